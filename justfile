@@ -1,0 +1,66 @@
+# `just` lists these recipes; `just ci` is everything a change has to pass.
+
+set shell := ["bash", "-euo", "pipefail", "-c"]
+
+# The oldest supported compiler, `rust-version` in Cargo.toml.
+msrv := `sed -n 's/^rust-version = "\(.*\)"/\1/p' Cargo.toml`
+
+# list the recipes
+default:
+    @just --list --unsorted
+
+# check the formatting (`cargo fmt --all` repairs it)
+fmt:
+    cargo fmt --all -- --check
+
+# clippy on every target and feature, warnings are errors
+lint:
+    cargo clippy --workspace --all-targets --all-features -- -D warnings
+
+# unit tests, integration tests and doctests
+test:
+    cargo test --workspace --all-features
+
+# build the documentation with rendered formulas, warnings are errors
+doc:
+    RUSTDOCFLAGS="-D warnings --html-in-header {{ justfile_directory() / "docs/katex.html" }}" cargo doc --workspace --no-deps --all-features
+
+# build and run every example in release mode; one that fails fails the recipe
+examples:
+    #!/usr/bin/env bash
+    set -euo pipefail
+    shopt -s nullglob
+    for file in examples/*.rs; do
+        example=$(basename "$file" .rs)
+        echo "example $example"
+        cargo run --quiet --release --all-features --example "$example" -- --json > /dev/null
+    done
+
+# the slow studies, which `test` leaves out
+study:
+    cargo test --release --workspace -- --ignored
+
+# time fields, steps and runs
+bench:
+    cargo bench
+
+# check every combination of features
+features: (need "cargo hack --version" "cargo install cargo-hack --locked")
+    cargo hack check --workspace --feature-powerset
+
+# check with the oldest supported compiler
+msrv: (need ("rustup run " + msrv + " cargo --version") ("rustup toolchain install " + msrv + " --profile minimal"))
+    cargo +{{ msrv }} check --workspace --all-features
+
+# check licenses, advisories and duplicate dependencies
+deny: (need "cargo deny --version" "cargo install cargo-deny --locked")
+    cargo deny check
+
+# everything a change has to pass; ends on the closing line of `test`
+ci: fmt lint doc examples test
+
+# stop, saying how to install it, where a tool is missing
+[no-exit-message]
+[private]
+need tool install:
+    @{{ tool }} > /dev/null 2>&1 || { echo 'this recipe needs `{{ tool }}` to work; run `{{ install }}` first' >&2; exit 1; }

@@ -1,0 +1,313 @@
+//! Vectors and matrices of a size that the compiler knows, at any scalar.
+//!
+//! A manifold names its [`Dimension`] once; [`Column`] and [`Square`] are then all that generic
+//! code needs, without an allocator bound in sight. The concrete types are nalgebra's
+//! [`SVector`] and [`SMatrix`], so concrete code has all of nalgebra.
+
+use std::fmt::Debug;
+use std::ops::{Add, AddAssign, Index, IndexMut, Mul, Neg, Sub, SubAssign};
+
+use approx::RelativeEq;
+use nalgebra::{Const, SMatrix, SVector};
+use num_dual::linalg::LU;
+
+use crate::Scalar;
+
+/// The dimension of a manifold; [`Const<N>`] is the one implementation.
+pub trait Dimension: Copy + Debug + Send + Sync + 'static {
+    /// The dimension as a number.
+    const LEN: usize;
+    /// `N` scalars: coordinates, components of a tangent vector or of a covector.
+    type Vector<D: Scalar>: Column<D>;
+    /// `N × N` scalars: a bilinear form or a linear map in a frame.
+    type Matrix<D: Scalar>: Square<D, Column = Self::Vector<D>>;
+    /// `N` values of any kind.
+    type Array<T: Copy + Debug + Send + Sync>: Copy
+        + Debug
+        + Send
+        + Sync
+        + Index<usize, Output = T>
+        + AsRef<[T]>;
+
+    /// The array whose `i`-th value is `f(i)`.
+    fn array<T: Copy + Debug + Send + Sync>(f: impl FnMut(usize) -> T) -> Self::Array<T>;
+}
+
+impl<const N: usize> Dimension for Const<N> {
+    const LEN: usize = N;
+    type Vector<D: Scalar> = SVector<D, N>;
+    type Matrix<D: Scalar> = SMatrix<D, N, N>;
+    type Array<T: Copy + Debug + Send + Sync> = [T; N];
+
+    fn array<T: Copy + Debug + Send + Sync>(f: impl FnMut(usize) -> T) -> [T; N] {
+        std::array::from_fn(f)
+    }
+}
+
+/// A column of scalars: a vector or a covector in components.
+pub trait Column<D: Scalar>:
+    Copy
+    + Debug
+    + Send
+    + Sync
+    + 'static
+    + RelativeEq<Epsilon = D>
+    + Index<usize, Output = D>
+    + IndexMut<usize>
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Neg<Output = Self>
+    + Mul<D, Output = Self>
+    + AddAssign
+    + SubAssign
+{
+    /// The number of components.
+    const LEN: usize;
+
+    /// The column whose `i`-th component is `f(i)`.
+    fn from_index(f: impl FnMut(usize) -> D) -> Self;
+
+    /// `Σ_i a_i b_i`: a covector on a vector.
+    fn dot(&self, other: &Self) -> D;
+
+    /// The column of zeros.
+    fn zero() -> Self {
+        Self::from_index(|_| D::zero())
+    }
+
+    /// The `k`-th basis vector.
+    fn basis(k: usize) -> Self {
+        Self::from_index(|i| if i == k { D::one() } else { D::zero() })
+    }
+
+    /// The real components, embedded in this scalar.
+    fn embed<R: Column<f64>>(real: &R) -> Self {
+        Self::from_index(|i| D::from(real[i]))
+    }
+
+    /// The real parts of the components.
+    fn real<R: Column<f64>>(&self) -> R {
+        R::from_index(|i| self[i].re())
+    }
+
+    /// The Euclidean norm of the real parts.
+    fn magnitude(&self) -> f64 {
+        (0..Self::LEN).map(|i| self[i].re().powi(2)).sum::<f64>().sqrt()
+    }
+
+    /// Whether every real part is finite.
+    fn is_finite(&self) -> bool {
+        (0..Self::LEN).all(|i| self[i].re().is_finite())
+    }
+}
+
+impl<D: Scalar, const N: usize> Column<D> for SVector<D, N> {
+    const LEN: usize = N;
+
+    #[inline]
+    fn from_index(mut f: impl FnMut(usize) -> D) -> Self {
+        Self::from_fn(|i, _| f(i))
+    }
+
+    #[inline]
+    fn dot(&self, other: &Self) -> D {
+        let mut sum = self[0] * other[0];
+        for i in 1..N {
+            sum += self[i] * other[i];
+        }
+        sum
+    }
+}
+
+/// A square matrix of scalars.
+pub trait Square<D: Scalar>:
+    Copy
+    + Debug
+    + Send
+    + Sync
+    + 'static
+    + RelativeEq<Epsilon = D>
+    + Index<(usize, usize), Output = D>
+    + IndexMut<(usize, usize)>
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Neg<Output = Self>
+    + Mul<D, Output = Self>
+    + Mul<Output = Self>
+    + Mul<Self::Column, Output = Self::Column>
+    + AddAssign
+    + SubAssign
+{
+    /// A column of the same height.
+    type Column: Column<D>;
+
+    /// The matrix whose entry in row `i`, column `j` is `f(i, j)`.
+    fn from_entries(f: impl FnMut(usize, usize) -> D) -> Self;
+
+    /// The solution of `A x = b` by LU decomposition with row pivoting; `None` if `A` is singular
+    /// or not a number.
+    fn solve(&self, b: &Self::Column) -> Option<Self::Column>;
+
+    /// The matrix of zeros.
+    fn zeros() -> Self {
+        Self::from_entries(|_, _| D::zero())
+    }
+
+    /// The identity matrix.
+    fn one() -> Self {
+        Self::from_entries(|i, j| if i == j { D::one() } else { D::zero() })
+    }
+
+    /// `a bᵀ`.
+    fn outer(a: &Self::Column, b: &Self::Column) -> Self {
+        Self::from_entries(|i, j| a[i] * b[j])
+    }
+
+    /// `Aᵀ b`, the row `bᵀ A` as a column.
+    fn transpose_times(&self, b: &Self::Column) -> Self::Column {
+        Self::Column::from_index(|j| {
+            (0..Self::Column::LEN).map(|i| self[(i, j)] * b[i]).fold(D::zero(), |sum, x| sum + x)
+        })
+    }
+
+    /// The lower triangular `L` with `A = L Lᵀ` (Cholesky), read from the lower triangle of `A`.
+    ///
+    /// # Errors
+    ///
+    /// [`NotPositive`] with the first pivot that is not a positive finite number.
+    fn cholesky(&self) -> Result<Self, NotPositive> {
+        let mut l = Self::zeros();
+        for j in 0..Self::Column::LEN {
+            let mut pivot = self[(j, j)];
+            for k in 0..j {
+                pivot -= l[(j, k)] * l[(j, k)];
+            }
+            if !(pivot.re() > 0.0 && pivot.re().is_finite()) {
+                return Err(NotPositive { index: j, pivot: pivot.re() });
+            }
+            l[(j, j)] = pivot.sqrt();
+            for i in j + 1..Self::Column::LEN {
+                let mut entry = self[(i, j)];
+                for k in 0..j {
+                    entry -= l[(i, k)] * l[(j, k)];
+                }
+                l[(i, j)] = entry / l[(j, j)];
+            }
+        }
+        Ok(l)
+    }
+
+    /// The solution of `L x = b` for a lower triangular `L` with nonzero diagonal.
+    fn solve_lower(&self, b: &Self::Column) -> Self::Column {
+        let mut x = *b;
+        for i in 0..Self::Column::LEN {
+            for k in 0..i {
+                let known = self[(i, k)] * x[k];
+                x[i] -= known;
+            }
+            x[i] /= self[(i, i)];
+        }
+        x
+    }
+
+    /// The solution of `Lᵀ x = b` for a lower triangular `L` with nonzero diagonal.
+    fn solve_lower_transpose(&self, b: &Self::Column) -> Self::Column {
+        let mut x = *b;
+        for i in (0..Self::Column::LEN).rev() {
+            for k in i + 1..Self::Column::LEN {
+                let known = self[(k, i)] * x[k];
+                x[i] -= known;
+            }
+            x[i] /= self[(i, i)];
+        }
+        x
+    }
+
+    /// The largest `|A_ij|` over the real parts; NaN if any entry is.
+    fn max_abs(&self) -> f64 {
+        let mut worst = 0.0_f64;
+        for j in 0..Self::Column::LEN {
+            for i in 0..Self::Column::LEN {
+                let size = self[(i, j)].re().abs();
+                if size > worst || size.is_nan() {
+                    worst = size;
+                }
+            }
+        }
+        worst
+    }
+}
+
+/// A matrix that should be positive definite has a pivot that is not.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[error("not positive definite: the Cholesky pivot {index} is {pivot:.3e}")]
+pub struct NotPositive {
+    /// The row of the failing pivot.
+    pub index: usize,
+    /// Its value.
+    pub pivot: f64,
+}
+
+impl<D: Scalar, const N: usize> Square<D> for SMatrix<D, N, N> {
+    type Column = SVector<D, N>;
+
+    #[inline]
+    fn from_entries(f: impl FnMut(usize, usize) -> D) -> Self {
+        Self::from_fn(f)
+    }
+
+    #[inline]
+    fn solve(&self, b: &SVector<D, N>) -> Option<SVector<D, N>> {
+        let x = LU::new(*self).ok()?.solve(b);
+        (0..N).all(|i| x[i].re().is_finite()).then_some(x)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{Matrix3, Vector3};
+    use num_dual::Dual64;
+
+    const A: Matrix3<f64> = Matrix3::new(4.0, 1.0, 0.5, 1.0, 3.0, -0.2, 0.5, -0.2, 2.0);
+
+    #[test]
+    fn cholesky_factor_reproduces_the_matrix() {
+        let l = Square::cholesky(&A).unwrap();
+        assert!((l * l.transpose() - A).abs().max() < 1e-15);
+        let b = Vector3::new(1.0, -2.0, 3.0);
+        let x = l.solve_lower_transpose(&l.solve_lower(&b));
+        assert!((A * x - b).norm() < 1e-14);
+    }
+
+    #[test]
+    fn cholesky_names_the_failing_pivot() {
+        let indefinite = Matrix3::from_diagonal(&Vector3::new(1.0, -2.0, 3.0));
+        assert_eq!(Square::cholesky(&indefinite), Err(NotPositive { index: 1, pivot: -2.0 }));
+        let mut nan = A;
+        nan[(2, 2)] = f64::NAN;
+        assert_eq!(Square::cholesky(&nan).unwrap_err().index, 2);
+    }
+
+    #[test]
+    fn solve_carries_derivatives() {
+        // (A + ε B) x = b  ⇒  x' = −A⁻¹ B x
+        let b = Vector3::new(1.0, 2.0, 3.0);
+        let perturbed = Matrix3::from_fn(|i, j| Dual64::new(A[(i, j)], (i + 2 * j) as f64));
+        let x = Square::solve(&perturbed, &b.cast()).unwrap();
+        let direction = Matrix3::from_fn(|i, j| (i + 2 * j) as f64);
+        let x0 = A.lu().solve(&b).unwrap();
+        let expected = -(A.lu().solve(&(direction * x0)).unwrap());
+        for i in 0..3 {
+            assert!((x[i].re - x0[i]).abs() < 1e-14);
+            assert!((x[i].eps - expected[i]).abs() < 1e-14);
+        }
+    }
+
+    #[test]
+    fn a_singular_matrix_has_no_solution() {
+        assert_eq!(Square::solve(&Matrix3::<f64>::zeros(), &Vector3::zeros()), None);
+        let nan = Matrix3::from_element(f64::NAN);
+        assert_eq!(Square::solve(&nan, &Vector3::new(1.0, 0.0, 0.0)), None);
+    }
+}

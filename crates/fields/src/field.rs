@@ -1,0 +1,168 @@
+//! Smooth functions on a manifold: scalar fields (energy, entropy) and matrix fields (metric,
+//! Poisson tensor).
+
+use crate::{Column, Dimension, Matrix, Real, Scalar, Space, Square, Vector};
+
+/// A smooth function `f: M → R`.
+///
+/// Implemented by every closure `Fn(&M::Point<Real>) -> Real`. Implement it by hand, with the one
+/// method [`at`](Self::at), for a type that should be evaluated at each scalar directly:
+///
+/// ```
+/// # use metriplectic_fields::{Scalar, ScalarField, Space};
+/// struct KineticEnergy { inertia: [f64; 3] }
+///
+/// impl<M> ScalarField<M> for KineticEnergy
+/// where
+///     M: for<'a> Space,
+///     M: PointsAreVectors,
+/// # {
+/// #     fn at<D: Scalar>(&self, x: &M::Point<D>) -> D { M::kinetic(&self.inertia, x) }
+/// # }
+/// # trait PointsAreVectors: Space { fn kinetic<D: Scalar>(i: &[f64; 3], x: &Self::Point<D>) -> D; }
+/// ```
+///
+/// Laws ([`laws::scalar_field`](crate::laws::scalar_field)): 1. `jet1` and `jet2` agree with `at`;
+/// 2. `f(φ(tv)) − f − t df·v` falls like `t²`; 3. with the Hessian term, like `t³`.
+#[diagnostic::on_unimplemented(
+    message = "`{Self}` is not a scalar field on `{M}`",
+    label = "expected a function of one point that returns one number",
+    note = "a closure takes a point over `Real` and returns a `Real`: `|p: &Vector3<Real>| p.norm_squared() * 0.5`",
+    note = "a type of your own implements `ScalarField` with the generic method `at`"
+)]
+pub trait ScalarField<M: Space> {
+    /// The value `f(x)` at any scalar.
+    fn at<D: Scalar>(&self, x: &M::Point<D>) -> D;
+
+    /// The value `f(x)` at the scalar of closures, which a closure answers without a lift.
+    #[inline]
+    fn at_real(&self, x: &M::Point<Real>) -> Real {
+        self.at(x)
+    }
+
+    /// Value and differential at a real point, in `⌈n/2⌉` evaluations.
+    #[inline]
+    fn jet1(&self, x: &M::Point<f64>) -> Jet1<M> {
+        let n = M::Dim::LEN;
+        let mut value = f64::NAN;
+        let mut df = Vector::<M>::zero();
+        for i in (0..n).step_by(2) {
+            let f = self.at_real(&M::chart(x, &seed::<M>(i, i + 1)));
+            value = f.re;
+            df[i] = f.eps1;
+            if i + 1 < n {
+                df[i + 1] = f.eps2;
+            }
+        }
+        Jet1 { value, df }
+    }
+
+    /// Value, differential and Hessian at a real point, in `n(n+1)/2` evaluations.
+    #[inline]
+    fn jet2(&self, x: &M::Point<f64>) -> Jet2<M> {
+        let mut value = f64::NAN;
+        let mut df = Vector::<M>::zero();
+        let mut hf = Matrix::<M>::zeros();
+        for i in 0..M::Dim::LEN {
+            for j in i..M::Dim::LEN {
+                let f = self.at_real(&M::chart(x, &seed::<M>(i, j)));
+                value = f.re;
+                df[i] = f.eps1;
+                hf[(i, j)] = f.eps1eps2;
+                hf[(j, i)] = f.eps1eps2;
+            }
+        }
+        Jet2 { value, df, hf }
+    }
+}
+
+/// Chart coordinates `ε₁ e_i + ε₂ e_j`; an index beyond the dimension seeds nothing.
+#[inline]
+pub(crate) fn seed<M: Space>(i: usize, j: usize) -> Vector<M, Real> {
+    Vector::<M, Real>::from_index(|k| {
+        let part = |direction| if k == direction { 1.0 } else { 0.0 };
+        Real::new(0.0, part(i), part(j), 0.0)
+    })
+}
+
+/// `f(x)` and `df(x)` in the coordinate frame of the chart at `x`.
+#[derive(Clone, Copy, Debug)]
+pub struct Jet1<M: Space> {
+    /// The value.
+    pub value: f64,
+    /// The differential `∂f/∂qⁱ`.
+    pub df: Vector<M>,
+}
+
+impl<M: Space> Jet1<M> {
+    /// Whether value and differential are finite numbers.
+    pub fn is_finite(&self) -> bool {
+        self.value.is_finite() && self.df.is_finite()
+    }
+}
+
+/// `f(x)`, `df(x)` and the Hessian in the coordinates of the chart at `x`.
+#[derive(Clone, Copy, Debug)]
+pub struct Jet2<M: Space> {
+    /// The value.
+    pub value: f64,
+    /// The differential `∂f/∂qⁱ`.
+    pub df: Vector<M>,
+    /// The matrix `∂²f/∂qⁱ∂qʲ`.
+    pub hf: Matrix<M>,
+}
+
+impl<M: Space> Jet2<M> {
+    /// Whether value, differential and Hessian are finite numbers.
+    pub fn is_finite(&self) -> bool {
+        self.value.is_finite() && self.df.is_finite() && self.hf.max_abs().is_finite()
+    }
+}
+
+/// A smooth field of `n × n` matrices on `M`, in the coordinate frame at each point: a metric `g`,
+/// a Poisson tensor `Π`.
+///
+/// Implemented by every closure `Fn(&M::Point<Real>) -> Matrix<M, Real>`, and by hand with the one
+/// method [`at`](Self::at).
+#[diagnostic::on_unimplemented(
+    message = "`{Self}` is not a matrix field on `{M}`",
+    label = "expected a function of one point that returns one square matrix",
+    note = "a closure takes a point over `Real` and returns a matrix over `Real`: `|q: &Vector2<Real>| Matrix2::from_diagonal_element(q.y.powi(-2))`",
+    note = "a type of your own implements `MatrixField` with the generic method `at`"
+)]
+pub trait MatrixField<M: Space> {
+    /// The matrix at `x`, at any scalar.
+    fn at<D: Scalar>(&self, x: &M::Point<D>) -> Matrix<M, D>;
+
+    /// The matrix at the scalar of closures, which a closure answers without a lift.
+    #[inline]
+    fn at_real(&self, x: &M::Point<Real>) -> Matrix<M, Real> {
+        self.at(x)
+    }
+
+    /// Value and first derivatives along the chart at a real point, in `⌈n/2⌉` evaluations.
+    fn jet(&self, x: &M::Point<f64>) -> MatrixJet<M> {
+        let pairs = |k: usize| self.at_real(&M::chart(x, &seed::<M>(2 * k, 2 * k + 1)));
+        let part = |a: &Matrix<M, Real>, pick: fn(&Real) -> f64| {
+            Matrix::<M>::from_entries(|i, j| pick(&a[(i, j)]))
+        };
+        let mut last = pairs(0);
+        let value = part(&last, |a| a.re);
+        let slopes = M::Dim::array(|k| {
+            if k > 0 && k % 2 == 0 {
+                last = pairs(k / 2);
+            }
+            part(&last, if k % 2 == 0 { |a| a.eps1 } else { |a| a.eps2 })
+        });
+        MatrixJet { value, slopes }
+    }
+}
+
+/// A matrix and its derivatives `∂A/∂qᵏ` along the chart at a real point.
+#[derive(Clone, Copy, Debug)]
+pub struct MatrixJet<M: Space> {
+    /// The matrix `A`.
+    pub value: Matrix<M>,
+    /// Its derivative along each chart direction.
+    pub slopes: <M::Dim as Dimension>::Array<Matrix<M>>,
+}

@@ -1,0 +1,83 @@
+//! What a field promises, and the one function that checks it.
+
+use crate::{ChartPoint, Column, Dimension, Matrix, ScalarField, Space, Square, Vector, hessian};
+
+/// A law that does not hold, with the size of the violation.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("law broken: {law}: {size:.3e}, where {bound:.1e} is allowed")]
+pub struct BrokenLaw {
+    /// The law as a sentence.
+    pub law: &'static str,
+    /// How far off it is.
+    pub size: f64,
+    /// How far off it may be.
+    pub bound: f64,
+}
+
+impl BrokenLaw {
+    /// `Ok` if `size ≤ bound`; a NaN breaks every law.
+    ///
+    /// # Errors
+    ///
+    /// The broken law.
+    pub fn unless(law: &'static str, size: f64, bound: f64) -> Result<(), Self> {
+        if size <= bound { Ok(()) } else { Err(Self { law, size, bound }) }
+    }
+}
+
+/// Checks a scalar field at `x` along the chart direction `v`:
+///
+/// 1. `jet1` and `jet2` agree with `at` and with nested dual numbers to round-off;
+/// 2. `f(φ(tv)) − f − t df·v` falls like `t²`;
+/// 3. `f(φ(tv)) − f − t df·v − ½t² vᵀHf v` falls like `t³`.
+///
+/// # Errors
+///
+/// The first law that is broken.
+pub fn scalar_field<M: Space>(
+    f: &impl ScalarField<M>,
+    x: &M::Point<f64>,
+    v: &Vector<M>,
+) -> Result<(), BrokenLaw> {
+    let jet = f.jet2(x);
+    let jet1 = f.jet1(x);
+    let value: f64 = f.at(x);
+    let centre = ChartPoint::centre(x);
+    let hf: Matrix<M> = hessian(f, &centre);
+    // A few operations on dual numbers lose a few ε of the largest part.
+    let size = value.abs() + jet.df.magnitude() + jet.hf.max_abs();
+    let bound = 200.0 * f64::EPSILON * M::Dim::LEN as f64 * size.max(f64::MIN_POSITIVE);
+    BrokenLaw::unless("jet2 has the value of the field", (jet.value - value).abs(), bound)?;
+    BrokenLaw::unless("jet1 has the value of the field", (jet1.value - value).abs(), bound)?;
+    BrokenLaw::unless("jet1 and jet2 agree on df", (jet1.df - jet.df).magnitude(), bound)?;
+    BrokenLaw::unless("the Hessian is the derivative of df", (hf - jet.hf).max_abs(), bound)?;
+
+    let slope = jet.df.dot(v);
+    let curvature = v.dot(&(jet.hf * *v));
+    let remainder = |t: f64, second: f64| {
+        let shifted: f64 = f.at(&M::chart(x, &(*v * t)));
+        (shifted - value - slope * t - second * t * t * 0.5).abs()
+    };
+    let floor = 100.0 * f64::EPSILON * (value.abs() + slope.abs());
+    taylor_order("df is the derivative of the field", 2.0, floor, |t| remainder(t, 0.0))?;
+    taylor_order("Hf is the second derivative", 3.0, floor, |t| remainder(t, curvature))
+}
+
+/// Checks that `remainder(t)` falls at least like `t^order` over `t = 2⁻⁴ … 2⁻¹²`, as far as it
+/// stays above the round-off `floor`.
+fn taylor_order(
+    law: &'static str,
+    order: f64,
+    floor: f64,
+    remainder: impl Fn(f64) -> f64,
+) -> Result<(), BrokenLaw> {
+    let sizes: Vec<(f64, f64)> = (4..=12)
+        .map(|k| 2.0_f64.powi(-k))
+        .map(|t| (t, remainder(t)))
+        .take_while(|&(_, r)| r.is_nan() || r > 1e2 * floor)
+        .collect();
+    // The finest pair above the floor is the most asymptotic one.
+    let Some([(t0, r0), (t1, r1)]) = sizes.last_chunk::<2>() else { return Ok(()) };
+    let measured = (r0 / r1).ln() / (t0 / t1).ln();
+    BrokenLaw::unless(law, order - measured, 0.25)
+}

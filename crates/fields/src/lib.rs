@@ -1,0 +1,39 @@
+//! What the user writes, smooth functions as closures, and their derivatives.
+//!
+//! | module | what it holds |
+//! |---|---|
+//! | [`scalar`] | [`Scalar`]: `f64` or a dual number over it; [`Real`], the one a closure uses |
+//! | [`dimension`] | [`Dimension`]: vectors and matrices of a size the compiler knows |
+//! | [`space`] | [`Space`]: how a point looks at each scalar, and the chart around it |
+//! | [`field`](mod@field) | [`ScalarField`] (`H`, `S`) and [`MatrixField`] (`g`, `Π`) |
+//! | [`closure`](mod@closure) | ordinary closures are fields, lifted to every scalar of order ≤ 2 |
+//! | [`differential`](mod@differential) | differential, Hessian and Jacobian at any scalar |
+//! | [`laws`] | what a field promises, and the function that checks it |
+//!
+//! # Two doors
+//!
+//! A field is evaluated at several scalars: `f64` for its value, dual numbers for its derivatives.
+//! Rust closures cannot be generic, so there are two ways in:
+//!
+//! 1. **A closure over [`Real`]**. Write `|p: &Vector3<Real>| p.norm_squared() * 0.5`. It is lifted
+//!    to every scalar of derivative order ≤ 2 by its exact second-order Taylor expansion.
+//! 2. **A type of your own** with the one generic method [`ScalarField::at`]. It is evaluated at
+//!    each scalar directly, of any order.
+//!
+//! Both are accepted wherever a field is asked for; so are captured parameters, boxed closures,
+//! returned closures and plain functions.
+
+pub mod closure;
+pub mod differential;
+pub mod dimension;
+pub mod field;
+pub mod laws;
+pub mod scalar;
+pub mod space;
+
+pub use differential::{differential, hessian, jacobian};
+pub use dimension::{Column, Dimension, NotPositive, Square};
+pub use field::{Jet1, Jet2, MatrixField, MatrixJet, ScalarField};
+pub use laws::BrokenLaw;
+pub use scalar::{Real, Scalar};
+pub use space::{ChartPoint, Matrix, Space, Vector};

@@ -1,0 +1,86 @@
+//! Rⁿ.
+
+use metriplectic_fields::{Column, Scalar, Space};
+use nalgebra::{Const, SVector};
+use rand::{Rng, RngExt};
+
+use crate::Manifold;
+
+/// The flat space Rⁿ: a point is a [`SVector`], the chart at `x` is `φ_x(q) = x + q`, and the
+/// canonical metric is the dot product.
+///
+/// ```
+/// use metriplectic_manifolds::{Euclidean, Manifold};
+/// assert!(Euclidean::<2>.check(&nalgebra::vector![1.0, 2.0]).is_ok());
+/// ```
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Euclidean<const N: usize>;
+
+/// The charts of a vector space, and its membership: every finite column of numbers is a point.
+macro_rules! vector_space {
+    ($space:ident) => {
+        impl<const N: usize> Space for $space<N> {
+            type Dim = Const<N>;
+            type Point<D: Scalar> = SVector<D, N>;
+
+            #[inline]
+            fn constant<D: Scalar>(x: &SVector<f64, N>) -> SVector<D, N> {
+                Column::embed(x)
+            }
+
+            #[inline]
+            fn real<D: Scalar>(x: &SVector<D, N>) -> SVector<f64, N> {
+                Column::real(x)
+            }
+
+            #[inline]
+            fn chart<D: Scalar>(x: &SVector<f64, N>, q: &SVector<D, N>) -> SVector<D, N> {
+                Column::from_index(|i| q[i] + x[i])
+            }
+
+            #[inline]
+            fn coordinates<D: Scalar>(x: &SVector<f64, N>, y: &SVector<D, N>) -> SVector<D, N> {
+                Column::from_index(|i| y[i] - x[i])
+            }
+        }
+
+        impl<const N: usize> Manifold for $space<N> {
+            fn defect(&self, x: &SVector<f64, N>) -> f64 {
+                if x.is_finite() { 0.0 } else { f64::NAN }
+            }
+
+            fn entries(x: &SVector<f64, N>) -> Vec<f64> {
+                x.iter().copied().collect()
+            }
+
+            #[inline]
+            fn magnitude(x: &SVector<f64, N>) -> f64 {
+                Column::magnitude(x)
+            }
+
+            fn random(&self, rng: &mut impl Rng) -> SVector<f64, N> {
+                Column::from_index(|_| rng.random_range(-1.0..1.0))
+            }
+        }
+
+        impl<const N: usize> $crate::metric::Flat for $space<N> {}
+    };
+}
+pub(crate) use vector_space;
+
+vector_space!(Euclidean);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::PointError;
+    use nalgebra::vector;
+
+    #[test]
+    fn a_point_with_a_nan_names_its_entry() {
+        let error = Euclidean::<3>.check(&vector![0.0, f64::NAN, 1.0]).unwrap_err();
+        assert!(matches!(error, PointError::NotFinite { index: 1, .. }));
+        let error = Euclidean::<3>.check(&vector![0.0, 1.0, f64::INFINITY]).unwrap_err();
+        assert!(matches!(error, PointError::NotFinite { index: 2, .. }));
+    }
+}

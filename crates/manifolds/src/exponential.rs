@@ -1,0 +1,68 @@
+//! The Riemannian exponential as a retraction: base point at the start.
+
+use metriplectic_fields::{ChartPoint, Matrix, Scalar, Square, Vector};
+use num_dual::Dual64;
+
+use crate::{Arc, ArcJet, Manifold, MetricError, PointPair, Retraction, Riemannian, Tangent};
+use metriplectic_fields::{Column, Dimension};
+
+/// The Riemannian exponential based at the start of the step,
+///
+/// ```math
+/// R_h(v_x) = \bigl(x,\ \exp_x(hv)\bigr).
+/// ```
+///
+/// Schemes built on it have order 1; [`WeylMidpoint`](crate::WeylMidpoint) has order 2 at the same
+/// price.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Exponential;
+
+impl<M: Manifold, G: Riemannian<M>> Retraction<M, G> for Exponential {
+    #[inline]
+    fn arc<D: Scalar>(
+        &self,
+        metric: &G,
+        x: &M::Point<f64>,
+        u: &Vector<M, D>,
+    ) -> Result<Arc<M, D>, MetricError> {
+        let z = ChartPoint::centre(x);
+        let (end, _) = metric.exp(&z, u)?;
+        Ok(Arc { z, d: *u, end: end.point() })
+    }
+
+    fn arc_jet(
+        &self,
+        metric: &G,
+        x: &M::Point<f64>,
+        u: &Vector<M>,
+    ) -> Result<ArcJet<M>, MetricError> {
+        let (end, _) = metric.exp(&ChartPoint::centre(x), u)?;
+        let mut dend = Matrix::<M>::zeros();
+        for j in 0..M::Dim::LEN {
+            let seeded = Vector::<M, Dual64>::from_index(|i| {
+                Dual64::new(u[i], if i == j { 1.0 } else { 0.0 })
+            });
+            let (moved, _) = metric.exp(&ChartPoint::centre(x), &seeded)?;
+            let column = M::coordinates(&end.point(), &moved.point());
+            for i in 0..M::Dim::LEN {
+                dend[(i, j)] = column[i].eps;
+            }
+        }
+        let (zero, one) = (Matrix::<M>::zeros(), Matrix::<M>::one());
+        Ok(ArcJet { z: x.clone(), dz: zero, d: *u, dd: one, end: end.point(), dend })
+    }
+
+    fn pair(&self, metric: &G, tangent: &Tangent<M>) -> Result<PointPair<M>, MetricError> {
+        let (y, _) = metric.exp(&ChartPoint::centre(&tangent.base), &tangent.vector)?;
+        Ok((tangent.base.clone(), y.point()))
+    }
+
+    fn inverse(
+        &self,
+        metric: &G,
+        x: &M::Point<f64>,
+        y: &M::Point<f64>,
+    ) -> Result<Tangent<M>, MetricError> {
+        Ok(Tangent { base: x.clone(), vector: metric.log(x, y)? })
+    }
+}

@@ -1,0 +1,246 @@
+//! What manifolds, metrics and retractions promise, and the functions that check it.
+//!
+//! A manifold, metric or retraction of your own is checked by the same line as the ones of this
+//! crate.
+
+use metriplectic_fields::{
+    BrokenLaw, ChartPoint, Column, Dimension, Matrix, Square, Vector, jacobian,
+};
+use num_dual::{Dual, Dual64};
+
+use crate::metric::MetricError;
+use crate::{InnerProduct, Manifold, Retraction, Riemannian, Tangent};
+
+/// Round-off of a handful of operations on numbers of size `scale`.
+fn round_off<M: Manifold>(scale: f64) -> f64 {
+    64.0 * M::Dim::LEN as f64 * f64::EPSILON * scale.max(1.0)
+}
+
+/// Checks a manifold at `x`, with coordinates `q` inside the domain of the chart:
+///
+/// 1. `φ_x(0) = x`;
+/// 2. `φ_x⁻¹(φ_x(q)) = q`, and the chain rule gives the identity at dual numbers;
+/// 3. `φ_x(q)` lies on the manifold.
+///
+/// # Errors
+///
+/// The first law that is broken.
+pub fn manifold<M: Manifold>(space: &M, x: &M::Point<f64>, q: &Vector<M>) -> Result<(), BrokenLaw> {
+    let bound = round_off::<M>(M::magnitude(x) + q.magnitude());
+    let distance = |a: &M::Point<f64>, b: &M::Point<f64>| {
+        let difference = M::entries(a).into_iter().zip(M::entries(b)).map(|(a, b)| (a - b).abs());
+        difference.fold(0.0, f64::max)
+    };
+    let origin = M::chart(x, &Vector::<M>::zero());
+    BrokenLaw::unless("φ_x(0) = x", distance(&origin, x), bound)?;
+    let y: M::Point<f64> = M::chart(x, q);
+    let back = M::coordinates(x, &y);
+    BrokenLaw::unless("φ_x⁻¹(φ_x(q)) = q", (back - *q).magnitude(), bound)?;
+    let there_and_back = jacobian::<M, f64>(|q| M::coordinates(x, &M::chart::<Dual<f64>>(x, q)), q);
+    let off = (there_and_back - Matrix::<M>::one()).max_abs();
+    BrokenLaw::unless("the derivative of φ_x⁻¹ φ_x is 1", off, bound)?;
+    let allowed = round_off::<M>(M::magnitude(&y));
+    BrokenLaw::unless("chart points lie on the manifold", space.defect(&y), allowed)
+}
+
+/// Checks a metric at `x` along the tangent vector `v`:
+///
+/// 1. `g` is symmetric; 2. `♯♭v = v` and `♭` is the matrix; 3. `G(v, v) > 0`, and equals
+///    `|L⁻¹♭v|²`; 4. `exp_x(0) = x`; 5. the geodesic along `v` has constant speed.
+///
+/// # Errors
+///
+/// The first law that is broken.
+pub fn metric<M: Manifold, G: Riemannian<M>>(
+    metric: &G,
+    x: &M::Point<f64>,
+    v: &Vector<M>,
+) -> Result<(), BrokenLaw> {
+    let centre = ChartPoint::<M>::centre(x);
+    let g: Matrix<M> = metric.matrix(&centre);
+    let asymmetry = Matrix::<M>::from_entries(|i, j| g[(i, j)] - g[(j, i)]).max_abs();
+    BrokenLaw::unless("g is symmetric", asymmetry, round_off::<M>(g.max_abs()))?;
+    let at = usable("g is positive", metric.at(&centre))?;
+    let flat = at.flat(v);
+    // The condition number of g enters the round-off of ♯♭.
+    let bound = round_off::<M>(v.magnitude()) * condition::<M>(&g);
+    BrokenLaw::unless("♯♭v = v", (at.sharp(&flat) - *v).magnitude(), bound)?;
+    BrokenLaw::unless("♭v = g v", (g * *v - flat).magnitude(), round_off::<M>(g.max_abs()))?;
+    let square = flat.dot(v);
+    BrokenLaw::unless("G(v, v) > 0", -square, 0.0)?;
+    let orthonormal = at.orthonormal(&flat).magnitude().powi(2);
+    let off = (orthonormal - square).abs() / square.max(f64::MIN_POSITIVE);
+    BrokenLaw::unless("|L⁻¹♭v|² = G(v, v)", off, round_off::<M>(1.0) * condition::<M>(&g))?;
+
+    let (start, _) = usable("geodesics exist", metric.exp(&centre, &Vector::<M>::zero()))?;
+    let moved = M::coordinates(x, &start.point()).magnitude();
+    BrokenLaw::unless("exp_x(0) = x", moved, round_off::<M>(M::magnitude(x)))?;
+    let (end, velocity) = usable("geodesics exist", metric.exp(&centre, v))?;
+    let there = usable("g is positive", metric.at(&end))?;
+    let speed = there.flat(&velocity).dot(&velocity);
+    // Numerical geodesics promise 1e-13 relative.
+    let off = (speed - square).abs() / square.max(f64::MIN_POSITIVE);
+    BrokenLaw::unless("geodesics have constant speed", off, 1e-12)
+}
+
+/// Checks a retraction at `x` with the displacement `u`:
+///
+/// 1. `R_h⁻¹(R_h(d)) = d`; 2. the arc from `x` is the pair of its own `(z, d)`; 3. `arc_jet` is
+///    the derivative of `arc` at dual numbers.
+///
+/// # Errors
+///
+/// The first law that is broken.
+pub fn retraction<M: Manifold, G: Riemannian<M>, R: Retraction<M, G>>(
+    retraction: &R,
+    metric: &G,
+    x: &M::Point<f64>,
+    u: &Vector<M>,
+) -> Result<(), BrokenLaw> {
+    let exists = "the retraction is defined";
+    let bound = 1e-12 * (M::magnitude(x) + u.magnitude()).max(1.0);
+    let jet = usable(exists, retraction.arc_jet(metric, x, u))?;
+    let tangent = Tangent { base: jet.z.clone(), vector: jet.d };
+    let (start, end) = usable(exists, retraction.pair(metric, &tangent))?;
+    let off = M::coordinates(x, &start).magnitude();
+    BrokenLaw::unless("the arc starts where its pair does", off, bound)?;
+    let off = M::coordinates(&jet.end, &end).magnitude();
+    BrokenLaw::unless("the arc ends where its pair does", off, bound)?;
+    let back = usable(exists, retraction.inverse(metric, &start, &end))?;
+    let off = M::coordinates(&jet.z, &back.base).magnitude();
+    BrokenLaw::unless("R_h⁻¹ R_h keeps the base point", off, bound)?;
+    BrokenLaw::unless("R_h⁻¹ R_h keeps the vector", (back.vector - jet.d).magnitude(), bound)?;
+
+    for k in 0..M::Dim::LEN {
+        let seeded =
+            Vector::<M, Dual64>::from_index(|i| Dual64::new(u[i], if i == k { 1.0 } else { 0.0 }));
+        let arc = usable(exists, retraction.arc(metric, x, &seeded))?;
+        let end = M::coordinates(&jet.end, &arc.end);
+        let z = M::coordinates(&jet.z, &arc.z.point());
+        let off = |dual: &Vector<M, Dual64>, slope: &Matrix<M>| {
+            let column = Vector::<M>::from_index(|i| dual[i].eps - slope[(i, k)]);
+            column.magnitude()
+        };
+        BrokenLaw::unless("∂z/∂u is the derivative of z", off(&z, &jet.dz), bound)?;
+        BrokenLaw::unless("∂d/∂u is the derivative of d", off(&arc.d, &jet.dd), bound)?;
+        BrokenLaw::unless("∂x'/∂u is the derivative of x'", off(&end, &jet.dend), bound)?;
+    }
+    Ok(())
+}
+
+/// Checks that a retraction is symmetric: the swapped pair has the same base point and the
+/// opposite displacement. [`Exponential`](crate::Exponential) is not.
+///
+/// # Errors
+///
+/// The first law that is broken.
+pub fn symmetric_retraction<M: Manifold, G: Riemannian<M>, R: Retraction<M, G>>(
+    retraction: &R,
+    metric: &G,
+    x: &M::Point<f64>,
+    y: &M::Point<f64>,
+) -> Result<(), BrokenLaw> {
+    let exists = "the retraction is defined";
+    let there = usable(exists, retraction.inverse(metric, x, y))?;
+    let back = usable(exists, retraction.inverse(metric, y, x))?;
+    let bound = 1e-12 * (M::magnitude(x) + there.vector.magnitude()).max(1.0);
+    let off = M::coordinates(&there.base, &back.base).magnitude();
+    BrokenLaw::unless("R_h⁻¹(x, y) and R_h⁻¹(y, x) share their base", off, bound)?;
+    let off = (there.vector + back.vector).magnitude();
+    BrokenLaw::unless("R_h⁻¹(y, x) is the opposite vector", off, bound)
+}
+
+/// A metric that cannot be used breaks the law that it exists.
+fn usable<T>(law: &'static str, result: Result<T, MetricError>) -> Result<T, BrokenLaw> {
+    result.map_err(|_| BrokenLaw { law, size: f64::NAN, bound: 0.0 })
+}
+
+/// The condition number of `g`, estimated by its entries and those of its inverse.
+fn condition<M: Manifold>(g: &Matrix<M>) -> f64 {
+    let inverse = (0..M::Dim::LEN)
+        .map(|k| g.solve(&Vector::<M>::basis(k)).map_or(f64::INFINITY, |x| x.magnitude()));
+    g.max_abs() * inverse.fold(1.0, f64::max)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Canonical, Euclidean, Exponential, LieDual, Metric, WeylMidpoint};
+    use metriplectic_fields::Real;
+    use nalgebra::{SMatrix, SVector, Vector3, vector};
+    use proptest::prelude::*;
+
+    fn columns<const N: usize>() -> impl Strategy<Value = SVector<f64, N>> {
+        prop::array::uniform(-2.0..2.0).prop_map(SVector::<f64, N>::from)
+    }
+
+    /// `1 + B Bᵀ`, positive by construction.
+    fn metrics<const N: usize>() -> impl Strategy<Value = SMatrix<f64, N, N>> {
+        prop::array::uniform::<_, N>(columns::<N>()).prop_map(|columns| {
+            let b = SMatrix::<f64, N, N>::from_columns(&columns);
+            let g = SMatrix::identity() + b * b.transpose();
+            (g + g.transpose()) * 0.5
+        })
+    }
+
+    fn all<M: Manifold, G: Riemannian<M>>(
+        space: &M,
+        g: &G,
+        x: &M::Point<f64>,
+        u: &Vector<M>,
+    ) -> Result<(), BrokenLaw> {
+        manifold(space, x, u)?;
+        metric(g, x, u)?;
+        retraction(&WeylMidpoint, g, x, u)?;
+        retraction(&Exponential, g, x, u)?;
+        symmetric_retraction(&WeylMidpoint, g, x, &M::chart(x, u))
+    }
+
+    proptest! {
+        #[test]
+        fn flat_spaces_keep_the_laws(
+            x in columns::<5>(), u in columns::<5>(), g in metrics::<5>(),
+        ) {
+            let constant = Metric::constant(g).unwrap();
+            let field = Metric::field(move |_: &SVector<Real, 5>| g.cast::<Real>());
+            all(&Euclidean::<5>, &Canonical, &x, &u)?;
+            all(&Euclidean::<5>, &constant, &x, &u)?;
+            all(&Euclidean::<5>, &field, &x, &u)?;
+        }
+
+        #[test]
+        fn duals_of_lie_algebras_keep_the_laws(
+            x in columns::<6>(), u in columns::<6>(), g in metrics::<6>(),
+        ) {
+            let constant = Metric::constant(g).unwrap();
+            all(&LieDual::se3(), &Canonical, &x, &u)?;
+            all(&LieDual::so4(), &constant, &x, &u)?;
+        }
+    }
+
+    #[test]
+    fn dimensions_one_and_sixteen_keep_the_laws() {
+        all(&Euclidean::<1>, &Canonical, &vector![0.5], &vector![-2.0]).unwrap();
+        let x = SVector::<f64, 16>::from_fn(|i, _| i as f64);
+        all(&Euclidean::<16>, &Canonical, &x, &(x * -0.3)).unwrap();
+    }
+
+    #[test]
+    fn the_exponential_is_not_symmetric() {
+        let (x, y) = (vector![1.0, 0.0, 0.0], vector![0.0, 1.0, 0.0]);
+        let broken = symmetric_retraction::<Euclidean<3>, _, _>(&Exponential, &Canonical, &x, &y);
+        assert_eq!(broken.unwrap_err().law, "R_h⁻¹(x, y) and R_h⁻¹(y, x) share their base");
+    }
+
+    #[test]
+    fn an_asymmetric_field_breaks_the_first_law_of_metrics() {
+        let skewed = Metric::field(|_: &Vector3<Real>| {
+            let mut g = SMatrix::<f64, 3, 3>::identity();
+            g[(0, 1)] = 0.1;
+            g.cast::<Real>()
+        });
+        let (x, v) = (vector![1.0, 0.0, 0.0], vector![0.0, 1.0, 0.0]);
+        let broken = metric::<Euclidean<3>, _>(&skewed, &x, &v).unwrap_err();
+        assert_eq!(broken.law, "g is symmetric");
+    }
+}

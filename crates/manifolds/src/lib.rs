@@ -1,0 +1,33 @@
+//! Where the state lives: manifolds, their metrics, and the retractions that turn a tangent vector
+//! into a pair of points.
+//!
+//! | module | what it holds |
+//! |---|---|
+//! | [`manifold`](mod@manifold) | [`Manifold`]: what every space of states answers |
+//! | [`euclidean`](mod@euclidean) | [`Euclidean`]: Rⁿ |
+//! | [`lie_dual`] | [`LieDual`]: the dual of a Lie algebra, with the ready-made algebras |
+//! | [`metric`] | [`Riemannian`]: flat, sharp, norm, geodesics; [`Metric::constant`], [`Metric::field`] |
+//! | [`retraction`] | [`Retraction`]: `R_h` and `R_h⁻¹` |
+//! | [`weyl_midpoint`] | [`WeylMidpoint`]: the symmetric one, order 2 |
+//! | [`exponential`] | [`Exponential`]: based at the start, order 1 |
+//! | [`laws`] | what each of them promises, and the functions that check it |
+
+pub mod euclidean;
+pub mod exponential;
+pub mod laws;
+pub mod lie_dual;
+pub mod manifold;
+pub mod metric;
+pub mod retraction;
+pub mod weyl_midpoint;
+
+pub use euclidean::Euclidean;
+pub use exponential::Exponential;
+pub use lie_dual::{AlgebraError, LieAlgebra, LieDual};
+pub use manifold::{Manifold, PointError};
+pub use metric::{
+    Canonical, Constant, FieldMetric, Flat, GeodesicEnd, InnerProduct, Metric, MetricError,
+    Riemannian,
+};
+pub use retraction::{Arc, ArcJet, PointPair, Retraction, Tangent};
+pub use weyl_midpoint::WeylMidpoint;

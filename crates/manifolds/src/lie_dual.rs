@@ -1,0 +1,415 @@
+//! The dual `g*` of a Lie algebra, where reduced mechanical systems live.
+
+use metriplectic_fields::{Column, Scalar, Space, Square};
+use nalgebra::{Const, SMatrix, SVector};
+use rand::{Rng, RngExt};
+
+use crate::Manifold;
+use crate::euclidean::vector_space;
+
+/// A Lie algebra of dimension `N` by its structure constants, `[e_a, e_b] = C_ab^d e_d`.
+///
+/// Only the nonzero constants are kept.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LieAlgebra<const N: usize> {
+    nonzero: Vec<StructureConstant>,
+}
+
+/// Matrices of a basis are taken to be dependent, and commutators to lie in their span, up to this
+/// relative size.
+const SPAN_TOLERANCE: f64 = 1e-12;
+
+/// One nonzero `C_ab^d`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StructureConstant {
+    /// The first factor `e_a`.
+    pub a: usize,
+    /// The second factor `e_b`.
+    pub b: usize,
+    /// The component `e_d` of the bracket.
+    pub d: usize,
+    /// The value `C_ab^d`.
+    pub value: f64,
+}
+
+impl<const N: usize> LieAlgebra<N> {
+    /// The algebra with `[e_a, e_b] = constants[a][b][d] e_d`.
+    ///
+    /// # Errors
+    ///
+    /// [`AlgebraError`] with the failing indices if a constant is not finite, if `C_ab^d ≠ −C_ba^d`,
+    /// or if the Jacobi identity
+    /// `C_ab^e C_ec^d + C_bc^e C_ea^d + C_ca^e C_eb^d = 0` fails beyond round-off.
+    pub fn new(constants: &[[[f64; N]; N]; N]) -> Result<Self, AlgebraError> {
+        // Each of the 3N products of the Jacobi identity is rounded once and added once.
+        Self::checked(constants, 6.0 * N as f64 * f64::EPSILON)
+    }
+
+    /// The algebra of the given constants if their laws hold to a relative `tolerance`.
+    fn checked(constants: &[[[f64; N]; N]; N], tolerance: f64) -> Result<Self, AlgebraError> {
+        let c = |a: usize, b: usize, d: usize| constants[a][b][d];
+        let largest = finite_maximum(constants)?;
+        for (a, b, d) in triples(N) {
+            let size = (c(a, b, d) + c(b, a, d)).abs();
+            if size > tolerance * largest {
+                return Err(AlgebraError::NotAntisymmetric { a, b, d, size });
+            }
+        }
+        for (a, b, d) in triples(N) {
+            for k in 0..N {
+                let cyclic = |e: usize| {
+                    c(a, b, e) * c(e, k, d) + c(b, k, e) * c(e, a, d) + c(k, a, e) * c(e, b, d)
+                };
+                let size = (0..N).map(cyclic).sum::<f64>().abs();
+                if size > tolerance * largest * largest {
+                    return Err(AlgebraError::NoJacobiIdentity { a, b, c: k, d, size });
+                }
+            }
+        }
+        let nonzero = triples(N)
+            .map(|(a, b, d)| StructureConstant { a, b, d, value: c(a, b, d) })
+            .filter(|constant| constant.value != 0.0)
+            .collect();
+        Ok(Self { nonzero })
+    }
+
+    /// The algebra spanned by matrices, with the commutator `[A, B] = AB − BA`.
+    ///
+    /// # Errors
+    ///
+    /// [`AlgebraError::NotIndependent`] if the matrices are linearly dependent,
+    /// [`AlgebraError::NotClosed`] if a commutator leaves their span, and those of [`new`](Self::new).
+    pub fn of_matrices<const R: usize>(
+        basis: &[SMatrix<f64, R, R>; N],
+    ) -> Result<Self, AlgebraError> {
+        let gram = SMatrix::<f64, N, N>::from_fn(|a, b| basis[a].dot(&basis[b]));
+        let factor = Square::cholesky(&gram).map_err(|_| AlgebraError::NotIndependent)?;
+        if (0..N).any(|a| factor[(a, a)].powi(2) <= SPAN_TOLERANCE * gram[(a, a)]) {
+            return Err(AlgebraError::NotIndependent);
+        }
+        let mut constants = [[[0.0; N]; N]; N];
+        for a in 0..N {
+            for b in a + 1..N {
+                let commutator = basis[a] * basis[b] - basis[b] * basis[a];
+                let traces = SVector::<f64, N>::from_fn(|d, _| basis[d].dot(&commutator));
+                let components =
+                    Square::solve(&gram, &traces).ok_or(AlgebraError::NotIndependent)?;
+                let span: SMatrix<f64, R, R> = (0..N).map(|d| basis[d] * components[d]).sum();
+                let size = (commutator - span).norm();
+                if size > SPAN_TOLERANCE * commutator.norm() {
+                    return Err(AlgebraError::NotClosed { a, b, size });
+                }
+                constants[a][b] = components.into();
+                constants[b][a] = (-components).into();
+            }
+        }
+        Self::checked(&constants, SPAN_TOLERANCE)
+    }
+
+    /// The nonzero structure constants.
+    pub fn constants(&self) -> &[StructureConstant] {
+        &self.nonzero
+    }
+
+    /// The bracket `[ξ, η]^d = C_ab^d ξ^a η^b`.
+    pub fn bracket<D: Scalar>(&self, xi: &SVector<D, N>, eta: &SVector<D, N>) -> SVector<D, N> {
+        let mut sum = <SVector<D, N> as Column<D>>::zero();
+        for c in &self.nonzero {
+            sum[c.d] += xi[c.a] * eta[c.b] * c.value;
+        }
+        sum
+    }
+
+    /// The coadjoint action `(ad*_ξ μ)_b = C_ab^d ξ^a μ_d`, that is `⟨ad*_ξ μ, η⟩ = ⟨μ, [ξ, η]⟩`.
+    #[inline]
+    pub fn coadjoint<D: Scalar>(&self, xi: &SVector<D, N>, mu: &SVector<D, N>) -> SVector<D, N> {
+        let mut sum = <SVector<D, N> as Column<D>>::zero();
+        for c in &self.nonzero {
+            sum[c.b] += xi[c.a] * mu[c.d] * c.value;
+        }
+        sum
+    }
+}
+
+/// All `(a, b, d)` with each index below `n`.
+fn triples(n: usize) -> impl Iterator<Item = (usize, usize, usize)> {
+    (0..n * n * n).map(move |k| (k / (n * n), (k / n) % n, k % n))
+}
+
+/// The largest `|C_ab^d|`, or the first one that is not finite.
+fn finite_maximum<const N: usize>(constants: &[[[f64; N]; N]; N]) -> Result<f64, AlgebraError> {
+    let mut largest = 0.0_f64;
+    for (a, b, d) in triples(N) {
+        let value = constants[a][b][d];
+        if !value.is_finite() {
+            return Err(AlgebraError::NotFinite { a, b, d, value });
+        }
+        largest = largest.max(value.abs());
+    }
+    Ok(largest)
+}
+
+/// Structure constants that do not make a Lie algebra.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum AlgebraError {
+    /// A constant is NaN or infinite.
+    #[error("the structure constant C_{a}{b}^{d} is {value}; every one must be a finite number")]
+    NotFinite {
+        /// First index.
+        a: usize,
+        /// Second index.
+        b: usize,
+        /// Upper index.
+        d: usize,
+        /// The value.
+        value: f64,
+    },
+    /// `C_ab^d ≠ −C_ba^d`.
+    #[error("C_{a}{b}^{d} + C_{b}{a}^{d} = {size:.3e}, but a Lie bracket is antisymmetric")]
+    NotAntisymmetric {
+        /// First index.
+        a: usize,
+        /// Second index.
+        b: usize,
+        /// Upper index.
+        d: usize,
+        /// `|C_ab^d + C_ba^d|`.
+        size: f64,
+    },
+    /// The Jacobi identity fails.
+    #[error(
+        "[[e_{a}, e_{b}], e_{c}] + cyclic has the component {size:.3e} along e_{d}, \
+         but a Lie bracket satisfies the Jacobi identity"
+    )]
+    NoJacobiIdentity {
+        /// First element.
+        a: usize,
+        /// Second element.
+        b: usize,
+        /// Third element.
+        c: usize,
+        /// Component of the double bracket.
+        d: usize,
+        /// Its absolute value.
+        size: f64,
+    },
+    /// Basis matrices are linearly dependent.
+    #[error("the basis matrices are linearly dependent")]
+    NotIndependent,
+    /// A commutator leaves the span of the basis.
+    #[error("the commutator of basis matrices {a} and {b} leaves their span by {size:.3e}")]
+    NotClosed {
+        /// First matrix.
+        a: usize,
+        /// Second matrix.
+        b: usize,
+        /// Norm of the part outside the span.
+        size: f64,
+    },
+}
+
+/// The dual `g*` of a Lie algebra: momenta `μ = μ_a e^a` in the dual basis, flat, with the
+/// Lie-Poisson bracket `μ' = ad*_ξ μ`, `ξ = dH(μ)`.
+///
+/// ```
+/// use metriplectic_manifolds::LieDual;
+/// use nalgebra::vector;
+/// // On so(3)* the coadjoint action is the cross product, `ad*_ξ p = p × ξ`.
+/// let (p, xi) = (vector![1.0, 2.0, 3.0], vector![-1.0, 0.5, 2.0]);
+/// assert_eq!(LieDual::so3().algebra().coadjoint(&xi, &p), p.cross(&xi));
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub struct LieDual<const N: usize> {
+    algebra: LieAlgebra<N>,
+}
+
+vector_space!(LieDual);
+
+impl<const N: usize> LieDual<N> {
+    /// The dual of a given algebra.
+    pub const fn of(algebra: LieAlgebra<N>) -> Self {
+        Self { algebra }
+    }
+
+    /// The dual of the algebra with `[e_a, e_b] = constants[a][b][d] e_d`.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`LieAlgebra::new`].
+    pub fn new(constants: &[[[f64; N]; N]; N]) -> Result<Self, AlgebraError> {
+        LieAlgebra::new(constants).map(Self::of)
+    }
+
+    /// The algebra.
+    pub const fn algebra(&self) -> &LieAlgebra<N> {
+        &self.algebra
+    }
+
+    /// From the brackets `[e_a, e_b] = value e_d` of a known algebra, one line for each pair.
+    fn known(brackets: &[(usize, usize, usize, f64)]) -> Self {
+        let nonzero = brackets
+            .iter()
+            .flat_map(|&(a, b, d, value)| {
+                [
+                    StructureConstant { a, b, d, value },
+                    StructureConstant { a: b, b: a, d, value: -value },
+                ]
+            })
+            .collect();
+        Self::of(LieAlgebra { nonzero })
+    }
+}
+
+impl LieDual<3> {
+    /// `so(3)*`, the angular momenta of a body in its own frame: `[e_a, e_b] = ε_abc e_c`.
+    pub fn so3() -> Self {
+        Self::su2(1.0)
+    }
+
+    /// `su(2)*` in the basis where `[e_a, e_b] = scale · ε_abc e_c`: 1 for `−iσ_a/2` (the same
+    /// constants as `so(3)`), 2 for `−iσ_a`.
+    pub fn su2(scale: f64) -> Self {
+        Self::known(&[(0, 1, 2, scale), (1, 2, 0, scale), (2, 0, 1, scale)])
+    }
+
+    /// `sl(2, R)*` in the basis `H = diag(1, −1)`, `E`, `F`: `[H, E] = 2E`, `[H, F] = −2F`,
+    /// `[E, F] = H`.
+    pub fn sl2() -> Self {
+        Self::known(&[(0, 1, 1, 2.0), (0, 2, 2, -2.0), (1, 2, 0, 1.0)])
+    }
+
+    /// The dual of the Heisenberg algebra: `[e_1, e_2] = e_3`, with `e_3` central.
+    pub fn heisenberg() -> Self {
+        Self::known(&[(0, 1, 2, 1.0)])
+    }
+}
+
+impl LieDual<6> {
+    /// `se(3)*`, states `(M, Γ)`: angular momentum and the dual of translations, as in the heavy
+    /// top. Rotations come first: `[R_a, R_b] = ε_abc R_c`, `[R_a, T_b] = ε_abc T_c`,
+    /// `[T_a, T_b] = 0`.
+    pub fn se3() -> Self {
+        Self::known(&[
+            (0, 1, 2, 1.0),
+            (1, 2, 0, 1.0),
+            (2, 0, 1, 1.0),
+            (0, 4, 5, 1.0),
+            (1, 5, 3, 1.0),
+            (2, 3, 4, 1.0),
+            (3, 1, 5, 1.0),
+            (4, 2, 3, 1.0),
+            (5, 0, 4, 1.0),
+        ])
+    }
+
+    /// `so(4)* ≅ so(3)* ⊕ so(3)*` in the basis `(J, N)` of rotations and boosts of Euclidean
+    /// four-space: `[J_a, J_b] = ε_abc J_c`, `[J_a, N_b] = ε_abc N_c`, `[N_a, N_b] = ε_abc J_c`.
+    pub fn so4() -> Self {
+        let mut so4 = Self::se3();
+        let boosts = Self::known(&[(3, 4, 2, 1.0), (4, 5, 0, 1.0), (5, 3, 1, 1.0)]);
+        so4.algebra.nonzero.extend(boosts.algebra.nonzero);
+        so4
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{Matrix2, Matrix4, vector};
+
+    /// The dense constants of an algebra, so that the ready-made ones pass through the checks.
+    fn dense<const N: usize>(space: &LieDual<N>) -> [[[f64; N]; N]; N] {
+        let mut constants = [[[0.0; N]; N]; N];
+        for c in space.algebra().constants() {
+            constants[c.a][c.b][c.d] += c.value;
+        }
+        constants
+    }
+
+    #[test]
+    fn ready_made_algebras_pass_the_checks() {
+        assert!(LieDual::new(&dense(&LieDual::so3())).is_ok());
+        assert!(LieDual::new(&dense(&LieDual::su2(2.0))).is_ok());
+        assert!(LieDual::new(&dense(&LieDual::sl2())).is_ok());
+        assert!(LieDual::new(&dense(&LieDual::heisenberg())).is_ok());
+        assert!(LieDual::new(&dense(&LieDual::se3())).is_ok());
+        assert!(LieDual::new(&dense(&LieDual::so4())).is_ok());
+    }
+
+    /// An elementary rotation generator of R⁴: `e_j e_iᵀ − e_i e_jᵀ`.
+    fn rotation(i: usize, j: usize) -> Matrix4<f64> {
+        let mut generator = Matrix4::zeros();
+        generator[(j, i)] = 1.0;
+        generator[(i, j)] = -1.0;
+        generator
+    }
+
+    /// A translation in homogeneous coordinates.
+    fn translation(i: usize) -> Matrix4<f64> {
+        let mut generator = Matrix4::zeros();
+        generator[(i, 3)] = 1.0;
+        generator
+    }
+
+    #[test]
+    fn ready_made_algebras_are_the_commutators_of_their_matrices() {
+        let rotations = [rotation(1, 2), rotation(2, 0), rotation(0, 1)];
+        let [x, y, z] = rotations;
+        let so3 = LieAlgebra::of_matrices(&rotations).unwrap();
+        assert_eq!(dense(&LieDual::of(so3)), dense(&LieDual::so3()));
+        let se3 =
+            LieAlgebra::of_matrices(&[x, y, z, translation(0), translation(1), translation(2)]);
+        assert_eq!(dense(&LieDual::of(se3.unwrap())), dense(&LieDual::se3()));
+        let so4 =
+            LieAlgebra::of_matrices(&[x, y, z, rotation(0, 3), rotation(1, 3), rotation(2, 3)]);
+        assert_eq!(dense(&LieDual::of(so4.unwrap())), dense(&LieDual::so4()));
+        let sl2 = LieAlgebra::of_matrices(&[
+            Matrix2::new(1.0, 0.0, 0.0, -1.0),
+            Matrix2::new(0.0, 1.0, 0.0, 0.0),
+            Matrix2::new(0.0, 0.0, 1.0, 0.0),
+        ]);
+        assert_eq!(dense(&LieDual::of(sl2.unwrap())), dense(&LieDual::sl2()));
+    }
+
+    #[test]
+    fn bad_constants_name_their_indices() {
+        let mut constants = dense(&LieDual::so3());
+        constants[0][1][2] = 1.5;
+        let error = LieDual::new(&constants).unwrap_err();
+        assert_eq!(error, AlgebraError::NotAntisymmetric { a: 0, b: 1, d: 2, size: 0.5 });
+
+        // Antisymmetric, but [[e_0, e_1], e_2] + cyclic = e_0 ≠ 0.
+        let mut constants = dense(&LieDual::so3());
+        (constants[0][1][0], constants[1][0][0]) = (1.0, -1.0);
+        let error = LieDual::new(&constants).unwrap_err();
+        assert!(matches!(error, AlgebraError::NoJacobiIdentity { .. }), "{error}");
+
+        let mut constants = dense(&LieDual::se3());
+        constants[3][4][5] = f64::NAN;
+        let error = LieDual::new(&constants).unwrap_err();
+        assert!(matches!(error, AlgebraError::NotFinite { a: 3, b: 4, d: 5, .. }));
+    }
+
+    #[test]
+    fn matrices_that_do_not_close_are_refused() {
+        let pair = [rotation(1, 2), rotation(2, 0)];
+        assert!(matches!(
+            LieAlgebra::of_matrices(&pair),
+            Err(AlgebraError::NotClosed { a: 0, b: 1, .. })
+        ));
+        let twice = [rotation(1, 2), rotation(1, 2) * 2.0];
+        assert_eq!(LieAlgebra::of_matrices(&twice), Err(AlgebraError::NotIndependent));
+    }
+
+    #[test]
+    fn coadjoint_is_the_transpose_of_the_bracket() {
+        let se3 = LieDual::se3();
+        let xi = vector![0.3, -1.2, 0.7, 2.0, -0.4, 0.1];
+        let mu = vector![1.5, 0.2, -0.8, 0.6, -1.1, 0.9];
+        let eta = vector![-0.7, 0.4, 1.3, -0.2, 0.5, 2.2];
+        let left = se3.algebra().coadjoint(&xi, &mu).dot(&eta);
+        let right = mu.dot(&se3.algebra().bracket(&xi, &eta));
+        assert!(f64::abs(left - right) < 1e-14);
+    }
+}

@@ -1,0 +1,68 @@
+//! What every space of states answers.
+
+use metriplectic_fields::Space;
+use rand::Rng;
+
+/// A space of states.
+///
+/// Beyond its points and charts ([`Space`]) a manifold says whether a point lies on it, how large
+/// its entries are (the scale of round-off), and draws random points for the checks of a model.
+///
+/// Laws ([`laws::manifold`](crate::laws::manifold)): 1. `φ_x(0) = x`; 2. `φ_x⁻¹(φ_x(q)) = q`, at
+/// dual numbers too; 3. chart points and random points lie on the manifold.
+pub trait Manifold: Space {
+    /// How far the point is off the manifold, in the units of its entries: 0 where every array of
+    /// numbers is a point, NaN or infinite if an entry is.
+    fn defect(&self, x: &Self::Point<f64>) -> f64;
+
+    /// The entries of the point, in the order in which it is written.
+    fn entries(x: &Self::Point<f64>) -> Vec<f64>;
+
+    /// The size `|x|` of the entries, which sets the scale of round-off.
+    fn magnitude(x: &Self::Point<f64>) -> f64;
+
+    /// A random point, spread over a unit scale.
+    fn random(&self, rng: &mut impl Rng) -> Self::Point<f64>;
+
+    /// Accepts a point whose entries are finite and whose defect is round-off.
+    ///
+    /// # Errors
+    ///
+    /// [`PointError::NotFinite`] with the first bad entry, or [`PointError::OffManifold`] with the
+    /// distance.
+    fn check(&self, x: &Self::Point<f64>) -> Result<(), PointError> {
+        let entries = Self::entries(x);
+        if let Some(index) = entries.iter().position(|entry| !entry.is_finite()) {
+            return Err(PointError::NotFinite { index, value: entries[index] });
+        }
+        let (defect, allowed) = (self.defect(x), POINT_TOLERANCE * Self::magnitude(x).max(1.0));
+        if defect <= allowed { Ok(()) } else { Err(PointError::OffManifold { defect, allowed }) }
+    }
+}
+
+/// A start that a user typed in with ten digits is accepted, a mistaken one is not.
+const POINT_TOLERANCE: f64 = 1e-10;
+
+/// A point that is not on the manifold.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum PointError {
+    /// An entry is NaN or infinite.
+    #[error("entry {index} of the point is {value}; every entry must be a finite number")]
+    NotFinite {
+        /// Which entry.
+        index: usize,
+        /// Its value.
+        value: f64,
+    },
+    /// The point is too far off the manifold.
+    #[error(
+        "the point is {defect:.3e} off the manifold ({allowed:.1e} is allowed); project it first"
+    )]
+    OffManifold {
+        /// How far off.
+        defect: f64,
+        /// How far it may be.
+        allowed: f64,
+    },
+}

@@ -1,0 +1,152 @@
+//! Retractions: how a tangent vector becomes a pair of points.
+
+use approx::{AbsDiffEq, RelativeEq};
+use metriplectic_fields::{ChartPoint, Column, Matrix, Scalar, Space, Square, Vector};
+
+use crate::{Manifold, MetricError, Riemannian};
+
+/// A discrete derivative `R_h: TM → M × M` (Bloch, Farré Puiggalí, Martín de Diego 2024, §4.4):
+/// a base point `z` and a vector `v ∈ T_zM` stand for a pair `(x, x')`.
+///
+/// Everything here is written in the displacement `d = hv`, so no step size appears.
+///
+/// Laws ([`laws::retraction`](crate::laws::retraction)): 1. `R_h⁻¹ R_h = 1`; 2. the arc from `x`
+/// ends where the pair does; 3. `arc_jet` is the derivative of `arc`; 4. a symmetric one returns
+/// the same base and the opposite vector for the swapped pair.
+pub trait Retraction<M: Manifold, G: Riemannian<M>> {
+    /// The arc that leaves `x` with initial displacement `u ∈ T_xM`: the unknown of a step.
+    ///
+    /// # Errors
+    ///
+    /// [`MetricError`] if the geodesic cannot be followed.
+    fn arc<D: Scalar>(
+        &self,
+        metric: &G,
+        x: &M::Point<f64>,
+        u: &Vector<M, D>,
+    ) -> Result<Arc<M, D>, MetricError>;
+
+    /// The same arc at `f64`, with its derivatives along `u`.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`arc`](Self::arc).
+    fn arc_jet(
+        &self,
+        metric: &G,
+        x: &M::Point<f64>,
+        u: &Vector<M>,
+    ) -> Result<ArcJet<M>, MetricError>;
+
+    /// `R_h(v)`: the pair `(x, x')` of the displacement `d = hv` at `z`.
+    ///
+    /// # Errors
+    ///
+    /// [`MetricError`] if the geodesic cannot be followed.
+    fn pair(&self, metric: &G, tangent: &Tangent<M>) -> Result<PointPair<M>, MetricError>;
+
+    /// `R_h⁻¹(x, y)`: the base point and the displacement `d = hv`.
+    ///
+    /// # Errors
+    ///
+    /// [`MetricError`] if no geodesic is found.
+    fn inverse(
+        &self,
+        metric: &G,
+        x: &M::Point<f64>,
+        y: &M::Point<f64>,
+    ) -> Result<Tangent<M>, MetricError>;
+}
+
+/// A pair of points `(x, x')`.
+pub type PointPair<M> = (<M as Space>::Point<f64>, <M as Space>::Point<f64>);
+
+/// A step's arc: its base point, its displacement there, and its end.
+#[derive(Clone, Debug)]
+pub struct Arc<M: Space, D: Scalar = f64> {
+    /// The base point `z`.
+    pub z: ChartPoint<M, D>,
+    /// The displacement `d = hv ∈ T_zM`.
+    pub d: Vector<M, D>,
+    /// The end `x'`.
+    pub end: M::Point<D>,
+}
+
+/// A step's arc at `f64`, with its derivatives along the unknown `u`.
+#[derive(Clone, Debug)]
+pub struct ArcJet<M: Space> {
+    /// The base point `z`.
+    pub z: M::Point<f64>,
+    /// `∂z/∂u` in the chart at `z`.
+    pub dz: Matrix<M>,
+    /// The displacement `d = hv ∈ T_zM`.
+    pub d: Vector<M>,
+    /// `∂d/∂u` in the chart at `z`.
+    pub dd: Matrix<M>,
+    /// The end `x'`.
+    pub end: M::Point<f64>,
+    /// `∂x'/∂u` in the chart at `x'`.
+    pub dend: Matrix<M>,
+}
+
+impl<M: Space> ArcJet<M> {
+    /// The straight line of a flat space, with its middle as the base: `z = x + u/2`, `d = u`,
+    /// `x' = x + u`.
+    #[inline]
+    pub fn straight(x: &M::Point<f64>, u: &Vector<M>) -> Self {
+        let one = Matrix::<M>::one();
+        Self {
+            z: M::chart(x, &(*u * 0.5)),
+            dz: one * 0.5,
+            d: *u,
+            dd: one,
+            end: M::chart(x, u),
+            dend: one,
+        }
+    }
+}
+
+/// A tangent vector with its base point.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Tangent<M: Space> {
+    /// The base point.
+    pub base: M::Point<f64>,
+    /// The components in the frame of the chart at the base point.
+    pub vector: Vector<M>,
+}
+
+impl<M: Space> AbsDiffEq for Tangent<M>
+where
+    Self: PartialEq,
+{
+    type Epsilon = f64;
+
+    fn default_epsilon() -> f64 {
+        f64::default_epsilon()
+    }
+
+    fn abs_diff_eq(&self, other: &Self, epsilon: f64) -> bool {
+        self.base.abs_diff_eq(&other.base, epsilon)
+            && self.vector.abs_diff_eq(&other.vector, epsilon)
+    }
+}
+
+impl<M: Space> RelativeEq for Tangent<M>
+where
+    Self: PartialEq,
+{
+    fn default_max_relative() -> f64 {
+        f64::default_max_relative()
+    }
+
+    fn relative_eq(&self, other: &Self, epsilon: f64, max_relative: f64) -> bool {
+        self.base.relative_eq(&other.base, epsilon, max_relative)
+            && self.vector.relative_eq(&other.vector, epsilon, max_relative)
+    }
+}
+
+/// The middle of two vectors' components, for the inverse of a midpoint rule.
+#[inline]
+pub(crate) fn half<M: Space>(v: &Vector<M>) -> Vector<M> {
+    Vector::<M>::from_index(|i| v[i] * 0.5)
+}

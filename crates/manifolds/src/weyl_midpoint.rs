@@ -1,0 +1,60 @@
+//! The symmetric retraction: base point in the middle of the geodesic.
+
+use metriplectic_fields::{ChartPoint, Scalar, Vector};
+
+use crate::retraction::half;
+use crate::{Arc, ArcJet, Manifold, MetricError, PointPair, Retraction, Riemannian, Tangent};
+
+/// Weyl's midpoint retraction (Bloch, Farré Puiggalí, Martín de Diego 2024, eq. "weyl"):
+///
+/// ```math
+/// R_h(v_z) = \bigl(\exp_z(-hv/2),\ \exp_z(hv/2)\bigr).
+/// ```
+///
+/// `z` is the geodesic midpoint of the pair, and schemes built on it have order 2.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct WeylMidpoint;
+
+impl<M: Manifold, G: Riemannian<M>> Retraction<M, G> for WeylMidpoint {
+    #[inline]
+    fn arc<D: Scalar>(
+        &self,
+        metric: &G,
+        x: &M::Point<f64>,
+        u: &Vector<M, D>,
+    ) -> Result<Arc<M, D>, MetricError> {
+        let half = *u * D::from(0.5);
+        let (z, velocity) = metric.exp(&ChartPoint::centre(x), &half)?;
+        let (end, _) = metric.exp(&z, &velocity)?;
+        Ok(Arc { z, d: velocity * D::from(2.0), end: end.point() })
+    }
+
+    #[inline]
+    fn arc_jet(
+        &self,
+        metric: &G,
+        x: &M::Point<f64>,
+        u: &Vector<M>,
+    ) -> Result<ArcJet<M>, MetricError> {
+        metric.weyl_jet(x, u)
+    }
+
+    fn pair(&self, metric: &G, tangent: &Tangent<M>) -> Result<PointPair<M>, MetricError> {
+        let z = ChartPoint::centre(&tangent.base);
+        let forward = half::<M>(&tangent.vector);
+        let (x, _) = metric.exp(&z, &-forward)?;
+        let (y, _) = metric.exp(&z, &forward)?;
+        Ok((x.point(), y.point()))
+    }
+
+    fn inverse(
+        &self,
+        metric: &G,
+        x: &M::Point<f64>,
+        y: &M::Point<f64>,
+    ) -> Result<Tangent<M>, MetricError> {
+        let u = metric.log(x, y)?;
+        let (z, velocity) = metric.exp(&ChartPoint::centre(x), &half::<M>(&u))?;
+        Ok(Tangent { base: z.point(), vector: velocity * 2.0 })
+    }
+}

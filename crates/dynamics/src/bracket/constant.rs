@@ -1,0 +1,67 @@
+//! A Poisson tensor with the same matrix everywhere.
+
+use metriplectic_fields::{ChartPoint, Matrix, Scalar, Square};
+use metriplectic_manifolds::{Flat, Manifold};
+use nalgebra::{Const, SMatrix, SVector};
+
+use super::{Bracket, BracketJet, PoissonError};
+
+/// The same skew matrix everywhere on a flat space; see [`Poisson::constant`](super::Poisson::constant).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ConstantPoisson<const N: usize> {
+    tensor: SMatrix<f64, N, N>,
+}
+
+impl<const N: usize> ConstantPoisson<N> {
+    pub(super) fn new(tensor: SMatrix<f64, N, N>) -> Result<Self, PoissonError> {
+        for row in 0..N {
+            for column in 0..N {
+                let size = (tensor[(row, column)] + tensor[(column, row)]).abs();
+                if !size.is_finite() {
+                    return Err(PoissonError::NotFinite { row, column });
+                }
+                if size > 4.0 * f64::EPSILON * tensor.amax() {
+                    return Err(PoissonError::NotSkew { row, column, size });
+                }
+            }
+        }
+        Ok(Self { tensor })
+    }
+}
+
+impl<const N: usize, M> Bracket<M> for ConstantPoisson<N>
+where
+    M: Manifold<Dim = Const<N>> + Flat,
+{
+    fn apply<D: Scalar>(
+        &self,
+        _: &M,
+        _: &ChartPoint<M, D>,
+        alpha: &SVector<D, N>,
+    ) -> SVector<D, N> {
+        SMatrix::<D, N, N>::from_entries(|i, j| D::from(self.tensor[(i, j)])) * *alpha
+    }
+
+    #[inline]
+    fn linearise(&self, _: &M, _: &M::Point<f64>, alpha: &SVector<f64, N>) -> BracketJet<M> {
+        BracketJet {
+            value: self.tensor * alpha,
+            along_z: Matrix::<M>::zeros(),
+            tensor: self.tensor,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Matrix2;
+
+    #[test]
+    fn a_matrix_that_is_not_skew_is_refused() {
+        let error = ConstantPoisson::new(Matrix2::new(0.0, 1.0, -0.5, 0.0)).unwrap_err();
+        assert_eq!(error, PoissonError::NotSkew { row: 0, column: 1, size: 0.5 });
+        let error = ConstantPoisson::new(Matrix2::new(0.0, f64::NAN, 1.0, 0.0)).unwrap_err();
+        assert_eq!(error, PoissonError::NotFinite { row: 0, column: 1 });
+    }
+}

@@ -1,0 +1,60 @@
+//! The Lie-Poisson bracket on the dual of a Lie algebra.
+
+use metriplectic_fields::{ChartPoint, Column, Scalar};
+use metriplectic_manifolds::LieDual;
+use nalgebra::{SMatrix, SVector};
+
+use super::{Bracket, BracketJet, NaturalBracket};
+
+/// The Lie-Poisson bracket `{f, g}(μ) = ⟨μ, [df, dg]⟩` up to the sign of the left-invariant
+/// convention: `x' = Π dH` reads
+///
+/// ```math
+/// \mu'_b = C_{ab}^d\, \xi^a \mu_d, \qquad \xi = dH(\mu),
+/// ```
+///
+/// that is `μ' = ad*_ξ μ` (Marsden and Ratiu 1999, §10.7; Bloch, Farré Puiggalí, Martín de Diego
+/// 2024, eq. "flp" without force). On so(3)*, `Π dH = p × dH`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct LiePoisson;
+
+impl<const N: usize> Bracket<LieDual<N>> for LiePoisson {
+    #[inline]
+    fn apply<D: Scalar>(
+        &self,
+        space: &LieDual<N>,
+        x: &ChartPoint<LieDual<N>, D>,
+        alpha: &SVector<D, N>,
+    ) -> SVector<D, N> {
+        space.algebra().coadjoint(alpha, &x.point())
+    }
+
+    #[inline]
+    fn linearise(
+        &self,
+        space: &LieDual<N>,
+        z: &SVector<f64, N>,
+        alpha: &SVector<f64, N>,
+    ) -> BracketJet<LieDual<N>> {
+        let mut jet = BracketJet::<LieDual<N>> {
+            value: Column::zero(),
+            along_z: SMatrix::zeros(),
+            tensor: SMatrix::zeros(),
+        };
+        for c in space.algebra().constants() {
+            let (slope, entry) = (c.value * alpha[c.a], c.value * z[c.d]);
+            jet.value[c.b] += slope * z[c.d];
+            jet.along_z[(c.b, c.d)] += slope;
+            jet.tensor[(c.b, c.a)] += entry;
+        }
+        jet
+    }
+}
+
+impl<const N: usize> NaturalBracket for LieDual<N> {
+    type Bracket = LiePoisson;
+
+    fn natural_bracket(&self) -> LiePoisson {
+        LiePoisson
+    }
+}

@@ -1,0 +1,118 @@
+//! Dissipations: the symmetric positive semidefinite tensor `K` that produces entropy.
+
+mod metric;
+mod none;
+
+pub use metric::MetricDissipation;
+pub use none::NoDissipation;
+
+use metriplectic_fields::{ChartPoint, Column, Dimension, Matrix, Scalar, Square, Vector};
+use metriplectic_manifolds::{Manifold, MetricError, Riemannian};
+use num_dual::Dual64;
+
+use crate::bracket::epsilon;
+
+/// A dissipation `K`, given the covector `w` that it must kill: `dH` in the equations of motion,
+/// the discrete gradient in a step. Both are then the same code.
+///
+/// The one method to write is [`apply`](Self::apply), at any scalar.
+///
+/// Laws ([`laws::dissipation`](crate::laws::dissipation)): 1. `K_w` is symmetric; 2. `K_w ⪰ 0`;
+/// 3. `K_w w = 0`; 4. `linearise` is the derivative of `apply`.
+pub trait Dissipation<M: Manifold, G: Riemannian<M>> {
+    /// The vector `K_w(x) α`, components in the frame of the chart of `x`.
+    ///
+    /// # Errors
+    ///
+    /// [`MetricError`] if the metric cannot be used at `x`.
+    fn apply<D: Scalar>(
+        &self,
+        metric: &G,
+        x: &ChartPoint<M, D>,
+        w: &Vector<M, D>,
+        alpha: &Vector<M, D>,
+    ) -> Result<Vector<M, D>, MetricError>;
+
+    /// `K_w α` at a real point with its derivatives along `x`, `w` and `α`.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`apply`](Self::apply).
+    fn linearise(
+        &self,
+        metric: &G,
+        z: &M::Point<f64>,
+        w: &Vector<M>,
+        alpha: &Vector<M>,
+    ) -> Result<DissipationJet<M>, MetricError> {
+        by_dual_numbers(self, metric, z, w, alpha)
+    }
+
+    /// The matrix `K_w(x)`.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`apply`](Self::apply).
+    fn tensor(
+        &self,
+        metric: &G,
+        x: &ChartPoint<M>,
+        w: &Vector<M>,
+    ) -> Result<Matrix<M>, MetricError> {
+        let mut tensor = Matrix::<M>::zeros();
+        for j in 0..M::Dim::LEN {
+            let column = self.apply(metric, x, w, &Vector::<M>::basis(j))?;
+            for i in 0..M::Dim::LEN {
+                tensor[(i, j)] = column[i];
+            }
+        }
+        Ok(tensor)
+    }
+
+    /// Whether there is no dissipation by construction, so that no entropy is produced.
+    fn is_none(&self) -> bool {
+        false
+    }
+}
+
+/// The definition of [`Dissipation::linearise`]: one dual number for each direction.
+pub(crate) fn by_dual_numbers<M: Manifold, G: Riemannian<M>>(
+    dissipation: &(impl Dissipation<M, G> + ?Sized),
+    metric: &G,
+    z: &M::Point<f64>,
+    w: &Vector<M>,
+    alpha: &Vector<M>,
+) -> Result<DissipationJet<M>, MetricError> {
+    let still = ChartPoint::centre(z);
+    let value = dissipation.apply(metric, &still, w, alpha)?;
+    let zero = Matrix::<M>::zeros();
+    let mut jet = DissipationJet::<M> { value, along_z: zero, along_w: zero, tensor: zero };
+    let still = ChartPoint::centre(z);
+    let (w, alpha) = (Vector::<M, Dual64>::embed(w), Vector::<M, Dual64>::embed(alpha));
+    for k in 0..M::Dim::LEN {
+        let e = epsilon::<M>(k);
+        let moved = ChartPoint { base: z.clone(), q: e };
+        let along_z = dissipation.apply(metric, &moved, &w, &alpha)?;
+        let along_w = dissipation.apply(metric, &still, &(w + e), &alpha)?;
+        let along_alpha = dissipation.apply(metric, &still, &w, &(alpha + e))?;
+        for i in 0..M::Dim::LEN {
+            jet.along_z[(i, k)] = along_z[i].eps;
+            jet.along_w[(i, k)] = along_w[i].eps;
+            jet.tensor[(i, k)] = along_alpha[i].eps;
+        }
+    }
+    Ok(jet)
+}
+
+/// `K_w α` at a real point, with its derivatives.
+#[derive(Clone, Copy, Debug)]
+pub struct DissipationJet<M: Manifold> {
+    /// The vector `K_w α`.
+    pub value: Vector<M>,
+    /// `∂(K_w α)/∂z` in the chart at `z`.
+    pub along_z: Matrix<M>,
+    /// `∂(K_w α)/∂w`.
+    pub along_w: Matrix<M>,
+    /// `∂(K_w α)/∂α`, the tensor itself.
+    pub tensor: Matrix<M>,
+}

@@ -1,0 +1,106 @@
+//! The dissipation built from the metric.
+
+use metriplectic_fields::{ChartPoint, Column, Dimension, Matrix, Scalar, Square, Vector};
+use metriplectic_manifolds::{InnerProduct, Manifold, MetricError, Riemannian};
+
+use super::{Dissipation, DissipationJet};
+
+/// The dissipation of a Riemannian metric (Bloch, Farré Puiggalí, Martín de Diego 2024, eq.
+/// "semid"):
+///
+/// ```math
+/// K_w(\alpha, \beta) = G^*(w, w)\, G^*(\alpha, \beta) - G^*(w, \alpha)\, G^*(w, \beta) .
+/// ```
+///
+/// It is `G*(w, w)` times the projection off `w`: symmetric, positive semidefinite, and it kills
+/// `w`. In an orthonormal coframe with components `w_i`, `s_i` it is evaluated by antisymmetry,
+///
+/// ```math
+/// (K_w s)_i = \sum_j w_j a_{ji}, \qquad a_{ji} = w_j s_i - w_i s_j ,
+/// ```
+///
+/// so that `⟨w, K_w s⟩ = Σ w_i w_j a_ji` cancels in pairs instead of between two large numbers.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct MetricDissipation;
+
+impl<M: Manifold, G: Riemannian<M>> Dissipation<M, G> for MetricDissipation {
+    #[inline]
+    fn apply<D: Scalar>(
+        &self,
+        metric: &G,
+        x: &ChartPoint<M, D>,
+        w: &Vector<M, D>,
+        alpha: &Vector<M, D>,
+    ) -> Result<Vector<M, D>, MetricError> {
+        let g = metric.at(x)?;
+        Ok(g.raise(&pairwise::<M, D>(&g.orthonormal(w), &g.orthonormal(alpha))))
+    }
+
+    #[inline]
+    fn linearise(
+        &self,
+        metric: &G,
+        z: &M::Point<f64>,
+        w: &Vector<M>,
+        alpha: &Vector<M>,
+    ) -> Result<DissipationJet<M>, MetricError> {
+        let g = metric.at(&ChartPoint::centre(z))?;
+        let (w_hat, a_hat) = (g.orthonormal(w), g.orthonormal(alpha));
+        let value = g.raise(&pairwise::<M, f64>(&w_hat, &a_hat));
+        let (w_sharp, a_sharp) = (g.raise(&w_hat), g.raise(&a_hat));
+        let (ww, wa) = (w_hat.dot(&w_hat), w_hat.dot(&a_hat));
+        // K = (w·w) g⁻¹ − ♯w ♯wᵀ, and K_w α = (w·w) ♯α − (w·α) ♯w differentiated along w.
+        let mut tensor = Matrix::<M>::zeros();
+        let mut along_w = Matrix::<M>::zeros();
+        for j in 0..M::Dim::LEN {
+            let cometric = g.sharp(&Vector::<M>::basis(j));
+            for i in 0..M::Dim::LEN {
+                tensor[(i, j)] = ww * cometric[i] - w_sharp[i] * w_sharp[j];
+                along_w[(i, j)] =
+                    2.0 * a_sharp[i] * w_sharp[j] - w_sharp[i] * a_sharp[j] - wa * cometric[i];
+            }
+        }
+        let along_z = slope_along_z::<M, G>(metric, z, w, alpha)?;
+        Ok(DissipationJet { value, along_z, along_w, tensor })
+    }
+}
+
+/// `Σ_j w_j (w_j s_i − w_i s_j)`.
+#[inline]
+fn pairwise<M: Manifold, D: Scalar>(w: &Vector<M, D>, s: &Vector<M, D>) -> Vector<M, D> {
+    let mut k = Vector::<M, D>::zero();
+    for i in 0..M::Dim::LEN {
+        for j in 0..i {
+            let a = w[j] * s[i] - w[i] * s[j];
+            k[i] += w[j] * a;
+            k[j] -= w[i] * a;
+        }
+    }
+    k
+}
+
+/// `∂(K_w α)/∂z`, which only a metric that varies has: with `P = ♯w`, `A = ♯α` and
+/// `∂_k g⁻¹ = −g⁻¹ (∂_k g) g⁻¹`,
+/// `∂_k (K_w α) = −(P·∂_k g P) A + (w·P) ∂_k A + (A·∂_k g P) P − (w·A) ∂_k P`.
+#[inline]
+fn slope_along_z<M: Manifold, G: Riemannian<M>>(
+    metric: &G,
+    z: &M::Point<f64>,
+    w: &Vector<M>,
+    alpha: &Vector<M>,
+) -> Result<Matrix<M>, MetricError> {
+    let mut slope = Matrix::<M>::zeros();
+    let Some(slopes) = metric.slopes(z) else { return Ok(slope) };
+    let g = metric.at(&ChartPoint::centre(z))?;
+    let (p, a) = (g.sharp(w), g.sharp(alpha));
+    for k in 0..M::Dim::LEN {
+        let (gp, ga) = (slopes[k] * p, slopes[k] * a);
+        let column = -(a * p.dot(&gp)) - g.sharp(&ga) * w.dot(&p)
+            + p * a.dot(&gp)
+            + g.sharp(&gp) * w.dot(&a);
+        for i in 0..M::Dim::LEN {
+            slope[(i, k)] = column[i];
+        }
+    }
+    Ok(slope)
+}

@@ -1,0 +1,28 @@
+//! What drives the state: a bracket turns energy into reversible motion, a dissipation turns
+//! entropy into irreversible motion, and a [`System`] puts them together and checks them.
+//!
+//! ```math
+//! \dot x = \Pi\, dH + K\, dS .
+//! ```
+//!
+//! | module | what it holds |
+//! |---|---|
+//! | [`bracket`] | [`Bracket`]: `Π`; [`LiePoisson`], [`Poisson::constant`], [`Poisson::field`], [`Zero`] |
+//! | [`dissipation`] | [`Dissipation`]: `K`, given the covector it must kill; [`MetricDissipation`] |
+//! | [`system`] | [`System`] and its builder |
+//! | [`verify`] | the laws of a model, sampled: [`System::verify`], [`System::report`] |
+//! | [`laws`] | what brackets and dissipations promise, and the functions that check it |
+
+pub mod bracket;
+pub mod dissipation;
+pub mod laws;
+pub mod system;
+pub mod verify;
+
+pub use bracket::{
+    Bracket, BracketJet, ConstantPoisson, FieldPoisson, LiePoisson, NaturalBracket, Poisson,
+    PoissonError, Zero,
+};
+pub use dissipation::{Dissipation, DissipationJet, MetricDissipation, NoDissipation};
+pub use system::{BuildError, Metriplectic, NoEntropy, Point, SecondLaw, System, SystemBuilder};
+pub use verify::{LawResidual, ModelError, Report};

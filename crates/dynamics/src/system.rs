@@ -1,0 +1,292 @@
+//! A metriplectic system: manifold, metric, bracket, dissipation, energy and entropy.
+
+use metriplectic_fields::{ChartPoint, Matrix, Scalar, ScalarField, Space, Vector, differential};
+use metriplectic_manifolds::{Canonical, Manifold, MetricError, Riemannian};
+
+use crate::verify::{self, ModelError, Report};
+use crate::{Bracket, Dissipation, MetricDissipation, NaturalBracket, NoDissipation};
+
+/// What an integrator asks of a system `x' = Π dH + K dS`; [`System`] is the one to build.
+pub trait Metriplectic {
+    /// Where the state lives.
+    type Manifold: Manifold;
+    /// The Riemannian metric.
+    type Metric: Riemannian<Self::Manifold>;
+    /// The Poisson tensor `Π`.
+    type Bracket: Bracket<Self::Manifold>;
+    /// The dissipation `K`.
+    type Dissipation: Dissipation<Self::Manifold, Self::Metric>;
+    /// The energy `H`.
+    type Energy: ScalarField<Self::Manifold>;
+    /// The entropy `S`.
+    type Entropy: ScalarField<Self::Manifold>;
+
+    /// Where the state lives.
+    fn manifold(&self) -> &Self::Manifold;
+    /// The Riemannian metric.
+    fn metric(&self) -> &Self::Metric;
+    /// The Poisson tensor `Π`.
+    fn bracket(&self) -> &Self::Bracket;
+    /// The dissipation `K`.
+    fn dissipation(&self) -> &Self::Dissipation;
+    /// The energy `H`.
+    fn energy(&self) -> &Self::Energy;
+    /// The entropy `S`.
+    fn entropy(&self) -> &Self::Entropy;
+    /// What the model promises about its entropy.
+    fn second_law(&self) -> SecondLaw;
+
+    /// The velocity `Π dH + K dS`, by the definition and at any scalar.
+    ///
+    /// # Errors
+    ///
+    /// [`MetricError`] if the metric cannot be used at `x`.
+    fn velocity<D: Scalar>(
+        &self,
+        x: &ChartPoint<Self::Manifold, D>,
+    ) -> Result<Vector<Self::Manifold, D>, MetricError> {
+        let (dh, ds) = (differential(self.energy(), x), differential(self.entropy(), x));
+        let reversible = self.bracket().apply(self.manifold(), x, &dh);
+        Ok(reversible + self.dissipation().apply(self.metric(), x, &dh, &ds)?)
+    }
+
+    /// Checks the laws of the model at `x0` and at sampled points within `radius` of it, in chart
+    /// coordinates. Every run does this first.
+    ///
+    /// # Errors
+    ///
+    /// [`ModelError`] that names the law, the point and the size of the violation.
+    fn verify(&self, x0: &Point<Self>, radius: f64) -> Result<(), ModelError> {
+        verify::verify(self, x0, radius)
+    }
+
+    /// The residual of every law of the model around `x0`: the page to read when a new model
+    /// misbehaves.
+    fn report(&self, x0: &Point<Self>) -> Report {
+        verify::report(self, x0, verify::default_radius::<Self::Manifold>(x0))
+    }
+}
+
+/// A state of the system `Y`.
+pub type Point<Y> = <<Y as Metriplectic>::Manifold as Space>::Point<f64>;
+
+/// What a system promises about its entropy.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum SecondLaw {
+    /// There is no entropy: the system is Hamiltonian.
+    #[default]
+    NoEntropy,
+    /// `S` is a Casimir of the bracket, `Π dS = 0`, and verification refuses the model otherwise.
+    /// Then `S' = K(dS, dS) ≥ 0`.
+    Casimir,
+    /// The scheme as published, for an entropy that need not be a Casimir. The first law still
+    /// holds exactly; the second is not promised, and the certificate says so.
+    Published,
+}
+
+/// The entropy of a system that has none, `S = 0`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct NoEntropy;
+
+impl<M: Space> ScalarField<M> for NoEntropy {
+    #[inline]
+    fn at<D: Scalar>(&self, _: &M::Point<D>) -> D {
+        D::zero()
+    }
+}
+
+/// A metriplectic system on the manifold `M` with metric `G`, bracket `B`, dissipation `K`, energy
+/// `H` and entropy `S`; built by [`System::on`].
+#[derive(Clone, Debug)]
+pub struct System<M, G, B, K, H, S> {
+    parts: SystemBuilder<M, G, B, K, H, S>,
+}
+
+impl System<(), (), (), (), (), ()> {
+    /// Starts a system on a manifold, with the manifold's canonical metric and its natural bracket
+    /// (Lie-Poisson on the dual of a Lie algebra, none on Rⁿ).
+    ///
+    /// ```
+    /// use metriplectic_dynamics::System;
+    /// use metriplectic_fields::Real;
+    /// use metriplectic_manifolds::LieDual;
+    /// use nalgebra::Vector3;
+    ///
+    /// let inertia = Vector3::new(10.0, 5.0, 1.0);
+    /// let body = System::on(LieDual::so3())
+    ///     .energy(move |p: &Vector3<Real>| p.component_mul(p).component_div(&inertia.cast()).sum() * 0.5)
+    ///     .entropy(|p: &Vector3<Real>| p.norm_squared() * 0.5)
+    ///     .build();
+    /// assert!(body.is_ok());
+    /// ```
+    pub fn on<M: NaturalBracket>(
+        manifold: M,
+    ) -> SystemBuilder<M, Canonical, M::Bracket, NoDissipation, (), NoEntropy> {
+        SystemBuilder {
+            bracket: manifold.natural_bracket(),
+            manifold,
+            metric: Canonical,
+            dissipation: NoDissipation,
+            energy: (),
+            entropy: NoEntropy,
+            second_law: SecondLaw::NoEntropy,
+        }
+    }
+}
+
+/// A system in the making: each method replaces one part.
+#[derive(Clone, Debug)]
+#[must_use = "a builder does nothing until `build` is called"]
+pub struct SystemBuilder<M, G, B, K, H, S> {
+    manifold: M,
+    metric: G,
+    bracket: B,
+    dissipation: K,
+    energy: H,
+    entropy: S,
+    second_law: SecondLaw,
+}
+
+impl<M: Manifold, G, B, K, H, S> SystemBuilder<M, G, B, K, H, S> {
+    /// The energy `H`: a closure `|x| -> Real` or any other [`ScalarField`].
+    pub fn energy<F: ScalarField<M>>(self, energy: F) -> SystemBuilder<M, G, B, K, F, S> {
+        let Self { manifold, metric, bracket, dissipation, entropy, second_law, .. } = self;
+        SystemBuilder { manifold, metric, bracket, dissipation, energy, entropy, second_law }
+    }
+
+    /// The entropy `S`: a closure `|x| -> Real` or any other [`ScalarField`]. It must be a Casimir
+    /// of the bracket unless [`second_law`](Self::second_law) says otherwise, and it is produced by
+    /// the dissipation of the metric ([`MetricDissipation`]).
+    pub fn entropy<F: ScalarField<M>>(
+        self,
+        entropy: F,
+    ) -> SystemBuilder<M, G, B, MetricDissipation, H, F> {
+        let Self { manifold, metric, bracket, energy, second_law, .. } = self;
+        let second_law = match second_law {
+            SecondLaw::NoEntropy => SecondLaw::Casimir,
+            chosen => chosen,
+        };
+        let dissipation = MetricDissipation;
+        SystemBuilder { manifold, metric, bracket, dissipation, energy, entropy, second_law }
+    }
+
+    /// The Riemannian metric: [`Metric::constant`](metriplectic_manifolds::Metric::constant) or
+    /// [`Metric::field`](metriplectic_manifolds::Metric::field).
+    pub fn metric<F: Riemannian<M>>(self, metric: F) -> SystemBuilder<M, F, B, K, H, S> {
+        let Self { manifold, bracket, dissipation, energy, entropy, second_law, .. } = self;
+        SystemBuilder { manifold, metric, bracket, dissipation, energy, entropy, second_law }
+    }
+
+    /// The Poisson tensor: [`LiePoisson`](crate::LiePoisson), [`Zero`](crate::Zero),
+    /// [`Poisson::constant`](crate::Poisson::constant) or [`Poisson::field`](crate::Poisson::field).
+    pub fn bracket<F: Bracket<M>>(self, bracket: F) -> SystemBuilder<M, G, F, K, H, S> {
+        let Self { manifold, metric, dissipation, energy, entropy, second_law, .. } = self;
+        SystemBuilder { manifold, metric, bracket, dissipation, energy, entropy, second_law }
+    }
+
+    /// What is promised about the entropy; [`SecondLaw::Published`] allows one that is not a
+    /// Casimir.
+    pub fn second_law(mut self, second_law: SecondLaw) -> Self {
+        self.second_law = second_law;
+        self
+    }
+}
+
+impl<M, G, B, K, H, S> SystemBuilder<M, G, B, K, H, S>
+where
+    M: Manifold,
+    G: Riemannian<M>,
+    B: Bracket<M>,
+    K: Dissipation<M, G>,
+    H: ScalarField<M>,
+    S: ScalarField<M>,
+{
+    /// Checks the structure and finishes the system. The laws that need a point are checked by
+    /// [`Metriplectic::verify`], which every run calls.
+    ///
+    /// # Errors
+    ///
+    /// [`BuildError`] if the parts do not make a system.
+    pub fn build(self) -> Result<System<M, G, B, K, H, S>, BuildError> {
+        let has_entropy = !self.dissipation.is_none();
+        if !has_entropy && self.bracket.is_zero() {
+            return Err(BuildError::NothingMoves);
+        }
+        if has_entropy == (self.second_law == SecondLaw::NoEntropy) {
+            return Err(BuildError::SecondLawWithoutEntropy);
+        }
+        Ok(System { parts: self })
+    }
+}
+
+impl<M, G, B, K, H, S> Metriplectic for System<M, G, B, K, H, S>
+where
+    M: Manifold,
+    G: Riemannian<M>,
+    B: Bracket<M>,
+    K: Dissipation<M, G>,
+    H: ScalarField<M>,
+    S: ScalarField<M>,
+{
+    type Manifold = M;
+    type Metric = G;
+    type Bracket = B;
+    type Dissipation = K;
+    type Energy = H;
+    type Entropy = S;
+
+    #[inline]
+    fn manifold(&self) -> &M {
+        &self.parts.manifold
+    }
+
+    #[inline]
+    fn metric(&self) -> &G {
+        &self.parts.metric
+    }
+
+    #[inline]
+    fn bracket(&self) -> &B {
+        &self.parts.bracket
+    }
+
+    #[inline]
+    fn dissipation(&self) -> &K {
+        &self.parts.dissipation
+    }
+
+    #[inline]
+    fn energy(&self) -> &H {
+        &self.parts.energy
+    }
+
+    #[inline]
+    fn entropy(&self) -> &S {
+        &self.parts.entropy
+    }
+
+    fn second_law(&self) -> SecondLaw {
+        self.parts.second_law
+    }
+}
+
+/// Parts that do not make a system.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum BuildError {
+    /// Neither a bracket nor an entropy.
+    #[error("nothing moves: the bracket is zero and there is no entropy; give one of the two")]
+    NothingMoves,
+    /// A promise about an entropy that is not there, or an entropy without one.
+    #[error("the second law speaks of an entropy, and this system has none; give `.entropy(..)`")]
+    SecondLawWithoutEntropy,
+}
+
+/// The matrix of a metric, for reports.
+pub(crate) fn metric_matrix<Y: Metriplectic + ?Sized>(
+    system: &Y,
+    x: &Point<Y>,
+) -> Matrix<Y::Manifold> {
+    system.metric().matrix(&ChartPoint::<Y::Manifold>::centre(x))
+}

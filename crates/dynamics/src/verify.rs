@@ -1,0 +1,366 @@
+//! The laws of a model, checked at sampled points.
+//!
+//! A model has a domain (a logarithm, a square root), and is only judged where it lives: away from
+//! the start, a sample whose *value* is not finite is passed over. A value that is finite while a
+//! derivative is not is an error wherever it happens; it is how `x.norm()` at zero shows itself.
+
+use std::fmt;
+
+use metriplectic_fields::{ChartPoint, Column, Jet2, Matrix, ScalarField, Space, Square, Vector};
+use metriplectic_manifolds::{Manifold, MetricError, PointError, Riemannian};
+use rand::rngs::ChaCha8Rng;
+use rand::{RngExt, SeedableRng};
+
+use crate::laws::bracket_defects;
+use crate::system::{Metriplectic, Point, SecondLaw, metric_matrix};
+use crate::{Bracket, Dissipation};
+
+/// Points sampled around the start, beside the start itself.
+const SAMPLES: usize = 16;
+
+/// A seed, so that a model fails in the same way each time.
+const SEED: u64 = 0x4745_4e45_5249_4321;
+
+/// The violation of a law that is taken for round-off, relative to the terms that cancel. Models
+/// are written with transcendental functions of their own, so this is far above `ε` and far below
+/// any mistake.
+const TOLERANCE: f64 = 1e-10;
+
+/// The radius in which a run samples its model: a tenth of the size of the start.
+pub(crate) fn default_radius<M: Manifold>(x0: &M::Point<f64>) -> f64 {
+    0.1 * M::magnitude(x0).max(0.1)
+}
+
+/// A law of the model, with its largest violation among the samples.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LawResidual {
+    /// The law as a formula.
+    pub law: &'static str,
+    /// The violation, relative to the terms that should cancel.
+    pub size: f64,
+    /// The violation that is taken for round-off.
+    pub allowed: f64,
+    /// The entries of the point where it is largest.
+    pub point: Vec<f64>,
+}
+
+impl LawResidual {
+    /// Whether the law holds at every sample.
+    pub fn holds(&self) -> bool {
+        self.size <= self.allowed
+    }
+}
+
+/// The residual of every law of a model, and the first error if there is one; see
+/// [`Metriplectic::report`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct Report {
+    /// The laws, in the order in which they are checked.
+    pub laws: Vec<LawResidual>,
+    /// Points at which the model was judged.
+    pub judged: usize,
+    /// Points passed over, because a value was not finite there.
+    pub passed_over: usize,
+    /// What [`Metriplectic::verify`] says.
+    pub verdict: Result<(), ModelError>,
+}
+
+impl fmt::Display for Report {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "model judged at {} points ({} passed over)", self.judged, self.passed_over)?;
+        for residual in &self.laws {
+            let mark = if residual.holds() { "ok    " } else { "BROKEN" };
+            writeln!(
+                f,
+                "  {mark}  {:<22} {:9.2e}  (allowed {:.0e})",
+                residual.law, residual.size, residual.allowed
+            )?;
+        }
+        match &self.verdict {
+            Ok(()) => write!(f, "verdict: the model keeps its laws"),
+            Err(error) => write!(f, "verdict: {error}"),
+        }
+    }
+}
+
+pub(crate) fn verify<Y: Metriplectic + ?Sized>(
+    system: &Y,
+    x0: &Point<Y>,
+    radius: f64,
+) -> Result<(), ModelError> {
+    report(system, x0, radius).verdict
+}
+
+pub(crate) fn report<Y: Metriplectic + ?Sized>(system: &Y, x0: &Point<Y>, radius: f64) -> Report {
+    let mut report = Report { laws: Vec::new(), judged: 0, passed_over: 0, verdict: Ok(()) };
+    report.verdict = examine(system, x0, radius, &mut report);
+    report
+}
+
+/// Examines the start and the samples around it, and notes every law in the report.
+fn examine<Y: Metriplectic + ?Sized>(
+    system: &Y,
+    x0: &Point<Y>,
+    radius: f64,
+    report: &mut Report,
+) -> Result<(), ModelError> {
+    system.manifold().check(x0)?;
+    let mut rng = ChaCha8Rng::seed_from_u64(SEED);
+    if let Some(unfit) = value_not_finite(system, x0) {
+        return Err(unfit);
+    }
+    let mut first = examine_at(system, x0, &mut rng, report);
+    for _ in 0..SAMPLES {
+        let q = Vector::<Y::Manifold>::from_index(|_| radius * rng.random_range(-1.0..1.0));
+        let x = Y::Manifold::chart(x0, &q);
+        if value_not_finite(system, &x).is_some() {
+            report.passed_over += 1;
+        } else {
+            first = first.and(examine_at(system, &x, &mut rng, report));
+        }
+    }
+    first
+}
+
+/// A field whose value at `x` is not a finite number.
+fn value_not_finite<Y: Metriplectic + ?Sized>(system: &Y, x: &Point<Y>) -> Option<ModelError> {
+    let at = ChartPoint::<Y::Manifold>::centre(x);
+    let values = [
+        ("energy", system.energy().at::<f64>(x)),
+        ("entropy", system.entropy().at::<f64>(x)),
+        ("metric", metric_matrix(system, x).max_abs()),
+        ("bracket", system.bracket().tensor(system.manifold(), &at).max_abs()),
+    ];
+    let (field, value) = values.into_iter().find(|(_, value)| !value.is_finite())?;
+    Some(ModelError::ValueNotFinite { field, value, point: Y::Manifold::entries(x) })
+}
+
+/// Judges the model at one point where its values are finite.
+fn examine_at<Y: Metriplectic + ?Sized>(
+    system: &Y,
+    x: &Point<Y>,
+    rng: &mut ChaCha8Rng,
+    report: &mut Report,
+) -> Result<(), ModelError> {
+    report.judged += 1;
+    let mut site = Site { point: Y::Manifold::entries(x), laws: &mut report.laws, first: None };
+    let energy = jet(system.energy(), "energy", x)?;
+    let entropy = jet(system.entropy(), "entropy", x)?;
+    examine_metric(system, x)?;
+    examine_bracket(system, x, &entropy, &mut site)?;
+    examine_dissipation(system, x, &energy, &entropy, rng, &mut site)?;
+    site.first.map_or(Ok(()), Err)
+}
+
+/// Value, differential and Hessian, all finite.
+fn jet<M: Manifold>(
+    f: &impl ScalarField<M>,
+    field: &'static str,
+    x: &M::Point<f64>,
+) -> Result<Jet2<M>, ModelError> {
+    let jet = f.jet2(x);
+    if jet.is_finite() {
+        Ok(jet)
+    } else {
+        Err(ModelError::DerivativeNotFinite { field, point: M::entries(x) })
+    }
+}
+
+/// The metric can be factored, differentiated, and followed along a geodesic.
+fn examine_metric<Y: Metriplectic + ?Sized>(system: &Y, x: &Point<Y>) -> Result<(), ModelError> {
+    let point = || Y::Manifold::entries(x);
+    let metric = system.metric();
+    if let Some(slopes) = metric.slopes(x)
+        && !slopes.as_ref().iter().all(|slope| slope.max_abs().is_finite())
+    {
+        return Err(ModelError::DerivativeNotFinite { field: "metric", point: point() });
+    }
+    let centre = ChartPoint::<Y::Manifold>::centre(x);
+    let at = metric.at(&centre).and_then(|_| metric.exp(&centre, &Vector::<Y::Manifold>::zero()));
+    at.map(|_| ()).map_err(|source| ModelError::Metric { source, point: point() })
+}
+
+/// `Π` is skew, satisfies the Jacobi identity, and has `S` as a Casimir.
+fn examine_bracket<Y: Metriplectic + ?Sized>(
+    system: &Y,
+    x: &Point<Y>,
+    entropy: &Jet2<Y::Manifold>,
+    site: &mut Site<'_>,
+) -> Result<(), ModelError> {
+    let defects = bracket_defects(system.bracket(), system.manifold(), x);
+    if !defects.jacobi.is_finite() {
+        return Err(ModelError::DerivativeNotFinite {
+            field: "bracket",
+            point: site.point.clone(),
+        });
+    }
+    let size = relative(defects.skewness, defects.size);
+    site.note("Πᵀ = −Π", size, |point| ModelError::BracketNotSkew { point, size });
+    let size = relative(defects.jacobi, defects.jacobi_size);
+    site.note("Jacobi identity", size, |point| ModelError::NoJacobiIdentity { point, size });
+
+    let centre = ChartPoint::<Y::Manifold>::centre(x);
+    let velocity = system.bracket().apply(system.manifold(), &centre, &entropy.df);
+    let size = relative(velocity.magnitude(), defects.size * entropy.df.magnitude());
+    if system.second_law() == SecondLaw::Casimir {
+        site.note("Π dS = 0", size, |point| ModelError::EntropyNotCasimir { point, size });
+    }
+    Ok(())
+}
+
+/// `K` is symmetric and positive semidefinite, and kills `dH`.
+fn examine_dissipation<Y: Metriplectic + ?Sized>(
+    system: &Y,
+    x: &Point<Y>,
+    energy: &Jet2<Y::Manifold>,
+    entropy: &Jet2<Y::Manifold>,
+    rng: &mut ChaCha8Rng,
+    site: &mut Site<'_>,
+) -> Result<(), ModelError> {
+    if system.dissipation().is_none() {
+        return Ok(());
+    }
+    let metric = |source| ModelError::Metric { source, point: Y::Manifold::entries(x) };
+    let centre = ChartPoint::<Y::Manifold>::centre(x);
+    let (k, g) = (system.dissipation(), system.metric());
+    let tensor = k.tensor(g, &centre, &energy.df).map_err(metric)?;
+    let scale = tensor.max_abs();
+    let transposed = Matrix::<Y::Manifold>::from_entries(|i, j| tensor[(j, i)]);
+    let size = relative((tensor - transposed).max_abs(), scale);
+    site.note("Kᵀ = K", size, |point| ModelError::DissipationNotSymmetric { point, size });
+
+    let covector = Vector::<Y::Manifold>::from_index(|_| rng.random_range(-1.0..1.0));
+    let negative = [entropy.df, covector].iter().fold(0.0_f64, |worst, alpha| {
+        let form = alpha.dot(&(tensor * *alpha));
+        worst.max(relative((-form).max(0.0), scale * alpha.magnitude().powi(2)))
+    });
+    site.note("K ⪰ 0", negative, |point| ModelError::DissipationNotPositive {
+        point,
+        size: negative,
+    });
+
+    let killed = tensor * energy.df;
+    let size = relative(killed.magnitude(), scale * energy.df.magnitude());
+    site.note("K dH = 0", size, |point| ModelError::EnergyNotKept { point, size });
+    Ok(())
+}
+
+/// `size / scale`, where a law about nothing holds.
+fn relative(size: f64, scale: f64) -> f64 {
+    if size == 0.0 { 0.0 } else { size / scale.max(f64::MIN_POSITIVE) }
+}
+
+/// One point of the examination: where the laws' residuals and the first error are kept.
+struct Site<'a> {
+    point: Vec<f64>,
+    laws: &'a mut Vec<LawResidual>,
+    first: Option<ModelError>,
+}
+
+impl Site<'_> {
+    /// Notes the violation of a law here, and keeps the worst of all points.
+    fn note(&mut self, law: &'static str, size: f64, error: impl FnOnce(Vec<f64>) -> ModelError) {
+        let here = LawResidual { law, size, allowed: TOLERANCE, point: self.point.clone() };
+        if !here.holds() && self.first.is_none() {
+            self.first = Some(error(self.point.clone()));
+        }
+        match self.laws.iter_mut().find(|residual| residual.law == law) {
+            None => self.laws.push(here),
+            Some(known) if size > known.size || size.is_nan() => *known = here,
+            Some(_) => {}
+        }
+    }
+}
+
+/// A model that breaks one of its laws. `size` is relative to the terms that should cancel.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ModelError {
+    /// The start is not a point of the manifold.
+    #[error("the start: {0}")]
+    Start(#[from] PointError),
+    /// A value at the start is not a finite number.
+    #[error("the {field} is {value} at {point:?}; start where the model is defined")]
+    ValueNotFinite {
+        /// Which part of the model.
+        field: &'static str,
+        /// Its value there.
+        value: f64,
+        /// The entries of the point.
+        point: Vec<f64>,
+    },
+    /// A value is finite, but a derivative is not.
+    #[error(
+        "the {field} has a finite value but a derivative that is not finite at {point:?}; a square \
+         root or a norm at zero does this: write `norm_squared()`, or keep the start away from it"
+    )]
+    DerivativeNotFinite {
+        /// Which part of the model.
+        field: &'static str,
+        /// The entries of the point.
+        point: Vec<f64>,
+    },
+    /// The metric cannot be used.
+    #[error("at {point:?}: {source}")]
+    Metric {
+        /// What is wrong with it.
+        source: MetricError,
+        /// The entries of the point.
+        point: Vec<f64>,
+    },
+    /// `Π` is not skew.
+    #[error(
+        "the bracket is not skew at {point:?}: Π + Πᵀ is {size:.1e} of Π; energy would not be kept"
+    )]
+    BracketNotSkew {
+        /// The entries of the point.
+        point: Vec<f64>,
+        /// The relative size of the violation.
+        size: f64,
+    },
+    /// `Π` breaks the Jacobi identity.
+    #[error("the bracket breaks the Jacobi identity at {point:?} by {size:.1e} of its terms")]
+    NoJacobiIdentity {
+        /// The entries of the point.
+        point: Vec<f64>,
+        /// The relative size of the violation.
+        size: f64,
+    },
+    /// `Π dS ≠ 0`.
+    #[error(
+        "the entropy is not a Casimir of the bracket at {point:?}: Π dS is {size:.1e} of |Π||dS|; \
+         use a Casimir, give S a factor of its own, or ask for `SecondLaw::Published`"
+    )]
+    EntropyNotCasimir {
+        /// The entries of the point.
+        point: Vec<f64>,
+        /// The relative size of the violation.
+        size: f64,
+    },
+    /// `K` is not symmetric.
+    #[error("the dissipation is not symmetric at {point:?}: K − Kᵀ is {size:.1e} of K")]
+    DissipationNotSymmetric {
+        /// The entries of the point.
+        point: Vec<f64>,
+        /// The relative size of the violation.
+        size: f64,
+    },
+    /// `K` is not positive semidefinite.
+    #[error(
+        "the dissipation destroys entropy at {point:?}: K has the negative value {size:.1e} of |K|"
+    )]
+    DissipationNotPositive {
+        /// The entries of the point.
+        point: Vec<f64>,
+        /// The relative size of the violation.
+        size: f64,
+    },
+    /// `K dH ≠ 0`.
+    #[error("the dissipation does not keep the energy at {point:?}: K dH is {size:.1e} of |K||dH|")]
+    EnergyNotKept {
+        /// The entries of the point.
+        point: Vec<f64>,
+        /// The relative size of the violation.
+        size: f64,
+    },
+}

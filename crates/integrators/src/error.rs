@@ -1,0 +1,117 @@
+//! What can go wrong in a run.
+
+use metriplectic_dynamics::{BuildError, ModelError, PoissonError};
+use metriplectic_manifolds::{AlgebraError, Manifold, MetricError, PointError};
+
+use crate::span::SpanError;
+use crate::trajectory::Trajectory;
+
+/// A step that could not be taken, after its halves had been tried too.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum StepError {
+    /// The implicit equation was not solved.
+    #[error(
+        "the step of size {h:.3e} from t = {time} was not solved: residual {residual:.1e} after \
+         {sweeps} Newton sweeps, with {splits} halvings of the step tried; \
+         try a step below {suggested:.1e}"
+    )]
+    NotConverged {
+        /// The time at which the step starts.
+        time: f64,
+        /// The size of the step that was asked for.
+        h: f64,
+        /// The residual that was left in the smallest step tried.
+        residual: f64,
+        /// Linear systems solved in this step, over all attempts.
+        sweeps: usize,
+        /// How often the step was halved.
+        splits: usize,
+        /// A step size to try next.
+        suggested: f64,
+    },
+    /// A field is not defined around the start of the step.
+    #[error(
+        "the step of size {h:.3e} from t = {time} leaves the domain of the model wherever it goes \
+         ({splits} halvings tried); try a smaller step, or check energy and entropy there"
+    )]
+    OutOfDomain {
+        /// The time at which the step starts.
+        time: f64,
+        /// The size of the step that was asked for.
+        h: f64,
+        /// How often the step was halved.
+        splits: usize,
+    },
+}
+
+/// A run that did not finish.
+#[derive(Clone, Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum RunError<M: Manifold> {
+    /// The model breaks one of its laws.
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    /// The span cannot be run.
+    #[error(transparent)]
+    Span(#[from] SpanError),
+    /// A step failed; what was computed until then is kept.
+    #[error("{cause} ({} steps were taken and are kept in this error)", trajectory.certificate().steps)]
+    Step {
+        /// The step that failed.
+        cause: StepError,
+        /// The trajectory so far.
+        trajectory: Box<Trajectory<M>>,
+    },
+}
+
+impl<M: Manifold> RunError<M> {
+    /// The trajectory up to the step that failed, if the run had started.
+    pub fn trajectory(&self) -> Option<&Trajectory<M>> {
+        match self {
+            Self::Step { trajectory, .. } => Some(trajectory),
+            Self::Model(_) | Self::Span(_) => None,
+        }
+    }
+}
+
+/// Everything that can go wrong between three closures and a trajectory, for programs that pass all
+/// of it on with `?`.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// Structure constants that do not make a Lie algebra.
+    #[error(transparent)]
+    Algebra(#[from] AlgebraError),
+    /// A metric that cannot be used.
+    #[error(transparent)]
+    Metric(#[from] MetricError),
+    /// A matrix that is not a Poisson tensor.
+    #[error(transparent)]
+    Poisson(#[from] PoissonError),
+    /// A point that is not on its manifold.
+    #[error(transparent)]
+    Point(#[from] PointError),
+    /// Parts that do not make a system.
+    #[error(transparent)]
+    Build(#[from] BuildError),
+    /// A model that breaks one of its laws.
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    /// A span that cannot be run.
+    #[error(transparent)]
+    Span(#[from] SpanError),
+    /// A run that stopped; the [`RunError`] with the trajectory so far can be downcast from it.
+    #[error("{0}")]
+    Run(#[source] Box<dyn std::error::Error + Send + Sync>),
+}
+
+impl<M: Manifold> From<RunError<M>> for Error {
+    fn from(error: RunError<M>) -> Self {
+        match error {
+            RunError::Model(error) => Self::Model(error),
+            RunError::Span(error) => Self::Span(error),
+            error @ RunError::Step { .. } => Self::Run(Box::new(error)),
+        }
+    }
+}

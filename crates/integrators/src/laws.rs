@@ -1,0 +1,1 @@
+//! What a step promises, and the function that checks it.

@@ -1,0 +1,37 @@
+//! How a metriplectic system moves in discrete time, with the first law kept to round-off.
+//!
+//! | module | what it holds |
+//! |---|---|
+//! | [`gonzalez`] | the midpoint discrete gradient, safe against round-off |
+//! | [`residual`] | the implicit equation of one step, and its Jacobian |
+//! | [`root_finder`] | [`RootFinder`]: what solves an equation |
+//! | [`newton`] | [`Newton`]: the solver of every step |
+//! | `globaliser` | L-BFGS from argmin, which brings a lost Newton back (feature `argmin`) |
+//! | [`span`](mod@span) | [`Span`]: step size, number of steps, what is recorded |
+//! | [`step`] | [`Scheme`] and one step of it |
+//! | [`trajectory`] | [`Steps`], the endless iterator, and [`Trajectory`], the record |
+//! | [`certificate`] | [`Certificate`]: what a run did to its laws |
+//! | [`error`](mod@error) | [`Error`], [`RunError`], [`StepError`] |
+//! | [`laws`] | what a step promises, and the function that checks it |
+
+pub mod certificate;
+pub mod error;
+#[cfg(feature = "argmin")]
+mod globaliser;
+pub mod gonzalez;
+pub mod laws;
+pub mod newton;
+pub mod residual;
+pub mod root_finder;
+pub mod span;
+pub mod step;
+pub mod trajectory;
+
+pub use certificate::Certificate;
+pub use error::{Error, RunError, StepError};
+pub use newton::Newton;
+pub use residual::Residual;
+pub use root_finder::{Equation, Linearised, NoRoot, Root, RootFinder};
+pub use span::{Span, SpanError};
+pub use step::{Scheme, Work};
+pub use trajectory::{Run, State, Steps, Trajectory};

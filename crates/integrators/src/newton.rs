@@ -1,0 +1,156 @@
+//! Newton's method with a residual floor that follows the scale of the state.
+
+use metriplectic_fields::{Column, Space, Square, Vector};
+
+use crate::root_finder::{Equation, Linearised, NoRoot, Root, RootFinder};
+
+/// Newton's method, damped, down to round-off.
+///
+/// It stops where the residual is at the floor that the equation states, or where it no longer
+/// falls within a small multiple of it: a stall *at* the floor is convergence, a stall above it is
+/// not.
+///
+/// ```
+/// use metriplectic_integrators::Newton;
+/// let patient = Newton { sweeps: 50, ..Newton::default() };
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Newton {
+    /// The residual that counts as solved, in units of the round-off floor.
+    pub tolerance: f64,
+    /// The multiple of the floor at which a residual that no longer falls counts as solved.
+    pub stall: f64,
+    /// Linear systems that may be solved.
+    pub sweeps: usize,
+    /// Halvings of one correction that does not reduce the residual.
+    pub halvings: usize,
+}
+
+impl Default for Newton {
+    fn default() -> Self {
+        Self { tolerance: 1.0, stall: 100.0, sweeps: 30, halvings: 8 }
+    }
+}
+
+impl<M: Space> RootFinder<M> for Newton {
+    fn solve(&self, equation: &impl Equation<M>, guess: &Vector<M>) -> Result<Root<M>, NoRoot<M>> {
+        let mut u = *guess;
+        let Some(mut here) = equation.linearise(&u) else {
+            return Err(NoRoot { best: u, residual: f64::INFINITY, sweeps: 0 });
+        };
+        let mut residual = here.residual.magnitude();
+        for sweeps in 0..self.sweeps {
+            if residual <= self.tolerance * here.floor {
+                return Ok(Root { u, residual, sweeps });
+            }
+            let fails = || NoRoot { best: u, residual, sweeps: sweeps + 1 };
+            let correction = here.jacobian.solve(&here.residual).ok_or_else(fails)?;
+            match self.descend(equation, &u, &correction, residual) {
+                Some((next, linearised)) => {
+                    u = next;
+                    here = linearised;
+                    residual = here.residual.magnitude();
+                }
+                None if residual <= self.stall * here.floor => {
+                    return Ok(Root { u, residual, sweeps: sweeps + 1 });
+                }
+                None => return Err(fails()),
+            }
+        }
+        if residual <= self.stall * here.floor {
+            Ok(Root { u, residual, sweeps: self.sweeps })
+        } else {
+            Err(NoRoot { best: u, residual, sweeps: self.sweeps })
+        }
+    }
+}
+
+impl Newton {
+    /// The longest of the corrections `δ, δ/2, δ/4, …` that reduces the residual.
+    fn descend<M: Space>(
+        &self,
+        equation: &impl Equation<M>,
+        u: &Vector<M>,
+        correction: &Vector<M>,
+        residual: f64,
+    ) -> Option<(Vector<M>, Linearised<M>)> {
+        let mut length = 1.0;
+        for _ in 0..=self.halvings {
+            let next = *u - *correction * length;
+            if let Some(there) = equation.linearise(&next)
+                && there.residual.magnitude() < residual * (1.0 - 1e-4 * length)
+            {
+                return Some((next, there));
+            }
+            length *= 0.5;
+        }
+        None
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use metriplectic_manifolds::Euclidean;
+    use nalgebra::{Matrix1, Matrix2, Vector1, Vector2, vector};
+
+    /// `x² + y² = 4`, `xy = 1`.
+    struct CircleAndHyperbola;
+
+    impl Equation<Euclidean<2>> for CircleAndHyperbola {
+        fn linearise(&self, u: &Vector2<f64>) -> Option<Linearised<Euclidean<2>>> {
+            Some(Linearised {
+                residual: vector![u.norm_squared() - 4.0, u.x * u.y - 1.0],
+                jacobian: Matrix2::new(2.0 * u.x, 2.0 * u.y, u.y, u.x),
+                floor: 8.0 * f64::EPSILON,
+            })
+        }
+    }
+
+    #[test]
+    fn convergence_is_quadratic() {
+        let root = Newton::default().solve(&CircleAndHyperbola, &vector![2.0, 0.4]).unwrap();
+        // x² = 2 + √3 in closed form.
+        assert!((root.u.x - (2.0 + 3.0_f64.sqrt()).sqrt()).abs() < 1e-15);
+        assert!(root.sweeps <= 5, "{} sweeps", root.sweeps);
+    }
+
+    /// `ln u = 1`, defined for `u > 0` only.
+    struct Logarithm;
+
+    impl Equation<Euclidean<1>> for Logarithm {
+        fn linearise(&self, u: &Vector1<f64>) -> Option<Linearised<Euclidean<1>>> {
+            let residual = vector![u.x.ln() - 1.0];
+            let jacobian = Matrix1::new(u.x.recip());
+            (u.x > 0.0).then_some(Linearised { residual, jacobian, floor: 4.0 * f64::EPSILON })
+        }
+    }
+
+    #[test]
+    fn damping_backs_off_from_the_edge_of_the_domain() {
+        // The undamped correction from u = 20 lands at 20 − 20 (ln 20 − 1) = −19.9.
+        let root = Newton::default().solve(&Logarithm, &vector![20.0]).unwrap();
+        assert!((root.u.x - 1.0_f64.exp()).abs() < 1e-14);
+    }
+
+    /// `u² + 1 = 0` has no real root.
+    struct NoRealRoot;
+
+    impl Equation<Euclidean<1>> for NoRealRoot {
+        fn linearise(&self, u: &Vector1<f64>) -> Option<Linearised<Euclidean<1>>> {
+            Some(Linearised {
+                residual: vector![u.x * u.x + 1.0],
+                jacobian: Matrix1::new(2.0 * u.x),
+                floor: f64::EPSILON,
+            })
+        }
+    }
+
+    #[test]
+    fn a_missing_root_is_an_error_with_the_best_point() {
+        let failure = Newton::default().solve(&NoRealRoot, &vector![3.0]).unwrap_err();
+        assert!(failure.residual >= 1.0 && failure.residual < 10.0);
+        let undefined = Newton::default().solve(&Logarithm, &vector![-1.0]).unwrap_err();
+        assert!(undefined.residual.is_infinite());
+    }
+}

@@ -1,0 +1,106 @@
+//! The implicit equation of one step.
+
+use metriplectic_dynamics::{Bracket, Dissipation, Metriplectic, system::Point};
+use metriplectic_fields::{
+    ChartPoint, Column, Real, Scalar, ScalarField, Space, Square, Vector, differential,
+};
+use metriplectic_manifolds::{ArcJet, Manifold, MetricError, Retraction, Riemannian};
+
+use crate::gonzalez::{Chord, gonzalez};
+use crate::root_finder::{Equation, Linearised};
+
+/// The equation of one step (Bloch, Farré Puiggalí, Martín de Diego 2024, §4.4), as a function of
+/// the initial displacement `u ∈ T_xM` of the arc:
+///
+/// ```math
+/// F(u) = d - h \bigl( \Pi(z)\, w + K_w(z)\, dS(z) \bigr) = 0 ,
+/// ```
+///
+/// with `(z, d) = R_h⁻¹(x, x')` the base point and displacement of the arc, and `w` the Gonzalez
+/// discrete gradient of `H` along it. Both brackets kill `w`, so a root keeps `H`. No logarithm is
+/// taken: the arc is shot from `x`.
+#[derive(Debug)]
+pub struct Residual<'a, Y: Metriplectic, R> {
+    /// The system.
+    pub system: &'a Y,
+    /// The retraction of the scheme.
+    pub retraction: &'a R,
+    /// Where the step starts.
+    pub x: &'a Point<Y>,
+    /// The step size `h`.
+    pub h: f64,
+    /// The energy `H(x)`.
+    pub energy: f64,
+    /// The part of the energy error of earlier steps that this step takes back.
+    pub recall: f64,
+}
+
+impl<Y, R> Residual<'_, Y, R>
+where
+    Y: Metriplectic,
+    R: Retraction<Y::Manifold, Y::Metric>,
+{
+    /// The residual by its definition, at any scalar.
+    ///
+    /// # Errors
+    ///
+    /// [`MetricError`] if the arc cannot be followed.
+    pub fn at<D: Scalar>(
+        &self,
+        u: &Vector<Y::Manifold, D>,
+    ) -> Result<Vector<Y::Manifold, D>, MetricError> {
+        let (metric, space) = (self.system.metric(), self.system.manifold());
+        let arc = self.retraction.arc(metric, self.x, u)?;
+        let g = metric.at(&arc.z)?;
+        let w = gonzalez(self.system.energy(), &g, &arc, self.energy);
+        let s = differential(self.system.entropy(), &arc.z);
+        let reversible = self.system.bracket().apply(space, &arc.z, &w);
+        let irreversible = self.system.dissipation().apply(metric, &arc.z, &w, &s)?;
+        Ok(arc.d - (reversible + irreversible) * D::from(self.h))
+    }
+
+    /// The field's data along an arc.
+    fn chord(&self, u: &Vector<Y::Manifold>, arc: &ArcJet<Y::Manifold>) -> Chord<Y::Manifold> {
+        Chord::new(self.system.energy(), arc, |s| {
+            let u = Vector::<Y::Manifold, Real>::embed(u) * s;
+            match self.retraction.arc(self.system.metric(), self.x, &u) {
+                Ok(arc) => arc.end,
+                // The same arc has been followed to its end, so this is not reached.
+                Err(_) => Y::Manifold::constant(&arc.end),
+            }
+        })
+    }
+}
+
+impl<Y, R> Equation<Y::Manifold> for Residual<'_, Y, R>
+where
+    Y: Metriplectic,
+    R: Retraction<Y::Manifold, Y::Metric>,
+{
+    /// The residual safe against round-off, with its Jacobian from the jets `(f, df, Hf)` of the
+    /// fields: no nested dual number is formed.
+    fn linearise(&self, u: &Vector<Y::Manifold>) -> Option<Linearised<Y::Manifold>> {
+        let (system, metric, h) = (self.system, self.system.metric(), self.h);
+        let arc = self.retraction.arc_jet(metric, self.x, u).ok()?;
+        let g = metric.at(&ChartPoint::<Y::Manifold>::centre(&arc.z)).ok()?;
+        let chord = self.chord(u, &arc);
+        let entropy = system.entropy().jet2(&arc.z);
+        if !(chord.is_finite() && entropy.is_finite()) {
+            return None;
+        }
+        let (w, dw) = chord.covector(self.energy, self.recall, &g, &arc);
+        let pi = system.bracket().linearise(system.manifold(), &arc.z, &w);
+        let k = system.dissipation().linearise(metric, &arc.z, &w, &entropy.df).ok()?;
+
+        let residual = arc.d - (pi.value + k.value) * h;
+        let slope = (pi.along_z + k.along_z) * arc.dz
+            + (pi.tensor + k.along_w) * dw
+            + k.tensor * (entropy.hf * arc.dz);
+        let jacobian = arc.dd - slope * h;
+        // The terms of Πw and K dS are rounded, and so is d.
+        let terms =
+            pi.tensor.max_abs() * w.magnitude() + k.tensor.max_abs() * entropy.df.magnitude();
+        let floor = f64::EPSILON * (4.0 * h * terms + arc.d.magnitude());
+        residual.is_finite().then_some(Linearised { residual, jacobian, floor })
+    }
+}

@@ -1,0 +1,258 @@
+//! One step: guess, solve, retract.
+
+use metriplectic_dynamics::{Bracket, Dissipation, Metriplectic, system::Point};
+use metriplectic_fields::{ChartPoint, Column, ScalarField, Square, Vector};
+use metriplectic_manifolds::{Manifold, Retraction};
+
+use crate::error::StepError;
+use crate::newton::Newton;
+use crate::residual::Residual;
+use crate::root_finder::{NoRoot, Root, RootFinder};
+
+/// A scheme: a retraction, and how hard to try to solve its equation.
+///
+/// ```
+/// use metriplectic_integrators::{Newton, Scheme};
+/// use metriplectic_manifolds::WeylMidpoint;
+/// let scheme = Scheme { splits: 4, ..Scheme::new(WeylMidpoint) };
+/// let patient = scheme.newton(Newton { sweeps: 60, ..Newton::default() });
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Scheme<R> {
+    /// Turns a vector into a pair of points.
+    pub retraction: R,
+    /// Solves the equation of a step.
+    pub newton: Newton,
+    /// How often a step that is not solved is split in halves; both laws hold for each half.
+    pub splits: usize,
+}
+
+impl<R> Scheme<R> {
+    /// The scheme of a retraction, with the default solver.
+    pub fn new(retraction: R) -> Self {
+        Self { retraction, newton: Newton::default(), splits: 10 }
+    }
+
+    /// Replaces the options of the solver.
+    #[must_use]
+    pub fn newton(self, newton: Newton) -> Self {
+        Self { newton, ..self }
+    }
+
+    /// One step of size `h` from `x`, with the energy `energy = H(x)`; `left_over = H(x) − H(x₀)`
+    /// is the round-off that earlier steps have left in the energy. The displacement is guessed
+    /// from `history`, and noted there.
+    ///
+    /// # Errors
+    ///
+    /// [`StepError`] with `time` and all that was tried.
+    pub fn step<Y>(
+        &self,
+        system: &Y,
+        start: &Start<'_, Y>,
+        history: &mut History<Vector<Y::Manifold>>,
+    ) -> Result<(Point<Y>, Work), StepError>
+    where
+        Y: Metriplectic,
+        R: Retraction<Y::Manifold, Y::Metric>,
+    {
+        let mut work = Work::default();
+        match self.attempt(system, start, history, &mut work) {
+            Ok(end) => Ok((end, work)),
+            Err(failure) => {
+                history.forget();
+                let end = self.halves(system, start, 1, &mut work).map_err(|smallest| {
+                    let residual = smallest.residual.min(failure.residual);
+                    if residual.is_finite() {
+                        StepError::NotConverged {
+                            time: start.time,
+                            h: start.h,
+                            residual,
+                            sweeps: work.sweeps,
+                            splits: work.splits,
+                            suggested: start.h * 0.5_f64.powi(work.splits.min(30) as i32),
+                        }
+                    } else {
+                        StepError::OutOfDomain { time: start.time, h: start.h, splits: work.splits }
+                    }
+                })?;
+                Ok((end, work))
+            }
+        }
+    }
+
+    /// The two halves of a step that was not solved whole.
+    fn halves<Y>(
+        &self,
+        system: &Y,
+        start: &Start<'_, Y>,
+        depth: usize,
+        work: &mut Work,
+    ) -> Result<Point<Y>, NoRoot<Y::Manifold>>
+    where
+        Y: Metriplectic,
+        R: Retraction<Y::Manifold, Y::Metric>,
+    {
+        work.splits += 1;
+        let mut history = History::new();
+        let mut point = start.x.clone();
+        for half in 0..2 {
+            let h = 0.5 * start.h;
+            let energy = system.energy().at::<f64>(&point);
+            let left_over = start.left_over + (energy - start.energy);
+            let time = start.time + f64::from(half) * h;
+            let part = Start { x: &point, time, h, energy, left_over };
+            let end = match self.attempt(system, &part, &mut history, work) {
+                Ok(end) => end,
+                Err(failure) if depth >= self.splits => return Err(failure),
+                Err(_) => self.halves(system, &part, depth + 1, work)?,
+            };
+            point = end;
+        }
+        Ok(point)
+    }
+
+    /// Guess, solve, retract.
+    fn attempt<Y>(
+        &self,
+        system: &Y,
+        start: &Start<'_, Y>,
+        history: &mut History<Vector<Y::Manifold>>,
+        work: &mut Work,
+    ) -> Result<Point<Y>, NoRoot<Y::Manifold>>
+    where
+        Y: Metriplectic,
+        R: Retraction<Y::Manifold, Y::Metric>,
+    {
+        let guess = history.extrapolate().or_else(|| explicit(system, start));
+        let guess = guess.unwrap_or_else(Vector::<Y::Manifold>::zero);
+        let residual = Residual {
+            system,
+            retraction: &self.retraction,
+            x: start.x,
+            h: start.h,
+            energy: start.energy,
+            recall: recall(system, start, &guess),
+        };
+        let root = self.solve(&residual, &guess, work)?;
+        let lost = NoRoot { best: root.u, residual: f64::INFINITY, sweeps: root.sweeps };
+        let arc = self.retraction.arc(system.metric(), start.x, &root.u).map_err(|_| lost)?;
+        history.note(root.u);
+        Ok(arc.end)
+    }
+
+    /// Newton's method, and where it is lost the globaliser with Newton's polish.
+    fn solve<Y>(
+        &self,
+        residual: &Residual<'_, Y, R>,
+        guess: &Vector<Y::Manifold>,
+        work: &mut Work,
+    ) -> Result<Root<Y::Manifold>, NoRoot<Y::Manifold>>
+    where
+        Y: Metriplectic,
+        R: Retraction<Y::Manifold, Y::Metric>,
+    {
+        let solved = self.newton.solve(residual, guess);
+        work.sweeps += solved.as_ref().map_or_else(|failure| failure.sweeps, |root| root.sweeps);
+        #[cfg(feature = "argmin")]
+        if let Err(failure) = &solved
+            && let Some(closer) = crate::globaliser::descend(residual, &failure.best)
+        {
+            work.globalised += 1;
+            let polished = self.newton.solve(residual, &closer);
+            work.sweeps +=
+                polished.as_ref().map_or_else(|failure| failure.sweeps, |root| root.sweeps);
+            return polished;
+        }
+        solved
+    }
+}
+
+/// Where a step starts.
+#[derive(Debug)]
+pub struct Start<'a, Y: Metriplectic> {
+    /// The point `x`.
+    pub x: &'a Point<Y>,
+    /// The time.
+    pub time: f64,
+    /// The step size.
+    pub h: f64,
+    /// The energy `H(x)`.
+    pub energy: f64,
+    /// The round-off `H(x) − H(x₀)` that earlier steps have left.
+    pub left_over: f64,
+}
+
+/// What a step cost.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Work {
+    /// Linear systems solved by Newton's method.
+    pub sweeps: usize,
+    /// How often the step, or a part of it, was split in halves.
+    pub splits: usize,
+    /// How often the globaliser was called.
+    pub globalised: usize,
+}
+
+/// The explicit Euler displacement `h (Π dH + K dS)(x)`.
+fn explicit<Y: Metriplectic>(system: &Y, start: &Start<'_, Y>) -> Option<Vector<Y::Manifold>> {
+    let (dh, ds) = (system.energy().jet1(start.x).df, system.entropy().jet1(start.x).df);
+    let x = ChartPoint::centre(start.x);
+    let reversible = system.bracket().apply(system.manifold(), &x, &dh);
+    let irreversible = system.dissipation().apply(system.metric(), &x, &dh, &ds).ok()?;
+    let displacement = (reversible + irreversible) * start.h;
+    displacement.is_finite().then_some(displacement)
+}
+
+/// The share `φ e` of the left-over energy `e` that the step takes back.
+///
+/// Round-off would make the energy a random walk over millions of steps, so each step aims at
+/// `H(x₀)` instead of `H(x)`. Asking for `⟨w, d⟩ = F(x') − F(x) + φe` changes the covector by
+/// `φ|e|/|d|`, and with it the displacement by `h|Π|φ|e|/|d|`, which must stay small against `|d|`.
+/// Hence `φ = r²/(1 + r²)` with `r = |d|² / (10² h|Π| ε max(|H|, |dH||x|))`: all of it while the
+/// state moves, nothing of it at rest, where it would hold the state fast.
+fn recall<Y: Metriplectic>(system: &Y, start: &Start<'_, Y>, d: &Vector<Y::Manifold>) -> f64 {
+    if start.left_over == 0.0 {
+        return 0.0;
+    }
+    let dh = system.energy().jet1(start.x).df;
+    let ds = system.entropy().jet1(start.x).df;
+    let pi = system.bracket().linearise(system.manifold(), start.x, &dh);
+    let k = system.dissipation().linearise(system.metric(), start.x, &dh, &ds);
+    let gain = start.h * (pi.tensor.max_abs() + k.map_or(0.0, |k| k.along_w.max_abs()));
+    let scale = start.energy.abs().max(dh.magnitude() * Y::Manifold::magnitude(start.x));
+    let r = d.dot(d) / (1e2 * gain * f64::EPSILON * scale).max(f64::MIN_POSITIVE);
+    start.left_over * (r * r / (1.0 + r * r))
+}
+
+/// The displacements of the last three steps, from which the next one is extrapolated.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct History<V> {
+    known: [Option<V>; 3],
+}
+
+impl<V: Copy> History<V> {
+    /// An empty history.
+    pub const fn new() -> Self {
+        Self { known: [None; 3] }
+    }
+
+    fn note(&mut self, d: V) {
+        self.known = [Some(d), self.known[0], self.known[1]];
+    }
+
+    fn forget(&mut self) {
+        self.known = [None; 3];
+    }
+}
+
+impl<V: Column<f64>> History<V> {
+    /// The parabola through the last three displacements, continued by one step.
+    fn extrapolate(&self) -> Option<V> {
+        match self.known {
+            [Some(a), Some(b), Some(c)] => Some((a - b) * 3.0 + c),
+            [Some(a), Some(b), None] => Some(a * 2.0 - b),
+            _ => None,
+        }
+    }
+}

@@ -1,0 +1,324 @@
+//! Steps in a row, with their certificate.
+
+use approx::{AbsDiffEq, RelativeEq};
+use metriplectic_dynamics::{Metriplectic, system::Point};
+use metriplectic_fields::{Column, ScalarField, Space, Vector};
+use metriplectic_manifolds::{Exponential, Manifold, Retraction, WeylMidpoint};
+
+use crate::certificate::Certificate;
+use crate::error::{RunError, StepError};
+use crate::span::{Span, check_step_size};
+use crate::step::{History, Scheme, Start, Work};
+
+/// A state of a run: time, point, and the two fields there.
+#[derive(Clone, Debug, PartialEq)]
+pub struct State<M: Space> {
+    /// Steps taken.
+    pub step: usize,
+    /// The time `step · h`.
+    pub time: f64,
+    /// The point.
+    pub point: M::Point<f64>,
+    /// The energy `H` there.
+    pub energy: f64,
+    /// The entropy `S` there; 0 without an entropy.
+    pub entropy: f64,
+}
+
+/// An endless iterator over the states of a run, in constant memory; ended by an error.
+///
+/// Made by [`Scheme::steps`] or [`Run::steps`].
+#[derive(Debug)]
+pub struct Steps<'a, Y: Metriplectic, R> {
+    scheme: Scheme<R>,
+    system: &'a Y,
+    h: f64,
+    state: State<Y::Manifold>,
+    history: History<Vector<Y::Manifold>>,
+    certificate: Certificate,
+    failed: bool,
+}
+
+impl<'a, Y, R> Steps<'a, Y, R>
+where
+    Y: Metriplectic,
+    R: Retraction<Y::Manifold, Y::Metric>,
+{
+    fn start(scheme: Scheme<R>, system: &'a Y, x0: Point<Y>, h: f64) -> Self {
+        let energy = system.energy().at::<f64>(&x0);
+        let entropy = system.entropy().at::<f64>(&x0);
+        let certificate = Certificate {
+            energy,
+            max_energy_error: 0.0,
+            entropy,
+            min_entropy_increment: 0.0,
+            entropy_gained: 0.0,
+            entropy_falls: 0,
+            max_manifold_defect: system.manifold().defect(&x0),
+            steps: 0,
+            sweeps: 0,
+            worst_sweeps: 0,
+            retries: 0,
+            globalised: 0,
+            second_law: system.second_law(),
+        };
+        let state = State { step: 0, time: 0.0, point: x0, energy, entropy };
+        Self { scheme, system, h, state, history: History::new(), certificate, failed: false }
+    }
+
+    /// The state reached so far.
+    pub const fn state(&self) -> &State<Y::Manifold> {
+        &self.state
+    }
+
+    /// The balance of the steps taken so far.
+    pub const fn certificate(&self) -> &Certificate {
+        &self.certificate
+    }
+
+    /// Takes one step.
+    ///
+    /// # Errors
+    ///
+    /// [`StepError`]; the state is then the last one reached.
+    pub fn advance(&mut self) -> Result<&State<Y::Manifold>, StepError> {
+        let start = Start {
+            x: &self.state.point,
+            time: self.state.time,
+            h: self.h,
+            energy: self.state.energy,
+            left_over: self.state.energy - self.certificate.energy,
+        };
+        let (point, work) = self.scheme.step(self.system, &start, &mut self.history)?;
+        let step = self.state.step + 1;
+        let next = State {
+            step,
+            time: step as f64 * self.h,
+            energy: self.system.energy().at::<f64>(&point),
+            entropy: self.system.entropy().at::<f64>(&point),
+            point,
+        };
+        self.account(&next, work);
+        self.state = next;
+        Ok(&self.state)
+    }
+
+    /// Enters a step into the certificate.
+    fn account(&mut self, next: &State<Y::Manifold>, work: Work) {
+        let c = &mut self.certificate;
+        c.max_energy_error = c.max_energy_error.max((next.energy - c.energy).abs());
+        let increment = next.entropy - self.state.entropy;
+        c.min_entropy_increment =
+            if c.steps == 0 { increment } else { c.min_entropy_increment.min(increment) };
+        c.entropy_gained = next.entropy - c.entropy;
+        if increment < 0.0 && increment < -entropy_round_off(self.system, &self.state) {
+            c.entropy_falls += 1;
+        }
+        c.max_manifold_defect =
+            c.max_manifold_defect.max(self.system.manifold().defect(&next.point));
+        c.steps += 1;
+        c.sweeps += work.sweeps;
+        c.worst_sweeps = c.worst_sweeps.max(work.sweeps);
+        c.retries += work.splits;
+        c.globalised += work.globalised;
+    }
+}
+
+/// The round-off `4ε (max(|S|, 1) + |dS||x|)` of an entropy increment: `S` is evaluated twice, at
+/// points whose entries are rounded.
+fn entropy_round_off<Y: Metriplectic>(system: &Y, state: &State<Y::Manifold>) -> f64 {
+    let ds = system.entropy().jet1(&state.point).df.magnitude();
+    let position = Y::Manifold::magnitude(&state.point);
+    4.0 * f64::EPSILON * (state.entropy.abs().max(1.0) + ds * position)
+}
+
+impl<Y, R> Iterator for Steps<'_, Y, R>
+where
+    Y: Metriplectic,
+    R: Retraction<Y::Manifold, Y::Metric>,
+{
+    type Item = Result<State<Y::Manifold>, StepError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        if self.failed {
+            return None;
+        }
+        let advanced = self.advance().cloned();
+        self.failed = advanced.is_err();
+        Some(advanced)
+    }
+}
+
+/// The record of a run: states and certificate.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Trajectory<M: Manifold> {
+    states: Vec<State<M>>,
+    certificate: Certificate,
+}
+
+impl<M: Manifold> Trajectory<M> {
+    /// The recorded states, the start first.
+    pub fn states(&self) -> &[State<M>] {
+        &self.states
+    }
+
+    /// The state at the end of the run.
+    pub fn last(&self) -> &State<M> {
+        &self.states[self.states.len() - 1]
+    }
+
+    /// The balance of the run, over all of its steps, recorded or not.
+    pub const fn certificate(&self) -> &Certificate {
+        &self.certificate
+    }
+
+    /// The recorded states in order.
+    pub fn iter(&self) -> std::slice::Iter<'_, State<M>> {
+        self.states.iter()
+    }
+}
+
+impl<'a, M: Manifold> IntoIterator for &'a Trajectory<M> {
+    type Item = &'a State<M>;
+    type IntoIter = std::slice::Iter<'a, State<M>>;
+
+    fn into_iter(self) -> Self::IntoIter {
+        self.iter()
+    }
+}
+
+impl<M: Manifold> AbsDiffEq for Trajectory<M>
+where
+    Self: PartialEq,
+{
+    type Epsilon = f64;
+
+    fn default_epsilon() -> f64 {
+        f64::default_epsilon()
+    }
+
+    fn abs_diff_eq(&self, other: &Self, epsilon: f64) -> bool {
+        self.states.len() == other.states.len()
+            && self.iter().zip(other).all(|(a, b)| a.point.abs_diff_eq(&b.point, epsilon))
+    }
+}
+
+impl<M: Manifold> RelativeEq for Trajectory<M>
+where
+    Self: PartialEq,
+{
+    fn default_max_relative() -> f64 {
+        f64::default_max_relative()
+    }
+
+    fn relative_eq(&self, other: &Self, epsilon: f64, max_relative: f64) -> bool {
+        self.states.len() == other.states.len()
+            && self
+                .iter()
+                .zip(other)
+                .all(|(a, b)| a.point.relative_eq(&b.point, epsilon, max_relative))
+    }
+}
+
+impl<R> Scheme<R> {
+    /// Verifies the model and starts an endless run in steps of size `h`.
+    ///
+    /// # Errors
+    ///
+    /// [`RunError`] if the model breaks a law or `h` is not a positive finite number.
+    pub fn steps<Y>(
+        self,
+        system: &Y,
+        x0: Point<Y>,
+        h: f64,
+    ) -> Result<Steps<'_, Y, R>, RunError<Y::Manifold>>
+    where
+        Y: Metriplectic,
+        R: Retraction<Y::Manifold, Y::Metric>,
+    {
+        check_step_size(h)?;
+        system.report(&x0).verdict?;
+        Ok(Steps::start(self, system, x0, h))
+    }
+
+    /// Verifies the model, runs it over a span, and records the states.
+    ///
+    /// # Errors
+    ///
+    /// [`RunError`]; if a step failed, the trajectory so far is in it.
+    pub fn run<Y>(
+        self,
+        system: &Y,
+        x0: Point<Y>,
+        span: Span,
+    ) -> Result<Trajectory<Y::Manifold>, RunError<Y::Manifold>>
+    where
+        Y: Metriplectic,
+        R: Retraction<Y::Manifold, Y::Metric>,
+    {
+        span.check()?;
+        let mut steps = self.steps(system, x0, span.step_size())?;
+        let mut states = Vec::with_capacity(span.recorded());
+        states.push(steps.state().clone());
+        for step in 1..=span.count() {
+            match steps.advance() {
+                Ok(state) if span.records(step) => states.push(state.clone()),
+                Ok(_) => {}
+                Err(cause) => {
+                    if states.last().is_none_or(|last| last.step != steps.state().step) {
+                        states.push(steps.state().clone());
+                    }
+                    let certificate = *steps.certificate();
+                    let trajectory = Box::new(Trajectory { states, certificate });
+                    return Err(RunError::Step { cause, trajectory });
+                }
+            }
+        }
+        Ok(Trajectory { states, certificate: *steps.certificate() })
+    }
+}
+
+/// Runs a system with the default scheme of a retraction:
+/// `WeylMidpoint.run(&system, x0, Span::steps(0.1, 1000))`.
+///
+/// A retraction of your own runs by `Scheme::new(mine).run(..)`.
+pub trait Run: Sized {
+    /// [`Scheme::run`] with the defaults.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Scheme::run`].
+    fn run<Y>(
+        self,
+        system: &Y,
+        x0: Point<Y>,
+        span: Span,
+    ) -> Result<Trajectory<Y::Manifold>, RunError<Y::Manifold>>
+    where
+        Y: Metriplectic,
+        Self: Retraction<Y::Manifold, Y::Metric>,
+    {
+        Scheme::new(self).run(system, x0, span)
+    }
+
+    /// [`Scheme::steps`] with the defaults.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Scheme::steps`].
+    fn steps<Y>(
+        self,
+        system: &Y,
+        x0: Point<Y>,
+        h: f64,
+    ) -> Result<Steps<'_, Y, Self>, RunError<Y::Manifold>>
+    where
+        Y: Metriplectic,
+        Self: Retraction<Y::Manifold, Y::Metric>,
+    {
+        Scheme::new(self).steps(system, x0, h)
+    }
+}
+
+impl Run for WeylMidpoint {}
+impl Run for Exponential {}

@@ -1,0 +1,70 @@
+//! Integrates metriplectic (GENERIC) systems from closures for energy, entropy and metric.
+//!
+//! ```math
+//! \dot x = \Pi(x)\, dH(x) + K(x)\, dS(x)
+//! ```
+//!
+//! A Poisson tensor `Π` drives the reversible flow of the energy `H`; a positive semidefinite `K`,
+//! built from a Riemannian metric, produces the entropy `S` and leaves `H` alone. You write `H`,
+//! `S` and, if it is not the canonical one, the metric; dual numbers differentiate them, and every
+//! step of the scheme keeps `H` to round-off.
+//!
+//! ```
+//! use metriplectic::prelude::*;
+//!
+//! fn main() -> Result<(), Error> {
+//!     let inertia = Vector3::new(10.0, 5.0, 1.0);
+//!     let body = System::on(LieDual::so3())
+//!         .energy(move |p: &Vector3<Real>| {
+//!             p.component_mul(p).component_div(&inertia.cast()).sum() * 0.5
+//!         })
+//!         .entropy(|p: &Vector3<Real>| p.norm_squared() * 0.5)
+//!         .build()?;
+//!     let run = WeylMidpoint.run(&body, vector![0.001, -1.0, 0.001], Span::steps(0.1, 1000))?;
+//!     println!("{}", run.certificate());
+//!     # assert!(run.certificate().keeps_energy() && run.certificate().keeps_entropy());
+//!     Ok(())
+//! }
+//! ```
+//!
+//! # The vocabulary
+//!
+//! | concept | in one line | where |
+//! |---|---|---|
+//! | [`Scalar`](fields::Scalar) | `f64` or a dual number over it; [`Real`](fields::Real) is the one a closure uses | [`fields`] |
+//! | Field | a smooth function: [`ScalarField`](fields::ScalarField), [`MatrixField`](fields::MatrixField) | [`fields`] |
+//! | [`Manifold`](manifolds::Manifold) | where points live, its frame, its charts | [`manifolds`] |
+//! | [`Riemannian`](manifolds::Riemannian) metric | flat, sharp, norm, geodesics | [`manifolds`] |
+//! | [`Retraction`](manifolds::Retraction) | `R_h`, `R_h⁻¹`: [`WeylMidpoint`](manifolds::WeylMidpoint), [`Exponential`](manifolds::Exponential) | [`manifolds`] |
+//! | [`Bracket`](dynamics::Bracket) | `Π` | [`dynamics`] |
+//! | [`Dissipation`](dynamics::Dissipation) | `K`, given the covector it must kill | [`dynamics`] |
+//! | [`System`](dynamics::System) | all of these with `H` and `S` | [`dynamics`] |
+//! | [discrete gradient](integrators::gonzalez) | a covector with `⟨w, d⟩ = ΔH` | [`integrators`] |
+//! | [`RootFinder`](integrators::RootFinder) | [`Newton`](integrators::Newton), and argmin as the globaliser | [`integrators`] |
+//! | [`Scheme`](integrators::Scheme) | one step: guess, solve, retract | [`integrators`] |
+//! | [`Trajectory`](integrators::Trajectory) | steps in a row, with their [`Certificate`](integrators::Certificate) | [`integrators`] |
+
+pub use metriplectic_dynamics as dynamics;
+pub use metriplectic_fields as fields;
+pub use metriplectic_integrators as integrators;
+pub use metriplectic_manifolds as manifolds;
+pub use nalgebra;
+
+/// Everything that a program usually needs.
+pub mod prelude {
+    pub use metriplectic_dynamics::{
+        LiePoisson, Metriplectic, ModelError, Poisson, SecondLaw, System, Zero,
+    };
+    pub use metriplectic_fields::{MatrixField, Real, Scalar, ScalarField};
+    pub use metriplectic_integrators::{
+        Certificate, Error, Newton, Run, RunError, Scheme, Span, State, Trajectory,
+    };
+    pub use metriplectic_manifolds::{
+        Euclidean, Exponential, LieAlgebra, LieDual, Manifold, Metric, Retraction, WeylMidpoint,
+    };
+    pub use nalgebra::{
+        Matrix1, Matrix2, Matrix3, Matrix4, Matrix5, Matrix6, SMatrix, SVector, Vector1, Vector2,
+        Vector3, Vector4, Vector5, Vector6, matrix, vector,
+    };
+    pub use num_dual::DualNum;
+}

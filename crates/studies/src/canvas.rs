@@ -1,0 +1,184 @@
+//! Ink on paper: lengths in pixels, `y` downwards, drawn by plotters.
+
+use std::error::Error;
+
+use plotters::{
+    coord::Shift,
+    prelude::*,
+    style::text_anchor::{HPos, Pos, VPos},
+};
+
+use crate::plot::PlotError;
+
+/// The backend snaps to whole units, which shows as jagged lines; ten units are a pixel.
+const UNITS: f64 = 10.0;
+/// The backend divides font sizes by this.
+const FONT: f64 = 1.24;
+
+pub(crate) const INK: RGBColor = RGBColor(34, 34, 34);
+pub(crate) const GREY: RGBColor = RGBColor(119, 119, 119);
+pub(crate) const GRID: RGBColor = RGBColor(229, 229, 229);
+
+/// Okabe & Ito 2008, the dark colours first.
+const PALETTE: [RGBColor; 6] = [
+    RGBColor(0, 114, 178),
+    RGBColor(213, 94, 0),
+    RGBColor(0, 158, 115),
+    RGBColor(204, 121, 167),
+    RGBColor(230, 159, 0),
+    RGBColor(86, 180, 233),
+];
+
+/// The colour of the line of this number.
+pub(crate) fn color(line: usize) -> RGBColor {
+    PALETTE[line % PALETTE.len()]
+}
+
+/// An estimate, on the wide side, of how long a text is: fonts are known to the viewer only.
+pub(crate) fn length(text: &str, size: f64) -> f64 {
+    0.6 * size * text.chars().count() as f64
+}
+
+pub(crate) type At = (f64, f64);
+
+/// A sheet that is being drawn on.
+pub(crate) struct Canvas<'a> {
+    area: DrawingArea<SVGBackend<'a>, Shift>,
+}
+
+/// How a text is set: its size in pixels, and which of its points is placed.
+#[derive(Clone, Copy)]
+pub(crate) struct Type {
+    pub(crate) size: f64,
+    pub(crate) color: RGBColor,
+    pub(crate) horizontal: HPos,
+    pub(crate) vertical: VPos,
+    /// Reads upwards.
+    pub(crate) upwards: bool,
+}
+
+impl Type {
+    pub(crate) const fn centred(size: f64) -> Self {
+        let (horizontal, vertical) = (HPos::Center, VPos::Center);
+        Self { size, color: INK, horizontal, vertical, upwards: false }
+    }
+
+    pub(crate) const fn left(size: f64) -> Self {
+        Self { horizontal: HPos::Left, ..Self::centred(size) }
+    }
+
+    pub(crate) const fn right(size: f64) -> Self {
+        Self { horizontal: HPos::Right, ..Self::centred(size) }
+    }
+
+    pub(crate) const fn upwards(size: f64) -> Self {
+        Self { upwards: true, ..Self::centred(size) }
+    }
+
+    /// Smaller, where the text would be longer than this.
+    pub(crate) fn fitting(self, text: &str, most: f64) -> Self {
+        Self { size: self.size.min(most / length(text, 1.0)), ..self }
+    }
+
+    pub(crate) const fn grey(self) -> Self {
+        Self { color: GREY, ..self }
+    }
+}
+
+/// Markers that differ in shape, for those who cannot go by colour.
+#[derive(Clone, Copy)]
+pub(crate) struct Marker {
+    pub(crate) line: usize,
+    pub(crate) filled: bool,
+}
+
+/// Draws a sheet of this size, as SVG.
+pub(crate) fn sheet(
+    (width, height): At,
+    draw: impl FnOnce(&Canvas<'_>) -> Result<(), PlotError>,
+) -> Result<String, PlotError> {
+    let (units, pixels) = (whole((width, height)), (width.round(), height.round()));
+    let mut svg = String::new();
+    {
+        let size = (units.0.unsigned_abs(), units.1.unsigned_abs());
+        let area = SVGBackend::with_string(&mut svg, size).into_drawing_area();
+        area.fill(&WHITE).map_err(failed)?;
+        let canvas = Canvas { area };
+        draw(&canvas)?;
+        canvas.area.present().map_err(failed)?;
+    }
+    let header = format!("<svg width=\"{}\" height=\"{}\"", units.0, units.1);
+    let scaled = format!(
+        "<svg width=\"{}\" height=\"{}\" stroke-linejoin=\"round\" stroke-linecap=\"round\"",
+        pixels.0, pixels.1
+    );
+    Ok(svg.replacen(&header, &scaled, 1))
+}
+
+impl Canvas<'_> {
+    pub(crate) fn text(&self, text: &str, at: At, set: Type) -> Result<(), PlotError> {
+        let font = ("sans-serif", set.size * UNITS * FONT).into_font().color(&set.color);
+        let style = font.pos(Pos::new(set.horizontal, set.vertical));
+        let turn = if set.upwards { FontTransform::Rotate270 } else { FontTransform::None };
+        self.area.draw(&Text::new(text, whole(at), style.transform(turn))).map_err(failed)
+    }
+
+    /// A line through these points.
+    pub(crate) fn line(
+        &self,
+        points: impl IntoIterator<Item = At>,
+        color: RGBColor,
+        width: f64,
+    ) -> Result<(), PlotError> {
+        let mut path: Vec<(i32, i32)> = points.into_iter().map(whole).collect();
+        path.dedup();
+        self.area.draw(&PathElement::new(path, color.stroke_width(stroke(width)))).map_err(failed)
+    }
+
+    /// A straight line in dashes.
+    pub(crate) fn dashed(&self, from: At, to: At, color: RGBColor) -> Result<(), PlotError> {
+        let (dash, gap) = (5.0, 4.0);
+        let (dx, dy) = (to.0 - from.0, to.1 - from.1);
+        let length = dx.hypot(dy);
+        let at = |s: f64| (from.0 + s / length * dx, from.1 + s / length * dy);
+        let mut start = 0.0;
+        while start < length {
+            self.line([at(start), at((start + dash).min(length))], color, 1.0)?;
+            start += dash + gap;
+        }
+        Ok(())
+    }
+
+    pub(crate) fn marker(&self, at: At, marker: Marker) -> Result<(), PlotError> {
+        let color = color(marker.line);
+        let inside = if marker.filled { color } else { WHITE };
+        let outline = marker_outline(at, marker.line);
+        let path: Vec<(i32, i32)> = outline.iter().copied().map(whole).collect();
+        self.area.draw(&Polygon::new(path, inside.filled())).map_err(failed)?;
+        self.line(outline.iter().copied().chain(outline.first().copied()), color, 1.2)
+    }
+}
+
+/// Disc, square, triangle, diamond, as polygons around a point.
+fn marker_outline((x, y): At, line: usize) -> Vec<At> {
+    let (corners, radius, turn) =
+        [(16, 3.6, 0.0), (4, 4.6, 0.5), (3, 4.8, 0.75), (4, 4.8, 0.0)][line % 4];
+    let corner = |k: u8| {
+        let angle = std::f64::consts::TAU * (f64::from(k) + turn) / f64::from(corners);
+        (x + radius * angle.cos(), y - radius * angle.sin())
+    };
+    (0..corners).map(corner).collect()
+}
+
+fn stroke(width: f64) -> u32 {
+    whole((width, 0.0)).0.unsigned_abs()
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "saturates; a sheet has some thousand pixels")]
+fn whole((x, y): At) -> (i32, i32) {
+    ((x * UNITS).round() as i32, (y * UNITS).round() as i32)
+}
+
+fn failed(source: impl Error + Send + Sync + 'static) -> PlotError {
+    PlotError::Backend { source: Box::new(source) }
+}

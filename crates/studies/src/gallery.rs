@@ -1,0 +1,356 @@
+//! What every example shares: its options, its folder, its data files and its progress.
+
+use std::{
+    env,
+    ffi::OsString,
+    fmt, fs,
+    io::{self, BufWriter, IsTerminal, Write},
+    path::{Path, PathBuf},
+    time::{Duration, Instant},
+};
+
+use clap::{Parser, builder::RangedU64ValueParser};
+use indicatif::{ProgressBar, ProgressStyle};
+
+/// How long a run stays silent.
+const PATIENCE: Duration = Duration::from_secs(1);
+/// How often a bar looks at the clock, at most.
+const GLANCE: Duration = Duration::from_millis(50);
+
+/// The command line of an example.
+///
+/// # Examples
+///
+/// ```
+/// use metriplectic_studies::Options;
+///
+/// let options = Options { steps: Some(10), ..Options::default() };
+/// assert_eq!(options.steps_or(1000), 10);
+/// assert_eq!(options.step_size_or(0.1), 0.1);
+/// ```
+#[derive(Clone, Debug, Default, PartialEq, Parser)]
+#[command(about = None, long_about = None)]
+pub struct Options {
+    /// Print the certificate as JSON
+    #[arg(long)]
+    pub json: bool,
+    /// Number of steps
+    #[arg(long, value_name = "N", value_parser = RangedU64ValueParser::<usize>::new().range(1..))]
+    pub steps: Option<usize>,
+    /// Size of a step
+    #[arg(long, value_name = "h", value_parser = positive)]
+    pub step_size: Option<f64>,
+}
+
+impl Options {
+    /// Reads the command line; on a mistake or `--help`, prints what is possible and exits.
+    #[must_use]
+    pub fn read() -> Self {
+        Self::parse()
+    }
+
+    /// The number of steps asked for, or the example's own.
+    #[must_use]
+    pub fn steps_or(&self, default: usize) -> usize {
+        self.steps.unwrap_or(default)
+    }
+
+    /// The step size asked for, or the example's own.
+    #[must_use]
+    pub fn step_size_or(&self, default: f64) -> f64 {
+        self.step_size.unwrap_or(default)
+    }
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    let value: f64 = text.parse().map_err(|_| format!("`{text}` is not a number"))?;
+    let valid = value.is_finite() && value > 0.0;
+    if valid { Ok(value) } else { Err(format!("a step size is positive and finite, not {value}")) }
+}
+
+/// The folder the examples draw into, `target/gallery` of the workspace.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Gallery {
+    folder: PathBuf,
+}
+
+/// A file or folder of the gallery that could not be written.
+#[derive(Debug, thiserror::Error)]
+#[error("cannot write {}: {source}; is there a place left, and may one write to it?", path.display())]
+pub struct GalleryError {
+    /// The file or folder.
+    pub path: PathBuf,
+    /// What the system says.
+    pub source: io::Error,
+}
+
+impl Gallery {
+    /// Opens the gallery, creating its folder where needed: `$CARGO_TARGET_DIR/gallery`, or else
+    /// `target/gallery` of the workspace around `$CARGO_MANIFEST_DIR` (set by `cargo run`) or
+    /// around the current directory.
+    ///
+    /// # Errors
+    ///
+    /// [`GalleryError`] if the folder cannot be created.
+    pub fn open() -> Result<Self, GalleryError> {
+        let here = || env::current_dir().unwrap_or_default();
+        let start = env::var_os("CARGO_MANIFEST_DIR").map_or_else(here, PathBuf::from);
+        Self::within(target(env::var_os("CARGO_TARGET_DIR"), &start).join("gallery"))
+    }
+
+    /// A gallery in this folder, created where needed.
+    ///
+    /// # Errors
+    ///
+    /// [`GalleryError`] if the folder cannot be created.
+    pub fn within(folder: impl Into<PathBuf>) -> Result<Self, GalleryError> {
+        let folder = folder.into();
+        match fs::create_dir_all(&folder) {
+            Ok(()) => Ok(Self { folder }),
+            Err(source) => Err(GalleryError { path: folder, source }),
+        }
+    }
+
+    /// The path of a file in the gallery.
+    #[must_use]
+    pub fn path(&self, name: impl AsRef<Path>) -> PathBuf {
+        self.folder.join(name)
+    }
+}
+
+/// The build folder: the one asked for, or the one of the workspace around `start`.
+fn target(asked: Option<OsString>, start: &Path) -> PathBuf {
+    let is_root = |folder: &&Path| {
+        fs::read_to_string(folder.join("Cargo.toml"))
+            .is_ok_and(|manifest| manifest.lines().any(|line| line.trim() == "[workspace]"))
+    };
+    let root = || start.ancestors().find(is_root).unwrap_or(start);
+    asked.map_or_else(|| root().join("target"), PathBuf::from)
+}
+
+/// Writes a table of numbers, one row a line under a line of names. A number read back is the
+/// number written: each has the digits that tell it from its neighbours.
+///
+/// # Examples
+///
+/// ```
+/// use metriplectic_studies::{Gallery, write_csv};
+///
+/// let gallery = Gallery::within(std::env::temp_dir().join("metriplectic-doc"))?;
+/// let path = gallery.path("parabola.csv");
+/// let rows = (0..3).map(f64::from).map(|t| [t, 0.1 * t * t]);
+/// write_csv(&path, ["t", "q"], rows)?;
+/// assert_eq!(std::fs::read_to_string(&path)?, "t,q\n0.0,0.0\n1.0,0.1\n2.0,0.4\n");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
+/// # Errors
+///
+/// [`GalleryError`] if the file cannot be written.
+pub fn write_csv<const N: usize>(
+    path: impl AsRef<Path>,
+    header: [&str; N],
+    rows: impl IntoIterator<Item = [f64; N]>,
+) -> Result<(), GalleryError> {
+    let path = path.as_ref();
+    let named = |source| GalleryError { path: path.into(), source };
+    let write = || {
+        let mut file = BufWriter::new(fs::File::create(path)?);
+        writeln!(file, "{}", header.map(quoted).join(","))?;
+        for row in rows {
+            writeln!(file, "{}", row.map(|x| format!("{x:?}")).join(","))?;
+        }
+        file.flush()
+    };
+    write().map_err(named)
+}
+
+/// A name as RFC 4180 wants it.
+fn quoted(name: &str) -> String {
+    if name.contains([',', '"', '\n', '\r']) {
+        format!("\"{}\"", name.replace('"', "\"\""))
+    } else {
+        name.into()
+    }
+}
+
+/// A bar on the terminal for a long run.
+///
+/// It appears once the run has taken a second, disappears at the end, and says nothing at all where
+/// standard error is no terminal. A step costs a comparison: the clock is read about twenty times a
+/// second, whatever a step takes.
+///
+/// # Examples
+///
+/// ```
+/// let mut progress = metriplectic_studies::Progress::over(1000);
+/// for _ in 0..1000 {
+///     progress.step();
+/// }
+/// ```
+pub struct Progress {
+    total: usize,
+    done: usize,
+    /// The step at which the clock is read next.
+    glance: usize,
+    /// Steps between two readings.
+    stride: usize,
+    started: Instant,
+    read: Instant,
+    shown: bool,
+    bar: ProgressBar,
+}
+
+impl Progress {
+    /// Progress of a run of so many steps.
+    #[must_use]
+    pub fn over(total: usize) -> Self {
+        Self::starting(total, io::stderr().is_terminal())
+    }
+
+    fn starting(total: usize, terminal: bool) -> Self {
+        let now = Instant::now();
+        // Without a terminal the clock is never read.
+        let glance = if terminal { 1 } else { usize::MAX };
+        let (stride, bar) = (1, ProgressBar::hidden());
+        Self { total, done: 0, glance, stride, started: now, read: now, shown: false, bar }
+    }
+
+    /// One step is done.
+    #[inline]
+    pub fn step(&mut self) {
+        self.done += 1;
+        if self.done >= self.glance {
+            self.look(Instant::now());
+        }
+    }
+
+    /// Draws what is due, and reads the clock again in twice or half as many steps.
+    #[cold]
+    fn look(&mut self, now: Instant) {
+        let quick = now.duration_since(self.read) < GLANCE;
+        self.stride = if quick { self.stride.saturating_mul(2) } else { (self.stride / 2).max(1) };
+        self.glance = self.done.saturating_add(self.stride);
+        self.read = now;
+        if now.duration_since(self.started) >= PATIENCE {
+            self.draw();
+        }
+    }
+
+    fn draw(&mut self) {
+        if !self.shown {
+            self.shown = true;
+            self.bar = ProgressBar::new(self.total as u64).with_style(style());
+        }
+        self.bar.set_position(self.done as u64);
+    }
+}
+
+impl Drop for Progress {
+    fn drop(&mut self) {
+        self.bar.finish_and_clear();
+    }
+}
+
+impl fmt::Debug for Progress {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "Progress {{ {} of {} }}", self.done, self.total)
+    }
+}
+
+fn style() -> ProgressStyle {
+    ProgressStyle::with_template("{bar:40} {percent:>3} %  {human_pos} steps  {eta} left")
+        .unwrap_or_else(|_| ProgressStyle::default_bar())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn scratch(name: &str) -> PathBuf {
+        env::temp_dir().join(format!("metriplectic-{name}-{}", std::process::id()))
+    }
+
+    #[test]
+    fn options_are_read() {
+        let line = ["example", "--json", "--steps", "12", "--step-size", "0.5"];
+        let options = Options::try_parse_from(line).unwrap();
+        let expected = Options { json: true, steps: Some(12), step_size: Some(0.5) };
+        assert_eq!(options, expected);
+        assert_eq!((options.steps_or(3), options.step_size_or(0.1)), (12, 0.5));
+        let none = Options::try_parse_from(["example"]).unwrap();
+        assert_eq!((none.json, none.steps_or(3), none.step_size_or(0.1)), (false, 3, 0.1));
+    }
+
+    #[test]
+    fn impossible_steps_are_refused() {
+        for (option, value) in
+            [("--steps", "0"), ("--step-size", "0"), ("--step-size", "-1"), ("--step-size", "NaN")]
+        {
+            let line = ["example".into(), format!("{option}={value}")];
+            assert!(Options::try_parse_from(line).is_err(), "{option} {value}");
+        }
+    }
+
+    #[test]
+    fn the_gallery_is_in_the_target_of_the_workspace() {
+        let root = scratch("root");
+        let member = root.join("crates/one");
+        fs::create_dir_all(&member).unwrap();
+        fs::write(root.join("Cargo.toml"), "[workspace]\nmembers = []\n").unwrap();
+        fs::write(member.join("Cargo.toml"), "[package]\n[workspace.lints]\n").unwrap();
+        assert_eq!(target(None, &member), root.join("target"));
+        assert_eq!(target(Some("/elsewhere".into()), &member), Path::new("/elsewhere"));
+        let gallery = Gallery::within(root.join("target/gallery")).unwrap();
+        assert!(root.join("target/gallery").is_dir());
+        assert_eq!(gallery.path("a.svg"), root.join("target/gallery/a.svg"));
+        fs::remove_dir_all(root).unwrap();
+    }
+
+    #[test]
+    fn numbers_survive_a_csv() {
+        let folder = scratch("csv");
+        let path = Gallery::within(&folder).unwrap().path("numbers.csv");
+        let rows = [[0.1 + 0.2, f64::MIN_POSITIVE], [1e300 / 3.0, -0.0], [1.0, 5e-324]];
+        write_csv(&path, ["t", "a, \"b\""], rows).unwrap();
+        let text = fs::read_to_string(&path).unwrap();
+        let mut lines = text.lines();
+        assert_eq!(lines.next(), Some("t,\"a, \"\"b\"\"\""));
+        let read = lines.map(|line| line.split(',').map(|x| x.parse::<f64>().unwrap().to_bits()));
+        let bits = rows.iter().flatten().map(|x| x.to_bits());
+        assert_eq!(read.flatten().collect::<Vec<_>>(), bits.collect::<Vec<_>>());
+        fs::remove_dir_all(folder).unwrap();
+    }
+
+    #[test]
+    fn a_missing_folder_is_named() {
+        let path = scratch("missing").join("a.csv");
+        let error = write_csv(&path, ["t"], [[0.0]]).unwrap_err();
+        assert_eq!(error.path, path);
+        assert!(error.to_string().contains("a.csv"), "{error}");
+    }
+
+    #[test]
+    fn a_bar_waits_a_second_and_for_a_terminal() {
+        let started = Instant::now();
+        let mut progress = Progress::starting(10, true);
+        progress.look(started + PATIENCE / 2);
+        assert!(!progress.shown);
+        let mut silent = Progress::starting(10, false);
+        silent.started = started - 2 * PATIENCE;
+        (0..10).for_each(|_| silent.step());
+        assert!(!silent.shown);
+    }
+
+    #[test]
+    fn the_clock_is_read_rarely_in_quick_runs_and_always_in_slow_ones() {
+        let mut quick = Progress::starting(1 << 20, true);
+        let start = quick.read;
+        (0..10).for_each(|_| quick.look(start));
+        assert_eq!(quick.stride, 1 << 10);
+        (1..=20).for_each(|k| quick.look(start + k * GLANCE * 2 / 100));
+        let slow = quick.stride;
+        quick.look(start + 2 * GLANCE);
+        assert_eq!(quick.stride, slow / 2);
+    }
+}

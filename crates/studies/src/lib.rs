@@ -1,0 +1,58 @@
+//! What we claim, measured.
+//!
+//! A claim of this project is a number with an uncertainty, and the examples, the tests and the
+//! benches all read it off the same instruments:
+//!
+//! | module | question | answer |
+//! |---|---|---|
+//! | [`order`] | how fast does the error fall with the step? | [`Order`]: the fitted slope, its 95 % interval, the points left out as round-off |
+//! | [`drift`] | does the error grow with time? | [`Drift`]: flat, a random walk or a linear drift, in constant memory |
+//! | [`table`] | what does the study say, in rows? | [`Table`]: plain text and Markdown |
+//! | [`plot`] | what does it look like? | [`Panels`] and [`LogLog`]: SVG, the same bytes every time |
+//! | [`gallery`] | where do the pictures of an example go? | [`Options`], [`Gallery`], [`Progress`], [`write_csv`] |
+//!
+//! # Example
+//!
+//! The trapezoidal rule on `∫₀¹ eᵗ dt`, second order until round-off:
+//!
+//! ```
+//! use metriplectic_studies::{Order, Table, scientific};
+//!
+//! let trapezoid = |n: u32| {
+//!     let h = f64::from(n).recip();
+//!     let inner: f64 = (1..n).map(|i| (h * f64::from(i)).exp()).sum();
+//!     h * (0.5 + inner + 0.5 * 1_f64.exp())
+//! };
+//! let steps: Vec<f64> = (2..8).map(|k| 0.5_f64.powi(k)).collect();
+//! let errors: Vec<f64> =
+//!     (2..8).map(|k| (trapezoid(1 << k) - (1_f64.exp() - 1.0)).abs()).collect();
+//!
+//! let order = Order::fit(&steps, &errors)?;
+//! assert!(order.agrees(2.0, 0.01), "measured {order}");
+//!
+//! let mut table = Table::new(["h", "error"]);
+//! for (h, error) in steps.iter().zip(&errors) {
+//!     table.row([h.to_string(), scientific(*error)]);
+//! }
+//! assert!(table.markdown().starts_with("| h "));
+//! # Ok::<(), metriplectic_studies::OrderError>(())
+//! ```
+
+pub mod drift;
+pub mod gallery;
+pub mod order;
+pub mod plot;
+pub mod table;
+
+mod axis;
+mod canvas;
+mod frame;
+mod log_log;
+mod panels;
+mod student;
+
+pub use drift::{Drift, Growth, Slope};
+pub use gallery::{Gallery, GalleryError, Options, Progress, write_csv};
+pub use order::{Order, OrderError};
+pub use plot::{LogLog, Panel, Panels, PlotError};
+pub use table::{Table, scientific};

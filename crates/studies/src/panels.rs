@@ -1,0 +1,428 @@
+//! A grid of panels with lines.
+
+use std::path::PathBuf;
+
+use crate::{
+    axis::Axis,
+    canvas::{self, At, Canvas, Marker, Type, color, length},
+    frame::{self, Frame},
+    plot::{self, PlotError},
+};
+
+/// Stretches of a line of which the lowest and the highest point are drawn, at most.
+const STRETCHES: usize = 700;
+/// Stretches of all lines of a figure: what keeps its file below some 300 kB.
+const ALL_STRETCHES: usize = 12_000;
+/// Height of a row of the legend.
+const ROW: f64 = 18.0;
+
+/// A figure of titled panels in a grid.
+///
+/// # Examples
+///
+/// ```
+/// use metriplectic_studies::{Panel, Panels};
+///
+/// let energy: Vec<(f64, f64)> =
+///     (0..100).map(f64::from).map(|t| (t, 2.2e-16 * t.sin())).collect();
+/// let svg = Panels::new("A free rigid body")
+///     .panel(Panel::new("energy", "t").vertical("ΔH").line("Weyl midpoint", &energy).level(0.0))
+///     .svg()?;
+/// assert!(svg.contains("ΔH (units of 10⁻¹⁶)"));
+/// # Ok::<(), metriplectic_studies::PlotError>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct Panels {
+    title: String,
+    columns: Option<usize>,
+    panels: Vec<Panel>,
+}
+
+/// A titled pair of axes with lines on it.
+#[derive(Clone, Debug)]
+pub struct Panel {
+    title: String,
+    horizontal: String,
+    vertical: String,
+    lines: Vec<(String, Vec<(f64, f64)>)>,
+    levels: Vec<f64>,
+}
+
+impl Panel {
+    /// A panel with a title and the name of its horizontal axis.
+    #[must_use]
+    pub fn new(title: impl Into<String>, horizontal: impl Into<String>) -> Self {
+        Self {
+            title: title.into(),
+            horizontal: horizontal.into(),
+            vertical: String::new(),
+            lines: Vec::new(),
+            levels: Vec::new(),
+        }
+    }
+
+    /// Names the vertical axis.
+    #[must_use]
+    pub fn vertical(mut self, name: impl Into<String>) -> Self {
+        self.vertical = name.into();
+        self
+    }
+
+    /// Adds a line through points `(x, y)`. The labels make a legend as soon as there are two.
+    #[must_use]
+    pub fn line(mut self, label: impl Into<String>, points: impl AsRef<[(f64, f64)]>) -> Self {
+        self.lines.push((label.into(), points.as_ref().to_vec()));
+        self
+    }
+
+    /// Adds a dashed line at height `y`.
+    #[must_use]
+    pub fn level(mut self, y: f64) -> Self {
+        self.levels.push(y);
+        self
+    }
+
+    /// The points of the lines and the levels, checked, as `(least, greatest)` of `x` and `y`.
+    fn ranges(&self) -> Result<[(f64, f64); 2], PlotError> {
+        if self.lines.is_empty() {
+            return Err(PlotError::Empty { name: self.title.clone() });
+        }
+        let mut ranges = [(f64::INFINITY, f64::NEG_INFINITY); 2];
+        for (label, points) in &self.lines {
+            check(label, points)?;
+            points.iter().for_each(|(x, y)| ranges = [wider(ranges[0], *x), wider(ranges[1], *y)]);
+        }
+        for (index, &y) in self.levels.iter().enumerate() {
+            if !y.is_finite() {
+                return Err(PlotError::NonFinite { name: self.title.clone(), index, x: 0.0, y });
+            }
+            ranges[1] = wider(ranges[1], y);
+        }
+        Ok(ranges)
+    }
+
+    fn axes(&self, (width, height): At) -> Result<(Axis, Axis), PlotError> {
+        let [x, y] = self.ranges()?;
+        Ok((Axis::linear(x, 0.0, width / 65.0)?, Axis::linear(y, 0.06, height / 42.0)?))
+    }
+
+    /// The rows of the legend, each of entries `(line, place)`, in this width.
+    fn legend(&self, width: f64) -> Vec<Vec<(usize, f64)>> {
+        let mut rows = vec![Vec::new()];
+        let mut used = 0.0;
+        for (line, (label, _)) in self.lines.iter().enumerate() {
+            let entry = 40.0 + length(label, frame::NUMBER);
+            if used > 0.0 && used + entry > width {
+                rows.push(Vec::new());
+                used = 0.0;
+            }
+            rows.last_mut().into_iter().for_each(|row| row.push((line, used)));
+            used += entry;
+        }
+        if self.lines.len() > 1 { rows } else { Vec::new() }
+    }
+
+    fn draw(&self, canvas: &Canvas<'_>, frame: &Frame, stretches: usize) -> Result<(), PlotError> {
+        frame.draw(canvas, (&self.horizontal, &self.vertical))?;
+        for (line, (_, points)) in self.lines.iter().enumerate() {
+            let shown = thinned(points, stretches).map(|point| frame.at(point));
+            canvas.line(shown, color(line), 1.4)?;
+            if let &[point] = points.as_slice() {
+                canvas.marker(frame.at(point), Marker { line, filled: true })?;
+            }
+        }
+        // Last, since the lines of a long run may cover everything.
+        self.levels.iter().try_for_each(|&y| frame.level(canvas, y))?;
+        self.draw_header(canvas, frame)
+    }
+
+    /// Title and legend, above the frame, where they hide nothing.
+    fn draw_header(&self, canvas: &Canvas<'_>, frame: &Frame) -> Result<(), PlotError> {
+        let ((left, top), (right, _)) = (frame.upper_left, frame.lower_right);
+        let rows = self.legend(right - left);
+        let first = top - ROW * rows.len() as f64;
+        let middle = 0.5 * (left + right);
+        let set = Type::centred(frame::SUBTITLE).fitting(&self.title, right - left);
+        canvas.text(&self.title, (middle, first - 12.0), set)?;
+        for (row, entries) in rows.iter().enumerate() {
+            let y = first + ROW * (row as f64 + 0.4);
+            for &(line, place) in entries {
+                let (x, label) = (left + place, &self.lines[line].0);
+                let set = Type::left(frame::NUMBER).fitting(label, right - x - 24.0);
+                canvas.line([(x, y), (x + 18.0, y)], color(line), 2.0)?;
+                canvas.text(label, (x + 24.0, y), set)?;
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Panels {
+    /// A figure with a title and no panels yet.
+    #[must_use]
+    pub fn new(title: impl Into<String>) -> Self {
+        Self { title: title.into(), columns: None, panels: Vec::new() }
+    }
+
+    /// Adds a panel, to the right of the last or under it.
+    #[must_use]
+    pub fn panel(mut self, panel: Panel) -> Self {
+        self.panels.push(panel);
+        self
+    }
+
+    /// Puts so many panels side by side, rather than one, two or three as their number suggests.
+    #[must_use]
+    pub fn columns(mut self, columns: usize) -> Self {
+        self.columns = Some(columns.max(1));
+        self
+    }
+
+    /// The figure.
+    ///
+    /// # Errors
+    ///
+    /// [`PlotError::Empty`] without panels, lines or points, [`PlotError::NonFinite`] for a point
+    /// that is not finite, [`PlotError::Range`] for numbers too far apart.
+    pub fn svg(&self) -> Result<String, PlotError> {
+        let layout = Layout::of(self)?;
+        canvas::sheet(layout.sheet(), |canvas| {
+            let middle = 0.5 * layout.sheet().0;
+            let set = Type::centred(frame::TITLE).fitting(&self.title, 2.0 * middle - 16.0);
+            canvas.text(&self.title, (middle, 22.0), set)?;
+            let lines: usize = self.panels.iter().map(|panel| panel.lines.len()).sum();
+            let stretches = STRETCHES.min(ALL_STRETCHES / lines.max(1)).max(1);
+            let mut pairs = self.panels.iter().zip(layout.frames());
+            pairs.try_for_each(|(panel, frame)| panel.draw(canvas, &frame, stretches))
+        })
+    }
+
+    /// Writes the figure to a file.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Panels::svg`], and [`PlotError::Io`] if the file cannot be written.
+    pub fn save(&self, path: impl Into<PathBuf>) -> Result<(), PlotError> {
+        plot::save(path.into(), &self.svg()?)
+    }
+
+    fn columns_or_usual(&self) -> usize {
+        let usual = match self.panels.len() {
+            0 | 1 => 1,
+            2 | 4 => 2,
+            _ => 3,
+        };
+        self.columns.unwrap_or(usual).min(self.panels.len())
+    }
+}
+
+/// Where the panels go: the frames are of one size, and line up in columns and rows.
+struct Layout {
+    axes: Vec<(Axis, Axis)>,
+    frame: At,
+    /// Room to the left of the frames of each column.
+    lefts: Vec<f64>,
+    /// Room above the frames of each row.
+    tops: Vec<f64>,
+}
+
+impl Layout {
+    const EDGE: f64 = 8.0;
+    const HEAD: f64 = 40.0;
+    const RIGHT: f64 = 22.0;
+
+    fn of(figure: &Panels) -> Result<Self, PlotError> {
+        if figure.panels.is_empty() {
+            return Err(PlotError::Empty { name: figure.title.clone() });
+        }
+        let columns = figure.columns_or_usual();
+        let frame = match columns {
+            1 => (560.0, 280.0),
+            2 => (340.0, 210.0),
+            _ => (260.0, 180.0),
+        };
+        let axes = figure.panels.iter().map(|panel| panel.axes(frame));
+        let axes = axes.collect::<Result<Vec<_>, PlotError>>()?;
+        let mut lefts = vec![0.0_f64; columns];
+        let mut tops = vec![0.0_f64; figure.panels.len().div_ceil(columns)];
+        for (index, (panel, (_, y))) in figure.panels.iter().zip(&axes).enumerate() {
+            let (column, row) = (index % columns, index / columns);
+            let header = 26.0 + ROW * panel.legend(frame.0).len() as f64;
+            lefts[column] = lefts[column].max(frame::margin(y, &panel.vertical));
+            tops[row] = tops[row].max(header);
+        }
+        Ok(Self { axes, frame, lefts, tops })
+    }
+
+    fn sheet(&self) -> At {
+        self.upper_left(self.lefts.len(), self.tops.len())
+    }
+
+    fn frames(&self) -> Vec<Frame> {
+        self.axes.iter().enumerate().map(|(index, axes)| self.frame_at(index, axes)).collect()
+    }
+
+    fn frame_at(&self, index: usize, (x, y): &(Axis, Axis)) -> Frame {
+        let (column, row) = (index % self.lefts.len(), index / self.lefts.len());
+        let (left, top) = self.upper_left(column, row);
+        let upper_left = (left + self.lefts[column], top + self.tops[row]);
+        let lower_right = (upper_left.0 + self.frame.0, upper_left.1 + self.frame.1);
+        Frame { x: x.clone(), y: y.clone(), upper_left, lower_right }
+    }
+
+    /// Where a cell of the grid begins; past the last, where the grid ends.
+    fn upper_left(&self, column: usize, row: usize) -> At {
+        let width = |left: &f64| left + self.frame.0 + Self::RIGHT;
+        let height = |top: &f64| top + self.frame.1 + frame::BELOW + 8.0;
+        let left = Self::EDGE + self.lefts[..column].iter().map(width).sum::<f64>();
+        (left, Self::HEAD + self.tops[..row].iter().map(height).sum::<f64>())
+    }
+}
+
+fn check(label: &str, points: &[(f64, f64)]) -> Result<(), PlotError> {
+    let name = || label.to_owned();
+    if points.is_empty() {
+        return Err(PlotError::Empty { name: name() });
+    }
+    match points.iter().position(|(x, y)| !(x.is_finite() && y.is_finite())) {
+        Some(index) => Err(PlotError::NonFinite {
+            name: name(),
+            index,
+            x: points[index].0,
+            y: points[index].1,
+        }),
+        None => Ok(()),
+    }
+}
+
+fn wider((low, high): (f64, f64), value: f64) -> (f64, f64) {
+    (low.min(value), high.max(value))
+}
+
+/// The lowest and the highest point of each of so many stretches, in their order, and the two ends:
+/// a spike stays, whatever is left out around it.
+fn thinned(points: &[(f64, f64)], stretches: usize) -> impl Iterator<Item = (f64, f64)> {
+    let extremes = |stretch: &[(f64, f64)]| {
+        let low = (0..stretch.len()).min_by(|&i, &j| stretch[i].1.total_cmp(&stretch[j].1));
+        let high = (0..stretch.len()).max_by(|&i, &j| stretch[i].1.total_cmp(&stretch[j].1));
+        let mut kept: Vec<usize> = low.into_iter().chain(high).collect();
+        kept.sort_unstable();
+        kept.into_iter().map(|i| stretch[i]).collect::<Vec<_>>()
+    };
+    let short = points.len() <= 2 * stretches;
+    let length = if short { 1 } else { points.len().div_ceil(stretches) };
+    let ends = (points.first().copied(), points.last().copied());
+    let inner = points.chunks(length).flat_map(extremes);
+    ends.0.into_iter().chain(inner).chain(ends.1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn wave(count: u32) -> Vec<(f64, f64)> {
+        (0..count).map(|n| f64::from(n) * 1e-3).map(|t| (t, t.sin())).collect()
+    }
+
+    fn figure() -> Panels {
+        let panel = |title| Panel::new(title, "t").line("a", wave(50_000)).line("b", wave(100));
+        Panels::new("title").panel(panel("one")).panel(panel("two").level(0.5))
+    }
+
+    #[test]
+    fn a_figure_is_the_same_bytes_every_time_and_small() {
+        let svg = figure().svg().unwrap();
+        assert_eq!(svg, figure().svg().unwrap());
+        assert!(svg.len() < 100_000, "{} bytes", svg.len());
+        assert!(svg.starts_with("<svg width=\"") && svg.trim_end().ends_with("</svg>"));
+    }
+
+    #[test]
+    fn many_long_lines_are_still_a_small_file() {
+        let panel = || (0..6).fold(Panel::new("p", "t"), |p, _| p.line("l", wave(20_000)));
+        let figure = (0..9).fold(Panels::new("nine"), |figure, _| figure.panel(panel()));
+        let size = figure.svg().unwrap().len();
+        assert!(size < 350_000, "{size} bytes");
+    }
+
+    #[test]
+    fn the_lines_stay_in_their_frame() {
+        let svg = Panels::new("").panel(Panel::new("", "").line("", wave(10_000))).svg().unwrap();
+        let places = |line: &str| -> Vec<(i32, i32)> {
+            let points = line.split("points=\"").nth(1).unwrap().split('"').next().unwrap();
+            let number = |text: &str| text.parse::<i32>().unwrap();
+            points
+                .split_whitespace()
+                .map(|p| p.split_once(',').unwrap())
+                .map(|(x, y)| (number(x), number(y)))
+                .collect()
+        };
+        let longest = svg.lines().max_by_key(|line| line.len()).unwrap();
+        let line = places(longest);
+        let closed = |points: &Vec<(i32, i32)>| points.len() == 5 && points[0] == points[4];
+        let frames = svg.lines().filter(|line| line.contains("points=")).map(places);
+        let frame = frames.into_iter().find(closed).unwrap();
+        let ((left, bottom), (right, top)) = (frame[0], frame[2]);
+        assert!(line.iter().all(|(x, y)| (left..=right).contains(x) && (top..=bottom).contains(y)));
+        assert_eq!((line[0].0, line[line.len() - 1].0), (left, right));
+        let sheet = svg.split("viewBox=\"0 0 ").nth(1).unwrap().split(' ').next().unwrap();
+        assert!(left > 0 && right + 200 < sheet.parse().unwrap(), "{left} to {right} of {sheet}");
+    }
+
+    #[test]
+    fn the_sheet_is_measured_in_pixels() {
+        let svg = Panels::new("").panel(Panel::new("", "").line("", [(0.0, 0.0)])).svg().unwrap();
+        let header = svg.lines().next().unwrap();
+        let number = |after: &str| -> f64 {
+            let start = header.split(after).nth(1).unwrap();
+            start.split(['"', ' ']).next().unwrap().parse().unwrap()
+        };
+        assert!(number("width=\"") < 700.0, "{header}");
+        assert!((number("viewBox=\"0 0 ") / number("width=\"") - 10.0).abs() < 0.02, "{header}");
+    }
+
+    #[test]
+    fn a_legend_needs_two_lines() {
+        assert!(figure().svg().unwrap().contains("\na\n"));
+        let one = Panels::new("title").panel(Panel::new("one", "t").line("alone", wave(10)));
+        assert!(!one.svg().unwrap().contains("alone"));
+    }
+
+    #[test]
+    fn a_long_line_keeps_its_spikes_and_its_ends() {
+        let mut points = wave(1_000_000);
+        points[345_678].1 = 40.0;
+        points[345_679].1 = -40.0;
+        let shown: Vec<_> = thinned(&points, STRETCHES).collect();
+        assert!(shown.len() <= 1500, "{} points", shown.len());
+        let order = [0, 345_678, 345_679, 999_999].map(|i| points[i]);
+        let places = order.map(|point| shown.iter().position(|p| *p == point));
+        assert!(places.iter().all(Option::is_some) && places.is_sorted(), "{places:?}");
+        assert!(shown.is_sorted_by(|a, b| a.0 <= b.0));
+    }
+
+    #[test]
+    fn a_short_line_is_drawn_whole() {
+        let points = wave(1000);
+        let mut shown: Vec<_> = thinned(&points, STRETCHES).collect();
+        shown.dedup();
+        assert_eq!(shown, points);
+    }
+
+    #[test]
+    fn what_cannot_be_drawn_is_named() {
+        let error = |panel| Panels::new("title").panel(panel).svg().unwrap_err();
+        let panel = || Panel::new("panel", "t");
+        assert!(matches!(Panels::new("f").svg(), Err(PlotError::Empty { name }) if name == "f"));
+        assert!(matches!(error(panel()), PlotError::Empty { name } if name == "panel"));
+        assert!(matches!(error(panel().line("l", [])), PlotError::Empty { name } if name == "l"));
+        let nan = error(panel().line("l", [(0.0, 0.0), (1.0, f64::NAN)]));
+        assert!(matches!(nan, PlotError::NonFinite { index: 1, .. }), "{nan}");
+        let level = error(panel().line("l", [(0.0, 0.0)]).level(f64::INFINITY));
+        assert!(matches!(level, PlotError::NonFinite { .. }), "{level}");
+        let far = error(panel().line("l", [(0.0, -f64::MAX), (1.0, f64::MAX)]));
+        assert!(matches!(far, PlotError::Range { .. }), "{far}");
+        let path = std::env::temp_dir().join("metriplectic-no-such-folder/a.svg");
+        assert!(matches!(figure().save(&path), Err(PlotError::Io { path: p, .. }) if p == path));
+    }
+}

@@ -144,9 +144,17 @@ pub trait Square<D: Scalar>:
     /// The matrix whose entry in row `i`, column `j` is `f(i, j)`.
     fn from_entries(f: impl FnMut(usize, usize) -> D) -> Self;
 
-    /// The solution of `A x = b` by LU decomposition with row pivoting; `None` if `A` is singular
-    /// or not a number.
-    fn solve(&self, b: &Self::Column) -> Option<Self::Column>;
+    /// The matrix, factored.
+    type Factors: Factors<Self::Column>;
+
+    /// The LU decomposition with row pivoting; `None` if the matrix is singular or not a number.
+    fn factor(&self) -> Option<Self::Factors>;
+
+    /// The solution of `A x = b`; `None` if `A` is singular or not a number.
+    #[inline]
+    fn solve(&self, b: &Self::Column) -> Option<Self::Column> {
+        self.factor()?.solve(b)
+    }
 
     /// The matrix of zeros.
     fn zeros() -> Self {
@@ -238,6 +246,12 @@ pub trait Square<D: Scalar>:
     }
 }
 
+/// A factored matrix, which solves for any number of right-hand sides.
+pub trait Factors<V> {
+    /// The solution of `A x = b`; `None` if it is not a number.
+    fn solve(&self, b: &V) -> Option<V>;
+}
+
 /// A matrix that should be positive definite has a pivot that is not.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[error("not positive definite: the Cholesky pivot {index} is {pivot:.3e}")]
@@ -256,10 +270,19 @@ impl<D: Scalar, const N: usize> Square<D> for SMatrix<D, N, N> {
         Self::from_fn(f)
     }
 
+    type Factors = LU<D, Const<N>>;
+
+    #[inline]
+    fn factor(&self) -> Option<LU<D, Const<N>>> {
+        LU::new(*self).ok()
+    }
+}
+
+impl<D: Scalar, const N: usize> Factors<SVector<D, N>> for LU<D, Const<N>> {
     #[inline]
     fn solve(&self, b: &SVector<D, N>) -> Option<SVector<D, N>> {
-        let x = LU::new(*self).ok()?.solve(b);
-        (0..N).all(|i| x[i].re().is_finite()).then_some(x)
+        let x = Self::solve(self, b);
+        Column::is_finite(&x).then_some(x)
     }
 }
 

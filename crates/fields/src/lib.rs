@@ -32,7 +32,7 @@ pub mod scalar;
 pub mod space;
 
 pub use differential::{differential, hessian, jacobian};
-pub use dimension::{Column, Dimension, NotPositive, Square};
+pub use dimension::{Column, Dimension, Factors, NotPositive, Square};
 pub use field::{Jet1, Jet2, MatrixField, MatrixJet, ScalarField};
 pub use laws::BrokenLaw;
 pub use scalar::{Real, Scalar};

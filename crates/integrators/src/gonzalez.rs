@@ -1,7 +1,7 @@
 //! The midpoint discrete gradient.
 
 use metriplectic_fields::{
-    Column, Jet1, Jet2, Matrix, Real, Scalar, ScalarField, Space, Square, Vector, differential,
+    Column, Matrix, Real, Scalar, ScalarField, Space, Square, Vector, differential,
 };
 use metriplectic_manifolds::{Arc, ArcJet, InnerProduct, Manifold};
 
@@ -38,86 +38,106 @@ pub fn gonzalez<M: Space, D: Scalar>(
 /// ```
 ///
 /// here by the three-point Hermite rule with end corrections
-/// `∫f = (7f(0) + 16f(½) + 7f(1))/30 − (f'(1) − f'(0))/60`, exact to degree 5. The two are averaged
-/// with the inverse squares of their error estimates, which changes over smoothly and switches
-/// nothing off.
-#[derive(Clone, Copy, Debug)]
+/// `∫f = (7f(0) + 16f(½) + 7f(1))/30 − (f'(1) − f'(0))/60`, exact to degree 5. Where the difference
+/// is short of digits the two are averaged with the inverse squares of their error estimates; the
+/// weight changes smoothly and switches nothing off.
+#[derive(Clone, Debug)]
 pub struct Chord<M: Space> {
-    /// `F`, `dF` and Hessian at the base point `z`.
-    pub middle: Jet2<M>,
-    /// `F` and `dF` at the end `x'`.
-    pub end: Jet1<M>,
-    /// `F`, `f`, `f'` along the arc at `s = 0, ½, 1`.
-    along: [Real; 3],
+    /// `dF(z)`.
+    df: Vector<M>,
+    /// The defect `F(x') − F(x) − dF(z) d`.
+    defect: f64,
     /// The size of a rounding error in a difference of two values of `F`.
     rounding: f64,
+    /// The part of it that is left in the defect.
+    noise: f64,
 }
 
+/// The share of `|F| + |dF||x|` by which a step changes `F`, at which a difference of two values of
+/// `F` starts to be trusted; from four times that share on it is trusted alone.
+const SHORT: f64 = 5e-3;
+
 impl<M: Manifold> Chord<M> {
-    /// Evaluates `f` along an arc: its jets at `z` and `x'`, and its derivatives along the arc,
-    /// whose point at time `s` is `position(s)`.
+    /// Evaluates `f` along an arc with displacement `d` at its base, where `df` is known. `start` is
+    /// `F(x)`, `end` the point `x'`, and `position(s)` the point of the arc at time `s`.
+    #[inline]
     pub fn new(
         f: &impl ScalarField<M>,
-        arc: &ArcJet<M>,
+        df: &Vector<M>,
+        d: &Vector<M>,
+        start: f64,
+        end: (&M::Point<f64>, f64),
         position: impl Fn(Real) -> M::Point<Real>,
     ) -> Self {
-        let middle = f.jet2(&arc.z);
-        let end = f.jet1(&arc.end);
-        let along = [0.0, 0.5, 1.0].map(|s| f.at_real(&position(Real::new(s, 1.0, 1.0, 0.0))));
-        let point = M::magnitude(&arc.end) * middle.df.magnitude();
-        let rounding = f64::EPSILON * (along[0].re.abs() + along[2].re.abs() + point);
-        Self { middle, end, along, rounding }
+        let (end, value) = end;
+        let slope = df.dot(d);
+        let size = start.abs() + value.abs() + M::magnitude(end) * df.magnitude();
+        let rounding = f64::EPSILON * size;
+        let difference = (value - start) - slope;
+        let share = df.magnitude() * d.magnitude() / (SHORT * size).max(f64::MIN_POSITIVE);
+        let (mut defect, mut noise) = (difference, rounding);
+        if share < 4.0 {
+            let along = [0.0, 0.5, 1.0].map(|s| f.at_real(&position(Real::new(s, 1.0, 1.0, 0.0))));
+            let integral = Integral::new(&along, slope);
+            // Falls from 1 to 0 between one and four times the short share, with zero slope at both.
+            let t = ((share - 1.0) / 3.0).clamp(0.0, 1.0);
+            let short = 1.0 - t * t * (3.0 - 2.0 * t);
+            let weight = short * integral.weight(rounding);
+            defect += weight * (integral.value - difference);
+            noise *= 1.0 - weight;
+        }
+        Self { df: *df, defect, rounding, noise }
     }
 
-    /// Whether everything is a finite number.
-    pub fn is_finite(&self) -> bool {
-        let [a, b, c] = &self.along;
-        self.middle.is_finite()
-            && self.end.is_finite()
-            && [a, b, c].iter().all(|f| f.re.is_finite() && f.eps1eps2.is_finite())
-    }
-
-    /// The defect `F(x') − F(x) − dF(z) d`, free of cancellation.
-    pub fn defect(&self, start: f64, d: &Vector<M>) -> f64 {
-        let slope = self.middle.df.dot(d);
-        let difference = (self.end.value - start) - slope;
-        let [f0, f1, f2] = self.along.map(|f| f.eps1 - slope);
-        let ends = self.along[2].eps1eps2 - self.along[0].eps1eps2;
-        let hermite = (7.0 * (f0 + f2) + 16.0 * f1) / 30.0 - ends / 60.0;
-        let simpson = (f0 + f2 + 4.0 * f1) / 6.0;
-        let naive_error = self.rounding.powi(2);
-        let size = self.along.iter().map(|f| f.eps1.abs()).sum::<f64>();
-        let hermite_error = (hermite - simpson).powi(2) + (f64::EPSILON * size).powi(2);
-        let total = naive_error + hermite_error;
-        let weight = if total > 0.0 { naive_error / total } else { 0.0 };
-        difference + weight * (hermite - difference)
-    }
-
-    /// The covector `w` with `⟨w, d⟩ = F(x') − F(x) + recall`, and its derivative along the unknown
-    /// of the arc.
+    /// The covector `w` with `⟨w, d⟩ = F(x') − F(x) + recall`.
     ///
     /// `recall` is what earlier steps have left over; it is zero in the definition.
+    #[inline]
     pub fn covector(
         &self,
-        start: f64,
+        recall: f64,
+        g: &impl InnerProduct<Vector<M>>,
+        d: &Vector<M>,
+    ) -> Vector<M> {
+        let flat = g.flat(d);
+        self.df + flat * self.correction(recall, flat.dot(d))
+    }
+
+    /// The round-off of the covector on an arc of length `|d|`, beside that of `dF(z)`.
+    #[inline]
+    pub fn noise(&self, length: f64) -> f64 {
+        if length > 0.0 { self.noise / length } else { 0.0 }
+    }
+
+    /// The factor of `♭d` in the covector; zero on an arc without length.
+    fn correction(&self, recall: f64, square: f64) -> f64 {
+        if square > 0.0 { (self.defect + recall) / square } else { 0.0 }
+    }
+
+    /// The derivative of the covector along the unknown of the arc, from the Hessian `hf` at `z` and
+    /// the differential at `x'`.
+    #[inline]
+    pub fn slope(
+        &self,
         recall: f64,
         g: &impl InnerProduct<Vector<M>>,
         arc: &ArcJet<M>,
-    ) -> (Vector<M>, Matrix<M>) {
-        let df = self.middle.df;
-        let mut slope = self.middle.hf * arc.dz;
+        hf: &Matrix<M>,
+        df_end: &Vector<M>,
+    ) -> Matrix<M> {
+        let mut slope = *hf * arc.dz;
         let flat = g.flat(&arc.d);
         let square = flat.dot(&arc.d);
         if square <= 0.0 {
-            return (df, slope);
+            return slope;
         }
-        let c = (self.defect(start, &arc.d) + recall) / square;
+        let c = self.correction(recall, square);
         // ∂δ = dF(x') ∂x' − ∂(dF(z) d), a difference of nearly equal rows, which counts only as far
         // as it is above its own round-off.
-        let rows = arc.dend.transpose_times(&self.end.df)
-            - arc.dd.transpose_times(&df)
+        let rows = arc.dend.transpose_times(df_end)
+            - arc.dd.transpose_times(&self.df)
             - slope.transpose_times(&arc.d);
-        let signal = self.middle.df.magnitude() * arc.d.magnitude();
+        let signal = self.df.magnitude() * arc.d.magnitude();
         let trust = signal.powi(2) / (signal.powi(2) + (1e3 * self.rounding).powi(2));
         let dc = (rows * trust - arc.dd.transpose_times(&flat) * (2.0 * c)) * square.recip();
         slope += Matrix::<M>::outer(&flat, &dc);
@@ -127,6 +147,32 @@ impl<M: Manifold> Chord<M> {
                 slope[(i, k)] += c * column[i];
             }
         }
-        (df + flat * c, slope)
+        slope
+    }
+}
+
+/// The defect as an integral, with the estimate of its error.
+struct Integral {
+    value: f64,
+    error: f64,
+}
+
+impl Integral {
+    /// From `f`, `f'` along the arc at `s = 0, ½, 1` (first and second derivative of `F`), less the
+    /// slope `dF(z) d`. The error is estimated by the difference to Simpson's rule.
+    fn new(along: &[Real; 3], slope: f64) -> Self {
+        let [f0, f1, f2] = along.map(|f| f.eps1 - slope);
+        let ends = along[2].eps1eps2 - along[0].eps1eps2;
+        let value = (7.0 * (f0 + f2) + 16.0 * f1) / 30.0 - ends / 60.0;
+        let simpson = (f0 + f2 + 4.0 * f1) / 6.0;
+        let size = along.iter().map(|f| f.eps1.abs()).sum::<f64>();
+        Self { value, error: (value - simpson).abs() + f64::EPSILON * size }
+    }
+
+    /// The weight of the integral against a difference with the error `rounding`.
+    fn weight(&self, rounding: f64) -> f64 {
+        let (difference, integral) = (rounding.powi(2), self.error.powi(2));
+        let total = difference + integral;
+        if total > 0.0 { difference / total } else { 0.0 }
     }
 }

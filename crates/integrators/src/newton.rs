@@ -1,10 +1,13 @@
 //! Newton's method with a residual floor that follows the scale of the state.
 
-use metriplectic_fields::{Column, Space, Square, Vector};
+use metriplectic_fields::{Column, Factors, Space, Square, Vector};
 
 use crate::root_finder::{Equation, Linearised, NoRoot, Root, RootFinder};
 
 /// Newton's method, damped, down to round-off.
+///
+/// The Jacobian is kept as long as it serves: with a good guess one of them is enough for a step,
+/// and each further correction costs only a residual.
 ///
 /// It stops where the residual is at the floor that the equation states, or where it no longer
 /// falls within a small multiple of it: a stall *at* the floor is convergence, a stall above it is
@@ -20,6 +23,8 @@ pub struct Newton {
     pub tolerance: f64,
     /// The multiple of the floor at which a residual that no longer falls counts as solved.
     pub stall: f64,
+    /// A correction that leaves more than this share of the residual asks for a new Jacobian.
+    pub reuse: f64,
     /// Linear systems that may be solved.
     pub sweeps: usize,
     /// Halvings of one correction that does not reduce the residual.
@@ -28,59 +33,89 @@ pub struct Newton {
 
 impl Default for Newton {
     fn default() -> Self {
-        Self { tolerance: 1.0, stall: 100.0, sweeps: 30, halvings: 8 }
+        Self { tolerance: 1.0, stall: 100.0, reuse: 0.05, sweeps: 30, halvings: 8 }
     }
 }
 
 impl<M: Space> RootFinder<M> for Newton {
     fn solve(&self, equation: &impl Equation<M>, guess: &Vector<M>) -> Result<Root<M>, NoRoot<M>> {
-        let mut u = *guess;
-        let Some(mut here) = equation.linearise(&u) else {
-            return Err(NoRoot { best: u, residual: f64::INFINITY, sweeps: 0 });
-        };
-        let mut residual = here.residual.magnitude();
-        for sweeps in 0..self.sweeps {
-            if residual <= self.tolerance * here.floor {
-                return Ok(Root { u, residual, sweeps });
-            }
-            let fails = || NoRoot { best: u, residual, sweeps: sweeps + 1 };
-            let correction = here.jacobian.solve(&here.residual).ok_or_else(fails)?;
-            match self.descend(equation, &u, &correction, residual) {
-                Some((next, linearised)) => {
-                    u = next;
-                    here = linearised;
-                    residual = here.residual.magnitude();
+        let mut best = NoRoot { best: *guess, residual: f64::INFINITY, sweeps: 0 };
+        while let Some(here) = equation.linearise(&best.best) {
+            best.residual = here.residual.magnitude();
+            match self.correct(equation, &here, &mut best) {
+                Progress::Solved => {
+                    let NoRoot { best: u, residual, sweeps } = best;
+                    return Ok(Root { u, residual, sweeps });
                 }
-                None if residual <= self.stall * here.floor => {
-                    return Ok(Root { u, residual, sweeps: sweeps + 1 });
-                }
-                None => return Err(fails()),
+                Progress::Slow if best.sweeps < self.sweeps => {}
+                Progress::Slow | Progress::Stuck => break,
             }
         }
-        if residual <= self.stall * here.floor {
-            Ok(Root { u, residual, sweeps: self.sweeps })
-        } else {
-            Err(NoRoot { best: u, residual, sweeps: self.sweeps })
-        }
+        Err(best)
     }
 }
 
+/// How far one Jacobian has brought the iteration.
+enum Progress {
+    /// The residual is round-off.
+    Solved,
+    /// It falls too slowly for this Jacobian.
+    Slow,
+    /// It does not fall.
+    Stuck,
+}
+
 impl Newton {
+    /// Corrects the best point with one Jacobian as long as the residual falls fast.
+    fn correct<M: Space>(
+        &self,
+        equation: &impl Equation<M>,
+        here: &Linearised<M>,
+        best: &mut NoRoot<M>,
+    ) -> Progress {
+        let mut residual = here.residual;
+        let mut factors = None;
+        loop {
+            if best.residual <= self.tolerance * here.floor {
+                return Progress::Solved;
+            }
+            factors = factors.or_else(|| here.jacobian.factor());
+            let correction = factors.as_ref().and_then(|factors| factors.solve(&residual));
+            best.sweeps += 1;
+            let next = correction.and_then(|c| self.descend(equation, best, &c));
+            let Some((u, value)) = next else {
+                let at_floor = best.residual <= self.stall * here.floor;
+                return if at_floor { Progress::Solved } else { Progress::Stuck };
+            };
+            let before = best.residual;
+            residual = value;
+            (best.best, best.residual) = (u, value.magnitude());
+            if best.residual > self.reuse * before && best.residual > self.tolerance * here.floor {
+                let at_floor = best.residual <= self.stall * here.floor;
+                return if at_floor && best.residual > 0.5 * before {
+                    Progress::Solved
+                } else {
+                    Progress::Slow
+                };
+            }
+        }
+    }
+
     /// The longest of the corrections `δ, δ/2, δ/4, …` that reduces the residual.
+    #[inline]
     fn descend<M: Space>(
         &self,
         equation: &impl Equation<M>,
-        u: &Vector<M>,
+        best: &NoRoot<M>,
         correction: &Vector<M>,
-        residual: f64,
-    ) -> Option<(Vector<M>, Linearised<M>)> {
+    ) -> Option<(Vector<M>, Vector<M>)> {
         let mut length = 1.0;
         for _ in 0..=self.halvings {
-            let next = *u - *correction * length;
-            if let Some(there) = equation.linearise(&next)
-                && there.residual.magnitude() < residual * (1.0 - 1e-4 * length)
+            let next = best.best - *correction * length;
+            if let Some(value) = equation.value(&next)
+                && value.magnitude() < best.residual * (1.0 - 1e-4 * length)
             {
-                return Some((next, there));
+                return Some((next, value));
             }
             length *= 0.5;
         }
@@ -98,6 +133,10 @@ mod tests {
     struct CircleAndHyperbola;
 
     impl Equation<Euclidean<2>> for CircleAndHyperbola {
+        fn value(&self, u: &Vector2<f64>) -> Option<Vector2<f64>> {
+            self.linearise(u).map(|at| at.residual)
+        }
+
         fn linearise(&self, u: &Vector2<f64>) -> Option<Linearised<Euclidean<2>>> {
             Some(Linearised {
                 residual: vector![u.norm_squared() - 4.0, u.x * u.y - 1.0],
@@ -119,6 +158,10 @@ mod tests {
     struct Logarithm;
 
     impl Equation<Euclidean<1>> for Logarithm {
+        fn value(&self, u: &Vector1<f64>) -> Option<Vector1<f64>> {
+            self.linearise(u).map(|at| at.residual)
+        }
+
         fn linearise(&self, u: &Vector1<f64>) -> Option<Linearised<Euclidean<1>>> {
             let residual = vector![u.x.ln() - 1.0];
             let jacobian = Matrix1::new(u.x.recip());
@@ -137,6 +180,10 @@ mod tests {
     struct NoRealRoot;
 
     impl Equation<Euclidean<1>> for NoRealRoot {
+        fn value(&self, u: &Vector1<f64>) -> Option<Vector1<f64>> {
+            self.linearise(u).map(|at| at.residual)
+        }
+
         fn linearise(&self, u: &Vector1<f64>) -> Option<Linearised<Euclidean<1>>> {
             Some(Linearised {
                 residual: vector![u.x * u.x + 1.0],

@@ -4,7 +4,7 @@ use metriplectic_dynamics::{Bracket, Dissipation, Metriplectic, system::Point};
 use metriplectic_fields::{
     ChartPoint, Column, Real, Scalar, ScalarField, Space, Square, Vector, differential,
 };
-use metriplectic_manifolds::{ArcJet, Manifold, MetricError, Retraction, Riemannian};
+use metriplectic_manifolds::{MetricError, Retraction, Riemannian};
 
 use crate::gonzalez::{Chord, gonzalez};
 use crate::root_finder::{Equation, Linearised};
@@ -59,14 +59,21 @@ where
         Ok(arc.d - (reversible + irreversible) * D::from(self.h))
     }
 
-    /// The field's data along an arc.
-    fn chord(&self, u: &Vector<Y::Manifold>, arc: &ArcJet<Y::Manifold>) -> Chord<Y::Manifold> {
-        Chord::new(self.system.energy(), arc, |s| {
+    /// The data of the discrete gradient of `H` along the arc of `u`.
+    #[inline]
+    fn chord(
+        &self,
+        u: &Vector<Y::Manifold>,
+        df: &Vector<Y::Manifold>,
+        d: &Vector<Y::Manifold>,
+        end: (&Point<Y>, f64),
+    ) -> Chord<Y::Manifold> {
+        Chord::new(self.system.energy(), df, d, self.energy, end, |s| {
             let u = Vector::<Y::Manifold, Real>::embed(u) * s;
             match self.retraction.arc(self.system.metric(), self.x, &u) {
                 Ok(arc) => arc.end,
                 // The same arc has been followed to its end, so this is not reached.
-                Err(_) => Y::Manifold::constant(&arc.end),
+                Err(_) => Y::Manifold::constant(end.0),
             }
         })
     }
@@ -77,18 +84,36 @@ where
     Y: Metriplectic,
     R: Retraction<Y::Manifold, Y::Metric>,
 {
-    /// The residual safe against round-off, with its Jacobian from the jets `(f, df, Hf)` of the
-    /// fields: no nested dual number is formed.
+    /// The residual, safe against round-off.
+    #[inline]
+    fn value(&self, u: &Vector<Y::Manifold>) -> Option<Vector<Y::Manifold>> {
+        let (system, metric) = (self.system, self.system.metric());
+        let arc = self.retraction.arc(metric, self.x, u).ok()?;
+        let z = arc.z.point();
+        let g = metric.at(&arc.z).ok()?;
+        let df = system.energy().jet1(&z).df;
+        let end = system.energy().at::<f64>(&arc.end);
+        let w = self.chord(u, &df, &arc.d, (&arc.end, end)).covector(self.recall, &g, &arc.d);
+        let s = system.entropy().jet1(&z).df;
+        let reversible = system.bracket().apply(system.manifold(), &arc.z, &w);
+        let irreversible = system.dissipation().apply(metric, &arc.z, &w, &s).ok()?;
+        let residual = arc.d - (reversible + irreversible) * self.h;
+        residual.is_finite().then_some(residual)
+    }
+
+    /// The residual with its Jacobian from the jets `(f, df, Hf)` of the fields: no nested dual
+    /// number is formed.
+    #[inline]
     fn linearise(&self, u: &Vector<Y::Manifold>) -> Option<Linearised<Y::Manifold>> {
         let (system, metric, h) = (self.system, self.system.metric(), self.h);
         let arc = self.retraction.arc_jet(metric, self.x, u).ok()?;
         let g = metric.at(&ChartPoint::<Y::Manifold>::centre(&arc.z)).ok()?;
-        let chord = self.chord(u, &arc);
+        let energy = system.energy().jet2(&arc.z);
+        let end = system.energy().jet1(&arc.end);
         let entropy = system.entropy().jet2(&arc.z);
-        if !(chord.is_finite() && entropy.is_finite()) {
-            return None;
-        }
-        let (w, dw) = chord.covector(self.energy, self.recall, &g, &arc);
+        let chord = self.chord(u, &energy.df, &arc.d, (&arc.end, end.value));
+        let w = chord.covector(self.recall, &g, &arc.d);
+        let dw = chord.slope(self.recall, &g, &arc, &energy.hf, &end.df);
         let pi = system.bracket().linearise(system.manifold(), &arc.z, &w);
         let k = system.dissipation().linearise(metric, &arc.z, &w, &entropy.df).ok()?;
 
@@ -97,10 +122,14 @@ where
             + (pi.tensor + k.along_w) * dw
             + k.tensor * (entropy.hf * arc.dz);
         let jacobian = arc.dd - slope * h;
-        // The terms of Πw and K dS are rounded, and so is d.
+        // The terms of Πw and K dS are rounded, and so are w and d.
+        let length = arc.d.magnitude();
         let terms =
             pi.tensor.max_abs() * w.magnitude() + k.tensor.max_abs() * entropy.df.magnitude();
-        let floor = f64::EPSILON * (4.0 * h * terms + arc.d.magnitude());
-        residual.is_finite().then_some(Linearised { residual, jacobian, floor })
+        let gain = pi.tensor.max_abs() + k.along_w.max_abs();
+        let floor =
+            f64::EPSILON * (4.0 * h * terms + length) + h * gain * chord.noise(length);
+        let usable = residual.is_finite() && jacobian.max_abs().is_finite();
+        usable.then_some(Linearised { residual, jacobian, floor })
     }
 }

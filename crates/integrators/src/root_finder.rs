@@ -4,8 +4,11 @@ use metriplectic_fields::{Matrix, Space, Vector};
 
 /// An equation `F(u) = 0` for a tangent vector `u`.
 pub trait Equation<M: Space> {
-    /// `F(u)` with its Jacobian, or `None` where it is not defined: outside the domain of a field,
-    /// or beyond the reach of a geodesic.
+    /// `F(u)`, or `None` where it is not defined: outside the domain of a field, or beyond the reach
+    /// of a geodesic.
+    fn value(&self, u: &Vector<M>) -> Option<Vector<M>>;
+
+    /// `F(u)` with its Jacobian, or `None` where it is not defined.
     fn linearise(&self, u: &Vector<M>) -> Option<Linearised<M>>;
 }
 

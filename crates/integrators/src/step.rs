@@ -1,7 +1,7 @@
 //! One step: guess, solve, retract.
 
 use metriplectic_dynamics::{Bracket, Dissipation, Metriplectic, system::Point};
-use metriplectic_fields::{ChartPoint, Column, ScalarField, Square, Vector};
+use metriplectic_fields::{ChartPoint, Column, Dimension, ScalarField, Square, Vector};
 use metriplectic_manifolds::{Manifold, Retraction};
 
 use crate::error::StepError;
@@ -41,7 +41,7 @@ impl<R> Scheme<R> {
 
     /// One step of size `h` from `x`, with the energy `energy = H(x)`; `left_over = H(x) − H(x₀)`
     /// is the round-off that earlier steps have left in the energy. The displacement is guessed
-    /// from `history`, and noted there.
+    /// from `memory`, and noted there.
     ///
     /// # Errors
     ///
@@ -50,17 +50,17 @@ impl<R> Scheme<R> {
         &self,
         system: &Y,
         start: &Start<'_, Y>,
-        history: &mut History<Vector<Y::Manifold>>,
+        memory: &mut Memory<Vector<Y::Manifold>>,
     ) -> Result<(Point<Y>, Work), StepError>
     where
         Y: Metriplectic,
         R: Retraction<Y::Manifold, Y::Metric>,
     {
         let mut work = Work::default();
-        match self.attempt(system, start, history, &mut work) {
+        match self.attempt(system, start, memory, &mut work) {
             Ok(end) => Ok((end, work)),
             Err(failure) => {
-                history.forget();
+                *memory = Memory::new();
                 let end = self.halves(system, start, 1, &mut work).map_err(|smallest| {
                     let residual = smallest.residual.min(failure.residual);
                     if residual.is_finite() {
@@ -70,7 +70,7 @@ impl<R> Scheme<R> {
                             residual,
                             sweeps: work.sweeps,
                             splits: work.splits,
-                            suggested: start.h * 0.5_f64.powi(work.splits.min(30) as i32),
+                            suggested: smallest_part(start.h, self.splits),
                         }
                     } else {
                         StepError::OutOfDomain { time: start.time, h: start.h, splits: work.splits }
@@ -94,7 +94,7 @@ impl<R> Scheme<R> {
         R: Retraction<Y::Manifold, Y::Metric>,
     {
         work.splits += 1;
-        let mut history = History::new();
+        let mut memory = Memory::new();
         let mut point = start.x.clone();
         for half in 0..2 {
             let h = 0.5 * start.h;
@@ -102,7 +102,7 @@ impl<R> Scheme<R> {
             let left_over = start.left_over + (energy - start.energy);
             let time = start.time + f64::from(half) * h;
             let part = Start { x: &point, time, h, energy, left_over };
-            let end = match self.attempt(system, &part, &mut history, work) {
+            let end = match self.attempt(system, &part, &mut memory, work) {
                 Ok(end) => end,
                 Err(failure) if depth >= self.splits => return Err(failure),
                 Err(_) => self.halves(system, &part, depth + 1, work)?,
@@ -117,14 +117,14 @@ impl<R> Scheme<R> {
         &self,
         system: &Y,
         start: &Start<'_, Y>,
-        history: &mut History<Vector<Y::Manifold>>,
+        memory: &mut Memory<Vector<Y::Manifold>>,
         work: &mut Work,
     ) -> Result<Point<Y>, NoRoot<Y::Manifold>>
     where
         Y: Metriplectic,
         R: Retraction<Y::Manifold, Y::Metric>,
     {
-        let guess = history.extrapolate().or_else(|| explicit(system, start));
+        let guess = memory.extrapolate().or_else(|| explicit(system, start));
         let guess = guess.unwrap_or_else(Vector::<Y::Manifold>::zero);
         let residual = Residual {
             system,
@@ -137,8 +137,8 @@ impl<R> Scheme<R> {
         let root = self.solve(&residual, &guess, work)?;
         let lost = NoRoot { best: root.u, residual: f64::INFINITY, sweeps: root.sweeps };
         let arc = self.retraction.arc(system.metric(), start.x, &root.u).map_err(|_| lost)?;
-        history.note(root.u);
-        Ok(arc.end)
+        memory.note(root.u);
+        Ok(memory.settle::<Y::Manifold>(start.x, &root.u, arc.end))
     }
 
     /// Newton's method, and where it is lost the globaliser with Newton's polish.
@@ -166,6 +166,11 @@ impl<R> Scheme<R> {
         }
         solved
     }
+}
+
+/// The size of the smallest part of a step that was split `splits` times.
+fn smallest_part(h: f64, splits: usize) -> f64 {
+    (0..splits).fold(h, |part, _| 0.5 * part)
 }
 
 /// Where a step starts.
@@ -206,53 +211,72 @@ fn explicit<Y: Metriplectic>(system: &Y, start: &Start<'_, Y>) -> Option<Vector<
 
 /// The share `φ e` of the left-over energy `e` that the step takes back.
 ///
-/// Round-off would make the energy a random walk over millions of steps, so each step aims at
-/// `H(x₀)` instead of `H(x)`. Asking for `⟨w, d⟩ = F(x') − F(x) + φe` changes the covector by
-/// `φ|e|/|d|`, and with it the displacement by `h|Π|φ|e|/|d|`, which must stay small against `|d|`.
-/// Hence `φ = r²/(1 + r²)` with `r = |d|² / (10² h|Π| ε max(|H|, |dH||x|))`: all of it while the
-/// state moves, nothing of it at rest, where it would hold the state fast.
+/// What the solver leaves in each step would make the energy a random walk over millions of them, so
+/// a step aims at `H(x₀)` instead of `H(x)`, once they differ by more than a few units of round-off.
+/// Asking for `⟨w, d⟩ = F(x') − F(x) + φe` changes the covector by `φ|e|/|d|`, and with it the
+/// displacement by `h|Π|φ|e|/|d|`, which must stay small against `|d|`. Hence `φ = r²/(1 + r²)` with
+/// `r = |d|² / (10² h|Π||e|)`: all of it while the state moves, nothing of it at rest, where it
+/// would hold the state fast.
 fn recall<Y: Metriplectic>(system: &Y, start: &Start<'_, Y>, d: &Vector<Y::Manifold>) -> f64 {
-    if start.left_over == 0.0 {
+    let e = start.left_over;
+    if e.abs() <= 4.0 * f64::EPSILON * start.energy.abs() {
         return 0.0;
     }
-    let dh = system.energy().jet1(start.x).df;
-    let ds = system.entropy().jet1(start.x).df;
+    let (dh, ds) = (system.energy().jet1(start.x).df, system.entropy().jet1(start.x).df);
     let pi = system.bracket().linearise(system.manifold(), start.x, &dh);
     let k = system.dissipation().linearise(system.metric(), start.x, &dh, &ds);
     let gain = start.h * (pi.tensor.max_abs() + k.map_or(0.0, |k| k.along_w.max_abs()));
-    let scale = start.energy.abs().max(dh.magnitude() * Y::Manifold::magnitude(start.x));
-    let r = d.dot(d) / (1e2 * gain * f64::EPSILON * scale).max(f64::MIN_POSITIVE);
-    start.left_over * (r * r / (1.0 + r * r))
+    let r = d.dot(d) / (1e2 * gain * e.abs()).max(f64::MIN_POSITIVE);
+    if r.is_finite() { e * (r * r / (1.0 + r * r)) } else { 0.0 }
 }
 
-/// The displacements of the last three steps, from which the next one is extrapolated.
+/// What a step remembers of the steps before it: three displacements, from which the next one is
+/// extrapolated, and what rounding has lost of the position.
+///
+/// The entries of a point are rounded in every step, and steps shorter than their last digit would
+/// be lost altogether; what is lost is carried along and added to the next displacement
+/// (compensated summation; Kahan 1965, Hairer, Lubich, Wanner 2006, §VIII.5).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct History<V> {
-    known: [Option<V>; 3],
+pub struct Memory<V> {
+    displacements: [Option<V>; 3],
+    carry: Option<V>,
 }
 
-impl<V: Copy> History<V> {
-    /// An empty history.
+impl<V: Copy> Memory<V> {
+    /// An empty memory.
     pub const fn new() -> Self {
-        Self { known: [None; 3] }
+        Self { displacements: [None; 3], carry: None }
     }
 
     fn note(&mut self, d: V) {
-        self.known = [Some(d), self.known[0], self.known[1]];
-    }
-
-    fn forget(&mut self) {
-        self.known = [None; 3];
+        self.displacements = [Some(d), self.displacements[0], self.displacements[1]];
     }
 }
 
-impl<V: Column<f64>> History<V> {
+impl<V: Column<f64>> Memory<V> {
     /// The parabola through the last three displacements, continued by one step.
+    #[inline]
     fn extrapolate(&self) -> Option<V> {
-        match self.known {
+        match self.displacements {
             [Some(a), Some(b), Some(c)] => Some((a - b) * 3.0 + c),
             [Some(a), Some(b), None] => Some(a * 2.0 - b),
             _ => None,
         }
+    }
+
+    /// The end of an arc, moved by what earlier steps have lost.
+    #[inline]
+    fn settle<M>(&mut self, x: &M::Point<f64>, d: &V, end: M::Point<f64>) -> M::Point<f64>
+    where
+        M: Manifold<Dim: Dimension<Vector<f64> = V>>,
+    {
+        let lost = M::lost(x, d, &end);
+        let Some(carry) = self.carry else {
+            self.carry = Some(lost);
+            return end;
+        };
+        let settled = M::chart(&end, &carry);
+        self.carry = Some(lost + M::lost(&end, &carry, &settled));
+        settled
     }
 }

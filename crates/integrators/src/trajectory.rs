@@ -8,7 +8,7 @@ use metriplectic_manifolds::{Exponential, Manifold, Retraction, WeylMidpoint};
 use crate::certificate::Certificate;
 use crate::error::{RunError, StepError};
 use crate::span::{Span, check_step_size};
-use crate::step::{History, Scheme, Start, Work};
+use crate::step::{Memory, Scheme, Start, Work};
 
 /// A state of a run: time, point, and the two fields there.
 #[derive(Clone, Debug, PartialEq)]
@@ -34,7 +34,7 @@ pub struct Steps<'a, Y: Metriplectic, R> {
     system: &'a Y,
     h: f64,
     state: State<Y::Manifold>,
-    history: History<Vector<Y::Manifold>>,
+    memory: Memory<Vector<Y::Manifold>>,
     certificate: Certificate,
     failed: bool,
 }
@@ -63,7 +63,7 @@ where
             second_law: system.second_law(),
         };
         let state = State { step: 0, time: 0.0, point: x0, energy, entropy };
-        Self { scheme, system, h, state, history: History::new(), certificate, failed: false }
+        Self { scheme, system, h, state, memory: Memory::new(), certificate, failed: false }
     }
 
     /// The state reached so far.
@@ -89,7 +89,7 @@ where
             energy: self.state.energy,
             left_over: self.state.energy - self.certificate.energy,
         };
-        let (point, work) = self.scheme.step(self.system, &start, &mut self.history)?;
+        let (point, work) = self.scheme.step(self.system, &start, &mut self.memory)?;
         let step = self.state.step + 1;
         let next = State {
             step,

@@ -1,6 +1,6 @@
 //! What every space of states answers.
 
-use metriplectic_fields::Space;
+use metriplectic_fields::{Column, Space, Vector};
 use rand::Rng;
 
 /// A space of states.
@@ -20,6 +20,13 @@ pub trait Manifold: Space {
 
     /// The size `|x|` of the entries, which sets the scale of round-off.
     fn magnitude(x: &Self::Point<f64>) -> f64;
+
+    /// What rounding has lost of the displacement `q` on the way from `x` to `y = φ_x(q)`, so that
+    /// the next step can make up for it; zero where it is not known.
+    #[inline]
+    fn lost(_x: &Self::Point<f64>, _q: &Vector<Self>, _y: &Self::Point<f64>) -> Vector<Self> {
+        Vector::<Self>::zero()
+    }
 
     /// A random point, spread over a unit scale.
     fn random(&self, rng: &mut impl Rng) -> Self::Point<f64>;

@@ -36,6 +36,18 @@ pub trait Metriplectic {
     /// What the model promises about its entropy.
     fn second_law(&self) -> SecondLaw;
 
+    /// The energy `H(x)`.
+    #[inline]
+    fn energy_at(&self, x: &Point<Self>) -> f64 {
+        self.energy().at(x)
+    }
+
+    /// The entropy `S(x)`; 0 without an entropy.
+    #[inline]
+    fn entropy_at(&self, x: &Point<Self>) -> f64 {
+        self.entropy().at(x)
+    }
+
     /// The velocity `Π dH + K dS`, by the definition and at any scalar.
     ///
     /// # Errors

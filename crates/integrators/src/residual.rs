@@ -92,7 +92,7 @@ where
         let z = arc.z.point();
         let g = metric.at(&arc.z).ok()?;
         let df = system.energy().jet1(&z).df;
-        let end = system.energy().at::<f64>(&arc.end);
+        let end = system.energy_at(&arc.end);
         let w = self.chord(u, &df, &arc.d, (&arc.end, end)).covector(self.recall, &g, &arc.d);
         let s = system.entropy().jet1(&z).df;
         let reversible = system.bracket().apply(system.manifold(), &arc.z, &w);
@@ -127,8 +127,7 @@ where
         let terms =
             pi.tensor.max_abs() * w.magnitude() + k.tensor.max_abs() * entropy.df.magnitude();
         let gain = pi.tensor.max_abs() + k.along_w.max_abs();
-        let floor =
-            f64::EPSILON * (4.0 * h * terms + length) + h * gain * chord.noise(length);
+        let floor = f64::EPSILON * (4.0 * h * terms + length) + h * gain * chord.noise(length);
         let usable = residual.is_finite() && jacobian.max_abs().is_finite();
         usable.then_some(Linearised { residual, jacobian, floor })
     }

@@ -98,7 +98,7 @@ impl<R> Scheme<R> {
         let mut point = start.x.clone();
         for half in 0..2 {
             let h = 0.5 * start.h;
-            let energy = system.energy().at::<f64>(&point);
+            let energy = system.energy_at(&point);
             let left_over = start.left_over + (energy - start.energy);
             let time = start.time + f64::from(half) * h;
             let part = Start { x: &point, time, h, energy, left_over };

@@ -45,8 +45,8 @@ where
     R: Retraction<Y::Manifold, Y::Metric>,
 {
     fn start(scheme: Scheme<R>, system: &'a Y, x0: Point<Y>, h: f64) -> Self {
-        let energy = system.energy().at::<f64>(&x0);
-        let entropy = system.entropy().at::<f64>(&x0);
+        let energy = system.energy_at(&x0);
+        let entropy = system.entropy_at(&x0);
         let certificate = Certificate {
             energy,
             max_energy_error: 0.0,
@@ -94,8 +94,8 @@ where
         let next = State {
             step,
             time: step as f64 * self.h,
-            energy: self.system.energy().at::<f64>(&point),
-            entropy: self.system.entropy().at::<f64>(&point),
+            energy: self.system.energy_at(&point),
+            entropy: self.system.entropy_at(&point),
             point,
         };
         self.account(&next, work);

@@ -92,7 +92,11 @@ pub trait Column<D: Scalar>:
 
     /// The Euclidean norm of the real parts.
     fn magnitude(&self) -> f64 {
-        (0..Self::LEN).map(|i| self[i].re().powi(2)).sum::<f64>().sqrt()
+        let mut sum = 0.0;
+        for i in 0..Self::LEN {
+            sum += self[i].re() * self[i].re();
+        }
+        sum.sqrt()
     }
 
     /// Whether every real part is finite.
@@ -174,8 +178,23 @@ pub trait Square<D: Scalar>:
     /// `Aᵀ b`, the row `bᵀ A` as a column.
     fn transpose_times(&self, b: &Self::Column) -> Self::Column {
         Self::Column::from_index(|j| {
-            (0..Self::Column::LEN).map(|i| self[(i, j)] * b[i]).fold(D::zero(), |sum, x| sum + x)
+            let mut sum = self[(0, j)] * b[0];
+            for i in 1..Self::Column::LEN {
+                sum += self[(i, j)] * b[i];
+            }
+            sum
         })
+    }
+
+    /// The Frobenius norm of the real parts.
+    fn magnitude(&self) -> f64 {
+        let mut sum = 0.0;
+        for j in 0..Self::Column::LEN {
+            for i in 0..Self::Column::LEN {
+                sum += self[(i, j)].re() * self[(i, j)].re();
+            }
+        }
+        sum.sqrt()
     }
 
     /// The lower triangular `L` with `A = L Lᵀ` (Cholesky), read from the lower triangle of `A`.

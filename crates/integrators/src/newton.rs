@@ -9,6 +9,9 @@ use crate::root_finder::{Equation, Linearised, NoRoot, Root, RootFinder};
 /// The Jacobian is kept as long as it serves: with a good guess one of them is enough for a step,
 /// and each further correction costs only a residual.
 ///
+/// The last correction is not followed by another residual if the contraction so far says that it
+/// would be a tenth of the floor.
+///
 /// It stops where the residual is at the floor that the equation states, or where it no longer
 /// falls within a small multiple of it: a stall *at* the floor is convergence, a stall above it is
 /// not.
@@ -74,7 +77,7 @@ impl Newton {
         best: &mut NoRoot<M>,
     ) -> Progress {
         let mut residual = here.residual;
-        let mut factors = None;
+        let (mut factors, mut contraction) = (None, f64::INFINITY);
         loop {
             if best.residual <= self.tolerance * here.floor {
                 return Progress::Solved;
@@ -82,6 +85,13 @@ impl Newton {
             factors = factors.or_else(|| here.jacobian.factor());
             let correction = factors.as_ref().and_then(|factors| factors.solve(&residual));
             best.sweeps += 1;
+            if let Some(last) = &correction
+                && contraction * best.residual <= 0.1 * self.tolerance * here.floor
+            {
+                best.best -= *last;
+                best.residual *= contraction;
+                return Progress::Solved;
+            }
             let next = correction.and_then(|c| self.descend(equation, best, &c));
             let Some((u, value)) = next else {
                 let at_floor = best.residual <= self.stall * here.floor;
@@ -90,6 +100,7 @@ impl Newton {
             let before = best.residual;
             residual = value;
             (best.best, best.residual) = (u, value.magnitude());
+            contraction = best.residual / before;
             if best.residual > self.reuse * before && best.residual > self.tolerance * here.floor {
                 let at_floor = best.residual <= self.stall * here.floor;
                 return if at_floor && best.residual > 0.5 * before {
@@ -147,8 +158,9 @@ mod tests {
     }
 
     #[test]
-    fn convergence_is_quadratic() {
-        let root = Newton::default().solve(&CircleAndHyperbola, &vector![2.0, 0.4]).unwrap();
+    fn convergence_is_quadratic_with_a_jacobian_for_each_correction() {
+        let fresh = Newton { reuse: 0.0, ..Newton::default() };
+        let root = fresh.solve(&CircleAndHyperbola, &vector![2.0, 0.4]).unwrap();
         // x² = 2 + √3 in closed form.
         assert!((root.u.x - (2.0 + 3.0_f64.sqrt()).sqrt()).abs() < 1e-15);
         assert!(root.sweeps <= 5, "{} sweeps", root.sweeps);

@@ -124,11 +124,12 @@ where
         let jacobian = arc.dd - slope * h;
         // The terms of Πw and K dS are rounded, and so are w and d.
         let length = arc.d.magnitude();
-        let terms =
-            pi.tensor.max_abs() * w.magnitude() + k.tensor.max_abs() * entropy.df.magnitude();
-        let gain = pi.tensor.max_abs() + k.along_w.max_abs();
-        let floor = f64::EPSILON * (4.0 * h * terms + length) + h * gain * chord.noise(length);
-        let usable = residual.is_finite() && jacobian.max_abs().is_finite();
+        let pi_size = pi.tensor.magnitude();
+        let terms = pi_size * w.magnitude() + k.tensor.magnitude() * entropy.df.magnitude();
+        let gain = pi_size + k.along_w.magnitude();
+        let floor =
+            f64::EPSILON * (4.0 * h.abs() * terms + length) + h.abs() * gain * chord.noise(length);
+        let usable = residual.is_finite() && jacobian.magnitude().is_finite();
         usable.then_some(Linearised { residual, jacobian, floor })
     }
 }

@@ -8,6 +8,7 @@
 //! | [`field`](mod@field) | [`ScalarField`] (`H`, `S`) and [`MatrixField`] (`g`, `Π`) |
 //! | [`closure`](mod@closure) | ordinary closures are fields, lifted to every scalar of order ≤ 2 |
 //! | [`differential`](mod@differential) | differential, Hessian and Jacobian at any scalar |
+//! | [`series`] | the functions of a small angle, right under dual numbers |
 //! | [`laws`] | what a field promises, and the function that checks it |
 //!
 //! # Two doors
@@ -29,6 +30,7 @@ pub mod dimension;
 pub mod field;
 pub mod laws;
 pub mod scalar;
+pub mod series;
 pub mod space;
 
 pub use differential::{differential, hessian, jacobian};

@@ -58,6 +58,10 @@ macro_rules! vector_space {
                 Column::magnitude(x)
             }
 
+            fn project(&self, x: &SVector<f64, N>) -> SVector<f64, N> {
+                *x
+            }
+
             #[inline]
             fn lost(
                 x: &SVector<f64, N>,

@@ -6,6 +6,9 @@
 //! | [`manifold`](mod@manifold) | [`Manifold`]: what every space of states answers |
 //! | [`euclidean`](mod@euclidean) | [`Euclidean`]: Rⁿ |
 //! | [`lie_dual`] | [`LieDual`]: the dual of a Lie algebra, with the ready-made algebras |
+//! | [`sphere`](mod@sphere) | [`Sphere`]: Sⁿ, n = 1 … 7 |
+//! | [`rotations`](mod@rotations) | [`Rotations`]: SO(3), with its exp, log and dexp |
+//! | [`normal`] | normal coordinates on a space of constant curvature |
 //! | [`metric`] | [`Riemannian`]: flat, sharp, norm, geodesics; [`Metric::constant`], [`Metric::field`] |
 //! | [`retraction`] | [`Retraction`]: `R_h` and `R_h⁻¹` |
 //! | [`weyl_midpoint`] | [`WeylMidpoint`]: the symmetric one, order 2 |
@@ -18,7 +21,10 @@ pub mod laws;
 pub mod lie_dual;
 pub mod manifold;
 pub mod metric;
+pub mod normal;
 pub mod retraction;
+pub mod rotations;
+pub mod sphere;
 pub mod weyl_midpoint;
 
 pub use euclidean::Euclidean;
@@ -30,4 +36,6 @@ pub use metric::{
     Riemannian,
 };
 pub use retraction::{Arc, ArcJet, PointPair, Retraction, Tangent};
+pub use rotations::Rotations;
+pub use sphere::Sphere;
 pub use weyl_midpoint::WeylMidpoint;

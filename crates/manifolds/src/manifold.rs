@@ -21,6 +21,9 @@ pub trait Manifold: Space {
     /// The size `|x|` of the entries, which sets the scale of round-off.
     fn magnitude(x: &Self::Point<f64>) -> f64;
 
+    /// The nearest point of the manifold, for an array of numbers that is off it.
+    fn project(&self, x: &Self::Point<f64>) -> Self::Point<f64>;
+
     /// What rounding has lost of the displacement `q` on the way from `x` to `y = φ_x(q)`, so that
     /// the next step can make up for it; zero where it is not known.
     #[inline]

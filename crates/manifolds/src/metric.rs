@@ -337,6 +337,15 @@ where
     }
 }
 
+/// Refuses a geodesic that reaches the injectivity `radius`, up to the rounding of its length.
+pub(crate) fn within(radius: f64, length: f64) -> Result<(), MetricError> {
+    if length < radius - 4.0 * f64::EPSILON {
+        Ok(())
+    } else {
+        Err(MetricError::CutLocus { length, radius })
+    }
+}
+
 /// Where the flat geodesic through `x` arrives: `x + v`, with the same velocity.
 #[inline]
 fn straight<M: Flat, D: Scalar>(x: &ChartPoint<M, D>, v: &Vector<M, D>) -> GeodesicEnd<M, D> {
@@ -385,6 +394,18 @@ pub enum MetricError {
     Varies {
         /// The largest derivative of an entry.
         slope: f64,
+    },
+    /// Two points, or the ends of a step, are so far apart that no shortest geodesic, or more than
+    /// one, joins them.
+    #[error(
+        "a geodesic of length {length:.6} reaches the cut locus, which starts at {radius:.6}; take a \
+         smaller step, or points that are closer together"
+    )]
+    CutLocus {
+        /// The length of the geodesic.
+        length: f64,
+        /// The injectivity radius.
+        radius: f64,
     },
 }
 

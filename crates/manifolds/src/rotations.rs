@@ -1,0 +1,354 @@
+//! The rotation group SO(3).
+
+use std::f64::consts::PI;
+
+use metriplectic_fields::series::{angle_over_sine, stumpff};
+use metriplectic_fields::{ChartPoint, Column, Dimension, Scalar, Space};
+use nalgebra::{Const, Matrix3, Quaternion, SMatrix, UnitQuaternion, Vector3, Vector4};
+use num_dual::Dual;
+use rand::{Rng, RngExt};
+
+use crate::metric::{GeodesicEnd, MetricError, within};
+use crate::normal::Normal;
+use crate::{ArcJet, Canonical, Manifold, Riemannian};
+
+/// The rotation group `SO(3)`: points are 3×3 rotation matrices `R`, tangent vectors are written in
+/// the body frame, `R' = R Ω̂` with `Ω̂ v = Ω × v`.
+///
+/// The chart is the exponential of the group,
+///
+/// ```math
+/// \varphi_R(q) = R \exp(\hat q), \qquad
+/// \exp(\hat q) = 1 + \frac{\sin\theta}{\theta} \hat q + \frac{1 - \cos\theta}{\theta^2} \hat q^2,
+/// \quad \theta = |q|
+/// ```
+///
+/// (Rodrigues), and its inverse goes through the quaternion of `RᵀY`, taken from its largest pivot,
+/// so that it is accurate up to half a turn. The canonical metric is bi-invariant, `⟨â, b̂⟩ = a·b`:
+/// geodesics are `R exp(tΩ̂)`, the injectivity radius is π.
+///
+/// Points never drift: the chart ends with one step of the polar iteration
+/// `R ← R(3 − RᵀR)/2`, so that fields are only ever evaluated at matrices that are orthogonal to
+/// round-off, and the energy that a step keeps is that of the matrix it stores.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Rotations;
+
+impl Rotations {
+    /// The group with its bi-invariant metric.
+    pub const fn bi_invariant() -> Self {
+        Self
+    }
+}
+
+/// The matrix of `v ↦ a × v`.
+pub fn hat<D: Scalar>(a: &Vector3<D>) -> Matrix3<D> {
+    let zero = D::zero();
+    Matrix3::new(zero, -a.z, a.y, a.z, zero, -a.x, -a.y, a.x, zero)
+}
+
+/// The vector of the skew part of a matrix: `vee(hat(a)) = a`.
+pub fn vee<D: Scalar>(m: &Matrix3<D>) -> Vector3<D> {
+    Vector3::new(m.m32 - m.m23, m.m13 - m.m31, m.m21 - m.m12) * D::from(0.5)
+}
+
+/// The rotation by the vector `q`: `exp(q̂)` by Rodrigues' formula, right under dual numbers of
+/// every order at `q = 0`.
+pub fn exp<D: Scalar>(q: &Vector3<D>) -> Matrix3<D> {
+    let (s, a) = (q.dot(q), hat(q));
+    Matrix3::from_diagonal_element(D::one()) + a * stumpff(1, s) + a * a * stumpff(2, s)
+}
+
+/// The rotation vector of a matrix, `|q| ≤ π`: the inverse of [`exp`], accurate to a few `ε` up to
+/// half a turn.
+///
+/// Through the quaternion `(w, v) = (cos θ/2, sin θ/2 · axis)` of largest pivot, and
+/// `q = 2 atan2(|v|, w) v/|v|`.
+pub fn log<D: Scalar>(r: &Matrix3<D>) -> Vector3<D> {
+    let [w, x, y, z] = quaternion(r);
+    let v = Vector3::new(x, y, z);
+    v * (angle_over_sine(v.dot(&v), w) * 2.0)
+}
+
+/// The unit quaternion `(w, x, y, z)`, `w ≥ 0`, of a rotation matrix, from the largest of its four
+/// squared components (Shepperd 1978).
+fn quaternion<D: Scalar>(r: &Matrix3<D>) -> [D; 4] {
+    let trace = r.m11 + r.m22 + r.m33;
+    let squares = [trace, r.m11 * 2.0 - trace, r.m22 * 2.0 - trace, r.m33 * 2.0 - trace];
+    let pivot =
+        (1..4).fold(0, |best, k| if squares[k].re() > squares[best].re() { k } else { best });
+    let largest = (squares[pivot] + 1.0).sqrt() * 0.5;
+    let scale = (largest * 4.0).recip();
+    let skew = [r.m32 - r.m23, r.m13 - r.m31, r.m21 - r.m12].map(|entry| entry * scale);
+    let [xy, xz, yz] = [r.m12 + r.m21, r.m13 + r.m31, r.m23 + r.m32].map(|entry| entry * scale);
+    let q = match pivot {
+        0 => [largest, skew[0], skew[1], skew[2]],
+        1 => [skew[0], largest, xy, xz],
+        2 => [skew[1], xy, largest, yz],
+        _ => [skew[2], xz, yz, largest],
+    };
+    if q[0].re() < 0.0 { q.map(|entry| -entry) } else { q }
+}
+
+/// The left-trivialised derivative of the exponential: `exp(q̂)ᵀ d exp(q̂) = hat(dexp(q) dq)`,
+///
+/// ```math
+/// \mathrm{dexp}(q) = 1 - \frac{1 - \cos\theta}{\theta^2} \hat q
+///                      + \frac{\theta - \sin\theta}{\theta^3} \hat q^2 .
+/// ```
+pub fn dexp<D: Scalar>(q: &Vector3<D>) -> Matrix3<D> {
+    let (s, a) = (q.dot(q), hat(q));
+    Matrix3::from_diagonal_element(D::one()) - a * stumpff(2, s) + a * a * stumpff(3, s)
+}
+
+/// The inverse of [`dexp`], `1 + ½q̂ + (1 − ½θ cot ½θ)/θ² q̂²`, for `|q| < 2π`.
+pub fn dexp_inverse<D: Scalar>(q: &Vector3<D>) -> Matrix3<D> {
+    let (s, a) = (q.dot(q), hat(q));
+    // With t = θ²/4 the weight is (c₁ − c₀)/(4t c₁), and c₁ − c₀ = t (c₂ − c₃).
+    let t = s * 0.25;
+    let weight = (stumpff(2, t) - stumpff(3, t)) / stumpff(1, t) * 0.25;
+    Matrix3::from_diagonal_element(D::one()) + a * D::from(0.5) + a * a * weight
+}
+
+/// One step of Newton's iteration for the polar factor, `R ← R(3 − RᵀR)/2`, which squares the
+/// defect.
+#[inline]
+fn orthogonal<D: Scalar>(r: &Matrix3<D>) -> Matrix3<D> {
+    let correction = Matrix3::from_diagonal_element(D::from(1.5)) - r.tr_mul(r) * D::from(0.5);
+    r * correction
+}
+
+impl Space for Rotations {
+    type Dim = Const<3>;
+    type Point<D: Scalar> = Matrix3<D>;
+
+    #[inline]
+    fn constant<D: Scalar>(x: &Matrix3<f64>) -> Matrix3<D> {
+        x.map(D::from)
+    }
+
+    #[inline]
+    fn real<D: Scalar>(x: &Matrix3<D>) -> Matrix3<f64> {
+        x.map(|entry| entry.re())
+    }
+
+    #[inline]
+    fn chart<D: Scalar>(x: &Matrix3<f64>, q: &Vector3<D>) -> Matrix3<D> {
+        orthogonal(&(Self::constant::<D>(x) * exp(q)))
+    }
+
+    #[inline]
+    fn coordinates<D: Scalar>(x: &Matrix3<f64>, y: &Matrix3<D>) -> Vector3<D> {
+        log(&(Self::constant::<D>(x).tr_mul(y)))
+    }
+}
+
+impl Manifold for Rotations {
+    /// `max |RᵀR − 1|`, and at least 2 for a reflection.
+    fn defect(&self, x: &Matrix3<f64>) -> f64 {
+        let gram = (x.tr_mul(x) - Matrix3::identity()).amax();
+        if x.determinant() > 0.0 { gram } else { gram.max(2.0) }
+    }
+
+    /// Row by row.
+    fn entries(x: &Matrix3<f64>) -> Vec<f64> {
+        x.transpose().iter().copied().collect()
+    }
+
+    #[inline]
+    fn magnitude(_: &Matrix3<f64>) -> f64 {
+        1.0
+    }
+
+    /// The polar factor: the nearest rotation in the Frobenius norm.
+    fn project(&self, x: &Matrix3<f64>) -> Matrix3<f64> {
+        let svd = x.svd(true, true);
+        match (svd.u, svd.v_t) {
+            (Some(mut u), Some(v_t)) => {
+                if (u * v_t).determinant() < 0.0 {
+                    u.column_mut(2).neg_mut();
+                }
+                orthogonal(&(u * v_t))
+            }
+            _ => *x,
+        }
+    }
+
+    /// Uniform (Haar measure), from a uniform unit quaternion.
+    fn random(&self, rng: &mut impl Rng) -> Matrix3<f64> {
+        loop {
+            let q = Vector4::<f64>::from_fn(|_, _| rng.random_range(-1.0..1.0));
+            let square = q.norm_squared();
+            if square > 1e-6 && square <= 1.0 {
+                return self.from_quaternion([q.x, q.y, q.z, q.w]);
+            }
+        }
+    }
+}
+
+impl Rotations {
+    /// The rotation of a quaternion `[w, x, y, z]`, which need not have norm 1.
+    #[must_use]
+    pub fn from_quaternion(&self, [w, x, y, z]: [f64; 4]) -> Matrix3<f64> {
+        let unit = UnitQuaternion::new_normalize(Quaternion::new(w, x, y, z));
+        unit.to_rotation_matrix().into_inner()
+    }
+
+    /// The unit quaternion `[w, x, y, z]`, `w ≥ 0`, of a rotation.
+    #[must_use]
+    pub fn to_quaternion(&self, r: &Matrix3<f64>) -> [f64; 4] {
+        quaternion(r)
+    }
+}
+
+/// The curvature of SO(3) with `⟨â, b̂⟩ = a·b`.
+const CURVATURE: f64 = 0.25;
+
+impl Riemannian<Rotations> for Canonical {
+    type At<D: Scalar> = Normal<D, 3>;
+
+    #[inline]
+    fn at<D: Scalar>(&self, x: &ChartPoint<Rotations, D>) -> Result<Normal<D, 3>, MetricError> {
+        Ok(Normal::at(&x.q, CURVATURE))
+    }
+
+    fn matrix<D: Scalar>(&self, x: &ChartPoint<Rotations, D>) -> SMatrix<D, 3, 3> {
+        Normal::at(&x.q, CURVATURE).matrix()
+    }
+
+    fn exp<D: Scalar>(
+        &self,
+        x: &ChartPoint<Rotations, D>,
+        v: &Vector3<D>,
+    ) -> Result<GeodesicEnd<Rotations, D>, MetricError> {
+        let omega = dexp(&x.q) * v;
+        within(PI, Column::magnitude(&omega))?;
+        let end = orthogonal(&(x.point() * exp(&omega)));
+        let base = Rotations::real(&end);
+        // The body velocity is constant; the chart at the end reads it by one more dual number.
+        let turned = end * hat(&omega);
+        let moved = end.zip_map(&turned, Dual::new);
+        let q = Rotations::coordinates(&base, &moved);
+        Ok((ChartPoint { base, q: q.map(|q| q.re) }, q.map(|q| q.eps)))
+    }
+
+    fn log(&self, x: &Matrix3<f64>, y: &Matrix3<f64>) -> Result<Vector3<f64>, MetricError> {
+        let q = Rotations::coordinates(x, y);
+        within(PI, q.norm())?;
+        Ok(q)
+    }
+
+    /// With the constant body velocity `u`: `z = R exp(û/2)`, `x' = R exp(û)`, differentiated by
+    /// [`dexp`]. The chart at `z` reads the body velocity `Ω` at `q` as `dexp⁻¹(q) Ω = Ω + ½q × Ω + …`.
+    fn weyl_jet(
+        &self,
+        x: &Matrix3<f64>,
+        d: &Vector3<f64>,
+    ) -> Result<ArcJet<Rotations>, MetricError> {
+        within(PI, d.norm())?;
+        let half = d * 0.5;
+        let dz = dexp(&half) * 0.5;
+        Ok(ArcJet {
+            z: Rotations::chart(x, &half),
+            dz,
+            d: *d,
+            dd: Matrix3::identity() - hat(&half) * dz,
+            end: Rotations::chart(x, d),
+            dend: dexp(d),
+        })
+    }
+
+    fn slopes(&self, _: &Matrix3<f64>) -> Option<<Const<3> as Dimension>::Array<Matrix3<f64>>> {
+        // In normal coordinates the metric is constant to first order.
+        None
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::laws;
+    use crate::{Exponential, WeylMidpoint};
+    use metriplectic_fields::Real;
+    use nalgebra::vector;
+    use proptest::prelude::*;
+    use rand::SeedableRng;
+    use rand::rngs::ChaCha8Rng;
+
+    proptest! {
+        #[test]
+        fn rotations_keep_the_laws(seed in any::<u64>(), u in prop::array::uniform3(-1.0..1.0)) {
+            let x = Rotations.random(&mut ChaCha8Rng::seed_from_u64(seed));
+            // Up to 3.1 radians.
+            let u = Vector3::from(u) * (3.1 / 3.0_f64.sqrt());
+            laws::manifold(&Rotations, &x, &u)?;
+            laws::metric::<Rotations, _>(&Canonical, &x, &u)?;
+            laws::retraction::<Rotations, _, _>(&WeylMidpoint, &Canonical, &x, &u)?;
+            laws::retraction::<Rotations, _, _>(&Exponential, &Canonical, &x, &u)?;
+            let y = Rotations::chart(&x, &u);
+            laws::symmetric_retraction::<Rotations, _, _>(&WeylMidpoint, &Canonical, &x, &y)?;
+        }
+
+        #[test]
+        fn dexp_is_the_derivative_of_exp(q in prop::array::uniform3(-2.0..2.0)) {
+            let q = Vector3::from(q);
+            for k in 0..3 {
+                let seeded = Vector3::from_fn(|i, _| {
+                    Real::new(q[i], if i == k { 1.0 } else { 0.0 }, 0.0, 0.0)
+                });
+                let moved = exp(&seeded);
+                let slope = vee(&exp(&q).tr_mul(&moved.map(|entry| entry.eps1)));
+                prop_assert!((slope - dexp(&q).column(k)).norm() < 1e-14);
+            }
+            prop_assert!((dexp(&q) * dexp_inverse(&q) - Matrix3::identity()).amax() < 1e-13);
+        }
+    }
+
+    #[test]
+    fn first_and_second_derivatives_are_right_at_the_identity() {
+        let seeded = vector![
+            Real::new(0.0, 1.0, 0.0, 0.0),
+            Real::new(0.0, 0.0, 1.0, 0.0),
+            Real::new(0.0, 0.0, 0.0, 0.0)
+        ];
+        let r = exp(&seeded);
+        // exp(q̂) = 1 + q̂ + ½q̂²: first derivatives are the generators, the mixed second one is
+        // ½(ê₁ê₂ + ê₂ê₁).
+        let [e1, e2] = [Vector3::x(), Vector3::y()].map(|e: Vector3<f64>| hat(&e));
+        assert_eq!(r.map(|entry| entry.eps1), e1);
+        assert_eq!(r.map(|entry| entry.eps2), e2);
+        assert_eq!(r.map(|entry| entry.eps1eps2), (e1 * e2 + e2 * e1) * 0.5);
+        let back = log(&r);
+        assert_eq!(back.map(|entry| entry.eps1), Vector3::x());
+        assert_eq!(back.map(|entry| entry.eps2), Vector3::y());
+        assert!(back.map(|entry| entry.eps1eps2).norm() < 1e-16);
+    }
+
+    #[test]
+    fn the_logarithm_is_accurate_up_to_half_a_turn() {
+        let axis = vector![2.0, -1.0, 2.0] / 3.0;
+        for k in 0..=400 {
+            let theta = (PI - 1e-10) * f64::from(k) / 400.0;
+            // The matrix of the exact half-angle quaternion, whose logarithm is known.
+            let (sine, cosine) = (0.5 * theta).sin_cos();
+            let v = axis * sine;
+            let r = Rotations.from_quaternion([cosine, v.x, v.y, v.z]);
+            let off = (log(&r) - axis * theta).norm();
+            assert!(off <= 16.0 * f64::EPSILON * theta.max(1.0), "θ = {theta}: off by {off:.1e}");
+        }
+    }
+
+    #[test]
+    fn a_reflection_is_not_a_rotation() {
+        let mirror = Matrix3::from_diagonal(&vector![1.0, 1.0, -1.0]);
+        assert!(Rotations.check(&mirror).is_err());
+        assert!(Rotations.check(&Rotations.project(&mirror)).is_ok());
+    }
+
+    #[test]
+    fn quaternions_go_in_and_out() {
+        let q = [0.5, -0.5, 0.5, 0.5];
+        let r = Rotations.from_quaternion(q);
+        let back = Rotations.to_quaternion(&r);
+        assert!(q.iter().zip(back).all(|(a, b)| (a - b).abs() < 1e-15));
+    }
+}

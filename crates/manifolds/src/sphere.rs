@@ -1,0 +1,374 @@
+//! The unit spheres Sⁿ, n = 1 … 7.
+
+use std::f64::consts::PI;
+
+use metriplectic_fields::series::{angle_over_sine, stumpff};
+use metriplectic_fields::{ChartPoint, Column, Dimension, Scalar, Space};
+use nalgebra::{Const, SMatrix, SVector};
+use num_dual::Dual;
+use rand::{Rng, RngExt};
+
+use crate::metric::{GeodesicEnd, MetricError, within};
+use crate::normal::Normal;
+use crate::{ArcJet, Canonical, Manifold, Riemannian};
+
+/// The unit sphere `Sⁿ = { x ∈ Rⁿ⁺¹ : |x| = 1 }` for `n = 1 … 7`.
+///
+/// A point is a [`SVector`] of `n + 1` entries. At each point there is an orthonormal tangent frame
+/// `E(x)`, oriented so that `det[x, E] = +1`, and the chart is normal coordinates,
+///
+/// ```math
+/// \varphi_x(q) = \cos|q|\, x + \frac{\sin|q|}{|q|}\, E q, \qquad
+/// \varphi_x^{-1}(y) = \frac{\theta}{\sin\theta}\, E^T (y - x), \quad \cos\theta = x^T y .
+/// ```
+///
+/// The canonical metric is the round one: geodesics are great circles, the injectivity radius is π.
+/// The logarithm is accurate to about `8ε/(π − θ)`: its direction is lost at the antipode.
+///
+/// Points never drift: the chart divides by the norm, so that fields are only ever evaluated at
+/// points of norm 1 up to one rounding, and the energy that a step keeps is that of the point it
+/// stores.
+///
+/// ```
+/// use metriplectic_manifolds::{Canonical, Manifold, Riemannian, Sphere};
+/// use nalgebra::vector;
+/// let (x, y) = (vector![1.0, 0.0, 0.0], vector![0.0, 0.0, 1.0]);
+/// let quarter = Riemannian::<Sphere<2>>::log(&Canonical, &x, &y).unwrap();
+/// assert!((quarter.norm() - std::f64::consts::FRAC_PI_2).abs() < 1e-15);
+/// ```
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Sphere<const N: usize>;
+
+impl<const N: usize> Sphere<N> {
+    /// The sphere with its round metric.
+    pub const fn round() -> Self {
+        Self
+    }
+}
+
+/// An orthonormal basis of the tangent space at `x`, with `det[x, E] = +1`: the columns of the
+/// Householder reflection that takes the last axis to `∓x`, all but the last.
+fn frame<const A: usize, const N: usize>(x: &SVector<f64, A>) -> SMatrix<f64, A, N> {
+    let sign = if x[N] < 0.0 { -1.0 } else { 1.0 };
+    let mut axis = *x;
+    axis[N] += sign;
+    let scale = 2.0 / axis.norm_squared();
+    let mut e = SMatrix::from_fn(|i, j| {
+        let delta = if i == j { 1.0 } else { 0.0 };
+        delta - scale * axis[i] * axis[j]
+    });
+    // The reflection has determinant −1 and last column −sign·x, so det[E, x] = sign.
+    let oriented = if N.is_multiple_of(2) { sign } else { -sign };
+    if oriented < 0.0 {
+        for i in 0..A {
+            e[(i, 0)] = -e[(i, 0)];
+        }
+    }
+    e
+}
+
+/// `E q` at a scalar.
+#[inline]
+fn spread<D: Scalar, const A: usize, const N: usize>(
+    e: &SMatrix<f64, A, N>,
+    q: &SVector<D, N>,
+) -> SVector<D, A> {
+    SVector::from_fn(|i, _| (0..N).fold(D::zero(), |sum, j| sum + q[j] * e[(i, j)]))
+}
+
+/// `Eᵀ v` at a scalar.
+#[inline]
+fn components<D: Scalar, const A: usize, const N: usize>(
+    e: &SMatrix<f64, A, N>,
+    v: &SVector<D, A>,
+) -> SVector<D, N> {
+    SVector::from_fn(|j, _| (0..A).fold(D::zero(), |sum, i| sum + v[i] * e[(i, j)]))
+}
+
+/// The point at time `t` of the great circle from `x` with velocity `v`, and its velocity there:
+/// `c₀(t²s) x + t c₁(t²s) v` with `s = |v|²`.
+fn great_circle<D: Scalar, const A: usize>(
+    x: &SVector<D, A>,
+    v: &SVector<D, A>,
+    t: f64,
+) -> [SVector<D, A>; 2] {
+    let s = v.dot(v);
+    let (cosine, sine) = (stumpff(0, s * (t * t)), stumpff(1, s * (t * t)));
+    [x * cosine + v * (sine * t), v * cosine - x * (s * sine * t)]
+}
+
+/// Divides by the norm of the real part, which leaves derivatives along the sphere alone.
+#[inline]
+fn normalised<D: Scalar, const A: usize>(x: &SVector<D, A>) -> SVector<D, A> {
+    let norm = Column::magnitude(x);
+    x.map(|entry| entry / norm)
+}
+
+macro_rules! sphere {
+    ($n:literal in $a:literal) => {
+        impl Space for Sphere<$n> {
+            type Dim = Const<$n>;
+            type Point<D: Scalar> = SVector<D, $a>;
+
+            #[inline]
+            fn constant<D: Scalar>(x: &SVector<f64, $a>) -> SVector<D, $a> {
+                Column::embed(x)
+            }
+
+            #[inline]
+            fn real<D: Scalar>(x: &SVector<D, $a>) -> SVector<f64, $a> {
+                Column::real(x)
+            }
+
+            #[inline]
+            fn chart<D: Scalar>(x: &SVector<f64, $a>, q: &SVector<D, $n>) -> SVector<D, $a> {
+                let s = q.dot(q);
+                let along = spread(&frame::<$a, $n>(x), q) * stumpff(1, s);
+                let cosine = stumpff(0, s);
+                normalised(&SVector::from_fn(|i, _| along[i] + cosine * x[i]))
+            }
+
+            fn coordinates<D: Scalar>(x: &SVector<f64, $a>, y: &SVector<D, $a>) -> SVector<D, $n> {
+                let difference = SVector::<D, $a>::from_fn(|i, _| y[i] - x[i]);
+                let tangent = components(&frame::<$a, $n>(x), &difference);
+                let cosine = y.dot(&Column::embed(x));
+                tangent * angle_over_sine(tangent.dot(&tangent), cosine)
+            }
+        }
+
+        impl Manifold for Sphere<$n> {
+            fn defect(&self, x: &SVector<f64, $a>) -> f64 {
+                (x.norm() - 1.0).abs()
+            }
+
+            fn entries(x: &SVector<f64, $a>) -> Vec<f64> {
+                x.iter().copied().collect()
+            }
+
+            #[inline]
+            fn magnitude(_: &SVector<f64, $a>) -> f64 {
+                1.0
+            }
+
+            fn project(&self, x: &SVector<f64, $a>) -> SVector<f64, $a> {
+                normalised(x)
+            }
+
+            /// Uniform: the direction of a Gaussian vector (Muller 1959).
+            fn random(&self, rng: &mut impl Rng) -> SVector<f64, $a> {
+                normalised(&SVector::<f64, $a>::from_fn(|_, _| gaussian(rng)))
+            }
+        }
+
+        impl Riemannian<Sphere<$n>> for Canonical {
+            type At<D: Scalar> = Normal<D, $n>;
+
+            #[inline]
+            fn at<D: Scalar>(
+                &self,
+                x: &ChartPoint<Sphere<$n>, D>,
+            ) -> Result<Normal<D, $n>, MetricError> {
+                Ok(Normal::at(&x.q, 1.0))
+            }
+
+            fn matrix<D: Scalar>(&self, x: &ChartPoint<Sphere<$n>, D>) -> SMatrix<D, $n, $n> {
+                Normal::at(&x.q, 1.0).matrix()
+            }
+
+            fn exp<D: Scalar>(
+                &self,
+                x: &ChartPoint<Sphere<$n>, D>,
+                v: &SVector<D, $n>,
+            ) -> Result<GeodesicEnd<Sphere<$n>, D>, MetricError> {
+                // The chart is pushed forward, and pulled back at the end, by one more dual number.
+                let moved = SVector::from_fn(|i, _| Dual::new(x.q[i], v[i]));
+                let start = Sphere::<$n>::chart(&x.base, &moved);
+                let (point, velocity) = (start.map(|p| p.re), start.map(|p| p.eps));
+                within(PI, Column::magnitude(&velocity))?;
+                let [point, velocity] = great_circle(&point, &velocity, 1.0);
+                let point = normalised(&point);
+                let base = Sphere::<$n>::real(&point);
+                let end = SVector::from_fn(|i, _| Dual::new(point[i], velocity[i]));
+                let q = Sphere::<$n>::coordinates(&base, &end);
+                Ok((ChartPoint { base, q: q.map(|q| q.re) }, q.map(|q| q.eps)))
+            }
+
+            fn log(
+                &self,
+                x: &SVector<f64, $a>,
+                y: &SVector<f64, $a>,
+            ) -> Result<SVector<f64, $n>, MetricError> {
+                // Never the arc cosine, which has no digits for near points.
+                let length = 2.0 * (y - x).norm().atan2((y + x).norm());
+                within(PI, length)?;
+                Ok(Sphere::<$n>::coordinates(x, y))
+            }
+
+            fn weyl_jet(
+                &self,
+                x: &SVector<f64, $a>,
+                d: &SVector<f64, $n>,
+            ) -> Result<ArcJet<Sphere<$n>>, MetricError> {
+                within(PI, d.norm())?;
+                Ok(weyl_jet_in::<Sphere<$n>, $a, $n>(x, d))
+            }
+
+            fn slopes(
+                &self,
+                _: &SVector<f64, $a>,
+            ) -> Option<<Const<$n> as Dimension>::Array<SMatrix<f64, $n, $n>>> {
+                // In normal coordinates the metric is constant to first order.
+                None
+            }
+        }
+    };
+}
+
+sphere!(1 in 2);
+sphere!(2 in 3);
+sphere!(3 in 4);
+sphere!(4 in 5);
+sphere!(5 in 6);
+sphere!(6 in 7);
+sphere!(7 in 8);
+
+/// The midpoint arc in closed form. With `U = E(x) d`, `s = |d|²` and the Stumpff functions at
+/// `s/4`: `z = c₀ x + ½c₁ U`, `γ'(½) = c₀ U − ½s c₁ x`, differentiated by `c₀' = −½c₁` and
+/// `c₁' = −½(c₂ − c₃)`. The frames at `z` and `x'` turn ambient vectors into components; the chart at
+/// `z` is normal, so the derivative of components is the projected ambient derivative.
+fn weyl_jet_in<M, const A: usize, const N: usize>(
+    x: &SVector<f64, A>,
+    d: &SVector<f64, N>,
+) -> ArcJet<M>
+where
+    M: Space<Dim = Const<N>>,
+    M::Point<f64>: From<[f64; A]>,
+{
+    let (e, s) = (frame::<A, N>(x), d.norm_squared());
+    let u = e * d;
+    let [c0, c1] = [0, 1].map(|n| stumpff(n, 0.25 * s));
+    let slope = -0.5 * (stumpff(2, 0.25 * s) - stumpff(3, 0.25 * s));
+    let z = normalised(&(x * c0 + u * (0.5 * c1)));
+    let velocity = u * c0 - x * (0.5 * s * c1);
+    let mut dz = e * (0.5 * c1);
+    let mut dv = e * c0;
+    for k in 0..N {
+        let along = 0.5 * d[k];
+        let turn = x * (-0.5 * c1 * along) + u * (0.5 * slope * along);
+        let lean = x * (-(d[k] * c1 + 0.5 * s * slope * along)) - u * (0.5 * c1 * along);
+        dz.set_column(k, &(dz.column(k) + turn));
+        dv.set_column(k, &(dv.column(k) + lean));
+    }
+    let [c0, c1] = [0, 1].map(|n| stumpff(n, s));
+    let slope = -0.5 * (stumpff(2, s) - stumpff(3, s));
+    let end = normalised(&(x * c0 + u * c1));
+    let mut dend = e * c1;
+    for k in 0..N {
+        let turn = x * (-c1 * d[k]) + u * (2.0 * slope * d[k]);
+        dend.set_column(k, &(dend.column(k) + turn));
+    }
+    let (at_z, at_end) = (frame::<A, N>(&z), frame::<A, N>(&end));
+    ArcJet {
+        z: entries_of(&z).into(),
+        dz: at_z.tr_mul(&dz),
+        d: at_z.tr_mul(&velocity),
+        dd: at_z.tr_mul(&dv),
+        end: entries_of(&end).into(),
+        dend: at_end.tr_mul(&dend),
+    }
+}
+
+/// The entries of a column as an array.
+fn entries_of<const A: usize>(x: &SVector<f64, A>) -> [f64; A] {
+    (*x).into()
+}
+
+/// A normally distributed number (Box and Muller 1958).
+fn gaussian(rng: &mut impl Rng) -> f64 {
+    let (u, v): (f64, f64) = (rng.random_range(f64::MIN_POSITIVE..1.0), rng.random_range(0.0..1.0));
+    (-2.0 * u.ln()).sqrt() * (2.0 * PI * v).cos()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::laws;
+    use crate::{Exponential, WeylMidpoint};
+    use nalgebra::vector;
+    use proptest::prelude::*;
+    use rand::SeedableRng;
+    use rand::rngs::ChaCha8Rng;
+
+    macro_rules! keeps_the_laws {
+        ($name:ident, $n:literal) => {
+            proptest! {
+                #[test]
+                fn $name(seed in any::<u64>(), u in prop::array::uniform::<_, $n>(-1.0..1.0)) {
+                    let sphere = Sphere::<$n>::round();
+                    let x = sphere.random(&mut ChaCha8Rng::seed_from_u64(seed));
+                    // Up to 2.9 radians.
+                    let u = SVector::<f64, $n>::from(u) * (2.9 / f64::from($n as u8).sqrt());
+                    laws::manifold(&sphere, &x, &u)?;
+                    laws::metric::<Sphere<$n>, _>(&Canonical, &x, &u)?;
+                    laws::retraction::<Sphere<$n>, _, _>(&WeylMidpoint, &Canonical, &x, &u)?;
+                    laws::retraction::<Sphere<$n>, _, _>(&Exponential, &Canonical, &x, &u)?;
+                    let y = Sphere::<$n>::chart(&x, &u);
+                    laws::symmetric_retraction::<Sphere<$n>, _, _>(
+                        &WeylMidpoint, &Canonical, &x, &y,
+                    )?;
+                }
+            }
+        };
+    }
+    keeps_the_laws!(the_circle_keeps_the_laws, 1);
+    keeps_the_laws!(the_sphere_keeps_the_laws, 2);
+    keeps_the_laws!(the_three_sphere_keeps_the_laws, 3);
+    keeps_the_laws!(the_four_sphere_keeps_the_laws, 4);
+    keeps_the_laws!(the_five_sphere_keeps_the_laws, 5);
+    keeps_the_laws!(the_six_sphere_keeps_the_laws, 6);
+    keeps_the_laws!(the_seven_sphere_keeps_the_laws, 7);
+
+    #[test]
+    fn the_frame_is_oriented_at_both_poles_and_between() {
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        for _ in 0..100 {
+            let x = Sphere::<2>.random(&mut rng);
+            let e = frame::<3, 2>(&x);
+            let determinant = nalgebra::Matrix3::from_columns(&[
+                x,
+                e.column(0).into_owned(),
+                e.column(1).into_owned(),
+            ])
+            .determinant();
+            assert!((determinant - 1.0).abs() < 1e-14);
+        }
+    }
+
+    #[test]
+    fn the_logarithm_of_near_and_of_far_points_has_its_digits() {
+        let x = vector![0.6, 0.0, 0.8];
+        for k in 1..=300 {
+            let theta = 10.0_f64.powf(-14.0 + 0.05 * f64::from(k)).min(PI - 1e-6);
+            let q = vector![0.6, -0.8] * theta;
+            let y = Sphere::<2>::chart(&x, &q);
+            let log = Riemannian::<Sphere<2>>::log(&Canonical, &x, &y).unwrap();
+            // The points are rounded to ε, which a logarithm of length θ cannot undo.
+            let attainable = 8.0 * f64::EPSILON * (1.0 / theta + 1.0 + theta / (PI - theta));
+            assert!((log - q).norm() <= attainable * theta.max(1e-300), "θ = {theta}");
+        }
+    }
+
+    #[test]
+    fn antipodes_and_longer_arcs_are_refused_with_their_length() {
+        let x = vector![1.0, 0.0, 0.0];
+        let error = Riemannian::<Sphere<2>>::log(&Canonical, &x, &-x).unwrap_err();
+        assert!(
+            matches!(error, MetricError::CutLocus { length, .. } if (length - PI).abs() < 1e-15)
+        );
+        let long = vector![0.0, 3.5];
+        let error = Riemannian::<Sphere<2>>::weyl_jet(&Canonical, &x, &long).unwrap_err();
+        assert!(
+            matches!(error, MetricError::CutLocus { length, .. } if (length - 3.5).abs() < 1e-15)
+        );
+    }
+}

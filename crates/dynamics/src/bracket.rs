@@ -3,17 +3,33 @@
 mod constant;
 mod field;
 mod lie_poisson;
+mod nambu;
 mod zero;
 
 pub use constant::ConstantPoisson;
 pub use field::FieldPoisson;
 pub use lie_poisson::LiePoisson;
+pub use nambu::{AreaForm, Nambu};
 pub use zero::Zero;
 
 use metriplectic_fields::{ChartPoint, Column, Dimension, Matrix, Scalar, Square, Vector};
-use metriplectic_manifolds::Manifold;
+use metriplectic_manifolds::{Manifold, MetricError, Riemannian};
 use nalgebra::SMatrix;
 use num_dual::Dual64;
+
+/// Where a bracket is evaluated, and what of the system it may look at.
+#[derive(Debug)]
+pub struct Site<'a, M: Manifold, G, D: Scalar = f64> {
+    /// The manifold.
+    pub space: &'a M,
+    /// Its metric, whose volume form the Nambu brackets need.
+    pub metric: &'a G,
+    /// The point, and the chart that components refer to.
+    pub x: &'a ChartPoint<M, D>,
+    /// The covector of the entropy there: `dS`, or a discrete gradient of it. Only brackets that are
+    /// built from their Casimir look at it.
+    pub s: &'a Vector<M, D>,
+}
 
 /// A Poisson tensor `Π`, acting on covectors: `{f, g} = Π(df, dg)`, `x' = Π dH`.
 ///
@@ -26,30 +42,46 @@ use num_dual::Dual64;
     message = "`{Self}` is not a bracket on `{M}`",
     note = "a Poisson tensor of your own is `Poisson::field(|x| matrix)` or `Poisson::constant(matrix)?`"
 )]
-pub trait Bracket<M: Manifold> {
+pub trait Bracket<M: Manifold, G: Riemannian<M>> {
     /// The vector `Π(x) α`, components in the frame of the chart of `x`.
+    ///
+    /// # Errors
+    ///
+    /// [`MetricError`] if the bracket needs the metric and it cannot be used at `x`.
     fn apply<D: Scalar>(
         &self,
-        space: &M,
-        x: &ChartPoint<M, D>,
+        at: &Site<'_, M, G, D>,
         alpha: &Vector<M, D>,
-    ) -> Vector<M, D>;
+    ) -> Result<Vector<M, D>, MetricError>;
 
-    /// `Πα` at a real point with its derivatives along `x` and `α`.
-    fn linearise(&self, space: &M, z: &M::Point<f64>, alpha: &Vector<M>) -> BracketJet<M> {
-        by_dual_numbers(self, space, z, alpha)
+    /// `Πα` at the centre of a chart with its derivatives along the point, the covector of the
+    /// entropy, and `α`.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`apply`](Self::apply).
+    fn linearise(
+        &self,
+        at: &Site<'_, M, G>,
+        alpha: &Vector<M>,
+    ) -> Result<BracketJet<M>, MetricError> {
+        by_dual_numbers(self, at, alpha)
     }
 
     /// The matrix `Π(x)`.
-    fn tensor<D: Scalar>(&self, space: &M, x: &ChartPoint<M, D>) -> Matrix<M, D> {
+    ///
+    /// # Errors
+    ///
+    /// Those of [`apply`](Self::apply).
+    fn tensor<D: Scalar>(&self, at: &Site<'_, M, G, D>) -> Result<Matrix<M, D>, MetricError> {
         let mut tensor = Matrix::<M, D>::zeros();
         for j in 0..M::Dim::LEN {
-            let column = self.apply(space, x, &Vector::<M, D>::basis(j));
+            let column = self.apply(at, &Vector::<M, D>::basis(j))?;
             for i in 0..M::Dim::LEN {
                 tensor[(i, j)] = column[i];
             }
         }
-        tensor
+        Ok(tensor)
     }
 
     /// Whether the bracket is zero by construction, so that nothing moves reversibly.
@@ -59,23 +91,29 @@ pub trait Bracket<M: Manifold> {
 }
 
 /// The definition of [`Bracket::linearise`]: one dual number for each direction.
-pub(crate) fn by_dual_numbers<M: Manifold>(
-    bracket: &(impl Bracket<M> + ?Sized),
-    space: &M,
-    z: &M::Point<f64>,
+pub(crate) fn by_dual_numbers<M: Manifold, G: Riemannian<M>>(
+    bracket: &(impl Bracket<M, G> + ?Sized),
+    at: &Site<'_, M, G>,
     alpha: &Vector<M>,
-) -> BracketJet<M> {
-    let centre = ChartPoint::centre(z);
-    let value = bracket.apply(space, &centre, alpha);
-    let mut along_z = Matrix::<M>::zeros();
+) -> Result<BracketJet<M>, MetricError> {
+    let zero = Matrix::<M>::zeros();
+    let value = bracket.apply(at, alpha)?;
+    let mut jet =
+        BracketJet::<M> { value, along_z: zero, along_s: zero, tensor: bracket.tensor(at)? };
+    let (s, alpha) = (Vector::<M, Dual64>::embed(at.s), Vector::<M, Dual64>::embed(alpha));
+    let still = ChartPoint::centre(&at.x.base);
     for k in 0..M::Dim::LEN {
-        let moved = ChartPoint { base: z.clone(), q: epsilon::<M>(k) };
-        let column = bracket.apply(space, &moved, &Column::embed(alpha));
+        let e = epsilon::<M>(k);
+        let moved = ChartPoint { base: at.x.base.clone(), q: e };
+        let Site { space, metric, .. } = *at;
+        let along_z = bracket.apply(&Site { space, metric, x: &moved, s: &s }, &alpha)?;
+        let along_s = bracket.apply(&Site { space, metric, x: &still, s: &(s + e) }, &alpha)?;
         for i in 0..M::Dim::LEN {
-            along_z[(i, k)] = column[i].eps;
+            jet.along_z[(i, k)] = along_z[i].eps;
+            jet.along_s[(i, k)] = along_s[i].eps;
         }
     }
-    BracketJet { value, along_z, tensor: bracket.tensor(space, &centre) }
+    Ok(jet)
 }
 
 /// Chart coordinates `ε e_k`.
@@ -84,12 +122,14 @@ pub(crate) fn epsilon<M: Manifold>(k: usize) -> Vector<M, Dual64> {
 }
 
 /// `Πα` at a real point, with its derivatives.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct BracketJet<M: Manifold> {
     /// The vector `Πα`.
     pub value: Vector<M>,
     /// `∂(Πα)/∂z` in the chart at `z`.
     pub along_z: Matrix<M>,
+    /// `∂(Πα)/∂s`, along the covector of the entropy.
+    pub along_s: Matrix<M>,
     /// `∂(Πα)/∂α`, the tensor itself.
     pub tensor: Matrix<M>,
 }
@@ -97,7 +137,7 @@ pub struct BracketJet<M: Manifold> {
 /// A manifold that comes with a bracket; the others start from [`Zero`].
 pub trait NaturalBracket: Manifold {
     /// The bracket a system has unless it is given another one.
-    type Bracket: Bracket<Self>;
+    type Bracket;
 
     /// That bracket.
     fn natural_bracket(&self) -> Self::Bracket;

@@ -1,11 +1,14 @@
 //! What brackets and dissipations promise, and the functions that check it.
 
-use metriplectic_fields::{BrokenLaw, ChartPoint, Column, Dimension, Matrix, Square, Vector};
-use metriplectic_manifolds::{Manifold, Riemannian};
-use num_dual::Dual64;
+use metriplectic_fields::{
+    BrokenLaw, ChartPoint, Column, Dimension, Matrix, Scalar, ScalarField, Space, Square, Vector,
+    differential,
+};
+use metriplectic_manifolds::{Manifold, MetricError};
 
 use crate::bracket::{by_dual_numbers as by_dual_numbers_bracket, epsilon};
 use crate::dissipation::by_dual_numbers;
+use crate::system::{Metriplectic, Point};
 use crate::{Bracket, Dissipation};
 
 /// Round-off of a tensor contraction whose terms have the size `scale`.
@@ -25,16 +28,17 @@ pub(crate) struct BracketDefects {
 }
 
 /// Evaluates skewness and the Jacobi identity `Π^{il}∂_lΠ^{jk} + cyclic` at `x`.
-pub(crate) fn bracket_defects<M: Manifold, B: Bracket<M>>(
-    bracket: &B,
-    space: &M,
-    x: &M::Point<f64>,
-) -> BracketDefects {
-    let n = M::Dim::LEN;
-    let tensor = bracket.tensor(space, &ChartPoint::<M>::centre(x));
-    let slopes: Vec<Matrix<M, Dual64>> = (0..n)
-        .map(|l| bracket.tensor(space, &ChartPoint { base: x.clone(), q: epsilon::<M>(l) }))
-        .collect();
+pub(crate) fn bracket_defects<Y: Metriplectic + ?Sized>(
+    system: &Y,
+    x: &Point<Y>,
+) -> Result<BracketDefects, MetricError> {
+    let n = <Y::Manifold as Space>::Dim::LEN;
+    let tensor = tensor(system, &ChartPoint::<Y::Manifold>::centre(x))?;
+    let mut slopes = Vec::with_capacity(n);
+    for l in 0..n {
+        let moved = ChartPoint { base: x.clone(), q: epsilon::<Y::Manifold>(l) };
+        slopes.push(self::tensor(system, &moved)?);
+    }
     let mut defects =
         BracketDefects { skewness: 0.0, jacobi: 0.0, size: tensor.max_abs(), jacobi_size: 0.0 };
     let worst = |old: f64, new: f64| if new > old || new.is_nan() { new } else { old };
@@ -52,10 +56,18 @@ pub(crate) fn bracket_defects<M: Manifold, B: Bracket<M>>(
             }
         }
     }
-    defects
+    Ok(defects)
 }
 
-/// Checks a bracket at `x` with the covectors `α`, `β`:
+/// The Poisson tensor of a system at any scalar.
+fn tensor<Y: Metriplectic + ?Sized, D: Scalar>(
+    system: &Y,
+    x: &ChartPoint<Y::Manifold, D>,
+) -> Result<Matrix<Y::Manifold, D>, MetricError> {
+    system.bracket().tensor(&system.site(x, &differential(system.entropy(), x)))
+}
+
+/// Checks the bracket of a system at `x` with the covectors `α`, `β`:
 ///
 /// 1. `Π` is skew; 2. Jacobi identity; 3. `linearise` is the derivative of `apply`;
 /// 4. `apply` is linear in the covector (which is Leibniz' rule).
@@ -63,37 +75,43 @@ pub(crate) fn bracket_defects<M: Manifold, B: Bracket<M>>(
 /// # Errors
 ///
 /// The first law that is broken.
-pub fn bracket<M: Manifold, B: Bracket<M>>(
-    bracket: &B,
-    space: &M,
-    x: &M::Point<f64>,
-    alpha: &Vector<M>,
-    beta: &Vector<M>,
+pub fn bracket<Y: Metriplectic>(
+    system: &Y,
+    x: &Point<Y>,
+    alpha: &Vector<Y::Manifold>,
+    beta: &Vector<Y::Manifold>,
 ) -> Result<(), BrokenLaw> {
-    let defects = bracket_defects(bracket, space, x);
-    BrokenLaw::unless("Π is skew", defects.skewness, round_off::<M>(defects.size))?;
+    let exists = |_| BrokenLaw { law: "Π exists", size: f64::NAN, bound: 0.0 };
+    let bracket = system.bracket();
+    let defects = bracket_defects(system, x).map_err(exists)?;
+    let round_off = round_off::<Y::Manifold>;
+    BrokenLaw::unless("Π is skew", defects.skewness, round_off(defects.size))?;
     // The terms may vanish one by one, so the size of a generic product Π ∂Π is allowed for.
     let size = defects.jacobi_size + defects.size;
-    BrokenLaw::unless("Jacobi identity", defects.jacobi, round_off::<M>(size))?;
+    BrokenLaw::unless("Jacobi identity", defects.jacobi, round_off(size))?;
 
-    let centre = ChartPoint::<M>::centre(x);
-    let jet = bracket.linearise(space, x, alpha);
-    let defined = by_dual_numbers_bracket(bracket, space, x, alpha);
+    let centre = ChartPoint::centre(x);
+    let s = system.entropy().jet1(x).df;
+    let site = system.site(&centre, &s);
+    let jet = bracket.linearise(&site, alpha).map_err(exists)?;
+    let defined = by_dual_numbers_bracket(bracket, &site, alpha).map_err(exists)?;
     let size = defects.size * (alpha.magnitude() + beta.magnitude());
     let off = (defined.value - jet.value).magnitude();
-    BrokenLaw::unless("linearise has the value of apply", off, round_off::<M>(size))?;
+    BrokenLaw::unless("linearise has the value of apply", off, round_off(size))?;
     let off = (defined.tensor - jet.tensor).max_abs();
-    BrokenLaw::unless("linearise has the tensor of apply", off, round_off::<M>(defects.size))?;
+    BrokenLaw::unless("linearise has the tensor of apply", off, round_off(defects.size))?;
+    let slopes = jet.along_z.max_abs() + jet.along_s.max_abs();
     let off = (defined.along_z - jet.along_z).max_abs();
-    let bound = round_off::<M>(size + jet.along_z.max_abs());
-    BrokenLaw::unless("linearise is the derivative of apply", off, bound)?;
-    let combined = bracket.apply(space, &centre, &(*alpha + *beta * 3.0));
-    let apart = jet.value + bracket.apply(space, &centre, beta) * 3.0;
+    BrokenLaw::unless("linearise is the derivative along x", off, round_off(size + slopes))?;
+    let off = (defined.along_s - jet.along_s).max_abs();
+    BrokenLaw::unless("linearise is the derivative along dS", off, round_off(size + slopes))?;
+    let combined = bracket.apply(&site, &(*alpha + *beta * 3.0)).map_err(exists)?;
+    let apart = jet.value + bracket.apply(&site, beta).map_err(exists)? * 3.0;
     let off = (combined - apart).magnitude();
-    BrokenLaw::unless("Π(α + 3β) = Πα + 3Πβ", off, round_off::<M>(4.0 * size))
+    BrokenLaw::unless("Π(α + 3β) = Πα + 3Πβ", off, round_off(4.0 * size))
 }
 
-/// Checks a dissipation at `x` with the covector `w` to be killed and two more covectors:
+/// Checks the dissipation of a system at `x` with the covector `w` to be killed and two more covectors:
 ///
 /// 1. `K_w` is symmetric; 2. `K_w ⪰ 0`; 3. `K_w w = 0`; 4. `linearise` is the derivative of
 ///    `apply` along `x`, `w` and `α`.
@@ -101,25 +119,26 @@ pub fn bracket<M: Manifold, B: Bracket<M>>(
 /// # Errors
 ///
 /// The first law that is broken.
-pub fn dissipation<M: Manifold, G: Riemannian<M>, K: Dissipation<M, G>>(
-    dissipation: &K,
-    metric: &G,
-    x: &M::Point<f64>,
-    w: &Vector<M>,
-    alpha: &Vector<M>,
+pub fn dissipation<Y: Metriplectic>(
+    system: &Y,
+    x: &Point<Y>,
+    w: &Vector<Y::Manifold>,
+    alpha: &Vector<Y::Manifold>,
 ) -> Result<(), BrokenLaw> {
+    let (dissipation, metric) = (system.dissipation(), system.metric());
     let broken = |law| move |_| BrokenLaw { law, size: f64::NAN, bound: 0.0 };
-    let centre = ChartPoint::<M>::centre(x);
+    let centre = ChartPoint::<Y::Manifold>::centre(x);
     let tensor = dissipation.tensor(metric, &centre, w).map_err(broken("K exists"))?;
     let size = tensor.max_abs();
-    let asymmetry = Matrix::<M>::from_entries(|i, j| tensor[(i, j)] - tensor[(j, i)]).max_abs();
-    BrokenLaw::unless("K is symmetric", asymmetry, round_off::<M>(size))?;
+    let asymmetry =
+        Matrix::<Y::Manifold>::from_entries(|i, j| tensor[(i, j)] - tensor[(j, i)]).max_abs();
+    BrokenLaw::unless("K is symmetric", asymmetry, round_off::<Y::Manifold>(size))?;
     let form = alpha.dot(&(tensor * *alpha));
     let scale = size * alpha.magnitude().powi(2);
-    BrokenLaw::unless("K is positive semidefinite", -form, round_off::<M>(scale))?;
+    BrokenLaw::unless("K is positive semidefinite", -form, round_off::<Y::Manifold>(scale))?;
     let killed = dissipation.apply(metric, &centre, w, w).map_err(broken("K exists"))?;
     let off = killed.magnitude();
-    BrokenLaw::unless("K_w w = 0", off, round_off::<M>(size * w.magnitude()))?;
+    BrokenLaw::unless("K_w w = 0", off, round_off::<Y::Manifold>(size * w.magnitude()))?;
 
     let jet = dissipation.linearise(metric, x, w, alpha).map_err(broken("K exists"))?;
     let defined = by_dual_numbers(dissipation, metric, x, w, alpha).map_err(broken("K exists"))?;
@@ -130,7 +149,7 @@ pub fn dissipation<M: Manifold, G: Riemannian<M>, K: Dissipation<M, G>>(
         ("linearise is the derivative along w", defined.along_w, jet.along_w),
         ("linearise is the derivative along α", defined.tensor, jet.tensor),
     ] {
-        let bound = relative * round_off::<M>(left.max_abs() + size);
+        let bound = relative * round_off::<Y::Manifold>(left.max_abs() + size);
         BrokenLaw::unless(law, (left - right).max_abs(), bound)?;
     }
     Ok(())

@@ -7,7 +7,7 @@
 //!
 //! | module | what it holds |
 //! |---|---|
-//! | [`bracket`] | [`Bracket`]: `Π`; [`LiePoisson`], [`Poisson::constant`], [`Poisson::field`], [`Zero`] |
+//! | [`bracket`] | [`Bracket`]: `Π`; [`LiePoisson`], [`AreaForm`], [`Nambu`], [`Poisson::constant`], [`Poisson::field`], [`Zero`] |
 //! | [`dissipation`] | [`Dissipation`]: `K`, given the covector it must kill; [`MetricDissipation`] |
 //! | [`system`] | [`System`] and its builder |
 //! | [`verify`] | the laws of a model, sampled: [`System::verify`], [`System::report`] |
@@ -20,8 +20,8 @@ pub mod system;
 pub mod verify;
 
 pub use bracket::{
-    Bracket, BracketJet, ConstantPoisson, FieldPoisson, LiePoisson, NaturalBracket, Poisson,
-    PoissonError, Zero,
+    AreaForm, Bracket, BracketJet, ConstantPoisson, FieldPoisson, LiePoisson, Nambu,
+    NaturalBracket, Poisson, PoissonError, Site, Zero,
 };
 pub use dissipation::{Dissipation, DissipationJet, MetricDissipation, NoDissipation};
 pub use system::{BuildError, Metriplectic, NoEntropy, Point, SecondLaw, System, SystemBuilder};

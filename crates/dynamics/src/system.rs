@@ -3,6 +3,7 @@
 use metriplectic_fields::{ChartPoint, Matrix, Scalar, ScalarField, Space, Vector, differential};
 use metriplectic_manifolds::{Canonical, Manifold, MetricError, Riemannian};
 
+use crate::bracket::Site;
 use crate::verify::{self, ModelError, Report};
 use crate::{Bracket, Dissipation, MetricDissipation, NaturalBracket, NoDissipation};
 
@@ -13,7 +14,7 @@ pub trait Metriplectic {
     /// The Riemannian metric.
     type Metric: Riemannian<Self::Manifold>;
     /// The Poisson tensor `Π`.
-    type Bracket: Bracket<Self::Manifold>;
+    type Bracket: Bracket<Self::Manifold, Self::Metric>;
     /// The dissipation `K`.
     type Dissipation: Dissipation<Self::Manifold, Self::Metric>;
     /// The energy `H`.
@@ -48,6 +49,16 @@ pub trait Metriplectic {
         self.entropy().at(x)
     }
 
+    /// Where the bracket is evaluated: the point `x` with the covector `s` of the entropy there.
+    #[inline]
+    fn site<'a, D: Scalar>(
+        &'a self,
+        x: &'a ChartPoint<Self::Manifold, D>,
+        s: &'a Vector<Self::Manifold, D>,
+    ) -> Site<'a, Self::Manifold, Self::Metric, D> {
+        Site { space: self.manifold(), metric: self.metric(), x, s }
+    }
+
     /// The velocity `Π dH + K dS`, by the definition and at any scalar.
     ///
     /// # Errors
@@ -58,7 +69,7 @@ pub trait Metriplectic {
         x: &ChartPoint<Self::Manifold, D>,
     ) -> Result<Vector<Self::Manifold, D>, MetricError> {
         let (dh, ds) = (differential(self.energy(), x), differential(self.entropy(), x));
-        let reversible = self.bracket().apply(self.manifold(), x, &dh);
+        let reversible = self.bracket().apply(&self.site(x, &ds), &dh)?;
         Ok(reversible + self.dissipation().apply(self.metric(), x, &dh, &ds)?)
     }
 
@@ -191,8 +202,9 @@ impl<M: Manifold, G, B, K, H, S> SystemBuilder<M, G, B, K, H, S> {
     }
 
     /// The Poisson tensor: [`LiePoisson`](crate::LiePoisson), [`Zero`](crate::Zero),
-    /// [`Poisson::constant`](crate::Poisson::constant) or [`Poisson::field`](crate::Poisson::field).
-    pub fn bracket<F: Bracket<M>>(self, bracket: F) -> SystemBuilder<M, G, F, K, H, S> {
+    /// [`Poisson::constant`](crate::Poisson::constant), [`Poisson::field`](crate::Poisson::field),
+    /// [`AreaForm`](crate::AreaForm) or [`Nambu`](crate::Nambu).
+    pub fn bracket<F>(self, bracket: F) -> SystemBuilder<M, G, F, K, H, S> {
         let Self { manifold, metric, dissipation, energy, entropy, second_law, .. } = self;
         SystemBuilder { manifold, metric, bracket, dissipation, energy, entropy, second_law }
     }
@@ -209,7 +221,7 @@ impl<M, G, B, K, H, S> SystemBuilder<M, G, B, K, H, S>
 where
     M: Manifold,
     G: Riemannian<M>,
-    B: Bracket<M>,
+    B: Bracket<M, G>,
     K: Dissipation<M, G>,
     H: ScalarField<M>,
     S: ScalarField<M>,
@@ -221,8 +233,8 @@ where
     ///
     /// [`BuildError`] if the parts do not make a system.
     pub fn build(self) -> Result<System<M, G, B, K, H, S>, BuildError> {
-        let has_entropy = !self.dissipation.is_none();
-        if !has_entropy && self.bracket.is_zero() {
+        let has_entropy = !Dissipation::<M, G>::is_none(&self.dissipation);
+        if !has_entropy && Bracket::<M, G>::is_zero(&self.bracket) {
             return Err(BuildError::NothingMoves);
         }
         if has_entropy == (self.second_law == SecondLaw::NoEntropy) {
@@ -236,7 +248,7 @@ impl<M, G, B, K, H, S> Metriplectic for System<M, G, B, K, H, S>
 where
     M: Manifold,
     G: Riemannian<M>,
-    B: Bracket<M>,
+    B: Bracket<M, G>,
     K: Dissipation<M, G>,
     H: ScalarField<M>,
     S: ScalarField<M>,

@@ -125,11 +125,14 @@ fn examine<Y: Metriplectic + ?Sized>(
 /// A field whose value at `x` is not a finite number.
 fn value_not_finite<Y: Metriplectic + ?Sized>(system: &Y, x: &Point<Y>) -> Option<ModelError> {
     let at = ChartPoint::<Y::Manifold>::centre(x);
+    let ds = system.entropy().jet1(x).df;
+    let bracket = system.bracket().tensor(&system.site(&at, &ds));
     let values = [
         ("energy", system.energy().at::<f64>(x)),
         ("entropy", system.entropy().at::<f64>(x)),
         ("metric", metric_matrix(system, x).max_abs()),
-        ("bracket", system.bracket().tensor(system.manifold(), &at).max_abs()),
+        // A metric that cannot be used is reported as such, not as a bracket without a value.
+        ("bracket", bracket.map_or(0.0, |tensor| tensor.max_abs())),
     ];
     let (field, value) = values.into_iter().find(|(_, value)| !value.is_finite())?;
     Some(ModelError::ValueNotFinite { field, value, point: Y::Manifold::entries(x) })
@@ -143,13 +146,14 @@ fn examine_at<Y: Metriplectic + ?Sized>(
     report: &mut Report,
 ) -> Result<(), ModelError> {
     report.judged += 1;
-    let mut site = Site { point: Y::Manifold::entries(x), laws: &mut report.laws, first: None };
+    let mut findings =
+        Findings { point: Y::Manifold::entries(x), laws: &mut report.laws, first: None };
     let energy = jet(system.energy(), "energy", x)?;
     let entropy = jet(system.entropy(), "entropy", x)?;
     examine_metric(system, x)?;
-    examine_bracket(system, x, &entropy, &mut site)?;
-    examine_dissipation(system, x, &energy, &entropy, rng, &mut site)?;
-    site.first.map_or(Ok(()), Err)
+    examine_bracket(system, x, &entropy, &mut findings)?;
+    examine_dissipation(system, x, &energy, &entropy, rng, &mut findings)?;
+    findings.first.map_or(Ok(()), Err)
 }
 
 /// Value, differential and Hessian, all finite.
@@ -185,25 +189,27 @@ fn examine_bracket<Y: Metriplectic + ?Sized>(
     system: &Y,
     x: &Point<Y>,
     entropy: &Jet2<Y::Manifold>,
-    site: &mut Site<'_>,
+    findings: &mut Findings<'_>,
 ) -> Result<(), ModelError> {
-    let defects = bracket_defects(system.bracket(), system.manifold(), x);
+    let metric = |source| ModelError::Metric { source, point: Y::Manifold::entries(x) };
+    let defects = bracket_defects(system, x).map_err(metric)?;
     if !defects.jacobi.is_finite() {
         return Err(ModelError::DerivativeNotFinite {
             field: "bracket",
-            point: site.point.clone(),
+            point: findings.point.clone(),
         });
     }
     let size = relative(defects.skewness, defects.size);
-    site.note("Πᵀ = −Π", size, |point| ModelError::BracketNotSkew { point, size });
+    findings.note("Πᵀ = −Π", size, |point| ModelError::BracketNotSkew { point, size });
     let size = relative(defects.jacobi, defects.jacobi_size);
-    site.note("Jacobi identity", size, |point| ModelError::NoJacobiIdentity { point, size });
+    findings.note("Jacobi identity", size, |point| ModelError::NoJacobiIdentity { point, size });
 
     let centre = ChartPoint::<Y::Manifold>::centre(x);
-    let velocity = system.bracket().apply(system.manifold(), &centre, &entropy.df);
+    let here = system.site(&centre, &entropy.df);
+    let velocity = system.bracket().apply(&here, &entropy.df).map_err(metric)?;
     let size = relative(velocity.magnitude(), defects.size * entropy.df.magnitude());
     if system.second_law() == SecondLaw::Casimir {
-        site.note("Π dS = 0", size, |point| ModelError::EntropyNotCasimir { point, size });
+        findings.note("Π dS = 0", size, |point| ModelError::EntropyNotCasimir { point, size });
     }
     Ok(())
 }
@@ -215,7 +221,7 @@ fn examine_dissipation<Y: Metriplectic + ?Sized>(
     energy: &Jet2<Y::Manifold>,
     entropy: &Jet2<Y::Manifold>,
     rng: &mut ChaCha8Rng,
-    site: &mut Site<'_>,
+    findings: &mut Findings<'_>,
 ) -> Result<(), ModelError> {
     if system.dissipation().is_none() {
         return Ok(());
@@ -227,21 +233,21 @@ fn examine_dissipation<Y: Metriplectic + ?Sized>(
     let scale = tensor.max_abs();
     let transposed = Matrix::<Y::Manifold>::from_entries(|i, j| tensor[(j, i)]);
     let size = relative((tensor - transposed).max_abs(), scale);
-    site.note("Kᵀ = K", size, |point| ModelError::DissipationNotSymmetric { point, size });
+    findings.note("Kᵀ = K", size, |point| ModelError::DissipationNotSymmetric { point, size });
 
     let covector = Vector::<Y::Manifold>::from_index(|_| rng.random_range(-1.0..1.0));
     let negative = [entropy.df, covector].iter().fold(0.0_f64, |worst, alpha| {
         let form = alpha.dot(&(tensor * *alpha));
         worst.max(relative((-form).max(0.0), scale * alpha.magnitude().powi(2)))
     });
-    site.note("K ⪰ 0", negative, |point| ModelError::DissipationNotPositive {
+    findings.note("K ⪰ 0", negative, |point| ModelError::DissipationNotPositive {
         point,
         size: negative,
     });
 
     let killed = tensor * energy.df;
     let size = relative(killed.magnitude(), scale * energy.df.magnitude());
-    site.note("K dH = 0", size, |point| ModelError::EnergyNotKept { point, size });
+    findings.note("K dH = 0", size, |point| ModelError::EnergyNotKept { point, size });
     Ok(())
 }
 
@@ -250,14 +256,14 @@ fn relative(size: f64, scale: f64) -> f64 {
     if size == 0.0 { 0.0 } else { size / scale.max(f64::MIN_POSITIVE) }
 }
 
-/// One point of the examination: where the laws' residuals and the first error are kept.
-struct Site<'a> {
+/// What is found at one point: the laws' residuals and the first error.
+struct Findings<'a> {
     point: Vec<f64>,
     laws: &'a mut Vec<LawResidual>,
     first: Option<ModelError>,
 }
 
-impl Site<'_> {
+impl Findings<'_> {
     /// Notes the violation of a law here, and keeps the worst of all points.
     fn note(&mut self, law: &'static str, size: f64, error: impl FnOnce(Vec<f64>) -> ModelError) {
         let here = LawResidual { law, size, allowed: TOLERANCE, point: self.point.clone() };

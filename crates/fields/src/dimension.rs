@@ -250,6 +250,16 @@ pub trait Square<D: Scalar>:
         x
     }
 
+    /// The root of the determinant of a symmetric positive matrix, from its Cholesky factor.
+    ///
+    /// # Errors
+    ///
+    /// [`NotPositive`] if the matrix is not positive definite.
+    fn root_determinant(&self) -> Result<D, NotPositive> {
+        let l = self.cholesky()?;
+        Ok((0..Self::Column::LEN).fold(D::one(), |product, i| product * l[(i, i)]))
+    }
+
     /// The largest `|A_ij|` over the real parts; NaN if any entry is.
     fn max_abs(&self) -> f64 {
         let mut worst = 0.0_f64;

@@ -40,7 +40,7 @@ where
         let end: f64 = f.at(&arc.end);
         let chord = Chord::new(f, &df, &arc.d, start, (&arc.end, end), |s| {
             let u = Vector::<M, Real>::embed(u) * s;
-            retraction.arc(metric, x, &u).map_or_else(|_| M::constant(&arc.end), |arc| arc.end)
+            retraction.end(metric, x, &u).unwrap_or_else(|_| M::constant(&arc.end))
         });
         let safe = chord.covector(0.0, &g, &arc.d);
         Ok((arc, w, safe, df, end))

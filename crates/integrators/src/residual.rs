@@ -49,12 +49,12 @@ where
         &self,
         u: &Vector<Y::Manifold, D>,
     ) -> Result<Vector<Y::Manifold, D>, MetricError> {
-        let (metric, space) = (self.system.metric(), self.system.manifold());
+        let metric = self.system.metric();
         let arc = self.retraction.arc(metric, self.x, u)?;
         let g = metric.at(&arc.z)?;
         let w = gonzalez(self.system.energy(), &g, &arc, self.energy);
         let s = differential(self.system.entropy(), &arc.z);
-        let reversible = self.system.bracket().apply(space, &arc.z, &w);
+        let reversible = self.system.bracket().apply(&self.system.site(&arc.z, &s), &w)?;
         let irreversible = self.system.dissipation().apply(metric, &arc.z, &w, &s)?;
         Ok(arc.d - (reversible + irreversible) * D::from(self.h))
     }
@@ -70,8 +70,8 @@ where
     ) -> Chord<Y::Manifold> {
         Chord::new(self.system.energy(), df, d, self.energy, end, |s| {
             let u = Vector::<Y::Manifold, Real>::embed(u) * s;
-            match self.retraction.arc(self.system.metric(), self.x, &u) {
-                Ok(arc) => arc.end,
+            match self.retraction.end(self.system.metric(), self.x, &u) {
+                Ok(end) => end,
                 // The same arc has been followed to its end, so this is not reached.
                 Err(_) => Y::Manifold::constant(end.0),
             }
@@ -88,15 +88,15 @@ where
     #[inline]
     fn value(&self, u: &Vector<Y::Manifold>) -> Option<Vector<Y::Manifold>> {
         let (system, metric) = (self.system, self.system.metric());
-        let arc = self.retraction.arc(metric, self.x, u).ok()?;
-        let z = arc.z.point();
-        let g = metric.at(&arc.z).ok()?;
-        let df = system.energy().jet1(&z).df;
+        let arc = self.retraction.arc_jet(metric, self.x, u).ok()?;
+        let z = ChartPoint::<Y::Manifold>::centre(&arc.z);
+        let g = metric.at(&z).ok()?;
+        let df = system.energy().jet1(&arc.z).df;
         let end = system.energy_at(&arc.end);
         let w = self.chord(u, &df, &arc.d, (&arc.end, end)).covector(self.recall, &g, &arc.d);
-        let s = system.entropy().jet1(&z).df;
-        let reversible = system.bracket().apply(system.manifold(), &arc.z, &w);
-        let irreversible = system.dissipation().apply(metric, &arc.z, &w, &s).ok()?;
+        let s = system.entropy().jet1(&arc.z).df;
+        let reversible = system.bracket().apply(&system.site(&z, &s), &w).ok()?;
+        let irreversible = system.dissipation().apply(metric, &z, &w, &s).ok()?;
         let residual = arc.d - (reversible + irreversible) * self.h;
         residual.is_finite().then_some(residual)
     }
@@ -107,20 +107,21 @@ where
     fn linearise(&self, u: &Vector<Y::Manifold>) -> Option<Linearised<Y::Manifold>> {
         let (system, metric, h) = (self.system, self.system.metric(), self.h);
         let arc = self.retraction.arc_jet(metric, self.x, u).ok()?;
-        let g = metric.at(&ChartPoint::<Y::Manifold>::centre(&arc.z)).ok()?;
+        let centre = ChartPoint::<Y::Manifold>::centre(&arc.z);
+        let g = metric.at(&centre).ok()?;
         let energy = system.energy().jet2(&arc.z);
         let end = system.energy().jet1(&arc.end);
         let entropy = system.entropy().jet2(&arc.z);
         let chord = self.chord(u, &energy.df, &arc.d, (&arc.end, end.value));
         let w = chord.covector(self.recall, &g, &arc.d);
         let dw = chord.slope(self.recall, &g, &arc, &energy.hf, &end.df);
-        let pi = system.bracket().linearise(system.manifold(), &arc.z, &w);
+        let pi = system.bracket().linearise(&system.site(&centre, &entropy.df), &w).ok()?;
         let k = system.dissipation().linearise(metric, &arc.z, &w, &entropy.df).ok()?;
 
         let residual = arc.d - (pi.value + k.value) * h;
         let slope = (pi.along_z + k.along_z) * arc.dz
             + (pi.tensor + k.along_w) * dw
-            + k.tensor * (entropy.hf * arc.dz);
+            + (pi.along_s + k.tensor) * (entropy.hf * arc.dz);
         let jacobian = arc.dd - slope * h;
         // The terms of Πw and K dS are rounded, and so are w and d.
         let length = arc.d.magnitude();

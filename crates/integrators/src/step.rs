@@ -136,9 +136,8 @@ impl<R> Scheme<R> {
         };
         let root = self.solve(&residual, &guess, work)?;
         let lost = NoRoot { best: root.u, residual: f64::INFINITY, sweeps: root.sweeps };
-        let arc = self.retraction.arc(system.metric(), start.x, &root.u).map_err(|_| lost)?;
-        memory.note(root.u);
-        Ok(memory.settle::<Y::Manifold>(start.x, &root.u, arc.end))
+        let end = self.retraction.end(system.metric(), start.x, &root.u).map_err(|_| lost)?;
+        Ok(memory.note::<Y::Manifold>(start.x, &root.u, end))
     }
 
     /// Newton's method, and where it is lost the globaliser with Newton's polish.
@@ -203,7 +202,7 @@ pub struct Work {
 fn explicit<Y: Metriplectic>(system: &Y, start: &Start<'_, Y>) -> Option<Vector<Y::Manifold>> {
     let (dh, ds) = (system.energy().jet1(start.x).df, system.entropy().jet1(start.x).df);
     let x = ChartPoint::centre(start.x);
-    let reversible = system.bracket().apply(system.manifold(), &x, &dh);
+    let reversible = system.bracket().apply(&system.site(&x, &ds), &dh).ok()?;
     let irreversible = system.dissipation().apply(system.metric(), &x, &dh, &ds).ok()?;
     let displacement = (reversible + irreversible) * start.h;
     displacement.is_finite().then_some(displacement)
@@ -223,9 +222,11 @@ fn recall<Y: Metriplectic>(system: &Y, start: &Start<'_, Y>, d: &Vector<Y::Manif
         return 0.0;
     }
     let (dh, ds) = (system.energy().jet1(start.x).df, system.entropy().jet1(start.x).df);
-    let pi = system.bracket().linearise(system.manifold(), start.x, &dh);
+    let x = ChartPoint::centre(start.x);
+    let pi = system.bracket().linearise(&system.site(&x, &ds), &dh);
     let k = system.dissipation().linearise(system.metric(), start.x, &dh, &ds);
-    let gain = start.h * (pi.tensor.max_abs() + k.map_or(0.0, |k| k.along_w.max_abs()));
+    let sizes = (pi.map_or(0.0, |pi| pi.tensor.max_abs()), k.map_or(0.0, |k| k.along_w.max_abs()));
+    let gain = start.h * (sizes.0 + sizes.1);
     let r = d.dot(d) / (1e2 * gain * e.abs()).max(f64::MIN_POSITIVE);
     if r.is_finite() { e * (r * r / (1.0 + r * r)) } else { 0.0 }
 }
@@ -247,10 +248,6 @@ impl<V: Copy> Memory<V> {
     pub const fn new() -> Self {
         Self { displacements: [None; 3], carry: None }
     }
-
-    fn note(&mut self, d: V) {
-        self.displacements = [Some(d), self.displacements[0], self.displacements[1]];
-    }
 }
 
 impl<V: Column<f64>> Memory<V> {
@@ -264,19 +261,26 @@ impl<V: Column<f64>> Memory<V> {
         }
     }
 
-    /// The end of an arc, moved by what earlier steps have lost.
+    /// Notes the step from `x` by the displacement `d`, and gives its end, moved by what earlier
+    /// steps have lost.
     #[inline]
-    fn settle<M>(&mut self, x: &M::Point<f64>, d: &V, end: M::Point<f64>) -> M::Point<f64>
+    fn note<M>(&mut self, x: &M::Point<f64>, d: &V, end: M::Point<f64>) -> M::Point<f64>
     where
         M: Manifold<Dim: Dimension<Vector<f64> = V>>,
     {
+        let [last, before, _] = self.displacements;
+        self.displacements = [Some(*d), last, before].map(|d| d.map(|d| M::transport(x, &end, &d)));
         let lost = M::lost(x, d, &end);
-        let Some(carry) = self.carry else {
-            self.carry = Some(lost);
-            return end;
-        };
-        let settled = M::chart(&end, &carry);
-        self.carry = Some(lost + M::lost(&end, &carry, &settled));
-        settled
+        match self.carry {
+            Some(carry) if carry.magnitude() > 0.0 => {
+                let settled = M::chart(&end, &carry);
+                self.carry = Some(lost + M::lost(&end, &carry, &settled));
+                settled
+            }
+            _ => {
+                self.carry = Some(lost);
+                end
+            }
+        }
     }
 }

@@ -30,6 +30,15 @@ impl<M: Manifold, G: Riemannian<M>> Retraction<M, G> for Exponential {
         Ok(Arc { z, d: *u, end: end.point() })
     }
 
+    fn end<D: Scalar>(
+        &self,
+        metric: &G,
+        x: &M::Point<f64>,
+        u: &Vector<M, D>,
+    ) -> Result<M::Point<D>, MetricError> {
+        metric.end(x, u)
+    }
+
     fn arc_jet(
         &self,
         metric: &G,

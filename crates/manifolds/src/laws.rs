@@ -72,6 +72,15 @@ pub fn metric<M: Manifold, G: Riemannian<M>>(
     let off = (orthonormal - square).abs() / square.max(f64::MIN_POSITIVE);
     BrokenLaw::unless("|L⁻¹♭v|² = G(v, v)", off, round_off::<M>(1.0) * condition::<M>(&g))?;
 
+    let volume = usable("g is positive", metric.volume(&centre))?;
+    let root = g.root_determinant().map_err(|_| BrokenLaw {
+        law: "g is positive",
+        size: f64::NAN,
+        bound: 0.0,
+    })?;
+    let off = (volume / root - 1.0).abs();
+    BrokenLaw::unless("the volume form is √det g", off, round_off::<M>(1.0) * condition::<M>(&g))?;
+
     let (start, _) = usable("geodesics exist", metric.exp(&centre, &Vector::<M>::zero()))?;
     let moved = M::coordinates(x, &start.point()).magnitude();
     BrokenLaw::unless("exp_x(0) = x", moved, round_off::<M>(M::magnitude(x)))?;
@@ -106,6 +115,9 @@ pub fn retraction<M: Manifold, G: Riemannian<M>, R: Retraction<M, G>>(
     BrokenLaw::unless("the arc starts where its pair does", off, bound)?;
     let off = M::coordinates(&jet.end, &end).magnitude();
     BrokenLaw::unless("the arc ends where its pair does", off, bound)?;
+    let alone: M::Point<f64> = usable(exists, retraction.end(metric, x, u))?;
+    let off = M::coordinates(&jet.end, &alone).magnitude();
+    BrokenLaw::unless("the end alone is the end of the arc", off, bound)?;
     let back = usable(exists, retraction.inverse(metric, &start, &end))?;
     let off = M::coordinates(&jet.z, &back.base).magnitude();
     BrokenLaw::unless("R_h⁻¹ R_h keeps the base point", off, bound)?;

@@ -31,6 +31,14 @@ pub trait Manifold: Space {
         Vector::<Self>::zero()
     }
 
+    /// The components at `y` of the tangent vector `v` at `x`, for `y` near `x`: a vector transport
+    /// (Absil, Mahony, Sepulchre 2008, §8.1), which only guesses are made of. The same components
+    /// where the frame is the same everywhere.
+    #[inline]
+    fn transport(_x: &Self::Point<f64>, _y: &Self::Point<f64>, v: &Vector<Self>) -> Vector<Self> {
+        *v
+    }
+
     /// A random point, spread over a unit scale.
     fn random(&self, rng: &mut impl Rng) -> Self::Point<f64>;
 

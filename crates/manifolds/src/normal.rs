@@ -30,6 +30,11 @@ impl<D: Scalar, const N: usize> Normal<D, N> {
         Self { q: *q, across: stumpff(1, s), bend: stumpff(3, s) * curvature }
     }
 
+    /// The density `√det g = σⁿ⁻¹`.
+    pub(crate) fn volume(&self) -> D {
+        (1..N).fold(D::one(), |product, _| product * self.across)
+    }
+
     /// The matrix `g(q)`.
     pub(crate) fn matrix(&self) -> SMatrix<D, N, N> {
         let square = self.across * self.across;

@@ -26,6 +26,20 @@ pub trait Retraction<M: Manifold, G: Riemannian<M>> {
         u: &Vector<M, D>,
     ) -> Result<Arc<M, D>, MetricError>;
 
+    /// The end of the arc of `u` alone, at any scalar.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`arc`](Self::arc).
+    fn end<D: Scalar>(
+        &self,
+        metric: &G,
+        x: &M::Point<f64>,
+        u: &Vector<M, D>,
+    ) -> Result<M::Point<D>, MetricError> {
+        self.arc(metric, x, u).map(|arc| arc.end)
+    }
+
     /// The same arc at `f64`, with its derivatives along `u`.
     ///
     /// # Errors

@@ -215,6 +215,11 @@ impl Riemannian<Rotations> for Canonical {
         Normal::at(&x.q, CURVATURE).matrix()
     }
 
+    #[inline]
+    fn volume<D: Scalar>(&self, x: &ChartPoint<Rotations, D>) -> Result<D, MetricError> {
+        Ok(Normal::at(&x.q, CURVATURE).volume())
+    }
+
     fn exp<D: Scalar>(
         &self,
         x: &ChartPoint<Rotations, D>,
@@ -229,6 +234,12 @@ impl Riemannian<Rotations> for Canonical {
         let moved = end.zip_map(&turned, Dual::new);
         let q = Rotations::coordinates(&base, &moved);
         Ok((ChartPoint { base, q: q.map(|q| q.re) }, q.map(|q| q.eps)))
+    }
+
+    #[inline]
+    fn end<D: Scalar>(&self, x: &Matrix3<f64>, v: &Vector3<D>) -> Result<Matrix3<D>, MetricError> {
+        within(PI, Column::magnitude(v))?;
+        Ok(Rotations::chart(x, v))
     }
 
     fn log(&self, x: &Matrix3<f64>, y: &Matrix3<f64>) -> Result<Vector3<f64>, MetricError> {

@@ -150,6 +150,16 @@ macro_rules! sphere {
                 1.0
             }
 
+            /// By projection of the ambient vector.
+            #[inline]
+            fn transport(
+                x: &SVector<f64, $a>,
+                y: &SVector<f64, $a>,
+                v: &SVector<f64, $n>,
+            ) -> SVector<f64, $n> {
+                frame::<$a, $n>(y).tr_mul(&(frame::<$a, $n>(x) * v))
+            }
+
             fn project(&self, x: &SVector<f64, $a>) -> SVector<f64, $a> {
                 normalised(x)
             }
@@ -175,6 +185,11 @@ macro_rules! sphere {
                 Normal::at(&x.q, 1.0).matrix()
             }
 
+            #[inline]
+            fn volume<D: Scalar>(&self, x: &ChartPoint<Sphere<$n>, D>) -> Result<D, MetricError> {
+                Ok(Normal::at(&x.q, 1.0).volume())
+            }
+
             fn exp<D: Scalar>(
                 &self,
                 x: &ChartPoint<Sphere<$n>, D>,
@@ -191,6 +206,16 @@ macro_rules! sphere {
                 let end = SVector::from_fn(|i, _| Dual::new(point[i], velocity[i]));
                 let q = Sphere::<$n>::coordinates(&base, &end);
                 Ok((ChartPoint { base, q: q.map(|q| q.re) }, q.map(|q| q.eps)))
+            }
+
+            #[inline]
+            fn end<D: Scalar>(
+                &self,
+                x: &SVector<f64, $a>,
+                v: &SVector<D, $n>,
+            ) -> Result<SVector<D, $a>, MetricError> {
+                within(PI, Column::magnitude(v))?;
+                Ok(Sphere::<$n>::chart(x, v))
             }
 
             fn log(

@@ -30,6 +30,16 @@ impl<M: Manifold, G: Riemannian<M>> Retraction<M, G> for WeylMidpoint {
     }
 
     #[inline]
+    fn end<D: Scalar>(
+        &self,
+        metric: &G,
+        x: &M::Point<f64>,
+        u: &Vector<M, D>,
+    ) -> Result<M::Point<D>, MetricError> {
+        metric.end(x, u)
+    }
+
+    #[inline]
     fn arc_jet(
         &self,
         metric: &G,

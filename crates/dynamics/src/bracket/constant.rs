@@ -1,10 +1,10 @@
 //! A Poisson tensor with the same matrix everywhere.
 
-use metriplectic_fields::{ChartPoint, Matrix, Scalar, Square};
-use metriplectic_manifolds::{Flat, Manifold};
+use metriplectic_fields::{Matrix, Scalar, Square};
+use metriplectic_manifolds::{Flat, Manifold, MetricError, Riemannian};
 use nalgebra::{Const, SMatrix, SVector};
 
-use super::{Bracket, BracketJet, PoissonError};
+use super::{Bracket, BracketJet, PoissonError, Site};
 
 /// The same skew matrix everywhere on a flat space; see [`Poisson::constant`](super::Poisson::constant).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -29,26 +29,28 @@ impl<const N: usize> ConstantPoisson<N> {
     }
 }
 
-impl<const N: usize, M> Bracket<M> for ConstantPoisson<N>
+impl<const N: usize, M, G> Bracket<M, G> for ConstantPoisson<N>
 where
     M: Manifold<Dim = Const<N>> + Flat,
+    G: Riemannian<M>,
 {
     fn apply<D: Scalar>(
         &self,
-        _: &M,
-        _: &ChartPoint<M, D>,
+        _: &Site<'_, M, G, D>,
         alpha: &SVector<D, N>,
-    ) -> SVector<D, N> {
-        SMatrix::<D, N, N>::from_entries(|i, j| D::from(self.tensor[(i, j)])) * *alpha
+    ) -> Result<SVector<D, N>, MetricError> {
+        Ok(SMatrix::<D, N, N>::from_entries(|i, j| D::from(self.tensor[(i, j)])) * *alpha)
     }
 
     #[inline]
-    fn linearise(&self, _: &M, _: &M::Point<f64>, alpha: &SVector<f64, N>) -> BracketJet<M> {
-        BracketJet {
-            value: self.tensor * alpha,
-            along_z: Matrix::<M>::zeros(),
-            tensor: self.tensor,
-        }
+    fn linearise(
+        &self,
+        _: &Site<'_, M, G>,
+        alpha: &SVector<f64, N>,
+    ) -> Result<BracketJet<M>, MetricError> {
+        let zero = Matrix::<M>::zeros();
+        let value = self.tensor * alpha;
+        Ok(BracketJet { value, along_z: zero, along_s: zero, tensor: self.tensor })
     }
 }
 

@@ -1,9 +1,9 @@
 //! A Poisson tensor from a closure.
 
-use metriplectic_fields::{ChartPoint, Dimension, Matrix, MatrixField, Scalar, Square, Vector};
-use metriplectic_manifolds::Manifold;
+use metriplectic_fields::{Dimension, Matrix, MatrixField, Scalar, Square, Vector};
+use metriplectic_manifolds::{Flat, Manifold, MetricError, Riemannian};
 
-use super::{Bracket, BracketJet};
+use super::{Bracket, BracketJet, Site};
 
 /// The tensor `Π(x)` of a matrix field; see [`Poisson::field`](super::Poisson::field).
 #[derive(Clone, Copy, Debug)]
@@ -17,20 +17,28 @@ impl<F> FieldPoisson<F> {
     }
 }
 
-impl<M: Manifold, F: MatrixField<M>> Bracket<M> for FieldPoisson<F> {
-    fn apply<D: Scalar>(&self, _: &M, x: &ChartPoint<M, D>, alpha: &Vector<M, D>) -> Vector<M, D> {
-        self.field.at(&x.point()) * *alpha
+impl<M: Manifold + Flat, G: Riemannian<M>, F: MatrixField<M>> Bracket<M, G> for FieldPoisson<F> {
+    fn apply<D: Scalar>(
+        &self,
+        at: &Site<'_, M, G, D>,
+        alpha: &Vector<M, D>,
+    ) -> Result<Vector<M, D>, MetricError> {
+        Ok(self.field.at(&at.x.point()) * *alpha)
     }
 
-    fn linearise(&self, _: &M, z: &M::Point<f64>, alpha: &Vector<M>) -> BracketJet<M> {
-        let jet = self.field.jet(z);
-        let mut along_z = Matrix::<M>::zeros();
+    fn linearise(
+        &self,
+        at: &Site<'_, M, G>,
+        alpha: &Vector<M>,
+    ) -> Result<BracketJet<M>, MetricError> {
+        let jet = self.field.jet(&at.x.point());
+        let (mut along_z, along_s) = (Matrix::<M>::zeros(), Matrix::<M>::zeros());
         for k in 0..M::Dim::LEN {
             let column = jet.slopes[k] * *alpha;
             for i in 0..M::Dim::LEN {
                 along_z[(i, k)] = column[i];
             }
         }
-        BracketJet { value: jet.value * *alpha, along_z, tensor: jet.value }
+        Ok(BracketJet { value: jet.value * *alpha, along_z, along_s, tensor: jet.value })
     }
 }

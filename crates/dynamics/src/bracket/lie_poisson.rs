@@ -1,10 +1,10 @@
 //! The Lie-Poisson bracket on the dual of a Lie algebra.
 
-use metriplectic_fields::{ChartPoint, Column, Scalar};
-use metriplectic_manifolds::LieDual;
+use metriplectic_fields::{Column, Scalar};
+use metriplectic_manifolds::{LieDual, MetricError, Riemannian};
 use nalgebra::{SMatrix, SVector};
 
-use super::{Bracket, BracketJet, NaturalBracket};
+use super::{Bracket, BracketJet, NaturalBracket, Site};
 
 /// The Lie-Poisson bracket `{f, g}(μ) = ⟨μ, [df, dg]⟩` up to the sign of the left-invariant
 /// convention: `x' = Π dH` reads
@@ -18,36 +18,36 @@ use super::{Bracket, BracketJet, NaturalBracket};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct LiePoisson;
 
-impl<const N: usize> Bracket<LieDual<N>> for LiePoisson {
+impl<const N: usize, G: Riemannian<LieDual<N>>> Bracket<LieDual<N>, G> for LiePoisson {
     #[inline]
     fn apply<D: Scalar>(
         &self,
-        space: &LieDual<N>,
-        x: &ChartPoint<LieDual<N>, D>,
+        at: &Site<'_, LieDual<N>, G, D>,
         alpha: &SVector<D, N>,
-    ) -> SVector<D, N> {
-        space.algebra().coadjoint(alpha, &x.point())
+    ) -> Result<SVector<D, N>, MetricError> {
+        Ok(at.space.algebra().coadjoint(alpha, &at.x.point()))
     }
 
     #[inline]
     fn linearise(
         &self,
-        space: &LieDual<N>,
-        z: &SVector<f64, N>,
+        at: &Site<'_, LieDual<N>, G>,
         alpha: &SVector<f64, N>,
-    ) -> BracketJet<LieDual<N>> {
+    ) -> Result<BracketJet<LieDual<N>>, MetricError> {
+        let (z, zero) = (at.x.point(), SMatrix::zeros());
         let mut jet = BracketJet::<LieDual<N>> {
             value: Column::zero(),
-            along_z: SMatrix::zeros(),
-            tensor: SMatrix::zeros(),
+            along_z: zero,
+            along_s: zero,
+            tensor: zero,
         };
-        for c in space.algebra().constants() {
+        for c in at.space.algebra().constants() {
             let (slope, entry) = (c.value * alpha[c.a], c.value * z[c.d]);
             jet.value[c.b] += slope * z[c.d];
             jet.along_z[(c.b, c.d)] += slope;
             jet.tensor[(c.b, c.a)] += entry;
         }
-        jet
+        Ok(jet)
     }
 }
 

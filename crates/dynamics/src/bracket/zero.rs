@@ -1,24 +1,28 @@
 //! No bracket: pure relaxation.
 
-use metriplectic_fields::{ChartPoint, Column, Matrix, Scalar, Square, Vector};
-use metriplectic_manifolds::{Euclidean, Manifold};
+use metriplectic_fields::{Column, Matrix, Scalar, Square, Vector};
+use metriplectic_manifolds::{Euclidean, Manifold, MetricError, Riemannian};
 
-use super::{Bracket, BracketJet, NaturalBracket};
+use super::{Bracket, BracketJet, NaturalBracket, Site};
 
 /// `Π = 0`: the state climbs `S` along a level set of `H`, and nothing moves reversibly.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Zero;
 
-impl<M: Manifold> Bracket<M> for Zero {
+impl<M: Manifold, G: Riemannian<M>> Bracket<M, G> for Zero {
     #[inline]
-    fn apply<D: Scalar>(&self, _: &M, _: &ChartPoint<M, D>, _: &Vector<M, D>) -> Vector<M, D> {
-        Vector::<M, D>::zero()
+    fn apply<D: Scalar>(
+        &self,
+        _: &Site<'_, M, G, D>,
+        _: &Vector<M, D>,
+    ) -> Result<Vector<M, D>, MetricError> {
+        Ok(Vector::<M, D>::zero())
     }
 
     #[inline]
-    fn linearise(&self, _: &M, _: &M::Point<f64>, _: &Vector<M>) -> BracketJet<M> {
-        let zero = Matrix::<M>::zeros();
-        BracketJet { value: Vector::<M>::zero(), along_z: zero, tensor: zero }
+    fn linearise(&self, _: &Site<'_, M, G>, _: &Vector<M>) -> Result<BracketJet<M>, MetricError> {
+        let (value, zero) = (Vector::<M>::zero(), Matrix::<M>::zeros());
+        Ok(BracketJet { value, along_z: zero, along_s: zero, tensor: zero })
     }
 
     fn is_zero(&self) -> bool {

@@ -60,8 +60,8 @@ pub mod prelude {
         Certificate, Error, Newton, Run, RunError, Scheme, Span, State, Trajectory,
     };
     pub use metriplectic_manifolds::{
-        Euclidean, Exponential, LieAlgebra, LieDual, Manifold, Metric, Retraction, Rotations,
-        Sphere, WeylMidpoint,
+        Canonical, Euclidean, Exponential, LieAlgebra, LieDual, Manifold, Metric, Retraction,
+        Rotations, Sphere, WeylMidpoint,
     };
     pub use nalgebra::{
         Matrix1, Matrix2, Matrix3, Matrix4, Matrix5, Matrix6, SMatrix, SVector, Vector1, Vector2,

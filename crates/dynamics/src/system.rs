@@ -1,5 +1,7 @@
 //! A metriplectic system: manifold, metric, bracket, dissipation, energy and entropy.
 
+use std::fmt;
+
 use metriplectic_fields::{ChartPoint, Matrix, Scalar, ScalarField, Space, Vector, differential};
 use metriplectic_manifolds::{Canonical, Manifold, MetricError, Riemannian};
 
@@ -121,7 +123,7 @@ impl<M: Space> ScalarField<M> for NoEntropy {
 
 /// A metriplectic system on the manifold `M` with metric `G`, bracket `B`, dissipation `K`, energy
 /// `H` and entropy `S`; built by [`System::on`].
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub struct System<M, G, B, K, H, S> {
     parts: SystemBuilder<M, G, B, K, H, S>,
 }
@@ -159,7 +161,7 @@ impl System<(), (), (), (), (), ()> {
 }
 
 /// A system in the making: each method replaces one part.
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 #[must_use = "a builder does nothing until `build` is called"]
 pub struct SystemBuilder<M, G, B, K, H, S> {
     manifold: M,
@@ -169,6 +171,26 @@ pub struct SystemBuilder<M, G, B, K, H, S> {
     energy: H,
     entropy: S,
     second_law: SecondLaw,
+}
+
+// By hand, because closures have no `Debug`.
+impl<M: fmt::Debug, G, B, K, H, S> fmt::Debug for System<M, G, B, K, H, S> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let SystemBuilder { manifold, second_law, .. } = &self.parts;
+        f.debug_struct("System")
+            .field("manifold", manifold)
+            .field("second_law", second_law)
+            .finish_non_exhaustive()
+    }
+}
+
+impl<M: fmt::Debug, G, B, K, H, S> fmt::Debug for SystemBuilder<M, G, B, K, H, S> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("SystemBuilder")
+            .field("manifold", &self.manifold)
+            .field("second_law", &self.second_law)
+            .finish_non_exhaustive()
+    }
 }
 
 impl<M: Manifold, G, B, K, H, S> SystemBuilder<M, G, B, K, H, S> {

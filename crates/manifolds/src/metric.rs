@@ -5,6 +5,8 @@
 //! each point ([`Metric::field`]). On a flat space the geodesics of a closure are straight lines only if its derivative
 //! vanishes; that is checked wherever a geodesic is asked for.
 
+use std::fmt;
+
 use metriplectic_fields::{
     ChartPoint, Column, Dimension, Matrix, MatrixField, NotPositive, Scalar, Space, Square, Vector,
 };
@@ -327,9 +329,15 @@ impl<M: Flat + Space<Dim = Const<N>>, const N: usize> Riemannian<M> for Constant
 }
 
 /// A metric given as a matrix field; see [`Metric::field`].
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 pub struct FieldMetric<F> {
     field: F,
+}
+
+impl<F> fmt::Debug for FieldMetric<F> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("FieldMetric").finish_non_exhaustive()
+    }
 }
 
 impl<const N: usize, M, F> Riemannian<M> for FieldMetric<F>

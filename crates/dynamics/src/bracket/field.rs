@@ -1,14 +1,22 @@
 //! A Poisson tensor from a closure.
 
+use std::fmt;
+
 use metriplectic_fields::{Dimension, Matrix, MatrixField, Scalar, Square, Vector};
 use metriplectic_manifolds::{Flat, Manifold, MetricError, Riemannian};
 
 use super::{Bracket, BracketJet, Site};
 
 /// The tensor `Π(x)` of a matrix field; see [`Poisson::field`](super::Poisson::field).
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 pub struct FieldPoisson<F> {
     field: F,
+}
+
+impl<F> fmt::Debug for FieldPoisson<F> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("FieldPoisson").finish_non_exhaustive()
+    }
 }
 
 impl<F> FieldPoisson<F> {

@@ -1,0 +1,68 @@
+//! A step allocates nothing.
+
+use metriplectic::prelude::*;
+
+#[global_allocator]
+static ALLOCATOR: dhat::Alloc = dhat::Alloc;
+
+/// Blocks allocated while a run takes a thousand steps, after its first.
+fn blocks<Y: Metriplectic>(
+    system: &Y,
+    x0: <Y::Manifold as metriplectic::fields::Space>::Point<f64>,
+) -> u64
+where
+    WeylMidpoint: Retraction<Y::Manifold, Y::Metric>,
+{
+    let mut run = WeylMidpoint.steps(system, x0, 0.05).expect("the model keeps its laws");
+    run.advance().expect("the first step is solved");
+    let before = dhat::HeapStats::get().total_blocks;
+    for _ in 0..1000 {
+        run.advance().expect("every step is solved");
+    }
+    dhat::HeapStats::get().total_blocks - before
+}
+
+/// One test, because the allocator counts for the whole process.
+#[test]
+fn a_step_allocates_nothing() {
+    let _profiler = dhat::Profiler::builder().testing().build();
+    // The counter counts.
+    let before = dhat::HeapStats::get().total_blocks;
+    drop(std::hint::black_box(vec![1.0_f64; 10]));
+    assert!(dhat::HeapStats::get().total_blocks > before);
+
+    let body = System::on(LieDual::so3())
+        .energy(|p: &Vector3<Real>| p.x.powi(2) * 0.5 + p.y.powi(2) * 0.25 + p.z.powi(4))
+        .entropy(|p: &Vector3<Real>| p.norm_squared() * 0.5)
+        .build()
+        .unwrap();
+    assert_eq!(blocks(&body, vector![0.5, -0.3, 0.1]), 0);
+
+    let top = System::on(LieDual::se3())
+        .energy(|x: &Vector6<Real>| {
+            let weights = [1.0, 0.5, 0.25, 0.2, 0.15, 0.1];
+            (0..6).map(|i| x[i].powi(2) * weights[i]).sum()
+        })
+        .entropy(|x: &Vector6<Real>| (3..6).map(|i| x[i].powi(2) * 0.5).sum())
+        .build()
+        .unwrap();
+    assert_eq!(blocks(&top, vector![0.1, 0.2, 1.0, 0.0, 0.6, 0.8]), 0);
+
+    let metric = Matrix6::<f64>::identity() * 2.0 + Matrix6::from_element(0.1);
+    let spring = System::on(Euclidean::<6>)
+        .metric(Metric::constant(metric).unwrap())
+        .bracket(Poisson::field(|_: &Vector6<Real>| {
+            Matrix6::from_fn(|i, j| Real::from(f64::from(j == i + 3) - f64::from(i == j + 3)))
+        }))
+        .energy(|x: &Vector6<Real>| x.norm_squared() * 0.5 + x[0].powi(4))
+        .build()
+        .unwrap();
+    assert_eq!(blocks(&spring, vector![0.3, 0.2, 0.1, 0.0, 0.1, 0.2]), 0);
+
+    let sphere = System::on(Sphere::<2>::round())
+        .energy(|x: &Vector3<Real>| x.x.powi(2) + x.y.powi(3) * 0.5)
+        .entropy(|x: &Vector3<Real>| x.z)
+        .build()
+        .unwrap();
+    assert_eq!(blocks(&sphere, vector![0.6, 0.0, 0.8]), 0);
+}

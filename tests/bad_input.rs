@@ -1,0 +1,254 @@
+//! Bad input: each kind has its error, which names the numbers.
+
+mod models;
+
+use std::time::{Duration, Instant};
+
+use metriplectic::dynamics::{BuildError, PoissonError};
+use metriplectic::integrators::{RunError, SpanError, StepError};
+use metriplectic::manifolds::{AlgebraError, MetricError, PointError};
+use metriplectic::prelude::*;
+use models::{UNSTABLE, half_square, kinetic, relaxing_body};
+
+const INERTIA: Vector3<f64> = Vector3::new(10.0, 5.0, 1.0);
+const TEN_STEPS: Span = Span::steps(0.1, 10);
+
+/// What a run of the model says that it should refuse.
+fn refused<Y: Metriplectic<Manifold = LieDual<3>>>(system: &Y, x0: Vector3<f64>) -> ModelError
+where
+    WeylMidpoint: Retraction<LieDual<3>, Y::Metric>,
+{
+    match WeylMidpoint.run(system, x0, TEN_STEPS) {
+        Err(RunError::Model(error)) => error,
+        Err(other) => panic!("another error: {other}"),
+        Ok(_) => panic!("the run should be refused"),
+    }
+}
+
+#[test]
+fn a_start_that_is_not_finite_names_its_entry() {
+    for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+        let error = refused(&relaxing_body(), vector![0.1, bad, 0.2]);
+        assert!(matches!(error, ModelError::Start(PointError::NotFinite { index: 1, .. })));
+    }
+}
+
+#[test]
+fn a_field_that_is_not_a_number_is_named() {
+    let nan = |p: &Vector3<Real>| p.x * f64::NAN;
+    let system = System::on(LieDual::so3()).energy(nan).entropy(half_square).build().unwrap();
+    let error = refused(&system, UNSTABLE);
+    assert!(matches!(error, ModelError::ValueNotFinite { field: "energy", .. }), "{error}");
+    let system = System::on(LieDual::so3()).energy(kinetic(INERTIA)).entropy(nan).build().unwrap();
+    let error = refused(&system, UNSTABLE);
+    assert!(matches!(error, ModelError::ValueNotFinite { field: "entropy", .. }), "{error}");
+}
+
+#[test]
+fn a_derivative_that_is_not_a_number_is_found_under_a_finite_value() {
+    let system = System::on(LieDual::so3())
+        .energy(|p: &Vector3<Real>| p.norm() + p.x)
+        .entropy(half_square)
+        .build()
+        .unwrap();
+    let error = refused(&system, Vector3::zeros());
+    assert!(matches!(error, ModelError::DerivativeNotFinite { field: "energy", .. }), "{error}");
+    assert!(error.to_string().contains("norm_squared"), "{error}");
+}
+
+#[test]
+fn bad_metrics_are_refused() {
+    let indefinite = Matrix3::from_diagonal(&vector![1.0, -1.0, 1.0]);
+    let asymmetric = Matrix3::new(1.0, 0.3, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0);
+    assert!(matches!(Metric::constant(indefinite), Err(MetricError::NotPositive(_))));
+    assert!(matches!(Metric::constant(asymmetric), Err(MetricError::NotSymmetric { .. })));
+    let with = |g: Matrix3<f64>| {
+        let system = System::on(LieDual::so3())
+            .metric(Metric::field(move |_: &Vector3<Real>| g.cast::<Real>()))
+            .energy(kinetic(INERTIA))
+            .entropy(half_square)
+            .build()
+            .unwrap();
+        match refused(&system, UNSTABLE) {
+            ModelError::Metric { source, .. } => source,
+            other => panic!("another error: {other}"),
+        }
+    };
+    assert!(matches!(with(indefinite), MetricError::NotPositive(_)));
+    assert!(matches!(with(asymmetric), MetricError::NotSymmetric { row: 1, column: 0, .. }));
+}
+
+#[test]
+fn a_metric_that_varies_is_a_clear_error_and_no_wrong_answer() {
+    let system = System::on(LieDual::so3())
+        .metric(Metric::field(|p: &Vector3<Real>| {
+            Matrix3::from_diagonal_element(p.norm_squared() + 1.0)
+        }))
+        .energy(kinetic(INERTIA))
+        .entropy(half_square)
+        .build()
+        .unwrap();
+    let error = refused(&system, UNSTABLE);
+    let ModelError::Metric { source: MetricError::Varies { slope }, .. } = error else {
+        panic!("another error: {error}")
+    };
+    // |∂(1 + p²)| = 2|p| at the start, up to the radius of the samples.
+    assert!((slope - 2.0).abs() < 0.3);
+}
+
+#[test]
+fn bad_spans_are_refused() {
+    let body = relaxing_body();
+    for h in [0.0, -0.1, f64::NAN, f64::INFINITY] {
+        let error = WeylMidpoint.run(&body, UNSTABLE, Span::steps(h, 10)).unwrap_err();
+        assert!(matches!(error, RunError::Span(SpanError::StepSize { .. })), "{error}");
+        assert!(WeylMidpoint.steps(&body, UNSTABLE, h).is_err());
+    }
+    let error = WeylMidpoint.run(&body, UNSTABLE, Span::steps(0.1, 0)).unwrap_err();
+    assert!(matches!(error, RunError::Span(SpanError::NoSteps)));
+    let error = WeylMidpoint.run(&body, UNSTABLE, TEN_STEPS.every(0)).unwrap_err();
+    assert!(matches!(error, RunError::Span(SpanError::RecordsNothing)));
+}
+
+#[test]
+fn an_absurd_step_ends_soon_in_an_error_with_the_trajectory_so_far() {
+    let begin = Instant::now();
+    let error = WeylMidpoint.run(&relaxing_body(), UNSTABLE, Span::steps(1e300, 10)).unwrap_err();
+    assert!(begin.elapsed() < Duration::from_secs(10));
+    let RunError::Step { cause, trajectory } = &error else { panic!("another error: {error}") };
+    let h = match cause {
+        StepError::NotConverged { h, .. } | StepError::OutOfDomain { h, .. } => *h,
+        other => panic!("another cause: {other}"),
+    };
+    assert!(h > 1e299);
+    assert_eq!(trajectory.last().point, UNSTABLE);
+    // The same error arrives as the one type that programs pass on.
+    let passed_on = Error::from(error.clone());
+    assert_eq!(passed_on.to_string(), error.to_string());
+}
+
+#[test]
+fn a_run_that_fails_on_its_way_keeps_what_it_has() {
+    // The entropy climbs without bound along H = 1, and blows up in finite time.
+    let system = System::on(LieDual::so3())
+        .energy(|p: &Vector3<Real>| p.x.powi(2) * 0.5 + p.y.powi(2) * 0.25 + p.z.exp())
+        .entropy(|p: &Vector3<Real>| p.norm_squared().powi(2))
+        .build()
+        .unwrap();
+    let start = vector![0.5, -0.3, -0.1];
+    let error = WeylMidpoint.run(&system, start, Span::steps(0.1, 100_000)).unwrap_err();
+    let Some(trajectory) = error.trajectory() else { panic!("no trajectory: {error}") };
+    let taken = trajectory.certificate().steps;
+    assert!(taken > 0 && trajectory.last().step == taken, "{error}");
+    assert!(trajectory.certificate().keeps_energy());
+    let RunError::Step { cause, .. } = &error else { panic!("another error: {error}") };
+    assert!(cause.to_string().contains(&format!("t = {}", trajectory.last().time)), "{cause}");
+}
+
+#[test]
+fn an_entropy_that_is_no_casimir_is_refused_unless_the_published_scheme_is_asked_for() {
+    let builder = || {
+        System::on(LieDual::so3()).energy(kinetic(INERTIA)).entropy(|p: &Vector3<Real>| p.x * 0.1)
+    };
+    let error = refused(&builder().build().unwrap(), UNSTABLE);
+    let ModelError::EntropyNotCasimir { point, size } = &error else { panic!("{error}") };
+    assert!(point.len() == 3 && *size > 0.1);
+    assert!(error.to_string().contains("SecondLaw::Published"));
+
+    let published = builder().second_law(SecondLaw::Published).build().unwrap();
+    let run = WeylMidpoint.run(&published, UNSTABLE, Span::steps(0.1, 100)).unwrap();
+    assert!(run.certificate().to_string().contains("second law: not promised"));
+    assert!(run.certificate().keeps_energy());
+}
+
+#[test]
+fn bad_brackets_are_refused() {
+    assert!(matches!(
+        Poisson::constant(Matrix2::new(0.0, 1.0, 1.0, 0.0)),
+        Err(PoissonError::NotSkew { .. })
+    ));
+    let with = |tensor: fn(&Vector3<Real>) -> Matrix3<Real>| {
+        let system = System::on(LieDual::so3())
+            .bracket(Poisson::field(tensor))
+            .energy(kinetic(INERTIA))
+            .build()
+            .unwrap();
+        refused(&system, UNSTABLE)
+    };
+    let error = with(|p| Matrix3::from_diagonal_element(p.y));
+    assert!(matches!(error, ModelError::BracketNotSkew { .. }), "{error}");
+    // hat(v) is Poisson only if v · curl v = 0; here it is p₃ · 1.
+    let error = with(|p| Vector3::new(-p.y, p.z * 0.0, Real::from(1.0)).cross_matrix());
+    assert!(matches!(error, ModelError::NoJacobiIdentity { .. }), "{error}");
+}
+
+#[test]
+fn bad_structure_constants_are_refused() {
+    let mut constants = [[[0.0; 3]; 3]; 3];
+    constants[0][1][2] = 1.0;
+    let error = LieDual::new(&constants).unwrap_err();
+    assert!(matches!(error, AlgebraError::NotAntisymmetric { a: 0, b: 1, d: 2, .. }));
+}
+
+#[test]
+fn a_system_in_which_nothing_moves_is_not_built() {
+    let error = System::on(Euclidean::<2>).energy(|x: &Vector2<Real>| x.x).build().unwrap_err();
+    assert_eq!(error, BuildError::NothingMoves);
+    let error = System::on(LieDual::so3())
+        .energy(kinetic(INERTIA))
+        .second_law(SecondLaw::Casimir)
+        .build()
+        .unwrap_err();
+    assert_eq!(error, BuildError::SecondLawWithoutEntropy);
+}
+
+#[test]
+fn a_model_is_judged_only_inside_its_domain() {
+    // The start is closer to the edge of the logarithm than the samples reach.
+    let system = System::on(Euclidean::<2>)
+        .energy(|x: &Vector2<Real>| x.x + x.y)
+        .entropy(|x: &Vector2<Real>| x.x.ln() + x.y.ln())
+        .build()
+        .unwrap();
+    let start = vector![0.01, 2.0];
+    let report = system.report(&start);
+    assert!(report.passed_over > 0 && report.verdict.is_ok(), "{report}");
+    let run = WeylMidpoint.run(&system, start, Span::steps(1e-3, 100)).unwrap();
+    assert!(run.certificate().keeps_energy() && run.certificate().keeps_entropy());
+    // Outside the domain altogether it is refused.
+    let error = WeylMidpoint.run(&system, vector![-1.0, 2.0], TEN_STEPS).unwrap_err();
+    let RunError::Model(ModelError::ValueNotFinite { field, .. }) = &error else {
+        panic!("another error: {error}")
+    };
+    assert_eq!(*field, "entropy");
+}
+
+#[test]
+fn a_point_off_its_manifold_says_how_far() {
+    let system = System::on(Sphere::<2>::round())
+        .bracket(AreaForm)
+        .energy(|x: &Vector3<Real>| x.x)
+        .build()
+        .unwrap();
+    let error = WeylMidpoint.run(&system, vector![1.0, 0.1, 0.0], TEN_STEPS).unwrap_err();
+    let RunError::Model(ModelError::Start(PointError::OffManifold { defect, .. })) = error else {
+        panic!("another error: {error}")
+    };
+    assert!((defect - (1.01_f64.sqrt() - 1.0)).abs() < 1e-15);
+}
+
+#[test]
+fn every_error_passes_on_with_a_question_mark() {
+    fn program(h: f64) -> Result<Certificate, Error> {
+        let metric = Metric::constant(Matrix3::identity())?;
+        let algebra = LieDual::new(&[[[0.0; 3]; 3]; 3])?;
+        let system = System::on(algebra)
+            .metric(metric)
+            .bracket(Poisson::constant(Vector3::x().cross_matrix())?)
+            .energy(half_square)
+            .build()?;
+        Ok(*WeylMidpoint.run(&system, UNSTABLE, Span::steps(h, 10))?.certificate())
+    }
+    assert!(program(0.1).is_ok());
+    assert!(matches!(program(-0.1), Err(Error::Span(_))));
+}

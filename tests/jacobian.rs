@@ -1,0 +1,209 @@
+//! The Jacobian of a step, assembled from jets, against nested dual numbers.
+
+use metriplectic::fields::{Column, Square, jacobian};
+use metriplectic::integrators::{Equation, Residual};
+use metriplectic::prelude::*;
+use proptest::prelude::*;
+
+/// Random coefficients of a field on Rⁿ.
+type Coefficients<const N: usize> = [[f64; N]; 3];
+
+fn coefficients<const N: usize>() -> impl Strategy<Value = Coefficients<N>> {
+    prop::array::uniform3(prop::array::uniform::<_, N>(-1.0..1.0))
+}
+
+fn columns<const N: usize>(size: f64) -> impl Strategy<Value = SVector<f64, N>> {
+    prop::array::uniform::<_, N>(-size..size).prop_map(SVector::<f64, N>::from)
+}
+
+/// A displacement that is neither at round-off nor out of proportion.
+fn displacements<const N: usize>() -> impl Strategy<Value = SVector<f64, N>> {
+    columns::<N>(1.0).prop_filter("long enough", |u| u.norm() > 0.05)
+}
+
+/// `1 + B Bᵀ/4`, symmetric and positive.
+fn metrics<const N: usize>() -> impl Strategy<Value = SMatrix<f64, N, N>> {
+    prop::array::uniform::<_, N>(columns::<N>(1.0)).prop_map(|columns| {
+        let b = SMatrix::<f64, N, N>::from_columns(&columns);
+        let g = SMatrix::identity() + b * b.transpose() * 0.25;
+        (g + g.transpose()) * 0.5
+    })
+}
+
+/// `Σ a_i x_i² + b_i sin x_i + c_i x_i x_{i+1}²`, a closure over `Real`.
+fn wavy<const N: usize>([a, b, c]: Coefficients<N>) -> impl Fn(&SVector<Real, N>) -> Real {
+    move |x| {
+        (0..N)
+            .map(|i| {
+                let next = x[(i + 1) % N];
+                x[i].powi(2) * a[i] + x[i].sin() * b[i] + x[i] * next * next * c[i]
+            })
+            .sum()
+    }
+}
+
+/// The same function as a type with a generic method.
+struct Wavy<const N: usize>(Coefficients<N>);
+
+impl<const N: usize> ScalarField<Euclidean<N>> for Wavy<N> {
+    fn at<D: Scalar>(&self, x: &SVector<D, N>) -> D {
+        let Self([a, b, c]) = *self;
+        (0..N)
+            .map(|i| {
+                let next = x[(i + 1) % N];
+                x[i].powi(2) * a[i] + x[i].sin() * b[i] + x[i] * next * next * c[i]
+            })
+            .sum()
+    }
+}
+
+/// Compares value and Jacobian of the residual of a step from `x` with its definition at dual
+/// numbers.
+fn agrees<Y: Metriplectic>(
+    system: &Y,
+    x: &<Y::Manifold as metriplectic::fields::Space>::Point<f64>,
+    u: &metriplectic::fields::Vector<Y::Manifold>,
+) -> Result<(), TestCaseError>
+where
+    WeylMidpoint: Retraction<Y::Manifold, Y::Metric>,
+{
+    let residual = Residual {
+        system,
+        retraction: &WeylMidpoint,
+        x,
+        h: 0.1,
+        energy: system.energy_at(x),
+        recall: 0.0,
+    };
+    let Some(assembled) = residual.linearise(u) else {
+        return Err(TestCaseError::fail("the residual is defined"));
+    };
+    let Some(value) = residual.value(u) else {
+        return Err(TestCaseError::fail("the residual has a value"));
+    };
+    let defined = residual.at::<f64>(u).map_err(|error| TestCaseError::fail(error.to_string()))?;
+    let nested = jacobian::<Y::Manifold, f64>(
+        |u| residual.at(u).unwrap_or_else(|_| Column::from_index(|_| f64::NAN.into())),
+        u,
+    );
+    let size = nested.max_abs().max(1.0);
+    // Both sides lose digits in the defect of the discrete gradient, whose terms are of order 1.
+    prop_assert!((assembled.residual - defined).magnitude() <= 1e-13 * size);
+    prop_assert!((value - defined).magnitude() <= 1e-13 * size);
+    let off = (assembled.jacobian - nested).max_abs();
+    prop_assert!(off <= 1e-12 * size, "off by {off:.1e} of {size:.1e}");
+    Ok(())
+}
+
+macro_rules! on_flat_spaces {
+    ($name:ident, $n:literal) => {
+        proptest! {
+            #[test]
+            fn $name(
+                h in coefficients::<$n>(),
+                s in coefficients::<$n>(),
+                g in metrics::<$n>(),
+                skew in prop::array::uniform::<_, $n>(columns::<$n>(1.0)),
+                x in columns::<$n>(1.0),
+                u in displacements::<$n>(),
+            ) {
+                let b = SMatrix::<f64, $n, $n>::from_columns(&skew);
+                let system = System::on(Euclidean::<$n>)
+                    .metric(Metric::constant(g).unwrap())
+                    .bracket(Poisson::constant(b - b.transpose()).unwrap())
+                    .energy(wavy(h))
+                    .entropy(Wavy(s))
+                    .second_law(SecondLaw::Published)
+                    .build()
+                    .unwrap();
+                agrees(&system, &x, &u)?;
+                let relaxing = System::on(Euclidean::<$n>)
+                    .metric(Metric::field(move |_: &SVector<Real, $n>| g.cast::<Real>()))
+                    .energy(Wavy(h))
+                    .entropy(wavy(s))
+                    .build()
+                    .unwrap();
+                agrees(&relaxing, &x, &u)?;
+            }
+        }
+    };
+}
+on_flat_spaces!(on_the_line, 1);
+on_flat_spaces!(on_the_plane, 2);
+on_flat_spaces!(in_dimension_three, 3);
+on_flat_spaces!(in_dimension_four, 4);
+on_flat_spaces!(in_dimension_five, 5);
+on_flat_spaces!(in_dimension_six, 6);
+
+proptest! {
+    #[test]
+    fn on_duals_of_lie_algebras(
+        h in coefficients::<3>(), s in coefficients::<3>(), g in metrics::<3>(),
+        x in columns::<3>(1.0), u in displacements::<3>(),
+        h6 in coefficients::<6>(), s6 in coefficients::<6>(),
+        x6 in columns::<6>(1.0), u6 in displacements::<6>(),
+    ) {
+        for space in [LieDual::so3(), LieDual::sl2(), LieDual::heisenberg()] {
+            let system = System::on(space)
+                .metric(Metric::constant(g).unwrap())
+                .energy(wavy(h))
+                .entropy(wavy(s))
+                .second_law(SecondLaw::Published)
+                .build()
+                .unwrap();
+            agrees(&system, &x, &u)?;
+        }
+        for space in [LieDual::se3(), LieDual::so4()] {
+            let system = System::on(space)
+                .energy(wavy(h6))
+                .entropy(wavy(s6))
+                .second_law(SecondLaw::Published)
+                .build()
+                .unwrap();
+            agrees(&system, &x6, &u6)?;
+        }
+    }
+
+    #[test]
+    fn with_a_bracket_from_a_closure(
+        h in coefficients::<3>(), c in prop::array::uniform3(-1.0..1.0),
+        x in columns::<3>(1.0), u in displacements::<3>(),
+    ) {
+        // Π = hat(∇C) with C = Σ c_i x_i³/3 is a Poisson tensor for every c.
+        let tensor = move |x: &Vector3<Real>| {
+            let d = Vector3::from_fn(|i, _| x[i] * x[i] * c[i]);
+            d.cross_matrix()
+        };
+        let system = System::on(Euclidean::<3>)
+            .bracket(Poisson::field(tensor))
+            .energy(wavy(h))
+            .entropy(move |x: &Vector3<Real>| (0..3).map(|i| x[i].powi(3) * (c[i] / 3.0)).sum())
+            .build()
+            .unwrap();
+        agrees(&system, &x, &u)?;
+    }
+
+    #[test]
+    fn on_the_sphere_and_the_rotation_group(
+        seed in any::<u64>(), h in coefficients::<3>(), s in coefficients::<3>(),
+        u in displacements::<2>(), v in displacements::<3>(),
+    ) {
+        use rand::SeedableRng;
+        let mut rng = rand::rngs::ChaCha8Rng::seed_from_u64(seed);
+        let sphere = System::on(Sphere::<2>::round())
+            .bracket(AreaForm)
+            .energy(wavy(h))
+            .entropy(wavy(s))
+            .second_law(SecondLaw::Published)
+            .build()
+            .unwrap();
+        agrees(&sphere, &Sphere::<2>::round().random(&mut rng), &u)?;
+        let group = System::on(Rotations::bi_invariant())
+            .bracket(Nambu::default())
+            .energy(move |r: &Matrix3<Real>| wavy(h)(&r.column(0).into_owned()))
+            .entropy(move |r: &Matrix3<Real>| wavy(s)(&r.column(2).into_owned()))
+            .build()
+            .unwrap();
+        agrees(&group, &Rotations.random(&mut rng), &v)?;
+    }
+}

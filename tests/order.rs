@@ -12,7 +12,10 @@ fn fitted(time: f64, steps: [u32; 5], error: impl Fn(Span) -> f64) -> Order {
     let errors: Vec<f64> =
         sizes.iter().zip(steps).map(|(&h, n)| error(Span::steps(h, n as usize))).collect();
     let order = Order::fit(&sizes, &errors).expect("the errors follow a power law");
-    println!("order {order} from {}", errors.iter().map(|&e| scientific(e)).collect::<Vec<_>>().join(", "));
+    println!(
+        "order {order} from {}",
+        errors.iter().map(|&e| scientific(e)).collect::<Vec<_>>().join(", ")
+    );
     order
 }
 
@@ -36,7 +39,8 @@ fn symmetric_body(start: Vector3<f64>, t: f64) -> Vector3<f64> {
 #[test]
 fn the_closed_form_of_the_symmetric_body_has_its_published_digits() {
     let p = symmetric_body(vector![0.8, 0.0, 0.3], 5.0);
-    let published = vector![0.306_632_521_122_178, 0.631_568_390_269_131_1, 0.619_835_244_888_697_2];
+    let published =
+        vector![0.306_632_521_122_178, 0.631_568_390_269_131_1, 0.619_835_244_888_697_2];
     assert!((p - published).norm() < 1e-14);
 }
 
@@ -61,8 +65,7 @@ fn the_symmetric_relaxing_body_is_integrated_to_second_order() {
 #[test]
 fn the_free_body_is_integrated_to_second_order() {
     // Jacobi's elliptic solution at t = 10.
-    let exact =
-        vector![0.979_621_777_929_109_3, -0.501_362_831_518_296_1, 0.720_400_224_444_001_3];
+    let exact = vector![0.979_621_777_929_109_3, -0.501_362_831_518_296_1, 0.720_400_224_444_001_3];
     let order = fitted(10.0, [100, 200, 400, 800, 1600], |span| {
         let run = WeylMidpoint.run(&free_body(), TUMBLING, span).unwrap();
         (run.last().point - exact).norm()

@@ -110,8 +110,7 @@ fn the_relaxing_body_comes_to_rest_on_its_axis_of_largest_inertia() {
 #[test]
 fn the_free_body_follows_its_elliptic_functions() {
     // Jacobi's solution at t = 10.
-    let exact =
-        vector![0.979_621_777_929_109_3, -0.501_362_831_518_296_1, 0.720_400_224_444_001_3];
+    let exact = vector![0.979_621_777_929_109_3, -0.501_362_831_518_296_1, 0.720_400_224_444_001_3];
     let run = WeylMidpoint.run(&free_body(), TUMBLING, Span::steps(1e-3, 10_000)).unwrap();
     assert!((run.last().point - exact).norm() < 1e-6);
 }

@@ -38,7 +38,7 @@ pub struct Options {
     #[arg(long, value_name = "N", value_parser = RangedU64ValueParser::<usize>::new().range(1..))]
     pub steps: Option<usize>,
     /// Size of a step
-    #[arg(long, value_name = "h", value_parser = positive)]
+    #[arg(long, value_name = "h", value_parser = positive, allow_negative_numbers = true)]
     pub step_size: Option<f64>,
 }
 

@@ -69,3 +69,8 @@ pub mod prelude {
     };
     pub use num_dual::DualNum;
 }
+
+/// The programs of the README, compiled and run.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

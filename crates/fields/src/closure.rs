@@ -13,6 +13,8 @@
 use crate::field::seed;
 use crate::{Dimension, Matrix, MatrixField, Real, Scalar, ScalarField, Space, Square};
 
+// A closure that returns an `f64` is then told what a scalar field is, not what `Fn` is.
+#[diagnostic::do_not_recommend]
 impl<M, F> ScalarField<M> for F
 where
     M: Space,
@@ -59,8 +61,16 @@ struct Weights<D> {
 }
 
 impl<D: Scalar> Weights<D> {
+    /// The weighted sum of the parts that the order of `D` asks for. The others are not multiplied
+    /// by zero but left out: they may be infinite where the wanted ones are not (the slope of a
+    /// norm at zero).
     fn of(&self, f: &Real) -> D {
-        self.eps1 * f.eps1 + self.eps2 * f.eps2 + self.eps1eps2 * f.eps1eps2 + self.re * f.re
+        let value = D::from(self.re * f.re);
+        match D::NDERIV {
+            0 => value,
+            1 => self.eps1 * f.eps1 + self.eps2 * f.eps2 + value,
+            _ => self.eps1 * f.eps1 + self.eps2 * f.eps2 + self.eps1eps2 * f.eps1eps2 + value,
+        }
     }
 }
 

@@ -59,7 +59,7 @@ const SHORT: f64 = 1e-3;
 
 impl<M: Manifold> Chord<M> {
     /// Evaluates `f` along an arc with displacement `d` at its base, where `df` is known. `start` is
-    /// `F(x)`, `end` the point `x'`, and `position(s)` the point of the arc at time `s`.
+    /// `F(x)`, `end` the point `x'`, and `position(t)` the point `γ(t + ε₁ + ε₂)` of the arc.
     #[inline]
     pub fn new(
         f: &impl ScalarField<M>,
@@ -67,7 +67,7 @@ impl<M: Manifold> Chord<M> {
         d: &Vector<M>,
         start: f64,
         end: (&M::Point<f64>, f64),
-        position: impl Fn(Real) -> M::Point<Real>,
+        position: impl Fn(f64) -> M::Point<Real>,
     ) -> Self {
         let (end, value) = end;
         let slope = df.dot(d);
@@ -77,7 +77,7 @@ impl<M: Manifold> Chord<M> {
         let share = df.magnitude() * d.magnitude() / (SHORT * size).max(f64::MIN_POSITIVE);
         let (mut defect, mut noise) = (difference, rounding);
         if share < 4.0 {
-            let along = [0.0, 0.5, 1.0].map(|s| f.at_real(&position(Real::new(s, 1.0, 1.0, 0.0))));
+            let along = [0.0, 0.5, 1.0].map(|t| f.at_real(&position(t)));
             let integral = Integral::new(&along, slope);
             // Falls from 1 to 0 between one and four times the short share, with zero slope at both.
             let t = ((share - 1.0) / 3.0).clamp(0.0, 1.0);
@@ -203,8 +203,8 @@ mod tests {
             let d: Vector2<f64> = y - x;
             let [start, end]: [f64; 2] =
                 [x, y].map(|p| ScalarField::<Euclidean<2>>::at(&cubic, &p));
-            let chord = Chord::<Euclidean<2>>::new(&cubic, &df, &d, start, (&y, end), |s| {
-                x.cast::<Real>() + d.cast::<Real>() * s
+            let chord = Chord::<Euclidean<2>>::new(&cubic, &df, &d, start, (&y, end), |t| {
+                x.cast::<Real>() + d.cast::<Real>() * Real::new(t, 1.0, 1.0, 0.0)
             });
             let w = chord.covector(0.0, &Canonical, &d);
             let defect = 0.25 * (d.x.powi(3) + 2.0 * d.y.powi(3));

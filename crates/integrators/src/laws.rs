@@ -2,7 +2,7 @@
 
 use metriplectic_dynamics::{Metriplectic, system::Point};
 use metriplectic_fields::{
-    BrokenLaw, ChartPoint, Column, Real, ScalarField, Space, Vector, differential,
+    BrokenLaw, ChartPoint, Column, ScalarField, Space, Vector, differential,
 };
 use metriplectic_manifolds::{Arc, Manifold, Retraction, Riemannian};
 
@@ -38,9 +38,8 @@ where
         let w = gonzalez(f, &g, &arc, start);
         let df = differential(f, &ChartPoint::centre(&arc.z.point()));
         let end: f64 = f.at(&arc.end);
-        let chord = Chord::new(f, &df, &arc.d, start, (&arc.end, end), |s| {
-            let u = Vector::<M, Real>::embed(u) * s;
-            retraction.end(metric, x, &u).unwrap_or_else(|_| M::constant(&arc.end))
+        let chord = Chord::new(f, &df, &arc.d, start, (&arc.end, end), |t| {
+            retraction.along(metric, x, u, t).unwrap_or_else(|_| M::constant(&arc.end))
         });
         let safe = chord.covector(0.0, &g, &arc.d);
         Ok((arc, w, safe, df, end))

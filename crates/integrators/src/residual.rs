@@ -2,7 +2,7 @@
 
 use metriplectic_dynamics::{Bracket, Dissipation, Metriplectic, system::Point};
 use metriplectic_fields::{
-    ChartPoint, Column, Real, Scalar, ScalarField, Space, Square, Vector, differential,
+    ChartPoint, Column, Scalar, ScalarField, Space, Square, Vector, differential,
 };
 use metriplectic_manifolds::{MetricError, Retraction, Riemannian};
 
@@ -68,13 +68,10 @@ where
         d: &Vector<Y::Manifold>,
         end: (&Point<Y>, f64),
     ) -> Chord<Y::Manifold> {
-        Chord::new(self.system.energy(), df, d, self.energy, end, |s| {
-            let u = Vector::<Y::Manifold, Real>::embed(u) * s;
-            match self.retraction.end(self.system.metric(), self.x, &u) {
-                Ok(end) => end,
-                // The same arc has been followed to its end, so this is not reached.
-                Err(_) => Y::Manifold::constant(end.0),
-            }
+        Chord::new(self.system.energy(), df, d, self.energy, end, |t| {
+            // The same arc has been followed to its end, so the alternative is not reached.
+            let along = self.retraction.along(self.system.metric(), self.x, u, t);
+            along.unwrap_or_else(|_| Y::Manifold::constant(end.0))
         })
     }
 }

@@ -2,7 +2,7 @@
 
 use metriplectic_dynamics::{Bracket, Dissipation, Metriplectic, system::Point};
 use metriplectic_fields::{ChartPoint, Column, Dimension, ScalarField, Square, Vector};
-use metriplectic_manifolds::{Manifold, Retraction};
+use metriplectic_manifolds::{Manifold, Retraction, Riemannian};
 
 use crate::error::StepError;
 use crate::newton::Newton;
@@ -137,7 +137,7 @@ impl<R> Scheme<R> {
         let root = self.solve(&residual, &guess, work)?;
         let lost = NoRoot { best: root.u, residual: f64::INFINITY, sweeps: root.sweeps };
         let end = self.retraction.end(system.metric(), start.x, &root.u).map_err(|_| lost)?;
-        Ok(memory.note::<Y::Manifold>(start.x, &root.u, end))
+        Ok(memory.note::<Y::Manifold, _>(system.metric(), start.x, &root.u, end))
     }
 
     /// Newton's method, and where it is lost the globaliser with Newton's polish.
@@ -264,17 +264,24 @@ impl<V: Column<f64>> Memory<V> {
     /// Notes the step from `x` by the displacement `d`, and gives its end, moved by what earlier
     /// steps have lost.
     #[inline]
-    fn note<M>(&mut self, x: &M::Point<f64>, d: &V, end: M::Point<f64>) -> M::Point<f64>
+    fn note<M, G>(
+        &mut self,
+        metric: &G,
+        x: &M::Point<f64>,
+        d: &V,
+        end: M::Point<f64>,
+    ) -> M::Point<f64>
     where
         M: Manifold<Dim: Dimension<Vector<f64> = V>>,
+        G: Riemannian<M>,
     {
         let [last, before, _] = self.displacements;
         self.displacements = [Some(*d), last, before].map(|d| d.map(|d| M::transport(x, &end, &d)));
-        let lost = M::lost(x, d, &end);
+        let lost = metric.lost(x, d, &end);
         match self.carry {
             Some(carry) if carry.magnitude() > 0.0 => {
                 let settled = M::chart(&end, &carry);
-                self.carry = Some(lost + M::lost(&end, &carry, &settled));
+                self.carry = Some(lost + metric.lost(&end, &carry, &settled));
                 settled
             }
             _ => {

@@ -62,15 +62,6 @@ macro_rules! vector_space {
                 *x
             }
 
-            #[inline]
-            fn lost(
-                x: &SVector<f64, N>,
-                q: &SVector<f64, N>,
-                y: &SVector<f64, N>,
-            ) -> SVector<f64, N> {
-                q - (y - x)
-            }
-
             fn random(&self, rng: &mut impl Rng) -> SVector<f64, N> {
                 Column::from_index(|_| rng.random_range(-1.0..1.0))
             }

@@ -180,6 +180,7 @@ mod tests {
     use crate::{Canonical, Euclidean, Exponential, LieDual, Metric, WeylMidpoint};
     use metriplectic_fields::Real;
     use nalgebra::{SMatrix, SVector, Vector3, vector};
+    use num_dual::DualNum;
     use proptest::prelude::*;
 
     fn columns<const N: usize>() -> impl Strategy<Value = SVector<f64, N>> {
@@ -227,6 +228,22 @@ mod tests {
             let constant = Metric::constant(g).unwrap();
             all(&LieDual::se3(), &Canonical, &x, &u)?;
             all(&LieDual::so4(), &constant, &x, &u)?;
+        }
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(32))]
+
+        #[test]
+        fn metrics_that_vary_keep_the_laws(
+            x in columns::<3>(), u in prop::array::uniform3(-0.7..0.7), a in 0.1..1.0_f64,
+        ) {
+            let g = Metric::field(move |q: &Vector3<Real>| {
+                let wave = Vector3::new(q.y.sin(), q.z.cos(), q.x * 0.5);
+                SMatrix::<Real, 3, 3>::from_diagonal_element(1.0.into())
+                    + wave * wave.transpose() * Real::from(a)
+            });
+            all(&Euclidean::<3>, &g, &x, &Vector3::from(u))?;
         }
     }
 

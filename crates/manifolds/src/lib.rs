@@ -17,6 +17,7 @@
 
 pub mod euclidean;
 pub mod exponential;
+mod geodesic;
 pub mod laws;
 pub mod lie_dual;
 pub mod manifold;

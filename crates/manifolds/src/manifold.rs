@@ -1,6 +1,6 @@
 //! What every space of states answers.
 
-use metriplectic_fields::{Column, Space, Vector};
+use metriplectic_fields::{Space, Vector};
 use rand::Rng;
 
 /// A space of states.
@@ -23,13 +23,6 @@ pub trait Manifold: Space {
 
     /// The nearest point of the manifold, for an array of numbers that is off it.
     fn project(&self, x: &Self::Point<f64>) -> Self::Point<f64>;
-
-    /// What rounding has lost of the displacement `q` on the way from `x` to `y = φ_x(q)`, so that
-    /// the next step can make up for it; zero where it is not known.
-    #[inline]
-    fn lost(_x: &Self::Point<f64>, _q: &Vector<Self>, _y: &Self::Point<f64>) -> Vector<Self> {
-        Vector::<Self>::zero()
-    }
 
     /// The components at `y` of the tangent vector `v` at `x`, for `y` near `x`: a vector transport
     /// (Absil, Mahony, Sepulchre 2008, §8.1), which only guesses are made of. The same components

@@ -2,17 +2,18 @@
 //!
 //! A metric is the canonical one of its manifold ([`Canonical`]), a constant matrix
 //! ([`Metric::constant`]), or a closure that gives the matrix `g(x)` in the coordinate frame at
-//! each point ([`Metric::field`]). On a flat space the geodesics of a closure are straight lines only if its derivative
-//! vanishes; that is checked wherever a geodesic is asked for.
+//! each point ([`Metric::field`]), whose geodesics are integrated numerically.
 
 use std::fmt;
 
 use metriplectic_fields::{
-    ChartPoint, Column, Dimension, Matrix, MatrixField, NotPositive, Scalar, Space, Square, Vector,
+    ChartPoint, Column, Dimension, Matrix, MatrixField, NotPositive, Real, Scalar, Space, Square,
+    Vector,
 };
 use nalgebra::{Const, SMatrix, SVector};
+use num_dual::Dual64;
 
-use crate::ArcJet;
+use crate::{ArcJet, geodesic};
 
 /// The metric at one point: an inner product `G(u, v) = uᵀ g v` on tangent vectors, factored as
 /// `g = L Lᵀ`.
@@ -79,13 +80,22 @@ pub trait Riemannian<M: Space> {
     /// # Errors
     ///
     /// Those of [`exp`](Self::exp).
-    fn end<D: Scalar>(
-        &self,
-        x: &M::Point<f64>,
-        v: &Vector<M, D>,
-    ) -> Result<M::Point<D>, MetricError> {
+    fn end(&self, x: &M::Point<f64>, v: &Vector<M>) -> Result<M::Point<f64>, MetricError> {
         Ok(self.exp(&ChartPoint::centre(x), v)?.0.point())
     }
+
+    /// The geodesic from a real point with velocity `v`, at time `t`, with its first and second
+    /// derivative along `t`: the point `γ(t + ε₁ + ε₂)`.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`exp`](Self::exp).
+    fn along(
+        &self,
+        x: &M::Point<f64>,
+        v: &Vector<M>,
+        t: f64,
+    ) -> Result<M::Point<Real>, MetricError>;
 
     /// The vector `v` at `x` with `exp_x(v) = y`.
     ///
@@ -101,6 +111,13 @@ pub trait Riemannian<M: Space> {
     ///
     /// Those of [`exp`](Self::exp).
     fn weyl_jet(&self, x: &M::Point<f64>, d: &Vector<M>) -> Result<ArcJet<M>, MetricError>;
+
+    /// What rounding has lost of the displacement `v` on the way from `x` to `y = exp_x(v)`, so that
+    /// the next step can make up for it; zero where it is not known.
+    #[inline]
+    fn lost(&self, _x: &M::Point<f64>, _v: &Vector<M>, _y: &M::Point<f64>) -> Vector<M> {
+        Vector::<M>::zero()
+    }
 
     /// The density `√det g` of the volume form in the chart.
     ///
@@ -270,12 +287,23 @@ impl<M: Flat> Riemannian<M> for Canonical {
     }
 
     #[inline]
-    fn end<D: Scalar>(
+    fn end(&self, x: &M::Point<f64>, v: &Vector<M>) -> Result<M::Point<f64>, MetricError> {
+        Ok(M::chart(x, v))
+    }
+
+    #[inline]
+    fn along(
         &self,
         x: &M::Point<f64>,
-        v: &Vector<M, D>,
-    ) -> Result<M::Point<D>, MetricError> {
-        Ok(M::chart(x, v))
+        v: &Vector<M>,
+        t: f64,
+    ) -> Result<M::Point<Real>, MetricError> {
+        Ok(M::chart(x, &(Vector::<M, Real>::embed(v) * time(t))))
+    }
+
+    #[inline]
+    fn lost(&self, x: &M::Point<f64>, v: &Vector<M>, y: &M::Point<f64>) -> Vector<M> {
+        *v - M::coordinates(x, y)
     }
 
     fn log(&self, x: &M::Point<f64>, y: &M::Point<f64>) -> Result<Vector<M>, MetricError> {
@@ -312,6 +340,21 @@ impl<M: Flat + Space<Dim = Const<N>>, const N: usize> Riemannian<M> for Constant
         v: &Vector<M, D>,
     ) -> Result<GeodesicEnd<M, D>, MetricError> {
         Ok(straight(x, v))
+    }
+
+    #[inline]
+    fn along(
+        &self,
+        x: &M::Point<f64>,
+        v: &Vector<M>,
+        t: f64,
+    ) -> Result<M::Point<Real>, MetricError> {
+        Ok(M::chart(x, &(Vector::<M, Real>::embed(v) * time(t))))
+    }
+
+    #[inline]
+    fn lost(&self, x: &M::Point<f64>, v: &Vector<M>, y: &M::Point<f64>) -> Vector<M> {
+        *v - M::coordinates(x, y)
     }
 
     fn log(&self, x: &M::Point<f64>, y: &M::Point<f64>) -> Result<Vector<M>, MetricError> {
@@ -360,25 +403,138 @@ where
         x: &ChartPoint<M, D>,
         v: &Vector<M, D>,
     ) -> Result<GeodesicEnd<M, D>, MetricError> {
-        constant_at(&self.field, &M::real(&x.point()))?;
-        Ok(straight(x, v))
+        let (q, velocity) = geodesic::follow(&self.field, &x.base, &x.q, v)?;
+        Ok((ChartPoint::around(&M::chart(&x.base, &q)), velocity))
+    }
+
+    fn along(
+        &self,
+        x: &M::Point<f64>,
+        v: &Vector<M>,
+        t: f64,
+    ) -> Result<M::Point<Real>, MetricError> {
+        let (q, velocity) = geodesic::follow(&self.field, x, &Vector::<M>::zero(), &(*v * t))?;
+        let velocity = if t > 0.0 { velocity * t.recip() } else { *v };
+        let bend = geodesic::acceleration(&self.field, &M::chart(x, &q), &velocity)
+            .ok_or(MetricError::Lost { time: t })?;
+        let jet =
+            Vector::<M, Real>::from_index(|i| Real::new(q[i], velocity[i], velocity[i], bend[i]));
+        Ok(M::chart(x, &jet))
     }
 
     fn log(&self, x: &M::Point<f64>, y: &M::Point<f64>) -> Result<Vector<M>, MetricError> {
-        constant_at(&self.field, x)?;
-        Ok(M::coordinates(x, y))
+        shoot(self, x, y)
     }
 
     fn weyl_jet(&self, x: &M::Point<f64>, d: &Vector<M>) -> Result<ArcJet<M>, MetricError> {
-        let jet = ArcJet::straight(x, d);
-        constant_at(&self.field, x)?;
-        constant_at(&self.field, &jet.z)?;
-        Ok(jet)
+        arc_by_dual_numbers(self, x, d)
     }
 
     fn slopes(&self, x: &M::Point<f64>) -> Option<<M::Dim as Dimension>::Array<Matrix<M>>> {
         Some(self.field.jet(x).slopes)
     }
+}
+
+/// The time `t + ε₁ + ε₂`.
+#[inline]
+pub(crate) fn time(t: f64) -> Real {
+    Real::new(t, 1.0, 1.0, 0.0)
+}
+
+/// The midpoint arc of any metric: two halves of a geodesic, one dual number for each direction.
+fn arc_by_dual_numbers<M: Space, G: Riemannian<M>>(
+    metric: &G,
+    x: &M::Point<f64>,
+    d: &Vector<M>,
+) -> Result<ArcJet<M>, MetricError> {
+    let zero = Matrix::<M>::zeros();
+    let mut jet: Option<ArcJet<M>> = None;
+    for k in 0..M::Dim::LEN {
+        let half = Vector::<M, Dual64>::from_index(|i| {
+            Dual64::new(0.5 * d[i], if i == k { 0.5 } else { 0.0 })
+        });
+        let (z, v) = metric.exp(&ChartPoint::centre(x), &half)?;
+        let (end, _) = metric.exp(&z, &v)?;
+        let jet = jet.get_or_insert_with(|| ArcJet {
+            z: z.base.clone(),
+            dz: zero,
+            d: Vector::<M>::from_index(|i| 2.0 * v[i].re),
+            dd: zero,
+            end: end.base.clone(),
+            dend: zero,
+        });
+        for i in 0..M::Dim::LEN {
+            jet.dz[(i, k)] = z.q[i].eps;
+            jet.dd[(i, k)] = 2.0 * v[i].eps;
+            jet.dend[(i, k)] = end.q[i].eps;
+        }
+    }
+    jet.ok_or(MetricError::NotFinite)
+}
+
+/// Corrections that one shot of a logarithm may take, and halvings of each.
+const CORRECTIONS: usize = 20;
+const HALVINGS: usize = 8;
+/// Stages of the continuation of a logarithm, until it is given up.
+const STAGES: [u32; 4] = [1, 4, 16, 64];
+
+/// The logarithm by shooting: Newton's method for `exp_x(v) = y`. If it does not get there from the
+/// straight line, the end is moved from `x` to `y` in stages, each shot aimed by the one before.
+fn shoot<M: Space, G: Riemannian<M>>(
+    metric: &G,
+    x: &M::Point<f64>,
+    y: &M::Point<f64>,
+) -> Result<Vector<M>, MetricError> {
+    let straight = M::coordinates(x, y);
+    let mut missed = MetricError::NotFinite;
+    for stages in STAGES {
+        let mut v = Vector::<M>::zero();
+        let end = (1..=stages).try_for_each(|stage| {
+            let share = f64::from(stage) / f64::from(stages);
+            let grown = f64::from(stage) / f64::from((stage - 1).max(1));
+            let aim = if stage == 1 { straight * share } else { v * grown };
+            v = hit(metric, x, &M::chart(x, &(straight * share)), &aim)?;
+            Ok(())
+        });
+        match end {
+            Ok(()) => return Ok(v),
+            Err(error) => missed = error,
+        }
+    }
+    Err(missed)
+}
+
+/// Newton's method for `exp_x(v) = y`, damped, from a first aim.
+fn hit<M: Space, G: Riemannian<M>>(
+    metric: &G,
+    x: &M::Point<f64>,
+    y: &M::Point<f64>,
+    aim: &Vector<M>,
+) -> Result<Vector<M>, MetricError> {
+    let miss = |v: &Vector<M>| metric.end(x, v).map(|end| M::coordinates(&end, y));
+    let size = M::coordinates(x, y).magnitude();
+    let (mut v, mut off) = (*aim, miss(aim)?);
+    for _ in 0..CORRECTIONS {
+        if off.magnitude() <= 4.0 * f64::EPSILON * (1.0 + size) {
+            return Ok(v);
+        }
+        let missed = MetricError::NoLogarithm { distance: size, missed_by: off.magnitude() };
+        let correction = metric.weyl_jet(x, &v)?.dend.solve(&off).ok_or(missed)?;
+        let mut length = 1.0;
+        let closer = (0..HALVINGS).find_map(|_| {
+            let next = v + correction * length;
+            length *= 0.5;
+            let off_next = miss(&next).ok()?;
+            (off_next.magnitude() < off.magnitude()).then_some((next, off_next))
+        });
+        match closer {
+            Some(next) => (v, off) = next,
+            // The geodesic itself is good to 1e-13: a stall there is the end.
+            None if off.magnitude() <= 1e-12 * (1.0 + size) => return Ok(v),
+            None => return Err(missed),
+        }
+    }
+    Err(MetricError::NoLogarithm { distance: size, missed_by: off.magnitude() })
 }
 
 /// Refuses a geodesic that reaches the injectivity `radius`, up to the rounding of its length.
@@ -394,18 +550,6 @@ pub(crate) fn within(radius: f64, length: f64) -> Result<(), MetricError> {
 #[inline]
 fn straight<M: Flat, D: Scalar>(x: &ChartPoint<M, D>, v: &Vector<M, D>) -> GeodesicEnd<M, D> {
     (ChartPoint::around(&M::chart(&x.base, &(x.q + *v))), *v)
-}
-
-/// Refuses a metric closure whose derivative does not vanish at `x`.
-fn constant_at<M: Flat>(g: &impl MatrixField<M>, x: &M::Point<f64>) -> Result<(), MetricError> {
-    let jet = g.jet(x);
-    let slope = jet.slopes.as_ref().iter().map(|slope| slope.max_abs()).fold(0.0, f64::max);
-    // Round-off in the closure's own derivative of a constant.
-    if slope <= 64.0 * f64::EPSILON * jet.value.max_abs() {
-        Ok(())
-    } else {
-        Err(MetricError::Varies { slope })
-    }
 }
 
 /// A metric that cannot be used.
@@ -430,14 +574,25 @@ pub enum MetricError {
     /// Not positive definite.
     #[error("the metric is {0}")]
     NotPositive(#[from] NotPositive),
-    /// A closure metric on a flat space depends on the point.
+    /// A geodesic was lost on its way.
     #[error(
-        "the metric varies (a derivative of size {slope:.3e}), so its geodesics are not straight \
-         lines, and curved ones are not followed yet; use a constant metric"
+        "the geodesic cannot be followed beyond {time:.3} of its way: it runs into the edge of the \
+         chart, or the metric is not positive there; take a smaller step"
     )]
-    Varies {
-        /// The largest derivative of an entry.
-        slope: f64,
+    Lost {
+        /// The share of the way that was followed.
+        time: f64,
+    },
+    /// No geodesic was found between two points.
+    #[error(
+        "no geodesic was found to a point at the coordinate distance {distance:.3e}; the best one \
+         misses it by {missed_by:.1e}; take points that are closer together"
+    )]
+    NoLogarithm {
+        /// The coordinate distance of the points.
+        distance: f64,
+        /// How far off the best geodesic ends.
+        missed_by: f64,
     },
     /// Two points, or the ends of a step, are so far apart that no shortest geodesic, or more than
     /// one, joins them.
@@ -460,6 +615,8 @@ mod tests {
     use metriplectic_fields::Real;
     use nalgebra::{Matrix2, Matrix3, Vector2, Vector3, vector};
     use num_dual::DualNum;
+    use rand::rngs::ChaCha8Rng;
+    use rand::{RngExt, SeedableRng};
 
     #[test]
     fn bad_constant_metrics_are_refused() {
@@ -479,16 +636,48 @@ mod tests {
         );
     }
 
+    /// The upper half plane with curvature −1.
+    fn half_plane() -> FieldMetric<impl Fn(&Vector2<Real>) -> Matrix2<Real>> {
+        Metric::field(|q: &Vector2<Real>| Matrix2::from_diagonal_element(q.y.powi(-2)))
+    }
+
     #[test]
-    fn a_varying_closure_has_no_straight_geodesics() {
-        let half_plane =
-            Metric::field(|q: &Vector2<Real>| Matrix2::from_diagonal_element(q.y.powi(-2)));
-        let x = ChartPoint::<Euclidean<2>>::centre(&vector![0.0, 2.0]);
-        let error = Riemannian::<Euclidean<2>>::exp(&half_plane, &x, &vector![0.1, 0.0]);
-        // ∂(y⁻²)/∂y at y = 2 is −1/4.
-        assert_eq!(error.unwrap_err(), MetricError::Varies { slope: 0.25 });
-        // … but it is a metric all the same, at every single point.
-        assert!(Riemannian::<Euclidean<2>>::at(&half_plane, &x).is_ok());
+    fn geodesics_of_the_half_plane_are_its_semicircles() {
+        let (g, x) = (half_plane(), vector![0.3, 1.2]);
+        for (k, length) in [0.1, 1.0, 2.0, 4.0].into_iter().enumerate() {
+            let (sine, cosine) = (0.4 + k as f64).sin_cos();
+            // Unit speed at height y is y in the chart.
+            let v = vector![cosine, sine] * (x.y * length);
+            let end = Riemannian::<Euclidean<2>>::end(&g, &x, &v).unwrap();
+            // cosh d = 1 + |x − y|²/(2 x₂ y₂), and the centre of the circle is on the axis.
+            let distance = (1.0 + (end - x).norm_squared() / (2.0 * x.y * end.y)).acosh();
+            assert!((distance - length).abs() < 1e-12 * length, "{distance} for {length}");
+            let centre = x.x + x.y * sine / cosine;
+            let radii = ((x - vector![centre, 0.0]).norm(), (end - vector![centre, 0.0]).norm());
+            assert!((radii.0 / radii.1 - 1.0).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn logarithms_of_the_half_plane_are_found_and_have_the_right_length() {
+        let g = half_plane();
+        let mut rng = ChaCha8Rng::seed_from_u64(7);
+        for _ in 0..400 {
+            let mut point = || vector![rng.random_range(-1.0..1.0), rng.random_range(0.2..2.0)];
+            let (x, y): (Vector2<f64>, Vector2<f64>) = (point(), point());
+            let v = Riemannian::<Euclidean<2>>::log(&g, &x, &y).unwrap();
+            let distance = (1.0 + (y - x).norm_squared() / (2.0 * x.y * y.y)).acosh();
+            assert!((v.norm() / x.y - distance).abs() < 1e-11 * (1.0 + distance));
+        }
+    }
+
+    #[test]
+    fn a_geodesic_that_leaves_the_chart_is_an_error_with_the_time() {
+        // The edge x = 1 of the slit metric is at a finite distance, and there is nothing beyond it.
+        let slit =
+            Metric::field(|q: &Vector2<Real>| Matrix2::from_diagonal_element((-q.x + 1.0).sqrt()));
+        let error = Riemannian::<Euclidean<2>>::end(&slit, &vector![0.0, 0.0], &vector![3.0, 0.0]);
+        assert!(matches!(error, Err(MetricError::Lost { time }) if time > 0.1 && time < 1.0));
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! Retractions: how a tangent vector becomes a pair of points.
 
 use approx::{AbsDiffEq, RelativeEq};
-use metriplectic_fields::{ChartPoint, Column, Matrix, Scalar, Space, Square, Vector};
+use metriplectic_fields::{ChartPoint, Column, Matrix, Real, Scalar, Space, Square, Vector};
 
 use crate::{Manifold, MetricError, Riemannian};
 
@@ -26,19 +26,33 @@ pub trait Retraction<M: Manifold, G: Riemannian<M>> {
         u: &Vector<M, D>,
     ) -> Result<Arc<M, D>, MetricError>;
 
-    /// The end of the arc of `u` alone, at any scalar.
+    /// The end of the arc of `u` alone.
     ///
     /// # Errors
     ///
     /// Those of [`arc`](Self::arc).
-    fn end<D: Scalar>(
+    fn end(
         &self,
         metric: &G,
         x: &M::Point<f64>,
-        u: &Vector<M, D>,
-    ) -> Result<M::Point<D>, MetricError> {
+        u: &Vector<M>,
+    ) -> Result<M::Point<f64>, MetricError> {
         self.arc(metric, x, u).map(|arc| arc.end)
     }
+
+    /// A curve from the start of the arc to its end, at the time `0 ≤ t ≤ 1`, with its first and
+    /// second derivative along `t`: the point at `t + ε₁ + ε₂`.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`arc`](Self::arc).
+    fn along(
+        &self,
+        metric: &G,
+        x: &M::Point<f64>,
+        u: &Vector<M>,
+        t: f64,
+    ) -> Result<M::Point<Real>, MetricError>;
 
     /// The same arc at `f64`, with its derivatives along `u`.
     ///

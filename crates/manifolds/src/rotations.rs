@@ -3,12 +3,12 @@
 use std::f64::consts::PI;
 
 use metriplectic_fields::series::{angle_over_sine, stumpff};
-use metriplectic_fields::{ChartPoint, Column, Dimension, Scalar, Space};
+use metriplectic_fields::{ChartPoint, Column, Dimension, Real, Scalar, Space};
 use nalgebra::{Const, Matrix3, Quaternion, SMatrix, UnitQuaternion, Vector3, Vector4};
 use num_dual::Dual;
 use rand::{Rng, RngExt};
 
-use crate::metric::{GeodesicEnd, MetricError, within};
+use crate::metric::{GeodesicEnd, MetricError, time, within};
 use crate::normal::Normal;
 use crate::{ArcJet, Canonical, Manifold, Riemannian};
 
@@ -237,9 +237,19 @@ impl Riemannian<Rotations> for Canonical {
     }
 
     #[inline]
-    fn end<D: Scalar>(&self, x: &Matrix3<f64>, v: &Vector3<D>) -> Result<Matrix3<D>, MetricError> {
-        within(PI, Column::magnitude(v))?;
+    fn end(&self, x: &Matrix3<f64>, v: &Vector3<f64>) -> Result<Matrix3<f64>, MetricError> {
+        within(PI, v.norm())?;
         Ok(Rotations::chart(x, v))
+    }
+
+    fn along(
+        &self,
+        x: &Matrix3<f64>,
+        v: &Vector3<f64>,
+        t: f64,
+    ) -> Result<Matrix3<Real>, MetricError> {
+        within(PI, v.norm())?;
+        Ok(Rotations::chart(x, &v.map(|v| time(t) * v)))
     }
 
     fn log(&self, x: &Matrix3<f64>, y: &Matrix3<f64>) -> Result<Vector3<f64>, MetricError> {
@@ -279,7 +289,6 @@ mod tests {
     use super::*;
     use crate::laws;
     use crate::{Exponential, WeylMidpoint};
-    use metriplectic_fields::Real;
     use nalgebra::vector;
     use proptest::prelude::*;
     use rand::SeedableRng;

@@ -3,12 +3,12 @@
 use std::f64::consts::PI;
 
 use metriplectic_fields::series::{angle_over_sine, stumpff};
-use metriplectic_fields::{ChartPoint, Column, Dimension, Scalar, Space};
+use metriplectic_fields::{ChartPoint, Column, Dimension, Real, Scalar, Space};
 use nalgebra::{Const, SMatrix, SVector};
 use num_dual::Dual;
 use rand::{Rng, RngExt};
 
-use crate::metric::{GeodesicEnd, MetricError, within};
+use crate::metric::{GeodesicEnd, MetricError, time, within};
 use crate::normal::Normal;
 use crate::{ArcJet, Canonical, Manifold, Riemannian};
 
@@ -209,13 +209,23 @@ macro_rules! sphere {
             }
 
             #[inline]
-            fn end<D: Scalar>(
+            fn end(
                 &self,
                 x: &SVector<f64, $a>,
-                v: &SVector<D, $n>,
-            ) -> Result<SVector<D, $a>, MetricError> {
-                within(PI, Column::magnitude(v))?;
+                v: &SVector<f64, $n>,
+            ) -> Result<SVector<f64, $a>, MetricError> {
+                within(PI, v.norm())?;
                 Ok(Sphere::<$n>::chart(x, v))
+            }
+
+            fn along(
+                &self,
+                x: &SVector<f64, $a>,
+                v: &SVector<f64, $n>,
+                t: f64,
+            ) -> Result<SVector<Real, $a>, MetricError> {
+                within(PI, v.norm())?;
+                Ok(Sphere::<$n>::chart(x, &v.map(|v| time(t) * v)))
             }
 
             fn log(

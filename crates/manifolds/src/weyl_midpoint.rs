@@ -1,6 +1,6 @@
 //! The symmetric retraction: base point in the middle of the geodesic.
 
-use metriplectic_fields::{ChartPoint, Scalar, Vector};
+use metriplectic_fields::{ChartPoint, Real, Scalar, Vector};
 
 use crate::retraction::half;
 use crate::{Arc, ArcJet, Manifold, MetricError, PointPair, Retraction, Riemannian, Tangent};
@@ -30,13 +30,23 @@ impl<M: Manifold, G: Riemannian<M>> Retraction<M, G> for WeylMidpoint {
     }
 
     #[inline]
-    fn end<D: Scalar>(
+    fn end(
         &self,
         metric: &G,
         x: &M::Point<f64>,
-        u: &Vector<M, D>,
-    ) -> Result<M::Point<D>, MetricError> {
+        u: &Vector<M>,
+    ) -> Result<M::Point<f64>, MetricError> {
         metric.end(x, u)
+    }
+
+    fn along(
+        &self,
+        metric: &G,
+        x: &M::Point<f64>,
+        u: &Vector<M>,
+        t: f64,
+    ) -> Result<M::Point<Real>, MetricError> {
+        metric.along(x, u, t)
     }
 
     #[inline]

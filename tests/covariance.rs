@@ -1,0 +1,135 @@
+//! The Weyl-Gonzalez step is intrinsic: computed in two charts, with the metric pulled back, it is
+//! the same step. A missing `√det g` or Christoffel symbol breaks this.
+
+mod models;
+
+use metriplectic::prelude::*;
+use metriplectic_studies::Order;
+use models::top;
+
+/// A point of the sphere from colatitude and longitude, at any scalar.
+fn on_sphere<D: Scalar>(q: &Vector2<D>) -> Vector3<D> {
+    let ((sine, cosine), (s, c)) = (q.x.sin_cos(), q.y.sin_cos());
+    Vector3::new(sine * c, sine * s, cosine)
+}
+
+/// The round metric in these coordinates, `diag(1, sin²θ)`.
+fn round(q: &Vector2<Real>) -> Matrix2<Real> {
+    Matrix2::from_diagonal(&Vector2::new(1.0.into(), q.x.sin().powi(2)))
+}
+
+/// `S = x₃ + 0.3 x₁x₂`.
+fn hill(x: &Vector3<Real>) -> Real {
+    x.z + x.x * x.y * 0.3
+}
+
+#[test]
+fn a_step_on_the_sphere_is_the_same_in_colatitude_and_longitude() {
+    let start = vector![1.1, 0.7];
+    let embedded = System::on(Sphere::<2>::round())
+        .bracket(AreaForm)
+        .energy(top)
+        .entropy(hill)
+        .second_law(SecondLaw::Published)
+        .build()
+        .unwrap();
+    let chart = System::on(Euclidean::<2>)
+        .metric(Metric::field(round))
+        .bracket(AreaForm)
+        .energy(|q: &Vector2<Real>| top(&on_sphere(q)))
+        .entropy(|q: &Vector2<Real>| hill(&on_sphere(q)))
+        .second_law(SecondLaw::Published)
+        .build()
+        .unwrap();
+    let span = Span::steps(0.2, 1);
+    let there = WeylMidpoint.run(&embedded, on_sphere(&start), span).unwrap().last().point;
+    let here = WeylMidpoint.run(&chart, start, span).unwrap().last().point;
+    assert!((on_sphere(&here) - there).amax() < 1e-11, "{:e}", (on_sphere(&here) - there).amax());
+    // The step is long enough for the test to mean something.
+    assert!((there - on_sphere(&start)).norm() > 0.05);
+
+    let there = Exponential.run(&embedded, on_sphere(&start), span).unwrap().last().point;
+    let here = Exponential.run(&chart, start, span).unwrap().last().point;
+    assert!((on_sphere(&here) - there).amax() < 1e-11, "{:e}", (on_sphere(&here) - there).amax());
+}
+
+/// A point of R³ from bent coordinates, at any scalar: `(u, v, w) ↦ (u, v + u²/2, w + uv/2)`.
+fn unbend<D: Scalar>(q: &Vector3<D>) -> Vector3<D> {
+    Vector3::new(q.x * 2.0, q.y + q.x * q.x * 0.5, q.z + q.x * q.y * 0.5)
+}
+
+/// The flat metric in the bent coordinates, `JᵀJ`.
+fn bent(q: &Vector3<Real>) -> Matrix3<Real> {
+    let (zero, one, half) = (Real::from(0.0), Real::from(1.0), Real::from(0.5));
+    let jacobian = Matrix3::new(one * 2.0, zero, zero, q.x, one, zero, q.y * half, q.x * half, one);
+    jacobian.tr_mul(&jacobian)
+}
+
+/// A nonlinear energy and an entropy that is not quadratic.
+fn energy(p: &Vector3<Real>) -> Real {
+    p.x.powi(2) * 0.5 + p.y.powi(2) * 0.25 + p.z.powi(2) + p.x.powi(3) * 0.2
+}
+
+fn entropy(p: &Vector3<Real>) -> Real {
+    p.norm_squared() * 0.5 + p.z.powi(3) * 0.1
+}
+
+/// `dH` and `dS` by hand, and `p' = dS × dH + |dH|² dS − (dH·dS) dH`.
+fn by_hand(p: &Vector3<f64>) -> Vector3<f64> {
+    let w = vector![p.x + 0.6 * p.x * p.x, 0.5 * p.y, 2.0 * p.z];
+    let s = vector![p.x, p.y, p.z + 0.3 * p.z * p.z];
+    s.cross(&w) + s * w.norm_squared() - w * w.dot(&s)
+}
+
+#[test]
+fn a_nambu_step_is_the_same_in_bent_coordinates() {
+    let flat = System::on(Euclidean::<3>)
+        .bracket(Nambu::default())
+        .energy(energy)
+        .entropy(entropy)
+        .build()
+        .unwrap();
+    let start = vector![0.3, -0.4, 0.5];
+    let span = Span::steps(0.1, 1);
+    let there = WeylMidpoint.run(&flat, unbend(&start), span).unwrap().last().point;
+    let system = System::on(Euclidean::<3>)
+        .metric(Metric::field(bent))
+        .bracket(Nambu::default())
+        .energy(|q: &Vector3<Real>| energy(&unbend(q)))
+        .entropy(|q: &Vector3<Real>| entropy(&unbend(q)))
+        .build()
+        .unwrap();
+    let here = WeylMidpoint.run(&system, start, span).unwrap().last().point;
+    assert!((unbend(&here) - there).amax() < 1e-11, "{:e}", (unbend(&here) - there).amax());
+    assert!((there - unbend(&start)).norm() > 0.01);
+}
+
+#[test]
+fn a_run_with_numerical_geodesics_has_order_two_and_keeps_the_energy() {
+    let system = System::on(Euclidean::<3>)
+        .metric(Metric::field(bent))
+        .bracket(Nambu::default())
+        .energy(|q: &Vector3<Real>| energy(&unbend(q)))
+        .entropy(|q: &Vector3<Real>| entropy(&unbend(q)))
+        .build()
+        .unwrap();
+    let start = vector![0.3, -0.4, 0.5];
+    // The exact flow in flat coordinates, by a classical Runge-Kutta method with gradients by hand.
+    let (time, fine) = (1.0, 4000);
+    let h = time / f64::from(fine);
+    let exact = (0..fine).fold(unbend(&start), |x, _| {
+        let a = by_hand(&x);
+        let b = by_hand(&(x + a * (0.5 * h)));
+        let c = by_hand(&(x + b * (0.5 * h)));
+        x + (a + (b + c) * 2.0 + by_hand(&(x + c * h))) * (h / 6.0)
+    });
+    let steps = [5_usize, 10, 20, 40];
+    let sizes = steps.map(|n| time / n as f64);
+    let errors = steps.map(|n| {
+        let run = WeylMidpoint.run(&system, start, Span::steps(time / n as f64, n)).unwrap();
+        assert!(run.certificate().keeps_energy(), "{}", run.certificate());
+        (unbend(&run.last().point) - exact).norm()
+    });
+    let order = Order::fit(&sizes, &errors).unwrap();
+    assert!(order.agrees(2.0, 0.05), "{order} from {errors:?}");
+}

@@ -24,5 +24,7 @@ pub use bracket::{
     NaturalBracket, Poisson, PoissonError, Site, Zero,
 };
 pub use dissipation::{Dissipation, DissipationJet, MetricDissipation, NoDissipation};
-pub use system::{BuildError, Metriplectic, NoEntropy, Point, SecondLaw, System, SystemBuilder};
+pub use system::{
+    BuildError, Metriplectic, NoEnergy, NoEntropy, Point, SecondLaw, System, SystemBuilder,
+};
 pub use verify::{LawResidual, ModelError, Report};

@@ -110,6 +110,10 @@ pub enum SecondLaw {
     Published,
 }
 
+/// Stands for the energy that a builder has not been given yet.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct NoEnergy;
+
 /// The entropy of a system that has none, `S = 0`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct NoEntropy;
@@ -147,13 +151,13 @@ impl System<(), (), (), (), (), ()> {
     /// ```
     pub fn on<M: NaturalBracket>(
         manifold: M,
-    ) -> SystemBuilder<M, Canonical, M::Bracket, NoDissipation, (), NoEntropy> {
+    ) -> SystemBuilder<M, Canonical, M::Bracket, NoDissipation, NoEnergy, NoEntropy> {
         SystemBuilder {
             bracket: manifold.natural_bracket(),
             manifold,
             metric: Canonical,
             dissipation: NoDissipation,
-            energy: (),
+            energy: NoEnergy,
             entropy: NoEntropy,
             second_law: SecondLaw::NoEntropy,
         }
@@ -239,22 +243,22 @@ impl<M: Manifold, G, B, K, H, S> SystemBuilder<M, G, B, K, H, S> {
     }
 }
 
-impl<M, G, B, K, H, S> SystemBuilder<M, G, B, K, H, S>
-where
-    M: Manifold,
-    G: Riemannian<M>,
-    B: Bracket<M, G>,
-    K: Dissipation<M, G>,
-    H: ScalarField<M>,
-    S: ScalarField<M>,
-{
+impl<M: Manifold, G, B, K, H, S> SystemBuilder<M, G, B, K, H, S> {
     /// Checks the structure and finishes the system. The laws that need a point are checked by
     /// [`Metriplectic::verify`], which every run calls.
     ///
     /// # Errors
     ///
     /// [`BuildError`] if the parts do not make a system.
-    pub fn build(self) -> Result<System<M, G, B, K, H, S>, BuildError> {
+    // The bounds stand on the method, so that a part that does not fit is explained as such.
+    pub fn build(self) -> Result<System<M, G, B, K, H, S>, BuildError>
+    where
+        G: Riemannian<M>,
+        B: Bracket<M, G>,
+        K: Dissipation<M, G>,
+        H: ScalarField<M>,
+        S: ScalarField<M>,
+    {
         let has_entropy = !Dissipation::<M, G>::is_none(&self.dissipation);
         if !has_entropy && Bracket::<M, G>::is_zero(&self.bracket) {
             return Err(BuildError::NothingMoves);

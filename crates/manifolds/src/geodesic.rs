@@ -150,7 +150,7 @@ pub(crate) fn follow<M: Flat, D: Scalar>(
     x: &M::Point<f64>,
     q: &Vector<M, D>,
     v: &Vector<M, D>,
-) -> Result<(Vector<M, D>, Vector<M, D>), MetricError> {
+) -> Result<[Vector<M, D>; 2], MetricError> {
     let (g, _) = slopes(field, x, q);
     let mut here = Phase::<M, D> { q: *q, p: g * *v };
     let (mut time, mut h) = (0.0, 1.0_f64);
@@ -169,7 +169,7 @@ pub(crate) fn follow<M: Flat, D: Scalar>(
     }
     let (g, _) = slopes(field, x, &here.q);
     let velocity = g.solve(&here.p).ok_or(MetricError::Lost { time })?;
-    Ok((here.q, velocity))
+    Ok([here.q, velocity])
 }
 
 /// The acceleration `−Γ(v, v)` of the geodesic through a real point, with the Christoffel symbols of

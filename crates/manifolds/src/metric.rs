@@ -403,7 +403,7 @@ where
         x: &ChartPoint<M, D>,
         v: &Vector<M, D>,
     ) -> Result<GeodesicEnd<M, D>, MetricError> {
-        let (q, velocity) = geodesic::follow(&self.field, &x.base, &x.q, v)?;
+        let [q, velocity] = geodesic::follow(&self.field, &x.base, &x.q, v)?;
         Ok((ChartPoint::around(&M::chart(&x.base, &q)), velocity))
     }
 
@@ -413,7 +413,7 @@ where
         v: &Vector<M>,
         t: f64,
     ) -> Result<M::Point<Real>, MetricError> {
-        let (q, velocity) = geodesic::follow(&self.field, x, &Vector::<M>::zero(), &(*v * t))?;
+        let [q, velocity] = geodesic::follow(&self.field, x, &Vector::<M>::zero(), &(*v * t))?;
         let velocity = if t > 0.0 { velocity * t.recip() } else { *v };
         let bend = geodesic::acceleration(&self.field, &M::chart(x, &q), &velocity)
             .ok_or(MetricError::Lost { time: t })?;

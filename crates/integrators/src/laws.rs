@@ -114,6 +114,7 @@ where
 mod tests {
     use super::*;
     use metriplectic_dynamics::System;
+    use metriplectic_fields::Real;
     use metriplectic_manifolds::{Canonical, Exponential, LieDual, WeylMidpoint};
     use nalgebra::{Vector3, vector};
     use num_dual::DualNum;

@@ -67,7 +67,7 @@ macro_rules! vector_space {
             }
         }
 
-        impl<const N: usize> $crate::metric::Flat for $space<N> {}
+        impl<const N: usize> $crate::Flat for $space<N> {}
     };
 }
 pub(crate) use vector_space;

@@ -1,6 +1,6 @@
 //! The Riemannian exponential as a retraction: base point at the start.
 
-use metriplectic_fields::{ChartPoint, Matrix, Real, Scalar, Square, Vector};
+use metriplectic_fields::{ChartPoint, Matrix, Scalar, Square, Vector};
 use num_dual::Dual64;
 
 use crate::{Arc, ArcJet, Manifold, MetricError, PointPair, Retraction, Riemannian, Tangent};
@@ -28,25 +28,6 @@ impl<M: Manifold, G: Riemannian<M>> Retraction<M, G> for Exponential {
         let z = ChartPoint::centre(x);
         let (end, _) = metric.exp(&z, u)?;
         Ok(Arc { z, d: *u, end: end.point() })
-    }
-
-    fn end(
-        &self,
-        metric: &G,
-        x: &M::Point<f64>,
-        u: &Vector<M>,
-    ) -> Result<M::Point<f64>, MetricError> {
-        metric.end(x, u)
-    }
-
-    fn along(
-        &self,
-        metric: &G,
-        x: &M::Point<f64>,
-        u: &Vector<M>,
-        t: f64,
-    ) -> Result<M::Point<Real>, MetricError> {
-        metric.along(x, u, t)
     }
 
     fn arc_jet(

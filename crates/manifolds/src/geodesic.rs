@@ -13,7 +13,7 @@
 use metriplectic_fields::{Column, Dimension, Matrix, MatrixField, Scalar, Space, Square, Vector};
 use num_dual::Dual;
 
-use crate::metric::{Flat, MetricError};
+use crate::{Flat, MetricError};
 
 /// The relative error of a geodesic.
 const TOLERANCE: f64 = 1e-13;

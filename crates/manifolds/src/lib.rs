@@ -10,6 +10,8 @@
 //! | [`rotations`](mod@rotations) | [`Rotations`]: SO(3), with its exp, log and dexp |
 //! | [`normal`] | normal coordinates on a space of constant curvature |
 //! | [`metric`] | [`Riemannian`]: flat, sharp, norm, geodesics; [`Metric::constant`], [`Metric::field`] |
+//! | [`flat`] | metrics that are constant in a global chart, with straight geodesics |
+//! | [`field_metric`] | a metric from a closure, with numerical geodesics |
 //! | [`retraction`] | [`Retraction`]: `R_h` and `R_h⁻¹` |
 //! | [`weyl_midpoint`] | [`WeylMidpoint`]: the symmetric one, order 2 |
 //! | [`exponential`] | [`Exponential`]: based at the start, order 1 |
@@ -17,6 +19,8 @@
 
 pub mod euclidean;
 pub mod exponential;
+pub mod field_metric;
+pub mod flat;
 mod geodesic;
 pub mod laws;
 pub mod lie_dual;
@@ -30,12 +34,11 @@ pub mod weyl_midpoint;
 
 pub use euclidean::Euclidean;
 pub use exponential::Exponential;
+pub use field_metric::FieldMetric;
+pub use flat::{Constant, Flat};
 pub use lie_dual::{AlgebraError, LieAlgebra, LieDual};
 pub use manifold::{Manifold, PointError};
-pub use metric::{
-    Canonical, Constant, FieldMetric, Flat, GeodesicEnd, InnerProduct, Metric, MetricError,
-    Riemannian,
-};
+pub use metric::{Canonical, GeodesicEnd, InnerProduct, Metric, MetricError, Riemannian};
 pub use retraction::{Arc, ArcJet, PointPair, Retraction, Tangent};
 pub use rotations::Rotations;
 pub use sphere::Sphere;

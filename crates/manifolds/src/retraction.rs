@@ -26,18 +26,19 @@ pub trait Retraction<M: Manifold, G: Riemannian<M>> {
         u: &Vector<M, D>,
     ) -> Result<Arc<M, D>, MetricError>;
 
-    /// The end of the arc of `u` alone.
+    /// The end of the arc of `u` alone; that of a geodesic, unless the retraction says otherwise.
     ///
     /// # Errors
     ///
     /// Those of [`arc`](Self::arc).
+    #[inline]
     fn end(
         &self,
         metric: &G,
         x: &M::Point<f64>,
         u: &Vector<M>,
     ) -> Result<M::Point<f64>, MetricError> {
-        self.arc(metric, x, u).map(|arc| arc.end)
+        metric.end(x, u)
     }
 
     /// A curve from the start of the arc to its end, at the time `0 ≤ t ≤ 1`, with its first and
@@ -46,13 +47,16 @@ pub trait Retraction<M: Manifold, G: Riemannian<M>> {
     /// # Errors
     ///
     /// Those of [`arc`](Self::arc).
+    #[inline]
     fn along(
         &self,
         metric: &G,
         x: &M::Point<f64>,
         u: &Vector<M>,
         t: f64,
-    ) -> Result<M::Point<Real>, MetricError>;
+    ) -> Result<M::Point<Real>, MetricError> {
+        metric.along(x, u, t)
+    }
 
     /// The same arc at `f64`, with its derivatives along `u`.
     ///

@@ -1,6 +1,6 @@
 //! The symmetric retraction: base point in the middle of the geodesic.
 
-use metriplectic_fields::{ChartPoint, Real, Scalar, Vector};
+use metriplectic_fields::{ChartPoint, Scalar, Vector};
 
 use crate::retraction::half;
 use crate::{Arc, ArcJet, Manifold, MetricError, PointPair, Retraction, Riemannian, Tangent};
@@ -27,26 +27,6 @@ impl<M: Manifold, G: Riemannian<M>> Retraction<M, G> for WeylMidpoint {
         let (z, velocity) = metric.exp(&ChartPoint::centre(x), &half)?;
         let (end, _) = metric.exp(&z, &velocity)?;
         Ok(Arc { z, d: velocity * D::from(2.0), end: end.point() })
-    }
-
-    #[inline]
-    fn end(
-        &self,
-        metric: &G,
-        x: &M::Point<f64>,
-        u: &Vector<M>,
-    ) -> Result<M::Point<f64>, MetricError> {
-        metric.end(x, u)
-    }
-
-    fn along(
-        &self,
-        metric: &G,
-        x: &M::Point<f64>,
-        u: &Vector<M>,
-        t: f64,
-    ) -> Result<M::Point<Real>, MetricError> {
-        metric.along(x, u, t)
     }
 
     #[inline]

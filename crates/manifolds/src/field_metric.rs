@@ -1,0 +1,245 @@
+//! A metric from a closure, with numerical geodesics.
+
+use std::fmt;
+
+use metriplectic_fields::{
+    ChartPoint, Column, Dimension, Matrix, MatrixField, Real, Scalar, Space, Square, Vector,
+};
+use nalgebra::{Const, SMatrix};
+use num_dual::Dual64;
+
+use crate::metric::{Factored, GeodesicEnd, MetricError};
+use crate::{ArcJet, Flat, Riemannian, geodesic};
+
+/// A metric given as a matrix field; see [`Metric::field`].
+#[derive(Clone, Copy)]
+pub struct FieldMetric<F> {
+    field: F,
+}
+
+impl<F> FieldMetric<F> {
+    pub(crate) const fn new(field: F) -> Self {
+        Self { field }
+    }
+}
+
+impl<F> fmt::Debug for FieldMetric<F> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("FieldMetric").finish_non_exhaustive()
+    }
+}
+
+impl<const N: usize, M, F> Riemannian<M> for FieldMetric<F>
+where
+    M: Flat + Space<Dim = Const<N>>,
+    F: MatrixField<M>,
+{
+    type At<D: Scalar> = Factored<SMatrix<D, N, N>>;
+
+    fn at<D: Scalar>(&self, x: &ChartPoint<M, D>) -> Result<Self::At<D>, MetricError> {
+        Factored::new(self.field.at(&x.point()))
+    }
+
+    fn matrix<D: Scalar>(&self, x: &ChartPoint<M, D>) -> SMatrix<D, N, N> {
+        self.field.at(&x.point())
+    }
+
+    fn exp<D: Scalar>(
+        &self,
+        x: &ChartPoint<M, D>,
+        v: &Vector<M, D>,
+    ) -> Result<GeodesicEnd<M, D>, MetricError> {
+        let [q, velocity] = geodesic::follow(&self.field, &x.base, &x.q, v)?;
+        Ok((ChartPoint::around(&M::chart(&x.base, &q)), velocity))
+    }
+
+    fn along(
+        &self,
+        x: &M::Point<f64>,
+        v: &Vector<M>,
+        t: f64,
+    ) -> Result<M::Point<Real>, MetricError> {
+        let [q, velocity] = geodesic::follow(&self.field, x, &Vector::<M>::zero(), &(*v * t))?;
+        let velocity = if t > 0.0 { velocity * t.recip() } else { *v };
+        let bend = geodesic::acceleration(&self.field, &M::chart(x, &q), &velocity)
+            .ok_or(MetricError::Lost { time: t })?;
+        let jet =
+            Vector::<M, Real>::from_index(|i| Real::new(q[i], velocity[i], velocity[i], bend[i]));
+        Ok(M::chart(x, &jet))
+    }
+
+    fn log(&self, x: &M::Point<f64>, y: &M::Point<f64>) -> Result<Vector<M>, MetricError> {
+        shoot(self, x, y)
+    }
+
+    fn weyl_jet(&self, x: &M::Point<f64>, d: &Vector<M>) -> Result<ArcJet<M>, MetricError> {
+        arc_by_dual_numbers(self, x, d)
+    }
+
+    fn slopes(&self, x: &M::Point<f64>) -> Option<<M::Dim as Dimension>::Array<Matrix<M>>> {
+        Some(self.field.jet(x).slopes)
+    }
+}
+
+/// The midpoint arc of any metric: two halves of a geodesic, one dual number for each direction.
+fn arc_by_dual_numbers<M: Space, G: Riemannian<M>>(
+    metric: &G,
+    x: &M::Point<f64>,
+    d: &Vector<M>,
+) -> Result<ArcJet<M>, MetricError> {
+    let zero = Matrix::<M>::zeros();
+    let mut jet: Option<ArcJet<M>> = None;
+    for k in 0..M::Dim::LEN {
+        let half = Vector::<M, Dual64>::from_index(|i| {
+            Dual64::new(0.5 * d[i], if i == k { 0.5 } else { 0.0 })
+        });
+        let (z, v) = metric.exp(&ChartPoint::centre(x), &half)?;
+        let (end, _) = metric.exp(&z, &v)?;
+        let jet = jet.get_or_insert_with(|| ArcJet {
+            z: z.base.clone(),
+            dz: zero,
+            d: Vector::<M>::from_index(|i| 2.0 * v[i].re),
+            dd: zero,
+            end: end.base.clone(),
+            dend: zero,
+        });
+        for i in 0..M::Dim::LEN {
+            jet.dz[(i, k)] = z.q[i].eps;
+            jet.dd[(i, k)] = 2.0 * v[i].eps;
+            jet.dend[(i, k)] = end.q[i].eps;
+        }
+    }
+    jet.ok_or(MetricError::NotFinite)
+}
+
+/// Corrections that one shot of a logarithm may take, and halvings of each.
+const CORRECTIONS: usize = 20;
+const HALVINGS: usize = 8;
+/// Stages of the continuation of a logarithm, until it is given up.
+const STAGES: [u32; 4] = [1, 4, 16, 64];
+
+/// The logarithm by shooting: Newton's method for `exp_x(v) = y`. If it does not get there from the
+/// straight line, the end is moved from `x` to `y` in stages, each shot aimed by the one before.
+fn shoot<M: Space, G: Riemannian<M>>(
+    metric: &G,
+    x: &M::Point<f64>,
+    y: &M::Point<f64>,
+) -> Result<Vector<M>, MetricError> {
+    let straight = M::coordinates(x, y);
+    let mut missed = MetricError::NotFinite;
+    for stages in STAGES {
+        let mut v = Vector::<M>::zero();
+        let end = (1..=stages).try_for_each(|stage| {
+            let share = f64::from(stage) / f64::from(stages);
+            let grown = f64::from(stage) / f64::from((stage - 1).max(1));
+            let aim = if stage == 1 { straight * share } else { v * grown };
+            v = hit(metric, x, &M::chart(x, &(straight * share)), &aim)?;
+            Ok(())
+        });
+        match end {
+            Ok(()) => return Ok(v),
+            Err(error) => missed = error,
+        }
+    }
+    Err(missed)
+}
+
+/// Newton's method for `exp_x(v) = y`, damped, from a first aim.
+fn hit<M: Space, G: Riemannian<M>>(
+    metric: &G,
+    x: &M::Point<f64>,
+    y: &M::Point<f64>,
+    aim: &Vector<M>,
+) -> Result<Vector<M>, MetricError> {
+    let miss = |v: &Vector<M>| metric.end(x, v).map(|end| M::coordinates(&end, y));
+    let size = M::coordinates(x, y).magnitude();
+    let (mut v, mut off) = (*aim, miss(aim)?);
+    for _ in 0..CORRECTIONS {
+        if off.magnitude() <= 4.0 * f64::EPSILON * (1.0 + size) {
+            return Ok(v);
+        }
+        let missed = MetricError::NoLogarithm { distance: size, missed_by: off.magnitude() };
+        let correction = metric.weyl_jet(x, &v)?.dend.solve(&off).ok_or(missed)?;
+        let mut length = 1.0;
+        let closer = (0..HALVINGS).find_map(|_| {
+            let next = v + correction * length;
+            length *= 0.5;
+            let off_next = miss(&next).ok()?;
+            (off_next.magnitude() < off.magnitude()).then_some((next, off_next))
+        });
+        match closer {
+            Some(next) => (v, off) = next,
+            // The geodesic itself is good to 1e-13: a stall there is the end.
+            None if off.magnitude() <= 1e-12 * (1.0 + size) => return Ok(v),
+            None => return Err(missed),
+        }
+    }
+    Err(MetricError::NoLogarithm { distance: size, missed_by: off.magnitude() })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Euclidean, InnerProduct, LieDual, Metric};
+    use nalgebra::{Matrix2, Matrix3, Vector2, Vector3, vector};
+    use num_dual::DualNum;
+    use rand::rngs::ChaCha8Rng;
+    use rand::{RngExt, SeedableRng};
+
+    /// The upper half plane with curvature −1.
+    fn half_plane() -> FieldMetric<impl Fn(&Vector2<Real>) -> Matrix2<Real>> {
+        Metric::field(|q: &Vector2<Real>| Matrix2::from_diagonal_element(q.y.powi(-2)))
+    }
+
+    #[test]
+    fn geodesics_of_the_half_plane_are_its_semicircles() {
+        let (g, x) = (half_plane(), vector![0.3, 1.2]);
+        for (k, length) in [0.1, 1.0, 2.0, 4.0].into_iter().enumerate() {
+            let (sine, cosine) = (0.4 + k as f64).sin_cos();
+            // Unit speed at height y is y in the chart.
+            let v = vector![cosine, sine] * (x.y * length);
+            let end = Riemannian::<Euclidean<2>>::end(&g, &x, &v).unwrap();
+            // cosh d = 1 + |x − y|²/(2 x₂ y₂), and the centre of the circle is on the axis.
+            let distance = (1.0 + (end - x).norm_squared() / (2.0 * x.y * end.y)).acosh();
+            assert!((distance - length).abs() < 1e-12 * length, "{distance} for {length}");
+            let centre = x.x + x.y * sine / cosine;
+            let radii = ((x - vector![centre, 0.0]).norm(), (end - vector![centre, 0.0]).norm());
+            assert!((radii.0 / radii.1 - 1.0).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn logarithms_of_the_half_plane_are_found_and_have_the_right_length() {
+        let g = half_plane();
+        let mut rng = ChaCha8Rng::seed_from_u64(7);
+        for _ in 0..400 {
+            let mut point = || vector![rng.random_range(-1.0..1.0), rng.random_range(0.2..2.0)];
+            let (x, y): (Vector2<f64>, Vector2<f64>) = (point(), point());
+            let v = Riemannian::<Euclidean<2>>::log(&g, &x, &y).unwrap();
+            let distance = (1.0 + (y - x).norm_squared() / (2.0 * x.y * y.y)).acosh();
+            assert!((v.norm() / x.y - distance).abs() < 1e-11 * (1.0 + distance));
+        }
+    }
+
+    #[test]
+    fn a_geodesic_that_leaves_the_chart_is_an_error_with_the_time() {
+        // The edge x = 1 of the slit metric is at a finite distance, and there is nothing beyond it.
+        let slit =
+            Metric::field(|q: &Vector2<Real>| Matrix2::from_diagonal_element((-q.x + 1.0).sqrt()));
+        let error = Riemannian::<Euclidean<2>>::end(&slit, &vector![0.0, 0.0], &vector![3.0, 0.0]);
+        assert!(matches!(error, Err(MetricError::Lost { time }) if time > 0.1 && time < 1.0));
+    }
+
+    #[test]
+    fn a_constant_closure_is_the_constant_metric() {
+        let g = Matrix3::new(2.0, 0.3, 0.0, 0.3, 1.0, -0.2, 0.0, -0.2, 3.0);
+        let closure = Metric::field(move |_: &Vector3<Real>| g.cast::<Real>());
+        let constant = Metric::constant(g).unwrap();
+        let x = ChartPoint::<LieDual<3>>::centre(&vector![1.0, 2.0, 3.0]);
+        let alpha = vector![0.3, -0.1, 0.7];
+        let left = Riemannian::<LieDual<3>>::at(&closure, &x).unwrap();
+        let right = Riemannian::<LieDual<3>>::at(&constant, &x).unwrap();
+        assert_eq!(left.sharp(&alpha), right.sharp(&alpha));
+        assert!((g * right.sharp(&alpha) - alpha).norm() < 1e-15);
+    }
+}

@@ -1,0 +1,140 @@
+//! Metrics that are constant in a global chart: their geodesics are straight lines.
+
+use metriplectic_fields::{
+    ChartPoint, Column, Dimension, Matrix, Real, Scalar, Space, Square, Vector,
+};
+use nalgebra::{Const, SMatrix};
+
+use crate::metric::{Factored, GeodesicEnd, MetricError, time};
+use crate::{ArcJet, Canonical, Riemannian};
+
+/// A manifold whose charts are global and linear: straight lines are the geodesics of every metric
+/// that is constant in them.
+pub trait Flat: Space {}
+
+/// Straight lines, the geodesics of every metric that is constant in a global chart.
+macro_rules! straight_geodesics {
+    () => {
+        #[inline]
+        fn exp<D: Scalar>(
+            &self,
+            x: &ChartPoint<M, D>,
+            v: &Vector<M, D>,
+        ) -> Result<GeodesicEnd<M, D>, MetricError> {
+            Ok(straight(x, v))
+        }
+
+        #[inline]
+        fn end(&self, x: &M::Point<f64>, v: &Vector<M>) -> Result<M::Point<f64>, MetricError> {
+            Ok(M::chart(x, v))
+        }
+
+        #[inline]
+        fn along(
+            &self,
+            x: &M::Point<f64>,
+            v: &Vector<M>,
+            t: f64,
+        ) -> Result<M::Point<Real>, MetricError> {
+            Ok(M::chart(x, &(Vector::<M, Real>::embed(v) * time(t))))
+        }
+
+        #[inline]
+        fn lost(&self, x: &M::Point<f64>, v: &Vector<M>, y: &M::Point<f64>) -> Vector<M> {
+            *v - M::coordinates(x, y)
+        }
+
+        fn log(&self, x: &M::Point<f64>, y: &M::Point<f64>) -> Result<Vector<M>, MetricError> {
+            Ok(M::coordinates(x, y))
+        }
+
+        #[inline]
+        fn weyl_jet(&self, x: &M::Point<f64>, d: &Vector<M>) -> Result<ArcJet<M>, MetricError> {
+            Ok(ArcJet::straight(x, d))
+        }
+
+        fn slopes(&self, _: &M::Point<f64>) -> Option<<M::Dim as Dimension>::Array<Matrix<M>>> {
+            None
+        }
+    };
+}
+
+impl<M: Flat> Riemannian<M> for Canonical {
+    type At<D: Scalar> = Self;
+
+    #[inline]
+    fn at<D: Scalar>(&self, _: &ChartPoint<M, D>) -> Result<Self, MetricError> {
+        Ok(Self)
+    }
+
+    fn matrix<D: Scalar>(&self, _: &ChartPoint<M, D>) -> Matrix<M, D> {
+        Matrix::<M, D>::one()
+    }
+
+    #[inline]
+    fn volume<D: Scalar>(&self, _: &ChartPoint<M, D>) -> Result<D, MetricError> {
+        Ok(D::one())
+    }
+
+    straight_geodesics!();
+}
+
+/// A metric with the same matrix everywhere; see [`Metric::constant`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Constant<const N: usize> {
+    factored: Factored<SMatrix<f64, N, N>>,
+}
+
+impl<const N: usize> Constant<N> {
+    pub(crate) fn new(g: SMatrix<f64, N, N>) -> Result<Self, MetricError> {
+        Factored::new(g).map(|factored| Self { factored })
+    }
+}
+
+impl<M: Flat + Space<Dim = Const<N>>, const N: usize> Riemannian<M> for Constant<N> {
+    type At<D: Scalar> = Factored<SMatrix<D, N, N>>;
+
+    #[inline]
+    fn at<D: Scalar>(&self, _: &ChartPoint<M, D>) -> Result<Self::At<D>, MetricError> {
+        let embed = |a: &SMatrix<f64, N, N>| SMatrix::from_entries(|i, j| D::from(a[(i, j)]));
+        Ok(Factored { g: embed(&self.factored.g), l: embed(&self.factored.l) })
+    }
+
+    fn matrix<D: Scalar>(&self, _: &ChartPoint<M, D>) -> SMatrix<D, N, N> {
+        SMatrix::from_entries(|i, j| D::from(self.factored.g[(i, j)]))
+    }
+
+    straight_geodesics!();
+}
+
+/// Where the flat geodesic through `x` arrives: `x + v`, with the same velocity.
+#[inline]
+fn straight<M: Flat, D: Scalar>(x: &ChartPoint<M, D>, v: &Vector<M, D>) -> GeodesicEnd<M, D> {
+    (ChartPoint::around(&M::chart(&x.base, &(x.q + *v))), *v)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Metric;
+    use metriplectic_fields::NotPositive;
+    use nalgebra::Matrix2;
+
+    #[test]
+    fn bad_constant_metrics_are_refused() {
+        let asymmetric = Matrix2::new(1.0, 0.2, 0.1, 1.0);
+        assert!(matches!(
+            Metric::constant(asymmetric),
+            Err(MetricError::NotSymmetric { row: 1, column: 0, .. })
+        ));
+        let indefinite = Matrix2::new(1.0, 0.0, 0.0, -3.0);
+        assert!(matches!(
+            Metric::constant(indefinite),
+            Err(MetricError::NotPositive(NotPositive { index: 1, .. }))
+        ));
+        assert_eq!(
+            Metric::constant(Matrix2::from_element(f64::NAN)).unwrap_err(),
+            MetricError::NotFinite
+        );
+    }
+}

@@ -11,7 +11,7 @@ use num_dual::Dual64;
 use crate::metric::{Factored, GeodesicEnd, MetricError};
 use crate::{ArcJet, Flat, Riemannian, geodesic};
 
-/// A metric given as a matrix field; see [`Metric::field`].
+/// A metric given as a matrix field; see [`Metric::field`](crate::Metric::field).
 #[derive(Clone, Copy)]
 pub struct FieldMetric<F> {
     field: F,

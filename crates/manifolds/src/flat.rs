@@ -79,7 +79,7 @@ impl<M: Flat> Riemannian<M> for Canonical {
     straight_geodesics!();
 }
 
-/// A metric with the same matrix everywhere; see [`Metric::constant`].
+/// A metric with the same matrix everywhere; see [`Metric::constant`](crate::Metric::constant).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Constant<const N: usize> {
     factored: Factored<SMatrix<f64, N, N>>,

@@ -229,7 +229,7 @@ impl Metric {
     }
 
     /// The metric with the matrix `g(x)` in the frame at each point, from a closure or any other
-    /// [`MatrixField`].
+    /// [`MatrixField`](metriplectic_fields::MatrixField).
     ///
     /// Whether it is symmetric and positive is checked at every point where it is used.
     ///

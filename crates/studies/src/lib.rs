@@ -6,6 +6,7 @@
 //! | module | question | answer |
 //! |---|---|---|
 //! | [`order`] | how fast does the error fall with the step? | [`Order`]: the fitted slope, its 95 % interval, the points left out as round-off |
+//! | [`convergence`] | how do schemes compare? | [`Convergence`]: errors, order, table and figure |
 //! | [`drift`] | does the error grow with time? | [`Drift`]: flat, a random walk or a linear drift, in constant memory |
 //! | [`table`] | what does the study say, in rows? | [`Table`]: plain text and Markdown |
 //! | [`plot`] | what does it look like? | [`Panels`] and [`LogLog`]: SVG, the same bytes every time |
@@ -38,6 +39,7 @@
 //! # Ok::<(), metriplectic_studies::OrderError>(())
 //! ```
 
+pub mod convergence;
 pub mod drift;
 pub mod gallery;
 pub mod order;
@@ -51,6 +53,7 @@ mod log_log;
 mod panels;
 mod student;
 
+pub use convergence::Convergence;
 pub use drift::{Drift, Growth, Slope};
 pub use gallery::{Gallery, GalleryError, Options, Progress, write_csv};
 pub use order::{Order, OrderError};

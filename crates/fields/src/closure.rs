@@ -10,7 +10,6 @@
 //! which is exact because the coordinates `d` are nilpotent, `d_i d_j d_k = 0`. A scalar of order 3
 //! would need derivatives that the closure does not have; it stops the build.
 
-use crate::field::seed;
 use crate::{Dimension, Matrix, MatrixField, Real, Scalar, ScalarField, Space, Square};
 
 // A closure that returns an `f64` is then told what a scalar field is, not what `Fn` is.
@@ -101,16 +100,16 @@ fn sweep<M: Space, D: Scalar>(
         for i in (0..n).step_by(2) {
             let eps2 = if i + 1 < n { d[i + 1] } else { none };
             let weights = Weights { re: first(i), eps1: d[i], eps2, eps1eps2: none };
-            visit(&M::chart(&base, &seed::<M>(i, i + 1)), &weights);
+            visit(&M::seeded(&base, i, i + 1), &weights);
         }
         return;
     }
     for i in 0..n {
         let weights = Weights { re: first(i), eps1: d[i], eps2: none, eps1eps2: d[i] * d[i] * 0.5 };
-        visit(&M::chart(&base, &seed::<M>(i, i)), &weights);
+        visit(&M::seeded(&base, i, i), &weights);
         for j in i + 1..n {
             let weights = Weights { re: 0.0, eps1: none, eps2: none, eps1eps2: d[i] * d[j] };
-            visit(&M::chart(&base, &seed::<M>(i, j)), &weights);
+            visit(&M::seeded(&base, i, j), &weights);
         }
     }
 }

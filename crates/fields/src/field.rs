@@ -47,7 +47,7 @@ pub trait ScalarField<M: Space> {
         let mut value = f64::NAN;
         let mut df = Vector::<M>::zero();
         for i in (0..n).step_by(2) {
-            let f = self.at_real(&M::chart(x, &seed::<M>(i, i + 1)));
+            let f = self.at_real(&M::seeded(x, i, i + 1));
             value = f.re;
             df[i] = f.eps1;
             if i + 1 < n {
@@ -65,7 +65,7 @@ pub trait ScalarField<M: Space> {
         let mut hf = Matrix::<M>::zeros();
         for i in 0..M::Dim::LEN {
             for j in i..M::Dim::LEN {
-                let f = self.at_real(&M::chart(x, &seed::<M>(i, j)));
+                let f = self.at_real(&M::seeded(x, i, j));
                 value = f.re;
                 df[i] = f.eps1;
                 hf[(i, j)] = f.eps1eps2;
@@ -74,15 +74,6 @@ pub trait ScalarField<M: Space> {
         }
         Jet2 { value, df, hf }
     }
-}
-
-/// Chart coordinates `ε₁ e_i + ε₂ e_j`; an index beyond the dimension seeds nothing.
-#[inline]
-pub(crate) fn seed<M: Space>(i: usize, j: usize) -> Vector<M, Real> {
-    Vector::<M, Real>::from_index(|k| {
-        let part = |direction| if k == direction { 1.0 } else { 0.0 };
-        Real::new(0.0, part(i), part(j), 0.0)
-    })
 }
 
 /// `f(x)` and `df(x)` in the coordinate frame of the chart at `x`.
@@ -142,7 +133,7 @@ pub trait MatrixField<M: Space> {
 
     /// Value and first derivatives along the chart at a real point, in `⌈n/2⌉` evaluations.
     fn jet(&self, x: &M::Point<f64>) -> MatrixJet<M> {
-        let pairs = |k: usize| self.at_real(&M::chart(x, &seed::<M>(2 * k, 2 * k + 1)));
+        let pairs = |k: usize| self.at_real(&M::seeded(x, 2 * k, 2 * k + 1));
         let part = |a: &Matrix<M, Real>, pick: fn(&Real) -> f64| {
             Matrix::<M>::from_entries(|i, j| pick(&a[(i, j)]))
         };

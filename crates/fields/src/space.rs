@@ -4,7 +4,7 @@ use std::fmt::Debug;
 
 use approx::RelativeEq;
 
-use crate::{Column, Dimension, Scalar};
+use crate::{Column, Dimension, Real, Scalar};
 
 /// Components of a vector or covector on `M`.
 pub type Vector<M, D = f64> = <<M as Space>::Dim as Dimension>::Vector<D>;
@@ -20,7 +20,7 @@ pub type Matrix<M, D = f64> = <<M as Space>::Dim as Dimension>::Matrix<D>;
 /// frame `∂φ_x/∂qⁱ`.
 ///
 /// Laws: 1. `φ_x(0) = x`; 2. `φ_x⁻¹(φ_x(q)) = q` near `q = 0`; 3. both at dual numbers too;
-/// 4. `real` undoes `constant`.
+/// 4. `real` undoes `constant`; 5. `seeded` is the chart at its seeds.
 pub trait Space: Clone + Debug + PartialEq + Send + Sync + 'static {
     /// The dimension `n`.
     type Dim: Dimension;
@@ -35,6 +35,15 @@ pub trait Space: Clone + Debug + PartialEq + Send + Sync + 'static {
 
     /// The point `φ_x(q)`.
     fn chart<D: Scalar>(x: &Self::Point<f64>, q: &Vector<Self, D>) -> Self::Point<D>;
+
+    /// The point `φ_x(ε₁ e_i + ε₂ e_j)` that a derivative is read off; an index beyond the dimension
+    /// seeds nothing.
+    #[inline]
+    fn seeded(x: &Self::Point<f64>, i: usize, j: usize) -> Self::Point<Real> {
+        let part = |k, direction| if k == direction { 1.0 } else { 0.0 };
+        let q = Vector::<Self, Real>::from_index(|k| Real::new(0.0, part(k, i), part(k, j), 0.0));
+        Self::chart(x, &q)
+    }
 
     /// The coordinates `φ_x⁻¹(y)`, for `y` near `x`.
     fn coordinates<D: Scalar>(x: &Self::Point<f64>, y: &Self::Point<D>) -> Vector<Self, D>;

@@ -20,7 +20,7 @@ fn round_off<M: Manifold>(scale: f64) -> f64 {
 ///
 /// 1. `φ_x(0) = x`;
 /// 2. `φ_x⁻¹(φ_x(q)) = q`, and the chain rule gives the identity at dual numbers;
-/// 3. `φ_x(q)` lies on the manifold.
+/// 3. `seeded` is the chart at its seeds; 4. `φ_x(q)` lies on the manifold.
 ///
 /// # Errors
 ///
@@ -39,6 +39,17 @@ pub fn manifold<M: Manifold>(space: &M, x: &M::Point<f64>, q: &Vector<M>) -> Res
     let there_and_back = jacobian::<M, f64>(|q| M::coordinates(x, &M::chart::<Dual<f64>>(x, q)), q);
     let off = (there_and_back - Matrix::<M>::one()).max_abs();
     BrokenLaw::unless("the derivative of φ_x⁻¹ φ_x is 1", off, bound)?;
+    for i in 0..=M::Dim::LEN {
+        for j in 0..=M::Dim::LEN {
+            let seed = M::coordinates(x, &M::seeded(x, i, j));
+            let expected = |k, direction| if k == direction { 1.0 } else { 0.0 };
+            let off = (0..M::Dim::LEN).fold(0.0_f64, |worst, k| {
+                let (a, b) = (seed[k].eps1 - expected(k, i), seed[k].eps2 - expected(k, j));
+                worst.max(a.abs()).max(b.abs()).max(seed[k].eps1eps2.abs())
+            });
+            BrokenLaw::unless("seeded points are the chart at its seeds", off, bound)?;
+        }
+    }
     let allowed = round_off::<M>(M::magnitude(&y));
     BrokenLaw::unless("chart points lie on the manifold", space.defect(&y), allowed)
 }

@@ -136,6 +136,20 @@ impl Space for Rotations {
         orthogonal(&(Self::constant::<D>(x) * exp(q)))
     }
 
+    /// `R (1 + ε₁ ê_i + ε₂ ê_j + ½ε₁ε₂ (ê_i ê_j + ê_j ê_i))`.
+    #[inline]
+    fn seeded(x: &Matrix3<f64>, i: usize, j: usize) -> Matrix3<Real> {
+        let generator = |k: usize| match k {
+            0 => hat(&Vector3::x()),
+            1 => hat(&Vector3::y()),
+            2 => hat(&Vector3::z()),
+            _ => Matrix3::zeros(),
+        };
+        let (a, b) = (generator(i), generator(j));
+        let (first, second, mixed) = (x * a, x * b, x * ((a * b + b * a) * 0.5));
+        Matrix3::from_fn(|r, c| Real::new(x[(r, c)], first[(r, c)], second[(r, c)], mixed[(r, c)]))
+    }
+
     #[inline]
     fn coordinates<D: Scalar>(x: &Matrix3<f64>, y: &Matrix3<D>) -> Vector3<D> {
         log(&(Self::constant::<D>(x).tr_mul(y)))

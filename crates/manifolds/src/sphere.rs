@@ -128,6 +128,15 @@ macro_rules! sphere {
                 normalised(&SVector::from_fn(|i, _| along[i] + cosine * x[i]))
             }
 
+            /// `x + ε₁ E_i + ε₂ E_j − ε₁ε₂ δ_ij x`, because `cos|q| = 1 − |q|²/2` for a seed.
+            #[inline]
+            fn seeded(x: &SVector<f64, $a>, i: usize, j: usize) -> SVector<Real, $a> {
+                let e = frame::<$a, $n>(x);
+                let entry = |row, column| if column < $n { e[(row, column)] } else { 0.0 };
+                let bend = if i == j && i < $n { -1.0 } else { 0.0 };
+                SVector::from_fn(|k, _| Real::new(x[k], entry(k, i), entry(k, j), bend * x[k]))
+            }
+
             fn coordinates<D: Scalar>(x: &SVector<f64, $a>, y: &SVector<D, $a>) -> SVector<D, $n> {
                 let difference = SVector::<D, $a>::from_fn(|i, _| y[i] - x[i]);
                 let tangent = components(&frame::<$a, $n>(x), &difference);

@@ -48,7 +48,7 @@ impl<M: Space> RootFinder<M> for Newton {
             match self.correct(equation, &here, &mut best) {
                 Progress::Solved => {
                     let NoRoot { best: u, residual, sweeps } = best;
-                    return Ok(Root { u, residual, sweeps });
+                    return Ok(Root { u, residual, floor: here.floor, sweeps });
                 }
                 Progress::Slow if best.sweeps < self.sweeps => {}
                 Progress::Slow | Progress::Stuck => break,

@@ -30,6 +30,8 @@ pub struct Root<M: Space> {
     pub u: Vector<M>,
     /// The norm of the residual that is left.
     pub residual: f64,
+    /// The norm below which a residual is round-off, and so is a displacement.
+    pub floor: f64,
     /// Linear systems solved.
     pub sweeps: usize,
 }

@@ -135,6 +135,11 @@ impl<R> Scheme<R> {
             recall: recall(system, start, &guess),
         };
         let root = self.solve(&residual, &guess, work)?;
+        if root.u.magnitude() <= 2.0 * root.floor {
+            // The state is at rest: what the solver found is its own round-off, and following it
+            // would make a random walk of the energy.
+            return Ok(start.x.clone());
+        }
         let lost = NoRoot { best: root.u, residual: f64::INFINITY, sweeps: root.sweeps };
         let end = self.retraction.end(system.metric(), start.x, &root.u).map_err(|_| lost)?;
         Ok(memory.note::<Y::Manifold, _>(system.metric(), start.x, &root.u, end))

@@ -20,7 +20,8 @@
 //!         })
 //!         .entropy(|p: &Vector3<Real>| p.norm_squared() * 0.5)
 //!         .build()?;
-//!     let run = WeylMidpoint.run(&body, vector![0.001, -1.0, 0.001], Span::steps(0.1, 1000))?;
+//!     let start = Vector3::new(0.001, -1.0, 0.001);
+//!     let run = WeylMidpoint.run(&body, start, Span::steps(0.1, 1000))?;
 //!     println!("{}", run.certificate());
 //!     # assert!(run.certificate().keeps_energy() && run.certificate().keeps_entropy());
 //!     Ok(())

@@ -3,13 +3,16 @@
 use std::path::PathBuf;
 use std::process::{Command, Output};
 
-/// Runs an example that `cargo test` has built beside the tests.
+/// Runs an example that `cargo test` has built beside the tests. Each call draws into a folder of its
+/// own, so that the gallery keeps the pictures of a reader.
 fn example(name: &str, arguments: &[&str]) -> Output {
     let tests = std::env::current_exe().expect("a test has a path");
     let folder: PathBuf = tests.ancestors().skip(2).take(1).collect();
     let program = folder.join("examples").join(name);
     let message = "the example is built: `cargo test` builds all, `cargo build --examples` one";
-    Command::new(program).args(arguments).output().expect(message)
+    let gallery = format!("{}/{name}{}", env!("CARGO_TARGET_TMPDIR"), arguments.concat());
+    let run = Command::new(program).args(arguments).env("CARGO_TARGET_DIR", gallery).output();
+    run.expect(message)
 }
 
 fn json(output: &Output) -> serde_json::Value {

@@ -54,15 +54,16 @@ pub use nalgebra;
 /// Everything that a program usually needs.
 pub mod prelude {
     pub use metriplectic_dynamics::{
-        AreaForm, LiePoisson, Metriplectic, ModelError, Nambu, Poisson, SecondLaw, System, Zero,
+        AreaForm, LiePoisson, Metriplectic, ModelError, Nambu, Poisson, SecondLaw, Symplectic,
+        System, Zero,
     };
     pub use metriplectic_fields::{MatrixField, Real, Scalar, ScalarField};
     pub use metriplectic_integrators::{
         Certificate, Error, Newton, Run, RunError, Scheme, Span, State, Trajectory,
     };
     pub use metriplectic_manifolds::{
-        Canonical, Euclidean, Exponential, LieAlgebra, LieDual, Manifold, Metric, Retraction,
-        Rotations, Sphere, WeylMidpoint,
+        Canonical, Cayley, Chart, Euclidean, Exponential, HalfLine, LieAlgebra, LieDual, Manifold,
+        Metric, Product, Projection, Retraction, Rotations, Sphere, WeylMidpoint,
     };
     pub use nalgebra::{
         Matrix1, Matrix2, Matrix3, Matrix4, Matrix5, Matrix6, SMatrix, SVector, Vector1, Vector2,

@@ -4,12 +4,15 @@ mod constant;
 mod field;
 mod lie_poisson;
 mod nambu;
+mod product;
+mod symplectic;
 mod zero;
 
 pub use constant::ConstantPoisson;
 pub use field::FieldPoisson;
 pub use lie_poisson::LiePoisson;
 pub use nambu::{AreaForm, Nambu};
+pub use symplectic::Symplectic;
 pub use zero::Zero;
 
 use metriplectic_fields::{ChartPoint, Column, Dimension, Matrix, Scalar, Square, Vector};
@@ -167,8 +170,12 @@ impl Poisson {
     }
 
     /// The tensor `Π(x)` from a closure or any other
-    /// [`MatrixField`](metriplectic_fields::MatrixField). It is checked at sampled points to be
-    /// skew and to satisfy the Jacobi identity.
+    /// [`MatrixField`](metriplectic_fields::MatrixField), acting on covectors dual to the
+    /// [`velocity`](metriplectic_fields::Space::velocity) of the space. It is checked at sampled
+    /// points to be skew and to satisfy the Jacobi identity.
+    ///
+    /// On a sphere the matrix is a bivector of the space around, `x' = A ∇H`; on S²,
+    /// `|x: &Vector3<Real>| x.cross_matrix()` is the area form. On SO(3) it acts on body covectors and gives `Ω`.
     pub const fn field<F>(field: F) -> FieldPoisson<F> {
         FieldPoisson::new(field)
     }

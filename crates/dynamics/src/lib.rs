@@ -7,7 +7,7 @@
 //!
 //! | module | what it holds |
 //! |---|---|
-//! | [`bracket`] | [`Bracket`]: `Π`; [`LiePoisson`], [`AreaForm`], [`Nambu`], [`Poisson::constant`], [`Poisson::field`], [`Zero`] |
+//! | [`bracket`] | [`Bracket`]: `Π`; [`LiePoisson`], [`AreaForm`], [`Nambu`], [`Symplectic`], [`Poisson::constant`], [`Poisson::field`], [`Zero`] |
 //! | [`dissipation`] | [`Dissipation`]: `K`, given the covector it must kill; [`MetricDissipation`] |
 //! | [`system`] | [`System`] and its builder |
 //! | [`verify`] | the laws of a model, sampled: [`System::verify`], [`System::report`] |
@@ -21,7 +21,7 @@ pub mod verify;
 
 pub use bracket::{
     AreaForm, Bracket, BracketJet, ConstantPoisson, FieldPoisson, LiePoisson, Nambu,
-    NaturalBracket, Poisson, PoissonError, Site, Zero,
+    NaturalBracket, Poisson, PoissonError, Site, Symplectic, Zero,
 };
 pub use dissipation::{Dissipation, DissipationJet, MetricDissipation, NoDissipation};
 pub use system::{

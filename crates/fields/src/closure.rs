@@ -10,7 +10,7 @@
 //! which is exact because the coordinates `d` are nilpotent, `d_i d_j d_k = 0`. A scalar of order 3
 //! would need derivatives that the closure does not have; it stops the build.
 
-use crate::{Dimension, Matrix, MatrixField, Real, Scalar, ScalarField, Space, Square};
+use crate::{Dimension, Form, MatrixField, Real, Scalar, ScalarField, Space, Square};
 
 // A closure that returns an `f64` is then told what a scalar field is, not what `Fn` is.
 #[diagnostic::do_not_recommend]
@@ -34,19 +34,19 @@ where
 impl<M, F> MatrixField<M> for F
 where
     M: Space,
-    F: Fn(&M::Point<Real>) -> Matrix<M, Real>,
+    F: Fn(&M::Point<Real>) -> Form<M, Real>,
 {
-    fn at<D: Scalar>(&self, x: &M::Point<D>) -> Matrix<M, D> {
-        let mut sum = Matrix::<M, D>::zeros();
+    fn at<D: Scalar>(&self, x: &M::Point<D>) -> Form<M, D> {
+        let mut sum = Form::<M, D>::zeros();
         sweep::<M, D>(x, |point, weights| {
             let a = self(point);
-            sum += Matrix::<M, D>::from_entries(|i, j| weights.of(&a[(i, j)]));
+            sum += Form::<M, D>::from_entries(|i, j| weights.of(&a[(i, j)]));
         });
         sum
     }
 
     #[inline]
-    fn at_real(&self, x: &M::Point<Real>) -> Matrix<M, Real> {
+    fn at_real(&self, x: &M::Point<Real>) -> Form<M, Real> {
         self(x)
     }
 }

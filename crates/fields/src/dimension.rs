@@ -8,7 +8,7 @@ use std::fmt::Debug;
 use std::ops::{Add, AddAssign, Index, IndexMut, Mul, Neg, Sub, SubAssign};
 
 use approx::RelativeEq;
-use nalgebra::{Const, SMatrix, SVector};
+use nalgebra::{Const, DimAdd, SMatrix, SVector};
 use num_dual::linalg::LU;
 
 use crate::Scalar;
@@ -26,7 +26,7 @@ pub trait Dimension: Copy + Debug + Send + Sync + 'static {
         + Debug
         + Send
         + Sync
-        + Index<usize, Output = T>
+        + IndexMut<usize, Output = T>
         + AsRef<[T]>;
 
     /// The array whose `i`-th value is `f(i)`.
@@ -42,6 +42,19 @@ impl<const N: usize> Dimension for Const<N> {
     fn array<T: Copy + Debug + Send + Sync>(f: impl FnMut(usize) -> T) -> [T; N] {
         std::array::from_fn(f)
     }
+}
+
+/// Dimensions that can be added: those of the factors of a product.
+pub trait Plus<N: Dimension>: Dimension {
+    /// The sum of the two.
+    type Sum: Dimension;
+}
+
+impl<const N: usize, const K: usize, const SUM: usize> Plus<Const<K>> for Const<N>
+where
+    Self: DimAdd<Const<K>, Output = Const<SUM>>,
+{
+    type Sum = Const<SUM>;
 }
 
 /// A column of scalars: a vector or a covector in components.

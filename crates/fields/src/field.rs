@@ -1,7 +1,7 @@
 //! Smooth functions on a manifold: scalar fields (energy, entropy) and matrix fields (metric,
 //! Poisson tensor).
 
-use crate::{Column, Dimension, Matrix, Real, Scalar, Space, Square, Vector};
+use crate::{ChartPoint, Column, Dimension, Form, Matrix, Real, Scalar, Space, Square, Vector};
 
 /// A smooth function `f: M → R`.
 ///
@@ -110,10 +110,11 @@ impl<M: Space> Jet2<M> {
     }
 }
 
-/// A smooth field of `n × n` matrices on `M`, in the coordinate frame at each point: a metric `g`,
-/// a Poisson tensor `Π`.
+/// A smooth field of square matrices on `M`: a metric `g` that acts on velocities, a Poisson tensor
+/// `Π` that acts on covectors dual to them. Velocities are those of [`Space::velocity`]: components
+/// on a vector space, entries of `x'` on a sphere, the body angular velocity on SO(3).
 ///
-/// Implemented by every closure `Fn(&M::Point<Real>) -> Matrix<M, Real>`, and by hand with the one
+/// Implemented by every closure `Fn(&M::Point<Real>) -> Form<M, Real>`, and by hand with the one
 /// method [`at`](Self::at).
 #[diagnostic::on_unimplemented(
     message = "`{Self}` is not a matrix field on `{M}`",
@@ -123,29 +124,27 @@ impl<M: Space> Jet2<M> {
 )]
 pub trait MatrixField<M: Space> {
     /// The matrix at `x`, at any scalar.
-    fn at<D: Scalar>(&self, x: &M::Point<D>) -> Matrix<M, D>;
+    fn at<D: Scalar>(&self, x: &M::Point<D>) -> Form<M, D>;
 
     /// The matrix at the scalar of closures, which a closure answers without a lift.
     #[inline]
-    fn at_real(&self, x: &M::Point<Real>) -> Matrix<M, Real> {
+    fn at_real(&self, x: &M::Point<Real>) -> Form<M, Real> {
         self.at(x)
     }
 
-    /// Value and first derivatives along the chart at a real point, in `⌈n/2⌉` evaluations.
-    fn jet(&self, x: &M::Point<f64>) -> MatrixJet<M> {
-        let pairs = |k: usize| self.at_real(&M::seeded(x, 2 * k, 2 * k + 1));
-        let part = |a: &Matrix<M, Real>, pick: fn(&Real) -> f64| {
-            Matrix::<M>::from_entries(|i, j| pick(&a[(i, j)]))
-        };
-        let mut last = pairs(0);
-        let value = part(&last, |a| a.re);
-        let slopes = M::Dim::array(|k| {
-            if k > 0 && k % 2 == 0 {
-                last = pairs(k / 2);
-            }
-            part(&last, if k % 2 == 0 { |a| a.eps1 } else { |a| a.eps2 })
-        });
-        MatrixJet { value, slopes }
+    /// A metric in the frame of the chart at a real point, with its first derivatives along the
+    /// chart, in `⌈n/2⌉` evaluations.
+    fn covariant_jet(&self, x: &M::Point<f64>) -> MatrixJet<M> {
+        MatrixJet::new(x, |point, chart| M::covariant(chart, &self.at_real(point)))
+    }
+
+    /// A Poisson tensor in the frame of the chart at a real point, with its first derivatives along
+    /// the chart, in `⌈n/2⌉` evaluations.
+    fn contravariant_jet(&self, x: &M::Point<f64>) -> MatrixJet<M> {
+        MatrixJet::new(x, |point, chart| {
+            // A chart has a frame at its own centre.
+            M::contravariant(chart, &self.at_real(point)).unwrap_or_else(Matrix::<M, Real>::zeros)
+        })
     }
 }
 
@@ -156,4 +155,31 @@ pub struct MatrixJet<M: Space> {
     pub value: Matrix<M>,
     /// Its derivative along each chart direction.
     pub slopes: <M::Dim as Dimension>::Array<Matrix<M>>,
+}
+
+impl<M: Space> MatrixJet<M> {
+    fn new(
+        x: &M::Point<f64>,
+        tensor: impl Fn(&M::Point<Real>, &ChartPoint<M, Real>) -> Matrix<M, Real>,
+    ) -> Self {
+        let seeds = |k: usize| {
+            let part = |i, direction| if i == direction { 1.0 } else { 0.0 };
+            let q = Vector::<M, Real>::from_index(|i| {
+                Real::new(0.0, part(i, 2 * k), part(i, 2 * k + 1), 0.0)
+            });
+            tensor(&M::seeded(x, 2 * k, 2 * k + 1), &ChartPoint { base: x.clone(), q })
+        };
+        let part = |a: &Matrix<M, Real>, pick: fn(&Real) -> f64| {
+            Matrix::<M>::from_entries(|i, j| pick(&a[(i, j)]))
+        };
+        let mut last = seeds(0);
+        let value = part(&last, |a| a.re);
+        let slopes = M::Dim::array(|k| {
+            if k > 0 && k % 2 == 0 {
+                last = seeds(k / 2);
+            }
+            part(&last, if k % 2 == 0 { |a| a.eps1 } else { |a| a.eps2 })
+        });
+        Self { value, slopes }
+    }
 }

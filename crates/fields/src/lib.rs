@@ -34,8 +34,8 @@ pub mod series;
 pub mod space;
 
 pub use differential::{differential, hessian, jacobian};
-pub use dimension::{Column, Dimension, Factors, NotPositive, Square};
+pub use dimension::{Column, Dimension, Factors, NotPositive, Plus, Square};
 pub use field::{Jet1, Jet2, MatrixField, MatrixJet, ScalarField};
 pub use laws::BrokenLaw;
 pub use scalar::{Real, Scalar};
-pub use space::{ChartPoint, Matrix, Space, Vector};
+pub use space::{ChartPoint, Form, Matrix, Space, Vector, Velocity};

@@ -2,15 +2,21 @@
 
 use std::fmt::Debug;
 
-use approx::RelativeEq;
-
-use crate::{Column, Dimension, Real, Scalar};
+use crate::{Column, Dimension, Factors, Real, Scalar, Square};
 
 /// Components of a vector or covector on `M`.
 pub type Vector<M, D = f64> = <<M as Space>::Dim as Dimension>::Vector<D>;
 
 /// Components of a bilinear form or linear map on `M`.
 pub type Matrix<M, D = f64> = <<M as Space>::Dim as Dimension>::Matrix<D>;
+
+/// A velocity as it is written by hand: entries of a tangent vector of the embedding, a body angular
+/// velocity; see [`Space::velocity`].
+pub type Velocity<M, D = f64> = <<M as Space>::Velocity as Dimension>::Vector<D>;
+
+/// A tensor as it is written by hand: a square matrix that acts on velocities (a metric) or on
+/// covectors dual to them (a Poisson tensor).
+pub type Form<M, D = f64> = <<M as Space>::Velocity as Dimension>::Matrix<D>;
 
 /// The points of a manifold at every scalar, and around each real point `x` a chart
 /// `φ_x: Rⁿ → M` with `φ_x(0) = x`.
@@ -19,13 +25,20 @@ pub type Matrix<M, D = f64> = <<M as Space>::Dim as Dimension>::Matrix<D>;
 /// entries of a point, and components of tangent vectors and covectors refer to its coordinate
 /// frame `∂φ_x/∂qⁱ`.
 ///
+/// The frame of a chart is a matter of computation. A tensor is written by hand in the terms of a
+/// [`velocity`](Self::velocity), which needs no chart: the components themselves on a vector space,
+/// the entries of `x'` on a sphere, the body angular velocity on SO(3).
+///
 /// Laws: 1. `φ_x(0) = x`; 2. `φ_x⁻¹(φ_x(q)) = q` near `q = 0`; 3. both at dual numbers too;
 /// 4. `real` undoes `constant`; 5. `seeded` is the chart at its seeds.
 pub trait Space: Clone + Debug + PartialEq + Send + Sync + 'static {
     /// The dimension `n`.
     type Dim: Dimension;
-    /// A point with entries in `D`: a vector in Rⁿ, a matrix on a group.
-    type Point<D: Scalar>: Clone + Debug + Send + Sync + 'static + RelativeEq<Epsilon = D>;
+    /// The number of entries of a velocity: `n` on vector spaces and groups, more where velocities
+    /// are written in the space around.
+    type Velocity: Dimension;
+    /// A point with entries in `D`: a vector in Rⁿ, a matrix on a group, a pair on a product.
+    type Point<D: Scalar>: Clone + Debug + PartialEq + Send + Sync + 'static;
 
     /// The real point, embedded in the scalar `D`.
     fn constant<D: Scalar>(x: &Self::Point<f64>) -> Self::Point<D>;
@@ -47,6 +60,53 @@ pub trait Space: Clone + Debug + PartialEq + Send + Sync + 'static {
 
     /// The coordinates `φ_x⁻¹(y)`, for `y` near `x`.
     fn coordinates<D: Scalar>(x: &Self::Point<f64>, y: &Self::Point<D>) -> Vector<Self, D>;
+
+    /// The velocity `θ(x) v` of a tangent vector with the components `v` in the frame of the chart of
+    /// `x`: linear in `v`, and one to one.
+    fn velocity<D: Scalar>(x: &ChartPoint<Self, D>, v: &Vector<Self, D>) -> Velocity<Self, D>;
+
+    /// The matrix `θᵀ A θ` of a bilinear form on velocities, in the frame of the chart.
+    fn covariant<D: Scalar>(x: &ChartPoint<Self, D>, a: &Form<Self, D>) -> Matrix<Self, D> {
+        let theta = frame(x);
+        let image = Self::Dim::array(|j| *a * theta[j]);
+        Matrix::<Self, D>::from_entries(|i, j| theta[i].dot(&image[j]))
+    }
+
+    /// The matrix `θ⁺ A θ⁺ᵀ` of a bilinear form on covectors dual to velocities, in the frame of the
+    /// chart, with `θ⁺ = (θᵀθ)⁻¹θᵀ`; `None` at the edge of the chart, where it has no frame.
+    fn contravariant<D: Scalar>(
+        x: &ChartPoint<Self, D>,
+        a: &Form<Self, D>,
+    ) -> Option<Matrix<Self, D>> {
+        let theta = frame(x);
+        let gram = Matrix::<Self, D>::from_entries(|i, j| theta[i].dot(&theta[j])).factor()?;
+        // The columns of θ⁺ᵀ = θ (θᵀθ)⁻¹.
+        let mut dual = theta;
+        for k in 0..Self::Dim::LEN {
+            let weights = gram.solve(&Vector::<Self, D>::basis(k))?;
+            let mut sum = Velocity::<Self, D>::zero();
+            for j in 0..Self::Dim::LEN {
+                sum += theta[j] * weights[j];
+            }
+            dual[k] = sum;
+        }
+        let image = Self::Dim::array(|j| *a * dual[j]);
+        Some(Matrix::<Self, D>::from_entries(|i, j| dual[i].dot(&image[j])))
+    }
+
+    /// Whether the point with coordinates `q` is well inside the chart; always, for a chart of the
+    /// whole space. Curves that are followed over long distances change to another chart in time.
+    #[inline]
+    fn is_near(_q: &Vector<Self>) -> bool {
+        true
+    }
+}
+
+/// The columns of `θ`: the velocities of the chart's frame.
+fn frame<M: Space, D: Scalar>(
+    x: &ChartPoint<M, D>,
+) -> <M::Dim as Dimension>::Array<Velocity<M, D>> {
+    M::Dim::array(|k| M::velocity(x, &Vector::<M, D>::basis(k)))
 }
 
 /// A point `φ_x(q)` written in the chart at the real point `x`: the place where a tensor is

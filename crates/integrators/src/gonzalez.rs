@@ -1,7 +1,7 @@
 //! The midpoint discrete gradient.
 
 use metriplectic_fields::{
-    Column, Matrix, Real, Scalar, ScalarField, Space, Square, Vector, differential,
+    Column, Dimension, Matrix, Real, Scalar, ScalarField, Space, Square, Vector, differential,
 };
 use metriplectic_manifolds::{Arc, ArcJet, InnerProduct, Manifold};
 
@@ -115,12 +115,12 @@ impl<M: Manifold> Chord<M> {
     }
 
     /// The derivative of the covector along the unknown of the arc, from the Hessian `hf` at `z` and
-    /// the differential at `x'`.
+    /// the differential at `x'`; `slopes` are the derivatives of the metric at `z`, if it has any.
     #[inline]
     pub fn slope(
         &self,
         recall: f64,
-        g: &impl InnerProduct<Vector<M>>,
+        (g, slopes): (&impl InnerProduct<Vector<M>>, Option<&Slopes<M>>),
         arc: &ArcJet<M>,
         hf: &Matrix<M>,
         df_end: &Vector<M>,
@@ -139,8 +139,21 @@ impl<M: Manifold> Chord<M> {
             - slope.transpose_times(&arc.d);
         let signal = self.df.magnitude() * arc.d.magnitude();
         let trust = signal.powi(2) / (signal.powi(2) + (1e3 * self.rounding).powi(2));
-        let dc = (rows * trust - arc.dd.transpose_times(&flat) * (2.0 * c)) * square.recip();
-        slope += Matrix::<M>::outer(&flat, &dc);
+        let mut along = rows * trust - arc.dd.transpose_times(&flat) * (2.0 * c);
+        if let Some(slopes) = slopes {
+            // ∂g along z, in ♭d and in G(d, d).
+            let mut turned = Matrix::<M>::zeros();
+            for k in 0..Vector::<M>::LEN {
+                let column = slopes[k] * arc.d;
+                for i in 0..Vector::<M>::LEN {
+                    turned[(i, k)] = column[i];
+                }
+            }
+            let turned = turned * arc.dz;
+            along -= turned.transpose_times(&arc.d) * c;
+            slope += turned * c;
+        }
+        slope += Matrix::<M>::outer(&flat, &(along * square.recip()));
         for k in 0..Vector::<M>::LEN {
             let column = g.flat(&Vector::<M>::from_index(|i| arc.dd[(i, k)]));
             for i in 0..Vector::<M>::LEN {
@@ -150,6 +163,9 @@ impl<M: Manifold> Chord<M> {
         slope
     }
 }
+
+/// The derivatives of a metric along the chart.
+type Slopes<M> = <<M as Space>::Dim as Dimension>::Array<Matrix<M>>;
 
 /// The defect as an integral, with the estimate of its error.
 struct Integral {

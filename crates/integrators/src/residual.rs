@@ -111,7 +111,9 @@ where
         let entropy = system.entropy().jet2(&arc.z);
         let chord = self.chord(u, &energy.df, &arc.d, (&arc.end, end.value));
         let w = chord.covector(self.recall, &g, &arc.d);
-        let dw = chord.slope(self.recall, &g, &arc, &energy.hf, &end.df);
+        let slopes = metric.slopes(&arc.z);
+        let metric_jet = (&g, slopes.as_ref());
+        let dw = chord.slope(self.recall, metric_jet, &arc, &energy.hf, &end.df);
         let pi = system.bracket().linearise(&system.site(&centre, &entropy.df), &w).ok()?;
         let k = system.dissipation().linearise(metric, &arc.z, &w, &entropy.df).ok()?;
 

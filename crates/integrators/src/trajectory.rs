@@ -199,7 +199,10 @@ where
 
     fn abs_diff_eq(&self, other: &Self, epsilon: f64) -> bool {
         self.states.len() == other.states.len()
-            && self.iter().zip(other).all(|(a, b)| a.point.abs_diff_eq(&b.point, epsilon))
+            && self
+                .iter()
+                .zip(other)
+                .all(|(a, b)| M::entries(&a.point).abs_diff_eq(&M::entries(&b.point), epsilon))
     }
 }
 
@@ -213,10 +216,9 @@ where
 
     fn relative_eq(&self, other: &Self, epsilon: f64, max_relative: f64) -> bool {
         self.states.len() == other.states.len()
-            && self
-                .iter()
-                .zip(other)
-                .all(|(a, b)| a.point.relative_eq(&b.point, epsilon, max_relative))
+            && self.iter().zip(other).all(|(a, b)| {
+                M::entries(&a.point).relative_eq(&M::entries(&b.point), epsilon, max_relative)
+            })
     }
 }
 

@@ -1,7 +1,7 @@
 //! Rⁿ.
 
-use metriplectic_fields::{Column, Scalar, Space};
-use nalgebra::{Const, SVector};
+use metriplectic_fields::{ChartPoint, Column, Scalar, Space};
+use nalgebra::{Const, SMatrix, SVector};
 use rand::{Rng, RngExt};
 
 use crate::Manifold;
@@ -16,11 +16,39 @@ use crate::Manifold;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Euclidean<const N: usize>;
 
+/// A velocity is its components in the frame of the chart, the same everywhere.
+macro_rules! components_are_velocities {
+    ($n:expr) => {
+        #[inline]
+        fn velocity<D: Scalar>(_: &ChartPoint<Self, D>, v: &SVector<D, $n>) -> SVector<D, $n> {
+            *v
+        }
+
+        #[inline]
+        fn covariant<D: Scalar>(
+            _: &ChartPoint<Self, D>,
+            a: &SMatrix<D, $n, $n>,
+        ) -> SMatrix<D, $n, $n> {
+            *a
+        }
+
+        #[inline]
+        fn contravariant<D: Scalar>(
+            _: &ChartPoint<Self, D>,
+            a: &SMatrix<D, $n, $n>,
+        ) -> Option<SMatrix<D, $n, $n>> {
+            Some(*a)
+        }
+    };
+}
+pub(crate) use components_are_velocities;
+
 /// The charts of a vector space, and its membership: every finite column of numbers is a point.
 macro_rules! vector_space {
     ($space:ident) => {
         impl<const N: usize> Space for $space<N> {
             type Dim = Const<N>;
+            type Velocity = Const<N>;
             type Point<D: Scalar> = SVector<D, N>;
 
             #[inline]
@@ -42,6 +70,8 @@ macro_rules! vector_space {
             fn coordinates<D: Scalar>(x: &SVector<f64, N>, y: &SVector<D, N>) -> SVector<D, N> {
                 Column::from_index(|i| y[i] - x[i])
             }
+
+            $crate::euclidean::components_are_velocities!(N);
         }
 
         impl<const N: usize> Manifold for $space<N> {

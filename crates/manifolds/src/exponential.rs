@@ -1,10 +1,9 @@
 //! The Riemannian exponential as a retraction: base point at the start.
 
-use metriplectic_fields::{ChartPoint, Matrix, Scalar, Square, Vector};
-use num_dual::Dual64;
+use metriplectic_fields::{ChartPoint, Scalar, Vector};
 
+use crate::retraction::jet_by_dual_numbers;
 use crate::{Arc, ArcJet, Manifold, MetricError, PointPair, Retraction, Riemannian, Tangent};
-use metriplectic_fields::{Column, Dimension};
 
 /// The Riemannian exponential based at the start of the step,
 ///
@@ -36,20 +35,7 @@ impl<M: Manifold, G: Riemannian<M>> Retraction<M, G> for Exponential {
         x: &M::Point<f64>,
         u: &Vector<M>,
     ) -> Result<ArcJet<M>, MetricError> {
-        let (end, _) = metric.exp(&ChartPoint::centre(x), u)?;
-        let mut dend = Matrix::<M>::zeros();
-        for j in 0..M::Dim::LEN {
-            let seeded = Vector::<M, Dual64>::from_index(|i| {
-                Dual64::new(u[i], if i == j { 1.0 } else { 0.0 })
-            });
-            let (moved, _) = metric.exp(&ChartPoint::centre(x), &seeded)?;
-            let column = M::coordinates(&end.point(), &moved.point());
-            for i in 0..M::Dim::LEN {
-                dend[(i, j)] = column[i].eps;
-            }
-        }
-        let (zero, one) = (Matrix::<M>::zeros(), Matrix::<M>::one());
-        Ok(ArcJet { z: x.clone(), dz: zero, d: *u, dd: one, end: end.point(), dend })
+        jet_by_dual_numbers(self, metric, x, u)
     }
 
     fn pair(&self, metric: &G, tangent: &Tangent<M>) -> Result<PointPair<M>, MetricError> {

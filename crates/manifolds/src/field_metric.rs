@@ -5,11 +5,10 @@ use std::fmt;
 use metriplectic_fields::{
     ChartPoint, Column, Dimension, Matrix, MatrixField, Real, Scalar, Space, Square, Vector,
 };
-use nalgebra::{Const, SMatrix};
-use num_dual::Dual64;
 
 use crate::metric::{Factored, GeodesicEnd, MetricError};
-use crate::{ArcJet, Flat, Riemannian, geodesic};
+use crate::retraction::jet_by_dual_numbers;
+use crate::{ArcJet, Manifold, Riemannian, WeylMidpoint, geodesic};
 
 /// A metric given as a matrix field; see [`Metric::field`](crate::Metric::field).
 #[derive(Clone, Copy)]
@@ -29,19 +28,15 @@ impl<F> fmt::Debug for FieldMetric<F> {
     }
 }
 
-impl<const N: usize, M, F> Riemannian<M> for FieldMetric<F>
-where
-    M: Flat + Space<Dim = Const<N>>,
-    F: MatrixField<M>,
-{
-    type At<D: Scalar> = Factored<SMatrix<D, N, N>>;
+impl<M: Manifold, F: MatrixField<M>> Riemannian<M> for FieldMetric<F> {
+    type At<D: Scalar> = Factored<M::Dim, D>;
 
     fn at<D: Scalar>(&self, x: &ChartPoint<M, D>) -> Result<Self::At<D>, MetricError> {
-        Factored::new(self.field.at(&x.point()))
+        Factored::new(geodesic::metric(&self.field, x))
     }
 
-    fn matrix<D: Scalar>(&self, x: &ChartPoint<M, D>) -> SMatrix<D, N, N> {
-        self.field.at(&x.point())
+    fn matrix<D: Scalar>(&self, x: &ChartPoint<M, D>) -> Matrix<M, D> {
+        geodesic::metric(&self.field, x)
     }
 
     fn exp<D: Scalar>(
@@ -49,8 +44,7 @@ where
         x: &ChartPoint<M, D>,
         v: &Vector<M, D>,
     ) -> Result<GeodesicEnd<M, D>, MetricError> {
-        let [q, velocity] = geodesic::follow(&self.field, &x.base, &x.q, v)?;
-        Ok((ChartPoint::around(&M::chart(&x.base, &q)), velocity))
+        geodesic::follow(&self.field, x, v)
     }
 
     fn along(
@@ -59,13 +53,13 @@ where
         v: &Vector<M>,
         t: f64,
     ) -> Result<M::Point<Real>, MetricError> {
-        let [q, velocity] = geodesic::follow(&self.field, x, &Vector::<M>::zero(), &(*v * t))?;
+        let (here, velocity) = geodesic::follow(&self.field, &ChartPoint::centre(x), &(*v * t))?;
         let velocity = if t > 0.0 { velocity * t.recip() } else { *v };
-        let bend = geodesic::acceleration(&self.field, &M::chart(x, &q), &velocity)
+        let bend = geodesic::acceleration(&self.field, &here.base, &velocity)
             .ok_or(MetricError::Lost { time: t })?;
         let jet =
-            Vector::<M, Real>::from_index(|i| Real::new(q[i], velocity[i], velocity[i], bend[i]));
-        Ok(M::chart(x, &jet))
+            Vector::<M, Real>::from_index(|i| Real::new(0.0, velocity[i], velocity[i], bend[i]));
+        Ok(M::chart(&here.base, &jet))
     }
 
     fn log(&self, x: &M::Point<f64>, y: &M::Point<f64>) -> Result<Vector<M>, MetricError> {
@@ -73,43 +67,12 @@ where
     }
 
     fn weyl_jet(&self, x: &M::Point<f64>, d: &Vector<M>) -> Result<ArcJet<M>, MetricError> {
-        arc_by_dual_numbers(self, x, d)
+        jet_by_dual_numbers(&WeylMidpoint, self, x, d)
     }
 
     fn slopes(&self, x: &M::Point<f64>) -> Option<<M::Dim as Dimension>::Array<Matrix<M>>> {
-        Some(self.field.jet(x).slopes)
+        Some(self.field.covariant_jet(x).slopes)
     }
-}
-
-/// The midpoint arc of any metric: two halves of a geodesic, one dual number for each direction.
-fn arc_by_dual_numbers<M: Space, G: Riemannian<M>>(
-    metric: &G,
-    x: &M::Point<f64>,
-    d: &Vector<M>,
-) -> Result<ArcJet<M>, MetricError> {
-    let zero = Matrix::<M>::zeros();
-    let mut jet: Option<ArcJet<M>> = None;
-    for k in 0..M::Dim::LEN {
-        let half = Vector::<M, Dual64>::from_index(|i| {
-            Dual64::new(0.5 * d[i], if i == k { 0.5 } else { 0.0 })
-        });
-        let (z, v) = metric.exp(&ChartPoint::centre(x), &half)?;
-        let (end, _) = metric.exp(&z, &v)?;
-        let jet = jet.get_or_insert_with(|| ArcJet {
-            z: z.base.clone(),
-            dz: zero,
-            d: Vector::<M>::from_index(|i| 2.0 * v[i].re),
-            dd: zero,
-            end: end.base.clone(),
-            dend: zero,
-        });
-        for i in 0..M::Dim::LEN {
-            jet.dz[(i, k)] = z.q[i].eps;
-            jet.dd[(i, k)] = 2.0 * v[i].eps;
-            jet.dend[(i, k)] = end.q[i].eps;
-        }
-    }
-    jet.ok_or(MetricError::NotFinite)
 }
 
 /// Corrections that one shot of a logarithm may take, and halvings of each.

@@ -82,7 +82,7 @@ impl<M: Flat> Riemannian<M> for Canonical {
 /// A metric with the same matrix everywhere; see [`Metric::constant`](crate::Metric::constant).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Constant<const N: usize> {
-    factored: Factored<SMatrix<f64, N, N>>,
+    factored: Factored<Const<N>, f64>,
 }
 
 impl<const N: usize> Constant<N> {
@@ -92,7 +92,7 @@ impl<const N: usize> Constant<N> {
 }
 
 impl<M: Flat + Space<Dim = Const<N>>, const N: usize> Riemannian<M> for Constant<N> {
-    type At<D: Scalar> = Factored<SMatrix<D, N, N>>;
+    type At<D: Scalar> = Factored<Const<N>, D>;
 
     #[inline]
     fn at<D: Scalar>(&self, _: &ChartPoint<M, D>) -> Result<Self::At<D>, MetricError> {

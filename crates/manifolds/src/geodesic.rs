@@ -8,12 +8,16 @@
 //!
 //! so that only first derivatives of the metric appear; dual numbers give them. The equations are
 //! integrated by extrapolation of the modified midpoint rule (Gragg 1965, Bulirsch and Stoer 1966),
-//! which finds its own steps and orders and works at every scalar.
+//! which finds its own steps and orders and works at every scalar. A geodesic that comes near the edge
+//! of its chart goes on in the chart around the point it has reached.
 
-use metriplectic_fields::{Column, Dimension, Matrix, MatrixField, Scalar, Space, Square, Vector};
+use metriplectic_fields::{
+    ChartPoint, Column, Dimension, Matrix, MatrixField, Scalar, Space, Square, Vector,
+};
 use num_dual::Dual;
 
-use crate::{Flat, MetricError};
+use crate::MetricError;
+use crate::metric::GeodesicEnd;
 
 /// The relative error of a geodesic.
 const TOLERANCE: f64 = 1e-13;
@@ -59,18 +63,27 @@ impl<M: Space, D: Scalar> Phase<M, D> {
 /// The metric at `x + q`, and its derivatives along the chart.
 type Slopes<M, D> = (Matrix<M, D>, <<M as Space>::Dim as Dimension>::Array<Matrix<M, D>>);
 
+/// The metric in the frame of the chart, at any scalar.
+#[inline]
+pub(crate) fn metric<M: Space, D: Scalar>(
+    field: &impl MatrixField<M>,
+    x: &ChartPoint<M, D>,
+) -> Matrix<M, D> {
+    M::covariant(x, &field.at(&x.point()))
+}
+
 /// The metric and its derivatives at any scalar, by one more dual number.
-fn slopes<M: Flat, D: Scalar>(
+fn slopes<M: Space, D: Scalar>(
     field: &impl MatrixField<M>,
     x: &M::Point<f64>,
     q: &Vector<M, D>,
 ) -> Slopes<M, D> {
     let mut value = Matrix::<M, D>::zeros();
     let slopes = M::Dim::array(|k| {
-        let seeded = Vector::<M, Dual<D>>::from_index(|i| {
+        let q = Vector::<M, Dual<D>>::from_index(|i| {
             Dual::new(q[i], if i == k { D::one() } else { D::zero() })
         });
-        let g = field.at(&M::chart(x, &seeded));
+        let g = metric(field, &ChartPoint { base: x.clone(), q });
         value = Matrix::<M, D>::from_entries(|i, j| g[(i, j)].re);
         Matrix::<M, D>::from_entries(|i, j| g[(i, j)].eps)
     });
@@ -78,7 +91,7 @@ fn slopes<M: Flat, D: Scalar>(
 }
 
 /// The velocity `g⁻¹p` and the derivative of the phase point.
-fn derivative<M: Flat, D: Scalar>(
+fn derivative<M: Space, D: Scalar>(
     field: &impl MatrixField<M>,
     x: &M::Point<f64>,
     at: &Phase<M, D>,
@@ -90,7 +103,7 @@ fn derivative<M: Flat, D: Scalar>(
 }
 
 /// One row of the extrapolation: the midpoint rule with `n` substeps over `h`, smoothed by Gragg.
-fn midpoint_rule<M: Flat, D: Scalar>(
+fn midpoint_rule<M: Space, D: Scalar>(
     field: &impl MatrixField<M>,
     x: &M::Point<f64>,
     start: &Phase<M, D>,
@@ -111,7 +124,7 @@ fn midpoint_rule<M: Flat, D: Scalar>(
 }
 
 /// One extrapolated step; `None` if it does not converge or leaves the chart.
-fn extrapolated<M: Flat, D: Scalar>(
+fn extrapolated<M: Space, D: Scalar>(
     field: &impl MatrixField<M>,
     x: &M::Point<f64>,
     start: &Phase<M, D>,
@@ -138,48 +151,73 @@ fn extrapolated<M: Flat, D: Scalar>(
     None
 }
 
-/// The geodesic from `x + q` with velocity `v`, followed for a unit of time: coordinates and
-/// velocity at its end.
+/// A point and a velocity of one chart, in the chart centred at the point itself.
+pub(crate) fn centred<M: Space, D: Scalar>(
+    x: &M::Point<f64>,
+    q: &Vector<M, D>,
+    v: &Vector<M, D>,
+) -> GeodesicEnd<M, D> {
+    let moving = Vector::<M, Dual<D>>::from_index(|i| Dual::new(q[i], v[i]));
+    let point = M::chart(x, &moving);
+    let base = M::real(&point);
+    let q = M::coordinates(&base, &point);
+    let velocity = Vector::<M, D>::from_index(|i| q[i].eps);
+    (ChartPoint { base, q: Vector::<M, D>::from_index(|i| q[i].re) }, velocity)
+}
+
+/// The geodesic from `x` with velocity `v`, followed for a unit of time: its end, centred, and its
+/// velocity there.
 ///
 /// # Errors
 ///
 /// [`MetricError::Lost`] with the time reached, if the geodesic runs into the edge of the chart or
 /// into a place where the metric is not positive.
-pub(crate) fn follow<M: Flat, D: Scalar>(
+pub(crate) fn follow<M: Space, D: Scalar>(
     field: &impl MatrixField<M>,
-    x: &M::Point<f64>,
-    q: &Vector<M, D>,
+    x: &ChartPoint<M, D>,
     v: &Vector<M, D>,
-) -> Result<[Vector<M, D>; 2], MetricError> {
-    let (g, _) = slopes(field, x, q);
-    let mut here = Phase::<M, D> { q: *q, p: g * *v };
+) -> Result<GeodesicEnd<M, D>, MetricError> {
+    let mut base = x.base.clone();
+    let mut here = Phase::<M, D> { q: x.q, p: metric(field, x) * *v };
     let (mut time, mut h) = (0.0, 1.0_f64);
-    while time < 1.0 {
+    loop {
         h = h.min(1.0 - time);
-        match extrapolated(field, x, &here, h) {
+        let next = extrapolated(field, &base, &here, h);
+        match next.filter(|next| M::is_near(&next.q.real())) {
             Some(next) => {
                 here = next;
                 // A sum of halves and quarters is exact.
                 time += h;
                 h *= 2.0;
             }
-            None if h > SHORTEST => h *= 0.5,
+            None if h > SHORTEST => {
+                h *= 0.5;
+                continue;
+            }
             None => return Err(MetricError::Lost { time }),
         }
+        let finished = time >= 1.0;
+        if finished || !M::is_near(&(here.q.real::<Vector<M>>() * 2.0)) {
+            let at = ChartPoint { base: base.clone(), q: here.q };
+            let v = metric(field, &at).solve(&here.p).ok_or(MetricError::Lost { time })?;
+            let (centre, v) = centred(&base, &here.q, &v);
+            if finished {
+                return Ok((centre, v));
+            }
+            here = Phase { q: centre.q, p: metric(field, &centre) * v };
+            base = centre.base;
+        }
     }
-    let (g, _) = slopes(field, x, &here.q);
-    let velocity = g.solve(&here.p).ok_or(MetricError::Lost { time })?;
-    Ok([here.q, velocity])
 }
 
 /// The acceleration `−Γ(v, v)` of the geodesic through a real point, with the Christoffel symbols of
 /// the metric: `g a = ½∇(vᵀ g v) − (∂_v g) v`.
-pub(crate) fn acceleration<M: Flat>(
+pub(crate) fn acceleration<M: Space>(
     field: &impl MatrixField<M>,
     x: &M::Point<f64>,
     v: &Vector<M>,
 ) -> Option<Vector<M>> {
-    let jet = field.jet(x);
+    let jet = field.covariant_jet(x);
     let mut force = Vector::<M>::from_index(|k| 0.5 * v.dot(&(jet.slopes[k] * *v)));
     for k in 0..M::Dim::LEN {
         force -= (jet.slopes[k] * *v) * v[k];

@@ -17,28 +17,38 @@
 //! | [`exponential`] | [`Exponential`]: based at the start, order 1 |
 //! | [`laws`] | what each of them promises, and the functions that check it |
 
+pub mod cayley;
+pub mod chart;
 pub mod euclidean;
 pub mod exponential;
 pub mod field_metric;
 pub mod flat;
 mod geodesic;
+pub mod half_line;
 pub mod laws;
 pub mod lie_dual;
 pub mod manifold;
 pub mod metric;
 pub mod normal;
+pub mod product;
+pub mod projection;
 pub mod retraction;
 pub mod rotations;
 pub mod sphere;
 pub mod weyl_midpoint;
 
+pub use cayley::Cayley;
+pub use chart::Chart;
 pub use euclidean::Euclidean;
 pub use exponential::Exponential;
 pub use field_metric::FieldMetric;
 pub use flat::{Constant, Flat};
+pub use half_line::HalfLine;
 pub use lie_dual::{AlgebraError, LieAlgebra, LieDual};
 pub use manifold::{Manifold, PointError};
 pub use metric::{Canonical, GeodesicEnd, InnerProduct, Metric, MetricError, Riemannian};
+pub use product::{Product, Split, Times};
+pub use projection::Projection;
 pub use retraction::{Arc, ArcJet, PointPair, Retraction, Tangent};
 pub use rotations::Rotations;
 pub use sphere::Sphere;

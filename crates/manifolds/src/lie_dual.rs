@@ -1,6 +1,6 @@
 //! The dual `g*` of a Lie algebra, where reduced mechanical systems live.
 
-use metriplectic_fields::{Column, Scalar, Space, Square};
+use metriplectic_fields::{ChartPoint, Column, Scalar, Space, Square};
 use nalgebra::{Const, SMatrix, SVector};
 use rand::{Rng, RngExt};
 

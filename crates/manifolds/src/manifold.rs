@@ -66,6 +66,9 @@ pub enum PointError {
         /// Its value.
         value: f64,
     },
+    /// The point is not in the domain of the chart.
+    #[error("the point is outside the domain of its chart; start inside")]
+    OutsideChart,
     /// The point is too far off the manifold.
     #[error(
         "the point is {defect:.3e} off the manifold ({allowed:.1e} is allowed); project it first"

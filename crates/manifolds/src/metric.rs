@@ -7,7 +7,7 @@
 use metriplectic_fields::{
     ChartPoint, Column, Dimension, Matrix, NotPositive, Real, Scalar, Space, Square, Vector,
 };
-use nalgebra::{SMatrix, SVector};
+use nalgebra::SMatrix;
 
 use crate::{ArcJet, Constant, FieldMetric};
 
@@ -151,41 +151,44 @@ impl<V: Copy> InnerProduct<V> for Canonical {
 }
 
 /// A symmetric positive matrix `g` and its Cholesky factor.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Factored<A> {
-    pub(crate) g: A,
-    pub(crate) l: A,
+#[derive(Clone, Copy, Debug)]
+pub struct Factored<N: Dimension, D: Scalar> {
+    pub(crate) g: N::Matrix<D>,
+    pub(crate) l: N::Matrix<D>,
 }
 
-impl<A> Factored<A> {
+impl<N: Dimension, D: Scalar> Factored<N, D> {
     /// Factors `g = L Lᵀ`.
     ///
     /// # Errors
     ///
     /// [`MetricError`] if `g` is not finite, not symmetric, or not positive.
-    pub fn new<D: Scalar>(g: A) -> Result<Self, MetricError>
-    where
-        A: Square<D>,
-    {
+    pub fn new(g: N::Matrix<D>) -> Result<Self, MetricError> {
         symmetric(&g)?;
         let l = g.cholesky()?;
         Ok(Self { g, l })
     }
 }
 
-impl<D: Scalar, const N: usize> InnerProduct<SVector<D, N>> for Factored<SMatrix<D, N, N>> {
+impl<N: Dimension, D: Scalar> PartialEq for Factored<N, D> {
+    fn eq(&self, other: &Self) -> bool {
+        self.g == other.g
+    }
+}
+
+impl<N: Dimension, D: Scalar> InnerProduct<N::Vector<D>> for Factored<N, D> {
     #[inline]
-    fn flat(&self, v: &SVector<D, N>) -> SVector<D, N> {
+    fn flat(&self, v: &N::Vector<D>) -> N::Vector<D> {
         self.g * *v
     }
 
     #[inline]
-    fn orthonormal(&self, alpha: &SVector<D, N>) -> SVector<D, N> {
+    fn orthonormal(&self, alpha: &N::Vector<D>) -> N::Vector<D> {
         self.l.solve_lower(alpha)
     }
 
     #[inline]
-    fn raise(&self, a: &SVector<D, N>) -> SVector<D, N> {
+    fn raise(&self, a: &N::Vector<D>) -> N::Vector<D> {
         self.l.solve_lower_transpose(a)
     }
 }
@@ -228,10 +231,20 @@ impl Metric {
         Constant::new(g)
     }
 
-    /// The metric with the matrix `g(x)` in the frame at each point, from a closure or any other
-    /// [`MatrixField`](metriplectic_fields::MatrixField).
+    /// The metric `G(u, v) = θ(u)·A(x) θ(v)` from a closure `A` or any other
+    /// [`MatrixField`](metriplectic_fields::MatrixField), with `θ` the
+    /// [`velocity`](metriplectic_fields::Space::velocity) of a tangent vector:
     ///
-    /// Whether it is symmetric and positive is checked at every point where it is used.
+    /// | on | a velocity is | the closure returns |
+    /// |---|---|---|
+    /// | a vector space, a chart | `x'` | `g`, `n × n` |
+    /// | Sⁿ | `x'` in Rⁿ⁺¹ | a form on Rⁿ⁺¹, `(n+1) × (n+1)`; what it does off the sphere is not looked at |
+    /// | SO(3) | the body angular velocity `Ω` | the inner product on so(3), `3 × 3` |
+    /// | R₊ | `s'` | `1 × 1` |
+    /// | a product | both, one below the other | the full matrix |
+    ///
+    /// Whether it is symmetric and positive is checked at every point where it is used. Geodesics are
+    /// integrated to 10⁻¹³; their derivatives come from dual numbers.
     ///
     /// ```
     /// use metriplectic_fields::Real;

@@ -1,7 +1,10 @@
 //! Retractions: how a tangent vector becomes a pair of points.
 
 use approx::{AbsDiffEq, RelativeEq};
-use metriplectic_fields::{ChartPoint, Column, Matrix, Real, Scalar, Space, Square, Vector};
+use metriplectic_fields::{
+    ChartPoint, Column, Dimension, Matrix, Real, Scalar, Space, Square, Vector,
+};
+use num_dual::Dual64;
 
 use crate::{Manifold, MetricError, Riemannian};
 
@@ -147,10 +150,7 @@ pub struct Tangent<M: Space> {
     pub vector: Vector<M>,
 }
 
-impl<M: Space> AbsDiffEq for Tangent<M>
-where
-    Self: PartialEq,
-{
+impl<M: Manifold> AbsDiffEq for Tangent<M> {
     type Epsilon = f64;
 
     fn default_epsilon() -> f64 {
@@ -158,23 +158,52 @@ where
     }
 
     fn abs_diff_eq(&self, other: &Self, epsilon: f64) -> bool {
-        self.base.abs_diff_eq(&other.base, epsilon)
+        M::entries(&self.base).abs_diff_eq(&M::entries(&other.base), epsilon)
             && self.vector.abs_diff_eq(&other.vector, epsilon)
     }
 }
 
-impl<M: Space> RelativeEq for Tangent<M>
-where
-    Self: PartialEq,
-{
+impl<M: Manifold> RelativeEq for Tangent<M> {
     fn default_max_relative() -> f64 {
         f64::default_max_relative()
     }
 
     fn relative_eq(&self, other: &Self, epsilon: f64, max_relative: f64) -> bool {
-        self.base.relative_eq(&other.base, epsilon, max_relative)
+        M::entries(&self.base).relative_eq(&M::entries(&other.base), epsilon, max_relative)
             && self.vector.relative_eq(&other.vector, epsilon, max_relative)
     }
+}
+
+/// The derivatives of an arc by its definition: one dual number for each direction.
+pub(crate) fn jet_by_dual_numbers<M: Manifold, G: Riemannian<M>>(
+    retraction: &impl Retraction<M, G>,
+    metric: &G,
+    x: &M::Point<f64>,
+    u: &Vector<M>,
+) -> Result<ArcJet<M>, MetricError> {
+    let zero = Matrix::<M>::zeros();
+    let mut jet: Option<ArcJet<M>> = None;
+    for k in 0..M::Dim::LEN {
+        let seeded =
+            Vector::<M, Dual64>::from_index(|i| Dual64::new(u[i], if i == k { 1.0 } else { 0.0 }));
+        let arc = retraction.arc(metric, x, &seeded)?;
+        let end = M::real(&arc.end);
+        let moved = M::coordinates(&end, &arc.end);
+        let jet = jet.get_or_insert_with(|| ArcJet {
+            z: arc.z.base.clone(),
+            dz: zero,
+            d: arc.d.real(),
+            dd: zero,
+            end,
+            dend: zero,
+        });
+        for i in 0..M::Dim::LEN {
+            jet.dz[(i, k)] = arc.z.q[i].eps;
+            jet.dd[(i, k)] = arc.d[i].eps;
+            jet.dend[(i, k)] = moved[i].eps;
+        }
+    }
+    jet.ok_or(MetricError::NotFinite)
 }
 
 /// The middle of two vectors' components, for the inverse of a midpoint rule.

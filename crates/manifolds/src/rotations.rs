@@ -112,13 +112,14 @@ pub fn dexp_inverse<D: Scalar>(q: &Vector3<D>) -> Matrix3<D> {
 /// One step of Newton's iteration for the polar factor, `R ← R(3 − RᵀR)/2`, which squares the
 /// defect.
 #[inline]
-fn orthogonal<D: Scalar>(r: &Matrix3<D>) -> Matrix3<D> {
+pub(crate) fn orthogonal<D: Scalar>(r: &Matrix3<D>) -> Matrix3<D> {
     let correction = Matrix3::from_diagonal_element(D::from(1.5)) - r.tr_mul(r) * D::from(0.5);
     r * correction
 }
 
 impl Space for Rotations {
     type Dim = Const<3>;
+    type Velocity = Const<3>;
     type Point<D: Scalar> = Matrix3<D>;
 
     #[inline]
@@ -153,6 +154,17 @@ impl Space for Rotations {
     #[inline]
     fn coordinates<D: Scalar>(x: &Matrix3<f64>, y: &Matrix3<D>) -> Vector3<D> {
         log(&(Self::constant::<D>(x).tr_mul(y)))
+    }
+
+    /// The body angular velocity `Ω = dexp(q) v` of `R' = R Ω̂`.
+    #[inline]
+    fn velocity<D: Scalar>(at: &ChartPoint<Self, D>, v: &Vector3<D>) -> Vector3<D> {
+        dexp(&at.q) * v
+    }
+
+    #[inline]
+    fn is_near(q: &Vector3<f64>) -> bool {
+        q.norm() < 0.5 * PI
     }
 }
 

@@ -48,7 +48,7 @@ impl<const N: usize> Sphere<N> {
 
 /// An orthonormal basis of the tangent space at `x`, with `det[x, E] = +1`: the columns of the
 /// Householder reflection that takes the last axis to `∓x`, all but the last.
-fn frame<const A: usize, const N: usize>(x: &SVector<f64, A>) -> SMatrix<f64, A, N> {
+pub(crate) fn frame<const A: usize, const N: usize>(x: &SVector<f64, A>) -> SMatrix<f64, A, N> {
     let sign = if x[N] < 0.0 { -1.0 } else { 1.0 };
     let mut axis = *x;
     axis[N] += sign;
@@ -69,7 +69,7 @@ fn frame<const A: usize, const N: usize>(x: &SVector<f64, A>) -> SMatrix<f64, A,
 
 /// `E q` at a scalar.
 #[inline]
-fn spread<D: Scalar, const A: usize, const N: usize>(
+pub(crate) fn spread<D: Scalar, const A: usize, const N: usize>(
     e: &SMatrix<f64, A, N>,
     q: &SVector<D, N>,
 ) -> SVector<D, A> {
@@ -78,7 +78,7 @@ fn spread<D: Scalar, const A: usize, const N: usize>(
 
 /// `Eᵀ v` at a scalar.
 #[inline]
-fn components<D: Scalar, const A: usize, const N: usize>(
+pub(crate) fn components<D: Scalar, const A: usize, const N: usize>(
     e: &SMatrix<f64, A, N>,
     v: &SVector<D, A>,
 ) -> SVector<D, N> {
@@ -99,7 +99,7 @@ fn great_circle<D: Scalar, const A: usize>(
 
 /// Divides by the norm of the real part, which leaves derivatives along the sphere alone.
 #[inline]
-fn normalised<D: Scalar, const A: usize>(x: &SVector<D, A>) -> SVector<D, A> {
+pub(crate) fn normalised<D: Scalar, const A: usize>(x: &SVector<D, A>) -> SVector<D, A> {
     let norm = Column::magnitude(x);
     x.map(|entry| entry / norm)
 }
@@ -108,6 +108,7 @@ macro_rules! sphere {
     ($n:literal in $a:literal) => {
         impl Space for Sphere<$n> {
             type Dim = Const<$n>;
+            type Velocity = Const<$a>;
             type Point<D: Scalar> = SVector<D, $a>;
 
             #[inline]
@@ -142,6 +143,21 @@ macro_rules! sphere {
                 let tangent = components(&frame::<$a, $n>(x), &difference);
                 let cosine = y.dot(&Column::embed(x));
                 tangent * angle_over_sine(tangent.dot(&tangent), cosine)
+            }
+
+            /// The entries of `x' = c₁ E v − (q·v) (c₁ x + (c₂ − c₃) E q)`, with the Stumpff functions
+            /// at `|q|²`.
+            fn velocity<D: Scalar>(at: &ChartPoint<Self, D>, v: &SVector<D, $n>) -> SVector<D, $a> {
+                let (s, along) = (at.q.dot(&at.q), at.q.dot(v));
+                let sine = stumpff(1, s);
+                let tangent = v * sine - at.q * (along * (stumpff(2, s) - stumpff(3, s)));
+                let moved = spread(&frame::<$a, $n>(&at.base), &tangent);
+                SVector::from_fn(|i, _| moved[i] - sine * along * at.base[i])
+            }
+
+            #[inline]
+            fn is_near(q: &SVector<f64, $n>) -> bool {
+                q.norm() < 0.5 * PI
             }
         }
 

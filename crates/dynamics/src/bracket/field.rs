@@ -3,7 +3,7 @@
 use std::fmt;
 
 use metriplectic_fields::{Dimension, Matrix, MatrixField, Scalar, Square, Vector};
-use metriplectic_manifolds::{Flat, Manifold, MetricError, Riemannian};
+use metriplectic_manifolds::{Manifold, MetricError, Riemannian};
 
 use super::{Bracket, BracketJet, Site};
 
@@ -25,13 +25,13 @@ impl<F> FieldPoisson<F> {
     }
 }
 
-impl<M: Manifold + Flat, G: Riemannian<M>, F: MatrixField<M>> Bracket<M, G> for FieldPoisson<F> {
+impl<M: Manifold, G: Riemannian<M>, F: MatrixField<M>> Bracket<M, G> for FieldPoisson<F> {
     fn apply<D: Scalar>(
         &self,
         at: &Site<'_, M, G, D>,
         alpha: &Vector<M, D>,
     ) -> Result<Vector<M, D>, MetricError> {
-        Ok(self.field.at(&at.x.point()) * *alpha)
+        Ok(self.tensor_at(at)? * *alpha)
     }
 
     fn linearise(
@@ -39,7 +39,7 @@ impl<M: Manifold + Flat, G: Riemannian<M>, F: MatrixField<M>> Bracket<M, G> for 
         at: &Site<'_, M, G>,
         alpha: &Vector<M>,
     ) -> Result<BracketJet<M>, MetricError> {
-        let jet = self.field.jet(&at.x.point());
+        let jet = self.field.contravariant_jet(&at.x.point());
         let (mut along_z, along_s) = (Matrix::<M>::zeros(), Matrix::<M>::zeros());
         for k in 0..M::Dim::LEN {
             let column = jet.slopes[k] * *alpha;
@@ -48,5 +48,18 @@ impl<M: Manifold + Flat, G: Riemannian<M>, F: MatrixField<M>> Bracket<M, G> for 
             }
         }
         Ok(BracketJet { value: jet.value * *alpha, along_z, along_s, tensor: jet.value })
+    }
+}
+
+impl<F> FieldPoisson<F> {
+    /// The matrix in the frame of the chart.
+    fn tensor_at<M: Manifold, G, D: Scalar>(
+        &self,
+        at: &Site<'_, M, G, D>,
+    ) -> Result<Matrix<M, D>, MetricError>
+    where
+        F: MatrixField<M>,
+    {
+        M::contravariant(at.x, &self.field.at(&at.x.point())).ok_or(MetricError::NotFinite)
     }
 }

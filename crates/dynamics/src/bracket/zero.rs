@@ -1,7 +1,7 @@
 //! No bracket: pure relaxation.
 
 use metriplectic_fields::{Column, Matrix, Scalar, Square, Vector};
-use metriplectic_manifolds::{Euclidean, Manifold, MetricError, Riemannian};
+use metriplectic_manifolds::{Chart, Euclidean, HalfLine, Manifold, MetricError, Riemannian};
 
 use super::{Bracket, BracketJet, NaturalBracket, Site};
 
@@ -30,10 +30,17 @@ impl<M: Manifold, G: Riemannian<M>> Bracket<M, G> for Zero {
     }
 }
 
-impl<const N: usize> NaturalBracket for Euclidean<N> {
-    type Bracket = Zero;
+/// A space starts without a bracket.
+macro_rules! starts_from_zero {
+    ($([$($generics:tt)*] $space:ty),+) => {$(
+        impl<$($generics)*> NaturalBracket for $space {
+            type Bracket = Zero;
 
-    fn natural_bracket(&self) -> Zero {
-        Zero
-    }
+            fn natural_bracket(&self) -> Zero {
+                Zero
+            }
+        }
+    )+};
 }
+
+starts_from_zero!([const N: usize] Euclidean<N>, [const N: usize] Chart<N>, [] HalfLine);

@@ -99,7 +99,7 @@ fn a_first_derivative_does_not_suffer_from_a_bad_second_one() {
 #[test]
 fn a_matrix_that_is_nan_shows() {
     let a = |x: &Vector3<Real>| Matrix3::from_diagonal_element(x.x.ln());
-    let jet = MatrixField::<Plain<3>>::jet(&a, &vector![-1.0, 0.0, 0.0]);
+    let jet = MatrixField::<Plain<3>>::covariant_jet(&a, &vector![-1.0, 0.0, 0.0]);
     assert!(jet.value[(0, 0)].is_nan());
     let value: Matrix3<f64> = MatrixField::<Plain<3>>::at(&a, &vector![-1.0, 0.0, 0.0]);
     assert!(value[(1, 1)].is_nan() && value[(0, 1)] == 0.0);

@@ -1,10 +1,10 @@
 //! Spaces to test on: Rⁿ, whose chart is a translation, and two whose charts are not.
 
-use metriplectic_fields::{Column, Scalar, Space};
+use metriplectic_fields::{ChartPoint, Column, Scalar, Space};
 use nalgebra::{Const, SVector, vector};
 
 /// A space whose points are columns, with a point for every six numbers in `−1.5 … 1.5`.
-pub(crate) trait TestSpace: Space {
+pub(crate) trait TestSpace: Space<Velocity = <Self as Space>::Dim> {
     /// The entries of a point.
     fn entries<D: Scalar>(x: &Self::Point<D>) -> &[D];
 
@@ -18,6 +18,7 @@ pub(crate) struct Plain<const N: usize>;
 
 impl<const N: usize> Space for Plain<N> {
     type Dim = Const<N>;
+    type Velocity = Const<N>;
     type Point<D: Scalar> = SVector<D, N>;
 
     fn constant<D: Scalar>(x: &SVector<f64, N>) -> SVector<D, N> {
@@ -34,6 +35,10 @@ impl<const N: usize> Space for Plain<N> {
 
     fn coordinates<D: Scalar>(x: &SVector<f64, N>, y: &SVector<D, N>) -> SVector<D, N> {
         SVector::from_fn(|i, _| y[i] - x[i])
+    }
+
+    fn velocity<D: Scalar>(_: &ChartPoint<Self, D>, v: &SVector<D, N>) -> SVector<D, N> {
+        *v
     }
 }
 
@@ -53,6 +58,7 @@ pub(crate) struct Circle;
 
 impl Space for Circle {
     type Dim = Const<1>;
+    type Velocity = Const<1>;
     type Point<D: Scalar> = SVector<D, 2>;
 
     fn constant<D: Scalar>(x: &SVector<f64, 2>) -> SVector<D, 2> {
@@ -70,6 +76,10 @@ impl Space for Circle {
 
     fn coordinates<D: Scalar>(x: &SVector<f64, 2>, y: &SVector<D, 2>) -> SVector<D, 1> {
         vector![(y[1] * x[0] - y[0] * x[1]).atan2(y[0] * x[0] + y[1] * x[1])]
+    }
+
+    fn velocity<D: Scalar>(_: &ChartPoint<Self, D>, v: &SVector<D, 1>) -> SVector<D, 1> {
+        *v
     }
 }
 
@@ -91,6 +101,7 @@ pub(crate) struct Affine;
 
 impl Space for Affine {
     type Dim = Const<2>;
+    type Velocity = Const<2>;
     type Point<D: Scalar> = SVector<D, 2>;
 
     fn constant<D: Scalar>(x: &SVector<f64, 2>) -> SVector<D, 2> {
@@ -108,6 +119,10 @@ impl Space for Affine {
 
     fn coordinates<D: Scalar>(x: &SVector<f64, 2>, y: &SVector<D, 2>) -> SVector<D, 2> {
         vector![(y[0] / x[0]).ln(), (y[1] - x[1]) / y[0]]
+    }
+
+    fn velocity<D: Scalar>(_: &ChartPoint<Self, D>, v: &SVector<D, 2>) -> SVector<D, 2> {
+        *v
     }
 }
 

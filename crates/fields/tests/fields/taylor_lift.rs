@@ -210,8 +210,8 @@ fn slope_of_gradient<M: TestSpace>(f: &impl ScalarField<M>, x: &ChartPoint<M>) -
 fn matrix_jets_agree<M: TestSpace>(sample: &Sample) -> Result<(), TestCaseError> {
     let x = M::point(&sample.point);
     let size = MATRIX * size::<M>(&x);
-    let a = MatrixField::<M>::jet(&matrix_closure::<M>(), &x);
-    let b = MatrixField::<M>::jet(&ByHand, &x);
+    let a = MatrixField::<M>::covariant_jet(&matrix_closure::<M>(), &x);
+    let b = MatrixField::<M>::covariant_jet(&ByHand, &x);
     agree("the matrix", &square::<M, f64>(&a.value), &square::<M, f64>(&b.value), size)?;
     for k in 0..M::Dim::LEN {
         let (a, b) = (square::<M, f64>(&a.slopes[k]), square::<M, f64>(&b.slopes[k]));
@@ -264,7 +264,7 @@ fn derivatives_are_parts<M: TestSpace>(sample: &Sample) -> Result<(), TestCaseEr
 fn slopes_are_parts<M: TestSpace>(sample: &Sample) -> Result<(), TestCaseError> {
     let x = M::point(&sample.point);
     let size = MATRIX * size::<M>(&x);
-    let jet = MatrixField::<M>::jet(&matrix_closure::<M>(), &x);
+    let jet = MatrixField::<M>::covariant_jet(&matrix_closure::<M>(), &x);
     for k in 0..M::Dim::LEN {
         let q = Vector::<M, Dual64>::basis(k) * Dual64::new(0.0, 1.0);
         let a = MatrixField::<M>::at(&ByHand, &M::chart(&x, &q));

@@ -1,0 +1,64 @@
+//! The sum of two brackets, on a product.
+
+use metriplectic_fields::{Matrix, Scalar, Vector};
+use metriplectic_manifolds::{Manifold, MetricError, Product, Riemannian, Split, Times};
+
+use super::{Bracket, BracketJet, NaturalBracket, Site, Zero};
+
+/// `Π_A ⊕ Π_B` on `A × B`: `{f, g} = {f, g}_A + {f, g}_B`. The Casimirs are functions of the Casimirs
+/// of both; with `(AreaForm, Zero)` on `S² × R` every function of the second factor is one.
+///
+/// The metric must be one of the factors (a pair, or [`Canonical`](metriplectic_manifolds::Canonical)),
+/// whose volume forms the brackets may ask for.
+impl<A, B, G, P, Q> Bracket<Product<A, B>, G> for (P, Q)
+where
+    A: Manifold + Times<B>,
+    B: Manifold,
+    G: Riemannian<Product<A, B>> + Split<A, B>,
+    P: Bracket<A, G::Left>,
+    Q: Bracket<B, G::Right>,
+{
+    fn apply<D: Scalar>(
+        &self,
+        at: &Site<'_, Product<A, B>, G, D>,
+        alpha: &Vector<Product<A, B>, D>,
+    ) -> Result<Vector<Product<A, B>, D>, MetricError> {
+        let ((x, y), (sx, sy)) = (Product::parts(at.x), Product::<A, B>::split(at.s));
+        let ((left, right), (a, b)) = (at.metric.halves(), Product::<A, B>::split(alpha));
+        let (m, n) = (&at.space.0, &at.space.1);
+        let a = self.0.apply(&Site { space: m, metric: left, x: &x, s: &sx }, &a)?;
+        let b = self.1.apply(&Site { space: n, metric: right, x: &y, s: &sy }, &b)?;
+        Ok(Product::<A, B>::join(&a, &b))
+    }
+
+    fn linearise(
+        &self,
+        at: &Site<'_, Product<A, B>, G>,
+        alpha: &Vector<Product<A, B>>,
+    ) -> Result<BracketJet<Product<A, B>>, MetricError> {
+        let ((x, y), (sx, sy)) = (Product::parts(at.x), Product::<A, B>::split(at.s));
+        let ((left, right), (a, b)) = (at.metric.halves(), Product::<A, B>::split(alpha));
+        let (m, n) = (&at.space.0, &at.space.1);
+        let a = self.0.linearise(&Site { space: m, metric: left, x: &x, s: &sx }, &a)?;
+        let b = self.1.linearise(&Site { space: n, metric: right, x: &y, s: &sy }, &b)?;
+        let block = |a: &Matrix<A>, b: &Matrix<B>| Product::<A, B>::block(a, b);
+        Ok(BracketJet {
+            value: Product::<A, B>::join(&a.value, &b.value),
+            along_z: block(&a.along_z, &b.along_z),
+            along_s: block(&a.along_s, &b.along_s),
+            tensor: block(&a.tensor, &b.tensor),
+        })
+    }
+
+    fn is_zero(&self) -> bool {
+        Bracket::<A, G::Left>::is_zero(&self.0) && Bracket::<B, G::Right>::is_zero(&self.1)
+    }
+}
+
+impl<A: Manifold + Times<B>, B: Manifold> NaturalBracket for Product<A, B> {
+    type Bracket = Zero;
+
+    fn natural_bracket(&self) -> Zero {
+        Zero
+    }
+}

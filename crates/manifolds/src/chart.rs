@@ -1,0 +1,116 @@
+//! An open chart of Rⁿ.
+
+use std::fmt;
+
+use metriplectic_fields::{ChartPoint, Column, Scalar, Space};
+use nalgebra::{Const, SMatrix, SVector};
+use rand::{Rng, RngExt};
+
+use crate::euclidean::components_are_velocities;
+use crate::{Flat, Manifold, PointError};
+
+/// An open part of Rⁿ in coordinates of your own, to be given a metric of your own.
+///
+/// The domain is a plain function or a closure without captures; a point outside of it is refused as
+/// the start of a run, and a step that ends there is taken in halves until it is given up.
+///
+/// ```
+/// use metriplectic_manifolds::{Chart, Manifold};
+/// use nalgebra::vector;
+/// let half_plane = Chart::<2>::new(|q| q.y > 0.0);
+/// assert!(half_plane.check(&vector![3.0, 0.5]).is_ok());
+/// assert!(half_plane.check(&vector![3.0, -0.5]).is_err());
+/// ```
+#[derive(Clone, Copy)]
+pub struct Chart<const N: usize> {
+    domain: fn(&SVector<f64, N>) -> bool,
+}
+
+impl<const N: usize> Chart<N> {
+    /// The chart whose points are those that `domain` accepts.
+    pub const fn new(domain: fn(&SVector<f64, N>) -> bool) -> Self {
+        Self { domain }
+    }
+}
+
+impl<const N: usize> fmt::Debug for Chart<N> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Chart").field("dimension", &N).finish_non_exhaustive()
+    }
+}
+
+impl<const N: usize> PartialEq for Chart<N> {
+    fn eq(&self, other: &Self) -> bool {
+        std::ptr::fn_addr_eq(self.domain, other.domain)
+    }
+}
+
+impl<const N: usize> Space for Chart<N> {
+    type Dim = Const<N>;
+    type Velocity = Const<N>;
+    type Point<D: Scalar> = SVector<D, N>;
+
+    #[inline]
+    fn constant<D: Scalar>(x: &SVector<f64, N>) -> SVector<D, N> {
+        Column::embed(x)
+    }
+
+    #[inline]
+    fn real<D: Scalar>(x: &SVector<D, N>) -> SVector<f64, N> {
+        Column::real(x)
+    }
+
+    #[inline]
+    fn chart<D: Scalar>(x: &SVector<f64, N>, q: &SVector<D, N>) -> SVector<D, N> {
+        Column::from_index(|i| q[i] + x[i])
+    }
+
+    #[inline]
+    fn coordinates<D: Scalar>(x: &SVector<f64, N>, y: &SVector<D, N>) -> SVector<D, N> {
+        Column::from_index(|i| y[i] - x[i])
+    }
+
+    components_are_velocities!(N);
+}
+
+impl<const N: usize> Manifold for Chart<N> {
+    /// 0 inside the domain and infinite outside: how far off is not known.
+    fn defect(&self, x: &SVector<f64, N>) -> f64 {
+        if (self.domain)(x) { 0.0 } else { f64::INFINITY }
+    }
+
+    fn entries(x: &SVector<f64, N>) -> Vec<f64> {
+        x.iter().copied().collect()
+    }
+
+    #[inline]
+    fn magnitude(x: &SVector<f64, N>) -> f64 {
+        Column::magnitude(x)
+    }
+
+    /// The point itself: the nearest one of the domain is not known.
+    fn project(&self, x: &SVector<f64, N>) -> SVector<f64, N> {
+        *x
+    }
+
+    /// A point of the domain with entries in `−1 … 1`, or beyond if there is none to be found.
+    fn random(&self, rng: &mut impl Rng) -> SVector<f64, N> {
+        let mut reach = 1.0;
+        loop {
+            let x = Column::from_index(|_| rng.random_range(-reach..reach));
+            if (self.domain)(&x) || reach > 1e6 {
+                return x;
+            }
+            reach *= 1.01;
+        }
+    }
+
+    fn check(&self, x: &SVector<f64, N>) -> Result<(), PointError> {
+        if let Some(index) = x.iter().position(|entry| !entry.is_finite()) {
+            return Err(PointError::NotFinite { index, value: x[index] });
+        }
+        if (self.domain)(x) { Ok(()) } else { Err(PointError::OutsideChart) }
+    }
+}
+
+impl<const N: usize> Flat for Chart<N> {}

@@ -1,0 +1,118 @@
+//! The half line R₊.
+
+use metriplectic_fields::{ChartPoint, Column, Scalar, Space};
+use nalgebra::{Const, SVector, Vector1};
+use rand::{Rng, RngExt};
+
+use crate::{Flat, Manifold};
+
+/// The positive numbers R₊, for a temperature, a volume, an internal energy: a state that must not
+/// reach zero, and never does.
+///
+/// A point is a [`Vector1`]; the chart `φ_s(q) = s e^q` maps onto the whole half line, and the canonical
+/// metric is `ds²/s²`, whose geodesics are `s e^{tv}`. A velocity is written as `s'`, so that
+/// `Metric::field(|s| Matrix1::new(s.x.powi(-2)))` is the canonical metric again.
+///
+/// ```
+/// use metriplectic_manifolds::{Canonical, HalfLine, Riemannian};
+/// use nalgebra::Vector1;
+/// let (one, e) = (Vector1::new(1.0), Vector1::new(1_f64.exp()));
+/// let length = Riemannian::<HalfLine>::log(&Canonical, &one, &e).unwrap();
+/// assert!((length.x - 1.0).abs() < 1e-15);
+/// ```
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct HalfLine;
+
+impl Space for HalfLine {
+    type Dim = Const<1>;
+    type Velocity = Const<1>;
+    type Point<D: Scalar> = Vector1<D>;
+
+    #[inline]
+    fn constant<D: Scalar>(x: &Vector1<f64>) -> Vector1<D> {
+        Column::embed(x)
+    }
+
+    #[inline]
+    fn real<D: Scalar>(x: &Vector1<D>) -> Vector1<f64> {
+        Column::real(x)
+    }
+
+    #[inline]
+    fn chart<D: Scalar>(x: &Vector1<f64>, q: &Vector1<D>) -> Vector1<D> {
+        Vector1::new(q.x.exp() * x.x)
+    }
+
+    #[inline]
+    fn coordinates<D: Scalar>(x: &Vector1<f64>, y: &Vector1<D>) -> Vector1<D> {
+        // ln(1 + (y − x)/x) has its digits for near points.
+        Vector1::new(((y.x - x.x) / x.x).ln_1p())
+    }
+
+    /// `s' = s e^q v`.
+    #[inline]
+    fn velocity<D: Scalar>(at: &ChartPoint<Self, D>, v: &Vector1<D>) -> Vector1<D> {
+        at.point() * v.x
+    }
+}
+
+impl Manifold for HalfLine {
+    /// How far a number is below zero; that of zero itself is its distance to the smallest number.
+    fn defect(&self, x: &Vector1<f64>) -> f64 {
+        if x.x > 0.0 { 0.0 } else { 1.0 - x.x }
+    }
+
+    fn entries(x: &Vector1<f64>) -> Vec<f64> {
+        vec![x.x]
+    }
+
+    #[inline]
+    fn magnitude(x: &Vector1<f64>) -> f64 {
+        x.x.abs()
+    }
+
+    /// The smallest positive number stands for everything that is not positive.
+    fn project(&self, x: &Vector1<f64>) -> Vector1<f64> {
+        Vector1::new(x.x.max(f64::MIN_POSITIVE))
+    }
+
+    /// `e^u` with `u` uniform in `−1 … 1`.
+    fn random(&self, rng: &mut impl Rng) -> Vector1<f64> {
+        let u: f64 = rng.random_range(-1.0..1.0);
+        SVector::from([u.exp()])
+    }
+}
+
+/// The logarithm is a global chart.
+impl Flat for HalfLine {}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Canonical, Exponential, Metric, WeylMidpoint, laws};
+    use metriplectic_fields::Real;
+    use nalgebra::Matrix1;
+    use num_dual::DualNum;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn the_half_line_keeps_the_laws(x in 0.1..10.0, u in -1.0..1.0) {
+            let (x, u) = (Vector1::new(x), Vector1::new(u));
+            let field = Metric::field(|s: &Vector1<Real>| Matrix1::new(s.x.powi(-2)));
+            laws::manifold(&HalfLine, &x, &u)?;
+            laws::metric::<HalfLine, _>(&Canonical, &x, &u)?;
+            laws::metric::<HalfLine, _>(&field, &x, &u)?;
+            laws::retraction::<HalfLine, _, _>(&WeylMidpoint, &Canonical, &x, &u)?;
+            laws::retraction::<HalfLine, _, _>(&Exponential, &field, &x, &u)?;
+        }
+    }
+
+    #[test]
+    fn what_is_not_positive_is_off_the_half_line() {
+        for off in [0.0, -1e-300, -3.0] {
+            assert!(HalfLine.check(&Vector1::new(off)).is_err());
+            assert!(HalfLine.check(&HalfLine.project(&Vector1::new(off))).is_ok());
+        }
+    }
+}

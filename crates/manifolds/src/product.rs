@@ -1,0 +1,482 @@
+//! Products of manifolds.
+
+use std::fmt;
+use std::marker::PhantomData;
+
+use metriplectic_fields::{
+    ChartPoint, Column, Dimension, Matrix, Plus, Real, Scalar, Space, Square, Vector, Velocity,
+};
+use rand::Rng;
+
+use crate::metric::GeodesicEnd;
+use crate::{ArcJet, Canonical, InnerProduct, Manifold, MetricError, Riemannian};
+
+/// The product `A × B`: a state with two parts, such as a direction with an internal energy
+/// (`S² × R`) or an attitude with an angular momentum (`SO(3) × R³`). A factor may be a product again.
+///
+/// A point is a pair, so a closure takes it apart:
+///
+/// ```
+/// use metriplectic_fields::Real;
+/// use metriplectic_manifolds::{Euclidean, Manifold, Product, Sphere};
+/// use nalgebra::{Vector1, Vector3, vector};
+///
+/// let spin_and_energy = Product(Sphere::<2>::round(), Euclidean::<1>);
+/// let _energy = |(n, e): &(Vector3<Real>, Vector1<Real>)| n.z + e.x;
+/// assert!(spin_and_energy.check(&(vector![0.0, 0.6, 0.8], vector![3.0])).is_ok());
+/// ```
+///
+/// Coordinates, velocities and covectors of the product are those of `A`, then those of `B`. Its
+/// metric is a pair `(gA, gB)`, [`Canonical`] (the pair of the canonical ones), or a full
+/// [`Metric::field`](crate::Metric::field). Geodesics of a pair are pairs of geodesics, in closed form
+/// where both factors have one.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Product<A, B>(pub A, pub B);
+
+/// Spaces whose dimensions can be added: the left and the right factor of a product. Nothing to
+/// implement.
+pub trait Times<B: Space>: Space {
+    /// The dimension of the product.
+    type SumDim: Dimension;
+    /// The number of entries of its velocities.
+    type SumVelocity: Dimension;
+}
+
+impl<A: Space, B: Space> Times<B> for A
+where
+    A::Dim: Plus<B::Dim>,
+    A::Velocity: Plus<B::Velocity>,
+{
+    type SumDim = <A::Dim as Plus<B::Dim>>::Sum;
+    type SumVelocity = <A::Velocity as Plus<B::Velocity>>::Sum;
+}
+
+/// `(a, b)` as one column.
+fn stack<D: Scalar, P: Column<D>, Q: Column<D>, S: Column<D>>(a: &P, b: &Q) -> S {
+    S::from_index(|i| if i < P::LEN { a[i] } else { b[i - P::LEN] })
+}
+
+impl<A: Times<B>, B: Space> Product<A, B> {
+    /// The components of a vector or covector on each factor.
+    #[inline]
+    pub fn split<D: Scalar>(v: &Vector<Self, D>) -> (Vector<A, D>, Vector<B, D>) {
+        let left = Vector::<A, D>::from_index(|i| v[i]);
+        (left, Vector::<B, D>::from_index(|i| v[i + A::Dim::LEN]))
+    }
+
+    /// The components of a vector or covector of the product, from those on the factors.
+    #[inline]
+    pub fn join<D: Scalar>(a: &Vector<A, D>, b: &Vector<B, D>) -> Vector<Self, D> {
+        stack(a, b)
+    }
+
+    /// The block-diagonal matrix of a matrix on each factor.
+    #[inline]
+    pub fn block<D: Scalar>(a: &Matrix<A, D>, b: &Matrix<B, D>) -> Matrix<Self, D> {
+        let n = A::Dim::LEN;
+        Matrix::<Self, D>::from_entries(|i, j| match (i < n, j < n) {
+            (true, true) => a[(i, j)],
+            (false, false) => b[(i - n, j - n)],
+            _ => D::zero(),
+        })
+    }
+
+    /// The parts of a chart point.
+    #[inline]
+    pub fn parts<D: Scalar>(x: &ChartPoint<Self, D>) -> (ChartPoint<A, D>, ChartPoint<B, D>) {
+        let (a, b) = Self::split(&x.q);
+        (ChartPoint { base: x.base.0.clone(), q: a }, ChartPoint { base: x.base.1.clone(), q: b })
+    }
+}
+
+impl<A: Times<B>, B: Space> Space for Product<A, B> {
+    type Dim = A::SumDim;
+    type Velocity = A::SumVelocity;
+    type Point<D: Scalar> = (A::Point<D>, B::Point<D>);
+
+    #[inline]
+    fn constant<D: Scalar>((a, b): &Self::Point<f64>) -> Self::Point<D> {
+        (A::constant(a), B::constant(b))
+    }
+
+    #[inline]
+    fn real<D: Scalar>((a, b): &Self::Point<D>) -> Self::Point<f64> {
+        (A::real(a), B::real(b))
+    }
+
+    #[inline]
+    fn chart<D: Scalar>((a, b): &Self::Point<f64>, q: &Vector<Self, D>) -> Self::Point<D> {
+        let (qa, qb) = Self::split(q);
+        (A::chart(a, &qa), B::chart(b, &qb))
+    }
+
+    #[inline]
+    fn seeded((a, b): &Self::Point<f64>, i: usize, j: usize) -> Self::Point<Real> {
+        let n = A::Dim::LEN;
+        // An index of `A` is beyond the dimension of `B` once it has been shifted.
+        let shifted = |k: usize| if k < n { B::Dim::LEN } else { k - n };
+        (A::seeded(a, i, j), B::seeded(b, shifted(i), shifted(j)))
+    }
+
+    #[inline]
+    fn coordinates<D: Scalar>((a, b): &Self::Point<f64>, y: &Self::Point<D>) -> Vector<Self, D> {
+        Self::join(&A::coordinates(a, &y.0), &B::coordinates(b, &y.1))
+    }
+
+    #[inline]
+    fn velocity<D: Scalar>(x: &ChartPoint<Self, D>, v: &Vector<Self, D>) -> Velocity<Self, D> {
+        let ((xa, xb), (va, vb)) = (Self::parts(x), Self::split(v));
+        stack(&A::velocity(&xa, &va), &B::velocity(&xb, &vb))
+    }
+
+    #[inline]
+    fn is_near(q: &Vector<Self>) -> bool {
+        let (a, b) = Self::split(q);
+        A::is_near(&a) && B::is_near(&b)
+    }
+}
+
+impl<A: Manifold + Times<B>, B: Manifold> Manifold for Product<A, B> {
+    /// The larger one of the factors' defects.
+    fn defect(&self, (a, b): &Self::Point<f64>) -> f64 {
+        let (a, b) = (self.0.defect(a), self.1.defect(b));
+        if a.is_nan() || a > b { a } else { b }
+    }
+
+    fn entries((a, b): &Self::Point<f64>) -> Vec<f64> {
+        let mut entries = A::entries(a);
+        entries.extend(B::entries(b));
+        entries
+    }
+
+    #[inline]
+    fn magnitude((a, b): &Self::Point<f64>) -> f64 {
+        A::magnitude(a).hypot(B::magnitude(b))
+    }
+
+    fn project(&self, (a, b): &Self::Point<f64>) -> Self::Point<f64> {
+        (self.0.project(a), self.1.project(b))
+    }
+
+    #[inline]
+    fn transport(x: &Self::Point<f64>, y: &Self::Point<f64>, v: &Vector<Self>) -> Vector<Self> {
+        let (a, b) = Self::split(v);
+        Self::join(&A::transport(&x.0, &y.0, &a), &B::transport(&x.1, &y.1, &b))
+    }
+
+    fn random(&self, rng: &mut impl Rng) -> Self::Point<f64> {
+        (self.0.random(rng), self.1.random(rng))
+    }
+}
+
+/// A metric on a product that is the sum of one on each factor.
+pub trait Split<A: Space, B: Space> {
+    /// The metric on the left factor.
+    type Left: Riemannian<A>;
+    /// The metric on the right factor.
+    type Right: Riemannian<B>;
+
+    /// The metric on each factor.
+    fn halves(&self) -> (&Self::Left, &Self::Right);
+}
+
+impl<A: Space, B: Space, G: Riemannian<A>, F: Riemannian<B>> Split<A, B> for (G, F) {
+    type Left = G;
+    type Right = F;
+
+    #[inline]
+    fn halves(&self) -> (&G, &F) {
+        (&self.0, &self.1)
+    }
+}
+
+impl<A: Space, B: Space> Split<A, B> for Canonical
+where
+    Self: Riemannian<A> + Riemannian<B>,
+{
+    type Left = Self;
+    type Right = Self;
+
+    #[inline]
+    fn halves(&self) -> (&Self, &Self) {
+        (self, self)
+    }
+}
+
+/// The inner products on the factors, as one on the product.
+pub struct Block<A, B, D, P, Q> {
+    left: P,
+    right: Q,
+    factors: PhantomData<fn() -> (A, B, D)>,
+}
+
+impl<A, B, D, P: Clone, Q: Clone> Clone for Block<A, B, D, P, Q> {
+    fn clone(&self) -> Self {
+        Self { left: self.left.clone(), right: self.right.clone(), factors: PhantomData }
+    }
+}
+
+impl<A, B, D, P: Copy, Q: Copy> Copy for Block<A, B, D, P, Q> {}
+
+impl<A, B, D, P: fmt::Debug, Q: fmt::Debug> fmt::Debug for Block<A, B, D, P, Q> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_tuple("Block").field(&self.left).field(&self.right).finish()
+    }
+}
+
+impl<A, B, D, P, Q> InnerProduct<Vector<Product<A, B>, D>> for Block<A, B, D, P, Q>
+where
+    A: Times<B>,
+    B: Space,
+    D: Scalar,
+    P: InnerProduct<Vector<A, D>>,
+    Q: InnerProduct<Vector<B, D>>,
+{
+    #[inline]
+    fn flat(&self, v: &Vector<Product<A, B>, D>) -> Vector<Product<A, B>, D> {
+        let (a, b) = Product::<A, B>::split(v);
+        Product::<A, B>::join(&self.left.flat(&a), &self.right.flat(&b))
+    }
+
+    #[inline]
+    fn orthonormal(&self, alpha: &Vector<Product<A, B>, D>) -> Vector<Product<A, B>, D> {
+        let (a, b) = Product::<A, B>::split(alpha);
+        Product::<A, B>::join(&self.left.orthonormal(&a), &self.right.orthonormal(&b))
+    }
+
+    #[inline]
+    fn raise(&self, alpha: &Vector<Product<A, B>, D>) -> Vector<Product<A, B>, D> {
+        let (a, b) = Product::<A, B>::split(alpha);
+        Product::<A, B>::join(&self.left.raise(&a), &self.right.raise(&b))
+    }
+}
+
+/// The metric of a product, factor by factor.
+macro_rules! metric_of_the_factors {
+    () => {
+        type At<D: Scalar> = Block<
+            A,
+            B,
+            D,
+            <<Self as Split<A, B>>::Left as Riemannian<A>>::At<D>,
+            <<Self as Split<A, B>>::Right as Riemannian<B>>::At<D>,
+        >;
+
+        #[inline]
+        fn at<D: Scalar>(
+            &self,
+            x: &ChartPoint<Product<A, B>, D>,
+        ) -> Result<Self::At<D>, MetricError> {
+            let ((g, f), (a, b)) = (Split::<A, B>::halves(self), Product::parts(x));
+            Ok(Block { left: g.at(&a)?, right: f.at(&b)?, factors: PhantomData })
+        }
+
+        fn matrix<D: Scalar>(&self, x: &ChartPoint<Product<A, B>, D>) -> Matrix<Product<A, B>, D> {
+            let ((g, f), (a, b)) = (Split::<A, B>::halves(self), Product::parts(x));
+            Product::<A, B>::block(&g.matrix(&a), &f.matrix(&b))
+        }
+
+        fn volume<D: Scalar>(&self, x: &ChartPoint<Product<A, B>, D>) -> Result<D, MetricError> {
+            let ((g, f), (a, b)) = (Split::<A, B>::halves(self), Product::parts(x));
+            Ok(g.volume(&a)? * f.volume(&b)?)
+        }
+
+        fn exp<D: Scalar>(
+            &self,
+            x: &ChartPoint<Product<A, B>, D>,
+            v: &Vector<Product<A, B>, D>,
+        ) -> Result<GeodesicEnd<Product<A, B>, D>, MetricError> {
+            let ((g, f), (a, b)) = (Split::<A, B>::halves(self), Product::parts(x));
+            let (va, vb) = Product::<A, B>::split(v);
+            let ((a, va), (b, vb)) = (g.exp(&a, &va)?, f.exp(&b, &vb)?);
+            let q = Product::<A, B>::join(&a.q, &b.q);
+            let end = ChartPoint { base: (a.base, b.base), q };
+            Ok((end, Product::<A, B>::join(&va, &vb)))
+        }
+
+        fn end(
+            &self,
+            x: &(A::Point<f64>, B::Point<f64>),
+            v: &Vector<Product<A, B>>,
+        ) -> Result<(A::Point<f64>, B::Point<f64>), MetricError> {
+            let ((g, f), (a, b)) = (Split::<A, B>::halves(self), Product::<A, B>::split(v));
+            Ok((Riemannian::<A>::end(g, &x.0, &a)?, Riemannian::<B>::end(f, &x.1, &b)?))
+        }
+
+        fn along(
+            &self,
+            x: &(A::Point<f64>, B::Point<f64>),
+            v: &Vector<Product<A, B>>,
+            t: f64,
+        ) -> Result<(A::Point<Real>, B::Point<Real>), MetricError> {
+            let ((g, f), (a, b)) = (Split::<A, B>::halves(self), Product::<A, B>::split(v));
+            Ok((Riemannian::<A>::along(g, &x.0, &a, t)?, Riemannian::<B>::along(f, &x.1, &b, t)?))
+        }
+
+        fn log(
+            &self,
+            x: &(A::Point<f64>, B::Point<f64>),
+            y: &(A::Point<f64>, B::Point<f64>),
+        ) -> Result<Vector<Product<A, B>>, MetricError> {
+            let (g, f) = Split::<A, B>::halves(self);
+            Ok(Product::<A, B>::join(
+                &Riemannian::<A>::log(g, &x.0, &y.0)?,
+                &Riemannian::<B>::log(f, &x.1, &y.1)?,
+            ))
+        }
+
+        fn weyl_jet(
+            &self,
+            x: &(A::Point<f64>, B::Point<f64>),
+            d: &Vector<Product<A, B>>,
+        ) -> Result<ArcJet<Product<A, B>>, MetricError> {
+            let ((g, f), (da, db)) = (Split::<A, B>::halves(self), Product::<A, B>::split(d));
+            let (a, b) = (
+                Riemannian::<A>::weyl_jet(g, &x.0, &da)?,
+                Riemannian::<B>::weyl_jet(f, &x.1, &db)?,
+            );
+            Ok(ArcJet {
+                z: (a.z, b.z),
+                dz: Product::<A, B>::block(&a.dz, &b.dz),
+                d: Product::<A, B>::join(&a.d, &b.d),
+                dd: Product::<A, B>::block(&a.dd, &b.dd),
+                end: (a.end, b.end),
+                dend: Product::<A, B>::block(&a.dend, &b.dend),
+            })
+        }
+
+        #[inline]
+        fn lost(
+            &self,
+            x: &(A::Point<f64>, B::Point<f64>),
+            v: &Vector<Product<A, B>>,
+            y: &(A::Point<f64>, B::Point<f64>),
+        ) -> Vector<Product<A, B>> {
+            let ((g, f), (a, b)) = (Split::<A, B>::halves(self), Product::<A, B>::split(v));
+            Product::<A, B>::join(
+                &Riemannian::<A>::lost(g, &x.0, &a, &y.0),
+                &Riemannian::<B>::lost(f, &x.1, &b, &y.1),
+            )
+        }
+
+        fn slopes(
+            &self,
+            x: &(A::Point<f64>, B::Point<f64>),
+        ) -> Option<<A::SumDim as Dimension>::Array<Matrix<Product<A, B>>>> {
+            let (g, f) = Split::<A, B>::halves(self);
+            let (a, b) = (Riemannian::<A>::slopes(g, &x.0), Riemannian::<B>::slopes(f, &x.1));
+            if a.is_none() && b.is_none() {
+                return None;
+            }
+            let (left, right) = (Matrix::<A>::zeros(), Matrix::<B>::zeros());
+            let n = A::Dim::LEN;
+            Some(A::SumDim::array(|k| match (k < n, &a, &b) {
+                (true, Some(a), _) => Product::<A, B>::block(&a[k], &right),
+                (false, _, Some(b)) => Product::<A, B>::block(&left, &b[k - n]),
+                _ => Matrix::<Product<A, B>>::zeros(),
+            }))
+        }
+    };
+}
+
+impl<A, B, G, F> Riemannian<Product<A, B>> for (G, F)
+where
+    A: Times<B>,
+    B: Space,
+    G: Riemannian<A>,
+    F: Riemannian<B>,
+{
+    metric_of_the_factors!();
+}
+
+impl<A, B> Riemannian<Product<A, B>> for Canonical
+where
+    A: Times<B>,
+    B: Space,
+    Self: Riemannian<A> + Riemannian<B>,
+{
+    metric_of_the_factors!();
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        Euclidean, Exponential, HalfLine, Metric, PointError, Rotations, Sphere, WeylMidpoint, laws,
+    };
+    use nalgebra::{Matrix3, SMatrix, SVector, Vector1, Vector3, Vector6, vector};
+    use num_dual::DualNum;
+    use proptest::prelude::*;
+    use rand::SeedableRng;
+    use rand::rngs::ChaCha8Rng;
+
+    type Spin = Product<Sphere<2>, HalfLine>;
+    type Attitude = Product<Rotations, Euclidean<3>>;
+    type Three = Product<Product<Sphere<1>, Euclidean<1>>, HalfLine>;
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(64))]
+
+        #[test]
+        fn products_keep_the_laws(seed in any::<u64>(), u in prop::array::uniform6(-1.0..1.0)) {
+            let mut rng = ChaCha8Rng::seed_from_u64(seed);
+            let spin = Product(Sphere::<2>, HalfLine);
+            let (x, v) = (spin.random(&mut rng), vector![u[0], u[1], u[2]]);
+            laws::manifold::<Spin>(&spin, &x, &v)?;
+            laws::metric::<Spin, _>(&Canonical, &x, &v)?;
+            laws::retraction::<Spin, _, _>(&WeylMidpoint, &Canonical, &x, &v)?;
+            laws::retraction::<Spin, _, _>(&Exponential, &Canonical, &x, &v)?;
+
+            let attitude = Product(Rotations, Euclidean::<3>);
+            let (x, v) = (attitude.random(&mut rng), Vector6::from(u));
+            let metric = (Canonical, Metric::constant(Matrix3::from_diagonal(&vector![1.0, 2.0, 3.0])).unwrap());
+            laws::manifold::<Attitude>(&attitude, &x, &v)?;
+            laws::metric::<Attitude, _>(&metric, &x, &v)?;
+            laws::retraction::<Attitude, _, _>(&WeylMidpoint, &metric, &x, &v)?;
+            laws::symmetric_retraction::<Attitude, _, _>(
+                &WeylMidpoint, &metric, &x, &Attitude::chart(&x, &v),
+            )?;
+        }
+
+        #[test]
+        fn a_product_may_be_a_factor(seed in any::<u64>(), u in prop::array::uniform3(-1.0..1.0)) {
+            let space = Product(Product(Sphere::<1>, Euclidean::<1>), HalfLine);
+            let x = space.random(&mut ChaCha8Rng::seed_from_u64(seed));
+            laws::manifold::<Three>(&space, &x, &Vector3::from(u))?;
+            laws::metric::<Three, _>(&Canonical, &x, &Vector3::from(u))?;
+            laws::metric::<Three, _>(&((Canonical, Canonical), Canonical), &x, &Vector3::from(u))?;
+        }
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(8))]
+
+        /// The identity on `R³ × R`, restricted to `S² × R₊`, with `1/s²` on the half line.
+        #[test]
+        fn a_full_metric_that_is_the_canonical_one_gives_its_geodesics(
+            seed in any::<u64>(), u in prop::array::uniform3(-0.8..0.8),
+        ) {
+            let field = Metric::field(|(_, s): &(Vector3<Real>, Vector1<Real>)| {
+                let mut g = SMatrix::<Real, 4, 4>::identity();
+                g[(3, 3)] = s.x.powi(-2);
+                g
+            });
+            let space = Product(Sphere::<2>, HalfLine);
+            let x = space.random(&mut ChaCha8Rng::seed_from_u64(seed));
+            let u = SVector::from(u);
+            let left = Riemannian::<Spin>::end(&field, &x, &u).unwrap();
+            let right = Riemannian::<Spin>::end(&Canonical, &x, &u).unwrap();
+            prop_assert!(Spin::coordinates(&left, &right).norm() < 1e-12);
+            laws::metric::<Spin, _>(&field, &x, &u)?;
+        }
+    }
+
+    #[test]
+    fn a_bad_entry_of_either_factor_is_named() {
+        let space = Product(Sphere::<2>, Euclidean::<1>);
+        let off = space.check(&(vector![0.0, 0.0, 2.0], vector![1.0])).unwrap_err();
+        assert!(matches!(off, PointError::OffManifold { .. }));
+        let nan = space.check(&(vector![0.0, 0.0, 1.0], vector![f64::NAN])).unwrap_err();
+        assert!(matches!(nan, PointError::NotFinite { index: 3, .. }));
+    }
+}

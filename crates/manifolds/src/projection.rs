@@ -1,0 +1,189 @@
+//! The symmetric projection retraction of the spheres.
+
+use metriplectic_fields::{ChartPoint, Column, Real, Scalar, Space};
+use nalgebra::SVector;
+use num_dual::Dual;
+
+use crate::metric::{MetricError, within};
+use crate::retraction::jet_by_dual_numbers;
+use crate::sphere::{components, frame, normalised, spread};
+use crate::{Arc, ArcJet, PointPair, Retraction, Riemannian, Sphere, Tangent};
+
+/// The symmetric projection retraction of Sⁿ, for any metric:
+///
+/// ```math
+/// R_h(v_z) = \Bigl(\frac{z - hv/2}{|z - hv/2|},\ \frac{z + hv/2}{|z + hv/2|}\Bigr), \qquad
+/// z = \frac{x + x'}{|x + x'|}, \quad d = \frac{2 (x' - x)}{|x + x'|} .
+/// ```
+///
+/// Rational but for one root, of order 2, and exact in the energy like every other retraction
+/// (Absil, Mahony, Sepulchre 2008, §4.1.2, for the projection; symmetrised about `z`). It differs from
+/// [`WeylMidpoint`](crate::WeylMidpoint) in the length only: `|d| = 2 tan(θ/2)` for points at the angle
+/// `θ`, which grows without bound at the antipode.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Projection;
+
+/// The arc from `x` whose displacement is `U` at `x` and `d` at `z`, by the rotation in the plane of the
+/// two: with `s = |U|²/4`, `z = (x + U/2)/√(1+s)`, `d = (U − 2s x)/√(1+s)` and
+/// `x' = ((1 − s) x + U)/(1 + s)`.
+struct Ambient<D: Scalar, const A: usize> {
+    z: SVector<D, A>,
+    d: SVector<D, A>,
+    end: SVector<D, A>,
+}
+
+impl<D: Scalar, const A: usize> Ambient<D, A> {
+    fn new(x: &SVector<f64, A>, u: &SVector<D, A>) -> Self {
+        let x = SVector::<D, A>::from_fn(|i, _| D::from(x[i]));
+        let s = u.dot(u) * 0.25;
+        let scale = (s + 1.0).sqrt().recip();
+        Self {
+            z: (x + u * D::from(0.5)) * scale,
+            d: (u - x * (s * 2.0)) * scale,
+            end: (x * (-s + 1.0) + u) * (s + 1.0).recip(),
+        }
+    }
+}
+
+/// A tangent vector in the chart at the real part of its base.
+fn at_base<D: Scalar, M, const A: usize, const N: usize>(
+    z: &SVector<D, A>,
+    d: &SVector<D, A>,
+) -> (ChartPoint<M, D>, SVector<D, N>)
+where
+    M: for<'a> OnSphere<A, N>,
+{
+    let base: SVector<f64, A> = Column::real(&normalised(z));
+    let moving = SVector::<Dual<D>, A>::from_fn(|i, _| Dual::new(z[i], d[i]));
+    let q = M::components_at(&base, &moving);
+    (M::chart_point(base, q.map(|q| q.re)), q.map(|q| q.eps))
+}
+
+/// What the generic code above needs of `Sphere<N>`, whose entries the compiler cannot count.
+trait OnSphere<const A: usize, const N: usize>: Space {
+    fn components_at<D: Scalar>(x: &SVector<f64, A>, y: &SVector<D, A>) -> SVector<D, N>;
+    fn chart_point<D: Scalar>(x: SVector<f64, A>, q: SVector<D, N>) -> ChartPoint<Self, D>;
+}
+
+macro_rules! projection {
+    ($n:literal in $a:literal) => {
+        impl OnSphere<$a, $n> for Sphere<$n> {
+            fn components_at<D: Scalar>(
+                x: &SVector<f64, $a>,
+                y: &SVector<D, $a>,
+            ) -> SVector<D, $n> {
+                Self::coordinates(x, y)
+            }
+
+            fn chart_point<D: Scalar>(
+                base: SVector<f64, $a>,
+                q: SVector<D, $n>,
+            ) -> ChartPoint<Self, D> {
+                ChartPoint { base, q }
+            }
+        }
+
+        impl<G: Riemannian<Sphere<$n>>> Retraction<Sphere<$n>, G> for Projection {
+            fn arc<D: Scalar>(
+                &self,
+                _: &G,
+                x: &SVector<f64, $a>,
+                u: &SVector<D, $n>,
+            ) -> Result<Arc<Sphere<$n>, D>, MetricError> {
+                let ambient = Ambient::new(x, &spread(&frame::<$a, $n>(x), u));
+                let (z, d) = at_base(&ambient.z, &ambient.d);
+                Ok(Arc { z, d, end: normalised(&ambient.end) })
+            }
+
+            fn end(
+                &self,
+                _: &G,
+                x: &SVector<f64, $a>,
+                u: &SVector<f64, $n>,
+            ) -> Result<SVector<f64, $a>, MetricError> {
+                Ok(normalised(&Ambient::new(x, &spread(&frame::<$a, $n>(x), u)).end))
+            }
+
+            fn along(
+                &self,
+                _: &G,
+                x: &SVector<f64, $a>,
+                u: &SVector<f64, $n>,
+                t: f64,
+            ) -> Result<SVector<Real, $a>, MetricError> {
+                let u = spread(&frame::<$a, $n>(x), &u.map(|u| crate::metric::time(t) * u));
+                Ok(normalised(&Ambient::new(x, &u).end))
+            }
+
+            fn arc_jet(
+                &self,
+                metric: &G,
+                x: &SVector<f64, $a>,
+                u: &SVector<f64, $n>,
+            ) -> Result<ArcJet<Sphere<$n>>, MetricError> {
+                jet_by_dual_numbers(self, metric, x, u)
+            }
+
+            fn pair(
+                &self,
+                _: &G,
+                tangent: &Tangent<Sphere<$n>>,
+            ) -> Result<PointPair<Sphere<$n>>, MetricError> {
+                let half = frame::<$a, $n>(&tangent.base) * tangent.vector * 0.5;
+                Ok((normalised(&(tangent.base - half)), normalised(&(tangent.base + half))))
+            }
+
+            fn inverse(
+                &self,
+                _: &G,
+                x: &SVector<f64, $a>,
+                y: &SVector<f64, $a>,
+            ) -> Result<Tangent<Sphere<$n>>, MetricError> {
+                let sum = x + y;
+                within(std::f64::consts::PI, 2.0 * (y - x).norm().atan2(sum.norm()))?;
+                let base = normalised(&sum);
+                let d = (y - x) * (2.0 / sum.norm());
+                Ok(Tangent { base, vector: components(&frame::<$a, $n>(&base), &d) })
+            }
+        }
+    };
+}
+
+projection!(1 in 2);
+projection!(2 in 3);
+projection!(3 in 4);
+projection!(4 in 5);
+projection!(5 in 6);
+projection!(6 in 7);
+projection!(7 in 8);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Canonical, Manifold, laws};
+    use proptest::prelude::*;
+    use rand::SeedableRng;
+    use rand::rngs::ChaCha8Rng;
+
+    macro_rules! keeps_the_laws {
+        ($name:ident, $n:literal) => {
+            proptest! {
+                #[test]
+                fn $name(seed in any::<u64>(), u in prop::array::uniform::<_, $n>(-1.0..1.0)) {
+                    let sphere = Sphere::<$n>::round();
+                    let x = sphere.random(&mut ChaCha8Rng::seed_from_u64(seed));
+                    let u = SVector::<f64, $n>::from(u) * 2.0;
+                    laws::retraction::<Sphere<$n>, _, _>(&Projection, &Canonical, &x, &u)?;
+                    let y: SVector<f64, { $n + 1 }> = Sphere::<$n>::chart(&x, &(u * 0.5));
+                    laws::symmetric_retraction::<Sphere<$n>, _, _>(
+                        &Projection, &Canonical, &x, &y,
+                    )?;
+                }
+            }
+        };
+    }
+    keeps_the_laws!(the_projection_of_the_circle_keeps_the_laws, 1);
+    keeps_the_laws!(the_projection_of_the_sphere_keeps_the_laws, 2);
+    keeps_the_laws!(the_projection_of_the_three_sphere_keeps_the_laws, 3);
+    keeps_the_laws!(the_projection_of_the_seven_sphere_keeps_the_laws, 7);
+}

@@ -3,7 +3,7 @@
 use approx::{AbsDiffEq, RelativeEq};
 use metriplectic_dynamics::{Metriplectic, system::Point};
 use metriplectic_fields::{Column, ScalarField, Space, Vector};
-use metriplectic_manifolds::{Exponential, Manifold, Retraction, WeylMidpoint};
+use metriplectic_manifolds::{Cayley, Exponential, Manifold, Projection, Retraction, WeylMidpoint};
 
 use crate::certificate::Certificate;
 use crate::error::{RunError, StepError};
@@ -324,3 +324,5 @@ pub trait Run: Sized {
 
 impl Run for WeylMidpoint {}
 impl Run for Exponential {}
+impl Run for Projection {}
+impl Run for Cayley {}

@@ -1,0 +1,328 @@
+//! The problems that orders and energies are measured on: every manifold, bracket and kind of metric,
+//! none of them linear or separable.
+//!
+//! A problem is visited by a [`Study`], because each is of a type of its own.
+
+use std::f64::consts::FRAC_1_SQRT_2;
+
+use metriplectic_dynamics::{
+    AreaForm, Metriplectic, Nambu, SecondLaw, Symplectic, System, Zero, system::Point,
+};
+use metriplectic_fields::{ChartPoint, Column, Real, Space, Vector};
+use metriplectic_manifolds::{
+    Canonical, Cayley, Euclidean, Exponential, HalfLine, LieDual, Manifold, Metric, Product,
+    Projection, Retraction, Rotations, Sphere, WeylMidpoint, rotations,
+};
+use nalgebra::{Matrix2, Matrix3, SVector, Vector1, Vector2, Vector3, Vector6, vector};
+use num_dual::DualNum;
+
+/// A system with a start, and names for tables.
+#[derive(Clone, Debug)]
+pub struct Problem<Y: Metriplectic> {
+    /// What it is.
+    pub name: &'static str,
+    /// Where it lives, as a formula.
+    pub manifold: &'static str,
+    /// The metric in words.
+    pub metric: &'static str,
+    /// The system.
+    pub system: Y,
+    /// Its start.
+    pub start: Point<Y>,
+    /// The time over which errors are measured.
+    pub time: f64,
+}
+
+impl<Y: Metriplectic> Problem<Y> {
+    /// The distance of a point from another one, by their entries.
+    pub fn distance(x: &Point<Y>, y: &Point<Y>) -> f64 {
+        let (x, y) = (Y::Manifold::entries(x), Y::Manifold::entries(y));
+        x.iter().zip(y).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
+    }
+}
+
+/// What is done with every problem, and each of the retractions that its manifold has.
+pub trait Study {
+    /// Called once for each problem and retraction; `order` is what theory says.
+    fn visit<Y, R>(
+        &mut self,
+        problem: &Problem<Y>,
+        scheme: &'static str,
+        retraction: R,
+        order: f64,
+    ) where
+        Y: Metriplectic,
+        R: Retraction<Y::Manifold, Y::Metric> + Copy;
+}
+
+/// The exact flow over `time`, by another method: the classical Runge-Kutta method of order 4 in a
+/// chart around each step's start (Munthe-Kaas 1998), with steps so small that what is left is
+/// round-off; `None` if it leaves the domain.
+pub fn flow<Y: Metriplectic>(system: &Y, start: &Point<Y>, time: f64) -> Option<Point<Y>> {
+    const STEPS: u32 = 4000;
+    let h = time / f64::from(STEPS);
+    let velocity = |x: &Point<Y>, q: Vector<Y::Manifold>| {
+        system.velocity(&ChartPoint { base: x.clone(), q }).ok()
+    };
+    (0..STEPS).try_fold(start.clone(), |x, _| {
+        let a = velocity(&x, Vector::<Y::Manifold>::zero())?;
+        let b = velocity(&x, a * (0.5 * h))?;
+        let c = velocity(&x, b * (0.5 * h))?;
+        let d = velocity(&x, c * h)?;
+        let q = (a + (b + c) * 2.0 + d) * (h / 6.0);
+        q.is_finite().then(|| Y::Manifold::chart(&x, &q))
+    })
+}
+
+/// The spinning top's energy on S² (Celledoni, Eidnes, Owren, Ringholm 2019, example 1).
+fn top(x: &Vector3<Real>) -> Real {
+    let weights = [1.0, 0.5, 0.25];
+    (0..3).map(|i| (x[i].powi(2) + x[i].powi(3) * (2.0 / 3.0)) * (0.5 * weights[i])).sum()
+}
+
+fn hill(x: &Vector3<Real>) -> Real {
+    x.z + x.x * x.y * 0.3
+}
+
+/// `Σ a_i x_i² + b_i x_i³` with coefficients that no symmetry relates.
+fn bumpy<const A: usize>(x: &SVector<Real, A>) -> Real {
+    (0..A)
+        .map(|i| {
+            let k = i as f64;
+            x[i].powi(2) * (0.5 + 0.3 * k) + x[i].powi(3) * (0.3 - 0.1 * k)
+        })
+        .sum()
+}
+
+/// `x_n + ⅓ Σ x_i x_{i+1}`.
+fn slope<const A: usize>(x: &SVector<Real, A>) -> Real {
+    (0..A - 1).map(|i| x[i] * x[i + 1] * (1.0 / 3.0)).sum::<Real>() + x[A - 1]
+}
+
+fn body_energy(p: &Vector3<Real>) -> Real {
+    p.x.powi(2) * 0.05 + p.y.powi(2) * 0.1 + p.z.powi(2) * 0.5
+}
+
+fn rotation_energy(r: &Matrix3<Real>) -> Real {
+    r.m11 + r.m22 * 2.0 + r.m33 * 3.0 + r.m12 * r.m23 * 0.5
+}
+
+fn rotation_entropy(r: &Matrix3<Real>) -> Real {
+    r.m13 - r.m21 * 0.5 + (r.m31 + r.m32).powi(2) * 0.25
+}
+
+/// A point of norm 1 off every axis.
+fn off_axis<const A: usize>() -> SVector<f64, A> {
+    SVector::<f64, A>::from_fn(|i, _| 1.0 + 0.3 * i as f64).normalize()
+}
+
+fn attitude() -> Matrix3<f64> {
+    rotations::exp(&vector![0.3, -0.2, 0.5])
+}
+
+const CANONICAL: &str = "canonical";
+
+/// Visits every problem.
+pub fn each(study: &mut impl Study) {
+    canonical(study);
+    closures(study);
+    products(study);
+}
+
+/// Both geodesic retractions.
+fn geodesic<Y: Metriplectic>(study: &mut impl Study, problem: &Problem<Y>) {
+    study.visit(problem, "Weyl midpoint", WeylMidpoint, 2.0);
+    study.visit(problem, "exponential", Exponential, 1.0);
+}
+
+/// Canonical metrics.
+pub fn canonical(study: &mut impl Study) {
+    let problem = |name, manifold, time| (name, manifold, CANONICAL, time);
+    macro_rules! visit {
+        ($labels:expr, $start:expr, $system:expr $(, $scheme:literal by $retraction:expr)?) => {{
+            let (name, manifold, metric, time) = $labels;
+            let system = $system.build().expect("a problem is a system");
+            let problem = Problem { name, manifold, metric, system, start: $start, time };
+            geodesic(study, &problem);
+            $(study.visit(&problem, $scheme, $retraction, 2.0);)?
+        }};
+    }
+    visit!(
+        problem("rigid body", "so(3)*", 10.0),
+        vector![0.1, -1.0, 0.2],
+        System::on(LieDual::so3())
+            .energy(body_energy)
+            .entropy(|p: &Vector3<Real>| p.norm_squared() * 0.5)
+    );
+    let sphere = || System::on(Sphere::<2>::round()).energy(top);
+    let diagonal = Vector3::from_element(3.0_f64.sqrt().recip());
+    visit!(
+        problem("spinning top", "S²", 5.0),
+        diagonal,
+        sphere().bracket(AreaForm),
+        "projection" by Projection
+    );
+    visit!(problem("relaxation", "S²", 3.0), diagonal, sphere().entropy(hill), "projection" by Projection);
+    visit!(
+        problem("no Casimir", "S²", 3.0),
+        diagonal,
+        sphere().bracket(AreaForm).entropy(hill).second_law(SecondLaw::Published),
+        "projection" by Projection
+    );
+    visit!(
+        problem("Nambu", "S³", 2.0),
+        off_axis::<4>(),
+        System::on(Sphere::<3>::round())
+            .bracket(Nambu::default())
+            .energy(bumpy::<4>)
+            .entropy(slope::<4>),
+        "projection" by Projection
+    );
+    visit!(
+        problem("relaxation", "S⁵", 2.0),
+        off_axis::<6>(),
+        System::on(Sphere::<5>::round()).energy(bumpy::<6>).entropy(slope::<6>),
+        "projection" by Projection
+    );
+    visit!(
+        problem("Nambu", "SO(3)", 1.0),
+        attitude(),
+        System::on(Rotations::bi_invariant())
+            .bracket(Nambu::default())
+            .energy(rotation_energy)
+            .entropy(rotation_entropy),
+        "Cayley" by Cayley
+    );
+}
+
+/// Metrics from closures, with numerical geodesics.
+pub fn closures(study: &mut impl Study) {
+    let ambient = |x: &Vector3<Real>| {
+        let mut g = Matrix3::from_diagonal(&vector![1.0, 1.5, 2.0]).cast::<Real>();
+        g[(0, 1)] = x.z * 0.2;
+        g[(1, 0)] = x.z * 0.2;
+        g
+    };
+    let system = System::on(Sphere::<2>::round())
+        .metric(Metric::field(ambient))
+        .energy(top)
+        .entropy(hill)
+        .build()
+        .expect("a problem is a system");
+    let start = Vector3::from_element(3.0_f64.sqrt().recip());
+    let (name, manifold, metric) = ("relaxation", "S²", "ambient closure");
+    geodesic(study, &Problem { name, manifold, metric, system, start, time: 2.0 });
+
+    let inertia = Matrix3::new(1.0, 0.2, 0.0, 0.2, 1.5, 0.1, 0.0, 0.1, 2.0);
+    let system = System::on(Rotations)
+        .metric(Metric::field(move |_: &Matrix3<Real>| inertia.cast::<Real>()))
+        .bracket(Nambu::default())
+        .energy(rotation_energy)
+        .entropy(rotation_entropy)
+        .build()
+        .expect("a problem is a system");
+    let (name, manifold, metric) = ("Nambu", "SO(3)", "left-invariant");
+    geodesic(study, &Problem { name, manifold, metric, system, start: attitude(), time: 1.0 });
+
+    let varying = |r: &Matrix3<Real>| {
+        let lean = r.column(2).into_owned();
+        Matrix3::from_diagonal(&vector![1.0, 1.5, 2.0]).cast::<Real>()
+            + lean * lean.transpose() * Real::from(0.5)
+    };
+    let system = System::on(Rotations)
+        .metric(Metric::field(varying))
+        .bracket(Nambu::default())
+        .energy(rotation_energy)
+        .entropy(rotation_entropy)
+        .build()
+        .expect("a problem is a system");
+    let (name, manifold, metric) = ("Nambu", "SO(3)", "depends on R");
+    geodesic(study, &Problem { name, manifold, metric, system, start: attitude(), time: 1.0 });
+
+    let leaning = |q: &Vector2<Real>| {
+        let across = q.x.sin() * 0.4;
+        Matrix2::new(q.y.powi(2) + 1.0, across, across, q.x.powi(2) * 0.5 + 1.0)
+    };
+    let system = System::on(Euclidean::<2>)
+        .metric(Metric::field(leaning))
+        .bracket(AreaForm)
+        .energy(|q: &Vector2<Real>| q.x.powi(2) * 0.5 + q.y.powi(2) + q.x.powi(3) * 0.1)
+        .build()
+        .expect("a problem is a system");
+    let (name, manifold, metric) = ("area form", "2-chart", "non-diagonal");
+    geodesic(
+        study,
+        &Problem { name, manifold, metric, system, start: vector![0.6, 0.4], time: 2.0 },
+    );
+
+    let leaning = |q: &Vector3<Real>| {
+        let wave = Vector3::new(q.y.sin(), q.z.cos(), q.x * 0.5);
+        Matrix3::identity() + wave * wave.transpose() * Real::from(0.4)
+    };
+    let system = System::on(Euclidean::<3>)
+        .metric(Metric::field(leaning))
+        .bracket(Nambu::default())
+        .energy(bumpy::<3>)
+        .entropy(|q: &Vector3<Real>| q.norm_squared() * 0.5 + q.z.powi(3) * 0.1)
+        .build()
+        .expect("a problem is a system");
+    let (name, manifold, metric) = ("Nambu", "3-chart", "non-diagonal");
+    let start = vector![0.5, -0.4, 0.3];
+    geodesic(study, &Problem { name, manifold, metric, system, start, time: 2.0 });
+}
+
+/// Products.
+pub fn products(study: &mut impl Study) {
+    // H = h(n) + e(s) with the entropy itself as the second factor: a spin in a bath.
+    let system = System::on(Product(Sphere::<2>::round(), Euclidean::<1>))
+        .bracket((AreaForm, Zero))
+        .energy(|(n, s): &(Vector3<Real>, Vector1<Real>)| top(n) + s.x.exp())
+        .entropy(|(_, s): &(Vector3<Real>, Vector1<Real>)| s.x)
+        .build()
+        .expect("a problem is a system");
+    let start = (Vector3::from_element(3.0_f64.sqrt().recip()), Vector1::new(0.1));
+    let (name, manifold, metric) = ("spin in a bath", "S² × R", CANONICAL);
+    geodesic(study, &Problem { name, manifold, metric, system, start, time: 2.0 });
+
+    let system = System::on(Product(Sphere::<2>::round(), HalfLine))
+        .metric((Canonical, Canonical))
+        .bracket((AreaForm, Zero))
+        .energy(|(n, e): &(Vector3<Real>, Vector1<Real>)| top(n) + e.x)
+        .entropy(|(_, e): &(Vector3<Real>, Vector1<Real>)| e.x.ln())
+        .build()
+        .expect("a problem is a system");
+    let start = (Vector3::new(FRAC_1_SQRT_2, 0.5, 0.5), Vector1::new(0.8));
+    let (name, manifold) = ("spin in a bath", "S² × R₊");
+    geodesic(study, &Problem { name, manifold, metric, system, start, time: 2.0 });
+
+    let energy = |(r, p): &(Matrix3<Real>, Vector3<Real>)| {
+        p.x.powi(2) * 0.5
+            + p.y.powi(2) * 0.25
+            + p.z.powi(2) * (1.0 / 6.0)
+            + r.m33 * 0.7
+            + r.m31 * 0.2
+    };
+    let start = (attitude(), vector![0.4, -0.6, 0.8]);
+    let system = System::on(Product(Rotations, Euclidean::<3>))
+        .bracket(Symplectic)
+        .energy(energy)
+        .build()
+        .expect("a problem is a system");
+    let (name, manifold) = ("heavy body", "SO(3) × R³");
+    geodesic(study, &Problem { name, manifold, metric, system, start, time: 2.0 });
+
+    let full = |(r, _): &(Matrix3<Real>, Vector3<Real>)| {
+        let mut g = nalgebra::Matrix6::<Real>::identity();
+        let lean = Vector6::new(r.m13, r.m23, r.m33, Real::from(0.5), r.m31, Real::from(0.0));
+        g += lean * lean.transpose() * Real::from(0.3);
+        g
+    };
+    let system = System::on(Product(Rotations, Euclidean::<3>))
+        .metric(Metric::field(full))
+        .energy(energy)
+        .entropy(|(r, p): &(Matrix3<Real>, Vector3<Real>)| r.m12 - p.norm_squared() * 0.3)
+        .build()
+        .expect("a problem is a system");
+    let (name, metric) = ("relaxation", "full closure");
+    geodesic(study, &Problem { name, manifold, metric, system, start, time: 1.0 });
+}

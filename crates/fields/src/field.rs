@@ -135,15 +135,16 @@ pub trait MatrixField<M: Space> {
     /// A metric in the frame of the chart at a real point, with its first derivatives along the
     /// chart, in `⌈n/2⌉` evaluations.
     fn covariant_jet(&self, x: &M::Point<f64>) -> MatrixJet<M> {
-        MatrixJet::new(x, |point, chart| M::covariant(chart, &self.at_real(point)))
+        MatrixJet::new(|i, j| M::covariant(&seeds(x, i, j), &self.at_real(&M::seeded(x, i, j))))
     }
 
     /// A Poisson tensor in the frame of the chart at a real point, with its first derivatives along
     /// the chart, in `⌈n/2⌉` evaluations.
     fn contravariant_jet(&self, x: &M::Point<f64>) -> MatrixJet<M> {
-        MatrixJet::new(x, |point, chart| {
+        MatrixJet::new(|i, j| {
+            let tensor = M::contravariant(&seeds(x, i, j), &self.at_real(&M::seeded(x, i, j)));
             // A chart has a frame at its own centre.
-            M::contravariant(chart, &self.at_real(point)).unwrap_or_else(Matrix::<M, Real>::zeros)
+            tensor.unwrap_or_else(Matrix::<M, Real>::zeros)
         })
     }
 }
@@ -158,28 +159,27 @@ pub struct MatrixJet<M: Space> {
 }
 
 impl<M: Space> MatrixJet<M> {
-    fn new(
-        x: &M::Point<f64>,
-        tensor: impl Fn(&M::Point<Real>, &ChartPoint<M, Real>) -> Matrix<M, Real>,
-    ) -> Self {
-        let seeds = |k: usize| {
-            let part = |i, direction| if i == direction { 1.0 } else { 0.0 };
-            let q = Vector::<M, Real>::from_index(|i| {
-                Real::new(0.0, part(i, 2 * k), part(i, 2 * k + 1), 0.0)
-            });
-            tensor(&M::seeded(x, 2 * k, 2 * k + 1), &ChartPoint { base: x.clone(), q })
-        };
+    /// The jet of a matrix that `seeded(i, j)` gives with the derivatives along the chart directions
+    /// `i` and `j`, in `⌈n/2⌉` evaluations.
+    pub fn new(seeded: impl Fn(usize, usize) -> Matrix<M, Real>) -> Self {
         let part = |a: &Matrix<M, Real>, pick: fn(&Real) -> f64| {
             Matrix::<M>::from_entries(|i, j| pick(&a[(i, j)]))
         };
-        let mut last = seeds(0);
+        let mut last = seeded(0, 1);
         let value = part(&last, |a| a.re);
         let slopes = M::Dim::array(|k| {
             if k > 0 && k % 2 == 0 {
-                last = seeds(k / 2);
+                last = seeded(k, k + 1);
             }
             part(&last, if k % 2 == 0 { |a| a.eps1 } else { |a| a.eps2 })
         });
         Self { value, slopes }
     }
+}
+
+/// The centre of the chart at `x` with seeds along the directions `i` and `j`.
+fn seeds<M: Space>(x: &M::Point<f64>, i: usize, j: usize) -> ChartPoint<M, Real> {
+    let part = |k, direction| if k == direction { 1.0 } else { 0.0 };
+    let q = Vector::<M, Real>::from_index(|k| Real::new(0.0, part(k, i), part(k, j), 0.0));
+    ChartPoint { base: x.clone(), q }
 }

@@ -6,9 +6,9 @@ use metriplectic_fields::{
     ChartPoint, Column, Dimension, Matrix, MatrixField, Real, Scalar, Space, Square, Vector,
 };
 
+use crate::geodesic::{self, GeodesicJet};
 use crate::metric::{Factored, GeodesicEnd, MetricError};
-use crate::retraction::jet_by_dual_numbers;
-use crate::{ArcJet, Manifold, Riemannian, WeylMidpoint, geodesic};
+use crate::{ArcJet, Manifold, Riemannian};
 
 /// A metric given as a matrix field; see [`Metric::field`](crate::Metric::field).
 #[derive(Clone, Copy)]
@@ -47,19 +47,23 @@ impl<M: Manifold, F: MatrixField<M>> Riemannian<M> for FieldMetric<F> {
         geodesic::follow(&self.field, x, v)
     }
 
+    fn end(&self, x: &M::Point<f64>, v: &Vector<M>) -> Result<M::Point<f64>, MetricError> {
+        Ok(geodesic::follow_real(&self.field, x, v)?.0)
+    }
+
     fn along(
         &self,
         x: &M::Point<f64>,
         v: &Vector<M>,
         t: f64,
     ) -> Result<M::Point<Real>, MetricError> {
-        let (here, velocity) = geodesic::follow(&self.field, &ChartPoint::centre(x), &(*v * t))?;
+        let (here, velocity) = geodesic::follow_real(&self.field, x, &(*v * t))?;
         let velocity = if t > 0.0 { velocity * t.recip() } else { *v };
-        let bend = geodesic::acceleration(&self.field, &here.base, &velocity)
+        let bend = geodesic::acceleration(&self.field, &here, &velocity)
             .ok_or(MetricError::Lost { time: t })?;
         let jet =
             Vector::<M, Real>::from_index(|i| Real::new(0.0, velocity[i], velocity[i], bend[i]));
-        Ok(M::chart(&here.base, &jet))
+        Ok(M::chart(&here, &jet))
     }
 
     fn log(&self, x: &M::Point<f64>, y: &M::Point<f64>) -> Result<Vector<M>, MetricError> {
@@ -67,7 +71,22 @@ impl<M: Manifold, F: MatrixField<M>> Riemannian<M> for FieldMetric<F> {
     }
 
     fn weyl_jet(&self, x: &M::Point<f64>, d: &Vector<M>) -> Result<ArcJet<M>, MetricError> {
-        jet_by_dual_numbers(&WeylMidpoint, self, x, d)
+        let half = GeodesicJet {
+            point: x.clone(),
+            velocity: *d * 0.5,
+            dpoint: Matrix::<M>::zeros(),
+            dvelocity: Matrix::<M>::one() * 0.5,
+        };
+        let z = geodesic::follow_jet(&self.field, &half)?;
+        let end = geodesic::follow_jet(&self.field, &z)?;
+        Ok(ArcJet {
+            z: z.point,
+            dz: z.dpoint,
+            d: z.velocity * 2.0,
+            dd: z.dvelocity * 2.0,
+            end: end.point,
+            dend: end.dpoint,
+        })
     }
 
     fn slopes(&self, x: &M::Point<f64>) -> Option<<M::Dim as Dimension>::Array<Matrix<M>>> {
@@ -75,36 +94,58 @@ impl<M: Manifold, F: MatrixField<M>> Riemannian<M> for FieldMetric<F> {
     }
 }
 
-/// Corrections that one shot of a logarithm may take, and halvings of each.
-const CORRECTIONS: usize = 20;
-const HALVINGS: usize = 8;
+/// Corrections that one shot of a logarithm may take.
+const CORRECTIONS: usize = 16;
+/// Halvings of a correction that comes no closer: none at first, while there is a better aim to be had.
+const EAGER: usize = 0;
+const PATIENT: usize = 6;
 /// Stages of the continuation of a logarithm, until it is given up.
-const STAGES: [u32; 4] = [1, 4, 16, 64];
+const STAGES: [u32; 3] = [4, 16, 64];
 
-/// The logarithm by shooting: Newton's method for `exp_x(v) = y`. If it does not get there from the
-/// straight line, the end is moved from `x` to `y` in stages, each shot aimed by the one before.
-fn shoot<M: Space, G: Riemannian<M>>(
-    metric: &G,
+/// The logarithm by shooting: Newton's method for `exp_x(v) = y`, aimed along the straight line of the
+/// chart. If it does not get there, the line is relaxed to a short path, which aims again; and then the
+/// end is moved from `x` to `y` in stages, each shot aimed by the one before.
+fn shoot<M: Manifold, F: MatrixField<M>>(
+    metric: &FieldMetric<F>,
     x: &M::Point<f64>,
     y: &M::Point<f64>,
 ) -> Result<Vector<M>, MetricError> {
     let straight = M::coordinates(x, y);
-    let mut missed = MetricError::NotFinite;
-    for stages in STAGES {
-        let mut v = Vector::<M>::zero();
-        let end = (1..=stages).try_for_each(|stage| {
-            let share = f64::from(stage) / f64::from(stages);
-            let grown = f64::from(stage) / f64::from((stage - 1).max(1));
-            let aim = if stage == 1 { straight * share } else { v * grown };
-            v = hit(metric, x, &M::chart(x, &(straight * share)), &aim)?;
-            Ok(())
-        });
-        match end {
-            Ok(()) => return Ok(v),
-            Err(error) => missed = error,
-        }
+    let line = straight * stretch(metric, x, &straight);
+    let mut last = hit(metric, x, y, &line, EAGER);
+    #[cfg(feature = "argmin")]
+    if last.is_err()
+        && let Some(aim) = crate::path::aim(&metric.field, x, &straight)
+    {
+        last = hit(metric, x, y, &aim, PATIENT).or(last);
     }
-    Err(missed)
+    for stages in STAGES {
+        if last.is_ok() {
+            break;
+        }
+        let mut v = straight * f64::from(stages).recip();
+        last = (1..=stages).try_fold(v, |_, stage| {
+            let target = M::chart(x, &(straight * (f64::from(stage) / f64::from(stages))));
+            let grown = f64::from(stage) / f64::from((stage - 1).max(1));
+            v = hit(metric, x, &target, &(v * grown), PATIENT)?;
+            Ok(v)
+        });
+    }
+    last
+}
+
+/// The length of the straight line of the chart, over that of its velocity at the start: where the
+/// metric changes much along the line, an aim with the length of the line is the better one.
+fn stretch<M: Space, G: Riemannian<M>>(metric: &G, x: &M::Point<f64>, line: &Vector<M>) -> f64 {
+    const PIECES: u32 = 16;
+    let speed = |t: f64| {
+        let at = ChartPoint::<M> { base: x.clone(), q: *line * t };
+        let g: Matrix<M> = metric.matrix(&at);
+        line.dot(&(g * *line)).sqrt()
+    };
+    let middles = (0..PIECES).map(|k| speed((f64::from(k) + 0.5) / f64::from(PIECES)));
+    let stretch = middles.sum::<f64>() / (f64::from(PIECES) * speed(0.0));
+    if stretch.is_finite() && stretch > 0.0 { stretch } else { 1.0 }
 }
 
 /// Newton's method for `exp_x(v) = y`, damped, from a first aim.
@@ -113,25 +154,31 @@ fn hit<M: Space, G: Riemannian<M>>(
     x: &M::Point<f64>,
     y: &M::Point<f64>,
     aim: &Vector<M>,
+    halvings: usize,
 ) -> Result<Vector<M>, MetricError> {
-    let miss = |v: &Vector<M>| metric.end(x, v).map(|end| M::coordinates(&end, y));
     let size = M::coordinates(x, y).magnitude();
-    let (mut v, mut off) = (*aim, miss(aim)?);
+    let miss = |v: &Vector<M>| {
+        let ArcJet { end, dend, .. } = metric.weyl_jet(x, v)?;
+        Ok::<_, MetricError>((M::coordinates(&end, y), dend))
+    };
+    let mut v = *aim;
+    let (mut off, mut slope) = miss(&v)?;
     for _ in 0..CORRECTIONS {
         if off.magnitude() <= 4.0 * f64::EPSILON * (1.0 + size) {
             return Ok(v);
         }
         let missed = MetricError::NoLogarithm { distance: size, missed_by: off.magnitude() };
-        let correction = metric.weyl_jet(x, &v)?.dend.solve(&off).ok_or(missed)?;
-        let mut length = 1.0;
-        let closer = (0..HALVINGS).find_map(|_| {
+        let correction = slope.solve(&off).ok_or(missed)?;
+        // A correction longer than the vector itself is not to be believed.
+        let mut length = (v.magnitude() / correction.magnitude()).min(1.0);
+        let closer = (0..=halvings).find_map(|_| {
             let next = v + correction * length;
             length *= 0.5;
-            let off_next = miss(&next).ok()?;
-            (off_next.magnitude() < off.magnitude()).then_some((next, off_next))
+            let (off_next, slope_next) = miss(&next).ok()?;
+            (off_next.magnitude() < off.magnitude()).then_some((next, off_next, slope_next))
         });
         match closer {
-            Some(next) => (v, off) = next,
+            Some(next) => (v, off, slope) = next,
             // The geodesic itself is good to 1e-13: a stall there is the end.
             None if off.magnitude() <= 1e-12 * (1.0 + size) => return Ok(v),
             None => return Err(missed),

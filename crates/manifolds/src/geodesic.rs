@@ -1,4 +1,4 @@
-//! Geodesics of a metric that is given as a matrix field, in one chart.
+//! Geodesics of a metric that is given as a matrix field, in one chart after the other.
 //!
 //! In Hamiltonian form, with `p = g v` and the Hamiltonian `½ p·g⁻¹p`,
 //!
@@ -6,25 +6,32 @@
 //! q' = g^{-1} p, \qquad p'_k = \tfrac12\, v^T (\partial_k g)\, v, \qquad v = g^{-1} p ,
 //! ```
 //!
-//! so that only first derivatives of the metric appear; dual numbers give them. The equations are
-//! integrated by extrapolation of the modified midpoint rule (Gragg 1965, Bulirsch and Stoer 1966),
-//! which finds its own steps and orders and works at every scalar. A geodesic that comes near the edge
-//! of its chart goes on in the chart around the point it has reached.
+//! so that only first derivatives of the metric appear, and with the derivatives `δq`, `δp` along the
+//! initial velocity
+//!
+//! ```math
+//! \delta q' = \delta v = g^{-1} \bigl( \delta p - (\partial_{\delta q} g) v \bigr), \qquad
+//! \delta p'_k = v^T (\partial_k g)\, \delta v
+//!             + \tfrac12\, v^T (\partial_{\delta q} \partial_k g)\, v .
+//! ```
+//!
+//! Hyper-dual numbers give `g`, `∂g` and `∂∂g`. A geodesic that comes near the edge of its chart goes
+//! on in the chart around the point it has reached.
 
 use metriplectic_fields::{
-    ChartPoint, Column, Dimension, Matrix, MatrixField, Scalar, Space, Square, Vector,
+    ChartPoint, Column, Dimension, Factors, Matrix, MatrixField, MatrixJet, Real, Scalar, Space,
+    Square, Vector,
 };
-use num_dual::Dual;
+use num_dual::{Dual, Dual64};
 
 use crate::MetricError;
+use crate::extrapolation::{self, State};
 use crate::metric::GeodesicEnd;
 
-/// The relative error of a geodesic.
-const TOLERANCE: f64 = 1e-13;
-/// Substeps of the midpoint rule, before extrapolation.
-const SUBSTEPS: [u32; 10] = [2, 4, 6, 8, 10, 12, 14, 16, 18, 20];
 /// A piece of a geodesic shorter than this, in a unit of time, is not worth pursuing.
 const SHORTEST: f64 = 1e-6;
+/// Pieces that a geodesic may take, so that one through a very uneven metric comes to an end.
+const PIECES: usize = 4096;
 
 /// A point of the phase space of geodesics.
 struct Phase<M: Space, D: Scalar> {
@@ -41,14 +48,12 @@ impl<M: Space, D: Scalar> Clone for Phase<M, D> {
 
 impl<M: Space, D: Scalar> Copy for Phase<M, D> {}
 
-impl<M: Space, D: Scalar> Phase<M, D> {
-    /// `self + other · h`.
+impl<M: Space, D: Scalar> State for Phase<M, D> {
     fn plus(&self, other: &Self, h: f64) -> Self {
         let h = D::from(h);
         Self { q: self.q + other.q * h, p: self.p + other.p * h }
     }
 
-    /// The largest difference to another point, relative to the sizes of position and momentum.
     fn distance(&self, other: &Self) -> f64 {
         let q = (self.q - other.q).magnitude() / (1.0 + self.q.magnitude());
         let p = (self.p - other.p).magnitude() / self.p.magnitude().max(f64::MIN_POSITIVE);
@@ -60,8 +65,37 @@ impl<M: Space, D: Scalar> Phase<M, D> {
     }
 }
 
-/// The metric at `x + q`, and its derivatives along the chart.
-type Slopes<M, D> = (Matrix<M, D>, <<M as Space>::Dim as Dimension>::Array<Matrix<M, D>>);
+/// A point of the phase space with its derivatives along the initial velocity.
+struct Bundle<M: Space> {
+    at: Phase<M, f64>,
+    dq: Matrix<M>,
+    dp: Matrix<M>,
+}
+
+impl<M: Space> Clone for Bundle<M> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<M: Space> Copy for Bundle<M> {}
+
+impl<M: Space> State for Bundle<M> {
+    fn plus(&self, other: &Self, h: f64) -> Self {
+        let at = self.at.plus(&other.at, h);
+        Self { at, dq: self.dq + other.dq * h, dp: self.dp + other.dp * h }
+    }
+
+    fn distance(&self, other: &Self) -> f64 {
+        let dq = (self.dq - other.dq).magnitude() / (1.0 + self.dq.magnitude());
+        let dp = (self.dp - other.dp).magnitude() / self.dp.magnitude().max(f64::MIN_POSITIVE);
+        self.at.distance(&other.at).max(dq).max(dp)
+    }
+
+    fn is_finite(&self) -> bool {
+        self.at.is_finite() && self.dq.magnitude().is_finite() && self.dp.magnitude().is_finite()
+    }
+}
 
 /// The metric in the frame of the chart, at any scalar.
 #[inline]
@@ -72,87 +106,107 @@ pub(crate) fn metric<M: Space, D: Scalar>(
     M::covariant(x, &field.at(&x.point()))
 }
 
-/// The metric and its derivatives at any scalar, by one more dual number.
-fn slopes<M: Space, D: Scalar>(
+/// The metric at `φ_x(q + ε₁ e_i + ε₂ e_j)`; an index beyond the dimension seeds nothing.
+#[inline]
+fn seeded<M: Space>(
     field: &impl MatrixField<M>,
     x: &M::Point<f64>,
-    q: &Vector<M, D>,
-) -> Slopes<M, D> {
+    q: &Vector<M>,
+    [i, j]: [usize; 2],
+) -> Matrix<M, Real> {
+    let part = |k, direction| if k == direction { 1.0 } else { 0.0 };
+    let q = Vector::<M, Real>::from_index(|k| Real::new(q[k], part(k, i), part(k, j), 0.0));
+    let at = ChartPoint { base: x.clone(), q };
+    M::covariant(&at, &field.at_real(&at.point()))
+}
+
+/// The metric and its derivatives along the chart at `x`, at the point with coordinates `q`.
+pub(crate) fn metric_jet<M: Space>(
+    field: &impl MatrixField<M>,
+    x: &M::Point<f64>,
+    q: &Vector<M>,
+) -> MatrixJet<M> {
+    MatrixJet::new(|i, j| seeded(field, x, q, [i, j]))
+}
+
+/// A part of a matrix of hyper-dual numbers.
+fn part<M: Space>(a: &Matrix<M, Real>, pick: impl Fn(&Real) -> f64) -> Matrix<M> {
+    Matrix::<M>::from_entries(|i, j| pick(&a[(i, j)]))
+}
+
+/// The rate of a real phase point, from `⌈n/2⌉` evaluations of the metric.
+fn rate<M: Space>(
+    field: &impl MatrixField<M>,
+    x: &M::Point<f64>,
+    at: &Phase<M, f64>,
+) -> Option<Phase<M, f64>> {
+    let g = metric_jet(field, x, &at.q);
+    let v = g.value.solve(&at.p)?;
+    let force = Vector::<M>::from_index(|k| 0.5 * v.dot(&(g.slopes[k] * v)));
+    Some(Phase { q: v, p: force })
+}
+
+/// The rate of a phase point with its derivatives, from `n(n+1)/2` evaluations of the metric.
+fn rate_of_bundle<M: Space>(
+    field: &impl MatrixField<M>,
+    x: &M::Point<f64>,
+    bundle: &Bundle<M>,
+) -> Option<Bundle<M>> {
+    let n = M::Dim::LEN;
+    let Bundle { at, dq, dp } = bundle;
+    let first = seeded(field, x, &at.q, [0, 0]);
+    let factors = part::<M>(&first, |g| g.re).factor()?;
+    let v = factors.solve(&at.p)?;
+    // Columns (∂_k g) v, and the symmetric matrix ½ vᵀ (∂_j ∂_k g) v.
+    let (mut turned, mut bend) = (Matrix::<M>::zeros(), Matrix::<M>::zeros());
+    for k in 0..n {
+        for j in k..n {
+            let g = if (j, k) == (0, 0) { first } else { seeded(field, x, &at.q, [k, j]) };
+            let second = 0.5 * v.dot(&(part::<M>(&g, |g| g.eps1eps2) * v));
+            (bend[(j, k)], bend[(k, j)]) = (second, second);
+            if j == k {
+                let column = part::<M>(&g, |g| g.eps1) * v;
+                for i in 0..n {
+                    turned[(i, k)] = column[i];
+                }
+            }
+        }
+    }
+    let force = turned.transpose_times(&v) * 0.5;
+    let (lag, mut dv) = (*dp - turned * *dq, Matrix::<M>::zeros());
+    for k in 0..n {
+        let column = Vector::<M>::from_index(|i| lag[(i, k)]);
+        let column = factors.solve(&column)?;
+        for i in 0..n {
+            dv[(i, k)] = column[i];
+        }
+    }
+    let transposed = Matrix::<M>::from_entries(|i, j| turned[(j, i)]);
+    Some(Bundle { at: Phase { q: v, p: force }, dq: dv, dp: transposed * dv + bend * *dq })
+}
+
+/// The rate at any scalar, by one more dual number: the definition.
+fn rate_at_scalar<M: Space, D: Scalar>(
+    field: &impl MatrixField<M>,
+    x: &M::Point<f64>,
+    at: &Phase<M, D>,
+) -> Option<Phase<M, D>> {
     let mut value = Matrix::<M, D>::zeros();
     let slopes = M::Dim::array(|k| {
         let q = Vector::<M, Dual<D>>::from_index(|i| {
-            Dual::new(q[i], if i == k { D::one() } else { D::zero() })
+            Dual::new(at.q[i], if i == k { D::one() } else { D::zero() })
         });
         let g = metric(field, &ChartPoint { base: x.clone(), q });
         value = Matrix::<M, D>::from_entries(|i, j| g[(i, j)].re);
         Matrix::<M, D>::from_entries(|i, j| g[(i, j)].eps)
     });
-    (value, slopes)
-}
-
-/// The velocity `g⁻¹p` and the derivative of the phase point.
-fn derivative<M: Space, D: Scalar>(
-    field: &impl MatrixField<M>,
-    x: &M::Point<f64>,
-    at: &Phase<M, D>,
-) -> Option<Phase<M, D>> {
-    let (g, slopes) = slopes(field, x, &at.q);
-    let v = g.solve(&at.p)?;
+    let v = value.solve(&at.p)?;
     let p = Vector::<M, D>::from_index(|k| v.dot(&(slopes[k] * v)) * 0.5);
     Some(Phase { q: v, p })
 }
 
-/// One row of the extrapolation: the midpoint rule with `n` substeps over `h`, smoothed by Gragg.
-fn midpoint_rule<M: Space, D: Scalar>(
-    field: &impl MatrixField<M>,
-    x: &M::Point<f64>,
-    start: &Phase<M, D>,
-    h: f64,
-    n: u32,
-) -> Option<Phase<M, D>> {
-    let step = h / f64::from(n);
-    let mut before = *start;
-    let mut here = start.plus(&derivative(field, x, start)?, step);
-    for _ in 1..n {
-        let next = before.plus(&derivative(field, x, &here)?, 2.0 * step);
-        (before, here) = (here, next);
-    }
-    let last = here.plus(&derivative(field, x, &here)?, step);
-    let smooth = before.plus(&last, 1.0);
-    let smooth = Phase::<M, D> { q: smooth.q * D::from(0.5), p: smooth.p * D::from(0.5) };
-    smooth.is_finite().then_some(smooth)
-}
-
-/// One extrapolated step; `None` if it does not converge or leaves the chart.
-fn extrapolated<M: Space, D: Scalar>(
-    field: &impl MatrixField<M>,
-    x: &M::Point<f64>,
-    start: &Phase<M, D>,
-    h: f64,
-) -> Option<Phase<M, D>> {
-    let mut table: [Option<Phase<M, D>>; SUBSTEPS.len()] = [None; SUBSTEPS.len()];
-    for (row, &n) in SUBSTEPS.iter().enumerate() {
-        // Aitken and Neville: the table of the row above is overwritten from the left.
-        let mut entry = midpoint_rule(field, x, start, h, n)?;
-        let mut change = f64::INFINITY;
-        for column in 1..=row {
-            let above = table[column - 1].replace(entry)?;
-            let ratio = f64::from(n) / f64::from(SUBSTEPS[row - column]);
-            let weight = 1.0 / (ratio * ratio - 1.0);
-            let better = entry.plus(&entry.plus(&above, -1.0), weight);
-            change = better.distance(&entry);
-            entry = better;
-        }
-        table[row] = Some(entry);
-        if change <= TOLERANCE * h.max(0.1) {
-            return Some(entry);
-        }
-    }
-    None
-}
-
 /// A point and a velocity of one chart, in the chart centred at the point itself.
-pub(crate) fn centred<M: Space, D: Scalar>(
+fn centred<M: Space, D: Scalar>(
     x: &M::Point<f64>,
     q: &Vector<M, D>,
     v: &Vector<M, D>,
@@ -165,25 +219,21 @@ pub(crate) fn centred<M: Space, D: Scalar>(
     (ChartPoint { base, q: Vector::<M, D>::from_index(|i| q[i].re) }, velocity)
 }
 
-/// The geodesic from `x` with velocity `v`, followed for a unit of time: its end, centred, and its
-/// velocity there.
-///
-/// # Errors
-///
-/// [`MetricError::Lost`] with the time reached, if the geodesic runs into the edge of the chart or
-/// into a place where the metric is not positive.
-pub(crate) fn follow<M: Space, D: Scalar>(
-    field: &impl MatrixField<M>,
-    x: &ChartPoint<M, D>,
-    v: &Vector<M, D>,
-) -> Result<GeodesicEnd<M, D>, MetricError> {
-    let mut base = x.base.clone();
-    let mut here = Phase::<M, D> { q: x.q, p: metric(field, x) * *v };
+/// Follows a geodesic for a unit of time: `rate` in the chart at a point, `position` of a state, and
+/// `recentre` to the chart at the state itself. The last state is recentred too.
+fn travel<M: Space, Y: State>(
+    x: &M::Point<f64>,
+    start: Y,
+    rate: impl Fn(&M::Point<f64>, &Y) -> Option<Y>,
+    position: impl Fn(&Y) -> Vector<M>,
+    recentre: impl Fn(&M::Point<f64>, &Y) -> Option<(M::Point<f64>, Y)>,
+) -> Result<(M::Point<f64>, Y), MetricError> {
+    let (mut base, mut here) = (x.clone(), start);
     let (mut time, mut h) = (0.0, 1.0_f64);
-    loop {
+    for _ in 0..PIECES {
         h = h.min(1.0 - time);
-        let next = extrapolated(field, &base, &here, h);
-        match next.filter(|next| M::is_near(&next.q.real())) {
+        let next = extrapolation::step(&|y: &Y| rate(&base, y), &here, h);
+        match next.filter(|next| M::is_near(&position(next))) {
             Some(next) => {
                 here = next;
                 // A sum of halves and quarters is exact.
@@ -197,17 +247,170 @@ pub(crate) fn follow<M: Space, D: Scalar>(
             None => return Err(MetricError::Lost { time }),
         }
         let finished = time >= 1.0;
-        if finished || !M::is_near(&(here.q.real::<Vector<M>>() * 2.0)) {
-            let at = ChartPoint { base: base.clone(), q: here.q };
-            let v = metric(field, &at).solve(&here.p).ok_or(MetricError::Lost { time })?;
-            let (centre, v) = centred(&base, &here.q, &v);
-            if finished {
-                return Ok((centre, v));
-            }
-            here = Phase { q: centre.q, p: metric(field, &centre) * v };
-            base = centre.base;
+        if finished || !M::is_near(&(position(&here) * 2.0)) {
+            (base, here) = recentre(&base, &here).ok_or(MetricError::Lost { time })?;
+        }
+        if finished {
+            return Ok((base, here));
         }
     }
+    Err(MetricError::Lost { time })
+}
+
+/// The geodesic from `x` with velocity `v`, followed for a unit of time at any scalar: its end,
+/// centred, and its velocity there.
+///
+/// # Errors
+///
+/// [`MetricError::Lost`] with the time reached, if the geodesic runs into the edge of the chart or
+/// into a place where the metric is not positive.
+pub(crate) fn follow<M: Space, D: Scalar>(
+    field: &impl MatrixField<M>,
+    x: &ChartPoint<M, D>,
+    v: &Vector<M, D>,
+) -> Result<GeodesicEnd<M, D>, MetricError> {
+    let recentre = |base: &M::Point<f64>, y: &Phase<M, D>| {
+        let g = metric(field, &ChartPoint { base: base.clone(), q: y.q });
+        let (at, v) = centred::<M, D>(base, &y.q, &g.solve(&y.p)?);
+        let p = metric(field, &at) * v;
+        Some((at.base, Phase { q: at.q, p }))
+    };
+    let start = Phase::<M, D> { q: x.q, p: metric(field, x) * *v };
+    let rate = |base: &M::Point<f64>, y: &Phase<M, D>| rate_at_scalar(field, base, y);
+    let (base, end) = travel::<M, _>(&x.base, start, rate, |y| y.q.real(), recentre)?;
+    let end_point = ChartPoint { base, q: end.q };
+    let v = metric(field, &end_point).solve(&end.p).ok_or(MetricError::Lost { time: 1.0 })?;
+    Ok((end_point, v))
+}
+
+/// The same from a real point: the end and the velocity there, in the frame of the chart at the end.
+///
+/// # Errors
+///
+/// Those of [`follow`].
+pub(crate) fn follow_real<M: Space>(
+    field: &impl MatrixField<M>,
+    x: &M::Point<f64>,
+    v: &Vector<M>,
+) -> Result<(M::Point<f64>, Vector<M>), MetricError> {
+    let value = |at: &ChartPoint<M>| part::<M>(&seeded(field, &at.base, &at.q, NOWHERE), |g| g.re);
+    let recentre = |base: &M::Point<f64>, y: &Phase<M, f64>| {
+        let g = value(&ChartPoint { base: base.clone(), q: y.q });
+        let (at, v) = centred::<M, f64>(base, &y.q, &g.solve(&y.p)?);
+        let p = value(&at) * v;
+        Some((at.base, Phase { q: Vector::<M>::zero(), p }))
+    };
+    let start = Phase::<M, f64> { q: Vector::<M>::zero(), p: value(&ChartPoint::centre(x)) * *v };
+    let (end, y) = travel::<M, _>(x, start, |base, y| rate(field, base, y), |y| y.q, recentre)?;
+    let v = value(&ChartPoint::centre(&end)).solve(&y.p);
+    Ok((end, v.ok_or(MetricError::Lost { time: 1.0 })?))
+}
+
+/// Indices that seed nothing.
+const NOWHERE: [usize; 2] = [usize::MAX; 2];
+
+/// A real point of a geodesic, its velocity, and the derivatives of both along a parameter of `n`
+/// directions, in the frame of the chart at the point.
+pub(crate) struct GeodesicJet<M: Space> {
+    pub(crate) point: M::Point<f64>,
+    pub(crate) velocity: Vector<M>,
+    pub(crate) dpoint: Matrix<M>,
+    pub(crate) dvelocity: Matrix<M>,
+}
+
+/// Follows a geodesic with its derivatives for a unit of time.
+///
+/// # Errors
+///
+/// Those of [`follow`].
+pub(crate) fn follow_jet<M: Space>(
+    field: &impl MatrixField<M>,
+    start: &GeodesicJet<M>,
+) -> Result<GeodesicJet<M>, MetricError> {
+    let recentre = |base: &M::Point<f64>, y: &Bundle<M>| {
+        let jet = into_velocities(field, base, y)?;
+        let centred = recentred(base, &y.at.q, &jet);
+        let bundle = into_momenta(field, &centred);
+        Some((centred.point, bundle))
+    };
+    let bundle = into_momenta(field, start);
+    let rate = |base: &M::Point<f64>, y: &Bundle<M>| rate_of_bundle(field, base, y);
+    let (base, end) = travel::<M, _>(&start.point, bundle, rate, |y| y.at.q, recentre)?;
+    into_velocities(field, &base, &end).ok_or(MetricError::Lost { time: 1.0 })
+}
+
+/// Columns `(∂_k g) v` at a real point of a chart, with `g` itself.
+fn turned<M: Space>(
+    field: &impl MatrixField<M>,
+    x: &M::Point<f64>,
+    q: &Vector<M>,
+    v: &Vector<M>,
+) -> (Matrix<M>, Matrix<M>) {
+    let g = metric_jet(field, x, q);
+    let mut turned = Matrix::<M>::zeros();
+    for k in 0..M::Dim::LEN {
+        let column = g.slopes[k] * *v;
+        for i in 0..M::Dim::LEN {
+            turned[(i, k)] = column[i];
+        }
+    }
+    (g.value, turned)
+}
+
+/// `p = g v` and `δp = g δv + (∂_δq g) v`, at the centre of a chart.
+fn into_momenta<M: Space>(field: &impl MatrixField<M>, jet: &GeodesicJet<M>) -> Bundle<M> {
+    let (g, turned) = turned(field, &jet.point, &Vector::<M>::zero(), &jet.velocity);
+    Bundle {
+        at: Phase { q: Vector::<M>::zero(), p: g * jet.velocity },
+        dq: jet.dpoint,
+        dp: g * jet.dvelocity + turned * jet.dpoint,
+    }
+}
+
+/// The inverse of [`into_momenta`], at a point of the chart at `x`, in the frame of that chart.
+fn into_velocities<M: Space>(
+    field: &impl MatrixField<M>,
+    x: &M::Point<f64>,
+    y: &Bundle<M>,
+) -> Option<GeodesicJet<M>> {
+    let (g, _) = turned(field, x, &y.at.q, &Vector::<M>::zero());
+    let factors = g.factor()?;
+    let velocity = factors.solve(&y.at.p)?;
+    let (_, turned) = turned(field, x, &y.at.q, &velocity);
+    let lag = y.dp - turned * y.dq;
+    let mut dvelocity = Matrix::<M>::zeros();
+    for k in 0..M::Dim::LEN {
+        let column = Vector::<M>::from_index(|i| lag[(i, k)]);
+        let column = factors.solve(&column)?;
+        for i in 0..M::Dim::LEN {
+            dvelocity[(i, k)] = column[i];
+        }
+    }
+    Some(GeodesicJet { point: x.clone(), velocity, dpoint: y.dq, dvelocity })
+}
+
+/// A jet at the point with coordinates `q` of the chart at `x`, in the chart at that point.
+fn recentred<M: Space>(x: &M::Point<f64>, q: &Vector<M>, jet: &GeodesicJet<M>) -> GeodesicJet<M> {
+    let mut result = GeodesicJet::<M> {
+        point: x.clone(),
+        velocity: jet.velocity,
+        dpoint: Matrix::<M>::zeros(),
+        dvelocity: Matrix::<M>::zeros(),
+    };
+    for k in 0..M::Dim::LEN {
+        let moved = Vector::<M, Dual64>::from_index(|i| Dual64::new(q[i], jet.dpoint[(i, k)]));
+        let velocity = Vector::<M, Dual64>::from_index(|i| {
+            Dual64::new(jet.velocity[i], jet.dvelocity[(i, k)])
+        });
+        let (point, velocity) = centred::<M, Dual64>(x, &moved, &velocity);
+        for i in 0..M::Dim::LEN {
+            result.dpoint[(i, k)] = point.q[i].eps;
+            result.dvelocity[(i, k)] = velocity[i].eps;
+            result.velocity[i] = velocity[i].re;
+        }
+        result.point = point.base;
+    }
+    result
 }
 
 /// The acceleration `−Γ(v, v)` of the geodesic through a real point, with the Christoffel symbols of
@@ -217,10 +420,6 @@ pub(crate) fn acceleration<M: Space>(
     x: &M::Point<f64>,
     v: &Vector<M>,
 ) -> Option<Vector<M>> {
-    let jet = field.covariant_jet(x);
-    let mut force = Vector::<M>::from_index(|k| 0.5 * v.dot(&(jet.slopes[k] * *v)));
-    for k in 0..M::Dim::LEN {
-        force -= (jet.slopes[k] * *v) * v[k];
-    }
-    jet.value.solve(&force)
+    let (g, turned) = turned(field, x, &Vector::<M>::zero(), v);
+    g.solve(&(turned.transpose_times(v) * 0.5 - turned * *v))
 }

@@ -101,7 +101,7 @@ pub fn metric<M: Manifold, G: Riemannian<M>>(
     // Numerical geodesics promise 10⁻¹³ of the momentum in each of their pieces, and the condition
     // number of g is what that becomes in p·g⁻¹p.
     let off = (speed - square).abs() / square.max(f64::MIN_POSITIVE);
-    let bound = 1e-12 * condition::<M>(&g).max(condition::<M>(&metric.matrix(&end)));
+    let bound = 1e-11 * condition::<M>(&g).max(condition::<M>(&metric.matrix(&end)));
     BrokenLaw::unless("geodesics have constant speed", off, bound)
 }
 
@@ -146,6 +146,8 @@ pub fn retraction<M: Manifold, G: Riemannian<M>, R: Retraction<M, G>>(
             let column = Vector::<M>::from_index(|i| dual[i].eps - slope[(i, k)]);
             column.magnitude()
         };
+        // Two numerical geodesics, each with its own steps.
+        let bound = 10.0 * bound;
         BrokenLaw::unless("∂z/∂u is the derivative of z", off(&z, &jet.dz), bound)?;
         BrokenLaw::unless("∂d/∂u is the derivative of d", off(&arc.d, &jet.dd), bound)?;
         BrokenLaw::unless("∂x'/∂u is the derivative of x'", off(&end, &jet.dend), bound)?;

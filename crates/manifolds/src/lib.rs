@@ -21,6 +21,7 @@ pub mod cayley;
 pub mod chart;
 pub mod euclidean;
 pub mod exponential;
+mod extrapolation;
 pub mod field_metric;
 pub mod flat;
 mod geodesic;
@@ -30,6 +31,8 @@ pub mod lie_dual;
 pub mod manifold;
 pub mod metric;
 pub mod normal;
+#[cfg(feature = "argmin")]
+mod path;
 pub mod product;
 pub mod projection;
 pub mod retraction;

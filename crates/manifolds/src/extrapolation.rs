@@ -1,0 +1,97 @@
+//! Extrapolation of the modified midpoint rule (Gragg 1965, Bulirsch and Stoer 1966): an explicit
+//! method that finds its own order, for any state that can be added and compared.
+
+/// What a solution is made of.
+pub(crate) trait State: Copy {
+    /// `self + other · h`.
+    fn plus(&self, other: &Self, h: f64) -> Self;
+
+    /// The largest difference to another state, relative to the sizes of its parts.
+    fn distance(&self, other: &Self) -> f64;
+
+    /// Whether every number of the state is finite.
+    fn is_finite(&self) -> bool;
+}
+
+/// The relative error of a step.
+const TOLERANCE: f64 = 1e-13;
+/// Substeps of the midpoint rule, before extrapolation.
+const SUBSTEPS: [u32; 10] = [2, 4, 6, 8, 10, 12, 14, 16, 18, 20];
+
+/// One row of the extrapolation: the midpoint rule with `n` substeps over `h`, smoothed by Gragg.
+/// `slope` is the rate at the start, the same in every row.
+fn midpoint_rule<Y: State>(
+    rate: &impl Fn(&Y) -> Option<Y>,
+    (start, slope): (&Y, &Y),
+    h: f64,
+    n: u32,
+) -> Option<Y> {
+    let step = h / f64::from(n);
+    let mut before = *start;
+    let mut here = start.plus(slope, step);
+    for _ in 1..n {
+        let next = before.plus(&rate(&here)?, 2.0 * step);
+        (before, here) = (here, next);
+    }
+    let last = here.plus(&rate(&here)?, step);
+    // ½ (before + last)
+    let smooth = before.plus(&last.plus(&before, -1.0), 0.5);
+    smooth.is_finite().then_some(smooth)
+}
+
+/// One step of size `h`; `None` if it does not converge or leaves the domain of `rate`.
+pub(crate) fn step<Y: State>(rate: &impl Fn(&Y) -> Option<Y>, start: &Y, h: f64) -> Option<Y> {
+    let slope = rate(start)?;
+    let mut table: [Option<Y>; SUBSTEPS.len()] = [None; SUBSTEPS.len()];
+    for (row, &n) in SUBSTEPS.iter().enumerate() {
+        // Aitken and Neville: the table of the row above is overwritten from the left.
+        let mut entry = midpoint_rule(rate, (start, &slope), h, n)?;
+        let mut change = f64::INFINITY;
+        for column in 1..=row {
+            let above = table[column - 1].replace(entry)?;
+            let ratio = f64::from(n) / f64::from(SUBSTEPS[row - column]);
+            let weight = 1.0 / (ratio * ratio - 1.0);
+            let better = entry.plus(&entry.plus(&above, -1.0), weight);
+            change = better.distance(&entry);
+            entry = better;
+        }
+        table[row] = Some(entry);
+        if change <= TOLERANCE * h.max(0.1) {
+            return Some(entry);
+        }
+    }
+    None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    impl State for [f64; 2] {
+        fn plus(&self, other: &Self, h: f64) -> Self {
+            [self[0] + other[0] * h, self[1] + other[1] * h]
+        }
+
+        fn distance(&self, other: &Self) -> f64 {
+            (self[0] - other[0]).hypot(self[1] - other[1])
+        }
+
+        fn is_finite(&self) -> bool {
+            self.iter().all(|entry| entry.is_finite())
+        }
+    }
+
+    #[test]
+    fn a_turn_by_one_radian_is_exact_to_round_off() {
+        let end = step(&|y: &[f64; 2]| Some([-y[1], y[0]]), &[1.0, 0.0], 1.0).unwrap();
+        let (sine, cosine) = 1_f64.sin_cos();
+        assert!(end.distance(&[cosine, sine]) < 1e-14);
+    }
+
+    #[test]
+    fn a_singularity_on_the_way_is_no_step() {
+        // x' = x² blows up at t = 1.
+        let end = step(&|y: &[f64; 2]| Some([y[0] * y[0], 0.0]), &[1.0, 0.0], 1.5);
+        assert!(end.is_none());
+    }
+}

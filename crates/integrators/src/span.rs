@@ -14,6 +14,9 @@ pub struct Span {
     every: usize,
 }
 
+/// The most states that a run makes room for beforehand: it may end long before its span.
+const ROOM: usize = 1 << 12;
+
 impl Span {
     /// `count` steps of size `step`, each of them recorded.
     pub const fn steps(step: f64, count: usize) -> Self {
@@ -40,9 +43,9 @@ impl Span {
         step == self.count || step.is_multiple_of(self.every)
     }
 
-    /// How many states a record holds.
-    pub(crate) const fn recorded(&self) -> usize {
-        self.count / self.every + 2
+    /// The states that a run makes room for before it starts.
+    pub(crate) fn room(&self) -> usize {
+        (self.count / self.every).min(ROOM) + 2
     }
 
     pub(crate) fn check(&self) -> Result<(), SpanError> {

@@ -233,7 +233,7 @@ fn recall<Y: Metriplectic>(system: &Y, start: &Start<'_, Y>, d: &Vector<Y::Manif
     let sizes = (pi.map_or(0.0, |pi| pi.tensor.max_abs()), k.map_or(0.0, |k| k.along_w.max_abs()));
     let gain = start.h * (sizes.0 + sizes.1);
     let r = d.dot(d) / (1e2 * gain * e.abs()).max(f64::MIN_POSITIVE);
-    if r.is_finite() { e * (r * r / (1.0 + r * r)) } else { 0.0 }
+    if r.is_finite() { e / (1.0 + r.powi(-2)) } else { 0.0 }
 }
 
 /// What a step remembers of the steps before it: three displacements, from which the next one is

@@ -258,7 +258,7 @@ impl<R> Scheme<R> {
     {
         span.check()?;
         let mut steps = self.steps(system, x0, span.step_size())?;
-        let mut states = Vec::with_capacity(span.recorded());
+        let mut states = Vec::with_capacity(span.room());
         states.push(steps.state().clone());
         for step in 1..=span.count() {
             match steps.advance() {

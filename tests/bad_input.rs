@@ -325,6 +325,33 @@ fn every_error_passes_on_with_a_question_mark() {
 }
 
 #[test]
+fn a_step_that_fails_passes_on_with_a_question_mark() {
+    fn program(h: f64) -> Result<Vector3<f64>, Error> {
+        let body = relaxing_body();
+        let mut steps = WeylMidpoint.steps(&body, UNSTABLE, h)?;
+        Ok(steps.advance()?.point)
+    }
+    assert!(program(0.1).is_ok());
+    assert!(matches!(program(1e300), Err(Error::Step(StepError::OutOfDomain { .. }))));
+}
+
+#[test]
+fn errors_returned_from_main_are_printed_as_sentences() {
+    let run = |h: f64| WeylMidpoint.run(&relaxing_body(), UNSTABLE, Span::steps(h, 10));
+    let same = |debug: String, display: String| assert_eq!(debug, display);
+    let error = run(1e300).unwrap_err();
+    same(format!("{error:?}"), error.to_string());
+    let RunError::Step { cause, .. } = &error else { panic!("another error: {error}") };
+    same(format!("{cause:?}"), cause.to_string());
+    let error = Error::from(error);
+    same(format!("{error:?}"), error.to_string());
+    let error = refused(&relaxing_body(), vector![0.1, f64::NAN, 0.2]);
+    same(format!("{error:?}"), error.to_string());
+    let error: Box<dyn std::error::Error> = Error::from(error).into();
+    assert!(format!("{error:?}").starts_with("the start: entry 1 of the point is NaN"));
+}
+
+#[test]
 fn errors_are_sentences_with_the_numbers() {
     let run = |h: f64| WeylMidpoint.run(&relaxing_body(), UNSTABLE, Span::steps(h, 10));
     let indefinite = Matrix3::from_diagonal(&vector![1.0, -3.0, 1.0]);

@@ -194,6 +194,7 @@ pub struct Start<'a, Y: Metriplectic> {
 
 /// What a step cost.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Work {
     /// Linear systems solved by Newton's method.
     pub sweeps: usize,

@@ -141,8 +141,11 @@ impl<R> Scheme<R> {
             return Ok(start.x.clone());
         }
         let lost = NoRoot { best: root.u, residual: f64::INFINITY, sweeps: root.sweeps };
-        let end = self.retraction.end(system.metric(), start.x, &root.u).map_err(|_| lost)?;
-        Ok(memory.note::<Y::Manifold, _>(system.metric(), start.x, &root.u, end))
+        let last = residual.last_correction(&root);
+        work.sweeps += usize::from(last.is_some());
+        let u = last.map_or(root.u, |correction| root.u - correction);
+        let end = self.retraction.end(system.metric(), start.x, &u).map_err(|_| lost)?;
+        Ok(memory.note::<Y::Manifold, _>(system.metric(), start.x, &u, end))
     }
 
     /// Newton's method, and where it is lost the globaliser with Newton's polish.

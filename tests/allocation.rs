@@ -59,10 +59,40 @@ fn a_step_allocates_nothing() {
         .unwrap();
     assert_eq!(blocks(&spring, vector![0.3, 0.2, 0.1, 0.0, 0.1, 0.2]), 0);
 
+    // With an entropy that the closure bracket, of rank four, leaves alone.
+    let bath = System::on(Euclidean::<6>)
+        .metric(Metric::constant(metric).unwrap())
+        .bracket(Poisson::field(|_: &Vector6<Real>| {
+            let pair = |i: usize, j: usize| f64::from(i < 2 && j == i + 2);
+            Matrix6::from_fn(|i, j| Real::from(pair(i, j) - pair(j, i)))
+        }))
+        .energy(|x: &Vector6<Real>| x.norm_squared() * 0.5 + x[0].powi(4))
+        .entropy(|x: &Vector6<Real>| x[4] - x[5].powi(2) * 0.5)
+        .build()
+        .unwrap();
+    assert_eq!(blocks(&bath, vector![0.3, 0.2, 0.1, 0.0, 0.1, 0.2]), 0);
+
     let sphere = System::on(Sphere::<2>::round())
         .energy(|x: &Vector3<Real>| x.x.powi(2) + x.y.powi(3) * 0.5)
         .entropy(|x: &Vector3<Real>| x.z)
         .build()
         .unwrap();
     assert_eq!(blocks(&sphere, vector![0.6, 0.0, 0.8]), 0);
+
+    let group = System::on(Rotations::bi_invariant())
+        .bracket(Nambu::default())
+        .energy(|r: &Matrix3<Real>| r.m11 + r.m22 * 2.0 + r.m12 * r.m23 * 0.5)
+        .entropy(|r: &Matrix3<Real>| r.m13 - r.m21 * 0.5)
+        .build()
+        .unwrap();
+    assert_eq!(blocks(&group, Matrix3::identity()), 0);
+
+    // Geodesics integrated numerically, of the half plane.
+    let plane = System::on(Euclidean::<2>)
+        .metric(Metric::field(|q: &Vector2<Real>| Matrix2::from_diagonal_element(q.y.powi(-2))))
+        .bracket(AreaForm)
+        .energy(|q: &Vector2<Real>| q.x.powi(2) + q.y.powi(2))
+        .build()
+        .unwrap();
+    assert_eq!(blocks(&plane, vector![0.3, 1.2]), 0);
 }

@@ -8,7 +8,7 @@ use metriplectic::dynamics::{BuildError, PoissonError};
 use metriplectic::integrators::{RunError, SpanError, StepError};
 use metriplectic::manifolds::{AlgebraError, MetricError, PointError};
 use metriplectic::prelude::*;
-use models::{UNSTABLE, half_square, kinetic, relaxing_body};
+use models::{TUMBLING, UNSTABLE, free_body, half_square, kinetic, relaxing_body};
 
 const INERTIA: Vector3<f64> = Vector3::new(10.0, 5.0, 1.0);
 const TEN_STEPS: Span = Span::steps(0.1, 10);
@@ -62,6 +62,7 @@ fn bad_metrics_are_refused() {
     let asymmetric = Matrix3::new(1.0, 0.3, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0);
     assert!(matches!(Metric::constant(indefinite), Err(MetricError::NotPositive(_))));
     assert!(matches!(Metric::constant(asymmetric), Err(MetricError::NotSymmetric { .. })));
+    assert_eq!(Metric::constant(Matrix3::repeat(f64::NAN)), Err(MetricError::NotFinite));
     let with = |g: Matrix3<f64>| {
         let system = System::on(LieDual::so3())
             .metric(Metric::field(move |_: &Vector3<Real>| g.cast::<Real>()))
@@ -143,6 +144,58 @@ fn a_run_that_fails_on_its_way_keeps_what_it_has() {
     assert!(cause.to_string().contains(&format!("t = {}", trajectory.last().time)), "{cause}");
 }
 
+/// `x' = −1`, `y' = 1/x` along `H = ln x + y`: the exact flow from (1, 0) reaches the edge of the
+/// logarithm at t = 1.
+fn doomed() -> impl Metriplectic<Manifold = Euclidean<2>, Metric = Canonical> {
+    System::on(Euclidean::<2>)
+        .energy(|x: &Vector2<Real>| x.x.ln() + x.y)
+        .entropy(|x: &Vector2<Real>| -x.x)
+        .build()
+        .expect("the doomed system is a system")
+}
+
+#[test]
+fn a_run_into_the_edge_of_a_logarithm_ends_there() {
+    let error =
+        WeylMidpoint.run(&doomed(), vector![1.0, 0.0], Span::steps(0.1, 100).every(7)).unwrap_err();
+    let Some(trajectory) = error.trajectory() else { panic!("no trajectory: {error}") };
+    // The last state is there although seven does not divide its number.
+    let end = trajectory.last();
+    assert!((8..=12).contains(&end.step) && end.step == trajectory.certificate().steps, "{error}");
+    assert!(end.point.x > 0.0 && end.point.x < 0.2, "{error} at {}", end.point);
+    assert!((end.point.x.ln() + end.point.y).abs() <= 50.0 * f64::EPSILON);
+    assert!(trajectory.certificate().keeps_energy() && trajectory.certificate().keeps_entropy());
+    assert!(error.to_string().contains(&format!("{} steps were taken", end.step)), "{error}");
+    // The iterator gives the same states, the error once, and then ends.
+    let system = doomed();
+    let mut steps = WeylMidpoint.steps(&system, vector![1.0, 0.0], 0.1).unwrap();
+    let taken = steps.by_ref().take_while(Result::is_ok).count();
+    assert_eq!(taken, end.step);
+    assert!(steps.next().is_none());
+}
+
+#[test]
+fn a_span_without_end_is_run_until_the_model_ends() {
+    // How many states a run will record is no reason to ask for the memory beforehand.
+    for span in [Span::steps(0.1, usize::MAX), Span::steps(0.1, usize::MAX).every(1000)] {
+        let error = WeylMidpoint.run(&doomed(), vector![1.0, 0.0], span).unwrap_err();
+        assert!(error.trajectory().is_some_and(|trajectory| trajectory.last().step > 7), "{error}");
+    }
+}
+
+#[test]
+fn a_state_as_small_or_large_as_a_number_can_be_is_integrated() {
+    // The free body has no scale: from s p₀ with steps h/s it takes the steps of p₀, times s.
+    let unit = WeylMidpoint.run(&free_body(), TUMBLING, Span::steps(0.1, 10)).unwrap();
+    for s in [1e-100, 1e-60, 1e60, 1e100] {
+        let run = WeylMidpoint.run(&free_body(), TUMBLING * s, Span::steps(0.1 / s, 10));
+        let end = run.unwrap_or_else(|error| panic!("at scale {s:e}: {error}")).last().point;
+        // Ten steps, each with a few roundings of |p|.
+        let off = (end / s - unit.last().point).norm();
+        assert!(off <= 50.0 * f64::EPSILON, "at scale {s:e}: off by {off:.1e}");
+    }
+}
+
 #[test]
 fn an_entropy_that_is_no_casimir_is_refused_unless_the_published_scheme_is_asked_for() {
     let builder = || {
@@ -186,6 +239,21 @@ fn bad_structure_constants_are_refused() {
     constants[0][1][2] = 1.0;
     let error = LieDual::new(&constants).unwrap_err();
     assert!(matches!(error, AlgebraError::NotAntisymmetric { a: 0, b: 1, d: 2, .. }));
+    constants[1][0][2] = f64::NAN;
+    let error = LieDual::new(&constants).unwrap_err();
+    assert!(matches!(error, AlgebraError::NotFinite { a: 1, b: 0, d: 2, .. }));
+    // [e₀, e₁] = e₂, [e₀, e₂] = e₀: antisymmetric, but [[e₀, e₁], e₂] + cyclic = −[e₀, e₁] ≠ 0.
+    let mut constants = [[[0.0; 3]; 3]; 3];
+    (constants[0][1][2], constants[1][0][2]) = (1.0, -1.0);
+    (constants[0][2][0], constants[2][0][0]) = (1.0, -1.0);
+    let error = LieDual::new(&constants).unwrap_err();
+    assert!(matches!(error, AlgebraError::NoJacobiIdentity { .. }), "{error}");
+    // Matrices that are no basis, and matrices whose commutators leave their span.
+    let [a, b] = [Matrix2::new(0.0, 1.0, 0.0, 0.0), Matrix2::new(0.0, 0.0, 1.0, 0.0)];
+    let error = LieAlgebra::of_matrices(&[a, a * 2.0]).unwrap_err();
+    assert_eq!(error, AlgebraError::NotIndependent);
+    let error = LieAlgebra::of_matrices(&[a, b]).unwrap_err();
+    assert!(matches!(error, AlgebraError::NotClosed { a: 0, b: 1, .. }), "{error}");
 }
 
 #[test]
@@ -249,4 +317,62 @@ fn every_error_passes_on_with_a_question_mark() {
     }
     assert!(program(0.1).is_ok());
     assert!(matches!(program(-0.1), Err(Error::Span(_))));
+    // A run that stopped arrives with its trajectory.
+    let stopped = WeylMidpoint.run(&doomed(), vector![1.0, 0.0], Span::steps(0.1, 100));
+    let Err(Error::Run(source)) = stopped.map_err(Error::from) else { panic!("the run stops") };
+    let error = source.downcast::<RunError<Euclidean<2>>>().unwrap();
+    assert!(error.trajectory().is_some_and(|trajectory| trajectory.last().step > 7));
+}
+
+#[test]
+fn a_step_that_fails_passes_on_with_a_question_mark() {
+    fn program(h: f64) -> Result<Vector3<f64>, Error> {
+        let body = relaxing_body();
+        let mut steps = WeylMidpoint.steps(&body, UNSTABLE, h)?;
+        Ok(steps.advance()?.point)
+    }
+    assert!(program(0.1).is_ok());
+    assert!(matches!(program(1e300), Err(Error::Step(StepError::OutOfDomain { .. }))));
+}
+
+#[test]
+fn errors_returned_from_main_are_printed_as_sentences() {
+    let run = |h: f64| WeylMidpoint.run(&relaxing_body(), UNSTABLE, Span::steps(h, 10));
+    let same = |debug: String, display: String| assert_eq!(debug, display);
+    let error = run(1e300).unwrap_err();
+    same(format!("{error:?}"), error.to_string());
+    let RunError::Step { cause, .. } = &error else { panic!("another error: {error}") };
+    same(format!("{cause:?}"), cause.to_string());
+    let error = Error::from(error);
+    same(format!("{error:?}"), error.to_string());
+    let error = refused(&relaxing_body(), vector![0.1, f64::NAN, 0.2]);
+    same(format!("{error:?}"), error.to_string());
+    let error: Box<dyn std::error::Error> = Error::from(error).into();
+    assert!(format!("{error:?}").starts_with("the start: entry 1 of the point is NaN"));
+}
+
+#[test]
+fn errors_are_sentences_with_the_numbers() {
+    let run = |h: f64| WeylMidpoint.run(&relaxing_body(), UNSTABLE, Span::steps(h, 10));
+    let indefinite = Matrix3::from_diagonal(&vector![1.0, -3.0, 1.0]);
+    let skew = Matrix2::new(0.0, 1.0, -0.75, 0.0);
+    let not_a_number = WeylMidpoint.run(&relaxing_body(), vector![0.1, f64::NAN, 0.2], TEN_STEPS);
+    let outside = WeylMidpoint.run(&doomed(), vector![-2.5, 1.0], TEN_STEPS);
+    let mut constants = [[[0.0; 2]; 2]; 2];
+    constants[0][1][1] = 0.125;
+    let table: [(Error, &[&str]); 7] = [
+        (run(-0.25).unwrap_err().into(), &["step size", "-0.25", "positive"]),
+        (run(1e300).unwrap_err().into(), &["1.000e300", "t = 0", "smaller step"]),
+        (Metric::constant(indefinite).unwrap_err().into(), &["pivot 1", "-3.000e0"]),
+        (Poisson::constant(skew).unwrap_err().into(), &["(0, 1)", "2.500e-1"]),
+        (not_a_number.unwrap_err().into(), &["entry 1", "NaN"]),
+        (outside.unwrap_err().into(), &["energy", "-2.5", "start where"]),
+        (LieDual::new(&constants).unwrap_err().into(), &["C_01^1", "1.250e-1", "antisymmetric"]),
+    ];
+    for (error, parts) in table {
+        let text = error.to_string();
+        for part in parts {
+            assert!(text.contains(part), "\"{part}\" is missing in: {text}");
+        }
+    }
 }

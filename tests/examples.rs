@@ -1,18 +1,26 @@
 //! What the examples print when a program reads them.
 
-use std::path::PathBuf;
 use std::process::{Command, Output};
 
-/// Runs an example that `cargo test` has built beside the tests. Each call draws into a folder of its
-/// own, so that the gallery keeps the pictures of a reader.
+/// Builds an example as these tests were built, which takes no time if `cargo test` has just done
+/// it, and runs it. Each call draws into a folder of its own, so that the gallery keeps the pictures
+/// of a reader.
 fn example(name: &str, arguments: &[&str]) -> Output {
     let tests = std::env::current_exe().expect("a test has a path");
-    let folder: PathBuf = tests.ancestors().skip(2).take(1).collect();
+    let folder = tests.ancestors().nth(2).expect("tests are in `deps` of a profile's folder");
+    let mut build = Command::new(env!("CARGO"));
+    build.args(["build", "--quiet", "--workspace", "--example", name, "--target-dir"]);
+    build.arg(folder.parent().expect("a profile is in the build folder"));
+    build.args(["--profile", if cfg!(debug_assertions) { "test" } else { "release" }]);
+    if cfg!(feature = "serde") {
+        build.arg("--all-features");
+    }
+    assert!(build.status().expect("cargo starts").success(), "{name} is not built");
+
     let program = folder.join("examples").join(name);
-    let message = "the example is built: `cargo test` builds all, `cargo build --examples` one";
     let gallery = format!("{}/{name}{}", env!("CARGO_TARGET_TMPDIR"), arguments.concat());
     let run = Command::new(program).args(arguments).env("CARGO_TARGET_DIR", gallery).output();
-    run.expect(message)
+    run.expect("the example starts")
 }
 
 fn json(output: &Output) -> serde_json::Value {
@@ -25,6 +33,7 @@ fn json(output: &Output) -> serde_json::Value {
 fn the_relaxing_rigid_body_prints_one_object() {
     let report = json(&example("relaxing_rigid_body", &["--json"]));
     assert_eq!(report["steps"], 1000);
+    assert_eq!(report["second_law"], "Casimir");
     let number = |key: &str| report[key].as_f64().expect("a number");
     assert!(number("max_relative_energy_error") <= 5e-15);
     assert!(number("min_entropy_increment") > 0.0);

@@ -1,7 +1,10 @@
 //! The laws of brackets and dissipations, with negative controls.
 
-use metriplectic::dynamics::laws;
-use metriplectic::fields::BrokenLaw;
+use metriplectic::dynamics::bracket::{BracketJet, Site};
+use metriplectic::dynamics::dissipation::DissipationJet;
+use metriplectic::dynamics::{Bracket, Dissipation, MetricDissipation, laws};
+use metriplectic::fields::{BrokenLaw, ChartPoint};
+use metriplectic::manifolds::MetricError;
 use metriplectic::prelude::*;
 use proptest::prelude::*;
 
@@ -91,8 +94,56 @@ proptest! {
         laws::bracket(&system, &y, &c, &d)?;
     }
 
-    /// On so(3)* every tensor linear in the point passes; in dimension 6 random antisymmetric
-    /// constants are no Lie algebra, and the identity must break.
+    #[test]
+    fn the_dual_of_an_algebra_in_a_random_basis_keeps_the_laws(
+        entries in prop::array::uniform3(columns::<3>()),
+        x in columns::<3>(), a in columns::<3>(), b in columns::<3>(),
+    ) {
+        let basis = Matrix3::from_columns(&entries);
+        prop_assume!(basis.determinant().abs() > 0.2);
+        // so(3) in the basis of the columns.
+        let mixed = entries.map(|column| column.cross_matrix());
+        let algebra = LieAlgebra::of_matrices(&mixed).unwrap();
+        let system = System::on(LieDual::of(algebra)).energy(square).build().unwrap();
+        laws::bracket(&system, &x, &a, &b)?;
+        // Its Casimir is |p|² in the old components, p = B⁻ᵀ μ.
+        let inverse = basis.try_inverse().unwrap().transpose();
+        let casimir = move |mu: &Vector3<Real>| (inverse.cast::<Real>() * mu).norm_squared();
+        let system = System::on(system.manifold().clone())
+            .energy(square)
+            .entropy(casimir)
+            .build()
+            .unwrap();
+        system.verify(&x, 0.1)?;
+    }
+
+    /// In dimension 3 a tensor linear in the point is `hat(Ax)`, with the Jacobi expression
+    /// `v · curl v` for `v = Ax`: it vanishes for the six-dimensional family of symmetric `A`, among
+    /// them so(3)*, and for no random one.
+    #[test]
+    fn random_antisymmetric_constants_in_dimension_three_break_the_jacobi_identity(
+        entries in prop::array::uniform3(columns::<3>()),
+        x in columns::<3>(), a in columns::<3>(), b in columns::<3>(),
+    ) {
+        let m = Matrix3::from_columns(&entries);
+        let curl = vector![m.m32 - m.m23, m.m13 - m.m31, m.m21 - m.m12];
+        prop_assume!((m * x).dot(&curl).abs() > 1e-3);
+        let with = |m: Matrix3<f64>| {
+            System::on(Euclidean::<3>)
+                .bracket(Poisson::field(move |x: &Vector3<Real>| {
+                    (m.cast::<Real>() * x).cross_matrix()
+                }))
+                .energy(square)
+                .build()
+                .unwrap()
+        };
+        let broken: BrokenLaw = laws::bracket(&with(m), &x, &a, &b).unwrap_err();
+        prop_assert_eq!(broken.law, "Jacobi identity");
+        prop_assert!(broken.size > 1e-3);
+        laws::bracket(&with(m + m.transpose()), &x, &a, &b)?;
+    }
+
+    /// In dimension 6 random antisymmetric constants are no Lie algebra either.
     #[test]
     fn random_antisymmetric_constants_break_the_jacobi_identity(
         constants in prop::collection::vec(-1.0..1.0_f64, 216),
@@ -160,4 +211,218 @@ fn a_report_lists_every_law_and_the_verdict() {
     {
         assert!(text.contains(law), "{law} is missing in:\n{text}");
     }
+}
+
+/// The bracket of so(3)* on R³, with one fault.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Faulty {
+    None,
+    NotSkew,
+    NoJacobi,
+    NotLinear,
+    Value,
+    Tensor,
+    AlongPoint,
+    AlongEntropy,
+}
+
+impl<G> Bracket<Euclidean<3>, G> for Faulty
+where
+    G: metriplectic::manifolds::Riemannian<Euclidean<3>>,
+{
+    fn apply<D: Scalar>(
+        &self,
+        at: &Site<'_, Euclidean<3>, G, D>,
+        a: &Vector3<D>,
+    ) -> Result<Vector3<D>, MetricError> {
+        let p = at.x.point();
+        let mut turn =
+            Vector3::new(p.y * a.z - p.z * a.y, p.z * a.x - p.x * a.z, p.x * a.y - p.y * a.x);
+        match self {
+            Self::NotSkew => turn.x += a.x * 1e-6,
+            Self::NoJacobi => {
+                turn.x += p.x * a.y * 1e-6;
+                turn.y -= p.x * a.x * 1e-6;
+            }
+            Self::NotLinear => turn.x += (a.x * a.x - a.x) * a.y * 1e-6,
+            _ => {}
+        }
+        Ok(turn)
+    }
+
+    fn linearise(
+        &self,
+        at: &Site<'_, Euclidean<3>, G>,
+        a: &Vector3<f64>,
+    ) -> Result<BracketJet<Euclidean<3>>, MetricError> {
+        // The derivatives of a × b are those of a cross product.
+        let p = at.x.point();
+        let mut jet = BracketJet::<Euclidean<3>> {
+            value: Bracket::<_, G>::apply(self, at, a)?,
+            along_z: -a.cross_matrix(),
+            along_s: Matrix3::zeros(),
+            tensor: Bracket::<_, G>::tensor(self, at)?,
+        };
+        if *self == Self::NoJacobi {
+            jet.along_z.m11 += a.y * 1e-6;
+            jet.along_z.m21 -= a.x * 1e-6;
+        }
+        let off = 1e-6 * p.norm();
+        match self {
+            Self::Value => jet.value.z += off,
+            Self::Tensor => jet.tensor.m13 += off,
+            Self::AlongPoint => jet.along_z.m12 += off,
+            Self::AlongEntropy => jet.along_s.m22 += off,
+            _ => {}
+        }
+        Ok(jet)
+    }
+}
+
+#[test]
+fn each_law_of_a_bracket_can_break() {
+    let (x, a, b) = (vector![0.3, -0.7, 0.5], vector![1.0, 0.4, -0.8], vector![-0.2, 0.9, 0.6]);
+    let law = |fault: Faulty| {
+        let system = System::on(Euclidean::<3>).bracket(fault).energy(square).build().unwrap();
+        laws::bracket(&system, &x, &a, &b).err().map(|broken| broken.law)
+    };
+    assert_eq!(law(Faulty::None), None);
+    assert_eq!(law(Faulty::NotSkew), Some("Π is skew"));
+    assert_eq!(law(Faulty::NoJacobi), Some("Jacobi identity"));
+    assert_eq!(law(Faulty::NotLinear), Some("Π(α + 3β) = Πα + 3Πβ"));
+    assert_eq!(law(Faulty::Value), Some("linearise has the value of apply"));
+    assert_eq!(law(Faulty::Tensor), Some("linearise has the tensor of apply"));
+    assert_eq!(law(Faulty::AlongPoint), Some("linearise is the derivative along x"));
+    assert_eq!(law(Faulty::AlongEntropy), Some("linearise is the derivative along dS"));
+}
+
+/// A system with another dissipation than the one it was built with.
+struct With<Y, K> {
+    system: Y,
+    dissipation: K,
+}
+
+impl<Y: Metriplectic, K: Dissipation<Y::Manifold, Y::Metric>> Metriplectic for With<Y, K> {
+    type Manifold = Y::Manifold;
+    type Metric = Y::Metric;
+    type Bracket = Y::Bracket;
+    type Dissipation = K;
+    type Energy = Y::Energy;
+    type Entropy = Y::Entropy;
+
+    fn manifold(&self) -> &Y::Manifold {
+        self.system.manifold()
+    }
+
+    fn metric(&self) -> &Y::Metric {
+        self.system.metric()
+    }
+
+    fn bracket(&self) -> &Y::Bracket {
+        self.system.bracket()
+    }
+
+    fn dissipation(&self) -> &K {
+        &self.dissipation
+    }
+
+    fn energy(&self) -> &Y::Energy {
+        self.system.energy()
+    }
+
+    fn entropy(&self) -> &Y::Entropy {
+        self.system.entropy()
+    }
+
+    fn second_law(&self) -> SecondLaw {
+        self.system.second_law()
+    }
+}
+
+/// The dissipation of the metric, with one fault.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Leaky {
+    None,
+    NotSymmetric,
+    Negative,
+    LosesEnergy,
+    AlongPoint,
+    AlongKilled,
+    AlongCovector,
+}
+
+impl<G> Dissipation<LieDual<3>, G> for Leaky
+where
+    G: metriplectic::manifolds::Riemannian<LieDual<3>>,
+{
+    fn apply<D: Scalar>(
+        &self,
+        metric: &G,
+        x: &ChartPoint<LieDual<3>, D>,
+        w: &Vector3<D>,
+        a: &Vector3<D>,
+    ) -> Result<Vector3<D>, MetricError> {
+        let mut k = MetricDissipation.apply(metric, x, w, a)?;
+        let off = 1e-6;
+        match self {
+            // w × α kills w and adds nothing to the form; only symmetry is lost.
+            Self::NotSymmetric => {
+                k.x += (w.y * a.z - w.z * a.y) * off;
+                k.y += (w.z * a.x - w.x * a.z) * off;
+                k.z += (w.x * a.y - w.y * a.x) * off;
+            }
+            Self::Negative => k = -k,
+            Self::LosesEnergy => k.x += a.x * off,
+            _ => {}
+        }
+        Ok(k)
+    }
+
+    fn linearise(
+        &self,
+        metric: &G,
+        z: &Vector3<f64>,
+        w: &Vector3<f64>,
+        a: &Vector3<f64>,
+    ) -> Result<DissipationJet<LieDual<3>>, MetricError> {
+        let mut jet = MetricDissipation.linearise(metric, z, w, a)?;
+        match self {
+            Self::AlongPoint => jet.along_z.m12 += 1e-6,
+            Self::AlongKilled => jet.along_w.m31 += 1e-6,
+            Self::AlongCovector => jet.tensor.m23 += 1e-6,
+            _ => {}
+        }
+        Ok(jet)
+    }
+}
+
+#[test]
+fn each_law_of_a_dissipation_can_break() {
+    let (x, w, a) = (vector![0.3, -0.7, 0.5], vector![1.0, 0.4, -0.8], vector![-0.2, 0.9, 0.6]);
+    let with = |dissipation: Leaky| {
+        let system = System::on(LieDual::so3())
+            .energy(|p: &Vector3<Real>| p.x.powi(2) + p.y.powi(2) * 0.5 + p.z * 0.1)
+            .entropy(square::<3>)
+            .build()
+            .unwrap();
+        With { system, dissipation }
+    };
+    let law = |fault| laws::dissipation(&with(fault), &x, &w, &a).err().map(|broken| broken.law);
+    assert_eq!(law(Leaky::None), None);
+    assert_eq!(law(Leaky::NotSymmetric), Some("K is symmetric"));
+    assert_eq!(law(Leaky::Negative), Some("K is positive semidefinite"));
+    assert_eq!(law(Leaky::LosesEnergy), Some("K_w w = 0"));
+    assert_eq!(law(Leaky::AlongPoint), Some("linearise is the derivative along x"));
+    assert_eq!(law(Leaky::AlongKilled), Some("linearise is the derivative along w"));
+    assert_eq!(law(Leaky::AlongCovector), Some("linearise is the derivative along α"));
+
+    // A run refuses the same faults, as far as a step can see them.
+    let refused = |fault| with(fault).verify(&x, 0.1).err();
+    assert_eq!(refused(Leaky::None), None);
+    assert!(matches!(
+        refused(Leaky::NotSymmetric),
+        Some(ModelError::DissipationNotSymmetric { .. })
+    ));
+    assert!(matches!(refused(Leaky::Negative), Some(ModelError::DissipationNotPositive { .. })));
+    assert!(matches!(refused(Leaky::LosesEnergy), Some(ModelError::EnergyNotKept { .. })));
 }

@@ -279,7 +279,7 @@ impl Findings<'_> {
 }
 
 /// A model that breaks one of its laws. `size` is relative to the terms that should cancel.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[derive(Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ModelError {
     /// The start is not a point of the manifold.
@@ -369,4 +369,11 @@ pub enum ModelError {
         /// The relative size of the violation.
         size: f64,
     },
+}
+
+/// The sentence of the `Display` form, which is what a `main` that returns the error prints.
+impl fmt::Debug for ModelError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        fmt::Display::fmt(self, f)
+    }
 }

@@ -9,13 +9,14 @@ use metriplectic_dynamics::SecondLaw;
 /// All figures of the laws are evaluated from the closures at the stored points, none from the
 /// terms of the scheme.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Certificate {
     /// The energy `H(x₀)`.
-    pub energy: f64,
+    pub initial_energy: f64,
     /// `max |H(x_k) − H(x₀)|`.
     pub max_energy_error: f64,
     /// The entropy `S(x₀)`; 0 without an entropy.
-    pub entropy: f64,
+    pub initial_entropy: f64,
     /// `min (S(x_{k+1}) − S(x_k))`; 0 before the first step.
     pub min_entropy_increment: f64,
     /// `S(x_n) − S(x₀)`.
@@ -35,23 +36,29 @@ pub struct Certificate {
     pub retries: usize,
     /// How often the globaliser was called.
     pub globalised: usize,
-    /// What the model promises about its entropy.
+    /// What the model promises about its entropy; serialized as the name of the variant.
+    #[cfg_attr(feature = "serde", serde(serialize_with = "by_name"))]
     pub second_law: SecondLaw,
+}
+
+#[cfg(feature = "serde")]
+fn by_name<S: serde::Serializer>(law: &SecondLaw, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_str(&format_args!("{law:?}"))
 }
 
 impl Certificate {
     /// `max |H(x_k) − H(x₀)| / |H(x₀)|`; the absolute error if `H(x₀) = 0`.
     pub fn max_relative_energy_error(&self) -> f64 {
-        if self.energy == 0.0 {
+        if self.initial_energy == 0.0 {
             self.max_energy_error
         } else {
-            self.max_energy_error / self.energy.abs()
+            self.max_energy_error / self.initial_energy.abs()
         }
     }
 
     /// Whether the first law was kept to round-off: `|H − H₀| ≤ 50 ε max(|H₀|, 1)`.
     pub fn keeps_energy(&self) -> bool {
-        self.max_energy_error <= 50.0 * f64::EPSILON * self.energy.abs().max(1.0)
+        self.max_energy_error <= 50.0 * f64::EPSILON * self.initial_energy.abs().max(1.0)
     }
 
     /// Whether the entropy fell on no step by more than its round-off.
@@ -64,11 +71,11 @@ impl fmt::Display for Certificate {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(
             f,
-            "first law:   |H − H₀| ≤ {:.1e}, {:.1e} of H₀ = {:.6}, over {} steps",
+            "first law:   |H − H₀| ≤ {:.1e}, {:.1e} of H₀ = {:.6}, over {}",
             self.max_energy_error,
             self.max_relative_energy_error(),
-            self.energy,
-            self.steps
+            self.initial_energy,
+            counted(self.steps, "step", "steps")
         )?;
         match self.second_law {
             SecondLaw::NoEntropy => writeln!(f, "second law:  no entropy, a Hamiltonian system"),
@@ -80,8 +87,10 @@ impl fmt::Display for Certificate {
         writeln!(f, "manifold:    defect ≤ {:.1e}", self.max_manifold_defect)?;
         write!(
             f,
-            "solver:      {} Newton sweeps ({} in the worst step), {} retries",
-            self.sweeps, self.worst_sweeps, self.retries
+            "solver:      {} ({} in the worst step), {}",
+            counted(self.sweeps, "Newton sweep", "Newton sweeps"),
+            self.worst_sweeps,
+            counted(self.retries, "retry", "retries")
         )
     }
 }
@@ -90,11 +99,49 @@ impl Certificate {
     fn entropy_line(&self) -> String {
         let falls = match self.entropy_falls {
             0 => "it never fell".to_owned(),
-            n => format!("it fell on {n} steps"),
+            n => format!("it fell on {}", counted(n, "step", "steps")),
         };
         format!(
             "ΔS ≥ {:.1e} on every step, {falls}; S rose by {:.6e}",
             self.min_entropy_increment, self.entropy_gained
         )
+    }
+}
+
+/// A number with its noun.
+fn counted(n: usize, one: &str, many: &str) -> String {
+    format!("{n} {}", if n == 1 { one } else { many })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const ONE_FALL: Certificate = Certificate {
+        initial_energy: 0.5,
+        max_energy_error: 1e-16,
+        initial_entropy: 1.0,
+        min_entropy_increment: -2e-9,
+        entropy_gained: 0.25,
+        entropy_falls: 1,
+        max_manifold_defect: 0.0,
+        steps: 7,
+        sweeps: 9,
+        worst_sweeps: 2,
+        retries: 1,
+        globalised: 0,
+        second_law: SecondLaw::Casimir,
+    };
+
+    #[test]
+    fn one_is_no_plural() {
+        let text = ONE_FALL.to_string();
+        for part in ["over 7 steps", "fell on 1 step;", "9 Newton sweeps", "1 retry"] {
+            assert!(text.contains(part), "\"{part}\" is missing in: {text}");
+        }
+        let text = Certificate { entropy_falls: 2, steps: 1, sweeps: 1, ..ONE_FALL }.to_string();
+        for part in ["over 1 step\n", "fell on 2 steps;", "1 Newton sweep ("] {
+            assert!(text.contains(part), "\"{part}\" is missing in: {text}");
+        }
     }
 }

@@ -1,4 +1,9 @@
 //! What can go wrong in a run.
+//!
+//! A `main` that returns an error prints its `Debug` form. For the errors of this module that is
+//! the sentence of their `Display` form.
+
+use std::fmt;
 
 use metriplectic_dynamics::{BuildError, ModelError, PoissonError};
 use metriplectic_manifolds::{AlgebraError, Manifold, MetricError, PointError};
@@ -7,7 +12,7 @@ use crate::span::SpanError;
 use crate::trajectory::Trajectory;
 
 /// A step that could not be taken, after its halves had been tried too.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[derive(Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum StepError {
     /// The implicit equation was not solved.
@@ -46,7 +51,7 @@ pub enum StepError {
 }
 
 /// A run that did not finish.
-#[derive(Clone, Debug, thiserror::Error)]
+#[derive(Clone, thiserror::Error)]
 #[non_exhaustive]
 pub enum RunError<M: Manifold> {
     /// The model breaks one of its laws.
@@ -77,7 +82,7 @@ impl<M: Manifold> RunError<M> {
 
 /// Everything that can go wrong between three closures and a trajectory, for programs that pass all
 /// of it on with `?`.
-#[derive(Debug, thiserror::Error)]
+#[derive(thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
     /// Structure constants that do not make a Lie algebra.
@@ -101,6 +106,9 @@ pub enum Error {
     /// A span that cannot be run.
     #[error(transparent)]
     Span(#[from] SpanError),
+    /// A step that could not be taken.
+    #[error(transparent)]
+    Step(#[from] StepError),
     /// A run that stopped; the [`RunError`] with the trajectory so far can be downcast from it.
     #[error("{0}")]
     Run(#[source] Box<dyn std::error::Error + Send + Sync>),
@@ -113,5 +121,23 @@ impl<M: Manifold> From<RunError<M>> for Error {
             RunError::Span(error) => Self::Span(error),
             error @ RunError::Step { .. } => Self::Run(Box::new(error)),
         }
+    }
+}
+
+impl fmt::Debug for StepError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        fmt::Display::fmt(self, f)
+    }
+}
+
+impl<M: Manifold> fmt::Debug for RunError<M> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        fmt::Display::fmt(self, f)
+    }
+}
+
+impl fmt::Debug for Error {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        fmt::Display::fmt(self, f)
     }
 }

@@ -138,7 +138,8 @@ impl<M: Manifold> Chord<M> {
             - arc.dd.transpose_times(&self.df)
             - slope.transpose_times(&arc.d);
         let signal = self.df.magnitude() * arc.d.magnitude();
-        let trust = signal.powi(2) / (signal.powi(2) + (1e3 * self.rounding).powi(2));
+        let noise = 1e3 * self.rounding / signal.max(f64::MIN_POSITIVE);
+        let trust = (1.0 + noise.powi(2)).recip();
         let mut along = rows * trust - arc.dd.transpose_times(&flat) * (2.0 * c);
         if let Some(slopes) = slopes {
             // ∂g along z, in ♭d and in G(d, d).
@@ -185,11 +186,10 @@ impl Integral {
         Self { value, error: (value - simpson).abs() + f64::EPSILON * size }
     }
 
-    /// The weight of the integral against a difference with the error `rounding`.
+    /// The weight of the integral against a difference with the error `rounding`. The square is
+    /// that of a ratio: those of the errors leave the range of numbers long before the state does.
     fn weight(&self, rounding: f64) -> f64 {
-        let (difference, integral) = (rounding.powi(2), self.error.powi(2));
-        let total = difference + integral;
-        if total > 0.0 { difference / total } else { 0.0 }
+        if rounding > 0.0 { (1.0 + (self.error / rounding).powi(2)).recip() } else { 0.0 }
     }
 }
 

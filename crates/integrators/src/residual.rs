@@ -4,10 +4,10 @@ use metriplectic_dynamics::{Bracket, Dissipation, Metriplectic, system::Point};
 use metriplectic_fields::{
     ChartPoint, Column, Scalar, ScalarField, Space, Square, Vector, differential,
 };
-use metriplectic_manifolds::{MetricError, Retraction, Riemannian};
+use metriplectic_manifolds::{Manifold, MetricError, Retraction, Riemannian};
 
 use crate::gonzalez::{Chord, gonzalez};
-use crate::root_finder::{Equation, Linearised};
+use crate::root_finder::{Equation, Linearised, Root};
 
 /// The equation of one step (Bloch, Farré Puiggalí, Martín de Diego 2024, §4.4), as a function of
 /// the initial displacement `u ∈ T_xM` of the arc:
@@ -35,6 +35,12 @@ pub struct Residual<'a, Y: Metriplectic, R> {
     pub recall: f64,
 }
 
+/// The residual with its Jacobian, and the discrete gradient `w` in it.
+struct Jet<M: Space> {
+    at: Linearised<M>,
+    w: Vector<M>,
+}
+
 impl<Y, R> Residual<'_, Y, R>
 where
     Y: Metriplectic,
@@ -59,6 +65,39 @@ where
         Ok(arc.d - (reversible + irreversible) * D::from(self.h))
     }
 
+    /// The error `e = H(x') − H(x) + recall` of the energy at the end of the arc of `u`.
+    fn imbalance(&self, u: &Vector<Y::Manifold>) -> Option<f64> {
+        let end = self.retraction.end(self.system.metric(), self.x, u).ok()?;
+        Some(self.system.energy_at(&end) - self.energy + self.recall)
+    }
+
+    /// One more correction for a root at which the energy is not kept to round-off.
+    ///
+    /// Both brackets kill `w`, so `⟨w, F(u)⟩ = e` for every `u`. Once `h|Π|` is large the sum
+    /// `d − h(Πw + K dS)` has lost digits of this number that the difference `H(x') − H(x)` has. So
+    /// the last correction is that of the residual whose part along `w` is exact,
+    /// `F + (e − ⟨w, F⟩) w/|w|²`, as long as this changes `F` within its round-off and reduces `e`.
+    #[inline]
+    pub(crate) fn last_correction(&self, root: &Root<Y::Manifold>) -> Option<Vector<Y::Manifold>> {
+        // A floor near the rounding of the entries of x' needs no correction.
+        let coarse = root.floor > 8.0 * f64::EPSILON * Y::Manifold::magnitude(self.x);
+        if coarse { self.balance(&root.u) } else { None }
+    }
+
+    /// The last correction, if there is an error to be corrected.
+    #[cold]
+    fn balance(&self, u: &Vector<Y::Manifold>) -> Option<Vector<Y::Manifold>> {
+        let e = self.imbalance(u)?;
+        if e.abs() <= 4.0 * f64::EPSILON * self.energy.abs() {
+            return None;
+        }
+        let Jet { at, w } = self.jet(u)?;
+        let lost = w * ((e - w.dot(&at.residual)) / w.dot(&w));
+        let correction = at.jacobian.solve(&(at.residual + lost))?;
+        let left = self.imbalance(&(*u - correction))?;
+        (lost.magnitude() <= at.floor && left.abs() < e.abs()).then_some(correction)
+    }
+
     /// The data of the discrete gradient of `H` along the arc of `u`.
     #[inline]
     fn chord(
@@ -74,34 +113,11 @@ where
             along.unwrap_or_else(|_| Y::Manifold::constant(end.0))
         })
     }
-}
 
-impl<Y, R> Equation<Y::Manifold> for Residual<'_, Y, R>
-where
-    Y: Metriplectic,
-    R: Retraction<Y::Manifold, Y::Metric>,
-{
-    /// The residual, safe against round-off.
+    /// The residual with its Jacobian, and `w`, from the jets `(f, df, Hf)` of the fields: no nested
+    /// dual number is formed.
     #[inline]
-    fn value(&self, u: &Vector<Y::Manifold>) -> Option<Vector<Y::Manifold>> {
-        let (system, metric) = (self.system, self.system.metric());
-        let arc = self.retraction.arc_jet(metric, self.x, u).ok()?;
-        let z = ChartPoint::<Y::Manifold>::centre(&arc.z);
-        let g = metric.at(&z).ok()?;
-        let df = system.energy().jet1(&arc.z).df;
-        let end = system.energy_at(&arc.end);
-        let w = self.chord(u, &df, &arc.d, (&arc.end, end)).covector(self.recall, &g, &arc.d);
-        let s = system.entropy().jet1(&arc.z).df;
-        let reversible = system.bracket().apply(&system.site(&z, &s), &w).ok()?;
-        let irreversible = system.dissipation().apply(metric, &z, &w, &s).ok()?;
-        let residual = arc.d - (reversible + irreversible) * self.h;
-        residual.is_finite().then_some(residual)
-    }
-
-    /// The residual with its Jacobian from the jets `(f, df, Hf)` of the fields: no nested dual
-    /// number is formed.
-    #[inline]
-    fn linearise(&self, u: &Vector<Y::Manifold>) -> Option<Linearised<Y::Manifold>> {
+    fn jet(&self, u: &Vector<Y::Manifold>) -> Option<Jet<Y::Manifold>> {
         let (system, metric, h) = (self.system, self.system.metric(), self.h);
         let arc = self.retraction.arc_jet(metric, self.x, u).ok()?;
         let centre = ChartPoint::<Y::Manifold>::centre(&arc.z);
@@ -130,6 +146,34 @@ where
         let floor =
             f64::EPSILON * (4.0 * h.abs() * terms + length) + h.abs() * gain * chord.noise(length);
         let usable = residual.is_finite() && jacobian.magnitude().is_finite();
-        usable.then_some(Linearised { residual, jacobian, floor })
+        usable.then_some(Jet { at: Linearised { residual, jacobian, floor }, w })
+    }
+}
+
+impl<Y, R> Equation<Y::Manifold> for Residual<'_, Y, R>
+where
+    Y: Metriplectic,
+    R: Retraction<Y::Manifold, Y::Metric>,
+{
+    /// The residual, safe against round-off.
+    #[inline]
+    fn value(&self, u: &Vector<Y::Manifold>) -> Option<Vector<Y::Manifold>> {
+        let (system, metric) = (self.system, self.system.metric());
+        let arc = self.retraction.arc_jet(metric, self.x, u).ok()?;
+        let z = ChartPoint::<Y::Manifold>::centre(&arc.z);
+        let g = metric.at(&z).ok()?;
+        let df = system.energy().jet1(&arc.z).df;
+        let end = system.energy_at(&arc.end);
+        let w = self.chord(u, &df, &arc.d, (&arc.end, end)).covector(self.recall, &g, &arc.d);
+        let s = system.entropy().jet1(&arc.z).df;
+        let reversible = system.bracket().apply(&system.site(&z, &s), &w).ok()?;
+        let irreversible = system.dissipation().apply(metric, &z, &w, &s).ok()?;
+        let residual = arc.d - (reversible + irreversible) * self.h;
+        residual.is_finite().then_some(residual)
+    }
+
+    #[inline]
+    fn linearise(&self, u: &Vector<Y::Manifold>) -> Option<Linearised<Y::Manifold>> {
+        self.jet(u).map(|jet| jet.at)
     }
 }

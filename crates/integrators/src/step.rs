@@ -141,8 +141,11 @@ impl<R> Scheme<R> {
             return Ok(start.x.clone());
         }
         let lost = NoRoot { best: root.u, residual: f64::INFINITY, sweeps: root.sweeps };
-        let end = self.retraction.end(system.metric(), start.x, &root.u).map_err(|_| lost)?;
-        Ok(memory.note::<Y::Manifold, _>(system.metric(), start.x, &root.u, end))
+        let last = residual.last_correction(&root);
+        work.sweeps += usize::from(last.is_some());
+        let u = last.map_or(root.u, |correction| root.u - correction);
+        let end = self.retraction.end(system.metric(), start.x, &u).map_err(|_| lost)?;
+        Ok(memory.note::<Y::Manifold, _>(system.metric(), start.x, &u, end))
     }
 
     /// Newton's method, and where it is lost the globaliser with Newton's polish.
@@ -194,6 +197,7 @@ pub struct Start<'a, Y: Metriplectic> {
 
 /// What a step cost.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Work {
     /// Linear systems solved by Newton's method.
     pub sweeps: usize,
@@ -233,7 +237,7 @@ fn recall<Y: Metriplectic>(system: &Y, start: &Start<'_, Y>, d: &Vector<Y::Manif
     let sizes = (pi.map_or(0.0, |pi| pi.tensor.max_abs()), k.map_or(0.0, |k| k.along_w.max_abs()));
     let gain = start.h * (sizes.0 + sizes.1);
     let r = d.dot(d) / (1e2 * gain * e.abs()).max(f64::MIN_POSITIVE);
-    if r.is_finite() { e * (r * r / (1.0 + r * r)) } else { 0.0 }
+    if r.is_finite() { e / (1.0 + r.powi(-2)) } else { 0.0 }
 }
 
 /// What a step remembers of the steps before it: three displacements, from which the next one is

@@ -12,17 +12,27 @@ use crate::step::{Memory, Scheme, Start, Work};
 
 /// A state of a run: time, point, and the two fields there.
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize), serde(bound = "M: Manifold"))]
 pub struct State<M: Space> {
     /// Steps taken.
     pub step: usize,
     /// The time `step · h`.
     pub time: f64,
-    /// The point.
+    /// The point; serialized as the list of its entries, in the order of [`Manifold::entries`].
+    #[cfg_attr(feature = "serde", serde(serialize_with = "entries::<M, _>"))]
     pub point: M::Point<f64>,
     /// The energy `H` there.
     pub energy: f64,
     /// The entropy `S` there; 0 without an entropy.
     pub entropy: f64,
+}
+
+#[cfg(feature = "serde")]
+fn entries<M: Manifold, S: serde::Serializer>(
+    point: &M::Point<f64>,
+    serializer: S,
+) -> Result<S::Ok, S::Error> {
+    serializer.collect_seq(M::entries(point))
 }
 
 /// An endless iterator over the states of a run, in constant memory; ended by an error.
@@ -48,9 +58,9 @@ where
         let energy = system.energy_at(&x0);
         let entropy = system.entropy_at(&x0);
         let certificate = Certificate {
-            energy,
+            initial_energy: energy,
             max_energy_error: 0.0,
-            entropy,
+            initial_entropy: entropy,
             min_entropy_increment: 0.0,
             entropy_gained: 0.0,
             entropy_falls: 0,
@@ -87,7 +97,7 @@ where
             time: self.state.time,
             h: self.h,
             energy: self.state.energy,
-            left_over: self.state.energy - self.certificate.energy,
+            left_over: self.state.energy - self.certificate.initial_energy,
         };
         let (point, work) = self.scheme.step(self.system, &start, &mut self.memory)?;
         let step = self.state.step + 1;
@@ -106,11 +116,11 @@ where
     /// Enters a step into the certificate.
     fn account(&mut self, next: &State<Y::Manifold>, work: Work) {
         let c = &mut self.certificate;
-        c.max_energy_error = c.max_energy_error.max((next.energy - c.energy).abs());
+        c.max_energy_error = c.max_energy_error.max((next.energy - c.initial_energy).abs());
         let increment = next.entropy - self.state.entropy;
         c.min_entropy_increment =
             if c.steps == 0 { increment } else { c.min_entropy_increment.min(increment) };
-        c.entropy_gained = next.entropy - c.entropy;
+        c.entropy_gained = next.entropy - c.initial_entropy;
         if increment < 0.0 && increment < -entropy_round_off(self.system, &self.state) {
             c.entropy_falls += 1;
         }
@@ -151,6 +161,7 @@ where
 
 /// The record of a run: states and certificate.
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize), serde(bound = "M: Manifold"))]
 pub struct Trajectory<M: Manifold> {
     states: Vec<State<M>>,
     certificate: Certificate,
@@ -260,7 +271,7 @@ impl<R> Scheme<R> {
     {
         span.check()?;
         let mut steps = self.steps(system, x0, span.step_size())?;
-        let mut states = Vec::with_capacity(span.recorded());
+        let mut states = Vec::with_capacity(span.room());
         states.push(steps.state().clone());
         for step in 1..=span.count() {
             match steps.advance() {
@@ -326,3 +337,33 @@ impl Run for WeylMidpoint {}
 impl Run for Exponential {}
 impl Run for Projection {}
 impl Run for Cayley {}
+
+#[cfg(all(test, feature = "serde"))]
+mod tests {
+    use super::*;
+    use metriplectic_dynamics::System;
+    use metriplectic_fields::Real;
+    use metriplectic_manifolds::Rotations;
+    use nalgebra::Matrix3;
+
+    #[test]
+    fn a_trajectory_is_written_with_the_entries_of_its_points() {
+        let group = System::on(Rotations::bi_invariant())
+            .energy(|r: &Matrix3<Real>| r.m11)
+            .entropy(|r: &Matrix3<Real>| r.m12)
+            .build()
+            .unwrap();
+        let run = WeylMidpoint.run(&group, Matrix3::identity(), Span::steps(0.1, 3)).unwrap();
+        let json = serde_json::to_value(&run).unwrap();
+        assert_eq!(json["certificate"]["steps"], 3);
+        assert_eq!(json["certificate"]["initial_energy"], 1.0);
+        assert_eq!(json["certificate"]["second_law"], "Casimir");
+        let states = json["states"].as_array().unwrap();
+        assert_eq!(states.len(), 4);
+        for (json, state) in states.iter().zip(&run) {
+            let point: Vec<f64> = serde_json::from_value(json["point"].clone()).unwrap();
+            assert_eq!(point, Rotations::entries(&state.point));
+            assert_eq!(json["energy"].as_f64(), Some(state.energy));
+        }
+    }
+}

@@ -149,6 +149,23 @@ impl Canvas<'_> {
         Ok(())
     }
 
+    /// A disc without an outline.
+    pub(crate) fn disc(&self, at: At, radius: f64, inside: RGBColor) -> Result<(), PlotError> {
+        self.area.draw(&Circle::new(whole(at), stroke(radius), inside.filled())).map_err(failed)
+    }
+
+    /// The outline of a disc.
+    pub(crate) fn circle(
+        &self,
+        at: At,
+        radius: f64,
+        color: RGBColor,
+        width: f64,
+    ) -> Result<(), PlotError> {
+        let style = color.stroke_width(stroke(width));
+        self.area.draw(&Circle::new(whole(at), stroke(radius), style)).map_err(failed)
+    }
+
     pub(crate) fn marker(&self, at: At, marker: Marker) -> Result<(), PlotError> {
         let color = color(marker.line);
         let inside = if marker.filled { color } else { WHITE };

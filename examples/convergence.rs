@@ -68,7 +68,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let relaxing = sphere().entropy(hill).build()?;
     let mixed =
         sphere().bracket(AreaForm).entropy(hill).second_law(SecondLaw::Published).build()?;
-    let rotations = System::on(Rotations::bi_invariant())
+    let frame = System::on(Rotations::bi_invariant())
         .bracket(Nambu::default())
         .energy(|r: &Matrix3<Real>| r.m11 + r.m22 * 2.0 + r.m33 * 3.0 + r.m12 * r.m23 * 0.5)
         .entropy(|r: &Matrix3<Real>| r.m13 - r.m21 * 0.5 + (r.m31 + r.m32).powi(2) * 0.25)
@@ -77,11 +77,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     studies.extend(study(&spinning, ["spinning_top", "spinning top", "S²"], vector)?);
     studies.extend(study(&relaxing, ["sphere_relaxation", "relaxation", "S²"], vector)?);
     studies.extend(study(&mixed, ["sphere_mixed", "relaxing top", "S²"], vector)?);
-    studies.extend(study(
-        &rotations,
-        ["so3_nambu", "Nambu bracket", "SO(3)"],
-        Matrix3::from_row_slice,
-    )?);
+    let matrix = Matrix3::from_row_slice;
+    studies.extend(study(&frame, ["so3_nambu", "Nambu bracket", "SO(3)"], matrix)?);
 
     let path = Gallery::open()?.path("convergence.svg");
     Convergence::figure("Order of convergence", &studies).guide(2.0).guide(1.0).save(&path)?;

@@ -51,9 +51,9 @@ fn the_spinning_top_keeps_its_energy_where_runge_kutta_drifts() {
     assert!(drift > 1e-8, "{report}");
     assert!(report["evaluations"].as_u64().expect("a count") < 12 * 1000, "{report}");
     assert_eq!(state.len(), 3);
-    // The exact flow to 17 digits at t = 30, and the error of second order of the phase.
+    // The exact flow at t = 30; the phase is off by an error of second order.
     let short = json(&example("spinning_top", &["--json", "--steps", "300"]));
-    let exact = [-0.203_053_235_045_859_31, 0.965_621_558_203_722_63, -0.162_309_550_149_169_38];
+    let exact = [-0.203_053_235_046, 0.965_621_558_204, -0.162_309_550_149];
     let (_, end) = certified(&short);
     assert!(end.iter().zip(exact).all(|(a, b)| (a - b).abs() < 1e-3), "{short}");
 }

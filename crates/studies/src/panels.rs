@@ -118,17 +118,24 @@ impl Panel {
             ranges[1] = wider(ranges[1], y);
         }
         ranges[1] = (self.shown(ranges[1].0), self.shown(ranges[1].1));
-        Ok(ranges)
+        match self.floor {
+            Some(low) if !(low.is_normal() && low > 0.0) => {
+                Err(PlotError::Range { low, high: ranges[1].1 })
+            }
+            _ => Ok(ranges),
+        }
     }
 
     /// Whether all ordinates have a place on the axis, if it is logarithmic.
     fn check_logarithms(&self, label: &str, points: &[(f64, f64)]) -> Result<(), PlotError> {
-        let Some(floor) = self.floor else { return Ok(()) };
-        let lost = |(_, y): &(f64, f64)| *y < 0.0 || !(floor > 0.0 && floor.is_finite());
-        points.iter().position(lost).map_or(Ok(()), |index| {
-            let (x, y) = points[index];
-            Err(PlotError::NonPositive { name: label.to_owned(), index, x, y })
-        })
+        let negative = |(_, y): &(f64, f64)| *y < 0.0;
+        match points.iter().position(negative).filter(|_| self.floor.is_some()) {
+            Some(index) => {
+                let (x, y) = points[index];
+                Err(PlotError::NonPositive { name: label.to_owned(), index, x, y })
+            }
+            None => Ok(()),
+        }
     }
 
     fn axes(&self, (width, height): At) -> Result<(Axis, Axis), PlotError> {
@@ -463,7 +470,7 @@ mod tests {
         let error = |panel| Panels::new("f").panel(panel).svg().unwrap_err();
         assert!(matches!(error(panel(-1e-3)), PlotError::NonPositive { index: 1, .. }));
         assert!(matches!(error(panel(1.0).level(-1.0)), PlotError::NonPositive { .. }));
-        assert!(matches!(error(panel(1.0).logarithmic(0.0)), PlotError::NonPositive { .. }));
+        assert!(matches!(error(panel(1.0).logarithmic(0.0)), PlotError::Range { .. }));
     }
 
     #[test]

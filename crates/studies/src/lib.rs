@@ -10,7 +10,7 @@
 //! | [`drift`] | does the error grow with time? | [`Drift`]: flat, a random walk or a linear drift, in constant memory |
 //! | [`table`] | what does the study say, in rows? | [`Table`]: plain text and Markdown |
 //! | [`plot`] | what does it look like? | [`Panels`] of lines, with a [`Globe`] beside them, and [`LogLog`]: SVG, the same bytes every time |
-//! | [`gallery`] | where do the pictures of an example go? | [`Options`], [`Gallery`], [`Progress`], [`print`], [`write_csv`] |
+//! | [`gallery`] | where do the pictures and the words of an example go? | [`Options`], [`Gallery`], [`Progress`], [`print()`], [`write_csv`] |
 //!
 //! # Example
 //!

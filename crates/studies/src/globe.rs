@@ -403,12 +403,19 @@ mod tests {
 
     #[test]
     fn the_same_bytes_every_time_and_small() {
-        let long =
-            || (0..200_000).map(f64::from).map(|n| [(1e-3 * n).cos(), (1e-3 * n).sin(), 0.0]);
-        let globe = || Globe::new("globe").curve("a", long().take(6000)).level("b", equator());
+        let circle = || (0..6000).map(|n| 1e-3 * f64::from(n)).map(|t| [t.cos(), t.sin(), 0.0]);
+        let globe = || Globe::new("globe").curve("a", circle()).level("b", equator());
         let figure = || Panels::new("title").globe(globe()).svg().unwrap();
         assert_eq!(figure(), figure());
         assert!(figure().len() < 60_000, "{} bytes", figure().len());
+    }
+
+    #[test]
+    fn points_too_near_to_be_told_apart_are_left_out() {
+        let line: Vec<At> = (0..=1000).map(|n| (0.01 * f64::from(n), 0.0)).collect();
+        let kept = spaced(&line);
+        assert!((30..=36).contains(&kept.len()), "{}", kept.len());
+        assert_eq!((kept[0], kept[kept.len() - 1]), (line[0], line[1000]));
     }
 
     #[test]

@@ -7,7 +7,7 @@
 use std::error::Error;
 
 use metriplectic::prelude::*;
-use metriplectic_studies::{Convergence, Gallery, Options};
+use metriplectic_studies::{Convergence, Gallery, Options, print};
 use serde_json::{Value, json};
 
 /// The number of steps of each run.
@@ -22,10 +22,10 @@ fn hill(x: &Vector3<Real>) -> Real {
     x.z + x.x * x.y * 0.3
 }
 
-/// Both retractions on one problem of the data file.
+/// Both retractions on one problem, by its key in the data file, its name and its manifold.
 fn study<Y: Metriplectic>(
     system: &Y,
-    [problem, manifold]: [&str; 2],
+    [key, problem, manifold]: [&str; 3],
     point: impl Fn(&[f64]) -> metriplectic::dynamics::Point<Y>,
 ) -> Result<Vec<Convergence>, Box<dyn Error>>
 where
@@ -33,10 +33,10 @@ where
     Exponential: Retraction<Y::Manifold, Y::Metric>,
 {
     let cases: Value = serde_json::from_str(include_str!("../tests/data/flow.json"))?;
-    let case = cases.as_array().into_iter().flatten().find(|case| case["name"] == problem);
+    let case = cases.as_array().into_iter().flatten().find(|case| case["name"] == key);
     let case = case.ok_or("the problem is not in the data")?;
-    let numbers = |key: &str| -> Result<Vec<f64>, Box<dyn Error>> {
-        let digits: Vec<String> = serde_json::from_value(case[key].clone())?;
+    let numbers = |entry: &str| -> Result<Vec<f64>, Box<dyn Error>> {
+        let digits: Vec<String> = serde_json::from_value(case[entry].clone())?;
         Ok(digits.iter().map(|digits| digits.parse()).collect::<Result<_, _>>()?)
     };
     let (start, exact) = (point(&numbers("x0")?), numbers("x_T")?);
@@ -68,16 +68,17 @@ fn main() -> Result<(), Box<dyn Error>> {
     let relaxing = sphere().entropy(hill).build()?;
     let mixed =
         sphere().bracket(AreaForm).entropy(hill).second_law(SecondLaw::Published).build()?;
-    let rotations = System::on(Rotations::bi_invariant())
+    let frame = System::on(Rotations::bi_invariant())
         .bracket(Nambu::default())
         .energy(|r: &Matrix3<Real>| r.m11 + r.m22 * 2.0 + r.m33 * 3.0 + r.m12 * r.m23 * 0.5)
         .entropy(|r: &Matrix3<Real>| r.m13 - r.m21 * 0.5 + (r.m31 + r.m32).powi(2) * 0.25)
         .build()?;
-    let mut studies = study(&body, ["rigid_body", "so(3)*"], vector)?;
-    studies.extend(study(&spinning, ["spinning_top", "S²"], vector)?);
-    studies.extend(study(&relaxing, ["sphere_relaxation", "S²"], vector)?);
-    studies.extend(study(&mixed, ["sphere_mixed", "S²"], vector)?);
-    studies.extend(study(&rotations, ["so3_nambu", "SO(3)"], Matrix3::from_row_slice)?);
+    let mut studies = study(&body, ["rigid_body", "rigid body", "so(3)*"], vector)?;
+    studies.extend(study(&spinning, ["spinning_top", "spinning top", "S²"], vector)?);
+    studies.extend(study(&relaxing, ["sphere_relaxation", "relaxation", "S²"], vector)?);
+    studies.extend(study(&mixed, ["sphere_mixed", "relaxing top", "S²"], vector)?);
+    let matrix = Matrix3::from_row_slice;
+    studies.extend(study(&frame, ["so3_nambu", "Nambu bracket", "SO(3)"], matrix)?);
 
     let path = Gallery::open()?.path("convergence.svg");
     Convergence::figure("Order of convergence", &studies).guide(2.0).guide(1.0).save(&path)?;
@@ -87,9 +88,9 @@ fn main() -> Result<(), Box<dyn Error>> {
             "steps": s.steps, "errors": s.errors,
             "order": s.order.slope, "order_interval": s.order.interval,
         }));
-        println!("{}", Value::Array(rows.collect()));
+        print(Value::Array(rows.collect()))?;
     } else {
-        println!("{}\nfigure: {}", Convergence::table(&studies), path.display());
+        print(format_args!("{}\nfigure: {}", Convergence::table(&studies), path.display()))?;
     }
     Ok(())
 }

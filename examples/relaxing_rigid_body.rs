@@ -9,7 +9,7 @@
 use std::error::Error;
 
 use metriplectic::prelude::*;
-use metriplectic_studies::{Gallery, Options, Panel, Panels, Progress, write_csv};
+use metriplectic_studies::{Gallery, Options, Panel, Panels, Progress, print, write_csv};
 
 const INERTIA: Vector3<f64> = Vector3::new(10.0, 5.0, 1.0);
 const START: Vector3<f64> = Vector3::new(0.001, -1.0, 0.001);
@@ -60,13 +60,16 @@ fn main() -> Result<(), Box<dyn Error>> {
         let mut report = serde_json::to_value(certificate)?;
         report["max_relative_energy_error"] = certificate.max_relative_energy_error().into();
         report["final_state"] = end.point.as_slice().into();
-        println!("{report}");
+        print(report)?;
     } else {
         let [x, y, z]: [f64; 3] = end.point.into();
-        println!("{certificate}");
-        println!("at t = {:.1}:  p = ({x:.6}, {y:.6}, {z:.6})", end.time);
-        println!("at rest:      |p₁| = √(2HI₁) = {:.6}", (2.0 * energy * INERTIA.x).sqrt());
-        println!("figure:       {}", gallery.path("relaxing_rigid_body.svg").display());
+        print(certificate)?;
+        print(format_args!("at t = {:.1}:  p = ({x:.6}, {y:.6}, {z:.6})", end.time))?;
+        print(format_args!(
+            "at rest:      |p₁| = √(2HI₁) = {:.6}",
+            (2.0 * energy * INERTIA.x).sqrt()
+        ))?;
+        print(format_args!("figure:       {}", gallery.path("relaxing_rigid_body.svg").display()))?;
     }
     Ok(())
 }

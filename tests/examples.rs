@@ -43,6 +43,62 @@ fn the_relaxing_rigid_body_prints_one_object() {
     assert!((state[0] + 1.414_217).abs() < 1e-3 && state.len() == 3);
 }
 
+/// The numbers that every example reports, with the state at the end.
+fn certified(report: &serde_json::Value) -> ([f64; 3], Vec<f64>) {
+    let keys = ["max_relative_energy_error", "min_entropy_increment", "max_manifold_defect"];
+    let numbers = keys.map(|key| report[key].as_f64().expect("a number"));
+    let state = serde_json::from_value(report["final_state"].clone());
+    (numbers, state.expect("a list of numbers"))
+}
+
+#[test]
+fn the_spinning_top_keeps_its_energy_where_runge_kutta_drifts() {
+    let report = json(&example("spinning_top", &["--json"]));
+    let ([energy, entropy, defect], state) = certified(&report);
+    assert!(energy <= 5e-15 && entropy == 0.0 && defect <= 1e-15, "{report}");
+    let drift = report["runge_kutta_energy_error"].as_f64().expect("a number");
+    assert!(drift > 1e-8, "{report}");
+    assert!(report["evaluations"].as_u64().expect("a count") < 12 * 1000, "{report}");
+    assert_eq!(state.len(), 3);
+    // The exact flow at t = 30; the phase is off by an error of second order.
+    let short = json(&example("spinning_top", &["--json", "--steps", "300"]));
+    let exact = [-0.203_053_235_046, 0.965_621_558_204, -0.162_309_550_149];
+    let (_, end) = certified(&short);
+    assert!(end.iter().zip(exact).all(|(a, b)| (a - b).abs() < 1e-3), "{short}");
+}
+
+#[test]
+fn the_sphere_relaxation_climbs_to_the_top_of_its_level_curve() {
+    let report = json(&example("sphere_relaxation", &["--json"]));
+    let ([energy, entropy, defect], state) = certified(&report);
+    assert!(energy <= 5e-15 && entropy > 0.0 && defect <= 1e-15, "{report}");
+    // At rest dS ∥ dH on the sphere: x, ∇S and ∇H are in one plane.
+    let [x, y, z] = state[..] else { panic!("{report}") };
+    let ds = [0.3 * y, 0.3 * x, 1.0];
+    let dh = [x + x * x, 0.5 * (y + y * y), 0.25 * (z + z * z)];
+    let volume = x * (ds[1] * dh[2] - ds[2] * dh[1])
+        + y * (ds[2] * dh[0] - ds[0] * dh[2])
+        + z * (ds[0] * dh[1] - ds[1] * dh[0]);
+    assert!(volume.abs() < 1e-3, "{volume:.1e} in {report}");
+}
+
+#[test]
+fn the_rotations_reach_the_reference_state() {
+    let report = json(&example("rotations", &["--json"]));
+    let ([energy, entropy, defect], state) = certified(&report);
+    assert!(energy <= 5e-15 && entropy > 0.0 && defect <= 4e-15, "{report}");
+    let cases: serde_json::Value =
+        serde_json::from_str(include_str!("data/flow.json")).expect("the data are JSON");
+    let case = cases.as_array().into_iter().flatten().find(|case| case["name"] == "so3_nambu");
+    let exact: Vec<String> =
+        serde_json::from_value(case.expect("the case")["x_T"].clone()).expect("a list of digits");
+    assert_eq!((state.len(), exact.len()), (9, 9));
+    for (entry, digits) in state.iter().zip(&exact) {
+        let exact: f64 = digits.parse().expect("a number");
+        assert!((entry - exact).abs() < 1e-3, "{entry} for {exact}");
+    }
+}
+
 #[test]
 fn the_run_of_an_example_can_be_changed() {
     let arguments = ["--json", "--steps", "10", "--step-size", "0.05"];

@@ -30,35 +30,38 @@ fn metrics<const N: usize>() -> impl Strategy<Value = SMatrix<f64, N, N>> {
     })
 }
 
-/// `Σ a_i x_i² + b_i sin x_i + c_i x_i x_{i+1}²`, a closure over `Real`.
-fn wavy<const N: usize>([a, b, c]: Coefficients<N>) -> impl Fn(&SVector<Real, N>) -> Real {
-    move |x| {
-        (0..N)
-            .map(|i| {
-                let next = x[(i + 1) % N];
-                x[i].powi(2) * a[i] + x[i].sin() * b[i] + x[i] * next * next * c[i]
-            })
-            .sum()
-    }
+/// `Σ a_i x_i² + b_i sin x_i + c_i x_i x_{i+1}²`.
+fn waves<D: Scalar, const N: usize>([a, b, c]: &Coefficients<N>, x: &SVector<D, N>) -> D {
+    (0..N)
+        .map(|i| {
+            let next = x[(i + 1) % N];
+            x[i].powi(2) * a[i] + x[i].sin() * b[i] + x[i] * next * next * c[i]
+        })
+        .sum()
 }
 
-/// The same function as a type with a generic method.
+/// The waves as a closure over `Real`.
+fn wavy<const N: usize>(c: Coefficients<N>) -> impl Fn(&SVector<Real, N>) -> Real {
+    move |x| waves(&c, x)
+}
+
+/// The waves as a type with a generic method.
 struct Wavy<const N: usize>(Coefficients<N>);
 
 impl<const N: usize> ScalarField<Euclidean<N>> for Wavy<N> {
     fn at<D: Scalar>(&self, x: &SVector<D, N>) -> D {
-        let Self([a, b, c]) = *self;
-        (0..N)
-            .map(|i| {
-                let next = x[(i + 1) % N];
-                x[i].powi(2) * a[i] + x[i].sin() * b[i] + x[i] * next * next * c[i]
-            })
-            .sum()
+        waves(&self.0, x)
+    }
+}
+
+impl<const N: usize> ScalarField<LieDual<N>> for Wavy<N> {
+    fn at<D: Scalar>(&self, x: &SVector<D, N>) -> D {
+        waves(&self.0, x)
     }
 }
 
 /// Compares value and Jacobian of the residual of a step from `x` with its definition at dual
-/// numbers.
+/// numbers, for both retractions.
 fn agrees<Y: Metriplectic>(
     system: &Y,
     x: &<Y::Manifold as metriplectic::fields::Space>::Point<f64>,
@@ -66,15 +69,20 @@ fn agrees<Y: Metriplectic>(
 ) -> Result<(), TestCaseError>
 where
     WeylMidpoint: Retraction<Y::Manifold, Y::Metric>,
+    Exponential: Retraction<Y::Manifold, Y::Metric>,
 {
-    let residual = Residual {
-        system,
-        retraction: &WeylMidpoint,
-        x,
-        h: 0.1,
-        energy: system.energy_at(x),
-        recall: 0.0,
-    };
+    agrees_with(&WeylMidpoint, system, x, u)?;
+    agrees_with(&Exponential, system, x, u)
+}
+
+fn agrees_with<Y: Metriplectic, R: Retraction<Y::Manifold, Y::Metric>>(
+    retraction: &R,
+    system: &Y,
+    x: &<Y::Manifold as metriplectic::fields::Space>::Point<f64>,
+    u: &metriplectic::fields::Vector<Y::Manifold>,
+) -> Result<(), TestCaseError> {
+    let residual =
+        Residual { system, retraction, x, h: 0.1, energy: system.energy_at(x), recall: 0.0 };
     let Some(assembled) = residual.linearise(u) else {
         return Err(TestCaseError::fail("the residual is defined"));
     };
@@ -162,6 +170,53 @@ proptest! {
                 .unwrap();
             agrees(&system, &x6, &u6)?;
         }
+    }
+
+    #[test]
+    fn on_the_dual_of_an_algebra_in_a_random_basis(
+        h in coefficients::<3>(), s in coefficients::<3>(),
+        basis in metrics::<3>(), g in metrics::<3>(),
+        x in columns::<3>(1.0), u in displacements::<3>(),
+    ) {
+        // so(3) and sl(2) in the basis of the columns of B: no structure constant is zero.
+        let so3 = [Vector3::x(), Vector3::y(), Vector3::z()].map(|e| e.cross_matrix());
+        let diagonal = Matrix2::new(1.0, 0.0, 0.0, -1.0);
+        let sl2 = [diagonal, Matrix2::new(0.0, 1.0, 0.0, 0.0), Matrix2::new(0.0, 0.0, 1.0, 0.0)];
+        let mixed = |e: &[Matrix3<f64>; 3], j: usize| (0..3).map(|i| e[i] * basis[(i, j)]).sum();
+        let rotations = LieAlgebra::of_matrices(&[0, 1, 2].map(|j| mixed(&so3, j))).unwrap();
+        let mixed = |e: &[Matrix2<f64>; 3], j: usize| (0..3).map(|i| e[i] * basis[(i, j)]).sum();
+        let squeezes = LieAlgebra::of_matrices(&[0, 1, 2].map(|j| mixed(&sl2, j))).unwrap();
+        for algebra in [rotations, squeezes] {
+            let system = System::on(LieDual::of(algebra))
+                .metric(Metric::constant(g).unwrap())
+                .energy(Wavy(h))
+                .entropy(wavy(s))
+                .second_law(SecondLaw::Published)
+                .build()
+                .unwrap();
+            agrees(&system, &x, &u)?;
+        }
+    }
+
+    #[test]
+    fn with_a_metric_that_varies(
+        h in coefficients::<2>(), s in coefficients::<2>(), c in prop::array::uniform2(-0.3..0.3),
+        x in columns::<2>(0.5), u in displacements::<2>(),
+    ) {
+        // Geodesics are integrated to 10⁻¹³, and so are the derivatives of their ends.
+        let metric = move |q: &Vector2<Real>| {
+            let (a, b) = (q.x.sin() * c[0] + 1.0, q.y.cos() * c[1] + 1.0);
+            Matrix2::new(a, a * b * 0.25, a * b * 0.25, b)
+        };
+        let system = System::on(Euclidean::<2>)
+            .metric(Metric::field(metric))
+            .bracket(AreaForm)
+            .energy(wavy(h))
+            .entropy(Wavy(s))
+            .second_law(SecondLaw::Published)
+            .build()
+            .unwrap();
+        agrees(&system, &x, &u)?;
     }
 
     #[test]

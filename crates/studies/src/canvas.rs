@@ -135,18 +135,26 @@ impl Canvas<'_> {
         self.area.draw(&PathElement::new(path, color.stroke_width(stroke(width)))).map_err(failed)
     }
 
-    /// A straight line in dashes.
-    pub(crate) fn dashed(&self, from: At, to: At, color: RGBColor) -> Result<(), PlotError> {
-        let (dash, gap) = (5.0, 4.0);
-        let (dx, dy) = (to.0 - from.0, to.1 - from.1);
-        let length = dx.hypot(dy);
-        let at = |s: f64| (from.0 + s / length * dx, from.1 + s / length * dy);
-        let mut start = 0.0;
-        while start < length {
-            self.line([at(start), at((start + dash).min(length))], color, 1.0)?;
-            start += dash + gap;
-        }
-        Ok(())
+    /// A line through these points in dashes.
+    pub(crate) fn dashed(&self, points: &[At], color: RGBColor) -> Result<(), PlotError> {
+        dashes(points).into_iter().try_for_each(|dash| self.line(dash, color, 1.0))
+    }
+
+    /// A disc without an outline.
+    pub(crate) fn disc(&self, at: At, radius: f64, inside: RGBColor) -> Result<(), PlotError> {
+        self.area.draw(&Circle::new(whole(at), stroke(radius), inside.filled())).map_err(failed)
+    }
+
+    /// The outline of a disc.
+    pub(crate) fn circle(
+        &self,
+        at: At,
+        radius: f64,
+        color: RGBColor,
+        width: f64,
+    ) -> Result<(), PlotError> {
+        let style = color.stroke_width(stroke(width));
+        self.area.draw(&Circle::new(whole(at), stroke(radius), style)).map_err(failed)
     }
 
     pub(crate) fn marker(&self, at: At, marker: Marker) -> Result<(), PlotError> {
@@ -159,10 +167,47 @@ impl Canvas<'_> {
     }
 }
 
-/// Disc, square, triangle, diamond, as polygons around a point.
+/// The dashes of a line.
+fn dashes(points: &[At]) -> Vec<Vec<At>> {
+    let (dash, gap) = (5.0, 4.0);
+    let mut dashes = vec![Vec::new()];
+    // Whether a dash is being drawn, and how far it is to its end, or to the next.
+    let (mut drawn, mut left) = (true, dash);
+    for pair in points.windows(2) {
+        let (from, to) = (pair[0], pair[1]);
+        let length = (to.0 - from.0).hypot(to.1 - from.1);
+        let at =
+            |s: f64| (from.0 + s / length * (to.0 - from.0), from.1 + s / length * (to.1 - from.1));
+        let mut start = 0.0;
+        while start < length {
+            let end = (start + left).min(length);
+            if drawn {
+                dashes.last_mut().into_iter().for_each(|dash| dash.extend([at(start), at(end)]));
+            }
+            left -= end - start;
+            if end < length {
+                drawn = !drawn;
+                left = if drawn { dash } else { gap };
+                dashes.push(Vec::new());
+            }
+            start = end;
+        }
+    }
+    dashes.retain(|dash| !dash.is_empty());
+    dashes
+}
+
+/// Disc, square, triangle, diamond, pentagon, and the triangle on its tip, as polygons around a
+/// point.
 fn marker_outline((x, y): At, line: usize) -> Vec<At> {
-    let (corners, radius, turn) =
-        [(16, 3.6, 0.0), (4, 4.6, 0.5), (3, 4.8, 0.75), (4, 4.8, 0.0)][line % 4];
+    let (corners, radius, turn) = [
+        (16, 3.6, 0.0),
+        (4, 4.6, 0.5),
+        (3, 4.8, 0.75),
+        (4, 4.8, 0.0),
+        (5, 4.2, 0.25),
+        (3, 4.8, 0.25),
+    ][line % 6];
     let corner = |k: u8| {
         let angle = std::f64::consts::TAU * (f64::from(k) + turn) / f64::from(corners);
         (x + radius * angle.cos(), y - radius * angle.sin())
@@ -181,4 +226,31 @@ fn whole((x, y): At) -> (i32, i32) {
 
 fn failed(source: impl Error + Send + Sync + 'static) -> PlotError {
     PlotError::Backend { source: Box::new(source) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn dashes_go_round_corners_and_cover_five_parts_of_nine() {
+        let corner: [At; 3] = [(0.0, 0.0), (47.0, 0.0), (47.0, 43.0)];
+        let length = |dash: &Vec<At>| -> f64 {
+            dash.windows(2).map(|p| (p[1].0 - p[0].0).hypot(p[1].1 - p[0].1)).sum()
+        };
+        let dashes = dashes(&corner);
+        assert_eq!(dashes.len(), 10);
+        assert!(dashes.iter().all(|dash| (length(dash) - 5.0).abs() < 1e-9), "{dashes:?}");
+        assert_eq!(dashes[0], [(0.0, 0.0), (5.0, 0.0)]);
+        // The sixth begins at 45 and has its end behind the corner.
+        assert_eq!((dashes[5][0], dashes[5][dashes[5].len() - 1]), ((45.0, 0.0), (47.0, 3.0)));
+    }
+
+    #[test]
+    fn six_lines_differ_in_colour_and_in_marker() {
+        let outlines: Vec<_> = (0..6).map(|line| marker_outline((0.0, 0.0), line)).collect();
+        for i in 0..6 {
+            assert!((0..i).all(|j| color(i) != color(j) && outlines[i] != outlines[j]));
+        }
+    }
 }

@@ -73,14 +73,24 @@ impl Convergence {
         table
     }
 
-    /// A figure of studies, a series each.
+    /// A figure of studies, a series each; the schemes that follow the first on a problem are dashed.
     #[must_use]
     pub fn figure(title: &str, studies: &[Self]) -> LogLog {
-        studies.iter().fold(LogLog::new(title, "h", "error"), |figure, study| {
+        let mut figure = LogLog::new(title, "h", "error");
+        let mut before = None;
+        for study in studies {
             let points: Vec<(f64, f64)> =
                 study.steps.iter().copied().zip(study.errors.iter().copied()).collect();
-            figure.series(format!("{}, {}", study.problem, study.scheme), points)
-        })
+            let label = format!("{} on {}, {}", study.problem, study.manifold, study.scheme);
+            let place = Some((&study.problem, &study.manifold));
+            figure = if before == place {
+                figure.rival(label, points)
+            } else {
+                figure.series(label, points)
+            };
+            before = place;
+        }
+        figure
     }
 }
 

@@ -54,7 +54,7 @@ impl Frame {
     /// A dashed line at this height.
     pub(crate) fn level(&self, canvas: &Canvas<'_>, y: f64) -> Result<(), PlotError> {
         let place = self.y.place(y);
-        canvas.dashed(self.between(0.0, place), self.between(1.0, place), INK)
+        canvas.dashed(&[self.between(0.0, place), self.between(1.0, place)], INK)
     }
 
     fn between(&self, u: f64, v: f64) -> At {

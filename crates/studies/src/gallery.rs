@@ -1,4 +1,4 @@
-//! What every example shares: its options, its folder, its data files and its progress.
+//! What every example shares: its options, its folder, its data files, what it prints and its progress.
 
 use std::{
     env,
@@ -165,6 +165,28 @@ pub fn write_csv<const N: usize>(
     write().map_err(named)
 }
 
+/// Prints a line to standard output. A reader that has left, as `head` does, is no error.
+///
+/// ```
+/// # fn main() -> std::io::Result<()> {
+/// metriplectic_studies::print(format_args!("{:.3}", std::f64::consts::PI))
+/// # }
+/// ```
+///
+/// # Errors
+///
+/// Those of writing to standard output, but for a pipe that nobody reads any more.
+pub fn print(text: impl fmt::Display) -> io::Result<()> {
+    write_line(io::stdout().lock(), text)
+}
+
+fn write_line(mut out: impl Write, text: impl fmt::Display) -> io::Result<()> {
+    match writeln!(out, "{text}").and_then(|()| out.flush()) {
+        Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
+        written => written,
+    }
+}
+
 /// A name as RFC 4180 wants it.
 fn quoted(name: &str) -> String {
     if name.contains([',', '"', '\n', '\r']) {
@@ -320,6 +342,28 @@ mod tests {
         let bits = rows.iter().flatten().map(|x| x.to_bits());
         assert_eq!(read.flatten().collect::<Vec<_>>(), bits.collect::<Vec<_>>());
         fs::remove_dir_all(folder).unwrap();
+    }
+
+    /// A writer that fails in this way.
+    struct Failing(io::ErrorKind);
+
+    impl Write for Failing {
+        fn write(&mut self, _: &[u8]) -> io::Result<usize> {
+            Err(self.0.into())
+        }
+
+        fn flush(&mut self) -> io::Result<()> {
+            Ok(())
+        }
+    }
+
+    #[test]
+    fn a_reader_may_leave() {
+        assert!(write_line(Failing(io::ErrorKind::BrokenPipe), "text").is_ok());
+        assert!(write_line(Failing(io::ErrorKind::StorageFull), "text").is_err());
+        let mut text = Vec::new();
+        write_line(&mut text, 1.5).unwrap();
+        assert_eq!(text, b"1.5\n");
     }
 
     #[test]

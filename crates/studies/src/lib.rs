@@ -10,8 +10,8 @@
 //! | [`problems`] | on what, on every manifold and metric? | [`problems::each`], with exact flows by [`problems::flow`] |
 //! | [`drift`] | does the error grow with time? | [`Drift`]: flat, a random walk or a linear drift, in constant memory |
 //! | [`table`] | what does the study say, in rows? | [`Table`]: plain text and Markdown |
-//! | [`plot`] | what does it look like? | [`Panels`] and [`LogLog`]: SVG, the same bytes every time |
-//! | [`gallery`] | where do the pictures of an example go? | [`Options`], [`Gallery`], [`Progress`], [`write_csv`] |
+//! | [`plot`] | what does it look like? | [`Panels`] of lines, with a [`Globe`] beside them, and [`LogLog`]: SVG, the same bytes every time |
+//! | [`gallery`] | where do the pictures and the words of an example go? | [`Options`], [`Gallery`], [`Progress`], [`print()`], [`write_csv`] |
 //!
 //! # Example
 //!
@@ -51,13 +51,15 @@ pub mod table;
 mod axis;
 mod canvas;
 mod frame;
+mod globe;
+mod header;
 mod log_log;
 mod panels;
 mod student;
 
 pub use convergence::Convergence;
 pub use drift::{Drift, Growth, Slope};
-pub use gallery::{Gallery, GalleryError, Options, Progress, write_csv};
+pub use gallery::{Gallery, GalleryError, Options, Progress, print, write_csv};
 pub use order::{Order, OrderError};
-pub use plot::{LogLog, Panel, Panels, PlotError};
+pub use plot::{Globe, LogLog, Panel, Panels, PlotError};
 pub use table::{Table, scientific};

@@ -10,6 +10,11 @@ use crate::{
     plot::{self, PlotError},
 };
 
+/// Height of an entry of the legend.
+const ROW: f64 = 42.0;
+/// Length of the line that stands in it.
+const SAMPLE: f64 = 30.0;
+
 /// A figure of errors over step sizes, with the fitted [`Order`] of each series in the legend.
 ///
 /// Points left out of a fit as round-off have hollow markers.
@@ -34,9 +39,18 @@ pub struct LogLog {
     guides: Vec<f64>,
 }
 
+/// How a series is drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Look {
+    /// The number of its colour and marker.
+    line: usize,
+    dashed: bool,
+}
+
 #[derive(Clone, Debug)]
 struct Series {
     label: String,
+    look: Look,
     /// From the smallest step up.
     points: Vec<(f64, f64)>,
     /// As given, for errors to name.
@@ -61,10 +75,24 @@ impl LogLog {
         }
     }
 
-    /// Adds a series of points `(h, error)`, in any order.
+    /// Adds a series of points `(h, error)`, in any order, with a colour and a marker of its own as
+    /// long as there are six at most.
     #[must_use]
-    pub fn series(mut self, label: impl Into<String>, points: impl AsRef<[(f64, f64)]>) -> Self {
-        self.series.push(Series::of(label.into(), points.as_ref()));
+    pub fn series(self, label: impl Into<String>, points: impl AsRef<[(f64, f64)]>) -> Self {
+        let line = self.series.iter().map(|series| series.look.line + 1).max().unwrap_or(0);
+        self.add(label.into(), points.as_ref(), Look { line, dashed: false })
+    }
+
+    /// Adds a dashed series with the colour and the marker of the last one: the same problem, solved
+    /// in another way.
+    #[must_use]
+    pub fn rival(self, label: impl Into<String>, points: impl AsRef<[(f64, f64)]>) -> Self {
+        let line = self.series.last().map_or(0, |series| series.look.line);
+        self.add(label.into(), points.as_ref(), Look { line, dashed: true })
+    }
+
+    fn add(mut self, label: String, points: &[(f64, f64)], look: Look) -> Self {
+        self.series.push(Series::of(label, points, look));
         self
     }
 
@@ -87,7 +115,9 @@ impl LogLog {
         let legend = self.series.iter().map(Series::legend_width).fold(0.0, f64::max);
         let title = length(&self.title, frame::TITLE) + 20.0;
         let width = (column + legend + 8.0).max(title);
-        canvas::sheet((width, frame.lower_right.1 + frame::BELOW + 6.0), |canvas| {
+        let rows = frame.upper_left.1 + ROW * self.series.len() as f64;
+        let height = rows.max(frame.lower_right.1 + frame::BELOW) + 6.0;
+        canvas::sheet((width, height), |canvas| {
             let middle = 0.5 * (frame.upper_left.0 + frame.lower_right.0);
             let centre = middle.max(0.5 * title);
             canvas.text(&self.title, (centre, 22.0), Type::centred(frame::TITLE))?;
@@ -120,9 +150,10 @@ impl LogLog {
     }
 
     fn draw_series(&self, canvas: &Canvas<'_>, frame: &Frame) -> Result<(), PlotError> {
-        for (line, series) in self.series.iter().enumerate() {
-            let path = series.points.iter().map(|&point| frame.at(point));
-            canvas.line(path, color(line), 1.2)?;
+        for series in &self.series {
+            let path: Vec<At> = series.points.iter().map(|&point| frame.at(point)).collect();
+            let line = series.look.line;
+            series.look.draw(canvas, &path)?;
             for (index, &point) in series.given.iter().enumerate() {
                 let filled = !series.is_round_off(index);
                 canvas.marker(frame.at(point), Marker { line, filled })?;
@@ -132,12 +163,14 @@ impl LogLog {
     }
 
     fn draw_legend(&self, canvas: &Canvas<'_>, (left, top): At) -> Result<(), PlotError> {
-        for (line, series) in self.series.iter().enumerate() {
-            let y = top + 42.0 * line as f64;
-            canvas.line([(left, y), (left + 24.0, y)], color(line), 1.2)?;
-            canvas.marker((left + 12.0, y), Marker { line, filled: true })?;
-            canvas.text(&series.label, (left + 32.0, y), Type::left(frame::NAME))?;
-            let below = (left + 32.0, y + 16.0);
+        for (row, series) in self.series.iter().enumerate() {
+            let y = top + ROW * row as f64;
+            series.look.draw(canvas, &[(left, y), (left + SAMPLE, y)])?;
+            let marker = Marker { line: series.look.line, filled: true };
+            canvas.marker((left + 0.5 * SAMPLE, y), marker)?;
+            let beside = left + SAMPLE + 8.0;
+            canvas.text(&series.label, (beside, y), Type::left(frame::NAME))?;
+            let below = (beside, y + 16.0);
             canvas.text(&series.slope_label(), below, Type::left(frame::NUMBER).grey())?;
         }
         Ok(())
@@ -159,14 +192,24 @@ impl LogLog {
     }
 }
 
+impl Look {
+    fn draw(self, canvas: &Canvas<'_>, path: &[At]) -> Result<(), PlotError> {
+        if self.dashed {
+            canvas.dashed(path, color(self.line))
+        } else {
+            canvas.line(path.iter().copied(), color(self.line), 1.2)
+        }
+    }
+}
+
 impl Series {
-    fn of(label: String, given: &[(f64, f64)]) -> Self {
+    fn of(label: String, given: &[(f64, f64)], look: Look) -> Self {
         let mut points = given.to_vec();
         points.sort_by(|a, b| a.0.total_cmp(&b.0));
         let (steps, errors): (Vec<f64>, Vec<f64>) = given.iter().copied().unzip();
         // Four points make an order; a figure of three is still a figure.
         let order = Order::fit(&steps, &errors).ok();
-        Self { label, points, given: given.to_vec(), order }
+        Self { label, look, points, given: given.to_vec(), order }
     }
 
     fn check(&self) -> Result<(), PlotError> {
@@ -197,7 +240,7 @@ impl Series {
 
     fn legend_width(&self) -> f64 {
         let label = length(&self.label, frame::NAME);
-        32.0 + label.max(length(&self.slope_label(), frame::NUMBER))
+        SAMPLE + 8.0 + label.max(length(&self.slope_label(), frame::NUMBER))
     }
 
     fn is_round_off(&self, index: usize) -> bool {
@@ -231,7 +274,8 @@ mod tests {
     fn round_off_is_hollow_and_not_in_the_slope() {
         let svg = LogLog::new("t", "h", "error").series("s", with_plateau()).svg().unwrap();
         assert!(svg.contains("slope 4.00 [4.00, 4.00]"));
-        let order = Series::of("s".into(), &with_plateau()).order.unwrap();
+        let order =
+            Series::of("s".into(), &with_plateau(), Look { line: 0, dashed: false }).order.unwrap();
         let polygons =
             |fill: &str| svg.matches(&format!("<polygon opacity=\"1\" fill=\"{fill}\"")).count();
         assert_eq!(polygons("#FFFFFF"), order.plateau.len());
@@ -246,6 +290,19 @@ mod tests {
         assert_eq!(figure().svg().unwrap(), figure().svg().unwrap());
         let bare = LogLog::new("t", "h", "error").series("s", with_plateau()).svg().unwrap();
         assert!(figure().svg().unwrap().len() > bare.len());
+    }
+
+    #[test]
+    fn a_rival_is_dashed_in_the_colour_of_what_it_rivals() {
+        let figure = || LogLog::new("t", "h", "error").series("a", with_plateau());
+        let two = figure().rival("b", with_plateau()).series("c", with_plateau());
+        let looks: Vec<_> = two.series.iter().map(|series| series.look).collect();
+        let look = |line, dashed| Look { line, dashed };
+        assert_eq!(looks, [look(0, false), look(0, true), look(1, false)]);
+        let lines = |figure: LogLog| figure.svg().unwrap().matches("<polyline").count();
+        let (rival, solid) =
+            (figure().rival("b", with_plateau()), figure().series("b", with_plateau()));
+        assert!(lines(rival) > lines(solid));
     }
 
     #[test]

@@ -1,11 +1,13 @@
-//! A grid of panels with lines.
+//! A grid of panels with lines, and globes beside it.
 
 use std::path::PathBuf;
 
 use crate::{
     axis::Axis,
-    canvas::{self, At, Canvas, Marker, Type, color, length},
+    canvas::{self, At, Canvas, Marker, Type, color},
     frame::{self, Frame},
+    globe::Globe,
+    header::Header,
     plot::{self, PlotError},
 };
 
@@ -13,10 +15,8 @@ use crate::{
 const STRETCHES: usize = 700;
 /// Stretches of all lines of a figure: what keeps its file below some 300 kB.
 const ALL_STRETCHES: usize = 12_000;
-/// Height of a row of the legend.
-const ROW: f64 = 18.0;
 
-/// A figure of titled panels in a grid.
+/// A figure of titled panels in a grid, with globes to the left of it.
 ///
 /// # Examples
 ///
@@ -35,6 +35,7 @@ const ROW: f64 = 18.0;
 pub struct Panels {
     title: String,
     columns: Option<usize>,
+    globes: Vec<Globe>,
     panels: Vec<Panel>,
 }
 
@@ -46,6 +47,8 @@ pub struct Panel {
     vertical: String,
     lines: Vec<(String, Vec<(f64, f64)>)>,
     levels: Vec<f64>,
+    /// The lower end of a logarithmic axis.
+    floor: Option<f64>,
 }
 
 impl Panel {
@@ -58,6 +61,7 @@ impl Panel {
             vertical: String::new(),
             lines: Vec::new(),
             levels: Vec::new(),
+            floor: None,
         }
     }
 
@@ -82,6 +86,19 @@ impl Panel {
         self
     }
 
+    /// Makes the vertical axis logarithmic, for numbers `≥ 0`; what is below `floor` is drawn there,
+    /// since zero has no logarithm.
+    #[must_use]
+    pub fn logarithmic(mut self, floor: f64) -> Self {
+        self.floor = Some(floor);
+        self
+    }
+
+    /// Where a number is drawn.
+    fn shown(&self, y: f64) -> f64 {
+        self.floor.map_or(y, |floor| y.max(floor))
+    }
+
     /// The points of the lines and the levels, checked, as `(least, greatest)` of `x` and `y`.
     fn ranges(&self) -> Result<[(f64, f64); 2], PlotError> {
         if self.lines.is_empty() {
@@ -90,70 +107,65 @@ impl Panel {
         let mut ranges = [(f64::INFINITY, f64::NEG_INFINITY); 2];
         for (label, points) in &self.lines {
             check(label, points)?;
+            self.check_logarithms(label, points)?;
             points.iter().for_each(|(x, y)| ranges = [wider(ranges[0], *x), wider(ranges[1], *y)]);
         }
         for (index, &y) in self.levels.iter().enumerate() {
             if !y.is_finite() {
                 return Err(PlotError::NonFinite { name: self.title.clone(), index, x: 0.0, y });
             }
+            self.check_logarithms(&self.title, &[(0.0, y)])?;
             ranges[1] = wider(ranges[1], y);
         }
-        Ok(ranges)
+        ranges[1] = (self.shown(ranges[1].0), self.shown(ranges[1].1));
+        match self.floor {
+            Some(low) if !(low.is_normal() && low > 0.0) => {
+                Err(PlotError::Range { low, high: ranges[1].1 })
+            }
+            _ => Ok(ranges),
+        }
+    }
+
+    /// Whether all ordinates have a place on the axis, if it is logarithmic.
+    fn check_logarithms(&self, label: &str, points: &[(f64, f64)]) -> Result<(), PlotError> {
+        let negative = |(_, y): &(f64, f64)| *y < 0.0;
+        match points.iter().position(negative).filter(|_| self.floor.is_some()) {
+            Some(index) => {
+                let (x, y) = points[index];
+                Err(PlotError::NonPositive { name: label.to_owned(), index, x, y })
+            }
+            None => Ok(()),
+        }
     }
 
     fn axes(&self, (width, height): At) -> Result<(Axis, Axis), PlotError> {
         let [x, y] = self.ranges()?;
-        Ok((Axis::linear(x, 0.0, width / 65.0)?, Axis::linear(y, 0.06, height / 42.0)?))
+        let vertical = match self.floor {
+            Some(_) => Axis::logarithmic(y),
+            None => Axis::linear(y, 0.06, height / 42.0)?,
+        };
+        Ok((Axis::linear(x, 0.0, width / 65.0)?, vertical))
     }
 
-    /// The rows of the legend, each of entries `(line, place)`, in this width.
-    fn legend(&self, width: f64) -> Vec<Vec<(usize, f64)>> {
-        let mut rows = vec![Vec::new()];
-        let mut used = 0.0;
-        for (line, (label, _)) in self.lines.iter().enumerate() {
-            let entry = 40.0 + length(label, frame::NUMBER);
-            if used > 0.0 && used + entry > width {
-                rows.push(Vec::new());
-                used = 0.0;
-            }
-            rows.last_mut().into_iter().for_each(|row| row.push((line, used)));
-            used += entry;
-        }
-        if self.lines.len() > 1 { rows } else { Vec::new() }
+    fn header(&self) -> Header<'_> {
+        let lines = self.lines.iter().enumerate();
+        let entries = lines.map(|(line, (label, _))| (label.as_str(), color(line))).collect();
+        Header { title: &self.title, entries }
     }
 
     fn draw(&self, canvas: &Canvas<'_>, frame: &Frame, stretches: usize) -> Result<(), PlotError> {
         frame.draw(canvas, (&self.horizontal, &self.vertical))?;
         for (line, (_, points)) in self.lines.iter().enumerate() {
-            let shown = thinned(points, stretches).map(|point| frame.at(point));
+            let shown = thinned(points, stretches).map(|(x, y)| frame.at((x, self.shown(y))));
             canvas.line(shown, color(line), 1.4)?;
-            if let &[point] = points.as_slice() {
-                canvas.marker(frame.at(point), Marker { line, filled: true })?;
+            if let &[(x, y)] = points.as_slice() {
+                canvas.marker(frame.at((x, self.shown(y))), Marker { line, filled: true })?;
             }
         }
         // Last, since the lines of a long run may cover everything.
-        self.levels.iter().try_for_each(|&y| frame.level(canvas, y))?;
-        self.draw_header(canvas, frame)
-    }
-
-    /// Title and legend, above the frame, where they hide nothing.
-    fn draw_header(&self, canvas: &Canvas<'_>, frame: &Frame) -> Result<(), PlotError> {
-        let ((left, top), (right, _)) = (frame.upper_left, frame.lower_right);
-        let rows = self.legend(right - left);
-        let first = top - ROW * rows.len() as f64;
-        let middle = 0.5 * (left + right);
-        let set = Type::centred(frame::SUBTITLE).fitting(&self.title, right - left);
-        canvas.text(&self.title, (middle, first - 12.0), set)?;
-        for (row, entries) in rows.iter().enumerate() {
-            let y = first + ROW * (row as f64 + 0.4);
-            for &(line, place) in entries {
-                let (x, label) = (left + place, &self.lines[line].0);
-                let set = Type::left(frame::NUMBER).fitting(label, right - x - 24.0);
-                canvas.line([(x, y), (x + 18.0, y)], color(line), 2.0)?;
-                canvas.text(label, (x + 24.0, y), set)?;
-            }
-        }
-        Ok(())
+        self.levels.iter().try_for_each(|&y| frame.level(canvas, self.shown(y)))?;
+        let width = frame.lower_right.0 - frame.upper_left.0;
+        self.header().draw(canvas, frame.upper_left, width)
     }
 }
 
@@ -161,7 +173,14 @@ impl Panels {
     /// A figure with a title and no panels yet.
     #[must_use]
     pub fn new(title: impl Into<String>) -> Self {
-        Self { title: title.into(), columns: None, panels: Vec::new() }
+        Self { title: title.into(), columns: None, globes: Vec::new(), panels: Vec::new() }
+    }
+
+    /// Adds a globe, to the left of all panels and as high as they are together.
+    #[must_use]
+    pub fn globe(mut self, globe: Globe) -> Self {
+        self.globes.push(globe);
+        self
     }
 
     /// Adds a panel, to the right of the last or under it.
@@ -183,13 +202,18 @@ impl Panels {
     /// # Errors
     ///
     /// [`PlotError::Empty`] without panels, lines or points, [`PlotError::NonFinite`] for a point
-    /// that is not finite, [`PlotError::Range`] for numbers too far apart.
+    /// that is not finite, [`PlotError::NonPositive`] for one that has no place on a logarithmic axis,
+    /// [`PlotError::OffSphere`] for one that has none on a globe, [`PlotError::Range`] for numbers too
+    /// far apart.
     pub fn svg(&self) -> Result<String, PlotError> {
         let layout = Layout::of(self)?;
         canvas::sheet(layout.sheet(), |canvas| {
             let middle = 0.5 * layout.sheet().0;
             let set = Type::centred(frame::TITLE).fitting(&self.title, 2.0 * middle - 16.0);
             canvas.text(&self.title, (middle, 22.0), set)?;
+            for (globe, (at, diameter)) in self.globes.iter().zip(layout.globes(self)) {
+                globe.draw(canvas, at, diameter)?;
+            }
             let lines: usize = self.panels.iter().map(|panel| panel.lines.len()).sum();
             let stretches = STRETCHES.min(ALL_STRETCHES / lines.max(1)).max(1);
             let mut pairs = self.panels.iter().zip(layout.frames());
@@ -207,9 +231,9 @@ impl Panels {
     }
 
     fn columns_or_usual(&self) -> usize {
-        let usual = match self.panels.len() {
-            0 | 1 => 1,
-            2 | 4 => 2,
+        let usual = match (self.panels.len(), self.globes.len()) {
+            (0 | 1, _) | (_, 1..) => 1,
+            (2 | 4, _) => 2,
             _ => 3,
         };
         self.columns.unwrap_or(usual).min(self.panels.len())
@@ -220,6 +244,12 @@ impl Panels {
 struct Layout {
     axes: Vec<(Axis, Axis)>,
     frame: At,
+    /// Diameters of the globes.
+    diameters: Vec<f64>,
+    /// Upper left corner of the grid.
+    grid: At,
+    /// Height of the globes, at least.
+    body: f64,
     /// Room to the left of the frames of each column.
     lefts: Vec<f64>,
     /// Room above the frames of each row.
@@ -230,32 +260,66 @@ impl Layout {
     const EDGE: f64 = 8.0;
     const HEAD: f64 = 40.0;
     const RIGHT: f64 = 22.0;
+    /// The diameter of a globe, from beside a low grid to beside a high one.
+    const DISC: (f64, f64) = (320.0, 460.0);
 
     fn of(figure: &Panels) -> Result<Self, PlotError> {
-        if figure.panels.is_empty() {
+        if figure.panels.is_empty() && figure.globes.is_empty() {
             return Err(PlotError::Empty { name: figure.title.clone() });
         }
+        figure.globes.iter().try_for_each(Globe::check)?;
         let columns = figure.columns_or_usual();
-        let frame = match columns {
-            1 => (560.0, 280.0),
+        let frame = match columns + figure.globes.len() {
+            0 | 1 => (560.0, 280.0),
             2 => (340.0, 210.0),
             _ => (260.0, 180.0),
         };
         let axes = figure.panels.iter().map(|panel| panel.axes(frame));
         let axes = axes.collect::<Result<Vec<_>, PlotError>>()?;
         let mut lefts = vec![0.0_f64; columns];
-        let mut tops = vec![0.0_f64; figure.panels.len().div_ceil(columns)];
+        let mut tops = vec![0.0_f64; figure.panels.len().div_ceil(columns.max(1))];
         for (index, (panel, (_, y))) in figure.panels.iter().zip(&axes).enumerate() {
             let (column, row) = (index % columns, index / columns);
-            let header = 26.0 + ROW * panel.legend(frame.0).len() as f64;
             lefts[column] = lefts[column].max(frame::margin(y, &panel.vertical));
-            tops[row] = tops[row].max(header);
+            tops[row] = tops[row].max(panel.header().height(frame.0));
         }
-        Ok(Self { axes, frame, lefts, tops })
+        let grid = (Self::EDGE, Self::HEAD);
+        let alone = Self { axes, frame, diameters: Vec::new(), grid, body: 0.0, lefts, tops };
+        Ok(alone.beside(&figure.globes))
+    }
+
+    /// The same grid with globes to its left.
+    fn beside(mut self, globes: &[Globe]) -> Self {
+        let (_, bottom) = self.upper_left(self.lefts.len(), self.tops.len());
+        let height = bottom - Self::HEAD;
+        for globe in globes {
+            let diameter = globe.diameter_within(height).clamp(Self::DISC.0, Self::DISC.1);
+            let size = globe.size(diameter);
+            self.diameters.push(diameter);
+            self.grid.0 += size.0 + Self::EDGE;
+            self.body = self.body.max(size.1);
+        }
+        self.grid.1 += 0.5 * (self.body - height).max(0.0);
+        self
     }
 
     fn sheet(&self) -> At {
-        self.upper_left(self.lefts.len(), self.tops.len())
+        let (right, bottom) = self.upper_left(self.lefts.len(), self.tops.len());
+        (right, bottom.max(Self::HEAD + self.body + Self::EDGE))
+    }
+
+    /// Upper left corner and diameter of each globe.
+    fn globes(&self, figure: &Panels) -> Vec<(At, f64)> {
+        let height = self.sheet().1 - Self::HEAD - Self::EDGE;
+        let mut left = Self::EDGE;
+        let pairs = figure.globes.iter().zip(&self.diameters);
+        let place = |(globe, &diameter): (&Globe, &f64)| {
+            let size = globe.size(diameter);
+            let at = (left, Self::HEAD + 0.5 * (height - size.1));
+            left += size.0 + Self::EDGE;
+            (at, diameter)
+        };
+        pairs.map(place).collect()
     }
 
     fn frames(&self) -> Vec<Frame> {
@@ -274,8 +338,8 @@ impl Layout {
     fn upper_left(&self, column: usize, row: usize) -> At {
         let width = |left: &f64| left + self.frame.0 + Self::RIGHT;
         let height = |top: &f64| top + self.frame.1 + frame::BELOW + 8.0;
-        let left = Self::EDGE + self.lefts[..column].iter().map(width).sum::<f64>();
-        (left, Self::HEAD + self.tops[..row].iter().map(height).sum::<f64>())
+        let left = self.grid.0 + self.lefts[..column].iter().map(width).sum::<f64>();
+        (left, self.grid.1 + self.tops[..row].iter().map(height).sum::<f64>())
     }
 }
 
@@ -379,6 +443,34 @@ mod tests {
         };
         assert!(number("width=\"") < 700.0, "{header}");
         assert!((number("viewBox=\"0 0 ") / number("width=\"") - 10.0).abs() < 0.02, "{header}");
+    }
+
+    #[test]
+    fn a_globe_stands_to_the_left_and_the_panels_keep_their_width() {
+        let globe = Globe::new("globe").curve("c", [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]);
+        let beside = figure().columns(1).globe(globe.clone());
+        let layout = Layout::of(&beside).unwrap();
+        let (at, diameter) = layout.globes(&beside)[0];
+        let frames = layout.frames();
+        assert!(at.0 + globe.size(diameter).0 < frames[0].upper_left.0);
+        assert!(at.1 >= Layout::HEAD && at.1 + globe.size(diameter).1 <= layout.sheet().1);
+        let width = |frame: &Frame| frame.lower_right.0 - frame.upper_left.0;
+        assert!((width(&frames[0]) - width(&frames[1])).abs() < 1e-9);
+        assert!(frames[1].lower_right.1 <= layout.sheet().1);
+        let alone = Panels::new("title").globe(globe).svg().unwrap();
+        assert!(alone.len() < beside.svg().unwrap().len());
+    }
+
+    #[test]
+    fn a_logarithmic_panel_has_decades_and_a_floor() {
+        let panel = |y| Panel::new("p", "t").logarithmic(1e-16).line("l", [(0.0, 1e-3), (1.0, y)]);
+        let svg = |y| Panels::new("f").panel(panel(y)).svg().unwrap();
+        assert!(svg(1e-15).contains("\n10⁻¹²\n"));
+        assert_eq!(svg(0.0), svg(1e-16));
+        let error = |panel| Panels::new("f").panel(panel).svg().unwrap_err();
+        assert!(matches!(error(panel(-1e-3)), PlotError::NonPositive { index: 1, .. }));
+        assert!(matches!(error(panel(1.0).level(-1.0)), PlotError::NonPositive { .. }));
+        assert!(matches!(error(panel(1.0).logarithmic(0.0)), PlotError::Range { .. }));
     }
 
     #[test]

@@ -1,11 +1,13 @@
 //! Figures as SVG: the same bytes for the same numbers.
 //!
-//! [`Panels`] draws lines over time, [`LogLog`] draws convergence. Both use the colours of Okabe &
-//! Ito (2008), which the colour-blind tell apart, and thin long lines out to what can be seen.
+//! [`Panels`] draws lines over time and, beside them, curves on a sphere ([`Globe`]); [`LogLog`] draws
+//! convergence. All use the colours of Okabe & Ito (2008), which the colour-blind tell apart, and
+//! thin long lines out to what can be seen.
 
 use std::{error::Error, fs, io, path::PathBuf};
 
 pub use crate::{
+    globe::Globe,
     log_log::LogLog,
     panels::{Panel, Panels},
 };
@@ -46,6 +48,16 @@ pub enum PlotError {
         x: f64,
         /// Its ordinate.
         y: f64,
+    },
+    /// A point is not on the unit sphere.
+    #[error("point {index} of `{name}` has the norm {norm}; a globe shows points of norm 1")]
+    OffSphere {
+        /// Label of the curve.
+        name: String,
+        /// Index of the point.
+        index: usize,
+        /// Its norm.
+        norm: f64,
     },
     /// The length of an axis is not finite.
     #[error("an axis cannot reach from {low:e} to {high:e}; rescale the numbers")]

@@ -1,0 +1,76 @@
+//! One step from closures against the same step written by hand.
+//!
+//! Both sides solve the same equation from the same guess to the same floor, and both take a
+//! hundred steps from the same moving state, so that guesses are extrapolated as in a run. Before
+//! they are timed, they are checked to arrive at the same point.
+
+use std::hint::black_box;
+
+use criterion::{Criterion, Throughput, criterion_group, criterion_main};
+use metriplectic::dynamics::system::Point;
+use metriplectic::integrators::step::{Memory, Start};
+use metriplectic::prelude::*;
+
+mod chord;
+mod rigid_body;
+mod so3_nambu;
+mod spinning_top;
+
+/// Steps in one measurement.
+const STEPS: usize = 100;
+
+/// A step that is written out by hand.
+trait Step: Clone {
+    type Point: Copy;
+
+    /// One step of size `h`; the displacement is kept for the next guess.
+    fn step(&mut self, x: &Self::Point, h: f64) -> Self::Point;
+
+    /// The entries of a point, in the order of [`Manifold::entries`].
+    fn entries(x: &Self::Point) -> Vec<f64>;
+}
+
+/// Times `STEPS` steps of a system from its closures, and by hand, each from its start.
+fn compare<Y: Metriplectic, B: Step>(
+    criterion: &mut Criterion,
+    name: &str,
+    h: f64,
+    (system, start): (&Y, Point<Y>),
+    (hand, hand_start): (B, B::Point),
+) where
+    WeylMidpoint: Retraction<Y::Manifold, Y::Metric>,
+{
+    let scheme = Scheme::new(WeylMidpoint);
+    let by_closures = |start: &Point<Y>| {
+        let (mut memory, mut x) = (Memory::new(), start.clone());
+        for _ in 0..STEPS {
+            let energy = system.energy_at(&x);
+            let start = Start { x: &x, time: 0.0, h, energy, left_over: 0.0 };
+            let Ok((end, _)) = scheme.step(system, &start, &mut memory) else { break };
+            x = end;
+        }
+        x
+    };
+    let by_hand = |hand: &B, start: &B::Point| {
+        let mut hand = hand.clone();
+        (0..STEPS).fold(*start, |x, _| hand.step(&x, h))
+    };
+
+    let ends =
+        (Y::Manifold::entries(&by_closures(&start)), B::entries(&by_hand(&hand, &hand_start)));
+    let off = ends.0.iter().zip(&ends.1).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    assert!(off <= 1e-12, "{name}: the two ends are {off:.1e} apart");
+
+    let mut group = criterion.benchmark_group(name);
+    group.throughput(Throughput::Elements(STEPS as u64));
+    group.bench_function("closure", |bencher| {
+        bencher.iter(|| black_box(by_closures(black_box(&start))));
+    });
+    group.bench_function("hand_coded", |bencher| {
+        bencher.iter(|| black_box(by_hand(black_box(&hand), black_box(&hand_start))));
+    });
+    group.finish();
+}
+
+criterion_group!(benches, rigid_body::bench, spinning_top::bench, so3_nambu::bench);
+criterion_main!(benches);

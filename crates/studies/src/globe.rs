@@ -1,0 +1,446 @@
+//! Curves on the unit sphere.
+
+use std::f64::consts::{FRAC_PI_6, TAU};
+
+use plotters::style::RGBColor;
+
+use crate::{
+    canvas::{At, Canvas, GREY, INK, Type, color},
+    frame,
+    header::Header,
+    plot::PlotError,
+};
+
+/// How far from 1 the norm of a point may be: what an integrator that leaves the sphere makes of it
+/// is still shown, at the place nearest to it.
+const SLACK: f64 = 0.05;
+/// Room around the disc for the ends of the axes and their names.
+const MARGIN: f64 = 40.0;
+/// How far the axes stick out of the sphere, and their names out of the axes, in pixels.
+const AXIS: [f64; 2] = [22.0, 10.0];
+/// Points of a curve nearer than this to the last one drawn are left out, in pixels.
+const GRAIN: f64 = 0.3;
+/// Points of a circle of the graticule.
+const FINE: u8 = 120;
+
+const SURFACE: RGBColor = RGBColor(247, 249, 251);
+const GRATICULE: RGBColor = RGBColor(218, 222, 226);
+
+type Vector = [f64; 3];
+
+/// The unit sphere with curves on it, seen from far away: the orthographic projection
+///
+/// ```text
+/// x ↦ (x·r, x·u),   r ∝ e₃ × f,   u = f × r,   f the direction of the viewer,
+/// ```
+///
+/// where `x·f ≥ 0` is the side in front. What lies behind is thin and pale. The axis `e₃` points up,
+/// meridians and parallels are 30° apart.
+///
+/// # Examples
+///
+/// ```
+/// use metriplectic_studies::{Globe, Panels};
+///
+/// let spiral = (0..=400).map(f64::from).map(|n| {
+///     let (height, turn) = (n / 200.0 - 1.0, 0.1 * n);
+///     let width = (1.0 - height * height).sqrt();
+///     [width * turn.cos(), width * turn.sin(), height]
+/// });
+/// let globe = Globe::new("from pole to pole").seen_from([1.0, 0.2, 0.4]).curve("spiral", spiral);
+/// let svg = Panels::new("A spiral").globe(globe).svg()?;
+/// assert!(svg.contains("<circle"));
+/// # Ok::<(), metriplectic_studies::PlotError>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct Globe {
+    title: String,
+    viewer: Vector,
+    curves: Vec<(String, Vec<Vector>)>,
+    levels: Vec<(String, Vec<Vector>)>,
+}
+
+impl Globe {
+    /// A sphere with a title, seen from the octant where all coordinates are positive.
+    #[must_use]
+    pub fn new(title: impl Into<String>) -> Self {
+        let viewer = [0.72, 0.52, 0.46];
+        Self { title: title.into(), viewer, curves: Vec::new(), levels: Vec::new() }
+    }
+
+    /// Puts the viewer in this direction, which need not be a unit vector.
+    #[must_use]
+    pub fn seen_from(mut self, viewer: impl Into<[f64; 3]>) -> Self {
+        self.viewer = viewer.into();
+        self
+    }
+
+    /// Adds a curve through points of the sphere, with a hollow disc at its start and a filled one at
+    /// its end. The labels make a legend as soon as there are two.
+    #[must_use]
+    pub fn curve(
+        mut self,
+        label: impl Into<String>,
+        points: impl IntoIterator<Item = impl Into<[f64; 3]>>,
+    ) -> Self {
+        self.curves.push((label.into(), points.into_iter().map(Into::into).collect()));
+        self
+    }
+
+    /// Adds a level set, or any other curve for orientation: grey, under the others. Consecutive ones
+    /// with the same label share their entry in the legend.
+    #[must_use]
+    pub fn level(
+        mut self,
+        label: impl Into<String>,
+        points: impl IntoIterator<Item = impl Into<[f64; 3]>>,
+    ) -> Self {
+        self.levels.push((label.into(), points.into_iter().map(Into::into).collect()));
+        self
+    }
+
+    /// Width and height of a globe whose disc has this diameter.
+    pub(crate) fn size(&self, diameter: f64) -> At {
+        let width = diameter + 2.0 * MARGIN;
+        (width, width + self.header().height(width))
+    }
+
+    /// The largest disc with which the globe is not higher than this.
+    pub(crate) fn diameter_within(&self, height: f64) -> f64 {
+        height - 2.0 * MARGIN - self.header().height(height)
+    }
+
+    pub(crate) fn check(&self) -> Result<(), PlotError> {
+        if self.curves.is_empty() && self.levels.is_empty() {
+            return Err(PlotError::Empty { name: self.title.clone() });
+        }
+        for (label, points) in self.curves.iter().chain(&self.levels) {
+            if points.is_empty() {
+                return Err(PlotError::Empty { name: label.clone() });
+            }
+            let on = |x: &Vector| (norm(x) - 1.0).abs() <= SLACK;
+            if let Some(index) = points.iter().position(|x| !on(x)) {
+                let norm = norm(&points[index]);
+                return Err(PlotError::OffSphere { name: label.clone(), index, norm });
+            }
+        }
+        let far = norm(&self.viewer);
+        if far.is_finite() && far > 0.0 {
+            Ok(())
+        } else {
+            Err(PlotError::OffSphere { name: "the viewer".into(), index: 0, norm: far })
+        }
+    }
+
+    /// Draws the globe with its upper left corner here.
+    pub(crate) fn draw(
+        &self,
+        canvas: &Canvas<'_>,
+        (left, top): At,
+        diameter: f64,
+    ) -> Result<(), PlotError> {
+        let (width, height) = self.size(diameter);
+        let upper = top + height - width;
+        let radius = 0.5 * diameter;
+        let centre = (left + 0.5 * width, upper + 0.5 * width);
+        let view = View::from(self.viewer, centre, radius);
+        canvas.disc(centre, radius, SURFACE)?;
+        let pale = Ink { color: faded(GREY), width: 0.7 };
+        self.levels.iter().try_for_each(|(_, x)| view.draw(canvas, x, Side::Back, pale))?;
+        for (line, (_, x)) in self.curves.iter().enumerate() {
+            view.draw(canvas, x, Side::Back, Ink { color: faded(color(line)), width: 0.9 })?;
+        }
+        let thin = Ink { color: GRATICULE, width: 0.6 };
+        graticule().iter().try_for_each(|x| view.draw(canvas, x, Side::Front, thin))?;
+        canvas.circle(centre, radius, GREY, 0.9)?;
+        view.draw_axes(canvas)?;
+        let grey = Ink { color: GREY, width: 1.0 };
+        self.levels.iter().try_for_each(|(_, x)| view.draw(canvas, x, Side::Front, grey))?;
+        for (line, (_, x)) in self.curves.iter().enumerate() {
+            view.draw(canvas, x, Side::Front, Ink { color: color(line), width: 1.6 })?;
+        }
+        for (line, (_, x)) in self.curves.iter().enumerate() {
+            view.draw_ends(canvas, x, color(line))?;
+        }
+        self.header().draw(canvas, (left, upper), width)
+    }
+
+    fn header(&self) -> Header<'_> {
+        let curves = self.curves.iter().enumerate();
+        let mut entries: Vec<_> =
+            curves.map(|(k, (label, _))| (label.as_str(), color(k))).collect();
+        let mut levels: Vec<_> = self.levels.iter().map(|(label, _)| label.as_str()).collect();
+        levels.dedup();
+        entries.extend(levels.into_iter().map(|label| (label, GREY)));
+        Header { title: &self.title, entries }
+    }
+}
+
+/// How a line is drawn.
+#[derive(Clone, Copy)]
+struct Ink {
+    color: RGBColor,
+    width: f64,
+}
+
+/// A side of the sphere, as the viewer has it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Side {
+    Front,
+    Back,
+}
+
+/// Where the points of the sphere are on the sheet.
+struct View {
+    right: Vector,
+    up: Vector,
+    forward: Vector,
+    centre: At,
+    radius: f64,
+}
+
+impl View {
+    fn from(viewer: Vector, centre: At, radius: f64) -> Self {
+        let forward = unit(viewer);
+        // From above a pole the second axis points to the right.
+        let level = [-forward[1], forward[0], 0.0];
+        let right = if norm(&level) > 1e-6 { unit(level) } else { [0.0, 1.0, 0.0] };
+        Self { right, up: cross(&forward, &right), forward, centre, radius }
+    }
+
+    fn depth(&self, x: &Vector) -> f64 {
+        dot(x, &self.forward)
+    }
+
+    fn side(&self, x: &Vector) -> Side {
+        if self.depth(x) >= 0.0 { Side::Front } else { Side::Back }
+    }
+
+    fn at(&self, x: &Vector) -> At {
+        let (x, y) = (dot(x, &self.right), dot(x, &self.up));
+        (self.centre.0 + self.radius * x, self.centre.1 - self.radius * y)
+    }
+
+    /// The parts of a curve on one side, each up to the limb.
+    fn arcs(&self, points: &[Vector], side: Side) -> Vec<Vec<Vector>> {
+        let (mut arcs, mut arc): (Vec<_>, Vec<Vector>) = (Vec::new(), Vec::new());
+        let mut before: Option<Vector> = None;
+        for x in points.iter().copied().map(unit) {
+            if let Some(before) = before
+                && self.side(&before) != self.side(&x)
+            {
+                arc.push(self.limb(&before, &x));
+            }
+            if self.side(&x) == side {
+                arc.push(x);
+            } else {
+                arcs.push(std::mem::take(&mut arc));
+            }
+            before = Some(x);
+        }
+        arcs.push(arc);
+        arcs.retain(|arc| arc.len() > 1);
+        arcs
+    }
+
+    /// Where the arc from `x` to `y` passes from one side to the other.
+    fn limb(&self, x: &Vector, y: &Vector) -> Vector {
+        let t = self.depth(x) / (self.depth(x) - self.depth(y));
+        unit([0, 1, 2].map(|i| x[i] + t * (y[i] - x[i])))
+    }
+
+    fn draw(
+        &self,
+        canvas: &Canvas<'_>,
+        points: &[Vector],
+        side: Side,
+        ink: Ink,
+    ) -> Result<(), PlotError> {
+        let arcs = self.arcs(points, side);
+        arcs.iter().try_for_each(|arc| {
+            let places: Vec<At> = arc.iter().map(|x| self.at(x)).collect();
+            canvas.line(spaced(&places), ink.color, ink.width)
+        })
+    }
+
+    fn draw_ends(
+        &self,
+        canvas: &Canvas<'_>,
+        points: &[Vector],
+        color: RGBColor,
+    ) -> Result<(), PlotError> {
+        let mark = |x: Vector, filled| {
+            let color = if self.side(&x) == Side::Front { color } else { faded(color) };
+            let inside = if filled { color } else { SURFACE };
+            canvas.disc(self.at(&x), 4.0, inside)?;
+            canvas.circle(self.at(&x), 4.0, color, 1.4)
+        };
+        points.first().map_or(Ok(()), |x| mark(unit(*x), false))?;
+        points.last().map_or(Ok(()), |x| mark(unit(*x), true))
+    }
+
+    /// The ends of the coordinate axes that stick out of the sphere.
+    fn draw_axes(&self, canvas: &Canvas<'_>) -> Result<(), PlotError> {
+        let tip = 1.0 + AXIS[0] / self.radius;
+        for (i, name) in ["x₁", "x₂", "x₃"].into_iter().enumerate() {
+            let axis = |length: f64| [0, 1, 2].map(|j| if i == j { length } else { 0.0 });
+            let across = self.distance(self.at(&axis(1.0)));
+            // Behind the sphere an axis begins where the disc does not cover it.
+            let start = if self.side(&axis(1.0)) == Side::Front { 1.0 } else { across.recip() };
+            if start < tip {
+                canvas.line([self.at(&axis(start)), self.at(&axis(tip))], INK, 1.0)?;
+                let name_at = self.at(&axis(tip + AXIS[1] / (self.radius * across.max(1e-3))));
+                canvas.text(name, name_at, Type::centred(frame::NAME))?;
+            }
+        }
+        Ok(())
+    }
+
+    /// The distance from the centre of the disc, in radii.
+    fn distance(&self, (x, y): At) -> f64 {
+        (x - self.centre.0).hypot(y - self.centre.1) / self.radius
+    }
+}
+
+/// The points with those left out that are too near to the one before to be told from it.
+fn spaced(places: &[At]) -> Vec<At> {
+    let mut kept: Vec<At> = Vec::new();
+    for (k, &(x, y)) in places.iter().enumerate() {
+        let far = |&(a, b): &At| (x - a).hypot(y - b) >= GRAIN;
+        if k + 1 == places.len() || kept.last().is_none_or(far) {
+            kept.push((x, y));
+        }
+    }
+    kept
+}
+
+/// Meridians and parallels, 30° apart.
+fn graticule() -> Vec<Vec<Vector>> {
+    let point = |latitude: f64, longitude: f64| {
+        let width = latitude.cos();
+        [width * longitude.cos(), width * longitude.sin(), latitude.sin()]
+    };
+    let turn = |k: u8| TAU * f64::from(k) / f64::from(FINE);
+    let meridian = |k: u8| {
+        let longitude = FRAC_PI_6 * f64::from(k);
+        (0..=FINE).map(|n| point(turn(n), longitude)).collect()
+    };
+    let parallel = |k: i8| {
+        let latitude = FRAC_PI_6 * f64::from(k);
+        (0..=FINE).map(|n| point(latitude, turn(n))).collect()
+    };
+    (0..6).map(meridian).chain((-2..=2).map(parallel)).collect()
+}
+
+/// Two thirds of the way to the colour of the surface.
+fn faded(color: RGBColor) -> RGBColor {
+    let mix = |ink: u8, paper: u8| {
+        let mixed = (u16::from(ink) + 2 * u16::from(paper)) / 3;
+        u8::try_from(mixed).unwrap_or(u8::MAX)
+    };
+    RGBColor(mix(color.0, SURFACE.0), mix(color.1, SURFACE.1), mix(color.2, SURFACE.2))
+}
+
+fn dot(a: &Vector, b: &Vector) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+fn cross(a: &Vector, b: &Vector) -> Vector {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+fn norm(x: &Vector) -> f64 {
+    dot(x, x).sqrt()
+}
+
+fn unit(x: Vector) -> Vector {
+    x.map(|entry| entry / norm(&x))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Panels;
+
+    fn equator() -> Vec<Vector> {
+        (0..=360).map(|k| f64::from(k).to_radians()).map(|t| [t.cos(), t.sin(), 0.0]).collect()
+    }
+
+    fn view(viewer: Vector) -> View {
+        View::from(viewer, (0.0, 0.0), 1.0)
+    }
+
+    #[test]
+    fn the_third_axis_points_up_and_the_frame_is_right_handed() {
+        let view = view([1.0, 0.0, 0.0]);
+        assert_eq!(view.at(&[0.0, 0.0, 1.0]), (0.0, -1.0));
+        assert_eq!(view.at(&[0.0, 1.0, 0.0]), (1.0, 0.0));
+        assert_eq!(view.side(&[1.0, 0.0, 0.0]), Side::Front);
+        assert_eq!(view.side(&[-1.0, 0.0, 0.0]), Side::Back);
+        let above = View::from([0.0, 0.0, 2.0], (0.0, 0.0), 1.0);
+        assert_eq!(above.at(&[0.0, 1.0, 0.0]), (1.0, 0.0));
+    }
+
+    #[test]
+    fn a_curve_is_cut_at_the_limb_into_arcs_that_make_it_up() {
+        let view = view([1.0, 2.0, 0.5]);
+        let (front, back) = (view.arcs(&equator(), Side::Front), view.arcs(&equator(), Side::Back));
+        // The curve starts in front: behind it is one arc, in front the two ends of it.
+        assert_eq!((front.len(), back.len()), (2, 1));
+        for arc in &back {
+            assert!(arc.iter().all(|x| view.depth(x) < 1e-12));
+            for end in [arc[0], arc[arc.len() - 1]] {
+                assert!((view.distance(view.at(&end)) - 1.0).abs() < 1e-12);
+            }
+        }
+        let length = |arcs: &[Vec<Vector>]| -> f64 {
+            let step = |x: &Vector, y: &Vector| norm(&[0, 1, 2].map(|i| x[i] - y[i]));
+            arcs.iter().flat_map(|arc| arc.windows(2)).map(|pair| step(&pair[0], &pair[1])).sum()
+        };
+        assert!((length(&front) + length(&back) - TAU).abs() < 1e-3);
+        assert!((length(&back) - 0.5 * TAU).abs() < 1e-3);
+    }
+
+    #[test]
+    fn the_same_bytes_every_time_and_small() {
+        let circle = || (0..6000).map(|n| 1e-3 * f64::from(n)).map(|t| [t.cos(), t.sin(), 0.0]);
+        let globe = || Globe::new("globe").curve("a", circle()).level("b", equator());
+        let figure = || Panels::new("title").globe(globe()).svg().unwrap();
+        assert_eq!(figure(), figure());
+        assert!(figure().len() < 60_000, "{} bytes", figure().len());
+    }
+
+    #[test]
+    fn points_too_near_to_be_told_apart_are_left_out() {
+        let line: Vec<At> = (0..=1000).map(|n| (0.01 * f64::from(n), 0.0)).collect();
+        let kept = spaced(&line);
+        assert!((30..=36).contains(&kept.len()), "{}", kept.len());
+        assert_eq!((kept[0], kept[kept.len() - 1]), (line[0], line[1000]));
+    }
+
+    #[test]
+    fn levels_of_one_name_share_their_entry() {
+        let one = Globe::new("globe").level("H", equator()).level("H", equator());
+        assert_eq!(one.header().entries.len(), 1);
+        assert_eq!(one.clone().curve("x", equator()).header().entries.len(), 2);
+        let svg = Panels::new("").globe(one.curve("x", equator())).svg().unwrap();
+        assert_eq!(svg.matches("\nH\n").count(), 1);
+    }
+
+    #[test]
+    fn what_is_not_on_the_sphere_is_named() {
+        let error = |globe| Panels::new("title").globe(globe).svg().unwrap_err();
+        let globe = || Globe::new("globe");
+        assert!(matches!(error(globe()), PlotError::Empty { name } if name == "globe"));
+        let none: [Vector; 0] = [];
+        assert!(
+            matches!(error(globe().curve("c", none)), PlotError::Empty { name } if name == "c")
+        );
+        let off = error(globe().curve("c", [[1.0, 0.0, 0.0], [1.0, 1.0, 0.0]]));
+        assert!(matches!(off, PlotError::OffSphere { index: 1, .. }), "{off}");
+        let nan = error(globe().level("l", [[f64::NAN, 0.0, 0.0]]));
+        assert!(matches!(nan, PlotError::OffSphere { index: 0, .. }), "{nan}");
+        let nowhere = error(globe().curve("c", equator()).seen_from([0.0; 3]));
+        assert!(matches!(nowhere, PlotError::OffSphere { .. }), "{nowhere}");
+    }
+}

@@ -112,13 +112,13 @@ fn the_run_of_an_example_can_be_changed() {
 fn the_convergence_study_prints_an_array_of_orders() {
     let report = json(&example("convergence", &["--json"]));
     let rows = report.as_array().expect("an array");
-    assert_eq!(rows.len(), 10);
+    assert!(rows.len() >= 30);
     for row in rows {
         for key in ["problem", "manifold", "metric", "scheme", "steps", "errors", "order_interval"]
         {
             assert!(!row[key].is_null(), "{key} is missing in {row}");
         }
-        let expected = if row["scheme"] == "Weyl midpoint" { 2.0 } else { 1.0 };
+        let expected = if row["scheme"] == "exponential" { 1.0 } else { 2.0 };
         let order = row["order"].as_f64().expect("a number");
         assert!((order - expected).abs() < 0.05, "{row}");
     }

@@ -9,12 +9,15 @@ use metriplectic_dynamics::{
     AreaForm, Metriplectic, Nambu, SecondLaw, Symplectic, System, Zero, system::Point,
 };
 use metriplectic_fields::{ChartPoint, Column, Real, Space, Vector};
+use metriplectic_integrators::{Scheme, Span};
 use metriplectic_manifolds::{
     Canonical, Cayley, Euclidean, Exponential, HalfLine, LieDual, Manifold, Metric, Product,
     Projection, Retraction, Rotations, Sphere, WeylMidpoint, rotations,
 };
 use nalgebra::{Matrix2, Matrix3, SVector, Vector1, Vector2, Vector3, Vector6, vector};
 use num_dual::DualNum;
+
+use crate::Convergence;
 
 /// A system with a start, and names for tables.
 #[derive(Clone, Debug)]
@@ -59,7 +62,7 @@ pub trait Study {
 /// chart around each step's start (Munthe-Kaas 1998), with steps so small that what is left is
 /// round-off; `None` if it leaves the domain.
 pub fn flow<Y: Metriplectic>(system: &Y, start: &Point<Y>, time: f64) -> Option<Point<Y>> {
-    const STEPS: u32 = 4000;
+    const STEPS: u32 = 2000;
     let h = time / f64::from(STEPS);
     let velocity = |x: &Point<Y>, q: Vector<Y::Manifold>| {
         system.velocity(&ChartPoint { base: x.clone(), q }).ok()
@@ -72,6 +75,155 @@ pub fn flow<Y: Metriplectic>(system: &Y, start: &Point<Y>, time: f64) -> Option<
         let q = (a + (b + c) * 2.0 + d) * (h / 6.0);
         q.is_finite().then(|| Y::Manifold::chart(&x, &q))
     })
+}
+
+/// The orders of every scheme on the problems that are visited, and how well the energy was kept.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Orders {
+    coarsest: u32,
+    /// A study for each problem and scheme.
+    pub studies: Vec<Convergence>,
+    /// The order that theory gives for each of them.
+    pub expected: Vec<f64>,
+    /// The worst energy error of any step, relative to `max(|H|, 1)`.
+    pub energy_error: f64,
+    /// What went wrong, where an order could not be fitted.
+    pub failures: Vec<String>,
+}
+
+impl Orders {
+    /// Runs of `coarsest`, twice, four and eight times as many steps; of eight times as many again for
+    /// schemes of order 1.
+    const fn new(coarsest: u32) -> Self {
+        Self {
+            coarsest,
+            studies: Vec::new(),
+            expected: Vec::new(),
+            energy_error: 0.0,
+            failures: Vec::new(),
+        }
+    }
+
+    /// All of them.
+    pub fn of_every_problem() -> Self {
+        let mut all = Self::canonical();
+        for part in [Self::closures(), Self::products()] {
+            all.studies.extend(part.studies);
+            all.expected.extend(part.expected);
+            all.failures.extend(part.failures);
+            all.energy_error = all.energy_error.max(part.energy_error);
+        }
+        all
+    }
+
+    /// Those of canonical metrics, with geodesics in closed form.
+    pub fn canonical() -> Self {
+        let mut orders = Self::new(40);
+        canonical(&mut orders);
+        orders
+    }
+
+    /// Those of metrics from closures, with numerical geodesics.
+    pub fn closures() -> Self {
+        let mut orders = Self::new(15);
+        closures(&mut orders);
+        orders
+    }
+
+    /// Those of products.
+    pub fn products() -> Self {
+        let mut orders = Self::new(15);
+        products(&mut orders);
+        orders
+    }
+}
+
+/// The energy where steps are far too large for accuracy: a displacement of one and of two radians.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct LargeSteps {
+    /// The longest chord of a step.
+    pub longest: f64,
+    /// The worst energy error of any step, relative to `max(|H|, 1)`, and the problem.
+    pub worst: (f64, &'static str),
+    /// Steps that were taken.
+    pub steps: usize,
+    /// Runs that ended in an error, because a step so large has no solution.
+    pub ended: usize,
+}
+
+impl LargeSteps {
+    /// Those of every problem.
+    pub fn of_every_problem() -> Self {
+        let mut study = Self::default();
+        each(&mut study);
+        study
+    }
+}
+
+impl Study for LargeSteps {
+    fn visit<Y, R>(&mut self, problem: &Problem<Y>, _: &'static str, retraction: R, _: f64)
+    where
+        Y: Metriplectic,
+        R: Retraction<Y::Manifold, Y::Metric> + Copy,
+    {
+        let Problem { name, system, start, .. } = problem;
+        let here = ChartPoint::<Y::Manifold>::centre(start);
+        let Ok(velocity) = system.velocity(&here) else { return };
+        for radians in [1.0, 2.0] {
+            let scheme = Scheme::new(retraction);
+            let h = radians / velocity.magnitude();
+            let Ok(mut steps) = scheme.steps(system, start.clone(), h) else { return };
+            for _ in 0..3 {
+                let before = steps.state().point.clone();
+                if steps.advance().is_err() {
+                    self.ended += 1;
+                    break;
+                }
+                self.steps += 1;
+                self.longest =
+                    self.longest.max(Problem::<Y>::distance(&before, &steps.state().point));
+            }
+            let certificate = steps.certificate();
+            let error = certificate.max_energy_error / certificate.initial_energy.abs().max(1.0);
+            if error > self.worst.0 {
+                self.worst = (error, name);
+            }
+        }
+    }
+}
+
+impl Study for Orders {
+    fn visit<Y, R>(&mut self, problem: &Problem<Y>, scheme: &'static str, retraction: R, order: f64)
+    where
+        Y: Metriplectic,
+        R: Retraction<Y::Manifold, Y::Metric> + Copy,
+    {
+        let Problem { name, manifold, metric, system, start, time } = problem;
+        let Some(exact) = flow(system, start, *time) else {
+            return self.failures.push(format!("{name} on {manifold} has no flow"));
+        };
+        let first = if order > 1.5 { self.coarsest } else { 8 * self.coarsest };
+        let counts = [1, 2, 4, 8].map(|k| k * first);
+        let labels = [name, manifold, metric, scheme];
+        let study = Convergence::measure(labels, *time, &counts, |h, n| {
+            let run = Scheme::new(retraction).run(system, start.clone(), Span::steps(h, n));
+            run.map_or(f64::NAN, |run| {
+                let certificate = run.certificate();
+                let scale = certificate.initial_energy.abs().max(1.0);
+                self.energy_error = self.energy_error.max(certificate.max_energy_error / scale);
+                Problem::<Y>::distance(&run.last().point, &exact)
+            })
+        });
+        match study {
+            Ok(study) => {
+                self.studies.push(study);
+                self.expected.push(order);
+            }
+            Err(error) => {
+                self.failures.push(format!("{name} on {manifold} ({metric}), {scheme}: {error}"));
+            }
+        }
+    }
 }
 
 /// The spinning top's energy on S² (Celledoni, Eidnes, Owren, Ringholm 2019, example 1).
@@ -123,7 +275,7 @@ fn attitude() -> Matrix3<f64> {
 const CANONICAL: &str = "canonical";
 
 /// Visits every problem.
-pub fn each(study: &mut impl Study) {
+fn each(study: &mut impl Study) {
     canonical(study);
     closures(study);
     products(study);
@@ -136,7 +288,7 @@ fn geodesic<Y: Metriplectic>(study: &mut impl Study, problem: &Problem<Y>) {
 }
 
 /// Canonical metrics.
-pub fn canonical(study: &mut impl Study) {
+fn canonical(study: &mut impl Study) {
     let problem = |name, manifold, time| (name, manifold, CANONICAL, time);
     macro_rules! visit {
         ($labels:expr, $start:expr, $system:expr $(, $scheme:literal by $retraction:expr)?) => {{
@@ -196,7 +348,7 @@ pub fn canonical(study: &mut impl Study) {
 }
 
 /// Metrics from closures, with numerical geodesics.
-pub fn closures(study: &mut impl Study) {
+fn closures(study: &mut impl Study) {
     let ambient = |x: &Vector3<Real>| {
         let mut g = Matrix3::from_diagonal(&vector![1.0, 1.5, 2.0]).cast::<Real>();
         g[(0, 1)] = x.z * 0.2;
@@ -272,7 +424,7 @@ pub fn closures(study: &mut impl Study) {
 }
 
 /// Products.
-pub fn products(study: &mut impl Study) {
+fn products(study: &mut impl Study) {
     // H = h(n) + e(s) with the entropy itself as the second factor: a spin in a bath.
     let system = System::on(Product(Sphere::<2>::round(), Euclidean::<1>))
         .bracket((AreaForm, Zero))

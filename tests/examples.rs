@@ -100,6 +100,18 @@ fn the_rotations_reach_the_reference_state() {
 }
 
 #[test]
+fn the_spin_heats_its_bath_and_comes_to_rest_in_the_field() {
+    let report = json(&example("spin_in_a_bath", &["--json"]));
+    let ([energy, entropy, defect], state) = certified(&report);
+    assert!(energy <= 1e-14 && entropy > 0.0 && defect <= 1e-15, "{report}");
+    assert_eq!((&report["second_law"], &report["entropy_falls"]), (&"Casimir".into(), &0.into()));
+    assert!(state.len() == 4 && (state[2] - 1.0).abs() < 1e-6, "{report}");
+    // All of the spin's energy is in the bath.
+    let [end, rest] = ["temperature", "temperature_at_rest"].map(|key| report[key].as_f64());
+    assert!((end.expect("a number") - rest.expect("a number")).abs() < 1e-6, "{report}");
+}
+
+#[test]
 fn the_run_of_an_example_can_be_changed() {
     let arguments = ["--json", "--steps", "10", "--step-size", "0.05"];
     assert_eq!(json(&example("relaxing_rigid_body", &arguments))["steps"], 10);

@@ -56,3 +56,6 @@ pub use retraction::{Arc, ArcJet, PointPair, Retraction, Tangent};
 pub use rotations::Rotations;
 pub use sphere::Sphere;
 pub use weyl_midpoint::WeylMidpoint;
+
+/// The random numbers of [`Manifold::random`], for manifolds of your own.
+pub use rand;

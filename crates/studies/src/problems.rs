@@ -196,6 +196,10 @@ pub fn canonical(study: &mut impl Study) {
 }
 
 /// Metrics from closures, with numerical geodesics.
+///
+/// # Panics
+///
+/// Never: each of them is a system.
 pub fn closures(study: &mut impl Study) {
     let ambient = |x: &Vector3<Real>| {
         let mut g = Matrix3::from_diagonal(&vector![1.0, 1.5, 2.0]).cast::<Real>();
@@ -272,6 +276,10 @@ pub fn closures(study: &mut impl Study) {
 }
 
 /// Products.
+///
+/// # Panics
+///
+/// Never: each of them is a system.
 pub fn products(study: &mut impl Study) {
     // H = h(n) + e(s) with the entropy itself as the second factor: a spin in a bath.
     let system = System::on(Product(Sphere::<2>::round(), Euclidean::<1>))

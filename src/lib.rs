@@ -28,6 +28,9 @@
 //! }
 //! ```
 //!
+//! [Bring your own metric](guide::your_own_metric), on any of the spaces here, or [your own
+//! manifold](guide::your_own_manifold), in sixty lines.
+//!
 //! # The vocabulary
 //!
 //! | concept | in one line | where |
@@ -44,6 +47,8 @@
 //! | [`RootFinder`](integrators::RootFinder) | [`Newton`](integrators::Newton), and argmin as the globaliser | [`integrators`] |
 //! | [`Scheme`](integrators::Scheme) | one step: guess, solve, retract | [`integrators`] |
 //! | [`Trajectory`](integrators::Trajectory) | steps in a row, with their [`Certificate`](integrators::Certificate) | [`integrators`] |
+
+pub mod guide;
 
 pub use metriplectic_dynamics as dynamics;
 pub use metriplectic_fields as fields;

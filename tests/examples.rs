@@ -100,6 +100,31 @@ fn the_rotations_reach_the_reference_state() {
 }
 
 #[test]
+fn the_spin_heats_its_bath_and_comes_to_rest_in_the_field() {
+    let report = json(&example("spin_in_a_bath", &["--json"]));
+    let ([energy, entropy, defect], state) = certified(&report);
+    assert!(energy <= 1e-14 && entropy > 0.0 && defect <= 1e-15, "{report}");
+    assert_eq!((&report["second_law"], &report["entropy_falls"]), (&"Casimir".into(), &0.into()));
+    assert!(state.len() == 4 && (state[2] - 1.0).abs() < 1e-6, "{report}");
+    // All of the spin's energy is in the bath.
+    let [end, rest] = ["temperature", "temperature_at_rest"].map(|key| report[key].as_f64());
+    assert!((end.expect("a number") - rest.expect("a number")).abs() < 1e-6, "{report}");
+}
+
+#[test]
+fn your_own_metric_has_its_semicircles_and_comes_to_rest_where_ds_is_parallel_to_dh() {
+    let report = json(&example("your_own_metric", &["--json"]));
+    let ([energy, entropy, _], state) = certified(&report);
+    assert!(energy <= 5e-15 && entropy > 0.0, "{report}");
+    assert!(report["geodesic_deviation"].as_f64().expect("a number") < 5e-12, "{report}");
+    let [x, y, phi] = state[..] else { panic!("{report}") };
+    // dS = (−x/y, −(y² − x² − 1)/2y², −φ) is nearly a multiple of (½, 0, 1): the last turn of the
+    // spiral is some thousandths wide.
+    assert!((x / y - 0.5 * phi).abs() < 1e-2, "{report}");
+    assert!((1.0 + x * x - y * y).abs() < 1e-2, "{report}");
+}
+
+#[test]
 fn the_run_of_an_example_can_be_changed() {
     let arguments = ["--json", "--steps", "10", "--step-size", "0.05"];
     assert_eq!(json(&example("relaxing_rigid_body", &arguments))["steps"], 10);

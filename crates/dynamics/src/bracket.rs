@@ -138,6 +138,10 @@ pub struct BracketJet<M: Manifold> {
 }
 
 /// A manifold that comes with a bracket; the others start from [`Zero`].
+#[diagnostic::on_unimplemented(
+    message = "a system on `{Self}` has no bracket to start from",
+    note = "a manifold of your own implements `NaturalBracket`, with `Zero` if no bracket comes with it"
+)]
 pub trait NaturalBracket: Manifold {
     /// The bracket a system has unless it is given another one.
     type Bracket;

@@ -1,4 +1,28 @@
 //! An open chart of Rⁿ.
+//!
+//! Where one system of coordinates covers all states, they need not be embedded anywhere: the half plane
+//! with `g = 1/y²`, polar coordinates away from the pole, a shape space.
+//!
+//! - **Point and velocity**: columns of `n` coordinates and their rates, on the open set
+//!   `{ x : domain(x) }`.
+//! - **Frame**: `∂/∂xⁱ`.
+//! - **Chart**: `φ_x(q) = x + q`.
+//! - **Geodesics**: of the dot product and of constant matrices, straight lines. A metric
+//!   [from a closure](crate::Metric::field) has the geodesics of its matrix `g(x)`, integrated with an
+//!   estimated error of 10⁻¹³ in each piece; on the half plane, for lengths to 3/2, half of their ends
+//!   are within 2·10⁻¹⁴ of the closed form and all within 1.5·10⁻¹². Logarithms are found by shooting.
+//! - **Brackets**: none unless one is asked for. With `√g` the density of the metric, `AreaForm` on a
+//!   2-chart and `Nambu` on a 3-chart,
+//!
+//! ```math
+//! (\Pi\, dH)^i = -\frac{\varepsilon^{ij} H_j}{\sqrt{\det g}}, \qquad
+//! (\Pi\, dH)^i = \lambda \frac{\varepsilon^{ijk} S_j H_k}{\sqrt{\det g}},
+//! ```
+//!
+//! the coordinates in the order of the orientation; or `Poisson::field`.
+//!
+//! Nothing keeps a state from the edge but the metric and the model: what ends outside is refused, and
+//! the step is taken in halves.
 
 use std::fmt;
 
@@ -9,7 +33,8 @@ use rand::{Rng, RngExt};
 use crate::euclidean::components_are_velocities;
 use crate::{Flat, Manifold, PointError};
 
-/// An open part of Rⁿ in coordinates of your own, to be given a metric of your own.
+/// An open part of Rⁿ in coordinates of your own, to be given a metric of your own; see the
+/// [module](mod@crate::chart).
 ///
 /// The domain is a plain function or a closure without captures; a point outside of it is refused as
 /// the start of a run, and a step that ends there is taken in halves until it is given up.

@@ -1,4 +1,15 @@
 //! Rⁿ.
+//!
+//! - **Point and velocity**: columns `x` and `x'` of `n` numbers.
+//! - **Frame**: the unit vectors, the same everywhere.
+//! - **Chart**: `φ_x(q) = x + q`.
+//! - **Geodesics** of the dot product and of every constant matrix are straight lines,
+//!   `exp_x(v) = x + v` and `log_x(y) = y − x`, each entry rounded once; what the addition has lost is
+//!   handed to the next step. A metric from a closure has the numerical ones of
+//!   [`field_metric`](mod@crate::field_metric).
+//! - **Brackets**: none unless one is asked for. `Symplectic` on R²ⁿ, `q' = ∂H/∂p` and `p' = −∂H/∂q`;
+//!   `Poisson::constant` for another skew matrix; `AreaForm` on R² and `Nambu` on R³,
+//!   `x' = ∇S × ∇H`; `Poisson::field` for a matrix that varies (Hairer, Lubich and Wanner 2006, §VII.2).
 
 use metriplectic_fields::{ChartPoint, Column, Scalar, Space};
 use nalgebra::{Const, SMatrix, SVector};
@@ -6,8 +17,8 @@ use rand::{Rng, RngExt};
 
 use crate::Manifold;
 
-/// The flat space Rⁿ: a point is a [`SVector`], the chart at `x` is `φ_x(q) = x + q`, and the
-/// canonical metric is the dot product.
+/// The flat space Rⁿ, with the dot product as its canonical metric; see the
+/// [module](mod@crate::euclidean).
 ///
 /// ```
 /// use metriplectic_manifolds::{Euclidean, Manifold};

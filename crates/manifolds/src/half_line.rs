@@ -1,4 +1,14 @@
-//! The half line R₊.
+//! The half line `R₊ = { s > 0 }`.
+//!
+//! - **Point and velocity**: columns of one number, `s` and `s'`.
+//! - **Frame**: `s' = s v`.
+//! - **Chart**: `φ_s(q) = s e^q`, onto the whole half line; its inverse `ln(1 + (y − s)/s)` has its digits
+//!   for near points.
+//! - **Geodesics** of the canonical metric `ds²/s²` are `s e^{tv}`, which never reach zero. It is the
+//!   metric of positive matrices for 1 × 1 matrices (Bhatia 2007, ch. 6). `exp` and `log` are one
+//!   evaluation of `exp` and of `ln_1p`.
+//! - **Brackets**: none, as on every curve. The half line is a factor, for a temperature, a volume or
+//!   an internal energy, of a [`Product`](crate::Product).
 
 use metriplectic_fields::{ChartPoint, Column, Scalar, Space};
 use nalgebra::{Const, SVector, Vector1};
@@ -6,12 +16,10 @@ use rand::{Rng, RngExt};
 
 use crate::{Flat, Manifold};
 
-/// The positive numbers R₊, for a temperature, a volume, an internal energy: a state that must not
-/// reach zero, and never does.
+/// The positive numbers R₊: a state that must not reach zero, and never does; see the
+/// [module](mod@crate::half_line).
 ///
-/// A point is a [`Vector1`]; the chart `φ_s(q) = s e^q` maps onto the whole half line, and the canonical
-/// metric is `ds²/s²`, whose geodesics are `s e^{tv}`. A velocity is written as `s'`, so that
-/// `Metric::field(|s| Matrix1::new(s.x.powi(-2)))` is the canonical metric again.
+/// As a closure, the canonical metric is `Metric::field(|s| Matrix1::new(s.x.powi(-2)))`.
 ///
 /// ```
 /// use metriplectic_manifolds::{Canonical, HalfLine, Riemannian};

@@ -1,6 +1,9 @@
 //! Where the state lives: manifolds, their metrics, and the retractions that turn a tangent vector
 //! into a pair of points.
 //!
+//! The page of each space is its chapter: points and velocities, frame and chart, geodesics with their
+//! accuracy, the brackets that live there, and where to read about it.
+//!
 //! | module | what it holds |
 //! |---|---|
 //! | [`manifold`](mod@manifold) | [`Manifold`]: what every space of states answers |
@@ -8,6 +11,9 @@
 //! | [`lie_dual`] | [`LieDual`]: the dual of a Lie algebra, with the ready-made algebras |
 //! | [`sphere`](mod@sphere) | [`Sphere`]: Sⁿ, n = 1 … 7 |
 //! | [`rotations`](mod@rotations) | [`Rotations`]: SO(3), with its exp, log and dexp |
+//! | [`half_line`](mod@half_line) | [`HalfLine`]: R₊ |
+//! | [`chart`](mod@chart) | [`Chart`]: an open part of Rⁿ, in coordinates of your own |
+//! | [`product`](mod@product) | [`Product`]: `A × B` |
 //! | [`normal`] | normal coordinates on a space of constant curvature |
 //! | [`metric`] | [`Riemannian`]: flat, sharp, norm, geodesics; [`Metric::constant`], [`Metric::field`] |
 //! | [`flat`] | metrics that are constant in a global chart, with straight geodesics |
@@ -15,6 +21,8 @@
 //! | [`retraction`] | [`Retraction`]: `R_h` and `R_h⁻¹` |
 //! | [`weyl_midpoint`] | [`WeylMidpoint`]: the symmetric one, order 2 |
 //! | [`exponential`] | [`Exponential`]: based at the start, order 1 |
+//! | [`projection`] | [`Projection`]: symmetric, rational but for a root, on spheres |
+//! | [`cayley`] | [`Cayley`]: symmetric, rational, on SO(3) |
 //! | [`laws`] | what each of them promises, and the functions that check it |
 
 pub mod cayley;
@@ -56,3 +64,6 @@ pub use retraction::{Arc, ArcJet, PointPair, Retraction, Tangent};
 pub use rotations::Rotations;
 pub use sphere::Sphere;
 pub use weyl_midpoint::WeylMidpoint;
+
+/// The random numbers of [`Manifold::random`], for manifolds of your own.
+pub use rand;

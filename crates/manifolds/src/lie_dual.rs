@@ -1,4 +1,45 @@
 //! The dual `g*` of a Lie algebra, where reduced mechanical systems live.
+//!
+//! A mechanical system on a group `G` whose energy is left-invariant forgets its configuration: what
+//! remains is the momentum in the body frame, `μ ∈ g*` (Marsden and Ratiu 1999, ch. 13; Bloch, Farré
+//! Puiggalí and Martín de Diego 2024, §3). With `[e_a, e_b] = C_ab^d e_d`:
+//!
+//! - **Point and velocity**: columns of the components `μ_a = ⟨μ, e_a⟩` and of `μ'_a`.
+//! - **Frame**: the dual basis `e^a`, the same everywhere.
+//! - **Chart**: `φ_μ(q) = μ + q`.
+//! - **Geodesics**: straight lines, as on [Rⁿ](mod@crate::euclidean).
+//! - **Bracket**: `LiePoisson`, which every dual starts with,
+//!
+//! ```math
+//! \mu' = \mathrm{ad}^*_{\xi}\, \mu, \qquad
+//! \mu'_b = C_{ab}^d\, \xi^a \mu_d, \qquad \xi = dH(\mu) .
+//! ```
+//!
+//! The flow stays on a coadjoint orbit, a level set of the Casimirs: the functions with
+//! `ad*_{dC} μ = 0`, of which an entropy is made.
+//!
+//! | dual | brackets | Casimirs |
+//! |---|---|---|
+//! | [`so3`](LieDual::so3), [`su2`](LieDual::su2) | `[e_a, e_b] = ε_abc e_c`, up to scale | `½\|μ\|²` |
+//! | [`sl2`](LieDual::sl2) | `[H, E] = 2E`, `[H, F] = −2F`, `[E, F] = H` | `½μ_H² + 2 μ_E μ_F` |
+//! | [`heisenberg`](LieDual::heisenberg) | `[e_1, e_2] = e_3` | `μ_3` |
+//! | [`se3`](LieDual::se3), `(M, Γ)` | `[R_a, R_b] = ε_abc R_c`, `[R_a, T_b] = ε_abc T_c` | `M·Γ`, `\|Γ\|²` |
+//! | [`so4`](LieDual::so4), `(J, N)` | those of se(3), and `[N_a, N_b] = ε_abc J_c` | `J·N`, `\|J\|² + \|N\|²` |
+//! | [`new`](LieDual::new), [`of`](LieDual::of) | yours, from structure constants or from matrices | |
+//!
+//! ```
+//! use metriplectic_manifolds::LieDual;
+//! use nalgebra::{Vector3, Vector6, vector};
+//!
+//! let casimir: Vector3<f64> = vector![0.3, 2.0 * -0.7, 2.0 * 0.5]; // dC of sl(2)* at (0.3, 0.5, −0.7)
+//! assert_eq!(LieDual::sl2().algebra().coadjoint(&casimir, &vector![0.3, 0.5, -0.7]).norm(), 0.0);
+//!
+//! let (m, gamma) = ([1.0, 2.0, 4.0], [0.5, -1.0, 3.0]);
+//! let state = Vector6::from_iterator(m.into_iter().chain(gamma));
+//! let area = Vector6::from_iterator(gamma.into_iter().chain(m)); // d(M·Γ)
+//! assert_eq!(LieDual::se3().algebra().coadjoint(&area, &state).norm(), 0.0);
+//! assert_eq!(LieDual::so4().algebra().coadjoint(&area, &state).norm(), 0.0);
+//! ```
 
 use metriplectic_fields::{ChartPoint, Column, Scalar, Space, Square};
 use nalgebra::{Const, SMatrix, SVector};
@@ -209,8 +250,7 @@ pub enum AlgebraError {
     },
 }
 
-/// The dual `g*` of a Lie algebra: momenta `μ = μ_a e^a` in the dual basis, flat, with the
-/// Lie-Poisson bracket `μ' = ad*_ξ μ`, `ξ = dH(μ)`.
+/// The dual `g*` of a Lie algebra: momenta `μ = μ_a e^a`; see the [module](mod@crate::lie_dual).
 ///
 /// ```
 /// use metriplectic_manifolds::LieDual;

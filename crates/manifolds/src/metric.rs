@@ -244,7 +244,8 @@ impl Metric {
     /// | a product | both, one below the other | the full matrix |
     ///
     /// Whether it is symmetric and positive is checked at every point where it is used. Geodesics are
-    /// integrated to 10⁻¹³; their derivatives come from dual numbers.
+    /// integrated with an estimated error of 10⁻¹³ in each piece; their derivatives come from dual
+    /// numbers.
     ///
     /// ```
     /// use metriplectic_fields::Real;

@@ -1,4 +1,22 @@
-//! Products of manifolds.
+//! Products `A × B`.
+//!
+//! - **Point and velocity**: a pair of points, which a closure takes apart; the velocity of the first
+//!   factor, with that of the second below it.
+//! - **Frame and chart**: those of the factors, `φ_{(a,b)}(q, r) = (φ_a(q), φ_b(r))`.
+//! - **Geodesics**: of a pair of metrics `(gA, gB)`, and of [`Canonical`], which is the
+//!   pair of the canonical ones, pairs of geodesics, as accurate as those of the factors; none is
+//!   longer than the factors allow. One [closure](crate::Metric::field) for the full matrix couples the
+//!   factors, and its geodesics are numerical.
+//! - **Brackets**: none unless one is asked for. A pair, `{f, g} = {f, g}_A + {f, g}_B`, whose Casimirs
+//!   are functions of the Casimirs of both: with `(AreaForm, Zero)` on `S² × R` each function of the
+//!   second factor is one, and so an entropy there leaves the precession alone. `Symplectic` on
+//!   `Rⁿ × Rⁿ`, and on `SO(3) × R³` trivialised from the left,
+//!
+//! ```math
+//! R' = R\, \widehat{\alpha_p}, \qquad p' = p \times \alpha_p - \alpha_R
+//! ```
+//!
+//! (Marsden and Ratiu 1999, §13.5).
 
 use std::fmt;
 use std::marker::PhantomData;
@@ -13,8 +31,7 @@ use crate::{ArcJet, Canonical, InnerProduct, Manifold, MetricError, Riemannian};
 
 /// The product `A × B`: a state with two parts, such as a direction with an internal energy
 /// (`S² × R`) or an attitude with an angular momentum (`SO(3) × R³`). A factor may be a product again.
-///
-/// A point is a pair, so a closure takes it apart:
+/// See the [module](mod@crate::product).
 ///
 /// ```
 /// use metriplectic_fields::Real;
@@ -25,11 +42,6 @@ use crate::{ArcJet, Canonical, InnerProduct, Manifold, MetricError, Riemannian};
 /// let _energy = |(n, e): &(Vector3<Real>, Vector1<Real>)| n.z + e.x;
 /// assert!(spin_and_energy.check(&(vector![0.0, 0.6, 0.8], vector![3.0])).is_ok());
 /// ```
-///
-/// Coordinates, velocities and covectors of the product are those of `A`, then those of `B`. Its
-/// metric is a pair `(gA, gB)`, [`Canonical`] (the pair of the canonical ones), or a full
-/// [`Metric::field`](crate::Metric::field). Geodesics of a pair are pairs of geodesics, in closed form
-/// where both factors have one.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Product<A, B>(pub A, pub B);
 

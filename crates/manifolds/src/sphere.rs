@@ -1,4 +1,32 @@
-//! The unit spheres Sⁿ, n = 1 … 7.
+//! The unit spheres Sⁿ, n = 1 … 7,
+//!
+//! ```math
+//! S^n = \{ x \in \mathbb R^{n+1} : |x| = 1 \}, \qquad
+//! T_x S^n = \{ v \in \mathbb R^{n+1} : x^T v = 0 \} .
+//! ```
+//!
+//! - **Point and velocity**: columns `x` and `x'` of `n + 1` numbers.
+//! - **Frame**: orthonormal columns `E(x)` with `det[x, E] = +1`, those of the Householder reflection
+//!   that takes the last axis to `∓x`.
+//! - **Chart**: normal coordinates, divided by the norm, so that every point of a run has norm 1 up to
+//!   one rounding and never drifts,
+//!
+//! ```math
+//! \varphi_x(q) = \cos|q|\, x + \frac{\sin|q|}{|q|}\, E q, \qquad
+//! \varphi_x^{-1}(y) = \frac{\theta}{\sin\theta}\, E^T (y - x), \quad
+//! \theta = \mathrm{atan2}\bigl(|E^T (y - x)|,\ x^T y\bigr) .
+//! ```
+//!
+//! - **Geodesics** of the round metric are great circles, `exp_x(v) = φ_x(v)` and
+//!   `log_x(y) = φ_x⁻¹(y)`, up to the injectivity radius π, beyond which they are refused (Absil, Mahony
+//!   and Sepulchre 2008, §5.4). The logarithm of rounded points is within
+//!   `8ε(1/θ + 1 + θ/(π − θ))` of the exact one, relative to `θ`, from `θ = 10⁻¹⁴` to `π − 10⁻⁶`: its direction is
+//!   lost at the antipode.
+//! - **Other metrics** are forms on Rⁿ⁺¹, by [`Metric::field`](crate::Metric::field);
+//!   [`Projection`](crate::Projection) is a retraction for all of them.
+//! - **Brackets**: none unless one is asked for. `AreaForm` on S², `x' = x × ∇H` (Marsden and Ratiu 1999,
+//!   §2), without a Casimir; `Nambu` on S³, with the volume `det[x, a, b, c]`; `Poisson::field` with a
+//!   bivector of Rⁿ⁺¹.
 
 use std::f64::consts::PI;
 
@@ -12,22 +40,8 @@ use crate::metric::{GeodesicEnd, MetricError, time, within};
 use crate::normal::Normal;
 use crate::{ArcJet, Canonical, Manifold, Riemannian};
 
-/// The unit sphere `Sⁿ = { x ∈ Rⁿ⁺¹ : |x| = 1 }` for `n = 1 … 7`.
-///
-/// A point is a [`SVector`] of `n + 1` entries. At each point there is an orthonormal tangent frame
-/// `E(x)`, oriented so that `det[x, E] = +1`, and the chart is normal coordinates,
-///
-/// ```math
-/// \varphi_x(q) = \cos|q|\, x + \frac{\sin|q|}{|q|}\, E q, \qquad
-/// \varphi_x^{-1}(y) = \frac{\theta}{\sin\theta}\, E^T (y - x), \quad \cos\theta = x^T y .
-/// ```
-///
-/// The canonical metric is the round one: geodesics are great circles, the injectivity radius is π.
-/// The logarithm is accurate to about `8ε/(π − θ)`: its direction is lost at the antipode.
-///
-/// Points never drift: the chart divides by the norm, so that fields are only ever evaluated at
-/// points of norm 1 up to one rounding, and the energy that a step keeps is that of the point it
-/// stores.
+/// The unit sphere `Sⁿ = { x ∈ Rⁿ⁺¹ : |x| = 1 }` for `n = 1 … 7`, with the round metric as its
+/// canonical one; see the [module](mod@crate::sphere).
 ///
 /// ```
 /// use metriplectic_manifolds::{Canonical, Manifold, Riemannian, Sphere};

@@ -49,6 +49,8 @@ pub struct Panel {
     levels: Vec<f64>,
     /// The lower end of a logarithmic axis.
     floor: Option<f64>,
+    /// Whether a unit has the same length on both axes.
+    equal: bool,
 }
 
 impl Panel {
@@ -62,6 +64,7 @@ impl Panel {
             lines: Vec::new(),
             levels: Vec::new(),
             floor: None,
+            equal: false,
         }
     }
 
@@ -72,7 +75,8 @@ impl Panel {
         self
     }
 
-    /// Adds a line through points `(x, y)`. The labels make a legend as soon as there are two.
+    /// Adds a line through points `(x, y)`. The labels make a legend as soon as there are two; lines
+    /// with the same label share their colour.
     #[must_use]
     pub fn line(mut self, label: impl Into<String>, points: impl AsRef<[(f64, f64)]>) -> Self {
         self.lines.push((label.into(), points.as_ref().to_vec()));
@@ -91,6 +95,13 @@ impl Panel {
     #[must_use]
     pub fn logarithmic(mut self, floor: f64) -> Self {
         self.floor = Some(floor);
+        self
+    }
+
+    /// Gives a unit the same length on both axes, for curves in a plane.
+    #[must_use]
+    pub fn equal(mut self) -> Self {
+        self.equal = true;
         self
     }
 
@@ -140,6 +151,11 @@ impl Panel {
 
     fn axes(&self, (width, height): At) -> Result<(Axis, Axis), PlotError> {
         let [x, y] = self.ranges()?;
+        if self.equal {
+            let unit = (1.06 * (x.1 - x.0) / width).max(1.12 * (y.1 - y.0) / height);
+            let (x, y) = (around(x, unit * width), around(y, unit * height));
+            return Ok((Axis::linear(x, 0.0, width / 65.0)?, Axis::linear(y, 0.0, height / 42.0)?));
+        }
         let vertical = match self.floor {
             Some(_) => Axis::logarithmic(y),
             None => Axis::linear(y, 0.06, height / 42.0)?,
@@ -148,14 +164,27 @@ impl Panel {
     }
 
     fn header(&self) -> Header<'_> {
-        let lines = self.lines.iter().enumerate();
-        let entries = lines.map(|(line, (label, _))| (label.as_str(), color(line))).collect();
+        let labels = self.labels().into_iter().enumerate();
+        let entries = labels.map(|(k, label)| (label, color(k))).collect();
         Header { title: &self.title, entries }
+    }
+
+    /// The labels of the lines, each once.
+    fn labels(&self) -> Vec<&str> {
+        let mut labels: Vec<&str> = Vec::new();
+        for (label, _) in &self.lines {
+            if !labels.contains(&label.as_str()) {
+                labels.push(label);
+            }
+        }
+        labels
     }
 
     fn draw(&self, canvas: &Canvas<'_>, frame: &Frame, stretches: usize) -> Result<(), PlotError> {
         frame.draw(canvas, (&self.horizontal, &self.vertical))?;
-        for (line, (_, points)) in self.lines.iter().enumerate() {
+        let labels = self.labels();
+        for (label, points) in &self.lines {
+            let line = labels.iter().position(|other| other == label).unwrap_or(0);
             let shown = thinned(points, stretches).map(|(x, y)| frame.at((x, self.shown(y))));
             canvas.line(shown, color(line), 1.4)?;
             if let &[(x, y)] = points.as_slice() {
@@ -363,6 +392,12 @@ fn wider((low, high): (f64, f64), value: f64) -> (f64, f64) {
     (low.min(value), high.max(value))
 }
 
+/// A range of this length around the middle of another.
+fn around((low, high): (f64, f64), length: f64) -> (f64, f64) {
+    let middle = 0.5 * low + 0.5 * high;
+    (middle - 0.5 * length, middle + 0.5 * length)
+}
+
 /// The lowest and the highest point of each of so many stretches, in their order, and the two ends:
 /// a spike stays, whatever is left out around it.
 fn thinned(points: &[(f64, f64)], stretches: usize) -> impl Iterator<Item = (f64, f64)> {
@@ -399,6 +434,26 @@ mod tests {
         assert_eq!(svg, figure().svg().unwrap());
         assert!(svg.len() < 100_000, "{} bytes", svg.len());
         assert!(svg.starts_with("<svg width=\"") && svg.trim_end().ends_with("</svg>"));
+    }
+
+    #[test]
+    fn a_circle_is_round_where_the_axes_are_equal() {
+        let circle: Vec<_> = (0..=360)
+            .map(|k| f64::from(k).to_radians())
+            .map(|t| (3.0 + t.cos(), 5.0 + t.sin()))
+            .collect();
+        let panel = Panel::new("", "x").line("", circle).equal();
+        let (x, y) = panel.axes((340.0, 210.0)).unwrap();
+        let width = 340.0 * (x.place(4.0) - x.place(2.0));
+        let height = 210.0 * (y.place(6.0) - y.place(4.0));
+        assert!((width - height).abs() < 1e-9 && (150.0..210.0).contains(&height));
+        assert!((x.place(3.0) - 0.5).abs() < 1e-12 && (y.place(5.0) - 0.5).abs() < 1e-12);
+    }
+
+    #[test]
+    fn lines_with_the_same_label_share_their_colour() {
+        let panel = Panel::new("p", "t").line("a", wave(9)).line("b", wave(9)).line("a", wave(9));
+        assert_eq!(panel.labels(), ["a", "b"]);
     }
 
     #[test]

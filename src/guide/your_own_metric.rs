@@ -1,0 +1,120 @@
+//! Bring your own metric.
+//!
+//! A metric is a closure from a point over [`Real`](crate::fields::Real) to a symmetric matrix
+//! `A(x)`, which measures *velocities*:
+//!
+//! ```math
+//! G_x(u, v) = \theta(u)^T A(x)\, \theta(v) , \qquad
+//! \theta = \text{the velocity of a tangent vector, as it is written by hand} .
+//! ```
+//!
+//! [`Metric::field`](crate::manifolds::Metric::field) has the table of what a velocity is on each space:
+//! `x'` on Rⁿ and on spheres, the body angular velocity on SO(3), one below the other on a product. No
+//! chart has to be known, but for your own coordinates. A metric without a closure is
+//! [`Canonical`](crate::manifolds::Canonical) or
+//! [`Metric::constant`](crate::manifolds::Metric::constant), with geodesics in closed form.
+//!
+//! ```
+//! use metriplectic::manifolds::{MetricError, Riemannian, laws, rotations};
+//! use metriplectic::prelude::*;
+//! use std::f64::consts::FRAC_PI_2;
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! // 1. A chart: the half plane, (dx² + dy²)/y². Vertical geodesics are y eᵗ.
+//! let plane = Metric::field(|q: &Vector2<Real>| Matrix2::from_diagonal_element(q.y.powi(-2)));
+//! let (x, v) = (Vector2::new(0.3, 1.5), Vector2::new(0.0, 1.5));
+//! laws::metric::<Chart<2>, _>(&plane, &x, &v)?;
+//! let end = Riemannian::<Chart<2>>::end(&plane, &x, &v)?;
+//! assert!((end - Vector2::new(0.3, 1.5 * 1_f64.exp())).norm() < 1e-12);
+//!
+//! // 2. A sphere, by a form on the space around: the spheroid x ↦ (x₁, x₂, 2x₃) has A = DᵀD.
+//! let d = Vector3::new(1.0, 1.0, 2.0);
+//! let spheroid =
+//!     Metric::field(move |_: &Vector3<Real>| Matrix3::from_diagonal(&d.component_mul(&d)).cast());
+//! let (x, y) = (Vector3::x(), Vector3::y());
+//! let v: Vector2<f64> = Riemannian::<Sphere<2>>::log(&spheroid, &x, &y)?;
+//! laws::metric::<Sphere<2>, _>(&spheroid, &x, &v)?;
+//! assert!((v.norm() - FRAC_PI_2).abs() < 1e-12); // a quarter of the equator
+//!
+//! // 3. SO(3), left-invariant: A is the inertia, geodesics are the motions of a free rigid body.
+//! let inertia = Vector3::new(1.0, 2.0, 4.0);
+//! let body = Metric::field(move |_: &Matrix3<Real>| Matrix3::from_diagonal(&inertia).cast());
+//! let (r, omega) = (rotations::exp(&Vector3::new(0.3, -0.2, 0.5)), Vector3::z() * 0.8);
+//! laws::metric::<Rotations, _>(&body, &r, &omega)?;
+//! let end = Riemannian::<Rotations>::end(&body, &r, &omega)?;
+//! assert!((end - r * rotations::exp(&omega)).norm() < 1e-12); // about a principal axis, steadily
+//!
+//! // 4. A product: a pair, factor by factor, or one matrix that couples them.
+//! let bath = Metric::field(|s: &Vector1<Real>| Matrix1::new(s.x.exp()));
+//! let pair = (Canonical, bath);
+//! let coupled = Metric::field(|(n, s): &(Vector3<Real>, Vector1<Real>)| {
+//!     let mut a = Matrix4::<Real>::identity();
+//!     a[(3, 3)] = s.x.exp();
+//!     a[(0, 3)] = n.y * 0.2;
+//!     a[(3, 0)] = n.y * 0.2;
+//!     a
+//! });
+//! let (point, v) = ((Vector3::y(), Vector1::new(0.1)), Vector3::new(0.4, 0.1, -0.2));
+//! laws::metric::<Product<Sphere<2>, Euclidean<1>>, _>(&pair, &point, &v)?;
+//! laws::metric::<Product<Sphere<2>, Euclidean<1>>, _>(&coupled, &point, &v)?;
+//!
+//! // In a system: friction is measured by the metric, and the second law is the metric's.
+//! let system = System::on(Rotations::bi_invariant())
+//!     .metric(body)
+//!     .bracket(Nambu::default())
+//!     .energy(|r: &Matrix3<Real>| r.m11 + r.m22 * 2.0 + r.m33 * 3.0)
+//!     .entropy(|r: &Matrix3<Real>| r.m13 - r.m21 * 0.5)
+//!     .build()?;
+//! let run = WeylMidpoint.run(&system, r, Span::steps(0.02, 50))?;
+//! assert!(run.certificate().keeps_energy());
+//! # assert!(run.certificate().min_entropy_increment > 0.0);
+//!
+//! // What goes wrong has a name. √(1 − x) ends at x = 1, a finite way from here.
+//! let slit = Metric::field(|q: &Vector2<Real>| Matrix2::from_diagonal_element((-q.x + 1.0).sqrt()));
+//! let lost = Riemannian::<Chart<2>>::end(&slit, &Vector2::zeros(), &Vector2::new(3.0, 0.0));
+//! assert!(matches!(lost, Err(MetricError::Lost { time }) if time < 1.0));
+//! let beyond = Riemannian::<Sphere<2>>::end(&Canonical, &x, &Vector2::new(3.5, 0.0));
+//! assert!(matches!(beyond, Err(MetricError::CutLocus { .. })));
+//! let indefinite = Metric::constant(Matrix2::new(1.0, 2.0, 2.0, 1.0));
+//! assert!(matches!(indefinite, Err(MetricError::NotPositive(_))));
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! # What is checked
+//!
+//! - At every point where it is used: entries finite, symmetric up to the rounding of its entries,
+//!   positive in the frame of the chart (so a form on R³ may be indefinite off the tangent plane).
+//! - Before every run, at sampled points around the start.
+//! - By [`laws::metric`](crate::manifolds::laws::metric), when you call it: also that geodesics have
+//!   constant speed, which a wrong derivative breaks.
+//!
+//! Not checked: that it is the metric you meant. A tensor in the wrong coordinates is a metric, too;
+//! compare a length with a closed form, or one step with the same step in another chart.
+//!
+//! # What it costs
+//!
+//! Geodesics are integrated by extrapolation, with an estimated error of 10⁻¹³ in each piece, and with
+//! their derivatives by hyper-dual numbers. One step of `h = 0.1`, over 200 of them, roughly:
+//!
+//! | | evaluations of the closure | time, with the canonical metric 1 |
+//! |---|---|---|
+//! | chart of R², half plane | 240 | 30 |
+//! | S², ellipsoid | 300 | 160 |
+//! | SO(3), left-invariant | 600 | 170 |
+//! | `S² × R`, a closure on R alone | 160 | 2 |
+//! | `S² × R`, one closure | 430 | 160 |
+//!
+//! So write a constant matrix as [`Metric::constant`](crate::manifolds::Metric::constant), and a
+//! product as a pair.
+//!
+//! # What can go wrong
+//!
+//! | | what happens | what helps |
+//! |---|---|---|
+//! | the edge of a chart is at a finite distance | [`MetricError::Lost`](crate::manifolds::MetricError), with the share of the way; a run halves the step, and ends in an error that has the trajectory so far | a smaller step; coordinates or a metric in which the edge is far, as `ds²/s²` on R₊ |
+//! | `A` is not positive somewhere | [`NotPositive`](crate::manifolds::MetricError::NotPositive) with the pivot | the domain of the [`Chart`](crate::manifolds::Chart) |
+//! | a step beyond the cut locus, where geodesics stop being shortest | [`CutLocus`](crate::manifolds::MetricError::CutLocus) for canonical metrics; with a closure the cut locus is not known, and the logarithm is *a* geodesic | a smaller step |
+//! | two points far apart | [`NoLogarithm`](crate::manifolds::MetricError::NoLogarithm), with the miss; steps need no logarithm | points closer together |
+//! | `sqrt`, `norm` at zero | derivatives that are not numbers: the run refuses to start | `norm_squared`, even powers |
+//! | friction too strong or weak | `K` is of second order in `A⁻¹`, and [`Nambu`](crate::dynamics::Nambu) and [`AreaForm`](crate::dynamics::AreaForm) have `1/√det g` | scale `A`, or the factor of the bracket |

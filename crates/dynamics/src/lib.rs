@@ -8,7 +8,7 @@
 //! | module | what it holds |
 //! |---|---|
 //! | [`bracket`] | [`Bracket`]: `Π`; [`LiePoisson`], [`AreaForm`], [`Nambu`], [`Symplectic`], [`Poisson::constant`], [`Poisson::field`], [`Zero`] |
-//! | [`dissipation`] | [`Dissipation`]: `K`, given the covector it must kill; [`MetricDissipation`] |
+//! | [`dissipation`] | [`Dissipation`]: `K`, given the covector it must kill; [`MetricDissipation`], [`CometricDissipation`], [`KulkarniNomizu`], [`CasimirDissipation`], [`FieldDissipation`], [`ProjectedDissipation`], [`Scaled`] |
 //! | [`system`] | [`System`] and its builder |
 //! | [`verify`] | the laws of a model, sampled: [`System::verify`], [`System::report`] |
 //! | [`laws`] | what brackets and dissipations promise, and the functions that check it |
@@ -23,7 +23,10 @@ pub use bracket::{
     AreaForm, Bracket, BracketJet, ConstantPoisson, FieldPoisson, LiePoisson, Nambu,
     NaturalBracket, Poisson, PoissonError, Site, Symplectic, Zero,
 };
-pub use dissipation::{Dissipation, DissipationJet, MetricDissipation, NoDissipation};
+pub use dissipation::{
+    CasimirDissipation, CometricDissipation, Dissipation, DissipationJet, FieldDissipation,
+    FormError, KulkarniNomizu, MetricDissipation, NoDissipation, ProjectedDissipation, Scaled,
+};
 pub use system::{
     BuildError, Metriplectic, NoEnergy, NoEntropy, Point, SecondLaw, System, SystemBuilder,
 };

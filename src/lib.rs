@@ -55,7 +55,7 @@ pub use nalgebra;
 pub mod prelude {
     pub use metriplectic_dynamics::{
         AreaForm, CasimirDissipation, CometricDissipation, FieldDissipation, KulkarniNomizu,
-        LiePoisson, MetricDissipation, Metriplectic, ModelError, Nambu, Poisson,
+        Legendre, LiePoisson, MetricDissipation, Metriplectic, ModelError, Nambu, Poisson,
         ProjectedDissipation, Scaled, SecondLaw, Symplectic, System, Zero,
     };
     pub use metriplectic_fields::{MatrixField, Real, Scalar, ScalarField};

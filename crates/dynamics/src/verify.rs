@@ -386,7 +386,10 @@ pub enum ModelError {
         size: f64,
     },
     /// `K dH ≠ 0`.
-    #[error("the dissipation does not keep the energy at {point:?}: K dH is {size:.1e} of |K||dH|")]
+    #[error(
+        "the dissipation does not keep the energy at {point:?}: K dH is {size:.1e} of |K||dH|; build \
+         K from the covector w that it is told to kill, or ask for `ProjectedDissipation`"
+    )]
     EnergyNotKept {
         /// The entries of the point.
         point: Vec<f64>,

@@ -261,6 +261,7 @@ fn the_compiler_explains_what_is_not_a_field() {
     cases.pass("tests/doors/a_closure_is_a_field.rs");
     cases.pass("tests/doors/a_type_of_your_own_has_every_order.rs");
     cases.compile_fail("tests/doors/closure_*.rs");
+    cases.compile_fail("tests/doors/dissipation_*.rs");
     cases.compile_fail("tests/doors/energy_*.rs");
     cases.compile_fail("tests/doors/matrix_*.rs");
 }

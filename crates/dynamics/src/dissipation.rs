@@ -1,10 +1,35 @@
 //! Dissipations: the symmetric positive semidefinite tensor `K` that produces entropy.
+//!
+//! | type | `K_w(α, β)` | from |
+//! |---|---|---|
+//! | [`MetricDissipation`] | `G*(w,w) G*(α,β) − G*(w,α) G*(w,β)` | the metric of the system |
+//! | [`CometricDissipation`] | the same | a semidefinite matrix `G*(x)` on covectors |
+//! | [`KulkarniNomizu`] | `σ(w,w) μ(α,β) − σ(w,α) μ(w,β) − μ(w,α) σ(w,β) + μ(w,w) σ(α,β)` | two of them |
+//! | [`CasimirDissipation`] | `κ([w,α], [w,β])` | a semidefinite form `κ` on a Lie algebra |
+//! | [`FieldDissipation`] | `K(x, w)(α, β)` | a closure that kills `w` itself |
+//! | [`ProjectedDissipation`] | `K(x)(Qᵀα, Qᵀβ)`, `Qᵀα = α − w G*(w,α)/G*(w,w)` | a closure that knows nothing of `w` |
+//! | [`Scaled`] | `κ(x) K_w(α, β)` | any of these, and a number `κ(x) ≥ 0` |
+//! | [`NoDissipation`] | 0 | |
 
+mod casimir;
+mod choice;
+mod cometric;
+mod field;
+mod kulkarni_nomizu;
 mod metric;
 mod none;
+mod projected;
+mod scaled;
 
+pub use casimir::{CasimirDissipation, FormError};
+pub use choice::{Choice, Given};
+pub use cometric::CometricDissipation;
+pub use field::FieldDissipation;
+pub use kulkarni_nomizu::KulkarniNomizu;
 pub use metric::MetricDissipation;
 pub use none::NoDissipation;
+pub use projected::ProjectedDissipation;
+pub use scaled::Scaled;
 
 use metriplectic_fields::{ChartPoint, Column, Dimension, Matrix, Scalar, Square, Vector};
 use metriplectic_manifolds::{Manifold, MetricError, Riemannian};
@@ -19,6 +44,10 @@ use crate::bracket::epsilon;
 ///
 /// Laws ([`laws::dissipation`](crate::laws::dissipation)): 1. `K_w` is symmetric; 2. `K_w ⪰ 0`;
 /// 3. `K_w w = 0`; 4. `linearise` is the derivative of `apply`.
+#[diagnostic::on_unimplemented(
+    message = "`{Self}` is not a dissipation on `{M}`",
+    note = "a dissipation of your own is `FieldDissipation(|x, w| matrix)`, which kills `w`, or `ProjectedDissipation(|x| matrix)`"
+)]
 pub trait Dissipation<M: Manifold, G: Riemannian<M>> {
     /// The vector `K_w(x) α`, components in the frame of the chart of `x`.
     ///
@@ -73,6 +102,31 @@ pub trait Dissipation<M: Manifold, G: Riemannian<M>> {
     fn is_none(&self) -> bool {
         false
     }
+
+    /// Whether a tensor that does not kill `w` was projected until it does, so that `K` is not quite
+    /// the one that was written down; see [`ProjectedDissipation`].
+    fn is_projected(&self) -> bool {
+        false
+    }
+}
+
+/// `−(p ∧ q) w` with `(p ∧ q)^{ij} = p^i q^j − q^i p^j`, that is `q (p·w) − p (q·w)`, evaluated so
+/// that `⟨w, −(p ∧ q) w⟩` cancels in pairs instead of between two large numbers.
+#[inline]
+fn turn<M: Manifold, D: Scalar>(
+    p: &Vector<M, D>,
+    q: &Vector<M, D>,
+    w: &Vector<M, D>,
+) -> Vector<M, D> {
+    let mut k = Vector::<M, D>::zero();
+    for i in 0..M::Dim::LEN {
+        for j in 0..i {
+            let a = p[j] * q[i] - p[i] * q[j];
+            k[i] += w[j] * a;
+            k[j] -= w[i] * a;
+        }
+    }
+    k
 }
 
 /// The definition of [`Dissipation::linearise`]: one dual number for each direction.

@@ -8,13 +8,15 @@
 //! | module | what it holds |
 //! |---|---|
 //! | [`bracket`] | [`Bracket`]: `Π`; [`LiePoisson`], [`AreaForm`], [`Nambu`], [`Symplectic`], [`Poisson::constant`], [`Poisson::field`], [`Zero`] |
-//! | [`dissipation`] | [`Dissipation`]: `K`, given the covector it must kill; [`MetricDissipation`] |
+//! | [`dissipation`] | [`Dissipation`]: `K`, given the covector it must kill; [`MetricDissipation`], [`CometricDissipation`], [`KulkarniNomizu`], [`CasimirDissipation`], [`FieldDissipation`], [`ProjectedDissipation`], [`Scaled`] |
+//! | [`euler_poincare`] | [`Legendre`]: a reduced Lagrangian on a Lie algebra, as an energy on its dual |
 //! | [`system`] | [`System`] and its builder |
 //! | [`verify`] | the laws of a model, sampled: [`System::verify`], [`System::report`] |
 //! | [`laws`] | what brackets and dissipations promise, and the functions that check it |
 
 pub mod bracket;
 pub mod dissipation;
+pub mod euler_poincare;
 pub mod laws;
 pub mod system;
 pub mod verify;
@@ -23,7 +25,11 @@ pub use bracket::{
     AreaForm, Bracket, BracketJet, ConstantPoisson, FieldPoisson, LiePoisson, Nambu,
     NaturalBracket, Poisson, PoissonError, Site, Symplectic, Zero,
 };
-pub use dissipation::{Dissipation, DissipationJet, MetricDissipation, NoDissipation};
+pub use dissipation::{
+    CasimirDissipation, CometricDissipation, Dissipation, DissipationJet, FieldDissipation,
+    FormError, KulkarniNomizu, MetricDissipation, NoDissipation, ProjectedDissipation, Scaled,
+};
+pub use euler_poincare::{Legendre, LegendreError};
 pub use system::{
     BuildError, Metriplectic, NoEnergy, NoEntropy, Point, SecondLaw, System, SystemBuilder,
 };

@@ -6,8 +6,9 @@ use metriplectic_fields::{ChartPoint, Matrix, Scalar, ScalarField, Space, Vector
 use metriplectic_manifolds::{Canonical, Manifold, MetricError, Riemannian};
 
 use crate::bracket::Site;
+use crate::dissipation::{Choice, Given};
 use crate::verify::{self, ModelError, Report};
-use crate::{Bracket, Dissipation, MetricDissipation, NaturalBracket, NoDissipation};
+use crate::{Bracket, Dissipation, NaturalBracket, NoDissipation};
 
 /// What an integrator asks of a system `x' = Π dH + K dS`; [`System`] is the one to build.
 pub trait Metriplectic {
@@ -132,6 +133,9 @@ pub struct System<M, G, B, K, H, S> {
     parts: SystemBuilder<M, G, B, K, H, S>,
 }
 
+/// The system that a builder makes, with the dissipation that its choice `K` has come to.
+pub type Built<M, G, B, K, H, S> = System<M, G, B, <K as Choice>::Dissipation, H, S>;
+
 impl System<(), (), (), (), (), ()> {
     /// Starts a system on a manifold, with the manifold's canonical metric and its natural bracket
     /// (Lie-Poisson on the dual of a Lie algebra, none on Rⁿ).
@@ -206,17 +210,29 @@ impl<M: Manifold, G, B, K, H, S> SystemBuilder<M, G, B, K, H, S> {
 
     /// The entropy `S`: a closure `|x| -> Real` or any other [`ScalarField`]. It must be a Casimir
     /// of the bracket unless [`second_law`](Self::second_law) says otherwise, and it is produced by
-    /// the dissipation of the metric ([`MetricDissipation`]).
+    /// the dissipation of the metric ([`MetricDissipation`](crate::MetricDissipation)) unless
+    /// [`dissipation`](Self::dissipation) gives another one, before or after.
     pub fn entropy<F: ScalarField<M>>(
         self,
         entropy: F,
-    ) -> SystemBuilder<M, G, B, MetricDissipation, H, F> {
-        let Self { manifold, metric, bracket, energy, second_law, .. } = self;
+    ) -> SystemBuilder<M, G, B, K::WithEntropy, H, F>
+    where
+        K: Choice,
+    {
+        let Self { manifold, metric, bracket, dissipation, energy, second_law, .. } = self;
         let second_law = match second_law {
             SecondLaw::NoEntropy => SecondLaw::Casimir,
             chosen => chosen,
         };
-        let dissipation = MetricDissipation;
+        let dissipation = dissipation.with_entropy();
+        SystemBuilder { manifold, metric, bracket, dissipation, energy, entropy, second_law }
+    }
+
+    /// What produces the entropy, in place of the dissipation of the metric: any
+    /// [`Dissipation`], such as those of the table in [`dissipation`](crate::dissipation).
+    pub fn dissipation<F>(self, dissipation: F) -> SystemBuilder<M, G, B, Given<F>, H, S> {
+        let Self { manifold, metric, bracket, energy, entropy, second_law, .. } = self;
+        let dissipation = Given(dissipation);
         SystemBuilder { manifold, metric, bracket, dissipation, energy, entropy, second_law }
     }
 
@@ -251,22 +267,26 @@ impl<M: Manifold, G, B, K, H, S> SystemBuilder<M, G, B, K, H, S> {
     ///
     /// [`BuildError`] if the parts do not make a system.
     // The bounds stand on the method, so that a part that does not fit is explained as such.
-    pub fn build(self) -> Result<System<M, G, B, K, H, S>, BuildError>
+    pub fn build(self) -> Result<Built<M, G, B, K, H, S>, BuildError>
     where
         G: Riemannian<M>,
         B: Bracket<M, G>,
-        K: Dissipation<M, G>,
+        K: Choice<Dissipation: Dissipation<M, G>>,
         H: ScalarField<M>,
         S: ScalarField<M>,
     {
-        let has_entropy = !Dissipation::<M, G>::is_none(&self.dissipation);
-        if !has_entropy && Bracket::<M, G>::is_zero(&self.bracket) {
+        let Self { manifold, metric, bracket, dissipation, energy, entropy, second_law } = self;
+        let dissipation = dissipation.chosen();
+        let has_entropy = !Dissipation::<M, G>::is_none(&dissipation);
+        if !has_entropy && Bracket::<M, G>::is_zero(&bracket) {
             return Err(BuildError::NothingMoves);
         }
-        if has_entropy == (self.second_law == SecondLaw::NoEntropy) {
+        if has_entropy == (second_law == SecondLaw::NoEntropy) {
             return Err(BuildError::SecondLawWithoutEntropy);
         }
-        Ok(System { parts: self })
+        let parts =
+            SystemBuilder { manifold, metric, bracket, dissipation, energy, entropy, second_law };
+        Ok(System { parts })
     }
 }
 

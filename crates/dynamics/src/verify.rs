@@ -127,12 +127,19 @@ fn value_not_finite<Y: Metriplectic + ?Sized>(system: &Y, x: &Point<Y>) -> Optio
     let at = ChartPoint::<Y::Manifold>::centre(x);
     let ds = system.entropy().jet1(x).df;
     let bracket = system.bracket().tensor(&system.site(&at, &ds));
+    let dh = system.energy().jet1(x).df;
+    let dissipation = system.dissipation().tensor(system.metric(), &at, &dh);
     let values = [
         ("energy", system.energy().at::<f64>(x)),
         ("entropy", system.entropy().at::<f64>(x)),
         ("metric", metric_matrix(system, x).max_abs()),
         // A metric that cannot be used is reported as such, not as a bracket without a value.
         ("bracket", bracket.map_or(0.0, |tensor| tensor.max_abs())),
+        // A derivative of the energy that is not finite is reported as such.
+        (
+            "dissipation",
+            dissipation.map_or(0.0, |k| if dh.is_finite() { k.max_abs() } else { 0.0 }),
+        ),
     ];
     let (field, value) = values.into_iter().find(|(_, value)| !value.is_finite())?;
     Some(ModelError::ValueNotFinite { field, value, point: Y::Manifold::entries(x) })
@@ -214,7 +221,10 @@ fn examine_bracket<Y: Metriplectic + ?Sized>(
     Ok(())
 }
 
-/// `K` is symmetric and positive semidefinite, and kills `dH`.
+/// How far from `dH`, relative to it, another covector is that `K` has to kill.
+const NEARBY: f64 = 1e-2;
+
+/// `K` is symmetric and positive semidefinite, and kills `dH`, and whatever else it is told to kill.
 fn examine_dissipation<Y: Metriplectic + ?Sized>(
     system: &Y,
     x: &Point<Y>,
@@ -229,6 +239,13 @@ fn examine_dissipation<Y: Metriplectic + ?Sized>(
     let metric = |source| ModelError::Metric { source, point: Y::Manifold::entries(x) };
     let centre = ChartPoint::<Y::Manifold>::centre(x);
     let (k, g) = (system.dissipation(), system.metric());
+    let jet = k.linearise(g, x, &energy.df, &entropy.df).map_err(metric)?;
+    if !(jet.along_z.max_abs() + jet.along_w.max_abs()).is_finite() {
+        return Err(ModelError::DerivativeNotFinite {
+            field: "dissipation",
+            point: findings.point.clone(),
+        });
+    }
     let tensor = k.tensor(g, &centre, &energy.df).map_err(metric)?;
     let scale = tensor.max_abs();
     let transposed = Matrix::<Y::Manifold>::from_entries(|i, j| tensor[(j, i)]);
@@ -248,6 +265,13 @@ fn examine_dissipation<Y: Metriplectic + ?Sized>(
     let killed = tensor * energy.df;
     let size = relative(killed.magnitude(), scale * energy.df.magnitude());
     findings.note("K dH = 0", size, |point| ModelError::EnergyNotKept { point, size });
+    // A step gives K a discrete gradient of H, which is near dH and not dH.
+    let w = energy.df + covector * (NEARBY * energy.df.magnitude());
+    let tensor = k.tensor(g, &centre, &w).map_err(metric)?;
+    if tensor.max_abs().is_finite() {
+        let size = relative((tensor * w).magnitude(), tensor.max_abs() * w.magnitude());
+        findings.note("K_w w = 0", size, |point| ModelError::CovectorNotKilled { point, size });
+    }
     Ok(())
 }
 
@@ -362,8 +386,23 @@ pub enum ModelError {
         size: f64,
     },
     /// `K dH ≠ 0`.
-    #[error("the dissipation does not keep the energy at {point:?}: K dH is {size:.1e} of |K||dH|")]
+    #[error(
+        "the dissipation does not keep the energy at {point:?}: K dH is {size:.1e} of |K||dH|; build \
+         K from the covector w that it is told to kill, or ask for `ProjectedDissipation`"
+    )]
     EnergyNotKept {
+        /// The entries of the point.
+        point: Vec<f64>,
+        /// The relative size of the violation.
+        size: f64,
+    },
+    /// `K_w w ≠ 0` for a covector near `dH`.
+    #[error(
+        "the dissipation kills dH at {point:?}, but not the covector w near it that it is told to \
+         kill: K_w w is {size:.1e} of |K||w|; build K from w and not from dH(x), or ask for \
+         `ProjectedDissipation`"
+    )]
+    CovectorNotKilled {
         /// The entries of the point.
         point: Vec<f64>,
         /// The relative size of the violation.

@@ -3,7 +3,7 @@
 use metriplectic_fields::{ChartPoint, Column, Dimension, Matrix, Scalar, Square, Vector};
 use metriplectic_manifolds::{InnerProduct, Manifold, MetricError, Riemannian};
 
-use super::{Dissipation, DissipationJet};
+use super::{Dissipation, DissipationJet, Scaled, turn};
 
 /// The dissipation of a Riemannian metric (Bloch, Farré Puiggalí, Martín de Diego 2024, eq.
 /// "semid"):
@@ -23,6 +23,27 @@ use super::{Dissipation, DissipationJet};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct MetricDissipation;
 
+impl MetricDissipation {
+    /// The same `κ(x)` times over: `κ` is a closure `|x| -> Real` or any other
+    /// [`ScalarField`](metriplectic_fields::ScalarField), and nowhere negative.
+    ///
+    /// ```
+    /// use metriplectic_dynamics::{MetricDissipation, System};
+    /// use metriplectic_fields::Real;
+    /// use metriplectic_manifolds::LieDual;
+    /// use nalgebra::Vector3;
+    /// let body = System::on(LieDual::so3())
+    ///     .energy(|p: &Vector3<Real>| p.x * p.x + p.y * p.y * 0.5)
+    ///     .entropy(|p: &Vector3<Real>| p.norm_squared() * 0.5)
+    ///     .dissipation(MetricDissipation::scaled(|p: &Vector3<Real>| p.norm_squared() + 0.1))
+    ///     .build();
+    /// assert!(body.is_ok());
+    /// ```
+    pub const fn scaled<F>(kappa: F) -> Scaled<F, Self> {
+        Scaled(kappa, Self)
+    }
+}
+
 impl<M: Manifold, G: Riemannian<M>> Dissipation<M, G> for MetricDissipation {
     #[inline]
     fn apply<D: Scalar>(
@@ -33,7 +54,8 @@ impl<M: Manifold, G: Riemannian<M>> Dissipation<M, G> for MetricDissipation {
         alpha: &Vector<M, D>,
     ) -> Result<Vector<M, D>, MetricError> {
         let g = metric.at(x)?;
-        Ok(g.raise(&pairwise::<M, D>(&g.orthonormal(w), &g.orthonormal(alpha))))
+        let w_hat = g.orthonormal(w);
+        Ok(g.raise(&turn::<M, D>(&w_hat, &g.orthonormal(alpha), &w_hat)))
     }
 
     #[inline]
@@ -46,7 +68,7 @@ impl<M: Manifold, G: Riemannian<M>> Dissipation<M, G> for MetricDissipation {
     ) -> Result<DissipationJet<M>, MetricError> {
         let g = metric.at(&ChartPoint::centre(z))?;
         let (w_hat, a_hat) = (g.orthonormal(w), g.orthonormal(alpha));
-        let value = g.raise(&pairwise::<M, f64>(&w_hat, &a_hat));
+        let value = g.raise(&turn::<M, f64>(&w_hat, &a_hat, &w_hat));
         let (w_sharp, a_sharp) = (g.raise(&w_hat), g.raise(&a_hat));
         let (ww, wa) = (w_hat.dot(&w_hat), w_hat.dot(&a_hat));
         // K = (w·w) g⁻¹ − ♯w ♯wᵀ, and K_w α = (w·w) ♯α − (w·α) ♯w differentiated along w.
@@ -63,20 +85,6 @@ impl<M: Manifold, G: Riemannian<M>> Dissipation<M, G> for MetricDissipation {
         let along_z = slope_along_z::<M, G>(metric, z, w, alpha)?;
         Ok(DissipationJet { value, along_z, along_w, tensor })
     }
-}
-
-/// `Σ_j w_j (w_j s_i − w_i s_j)`.
-#[inline]
-fn pairwise<M: Manifold, D: Scalar>(w: &Vector<M, D>, s: &Vector<M, D>) -> Vector<M, D> {
-    let mut k = Vector::<M, D>::zero();
-    for i in 0..M::Dim::LEN {
-        for j in 0..i {
-            let a = w[j] * s[i] - w[i] * s[j];
-            k[i] += w[j] * a;
-            k[j] -= w[i] * a;
-        }
-    }
-    k
 }
 
 /// `∂(K_w α)/∂z`, which only a metric that varies has: with `P = ♯w`, `A = ♯α` and

@@ -1,0 +1,203 @@
+//! A dissipation from a closure of the point and the covector to be killed.
+
+use std::fmt;
+
+use metriplectic_fields::{
+    ChartPoint, Column, Dimension, Factors, Form, Matrix, Real, Scalar, Square, Vector, Velocity,
+};
+use metriplectic_manifolds::{Manifold, MetricError, Riemannian};
+
+use super::{Dissipation, DissipationJet};
+
+/// The dissipation of a closure `|x, w| -> K` of the point and of the covector to be killed, which
+/// is used as it is written:
+///
+/// ```math
+/// K_w(x)\, \alpha = K(x, w)\, \alpha .
+/// ```
+///
+/// `w` is `dH` in the equations of motion and a discrete gradient of `H` in a step, so the closure
+/// builds `K` from the `w` that it is given and never from its own `dH(x)`. That `K` is symmetric and
+/// positive semidefinite and that `K(x, w) w = 0` is checked at sampled points, for `dH` and for
+/// covectors near it. A matrix that knows nothing of `w` is a
+/// [`ProjectedDissipation`](super::ProjectedDissipation).
+///
+/// `w` and `K` are written in the terms dual to the
+/// [`velocity`](metriplectic_fields::Space::velocity) of the space: on a vector space in components,
+/// on SO(3) as body covectors, and on a sphere in the space around, where `w` is tangent and what `K`
+/// does across the sphere is not looked at.
+///
+/// Like every closure it is written over [`Real`], and lifted to every scalar of derivative order
+/// ≤ 2. A dissipation at a scalar of any order is a type of your own that implements
+/// [`Dissipation`].
+///
+/// ```
+/// use metriplectic_dynamics::{FieldDissipation, System};
+/// use metriplectic_fields::Real;
+/// use metriplectic_manifolds::Euclidean;
+/// use nalgebra::{Matrix3, Vector3};
+/// // The damped oscillator x = (q, p, s): K = (γ/w_s) b bᵀ with b = (0, w_s, −w_p) kills w.
+/// let friction = |_: &Vector3<Real>, w: &Vector3<Real>| -> Matrix3<Real> {
+///     let b = Vector3::new(0.0.into(), w.z, -w.y);
+///     b * b.transpose() * (w.z.recip() * 0.01)
+/// };
+/// # use num_dual::DualNum;
+/// let system = System::on(Euclidean::<3>)
+///     .energy(|x: &Vector3<Real>| (x.x * x.x + x.y * x.y) * 0.5 + x.z)
+///     .entropy(|x: &Vector3<Real>| x.z)
+///     .dissipation(FieldDissipation(friction))
+///     .build();
+/// assert!(system.is_ok());
+/// ```
+#[derive(Clone, Copy)]
+pub struct FieldDissipation<F>(pub F);
+
+impl<F> fmt::Debug for FieldDissipation<F> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("FieldDissipation").finish_non_exhaustive()
+    }
+}
+
+impl<M, G, F> Dissipation<M, G> for FieldDissipation<F>
+where
+    M: Manifold,
+    G: Riemannian<M>,
+    F: Fn(&M::Point<Real>, &Velocity<M, Real>) -> Form<M, Real>,
+{
+    fn apply<D: Scalar>(
+        &self,
+        _: &G,
+        x: &ChartPoint<M, D>,
+        w: &Vector<M, D>,
+        alpha: &Vector<M, D>,
+    ) -> Result<Vector<M, D>, MetricError> {
+        let tensor = lift::<M, D>(x, w, |x, w| self.tensor_at(x, w));
+        Ok(tensor.ok_or(MetricError::NotFinite)? * *alpha)
+    }
+
+    fn linearise(
+        &self,
+        _: &G,
+        z: &M::Point<f64>,
+        w: &Vector<M>,
+        alpha: &Vector<M>,
+    ) -> Result<DissipationJet<M>, MetricError> {
+        let (zero, x) = (Matrix::<M>::zeros(), ChartPoint::centre(z));
+        let mut jet = DissipationJet::<M> {
+            value: Vector::<M>::zero(),
+            along_z: zero,
+            along_w: zero,
+            tensor: zero,
+        };
+        let real = Vector::<M, Real>::embed(alpha);
+        let n = M::Dim::LEN;
+        for k in 0..n {
+            let (x, w) = seeded::<M, f64>(&x, w, k, n + k);
+            let tensor = self.tensor_at(&x, &w).ok_or(MetricError::NotFinite)?;
+            let column = tensor * real;
+            for i in 0..n {
+                jet.value[i] = column[i].re;
+                jet.along_z[(i, k)] = column[i].eps1;
+                jet.along_w[(i, k)] = column[i].eps2;
+            }
+            jet.tensor = Matrix::<M>::from_entries(|i, j| tensor[(i, j)].re);
+        }
+        Ok(jet)
+    }
+}
+
+impl<F> FieldDissipation<F> {
+    /// The matrix in the frame of the chart, at the scalar of closures.
+    fn tensor_at<M: Manifold>(
+        &self,
+        x: &ChartPoint<M, Real>,
+        w: &Vector<M, Real>,
+    ) -> Option<Matrix<M, Real>>
+    where
+        F: Fn(&M::Point<Real>, &Velocity<M, Real>) -> Form<M, Real>,
+    {
+        M::contravariant(x, &(self.0)(&x.point(), &along_velocities(x, w)?))
+    }
+}
+
+/// The covector `θ (θᵀθ)⁻¹ w` on velocities that is `w` on the frame `θ` of the chart, and zero
+/// across the manifold.
+fn along_velocities<M: Manifold, D: Scalar>(
+    x: &ChartPoint<M, D>,
+    w: &Vector<M, D>,
+) -> Option<Velocity<M, D>> {
+    let theta = M::Dim::array(|k| M::velocity(x, &Vector::<M, D>::basis(k)));
+    let gram = Matrix::<M, D>::from_entries(|i, j| theta[i].dot(&theta[j]));
+    let weights = gram.factor()?.solve(w)?;
+    let mut sum = Velocity::<M, D>::zero();
+    for k in 0..M::Dim::LEN {
+        sum += theta[k] * weights[k];
+    }
+    Some(sum)
+}
+
+/// The real parts of a chart point and a covector, with `ε₁` and `ε₂` in the directions `i` and `j`:
+/// those of the chart, then those of the covector; a direction beyond them is none.
+fn seeded<M: Manifold, D: Scalar>(
+    x: &ChartPoint<M, D>,
+    w: &Vector<M, D>,
+    i: usize,
+    j: usize,
+) -> (ChartPoint<M, Real>, Vector<M, Real>) {
+    let seed = |value: D, k: usize| {
+        let part = |direction| if k == direction { 1.0 } else { 0.0 };
+        Real::new(value.re(), part(i), part(j), 0.0)
+    };
+    let q = Vector::<M, Real>::from_index(|k| seed(x.q[k], k));
+    let w = Vector::<M, Real>::from_index(|k| seed(w[k], M::Dim::LEN + k));
+    (ChartPoint { base: x.base.clone(), q }, w)
+}
+
+/// The matrix `k(x, w)` at any scalar of order ≤ 2, by its Taylor expansion about the real parts, as
+/// for the [closures](mod@metriplectic_fields::closure) of one point.
+fn lift<M: Manifold, D: Scalar>(
+    x: &ChartPoint<M, D>,
+    w: &Vector<M, D>,
+    k: impl Fn(&ChartPoint<M, Real>, &Vector<M, Real>) -> Option<Matrix<M, Real>>,
+) -> Option<Matrix<M, D>> {
+    const {
+        assert!(
+            D::NDERIV <= 2,
+            "a closure has derivatives up to order 2, and this scalar asks for more: write the \
+             dissipation as a type of your own with the generic method `apply`"
+        );
+    }
+    let n = M::Dim::LEN;
+    let at = |i, j| {
+        let (x, w) = seeded::<M, D>(x, w, i, j);
+        k(&x, &w)
+    };
+    let d = |i: usize| {
+        let value = if i < n { x.q[i] } else { w[i - n] };
+        value - value.re()
+    };
+    let value = |i: usize, re: f64| D::from(if i == 0 { re } else { 0.0 });
+    let mut sum = Matrix::<M, D>::zeros();
+    let mut add = |i: usize, j: usize, part: &dyn Fn(&Real) -> D| {
+        let a = at(i, j)?;
+        sum += Matrix::<M, D>::from_entries(|row, column| part(&a[(row, column)]));
+        Some(())
+    };
+    match D::NDERIV {
+        0 => add(2 * n, 2 * n, &|a| D::from(a.re))?,
+        1 => {
+            for i in 0..n {
+                add(i, n + i, &|a| d(i) * a.eps1 + d(n + i) * a.eps2 + value(i, a.re))?;
+            }
+        }
+        _ => {
+            for i in 0..2 * n {
+                add(i, i, &|a| d(i) * a.eps1 + d(i) * d(i) * (a.eps1eps2 * 0.5) + value(i, a.re))?;
+                for j in i + 1..2 * n {
+                    add(i, j, &|a| d(i) * d(j) * a.eps1eps2)?;
+                }
+            }
+        }
+    }
+    Some(sum)
+}

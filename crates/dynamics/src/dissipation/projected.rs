@@ -1,0 +1,70 @@
+//! A dissipation from a closure of the point alone, projected.
+
+use std::fmt;
+
+use metriplectic_fields::{ChartPoint, Column, MatrixField, Scalar, Vector};
+use metriplectic_manifolds::{InnerProduct, Manifold, MetricError, Riemannian};
+
+use super::Dissipation;
+use super::kulkarni_nomizu::form;
+
+/// The dissipation of a symmetric positive semidefinite matrix field `K` that knows nothing of the
+/// covector to be killed, projected off it with the metric of the system:
+///
+/// ```math
+/// K_w = Q\, K\, Q^T, \qquad Q = 1 - \frac{♯w \otimes w}{\langle w, ♯w \rangle} .
+/// ```
+///
+/// The field is a closure `|x| -> K` or any other [`MatrixField`], acting on covectors dual to the
+/// [`velocity`](metriplectic_fields::Space::velocity) of the space. `Qᵀw = 0`, so `K_w` kills `w`
+/// whatever `K` is; where `K` kills it already, nothing changes. Otherwise the projection spreads
+/// friction onto variables that had none, [`is_projected`](Dissipation::is_projected) says so, and a
+/// closure `|x, w| -> K` that kills `w` of itself ([`FieldDissipation`](super::FieldDissipation)) is
+/// the better model. Every `K` kills `w = 0`, and is left alone there.
+///
+/// ```
+/// use metriplectic_dynamics::{ProjectedDissipation, System};
+/// use metriplectic_fields::Real;
+/// use metriplectic_manifolds::LieDual;
+/// use nalgebra::{Matrix3, Vector3};
+/// let friction = |_: &Vector3<Real>| Matrix3::from_diagonal(&Vector3::new(0.1, 0.1, 0.0)).cast();
+/// let system = System::on(LieDual::so3())
+///     .energy(|p: &Vector3<Real>| p.x * p.x + p.y * p.y * 0.5)
+///     .entropy(|p: &Vector3<Real>| p.norm_squared() * 0.5)
+///     .dissipation(ProjectedDissipation(friction))
+///     .build();
+/// assert!(system.is_ok());
+/// ```
+#[derive(Clone, Copy)]
+pub struct ProjectedDissipation<F>(pub F);
+
+impl<F> fmt::Debug for ProjectedDissipation<F> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("ProjectedDissipation").finish_non_exhaustive()
+    }
+}
+
+impl<M: Manifold, G: Riemannian<M>, F: MatrixField<M>> Dissipation<M, G>
+    for ProjectedDissipation<F>
+{
+    fn apply<D: Scalar>(
+        &self,
+        metric: &G,
+        x: &ChartPoint<M, D>,
+        w: &Vector<M, D>,
+        alpha: &Vector<M, D>,
+    ) -> Result<Vector<M, D>, MetricError> {
+        let tensor = form(&self.0, x)?;
+        let sharp = metric.at(x)?.sharp(w);
+        let square = w.dot(&sharp);
+        if square.re() == 0.0 {
+            return Ok(tensor * *alpha);
+        }
+        let v = tensor * (*alpha - *w * (alpha.dot(&sharp) / square));
+        Ok(v - sharp * (w.dot(&v) / square))
+    }
+
+    fn is_projected(&self) -> bool {
+        true
+    }
+}

@@ -1,0 +1,65 @@
+//! A dissipation times a number.
+
+use std::fmt;
+
+use metriplectic_fields::{ChartPoint, Matrix, Scalar, ScalarField, Square, Vector};
+use metriplectic_manifolds::{Manifold, MetricError, Riemannian};
+
+use super::{Dissipation, DissipationJet};
+
+/// The dissipation `κ(x) K_w` with a scalar field `κ`, first, and any dissipation `K`, second.
+///
+/// It is symmetric and kills `w` as `K` does, and positive semidefinite if `κ(x) ≥ 0`, which is
+/// checked at sampled points.
+#[derive(Clone, Copy)]
+pub struct Scaled<F, K>(pub F, pub K);
+
+impl<F, K: fmt::Debug> fmt::Debug for Scaled<F, K> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_tuple("Scaled").field(&self.1).finish_non_exhaustive()
+    }
+}
+
+impl<M, G, F, K> Dissipation<M, G> for Scaled<F, K>
+where
+    M: Manifold,
+    G: Riemannian<M>,
+    F: ScalarField<M>,
+    K: Dissipation<M, G>,
+{
+    #[inline]
+    fn apply<D: Scalar>(
+        &self,
+        metric: &G,
+        x: &ChartPoint<M, D>,
+        w: &Vector<M, D>,
+        alpha: &Vector<M, D>,
+    ) -> Result<Vector<M, D>, MetricError> {
+        Ok(self.1.apply(metric, x, w, alpha)? * self.0.at(&x.point()))
+    }
+
+    #[inline]
+    fn linearise(
+        &self,
+        metric: &G,
+        z: &M::Point<f64>,
+        w: &Vector<M>,
+        alpha: &Vector<M>,
+    ) -> Result<DissipationJet<M>, MetricError> {
+        let (jet, kappa) = (self.1.linearise(metric, z, w, alpha)?, self.0.jet1(z));
+        Ok(DissipationJet {
+            value: jet.value * kappa.value,
+            along_z: jet.along_z * kappa.value + Matrix::<M>::outer(&jet.value, &kappa.df),
+            along_w: jet.along_w * kappa.value,
+            tensor: jet.tensor * kappa.value,
+        })
+    }
+
+    fn is_none(&self) -> bool {
+        self.1.is_none()
+    }
+
+    fn is_projected(&self) -> bool {
+        self.1.is_projected()
+    }
+}

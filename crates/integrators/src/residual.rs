@@ -4,7 +4,7 @@ use metriplectic_dynamics::{Bracket, Dissipation, Metriplectic, system::Point};
 use metriplectic_fields::{
     ChartPoint, Column, Scalar, ScalarField, Space, Square, Vector, differential,
 };
-use metriplectic_manifolds::{Manifold, MetricError, Retraction, Riemannian};
+use metriplectic_manifolds::{Arc, Manifold, MetricError, Retraction, Riemannian};
 
 use crate::gonzalez::{Chord, gonzalez};
 use crate::root_finder::{Equation, Linearised, Root};
@@ -159,16 +159,15 @@ where
     #[inline]
     fn value(&self, u: &Vector<Y::Manifold>) -> Option<Vector<Y::Manifold>> {
         let (system, metric) = (self.system, self.system.metric());
-        let arc = self.retraction.arc_jet(metric, self.x, u).ok()?;
-        let z = ChartPoint::<Y::Manifold>::centre(&arc.z);
+        let Arc { z, d, end: point } = self.retraction.real_arc(metric, self.x, u).ok()?;
         let g = metric.at(&z).ok()?;
-        let df = system.energy().jet1(&arc.z).df;
-        let end = system.energy_at(&arc.end);
-        let w = self.chord(u, &df, &arc.d, (&arc.end, end)).covector(self.recall, &g, &arc.d);
-        let s = system.entropy().jet1(&arc.z).df;
+        let df = system.energy().jet1(&z.base).df;
+        let end = system.energy_at(&point);
+        let w = self.chord(u, &df, &d, (&point, end)).covector(self.recall, &g, &d);
+        let s = system.entropy().jet1(&z.base).df;
         let reversible = system.bracket().apply(&system.site(&z, &s), &w).ok()?;
         let irreversible = system.dissipation().apply(metric, &z, &w, &s).ok()?;
-        let residual = arc.d - (reversible + irreversible) * self.h;
+        let residual = d - (reversible + irreversible) * self.h;
         residual.is_finite().then_some(residual)
     }
 

@@ -28,6 +28,16 @@ impl<M: Manifold, G: Riemannian<M>> Retraction<M, G> for Exponential {
         Ok(Arc { z, d: *u, end: end.point() })
     }
 
+    #[inline]
+    fn real_arc(
+        &self,
+        metric: &G,
+        x: &M::Point<f64>,
+        u: &Vector<M>,
+    ) -> Result<Arc<M>, MetricError> {
+        Ok(Arc { z: ChartPoint::centre(x), d: *u, end: metric.end(x, u)? })
+    }
+
     fn arc_jet(
         &self,
         metric: &G,

@@ -6,7 +6,7 @@ use metriplectic_fields::{
 use nalgebra::{Const, SMatrix};
 
 use crate::metric::{Factored, GeodesicEnd, MetricError, time};
-use crate::{ArcJet, Canonical, Riemannian};
+use crate::{Arc, ArcJet, Canonical, Riemannian};
 
 /// A manifold whose charts are global and linear: straight lines are the geodesics of every metric
 /// that is constant in them.
@@ -46,6 +46,12 @@ macro_rules! straight_geodesics {
 
         fn log(&self, x: &M::Point<f64>, y: &M::Point<f64>) -> Result<Vector<M>, MetricError> {
             Ok(M::coordinates(x, y))
+        }
+
+        #[inline]
+        fn weyl_arc(&self, x: &M::Point<f64>, d: &Vector<M>) -> Result<Arc<M>, MetricError> {
+            let z = ChartPoint::centre(&M::chart(x, &(*d * 0.5)));
+            Ok(Arc { z, d: *d, end: M::chart(x, d) })
         }
 
         #[inline]

@@ -14,7 +14,7 @@ use crate::{Manifold, MetricError, Riemannian};
 /// Everything here is written in the displacement `d = hv`, so no step size appears.
 ///
 /// Laws ([`laws::retraction`](crate::laws::retraction)): 1. `R_h⁻¹ R_h = 1`; 2. the arc from `x`
-/// ends where the pair does; 3. `arc_jet` is the derivative of `arc`; 4. a symmetric one returns
+/// ends where the pair does; 3. `real_arc` is `arc`, and `arc_jet` its derivative; 4. a symmetric one returns
 /// the same base and the opposite vector for the swapped pair.
 pub trait Retraction<M: Manifold, G: Riemannian<M>> {
     /// The arc that leaves `x` with initial displacement `u ∈ T_xM`: the unknown of a step.
@@ -28,6 +28,21 @@ pub trait Retraction<M: Manifold, G: Riemannian<M>> {
         x: &M::Point<f64>,
         u: &Vector<M, D>,
     ) -> Result<Arc<M, D>, MetricError>;
+
+    /// The same arc at `f64`, in the charts at its own points.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`arc`](Self::arc).
+    #[inline]
+    fn real_arc(
+        &self,
+        metric: &G,
+        x: &M::Point<f64>,
+        u: &Vector<M>,
+    ) -> Result<Arc<M>, MetricError> {
+        self.arc(metric, x, u)
+    }
 
     /// The end of the arc of `u` alone; that of a geodesic, unless the retraction says otherwise.
     ///

@@ -8,9 +8,9 @@ use nalgebra::{Const, SMatrix, SVector};
 use num_dual::Dual;
 use rand::{Rng, RngExt};
 
-use crate::metric::{GeodesicEnd, MetricError, time, within};
+use crate::metric::{GeodesicEnd, MetricError, within};
 use crate::normal::Normal;
-use crate::{ArcJet, Canonical, Manifold, Riemannian};
+use crate::{Arc, ArcJet, Canonical, Manifold, Riemannian};
 
 /// The unit sphere `Sⁿ = { x ∈ Rⁿ⁺¹ : |x| = 1 }` for `n = 1 … 7`.
 ///
@@ -47,24 +47,22 @@ impl<const N: usize> Sphere<N> {
 }
 
 /// An orthonormal basis of the tangent space at `x`, with `det[x, E] = +1`: the columns of the
-/// Householder reflection that takes the last axis to `∓x`, all but the last.
+/// Householder reflection `1 − a aᵀ/(1 + |x_N|)` along `a = x ± e_N`, which takes the last axis to
+/// `∓x`, all but the last.
+#[inline]
 pub(crate) fn frame<const A: usize, const N: usize>(x: &SVector<f64, A>) -> SMatrix<f64, A, N> {
-    let sign = if x[N] < 0.0 { -1.0 } else { 1.0 };
-    let mut axis = *x;
-    axis[N] += sign;
-    let scale = 2.0 / axis.norm_squared();
-    let mut e = SMatrix::from_fn(|i, j| {
-        let delta = if i == j { 1.0 } else { 0.0 };
-        delta - scale * axis[i] * axis[j]
-    });
+    let sign = 1.0_f64.copysign(x[N]);
+    let scale = (1.0 + x[N].abs()).recip();
     // The reflection has determinant −1 and last column −sign·x, so det[E, x] = sign.
     let oriented = if N.is_multiple_of(2) { sign } else { -sign };
-    if oriented < 0.0 {
-        for i in 0..A {
-            e[(i, 0)] = -e[(i, 0)];
-        }
-    }
-    e
+    SMatrix::from_fn(|i, j| {
+        let entry = match i {
+            _ if i == N => -sign * x[j],
+            _ if i == j => 1.0 - scale * x[i] * x[j],
+            _ => -scale * x[i] * x[j],
+        };
+        if j == 0 { oriented * entry } else { entry }
+    })
 }
 
 /// `E q` at a scalar.
@@ -93,7 +91,7 @@ fn great_circle<D: Scalar, const A: usize>(
     t: f64,
 ) -> [SVector<D, A>; 2] {
     let s = v.dot(v);
-    let (cosine, sine) = (stumpff(0, s * (t * t)), stumpff(1, s * (t * t)));
+    let [cosine, sine, ..] = stumpff(s * (t * t));
     [x * cosine + v * (sine * t), v * cosine - x * (s * sine * t)]
 }
 
@@ -123,19 +121,20 @@ macro_rules! sphere {
 
             #[inline]
             fn chart<D: Scalar>(x: &SVector<f64, $a>, q: &SVector<D, $n>) -> SVector<D, $a> {
-                let s = q.dot(q);
-                let along = spread(&frame::<$a, $n>(x), q) * stumpff(1, s);
-                let cosine = stumpff(0, s);
+                let [cosine, sine, ..] = stumpff(q.dot(q));
+                let along = spread(&frame::<$a, $n>(x), q) * sine;
                 normalised(&SVector::from_fn(|i, _| along[i] + cosine * x[i]))
             }
 
             /// `x + ε₁ E_i + ε₂ E_j − ε₁ε₂ δ_ij x`, because `cos|q| = 1 − |q|²/2` for a seed.
             #[inline]
-            fn seeded(x: &SVector<f64, $a>, i: usize, j: usize) -> SVector<Real, $a> {
-                let e = frame::<$a, $n>(x);
-                let entry = |row, column| if column < $n { e[(row, column)] } else { 0.0 };
-                let bend = if i == j && i < $n { -1.0 } else { 0.0 };
-                SVector::from_fn(|k, _| Real::new(x[k], entry(k, i), entry(k, j), bend * x[k]))
+            fn seeds(x: &SVector<f64, $a>) -> impl Fn(usize, usize) -> SVector<Real, $a> {
+                let (x, e) = (*x, frame::<$a, $n>(x));
+                move |i, j| {
+                    let entry = |row, column| if column < $n { e[(row, column)] } else { 0.0 };
+                    let bend = if i == j && i < $n { -1.0 } else { 0.0 };
+                    SVector::from_fn(|k, _| Real::new(x[k], entry(k, i), entry(k, j), bend * x[k]))
+                }
             }
 
             fn coordinates<D: Scalar>(x: &SVector<f64, $a>, y: &SVector<D, $a>) -> SVector<D, $n> {
@@ -148,9 +147,8 @@ macro_rules! sphere {
             /// The entries of `x' = c₁ E v − (q·v) (c₁ x + (c₂ − c₃) E q)`, with the Stumpff functions
             /// at `|q|²`.
             fn velocity<D: Scalar>(at: &ChartPoint<Self, D>, v: &SVector<D, $n>) -> SVector<D, $a> {
-                let (s, along) = (at.q.dot(&at.q), at.q.dot(v));
-                let sine = stumpff(1, s);
-                let tangent = v * sine - at.q * (along * (stumpff(2, s) - stumpff(3, s)));
+                let ([_, sine, c2, c3], along) = (stumpff(at.q.dot(&at.q)), at.q.dot(v));
+                let tangent = v * sine - at.q * (along * (c2 - c3));
                 let moved = spread(&frame::<$a, $n>(&at.base), &tangent);
                 SVector::from_fn(|i, _| moved[i] - sine * along * at.base[i])
             }
@@ -250,7 +248,9 @@ macro_rules! sphere {
                 t: f64,
             ) -> Result<SVector<Real, $a>, MetricError> {
                 within(PI, v.norm())?;
-                Ok(Sphere::<$n>::chart(x, &v.map(|v| time(t) * v)))
+                let [_, velocity] = great_circle(x, &(frame::<$a, $n>(x) * v), t);
+                let (y, s) = (Sphere::<$n>::chart(x, &(v * t)), v.norm_squared());
+                Ok(SVector::from_fn(|i, _| Real::new(y[i], velocity[i], velocity[i], -s * y[i])))
             }
 
             fn log(
@@ -264,6 +264,21 @@ macro_rules! sphere {
                 Ok(Sphere::<$n>::coordinates(x, y))
             }
 
+            /// `γ'(½) = c₀ U − ½s c₁ x` with `U = E(x) d` and the Stumpff functions at `s/4 = |d|²/4`.
+            #[inline]
+            fn weyl_arc(
+                &self,
+                x: &SVector<f64, $a>,
+                d: &SVector<f64, $n>,
+            ) -> Result<Arc<Sphere<$n>>, MetricError> {
+                within(PI, d.norm())?;
+                let [z, velocity] = great_circle(x, &(frame::<$a, $n>(x) * d), 0.5);
+                let z = normalised(&z);
+                let d_at_z = frame::<$a, $n>(&z).tr_mul(&velocity);
+                Ok(Arc { z: ChartPoint::centre(&z), d: d_at_z, end: Sphere::<$n>::chart(x, d) })
+            }
+
+            #[inline]
             fn weyl_jet(
                 &self,
                 x: &SVector<f64, $a>,
@@ -306,8 +321,8 @@ where
 {
     let (e, s) = (frame::<A, N>(x), d.norm_squared());
     let u = e * d;
-    let [c0, c1] = [0, 1].map(|n| stumpff(n, 0.25 * s));
-    let slope = -0.5 * (stumpff(2, 0.25 * s) - stumpff(3, 0.25 * s));
+    let [c0, c1, c2, c3] = stumpff(0.25 * s);
+    let slope = -0.5 * (c2 - c3);
     let z = normalised(&(x * c0 + u * (0.5 * c1)));
     let velocity = u * c0 - x * (0.5 * s * c1);
     let mut dz = e * (0.5 * c1);
@@ -319,8 +334,8 @@ where
         dz.set_column(k, &(dz.column(k) + turn));
         dv.set_column(k, &(dv.column(k) + lean));
     }
-    let [c0, c1] = [0, 1].map(|n| stumpff(n, s));
-    let slope = -0.5 * (stumpff(2, s) - stumpff(3, s));
+    let [c0, c1, c2, c3] = stumpff(s);
+    let slope = -0.5 * (c2 - c3);
     let end = normalised(&(x * c0 + u * c1));
     let mut dend = e * c1;
     for k in 0..N {

@@ -30,6 +30,16 @@ impl<M: Manifold, G: Riemannian<M>> Retraction<M, G> for WeylMidpoint {
     }
 
     #[inline]
+    fn real_arc(
+        &self,
+        metric: &G,
+        x: &M::Point<f64>,
+        u: &Vector<M>,
+    ) -> Result<Arc<M>, MetricError> {
+        metric.weyl_arc(x, u)
+    }
+
+    #[inline]
     fn arc_jet(
         &self,
         metric: &G,

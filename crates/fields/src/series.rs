@@ -34,12 +34,11 @@ const TINY: f64 = 1.0 / 32.0;
 #[inline]
 pub fn stumpff<D: Scalar>(s: D) -> [D; 4] {
     // Each derivative takes a term away from the end of a series.
-    let [c2, c3] = match s.re().abs() {
-        size if size < TINY => [2, 3].map(|n| power_series(n, s, 5 + D::NDERIV)),
-        size if size < NEAR => [2, 3].map(|n| power_series(n, s, 9 + D::NDERIV)),
-        _ => return closed_forms(s),
-    };
-    [-(s * c2) + 1.0, -(s * c3) + 1.0, c2, c3]
+    match s.re().abs() {
+        size if size < TINY => power_series(s, 5 + D::NDERIV),
+        size if size < NEAR => power_series(s, 9 + D::NDERIV),
+        _ => closed_forms(s),
+    }
 }
 
 fn closed_forms<D: Scalar>(s: D) -> [D; 4] {
@@ -49,11 +48,15 @@ fn closed_forms<D: Scalar>(s: D) -> [D; 4] {
     [c0, c1, sine * sine * 2.0 / s, (-c1 + 1.0) / s]
 }
 
-/// The first terms of `Σ_k (−s)^k / (2k + n)!`, by Horner's scheme.
-#[inline]
-fn power_series<D: Scalar>(n: usize, s: D, terms: usize) -> D {
-    let last = D::from(RECIPROCAL_FACTORIALS[2 * (terms - 1) + n]);
-    (0..terms - 1).rev().fold(last, |sum, k| -(s * sum) + RECIPROCAL_FACTORIALS[2 * k + n])
+/// The first terms of the series, by Horner's scheme.
+#[inline(always)]
+fn power_series<D: Scalar>(s: D, terms: usize) -> [D; 4] {
+    let (mut c2, mut c3) = (D::zero(), D::zero());
+    for k in (0..terms).rev() {
+        c2 = -(s * c2) + RECIPROCAL_FACTORIALS[2 * k + 2];
+        c3 = -(s * c3) + RECIPROCAL_FACTORIALS[2 * k + 3];
+    }
+    [-(s * c2) + 1.0, -(s * c3) + 1.0, c2, c3]
 }
 
 /// `1/k!`.

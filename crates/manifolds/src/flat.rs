@@ -1,11 +1,9 @@
 //! Metrics that are constant in a global chart: their geodesics are straight lines.
 
-use metriplectic_fields::{
-    ChartPoint, Column, Dimension, Matrix, Real, Scalar, Space, Square, Vector,
-};
+use metriplectic_fields::{ChartPoint, Dimension, Matrix, Real, Scalar, Space, Square, Vector};
 use nalgebra::{Const, SMatrix};
 
-use crate::metric::{Factored, GeodesicEnd, MetricError, time};
+use crate::metric::{Factored, GeodesicEnd, MetricError, stretched};
 use crate::{Arc, ArcJet, Canonical, Riemannian};
 
 /// A manifold whose charts are global and linear: straight lines are the geodesics of every metric
@@ -36,7 +34,7 @@ macro_rules! straight_geodesics {
             v: &Vector<M>,
             t: f64,
         ) -> Result<M::Point<Real>, MetricError> {
-            Ok(M::chart(x, &(Vector::<M, Real>::embed(v) * time(t))))
+            Ok(M::chart(x, &stretched::<M>(v, t)))
         }
 
         #[inline]

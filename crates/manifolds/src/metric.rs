@@ -270,10 +270,10 @@ impl Metric {
     }
 }
 
-/// The time `t + ε₁ + ε₂`.
+/// The vector `(t + ε₁ + ε₂) v`.
 #[inline]
-pub(crate) fn time(t: f64) -> Real {
-    Real::new(t, 1.0, 1.0, 0.0)
+pub(crate) fn stretched<M: Space>(v: &Vector<M>, t: f64) -> Vector<M, Real> {
+    Vector::<M, Real>::from_index(|i| Real::new(t * v[i], v[i], v[i], 0.0))
 }
 
 /// Refuses a geodesic that reaches the injectivity `radius`, up to the rounding of its length.

@@ -128,7 +128,13 @@ pub fn dexp_inverse<D: Scalar>(q: &Vector3<D>) -> Matrix3<D> {
     rodrigues(q, D::from(0.5), (c2 - c3) / c1 * 0.25)
 }
 
-/// `A B` with a real matrix `B`: nalgebra's product is not made for so few entries.
+/// `A B`: nalgebra's product is not made for so few entries.
+#[inline]
+fn product<D: Scalar>(a: &Matrix3<D>, b: &Matrix3<D>) -> Matrix3<D> {
+    Matrix3::from_fn(|i, j| a[(i, 0)] * b[(0, j)] + a[(i, 1)] * b[(1, j)] + a[(i, 2)] * b[(2, j)])
+}
+
+/// `A B` with a real matrix `B`.
 #[inline]
 fn times<D: Scalar>(a: &Matrix3<D>, b: &Matrix3<f64>) -> Matrix3<D> {
     Matrix3::from_fn(|i, j| a[(i, 0)] * b[(0, j)] + a[(i, 1)] * b[(1, j)] + a[(i, 2)] * b[(2, j)])
@@ -138,6 +144,17 @@ fn times<D: Scalar>(a: &Matrix3<D>, b: &Matrix3<f64>) -> Matrix3<D> {
 #[inline]
 fn moved<D: Scalar>(a: &Matrix3<f64>, b: &Matrix3<D>) -> Matrix3<D> {
     Matrix3::from_fn(|i, j| b[(0, j)] * a[(i, 0)] + b[(1, j)] * a[(i, 1)] + b[(2, j)] * a[(i, 2)])
+}
+
+/// `A ω̂`.
+#[inline]
+fn spun(a: &Matrix3<f64>, omega: &Vector3<f64>) -> Matrix3<f64> {
+    let [x, y, z] = [a.column(0), a.column(1), a.column(2)];
+    Matrix3::from_columns(&[
+        y * omega.z - z * omega.y,
+        z * omega.x - x * omega.z,
+        x * omega.y - y * omega.x,
+    ])
 }
 
 /// One step of Newton's iteration for the polar factor, `R ← R(3 − RᵀR)/2` with the real part of
@@ -176,7 +193,7 @@ impl Space for Rotations {
     #[inline]
     fn seeds(x: &Matrix3<f64>) -> impl Fn(usize, usize) -> Matrix3<Real> {
         let x = *x;
-        let turned = [Vector3::x(), Vector3::y(), Vector3::z()].map(|e| moved(&x, &hat(&e)));
+        let turned = [spun(&x, &Vector3::x()), spun(&x, &Vector3::y()), spun(&x, &Vector3::z())];
         move |i, j| {
             let turn = |k: usize, r, c| if k < 3 { turned[k][(r, c)] } else { 0.0 };
             let half = |k: usize, r| if k < 3 { 0.5 * x[(r, k)] } else { 0.0 };
@@ -202,6 +219,12 @@ impl Space for Rotations {
     #[inline]
     fn velocity<D: Scalar>(at: &ChartPoint<Self, D>, v: &Vector3<D>) -> Vector3<D> {
         dexp(&at.q) * v
+    }
+
+    /// With `θ = dexp(q)`.
+    fn covariant<D: Scalar>(at: &ChartPoint<Self, D>, a: &Matrix3<D>) -> Matrix3<D> {
+        let theta = dexp(&at.q);
+        product(&theta.transpose(), &product(a, &theta))
     }
 
     #[inline]
@@ -310,18 +333,22 @@ impl Riemannian<Rotations> for Canonical {
         Ok(Rotations::chart(x, v))
     }
 
+    /// `R(t)` with `R' = R Ω̂` and `R'' = R Ω̂²`.
+    #[inline]
     fn along(
         &self,
         x: &Matrix3<f64>,
-        v: &Vector3<f64>,
+        omega: &Vector3<f64>,
         t: f64,
     ) -> Result<Matrix3<Real>, MetricError> {
-        // R(t), R' = R Ω̂ and R'' = R Ω̂².
-        let (r, omega) = (Riemannian::<Rotations>::end(self, x, &(v * t))?, hat(v));
-        let velocity = times(&r, &omega);
-        let bend = times(&velocity, &omega);
-        let entry = |i, j| Real::new(r[(i, j)], velocity[(i, j)], velocity[(i, j)], bend[(i, j)]);
-        Ok(Matrix3::from_fn(entry))
+        within(PI, omega.norm())?;
+        let r = if t > 0.0 { moved(x, &exp(&(omega * t))) } else { *x };
+        let velocity = spun(&r, omega);
+        let bend = spun(&velocity, omega);
+        Ok(Matrix3::from_fn(|i, j| {
+            let v = velocity[(i, j)];
+            Real::new(r[(i, j)], v, v, bend[(i, j)])
+        }))
     }
 
     fn log(&self, x: &Matrix3<f64>, y: &Matrix3<f64>) -> Result<Vector3<f64>, MetricError> {
@@ -333,12 +360,14 @@ impl Riemannian<Rotations> for Canonical {
     #[inline]
     fn weyl_arc(&self, x: &Matrix3<f64>, d: &Vector3<f64>) -> Result<Arc<Rotations>, MetricError> {
         within(PI, d.norm())?;
-        let z = ChartPoint::centre(&Rotations::chart(x, &(d * 0.5)));
+        let z = ChartPoint::centre(&moved(x, &exp(&(d * 0.5))));
         Ok(Arc { z, d: *d, end: Rotations::chart(x, d) })
     }
 
     /// With the constant body velocity `u`: `z = R exp(û/2)`, `x' = R exp(û)`, differentiated by
-    /// [`dexp`]. The chart at `z` reads the body velocity `Ω` at `q` as `dexp⁻¹(q) Ω = Ω + ½q × Ω + …`.
+    /// [`dexp`]. The chart at `z` reads the body velocity `Ω` at `q` as `dexp⁻¹(q) Ω = Ω + ½q × Ω + …`,
+    /// so `∂d/∂u = 1 − ½û ∂z/∂u = ½(1 + exp(−û/2))`.
+    #[inline]
     fn weyl_jet(
         &self,
         x: &Matrix3<f64>,
@@ -346,12 +375,12 @@ impl Riemannian<Rotations> for Canonical {
     ) -> Result<ArcJet<Rotations>, MetricError> {
         within(PI, d.norm())?;
         let half = d * 0.5;
-        let dz = dexp(&half) * 0.5;
+        let [_, c1, c2, c3] = stumpff(half.norm_squared());
         Ok(ArcJet {
-            z: Rotations::chart(x, &half),
-            dz,
+            z: moved(x, &rodrigues(&half, c1, c2)),
+            dz: rodrigues(&half, -c2, c3) * 0.5,
             d: *d,
-            dd: Matrix3::identity() - hat(&half) * dz,
+            dd: rodrigues(&half, -0.5 * c1, 0.5 * c2),
             end: Rotations::chart(x, d),
             dend: dexp(d),
         })

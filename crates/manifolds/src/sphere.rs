@@ -25,7 +25,7 @@ use crate::{Arc, ArcJet, Canonical, Manifold, Riemannian};
 /// The canonical metric is the round one: geodesics are great circles, the injectivity radius is π.
 /// The logarithm is accurate to about `8ε/(π − θ)`: its direction is lost at the antipode.
 ///
-/// Points never drift: the chart divides by the norm, so that fields are only ever evaluated at
+/// Points never drift: the chart ends with one step towards the norm 1, so that fields are only ever evaluated at
 /// points of norm 1 up to one rounding, and the energy that a step keeps is that of the point it
 /// stores.
 ///
@@ -83,8 +83,21 @@ pub(crate) fn components<D: Scalar, const A: usize, const N: usize>(
     SVector::from_fn(|j, _| (0..A).fold(D::zero(), |sum, i| sum + v[i] * e[(i, j)]))
 }
 
+/// The derivative of the chart at `q`, whose columns are the velocities of its frame:
+/// `x' = c₁ E v − (q·v) (c₁ x + (c₂ − c₃) E q)`, with the Stumpff functions at `|q|²`.
+#[inline]
+fn pushforward<D: Scalar, const A: usize, const N: usize>(
+    x: &SVector<f64, A>,
+    q: &SVector<D, N>,
+) -> SMatrix<D, A, N> {
+    let (e, [_, c1, c2, c3]) = (frame::<A, N>(x), stumpff(q.dot(q)));
+    let along = spread(&e, q) * (c2 - c3);
+    SMatrix::from_fn(|i, k| c1 * e[(i, k)] - (along[i] + c1 * x[i]) * q[k])
+}
+
 /// The point at time `t` of the great circle from `x` with velocity `v`, and its velocity there:
 /// `c₀(t²s) x + t c₁(t²s) v` with `s = |v|²`.
+#[inline]
 fn great_circle<D: Scalar, const A: usize>(
     x: &SVector<D, A>,
     v: &SVector<D, A>,
@@ -93,6 +106,15 @@ fn great_circle<D: Scalar, const A: usize>(
     let s = v.dot(v);
     let [cosine, sine, ..] = stumpff(s * (t * t));
     [x * cosine + v * (sine * t), v * cosine - x * (s * sine * t)]
+}
+
+/// Brings a point that is on the sphere up to round-off back to it, by one step of Newton's iteration
+/// `x ← x(3 − |x|²)/2` for the norm of the real part.
+#[inline]
+fn polished<D: Scalar, const A: usize>(x: &SVector<D, A>) -> SVector<D, A> {
+    let square = x.iter().fold(0.0, |sum, entry| sum + entry.re() * entry.re());
+    let scale = 1.5 - 0.5 * square;
+    x.map(|entry| entry * scale)
 }
 
 /// Divides by the norm of the real part, which leaves derivatives along the sphere alone.
@@ -123,7 +145,7 @@ macro_rules! sphere {
             fn chart<D: Scalar>(x: &SVector<f64, $a>, q: &SVector<D, $n>) -> SVector<D, $a> {
                 let [cosine, sine, ..] = stumpff(q.dot(q));
                 let along = spread(&frame::<$a, $n>(x), q) * sine;
-                normalised(&SVector::from_fn(|i, _| along[i] + cosine * x[i]))
+                polished(&SVector::from_fn(|i, _| along[i] + cosine * x[i]))
             }
 
             /// `x + ε₁ E_i + ε₂ E_j − ε₁ε₂ δ_ij x`, because `cos|q| = 1 − |q|²/2` for a seed.
@@ -144,13 +166,21 @@ macro_rules! sphere {
                 tangent * angle_over_sine(tangent.dot(&tangent), cosine)
             }
 
-            /// The entries of `x' = c₁ E v − (q·v) (c₁ x + (c₂ − c₃) E q)`, with the Stumpff functions
-            /// at `|q|²`.
             fn velocity<D: Scalar>(at: &ChartPoint<Self, D>, v: &SVector<D, $n>) -> SVector<D, $a> {
-                let ([_, sine, c2, c3], along) = (stumpff(at.q.dot(&at.q)), at.q.dot(v));
-                let tangent = v * sine - at.q * (along * (c2 - c3));
-                let moved = spread(&frame::<$a, $n>(&at.base), &tangent);
-                SVector::from_fn(|i, _| moved[i] - sine * along * at.base[i])
+                let theta = pushforward(&at.base, &at.q);
+                SVector::from_fn(|i, _| {
+                    (0..$n).fold(D::zero(), |sum, k| sum + theta[(i, k)] * v[k])
+                })
+            }
+
+            fn covariant<D: Scalar>(
+                at: &ChartPoint<Self, D>,
+                a: &SMatrix<D, $a, $a>,
+            ) -> SMatrix<D, $n, $n> {
+                let theta = pushforward(&at.base, &at.q);
+                theta.tr_mul(&SMatrix::<D, $a, $n>::from_fn(|i, k| {
+                    (0..$a).fold(D::zero(), |sum, j| sum + a[(i, j)] * theta[(j, k)])
+                }))
             }
 
             #[inline]
@@ -224,7 +254,7 @@ macro_rules! sphere {
                 let (point, velocity) = (start.map(|p| p.re), start.map(|p| p.eps));
                 within(PI, Column::magnitude(&velocity))?;
                 let [point, velocity] = great_circle(&point, &velocity, 1.0);
-                let point = normalised(&point);
+                let point = polished(&point);
                 let base = Sphere::<$n>::real(&point);
                 let end = SVector::from_fn(|i, _| Dual::new(point[i], velocity[i]));
                 let q = Sphere::<$n>::coordinates(&base, &end);
@@ -241,6 +271,8 @@ macro_rules! sphere {
                 Ok(Sphere::<$n>::chart(x, v))
             }
 
+            /// With the velocity of [`great_circle`], and `γ'' = −|v|² γ`.
+            #[inline]
             fn along(
                 &self,
                 x: &SVector<f64, $a>,
@@ -248,9 +280,9 @@ macro_rules! sphere {
                 t: f64,
             ) -> Result<SVector<Real, $a>, MetricError> {
                 within(PI, v.norm())?;
-                let [_, velocity] = great_circle(x, &(frame::<$a, $n>(x) * v), t);
-                let (y, s) = (Sphere::<$n>::chart(x, &(v * t)), v.norm_squared());
-                Ok(SVector::from_fn(|i, _| Real::new(y[i], velocity[i], velocity[i], -s * y[i])))
+                let (u, s) = (frame::<$a, $n>(x) * v, v.norm_squared());
+                let [y, dy] = if t > 0.0 { great_circle(x, &u, t) } else { [*x, u] };
+                Ok(SVector::from_fn(|i, _| Real::new(y[i], dy[i], dy[i], -s * y[i])))
             }
 
             fn log(
@@ -273,7 +305,7 @@ macro_rules! sphere {
             ) -> Result<Arc<Sphere<$n>>, MetricError> {
                 within(PI, d.norm())?;
                 let [z, velocity] = great_circle(x, &(frame::<$a, $n>(x) * d), 0.5);
-                let z = normalised(&z);
+                let z = polished(&z);
                 let d_at_z = frame::<$a, $n>(&z).tr_mul(&velocity);
                 Ok(Arc { z: ChartPoint::centre(&z), d: d_at_z, end: Sphere::<$n>::chart(x, d) })
             }
@@ -311,6 +343,7 @@ sphere!(7 in 8);
 /// `s/4`: `z = c₀ x + ½c₁ U`, `γ'(½) = c₀ U − ½s c₁ x`, differentiated by `c₀' = −½c₁` and
 /// `c₁' = −½(c₂ − c₃)`. The frames at `z` and `x'` turn ambient vectors into components; the chart at
 /// `z` is normal, so the derivative of components is the projected ambient derivative.
+#[inline]
 fn weyl_jet_in<M, const A: usize, const N: usize>(
     x: &SVector<f64, A>,
     d: &SVector<f64, N>,
@@ -321,36 +354,25 @@ where
 {
     let (e, s) = (frame::<A, N>(x), d.norm_squared());
     let u = e * d;
+    // E(y)ᵀ of E(x), x and U.
+    let seen_from = |y: &SVector<f64, A>| {
+        let at_y = frame::<A, N>(y);
+        (at_y.tr_mul(&e), at_y.tr_mul(x), at_y.tr_mul(&u))
+    };
     let [c0, c1, c2, c3] = stumpff(0.25 * s);
     let slope = -0.5 * (c2 - c3);
-    let z = normalised(&(x * c0 + u * (0.5 * c1)));
-    let velocity = u * c0 - x * (0.5 * s * c1);
-    let mut dz = e * (0.5 * c1);
-    let mut dv = e * c0;
-    for k in 0..N {
-        let along = 0.5 * d[k];
-        let turn = x * (-0.5 * c1 * along) + u * (0.5 * slope * along);
-        let lean = x * (-(d[k] * c1 + 0.5 * s * slope * along)) - u * (0.5 * c1 * along);
-        dz.set_column(k, &(dz.column(k) + turn));
-        dv.set_column(k, &(dv.column(k) + lean));
-    }
+    let z = polished(&(x * c0 + u * (0.5 * c1)));
+    let (turn, along_x, along_u) = seen_from(&z);
+    let dz = turn * (0.5 * c1) + (along_u * slope - along_x * c1) * (d * 0.25).transpose();
+    let lean = along_x * (c1 + 0.25 * s * slope) + along_u * (0.25 * c1);
+    let (velocity, dv) =
+        (along_u * c0 - along_x * (0.5 * s * c1), turn * c0 - lean * d.transpose());
+
     let [c0, c1, c2, c3] = stumpff(s);
-    let slope = -0.5 * (c2 - c3);
-    let end = normalised(&(x * c0 + u * c1));
-    let mut dend = e * c1;
-    for k in 0..N {
-        let turn = x * (-c1 * d[k]) + u * (2.0 * slope * d[k]);
-        dend.set_column(k, &(dend.column(k) + turn));
-    }
-    let (at_z, at_end) = (frame::<A, N>(&z), frame::<A, N>(&end));
-    ArcJet {
-        z: entries_of(&z).into(),
-        dz: at_z.tr_mul(&dz),
-        d: at_z.tr_mul(&velocity),
-        dd: at_z.tr_mul(&dv),
-        end: entries_of(&end).into(),
-        dend: at_end.tr_mul(&dend),
-    }
+    let end = polished(&(x * c0 + u * c1));
+    let (turn, along_x, along_u) = seen_from(&end);
+    let dend = turn * c1 - (along_x * c1 + along_u * (c2 - c3)) * d.transpose();
+    ArcJet { z: entries_of(&z).into(), dz, d: velocity, dd: dv, end: entries_of(&end).into(), dend }
 }
 
 /// The entries of a column as an array.

@@ -1,24 +1,34 @@
 //! Relaxation on SO(3) with the Nambu bracket, for fields that are quadratic in the entries of `R`.
 
+use std::cell::Cell;
+
 use criterion::Criterion;
 use metriplectic::manifolds::rotations;
 use metriplectic::prelude::*;
 
 use crate::chord::{self, Displacements, Linearised};
-use crate::{Step, compare};
+use crate::{Step, compare, compare_metric};
 
 const STEP_SIZE: f64 = 0.005;
 
 pub(crate) fn bench(criterion: &mut Criterion) {
-    let frame = System::on(Rotations::bi_invariant())
+    const NAME: &str = "step/so3_nambu";
+    let builder = System::on(Rotations::bi_invariant())
         .bracket(Nambu::default())
         .energy(|r: &Matrix3<Real>| r.m11 + r.m22 * 2.0 + r.m33 * 3.0 + r.m12 * r.m23 * 0.5)
-        .entropy(|r: &Matrix3<Real>| r.m13 - r.m21 * 0.5 + (r.m31 + r.m32).powi(2) * 0.25)
-        .build()
-        .expect("energy, entropy and metric are a system on SO(3)");
+        .entropy(|r: &Matrix3<Real>| r.m13 - r.m21 * 0.5 + (r.m31 + r.m32).powi(2) * 0.25);
+    let frame = builder.clone().build().expect("energy, entropy and metric are a system on SO(3)");
     let start = rotations::exp(&Vector3::new(0.3, -0.2, 0.5));
     let hand = HandCoded { displacements: Displacements::new() };
-    compare(criterion, "step/so3_nambu", STEP_SIZE, (&frame, start), (hand, start));
+    compare(criterion, NAME, STEP_SIZE, (&frame, start), (hand, start));
+
+    let evaluations = Cell::new(0);
+    let body = Metric::field(|_: &Matrix3<Real>| {
+        evaluations.set(evaluations.get() + 1);
+        Matrix3::<Real>::identity()
+    });
+    let numerical = builder.metric(body).build().expect("the same system");
+    compare_metric(criterion, NAME, STEP_SIZE, (&frame, start), (&numerical, &evaluations));
 }
 
 /// By hand in the body frame: `u = h (s × w + |w|² s − (w·s) w)` with `w = dH(z) + c u`, `s = dS(z)`,

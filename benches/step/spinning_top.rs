@@ -1,26 +1,34 @@
 //! The spinning top on S² (Celledoni, Eidnes, Owren, Ringholm 2019, example 1).
 
+use std::cell::Cell;
+
 use criterion::Criterion;
 use metriplectic::nalgebra::Matrix3x2;
 use metriplectic::prelude::*;
 
 use crate::chord::{self, Displacements, Linearised};
-use crate::{Step, compare};
+use crate::{Step, compare, compare_metric};
 
 const D: Vector3<f64> = Vector3::new(1.0, 0.5, 0.25);
 const STEP_SIZE: f64 = 0.1;
 
 pub(crate) fn bench(criterion: &mut Criterion) {
-    let top = System::on(Sphere::<2>::round())
-        .bracket(AreaForm)
-        .energy(|x: &Vector3<Real>| {
-            (0..3).map(|i| (x[i].powi(2) + x[i].powi(3) * (2.0 / 3.0)) * (0.5 * D[i])).sum()
-        })
-        .build()
-        .expect("the top is a Hamiltonian system");
+    const NAME: &str = "step/spinning_top";
+    let builder = System::on(Sphere::<2>::round()).bracket(AreaForm).energy(|x: &Vector3<Real>| {
+        (0..3).map(|i| (x[i].powi(2) + x[i].powi(3) * (2.0 / 3.0)) * (0.5 * D[i])).sum()
+    });
+    let top = builder.clone().build().expect("the top is a Hamiltonian system");
     let start = Vector3::repeat(3.0_f64.sqrt().recip());
     let hand = HandCoded { displacements: Displacements::new() };
-    compare(criterion, "step/spinning_top", STEP_SIZE, (&top, start), (hand, start));
+    compare(criterion, NAME, STEP_SIZE, (&top, start), (hand, start));
+
+    let evaluations = Cell::new(0);
+    let ambient = Metric::field(|_: &Vector3<Real>| {
+        evaluations.set(evaluations.get() + 1);
+        Matrix3::<Real>::identity()
+    });
+    let numerical = builder.metric(ambient).build().expect("the same system");
+    compare_metric(criterion, NAME, STEP_SIZE, (&top, start), (&numerical, &evaluations));
 }
 
 /// `H = ½ Σ D_i (x_i² + ⅔ x_i³)`

@@ -208,7 +208,8 @@ fn examine_bracket<Y: Metriplectic + ?Sized>(
     }
     let size = relative(defects.skewness, defects.size);
     findings.note("Πᵀ = −Π", size, |point| ModelError::BracketNotSkew { point, size });
-    let size = relative(defects.jacobi, defects.jacobi_size);
+    // The terms may all be round-off: then a generic product Π ∂Π sets their scale.
+    let size = relative(defects.jacobi, defects.jacobi_size + defects.size);
     findings.note("Jacobi identity", size, |point| ModelError::NoJacobiIdentity { point, size });
 
     let centre = ChartPoint::<Y::Manifold>::centre(x);

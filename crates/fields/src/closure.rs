@@ -19,6 +19,7 @@ where
     M: Space,
     F: Fn(&M::Point<Real>) -> Real,
 {
+    #[inline]
     fn at<D: Scalar>(&self, x: &M::Point<D>) -> D {
         let mut sum = D::zero();
         sweep::<M, D>(x, |point, weights| sum += weights.of(&self(point)));
@@ -63,6 +64,7 @@ impl<D: Scalar> Weights<D> {
     /// The weighted sum of the parts that the order of `D` asks for. The others are not multiplied
     /// by zero but left out: they may be infinite where the wanted ones are not (the slope of a
     /// norm at zero).
+    #[inline]
     fn of(&self, f: &Real) -> D {
         let value = D::from(self.re * f.re);
         match D::NDERIV {
@@ -94,22 +96,22 @@ fn sweep<M: Space, D: Scalar>(
         let weights = Weights { re: 1.0, eps1: none, eps2: none, eps1eps2: none };
         return visit(&M::constant(&base), &weights);
     }
-    let d = M::coordinates(&base, x);
+    let (d, seeded) = (M::coordinates(&base, x), M::seeds(&base));
     let first = |i: usize| if i == 0 { 1.0 } else { 0.0 };
     if D::NDERIV == 1 {
         for i in (0..n).step_by(2) {
             let eps2 = if i + 1 < n { d[i + 1] } else { none };
             let weights = Weights { re: first(i), eps1: d[i], eps2, eps1eps2: none };
-            visit(&M::seeded(&base, i, i + 1), &weights);
+            visit(&seeded(i, i + 1), &weights);
         }
         return;
     }
     for i in 0..n {
         let weights = Weights { re: first(i), eps1: d[i], eps2: none, eps1eps2: d[i] * d[i] * 0.5 };
-        visit(&M::seeded(&base, i, i), &weights);
+        visit(&seeded(i, i), &weights);
         for j in i + 1..n {
             let weights = Weights { re: 0.0, eps1: none, eps2: none, eps1eps2: d[i] * d[j] };
-            visit(&M::seeded(&base, i, j), &weights);
+            visit(&seeded(i, j), &weights);
         }
     }
 }

@@ -46,8 +46,9 @@ pub trait ScalarField<M: Space> {
         let n = M::Dim::LEN;
         let mut value = f64::NAN;
         let mut df = Vector::<M>::zero();
+        let seeded = M::seeds(x);
         for i in (0..n).step_by(2) {
-            let f = self.at_real(&M::seeded(x, i, i + 1));
+            let f = self.at_real(&seeded(i, i + 1));
             value = f.re;
             df[i] = f.eps1;
             if i + 1 < n {
@@ -63,9 +64,10 @@ pub trait ScalarField<M: Space> {
         let mut value = f64::NAN;
         let mut df = Vector::<M>::zero();
         let mut hf = Matrix::<M>::zeros();
+        let seeded = M::seeds(x);
         for i in 0..M::Dim::LEN {
             for j in i..M::Dim::LEN {
-                let f = self.at_real(&M::seeded(x, i, j));
+                let f = self.at_real(&seeded(i, j));
                 value = f.re;
                 df[i] = f.eps1;
                 hf[(i, j)] = f.eps1eps2;
@@ -135,14 +137,16 @@ pub trait MatrixField<M: Space> {
     /// A metric in the frame of the chart at a real point, with its first derivatives along the
     /// chart, in `⌈n/2⌉` evaluations.
     fn covariant_jet(&self, x: &M::Point<f64>) -> MatrixJet<M> {
-        MatrixJet::new(|i, j| M::covariant(&seeds(x, i, j), &self.at_real(&M::seeded(x, i, j))))
+        let seeded = M::seeds(x);
+        MatrixJet::new(|i, j| M::covariant(&seeds(x, i, j), &self.at_real(&seeded(i, j))))
     }
 
     /// A Poisson tensor in the frame of the chart at a real point, with its first derivatives along
     /// the chart, in `⌈n/2⌉` evaluations.
     fn contravariant_jet(&self, x: &M::Point<f64>) -> MatrixJet<M> {
+        let seeded = M::seeds(x);
         MatrixJet::new(|i, j| {
-            let tensor = M::contravariant(&seeds(x, i, j), &self.at_real(&M::seeded(x, i, j)));
+            let tensor = M::contravariant(&seeds(x, i, j), &self.at_real(&seeded(i, j)));
             // A chart has a frame at its own centre.
             tensor.unwrap_or_else(Matrix::<M, Real>::zeros)
         })

@@ -30,7 +30,7 @@ pub type Form<M, D = f64> = <<M as Space>::Velocity as Dimension>::Matrix<D>;
 /// the entries of `x'` on a sphere, the body angular velocity on SO(3).
 ///
 /// Laws: 1. `φ_x(0) = x`; 2. `φ_x⁻¹(φ_x(q)) = q` near `q = 0`; 3. both at dual numbers too;
-/// 4. `real` undoes `constant`; 5. `seeded` is the chart at its seeds.
+/// 4. `real` undoes `constant`; 5. `seeds` are the chart at dual numbers.
 pub trait Space: Clone + Debug + PartialEq + Send + Sync + 'static {
     /// The dimension `n`.
     type Dim: Dimension;
@@ -49,13 +49,16 @@ pub trait Space: Clone + Debug + PartialEq + Send + Sync + 'static {
     /// The point `φ_x(q)`.
     fn chart<D: Scalar>(x: &Self::Point<f64>, q: &Vector<Self, D>) -> Self::Point<D>;
 
-    /// The point `φ_x(ε₁ e_i + ε₂ e_j)` that a derivative is read off; an index beyond the dimension
-    /// seeds nothing.
+    /// The points `φ_x(ε₁ e_i + ε₂ e_j)` that derivatives are read off, by `i` and `j`; an index
+    /// beyond the dimension seeds nothing.
     #[inline]
-    fn seeded(x: &Self::Point<f64>, i: usize, j: usize) -> Self::Point<Real> {
-        let part = |k, direction| if k == direction { 1.0 } else { 0.0 };
-        let q = Vector::<Self, Real>::from_index(|k| Real::new(0.0, part(k, i), part(k, j), 0.0));
-        Self::chart(x, &q)
+    fn seeds(x: &Self::Point<f64>) -> impl Fn(usize, usize) -> Self::Point<Real> {
+        let x = x.clone();
+        move |i, j| {
+            let part = |k, direction| if k == direction { 1.0 } else { 0.0 };
+            let seed = |k| Real::new(0.0, part(k, i), part(k, j), 0.0);
+            Self::chart(&x, &Vector::<Self, Real>::from_index(seed))
+        }
     }
 
     /// The coordinates `φ_x⁻¹(y)`, for `y` near `x`.

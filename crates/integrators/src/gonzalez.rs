@@ -3,7 +3,7 @@
 use metriplectic_fields::{
     Column, Dimension, Matrix, Real, Scalar, ScalarField, Space, Square, Vector, differential,
 };
-use metriplectic_manifolds::{Arc, ArcJet, InnerProduct, Manifold};
+use metriplectic_manifolds::{Arc, ArcJet, InnerProduct, Manifold, Nodes};
 
 /// Gonzalez' discrete gradient on a manifold (Gonzalez 1996; Bloch, Farré Puiggalí, Martín de Diego
 /// 2024, eq. "gonzalez-m", with the missing step size restored):
@@ -59,7 +59,7 @@ const SHORT: f64 = 1e-3;
 
 impl<M: Manifold> Chord<M> {
     /// Evaluates `f` along an arc with displacement `d` at its base, where `df` is known. `start` is
-    /// `F(x)`, `end` the point `x'`, and `position(t)` the point `γ(t + ε₁ + ε₂)` of the arc.
+    /// `F(x)`, `end` the point `x'`, and `nodes` those of the arc.
     #[inline]
     pub fn new(
         f: &impl ScalarField<M>,
@@ -67,7 +67,7 @@ impl<M: Manifold> Chord<M> {
         d: &Vector<M>,
         start: f64,
         end: (&M::Point<f64>, f64),
-        position: impl Fn(f64) -> M::Point<Real>,
+        nodes: impl FnOnce() -> Nodes<M>,
     ) -> Self {
         let (end, value) = end;
         let slope = df.dot(d);
@@ -77,8 +77,9 @@ impl<M: Manifold> Chord<M> {
         let share = df.magnitude() * d.magnitude() / (SHORT * size).max(f64::MIN_POSITIVE);
         let (mut defect, mut noise) = (difference, rounding);
         if share < 4.0 {
-            let along = [0.0, 0.5, 1.0].map(|t| f.at_real(&position(t)));
-            let integral = Integral::new(&along, slope);
+            let Nodes { ends: [x, y], middle } = nodes();
+            let middle = middle.map_or(slope, |z| f.at_real(&z).eps1);
+            let integral = Integral::new([f.at_real(&x), f.at_real(&y)], middle, slope);
             // Falls from 1 to 0 between one and four times the short share, with zero slope at both.
             let t = ((share - 1.0) / 3.0).clamp(0.0, 1.0);
             let short = 1.0 - t * t * (3.0 - 2.0 * t);
@@ -175,14 +176,15 @@ struct Integral {
 }
 
 impl Integral {
-    /// From `f`, `f'` along the arc at `s = 0, ½, 1` (first and second derivative of `F`), less the
-    /// slope `dF(z) d`. The error is estimated by the difference to Simpson's rule.
-    fn new(along: &[Real; 3], slope: f64) -> Self {
-        let [f0, f1, f2] = along.map(|f| f.eps1 - slope);
-        let ends = along[2].eps1eps2 - along[0].eps1eps2;
+    /// From `f`, `f'` at both ends of the arc (first and second derivative of `F`) and `f` in its
+    /// middle, less the slope `dF(z) d`. The error is estimated by the difference to Simpson's rule.
+    #[inline]
+    fn new([start, end]: [Real; 2], middle: f64, slope: f64) -> Self {
+        let (f0, f1, f2) = (start.eps1 - slope, middle - slope, end.eps1 - slope);
+        let ends = end.eps1eps2 - start.eps1eps2;
         let value = (7.0 * (f0 + f2) + 16.0 * f1) / 30.0 - ends / 60.0;
         let simpson = (f0 + f2 + 4.0 * f1) / 6.0;
-        let size = along.iter().map(|f| f.eps1.abs()).sum::<f64>();
+        let size = start.eps1.abs() + middle.abs() + end.eps1.abs();
         Self { value, error: (value - simpson).abs() + f64::EPSILON * size }
     }
 
@@ -219,8 +221,10 @@ mod tests {
             let d: Vector2<f64> = y - x;
             let [start, end]: [f64; 2] =
                 [x, y].map(|p| ScalarField::<Euclidean<2>>::at(&cubic, &p));
-            let chord = Chord::<Euclidean<2>>::new(&cubic, &df, &d, start, (&y, end), |t| {
-                x.cast::<Real>() + d.cast::<Real>() * Real::new(t, 1.0, 1.0, 0.0)
+            let chord = Chord::<Euclidean<2>>::new(&cubic, &df, &d, start, (&y, end), || {
+                let d = d.cast::<Real>();
+                let at = |t| x.cast::<Real>() + d * Real::new(t, 1.0, 1.0, 0.0);
+                Nodes { ends: [at(0.0), at(1.0)], middle: Some(at(0.5)) }
             });
             let w = chord.covector(0.0, &Canonical, &d);
             let defect = 0.25 * (d.x.powi(3) + 2.0 * d.y.powi(3));
@@ -236,8 +240,10 @@ mod tests {
     fn an_arc_without_length_has_the_differential_itself() {
         let (x, df, d) = (vector![0.7, -0.4], vector![1.47, 0.96], Vector2::zeros());
         let start = ScalarField::<Euclidean<2>>::at(&cubic, &x);
-        let chord =
-            Chord::<Euclidean<2>>::new(&cubic, &df, &d, start, (&x, start), |_| x.cast::<Real>());
+        let chord = Chord::<Euclidean<2>>::new(&cubic, &df, &d, start, (&x, start), || Nodes {
+            ends: [x.cast(); 2],
+            middle: None,
+        });
         assert_eq!(chord.covector(0.0, &Canonical, &d), df);
     }
 }

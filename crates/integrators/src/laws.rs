@@ -4,7 +4,7 @@ use metriplectic_dynamics::{Metriplectic, system::Point};
 use metriplectic_fields::{
     BrokenLaw, ChartPoint, Column, ScalarField, Space, Vector, differential,
 };
-use metriplectic_manifolds::{Arc, Manifold, Retraction, Riemannian};
+use metriplectic_manifolds::{Arc, Manifold, Nodes, Retraction, Riemannian};
 
 use crate::gonzalez::{Chord, gonzalez};
 use crate::step::{Memory, Scheme, Start};
@@ -38,8 +38,10 @@ where
         let w = gonzalez(f, &g, &arc, start);
         let df = differential(f, &ChartPoint::centre(&arc.z.point()));
         let end: f64 = f.at(&arc.end);
-        let chord = Chord::new(f, &df, &arc.d, start, (&arc.end, end), |t| {
-            retraction.along(metric, x, u, t).unwrap_or_else(|_| M::constant(&arc.end))
+        let chord = Chord::new(f, &df, &arc.d, start, (&arc.end, end), || {
+            retraction
+                .along(metric, x, u)
+                .unwrap_or_else(|_| Nodes { ends: [x, &arc.end].map(M::constant), middle: None })
         });
         let safe = chord.covector(0.0, &g, &arc.d);
         Ok((arc, w, safe, df, end))

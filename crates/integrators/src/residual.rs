@@ -4,7 +4,7 @@ use metriplectic_dynamics::{Bracket, Dissipation, Metriplectic, system::Point};
 use metriplectic_fields::{
     ChartPoint, Column, Scalar, ScalarField, Space, Square, Vector, differential,
 };
-use metriplectic_manifolds::{Manifold, MetricError, Retraction, Riemannian};
+use metriplectic_manifolds::{Arc, Manifold, MetricError, Nodes, Retraction, Riemannian};
 
 use crate::gonzalez::{Chord, gonzalez};
 use crate::root_finder::{Equation, Linearised, Root};
@@ -65,37 +65,44 @@ where
         Ok(arc.d - (reversible + irreversible) * D::from(self.h))
     }
 
-    /// The error `e = H(x') − H(x) + recall` of the energy at the end of the arc of `u`.
-    fn imbalance(&self, u: &Vector<Y::Manifold>) -> Option<f64> {
-        let end = self.retraction.end(self.system.metric(), self.x, u).ok()?;
-        Some(self.system.energy_at(&end) - self.energy + self.recall)
+    /// The error `e = H(x') − H(x) + recall` of the energy at the end of an arc.
+    #[inline]
+    fn imbalance(&self, end: &Point<Y>) -> f64 {
+        self.system.energy_at(end) - self.energy + self.recall
     }
 
-    /// One more correction for a root at which the energy is not kept to round-off.
+    /// One more correction for a root with the end `x'` at which the energy is not kept to round-off:
+    /// the corrected root, and its end.
     ///
     /// Both brackets kill `w`, so `⟨w, F(u)⟩ = e` for every `u`. Once `h|Π|` is large the sum
     /// `d − h(Πw + K dS)` has lost digits of this number that the difference `H(x') − H(x)` has. So
     /// the last correction is that of the residual whose part along `w` is exact,
     /// `F + (e − ⟨w, F⟩) w/|w|²`, as long as this changes `F` within its round-off and reduces `e`.
     #[inline]
-    pub(crate) fn last_correction(&self, root: &Root<Y::Manifold>) -> Option<Vector<Y::Manifold>> {
+    pub(crate) fn last_correction(
+        &self,
+        root: &Root<Y::Manifold>,
+        end: &Point<Y>,
+    ) -> Option<(Vector<Y::Manifold>, Point<Y>)> {
         // A floor near the rounding of the entries of x' needs no correction.
         let coarse = root.floor > 8.0 * f64::EPSILON * Y::Manifold::magnitude(self.x);
-        if coarse { self.balance(&root.u) } else { None }
+        let e = if coarse { self.imbalance(end) } else { 0.0 };
+        if e.abs() <= 4.0 * f64::EPSILON * self.energy.abs() {
+            None
+        } else {
+            self.balance(&root.u, e)
+        }
     }
 
-    /// The last correction, if there is an error to be corrected.
+    /// The last correction, for an error `e` of the energy.
     #[cold]
-    fn balance(&self, u: &Vector<Y::Manifold>) -> Option<Vector<Y::Manifold>> {
-        let e = self.imbalance(u)?;
-        if e.abs() <= 4.0 * f64::EPSILON * self.energy.abs() {
-            return None;
-        }
+    fn balance(&self, u: &Vector<Y::Manifold>, e: f64) -> Option<(Vector<Y::Manifold>, Point<Y>)> {
         let Jet { at, w } = self.jet(u)?;
         let lost = w * ((e - w.dot(&at.residual)) / w.dot(&w));
-        let correction = at.jacobian.solve(&(at.residual + lost))?;
-        let left = self.imbalance(&(*u - correction))?;
-        (lost.magnitude() <= at.floor && left.abs() < e.abs()).then_some(correction)
+        let u = *u - at.jacobian.solve(&(at.residual + lost))?;
+        let end = self.retraction.end(self.system.metric(), self.x, &u).ok()?;
+        let better = self.imbalance(&end).abs() < e.abs();
+        (lost.magnitude() <= at.floor && better).then_some((u, end))
     }
 
     /// The data of the discrete gradient of `H` along the arc of `u`.
@@ -107,10 +114,13 @@ where
         d: &Vector<Y::Manifold>,
         end: (&Point<Y>, f64),
     ) -> Chord<Y::Manifold> {
-        Chord::new(self.system.energy(), df, d, self.energy, end, |t| {
+        Chord::new(self.system.energy(), df, d, self.energy, end, || {
             // The same arc has been followed to its end, so the alternative is not reached.
-            let along = self.retraction.along(self.system.metric(), self.x, u, t);
-            along.unwrap_or_else(|_| Y::Manifold::constant(end.0))
+            let along = self.retraction.along(self.system.metric(), self.x, u);
+            along.unwrap_or_else(|_| Nodes {
+                ends: [self.x, end.0].map(Y::Manifold::constant),
+                middle: None,
+            })
         })
     }
 
@@ -159,16 +169,15 @@ where
     #[inline]
     fn value(&self, u: &Vector<Y::Manifold>) -> Option<Vector<Y::Manifold>> {
         let (system, metric) = (self.system, self.system.metric());
-        let arc = self.retraction.arc_jet(metric, self.x, u).ok()?;
-        let z = ChartPoint::<Y::Manifold>::centre(&arc.z);
+        let Arc { z, d, end: point } = self.retraction.real_arc(metric, self.x, u).ok()?;
         let g = metric.at(&z).ok()?;
-        let df = system.energy().jet1(&arc.z).df;
-        let end = system.energy_at(&arc.end);
-        let w = self.chord(u, &df, &arc.d, (&arc.end, end)).covector(self.recall, &g, &arc.d);
-        let s = system.entropy().jet1(&arc.z).df;
+        let df = system.energy().jet1(&z.base).df;
+        let end = system.energy_at(&point);
+        let w = self.chord(u, &df, &d, (&point, end)).covector(self.recall, &g, &d);
+        let s = system.entropy().jet1(&z.base).df;
         let reversible = system.bracket().apply(&system.site(&z, &s), &w).ok()?;
         let irreversible = system.dissipation().apply(metric, &z, &w, &s).ok()?;
-        let residual = arc.d - (reversible + irreversible) * self.h;
+        let residual = d - (reversible + irreversible) * self.h;
         residual.is_finite().then_some(residual)
     }
 

@@ -141,10 +141,10 @@ impl<R> Scheme<R> {
             return Ok(start.x.clone());
         }
         let lost = NoRoot { best: root.u, residual: f64::INFINITY, sweeps: root.sweeps };
-        let last = residual.last_correction(&root);
+        let end = self.retraction.end(system.metric(), start.x, &root.u).map_err(|_| lost)?;
+        let last = residual.last_correction(&root, &end);
         work.sweeps += usize::from(last.is_some());
-        let u = last.map_or(root.u, |correction| root.u - correction);
-        let end = self.retraction.end(system.metric(), start.x, &u).map_err(|_| lost)?;
+        let (u, end) = last.unwrap_or((root.u, end));
         Ok(memory.note::<Y::Manifold, _>(system.metric(), start.x, &u, end))
     }
 
@@ -285,7 +285,8 @@ impl<V: Column<f64>> Memory<V> {
         G: Riemannian<M>,
     {
         let [last, before, _] = self.displacements;
-        self.displacements = [Some(*d), last, before].map(|d| d.map(|d| M::transport(x, &end, &d)));
+        let transport = |d: Option<V>| d.map(|d| M::transport(x, &end, &d));
+        self.displacements = [transport(Some(*d)), transport(last), transport(before)];
         let lost = metric.lost(x, d, &end);
         match self.carry {
             Some(carry) if carry.magnitude() > 0.0 => {

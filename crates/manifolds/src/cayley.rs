@@ -1,12 +1,12 @@
 //! The Cayley retraction of SO(3).
 
-use metriplectic_fields::{ChartPoint, Column, Real, Scalar, Space};
+use metriplectic_fields::{ChartPoint, Column, Scalar, Space};
 use nalgebra::{Matrix3, Vector3};
 
-use crate::metric::{MetricError, time};
+use crate::metric::{MetricError, stretched};
 use crate::retraction::jet_by_dual_numbers;
 use crate::rotations::{dexp_inverse, hat, orthogonal};
-use crate::{Arc, ArcJet, PointPair, Retraction, Riemannian, Rotations, Tangent};
+use crate::{Arc, ArcJet, Nodes, PointPair, Retraction, Riemannian, Rotations, Tangent};
 
 /// The symmetric Cayley retraction of SO(3), for any metric:
 ///
@@ -58,10 +58,11 @@ impl<G: Riemannian<Rotations>> Retraction<Rotations, G> for Cayley {
         _: &G,
         x: &Matrix3<f64>,
         u: &Vector3<f64>,
-        t: f64,
-    ) -> Result<Matrix3<Real>, MetricError> {
-        let half = u.map(|u| time(t) * (0.5 * u));
-        Ok(turned(&turned(&Rotations::constant(x), &half), &half))
+    ) -> Result<Nodes<Rotations>, MetricError> {
+        Nodes::of(|t| {
+            let half = stretched::<Rotations>(&(u * 0.5), t);
+            Ok(turned(&turned(&Rotations::constant(x), &half), &half))
+        })
     }
 
     fn arc_jet(

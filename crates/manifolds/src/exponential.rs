@@ -28,13 +28,24 @@ impl<M: Manifold, G: Riemannian<M>> Retraction<M, G> for Exponential {
         Ok(Arc { z, d: *u, end: end.point() })
     }
 
+    #[inline]
+    fn real_arc(
+        &self,
+        metric: &G,
+        x: &M::Point<f64>,
+        u: &Vector<M>,
+    ) -> Result<Arc<M>, MetricError> {
+        // The midpoint arc ends at the same point.
+        let Arc { end, .. } = metric.weyl_arc(x, u)?;
+        Ok(Arc { z: ChartPoint::centre(x), d: *u, end })
+    }
+
     fn arc_jet(
         &self,
         metric: &G,
         x: &M::Point<f64>,
         u: &Vector<M>,
     ) -> Result<ArcJet<M>, MetricError> {
-        // The midpoint arc ends at the same point.
         let ArcJet { end, dend, .. } = metric.weyl_jet(x, u)?;
         let (zero, one) = (Matrix::<M>::zeros(), Matrix::<M>::one());
         Ok(ArcJet { z: x.clone(), dz: zero, d: *u, dd: one, end, dend })

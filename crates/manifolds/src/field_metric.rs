@@ -57,8 +57,12 @@ impl<M: Manifold, F: MatrixField<M>> Riemannian<M> for FieldMetric<F> {
         v: &Vector<M>,
         t: f64,
     ) -> Result<M::Point<Real>, MetricError> {
-        let (here, velocity) = geodesic::follow_real(&self.field, x, &(*v * t))?;
-        let velocity = if t > 0.0 { velocity * t.recip() } else { *v };
+        let (here, velocity) = if t > 0.0 {
+            let (here, velocity) = geodesic::follow_real(&self.field, x, &(*v * t))?;
+            (here, velocity * t.recip())
+        } else {
+            (x.clone(), *v)
+        };
         let bend = geodesic::acceleration(&self.field, &here, &velocity)
             .ok_or(MetricError::Lost { time: t })?;
         let jet =

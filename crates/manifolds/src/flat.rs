@@ -1,12 +1,10 @@
 //! Metrics that are constant in a global chart: their geodesics are straight lines.
 
-use metriplectic_fields::{
-    ChartPoint, Column, Dimension, Matrix, Real, Scalar, Space, Square, Vector,
-};
+use metriplectic_fields::{ChartPoint, Dimension, Matrix, Real, Scalar, Space, Square, Vector};
 use nalgebra::{Const, SMatrix};
 
-use crate::metric::{Factored, GeodesicEnd, MetricError, time};
-use crate::{ArcJet, Canonical, Riemannian};
+use crate::metric::{Factored, GeodesicEnd, MetricError, stretched};
+use crate::{Arc, ArcJet, Canonical, Riemannian};
 
 /// A manifold whose charts are global and linear: straight lines are the geodesics of every metric
 /// that is constant in them.
@@ -36,7 +34,7 @@ macro_rules! straight_geodesics {
             v: &Vector<M>,
             t: f64,
         ) -> Result<M::Point<Real>, MetricError> {
-            Ok(M::chart(x, &(Vector::<M, Real>::embed(v) * time(t))))
+            Ok(M::chart(x, &stretched::<M>(v, t)))
         }
 
         #[inline]
@@ -46,6 +44,12 @@ macro_rules! straight_geodesics {
 
         fn log(&self, x: &M::Point<f64>, y: &M::Point<f64>) -> Result<Vector<M>, MetricError> {
             Ok(M::coordinates(x, y))
+        }
+
+        #[inline]
+        fn weyl_arc(&self, x: &M::Point<f64>, d: &Vector<M>) -> Result<Arc<M>, MetricError> {
+            let z = ChartPoint::centre(&M::chart(x, &(*d * 0.5)));
+            Ok(Arc { z, d: *d, end: M::chart(x, d) })
         }
 
         #[inline]

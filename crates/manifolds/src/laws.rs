@@ -20,7 +20,7 @@ fn round_off<M: Manifold>(scale: f64) -> f64 {
 ///
 /// 1. `φ_x(0) = x`;
 /// 2. `φ_x⁻¹(φ_x(q)) = q`, and the chain rule gives the identity at dual numbers;
-/// 3. `seeded` is the chart at its seeds; 4. `φ_x(q)` lies on the manifold.
+/// 3. `seeds` are the chart at dual numbers; 4. `φ_x(q)` lies on the manifold.
 ///
 /// # Errors
 ///
@@ -41,7 +41,7 @@ pub fn manifold<M: Manifold>(space: &M, x: &M::Point<f64>, q: &Vector<M>) -> Res
     BrokenLaw::unless("the derivative of φ_x⁻¹ φ_x is 1", off, bound)?;
     for i in 0..=M::Dim::LEN {
         for j in 0..=M::Dim::LEN {
-            let seed = M::coordinates(x, &M::seeded(x, i, j));
+            let seed = M::coordinates(x, &M::seeds(x)(i, j));
             let expected = |k, direction| if k == direction { 1.0 } else { 0.0 };
             let off = (0..M::Dim::LEN).fold(0.0_f64, |worst, k| {
                 let (a, b) = (seed[k].eps1 - expected(k, i), seed[k].eps2 - expected(k, j));
@@ -107,7 +107,7 @@ pub fn metric<M: Manifold, G: Riemannian<M>>(
 
 /// Checks a retraction at `x` with the displacement `u`:
 ///
-/// 1. `R_h⁻¹(R_h(d)) = d`; 2. the arc from `x` is the pair of its own `(z, d)`; 3. `arc_jet` is
+/// 1. `R_h⁻¹(R_h(d)) = d`; 2. the arc from `x` is the pair of its own `(z, d)`; 3. `real_arc` is the same arc, and `arc_jet`
 ///    the derivative of `arc` at dual numbers.
 ///
 /// # Errors
@@ -131,6 +131,11 @@ pub fn retraction<M: Manifold, G: Riemannian<M>, R: Retraction<M, G>>(
     let alone: M::Point<f64> = usable(exists, retraction.end(metric, x, u))?;
     let off = M::coordinates(&jet.end, &alone).magnitude();
     BrokenLaw::unless("the end alone is the end of the arc", off, bound)?;
+    let real = usable(exists, retraction.real_arc(metric, x, u))?;
+    let off = M::coordinates(&jet.z, &real.z.point()).magnitude();
+    BrokenLaw::unless("the real arc has the base point of its jet", off, bound)?;
+    let off = (real.d - jet.d).magnitude() + M::coordinates(&jet.end, &real.end).magnitude();
+    BrokenLaw::unless("the real arc is that of its jet", off, bound)?;
     let back = usable(exists, retraction.inverse(metric, &start, &end))?;
     let off = M::coordinates(&jet.z, &back.base).magnitude();
     BrokenLaw::unless("R_h⁻¹ R_h keeps the base point", off, bound)?;

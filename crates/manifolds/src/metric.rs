@@ -9,7 +9,7 @@ use metriplectic_fields::{
 };
 use nalgebra::SMatrix;
 
-use crate::{ArcJet, Constant, FieldMetric};
+use crate::{Arc, ArcJet, Constant, FieldMetric};
 
 /// The metric at one point: an inner product `G(u, v) = uᵀ g v` on tangent vectors, factored as
 /// `g = L Lᵀ`.
@@ -100,7 +100,18 @@ pub trait Riemannian<M: Space> {
     /// [`MetricError`] if there is none that is found.
     fn log(&self, x: &M::Point<f64>, y: &M::Point<f64>) -> Result<Vector<M>, MetricError>;
 
-    /// The geodesic of time 1 from `x` with velocity `d`, at its middle and its end, with the
+    /// The geodesic of time 1 from `x` with velocity `d`, at its middle and its end.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`exp`](Self::exp).
+    #[inline]
+    fn weyl_arc(&self, x: &M::Point<f64>, d: &Vector<M>) -> Result<Arc<M>, MetricError> {
+        let ArcJet { z, d, end, .. } = self.weyl_jet(x, d)?;
+        Ok(Arc { z: ChartPoint::centre(&z), d, end })
+    }
+
+    /// The same arc, with the
     /// derivatives along `d`.
     ///
     /// # Errors
@@ -260,10 +271,10 @@ impl Metric {
     }
 }
 
-/// The time `t + ε₁ + ε₂`.
+/// The vector `(t + ε₁ + ε₂) v`.
 #[inline]
-pub(crate) fn time(t: f64) -> Real {
-    Real::new(t, 1.0, 1.0, 0.0)
+pub(crate) fn stretched<M: Space>(v: &Vector<M>, t: f64) -> Vector<M, Real> {
+    Vector::<M, Real>::from_index(|i| Real::new(t * v[i], v[i], v[i], 0.0))
 }
 
 /// Refuses a geodesic that reaches the injectivity `radius`, up to the rounding of its length.

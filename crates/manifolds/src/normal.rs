@@ -25,12 +25,14 @@ pub struct Normal<D, const N: usize> {
 }
 
 impl<D: Scalar, const N: usize> Normal<D, N> {
+    #[inline]
     pub(crate) fn at(q: &SVector<D, N>, curvature: f64) -> Self {
-        let s = q.dot(q) * curvature;
-        Self { q: *q, across: stumpff(1, s), bend: stumpff(3, s) * curvature }
+        let [_, across, _, c3] = stumpff(q.dot(q) * curvature);
+        Self { q: *q, across, bend: c3 * curvature }
     }
 
     /// The density `√det g = σⁿ⁻¹`.
+    #[inline]
     pub(crate) fn volume(&self) -> D {
         (1..N).fold(D::one(), |product, _| product * self.across)
     }

@@ -27,7 +27,7 @@ use metriplectic_fields::{
 use rand::Rng;
 
 use crate::metric::GeodesicEnd;
-use crate::{ArcJet, Canonical, InnerProduct, Manifold, MetricError, Riemannian};
+use crate::{Arc, ArcJet, Canonical, InnerProduct, Manifold, MetricError, Riemannian};
 
 /// The product `A × B`: a state with two parts, such as a direction with an internal energy
 /// (`S² × R`) or an attitude with an angular momentum (`SO(3) × R³`). A factor may be a product again.
@@ -123,11 +123,11 @@ impl<A: Times<B>, B: Space> Space for Product<A, B> {
     }
 
     #[inline]
-    fn seeded((a, b): &Self::Point<f64>, i: usize, j: usize) -> Self::Point<Real> {
-        let n = A::Dim::LEN;
+    fn seeds((a, b): &Self::Point<f64>) -> impl Fn(usize, usize) -> Self::Point<Real> {
+        let (n, a, b) = (A::Dim::LEN, A::seeds(a), B::seeds(b));
         // An index of `A` is beyond the dimension of `B` once it has been shifted.
-        let shifted = |k: usize| if k < n { B::Dim::LEN } else { k - n };
-        (A::seeded(a, i, j), B::seeded(b, shifted(i), shifted(j)))
+        let shifted = move |k: usize| if k < n { B::Dim::LEN } else { k - n };
+        move |i, j| (a(i, j), b(shifted(i), shifted(j)))
     }
 
     #[inline]
@@ -219,7 +219,7 @@ where
 pub struct Block<A, B, D, P, Q> {
     left: P,
     right: Q,
-    factors: PhantomData<fn() -> (A, B, D)>,
+    factors: PhantomData<(A, B, D)>,
 }
 
 impl<A, B, D, P: Clone, Q: Clone> Clone for Block<A, B, D, P, Q> {
@@ -335,6 +335,26 @@ macro_rules! metric_of_the_factors {
                 &Riemannian::<A>::log(g, &x.0, &y.0)?,
                 &Riemannian::<B>::log(f, &x.1, &y.1)?,
             ))
+        }
+
+        fn weyl_arc(
+            &self,
+            x: &(A::Point<f64>, B::Point<f64>),
+            d: &Vector<Product<A, B>>,
+        ) -> Result<Arc<Product<A, B>>, MetricError> {
+            let ((g, f), (da, db)) = (Split::<A, B>::halves(self), Product::<A, B>::split(d));
+            let (a, b) = (
+                Riemannian::<A>::weyl_arc(g, &x.0, &da)?,
+                Riemannian::<B>::weyl_arc(f, &x.1, &db)?,
+            );
+            Ok(Arc {
+                z: ChartPoint {
+                    base: (a.z.base, b.z.base),
+                    q: Product::<A, B>::join(&a.z.q, &b.z.q),
+                },
+                d: Product::<A, B>::join(&a.d, &b.d),
+                end: (a.end, b.end),
+            })
         }
 
         fn weyl_jet(

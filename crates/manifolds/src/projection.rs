@@ -1,13 +1,13 @@
 //! The symmetric projection retraction of the spheres.
 
-use metriplectic_fields::{ChartPoint, Column, Real, Scalar, Space};
+use metriplectic_fields::{ChartPoint, Column, Scalar, Space};
 use nalgebra::SVector;
 use num_dual::Dual;
 
-use crate::metric::{MetricError, within};
+use crate::metric::{MetricError, stretched, within};
 use crate::retraction::jet_by_dual_numbers;
 use crate::sphere::{components, frame, normalised, spread};
-use crate::{Arc, ArcJet, PointPair, Retraction, Riemannian, Sphere, Tangent};
+use crate::{Arc, ArcJet, Nodes, PointPair, Retraction, Riemannian, Sphere, Tangent};
 
 /// The symmetric projection retraction of Sⁿ, for any metric:
 ///
@@ -109,10 +109,12 @@ macro_rules! projection {
                 _: &G,
                 x: &SVector<f64, $a>,
                 u: &SVector<f64, $n>,
-                t: f64,
-            ) -> Result<SVector<Real, $a>, MetricError> {
-                let u = spread(&frame::<$a, $n>(x), &u.map(|u| crate::metric::time(t) * u));
-                Ok(normalised(&Ambient::new(x, &u).end))
+            ) -> Result<Nodes<Sphere<$n>>, MetricError> {
+                let e = frame::<$a, $n>(x);
+                Nodes::of(|t| {
+                    let u = spread(&e, &stretched::<Sphere<$n>>(u, t));
+                    Ok(normalised(&Ambient::new(x, &u).end))
+                })
             }
 
             fn arc_jet(

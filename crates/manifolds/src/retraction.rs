@@ -14,7 +14,7 @@ use crate::{Manifold, MetricError, Riemannian};
 /// Everything here is written in the displacement `d = hv`, so no step size appears.
 ///
 /// Laws ([`laws::retraction`](crate::laws::retraction)): 1. `R_h⁻¹ R_h = 1`; 2. the arc from `x`
-/// ends where the pair does; 3. `arc_jet` is the derivative of `arc`; 4. a symmetric one returns
+/// ends where the pair does; 3. `real_arc` is `arc`, and `arc_jet` its derivative; 4. a symmetric one returns
 /// the same base and the opposite vector for the swapped pair.
 pub trait Retraction<M: Manifold, G: Riemannian<M>> {
     /// The arc that leaves `x` with initial displacement `u ∈ T_xM`: the unknown of a step.
@@ -28,6 +28,21 @@ pub trait Retraction<M: Manifold, G: Riemannian<M>> {
         x: &M::Point<f64>,
         u: &Vector<M, D>,
     ) -> Result<Arc<M, D>, MetricError>;
+
+    /// The same arc at `f64`, in the charts at its own points.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`arc`](Self::arc).
+    #[inline]
+    fn real_arc(
+        &self,
+        metric: &G,
+        x: &M::Point<f64>,
+        u: &Vector<M>,
+    ) -> Result<Arc<M>, MetricError> {
+        self.arc(metric, x, u)
+    }
 
     /// The end of the arc of `u` alone; that of a geodesic, unless the retraction says otherwise.
     ///
@@ -44,21 +59,15 @@ pub trait Retraction<M: Manifold, G: Riemannian<M>> {
         metric.end(x, u)
     }
 
-    /// A curve from the start of the arc to its end, at the time `0 ≤ t ≤ 1`, with its first and
-    /// second derivative along `t`: the point at `t + ε₁ + ε₂`.
+    /// A curve from the start of the arc to its end; the geodesic, unless the retraction says
+    /// otherwise.
     ///
     /// # Errors
     ///
     /// Those of [`arc`](Self::arc).
     #[inline]
-    fn along(
-        &self,
-        metric: &G,
-        x: &M::Point<f64>,
-        u: &Vector<M>,
-        t: f64,
-    ) -> Result<M::Point<Real>, MetricError> {
-        metric.along(x, u, t)
+    fn along(&self, metric: &G, x: &M::Point<f64>, u: &Vector<M>) -> Result<Nodes<M>, MetricError> {
+        Nodes::of(|t| metric.along(x, u, t))
     }
 
     /// The same arc at `f64`, with its derivatives along `u`.
@@ -95,6 +104,31 @@ pub trait Retraction<M: Manifold, G: Riemannian<M>> {
 
 /// A pair of points `(x, x')`.
 pub type PointPair<M> = (<M as Space>::Point<f64>, <M as Space>::Point<f64>);
+
+/// A curve at its start, middle and end, with its first and second derivative: the points at
+/// `t + ε₁ + ε₂` for the times `t = 0, ½, 1`.
+#[derive(Clone, Debug)]
+pub struct Nodes<M: Space> {
+    /// Start and end.
+    pub ends: [M::Point<Real>; 2],
+    /// The middle; `None` where the curve passes the base point `z` with the displacement `d` as its
+    /// velocity.
+    pub middle: Option<M::Point<Real>>,
+}
+
+impl<M: Space> Nodes<M> {
+    /// The nodes of the curve with the point `at(t)` at the time `t`.
+    ///
+    /// # Errors
+    ///
+    /// Those of the curve.
+    #[inline]
+    pub fn of(
+        at: impl Fn(f64) -> Result<M::Point<Real>, MetricError>,
+    ) -> Result<Self, MetricError> {
+        Ok(Self { ends: [at(0.0)?, at(1.0)?], middle: Some(at(0.5)?) })
+    }
+}
 
 /// A step's arc: its base point, its displacement there, and its end.
 #[derive(Clone, Debug)]

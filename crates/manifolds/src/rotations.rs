@@ -40,9 +40,9 @@ use nalgebra::{Const, Matrix3, Quaternion, SMatrix, UnitQuaternion, Vector3, Vec
 use num_dual::Dual;
 use rand::{Rng, RngExt};
 
-use crate::metric::{GeodesicEnd, MetricError, time, within};
+use crate::metric::{GeodesicEnd, MetricError, within};
 use crate::normal::Normal;
-use crate::{ArcJet, Canonical, Manifold, Riemannian};
+use crate::{Arc, ArcJet, Canonical, Manifold, Riemannian};
 
 /// The rotation group `SO(3)`: 3 × 3 rotation matrices, with tangent vectors in the body frame and the
 /// bi-invariant metric as the canonical one; see the [module](mod@crate::rotations).
@@ -76,11 +76,31 @@ pub fn vee<D: Scalar>(m: &Matrix3<D>) -> Vector3<D> {
     Vector3::new(m.m32 - m.m23, m.m13 - m.m31, m.m21 - m.m12) * D::from(0.5)
 }
 
+/// `1 + a q̂ + b q̂²`, the form of all that follows, with `q̂² = q qᵀ − |q|²`.
+#[inline]
+fn rodrigues<D: Scalar>(q: &Vector3<D>, a: D, b: D) -> Matrix3<D> {
+    let (turn, bend) = (q * a, q * b);
+    let [xx, yy, zz] = [bend.x * q.x, bend.y * q.y, bend.z * q.z];
+    let [xy, xz, yz] = [bend.x * q.y, bend.x * q.z, bend.y * q.z];
+    Matrix3::new(
+        -(yy + zz) + 1.0,
+        xy - turn.z,
+        xz + turn.y,
+        xy + turn.z,
+        -(xx + zz) + 1.0,
+        yz - turn.x,
+        xz - turn.y,
+        yz + turn.x,
+        -(xx + yy) + 1.0,
+    )
+}
+
 /// The rotation by the vector `q`: `exp(q̂)` by Rodrigues' formula, right under dual numbers of
 /// every order at `q = 0`.
+#[inline]
 pub fn exp<D: Scalar>(q: &Vector3<D>) -> Matrix3<D> {
-    let (s, a) = (q.dot(q), hat(q));
-    Matrix3::from_diagonal_element(D::one()) + a * stumpff(1, s) + a * a * stumpff(2, s)
+    let [_, c1, c2, _] = stumpff(q.dot(q));
+    rodrigues(q, c1, c2)
 }
 
 /// The rotation vector of a matrix, `|q| ≤ π`: the inverse of [`exp`], accurate to a few `ε` up to
@@ -120,26 +140,57 @@ fn quaternion<D: Scalar>(r: &Matrix3<D>) -> [D; 4] {
 /// \mathrm{dexp}(q) = 1 - \frac{1 - \cos\theta}{\theta^2} \hat q
 ///                      + \frac{\theta - \sin\theta}{\theta^3} \hat q^2 .
 /// ```
+#[inline]
 pub fn dexp<D: Scalar>(q: &Vector3<D>) -> Matrix3<D> {
-    let (s, a) = (q.dot(q), hat(q));
-    Matrix3::from_diagonal_element(D::one()) - a * stumpff(2, s) + a * a * stumpff(3, s)
+    let [_, _, c2, c3] = stumpff(q.dot(q));
+    rodrigues(q, -c2, c3)
 }
 
 /// The inverse of [`dexp`], `1 + ½q̂ + (1 − ½θ cot ½θ)/θ² q̂²`, for `|q| < 2π`.
 pub fn dexp_inverse<D: Scalar>(q: &Vector3<D>) -> Matrix3<D> {
-    let (s, a) = (q.dot(q), hat(q));
     // With t = θ²/4 the weight is (c₁ − c₀)/(4t c₁), and c₁ − c₀ = t (c₂ − c₃).
-    let t = s * 0.25;
-    let weight = (stumpff(2, t) - stumpff(3, t)) / stumpff(1, t) * 0.25;
-    Matrix3::from_diagonal_element(D::one()) + a * D::from(0.5) + a * a * weight
+    let [_, c1, c2, c3] = stumpff(q.dot(q) * 0.25);
+    rodrigues(q, D::from(0.5), (c2 - c3) / c1 * 0.25)
 }
 
-/// One step of Newton's iteration for the polar factor, `R ← R(3 − RᵀR)/2`, which squares the
-/// defect.
+/// `A B`: nalgebra's product is not made for so few entries.
+#[inline]
+fn product<D: Scalar>(a: &Matrix3<D>, b: &Matrix3<D>) -> Matrix3<D> {
+    Matrix3::from_fn(|i, j| a[(i, 0)] * b[(0, j)] + a[(i, 1)] * b[(1, j)] + a[(i, 2)] * b[(2, j)])
+}
+
+/// `A B` with a real matrix `B`.
+#[inline]
+fn times<D: Scalar>(a: &Matrix3<D>, b: &Matrix3<f64>) -> Matrix3<D> {
+    Matrix3::from_fn(|i, j| a[(i, 0)] * b[(0, j)] + a[(i, 1)] * b[(1, j)] + a[(i, 2)] * b[(2, j)])
+}
+
+/// `A B` with a real matrix `A`.
+#[inline]
+fn moved<D: Scalar>(a: &Matrix3<f64>, b: &Matrix3<D>) -> Matrix3<D> {
+    Matrix3::from_fn(|i, j| b[(0, j)] * a[(i, 0)] + b[(1, j)] * a[(i, 1)] + b[(2, j)] * a[(i, 2)])
+}
+
+/// `A ω̂`.
+#[inline]
+fn spun(a: &Matrix3<f64>, omega: &Vector3<f64>) -> Matrix3<f64> {
+    let [x, y, z] = [a.column(0), a.column(1), a.column(2)];
+    Matrix3::from_columns(&[
+        y * omega.z - z * omega.y,
+        z * omega.x - x * omega.z,
+        x * omega.y - y * omega.x,
+    ])
+}
+
+/// One step of Newton's iteration for the polar factor, `R ← R(3 − RᵀR)/2` with the real part of
+/// `RᵀR`, which squares the defect and leaves derivatives along the group alone.
 #[inline]
 pub(crate) fn orthogonal<D: Scalar>(r: &Matrix3<D>) -> Matrix3<D> {
-    let correction = Matrix3::from_diagonal_element(D::from(1.5)) - r.tr_mul(r) * D::from(0.5);
-    r * correction
+    let real = r.map(|entry| entry.re());
+    let dot = |i, j| real.column(i).dot(&real.column(j));
+    let [xx, yy, zz] = [dot(0, 0), dot(1, 1), dot(2, 2)].map(|square| 1.5 - 0.5 * square);
+    let [xy, xz, yz] = [dot(0, 1), dot(0, 2), dot(1, 2)].map(|product| -0.5 * product);
+    times(r, &Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz))
 }
 
 impl Space for Rotations {
@@ -159,21 +210,29 @@ impl Space for Rotations {
 
     #[inline]
     fn chart<D: Scalar>(x: &Matrix3<f64>, q: &Vector3<D>) -> Matrix3<D> {
-        orthogonal(&(Self::constant::<D>(x) * exp(q)))
+        orthogonal(&moved(x, &exp(q)))
     }
 
-    /// `R (1 + ε₁ ê_i + ε₂ ê_j + ½ε₁ε₂ (ê_i ê_j + ê_j ê_i))`.
+    /// `R (1 + ε₁ ê_i + ε₂ ê_j + ½ε₁ε₂ (ê_i ê_j + ê_j ê_i))`, whose last term has the entries
+    /// `½(R_ri δ_jc + R_rj δ_ic) − R_rc δ_ij`.
     #[inline]
-    fn seeded(x: &Matrix3<f64>, i: usize, j: usize) -> Matrix3<Real> {
-        let generator = |k: usize| match k {
-            0 => hat(&Vector3::x()),
-            1 => hat(&Vector3::y()),
-            2 => hat(&Vector3::z()),
-            _ => Matrix3::zeros(),
-        };
-        let (a, b) = (generator(i), generator(j));
-        let (first, second, mixed) = (x * a, x * b, x * ((a * b + b * a) * 0.5));
-        Matrix3::from_fn(|r, c| Real::new(x[(r, c)], first[(r, c)], second[(r, c)], mixed[(r, c)]))
+    fn seeds(x: &Matrix3<f64>) -> impl Fn(usize, usize) -> Matrix3<Real> {
+        let x = *x;
+        let turned = [spun(&x, &Vector3::x()), spun(&x, &Vector3::y()), spun(&x, &Vector3::z())];
+        move |i, j| {
+            let turn = |k: usize, r, c| if k < 3 { turned[k][(r, c)] } else { 0.0 };
+            let half = |k: usize, r| if k < 3 { 0.5 * x[(r, k)] } else { 0.0 };
+            Matrix3::from_fn(|r, c| {
+                let mut bend = if i == j && i < 3 { -x[(r, c)] } else { 0.0 };
+                if c == i {
+                    bend += half(j, r);
+                }
+                if c == j {
+                    bend += half(i, r);
+                }
+                Real::new(x[(r, c)], turn(i, r, c), turn(j, r, c), bend)
+            })
+        }
     }
 
     #[inline]
@@ -185,6 +244,12 @@ impl Space for Rotations {
     #[inline]
     fn velocity<D: Scalar>(at: &ChartPoint<Self, D>, v: &Vector3<D>) -> Vector3<D> {
         dexp(&at.q) * v
+    }
+
+    /// With `θ = dexp(q)`.
+    fn covariant<D: Scalar>(at: &ChartPoint<Self, D>, a: &Matrix3<D>) -> Matrix3<D> {
+        let theta = dexp(&at.q);
+        product(&theta.transpose(), &product(a, &theta))
     }
 
     #[inline]
@@ -293,14 +358,22 @@ impl Riemannian<Rotations> for Canonical {
         Ok(Rotations::chart(x, v))
     }
 
+    /// `R(t)` with `R' = R Ω̂` and `R'' = R Ω̂²`.
+    #[inline]
     fn along(
         &self,
         x: &Matrix3<f64>,
-        v: &Vector3<f64>,
+        omega: &Vector3<f64>,
         t: f64,
     ) -> Result<Matrix3<Real>, MetricError> {
-        within(PI, v.norm())?;
-        Ok(Rotations::chart(x, &v.map(|v| time(t) * v)))
+        within(PI, omega.norm())?;
+        let r = if t > 0.0 { moved(x, &exp(&(omega * t))) } else { *x };
+        let velocity = spun(&r, omega);
+        let bend = spun(&velocity, omega);
+        Ok(Matrix3::from_fn(|i, j| {
+            let v = velocity[(i, j)];
+            Real::new(r[(i, j)], v, v, bend[(i, j)])
+        }))
     }
 
     fn log(&self, x: &Matrix3<f64>, y: &Matrix3<f64>) -> Result<Vector3<f64>, MetricError> {
@@ -309,8 +382,17 @@ impl Riemannian<Rotations> for Canonical {
         Ok(q)
     }
 
+    #[inline]
+    fn weyl_arc(&self, x: &Matrix3<f64>, d: &Vector3<f64>) -> Result<Arc<Rotations>, MetricError> {
+        within(PI, d.norm())?;
+        let z = ChartPoint::centre(&moved(x, &exp(&(d * 0.5))));
+        Ok(Arc { z, d: *d, end: Rotations::chart(x, d) })
+    }
+
     /// With the constant body velocity `u`: `z = R exp(û/2)`, `x' = R exp(û)`, differentiated by
-    /// [`dexp`]. The chart at `z` reads the body velocity `Ω` at `q` as `dexp⁻¹(q) Ω = Ω + ½q × Ω + …`.
+    /// [`dexp`]. The chart at `z` reads the body velocity `Ω` at `q` as `dexp⁻¹(q) Ω = Ω + ½q × Ω + …`,
+    /// so `∂d/∂u = 1 − ½û ∂z/∂u = ½(1 + exp(−û/2))`.
+    #[inline]
     fn weyl_jet(
         &self,
         x: &Matrix3<f64>,
@@ -318,12 +400,12 @@ impl Riemannian<Rotations> for Canonical {
     ) -> Result<ArcJet<Rotations>, MetricError> {
         within(PI, d.norm())?;
         let half = d * 0.5;
-        let dz = dexp(&half) * 0.5;
+        let [_, c1, c2, c3] = stumpff(half.norm_squared());
         Ok(ArcJet {
-            z: Rotations::chart(x, &half),
-            dz,
+            z: moved(x, &rodrigues(&half, c1, c2)),
+            dz: rodrigues(&half, -c2, c3) * 0.5,
             d: *d,
-            dd: Matrix3::identity() - hat(&half) * dz,
+            dd: rodrigues(&half, -0.5 * c1, 0.5 * c2),
             end: Rotations::chart(x, d),
             dend: dexp(d),
         })

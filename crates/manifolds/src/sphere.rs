@@ -36,9 +36,9 @@ use nalgebra::{Const, SMatrix, SVector};
 use num_dual::Dual;
 use rand::{Rng, RngExt};
 
-use crate::metric::{GeodesicEnd, MetricError, time, within};
+use crate::metric::{GeodesicEnd, MetricError, within};
 use crate::normal::Normal;
-use crate::{ArcJet, Canonical, Manifold, Riemannian};
+use crate::{Arc, ArcJet, Canonical, Manifold, Riemannian};
 
 /// The unit sphere `Sⁿ = { x ∈ Rⁿ⁺¹ : |x| = 1 }` for `n = 1 … 7`, with the round metric as its
 /// canonical one; see the [module](mod@crate::sphere).
@@ -61,24 +61,22 @@ impl<const N: usize> Sphere<N> {
 }
 
 /// An orthonormal basis of the tangent space at `x`, with `det[x, E] = +1`: the columns of the
-/// Householder reflection that takes the last axis to `∓x`, all but the last.
+/// Householder reflection `1 − a aᵀ/(1 + |x_N|)` along `a = x ± e_N`, which takes the last axis to
+/// `∓x`, all but the last.
+#[inline]
 pub(crate) fn frame<const A: usize, const N: usize>(x: &SVector<f64, A>) -> SMatrix<f64, A, N> {
-    let sign = if x[N] < 0.0 { -1.0 } else { 1.0 };
-    let mut axis = *x;
-    axis[N] += sign;
-    let scale = 2.0 / axis.norm_squared();
-    let mut e = SMatrix::from_fn(|i, j| {
-        let delta = if i == j { 1.0 } else { 0.0 };
-        delta - scale * axis[i] * axis[j]
-    });
+    let sign = 1.0_f64.copysign(x[N]);
+    let scale = (1.0 + x[N].abs()).recip();
     // The reflection has determinant −1 and last column −sign·x, so det[E, x] = sign.
     let oriented = if N.is_multiple_of(2) { sign } else { -sign };
-    if oriented < 0.0 {
-        for i in 0..A {
-            e[(i, 0)] = -e[(i, 0)];
-        }
-    }
-    e
+    SMatrix::from_fn(|i, j| {
+        let entry = match i {
+            _ if i == N => -sign * x[j],
+            _ if i == j => 1.0 - scale * x[i] * x[j],
+            _ => -scale * x[i] * x[j],
+        };
+        if j == 0 { oriented * entry } else { entry }
+    })
 }
 
 /// `E q` at a scalar.
@@ -99,16 +97,38 @@ pub(crate) fn components<D: Scalar, const A: usize, const N: usize>(
     SVector::from_fn(|j, _| (0..A).fold(D::zero(), |sum, i| sum + v[i] * e[(i, j)]))
 }
 
+/// The derivative of the chart at `q`, whose columns are the velocities of its frame:
+/// `x' = c₁ E v − (q·v) (c₁ x + (c₂ − c₃) E q)`, with the Stumpff functions at `|q|²`.
+#[inline]
+fn pushforward<D: Scalar, const A: usize, const N: usize>(
+    x: &SVector<f64, A>,
+    q: &SVector<D, N>,
+) -> SMatrix<D, A, N> {
+    let (e, [_, c1, c2, c3]) = (frame::<A, N>(x), stumpff(q.dot(q)));
+    let along = spread(&e, q) * (c2 - c3);
+    SMatrix::from_fn(|i, k| c1 * e[(i, k)] - (along[i] + c1 * x[i]) * q[k])
+}
+
 /// The point at time `t` of the great circle from `x` with velocity `v`, and its velocity there:
 /// `c₀(t²s) x + t c₁(t²s) v` with `s = |v|²`.
+#[inline]
 fn great_circle<D: Scalar, const A: usize>(
     x: &SVector<D, A>,
     v: &SVector<D, A>,
     t: f64,
 ) -> [SVector<D, A>; 2] {
     let s = v.dot(v);
-    let (cosine, sine) = (stumpff(0, s * (t * t)), stumpff(1, s * (t * t)));
+    let [cosine, sine, ..] = stumpff(s * (t * t));
     [x * cosine + v * (sine * t), v * cosine - x * (s * sine * t)]
+}
+
+/// Brings a point that is on the sphere up to round-off back to it, by one step of Newton's iteration
+/// `x ← x(3 − |x|²)/2` for the norm of the real part.
+#[inline]
+fn polished<D: Scalar, const A: usize>(x: &SVector<D, A>) -> SVector<D, A> {
+    let square = x.iter().fold(0.0, |sum, entry| sum + entry.re() * entry.re());
+    let scale = 1.5 - 0.5 * square;
+    x.map(|entry| entry * scale)
 }
 
 /// Divides by the norm of the real part, which leaves derivatives along the sphere alone.
@@ -137,19 +157,20 @@ macro_rules! sphere {
 
             #[inline]
             fn chart<D: Scalar>(x: &SVector<f64, $a>, q: &SVector<D, $n>) -> SVector<D, $a> {
-                let s = q.dot(q);
-                let along = spread(&frame::<$a, $n>(x), q) * stumpff(1, s);
-                let cosine = stumpff(0, s);
-                normalised(&SVector::from_fn(|i, _| along[i] + cosine * x[i]))
+                let [cosine, sine, ..] = stumpff(q.dot(q));
+                let along = spread(&frame::<$a, $n>(x), q) * sine;
+                polished(&SVector::from_fn(|i, _| along[i] + cosine * x[i]))
             }
 
             /// `x + ε₁ E_i + ε₂ E_j − ε₁ε₂ δ_ij x`, because `cos|q| = 1 − |q|²/2` for a seed.
             #[inline]
-            fn seeded(x: &SVector<f64, $a>, i: usize, j: usize) -> SVector<Real, $a> {
-                let e = frame::<$a, $n>(x);
-                let entry = |row, column| if column < $n { e[(row, column)] } else { 0.0 };
-                let bend = if i == j && i < $n { -1.0 } else { 0.0 };
-                SVector::from_fn(|k, _| Real::new(x[k], entry(k, i), entry(k, j), bend * x[k]))
+            fn seeds(x: &SVector<f64, $a>) -> impl Fn(usize, usize) -> SVector<Real, $a> {
+                let (x, e) = (*x, frame::<$a, $n>(x));
+                move |i, j| {
+                    let entry = |row, column| if column < $n { e[(row, column)] } else { 0.0 };
+                    let bend = if i == j && i < $n { -1.0 } else { 0.0 };
+                    SVector::from_fn(|k, _| Real::new(x[k], entry(k, i), entry(k, j), bend * x[k]))
+                }
             }
 
             fn coordinates<D: Scalar>(x: &SVector<f64, $a>, y: &SVector<D, $a>) -> SVector<D, $n> {
@@ -159,14 +180,21 @@ macro_rules! sphere {
                 tangent * angle_over_sine(tangent.dot(&tangent), cosine)
             }
 
-            /// The entries of `x' = c₁ E v − (q·v) (c₁ x + (c₂ − c₃) E q)`, with the Stumpff functions
-            /// at `|q|²`.
             fn velocity<D: Scalar>(at: &ChartPoint<Self, D>, v: &SVector<D, $n>) -> SVector<D, $a> {
-                let (s, along) = (at.q.dot(&at.q), at.q.dot(v));
-                let sine = stumpff(1, s);
-                let tangent = v * sine - at.q * (along * (stumpff(2, s) - stumpff(3, s)));
-                let moved = spread(&frame::<$a, $n>(&at.base), &tangent);
-                SVector::from_fn(|i, _| moved[i] - sine * along * at.base[i])
+                let theta = pushforward(&at.base, &at.q);
+                SVector::from_fn(|i, _| {
+                    (0..$n).fold(D::zero(), |sum, k| sum + theta[(i, k)] * v[k])
+                })
+            }
+
+            fn covariant<D: Scalar>(
+                at: &ChartPoint<Self, D>,
+                a: &SMatrix<D, $a, $a>,
+            ) -> SMatrix<D, $n, $n> {
+                let theta = pushforward(&at.base, &at.q);
+                theta.tr_mul(&SMatrix::<D, $a, $n>::from_fn(|i, k| {
+                    (0..$a).fold(D::zero(), |sum, j| sum + a[(i, j)] * theta[(j, k)])
+                }))
             }
 
             #[inline]
@@ -240,7 +268,7 @@ macro_rules! sphere {
                 let (point, velocity) = (start.map(|p| p.re), start.map(|p| p.eps));
                 within(PI, Column::magnitude(&velocity))?;
                 let [point, velocity] = great_circle(&point, &velocity, 1.0);
-                let point = normalised(&point);
+                let point = polished(&point);
                 let base = Sphere::<$n>::real(&point);
                 let end = SVector::from_fn(|i, _| Dual::new(point[i], velocity[i]));
                 let q = Sphere::<$n>::coordinates(&base, &end);
@@ -257,6 +285,8 @@ macro_rules! sphere {
                 Ok(Sphere::<$n>::chart(x, v))
             }
 
+            /// With the velocity of [`great_circle`], and `γ'' = −|v|² γ`.
+            #[inline]
             fn along(
                 &self,
                 x: &SVector<f64, $a>,
@@ -264,7 +294,9 @@ macro_rules! sphere {
                 t: f64,
             ) -> Result<SVector<Real, $a>, MetricError> {
                 within(PI, v.norm())?;
-                Ok(Sphere::<$n>::chart(x, &v.map(|v| time(t) * v)))
+                let (u, s) = (frame::<$a, $n>(x) * v, v.norm_squared());
+                let [y, dy] = if t > 0.0 { great_circle(x, &u, t) } else { [*x, u] };
+                Ok(SVector::from_fn(|i, _| Real::new(y[i], dy[i], dy[i], -s * y[i])))
             }
 
             fn log(
@@ -278,6 +310,21 @@ macro_rules! sphere {
                 Ok(Sphere::<$n>::coordinates(x, y))
             }
 
+            /// `γ'(½) = c₀ U − ½s c₁ x` with `U = E(x) d` and the Stumpff functions at `s/4 = |d|²/4`.
+            #[inline]
+            fn weyl_arc(
+                &self,
+                x: &SVector<f64, $a>,
+                d: &SVector<f64, $n>,
+            ) -> Result<Arc<Sphere<$n>>, MetricError> {
+                within(PI, d.norm())?;
+                let [z, velocity] = great_circle(x, &(frame::<$a, $n>(x) * d), 0.5);
+                let z = polished(&z);
+                let d_at_z = frame::<$a, $n>(&z).tr_mul(&velocity);
+                Ok(Arc { z: ChartPoint::centre(&z), d: d_at_z, end: Sphere::<$n>::chart(x, d) })
+            }
+
+            #[inline]
             fn weyl_jet(
                 &self,
                 x: &SVector<f64, $a>,
@@ -310,6 +357,7 @@ sphere!(7 in 8);
 /// `s/4`: `z = c₀ x + ½c₁ U`, `γ'(½) = c₀ U − ½s c₁ x`, differentiated by `c₀' = −½c₁` and
 /// `c₁' = −½(c₂ − c₃)`. The frames at `z` and `x'` turn ambient vectors into components; the chart at
 /// `z` is normal, so the derivative of components is the projected ambient derivative.
+#[inline]
 fn weyl_jet_in<M, const A: usize, const N: usize>(
     x: &SVector<f64, A>,
     d: &SVector<f64, N>,
@@ -320,36 +368,25 @@ where
 {
     let (e, s) = (frame::<A, N>(x), d.norm_squared());
     let u = e * d;
-    let [c0, c1] = [0, 1].map(|n| stumpff(n, 0.25 * s));
-    let slope = -0.5 * (stumpff(2, 0.25 * s) - stumpff(3, 0.25 * s));
-    let z = normalised(&(x * c0 + u * (0.5 * c1)));
-    let velocity = u * c0 - x * (0.5 * s * c1);
-    let mut dz = e * (0.5 * c1);
-    let mut dv = e * c0;
-    for k in 0..N {
-        let along = 0.5 * d[k];
-        let turn = x * (-0.5 * c1 * along) + u * (0.5 * slope * along);
-        let lean = x * (-(d[k] * c1 + 0.5 * s * slope * along)) - u * (0.5 * c1 * along);
-        dz.set_column(k, &(dz.column(k) + turn));
-        dv.set_column(k, &(dv.column(k) + lean));
-    }
-    let [c0, c1] = [0, 1].map(|n| stumpff(n, s));
-    let slope = -0.5 * (stumpff(2, s) - stumpff(3, s));
-    let end = normalised(&(x * c0 + u * c1));
-    let mut dend = e * c1;
-    for k in 0..N {
-        let turn = x * (-c1 * d[k]) + u * (2.0 * slope * d[k]);
-        dend.set_column(k, &(dend.column(k) + turn));
-    }
-    let (at_z, at_end) = (frame::<A, N>(&z), frame::<A, N>(&end));
-    ArcJet {
-        z: entries_of(&z).into(),
-        dz: at_z.tr_mul(&dz),
-        d: at_z.tr_mul(&velocity),
-        dd: at_z.tr_mul(&dv),
-        end: entries_of(&end).into(),
-        dend: at_end.tr_mul(&dend),
-    }
+    // E(y)ᵀ of E(x), x and U.
+    let seen_from = |y: &SVector<f64, A>| {
+        let at_y = frame::<A, N>(y);
+        (at_y.tr_mul(&e), at_y.tr_mul(x), at_y.tr_mul(&u))
+    };
+    let [c0, c1, c2, c3] = stumpff(0.25 * s);
+    let slope = -0.5 * (c2 - c3);
+    let z = polished(&(x * c0 + u * (0.5 * c1)));
+    let (turn, along_x, along_u) = seen_from(&z);
+    let dz = turn * (0.5 * c1) + (along_u * slope - along_x * c1) * (d * 0.25).transpose();
+    let lean = along_x * (c1 + 0.25 * s * slope) + along_u * (0.25 * c1);
+    let (velocity, dv) =
+        (along_u * c0 - along_x * (0.5 * s * c1), turn * c0 - lean * d.transpose());
+
+    let [c0, c1, c2, c3] = stumpff(s);
+    let end = polished(&(x * c0 + u * c1));
+    let (turn, along_x, along_u) = seen_from(&end);
+    let dend = turn * c1 - (along_x * c1 + along_u * (c2 - c3)) * d.transpose();
+    ArcJet { z: entries_of(&z).into(), dz, d: velocity, dd: dv, end: entries_of(&end).into(), dend }
 }
 
 /// The entries of a column as an array.

@@ -3,7 +3,9 @@
 use metriplectic_fields::{ChartPoint, Scalar, Vector};
 
 use crate::retraction::half;
-use crate::{Arc, ArcJet, Manifold, MetricError, PointPair, Retraction, Riemannian, Tangent};
+use crate::{
+    Arc, ArcJet, Manifold, MetricError, Nodes, PointPair, Retraction, Riemannian, Tangent,
+};
 
 /// Weyl's midpoint retraction (Bloch, Farré Puiggalí, Martín de Diego 2024, eq. "weyl"):
 ///
@@ -27,6 +29,21 @@ impl<M: Manifold, G: Riemannian<M>> Retraction<M, G> for WeylMidpoint {
         let (z, velocity) = metric.exp(&ChartPoint::centre(x), &half)?;
         let (end, _) = metric.exp(&z, &velocity)?;
         Ok(Arc { z, d: velocity * D::from(2.0), end: end.point() })
+    }
+
+    #[inline]
+    fn real_arc(
+        &self,
+        metric: &G,
+        x: &M::Point<f64>,
+        u: &Vector<M>,
+    ) -> Result<Arc<M>, MetricError> {
+        metric.weyl_arc(x, u)
+    }
+
+    #[inline]
+    fn along(&self, metric: &G, x: &M::Point<f64>, u: &Vector<M>) -> Result<Nodes<M>, MetricError> {
+        Ok(Nodes { ends: [metric.along(x, u, 0.0)?, metric.along(x, u, 1.0)?], middle: None })
     }
 
     #[inline]

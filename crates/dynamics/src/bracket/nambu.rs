@@ -1,10 +1,28 @@
 //! The brackets of a volume form: area form on a surface, Nambu on a 3-manifold.
 
-use metriplectic_fields::Scalar;
-use metriplectic_manifolds::{Manifold, MetricError, Riemannian, Rotations, Sphere};
-use nalgebra::{Const, Vector2, Vector3};
+use metriplectic_fields::{ChartPoint, Column, Dimension, Scalar, Vector};
+use metriplectic_manifolds::{InnerProduct, Manifold, MetricError, Riemannian, Rotations, Sphere};
+use nalgebra::{Const, Matrix2, Matrix3, Vector2, Vector3};
 
-use super::{Bracket, NaturalBracket, Site, Zero};
+use super::{Bracket, BracketJet, NaturalBracket, Site, Zero};
+
+/// The derivative of `ln(1/√det g)` along the chart at its centre, `−½ tr(g⁻¹ ∂_k g)`.
+#[inline]
+fn density_slope<M: Manifold, G: Riemannian<M>>(
+    metric: &G,
+    x: &ChartPoint<M>,
+) -> Result<Vector<M>, MetricError> {
+    let mut slope = Vector::<M>::zero();
+    let Some(slopes) = metric.slopes(&x.base) else { return Ok(slope) };
+    let g = metric.at(x)?;
+    for i in 0..M::Dim::LEN {
+        let row = g.sharp(&Vector::<M>::basis(i));
+        for k in 0..M::Dim::LEN {
+            slope[k] -= 0.5 * (slopes[k] * row)[i];
+        }
+    }
+    Ok(slope)
+}
 
 /// The bracket of the area form of an oriented surface,
 ///
@@ -19,6 +37,7 @@ use super::{Bracket, NaturalBracket, Site, Zero};
 pub struct AreaForm;
 
 impl<M: Manifold<Dim = Const<2>>, G: Riemannian<M>> Bracket<M, G> for AreaForm {
+    #[inline]
     fn apply<D: Scalar>(
         &self,
         at: &Site<'_, M, G, D>,
@@ -26,6 +45,19 @@ impl<M: Manifold<Dim = Const<2>>, G: Riemannian<M>> Bracket<M, G> for AreaForm {
     ) -> Result<Vector2<D>, MetricError> {
         let density = at.metric.volume(at.x)?.recip();
         Ok(Vector2::new(-alpha.y * density, alpha.x * density))
+    }
+
+    #[inline]
+    fn linearise(
+        &self,
+        at: &Site<'_, M, G>,
+        alpha: &Vector2<f64>,
+    ) -> Result<BracketJet<M>, MetricError> {
+        let density = at.metric.volume(at.x)?.recip();
+        let value = Vector2::new(-alpha.y * density, alpha.x * density);
+        let along_z = value * density_slope(at.metric, at.x)?.transpose();
+        let tensor = Matrix2::new(0.0, -density, density, 0.0);
+        Ok(BracketJet { value, along_z, along_s: Matrix2::zeros(), tensor })
     }
 }
 
@@ -52,6 +84,7 @@ impl Default for Nambu {
 }
 
 impl<M: Manifold<Dim = Const<3>>, G: Riemannian<M>> Bracket<M, G> for Nambu {
+    #[inline]
     fn apply<D: Scalar>(
         &self,
         at: &Site<'_, M, G, D>,
@@ -64,6 +97,20 @@ impl<M: Manifold<Dim = Const<3>>, G: Riemannian<M>> Bracket<M, G> for Nambu {
             s.x * alpha.y - s.y * alpha.x,
         );
         Ok(cross * density)
+    }
+
+    #[inline]
+    fn linearise(
+        &self,
+        at: &Site<'_, M, G>,
+        alpha: &Vector3<f64>,
+    ) -> Result<BracketJet<M>, MetricError> {
+        let density = at.metric.volume(at.x)?.recip() * self.factor;
+        let hat = |a: Vector3<f64>| Matrix3::new(0.0, -a.z, a.y, a.z, 0.0, -a.x, -a.y, a.x, 0.0);
+        let value = at.s.cross(alpha) * density;
+        let along_z = value * density_slope(at.metric, at.x)?.transpose();
+        let (along_s, tensor) = (hat(alpha * -density), hat(at.s * density));
+        Ok(BracketJet { value, along_z, along_s, tensor })
     }
 }
 

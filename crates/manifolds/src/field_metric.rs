@@ -48,7 +48,8 @@ impl<M: Manifold, F: MatrixField<M>> Riemannian<M> for FieldMetric<F> {
     }
 
     fn end(&self, x: &M::Point<f64>, v: &Vector<M>) -> Result<M::Point<f64>, MetricError> {
-        Ok(geodesic::follow_real(&self.field, x, v)?.0)
+        // With the very roundings of a step's arc, whose energy a step has been solved for.
+        Ok(self.weyl_jet(x, v)?.end)
     }
 
     fn along(

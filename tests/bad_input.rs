@@ -376,3 +376,18 @@ fn errors_are_sentences_with_the_numbers() {
         }
     }
 }
+
+#[test]
+fn a_step_out_of_an_open_chart_is_an_error_with_the_trajectory_so_far() {
+    // x' = −1 towards the edge x = 0 of the chart, where the fields themselves go on.
+    let system = System::on(Chart::<2>::new(|q| q.x > 0.0))
+        .energy(|q: &Vector2<Real>| q.y)
+        .entropy(|q: &Vector2<Real>| -q.x)
+        .build()
+        .unwrap();
+    let error = WeylMidpoint.run(&system, vector![1.0, 0.5], Span::steps(0.1, 100)).unwrap_err();
+    let end = error.trajectory().expect("a trajectory").last();
+    assert!(end.point.x > 0.0 && end.point.x < 0.2 && end.step >= 8, "{error}");
+    let outside = WeylMidpoint.run(&system, vector![-1.0, 0.5], TEN_STEPS).unwrap_err();
+    assert!(outside.to_string().contains("chart"), "{outside}");
+}

@@ -82,29 +82,6 @@ fn by_hand(p: &Vector3<f64>) -> Vector3<f64> {
 }
 
 #[test]
-fn a_nambu_step_is_the_same_in_bent_coordinates() {
-    let flat = System::on(Euclidean::<3>)
-        .bracket(Nambu::default())
-        .energy(energy)
-        .entropy(entropy)
-        .build()
-        .unwrap();
-    let start = vector![0.3, -0.4, 0.5];
-    let span = Span::steps(0.1, 1);
-    let there = WeylMidpoint.run(&flat, unbend(&start), span).unwrap().last().point;
-    let system = System::on(Euclidean::<3>)
-        .metric(Metric::field(bent))
-        .bracket(Nambu::default())
-        .energy(|q: &Vector3<Real>| energy(&unbend(q)))
-        .entropy(|q: &Vector3<Real>| entropy(&unbend(q)))
-        .build()
-        .unwrap();
-    let here = WeylMidpoint.run(&system, start, span).unwrap().last().point;
-    assert!((unbend(&here) - there).amax() < 1e-11, "{:e}", (unbend(&here) - there).amax());
-    assert!((there - unbend(&start)).norm() > 0.01);
-}
-
-#[test]
 fn a_run_with_numerical_geodesics_has_order_two_and_keeps_the_energy() {
     let system = System::on(Euclidean::<3>)
         .metric(Metric::field(bent))
@@ -132,4 +109,122 @@ fn a_run_with_numerical_geodesics_has_order_two_and_keeps_the_energy() {
     });
     let order = Order::fit(&sizes, &errors).unwrap();
     assert!(order.agrees(2.0, 0.05), "{order} from {errors:?}");
+}
+
+/// Compares one step of both geodesic retractions on a manifold and in a chart of it, `point`.
+fn same_in_the_chart<Y, Z, const N: usize>(
+    embedded: &Y,
+    chart: &Z,
+    start: SVector<f64, N>,
+    point: impl Fn(&SVector<f64, N>) -> metriplectic::dynamics::Point<Y>,
+) where
+    Y: Metriplectic,
+    Z: Metriplectic<Manifold = Euclidean<N>>,
+{
+    fn ends<Y, Z, R, const N: usize>(
+        (embedded, chart, retraction): (&Y, &Z, R),
+        (x, q): (metriplectic::dynamics::Point<Y>, SVector<f64, N>),
+    ) -> (metriplectic::dynamics::Point<Y>, SVector<f64, N>)
+    where
+        Y: Metriplectic,
+        Z: Metriplectic<Manifold = Euclidean<N>>,
+        R: Retraction<Y::Manifold, Y::Metric> + Retraction<Euclidean<N>, Z::Metric> + Copy,
+    {
+        let (scheme, span) = (Scheme::new(retraction), Span::steps(0.2, 1));
+        let there = scheme.run(embedded, x, span).expect("a step").last().point.clone();
+        (there, scheme.run(chart, q, span).expect("a step").last().point)
+    }
+    let distance = |x: &metriplectic::dynamics::Point<Y>, y: &metriplectic::dynamics::Point<Y>| {
+        let (x, y) = (Y::Manifold::entries(x), Y::Manifold::entries(y));
+        x.iter().zip(y).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+    };
+    for (there, here) in [
+        ends((embedded, chart, WeylMidpoint), (point(&start), start)),
+        ends((embedded, chart, Exponential), (point(&start), start)),
+    ] {
+        let off = distance(&point(&here), &there);
+        assert!(off < 1e-11, "{off:e}");
+        // The step is long enough for the test to mean something.
+        assert!(distance(&there, &point(&start)) > 0.05);
+    }
+}
+
+/// Stereographic coordinates of S³ from the pole `−e₀`: `x = (1 − |q|²/4, q)/(1 + |q|²/4)`, in which
+/// the round metric is conformal, and which keep the orientation `det[x, a, b, c]`.
+fn stereographic<D: Scalar>(q: &Vector3<D>) -> Vector4<D> {
+    let s = q.dot(q) * 0.25;
+    Vector4::new(-s + 1.0, q.x, q.y, q.z) * (s + 1.0).recip()
+}
+
+fn wavy(x: &Vector4<Real>) -> Real {
+    x[0].powi(2) * 0.5 + x[1].powi(3) + x[2] * x[3] * 0.7 + x[1] * 0.5
+}
+
+fn tilted(x: &Vector4<Real>) -> Real {
+    x[3] + x[0] * x[1] * 0.4 - x[2] * 0.6
+}
+
+#[test]
+fn a_nambu_step_on_the_three_sphere_is_the_same_in_stereographic_coordinates() {
+    let embedded = System::on(Sphere::<3>::round())
+        .bracket(Nambu::default())
+        .energy(wavy)
+        .entropy(tilted)
+        .build()
+        .unwrap();
+    let conformal =
+        |q: &Vector3<Real>| Matrix3::from_diagonal_element((q.dot(q) * 0.25 + 1.0).powi(-2));
+    let chart = System::on(Euclidean::<3>)
+        .metric(Metric::field(conformal))
+        .bracket(Nambu::default())
+        .energy(|q: &Vector3<Real>| wavy(&stereographic(q)))
+        .entropy(|q: &Vector3<Real>| tilted(&stereographic(q)))
+        .build()
+        .unwrap();
+    same_in_the_chart(&embedded, &chart, vector![0.5, -0.4, 0.6], stereographic);
+}
+
+#[test]
+fn a_nambu_step_on_rotations_is_the_same_in_rotation_vectors() {
+    use metriplectic::manifolds::rotations::{dexp, exp};
+    let energy = |r: &Matrix3<Real>| r.m11 + r.m22 * 2.0 + r.m33 * 3.0 + r.m12 * r.m23 * 0.5;
+    let entropy = |r: &Matrix3<Real>| r.m13 * 2.0 - r.m21 + (r.m31 + r.m32).powi(2) * 0.25;
+    // Left-invariant on the group, and its pull-back by the exponential, `dexpᵀ J dexp`.
+    let j = Matrix3::new(1.0, 0.2, 0.0, 0.2, 1.5, 0.1, 0.0, 0.1, 2.0);
+    let embedded = System::on(Rotations)
+        .metric(Metric::field(move |_: &Matrix3<Real>| j.cast::<Real>()))
+        .bracket(Nambu::default())
+        .energy(energy)
+        .entropy(entropy)
+        .build()
+        .unwrap();
+    let chart = System::on(Euclidean::<3>)
+        .metric(Metric::field(move |q: &Vector3<Real>| {
+            let theta = dexp(q);
+            theta.transpose() * j.cast::<Real>() * theta
+        }))
+        .bracket(Nambu::default())
+        .energy(move |q: &Vector3<Real>| energy(&exp(q)))
+        .entropy(move |q: &Vector3<Real>| entropy(&exp(q)))
+        .build()
+        .unwrap();
+    same_in_the_chart(&embedded, &chart, vector![0.3, -0.5, 0.4], exp);
+}
+
+#[test]
+fn a_nambu_step_is_the_same_in_bent_coordinates_with_both_retractions() {
+    let flat = System::on(Euclidean::<3>)
+        .bracket(Nambu::default())
+        .energy(energy)
+        .entropy(entropy)
+        .build()
+        .unwrap();
+    let chart = System::on(Euclidean::<3>)
+        .metric(Metric::field(bent))
+        .bracket(Nambu::default())
+        .energy(|q: &Vector3<Real>| energy(&unbend(q)))
+        .entropy(|q: &Vector3<Real>| entropy(&unbend(q)))
+        .build()
+        .unwrap();
+    same_in_the_chart(&flat, &chart, vector![0.3, -0.7, 0.8], unbend);
 }

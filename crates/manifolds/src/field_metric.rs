@@ -237,6 +237,18 @@ mod tests {
     }
 
     #[test]
+    fn the_half_plane_has_its_christoffel_symbols_and_distances() {
+        let (g, x) = (half_plane(), vector![0.3, 1.2]);
+        let [across, up] = Riemannian::<Euclidean<2>>::christoffel(&g, &x).unwrap();
+        // Γˣ_xy = −1/y, Γʸ_xx = 1/y, Γʸ_yy = −1/y.
+        assert!((across - Matrix2::new(0.0, -1.0, -1.0, 0.0) / x.y).norm() < 1e-15);
+        assert!((up - Matrix2::new(1.0, 0.0, 0.0, -1.0) / x.y).norm() < 1e-15);
+        let distance = Riemannian::<Euclidean<2>>::distance(&g, &x, &(x * 2.0)).unwrap();
+        let exact = (1.0 + x.norm_squared() / (4.0 * x.y * x.y)).acosh();
+        assert!((distance - exact).abs() < 1e-12);
+    }
+
+    #[test]
     fn a_geodesic_that_leaves_the_chart_is_an_error_with_the_time() {
         // The edge x = 1 of the slit metric is at a finite distance, and there is nothing beyond it.
         let slit =

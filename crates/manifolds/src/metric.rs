@@ -119,6 +119,53 @@ pub trait Riemannian<M: Space> {
     /// Those of [`exp`](Self::exp).
     fn weyl_jet(&self, x: &M::Point<f64>, d: &Vector<M>) -> Result<ArcJet<M>, MetricError>;
 
+    /// The length `√G(v, v)` of a tangent vector at a real point.
+    ///
+    /// # Errors
+    ///
+    /// [`MetricError`] if the matrix is not symmetric and positive.
+    fn norm(&self, x: &M::Point<f64>, v: &Vector<M>) -> Result<f64, MetricError> {
+        let at = self.at(&ChartPoint::centre(x))?;
+        Ok(at.orthonormal(&at.flat(v)).magnitude())
+    }
+
+    /// The length of the geodesic that [`log`](Self::log) finds between two points: their distance,
+    /// where it is the shortest.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`log`](Self::log).
+    fn distance(&self, x: &M::Point<f64>, y: &M::Point<f64>) -> Result<f64, MetricError> {
+        self.norm(x, &self.log(x, y)?)
+    }
+
+    /// The Christoffel symbols at a real point in the chart centred there: the `k`-th matrix is
+    /// `Γᵏ_ij = ½ g^{kl} (∂_i g_lj + ∂_j g_li − ∂_l g_ij)`. They vanish where the chart is normal.
+    ///
+    /// # Errors
+    ///
+    /// [`MetricError`] if the matrix is not symmetric and positive.
+    fn christoffel(
+        &self,
+        x: &M::Point<f64>,
+    ) -> Result<<M::Dim as Dimension>::Array<Matrix<M>>, MetricError> {
+        let n = M::Dim::LEN;
+        let mut symbols = M::Dim::array(|_| Matrix::<M>::zeros());
+        let Some(g) = self.slopes(x) else { return Ok(symbols) };
+        let at = self.at(&ChartPoint::centre(x))?;
+        for i in 0..n {
+            for j in 0..n {
+                let first_kind =
+                    Vector::<M>::from_index(|l| 0.5 * (g[i][(l, j)] + g[j][(l, i)] - g[l][(i, j)]));
+                let raised = at.sharp(&first_kind);
+                for k in 0..n {
+                    symbols[k][(i, j)] = raised[k];
+                }
+            }
+        }
+        Ok(symbols)
+    }
+
     /// What rounding has lost of the displacement `v` on the way from `x` to `y = exp_x(v)`, so that
     /// the next step can make up for it; zero where it is not known.
     #[inline]

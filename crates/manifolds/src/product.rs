@@ -207,7 +207,7 @@ where
 pub struct Block<A, B, D, P, Q> {
     left: P,
     right: Q,
-    factors: PhantomData<fn() -> (A, B, D)>,
+    factors: PhantomData<(A, B, D)>,
 }
 
 impl<A, B, D, P: Clone, Q: Clone> Clone for Block<A, B, D, P, Q> {

@@ -44,9 +44,7 @@ fn the_relaxed_rigid_body_of_a_lagrangian_relaxes_and_keeps_both_laws() {
 }
 
 /// `I₁ξ₁²/2 + … + (|ξ|²)²/4`.
-fn quartic<const N: usize>(
-    inertia: SVector<f64, N>,
-) -> impl Fn(&SVector<Real, N>) -> Real + Clone + Copy {
+fn quartic<const N: usize>(inertia: SVector<f64, N>) -> impl Fn(&SVector<Real, N>) -> Real + Copy {
     move |xi| {
         let square = xi.norm_squared();
         xi.component_mul(xi).component_mul(&inertia.cast()).sum() * 0.5 + square * square * 0.25
@@ -64,16 +62,16 @@ fn relaxes<const N: usize>(
 where
     Canonical: Riemannian<LieDual<N>>,
 {
-    let friction = CasimirDissipation::new(space.algebra(), form).unwrap();
+    let friction = CasimirDissipation::new(space.algebra(), form).expect("a sound model");
     let inertia = SVector::from_fn(|i, _| 1.0 + 0.7 * i as f64);
     let system = System::on(space)
         .lagrangian(quartic(inertia))
         .dissipation(friction)
         .entropy(casimir)
         .build()
-        .unwrap();
-    system.verify(&start, 0.1).unwrap();
-    let run = WeylMidpoint.run(&system, start, Span::steps(0.05, 400)).unwrap();
+        .expect("a sound model");
+    system.verify(&start, 0.1).expect("a sound model");
+    let run = WeylMidpoint.run(&system, start, Span::steps(0.05, 400)).expect("a sound model");
     let certificate = run.certificate();
     assert!(certificate.keeps_energy(), "{certificate}");
     // Newton's method has the right Jacobian.

@@ -139,7 +139,7 @@
 //!
 //! - [`Space::is_near`](crate::fields::Space::is_near): a chart that does not cover everything says
 //!   where its inside ends, and long geodesics change charts there.
-//! - [`Space::seeded`](crate::fields::Space::seeded),
+//! - [`Space::seeds`](crate::fields::Space::seeds),
 //!   [`Space::covariant`](crate::fields::Space::covariant) and
 //!   [`Space::contravariant`](crate::fields::Space::contravariant) are derived from `chart` and
 //!   `velocity`; a closed form is faster.

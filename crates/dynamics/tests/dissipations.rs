@@ -366,7 +366,7 @@ proptest! {
 
 /// `K = (γ/w_s) b bᵀ` with `b = (0, w_s, −w_p)` on `(q, p, s)`: the damped oscillator.
 fn oscillator()
--> FieldDissipation<impl Fn(&Vector3<Real>, &Vector3<Real>) -> Matrix3<Real> + Clone + Copy> {
+-> FieldDissipation<impl Fn(&Vector3<Real>, &Vector3<Real>) -> Matrix3<Real> + Copy> {
     FieldDissipation(|_: &Vector3<Real>, w: &Vector3<Real>| {
         let b = Vector3::new(Real::from(0.0), w.z, -w.y);
         b * b.transpose() * (w.z.recip() * 0.01)
@@ -375,7 +375,7 @@ fn oscillator()
 
 /// `|w|² − w wᵀ` in the space around a sphere.
 fn kills_on_vectors()
--> FieldDissipation<impl Fn(&Vector3<Real>, &Vector3<Real>) -> Matrix3<Real> + Clone + Copy> {
+-> FieldDissipation<impl Fn(&Vector3<Real>, &Vector3<Real>) -> Matrix3<Real> + Copy> {
     FieldDissipation(|x: &Vector3<Real>, w: &Vector3<Real>| {
         (eye() * w.norm_squared() - w * w.transpose()) * (x.x * x.y + 2.0)
     })
@@ -383,7 +383,7 @@ fn kills_on_vectors()
 
 /// The dissipation of the bi-invariant metric, on body covectors.
 fn kills_on_rotations()
--> FieldDissipation<impl Fn(&Matrix3<Real>, &Vector3<Real>) -> Matrix3<Real> + Clone + Copy> {
+-> FieldDissipation<impl Fn(&Matrix3<Real>, &Vector3<Real>) -> Matrix3<Real> + Copy> {
     FieldDissipation(|_: &Matrix3<Real>, w: &Vector3<Real>| {
         eye() * w.norm_squared() - w * w.transpose()
     })

@@ -285,7 +285,7 @@ macro_rules! sphere {
                 Ok(Sphere::<$n>::chart(x, v))
             }
 
-            /// With the velocity of [`great_circle`], and `γ'' = −|v|² γ`.
+            /// With the velocity of the great circle, and `γ'' = −|v|² γ`.
             #[inline]
             fn along(
                 &self,

@@ -81,8 +81,13 @@ impl Convergence {
         for study in studies {
             let points: Vec<(f64, f64)> =
                 study.steps.iter().copied().zip(study.errors.iter().copied()).collect();
-            let label = format!("{} on {}, {}", study.problem, study.manifold, study.scheme);
-            let place = Some((&study.problem, &study.manifold));
+            let Self { problem, manifold, metric, scheme, .. } = study;
+            let place = format!("{problem} on {manifold}");
+            let label = match metric.as_str() {
+                "canonical" => format!("{place}, {scheme}"),
+                _ => format!("{place} ({metric}), {scheme}"),
+            };
+            let place = Some((problem, manifold, metric));
             figure = if before == place {
                 figure.rival(label, points)
             } else {

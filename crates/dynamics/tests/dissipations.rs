@@ -365,8 +365,8 @@ proptest! {
 }
 
 /// `K = (γ/w_s) b bᵀ` with `b = (0, w_s, −w_p)` on `(q, p, s)`: the damped oscillator.
-fn oscillator()
--> FieldDissipation<impl Fn(&Vector3<Real>, &Vector3<Real>) -> Matrix3<Real> + Copy> {
+fn oscillator() -> FieldDissipation<impl Fn(&Vector3<Real>, &Vector3<Real>) -> Matrix3<Real> + Copy>
+{
     FieldDissipation(|_: &Vector3<Real>, w: &Vector3<Real>| {
         let b = Vector3::new(Real::from(0.0), w.z, -w.y);
         b * b.transpose() * (w.z.recip() * 0.01)

@@ -64,7 +64,7 @@ fn a_million_steps_on_the_sphere_keep_energy_and_norm() {
 }
 
 #[test]
-fn a_hundred_thousand_steps_of_a_heavy_body_keep_energy_and_orthogonality() {
+fn a_million_steps_of_a_heavy_body_keep_energy_and_orthogonality() {
     // Without an entropy to climb the frame never rests.
     let energy = |(r, p): &(Matrix3<Real>, Vector3<Real>)| {
         p.x.powi(2) * 0.5 + p.y.powi(2) * 0.25 + p.z.powi(2) * (1.0 / 6.0) + r.m33 * 0.7
@@ -72,7 +72,7 @@ fn a_hundred_thousand_steps_of_a_heavy_body_keep_energy_and_orthogonality() {
     let space = Product(Rotations::bi_invariant(), Euclidean::<3>);
     let system = System::on(space).bracket(Symplectic).energy(energy).build().unwrap();
     let start = (Matrix3::identity(), vector![0.4, -0.6, 0.8]);
-    let (drift, certificate) = energy_drift(&system, start, 0.1, MILLION / 10);
+    let (drift, certificate) = energy_drift(&system, start, 0.1, MILLION);
     println!("{drift}\n{certificate}");
     assert!(certificate.keeps_energy() && is_flat(&drift), "{drift}");
     assert!(certificate.max_manifold_defect <= 1e-14, "{certificate}");

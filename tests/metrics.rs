@@ -59,6 +59,8 @@ on_the_sphere!(the_ambient_identity_is_the_round_metric_of_the_sphere, 2, 3);
 on_the_sphere!(the_ambient_identity_is_the_round_metric_of_the_three_sphere, 3, 4);
 on_the_sphere!(the_ambient_identity_is_the_round_metric_of_the_four_sphere, 4, 5);
 on_the_sphere!(the_ambient_identity_is_the_round_metric_of_the_five_sphere, 5, 6);
+on_the_sphere!(the_ambient_identity_is_the_round_metric_of_the_six_sphere, 6, 7);
+on_the_sphere!(the_ambient_identity_is_the_round_metric_of_the_seven_sphere, 7, 8);
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(16))]
@@ -109,7 +111,7 @@ proptest! {
     ) {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let ambient = Metric::field(move |x: &Vector3<Real>| {
-            Matrix3::from_diagonal(&vector![1.0, 1.5, 2.0]).cast::<Real>() + x * x.yzx().transpose() * Real::from(0.0)
+            Matrix3::from_diagonal(&vector![1.0, 1.5, 2.0]).cast::<Real>()
                 + x.yzx() * x.yzx().transpose() * Real::from(a)
         });
         let (x, v) = (Sphere::<2>.random(&mut rng), vector![u[0], u[1]]);

@@ -140,15 +140,15 @@ impl<R> Scheme<R> {
             // would make a random walk of the energy.
             return Ok(start.x.clone());
         }
-        let lost = NoRoot { best: root.u, residual: f64::INFINITY, sweeps: root.sweeps };
-        let end = self.retraction.end(system.metric(), start.x, &root.u).map_err(|_| lost)?;
-        // Outside an open chart the defect is infinite: there is no state to go on from.
-        if system.manifold().defect(&end).is_infinite() {
-            return Err(NoRoot { best: root.u, residual: f64::INFINITY, sweeps: root.sweeps });
-        }
+        let lost = || NoRoot { best: root.u, residual: f64::INFINITY, sweeps: root.sweeps };
+        let end = self.retraction.end(system.metric(), start.x, &root.u).map_err(|_| lost())?;
         let last = residual.last_correction(&root, &end);
         work.sweeps += usize::from(last.is_some());
         let (u, end) = last.unwrap_or((root.u, end));
+        // Outside an open chart the defect is infinite: there is no state to go on from.
+        if system.manifold().defect(&end).is_infinite() {
+            return Err(lost());
+        }
         Ok(memory.note::<Y::Manifold, _>(system.metric(), start.x, &u, end))
     }
 

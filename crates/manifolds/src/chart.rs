@@ -139,3 +139,43 @@ impl<const N: usize> Manifold for Chart<N> {
 }
 
 impl<const N: usize> Flat for Chart<N> {}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Canonical, Exponential, Metric, WeylMidpoint, laws};
+    use metriplectic_fields::Real;
+    use nalgebra::{Matrix2, Vector2, vector};
+    use num_dual::DualNum;
+    use proptest::prelude::*;
+    use rand::SeedableRng;
+    use rand::rngs::ChaCha8Rng;
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(16))]
+
+        #[test]
+        fn an_open_chart_keeps_the_laws(seed in any::<u64>(), u in prop::array::uniform2(-0.7..0.7)) {
+            let chart = Chart::<2>::new(|q| q.y > 0.0);
+            let x = chart.random(&mut ChaCha8Rng::seed_from_u64(seed));
+            prop_assert!(chart.check(&x).is_ok());
+            // Displacements that stay inside the domain.
+            let u = Vector2::from(u) * x.y;
+            let half_plane =
+                Metric::field(|q: &Vector2<Real>| Matrix2::from_diagonal_element(q.y.powi(-2)));
+            laws::manifold(&chart, &x, &u)?;
+            laws::metric::<Chart<2>, _>(&Canonical, &x, &u)?;
+            laws::metric::<Chart<2>, _>(&half_plane, &x, &u)?;
+            laws::retraction::<Chart<2>, _, _>(&WeylMidpoint, &half_plane, &x, &u)?;
+            laws::retraction::<Chart<2>, _, _>(&Exponential, &half_plane, &x, &u)?;
+        }
+    }
+
+    #[test]
+    fn a_point_that_is_not_finite_is_named_before_the_domain_is_asked() {
+        let chart = Chart::<2>::new(|q| q.y > 0.0);
+        let error = chart.check(&vector![f64::NAN, 1.0]).unwrap_err();
+        assert!(matches!(error, PointError::NotFinite { index: 0, .. }));
+        assert_eq!(chart.check(&vector![0.0, -1.0]), Err(PointError::OutsideChart));
+    }
+}

@@ -151,8 +151,9 @@ pub fn retraction<M: Manifold, G: Riemannian<M>, R: Retraction<M, G>>(
             let column = Vector::<M>::from_index(|i| dual[i].eps - slope[(i, k)]);
             column.magnitude()
         };
-        // Two numerical geodesics, each with its own steps.
-        let bound = 10.0 * bound;
+        // Two numerical geodesics, each with its own steps; their derivatives are those of the
+        // variational equations, which grow along the way and are not what the steps are chosen by.
+        let bound = 100.0 * bound;
         BrokenLaw::unless("∂z/∂u is the derivative of z", off(&z, &jet.dz), bound)?;
         BrokenLaw::unless("∂d/∂u is the derivative of d", off(&arc.d, &jet.dd), bound)?;
         BrokenLaw::unless("∂x'/∂u is the derivative of x'", off(&end, &jet.dend), bound)?;

@@ -111,8 +111,7 @@ pub trait Riemannian<M: Space> {
         Ok(Arc { z: ChartPoint::centre(&z), d, end })
     }
 
-    /// The same arc, with the
-    /// derivatives along `d`.
+    /// The same arc, with the derivatives along `d`.
     ///
     /// # Errors
     ///

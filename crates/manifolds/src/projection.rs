@@ -45,44 +45,8 @@ impl<D: Scalar, const A: usize> Ambient<D, A> {
     }
 }
 
-/// A tangent vector in the chart at the real part of its base.
-fn at_base<D: Scalar, M, const A: usize, const N: usize>(
-    z: &SVector<D, A>,
-    d: &SVector<D, A>,
-) -> (ChartPoint<M, D>, SVector<D, N>)
-where
-    M: for<'a> OnSphere<A, N>,
-{
-    let base: SVector<f64, A> = Column::real(&normalised(z));
-    let moving = SVector::<Dual<D>, A>::from_fn(|i, _| Dual::new(z[i], d[i]));
-    let q = M::components_at(&base, &moving);
-    (M::chart_point(base, q.map(|q| q.re)), q.map(|q| q.eps))
-}
-
-/// What the generic code above needs of `Sphere<N>`, whose entries the compiler cannot count.
-trait OnSphere<const A: usize, const N: usize>: Space {
-    fn components_at<D: Scalar>(x: &SVector<f64, A>, y: &SVector<D, A>) -> SVector<D, N>;
-    fn chart_point<D: Scalar>(x: SVector<f64, A>, q: SVector<D, N>) -> ChartPoint<Self, D>;
-}
-
 macro_rules! projection {
     ($n:literal in $a:literal) => {
-        impl OnSphere<$a, $n> for Sphere<$n> {
-            fn components_at<D: Scalar>(
-                x: &SVector<f64, $a>,
-                y: &SVector<D, $a>,
-            ) -> SVector<D, $n> {
-                Self::coordinates(x, y)
-            }
-
-            fn chart_point<D: Scalar>(
-                base: SVector<f64, $a>,
-                q: SVector<D, $n>,
-            ) -> ChartPoint<Self, D> {
-                ChartPoint { base, q }
-            }
-        }
-
         impl<G: Riemannian<Sphere<$n>>> Retraction<Sphere<$n>, G> for Projection {
             fn arc<D: Scalar>(
                 &self,
@@ -91,8 +55,11 @@ macro_rules! projection {
                 u: &SVector<D, $n>,
             ) -> Result<Arc<Sphere<$n>, D>, MetricError> {
                 let ambient = Ambient::new(x, &spread(&frame::<$a, $n>(x), u));
-                let (z, d) = at_base(&ambient.z, &ambient.d);
-                Ok(Arc { z, d, end: normalised(&ambient.end) })
+                // The chart at the base reads its velocity by one more dual number.
+                let base = Column::real(&normalised(&ambient.z));
+                let q = Sphere::<$n>::coordinates(&base, &ambient.z.zip_map(&ambient.d, Dual::new));
+                let z = ChartPoint { base, q: q.map(|q| q.re) };
+                Ok(Arc { z, d: q.map(|q| q.eps), end: normalised(&ambient.end) })
             }
 
             fn end(
@@ -187,5 +154,8 @@ mod tests {
     keeps_the_laws!(the_projection_of_the_circle_keeps_the_laws, 1);
     keeps_the_laws!(the_projection_of_the_sphere_keeps_the_laws, 2);
     keeps_the_laws!(the_projection_of_the_three_sphere_keeps_the_laws, 3);
+    keeps_the_laws!(the_projection_of_the_four_sphere_keeps_the_laws, 4);
+    keeps_the_laws!(the_projection_of_the_five_sphere_keeps_the_laws, 5);
+    keeps_the_laws!(the_projection_of_the_six_sphere_keeps_the_laws, 6);
     keeps_the_laws!(the_projection_of_the_seven_sphere_keeps_the_laws, 7);
 }

@@ -20,8 +20,8 @@
 //! - **Geodesics** of the round metric are great circles, `exp_x(v) = φ_x(v)` and
 //!   `log_x(y) = φ_x⁻¹(y)`, up to the injectivity radius π, beyond which they are refused (Absil, Mahony
 //!   and Sepulchre 2008, §5.4). The logarithm of rounded points is within
-//!   `8ε(1/θ + 1 + θ/(π − θ))` of the exact one, relative to `θ`, from `θ = 10⁻¹⁴` to `π − 10⁻⁶`: its direction is
-//!   lost at the antipode.
+//!   `8ε(1/θ + 1 + θ/(π − θ))` of the exact one, relative to `θ`, from `θ = 10⁻¹⁴` to `π − 10⁻⁶`: its
+//!   direction is lost at the antipode.
 //! - **Other metrics** are forms on Rⁿ⁺¹, by [`Metric::field`](crate::Metric::field);
 //!   [`Projection`](crate::Projection) is a retraction for all of them.
 //! - **Brackets**: none unless one is asked for. `AreaForm` on S², `x' = x × ∇H` (Marsden and Ratiu 1999,

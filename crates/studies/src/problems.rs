@@ -172,7 +172,10 @@ impl Study for LargeSteps {
         for radians in [1.0, 2.0] {
             let scheme = Scheme::new(retraction);
             let h = radians / velocity.magnitude();
-            let Ok(mut steps) = scheme.steps(system, start.clone(), h) else { return };
+            let Ok(mut steps) = scheme.steps(system, start.clone(), h) else {
+                self.ended += 1;
+                continue;
+            };
             for _ in 0..3 {
                 let before = steps.state().point.clone();
                 if steps.advance().is_err() {

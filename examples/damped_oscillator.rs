@@ -8,8 +8,6 @@
 //! q' = p,   p' = −q − γ p,   s' = γ p²   have   s = 2 − ½p² − ½q²,   ω² = 1 − ¼γ²,
 //! q = 2e^{−γt/2} (cos ωt + (γ/2ω) sin ωt),      p = −(2/ω) e^{−γt/2} sin ωt .
 //! ```
-//!
-//! The scheme is a little late, a quarter of that with half the step.
 
 use std::error::Error;
 
@@ -46,9 +44,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     let runs = runs.collect::<Result<Vec<_>, _>>()?;
     let error = |s: &State<Euclidean<3>>| (s.point - exact(s.time)).norm();
     let errors: Vec<f64> = runs.iter().map(|run| error(run.last())).collect();
-    let (run, end, order) = (&runs[0], runs[0].last(), Order::fit(&sizes, &errors)?);
+    let (run, order) = (&runs[0], Order::fit(&sizes, &errors)?);
 
-    let path = Gallery::open()?.path("damped_oscillator.svg");
+    let (path, end) = (Gallery::open()?.path("damped_oscillator.svg"), run.last());
     let beside = |title: &str, i: usize, since: f64| {
         let late: Vec<_> = run.iter().filter(|state| state.time >= since * end.time).collect();
         let closed: Vec<_> = late.iter().map(|s| (s.time, exact(s.time)[i])).collect();
@@ -62,8 +60,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
     Panels::new(format!("The damped oscillator and its bath, γ = {GAMMA}, h = {h}"))
         .panel(beside("position q", 0, 0.0))
-        .panel(beside("momentum p, the last fifth", 1, 0.8))
-        .panel(beside("entropy s, at rest H", 2, 0.0).level(2.0))
+        .panel(beside("momentum p, last fifth of the run", 1, 0.8))
+        .panel(beside("entropy s, at rest 2", 2, 0.0).level(2.0))
         .panel(distance)
         .save(&path)?;
 

@@ -52,8 +52,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         pairs.collect::<Vec<_>>()
     };
     let both = |title, value: &dyn Fn(&State<Space>, &State<Space>) -> f64| {
-        let panel = Panel::new(title, "t").line("published", line(&published, value));
-        panel.line("exact", line(&exact, value)).level(0.0)
+        let panel = Panel::new(title, "t").line("exact", line(&exact, value));
+        panel.line("published", line(&published, value)).level(0.0)
     };
     let entry = |i: usize| line(&exact, &|_, s| s.point[i]);
     let rise = |s: &State<Space>, next: &State<Space>| next.entropy - s.entropy;

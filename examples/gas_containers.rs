@@ -34,7 +34,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         let b = Vector4::new(0.0.into(), 0.0.into(), w.w, -w.z);
         b * b.transpose() * Real::from(ALPHA)
     };
-    let [published, exact] = [SecondLaw::Published, SecondLaw::Casimir].map(|law| {
+    let [published, exact] = [SecondLaw::Published, SecondLaw::Exact].map(|law| {
         let containers = System::on(Euclidean::<4>)
             .bracket(Poisson::field(wall))
             .dissipation(FieldDissipation(leak))

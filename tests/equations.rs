@@ -5,9 +5,10 @@ mod models;
 
 use metriplectic::dynamics::{Bracket, Dissipation, laws};
 use metriplectic::fields::{BrokenLaw, ChartPoint};
-use metriplectic::manifolds::rotations;
+use metriplectic::integrators::DiscreteGradient;
+use metriplectic::manifolds::{Arc, rotations};
 use metriplectic::prelude::*;
-use models::{half_square, kinetic, relaxing_body};
+use models::{half_square, kinetic, relaxing_body, top};
 use proptest::prelude::*;
 
 const EPS: f64 = f64::EPSILON;
@@ -187,6 +188,35 @@ proptest! {
         prop_assert!(run.certificate().keeps_energy() && run.certificate().keeps_entropy());
     }
 
+    /// §4.1, eqs. (AVF), (gonzalez) and (itoAbe) on R³, and eq. (discGrad) for each.
+    #[test]
+    fn three_discrete_gradients_are_the_printed_ones(x in columns::<3>(), d in columns::<3>()) {
+        // Away from short edges, where the quotients are integrals.
+        prop_assume!(d.amin() > 0.2);
+        let f = |p: &Vector3<Real>| p.x.powi(3) * p.y + p.z.powi(4) * 0.25 + p.y * p.z + 3.0;
+        let df = |p: Vector3<f64>| {
+            vector![3.0 * p.x * p.x * p.y, p.x.powi(3) + p.z, p.z.powi(3) + p.y]
+        };
+        let at = |p: &Vector3<f64>| ScalarField::<Euclidean<3>>::at::<f64>(&f, p);
+        let arc: Arc<Euclidean<3>> = WeylMidpoint.arc(&Canonical, &x, &d).unwrap();
+        let (y, z) = (x + d, x + d * 0.5);
+        let close = |a: Vector3<f64>, b: Vector3<f64>| {
+            BrokenLaw::unless("the printed covector", (a - b).norm(), 1e-12 * (1.0 + b.norm()))
+        };
+        // Simpson's rule is exact to degree 3, that of a gradient of a polynomial of degree 4.
+        let mean = (df(x) + df(z) * 4.0 + df(y)) / 6.0;
+        close(MeanValue.mean(&f, &x, &arc), mean)?;
+        let slope = (at(&y) - at(&x) - df(z).dot(&d)) / d.norm_squared();
+        close(Gonzalez.covector(&f, &Canonical, (&x, at(&x)), &arc), df(z) + d * slope)?;
+        let corners = [x, vector![y.x, x.y, x.z], vector![y.x, y.y, x.z], y];
+        let quotients =
+            Vector3::from_fn(|i, _| (at(&corners[i + 1]) - at(&corners[i])) / (y[i] - x[i]));
+        close(ItohAbe.mean(&f, &x, &arc), quotients)?;
+        for w in [mean, df(z) + d * slope, quotients] {
+            equal(w.dot(&d) / 10.0, (at(&y) - at(&x)) / 10.0)?;
+        }
+    }
+
     /// The dissipations of a form on an algebra and of two forms on covectors keep the laws.
     #[test]
     fn dissipations_beside_that_of_the_metric_keep_the_laws(
@@ -244,6 +274,51 @@ fn printed(p: &Vector3<f64>) -> Vector3<f64> {
     ]
 }
 
+/// §2.4: an action with `Φ_g^*{f, h} = {Φ_g^*f, Φ_g^*h}`, `H∘Φ_g = H` and `X_{J_ξ} = ξ_P`; rotations
+/// of so(3)* about an axis `e`, with `J = −p·e`, for a body that is symmetric about it or is not.
+#[test]
+fn an_action_is_checked_against_bracket_energy_and_momentum_map() {
+    let body = |moments: Vector3<f64>, sign: f64| {
+        let turn = |t: Real, p: &Vector3<Real>| {
+            rotations::exp(&Vector3::new(0.0.into(), 0.0.into(), t)) * p
+        };
+        System::on(LieDual::so3())
+            .energy(kinetic(moments))
+            .symmetry(turn, move |p: &Vector3<Real>| p.z * sign)
+            .build()
+            .expect("a system")
+    };
+    let start = vector![0.4, -0.7, 0.9];
+    let verdict = |moments, sign| body(moments, sign).verify(&start, 0.1);
+    let signs = [1.0, -1.0].map(|sign| verdict(vector![2.0, 2.0, 1.0], sign).is_ok());
+    assert!(signs[0] != signs[1], "{signs:?}");
+    let mistaken = verdict(vector![2.0, 2.0, 1.0], if signs[0] { -1.0 } else { 1.0 });
+    assert!(matches!(mistaken, Err(ModelError::ActionNotOfMomentum { .. })), "{mistaken:?}");
+    let asymmetric = verdict(vector![2.0, 3.0, 1.0], if signs[0] { 1.0 } else { -1.0 });
+    assert!(asymmetric.is_err(), "{asymmetric:?}");
+}
+
+/// What the page on choosing says of the discrete gradients: errors at `t = 5` of the spinning top of
+/// Celledoni, Eidnes, Owren and Ringholm (2020), with 25 steps.
+#[test]
+fn the_discrete_gradients_have_small_errors_on_the_spinning_top() {
+    let system = System::on(Sphere::<2>::round()).bracket(AreaForm).energy(top).build().unwrap();
+    let start = Vector3::from_element(3.0_f64.sqrt().recip());
+    let exact = vector![-0.135_129_410_617_930_4, 0.973_728_123_375_976_9, 0.183_285_526_250_026_5];
+    let span = Span::steps(0.2, 25);
+    let error = |end: Vector3<f64>| (end - exact).norm();
+    let gonzalez = error(WeylMidpoint.run(&system, start, span).unwrap().last().point);
+    let scheme = Scheme::new(WeylMidpoint);
+    let mean_value = scheme.gradient(MeanValue).run(&system, start, span).unwrap();
+    let mean_value = error(mean_value.last().point);
+    let increments = scheme.gradient(SymmetricItohAbe).run(&system, start, span).unwrap();
+    let increments = error(increments.last().point);
+    println!("{gonzalez:.4e}, {mean_value:.4e}, {increments:.4e}");
+    assert!((gonzalez / 3.57e-4 - 1.0).abs() < 1e-2);
+    assert!((mean_value / 3.16e-4 - 1.0).abs() < 1e-2);
+    assert!((increments / 5.42e-5 - 1.0).abs() < 1e-2);
+}
+
 /// §4.3: `S` grows although it is not asked for, because it is quadratic: `∇S(z) = ∇̄₂S(p, P)`.
 #[test]
 fn the_example_relaxes_with_both_laws() {
@@ -275,10 +350,11 @@ fn named(page: &str) -> Vec<(&str, &str)> {
 
 const ERRATA: &str = include_str!("../src/guide/errata.rs");
 const EQUATIONS: &str = include_str!("../src/guide/equations.rs");
+const CHOOSING: &str = include_str!("../src/guide/choosing.rs");
 
 #[test]
 fn every_test_that_the_guide_names_exists() {
-    for (page, at_least) in [(ERRATA, 17), (EQUATIONS, 40)] {
+    for (page, at_least) in [(ERRATA, 17), (EQUATIONS, 80), (CHOOSING, 1)] {
         let tests = named(page);
         assert!(tests.len() >= at_least, "{} tests are named", tests.len());
         for (path, name) in tests {

@@ -38,7 +38,7 @@
 //! | `G*(df, dg) = G(grad f, grad g)` | [`InnerProduct`](crate::manifolds::InnerProduct), [`Riemannian`](crate::manifolds::Riemannian) | `crates/manifolds/src/laws.rs::flat_spaces_keep_the_laws`, `tests/metrics.rs::metrics_that_vary_keep_the_laws_on_the_sphere_and_on_rotations` |
 //! | (semid) `K(α, β) = G*(dH,dH) G*(α,β) − G*(dH,α) G*(dH,β)`, both lines | [`MetricDissipation`](crate::dynamics::MetricDissipation) | `tests/equations.rs::the_form_of_the_metric_is_the_printed_one_on_each_line` |
 //! | `K^{ij} = C_H g^{ij} − (g⁻¹dH)^i (g⁻¹dH)^j` | the same | `tests/equations.rs::the_form_of_the_metric_is_the_printed_one_on_each_line` |
-//! | remark: `K(α, β) = G*(Qα, Qβ)` off all `dL_a` † | not as a list of functions; a [`FieldDissipation`](crate::dynamics::FieldDissipation) can be written so | `tests/errata.rs::the_remark_has_another_scale_than_the_equation_before_it`, `tests/errata.rs::a_momentum_is_kept_if_its_differential_is_killed` |
+//! | remark: `K(α, β) = G*(Qα, Qβ)` off all `dL_a` † | [`SystemBuilder::casimir`](crate::dynamics::SystemBuilder::casimir), [`momentum`](crate::dynamics::SystemBuilder::momentum), with the scale `G*(dH, dH)` | `tests/errata.rs::the_remark_has_another_scale_than_the_equation_before_it`, `tests/errata.rs::a_momentum_is_kept_if_its_differential_is_killed` |
 //!
 //! # §2.3 Metriplectic systems
 //!
@@ -56,11 +56,11 @@
 //!
 //! | equation | in the library | checked by |
 //! |---|---|---|
-//! | the action `Φ`, its laws, `ξ_P(x)` | not in the library: a symmetry is not declared | — |
-//! | Poisson actions, `Φ_g^*{f, h} = {Φ_g^* f, Φ_g^* h}` | not in the library | — |
-//! | momentum maps, `X_{J_ξ} = ξ_P`, `{f, J_ξ} = ξ_P(f)` | not as a type; a momentum is a function of the state | `tests/errata.rs::the_momentum_of_a_body_is_a_covector_and_its_velocity_is_not_kept` |
-//! | `H∘Φ_g = H` makes `J_ξ` a first integral | not declared; kept to the order of the scheme | `tests/errata.rs::a_momentum_is_kept_if_its_differential_is_killed` |
-//! | `(f, J_ξ) = 0`, `♯_K(dJ_ξ) = 0` † | a [`FieldDissipation`](crate::dynamics::FieldDissipation) that kills both `w` and `dJ_ξ` | `tests/errata.rs::a_momentum_is_kept_if_its_differential_is_killed` |
+//! | the action `Φ`, `Φ_e = 1`, `Φ_g Φ_h = Φ_{gh}`; `ξ_P(x) = d/dt exp(tξ)·x` | [`SystemBuilder::symmetry`](crate::dynamics::SystemBuilder::symmetry), one closure `(t, x)` for each one-parameter group `exp(tξ)` | `tests/equations.rs::an_action_is_checked_against_bracket_energy_and_momentum_map` |
+//! | Poisson actions, `Φ_g^*{f, h} = {Φ_g^* f, Φ_g^* h}` | [`SystemBuilder::symmetry`](crate::dynamics::SystemBuilder::symmetry), checked as `T Π(x) Tᵀ = Π(Φ(x))` | `tests/equations.rs::an_action_is_checked_against_bracket_energy_and_momentum_map` |
+//! | momentum maps, `X_{J_ξ} = ξ_P`, `{f, J_ξ} = ξ_P(f)` | [`SystemBuilder::symmetry`](crate::dynamics::SystemBuilder::symmetry), checked as `Π dJ_ξ = dΦ_t/dt` | `tests/equations.rs::an_action_is_checked_against_bracket_energy_and_momentum_map`, `tests/errata.rs::the_momentum_of_a_body_is_a_covector_and_its_velocity_is_not_kept` |
+//! | `H∘Φ_g = H` makes `J_ξ` a first integral | [`SystemBuilder::momentum`](crate::dynamics::SystemBuilder::momentum), kept to round-off | `tests/errata.rs::a_momentum_is_kept_if_its_differential_is_killed` |
+//! | `(f, J_ξ) = 0`, `♯_K(dJ_ξ) = 0` † | by projection for [`MetricDissipation`](crate::dynamics::MetricDissipation); asked of any other one | `tests/errata.rs::a_momentum_is_kept_if_its_differential_is_killed` |
 //! | `dJ_ξ/dt = {J_ξ, H} + (J_ξ, S) = 0` | the same | `tests/errata.rs::a_momentum_is_kept_if_its_differential_is_killed` |
 //! | `P = T*G`, `Ψ_g = T*L_{g⁻¹}` † | [`Symplectic`](crate::dynamics::Symplectic) on `Product<Rotations, Euclidean<3>>` | `tests/errata.rs::the_pull_back_by_a_left_translation_acts_from_the_right`, `tests/errata.rs::before_reduction_the_entropy_is_no_casimir_and_a_function_of_the_momentum` |
 //!
@@ -89,9 +89,9 @@
 //! |---|---|---|
 //! | `H' = ∇HᵀΠ∇H = 0` | [`Bracket`](crate::dynamics::Bracket) | `tests/laws.rs::each_law_of_a_bracket_can_break` |
 //! | (discGrad) `∇̄H·(x' − x) = ΔH`, `∇̄H(x, x) = ∇H(x)` | [`laws::discrete_gradient`](crate::integrators::laws::discrete_gradient) | `crates/integrators/src/laws.rs::the_discrete_gradient_keeps_its_laws` |
-//! | (AVF) `∫₀¹ ∇H((1−ξ)x + ξx') dξ` | not in the library | — |
-//! | (gonzalez) `∇H(z) + (ΔH − ∇H(z)·d) d/\|d\|²` | [`gonzalez`](crate::integrators::gonzalez::gonzalez); safe against round-off, [`Chord`](crate::integrators::gonzalez::Chord) | `crates/integrators/src/gonzalez.rs::the_covector_keeps_its_digits_on_short_arcs` |
-//! | (itoAbe) quotients, one coordinate after another | not in the library | — |
+//! | (AVF) `∫₀¹ ∇H((1−ξ)x + ξx') dξ` | [`MeanValue`](crate::integrators::MeanValue) | `tests/equations.rs::three_discrete_gradients_are_the_printed_ones`, `crates/integrators/src/laws.rs::the_discrete_gradient_keeps_its_laws` |
+//! | (gonzalez) `∇H(z) + (ΔH − ∇H(z)·d) d/\|d\|²` | [`Gonzalez`](crate::integrators::Gonzalez); safe against round-off, [`Chord`](crate::integrators::Chord) | `tests/equations.rs::three_discrete_gradients_are_the_printed_ones`, `crates/integrators/src/discrete_gradient/chord.rs::the_covector_keeps_its_digits_on_short_arcs` |
+//! | (itoAbe) quotients, one coordinate after another | [`ItohAbe`](crate::integrators::ItohAbe); symmetrised, [`SymmetricItohAbe`](crate::integrators::SymmetricItohAbe) | `tests/equations.rs::three_discrete_gradients_are_the_printed_ones`, `crates/integrators/src/laws.rs::the_discrete_gradient_keeps_its_laws` |
 //!
 //! # §4.2 Construction of metriplectic or generic integrators
 //!
@@ -99,7 +99,7 @@
 //! |---|---|---|
 //! | (ops) `(x' − x)/h = Π(z) ∇̄₂H + K_d(z) ∇S(z)` | [`Scheme`](crate::integrators::Scheme), [`Residual`](crate::integrators::Residual) | `tests/reference.rs::one_step_of_the_rigid_body_is_the_published_one`, `tests/order.rs::a_heavy_top_is_integrated_to_the_order_of_the_retraction` |
 //! | `x_k = φ(x_{k−1}, h)`, for `h ≤ h̄` | [`Steps`](crate::integrators::Steps); a step that is not solved is split in halves | `tests/conservation.rs::the_iterator_takes_the_steps_of_the_run`, `tests/conservation.rs::steps_far_too_large_keep_the_energy` |
-//! | second law, `ΔS ≥ −C h³` † | [`SecondLaw`](crate::dynamics::SecondLaw), [`Certificate::keeps_entropy`](crate::integrators::Certificate::keeps_entropy) | `tests/errata.rs::the_published_scheme_lowers_the_entropy_and_by_third_order_only` |
+//! | second law, `ΔS ≥ −C h³` † | [`SecondLaw::Published`](crate::dynamics::SecondLaw::Published) | `tests/errata.rs::the_published_scheme_lowers_the_entropy_and_by_third_order_only` |
 //! | (semid-d) `K_d(α, β) = G*(w,w) G*(α,β) − G*(w,α) G*(w,β)` † | [`MetricDissipation`](crate::dynamics::MetricDissipation), told to kill `w` | `tests/errata.rs::the_factor_in_the_discrete_form_makes_another_equation_of_it` |
 //! | first law, `H(x_{k+1}) = H(x_k)` | [`laws::step`](crate::integrators::laws::step) | `crates/integrators/src/laws.rs::a_midpoint_step_is_symmetric_and_keeps_the_energy`, `tests/conservation.rs::a_million_steps_of_the_relaxing_body_keep_the_energy`, `tests/conservation.rs::a_million_steps_of_a_heavy_body_keep_energy_and_orthogonality` |
 //!
@@ -113,7 +113,7 @@
 //! | `H = ½ Σ p_i²/I_i`, `S = ½\|p\|²` | closures | `tests/reference.rs::the_relaxing_body_comes_to_rest_on_its_axis_of_largest_inertia` |
 //! | the matrix `K`; `p' = Π∇H + K∇S` in components | [`MetricDissipation`](crate::dynamics::MetricDissipation) | `tests/equations.rs::the_relaxed_rigid_body_in_components`, `tests/reference.rs::the_relaxing_body_extrapolated_to_no_step_is_its_exact_flow` |
 //! | `Π∇S = 0`, `K∇H = 0` | [`verify`](crate::dynamics::Metriplectic::verify) | `tests/equations.rs::the_equations_of_motion_have_both_laws` |
-//! | `∇̄₂H(p, P) = (z₁/I₁, z₂/I₂, z₃/I₃)` † | [`gonzalez`](crate::integrators::gonzalez::gonzalez) | `tests/errata.rs::a_discrete_gradient_is_a_function_of_two_points` |
+//! | `∇̄₂H(p, P) = (z₁/I₁, z₂/I₂, z₃/I₃)` † | [`Gonzalez`](crate::integrators::Gonzalez) | `tests/errata.rs::a_discrete_gradient_is_a_function_of_two_points` |
 //! | `K_d` and the midpoint rule in components | [`WeylMidpoint`](crate::manifolds::WeylMidpoint) on [`LieDual`](crate::manifolds::LieDual) | `tests/equations.rs::a_step_solves_the_printed_midpoint_rule` |
 //! | `∇S(z) = ∇̄₂S(p, P)`, `ΔS ≥ 0`, `ΔH = 0` | [`Certificate`](crate::integrators::Certificate) | `tests/equations.rs::the_example_relaxes_with_both_laws`, `tests/conservation.rs::the_entropy_falls_on_no_step_by_more_than_its_round_off` |
 //! | figure: `I = (10, 5, 1)`, `h = 0.1`, `p = (0.001, −1, 0.001)` | `examples/relaxing_rigid_body.rs` | `tests/examples.rs::the_relaxing_rigid_body_prints_one_object` |
@@ -128,7 +128,7 @@
 //! | (weyl) `(exp_z(−hv/2), exp_z(hv/2))` | [`WeylMidpoint`](crate::manifolds::WeylMidpoint) | `tests/equations.rs::both_retractions_are_the_printed_pairs`, `tests/reference.rs::the_spinning_top_has_the_published_errors` |
 //! | second order † | [`WeylMidpoint`](crate::manifolds::WeylMidpoint) 2, [`Exponential`](crate::manifolds::Exponential) 1 | `tests/errata.rs::the_exponential_at_the_start_is_of_first_order`, `tests/problems.rs::canonical_metrics_are_integrated_to_the_order_of_the_retraction` |
 //! | (discGrad-m) `h⟨w, v⟩ = ΔH` †, `w → dH` | [`laws::discrete_gradient`](crate::integrators::laws::discrete_gradient) | `crates/integrators/src/laws.rs::the_discrete_gradient_keeps_its_laws`, `tests/errata.rs::a_discrete_gradient_on_a_manifold_counts_the_step` |
-//! | (gonzalez-m) `w = dH(z) + (ΔH/h − dH(z)v) ♭v/G(v,v)` † | [`gonzalez`](crate::integrators::gonzalez::gonzalez) | `tests/errata.rs::a_discrete_gradient_on_a_manifold_counts_the_step`, `tests/covariance.rs::a_step_on_the_sphere_is_the_same_in_colatitude_and_longitude` |
+//! | (gonzalez-m) `w = dH(z) + (ΔH/h − dH(z)v) ♭v/G(v,v)` † | [`Gonzalez`](crate::integrators::Gonzalez) | `tests/errata.rs::a_discrete_gradient_on_a_manifold_counts_the_step`, `tests/covariance.rs::a_step_on_the_sphere_is_the_same_in_colatitude_and_longitude` |
 //! | `♭(u)(v) = G(u, v)` | [`InnerProduct::flat`](crate::manifolds::InnerProduct::flat) | `crates/manifolds/src/laws.rs::flat_spaces_keep_the_laws` |
 //! | `R_h⁻¹(x_k, x_{k+1}) = Π(z) w + K_d(z) dS(z)` † | [`Scheme`](crate::integrators::Scheme), [`Residual`](crate::integrators::Residual), [`Run`](crate::integrators::Run) | `tests/reference.rs::one_step_of_pure_relaxation_on_the_sphere_is_the_published_one`, `tests/reference.rs::one_step_on_the_rotation_group_is_the_published_one`, `tests/errata.rs::the_dissipation_acts_on_the_differential_and_not_on_the_gradient` |
 //!
@@ -136,6 +136,7 @@
 //!
 //! | equation | in the library | checked by |
 //! |---|---|---|
+//! | exact scheme, `v = P Π Pᵀ w_H + K_{w_H} w_S`, `ΔS = h K(w_S, w_S) ≥ 0` | [`SecondLaw::Exact`](crate::dynamics::SecondLaw::Exact), [`velocity`](crate::dynamics::velocity) | `tests/second_law.rs::two_gas_containers_lose_entropy_by_the_published_scheme_and_never_by_the_exact_one`, `tests/second_law.rs::two_gas_containers_follow_their_exact_flow` |
 //! | Nambu, `ε^{ijk} S_j H_k/√det g`; area form, `−ε^{ij} H_j/√det g` | [`Nambu`](crate::dynamics::Nambu), [`AreaForm`](crate::dynamics::AreaForm) | `tests/laws.rs::brackets_of_a_volume_form_keep_the_laws`, `tests/covariance.rs::a_nambu_step_on_rotations_is_the_same_in_rotation_vectors` |
 //! | Kulkarni-Nomizu product of two forms (Morrison and Updike 2024) | [`KulkarniNomizu`](crate::dynamics::KulkarniNomizu) | `tests/equations.rs::dissipations_beside_that_of_the_metric_keep_the_laws` |
 //! | `K(x, w)` from a closure; a semidefinite cometric; a scale `κ(x)` | [`FieldDissipation`](crate::dynamics::FieldDissipation), [`CometricDissipation`](crate::dynamics::CometricDissipation), [`Scaled`](crate::dynamics::Scaled) | `tests/dissipations.rs::a_closure_of_the_killed_covector_damps_an_oscillator_as_its_closed_form`, `tests/dissipations.rs::a_scaled_dissipation_relaxes_a_symmetric_body_on_time` |

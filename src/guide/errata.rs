@@ -73,9 +73,10 @@
 //! positive semidefinite; they differ in time scale, `C_H = |Ω|²` for a body, so that entropy at the start
 //! of the paper's example would be produced 25 times as fast, and near an equilibrium of `H`, where
 //! `K` of (semid) vanishes like `|dH|²` and that of the remark keeps its norm and has no limit. The library
-//! takes (semid) for its default, [`MetricDissipation`](crate::dynamics::MetricDissipation), and any other
-//! scale by [`MetricDissipation::scaled`](crate::dynamics::MetricDissipation::scaled), whose number `κ(x)`
-//! multiplies (semid); the scale of the remark is `κ = 1/C_H`.
+//! has `C_H G*(Qα, Qβ)` in both cases, [`MetricDissipation`](crate::dynamics::MetricDissipation) with or
+//! without further invariants, so that listing one does not change the clock. Any other scale is a number
+//! `κ(x)` in front, [`MetricDissipation::scaled`](crate::dynamics::MetricDissipation::scaled); that of the
+//! remark is `κ = 1/C_H`.
 //! (`tests/errata.rs::the_remark_has_another_scale_than_the_equation_before_it`)
 //!
 //! # §2.4 Symmetry preservation
@@ -85,7 +86,8 @@
 //! point. The condition is not automatic: an oscillator in the plane with a bath, `H = ½|q|² + ½|p|² + s`
 //! and `S = s`, is invariant under rotations together with its metric, yet (semid) gives
 //! `(J, S) = −G*(dH, dJ) = −2J`, and the angular momentum `J` dies as `exp(−2t)`: 0.135 of it is left at
-//! `t = 1`. With `J` among the `L_a` of the remark it is kept to round-off.
+//! `t = 1`. With `J` among the `L_a` of the remark,
+//! [`momentum`](crate::dynamics::SystemBuilder::momentum), it is kept to round-off.
 //! (`tests/errata.rs::a_momentum_is_kept_if_its_differential_is_killed`)
 //!
 //! **The bundle.** *Printed:* "the case when `P = TG`". *Correct:* `P = T*G`, which the next line of the paper
@@ -182,7 +184,10 @@
 //! smaller than `h²`: two gas containers with a wall that hardly conducts (Shang and Öttinger 2020) lose
 //! entropy on 150 of 300 steps of `h = 0.1`, up to 1.4e-3 at once, and on 500 of 1200 of `h = 0.025`.
 //! Without conduction the largest loss in a step falls with the fitted order 3. The remedy is a discrete
-//! gradient of `S`, too, with the bracket projected so that it kills it.
+//! gradient `w_S` of `S` in the place of `dS(z)`, and the bracket `PΠPᵀ` with `Pᵀ` the projection off `w_S`:
+//! then `ΔS = h ⟨w_S, v⟩ = h K(w_S, w_S) ≥ 0`, and the order is 2 because `Π dS = 0` makes `P` a change of
+//! `O(h²)`. This is [`SecondLaw::Exact`](crate::dynamics::SecondLaw::Exact), the default (for a flat space, with
+//! other tensors, Romero 2009). With it the entropy of the containers falls on no step.
 //! (`tests/errata.rs::the_published_scheme_lowers_the_entropy_and_by_third_order_only`)
 //!
 //! **The factor in (semid-d).** *Printed:*
@@ -251,7 +256,7 @@
 //! implies `⟨w, v⟩ = 0`, hence `H(x') = H(x)` by either formula, and then both have the same correction
 //! `−dH(z)v/G(v,v)`. A solution of one is a solution of the other. This rescue is for `H` alone; the
 //! covector of an entropy, which does change, would be wrong at order 0. The library writes the displacement
-//! `d = hv` throughout, [`gonzalez`](crate::integrators::gonzalez), and no `h` appears.
+//! `d = hv` throughout, [`Gonzalez`](crate::integrators::Gonzalez), and no `h` appears.
 //! (`tests/errata.rs::a_discrete_gradient_on_a_manifold_counts_the_step`)
 //!
 //! **The last formula.** *Printed:* `R_h⁻¹(x_k, x_{k+1}) = Π(z_τ) ∇̄₂H + K_d(z) ∇C(z)`. *Correct:*

@@ -90,6 +90,9 @@ proptest! {
         let v = body.velocity(&x).unwrap();
         let k = body.dissipation().tensor(&Canonical, &x, &velocity(&p)).unwrap();
         same(&v, &(p.cross(&velocity(&p)) + k * p))?;
+        // The same with E = H + S for both, since Π dS = 0 and K dH = 0.
+        let de = velocity(&p) + p;
+        same(&v, &(p.cross(&de) + k * de))?;
         equal(velocity(&p).dot(&v), 0.0)?;
         let rate = p.dot(&(k * p));
         equal(p.dot(&v), rate)?;

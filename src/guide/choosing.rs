@@ -20,7 +20,7 @@
 //!
 //! | the bracket | use it | its Casimirs |
 //! |---|---|---|
-//! | [`LiePoisson`](crate::dynamics::LiePoisson), **of every `LieDual`** | for momenta in the body frame, heavy tops, fluids truncated to a Lie algebra | functions that the coadjoint action leaves alone: `½∣p∣²` on so(3)*, `∣Γ∣²` and `M·Γ` on se(3)* |
+//! | [`LiePoisson`](crate::dynamics::LiePoisson), **of every `LieDual`** | for momenta in the body frame, heavy tops, fluids truncated to a Lie algebra | functions that the coadjoint action leaves alone: `½\|p\|²` on so(3)*, `\|Γ\|²` and `M·Γ` on se(3)* |
 //! | [`Symplectic`](crate::dynamics::Symplectic) | for positions and momenta, R²ⁿ or `T*SO(3)` | constants only |
 //! | [`Poisson::constant`](crate::dynamics::Poisson::constant) | the same with further variables, such as `s` in `(q, p, s)` | functions of the variables with zero rows |
 //! | [`Poisson::field`](crate::dynamics::Poisson::field) | for a matrix that varies; Jacobi's identity is checked, not assumed | yours to know |
@@ -47,7 +47,7 @@
 //!
 //! | you know | dissipation | because |
 //! |---|---|---|
-//! | nothing but a metric | **[`MetricDissipation`](crate::dynamics::MetricDissipation)** | steepest ascent of `S` off `dH`, times `∣dH∣²` |
+//! | nothing but a metric | **[`MetricDissipation`](crate::dynamics::MetricDissipation)** | steepest ascent of `S` off `dH`, times `\|dH\|²` |
 //! | the same, and a rate | [`MetricDissipation::scaled`](crate::dynamics::MetricDissipation::scaled), or [`Scaled`](crate::dynamics::Scaled) around any other | `κ(x) ≥ 0`; a constant is a time scale |
 //! | which variables have friction | [`CometricDissipation`](crate::dynamics::CometricDissipation) | a semidefinite cometric; rows of zeros are left alone |
 //! | two such forms | [`KulkarniNomizu`](crate::dynamics::KulkarniNomizu) | metriplectic 4-brackets (Morrison and Updike 2024) |
@@ -86,7 +86,7 @@
 //!
 //! | `.second_law(..)` | `ΔS` in a step | use it |
 //! |---|---|---|
-//! | **[`Exact`](crate::dynamics::SecondLaw::Exact)** | `h K(w_S, w_S) ≥ 0` to round-off | if `S` is a Casimir. Its order is 2 as long as `∣w_S∣` is large against `h²`; [`Certificate::min_entropy_slope`](crate::integrators::Certificate) has the least one |
+//! | **[`Exact`](crate::dynamics::SecondLaw::Exact)** | `h K(w_S, w_S) ≥ 0` to round-off | if `S` is a Casimir. Its order is 2 as long as `\|w_S\|` is large against `h²`; [`Certificate::min_entropy_slope`](crate::integrators::Certificate) has the least one |
 //! | [`Published`](crate::dynamics::SecondLaw::Published) | `≥ −C h³` | to reproduce the paper, and if `S` is none |
 //!
 //! Where `S` is quadratic, space flat and `Π` linear, as in the paper's example, the two are the same map.
@@ -95,7 +95,7 @@
 //!
 //! | the function | say | because |
 //! |---|---|---|
-//! | a Casimir beside `S` (`∣Γ∣²` of a heavy top) | `.casimir(f)` | the bracket is projected until it kills a discrete gradient of `f` |
+//! | a Casimir beside `S` (`\|Γ\|²` of a heavy top) | `.casimir(f)` | the bracket is projected until it kills a discrete gradient of `f` |
 //! | a momentum (an angular momentum) | `.momentum(f)` | `Π df ≠ 0`, so projecting the bracket would change the flow; its drift alone is taken out |
 //! | a momentum, and the symmetry is to be checked | `.symmetry(action, f)` | verification also tries the action: Poisson, `H∘Φ = H`, and `X_J` its generator |
 //!

@@ -25,7 +25,7 @@
 //! | `Π = ½ Π^{ij} ∂_i ∧ ∂_j` † | the matrix `Π^{ij}` itself, [`Poisson::field`](crate::dynamics::Poisson::field) | `tests/errata.rs::a_double_sum_over_wedges_counts_every_bracket_twice` |
 //! | `♯_Π(α) = Π(·, α)` | [`Bracket::apply`](crate::dynamics::Bracket::apply) | `tests/laws.rs::each_law_of_a_bracket_can_break` |
 //! | (hamil-eq) `x' = X_H(x) = ♯_Π(dH)` | a [`System`](crate::dynamics::System) without an entropy | `tests/order.rs::the_free_body_is_integrated_to_second_order`, `tests/reference.rs::the_free_body_extrapolated_to_no_step_follows_its_elliptic_functions` |
-//! | `{f, H} = 0`, first integrals; `{H, H} = 0` | further integrals are not looked for | `tests/equations.rs::a_hamiltonian_vector_field_is_the_bracket_with_the_energy` |
+//! | `{f, H} = 0`, first integrals; `{H, H} = 0` | listed by [`momentum`](crate::dynamics::SystemBuilder::momentum), and then checked and kept | `tests/equations.rs::a_hamiltonian_vector_field_is_the_bracket_with_the_energy`, `tests/errata.rs::a_momentum_is_kept_if_its_differential_is_killed` |
 //! | Casimirs, `{C, g} = 0` for all `g` | `Π dS = 0`, in every [`verify`](crate::dynamics::Metriplectic::verify) | `tests/laws.rs::the_casimirs_of_se3_are_entropies_and_the_angular_momentum_is_not` |
 //! | the rank of `Π` is even | not computed | — |
 //!
@@ -44,9 +44,10 @@
 //!
 //! | equation | in the library | checked by |
 //! |---|---|---|
+//! | `{f, g} = ⟨df, ♯_Π(dg)⟩`, `(f, g) = ⟨df, ♯_K(dg)⟩` | [`Bracket::apply`](crate::dynamics::Bracket::apply), [`Dissipation::apply`](crate::dynamics::Dissipation::apply) | `tests/equations.rs::a_hamiltonian_vector_field_is_the_bracket_with_the_energy`, `tests/equations.rs::the_form_of_the_metric_is_the_printed_one_on_each_line` |
 //! | `♯_K(dH) = 0` | [`verify`](crate::dynamics::Metriplectic::verify), and by construction for every [`Dissipation`](crate::dynamics::Dissipation) | `tests/laws.rs::each_law_of_a_dissipation_can_break` |
 //! | `♯_Π(dS) = 0` | [`verify`](crate::dynamics::Metriplectic::verify) | `tests/bad_input.rs::an_entropy_that_is_no_casimir_is_refused_unless_the_published_scheme_is_asked_for` |
-//! | `x' = ♯_Π(dE) + ♯_K(dE)`, `E = H + S` | `H` and `S` are kept apart | — |
+//! | `x' = ♯_Π(dE) + ♯_K(dE)`, `E = H + S` | `H` and `S` are kept apart; it is the same velocity | `tests/equations.rs::the_equations_of_motion_have_both_laws` |
 //! | `x' = X_H + grad^K S` | [`System`](crate::dynamics::System), [`Metriplectic::velocity`](crate::dynamics::Metriplectic::velocity) | `tests/equations.rs::the_equations_of_motion_have_both_laws` |
 //! | first law, `H' = {H, H} + (H, S) = 0` | [`Certificate::keeps_energy`](crate::integrators::Certificate::keeps_energy) | `tests/equations.rs::the_equations_of_motion_have_both_laws`, `tests/problems.rs::the_energy_is_kept_where_a_step_spans_two_radians` |
 //! | second law, `S' = (S, S) ≥ 0` | [`Certificate::keeps_entropy`](crate::integrators::Certificate::keeps_entropy) | `tests/equations.rs::the_equations_of_motion_have_both_laws` |
@@ -127,6 +128,7 @@
 //! | `exp_x(v) = γ_v(1)`, geodesics of `G` | [`Riemannian::exp`](crate::manifolds::Riemannian::exp), [`Riemannian::log`](crate::manifolds::Riemannian::log) | `tests/metrics.rs::geodesics_of_a_left_invariant_metric_are_euler_s_rigid_body`, `crates/manifolds/src/field_metric.rs::geodesics_of_the_half_plane_are_its_semicircles` |
 //! | (weyl) `(exp_z(−hv/2), exp_z(hv/2))` | [`WeylMidpoint`](crate::manifolds::WeylMidpoint) | `tests/equations.rs::both_retractions_are_the_printed_pairs`, `tests/reference.rs::the_spinning_top_has_the_published_errors` |
 //! | second order † | [`WeylMidpoint`](crate::manifolds::WeylMidpoint) 2, [`Exponential`](crate::manifolds::Exponential) 1 | `tests/errata.rs::the_exponential_at_the_start_is_of_first_order`, `tests/problems.rs::canonical_metrics_are_integrated_to_the_order_of_the_retraction` |
+//! | the diagram `π_P ∘ ∇̄H = τ_P ∘ R_h⁻¹` | covectors of a step are at the base `z` of its [`Arc`](crate::manifolds::Arc) | `crates/manifolds/src/laws.rs::metrics_that_vary_keep_the_laws` |
 //! | (discGrad-m) `h⟨w, v⟩ = ΔH` †, `w → dH` | [`laws::discrete_gradient`](crate::integrators::laws::discrete_gradient) | `crates/integrators/src/laws.rs::the_discrete_gradient_keeps_its_laws`, `tests/errata.rs::a_discrete_gradient_on_a_manifold_counts_the_step` |
 //! | (gonzalez-m) `w = dH(z) + (ΔH/h − dH(z)v) ♭v/G(v,v)` † | [`Gonzalez`](crate::integrators::Gonzalez) | `tests/errata.rs::a_discrete_gradient_on_a_manifold_counts_the_step`, `tests/covariance.rs::a_step_on_the_sphere_is_the_same_in_colatitude_and_longitude` |
 //! | `♭(u)(v) = G(u, v)` | [`InnerProduct::flat`](crate::manifolds::InnerProduct::flat) | `crates/manifolds/src/laws.rs::flat_spaces_keep_the_laws` |

@@ -232,6 +232,17 @@ fn before_reduction_the_entropy_is_no_casimir_and_a_function_of_the_momentum() {
         .build();
     let refused = upstairs.expect("a system").verify(&(r, P), 0.1);
     assert!(matches!(refused, Err(ModelError::EntropyNotCasimir { .. })), "{refused:?}");
+    // With a bath there are both laws in space: S = s.
+    type State = ((Matrix3<Real>, Vector3<Real>), Vector1<Real>);
+    let with_a_bath = System::on(Product(Product(Rotations, Euclidean::<3>), Euclidean::<1>))
+        .bracket((Symplectic, Zero))
+        .energy(|((_, p), s): &State| kinetic(INERTIA)(p) + s.x.exp())
+        .entropy(|(_, s): &State| s.x)
+        .build()
+        .expect("a system");
+    let start = ((r, P), Vector1::new(0.1));
+    with_a_bath.verify(&start, 0.1).expect("a sound model");
+    assert!(with_a_bath.velocity::<f64>(&ChartPoint::centre(&start)).unwrap()[6] > 0.1);
 }
 
 // §3

@@ -39,6 +39,7 @@ impl<const N: usize> Dimension for Const<N> {
     type Matrix<D: Scalar> = SMatrix<D, N, N>;
     type Array<T: Copy + Debug + Send + Sync> = [T; N];
 
+    #[inline]
     fn array<T: Copy + Debug + Send + Sync>(f: impl FnMut(usize) -> T) -> [T; N] {
         std::array::from_fn(f)
     }
@@ -84,26 +85,31 @@ pub trait Column<D: Scalar>:
     fn dot(&self, other: &Self) -> D;
 
     /// The column of zeros.
+    #[inline]
     fn zero() -> Self {
         Self::from_index(|_| D::zero())
     }
 
     /// The `k`-th basis vector.
+    #[inline]
     fn basis(k: usize) -> Self {
         Self::from_index(|i| if i == k { D::one() } else { D::zero() })
     }
 
     /// The real components, embedded in this scalar.
+    #[inline]
     fn embed<R: Column<f64>>(real: &R) -> Self {
         Self::from_index(|i| D::from(real[i]))
     }
 
     /// The real parts of the components.
+    #[inline]
     fn real<R: Column<f64>>(&self) -> R {
         R::from_index(|i| self[i].re())
     }
 
     /// The Euclidean norm of the real parts.
+    #[inline]
     fn magnitude(&self) -> f64 {
         let mut sum = 0.0;
         for i in 0..Self::LEN {
@@ -113,6 +119,7 @@ pub trait Column<D: Scalar>:
     }
 
     /// Whether every real part is finite.
+    #[inline]
     fn is_finite(&self) -> bool {
         (0..Self::LEN).all(|i| self[i].re().is_finite())
     }
@@ -192,22 +199,39 @@ pub trait Square<D: Scalar>:
         self.factor()?.solve(b)
     }
 
+    /// The inverse; `None` if the matrix is singular or not a number.
+    fn inverse(&self) -> Option<Self> {
+        let factors = self.factor()?;
+        let mut inverse = Self::zeros();
+        for j in 0..Self::Column::LEN {
+            let column = factors.solve(&Self::Column::basis(j))?;
+            for i in 0..Self::Column::LEN {
+                inverse[(i, j)] = column[i];
+            }
+        }
+        Some(inverse)
+    }
+
     /// The matrix of zeros.
+    #[inline]
     fn zeros() -> Self {
         Self::from_entries(|_, _| D::zero())
     }
 
     /// The identity matrix.
+    #[inline]
     fn one() -> Self {
         Self::from_entries(|i, j| if i == j { D::one() } else { D::zero() })
     }
 
     /// `a bᵀ`.
+    #[inline]
     fn outer(a: &Self::Column, b: &Self::Column) -> Self {
         Self::from_entries(|i, j| a[i] * b[j])
     }
 
     /// `Aᵀ b`, the row `bᵀ A` as a column.
+    #[inline]
     fn transpose_times(&self, b: &Self::Column) -> Self::Column {
         Self::Column::from_index(|j| {
             let mut sum = self[(0, j)] * b[0];
@@ -219,6 +243,7 @@ pub trait Square<D: Scalar>:
     }
 
     /// The Frobenius norm of the real parts.
+    #[inline]
     fn magnitude(&self) -> f64 {
         let mut sum = 0.0;
         for j in 0..Self::Column::LEN {
@@ -234,6 +259,7 @@ pub trait Square<D: Scalar>:
     /// # Errors
     ///
     /// [`NotPositive`] with the first pivot that is not a positive finite number.
+    #[inline]
     fn cholesky(&self) -> Result<Self, NotPositive> {
         let mut l = Self::zeros();
         for j in 0..Self::Column::LEN {
@@ -257,6 +283,7 @@ pub trait Square<D: Scalar>:
     }
 
     /// The solution of `L x = b` for a lower triangular `L` with nonzero diagonal.
+    #[inline]
     fn solve_lower(&self, b: &Self::Column) -> Self::Column {
         let mut x = *b;
         for i in 0..Self::Column::LEN {
@@ -270,6 +297,7 @@ pub trait Square<D: Scalar>:
     }
 
     /// The solution of `Lᵀ x = b` for a lower triangular `L` with nonzero diagonal.
+    #[inline]
     fn solve_lower_transpose(&self, b: &Self::Column) -> Self::Column {
         let mut x = *b;
         for i in (0..Self::Column::LEN).rev() {
@@ -287,12 +315,14 @@ pub trait Square<D: Scalar>:
     /// # Errors
     ///
     /// [`NotPositive`] if the matrix is not positive definite.
+    #[inline]
     fn root_determinant(&self) -> Result<D, NotPositive> {
         let l = self.cholesky()?;
         Ok((0..Self::Column::LEN).fold(D::one(), |product, i| product * l[(i, i)]))
     }
 
     /// The largest `|A_ij|` over the real parts; NaN if any entry is.
+    #[inline]
     fn max_abs(&self) -> f64 {
         let mut worst = 0.0_f64;
         for j in 0..Self::Column::LEN {

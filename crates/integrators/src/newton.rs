@@ -1,6 +1,6 @@
 //! Newton's method with a residual floor that follows the scale of the state.
 
-use metriplectic_fields::{Column, Factors, Space, Square, Vector};
+use metriplectic_fields::{Column, Dimension, Space, Square, Vector};
 
 use crate::root_finder::{Equation, Linearised, NoRoot, Root, RootFinder};
 
@@ -42,20 +42,47 @@ impl Default for Newton {
 
 impl<M: Space> RootFinder<M> for Newton {
     fn solve(&self, equation: &impl Equation<M>, guess: &Vector<M>) -> Result<Root<M>, NoRoot<M>> {
-        let mut best = NoRoot { best: *guess, residual: f64::INFINITY, sweeps: 0 };
-        while let Some(here) = equation.linearise(&best.best) {
-            best.residual = here.residual.magnitude();
-            match self.correct(equation, &here, &mut best) {
-                Progress::Solved => {
-                    let NoRoot { best: u, residual, sweeps } = best;
-                    return Ok(Root { u, residual, floor: here.floor, sweeps });
-                }
-                Progress::Slow if best.sweeps < self.sweeps => {}
-                Progress::Slow | Progress::Stuck => break,
-            }
-        }
-        Err(best)
+        self.solve_near(equation, guess, &mut None)
     }
+}
+
+/// The inverse of a Jacobian, kept up to date by Broyden's rank-one corrections.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Inverse<N: Dimension> {
+    matrix: N::Matrix<f64>,
+    /// The share of a residual that its corrections have left of late.
+    contraction: f64,
+}
+
+impl<N: Dimension> Inverse<N> {
+    fn of(jacobian: &N::Matrix<f64>) -> Option<Self> {
+        Some(Self { matrix: jacobian.inverse()?, contraction: 0.0 })
+    }
+
+    /// The correction of a residual.
+    #[inline]
+    fn times(&self, residual: &N::Vector<f64>) -> N::Vector<f64> {
+        self.matrix * *residual
+    }
+
+    /// Broyden's update: the least change of the inverse after which the step `s` has the change `y`
+    /// of the residual, `s = J⁻¹y`, with `predicted = J⁻¹y` before it (Broyden 1965, in the form of
+    /// Sherman and Morrison).
+    #[inline]
+    fn learn(&mut self, s: &N::Vector<f64>, predicted: &N::Vector<f64>) {
+        let along = s.dot(predicted);
+        // Beyond a factor of four the step says little about the slope.
+        if along > 0.25 * s.dot(s) {
+            let row = self.matrix.transpose_times(s);
+            self.matrix += N::Matrix::<f64>::outer(&((*s - *predicted) * along.recip()), &row);
+        }
+    }
+}
+
+/// Where a Jacobian is first used.
+struct Start<M: Space> {
+    residual: Vector<M>,
+    floor: f64,
 }
 
 /// How far one Jacobian has brought the iteration.
@@ -69,24 +96,78 @@ enum Progress {
 }
 
 impl Newton {
+    /// A root near the guess, first with the inverse of the Jacobian of an equation near by; the
+    /// inverse that solved the equation is left in its place.
+    #[inline]
+    pub(crate) fn solve_near<M: Space>(
+        &self,
+        equation: &impl Equation<M>,
+        guess: &Vector<M>,
+        known: &mut Option<Inverse<M::Dim>>,
+    ) -> Result<Root<M>, NoRoot<M>> {
+        let mut best = NoRoot { best: *guess, residual: f64::INFINITY, sweeps: 0 };
+        if let Some(inverse) = known
+            && let Some((residual, floor)) = equation.value_and_floor(guess)
+        {
+            best.residual = residual.magnitude();
+            let here = Start { residual, floor };
+            if let Progress::Solved = self.correct(equation, here, Some(inverse), &mut best) {
+                return Ok(best.solved(floor));
+            }
+        }
+        *known = None;
+        self.solve_afresh(equation, best, known)
+    }
+
+    /// A root near the best point so far, with Jacobians of the equation itself.
+    #[cold]
+    fn solve_afresh<M: Space>(
+        &self,
+        equation: &impl Equation<M>,
+        mut best: NoRoot<M>,
+        known: &mut Option<Inverse<M::Dim>>,
+    ) -> Result<Root<M>, NoRoot<M>> {
+        while let Some(Linearised { residual, jacobian, floor }) = equation.linearise(&best.best) {
+            best.residual = residual.magnitude();
+            let mut inverse = Inverse::of(&jacobian);
+            let here = Start { residual, floor };
+            match self.correct(equation, here, inverse.as_mut(), &mut best) {
+                Progress::Solved => {
+                    *known = inverse;
+                    return Ok(best.solved(floor));
+                }
+                Progress::Slow if best.sweeps < self.sweeps => {}
+                Progress::Slow | Progress::Stuck => break,
+            }
+        }
+        Err(best)
+    }
+
     /// Corrects the best point with one Jacobian as long as the residual falls fast.
+    #[inline]
     fn correct<M: Space>(
         &self,
         equation: &impl Equation<M>,
-        here: &Linearised<M>,
+        here: Start<M>,
+        mut inverse: Option<&mut Inverse<M::Dim>>,
         best: &mut NoRoot<M>,
     ) -> Progress {
+        let floor = self.tolerance * here.floor;
+        let stalled = self.stall * here.floor;
+        let correct = |inverse: &Inverse<M::Dim>, residual: &Vector<M>| {
+            Some(inverse.times(residual)).filter(|correction| correction.is_finite())
+        };
         let mut residual = here.residual;
-        let (mut factors, mut contraction) = (None, f64::INFINITY);
+        let mut correction = inverse.as_deref().and_then(|inverse| correct(inverse, &residual));
+        // Before a Jacobian has been seen to contract, nothing is left to it.
+        let mut contraction = f64::INFINITY;
         loop {
-            let solved = best.residual <= self.tolerance * here.floor;
-            if solved && best.residual <= 0.1 * self.tolerance * here.floor {
+            if best.residual <= 0.1 * floor {
                 return Progress::Solved;
             }
-            factors = factors.or_else(|| here.jacobian.factor());
-            let correction = factors.as_ref().and_then(|factors| factors.solve(&residual));
             best.sweeps += 1;
-            if solved {
+            let last = best.residual <= floor || contraction * best.residual <= 0.1 * floor;
+            if last {
                 // What a slow contraction leaves below the floor has the same sign in each step; it
                 // costs one more solution to take it out.
                 if let Some(last) = correction {
@@ -94,30 +175,35 @@ impl Newton {
                 }
                 return Progress::Solved;
             }
-            if let Some(last) = &correction
-                && contraction * best.residual <= 0.1 * self.tolerance * here.floor
-            {
-                best.best -= *last;
-                best.residual *= contraction;
-                return Progress::Solved;
-            }
             let next = correction.and_then(|c| self.descend(equation, best, &c));
-            let Some((u, value)) = next else {
-                let at_floor = best.residual <= self.stall * here.floor;
-                return if at_floor { Progress::Solved } else { Progress::Stuck };
+            let (Some(next), Some(inverse), Some(step)) = (next, inverse.as_mut(), correction)
+            else {
+                return if best.residual <= stalled { Progress::Solved } else { Progress::Stuck };
             };
             let before = best.residual;
-            residual = value;
-            (best.best, best.residual) = (u, value.magnitude());
+            residual = next.value;
+            (best.best, best.residual) = (next.u, residual.magnitude());
             contraction = best.residual / before;
-            if best.residual > self.reuse * before && best.residual > self.tolerance * here.floor {
-                let at_floor = best.residual <= self.stall * here.floor;
+            if best.residual > self.reuse * before && best.residual > floor {
+                let at_floor = best.residual <= stalled;
                 return if at_floor && best.residual > 0.5 * before {
                     Progress::Solved
                 } else {
                     Progress::Slow
                 };
             }
+            correction = correct(inverse, &residual);
+            // The change of a residual near its floor is noise.
+            if let Some(ahead) = &mut correction
+                && before > 1e3 * floor
+            {
+                let taken = step * -next.length;
+                let predicted = *ahead - step;
+                inverse.learn(&taken, &predicted);
+                *ahead = inverse.times(&residual);
+            }
+            inverse.contraction = contraction.max(0.5 * inverse.contraction);
+            contraction = inverse.contraction;
         }
     }
 
@@ -128,19 +214,26 @@ impl Newton {
         equation: &impl Equation<M>,
         best: &NoRoot<M>,
         correction: &Vector<M>,
-    ) -> Option<(Vector<M>, Vector<M>)> {
+    ) -> Option<Descent<M>> {
         let mut length = 1.0;
         for _ in 0..=self.halvings {
-            let next = best.best - *correction * length;
-            if let Some(value) = equation.value(&next)
+            let u = best.best - *correction * length;
+            if let Some(value) = equation.value(&u)
                 && value.magnitude() < best.residual * (1.0 - 1e-4 * length)
             {
-                return Some((next, value));
+                return Some(Descent { u, value, length });
             }
             length *= 0.5;
         }
         None
     }
+}
+
+/// A point with a smaller residual, and the share of the correction that led to it.
+struct Descent<M: Space> {
+    u: Vector<M>,
+    value: Vector<M>,
+    length: f64,
 }
 
 #[cfg(test)]

@@ -38,7 +38,28 @@ pub struct Residual<'a, Y: Metriplectic, R, W> {
     h: f64,
     energy: f64,
     recall: Recall<Y>,
+    entropy: f64,
     entropy_slope: Cell<f64>,
+    sizes: Cell<Option<Sizes>>,
+}
+
+/// The sizes of the terms of an equation, by which its round-off is judged.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Sizes {
+    /// Of the terms that the velocity is summed of.
+    terms: f64,
+    /// Of the derivative of the velocity along `w_H`.
+    gain: f64,
+}
+
+impl Sizes {
+    /// The round-off of the equation of a step of size `h` and length `length`: the terms of `Πw` and
+    /// `K dS` are rounded, and so are `w`, by `noise`, and `d`.
+    #[inline]
+    fn floor(&self, h: f64, length: f64, noise: f64) -> f64 {
+        let h = h.abs();
+        f64::EPSILON * (4.0 * h * self.terms + length) + h * self.gain * noise
+    }
 }
 
 /// What earlier steps have left over of the energy and of the further invariants, and this step
@@ -88,15 +109,31 @@ where
     }
 
     /// The same for a point with a known energy, and errors of earlier steps to take back.
-    pub(crate) const fn recalling(
+    #[inline]
+    pub(crate) fn recalling(
         system: &'a Y,
         (retraction, gradient): (&'a R, &'a W),
         (x, energy): (&'a Point<Y>, f64),
         h: f64,
         recall: Recall<Y>,
     ) -> Self {
+        let exact = system.second_law() == SecondLaw::Exact;
+        let entropy = if exact { system.entropy_at(x) } else { 0.0 };
         let entropy_slope = Cell::new(f64::INFINITY);
-        Self { system, retraction, gradient, x, h, energy, recall, entropy_slope }
+        let sizes = Cell::new(None);
+        Self { system, retraction, gradient, x, h, energy, recall, entropy, entropy_slope, sizes }
+    }
+
+    /// The same with the sizes of an equation near by, so that the Jacobian need not be formed.
+    #[inline]
+    pub(crate) fn with_sizes(self, sizes: Option<Sizes>) -> Self {
+        self.sizes.set(sizes);
+        self
+    }
+
+    /// The sizes that round-off is judged by, if they are known.
+    pub(crate) const fn sizes(&self) -> Option<Sizes> {
+        self.sizes.get()
     }
 
     /// The residual by its definition, at any scalar.
@@ -182,6 +219,28 @@ where
         (lost.magnitude() <= at.floor && better).then_some((u, end))
     }
 
+    /// The residual, safe against round-off, and that of `w_H`.
+    #[inline]
+    fn evaluate(&self, u: &Vector<Y::Manifold>) -> Option<(Vector<Y::Manifold>, f64)> {
+        let (system, metric) = (self.system, self.system.metric());
+        let arc = self.retraction.real_arc(metric, self.x, u).ok()?;
+        let g = metric.at(&arc.z).ok()?;
+        let along = Along::new(self, u, &g);
+        let (energy, noise) =
+            along.value(system.energy(), (self.energy, self.recall.energy), &arc);
+        let entropy = if self.is_exact() {
+            let (w, _) = along.value(system.entropy(), (self.entropy, 0.0), &arc);
+            self.entropy_slope.set(w.magnitude());
+            w
+        } else {
+            system.entropy().jet1(&arc.z.base).df
+        };
+        let mut values = Values { along: &along, arc: &arc, seen: 0 };
+        let w = Covectors::new([energy, entropy], system.invariants(), &mut values);
+        let residual = arc.d - self.velocity(&arc.z, &w).ok()? * self.h;
+        residual.is_finite().then_some((residual, noise))
+    }
+
     /// The residual with its Jacobian, and `w_H`, from the jets `(f, df, Hf)` of the fields: no nested
     /// dual number is formed.
     #[inline]
@@ -194,7 +253,7 @@ where
         let start = (self.energy, self.recall.energy);
         let (energy, chord) = along.jet(system.energy(), start, &arc, slopes);
         let entropy = if self.is_exact() {
-            along.jet(system.entropy(), (system.entropy_at(self.x), 0.0), &arc, slopes).0
+            along.jet(system.entropy(), (self.entropy, 0.0), &arc, slopes).0
         } else {
             let jet = system.entropy().jet2(&arc.z);
             Moving { value: jet.df, slope: jet.hf * arc.dz }
@@ -206,10 +265,9 @@ where
 
         let residual = arc.d - velocity.value * h;
         let jacobian = arc.dd - velocity.slope * h;
-        // The terms of Πw and K dS are rounded, and so are w and d.
-        let length = arc.d.magnitude();
-        let floor =
-            f64::EPSILON * (4.0 * h.abs() * terms + length) + h.abs() * gain * chord.noise(length);
+        let (length, sizes) = (arc.d.magnitude(), Sizes { terms, gain });
+        let floor = sizes.floor(h, length, chord.noise(length));
+        self.sizes.set(Some(sizes));
         let usable = residual.is_finite() && jacobian.magnitude().is_finite();
         usable.then_some(Jet { at: Linearised { residual, jacobian, floor }, w: energy.value })
     }
@@ -224,22 +282,14 @@ where
     /// The residual, safe against round-off.
     #[inline]
     fn value(&self, u: &Vector<Y::Manifold>) -> Option<Vector<Y::Manifold>> {
-        let (system, metric) = (self.system, self.system.metric());
-        let arc = self.retraction.real_arc(metric, self.x, u).ok()?;
-        let g = metric.at(&arc.z).ok()?;
-        let along = Along::new(self, u, &g);
-        let energy = along.value(system.energy(), (self.energy, self.recall.energy), &arc);
-        let entropy = if self.is_exact() {
-            let w = along.value(system.entropy(), (system.entropy_at(self.x), 0.0), &arc);
-            self.entropy_slope.set(w.magnitude());
-            w
-        } else {
-            system.entropy().jet1(&arc.z.base).df
-        };
-        let mut values = Values { along: &along, arc: &arc, seen: 0 };
-        let w = Covectors::new([energy, entropy], system.invariants(), &mut values);
-        let residual = arc.d - self.velocity(&arc.z, &w).ok()? * self.h;
-        residual.is_finite().then_some(residual)
+        self.evaluate(u).map(|(residual, _)| residual)
+    }
+
+    #[inline]
+    fn value_and_floor(&self, u: &Vector<Y::Manifold>) -> Option<(Vector<Y::Manifold>, f64)> {
+        let sizes = self.sizes.get()?;
+        let (residual, noise) = self.evaluate(u)?;
+        Some((residual, sizes.floor(self.h, u.magnitude(), noise)))
     }
 
     #[inline]
@@ -313,18 +363,18 @@ where
         Chord::new(f, mean, d, start, (end, value), base, nodes)
     }
 
-    /// The discrete gradient of `f`, with `⟨w, d⟩ = f(x') − start + recall`.
+    /// The discrete gradient of `f`, with `⟨w, d⟩ = f(x') − start + recall`, and its round-off.
     #[inline]
     fn value(
         &self,
         f: &impl ScalarField<Y::Manifold>,
         (start, recall): (f64, f64),
         arc: &Arc<Y::Manifold>,
-    ) -> Vector<Y::Manifold> {
+    ) -> (Vector<Y::Manifold>, f64) {
         let mean = self.step.gradient.real_mean(f, self.step.x, arc);
         let end = (&arc.end, f.at(&arc.end));
         let chord = self.chord(f, start, &mean, (&arc.z.base, &arc.d), end);
-        chord.covector(recall, self.g, &arc.d)
+        (chord.covector(recall, self.g, &arc.d), chord.noise(arc.d.magnitude()))
     }
 
     /// The same with its derivatives.
@@ -368,7 +418,7 @@ where
         let Residual { x, recall, .. } = self.along.step;
         let recall = recall.invariants[self.seen];
         self.seen += 1;
-        self.along.value(f, (f.at(x), recall), self.arc)
+        self.along.value(f, (f.at(x), recall), self.arc).0
     }
 }
 

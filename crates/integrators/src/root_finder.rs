@@ -8,6 +8,13 @@ pub trait Equation<M: Space> {
     /// of a geodesic.
     fn value(&self, u: &Vector<M>) -> Option<Vector<M>>;
 
+    /// `F(u)` with the norm below which it is round-off, if that is known without the Jacobian; only
+    /// then an equation is tried with the Jacobian of another one near by.
+    #[inline]
+    fn value_and_floor(&self, _u: &Vector<M>) -> Option<(Vector<M>, f64)> {
+        None
+    }
+
     /// `F(u)` with its Jacobian, or `None` where it is not defined.
     fn linearise(&self, u: &Vector<M>) -> Option<Linearised<M>>;
 }
@@ -45,6 +52,14 @@ pub struct NoRoot<M: Space> {
     pub residual: f64,
     /// Linear systems solved.
     pub sweeps: usize,
+}
+
+impl<M: Space> NoRoot<M> {
+    /// The best point as the root, with its floor.
+    pub(crate) fn solved(self, floor: f64) -> Root<M> {
+        let Self { best: u, residual, sweeps } = self;
+        Root { u, residual, floor, sweeps }
+    }
 }
 
 /// A method that solves `F(u) = 0` from a guess.

@@ -6,9 +6,9 @@ use metriplectic_manifolds::{Manifold, Retraction, Riemannian};
 
 use crate::discrete_gradient::{DiscreteGradient, Gonzalez};
 use crate::error::StepError;
-use crate::newton::Newton;
-use crate::residual::{Dim, Numbers, Recall, Residual};
-use crate::root_finder::{NoRoot, Root, RootFinder};
+use crate::newton::{Inverse, Newton};
+use crate::residual::{Dim, Numbers, Recall, Residual, Sizes};
+use crate::root_finder::{NoRoot, Root};
 
 /// A scheme: a retraction, and how hard to try to solve its equation.
 ///
@@ -62,7 +62,7 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
         &self,
         system: &Y,
         start: &Start<'_, Y>,
-        memory: &mut Memory<Vector<Y::Manifold>>,
+        memory: &mut Memory<Dim<Y>>,
     ) -> Result<(Point<Y>, Work), StepError>
     where
         Y: Metriplectic,
@@ -133,7 +133,7 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
         &self,
         system: &Y,
         start: &Start<'_, Y>,
-        memory: &mut Memory<Vector<Y::Manifold>>,
+        memory: &mut Memory<Dim<Y>>,
         work: &mut Work,
     ) -> Result<Point<Y>, NoRoot<Y::Manifold>>
     where
@@ -144,8 +144,17 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
         let guess = guess.unwrap_or_else(Vector::<Y::Manifold>::zero);
         let parts = (&self.retraction, &self.gradient);
         let recall = recall(system, start, &guess);
-        let residual = Residual::recalling(system, parts, (start.x, start.energy), start.h, recall);
-        let root = self.solve(&residual, &guess, work)?;
+        let known = memory.linearised.take().filter(|known| known.serves(start.h, &guess));
+        let residual = Residual::recalling(system, parts, (start.x, start.energy), start.h, recall)
+            .with_sizes(known.map(|known| known.sizes));
+        let mut inverse = known.map(|known| known.inverse);
+        let root = self.solve(&residual, &guess, &mut inverse, work)?;
+        memory.linearised = inverse.zip(residual.sizes()).map(|(inverse, sizes)| match known {
+            Some(known) if known.sizes == sizes => {
+                Linearisation { inverse, steps: known.steps + 1, ..known }
+            }
+            _ => Linearisation { inverse, sizes, h: start.h, length: root.u.magnitude(), steps: 0 },
+        });
         work.entropy_slope = work.entropy_slope.min(residual.entropy_slope());
         if root.u.magnitude() <= 2.0 * root.floor {
             // The state is at rest: what the solver found is its own round-off, and following it
@@ -169,20 +178,21 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
         &self,
         residual: &Residual<'_, Y, R, W>,
         guess: &Vector<Y::Manifold>,
+        inverse: &mut Option<Inverse<Dim<Y>>>,
         work: &mut Work,
     ) -> Result<Root<Y::Manifold>, NoRoot<Y::Manifold>>
     where
         Y: Metriplectic,
         R: Retraction<Y::Manifold, Y::Metric>,
     {
-        let solved = self.newton.solve(residual, guess);
+        let solved = self.newton.solve_near(residual, guess, inverse);
         work.sweeps += solved.as_ref().map_or_else(|failure| failure.sweeps, |root| root.sweeps);
         #[cfg(feature = "argmin")]
         if let Err(failure) = &solved
             && let Some(closer) = crate::globaliser::descend(residual, &failure.best)
         {
             work.globalised += 1;
-            let polished = self.newton.solve(residual, &closer);
+            let polished = self.newton.solve_near(residual, &closer, inverse);
             work.sweeps +=
                 polished.as_ref().map_or_else(|failure| failure.sweeps, |root| root.sweeps);
             return polished;
@@ -273,53 +283,106 @@ fn recall<Y: Metriplectic>(system: &Y, start: &Start<'_, Y>, d: &Vector<Y::Manif
     }
 }
 
-/// What a step remembers of the steps before it: three displacements, from which the next one is
-/// extrapolated, and what rounding has lost of the position.
+/// What a step remembers of the steps before it: the displacements, from which the next one is
+/// extrapolated; the inverse of a Jacobian, which serves as long as it contracts; and what rounding has
+/// lost of the position.
 ///
 /// The entries of a point are rounded in every step, and steps shorter than their last digit would
 /// be lost altogether; what is lost is carried along and added to the next displacement
 /// (compensated summation; Kahan 1965, Hairer, Lubich, Wanner 2006, §VIII.5).
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Memory<V> {
-    displacements: [Option<V>; 3],
-    carry: Option<V>,
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Memory<N: Dimension> {
+    /// The backward differences `∇ʲd` of the displacements, as far as they are `known`.
+    differences: [N::Vector<f64>; DIFFERENCES],
+    known: usize,
+    linearised: Option<Linearisation<N>>,
+    carry: Option<N::Vector<f64>>,
 }
 
-impl<V: Copy> Memory<V> {
-    /// An empty memory.
-    pub const fn new() -> Self {
-        Self { displacements: [None; 3], carry: None }
-    }
+/// Displacements that are remembered.
+const DIFFERENCES: usize = 7;
+
+/// The Jacobian of an earlier step, and what it was formed for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Linearisation<N: Dimension> {
+    inverse: Inverse<N>,
+    sizes: Sizes,
+    h: f64,
+    length: f64,
+    steps: u32,
 }
 
-impl<V: Column<f64>> Memory<V> {
-    /// The parabola through the last three displacements, continued by one step.
+/// Steps after which a Jacobian is formed again, because the sizes of the terms may have changed.
+const STEPS: u32 = 100;
+
+impl<N: Dimension> Linearisation<N> {
+    /// Whether it may be tried for a step of size `h` with this guess of the displacement: the sizes
+    /// that the round-off is judged by are those of steps that are about as long.
     #[inline]
-    fn extrapolate(&self) -> Option<V> {
-        match self.displacements {
-            [Some(a), Some(b), Some(c)] => Some((a - b) * 3.0 + c),
-            [Some(a), Some(b), None] => Some(a * 2.0 - b),
-            _ => None,
-        }
+    fn serves(&self, h: f64, guess: &N::Vector<f64>) -> bool {
+        let share = guess.magnitude() / self.length;
+        self.h.to_bits() == h.to_bits() && self.steps < STEPS && (0.7..1.5).contains(&share)
+    }
+}
+
+impl<N: Dimension> Default for Memory<N> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl<N: Dimension> Memory<N> {
+    /// An empty memory.
+    #[must_use]
+    pub fn new() -> Self {
+        let differences = [N::Vector::<f64>::zero(); DIFFERENCES];
+        Self { differences, known: 0, linearised: None, carry: None }
     }
 
+    /// The next displacement `Σ_{j<k} ∇ʲd`, on the polynomial through the last `k` of them; `k` is the
+    /// one that would have been best for the last step, where it was wrong by `∇ᵏd`.
+    #[inline]
+    fn extrapolate(&self) -> Option<N::Vector<f64>> {
+        if self.known < 2 {
+            return None;
+        }
+        let (mut best, mut smallest) = (1, f64::INFINITY);
+        for (k, difference) in self.differences[..self.known].iter().enumerate().skip(1) {
+            let size = difference.dot(difference);
+            if size < smallest {
+                (best, smallest) = (k, size);
+            }
+        }
+        // Where the last difference is the smallest, it is the next one that counts.
+        if best + 1 == self.known {
+            best = self.known;
+        }
+        let mut sum = self.differences[0];
+        for difference in &self.differences[1..best] {
+            sum += *difference;
+        }
+        Some(sum)
+    }
+}
+
+impl<N: Dimension> Memory<N> {
     /// Notes the step from `x` by the displacement `d`, and gives its end, moved by what earlier
     /// steps have lost.
     #[inline]
-    fn note<M, G>(
+    fn note<M: Manifold<Dim = N>, G: Riemannian<M>>(
         &mut self,
         metric: &G,
         x: &M::Point<f64>,
-        d: &V,
+        d: &N::Vector<f64>,
         end: M::Point<f64>,
-    ) -> M::Point<f64>
-    where
-        M: Manifold<Dim: Dimension<Vector<f64> = V>>,
-        G: Riemannian<M>,
-    {
-        let [last, before, _] = self.displacements;
-        let transport = |d: Option<V>| d.map(|d| M::transport(x, &end, &d));
-        self.displacements = [transport(Some(*d)), transport(last), transport(before)];
+    ) -> M::Point<f64> {
+        let mut difference = *d;
+        for last in &mut self.differences {
+            let next = difference - *last;
+            *last = M::transport(x, &end, &difference);
+            difference = next;
+        }
+        self.known = DIFFERENCES.min(self.known + 1);
         let lost = metric.lost(x, d, &end);
         match self.carry {
             Some(carry) if carry.magnitude() > 0.0 => {

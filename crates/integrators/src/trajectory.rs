@@ -3,7 +3,7 @@
 use approx::{AbsDiffEq, RelativeEq};
 use metriplectic_dynamics::velocity::{Covectors, Gradient, independence};
 use metriplectic_dynamics::{Dissipation, Invariants, Metriplectic, system::Point};
-use metriplectic_fields::{ChartPoint, Column, Dimension, ScalarField, Space, Vector};
+use metriplectic_fields::{ChartPoint, Column, Dimension, ScalarField, Space};
 use metriplectic_manifolds::{Cayley, Exponential, Manifold, Projection, Retraction, WeylMidpoint};
 
 use crate::certificate::{Certificate, Kept};
@@ -48,7 +48,7 @@ pub struct Steps<'a, Y: Metriplectic, R, W = Gonzalez> {
     h: f64,
     state: State<Y::Manifold>,
     invariants: Numbers<Y>,
-    memory: Memory<Vector<Y::Manifold>>,
+    memory: Memory<Dim<Y>>,
     certificate: Certificate,
     failed: bool,
 }

@@ -8,7 +8,7 @@ use metriplectic_fields::{
 
 use crate::geodesic::{self, GeodesicJet};
 use crate::metric::{Factored, GeodesicEnd, MetricError};
-use crate::{ArcJet, Manifold, Riemannian};
+use crate::{Arc, ArcJet, Manifold, Riemannian};
 
 /// A metric given as a matrix field; see [`Metric::field`](crate::Metric::field).
 #[derive(Clone, Copy)]
@@ -49,7 +49,13 @@ impl<M: Manifold, F: MatrixField<M>> Riemannian<M> for FieldMetric<F> {
 
     fn end(&self, x: &M::Point<f64>, v: &Vector<M>) -> Result<M::Point<f64>, MetricError> {
         // With the very roundings of a step's arc, whose energy a step has been solved for.
-        Ok(self.weyl_jet(x, v)?.end)
+        Ok(self.weyl_arc(x, v)?.end)
+    }
+
+    fn weyl_arc(&self, x: &M::Point<f64>, d: &Vector<M>) -> Result<Arc<M>, MetricError> {
+        let (z, velocity) = geodesic::follow_real(&self.field, x, &(*d * 0.5))?;
+        let (end, _) = geodesic::follow_real(&self.field, &z, &velocity)?;
+        Ok(Arc { z: ChartPoint::centre(&z), d: velocity * 2.0, end })
     }
 
     fn along(
@@ -84,12 +90,14 @@ impl<M: Manifold, F: MatrixField<M>> Riemannian<M> for FieldMetric<F> {
         };
         let z = geodesic::follow_jet(&self.field, &half)?;
         let end = geodesic::follow_jet(&self.field, &z)?;
+        // The arc itself is the one without derivatives, with its roundings.
+        let arc = self.weyl_arc(x, d)?;
         Ok(ArcJet {
-            z: z.point,
+            z: arc.z.base,
             dz: z.dpoint,
-            d: z.velocity * 2.0,
+            d: arc.d,
             dd: z.dvelocity * 2.0,
-            end: end.point,
+            end: arc.end,
             dend: end.dpoint,
         })
     }

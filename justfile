@@ -44,6 +44,19 @@ study:
 bench:
     cargo bench
 
+# count the instructions of a step in each row with callgrind, against benches/step/snapshot.txt (±3 %)
+instructions *flags:
+    #!/usr/bin/env bash
+    set -euo pipefail
+    wanted=$(sed -n 's/^channel = "\(.*\)"/\1/p' rust-toolchain.toml)
+    if [[ $(rustc --version) != "rustc $wanted "* ]]; then
+        echo "the counts belong to rustc $wanted: skipped"
+    elif ! command -v valgrind > /dev/null; then
+        echo "valgrind is not installed: skipped"
+    else
+        cargo bench --bench step -- --instructions {{ flags }}
+    fi
+
 # check every combination of features
 features: (need "cargo hack --version" "cargo install cargo-hack --locked")
     cargo hack check --workspace --feature-powerset

@@ -1,22 +1,29 @@
 //! One step from closures against the same step written by hand.
 //!
-//! Both sides solve the same equation from the same guess to the same floor, and both take a
-//! hundred steps from the same moving state, so that guesses are extrapolated as in a run. Before
-//! they are timed, they are checked to arrive at the same point.
+//! Both sides solve the same equation to the same floor, and both take a hundred steps from the same
+//! moving state. Before they are timed, they are checked to arrive at the same point. By hand there is an
+//! analytic Jacobian in every step and the guess of a parabola; the library differentiates closures,
+//! and keeps its Jacobian and a guess of higher order.
+//!
+//! - `cargo bench --bench step` times every row;
+//! - `cargo bench --bench step -- --instructions` counts the instructions of a step in each row with
+//!   callgrind, and compares them with `snapshot.txt`; `--bless` writes that file.
 //!
 //! `closure_metric` is the step from closures once more, with the canonical metric given by a closure
 //! too, so that its geodesics are integrated.
 
-use std::cell::Cell;
 use std::hint::black_box;
 
-use criterion::{Criterion, Throughput, criterion_group, criterion_main};
+use criterion::Criterion;
 use metriplectic::dynamics::system::Point;
+use metriplectic::integrators::DiscreteGradient;
 use metriplectic::integrators::residual::Recall;
 use metriplectic::integrators::step::{Memory, Start};
 use metriplectic::prelude::*;
 
 mod chord;
+mod dimension;
+mod instructions;
 mod rigid_body;
 mod so3_nambu;
 mod spinning_top;
@@ -35,85 +42,109 @@ trait Step: Clone {
     fn entries(x: &Self::Point) -> Vec<f64>;
 }
 
-/// `STEPS` steps of a system from its closures.
-fn run<Y: Metriplectic>(system: &Y, start: &Point<Y>, h: f64) -> Point<Y>
-where
-    WeylMidpoint: Retraction<Y::Manifold, Y::Metric>,
-{
-    let scheme = Scheme::new(WeylMidpoint);
-    let (mut memory, mut x) = (Memory::new(), start.clone());
-    for _ in 0..STEPS {
-        let energy = system.energy_at(&x);
-        let left_over = Recall::nothing();
-        let invariants = left_over.invariants;
-        let start = Start { x: &x, time: 0.0, h, energy, invariants, left_over };
-        let Ok((end, _)) = scheme.step(system, &start, &mut memory) else { break };
-        x = end;
+/// What a number of steps came to.
+struct Outcome {
+    /// The entries of the last point.
+    end: Vec<f64>,
+    /// Newton sweeps, where they are counted.
+    sweeps: Option<usize>,
+}
+
+/// One line of the comparison: what is timed, and counted.
+struct Row {
+    name: String,
+    run: Box<dyn Fn(usize) -> Outcome>,
+}
+
+impl Row {
+    /// Steps of a system from its closures.
+    fn new<Y: Metriplectic + 'static>(
+        name: impl Into<String>,
+        system: Y,
+        start: Point<Y>,
+        h: f64,
+    ) -> Self
+    where
+        WeylMidpoint: Retraction<Y::Manifold, Y::Metric>,
+    {
+        Self::with(name, Scheme::new(WeylMidpoint), system, start, h)
     }
-    x
+
+    /// The same with another scheme.
+    fn with<Y: Metriplectic + 'static, W: DiscreteGradient + 'static>(
+        name: impl Into<String>,
+        scheme: Scheme<WeylMidpoint, W>,
+        system: Y,
+        start: Point<Y>,
+        h: f64,
+    ) -> Self
+    where
+        WeylMidpoint: Retraction<Y::Manifold, Y::Metric>,
+    {
+        let run = move |steps| {
+            let (mut memory, mut x, mut sweeps) = (Memory::new(), black_box(start.clone()), 0);
+            for _ in 0..steps {
+                let energy = system.energy_at(&x);
+                let left_over = Recall::nothing();
+                let invariants = left_over.invariants;
+                let start = Start { x: &x, time: 0.0, h, energy, invariants, left_over };
+                let Ok((end, work)) = scheme.step(&system, &start, &mut memory) else { break };
+                sweeps += work.sweeps;
+                x = end;
+            }
+            Outcome { end: Y::Manifold::entries(&x), sweeps: Some(sweeps) }
+        };
+        Self { name: name.into(), run: Box::new(run) }
+    }
+
+    /// Steps by hand.
+    fn by_hand<B: Step + 'static>(name: &str, hand: B, start: B::Point, h: f64) -> Self
+    where
+        B::Point: 'static,
+    {
+        let run = move |steps| {
+            let mut hand = black_box(hand.clone());
+            let end = (0..steps).fold(black_box(start), |x, _| hand.step(&x, h));
+            Outcome { end: B::entries(&end), sweeps: None }
+        };
+        Self { name: name.into(), run: Box::new(run) }
+    }
 }
 
-/// The largest difference between the entries of two points.
-fn distance(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+/// Every row.
+fn rows() -> Vec<Row> {
+    let all = [rigid_body::rows(), spinning_top::rows(), so3_nambu::rows(), dimension::rows()];
+    all.into_iter().flatten().collect()
 }
 
-/// Times `STEPS` steps of a system from its closures, and by hand, each from its start.
-fn compare<Y: Metriplectic, B: Step>(
-    criterion: &mut Criterion,
-    name: &str,
-    h: f64,
-    (system, start): (&Y, Point<Y>),
-    (hand, hand_start): (B, B::Point),
-) where
-    WeylMidpoint: Retraction<Y::Manifold, Y::Metric>,
-{
-    let by_hand = |hand: &B, start: &B::Point| {
-        let mut hand = hand.clone();
-        (0..STEPS).fold(*start, |x, _| hand.step(&x, h))
-    };
-
-    let off = distance(
-        &Y::Manifold::entries(&run(system, &start, h)),
-        &B::entries(&by_hand(&hand, &hand_start)),
-    );
-    assert!(off <= 1e-12, "{name}: the two ends are {off:.1e} apart");
-
-    let mut group = criterion.benchmark_group(name);
-    group.throughput(Throughput::Elements(STEPS as u64));
-    group.bench_function("closure", |bencher| {
-        bencher.iter(|| black_box(run(system, black_box(&start), h)));
-    });
-    group.bench_function("hand_coded", |bencher| {
-        bencher.iter(|| black_box(by_hand(black_box(&hand), black_box(&hand_start))));
-    });
-    group.finish();
+/// Compares the ends of rows that solve the same equation.
+fn check(rows: &[Row], allowed: f64) {
+    let ends: Vec<_> = rows.iter().map(|row| (row.run)(STEPS).end).collect();
+    for (row, end) in rows.iter().zip(&ends) {
+        let off = end.iter().zip(&ends[0]).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(off <= allowed, "{}: ends {off:.1e} away from {}", row.name, rows[0].name);
+    }
 }
 
-/// Times the steps of a system whose canonical metric is a closure that counts its `evaluations`.
-fn compare_metric<Y: Metriplectic, C: Metriplectic<Manifold = Y::Manifold>>(
-    criterion: &mut Criterion,
-    name: &str,
-    h: f64,
-    (canonical, start): (&C, Point<C>),
-    (system, evaluations): (&Y, &Cell<u64>),
-) where
-    WeylMidpoint: Retraction<Y::Manifold, Y::Metric> + Retraction<C::Manifold, C::Metric>,
-{
-    evaluations.set(0);
-    let end = Y::Manifold::entries(&run(system, &start, h));
-    let each = evaluations.get() as f64 / STEPS as f64;
-    println!("{name}/closure_metric: {each:.0} evaluations of the metric in a step");
-    let off = distance(&C::Manifold::entries(&run(canonical, &start, h)), &end);
-    assert!(off <= 1e-10, "{name}: the ends of both metrics are {off:.1e} apart");
-
-    let mut group = criterion.benchmark_group(name);
-    group.throughput(Throughput::Elements(STEPS as u64));
-    group.bench_function("closure_metric", |bencher| {
-        bencher.iter(|| black_box(run(system, black_box(&start), h)));
-    });
-    group.finish();
+fn main() {
+    let arguments: Vec<String> = std::env::args().collect();
+    let has = |flag: &str| arguments.iter().any(|argument| argument == flag);
+    if has("--instructions") {
+        return instructions::compare(&rows(), has("--bless"));
+    }
+    if let [_, flag, name, steps] = &arguments[..]
+        && flag == "--row"
+    {
+        return instructions::count(&rows(), name, steps.parse().expect("a number of steps"));
+    }
+    let mut criterion = Criterion::default().configure_from_args();
+    for row in rows() {
+        let sweeps = (row.run)(STEPS).sweeps;
+        if let Some(sweeps) = sweeps {
+            println!("{}: {} Newton sweeps in {STEPS} steps", row.name, sweeps);
+        }
+        // The time of a hundred steps: read tens of nanoseconds for microseconds.
+        criterion.bench_function(&row.name, |bencher| bencher.iter(|| black_box((row.run)(STEPS))));
+    }
+    criterion.final_summary();
 }
-
-criterion_group!(benches, rigid_body::bench, spinning_top::bench, so3_nambu::bench);
-criterion_main!(benches);

@@ -1,25 +1,63 @@
 //! The relaxing rigid body on so(3)*, a hundred steps from a state in full motion.
 
-use criterion::Criterion;
 use metriplectic::prelude::*;
 
-use crate::{Step, compare};
+use crate::{Row, Step, check};
 
 const INERTIA: V = [10.0, 5.0, 1.0];
 const START: V = [-0.6, -0.84, 0.15];
 const STEP_SIZE: f64 = 0.1;
 
-pub(crate) fn bench(criterion: &mut Criterion) {
-    let inertia = Vector3::from(INERTIA);
-    let body = System::on(LieDual::so3())
-        .energy(move |p: &Vector3<Real>| {
-            p.component_mul(p).component_div(&inertia.cast()).sum() * 0.5
-        })
-        .entropy(|p: &Vector3<Real>| p.norm_squared() * 0.5)
-        .build()
-        .expect("the rigid body is a metriplectic system");
-    let closure = (&body, Vector3::from(START));
-    compare(criterion, "step/rigid_body", STEP_SIZE, closure, (HandCoded::new(&INERTIA), START));
+/// `½ Σ p_i²/I_i` at any scalar.
+struct Energy(V);
+
+impl ScalarField<LieDual<3>> for Energy {
+    fn at<D: Scalar>(&self, p: &SVector<D, 3>) -> D {
+        (p.x * p.x / self.0[0] + p.y * p.y / self.0[1] + p.z * p.z / self.0[2]) * 0.5
+    }
+}
+
+/// `½|p|²` at any scalar.
+struct Entropy;
+
+impl ScalarField<LieDual<3>> for Entropy {
+    fn at<D: Scalar>(&self, p: &SVector<D, 3>) -> D {
+        p.dot(p) * 0.5
+    }
+}
+
+pub(crate) fn rows() -> Vec<Row> {
+    const WELL: &str = "the rigid body is a metriplectic system";
+    let (start, h) = (Vector3::from(START), STEP_SIZE);
+    let body = || {
+        let inertia = Vector3::from(INERTIA);
+        System::on(LieDual::so3())
+            .energy(move |p: &Vector3<Real>| {
+                p.component_mul(p).component_div(&inertia.cast()).sum() * 0.5
+            })
+            .entropy(|p: &Vector3<Real>| p.norm_squared() * 0.5)
+    };
+    let typed = System::on(LieDual::so3()).energy(Energy(INERTIA)).entropy(Entropy);
+    let published = body().second_law(SecondLaw::Published).build().expect(WELL);
+    let [mean, itoh_abe] = [(); 2].map(|()| body().build().expect(WELL));
+    let scheme = Scheme::new(WeylMidpoint);
+    let rows = vec![
+        Row::new("step/rigid_body/closure", body().build().expect(WELL), start, h),
+        Row::new("step/rigid_body/typed", typed.build().expect(WELL), start, h),
+        Row::by_hand("step/rigid_body/hand_coded", HandCoded::new(&INERTIA), START, h),
+        Row::new("step/rigid_body/published", published, start, h),
+        Row::with("step/rigid_body/mean_value", scheme.gradient(MeanValue), mean, start, h),
+        Row::with(
+            "step/rigid_body/itoh_abe",
+            scheme.gradient(SymmetricItohAbe),
+            itoh_abe,
+            start,
+            h,
+        ),
+    ];
+    // For quadratic fields on a flat space all of these are the midpoint rule.
+    check(&rows, 1e-12);
+    rows
 }
 
 /// By hand: analytic gradients and Jacobian, the same chord-Newton iteration.

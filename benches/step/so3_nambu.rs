@@ -1,34 +1,74 @@
 //! Relaxation on SO(3) with the Nambu bracket, for fields that are quadratic in the entries of `R`.
 
 use std::cell::Cell;
+use std::rc::Rc;
 
-use criterion::Criterion;
 use metriplectic::manifolds::rotations;
 use metriplectic::prelude::*;
 
 use crate::chord::{self, Displacements, Linearised};
-use crate::{Step, compare, compare_metric};
+use crate::{Row, STEPS, Step, check};
 
 const STEP_SIZE: f64 = 0.005;
 
-pub(crate) fn bench(criterion: &mut Criterion) {
-    const NAME: &str = "step/so3_nambu";
-    let builder = System::on(Rotations::bi_invariant())
-        .bracket(Nambu::default())
-        .energy(|r: &Matrix3<Real>| r.m11 + r.m22 * 2.0 + r.m33 * 3.0 + r.m12 * r.m23 * 0.5)
-        .entropy(|r: &Matrix3<Real>| r.m13 - r.m21 * 0.5 + (r.m31 + r.m32).powi(2) * 0.25);
-    let frame = builder.clone().build().expect("energy, entropy and metric are a system on SO(3)");
-    let start = rotations::exp(&Vector3::new(0.3, -0.2, 0.5));
-    let hand = HandCoded { displacements: Displacements::new() };
-    compare(criterion, NAME, STEP_SIZE, (&frame, start), (hand, start));
+/// The fields of [`rows`] at any scalar.
+struct Energy;
+struct Entropy;
 
-    let evaluations = Cell::new(0);
-    let body = Metric::field(|_: &Matrix3<Real>| {
-        evaluations.set(evaluations.get() + 1);
+impl ScalarField<Rotations> for Energy {
+    fn at<D: Scalar>(&self, r: &SMatrix<D, 3, 3>) -> D {
+        r.m11 + r.m22 * 2.0 + r.m33 * 3.0 + r.m12 * r.m23 * 0.5
+    }
+}
+
+impl ScalarField<Rotations> for Entropy {
+    fn at<D: Scalar>(&self, r: &SMatrix<D, 3, 3>) -> D {
+        let tilt = r.m31 + r.m32;
+        r.m13 - r.m21 * 0.5 + tilt * tilt * 0.25
+    }
+}
+
+pub(crate) fn rows() -> Vec<Row> {
+    const WELL: &str = "energy, entropy and metric are a system on SO(3)";
+    let frame = || {
+        System::on(Rotations::bi_invariant())
+            .bracket(Nambu::default())
+            .energy(|r: &Matrix3<Real>| r.m11 + r.m22 * 2.0 + r.m33 * 3.0 + r.m12 * r.m23 * 0.5)
+            .entropy(|r: &Matrix3<Real>| r.m13 - r.m21 * 0.5 + (r.m31 + r.m32).powi(2) * 0.25)
+            // The step by hand is that of the published scheme.
+            .second_law(SecondLaw::Published)
+    };
+    let typed = System::on(Rotations::bi_invariant())
+        .bracket(Nambu::default())
+        .energy(Energy)
+        .entropy(Entropy)
+        .second_law(SecondLaw::Published);
+    let (start, h) = (rotations::exp(&Vector3::new(0.3, -0.2, 0.5)), STEP_SIZE);
+    let hand = HandCoded { displacements: Displacements::new() };
+    let mut rows = vec![
+        Row::new("step/so3_nambu/closure", frame().build().expect(WELL), start, h),
+        Row::new("step/so3_nambu/typed", typed.build().expect(WELL), start, h),
+        Row::by_hand("step/so3_nambu/hand_coded", hand, start, h),
+    ];
+    check(&rows, 1e-12);
+
+    let evaluations = Rc::new(Cell::new(0));
+    let count = Rc::clone(&evaluations);
+    let body = Metric::field(move |_: &Matrix3<Real>| {
+        count.set(count.get() + 1);
         Matrix3::<Real>::identity()
     });
-    let numerical = builder.metric(body).build().expect("the same system");
-    compare_metric(criterion, NAME, STEP_SIZE, (&frame, start), (&numerical, &evaluations));
+    let numerical = frame().metric(body).build().expect("the same system");
+    rows.push(Row::new("step/so3_nambu/closure_metric", numerical, start, h));
+    evaluations.set(0);
+    (rows[3].run)(STEPS);
+    let each = evaluations.get() as f64 / STEPS as f64;
+    println!("{}: {each:.0} evaluations of the metric in a step", rows[3].name);
+    check(&rows, 1e-10);
+
+    let exact = frame().second_law(SecondLaw::Exact).build().expect(WELL);
+    rows.push(Row::new("step/so3_nambu/exact", exact, start, h));
+    rows
 }
 
 /// By hand in the body frame: `u = h (s × w + |w|² s − (w·s) w)` with `w = dH(z) + c u`, `s = dS(z)`,

@@ -1,34 +1,58 @@
 //! The spinning top on S² (Celledoni, Eidnes, Owren, Ringholm 2019, example 1).
 
 use std::cell::Cell;
+use std::rc::Rc;
 
-use criterion::Criterion;
 use metriplectic::nalgebra::Matrix3x2;
 use metriplectic::prelude::*;
 
 use crate::chord::{self, Displacements, Linearised};
-use crate::{Step, compare, compare_metric};
+use crate::{Row, STEPS, Step, check};
 
 const D: Vector3<f64> = Vector3::new(1.0, 0.5, 0.25);
 const STEP_SIZE: f64 = 0.1;
 
-pub(crate) fn bench(criterion: &mut Criterion) {
-    const NAME: &str = "step/spinning_top";
-    let builder = System::on(Sphere::<2>::round()).bracket(AreaForm).energy(|x: &Vector3<Real>| {
-        (0..3).map(|i| (x[i].powi(2) + x[i].powi(3) * (2.0 / 3.0)) * (0.5 * D[i])).sum()
-    });
-    let top = builder.clone().build().expect("the top is a Hamiltonian system");
-    let start = Vector3::repeat(3.0_f64.sqrt().recip());
-    let hand = HandCoded { displacements: Displacements::new() };
-    compare(criterion, NAME, STEP_SIZE, (&top, start), (hand, start));
+/// `H = ½ Σ D_i (x_i² + ⅔ x_i³)` at any scalar.
+struct Energy;
 
-    let evaluations = Cell::new(0);
-    let ambient = Metric::field(|_: &Vector3<Real>| {
-        evaluations.set(evaluations.get() + 1);
+impl ScalarField<Sphere<2>> for Energy {
+    fn at<T: Scalar>(&self, x: &SVector<T, 3>) -> T {
+        let term = |i: usize| x[i] * x[i] * (x[i] * (2.0 / 3.0) + 1.0) * (0.5 * D[i]);
+        term(0) + term(1) + term(2)
+    }
+}
+
+pub(crate) fn rows() -> Vec<Row> {
+    const WELL: &str = "the top is a Hamiltonian system";
+    let top = || {
+        System::on(Sphere::<2>::round()).bracket(AreaForm).energy(|x: &Vector3<Real>| {
+            (0..3).map(|i| (x[i].powi(2) + x[i].powi(3) * (2.0 / 3.0)) * (0.5 * D[i])).sum()
+        })
+    };
+    let typed = System::on(Sphere::<2>::round()).bracket(AreaForm).energy(Energy);
+    let (start, h) = (Vector3::repeat(3.0_f64.sqrt().recip()), STEP_SIZE);
+    let hand = HandCoded { displacements: Displacements::new() };
+    let mut rows = vec![
+        Row::new("step/spinning_top/closure", top().build().expect(WELL), start, h),
+        Row::new("step/spinning_top/typed", typed.build().expect(WELL), start, h),
+        Row::by_hand("step/spinning_top/hand_coded", hand, start, h),
+    ];
+    check(&rows, 1e-12);
+
+    let evaluations = Rc::new(Cell::new(0));
+    let count = Rc::clone(&evaluations);
+    let ambient = Metric::field(move |_: &Vector3<Real>| {
+        count.set(count.get() + 1);
         Matrix3::<Real>::identity()
     });
-    let numerical = builder.metric(ambient).build().expect("the same system");
-    compare_metric(criterion, NAME, STEP_SIZE, (&top, start), (&numerical, &evaluations));
+    let numerical = top().metric(ambient).build().expect("the same system");
+    rows.push(Row::new("step/spinning_top/closure_metric", numerical, start, h));
+    evaluations.set(0);
+    (rows[3].run)(STEPS);
+    let each = evaluations.get() as f64 / STEPS as f64;
+    println!("{}: {each:.0} evaluations of the metric in a step", rows[3].name);
+    check(&rows, 1e-10);
+    rows
 }
 
 /// `H = ½ Σ D_i (x_i² + ⅔ x_i³)`

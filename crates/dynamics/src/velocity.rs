@@ -26,7 +26,7 @@ use metriplectic_fields::{
     ChartPoint, Column, Dimension, Matrix, Scalar, ScalarField, Space, Square, Vector,
     along_slopes, differential,
 };
-use metriplectic_manifolds::{MetricError, Riemannian};
+use metriplectic_manifolds::{InnerProduct, MetricError, Riemannian};
 
 use crate::invariants::{Invariants, Kind, Visitor};
 use crate::orthogonal::{Moving, Orthogonal, OrthogonalJet};
@@ -168,6 +168,18 @@ pub fn reversible<Y: Metriplectic + ?Sized, D: Scalar>(
         return bracket(&w.energy);
     }
     let g = system.metric().at(x)?;
+    if Y::Invariants::COUNT == 0 {
+        // The entropy alone: the same projections, without a list.
+        let w_hat = g.orthonormal(&w.entropy);
+        let square = w_hat.dot(&w_hat);
+        if square.re() > 0.0 {
+            let (sharp, share) = (g.raise(&w_hat), square.recip());
+            let alpha = w.energy - w.entropy * (sharp.dot(&w.energy) * share);
+            let v = bracket(&alpha)?;
+            return Ok(v - sharp * (w.entropy.dot(&v) * share));
+        }
+        return bracket(&w.energy);
+    }
     let mut off = Orthogonal::<Dim<Y>, D>::default();
     if killed.entropy {
         off.push(&g, &w.entropy);

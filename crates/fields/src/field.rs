@@ -138,7 +138,7 @@ pub trait MatrixField<M: Space> {
     /// chart, in `⌈n/2⌉` evaluations.
     fn covariant_jet(&self, x: &M::Point<f64>) -> MatrixJet<M> {
         let seeded = M::seeds(x);
-        MatrixJet::new(|i, j| M::covariant(&seeds(x, i, j), &self.at_real(&seeded(i, j))))
+        M::covariant_jet(x, &Vector::<M>::zero(), |i, j| self.at_real(&seeded(i, j)))
     }
 
     /// A Poisson tensor in the frame of the chart at a real point, with its first derivatives along

@@ -38,4 +38,4 @@ pub use dimension::{Column, Dimension, Factors, NotPositive, Plus, Square};
 pub use field::{Jet1, Jet2, MatrixField, MatrixJet, ScalarField, along_slopes};
 pub use laws::BrokenLaw;
 pub use scalar::{Real, Scalar};
-pub use space::{ChartPoint, Form, Matrix, Space, Vector, Velocity};
+pub use space::{ChartPoint, Form, Matrix, Space, Vector, Velocity, product_rule};

@@ -2,7 +2,10 @@
 
 use std::fmt::Debug;
 
-use crate::{Column, Dimension, Factors, Real, Scalar, Square};
+use nalgebra::{Const, SMatrix};
+use num_dual::Dual64;
+
+use crate::{Column, Dimension, Factors, MatrixJet, Real, Scalar, Square};
 
 /// Components of a vector or covector on `M`.
 pub type Vector<M, D = f64> = <<M as Space>::Dim as Dimension>::Vector<D>;
@@ -75,6 +78,21 @@ pub trait Space: Clone + Debug + PartialEq + Send + Sync + 'static {
         Matrix::<Self, D>::from_entries(|i, j| theta[i].dot(&image[j]))
     }
 
+    /// The same with its first derivatives along the chart, at the real coordinates `q` of the chart at
+    /// `x`, from the form `a(i, j)` at `φ_x(q + ε₁ e_i + ε₂ e_j)`.
+    fn covariant_jet(
+        x: &Self::Point<f64>,
+        q: &Vector<Self>,
+        a: impl Fn(usize, usize) -> Form<Self, Real>,
+    ) -> MatrixJet<Self> {
+        let part = |k, direction| if k == direction { 1.0 } else { 0.0 };
+        MatrixJet::new(|i, j| {
+            let seed = |k| Real::new(q[k], part(k, i), part(k, j), 0.0);
+            let at = ChartPoint { base: x.clone(), q: Vector::<Self, Real>::from_index(seed) };
+            Self::covariant(&at, &a(i, j))
+        })
+    }
+
     /// The matrix `θ⁺ A θ⁺ᵀ` of a bilinear form on covectors dual to velocities, in the frame of the
     /// chart, with `θ⁺ = (θᵀθ)⁻¹θᵀ`; `None` at the edge of the chart, where it has no frame.
     fn contravariant<D: Scalar>(
@@ -103,6 +121,45 @@ pub trait Space: Clone + Debug + PartialEq + Send + Sync + 'static {
     fn is_near(_q: &Vector<Self>) -> bool {
         true
     }
+}
+
+/// The derivatives of a symmetric form in the frame of a chart by the product rule,
+/// `∂_k(θᵀAθ) = θᵀ(∂_kA)θ + B + Bᵀ` with `B = (∂_kθ)ᵀ A θ`, in real numbers alone: the faster
+/// [`Space::covariant_jet`] of a space whose `theta(k)` is `θ` with its derivative along the `k`-th
+/// direction of the chart.
+#[inline]
+pub fn product_rule<M, const A: usize, const N: usize>(
+    theta: impl Fn(usize) -> SMatrix<Dual64, A, N>,
+    a: impl Fn(usize, usize) -> SMatrix<Real, A, A>,
+) -> MatrixJet<M>
+where
+    M: Space<Dim = Const<N>>,
+{
+    let mut last = a(0, 1);
+    let form = last.map(|a| a.re);
+    let frame = theta(0).map(|theta| theta.re);
+    // Row by row of Aᵀθ and Aθ, which are the same for a symmetric form.
+    let image = SMatrix::<f64, A, N>::from_fn(|i, j| inner(A, |l| form[(i, l)] * frame[(l, j)]));
+    let along = |other: &SMatrix<f64, A, N>, image: &SMatrix<f64, A, N>| {
+        SMatrix::<f64, N, N>::from_fn(|i, j| inner(A, |l| other[(l, i)] * image[(l, j)]))
+    };
+    let slopes = std::array::from_fn(|k| {
+        if k > 0 && k % 2 == 0 {
+            last = a(k, k + 1);
+        }
+        let slope = last.map(|a| if k % 2 == 0 { a.eps1 } else { a.eps2 });
+        let bend = along(&theta(k).map(|theta| theta.eps), &image);
+        let moved =
+            SMatrix::<f64, A, N>::from_fn(|i, j| inner(A, |l| slope[(i, l)] * frame[(l, j)]));
+        along(&frame, &moved) + bend + bend.transpose()
+    });
+    MatrixJet { value: along(&frame, &image), slopes }
+}
+
+/// `Σ_l f(l)` over the first `n` numbers.
+#[inline]
+fn inner(n: usize, f: impl Fn(usize) -> f64) -> f64 {
+    (0..n).fold(0.0, |sum, l| sum + f(l))
 }
 
 /// The columns of `θ`: the velocities of the chart's frame.

@@ -201,9 +201,9 @@ impl Newton {
                 let predicted = *ahead - step;
                 inverse.learn(&taken, &predicted);
                 *ahead = inverse.times(&residual);
+                inverse.contraction = contraction.max(0.5 * inverse.contraction);
+                contraction = inverse.contraction;
             }
-            inverse.contraction = contraction.max(0.5 * inverse.contraction);
-            contraction = inverse.contraction;
         }
     }
 

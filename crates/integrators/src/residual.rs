@@ -226,8 +226,7 @@ where
         let arc = self.retraction.real_arc(metric, self.x, u).ok()?;
         let g = metric.at(&arc.z).ok()?;
         let along = Along::new(self, u, &g);
-        let (energy, noise) =
-            along.value(system.energy(), (self.energy, self.recall.energy), &arc);
+        let (energy, noise) = along.value(system.energy(), (self.energy, self.recall.energy), &arc);
         let entropy = if self.is_exact() {
             let (w, _) = along.value(system.entropy(), (self.entropy, 0.0), &arc);
             self.entropy_slope.set(w.magnitude());
@@ -359,7 +358,7 @@ where
                 middle: None,
             })
         };
-        let nodes = || self.nodes.get_or_init(nodes).clone();
+        let nodes = || self.nodes.get_or_init(nodes);
         Chord::new(f, mean, d, start, (end, value), base, nodes)
     }
 

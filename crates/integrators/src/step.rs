@@ -300,7 +300,7 @@ pub struct Memory<N: Dimension> {
 }
 
 /// Displacements that are remembered.
-const DIFFERENCES: usize = 7;
+const DIFFERENCES: usize = 8;
 
 /// The Jacobian of an earlier step, and what it was formed for.
 #[derive(Clone, Copy, Debug, PartialEq)]

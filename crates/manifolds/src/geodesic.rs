@@ -126,7 +126,11 @@ pub(crate) fn metric_jet<M: Space>(
     x: &M::Point<f64>,
     q: &Vector<M>,
 ) -> MatrixJet<M> {
-    MatrixJet::new(|i, j| seeded(field, x, q, [i, j]))
+    let part = |k, direction| if k == direction { 1.0 } else { 0.0 };
+    M::covariant_jet(x, q, |i, j| {
+        let seed = |k| Real::new(q[k], part(k, i), part(k, j), 0.0);
+        field.at_real(&M::chart(x, &Vector::<M, Real>::from_index(seed)))
+    })
 }
 
 /// A part of a matrix of hyper-dual numbers.
@@ -293,7 +297,7 @@ pub(crate) fn follow_real<M: Space>(
     x: &M::Point<f64>,
     v: &Vector<M>,
 ) -> Result<(M::Point<f64>, Vector<M>), MetricError> {
-    let value = |at: &ChartPoint<M>| part::<M>(&seeded(field, &at.base, &at.q, NOWHERE), |g| g.re);
+    let value = |at: &ChartPoint<M>| metric(field, at);
     let recentre = |base: &M::Point<f64>, y: &Phase<M, f64>| {
         let g = value(&ChartPoint { base: base.clone(), q: y.q });
         let (at, v) = centred::<M, f64>(base, &y.q, &g.solve(&y.p)?);
@@ -305,9 +309,6 @@ pub(crate) fn follow_real<M: Space>(
     let v = value(&ChartPoint::centre(&end)).solve(&y.p);
     Ok((end, v.ok_or(MetricError::Lost { time: 1.0 })?))
 }
-
-/// Indices that seed nothing.
-const NOWHERE: [usize; 2] = [usize::MAX; 2];
 
 /// A real point of a geodesic, its velocity, and the derivatives of both along a parameter of `n`
 /// directions, in the frame of the chart at the point.

@@ -35,13 +35,16 @@
 use std::f64::consts::PI;
 
 use metriplectic_fields::series::{angle_over_sine, stumpff};
-use metriplectic_fields::{ChartPoint, Column, Dimension, Real, Scalar, Space};
+use metriplectic_fields::{
+    ChartPoint, Column, Dimension, MatrixJet, Real, Scalar, Space, product_rule,
+};
 use nalgebra::{Const, Matrix3, Quaternion, SMatrix, UnitQuaternion, Vector3, Vector4};
 use num_dual::Dual;
 use rand::{Rng, RngExt};
 
 use crate::metric::{GeodesicEnd, MetricError, within};
 use crate::normal::Normal;
+use crate::sphere::along;
 use crate::{Arc, ArcJet, Canonical, Manifold, Riemannian};
 
 /// The rotation group `SO(3)`: 3 × 3 rotation matrices, with tangent vectors in the body frame and the
@@ -250,6 +253,15 @@ impl Space for Rotations {
     fn covariant<D: Scalar>(at: &ChartPoint<Self, D>, a: &Matrix3<D>) -> Matrix3<D> {
         let theta = dexp(&at.q);
         product(&theta.transpose(), &product(a, &theta))
+    }
+
+    #[inline]
+    fn covariant_jet(
+        _: &Matrix3<f64>,
+        q: &Vector3<f64>,
+        a: impl Fn(usize, usize) -> Matrix3<Real>,
+    ) -> MatrixJet<Self> {
+        product_rule(|k| dexp(&along(q, k)), a)
     }
 
     #[inline]

@@ -31,9 +31,11 @@
 use std::f64::consts::PI;
 
 use metriplectic_fields::series::{angle_over_sine, stumpff};
-use metriplectic_fields::{ChartPoint, Column, Dimension, Real, Scalar, Space};
+use metriplectic_fields::{
+    ChartPoint, Column, Dimension, MatrixJet, Real, Scalar, Space, product_rule,
+};
 use nalgebra::{Const, SMatrix, SVector};
-use num_dual::Dual;
+use num_dual::{Dual, Dual64};
 use rand::{Rng, RngExt};
 
 use crate::metric::{GeodesicEnd, MetricError, within};
@@ -107,6 +109,12 @@ fn pushforward<D: Scalar, const A: usize, const N: usize>(
     let (e, [_, c1, c2, c3]) = (frame::<A, N>(x), stumpff(q.dot(q)));
     let along = spread(&e, q) * (c2 - c3);
     SMatrix::from_fn(|i, k| c1 * e[(i, k)] - (along[i] + c1 * x[i]) * q[k])
+}
+
+/// `q + ε e_k`.
+#[inline]
+pub(crate) fn along<const N: usize>(q: &SVector<f64, N>, k: usize) -> SVector<Dual64, N> {
+    SVector::from_fn(|i, _| Dual64::new(q[i], if i == k { 1.0 } else { 0.0 }))
 }
 
 /// The point at time `t` of the great circle from `x` with velocity `v`, and its velocity there:
@@ -195,6 +203,15 @@ macro_rules! sphere {
                 theta.tr_mul(&SMatrix::<D, $a, $n>::from_fn(|i, k| {
                     (0..$a).fold(D::zero(), |sum, j| sum + a[(i, j)] * theta[(j, k)])
                 }))
+            }
+
+            #[inline]
+            fn covariant_jet(
+                x: &SVector<f64, $a>,
+                q: &SVector<f64, $n>,
+                a: impl Fn(usize, usize) -> SMatrix<Real, $a, $a>,
+            ) -> MatrixJet<Self> {
+                product_rule(|k| pushforward(x, &along(q, k)), a)
             }
 
             #[inline]

@@ -1,5 +1,7 @@
 //! A discrete gradient at real points, safe against round-off.
 
+use std::borrow::Borrow;
+
 use metriplectic_fields::{
     Column, Dimension, Matrix, Real, ScalarField, Space, Square, Vector, along_slopes,
 };
@@ -34,15 +36,31 @@ pub struct Chord<M: Space> {
 
 /// The share of `|F| + |dF||x|` by which a step changes `F`, at which a difference of two values of
 /// `F` starts to be trusted; from four times that share on it is trusted alone.
-const SHORT: f64 = 1e-3;
+const SHORT: f64 = 2.5e-4;
 
 /// The weight of an integral against a difference of two values of size `size` that is about
 /// `change`: it falls from 1 to 0 between one and four times the short share, with zero slope at both.
 #[inline]
 pub(super) fn short(change: f64, size: f64) -> f64 {
+    if change.abs() >= 4.0 * SHORT * size && size > 0.0 {
+        return 0.0;
+    }
     let share = change.abs() / (SHORT * size).max(f64::MIN_POSITIVE);
     let t = ((share - 1.0) / 3.0).clamp(0.0, 1.0);
     1.0 - t * t * (3.0 - 2.0 * t)
+}
+
+/// The defect as an integral over the nodes of the arc, and its weight against a difference with the
+/// error `rounding`.
+fn safer<M: Space>(
+    f: &impl ScalarField<M>,
+    Nodes { ends: [x, y], middle }: &Nodes<M>,
+    (base, slope): (impl FnOnce() -> f64, f64),
+    rounding: f64,
+) -> (f64, f64) {
+    let middle = middle.as_ref().map_or_else(base, |z| f.at_real(z).eps1);
+    let integral = Integral::new([f.at_real(x), f.at_real(y)], middle, slope);
+    (integral.value, integral.weight(rounding))
 }
 
 impl<M: Manifold> Chord<M> {
@@ -50,29 +68,28 @@ impl<M: Manifold> Chord<M> {
     /// `start` is `F(x)`, `end` the point `x'` with `F(x')`, `base` the slope `⟨dF(z), d⟩` at the base
     /// point, and `nodes` those of the arc.
     #[inline]
-    pub fn new(
+    pub fn new<N: Borrow<Nodes<M>>>(
         f: &impl ScalarField<M>,
         mean: &Vector<M>,
         d: &Vector<M>,
         start: f64,
         end: (&M::Point<f64>, f64),
         base: impl FnOnce() -> f64,
-        nodes: impl FnOnce() -> Nodes<M>,
+        nodes: impl FnOnce() -> N,
     ) -> Self {
         let (end, value) = end;
         let slope = mean.dot(d);
-        let size = start.abs() + value.abs() + M::magnitude(end) * mean.magnitude();
+        let steepness = mean.magnitude();
+        let size = start.abs() + value.abs() + M::magnitude(end) * steepness;
         let rounding = f64::EPSILON * size;
         let difference = (value - start) - slope;
-        let share = short(mean.magnitude() * d.magnitude(), size);
+        // Far from round-off, and most often, the difference is all.
+        let share = short(steepness * d.magnitude(), size);
         let (mut defect, mut noise) = (difference, rounding);
         if share > 0.0 {
-            let Nodes { ends: [x, y], middle } = nodes();
-            let middle = middle.map_or_else(base, |z| f.at_real(&z).eps1);
-            let integral = Integral::new([f.at_real(&x), f.at_real(&y)], middle, slope);
-            let weight = share * integral.weight(rounding);
-            defect += weight * (integral.value - difference);
-            noise *= 1.0 - weight;
+            let (better, weight) = safer(f, nodes().borrow(), (base, slope), rounding);
+            defect += share * weight * (better - difference);
+            noise *= 1.0 - share * weight;
         }
         Self { mean: *mean, defect, rounding, noise }
     }

@@ -1,0 +1,72 @@
+//! Instructions of one step, counted by callgrind, against a snapshot.
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::path::Path;
+use std::process::{Command, Stdio};
+
+use crate::Row;
+
+/// A count that differs by more than this share from the snapshot is an error.
+const ALLOWED: f64 = 0.03;
+/// A count is the difference of two runs, so that the start of the program drops out.
+const RUNS: [usize; 2] = [100, 300];
+
+/// Takes the steps of one row, alone in its process.
+pub(crate) fn count(rows: &[Row], name: &str, steps: usize) {
+    for row in rows.iter().filter(|row| row.name == name) {
+        std::hint::black_box((row.run)(steps));
+    }
+}
+
+/// The instructions that callgrind counts in a run of one row.
+fn collected(name: &str, steps: usize) -> Option<f64> {
+    let program = std::env::current_exe().ok()?;
+    let output = Command::new("valgrind")
+        .args(["--tool=callgrind", "--callgrind-out-file=/dev/null"])
+        .arg(program)
+        .args(["--row", name, &steps.to_string()])
+        .output()
+        .ok()?;
+    let text = String::from_utf8_lossy(&output.stderr).into_owned();
+    let line = text.lines().find(|line| line.contains("Collected"))?;
+    line.rsplit(' ').next()?.parse().ok()
+}
+
+/// Counts every row and compares the counts with the snapshot, or writes it.
+pub(crate) fn compare(rows: &[Row], bless: bool) {
+    let valgrind = Command::new("valgrind").arg("--version").stdout(Stdio::null()).status();
+    if valgrind.is_err() {
+        println!("valgrind is not installed: the instructions are not counted");
+        return;
+    }
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("benches/step/snapshot.txt");
+    let known: BTreeMap<String, f64> = std::fs::read_to_string(&path)
+        .unwrap_or_default()
+        .lines()
+        .filter_map(|line| {
+            let mut words = line.split_whitespace();
+            Some((words.next()?.to_owned(), words.next()?.parse().ok()?))
+        })
+        .collect();
+    let (mut table, mut worse) = (String::from("# row, instructions, sweeps per step\n"), false);
+    for row in rows {
+        let [few, many] = RUNS.map(|steps| collected(&row.name, steps).expect("callgrind counts"));
+        let each = (many - few) / (RUNS[1] - RUNS[0]) as f64;
+        let sweeps = (row.run)(RUNS[1]).sweeps;
+        let sweeps = sweeps.map_or("-".to_owned(), |n| format!("{:.2}", n as f64 / RUNS[1] as f64));
+        writeln!(table, "{:32} {each:10.0} {sweeps:>6}", row.name).expect("a string takes it all");
+        let change = known.get(&row.name).map(|before| each / before - 1.0);
+        let change_text = change.map_or("new".to_owned(), |c| format!("{:+.1} %", 100.0 * c));
+        println!("{:32} {each:10.0} {sweeps:>6}  {change_text}", row.name);
+        worse |= change.is_none_or(|change| change.abs() > ALLOWED);
+    }
+    if bless {
+        std::fs::write(&path, table).expect("the snapshot is written");
+    } else {
+        assert!(
+            !worse,
+            "a count has left its band of 3 %: if it should, `just instructions --bless`"
+        );
+    }
+}

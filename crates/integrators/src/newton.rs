@@ -6,11 +6,12 @@ use crate::root_finder::{Equation, Linearised, NoRoot, Root, RootFinder};
 
 /// Newton's method, damped, down to round-off.
 ///
-/// The Jacobian is kept as long as it serves: with a good guess one of them is enough for a step,
-/// and each further correction costs only a residual.
+/// The inverse of a Jacobian is kept as long as it serves, from one step to the next: each correction
+/// then costs only a residual, from which the inverse learns (Broyden 1965). A correction that leaves too
+/// much of the residual asks for a new Jacobian.
 ///
-/// The last correction is not followed by another residual if the contraction so far says that it
-/// would be a tenth of the floor.
+/// The last correction is not followed by another residual if the worst contraction of late says that
+/// it would be a tenth of the floor.
 ///
 /// It stops where the residual is at the floor that the equation states, or where it no longer
 /// falls within a small multiple of it: a stall *at* the floor is convergence, a stall above it is
@@ -172,6 +173,7 @@ impl Newton {
                 // costs one more solution to take it out.
                 if let Some(last) = correction {
                     best.best -= last;
+                    best.residual *= contraction.min(1.0);
                 }
                 return Progress::Solved;
             }

@@ -80,6 +80,9 @@ impl<N: Dimension> Inverse<N> {
     }
 }
 
+/// The multiple of the floor below which a residual says little about its Jacobian.
+const NEAR: f64 = 10.0;
+
 /// Where a Jacobian is first used.
 struct Start<M: Space> {
     residual: Vector<M>,
@@ -160,7 +163,8 @@ impl Newton {
         };
         let mut residual = here.residual;
         let mut correction = inverse.as_deref().and_then(|inverse| correct(inverse, &residual));
-        // Before a Jacobian has been seen to contract, nothing is left to it.
+        // Before a Jacobian has been seen to contract here, nothing is left to it: the frame may have
+        // turned since the last step, as that of a sphere does across its equator.
         let mut contraction = f64::INFINITY;
         loop {
             if best.residual <= 0.1 * floor {
@@ -187,12 +191,13 @@ impl Newton {
             (best.best, best.residual) = (next.u, residual.magnitude());
             contraction = best.residual / before;
             if best.residual > self.reuse * before && best.residual > floor {
-                let at_floor = best.residual <= stalled;
-                return if at_floor && best.residual > 0.5 * before {
-                    Progress::Solved
-                } else {
-                    Progress::Slow
-                };
+                if best.residual <= stalled && best.residual > 0.5 * before {
+                    return Progress::Solved;
+                }
+                // Close to the floor it is the round-off that is slow, not the Jacobian.
+                if best.residual > NEAR * floor {
+                    return Progress::Slow;
+                }
             }
             correction = correct(inverse, &residual);
             // The change of a residual near its floor is noise.

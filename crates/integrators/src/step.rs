@@ -379,9 +379,10 @@ impl<N: Dimension> Memory<N> {
         let mut difference = *d;
         for last in &mut self.differences {
             let next = difference - *last;
-            *last = M::transport(x, &end, &difference);
+            *last = difference;
             difference = next;
         }
+        M::transport_all(x, &end, &mut self.differences);
         self.known = DIFFERENCES.min(self.known + 1);
         let lost = metric.lost(x, d, &end);
         match self.carry {

@@ -32,6 +32,14 @@ pub trait Manifold: Space {
         *v
     }
 
+    /// [`transport`](Self::transport) of several vectors at once.
+    #[inline]
+    fn transport_all(x: &Self::Point<f64>, y: &Self::Point<f64>, vectors: &mut [Vector<Self>]) {
+        for v in vectors {
+            *v = Self::transport(x, y, v);
+        }
+    }
+
     /// A random point, spread over a unit scale.
     fn random(&self, rng: &mut impl Rng) -> Self::Point<f64>;
 

@@ -244,6 +244,18 @@ macro_rules! sphere {
                 frame::<$a, $n>(y).tr_mul(&(frame::<$a, $n>(x) * v))
             }
 
+            #[inline]
+            fn transport_all(
+                x: &SVector<f64, $a>,
+                y: &SVector<f64, $a>,
+                vectors: &mut [SVector<f64, $n>],
+            ) {
+                let turn = frame::<$a, $n>(y).tr_mul(&frame::<$a, $n>(x));
+                for v in vectors {
+                    *v = turn * *v;
+                }
+            }
+
             fn project(&self, x: &SVector<f64, $a>) -> SVector<f64, $a> {
                 normalised(x)
             }

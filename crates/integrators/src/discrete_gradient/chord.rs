@@ -36,7 +36,7 @@ pub struct Chord<M: Space> {
 
 /// The share of `|F| + |dF||x|` by which a step changes `F`, at which a difference of two values of
 /// `F` starts to be trusted; from four times that share on it is trusted alone.
-const SHORT: f64 = 2.5e-4;
+const SHORT: f64 = 1e-3;
 
 /// The weight of an integral against a difference of two values of size `size` that is about
 /// `change`: it falls from 1 to 0 between one and four times the short share, with zero slope at both.

@@ -133,7 +133,7 @@ where
 
 /// The definition of [`DiscreteGradient::mean_jet`]: one dual number for each direction.
 fn by_dual_numbers<M: Manifold>(
-    gradient: &(impl DiscreteGradient + ?Sized),
+    gradient: &impl DiscreteGradient,
     f: &impl ScalarField<M>,
     x: &M::Point<f64>,
     jet: &ArcJet<M>,
@@ -180,7 +180,7 @@ fn partial<M: Space, D: Scalar>(
 const GAUSS: [(f64, f64); 4] = [
     (0.069_431_844_202_973_71, 0.173_927_422_568_726_93),
     (0.330_009_478_207_571_87, 0.326_072_577_431_273_07),
-    (0.669_990_521_792_428_13, 0.326_072_577_431_273_07),
+    (0.669_990_521_792_428_1, 0.326_072_577_431_273_07),
     (0.930_568_155_797_026_3, 0.173_927_422_568_726_93),
 ];
 

@@ -65,7 +65,8 @@ pub mod prelude {
     };
     pub use metriplectic_fields::{MatrixField, Real, Scalar, ScalarField};
     pub use metriplectic_integrators::{
-        Certificate, Error, Newton, Run, RunError, Scheme, Span, State, Trajectory,
+        Attitude, AttitudeError, Certificate, Error, Newton, Run, RunError, Scheme, Span, State,
+        Trajectory,
     };
     pub use metriplectic_manifolds::{
         Canonical, Cayley, Chart, Euclidean, Exponential, HalfLine, LieAlgebra, LieDual, Manifold,

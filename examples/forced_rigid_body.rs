@@ -1,103 +1,79 @@
-//! The relaxing rigid body from its Lagrangian and a force: the Euler-Poincaré route, and what it adds.
+//! The rigid body from its Lagrangian and a force: the Euler-Poincaré route to both laws.
 //!
-//! With the reduced Lagrangian `l(Ω) = ½Σ I_i Ω_i²` of a body with `I = (10, 5, 1)` and the force
-//! `F = κ(Ω × p)` of a positive semidefinite form `κ`, the forced Euler-Poincaré equations (Bloch, Farré
-//! Puiggalí and Martín de Diego 2024, §3) are
+//! With the Lagrangian `l(Ω) = ½Σ I_iΩ_i²`, `I = (10, 5, 1)`, and the force `F = κ(Ω × p)` of a positive
+//! semidefinite form `κ`, the equations of Bloch, Farré Puiggalí and Martín de Diego (2024), §3, are
 //!
 //! ```text
-//! p' = (p + F) × Ω,   p = ∂l/∂Ω = IΩ,   H = Ω·p − l,   (½|p|²)' = κ(Ω × p, Ω × p) ≥ 0 .
+//! p' = (p + F) × Ω,   p = ∂l/∂Ω,   H = Ω·p − l,   S = ½|p|²,   S' = κ(Ω × p, Ω × p) ≥ 0 .
 //! ```
 //!
-//! They keep the energy whatever `κ` is. With `κ = 1` they are the metriplectic system of the flat
-//! metric, and the two routes agree to round-off. A force about the first axis alone, `κ = e₁e₁ᵀ`, is no
-//! metric's: the body takes another way to the same end, the axis of largest inertia.
+//! They keep the energy whatever `κ` is. With `κ = 1` they are those of the flat metric, and a step is the
+//! same to round-off. A force about one axis, `κ = e₁e₁ᵀ`, is not that of a metric: `S' = (p₂p₃)²(1/I₂ − 1/I₃)²`
+//! is of fourth order near the last spin, about the axis of largest inertia, which it reaches like `1/t`.
 
 use std::error::Error;
 
 use metriplectic::prelude::*;
-use metriplectic_studies::{Gallery, Options, Panel, Panels, print, write_csv};
+use metriplectic_studies::{Gallery, Options, Panel, Panels, print};
 
 const INERTIA: Vector3<f64> = Vector3::new(10.0, 5.0, 1.0);
 const START: Vector3<f64> = Vector3::new(0.2, 0.1, 1.0);
-
-/// The body relaxed by the force of the form `κ`.
-fn forced(
-    kappa: Matrix3<f64>,
-) -> Result<impl Metriplectic<Manifold = LieDual<3>, Metric = Canonical>, Box<dyn Error>> {
-    let so3 = LieDual::so3();
-    let force = CasimirDissipation::new(so3.algebra(), kappa)?;
-    Ok(System::on(so3)
-        .lagrangian(|omega: &Vector3<Real>| omega.component_mul(omega).dot(&INERTIA.cast()) * 0.5)
-        .entropy(|p: &Vector3<Real>| p.norm_squared() * 0.5)
-        .dissipation(force)
-        .build()?)
-}
+type Body = LieDual<3>;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let options = Options::read();
-    let (count, h) = (options.steps_or(500), options.step_size_or(0.1));
+    let (count, h) = (options.steps_or(1000), options.step_size_or(0.1));
 
-    let metric = System::on(LieDual::so3())
-        .energy(|p: &Vector3<Real>| p.component_mul(p).component_div(&INERTIA.cast()).sum() * 0.5)
-        .entropy(|p: &Vector3<Real>| p.norm_squared() * 0.5)
-        .build()?;
-    let span = Span::steps(h, count).at_most(2000);
-    let metric = WeylMidpoint.run(&metric, START, span)?;
-    let whole = WeylMidpoint.run(&forced(Matrix3::identity())?, START, span)?;
-    let about_e1 = Matrix3::from_diagonal(&vector![1.0, 0.0, 0.0]);
-    let single = WeylMidpoint.run(&forced(about_e1)?, START, span)?;
-    let (certificate, end) = (whole.certificate(), whole.last());
-    let energy = certificate.initial_energy;
-    let top = energy * INERTIA.x;
-    let apart: Vec<_> =
-        metric.iter().zip(&whole).map(|(a, b)| (a.time, (a.point - b.point).norm())).collect();
-    let difference = apart.iter().map(|(_, off)| *off).fold(0.0, f64::max);
-
-    let gallery = Gallery::open()?;
-    let line = |run: &Trajectory<LieDual<3>>,
-                value: &dyn Fn(&State<LieDual<3>>) -> f64|
-     -> Vec<_> { run.iter().map(|state| (state.time, value(state))).collect() };
-    let momenta = |title: &str, run: &Trajectory<LieDual<3>>| {
-        let panel = Panel::new(title, "t").line("p₁", line(run, &|s| s.point.x));
-        panel.line("p₂", line(run, &|s| s.point.y)).line("p₃", line(run, &|s| s.point.z))
+    let entropy = |p: &Vector3<Real>| p.norm_squared() * 0.5;
+    let span = Span::steps(h, count).at_most(2001);
+    let forced = |kappa: Vector3<f64>| -> Result<Trajectory<Body>, Box<dyn Error>> {
+        let form = Matrix3::from_diagonal(&kappa);
+        let body = System::on(LieDual::so3())
+            .lagrangian(|w: &Vector3<Real>| w.component_mul(w).dot(&INERTIA.cast()) * 0.5)
+            .dissipation(CasimirDissipation::new(LieDual::so3().algebra(), form)?)
+            .entropy(entropy)
+            .build()?;
+        Ok(WeylMidpoint.run(&body, START, span)?)
     };
-    let pair = |title: &str, value: &dyn Fn(&State<LieDual<3>>) -> f64| {
-        let panel = Panel::new(title, "t").line("κ = 1", line(&whole, value));
-        panel.line("κ = e₁e₁ᵀ", line(&single, value))
+    let (all, one) = (forced(vector![1.0, 1.0, 1.0])?, forced(vector![1.0, 0.0, 0.0])?);
+    let flat = System::on(LieDual::so3())
+        .energy(|p: &Vector3<Real>| p.component_mul(p).component_div(&INERTIA.cast()).sum() * 0.5)
+        .entropy(entropy)
+        .build()?;
+    let metric = WeylMidpoint.run(&flat, START, span)?;
+    let distance = |(a, b): (&State<Body>, &State<Body>)| (a.time, (a.point - b.point).norm());
+    let apart: Vec<_> = all.iter().zip(&metric).map(distance).collect();
+    let worst = apart.iter().fold(0.0, |worst: f64, (_, off)| worst.max(*off));
+
+    let (gallery, certificate) = (Gallery::open()?, all.certificate());
+    let energy = certificate.initial_energy;
+    let line = |run: &Trajectory<Body>, value: &dyn Fn(&State<Body>) -> f64| -> Vec<_> {
+        run.iter().map(|state| (state.time, value(state))).collect()
+    };
+    let both = |title: &str, value: &dyn Fn(&State<Body>) -> f64| {
+        let panel = Panel::new(title, "t").line("κ = 1", line(&all, value));
+        panel.line("κ = e₁e₁ᵀ", line(&one, value))
     };
     Panels::new(format!("The rigid body from its Lagrangian and a force, I = (10, 5, 1), h = {h}"))
-        .columns(2)
-        .panel(momenta("κ = 1", &whole))
-        .panel(momenta("κ = e₁e₁ᵀ", &single))
-        .panel(pair("entropy S, maximum H I₁", &|s| s.entropy).level(top))
-        .panel(pair("energy H − H₀", &|s| s.energy - energy).level(0.0))
-        .panel(Panel::new("|p − p of the metric|, κ = 1", "t").line("", apart))
+        .columns(3)
+        .panel(both("p₁", &|s| s.point.x))
+        .panel(both("p₂", &|s| s.point.y))
+        .panel(both("p₃", &|s| s.point.z))
+        .panel(both("energy H − H₀", &|s| s.energy - energy).level(0.0))
+        .panel(both("entropy S, maximum H I₁", &|s| s.entropy).level(energy * INERTIA.x))
+        .panel(Panel::new("κ = 1: |p − p of the metric|", "t").logarithmic(1e-17).line("", apart))
         .save(gallery.path("forced_rigid_body.svg"))?;
-    write_csv(
-        gallery.path("forced_rigid_body.csv"),
-        ["t", "p1", "p2", "p3", "q1", "q2", "q3"],
-        whole.iter().zip(&single).map(|(a, b)| {
-            [a.time, a.point.x, a.point.y, a.point.z, b.point.x, b.point.y, b.point.z]
-        }),
-    )?;
 
     if options.json {
         let mut report = serde_json::to_value(certificate)?;
         report["max_relative_energy_error"] = certificate.max_relative_energy_error().into();
-        report["final_state"] = end.point.as_slice().into();
-        report["difference_of_the_routes"] = difference.into();
-        report["about_one_axis"] = serde_json::to_value(single.certificate())?;
-        report["final_state_about_one_axis"] = single.last().point.as_slice().into();
+        report["final_state"] = all.last().point.as_slice().into();
+        report["apart"] = worst.into();
+        report["about_one_axis"] = serde_json::to_value(one.certificate())?;
         print(report)?;
     } else {
-        print(format_args!("κ = 1\n{certificate}\nκ = e₁e₁ᵀ\n{}", single.certificate()))?;
-        print(format_args!(
-            "at t = {:.1}:  S = {:.6} and {:.6}, at rest {top:.6}",
-            end.time,
-            end.entropy,
-            single.last().entropy
-        ))?;
-        print(format_args!("routes:      |p − p of the metric| ≤ {difference:.1e}"))?;
+        print(format_args!("κ = 1\n{certificate}\nκ = e₁e₁ᵀ\n{}", one.certificate()))?;
+        print(format_args!("routes:      |p − p of the metric| ≤ {worst:.1e}"))?;
         print(format_args!("figure:      {}", gallery.path("forced_rigid_body.svg").display()))?;
     }
     Ok(())

@@ -33,6 +33,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let top = System::on(LieDual::se3())
         .energy(|x: &Vector6<Real>| spin(&x.xyz()) + x[5])
         .entropy(|x: &Vector6<Real>| x[0] * x[3] + x[1] * x[4] + x[2] * x[5])
+        .casimir(square)
         .dissipation(torque)
         .build()?;
     let inclined = rotations::exp(&vector![0.0, 60_f64.to_radians(), 0.0]);

@@ -37,6 +37,9 @@ fn main() -> Result<(), Box<dyn Error>> {
         .bracket((Symplectic, Zero))
         .energy(|((_, p), s): &Point| spin(p) + (s.x / CAPACITY).exp() * CAPACITY)
         .entropy(|(_, s): &Point| s.x)
+        .momentum(|((r, p), _): &Point| (r * p).x)
+        .momentum(|((r, p), _): &Point| (r * p).y)
+        .momentum(|((r, p), _): &Point| (r * p).z)
         .dissipation(FieldDissipation(rubbing))
         .build()?;
     let p0 = vector![0.15, 0.1, 2.0];

@@ -43,7 +43,7 @@
 //! | [`Bracket`](dynamics::Bracket) | `Π` | [`dynamics`] |
 //! | [`Dissipation`](dynamics::Dissipation) | `K`, given the covector it must kill | [`dynamics`] |
 //! | [`System`](dynamics::System) | all of these with `H` and `S` | [`dynamics`] |
-//! | [discrete gradient](integrators::gonzalez) | a covector with `⟨w, d⟩ = ΔH` | [`integrators`] |
+//! | [`DiscreteGradient`](integrators::DiscreteGradient) | a covector with `⟨w, d⟩ = ΔH` | [`integrators`] |
 //! | [`RootFinder`](integrators::RootFinder) | [`Newton`](integrators::Newton), and argmin as the globaliser | [`integrators`] |
 //! | [`Scheme`](integrators::Scheme) | one step: guess, solve, retract | [`integrators`] |
 //! | [`Trajectory`](integrators::Trajectory) | steps in a row, with their [`Certificate`](integrators::Certificate) | [`integrators`] |
@@ -65,8 +65,8 @@ pub mod prelude {
     };
     pub use metriplectic_fields::{MatrixField, Real, Scalar, ScalarField};
     pub use metriplectic_integrators::{
-        Attitude, AttitudeError, Certificate, Error, Newton, Run, RunError, Scheme, Span, State,
-        Trajectory,
+        Attitude, AttitudeError, Certificate, Error, Gonzalez, ItohAbe, MeanValue, Newton, Run,
+        RunError, Scheme, Span, State, SymmetricItohAbe, Trajectory,
     };
     pub use metriplectic_manifolds::{
         Canonical, Cayley, Chart, Euclidean, Exponential, HalfLine, LieAlgebra, LieDual, Manifold,

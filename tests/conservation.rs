@@ -26,7 +26,7 @@ where
         let state = run.advance().expect("every step is solved");
         drift.push((state.energy - start) / start);
     }
-    (drift, *run.certificate())
+    (drift, run.certificate().clone())
 }
 
 /// No drift: the worst of the last tenth is at most three times that of the first, where less than
@@ -104,7 +104,7 @@ where
     (0..=40).map(move |k| {
         let h = 0.1 * 10.0_f64.powf(0.1 * f64::from(k));
         let run = WeylMidpoint.run(system, x0, Span::steps(h, 1000)).expect("every step is solved");
-        (h, *run.certificate())
+        (h, run.certificate().clone())
     })
 }
 
@@ -163,14 +163,7 @@ where
 {
     let mut steps = Scheme::new(retraction).steps(system, x0, h).expect("the model keeps its laws");
     let x = steps.advance().expect("the step is solved").point;
-    let residual = Residual {
-        system,
-        retraction: &retraction,
-        x: &x,
-        h: -h,
-        energy: system.energy_at(&x),
-        recall: 0.0,
-    };
+    let residual = Residual::new(system, (&retraction, &Gonzalez), &x, -h);
     residual.at::<f64>(&(x0 - x)).expect("the residual is defined").norm()
 }
 

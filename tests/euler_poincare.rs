@@ -76,7 +76,7 @@ where
     assert!(certificate.keeps_energy(), "{certificate}");
     // Newton's method has the right Jacobian.
     assert!(certificate.worst_sweeps <= 6 && certificate.retries == 0, "{certificate}");
-    *certificate
+    certificate.clone()
 }
 
 #[test]

@@ -33,7 +33,7 @@ fn json(output: &Output) -> serde_json::Value {
 fn the_relaxing_rigid_body_prints_one_object() {
     let report = json(&example("relaxing_rigid_body", &["--json"]));
     assert_eq!(report["steps"], 1000);
-    assert_eq!(report["second_law"], "Casimir");
+    assert_eq!(report["second_law"], "Exact");
     let number = |key: &str| report[key].as_f64().expect("a number");
     assert!(number("max_relative_energy_error") <= 5e-15);
     assert!(number("min_entropy_increment") > 0.0);
@@ -104,7 +104,7 @@ fn the_spin_heats_its_bath_and_comes_to_rest_in_the_field() {
     let report = json(&example("spin_in_a_bath", &["--json"]));
     let ([energy, entropy, defect], state) = certified(&report);
     assert!(energy <= 1e-14 && entropy > 0.0 && defect <= 1e-15, "{report}");
-    assert_eq!((&report["second_law"], &report["entropy_falls"]), (&"Casimir".into(), &0.into()));
+    assert_eq!((&report["second_law"], &report["entropy_falls"]), (&"Exact".into(), &0.into()));
     assert!(state.len() == 4 && (state[2] - 1.0).abs() < 1e-6, "{report}");
     // All of the spin's energy is in the bath.
     let [end, rest] = ["temperature", "temperature_at_rest"].map(|key| report[key].as_f64());

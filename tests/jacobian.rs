@@ -82,8 +82,7 @@ fn agrees_with<Y: Metriplectic, R: Retraction<Y::Manifold, Y::Metric>>(
     x: &<Y::Manifold as metriplectic::fields::Space>::Point<f64>,
     u: &metriplectic::fields::Vector<Y::Manifold>,
 ) -> Result<(), TestCaseError> {
-    let residual =
-        Residual { system, retraction, x, h: 0.1, energy: system.energy_at(x), recall: 0.0 };
+    let residual = Residual::new(system, (retraction, &Gonzalez), x, 0.1);
     let Some(assembled) = residual.linearise(u) else {
         return Err(TestCaseError::fail("the residual is defined"));
     };

@@ -309,6 +309,7 @@ impl<Y: Metriplectic, K: Dissipation<Y::Manifold, Y::Metric>> Metriplectic for W
     type Dissipation = K;
     type Energy = Y::Energy;
     type Entropy = Y::Entropy;
+    type Invariants = Y::Invariants;
 
     fn manifold(&self) -> &Y::Manifold {
         self.system.manifold()
@@ -332,6 +333,10 @@ impl<Y: Metriplectic, K: Dissipation<Y::Manifold, Y::Metric>> Metriplectic for W
 
     fn entropy(&self) -> &Y::Entropy {
         self.system.entropy()
+    }
+
+    fn invariants(&self) -> &Y::Invariants {
+        self.system.invariants()
     }
 
     fn second_law(&self) -> SecondLaw {

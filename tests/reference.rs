@@ -47,7 +47,12 @@ fn one_step_of_the_spinning_top_is_the_published_one() {
 
 #[test]
 fn one_step_of_pure_relaxation_on_the_sphere_is_the_published_one() {
-    let system = System::on(Sphere::<2>::round()).energy(top).entropy(hill).build().unwrap();
+    let system = System::on(Sphere::<2>::round())
+        .energy(top)
+        .entropy(hill)
+        .second_law(SecondLaw::Published)
+        .build()
+        .unwrap();
     assert!(one_step(&system, "sphere_relaxation", 0.1) < 1e-13);
 }
 
@@ -69,6 +74,7 @@ fn one_step_on_the_rotation_group_is_the_published_one() {
         .bracket(Nambu::default())
         .energy(|r: &Matrix3<Real>| r.m11 + r.m22 * 2.0 + r.m33 * 3.0 + r.m12 * r.m23 * 0.5)
         .entropy(|r: &Matrix3<Real>| r.m13 - r.m21 * 0.5 + (r.m31 + r.m32).powi(2) * 0.25)
+        .second_law(SecondLaw::Published)
         .build()
         .unwrap();
     let start = Matrix3::from_row_slice(&data::<9>("so3_nambu", "x0"));

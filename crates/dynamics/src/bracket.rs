@@ -91,6 +91,12 @@ pub trait Bracket<M: Manifold, G: Riemannian<M>> {
     fn is_zero(&self) -> bool {
         false
     }
+
+    /// Whether `Π` is built from the covector of the entropy at its [`Site`] and kills it, whatever
+    /// covector it is. A discrete gradient of the entropy is then killed too.
+    fn kills_its_entropy(&self) -> bool {
+        self.is_zero()
+    }
 }
 
 /// The definition of [`Bracket::linearise`]: one dual number for each direction.

@@ -103,6 +103,12 @@ pub trait Dissipation<M: Manifold, G: Riemannian<M>> {
         false
     }
 
+    /// Whether it is defined by what it has to kill, so that further invariants of a system are
+    /// projected out of it too. Any other dissipation must kill them of its own.
+    fn adapts(&self) -> bool {
+        false
+    }
+
     /// Whether a tensor that does not kill `w` was projected until it does, so that `K` is not quite
     /// the one that was written down; see [`ProjectedDissipation`].
     fn is_projected(&self) -> bool {

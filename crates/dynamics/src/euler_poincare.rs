@@ -42,13 +42,13 @@ use nalgebra::{SMatrix, SVector};
 
 use crate::SystemBuilder;
 
-impl<G, B, K, H, S, const N: usize> SystemBuilder<LieDual<N>, G, B, K, H, S> {
+impl<G, B, K, H, S, I, const N: usize> SystemBuilder<LieDual<N>, G, B, K, H, S, I> {
     /// The energy `h(μ) = ⟨μ, ξ⟩ − l(ξ)` of a reduced Lagrangian `l`, a closure `|ξ| -> Real` on the
     /// Lie algebra or any other [`ScalarField`] on it: that of [`Legendre::of`].
     pub fn lagrangian<L: ScalarField<Euclidean<N>>>(
         self,
         l: L,
-    ) -> SystemBuilder<LieDual<N>, G, B, K, Legendre<L, N>, S> {
+    ) -> SystemBuilder<LieDual<N>, G, B, K, Legendre<L, N>, S, I> {
         self.energy(Legendre::of(l))
     }
 }

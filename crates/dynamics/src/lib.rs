@@ -11,14 +11,20 @@
 //! | [`dissipation`] | [`Dissipation`]: `K`, given the covector it must kill; [`MetricDissipation`], [`CometricDissipation`], [`KulkarniNomizu`], [`CasimirDissipation`], [`FieldDissipation`], [`ProjectedDissipation`], [`Scaled`] |
 //! | [`euler_poincare`] | [`Legendre`]: a reduced Lagrangian on a Lie algebra, as an energy on its dual |
 //! | [`system`] | [`System`] and its builder |
+//! | [`invariants`] | further Casimirs and momenta `L_a`, and symmetries |
+//! | [`orthogonal`] | projections off covectors, by which a tensor is made to kill them |
+//! | [`velocity`](mod@velocity) | `Π w_H + K w_S` for given covectors: differentials, or discrete gradients |
 //! | [`verify`] | the laws of a model, sampled: [`System::verify`], [`System::report`] |
 //! | [`laws`] | what brackets and dissipations promise, and the functions that check it |
 
 pub mod bracket;
 pub mod dissipation;
 pub mod euler_poincare;
+pub mod invariants;
 pub mod laws;
+pub mod orthogonal;
 pub mod system;
+pub mod velocity;
 pub mod verify;
 
 pub use bracket::{
@@ -30,6 +36,7 @@ pub use dissipation::{
     FormError, KulkarniNomizu, MetricDissipation, NoDissipation, ProjectedDissipation, Scaled,
 };
 pub use euler_poincare::{Legendre, LegendreError};
+pub use invariants::Invariants;
 pub use system::{
     BuildError, Metriplectic, NoEnergy, NoEntropy, Point, SecondLaw, System, SystemBuilder,
 };

@@ -2,11 +2,15 @@
 
 use std::fmt;
 
-use metriplectic_fields::{ChartPoint, Matrix, Scalar, ScalarField, Space, Vector, differential};
+use metriplectic_fields::{
+    ChartPoint, Dimension, Matrix, Real, Scalar, ScalarField, Space, Vector,
+};
 use metriplectic_manifolds::{Canonical, Manifold, MetricError, Riemannian};
 
 use crate::bracket::Site;
 use crate::dissipation::{Choice, Given};
+use crate::invariants::{Casimir, Invariants, Momentum, Symmetry};
+use crate::velocity;
 use crate::verify::{self, ModelError, Report};
 use crate::{Bracket, Dissipation, NaturalBracket, NoDissipation};
 
@@ -24,6 +28,8 @@ pub trait Metriplectic {
     type Energy: ScalarField<Self::Manifold>;
     /// The entropy `S`.
     type Entropy: ScalarField<Self::Manifold>;
+    /// The further invariants `L_a`.
+    type Invariants: Invariants<Self::Manifold>;
 
     /// Where the state lives.
     fn manifold(&self) -> &Self::Manifold;
@@ -37,7 +43,9 @@ pub trait Metriplectic {
     fn energy(&self) -> &Self::Energy;
     /// The entropy `S`.
     fn entropy(&self) -> &Self::Entropy;
-    /// What the model promises about its entropy.
+    /// The further invariants `L_a`.
+    fn invariants(&self) -> &Self::Invariants;
+    /// Which scheme the entropy is treated by, and what that promises.
     fn second_law(&self) -> SecondLaw;
 
     /// The energy `H(x)`.
@@ -62,7 +70,8 @@ pub trait Metriplectic {
         Site { space: self.manifold(), metric: self.metric(), x, s }
     }
 
-    /// The velocity `Π dH + K dS`, by the definition and at any scalar.
+    /// The velocity `Π dH + K dS`, by the definition and at any scalar. Further invariants are
+    /// killed by `K`.
     ///
     /// # Errors
     ///
@@ -71,9 +80,9 @@ pub trait Metriplectic {
         &self,
         x: &ChartPoint<Self::Manifold, D>,
     ) -> Result<Vector<Self::Manifold, D>, MetricError> {
-        let (dh, ds) = (differential(self.energy(), x), differential(self.entropy(), x));
-        let reversible = self.bracket().apply(&self.site(x, &ds), &dh)?;
-        Ok(reversible + self.dissipation().apply(self.metric(), x, &dh, &ds)?)
+        let w = velocity::differentials(self, x);
+        let reversible = self.bracket().apply(&self.site(x, &w.entropy), &w.energy)?;
+        Ok(reversible + velocity::irreversible(self, x, &w)?)
     }
 
     /// Checks the laws of the model at `x0` and at sampled points within `radius` of it, in chart
@@ -103,11 +112,13 @@ pub enum SecondLaw {
     /// There is no entropy: the system is Hamiltonian.
     #[default]
     NoEntropy,
-    /// `S` is a Casimir of the bracket, `Π dS = 0`, and verification refuses the model otherwise.
-    /// Then `S' = K(dS, dS) ≥ 0`.
-    Casimir,
-    /// The scheme as published, for an entropy that need not be a Casimir. The first law still
-    /// holds exactly; the second is not promised, and the certificate says so.
+    /// Both laws exactly, in each step: `ΔS = h K(w_S, w_S) ≥ 0` with a discrete gradient `w_S` of the
+    /// entropy, which takes the place of `dS` and is killed by the bracket. `S` must be a Casimir,
+    /// `Π dS = 0`, and verification refuses the model otherwise: there is no such scheme then.
+    Exact,
+    /// The scheme as published (Bloch, Farré Puiggalí, Martín de Diego 2024, §4.4), with `dS(z)` at
+    /// the base point and `Π(z)` as it is. The first law holds exactly; `ΔS ≥ −O(h³)`, of either sign,
+    /// is not promised, and the certificate says so. `S` need not be a Casimir.
     Published,
 }
 
@@ -127,14 +138,14 @@ impl<M: Space> ScalarField<M> for NoEntropy {
 }
 
 /// A metriplectic system on the manifold `M` with metric `G`, bracket `B`, dissipation `K`, energy
-/// `H` and entropy `S`; built by [`System::on`].
+/// `H`, entropy `S` and further invariants `L`; built by [`System::on`].
 #[derive(Clone)]
-pub struct System<M, G, B, K, H, S> {
-    parts: SystemBuilder<M, G, B, K, H, S>,
+pub struct System<M, G, B, K, H, S, L = ()> {
+    parts: SystemBuilder<M, G, B, K, H, S, L>,
 }
 
 /// The system that a builder makes, with the dissipation that its choice `K` has come to.
-pub type Built<M, G, B, K, H, S> = System<M, G, B, <K as Choice>::Dissipation, H, S>;
+pub type Built<M, G, B, K, H, S, L> = System<M, G, B, <K as Choice>::Dissipation, H, S, L>;
 
 impl System<(), (), (), (), (), ()> {
     /// Starts a system on a manifold, with the manifold's canonical metric and its natural bracket
@@ -163,6 +174,7 @@ impl System<(), (), (), (), (), ()> {
             dissipation: NoDissipation,
             energy: NoEnergy,
             entropy: NoEntropy,
+            invariants: (),
             second_law: SecondLaw::NoEntropy,
         }
     }
@@ -171,18 +183,19 @@ impl System<(), (), (), (), (), ()> {
 /// A system in the making: each method replaces one part.
 #[derive(Clone)]
 #[must_use = "a builder does nothing until `build` is called"]
-pub struct SystemBuilder<M, G, B, K, H, S> {
+pub struct SystemBuilder<M, G, B, K, H, S, L = ()> {
     manifold: M,
     metric: G,
     bracket: B,
     dissipation: K,
     energy: H,
     entropy: S,
+    invariants: L,
     second_law: SecondLaw,
 }
 
 // By hand, because closures have no `Debug`.
-impl<M: fmt::Debug, G, B, K, H, S> fmt::Debug for System<M, G, B, K, H, S> {
+impl<M: fmt::Debug, G, B, K, H, S, L> fmt::Debug for System<M, G, B, K, H, S, L> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let SystemBuilder { manifold, second_law, .. } = &self.parts;
         f.debug_struct("System")
@@ -192,7 +205,7 @@ impl<M: fmt::Debug, G, B, K, H, S> fmt::Debug for System<M, G, B, K, H, S> {
     }
 }
 
-impl<M: fmt::Debug, G, B, K, H, S> fmt::Debug for SystemBuilder<M, G, B, K, H, S> {
+impl<M: fmt::Debug, G, B, K, H, S, L> fmt::Debug for SystemBuilder<M, G, B, K, H, S, L> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("SystemBuilder")
             .field("manifold", &self.manifold)
@@ -201,11 +214,22 @@ impl<M: fmt::Debug, G, B, K, H, S> fmt::Debug for SystemBuilder<M, G, B, K, H, S
     }
 }
 
-impl<M: Manifold, G, B, K, H, S> SystemBuilder<M, G, B, K, H, S> {
+impl<M: Manifold, G, B, K, H, S, L> SystemBuilder<M, G, B, K, H, S, L> {
     /// The energy `H`: a closure `|x| -> Real` or any other [`ScalarField`].
-    pub fn energy<F: ScalarField<M>>(self, energy: F) -> SystemBuilder<M, G, B, K, F, S> {
-        let Self { manifold, metric, bracket, dissipation, entropy, second_law, .. } = self;
-        SystemBuilder { manifold, metric, bracket, dissipation, energy, entropy, second_law }
+    pub fn energy<F: ScalarField<M>>(self, energy: F) -> SystemBuilder<M, G, B, K, F, S, L> {
+        let Self {
+            manifold, metric, bracket, dissipation, entropy, invariants, second_law, ..
+        } = self;
+        SystemBuilder {
+            manifold,
+            metric,
+            bracket,
+            dissipation,
+            energy,
+            entropy,
+            invariants,
+            second_law,
+        }
     }
 
     /// The entropy `S`: a closure `|x| -> Real` or any other [`ScalarField`]. It must be a Casimir
@@ -215,43 +239,147 @@ impl<M: Manifold, G, B, K, H, S> SystemBuilder<M, G, B, K, H, S> {
     pub fn entropy<F: ScalarField<M>>(
         self,
         entropy: F,
-    ) -> SystemBuilder<M, G, B, K::WithEntropy, H, F>
+    ) -> SystemBuilder<M, G, B, K::WithEntropy, H, F, L>
     where
         K: Choice,
     {
-        let Self { manifold, metric, bracket, dissipation, energy, second_law, .. } = self;
+        let Self { manifold, metric, bracket, dissipation, energy, invariants, second_law, .. } =
+            self;
         let second_law = match second_law {
-            SecondLaw::NoEntropy => SecondLaw::Casimir,
+            SecondLaw::NoEntropy => SecondLaw::Exact,
             chosen => chosen,
         };
         let dissipation = dissipation.with_entropy();
-        SystemBuilder { manifold, metric, bracket, dissipation, energy, entropy, second_law }
+        SystemBuilder {
+            manifold,
+            metric,
+            bracket,
+            dissipation,
+            energy,
+            entropy,
+            invariants,
+            second_law,
+        }
     }
 
     /// What produces the entropy, in place of the dissipation of the metric: any
     /// [`Dissipation`], such as those of the table in [`dissipation`](crate::dissipation).
-    pub fn dissipation<F>(self, dissipation: F) -> SystemBuilder<M, G, B, Given<F>, H, S> {
-        let Self { manifold, metric, bracket, energy, entropy, second_law, .. } = self;
+    pub fn dissipation<F>(self, dissipation: F) -> SystemBuilder<M, G, B, Given<F>, H, S, L> {
+        let Self { manifold, metric, bracket, energy, entropy, invariants, second_law, .. } = self;
         let dissipation = Given(dissipation);
-        SystemBuilder { manifold, metric, bracket, dissipation, energy, entropy, second_law }
+        SystemBuilder {
+            manifold,
+            metric,
+            bracket,
+            dissipation,
+            energy,
+            entropy,
+            invariants,
+            second_law,
+        }
     }
 
     /// The Riemannian metric: [`Metric::constant`](metriplectic_manifolds::Metric::constant) or
     /// [`Metric::field`](metriplectic_manifolds::Metric::field).
-    pub fn metric<F: Riemannian<M>>(self, metric: F) -> SystemBuilder<M, F, B, K, H, S> {
-        let Self { manifold, bracket, dissipation, energy, entropy, second_law, .. } = self;
-        SystemBuilder { manifold, metric, bracket, dissipation, energy, entropy, second_law }
+    pub fn metric<F: Riemannian<M>>(self, metric: F) -> SystemBuilder<M, F, B, K, H, S, L> {
+        let Self {
+            manifold, bracket, dissipation, energy, entropy, invariants, second_law, ..
+        } = self;
+        SystemBuilder {
+            manifold,
+            metric,
+            bracket,
+            dissipation,
+            energy,
+            entropy,
+            invariants,
+            second_law,
+        }
     }
 
     /// The Poisson tensor: [`LiePoisson`](crate::LiePoisson), [`Zero`](crate::Zero),
     /// [`Poisson::constant`](crate::Poisson::constant), [`Poisson::field`](crate::Poisson::field),
     /// [`AreaForm`](crate::AreaForm) or [`Nambu`](crate::Nambu).
-    pub fn bracket<F>(self, bracket: F) -> SystemBuilder<M, G, F, K, H, S> {
-        let Self { manifold, metric, dissipation, energy, entropy, second_law, .. } = self;
-        SystemBuilder { manifold, metric, bracket, dissipation, energy, entropy, second_law }
+    pub fn bracket<F>(self, bracket: F) -> SystemBuilder<M, G, F, K, H, S, L> {
+        let Self { manifold, metric, dissipation, energy, entropy, invariants, second_law, .. } =
+            self;
+        SystemBuilder {
+            manifold,
+            metric,
+            bracket,
+            dissipation,
+            energy,
+            entropy,
+            invariants,
+            second_law,
+        }
     }
 
-    /// What is promised about the entropy; [`SecondLaw::Published`] allows one that is not a
+    /// A further Casimir `C` of the bracket, `Π dC = 0`, which each step keeps to round-off: a closure
+    /// `|x| -> Real` or any other [`ScalarField`].
+    ///
+    /// The dissipation of the metric is projected off its differential; another one must satisfy
+    /// `K dC = 0` of its own.
+    pub fn casimir<F: ScalarField<M>>(
+        self,
+        casimir: F,
+    ) -> SystemBuilder<M, G, B, K, H, S, (L, Casimir<F>)> {
+        self.with_invariant(Casimir(casimir))
+    }
+
+    /// A momentum `J`, conserved because the energy is symmetric, `⟨dJ, Π dH⟩ = 0`, which each step
+    /// keeps to round-off: a closure `|x| -> Real` or any other [`ScalarField`].
+    ///
+    /// The dissipation of the metric is projected off its differential; another one must satisfy
+    /// `K dJ = 0` of its own.
+    pub fn momentum<F: ScalarField<M>>(
+        self,
+        momentum: F,
+    ) -> SystemBuilder<M, G, B, K, H, S, (L, Momentum<F>)> {
+        self.with_invariant(Momentum(momentum))
+    }
+
+    /// A one-parameter group of symmetries, as a closure `|t, x| -> Φ_t(x)` with `Φ_0(x) = x`, and
+    /// its momentum map `J`, with `Π dJ = dΦ_t/dt` at `t = 0`. `J` is kept as a
+    /// [`momentum`](Self::momentum); verification checks at sampled points that `Φ_t` preserves the
+    /// bracket and the energy, and belongs to `J`.
+    pub fn symmetry<A, F>(
+        self,
+        action: A,
+        momentum: F,
+    ) -> SystemBuilder<M, G, B, K, H, S, (L, Symmetry<A, F>)>
+    where
+        A: Fn(Real, &M::Point<Real>) -> M::Point<Real>,
+        F: ScalarField<M>,
+    {
+        self.with_invariant(Symmetry { action, momentum })
+    }
+
+    fn with_invariant<T>(self, one: T) -> SystemBuilder<M, G, B, K, H, S, (L, T)> {
+        let Self {
+            manifold,
+            metric,
+            bracket,
+            dissipation,
+            energy,
+            entropy,
+            invariants,
+            second_law,
+        } = self;
+        let invariants = (invariants, one);
+        SystemBuilder {
+            manifold,
+            metric,
+            bracket,
+            dissipation,
+            energy,
+            entropy,
+            invariants,
+            second_law,
+        }
+    }
+
+    /// Which scheme the entropy is treated by; [`SecondLaw::Published`] allows one that is not a
     /// Casimir.
     pub fn second_law(mut self, second_law: SecondLaw) -> Self {
         self.second_law = second_law;
@@ -259,7 +387,7 @@ impl<M: Manifold, G, B, K, H, S> SystemBuilder<M, G, B, K, H, S> {
     }
 }
 
-impl<M: Manifold, G, B, K, H, S> SystemBuilder<M, G, B, K, H, S> {
+impl<M: Manifold, G, B, K, H, S, L> SystemBuilder<M, G, B, K, H, S, L> {
     /// Checks the structure and finishes the system. The laws that need a point are checked by
     /// [`Metriplectic::verify`], which every run calls.
     ///
@@ -267,15 +395,25 @@ impl<M: Manifold, G, B, K, H, S> SystemBuilder<M, G, B, K, H, S> {
     ///
     /// [`BuildError`] if the parts do not make a system.
     // The bounds stand on the method, so that a part that does not fit is explained as such.
-    pub fn build(self) -> Result<Built<M, G, B, K, H, S>, BuildError>
+    pub fn build(self) -> Result<Built<M, G, B, K, H, S, L>, BuildError>
     where
         G: Riemannian<M>,
         B: Bracket<M, G>,
         K: Choice<Dissipation: Dissipation<M, G>>,
         H: ScalarField<M>,
         S: ScalarField<M>,
+        L: Invariants<M>,
     {
-        let Self { manifold, metric, bracket, dissipation, energy, entropy, second_law } = self;
+        let Self {
+            manifold,
+            metric,
+            bracket,
+            dissipation,
+            energy,
+            entropy,
+            invariants,
+            second_law,
+        } = self;
         let dissipation = dissipation.chosen();
         let has_entropy = !Dissipation::<M, G>::is_none(&dissipation);
         if !has_entropy && Bracket::<M, G>::is_zero(&bracket) {
@@ -284,13 +422,24 @@ impl<M: Manifold, G, B, K, H, S> SystemBuilder<M, G, B, K, H, S> {
         if has_entropy == (second_law == SecondLaw::NoEntropy) {
             return Err(BuildError::SecondLawWithoutEntropy);
         }
-        let parts =
-            SystemBuilder { manifold, metric, bracket, dissipation, energy, entropy, second_law };
+        if L::COUNT >= M::Dim::LEN {
+            return Err(BuildError::TooManyInvariants { count: L::COUNT, dimension: M::Dim::LEN });
+        }
+        let parts = SystemBuilder {
+            manifold,
+            metric,
+            bracket,
+            dissipation,
+            energy,
+            entropy,
+            invariants,
+            second_law,
+        };
         Ok(System { parts })
     }
 }
 
-impl<M, G, B, K, H, S> Metriplectic for System<M, G, B, K, H, S>
+impl<M, G, B, K, H, S, L> Metriplectic for System<M, G, B, K, H, S, L>
 where
     M: Manifold,
     G: Riemannian<M>,
@@ -298,6 +447,7 @@ where
     K: Dissipation<M, G>,
     H: ScalarField<M>,
     S: ScalarField<M>,
+    L: Invariants<M>,
 {
     type Manifold = M;
     type Metric = G;
@@ -305,6 +455,7 @@ where
     type Dissipation = K;
     type Energy = H;
     type Entropy = S;
+    type Invariants = L;
 
     #[inline]
     fn manifold(&self) -> &M {
@@ -336,6 +487,12 @@ where
         &self.parts.entropy
     }
 
+    #[inline]
+    fn invariants(&self) -> &L {
+        &self.parts.invariants
+    }
+
+    #[inline]
     fn second_law(&self) -> SecondLaw {
         self.parts.second_law
     }
@@ -351,6 +508,17 @@ pub enum BuildError {
     /// A promise about an entropy that is not there, or an entropy without one.
     #[error("the second law speaks of an entropy, and this system has none; give `.entropy(..)`")]
     SecondLawWithoutEntropy,
+    /// As many invariants as there are dimensions.
+    #[error(
+        "{count} further invariants leave nothing to move in {dimension} dimensions; list only \
+         independent ones"
+    )]
+    TooManyInvariants {
+        /// How many there are.
+        count: usize,
+        /// The dimension of the manifold.
+        dimension: usize,
+    },
 }
 
 /// The matrix of a metric, for reports.

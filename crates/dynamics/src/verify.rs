@@ -6,13 +6,17 @@
 
 use std::fmt;
 
-use metriplectic_fields::{ChartPoint, Column, Jet2, Matrix, ScalarField, Space, Square, Vector};
+use metriplectic_fields::{
+    ChartPoint, Column, Jet2, Matrix, Real, ScalarField, Space, Square, Vector,
+};
 use metriplectic_manifolds::{Manifold, MetricError, PointError, Riemannian};
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
 
+use crate::invariants::{Action, Invariants, Kind, Visitor};
 use crate::laws::bracket_defects;
 use crate::system::{Metriplectic, Point, SecondLaw, metric_matrix};
+use crate::velocity::independence;
 use crate::{Bracket, Dissipation};
 
 /// Points sampled around the start, beside the start itself.
@@ -109,6 +113,12 @@ fn examine<Y: Metriplectic + ?Sized>(
     if let Some(unfit) = value_not_finite(system, x0) {
         return Err(unfit);
     }
+    let mut independent = vec![0.0_f64; Y::Invariants::COUNT];
+    let mut widen = |x: &Point<Y>| {
+        let shares = independence(system, &ChartPoint::centre(x)).unwrap_or_default();
+        independent.iter_mut().zip(shares).for_each(|(most, share)| *most = most.max(share));
+    };
+    widen(x0);
     let mut first = examine_at(system, x0, &mut rng, report);
     for _ in 0..SAMPLES {
         let q = Vector::<Y::Manifold>::from_index(|_| radius * rng.random_range(-1.0..1.0));
@@ -116,11 +126,20 @@ fn examine<Y: Metriplectic + ?Sized>(
         if value_not_finite(system, &x).is_some() {
             report.passed_over += 1;
         } else {
+            widen(&x);
             first = first.and(examine_at(system, &x, &mut rng, report));
         }
     }
-    first
+    first?;
+    match independent.iter().position(|share| *share < DEPENDENT) {
+        Some(index) => Err(ModelError::DependentInvariant { index, share: independent[index] }),
+        None => Ok(()),
+    }
 }
+
+/// The share of an invariant's differential that is independent of the other fields' somewhere near
+/// the start, below which it is taken for a function of them.
+const DEPENDENT: f64 = 1e-8;
 
 /// A field whose value at `x` is not a finite number.
 fn value_not_finite<Y: Metriplectic + ?Sized>(system: &Y, x: &Point<Y>) -> Option<ModelError> {
@@ -160,6 +179,7 @@ fn examine_at<Y: Metriplectic + ?Sized>(
     examine_metric(system, x)?;
     examine_bracket(system, x, &entropy, &mut findings)?;
     examine_dissipation(system, x, &energy, &entropy, rng, &mut findings)?;
+    examine_invariants(system, x, &energy, &entropy, &mut findings)?;
     findings.first.map_or(Ok(()), Err)
 }
 
@@ -216,7 +236,7 @@ fn examine_bracket<Y: Metriplectic + ?Sized>(
     let here = system.site(&centre, &entropy.df);
     let velocity = system.bracket().apply(&here, &entropy.df).map_err(metric)?;
     let size = relative(velocity.magnitude(), defects.size * entropy.df.magnitude());
-    if system.second_law() == SecondLaw::Casimir {
+    if system.second_law() == SecondLaw::Exact {
         findings.note("Π dS = 0", size, |point| ModelError::EntropyNotCasimir { point, size });
     }
     Ok(())
@@ -274,6 +294,133 @@ fn examine_dissipation<Y: Metriplectic + ?Sized>(
         findings.note("K_w w = 0", size, |point| ModelError::CovectorNotKilled { point, size });
     }
     Ok(())
+}
+
+/// Each further invariant has finite derivatives, is conserved for the reason it is listed for, and
+/// the dissipation leaves it alone.
+fn examine_invariants<Y: Metriplectic + ?Sized>(
+    system: &Y,
+    x: &Point<Y>,
+    energy: &Jet2<Y::Manifold>,
+    entropy: &Jet2<Y::Manifold>,
+    findings: &mut Findings<'_>,
+) -> Result<(), ModelError> {
+    let mut examined =
+        Invariance { system, x, energy, entropy, findings, dj: None, failed: Ok(()) };
+    system.invariants().each(&mut examined);
+    examined.failed
+}
+
+/// Examines the invariants, one after the other.
+struct Invariance<'a, 'b, Y: Metriplectic + ?Sized> {
+    system: &'a Y,
+    x: &'a Point<Y>,
+    energy: &'a Jet2<Y::Manifold>,
+    entropy: &'a Jet2<Y::Manifold>,
+    findings: &'a mut Findings<'b>,
+    /// The differential of the one visited last.
+    dj: Option<Vector<Y::Manifold>>,
+    failed: Result<(), ModelError>,
+}
+
+impl<Y: Metriplectic + ?Sized> Visitor<Y::Manifold> for Invariance<'_, '_, Y> {
+    fn visit(&mut self, kind: Kind, f: &impl ScalarField<Y::Manifold>) {
+        let outcome = self.conserved(kind, f);
+        self.failed = std::mem::replace(&mut self.failed, Ok(())).and(outcome);
+    }
+
+    fn acts(&mut self, action: &Action<'_, Y::Manifold>) {
+        let outcome = self.symmetric(action);
+        self.failed = std::mem::replace(&mut self.failed, Ok(())).and(outcome);
+    }
+}
+
+impl<Y: Metriplectic + ?Sized> Invariance<'_, '_, Y> {
+    fn conserved(
+        &mut self,
+        kind: Kind,
+        f: &impl ScalarField<Y::Manifold>,
+    ) -> Result<(), ModelError> {
+        let Self { system, x, energy, entropy, findings, .. } = self;
+        let metric = |source| ModelError::Metric { source, point: Y::Manifold::entries(x) };
+        let dl = jet(f, "invariant", x)?.df;
+        self.dj = Some(dl);
+        let centre = ChartPoint::<Y::Manifold>::centre(x);
+        let site = system.site(&centre, &entropy.df);
+        let tensor = system.bracket().tensor(&site).map_err(metric)?;
+        let scale = tensor.max_abs() * dl.magnitude();
+        match kind {
+            Kind::Casimir => {
+                let size = relative((tensor * dl).magnitude(), scale);
+                findings.note("Π dC = 0", size, |point| ModelError::NotCasimir { point, size });
+            }
+            Kind::Momentum => {
+                let rate = dl.dot(&(tensor * energy.df)).abs();
+                let size = relative(rate, scale * energy.df.magnitude());
+                findings.note("⟨dJ, Π dH⟩ = 0", size, |point| ModelError::NotMomentum {
+                    point,
+                    size,
+                });
+            }
+        }
+        let k = system.dissipation();
+        if !k.is_none() && !k.adapts() {
+            let tensor = k.tensor(system.metric(), &centre, &energy.df).map_err(metric)?;
+            let size = relative((tensor * dl).magnitude(), tensor.max_abs() * dl.magnitude());
+            findings.note("K dL = 0", size, |point| ModelError::InvariantNotKept { point, size });
+        }
+        Ok(())
+    }
+
+    /// The action preserves the bracket and the energy, and moves points along `Π dJ`.
+    fn symmetric(&mut self, action: &Action<'_, Y::Manifold>) -> Result<(), ModelError> {
+        let Self { system, x, energy, entropy, findings, dj, .. } = self;
+        let metric = |source| ModelError::Metric { source, point: Y::Manifold::entries(x) };
+        let moved = |t: Real, q: &Vector<Y::Manifold, Real>| action(t, &Y::Manifold::chart(x, q));
+        let still = Vector::<Y::Manifold, Real>::zero();
+        let y = Y::Manifold::real(&moved(FAR.into(), &still));
+        let size = (system.energy_at(&y) - energy.value).abs() / energy.value.abs().max(1.0);
+        findings.note("H∘Φ = H", size, |point| ModelError::EnergyNotSymmetric { point, size });
+
+        // T Π(x) Tᵀ = Π(Φ(x)) with the derivative T of the map.
+        let tangent = jacobian_of::<Y>(&y, &|q| moved(FAR.into(), q));
+        let tensor = |x: &Point<Y>, ds: &Vector<Y::Manifold>| {
+            let centre = ChartPoint::<Y::Manifold>::centre(x);
+            system.bracket().tensor(&system.site(&centre, ds)).map_err(metric)
+        };
+        let (here, there) = (tensor(x, &entropy.df)?, tensor(&y, &system.entropy().jet1(&y).df)?);
+        let transposed = Matrix::<Y::Manifold>::from_entries(|i, j| tangent[(j, i)]);
+        let off = (tangent * here * transposed - there).max_abs();
+        let size = relative(off, there.max_abs() + here.max_abs());
+        findings.note("Φ is Poisson", size, |point| ModelError::ActionNotPoisson { point, size });
+
+        let Some(dj) = dj else { return Ok(()) };
+        let along = moved(Real::new(0.0, 1.0, 0.0, 0.0), &still);
+        let at_rest = Y::Manifold::coordinates(x, &along);
+        let generator = Vector::<Y::Manifold>::from_index(|i| at_rest[i].eps1);
+        let field = here * *dj;
+        let start = Vector::<Y::Manifold>::from_index(|i| at_rest[i].re).magnitude();
+        let off = (field - generator).magnitude() + start;
+        let size = relative(off, field.magnitude() + generator.magnitude());
+        findings.note("Π dJ = Φ'", size, |point| ModelError::ActionNotOfMomentum { point, size });
+        Ok(())
+    }
+}
+
+/// How far along an action a symmetry is tried.
+const FAR: f64 = 0.7;
+
+/// The derivative of a map from the chart at some point to the chart at `y`.
+fn jacobian_of<Y: Metriplectic + ?Sized>(
+    y: &Point<Y>,
+    map: &dyn Fn(&Vector<Y::Manifold, Real>) -> <Y::Manifold as Space>::Point<Real>,
+) -> Matrix<Y::Manifold> {
+    Matrix::<Y::Manifold>::from_columns(|k| {
+        let seed = |i| Real::new(0.0, if i == k { 1.0 } else { 0.0 }, 0.0, 0.0);
+        let moved =
+            Y::Manifold::coordinates(y, &map(&Vector::<Y::Manifold, Real>::from_index(seed)));
+        Vector::<Y::Manifold>::from_index(|i| moved[i].eps1)
+    })
 }
 
 /// `size / scale`, where a law about nothing holds.
@@ -363,6 +510,82 @@ pub enum ModelError {
          use a Casimir, give S a factor of its own, or ask for `SecondLaw::Published`"
     )]
     EntropyNotCasimir {
+        /// The entries of the point.
+        point: Vec<f64>,
+        /// The relative size of the violation.
+        size: f64,
+    },
+    /// A function listed as a Casimir is none.
+    #[error(
+        "an invariant listed as a Casimir is not one at {point:?}: Π dC is {size:.1e} of |Π||dC|; if it \
+         is conserved because the energy is symmetric, list it by `.momentum(..)`"
+    )]
+    NotCasimir {
+        /// The entries of the point.
+        point: Vec<f64>,
+        /// The relative size of the violation.
+        size: f64,
+    },
+    /// A function listed as a momentum is not conserved.
+    #[error(
+        "an invariant listed as a momentum is not conserved at {point:?}: ⟨dJ, Π dH⟩ is {size:.1e} of \
+         |dJ||Π||dH|"
+    )]
+    NotMomentum {
+        /// The entries of the point.
+        point: Vec<f64>,
+        /// The relative size of the violation.
+        size: f64,
+    },
+    /// The dissipation changes a further invariant.
+    #[error(
+        "the dissipation changes an invariant at {point:?}: K dL is {size:.1e} of |K||dL|; use a \
+         dissipation that kills it, or that of the metric, which is projected"
+    )]
+    InvariantNotKept {
+        /// The entries of the point.
+        point: Vec<f64>,
+        /// The relative size of the violation.
+        size: f64,
+    },
+    /// A further invariant is a function of the other fields.
+    #[error(
+        "invariant {index} depends on the other fields around the start: only {share:.1e} of its \
+         differential is independent of theirs; leave it out of the list"
+    )]
+    DependentInvariant {
+        /// Which one, in the order of the list, counted from 0.
+        index: usize,
+        /// The share of its differential that is independent.
+        share: f64,
+    },
+    /// An action changes the energy.
+    #[error(
+        "the action is no symmetry of the energy at {point:?}: it changes by {size:.1e} of itself"
+    )]
+    EnergyNotSymmetric {
+        /// The entries of the point.
+        point: Vec<f64>,
+        /// The relative size of the violation.
+        size: f64,
+    },
+    /// An action changes the bracket.
+    #[error(
+        "the action does not preserve the bracket at {point:?}: it changes Π by {size:.1e} of it, so \
+         it is no Poisson map"
+    )]
+    ActionNotPoisson {
+        /// The entries of the point.
+        point: Vec<f64>,
+        /// The relative size of the violation.
+        size: f64,
+    },
+    /// An action and its momentum map do not belong together.
+    #[error(
+        "the action does not belong to its momentum map at {point:?}: dΦ_t/dt at t = 0 and Π dJ \
+         differ by {size:.1e} of their size; check the sign, and that Φ_0(x) = x"
+    )]
+    ActionNotOfMomentum {
         /// The entries of the point.
         point: Vec<f64>,
         /// The relative size of the violation.

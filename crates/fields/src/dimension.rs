@@ -161,6 +161,25 @@ pub trait Square<D: Scalar>:
     /// The matrix whose entry in row `i`, column `j` is `f(i, j)`.
     fn from_entries(f: impl FnMut(usize, usize) -> D) -> Self;
 
+    /// The matrix whose `j`-th column is `f(j)`.
+    #[inline]
+    fn from_columns(mut f: impl FnMut(usize) -> Self::Column) -> Self {
+        let mut matrix = Self::zeros();
+        for j in 0..Self::Column::LEN {
+            let column = f(j);
+            for i in 0..Self::Column::LEN {
+                matrix[(i, j)] = column[i];
+            }
+        }
+        matrix
+    }
+
+    /// The `j`-th column.
+    #[inline]
+    fn column_at(&self, j: usize) -> Self::Column {
+        Self::Column::from_index(|i| self[(i, j)])
+    }
+
     /// The matrix, factored.
     type Factors: Factors<Self::Column>;
 

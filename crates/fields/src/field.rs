@@ -181,6 +181,16 @@ impl<M: Space> MatrixJet<M> {
     }
 }
 
+/// The matrix with the columns `(∂_k A) v`, the derivative of `A v` along the chart, from the
+/// `slopes` of `A`.
+#[inline]
+pub fn along_slopes<M: Space>(
+    slopes: &<M::Dim as Dimension>::Array<Matrix<M>>,
+    v: &Vector<M>,
+) -> Matrix<M> {
+    Matrix::<M>::from_columns(|k| slopes[k] * *v)
+}
+
 /// The centre of the chart at `x` with seeds along the directions `i` and `j`.
 fn seeds<M: Space>(x: &M::Point<f64>, i: usize, j: usize) -> ChartPoint<M, Real> {
     let part = |k, direction| if k == direction { 1.0 } else { 0.0 };

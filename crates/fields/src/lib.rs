@@ -33,9 +33,9 @@ pub mod scalar;
 pub mod series;
 pub mod space;
 
-pub use differential::{differential, hessian, jacobian};
+pub use differential::{differential, differential_at, hessian, hessian_at, jacobian};
 pub use dimension::{Column, Dimension, Factors, NotPositive, Plus, Square};
-pub use field::{Jet1, Jet2, MatrixField, MatrixJet, ScalarField};
+pub use field::{Jet1, Jet2, MatrixField, MatrixJet, ScalarField, along_slopes};
 pub use laws::BrokenLaw;
 pub use scalar::{Real, Scalar};
 pub use space::{ChartPoint, Form, Matrix, Space, Vector, Velocity};

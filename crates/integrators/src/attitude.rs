@@ -25,7 +25,8 @@
 //!
 //! `|τ| = O(h³)`, so the order is 2. Of a free body `R p` is constant to round-off, and `τ = 0` for one
 //! that spins about a principal axis. With the discrete gradient instead of `dH(z)` this holds for every
-//! energy, quadratic or not; it is that of the run for metrics that do not vary.
+//! energy, quadratic or not: `w` is that of a run by [`Gonzalez`](crate::Gonzalez), the default, with a
+//! metric that does not vary. For other runs the attitude is of order 2 and the momentum kept within it.
 
 use metriplectic_dynamics::Metriplectic;
 use metriplectic_fields::{ChartPoint, ScalarField, Space};
@@ -35,7 +36,7 @@ use metriplectic_manifolds::{
 };
 use nalgebra::{Matrix3, Vector3};
 
-use crate::gonzalez::Chord;
+use crate::discrete_gradient::Chord;
 use crate::trajectory::{State, Trajectory};
 
 /// The attitude `R(t)` of a body, a rotation from its frame to space, along a run on so(3)*; see the
@@ -140,7 +141,8 @@ impl<'a, Y: Metriplectic<Manifold = LieDual<3>>> Attitude<'a, Y> {
         let nodes = WeylMidpoint.along(&Canonical, x, &d)?;
         let end = (&next.point, next.energy);
         let df = energy.jet1(&z).df;
-        let chord = Chord::new(energy, &df, &d, self.state.energy, end, || nodes);
+        let start = self.state.energy;
+        let chord = Chord::new(energy, &df, &d, start, end, || df.dot(&d), || nodes);
         let g = self.system.metric().at(&ChartPoint::<LieDual<3>>::centre(&z))?;
         Ok(chord.covector(0.0, &g, &d))
     }

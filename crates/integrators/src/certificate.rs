@@ -2,13 +2,16 @@
 
 use std::fmt;
 
-use metriplectic_dynamics::SecondLaw;
+use metriplectic_dynamics::invariants::{Invariants as _, Kind, Visitor};
+use metriplectic_dynamics::system::Point;
+use metriplectic_dynamics::{Metriplectic, SecondLaw};
+use metriplectic_fields::ScalarField;
 
 /// The balance of a run: what became of the two laws, of the manifold, and what it cost.
 ///
 /// All figures of the laws are evaluated from the closures at the stored points, none from the
 /// terms of the scheme.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Certificate {
     /// The energy `H(x₀)`.
@@ -24,6 +27,11 @@ pub struct Certificate {
     /// Steps on which the entropy fell by more than its round-off
     /// `4ε (max(|S|, 1) + |dS||x|)`.
     pub entropy_falls: usize,
+    /// `min |w_S|`, the size of the discrete gradient of the entropy in the exact scheme, which has
+    /// order 2 as long as this is large against `h²`; infinite (in JSON, null) without such a one.
+    pub min_entropy_slope: f64,
+    /// What became of the further invariants, in their order.
+    pub invariants: Vec<Kept>,
     /// `max` of the manifold's defect.
     pub max_manifold_defect: f64,
     /// Steps taken.
@@ -39,11 +47,47 @@ pub struct Certificate {
     /// What the model promises about its entropy; serialized as the name of the variant.
     #[cfg_attr(feature = "serde", serde(serialize_with = "by_name"))]
     pub second_law: SecondLaw,
+    /// Whether the dissipation was projected so that it keeps the energy, and is not quite the tensor
+    /// that was written down ([`ProjectedDissipation`](metriplectic_dynamics::ProjectedDissipation)).
+    pub projected: bool,
+}
+
+/// What became of a further invariant.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct Kept {
+    /// Why it is conserved; serialized as its name.
+    #[cfg_attr(feature = "serde", serde(serialize_with = "by_name"))]
+    pub kind: Kind,
+    /// Its value `L(x₀)`.
+    pub initial: f64,
+    /// `max |L(x_k) − L(x₀)|`.
+    pub max_error: f64,
+}
+
+impl Kept {
+    /// The further invariants of a system at the start of a run.
+    pub(crate) fn of<Y: Metriplectic>(system: &Y, x0: &Point<Y>) -> Vec<Self> {
+        struct At<'a, Y: Metriplectic>(&'a Point<Y>, Vec<Kept>);
+        impl<Y: Metriplectic> Visitor<Y::Manifold> for At<'_, Y> {
+            fn visit(&mut self, kind: Kind, f: &impl ScalarField<Y::Manifold>) {
+                self.1.push(Kept { kind, initial: f.at(self.0), max_error: 0.0 });
+            }
+        }
+        let mut at = At::<Y>(x0, Vec::new());
+        system.invariants().each(&mut at);
+        at.1
+    }
+
+    /// Whether it was kept to round-off: `|L − L₀| ≤ 50 ε max(|L₀|, 1)`.
+    pub fn is_kept(&self) -> bool {
+        self.max_error <= 50.0 * f64::EPSILON * self.initial.abs().max(1.0)
+    }
 }
 
 #[cfg(feature = "serde")]
-fn by_name<S: serde::Serializer>(law: &SecondLaw, serializer: S) -> Result<S::Ok, S::Error> {
-    serializer.collect_str(&format_args!("{law:?}"))
+fn by_name<S: serde::Serializer>(name: &impl fmt::Debug, to: S) -> Result<S::Ok, S::Error> {
+    to.collect_str(&format_args!("{name:?}"))
 }
 
 impl Certificate {
@@ -65,6 +109,11 @@ impl Certificate {
     pub const fn keeps_entropy(&self) -> bool {
         self.entropy_falls == 0
     }
+
+    /// Whether every further invariant was kept to round-off.
+    pub fn keeps_invariants(&self) -> bool {
+        self.invariants.iter().all(Kept::is_kept)
+    }
 }
 
 impl fmt::Display for Certificate {
@@ -84,6 +133,16 @@ impl fmt::Display for Certificate {
             }
             _ => writeln!(f, "second law:  {}", self.entropy_line()),
         }?;
+        if self.projected {
+            writeln!(f, "friction:    projected so that K dH = 0, not quite the tensor given")?;
+        }
+        for (index, Kept { kind, initial, max_error }) in self.invariants.iter().enumerate() {
+            writeln!(
+                f,
+                "{:<13}|L − L₀| ≤ {max_error:.1e}, L₀ = {initial:.6}",
+                format!("{kind} {}:", index + 1)
+            )?;
+        }
         writeln!(f, "manifold:    defect ≤ {:.1e}", self.max_manifold_defect)?;
         write!(
             f,
@@ -124,13 +183,16 @@ mod tests {
         min_entropy_increment: -2e-9,
         entropy_gained: 0.25,
         entropy_falls: 1,
+        min_entropy_slope: 0.7,
+        invariants: Vec::new(),
         max_manifold_defect: 0.0,
         steps: 7,
         sweeps: 9,
         worst_sweeps: 2,
         retries: 1,
         globalised: 0,
-        second_law: SecondLaw::Casimir,
+        second_law: SecondLaw::Exact,
+        projected: false,
     };
 
     #[test]

@@ -36,6 +36,23 @@ pub enum StepError {
         /// A step size to try next.
         suggested: f64,
     },
+    /// A further invariant was not kept, because its differential is a combination of those of the
+    /// other fields: it cannot be projected out beside them.
+    #[error(
+        "invariant {index} changed by {change:.1e} in the step from t = {time}: only {share:.1e} of its \
+         differential is independent of the other fields' there; leave it out of the list, or \
+         keep away from such states"
+    )]
+    DependentInvariants {
+        /// The time at which the step starts.
+        time: f64,
+        /// Which one, in the order of the list, counted from 0.
+        index: usize,
+        /// By how much it changed.
+        change: f64,
+        /// The share of its differential that is independent.
+        share: f64,
+    },
     /// A field is not defined around the start of the step.
     #[error(
         "the step of size {h:.3e} from t = {time} leaves the domain of the model wherever it goes \

@@ -6,10 +6,11 @@ use metriplectic_fields::{
 };
 use metriplectic_manifolds::{Arc, Manifold, Nodes, Retraction, Riemannian};
 
-use crate::gonzalez::{Chord, gonzalez};
+use crate::discrete_gradient::{Chord, DiscreteGradient};
+use crate::residual::Recall;
 use crate::step::{Memory, Scheme, Start};
 
-/// Checks the Gonzalez discrete gradient of `f` on the arc of `u` from `x`:
+/// Checks a discrete gradient of `f` on the arc of `u` from `x`:
 ///
 /// 1. mean value: `⟨w, d⟩ = F(x') − F(x)`; 2. consistency: `w → dF(z)` like `|d|²` on arcs that
 ///    shrink; 3. the covector that is safe against round-off agrees with the definition as far as
@@ -18,7 +19,8 @@ use crate::step::{Memory, Scheme, Start};
 /// # Errors
 ///
 /// The first law that is broken.
-pub fn discrete_gradient<M, G, R>(
+pub fn discrete_gradient<M, G, R, W>(
+    gradient: &W,
     f: &impl ScalarField<M>,
     metric: &G,
     retraction: &R,
@@ -29,16 +31,19 @@ where
     M: Manifold,
     G: Riemannian<M>,
     R: Retraction<M, G>,
+    W: DiscreteGradient,
 {
     let missing = |law| move |_| BrokenLaw { law, size: f64::NAN, bound: 0.0 };
     let start: f64 = f.at(x);
     let along = |u: &Vector<M>| -> Result<_, BrokenLaw> {
         let arc: Arc<M> = retraction.arc(metric, x, u).map_err(missing("the arc exists"))?;
         let g = metric.at(&arc.z).map_err(missing("the metric exists"))?;
-        let w = gonzalez(f, &g, &arc, start);
+        let w = gradient.covector(f, &g, (x, start), &arc);
         let df = differential(f, &ChartPoint::centre(&arc.z.point()));
         let end: f64 = f.at(&arc.end);
-        let chord = Chord::new(f, &df, &arc.d, start, (&arc.end, end), || {
+        let mean = gradient.real_mean(f, x, &arc);
+        let base = || df.dot(&arc.d);
+        let chord = Chord::new(f, &mean, &arc.d, start, (&arc.end, end), base, || {
             retraction
                 .along(metric, x, u)
                 .unwrap_or_else(|_| Nodes { ends: [x, &arc.end].map(M::constant), middle: None })
@@ -67,10 +72,16 @@ where
 /// # Errors
 ///
 /// The first law that is broken; a step that cannot be taken breaks the law that it exists.
-pub fn step<Y, R>(scheme: &Scheme<R>, system: &Y, x: &Point<Y>, h: f64) -> Result<(), BrokenLaw>
+pub fn step<Y, R, W>(
+    scheme: &Scheme<R, W>,
+    system: &Y,
+    x: &Point<Y>,
+    h: f64,
+) -> Result<(), BrokenLaw>
 where
     Y: Metriplectic,
     R: Retraction<Y::Manifold, Y::Metric>,
+    W: DiscreteGradient,
 {
     let end = one(scheme, system, x, h)?;
     let energy = system.energy_at(x);
@@ -85,8 +96,8 @@ where
 /// # Errors
 ///
 /// The law if it is broken, or a step that cannot be taken.
-pub fn symmetric_step<Y, R>(
-    scheme: &Scheme<R>,
+pub fn symmetric_step<Y, R, W>(
+    scheme: &Scheme<R, W>,
     system: &Y,
     x: &Point<Y>,
     h: f64,
@@ -94,6 +105,7 @@ pub fn symmetric_step<Y, R>(
 where
     Y: Metriplectic,
     R: Retraction<Y::Manifold, Y::Metric>,
+    W: DiscreteGradient,
 {
     let back = one(scheme, system, &one(scheme, system, x, h)?, -h)?;
     let off = Y::Manifold::coordinates(x, &back).magnitude();
@@ -102,12 +114,20 @@ where
 }
 
 /// A single step, with nothing remembered.
-fn one<Y, R>(scheme: &Scheme<R>, system: &Y, x: &Point<Y>, h: f64) -> Result<Point<Y>, BrokenLaw>
+fn one<Y, R, W>(
+    scheme: &Scheme<R, W>,
+    system: &Y,
+    x: &Point<Y>,
+    h: f64,
+) -> Result<Point<Y>, BrokenLaw>
 where
     Y: Metriplectic,
     R: Retraction<Y::Manifold, Y::Metric>,
+    W: DiscreteGradient,
 {
-    let start = Start { x, time: 0.0, h, energy: system.energy_at(x), left_over: 0.0 };
+    let left_over = Recall::nothing();
+    let (energy, invariants) = (system.energy_at(x), left_over.invariants);
+    let start = Start { x, time: 0.0, h, energy, invariants, left_over };
     let missing = |_| BrokenLaw { law: "the step exists", size: f64::NAN, bound: 0.0 };
     scheme.step(system, &start, &mut Memory::new()).map(|(end, _)| end).map_err(missing)
 }
@@ -115,6 +135,7 @@ where
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::{Gonzalez, MeanValue, SymmetricItohAbe};
     use metriplectic_dynamics::System;
     use metriplectic_fields::Real;
     use metriplectic_manifolds::{Canonical, Exponential, LieDual, WeylMidpoint};
@@ -133,7 +154,10 @@ mod tests {
         ) {
             let (x, u) = (Vector3::from(x), Vector3::from(u));
             prop_assume!(u.norm() > 0.05);
-            discrete_gradient::<LieDual<3>, _, _>(&top, &Canonical, &WeylMidpoint, &x, &u)?;
+            let (g, weyl, x, u) = (&Canonical, &WeylMidpoint, &x, &u);
+            discrete_gradient::<LieDual<3>, _, _, _>(&Gonzalez, &top, g, weyl, x, u)?;
+            discrete_gradient::<LieDual<3>, _, _, _>(&MeanValue, &top, g, weyl, x, u)?;
+            discrete_gradient::<LieDual<3>, _, _, _>(&SymmetricItohAbe, &top, g, weyl, x, u)?;
         }
 
         #[test]

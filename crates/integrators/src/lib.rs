@@ -2,7 +2,7 @@
 //!
 //! | module | what it holds |
 //! |---|---|
-//! | [`gonzalez`] | the midpoint discrete gradient, safe against round-off |
+//! | [`discrete_gradient`] | [`DiscreteGradient`]: [`Gonzalez`], [`MeanValue`], [`ItohAbe`], [`SymmetricItohAbe`], safe against round-off |
 //! | [`residual`] | the implicit equation of one step, and its Jacobian |
 //! | [`root_finder`] | [`RootFinder`]: what solves an equation |
 //! | [`newton`] | [`Newton`]: the solver of every step |
@@ -17,10 +17,10 @@
 
 pub mod attitude;
 pub mod certificate;
+pub mod discrete_gradient;
 pub mod error;
 #[cfg(feature = "argmin")]
 mod globaliser;
-pub mod gonzalez;
 pub mod laws;
 pub mod newton;
 pub mod residual;
@@ -30,7 +30,10 @@ pub mod step;
 pub mod trajectory;
 
 pub use attitude::{Attitude, AttitudeError};
-pub use certificate::Certificate;
+pub use certificate::{Certificate, Kept};
+pub use discrete_gradient::{
+    Chord, DiscreteGradient, Gonzalez, ItohAbe, MeanValue, SymmetricItohAbe,
+};
 pub use error::{Error, RunError, StepError};
 pub use newton::Newton;
 pub use residual::Residual;

@@ -1,51 +1,104 @@
 //! The implicit equation of one step.
 
-use metriplectic_dynamics::{Bracket, Dissipation, Metriplectic, system::Point};
-use metriplectic_fields::{
-    ChartPoint, Column, Scalar, ScalarField, Space, Square, Vector, differential,
-};
-use metriplectic_manifolds::{Arc, Manifold, MetricError, Nodes, Retraction, Riemannian};
+use std::cell::{Cell, OnceCell};
 
-use crate::gonzalez::{Chord, gonzalez};
+use metriplectic_dynamics::orthogonal::Moving;
+use metriplectic_dynamics::velocity::{
+    Covectors, Gradient, VelocityJet, irreversible, reversible, velocity_jet,
+};
+use metriplectic_dynamics::{Metriplectic, SecondLaw, system::Point};
+use metriplectic_fields::{
+    ChartPoint, Column, Dimension, Matrix, Scalar, ScalarField, Space, Square, Vector, differential,
+};
+use metriplectic_manifolds::{
+    Arc, ArcJet, InnerProduct, Manifold, MetricError, Nodes, Retraction, Riemannian,
+};
+
+use crate::discrete_gradient::{Chord, DiscreteGradient};
 use crate::root_finder::{Equation, Linearised, Root};
 
 /// The equation of one step (Bloch, Farré Puiggalí, Martín de Diego 2024, §4.4), as a function of
 /// the initial displacement `u ∈ T_xM` of the arc:
 ///
 /// ```math
-/// F(u) = d - h \bigl( \Pi(z)\, w + K_w(z)\, dS(z) \bigr) = 0 ,
+/// F(u) = d - h \bigl( \tilde\Pi\, w_H + \tilde K_{w_H} w_S \bigr) = 0 ,
 /// ```
 ///
-/// with `(z, d) = R_h⁻¹(x, x')` the base point and displacement of the arc, and `w` the Gonzalez
-/// discrete gradient of `H` along it. Both brackets kill `w`, so a root keeps `H`. No logarithm is
+/// with `(z, d) = R_h⁻¹(x, x')` the base point and displacement of the arc, and `w_H` a discrete
+/// gradient of `H` along it. Both tensors kill `w_H`, so a root keeps `H`. In the scheme as published
+/// `w_S` is `dS(z)` and `Π̃ = Π(z)`; in the exact one `w_S` is a discrete gradient of `S`, which `Π̃`
+/// kills, so that `ΔS = h K̃(w_S, w_S) ≥ 0` ([`velocity`](metriplectic_dynamics::velocity)). No logarithm is
 /// taken: the arc is shot from `x`.
 #[derive(Debug)]
-pub struct Residual<'a, Y: Metriplectic, R> {
-    /// The system.
-    pub system: &'a Y,
-    /// The retraction of the scheme.
-    pub retraction: &'a R,
-    /// Where the step starts.
-    pub x: &'a Point<Y>,
-    /// The step size `h`.
-    pub h: f64,
-    /// The energy `H(x)`.
-    pub energy: f64,
-    /// The part of the energy error of earlier steps that this step takes back.
-    pub recall: f64,
+pub struct Residual<'a, Y: Metriplectic, R, W> {
+    system: &'a Y,
+    retraction: &'a R,
+    gradient: &'a W,
+    x: &'a Point<Y>,
+    h: f64,
+    energy: f64,
+    recall: Recall<Y>,
+    entropy_slope: Cell<f64>,
 }
 
-/// The residual with its Jacobian, and the discrete gradient `w` in it.
+/// What earlier steps have left over of the energy and of the further invariants, and this step
+/// takes back.
+#[derive(Clone, Copy, Debug)]
+pub struct Recall<Y: Metriplectic> {
+    /// Of the energy.
+    pub energy: f64,
+    /// Of each further invariant.
+    pub invariants: Numbers<Y>,
+}
+
+/// A number for each further invariant of a system.
+pub type Numbers<Y> = <<<Y as Metriplectic>::Manifold as Space>::Dim as Dimension>::Array<f64>;
+
+impl<Y: Metriplectic> Recall<Y> {
+    /// Nothing is taken back, as in the definition of the scheme.
+    pub fn nothing() -> Self {
+        Self { energy: 0.0, invariants: Dim::<Y>::array(|_| 0.0) }
+    }
+}
+
+/// The dimension of the manifold of a system.
+pub(crate) type Dim<Y> = <<Y as Metriplectic>::Manifold as Space>::Dim;
+
+/// The residual with its Jacobian, and the discrete gradient `w_H` in it.
 struct Jet<M: Space> {
     at: Linearised<M>,
     w: Vector<M>,
 }
 
-impl<Y, R> Residual<'_, Y, R>
+impl<'a, Y, R, W> Residual<'a, Y, R, W>
 where
     Y: Metriplectic,
     R: Retraction<Y::Manifold, Y::Metric>,
+    W: DiscreteGradient,
 {
+    /// The equation of a step of size `h` from `x`.
+    pub fn new(
+        system: &'a Y,
+        (retraction, gradient): (&'a R, &'a W),
+        x: &'a Point<Y>,
+        h: f64,
+    ) -> Self {
+        let energy = system.energy_at(x);
+        Self::recalling(system, (retraction, gradient), (x, energy), h, Recall::nothing())
+    }
+
+    /// The same for a point with a known energy, and errors of earlier steps to take back.
+    pub(crate) const fn recalling(
+        system: &'a Y,
+        (retraction, gradient): (&'a R, &'a W),
+        (x, energy): (&'a Point<Y>, f64),
+        h: f64,
+        recall: Recall<Y>,
+    ) -> Self {
+        let entropy_slope = Cell::new(f64::INFINITY);
+        Self { system, retraction, gradient, x, h, energy, recall, entropy_slope }
+    }
+
     /// The residual by its definition, at any scalar.
     ///
     /// # Errors
@@ -58,17 +111,41 @@ where
         let metric = self.system.metric();
         let arc = self.retraction.arc(metric, self.x, u)?;
         let g = metric.at(&arc.z)?;
-        let w = gonzalez(self.system.energy(), &g, &arc, self.energy);
-        let s = differential(self.system.entropy(), &arc.z);
-        let reversible = self.system.bracket().apply(&self.system.site(&arc.z, &s), &w)?;
-        let irreversible = self.system.dissipation().apply(metric, &arc.z, &w, &s)?;
-        Ok(arc.d - (reversible + irreversible) * D::from(self.h))
+        let mut defined = Defined { gradient: self.gradient, g: &g, x: self.x, arc: &arc };
+        let entropy = if self.is_exact() {
+            defined.of(self.system.entropy())
+        } else {
+            differential(self.system.entropy(), &arc.z)
+        };
+        let laws = [defined.of(self.system.energy()), entropy];
+        let w = Covectors::new(laws, self.system.invariants(), &mut defined);
+        Ok(arc.d - self.velocity(&arc.z, &w)? * D::from(self.h))
+    }
+
+    /// `Π̃ w_H + K̃ w_S`.
+    #[inline]
+    fn velocity<D: Scalar>(
+        &self,
+        z: &ChartPoint<Y::Manifold, D>,
+        w: &Covectors<Dim<Y>, Vector<Y::Manifold, D>>,
+    ) -> Result<Vector<Y::Manifold, D>, MetricError> {
+        Ok(reversible(self.system, z, w)? + irreversible(self.system, z, w)?)
+    }
+
+    /// Whether the entropy has a discrete gradient.
+    fn is_exact(&self) -> bool {
+        self.system.second_law() == SecondLaw::Exact
+    }
+
+    /// `|w_S|` at the point evaluated last.
+    pub(crate) const fn entropy_slope(&self) -> f64 {
+        self.entropy_slope.get()
     }
 
     /// The error `e = H(x') − H(x) + recall` of the energy at the end of an arc.
     #[inline]
     fn imbalance(&self, end: &Point<Y>) -> f64 {
-        self.system.energy_at(end) - self.energy + self.recall
+        self.system.energy_at(end) - self.energy + self.recall.energy
     }
 
     /// One more correction for a root with the end `x'` at which the energy is not kept to round-off:
@@ -105,84 +182,217 @@ where
         (lost.magnitude() <= at.floor && better).then_some((u, end))
     }
 
-    /// The data of the discrete gradient of `H` along the arc of `u`.
-    #[inline]
-    fn chord(
-        &self,
-        u: &Vector<Y::Manifold>,
-        df: &Vector<Y::Manifold>,
-        d: &Vector<Y::Manifold>,
-        end: (&Point<Y>, f64),
-    ) -> Chord<Y::Manifold> {
-        Chord::new(self.system.energy(), df, d, self.energy, end, || {
-            // The same arc has been followed to its end, so the alternative is not reached.
-            let along = self.retraction.along(self.system.metric(), self.x, u);
-            along.unwrap_or_else(|_| Nodes {
-                ends: [self.x, end.0].map(Y::Manifold::constant),
-                middle: None,
-            })
-        })
-    }
-
-    /// The residual with its Jacobian, and `w`, from the jets `(f, df, Hf)` of the fields: no nested
+    /// The residual with its Jacobian, and `w_H`, from the jets `(f, df, Hf)` of the fields: no nested
     /// dual number is formed.
     #[inline]
     fn jet(&self, u: &Vector<Y::Manifold>) -> Option<Jet<Y::Manifold>> {
         let (system, metric, h) = (self.system, self.system.metric(), self.h);
         let arc = self.retraction.arc_jet(metric, self.x, u).ok()?;
-        let centre = ChartPoint::<Y::Manifold>::centre(&arc.z);
-        let g = metric.at(&centre).ok()?;
-        let energy = system.energy().jet2(&arc.z);
-        let end = system.energy().jet1(&arc.end);
-        let entropy = system.entropy().jet2(&arc.z);
-        let chord = self.chord(u, &energy.df, &arc.d, (&arc.end, end.value));
-        let w = chord.covector(self.recall, &g, &arc.d);
+        let g = metric.at(&ChartPoint::<Y::Manifold>::centre(&arc.z)).ok()?;
         let slopes = metric.slopes(&arc.z);
-        let metric_jet = (&g, slopes.as_ref());
-        let dw = chord.slope(self.recall, metric_jet, &arc, &energy.hf, &end.df);
-        let pi = system.bracket().linearise(&system.site(&centre, &entropy.df), &w).ok()?;
-        let k = system.dissipation().linearise(metric, &arc.z, &w, &entropy.df).ok()?;
+        let (along, slopes) = (Along::new(self, u, &g), slopes.as_ref());
+        let start = (self.energy, self.recall.energy);
+        let (energy, chord) = along.jet(system.energy(), start, &arc, slopes);
+        let entropy = if self.is_exact() {
+            along.jet(system.entropy(), (system.entropy_at(self.x), 0.0), &arc, slopes).0
+        } else {
+            let jet = system.entropy().jet2(&arc.z);
+            Moving { value: jet.df, slope: jet.hf * arc.dz }
+        };
+        let mut jets = Jets { along: &along, arc: &arc, slopes, seen: 0 };
+        let w = Covectors::new([energy, entropy], system.invariants(), &mut jets);
+        let VelocityJet { velocity, terms, gain } =
+            velocity_jet(system, &arc.z, &arc.dz, &w).ok()?;
 
-        let residual = arc.d - (pi.value + k.value) * h;
-        let slope = (pi.along_z + k.along_z) * arc.dz
-            + (pi.tensor + k.along_w) * dw
-            + (pi.along_s + k.tensor) * (entropy.hf * arc.dz);
-        let jacobian = arc.dd - slope * h;
+        let residual = arc.d - velocity.value * h;
+        let jacobian = arc.dd - velocity.slope * h;
         // The terms of Πw and K dS are rounded, and so are w and d.
         let length = arc.d.magnitude();
-        let pi_size = pi.tensor.magnitude();
-        let terms = pi_size * w.magnitude() + k.tensor.magnitude() * entropy.df.magnitude();
-        let gain = pi_size + k.along_w.magnitude();
         let floor =
             f64::EPSILON * (4.0 * h.abs() * terms + length) + h.abs() * gain * chord.noise(length);
         let usable = residual.is_finite() && jacobian.magnitude().is_finite();
-        usable.then_some(Jet { at: Linearised { residual, jacobian, floor }, w })
+        usable.then_some(Jet { at: Linearised { residual, jacobian, floor }, w: energy.value })
     }
 }
 
-impl<Y, R> Equation<Y::Manifold> for Residual<'_, Y, R>
+impl<Y, R, W> Equation<Y::Manifold> for Residual<'_, Y, R, W>
 where
     Y: Metriplectic,
     R: Retraction<Y::Manifold, Y::Metric>,
+    W: DiscreteGradient,
 {
     /// The residual, safe against round-off.
     #[inline]
     fn value(&self, u: &Vector<Y::Manifold>) -> Option<Vector<Y::Manifold>> {
         let (system, metric) = (self.system, self.system.metric());
-        let Arc { z, d, end: point } = self.retraction.real_arc(metric, self.x, u).ok()?;
-        let g = metric.at(&z).ok()?;
-        let df = system.energy().jet1(&z.base).df;
-        let end = system.energy_at(&point);
-        let w = self.chord(u, &df, &d, (&point, end)).covector(self.recall, &g, &d);
-        let s = system.entropy().jet1(&z.base).df;
-        let reversible = system.bracket().apply(&system.site(&z, &s), &w).ok()?;
-        let irreversible = system.dissipation().apply(metric, &z, &w, &s).ok()?;
-        let residual = d - (reversible + irreversible) * self.h;
+        let arc = self.retraction.real_arc(metric, self.x, u).ok()?;
+        let g = metric.at(&arc.z).ok()?;
+        let along = Along::new(self, u, &g);
+        let energy = along.value(system.energy(), (self.energy, self.recall.energy), &arc);
+        let entropy = if self.is_exact() {
+            let w = along.value(system.entropy(), (system.entropy_at(self.x), 0.0), &arc);
+            self.entropy_slope.set(w.magnitude());
+            w
+        } else {
+            system.entropy().jet1(&arc.z.base).df
+        };
+        let mut values = Values { along: &along, arc: &arc, seen: 0 };
+        let w = Covectors::new([energy, entropy], system.invariants(), &mut values);
+        let residual = arc.d - self.velocity(&arc.z, &w).ok()? * self.h;
         residual.is_finite().then_some(residual)
     }
 
     #[inline]
     fn linearise(&self, u: &Vector<Y::Manifold>) -> Option<Linearised<Y::Manifold>> {
         self.jet(u).map(|jet| jet.at)
+    }
+}
+
+/// Discrete gradients along one arc by their definition.
+struct Defined<'a, M: Manifold, D: Scalar, G, W> {
+    gradient: &'a W,
+    g: &'a G,
+    x: &'a M::Point<f64>,
+    arc: &'a Arc<M, D>,
+}
+
+impl<M, D, G, W> Gradient<M> for Defined<'_, M, D, G, W>
+where
+    M: Manifold,
+    D: Scalar,
+    G: InnerProduct<Vector<M, D>>,
+    W: DiscreteGradient,
+{
+    type Covector = Vector<M, D>;
+
+    fn of(&mut self, f: &impl ScalarField<M>) -> Vector<M, D> {
+        self.gradient.covector(f, self.g, (self.x, f.at(self.x)), self.arc)
+    }
+}
+
+/// One arc at real points, along which fields get discrete gradients that are safe against
+/// round-off.
+struct Along<'a, Y: Metriplectic, R, W, G> {
+    step: &'a Residual<'a, Y, R, W>,
+    u: &'a Vector<Y::Manifold>,
+    g: &'a G,
+    nodes: OnceCell<Nodes<Y::Manifold>>,
+}
+
+impl<'a, Y, R, W, G> Along<'a, Y, R, W, G>
+where
+    Y: Metriplectic,
+    R: Retraction<Y::Manifold, Y::Metric>,
+    W: DiscreteGradient,
+    G: InnerProduct<Vector<Y::Manifold>>,
+{
+    const fn new(step: &'a Residual<'a, Y, R, W>, u: &'a Vector<Y::Manifold>, g: &'a G) -> Self {
+        Self { step, u, g, nodes: OnceCell::new() }
+    }
+
+    /// The data of the discrete gradient of `f`, which has the value `start` at `x`.
+    #[inline]
+    fn chord(
+        &self,
+        f: &impl ScalarField<Y::Manifold>,
+        start: f64,
+        mean: &Vector<Y::Manifold>,
+        (z, d): (&Point<Y>, &Vector<Y::Manifold>),
+        (end, value): (&Point<Y>, f64),
+    ) -> Chord<Y::Manifold> {
+        let base = || self.step.gradient.slope_at_base(f, z, d, mean);
+        let nodes = || {
+            let Residual { system, retraction, x, .. } = self.step;
+            // The same arc has been followed to its end, so the alternative is not reached.
+            retraction.along(system.metric(), x, self.u).unwrap_or_else(|_| Nodes {
+                ends: [*x, end].map(Y::Manifold::constant),
+                middle: None,
+            })
+        };
+        let nodes = || self.nodes.get_or_init(nodes).clone();
+        Chord::new(f, mean, d, start, (end, value), base, nodes)
+    }
+
+    /// The discrete gradient of `f`, with `⟨w, d⟩ = f(x') − start + recall`.
+    #[inline]
+    fn value(
+        &self,
+        f: &impl ScalarField<Y::Manifold>,
+        (start, recall): (f64, f64),
+        arc: &Arc<Y::Manifold>,
+    ) -> Vector<Y::Manifold> {
+        let mean = self.step.gradient.real_mean(f, self.step.x, arc);
+        let end = (&arc.end, f.at(&arc.end));
+        let chord = self.chord(f, start, &mean, (&arc.z.base, &arc.d), end);
+        chord.covector(recall, self.g, &arc.d)
+    }
+
+    /// The same with its derivatives.
+    #[inline]
+    fn jet(
+        &self,
+        f: &impl ScalarField<Y::Manifold>,
+        (start, recall): (f64, f64),
+        arc: &ArcJet<Y::Manifold>,
+        slopes: Option<&Slopes<Y::Manifold>>,
+    ) -> (Moving<Dim<Y>>, Chord<Y::Manifold>) {
+        let (mean, dmean) = self.step.gradient.mean_jet(f, self.step.x, arc);
+        let end = f.jet1(&arc.end);
+        let chord = self.chord(f, start, &mean, (&arc.z, &arc.d), (&arc.end, end.value));
+        let value = chord.covector(recall, self.g, &arc.d);
+        let slope = chord.slope(recall, (self.g, slopes), arc, &dmean, &end.df);
+        (Moving { value, slope }, chord)
+    }
+}
+
+/// The derivatives of a metric along the chart.
+type Slopes<M> = <<M as Space>::Dim as Dimension>::Array<Matrix<M>>;
+
+/// The discrete gradients of the further invariants, one after the other.
+struct Values<'a, Y: Metriplectic, R, W, G> {
+    along: &'a Along<'a, Y, R, W, G>,
+    arc: &'a Arc<Y::Manifold>,
+    seen: usize,
+}
+
+impl<Y, R, W, G> Gradient<Y::Manifold> for Values<'_, Y, R, W, G>
+where
+    Y: Metriplectic,
+    R: Retraction<Y::Manifold, Y::Metric>,
+    W: DiscreteGradient,
+    G: InnerProduct<Vector<Y::Manifold>>,
+{
+    type Covector = Vector<Y::Manifold>;
+
+    fn of(&mut self, f: &impl ScalarField<Y::Manifold>) -> Vector<Y::Manifold> {
+        let Residual { x, recall, .. } = self.along.step;
+        let recall = recall.invariants[self.seen];
+        self.seen += 1;
+        self.along.value(f, (f.at(x), recall), self.arc)
+    }
+}
+
+/// The same with their derivatives.
+struct Jets<'a, Y: Metriplectic, R, W, G> {
+    along: &'a Along<'a, Y, R, W, G>,
+    arc: &'a ArcJet<Y::Manifold>,
+    slopes: Option<&'a Slopes<Y::Manifold>>,
+    seen: usize,
+}
+
+impl<Y, R, W, G> Gradient<Y::Manifold> for Jets<'_, Y, R, W, G>
+where
+    Y: Metriplectic,
+    R: Retraction<Y::Manifold, Y::Metric>,
+    W: DiscreteGradient,
+    G: InnerProduct<Vector<Y::Manifold>>,
+{
+    type Covector = Moving<Dim<Y>>;
+
+    fn of(&mut self, f: &impl ScalarField<Y::Manifold>) -> Moving<Dim<Y>> {
+        let Residual { x, recall, .. } = self.along.step;
+        let recall = recall.invariants[self.seen];
+        self.seen += 1;
+        self.along.jet(f, (f.at(x), recall), self.arc, self.slopes).0
     }
 }

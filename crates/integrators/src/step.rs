@@ -1,12 +1,13 @@
 //! One step: guess, solve, retract.
 
-use metriplectic_dynamics::{Bracket, Dissipation, Metriplectic, system::Point};
+use metriplectic_dynamics::{Bracket, Dissipation, Invariants, Metriplectic, system::Point};
 use metriplectic_fields::{ChartPoint, Column, Dimension, ScalarField, Square, Vector};
 use metriplectic_manifolds::{Manifold, Retraction, Riemannian};
 
+use crate::discrete_gradient::{DiscreteGradient, Gonzalez};
 use crate::error::StepError;
 use crate::newton::Newton;
-use crate::residual::Residual;
+use crate::residual::{Dim, Numbers, Recall, Residual};
 use crate::root_finder::{NoRoot, Root, RootFinder};
 
 /// A scheme: a retraction, and how hard to try to solve its equation.
@@ -18,9 +19,11 @@ use crate::root_finder::{NoRoot, Root, RootFinder};
 /// let patient = scheme.newton(Newton { sweeps: 60, ..Newton::default() });
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Scheme<R> {
+pub struct Scheme<R, W = Gonzalez> {
     /// Turns a vector into a pair of points.
     pub retraction: R,
+    /// Accounts for the change of energy and entropy along a step.
+    pub gradient: W,
     /// Solves the equation of a step.
     pub newton: Newton,
     /// How often a step that is not solved is split in halves; both laws hold for each half.
@@ -28,9 +31,18 @@ pub struct Scheme<R> {
 }
 
 impl<R> Scheme<R> {
-    /// The scheme of a retraction, with the default solver.
+    /// The scheme of a retraction, with the discrete gradient of Gonzalez and the default solver.
     pub fn new(retraction: R) -> Self {
-        Self { retraction, newton: Newton::default(), splits: 10 }
+        Self { retraction, gradient: Gonzalez, newton: Newton::default(), splits: 10 }
+    }
+}
+
+impl<R, W> Scheme<R, W> {
+    /// Replaces the discrete gradient.
+    #[must_use]
+    pub fn gradient<V: DiscreteGradient>(self, gradient: V) -> Scheme<R, V> {
+        let Self { retraction, newton, splits, .. } = self;
+        Scheme { retraction, gradient, newton, splits }
     }
 
     /// Replaces the options of the solver.
@@ -38,10 +50,10 @@ impl<R> Scheme<R> {
     pub fn newton(self, newton: Newton) -> Self {
         Self { newton, ..self }
     }
+}
 
-    /// One step of size `h` from `x`, with the energy `energy = H(x)`; `left_over = H(x) − H(x₀)`
-    /// is the round-off that earlier steps have left in the energy. The displacement is guessed
-    /// from `memory`, and noted there.
+impl<R, W: DiscreteGradient> Scheme<R, W> {
+    /// One step from where `start` says. The displacement is guessed from `memory`, and noted there.
     ///
     /// # Errors
     ///
@@ -99,9 +111,13 @@ impl<R> Scheme<R> {
         for half in 0..2 {
             let h = 0.5 * start.h;
             let energy = system.energy_at(&point);
-            let left_over = start.left_over + (energy - start.energy);
+            let left_over = Recall {
+                energy: start.left_over.energy + (energy - start.energy),
+                ..start.left_over
+            };
             let time = start.time + f64::from(half) * h;
-            let part = Start { x: &point, time, h, energy, left_over };
+            let part =
+                Start { x: &point, time, h, energy, invariants: start.invariants, left_over };
             let end = match self.attempt(system, &part, &mut memory, work) {
                 Ok(end) => end,
                 Err(failure) if depth >= self.splits => return Err(failure),
@@ -126,15 +142,11 @@ impl<R> Scheme<R> {
     {
         let guess = memory.extrapolate().or_else(|| explicit(system, start));
         let guess = guess.unwrap_or_else(Vector::<Y::Manifold>::zero);
-        let residual = Residual {
-            system,
-            retraction: &self.retraction,
-            x: start.x,
-            h: start.h,
-            energy: start.energy,
-            recall: recall(system, start, &guess),
-        };
+        let parts = (&self.retraction, &self.gradient);
+        let recall = recall(system, start, &guess);
+        let residual = Residual::recalling(system, parts, (start.x, start.energy), start.h, recall);
         let root = self.solve(&residual, &guess, work)?;
+        work.entropy_slope = work.entropy_slope.min(residual.entropy_slope());
         if root.u.magnitude() <= 2.0 * root.floor {
             // The state is at rest: what the solver found is its own round-off, and following it
             // would make a random walk of the energy.
@@ -155,7 +167,7 @@ impl<R> Scheme<R> {
     /// Newton's method, and where it is lost the globaliser with Newton's polish.
     fn solve<Y>(
         &self,
-        residual: &Residual<'_, Y, R>,
+        residual: &Residual<'_, Y, R, W>,
         guess: &Vector<Y::Manifold>,
         work: &mut Work,
     ) -> Result<Root<Y::Manifold>, NoRoot<Y::Manifold>>
@@ -195,13 +207,14 @@ pub struct Start<'a, Y: Metriplectic> {
     pub h: f64,
     /// The energy `H(x)`.
     pub energy: f64,
-    /// The round-off `H(x) − H(x₀)` that earlier steps have left.
-    pub left_over: f64,
+    /// The further invariants `L_a(x)`.
+    pub invariants: Numbers<Y>,
+    /// The round-off `H(x) − H(x₀)` that earlier steps have left, and that of the further invariants.
+    pub left_over: Recall<Y>,
 }
 
 /// What a step cost.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Work {
     /// Linear systems solved by Newton's method.
     pub sweeps: usize,
@@ -209,30 +222,40 @@ pub struct Work {
     pub splits: usize,
     /// How often the globaliser was called.
     pub globalised: usize,
+    /// The size `|w_S|` of the discrete gradient of the entropy, by which the bracket is projected;
+    /// infinite where it has none.
+    pub entropy_slope: f64,
+}
+
+impl Default for Work {
+    fn default() -> Self {
+        Self { sweeps: 0, splits: 0, globalised: 0, entropy_slope: f64::INFINITY }
+    }
 }
 
 /// The explicit Euler displacement `h (Π dH + K dS)(x)`.
 fn explicit<Y: Metriplectic>(system: &Y, start: &Start<'_, Y>) -> Option<Vector<Y::Manifold>> {
-    let (dh, ds) = (system.energy().jet1(start.x).df, system.entropy().jet1(start.x).df);
-    let x = ChartPoint::centre(start.x);
-    let reversible = system.bracket().apply(&system.site(&x, &ds), &dh).ok()?;
-    let irreversible = system.dissipation().apply(system.metric(), &x, &dh, &ds).ok()?;
-    let displacement = (reversible + irreversible) * start.h;
+    let displacement = system.velocity(&ChartPoint::centre(start.x)).ok()? * start.h;
     displacement.is_finite().then_some(displacement)
 }
 
-/// The share `φ e` of the left-over energy `e` that the step takes back.
+/// The shares `φ e` of the left-over errors `e` that the step takes back.
 ///
 /// What the solver leaves in each step would make the energy a random walk over millions of them, so
 /// a step aims at `H(x₀)` instead of `H(x)`, once they differ by more than a few units of round-off.
 /// Asking for `⟨w, d⟩ = F(x') − F(x) + φe` changes the covector by `φ|e|/|d|`, and with it the
 /// displacement by `h|Π|φ|e|/|d|`, which must stay small against `|d|`. Hence `φ = r²/(1 + r²)` with
 /// `r = |d|² / (10² h|Π||e|)`: all of it while the state moves, nothing of it at rest, where it
-/// would hold the state fast.
-fn recall<Y: Metriplectic>(system: &Y, start: &Start<'_, Y>, d: &Vector<Y::Manifold>) -> f64 {
-    let e = start.left_over;
-    if e.abs() <= 4.0 * f64::EPSILON * start.energy.abs() {
-        return 0.0;
+/// would hold the state fast. The further invariants are treated alike.
+fn recall<Y: Metriplectic>(system: &Y, start: &Start<'_, Y>, d: &Vector<Y::Manifold>) -> Recall<Y> {
+    let Recall { energy, invariants } = start.left_over;
+    let far = |e: f64, size: f64| e.abs() > 4.0 * f64::EPSILON * size;
+    let mut off = far(energy, start.energy.abs());
+    for k in 0..Y::Invariants::COUNT {
+        off |= far(invariants[k], start.invariants[k].abs());
+    }
+    if !off {
+        return Recall::nothing();
     }
     let (dh, ds) = (system.energy().jet1(start.x).df, system.entropy().jet1(start.x).df);
     let x = ChartPoint::centre(start.x);
@@ -240,8 +263,14 @@ fn recall<Y: Metriplectic>(system: &Y, start: &Start<'_, Y>, d: &Vector<Y::Manif
     let k = system.dissipation().linearise(system.metric(), start.x, &dh, &ds);
     let sizes = (pi.map_or(0.0, |pi| pi.tensor.max_abs()), k.map_or(0.0, |k| k.along_w.max_abs()));
     let gain = start.h * (sizes.0 + sizes.1);
-    let r = d.dot(d) / (1e2 * gain * e.abs()).max(f64::MIN_POSITIVE);
-    if r.is_finite() { e / (1.0 + r.powi(-2)) } else { 0.0 }
+    let share = |e: f64, size: f64| {
+        let r = d.dot(d) / (1e2 * gain * e.abs()).max(f64::MIN_POSITIVE);
+        if far(e, size) && r.is_finite() { e / (1.0 + r.powi(-2)) } else { 0.0 }
+    };
+    Recall {
+        energy: share(energy, start.energy.abs()),
+        invariants: Dim::<Y>::array(|k| share(invariants[k], start.invariants[k].abs())),
+    }
 }
 
 /// What a step remembers of the steps before it: three displacements, from which the next one is

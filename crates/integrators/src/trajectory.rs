@@ -1,12 +1,15 @@
 //! Steps in a row, with their certificate.
 
 use approx::{AbsDiffEq, RelativeEq};
-use metriplectic_dynamics::{Metriplectic, system::Point};
-use metriplectic_fields::{Column, ScalarField, Space, Vector};
+use metriplectic_dynamics::velocity::{Covectors, Gradient, independence};
+use metriplectic_dynamics::{Dissipation, Invariants, Metriplectic, system::Point};
+use metriplectic_fields::{ChartPoint, Column, Dimension, ScalarField, Space, Vector};
 use metriplectic_manifolds::{Cayley, Exponential, Manifold, Projection, Retraction, WeylMidpoint};
 
-use crate::certificate::Certificate;
+use crate::certificate::{Certificate, Kept};
+use crate::discrete_gradient::{DiscreteGradient, Gonzalez};
 use crate::error::{RunError, StepError};
+use crate::residual::{Dim, Numbers, Recall};
 use crate::span::{Span, check_step_size};
 use crate::step::{Memory, Scheme, Start, Work};
 
@@ -39,22 +42,24 @@ fn entries<M: Manifold, S: serde::Serializer>(
 ///
 /// Made by [`Scheme::steps`] or [`Run::steps`].
 #[derive(Debug)]
-pub struct Steps<'a, Y: Metriplectic, R> {
-    scheme: Scheme<R>,
+pub struct Steps<'a, Y: Metriplectic, R, W = Gonzalez> {
+    scheme: Scheme<R, W>,
     system: &'a Y,
     h: f64,
     state: State<Y::Manifold>,
+    invariants: Numbers<Y>,
     memory: Memory<Vector<Y::Manifold>>,
     certificate: Certificate,
     failed: bool,
 }
 
-impl<'a, Y, R> Steps<'a, Y, R>
+impl<'a, Y, R, W> Steps<'a, Y, R, W>
 where
     Y: Metriplectic,
     R: Retraction<Y::Manifold, Y::Metric>,
+    W: DiscreteGradient,
 {
-    fn start(scheme: Scheme<R>, system: &'a Y, x0: Point<Y>, h: f64) -> Self {
+    fn start(scheme: Scheme<R, W>, system: &'a Y, x0: Point<Y>, h: f64) -> Self {
         let energy = system.energy_at(&x0);
         let entropy = system.entropy_at(&x0);
         let certificate = Certificate {
@@ -64,6 +69,8 @@ where
             min_entropy_increment: 0.0,
             entropy_gained: 0.0,
             entropy_falls: 0,
+            min_entropy_slope: f64::INFINITY,
+            invariants: Kept::of(system, &x0),
             max_manifold_defect: system.manifold().defect(&x0),
             steps: 0,
             sweeps: 0,
@@ -71,9 +78,20 @@ where
             retries: 0,
             globalised: 0,
             second_law: system.second_law(),
+            projected: system.dissipation().is_projected(),
         };
+        let invariants = values(system, &x0);
         let state = State { step: 0, time: 0.0, point: x0, energy, entropy };
-        Self { scheme, system, h, state, memory: Memory::new(), certificate, failed: false }
+        Self {
+            scheme,
+            system,
+            h,
+            state,
+            invariants,
+            memory: Memory::new(),
+            certificate,
+            failed: false,
+        }
     }
 
     /// The state reached so far.
@@ -97,7 +115,14 @@ where
             time: self.state.time,
             h: self.h,
             energy: self.state.energy,
-            left_over: self.state.energy - self.certificate.initial_energy,
+            invariants: self.invariants,
+            left_over: Recall {
+                energy: self.state.energy - self.certificate.initial_energy,
+                invariants: Dim::<Y>::array(|k| {
+                    let kept = self.certificate.invariants.get(k);
+                    kept.map_or(0.0, |kept| self.invariants[k] - kept.initial)
+                }),
+            },
         };
         let (point, work) = self.scheme.step(self.system, &start, &mut self.memory)?;
         let step = self.state.step + 1;
@@ -109,8 +134,37 @@ where
             point,
         };
         self.account(&next, work);
-        self.state = next;
+        let before = std::mem::replace(&mut self.state, next);
+        if Y::Invariants::COUNT > 0 {
+            self.account_invariants(&before)?;
+        }
         Ok(&self.state)
+    }
+
+    /// Enters the further invariants into the certificate.
+    ///
+    /// # Errors
+    ///
+    /// [`StepError::DependentInvariants`] if one was lost because its differential depends on those
+    /// of the others.
+    fn account_invariants(&mut self, before: &State<Y::Manifold>) -> Result<(), StepError> {
+        let last = std::mem::replace(&mut self.invariants, values(self.system, &self.state.point));
+        for (index, kept) in self.certificate.invariants.iter_mut().enumerate() {
+            let value = self.invariants[index];
+            kept.max_error = kept.max_error.max((value - kept.initial).abs());
+            let change = (value - last[index]).abs();
+            if change > LOST * kept.initial.abs().max(1.0) {
+                let x = ChartPoint::centre(&before.point);
+                let shares = independence(self.system, &x).unwrap_or_default();
+                if let Some(&share) = shares.get(index)
+                    && share < DEPENDENT
+                {
+                    let time = before.time;
+                    return Err(StepError::DependentInvariants { time, index, change, share });
+                }
+            }
+        }
+        Ok(())
     }
 
     /// Enters a step into the certificate.
@@ -124,6 +178,7 @@ where
         if increment < 0.0 && increment < -entropy_round_off(self.system, &self.state) {
             c.entropy_falls += 1;
         }
+        c.min_entropy_slope = c.min_entropy_slope.min(work.entropy_slope);
         c.max_manifold_defect =
             c.max_manifold_defect.max(self.system.manifold().defect(&next.point));
         c.steps += 1;
@@ -134,6 +189,25 @@ where
     }
 }
 
+/// The change of a further invariant in one step that is more than round-off.
+const LOST: f64 = 1e-12;
+/// The independent share of a further invariant's differential that explains such a change.
+const DEPENDENT: f64 = 1e-6;
+
+/// The further invariants of a system at a point.
+fn values<Y: Metriplectic>(system: &Y, x: &Point<Y>) -> Numbers<Y> {
+    struct Values<'a, M: Space>(&'a M::Point<f64>);
+    impl<M: Space> Gradient<M> for Values<'_, M> {
+        type Covector = f64;
+
+        fn of(&mut self, f: &impl ScalarField<M>) -> f64 {
+            f.at(self.0)
+        }
+    }
+    let values = Covectors::new([0.0; 2], system.invariants(), &mut Values::<Y::Manifold>(x));
+    Dim::<Y>::array(|k| values.invariants[k].map_or(0.0, |(_, value)| value))
+}
+
 /// The round-off `4ε (max(|S|, 1) + |dS||x|)` of an entropy increment: `S` is evaluated twice, at
 /// points whose entries are rounded.
 fn entropy_round_off<Y: Metriplectic>(system: &Y, state: &State<Y::Manifold>) -> f64 {
@@ -142,10 +216,11 @@ fn entropy_round_off<Y: Metriplectic>(system: &Y, state: &State<Y::Manifold>) ->
     4.0 * f64::EPSILON * (state.entropy.abs().max(1.0) + ds * position)
 }
 
-impl<Y, R> Iterator for Steps<'_, Y, R>
+impl<Y, R, W> Iterator for Steps<'_, Y, R, W>
 where
     Y: Metriplectic,
     R: Retraction<Y::Manifold, Y::Metric>,
+    W: DiscreteGradient,
 {
     type Item = Result<State<Y::Manifold>, StepError>;
 
@@ -233,7 +308,7 @@ where
     }
 }
 
-impl<R> Scheme<R> {
+impl<R, W: DiscreteGradient> Scheme<R, W> {
     /// Verifies the model and starts an endless run in steps of size `h`.
     ///
     /// # Errors
@@ -244,7 +319,7 @@ impl<R> Scheme<R> {
         system: &Y,
         x0: Point<Y>,
         h: f64,
-    ) -> Result<Steps<'_, Y, R>, RunError<Y::Manifold>>
+    ) -> Result<Steps<'_, Y, R, W>, RunError<Y::Manifold>>
     where
         Y: Metriplectic,
         R: Retraction<Y::Manifold, Y::Metric>,
@@ -281,13 +356,13 @@ impl<R> Scheme<R> {
                     if states.last().is_none_or(|last| last.step != steps.state().step) {
                         states.push(steps.state().clone());
                     }
-                    let certificate = *steps.certificate();
+                    let certificate = steps.certificate().clone();
                     let trajectory = Box::new(Trajectory { states, certificate });
                     return Err(RunError::Step { cause, trajectory });
                 }
             }
         }
-        Ok(Trajectory { states, certificate: *steps.certificate() })
+        Ok(Trajectory { states, certificate: steps.certificate().clone() })
     }
 }
 
@@ -357,7 +432,7 @@ mod tests {
         let json = serde_json::to_value(&run).unwrap();
         assert_eq!(json["certificate"]["steps"], 3);
         assert_eq!(json["certificate"]["initial_energy"], 1.0);
-        assert_eq!(json["certificate"]["second_law"], "Casimir");
+        assert_eq!(json["certificate"]["second_law"], "Exact");
         let states = json["states"].as_array().unwrap();
         assert_eq!(states.len(), 4);
         for (json, state) in states.iter().zip(&run) {

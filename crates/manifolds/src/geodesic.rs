@@ -20,7 +20,7 @@
 
 use metriplectic_fields::{
     ChartPoint, Column, Dimension, Factors, Matrix, MatrixField, MatrixJet, Real, Scalar, Space,
-    Square, Vector,
+    Square, Vector, along_slopes,
 };
 use num_dual::{Dual, Dual64};
 
@@ -347,14 +347,7 @@ fn turned<M: Space>(
     v: &Vector<M>,
 ) -> (Matrix<M>, Matrix<M>) {
     let g = metric_jet(field, x, q);
-    let mut turned = Matrix::<M>::zeros();
-    for k in 0..M::Dim::LEN {
-        let column = g.slopes[k] * *v;
-        for i in 0..M::Dim::LEN {
-            turned[(i, k)] = column[i];
-        }
-    }
-    (g.value, turned)
+    (g.value, along_slopes::<M>(&g.slopes, v))
 }
 
 /// `p = g v` and `δp = g δv + (∂_δq g) v`, at the centre of a chart.

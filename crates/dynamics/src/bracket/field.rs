@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use metriplectic_fields::{Dimension, Matrix, MatrixField, Scalar, Square, Vector};
+use metriplectic_fields::{Matrix, MatrixField, Scalar, Square, Vector, along_slopes};
 use metriplectic_manifolds::{Manifold, MetricError, Riemannian};
 
 use super::{Bracket, BracketJet, Site};
@@ -40,14 +40,8 @@ impl<M: Manifold, G: Riemannian<M>, F: MatrixField<M>> Bracket<M, G> for FieldPo
         alpha: &Vector<M>,
     ) -> Result<BracketJet<M>, MetricError> {
         let jet = self.field.contravariant_jet(&at.x.point());
-        let (mut along_z, along_s) = (Matrix::<M>::zeros(), Matrix::<M>::zeros());
-        for k in 0..M::Dim::LEN {
-            let column = jet.slopes[k] * *alpha;
-            for i in 0..M::Dim::LEN {
-                along_z[(i, k)] = column[i];
-            }
-        }
-        Ok(BracketJet { value: jet.value * *alpha, along_z, along_s, tensor: jet.value })
+        let (value, along_z) = (jet.value * *alpha, along_slopes::<M>(&jet.slopes, alpha));
+        Ok(BracketJet { value, along_z, along_s: Matrix::<M>::zeros(), tensor: jet.value })
     }
 }
 

@@ -112,6 +112,9 @@ impl<M: Manifold<Dim = Const<3>>, G: Riemannian<M>> Bracket<M, G> for Nambu {
         let (along_s, tensor) = (hat(alpha * -density), hat(at.s * density));
         Ok(BracketJet { value, along_z, along_s, tensor })
     }
+    fn kills_its_entropy(&self) -> bool {
+        true
+    }
 }
 
 impl NaturalBracket for Rotations {

@@ -53,6 +53,11 @@ where
     fn is_zero(&self) -> bool {
         Bracket::<A, G::Left>::is_zero(&self.0) && Bracket::<B, G::Right>::is_zero(&self.1)
     }
+
+    fn kills_its_entropy(&self) -> bool {
+        Bracket::<A, G::Left>::kills_its_entropy(&self.0)
+            && Bracket::<B, G::Right>::kills_its_entropy(&self.1)
+    }
 }
 
 impl<A: Manifold + Times<B>, B: Manifold> NaturalBracket for Product<A, B> {

@@ -85,6 +85,10 @@ impl<M: Manifold, G: Riemannian<M>> Dissipation<M, G> for MetricDissipation {
         let along_z = slope_along_z::<M, G>(metric, z, w, alpha)?;
         Ok(DissipationJet { value, along_z, along_w, tensor })
     }
+
+    fn adapts(&self) -> bool {
+        true
+    }
 }
 
 /// `∂(K_w α)/∂z`, which only a metric that varies has: with `P = ♯w`, `A = ♯α` and

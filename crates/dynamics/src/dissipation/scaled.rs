@@ -59,6 +59,10 @@ where
         self.1.is_none()
     }
 
+    fn adapts(&self) -> bool {
+        self.1.adapts()
+    }
+
     fn is_projected(&self) -> bool {
         self.1.is_projected()
     }

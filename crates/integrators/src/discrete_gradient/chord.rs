@@ -1,39 +1,18 @@
-//! The midpoint discrete gradient.
+//! A discrete gradient at real points, safe against round-off.
 
 use metriplectic_fields::{
-    Column, Dimension, Matrix, Real, Scalar, ScalarField, Space, Square, Vector, differential,
+    Column, Dimension, Matrix, Real, ScalarField, Space, Square, Vector, along_slopes,
 };
-use metriplectic_manifolds::{Arc, ArcJet, InnerProduct, Manifold, Nodes};
-
-/// Gonzalez' discrete gradient on a manifold (Gonzalez 1996; Bloch, Farré Puiggalí, Martín de Diego
-/// 2024, eq. "gonzalez-m", with the missing step size restored):
-///
-/// ```math
-/// w = dF(z) + \frac{F(x') - F(x) - dF(z)\,d}{G(d, d)}\, \flat d , \qquad d = hv ,
-/// ```
-///
-/// so that `⟨w, d⟩ = F(x') − F(x)`. This is the definition, at any scalar; [`Chord::covector`] is
-/// the same covector evaluated safely near equilibrium.
-pub fn gonzalez<M: Space, D: Scalar>(
-    f: &impl ScalarField<M>,
-    g: &impl InnerProduct<Vector<M, D>>,
-    arc: &Arc<M, D>,
-    start: f64,
-) -> Vector<M, D> {
-    let df = differential(f, &arc.z);
-    let flat = g.flat(&arc.d);
-    let defect = f.at(&arc.end) - start - df.dot(&arc.d);
-    df + flat * (defect / flat.dot(&arc.d))
-}
+use metriplectic_manifolds::{ArcJet, InnerProduct, Manifold, Nodes};
 
 /// What a field does along one arc: the data of a discrete gradient at `f64`.
 ///
-/// The defect `δ = F(x') − F(x) − dF(z) d` is of third order, so the difference of the two values
+/// The defect `δ = F(x') − F(x) − ⟨w̄, d⟩` of a mean covector `w̄` is of third order, so the difference of the two values
 /// loses it in round-off as the step gets short: its error `ε|F|` enters the covector as `ε|F|/|d|`.
 /// The fundamental theorem of calculus gives the same number without the cancellation,
 ///
 /// ```math
-/// \delta = \int_0^1 \bigl( f(s) - dF(z)\,d \bigr) ds, \qquad
+/// \delta = \int_0^1 \bigl( f(s) - \langle\bar w, d\rangle \bigr) ds, \qquad
 /// f(s) = dF(\gamma(s))\,\gamma'(s) ,
 /// ```
 ///
@@ -43,9 +22,9 @@ pub fn gonzalez<M: Space, D: Scalar>(
 /// weight changes smoothly and switches nothing off.
 #[derive(Clone, Debug)]
 pub struct Chord<M: Space> {
-    /// `dF(z)`.
-    df: Vector<M>,
-    /// The defect `F(x') − F(x) − dF(z) d`.
+    /// The mean covector `w̄`.
+    mean: Vector<M>,
+    /// The defect `F(x') − F(x) − ⟨w̄, d⟩`.
     defect: f64,
     /// The size of a rounding error in a difference of two values of `F`.
     rounding: f64,
@@ -57,37 +36,45 @@ pub struct Chord<M: Space> {
 /// `F` starts to be trusted; from four times that share on it is trusted alone.
 const SHORT: f64 = 1e-3;
 
+/// The weight of an integral against a difference of two values of size `size` that is about
+/// `change`: it falls from 1 to 0 between one and four times the short share, with zero slope at both.
+#[inline]
+pub(super) fn short(change: f64, size: f64) -> f64 {
+    let share = change.abs() / (SHORT * size).max(f64::MIN_POSITIVE);
+    let t = ((share - 1.0) / 3.0).clamp(0.0, 1.0);
+    1.0 - t * t * (3.0 - 2.0 * t)
+}
+
 impl<M: Manifold> Chord<M> {
-    /// Evaluates `f` along an arc with displacement `d` at its base, where `df` is known. `start` is
-    /// `F(x)`, `end` the point `x'`, and `nodes` those of the arc.
+    /// Evaluates `f` along an arc with the displacement `d` at its base and the mean covector `mean`.
+    /// `start` is `F(x)`, `end` the point `x'` with `F(x')`, `base` the slope `⟨dF(z), d⟩` at the base
+    /// point, and `nodes` those of the arc.
     #[inline]
     pub fn new(
         f: &impl ScalarField<M>,
-        df: &Vector<M>,
+        mean: &Vector<M>,
         d: &Vector<M>,
         start: f64,
         end: (&M::Point<f64>, f64),
+        base: impl FnOnce() -> f64,
         nodes: impl FnOnce() -> Nodes<M>,
     ) -> Self {
         let (end, value) = end;
-        let slope = df.dot(d);
-        let size = start.abs() + value.abs() + M::magnitude(end) * df.magnitude();
+        let slope = mean.dot(d);
+        let size = start.abs() + value.abs() + M::magnitude(end) * mean.magnitude();
         let rounding = f64::EPSILON * size;
         let difference = (value - start) - slope;
-        let share = df.magnitude() * d.magnitude() / (SHORT * size).max(f64::MIN_POSITIVE);
+        let share = short(mean.magnitude() * d.magnitude(), size);
         let (mut defect, mut noise) = (difference, rounding);
-        if share < 4.0 {
+        if share > 0.0 {
             let Nodes { ends: [x, y], middle } = nodes();
-            let middle = middle.map_or(slope, |z| f.at_real(&z).eps1);
+            let middle = middle.map_or_else(base, |z| f.at_real(&z).eps1);
             let integral = Integral::new([f.at_real(&x), f.at_real(&y)], middle, slope);
-            // Falls from 1 to 0 between one and four times the short share, with zero slope at both.
-            let t = ((share - 1.0) / 3.0).clamp(0.0, 1.0);
-            let short = 1.0 - t * t * (3.0 - 2.0 * t);
-            let weight = short * integral.weight(rounding);
+            let weight = share * integral.weight(rounding);
             defect += weight * (integral.value - difference);
             noise *= 1.0 - weight;
         }
-        Self { df: *df, defect, rounding, noise }
+        Self { mean: *mean, defect, rounding, noise }
     }
 
     /// The covector `w` with `⟨w, d⟩ = F(x') − F(x) + recall`.
@@ -101,10 +88,10 @@ impl<M: Manifold> Chord<M> {
         d: &Vector<M>,
     ) -> Vector<M> {
         let flat = g.flat(d);
-        self.df + flat * self.correction(recall, flat.dot(d))
+        self.mean + flat * self.correction(recall, flat.dot(d))
     }
 
-    /// The round-off of the covector on an arc of length `|d|`, beside that of `dF(z)`.
+    /// The round-off of the covector on an arc of length `|d|`, beside that of its mean.
     #[inline]
     pub fn noise(&self, length: f64) -> f64 {
         if length > 0.0 { self.noise / length } else { 0.0 }
@@ -115,54 +102,41 @@ impl<M: Manifold> Chord<M> {
         if square > 0.0 { (self.defect + recall) / square } else { 0.0 }
     }
 
-    /// The derivative of the covector along the unknown of the arc, from the Hessian `hf` at `z` and
-    /// the differential at `x'`; `slopes` are the derivatives of the metric at `z`, if it has any.
+    /// The derivative of the covector along the unknown of the arc, from that of its mean and the
+    /// differential at `x'`; `slopes` are the derivatives of the metric at `z`, if it has any.
     #[inline]
     pub fn slope(
         &self,
         recall: f64,
         (g, slopes): (&impl InnerProduct<Vector<M>>, Option<&Slopes<M>>),
         arc: &ArcJet<M>,
-        hf: &Matrix<M>,
+        dmean: &Matrix<M>,
         df_end: &Vector<M>,
     ) -> Matrix<M> {
-        let mut slope = *hf * arc.dz;
+        let mut slope = *dmean;
         let flat = g.flat(&arc.d);
         let square = flat.dot(&arc.d);
         if square <= 0.0 {
             return slope;
         }
         let c = self.correction(recall, square);
-        // ∂δ = dF(x') ∂x' − ∂(dF(z) d), a difference of nearly equal rows, which counts only as far
+        // ∂δ = dF(x') ∂x' − ∂⟨w̄, d⟩, a difference of nearly equal rows, which counts only as far
         // as it is above its own round-off.
         let rows = arc.dend.transpose_times(df_end)
-            - arc.dd.transpose_times(&self.df)
+            - arc.dd.transpose_times(&self.mean)
             - slope.transpose_times(&arc.d);
-        let signal = self.df.magnitude() * arc.d.magnitude();
+        let signal = self.mean.magnitude() * arc.d.magnitude();
         let noise = 1e3 * self.rounding / signal.max(f64::MIN_POSITIVE);
         let trust = (1.0 + noise.powi(2)).recip();
         let mut along = rows * trust - arc.dd.transpose_times(&flat) * (2.0 * c);
         if let Some(slopes) = slopes {
             // ∂g along z, in ♭d and in G(d, d).
-            let mut turned = Matrix::<M>::zeros();
-            for k in 0..Vector::<M>::LEN {
-                let column = slopes[k] * arc.d;
-                for i in 0..Vector::<M>::LEN {
-                    turned[(i, k)] = column[i];
-                }
-            }
-            let turned = turned * arc.dz;
+            let turned = along_slopes::<M>(slopes, &arc.d) * arc.dz;
             along -= turned.transpose_times(&arc.d) * c;
             slope += turned * c;
         }
         slope += Matrix::<M>::outer(&flat, &(along * square.recip()));
-        for k in 0..Vector::<M>::LEN {
-            let column = g.flat(&Vector::<M>::from_index(|i| arc.dd[(i, k)]));
-            for i in 0..Vector::<M>::LEN {
-                slope[(i, k)] += c * column[i];
-            }
-        }
-        slope
+        slope + Matrix::<M>::from_columns(|k| g.flat(&arc.dd.column_at(k))) * c
     }
 }
 
@@ -177,7 +151,7 @@ struct Integral {
 
 impl Integral {
     /// From `f`, `f'` at both ends of the arc (first and second derivative of `F`) and `f` in its
-    /// middle, less the slope `dF(z) d`. The error is estimated by the difference to Simpson's rule.
+    /// middle, less the slope `⟨w̄, d⟩`. The error is estimated by the difference to Simpson's rule.
     #[inline]
     fn new([start, end]: [Real; 2], middle: f64, slope: f64) -> Self {
         let (f0, f1, f2) = (start.eps1 - slope, middle - slope, end.eps1 - slope);
@@ -221,11 +195,19 @@ mod tests {
             let d: Vector2<f64> = y - x;
             let [start, end]: [f64; 2] =
                 [x, y].map(|p| ScalarField::<Euclidean<2>>::at(&cubic, &p));
-            let chord = Chord::<Euclidean<2>>::new(&cubic, &df, &d, start, (&y, end), || {
-                let d = d.cast::<Real>();
-                let at = |t| x.cast::<Real>() + d * Real::new(t, 1.0, 1.0, 0.0);
-                Nodes { ends: [at(0.0), at(1.0)], middle: Some(at(0.5)) }
-            });
+            let chord = Chord::<Euclidean<2>>::new(
+                &cubic,
+                &df,
+                &d,
+                start,
+                (&y, end),
+                || df.dot(&d),
+                || {
+                    let d = d.cast::<Real>();
+                    let at = |t| x.cast::<Real>() + d * Real::new(t, 1.0, 1.0, 0.0);
+                    Nodes { ends: [at(0.0), at(1.0)], middle: Some(at(0.5)) }
+                },
+            );
             let w = chord.covector(0.0, &Canonical, &d);
             let defect = 0.25 * (d.x.powi(3) + 2.0 * d.y.powi(3));
             let exact = df + d * (defect / d.norm_squared());
@@ -240,10 +222,15 @@ mod tests {
     fn an_arc_without_length_has_the_differential_itself() {
         let (x, df, d) = (vector![0.7, -0.4], vector![1.47, 0.96], Vector2::zeros());
         let start = ScalarField::<Euclidean<2>>::at(&cubic, &x);
-        let chord = Chord::<Euclidean<2>>::new(&cubic, &df, &d, start, (&x, start), || Nodes {
-            ends: [x.cast(); 2],
-            middle: None,
-        });
+        let chord = Chord::<Euclidean<2>>::new(
+            &cubic,
+            &df,
+            &d,
+            start,
+            (&x, start),
+            || 0.0,
+            || Nodes { ends: [x.cast(); 2], middle: None },
+        );
         assert_eq!(chord.covector(0.0, &Canonical, &d), df);
     }
 }

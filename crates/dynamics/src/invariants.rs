@@ -1,0 +1,131 @@
+//! Further conserved functions `L_a`, beside the energy.
+//!
+//! There are two kinds, and a scheme keeps them in two ways:
+//!
+//! - a **Casimir** is conserved because the bracket kills it, `Π dC = 0`, whatever the energy is:
+//!   `|Γ|²` of a heavy top, which lives on se(3)*;
+//! - a **momentum** is conserved because the energy is symmetric, `⟨dJ, Π dH⟩ = 0` while
+//!   `Π dJ ≠ 0`: the angular momentum of a pendulum.
+//!
+//! Neither is produced by the dissipation, `K dL_a = 0`. That of the metric is projected until it
+//! is so ([`orthogonal`](crate::orthogonal)); any other one must have this property of its own.
+
+use std::fmt;
+
+use metriplectic_fields::{Real, ScalarField, Space};
+
+/// Why a function is conserved.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// The bracket kills it: `Π dC = 0`.
+    Casimir,
+    /// The energy is symmetric: `⟨dJ, Π dH⟩ = 0`.
+    Momentum,
+}
+
+impl fmt::Display for Kind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Casimir => "Casimir",
+            Self::Momentum => "momentum",
+        })
+    }
+}
+
+/// A list of further invariants: `()`, or a shorter list with one more, made by
+/// [`SystemBuilder::casimir`](crate::SystemBuilder::casimir),
+/// [`momentum`](crate::SystemBuilder::momentum) and [`symmetry`](crate::SystemBuilder::symmetry).
+pub trait Invariants<M: Space> {
+    /// How many there are.
+    const COUNT: usize;
+
+    /// Shows them to the visitor, in the order in which they were listed.
+    fn each(&self, visitor: &mut impl Visitor<M>);
+}
+
+/// Looks at each invariant of a list.
+pub trait Visitor<M: Space> {
+    /// Looks at one.
+    fn visit(&mut self, kind: Kind, f: &impl ScalarField<M>);
+
+    /// Looks at the action that the momentum visited last belongs to.
+    fn acts(&mut self, _action: &Action<'_, M>) {}
+}
+
+/// A one-parameter group of maps of `M`: `(t, x) ↦ Φ_t(x)`, with `Φ_0(x) = x`.
+pub type Action<'a, M> = dyn Fn(Real, &<M as Space>::Point<Real>) -> <M as Space>::Point<Real> + 'a;
+
+impl<M: Space> Invariants<M> for () {
+    const COUNT: usize = 0;
+
+    #[inline]
+    fn each(&self, _: &mut impl Visitor<M>) {}
+}
+
+/// A further Casimir of the bracket.
+#[derive(Clone, Copy)]
+pub struct Casimir<F>(pub F);
+
+/// A momentum: conserved because the energy is symmetric.
+#[derive(Clone, Copy)]
+pub struct Momentum<F>(pub F);
+
+/// A momentum with the one-parameter group of symmetries that it belongs to.
+#[derive(Clone, Copy)]
+pub struct Symmetry<A, F> {
+    /// The action `(t, x) ↦ Φ_t(x)`.
+    pub action: A,
+    /// Its momentum map.
+    pub momentum: F,
+}
+
+macro_rules! opaque {
+    ($name:ident<$($parameter:ident),*>) => {
+        // By hand, because closures have no `Debug`.
+        impl<$($parameter),*> fmt::Debug for $name<$($parameter),*> {
+            fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.debug_struct(stringify!($name)).finish_non_exhaustive()
+            }
+        }
+    };
+}
+opaque!(Casimir<F>);
+opaque!(Momentum<F>);
+opaque!(Symmetry<A, F>);
+
+impl<M: Space, L: Invariants<M>, F: ScalarField<M>> Invariants<M> for (L, Casimir<F>) {
+    const COUNT: usize = L::COUNT + 1;
+
+    #[inline]
+    fn each(&self, visitor: &mut impl Visitor<M>) {
+        self.0.each(visitor);
+        visitor.visit(Kind::Casimir, &self.1.0);
+    }
+}
+
+impl<M: Space, L: Invariants<M>, F: ScalarField<M>> Invariants<M> for (L, Momentum<F>) {
+    const COUNT: usize = L::COUNT + 1;
+
+    #[inline]
+    fn each(&self, visitor: &mut impl Visitor<M>) {
+        self.0.each(visitor);
+        visitor.visit(Kind::Momentum, &self.1.0);
+    }
+}
+
+impl<M, L, A, F> Invariants<M> for (L, Symmetry<A, F>)
+where
+    M: Space,
+    L: Invariants<M>,
+    A: Fn(Real, &M::Point<Real>) -> M::Point<Real>,
+    F: ScalarField<M>,
+{
+    const COUNT: usize = L::COUNT + 1;
+
+    #[inline]
+    fn each(&self, visitor: &mut impl Visitor<M>) {
+        self.0.each(visitor);
+        visitor.visit(Kind::Momentum, &self.1.momentum);
+        visitor.acts(&self.1.action);
+    }
+}

@@ -1,0 +1,168 @@
+//! Discrete gradients: covectors that account exactly for the change of a function along a step.
+//!
+//! | type | mean covector `w̄` | order of a symmetric scheme | fields per step |
+//! |---|---|---|---|
+//! | [`Gonzalez`] | `dF(z)` | 2 | one differential |
+//! | [`MeanValue`] | `∫₀¹ dF(φ_z(q(s))) ds`, `q` the segment in the chart at `z` | 2 | four differentials |
+//! | [`ItohAbe`] | difference quotients, one coordinate of that chart after the other | 1 | `n + 1` values, `4n` slopes where they are small |
+//! | [`SymmetricItohAbe`] | the mean of these from `x` to `x'` and from `x'` to `x` | 2 | twice as many |
+//!
+//! Each is completed by the correction of Gonzalez (1996),
+//!
+//! ```math
+//! w = \bar w + \frac{F(x') - F(x) - \langle\bar w, d\rangle}{G(d, d)}\, \flat d ,
+//! \qquad \langle w, d\rangle = F(x') - F(x) ,
+//! ```
+//!
+//! with the displacement `d = hv` of the step's arc. It is all there is to [`Gonzalez`]; for the
+//! others it is the defect of the quadrature, and of a chart that is not normal for the metric.
+
+mod chord;
+mod gonzalez;
+mod itoh_abe;
+mod mean_value;
+
+pub use chord::Chord;
+pub use gonzalez::Gonzalez;
+pub use itoh_abe::{ItohAbe, SymmetricItohAbe};
+pub use mean_value::MeanValue;
+
+use std::fmt::Debug;
+
+use metriplectic_fields::{ChartPoint, Column, Matrix, Scalar, ScalarField, Space, Square, Vector};
+use metriplectic_manifolds::{Arc, ArcJet, InnerProduct, Manifold};
+use num_dual::Dual64;
+
+/// A discrete gradient on a manifold (Bloch, Farré Puiggalí, Martín de Diego 2024, eq. "discGrad-m",
+/// with the missing step size restored): a covector `w` at the base `z` of an arc from `x` to `x'`
+/// with the displacement `d`.
+///
+/// The one method to write is [`mean`](Self::mean), at any scalar.
+///
+/// Laws ([`laws::discrete_gradient`](crate::laws::discrete_gradient)): 1. `⟨w, d⟩ = F(x') − F(x)`;
+/// 2. `w → dF(z)` as the points meet; 3. what is evaluated safely is the definition.
+pub trait DiscreteGradient: Copy + Debug + Send + Sync {
+    /// The covector `w̄` before its correction, in the frame of the chart of the base point.
+    fn mean<M: Manifold, D: Scalar>(
+        &self,
+        f: &impl ScalarField<M>,
+        x: &M::Point<f64>,
+        arc: &Arc<M, D>,
+    ) -> Vector<M, D>;
+
+    /// The same at real points.
+    #[inline]
+    fn real_mean<M: Manifold>(
+        &self,
+        f: &impl ScalarField<M>,
+        x: &M::Point<f64>,
+        arc: &Arc<M>,
+    ) -> Vector<M> {
+        self.mean(f, x, arc)
+    }
+
+    /// The same at real points, with its derivatives along the unknown of the arc, in a chart that
+    /// stays where it is.
+    #[inline]
+    fn mean_jet<M: Manifold>(
+        &self,
+        f: &impl ScalarField<M>,
+        x: &M::Point<f64>,
+        arc: &ArcJet<M>,
+    ) -> (Vector<M>, Matrix<M>) {
+        by_dual_numbers(self, f, x, arc)
+    }
+
+    /// The slope `⟨dF(z), d⟩` at the base point.
+    #[inline]
+    fn slope_at_base<M: Manifold>(
+        &self,
+        f: &impl ScalarField<M>,
+        z: &M::Point<f64>,
+        d: &Vector<M>,
+        _mean: &Vector<M>,
+    ) -> f64 {
+        f.jet1(z).df.dot(d)
+    }
+
+    /// The covector `w` by its definition, from the value `start = F(x)`; a step evaluates it by
+    /// [`Chord`], which is safe against round-off.
+    fn covector<M: Manifold, D: Scalar>(
+        &self,
+        f: &impl ScalarField<M>,
+        g: &impl InnerProduct<Vector<M, D>>,
+        (x, start): (&M::Point<f64>, f64),
+        arc: &Arc<M, D>,
+    ) -> Vector<M, D> {
+        let mean = self.mean(f, x, arc);
+        let flat = g.flat(&arc.d);
+        let defect = f.at(&arc.end) - start - mean.dot(&arc.d);
+        mean + flat * (defect / flat.dot(&arc.d))
+    }
+}
+
+/// The definition of [`DiscreteGradient::mean_jet`]: one dual number for each direction.
+fn by_dual_numbers<M: Manifold>(
+    gradient: &(impl DiscreteGradient + ?Sized),
+    f: &impl ScalarField<M>,
+    x: &M::Point<f64>,
+    jet: &ArcJet<M>,
+) -> (Vector<M>, Matrix<M>) {
+    let along = |value: &Vector<M>, slope: &Matrix<M>, k: usize| {
+        Vector::<M, Dual64>::from_index(|i| Dual64::new(value[i], slope[(i, k)]))
+    };
+    let (zero, mut value) = (Vector::<M>::zero(), Vector::<M>::zero());
+    let slope = Matrix::<M>::from_columns(|k| {
+        let arc = Arc {
+            z: ChartPoint { base: jet.z.clone(), q: along(&zero, &jet.dz, k) },
+            d: along(&jet.d, &jet.dd, k),
+            end: M::chart(&jet.end, &along(&zero, &jet.dend, k)),
+        };
+        let mean = gradient.mean(f, x, &arc);
+        value = mean.real();
+        Vector::<M>::from_index(|i| mean[i].eps)
+    });
+    (value, slope)
+}
+
+/// The ends of an arc in the chart at its base.
+fn segment<M: Manifold, D: Scalar>(
+    x: &M::Point<f64>,
+    arc: &Arc<M, D>,
+) -> (Vector<M, D>, Vector<M, D>) {
+    let base = &arc.z.base;
+    (M::coordinates(base, &M::constant(x)), M::coordinates(base, &arc.end))
+}
+
+/// The partial derivative `∂f/∂qⁱ` at the coordinates `q` in the chart at `x`.
+fn partial<M: Space, D: Scalar>(
+    f: &impl ScalarField<M>,
+    x: &M::Point<f64>,
+    q: &Vector<M, D>,
+    i: usize,
+) -> D {
+    use num_dual::Dual;
+    let seed = |k| Dual::new(q[k], if k == i { D::one() } else { D::zero() });
+    f.at(&M::chart(x, &Vector::<M, Dual<D>>::from_index(seed))).eps
+}
+
+/// Nodes and weights of the Gauss-Legendre rule of order 8 on `[0, 1]`.
+const GAUSS: [(f64, f64); 4] = [
+    (0.069_431_844_202_973_71, 0.173_927_422_568_726_93),
+    (0.330_009_478_207_571_87, 0.326_072_577_431_273_07),
+    (0.669_990_521_792_428_13, 0.326_072_577_431_273_07),
+    (0.930_568_155_797_026_3, 0.173_927_422_568_726_93),
+];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_gauss_rule_is_exact_to_degree_seven() {
+        for degree in 0..8 {
+            let sum: f64 = GAUSS.iter().map(|(s, weight)| weight * s.powi(degree)).sum();
+            assert!((sum - f64::from(degree + 1).recip()).abs() < 1e-16, "degree {degree}");
+        }
+    }
+}

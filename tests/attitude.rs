@@ -91,10 +91,10 @@ fn the_attitude_is_of_second_order_for_an_energy_that_is_not_quadratic() {
     assert!(order.agrees(2.0, 0.05), "{order}");
 }
 
-/// What round-off makes of the momentum in space: each step rounds the entries of `R` and solves for `p`
-/// within some `ε`, in a direction of its own.
+/// What round-off makes of the momentum in space, a random walk: each step solves for `p` within some
+/// `ε`, in a direction of its own.
 fn walk(count: u32) -> f64 {
-    16.0 * f64::EPSILON * f64::from(count).sqrt()
+    8.0 * f64::EPSILON * f64::from(count).sqrt()
 }
 
 /// The largest `|R p − R₀ p₀|` of a run.

@@ -23,10 +23,14 @@
 //! \exp(\hat\tau) \exp(h \hat w)\, p_{k+1} = \mathrm{cay}(hw)\, p_{k+1} .
 //! ```
 //!
-//! `|τ| = O(h³)`, so the order is 2. Of a free body `R p` is constant to round-off, and `τ = 0` for one
-//! that spins about a principal axis. With the discrete gradient instead of `dH(z)` this holds for every
-//! energy, quadratic or not: `w` is that of a run by [`Gonzalez`](crate::Gonzalez), the default, with a
-//! metric that does not vary. For other runs the attitude is of order 2 and the momentum kept within it.
+//! `|τ| = O(h³)`, so the order is 2. The balance is kept as a sum `ℓ` in space, to which each step adds
+//! `R_k (cay(hw) p_{k+1} − p_k)`, what the dissipation has done, and `R_{k+1} p_{k+1}` is turned to `ℓ`: the
+//! rounding of the rotations does not add up to a drift.
+//!
+//! Of a free body `R p` is constant to round-off, and `τ = 0` for one that spins about a principal axis.
+//! With the discrete gradient instead of `dH(z)` this holds for every energy, quadratic or not: `w` is that
+//! of a run by [`Gonzalez`](crate::Gonzalez), the default, with a metric that does not vary. For other
+//! runs the attitude is of order 2, and so is the momentum.
 
 use metriplectic_dynamics::Metriplectic;
 use metriplectic_fields::{ChartPoint, ScalarField, Space};
@@ -65,6 +69,8 @@ pub struct Attitude<'a, Y> {
     system: &'a Y,
     state: State<LieDual<3>>,
     rotation: Matrix3<f64>,
+    /// The momentum `ℓ` in space.
+    momentum: Vector3<f64>,
 }
 
 impl<'a, Y: Metriplectic<Manifold = LieDual<3>>> Attitude<'a, Y> {
@@ -83,7 +89,7 @@ impl<'a, Y: Metriplectic<Manifold = LieDual<3>>> Attitude<'a, Y> {
         if !turns_vectors(system.manifold()) {
             return Err(AttitudeError::NotSo3);
         }
-        Ok(Self { system, state: state.clone(), rotation: r0 })
+        Ok(Self { system, state: state.clone(), rotation: r0, momentum: r0 * state.point })
     }
 
     /// The rotation from the frame of the body to space.
@@ -126,7 +132,8 @@ impl<'a, Y: Metriplectic<Manifold = LieDual<3>>> Attitude<'a, Y> {
         let turn = self.velocity(next)? * (next.time / to as f64);
         let (p, half) = (next.point, 0.5 * turn.norm());
         let slower = if half > 0.0 { half.atan() / half } else { 1.0 };
-        let balance = rotations::exp(&(turn * slower)) * p;
+        self.momentum += self.rotation * (rotations::exp(&(turn * slower)) * p - self.state.point);
+        let balance = self.rotation.tr_mul(&self.momentum);
         let tilt = smallest_rotation(&(rotations::exp(&turn) * p), &balance);
         self.rotation = Rotations::chart(&Rotations::chart(&self.rotation, &tilt), &turn);
         self.state = next.clone();
@@ -157,8 +164,8 @@ fn turns_vectors(space: &LieDual<3>) -> bool {
     })
 }
 
-/// The vector of the smallest rotation that takes `a` to `b`, which are of the same length; zero if it
-/// has no axis.
+/// The vector of the smallest rotation that takes the direction of `a` to that of `b`; zero if it has no
+/// axis.
 fn smallest_rotation(a: &Vector3<f64>, b: &Vector3<f64>) -> Vector3<f64> {
     let axis = a.cross(b);
     let sine = axis.norm();

@@ -1,7 +1,14 @@
-//! Bring your own: a manifold or a metric that is not in the box.
+//! Bring your own: a manifold or a metric that is not in the box. Choose: which scheme, bracket and
+//! dissipation. And the paper, equation by equation.
 //!
+//! - [`choosing`]: which space, bracket, dissipation and scheme, in short tables with reasons;
 //! - [`your_own_manifold`]: the hyperbolic plane, from nothing to a metriplectic run;
-//! - [`your_own_metric`]: closures on a chart, a sphere, SO(3) and a product.
+//! - [`your_own_metric`]: closures on a chart, a sphere, SO(3) and a product;
+//! - [`equations`]: what computes each equation of the paper, and which test checks it;
+//! - [`errata`]: where the library departs from the paper, with derivations.
 
+pub mod choosing;
+pub mod equations;
+pub mod errata;
 pub mod your_own_manifold;
 pub mod your_own_metric;

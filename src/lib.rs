@@ -29,7 +29,8 @@
 //! ```
 //!
 //! [Bring your own metric](guide::your_own_metric), on any of the spaces here, or [your own
-//! manifold](guide::your_own_manifold), in sixty lines.
+//! manifold](guide::your_own_manifold), in sixty lines; [choose](guide::choosing) bracket, dissipation and
+//! scheme; or read the paper [equation by equation](guide::equations), with its [errata](guide::errata).
 //!
 //! # The vocabulary
 //!

@@ -245,3 +245,78 @@ fn the_convergence_study_prints_an_array_of_orders() {
         assert!((order - expected).abs() < 0.05, "{row}");
     }
 }
+
+/// One of the numbers of a report.
+fn figure(report: &serde_json::Value, key: &str) -> f64 {
+    report[key].as_f64().unwrap_or_else(|| panic!("{key} in {report}"))
+}
+
+#[test]
+fn the_gas_containers_lose_entropy_with_the_published_scheme_alone() {
+    let report = json(&example("gas_containers", &["--json"]));
+    let (published, exact) = (&report["published"], &report["exact"]);
+    for run in [published, exact] {
+        assert_eq!(run["steps"], 300);
+        assert!((figure(run, "initial_energy") - 6.0).abs() < 1e-15);
+        assert!(figure(run, "max_energy_error") <= 5e-14 * 6.0, "{run}");
+    }
+    // A reference scheme of another hand falls on 150 steps, by 1.4e-3 at worst.
+    let falls = published["entropy_falls"].as_u64().expect("a count");
+    assert!((148..=152).contains(&falls), "{published}");
+    assert!((figure(published, "min_entropy_increment") + 1.4e-3).abs() < 1e-4, "{published}");
+    assert_eq!(exact["entropy_falls"], 0);
+    assert!(figure(exact, "min_entropy_increment") >= 0.0, "{exact}");
+
+    // A quarter of the step does not mend it.
+    let run = |steps, h| {
+        json(&example("gas_containers", &["--json", "--steps", steps, "--step-size", h]))
+    };
+    let fine = run("1200", "0.025");
+    let falls = fine["published"]["entropy_falls"].as_u64().expect("a count");
+    assert!((498..=502).contains(&falls), "{fine}");
+    assert_eq!(fine["exact"]["entropy_falls"], 0);
+
+    // The flow at t = 30, by a Runge-Kutta method of order 4 with h = 1e-3.
+    let finest = run("4800", "0.00625");
+    let state: Vec<f64> = serde_json::from_value(finest["final_state"].clone()).expect("numbers");
+    let flow = [1.711_934_52, 0.069_399_6, 1.401_216_8, 4.596_375_1];
+    assert!(state.iter().zip(flow).all(|(a, b)| (a - b).abs() < 3e-2), "{finest}");
+    for run in [&finest["published"], &finest["exact"]] {
+        assert!((figure(run, "entropy_gained") - 7.528_452e-3).abs() < 2e-4, "{finest}");
+    }
+}
+
+#[test]
+fn the_damped_oscillator_goes_to_its_closed_form_with_order_two() {
+    let report = json(&example("damped_oscillator", &["--json"]));
+    let ([energy, entropy, _], state) = certified(&report);
+    assert!(energy <= 5e-14 && entropy > 0.0, "{report}");
+    assert_eq!(report["entropy_falls"], 0);
+    let closed = [1.042_199_194_672_55, 0.615_567_352_383_51, 1.267_448_836_651_72];
+    let error = state.iter().zip(closed).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt();
+    let errors: Vec<f64> = serde_json::from_value(report["errors"].clone()).expect("numbers");
+    assert!((errors[0] - error).abs() < 1e-12 && errors.len() == 4, "{report}");
+    // The midpoint rule turns by 2 atan(h/2) rather than by h: late by h²/12 of the angle.
+    let late = 100.0 * 0.1_f64.powi(2) / 12.0 * (closed[0].powi(2) + closed[1].powi(2)).sqrt();
+    assert!((error / late - 1.0).abs() < 0.02, "{error:.4} for {late:.4}");
+    assert!((figure(&report, "order") - 2.0).abs() < 0.01, "{report}");
+}
+
+#[test]
+fn the_thermoelastic_pendulum_keeps_energy_and_angular_momentum() {
+    let run = |steps, h| {
+        json(&example("thermoelastic_pendulum", &["--json", "--steps", steps, "--step-size", h]))
+    };
+    let errors = [("800", "0.05"), ("1600", "0.025")].map(|(steps, h)| {
+        let report = run(steps, h);
+        assert!((figure(&report, "initial_energy") - 4.435_059_592_089_027).abs() < 1e-14);
+        assert!(figure(&report, "max_relative_energy_error") <= 5e-14, "{report}");
+        assert!(figure(&report, "min_entropy_increment") > 0.0, "{report}");
+        let momentum = &report["invariants"][0];
+        assert!((figure(momentum, "initial") - 2.0).abs() < 1e-15, "{momentum}");
+        assert!(figure(momentum, "max_error") <= 50.0 * f64::EPSILON * 2.0, "{momentum}");
+        figure(&report, "final_entropy") - 2.826_653_749_911_492
+    });
+    assert!(errors[0].abs() < 1e-3, "{errors:?}");
+    assert!((errors[0] / errors[1] - 4.0).abs() < 0.1, "{errors:?}");
+}

@@ -9,7 +9,7 @@
 //!
 //! of covectors and of vectors: `⟨w, Pv⟩ = 0`. Several covectors are first made orthogonal to each
 //! other by Gram and Schmidt, which is the inverse `C^{ab}` of their Gram matrix in the remark of
-//! Bloch, Farré Puiggalí, Martín de Diego (2024, §4.2), without forming it: a covector that depends
+//! Bloch, Farré Puiggalí, Martín de Diego (2024, §2.2), without forming it: a covector that depends
 //! on those before it is found by what is left of it, and left out.
 
 use metriplectic_fields::{Column, Dimension, Scalar, Square};

@@ -18,7 +18,7 @@
 //! - `K̃_w = Q K_w Qᵀ`, where `Q` takes out the parts of the further invariants orthogonal to `w_H`: it
 //!   is symmetric and positive semidefinite, and kills `w_H` and all of them. For the dissipation of
 //!   the metric this is `κ G*(Pα, Pβ)` with `κ = G*(w_H, w_H)` and `P = 1 − C^{ab} L_b ⊗ L_a` (Bloch,
-//!   Farré Puiggalí, Martín de Diego 2024, remark in §4.2).
+//!   Farré Puiggalí, Martín de Diego 2024, remark in §2.2).
 
 use std::fmt::Debug;
 

@@ -1,6 +1,6 @@
 //! Newton's method with a residual floor that follows the scale of the state.
 
-use metriplectic_fields::{Column, Factors, Matrix, Space, Square, Vector};
+use metriplectic_fields::{Column, Factors, Space, Square, Vector};
 
 use crate::root_finder::{Equation, Linearised, NoRoot, Root, RootFinder};
 
@@ -77,24 +77,23 @@ impl Newton {
         best: &mut NoRoot<M>,
     ) -> Progress {
         let mut residual = here.residual;
-        let (mut factors, mut contraction) =
-            (None::<<Matrix<M> as Square<f64>>::Factors>, f64::INFINITY);
+        let (mut factors, mut contraction) = (None, f64::INFINITY);
         loop {
-            if best.residual <= self.tolerance * here.floor {
-                // What a slow contraction leaves has the same sign in each step; it costs one more
-                // solution with known factors to take it out.
-                let last = factors.as_ref().and_then(|factors| factors.solve(&residual));
-                if let Some(last) = last
-                    && best.residual > 0.1 * self.tolerance * here.floor
-                {
-                    best.best -= last;
-                    best.sweeps += 1;
-                }
+            let solved = best.residual <= self.tolerance * here.floor;
+            if solved && best.residual <= 0.1 * self.tolerance * here.floor {
                 return Progress::Solved;
             }
             factors = factors.or_else(|| here.jacobian.factor());
             let correction = factors.as_ref().and_then(|factors| factors.solve(&residual));
             best.sweeps += 1;
+            if solved {
+                // What a slow contraction leaves below the floor has the same sign in each step; it
+                // costs one more solution to take it out.
+                if let Some(last) = correction {
+                    best.best -= last;
+                }
+                return Progress::Solved;
+            }
             if let Some(last) = &correction
                 && contraction * best.residual <= 0.1 * self.tolerance * here.floor
             {

@@ -8,6 +8,7 @@
 //! | [`order`] | how fast does the error fall with the step? | [`Order`]: the fitted slope, its 95 % interval, the points left out as round-off |
 //! | [`convergence`] | how do schemes compare? | [`Convergence`]: errors, order, table and figure |
 //! | [`problems`] | on what, on every manifold and metric? | [`problems::Orders`], [`problems::LargeSteps`], with exact flows by [`problems::flow`] |
+//! | [`published`] | and by the scheme as published? | [`Published`], [`problems::SecondLaws`] |
 //! | [`drift`] | does the error grow with time? | [`Drift`]: flat, a random walk or a linear drift, in constant memory |
 //! | [`table`] | what does the study say, in rows? | [`Table`]: plain text and Markdown |
 //! | [`plot`] | what does it look like? | [`Panels`] of lines, with a [`Globe`] beside them, and [`LogLog`]: SVG, the same bytes every time |
@@ -46,6 +47,7 @@ pub mod gallery;
 pub mod order;
 pub mod plot;
 pub mod problems;
+pub mod published;
 pub mod table;
 
 mod axis;
@@ -62,4 +64,5 @@ pub use drift::{Drift, Growth, Slope};
 pub use gallery::{Gallery, GalleryError, Options, Progress, print, write_csv};
 pub use order::{Order, OrderError};
 pub use plot::{Globe, LogLog, Panel, Panels, PlotError};
+pub use published::Published;
 pub use table::{Table, scientific};

@@ -9,7 +9,7 @@ use metriplectic_dynamics::{
     AreaForm, Metriplectic, Nambu, SecondLaw, Symplectic, System, Zero, system::Point,
 };
 use metriplectic_fields::{ChartPoint, Column, Real, Space, Vector};
-use metriplectic_integrators::{Scheme, Span};
+use metriplectic_integrators::{Certificate, Run, Scheme, Span};
 use metriplectic_manifolds::{
     Canonical, Cayley, Euclidean, Exponential, HalfLine, LieDual, Manifold, Metric, Product,
     Projection, Retraction, Rotations, Sphere, WeylMidpoint, rotations,
@@ -17,7 +17,7 @@ use metriplectic_manifolds::{
 use nalgebra::{Matrix2, Matrix3, SVector, Vector1, Vector2, Vector3, Vector6, vector};
 use num_dual::DualNum;
 
-use crate::Convergence;
+use crate::{Convergence, Published};
 
 /// A system with a start, and names for tables.
 #[derive(Clone, Debug)]
@@ -226,6 +226,62 @@ impl Study for Orders {
                 self.failures.push(format!("{name} on {manifold} ({metric}), {scheme}: {error}"));
             }
         }
+    }
+}
+
+/// The exact scheme beside the published one, with the Weyl midpoint on every problem that has an
+/// entropy which is a Casimir.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct SecondLaws {
+    /// A comparison for each of them.
+    pub rows: Vec<Comparison>,
+}
+
+/// Both schemes on one problem.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Comparison {
+    /// Problem and manifold.
+    pub problem: String,
+    /// The balance of the exact scheme.
+    pub exact: Certificate,
+    /// The balance of the published one.
+    pub published: Certificate,
+}
+
+impl SecondLaws {
+    /// `steps` steps of size `h` on every problem.
+    pub fn of_every_problem(h: f64, steps: usize) -> Self {
+        struct Runs(SecondLaws, f64, usize);
+        impl Study for Runs {
+            fn visit<Y, R>(&mut self, problem: &Problem<Y>, scheme: &'static str, _: R, _: f64)
+            where
+                Y: Metriplectic,
+                R: Retraction<Y::Manifold, Y::Metric> + Copy,
+            {
+                let Problem { name, manifold, system, start, .. } = problem;
+                if scheme != "Weyl midpoint" || system.second_law() != SecondLaw::Exact {
+                    return;
+                }
+                let span = Span::steps(self.1, self.2).at_most(2);
+                let exact = WeylMidpoint.run(system, start.clone(), span);
+                let published = WeylMidpoint.run(&Published(system), start.clone(), span);
+                if let (Ok(exact), Ok(published)) = (exact, published) {
+                    let problem = format!("{name} on {manifold}");
+                    let [exact, published] =
+                        [exact, published].map(|run| run.certificate().clone());
+                    self.0.rows.push(Comparison { problem, exact, published });
+                }
+            }
+        }
+        let mut runs = Runs(Self::default(), h, steps);
+        each(&mut runs);
+        runs.0
+    }
+
+    /// The share by which the exact scheme solves more linear systems, over all problems.
+    pub fn extra_sweeps(&self) -> f64 {
+        let sum = |of: fn(&Comparison) -> usize| self.rows.iter().map(of).sum::<usize>() as f64;
+        sum(|row| row.exact.sweeps) / sum(|row| row.published.sweeps) - 1.0
     }
 }
 

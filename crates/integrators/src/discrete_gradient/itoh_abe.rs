@@ -65,7 +65,7 @@ fn increments<M: Manifold, D: Scalar>(
         let slope = partial(f, z, &corner, i);
         corner[i] = end[i];
         let after = f.at(&M::chart(z, &corner));
-        let size = before.re().abs() + after.re().abs();
+        let size = before.re().abs() + after.re().abs() + M::magnitude(z) * slope.re().abs();
         let integral_share = short(slope.re() * step.re(), size);
         let mut mean = D::zero();
         if integral_share < 1.0 {

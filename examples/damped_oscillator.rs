@@ -1,0 +1,80 @@
+//! The damped oscillator and its bath: friction of your own, beside a closed form.
+//!
+//! `x = (q, p, s)` with a bath of temperature 1, `H = ½p² + ½q² + s`, `S = s` and `K = (γ/w_s) b bᵀ`,
+//! `b = (0, w_s, −w_p)`. It is made of the covector `w` that it has to kill: `dH` in the equations of
+//! motion, a discrete gradient of `H` in a step (after Öttinger 2018). From `(2, 0, 0)`
+//!
+//! ```text
+//! q' = p,   p' = −q − γ p,   s' = γ p²   have   s = 2 − ½p² − ½q²,   ω² = 1 − ¼γ²,
+//! q = 2e^{−γt/2} (cos ωt + (γ/2ω) sin ωt),      p = −(2/ω) e^{−γt/2} sin ωt .
+//! ```
+
+use std::error::Error;
+
+use metriplectic::prelude::*;
+use metriplectic_studies::{Gallery, Options, Order, Panel, Panels, print};
+
+const GAMMA: f64 = 0.01;
+
+/// The exact state at time `t`.
+fn exact(t: f64) -> Vector3<f64> {
+    let omega = (1.0 - 0.25 * GAMMA * GAMMA).sqrt();
+    let (amplitude, (sin, cos)) = (2.0 * (-0.5 * GAMMA * t).exp(), (omega * t).sin_cos());
+    let (q, p) = (amplitude * (cos + 0.5 * GAMMA * sin / omega), -amplitude * sin / omega);
+    Vector3::new(q, p, 2.0 - 0.5 * (p * p + q * q))
+}
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let options = Options::read();
+    let (count, h) = (options.steps_or(1000), options.step_size_or(0.1));
+
+    let friction = |_: &Vector3<Real>, w: &Vector3<Real>| {
+        let b = Vector3::new(0.0.into(), w.z, -w.y);
+        b * b.transpose() * (w.z.recip() * GAMMA)
+    };
+    let oscillator = System::on(Euclidean::<3>)
+        .bracket(Poisson::constant(matrix![0.0, 1.0, 0.0; -1.0, 0.0, 0.0; 0.0, 0.0, 0.0])?)
+        .dissipation(FieldDissipation(friction))
+        .energy(|x: &Vector3<Real>| (x.x.powi(2) + x.y.powi(2)) * 0.5 + x.z)
+        .entropy(|x: &Vector3<Real>| x.z)
+        .build()?;
+    let sizes = [1.0, 0.5, 0.25, 0.125].map(|part| part * h);
+    let span = |k: usize| Span::steps(sizes[k], count << k).at_most(1000);
+    let runs = (0..4).map(|k| WeylMidpoint.run(&oscillator, exact(0.0), span(k)));
+    let runs = runs.collect::<Result<Vec<_>, _>>()?;
+    let error = |s: &State<Euclidean<3>>| (s.point - exact(s.time)).norm();
+    let errors: Vec<f64> = runs.iter().map(|run| error(run.last())).collect();
+    let (run, order) = (&runs[0], Order::fit(&sizes, &errors)?);
+
+    let (path, end) = (Gallery::open()?.path("damped_oscillator.svg"), run.last());
+    let beside = |title: &str, i: usize, since: f64| {
+        let late: Vec<_> = run.iter().filter(|state| state.time >= since * end.time).collect();
+        let closed: Vec<_> = late.iter().map(|s| (s.time, exact(s.time)[i])).collect();
+        let scheme: Vec<_> = late.iter().map(|s| (s.time, s.point[i])).collect();
+        Panel::new(title, "t").line("closed form", closed).line("scheme", scheme)
+    };
+    let mut distance = Panel::new("distance from the closed form", "t").logarithmic(1e-5);
+    for (run, h) in runs.iter().zip(sizes) {
+        let points: Vec<_> = run.iter().map(|state| (state.time, error(state))).collect();
+        distance = distance.line(format!("h = {h}"), points);
+    }
+    Panels::new(format!("The damped oscillator and its bath, γ = {GAMMA}, h = {h}"))
+        .panel(beside("position q", 0, 0.0))
+        .panel(beside("momentum p, last fifth of the run", 1, 0.8))
+        .panel(beside("entropy s, at rest 2", 2, 0.0).level(2.0))
+        .panel(distance)
+        .save(&path)?;
+
+    let certificate = run.certificate();
+    if options.json {
+        let mut report = serde_json::to_value(certificate)?;
+        report["max_relative_energy_error"] = certificate.max_relative_energy_error().into();
+        report["final_state"] = end.point.as_slice().into();
+        (report["errors"], report["order"]) = (errors.into(), order.slope.into());
+        print(report)?;
+    } else {
+        print(format_args!("{certificate}\nerrors:      {errors:.4?} at h = {sizes:?}"))?;
+        print(format_args!("order:       {order}\nfigure:      {}", path.display()))?;
+    }
+    Ok(())
+}

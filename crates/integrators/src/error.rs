@@ -8,6 +8,7 @@ use std::fmt;
 use metriplectic_dynamics::{BuildError, ModelError, PoissonError};
 use metriplectic_manifolds::{AlgebraError, Manifold, MetricError, PointError};
 
+use crate::attitude::AttitudeError;
 use crate::span::SpanError;
 use crate::trajectory::Trajectory;
 
@@ -126,6 +127,9 @@ pub enum Error {
     /// A step that could not be taken.
     #[error(transparent)]
     Step(#[from] StepError),
+    /// A run along which there is no attitude.
+    #[error(transparent)]
+    Attitude(#[from] AttitudeError),
     /// A run that stopped; the [`RunError`] with the trajectory so far can be downcast from it.
     #[error("{0}")]
     Run(#[source] Box<dyn std::error::Error + Send + Sync>),

@@ -10,10 +10,12 @@
 //! | [`span`](mod@span) | [`Span`]: step size, number of steps, what is recorded |
 //! | [`step`] | [`Scheme`] and one step of it |
 //! | [`trajectory`] | [`Steps`], the endless iterator, and [`Trajectory`], the record |
+//! | [`attitude`] | [`Attitude`]: where a body points along a run of its angular momentum |
 //! | [`certificate`] | [`Certificate`]: what a run did to its laws |
 //! | [`error`](mod@error) | [`Error`], [`RunError`], [`StepError`] |
 //! | [`laws`] | what a step promises, and the function that checks it |
 
+pub mod attitude;
 pub mod certificate;
 pub mod discrete_gradient;
 pub mod error;
@@ -27,6 +29,7 @@ pub mod span;
 pub mod step;
 pub mod trajectory;
 
+pub use attitude::{Attitude, AttitudeError};
 pub use certificate::{Certificate, Kept};
 pub use discrete_gradient::{
     Chord, DiscreteGradient, Gonzalez, ItohAbe, MeanValue, SymmetricItohAbe,

@@ -5,7 +5,7 @@
 
 use std::fmt;
 
-use metriplectic_dynamics::{BuildError, ModelError, PoissonError};
+use metriplectic_dynamics::{BuildError, FormError, LegendreError, ModelError, PoissonError};
 use metriplectic_manifolds::{AlgebraError, Manifold, MetricError, PointError};
 
 use crate::attitude::AttitudeError;
@@ -115,6 +115,12 @@ pub enum Error {
     /// A point that is not on its manifold.
     #[error(transparent)]
     Point(#[from] PointError),
+    /// A form that is not symmetric and positive.
+    #[error(transparent)]
+    Form(#[from] FormError),
+    /// A Lagrangian without a Legendre transform.
+    #[error(transparent)]
+    Legendre(#[from] LegendreError),
     /// Parts that do not make a system.
     #[error(transparent)]
     Build(#[from] BuildError),

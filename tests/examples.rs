@@ -2,22 +2,19 @@
 
 use std::process::{Command, Output};
 
-/// Builds an example as these tests were built, which takes no time if `cargo test` has just done
-/// it, and runs it. Each call draws into a folder of its own, so that the gallery keeps the pictures
-/// of a reader.
+/// Builds an example for release, which takes no time if `just examples` has just done it, and runs
+/// it. Each call draws into a folder of its own, so that the gallery keeps the pictures of a reader.
 fn example(name: &str, arguments: &[&str]) -> Output {
     let tests = std::env::current_exe().expect("a test has a path");
     let folder = tests.ancestors().nth(2).expect("tests are in `deps` of a profile's folder");
     let mut build = Command::new(env!("CARGO"));
-    build.args(["build", "--quiet", "--workspace", "--example", name, "--target-dir"]);
+    build.args(["build", "--quiet", "--example", name, "--target-dir"]);
     build.arg(folder.parent().expect("a profile is in the build folder"));
-    build.args(["--profile", if cfg!(debug_assertions) { "test" } else { "release" }]);
-    if cfg!(feature = "serde") {
-        build.arg("--all-features");
-    }
+    build.args(["--release", "--all-features"]);
     assert!(build.status().expect("cargo starts").success(), "{name} is not built");
 
-    let program = folder.join("examples").join(name);
+    let release = folder.with_file_name("release");
+    let program = release.join("examples").join(name);
     let gallery = format!("{}/{name}{}", env!("CARGO_TARGET_TMPDIR"), arguments.concat());
     let run = Command::new(program).args(arguments).env("CARGO_TARGET_DIR", gallery).output();
     run.expect("the example starts")

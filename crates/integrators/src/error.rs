@@ -52,6 +52,20 @@ pub enum StepError {
         /// The share of its differential that is independent.
         share: f64,
     },
+    /// The controller asks for a step below the least one.
+    #[error(
+        "the step from t = {time} would have to be {h:.1e} long to keep the tolerance, below the least \
+         step {least:.1e}; the motion may end there: see the energy and the entropy around this \
+         state, or ask for a coarser tolerance"
+    )]
+    TooSmall {
+        /// The time at which the step starts.
+        time: f64,
+        /// The size that it would have to have.
+        h: f64,
+        /// The least step size.
+        least: f64,
+    },
     /// A field is not defined around the start of the step.
     #[error(
         "the step of size {h:.3e} from t = {time} leaves the domain of the model wherever it goes \

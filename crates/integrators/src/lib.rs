@@ -8,12 +8,14 @@
 //! | [`newton`] | [`Newton`]: the solver of every step |
 //! | `globaliser` | L-BFGS from argmin, which brings a lost Newton back (feature `argmin`) |
 //! | [`span`](mod@span) | [`Span`]: step size, number of steps, what is recorded |
+//! | [`adaptive`] | [`Until`]: steps of a size that follows the motion, and the estimate of their error |
 //! | [`step`] | [`Scheme`] and one step of it |
 //! | [`trajectory`] | [`Steps`], the endless iterator, and [`Trajectory`], the record |
 //! | [`certificate`] | [`Certificate`]: what a run did to its laws |
 //! | [`error`](mod@error) | [`Error`], [`RunError`], [`StepError`] |
 //! | [`laws`] | what a step promises, and the function that checks it |
 
+pub mod adaptive;
 pub mod certificate;
 pub mod discrete_gradient;
 pub mod error;
@@ -27,6 +29,7 @@ pub mod span;
 pub mod step;
 pub mod trajectory;
 
+pub use adaptive::Until;
 pub use certificate::{Certificate, Kept};
 pub use discrete_gradient::{
     Chord, DiscreteGradient, Gonzalez, ItohAbe, MeanValue, SymmetricItohAbe,
@@ -35,6 +38,6 @@ pub use error::{Error, RunError, StepError};
 pub use newton::Newton;
 pub use residual::Residual;
 pub use root_finder::{Equation, Linearised, NoRoot, Root, RootFinder};
-pub use span::{Span, SpanError};
+pub use span::{Course, Span, SpanError};
 pub use step::{Scheme, Work};
-pub use trajectory::{Run, State, Steps, Trajectory};
+pub use trajectory::{Ending, Run, State, Steps, Trajectory};

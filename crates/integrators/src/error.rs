@@ -8,6 +8,7 @@ use std::fmt;
 use metriplectic_dynamics::{BuildError, ModelError, PoissonError};
 use metriplectic_manifolds::{AlgebraError, Manifold, MetricError, PointError};
 
+use crate::checkpoint::ResumeError;
 use crate::span::SpanError;
 use crate::trajectory::Trajectory;
 
@@ -137,6 +138,9 @@ pub enum Error {
     /// A span that cannot be run.
     #[error(transparent)]
     Span(#[from] SpanError),
+    /// A checkpoint that cannot be resumed.
+    #[error(transparent)]
+    Resume(#[from] ResumeError),
     /// A step that could not be taken.
     #[error(transparent)]
     Step(#[from] StepError),

@@ -8,6 +8,7 @@ use metriplectic_manifolds::{Cayley, Exponential, Manifold, Projection, Retracti
 
 use crate::adaptive::{self, Controller, Pace};
 use crate::certificate::{Certificate, Kept};
+use crate::checkpoint::{Checkpoint, ResumeError};
 use crate::discrete_gradient::{DiscreteGradient, Gonzalez};
 use crate::error::{RunError, StepError};
 use crate::residual::{Dim, Numbers, Recall};
@@ -590,6 +591,23 @@ pub trait Run: Sized {
         Self: Retraction<Y::Manifold, Y::Metric>,
     {
         Scheme::new(self).steps(system, x0, course)
+    }
+
+    /// [`Scheme::resume`] with the defaults.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Scheme::resume`].
+    fn resume<'a, Y>(
+        self,
+        system: &'a Y,
+        checkpoint: &Checkpoint,
+    ) -> Result<Steps<'a, Y, Self>, ResumeError>
+    where
+        Y: Metriplectic,
+        Self: Retraction<Y::Manifold, Y::Metric>,
+    {
+        Scheme::new(self).resume(system, checkpoint)
     }
 }
 

@@ -74,7 +74,7 @@ where
     resumes(name, system, x0, Span::until(4.0).tolerance(1e-4).until_rest(1e-12));
 }
 
-/// A spin with a bath, and the energy of both listed as a Casimir's companion below.
+/// A spin with a bath.
 fn spin() -> impl Metriplectic<Manifold = Product<Sphere<2>, Euclidean<1>>, Metric = Canonical> {
     System::on(Product(Sphere::<2>::round(), Euclidean::<1>))
         .bracket((AreaForm, Zero))
@@ -115,15 +115,18 @@ fn a_resumed_run_with_a_further_invariant_is_the_run() {
         .build()
         .unwrap();
     resumes_both("so(3)*", &free, TUMBLING);
-    // A symmetric top on S², whose vertical component is a momentum.
-    let top = System::on(Sphere::<2>::round())
-        .bracket(AreaForm)
-        .energy(|x: &Vector3<Real>| x.z.powi(2) * 0.5 + x.z.powi(3) * 0.2)
-        .momentum(|x: &Vector3<Real>| x.z)
-        .build();
-    if let Ok(top) = top {
-        resumes("S²", &top, vector![0.6, 0.0, 0.8], Span::steps(0.07, 60));
-    }
+    // A spring in the plane that is not linear, with its angular momentum.
+    let canonical = Matrix4::from_fn(|i, j| f64::from(j == i + 2) - f64::from(i == j + 2));
+    let spring = System::on(Euclidean::<4>)
+        .bracket(Poisson::constant(canonical).unwrap())
+        .energy(|x: &Vector4<Real>| {
+            let r = x.x.powi(2) + x.y.powi(2);
+            (x.z.powi(2) + x.w.powi(2) + r) * 0.5 + r.powi(2) * 0.25
+        })
+        .momentum(|x: &Vector4<Real>| x.x * x.w - x.y * x.z)
+        .build()
+        .unwrap();
+    resumes_both("R⁴", &spring, vector![1.0, 0.2, -0.3, 0.6]);
 }
 
 #[test]

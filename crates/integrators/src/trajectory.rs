@@ -619,6 +619,7 @@ impl Run for Cayley {}
 #[cfg(all(test, feature = "serde"))]
 mod tests {
     use super::*;
+    use crate::Span;
     use metriplectic_dynamics::System;
     use metriplectic_fields::Real;
     use metriplectic_manifolds::Rotations;

@@ -28,7 +28,12 @@ fn flow<const N: usize>(
     (time, h): (f64, f64),
 ) -> SVector<f64, N> {
     let steps = (time / h).ceil().max(1.0);
-    (0..steps as usize).fold(*x, |x, _| runge_kutta(&f, &x, time / steps))
+    let (mut x, mut step) = (*x, 0.0);
+    while step < steps {
+        x = runge_kutta(&f, &x, time / steps);
+        step += 1.0;
+    }
+    x
 }
 
 /// The relaxing body by hand.
@@ -184,7 +189,8 @@ fn the_end_is_the_time_that_was_asked_for() {
         // The iterator ends there too, and stays.
         let mut steps = WeylMidpoint.steps(&body, TUMBLING, Span::until(end)).unwrap();
         assert_eq!(steps.by_ref().last().map(|state| state.unwrap().time), Some(end));
-        assert!(steps.next().is_none() && steps.advance().unwrap().time == end);
+        assert!(steps.next().is_none());
+        assert_eq!(steps.advance().unwrap().time.to_bits(), end.to_bits());
     }
 }
 
@@ -209,7 +215,7 @@ fn the_steps_asked_for_are_respected() {
 /// `x' = −1`, `y' = 1/x` along `H = ln x + y`: the flow from (1, 0) reaches the edge at t = 1.
 fn doomed() -> impl Metriplectic<Manifold = Euclidean<2>, Metric = Canonical> {
     System::on(Euclidean::<2>)
-        .bracket(Poisson::constant(Matrix2::new(0.0, -1.0, 1.0, 0.0)).unwrap())
+        .bracket(Poisson::constant(Matrix2::new(0.0, -1.0, 1.0, 0.0)).expect("it is skew"))
         .energy(|x: &Vector2<Real>| x.x.ln() + x.y)
         .build()
         .expect("the parts make a system")
@@ -233,7 +239,8 @@ fn a_motion_that_ends_is_an_error_with_what_there_is() {
             panic!("another error: {error}");
         };
         assert!(*time < 1.001 && *time > 0.5 && h < least, "{error}");
-        assert!(trajectory.last().time == *time && trajectory.ending() == Ending::Stopped);
+        assert_eq!(trajectory.last().time.to_bits(), time.to_bits());
+        assert_eq!(trajectory.ending(), Ending::Stopped);
         assert!(error.to_string().contains("coarser tolerance"), "{error}");
     }
 }
@@ -296,7 +303,7 @@ fn a_relaxing_body_comes_to_rest() {
     assert!(run.ending().is_rest() && run.states().len() == 1);
     let span = Span::until(20.0).tolerance(1e-3).until_rest(1e-9);
     let run = WeylMidpoint.run(&free_body(), TUMBLING, span).unwrap();
-    assert!(run.ending() == Ending::Span && run.last().time == 20.0);
+    assert_eq!((run.ending(), run.last().time), (Ending::Span, 20.0));
 }
 
 #[test]
@@ -342,7 +349,7 @@ fn every_scheme_follows_the_tolerance() {
     let (weyl, exact_law) = (Scheme::new(WeylMidpoint), SecondLaw::Exact);
     check("Weyl", rotated(weyl, exact_law, 1e-4));
     check("published", rotated(weyl, SecondLaw::Published, 1e-4));
-    check("mean value", rotated(weyl.gradient(MeanValue::default()), exact_law, 1e-4));
+    check("mean value", rotated(weyl.gradient(MeanValue), exact_law, 1e-4));
     check("Itoh-Abe", rotated(weyl.gradient(ItohAbe), exact_law, 1e-4));
     check("Cayley", rotated(Scheme::new(Cayley), exact_law, 1e-4));
     check("exponential", rotated(Scheme::new(Exponential), exact_law, 1e-4));

@@ -302,6 +302,7 @@ impl Controller {
 }
 
 /// The estimate `e` of the local error, in the chart at `x`.
+#[inline(never)]
 fn local_error<Y: Metriplectic>(
     system: &Y,
     x: &Point<Y>,

@@ -37,7 +37,7 @@
 //! ```
 //!
 //! Two formats are written here, with the standard library alone: CSV, whose digits give back the same
-//! numbers, and NPY, which NumPy reads as an array with named columns.
+//! numbers, and NPY, which `numpy` reads as an array with named columns.
 //! In both the file holds whole rows whenever something is written to it, and what is still in
 //! memory is written when the table is finished or dropped: a run that is interrupted leaves a file
 //! that can be read. The first column is always the time.
@@ -116,7 +116,7 @@ impl<'a, M: Space> Observables<'a, M> {
         Ok(table)
     }
 
-    /// An array of NumPy with one named `<f8` column for each number (format version 1.0, or 3.0 for
+    /// An array of `numpy` with one named `<f8` column for each number (format version 1.0, or 3.0 for
     /// names that are not ASCII): `numpy.load(path)["t"]`.
     ///
     /// The number of rows in the header is brought up to date whenever rows are written, hence
@@ -213,7 +213,7 @@ impl<M: Space, W: Write> Drop for Csv<'_, M, W> {
     }
 }
 
-/// An array of NumPy; made by [`Observables::npy`].
+/// An array of `numpy`; made by [`Observables::npy`].
 #[derive(Debug)]
 pub struct Npy<'a, M: Space, W: Write + Seek> {
     of: &'a Observables<'a, M>,

@@ -228,7 +228,9 @@ where
         Ok(&self.state)
     }
 
-    /// Tries steps until the controller accepts one.
+    /// Tries steps until the controller accepts one. Not part of the loop over steps of one size, which
+    /// is compiled for every system.
+    #[inline(never)]
     fn controlled(&mut self, mut controller: Controller) -> Result<Taken<Y>, StepError> {
         let (system, time, mut work) = (self.system, self.state.time, Work::default());
         loop {

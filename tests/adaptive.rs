@@ -4,7 +4,7 @@ mod models;
 
 use metriplectic::integrators::residual::Recall;
 use metriplectic::integrators::step::{Memory, Start};
-use metriplectic::integrators::{SpanError, StepError};
+use metriplectic::integrators::{Course, SpanError, StepError};
 use metriplectic::prelude::*;
 use metriplectic_studies::Order;
 use models::{TUMBLING, UNSTABLE, free_body, half_square, relaxing_body, top};
@@ -375,4 +375,19 @@ fn a_further_invariant_and_a_metric_from_a_closure_change_nothing() {
     let run = WeylMidpoint.run(&free, TUMBLING, Span::until(50.0).tolerance(1e-3)).unwrap();
     let certificate = run.certificate();
     assert!(certificate.keeps_energy() && certificate.keeps_invariants(), "{certificate}");
+}
+
+#[test]
+fn an_attitude_follows_steps_of_any_size() {
+    let body = relaxing_body();
+    let end = |course: Course| {
+        let run = WeylMidpoint.run(&body, UNSTABLE, course).expect("it runs");
+        let attitudes = Attitude::along(&body, &run, Matrix3::identity()).expect("it follows");
+        attitudes[attitudes.len() - 1]
+    };
+    let fixed = end(Span::steps(4e-3, 10_000).into());
+    let errors = [1e-3, 1e-5]
+        .map(|tolerance| (end(Span::until(40.0).tolerance(tolerance).into()) - fixed).norm());
+    println!("attitudes off by {errors:?}");
+    assert!(errors[1] < 1e-3 && errors[1] < 0.1 * errors[0], "{errors:?}");
 }

@@ -12,6 +12,7 @@ use std::hint::black_box;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use metriplectic::dynamics::system::Point;
+use metriplectic::integrators::residual::Recall;
 use metriplectic::integrators::step::{Memory, Start};
 use metriplectic::prelude::*;
 
@@ -43,7 +44,9 @@ where
     let (mut memory, mut x) = (Memory::new(), start.clone());
     for _ in 0..STEPS {
         let energy = system.energy_at(&x);
-        let start = Start { x: &x, time: 0.0, h, energy, left_over: 0.0 };
+        let left_over = Recall::nothing();
+        let invariants = left_over.invariants;
+        let start = Start { x: &x, time: 0.0, h, energy, invariants, left_over };
         let Ok((end, _)) = scheme.step(system, &start, &mut memory) else { break };
         x = end;
     }

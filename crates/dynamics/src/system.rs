@@ -343,6 +343,10 @@ impl<M: Manifold, G, B, K, H, S, L> SystemBuilder<M, G, B, K, H, S, L> {
     /// its momentum map `J`, with `Π dJ = dΦ_t/dt` at `t = 0`. `J` is kept as a
     /// [`momentum`](Self::momentum); verification checks at sampled points that `Φ_t` preserves the
     /// bracket and the energy, and belongs to `J`.
+    #[allow(
+        clippy::type_complexity,
+        reason = "the type of a builder lists the parts of the system, and a name for it would hide them"
+    )]
     pub fn symmetry<A, F>(
         self,
         action: A,
@@ -395,6 +399,10 @@ impl<M: Manifold, G, B, K, H, S, L> SystemBuilder<M, G, B, K, H, S, L> {
     ///
     /// [`BuildError`] if the parts do not make a system.
     // The bounds stand on the method, so that a part that does not fit is explained as such.
+    #[allow(
+        clippy::type_complexity,
+        reason = "the type of a builder lists the parts of the system, and a name for it would hide them"
+    )]
     pub fn build(self) -> Result<Built<M, G, B, K, H, S, L>, BuildError>
     where
         G: Riemannian<M>,

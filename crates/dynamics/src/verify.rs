@@ -410,10 +410,13 @@ impl<Y: Metriplectic + ?Sized> Invariance<'_, '_, Y> {
 /// How far along an action a symmetry is tried.
 const FAR: f64 = 0.7;
 
+/// A map from the coordinates of a chart to points.
+type ChartMap<'a, M> = dyn Fn(&Vector<M, Real>) -> <M as Space>::Point<Real> + 'a;
+
 /// The derivative of a map from the chart at some point to the chart at `y`.
 fn jacobian_of<Y: Metriplectic + ?Sized>(
     y: &Point<Y>,
-    map: &dyn Fn(&Vector<Y::Manifold, Real>) -> <Y::Manifold as Space>::Point<Real>,
+    map: &ChartMap<'_, Y::Manifold>,
 ) -> Matrix<Y::Manifold> {
     Matrix::<Y::Manifold>::from_columns(|k| {
         let seed = |i| Real::new(0.0, if i == k { 1.0 } else { 0.0 }, 0.0, 0.0);

@@ -174,8 +174,13 @@ impl Certificate {
             0 => "it never fell".to_owned(),
             n => format!("it fell on {}", counted(n, "step", "steps")),
         };
+        let slope = if self.min_entropy_slope.is_finite() {
+            format!(", |w_S| ≥ {:.1e}", self.min_entropy_slope)
+        } else {
+            String::new()
+        };
         format!(
-            "ΔS ≥ {:.1e} on every step, {falls}; S rose by {:.6e}",
+            "ΔS ≥ {:.1e} on every step, {falls}; S rose by {:.6e}{slope}",
             self.min_entropy_increment, self.entropy_gained
         )
     }

@@ -5,9 +5,10 @@
 
 use std::fmt;
 
-use metriplectic_dynamics::{BuildError, ModelError, PoissonError};
+use metriplectic_dynamics::{BuildError, FormError, LegendreError, ModelError, PoissonError};
 use metriplectic_manifolds::{AlgebraError, Manifold, MetricError, PointError};
 
+use crate::attitude::AttitudeError;
 use crate::checkpoint::ResumeError;
 use crate::span::SpanError;
 use crate::trajectory::Trajectory;
@@ -129,6 +130,12 @@ pub enum Error {
     /// A point that is not on its manifold.
     #[error(transparent)]
     Point(#[from] PointError),
+    /// A form that is not symmetric and positive.
+    #[error(transparent)]
+    Form(#[from] FormError),
+    /// A Lagrangian without a Legendre transform.
+    #[error(transparent)]
+    Legendre(#[from] LegendreError),
     /// Parts that do not make a system.
     #[error(transparent)]
     Build(#[from] BuildError),
@@ -144,6 +151,9 @@ pub enum Error {
     /// A step that could not be taken.
     #[error(transparent)]
     Step(#[from] StepError),
+    /// A run along which there is no attitude.
+    #[error(transparent)]
+    Attitude(#[from] AttitudeError),
     /// A run that stopped; the [`RunError`] with the trajectory so far can be downcast from it.
     #[error("{0}")]
     Run(#[source] Box<dyn std::error::Error + Send + Sync>),

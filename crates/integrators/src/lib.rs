@@ -13,11 +13,13 @@
 //! | [`trajectory`] | [`Steps`], the endless iterator, and [`Trajectory`], the record |
 //! | [`observables`] | [`Observables`]: named numbers of a state, streamed to CSV or NPY |
 //! | [`checkpoint`] | [`Checkpoint`]: a run that is put down and taken up again, bit for bit |
+//! | [`attitude`] | [`Attitude`]: where a body points along a run of its angular momentum |
 //! | [`certificate`] | [`Certificate`]: what a run did to its laws |
 //! | [`error`](mod@error) | [`Error`], [`RunError`], [`StepError`] |
 //! | [`laws`] | what a step promises, and the function that checks it |
 
 pub mod adaptive;
+pub mod attitude;
 pub mod certificate;
 pub mod checkpoint;
 pub mod discrete_gradient;
@@ -34,6 +36,7 @@ pub mod step;
 pub mod trajectory;
 
 pub use adaptive::Until;
+pub use attitude::{Attitude, AttitudeError};
 pub use certificate::{Certificate, Kept};
 pub use checkpoint::{Checkpoint, ResumeError};
 pub use discrete_gradient::{

@@ -80,7 +80,9 @@ impl Newton {
         let (mut factors, mut contraction) = (None, f64::INFINITY);
         loop {
             let solved = best.residual <= self.tolerance * here.floor;
-            if solved && best.residual <= 0.1 * self.tolerance * here.floor {
+            // A displacement within the floor is that of a state at rest.
+            let rests = best.best.magnitude() <= here.floor;
+            if solved && (rests || best.residual <= 0.1 * self.tolerance * here.floor) {
                 return Progress::Solved;
             }
             factors = factors.or_else(|| here.jacobian.factor());

@@ -396,7 +396,10 @@ fn every_model_keeps_both_laws_over_a_hundred_thousand_steps() {
         "tumbling_satellite",
     ];
     for name in models {
-        let report = json(&example(name, &["--json", "--steps", "100000"]));
+        // The oscillator is at rest after t = 10⁴, with no error left of which to fit an order.
+        let size = if name == "damped_oscillator" { "0.001" } else { "0.05" };
+        let options = ["--json", "--steps", "100000", "--step-size", size];
+        let report = json(&example(name, &options));
         // Two schemes or forces side by side print a report each.
         let report = if report["exact"].is_object() { &report["exact"] } else { &report };
         let number = |key: &str| report[key].as_f64().expect("a number");

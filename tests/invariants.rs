@@ -296,7 +296,7 @@ fn an_action_that_is_no_symmetry_is_refused() {
         x[9] += t;
         x
     };
-    let error = system(scaled, |x| pendulum_energy(x)).unwrap_err();
+    let error = system(scaled, pendulum_energy).unwrap_err();
     assert!(matches!(error, RunError::Model(ModelError::EnergyNotSymmetric { .. })), "{error}");
     // A map that stretches q alone is no Poisson map, though it keeps an energy without q.
     let stretched =

@@ -10,7 +10,7 @@ use crate::root_finder::{Equation, Linearised, NoRoot, Root, RootFinder};
 /// and each further correction costs only a residual.
 ///
 /// The last correction is not followed by another residual if the contraction so far says that it
-/// would be a tenth of the floor.
+/// would be a hundredth of the floor: in other directions the next contraction may be slower.
 ///
 /// It stops where the residual is at the floor that the equation states, or where it no longer
 /// falls within a small multiple of it: a stall *at* the floor is convergence, a stall above it is
@@ -97,7 +97,7 @@ impl Newton {
                 return Progress::Solved;
             }
             if let Some(last) = &correction
-                && contraction * best.residual <= 0.1 * self.tolerance * here.floor
+                && contraction * best.residual <= 0.01 * self.tolerance * here.floor
             {
                 best.best -= *last;
                 best.residual *= contraction;

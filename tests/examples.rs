@@ -5,6 +5,11 @@ use std::process::{Command, Output};
 /// Builds an example for release, which takes no time if `just examples` has just done it, and runs
 /// it. Each call draws into a folder of its own, so that the gallery keeps the pictures of a reader.
 fn example(name: &str, arguments: &[&str]) -> Output {
+    command(name, arguments).output().expect("the example starts")
+}
+
+/// The same, not yet started.
+fn command(name: &str, arguments: &[&str]) -> Command {
     let tests = std::env::current_exe().expect("a test has a path");
     let folder = tests.ancestors().nth(2).expect("tests are in `deps` of a profile's folder");
     let mut build = Command::new(env!("CARGO"));
@@ -14,10 +19,14 @@ fn example(name: &str, arguments: &[&str]) -> Output {
     assert!(build.status().expect("cargo starts").success(), "{name} is not built");
 
     let release = folder.with_file_name("release");
-    let program = release.join("examples").join(name);
-    let gallery = format!("{}/{name}{}", env!("CARGO_TARGET_TMPDIR"), arguments.concat());
-    let run = Command::new(program).args(arguments).env("CARGO_TARGET_DIR", gallery).output();
-    run.expect("the example starts")
+    let mut run = Command::new(release.join("examples").join(name));
+    run.args(arguments).env("CARGO_TARGET_DIR", gallery(name, arguments));
+    run
+}
+
+/// Where such a call draws.
+fn gallery(name: &str, arguments: &[&str]) -> String {
+    format!("{}/{name}{}", env!("CARGO_TARGET_TMPDIR"), arguments.concat())
 }
 
 fn json(output: &Output) -> serde_json::Value {
@@ -203,6 +212,60 @@ fn the_satellite_ends_in_a_flat_spin() {
     };
     let (coarse, fine) = (error("500", "0.02"), error("1000", "0.01"));
     assert!(fine < 2e-4 && (coarse / fine - 4.0).abs() < 0.1, "{coarse:.2e}, {fine:.2e}");
+}
+
+#[test]
+fn the_steps_of_the_adaptive_relaxation_follow_the_motion_until_it_rests() {
+    let report = json(&example("adaptive_relaxation", &["--json"]));
+    let ([energy, _, defect], state) = certified(&report);
+    assert!(energy <= 5e-15 && defect == 0.0 && report["entropy_falls"] == 0, "{report}");
+    assert_eq!(report["rested"], true);
+    let (smallest, largest) = (figure(&report, "smallest_step"), figure(&report, "largest_step"));
+    assert!(largest > 100.0 * smallest, "{report}");
+    // At rest on the axis of largest inertia, with S = H I₁.
+    let axis = (2.0 * 10.0 * figure(&report, "initial_energy")).sqrt();
+    assert!((state[0].abs() - axis).abs() < 1e-8, "{report}");
+    // A bound on the number of steps is kept, and the run has not come to rest then.
+    let short = json(&example("adaptive_relaxation", &["--json", "--steps", "30"]));
+    assert_eq!((&short["steps"], &short["rested"]), (&30.into(), &false.into()));
+}
+
+/// Ctrl-C ends a run of some hours within moments, and its file has whole rows and its report.
+#[cfg(unix)]
+#[test]
+fn an_interrupted_example_leaves_a_whole_file() {
+    use std::process::Stdio;
+    use std::time::{Duration, Instant};
+    let arguments = ["--json", "--step-size", "1e-6"];
+    let folder = gallery("adaptive_relaxation", &arguments);
+    let path = format!("{folder}/gallery/adaptive_relaxation.csv");
+    let _ = std::fs::remove_file(&path);
+    let child = command("adaptive_relaxation", &arguments).stdout(Stdio::piped()).spawn();
+    let child = child.expect("the example starts");
+    let length = || std::fs::metadata(&path).map_or(0, |file| file.len());
+    let begin = Instant::now();
+    // The first rows are in the file once the loop is running.
+    while length() < 1000 {
+        assert!(begin.elapsed() < Duration::from_secs(60), "no row after a minute");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    let kill = Command::new("kill").args(["-INT", &child.id().to_string()]).status();
+    assert!(kill.expect("kill starts").success());
+    let output = child.wait_with_output().expect("the example ends");
+    assert!(output.status.success(), "{:?}", output.status);
+    let report: serde_json::Value = serde_json::from_slice(&output.stdout).expect("one JSON value");
+    assert_eq!(report["rested"], false);
+    let text = std::fs::read_to_string(&path).expect("the file is there");
+    assert!(text.ends_with('\n'));
+    let mut lines = text.lines();
+    assert_eq!(lines.next(), Some("t,p1,p2,p3,entropy"));
+    let rows: Vec<Vec<f64>> = lines
+        .map(|line| line.split(',').map(|entry| entry.parse().expect("a number")).collect())
+        .collect();
+    assert!(rows.iter().all(|row| row.len() == 5));
+    // Every step that the report counts, and the start.
+    assert_eq!(report["steps"], rows.len() - 1);
+    assert_eq!(rows.last().map(|row| row[0]), report["time"].as_f64());
 }
 
 #[test]

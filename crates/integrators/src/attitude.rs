@@ -128,8 +128,7 @@ impl<'a, Y: Metriplectic<Manifold = LieDual<3>>> Attitude<'a, Y> {
         if to != from + 1 {
             return Err(AttitudeError::Skipped { from, to });
         }
-        // The quotient is h to an ε; the difference of two late times would not be.
-        let turn = self.velocity(next)? * (next.time / to as f64);
+        let turn = self.velocity(next)? * step_size(&self.state, next);
         let (p, half) = (next.point, 0.5 * turn.norm());
         let slower = if half > 0.0 { half.atan() / half } else { 1.0 };
         self.momentum += self.rotation * (rotations::exp(&(turn * slower)) * p - self.state.point);
@@ -153,6 +152,14 @@ impl<'a, Y: Metriplectic<Manifold = LieDual<3>>> Attitude<'a, Y> {
         let g = self.system.metric().at(&ChartPoint::<LieDual<3>>::centre(&z))?;
         Ok(chord.covector(0.0, &g, &d))
     }
+}
+
+/// The size of the step between two states. In steps of one size the quotient `t/n` is `h` to an `ε`, and
+/// the difference of two late times is not; in others the difference is all there is.
+fn step_size(from: &State<LieDual<3>>, to: &State<LieDual<3>>) -> f64 {
+    let mean = to.time / to.step as f64;
+    let off = (from.time - from.step as f64 * mean).abs();
+    if off <= 4.0 * f64::EPSILON * to.time { mean } else { to.time - from.time }
 }
 
 /// Whether the bracket of the algebra is the cross product.

@@ -9,6 +9,7 @@ use metriplectic_dynamics::{BuildError, FormError, LegendreError, ModelError, Po
 use metriplectic_manifolds::{AlgebraError, Manifold, MetricError, PointError};
 
 use crate::attitude::AttitudeError;
+use crate::checkpoint::ResumeError;
 use crate::span::SpanError;
 use crate::trajectory::Trajectory;
 
@@ -52,6 +53,20 @@ pub enum StepError {
         change: f64,
         /// The share of its differential that is independent.
         share: f64,
+    },
+    /// The controller asks for a step below the least one.
+    #[error(
+        "the step from t = {time} would have to be {h:.1e} long to keep the tolerance, below the least \
+         step {least:.1e}; the motion may end there: see the energy and the entropy around this \
+         state, or ask for a coarser tolerance"
+    )]
+    TooSmall {
+        /// The time at which the step starts.
+        time: f64,
+        /// The size that it would have to have.
+        h: f64,
+        /// The least step size.
+        least: f64,
     },
     /// A field is not defined around the start of the step.
     #[error(
@@ -130,6 +145,9 @@ pub enum Error {
     /// A span that cannot be run.
     #[error(transparent)]
     Span(#[from] SpanError),
+    /// A checkpoint that cannot be resumed.
+    #[error(transparent)]
+    Resume(#[from] ResumeError),
     /// A step that could not be taken.
     #[error(transparent)]
     Step(#[from] StepError),

@@ -129,7 +129,7 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
     }
 
     /// Guess, solve, retract.
-    fn attempt<Y>(
+    pub(crate) fn attempt<Y>(
         &self,
         system: &Y,
         start: &Start<'_, Y>,
@@ -281,8 +281,8 @@ fn recall<Y: Metriplectic>(system: &Y, start: &Start<'_, Y>, d: &Vector<Y::Manif
 /// (compensated summation; Kahan 1965, Hairer, Lubich, Wanner 2006, §VIII.5).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Memory<V> {
-    displacements: [Option<V>; 3],
-    carry: Option<V>,
+    pub(crate) displacements: [Option<V>; 3],
+    pub(crate) carry: Option<V>,
 }
 
 impl<V: Copy> Memory<V> {

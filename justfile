@@ -19,7 +19,8 @@ lint:
 
 # unit tests, integration tests and doctests; the random cases are the same in each run
 test:
-    PROPTEST_RNG_SEED=2401 cargo test --workspace --all-features
+    PROPTEST_RNG_SEED=2401 cargo test --workspace --all-features --tests
+    cargo test --workspace --all-features --doc
 
 # build the documentation with rendered formulas, warnings are errors
 doc:

@@ -66,8 +66,8 @@ pub mod prelude {
     };
     pub use metriplectic_fields::{MatrixField, Real, Scalar, ScalarField};
     pub use metriplectic_integrators::{
-        Certificate, Error, Gonzalez, ItohAbe, MeanValue, Newton, Run, RunError, Scheme, Span,
-        State, SymmetricItohAbe, Trajectory,
+        Attitude, AttitudeError, Certificate, Ending, Error, Gonzalez, ItohAbe, MeanValue, Newton,
+        Observables, Run, RunError, Scheme, Span, State, SymmetricItohAbe, Trajectory,
     };
     pub use metriplectic_manifolds::{
         Canonical, Cayley, Chart, Euclidean, Exponential, HalfLine, LieAlgebra, LieDual, Manifold,

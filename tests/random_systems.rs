@@ -85,7 +85,7 @@ fn sampled<S: Strategy>(strategy: S, count: usize, mut run: impl FnMut(S::Value)
 
 /// Little friction, so that the reversible part is not hidden by the irreversible one.
 fn friction(_: &Vector3<Real>) -> Real {
-    Real::from(1e-3)
+    Real::from(1e-4)
 }
 
 #[test]
@@ -99,7 +99,7 @@ fn nambu_brackets_of_random_energies_and_entropies() {
             .dissipation(MetricDissipation::scaled(friction))
             .build()
             .unwrap();
-        outcome.compare(&system, x, Span::steps(0.05, 10_000));
+        outcome.compare(&system, x, Span::steps(0.1, 10_000));
     });
     outcome.is_as_claimed();
 }
@@ -126,22 +126,33 @@ fn nambu_brackets_with_random_metrics() {
             .dissipation(MetricDissipation::scaled(friction))
             .build()
             .unwrap();
-        outcome.compare(&system, x, Span::steps(0.05, 400));
+        outcome.compare(&system, x, Span::steps(0.1, 400));
     });
     outcome.is_as_claimed();
 }
 
+/// `1 + c w(q) w(q)ᵀ`, of which no geodesic is a straight line.
+fn bent<const N: usize>(c: f64) -> impl Fn(&SVector<Real, N>) -> SMatrix<Real, N, N> {
+    move |q| {
+        let wave = SVector::<Real, N>::from_fn(|i, _| (q[(i + 1) % N] + i as f64).sin());
+        SMatrix::from_diagonal_element(Real::from(1.0)) + wave * wave.transpose() * Real::from(c)
+    }
+}
+
+// On a flat space the published scheme does not lose a function of quadratic Casimirs such as |p|² or
+// M·Γ: the midpoint rule keeps these. So the metric is not flat.
 #[test]
 fn the_dual_of_so3_with_a_quartic_casimir() {
     let mut outcome = Outcome::default();
-    sampled((coefficients::<3>(), columns::<3>()), 24, |(h, x)| {
+    sampled((coefficients::<3>(), columns::<3>(), 0.3..0.8), 10, |(h, x, c)| {
         let system = System::on(LieDual::so3())
+            .metric(Metric::field(bent(c)))
             .energy(waves(h))
             .entropy(|p: &Vector3<Real>| p.norm_squared().powi(2) * 0.25)
             .dissipation(MetricDissipation::scaled(friction))
             .build()
             .unwrap();
-        outcome.compare(&system, x, Span::steps(0.1, 10_000));
+        outcome.compare(&system, x, Span::steps(0.1, 400));
     });
     outcome.is_as_claimed();
 }
@@ -149,21 +160,37 @@ fn the_dual_of_so3_with_a_quartic_casimir() {
 #[test]
 fn the_dual_of_se3_with_an_entropy_of_both_casimirs() {
     let mut outcome = Outcome::default();
-    sampled((coefficients::<6>(), columns::<6>()), 12, |(h, x)| {
+    sampled((coefficients::<6>(), columns::<6>(), 0.3..0.8), 6, |(h, x, c)| {
         // C₁ = |Γ|², C₂ = M·Γ.
         let entropy = |x: &SVector<Real, 6>| {
             let (m, gamma) = (x.fixed_rows::<3>(0), x.fixed_rows::<3>(3));
             (gamma.norm_squared() * m.dot(&gamma)).exp()
         };
         let system = System::on(LieDual::se3())
+            .metric(Metric::field(bent(c)))
             .energy(waves(h))
             .entropy(entropy)
             .dissipation(MetricDissipation::scaled(|_: &SVector<Real, 6>| Real::from(1e-4)))
             .build()
             .unwrap();
-        outcome.compare(&system, x * 0.7, Span::steps(0.05, 2000));
+        outcome.compare(&system, x * 0.6, Span::steps(0.1, 100));
     });
     outcome.is_as_claimed();
+}
+
+#[test]
+fn long_runs_on_flat_duals_keep_both_laws() {
+    let mut outcome = Outcome::default();
+    sampled((coefficients::<3>(), columns::<3>()), 8, |(h, x)| {
+        let system = System::on(LieDual::so3())
+            .energy(waves(h))
+            .entropy(|p: &Vector3<Real>| p.norm_squared().powi(2) * 0.25)
+            .dissipation(MetricDissipation::scaled(friction))
+            .build()
+            .unwrap();
+        outcome.compare(&system, x, Span::steps(0.1, 100_000));
+    });
+    println!("{outcome:?}");
 }
 
 #[test]
@@ -176,7 +203,7 @@ fn nambu_brackets_on_the_rotation_group() {
                 waves(h)(&(r.column(0) + r.column(1) * Real::from(0.5)))
             })
             .entropy(move |r: &Matrix3<Real>| waves(s)(&(r.column(2) * r.m11)))
-            .dissipation(MetricDissipation::scaled(|_: &Matrix3<Real>| Real::from(1e-3)))
+            .dissipation(MetricDissipation::scaled(|_: &Matrix3<Real>| Real::from(1e-5)))
             .build()
             .unwrap();
         outcome.compare(

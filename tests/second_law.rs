@@ -112,14 +112,15 @@ fn relaxing(law: SecondLaw) -> impl Metriplectic<Manifold = LieDual<3>, Metric =
 #[test]
 fn where_both_schemes_coincide_they_agree_to_round_off() {
     // A quadratic S has w_S = dS(z) on a flat space, and Π(z) kills it: Π(z) w_S = z × z = 0.
-    let start = vector![0.7, -1.0, 0.4];
-    let [exact, published] = [SecondLaw::Exact, SecondLaw::Published].map(|law| {
-        let run = WeylMidpoint.run(&relaxing(law), start, Span::steps(0.1, 200)).expect("it runs");
-        run.iter().map(|state| state.point).collect::<Vec<_>>()
+    let (exact, published) = (relaxing(SecondLaw::Exact), relaxing(SecondLaw::Published));
+    let run = WeylMidpoint.run(&exact, vector![0.7, -1.0, 0.4], Span::steps(0.1, 200)).unwrap();
+    let apart = run.states().windows(2).fold(0.0_f64, |worst, pair| {
+        let one = WeylMidpoint.run(&published, pair[0].point, Span::steps(0.1, 1)).unwrap();
+        worst.max((one.last().point - pair[1].point).amax())
     });
-    let apart = exact.iter().zip(&published).map(|(a, b)| (a - b).amax()).fold(0.0, f64::max);
-    // Two hundred steps of a contracting flow, each rounded a few times.
-    assert!(apart <= 1e-14, "{apart:e}");
+    // Two solutions of the same equation from different guesses, each at its floor: the rounding of
+    // a displacement and of the terms of Πw and K dS, some of size 1.
+    assert!(apart <= 32.0 * f64::EPSILON, "{apart:e}");
 }
 
 #[test]

@@ -62,6 +62,9 @@
 //!     fn entries(x: &Vector3<f64>) -> Vec<f64> {
 //!         x.iter().copied().collect()
 //!     }
+//!     fn assemble(next: &mut impl FnMut() -> f64) -> Vector3<f64> {
+//!         Vector3::from_fn(|_, _| next())
+//!     }
 //!     fn magnitude(x: &Vector3<f64>) -> f64 {
 //!         x.norm()
 //!     }

@@ -19,6 +19,19 @@ use metriplectic_manifolds::InnerProduct;
 /// is their combination up to round-off.
 const INDEPENDENT: f64 = 1e-10;
 
+/// The independent share of a momentum's covector at which it starts to be left out.
+///
+/// Where the covectors are dependent, at a relative equilibrium, the projection off all of them jumps,
+/// and nearby it amplifies round-off by the reciprocal of the share `σ`. There the momentum is kept
+/// without it: it is a function of the others to first order, so a step that keeps the others changes it
+/// by no more than the order of `h³σ`.
+const SOFT: f64 = 1e-6;
+
+/// The weight of a projection off a momentum's covector with the independent share `σ`.
+fn weight(share: f64) -> f64 {
+    (1.0 + (SOFT / share).powi(4)).recip()
+}
+
 /// Covectors made orthogonal to each other.
 #[derive(Clone, Copy, Debug)]
 pub struct Orthogonal<N: Dimension, D: Scalar = f64> {
@@ -35,6 +48,8 @@ struct Normal<N: Dimension, D: Scalar> {
     sharp: N::Vector<D>,
     /// `G*(n, n)`.
     square: D,
+    /// The share that it is of the covector it was made of.
+    share: f64,
 }
 
 impl<N: Dimension, D: Scalar> Default for Orthogonal<N, D> {
@@ -66,7 +81,7 @@ impl<N: Dimension, D: Scalar> Orthogonal<N, D> {
         let hat = g.orthonormal(&n);
         let share = if size > 0.0 { hat.magnitude() / size } else { 0.0 };
         if share > INDEPENDENT && self.len < N::LEN {
-            let normal = Normal { n, sharp: g.raise(&hat), square: hat.dot(&hat) };
+            let normal = Normal { n, sharp: g.raise(&hat), square: hat.dot(&hat), share };
             self.normals[self.len] = Some(normal);
             self.len += 1;
         }
@@ -77,7 +92,7 @@ impl<N: Dimension, D: Scalar> Orthogonal<N, D> {
     #[inline]
     pub fn off_covector(&self, first: usize, alpha: &N::Vector<D>) -> N::Vector<D> {
         let mut alpha = *alpha;
-        for Normal { n, sharp, square } in self.normals.as_ref()[first..].iter().flatten() {
+        for Normal { n, sharp, square, .. } in self.normals.as_ref()[first..].iter().flatten() {
             alpha -= *n * (sharp.dot(&alpha) / *square);
         }
         alpha
@@ -87,8 +102,19 @@ impl<N: Dimension, D: Scalar> Orthogonal<N, D> {
     #[inline]
     pub fn off_vector(&self, first: usize, v: &N::Vector<D>) -> N::Vector<D> {
         let mut v = *v;
-        for Normal { n, sharp, square } in self.normals.as_ref()[first..].iter().flatten() {
+        for Normal { n, sharp, square, .. } in self.normals.as_ref()[first..].iter().flatten() {
             v -= *sharp * (n.dot(&v) / *square);
+        }
+        v
+    }
+
+    /// The same for momenta: a projection off a covector that is nearly dependent on those before it
+    /// fades out.
+    #[inline]
+    pub fn off_momenta(&self, first: usize, v: &N::Vector<D>) -> N::Vector<D> {
+        let mut v = *v;
+        for Normal { n, sharp, square, share } in self.normals.as_ref()[first..].iter().flatten() {
+            v -= *sharp * (n.dot(&v) / *square * weight(*share));
         }
         v
     }
@@ -100,6 +126,7 @@ impl<N: Dimension, D: Scalar> Orthogonal<N, D> {
 pub struct OrthogonalJet<N: Dimension> {
     normals: N::Array<Option<NormalJet<N>>>,
     len: usize,
+    amplification: f64,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -108,6 +135,7 @@ struct NormalJet<N: Dimension> {
     sharp: Moving<N>,
     square: f64,
     slope: N::Vector<f64>,
+    share: f64,
 }
 
 /// The components of a vector or covector, and their derivatives along the unknown of a step.
@@ -120,19 +148,21 @@ pub struct Moving<N: Dimension> {
 }
 
 impl<N: Dimension> Moving<N> {
-    /// `self − other (numerator·self) / square`, where the quotient has derivatives too.
+    /// `self − weight along (functional·self) / square`, where the quotient has derivatives too.
     #[inline]
     fn without(
         &self,
-        along: &Self,
+        (along, weight): (&Self, f64),
         functional: &Self,
         square: f64,
         slope: &N::Vector<f64>,
     ) -> Self {
+        let square = square / weight;
+        let slope = *slope * weight.recip();
         let c = functional.value.dot(&self.value) / square;
         let dc = (functional.slope.transpose_times(&self.value)
             + self.slope.transpose_times(&functional.value)
-            - *slope * c)
+            - slope * c)
             * square.recip();
         Self {
             value: self.value - along.value * c,
@@ -143,7 +173,7 @@ impl<N: Dimension> Moving<N> {
 
 impl<N: Dimension> Default for OrthogonalJet<N> {
     fn default() -> Self {
-        Self { normals: N::array(|_| None), len: 0 }
+        Self { normals: N::array(|_| None), len: 0, amplification: 0.0 }
     }
 }
 
@@ -156,6 +186,12 @@ impl<N: Dimension> OrthogonalJet<N> {
     /// Whether there are none.
     pub const fn is_empty(&self) -> bool {
         self.len == 0
+    }
+
+    /// By how much projections amplify round-off: the sum of the reciprocal shares of the covectors
+    /// that are independent of those before them.
+    pub const fn amplification(&self) -> f64 {
+        self.amplification
     }
 
     /// Adds a covector; `turned(v)` is the derivative of `g v` along the unknown, for a fixed `v`.
@@ -175,9 +211,11 @@ impl<N: Dimension> OrthogonalJet<N> {
             let slope = N::Matrix::<f64>::from_columns(|k| g.sharp(&bend.column_at(k)));
             let sharp = Moving { value, slope };
             let slope = slope.transpose_times(&n.value) + n.slope.transpose_times(&value);
-            let normal = NormalJet { n, sharp, square: hat.dot(&hat), slope };
+            let share = hat.magnitude() / size;
+            let normal = NormalJet { n, sharp, square: hat.dot(&hat), slope, share };
             self.normals[self.len] = Some(normal);
             self.len += 1;
+            self.amplification += weight(share) / share;
         }
     }
 
@@ -186,8 +224,8 @@ impl<N: Dimension> OrthogonalJet<N> {
     #[must_use]
     pub fn off_covector(&self, first: usize, alpha: &Moving<N>) -> Moving<N> {
         let normals = self.normals.as_ref()[first..].iter().flatten();
-        normals.fold(*alpha, |alpha, NormalJet { n, sharp, square, slope }| {
-            alpha.without(n, sharp, *square, slope)
+        normals.fold(*alpha, |alpha, NormalJet { n, sharp, square, slope, .. }| {
+            alpha.without((n, 1.0), sharp, *square, slope)
         })
     }
 
@@ -196,8 +234,17 @@ impl<N: Dimension> OrthogonalJet<N> {
     #[must_use]
     pub fn off_vector(&self, first: usize, v: &Moving<N>) -> Moving<N> {
         let normals = self.normals.as_ref()[first..].iter().flatten();
-        normals.fold(*v, |v, NormalJet { n, sharp, square, slope }| {
-            v.without(sharp, n, *square, slope)
+        normals.fold(*v, |v, NormalJet { n, sharp, square, slope, .. }| {
+            v.without((sharp, 1.0), n, *square, slope)
+        })
+    }
+    /// [`Orthogonal::off_momenta`] with derivatives, for weights that stay what they are.
+    #[inline]
+    #[must_use]
+    pub fn off_momenta(&self, first: usize, v: &Moving<N>) -> Moving<N> {
+        let normals = self.normals.as_ref()[first..].iter().flatten();
+        normals.fold(*v, |v, NormalJet { n, sharp, square, slope, share }| {
+            v.without((sharp, weight(*share)), n, *square, slope)
         })
     }
 }

@@ -14,7 +14,8 @@
 //!   ([`Bracket::kills_its_entropy`]) needs no `P` for it.
 //! - A momentum `J` must not enter `P`, which would change the flow: `Π dJ ≠ 0`. With
 //!   `a = Π̃w_H`, the number `⟨w_J, a⟩` is `O(h²)`; it is taken out of `a` along the vector `♯n`, where
-//!   `n` is the part of `w_J` orthogonal to all that `a` kills already.
+//!   `n` is the part of `w_J` orthogonal to all that `a` kills already. Near a relative equilibrium, where
+//!   `n` vanishes, this fades out ([`Orthogonal::off_momenta`]).
 //! - `K̃_w = Q K_w Qᵀ`, where `Q` takes out the parts of the further invariants orthogonal to `w_H`: it
 //!   is symmetric and positive semidefinite, and kills `w_H` and all of them. For the dissipation of
 //!   the metric this is `κ G*(Pα, Pβ)` with `κ = G*(w_H, w_H)` and `P = 1 − C^{ab} L_b ⊗ L_a` (Bloch,
@@ -198,7 +199,7 @@ pub fn reversible<Y: Metriplectic + ?Sized, D: Scalar>(
         for j in w.of_kind(Kind::Momentum) {
             off.push(&g, j);
         }
-        a = off.off_vector(first, &a);
+        a = off.off_momenta(first, &a);
     }
     Ok(a)
 }
@@ -253,6 +254,9 @@ pub fn independence<Y: Metriplectic + ?Sized>(
     if system.second_law() == SecondLaw::Exact && !system.bracket().is_zero() {
         casimirs.push(&g, &w.entropy);
     }
+    if system.second_law() == SecondLaw::Exact {
+        all.push(&g, &w.entropy);
+    }
     all.push(&g, &w.energy);
     let listed = w.invariants.as_ref().iter().flatten();
     Ok(listed
@@ -275,6 +279,8 @@ pub struct VelocityJet<N: Dimension> {
     pub terms: f64,
     /// The size of its derivative along `w_H`.
     pub gain: f64,
+    /// The size of `K̃ w_S`.
+    pub irreversible: f64,
 }
 
 /// The velocity `Π̃ w_H + K̃ w_S` at a real point `z` with its derivatives along the unknown of a step,
@@ -301,7 +307,7 @@ pub fn velocity_jet<Y: Metriplectic + ?Sized>(
         None => Matrix::<Y::Manifold>::zeros(),
     };
     let g = metric.at(&centre)?;
-    let (pi, pi_size) = reversible_jet(system, &centre, (&g, &turned), dz, w)?;
+    let (pi, pi_size, pi_noise) = reversible_jet(system, &centre, (&g, &turned), dz, w)?;
 
     let mut off = OrthogonalJet::<Dim<Y>>::default();
     let mut first = 0;
@@ -317,11 +323,15 @@ pub fn velocity_jet<Y: Metriplectic + ?Sized>(
     let k_s = off.off_vector(first, &Moving { value: k.value, slope });
     let velocity = Moving { value: pi.value + k_s.value, slope: pi.slope + k_s.slope };
     let terms = pi_size * Column::magnitude(&w.energy.value)
-        + k.tensor.magnitude() * Column::magnitude(&alpha.value);
-    Ok(VelocityJet { velocity, terms, gain: pi_size + k.along_w.magnitude() })
+        + k.tensor.magnitude() * Column::magnitude(&alpha.value)
+        + pi_noise
+        + Column::magnitude(&k.value) * off.amplification();
+    let (gain, irreversible) =
+        (pi_size + k.along_w.magnitude(), Column::magnitude(&k_s.value));
+    Ok(VelocityJet { velocity, terms, gain, irreversible })
 }
 
-/// [`reversible`] with its derivatives, and the size of `Π`.
+/// [`reversible`] with its derivatives, the size of `Π`, and that of the terms of the projections.
 #[inline]
 fn reversible_jet<Y: Metriplectic + ?Sized>(
     system: &Y,
@@ -332,15 +342,16 @@ fn reversible_jet<Y: Metriplectic + ?Sized>(
     ),
     dz: &Matrix<Y::Manifold>,
     w: &Covectors<Dim<Y>, Moving<Dim<Y>>>,
-) -> Result<(Moving<Dim<Y>>, f64), MetricError> {
+) -> Result<(Moving<Dim<Y>>, f64, f64), MetricError> {
     let killed = Killed::of(system, w);
     let bracket = |alpha: &Moving<Dim<Y>>| {
         let jet = system.bracket().linearise(&system.site(z, &w.entropy.value), &alpha.value)?;
         let slope = jet.along_z * *dz + jet.tensor * alpha.slope + jet.along_s * w.entropy.slope;
-        Ok((Moving { value: jet.value, slope }, jet.tensor.magnitude()))
+        Ok::<_, MetricError>((Moving { value: jet.value, slope }, jet.tensor.magnitude()))
     };
     if !killed.projected && !killed.momenta {
-        return bracket(&w.energy);
+        let (a, size) = bracket(&w.energy)?;
+        return Ok((a, size, 0.0));
     }
     let mut off = OrthogonalJet::<Dim<Y>>::default();
     if killed.entropy {
@@ -356,7 +367,8 @@ fn reversible_jet<Y: Metriplectic + ?Sized>(
         off.push(g, turned, &w.energy);
         let first = off.len();
         w.of_kind(Kind::Momentum).for_each(|j| off.push(g, turned, j));
-        a = off.off_vector(first, &a);
+        a = off.off_momenta(first, &a);
     }
-    Ok((a, size))
+    let noise = Column::magnitude(&a.value) * off.amplification();
+    Ok((a, size, noise))
 }

@@ -36,6 +36,13 @@ pub struct Certificate {
     pub max_manifold_defect: f64,
     /// Steps taken.
     pub steps: usize,
+    /// The size of the smallest step taken; 0 before the first step.
+    pub smallest_step: f64,
+    /// The size of the largest step taken; 0 before the first step.
+    pub largest_step: f64,
+    /// Steps that were tried and given up, because their error was above the tolerance or because
+    /// they were not solved.
+    pub rejected: usize,
     /// Linear systems solved by Newton's method, in all steps.
     pub sweeps: usize,
     /// The same in the worst step.
@@ -144,6 +151,13 @@ impl fmt::Display for Certificate {
             )?;
         }
         writeln!(f, "manifold:    defect ≤ {:.1e}", self.max_manifold_defect)?;
+        if self.smallest_step < self.largest_step || self.rejected > 0 {
+            writeln!(
+                f,
+                "step sizes:  {:.1e} to {:.1e}, {} rejected",
+                self.smallest_step, self.largest_step, self.rejected
+            )?;
+        }
         write!(
             f,
             "solver:      {} ({} in the worst step), {}",
@@ -160,8 +174,13 @@ impl Certificate {
             0 => "it never fell".to_owned(),
             n => format!("it fell on {}", counted(n, "step", "steps")),
         };
+        let slope = if self.min_entropy_slope.is_finite() {
+            format!(", |w_S| ≥ {:.1e}", self.min_entropy_slope)
+        } else {
+            String::new()
+        };
         format!(
-            "ΔS ≥ {:.1e} on every step, {falls}; S rose by {:.6e}",
+            "ΔS ≥ {:.1e} on every step, {falls}; S rose by {:.6e}{slope}",
             self.min_entropy_increment, self.entropy_gained
         )
     }
@@ -187,6 +206,9 @@ mod tests {
         invariants: Vec::new(),
         max_manifold_defect: 0.0,
         steps: 7,
+        smallest_step: 0.1,
+        largest_step: 0.1,
+        rejected: 0,
         sweeps: 9,
         worst_sweeps: 2,
         retries: 1,
@@ -201,6 +223,9 @@ mod tests {
         for part in ["over 7 steps", "fell on 1 step;", "9 Newton sweeps", "1 retry"] {
             assert!(text.contains(part), "\"{part}\" is missing in: {text}");
         }
+        assert!(!text.contains("step sizes"), "{text}");
+        let adaptive = Certificate { smallest_step: 1e-3, rejected: 2, ..ONE_FALL }.to_string();
+        assert!(adaptive.contains("step sizes:  1.0e-3 to 1.0e-1, 2 rejected"), "{adaptive}");
         let text = Certificate { entropy_falls: 2, steps: 1, sweeps: 1, ..ONE_FALL }.to_string();
         for part in ["over 1 step\n", "fell on 2 steps;", "1 Newton sweep ("] {
             assert!(text.contains(part), "\"{part}\" is missing in: {text}");

@@ -30,7 +30,9 @@ pub use mean_value::MeanValue;
 use std::fmt::Debug;
 
 use metriplectic_fields::{ChartPoint, Column, Matrix, Scalar, ScalarField, Space, Square, Vector};
-use metriplectic_manifolds::{Arc, ArcJet, InnerProduct, Manifold};
+use metriplectic_manifolds::{
+    Arc, ArcJet, InnerProduct, Manifold, MetricError, Retraction, Riemannian,
+};
 use num_dual::Dual64;
 
 /// A discrete gradient on a manifold (Bloch, Farré Puiggalí, Martín de Diego 2024, eq. "discGrad-m",
@@ -99,6 +101,34 @@ pub trait DiscreteGradient: Copy + Debug + Send + Sync {
         let defect = f.at(&arc.end) - start - mean.dot(&arc.d);
         mean + flat * (defect / flat.dot(&arc.d))
     }
+}
+
+/// The discrete gradient of `f` on the arc with the initial displacement `u` from `x`, safe against
+/// round-off: the covector at the base point with `⟨w, d⟩ = F(x') − F(x)`.
+///
+/// # Errors
+///
+/// [`MetricError`] if the arc cannot be followed.
+pub fn along<M, G, R, W>(
+    gradient: &W,
+    f: &impl ScalarField<M>,
+    metric: &G,
+    retraction: &R,
+    (x, u): (&M::Point<f64>, &Vector<M>),
+) -> Result<Vector<M>, MetricError>
+where
+    M: Manifold,
+    G: Riemannian<M>,
+    R: Retraction<M, G>,
+    W: DiscreteGradient,
+{
+    let arc = retraction.real_arc(metric, x, u)?;
+    let (g, mean) = (metric.at(&arc.z)?, gradient.real_mean(f, x, &arc));
+    let (start, end) = (f.at(x), (&arc.end, f.at(&arc.end)));
+    let nodes = retraction.along(metric, x, u)?;
+    let base = || gradient.slope_at_base(f, &arc.z.base, &arc.d, &mean);
+    let chord = Chord::new(f, &mean, &arc.d, start, end, base, || nodes);
+    Ok(chord.covector(0.0, &g, &arc.d))
 }
 
 /// The definition of [`DiscreteGradient::mean_jet`]: one dual number for each direction.

@@ -5,9 +5,11 @@
 
 use std::fmt;
 
-use metriplectic_dynamics::{BuildError, ModelError, PoissonError};
+use metriplectic_dynamics::{BuildError, FormError, LegendreError, ModelError, PoissonError};
 use metriplectic_manifolds::{AlgebraError, Manifold, MetricError, PointError};
 
+use crate::attitude::AttitudeError;
+use crate::checkpoint::ResumeError;
 use crate::span::SpanError;
 use crate::trajectory::Trajectory;
 
@@ -51,6 +53,20 @@ pub enum StepError {
         change: f64,
         /// The share of its differential that is independent.
         share: f64,
+    },
+    /// The controller asks for a step below the least one.
+    #[error(
+        "the step from t = {time} would have to be {h:.1e} long to keep the tolerance, below the least \
+         step {least:.1e}; the motion may end there: see the energy and the entropy around this \
+         state, or ask for a coarser tolerance"
+    )]
+    TooSmall {
+        /// The time at which the step starts.
+        time: f64,
+        /// The size that it would have to have.
+        h: f64,
+        /// The least step size.
+        least: f64,
     },
     /// A field is not defined around the start of the step.
     #[error(
@@ -114,6 +130,12 @@ pub enum Error {
     /// A point that is not on its manifold.
     #[error(transparent)]
     Point(#[from] PointError),
+    /// A form that is not symmetric and positive.
+    #[error(transparent)]
+    Form(#[from] FormError),
+    /// A Lagrangian without a Legendre transform.
+    #[error(transparent)]
+    Legendre(#[from] LegendreError),
     /// Parts that do not make a system.
     #[error(transparent)]
     Build(#[from] BuildError),
@@ -123,9 +145,15 @@ pub enum Error {
     /// A span that cannot be run.
     #[error(transparent)]
     Span(#[from] SpanError),
+    /// A checkpoint that cannot be resumed.
+    #[error(transparent)]
+    Resume(#[from] ResumeError),
     /// A step that could not be taken.
     #[error(transparent)]
     Step(#[from] StepError),
+    /// A run along which there is no attitude.
+    #[error(transparent)]
+    Attitude(#[from] AttitudeError),
     /// A run that stopped; the [`RunError`] with the trajectory so far can be downcast from it.
     #[error("{0}")]
     Run(#[source] Box<dyn std::error::Error + Send + Sync>),

@@ -4,9 +4,9 @@ use metriplectic_dynamics::{Metriplectic, system::Point};
 use metriplectic_fields::{
     BrokenLaw, ChartPoint, Column, ScalarField, Space, Vector, differential,
 };
-use metriplectic_manifolds::{Arc, Manifold, Nodes, Retraction, Riemannian};
+use metriplectic_manifolds::{Arc, Manifold, Retraction, Riemannian};
 
-use crate::discrete_gradient::{Chord, DiscreteGradient};
+use crate::discrete_gradient::{DiscreteGradient, along as along_arc};
 use crate::residual::Recall;
 use crate::step::{Memory, Scheme, Start};
 
@@ -41,14 +41,8 @@ where
         let w = gradient.covector(f, &g, (x, start), &arc);
         let df = differential(f, &ChartPoint::centre(&arc.z.point()));
         let end: f64 = f.at(&arc.end);
-        let mean = gradient.real_mean(f, x, &arc);
-        let base = || df.dot(&arc.d);
-        let chord = Chord::new(f, &mean, &arc.d, start, (&arc.end, end), base, || {
-            retraction
-                .along(metric, x, u)
-                .unwrap_or_else(|_| Nodes { ends: [x, &arc.end].map(M::constant), middle: None })
-        });
-        let safe = chord.covector(0.0, &g, &arc.d);
+        let safe = along_arc(gradient, f, metric, retraction, (x, u))
+            .map_err(missing("the arc exists"))?;
         Ok((arc, w, safe, df, end))
     };
     let (arc, w, safe, df, end) = along(u)?;
@@ -126,8 +120,9 @@ where
     W: DiscreteGradient,
 {
     let left_over = Recall::nothing();
-    let (energy, invariants) = (system.energy_at(x), left_over.invariants);
-    let start = Start { x, time: 0.0, h, energy, invariants, left_over };
+    let [energy, entropy] = [system.energy_at(x), system.entropy_at(x)];
+    let invariants = left_over.invariants;
+    let start = Start { x, time: 0.0, h, energy, entropy, invariants, left_over };
     let missing = |_| BrokenLaw { law: "the step exists", size: f64::NAN, bound: 0.0 };
     scheme.step(system, &start, &mut Memory::new()).map(|(end, _)| end).map_err(missing)
 }

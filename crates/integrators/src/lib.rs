@@ -8,33 +8,45 @@
 //! | [`newton`] | [`Newton`]: the solver of every step |
 //! | `globaliser` | L-BFGS from argmin, which brings a lost Newton back (feature `argmin`) |
 //! | [`span`](mod@span) | [`Span`]: step size, number of steps, what is recorded |
+//! | [`adaptive`] | [`Until`]: steps of a size that follows the motion, and the estimate of their error |
 //! | [`step`] | [`Scheme`] and one step of it |
 //! | [`trajectory`] | [`Steps`], the endless iterator, and [`Trajectory`], the record |
+//! | [`observables`] | [`Observables`]: named numbers of a state, streamed to CSV or NPY |
+//! | [`checkpoint`] | [`Checkpoint`]: a run that is put down and taken up again, bit for bit |
+//! | [`attitude`] | [`Attitude`]: where a body points along a run of its angular momentum |
 //! | [`certificate`] | [`Certificate`]: what a run did to its laws |
 //! | [`error`](mod@error) | [`Error`], [`RunError`], [`StepError`] |
 //! | [`laws`] | what a step promises, and the function that checks it |
 
+pub mod adaptive;
+pub mod attitude;
 pub mod certificate;
+pub mod checkpoint;
 pub mod discrete_gradient;
 pub mod error;
 #[cfg(feature = "argmin")]
 mod globaliser;
 pub mod laws;
 pub mod newton;
+pub mod observables;
 pub mod residual;
 pub mod root_finder;
 pub mod span;
 pub mod step;
 pub mod trajectory;
 
+pub use adaptive::Until;
+pub use attitude::{Attitude, AttitudeError};
 pub use certificate::{Certificate, Kept};
+pub use checkpoint::{Checkpoint, ResumeError};
 pub use discrete_gradient::{
     Chord, DiscreteGradient, Gonzalez, ItohAbe, MeanValue, SymmetricItohAbe,
 };
 pub use error::{Error, RunError, StepError};
 pub use newton::Newton;
+pub use observables::{Csv, Npy, Observables};
 pub use residual::Residual;
 pub use root_finder::{Equation, Linearised, NoRoot, Root, RootFinder};
-pub use span::{Span, SpanError};
+pub use span::{Course, Span, SpanError};
 pub use step::{Scheme, Work};
-pub use trajectory::{Run, State, Steps, Trajectory};
+pub use trajectory::{Ending, Run, State, Steps, Trajectory};

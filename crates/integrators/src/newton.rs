@@ -11,7 +11,7 @@ use crate::root_finder::{Equation, Linearised, NoRoot, Root, RootFinder};
 /// much of the residual asks for a new Jacobian.
 ///
 /// The last correction is not followed by another residual if the worst contraction of late says that
-/// it would be a tenth of the floor.
+/// it would be a hundredth of the floor: in other directions the next contraction may be slower.
 ///
 /// It stops where the residual is at the floor that the equation states, or where it no longer
 /// falls within a small multiple of it: a stall *at* the floor is convergence, a stall above it is
@@ -50,9 +50,9 @@ impl<M: Space> RootFinder<M> for Newton {
 /// The inverse of a Jacobian, kept up to date by Broyden's rank-one corrections.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Inverse<N: Dimension> {
-    matrix: N::Matrix<f64>,
+    pub(crate) matrix: N::Matrix<f64>,
     /// The share of a residual that its corrections have left of late.
-    contraction: f64,
+    pub(crate) contraction: f64,
 }
 
 impl<N: Dimension> Inverse<N> {
@@ -167,11 +167,13 @@ impl Newton {
         // turned since the last step, as that of a sphere does across its equator.
         let mut contraction = f64::INFINITY;
         loop {
-            if best.residual <= 0.1 * floor {
+            // A displacement within the floor is that of a state at rest.
+            let rests = best.best.magnitude() <= here.floor;
+            if best.residual <= 0.1 * floor || (rests && best.residual <= floor) {
                 return Progress::Solved;
             }
             best.sweeps += 1;
-            let last = best.residual <= floor || contraction * best.residual <= 0.1 * floor;
+            let last = best.residual <= floor || contraction * best.residual <= 0.01 * floor;
             if last {
                 // What a slow contraction leaves below the floor has the same sign in each step; it
                 // costs one more solution to take it out.

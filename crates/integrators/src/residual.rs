@@ -37,9 +37,10 @@ pub struct Residual<'a, Y: Metriplectic, R, W> {
     x: &'a Point<Y>,
     h: f64,
     energy: f64,
-    recall: Recall<Y>,
     entropy: f64,
+    recall: Recall<Y>,
     entropy_slope: Cell<f64>,
+    dissipates: Cell<bool>,
     sizes: Cell<Option<Sizes>>,
 }
 
@@ -47,9 +48,9 @@ pub struct Residual<'a, Y: Metriplectic, R, W> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Sizes {
     /// Of the terms that the velocity is summed of.
-    terms: f64,
+    pub(crate) terms: f64,
     /// Of the derivative of the velocity along `w_H`.
-    gain: f64,
+    pub(crate) gain: f64,
 }
 
 impl Sizes {
@@ -62,12 +63,14 @@ impl Sizes {
     }
 }
 
-/// What earlier steps have left over of the energy and of the further invariants, and this step
+/// What earlier steps have left over of the energy, the entropy and the further invariants, and this step
 /// takes back.
 #[derive(Clone, Copy, Debug)]
 pub struct Recall<Y: Metriplectic> {
     /// Of the energy.
     pub energy: f64,
+    /// Of the entropy, as long as nothing is dissipated.
+    pub entropy: f64,
     /// Of each further invariant.
     pub invariants: Numbers<Y>,
 }
@@ -78,7 +81,7 @@ pub type Numbers<Y> = <<<Y as Metriplectic>::Manifold as Space>::Dim as Dimensio
 impl<Y: Metriplectic> Recall<Y> {
     /// Nothing is taken back, as in the definition of the scheme.
     pub fn nothing() -> Self {
-        Self { energy: 0.0, invariants: Dim::<Y>::array(|_| 0.0) }
+        Self { energy: 0.0, entropy: 0.0, invariants: Dim::<Y>::array(|_| 0.0) }
     }
 }
 
@@ -104,24 +107,34 @@ where
         x: &'a Point<Y>,
         h: f64,
     ) -> Self {
-        let energy = system.energy_at(x);
-        Self::recalling(system, (retraction, gradient), (x, energy), h, Recall::nothing())
+        let values = [system.energy_at(x), system.entropy_at(x)];
+        Self::recalling(system, (retraction, gradient), (x, values), h, Recall::nothing())
     }
 
-    /// The same for a point with a known energy, and errors of earlier steps to take back.
+    /// The same for a point with known energy and entropy, and errors of earlier steps to take back.
     #[inline]
     pub(crate) fn recalling(
         system: &'a Y,
         (retraction, gradient): (&'a R, &'a W),
-        (x, energy): (&'a Point<Y>, f64),
+        (x, [energy, entropy]): (&'a Point<Y>, [f64; 2]),
         h: f64,
         recall: Recall<Y>,
     ) -> Self {
-        let exact = system.second_law() == SecondLaw::Exact;
-        let entropy = if exact { system.entropy_at(x) } else { 0.0 };
-        let entropy_slope = Cell::new(f64::INFINITY);
+        let (entropy_slope, dissipates) = (Cell::new(f64::INFINITY), Cell::new(true));
         let sizes = Cell::new(None);
-        Self { system, retraction, gradient, x, h, energy, recall, entropy, entropy_slope, sizes }
+        Self {
+            system,
+            retraction,
+            gradient,
+            x,
+            h,
+            energy,
+            entropy,
+            recall,
+            entropy_slope,
+            dissipates,
+            sizes,
+        }
     }
 
     /// The same with the sizes of an equation near by, so that the Jacobian need not be formed.
@@ -156,17 +169,9 @@ where
         };
         let laws = [defined.of(self.system.energy()), entropy];
         let w = Covectors::new(laws, self.system.invariants(), &mut defined);
-        Ok(arc.d - self.velocity(&arc.z, &w)? * D::from(self.h))
-    }
-
-    /// `Π̃ w_H + K̃ w_S`.
-    #[inline]
-    fn velocity<D: Scalar>(
-        &self,
-        z: &ChartPoint<Y::Manifold, D>,
-        w: &Covectors<Dim<Y>, Vector<Y::Manifold, D>>,
-    ) -> Result<Vector<Y::Manifold, D>, MetricError> {
-        Ok(reversible(self.system, z, w)? + irreversible(self.system, z, w)?)
+        let velocity =
+            reversible(self.system, &arc.z, &w)? + irreversible(self.system, &arc.z, &w)?;
+        Ok(arc.d - velocity * D::from(self.h))
     }
 
     /// Whether the entropy has a discrete gradient.
@@ -177,6 +182,11 @@ where
     /// `|w_S|` at the point evaluated last.
     pub(crate) const fn entropy_slope(&self) -> f64 {
         self.entropy_slope.get()
+    }
+
+    /// Whether `K̃ w_S` was not zero at the point evaluated last.
+    pub(crate) const fn dissipates(&self) -> bool {
+        self.dissipates.get()
     }
 
     /// The error `e = H(x') − H(x) + recall` of the energy at the end of an arc.
@@ -228,7 +238,7 @@ where
         let along = Along::new(self, u, &g);
         let (energy, noise) = along.value(system.energy(), (self.energy, self.recall.energy), &arc);
         let entropy = if self.is_exact() {
-            let (w, _) = along.value(system.entropy(), (self.entropy, 0.0), &arc);
+            let (w, _) = along.value(system.entropy(), (self.entropy, self.recall.entropy), &arc);
             self.entropy_slope.set(w.magnitude());
             w
         } else {
@@ -236,7 +246,10 @@ where
         };
         let mut values = Values { along: &along, arc: &arc, seen: 0 };
         let w = Covectors::new([energy, entropy], system.invariants(), &mut values);
-        let residual = arc.d - self.velocity(&arc.z, &w).ok()? * self.h;
+        let friction = irreversible(system, &arc.z, &w).ok()?;
+        self.dissipates.set(friction.magnitude() > 0.0);
+        let velocity = reversible(system, &arc.z, &w).ok()? + friction;
+        let residual = arc.d - velocity * self.h;
         residual.is_finite().then_some((residual, noise))
     }
 
@@ -252,15 +265,16 @@ where
         let start = (self.energy, self.recall.energy);
         let (energy, chord) = along.jet(system.energy(), start, &arc, slopes);
         let entropy = if self.is_exact() {
-            along.jet(system.entropy(), (self.entropy, 0.0), &arc, slopes).0
+            along.jet(system.entropy(), (self.entropy, self.recall.entropy), &arc, slopes).0
         } else {
             let jet = system.entropy().jet2(&arc.z);
             Moving { value: jet.df, slope: jet.hf * arc.dz }
         };
         let mut jets = Jets { along: &along, arc: &arc, slopes, seen: 0 };
         let w = Covectors::new([energy, entropy], system.invariants(), &mut jets);
-        let VelocityJet { velocity, terms, gain } =
+        let VelocityJet { velocity, terms, gain, irreversible } =
             velocity_jet(system, &arc.z, &arc.dz, &w).ok()?;
+        self.dissipates.set(irreversible > 0.0);
 
         let residual = arc.d - velocity.value * h;
         let jacobian = arc.dd - velocity.slope * h;

@@ -1,5 +1,7 @@
 //! How far a run goes, in which steps, and what of it is recorded.
 
+use crate::adaptive::Until;
+
 /// The time span of a run: the step size, the number of steps, and every how many a state is kept.
 ///
 /// ```
@@ -12,15 +14,16 @@ pub struct Span {
     step: f64,
     count: usize,
     every: usize,
+    rest: Option<f64>,
 }
 
 /// The most states that a run makes room for beforehand: it may end long before its span.
-const ROOM: usize = 1 << 12;
+pub(crate) const ROOM: usize = 1 << 12;
 
 impl Span {
     /// `count` steps of size `step`, each of them recorded.
     pub const fn steps(step: f64, count: usize) -> Self {
-        Self { step, count, every: 1 }
+        Self { step, count, every: 1, rest: None }
     }
 
     /// Records the start and every `every`-th state after it, and always the last.
@@ -43,6 +46,13 @@ impl Span {
         self.every(self.count.div_ceil(intervals))
     }
 
+    /// Ends the run as soon as the state is at rest, see [`Ending::Rest`](crate::Ending::Rest); the
+    /// number of steps is then a bound.
+    #[must_use]
+    pub const fn until_rest(self, tolerance: f64) -> Self {
+        Self { rest: Some(tolerance), ..self }
+    }
+
     /// The step size.
     pub const fn step_size(&self) -> f64 {
         self.step
@@ -57,21 +67,61 @@ impl Span {
     pub const fn records(&self, step: usize) -> bool {
         step == self.count || step.is_multiple_of(self.every)
     }
+}
 
-    /// The states that a run makes room for before it starts.
-    pub(crate) fn room(&self) -> usize {
-        (self.count / self.every).min(ROOM) + 2
+/// How a run goes: what [`Scheme::steps`](crate::Scheme::steps) and [`Scheme::run`](crate::Scheme::run)
+/// make of what they are given.
+///
+/// | given | steps | until |
+/// |---|---|---|
+/// | a number `h` | of size `h` | you stop |
+/// | [`Span::steps`]`(h, count)` | of size `h` | `count` of them |
+/// | [`Span::until`]`(end)` | that follow a tolerance | `t = end` |
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Course {
+    pub(crate) size: Size,
+    pub(crate) count: Option<usize>,
+    pub(crate) every: usize,
+    pub(crate) rest: Option<f64>,
+}
+
+/// How large the steps of a course are.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Size {
+    Fixed(f64),
+    Tolerance(Until),
+}
+
+impl From<f64> for Course {
+    fn from(h: f64) -> Self {
+        Self { size: Size::Fixed(h), count: None, every: 1, rest: None }
     }
+}
 
+impl From<Span> for Course {
+    fn from(Span { step, count, every, rest }: Span) -> Self {
+        Self { size: Size::Fixed(step), count: Some(count), every, rest }
+    }
+}
+
+impl Course {
     pub(crate) fn check(&self) -> Result<(), SpanError> {
-        check_step_size(self.step)?;
-        if self.count == 0 {
+        match &self.size {
+            Size::Fixed(h) => check_step_size(*h)?,
+            Size::Tolerance(until) => until.check()?,
+        }
+        if self.count == Some(0) {
             return Err(SpanError::NoSteps);
         }
         if self.every == 0 {
             return Err(SpanError::RecordsNothing);
         }
-        Ok(())
+        match self.rest {
+            Some(tolerance) if !(tolerance > 0.0 && tolerance < 1.0) => {
+                Err(SpanError::Rest { tolerance })
+            }
+            _ => Ok(()),
+        }
     }
 }
 
@@ -92,9 +142,45 @@ pub enum SpanError {
         /// The step size.
         h: f64,
     },
+    /// The end is zero, negative, infinite or NaN.
+    #[error(
+        "the run would end at t = {end}; it starts at 0, and its end must be a later, finite time"
+    )]
+    End {
+        /// The time asked for.
+        end: f64,
+    },
+    /// The tolerance is zero, negative, NaN, or finer than round-off.
+    #[error("the tolerance is {tolerance}; it must be a finite number of at least {least:.0e}")]
+    Tolerance {
+        /// The tolerance asked for.
+        tolerance: f64,
+        /// The least one.
+        least: f64,
+    },
+    /// The least step size is larger than the largest one.
+    #[error("the least step size {least} is above the largest one, {largest}; swap them?")]
+    StepSizes {
+        /// The least step size.
+        least: f64,
+        /// The largest step size.
+        largest: f64,
+    },
+    /// The tolerance of rest is not between 0 and 1.
+    #[error(
+        "the tolerance of rest is {tolerance}; it is compared with the speed relative to the \
+         largest one, so it must be between 0 and 1"
+    )]
+    Rest {
+        /// The tolerance asked for.
+        tolerance: f64,
+    },
     /// Zero steps.
     #[error("the span has no steps; ask for at least one")]
     NoSteps,
+    /// A step size alone, where a run has to end.
+    #[error("steps of one size have no end; say how many with `Span::steps`")]
+    Endless,
     /// `every(0)`.
     #[error("`every(0)` records nothing; use `every(1)` to record each step")]
     RecordsNothing,
@@ -114,10 +200,13 @@ mod tests {
                 // Spaced as closely as that allows.
                 let closer = count.div_ceil(span.every.saturating_sub(1).max(1)) + 1;
                 assert!(span.every == 1 || closer > states.max(2), "{states}, {count} steps");
-                assert!(span.records(0) && span.records(count) && span.check().is_ok());
+                assert!(
+                    span.records(0) && span.records(count) && Course::from(span).check().is_ok()
+                );
             }
         }
-        assert_eq!(Span::steps(0.1, 0).at_most(10).check(), Err(SpanError::NoSteps));
+        let none = Course::from(Span::steps(0.1, 0).at_most(10));
+        assert_eq!(none.check(), Err(SpanError::NoSteps));
         assert_eq!(
             Span::steps(0.1, usize::MAX).at_most(2),
             Span::steps(0.1, usize::MAX).every(usize::MAX)

@@ -110,14 +110,14 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
         let mut point = start.x.clone();
         for half in 0..2 {
             let h = 0.5 * start.h;
-            let energy = system.energy_at(&point);
+            let [energy, entropy] = [system.energy_at(&point), system.entropy_at(&point)];
             let left_over = Recall {
                 energy: start.left_over.energy + (energy - start.energy),
                 ..start.left_over
             };
             let time = start.time + f64::from(half) * h;
             let part =
-                Start { x: &point, time, h, energy, invariants: start.invariants, left_over };
+                Start { x: &point, time, h, energy, entropy, left_over, ..*start };
             let end = match self.attempt(system, &part, &mut memory, work) {
                 Ok(end) => end,
                 Err(failure) if depth >= self.splits => return Err(failure),
@@ -129,7 +129,7 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
     }
 
     /// Guess, solve, retract.
-    fn attempt<Y>(
+    pub(crate) fn attempt<Y>(
         &self,
         system: &Y,
         start: &Start<'_, Y>,
@@ -144,8 +144,9 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
         let guess = guess.unwrap_or_else(Vector::<Y::Manifold>::zero);
         let parts = (&self.retraction, &self.gradient);
         let recall = recall(system, start, &guess);
+        let values = [start.energy, start.entropy];
         let known = memory.linearised.take().filter(|known| known.serves(start.h, &guess));
-        let residual = Residual::recalling(system, parts, (start.x, start.energy), start.h, recall)
+        let residual = Residual::recalling(system, parts, (start.x, values), start.h, recall)
             .with_sizes(known.map(|known| known.sizes));
         let mut inverse = known.map(|known| known.inverse);
         let root = self.solve(&residual, &guess, &mut inverse, work)?;
@@ -156,6 +157,7 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
             _ => Linearisation { inverse, sizes, h: start.h, length: root.u.magnitude(), steps: 0 },
         });
         work.entropy_slope = work.entropy_slope.min(residual.entropy_slope());
+        work.dissipates |= residual.dissipates();
         if root.u.magnitude() <= 2.0 * root.floor {
             // The state is at rest: what the solver found is its own round-off, and following it
             // would make a random walk of the energy.
@@ -217,9 +219,12 @@ pub struct Start<'a, Y: Metriplectic> {
     pub h: f64,
     /// The energy `H(x)`.
     pub energy: f64,
+    /// The entropy `S(x)`.
+    pub entropy: f64,
     /// The further invariants `L_a(x)`.
     pub invariants: Numbers<Y>,
-    /// The round-off `H(x) − H(x₀)` that earlier steps have left, and that of the further invariants.
+    /// The round-off `H(x) − H(x₀)` that earlier steps have left, and that of the entropy, since
+    /// something was dissipated, and of the further invariants.
     pub left_over: Recall<Y>,
 }
 
@@ -235,11 +240,19 @@ pub struct Work {
     /// The size `|w_S|` of the discrete gradient of the entropy, by which the bracket is projected;
     /// infinite where it has none.
     pub entropy_slope: f64,
+    /// Whether anything was dissipated.
+    pub dissipates: bool,
 }
 
 impl Default for Work {
     fn default() -> Self {
-        Self { sweeps: 0, splits: 0, globalised: 0, entropy_slope: f64::INFINITY }
+        Self {
+            sweeps: 0,
+            splits: 0,
+            globalised: 0,
+            entropy_slope: f64::INFINITY,
+            dissipates: false,
+        }
     }
 }
 
@@ -255,12 +268,12 @@ fn explicit<Y: Metriplectic>(system: &Y, start: &Start<'_, Y>) -> Option<Vector<
 /// a step aims at `H(x₀)` instead of `H(x)`, once they differ by more than a few units of round-off.
 /// Asking for `⟨w, d⟩ = F(x') − F(x) + φe` changes the covector by `φ|e|/|d|`, and with it the
 /// displacement by `h|Π|φ|e|/|d|`, which must stay small against `|d|`. Hence `φ = r²/(1 + r²)` with
-/// `r = |d|² / (10² h|Π||e|)`: all of it while the state moves, nothing of it at rest, where it
+/// `r = |d|² / (10⁶ h|Π||e|)`: all of it while the state moves, nothing of it at rest, where it
 /// would hold the state fast. The further invariants are treated alike.
 fn recall<Y: Metriplectic>(system: &Y, start: &Start<'_, Y>, d: &Vector<Y::Manifold>) -> Recall<Y> {
-    let Recall { energy, invariants } = start.left_over;
+    let Recall { energy, entropy, invariants } = start.left_over;
     let far = |e: f64, size: f64| e.abs() > 4.0 * f64::EPSILON * size;
-    let mut off = far(energy, start.energy.abs());
+    let mut off = far(energy, start.energy.abs()) || far(entropy, start.entropy.abs());
     for k in 0..Y::Invariants::COUNT {
         off |= far(invariants[k], start.invariants[k].abs());
     }
@@ -274,11 +287,12 @@ fn recall<Y: Metriplectic>(system: &Y, start: &Start<'_, Y>, d: &Vector<Y::Manif
     let sizes = (pi.map_or(0.0, |pi| pi.tensor.max_abs()), k.map_or(0.0, |k| k.along_w.max_abs()));
     let gain = start.h * (sizes.0 + sizes.1);
     let share = |e: f64, size: f64| {
-        let r = d.dot(d) / (1e2 * gain * e.abs()).max(f64::MIN_POSITIVE);
+        let r = d.dot(d) / (1e6 * gain * e.abs()).max(f64::MIN_POSITIVE);
         if far(e, size) && r.is_finite() { e / (1.0 + r.powi(-2)) } else { 0.0 }
     };
     Recall {
         energy: share(energy, start.energy.abs()),
+        entropy: share(entropy, start.entropy.abs()),
         invariants: Dim::<Y>::array(|k| share(invariants[k], start.invariants[k].abs())),
     }
 }
@@ -293,10 +307,10 @@ fn recall<Y: Metriplectic>(system: &Y, start: &Start<'_, Y>, d: &Vector<Y::Manif
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Memory<N: Dimension> {
     /// The backward differences `∇ʲd` of the displacements, as far as they are `known`.
-    differences: [N::Vector<f64>; DIFFERENCES],
-    known: usize,
-    linearised: Option<Linearisation<N>>,
-    carry: Option<N::Vector<f64>>,
+    pub(crate) differences: [N::Vector<f64>; DIFFERENCES],
+    pub(crate) known: usize,
+    pub(crate) linearised: Option<Linearisation<N>>,
+    pub(crate) carry: Option<N::Vector<f64>>,
 }
 
 /// Displacements that are remembered.
@@ -304,12 +318,12 @@ const DIFFERENCES: usize = 8;
 
 /// The Jacobian of an earlier step, and what it was formed for.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Linearisation<N: Dimension> {
-    inverse: Inverse<N>,
-    sizes: Sizes,
-    h: f64,
-    length: f64,
-    steps: u32,
+pub(crate) struct Linearisation<N: Dimension> {
+    pub(crate) inverse: Inverse<N>,
+    pub(crate) sizes: Sizes,
+    pub(crate) h: f64,
+    pub(crate) length: f64,
+    pub(crate) steps: u32,
 }
 
 /// Steps after which a Jacobian is formed again, because the sizes of the terms may have changed.

@@ -2,15 +2,17 @@
 
 use approx::{AbsDiffEq, RelativeEq};
 use metriplectic_dynamics::velocity::{Covectors, Gradient, independence};
-use metriplectic_dynamics::{Dissipation, Invariants, Metriplectic, system::Point};
+use metriplectic_dynamics::{Dissipation, Invariants, Metriplectic, SecondLaw, system::Point};
 use metriplectic_fields::{ChartPoint, Column, Dimension, ScalarField, Space};
 use metriplectic_manifolds::{Cayley, Exponential, Manifold, Projection, Retraction, WeylMidpoint};
 
+use crate::adaptive::{self, Controller, Pace};
 use crate::certificate::{Certificate, Kept};
+use crate::checkpoint::{Checkpoint, ResumeError};
 use crate::discrete_gradient::{DiscreteGradient, Gonzalez};
 use crate::error::{RunError, StepError};
 use crate::residual::{Dim, Numbers, Recall};
-use crate::span::{Span, check_step_size};
+use crate::span::{Course, ROOM, Size, SpanError};
 use crate::step::{Memory, Scheme, Start, Work};
 
 /// A state of a run: time, point, and the two fields there.
@@ -19,7 +21,7 @@ use crate::step::{Memory, Scheme, Start, Work};
 pub struct State<M: Space> {
     /// Steps taken.
     pub step: usize,
-    /// The time `step · h`.
+    /// The time: `step · h` in steps of one size, their sum in others.
     pub time: f64,
     /// The point; serialized as the list of its entries, in the order of [`Manifold::entries`].
     #[cfg_attr(feature = "serde", serde(serialize_with = "entries::<M, _>"))]
@@ -38,19 +40,84 @@ fn entries<M: Manifold, S: serde::Serializer>(
     serializer.collect_seq(M::entries(point))
 }
 
-/// An endless iterator over the states of a run, in constant memory; ended by an error.
+/// How a run ended.
+///
+/// ```
+/// # use metriplectic_dynamics::System;
+/// # use metriplectic_fields::Real;
+/// # use metriplectic_integrators::{Ending, Run, Span};
+/// # use metriplectic_manifolds::{LieDual, WeylMidpoint};
+/// # use nalgebra::Vector3;
+/// # fn main() -> Result<(), metriplectic_integrators::Error> {
+/// # let body = System::on(LieDual::so3())
+/// #     .energy(|p: &Vector3<Real>| p.x * p.x * 0.5 + p.y * p.y + p.z * p.z * 1.5)
+/// #     .entropy(|p: &Vector3<Real>| p.norm_squared() * 0.5)
+/// #     .build()?;
+/// let span = Span::until(1e4).tolerance(1e-5).until_rest(1e-8);
+/// let run = WeylMidpoint.run(&body, Vector3::new(0.4, 0.5, 0.3), span)?;
+/// match run.ending() {
+///     Ending::Rest { speed, .. } => println!("at rest at t = {}, |x'| = {speed:.1e}", run.last().time),
+///     Ending::Span => println!("still moving at t = {}", run.last().time),
+///     _ => unreachable!("a run that stops is an error"),
+/// }
+/// # assert!(run.ending().is_rest() && run.last().time < 1e3);
+/// # Ok(())
+/// # }
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
+pub enum Ending {
+    /// It went the whole span.
+    Span,
+    /// The state came to rest: the speed `|Π dH + K dS|`, in the units of the point's entries, fell
+    /// below the tolerance times the largest speed of the run, or a step left every entry as it was.
+    Rest {
+        /// The speed at the end.
+        speed: f64,
+        /// The largest speed of the run, to which the tolerance is relative.
+        largest: f64,
+    },
+    /// It stopped on the way: a step failed, or nobody asked for the next.
+    Stopped,
+}
+
+impl Ending {
+    /// Whether the state came to rest.
+    pub const fn is_rest(&self) -> bool {
+        matches!(self, Self::Rest { .. })
+    }
+}
+
+/// The iterator over the states of a run after its start, in constant memory; ended by an error, or
+/// where its course ends. With a step size alone it is endless.
 ///
 /// Made by [`Scheme::steps`] or [`Run::steps`].
 #[derive(Debug)]
 pub struct Steps<'a, Y: Metriplectic, R, W = Gonzalez> {
-    scheme: Scheme<R, W>,
-    system: &'a Y,
-    h: f64,
-    state: State<Y::Manifold>,
-    invariants: Numbers<Y>,
-    memory: Memory<Dim<Y>>,
-    certificate: Certificate,
-    failed: bool,
+    pub(crate) scheme: Scheme<R, W>,
+    pub(crate) system: &'a Y,
+    pub(crate) progress: Progress,
+    pub(crate) state: State<Y::Manifold>,
+    pub(crate) invariants: Numbers<Y>,
+    /// The entropy after the last step that dissipated.
+    pub(crate) entropy: f64,
+    pub(crate) memory: Memory<Dim<Y>>,
+    pub(crate) certificate: Certificate,
+    pub(crate) failed: bool,
+}
+
+/// Where a run is on its course.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Progress {
+    pub(crate) pace: Pace,
+    pub(crate) count: Option<usize>,
+    pub(crate) every: usize,
+    /// The tolerance of rest.
+    pub(crate) rest: Option<f64>,
+    /// The largest speed so far, where rest is looked for.
+    pub(crate) largest_speed: f64,
+    pub(crate) ending: Option<Ending>,
 }
 
 impl<'a, Y, R, W> Steps<'a, Y, R, W>
@@ -59,7 +126,7 @@ where
     R: Retraction<Y::Manifold, Y::Metric>,
     W: DiscreteGradient,
 {
-    fn start(scheme: Scheme<R, W>, system: &'a Y, x0: Point<Y>, h: f64) -> Self {
+    fn start(scheme: Scheme<R, W>, system: &'a Y, x0: Point<Y>, course: Course) -> Self {
         let energy = system.energy_at(&x0);
         let entropy = system.entropy_at(&x0);
         let certificate = Certificate {
@@ -73,6 +140,9 @@ where
             invariants: Kept::of(system, &x0),
             max_manifold_defect: system.manifold().defect(&x0),
             steps: 0,
+            smallest_step: 0.0,
+            largest_step: 0.0,
+            rejected: 0,
             sweeps: 0,
             worst_sweeps: 0,
             retries: 0,
@@ -80,18 +150,28 @@ where
             second_law: system.second_law(),
             projected: system.dissipation().is_projected(),
         };
+        let Course { size, count, every, rest } = course;
+        let pace = match size {
+            Size::Fixed(h) => Pace::Fixed(h),
+            Size::Tolerance(until) => Pace::Adaptive(until.controller(system, &x0)),
+        };
+        let progress = Progress { pace, count, every, rest, largest_speed: 0.0, ending: None };
         let invariants = values(system, &x0);
         let state = State { step: 0, time: 0.0, point: x0, energy, entropy };
-        Self {
+        let memory = Memory::new();
+        let mut steps = Self {
             scheme,
             system,
-            h,
+            progress,
             state,
             invariants,
-            memory: Memory::new(),
+            entropy,
+            memory,
             certificate,
             failed: false,
-        }
+        };
+        steps.rest(true);
+        steps
     }
 
     /// The state reached so far.
@@ -104,41 +184,134 @@ where
         &self.certificate
     }
 
-    /// Takes one step.
+    /// How the run ended; `None` as long as there are steps to take.
+    pub const fn ending(&self) -> Option<Ending> {
+        if self.failed { Some(Ending::Stopped) } else { self.progress.ending }
+    }
+
+    /// Takes one step. A run that has [ended](Self::ending) stays where it is.
     ///
     /// # Errors
     ///
     /// [`StepError`]; the state is then the last one reached.
     pub fn advance(&mut self) -> Result<&State<Y::Manifold>, StepError> {
-        let start = Start {
-            x: &self.state.point,
-            time: self.state.time,
-            h: self.h,
-            energy: self.state.energy,
-            invariants: self.invariants,
-            left_over: Recall {
-                energy: self.state.energy - self.certificate.initial_energy,
-                invariants: Dim::<Y>::array(|k| {
-                    let kept = self.certificate.invariants.get(k);
-                    kept.map_or(0.0, |kept| self.invariants[k] - kept.initial)
-                }),
-            },
-        };
-        let (point, work) = self.scheme.step(self.system, &start, &mut self.memory)?;
+        if self.progress.ending.is_some() {
+            return Ok(&self.state);
+        }
         let step = self.state.step + 1;
+        let Taken { point, work, h, time } = match self.progress.pace {
+            Pace::Fixed(h) => {
+                let (scheme, system) = (&self.scheme, self.system);
+                let kept = (&self.invariants, self.entropy);
+                let start = from(&self.state, kept, &self.certificate, h);
+                let (point, work) = scheme.step(system, &start, &mut self.memory)?;
+                Taken { point, work, h, time: step as f64 * h }
+            }
+            Pace::Adaptive(controller) => self.controlled(controller)?,
+        };
         let next = State {
             step,
-            time: step as f64 * self.h,
+            time,
             energy: self.system.energy_at(&point),
             entropy: self.system.entropy_at(&point),
             point,
         };
-        self.account(&next, work);
+        self.account(&next, work, h);
+        if work.dissipates {
+            self.entropy = next.entropy;
+        }
         let before = std::mem::replace(&mut self.state, next);
         if Y::Invariants::COUNT > 0 {
             self.account_invariants(&before)?;
         }
+        let over = match self.progress.pace {
+            Pace::Fixed(_) => self.progress.count.is_some_and(|count| step >= count),
+            Pace::Adaptive(Controller { end, .. }) => self.state.time >= end,
+        };
+        if over {
+            self.progress.ending = Some(Ending::Span);
+        }
+        self.rest(self.state.point != before.point);
         Ok(&self.state)
+    }
+
+    /// Tries steps until the controller accepts one. Not part of the loop over steps of one size, which
+    /// is compiled for every system.
+    #[inline(never)]
+    fn controlled(&mut self, mut controller: Controller) -> Result<Taken<Y>, StepError> {
+        let (system, time, mut work) = (self.system, self.state.time, Work::default());
+        loop {
+            let (h, last) = controller.attempt(time);
+            if controller.next < controller.least && !last {
+                let (h, least) = (controller.next, controller.least);
+                return Err(StepError::TooSmall { time, h, least });
+            }
+            let ratio = controller.taken.map_or(1.0, |taken| h / taken);
+            let mut memory = self.memory.rescaled(ratio);
+            work.entropy_slope = f64::INFINITY;
+            let kept = (&self.invariants, self.entropy);
+            let start = from::<Y>(&self.state, kept, &self.certificate, h);
+            let end = self.scheme.attempt(system, &start, &mut memory, &mut work).ok();
+            let error = end.as_ref().and_then(|end| controller.error_of(system, start.x, end, h));
+            match (end, error) {
+                (Some(point), Some(error)) if error <= 1.0 => {
+                    controller.accept(h, error);
+                    self.memory = memory;
+                    self.progress.pace = Pace::Adaptive(controller);
+                    let time = if last { controller.end } else { time + h };
+                    return Ok(Taken { point, work, h, time });
+                }
+                (_, error) => {
+                    controller.reject(h, error);
+                    self.certificate.rejected += 1;
+                }
+            }
+        }
+    }
+
+    /// Ends the run if the state is at rest.
+    fn rest(&mut self, moved: bool) {
+        let Some(tolerance) = self.progress.rest else { return };
+        let x = &self.state.point;
+        let Ok(v) = self.system.velocity(&ChartPoint::centre(x)) else { return };
+        let speed = adaptive::speed::<Y>(x, &v);
+        let largest = self.progress.largest_speed.max(speed);
+        self.progress.largest_speed = largest;
+        if !moved || speed <= tolerance * largest {
+            self.progress.ending = Some(Ending::Rest { speed, largest });
+        }
+    }
+
+    /// Takes all steps that are left, and records the states from here on.
+    ///
+    /// # Errors
+    ///
+    /// [`RunError::Step`] if a step failed, with the trajectory so far;
+    /// [`SpanError::Endless`] if the course has no end.
+    pub fn run(mut self) -> Result<Trajectory<Y::Manifold>, RunError<Y::Manifold>> {
+        let Progress { count, every, pace, .. } = self.progress;
+        if count.is_none() && matches!(pace, Pace::Fixed(_)) {
+            return Err(SpanError::Endless.into());
+        }
+        let room = count.map_or(ROOM, |count| (count - self.state.step.min(count)) / every);
+        let mut states = Vec::with_capacity(room.min(ROOM) + 2);
+        states.push(self.state.clone());
+        let mut failure = None;
+        while self.progress.ending.is_none() && failure.is_none() {
+            failure = self.advance().err();
+            let state = &self.state;
+            let due = state.step.is_multiple_of(every) && failure.is_none();
+            let over = self.progress.ending.is_some() || failure.is_some();
+            if (due || over) && states.last().is_none_or(|last| last.step != state.step) {
+                states.push(state.clone());
+            }
+        }
+        let ending = self.progress.ending.unwrap_or(Ending::Stopped);
+        let trajectory = Trajectory { states, certificate: self.certificate, ending };
+        match failure {
+            Some(cause) => Err(RunError::Step { cause, trajectory: Box::new(trajectory) }),
+            None => Ok(trajectory),
+        }
     }
 
     /// Enters the further invariants into the certificate.
@@ -168,8 +341,10 @@ where
     }
 
     /// Enters a step into the certificate.
-    fn account(&mut self, next: &State<Y::Manifold>, work: Work) {
+    fn account(&mut self, next: &State<Y::Manifold>, work: Work, h: f64) {
         let c = &mut self.certificate;
+        c.smallest_step = if c.steps == 0 { h } else { c.smallest_step.min(h) };
+        c.largest_step = c.largest_step.max(h);
         c.max_energy_error = c.max_energy_error.max((next.energy - c.initial_energy).abs());
         let increment = next.entropy - self.state.entropy;
         c.min_entropy_increment =
@@ -186,6 +361,40 @@ where
         c.worst_sweeps = c.worst_sweeps.max(work.sweeps);
         c.retries += work.splits;
         c.globalised += work.globalised;
+    }
+}
+
+/// A step that was taken.
+struct Taken<Y: Metriplectic> {
+    point: Point<Y>,
+    work: Work,
+    h: f64,
+    time: f64,
+}
+
+/// Where the next step starts, with the further invariants there and the entropy that is kept.
+fn from<'a, Y: Metriplectic>(
+    state: &'a State<Y::Manifold>,
+    (invariants, entropy): (&Numbers<Y>, f64),
+    certificate: &Certificate,
+    h: f64,
+) -> Start<'a, Y> {
+    let exact = certificate.second_law == SecondLaw::Exact;
+    Start {
+        x: &state.point,
+        time: state.time,
+        h,
+        energy: state.energy,
+        entropy: state.entropy,
+        invariants: *invariants,
+        left_over: Recall {
+            energy: state.energy - certificate.initial_energy,
+            entropy: if exact { state.entropy - entropy } else { 0.0 },
+            invariants: Dim::<Y>::array(|k| {
+                let kept = certificate.invariants.get(k);
+                kept.map_or(0.0, |kept| invariants[k] - kept.initial)
+            }),
+        },
     }
 }
 
@@ -225,7 +434,7 @@ where
     type Item = Result<State<Y::Manifold>, StepError>;
 
     fn next(&mut self) -> Option<Self::Item> {
-        if self.failed {
+        if self.ending().is_some() {
             return None;
         }
         let advanced = self.advance().cloned();
@@ -240,6 +449,7 @@ where
 pub struct Trajectory<M: Manifold> {
     states: Vec<State<M>>,
     certificate: Certificate,
+    ending: Ending,
 }
 
 impl<M: Manifold> Trajectory<M> {
@@ -256,6 +466,11 @@ impl<M: Manifold> Trajectory<M> {
     /// The balance of the run, over all of its steps, recorded or not.
     pub const fn certificate(&self) -> &Certificate {
         &self.certificate
+    }
+
+    /// How the run ended.
+    pub const fn ending(&self) -> Ending {
+        self.ending
     }
 
     /// The recorded states in order.
@@ -309,27 +524,29 @@ where
 }
 
 impl<R, W: DiscreteGradient> Scheme<R, W> {
-    /// Verifies the model and starts an endless run in steps of size `h`.
+    /// Verifies the model and starts a run: endless in steps of size `h`, or over a [`Span`] or
+    /// [`Until`](crate::Until).
     ///
     /// # Errors
     ///
-    /// [`RunError`] if the model breaks a law or `h` is not a positive finite number.
+    /// [`RunError`] if the model breaks a law or the course cannot be run.
     pub fn steps<Y>(
         self,
         system: &Y,
         x0: Point<Y>,
-        h: f64,
+        course: impl Into<Course>,
     ) -> Result<Steps<'_, Y, R, W>, RunError<Y::Manifold>>
     where
         Y: Metriplectic,
         R: Retraction<Y::Manifold, Y::Metric>,
     {
-        check_step_size(h)?;
+        let course = course.into();
+        course.check()?;
         system.report(&x0).verdict?;
-        Ok(Steps::start(self, system, x0, h))
+        Ok(Steps::start(self, system, x0, course))
     }
 
-    /// Verifies the model, runs it over a span, and records the states.
+    /// Verifies the model, runs it over a [`Span`] or [`Until`](crate::Until), and records the states.
     ///
     /// # Errors
     ///
@@ -338,31 +555,13 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
         self,
         system: &Y,
         x0: Point<Y>,
-        span: Span,
+        course: impl Into<Course>,
     ) -> Result<Trajectory<Y::Manifold>, RunError<Y::Manifold>>
     where
         Y: Metriplectic,
         R: Retraction<Y::Manifold, Y::Metric>,
     {
-        span.check()?;
-        let mut steps = self.steps(system, x0, span.step_size())?;
-        let mut states = Vec::with_capacity(span.room());
-        states.push(steps.state().clone());
-        for step in 1..=span.count() {
-            match steps.advance() {
-                Ok(state) if span.records(step) => states.push(state.clone()),
-                Ok(_) => {}
-                Err(cause) => {
-                    if states.last().is_none_or(|last| last.step != steps.state().step) {
-                        states.push(steps.state().clone());
-                    }
-                    let certificate = steps.certificate().clone();
-                    let trajectory = Box::new(Trajectory { states, certificate });
-                    return Err(RunError::Step { cause, trajectory });
-                }
-            }
-        }
-        Ok(Trajectory { states, certificate: steps.certificate().clone() })
+        self.steps(system, x0, course)?.run()
     }
 }
 
@@ -380,13 +579,13 @@ pub trait Run: Sized {
         self,
         system: &Y,
         x0: Point<Y>,
-        span: Span,
+        course: impl Into<Course>,
     ) -> Result<Trajectory<Y::Manifold>, RunError<Y::Manifold>>
     where
         Y: Metriplectic,
         Self: Retraction<Y::Manifold, Y::Metric>,
     {
-        Scheme::new(self).run(system, x0, span)
+        Scheme::new(self).run(system, x0, course)
     }
 
     /// [`Scheme::steps`] with the defaults.
@@ -398,13 +597,30 @@ pub trait Run: Sized {
         self,
         system: &Y,
         x0: Point<Y>,
-        h: f64,
+        course: impl Into<Course>,
     ) -> Result<Steps<'_, Y, Self>, RunError<Y::Manifold>>
     where
         Y: Metriplectic,
         Self: Retraction<Y::Manifold, Y::Metric>,
     {
-        Scheme::new(self).steps(system, x0, h)
+        Scheme::new(self).steps(system, x0, course)
+    }
+
+    /// [`Scheme::resume`] with the defaults.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Scheme::resume`].
+    fn resume<'a, Y>(
+        self,
+        system: &'a Y,
+        checkpoint: &Checkpoint,
+    ) -> Result<Steps<'a, Y, Self>, ResumeError>
+    where
+        Y: Metriplectic,
+        Self: Retraction<Y::Manifold, Y::Metric>,
+    {
+        Scheme::new(self).resume(system, checkpoint)
     }
 }
 
@@ -416,6 +632,7 @@ impl Run for Cayley {}
 #[cfg(all(test, feature = "serde"))]
 mod tests {
     use super::*;
+    use crate::Span;
     use metriplectic_dynamics::System;
     use metriplectic_fields::Real;
     use metriplectic_manifolds::Rotations;

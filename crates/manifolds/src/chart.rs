@@ -108,6 +108,10 @@ impl<const N: usize> Manifold for Chart<N> {
         x.iter().copied().collect()
     }
 
+    fn assemble(next: &mut impl FnMut() -> f64) -> SVector<f64, N> {
+        Column::from_index(|_| next())
+    }
+
     #[inline]
     fn magnitude(x: &SVector<f64, N>) -> f64 {
         Column::magnitude(x)

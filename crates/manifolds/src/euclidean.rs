@@ -94,6 +94,10 @@ macro_rules! vector_space {
                 x.iter().copied().collect()
             }
 
+            fn assemble(next: &mut impl FnMut() -> f64) -> SVector<f64, N> {
+                Column::from_index(|_| next())
+            }
+
             #[inline]
             fn magnitude(x: &SVector<f64, N>) -> f64 {
                 Column::magnitude(x)

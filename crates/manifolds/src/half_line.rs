@@ -74,6 +74,10 @@ impl Manifold for HalfLine {
         vec![x.x]
     }
 
+    fn assemble(next: &mut impl FnMut() -> f64) -> Vector1<f64> {
+        Vector1::new(next())
+    }
+
     #[inline]
     fn magnitude(x: &Vector1<f64>) -> f64 {
         x.x.abs()

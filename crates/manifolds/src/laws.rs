@@ -20,7 +20,8 @@ fn round_off<M: Manifold>(scale: f64) -> f64 {
 ///
 /// 1. `φ_x(0) = x`;
 /// 2. `φ_x⁻¹(φ_x(q)) = q`, and the chain rule gives the identity at dual numbers;
-/// 3. `seeds` are the chart at dual numbers; 4. `φ_x(q)` lies on the manifold.
+/// 3. `seeds` are the chart at dual numbers; 4. `φ_x(q)` lies on the manifold; 5. a point read from
+///    its entries is that point, bit for bit.
 ///
 /// # Errors
 ///
@@ -51,7 +52,15 @@ pub fn manifold<M: Manifold>(space: &M, x: &M::Point<f64>, q: &Vector<M>) -> Res
         }
     }
     let allowed = round_off::<M>(M::magnitude(&y));
-    BrokenLaw::unless("chart points lie on the manifold", space.defect(&y), allowed)
+    BrokenLaw::unless("chart points lie on the manifold", space.defect(&y), allowed)?;
+    let entries = M::entries(&y);
+    let mut left = entries.iter().copied();
+    let read = M::entries(&M::assemble(&mut || left.next().unwrap_or(f64::NAN)));
+    let same = left.next().is_none()
+        && read.len() == entries.len()
+        && read.iter().zip(&entries).all(|(a, b)| a.to_bits() == b.to_bits());
+    let off = if same { 0.0 } else { f64::INFINITY };
+    BrokenLaw::unless("a point is what its entries make", off, 0.0)
 }
 
 /// Checks a metric at `x` along the tangent vector `v`:

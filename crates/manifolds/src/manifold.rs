@@ -9,7 +9,8 @@ use rand::Rng;
 /// its entries are (the scale of round-off), and draws random points for the checks of a model.
 ///
 /// Laws ([`laws::manifold`](crate::laws::manifold)): 1. `φ_x(0) = x`; 2. `φ_x⁻¹(φ_x(q)) = q`, at
-/// dual numbers too; 3. chart points and random points lie on the manifold.
+/// dual numbers too; 3. chart points and random points lie on the manifold; 4. a point that is read
+/// from its entries is the same point, bit for bit.
 pub trait Manifold: Space {
     /// How far the point is off the manifold, in the units of its entries: 0 where every array of
     /// numbers is a point, NaN or infinite if an entry is.
@@ -17,6 +18,40 @@ pub trait Manifold: Space {
 
     /// The entries of the point, in the order in which it is written.
     fn entries(x: &Self::Point<f64>) -> Vec<f64>;
+
+    /// The point whose entries are `next()`, `next()`, … in the order of [`entries`](Self::entries);
+    /// it asks for as many as a point has. Unchecked: [`from_entries`](Self::from_entries) is for
+    /// numbers that come from elsewhere.
+    fn assemble(next: &mut impl FnMut() -> f64) -> Self::Point<f64>;
+
+    /// The point with these entries, the inverse of [`entries`](Self::entries).
+    ///
+    /// ```
+    /// use metriplectic_manifolds::{Manifold, PointError, Sphere};
+    /// let sphere = Sphere::<2>::round();
+    /// assert_eq!(sphere.from_entries(&[0.6, 0.0, 0.8])?.z, 0.8);
+    /// assert!(matches!(sphere.from_entries(&[0.6, 0.8]), Err(PointError::Length { .. })));
+    /// assert!(matches!(sphere.from_entries(&[1.0, 1.0, 1.0]), Err(PointError::OffManifold { .. })));
+    /// # Ok::<(), PointError>(())
+    /// ```
+    ///
+    /// # Errors
+    ///
+    /// [`PointError::Length`] if there are too few or too many, and those of
+    /// [`check`](Self::check).
+    #[expect(clippy::wrong_self_convention, reason = "the space knows which points are its own")]
+    fn from_entries(&self, entries: &[f64]) -> Result<Self::Point<f64>, PointError> {
+        let mut asked = 0;
+        let point = Self::assemble(&mut || {
+            asked += 1;
+            entries.get(asked - 1).copied().unwrap_or(0.0)
+        });
+        if asked != entries.len() {
+            return Err(PointError::Length { found: entries.len(), expected: asked });
+        }
+        self.check(&point)?;
+        Ok(point)
+    }
 
     /// The size `|x|` of the entries, which sets the scale of round-off.
     fn magnitude(x: &Self::Point<f64>) -> f64;
@@ -73,6 +108,14 @@ pub enum PointError {
         index: usize,
         /// Its value.
         value: f64,
+    },
+    /// A list of entries has another length than a point.
+    #[error("{found} entries do not make a point, which has {expected}")]
+    Length {
+        /// How many there are.
+        found: usize,
+        /// How many a point has.
+        expected: usize,
     },
     /// The point is not in the domain of the chart.
     #[error("the point is outside the domain of its chart; start inside")]

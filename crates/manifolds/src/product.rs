@@ -161,6 +161,10 @@ impl<A: Manifold + Times<B>, B: Manifold> Manifold for Product<A, B> {
         entries
     }
 
+    fn assemble(next: &mut impl FnMut() -> f64) -> Self::Point<f64> {
+        (A::assemble(next), B::assemble(next))
+    }
+
     #[inline]
     fn magnitude((a, b): &Self::Point<f64>) -> f64 {
         A::magnitude(a).hypot(B::magnitude(b))

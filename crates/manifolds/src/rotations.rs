@@ -282,6 +282,10 @@ impl Manifold for Rotations {
         x.transpose().iter().copied().collect()
     }
 
+    fn assemble(next: &mut impl FnMut() -> f64) -> Matrix3<f64> {
+        Matrix3::from_fn(|_, _| next()).transpose()
+    }
+
     #[inline]
     fn magnitude(_: &Matrix3<f64>) -> f64 {
         1.0

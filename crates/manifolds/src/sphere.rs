@@ -229,6 +229,10 @@ macro_rules! sphere {
                 x.iter().copied().collect()
             }
 
+            fn assemble(next: &mut impl FnMut() -> f64) -> SVector<f64, $a> {
+                SVector::<f64, $a>::from_fn(|_, _| next())
+            }
+
             #[inline]
             fn magnitude(_: &SVector<f64, $a>) -> f64 {
                 1.0

@@ -13,6 +13,7 @@
 //! | [`table`] | what does the study say, in rows? | [`Table`]: plain text and Markdown |
 //! | [`plot`] | what does it look like? | [`Panels`] of lines, with a [`Globe`] beside them, and [`LogLog`]: SVG, the same bytes every time |
 //! | [`gallery`] | where do the pictures and the words of an example go? | [`Options`], [`Gallery`], [`Progress`], [`print()`], [`write_csv`] |
+//! | [`interrupt`] | has Ctrl-C been pressed? | [`interrupted()`]: a long run stops where its file is whole |
 //!
 //! # Example
 //!
@@ -44,6 +45,7 @@
 pub mod convergence;
 pub mod drift;
 pub mod gallery;
+pub mod interrupt;
 pub mod order;
 pub mod plot;
 pub mod problems;
@@ -62,6 +64,7 @@ mod student;
 pub use convergence::Convergence;
 pub use drift::{Drift, Growth, Slope};
 pub use gallery::{Gallery, GalleryError, Options, Progress, print, write_csv};
+pub use interrupt::interrupted;
 pub use order::{Order, OrderError};
 pub use plot::{Globe, LogLog, Panel, Panels, PlotError};
 pub use published::Published;

@@ -1,7 +1,8 @@
 //! The problems that orders and energies are measured on: every manifold, bracket and kind of metric,
 //! none of them linear or separable.
 //!
-//! A problem is visited by a [`Study`], because each is of a type of its own.
+//! A problem is visited by a [`Study`], because each is of a type of its own. The functions that visit all
+//! of them are marked `#[inline]`: their code is large, and is made where it is called, not here.
 
 use std::f64::consts::FRAC_1_SQRT_2;
 
@@ -105,6 +106,7 @@ impl Orders {
     }
 
     /// All of them.
+    #[inline]
     pub fn of_every_problem() -> Self {
         let mut all = Self::canonical();
         for part in [Self::closures(), Self::products()] {
@@ -117,6 +119,7 @@ impl Orders {
     }
 
     /// Those of canonical metrics, with geodesics in closed form.
+    #[inline]
     pub fn canonical() -> Self {
         let mut orders = Self::new(40);
         canonical(&mut orders);
@@ -124,6 +127,7 @@ impl Orders {
     }
 
     /// Those of metrics from closures, with numerical geodesics.
+    #[inline]
     pub fn closures() -> Self {
         let mut orders = Self::new(15);
         closures(&mut orders);
@@ -131,6 +135,7 @@ impl Orders {
     }
 
     /// Those of products.
+    #[inline]
     pub fn products() -> Self {
         let mut orders = Self::new(15);
         products(&mut orders);
@@ -153,6 +158,7 @@ pub struct LargeSteps {
 
 impl LargeSteps {
     /// Those of every problem.
+    #[inline]
     pub fn of_every_problem() -> Self {
         let mut study = Self::default();
         each(&mut study);
@@ -250,6 +256,7 @@ pub struct Comparison {
 
 impl SecondLaws {
     /// `steps` steps of size `h` on every problem.
+    #[inline]
     pub fn of_every_problem(h: f64, steps: usize) -> Self {
         struct Runs(SecondLaws, f64, usize);
         impl Study for Runs {

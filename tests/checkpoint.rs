@@ -1,0 +1,227 @@
+//! A run that is put down and taken up again, and a run that is taken twice: the same bits.
+
+mod models;
+
+use metriplectic::integrators::{Checkpoint, Course, ResumeError, Steps};
+use metriplectic::manifolds::PointError;
+use metriplectic::prelude::*;
+use models::{TUMBLING, UNSTABLE, free_body, half_square, relaxing_body, top};
+
+type Start<Y> = <<Y as Metriplectic>::Manifold as metriplectic::fields::Space>::Point<f64>;
+
+/// The bits of a state.
+fn bits<M: Manifold>(state: &State<M>) -> Vec<u64> {
+    let laws = [state.time, state.energy, state.entropy];
+    let numbers = M::entries(&state.point).into_iter().chain(laws).map(f64::to_bits);
+    numbers.chain([state.step as u64]).collect()
+}
+
+/// All states of a run from where it is.
+fn rest<Y: Metriplectic>(steps: &mut Steps<'_, Y, WeylMidpoint>) -> Vec<Vec<u64>>
+where
+    WeylMidpoint: Retraction<Y::Manifold, Y::Metric>,
+{
+    steps.map(|state| bits(&state.expect("every step is solved"))).collect()
+}
+
+/// A checkpoint that went through a file.
+fn through_a_file(checkpoint: &Checkpoint) -> Checkpoint {
+    if cfg!(feature = "serde") {
+        let text = serde_json::to_string(checkpoint).expect("it is written");
+        let read = serde_json::from_str(&text).expect("it is read");
+        assert_eq!(&read, checkpoint);
+        // Reading it as a tree, as a program that adds a field of its own does, costs no digit.
+        let tree: serde_json::Value = serde_json::from_str(&text).expect("it is read");
+        assert_eq!(&serde_json::from_value::<Checkpoint>(tree).expect("it is read"), checkpoint);
+        read
+    } else {
+        checkpoint.clone()
+    }
+}
+
+/// Puts a run down at several places and takes it up again.
+fn resumes<Y: Metriplectic>(name: &str, system: &Y, x0: Start<Y>, course: impl Into<Course> + Copy)
+where
+    WeylMidpoint: Retraction<Y::Manifold, Y::Metric>,
+{
+    let mut whole =
+        WeylMidpoint.steps(system, x0.clone(), course).expect("the model keeps its laws");
+    let expected = rest(&mut whole);
+    assert!(expected.len() > 20, "{name}: {} steps", expected.len());
+    for put_down in [0, 1, 2, 3, 10, expected.len() - 1, expected.len()] {
+        let mut steps = WeylMidpoint.steps(system, x0.clone(), course).expect("as before");
+        for _ in 0..put_down {
+            steps.advance().expect("every step is solved");
+        }
+        let checkpoint = through_a_file(&steps.checkpoint());
+        drop(steps);
+        let mut resumed = WeylMidpoint.resume(system, &checkpoint).expect("it is the same system");
+        assert_eq!(resumed.checkpoint(), checkpoint, "{name} at {put_down}");
+        assert!(rest(&mut resumed) == expected[put_down..], "{name} at {put_down}");
+        assert_eq!(resumed.certificate(), whole.certificate(), "{name} at {put_down}");
+        assert_eq!(resumed.ending(), whole.ending(), "{name} at {put_down}");
+        // Down to what the next step would be guessed from.
+        assert_eq!(resumed.checkpoint(), whole.checkpoint(), "{name} at {put_down}");
+    }
+}
+
+/// With steps of one size, and with those of a controller.
+fn resumes_both<Y: Metriplectic>(name: &str, system: &Y, x0: Start<Y>)
+where
+    WeylMidpoint: Retraction<Y::Manifold, Y::Metric>,
+{
+    resumes(name, system, x0.clone(), Span::steps(0.07, 60));
+    resumes(name, system, x0, Span::until(4.0).tolerance(1e-4).until_rest(1e-12));
+}
+
+/// A spin with a bath.
+fn spin() -> impl Metriplectic<Manifold = Product<Sphere<2>, Euclidean<1>>, Metric = Canonical> {
+    System::on(Product(Sphere::<2>::round(), Euclidean::<1>))
+        .bracket((AreaForm, Zero))
+        .energy(|(n, s): &(Vector3<Real>, Vector1<Real>)| {
+            n.x.powi(2) * 0.25 - n.z + (s.x * 0.05).exp()
+        })
+        .entropy(|(_, s): &(Vector3<Real>, Vector1<Real>)| s.x)
+        .build()
+        .expect("the parts make a system")
+}
+
+const SPIN: (Vector3<f64>, Vector1<f64>) = (Vector3::new(0.48, 0.36, -0.8), Vector1::new(0.0));
+
+#[test]
+fn a_resumed_run_is_the_run() {
+    resumes_both("so(3)*", &relaxing_body(), vector![0.2, -1.0, 0.3]);
+    let system = System::on(Sphere::<2>::round()).bracket(AreaForm).energy(top).build().unwrap();
+    resumes_both("S²", &system, Vector3::from_element(3.0_f64.sqrt().recip()));
+    let group = System::on(Rotations::bi_invariant())
+        .bracket(Nambu::default())
+        .energy(|r: &Matrix3<Real>| r.m11 + r.m22 * 2.0 + r.m33 * 3.0 + r.m12 * r.m23 * 0.5)
+        .entropy(|r: &Matrix3<Real>| r.m13 - r.m21 * 0.5 + (r.m31 + r.m32).powi(2) * 0.25)
+        .build()
+        .unwrap();
+    resumes_both(
+        "SO(3)",
+        &group,
+        Rotations::bi_invariant().from_quaternion([0.8, 0.3, -0.4, 0.33]),
+    );
+    resumes_both("S² × R", &spin(), SPIN);
+}
+
+#[test]
+fn a_resumed_run_with_a_further_invariant_is_the_run() {
+    let free = System::on(LieDual::so3())
+        .energy(|p: &Vector3<Real>| p.x.powi(2) * 0.5 + p.y.powi(2) * 0.25 + p.z.powi(4) * 0.2)
+        .casimir(half_square)
+        .build()
+        .unwrap();
+    resumes_both("so(3)*", &free, TUMBLING);
+    // A spring in the plane that is not linear, with its angular momentum.
+    let canonical = Matrix4::from_fn(|i, j| f64::from(j == i + 2) - f64::from(i == j + 2));
+    let spring = System::on(Euclidean::<4>)
+        .bracket(Poisson::constant(canonical).unwrap())
+        .energy(|x: &Vector4<Real>| {
+            let r = x.x.powi(2) + x.y.powi(2);
+            (x.z.powi(2) + x.w.powi(2) + r) * 0.5 + r.powi(2) * 0.25
+        })
+        .momentum(|x: &Vector4<Real>| x.x * x.w - x.y * x.z)
+        .build()
+        .unwrap();
+    resumes_both("R⁴", &spring, vector![1.0, 0.2, -0.3, 0.6]);
+}
+
+#[test]
+fn a_run_that_has_ended_stays_ended() {
+    let span = Span::until(1e4).tolerance(1e-4).until_rest(1e-8);
+    let mut steps = WeylMidpoint.steps(&relaxing_body(), UNSTABLE, span).unwrap().count();
+    assert!(steps > 10);
+    let body = relaxing_body();
+    let mut run = WeylMidpoint.steps(&body, UNSTABLE, span).unwrap();
+    while run.next().is_some() {
+        steps -= 1;
+    }
+    assert_eq!(steps, 0);
+    let mut resumed = WeylMidpoint.resume(&body, &through_a_file(&run.checkpoint())).unwrap();
+    assert!(resumed.ending().is_some_and(|ending| ending.is_rest()) && resumed.next().is_none());
+}
+
+#[test]
+fn a_checkpoint_of_another_system_is_refused() {
+    let (body, free) = (relaxing_body(), free_body());
+    let mut steps = WeylMidpoint.steps(&body, UNSTABLE, 0.1).unwrap();
+    steps.advance().unwrap();
+    let checkpoint = steps.checkpoint();
+    assert_eq!((checkpoint.step(), checkpoint.time()), (1, 0.1));
+    let refused = |error: Option<ResumeError>| error.expect("it is refused");
+    let error = refused(WeylMidpoint.resume(&free, &checkpoint).err());
+    assert!(matches!(error, ResumeError::AnotherSystem { field: "energy", .. }), "{error}");
+    let error = refused(WeylMidpoint.resume(&spin(), &checkpoint).err());
+    let expected = PointError::Length { found: 3, expected: 4 };
+    assert_eq!(error, ResumeError::Point(expected));
+    let sphere = System::on(Sphere::<2>::round()).bracket(AreaForm).energy(top).build().unwrap();
+    let mut steps = WeylMidpoint.steps(&body, vector![0.0, 0.5, 0.5], 0.1).unwrap();
+    steps.advance().unwrap();
+    let error = refused(WeylMidpoint.resume(&sphere, &steps.checkpoint()).err());
+    assert!(matches!(error, ResumeError::Point(PointError::OffManifold { .. })), "{error}");
+    let with = System::on(LieDual::so3())
+        .energy(models::kinetic(vector![10.0, 5.0, 1.0]))
+        .entropy(half_square)
+        .casimir(|p: &Vector3<Real>| p.norm_squared().powi(2))
+        .build()
+        .unwrap();
+    let error = refused(WeylMidpoint.resume(&with, &checkpoint).err());
+    assert!(matches!(error, ResumeError::Length { found: 0, expected: 1, .. }), "{error}");
+}
+
+#[test]
+fn a_damaged_checkpoint_is_refused() {
+    let body = relaxing_body();
+    let mut steps = WeylMidpoint.steps(&body, UNSTABLE, Span::until(1.0)).unwrap();
+    steps.advance().unwrap();
+    let tree = serde_json::to_value(steps.checkpoint()).unwrap();
+    let with = |change: &dyn Fn(&mut serde_json::Value)| {
+        let mut tree = tree.clone();
+        change(&mut tree);
+        let checkpoint = serde_json::from_value::<Checkpoint>(tree).ok()?;
+        WeylMidpoint.resume(&body, &checkpoint).err()
+    };
+    assert_eq!(with(&|_| ()), None);
+    let error = with(&|tree| tree["version"] = 7.into());
+    assert_eq!(error, Some(ResumeError::Version { found: 7, expected: 1 }));
+    let error = with(&|tree| tree["point"][1] = "NaN".into());
+    assert!(matches!(error, Some(ResumeError::Point(PointError::NotFinite { index: 1, .. }))));
+    let error = with(&|tree| tree["time"] = "-1.0".into());
+    assert!(matches!(error, Some(ResumeError::Damaged { what: "time", .. })));
+    let error = with(&|tree| tree["pace"]["Adaptive"]["next"] = "0.0".into());
+    assert!(matches!(error, Some(ResumeError::Damaged { what: "next step", .. })));
+    let error = with(&|tree| tree["every"] = 0.into());
+    assert!(matches!(error, Some(ResumeError::Damaged { .. })));
+    let error = with(&|tree| tree["carry"] = serde_json::json!(["0.0"]));
+    assert!(matches!(error, Some(ResumeError::Length { found: 1, expected: 3, .. })));
+    // What is no number, and what is no field, is not even read.
+    let mut unread = tree.clone();
+    unread["energy"] = "one".into();
+    assert!(serde_json::from_value::<Checkpoint>(unread).is_err());
+    let mut unread = tree.clone();
+    unread["enegry"] = "1.0".into();
+    assert!(serde_json::from_value::<Checkpoint>(unread).is_err());
+}
+
+#[test]
+fn the_same_inputs_give_the_same_bits() {
+    let whole = || {
+        let body = relaxing_body();
+        let fixed = WeylMidpoint.run(&body, UNSTABLE, Span::steps(0.1, 500)).unwrap();
+        let adaptive = WeylMidpoint.run(&body, UNSTABLE, Span::until(50.0)).unwrap();
+        let spin = WeylMidpoint.run(&spin(), SPIN, Span::until(5.0)).unwrap();
+        let bodies = fixed.iter().chain(&adaptive).map(bits);
+        let certificates = [fixed.certificate(), adaptive.certificate(), spin.certificate()];
+        let certificates = certificates.map(|certificate| format!("{certificate:?}"));
+        (bodies.chain(spin.iter().map(bits)).collect::<Vec<_>>(), certificates)
+    };
+    let once = whole();
+    assert!(once == whole(), "twice in one thread");
+    let threads = [0, 1].map(|_| std::thread::spawn(whole));
+    for thread in threads {
+        assert!(thread.join().expect("it runs") == once, "in another thread");
+    }
+}

@@ -1,0 +1,308 @@
+//! Further invariants: Casimirs, momenta, symmetries, and what is refused.
+
+mod models;
+
+use metriplectic::dynamics::BuildError;
+use metriplectic::prelude::*;
+use metriplectic_studies::Order;
+use metriplectic_studies::problems::flow;
+use models::kinetic;
+
+type State6 = SVector<Real, 6>;
+
+fn split(x: &State6) -> (Vector3<Real>, Vector3<Real>) {
+    (x.fixed_rows::<3>(0).into_owned(), x.fixed_rows::<3>(3).into_owned())
+}
+
+/// Heavy top on se(3)*: `H = ½ M·I⁻¹M + Γ·χ`.
+fn heavy(x: &State6) -> Real {
+    let (m, gamma) = split(x);
+    kinetic(vector![1.0, 1.5, 2.0])(&m) + gamma.x * 0.2 + gamma.z * 0.7
+}
+
+fn gamma_squared(x: &State6) -> Real {
+    split(x).1.norm_squared()
+}
+
+fn alignment(x: &State6) -> Real {
+    let (m, gamma) = split(x);
+    m.dot(&gamma)
+}
+
+const HEAVY: [f64; 6] = [0.4, -0.7, 0.9, 0.3, 0.5, 0.8];
+
+/// Orders on four step sizes, with certificates that must keep everything.
+fn order<Y: Metriplectic>(
+    system: &Y,
+    start: &<Y::Manifold as metriplectic::fields::Space>::Point<f64>,
+    time: f64,
+    coarsest: u32,
+) -> Order
+where
+    WeylMidpoint: Retraction<Y::Manifold, Y::Metric>,
+{
+    let exact = Y::Manifold::entries(&flow(system, start, time).expect("an exact flow"));
+    let (steps, errors): (Vec<f64>, Vec<f64>) = [1, 2, 4, 8]
+        .map(|k| k * coarsest)
+        .iter()
+        .map(|&n| {
+            let h = time / f64::from(n);
+            let run = WeylMidpoint.run(system, start.clone(), Span::steps(h, n as usize));
+            let run = run.expect("it runs");
+            let certificate = run.certificate();
+            assert!(certificate.keeps_energy() && certificate.keeps_invariants(), "{certificate}");
+            assert!(certificate.keeps_entropy(), "{certificate}");
+            let end = Y::Manifold::entries(&run.last().point);
+            let off = end.iter().zip(&exact).map(|(a, b)| (a - b).powi(2)).sum::<f64>();
+            (h, off.sqrt())
+        })
+        .unzip();
+    let order = Order::fit(&steps, &errors).expect("an order");
+    println!("errors {errors:?}, order {order}");
+    order
+}
+
+#[test]
+fn a_further_casimir_of_the_heavy_top_is_kept_at_second_order() {
+    // M·Γ is the entropy, |Γ|² a Casimir that friction leaves alone.
+    let system = System::on(LieDual::se3())
+        .energy(heavy)
+        .entropy(alignment)
+        .casimir(gamma_squared)
+        .dissipation(MetricDissipation::scaled(|_: &State6| Real::from(0.3)))
+        .build()
+        .unwrap();
+    let start = SVector::from(HEAVY);
+    assert!(order(&system, &start, 2.0, 20).agrees(2.0, 0.05));
+    let run = WeylMidpoint.run(&system, start, Span::steps(0.05, 20_000).at_most(2)).unwrap();
+    println!("{}", run.certificate());
+    assert!(run.certificate().keeps_invariants() && run.certificate().keeps_entropy());
+    assert!(run.certificate().entropy_gained > 0.1 && run.certificate().keeps_energy());
+    // Without it friction changes |Γ|².
+    let forgetful = System::on(LieDual::se3()).energy(heavy).entropy(alignment).build().unwrap();
+    let run = WeylMidpoint.run(&forgetful, start, Span::steps(0.05, 20)).unwrap();
+    let change = run.last().point.fixed_rows::<3>(3).norm_squared() - 0.98;
+    assert!(change.abs() > 1e-3, "{change}");
+}
+
+#[test]
+fn casimirs_of_a_hamiltonian_system_are_kept_on_a_curved_space_too() {
+    // A metric that varies has curved arcs, on which the midpoint rule keeps no quadratic function.
+    let metric = |x: &State6| {
+        let wave = SVector::<Real, 6>::from_fn(|i, _| (x[(i + 1) % 6] * 0.7).sin());
+        SMatrix::<Real, 6, 6>::identity() + wave * wave.transpose() * Real::from(0.5)
+    };
+    let top = || System::on(LieDual::se3()).metric(Metric::field(metric)).energy(heavy);
+    let (start, span) = (SVector::from(HEAVY), Span::steps(0.1, 100));
+    let kept = top().casimir(gamma_squared).casimir(alignment).build().unwrap();
+    let run = WeylMidpoint.run(&kept, start, span).unwrap();
+    println!("{}", run.certificate());
+    assert!(run.certificate().keeps_invariants() && run.certificate().keeps_energy());
+    let run = WeylMidpoint.run(&top().build().unwrap(), start, span).unwrap();
+    let change = run.last().point.fixed_rows::<3>(3).norm_squared() - 0.98;
+    assert!(change.abs() > 1e-6, "{change}");
+}
+
+/// The thermoelastic double pendulum (Romero 2009), all constants 1, as `(q₁, q₂, p₁, p₂, s₁, s₂)`.
+type State10 = SVector<Real, 10>;
+
+fn pair(x: &State10, i: usize) -> Vector2<Real> {
+    Vector2::new(x[i], x[i + 1])
+}
+
+fn stored(length: Real, s: Real) -> Real {
+    let stretch = length.ln();
+    stretch.powi(2) * 0.5 + stretch + (s - stretch).exp() - 1.0
+}
+
+fn pendulum_energy(x: &State10) -> Real {
+    let lengths =
+        [pair(x, 0).norm_squared().sqrt(), (pair(x, 2) - pair(x, 0)).norm_squared().sqrt()];
+    (pair(x, 4).norm_squared() + pair(x, 6).norm_squared()) * 0.5
+        + stored(lengths[0], x[8])
+        + stored(lengths[1], x[9])
+}
+
+fn angular_momentum(x: &State10) -> Real {
+    x[0] * x[5] - x[1] * x[4] + x[2] * x[7] - x[3] * x[6]
+}
+
+/// `q ↦ Q(t) q`, `p ↦ Q(t) p` for both masses.
+fn turned(t: Real, x: &State10) -> State10 {
+    let (sine, cosine) = (t.sin(), t.cos());
+    State10::from_fn(|i, _| match i {
+        8 | 9 => x[i],
+        i if i % 2 == 0 => x[i] * cosine - x[i + 1] * sine,
+        i => x[i] * cosine + x[i - 1] * sine,
+    })
+}
+
+fn pendulum_bracket() -> SMatrix<f64, 10, 10> {
+    let mut pi = SMatrix::zeros();
+    for i in 0..4 {
+        (pi[(i, i + 4)], pi[(i + 4, i)]) = (1.0, -1.0);
+    }
+    pi
+}
+
+fn heat_exchange(_: &State10, w: &State10) -> SMatrix<Real, 10, 10> {
+    // Temperatures are θᵢ = w_{sᵢ}; K = b bᵀ/(θ₁θ₂) with b = (θ₂, −θ₁) on the entropies.
+    let mut b = State10::zeros();
+    (b[8], b[9]) = (w[9], -w[8]);
+    b * b.transpose() * (w[8] * w[9]).recip()
+}
+
+const PENDULUM: [f64; 10] = [1.0, 0.0, 2.2, 0.0, 0.0, 2.0, 1.0, 0.0, 1.0, 0.2];
+
+#[test]
+fn the_angular_momentum_of_a_pendulum_is_kept_at_second_order() {
+    let system = System::on(Euclidean::<10>)
+        .bracket(Poisson::constant(pendulum_bracket()).unwrap())
+        .energy(pendulum_energy)
+        .entropy(|x: &State10| x[8] + x[9])
+        .dissipation(FieldDissipation(heat_exchange))
+        .symmetry(turned, angular_momentum)
+        .build()
+        .unwrap();
+    let start = SVector::from(PENDULUM);
+    let report = system.report(&start);
+    println!("{report}");
+    for law in ["⟨dJ, Π dH⟩ = 0", "K dL = 0", "H∘Φ = H", "Φ is Poisson", "Π dJ = Φ'"] {
+        assert!(
+            report.laws.iter().any(|residual| residual.law == law && residual.holds()),
+            "{law}"
+        );
+    }
+    assert!(order(&system, &start, 2.0, 40).agrees(2.0, 0.05));
+    // T = 40.
+    let run = WeylMidpoint.run(&system, start, Span::steps(0.05, 800)).unwrap();
+    let certificate = run.certificate();
+    println!("{certificate}");
+    assert!(certificate.max_relative_energy_error() <= 5e-14 / 4.4, "{certificate}");
+    assert!(certificate.invariants[0].max_error <= 5e-14 && certificate.keeps_entropy());
+    assert!((certificate.initial_energy - 4.435_059_592_089_027).abs() < 1e-14);
+    // S(40) from the data of the model, off by the error of second order.
+    assert!((run.last().entropy - 2.826_653_749_911_492).abs() < 2e-3, "{}", run.last().entropy);
+}
+
+/// A state of a free rigid body in space, on `T*SO(3)`, left-trivialised.
+type Frame = (Matrix3<Real>, Vector3<Real>);
+
+#[test]
+fn spatial_momenta_of_a_free_body_are_kept_and_reduction_commutes() {
+    let energy = kinetic(vector![1.0, 2.0, 3.0]);
+    let momentum = |i: usize| move |(r, p): &Frame| (r * p)[i];
+    let turn = |axis: Vector3<f64>| {
+        move |t: Real, (r, p): &Frame| {
+            let angle = Vector3::from_fn(|i, _| t * axis[i]);
+            (metriplectic::manifolds::rotations::exp(&angle) * r, *p)
+        }
+    };
+    let body = System::on(Product(Rotations::bi_invariant(), Euclidean::<3>))
+        .bracket(Symplectic)
+        .energy({
+            let energy = energy.clone();
+            move |(_, p): &Frame| energy(p)
+        })
+        .symmetry(turn(Vector3::x()), momentum(0))
+        .symmetry(turn(Vector3::y()), momentum(1))
+        .symmetry(turn(Vector3::z()), momentum(2))
+        .build()
+        .unwrap();
+    let p0 = vector![1.0, 0.3, 0.8];
+    let start = (metriplectic::manifolds::rotations::exp(&vector![0.3, -0.2, 0.5]), p0);
+    let reduced = System::on(LieDual::so3()).energy(energy).build().unwrap();
+    let errors = [50, 100, 200, 400].map(|n| {
+        let span = Span::steps(5.0 / f64::from(n), n as usize);
+        let run = WeylMidpoint.run(&body, start, span).unwrap();
+        let certificate = run.certificate();
+        assert!(certificate.keeps_energy() && certificate.keeps_invariants(), "{certificate}");
+        let projected = WeylMidpoint.run(&reduced, p0, span).unwrap();
+        let pairs = run.iter().zip(&projected);
+        pairs.map(|(a, b)| (a.point.1 - b.point).norm()).fold(0.0, f64::max)
+    });
+    let order = Order::fit(&[0.1, 0.05, 0.025, 0.0125], &errors).unwrap();
+    println!("reduction commutes up to {errors:?}, order {order}");
+    // Both have order 2; so has their difference, unless it is round-off.
+    assert!(order.agrees(2.0, 0.05) || errors[0] < 1e-12, "{order}");
+}
+
+#[test]
+fn mistakes_in_the_list_are_refused_with_numbers() {
+    let top = || System::on(LieDual::se3()).energy(heavy).entropy(alignment);
+    let start = SVector::from(HEAVY);
+    macro_rules! refused {
+        ($system:expr) => {
+            match WeylMidpoint.run(&$system.build().unwrap(), start, Span::steps(0.1, 1)) {
+                Err(RunError::Model(error)) => {
+                    println!("{error}");
+                    error
+                }
+                other => panic!("{:?}", other.map(|run| run.certificate().clone())),
+            }
+        };
+    }
+    // Not a Casimir; it says what else it may be.
+    let error = refused!(top().casimir(|x: &State6| x[0] + x[3]));
+    assert!(matches!(error, ModelError::NotCasimir { size, .. } if size > 0.1));
+    assert!(error.to_string().contains(".momentum(..)"));
+    // Not conserved.
+    let error = refused!(top().momentum(|x: &State6| x[2]));
+    assert!(matches!(error, ModelError::NotMomentum { size, .. } if size > 1e-3));
+    // A function of the entropy, and of the energy.
+    let error = refused!(top().casimir(|x: &State6| alignment(x).powi(2)));
+    assert!(matches!(error, ModelError::DependentInvariant { index: 0, share } if share < 1e-8));
+    let error = refused!(top().casimir(gamma_squared).momentum(|x: &State6| heavy(x) * 2.0));
+    assert!(matches!(error, ModelError::DependentInvariant { index: 1, share } if share < 1e-8));
+    // A dissipation of one's own that changes it.
+    let friction = CasimirDissipation::new(LieDual::se3().algebra(), SMatrix::identity()).unwrap();
+    let error = refused!(top().dissipation(friction).momentum(|x: &State6| heavy(x) + x[0]));
+    assert!(matches!(error, ModelError::NotMomentum { .. }), "{error}");
+    // A derivative that is not a number.
+    let error =
+        refused!(top().casimir(|x: &State6| gamma_squared(x) + (x[0] - HEAVY[0]).powi(2).sqrt()));
+    assert!(matches!(error, ModelError::DerivativeNotFinite { field: "invariant", .. }), "{error}");
+    // Nothing is left to move.
+    let crowd = System::on(Euclidean::<2>)
+        .bracket(Poisson::constant(Matrix2::new(0.0, 1.0, -1.0, 0.0)).unwrap())
+        .energy(|x: &Vector2<Real>| x.norm_squared())
+        .momentum(|x: &Vector2<Real>| x.x)
+        .momentum(|x: &Vector2<Real>| x.y)
+        .build();
+    assert!(matches!(crowd, Err(BuildError::TooManyInvariants { count: 2, dimension: 2 })));
+}
+
+#[test]
+fn an_action_that_is_no_symmetry_is_refused() {
+    let system = |action: fn(Real, &State10) -> State10, energy: fn(&State10) -> Real| {
+        let system = System::on(Euclidean::<10>)
+            .bracket(Poisson::constant(pendulum_bracket()).unwrap())
+            .energy(energy)
+            .entropy(|x: &State10| x[8] + x[9])
+            .dissipation(FieldDissipation(heat_exchange))
+            .symmetry(action, angular_momentum)
+            .build()
+            .unwrap();
+        WeylMidpoint.run(&system, SVector::from(PENDULUM), Span::steps(0.05, 1)).map(|_| ())
+    };
+    assert!(system(turned, pendulum_energy).is_ok());
+    let error = system(|t, x| turned(-t, x), pendulum_energy).unwrap_err();
+    assert!(matches!(error, RunError::Model(ModelError::ActionNotOfMomentum { .. })), "{error}");
+    let error = system(|t, x| x * (t + 1.0), pendulum_energy).unwrap_err();
+    assert!(matches!(error, RunError::Model(ModelError::EnergyNotSymmetric { .. })), "{error}");
+    let scaled = |t: Real, x: &State10| {
+        let mut x = turned(t, x);
+        x[8] += t;
+        x[9] += t;
+        x
+    };
+    let error = system(scaled, pendulum_energy).unwrap_err();
+    assert!(matches!(error, RunError::Model(ModelError::EnergyNotSymmetric { .. })), "{error}");
+    // A map that stretches q alone is no Poisson map, though it keeps an energy without q.
+    let stretched =
+        |t: Real, x: &State10| State10::from_fn(|i, _| if i < 4 { x[i] * (t + 1.0) } else { x[i] });
+    let kinetic: fn(&State10) -> Real =
+        |x| (pair(x, 4).norm_squared() + pair(x, 6).norm_squared()) * 0.5 + x[8].exp() + x[9].exp();
+    let error = system(stretched, kinetic).unwrap_err();
+    assert!(matches!(error, RunError::Model(ModelError::ActionNotPoisson { .. })), "{error}");
+}

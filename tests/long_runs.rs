@@ -167,9 +167,8 @@ fn ten_million_steps() {
         assert_eq!(run.energy.growth(), Some(Growth::Flat), "{}: {}", run.name, run.energy);
     }
     // Where K = 0 the entropy should stay. It is not aimed at its first value as the energy is, and
-    // creeps up by 10⁻¹⁸ in a step, a two-hundredth of a unit in the last place of S.
-    assert_eq!(nambu.entropy.growth(), Some(Growth::Linear), "{}", nambu.entropy);
-    assert!((5e-12..2e-11).contains(&nambu.certificate.entropy_gained), "{}", nambu.entropy);
+    // what the solver leaves of each step adds up, see the test below.
+    assert!(nambu.entropy.worst() <= 2e-11, "{}", nambu.entropy);
 }
 
 #[test]
@@ -182,4 +181,28 @@ fn a_hundred_thousand_steps() {
     }
     assert!(nambu.entropy.worst() <= 2e-13, "{}", nambu.entropy);
     assert!(rest.entropy.worst() <= 4.0 * f64::EPSILON, "{}", rest.entropy);
+}
+
+#[test]
+fn a_fresh_jacobian_for_each_correction_leaves_no_trend() {
+    // With the default the last residual of a step is foretold from the one before, not evaluated. It
+    // is within the floor as a rule, of the same sign in each step, and above the floor at times: in
+    // step 767 of the gas the energy is off by 3.6e-13.
+    let fresh = Newton { reuse: 0.0, ..Newton::default() };
+    let frame = metriplectic::manifolds::rotations::exp(&vector![0.3, -0.2, 0.5]);
+    let pushed = Vector4::new(1.0, 2.0, 2.0, 2.0);
+    let [usual, fresh] = [Newton::default(), fresh].map(|newton| {
+        let scheme = Scheme::new(WeylMidpoint).newton(newton);
+        let span = Span::steps(0.025, 100_000).at_most(2);
+        let nambu = scheme.run(&rotations(0.0), frame, span).unwrap().certificate().clone();
+        let span = Span::steps(0.025, 4000).at_most(2);
+        let gas = scheme.run(&gas(1e-3), pushed, span).unwrap().certificate().clone();
+        println!("{newton:?}\nNambu, κ = 0\n{nambu}\ngas\n{gas}\n");
+        (nambu, gas)
+    });
+    assert!(fresh.0.keeps_entropy() && fresh.0.entropy_gained.abs() <= 1e-13, "{}", fresh.0);
+    assert!(fresh.1.keeps_energy(), "{}", fresh.1);
+    // Known to be worse than promised.
+    assert!(usual.0.entropy_gained.abs() <= 1e-11, "{}", usual.0);
+    assert!(usual.1.max_energy_error <= 1e-12, "{}", usual.1);
 }

@@ -20,7 +20,6 @@ pub trait Number:
 }
 
 impl Number for f64 {}
-impl Number for twofloat::TwoFloat {}
 
 /// An initial value problem with an energy and, perhaps, an entropy.
 pub trait Problem<const N: usize>: Clone {

@@ -58,6 +58,10 @@ instructions *flags:
         cargo bench --bench step -- --instructions {{ flags }}
     fi
 
+# compare with other solvers, tables and docs/gallery/peers.svg: a package of its own, see docs/peers.md
+peers *options:
+    cd benches/peers && cargo run --release --bin peers -- {{ justfile_directory() }}/docs/gallery/peers.svg {{ options }}
+
 # check every combination of features
 features: (need "cargo hack --version" "cargo install cargo-hack --locked")
     cargo hack check --workspace --feature-powerset

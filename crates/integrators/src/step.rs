@@ -116,8 +116,7 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
                 ..start.left_over
             };
             let time = start.time + f64::from(half) * h;
-            let part =
-                Start { x: &point, time, h, energy, entropy, left_over, ..*start };
+            let part = Start { x: &point, time, h, energy, entropy, left_over, ..*start };
             let end = match self.attempt(system, &part, &mut memory, work) {
                 Ok(end) => end,
                 Err(failure) if depth >= self.splits => return Err(failure),

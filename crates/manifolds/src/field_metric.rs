@@ -1,5 +1,6 @@
 //! A metric from a closure, with numerical geodesics.
 
+use std::cell::Cell;
 use std::fmt;
 
 use metriplectic_fields::{
@@ -107,6 +108,8 @@ impl<M: Manifold, F: MatrixField<M>> Riemannian<M> for FieldMetric<F> {
     }
 }
 
+/// Geodesics that a logarithm may follow.
+const SHOTS: u32 = 500;
 /// Corrections that one shot of a logarithm may take.
 const CORRECTIONS: usize = 16;
 /// Halvings of a correction that comes no closer: none at first, while there is a better aim to be had.
@@ -123,24 +126,25 @@ fn shoot<M: Manifold, F: MatrixField<M>>(
     x: &M::Point<f64>,
     y: &M::Point<f64>,
 ) -> Result<Vector<M>, MetricError> {
+    let shots = Cell::new(0);
     let straight = M::coordinates(x, y);
     let line = straight * stretch(metric, x, &straight);
-    let mut last = hit(metric, x, y, &line, EAGER);
+    let mut last = hit(metric, (x, y), &line, EAGER, &shots);
     #[cfg(feature = "argmin")]
     if last.is_err()
         && let Some(aim) = crate::path::aim(&metric.field, x, &straight)
     {
-        last = hit(metric, x, y, &aim, PATIENT).or(last);
+        last = hit(metric, (x, y), &aim, PATIENT, &shots).or(last);
     }
     for stages in STAGES {
-        if last.is_ok() {
+        if last.is_ok() || shots.get() >= SHOTS {
             break;
         }
         let mut v = straight * f64::from(stages).recip();
         last = (1..=stages).try_fold(v, |_, stage| {
             let target = M::chart(x, &(straight * (f64::from(stage) / f64::from(stages))));
             let grown = f64::from(stage) / f64::from((stage - 1).max(1));
-            v = hit(metric, x, &target, &(v * grown), PATIENT)?;
+            v = hit(metric, (x, &target), &(v * grown), PATIENT, &shots)?;
             Ok(v)
         });
     }
@@ -164,13 +168,17 @@ fn stretch<M: Space, G: Riemannian<M>>(metric: &G, x: &M::Point<f64>, line: &Vec
 /// Newton's method for `exp_x(v) = y`, damped, from a first aim.
 fn hit<M: Space, G: Riemannian<M>>(
     metric: &G,
-    x: &M::Point<f64>,
-    y: &M::Point<f64>,
+    (x, y): (&M::Point<f64>, &M::Point<f64>),
     aim: &Vector<M>,
     halvings: usize,
+    shots: &Cell<u32>,
 ) -> Result<Vector<M>, MetricError> {
     let size = M::coordinates(x, y).magnitude();
     let miss = |v: &Vector<M>| {
+        shots.set(shots.get() + 1);
+        if shots.get() > SHOTS {
+            return Err(MetricError::NoLogarithm { distance: size, missed_by: size });
+        }
         let ArcJet { end, dend, .. } = metric.weyl_jet(x, v)?;
         Ok::<_, MetricError>((M::coordinates(&end, y), dend))
     };

@@ -31,7 +31,7 @@ use crate::metric::GeodesicEnd;
 /// A piece of a geodesic shorter than this, in a unit of time, is not worth pursuing.
 const SHORTEST: f64 = 1e-6;
 /// Pieces that a geodesic may take, so that one through a very uneven metric comes to an end.
-const PIECES: usize = 4096;
+const PIECES: usize = 1024;
 
 /// A point of the phase space of geodesics.
 struct Phase<M: Space, D: Scalar> {

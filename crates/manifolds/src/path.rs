@@ -4,6 +4,7 @@
 //! It stalls far above round-off, so Newton's method polishes: first for the whole path, by multiple
 //! shooting, then for the one geodesic.
 
+use std::cell::Cell;
 use std::marker::PhantomData;
 
 use argmin::core::{CostFunction, Executor, Gradient, State as _};
@@ -21,6 +22,8 @@ use crate::geodesic::{self, GeodesicJet};
 const PIECES: usize = 24;
 /// Iterations that the relaxation may take.
 const ITERATIONS: u64 = 200;
+/// Evaluations of its energy or of the gradient, at most.
+const EVALUATIONS: u32 = 2000;
 /// Pairs of differences that L-BFGS remembers.
 const MEMORY: usize = 7;
 
@@ -31,9 +34,21 @@ struct PathEnergy<'a, M: Space, F> {
     x: &'a M::Point<f64>,
     end: Vector<M>,
     space: PhantomData<M>,
+    evaluations: Cell<u32>,
 }
 
 impl<M: Space, F: MatrixField<M>> PathEnergy<'_, M, F> {
+    /// Notes an evaluation, as long as there may be more: a line search through a metric that is not
+    /// smooth has no end of its own.
+    fn spend(&self) -> Result<(), argmin::core::Error> {
+        self.evaluations.set(self.evaluations.get() + 1);
+        if self.evaluations.get() <= EVALUATIONS {
+            Ok(())
+        } else {
+            Err(argmin::core::Error::msg("the path is not found in the evaluations allowed"))
+        }
+    }
+
     /// The corner `k`, the ends among them.
     fn corner(&self, path: &[f64], k: usize) -> Vector<M> {
         match k {
@@ -55,6 +70,7 @@ impl<M: Space, F: MatrixField<M>> CostFunction for PathEnergy<'_, M, F> {
     type Output = f64;
 
     fn cost(&self, path: &Vec<f64>) -> Result<f64, argmin::core::Error> {
+        self.spend()?;
         let mut energy = 0.0;
         for k in 0..PIECES {
             let (step, g) = self.piece(path, k);
@@ -74,6 +90,7 @@ impl<M: Space, F: MatrixField<M>> Gradient for PathEnergy<'_, M, F> {
     type Gradient = Vec<f64>;
 
     fn gradient(&self, path: &Vec<f64>) -> Result<Vec<f64>, argmin::core::Error> {
+        self.spend()?;
         let n = M::Dim::LEN;
         let mut gradient = vec![0.0; path.len()];
         for k in 0..PIECES {
@@ -105,7 +122,8 @@ pub(crate) fn aim<M: Manifold>(
     let straight = (0..(PIECES - 1) * n)
         .map(|entry| end[entry % n] * (entry / n + 1) as f64 / PIECES as f64)
         .collect();
-    let energy = PathEnergy { field, x, end: *end, space: PhantomData };
+    let evaluations = Cell::new(0);
+    let energy = PathEnergy { field, x, end: *end, space: PhantomData, evaluations };
     let solver = LBFGS::new(MoreThuenteLineSearch::new(), MEMORY);
     let result = Executor::new(energy, solver)
         .configure(|state| state.param(straight).max_iters(ITERATIONS))

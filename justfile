@@ -26,6 +26,18 @@ test:
 doc:
     RUSTDOCFLAGS="-D warnings --html-in-header {{ justfile_directory() / "docs/katex.html" }}" cargo doc --workspace --no-deps --all-features
 
+# build the book into target/book, warnings are errors; `test` compiles and runs its programs
+book: (need "mdbook --version" "cargo install mdbook --locked --no-default-features")
+    #!/usr/bin/env bash
+    set -euo pipefail
+    log=$(mdbook build book 2>&1) || { echo "$log" >&2; exit 1; }
+    echo "$log"
+    # mdbook has no option that makes its warnings errors.
+    if grep -qwE 'WARN|ERROR' <<< "$log"; then
+        echo 'the book has warnings' >&2
+        exit 1
+    fi
+
 # build and run every example in release mode; one that fails fails the recipe
 examples:
     #!/usr/bin/env bash

@@ -1,0 +1,29 @@
+//! The programs of the book, compiled and run. The chapters are in `book/src`; `just book` builds
+//! their pages.
+
+#[doc = include_str!("../book/src/introduction.md")]
+struct Introduction;
+
+#[doc = include_str!("../book/src/first_system.md")]
+struct FirstSystem;
+
+#[doc = include_str!("../book/src/closures.md")]
+struct Closures;
+
+#[doc = include_str!("../book/src/manifolds.md")]
+struct Manifolds;
+
+#[doc = include_str!("../book/src/schemes.md")]
+struct Schemes;
+
+#[doc = include_str!("../book/src/verification.md")]
+struct Verification;
+
+#[doc = include_str!("../book/src/performance.md")]
+struct Performance;
+
+#[doc = include_str!("../book/src/errata.md")]
+struct Errata;
+
+#[doc = include_str!("../book/src/other_libraries.md")]
+struct OtherLibraries;

@@ -85,7 +85,7 @@ fn the_laws_hold_in_steps_of_random_sizes() {
         let fraction = (f64::from(step) * 0.618_033_988_749_894_9).fract();
         let h = 1e-4 * 1e4_f64.powf(fraction);
         let left_over = Recall { energy: energy(&x) - start, ..Recall::nothing() };
-        let (energy, entropy) = (energy(&x), 0.5 * x.norm_squared());
+        let (here, entropy) = (energy(&x), 0.5 * x.norm_squared());
         let from = Start { x: &x, time, h, energy, entropy, invariants: [0.0; 3], left_over };
         let (end, _) = scheme.step(&body, &from, &mut memory).expect("the step is solved");
         let (before, after) = (0.5 * x.norm_squared(), 0.5 * end.norm_squared());

@@ -27,5 +27,5 @@ fn row<const N: usize>() -> Row {
 }
 
 pub(crate) fn rows() -> Vec<Row> {
-    vec![row::<2>(), row::<4>(), row::<8>(), row::<12>()]
+    vec![row::<2>(), row::<4>(), row::<6>(), row::<8>(), row::<10>(), row::<12>()]
 }

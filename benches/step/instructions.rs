@@ -5,6 +5,8 @@ use std::fmt::Write as _;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
+use metriplectic_studies::LogLog;
+
 use crate::Row;
 
 /// A count that differs by more than this share from the snapshot is an error.
@@ -49,20 +51,32 @@ pub(crate) fn compare(rows: &[Row], bless: bool) {
             Some((words.next()?.to_owned(), words.next()?.parse().ok()?))
         })
         .collect();
-    let (mut table, mut worse) = (String::from("# row, instructions, sweeps per step\n"), false);
+    let head = "# row, instructions, Newton sweeps, calls of the closure: each in one step\n";
+    let (mut table, mut worse) = (String::from(head), false);
+    let mut rings = Vec::new();
     for row in rows {
         let [few, many] = RUNS.map(|steps| collected(&row.name, steps).expect("callgrind counts"));
         let each = (many - few) / (RUNS[1] - RUNS[0]) as f64;
         let sweeps = (row.run)(RUNS[1]).sweeps;
         let sweeps = sweeps.map_or("-".to_owned(), |n| format!("{:.2}", n as f64 / RUNS[1] as f64));
-        writeln!(table, "{:32} {each:10.0} {sweeps:>6}", row.name).expect("a string takes it all");
+        let calls = row.calls.map_or("-".to_owned(), |calls| format!("{calls:.1}"));
+        let line = format!("{:32} {each:10.0} {sweeps:>6} {calls:>6}", row.name);
+        writeln!(table, "{line}").expect("a string takes it all");
+        if let Some(n) = row.name.strip_prefix("step/ring/") {
+            rings.push((n.parse::<f64>().expect("a dimension"), each));
+        }
         let change = known.get(&row.name).map(|before| each / before - 1.0);
         let change_text = change.map_or("new".to_owned(), |c| format!("{:+.1} %", 100.0 * c));
-        println!("{:32} {each:10.0} {sweeps:>6}  {change_text}", row.name);
+        println!("{line}  {change_text}");
         worse |= change.is_none_or(|change| change.abs() > ALLOWED);
     }
     if bless {
         std::fs::write(&path, table).expect("the snapshot is written");
+        let figure = LogLog::new("A step on Rⁿ", "dimension n", "instructions")
+            .series("ring of oscillators", &rings)
+            .guide(3.0);
+        let figure = figure.save(path.with_file_name("../../docs/gallery/dimension.svg"));
+        figure.expect("the figure is written");
     } else {
         assert!(
             !worse,

@@ -12,6 +12,7 @@
 //! `closure_metric` is the step from closures once more, with the canonical metric given by a closure
 //! too, so that its geodesics are integrated.
 
+use std::cell::Cell;
 use std::hint::black_box;
 
 use criterion::Criterion;
@@ -54,6 +55,8 @@ struct Outcome {
 struct Row {
     name: String,
     run: Box<dyn Fn(usize) -> Outcome>,
+    /// Calls of the closure of the energy, or of the metric, in a step, where they are counted.
+    calls: Option<f64>,
 }
 
 impl Row {
@@ -94,7 +97,24 @@ impl Row {
             }
             Outcome { end: Y::Manifold::entries(&x), sweeps: Some(sweeps) }
         };
-        Self { name: name.into(), run: Box::new(run) }
+        Self { name: name.into(), run: Box::new(run), calls: None }
+    }
+
+    /// Notes the calls of a closure in a step, from the same system with a closure that counts them.
+    fn counted<Y: Metriplectic + 'static>(
+        self,
+        counter: &Cell<u64>,
+        twin: Y,
+        start: Point<Y>,
+        h: f64,
+    ) -> Self
+    where
+        WeylMidpoint: Retraction<Y::Manifold, Y::Metric>,
+    {
+        let twin = Self::new("", twin, start, h);
+        counter.set(0);
+        (twin.run)(STEPS);
+        Self { calls: Some(counter.get() as f64 / STEPS as f64), ..self }
     }
 
     /// Steps by hand.
@@ -107,7 +127,7 @@ impl Row {
             let end = (0..steps).fold(black_box(start), |x, _| hand.step(&x, h));
             Outcome { end: B::entries(&end), sweeps: None }
         };
-        Self { name: name.into(), run: Box::new(run) }
+        Self { name: name.into(), run: Box::new(run), calls: None }
     }
 }
 

@@ -1,5 +1,9 @@
 //! The relaxing rigid body on so(3)*, a hundred steps from a state in full motion.
 
+use std::cell::Cell;
+use std::rc::Rc;
+
+use metriplectic::fields::{Jet1, Jet2};
 use metriplectic::prelude::*;
 
 use crate::{Row, Step, check};
@@ -26,6 +30,42 @@ impl ScalarField<LieDual<3>> for Entropy {
     }
 }
 
+/// The energy with its derivatives on paper.
+struct Analytic(V);
+
+impl ScalarField<LieDual<3>> for Analytic {
+    fn at<D: Scalar>(&self, p: &SVector<D, 3>) -> D {
+        Energy(self.0).at(p)
+    }
+
+    fn jet1(&self, p: &Vector3<f64>) -> Jet1<LieDual<3>> {
+        let df = p.component_div(&Vector3::from(self.0));
+        Jet1 { value: p.dot(&df) * 0.5, df }
+    }
+
+    fn jet2(&self, p: &Vector3<f64>) -> Jet2<LieDual<3>> {
+        let Jet1 { value, df } = self.jet1(p);
+        Jet2 { value, df, hf: Matrix3::from_diagonal(&Vector3::from(self.0.map(f64::recip))) }
+    }
+}
+
+/// The entropy likewise.
+struct AnalyticEntropy;
+
+impl ScalarField<LieDual<3>> for AnalyticEntropy {
+    fn at<D: Scalar>(&self, p: &SVector<D, 3>) -> D {
+        Entropy.at(p)
+    }
+
+    fn jet1(&self, p: &Vector3<f64>) -> Jet1<LieDual<3>> {
+        Jet1 { value: p.norm_squared() * 0.5, df: *p }
+    }
+
+    fn jet2(&self, p: &Vector3<f64>) -> Jet2<LieDual<3>> {
+        Jet2 { value: p.norm_squared() * 0.5, df: *p, hf: Matrix3::identity() }
+    }
+}
+
 pub(crate) fn rows() -> Vec<Row> {
     const WELL: &str = "the rigid body is a metriplectic system";
     let (start, h) = (Vector3::from(START), STEP_SIZE);
@@ -37,13 +77,26 @@ pub(crate) fn rows() -> Vec<Row> {
             })
             .entropy(|p: &Vector3<Real>| p.norm_squared() * 0.5)
     };
+    let calls = Rc::new(Cell::new(0));
+    let count = Rc::clone(&calls);
+    let counting = System::on(LieDual::so3())
+        .energy(move |p: &Vector3<Real>| {
+            count.set(count.get() + 1);
+            p.component_mul(p).component_div(&Vector3::from(INERTIA).cast()).sum() * 0.5
+        })
+        .entropy(|p: &Vector3<Real>| p.norm_squared() * 0.5)
+        .build()
+        .expect(WELL);
+    let analytic = System::on(LieDual::so3()).energy(Analytic(INERTIA)).entropy(AnalyticEntropy);
     let typed = System::on(LieDual::so3()).energy(Energy(INERTIA)).entropy(Entropy);
     let published = body().second_law(SecondLaw::Published).build().expect(WELL);
     let [mean, itoh_abe] = [(); 2].map(|()| body().build().expect(WELL));
     let scheme = Scheme::new(WeylMidpoint);
     let rows = vec![
-        Row::new("step/rigid_body/closure", body().build().expect(WELL), start, h),
+        Row::new("step/rigid_body/closure", body().build().expect(WELL), start, h)
+            .counted(&calls, counting, start, h),
         Row::new("step/rigid_body/typed", typed.build().expect(WELL), start, h),
+        Row::new("step/rigid_body/analytic", analytic.build().expect(WELL), start, h),
         Row::by_hand("step/rigid_body/hand_coded", HandCoded::new(&INERTIA), START, h),
         Row::new("step/rigid_body/published", published, start, h),
         Row::with("step/rigid_body/mean_value", scheme.gradient(MeanValue), mean, start, h),

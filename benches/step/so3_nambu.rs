@@ -7,7 +7,7 @@ use metriplectic::manifolds::rotations;
 use metriplectic::prelude::*;
 
 use crate::chord::{self, Displacements, Linearised};
-use crate::{Row, STEPS, Step, check};
+use crate::{Row, Step, check};
 
 const STEP_SIZE: f64 = 0.005;
 
@@ -54,16 +54,20 @@ pub(crate) fn rows() -> Vec<Row> {
 
     let evaluations = Rc::new(Cell::new(0));
     let count = Rc::clone(&evaluations);
-    let body = Metric::field(move |_: &Matrix3<Real>| {
+    let body = move |_: &Matrix3<Real>| {
         count.set(count.get() + 1);
         Matrix3::<Real>::identity()
-    });
-    let numerical = frame().metric(body).build().expect("the same system");
-    rows.push(Row::new("step/so3_nambu/closure_metric", numerical, start, h));
-    evaluations.set(0);
-    (rows[3].run)(STEPS);
-    let each = evaluations.get() as f64 / STEPS as f64;
-    println!("{}: {each:.0} evaluations of the metric in a step", rows[3].name);
+    };
+    let numerical = || {
+        let metric = Metric::field(body.clone());
+        frame().metric(metric).build().expect("the same system")
+    };
+    rows.push(Row::new("step/so3_nambu/closure_metric", numerical(), start, h).counted(
+        &evaluations,
+        numerical(),
+        start,
+        h,
+    ));
     check(&rows, 1e-10);
 
     let exact = frame().second_law(SecondLaw::Exact).build().expect(WELL);

@@ -149,7 +149,7 @@ pub type Built<M, G, B, K, H, S, L> = System<M, G, B, <K as Choice>::Dissipation
 
 impl System<(), (), (), (), (), ()> {
     /// Starts a system on a manifold, with the manifold's canonical metric and its natural bracket
-    /// (Lie-Poisson on the dual of a Lie algebra, none on Rⁿ).
+    /// (Lie-Poisson on the dual of a Lie algebra, none elsewhere).
     ///
     /// ```
     /// use metriplectic_dynamics::System;
@@ -299,7 +299,8 @@ impl<M: Manifold, G, B, K, H, S, L> SystemBuilder<M, G, B, K, H, S, L> {
 
     /// The Poisson tensor: [`LiePoisson`](crate::LiePoisson), [`Zero`](crate::Zero),
     /// [`Poisson::constant`](crate::Poisson::constant), [`Poisson::field`](crate::Poisson::field),
-    /// [`AreaForm`](crate::AreaForm) or [`Nambu`](crate::Nambu).
+    /// [`Symplectic`](crate::Symplectic), [`AreaForm`](crate::AreaForm) or [`Nambu`](crate::Nambu);
+    /// on a product a pair of them, one for each factor.
     pub fn bracket<F>(self, bracket: F) -> SystemBuilder<M, G, F, K, H, S, L> {
         let Self { manifold, metric, dissipation, energy, entropy, invariants, second_law, .. } =
             self;

@@ -9,17 +9,17 @@ use crate::{ChartPoint, Column, Dimension, Form, Matrix, Real, Scalar, Space, Sq
 /// method [`at`](Self::at), for a type that should be evaluated at each scalar directly:
 ///
 /// ```
-/// # use metriplectic_fields::{Scalar, ScalarField, Space};
+/// # use metriplectic_fields::{Scalar, ScalarField};
+/// # use metriplectic_manifolds::LieDual;
+/// # use nalgebra::SVector;
 /// struct KineticEnergy { inertia: [f64; 3] }
 ///
-/// impl<M> ScalarField<M> for KineticEnergy
-/// where
-///     M: for<'a> Space,
-///     M: PointsAreVectors,
-/// # {
-/// #     fn at<D: Scalar>(&self, x: &M::Point<D>) -> D { M::kinetic(&self.inertia, x) }
-/// # }
-/// # trait PointsAreVectors: Space { fn kinetic<D: Scalar>(i: &[f64; 3], x: &Self::Point<D>) -> D; }
+/// impl ScalarField<LieDual<3>> for KineticEnergy {
+///     fn at<D: Scalar>(&self, p: &SVector<D, 3>) -> D {
+///         let term = |i: usize| p[i] * p[i] * (0.5 / self.inertia[i]);
+///         term(0) + term(1) + term(2)
+///     }
+/// }
 /// ```
 ///
 /// Laws ([`laws::scalar_field`](crate::laws::scalar_field)): 1. `jet1` and `jet2` agree with `at`;

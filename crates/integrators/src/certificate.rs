@@ -127,10 +127,9 @@ impl fmt::Display for Certificate {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(
             f,
-            "first law:   |H − H₀| ≤ {:.1e}, {:.1e} of H₀ = {:.6}, over {}",
+            "first law:   |H − H₀| ≤ {:.1e}{}, over {}",
             self.max_energy_error,
-            self.max_relative_energy_error(),
-            self.initial_energy,
+            self.relative_to(),
             counted(self.steps, "step", "steps")
         )?;
         match self.second_law {
@@ -169,6 +168,16 @@ impl fmt::Display for Certificate {
 }
 
 impl Certificate {
+    /// The energy at the start, and the error relative to it where it is not zero.
+    fn relative_to(&self) -> String {
+        let start = self.initial_energy;
+        if start.abs() > 0.0 {
+            format!(", {:.1e} of H₀ = {start:.6}", self.max_relative_energy_error())
+        } else {
+            " from H₀ = 0".to_owned()
+        }
+    }
+
     fn entropy_line(&self) -> String {
         let falls = match self.entropy_falls {
             0 => "it never fell".to_owned(),

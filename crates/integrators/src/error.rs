@@ -19,7 +19,7 @@ use crate::trajectory::Trajectory;
 pub enum StepError {
     /// The implicit equation was not solved.
     #[error(
-        "the step of size {h:.3e} from t = {time} was not solved: residual {residual:.1e} after \
+        "the step of size {h:.3e} from t = {time:.6} was not solved: residual {residual:.1e} after \
          {sweeps} Newton sweeps, with {splits} halvings of the step tried; \
          try a step below {suggested:.1e}"
     )]
@@ -40,7 +40,7 @@ pub enum StepError {
     /// A further invariant was not kept, because its differential is a combination of those of the
     /// other fields: it cannot be projected out beside them.
     #[error(
-        "invariant {index} changed by {change:.1e} in the step from t = {time}: only {share:.1e} of its \
+        "invariant {index} changed by {change:.1e} in the step from t = {time:.6}: only {share:.1e} of its \
          differential is independent of the other fields' there; leave it out of the list, or \
          keep away from such states"
     )]
@@ -56,7 +56,7 @@ pub enum StepError {
     },
     /// The controller asks for a step below the least one.
     #[error(
-        "the step from t = {time} would have to be {h:.1e} long to keep the tolerance, below the least \
+        "the step from t = {time:.6} would have to be {h:.1e} long to keep the tolerance, below the least \
          step {least:.1e}; the motion may end there: see the energy and the entropy around this \
          state, or ask for a coarser tolerance"
     )]
@@ -70,7 +70,7 @@ pub enum StepError {
     },
     /// A field is not defined around the start of the step.
     #[error(
-        "the step of size {h:.3e} from t = {time} leaves the domain of the model wherever it goes \
+        "the step of size {h:.3e} from t = {time:.6} leaves the domain of the model wherever it goes \
          ({splits} halvings tried); try a smaller step, or check energy and entropy there"
     )]
     OutOfDomain {

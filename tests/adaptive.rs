@@ -86,7 +86,7 @@ fn the_laws_hold_in_steps_of_random_sizes() {
         let h = 1e-4 * 1e4_f64.powf(fraction);
         let left_over = Recall { energy: energy(&x) - start, ..Recall::nothing() };
         let (here, entropy) = (energy(&x), 0.5 * x.norm_squared());
-        let from = Start { x: &x, time, h, energy, entropy, invariants: [0.0; 3], left_over };
+        let from = Start { x: &x, time, h, energy: here, entropy, invariants: [0.0; 3], left_over };
         let (end, _) = scheme.step(&body, &from, &mut memory).expect("the step is solved");
         let (before, after) = (0.5 * x.norm_squared(), 0.5 * end.norm_squared());
         let round_off = 4.0 * f64::EPSILON * (before.max(1.0) + 2.0 * before);

@@ -44,15 +44,15 @@ fn number() -> impl Strategy<Value = f64> + Clone {
 enum Tree {
     Number(f64),
     Entry(usize),
-    Sum(Box<Tree>, Box<Tree>),
-    Product(Box<Tree>, Box<Tree>),
-    Quotient(Box<Tree>, Box<Tree>),
-    Square(Box<Tree>),
-    Power(Box<Tree>, f64),
-    Sine(Box<Tree>),
-    Exponential(Box<Tree>),
-    Logarithm(Box<Tree>),
-    Root(Box<Tree>),
+    Sum(Box<Self>, Box<Self>),
+    Product(Box<Self>, Box<Self>),
+    Quotient(Box<Self>, Box<Self>),
+    Square(Box<Self>),
+    Power(Box<Self>, f64),
+    Sine(Box<Self>),
+    Exponential(Box<Self>),
+    Logarithm(Box<Self>),
+    Root(Box<Self>),
 }
 
 impl Tree {

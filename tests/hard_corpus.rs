@@ -251,13 +251,14 @@ fn hard_starts_end_in_a_certified_step_or_the_right_error() {
         let Outcome { result, time } = case.step();
         let (word, text) = match &result {
             Ok((end, certificate)) => {
-                let Certificate { sweeps, retries, globalised, .. } = **certificate;
+                let Certificate { sweeps, retries, continued, globalised, .. } = **certificate;
                 let certified = certificate.keeps_energy() && certificate.keeps_entropy();
                 let finite = end.iter().all(|entry| entry.is_finite());
-                let word = match (certified && finite, retries, globalised) {
+                let word = match (certified && finite, retries, globalised, continued) {
                     (false, ..) => "uncertified",
-                    (_, 0, 0) => "plain",
-                    (_, 0, _) => "globalised",
+                    (_, 0, 0, 0) => "plain",
+                    (_, 0, 0, _) => "continued",
+                    (_, 0, ..) => "globalised",
                     _ => "split",
                 };
                 let off = if case.solvable() { case.off(end) } else { f64::NAN };

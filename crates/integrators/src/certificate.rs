@@ -49,6 +49,8 @@ pub struct Certificate {
     pub worst_sweeps: usize,
     /// How often a step was retried as two halves.
     pub retries: usize,
+    /// How often a step was approached through smaller ones from the same start.
+    pub continued: usize,
     /// How often the globaliser was called.
     pub globalised: usize,
     /// What the model promises about its entropy; serialized as the name of the variant.
@@ -212,6 +214,7 @@ mod tests {
         sweeps: 9,
         worst_sweeps: 2,
         retries: 1,
+        continued: 0,
         globalised: 0,
         second_law: SecondLaw::Exact,
         projected: false,

@@ -144,6 +144,18 @@ where
         self
     }
 
+    /// The equation of a step of a share of the size, which takes nothing back.
+    pub(crate) fn of_share(&self, share: f64) -> Self {
+        let parts = (self.retraction, self.gradient);
+        let start = (self.x, [self.energy, self.entropy]);
+        Self::recalling(self.system, parts, start, self.h * share, Recall::nothing())
+    }
+
+    /// The system.
+    pub(crate) const fn system(&self) -> &'a Y {
+        self.system
+    }
+
     /// The sizes that round-off is judged by, if they are known.
     pub(crate) const fn sizes(&self) -> Option<Sizes> {
         self.sizes.get()

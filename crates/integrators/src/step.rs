@@ -5,10 +5,10 @@ use metriplectic_fields::{ChartPoint, Column, Dimension, ScalarField, Square, Ve
 use metriplectic_manifolds::{Manifold, Retraction, Riemannian};
 
 use crate::discrete_gradient::{DiscreteGradient, Gonzalez};
-use crate::error::StepError;
+use crate::error::{StepError, Tried};
 use crate::newton::{Inverse, Newton};
 use crate::residual::{Dim, Numbers, Recall, Residual, Sizes};
-use crate::root_finder::{NoRoot, Root};
+use crate::root_finder::{Equation, NoRoot, Root};
 
 /// A scheme: a retraction, and how hard to try to solve its equation.
 ///
@@ -69,27 +69,32 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
         R: Retraction<Y::Manifold, Y::Metric>,
     {
         let mut work = Work::default();
-        match self.attempt(system, start, memory, &mut work) {
+        let whole = self.attempt(system, start, memory, Effort::Whole, &mut work);
+        let end = whole.or_else(|Lost { .. }| {
+            *memory = Memory::new();
+            self.halves(system, start, 1, &mut work)
+        });
+        match end {
             Ok(end) => Ok((end, work)),
-            Err(failure) => {
-                *memory = Memory::new();
-                let end = self.halves(system, start, 1, &mut work).map_err(|smallest| {
-                    let residual = smallest.residual.min(failure.residual);
-                    if residual.is_finite() {
-                        StepError::NotConverged {
-                            time: start.time,
-                            h: start.h,
-                            residual,
-                            sweeps: work.sweeps,
-                            splits: work.splits,
-                            suggested: smallest_part(start.h, self.splits),
-                        }
-                    } else {
-                        StepError::OutOfDomain { time: start.time, h: start.h, splits: work.splits }
-                    }
-                })?;
-                Ok((end, work))
-            }
+            Err(smallest) => Err(self.failure(start, smallest, &work)),
+        }
+    }
+
+    /// What a user is told of a step that was not solved, by what became of its smallest part.
+    #[cold]
+    fn failure<Y: Metriplectic>(
+        &self,
+        &Start { time, h, .. }: &Start<'_, Y>,
+        Lost { residual, edge }: Lost,
+        work: &Work,
+    ) -> StepError {
+        let Work { sweeps, continued, globalised, splits, .. } = *work;
+        let tried = Tried { sweeps, continued, globalised, splits };
+        if edge {
+            StepError::OutOfDomain { time, h, tried }
+        } else {
+            let suggested = smallest_part(h, self.splits);
+            StepError::NotConverged { time, h, residual, tried, suggested }
         }
     }
 
@@ -100,7 +105,7 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
         start: &Start<'_, Y>,
         depth: usize,
         work: &mut Work,
-    ) -> Result<Point<Y>, NoRoot<Y::Manifold>>
+    ) -> Result<Point<Y>, Lost>
     where
         Y: Metriplectic,
         R: Retraction<Y::Manifold, Y::Metric>,
@@ -118,7 +123,7 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
             let time = start.time + f64::from(half) * h;
             let part =
                 Start { x: &point, time, h, energy, entropy, left_over, ..*start };
-            let end = match self.attempt(system, &part, &mut memory, work) {
+            let end = match self.attempt(system, &part, &mut memory, Effort::Part, work) {
                 Ok(end) => end,
                 Err(failure) if depth >= self.splits => return Err(failure),
                 Err(_) => self.halves(system, &part, depth + 1, work)?,
@@ -134,8 +139,9 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
         system: &Y,
         start: &Start<'_, Y>,
         memory: &mut Memory<Dim<Y>>,
+        effort: Effort,
         work: &mut Work,
-    ) -> Result<Point<Y>, NoRoot<Y::Manifold>>
+    ) -> Result<Point<Y>, Lost>
     where
         Y: Metriplectic,
         R: Retraction<Y::Manifold, Y::Metric>,
@@ -149,7 +155,12 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
         let residual = Residual::recalling(system, parts, (start.x, values), start.h, recall)
             .with_sizes(known.map(|known| known.sizes));
         let mut inverse = known.map(|known| known.inverse);
-        let root = self.solve(&residual, &guess, &mut inverse, work)?;
+        let root = self.newton.solve_near(&residual, &guess, &mut inverse);
+        work.sweeps += root.as_ref().map_or_else(|failure| failure.sweeps, |root| root.sweeps);
+        let root = match root {
+            Ok(root) => root,
+            Err(failure) => self.rescue(&residual, start, failure, effort, &mut inverse, work)?,
+        };
         memory.linearised = inverse.zip(residual.sizes()).map(|(inverse, sizes)| match known {
             Some(known) if known.sizes == sizes => {
                 Linearisation { inverse, steps: known.steps + 1, ..known }
@@ -163,7 +174,7 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
             // would make a random walk of the energy.
             return Ok(start.x.clone());
         }
-        let lost = || NoRoot { best: root.u, residual: f64::INFINITY, sweeps: root.sweeps };
+        let lost = || Lost { residual: root.residual, edge: true };
         let end = self.retraction.end(system.metric(), start.x, &root.u).map_err(|_| lost())?;
         let last = residual.last_correction(&root, &end);
         work.sweeps += usize::from(last.is_some());
@@ -175,32 +186,126 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
         Ok(memory.note::<Y::Manifold, _>(system.metric(), start.x, &u, end))
     }
 
-    /// Newton's method, and where it is lost the globaliser with Newton's polish.
-    fn solve<Y>(
+    /// A root where Newton's method has lost its way from the guess, in the order of the
+    /// [module](self).
+    #[cold]
+    fn rescue<Y>(
         &self,
         residual: &Residual<'_, Y, R, W>,
-        guess: &Vector<Y::Manifold>,
+        start: &Start<'_, Y>,
+        failure: NoRoot<Y::Manifold>,
+        effort: Effort,
         inverse: &mut Option<Inverse<Dim<Y>>>,
         work: &mut Work,
-    ) -> Result<Root<Y::Manifold>, NoRoot<Y::Manifold>>
+    ) -> Result<Root<Y::Manifold>, Lost>
     where
         Y: Metriplectic,
         R: Retraction<Y::Manifold, Y::Metric>,
     {
-        let solved = self.newton.solve_near(residual, guess, inverse);
-        work.sweeps += solved.as_ref().map_or_else(|failure| failure.sweeps, |root| root.sweeps);
-        #[cfg(feature = "argmin")]
-        if let Err(failure) = &solved
-            && let Some(closer) = crate::globaliser::descend(residual, &failure.best)
-        {
-            work.globalised += 1;
-            let polished = self.newton.solve_near(residual, &closer, inverse);
-            work.sweeps +=
-                polished.as_ref().map_or_else(|failure| failure.sweeps, |root| root.sweeps);
-            return polished;
+        let mut best = failure;
+        let mut newton = |guess: &Vector<Y::Manifold>, work: &mut Work| {
+            let solved = self.newton.solve_near(residual, guess, inverse);
+            work.sweeps += solved.as_ref().map_or_else(|lost| lost.sweeps, |root| root.sweeps);
+            solved
+        };
+        // At rest every field is defined that is defined at the start, and the first correction is
+        // the linearly implicit step, which no stiffness drives off.
+        match newton(&Vector::<Y::Manifold>::zero(), work) {
+            Ok(root) => return Ok(root),
+            Err(lost) if lost.residual < best.residual => best = lost,
+            Err(_) => {}
         }
-        solved
+        if effort == Effort::Whole {
+            work.continued += 1;
+            if let Some(near) = self.follow(residual, start, work)
+                && let Ok(root) = newton(&near, work)
+            {
+                return Ok(root);
+            }
+            #[cfg(feature = "argmin")]
+            if let Some(closer) = crate::globaliser::descend(residual, &best.best) {
+                work.globalised += 1;
+                match newton(&closer, work) {
+                    Ok(root) => return Ok(root),
+                    Err(lost) if lost.residual < best.residual => best = lost,
+                    Err(_) => {}
+                }
+            }
+        }
+        Err(Lost { residual: best.residual, edge: at_edge(residual, &best.best) })
     }
+
+    /// The displacement of the last of a row of steps of growing sizes from the same start, up to
+    /// that of `residual`: the branch of solutions that begins at rest is followed by secants. A
+    /// solution counts as one of this branch if it is near its prediction.
+    fn follow<Y>(
+        &self,
+        residual: &Residual<'_, Y, R, W>,
+        start: &Start<'_, Y>,
+        work: &mut Work,
+    ) -> Option<Vector<Y::Manifold>>
+    where
+        Y: Metriplectic,
+        R: Retraction<Y::Manifold, Y::Metric>,
+    {
+        let newton = Newton { sweeps: 8, halvings: 2, ..self.newton };
+        let mut slope = explicit(residual.system(), start)?;
+        let (mut u, mut share, mut increment) = (Vector::<Y::Manifold>::zero(), 0.0, 0.125);
+        for _ in 0..STAGES {
+            let next = f64::min(share + increment, 1.0);
+            let predicted = u + slope * (next - share);
+            let solved = newton.solve_near(&residual.of_share(next), &predicted, &mut None);
+            work.sweeps += solved.as_ref().map_or_else(|lost| lost.sweeps, |root| root.sweeps);
+            let near = solved.ok().filter(|root| {
+                let step = root.u - u;
+                (root.u - predicted).magnitude() <= 0.3 * step.magnitude()
+            });
+            match near {
+                Some(root) if next >= 1.0 => return Some(root.u),
+                Some(root) => {
+                    slope = (root.u - u) * (next - share).recip();
+                    (u, share) = (root.u, next);
+                    increment *= 2.0;
+                }
+                None => increment *= 0.25,
+            }
+            if increment <= LEAST * share {
+                return None;
+            }
+        }
+        None
+    }
+}
+
+/// Steps of growing sizes that may be tried to get to the size that is asked for.
+const STAGES: usize = 100;
+/// The share of what has been reached below which an increment of the size means that the branch of
+/// solutions ends there.
+const LEAST: f64 = 1e-4;
+
+/// How hard to try.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Effort {
+    /// Everything, because only halving the step comes after it.
+    Whole,
+    /// Newton's method alone, because a smaller step is tried next.
+    Part,
+}
+
+/// A step that was not solved.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Lost {
+    /// The smallest residual that was found.
+    residual: f64,
+    /// Whether the domain of the model is in the way.
+    edge: bool,
+}
+
+/// Whether it is the edge of the domain that stops Newton's method at `u`.
+fn at_edge<M: Manifold>(equation: &impl Equation<M>, u: &Vector<M>) -> bool {
+    let Some(at) = equation.linearise(u) else { return true };
+    let correction = at.jacobian.solve(&at.residual).filter(|step| step.is_finite());
+    correction.is_some_and(|correction| equation.value(&(*u - correction)).is_none())
 }
 
 /// The size of the smallest part of a step that was split `splits` times.
@@ -235,6 +340,8 @@ pub struct Work {
     pub sweeps: usize,
     /// How often the step, or a part of it, was split in halves.
     pub splits: usize,
+    /// How often a step was approached through smaller ones from the same start.
+    pub continued: usize,
     /// How often the globaliser was called.
     pub globalised: usize,
     /// The size `|w_S|` of the discrete gradient of the entropy, by which the bracket is projected;
@@ -249,6 +356,7 @@ impl Default for Work {
         Self {
             sweeps: 0,
             splits: 0,
+            continued: 0,
             globalised: 0,
             entropy_slope: f64::INFINITY,
             dissipates: false,
@@ -258,7 +366,7 @@ impl Default for Work {
 
 /// The explicit Euler displacement `h (Π dH + K dS)(x)`.
 fn explicit<Y: Metriplectic>(system: &Y, start: &Start<'_, Y>) -> Option<Vector<Y::Manifold>> {
-    let displacement = system.velocity(&ChartPoint::centre(start.x)).ok()? * start.h;
+    let displacement = system.velocity(&ChartPoint::<Y::Manifold>::centre(start.x)).ok()? * start.h;
     displacement.is_finite().then_some(displacement)
 }
 
@@ -281,7 +389,7 @@ fn recall<Y: Metriplectic>(system: &Y, start: &Start<'_, Y>, d: &Vector<Y::Manif
         return Recall::nothing();
     }
     let (dh, ds) = (system.energy().jet1(start.x).df, system.entropy().jet1(start.x).df);
-    let x = ChartPoint::centre(start.x);
+    let x = ChartPoint::<Y::Manifold>::centre(start.x);
     let pi = system.bracket().linearise(&system.site(&x, &ds), &dh);
     let k = system.dissipation().linearise(system.metric(), start.x, &dh, &ds);
     let sizes = (pi.map_or(0.0, |pi| pi.tensor.max_abs()), k.map_or(0.0, |k| k.along_w.max_abs()));

@@ -151,11 +151,6 @@ where
         Self::recalling(self.system, parts, start, self.h * share, Recall::nothing())
     }
 
-    /// The system.
-    pub(crate) const fn system(&self) -> &'a Y {
-        self.system
-    }
-
     /// The sizes that round-off is judged by, if they are known.
     pub(crate) const fn sizes(&self) -> Option<Sizes> {
         self.sizes.get()

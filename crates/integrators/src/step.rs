@@ -159,7 +159,7 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
         work.sweeps += root.as_ref().map_or_else(|failure| failure.sweeps, |root| root.sweeps);
         let root = match root {
             Ok(root) => root,
-            Err(failure) => self.rescue(&residual, start, failure, effort, &mut inverse, work)?,
+            Err(failure) => self.rescue(&residual, failure, effort, &mut inverse, work)?,
         };
         memory.linearised = inverse.zip(residual.sizes()).map(|(inverse, sizes)| match known {
             Some(known) if known.sizes == sizes => {
@@ -192,7 +192,6 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
     fn rescue<Y>(
         &self,
         residual: &Residual<'_, Y, R, W>,
-        start: &Start<'_, Y>,
         failure: NoRoot<Y::Manifold>,
         effort: Effort,
         inverse: &mut Option<Inverse<Dim<Y>>>,
@@ -203,29 +202,29 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
         R: Retraction<Y::Manifold, Y::Metric>,
     {
         let mut best = failure;
-        let mut newton = |guess: &Vector<Y::Manifold>, work: &mut Work| {
-            let solved = self.newton.solve_near(residual, guess, inverse);
+        let mut newton = |guess: &Vector<Y::Manifold>, newton: &Newton, work: &mut Work| {
+            let solved = newton.solve_near(residual, guess, inverse);
             work.sweeps += solved.as_ref().map_or_else(|lost| lost.sweeps, |root| root.sweeps);
             solved
         };
         // At rest every field is defined that is defined at the start, and the first correction is
         // the linearly implicit step, which no stiffness drives off.
-        match newton(&Vector::<Y::Manifold>::zero(), work) {
+        match newton(&Vector::<Y::Manifold>::zero(), &Newton { sweeps: DIRECT, ..self.newton }, work) {
             Ok(root) => return Ok(root),
             Err(lost) if lost.residual < best.residual => best = lost,
             Err(_) => {}
         }
         if effort == Effort::Whole {
             work.continued += 1;
-            if let Some(near) = self.follow(residual, start, work)
-                && let Ok(root) = newton(&near, work)
+            if let Some(near) = self.follow(residual, work)
+                && let Ok(root) = newton(&near, &self.newton, work)
             {
                 return Ok(root);
             }
             #[cfg(feature = "argmin")]
             if let Some(closer) = crate::globaliser::descend(residual, &best.best) {
                 work.globalised += 1;
-                match newton(&closer, work) {
+                match newton(&closer, &self.newton, work) {
                     Ok(root) => return Ok(root),
                     Err(lost) if lost.residual < best.residual => best = lost,
                     Err(_) => {}
@@ -236,12 +235,11 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
     }
 
     /// The displacement of the last of a row of steps of growing sizes from the same start, up to
-    /// that of `residual`: the branch of solutions that begins at rest is followed by secants. A
+    /// that of `residual`: the branch of solutions that begins at rest is followed along its tangents. A
     /// solution counts as one of this branch if it is near its prediction.
     fn follow<Y>(
         &self,
         residual: &Residual<'_, Y, R, W>,
-        start: &Start<'_, Y>,
         work: &mut Work,
     ) -> Option<Vector<Y::Manifold>>
     where
@@ -249,24 +247,22 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
         R: Retraction<Y::Manifold, Y::Metric>,
     {
         let newton = Newton { sweeps: 8, halvings: 2, ..self.newton };
-        let mut slope = explicit(residual.system(), start)?;
         let (mut u, mut share, mut increment) = (Vector::<Y::Manifold>::zero(), 0.0, 0.125);
         for _ in 0..STAGES {
             let next = f64::min(share + increment, 1.0);
-            let predicted = u + slope * (next - share);
-            let solved = newton.solve_near(&residual.of_share(next), &predicted, &mut None);
-            work.sweeps += solved.as_ref().map_or_else(|lost| lost.sweeps, |root| root.sweeps);
-            let near = solved.ok().filter(|root| {
-                let step = root.u - u;
-                (root.u - predicted).magnitude() <= 0.3 * step.magnitude()
+            let equation = residual.of_share(next);
+            let predicted = corrected(&equation, &u);
+            work.sweeps += 1;
+            let near = predicted.and_then(|predicted| {
+                let solved = newton.solve_near(&equation, &predicted, &mut None);
+                work.sweeps += solved.as_ref().map_or_else(|lost| lost.sweeps, |root| root.sweeps);
+                let root = solved.ok()?.u;
+                let off = (root - predicted).magnitude();
+                (off <= NEARBY * (root - u).magnitude()).then_some(root)
             });
             match near {
-                Some(root) if next >= 1.0 => return Some(root.u),
-                Some(root) => {
-                    slope = (root.u - u) * (next - share).recip();
-                    (u, share) = (root.u, next);
-                    increment *= 2.0;
-                }
+                Some(root) if next >= 1.0 => return Some(root),
+                Some(root) => (u, share, increment) = (root, next, 2.0 * increment),
                 None => increment *= 0.25,
             }
             if increment <= LEAST * share {
@@ -277,6 +273,17 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
     }
 }
 
+/// The point that Newton's method goes to from `u`.
+fn corrected<M: Manifold>(equation: &impl Equation<M>, u: &Vector<M>) -> Option<Vector<M>> {
+    let at = equation.linearise(u)?;
+    at.jacobian.solve(&at.residual).map(|step| *u - step).filter(Column::is_finite)
+}
+
+/// A solution belongs to a branch if it is off its prediction by no more than this share of the way.
+const NEARBY: f64 = 0.2;
+/// Linear systems after which a way from rest is no longer direct, and its end no longer likely to be
+/// the solution that belongs to the start.
+const DIRECT: usize = 8;
 /// Steps of growing sizes that may be tried to get to the size that is asked for.
 const STAGES: usize = 100;
 /// The share of what has been reached below which an increment of the size means that the branch of
@@ -303,9 +310,8 @@ pub(crate) struct Lost {
 
 /// Whether it is the edge of the domain that stops Newton's method at `u`.
 fn at_edge<M: Manifold>(equation: &impl Equation<M>, u: &Vector<M>) -> bool {
-    let Some(at) = equation.linearise(u) else { return true };
-    let correction = at.jacobian.solve(&at.residual).filter(|step| step.is_finite());
-    correction.is_some_and(|correction| equation.value(&(*u - correction)).is_none())
+    equation.value(u).is_none()
+        || corrected(equation, u).is_some_and(|next| equation.value(&next).is_none())
 }
 
 /// The size of the smallest part of a step that was split `splits` times.

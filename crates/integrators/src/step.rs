@@ -7,7 +7,7 @@ use metriplectic_manifolds::{Manifold, Retraction, Riemannian};
 use crate::discrete_gradient::{DiscreteGradient, Gonzalez};
 use crate::error::{StepError, Tried};
 use crate::newton::{Inverse, Newton};
-use crate::residual::{Dim, Numbers, Recall, Residual, Sizes};
+use crate::residual::{Dim, LastCorrection, Numbers, Recall, Residual, Sizes};
 use crate::root_finder::{Equation, NoRoot, Root};
 
 /// A scheme: a retraction, and how hard to try to solve its equation.
@@ -178,12 +178,21 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
         let end = self.retraction.end(system.metric(), start.x, &root.u).map_err(|_| lost())?;
         let last = residual.last_correction(&root, &end);
         work.sweeps += usize::from(last.is_some());
-        let (u, end) = last.unwrap_or((root.u, end));
+        let LastCorrection { u, end, moved } =
+            last.unwrap_or(LastCorrection { u: root.u, end, moved: false });
         // Outside an open chart the defect is infinite: there is no state to go on from.
         if system.manifold().defect(&end).is_infinite() {
             return Err(lost());
         }
-        Ok(memory.note::<Y::Manifold, _>(system.metric(), start.x, &u, end))
+        if moved {
+            memory.carry = None;
+        }
+        let end = memory.note::<Y::Manifold, _>(system.metric(), start.x, &u, end);
+        if moved {
+            // What the end has been moved by is not lost.
+            memory.carry = None;
+        }
+        Ok(end)
     }
 
     /// A root where Newton's method has lost its way from the guess, in the order of the

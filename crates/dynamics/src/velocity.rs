@@ -326,8 +326,7 @@ pub fn velocity_jet<Y: Metriplectic + ?Sized>(
         + k.tensor.magnitude() * Column::magnitude(&alpha.value)
         + pi_noise
         + Column::magnitude(&k.value) * off.amplification();
-    let (gain, irreversible) =
-        (pi_size + k.along_w.magnitude(), Column::magnitude(&k_s.value));
+    let (gain, irreversible) = (pi_size + k.along_w.magnitude(), Column::magnitude(&k_s.value));
     Ok(VelocityJet { velocity, terms, gain, irreversible })
 }
 

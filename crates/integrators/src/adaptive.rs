@@ -411,7 +411,8 @@ mod tests {
             let step = |k: f64| x(-k * h) - x(-(k + 1.0) * h);
             let [a, b, c] = [0.0, 1.0, 2.0].map(step);
             let mut memory = Line { known: n, ..Line::new() };
-            for (slot, d) in memory.differences.iter_mut().zip([a, a - b, a - b * 2.0 + c]).take(n) {
+            for (slot, d) in memory.differences.iter_mut().zip([a, a - b, a - b * 2.0 + c]).take(n)
+            {
                 *slot = Vector1::new(d);
             }
             memory

@@ -166,7 +166,15 @@ impl fmt::Display for Certificate {
             counted(self.sweeps, "Newton sweep", "Newton sweeps"),
             self.worst_sweeps,
             counted(self.retries, "retry", "retries")
-        )
+        )?;
+        if self.continued > 0 {
+            let steps = counted(self.continued, "continuation", "continuations");
+            write!(f, ", {steps} in the step size")?;
+        }
+        if self.globalised > 0 {
+            write!(f, ", {} of the globaliser", counted(self.globalised, "call", "calls"))?;
+        }
+        Ok(())
     }
 }
 
@@ -189,7 +197,7 @@ impl Certificate {
 }
 
 /// A number with its noun.
-fn counted(n: usize, one: &str, many: &str) -> String {
+pub(crate) fn counted(n: usize, one: &str, many: &str) -> String {
     format!("{n} {}", if n == 1 { one } else { many })
 }
 

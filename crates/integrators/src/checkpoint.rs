@@ -415,7 +415,10 @@ impl SavedLinearisation {
         let [terms, gain] = self.sizes;
         Ok(Linearisation {
             inverse: Inverse { matrix, contraction },
-            sizes: Sizes { terms: number("size of its terms", terms)?, gain: number("gain", gain)? },
+            sizes: Sizes {
+                terms: number("size of its terms", terms)?,
+                gain: number("gain", gain)?,
+            },
             h: number("step size", self.h)?,
             length: number("length of a step", self.length)?,
             steps: self.steps,

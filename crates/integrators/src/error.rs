@@ -9,6 +9,7 @@ use metriplectic_dynamics::{BuildError, FormError, LegendreError, ModelError, Po
 use metriplectic_manifolds::{AlgebraError, Manifold, MetricError, PointError};
 
 use crate::attitude::AttitudeError;
+use crate::certificate::counted;
 use crate::checkpoint::ResumeError;
 use crate::span::SpanError;
 use crate::trajectory::Trajectory;
@@ -31,8 +32,11 @@ impl fmt::Display for Tried {
         let Self { sweeps, continued, globalised, splits } = self;
         write!(
             f,
-            "{sweeps} Newton sweeps, {continued} continuations in the step size, \
-             {globalised} calls of the globaliser, {splits} halvings of the step"
+            "{}, {} in the step size, {} of the globaliser and {} of the step",
+            counted(*sweeps, "Newton sweep", "Newton sweeps"),
+            counted(*continued, "continuation", "continuations"),
+            counted(*globalised, "call", "calls"),
+            counted(*splits, "halving", "halvings"),
         )
     }
 }

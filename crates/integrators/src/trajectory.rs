@@ -252,7 +252,8 @@ where
             work.entropy_slope = f64::INFINITY;
             let kept = (&self.invariants, self.entropy);
             let start = from::<Y>(&self.state, kept, &self.certificate, h);
-            let end = self.scheme.attempt(system, &start, &mut memory, Effort::Part, &mut work).ok();
+            let end =
+                self.scheme.attempt(system, &start, &mut memory, Effort::Part, &mut work).ok();
             let error = end.as_ref().and_then(|end| controller.error_of(system, start.x, end, h));
             match (end, error) {
                 (Some(point), Some(error)) if error <= 1.0 => {

@@ -204,11 +204,7 @@ impl Case {
         self.outcome(system, self.x())
     }
 
-    fn outcome<Y: Metriplectic, E: std::fmt::Debug>(
-        &self,
-        system: Result<Y, E>,
-        x: Point<Y>,
-    ) -> Outcome
+    fn outcome<Y: Metriplectic, E: fmt::Debug>(&self, system: Result<Y, E>, x: Point<Y>) -> Outcome
     where
         WeylMidpoint: Retraction<Y::Manifold, Y::Metric>,
     {
@@ -361,19 +357,22 @@ fn every_hard_start_ends_in_a_certified_step_or_in_the_right_error() {
     // Every solvable start, 218, ends in a certified step.
     assert_eq!(of_solvable[..4].iter().sum::<usize>(), 218);
     let [plain, continued, globalised, split, ..] = of_solvable;
-    assert!(plain >= 195 && continued <= 25 && globalised == 0 && split <= 2, "{of_solvable:?}");
+    assert!(plain >= 191 && continued <= 26 && globalised == 0 && split <= 2, "{of_solvable:?}");
     // Every other ends in a certified step, of another solution or of halves, or in a typed error.
     assert_eq!(of_others[..6].iter().sum::<usize>(), 24);
-    assert!(of_others[2] >= 1 && of_others[3] >= 5, "{of_others:?}");
-    assert!(of_others[4] + of_others[5] <= 8, "{of_others:?}");
+    let [_, _, globalised, split, not_converged, out_of_domain, ..] = of_others;
+    assert!(globalised >= 4 && split >= 8, "{of_others:?}");
+    assert!(not_converged + out_of_domain <= 6, "{of_others:?}");
 
-    // The tamest half of the solvable ones needs no globaliser and no split.
+    // The tamest half of the solvable ones needs no globaliser and no split; 107 of 109 need nothing but
+    // Newton's method, and two are continued in the step size: the top on the sphere and the logarithm,
+    // both at h · rate = 1.7.
     let mut tame: Vec<&(Case, Outcome)> = solvable.clone().collect();
     tame.sort_by(|(a, _), (b, _)| a.number("tameness").total_cmp(&b.number("tameness")));
     tame.truncate(109);
     let of_tame = counts(tame.iter().map(|(_, outcome)| outcome));
     println!("the tamest half: {of_tame:?}");
-    assert!(of_tame[0] >= 108 && of_tame[0] + of_tame[1] == 109, "{of_tame:?}");
+    assert!(of_tame[0] >= 107 && of_tame[0] + of_tame[1] == 109, "{of_tame:?}");
 
     // Without a split, the end is the one of the branch, but for other solutions of the same equation.
     let ends = solvable.filter_map(|(case, outcome)| match outcome {

@@ -11,7 +11,7 @@
 //!    corrections.
 //! 3. **Continuation in the step size**: the solution that begins at rest is followed along its tangent
 //!    from a step of size 0 to the one that is asked for, by increments that double where Newton's
-//!    method ends near the prediction and are quartered where it does not. At most 100 increments, and
+//!    method ends near the prediction and are quartered where it does not. At most 200 increments, and
 //!    none below 10⁻⁴ of the size reached: there the solution has turned back, or has met the edge of the
 //!    domain.
 //! 4. **The globaliser**, 100 iterations of argmin's L-BFGS on `½|F(u)|²` from the best point of 1 and 2,
@@ -285,9 +285,15 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
         for _ in 0..STAGES {
             let next = f64::min(share + increment, 1.0);
             let equation = residual.of_share(next);
-            let predicted = corrected(&equation, &u);
             work.sweeps += 1;
-            let near = predicted.and_then(|predicted| {
+            let near = equation.linearise(&u).and_then(|at| {
+                let step = at.jacobian.solve(&at.residual)?;
+                // The branch begins as a straight line: the implicit displacement is the explicit one.
+                let bends = (step - at.residual).magnitude() > NEARBY * step.magnitude();
+                if share <= 0.0 && bends {
+                    return None;
+                }
+                let predicted = u - step;
                 let solved = newton.solve_near(&equation, &predicted, &mut None);
                 work.sweeps += sweeps(&solved);
                 let root = solved.ok()?.u;
@@ -319,12 +325,12 @@ fn corrected<M: Manifold>(equation: &impl Equation<M>, u: &Vector<M>) -> Option<
 }
 
 /// A solution belongs to a branch if it is off its prediction by no more than this share of the way.
-const NEARBY: f64 = 0.2;
+const NEARBY: f64 = 0.1;
 /// Linear systems after which a way from rest is no longer direct, and its end no longer likely to be
 /// the solution that belongs to the start.
 const DIRECT: usize = 8;
 /// Steps of growing sizes that may be tried to get to the size that is asked for.
-const STAGES: usize = 100;
+const STAGES: usize = 200;
 /// The share of what has been reached below which an increment of the size means that the branch of
 /// solutions ends there.
 const LEAST: f64 = 1e-4;

@@ -49,6 +49,8 @@ pub struct Certificate {
     pub worst_sweeps: usize,
     /// How often a step was retried as two halves.
     pub retries: usize,
+    /// How often a step was approached through smaller ones from the same start.
+    pub continued: usize,
     /// How often the globaliser was called.
     pub globalised: usize,
     /// What the model promises about its entropy; serialized as the name of the variant.
@@ -163,7 +165,15 @@ impl fmt::Display for Certificate {
             counted(self.sweeps, "Newton sweep", "Newton sweeps"),
             self.worst_sweeps,
             counted(self.retries, "retry", "retries")
-        )
+        )?;
+        if self.continued > 0 {
+            let steps = counted(self.continued, "continuation", "continuations");
+            write!(f, ", {steps} in the step size")?;
+        }
+        if self.globalised > 0 {
+            write!(f, ", {} of the globaliser", counted(self.globalised, "call", "calls"))?;
+        }
+        Ok(())
     }
 }
 
@@ -196,7 +206,7 @@ impl Certificate {
 }
 
 /// A number with its noun.
-fn counted(n: usize, one: &str, many: &str) -> String {
+pub(crate) fn counted(n: usize, one: &str, many: &str) -> String {
     format!("{n} {}", if n == 1 { one } else { many })
 }
 
@@ -221,6 +231,7 @@ mod tests {
         sweeps: 9,
         worst_sweeps: 2,
         retries: 1,
+        continued: 0,
         globalised: 0,
         second_law: SecondLaw::Exact,
         projected: false,

@@ -144,6 +144,7 @@ struct Balance {
     sweeps: usize,
     worst_sweeps: usize,
     retries: usize,
+    continued: usize,
     globalised: usize,
 }
 
@@ -526,6 +527,7 @@ impl Balance {
             sweeps: c.sweeps,
             worst_sweeps: c.worst_sweeps,
             retries: c.retries,
+            continued: c.continued,
             globalised: c.globalised,
         }
     }
@@ -558,6 +560,7 @@ impl Balance {
             sweeps: self.sweeps,
             worst_sweeps: self.worst_sweeps,
             retries: self.retries,
+            continued: self.continued,
             globalised: self.globalised,
             second_law: system.second_law(),
             projected: system.dissipation().is_projected(),

@@ -9,9 +9,37 @@ use metriplectic_dynamics::{BuildError, FormError, LegendreError, ModelError, Po
 use metriplectic_manifolds::{AlgebraError, Manifold, MetricError, PointError};
 
 use crate::attitude::AttitudeError;
+use crate::certificate::counted;
 use crate::checkpoint::ResumeError;
 use crate::span::SpanError;
 use crate::trajectory::Trajectory;
+
+/// What was done to solve a step.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Tried {
+    /// Linear systems solved by Newton's method, over all attempts.
+    pub sweeps: usize,
+    /// How often the step was approached through smaller ones from the same start.
+    pub continued: usize,
+    /// How often the globaliser was called.
+    pub globalised: usize,
+    /// How often the step, or a part of it, was split in halves.
+    pub splits: usize,
+}
+
+impl fmt::Display for Tried {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { sweeps, continued, globalised, splits } = self;
+        write!(
+            f,
+            "{}, {} in the step size, {} of the globaliser and {} of the step",
+            counted(*sweeps, "Newton sweep", "Newton sweeps"),
+            counted(*continued, "continuation", "continuations"),
+            counted(*globalised, "call", "calls"),
+            counted(*splits, "halving", "halvings"),
+        )
+    }
+}
 
 /// A step that could not be taken, after its halves had been tried too.
 #[derive(Clone, Copy, PartialEq, thiserror::Error)]
@@ -20,8 +48,7 @@ pub enum StepError {
     /// The implicit equation was not solved.
     #[error(
         "the step of size {h:.3e} from t = {time:.6} was not solved: residual {residual:.1e} after \
-         {sweeps} Newton sweeps, with {splits} halvings of the step tried; \
-         try a step below {suggested:.1e}"
+         {tried}; try a step below {suggested:.1e}"
     )]
     NotConverged {
         /// The time at which the step starts.
@@ -30,10 +57,8 @@ pub enum StepError {
         h: f64,
         /// The residual that was left in the smallest step tried.
         residual: f64,
-        /// Linear systems solved in this step, over all attempts.
-        sweeps: usize,
-        /// How often the step was halved.
-        splits: usize,
+        /// What was done to solve it.
+        tried: Tried,
         /// A step size to try next.
         suggested: f64,
     },
@@ -68,18 +93,19 @@ pub enum StepError {
         /// The least step size.
         least: f64,
     },
-    /// A field is not defined around the start of the step.
+    /// Even in the smallest part of the step the way to a solution leads out of the domain of a field, of
+    /// the metric or of the chart.
     #[error(
         "the step of size {h:.3e} from t = {time:.6} leaves the domain of the model wherever it goes \
-         ({splits} halvings tried); try a smaller step, or check energy and entropy there"
+         ({tried}); try a smaller step, or check energy and entropy there"
     )]
     OutOfDomain {
         /// The time at which the step starts.
         time: f64,
         /// The size of the step that was asked for.
         h: f64,
-        /// How often the step was halved.
-        splits: usize,
+        /// What was done to solve it.
+        tried: Tried,
     },
 }
 

@@ -42,7 +42,7 @@ pub use checkpoint::{Checkpoint, ResumeError};
 pub use discrete_gradient::{
     Chord, DiscreteGradient, Gonzalez, ItohAbe, MeanValue, SymmetricItohAbe,
 };
-pub use error::{Error, RunError, StepError};
+pub use error::{Error, RunError, StepError, Tried};
 pub use newton::Newton;
 pub use observables::{Csv, Npy, Observables};
 pub use residual::Residual;

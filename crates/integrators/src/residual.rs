@@ -85,6 +85,14 @@ impl<Y: Metriplectic> Recall<Y> {
     }
 }
 
+/// A root corrected for its energy.
+pub(crate) struct LastCorrection<M: Manifold> {
+    pub(crate) u: Vector<M>,
+    pub(crate) end: M::Point<f64>,
+    /// Whether the end is no longer that of `u`.
+    pub(crate) moved: bool,
+}
+
 /// The dimension of the manifold of a system.
 pub(crate) type Dim<Y> = <<Y as Metriplectic>::Manifold as Space>::Dim;
 
@@ -142,6 +150,13 @@ where
     pub(crate) fn with_sizes(self, sizes: Option<Sizes>) -> Self {
         self.sizes.set(sizes);
         self
+    }
+
+    /// The equation of a step of a share of the size, which takes nothing back.
+    pub(crate) fn of_share(&self, share: f64) -> Self {
+        let parts = (self.retraction, self.gradient);
+        let start = (self.x, [self.energy, self.entropy]);
+        Self::recalling(self.system, parts, start, self.h * share, Recall::nothing())
     }
 
     /// The sizes that round-off is judged by, if they are known.
@@ -202,24 +217,58 @@ where
     /// `d − h(Πw + K dS)` has lost digits of this number that the difference `H(x') − H(x)` has. So
     /// the last correction is that of the residual whose part along `w` is exact,
     /// `F + (e − ⟨w, F⟩) w/|w|²`, as long as this changes `F` within its round-off and reduces `e`.
+    ///
+    /// Where the end is nearer to the edge of a domain than the displacement has digits, no `u` has the
+    /// right energy; there the end itself is moved, within the rounding of `u`.
     #[inline]
     pub(crate) fn last_correction(
         &self,
         root: &Root<Y::Manifold>,
         end: &Point<Y>,
-    ) -> Option<(Vector<Y::Manifold>, Point<Y>)> {
+    ) -> Option<LastCorrection<Y::Manifold>> {
         // A floor near the rounding of the entries of x' needs no correction.
         let coarse = root.floor > 8.0 * f64::EPSILON * Y::Manifold::magnitude(self.x);
         let e = if coarse { self.imbalance(end) } else { 0.0 };
-        if e.abs() <= 4.0 * f64::EPSILON * self.energy.abs() {
-            None
-        } else {
-            self.balance(&root.u, e)
-        }
+        if self.is_balanced(e) { None } else { self.correct(&root.u, end, e) }
+    }
+
+    /// Whether an error of the energy is its round-off.
+    #[inline]
+    fn is_balanced(&self, e: f64) -> bool {
+        e.abs() <= 4.0 * f64::EPSILON * self.energy.abs()
     }
 
     /// The last correction, for an error `e` of the energy.
     #[cold]
+    fn correct(
+        &self,
+        u: &Vector<Y::Manifold>,
+        end: &Point<Y>,
+        e: f64,
+    ) -> Option<LastCorrection<Y::Manifold>> {
+        let balanced = self.balance(u, e);
+        let (u, at) = balanced.as_ref().map_or((u, end), |(u, end)| (u, end));
+        if let Some(end) = self.settle(u, at) {
+            return Some(LastCorrection { u: *u, end, moved: true });
+        }
+        balanced.map(|(u, end)| LastCorrection { u, end, moved: false })
+    }
+
+    /// The end `x'` with the part along `dH` taken off that the rounding of `u` has put there.
+    fn settle(&self, u: &Vector<Y::Manifold>, end: &Point<Y>) -> Option<Point<Y>> {
+        let e = self.imbalance(end);
+        if self.is_balanced(e) {
+            return None;
+        }
+        let slope = self.system.energy().jet1(end).df;
+        let off = slope * (-e / slope.dot(&slope));
+        let rounding = f64::EPSILON * (Y::Manifold::magnitude(self.x) + u.magnitude());
+        let settled = Y::Manifold::chart(end, &off);
+        let better = self.imbalance(&settled).abs() < e.abs();
+        (off.magnitude() <= 4.0 * rounding && better).then_some(settled)
+    }
+
+    /// The root with the energy corrected by its error `e`.
     fn balance(&self, u: &Vector<Y::Manifold>, e: f64) -> Option<(Vector<Y::Manifold>, Point<Y>)> {
         let Jet { at, w } = self.jet(u)?;
         let lost = w * ((e - w.dot(&at.residual)) / w.dot(&w));
@@ -263,7 +312,7 @@ where
         let slopes = metric.slopes(&arc.z);
         let (along, slopes) = (Along::new(self, u, &g), slopes.as_ref());
         let start = (self.energy, self.recall.energy);
-        let (energy, chord) = along.jet(system.energy(), start, &arc, slopes);
+        let (energy, chord, steepness) = along.jet(system.energy(), start, &arc, slopes);
         let entropy = if self.is_exact() {
             along.jet(system.entropy(), (self.entropy, self.recall.entropy), &arc, slopes).0
         } else {
@@ -279,7 +328,9 @@ where
         let residual = arc.d - velocity.value * h;
         let jacobian = arc.dd - velocity.slope * h;
         let (length, sizes) = (arc.d.magnitude(), Sizes { terms, gain });
-        let floor = sizes.floor(h, length, chord.noise(length));
+        // Near the edge of a domain dH is far steeper at x' than at z, and the rounding of d counts there.
+        let noise = chord.noise(length) + f64::EPSILON * steepness;
+        let floor = sizes.floor(h, length, noise);
         self.sizes.set(Some(sizes));
         let usable = residual.is_finite() && jacobian.magnitude().is_finite();
         usable.then_some(Jet { at: Linearised { residual, jacobian, floor }, w: energy.value })
@@ -390,7 +441,7 @@ where
         (chord.covector(recall, self.g, &arc.d), chord.noise(arc.d.magnitude()))
     }
 
-    /// The same with its derivatives.
+    /// The same with its derivatives, and the size of `dF(x')`.
     #[inline]
     fn jet(
         &self,
@@ -398,13 +449,13 @@ where
         (start, recall): (f64, f64),
         arc: &ArcJet<Y::Manifold>,
         slopes: Option<&Slopes<Y::Manifold>>,
-    ) -> (Moving<Dim<Y>>, Chord<Y::Manifold>) {
+    ) -> (Moving<Dim<Y>>, Chord<Y::Manifold>, f64) {
         let (mean, dmean) = self.step.gradient.mean_jet(f, self.step.x, arc);
         let end = f.jet1(&arc.end);
         let chord = self.chord(f, start, &mean, (&arc.z, &arc.d), (&arc.end, end.value));
         let value = chord.covector(recall, self.g, &arc.d);
         let slope = chord.slope(recall, (self.g, slopes), arc, &dmean, &end.df);
-        (Moving { value, slope }, chord)
+        (Moving { value, slope }, chord, end.df.magnitude())
     }
 }
 

@@ -1,14 +1,41 @@
 //! One step: guess, solve, retract.
+//!
+//! The equation of a step is tried in this order, until it is solved:
+//!
+//! 1. **Newton's method from the guess**: the displacement extrapolated from the steps before, with the
+//!    Jacobian that they have left, else that of explicit Euler. It is damped: a correction that
+//!    leaves the domain of a field, or does not reduce the residual, is halved up to
+//!    [`Newton::halvings`] times. At most [`Newton::sweeps`] corrections.
+//! 2. **Newton's method from rest**, `u = 0`, where all is defined that is defined at the start. Its first
+//!    correction is the linearly implicit step, which stiff friction does not drive off. At most 8
+//!    corrections.
+//! 3. **Continuation in the step size**: the solution that begins at rest is followed along its tangent
+//!    from a step of size 0 to the one that is asked for, by increments that double where Newton's
+//!    method ends near the prediction and are quartered where it does not. At most 200 increments, and
+//!    none below 10⁻⁴ of the size reached: there the solution has turned back, or has met the edge of the
+//!    domain.
+//! 4. **The globaliser**, 100 iterations of argmin's L-BFGS on `½|F(u)|²` from the best point of 1 and 2,
+//!    then Newton's method from where it ends (with the feature `argmin`). What it finds is a solution,
+//!    with both laws, but it may be another one than that of 3.
+//! 5. **Halves**: the step is taken as two of half the size, each by 1 and 2 alone, and each that
+//!    fails is halved again, [`Scheme::splits`] times at most. Both laws hold for each part.
+//! 6. [`StepError`]: `OutOfDomain` if in the smallest part the edge of a domain is in Newton's way,
+//!    `NotConverged` if it is not; either with all that was tried.
+//!
+//! Steps of adaptive size are tried by 1 and 2, and then by a smaller step.
+//!
+//! Of the 242 starts of `tests/hard_corpus.rs` 218 have a solution that continuation in 60 digits finds.
+//! All of them end in a certified step.
 
 use metriplectic_dynamics::{Bracket, Dissipation, Invariants, Metriplectic, system::Point};
 use metriplectic_fields::{ChartPoint, Column, Dimension, ScalarField, Square, Vector};
 use metriplectic_manifolds::{Manifold, Retraction, Riemannian};
 
 use crate::discrete_gradient::{DiscreteGradient, Gonzalez};
-use crate::error::StepError;
+use crate::error::{StepError, Tried};
 use crate::newton::{Inverse, Newton};
-use crate::residual::{Dim, Numbers, Recall, Residual, Sizes};
-use crate::root_finder::{NoRoot, Root};
+use crate::residual::{Dim, LastCorrection, Numbers, Recall, Residual, Sizes};
+use crate::root_finder::{Equation, NoRoot, Root};
 
 /// A scheme: a retraction, and how hard to try to solve its equation.
 ///
@@ -69,27 +96,32 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
         R: Retraction<Y::Manifold, Y::Metric>,
     {
         let mut work = Work::default();
-        match self.attempt(system, start, memory, &mut work) {
+        let whole = self.attempt(system, start, memory, Effort::Whole, &mut work);
+        let end = whole.or_else(|Lost { .. }| {
+            *memory = Memory::new();
+            self.halves(system, start, 1, &mut work)
+        });
+        match end {
             Ok(end) => Ok((end, work)),
-            Err(failure) => {
-                *memory = Memory::new();
-                let end = self.halves(system, start, 1, &mut work).map_err(|smallest| {
-                    let residual = smallest.residual.min(failure.residual);
-                    if residual.is_finite() {
-                        StepError::NotConverged {
-                            time: start.time,
-                            h: start.h,
-                            residual,
-                            sweeps: work.sweeps,
-                            splits: work.splits,
-                            suggested: smallest_part(start.h, self.splits),
-                        }
-                    } else {
-                        StepError::OutOfDomain { time: start.time, h: start.h, splits: work.splits }
-                    }
-                })?;
-                Ok((end, work))
-            }
+            Err(smallest) => Err(self.failure(start, smallest, &work)),
+        }
+    }
+
+    /// What a user is told of a step that was not solved, by what became of its smallest part.
+    #[cold]
+    fn failure<Y: Metriplectic>(
+        &self,
+        &Start { time, h, .. }: &Start<'_, Y>,
+        Lost { residual, edge }: Lost,
+        work: &Work,
+    ) -> StepError {
+        let Work { sweeps, continued, globalised, splits, .. } = *work;
+        let tried = Tried { sweeps, continued, globalised, splits };
+        if edge {
+            StepError::OutOfDomain { time, h, tried }
+        } else {
+            let suggested = smallest_part(h, self.splits);
+            StepError::NotConverged { time, h, residual, tried, suggested }
         }
     }
 
@@ -100,7 +132,7 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
         start: &Start<'_, Y>,
         depth: usize,
         work: &mut Work,
-    ) -> Result<Point<Y>, NoRoot<Y::Manifold>>
+    ) -> Result<Point<Y>, Lost>
     where
         Y: Metriplectic,
         R: Retraction<Y::Manifold, Y::Metric>,
@@ -117,7 +149,7 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
             };
             let time = start.time + f64::from(half) * h;
             let part = Start { x: &point, time, h, energy, entropy, left_over, ..*start };
-            let end = match self.attempt(system, &part, &mut memory, work) {
+            let end = match self.attempt(system, &part, &mut memory, Effort::Part, work) {
                 Ok(end) => end,
                 Err(failure) if depth >= self.splits => return Err(failure),
                 Err(_) => self.halves(system, &part, depth + 1, work)?,
@@ -133,8 +165,9 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
         system: &Y,
         start: &Start<'_, Y>,
         memory: &mut Memory<Dim<Y>>,
+        effort: Effort,
         work: &mut Work,
-    ) -> Result<Point<Y>, NoRoot<Y::Manifold>>
+    ) -> Result<Point<Y>, Lost>
     where
         Y: Metriplectic,
         R: Retraction<Y::Manifold, Y::Metric>,
@@ -148,7 +181,12 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
         let residual = Residual::recalling(system, parts, (start.x, values), start.h, recall)
             .with_sizes(known.map(|known| known.sizes));
         let mut inverse = known.map(|known| known.inverse);
-        let root = self.solve(&residual, &guess, &mut inverse, work)?;
+        let root = self.newton.solve_near(&residual, &guess, &mut inverse);
+        work.sweeps += sweeps(&root);
+        let root = match root {
+            Ok(root) => root,
+            Err(failure) => self.rescue(&residual, failure, effort, &mut inverse, work)?,
+        };
         memory.linearised = inverse.zip(residual.sizes()).map(|(inverse, sizes)| match known {
             Some(known) if known.sizes == sizes => {
                 Linearisation { inverse, steps: known.steps + 1, ..known }
@@ -162,44 +200,163 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
             // would make a random walk of the energy.
             return Ok(start.x.clone());
         }
-        let lost = || NoRoot { best: root.u, residual: f64::INFINITY, sweeps: root.sweeps };
+        let lost = || Lost { residual: root.residual, edge: true };
         let end = self.retraction.end(system.metric(), start.x, &root.u).map_err(|_| lost())?;
         let last = residual.last_correction(&root, &end);
         work.sweeps += usize::from(last.is_some());
-        let (u, end) = last.unwrap_or((root.u, end));
+        let LastCorrection { u, end, moved } =
+            last.unwrap_or(LastCorrection { u: root.u, end, moved: false });
         // Outside an open chart the defect is infinite: there is no state to go on from.
         if system.manifold().defect(&end).is_infinite() {
             return Err(lost());
         }
-        Ok(memory.note::<Y::Manifold, _>(system.metric(), start.x, &u, end))
+        if moved {
+            memory.carry = None;
+        }
+        let end = memory.note::<Y::Manifold, _>(system.metric(), start.x, &u, end);
+        if moved {
+            // What the end has been moved by is not lost.
+            memory.carry = None;
+        }
+        Ok(end)
     }
 
-    /// Newton's method, and where it is lost the globaliser with Newton's polish.
-    fn solve<Y>(
+    /// A root where Newton's method has lost its way from the guess, in the order of the
+    /// [module](self).
+    #[cold]
+    fn rescue<Y>(
         &self,
         residual: &Residual<'_, Y, R, W>,
-        guess: &Vector<Y::Manifold>,
+        failure: NoRoot<Y::Manifold>,
+        effort: Effort,
         inverse: &mut Option<Inverse<Dim<Y>>>,
         work: &mut Work,
-    ) -> Result<Root<Y::Manifold>, NoRoot<Y::Manifold>>
+    ) -> Result<Root<Y::Manifold>, Lost>
     where
         Y: Metriplectic,
         R: Retraction<Y::Manifold, Y::Metric>,
     {
-        let solved = self.newton.solve_near(residual, guess, inverse);
-        work.sweeps += solved.as_ref().map_or_else(|failure| failure.sweeps, |root| root.sweeps);
-        #[cfg(feature = "argmin")]
-        if let Err(failure) = &solved
-            && let Some(closer) = crate::globaliser::descend(residual, &failure.best)
-        {
-            work.globalised += 1;
-            let polished = self.newton.solve_near(residual, &closer, inverse);
-            work.sweeps +=
-                polished.as_ref().map_or_else(|failure| failure.sweeps, |root| root.sweeps);
-            return polished;
+        let mut best = failure;
+        let mut newton = |newton: &Newton, guess: &Vector<Y::Manifold>, work: &mut Work| {
+            let solved = newton.solve_near(residual, guess, inverse);
+            work.sweeps += sweeps(&solved);
+            solved
+                .map_err(|lost| {
+                    if lost.residual < best.residual {
+                        best = lost;
+                    }
+                })
+                .or(Err(best.best))
+        };
+        let direct = Newton { sweeps: DIRECT.min(self.newton.sweeps), ..self.newton };
+        let mut solved = newton(&direct, &Vector::<Y::Manifold>::zero(), work);
+        if effort == Effort::Whole {
+            if solved.is_err()
+                && let Some(near) = self.follow(residual, work)
+            {
+                solved = newton(&self.newton, &near, work);
+            }
+            #[cfg(feature = "argmin")]
+            if let Err(best) = &solved
+                && let Some(closer) = crate::globaliser::descend(residual, best)
+            {
+                work.globalised += 1;
+                solved = newton(&self.newton, &closer, work);
+            }
         }
-        solved
+        solved.map_err(|at| Lost { residual: best.residual, edge: at_edge(residual, &at) })
     }
+
+    /// The displacement of the last of a row of steps of growing sizes from the same start, up to
+    /// that of `residual`: the branch of solutions that begins at rest is followed along its tangents. A
+    /// solution counts as one of this branch if it is near its prediction.
+    fn follow<Y>(
+        &self,
+        residual: &Residual<'_, Y, R, W>,
+        work: &mut Work,
+    ) -> Option<Vector<Y::Manifold>>
+    where
+        Y: Metriplectic,
+        R: Retraction<Y::Manifold, Y::Metric>,
+    {
+        work.continued += 1;
+        let newton = Newton { sweeps: DIRECT, halvings: 2, ..self.newton };
+        let (mut u, mut share, mut increment) = (Vector::<Y::Manifold>::zero(), 0.0, 0.125);
+        for _ in 0..STAGES {
+            let next = f64::min(share + increment, 1.0);
+            let equation = residual.of_share(next);
+            work.sweeps += 1;
+            let near = equation.linearise(&u).and_then(|at| {
+                let step = at.jacobian.solve(&at.residual)?;
+                // The branch begins as a straight line: the implicit displacement is the explicit one.
+                let bends = (step - at.residual).magnitude() > NEARBY * step.magnitude();
+                if share <= 0.0 && bends {
+                    return None;
+                }
+                let predicted = u - step;
+                let solved = newton.solve_near(&equation, &predicted, &mut None);
+                work.sweeps += sweeps(&solved);
+                let root = solved.ok()?.u;
+                let off = (root - predicted).magnitude();
+                (off <= NEARBY * (root - u).magnitude()).then_some(root)
+            });
+            match near {
+                Some(root) if next >= 1.0 => return Some(root),
+                Some(root) => (u, share, increment) = (root, next, 2.0 * increment),
+                None => increment *= 0.25,
+            }
+            if increment <= LEAST * share {
+                return None;
+            }
+        }
+        None
+    }
+}
+
+/// What Newton's method has cost.
+fn sweeps<M: Manifold>(solved: &Result<Root<M>, NoRoot<M>>) -> usize {
+    solved.as_ref().map_or_else(|lost| lost.sweeps, |root| root.sweeps)
+}
+
+/// The point that Newton's method goes to from `u`.
+fn corrected<M: Manifold>(equation: &impl Equation<M>, u: &Vector<M>) -> Option<Vector<M>> {
+    let at = equation.linearise(u)?;
+    at.jacobian.solve(&at.residual).map(|step| *u - step).filter(Column::is_finite)
+}
+
+/// A solution belongs to a branch if it is off its prediction by no more than this share of the way.
+const NEARBY: f64 = 0.1;
+/// Linear systems after which a way from rest is no longer direct, and its end no longer likely to be
+/// the solution that belongs to the start.
+const DIRECT: usize = 8;
+/// Steps of growing sizes that may be tried to get to the size that is asked for.
+const STAGES: usize = 200;
+/// The share of what has been reached below which an increment of the size means that the branch of
+/// solutions ends there.
+const LEAST: f64 = 1e-4;
+
+/// How hard to try.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Effort {
+    /// Everything, because only halving the step comes after it.
+    Whole,
+    /// Newton's method alone, because a smaller step is tried next.
+    Part,
+}
+
+/// A step that was not solved.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Lost {
+    /// The smallest residual that was found.
+    residual: f64,
+    /// Whether the domain of the model is in the way.
+    edge: bool,
+}
+
+/// Whether it is the edge of the domain that stops Newton's method at `u`.
+fn at_edge<M: Manifold>(equation: &impl Equation<M>, u: &Vector<M>) -> bool {
+    equation.value(u).is_none()
+        || corrected(equation, u).is_some_and(|next| equation.value(&next).is_none())
 }
 
 /// The size of the smallest part of a step that was split `splits` times.
@@ -234,6 +391,8 @@ pub struct Work {
     pub sweeps: usize,
     /// How often the step, or a part of it, was split in halves.
     pub splits: usize,
+    /// How often a step was approached through smaller ones from the same start.
+    pub continued: usize,
     /// How often the globaliser was called.
     pub globalised: usize,
     /// The size `|w_S|` of the discrete gradient of the entropy, by which the bracket is projected;
@@ -248,6 +407,7 @@ impl Default for Work {
         Self {
             sweeps: 0,
             splits: 0,
+            continued: 0,
             globalised: 0,
             entropy_slope: f64::INFINITY,
             dissipates: false,
@@ -257,7 +417,7 @@ impl Default for Work {
 
 /// The explicit Euler displacement `h (Π dH + K dS)(x)`.
 fn explicit<Y: Metriplectic>(system: &Y, start: &Start<'_, Y>) -> Option<Vector<Y::Manifold>> {
-    let displacement = system.velocity(&ChartPoint::centre(start.x)).ok()? * start.h;
+    let displacement = system.velocity(&ChartPoint::<Y::Manifold>::centre(start.x)).ok()? * start.h;
     displacement.is_finite().then_some(displacement)
 }
 
@@ -280,7 +440,7 @@ fn recall<Y: Metriplectic>(system: &Y, start: &Start<'_, Y>, d: &Vector<Y::Manif
         return Recall::nothing();
     }
     let (dh, ds) = (system.energy().jet1(start.x).df, system.entropy().jet1(start.x).df);
-    let x = ChartPoint::centre(start.x);
+    let x = ChartPoint::<Y::Manifold>::centre(start.x);
     let pi = system.bracket().linearise(&system.site(&x, &ds), &dh);
     let k = system.dissipation().linearise(system.metric(), start.x, &dh, &ds);
     let sizes = (pi.map_or(0.0, |pi| pi.tensor.max_abs()), k.map_or(0.0, |k| k.along_w.max_abs()));

@@ -13,7 +13,7 @@ use crate::discrete_gradient::{DiscreteGradient, Gonzalez};
 use crate::error::{RunError, StepError};
 use crate::residual::{Dim, Numbers, Recall};
 use crate::span::{Course, ROOM, Size, SpanError};
-use crate::step::{Memory, Scheme, Start, Work};
+use crate::step::{Effort, Memory, Scheme, Start, Work};
 
 /// A state of a run: time, point, and the two fields there.
 #[derive(Clone, Debug, PartialEq)]
@@ -146,6 +146,7 @@ where
             sweeps: 0,
             worst_sweeps: 0,
             retries: 0,
+            continued: 0,
             globalised: 0,
             second_law: system.second_law(),
             projected: system.dissipation().is_projected(),
@@ -251,7 +252,8 @@ where
             work.entropy_slope = f64::INFINITY;
             let kept = (&self.invariants, self.entropy);
             let start = from::<Y>(&self.state, kept, &self.certificate, h);
-            let end = self.scheme.attempt(system, &start, &mut memory, &mut work).ok();
+            let end =
+                self.scheme.attempt(system, &start, &mut memory, Effort::Part, &mut work).ok();
             let error = end.as_ref().and_then(|end| controller.error_of(system, start.x, end, h));
             match (end, error) {
                 (Some(point), Some(error)) if error <= 1.0 => {
@@ -360,6 +362,7 @@ where
         c.sweeps += work.sweeps;
         c.worst_sweeps = c.worst_sweeps.max(work.sweeps);
         c.retries += work.splits;
+        c.continued += work.continued;
         c.globalised += work.globalised;
     }
 }

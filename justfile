@@ -53,6 +53,10 @@ examples:
 study:
     cargo test --release --workspace -- --ignored
 
+# random input without sense for ten minutes: a third of the seconds for each of six searches, two at a time
+fuzz seconds="600":
+    FUZZ_SECONDS=$(({{ seconds }} / 3)) cargo test --release --all-features --test fuzz -- --nocapture --test-threads 2
+
 # time fields, steps and runs
 bench:
     cargo bench
@@ -85,6 +89,10 @@ msrv: (need ("rustup run " + msrv + " cargo --version") ("rustup toolchain insta
 # check licenses, advisories and duplicate dependencies
 deny: (need "cargo deny --version" "cargo install cargo-deny --locked")
     cargo deny check
+
+# what would be published, in its order, without publishing it
+package:
+    cargo publish --workspace --dry-run
 
 # everything a change has to pass; ends on the closing line of `test`
 ci: fmt lint doc examples test

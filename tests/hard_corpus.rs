@@ -390,13 +390,14 @@ fn every_hard_start_ends_in_a_certified_step_or_in_the_right_error() {
     });
     let (same, other): (Vec<_>, Vec<_>) = ends.partition(|(_, off, _)| *off < 1e-4);
     println!("{} ends of the branch, {} others:", same.len(), other.len());
-    for (family, off, case) in &other {
+    for (family, off, case) in same.iter().filter(|(_, off, _)| *off > 1e-12).chain(&other) {
         println!("{family:<20} {:<12} {off:.1e}", case.number("tameness"));
     }
     assert!(other.len() <= 10);
     let digits = |limit: f64| same.iter().filter(|(_, off, _)| *off <= limit).count();
     println!("{} to 1e-14, {} to 1e-12, {} to 1e-9", digits(1e-14), digits(1e-12), digits(1e-9));
-    // 188 of them here; the metric of condition 10⁶ to 10¹² costs the others their digits.
+    // 188 of them here. Of the 19 others 18 have metrics of condition 10⁶ to 10¹², where the last digits
+    // of the metric's entries count that many times.
     assert!(digits(1e-12) >= 185);
 }
 

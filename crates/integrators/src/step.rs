@@ -250,19 +250,20 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
         };
         let direct = Newton { sweeps: DIRECT.min(self.newton.sweeps), ..self.newton };
         let mut solved = newton(&direct, &Vector::<Y::Manifold>::zero(), work);
-        if effort == Effort::Whole {
-            if solved.is_err()
-                && let Some(near) = self.follow(residual, work)
-            {
-                solved = newton(&self.newton, &near, work);
-            }
-            #[cfg(feature = "argmin")]
-            if let Err(best) = &solved
-                && let Some(closer) = crate::globaliser::descend(residual, best)
-            {
-                work.globalised += 1;
-                solved = newton(&self.newton, &closer, work);
-            }
+        let whole = effort == Effort::Whole;
+        if whole
+            && solved.is_err()
+            && let Some(near) = self.follow(residual, work)
+        {
+            solved = newton(&self.newton, &near, work);
+        }
+        #[cfg(feature = "argmin")]
+        if whole
+            && let Err(best) = &solved
+            && let Some(closer) = crate::globaliser::descend(residual, best)
+        {
+            work.globalised += 1;
+            solved = newton(&self.newton, &closer, work);
         }
         solved.map_err(|at| Lost { residual: best.residual, edge: at_edge(residual, &at) })
     }

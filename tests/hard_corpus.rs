@@ -363,6 +363,13 @@ fn every_hard_start_ends_in_a_certified_step_or_in_the_right_error() {
     let [_, _, globalised, split, not_converged, out_of_domain, ..] = of_others;
     assert!(globalised >= 4 && split >= 8, "{of_others:?}");
     assert!(not_converged + out_of_domain <= 6, "{of_others:?}");
+    // Only what has an edge is left, and what has none does not converge.
+    for (case, outcome) in &all {
+        if let Outcome::Refused { error, .. } = outcome {
+            let edge = case.family() == "doomed logarithm";
+            assert_eq!(*error == Error::OutOfDomain, edge, "{}: {outcome}", case.family());
+        }
+    }
 
     // The tamest half of the solvable ones needs no globaliser and no split; 107 of 109 need nothing but
     // Newton's method, and two are continued in the step size: the top on the sphere and the logarithm,
@@ -383,13 +390,15 @@ fn every_hard_start_ends_in_a_certified_step_or_in_the_right_error() {
     });
     let (same, other): (Vec<_>, Vec<_>) = ends.partition(|(_, off, _)| *off < 1e-4);
     println!("{} ends of the branch, {} others:", same.len(), other.len());
-    for (family, off, case) in &other {
+    for (family, off, case) in same.iter().filter(|(_, off, _)| *off > 1e-12).chain(&other) {
         println!("{family:<20} {:<12} {off:.1e}", case.number("tameness"));
     }
     assert!(other.len() <= 10);
     let digits = |limit: f64| same.iter().filter(|(_, off, _)| *off <= limit).count();
     println!("{} to 1e-14, {} to 1e-12, {} to 1e-9", digits(1e-14), digits(1e-12), digits(1e-9));
-    assert!(digits(1e-12) >= 180);
+    // 188 of them here. Of the 19 others 18 have metrics of condition 10⁶ to 10¹², where the last digits
+    // of the metric's entries count that many times.
+    assert!(digits(1e-12) >= 185);
 }
 
 const fn label(solvable: bool) -> &'static str {

@@ -12,7 +12,7 @@ followed from u(0) = 0 to t = h by a tangent predictor and Newton's method. A st
 branch reaches h inside the domain without a change of sign of det dF/du. It is not if it folds back,
 leaves the domain, or runs to infinity before. What a solver makes of a start plays no part in its choice.
 
-    python3 hard_corpus.py > hard_corpus.json        (mpmath; about ten minutes on two cores)
+    python3 hard_corpus.py > hard_corpus.json        (mpmath; three minutes on two cores)
 """
 
 import json
@@ -327,7 +327,6 @@ class Sphere(Family):
     def velocity(self, z, w_h, w_s):
         if not self.entropic:
             return cross(z, w_h)
-        # The dissipation goes as 1/ε² with a metric ε; here ε = 1.
         return self.dissipation(z, w_h, w_s)
 
     def displacement(self, x, u):

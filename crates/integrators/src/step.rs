@@ -250,19 +250,20 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
         };
         let direct = Newton { sweeps: DIRECT.min(self.newton.sweeps), ..self.newton };
         let mut solved = newton(&direct, &Vector::<Y::Manifold>::zero(), work);
-        if effort == Effort::Whole {
-            if solved.is_err()
-                && let Some(near) = self.follow(residual, work)
-            {
-                solved = newton(&self.newton, &near, work);
-            }
-            #[cfg(feature = "argmin")]
-            if let Err(best) = &solved
-                && let Some(closer) = crate::globaliser::descend(residual, best)
-            {
-                work.globalised += 1;
-                solved = newton(&self.newton, &closer, work);
-            }
+        let whole = effort == Effort::Whole;
+        if whole
+            && solved.is_err()
+            && let Some(near) = self.follow(residual, work)
+        {
+            solved = newton(&self.newton, &near, work);
+        }
+        #[cfg(feature = "argmin")]
+        if whole
+            && let Err(best) = &solved
+            && let Some(closer) = crate::globaliser::descend(residual, best)
+        {
+            work.globalised += 1;
+            solved = newton(&self.newton, &closer, work);
         }
         solved.map_err(|at| Lost { residual: best.residual, edge: at_edge(residual, &at) })
     }
@@ -318,12 +319,6 @@ fn sweeps<M: Manifold>(solved: &Result<Root<M>, NoRoot<M>>) -> usize {
     solved.as_ref().map_or_else(|lost| lost.sweeps, |root| root.sweeps)
 }
 
-/// The point that Newton's method goes to from `u`.
-fn corrected<M: Manifold>(equation: &impl Equation<M>, u: &Vector<M>) -> Option<Vector<M>> {
-    let at = equation.linearise(u)?;
-    at.jacobian.solve(&at.residual).map(|step| *u - step).filter(Column::is_finite)
-}
-
 /// A solution belongs to a branch if it is off its prediction by no more than this share of the way.
 const NEARBY: f64 = 0.1;
 /// Linear systems after which a way from rest is no longer direct, and its end no longer likely to be
@@ -353,10 +348,14 @@ pub(crate) struct Lost {
     edge: bool,
 }
 
-/// Whether it is the edge of the domain that stops Newton's method at `u`.
+/// Whether it is the edge of the domain that stops Newton's method at `u`: its correction leads out,
+/// cut to the length of the step, because a far longer one, from a Jacobian that is nearly singular,
+/// leads out of any domain.
 fn at_edge<M: Manifold>(equation: &impl Equation<M>, u: &Vector<M>) -> bool {
-    equation.value(u).is_none()
-        || corrected(equation, u).is_some_and(|next| equation.value(&next).is_none())
+    let Some(at) = equation.linearise(u) else { return true };
+    let Some(step) = at.jacobian.solve(&at.residual) else { return false };
+    let share = (u.magnitude() + at.residual.magnitude()) / step.magnitude();
+    equation.value(&(*u - step * share.min(1.0))).is_none()
 }
 
 /// The size of the smallest part of a step that was split `splits` times.

@@ -141,7 +141,7 @@ fn a_run_that_fails_on_its_way_keeps_what_it_has() {
     assert!(taken > 0 && trajectory.last().step == taken, "{error}");
     assert!(trajectory.certificate().keeps_energy());
     let RunError::Step { cause, .. } = &error else { panic!("another error: {error}") };
-    assert!(cause.to_string().contains(&format!("t = {}", trajectory.last().time)), "{cause}");
+    assert!(cause.to_string().contains(&format!("t = {:.6}", trajectory.last().time)), "{cause}");
 }
 
 /// `x' = −1`, `y' = 1/x` along `H = ln x + y`: the exact flow from (1, 0) reaches the edge of the

@@ -37,7 +37,7 @@ pub struct Newton {
 
 impl Default for Newton {
     fn default() -> Self {
-        Self { tolerance: 1.0, stall: 100.0, reuse: 0.05, sweeps: 30, halvings: 8 }
+        Self { tolerance: 1.0, stall: 100.0, reuse: 1e-3, sweeps: 30, halvings: 8 }
     }
 }
 
@@ -87,6 +87,8 @@ const NEAR: f64 = 10.0;
 struct Start<M: Space> {
     residual: Vector<M>,
     floor: f64,
+    /// The residual at which one that no longer falls counts as solved.
+    stalled: f64,
 }
 
 /// How far one Jacobian has brought the iteration.
@@ -114,7 +116,8 @@ impl Newton {
             && let Some((residual, floor)) = equation.value_and_floor(guess)
         {
             best.residual = residual.magnitude();
-            let here = Start { residual, floor };
+            // A stall of another equation's Jacobian is no round-off: the equation's own is to say so.
+            let here = Start { residual, floor, stalled: floor * self.tolerance };
             if let Progress::Solved = self.correct(equation, here, Some(inverse), &mut best) {
                 return Ok(best.solved(floor));
             }
@@ -134,7 +137,7 @@ impl Newton {
         while let Some(Linearised { residual, jacobian, floor }) = equation.linearise(&best.best) {
             best.residual = residual.magnitude();
             let mut inverse = Inverse::of(&jacobian);
-            let here = Start { residual, floor };
+            let here = Start { residual, floor, stalled: floor * self.stall };
             match self.correct(equation, here, inverse.as_mut(), &mut best) {
                 Progress::Solved => {
                     *known = inverse;
@@ -157,7 +160,7 @@ impl Newton {
         best: &mut NoRoot<M>,
     ) -> Progress {
         let floor = self.tolerance * here.floor;
-        let stalled = self.stall * here.floor;
+        let stalled = here.stalled;
         let correct = |inverse: &Inverse<M::Dim>, residual: &Vector<M>| {
             Some(inverse.times(residual)).filter(|correction| correction.is_finite())
         };

@@ -7,11 +7,12 @@ use crate::root_finder::{Equation, Linearised, NoRoot, Root, RootFinder};
 /// Newton's method, damped, down to round-off.
 ///
 /// The inverse of a Jacobian is kept as long as it serves, from one step to the next: each correction
-/// then costs only a residual, from which the inverse learns (Broyden 1965). A correction that leaves too
-/// much of the residual asks for a new Jacobian.
+/// then costs only a residual, from which the inverse learns (Broyden 1965). That of an earlier step is
+/// used where two corrections are expected to be enough, by the contraction that it has shown of late;
+/// otherwise a new one is formed.
 ///
-/// The last correction is not followed by another residual if the worst contraction of late says that
-/// it would be a hundredth of the floor: in other directions the next contraction may be slower.
+/// The last correction is not followed by another residual if the contraction so far says that it would
+/// be a hundredth of the floor: in other directions the next contraction may be slower.
 ///
 /// It stops where the residual is at the floor that the equation states, or where it no longer
 /// falls within a small multiple of it: a stall *at* the floor is convergence, a stall above it is
@@ -37,7 +38,7 @@ pub struct Newton {
 
 impl Default for Newton {
     fn default() -> Self {
-        Self { tolerance: 1.0, stall: 100.0, reuse: 1e-3, sweeps: 30, halvings: 8 }
+        Self { tolerance: 1.0, stall: 100.0, reuse: 0.05, sweeps: 30, halvings: 8 }
     }
 }
 
@@ -87,8 +88,8 @@ const NEAR: f64 = 10.0;
 struct Start<M: Space> {
     residual: Vector<M>,
     floor: f64,
-    /// The residual at which one that no longer falls counts as solved.
-    stalled: f64,
+    /// Whether the Jacobian is that of the equation itself, and not of one near by.
+    own: bool,
 }
 
 /// How far one Jacobian has brought the iteration.
@@ -116,9 +117,11 @@ impl Newton {
             && let Some((residual, floor)) = equation.value_and_floor(guess)
         {
             best.residual = residual.magnitude();
-            // A stall of another equation's Jacobian is no round-off: the equation's own is to say so.
-            let here = Start { residual, floor, stalled: floor * self.tolerance };
-            if let Progress::Solved = self.correct(equation, here, Some(inverse), &mut best) {
+            let here = Start { residual, floor, own: false };
+            let serves = inverse.contraction.powi(2) * best.residual <= self.sure(floor);
+            if serves
+                && let Progress::Solved = self.correct(equation, here, Some(inverse), &mut best)
+            {
                 return Ok(best.solved(floor));
             }
         }
@@ -137,7 +140,7 @@ impl Newton {
         while let Some(Linearised { residual, jacobian, floor }) = equation.linearise(&best.best) {
             best.residual = residual.magnitude();
             let mut inverse = Inverse::of(&jacobian);
-            let here = Start { residual, floor, stalled: floor * self.stall };
+            let here = Start { residual, floor, own: true };
             match self.correct(equation, here, inverse.as_mut(), &mut best) {
                 Progress::Solved => {
                     *known = inverse;
@@ -160,7 +163,8 @@ impl Newton {
         best: &mut NoRoot<M>,
     ) -> Progress {
         let floor = self.tolerance * here.floor;
-        let stalled = here.stalled;
+        // A stall of another equation's Jacobian is no round-off: the equation's own is to say so.
+        let stalled = if here.own { self.stall * here.floor } else { floor };
         let correct = |inverse: &Inverse<M::Dim>, residual: &Vector<M>| {
             Some(inverse.times(residual)).filter(|correction| correction.is_finite())
         };
@@ -176,7 +180,8 @@ impl Newton {
                 return Progress::Solved;
             }
             best.sweeps += 1;
-            let last = best.residual <= floor || contraction * best.residual <= 0.01 * floor;
+            let last =
+                best.residual <= floor || contraction * best.residual <= self.sure(here.floor);
             if last {
                 // What a slow contraction leaves below the floor has the same sign in each step; it
                 // costs one more solution to take it out.
@@ -216,7 +221,18 @@ impl Newton {
                 inverse.contraction = contraction.max(0.5 * inverse.contraction);
                 contraction = inverse.contraction;
             }
+            // Another equation's Jacobian gets one correction, and the last one.
+            let done =
+                best.residual <= floor || contraction * best.residual <= self.sure(here.floor);
+            if !here.own && !done {
+                return Progress::Slow;
+            }
         }
+    }
+
+    /// The residual that needs no evaluation to be believed: a hundredth of the floor.
+    const fn sure(&self, floor: f64) -> f64 {
+        0.01 * self.tolerance * floor
     }
 
     /// The longest of the corrections `δ, δ/2, δ/4, …` that reduces the residual.

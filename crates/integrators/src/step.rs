@@ -426,7 +426,7 @@ fn explicit<Y: Metriplectic>(system: &Y, start: &Start<'_, Y>) -> Option<Vector<
 /// a step aims at `H(x₀)` instead of `H(x)`, once they differ by more than a few units of round-off.
 /// Asking for `⟨w, d⟩ = F(x') − F(x) + φe` changes the covector by `φ|e|/|d|`, and with it the
 /// displacement by `h|Π|φ|e|/|d|`, which must stay small against `|d|`. Hence `φ = r²/(1 + r²)` with
-/// `r = |d|² / (10⁴ h|Π||e|)`: all of it while the state moves, nothing of it at rest, where it
+/// `r = |d|² / (10² h|Π||e|)`: all of it while the state moves, nothing of it at rest, where it
 /// would hold the state fast. The further invariants are treated alike.
 fn recall<Y: Metriplectic>(system: &Y, start: &Start<'_, Y>, d: &Vector<Y::Manifold>) -> Recall<Y> {
     let Recall { energy, entropy, invariants } = start.left_over;
@@ -445,7 +445,7 @@ fn recall<Y: Metriplectic>(system: &Y, start: &Start<'_, Y>, d: &Vector<Y::Manif
     let sizes = (pi.map_or(0.0, |pi| pi.tensor.max_abs()), k.map_or(0.0, |k| k.along_w.max_abs()));
     let gain = start.h * (sizes.0 + sizes.1);
     let share = |e: f64, size: f64| {
-        let r = d.dot(d) / (1e4 * gain * e.abs()).max(f64::MIN_POSITIVE);
+        let r = d.dot(d) / (1e2 * gain * e.abs()).max(f64::MIN_POSITIVE);
         if far(e, size) && r.is_finite() { e / (1.0 + r.powi(-2)) } else { 0.0 }
     };
     Recall {

@@ -402,7 +402,7 @@ fn from<'a, Y: Metriplectic>(
 }
 
 /// The change of a further invariant in one step that is more than round-off.
-const LOST: f64 = 1e-12;
+const LOST: f64 = 1e-10;
 /// The independent share of a further invariant's differential that explains such a change.
 const DEPENDENT: f64 = 1e-6;
 

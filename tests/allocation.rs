@@ -34,7 +34,7 @@ fn main() {
         .energy(|p: &Vector3<Real>| p.x.powi(2) * 0.5 + p.y.powi(2) * 0.25 + p.z.powi(4))
         .entropy(|p: &Vector3<Real>| p.norm_squared() * 0.5)
         .build()
-        .unwrap();
+        .expect("it is a system");
     assert_eq!(blocks(&body, vector![0.5, -0.3, 0.1]), 0);
 
     let top = System::on(LieDual::se3())
@@ -44,23 +44,23 @@ fn main() {
         })
         .entropy(|x: &Vector6<Real>| (3..6).map(|i| x[i].powi(2) * 0.5).sum())
         .build()
-        .unwrap();
+        .expect("it is a system");
     assert_eq!(blocks(&top, vector![0.1, 0.2, 1.0, 0.0, 0.6, 0.8]), 0);
 
     let metric = Matrix6::<f64>::identity() * 2.0 + Matrix6::from_element(0.1);
     let spring = System::on(Euclidean::<6>)
-        .metric(Metric::constant(metric).unwrap())
+        .metric(Metric::constant(metric).expect("it is a system"))
         .bracket(Poisson::field(|_: &Vector6<Real>| {
             Matrix6::from_fn(|i, j| Real::from(f64::from(j == i + 3) - f64::from(i == j + 3)))
         }))
         .energy(|x: &Vector6<Real>| x.norm_squared() * 0.5 + x[0].powi(4))
         .build()
-        .unwrap();
+        .expect("it is a system");
     assert_eq!(blocks(&spring, vector![0.3, 0.2, 0.1, 0.0, 0.1, 0.2]), 0);
 
     // With an entropy that the closure bracket, of rank four, leaves alone.
     let bath = System::on(Euclidean::<6>)
-        .metric(Metric::constant(metric).unwrap())
+        .metric(Metric::constant(metric).expect("it is a system"))
         .bracket(Poisson::field(|_: &Vector6<Real>| {
             let pair = |i: usize, j: usize| f64::from(i < 2 && j == i + 2);
             Matrix6::from_fn(|i, j| Real::from(pair(i, j) - pair(j, i)))
@@ -68,14 +68,14 @@ fn main() {
         .energy(|x: &Vector6<Real>| x.norm_squared() * 0.5 + x[0].powi(4))
         .entropy(|x: &Vector6<Real>| x[4] - x[5].powi(2) * 0.5)
         .build()
-        .unwrap();
+        .expect("it is a system");
     assert_eq!(blocks(&bath, vector![0.3, 0.2, 0.1, 0.0, 0.1, 0.2]), 0);
 
     let sphere = System::on(Sphere::<2>::round())
         .energy(|x: &Vector3<Real>| x.x.powi(2) + x.y.powi(3) * 0.5)
         .entropy(|x: &Vector3<Real>| x.z)
         .build()
-        .unwrap();
+        .expect("it is a system");
     assert_eq!(blocks(&sphere, vector![0.6, 0.0, 0.8]), 0);
 
     let group = System::on(Rotations::bi_invariant())
@@ -83,7 +83,7 @@ fn main() {
         .energy(|r: &Matrix3<Real>| r.m11 + r.m22 * 2.0 + r.m12 * r.m23 * 0.5)
         .entropy(|r: &Matrix3<Real>| r.m13 - r.m21 * 0.5)
         .build()
-        .unwrap();
+        .expect("it is a system");
     assert_eq!(blocks(&group, Matrix3::identity()), 0);
 
     // Geodesics integrated numerically, of the half plane.
@@ -92,6 +92,6 @@ fn main() {
         .bracket(AreaForm)
         .energy(|q: &Vector2<Real>| q.x.powi(2) + q.y.powi(2))
         .build()
-        .unwrap();
+        .expect("it is a system");
     assert_eq!(blocks(&plane, vector![0.3, 1.2]), 0);
 }

@@ -527,7 +527,7 @@ where
 }
 
 impl<R, W: DiscreteGradient> Scheme<R, W> {
-    /// Verifies the model and starts a run: endless in steps of size `h`, or over a [`Span`] or
+    /// Verifies the model and starts a run: endless in steps of size `h`, or over a [`Span`](crate::Span) or
     /// [`Until`](crate::Until).
     ///
     /// # Errors
@@ -549,7 +549,7 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
         Ok(Steps::start(self, system, x0, course))
     }
 
-    /// Verifies the model, runs it over a [`Span`] or [`Until`](crate::Until), and records the states.
+    /// Verifies the model, runs it over a [`Span`](crate::Span) or [`Until`](crate::Until), and records the states.
     ///
     /// # Errors
     ///

@@ -175,6 +175,26 @@ fn a_run_into_the_edge_of_a_logarithm_ends_there() {
 }
 
 #[test]
+fn no_step_ends_on_the_edge_of_a_logarithm() {
+    // q' = 1 for H = p + ln(1 − q): the flow reaches q = 1 at t = 1, in the middle of a step.
+    let system = System::on(Euclidean::<2>)
+        .bracket(Symplectic)
+        .energy(|x: &Vector2<Real>| x.y + (-x.x + 1.0).ln())
+        .build()
+        .unwrap();
+    for h in [0.15, 0.3, 0.7] {
+        let error = WeylMidpoint.run(&system, vector![0.0, 1.0], Span::steps(h, 10)).unwrap_err();
+        let Some(trajectory) = error.trajectory() else { panic!("no trajectory: {error}") };
+        let (end, certificate) = (trajectory.last(), trajectory.certificate());
+        assert!(end.point.x < 1.0, "h = {h}: {error}");
+        // As far as H has digits there: ε |dH| is the rounding of x.
+        let steep = (1.0 - end.point.x).recip();
+        let allowed = 50.0 * f64::EPSILON * steep.max(1.0);
+        assert!(certificate.max_energy_error <= allowed, "h = {h}: {certificate}");
+    }
+}
+
+#[test]
 fn a_span_without_end_is_run_until_the_model_ends() {
     // How many states a run will record is no reason to ask for the memory beforehand.
     for span in [Span::steps(0.1, usize::MAX), Span::steps(0.1, usize::MAX).every(1000)] {

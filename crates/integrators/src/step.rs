@@ -198,6 +198,7 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
         if root.u.magnitude() <= 2.0 * root.floor {
             // The state is at rest: what the solver found is its own round-off, and following it
             // would make a random walk of the energy.
+            (work.energy, work.entropy) = (start.energy, start.entropy);
             return Ok(start.x.clone());
         }
         let lost = || Lost { residual: root.residual, edge: true };
@@ -218,7 +219,9 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
             // What the end has been moved by is not lost.
             memory.carry = None;
         }
-        Ok(end)
+        // The last digits of the end, which no residual has seen, may be beyond the edge.
+        (work.energy, work.entropy) = (system.energy_at(&end), system.entropy_at(&end));
+        if work.energy.is_finite() && work.entropy.is_finite() { Ok(end) } else { Err(lost()) }
     }
 
     /// A root where Newton's method has lost its way from the guess, in the order of the
@@ -399,6 +402,10 @@ pub struct Work {
     pub entropy_slope: f64,
     /// Whether anything was dissipated.
     pub dissipates: bool,
+    /// The energy at the end.
+    pub energy: f64,
+    /// The entropy there.
+    pub entropy: f64,
 }
 
 impl Default for Work {
@@ -410,6 +417,8 @@ impl Default for Work {
             globalised: 0,
             entropy_slope: f64::INFINITY,
             dissipates: false,
+            energy: f64::NAN,
+            entropy: f64::NAN,
         }
     }
 }

@@ -210,13 +210,7 @@ where
             }
             Pace::Adaptive(controller) => self.controlled(controller)?,
         };
-        let next = State {
-            step,
-            time,
-            energy: self.system.energy_at(&point),
-            entropy: self.system.entropy_at(&point),
-            point,
-        };
+        let next = State { step, time, energy: work.energy, entropy: work.entropy, point };
         self.account(&next, work, h);
         if work.dissipates {
             self.entropy = next.entropy;

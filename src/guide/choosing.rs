@@ -125,7 +125,7 @@
 //! | **[`Canonical`](crate::manifolds::Canonical)** | closed forms | unless friction says otherwise |
 //! | [`Metric::constant`](crate::manifolds::Metric::constant) | closed forms | on flat spaces, for units and weights: a variable in other units needs another weight |
 //! | a pair | that of its parts | on products, `(Canonical, bath)` |
-//! | [`Metric::field`](crate::manifolds::Metric::field) | geodesics are integrated, thirty to 170 times the time | where friction varies with the state; or take `Canonical` with `CometricDissipation`, which costs nothing of the kind |
+//! | [`Metric::field`](crate::manifolds::Metric::field) | geodesics are integrated, 50 to 70 times the time | where friction varies with the state; or take `Canonical` with `CometricDissipation`, which costs nothing of the kind |
 //!
 //! More on the last line in [`your_own_metric`](super::your_own_metric).
 //!

@@ -107,7 +107,13 @@ impl From<Span> for Course {
 impl Course {
     pub(crate) fn check(&self) -> Result<(), SpanError> {
         match &self.size {
-            Size::Fixed(h) => check_step_size(*h)?,
+            Size::Fixed(h) => {
+                check_step_size(*h)?;
+                let end = self.count.map_or(0.0, |count| count as f64 * h);
+                if end.is_infinite() {
+                    return Err(SpanError::End { end });
+                }
+            }
             Size::Tolerance(until) => until.check()?,
         }
         if self.count == Some(0) {
@@ -142,7 +148,7 @@ pub enum SpanError {
         /// The step size.
         h: f64,
     },
-    /// The end is zero, negative, infinite or NaN.
+    /// The end is zero, negative, infinite or NaN; that of steps of one size may be infinite.
     #[error(
         "the run would end at t = {end}; it starts at 0, and its end must be a later, finite time"
     )]

@@ -125,7 +125,7 @@ pub trait Riemannian<M: Space> {
     /// [`MetricError`] if the matrix is not symmetric and positive.
     fn norm(&self, x: &M::Point<f64>, v: &Vector<M>) -> Result<f64, MetricError> {
         let at = self.at(&ChartPoint::centre(x))?;
-        Ok(at.orthonormal(&at.flat(v)).magnitude())
+        finite(at.orthonormal(&at.flat(v)).magnitude())
     }
 
     /// The length of the geodesic that [`log`](Self::log) finds between two points: their distance,
@@ -178,7 +178,7 @@ pub trait Riemannian<M: Space> {
     ///
     /// [`MetricError`] if the matrix is not symmetric and positive.
     fn volume<D: Scalar>(&self, x: &ChartPoint<M, D>) -> Result<D, MetricError> {
-        Ok(self.matrix(x).root_determinant()?)
+        finite(self.matrix(x).root_determinant()?)
     }
 
     /// The derivatives `∂g/∂qᵏ` at a real point; `None` for a metric that is constant by
@@ -332,12 +332,17 @@ pub(crate) fn within(radius: f64, length: f64) -> Result<(), MetricError> {
     }
 }
 
+/// A number that has not left the range of numbers.
+fn finite<D: Scalar>(number: D) -> Result<D, MetricError> {
+    if number.re().is_finite() { Ok(number) } else { Err(MetricError::NotFinite) }
+}
+
 /// A metric that cannot be used.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum MetricError {
-    /// An entry is NaN or infinite.
-    #[error("the metric has an entry that is not a finite number")]
+    /// An entry, or what is computed of it, is NaN or infinite.
+    #[error("the metric has an entry that is not a finite number, or too large a one")]
     NotFinite,
     /// `g ≠ gᵀ`.
     #[error(

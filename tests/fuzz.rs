@@ -279,7 +279,7 @@ fn metrics_and_their_geodesics() {
             }
         };
         // What the laws of a metric ask for: components that have squares.
-        if [x, v, y].iter().any(|a| is_huge(a)) {
+        if [x, v, y].iter().any(is_huge) {
             return Ok(());
         }
         let metric = Metric::field(field);

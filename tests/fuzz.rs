@@ -10,6 +10,7 @@ use std::collections::BTreeMap;
 use std::rc::Rc;
 use std::time::{Duration, Instant};
 
+use metriplectic::dynamics::BuildError;
 use metriplectic::fields::{ChartPoint, Form, Space};
 use metriplectic::integrators::{Newton, RunError, Scheme};
 use metriplectic::manifolds::{MetricError, Riemannian, rotations};
@@ -207,6 +208,25 @@ where
     Ok(())
 }
 
+/// The same for the system that a builder makes, if the parts make one.
+fn build_and_step<Y: Metriplectic>(
+    system: Result<Y, BuildError>,
+    x0: <Y::Manifold as Space>::Point<f64>,
+    span: (f64, bool),
+    tally: &Tally,
+) -> TestCaseResult
+where
+    WeylMidpoint: Retraction<Y::Manifold, Y::Metric>,
+{
+    match system {
+        Ok(system) => step(&system, x0, span, tally),
+        Err(_) => {
+            tally.count("parts refused");
+            Ok(())
+        }
+    }
+}
+
 /// A run that did not start.
 fn refused<M: Manifold>(error: &RunError<M>, tally: &Tally) -> TestCaseResult {
     prop_assert!(!error.to_string().is_empty());
@@ -249,13 +269,8 @@ fn structure_constants_and_the_models_on_them() {
                     return Ok(());
                 }
             };
-            match System::on(space).energy(energy.field()).entropy(entropy.field()).build() {
-                Ok(system) => step(&system, x0, (h, adaptive), tally),
-                Err(_) => {
-                    tally.count("parts refused");
-                    Ok(())
-                }
-            }
+            let system = System::on(space).energy(energy.field()).entropy(entropy.field()).build();
+            build_and_step(system, x0, (h, adaptive), tally)
         },
     );
 }
@@ -327,13 +342,7 @@ fn models_on_flat_space_with_brackets_and_metrics_of_their_own() {
             .entropy(entropy.field())
             .second_law(SecondLaw::Published)
             .build();
-        match system {
-            Ok(system) => step(&system, x0, (h, adaptive), tally),
-            Err(_) => {
-                tally.count("parts refused");
-                Ok(())
-            }
-        }
+        build_and_step(system, x0, (h, adaptive), tally)
     });
 }
 
@@ -346,13 +355,7 @@ fn models_on_the_sphere() {
         let x0 = if kind == 0 { x0 } else { space.project(&x0) };
         let system =
             System::on(space).bracket(Zero).energy(energy.field()).entropy(entropy.field());
-        match system.build() {
-            Ok(system) => step(&system, x0, (h, adaptive), tally),
-            Err(_) => {
-                tally.count("parts refused");
-                Ok(())
-            }
-        }
+        build_and_step(system.build(), x0, (h, adaptive), tally)
     });
 }
 
@@ -369,13 +372,7 @@ fn models_on_the_rotations() {
             .energy(energy.field())
             .entropy(entropy.field())
             .build();
-        match system {
-            Ok(system) => step(&system, x0, (h, adaptive), tally),
-            Err(_) => {
-                tally.count("parts refused");
-                Ok(())
-            }
-        }
+        build_and_step(system, x0, (h, adaptive), tally)
     });
 }
 

@@ -45,7 +45,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     });
     let system = System::on(Chart::<3>::new(|q| q.y > 0.0))
         .metric(tangent_vectors)
-        .bracket(Nambu { factor: 4.0 })
+        .bracket(Nambu::default().times(4.0))
         .energy(|q: &Vector3<Real>| (q.z + q.x * 0.5) * 0.25)
         .entropy(|q: &Vector3<Real>| (q.xy().norm_squared() + 1.0) / q.y * -0.5 - q.z * q.z * 0.5)
         .build()?;

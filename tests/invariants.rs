@@ -306,3 +306,49 @@ fn an_action_that_is_no_symmetry_is_refused() {
     let error = system(stretched, kinetic).unwrap_err();
     assert!(matches!(error, RunError::Model(ModelError::ActionNotPoisson { .. })), "{error}");
 }
+
+/// A metriplectic system on S⁴ with two Casimirs: the entropy, and one that is listed too.
+fn on_the_four_sphere()
+-> impl Metriplectic<Manifold = Sphere<4>, Metric = metriplectic::manifolds::Canonical> {
+    let tilt = |x: &Vector5<Real>| x[4] + x[0] * x[1] * 0.3;
+    System::on(Sphere::<4>)
+        .bracket(Nambu::default().and(tilt))
+        .energy(|x: &Vector5<Real>| x[0].powi(2) + x[1].powi(2) * 2.0 + x[2] * x[3] + x[4].powi(3))
+        .entropy(|x: &Vector5<Real>| x[0] + x[2].powi(2) - x[3] * x[1])
+        .casimir(tilt)
+        .build()
+        .unwrap()
+}
+
+const ON_S4: [f64; 5] = [0.6, -0.4, 0.5, 0.4, 0.264_575_131_106_459_05];
+
+#[test]
+fn the_velocity_of_a_bracket_with_two_casimirs_is_the_cross_product_of_the_space_around() {
+    use metriplectic::dynamics::velocity::{differentials, reversible};
+    use metriplectic::fields::{ChartPoint, Space};
+    let system = on_the_four_sphere();
+    let x = SVector::from(ON_S4);
+    let z = ChartPoint::<Sphere<4>>::centre(&x);
+    let w = differentials(&system, &z);
+    let v = Sphere::<4>::velocity(&z, &reversible(&system, &z, &w).unwrap());
+    // By hand: gradients in R⁵, and det[x, ∇S, ∇C, ∇H, e_i].
+    let ds = vector![1.0, -x[3], 2.0 * x[2], -x[1], 0.0];
+    let dc = vector![0.3 * x[1], 0.3 * x[0], 0.0, 0.0, 1.0];
+    let dh = vector![2.0 * x[0], 4.0 * x[1], x[3], x[2], 3.0 * x[4] * x[4]];
+    let around = Vector5::from_fn(|i, _| {
+        let e = Vector5::from_fn(|j, _| if i == j { 1.0 } else { 0.0 });
+        Matrix5::from_columns(&[x, ds, dc, dh, e]).determinant()
+    });
+    assert!((v - around).norm() < 1e-14 && v.norm() > 0.1, "{v} {around}");
+}
+
+#[test]
+fn several_casimirs_on_a_sphere_are_kept_with_both_laws_at_second_order() {
+    let system = on_the_four_sphere();
+    assert!(order(&system, &SVector::from(ON_S4), 1.0, 10).agrees(2.0, 0.05));
+    let run = WeylMidpoint.run(&system, SVector::from(ON_S4), Span::steps(0.05, 2000)).unwrap();
+    println!("{}", run.certificate());
+    let certificate = run.certificate();
+    assert!(certificate.keeps_invariants() && certificate.keeps_entropy());
+    assert!(certificate.keeps_energy() && certificate.entropy_gained > 0.01);
+}

@@ -62,12 +62,63 @@ proptest! {
             .unwrap();
         laws::bracket(&nambu, &three.random(&mut rng), &c, &d)?;
         let group = System::on(Rotations::bi_invariant())
-            .bracket(Nambu { factor: 0.7 })
+            .bracket(Nambu::default().times(0.7))
             .energy(|r: &Matrix3<Real>| r.m11)
             .entropy(|r: &Matrix3<Real>| r.m12 * r.m23 + r.m31)
             .build()
             .unwrap();
         laws::bracket(&group, &Rotations.random(&mut rng), &c, &d)?;
+    }
+
+    #[test]
+    fn brackets_with_several_casimirs_keep_the_laws(
+        seed in any::<u64>(),
+        a4 in columns::<4>(), b4 in columns::<4>(), x4 in columns::<4>(),
+        a5 in columns::<5>(), b5 in columns::<5>(), a7 in columns::<7>(), b7 in columns::<7>(),
+    ) {
+        use rand::SeedableRng;
+        let mut rng = rand::rngs::ChaCha8Rng::seed_from_u64(seed);
+        let four = System::on(Sphere::<4>)
+            .bracket(Nambu::default().and(|x: &Vector5<Real>| x[4] + x[0] * x[1]))
+            .energy(square)
+            .entropy(|x: &Vector5<Real>| x[0] * x[1] + x[2].powi(3) - x[3])
+            .build()
+            .unwrap();
+        laws::bracket(&four, &Sphere::<4>.random(&mut rng), &a4, &b4)?;
+        // No entropy, a factor that varies, and a metric that does.
+        let metric = |q: &Vector4<Real>| {
+            let wave = q.map(|x| (x * 0.7).sin());
+            Matrix4::identity() + wave * wave.transpose() * Real::from(0.5)
+        };
+        let nambu = Nambu::of(|x: &Vector4<Real>| x[0] * x[2] - x[3].powi(2))
+            .and(|x: &Vector4<Real>| x[1].sin() + x[2] * x[0])
+            .times(|x: &Vector4<Real>| x[1].exp());
+        let chart = System::on(Euclidean::<4>)
+            .metric(Metric::field(metric))
+            .bracket(nambu)
+            .energy(square)
+            .build()
+            .unwrap();
+        laws::bracket(&chart, &x4, &a4, &b4)?;
+        let five = System::on(Sphere::<5>)
+            .bracket(
+                Nambu::default()
+                    .and(|x: &Vector6<Real>| x[4].powi(2) - x[5])
+                    .and(|x: &Vector6<Real>| x[1] * x[3]),
+            )
+            .energy(square)
+            .entropy(|x: &Vector6<Real>| x[0] * x[1] + x[2].powi(3) - x[3])
+            .build()
+            .unwrap();
+        laws::bracket(&five, &Sphere::<5>.random(&mut rng), &a5, &b5)?;
+        let entry = |i: usize| move |x: &SVector<Real, 8>| x[i] + x[i + 1].powi(2);
+        let seven = System::on(Sphere::<7>)
+            .bracket(Nambu::default().and(entry(1)).and(entry(3)).and(entry(5)).and(entry(0)))
+            .energy(square)
+            .entropy(|x: &SVector<Real, 8>| x[0] * x[7])
+            .build()
+            .unwrap();
+        laws::bracket(&seven, &Sphere::<7>.random(&mut rng), &a7, &b7)?;
     }
 
     #[test]

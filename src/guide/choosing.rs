@@ -24,8 +24,9 @@
 //! | [`Symplectic`](crate::dynamics::Symplectic) | for positions and momenta, R²ⁿ or `T*SO(3)` | constants only |
 //! | [`Poisson::constant`](crate::dynamics::Poisson::constant) | the same with further variables, such as `s` in `(q, p, s)` | functions of the variables with zero rows |
 //! | [`Poisson::field`](crate::dynamics::Poisson::field) | for a matrix that varies; Jacobi's identity is checked, not assumed | yours to know |
-//! | [`AreaForm`](crate::dynamics::AreaForm) | on a surface: spins, point vortices | constants only |
+//! | [`AreaForm`](type@crate::dynamics::AreaForm) | on a surface: spins, point vortices | constants only |
 //! | [`Nambu`](crate::dynamics::Nambu) | on a 3-manifold, if only `H`, `S` and a metric are known | `S`, by construction |
+//! | `Nambu::default().and(c)`, once for each further Casimir | the same on an `n`-manifold, `n ≤ 8`, with `n − 3` functions more | `S`, and each `c` |
 //! | a pair, `(AreaForm, Zero)` | on a product | those of both factors; every function of a factor with `Zero` |
 //! | [`Zero`](crate::dynamics::Zero), **elsewhere** | if nothing does: `S` climbs along a level set of `H` | all functions |
 //!
@@ -35,7 +36,7 @@
 //! |---|---|---|
 //! | `= 0` | nothing; [`SecondLaw::Exact`](crate::dynamics::SecondLaw::Exact) is the **default** | both laws hold in each step |
 //! | `≠ 0`, but a bath would make sense | `S = s` on a `Product` with a factor for `s` | friction has to put the energy somewhere: `H = h + e(s)`, temperature `e'(s)` |
-//! | `≠ 0`, on a 3-manifold | `Nambu` | it has any `S` for a Casimir |
+//! | `≠ 0`, on a 3-manifold | `Nambu` | it has any `S` for a Casimir; in `n` dimensions, too, with `n − 3` further ones |
 //! | `≠ 0`, and meant so | [`SecondLaw::Published`](crate::dynamics::SecondLaw::Published) | `H` is kept; the entropy then also changes reversibly, and nothing can be promised of it |
 //! | there is no `S` | leave it out | the system is Hamiltonian, without a projection |
 //!

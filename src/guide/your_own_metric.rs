@@ -120,4 +120,4 @@
 //! | a step beyond the cut locus, where geodesics stop being shortest | [`CutLocus`](crate::manifolds::MetricError::CutLocus) for canonical metrics; with a closure the cut locus is not known, and the logarithm is *a* geodesic | a smaller step |
 //! | two points far apart | [`NoLogarithm`](crate::manifolds::MetricError::NoLogarithm), with the miss; steps need no logarithm | points closer together |
 //! | `sqrt`, `norm` at zero | derivatives that are not numbers: the run refuses to start | `norm_squared`, even powers |
-//! | friction too strong or weak | `K` is of second order in `A⁻¹`, and [`Nambu`](crate::dynamics::Nambu) and [`AreaForm`](crate::dynamics::AreaForm) have `1/√det g` | scale `A`, or the factor of the bracket |
+//! | friction too strong or weak | `K` is of second order in `A⁻¹`, and [`Nambu`](crate::dynamics::Nambu) and [`AreaForm`](type@crate::dynamics::AreaForm) have `1/√det g` | scale `A`, or the factor of the bracket |

@@ -11,7 +11,7 @@ mod zero;
 pub use constant::ConstantPoisson;
 pub use field::FieldPoisson;
 pub use lie_poisson::LiePoisson;
-pub use nambu::{AreaForm, Nambu};
+pub use nambu::{AreaForm, Casimirs, Nambu, OfEntropy, Rows};
 pub use symplectic::Symplectic;
 pub use zero::Zero;
 

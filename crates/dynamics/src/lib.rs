@@ -7,7 +7,7 @@
 //!
 //! | module | what it holds |
 //! |---|---|
-//! | [`bracket`] | [`Bracket`]: `Π`; [`LiePoisson`], [`AreaForm`], [`Nambu`], [`Symplectic`], [`Poisson::constant`], [`Poisson::field`], [`Zero`] |
+//! | [`bracket`] | [`Bracket`]: `Π`; [`LiePoisson`], [`AreaForm`](type@AreaForm), [`Nambu`], [`Symplectic`], [`Poisson::constant`], [`Poisson::field`], [`Zero`] |
 //! | [`dissipation`] | [`Dissipation`]: `K`, given the covector it must kill; [`MetricDissipation`], [`CometricDissipation`], [`KulkarniNomizu`], [`CasimirDissipation`], [`FieldDissipation`], [`ProjectedDissipation`], [`Scaled`] |
 //! | [`euler_poincare`] | [`Legendre`]: a reduced Lagrangian on a Lie algebra, as an energy on its dual |
 //! | [`system`] | [`System`] and its builder |
@@ -29,7 +29,7 @@ pub mod verify;
 
 pub use bracket::{
     AreaForm, Bracket, BracketJet, ConstantPoisson, FieldPoisson, LiePoisson, Nambu,
-    NaturalBracket, Poisson, PoissonError, Site, Symplectic, Zero,
+    NaturalBracket, OfEntropy, Poisson, PoissonError, Site, Symplectic, Zero,
 };
 pub use dissipation::{
     CasimirDissipation, CometricDissipation, Dissipation, DissipationJet, FieldDissipation,

@@ -299,7 +299,7 @@ impl<M: Manifold, G, B, K, H, S, L> SystemBuilder<M, G, B, K, H, S, L> {
 
     /// The Poisson tensor: [`LiePoisson`](crate::LiePoisson), [`Zero`](crate::Zero),
     /// [`Poisson::constant`](crate::Poisson::constant), [`Poisson::field`](crate::Poisson::field),
-    /// [`Symplectic`](crate::Symplectic), [`AreaForm`](crate::AreaForm) or [`Nambu`](crate::Nambu);
+    /// [`Symplectic`](crate::Symplectic), [`AreaForm`](type@crate::AreaForm) or [`Nambu`](crate::Nambu);
     /// on a product a pair of them, one for each factor.
     pub fn bracket<F>(self, bracket: F) -> SystemBuilder<M, G, F, K, H, S, L> {
         let Self { manifold, metric, dissipation, energy, entropy, invariants, second_law, .. } =

@@ -78,6 +78,24 @@ pub trait ScalarField<M: Space> {
     }
 }
 
+/// A number is the constant field with this value.
+impl<M: Space> ScalarField<M> for f64 {
+    #[inline]
+    fn at<D: Scalar>(&self, _: &M::Point<D>) -> D {
+        D::from(*self)
+    }
+
+    #[inline]
+    fn jet1(&self, _: &M::Point<f64>) -> Jet1<M> {
+        Jet1 { value: *self, df: Vector::<M>::zero() }
+    }
+
+    #[inline]
+    fn jet2(&self, _: &M::Point<f64>) -> Jet2<M> {
+        Jet2 { value: *self, df: Vector::<M>::zero(), hf: Matrix::<M>::zeros() }
+    }
+}
+
 /// `f(x)` and `df(x)` in the coordinate frame of the chart at `x`.
 #[derive(Clone, Copy, Debug)]
 pub struct Jet1<M: Space> {

@@ -25,8 +25,8 @@
 //! - **Other metrics** are forms on Rⁿ⁺¹, by [`Metric::field`](crate::Metric::field);
 //!   [`Projection`](crate::Projection) is a retraction for all of them.
 //! - **Brackets**: none unless one is asked for. `AreaForm` on S², `x' = x × ∇H` (Marsden and Ratiu 1999,
-//!   §2), without a Casimir; `Nambu` on S³, with the volume `det[x, a, b, c]`; `Poisson::field` with a
-//!   bivector of Rⁿ⁺¹.
+//!   §2), without a Casimir; `Nambu` on S³, with the volume `det[x, a, b, c]`, and with `n − 2` Casimirs on Sⁿ;
+//!   `Poisson::field` with a bivector of Rⁿ⁺¹.
 
 use std::f64::consts::PI;
 

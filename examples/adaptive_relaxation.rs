@@ -13,7 +13,7 @@
 use std::{error::Error, fs::File};
 
 use metriplectic::prelude::*;
-use metriplectic_studies::{Gallery, Options, Panel, Panels, interrupted, print};
+use metriplectic_studies::{Gallery, Options, Panel, Panels, Report, interrupted, print};
 
 const INERTIA: Vector3<f64> = Vector3::new(10.0, 5.0, 1.0);
 const START: Vector3<f64> = Vector3::new(1e-6, -1.0, 1e-6);
@@ -65,12 +65,9 @@ fn main() -> Result<(), Box<dyn Error>> {
         .save(gallery.path("adaptive_relaxation.svg"))?;
 
     if options.json {
-        let mut report = serde_json::to_value(certificate)?;
-        report["max_relative_energy_error"] = certificate.max_relative_energy_error().into();
-        report["final_state"] = end.point.as_slice().into();
-        report["time"] = end.time.into();
-        report["rested"] = steps.ending().is_some_and(|ending| ending.is_rest()).into();
-        print(report)?;
+        let rested = steps.ending().is_some_and(|ending| ending.is_rest());
+        let report = Report::new(certificate, end)?.with("time", end.time);
+        report.with("rested", rested).print()?;
     } else {
         print(certificate)?;
         print(format_args!("ended at t = {:.3}: {:?}", end.time, steps.ending()))?;

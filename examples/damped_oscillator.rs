@@ -12,7 +12,7 @@
 use std::error::Error;
 
 use metriplectic::prelude::*;
-use metriplectic_studies::{Gallery, Options, Order, Panel, Panels, print};
+use metriplectic_studies::{Gallery, Options, Order, Panel, Panels, Report, print};
 
 const GAMMA: f64 = 0.01;
 
@@ -67,11 +67,8 @@ fn main() -> Result<(), Box<dyn Error>> {
 
     let certificate = run.certificate();
     if options.json {
-        let mut report = serde_json::to_value(certificate)?;
-        report["max_relative_energy_error"] = certificate.max_relative_energy_error().into();
-        report["final_state"] = end.point.as_slice().into();
-        (report["errors"], report["order"]) = (errors.into(), order.slope.into());
-        print(report)?;
+        let report = Report::new(certificate, end)?.with("errors", errors);
+        report.with("order", order.slope).print()?;
     } else {
         print(format_args!("{certificate}\nerrors:      {errors:.4?} at h = {sizes:?}"))?;
         print(format_args!("order:       {order}\nfigure:      {}", path.display()))?;

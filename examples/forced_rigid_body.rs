@@ -14,7 +14,7 @@
 use std::error::Error;
 
 use metriplectic::prelude::*;
-use metriplectic_studies::{Gallery, Options, Panel, Panels, print};
+use metriplectic_studies::{Gallery, Options, Panel, Panels, Report, print};
 
 const INERTIA: Vector3<f64> = Vector3::new(10.0, 5.0, 1.0);
 const START: Vector3<f64> = Vector3::new(0.2, 0.1, 1.0);
@@ -65,12 +65,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         .save(gallery.path("forced_rigid_body.svg"))?;
 
     if options.json {
-        let mut report = serde_json::to_value(certificate)?;
-        report["max_relative_energy_error"] = certificate.max_relative_energy_error().into();
-        report["final_state"] = all.last().point.as_slice().into();
-        report["apart"] = worst.into();
-        report["about_one_axis"] = serde_json::to_value(one.certificate())?;
-        print(report)?;
+        let report = Report::new(certificate, all.last())?.with("apart", worst);
+        report.with("about_one_axis", serde_json::to_value(one.certificate())?).print()?;
     } else {
         print(format_args!("κ = 1\n{certificate}\nκ = e₁e₁ᵀ\n{}", one.certificate()))?;
         print(format_args!("routes:      |p − p of the metric| ≤ {worst:.1e}"))?;

@@ -16,7 +16,7 @@
 use std::error::Error;
 
 use metriplectic::prelude::*;
-use metriplectic_studies::{Gallery, Options, Panel, Panels, print};
+use metriplectic_studies::{Gallery, Options, Panel, Panels, Report, print};
 
 const ALPHA: f64 = 1e-3;
 type Space = Euclidean<4>;
@@ -69,8 +69,8 @@ fn main() -> Result<(), Box<dyn Error>> {
 
     let (published, exact, end) = (published.certificate(), exact.certificate(), exact.last());
     if options.json {
-        let end = end.point.as_slice();
-        print(serde_json::json!({ "published": published, "exact": exact, "final_state": end }))?;
+        let report = Report::new(exact, end)?;
+        report.with("published", serde_json::to_value(published)?).print()?;
     } else {
         print(format_args!("published scheme\n{published}\n\nexact scheme\n{exact}"))?;
         print(format_args!("\nfigure:       {}", path.display()))?;

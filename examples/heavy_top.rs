@@ -17,7 +17,7 @@ use std::error::Error;
 
 use metriplectic::manifolds::rotations;
 use metriplectic::prelude::*;
-use metriplectic_studies::{Gallery, Globe, Options, Panel, Panels, print};
+use metriplectic_studies::{Gallery, Globe, Options, Panel, Panels, Report, print};
 
 const INERTIA: Vector3<f64> = Vector3::new(1.0, 1.2, 2.0);
 type Top = LieDual<6>;
@@ -65,11 +65,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         .save(gallery.path("heavy_top.svg"))?;
 
     if options.json {
-        let mut report = serde_json::to_value(certificate)?;
-        report["max_relative_energy_error"] = certificate.max_relative_energy_error().into();
-        report["final_state"] = end.point.as_slice().into();
-        report["entropies"] = vec![end.entropy, asleep].into();
-        print(report)?;
+        let entropies = vec![end.entropy, asleep];
+        Report::new(certificate, end)?.with("entropies", entropies).print()?;
     } else {
         print(certificate)?;
         print(format_args!("entropy:     S = {:.6}, asleep {asleep:.6}", end.entropy))?;

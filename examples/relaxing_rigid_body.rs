@@ -9,7 +9,7 @@
 use std::error::Error;
 
 use metriplectic::prelude::*;
-use metriplectic_studies::{Gallery, Options, Panel, Panels, Progress, print, write_csv};
+use metriplectic_studies::{Gallery, Options, Panel, Panels, Progress, Report, print, write_csv};
 
 const INERTIA: Vector3<f64> = Vector3::new(10.0, 5.0, 1.0);
 const START: Vector3<f64> = Vector3::new(0.001, -1.0, 0.001);
@@ -57,10 +57,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     )?;
 
     if options.json {
-        let mut report = serde_json::to_value(certificate)?;
-        report["max_relative_energy_error"] = certificate.max_relative_energy_error().into();
-        report["final_state"] = end.point.as_slice().into();
-        print(report)?;
+        Report::new(certificate, end)?.print()?;
     } else {
         let [x, y, z]: [f64; 3] = end.point.into();
         print(certificate)?;

@@ -10,7 +10,7 @@ use std::error::Error;
 
 use metriplectic::manifolds::rotations;
 use metriplectic::prelude::*;
-use metriplectic_studies::{Gallery, Globe, Options, Panel, Panels, print, write_csv};
+use metriplectic_studies::{Gallery, Globe, Options, Panel, Panels, Report, print, write_csv};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let options = Options::read();
@@ -47,13 +47,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     )?;
 
     if options.json {
-        print(serde_json::json!({
-            "steps": certificate.steps,
-            "max_relative_energy_error": certificate.max_relative_energy_error(),
-            "min_entropy_increment": certificate.min_entropy_increment,
-            "max_manifold_defect": certificate.max_manifold_defect,
-            "final_state": Rotations::entries(&end.point),
-        }))?;
+        Report::new(certificate, end)?.print()?;
     } else {
         let [w, x, y, z] = Rotations.to_quaternion(&end.point);
         print(certificate)?;

@@ -9,7 +9,7 @@
 use std::error::Error;
 
 use metriplectic::prelude::*;
-use metriplectic_studies::{Gallery, Globe, Options, Panel, Panels, print, write_csv};
+use metriplectic_studies::{Gallery, Globe, Options, Panel, Panels, Report, print, write_csv};
 
 fn energy(x: &Vector3<Real>) -> Real {
     let d = [1.0, 0.5, 0.25];
@@ -54,13 +54,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     )?;
 
     if options.json {
-        print(serde_json::json!({
-            "steps": certificate.steps,
-            "max_relative_energy_error": certificate.max_relative_energy_error(),
-            "min_entropy_increment": certificate.min_entropy_increment,
-            "max_manifold_defect": certificate.max_manifold_defect,
-            "final_state": end.point.as_slice(),
-        }))?;
+        Report::new(certificate, end)?.print()?;
     } else {
         let (t, [x, y, z]): (f64, [f64; 3]) = (end.time, end.point.into());
         print(format_args!("{certificate}\nat t = {t:.1}:  x = ({x:.6}, {y:.6}, {z:.6})"))?;

@@ -15,7 +15,7 @@
 use std::error::Error;
 
 use metriplectic::prelude::*;
-use metriplectic_studies::{Gallery, Globe, Options, Panel, Panels, print, write_csv};
+use metriplectic_studies::{Gallery, Globe, Options, Panel, Panels, Report, print, write_csv};
 
 const CAPACITY: f64 = 20.0;
 type Space = Product<Sphere<2>, Euclidean<1>>;
@@ -61,12 +61,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     write_csv(gallery.path("spin_in_a_bath.csv"), ["t", "n1", "n2", "n3", "s"], rows)?;
 
     if options.json {
-        let mut report = serde_json::to_value(certificate)?;
-        report["max_relative_energy_error"] = certificate.max_relative_energy_error().into();
-        report["final_state"] = Space::entries(&end.point).into();
-        report["temperature"] = last.into();
-        report["temperature_at_rest"] = rest.into();
-        print(report)?;
+        let report = Report::new(certificate, end)?.with("temperature", last);
+        report.with("temperature_at_rest", rest).print()?;
     } else {
         let (t, [x, y, z]): (f64, [f64; 3]) = (end.time, end.point.0.into());
         print(format_args!("{certificate}\nat t = {t:.1}:   n = ({x:.6}, {y:.6}, {z:.6})"))?;

@@ -9,7 +9,7 @@
 use std::{cell::Cell, error::Error};
 
 use metriplectic::prelude::*;
-use metriplectic_studies::{Gallery, Globe, Options, Panel, Panels, print, write_csv};
+use metriplectic_studies::{Gallery, Globe, Options, Panel, Panels, Report, print, write_csv};
 
 const D: [f64; 3] = [1.0, 0.5, 0.25];
 
@@ -61,15 +61,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     write_csv(gallery.path("spinning_top.csv"), ["t", "x1", "x2", "x3", "energy"], rows)?;
 
     if options.json {
-        print(serde_json::json!({
-            "steps": certificate.steps,
-            "max_relative_energy_error": certificate.max_relative_energy_error(),
-            "min_entropy_increment": certificate.min_entropy_increment,
-            "max_manifold_defect": certificate.max_manifold_defect,
-            "final_state": end.point.as_slice(),
-            "evaluations": calls,
-            "runge_kutta_energy_error": worst,
-        }))?;
+        let report = Report::new(certificate, end)?.with("evaluations", calls);
+        report.with("runge_kutta_energy_error", worst).print()?;
     } else {
         let (t, [x, y, z]): (f64, [f64; 3]) = (end.time, end.point.into());
         print(format_args!("{certificate}\nat t = {t:.1}:  x = ({x:.6}, {y:.6}, {z:.6})"))?;

@@ -13,7 +13,7 @@
 use std::error::Error;
 
 use metriplectic::prelude::*;
-use metriplectic_studies::{Gallery, Options, Panel, Panels, print};
+use metriplectic_studies::{Gallery, Options, Panel, Panels, Report, print};
 
 type Space = Product<Euclidean<8>, Euclidean<2>>;
 type Point<D> = (SVector<D, 8>, Vector2<D>); // ((q₁, q₂, p₁, p₂), (s₁, s₂))
@@ -68,10 +68,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         .save(&path)?;
 
     if options.json {
-        let mut report = serde_json::to_value(certificate)?;
-        report["max_relative_energy_error"] = certificate.max_relative_energy_error().into();
-        report["final_entropy"] = end.entropy.into();
-        print(report)?;
+        Report::new(certificate, end)?.with("final_entropy", end.entropy).print()?;
     } else {
         print(format_args!("{certificate}\nat t = {:.1}:  S = {:.6}", end.time, end.entropy))?;
         print(format_args!("figure:      {}", path.display()))?;

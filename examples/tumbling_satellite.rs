@@ -13,7 +13,7 @@
 use std::error::Error;
 
 use metriplectic::prelude::*;
-use metriplectic_studies::{Gallery, Globe, Options, Panel, Panels, print};
+use metriplectic_studies::{Gallery, Globe, Options, Panel, Panels, Report, print};
 
 const INERTIA: Vector3<f64> = Vector3::new(3.0, 2.5, 1.0);
 const CAPACITY: f64 = 4.0;
@@ -66,11 +66,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         .save(gallery.path("tumbling_satellite.svg"))?;
 
     if options.json {
-        let mut report = serde_json::to_value(certificate)?;
-        report["max_relative_energy_error"] = certificate.max_relative_energy_error().into();
-        report["final_state"] = Space::entries(&end.point).into();
-        report["kinetic_energies"] = vec![kinetic(&run.states()[0]), kinetic(end), flat].into();
-        print(report)?;
+        let energies = vec![kinetic(&run.states()[0]), kinetic(end), flat];
+        Report::new(certificate, end)?.with("kinetic_energies", energies).print()?;
     } else {
         print(certificate)?;
         print(format_args!("kinetic:     {:.6}, in a flat spin {flat:.6}", kinetic(end)))?;

@@ -13,7 +13,7 @@ use std::f64::consts::TAU;
 
 use metriplectic::manifolds::{MetricError, Riemannian};
 use metriplectic::prelude::*;
-use metriplectic_studies::{Gallery, Options, Panel, Panels, print, write_csv};
+use metriplectic_studies::{Gallery, Options, Panel, Panels, Report, print, write_csv};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let options = Options::read();
@@ -67,11 +67,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     write_csv(gallery.path("your_own_metric.csv"), ["t", "x", "y", "phi", "S"], rows)?;
 
     if options.json {
-        let mut report = serde_json::to_value(certificate)?;
-        report["max_relative_energy_error"] = certificate.max_relative_energy_error().into();
-        report["final_state"] = vec![x, y, phi].into();
-        report["geodesic_deviation"] = deviation.into();
-        return Ok(print(report)?);
+        let report = Report::new(certificate, run.last())?;
+        return Ok(report.with("geodesic_deviation", deviation).print()?);
     }
     print(format_args!("{certificate}\nat the end:  (x, y, φ) = ({x:.6}, {y:.6}, {phi:.6})"))?;
     print(format_args!("half plane:  {deviation:.1e} off the closed form"))?;

@@ -1,12 +1,13 @@
 //! A step allocates nothing. A program of its own, because the allocator counts for the whole process,
 //! and the threads of a test harness allocate too.
 
+use metriplectic::integrators::DiscreteGradient;
 use metriplectic::prelude::*;
 
 #[global_allocator]
 static ALLOCATOR: dhat::Alloc = dhat::Alloc;
 
-/// Blocks allocated while a run takes a thousand steps, after its first.
+/// Blocks allocated while a run of the Weyl midpoint takes a thousand steps.
 fn blocks<Y: Metriplectic>(
     system: &Y,
     x0: <Y::Manifold as metriplectic::fields::Space>::Point<f64>,
@@ -14,8 +15,16 @@ fn blocks<Y: Metriplectic>(
 where
     WeylMidpoint: Retraction<Y::Manifold, Y::Metric>,
 {
-    let mut run = WeylMidpoint.steps(system, x0, 0.05).expect("the model keeps its laws");
-    run.advance().expect("the first step is solved");
+    blocks_of(Scheme::new(WeylMidpoint), system, x0)
+}
+
+/// The same with another scheme.
+fn blocks_of<Y: Metriplectic, R: Retraction<Y::Manifold, Y::Metric>, W: DiscreteGradient>(
+    scheme: Scheme<R, W>,
+    system: &Y,
+    x0: <Y::Manifold as metriplectic::fields::Space>::Point<f64>,
+) -> u64 {
+    let mut run = scheme.steps(system, x0, 0.05).expect("the model keeps its laws");
     let before = dhat::HeapStats::get().total_blocks;
     for _ in 0..1000 {
         run.advance().expect("every step is solved");
@@ -43,6 +52,7 @@ fn main() {
             (0..6).map(|i| x[i].powi(2) * weights[i]).sum()
         })
         .entropy(|x: &Vector6<Real>| (3..6).map(|i| x[i].powi(2) * 0.5).sum())
+        .casimir(|x: &Vector6<Real>| (0..3).map(|i| x[i] * x[i + 3]).sum())
         .build()
         .expect("it is a system");
     assert_eq!(blocks(&top, vector![0.1, 0.2, 1.0, 0.0, 0.6, 0.8]), 0);
@@ -77,6 +87,8 @@ fn main() {
         .build()
         .expect("it is a system");
     assert_eq!(blocks(&sphere, vector![0.6, 0.0, 0.8]), 0);
+    let projected = Scheme::new(Projection).gradient(MeanValue);
+    assert_eq!(blocks_of(projected, &sphere, vector![0.6, 0.0, 0.8]), 0);
 
     let group = System::on(Rotations::bi_invariant())
         .bracket(Nambu::default())
@@ -85,6 +97,18 @@ fn main() {
         .build()
         .expect("it is a system");
     assert_eq!(blocks(&group, Matrix3::identity()), 0);
+    let cayley = Scheme::new(Cayley).gradient(SymmetricItohAbe);
+    assert_eq!(blocks_of(cayley, &group, Matrix3::identity()), 0);
+
+    // A product, with a momentum: the height of the axis, about which nothing depends on the angle.
+    let bath = System::on(Product(Sphere::<2>::round(), Euclidean::<1>))
+        .bracket((AreaForm, Zero))
+        .energy(|(n, s): &(Vector3<Real>, Vector1<Real>)| n.z.powi(2) * 0.5 + s.x.exp())
+        .entropy(|(_, s): &(Vector3<Real>, Vector1<Real>)| s.x)
+        .momentum(|(n, _): &(Vector3<Real>, Vector1<Real>)| n.z)
+        .build()
+        .expect("it is a system");
+    assert_eq!(blocks(&bath, (vector![0.6, 0.0, 0.8], vector![0.0])), 0);
 
     // Geodesics integrated numerically, of the half plane.
     let plane = System::on(Euclidean::<2>)

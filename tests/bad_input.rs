@@ -80,6 +80,51 @@ fn bad_metrics_are_refused() {
 }
 
 #[test]
+fn a_metric_or_bracket_that_is_not_a_number_is_named_and_so_is_its_derivative() {
+    let with = |factor: fn(&Vector3<Real>) -> Real| {
+        let metric = move |p: &Vector3<Real>| Matrix3::from_diagonal_element(factor(p) + 1.0);
+        let body = System::on(LieDual::so3()).metric(Metric::field(metric));
+        let tensor = move |p: &Vector3<Real>| Vector3::x().cross_matrix() * (factor(p) + 1.0);
+        let bracket = System::on(LieDual::so3()).bracket(Poisson::field(tensor));
+        [
+            refused(&body.energy(kinetic(INERTIA)).entropy(half_square).build().unwrap(), ORIGIN),
+            refused(&bracket.energy(kinetic(INERTIA)).build().unwrap(), ORIGIN),
+        ]
+    };
+    const ORIGIN: Vector3<f64> = Vector3::new(0.0, 0.0, 0.0);
+    for (error, name) in with(|p| p.x * f64::NAN).into_iter().zip(["metric", "bracket"]) {
+        let ModelError::ValueNotFinite { field, value, point } = &error else { panic!("{error}") };
+        assert!(*field == name && !value.is_finite() && *point == [0.0; 3], "{error}");
+    }
+    // |p| is zero at the origin, and its derivative there is not a number.
+    for (error, name) in with(|p| p.norm()).into_iter().zip(["metric", "bracket"]) {
+        let ModelError::DerivativeNotFinite { field, point } = &error else { panic!("{error}") };
+        assert!(*field == name && *point == [0.0; 3], "{error}");
+    }
+}
+
+#[test]
+fn a_dissipation_that_changes_an_invariant_is_refused() {
+    // K = |w|² − w wᵀ kills w, and nothing else.
+    let friction = |_: &Vector3<Real>, w: &Vector3<Real>| {
+        Matrix3::from_diagonal_element(w.norm_squared()) - w * w.transpose()
+    };
+    let system = System::on(Euclidean::<3>)
+        .energy(|x: &Vector3<Real>| x.x)
+        .entropy(|x: &Vector3<Real>| x.y)
+        .casimir(|x: &Vector3<Real>| x.z)
+        .dissipation(FieldDissipation(friction))
+        .build()
+        .unwrap();
+    let error = WeylMidpoint.run(&system, vector![0.1, 0.2, 0.3], TEN_STEPS).unwrap_err();
+    let RunError::Model(ModelError::InvariantNotKept { point, size }) = &error else {
+        panic!("{error}")
+    };
+    // K = diag(0, 1, 1) has the norm √2, and K dL the norm 1.
+    assert!(point.len() == 3 && (0.5..=1.0).contains(size), "{error}");
+}
+
+#[test]
 fn a_metric_that_ends_nearby_stops_the_run_with_what_it_has() {
     // g = 1 + 2p₁ is positive at the start and for p₁ > −½, and the body turns towards −1.41.
     let system = System::on(LieDual::so3())
@@ -262,12 +307,12 @@ fn bad_structure_constants_are_refused() {
     constants[1][0][2] = f64::NAN;
     let error = LieDual::new(&constants).unwrap_err();
     assert!(matches!(error, AlgebraError::NotFinite { a: 1, b: 0, d: 2, .. }));
-    // [e₀, e₁] = e₂, [e₀, e₂] = e₀: antisymmetric, but [[e₀, e₁], e₂] + cyclic = −[e₀, e₁] ≠ 0.
+    // [e₀, e₁] = e₂, [e₀, e₂] = e₀: antisymmetric, but [[e₀, e₁], e₂] + cyclic = −[e₀, e₁] = −e₂ ≠ 0.
     let mut constants = [[[0.0; 3]; 3]; 3];
     (constants[0][1][2], constants[1][0][2]) = (1.0, -1.0);
     (constants[0][2][0], constants[2][0][0]) = (1.0, -1.0);
     let error = LieDual::new(&constants).unwrap_err();
-    assert!(matches!(error, AlgebraError::NoJacobiIdentity { .. }), "{error}");
+    assert_eq!(error, AlgebraError::NoJacobiIdentity { a: 0, b: 1, c: 2, d: 2, size: 1.0 });
     // Matrices that are no basis, and matrices whose commutators leave their span.
     let [a, b] = [Matrix2::new(0.0, 1.0, 0.0, 0.0), Matrix2::new(0.0, 0.0, 1.0, 0.0)];
     let error = LieAlgebra::of_matrices(&[a, a * 2.0]).unwrap_err();
@@ -301,6 +346,17 @@ fn a_model_is_judged_only_inside_its_domain() {
     assert!(report.passed_over > 0 && report.verdict.is_ok(), "{report}");
     let run = WeylMidpoint.run(&system, start, Span::steps(1e-3, 100)).unwrap();
     assert!(run.certificate().keeps_energy() && run.certificate().keeps_entropy());
+    // Nor is it judged beyond the edge of an open chart, where this metric is not positive.
+    let chart = Chart::<2>::new(|q| q.x > 0.0);
+    let metric = |q: &Vector2<Real>| Matrix2::new(q.x.recip(), 0.0.into(), 0.0.into(), 1.0.into());
+    let plane = System::on(chart)
+        .metric(Metric::field(metric))
+        .bracket(AreaForm)
+        .energy(|q: &Vector2<Real>| q.x.powi(2) + q.y.powi(2))
+        .build()
+        .unwrap();
+    let report = plane.report(&vector![0.05, 1.0]);
+    assert!(report.passed_over > 0 && report.judged > 1 && report.verdict.is_ok(), "{report}");
     // Outside the domain altogether it is refused.
     let error = WeylMidpoint.run(&system, vector![-1.0, 2.0], TEN_STEPS).unwrap_err();
     let RunError::Model(ModelError::ValueNotFinite { field, .. }) = &error else {
@@ -387,7 +443,7 @@ fn errors_are_sentences_with_the_numbers() {
         (Poisson::constant(skew).unwrap_err().into(), &["(0, 1)", "2.500e-1"]),
         (not_a_number.unwrap_err().into(), &["entry 1", "NaN"]),
         (outside.unwrap_err().into(), &["energy", "-2.5", "start where"]),
-        (LieDual::new(&constants).unwrap_err().into(), &["C_01^1", "1.250e-1", "antisymmetric"]),
+        (LieDual::new(&constants).unwrap_err().into(), &["C_(0,1)^1", "1.250e-1", "antisymmetric"]),
     ];
     for (error, parts) in table {
         let text = error.to_string();

@@ -3,42 +3,61 @@
 mod models;
 
 use metriplectic::integrators::Residual;
+use metriplectic::manifolds::Tangent;
 use metriplectic::prelude::*;
 use metriplectic_studies::{Drift, Growth};
 use models::{TUMBLING, UNSTABLE, free_body, half_square, kinetic, relaxing_body, top};
 
 const MILLION: usize = 1_000_000;
 
-/// The energy error of every step of a run, relative to the start.
+/// A point of a system.
+type Point<Y> = <<Y as Metriplectic>::Manifold as metriplectic::fields::Space>::Point<f64>;
+
+/// The error of an energy by hand at the point of every step of a run, relative to the start. `look`
+/// sees the points, too.
 fn energy_drift<Y: Metriplectic>(
     system: &Y,
-    x0: <Y::Manifold as metriplectic::fields::Space>::Point<f64>,
-    h: f64,
-    steps: usize,
+    x0: Point<Y>,
+    energy: impl Fn(&Point<Y>) -> f64,
+    mut look: impl FnMut(&Point<Y>),
 ) -> (Drift, Certificate)
 where
     WeylMidpoint: Retraction<Y::Manifold, Y::Metric>,
 {
-    let mut run = WeylMidpoint.steps(system, x0, h).expect("the model keeps its laws");
-    let start = run.state().energy;
-    let mut drift = Drift::over(steps);
-    for _ in 0..steps {
+    let start = energy(&x0);
+    let mut run = WeylMidpoint.steps(system, x0, 0.1).expect("the model keeps its laws");
+    let mut drift = Drift::over(MILLION);
+    for _ in 0..MILLION {
         let state = run.advance().expect("every step is solved");
-        drift.push((state.energy - start) / start);
+        drift.push((energy(&state.point) - start) / start);
+        look(&state.point);
     }
     (drift, run.certificate().clone())
 }
 
-/// No drift: the worst of the last tenth is at most three times that of the first, where less than
-/// a unit in the last place of `H` counts as one.
+/// No drift: the worst of the last tenth is at most three times that of the first.
 fn is_flat(drift: &Drift) -> bool {
-    drift.last_tenth_worst() <= 3.0 * drift.first_tenth_worst().max(f64::EPSILON)
+    drift.last_tenth_worst() <= 3.0 * drift.first_tenth_worst()
+}
+
+/// `½ Σ p_i²/I_i`.
+fn by_hand(inertia: Vector3<f64>) -> impl Fn(&Vector3<f64>) -> f64 {
+    move |p| 0.5 * p.component_mul(p).component_div(&inertia).sum()
 }
 
 #[test]
 fn a_million_steps_of_the_relaxing_body_keep_the_energy() {
-    let (drift, certificate) = energy_drift(&relaxing_body(), UNSTABLE, 0.1, MILLION);
+    // S = |p|²/2 by hand; ΔS ≥ −4ε(max(|S|, 1) + |dS||x|) on every step, and |dS| = |x| = |p|.
+    let (mut entropy, mut falls) = (0.5 * UNSTABLE.norm_squared(), 0);
+    let (drift, certificate) =
+        energy_drift(&relaxing_body(), UNSTABLE, by_hand(vector![10.0, 5.0, 1.0]), |p| {
+            let next = 0.5 * p.norm_squared();
+            let round_off = 4.0 * f64::EPSILON * (entropy.max(1.0) + 2.0 * entropy);
+            falls += usize::from(next - entropy < -round_off);
+            entropy = next;
+        });
     println!("{drift}\n{certificate}");
+    assert_eq!((falls, certificate.entropy_falls), (0, 0));
     assert!(drift.worst() <= 5e-15, "{drift}");
     assert!(is_flat(&drift), "{drift}");
     assert_eq!(certificate.retries, 0);
@@ -46,7 +65,8 @@ fn a_million_steps_of_the_relaxing_body_keep_the_energy() {
 
 #[test]
 fn a_million_steps_of_a_body_that_never_rests_keep_the_energy() {
-    let (drift, certificate) = energy_drift(&free_body(), TUMBLING, 0.1, MILLION);
+    let inertia = vector![1.0, 2.0, 3.0];
+    let (drift, certificate) = energy_drift(&free_body(), TUMBLING, by_hand(inertia), |_| ());
     println!("{drift}\n{certificate}");
     assert!(drift.worst() <= 5e-15, "{drift}");
     assert!(is_flat(&drift), "{drift}");
@@ -57,10 +77,16 @@ fn a_million_steps_of_a_body_that_never_rests_keep_the_energy() {
 fn a_million_steps_on_the_sphere_keep_energy_and_norm() {
     let system = System::on(Sphere::<2>::round()).bracket(AreaForm).energy(top).build().unwrap();
     let start = Vector3::from_element(3.0_f64.sqrt().recip());
-    let (drift, certificate) = energy_drift(&system, start, 0.1, MILLION);
+    let by_hand = |x: &Vector3<f64>| {
+        let terms = x.map(|x| x.powi(2) + x.powi(3) / 1.5);
+        terms.dot(&vector![0.5, 0.25, 0.125])
+    };
+    let mut off = 0.0_f64;
+    let (drift, certificate) =
+        energy_drift(&system, start, by_hand, |x| off = off.max((x.norm() - 1.0).abs()));
     println!("{drift}\n{certificate}");
     assert!(certificate.keeps_energy() && is_flat(&drift), "{drift}");
-    assert!(certificate.max_manifold_defect <= 1e-15);
+    assert!(off <= 1e-15 && certificate.max_manifold_defect <= 1e-15, "{off:.1e}");
 }
 
 #[test]
@@ -72,10 +98,16 @@ fn a_million_steps_of_a_heavy_body_keep_energy_and_orthogonality() {
     let space = Product(Rotations::bi_invariant(), Euclidean::<3>);
     let system = System::on(space).bracket(Symplectic).energy(energy).build().unwrap();
     let start = (Matrix3::identity(), vector![0.4, -0.6, 0.8]);
-    let (drift, certificate) = energy_drift(&system, start, 0.1, MILLION);
+    let by_hand = |(r, p): &(Matrix3<f64>, Vector3<f64>)| {
+        0.5 * p.component_mul(p).dot(&vector![1.0, 0.5, 1.0 / 3.0]) + 0.7 * r.m33
+    };
+    let mut off = 0.0_f64;
+    let (drift, certificate) = energy_drift(&system, start, by_hand, |(r, _)| {
+        off = off.max((r.tr_mul(r) - Matrix3::identity()).norm());
+    });
     println!("{drift}\n{certificate}");
     assert!(certificate.keeps_energy() && is_flat(&drift), "{drift}");
-    assert!(certificate.max_manifold_defect <= 1e-14, "{certificate}");
+    assert!(off <= 1e-14 && certificate.max_manifold_defect <= 1e-14, "{off:.1e}");
 }
 
 #[test]
@@ -247,4 +279,54 @@ fn trajectories_are_compared_by_approx() {
     approx::assert_relative_eq!(run(0.1), run(0.1));
     approx::assert_abs_diff_ne!(run(0.1), run(0.2), epsilon = 1e-9);
     approx::assert_abs_diff_eq!(run(0.1), run(0.1 + 1e-12), epsilon = 1e-9);
+    // At rest all points are the same, and the times are not.
+    let rest = |h: f64| WeylMidpoint.run(&body, Vector3::x(), Span::steps(h, 20)).unwrap();
+    approx::assert_relative_ne!(rest(0.1), rest(0.2));
+    // Points of a product, in their states, and tangents.
+    let space = Product(Rotations::bi_invariant(), Euclidean::<1>);
+    let system = System::on(space)
+        .energy(|(r, s): &(Matrix3<Real>, Vector1<Real>)| r.m33 + s.x)
+        .entropy(|(_, s): &(Matrix3<Real>, Vector1<Real>)| s.x)
+        .build()
+        .unwrap();
+    let start = (Matrix3::identity(), vector![0.3]);
+    let run = WeylMidpoint.run(&system, start, Span::steps(0.1, 2)).unwrap();
+    approx::assert_relative_eq!(run.last(), run.last());
+    approx::assert_abs_diff_ne!(run.states()[0].clone(), run.last().clone(), epsilon = 1e-9);
+    let tangent =
+        |d: f64| Tangent::<Euclidean<2>> { base: vector![1.0, 2.0], vector: vector![d, 0.0] };
+    approx::assert_relative_eq!(tangent(1.0), tangent(1.0 + 1e-16));
+    approx::assert_abs_diff_ne!(tangent(1.0), tangent(1.1));
+}
+
+#[test]
+fn a_certificate_has_the_figures_of_its_states() {
+    // Of a system with entropy, far from rest, by hand from the recorded states.
+    let run =
+        WeylMidpoint.run(&relaxing_body(), vector![0.7, -1.0, 0.4], Span::steps(0.3, 60)).unwrap();
+    let (certificate, energy) = (run.certificate(), by_hand(vector![10.0, 5.0, 1.0]));
+    let energies: Vec<f64> = run.iter().map(|s| energy(&s.point)).collect();
+    let entropies: Vec<f64> = run.iter().map(|s| 0.5 * s.point.norm_squared()).collect();
+    let worst = energies.iter().map(|e| (e - energies[0]).abs()).fold(0.0, f64::max);
+    let least = entropies.windows(2).map(|s| s[1] - s[0]).fold(f64::INFINITY, f64::min);
+    // The fields of the closures are summed in another order.
+    let round_off = 8.0 * f64::EPSILON;
+    assert!((certificate.max_energy_error - worst).abs() <= round_off);
+    assert!((certificate.min_entropy_increment - least).abs() <= round_off);
+    let gained = entropies[60] - entropies[0];
+    assert!((certificate.entropy_gained - gained).abs() <= round_off && gained > 0.1);
+    assert_eq!((certificate.steps, certificate.entropy_falls), (60, 0));
+}
+
+#[test]
+fn a_certificate_says_when_the_first_law_is_broken() {
+    // A solver that is content with a residual of 10⁻⁴.
+    let crude = Newton { tolerance: 1e12, ..Newton::default() };
+    let scheme = Scheme::new(WeylMidpoint).newton(crude);
+    let run = scheme.run(&free_body(), TUMBLING, Span::steps(0.5, 20)).unwrap();
+    let (certificate, energy) = (run.certificate(), by_hand(vector![1.0, 2.0, 3.0]));
+    let worst =
+        run.iter().map(|s| (energy(&s.point) - energy(&TUMBLING)).abs()).fold(0.0, f64::max);
+    assert!(worst > 1e-9 && !certificate.keeps_energy(), "{certificate}");
+    assert!((certificate.max_energy_error - worst).abs() <= 8.0 * f64::EPSILON);
 }

@@ -32,19 +32,23 @@ pub(crate) struct Linearised<const N: usize> {
     pub(crate) floor: f64,
 }
 
-/// The root near `u`, by corrections with the Jacobian there.
+/// The root near `u`, by corrections with the Jacobian there, and their number. It ends as the library's
+/// iteration does: the last correction is not checked if it promises a hundredth of the floor.
 pub(crate) fn solve<const N: usize>(
     mut u: SVector<f64, N>,
     here: &Linearised<N>,
     residual: impl Fn(&SVector<f64, N>) -> SVector<f64, N>,
-) -> SVector<f64, N> {
-    let mut r = here.residual;
-    for _ in 0..30 {
-        if r.norm_squared() <= here.floor * here.floor {
+) -> (SVector<f64, N>, usize) {
+    let (mut r, mut size, mut contraction) = (here.residual, here.residual.norm(), f64::INFINITY);
+    let mut sweeps = 0;
+    while size > 0.1 * here.floor && sweeps < 30 {
+        u -= here.inverse * r;
+        sweeps += 1;
+        if size <= here.floor || contraction * size <= 0.01 * here.floor {
             break;
         }
-        u -= here.inverse * r;
         r = residual(&u);
+        (contraction, size) = (r.norm() / size, r.norm());
     }
-    u
+    (u, sweeps)
 }

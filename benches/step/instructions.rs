@@ -57,10 +57,9 @@ pub(crate) fn compare(rows: &[Row], bless: bool) {
     for row in rows {
         let [few, many] = RUNS.map(|steps| collected(&row.name, steps).expect("callgrind counts"));
         let each = (many - few) / (RUNS[1] - RUNS[0]) as f64;
-        let sweeps = (row.run)(RUNS[1]).sweeps;
-        let sweeps = sweeps.map_or("-".to_owned(), |n| format!("{:.2}", n as f64 / RUNS[1] as f64));
+        let sweeps = (row.run)(RUNS[1]).sweeps as f64 / RUNS[1] as f64;
         let calls = row.calls.map_or("-".to_owned(), |calls| format!("{calls:.1}"));
-        let line = format!("{:32} {each:10.0} {sweeps:>6} {calls:>6}", row.name);
+        let line = format!("{:32} {each:10.0} {sweeps:6.2} {calls:>6}", row.name);
         writeln!(table, "{line}").expect("a string takes it all");
         if let Some(n) = row.name.strip_prefix("step/ring/") {
             rings.push((n.parse::<f64>().expect("a dimension"), each));

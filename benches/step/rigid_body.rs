@@ -6,7 +6,10 @@ use std::rc::Rc;
 use metriplectic::fields::{Jet1, Jet2};
 use metriplectic::prelude::*;
 
+use crate::chord::{self, Displacements, Linearised};
 use crate::{Row, Step, check};
+
+type V = [f64; 3];
 
 const INERTIA: V = [10.0, 5.0, 1.0];
 const START: V = [-0.6, -0.84, 0.15];
@@ -97,7 +100,7 @@ pub(crate) fn rows() -> Vec<Row> {
             .counted(&calls, counting, start, h),
         Row::new("step/rigid_body/typed", typed.build().expect(WELL), start, h),
         Row::new("step/rigid_body/analytic", analytic.build().expect(WELL), start, h),
-        Row::by_hand("step/rigid_body/hand_coded", HandCoded::new(&INERTIA), START, h),
+        Row::by_hand("step/rigid_body/hand_coded", HandCoded::new(&INERTIA), start, h),
         Row::new("step/rigid_body/published", published, start, h),
         Row::with("step/rigid_body/mean_value", scheme.gradient(MeanValue), mean, start, h),
         Row::with(
@@ -114,96 +117,65 @@ pub(crate) fn rows() -> Vec<Row> {
 }
 
 /// By hand: analytic gradients and Jacobian, the same chord-Newton iteration.
-#[derive(Clone, Copy)]
+#[derive(Clone)]
 struct HandCoded {
-    inverse_inertia: [f64; 3],
-    displacements: [Option<[f64; 3]>; 3],
-}
-
-type V = [f64; 3];
-
-fn dot(a: &V, b: &V) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-fn cross(a: &V, b: &V) -> V {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+    inverse_inertia: Vector3<f64>,
+    displacements: Displacements<3>,
+    sweeps: usize,
 }
 
 impl HandCoded {
     fn new(inertia: &V) -> Self {
-        Self { inverse_inertia: inertia.map(f64::recip), displacements: [None; 3] }
+        let inverse_inertia = Vector3::from(inertia.map(f64::recip));
+        Self { inverse_inertia, displacements: Displacements::new(), sweeps: 0 }
     }
 
     /// `z × w + |w|² z − (w·z) w` at the midpoint, where `w = I⁻¹z` is the discrete gradient of
     /// the quadratic energy and `z` that of the entropy.
-    fn residual(&self, x: &V, d: &V, h: f64) -> (V, V, V) {
-        let z: V = std::array::from_fn(|i| x[i] + 0.5 * d[i]);
-        let w: V = std::array::from_fn(|i| self.inverse_inertia[i] * z[i]);
-        let (c, (ww, wz)) = (cross(&z, &w), (dot(&w, &w), dot(&w, &z)));
-        let r = std::array::from_fn(|i| d[i] - h * (c[i] + ww * z[i] - wz * w[i]));
-        (r, z, w)
+    fn residual(&self, x: &Vector3<f64>, d: &Vector3<f64>, h: f64) -> Vector3<f64> {
+        let z = x + d * 0.5;
+        let w = self.inverse_inertia.component_mul(&z);
+        d - (z.cross(&w) + z * w.norm_squared() - w * w.dot(&z)) * h
     }
 
-    /// The inverse of `1 − (h/2) ∂v/∂z` by cofactors.
-    fn inverse_jacobian(&self, z: &V, w: &V, h: f64) -> [V; 3] {
-        let m = &self.inverse_inertia;
-        let (ww, wz) = (dot(w, w), dot(w, z));
-        let skew = |a: &V| [[0.0, -a[2], a[1]], [a[2], 0.0, -a[0]], [-a[1], a[0], 0.0]];
-        let (zx, wx) = (skew(z), skew(w));
-        let mut j = [[0.0; 3]; 3];
-        for i in 0..3 {
-            for k in 0..3 {
-                let delta = if i == k { 1.0 } else { 0.0 };
-                let slope = zx[i][k] * m[k] - wx[i][k] + 2.0 * z[i] * w[k] * m[k] + ww * delta
-                    - w[i] * (w[k] + m[k] * z[k])
-                    - wz * m[i] * delta;
-                j[i][k] = delta - 0.5 * h * slope;
-            }
-        }
-        let [a, b, c] =
-            [[j[0][0], j[1][0], j[2][0]], [j[0][1], j[1][1], j[2][1]], [j[0][2], j[1][2], j[2][2]]];
-        let rows = [cross(&b, &c), cross(&c, &a), cross(&a, &b)];
-        let scale = dot(&a, &rows[0]).recip();
-        rows.map(|row| row.map(|entry| entry * scale))
-    }
-
-    fn guess(&self, x: &V, h: f64) -> V {
-        match self.displacements {
-            [Some(a), Some(b), Some(c)] => std::array::from_fn(|i| 3.0 * (a[i] - b[i]) + c[i]),
-            [Some(a), Some(b), None] => std::array::from_fn(|i| 2.0 * a[i] - b[i]),
-            _ => {
-                let (r, _, _) = self.residual(x, &[0.0; 3], h);
-                r.map(|r| -r)
-            }
-        }
+    /// The residual with the inverse of `1 − (h/2) ∂v/∂z`.
+    fn linearise(&self, x: &Vector3<f64>, d: &Vector3<f64>, h: f64) -> Linearised<3> {
+        let (m, z) = (&self.inverse_inertia, x + d * 0.5);
+        let w = m.component_mul(&z);
+        let (ww, wz) = (w.norm_squared(), w.dot(&z));
+        let velocity = z.cross(&w) + z * ww - w * wz;
+        let m_diagonal = Matrix3::from_diagonal(m);
+        let slope = z.cross_matrix() * m_diagonal - w.cross_matrix()
+            + (z * w.component_mul(m).transpose()) * 2.0
+            + Matrix3::from_diagonal_element(ww)
+            - w * (w + m.component_mul(&z)).transpose()
+            - m_diagonal * wz;
+        let jacobian = Matrix3::identity() - slope * (0.5 * h);
+        let terms = (z.norm() + w.norm()) * w.norm() * z.norm();
+        let floor = f64::EPSILON * (4.0 * h * terms + d.norm());
+        let inverse = jacobian.try_inverse().unwrap_or_else(Matrix3::identity);
+        Linearised { residual: d - velocity * h, inverse, floor }
     }
 }
 
 impl Step for HandCoded {
-    type Point = V;
+    type Point = Vector3<f64>;
 
-    fn step(&mut self, x: &V, h: f64) -> V {
-        let mut d = self.guess(x, h);
-        let (mut r, z, w) = self.residual(x, &d, h);
-        let inverse = self.inverse_jacobian(&z, &w, h);
-        let pw = dot(&z, &z).sqrt() * dot(&w, &w).sqrt();
-        let kz = dot(&w, &w) * dot(&z, &z).sqrt();
-        let floor = f64::EPSILON * (4.0 * h * (pw + kz) + dot(&d, &d).sqrt());
-        for _ in 0..30 {
-            if dot(&r, &r) <= floor * floor {
-                break;
-            }
-            for i in 0..3 {
-                d[i] -= dot(&inverse[i], &r);
-            }
-            (r, _, _) = self.residual(x, &d, h);
-        }
-        self.displacements = [Some(d), self.displacements[0], self.displacements[1]];
-        std::array::from_fn(|i| x[i] + d[i])
+    fn step(&mut self, x: &Vector3<f64>, h: f64) -> Vector3<f64> {
+        let guess = self.displacements.extrapolate();
+        let guess = guess.unwrap_or_else(|| -self.residual(x, &Vector3::zeros(), h));
+        let here = self.linearise(x, &guess, h);
+        let (d, sweeps) = chord::solve(guess, &here, |d| self.residual(x, d, h));
+        self.sweeps += sweeps;
+        self.displacements.note(d);
+        x + d
     }
 
-    fn entries(x: &V) -> Vec<f64> {
-        x.to_vec()
+    fn sweeps(&self) -> usize {
+        self.sweeps
+    }
+
+    fn entries(x: &Vector3<f64>) -> Vec<f64> {
+        x.as_slice().to_vec()
     }
 }

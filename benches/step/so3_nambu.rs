@@ -44,7 +44,7 @@ pub(crate) fn rows() -> Vec<Row> {
         .entropy(Entropy)
         .second_law(SecondLaw::Published);
     let (start, h) = (rotations::exp(&Vector3::new(0.3, -0.2, 0.5)), STEP_SIZE);
-    let hand = HandCoded { displacements: Displacements::new() };
+    let hand = HandCoded { displacements: Displacements::new(), sweeps: 0 };
     let mut rows = vec![
         Row::new("step/so3_nambu/closure", frame().build().expect(WELL), start, h),
         Row::new("step/so3_nambu/typed", typed.build().expect(WELL), start, h),
@@ -80,6 +80,7 @@ pub(crate) fn rows() -> Vec<Row> {
 #[derive(Clone)]
 struct HandCoded {
     displacements: Displacements<3>,
+    sweeps: usize,
 }
 
 /// `H = R₁₁ + 2R₂₂ + 3R₃₃ + ½R₁₂R₂₃`
@@ -197,12 +198,17 @@ impl Step for HandCoded {
             velocity(&differential(&entropy_slope(x)), &differential(&energy_slope(x))) * h
         });
         let here = equation.linearise(&guess);
-        let u = chord::solve(guess, &here, |u| equation.residual(u));
+        let (u, sweeps) = chord::solve(guess, &here, |u| equation.residual(u));
+        self.sweeps += sweeps;
         self.displacements.note(u);
         let (turn, _) = exp(&u);
         let end = x * turn;
         // One step of the polar iteration keeps the matrix orthogonal.
         end * (Matrix3::from_diagonal_element(1.5) - end.tr_mul(&end) * 0.5)
+    }
+
+    fn sweeps(&self) -> usize {
+        self.sweeps
     }
 
     fn entries(x: &Matrix3<f64>) -> Vec<f64> {

@@ -31,7 +31,7 @@ pub(crate) fn rows() -> Vec<Row> {
     };
     let typed = System::on(Sphere::<2>::round()).bracket(AreaForm).energy(Energy);
     let (start, h) = (Vector3::repeat(3.0_f64.sqrt().recip()), STEP_SIZE);
-    let hand = HandCoded { displacements: Displacements::new() };
+    let hand = HandCoded { displacements: Displacements::new(), sweeps: 0 };
     let mut rows = vec![
         Row::new("step/spinning_top/closure", top().build().expect(WELL), start, h),
         Row::new("step/spinning_top/typed", typed.build().expect(WELL), start, h),
@@ -74,6 +74,7 @@ fn gradient(x: &Vector3<f64>) -> Vector3<f64> {
 #[derive(Clone)]
 struct HandCoded {
     displacements: Displacements<3>,
+    sweeps: usize,
 }
 
 /// The middle, the displacement and the end of an arc, with `cos θ/2` and `sin(θ/2)/θ`.
@@ -169,10 +170,15 @@ impl Step for HandCoded {
         let guess = self.displacements.extrapolate();
         let guess = equation.e.tr_mul(&guess.unwrap_or_else(|| x.cross(&gradient(x)) * h));
         let here = equation.linearise(&guess);
-        let u = chord::solve(guess, &here, |u| equation.residual(u));
+        let (u, sweeps) = chord::solve(guess, &here, |u| equation.residual(u));
+        self.sweeps += sweeps;
         let arc = Arc::new(x, &equation.e, &u);
         self.displacements.note(arc.tangent);
         arc.end.normalize()
+    }
+
+    fn sweeps(&self) -> usize {
+        self.sweeps
     }
 
     fn entries(x: &Vector3<f64>) -> Vec<f64> {

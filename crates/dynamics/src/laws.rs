@@ -8,7 +8,7 @@ use metriplectic_manifolds::{Manifold, MetricError};
 
 use crate::bracket::{by_dual_numbers as by_dual_numbers_bracket, epsilon};
 use crate::dissipation::by_dual_numbers;
-use crate::system::{Metriplectic, Point};
+use crate::system::{Metriplectic, Point, SecondLaw};
 use crate::{Bracket, Dissipation};
 
 /// Round-off of a tensor contraction whose terms have the size `scale`.
@@ -70,7 +70,8 @@ fn tensor<Y: Metriplectic + ?Sized, D: Scalar>(
 /// Checks the bracket of a system at `x` with the covectors `α`, `β`:
 ///
 /// 1. `Π` is skew; 2. Jacobi identity; 3. `linearise` is the derivative of `apply`;
-/// 4. `apply` is linear in the covector (which is Leibniz' rule).
+/// 4. `apply` is linear in the covector (which is Leibniz' rule); 5. `Π dS = 0`, if the system has
+///    [`SecondLaw::Exact`].
 ///
 /// # Errors
 ///
@@ -108,7 +109,12 @@ pub fn bracket<Y: Metriplectic>(
     let combined = bracket.apply(&site, &(*alpha + *beta * 3.0)).map_err(exists)?;
     let apart = jet.value + bracket.apply(&site, beta).map_err(exists)? * 3.0;
     let off = (combined - apart).magnitude();
-    BrokenLaw::unless("Π(α + 3β) = Πα + 3Πβ", off, round_off(4.0 * size))
+    BrokenLaw::unless("Π(α + 3β) = Πα + 3Πβ", off, round_off(4.0 * size))?;
+    if system.second_law() != SecondLaw::Exact {
+        return Ok(());
+    }
+    let left = bracket.apply(&site, &s).map_err(exists)?.magnitude();
+    BrokenLaw::unless("Π dS = 0", left, round_off(defects.size * s.magnitude()))
 }
 
 /// Checks the dissipation of a system at `x` with the covector `w` to be killed and two more covectors:

@@ -123,7 +123,9 @@ fn examine<Y: Metriplectic + ?Sized>(
     for _ in 0..SAMPLES {
         let q = Vector::<Y::Manifold>::from_index(|_| radius * rng.random_range(-1.0..1.0));
         let x = Y::Manifold::chart(x0, &q);
-        if value_not_finite(system, &x).is_some() {
+        // Beyond an open chart's edge, where its defect is infinite, or a field's, there is no model to judge.
+        let outside = !system.manifold().defect(&x).is_finite();
+        if outside || value_not_finite(system, &x).is_some() {
             report.passed_over += 1;
         } else {
             widen(&x);

@@ -1,6 +1,6 @@
 //! What discrete gradients and steps promise, and the functions that check it.
 
-use metriplectic_dynamics::{Metriplectic, system::Point};
+use metriplectic_dynamics::{Metriplectic, SecondLaw, system::Point};
 use metriplectic_fields::{
     BrokenLaw, ChartPoint, Column, ScalarField, Space, Vector, differential,
 };
@@ -9,6 +9,7 @@ use metriplectic_manifolds::{Arc, Manifold, Retraction, Riemannian};
 use crate::discrete_gradient::{DiscreteGradient, along as along_arc};
 use crate::residual::Recall;
 use crate::step::{Memory, Scheme, Start};
+use crate::trajectory::entropy_round_off;
 
 /// Checks a discrete gradient of `f` on the arc of `u` from `x`:
 ///
@@ -61,7 +62,10 @@ where
     BrokenLaw::unless("w − dF(z) falls like |d|²", deviation(1e-2)?, allowed)
 }
 
-/// Checks one step of size `h` from `x`: the energy is kept to `50 ε max(|H|, 1)`.
+/// Checks one step of size `h` from `x`:
+///
+/// 1. the energy is kept to `50 ε max(|H|, 1)`; 2. with [`SecondLaw::Exact`] and `h > 0` the entropy
+///    does not fall by more than its round-off `4ε (max(|S|, 1) + |dS||x|)`.
 ///
 /// # Errors
 ///
@@ -80,7 +84,14 @@ where
     let end = one(scheme, system, x, h)?;
     let energy = system.energy_at(x);
     let bound = 50.0 * f64::EPSILON * energy.abs().max(1.0);
-    BrokenLaw::unless("a step keeps the energy", (system.energy_at(&end) - energy).abs(), bound)
+    BrokenLaw::unless("a step keeps the energy", (system.energy_at(&end) - energy).abs(), bound)?;
+    if system.second_law() == SecondLaw::Exact && h > 0.0 {
+        let entropy = system.entropy_at(x);
+        let bound = entropy_round_off(system, x, entropy);
+        let fall = entropy - system.entropy_at(&end);
+        BrokenLaw::unless("a step does not lower the entropy", fall, bound)?;
+    }
+    Ok(())
 }
 
 /// Checks that a scheme is symmetric in time: a step of `h` and one of `−h` lead back to `x`, as

@@ -346,7 +346,9 @@ where
         c.min_entropy_increment =
             if c.steps == 0 { increment } else { c.min_entropy_increment.min(increment) };
         c.entropy_gained = next.entropy - c.initial_entropy;
-        if increment < 0.0 && increment < -entropy_round_off(self.system, &self.state) {
+        if increment < 0.0
+            && increment < -entropy_round_off(self.system, &self.state.point, self.state.entropy)
+        {
             c.entropy_falls += 1;
         }
         c.min_entropy_slope = c.min_entropy_slope.min(work.entropy_slope);
@@ -416,10 +418,9 @@ fn values<Y: Metriplectic>(system: &Y, x: &Point<Y>) -> Numbers<Y> {
 
 /// The round-off `4ε (max(|S|, 1) + |dS||x|)` of an entropy increment: `S` is evaluated twice, at
 /// points whose entries are rounded.
-fn entropy_round_off<Y: Metriplectic>(system: &Y, state: &State<Y::Manifold>) -> f64 {
-    let ds = system.entropy().jet1(&state.point).df.magnitude();
-    let position = Y::Manifold::magnitude(&state.point);
-    4.0 * f64::EPSILON * (state.entropy.abs().max(1.0) + ds * position)
+pub(crate) fn entropy_round_off<Y: Metriplectic>(system: &Y, x: &Point<Y>, entropy: f64) -> f64 {
+    let ds = system.entropy().jet1(x).df.magnitude();
+    4.0 * f64::EPSILON * (entropy.abs().max(1.0) + ds * Y::Manifold::magnitude(x))
 }
 
 impl<Y, R, W> Iterator for Steps<'_, Y, R, W>
@@ -485,7 +486,8 @@ impl<'a, M: Manifold> IntoIterator for &'a Trajectory<M> {
     }
 }
 
-impl<M: Manifold> AbsDiffEq for Trajectory<M>
+/// States are compared by their times and the entries of their points.
+impl<M: Manifold> AbsDiffEq for State<M>
 where
     Self: PartialEq,
 {
@@ -496,15 +498,12 @@ where
     }
 
     fn abs_diff_eq(&self, other: &Self, epsilon: f64) -> bool {
-        self.states.len() == other.states.len()
-            && self
-                .iter()
-                .zip(other)
-                .all(|(a, b)| M::entries(&a.point).abs_diff_eq(&M::entries(&b.point), epsilon))
+        self.time.abs_diff_eq(&other.time, epsilon)
+            && M::entries(&self.point).abs_diff_eq(&M::entries(&other.point), epsilon)
     }
 }
 
-impl<M: Manifold> RelativeEq for Trajectory<M>
+impl<M: Manifold> RelativeEq for State<M>
 where
     Self: PartialEq,
 {
@@ -513,10 +512,40 @@ where
     }
 
     fn relative_eq(&self, other: &Self, epsilon: f64, max_relative: f64) -> bool {
-        self.states.len() == other.states.len()
-            && self.iter().zip(other).all(|(a, b)| {
-                M::entries(&a.point).relative_eq(&M::entries(&b.point), epsilon, max_relative)
-            })
+        let (here, there) = (M::entries(&self.point), M::entries(&other.point));
+        self.time.relative_eq(&other.time, epsilon, max_relative)
+            && here.relative_eq(&there, epsilon, max_relative)
+    }
+}
+
+/// Trajectories are compared state by state.
+impl<M: Manifold> AbsDiffEq for Trajectory<M>
+where
+    Self: PartialEq,
+    State<M>: PartialEq,
+{
+    type Epsilon = f64;
+
+    fn default_epsilon() -> f64 {
+        f64::default_epsilon()
+    }
+
+    fn abs_diff_eq(&self, other: &Self, epsilon: f64) -> bool {
+        self.states.abs_diff_eq(&other.states, epsilon)
+    }
+}
+
+impl<M: Manifold> RelativeEq for Trajectory<M>
+where
+    Self: PartialEq,
+    State<M>: PartialEq,
+{
+    fn default_max_relative() -> f64 {
+        f64::default_max_relative()
+    }
+
+    fn relative_eq(&self, other: &Self, epsilon: f64, max_relative: f64) -> bool {
+        self.states.relative_eq(&other.states, epsilon, max_relative)
     }
 }
 

@@ -380,6 +380,8 @@ mod tests {
         let mut progress = Progress::starting(10, true);
         progress.look(started + PATIENCE / 2);
         assert!(!progress.shown);
+        progress.look(started + PATIENCE);
+        assert!(progress.shown);
         let mut silent = Progress::starting(10, false);
         silent.started = started - 2 * PATIENCE;
         (0..10).for_each(|_| silent.step());

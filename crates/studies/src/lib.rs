@@ -13,6 +13,7 @@
 //! | [`table`] | what does the study say, in rows? | [`Table`]: plain text and Markdown |
 //! | [`plot`] | what does it look like? | [`Panels`] of lines, with a [`Globe`] beside them, and [`LogLog`]: SVG, the same bytes every time |
 //! | [`gallery`] | where do the pictures and the words of an example go? | [`Options`], [`Gallery`], [`Progress`], [`print()`], [`write_csv`] |
+//! | [`report`] | what does a program read of it? | [`Report`]: one JSON object |
 //! | [`interrupt`] | has Ctrl-C been pressed? | [`interrupted()`]: a long run stops where its file is whole |
 //!
 //! # Example
@@ -50,6 +51,7 @@ pub mod order;
 pub mod plot;
 pub mod problems;
 pub mod published;
+pub mod report;
 pub mod table;
 
 mod axis;
@@ -68,4 +70,5 @@ pub use interrupt::interrupted;
 pub use order::{Order, OrderError};
 pub use plot::{Globe, LogLog, Panel, Panels, PlotError};
 pub use published::Published;
+pub use report::Report;
 pub use table::{Table, scientific};

@@ -13,9 +13,10 @@ default:
 fmt:
     cargo fmt --all -- --check
 
-# clippy on every target and feature, warnings are errors
+# clippy on every target, with every feature and with none, warnings are errors
 lint:
     cargo clippy --workspace --all-targets --all-features -- -D warnings
+    cargo clippy --no-default-features -- -D warnings
 
 # unit tests, integration tests and doctests; the random cases are the same in each run
 test:
@@ -57,7 +58,7 @@ study:
 fuzz seconds="600":
     FUZZ_SECONDS=$(({{ seconds }} / 3)) cargo test --release --all-features --test fuzz -- --nocapture --test-threads 2
 
-# time fields, steps and runs
+# time steps, and print the table of orders
 bench:
     cargo bench
 

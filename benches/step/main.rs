@@ -89,14 +89,14 @@ impl Row {
     {
         let run = move |steps| {
             let (mut memory, mut x, mut sweeps) = (Memory::new(), black_box(start.clone()), 0);
+            let [mut energy, mut entropy] = [system.energy_at(&x), system.entropy_at(&x)];
             for _ in 0..steps {
-                let [energy, entropy] = [system.energy_at(&x), system.entropy_at(&x)];
                 let left_over = Recall::nothing();
                 let invariants = left_over.invariants;
                 let start = Start { x: &x, time: 0.0, h, energy, entropy, invariants, left_over };
                 let Ok((end, work)) = scheme.step(&system, &start, &mut memory) else { break };
                 sweeps += work.sweeps;
-                x = end;
+                (x, energy, entropy) = (end, work.energy, work.entropy);
             }
             Outcome { end: Y::Manifold::entries(&x), sweeps }
         };

@@ -40,7 +40,7 @@ use metriplectic_manifolds::{
 };
 use nalgebra::{Matrix3, Vector3};
 
-use crate::discrete_gradient::Chord;
+use crate::discrete_gradient::{Chord, Segment};
 use crate::trajectory::{State, Trajectory};
 
 /// The attitude `R(t)` of a body, a rotation from its frame to space, along a run on so(3)*; see the
@@ -145,10 +145,9 @@ impl<'a, Y: Metriplectic<Manifold = LieDual<3>>> Attitude<'a, Y> {
         let d = next.point - x;
         let z = x + d * 0.5;
         let nodes = WeylMidpoint.along(&Canonical, x, &d)?;
-        let end = (&next.point, next.energy);
         let df = energy.jet1(&z).df;
-        let start = self.state.energy;
-        let chord = Chord::new(energy, &df, &d, start, end, || df.dot(&d), || nodes);
+        let (segment, values) = (Segment::new(&d, &next.point), [self.state.energy, next.energy]);
+        let chord = Chord::new(energy, &df, &segment, values, || df.dot(&d), || nodes);
         let g = self.system.metric().at(&ChartPoint::<LieDual<3>>::centre(&z))?;
         Ok(chord.covector(0.0, &g, &d))
     }

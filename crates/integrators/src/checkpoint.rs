@@ -104,6 +104,7 @@ struct SavedLinearisation {
     /// The inverse, row by row.
     inverse: Vec<Exact>,
     contraction: Exact,
+    first: Exact,
     sizes: [Exact; 2],
     h: Exact,
     length: Exact,
@@ -396,6 +397,7 @@ impl SavedLinearisation {
         Self {
             inverse: exact((0..n * n).map(|k| inverse.matrix[(k / n, k % n)])),
             contraction: Exact(inverse.contraction),
+            first: Exact(inverse.first),
             sizes: [Exact(sizes.terms), Exact(sizes.gain)],
             h: Exact(h),
             length: Exact(length),
@@ -414,7 +416,7 @@ impl SavedLinearisation {
         let contraction = number("contraction", self.contraction)?;
         let [terms, gain] = self.sizes;
         Ok(Linearisation {
-            inverse: Inverse { matrix, contraction },
+            inverse: Inverse { matrix, contraction, first: self.first.0 },
             sizes: Sizes {
                 terms: number("size of its terms", terms)?,
                 gain: number("gain", gain)?,

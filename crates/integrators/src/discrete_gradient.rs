@@ -22,7 +22,7 @@ mod gonzalez;
 mod itoh_abe;
 mod mean_value;
 
-pub use chord::Chord;
+pub use chord::{Chord, Segment};
 pub use gonzalez::Gonzalez;
 pub use itoh_abe::{ItohAbe, SymmetricItohAbe};
 pub use mean_value::MeanValue;
@@ -124,10 +124,10 @@ where
 {
     let arc = retraction.real_arc(metric, x, u)?;
     let (g, mean) = (metric.at(&arc.z)?, gradient.real_mean(f, x, &arc));
-    let (start, end) = (f.at(x), (&arc.end, f.at(&arc.end)));
+    let values = [f.at(x), f.at(&arc.end)];
     let nodes = retraction.along(metric, x, u)?;
     let base = || gradient.slope_at_base(f, &arc.z.base, &arc.d, &mean);
-    let chord = Chord::new(f, &mean, &arc.d, start, end, base, || nodes);
+    let chord = Chord::new(f, &mean, &Segment::new(&arc.d, &arc.end), values, base, || nodes);
     Ok(chord.covector(0.0, &g, &arc.d))
 }
 

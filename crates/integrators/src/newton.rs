@@ -8,8 +8,8 @@ use crate::root_finder::{Equation, Linearised, NoRoot, Root, RootFinder};
 ///
 /// The inverse of a Jacobian is kept as long as it serves, from one step to the next: each correction
 /// then costs only a residual, from which the inverse learns (Broyden 1965). That of an earlier step is
-/// used where two corrections are expected to be enough, by the contraction that it has shown of late;
-/// otherwise a new one is formed.
+/// used where three corrections are expected to be enough, by the contraction that it has shown of late;
+/// otherwise a new one is formed, at the guess or where the first correction has led.
 ///
 /// The last correction is not followed by another residual if the contraction so far says that it would
 /// be a hundredth of the floor: in other directions the next contraction may be slower.
@@ -52,13 +52,20 @@ impl<M: Space> RootFinder<M> for Newton {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Inverse<N: Dimension> {
     pub(crate) matrix: N::Matrix<f64>,
-    /// The share of a residual that its corrections have left of late.
+    /// The share of a residual that the first correction by a kept inverse has left of late.
     pub(crate) contraction: f64,
+    /// The residual of the guess in the last step, in units of its floor.
+    pub(crate) first: f64,
 }
 
 impl<N: Dimension> Inverse<N> {
     fn of(jacobian: &N::Matrix<f64>) -> Option<Self> {
-        Some(Self { matrix: jacobian.inverse()?, contraction: 0.0 })
+        Some(Self { matrix: jacobian.inverse()?, contraction: 0.0, first: 0.0 })
+    }
+
+    /// Whether three corrections of the next guess are expected to be enough, the last one unchecked.
+    fn serves(&self) -> bool {
+        self.contraction.powi(3) * self.first <= SURE
     }
 
     /// The correction of a residual.
@@ -81,6 +88,10 @@ impl<N: Dimension> Inverse<N> {
     }
 }
 
+/// The multiple of the floor below which the change of a residual says nothing of the Jacobian.
+const NOISE: f64 = 1e3;
+/// The share of the floor that the last correction has to promise.
+const SURE: f64 = 0.01;
 /// The multiple of the floor below which a residual says little about its Jacobian.
 const NEAR: f64 = 10.0;
 
@@ -113,20 +124,31 @@ impl Newton {
         known: &mut Option<Inverse<M::Dim>>,
     ) -> Result<Root<M>, NoRoot<M>> {
         let mut best = NoRoot { best: *guess, residual: f64::INFINITY, sweeps: 0 };
-        if let Some(inverse) = known
-            && let Some((residual, floor)) = equation.value_and_floor(guess)
-        {
-            best.residual = residual.magnitude();
-            let here = Start { residual, floor, own: false };
-            let serves = inverse.contraction.powi(2) * best.residual <= self.sure(floor);
-            if serves
-                && let Progress::Solved = self.correct(equation, here, Some(inverse), &mut best)
+        let (mut contraction, mut first) = (0.0, None);
+        if let Some(inverse) = known {
+            if inverse.serves()
+                && let Some((residual, floor)) = equation.value_and_floor(guess)
             {
-                return Ok(best.solved(floor));
+                best.residual = residual.magnitude();
+                inverse.first = best.residual / floor;
+                first = Some(inverse.first);
+                let here = Start { residual, floor, own: false };
+                if let Progress::Solved = self.correct(equation, here, Some(inverse), &mut best) {
+                    return Ok(best.solved(floor));
+                }
+            } else {
+                // What has not served is forgotten, and tried again some steps later.
+                inverse.contraction *= 0.8;
             }
+            contraction = inverse.contraction;
         }
         *known = None;
-        self.solve_afresh(equation, best, known)
+        let solved = self.solve_afresh(equation, best, known);
+        if let Some(inverse) = known {
+            inverse.contraction = contraction;
+            inverse.first = first.unwrap_or(inverse.first);
+        }
+        solved
     }
 
     /// A root near the best point so far, with Jacobians of the equation itself.
@@ -137,9 +159,11 @@ impl Newton {
         mut best: NoRoot<M>,
         known: &mut Option<Inverse<M::Dim>>,
     ) -> Result<Root<M>, NoRoot<M>> {
+        let mut first = None;
         while let Some(Linearised { residual, jacobian, floor }) = equation.linearise(&best.best) {
             best.residual = residual.magnitude();
-            let mut inverse = Inverse::of(&jacobian);
+            let first = *first.get_or_insert(best.residual / floor);
+            let mut inverse = Inverse::of(&jacobian).map(|inverse| Inverse { first, ..inverse });
             let here = Start { residual, floor, own: true };
             match self.correct(equation, here, inverse.as_mut(), &mut best) {
                 Progress::Solved => {
@@ -173,10 +197,12 @@ impl Newton {
         // Before a Jacobian has been seen to contract here, nothing is left to it: the frame may have
         // turned since the last step, as that of a sphere does across its equator.
         let mut contraction = f64::INFINITY;
+        // Whether the equation's own Jacobian has had so little left to do that what remains is noise.
+        let mut settled = false;
         loop {
             // A displacement within the floor is that of a state at rest.
             let rests = best.best.magnitude() <= here.floor;
-            if best.residual <= 0.1 * floor || (rests && best.residual <= floor) {
+            if best.residual <= 0.1 * floor || ((rests || settled) && best.residual <= floor) {
                 return Progress::Solved;
             }
             best.sweeps += 1;
@@ -200,6 +226,10 @@ impl Newton {
             residual = next.value;
             (best.best, best.residual) = (next.u, residual.magnitude());
             contraction = best.residual / before;
+            settled = here.own && before <= NOISE * floor;
+            if !here.own && best.sweeps == 1 {
+                inverse.contraction = contraction;
+            }
             if best.residual > self.reuse * before && best.residual > floor {
                 if best.residual <= stalled && best.residual > 0.5 * before {
                     return Progress::Solved;
@@ -212,27 +242,24 @@ impl Newton {
             correction = correct(inverse, &residual);
             // The change of a residual near its floor is noise.
             if let Some(ahead) = &mut correction
-                && before > 1e3 * floor
+                && before > NOISE * floor
             {
                 let taken = step * -next.length;
                 let predicted = *ahead - step;
                 inverse.learn(&taken, &predicted);
                 *ahead = inverse.times(&residual);
-                inverse.contraction = contraction.max(0.5 * inverse.contraction);
-                contraction = inverse.contraction;
             }
-            // Another equation's Jacobian gets one correction, and the last one.
-            let done =
-                best.residual <= floor || contraction * best.residual <= self.sure(here.floor);
-            if !here.own && !done {
+            // Another equation's Jacobian gets two corrections, and the last one.
+            let left = contraction.powi(if best.sweeps == 1 { 2 } else { 1 }) * best.residual;
+            if !here.own && best.residual > floor && left > self.sure(here.floor) {
                 return Progress::Slow;
             }
         }
     }
 
-    /// The residual that needs no evaluation to be believed: a hundredth of the floor.
+    /// The residual that needs no evaluation to be believed.
     const fn sure(&self, floor: f64) -> f64 {
-        0.01 * self.tolerance * floor
+        SURE * self.tolerance * floor
     }
 
     /// The longest of the corrections `δ, δ/2, δ/4, …` that reduces the residual.

@@ -14,7 +14,7 @@ use metriplectic_manifolds::{
     Arc, ArcJet, InnerProduct, Manifold, MetricError, Nodes, Retraction, Riemannian,
 };
 
-use crate::discrete_gradient::{Chord, DiscreteGradient};
+use crate::discrete_gradient::{Chord, DiscreteGradient, Segment};
 use crate::root_finder::{Equation, Linearised, Root};
 
 /// The equation of one step (Bloch, Farré Puiggalí, Martín de Diego 2024, §4.4), as a function of
@@ -195,8 +195,8 @@ where
     }
 
     /// `|w_S|` at the point evaluated last.
-    pub(crate) const fn entropy_slope(&self) -> f64 {
-        self.entropy_slope.get()
+    pub(crate) fn entropy_slope(&self) -> f64 {
+        self.entropy_slope.get().sqrt()
     }
 
     /// Whether `K̃ w_S` was not zero at the point evaluated last.
@@ -284,11 +284,11 @@ where
         let (system, metric) = (self.system, self.system.metric());
         let arc = self.retraction.real_arc(metric, self.x, u).ok()?;
         let g = metric.at(&arc.z).ok()?;
-        let along = Along::new(self, u, &g);
+        let along = Along::new(self, u, &g, Segment::new(&arc.d, &arc.end));
         let (energy, noise) = along.value(system.energy(), (self.energy, self.recall.energy), &arc);
         let entropy = if self.is_exact() {
             let (w, _) = along.value(system.entropy(), (self.entropy, self.recall.entropy), &arc);
-            self.entropy_slope.set(w.magnitude());
+            self.entropy_slope.set(w.dot(&w));
             w
         } else {
             system.entropy().jet1(&arc.z.base).df
@@ -296,7 +296,7 @@ where
         let mut values = Values { along: &along, arc: &arc, seen: 0 };
         let w = Covectors::new([energy, entropy], system.invariants(), &mut values);
         let friction = irreversible(system, &arc.z, &w).ok()?;
-        self.dissipates.set(friction.magnitude() > 0.0);
+        self.dissipates.set((0..Dim::<Y>::LEN).any(|i| friction[i].abs() > 0.0));
         let velocity = reversible(system, &arc.z, &w).ok()? + friction;
         let residual = arc.d - velocity * self.h;
         residual.is_finite().then_some((residual, noise))
@@ -310,7 +310,8 @@ where
         let arc = self.retraction.arc_jet(metric, self.x, u).ok()?;
         let g = metric.at(&ChartPoint::<Y::Manifold>::centre(&arc.z)).ok()?;
         let slopes = metric.slopes(&arc.z);
-        let (along, slopes) = (Along::new(self, u, &g), slopes.as_ref());
+        let segment = Segment::new(&arc.d, &arc.end);
+        let (along, slopes) = (Along::new(self, u, &g, segment), slopes.as_ref());
         let start = (self.energy, self.recall.energy);
         let (energy, chord, steepness) = along.jet(system.energy(), start, &arc, slopes);
         let entropy = if self.is_exact() {
@@ -327,7 +328,7 @@ where
 
         let residual = arc.d - velocity.value * h;
         let jacobian = arc.dd - velocity.slope * h;
-        let (length, sizes) = (arc.d.magnitude(), Sizes { terms, gain });
+        let (length, sizes) = (along.segment.length, Sizes { terms, gain });
         // Near the edge of a domain dH is far steeper at x' than at z, and the rounding of d counts there.
         let noise = chord.noise(length) + f64::EPSILON * steepness;
         let floor = sizes.floor(h, length, noise);
@@ -390,6 +391,7 @@ struct Along<'a, Y: Metriplectic, R, W, G> {
     step: &'a Residual<'a, Y, R, W>,
     u: &'a Vector<Y::Manifold>,
     g: &'a G,
+    segment: Segment<'a, Y::Manifold>,
     nodes: OnceCell<Nodes<Y::Manifold>>,
 }
 
@@ -400,21 +402,26 @@ where
     W: DiscreteGradient,
     G: InnerProduct<Vector<Y::Manifold>>,
 {
-    const fn new(step: &'a Residual<'a, Y, R, W>, u: &'a Vector<Y::Manifold>, g: &'a G) -> Self {
-        Self { step, u, g, nodes: OnceCell::new() }
+    const fn new(
+        step: &'a Residual<'a, Y, R, W>,
+        u: &'a Vector<Y::Manifold>,
+        g: &'a G,
+        segment: Segment<'a, Y::Manifold>,
+    ) -> Self {
+        Self { step, u, g, segment, nodes: OnceCell::new() }
     }
 
-    /// The data of the discrete gradient of `f`, which has the value `start` at `x`.
+    /// The data of the discrete gradient of `f` on the arc with the base `z` and the end `x'`, from its
+    /// values at `x` and `x'`.
     #[inline]
     fn chord(
         &self,
         f: &impl ScalarField<Y::Manifold>,
-        start: f64,
         mean: &Vector<Y::Manifold>,
-        (z, d): (&Point<Y>, &Vector<Y::Manifold>),
-        (end, value): (&Point<Y>, f64),
+        [z, end]: [&Point<Y>; 2],
+        values: [f64; 2],
     ) -> Chord<Y::Manifold> {
-        let base = || self.step.gradient.slope_at_base(f, z, d, mean);
+        let base = || self.step.gradient.slope_at_base(f, z, self.segment.d, mean);
         let nodes = || {
             let Residual { system, retraction, x, .. } = self.step;
             // The same arc has been followed to its end, so the alternative is not reached.
@@ -424,7 +431,7 @@ where
             })
         };
         let nodes = || self.nodes.get_or_init(nodes);
-        Chord::new(f, mean, d, start, (end, value), base, nodes)
+        Chord::new(f, mean, &self.segment, values, base, nodes)
     }
 
     /// The discrete gradient of `f`, with `⟨w, d⟩ = f(x') − start + recall`, and its round-off.
@@ -436,9 +443,9 @@ where
         arc: &Arc<Y::Manifold>,
     ) -> (Vector<Y::Manifold>, f64) {
         let mean = self.step.gradient.real_mean(f, self.step.x, arc);
-        let end = (&arc.end, f.at(&arc.end));
-        let chord = self.chord(f, start, &mean, (&arc.z.base, &arc.d), end);
-        (chord.covector(recall, self.g, &arc.d), chord.noise(arc.d.magnitude()))
+        let values = [start, f.at(&arc.end)];
+        let chord = self.chord(f, &mean, [&arc.z.base, &arc.end], values);
+        (chord.covector(recall, self.g, &arc.d), chord.noise(self.segment.length))
     }
 
     /// The same with its derivatives, and the size of `dF(x')`.
@@ -452,7 +459,7 @@ where
     ) -> (Moving<Dim<Y>>, Chord<Y::Manifold>, f64) {
         let (mean, dmean) = self.step.gradient.mean_jet(f, self.step.x, arc);
         let end = f.jet1(&arc.end);
-        let chord = self.chord(f, start, &mean, (&arc.z, &arc.d), (&arc.end, end.value));
+        let chord = self.chord(f, &mean, [&arc.z, &arc.end], [start, end.value]);
         let value = chord.covector(recall, self.g, &arc.d);
         let slope = chord.slope(recall, (self.g, slopes), arc, &dmean, &end.df);
         (Moving { value, slope }, chord, end.df.magnitude())

@@ -34,6 +34,25 @@ pub struct Chord<M: Space> {
     noise: f64,
 }
 
+/// What the chords of all fields along one arc share.
+#[derive(Debug)]
+pub struct Segment<'a, M: Space> {
+    /// The displacement `d` at the base point.
+    pub d: &'a Vector<M>,
+    /// Its length in components.
+    pub length: f64,
+    /// The size of the entries of the end `x'`.
+    pub size: f64,
+}
+
+impl<'a, M: Manifold> Segment<'a, M> {
+    /// That of an arc with the displacement `d` and the end `x'`.
+    #[inline]
+    pub fn new(d: &'a Vector<M>, end: &M::Point<f64>) -> Self {
+        Self { d, length: d.magnitude(), size: M::magnitude(end) }
+    }
+}
+
 /// The share of `|F| + |dF||x|` by which a step changes `F`, at which a difference of two values of
 /// `F` starts to be trusted; from four times that share on it is trusted alone.
 const SHORT: f64 = 1e-3;
@@ -64,27 +83,24 @@ fn safer<M: Space>(
 }
 
 impl<M: Manifold> Chord<M> {
-    /// Evaluates `f` along an arc with the displacement `d` at its base and the mean covector `mean`.
-    /// `start` is `F(x)`, `end` the point `x'` with `F(x')`, `base` the slope `⟨dF(z), d⟩` at the base
-    /// point, and `nodes` those of the arc.
+    /// Evaluates `f` along an arc with the mean covector `mean`. `start` is `F(x)`, `end` is `F(x')`,
+    /// `base` the slope `⟨dF(z), d⟩` at the base point, and `nodes` those of the arc.
     #[inline]
     pub fn new<N: Borrow<Nodes<M>>>(
         f: &impl ScalarField<M>,
         mean: &Vector<M>,
-        d: &Vector<M>,
-        start: f64,
-        end: (&M::Point<f64>, f64),
+        &Segment { d, length, size }: &Segment<'_, M>,
+        [start, end]: [f64; 2],
         base: impl FnOnce() -> f64,
         nodes: impl FnOnce() -> N,
     ) -> Self {
-        let (end, value) = end;
         let slope = mean.dot(d);
         let steepness = mean.magnitude();
-        let size = start.abs() + value.abs() + M::magnitude(end) * steepness;
+        let size = start.abs() + end.abs() + size * steepness;
         let rounding = f64::EPSILON * size;
-        let difference = (value - start) - slope;
+        let difference = (end - start) - slope;
         // Far from round-off, and most often, the difference is all.
-        let share = short(steepness * d.magnitude(), size);
+        let share = short(steepness * length, size);
         let (mut defect, mut noise) = (difference, rounding);
         if share > 0.0 {
             let (better, weight) = safer(f, nodes().borrow(), (base, slope), rounding);
@@ -215,9 +231,8 @@ mod tests {
             let chord = Chord::<Euclidean<2>>::new(
                 &cubic,
                 &df,
-                &d,
-                start,
-                (&y, end),
+                &Segment::new(&d, &y),
+                [start, end],
                 || df.dot(&d),
                 || {
                     let d = d.cast::<Real>();
@@ -242,9 +257,8 @@ mod tests {
         let chord = Chord::<Euclidean<2>>::new(
             &cubic,
             &df,
-            &d,
-            start,
-            (&x, start),
+            &Segment::new(&d, &x),
+            [start, start],
             || 0.0,
             || Nodes { ends: [x.cast(); 2], middle: None },
         );

@@ -62,7 +62,7 @@ fn the_relaxing_rigid_body_draws_its_figure_and_writes_its_table() {
         assert!(figure.contains(title), "{title} is missing");
     }
     // So that one sees that it is exact.
-    assert!(figure.contains("10⁻¹⁶"));
+    assert!(["10⁻¹⁶", "10⁻¹⁷"].iter().any(|unit| figure.contains(&format!("units of {unit}"))));
     let table = read("relaxing_rigid_body.csv");
     let mut lines = table.lines();
     assert_eq!(lines.next(), Some("t,p1,p2,p3,energy,entropy"));
@@ -104,8 +104,8 @@ fn the_spinning_top_keeps_its_energy_where_runge_kutta_drifts() {
     let ([energy, entropy, defect], state) = certified(&report);
     assert!(energy <= 5e-15 && entropy == 0.0 && defect <= 1e-15, "{report}");
     let drift = report["runge_kutta_energy_error"].as_f64().expect("a number");
-    assert!(drift > 1e-9, "{report}");
-    assert!(report["evaluations"].as_u64().expect("a count") < 17 * 1000, "{report}");
+    assert!(drift > 1e-8, "{report}");
+    assert!(report["evaluations"].as_u64().expect("a count") < 12_500, "{report}");
     assert_eq!(state.len(), 3);
     // The exact flow at t = 30; the phase is off by an error of second order.
     let short = json(&example("spinning_top", &["--json", "--steps", "300"]));

@@ -94,19 +94,16 @@
 //!
 //! # What it costs
 //!
-//! Geodesics are integrated by extrapolation, with an estimated error of 10⁻¹³ in each piece, and with
-//! their derivatives by hyper-dual numbers. One step of `h = 0.1` takes at most
+//! Geodesics are integrated by extrapolation to 10⁻¹³, and with their derivatives by hyper-dual numbers,
+//! in each evaluation of the equation of a step. A step of `h = 0.1` then takes, on average
+//! (`benches/step/snapshot.txt`),
 //!
 //! | | evaluations of the closure |
 //! |---|---|
-//! | chart of R², half plane | 240 |
-//! | S², ellipsoid | 300 |
-//! | SO(3), left-invariant | 600 |
-//! | `S² × R`, a closure on R alone | 160 |
-//! | `S² × R`, one closure | 430 |
+//! | S², the spinning top | 153 |
+//! | SO(3), Nambu's bracket | 286 |
 //!
-//! which is 50 times the time of the canonical metric on S² and 70 times on SO(3) (`benches/README.md`); the
-//! closure on R alone twice.
+//! which is @@ times the time of the canonical metric (`benches/README.md`).
 //!
 //! So write a constant matrix as [`Metric::constant`](crate::manifolds::Metric::constant), and a
 //! product as a pair.

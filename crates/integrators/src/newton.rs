@@ -202,7 +202,14 @@ impl Newton {
         loop {
             // A displacement within the floor is that of a state at rest.
             let rests = best.best.magnitude() <= here.floor;
-            if best.residual <= 0.1 * floor || ((rests || settled) && best.residual <= floor) {
+            let enough = if rests {
+                1.0
+            } else if settled {
+                0.3
+            } else {
+                0.1
+            };
+            if best.residual <= enough * floor {
                 return Progress::Solved;
             }
             best.sweeps += 1;

@@ -481,7 +481,7 @@ pub struct Memory<N: Dimension> {
 }
 
 /// Displacements that are remembered.
-const DIFFERENCES: usize = 6;
+const DIFFERENCES: usize = 4;
 
 /// The Jacobian of an earlier step, and what it was formed for.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -101,7 +101,11 @@ impl<const N: usize> Space for Chart<N> {
 impl<const N: usize> Manifold for Chart<N> {
     /// 0 inside the domain and infinite outside: how far off is not known.
     fn defect(&self, x: &SVector<f64, N>) -> f64 {
-        if (self.domain)(x) { 0.0 } else { f64::INFINITY }
+        match x.is_finite() {
+            true if (self.domain)(x) => 0.0,
+            true => f64::INFINITY,
+            false => f64::NAN,
+        }
     }
 
     fn entries(x: &SVector<f64, N>) -> Vec<f64> {
@@ -122,16 +126,19 @@ impl<const N: usize> Manifold for Chart<N> {
         *x
     }
 
-    /// A point of the domain with entries in `−1 … 1`, or beyond if there is none to be found.
+    /// A point of the domain, by rejection: with entries in `−1 … 1`, or if a thousand of them are all
+    /// outside, in `−2 … 2`, and so on. A domain that is not met within `±10⁶` is too thin, and the
+    /// entries are not numbers, which [`check`](Manifold::check) finds.
     fn random(&self, rng: &mut impl Rng) -> SVector<f64, N> {
-        let mut reach = 1.0;
-        loop {
-            let x = Column::from_index(|_| rng.random_range(-reach..reach));
-            if (self.domain)(&x) || reach > 1e6 {
-                return x;
+        for reach in (0..=20).map(|k| 2_f64.powi(k)) {
+            for _ in 0..1000 {
+                let x = Column::from_index(|_| rng.random_range(-reach..reach));
+                if (self.domain)(&x) {
+                    return x;
+                }
             }
-            reach *= 1.01;
         }
+        SVector::repeat(f64::NAN)
     }
 
     fn check(&self, x: &SVector<f64, N>) -> Result<(), PointError> {
@@ -147,7 +154,7 @@ impl<const N: usize> Flat for Chart<N> {}
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Canonical, Exponential, Metric, WeylMidpoint, laws};
+    use crate::{Canonical, Exponential, Metric, Riemannian, WeylMidpoint, laws};
     use metriplectic_fields::Real;
     use nalgebra::{Matrix2, Vector2, vector};
     use num_dual::DualNum;
@@ -181,5 +188,33 @@ mod tests {
         let error = chart.check(&vector![f64::NAN, 1.0]).unwrap_err();
         assert!(matches!(error, PointError::NotFinite { index: 0, .. }));
         assert_eq!(chart.check(&vector![0.0, -1.0]), Err(PointError::OutsideChart));
+        // A domain that is not told of NaN.
+        let everything = Chart::<2>::new(|_| true);
+        assert!(everything.defect(&vector![f64::NAN, 1.0]).is_nan());
+        assert!(everything.defect(&vector![f64::INFINITY, 1.0]).is_nan());
+    }
+
+    #[test]
+    fn random_points_are_inside_the_domain_or_are_no_points() {
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        let ring = Chart::<2>::new(|q| (40.0..41.0).contains(&q.norm()));
+        let corner = Chart::<2>::new(|q| q.min() > 0.97);
+        for _ in 0..100 {
+            assert_eq!(ring.check(&ring.random(&mut rng)), Ok(()));
+            assert_eq!(corner.check(&corner.random(&mut rng)), Ok(()));
+        }
+        let nowhere = Chart::<2>::new(|_| false);
+        let error = nowhere.check(&nowhere.random(&mut rng)).unwrap_err();
+        assert!(matches!(error, PointError::NotFinite { .. }), "{error}");
+    }
+
+    #[test]
+    fn only_the_ends_of_a_geodesic_are_asked_for_the_domain() {
+        // The disc is cut out of the domain, and the straight line goes through it all the same.
+        let plane = Chart::<2>::new(|q| q.norm() > 0.5);
+        let (x, y) = (vector![-1.0, 0.0], vector![1.0, 0.0]);
+        let line = Riemannian::<Chart<2>>::log(&Canonical, &x, &y).unwrap();
+        assert_eq!(line, vector![2.0, 0.0]);
+        assert_eq!(plane.check(&(x + line * 0.5)), Err(PointError::OutsideChart));
     }
 }

@@ -8,7 +8,7 @@ use metriplectic_fields::{
 };
 
 use crate::geodesic::{self, GeodesicJet};
-use crate::metric::{Factored, GeodesicEnd, MetricError};
+use crate::metric::{Factored, GeodesicEnd, MetricError, finite};
 use crate::{Arc, ArcJet, Manifold, Riemannian};
 
 /// A metric given as a matrix field; see [`Metric::field`](crate::Metric::field).
@@ -78,6 +78,9 @@ impl<M: Manifold, F: MatrixField<M>> Riemannian<M> for FieldMetric<F> {
         Ok(M::chart(&here, &jet))
     }
 
+    /// *A* geodesic, since the cut locus of a closure is not known, by [shooting](mod@crate::field_metric).
+    /// Points that the chart at the other one does not reach are refused
+    /// ([`MetricError::OutOfChart`]): antipodes, and rotations half a turn apart.
     fn log(&self, x: &M::Point<f64>, y: &M::Point<f64>) -> Result<Vector<M>, MetricError> {
         shoot(self, x, y)
     }
@@ -127,9 +130,9 @@ fn shoot<M: Manifold, F: MatrixField<M>>(
     y: &M::Point<f64>,
 ) -> Result<Vector<M>, MetricError> {
     let shots = Cell::new(0);
-    let straight = M::coordinates(x, y);
-    let line = straight * stretch(metric, x, &straight);
-    let mut last = hit(metric, (x, y), &line, EAGER, &shots);
+    let straight = line::<M>(x, y)?;
+    let aim = straight * stretch(metric, x, &straight);
+    let mut last = hit(metric, (x, y), &aim, EAGER, &shots);
     #[cfg(feature = "argmin")]
     if last.is_err()
         && let Some(aim) = crate::path::aim(&metric.field, x, &straight)
@@ -149,6 +152,26 @@ fn shoot<M: Manifold, F: MatrixField<M>>(
         });
     }
     last
+}
+
+/// The straight line of the chart from `x` to `y`, if there is one and no other.
+///
+/// # Errors
+///
+/// [`MetricError::NotFinite`] if a point is not, and [`MetricError::OutOfChart`] at the edge of the
+/// chart, of which [`is_near`](Space::is_near) accepts the half: beyond it a line of other coordinates
+/// leads to the same point, as at half a turn on SO(3), and aims at another geodesic.
+fn line<M: Manifold>(x: &M::Point<f64>, y: &M::Point<f64>) -> Result<Vector<M>, MetricError> {
+    for entry in M::entries(x).into_iter().chain(M::entries(y)) {
+        finite("an entry of a point", entry)?;
+    }
+    let straight = M::coordinates(x, y);
+    // Half of it, and the rounding of half a turn.
+    if straight.is_finite() && M::is_near(&(straight * (0.5 + f64::EPSILON))) {
+        Ok(straight)
+    } else {
+        Err(MetricError::OutOfChart { distance: straight.magnitude() })
+    }
 }
 
 /// The length of the straight line of the chart, over that of its velocity at the start: where the
@@ -211,11 +234,15 @@ fn hit<M: Space, G: Riemannian<M>>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Euclidean, InnerProduct, LieDual, Metric};
+    use crate::{
+        Canonical, Cayley, Euclidean, InnerProduct, LieDual, Metric, Projection, Retraction,
+        Rotations, Sphere, rotations,
+    };
     use nalgebra::{Matrix2, Matrix3, Vector2, Vector3, vector};
     use num_dual::DualNum;
     use rand::rngs::ChaCha8Rng;
     use rand::{RngExt, SeedableRng};
+    use std::f64::consts::PI;
 
     /// The upper half plane with curvature −1.
     fn half_plane() -> FieldMetric<impl Fn(&Vector2<Real>) -> Matrix2<Real>> {
@@ -262,6 +289,53 @@ mod tests {
         let distance = Riemannian::<Euclidean<2>>::distance(&g, &x, &(x * 2.0)).unwrap();
         let exact = (1.0 + x.norm_squared() / (4.0 * x.y * x.y)).acosh();
         assert!((distance - exact).abs() < 1e-12);
+    }
+
+    #[test]
+    fn what_the_chart_does_not_reach_has_no_logarithm() {
+        let (round, form) = (Canonical, Metric::field(|_: &Vector3<Real>| Matrix3::identity()));
+        let x = vector![0.6, 0.0, 0.8];
+        let log = Riemannian::<Sphere<2>>::log(&form, &x, &-x);
+        assert!(matches!(log, Err(MetricError::OutOfChart { .. })), "{log:?}");
+        assert!(Riemannian::<Sphere<2>>::log(&round, &x, &-x).is_err());
+        // Half a turn has two straight lines, and which one is found would be a matter of rounding.
+        let body = Metric::field(|_: &Matrix3<Real>| Matrix3::identity());
+        let r = rotations::exp(&vector![0.3, -0.2, 0.5]);
+        let turned = |angle: f64| r * rotations::exp(&(vector![2.0, -1.0, 2.0] / 3.0 * angle));
+        let log = Riemannian::<Rotations>::log(&body, &r, &turned(PI));
+        assert!(
+            matches!(log, Err(MetricError::OutOfChart { distance }) if (distance - PI).abs() < 1e-14)
+        );
+        assert!(Riemannian::<Rotations>::log(&Canonical, &r, &turned(PI)).is_err());
+        let log = Riemannian::<Rotations>::log(&body, &r, &turned(PI - 1e-9)).unwrap();
+        assert!((log.norm() - (PI - 1e-9)).abs() < 1e-12);
+    }
+
+    #[test]
+    fn points_that_are_not_finite_have_no_logarithm() {
+        for bad in [f64::NAN, f64::INFINITY] {
+            let (x, y) = (Vector3::x(), vector![0.0, bad, 0.6]);
+            let (r, s) = (Matrix3::identity(), Matrix3::from_diagonal(&vector![1.0, 1.0, bad]));
+            let form = Metric::field(|_: &Vector3<Real>| Matrix3::identity());
+            let body = Metric::field(|_: &Matrix3<Real>| Matrix3::identity());
+            let errors = [
+                Riemannian::<Sphere<2>>::log(&Canonical, &x, &y).unwrap_err(),
+                Riemannian::<Sphere<2>>::log(&Canonical, &y, &x).unwrap_err(),
+                Riemannian::<Sphere<2>>::log(&form, &x, &y).unwrap_err(),
+                Riemannian::<Rotations>::log(&Canonical, &r, &s).unwrap_err(),
+                Riemannian::<Rotations>::log(&Canonical, &s, &r).unwrap_err(),
+                Riemannian::<Rotations>::log(&body, &r, &s).unwrap_err(),
+                Riemannian::<Euclidean<3>>::log(&Canonical, &x, &y).unwrap_err(),
+                Riemannian::<Euclidean<3>>::end(&Canonical, &x, &y).unwrap_err(),
+                Riemannian::<Sphere<2>>::end(&Canonical, &y, &vector![0.1, 0.2]).unwrap_err(),
+                Riemannian::<Rotations>::end(&Canonical, &s, &Vector3::x()).unwrap_err(),
+                Retraction::<Sphere<2>, _>::inverse(&Projection, &Canonical, &x, &y).unwrap_err(),
+                Retraction::<Rotations, _>::inverse(&Cayley, &Canonical, &r, &s).unwrap_err(),
+            ];
+            for (k, error) in errors.into_iter().enumerate() {
+                assert!(matches!(error, MetricError::NotFinite { .. }), "{bad}, case {k}: {error}");
+            }
+        }
     }
 
     #[test]

@@ -4,9 +4,10 @@
 //! - **Frame**: `s' = s v`.
 //! - **Chart**: `φ_s(q) = s e^q`, onto the whole half line; its inverse `ln(1 + (y − s)/s)` has its digits
 //!   for near points.
-//! - **Geodesics** of the canonical metric `ds²/s²` are `s e^{tv}`, which never reach zero. It is the
-//!   metric of positive matrices for 1 × 1 matrices (Bhatia 2007, ch. 6). `exp` and `log` are one
-//!   evaluation of `exp` and of `ln_1p`.
+//! - **Geodesics** of the canonical metric `ds²/s²` are `s e^{tv}`, which come to zero in no finite
+//!   time: it is the metric of positive matrices for 1 × 1 matrices (Bhatia 2007, ch. 6). `exp` and `log`
+//!   are one evaluation of `exp` and of `ln_1p`. Numbers end before the half line does, at 5·10⁻³²⁴ and
+//!   2·10³⁰⁸; a geodesic that goes there is an error.
 //! - **Brackets**: none, as on every curve. The half line is a factor, for a temperature, a volume or
 //!   an internal energy, of a [`Product`](crate::Product).
 
@@ -14,10 +15,9 @@ use metriplectic_fields::{ChartPoint, Column, Scalar, Space};
 use nalgebra::{Const, SVector, Vector1};
 use rand::{Rng, RngExt};
 
-use crate::{Flat, Manifold};
+use crate::{Flat, Manifold, PointError};
 
-/// The positive numbers R₊: a state that must not reach zero, and never does; see the
-/// [module](mod@crate::half_line).
+/// The positive numbers R₊: a state that must not reach zero; see the [module](mod@crate::half_line).
 ///
 /// As a closure, the canonical metric is `Metric::field(|s| Matrix1::new(s.x.powi(-2)))`.
 ///
@@ -65,9 +65,10 @@ impl Space for HalfLine {
 }
 
 impl Manifold for HalfLine {
-    /// How far a number is below zero; that of zero itself is its distance to the smallest number.
+    /// The distance to the [projection](Self::project): how far a number is below zero, and not quite
+    /// nothing for zero itself.
     fn defect(&self, x: &Vector1<f64>) -> f64 {
-        if x.x > 0.0 { 0.0 } else { 1.0 - x.x }
+        if x.x.is_finite() { (self.project(x).x - x.x).abs() } else { f64::NAN }
     }
 
     fn entries(x: &Vector1<f64>) -> Vec<f64> {
@@ -83,15 +84,27 @@ impl Manifold for HalfLine {
         x.x.abs()
     }
 
-    /// The smallest positive number stands for everything that is not positive.
+    /// No positive number is nearest to one that is not: `2.2·10⁻³⁰⁸`, the smallest of full precision,
+    /// stands for zero.
     fn project(&self, x: &Vector1<f64>) -> Vector1<f64> {
-        Vector1::new(x.x.max(f64::MIN_POSITIVE))
+        Vector1::new(if x.x <= 0.0 { f64::MIN_POSITIVE } else { x.x })
     }
 
     /// `e^u` with `u` uniform in `−1 … 1`.
     fn random(&self, rng: &mut impl Rng) -> Vector1<f64> {
         let u: f64 = rng.random_range(-1.0..1.0);
         SVector::from([u.exp()])
+    }
+
+    /// No number that is not positive is allowed, however near to zero.
+    fn check(&self, x: &Vector1<f64>) -> Result<(), PointError> {
+        if !x.x.is_finite() {
+            return Err(PointError::NotFinite { index: 0, value: x.x });
+        }
+        match self.defect(x) {
+            defect if defect > 0.0 => Err(PointError::OffManifold { defect, allowed: 0.0 }),
+            _ => Ok(()),
+        }
     }
 }
 
@@ -101,7 +114,7 @@ impl Flat for HalfLine {}
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Canonical, Exponential, Metric, WeylMidpoint, laws};
+    use crate::{Canonical, Exponential, Metric, MetricError, Riemannian, WeylMidpoint, laws};
     use metriplectic_fields::Real;
     use nalgebra::Matrix1;
     use num_dual::DualNum;
@@ -125,6 +138,33 @@ mod tests {
         for off in [0.0, -1e-300, -3.0] {
             assert!(HalfLine.check(&Vector1::new(off)).is_err());
             assert!(HalfLine.check(&HalfLine.project(&Vector1::new(off))).is_ok());
+        }
+        assert_eq!(HalfLine.defect(&Vector1::new(-3.0)), 3.0);
+        assert_eq!(HalfLine.defect(&Vector1::new(0.0)), f64::MIN_POSITIVE);
+        for on in [5e-324, 1.0, f64::MAX] {
+            assert_eq!(HalfLine.project(&Vector1::new(on)).x, on);
+            assert_eq!(HalfLine.defect(&Vector1::new(on)), 0.0);
+        }
+    }
+
+    #[test]
+    fn what_is_not_finite_is_no_point_and_is_never_reached() {
+        for off in [f64::NAN, f64::INFINITY] {
+            assert!(HalfLine.defect(&Vector1::new(off)).is_nan());
+            let projected = HalfLine.project(&Vector1::new(off));
+            assert!(matches!(HalfLine.check(&projected), Err(PointError::NotFinite { .. })));
+        }
+        let one = Vector1::new(1.0);
+        for to in [-1.0, 0.0, f64::NAN, f64::INFINITY] {
+            let log = Riemannian::<HalfLine>::log(&Canonical, &one, &Vector1::new(to));
+            assert!(matches!(log, Err(MetricError::NotFinite { .. })), "{to}: {log:?}");
+        }
+        // e^10000 is no number, and e^−10000 is not a positive one.
+        for v in [1e4, -1e4, f64::NAN].map(Vector1::new) {
+            let end = Riemannian::<HalfLine>::end(&Canonical, &one, &v);
+            assert!(matches!(end, Err(MetricError::NotFinite { .. })), "{v}: {end:?}");
+            let end = Riemannian::<HalfLine>::exp(&Canonical, &ChartPoint::centre(&one), &v);
+            assert!(matches!(end, Err(MetricError::NotFinite { .. })), "{v}: {end:?}");
         }
     }
 }

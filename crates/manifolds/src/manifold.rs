@@ -56,7 +56,9 @@ pub trait Manifold: Space {
     /// The size `|x|` of the entries, which sets the scale of round-off.
     fn magnitude(x: &Self::Point<f64>) -> f64;
 
-    /// The nearest point of the manifold, for an array of numbers that is off it.
+    /// The nearest point of the manifold, for an array of numbers that is off it: one of them, where
+    /// there are several. What is not finite stays so, and where no point is nearest (the centre of a
+    /// sphere) the entries are not numbers: [`check`](Self::check) finds both.
     fn project(&self, x: &Self::Point<f64>) -> Self::Point<f64>;
 
     /// The components at `y` of the tangent vector `v` at `x`, for `y` near `x`: a vector transport

@@ -4,7 +4,7 @@ use metriplectic_fields::{ChartPoint, Column, Scalar, Space};
 use nalgebra::SVector;
 use num_dual::Dual;
 
-use crate::metric::{MetricError, stretched, within};
+use crate::metric::{MetricError, finite_column, stretched, within};
 use crate::retraction::jet_by_dual_numbers;
 use crate::sphere::{components, frame, normalised, spread};
 use crate::{Arc, ArcJet, Nodes, PointPair, Retraction, Riemannian, Sphere, Tangent};
@@ -112,7 +112,8 @@ macro_rules! projection {
                 within(std::f64::consts::PI, 2.0 * (y - x).norm().atan2(sum.norm()))?;
                 let base = normalised(&sum);
                 let d = (y - x) * (2.0 / sum.norm());
-                Ok(Tangent { base, vector: components(&frame::<$a, $n>(&base), &d) })
+                let vector = components(&frame::<$a, $n>(&base), &d);
+                Ok(Tangent { base, vector: finite_column("the displacement", vector)? })
             }
         }
     };

@@ -36,13 +36,13 @@ use std::f64::consts::PI;
 
 use metriplectic_fields::series::{angle_over_sine, stumpff};
 use metriplectic_fields::{
-    ChartPoint, Column, Dimension, MatrixJet, Real, Scalar, Space, product_rule,
+    ChartPoint, Column, Dimension, MatrixJet, Real, Scalar, Space, Square, product_rule,
 };
 use nalgebra::{Const, Matrix3, Quaternion, SMatrix, UnitQuaternion, Vector3, Vector4};
 use num_dual::Dual;
 use rand::{Rng, RngExt};
 
-use crate::metric::{GeodesicEnd, MetricError, within};
+use crate::metric::{GeodesicEnd, MetricError, finite, finite_column, within};
 use crate::normal::Normal;
 use crate::sphere::along;
 use crate::{Arc, ArcJet, Canonical, Manifold, Riemannian};
@@ -273,8 +273,8 @@ impl Space for Rotations {
 impl Manifold for Rotations {
     /// `max |RᵀR − 1|`, and at least 2 for a reflection.
     fn defect(&self, x: &Matrix3<f64>) -> f64 {
-        let gram = (x.tr_mul(x) - Matrix3::identity()).amax();
-        if x.determinant() > 0.0 { gram } else { gram.max(2.0) }
+        let gram = (x.tr_mul(x) - Matrix3::identity()).max_abs();
+        if x.determinant() > 0.0 || gram.is_nan() { gram } else { gram.max(2.0) }
     }
 
     /// Row by row.
@@ -291,9 +291,15 @@ impl Manifold for Rotations {
         1.0
     }
 
-    /// The polar factor: the nearest rotation in the Frobenius norm.
+    /// The polar factor `R`, with `RᵀA` symmetric: the nearest rotation in the Frobenius norm, one of
+    /// them for a matrix that has several (Higham 1989). A matrix that is not finite is left alone.
     fn project(&self, x: &Matrix3<f64>) -> Matrix3<f64> {
-        let svd = x.svd(true, true);
+        let largest = x.max_abs();
+        if !largest.is_finite() {
+            return *x;
+        }
+        // So that no square overflows or vanishes.
+        let svd = (x / largest.max(f64::MIN_POSITIVE)).svd(true, true);
         match (svd.u, svd.v_t) {
             (Some(mut u), Some(v_t)) => {
                 if (u * v_t).determinant() < 0.0 {
@@ -365,13 +371,16 @@ impl Riemannian<Rotations> for Canonical {
         let turned = end * hat(&omega);
         let moved = end.zip_map(&turned, Dual::new);
         let q = Rotations::coordinates(&base, &moved);
-        Ok((ChartPoint { base, q: q.map(|q| q.re) }, q.map(|q| q.eps)))
+        let at = ChartPoint { base, q: finite_column("a coordinate of the end", q.map(|q| q.re))? };
+        Ok((at, q.map(|q| q.eps)))
     }
 
     #[inline]
     fn end(&self, x: &Matrix3<f64>, v: &Vector3<f64>) -> Result<Matrix3<f64>, MetricError> {
         within(PI, v.norm())?;
-        Ok(Rotations::chart(x, v))
+        let end = Rotations::chart(x, v);
+        finite("an entry of the end", end.sum())?;
+        Ok(end)
     }
 
     /// `R(t)` with `R' = R Ω̂` and `R'' = R Ω̂²`.
@@ -395,7 +404,7 @@ impl Riemannian<Rotations> for Canonical {
     fn log(&self, x: &Matrix3<f64>, y: &Matrix3<f64>) -> Result<Vector3<f64>, MetricError> {
         let q = Rotations::coordinates(x, y);
         within(PI, q.norm())?;
-        Ok(q)
+        finite_column("the logarithm", q)
     }
 
     #[inline]
@@ -511,6 +520,23 @@ mod tests {
         let mirror = Matrix3::from_diagonal(&vector![1.0, 1.0, -1.0]);
         assert!(Rotations.check(&mirror).is_err());
         assert!(Rotations.check(&Rotations.project(&mirror)).is_ok());
+    }
+
+    #[test]
+    fn what_is_not_finite_is_off_the_group_and_stays_so() {
+        for bad in [f64::NAN, f64::INFINITY] {
+            for (i, j) in [(0, 0), (2, 1)] {
+                let mut r = Matrix3::identity();
+                r[(i, j)] = bad;
+                assert!(!Rotations.defect(&r).is_finite(), "{r}");
+                assert!(Rotations.check(&Rotations.project(&r)).is_err());
+            }
+        }
+        // Any rotation is nearest to zero; and no size is too large or too small.
+        for scale in [0.0, 5e-324, 1e-200, 1e200, f64::MAX] {
+            let projected = Rotations.project(&(Matrix3::identity() * scale));
+            assert!((projected - Matrix3::identity()).amax() < 1e-15, "{scale}: {projected}");
+        }
     }
 
     #[test]

@@ -38,7 +38,7 @@ use nalgebra::{Const, SMatrix, SVector};
 use num_dual::{Dual, Dual64};
 use rand::{Rng, RngExt};
 
-use crate::metric::{GeodesicEnd, MetricError, within};
+use crate::metric::{GeodesicEnd, MetricError, finite_column, within};
 use crate::normal::Normal;
 use crate::{Arc, ArcJet, Canonical, Manifold, Riemannian};
 
@@ -260,8 +260,11 @@ macro_rules! sphere {
                 }
             }
 
+            /// `x/|x|`; the centre is equally far from all points, and has entries that are not
+            /// numbers.
             fn project(&self, x: &SVector<f64, $a>) -> SVector<f64, $a> {
-                normalised(x)
+                // So that no square overflows or vanishes.
+                normalised(&(x / x.amax()))
             }
 
             /// Uniform: the direction of a Gaussian vector (Muller 1959).
@@ -315,7 +318,7 @@ macro_rules! sphere {
                 v: &SVector<f64, $n>,
             ) -> Result<SVector<f64, $a>, MetricError> {
                 within(PI, v.norm())?;
-                Ok(Sphere::<$n>::chart(x, v))
+                finite_column("an entry of the end", Sphere::<$n>::chart(x, v))
             }
 
             /// With the velocity of the great circle, and `γ'' = −|v|² γ`.
@@ -340,7 +343,7 @@ macro_rules! sphere {
                 // Never the arc cosine, which has no digits for near points.
                 let length = 2.0 * (y - x).norm().atan2((y + x).norm());
                 within(PI, length)?;
-                Ok(Sphere::<$n>::coordinates(x, y))
+                finite_column("the logarithm", Sphere::<$n>::coordinates(x, y))
             }
 
             /// `γ'(½) = c₀ U − ½s c₁ x` with `U = E(x) d` and the Stumpff functions at `s/4 = |d|²/4`.
@@ -437,7 +440,7 @@ fn gaussian(rng: &mut impl Rng) -> f64 {
 mod tests {
     use super::*;
     use crate::laws;
-    use crate::{Exponential, WeylMidpoint};
+    use crate::{Exponential, PointError, WeylMidpoint};
     use nalgebra::vector;
     use proptest::prelude::*;
     use rand::SeedableRng;
@@ -485,6 +488,22 @@ mod tests {
             ])
             .determinant();
             assert!((determinant - 1.0).abs() < 1e-14);
+        }
+    }
+
+    #[test]
+    fn what_has_no_nearest_point_is_found_by_its_defect() {
+        for off in
+            [vector![0.0, 0.0, 0.0], vector![f64::NAN, 1.0, 0.0], vector![f64::INFINITY, 1.0, 0.0]]
+        {
+            let projected = Sphere::<2>.project(&off);
+            assert!(!Sphere::<2>.defect(&projected).is_finite(), "{projected}");
+            assert!(matches!(Sphere::<2>.check(&projected), Err(PointError::NotFinite { .. })));
+        }
+        for scale in [1e-320, 1e-200, 1.0, 1e200] {
+            let projected = Sphere::<2>.project(&(vector![3.0, 0.0, 4.0] * scale));
+            assert!((projected - vector![0.6, 0.0, 0.8]).norm() < 1e-3, "{scale}: {projected}");
+            assert!(Sphere::<2>.defect(&projected) < 1e-15);
         }
     }
 

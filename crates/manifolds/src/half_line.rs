@@ -2,11 +2,11 @@
 //!
 //! - **Point and velocity**: columns of one number, `s` and `s'`.
 //! - **Frame**: `s' = s v`.
-//! - **Chart**: `φ_s(q) = s e^q`, onto the whole half line; its inverse `ln(1 + (y − s)/s)` has its digits
-//!   for near points.
+//! - **Chart**: `φ_s(q) = s e^q`, onto the whole half line, and its inverse `ln(y/s)`, which is
+//!   `ln(1 + (y − s)/s)` within a factor of two, where only that has its digits.
 //! - **Geodesics** of the canonical metric `ds²/s²` are `s e^{tv}`, which come to zero in no finite
-//!   time: it is the metric of positive matrices for 1 × 1 matrices (Bhatia 2007, ch. 6). `exp` and `log`
-//!   are one evaluation of `exp` and of `ln_1p`. Numbers end before the half line does, at 5·10⁻³²⁴ and
+//!   time: it is the metric of positive matrices for 1 × 1 matrices (Bhatia 2007, ch. 6). The logarithm is
+//!   within `2ε` of the exact one, relative to it. Numbers end before the half line does, at 5·10⁻³²⁴ and
 //!   2·10³⁰⁸; a geodesic that goes there is an error.
 //! - **Brackets**: none, as on every curve. The half line is a factor, for a temperature, a volume or
 //!   an internal energy, of a [`Product`](crate::Product).
@@ -53,8 +53,12 @@ impl Space for HalfLine {
 
     #[inline]
     fn coordinates<D: Scalar>(x: &Vector1<f64>, y: &Vector1<D>) -> Vector1<D> {
-        // ln(1 + (y − x)/x) has its digits for near points.
-        Vector1::new(((y.x - x.x) / x.x).ln_1p())
+        let ratio = y.x / x.x;
+        Vector1::new(match ratio.re() {
+            near if (0.5..=2.0).contains(&near) => ((y.x - x.x) / x.x).ln_1p(),
+            far if far.is_normal() => ratio.ln(),
+            _ => y.x.ln() - x.x.ln(),
+        })
     }
 
     /// `s' = s e^q v`.
@@ -144,6 +148,24 @@ mod tests {
         for on in [5e-324, 1.0, f64::MAX] {
             assert_eq!(HalfLine.project(&Vector1::new(on)).x, on);
             assert_eq!(HalfLine.defect(&Vector1::new(on)), 0.0);
+        }
+    }
+
+    #[test]
+    fn logarithms_have_their_digits_between_all_numbers() {
+        // The exact ones, rounded.
+        for (x, y, exact) in [
+            (1.0, 1.0 + f64::EPSILON, f64::EPSILON),
+            (1.0, 1e-17, -39.143_946_580_898_77),
+            (3.0, 1e-10, -24.124_463_218_608_567),
+            (1e-200, 1e200, 921.034_037_197_618_3),
+            (1e200, 1e-200, -921.034_037_197_618_3),
+            (2.0, 1.0, -std::f64::consts::LN_2),
+        ] {
+            let (x, y) = (Vector1::new(x), Vector1::new(y));
+            let log = Riemannian::<HalfLine>::log(&Canonical, &x, &y).unwrap().x;
+            let off = (log - exact).abs() / exact.abs();
+            assert!(off <= 2.0 * f64::EPSILON, "{x} to {y}: {log}");
         }
     }
 

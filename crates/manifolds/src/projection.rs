@@ -6,7 +6,7 @@ use num_dual::Dual;
 
 use crate::metric::{MetricError, finite_column, stretched, within};
 use crate::retraction::jet_by_dual_numbers;
-use crate::sphere::{components, frame, normalised, spread};
+use crate::sphere::{angle, components, frame, normalised, spread};
 use crate::{Arc, ArcJet, Nodes, PointPair, Retraction, Riemannian, Sphere, Tangent};
 
 /// The symmetric projection retraction of Sⁿ, for any metric:
@@ -108,8 +108,8 @@ macro_rules! projection {
                 x: &SVector<f64, $a>,
                 y: &SVector<f64, $a>,
             ) -> Result<Tangent<Sphere<$n>>, MetricError> {
+                within(std::f64::consts::PI, angle(x, y))?;
                 let sum = x + y;
-                within(std::f64::consts::PI, 2.0 * (y - x).norm().atan2(sum.norm()))?;
                 let base = normalised(&sum);
                 let d = (y - x) * (2.0 / sum.norm());
                 let vector = components(&frame::<$a, $n>(&base), &d);

@@ -130,6 +130,14 @@ fn great_circle<D: Scalar, const A: usize>(
     [x * cosine + v * (sine * t), v * cosine - x * (s * sine * t)]
 }
 
+/// The angle between two points, by the lengths of the sides and not by the arc cosine, which has no
+/// digits for near points; it is not a number where a point is not finite.
+#[inline]
+pub(crate) fn angle<const A: usize>(x: &SVector<f64, A>, y: &SVector<f64, A>) -> f64 {
+    let sides = [(y - x).norm(), (y + x).norm()];
+    if sides[1].is_finite() { 2.0 * sides[0].atan2(sides[1]) } else { f64::NAN }
+}
+
 /// Brings a point that is on the sphere up to round-off back to it, by one step of Newton's iteration
 /// `x ← x(3 − |x|²)/2` for the norm of the real part.
 #[inline]
@@ -182,9 +190,11 @@ macro_rules! sphere {
             }
 
             fn coordinates<D: Scalar>(x: &SVector<f64, $a>, y: &SVector<D, $a>) -> SVector<D, $n> {
-                let difference = SVector::<D, $a>::from_fn(|i, _| y[i] - x[i]);
-                let tangent = components(&frame::<$a, $n>(x), &difference);
                 let cosine = y.dot(&Column::embed(x));
+                // Eᵀx = 0, and the shorter one of y − x and y + x has the digits of y across x.
+                let side = 1_f64.copysign(cosine.re());
+                let short = SVector::<D, $a>::from_fn(|i, _| y[i] - side * x[i]);
+                let tangent = components(&frame::<$a, $n>(x), &short);
                 tangent * angle_over_sine(tangent.dot(&tangent), cosine)
             }
 
@@ -340,10 +350,19 @@ macro_rules! sphere {
                 x: &SVector<f64, $a>,
                 y: &SVector<f64, $a>,
             ) -> Result<SVector<f64, $n>, MetricError> {
-                // Never the arc cosine, which has no digits for near points.
-                let length = 2.0 * (y - x).norm().atan2((y + x).norm());
-                within(PI, length)?;
+                within(PI, angle(x, y))?;
                 finite_column("the logarithm", Sphere::<$n>::coordinates(x, y))
+            }
+
+            fn distance(
+                &self,
+                x: &SVector<f64, $a>,
+                y: &SVector<f64, $a>,
+            ) -> Result<f64, MetricError> {
+                let length = angle(x, y);
+                within(PI, length)?;
+                // The sides of near points have the rounding of their norms, which the chart leaves out.
+                Ok(if length < 1.0 { Sphere::<$n>::coordinates(x, y).norm() } else { length })
             }
 
             /// `γ'(½) = c₀ U − ½s c₁ x` with `U = E(x) d` and the Stumpff functions at `s/4 = |d|²/4`.

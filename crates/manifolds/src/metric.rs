@@ -93,7 +93,8 @@ pub trait Riemannian<M: Space> {
         t: f64,
     ) -> Result<M::Point<Real>, MetricError>;
 
-    /// The vector `v` at `x` with `exp_x(v) = y`.
+    /// The vector `v` at `x` with `exp_x(v) = y`. Of an open [`Chart`](crate::Chart) the domain is not
+    /// known here: the way may lead through what it leaves out.
     ///
     /// # Errors
     ///

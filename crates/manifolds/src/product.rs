@@ -4,8 +4,9 @@
 //!   factor, with that of the second below it.
 //! - **Frame and chart**: those of the factors, `φ_{(a,b)}(q, r) = (φ_a(q), φ_b(r))`.
 //! - **Geodesics**: of a pair of metrics `(gA, gB)`, and of [`Canonical`], which is the
-//!   pair of the canonical ones, pairs of geodesics, as accurate as those of the factors; none is
-//!   longer than the factors allow. One [closure](crate::Metric::field) for the full matrix couples the
+//!   pair of the canonical ones, pairs of geodesics, as accurate as those of the factors, with
+//!   `d² = d_A² + d_B²` (Lee 2018, ch. 2, for the product metric); none is longer than the factors allow.
+//!   One [closure](crate::Metric::field) for the full matrix couples the
 //!   factors, and its geodesics are numerical.
 //! - **Brackets**: none unless one is asked for. A pair, `{f, g} = {f, g}_A + {f, g}_B`, whose Casimirs
 //!   are functions of the Casimirs of both: with `(AreaForm, Zero)` on `S² × R` each function of the

@@ -8,20 +8,26 @@
 //! - **Point and velocity**: columns `x` and `x'` of `n + 1` numbers.
 //! - **Frame**: orthonormal columns `E(x)` with `det[x, E] = +1`, those of the Householder reflection
 //!   that takes the last axis to `∓x`.
-//! - **Chart**: normal coordinates, divided by the norm, so that every point of a run has norm 1 up to
-//!   one rounding and never drifts,
+//! - **Chart**: normal coordinates, which end with one step `ν` of Newton's iteration for `|y| = 1`, so that
+//!   every point of a run has norm 1 to round-off and
+//!   [never drifts](mod@crate::manifold#why-points-do-not-drift),
 //!
 //! ```math
-//! \varphi_x(q) = \cos|q|\, x + \frac{\sin|q|}{|q|}\, E q, \qquad
-//! \varphi_x^{-1}(y) = \frac{\theta}{\sin\theta}\, E^T (y - x), \quad
-//! \theta = \mathrm{atan2}\bigl(|E^T (y - x)|,\ x^T y\bigr) .
+//! \varphi_x(q) = \nu\Bigl(\cos|q|\, x + \frac{\sin|q|}{|q|}\, E q\Bigr), \qquad
+//! \nu(y) = \tfrac12 (3 - |y|^2)\, y ,
 //! ```
 //!
+//! ```math
+//! \varphi_x^{-1}(y) = \frac{\theta}{\sin\theta}\, E^T (y \mp x), \qquad
+//! \theta = \mathrm{atan2}\bigl(|E^T (y \mp x)|,\ x^T y\bigr) ,
+//! ```
+//!
+//! with the sign that makes `y ∓ x` short: `Eᵀx = 0`, and a long one has lost digits.
 //! - **Geodesics** of the round metric are great circles, `exp_x(v) = φ_x(v)` and
 //!   `log_x(y) = φ_x⁻¹(y)`, up to the injectivity radius π, beyond which they are refused (Absil, Mahony
-//!   and Sepulchre 2008, §5.4). The logarithm of rounded points is within
-//!   `8ε(1/θ + 1 + θ/(π − θ))` of the exact one, relative to `θ`, from `θ = 10⁻¹⁴` to `π − 10⁻⁶`: its
-//!   direction is lost at the antipode.
+//!   and Sepulchre 2008, §5.4). From `θ = 10⁻¹⁵` to `π − 10⁻¹⁰` the logarithm of rounded points was
+//!   measured within `8ε min(θ, 1)/(π − θ)` of the exact one of these very points, as its direction is
+//!   lost at the antipode, and their distance within `3ε min(θ, 1)`.
 //! - **Other metrics** are forms on Rⁿ⁺¹, by [`Metric::field`](crate::Metric::field);
 //!   [`Projection`](crate::Projection) is a retraction for all of them.
 //! - **Brackets**: none unless one is asked for. `AreaForm` on S², `x' = x × ∇H` (Marsden and Ratiu 1999,

@@ -291,6 +291,66 @@ mod tests {
         assert!((distance - exact).abs() < 1e-12);
     }
 
+    /// A metric with all its entries, none of them constant.
+    fn skewed<D: Scalar>(q: &Vector3<D>) -> Matrix3<D> {
+        let wave = Vector3::new(q.y.sin(), q.z.cos(), q.x * 0.5);
+        let other = Vector3::new(q.x * q.z, -q.y, q.z.exp() * 0.3);
+        Matrix3::identity() + wave * wave.transpose() + other * other.transpose() * D::from(0.2)
+    }
+
+    /// `Γᵏ_ij` from the matrix alone, by differences of order four.
+    fn christoffel_by_differences(x: &Vector3<f64>) -> [Matrix3<f64>; 3] {
+        let h = 1e-3;
+        let slopes = [0, 1, 2].map(|k| {
+            let at = |t: f64| skewed(&(x + Vector3::ith(k, t * h)));
+            ((at(1.0) - at(-1.0)) * 8.0 - (at(2.0) - at(-2.0))) / (12.0 * h)
+        });
+        let inverse = skewed(x).try_inverse().unwrap();
+        [0, 1, 2].map(|k| {
+            Matrix3::from_fn(|i, j| {
+                let first_kind =
+                    |l: usize| slopes[i][(l, j)] + slopes[j][(l, i)] - slopes[l][(i, j)];
+                (0..3).map(|l| 0.5 * inverse[(k, l)] * first_kind(l)).sum()
+            })
+        })
+    }
+
+    #[test]
+    fn christoffel_symbols_are_those_of_differences_of_the_metric() {
+        let g = Metric::field(|q: &Vector3<Real>| skewed(q));
+        let mut rng = ChaCha8Rng::seed_from_u64(5);
+        for _ in 0..50 {
+            let x = Vector3::from_fn(|_, _| rng.random_range(-1.0..1.0));
+            let symbols = Riemannian::<Euclidean<3>>::christoffel(&g, &x).unwrap();
+            for (exact, differences) in symbols.iter().zip(christoffel_by_differences(&x)) {
+                assert_eq!(*exact, exact.transpose());
+                assert!((exact - differences).amax() < 1e-10, "{exact} or {differences}");
+            }
+        }
+    }
+
+    #[test]
+    fn geodesics_solve_their_equation() {
+        let g = Metric::field(|q: &Vector3<Real>| skewed(q));
+        let mut rng = ChaCha8Rng::seed_from_u64(6);
+        for _ in 0..20 {
+            let mut column = || Vector3::from_fn(|_, _| rng.random_range(-0.7..0.7));
+            let (x, v) = (column(), column());
+            let at = |t: f64| Riemannian::<Euclidean<3>>::end(&g, &x, &(v * t)).unwrap();
+            // Differences of order four of points on the way.
+            let (t, h) = (0.6, 2e-2);
+            let [a, b, c, d, e] = [-2.0, -1.0, 0.0, 1.0, 2.0].map(|k| at(t + k * h));
+            let velocity = ((d - b) * 8.0 - (e - a)) / (12.0 * h);
+            let acceleration = ((d + b) * 16.0 - (e + a) - c * 30.0) / (12.0 * h * h);
+            let symbols = christoffel_by_differences(&c);
+            let force = Vector3::from_fn(|k, _| velocity.dot(&(symbols[k] * velocity)));
+            assert!((acceleration + force).norm() < 1e-6, "{acceleration} and {force}");
+            let along = Riemannian::<Euclidean<3>>::along(&g, &x, &v, t).unwrap();
+            assert!((along.map(|entry| entry.eps1) - velocity).norm() < 1e-7);
+            assert!((along.map(|entry| entry.eps1eps2) + force).norm() < 1e-6);
+        }
+    }
+
     #[test]
     fn what_the_chart_does_not_reach_has_no_logarithm() {
         let (round, form) = (Canonical, Metric::field(|_: &Vector3<Real>| Matrix3::identity()));

@@ -503,17 +503,38 @@ mod tests {
         assert!(back.map(|entry| entry.eps1eps2).norm() < 1e-16);
     }
 
+    /// `q = ε₁ e_i + ε₂ e_j`.
+    fn seed(i: usize, j: usize) -> Vector3<Real> {
+        let part = |k, direction| if k == direction { 1.0 } else { 0.0 };
+        Vector3::from_fn(|k, _| Real::new(0.0, part(k, i), part(k, j), 0.0))
+    }
+
     #[test]
-    fn the_logarithm_is_accurate_up_to_half_a_turn() {
-        let axis = vector![2.0, -1.0, 2.0] / 3.0;
-        for k in 0..=400 {
-            let theta = (PI - 1e-10) * f64::from(k) / 400.0;
-            // The matrix of the exact half-angle quaternion, whose logarithm is known.
-            let (sine, cosine) = (0.5 * theta).sin_cos();
-            let v = axis * sine;
-            let r = Rotations.from_quaternion([cosine, v.x, v.y, v.z]);
-            let off = (log(&r) - axis * theta).norm();
-            assert!(off <= 16.0 * f64::EPSILON * theta.max(1.0), "θ = {theta}: off by {off:.1e}");
+    fn all_second_derivatives_are_right_at_the_identity() {
+        for (i, j) in (0..3).flat_map(|i| (0..3).map(move |j| (i, j))) {
+            let q = seed(i, j);
+            let [a, b] = [i, j].map(|k| hat(&Vector3::<f64>::ith(k, 1.0)));
+            let square = a * b + b * a;
+            // exp(q̂) = 1 + q̂ + ½q̂², dexp(q) = 1 − ½q̂ + q̂²/6, dexp⁻¹(q) = 1 + ½q̂ + q̂²/12, each + O(q³).
+            for (name, value, first, second) in [
+                ("exp", exp(&q), 1.0, 0.5),
+                ("dexp", dexp(&q), -0.5, 1.0 / 6.0),
+                ("dexp⁻¹", dexp_inverse(&q), 0.5, 1.0 / 12.0),
+            ] {
+                assert_eq!(value.map(|entry| entry.re), Matrix3::identity(), "{name}");
+                assert_eq!(value.map(|entry| entry.eps1), a * first, "{name}");
+                assert_eq!(value.map(|entry| entry.eps2), b * first, "{name}");
+                let off = value.map(|entry| entry.eps1eps2) - square * second;
+                assert!(off.amax() < 1e-16, "{name}, {i} and {j}: {off}");
+            }
+            // log((1 + ε₁â)(1 + ε₂b̂)) = ε₁a + ε₂b + ½ε₁ε₂ a × b (Baker, Campbell and Hausdorff).
+            let product = exp(&seed(i, 3)) * exp(&seed(3, j));
+            let sum = log(&product);
+            assert_eq!(sum.map(|entry| entry.eps1), Vector3::ith(i, 1.0));
+            assert_eq!(sum.map(|entry| entry.eps2), Vector3::ith(j, 1.0));
+            let bracket = Vector3::<f64>::ith(i, 1.0).cross(&Vector3::ith(j, 1.0)) * 0.5;
+            assert!((sum.map(|entry| entry.eps1eps2) - bracket).amax() < 1e-16, "{i} and {j}");
+            assert!(log(&exp(&q)).map(|entry| entry.eps1eps2).amax() < 1e-16, "{i} and {j}");
         }
     }
 
@@ -541,11 +562,25 @@ mod tests {
         }
     }
 
-    #[test]
-    fn quaternions_go_in_and_out() {
-        let q = [0.5, -0.5, 0.5, 0.5];
-        let r = Rotations.from_quaternion(q);
-        let back = Rotations.to_quaternion(&r);
-        assert!(q.iter().zip(back).all(|(a, b)| (a - b).abs() < 1e-15));
+    proptest! {
+        #[test]
+        fn quaternions_go_in_and_out(
+            mut q in prop::array::uniform4(-0.9..0.9), largest in 0..4_usize, scale in 1e-3..1e3_f64,
+        ) {
+            // Each component has its turn as the pivot, with either sign.
+            q[largest] = 1_f64.copysign(q[largest]);
+            let q: Vector4<f64> = Vector4::from(q).normalize();
+            let r = Rotations.from_quaternion((q * scale).into());
+            prop_assert!(Rotations.defect(&r) < 1e-15);
+            prop_assert!((r - Rotations.from_quaternion((-q).into())).amax() < 1e-15);
+            let v = vector![q[1], q[2], q[3]];
+            let turned = v * (2.0 * v.dot(&Vector3::x()))
+                + Vector3::x() * (q[0] * q[0] - v.norm_squared())
+                + v.cross(&Vector3::x()) * (2.0 * q[0]);
+            prop_assert!((r.column(0) - turned).norm() < 1e-15);
+            let back = Vector4::from(Rotations.to_quaternion(&r));
+            prop_assert!(back[0] >= 0.0);
+            prop_assert!((back - q * 1_f64.copysign(q[0])).norm() < 1e-15);
+        }
     }
 }

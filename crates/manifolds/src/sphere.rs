@@ -532,19 +532,48 @@ mod tests {
         }
     }
 
-    #[test]
-    fn the_logarithm_of_near_and_of_far_points_has_its_digits() {
-        let x = vector![0.6, 0.0, 0.8];
-        for k in 1..=300 {
-            let theta = 10.0_f64.powf(-14.0 + 0.05 * f64::from(k)).min(PI - 1e-6);
-            let q = vector![0.6, -0.8] * theta;
-            let y = Sphere::<2>::chart(&x, &q);
-            let log = Riemannian::<Sphere<2>>::log(&Canonical, &x, &y).unwrap();
-            // The points are rounded to ε, which a logarithm of length θ cannot undo.
-            let attainable = 8.0 * f64::EPSILON * (1.0 / theta + 1.0 + theta / (PI - theta));
-            assert!((log - q).norm() <= attainable * theta.max(1e-300), "θ = {theta}");
-        }
+    macro_rules! chart_at_its_centre {
+        ($name:ident, $n:literal in $a:literal) => {
+            /// `φ_x(q) = x + E q − ½|q|²x + O(q³)`, with the columns of `E` orthonormal and across `x`.
+            #[test]
+            fn $name() {
+                const BOUND: f64 = 8.0 * f64::EPSILON;
+                let mut rng = ChaCha8Rng::seed_from_u64(3);
+                for x in (0..20).map(|_| Sphere::<$n>.random(&mut rng)) {
+                    let mut columns = vec![x];
+                    for (i, j) in (0..$n).flat_map(|i| (0..$n).map(move |j| (i, j))) {
+                        let part = |k, direction| if k == direction { 1.0 } else { 0.0 };
+                        let seed = |k, _| Real::new(0.0, part(k, i), part(k, j), 0.0);
+                        let y = Sphere::<$n>::chart(&x, &SVector::<Real, $n>::from_fn(seed));
+                        assert!((y.map(|entry| entry.re) - x).norm() < BOUND);
+                        let bend = x * if i == j { -1.0 } else { 0.0 };
+                        assert!((y.map(|entry| entry.eps1eps2) - bend).norm() < BOUND);
+                        let [along_i, along_j] =
+                            [y.map(|entry| entry.eps1), y.map(|entry| entry.eps2)];
+                        let right = part(i, j);
+                        assert!((along_i.dot(&along_j) - right).abs() < BOUND, "{i} and {j}");
+                        if j == 0 {
+                            columns.push(along_i);
+                        }
+                        let back = Sphere::<$n>::coordinates(&x, &y);
+                        assert!((back[i].eps1 - 1.0).abs() < BOUND);
+                        assert!((back[j].eps2 - 1.0).abs() < BOUND);
+                        assert!(back.iter().all(|entry| entry.eps1eps2.abs() < BOUND));
+                    }
+                    let turn = SMatrix::<f64, $a, $a>::from_columns(&columns);
+                    assert!((turn.determinant() - 1.0).abs() < BOUND);
+                    assert!(columns[1..].iter().all(|e| e.dot(&x).abs() < BOUND));
+                }
+            }
+        };
     }
+    chart_at_its_centre!(the_chart_of_the_circle_has_its_derivatives_at_the_centre, 1 in 2);
+    chart_at_its_centre!(the_chart_of_the_sphere_has_its_derivatives_at_the_centre, 2 in 3);
+    chart_at_its_centre!(the_chart_of_the_three_sphere_has_its_derivatives_at_the_centre, 3 in 4);
+    chart_at_its_centre!(the_chart_of_the_four_sphere_has_its_derivatives_at_the_centre, 4 in 5);
+    chart_at_its_centre!(the_chart_of_the_five_sphere_has_its_derivatives_at_the_centre, 5 in 6);
+    chart_at_its_centre!(the_chart_of_the_six_sphere_has_its_derivatives_at_the_centre, 6 in 7);
+    chart_at_its_centre!(the_chart_of_the_seven_sphere_has_its_derivatives_at_the_centre, 7 in 8);
 
     #[test]
     fn antipodes_and_longer_arcs_are_refused_with_their_length() {

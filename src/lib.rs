@@ -73,6 +73,8 @@ pub mod prelude {
         Canonical, Cayley, Chart, Euclidean, Exponential, HalfLine, LieAlgebra, LieDual, Manifold,
         Metric, Product, Projection, Retraction, Rotations, Sphere, WeylMidpoint,
     };
+    /// The linear algebra of this library; its macros, such as `vector!`, look for it under this name.
+    pub use nalgebra;
     pub use nalgebra::{
         Matrix1, Matrix2, Matrix3, Matrix4, Matrix5, Matrix6, SMatrix, SVector, Vector1, Vector2,
         Vector3, Vector4, Vector5, Vector6, matrix, vector,

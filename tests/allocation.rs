@@ -100,15 +100,16 @@ fn main() {
     let cayley = Scheme::new(Cayley).gradient(SymmetricItohAbe);
     assert_eq!(blocks_of(cayley, &group, Matrix3::identity()), 0);
 
-    // A product, with a momentum: the height of the axis, about which nothing depends on the angle.
-    let bath = System::on(Product(Sphere::<2>::round(), Euclidean::<1>))
-        .bracket((AreaForm, Zero))
-        .energy(|(n, s): &(Vector3<Real>, Vector1<Real>)| n.z.powi(2) * 0.5 + s.x.exp())
-        .entropy(|(_, s): &(Vector3<Real>, Vector1<Real>)| s.x)
-        .momentum(|(n, _): &(Vector3<Real>, Vector1<Real>)| n.z)
+    // A product, with a momentum: a spring in the plane, which warms up.
+    type Warm = (Vector4<Real>, Vector1<Real>);
+    let spring = System::on(Product(Euclidean::<4>, Euclidean::<1>))
+        .bracket((Symplectic, Zero))
+        .energy(|(x, s): &Warm| x.norm_squared() * 0.5 + x.xy().norm_squared().powi(2) + s.x.exp())
+        .entropy(|(_, s): &Warm| s.x)
+        .momentum(|(x, _): &Warm| x.x * x.w - x.y * x.z)
         .build()
         .expect("it is a system");
-    assert_eq!(blocks(&bath, (vector![0.6, 0.0, 0.8], vector![0.0])), 0);
+    assert_eq!(blocks(&spring, (vector![0.6, 0.0, 0.1, 0.8], vector![0.0])), 0);
 
     // Geodesics integrated numerically, of the half plane.
     let plane = System::on(Euclidean::<2>)

@@ -122,6 +122,98 @@ proptest! {
     }
 
     #[test]
+    fn canonical_brackets_and_sums_keep_the_laws(
+        seed in any::<u64>(), x in columns::<4>(), a in columns::<4>(), b in columns::<4>(),
+        a2 in columns::<2>(), b2 in columns::<2>(), a3 in columns::<3>(), b3 in columns::<3>(),
+        a6 in columns::<6>(), b6 in columns::<6>(),
+    ) {
+        use rand::SeedableRng;
+        let mut rng = rand::rngs::ChaCha8Rng::seed_from_u64(seed);
+        let column = System::on(Euclidean::<4>).bracket(Symplectic).energy(square).build().unwrap();
+        laws::bracket(&column, &x, &a, &b)?;
+        let open = Chart::<4>::new(|_| true);
+        let open = System::on(open).bracket(Symplectic).energy(square).build().unwrap();
+        laws::bracket(&open, &x, &a, &b)?;
+
+        let pairs = Product(Chart::<2>::new(|_| true), Euclidean::<2>);
+        let sum = |(q, p): &(Vector2<Real>, Vector2<Real>)| q.norm_squared() + p.x.powi(3);
+        let pairs = System::on(pairs).bracket(Symplectic).energy(sum).build().unwrap();
+        laws::bracket(&pairs, &pairs.manifold().random(&mut rng), &a, &b)?;
+
+        let angle = Product(Sphere::<1>::round(), Euclidean::<1>);
+        let pendulum = |(x, p): &(Vector2<Real>, Vector1<Real>)| p.x.powi(2) * 0.5 + x.y;
+        let angle = System::on(angle).bracket(Symplectic).energy(pendulum).build().unwrap();
+        let at = angle.manifold().random(&mut rng);
+        laws::bracket(&angle, &at, &a2, &b2)?;
+        // θ' = p and p' = −∂H/∂θ, everywhere on the circle.
+        let centre = ChartPoint::<Product<Sphere<1>, Euclidean<1>>>::centre(&at);
+        let v = angle.velocity(&centre).map_err(|error| TestCaseError::fail(error.to_string()))?;
+        let (turn, force) = (at.1.x, -at.0.x);
+        prop_assert!((v - vector![turn, force]).norm() <= 1e-14, "{v}");
+
+        let attitude = Product(Rotations, Euclidean::<3>);
+        let heavy = |(r, p): &(Matrix3<Real>, Vector3<Real>)| p.norm_squared() + r.m33;
+        let attitude = System::on(attitude).bracket(Symplectic).energy(heavy).build().unwrap();
+        laws::bracket(&attitude, &attitude.manifold().random(&mut rng), &a6, &b6)?;
+
+        let bath = System::on(Product(Sphere::<2>::round(), Euclidean::<1>))
+            .bracket((AreaForm, Zero))
+            .energy(|(n, s): &(Vector3<Real>, Vector1<Real>)| n.z.powi(2) + s.x.exp())
+            .entropy(|(_, s): &(Vector3<Real>, Vector1<Real>)| s.x)
+            .build()
+            .unwrap();
+        laws::bracket(&bath, &bath.manifold().random(&mut rng), &a3, &b3)?;
+    }
+
+    #[test]
+    fn closure_brackets_on_curved_spaces_keep_the_laws(
+        seed in any::<u64>(), a in columns::<2>(), b in columns::<2>(),
+        a3 in columns::<3>(), b3 in columns::<3>(),
+    ) {
+        use rand::SeedableRng;
+        let mut rng = rand::rngs::ChaCha8Rng::seed_from_u64(seed);
+        // On S² the bivector x̂ is the area form.
+        let energy = |x: &Vector3<Real>| x.x.powi(2) + x.y * x.z;
+        let form = Poisson::field(|x: &Vector3<Real>| x.cross_matrix());
+        let closure = System::on(Sphere::<2>).bracket(form).energy(energy).build().unwrap();
+        let x = Sphere::<2>.random(&mut rng);
+        laws::bracket(&closure, &x, &a, &b)?;
+        let area = System::on(Sphere::<2>).bracket(AreaForm).energy(energy).build().unwrap();
+        let at = ChartPoint::<Sphere<2>>::centre(&x);
+        let [left, right] = [closure.velocity(&at).unwrap(), area.velocity(&at).unwrap()];
+        prop_assert!((left - right).norm() <= 1e-14, "{left} {right}");
+        // On SO(3) the body covectors (dS)^ are Nambu's bracket of S = R₁₃, with dS = (R₁₂·, −R₁₁·, 0).
+        let slope = |r: &Matrix3<Real>| Vector3::new(-r.m12, r.m11, Real::from(0.0));
+        let body = System::on(Rotations)
+            .bracket(Poisson::field(move |r: &Matrix3<Real>| slope(r).cross_matrix()))
+            .energy(|r: &Matrix3<Real>| r.m21 + r.m33.powi(2))
+            .build()
+            .unwrap();
+        let r = Rotations.random(&mut rng);
+        laws::bracket(&body, &r, &a3, &b3)?;
+        let nambu = System::on(Rotations)
+            .bracket(Nambu::of(|r: &Matrix3<Real>| r.m13))
+            .energy(|r: &Matrix3<Real>| r.m21 + r.m33.powi(2))
+            .build()
+            .unwrap();
+        let at = ChartPoint::<Rotations>::centre(&r);
+        let [left, right] = [body.velocity(&at).unwrap(), nambu.velocity(&at).unwrap()];
+        prop_assert!((left - right).norm() <= 1e-14, "{left} {right}");
+        // A metric that depends on R has a volume form that does.
+        let metric = Metric::field(|r: &Matrix3<Real>| {
+            let lean = r.column(2).into_owned();
+            Matrix3::identity() + lean * lean.transpose() * (r.m11 + 1.5)
+        });
+        let varying = System::on(Rotations)
+            .metric(metric)
+            .bracket(Nambu::of(|r: &Matrix3<Real>| r.m13))
+            .energy(|r: &Matrix3<Real>| r.m21)
+            .build()
+            .unwrap();
+        laws::bracket(&varying, &r, &a3, &b3)?;
+    }
+
+    #[test]
     fn constant_and_closure_brackets_keep_the_laws(
         entries in prop::array::uniform4(columns::<4>()),
         x in columns::<4>(), a in columns::<4>(), b in columns::<4>(),

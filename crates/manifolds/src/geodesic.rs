@@ -237,12 +237,14 @@ fn travel<M: Space, Y: State>(
     for _ in 0..PIECES {
         h = h.min(1.0 - time);
         let next = extrapolation::step(&|y: &Y| rate(&base, y), &here, h);
-        match next.filter(|next| M::is_near(&position(next))) {
+        match next.filter(|next| M::is_near(&position(&next.state))) {
             Some(next) => {
-                here = next;
+                here = next.state;
                 // A sum of halves and quarters is exact.
                 time += h;
-                h *= 2.0;
+                if next.easy {
+                    h *= 2.0;
+                }
             }
             None if h > SHORTEST => {
                 h *= 0.5;

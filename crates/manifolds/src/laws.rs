@@ -67,7 +67,8 @@ pub fn manifold<M: Manifold>(space: &M, x: &M::Point<f64>, q: &Vector<M>) -> Res
 /// Checks a metric at `x` along the tangent vector `v`:
 ///
 /// 1. `g` is symmetric; 2. `♯♭v = v` and `♭` is the matrix; 3. `G(v, v) > 0`, and equals
-///    `|L⁻¹♭v|²`; 4. `exp_x(0) = x`; 5. the geodesic along `v` has constant speed.
+///    `|L⁻¹♭v|²`; 4. `exp_x(0) = x`; 5. the geodesic along `v` has constant speed; 6. its connection is
+///    without torsion, `Γ^k_{ij} = Γ^k_{ji}`, and it has the acceleration `−Γ(v, v)`.
 ///
 /// # Errors
 ///
@@ -112,13 +113,33 @@ pub fn metric<M: Manifold, G: Riemannian<M>>(
     // number of g is what that becomes in p·g⁻¹p.
     let off = (speed - square).abs() / square.max(f64::MIN_POSITIVE);
     let bound = 1e-11 * condition::<M>(&g).max(condition::<M>(&metric.matrix(&end)));
-    BrokenLaw::unless("geodesics have constant speed", off, bound)
+    BrokenLaw::unless("geodesics have constant speed", off, bound)?;
+
+    let symbols = usable("g is positive", metric.christoffel(x))?;
+    let begin = M::coordinates(x, &usable("geodesics exist", metric.along(x, v, 0.0))?);
+    let (mut torsion, mut turn, mut size) = (0.0_f64, 0.0_f64, 0.0_f64);
+    for k in 0..M::Dim::LEN {
+        let gamma: &Matrix<M> = &symbols[k];
+        let skew = Matrix::<M>::from_entries(|i, j| gamma[(i, j)] - gamma[(j, i)]);
+        torsion = torsion.max(skew.max_abs());
+        turn = turn.max((begin[k].eps1eps2 + v.dot(&(*gamma * *v))).abs());
+        size = size.max(gamma.max_abs());
+    }
+    let bound = round_off::<M>(size) * condition::<M>(&g);
+    BrokenLaw::unless("the connection has no torsion", torsion, bound)?;
+    let bound = round_off::<M>(size * square_of(v)) * condition::<M>(&g);
+    BrokenLaw::unless("geodesics have the acceleration −Γ(v, v)", turn, bound)
+}
+
+/// `|v|²` in components.
+fn square_of<V: Column<f64>>(v: &V) -> f64 {
+    v.dot(v)
 }
 
 /// Checks a retraction at `x` with the displacement `u`:
 ///
-/// 1. `R_h⁻¹(R_h(d)) = d`; 2. the arc from `x` is the pair of its own `(z, d)`; 3. `real_arc` is the same arc, and `arc_jet`
-///    the derivative of `arc` at dual numbers.
+/// 1. `R_h⁻¹(R_h(d)) = d`; 2. the arc from `x` is the pair of its own `(z, d)`; 3. `real_arc` is the same
+///    arc, and `arc_jet` the derivative of `arc` at dual numbers; 4. consistency, `x' − x = d + O(|d|²)`.
 ///
 /// # Errors
 ///
@@ -130,6 +151,14 @@ pub fn retraction<M: Manifold, G: Riemannian<M>, R: Retraction<M, G>>(
     u: &Vector<M>,
 ) -> Result<(), BrokenLaw> {
     let exists = "the retraction is defined";
+    let apart = |t: f64| {
+        let tangent = Tangent::<M> { base: x.clone(), vector: *u * t };
+        let (start, end) = usable(exists, retraction.pair(metric, &tangent))?;
+        Ok((M::coordinates(x, &end) - M::coordinates(x, &start) - tangent.vector).magnitude())
+    };
+    // Of second order it is a hundredth on a tenth of the way, of first order a tenth.
+    let round_off = round_off::<M>(M::magnitude(x));
+    BrokenLaw::unless("x' − x = d + O(|d|²)", apart(1e-3)?, 0.05 * apart(1e-2)? + round_off)?;
     let bound = 1e-12 * (M::magnitude(x) + u.magnitude()).max(1.0);
     let jet = usable(exists, retraction.arc_jet(metric, x, u))?;
     let tangent = Tangent { base: jet.z.clone(), vector: jet.d };

@@ -1,8 +1,10 @@
 //! The canonical bracket of a phase space.
 
-use metriplectic_fields::{Column, Scalar};
+use metriplectic_fields::{Column, Scalar, Vector};
 use metriplectic_manifolds::rotations::dexp_inverse;
-use metriplectic_manifolds::{Euclidean, MetricError, Product, Riemannian, Rotations, Times};
+use metriplectic_manifolds::{
+    Chart, Euclidean, MetricError, Product, Riemannian, Rotations, Sphere, Times,
+};
 use nalgebra::{SVector, Vector3, Vector6};
 
 use super::{Bracket, Site};
@@ -12,7 +14,10 @@ use super::{Bracket, Site};
 /// | phase space | state | `x' = Π α` |
 /// |---|---|---|
 /// | R²ⁿ, [`Euclidean<2n>`](Euclidean) | `(q, p)` in one column | `q' = α_p`, `p' = −α_q` |
+/// | `U ⊂ R²ⁿ`, [`Chart<2n>`](Chart) | the same | the same |
 /// | `Rⁿ × Rⁿ`, [`Product`] | the pair `(q, p)` | the same |
+/// | `T*U = U × Rⁿ`, `Product<Chart<n>, Euclidean<n>>` | the same | the same |
+/// | `T*S¹`, `Product<Sphere<1>, Euclidean<1>>` | `(x, p)` | `θ' = α_p`, `p' = −α_θ` with the angle `θ` |
 /// | `T*SO(3)`, `Product<Rotations, Euclidean<3>>` | `(R, p)`, `p` in the body frame | `R' = R α̂_p`, `p' = p × α_p − α_R` |
 ///
 /// On `T*SO(3)`, trivialised from the left, `α_R` is the derivative along the body rotations,
@@ -21,33 +26,51 @@ use super::{Bracket, Site};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Symplectic;
 
-impl<const N: usize, G: Riemannian<Euclidean<N>>> Bracket<Euclidean<N>, G> for Symplectic {
-    fn apply<D: Scalar>(
-        &self,
-        _: &Site<'_, Euclidean<N>, G, D>,
-        alpha: &SVector<D, N>,
-    ) -> Result<SVector<D, N>, MetricError> {
-        const { assert!(N.is_multiple_of(2), "positions and momenta come in pairs: R²ⁿ") }
-        let n = N / 2;
-        Ok(SVector::from_index(|i| if i < n { alpha[i + n] } else { -alpha[i - n] }))
-    }
+/// Positions and momenta in one column.
+macro_rules! on_a_column {
+    ($($space:ident),+) => {$(
+        impl<const N: usize, G: Riemannian<$space<N>>> Bracket<$space<N>, G> for Symplectic {
+            fn apply<D: Scalar>(
+                &self,
+                _: &Site<'_, $space<N>, G, D>,
+                alpha: &SVector<D, N>,
+            ) -> Result<SVector<D, N>, MetricError> {
+                const { assert!(N.is_multiple_of(2), "positions and momenta come in pairs: R²ⁿ") }
+                let n = N / 2;
+                Ok(SVector::from_index(|i| if i < n { alpha[i + n] } else { -alpha[i - n] }))
+            }
+        }
+    )+};
 }
+on_a_column!(Euclidean, Chart);
 
-impl<const N: usize, G> Bracket<Product<Euclidean<N>, Euclidean<N>>, G> for Symplectic
-where
-    Euclidean<N>: Times<Euclidean<N>>,
-    G: Riemannian<Product<Euclidean<N>, Euclidean<N>>>,
-{
-    fn apply<D: Scalar>(
-        &self,
-        _: &Site<'_, Product<Euclidean<N>, Euclidean<N>>, G, D>,
-        alpha: &metriplectic_fields::Vector<Product<Euclidean<N>, Euclidean<N>>, D>,
-    ) -> Result<metriplectic_fields::Vector<Product<Euclidean<N>, Euclidean<N>>, D>, MetricError>
-    {
-        let (along_q, along_p) = Product::<Euclidean<N>, Euclidean<N>>::split(alpha);
-        Ok(Product::<Euclidean<N>, Euclidean<N>>::join(&along_p, &-along_q))
-    }
+/// The cotangent bundle of a space whose frame is that of global coordinates.
+macro_rules! on_a_cotangent_product {
+    ($([$($n:ident)?] $space:ty, $fibre:ty);+) => {$(
+        impl<$(const $n: usize,)? G> Bracket<Product<$space, $fibre>, G> for Symplectic
+        where
+            $space: Times<$fibre>,
+            G: Riemannian<Product<$space, $fibre>>,
+        {
+            fn apply<D: Scalar>(
+                &self,
+                _: &Site<'_, Product<$space, $fibre>, G, D>,
+                alpha: &Vector<Product<$space, $fibre>, D>,
+            ) -> Result<Vector<Product<$space, $fibre>, D>, MetricError> {
+                let (along_q, along_p) = Product::<$space, $fibre>::split(alpha);
+                // The two columns are of the same size, and of types that need not know it.
+                let forward = Column::from_index(|i| along_p[i]);
+                let back = Column::from_index(|i| -along_q[i]);
+                Ok(Product::<$space, $fibre>::join(&forward, &back))
+            }
+        }
+    )+};
 }
+on_a_cotangent_product!(
+    [N] Euclidean<N>, Euclidean<N>;
+    [N] Chart<N>, Euclidean<N>;
+    [] Sphere<1>, Euclidean<1>
+);
 
 impl<G> Bracket<Product<Rotations, Euclidean<3>>, G> for Symplectic
 where

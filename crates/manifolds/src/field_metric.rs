@@ -54,8 +54,9 @@ impl<M: Manifold, F: MatrixField<M>> Riemannian<M> for FieldMetric<F> {
     }
 
     fn weyl_arc(&self, x: &M::Point<f64>, d: &Vector<M>) -> Result<Arc<M>, MetricError> {
-        let (z, velocity) = geodesic::follow_real(&self.field, x, &(*d * 0.5))?;
-        let (end, _) = geodesic::follow_real(&self.field, &z, &velocity)?;
+        let (z, velocity) =
+            geodesic::follow_real(&self.field, x, &(*d * 0.5)).map_err(on_first_half)?;
+        let (end, _) = geodesic::follow_real(&self.field, &z, &velocity).map_err(on_second_half)?;
         Ok(Arc { z: ChartPoint::centre(&z), d: velocity * 2.0, end })
     }
 
@@ -66,13 +67,16 @@ impl<M: Manifold, F: MatrixField<M>> Riemannian<M> for FieldMetric<F> {
         t: f64,
     ) -> Result<M::Point<Real>, MetricError> {
         let (here, velocity) = if t > 0.0 {
-            let (here, velocity) = geodesic::follow_real(&self.field, x, &(*v * t))?;
+            let (here, velocity) = geodesic::follow_real(&self.field, x, &(*v * t))
+                .map_err(|error| error.on_part(0.0, t))?;
             (here, velocity * t.recip())
         } else {
             (x.clone(), *v)
         };
-        let bend = geodesic::acceleration(&self.field, &here, &velocity)
-            .ok_or(MetricError::Lost { time: t })?;
+        let bend = geodesic::acceleration(&self.field, &here, &velocity).ok_or_else(|| {
+            let g = geodesic::metric(&self.field, &ChartPoint::<M>::centre(&here));
+            MetricError::stopped(t, &g).unwrap_or(MetricError::Edge { time: t })
+        })?;
         let jet =
             Vector::<M, Real>::from_index(|i| Real::new(0.0, velocity[i], velocity[i], bend[i]));
         Ok(M::chart(&here, &jet))
@@ -92,8 +96,8 @@ impl<M: Manifold, F: MatrixField<M>> Riemannian<M> for FieldMetric<F> {
             dpoint: Matrix::<M>::zeros(),
             dvelocity: Matrix::<M>::one() * 0.5,
         };
-        let z = geodesic::follow_jet(&self.field, &half)?;
-        let end = geodesic::follow_jet(&self.field, &z)?;
+        let z = geodesic::follow_jet(&self.field, &half).map_err(on_first_half)?;
+        let end = geodesic::follow_jet(&self.field, &z).map_err(on_second_half)?;
         // The arc itself is the one without derivatives, with its roundings.
         let arc = self.weyl_arc(x, d)?;
         Ok(ArcJet {
@@ -109,6 +113,14 @@ impl<M: Manifold, F: MatrixField<M>> Riemannian<M> for FieldMetric<F> {
     fn slopes(&self, x: &M::Point<f64>) -> Option<<M::Dim as Dimension>::Array<Matrix<M>>> {
         Some(self.field.covariant_jet(x).slopes)
     }
+}
+
+fn on_first_half(error: MetricError) -> MetricError {
+    error.on_part(0.0, 0.5)
+}
+
+fn on_second_half(error: MetricError) -> MetricError {
+    error.on_part(0.5, 0.5)
 }
 
 /// Geodesics that a logarithm may follow.
@@ -399,12 +411,39 @@ mod tests {
     }
 
     #[test]
-    fn a_geodesic_that_leaves_the_chart_is_an_error_with_the_time() {
-        // The edge x = 1 of the slit metric is at a finite distance, and there is nothing beyond it.
+    fn a_geodesic_that_is_lost_says_where_and_why() {
+        let (x, v) = (vector![0.0, 0.0], vector![3.0, 0.0]);
+        // The edge x = 1 of the slit metric is at a finite distance, and there is nothing beyond it:
+        // with x' = 3 (1 − x)^(−1/4) it is reached at t = 4/15.
         let slit =
             Metric::field(|q: &Vector2<Real>| Matrix2::from_diagonal_element((-q.x + 1.0).sqrt()));
-        let error = Riemannian::<Euclidean<2>>::end(&slit, &vector![0.0, 0.0], &vector![3.0, 0.0]);
-        assert!(matches!(error, Err(MetricError::Lost { time }) if time > 0.1 && time < 1.0));
+        let reached = |t: f64| (t - 4.0 / 15.0).abs() < 1e-4;
+        let error = Riemannian::<Euclidean<2>>::end(&slit, &x, &v).unwrap_err();
+        assert!(matches!(error, MetricError::Edge { time } if reached(time)), "{error}");
+        // In the first and in the second half of an arc, and on the way to an inner point.
+        let error = Riemannian::<Euclidean<2>>::weyl_jet(&slit, &x, &v).unwrap_err();
+        assert!(matches!(error, MetricError::Edge { time } if reached(time)), "{error}");
+        let error = Riemannian::<Euclidean<2>>::weyl_arc(&slit, &x, &(v / 3.0)).unwrap_err();
+        assert!(matches!(error, MetricError::Edge { time } if reached(time / 3.0)), "{error}");
+        let error = Riemannian::<Euclidean<2>>::along(&slit, &x, &v, 0.5).unwrap_err();
+        assert!(matches!(error, MetricError::Edge { time } if reached(time)), "{error}");
+        let centre = ChartPoint::centre(&x);
+        let error = Riemannian::<Euclidean<2>>::exp(&slit, &centre, &v).unwrap_err();
+        assert!(matches!(error, MetricError::Edge { time } if reached(time)), "{error}");
+        // Here it is there, and negative: x' = 3 (1 − x)^(−1/2) comes to x = 1 at t = 2/9.
+        let fold = Metric::field(|q: &Vector2<Real>| {
+            Matrix2::from_diagonal(&vector![-q.x + 1.0, 1.0.into()])
+        });
+        let error = Riemannian::<Euclidean<2>>::end(&fold, &x, &v).unwrap_err();
+        let MetricError::Degenerate { time, not_positive } = error else { panic!("{error}") };
+        assert!((time - 2.0 / 9.0).abs() < 1e-4, "{error}");
+        assert!(not_positive.index == 0 && not_positive.pivot <= 0.0, "{error}");
+        // A metric with a wave of length 10⁻⁵ is positive everywhere, and too uneven for a long way.
+        let rough = Metric::field(|q: &Vector2<Real>| {
+            Matrix2::from_diagonal_element((q.x * 6e5).sin() * 0.9 + 1.0)
+        });
+        let error = Riemannian::<Euclidean<2>>::end(&rough, &x, &v).unwrap_err();
+        assert!(matches!(error, MetricError::Uneven { time, pieces } if time < 1.0 && pieces > 1));
     }
 
     #[test]

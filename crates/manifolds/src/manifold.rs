@@ -128,6 +128,9 @@ pub enum PointError {
         /// How many a point has.
         expected: usize,
     },
+    /// All entries are zero, where only their direction counts.
+    #[error("all entries are zero, which have no direction")]
+    NoDirection,
     /// The point is not in the domain of the chart.
     #[error("the point is outside the domain of its chart; start inside")]
     OutsideChart,

@@ -421,14 +421,36 @@ pub enum MetricError {
     /// Not positive definite.
     #[error("the metric is {0}")]
     NotPositive(#[from] NotPositive),
-    /// A geodesic was lost on its way.
+    /// A geodesic runs out of the chart: the metric beyond is not a number.
     #[error(
-        "the geodesic cannot be followed beyond {time:.3} of its way: it runs into the edge of the \
-         chart, or the metric is not positive there; take a smaller step"
+        "the geodesic runs into the edge of the chart at {time:.3} of its way, where the metric is not a \
+         finite number; take a smaller step, or a metric in which the edge is far"
     )]
-    Lost {
+    Edge {
         /// The share of the way that was followed.
         time: f64,
+    },
+    /// A geodesic comes to a place where its metric is not positive.
+    #[error(
+        "at {time:.3} of the way of a geodesic the metric is {not_positive}; take a smaller step, or \
+         leave the place out of the domain"
+    )]
+    Degenerate {
+        /// The share of the way that was followed.
+        time: f64,
+        /// The pivot.
+        not_positive: NotPositive,
+    },
+    /// A geodesic through a metric that varies too much along it.
+    #[error(
+        "the geodesic was followed for {time:.3} of its way in {pieces} pieces, and the metric is too \
+         uneven to go on; take a smaller step, and look for what is not smooth in the metric"
+    )]
+    Uneven {
+        /// The share of the way that was followed.
+        time: f64,
+        /// The pieces that were tried.
+        pieces: usize,
     },
     /// No geodesic was found between two points.
     #[error(
@@ -456,6 +478,26 @@ pub enum MetricError {
 }
 
 impl MetricError {
+    /// The error of a geodesic that stops at `time`, if it is the matrix `g` there that stops it.
+    pub(crate) fn stopped<D: Scalar>(time: f64, g: &impl Square<D>) -> Option<Self> {
+        let not_positive = g.cholesky().err()?;
+        let edge = !not_positive.pivot.is_finite();
+        Some(if edge { Self::Edge { time } } else { Self::Degenerate { time, not_positive } })
+    }
+
+    /// The error on a part of a way that begins at `start` and has the length `share`.
+    pub(crate) fn on_part(self, start: f64, share: f64) -> Self {
+        let whole = |time| start + share * time;
+        match self {
+            Self::Edge { time } => Self::Edge { time: whole(time) },
+            Self::Degenerate { time, not_positive } => {
+                Self::Degenerate { time: whole(time), not_positive }
+            }
+            Self::Uneven { time, pieces } => Self::Uneven { time: whole(time), pieces },
+            other => other,
+        }
+    }
+
     /// The error of a point that is at the edge of its chart.
     #[cold]
     pub fn out_of_chart<M: Space, D: Scalar>(x: &ChartPoint<M, D>) -> Self {

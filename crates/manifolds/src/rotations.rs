@@ -47,7 +47,7 @@ use rand::{Rng, RngExt};
 use crate::metric::{GeodesicEnd, MetricError, finite, finite_column, within};
 use crate::normal::Normal;
 use crate::sphere::along;
-use crate::{Arc, ArcJet, Canonical, Manifold, Riemannian};
+use crate::{Arc, ArcJet, Canonical, Manifold, PointError, Riemannian};
 
 /// The rotation group `SO(3)`: 3 × 3 rotation matrices, with tangent vectors in the body frame and the
 /// bi-invariant metric as the canonical one; see the [module](mod@crate::rotations).
@@ -137,6 +137,11 @@ fn quaternion<D: Scalar>(r: &Matrix3<D>) -> [D; 4] {
         _ => [skew[2], xz, yz, largest],
     };
     if q[0].re() < 0.0 { q.map(|entry| -entry) } else { q }
+}
+
+/// The rotation of a quaternion `(w, x, y, z)` that is not too short to be divided by its norm.
+fn turn([w, x, y, z]: [f64; 4]) -> Matrix3<f64> {
+    UnitQuaternion::new_normalize(Quaternion::new(w, x, y, z)).to_rotation_matrix().into_inner()
 }
 
 /// The left-trivialised derivative of the exponential: `exp(q̂)ᵀ d exp(q̂) = hat(dexp(q) dq)`,
@@ -319,7 +324,7 @@ impl Manifold for Rotations {
             let q = Vector4::<f64>::from_fn(|_, _| rng.random_range(-1.0..1.0));
             let square = q.norm_squared();
             if square > 1e-6 && square <= 1.0 {
-                return self.from_quaternion([q.x, q.y, q.z, q.w]);
+                return turn(q.into());
             }
         }
     }
@@ -327,10 +332,30 @@ impl Manifold for Rotations {
 
 impl Rotations {
     /// The rotation of a quaternion `[w, x, y, z]`, which need not have norm 1.
-    #[must_use]
-    pub fn from_quaternion(&self, [w, x, y, z]: [f64; 4]) -> Matrix3<f64> {
-        let unit = UnitQuaternion::new_normalize(Quaternion::new(w, x, y, z));
-        unit.to_rotation_matrix().into_inner()
+    ///
+    /// ```
+    /// use metriplectic_manifolds::{PointError, Rotations};
+    /// let quarter = Rotations.from_quaternion([1.0, 0.0, 0.0, 1.0])?;
+    /// assert!((quarter.m21 - 1.0).abs() < 1e-15);
+    /// assert_eq!(Rotations.from_quaternion([0.0; 4]), Err(PointError::NoDirection));
+    /// # Ok::<(), PointError>(())
+    /// ```
+    ///
+    /// # Errors
+    ///
+    /// [`PointError::NotFinite`] with the first bad entry, and [`PointError::NoDirection`] if all are
+    /// zero.
+    pub fn from_quaternion(&self, q: [f64; 4]) -> Result<Matrix3<f64>, PointError> {
+        if let Some(index) = q.iter().position(|entry| !entry.is_finite()) {
+            return Err(PointError::NotFinite { index, value: q[index] });
+        }
+        let largest = Vector4::from(q).amax();
+        if largest > 0.0 {
+            // So that no square overflows or vanishes.
+            Ok(turn(q.map(|entry| entry / largest)))
+        } else {
+            Err(PointError::NoDirection)
+        }
     }
 
     /// The unit quaternion `[w, x, y, z]`, `w ≥ 0`, of a rotation.
@@ -546,6 +571,20 @@ mod tests {
     }
 
     #[test]
+    fn quaternions_without_a_direction_are_refused() {
+        assert_eq!(Rotations.from_quaternion([0.0; 4]), Err(PointError::NoDirection));
+        for bad in [f64::NAN, f64::INFINITY] {
+            let error = Rotations.from_quaternion([1.0, bad, 0.0, 0.0]).unwrap_err();
+            assert!(matches!(error, PointError::NotFinite { index: 1, .. }), "{error}");
+        }
+        let half = Rotations.from_quaternion([0.0, 0.0, 1.0, 1.0]).unwrap();
+        for size in [1e-320, 1e-200, 1e200, 1e308] {
+            let r = Rotations.from_quaternion([0.0, 0.0, size, size]).unwrap();
+            assert!((r - half).amax() < 1e-15, "{size}: {r}");
+        }
+    }
+
+    #[test]
     fn what_is_not_finite_is_off_the_group_and_stays_so() {
         for bad in [f64::NAN, f64::INFINITY] {
             for (i, j) in [(0, 0), (2, 1)] {
@@ -570,9 +609,9 @@ mod tests {
             // Each component has its turn as the pivot, with either sign.
             q[largest] = 1_f64.copysign(q[largest]);
             let q: Vector4<f64> = Vector4::from(q).normalize();
-            let r = Rotations.from_quaternion((q * scale).into());
+            let r = Rotations.from_quaternion((q * scale).into()).unwrap();
             prop_assert!(Rotations.defect(&r) < 1e-15);
-            prop_assert!((r - Rotations.from_quaternion((-q).into())).amax() < 1e-15);
+            prop_assert!((r - Rotations.from_quaternion((-q).into()).unwrap()).amax() < 1e-15);
             let v = vector![q[1], q[2], q[3]];
             let turned = v * (2.0 * v.dot(&Vector3::x()))
                 + Vector3::x() * (q[0] * q[0] - v.norm_squared())

@@ -27,13 +27,14 @@
 //! ```
 //!
 //! by extrapolation (Hairer, Nørsett and Wanner 1993, §II.9), with an estimated error of 10⁻¹³ in each
-//! piece. On the half plane, for lengths to 3/2, half of the ends were measured within 2·10⁻¹⁴ of the
-//! closed form and all within 1.5·10⁻¹².
+//! piece. On the half plane, of 4000 geodesics of lengths to 3/2 from heights of ½ to 2, half of the ends
+//! were measured within 2·10⁻¹⁵ of the closed form and all within 2·10⁻¹³.
 //!
 //! - **Exponential and logarithm**: `exp_x(v) = γ(1)` for the geodesic with `γ(0) = x` and `γ'(0) = v`, and
 //!   `log_x(y)` is a `v` with `exp_x(v) = y`. It is found by shooting, Newton's method for `v` with the
 //!   derivative of the end from the equations of variation, aimed along the straight line; it is *a*
-//!   geodesic, and the shortest one for points that are near.
+//!   geodesic, and the shortest one for points that are near. The logarithms of the same 4000 ends were
+//!   all found, within 10⁻¹³.
 //! - **Domain**: asked of the points of a run, not of the way between two of them. A geodesic knows the
 //!   matrix `g` and no more: one that passes a hole of the domain where `g` is defined and positive
 //!   goes on, and a logarithm may lead through it. Write a hole that matters into the metric, as `1/y²`

@@ -82,9 +82,9 @@ impl<M: Manifold, F: MatrixField<M>> Riemannian<M> for FieldMetric<F> {
         Ok(M::chart(&here, &jet))
     }
 
-    /// *A* geodesic, since the cut locus of a closure is not known, by [shooting](mod@crate::field_metric).
-    /// Points that the chart at the other one does not reach are refused
-    /// ([`MetricError::OutOfChart`]): antipodes, and rotations half a turn apart.
+    /// By shooting: *a* geodesic, since the cut locus of a closure is not known. A point that the chart
+    /// at the other one does not reach is refused ([`MetricError::OutOfChart`]): the antipode, and a
+    /// rotation half a turn away.
     fn log(&self, x: &M::Point<f64>, y: &M::Point<f64>) -> Result<Vector<M>, MetricError> {
         shoot(self, x, y)
     }

@@ -143,11 +143,12 @@ mod tests {
             assert!(HalfLine.check(&Vector1::new(off)).is_err());
             assert!(HalfLine.check(&HalfLine.project(&Vector1::new(off))).is_ok());
         }
-        assert_eq!(HalfLine.defect(&Vector1::new(-3.0)), 3.0);
-        assert_eq!(HalfLine.defect(&Vector1::new(0.0)), f64::MIN_POSITIVE);
+        let defect = |s| Vector1::new(HalfLine.defect(&Vector1::new(s)));
+        assert_eq!(defect(-3.0), Vector1::new(3.0));
+        assert_eq!(defect(0.0), Vector1::new(f64::MIN_POSITIVE));
         for on in [5e-324, 1.0, f64::MAX] {
-            assert_eq!(HalfLine.project(&Vector1::new(on)).x, on);
-            assert_eq!(HalfLine.defect(&Vector1::new(on)), 0.0);
+            assert_eq!(HalfLine.project(&Vector1::new(on)), Vector1::new(on));
+            assert_eq!(defect(on), Vector1::new(0.0));
         }
     }
 

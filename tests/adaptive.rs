@@ -333,7 +333,8 @@ where
         .second_law(law)
         .build()
         .expect("the parts make a system");
-    let start = Rotations::bi_invariant().from_quaternion([0.8, 0.3, -0.4, 0.33]);
+    let start =
+        Rotations::bi_invariant().from_quaternion([0.8, 0.3, -0.4, 0.33]).expect("it is one");
     let run = scheme.run(&system, start, Span::until(0.3).tolerance(tolerance)).expect("it runs");
     (run.last().point, run.certificate().clone())
 }

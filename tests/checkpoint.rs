@@ -102,7 +102,7 @@ fn a_resumed_run_is_the_run() {
     resumes_both(
         "SO(3)",
         &group,
-        Rotations::bi_invariant().from_quaternion([0.8, 0.3, -0.4, 0.33]),
+        Rotations::bi_invariant().from_quaternion([0.8, 0.3, -0.4, 0.33]).unwrap(),
     );
     resumes_both("S² × R", &spin(), SPIN);
 }

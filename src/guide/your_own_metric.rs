@@ -72,7 +72,7 @@
 //! // What goes wrong has a name. √(1 − x) ends at x = 1, a finite way from here.
 //! let slit = Metric::field(|q: &Vector2<Real>| Matrix2::from_diagonal_element((-q.x + 1.0).sqrt()));
 //! let lost = Riemannian::<Chart<2>>::end(&slit, &Vector2::zeros(), &Vector2::new(3.0, 0.0));
-//! assert!(matches!(lost, Err(MetricError::Lost { time }) if time < 1.0));
+//! assert!(matches!(lost, Err(MetricError::Edge { time }) if time < 1.0));
 //! let beyond = Riemannian::<Sphere<2>>::end(&Canonical, &x, &Vector2::new(3.5, 0.0));
 //! assert!(matches!(beyond, Err(MetricError::CutLocus { .. })));
 //! let indefinite = Metric::constant(Matrix2::new(1.0, 2.0, 2.0, 1.0));
@@ -112,9 +112,10 @@
 //!
 //! | | what happens | what helps |
 //! |---|---|---|
-//! | the edge of a chart is at a finite distance | [`MetricError::Lost`](crate::manifolds::MetricError), with the share of the way; a run halves the step, and ends in an error that has the trajectory so far | a smaller step; coordinates or a metric in which the edge is far, as `ds²/s²` on R₊ |
-//! | `A` is not positive somewhere | [`NotPositive`](crate::manifolds::MetricError::NotPositive) with the pivot | the domain of the [`Chart`](crate::manifolds::Chart) |
-//! | a step beyond the cut locus, where geodesics stop being shortest | [`CutLocus`](crate::manifolds::MetricError::CutLocus) for canonical metrics; with a closure the cut locus is not known, and the logarithm is *a* geodesic | a smaller step |
+//! | the edge of a chart is at a finite distance | [`MetricError::Edge`](crate::manifolds::MetricError::Edge), with the share of the way; a run halves the step, and ends in an error that has the trajectory so far | a smaller step; coordinates or a metric in which the edge is far, as `ds²/s²` on R₊ |
+//! | `A` is not positive somewhere | [`NotPositive`](crate::manifolds::MetricError::NotPositive) with the pivot, on the way of a geodesic [`Degenerate`](crate::manifolds::MetricError::Degenerate) | the domain of the [`Chart`](crate::manifolds::Chart) |
+//! | a step beyond the cut locus, where geodesics stop being shortest | [`CutLocus`](crate::manifolds::MetricError::CutLocus) for canonical metrics; with a closure the cut locus is not known, and the logarithm is *a* geodesic, up to where the chart ends: antipodes and half turns are [`OutOfChart`](crate::manifolds::MetricError::OutOfChart) | a smaller step |
 //! | two points far apart | [`NoLogarithm`](crate::manifolds::MetricError::NoLogarithm), with the miss; steps need no logarithm | points closer together |
+//! | a metric with waves shorter than a thousandth of a step | [`Uneven`](crate::manifolds::MetricError::Uneven), with the pieces | a smaller step |
 //! | `sqrt`, `norm` at zero | derivatives that are not numbers: the run refuses to start | `norm_squared`, even powers |
 //! | friction too strong or weak | `K` is of second order in `A⁻¹`, and [`Nambu`](crate::dynamics::Nambu) and [`AreaForm`](type@crate::dynamics::AreaForm) have `1/√det g` | scale `A`, or the factor of the bracket |

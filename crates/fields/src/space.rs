@@ -115,8 +115,9 @@ pub trait Space: Clone + Debug + PartialEq + Send + Sync + 'static {
         Some(Matrix::<Self, D>::from_entries(|i, j| dual[i].dot(&image[j])))
     }
 
-    /// Whether the point with coordinates `q` is well inside the chart; always, for a chart of the
-    /// whole space. Curves that are followed over long distances change to another chart in time.
+    /// Whether the point with coordinates `q` is well inside the chart, less than half the way to its
+    /// edge; always, for a chart of the whole space. Curves that are followed over long distances
+    /// change to another chart in time, and a logarithm is not looked for beyond twice as far.
     #[inline]
     fn is_near(_q: &Vector<Self>) -> bool {
         true

@@ -389,7 +389,7 @@ mod tests {
             .entropy(|r: &Matrix3<Real>| r.m13 - r.m21 * 0.5 + (r.m31 + r.m32).powi(2) * 0.25)
             .build()
             .unwrap();
-        let turned = Rotations::bi_invariant().from_quaternion([0.8, 0.3, -0.4, 0.33]);
+        let turned = Rotations::bi_invariant().from_quaternion([0.8, 0.3, -0.4, 0.33]).unwrap();
         let steps = [0.1, 0.05, 0.025];
         for (name, off) in [
             ("S²", steps.map(|h| off(WeylMidpoint, &top, &start, h))),

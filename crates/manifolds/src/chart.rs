@@ -7,10 +7,38 @@
 //!   `{ x : domain(x) }`.
 //! - **Frame**: `∂/∂xⁱ`.
 //! - **Chart**: `φ_x(q) = x + q`.
-//! - **Geodesics**: of the dot product and of constant matrices, straight lines. A metric
-//!   [from a closure](crate::Metric::field) has the geodesics of its matrix `g(x)`, integrated with an
-//!   estimated error of 10⁻¹³ in each piece; on the half plane, for lengths to 3/2, half of their ends
-//!   are within 2·10⁻¹⁴ of the closed form and all within 1.5·10⁻¹². Logarithms are found by shooting.
+//! - **Geodesics** of the dot product and of constant matrices are straight lines. Those of a metric
+//!   `g(x)` [from a closure](crate::Metric::field) are straight in its own terms, with the Christoffel
+//!   symbols in the place of forces (do Carmo 1992, ch. 3; Lee 2018, ch. 4 and 5),
+//!
+//! ```math
+//! \ddot x^k + \Gamma^k_{ij}\, \dot x^i \dot x^j = 0, \qquad
+//! \Gamma^k_{ij} = \tfrac12\, g^{kl} (\partial_i g_{lj} + \partial_j g_{li} - \partial_l g_{ij}) .
+//! ```
+//!
+//! They are the motions of a free particle with the energy `½ pᵀg⁻¹p`. That is how they are computed, by
+//! the Hamiltonian equations (Hairer, Lubich and Wanner 2006, §VI.1), which ask only for first derivatives
+//! of `g`,
+//!
+//! ```math
+//! \dot x = g^{-1} p, \qquad
+//! \dot p_k = -\tfrac12\, p^T \partial_k (g^{-1})\, p = \tfrac12\, \dot x^T (\partial_k g)\, \dot x,
+//! \qquad p = g\, \dot x ,
+//! ```
+//!
+//! by extrapolation (Hairer, Nørsett and Wanner 1993, §II.9), with an estimated error of 10⁻¹³ in each
+//! piece. On the half plane, of 4000 geodesics of lengths to 3/2 from heights of ½ to 2, half of the ends
+//! were measured within 2·10⁻¹⁵ of the closed form and all within 2·10⁻¹³.
+//!
+//! - **Exponential and logarithm**: `exp_x(v) = γ(1)` for the geodesic with `γ(0) = x` and `γ'(0) = v`, and
+//!   `log_x(y)` is a `v` with `exp_x(v) = y`. It is found by shooting, Newton's method for `v` with the
+//!   derivative of the end from the equations of variation, aimed along the straight line; it is *a*
+//!   geodesic, and the shortest one for points that are near. The logarithms of the same 4000 ends were
+//!   all found, within 10⁻¹³.
+//! - **Domain**: asked of the points of a run, not of the way between two of them. A geodesic knows the
+//!   matrix `g` and no more: one that passes a hole of the domain where `g` is defined and positive
+//!   goes on, and a logarithm may lead through it. Write a hole that matters into the metric, as `1/y²`
+//!   writes the edge of the half plane.
 //! - **Brackets**: none unless one is asked for. With `√g` the density of the metric, `AreaForm` on a
 //!   2-chart and `Nambu` on a 3-chart,
 //!
@@ -101,7 +129,11 @@ impl<const N: usize> Space for Chart<N> {
 impl<const N: usize> Manifold for Chart<N> {
     /// 0 inside the domain and infinite outside: how far off is not known.
     fn defect(&self, x: &SVector<f64, N>) -> f64 {
-        if (self.domain)(x) { 0.0 } else { f64::INFINITY }
+        match x.is_finite() {
+            true if (self.domain)(x) => 0.0,
+            true => f64::INFINITY,
+            false => f64::NAN,
+        }
     }
 
     fn entries(x: &SVector<f64, N>) -> Vec<f64> {
@@ -122,16 +154,19 @@ impl<const N: usize> Manifold for Chart<N> {
         *x
     }
 
-    /// A point of the domain with entries in `−1 … 1`, or beyond if there is none to be found.
+    /// A point of the domain, by rejection: with entries in `−1 … 1`, or if a thousand of them are all
+    /// outside, in `−2 … 2`, and so on. A domain that is not met within `±10⁶` is too thin, and the
+    /// entries are not numbers, which [`check`](Manifold::check) finds.
     fn random(&self, rng: &mut impl Rng) -> SVector<f64, N> {
-        let mut reach = 1.0;
-        loop {
-            let x = Column::from_index(|_| rng.random_range(-reach..reach));
-            if (self.domain)(&x) || reach > 1e6 {
-                return x;
+        for reach in (0..=20).map(|k| 2_f64.powi(k)) {
+            for _ in 0..1000 {
+                let x = Column::from_index(|_| rng.random_range(-reach..reach));
+                if (self.domain)(&x) {
+                    return x;
+                }
             }
-            reach *= 1.01;
         }
+        SVector::repeat(f64::NAN)
     }
 
     fn check(&self, x: &SVector<f64, N>) -> Result<(), PointError> {
@@ -147,7 +182,7 @@ impl<const N: usize> Flat for Chart<N> {}
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Canonical, Exponential, Metric, WeylMidpoint, laws};
+    use crate::{Canonical, Exponential, Metric, Riemannian, WeylMidpoint, laws};
     use metriplectic_fields::Real;
     use nalgebra::{Matrix2, Vector2, vector};
     use num_dual::DualNum;
@@ -181,5 +216,33 @@ mod tests {
         let error = chart.check(&vector![f64::NAN, 1.0]).unwrap_err();
         assert!(matches!(error, PointError::NotFinite { index: 0, .. }));
         assert_eq!(chart.check(&vector![0.0, -1.0]), Err(PointError::OutsideChart));
+        // A domain that is not told of NaN.
+        let everything = Chart::<2>::new(|_| true);
+        assert!(everything.defect(&vector![f64::NAN, 1.0]).is_nan());
+        assert!(everything.defect(&vector![f64::INFINITY, 1.0]).is_nan());
+    }
+
+    #[test]
+    fn random_points_are_inside_the_domain_or_are_no_points() {
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        let ring = Chart::<2>::new(|q| (40.0..41.0).contains(&q.norm()));
+        let corner = Chart::<2>::new(|q| q.min() > 0.97);
+        for _ in 0..100 {
+            assert_eq!(ring.check(&ring.random(&mut rng)), Ok(()));
+            assert_eq!(corner.check(&corner.random(&mut rng)), Ok(()));
+        }
+        let nowhere = Chart::<2>::new(|_| false);
+        let error = nowhere.check(&nowhere.random(&mut rng)).unwrap_err();
+        assert!(matches!(error, PointError::NotFinite { .. }), "{error}");
+    }
+
+    #[test]
+    fn only_the_ends_of_a_geodesic_are_asked_for_the_domain() {
+        // The disc is cut out of the domain, and the straight line goes through it all the same.
+        let plane = Chart::<2>::new(|q| q.norm() > 0.5);
+        let (x, y) = (vector![-1.0, 0.0], vector![1.0, 0.0]);
+        let line = Riemannian::<Chart<2>>::log(&Canonical, &x, &y).unwrap();
+        assert_eq!(line, vector![2.0, 0.0]);
+        assert_eq!(plane.check(&(x + line * 0.5)), Err(PointError::OutsideChart));
     }
 }

@@ -8,7 +8,7 @@ use metriplectic_fields::{
 };
 
 use crate::geodesic::{self, GeodesicJet};
-use crate::metric::{Factored, GeodesicEnd, MetricError};
+use crate::metric::{Factored, GeodesicEnd, MetricError, finite};
 use crate::{Arc, ArcJet, Manifold, Riemannian};
 
 /// A metric given as a matrix field; see [`Metric::field`](crate::Metric::field).
@@ -54,8 +54,9 @@ impl<M: Manifold, F: MatrixField<M>> Riemannian<M> for FieldMetric<F> {
     }
 
     fn weyl_arc(&self, x: &M::Point<f64>, d: &Vector<M>) -> Result<Arc<M>, MetricError> {
-        let (z, velocity) = geodesic::follow_real(&self.field, x, &(*d * 0.5))?;
-        let (end, _) = geodesic::follow_real(&self.field, &z, &velocity)?;
+        let (z, velocity) =
+            geodesic::follow_real(&self.field, x, &(*d * 0.5)).map_err(on_first_half)?;
+        let (end, _) = geodesic::follow_real(&self.field, &z, &velocity).map_err(on_second_half)?;
         Ok(Arc { z: ChartPoint::centre(&z), d: velocity * 2.0, end })
     }
 
@@ -66,18 +67,24 @@ impl<M: Manifold, F: MatrixField<M>> Riemannian<M> for FieldMetric<F> {
         t: f64,
     ) -> Result<M::Point<Real>, MetricError> {
         let (here, velocity) = if t > 0.0 {
-            let (here, velocity) = geodesic::follow_real(&self.field, x, &(*v * t))?;
+            let (here, velocity) = geodesic::follow_real(&self.field, x, &(*v * t))
+                .map_err(|error| error.on_part(0.0, t))?;
             (here, velocity * t.recip())
         } else {
             (x.clone(), *v)
         };
-        let bend = geodesic::acceleration(&self.field, &here, &velocity)
-            .ok_or(MetricError::Lost { time: t })?;
+        let bend = geodesic::acceleration(&self.field, &here, &velocity).ok_or_else(|| {
+            let g = geodesic::metric(&self.field, &ChartPoint::<M>::centre(&here));
+            MetricError::stopped(t, &g).unwrap_or(MetricError::Edge { time: t })
+        })?;
         let jet =
             Vector::<M, Real>::from_index(|i| Real::new(0.0, velocity[i], velocity[i], bend[i]));
         Ok(M::chart(&here, &jet))
     }
 
+    /// By shooting: *a* geodesic, since the cut locus of a closure is not known. A point that the chart
+    /// at the other one does not reach is refused ([`MetricError::OutOfChart`]): the antipode, and a
+    /// rotation half a turn away.
     fn log(&self, x: &M::Point<f64>, y: &M::Point<f64>) -> Result<Vector<M>, MetricError> {
         shoot(self, x, y)
     }
@@ -89,8 +96,8 @@ impl<M: Manifold, F: MatrixField<M>> Riemannian<M> for FieldMetric<F> {
             dpoint: Matrix::<M>::zeros(),
             dvelocity: Matrix::<M>::one() * 0.5,
         };
-        let z = geodesic::follow_jet(&self.field, &half)?;
-        let end = geodesic::follow_jet(&self.field, &z)?;
+        let z = geodesic::follow_jet(&self.field, &half).map_err(on_first_half)?;
+        let end = geodesic::follow_jet(&self.field, &z).map_err(on_second_half)?;
         // The arc itself is the one without derivatives, with its roundings.
         let arc = self.weyl_arc(x, d)?;
         Ok(ArcJet {
@@ -106,6 +113,14 @@ impl<M: Manifold, F: MatrixField<M>> Riemannian<M> for FieldMetric<F> {
     fn slopes(&self, x: &M::Point<f64>) -> Option<<M::Dim as Dimension>::Array<Matrix<M>>> {
         Some(self.field.covariant_jet(x).slopes)
     }
+}
+
+fn on_first_half(error: MetricError) -> MetricError {
+    error.on_part(0.0, 0.5)
+}
+
+fn on_second_half(error: MetricError) -> MetricError {
+    error.on_part(0.5, 0.5)
 }
 
 /// Geodesics that a logarithm may follow.
@@ -127,9 +142,9 @@ fn shoot<M: Manifold, F: MatrixField<M>>(
     y: &M::Point<f64>,
 ) -> Result<Vector<M>, MetricError> {
     let shots = Cell::new(0);
-    let straight = M::coordinates(x, y);
-    let line = straight * stretch(metric, x, &straight);
-    let mut last = hit(metric, (x, y), &line, EAGER, &shots);
+    let straight = line::<M>(x, y)?;
+    let aim = straight * stretch(metric, x, &straight);
+    let mut last = hit(metric, (x, y), &aim, EAGER, &shots);
     #[cfg(feature = "argmin")]
     if last.is_err()
         && let Some(aim) = crate::path::aim(&metric.field, x, &straight)
@@ -149,6 +164,26 @@ fn shoot<M: Manifold, F: MatrixField<M>>(
         });
     }
     last
+}
+
+/// The straight line of the chart from `x` to `y`, if there is one and no other.
+///
+/// # Errors
+///
+/// [`MetricError::NotFinite`] if a point is not, and [`MetricError::OutOfChart`] at the edge of the
+/// chart, of which [`is_near`](Space::is_near) accepts the half: beyond it a line of other coordinates
+/// leads to the same point, as at half a turn on SO(3), and aims at another geodesic.
+fn line<M: Manifold>(x: &M::Point<f64>, y: &M::Point<f64>) -> Result<Vector<M>, MetricError> {
+    for entry in M::entries(x).into_iter().chain(M::entries(y)) {
+        finite("an entry of a point", entry)?;
+    }
+    let straight = M::coordinates(x, y);
+    // Half of it, and the rounding of half a turn.
+    if straight.is_finite() && M::is_near(&(straight * (0.5 + f64::EPSILON))) {
+        Ok(straight)
+    } else {
+        Err(MetricError::OutOfChart { distance: straight.magnitude() })
+    }
 }
 
 /// The length of the straight line of the chart, over that of its velocity at the start: where the
@@ -211,11 +246,15 @@ fn hit<M: Space, G: Riemannian<M>>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Euclidean, InnerProduct, LieDual, Metric};
+    use crate::{
+        Canonical, Cayley, Euclidean, InnerProduct, LieDual, Metric, Projection, Retraction,
+        Rotations, Sphere, rotations,
+    };
     use nalgebra::{Matrix2, Matrix3, Vector2, Vector3, vector};
     use num_dual::DualNum;
     use rand::rngs::ChaCha8Rng;
     use rand::{RngExt, SeedableRng};
+    use std::f64::consts::PI;
 
     /// The upper half plane with curvature −1.
     fn half_plane() -> FieldMetric<impl Fn(&Vector2<Real>) -> Matrix2<Real>> {
@@ -264,13 +303,147 @@ mod tests {
         assert!((distance - exact).abs() < 1e-12);
     }
 
+    /// A metric with all its entries, none of them constant.
+    fn skewed<D: Scalar>(q: &Vector3<D>) -> Matrix3<D> {
+        let wave = Vector3::new(q.y.sin(), q.z.cos(), q.x * 0.5);
+        let other = Vector3::new(q.x * q.z, -q.y, q.z.exp() * 0.3);
+        Matrix3::identity() + wave * wave.transpose() + other * other.transpose() * D::from(0.2)
+    }
+
+    /// `Γᵏ_ij` from the matrix alone, by differences of order four.
+    fn christoffel_by_differences(x: &Vector3<f64>) -> [Matrix3<f64>; 3] {
+        let h = 1e-3;
+        let slopes = [0, 1, 2].map(|k| {
+            let at = |t: f64| skewed(&(x + Vector3::ith(k, t * h)));
+            ((at(1.0) - at(-1.0)) * 8.0 - (at(2.0) - at(-2.0))) / (12.0 * h)
+        });
+        let inverse = skewed(x).try_inverse().unwrap();
+        [0, 1, 2].map(|k| {
+            Matrix3::from_fn(|i, j| {
+                let first_kind =
+                    |l: usize| slopes[i][(l, j)] + slopes[j][(l, i)] - slopes[l][(i, j)];
+                (0..3).map(|l| 0.5 * inverse[(k, l)] * first_kind(l)).sum()
+            })
+        })
+    }
+
     #[test]
-    fn a_geodesic_that_leaves_the_chart_is_an_error_with_the_time() {
-        // The edge x = 1 of the slit metric is at a finite distance, and there is nothing beyond it.
+    fn christoffel_symbols_are_those_of_differences_of_the_metric() {
+        let g = Metric::field(|q: &Vector3<Real>| skewed(q));
+        let mut rng = ChaCha8Rng::seed_from_u64(5);
+        for _ in 0..50 {
+            let x = Vector3::from_fn(|_, _| rng.random_range(-1.0..1.0));
+            let symbols = Riemannian::<Euclidean<3>>::christoffel(&g, &x).unwrap();
+            for (exact, differences) in symbols.iter().zip(christoffel_by_differences(&x)) {
+                assert_eq!(*exact, exact.transpose());
+                assert!((exact - differences).amax() < 1e-10, "{exact} or {differences}");
+            }
+        }
+    }
+
+    #[test]
+    fn geodesics_solve_their_equation() {
+        let g = Metric::field(|q: &Vector3<Real>| skewed(q));
+        let mut rng = ChaCha8Rng::seed_from_u64(6);
+        for _ in 0..20 {
+            let mut column = || Vector3::from_fn(|_, _| rng.random_range(-0.7..0.7));
+            let (x, v) = (column(), column());
+            let at = |t: f64| Riemannian::<Euclidean<3>>::end(&g, &x, &(v * t)).unwrap();
+            // Differences of order four of points on the way.
+            let (t, h) = (0.6, 2e-2);
+            let [a, b, c, d, e] = [-2.0, -1.0, 0.0, 1.0, 2.0].map(|k| at(t + k * h));
+            let velocity = ((d - b) * 8.0 - (e - a)) / (12.0 * h);
+            let acceleration = ((d + b) * 16.0 - (e + a) - c * 30.0) / (12.0 * h * h);
+            let symbols = christoffel_by_differences(&c);
+            let force = Vector3::from_fn(|k, _| velocity.dot(&(symbols[k] * velocity)));
+            assert!((acceleration + force).norm() < 1e-6, "{acceleration} and {force}");
+            let along = Riemannian::<Euclidean<3>>::along(&g, &x, &v, t).unwrap();
+            assert!((along.map(|entry| entry.eps1) - velocity).norm() < 1e-7);
+            assert!((along.map(|entry| entry.eps1eps2) + force).norm() < 1e-6);
+        }
+    }
+
+    #[test]
+    fn what_the_chart_does_not_reach_has_no_logarithm() {
+        let (round, form) = (Canonical, Metric::field(|_: &Vector3<Real>| Matrix3::identity()));
+        let x = vector![0.6, 0.0, 0.8];
+        let log = Riemannian::<Sphere<2>>::log(&form, &x, &-x);
+        assert!(matches!(log, Err(MetricError::OutOfChart { .. })), "{log:?}");
+        assert!(Riemannian::<Sphere<2>>::log(&round, &x, &-x).is_err());
+        // Half a turn has two straight lines, and which one is found would be a matter of rounding.
+        let body = Metric::field(|_: &Matrix3<Real>| Matrix3::identity());
+        let r = rotations::exp(&vector![0.3, -0.2, 0.5]);
+        let turned = |angle: f64| r * rotations::exp(&(vector![2.0, -1.0, 2.0] / 3.0 * angle));
+        let log = Riemannian::<Rotations>::log(&body, &r, &turned(PI));
+        assert!(
+            matches!(log, Err(MetricError::OutOfChart { distance }) if (distance - PI).abs() < 1e-14)
+        );
+        assert!(Riemannian::<Rotations>::log(&Canonical, &r, &turned(PI)).is_err());
+        let log = Riemannian::<Rotations>::log(&body, &r, &turned(PI - 1e-9)).unwrap();
+        assert!((log.norm() - (PI - 1e-9)).abs() < 1e-12);
+    }
+
+    #[test]
+    fn points_that_are_not_finite_have_no_logarithm() {
+        for bad in [f64::NAN, f64::INFINITY] {
+            let (x, y) = (Vector3::x(), vector![0.0, bad, 0.6]);
+            let (r, s) = (Matrix3::identity(), Matrix3::from_diagonal(&vector![1.0, 1.0, bad]));
+            let form = Metric::field(|_: &Vector3<Real>| Matrix3::identity());
+            let body = Metric::field(|_: &Matrix3<Real>| Matrix3::identity());
+            let errors = [
+                Riemannian::<Sphere<2>>::log(&Canonical, &x, &y).unwrap_err(),
+                Riemannian::<Sphere<2>>::log(&Canonical, &y, &x).unwrap_err(),
+                Riemannian::<Sphere<2>>::log(&form, &x, &y).unwrap_err(),
+                Riemannian::<Rotations>::log(&Canonical, &r, &s).unwrap_err(),
+                Riemannian::<Rotations>::log(&Canonical, &s, &r).unwrap_err(),
+                Riemannian::<Rotations>::log(&body, &r, &s).unwrap_err(),
+                Riemannian::<Euclidean<3>>::log(&Canonical, &x, &y).unwrap_err(),
+                Riemannian::<Euclidean<3>>::end(&Canonical, &x, &y).unwrap_err(),
+                Riemannian::<Sphere<2>>::end(&Canonical, &y, &vector![0.1, 0.2]).unwrap_err(),
+                Riemannian::<Rotations>::end(&Canonical, &s, &Vector3::x()).unwrap_err(),
+                Retraction::<Sphere<2>, _>::inverse(&Projection, &Canonical, &x, &y).unwrap_err(),
+                Retraction::<Rotations, _>::inverse(&Cayley, &Canonical, &r, &s).unwrap_err(),
+            ];
+            for (k, error) in errors.into_iter().enumerate() {
+                assert!(matches!(error, MetricError::NotFinite { .. }), "{bad}, case {k}: {error}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_geodesic_that_is_lost_says_where_and_why() {
+        let (x, v) = (vector![0.0, 0.0], vector![3.0, 0.0]);
+        // The edge x = 1 of the slit metric is at a finite distance, and there is nothing beyond it:
+        // with x' = 3 (1 − x)^(−1/4) it is reached at t = 4/15.
         let slit =
             Metric::field(|q: &Vector2<Real>| Matrix2::from_diagonal_element((-q.x + 1.0).sqrt()));
-        let error = Riemannian::<Euclidean<2>>::end(&slit, &vector![0.0, 0.0], &vector![3.0, 0.0]);
-        assert!(matches!(error, Err(MetricError::Lost { time }) if time > 0.1 && time < 1.0));
+        let reached = |t: f64| (t - 4.0 / 15.0).abs() < 1e-4;
+        let error = Riemannian::<Euclidean<2>>::end(&slit, &x, &v).unwrap_err();
+        assert!(matches!(error, MetricError::Edge { time } if reached(time)), "{error}");
+        // In the first and in the second half of an arc, and on the way to an inner point.
+        let error = Riemannian::<Euclidean<2>>::weyl_jet(&slit, &x, &v).unwrap_err();
+        assert!(matches!(error, MetricError::Edge { time } if reached(time)), "{error}");
+        let error = Riemannian::<Euclidean<2>>::weyl_arc(&slit, &x, &(v / 3.0)).unwrap_err();
+        assert!(matches!(error, MetricError::Edge { time } if reached(time / 3.0)), "{error}");
+        let error = Riemannian::<Euclidean<2>>::along(&slit, &x, &v, 0.5).unwrap_err();
+        assert!(matches!(error, MetricError::Edge { time } if reached(time)), "{error}");
+        let centre = ChartPoint::centre(&x);
+        let error = Riemannian::<Euclidean<2>>::exp(&slit, &centre, &v).unwrap_err();
+        assert!(matches!(error, MetricError::Edge { time } if reached(time)), "{error}");
+        // Here it is there, and negative: x' = 3 (1 − x)^(−1/2) comes to x = 1 at t = 2/9.
+        let fold = Metric::field(|q: &Vector2<Real>| {
+            Matrix2::from_diagonal(&vector![-q.x + 1.0, 1.0.into()])
+        });
+        let error = Riemannian::<Euclidean<2>>::end(&fold, &x, &v).unwrap_err();
+        let MetricError::Degenerate { time, not_positive } = error else { panic!("{error}") };
+        assert!((time - 2.0 / 9.0).abs() < 1e-4, "{error}");
+        assert!(not_positive.index == 0 && not_positive.pivot <= 0.0, "{error}");
+        // A metric with a wave of length 10⁻⁵ is positive everywhere, and too uneven for a long way.
+        let rough = Metric::field(|q: &Vector2<Real>| {
+            Matrix2::from_diagonal_element((q.x * 6e5).sin() * 0.9 + 1.0)
+        });
+        let error = Riemannian::<Euclidean<2>>::end(&rough, &x, &v).unwrap_err();
+        assert!(matches!(error, MetricError::Uneven { time, pieces } if time < 1.0 && pieces > 1));
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use metriplectic_fields::{ChartPoint, Dimension, Matrix, Real, Scalar, Space, Square, Vector};
 use nalgebra::{Const, SMatrix};
 
-use crate::metric::{Factored, GeodesicEnd, MetricError, stretched};
+use crate::metric::{Factored, GeodesicEnd, MetricError, finite_column, stretched};
 use crate::{Arc, ArcJet, Canonical, Riemannian};
 
 /// A manifold whose charts are global and linear: straight lines are the geodesics of every metric
@@ -19,12 +19,14 @@ macro_rules! straight_geodesics {
             x: &ChartPoint<M, D>,
             v: &Vector<M, D>,
         ) -> Result<GeodesicEnd<M, D>, MetricError> {
-            Ok(straight(x, v))
+            straight(x, v)
         }
 
         #[inline]
         fn end(&self, x: &M::Point<f64>, v: &Vector<M>) -> Result<M::Point<f64>, MetricError> {
-            Ok(M::chart(x, v))
+            let end = M::chart(x, v);
+            reached::<M>(&end)?;
+            Ok(end)
         }
 
         #[inline]
@@ -43,7 +45,7 @@ macro_rules! straight_geodesics {
         }
 
         fn log(&self, x: &M::Point<f64>, y: &M::Point<f64>) -> Result<Vector<M>, MetricError> {
-            Ok(M::coordinates(x, y))
+            finite_column("the logarithm", M::coordinates(x, y))
         }
 
         #[inline]
@@ -113,8 +115,20 @@ impl<M: Flat + Space<Dim = Const<N>>, const N: usize> Riemannian<M> for Constant
 
 /// Where the flat geodesic through `x` arrives: `x + v`, with the same velocity.
 #[inline]
-fn straight<M: Flat, D: Scalar>(x: &ChartPoint<M, D>, v: &Vector<M, D>) -> GeodesicEnd<M, D> {
-    (ChartPoint::around(&M::chart(&x.base, &(x.q + *v))), *v)
+fn straight<M: Flat, D: Scalar>(
+    x: &ChartPoint<M, D>,
+    v: &Vector<M, D>,
+) -> Result<GeodesicEnd<M, D>, MetricError> {
+    let end = ChartPoint::around(&M::chart(&x.base, &(x.q + *v)));
+    reached::<M>(&end.base)?;
+    Ok((end, *v))
+}
+
+/// Refuses the end of a geodesic whose numbers are not finite, and one that has no chart of its own
+/// because its numbers have run out: `s e^q` at zero.
+#[inline]
+fn reached<M: Flat>(y: &M::Point<f64>) -> Result<(), MetricError> {
+    finite_column("a coordinate of the end", M::coordinates(y, y)).map(drop)
 }
 
 #[cfg(test)]
@@ -136,9 +150,10 @@ mod tests {
             Metric::constant(indefinite),
             Err(MetricError::NotPositive(NotPositive { index: 1, .. }))
         ));
+        let infinite = Matrix2::new(1.0, 0.0, f64::INFINITY, 1.0);
         assert_eq!(
-            Metric::constant(Matrix2::from_element(f64::NAN)).unwrap_err(),
-            MetricError::NotFinite
+            Metric::constant(infinite).unwrap_err(),
+            MetricError::EntryNotFinite { row: 1, column: 0, value: f64::INFINITY }
         );
     }
 }

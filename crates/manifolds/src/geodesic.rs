@@ -30,6 +30,8 @@ use crate::metric::GeodesicEnd;
 
 /// A piece of a geodesic shorter than this, in a unit of time, is not worth pursuing.
 const SHORTEST: f64 = 1e-6;
+/// Doublings of a piece of that length, over which an obstacle is looked for.
+const LOOK_AHEAD: i32 = 9;
 /// Pieces that a geodesic may take, so that one through a very uneven metric comes to an end.
 const PIECES: usize = 1024;
 
@@ -223,9 +225,43 @@ fn centred<M: Space, D: Scalar>(
     (ChartPoint { base, q: Vector::<M, D>::from_index(|i| q[i].re) }, velocity)
 }
 
+/// What stops a geodesic at a real point of a chart, or a little ahead of it.
+#[cold]
+fn obstacle<M: Space>(
+    field: &impl MatrixField<M>,
+    time: f64,
+    at: &ChartPoint<M>,
+    ahead: &Vector<M>,
+) -> Option<MetricError> {
+    let places = (0..=LOOK_AHEAD).map(|k| if k == 0 { 0.0 } else { 2_f64.powi(k) });
+    places.into_iter().find_map(|t| {
+        let place = ChartPoint { base: at.base.clone(), q: at.q + *ahead * t };
+        MetricError::stopped(time, &metric(field, &place))
+    })
+}
+
+/// The end of a geodesic, unless its metric has no inverse there.
+fn ended<M: Space, T>(
+    field: &impl MatrixField<M>,
+    end: &M::Point<f64>,
+    found: Option<T>,
+) -> Result<T, MetricError> {
+    found.ok_or_else(|| {
+        let (at, time) = (ChartPoint::centre(end), 1.0);
+        obstacle(field, time, &at, &Vector::<M>::zero()).unwrap_or(MetricError::Edge { time })
+    })
+}
+
 /// Follows a geodesic for a unit of time: `rate` in the chart at a point, `position` of a state, and
 /// `recentre` to the chart at the state itself. The last state is recentred too.
+///
+/// # Errors
+///
+/// With the time reached, [`MetricError::Edge`] if the geodesic runs out of the chart,
+/// [`MetricError::Degenerate`] where the metric is not positive, and [`MetricError::Uneven`] if it is
+/// neither and the pieces are used up, or too short.
 fn travel<M: Space, Y: State>(
+    field: &impl MatrixField<M>,
     x: &M::Point<f64>,
     start: Y,
     rate: impl Fn(&M::Point<f64>, &Y) -> Option<Y>,
@@ -234,7 +270,7 @@ fn travel<M: Space, Y: State>(
 ) -> Result<(M::Point<f64>, Y), MetricError> {
     let (mut base, mut here) = (x.clone(), start);
     let (mut time, mut h) = (0.0, 1.0_f64);
-    for _ in 0..PIECES {
+    for pieces in 1..=PIECES {
         h = h.min(1.0 - time);
         let next = extrapolation::step(&|y: &Y| rate(&base, y), &here, h);
         match next.filter(|next| M::is_near(&position(&next.state))) {
@@ -250,17 +286,27 @@ fn travel<M: Space, Y: State>(
                 h *= 0.5;
                 continue;
             }
-            None => return Err(MetricError::Lost { time }),
+            None => {
+                let velocity = rate(&base, &here).map(|rate| position(&rate));
+                let at = ChartPoint { q: position(&here), base };
+                let obstacle =
+                    obstacle(field, time, &at, &(velocity.unwrap_or(Vector::<M>::zero()) * h));
+                return Err(obstacle.unwrap_or(MetricError::Uneven { time, pieces }));
+            }
         }
         let finished = time >= 1.0;
         if finished || !M::is_near(&(position(&here) * 2.0)) {
-            (base, here) = recentre(&base, &here).ok_or(MetricError::Lost { time })?;
+            (base, here) = recentre(&base, &here).ok_or_else(|| {
+                let at = ChartPoint { base: base.clone(), q: position(&here) };
+                obstacle(field, time, &at, &Vector::<M>::zero())
+                    .unwrap_or(MetricError::Edge { time })
+            })?;
         }
         if finished {
             return Ok((base, here));
         }
     }
-    Err(MetricError::Lost { time })
+    Err(MetricError::Uneven { time, pieces: PIECES })
 }
 
 /// The geodesic from `x` with velocity `v`, followed for a unit of time at any scalar: its end,
@@ -268,8 +314,7 @@ fn travel<M: Space, Y: State>(
 ///
 /// # Errors
 ///
-/// [`MetricError::Lost`] with the time reached, if the geodesic runs into the edge of the chart or
-/// into a place where the metric is not positive.
+/// Those of [`travel`].
 pub(crate) fn follow<M: Space, D: Scalar>(
     field: &impl MatrixField<M>,
     x: &ChartPoint<M, D>,
@@ -283,9 +328,10 @@ pub(crate) fn follow<M: Space, D: Scalar>(
     };
     let start = Phase::<M, D> { q: x.q, p: metric(field, x) * *v };
     let rate = |base: &M::Point<f64>, y: &Phase<M, D>| rate_at_scalar(field, base, y);
-    let (base, end) = travel::<M, _>(&x.base, start, rate, |y| y.q.real(), recentre)?;
+    let (base, end) = travel::<M, _>(field, &x.base, start, rate, |y| y.q.real(), recentre)?;
     let end_point = ChartPoint { base, q: end.q };
-    let v = metric(field, &end_point).solve(&end.p).ok_or(MetricError::Lost { time: 1.0 })?;
+    let v = metric(field, &end_point).solve(&end.p);
+    let v = ended(field, &end_point.base, v)?;
     Ok((end_point, v))
 }
 
@@ -307,9 +353,11 @@ pub(crate) fn follow_real<M: Space>(
         Some((at.base, Phase { q: Vector::<M>::zero(), p }))
     };
     let start = Phase::<M, f64> { q: Vector::<M>::zero(), p: value(&ChartPoint::centre(x)) * *v };
-    let (end, y) = travel::<M, _>(x, start, |base, y| rate(field, base, y), |y| y.q, recentre)?;
+    let (end, y) =
+        travel::<M, _>(field, x, start, |base, y| rate(field, base, y), |y| y.q, recentre)?;
     let v = value(&ChartPoint::centre(&end)).solve(&y.p);
-    Ok((end, v.ok_or(MetricError::Lost { time: 1.0 })?))
+    let v = ended(field, &end, v)?;
+    Ok((end, v))
 }
 
 /// A real point of a geodesic, its velocity, and the derivatives of both along a parameter of `n`
@@ -338,8 +386,8 @@ pub(crate) fn follow_jet<M: Space>(
     };
     let bundle = into_momenta(field, start);
     let rate = |base: &M::Point<f64>, y: &Bundle<M>| rate_of_bundle(field, base, y);
-    let (base, end) = travel::<M, _>(&start.point, bundle, rate, |y| y.at.q, recentre)?;
-    into_velocities(field, &base, &end).ok_or(MetricError::Lost { time: 1.0 })
+    let (base, end) = travel::<M, _>(field, &start.point, bundle, rate, |y| y.at.q, recentre)?;
+    ended(field, &base, into_velocities(field, &base, &end))
 }
 
 /// Columns `(∂_k g) v` at a real point of a chart, with `g` itself.

@@ -2,11 +2,12 @@
 //!
 //! - **Point and velocity**: columns of one number, `s` and `s'`.
 //! - **Frame**: `s' = s v`.
-//! - **Chart**: `φ_s(q) = s e^q`, onto the whole half line; its inverse `ln(1 + (y − s)/s)` has its digits
-//!   for near points.
-//! - **Geodesics** of the canonical metric `ds²/s²` are `s e^{tv}`, which never reach zero. It is the
-//!   metric of positive matrices for 1 × 1 matrices (Bhatia 2007, ch. 6). `exp` and `log` are one
-//!   evaluation of `exp` and of `ln_1p`.
+//! - **Chart**: `φ_s(q) = s e^q`, onto the whole half line, and its inverse `ln(y/s)`, which is
+//!   `ln(1 + (y − s)/s)` within a factor of two, where only that has its digits.
+//! - **Geodesics** of the canonical metric `ds²/s²` are `s e^{tv}`, which come to zero in no finite
+//!   time: it is the metric of positive matrices for 1 × 1 matrices (Bhatia 2007, ch. 6). The logarithm is
+//!   within `2ε` of the exact one, relative to it. Numbers end before the half line does, at 5·10⁻³²⁴ and
+//!   2·10³⁰⁸; a geodesic that goes there is an error.
 //! - **Brackets**: none, as on every curve. The half line is a factor, for a temperature, a volume or
 //!   an internal energy, of a [`Product`](crate::Product).
 
@@ -14,10 +15,9 @@ use metriplectic_fields::{ChartPoint, Column, Scalar, Space};
 use nalgebra::{Const, SVector, Vector1};
 use rand::{Rng, RngExt};
 
-use crate::{Flat, Manifold};
+use crate::{Flat, Manifold, PointError};
 
-/// The positive numbers R₊: a state that must not reach zero, and never does; see the
-/// [module](mod@crate::half_line).
+/// The positive numbers R₊: a state that must not reach zero; see the [module](mod@crate::half_line).
 ///
 /// As a closure, the canonical metric is `Metric::field(|s| Matrix1::new(s.x.powi(-2)))`.
 ///
@@ -53,8 +53,12 @@ impl Space for HalfLine {
 
     #[inline]
     fn coordinates<D: Scalar>(x: &Vector1<f64>, y: &Vector1<D>) -> Vector1<D> {
-        // ln(1 + (y − x)/x) has its digits for near points.
-        Vector1::new(((y.x - x.x) / x.x).ln_1p())
+        let ratio = y.x / x.x;
+        Vector1::new(match ratio.re() {
+            near if (0.5..=2.0).contains(&near) => ((y.x - x.x) / x.x).ln_1p(),
+            far if far.is_normal() => ratio.ln(),
+            _ => y.x.ln() - x.x.ln(),
+        })
     }
 
     /// `s' = s e^q v`.
@@ -65,9 +69,10 @@ impl Space for HalfLine {
 }
 
 impl Manifold for HalfLine {
-    /// How far a number is below zero; that of zero itself is its distance to the smallest number.
+    /// The distance to the [projection](Self::project): how far a number is below zero, and not quite
+    /// nothing for zero itself.
     fn defect(&self, x: &Vector1<f64>) -> f64 {
-        if x.x > 0.0 { 0.0 } else { 1.0 - x.x }
+        if x.x.is_finite() { (self.project(x).x - x.x).abs() } else { f64::NAN }
     }
 
     fn entries(x: &Vector1<f64>) -> Vec<f64> {
@@ -83,15 +88,27 @@ impl Manifold for HalfLine {
         x.x.abs()
     }
 
-    /// The smallest positive number stands for everything that is not positive.
+    /// No positive number is nearest to one that is not: `2.2·10⁻³⁰⁸`, the smallest of full precision,
+    /// stands for zero.
     fn project(&self, x: &Vector1<f64>) -> Vector1<f64> {
-        Vector1::new(x.x.max(f64::MIN_POSITIVE))
+        Vector1::new(if x.x <= 0.0 { f64::MIN_POSITIVE } else { x.x })
     }
 
     /// `e^u` with `u` uniform in `−1 … 1`.
     fn random(&self, rng: &mut impl Rng) -> Vector1<f64> {
         let u: f64 = rng.random_range(-1.0..1.0);
         SVector::from([u.exp()])
+    }
+
+    /// No number that is not positive is allowed, however near to zero.
+    fn check(&self, x: &Vector1<f64>) -> Result<(), PointError> {
+        if !x.x.is_finite() {
+            return Err(PointError::NotFinite { index: 0, value: x.x });
+        }
+        match self.defect(x) {
+            defect if defect > 0.0 => Err(PointError::OffManifold { defect, allowed: 0.0 }),
+            _ => Ok(()),
+        }
     }
 }
 
@@ -101,7 +118,7 @@ impl Flat for HalfLine {}
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Canonical, Exponential, Metric, WeylMidpoint, laws};
+    use crate::{Canonical, Exponential, Metric, MetricError, Riemannian, WeylMidpoint, laws};
     use metriplectic_fields::Real;
     use nalgebra::Matrix1;
     use num_dual::DualNum;
@@ -125,6 +142,52 @@ mod tests {
         for off in [0.0, -1e-300, -3.0] {
             assert!(HalfLine.check(&Vector1::new(off)).is_err());
             assert!(HalfLine.check(&HalfLine.project(&Vector1::new(off))).is_ok());
+        }
+        let defect = |s| Vector1::new(HalfLine.defect(&Vector1::new(s)));
+        assert_eq!(defect(-3.0), Vector1::new(3.0));
+        assert_eq!(defect(0.0), Vector1::new(f64::MIN_POSITIVE));
+        for on in [5e-324, 1.0, f64::MAX] {
+            assert_eq!(HalfLine.project(&Vector1::new(on)), Vector1::new(on));
+            assert_eq!(defect(on), Vector1::new(0.0));
+        }
+    }
+
+    #[test]
+    fn logarithms_have_their_digits_between_all_numbers() {
+        // The exact ones, rounded.
+        for (x, y, exact) in [
+            (1.0, 1.0 + f64::EPSILON, f64::EPSILON),
+            (1.0, 1e-17, -39.143_946_580_898_77),
+            (3.0, 1e-10, -24.124_463_218_608_567),
+            (1e-200, 1e200, 921.034_037_197_618_3),
+            (1e200, 1e-200, -921.034_037_197_618_3),
+            (2.0, 1.0, -std::f64::consts::LN_2),
+        ] {
+            let (x, y) = (Vector1::new(x), Vector1::new(y));
+            let log = Riemannian::<HalfLine>::log(&Canonical, &x, &y).unwrap().x;
+            let off = (log - exact).abs() / exact.abs();
+            assert!(off <= 2.0 * f64::EPSILON, "{x} to {y}: {log}");
+        }
+    }
+
+    #[test]
+    fn what_is_not_finite_is_no_point_and_is_never_reached() {
+        for off in [f64::NAN, f64::INFINITY] {
+            assert!(HalfLine.defect(&Vector1::new(off)).is_nan());
+            let projected = HalfLine.project(&Vector1::new(off));
+            assert!(matches!(HalfLine.check(&projected), Err(PointError::NotFinite { .. })));
+        }
+        let one = Vector1::new(1.0);
+        for to in [-1.0, 0.0, f64::NAN, f64::INFINITY] {
+            let log = Riemannian::<HalfLine>::log(&Canonical, &one, &Vector1::new(to));
+            assert!(matches!(log, Err(MetricError::NotFinite { .. })), "{to}: {log:?}");
+        }
+        // e^10000 is no number, and e^−10000 is not a positive one.
+        for v in [1e4, -1e4, f64::NAN].map(Vector1::new) {
+            let end = Riemannian::<HalfLine>::end(&Canonical, &one, &v);
+            assert!(matches!(end, Err(MetricError::NotFinite { .. })), "{v}: {end:?}");
+            let end = Riemannian::<HalfLine>::exp(&Canonical, &ChartPoint::centre(&one), &v);
+            assert!(matches!(end, Err(MetricError::NotFinite { .. })), "{v}: {end:?}");
         }
     }
 }

@@ -2,7 +2,7 @@
 //! into a pair of points.
 //!
 //! The page of each space is its chapter: points and velocities, frame and chart, geodesics with their
-//! accuracy, the brackets that live there, and where to read about it.
+//! accuracy, and the brackets that live there, with the sources of what is not elementary.
 //!
 //! | module | what it holds |
 //! |---|---|

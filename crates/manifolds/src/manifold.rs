@@ -1,4 +1,13 @@
 //! What every space of states answers.
+//!
+//! # Why points do not drift
+//!
+//! The unknown of a step is a tangent vector `u` at `x`, and its end is the end of an arc, `φ_x(u)` for a
+//! geodesic in a normal chart. On a curved space the chart itself ends on the manifold: its last operation is
+//! one step of Newton's iteration for `|x| = 1` or `RᵀR = 1`, which squares a defect of round-off. The
+//! equation of the step has `H` and `S` at that very end in it. So the point that a run keeps is the one
+//! for which the laws have been solved, and it lies on the manifold; a projection after the step would
+//! move it, and `H` with it. The defects of all points of a run are in its certificate.
 
 use metriplectic_fields::{Space, Vector};
 use rand::Rng;
@@ -56,7 +65,9 @@ pub trait Manifold: Space {
     /// The size `|x|` of the entries, which sets the scale of round-off.
     fn magnitude(x: &Self::Point<f64>) -> f64;
 
-    /// The nearest point of the manifold, for an array of numbers that is off it.
+    /// The nearest point of the manifold, for an array of numbers that is off it: one of them, where
+    /// there are several. What is not finite stays so, and where no point is nearest (the centre of a
+    /// sphere) the entries are not numbers: [`check`](Self::check) finds both.
     fn project(&self, x: &Self::Point<f64>) -> Self::Point<f64>;
 
     /// The components at `y` of the tangent vector `v` at `x`, for `y` near `x`: a vector transport
@@ -117,6 +128,9 @@ pub enum PointError {
         /// How many a point has.
         expected: usize,
     },
+    /// All entries are zero, where only their direction counts.
+    #[error("all entries are zero, which have no direction")]
+    NoDirection,
     /// The point is not in the domain of the chart.
     #[error("the point is outside the domain of its chart; start inside")]
     OutsideChart,

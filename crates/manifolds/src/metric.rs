@@ -93,7 +93,8 @@ pub trait Riemannian<M: Space> {
         t: f64,
     ) -> Result<M::Point<Real>, MetricError>;
 
-    /// The vector `v` at `x` with `exp_x(v) = y`.
+    /// The vector `v` at `x` with `exp_x(v) = y`. Of an open [`Chart`](crate::Chart) the domain is not
+    /// known here: the way may lead through what it leaves out.
     ///
     /// # Errors
     ///
@@ -125,7 +126,7 @@ pub trait Riemannian<M: Space> {
     /// [`MetricError`] if the matrix is not symmetric and positive.
     fn norm(&self, x: &M::Point<f64>, v: &Vector<M>) -> Result<f64, MetricError> {
         let at = self.at(&ChartPoint::centre(x))?;
-        finite(at.orthonormal(&at.flat(v)).magnitude())
+        finite("the length of a vector", at.orthonormal(&at.flat(v)).magnitude())
     }
 
     /// The length of the geodesic that [`log`](Self::log) finds between two points: their distance,
@@ -178,7 +179,7 @@ pub trait Riemannian<M: Space> {
     ///
     /// [`MetricError`] if the matrix is not symmetric and positive.
     fn volume<D: Scalar>(&self, x: &ChartPoint<M, D>) -> Result<D, MetricError> {
-        finite(self.matrix(x).root_determinant()?)
+        finite("√det g", self.matrix(x).root_determinant()?)
     }
 
     /// The derivatives `∂g/∂qᵏ` at a real point; `None` for a metric that is constant by
@@ -254,7 +255,7 @@ impl<N: Dimension, D: Scalar> InnerProduct<N::Vector<D>> for Factored<N, D> {
 fn symmetric<D: Scalar, A: Square<D>>(g: &A) -> Result<(), MetricError> {
     let largest = g.max_abs();
     if !largest.is_finite() {
-        return Err(MetricError::NotFinite);
+        return Err(entry_not_finite(g));
     }
     for i in 0..A::Column::LEN {
         for j in 0..i {
@@ -265,6 +266,16 @@ fn symmetric<D: Scalar, A: Square<D>>(g: &A) -> Result<(), MetricError> {
         }
     }
     Ok(())
+}
+
+/// The first entry that is not finite.
+#[cold]
+fn entry_not_finite<D: Scalar, A: Square<D>>(g: &A) -> MetricError {
+    let n = A::Column::LEN;
+    let entries = (0..n).flat_map(|i| (0..n).map(move |j| (i, j)));
+    let bad = entries.map(|(i, j)| (i, j, g[(i, j)].re())).find(|(.., entry)| !entry.is_finite());
+    let (row, column, value) = bad.unwrap_or((0, 0, f64::NAN));
+    MetricError::EntryNotFinite { row, column, value }
 }
 
 /// Ready-made metrics.
@@ -324,26 +335,77 @@ pub(crate) fn stretched<M: Space>(v: &Vector<M>, t: f64) -> Vector<M, Real> {
 }
 
 /// Refuses a geodesic that reaches the injectivity `radius`, up to the rounding of its length.
+#[inline]
 pub(crate) fn within(radius: f64, length: f64) -> Result<(), MetricError> {
-    if length < radius - 4.0 * f64::EPSILON {
-        Ok(())
+    if length < radius - 4.0 * f64::EPSILON { Ok(()) } else { Err(beyond(radius, length)) }
+}
+
+/// A length that is not a number has not reached anything.
+#[cold]
+fn beyond(radius: f64, length: f64) -> MetricError {
+    if length.is_nan() {
+        MetricError::NotFinite { quantity: "the length of the geodesic", value: length }
     } else {
-        Err(MetricError::CutLocus { length, radius })
+        MetricError::CutLocus { length, radius }
     }
 }
 
 /// A number that has not left the range of numbers.
-fn finite<D: Scalar>(number: D) -> Result<D, MetricError> {
-    if number.re().is_finite() { Ok(number) } else { Err(MetricError::NotFinite) }
+#[inline]
+pub(crate) fn finite<D: Scalar>(quantity: &'static str, number: D) -> Result<D, MetricError> {
+    let value = number.re();
+    if value.is_finite() { Ok(number) } else { Err(MetricError::NotFinite { quantity, value }) }
+}
+
+/// A column whose components have not left the range of numbers.
+#[inline]
+pub(crate) fn finite_column<D: Scalar, V: Column<D>>(
+    quantity: &'static str,
+    v: V,
+) -> Result<V, MetricError> {
+    for i in 0..V::LEN {
+        finite(quantity, v[i])?;
+    }
+    Ok(v)
 }
 
 /// A metric that cannot be used.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum MetricError {
-    /// An entry, or what is computed of it, is NaN or infinite.
-    #[error("the metric has an entry that is not a finite number, or too large a one")]
-    NotFinite,
+    /// An entry is NaN or infinite.
+    #[error(
+        "entry ({row}, {column}) of the metric is {value}; every entry must be a finite number"
+    )]
+    EntryNotFinite {
+        /// Row of the entry.
+        row: usize,
+        /// Its column.
+        column: usize,
+        /// Its value.
+        value: f64,
+    },
+    /// What is computed of a metric and of points is NaN, because they are, or beyond the range of
+    /// numbers.
+    #[error(
+        "{quantity} is {value}, which is not a finite number; take finite points, closer together"
+    )]
+    NotFinite {
+        /// What is not finite.
+        quantity: &'static str,
+        /// Its value.
+        value: f64,
+    },
+    /// A point is at or beyond the edge of the chart at another one: on Sⁿ its antipode, on SO(3) half
+    /// a turn.
+    #[error(
+        "the chart at one point does not reach the other, at the coordinate distance {distance}; take \
+         a smaller step, or points that are closer together"
+    )]
+    OutOfChart {
+        /// The norm of the coordinates; not a number where there are none.
+        distance: f64,
+    },
     /// `g ≠ gᵀ`.
     #[error(
         "the metric is not symmetric: entries ({row}, {column}) and ({column}, {row}) differ by {size:.3e}"
@@ -359,14 +421,36 @@ pub enum MetricError {
     /// Not positive definite.
     #[error("the metric is {0}")]
     NotPositive(#[from] NotPositive),
-    /// A geodesic was lost on its way.
+    /// A geodesic runs out of the chart: the metric beyond is not a number.
     #[error(
-        "the geodesic cannot be followed beyond {time:.3} of its way: it runs into the edge of the \
-         chart, or the metric is not positive there; take a smaller step"
+        "the geodesic runs into the edge of the chart at {time:.3} of its way, where the metric is not a \
+         finite number; take a smaller step, or a metric in which the edge is far"
     )]
-    Lost {
+    Edge {
         /// The share of the way that was followed.
         time: f64,
+    },
+    /// A geodesic comes to a place where its metric is not positive.
+    #[error(
+        "at {time:.3} of the way of a geodesic the metric is {not_positive}; take a smaller step, or \
+         leave the place out of the domain"
+    )]
+    Degenerate {
+        /// The share of the way that was followed.
+        time: f64,
+        /// The pivot.
+        not_positive: NotPositive,
+    },
+    /// A geodesic through a metric that varies too much along it.
+    #[error(
+        "the geodesic was followed for {time:.3} of its way in {pieces} pieces, and the metric is too \
+         uneven to go on; take a smaller step, and look for what is not smooth in the metric"
+    )]
+    Uneven {
+        /// The share of the way that was followed.
+        time: f64,
+        /// The pieces that were tried.
+        pieces: usize,
     },
     /// No geodesic was found between two points.
     #[error(
@@ -391,4 +475,32 @@ pub enum MetricError {
         /// The injectivity radius.
         radius: f64,
     },
+}
+
+impl MetricError {
+    /// The error of a geodesic that stops at `time`, if it is the matrix `g` there that stops it.
+    pub(crate) fn stopped<D: Scalar>(time: f64, g: &impl Square<D>) -> Option<Self> {
+        let not_positive = g.cholesky().err()?;
+        let edge = !not_positive.pivot.is_finite();
+        Some(if edge { Self::Edge { time } } else { Self::Degenerate { time, not_positive } })
+    }
+
+    /// The error on a part of a way that begins at `start` and has the length `share`.
+    pub(crate) fn on_part(self, start: f64, share: f64) -> Self {
+        let whole = |time| start + share * time;
+        match self {
+            Self::Edge { time } => Self::Edge { time: whole(time) },
+            Self::Degenerate { time, not_positive } => {
+                Self::Degenerate { time: whole(time), not_positive }
+            }
+            Self::Uneven { time, pieces } => Self::Uneven { time: whole(time), pieces },
+            other => other,
+        }
+    }
+
+    /// The error of a point that is at the edge of its chart.
+    #[cold]
+    pub fn out_of_chart<M: Space, D: Scalar>(x: &ChartPoint<M, D>) -> Self {
+        Self::OutOfChart { distance: x.q.magnitude() }
+    }
 }

@@ -4,8 +4,9 @@
 //!   factor, with that of the second below it.
 //! - **Frame and chart**: those of the factors, `φ_{(a,b)}(q, r) = (φ_a(q), φ_b(r))`.
 //! - **Geodesics**: of a pair of metrics `(gA, gB)`, and of [`Canonical`], which is the
-//!   pair of the canonical ones, pairs of geodesics, as accurate as those of the factors; none is
-//!   longer than the factors allow. One [closure](crate::Metric::field) for the full matrix couples the
+//!   pair of the canonical ones, pairs of geodesics, as accurate as those of the factors, with
+//!   `d² = d_A² + d_B²` (Lee 2018, ch. 2, for the product metric); none is longer than the factors allow.
+//!   One [closure](crate::Metric::field) for the full matrix couples the
 //!   factors, and its geodesics are numerical.
 //! - **Brackets**: none unless one is asked for. A pair, `{f, g} = {f, g}_A + {f, g}_B`, whose Casimirs
 //!   are functions of the Casimirs of both: with `(AreaForm, Zero)` on `S² × R` each function of the
@@ -27,7 +28,7 @@ use metriplectic_fields::{
 use rand::Rng;
 
 use crate::metric::GeodesicEnd;
-use crate::{Arc, ArcJet, Canonical, InnerProduct, Manifold, MetricError, Riemannian};
+use crate::{Arc, ArcJet, Canonical, InnerProduct, Manifold, MetricError, PointError, Riemannian};
 
 /// The product `A × B`: a state with two parts, such as a direction with an internal energy
 /// (`S² × R`) or an attitude with an angular momentum (`SO(3) × R³`). A factor may be a product again.
@@ -182,6 +183,17 @@ impl<A: Manifold + Times<B>, B: Manifold> Manifold for Product<A, B> {
 
     fn random(&self, rng: &mut impl Rng) -> Self::Point<f64> {
         (self.0.random(rng), self.1.random(rng))
+    }
+
+    /// Each factor checks its own half; an entry is counted in the whole point.
+    fn check(&self, (a, b): &Self::Point<f64>) -> Result<(), PointError> {
+        self.0.check(a)?;
+        self.1.check(b).map_err(|error| match error {
+            PointError::NotFinite { index, value } => {
+                PointError::NotFinite { index: A::entries(a).len() + index, value }
+            }
+            other => other,
+        })
     }
 }
 
@@ -514,5 +526,9 @@ mod tests {
         assert!(matches!(off, PointError::OffManifold { .. }));
         let nan = space.check(&(vector![0.0, 0.0, 1.0], vector![f64::NAN])).unwrap_err();
         assert!(matches!(nan, PointError::NotFinite { index: 3, .. }));
+        // Each factor has the last word on its own half.
+        let space = Product(Euclidean::<1>, HalfLine);
+        let zero = space.check(&(vector![1.0], vector![0.0])).unwrap_err();
+        assert!(matches!(zero, PointError::OffManifold { defect, .. } if defect > 0.0));
     }
 }

@@ -4,9 +4,9 @@ use metriplectic_fields::{ChartPoint, Column, Scalar, Space};
 use nalgebra::SVector;
 use num_dual::Dual;
 
-use crate::metric::{MetricError, stretched, within};
+use crate::metric::{MetricError, finite_column, stretched, within};
 use crate::retraction::jet_by_dual_numbers;
-use crate::sphere::{components, frame, normalised, spread};
+use crate::sphere::{angle, components, frame, normalised, spread};
 use crate::{Arc, ArcJet, Nodes, PointPair, Retraction, Riemannian, Sphere, Tangent};
 
 /// The symmetric projection retraction of Sⁿ, for any metric:
@@ -108,11 +108,12 @@ macro_rules! projection {
                 x: &SVector<f64, $a>,
                 y: &SVector<f64, $a>,
             ) -> Result<Tangent<Sphere<$n>>, MetricError> {
+                within(std::f64::consts::PI, angle(x, y))?;
                 let sum = x + y;
-                within(std::f64::consts::PI, 2.0 * (y - x).norm().atan2(sum.norm()))?;
                 let base = normalised(&sum);
                 let d = (y - x) * (2.0 / sum.norm());
-                Ok(Tangent { base, vector: components(&frame::<$a, $n>(&base), &d) })
+                let vector = components(&frame::<$a, $n>(&base), &d);
+                Ok(Tangent { base, vector: finite_column("the displacement", vector)? })
             }
         }
     };

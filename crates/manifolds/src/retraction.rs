@@ -215,29 +215,26 @@ pub(crate) fn jet_by_dual_numbers<M: Manifold, G: Riemannian<M>>(
     x: &M::Point<f64>,
     u: &Vector<M>,
 ) -> Result<ArcJet<M>, MetricError> {
-    let zero = Matrix::<M>::zeros();
-    let mut jet: Option<ArcJet<M>> = None;
+    let along = |k| {
+        let part = |i| if i == k { 1.0 } else { 0.0 };
+        let seeded = Vector::<M, Dual64>::from_index(|i| Dual64::new(u[i], part(i)));
+        retraction.arc(metric, x, &seeded)
+    };
+    let (mut arc, zero) = (along(0)?, Matrix::<M>::zeros());
+    let (z, d, end) = (arc.z.base.clone(), arc.d.real(), M::real(&arc.end));
+    let mut jet = ArcJet::<M> { z, dz: zero, d, dd: zero, end, dend: zero };
     for k in 0..M::Dim::LEN {
-        let seeded =
-            Vector::<M, Dual64>::from_index(|i| Dual64::new(u[i], if i == k { 1.0 } else { 0.0 }));
-        let arc = retraction.arc(metric, x, &seeded)?;
-        let end = M::real(&arc.end);
-        let moved = M::coordinates(&end, &arc.end);
-        let jet = jet.get_or_insert_with(|| ArcJet {
-            z: arc.z.base.clone(),
-            dz: zero,
-            d: arc.d.real(),
-            dd: zero,
-            end,
-            dend: zero,
-        });
+        if k > 0 {
+            arc = along(k)?;
+        }
+        let moved = M::coordinates(&jet.end, &arc.end);
         for i in 0..M::Dim::LEN {
             jet.dz[(i, k)] = arc.z.q[i].eps;
             jet.dd[(i, k)] = arc.d[i].eps;
             jet.dend[(i, k)] = moved[i].eps;
         }
     }
-    jet.ok_or(MetricError::NotFinite)
+    Ok(jet)
 }
 
 /// The middle of two vectors' components, for the inverse of a midpoint rule.

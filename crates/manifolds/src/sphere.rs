@@ -8,20 +8,26 @@
 //! - **Point and velocity**: columns `x` and `x'` of `n + 1` numbers.
 //! - **Frame**: orthonormal columns `E(x)` with `det[x, E] = +1`, those of the Householder reflection
 //!   that takes the last axis to `∓x`.
-//! - **Chart**: normal coordinates, divided by the norm, so that every point of a run has norm 1 up to
-//!   one rounding and never drifts,
+//! - **Chart**: normal coordinates, which end with one step `ν` of Newton's iteration for `|y| = 1`, so that
+//!   every point of a run has norm 1 to round-off and
+//!   [never drifts](mod@crate::manifold#why-points-do-not-drift),
 //!
 //! ```math
-//! \varphi_x(q) = \cos|q|\, x + \frac{\sin|q|}{|q|}\, E q, \qquad
-//! \varphi_x^{-1}(y) = \frac{\theta}{\sin\theta}\, E^T (y - x), \quad
-//! \theta = \mathrm{atan2}\bigl(|E^T (y - x)|,\ x^T y\bigr) .
+//! \varphi_x(q) = \nu\Bigl(\cos|q|\, x + \frac{\sin|q|}{|q|}\, E q\Bigr), \qquad
+//! \nu(y) = \tfrac12 (3 - |y|^2)\, y ,
 //! ```
 //!
+//! ```math
+//! \varphi_x^{-1}(y) = \frac{\theta}{\sin\theta}\, E^T (y \mp x), \qquad
+//! \theta = \mathrm{atan2}\bigl(|E^T (y \mp x)|,\ x^T y\bigr) ,
+//! ```
+//!
+//! with the sign that makes `y ∓ x` short: `Eᵀx = 0`, and a long one has lost digits.
 //! - **Geodesics** of the round metric are great circles, `exp_x(v) = φ_x(v)` and
 //!   `log_x(y) = φ_x⁻¹(y)`, up to the injectivity radius π, beyond which they are refused (Absil, Mahony
-//!   and Sepulchre 2008, §5.4). The logarithm of rounded points is within
-//!   `8ε(1/θ + 1 + θ/(π − θ))` of the exact one, relative to `θ`, from `θ = 10⁻¹⁴` to `π − 10⁻⁶`: its
-//!   direction is lost at the antipode.
+//!   and Sepulchre 2008, §5.4). From `θ = 10⁻¹⁵` to `π − 10⁻¹⁰` the logarithm of rounded points was
+//!   measured within `8ε min(θ, 1)/(π − θ)` of the exact one of these very points, as its direction is
+//!   lost at the antipode, and their distance within `3ε min(θ, 1)`.
 //! - **Other metrics** are forms on Rⁿ⁺¹, by [`Metric::field`](crate::Metric::field);
 //!   [`Projection`](crate::Projection) is a retraction for all of them.
 //! - **Brackets**: none unless one is asked for. `AreaForm` on S², `x' = x × ∇H` (Marsden and Ratiu 1999,
@@ -38,7 +44,7 @@ use nalgebra::{Const, SMatrix, SVector};
 use num_dual::{Dual, Dual64};
 use rand::{Rng, RngExt};
 
-use crate::metric::{GeodesicEnd, MetricError, within};
+use crate::metric::{GeodesicEnd, MetricError, finite_column, within};
 use crate::normal::Normal;
 use crate::{Arc, ArcJet, Canonical, Manifold, Riemannian};
 
@@ -130,6 +136,14 @@ fn great_circle<D: Scalar, const A: usize>(
     [x * cosine + v * (sine * t), v * cosine - x * (s * sine * t)]
 }
 
+/// The angle between two points, by the lengths of the sides and not by the arc cosine, which has no
+/// digits for near points; it is not a number where a point is not finite.
+#[inline]
+pub(crate) fn angle<const A: usize>(x: &SVector<f64, A>, y: &SVector<f64, A>) -> f64 {
+    let sides = [(y - x).norm(), (y + x).norm()];
+    if sides[1].is_finite() { 2.0 * sides[0].atan2(sides[1]) } else { f64::NAN }
+}
+
 /// Brings a point that is on the sphere up to round-off back to it, by one step of Newton's iteration
 /// `x ← x(3 − |x|²)/2` for the norm of the real part.
 #[inline]
@@ -182,9 +196,11 @@ macro_rules! sphere {
             }
 
             fn coordinates<D: Scalar>(x: &SVector<f64, $a>, y: &SVector<D, $a>) -> SVector<D, $n> {
-                let difference = SVector::<D, $a>::from_fn(|i, _| y[i] - x[i]);
-                let tangent = components(&frame::<$a, $n>(x), &difference);
                 let cosine = y.dot(&Column::embed(x));
+                // Eᵀx = 0, and the shorter one of y − x and y + x has the digits of y across x.
+                let side = 1_f64.copysign(cosine.re());
+                let short = SVector::<D, $a>::from_fn(|i, _| y[i] - side * x[i]);
+                let tangent = components(&frame::<$a, $n>(x), &short);
                 tangent * angle_over_sine(tangent.dot(&tangent), cosine)
             }
 
@@ -260,8 +276,11 @@ macro_rules! sphere {
                 }
             }
 
+            /// `x/|x|`; the centre is equally far from all points, and has entries that are not
+            /// numbers.
             fn project(&self, x: &SVector<f64, $a>) -> SVector<f64, $a> {
-                normalised(x)
+                // So that no square overflows or vanishes.
+                normalised(&(x / x.amax()))
             }
 
             /// Uniform: the direction of a Gaussian vector (Muller 1959).
@@ -315,7 +334,7 @@ macro_rules! sphere {
                 v: &SVector<f64, $n>,
             ) -> Result<SVector<f64, $a>, MetricError> {
                 within(PI, v.norm())?;
-                Ok(Sphere::<$n>::chart(x, v))
+                finite_column("an entry of the end", Sphere::<$n>::chart(x, v))
             }
 
             /// With the velocity of the great circle, and `γ'' = −|v|² γ`.
@@ -337,10 +356,19 @@ macro_rules! sphere {
                 x: &SVector<f64, $a>,
                 y: &SVector<f64, $a>,
             ) -> Result<SVector<f64, $n>, MetricError> {
-                // Never the arc cosine, which has no digits for near points.
-                let length = 2.0 * (y - x).norm().atan2((y + x).norm());
+                within(PI, angle(x, y))?;
+                finite_column("the logarithm", Sphere::<$n>::coordinates(x, y))
+            }
+
+            fn distance(
+                &self,
+                x: &SVector<f64, $a>,
+                y: &SVector<f64, $a>,
+            ) -> Result<f64, MetricError> {
+                let length = angle(x, y);
                 within(PI, length)?;
-                Ok(Sphere::<$n>::coordinates(x, y))
+                // The sides of near points have the rounding of their norms, which the chart leaves out.
+                Ok(if length < 1.0 { Sphere::<$n>::coordinates(x, y).norm() } else { length })
             }
 
             /// `γ'(½) = c₀ U − ½s c₁ x` with `U = E(x) d` and the Stumpff functions at `s/4 = |d|²/4`.
@@ -437,7 +465,7 @@ fn gaussian(rng: &mut impl Rng) -> f64 {
 mod tests {
     use super::*;
     use crate::laws;
-    use crate::{Exponential, WeylMidpoint};
+    use crate::{Exponential, PointError, WeylMidpoint};
     use nalgebra::vector;
     use proptest::prelude::*;
     use rand::SeedableRng;
@@ -489,18 +517,63 @@ mod tests {
     }
 
     #[test]
-    fn the_logarithm_of_near_and_of_far_points_has_its_digits() {
-        let x = vector![0.6, 0.0, 0.8];
-        for k in 1..=300 {
-            let theta = 10.0_f64.powf(-14.0 + 0.05 * f64::from(k)).min(PI - 1e-6);
-            let q = vector![0.6, -0.8] * theta;
-            let y = Sphere::<2>::chart(&x, &q);
-            let log = Riemannian::<Sphere<2>>::log(&Canonical, &x, &y).unwrap();
-            // The points are rounded to ε, which a logarithm of length θ cannot undo.
-            let attainable = 8.0 * f64::EPSILON * (1.0 / theta + 1.0 + theta / (PI - theta));
-            assert!((log - q).norm() <= attainable * theta.max(1e-300), "θ = {theta}");
+    fn what_has_no_nearest_point_is_found_by_its_defect() {
+        for off in
+            [vector![0.0, 0.0, 0.0], vector![f64::NAN, 1.0, 0.0], vector![f64::INFINITY, 1.0, 0.0]]
+        {
+            let projected = Sphere::<2>.project(&off);
+            assert!(!Sphere::<2>.defect(&projected).is_finite(), "{projected}");
+            assert!(matches!(Sphere::<2>.check(&projected), Err(PointError::NotFinite { .. })));
+        }
+        for scale in [1e-320, 1e-200, 1.0, 1e200] {
+            let projected = Sphere::<2>.project(&(vector![3.0, 0.0, 4.0] * scale));
+            assert!((projected - vector![0.6, 0.0, 0.8]).norm() < 1e-3, "{scale}: {projected}");
+            assert!(Sphere::<2>.defect(&projected) < 1e-15);
         }
     }
+
+    macro_rules! chart_at_its_centre {
+        ($name:ident, $n:literal in $a:literal) => {
+            /// `φ_x(q) = x + E q − ½|q|²x + O(q³)`, with the columns of `E` orthonormal and across `x`.
+            #[test]
+            fn $name() {
+                const BOUND: f64 = 8.0 * f64::EPSILON;
+                let mut rng = ChaCha8Rng::seed_from_u64(3);
+                for x in (0..20).map(|_| Sphere::<$n>.random(&mut rng)) {
+                    let mut columns = vec![x];
+                    for (i, j) in (0..$n).flat_map(|i| (0..$n).map(move |j| (i, j))) {
+                        let part = |k, direction| if k == direction { 1.0 } else { 0.0 };
+                        let seed = |k, _| Real::new(0.0, part(k, i), part(k, j), 0.0);
+                        let y = Sphere::<$n>::chart(&x, &SVector::<Real, $n>::from_fn(seed));
+                        assert!((y.map(|entry| entry.re) - x).norm() < BOUND);
+                        let bend = x * if i == j { -1.0 } else { 0.0 };
+                        assert!((y.map(|entry| entry.eps1eps2) - bend).norm() < BOUND);
+                        let [along_i, along_j] =
+                            [y.map(|entry| entry.eps1), y.map(|entry| entry.eps2)];
+                        let right = part(i, j);
+                        assert!((along_i.dot(&along_j) - right).abs() < BOUND, "{i} and {j}");
+                        if j == 0 {
+                            columns.push(along_i);
+                        }
+                        let back = Sphere::<$n>::coordinates(&x, &y);
+                        assert!((back[i].eps1 - 1.0).abs() < BOUND);
+                        assert!((back[j].eps2 - 1.0).abs() < BOUND);
+                        assert!(back.iter().all(|entry| entry.eps1eps2.abs() < BOUND));
+                    }
+                    let turn = SMatrix::<f64, $a, $a>::from_columns(&columns);
+                    assert!((turn.determinant() - 1.0).abs() < BOUND);
+                    assert!(columns[1..].iter().all(|e| e.dot(&x).abs() < BOUND));
+                }
+            }
+        };
+    }
+    chart_at_its_centre!(the_chart_of_the_circle_has_its_derivatives_at_the_centre, 1 in 2);
+    chart_at_its_centre!(the_chart_of_the_sphere_has_its_derivatives_at_the_centre, 2 in 3);
+    chart_at_its_centre!(the_chart_of_the_three_sphere_has_its_derivatives_at_the_centre, 3 in 4);
+    chart_at_its_centre!(the_chart_of_the_four_sphere_has_its_derivatives_at_the_centre, 4 in 5);
+    chart_at_its_centre!(the_chart_of_the_five_sphere_has_its_derivatives_at_the_centre, 5 in 6);
+    chart_at_its_centre!(the_chart_of_the_six_sphere_has_its_derivatives_at_the_centre, 6 in 7);
+    chart_at_its_centre!(the_chart_of_the_seven_sphere_has_its_derivatives_at_the_centre, 7 in 8);
 
     #[test]
     fn antipodes_and_longer_arcs_are_refused_with_their_length() {

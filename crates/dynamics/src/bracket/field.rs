@@ -54,6 +54,7 @@ impl<F> FieldPoisson<F> {
     where
         F: MatrixField<M>,
     {
-        M::contravariant(at.x, &self.field.at(&at.x.point())).ok_or(MetricError::NotFinite)
+        M::contravariant(at.x, &self.field.at(&at.x.point()))
+            .ok_or_else(|| MetricError::out_of_chart(at.x))
     }
 }

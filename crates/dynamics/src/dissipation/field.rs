@@ -72,7 +72,7 @@ where
         alpha: &Vector<M, D>,
     ) -> Result<Vector<M, D>, MetricError> {
         let tensor = lift::<M, D>(x, w, |x, w| self.tensor_at(x, w));
-        Ok(tensor.ok_or(MetricError::NotFinite)? * *alpha)
+        Ok(tensor.ok_or_else(|| MetricError::out_of_chart(x))? * *alpha)
     }
 
     fn linearise(
@@ -93,7 +93,7 @@ where
         let n = M::Dim::LEN;
         for k in 0..n {
             let (x, w) = seeded::<M, f64>(&x, w, k, n + k);
-            let tensor = self.tensor_at(&x, &w).ok_or(MetricError::NotFinite)?;
+            let tensor = self.tensor_at(&x, &w).ok_or_else(|| MetricError::out_of_chart(&x))?;
             let column = tensor * real;
             for i in 0..n {
                 jet.value[i] = column[i].re;

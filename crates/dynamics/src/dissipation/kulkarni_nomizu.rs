@@ -82,7 +82,7 @@ pub(super) fn form<M: Manifold, D: Scalar>(
     field: &impl MatrixField<M>,
     x: &ChartPoint<M, D>,
 ) -> Result<Matrix<M, D>, MetricError> {
-    M::contravariant(x, &field.at(&x.point())).ok_or(MetricError::NotFinite)
+    M::contravariant(x, &field.at(&x.point())).ok_or_else(|| MetricError::out_of_chart(x))
 }
 
 /// `K_w α`, bilinear in `σ` and `μ`.

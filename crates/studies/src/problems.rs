@@ -317,6 +317,15 @@ fn slope<const A: usize>(x: &SVector<Real, A>) -> Real {
     (0..A - 1).map(|i| x[i] * x[i + 1] * (1.0 / 3.0)).sum::<Real>() + x[A - 1]
 }
 
+/// Two Casimirs on S⁵.
+fn first_twist(x: &Vector6<Real>) -> Real {
+    x[0] * x[3] - x[1] * x[4] * 0.5
+}
+
+fn second_twist(x: &Vector6<Real>) -> Real {
+    x[2] + x[1] * x[5]
+}
+
 fn body_energy(p: &Vector3<Real>) -> Real {
     p.x.powi(2) * 0.05 + p.y.powi(2) * 0.1 + p.z.powi(2) * 0.5
 }
@@ -341,7 +350,7 @@ fn attitude() -> Matrix3<f64> {
 const CANONICAL: &str = "canonical";
 
 /// Visits every problem.
-fn each(study: &mut impl Study) {
+pub fn each(study: &mut impl Study) {
     canonical(study);
     closures(study);
     products(study);
@@ -397,9 +406,12 @@ fn canonical(study: &mut impl Study) {
         "projection" by Projection
     );
     visit!(
-        problem("relaxation", "S⁵", 2.0),
+        problem("Nambu", "S⁵", 2.0),
         off_axis::<6>(),
-        System::on(Sphere::<5>::round()).energy(bumpy::<6>).entropy(slope::<6>),
+        System::on(Sphere::<5>::round())
+            .bracket(Nambu::default().and(first_twist).and(second_twist))
+            .energy(bumpy::<6>)
+            .entropy(slope::<6>),
         "projection" by Projection
     );
     visit!(
@@ -429,33 +441,32 @@ fn closures(study: &mut impl Study) {
         .expect("a problem is a system");
     let start = Vector3::from_element(3.0_f64.sqrt().recip());
     let (name, manifold, metric) = ("relaxation", "S²", "ambient closure");
-    geodesic(study, &Problem { name, manifold, metric, system, start, time: 2.0 });
+    let problem = Problem { name, manifold, metric, system, start, time: 2.0 };
+    geodesic(study, &problem);
+    study.visit(&problem, "projection", Projection, 2.0);
 
-    let inertia = Matrix3::new(1.0, 0.2, 0.0, 0.2, 1.5, 0.1, 0.0, 0.1, 2.0);
-    let system = System::on(Rotations)
-        .metric(Metric::field(move |_: &Matrix3<Real>| inertia.cast::<Real>()))
-        .bracket(Nambu::default())
-        .energy(rotation_energy)
-        .entropy(rotation_entropy)
-        .build()
-        .expect("a problem is a system");
-    let (name, manifold, metric) = ("Nambu", "SO(3)", "left-invariant");
-    geodesic(study, &Problem { name, manifold, metric, system, start: attitude(), time: 1.0 });
-
-    let varying = |r: &Matrix3<Real>| {
-        let lean = r.column(2).into_owned();
-        Matrix3::from_diagonal(&vector![1.0, 1.5, 2.0]).cast::<Real>()
-            + lean * lean.transpose() * Real::from(0.5)
-    };
-    let system = System::on(Rotations)
-        .metric(Metric::field(varying))
-        .bracket(Nambu::default())
-        .energy(rotation_energy)
-        .entropy(rotation_entropy)
-        .build()
-        .expect("a problem is a system");
-    let (name, manifold, metric) = ("Nambu", "SO(3)", "depends on R");
-    geodesic(study, &Problem { name, manifold, metric, system, start: attitude(), time: 1.0 });
+    // One closure for both, and so one type.
+    let diagonal = Matrix3::from_diagonal(&vector![1.0, 1.5, 2.0]);
+    let full = Matrix3::new(1.0, 0.2, 0.0, 0.2, 1.5, 0.1, 0.0, 0.1, 2.0);
+    for (metric, inertia, leaning) in
+        [("left-invariant", full, 0.0), ("depends on R", diagonal, 0.5)]
+    {
+        let body = move |r: &Matrix3<Real>| {
+            let lean = r.column(2).into_owned();
+            inertia.cast::<Real>() + lean * lean.transpose() * Real::from(leaning)
+        };
+        let system = System::on(Rotations)
+            .metric(Metric::field(body))
+            .bracket(Nambu::default())
+            .energy(rotation_energy)
+            .entropy(rotation_entropy)
+            .build()
+            .expect("a problem is a system");
+        let (name, manifold) = ("Nambu", "SO(3)");
+        let problem = Problem { name, manifold, metric, system, start: attitude(), time: 1.0 };
+        geodesic(study, &problem);
+        study.visit(&problem, "Cayley", Cayley, 2.0);
+    }
 
     let leaning = |q: &Vector2<Real>| {
         let across = q.x.sin() * 0.4;

@@ -202,7 +202,7 @@ fn in_stereographic_coordinates(
         .energy(|q: &Vector3<Real>| wavy(&stereographic(q)))
         .entropy(|q: &Vector3<Real>| tilted(&stereographic(q)))
         .build()
-        .unwrap()
+        .expect("a system")
 }
 
 /// A metric whose geodesics are wrong: straight lines of the chart.

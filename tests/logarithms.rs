@@ -20,7 +20,7 @@ fn is_found(height: f64, x: &Vector2<f64>, y: &Vector2<f64>) -> bool {
     let metric = Metric::field(bumps(height));
     let log = Riemannian::<Euclidean<2>>::log(&metric, x, y);
     if let Ok(v) = &log {
-        let end = Riemannian::<Euclidean<2>>::end(&metric, x, v).unwrap();
+        let end = Riemannian::<Euclidean<2>>::end(&metric, x, v).expect("it was followed");
         assert!((end - y).norm() < 1e-10, "from {x} to {y}: {:e}", (end - y).norm());
     }
     log.is_ok()

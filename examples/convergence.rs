@@ -1,7 +1,7 @@
 //! Convergence orders, measured: retraction × manifold × metric × problem.
 //!
-//! The references are flows by another method, a Runge-Kutta method of order 4 with round-off for an
-//! error. The orders are fitted to the errors, with 95 % intervals: 2 for the symmetric retractions,
+//! The references are flows of the same velocity by another method, a Runge-Kutta method of order 4
+//! with round-off for an error. The orders are fitted to the errors, with 95 % intervals: 2 for the symmetric retractions,
 //! 1 for the exponential based at the start.
 
 use std::error::Error;
@@ -16,17 +16,16 @@ fn main() -> Result<(), Box<dyn Error>> {
     if !orders.failures.is_empty() {
         return Err(orders.failures.join("\n").into());
     }
-    // A figure for closed forms and one for numerical geodesics, with the two schemes that all have.
     let gallery = Gallery::open()?;
-    let shared = |study: &&Convergence| ["Weyl midpoint", "exponential"].contains(&&*study.scheme);
-    let (closed, numerical): (Vec<Convergence>, Vec<Convergence>) =
-        orders.studies.iter().filter(shared).cloned().partition(|s| s.metric == "canonical");
-    for (title, name, studies) in [
-        ("Order of convergence", "convergence.svg", closed),
-        ("Order of convergence, metrics from closures", "convergence_closures.svg", numerical),
+    for (place, name) in [
+        ("spheres", "convergence.svg"),
+        ("rotations", "convergence_rotations.svg"),
+        ("charts and products", "convergence_charts.svg"),
     ] {
-        let figure = Convergence::figure(title, &studies).guide(2.0).guide(1.0);
-        figure.save(gallery.path(name))?;
+        let there = |study: &&Convergence| kind(&study.manifold) == place;
+        let studies: Vec<Convergence> = orders.studies.iter().filter(there).cloned().collect();
+        let figure = Convergence::figure(&format!("Order of convergence: {place}"), &studies);
+        figure.guide(2.0).guide(1.0).save(gallery.path(name))?;
     }
     if options.json {
         let rows = orders.studies.iter().map(|s| {
@@ -43,4 +42,13 @@ fn main() -> Result<(), Box<dyn Error>> {
         print(format_args!("figures: {}", gallery.path("convergence*.svg").display()))?;
     }
     Ok(())
+}
+
+/// Which figure a manifold is in; none has more problems than there are colours.
+fn kind(manifold: &str) -> &'static str {
+    match manifold {
+        "S²" | "S³" | "S⁵" => "spheres",
+        _ if manifold.to_lowercase().starts_with("so(3)") => "rotations",
+        _ => "charts and products",
+    }
 }

@@ -1,8 +1,11 @@
 //! The Weyl-Gonzalez step is intrinsic: computed in two charts, with the metric pulled back, it is
-//! the same step. A missing `√det g` or Christoffel symbol breaks this.
+//! the same step. Without `√det g` in the bracket, or with geodesics that are straight lines of the
+//! chart, it is another one.
 
 mod models;
 
+use metriplectic::fields::{ChartPoint, Matrix};
+use metriplectic::manifolds::{ArcJet, GeodesicEnd, MetricError, Riemannian};
 use metriplectic::prelude::*;
 use metriplectic_studies::Order;
 use models::top;
@@ -111,13 +114,15 @@ fn a_run_with_numerical_geodesics_has_order_two_and_keeps_the_energy() {
     assert!(order.agrees(2.0, 0.05), "{order} from {errors:?}");
 }
 
-/// Compares one step of both geodesic retractions on a manifold and in a chart of it, `point`.
-fn same_in_the_chart<Y, Z, const N: usize>(
+/// How far one step on a manifold is off the same step in a chart of it, `point`: with the Weyl
+/// midpoint, and with the exponential.
+fn discrepancies<Y, Z, const N: usize>(
     embedded: &Y,
     chart: &Z,
     start: SVector<f64, N>,
     point: impl Fn(&SVector<f64, N>) -> metriplectic::dynamics::Point<Y>,
-) where
+) -> [f64; 2]
+where
     Y: Metriplectic,
     Z: Metriplectic<Manifold = Euclidean<N>>,
 {
@@ -138,15 +143,29 @@ fn same_in_the_chart<Y, Z, const N: usize>(
         let (x, y) = (Y::Manifold::entries(x), Y::Manifold::entries(y));
         x.iter().zip(y).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
     };
-    for (there, here) in [
+    [
         ends((embedded, chart, WeylMidpoint), (point(&start), start)),
         ends((embedded, chart, Exponential), (point(&start), start)),
-    ] {
-        let off = distance(&point(&here), &there);
-        assert!(off < 1e-11, "{off:e}");
-        // The step is long enough for the test to mean something.
+    ]
+    .map(|(there, here)| {
+        // The step is long enough for the comparison to mean something.
         assert!(distance(&there, &point(&start)) > 0.05);
-    }
+        distance(&point(&here), &there)
+    })
+}
+
+/// One step of both geodesic retractions is the same in the chart.
+fn same_in_the_chart<Y, Z, const N: usize>(
+    embedded: &Y,
+    chart: &Z,
+    start: SVector<f64, N>,
+    point: impl Fn(&SVector<f64, N>) -> metriplectic::dynamics::Point<Y>,
+) where
+    Y: Metriplectic,
+    Z: Metriplectic<Manifold = Euclidean<N>>,
+{
+    let off = discrepancies(embedded, chart, start, point);
+    assert!(off.iter().all(|&off| off < 1e-11), "{off:?}");
 }
 
 /// Stereographic coordinates of S³ from the pole `−e₀`: `x = (1 − |q|²/4, q)/(1 + |q|²/4)`, in which
@@ -164,6 +183,76 @@ fn tilted(x: &Vector4<Real>) -> Real {
     x[3] + x[0] * x[1] * 0.4 - x[2] * 0.6
 }
 
+/// The round metric in these coordinates; its `√det g` is `(1 + |q|²/4)⁻³`.
+fn conformal(q: &Vector3<Real>) -> Matrix3<Real> {
+    Matrix3::from_diagonal_element((q.dot(q) * 0.25 + 1.0).powi(-2))
+}
+
+/// The system in these coordinates, with a metric that ought to be the round one, and Nambu's bracket
+/// times `(1 + |q|²/4)^power`.
+fn in_stereographic_coordinates(
+    metric: impl Riemannian<Euclidean<3>>,
+    power: i32,
+) -> impl Metriplectic<Manifold = Euclidean<3>> {
+    System::on(Euclidean::<3>)
+        .metric(metric)
+        .bracket(
+            Nambu::default().times(move |q: &Vector3<Real>| (q.dot(q) * 0.25 + 1.0).powi(power)),
+        )
+        .energy(|q: &Vector3<Real>| wavy(&stereographic(q)))
+        .entropy(|q: &Vector3<Real>| tilted(&stereographic(q)))
+        .build()
+        .expect("a system")
+}
+
+/// A metric whose geodesics are wrong: straight lines of the chart.
+struct Straight<G>(G);
+
+impl<G: Riemannian<Euclidean<3>>> Riemannian<Euclidean<3>> for Straight<G> {
+    type At<D: Scalar> = G::At<D>;
+
+    fn at<D: Scalar>(&self, x: &ChartPoint<Euclidean<3>, D>) -> Result<Self::At<D>, MetricError> {
+        self.0.at(x)
+    }
+
+    fn matrix<D: Scalar>(&self, x: &ChartPoint<Euclidean<3>, D>) -> Matrix<Euclidean<3>, D> {
+        self.0.matrix(x)
+    }
+
+    fn exp<D: Scalar>(
+        &self,
+        x: &ChartPoint<Euclidean<3>, D>,
+        v: &Vector3<D>,
+    ) -> Result<GeodesicEnd<Euclidean<3>, D>, MetricError> {
+        Riemannian::<Euclidean<3>>::exp(&Canonical, x, v)
+    }
+
+    fn along(
+        &self,
+        x: &Vector3<f64>,
+        v: &Vector3<f64>,
+        t: f64,
+    ) -> Result<Vector3<Real>, MetricError> {
+        Riemannian::<Euclidean<3>>::along(&Canonical, x, v, t)
+    }
+
+    fn log(&self, x: &Vector3<f64>, y: &Vector3<f64>) -> Result<Vector3<f64>, MetricError> {
+        Riemannian::<Euclidean<3>>::log(&Canonical, x, y)
+    }
+
+    fn weyl_jet(
+        &self,
+        x: &Vector3<f64>,
+        d: &Vector3<f64>,
+    ) -> Result<ArcJet<Euclidean<3>>, MetricError> {
+        Riemannian::<Euclidean<3>>::weyl_jet(&Canonical, x, d)
+    }
+
+    fn slopes(&self, x: &Vector3<f64>) -> Option<[Matrix3<f64>; 3]> {
+        self.0.slopes(x)
+    }
+}
+
 #[test]
 fn a_nambu_step_on_the_three_sphere_is_the_same_in_stereographic_coordinates() {
     let embedded = System::on(Sphere::<3>::round())
@@ -172,16 +261,20 @@ fn a_nambu_step_on_the_three_sphere_is_the_same_in_stereographic_coordinates() {
         .entropy(tilted)
         .build()
         .unwrap();
-    let conformal =
-        |q: &Vector3<Real>| Matrix3::from_diagonal_element((q.dot(q) * 0.25 + 1.0).powi(-2));
-    let chart = System::on(Euclidean::<3>)
-        .metric(Metric::field(conformal))
-        .bracket(Nambu::default())
-        .energy(|q: &Vector3<Real>| wavy(&stereographic(q)))
-        .entropy(|q: &Vector3<Real>| tilted(&stereographic(q)))
-        .build()
-        .unwrap();
-    same_in_the_chart(&embedded, &chart, vector![0.5, -0.4, 0.6], stereographic);
+    let start = vector![0.5, -0.4, 0.6];
+    let round = || Metric::field(conformal);
+    let chart = in_stereographic_coordinates(round(), 0);
+    same_in_the_chart(&embedded, &chart, start, stereographic);
+
+    // With the factor that cancels 1/√det g, and with straight lines for geodesics, it is not.
+    let dense = in_stereographic_coordinates(round(), -3);
+    let straight = in_stereographic_coordinates(Straight(round()), 0);
+    let off = [
+        discrepancies(&embedded, &dense, start, stereographic),
+        discrepancies(&embedded, &straight, start, stereographic),
+    ];
+    println!("without √det g, and with straight lines: {off:?}");
+    assert!(off.iter().flatten().all(|&off| off > 1e-6), "{off:?}");
 }
 
 #[test]

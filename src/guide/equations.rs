@@ -51,7 +51,7 @@
 //! | `x' = X_H + grad^K S` | [`System`](crate::dynamics::System), [`Metriplectic::velocity`](crate::dynamics::Metriplectic::velocity) | `tests/equations.rs::the_equations_of_motion_have_both_laws` |
 //! | first law, `H' = {H, H} + (H, S) = 0` | [`Certificate::keeps_energy`](crate::integrators::Certificate::keeps_energy) | `tests/equations.rs::the_equations_of_motion_have_both_laws`, `tests/problems.rs::the_energy_is_kept_where_a_step_spans_two_radians` |
 //! | second law, `S' = (S, S) ≥ 0` | [`Certificate::keeps_entropy`](crate::integrators::Certificate::keeps_entropy) | `tests/equations.rs::the_equations_of_motion_have_both_laws` |
-//! | `x'^i = Π^{ij} H_j + K^{ij} S_j`; (matricial) `x' = Π∇H + K∇S` | [`Metriplectic::velocity`](crate::dynamics::Metriplectic::velocity) | `tests/equations.rs::the_equations_of_motion_have_both_laws` |
+//! | `x'^i = Π^{ij} H_j + K^{ij} S_j`; (matricial) `x' = Π∇H + K∇S` | [`Metriplectic::velocity`](crate::dynamics::Metriplectic::velocity) | `tests/equations.rs::the_equations_of_motion_have_both_laws`, `tests/problems.rs::the_velocity_of_each_problem_is_the_one_by_hand` |
 //!
 //! # §2.4 Symmetry preservation
 //!

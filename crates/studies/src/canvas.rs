@@ -137,7 +137,12 @@ impl Canvas<'_> {
 
     /// A line through these points in dashes.
     pub(crate) fn dashed(&self, points: &[At], color: RGBColor) -> Result<(), PlotError> {
-        dashes(points).into_iter().try_for_each(|dash| self.line(dash, color, 1.0))
+        dashes(points, (5.0, 4.0)).into_iter().try_for_each(|dash| self.line(dash, color, 1.0))
+    }
+
+    /// A line through these points in dots.
+    pub(crate) fn dotted(&self, points: &[At], color: RGBColor) -> Result<(), PlotError> {
+        dashes(points, (0.5, 4.0)).into_iter().try_for_each(|dot| self.line(dot, color, 1.8))
     }
 
     /// A disc without an outline.
@@ -167,9 +172,8 @@ impl Canvas<'_> {
     }
 }
 
-/// The dashes of a line.
-fn dashes(points: &[At]) -> Vec<Vec<At>> {
-    let (dash, gap) = (5.0, 4.0);
+/// The dashes of a line, of this length and at this distance.
+fn dashes(points: &[At], (dash, gap): (f64, f64)) -> Vec<Vec<At>> {
     let mut dashes = vec![Vec::new()];
     // Whether a dash is being drawn, and how far it is to its end, or to the next.
     let (mut drawn, mut left) = (true, dash);
@@ -238,7 +242,7 @@ mod tests {
         let length = |dash: &Vec<At>| -> f64 {
             dash.windows(2).map(|p| (p[1].0 - p[0].0).hypot(p[1].1 - p[0].1)).sum()
         };
-        let dashes = dashes(&corner);
+        let dashes = dashes(&corner, (5.0, 4.0));
         assert_eq!(dashes.len(), 10);
         assert!(dashes.iter().all(|dash| (length(dash) - 5.0).abs() < 1e-9), "{dashes:?}");
         assert_eq!(dashes[0], [(0.0, 0.0), (5.0, 0.0)]);

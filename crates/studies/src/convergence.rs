@@ -73,7 +73,8 @@ impl Convergence {
         table
     }
 
-    /// A figure of studies, a series each; the schemes that follow the first on a problem are dashed.
+    /// A figure of studies, a series each; the schemes that follow the first on a problem are its
+    /// rivals.
     #[must_use]
     pub fn figure(title: &str, studies: &[Self]) -> LogLog {
         let mut figure = LogLog::new(title, "h", "error");
@@ -89,7 +90,7 @@ impl Convergence {
             };
             let place = Some((problem, manifold, metric));
             figure = if before == place {
-                figure.rival(label, points)
+                figure.rival(scheme, points)
             } else {
                 figure.series(label, points)
             };

@@ -7,7 +7,7 @@
 //! |---|---|---|
 //! | [`order`] | how fast does the error fall with the step? | [`Order`]: the fitted slope, its 95 % interval, the points left out as round-off |
 //! | [`convergence`] | how do schemes compare? | [`Convergence`]: errors, order, table and figure |
-//! | [`problems`] | on what, on every manifold and metric? | [`problems::Orders`], [`problems::LargeSteps`], with exact flows by [`problems::flow`] |
+//! | [`problems`] | on what, on every manifold and metric? | [`problems::Orders`], [`problems::LargeSteps`], with flows by another method, [`problems::flow`] |
 //! | [`published`] | and by the scheme as published? | [`Published`], [`problems::SecondLaws`] |
 //! | [`drift`] | does the error grow with time? | [`Drift`]: flat, a random walk or a linear drift, in constant memory |
 //! | [`table`] | what does the study say, in rows? | [`Table`]: plain text and Markdown |

@@ -10,8 +10,10 @@ use crate::{
     plot::{self, PlotError},
 };
 
-/// Height of an entry of the legend.
-const ROW: f64 = 42.0;
+/// Height of an entry of the legend, of one below it for the same problem, and between two problems.
+const ROW: f64 = 36.0;
+const RIVAL: f64 = 20.0;
+const GAP: f64 = 6.0;
 /// Length of the line that stands in it.
 const SAMPLE: f64 = 30.0;
 
@@ -44,7 +46,8 @@ pub struct LogLog {
 struct Look {
     /// The number of its colour and marker.
     line: usize,
-    dashed: bool,
+    /// Its place among the series of this number: solid, dashed, and dotted from the third on.
+    rank: usize,
 }
 
 #[derive(Clone, Debug)]
@@ -80,15 +83,15 @@ impl LogLog {
     #[must_use]
     pub fn series(self, label: impl Into<String>, points: impl AsRef<[(f64, f64)]>) -> Self {
         let line = self.series.iter().map(|series| series.look.line + 1).max().unwrap_or(0);
-        self.add(label.into(), points.as_ref(), Look { line, dashed: false })
+        self.add(label.into(), points.as_ref(), Look { line, rank: 0 })
     }
 
-    /// Adds a dashed series with the colour and the marker of the last one: the same problem, solved
-    /// in another way.
+    /// Adds a series with the colour and the marker of the last one, the first dashed and the others
+    /// dotted: the same problem, solved in another way. Its label stands below that of the problem.
     #[must_use]
     pub fn rival(self, label: impl Into<String>, points: impl AsRef<[(f64, f64)]>) -> Self {
-        let line = self.series.last().map_or(0, |series| series.look.line);
-        self.add(label.into(), points.as_ref(), Look { line, dashed: true })
+        let look = self.series.last().map_or(Look { line: 0, rank: 0 }, |series| series.look);
+        self.add(label.into(), points.as_ref(), Look { rank: look.rank + 1, ..look })
     }
 
     fn add(mut self, label: String, points: &[(f64, f64)], look: Look) -> Self {
@@ -115,7 +118,7 @@ impl LogLog {
         let legend = self.series.iter().map(Series::legend_width).fold(0.0, f64::max);
         let title = length(&self.title, frame::TITLE) + 20.0;
         let width = (column + legend + 8.0).max(title);
-        let rows = frame.upper_left.1 + ROW * self.series.len() as f64;
+        let rows = frame.upper_left.1 + self.series.iter().map(Series::height).sum::<f64>();
         let height = rows.max(frame.lower_right.1 + frame::BELOW) + 6.0;
         canvas::sheet((width, height), |canvas| {
             let middle = 0.5 * (frame.upper_left.0 + frame.lower_right.0);
@@ -163,15 +166,21 @@ impl LogLog {
     }
 
     fn draw_legend(&self, canvas: &Canvas<'_>, (left, top): At) -> Result<(), PlotError> {
-        for (row, series) in self.series.iter().enumerate() {
-            let y = top + ROW * row as f64;
+        let mut bottom = top - GAP;
+        for series in &self.series {
+            let y = bottom + if series.look.rank == 0 { GAP } else { 0.0 };
+            bottom += series.height();
             series.look.draw(canvas, &[(left, y), (left + SAMPLE, y)])?;
             let marker = Marker { line: series.look.line, filled: true };
             canvas.marker((left + 0.5 * SAMPLE, y), marker)?;
             let beside = left + SAMPLE + 8.0;
-            canvas.text(&series.label, (beside, y), Type::left(frame::NAME))?;
-            let below = (beside, y + 16.0);
-            canvas.text(&series.slope_label(), below, Type::left(frame::NUMBER).grey())?;
+            let small = Type::left(frame::NUMBER).grey();
+            if series.look.rank == 0 {
+                canvas.text(&series.label, (beside, y), Type::left(frame::NAME))?;
+                canvas.text(&series.slope_label(), (beside, y + 16.0), small)?;
+            } else {
+                canvas.text(&series.rival_label(), (beside, y), small)?;
+            }
         }
         Ok(())
     }
@@ -194,10 +203,10 @@ impl LogLog {
 
 impl Look {
     fn draw(self, canvas: &Canvas<'_>, path: &[At]) -> Result<(), PlotError> {
-        if self.dashed {
-            canvas.dashed(path, color(self.line))
-        } else {
-            canvas.line(path.iter().copied(), color(self.line), 1.2)
+        match self.rank {
+            0 => canvas.line(path.iter().copied(), color(self.line), 1.2),
+            1 => canvas.dashed(path, color(self.line)),
+            _ => canvas.dotted(path, color(self.line)),
         }
     }
 }
@@ -238,9 +247,24 @@ impl Series {
             .map_or_else(|| "no slope fitted".into(), |order| format!("slope {order}"))
     }
 
+    /// The slope with the name of a rival, on one line.
+    fn rival_label(&self) -> String {
+        format!("{}, {}", self.label, self.slope_label())
+    }
+
+    /// The height of its entry in the legend, with the gap above it.
+    const fn height(&self) -> f64 {
+        if self.look.rank == 0 { GAP + ROW } else { RIVAL }
+    }
+
     fn legend_width(&self) -> f64 {
-        let label = length(&self.label, frame::NAME);
-        SAMPLE + 8.0 + label.max(length(&self.slope_label(), frame::NUMBER))
+        let number = |text: String| length(&text, frame::NUMBER);
+        let text = if self.look.rank == 0 {
+            length(&self.label, frame::NAME).max(number(self.slope_label()))
+        } else {
+            number(self.rival_label())
+        };
+        SAMPLE + 8.0 + text
     }
 
     fn is_round_off(&self, index: usize) -> bool {
@@ -275,7 +299,7 @@ mod tests {
         let svg = LogLog::new("t", "h", "error").series("s", with_plateau()).svg().unwrap();
         assert!(svg.contains("slope 4.00 [4.00, 4.00]"));
         let order =
-            Series::of("s".into(), &with_plateau(), Look { line: 0, dashed: false }).order.unwrap();
+            Series::of("s".into(), &with_plateau(), Look { line: 0, rank: 0 }).order.unwrap();
         let polygons =
             |fill: &str| svg.matches(&format!("<polygon opacity=\"1\" fill=\"{fill}\"")).count();
         assert_eq!(polygons("#FFFFFF"), order.plateau.len());
@@ -293,16 +317,18 @@ mod tests {
     }
 
     #[test]
-    fn a_rival_is_dashed_in_the_colour_of_what_it_rivals() {
+    fn rivals_are_dashed_and_dotted_in_the_colour_of_what_they_rival() {
         let figure = || LogLog::new("t", "h", "error").series("a", with_plateau());
-        let two = figure().rival("b", with_plateau()).series("c", with_plateau());
-        let looks: Vec<_> = two.series.iter().map(|series| series.look).collect();
-        let look = |line, dashed| Look { line, dashed };
-        assert_eq!(looks, [look(0, false), look(0, true), look(1, false)]);
+        let rival = || figure().rival("b", with_plateau());
+        let all = rival().rival("c", with_plateau()).series("d", with_plateau());
+        let looks: Vec<_> = all.series.iter().map(|series| series.look).collect();
+        let look = |line, rank| Look { line, rank };
+        assert_eq!(looks, [look(0, 0), look(0, 1), look(0, 2), look(1, 0)]);
         let lines = |figure: LogLog| figure.svg().unwrap().matches("<polyline").count();
-        let (rival, solid) =
-            (figure().rival("b", with_plateau()), figure().series("b", with_plateau()));
-        assert!(lines(rival) > lines(solid));
+        let [solid, dashed, dotted] =
+            [figure().series("b", with_plateau()), rival(), rival().rival("c", with_plateau())]
+                .map(lines);
+        assert!(solid < dashed && dashed - solid < dotted - dashed);
     }
 
     #[test]

@@ -7,13 +7,14 @@
 use std::f64::consts::FRAC_1_SQRT_2;
 
 use metriplectic_dynamics::{
-    AreaForm, Metriplectic, Nambu, SecondLaw, Symplectic, System, Zero, system::Point,
+    AreaForm, MetricDissipation, Metriplectic, Nambu, Scaled, SecondLaw, Symplectic, System, Zero,
+    system::Point,
 };
 use metriplectic_fields::{ChartPoint, Column, Real, Space, Vector};
 use metriplectic_integrators::{Certificate, Run, Scheme, Span};
 use metriplectic_manifolds::{
     Canonical, Cayley, Euclidean, Exponential, HalfLine, LieDual, Manifold, Metric, Product,
-    Projection, Retraction, Rotations, Sphere, WeylMidpoint, rotations,
+    Projection, Retraction, Riemannian as _, Rotations, Sphere, WeylMidpoint, rotations,
 };
 use nalgebra::{Matrix2, Matrix3, SVector, Vector1, Vector2, Vector3, Vector6, vector};
 use num_dual::DualNum;
@@ -35,6 +36,9 @@ pub struct Problem<Y: Metriplectic> {
     pub start: Point<Y>,
     /// The time over which errors are measured.
     pub time: f64,
+    /// Where a step may be long, and its size: points, by their coordinates in the chart at the start,
+    /// and for each retraction one at least from which a step spans two radians.
+    pub strides: Vec<(Vector<Y::Manifold>, f64)>,
 }
 
 impl<Y: Metriplectic> Problem<Y> {
@@ -59,7 +63,7 @@ pub trait Study {
         R: Retraction<Y::Manifold, Y::Metric> + Copy;
 }
 
-/// The exact flow over `time`, by another method: the classical Runge-Kutta method of order 4 in a
+/// The flow of the velocity `Π dH + K dS` over `time`, by another method: the classical Runge-Kutta method of order 4 in a
 /// chart around each step's start (Munthe-Kaas 1998), with steps so small that what is left is
 /// round-off; `None` if it leaves the domain.
 pub fn flow<Y: Metriplectic>(system: &Y, start: &Point<Y>, time: f64) -> Option<Point<Y>> {
@@ -143,17 +147,26 @@ impl Orders {
     }
 }
 
-/// The energy where steps are far too large for accuracy: a displacement of one and of two radians.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+/// Steps that are far too large for accuracy, of each retraction on every problem.
+///
+/// With numerical geodesics the starts are chosen: of 76 such steps from a grid on the 2-chart 32 keep
+/// the energy to `50 ε`, and the others to `2600 ε`; a geodesic is good to 10⁻¹³ in each piece.
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct LargeSteps {
-    /// The longest chord of a step.
+    /// Those of each problem and scheme.
+    pub rows: Vec<Strides>,
+}
+
+/// The steps of one scheme on one problem.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Strides {
+    /// Problem, manifold, metric and scheme.
+    pub label: String,
+    /// The largest `√G(d, d)` of the displacements `d = hv`, from `R_h⁻¹(x, x')`, of the steps that
+    /// were taken whole.
     pub longest: f64,
-    /// The worst energy error of any step, relative to `max(|H|, 1)`, and the problem.
-    pub worst: (f64, &'static str),
-    /// Steps that were taken.
-    pub steps: usize,
-    /// Runs that ended in an error, because a step so large has no solution.
-    pub ended: usize,
+    /// The largest `|H(x') − H(x)|`, relative to `max(|H|, 1)`, of all of them.
+    pub energy_error: f64,
 }
 
 impl LargeSteps {
@@ -167,37 +180,30 @@ impl LargeSteps {
 }
 
 impl Study for LargeSteps {
-    fn visit<Y, R>(&mut self, problem: &Problem<Y>, _: &'static str, retraction: R, _: f64)
+    fn visit<Y, R>(&mut self, problem: &Problem<Y>, scheme: &'static str, retraction: R, _: f64)
     where
         Y: Metriplectic,
         R: Retraction<Y::Manifold, Y::Metric> + Copy,
     {
-        let Problem { name, system, start, .. } = problem;
-        let here = ChartPoint::<Y::Manifold>::centre(start);
-        let Ok(velocity) = system.velocity(&here) else { return };
-        for radians in [1.0, 2.0] {
-            let scheme = Scheme::new(retraction);
-            let h = radians / velocity.magnitude();
-            let Ok(mut steps) = scheme.steps(system, start.clone(), h) else {
-                self.ended += 1;
-                continue;
-            };
-            for _ in 0..3 {
-                let before = steps.state().point.clone();
-                if steps.advance().is_err() {
-                    self.ended += 1;
-                    break;
-                }
-                self.steps += 1;
-                self.longest =
-                    self.longest.max(Problem::<Y>::distance(&before, &steps.state().point));
-            }
-            let certificate = steps.certificate();
-            let error = certificate.max_energy_error / certificate.initial_energy.abs().max(1.0);
-            if error > self.worst.0 {
-                self.worst = (error, name);
+        let Problem { name, manifold, metric, system, start, strides, .. } = problem;
+        let label = format!("{name} on {manifold} ({metric}), {scheme}");
+        let mut row = Strides { label, longest: 0.0, energy_error: 0.0 };
+        for (away, h) in strides {
+            let x = Y::Manifold::chart(start, away);
+            let span = Span::steps(*h, 1);
+            let Ok(run) = Scheme::new(retraction).run(system, x.clone(), span) else { continue };
+            let y = &run.last().point;
+            let (before, after) = (system.energy_at(&x), system.energy_at(y));
+            let error = (after - before).abs() / before.abs().max(1.0);
+            row.energy_error = row.energy_error.max(error);
+            if run.certificate().retries == 0
+                && let Ok(d) = retraction.inverse(system.metric(), &x, y)
+                && let Ok(length) = system.metric().norm(&d.base, &d.vector)
+            {
+                row.longest = row.longest.max(length);
             }
         }
+        self.rows.push(row);
     }
 }
 
@@ -207,7 +213,7 @@ impl Study for Orders {
         Y: Metriplectic,
         R: Retraction<Y::Manifold, Y::Metric> + Copy,
     {
-        let Problem { name, manifold, metric, system, start, time } = problem;
+        let Problem { name, manifold, metric, system, start, time, .. } = problem;
         let Some(exact) = flow(system, start, *time) else {
             return self.failures.push(format!("{name} on {manifold} has no flow"));
         };
@@ -302,6 +308,10 @@ fn hill(x: &Vector3<Real>) -> Real {
     x.z + x.x * x.y * 0.3
 }
 
+fn tilt(x: &Vector3<Real>) -> Real {
+    x.x - x.y * x.z * 0.2
+}
+
 /// `Σ a_i x_i² + b_i x_i³` with coefficients that no symmetry relates.
 fn bumpy<const A: usize>(x: &SVector<Real, A>) -> Real {
     (0..A)
@@ -315,6 +325,15 @@ fn bumpy<const A: usize>(x: &SVector<Real, A>) -> Real {
 /// `x_n + ⅓ Σ x_i x_{i+1}`.
 fn slope<const A: usize>(x: &SVector<Real, A>) -> Real {
     (0..A - 1).map(|i| x[i] * x[i + 1] * (1.0 / 3.0)).sum::<Real>() + x[A - 1]
+}
+
+/// Two Casimirs on S⁵.
+fn first_twist(x: &Vector6<Real>) -> Real {
+    x[0] * x[3] - x[1] * x[4] * 0.5
+}
+
+fn second_twist(x: &Vector6<Real>) -> Real {
+    x[2] + x[1] * x[5]
 }
 
 fn body_energy(p: &Vector3<Real>) -> Real {
@@ -341,7 +360,7 @@ fn attitude() -> Matrix3<f64> {
 const CANONICAL: &str = "canonical";
 
 /// Visits every problem.
-fn each(study: &mut impl Study) {
+pub fn each(study: &mut impl Study) {
     canonical(study);
     closures(study);
     products(study);
@@ -357,10 +376,11 @@ fn geodesic<Y: Metriplectic>(study: &mut impl Study, problem: &Problem<Y>) {
 fn canonical(study: &mut impl Study) {
     let problem = |name, manifold, time| (name, manifold, CANONICAL, time);
     macro_rules! visit {
-        ($labels:expr, $start:expr, $system:expr $(, $scheme:literal by $retraction:expr)?) => {{
+        ($labels:expr, $start:expr, $strides:expr, $system:expr $(, $scheme:literal by $retraction:expr)?) => {{
             let (name, manifold, metric, time) = $labels;
             let system = $system.build().expect("a problem is a system");
-            let problem = Problem { name, manifold, metric, system, start: $start, time };
+            let strides = $strides.to_vec();
+            let problem = Problem { name, manifold, metric, system, start: $start, time, strides };
             geodesic(study, &problem);
             $(study.visit(&problem, $scheme, $retraction, 2.0);)?
         }};
@@ -368,6 +388,7 @@ fn canonical(study: &mut impl Study) {
     visit!(
         problem("rigid body", "so(3)*", 10.0),
         vector![0.1, -1.0, 0.2],
+        [(vector![1.0, -0.3, -0.8], 2.0)],
         System::on(LieDual::so3())
             .energy(body_energy)
             .entropy(|p: &Vector3<Real>| p.norm_squared() * 0.5)
@@ -377,19 +398,28 @@ fn canonical(study: &mut impl Study) {
     visit!(
         problem("spinning top", "S²", 5.0),
         diagonal,
+        [(vector![0.6, -1.2], 4.0)],
         sphere().bracket(AreaForm),
         "projection" by Projection
     );
-    visit!(problem("relaxation", "S²", 3.0), diagonal, sphere().entropy(hill), "projection" by Projection);
+    visit!(
+        problem("relaxation", "S²", 3.0),
+        diagonal,
+        [(vector![-0.4, 1.1], 4.0)],
+        System::on(Sphere::<2>::round()).energy(hill).entropy(tilt),
+        "projection" by Projection
+    );
     visit!(
         problem("no Casimir", "S²", 3.0),
         diagonal,
+        [(vector![0.3, 1.0], 8.0)],
         sphere().bracket(AreaForm).entropy(hill).second_law(SecondLaw::Published),
         "projection" by Projection
     );
     visit!(
         problem("Nambu", "S³", 2.0),
         off_axis::<4>(),
+        [(vector![-1.1, -1.0, 0.1], 8.0)],
         System::on(Sphere::<3>::round())
             .bracket(Nambu::default())
             .energy(bumpy::<4>)
@@ -397,14 +427,19 @@ fn canonical(study: &mut impl Study) {
         "projection" by Projection
     );
     visit!(
-        problem("relaxation", "S⁵", 2.0),
+        problem("Nambu", "S⁵", 2.0),
         off_axis::<6>(),
-        System::on(Sphere::<5>::round()).energy(bumpy::<6>).entropy(slope::<6>),
+        [ (vector![0.4, 0.0, -1.2, 0.6, 0.2], 4.0), (vector![-0.1, -0.2, -0.7, 1.8, 0.2], 8.0)],
+        System::on(Sphere::<5>::round())
+            .bracket(Nambu::default().and(first_twist).and(second_twist))
+            .energy(bumpy::<6>)
+            .entropy(slope::<6>),
         "projection" by Projection
     );
     visit!(
         problem("Nambu", "SO(3)", 1.0),
         attitude(),
+        [(vector![1.1, -1.2, 1.1], 2.0)],
         System::on(Rotations::bi_invariant())
             .bracket(Nambu::default())
             .energy(rotation_energy)
@@ -428,34 +463,37 @@ fn closures(study: &mut impl Study) {
         .build()
         .expect("a problem is a system");
     let start = Vector3::from_element(3.0_f64.sqrt().recip());
+    let strides = vec![(vector![0.7, -1.5], 32.0)];
     let (name, manifold, metric) = ("relaxation", "S²", "ambient closure");
-    geodesic(study, &Problem { name, manifold, metric, system, start, time: 2.0 });
+    let problem = Problem { name, manifold, metric, system, start, time: 2.0, strides };
+    geodesic(study, &problem);
+    study.visit(&problem, "projection", Projection, 2.0);
 
-    let inertia = Matrix3::new(1.0, 0.2, 0.0, 0.2, 1.5, 0.1, 0.0, 0.1, 2.0);
-    let system = System::on(Rotations)
-        .metric(Metric::field(move |_: &Matrix3<Real>| inertia.cast::<Real>()))
-        .bracket(Nambu::default())
-        .energy(rotation_energy)
-        .entropy(rotation_entropy)
-        .build()
-        .expect("a problem is a system");
-    let (name, manifold, metric) = ("Nambu", "SO(3)", "left-invariant");
-    geodesic(study, &Problem { name, manifold, metric, system, start: attitude(), time: 1.0 });
-
-    let varying = |r: &Matrix3<Real>| {
-        let lean = r.column(2).into_owned();
-        Matrix3::from_diagonal(&vector![1.0, 1.5, 2.0]).cast::<Real>()
-            + lean * lean.transpose() * Real::from(0.5)
-    };
-    let system = System::on(Rotations)
-        .metric(Metric::field(varying))
-        .bracket(Nambu::default())
-        .energy(rotation_energy)
-        .entropy(rotation_entropy)
-        .build()
-        .expect("a problem is a system");
-    let (name, manifold, metric) = ("Nambu", "SO(3)", "depends on R");
-    geodesic(study, &Problem { name, manifold, metric, system, start: attitude(), time: 1.0 });
+    // One closure for both, and so one type.
+    let diagonal = Matrix3::from_diagonal(&vector![1.0, 1.5, 2.0]);
+    let full = Matrix3::new(1.0, 0.2, 0.0, 0.2, 1.5, 0.1, 0.0, 0.1, 2.0);
+    for (metric, inertia, leaning, strides) in [
+        ("left-invariant", full, 0.0, [(vector![-0.2, 1.4, -0.3], 2.0)]),
+        ("depends on R", diagonal, 0.5, [(vector![-0.2, 1.4, -0.3], 2.0)]),
+    ] {
+        let body = move |r: &Matrix3<Real>| {
+            let lean = r.column(2).into_owned();
+            inertia.cast::<Real>() + lean * lean.transpose() * Real::from(leaning)
+        };
+        let system = System::on(Rotations)
+            .metric(Metric::field(body))
+            .bracket(Nambu::default())
+            .dissipation(Scaled(0.1, MetricDissipation))
+            .energy(rotation_energy)
+            .entropy(rotation_entropy)
+            .build()
+            .expect("a problem is a system");
+        let (name, manifold, strides) = ("Nambu", "SO(3)", strides.to_vec());
+        let problem =
+            Problem { name, manifold, metric, system, start: attitude(), time: 1.0, strides };
+        geodesic(study, &problem);
+        study.visit(&problem, "Cayley", Cayley, 2.0);
+    }
 
     let leaning = |q: &Vector2<Real>| {
         let across = q.x.sin() * 0.4;
@@ -467,10 +505,11 @@ fn closures(study: &mut impl Study) {
         .energy(|q: &Vector2<Real>| q.x.powi(2) * 0.5 + q.y.powi(2) + q.x.powi(3) * 0.1)
         .build()
         .expect("a problem is a system");
+    let strides = vec![(vector![0.0, 0.55], 2.0)];
     let (name, manifold, metric) = ("area form", "2-chart", "non-diagonal");
     geodesic(
         study,
-        &Problem { name, manifold, metric, system, start: vector![0.6, 0.4], time: 2.0 },
+        &Problem { name, manifold, metric, system, start: vector![0.6, 0.4], time: 2.0, strides },
     );
 
     let leaning = |q: &Vector3<Real>| {
@@ -480,13 +519,15 @@ fn closures(study: &mut impl Study) {
     let system = System::on(Euclidean::<3>)
         .metric(Metric::field(leaning))
         .bracket(Nambu::default())
+        .dissipation(Scaled(0.1, MetricDissipation))
         .energy(bumpy::<3>)
         .entropy(|q: &Vector3<Real>| q.norm_squared() * 0.5 + q.z.powi(3) * 0.1)
         .build()
         .expect("a problem is a system");
+    let strides = vec![(vector![-1.1, 0.8, 0.9], 2.0)];
     let (name, manifold, metric) = ("Nambu", "3-chart", "non-diagonal");
     let start = vector![0.5, -0.4, 0.3];
-    geodesic(study, &Problem { name, manifold, metric, system, start, time: 2.0 });
+    geodesic(study, &Problem { name, manifold, metric, system, start, time: 2.0, strides });
 }
 
 /// Products.
@@ -499,8 +540,9 @@ fn products(study: &mut impl Study) {
         .build()
         .expect("a problem is a system");
     let start = (Vector3::from_element(3.0_f64.sqrt().recip()), Vector1::new(0.1));
+    let strides = vec![(vector![1.3, 0.2, 1.5], 2.0)];
     let (name, manifold, metric) = ("spin in a bath", "S² × R", CANONICAL);
-    geodesic(study, &Problem { name, manifold, metric, system, start, time: 2.0 });
+    geodesic(study, &Problem { name, manifold, metric, system, start, time: 2.0, strides });
 
     let system = System::on(Product(Sphere::<2>::round(), HalfLine))
         .metric((Canonical, Canonical))
@@ -510,8 +552,9 @@ fn products(study: &mut impl Study) {
         .build()
         .expect("a problem is a system");
     let start = (Vector3::new(FRAC_1_SQRT_2, 0.5, 0.5), Vector1::new(0.8));
+    let strides = vec![(vector![-0.2, 0.1, -0.6], 8.0)];
     let (name, manifold) = ("spin in a bath", "S² × R₊");
-    geodesic(study, &Problem { name, manifold, metric, system, start, time: 2.0 });
+    geodesic(study, &Problem { name, manifold, metric, system, start, time: 2.0, strides });
 
     let energy = |(r, p): &(Matrix3<Real>, Vector3<Real>)| {
         p.x.powi(2) * 0.5
@@ -526,8 +569,9 @@ fn products(study: &mut impl Study) {
         .energy(energy)
         .build()
         .expect("a problem is a system");
+    let strides = vec![(vector![-0.9, 0.8, 1.0, 0.6, 1.4, 0.9], 1.0)];
     let (name, manifold) = ("heavy body", "SO(3) × R³");
-    geodesic(study, &Problem { name, manifold, metric, system, start, time: 2.0 });
+    geodesic(study, &Problem { name, manifold, metric, system, start, time: 2.0, strides });
 
     let full = |(r, _): &(Matrix3<Real>, Vector3<Real>)| {
         let mut g = nalgebra::Matrix6::<Real>::identity();
@@ -541,6 +585,7 @@ fn products(study: &mut impl Study) {
         .entropy(|(r, p): &(Matrix3<Real>, Vector3<Real>)| r.m12 - p.norm_squared() * 0.3)
         .build()
         .expect("a problem is a system");
+    let strides = vec![(vector![0.2, -0.3, 1.5, -1.3, -0.9, 0.3], 4.0)];
     let (name, metric) = ("relaxation", "full closure");
-    geodesic(study, &Problem { name, manifold, metric, system, start, time: 1.0 });
+    geodesic(study, &Problem { name, manifold, metric, system, start, time: 1.0, strides });
 }

@@ -130,6 +130,7 @@ pub struct NoEnergy;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct NoEntropy;
 
+#[diagnostic::do_not_recommend]
 impl<M: Space> ScalarField<M> for NoEntropy {
     #[inline]
     fn at<D: Scalar>(&self, _: &M::Point<D>) -> D {

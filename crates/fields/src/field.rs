@@ -79,6 +79,7 @@ pub trait ScalarField<M: Space> {
 }
 
 /// A number is the constant field with this value.
+#[diagnostic::do_not_recommend]
 impl<M: Space> ScalarField<M> for f64 {
     #[inline]
     fn at<D: Scalar>(&self, _: &M::Point<D>) -> D {

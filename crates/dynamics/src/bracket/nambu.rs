@@ -43,7 +43,7 @@ use super::{Bracket, BracketJet, NaturalBracket, Site, Zero};
 /// let height = |x: &Vector5<Real>| x[4];
 /// let system = System::on(Sphere::<4>)
 ///     .bracket(Nambu::default().and(height))
-///     .energy(|x: &Vector5<Real>| x[0].powi(2) + x[1].powi(2) * 2.0)
+///     .energy(|x: &Vector5<Real>| x[0] * x[0] + x[1] * x[1] * 2.0)
 ///     .entropy(|x: &Vector5<Real>| x[0] + x[2] * x[3])
 ///     .casimir(height)
 ///     .build();

@@ -354,3 +354,33 @@ fn logarithms_of_a_bumpy_conformal_metric_are_found() {
     println!("{found} of 10000 logarithms of the bumpy metric");
     assert!(found >= 9990);
 }
+
+/// A numerical geodesic of two radians has an error of its own, of which the energy must see nothing.
+#[test]
+fn long_steps_along_numerical_geodesics_keep_the_energy() {
+    let metric = |q: &Vector2<Real>| {
+        let (a, b) = (q.x.sin() * 0.3 + 1.0, q.y.cos() * 0.3 + 1.2);
+        Matrix2::new(a, a * b * 0.25, a * b * 0.25, b)
+    };
+    let energy = |x: f64, y: f64| 0.5 * x * x + 0.3 * y * y + 0.2 * x.cos();
+    let system = System::on(Euclidean::<2>)
+        .metric(Metric::field(metric))
+        .bracket(AreaForm)
+        .energy(|q: &Vector2<Real>| q.x.powi(2) * 0.5 + q.y.powi(2) * 0.3 + q.x.cos() * 0.2)
+        .build()
+        .unwrap();
+    let (mut long, mut worst) = (0, 0.0_f64);
+    for k in 0..20_u32 {
+        let start = vector![1.5 + 0.1 * f64::from(k), -0.5 + 0.13 * f64::from(k)];
+        for h in [1.5, 2.0, 2.5, 3.0, 4.0, 5.0] {
+            let mut steps = WeylMidpoint.steps(&system, start, h).unwrap();
+            let end = steps.advance().unwrap().point;
+            let size = energy(start.x, start.y);
+            worst = worst.max((energy(end.x, end.y) - size).abs() / size.max(1.0));
+            // The eigenvalues of the metric are above 0.6.
+            long += u32::from(steps.certificate().retries == 0 && (end - start).norm() > 2.6);
+        }
+    }
+    println!("{long} steps of two radians, |H − H₀| ≤ {worst:.1e}");
+    assert!(long >= 50 && worst <= 50.0 * f64::EPSILON, "{long}, {worst:e}");
+}

@@ -2,16 +2,16 @@
 
 use std::cell::{Cell, OnceCell};
 
-use metriplectic_dynamics::orthogonal::Moving;
+use metriplectic_dynamics::orthogonal::{Moving, Orthogonal};
 use metriplectic_dynamics::velocity::{
-    Covectors, Gradient, VelocityJet, irreversible, reversible, velocity_jet,
+    Covectors, Gradient, VelocityJet, differentials, irreversible, reversible, velocity_jet,
 };
 use metriplectic_dynamics::{Metriplectic, SecondLaw, system::Point};
 use metriplectic_fields::{
     ChartPoint, Column, Dimension, Matrix, Scalar, ScalarField, Space, Square, Vector, differential,
 };
 use metriplectic_manifolds::{
-    Arc, ArcJet, InnerProduct, Manifold, MetricError, Nodes, Retraction, Riemannian,
+    Arc, ArcJet, Canonical, InnerProduct, Manifold, MetricError, Nodes, Retraction, Riemannian,
 };
 
 use crate::discrete_gradient::{Chord, DiscreteGradient, Segment};
@@ -219,7 +219,8 @@ where
     /// `F + (e − ⟨w, F⟩) w/|w|²`, as long as this changes `F` within its round-off and reduces `e`.
     ///
     /// Where the end is nearer to the edge of a domain than the displacement has digits, no `u` has the
-    /// right energy; there the end itself is moved, within the rounding of `u`.
+    /// right energy, and a numerical geodesic has an error of its own: there the end itself is moved, within
+    /// the accuracy of geodesics.
     #[inline]
     pub(crate) fn last_correction(
         &self,
@@ -227,7 +228,8 @@ where
         end: &Point<Y>,
     ) -> Option<LastCorrection<Y::Manifold>> {
         // A floor near the rounding of the entries of x' needs no correction.
-        let coarse = root.floor > 8.0 * f64::EPSILON * Y::Manifold::magnitude(self.x);
+        let accuracy = self.system.metric().accuracy().max(root.floor);
+        let coarse = accuracy > 8.0 * f64::EPSILON * Y::Manifold::magnitude(self.x);
         let e = if coarse { self.imbalance(end) } else { 0.0 };
         if self.is_balanced(e) { None } else { self.correct(&root.u, end, e) }
     }
@@ -246,7 +248,8 @@ where
         end: &Point<Y>,
         e: f64,
     ) -> Option<LastCorrection<Y::Manifold>> {
-        let balanced = self.balance(u, e);
+        let closed = self.system.metric().accuracy() <= 4.0 * f64::EPSILON;
+        let balanced = if closed { self.balance(u, e) } else { None };
         let (u, at) = balanced.as_ref().map_or((u, end), |(u, end)| (u, end));
         if let Some(end) = self.settle(u, at) {
             return Some(LastCorrection { u: *u, end, moved: true });
@@ -254,18 +257,28 @@ where
         balanced.map(|(u, end)| LastCorrection { u, end, moved: false })
     }
 
-    /// The end `x'` with the part along `dH` taken off that the rounding of `u` has put there.
+    /// The end `x'` moved onto the level of the energy, within the accuracy of geodesics, and along the
+    /// levels of the entropy and the further invariants.
     fn settle(&self, u: &Vector<Y::Manifold>, end: &Point<Y>) -> Option<Point<Y>> {
         let e = self.imbalance(end);
         if self.is_balanced(e) {
             return None;
         }
-        let slope = self.system.energy().jet1(end).df;
-        let off = slope * (-e / slope.dot(&slope));
-        let rounding = f64::EPSILON * (Y::Manifold::magnitude(self.x) + u.magnitude());
+        let w = differentials(self.system, &ChartPoint::<Y::Manifold>::centre(end));
+        let mut kept = Orthogonal::<Dim<Y>>::default();
+        if self.is_exact() {
+            kept.push(&Canonical, &w.entropy);
+        }
+        for (_, l) in w.invariants.as_ref().iter().flatten() {
+            kept.push(&Canonical, l);
+        }
+        let across = kept.off_covector(0, &w.energy);
+        let off = across * (-e / across.dot(&w.energy));
+        let inaccuracy =
+            self.system.metric().accuracy() * (Y::Manifold::magnitude(self.x) + u.magnitude());
         let settled = Y::Manifold::chart(end, &off);
         let better = self.imbalance(&settled).abs() < e.abs();
-        (off.magnitude() <= 4.0 * rounding && better).then_some(settled)
+        (off.magnitude() <= inaccuracy && better).then_some(settled)
     }
 
     /// The root with the energy corrected by its error `e`.

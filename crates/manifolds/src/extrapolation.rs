@@ -14,7 +14,7 @@ pub(crate) trait State: Copy {
 }
 
 /// The relative error of a step.
-const TOLERANCE: f64 = 1e-13;
+pub(crate) const TOLERANCE: f64 = 1e-13;
 /// Substeps of the midpoint rule, before extrapolation.
 const SUBSTEPS: [u32; 8] = [2, 4, 6, 8, 10, 12, 14, 16];
 

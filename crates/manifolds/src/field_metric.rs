@@ -110,6 +110,10 @@ impl<M: Manifold, F: MatrixField<M>> Riemannian<M> for FieldMetric<F> {
         })
     }
 
+    fn accuracy(&self) -> f64 {
+        geodesic::ACCURACY
+    }
+
     fn slopes(&self, x: &M::Point<f64>) -> Option<<M::Dim as Dimension>::Array<Matrix<M>>> {
         Some(self.field.covariant_jet(x).slopes)
     }

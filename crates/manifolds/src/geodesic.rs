@@ -25,6 +25,7 @@ use metriplectic_fields::{
 use num_dual::{Dual, Dual64};
 
 use crate::MetricError;
+pub(crate) use crate::extrapolation::TOLERANCE as ACCURACY;
 use crate::extrapolation::{self, State};
 use crate::metric::GeodesicEnd;
 

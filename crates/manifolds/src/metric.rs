@@ -33,6 +33,9 @@ pub trait InnerProduct<V>: Copy {
     }
 }
 
+/// A few roundings: the accuracy of a closed form.
+pub(crate) const ROUNDED: f64 = 4.0 * f64::EPSILON;
+
 /// Where a geodesic arrives: the point in the chart centred at its real part, and the velocity in
 /// that frame.
 pub type GeodesicEnd<M, D> = (ChartPoint<M, D>, Vector<M, D>);
@@ -164,6 +167,11 @@ pub trait Riemannian<M: Space> {
             }
         }
         Ok(symbols)
+    }
+
+    /// The relative accuracy of the ends of geodesics.
+    fn accuracy(&self) -> f64 {
+        ROUNDED
     }
 
     /// What rounding has lost of the displacement `v` on the way from `x` to `y = exp_x(v)`, so that

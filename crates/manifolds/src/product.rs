@@ -393,6 +393,11 @@ macro_rules! metric_of_the_factors {
             })
         }
 
+        fn accuracy(&self) -> f64 {
+            let (g, f) = Split::<A, B>::halves(self);
+            Riemannian::<A>::accuracy(g).max(Riemannian::<B>::accuracy(f))
+        }
+
         #[inline]
         fn lost(
             &self,

@@ -148,9 +148,6 @@ impl Orders {
 }
 
 /// Steps that are far too large for accuracy, of each retraction on every problem.
-///
-/// With numerical geodesics the starts are chosen: of 76 such steps from a grid on the 2-chart 32 keep
-/// the energy to `50 ε`, and the others to `2600 ε`; a geodesic is good to 10⁻¹³ in each piece.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LargeSteps {
     /// Those of each problem and scheme.

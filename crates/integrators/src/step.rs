@@ -221,7 +221,9 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
         }
         // The last digits of the end, which no residual has seen, may be beyond the edge.
         (work.energy, work.entropy) = (system.energy_at(&end), system.entropy_at(&end));
-        if work.energy.is_finite() && work.entropy.is_finite() { Ok(end) } else { Err(lost()) }
+        let has_digits =
+            (work.energy - start.energy).abs() <= NO_DIGITS * start.energy.abs().max(1.0);
+        if has_digits && work.entropy.is_finite() { Ok(end) } else { Err(lost()) }
     }
 
     /// A root where Newton's method has lost its way from the guess, in the order of the
@@ -316,6 +318,10 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
         None
     }
 }
+
+/// A step that changes the energy by this share of it ends so near to the edge of a domain that the energy
+/// has no digits there.
+const NO_DIGITS: f64 = 1e-3;
 
 /// What Newton's method has cost.
 fn sweeps<M: Manifold>(solved: &Result<Root<M>, NoRoot<M>>) -> usize {

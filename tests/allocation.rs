@@ -107,6 +107,7 @@ fn main() {
         .energy(|(x, s): &Warm| x.norm_squared() * 0.5 + x.xy().norm_squared().powi(2) + s.x.exp())
         .entropy(|(_, s): &Warm| s.x)
         .momentum(|(x, _): &Warm| x.x * x.w - x.y * x.z)
+        .dissipation(MetricDissipation::scaled(|_: &Warm| Real::from(1e-4)))
         .build()
         .expect("it is a system");
     assert_eq!(blocks(&spring, (vector![0.6, 0.0, 0.1, 0.8], vector![0.0])), 0);

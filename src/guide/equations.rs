@@ -35,7 +35,7 @@
 //! |---|---|---|
 //! | `♯_K(α) = K(α, ·)`, `grad^K S = ♯_K(dS)` | [`Dissipation::apply`](crate::dynamics::Dissipation::apply) | `tests/laws.rs::each_law_of_a_dissipation_can_break` |
 //! | `(f, g) = K(df, dg) = K^{ij} f_i g_j`, symmetric, `⪰ 0` | [`Dissipation::tensor`](crate::dynamics::Dissipation::tensor), [`laws::dissipation`](crate::dynamics::laws::dissipation) | `tests/laws.rs::the_metric_dissipation_keeps_the_laws` |
-//! | `G*(df, dg) = G(grad f, grad g)` | [`InnerProduct`](crate::manifolds::InnerProduct), [`Riemannian`](crate::manifolds::Riemannian) | `crates/manifolds/src/laws.rs::flat_spaces_keep_the_laws`, `tests/metrics.rs::metrics_that_vary_keep_the_laws_on_the_sphere_and_on_rotations` |
+//! | `G*(df, dg) = G(grad f, grad g)` | [`InnerProduct`](crate::manifolds::InnerProduct), [`Riemannian`](crate::manifolds::Riemannian) | `crates/manifolds/src/laws.rs::flat_spaces_keep_the_laws`, `tests/metrics.rs::metrics_that_vary_keep_the_laws_on_rotations_and_products` |
 //! | (semid) `K(α, β) = G*(dH,dH) G*(α,β) − G*(dH,α) G*(dH,β)`, both lines | [`MetricDissipation`](crate::dynamics::MetricDissipation) | `tests/equations.rs::the_form_of_the_metric_is_the_printed_one_on_each_line` |
 //! | `K^{ij} = C_H g^{ij} − (g⁻¹dH)^i (g⁻¹dH)^j` | the same | `tests/equations.rs::the_form_of_the_metric_is_the_printed_one_on_each_line` |
 //! | remark: `K(α, β) = G*(Qα, Qβ)` off all `dL_a` † | [`SystemBuilder::casimir`](crate::dynamics::SystemBuilder::casimir), [`momentum`](crate::dynamics::SystemBuilder::momentum), with the scale `G*(dH, dH)` | `tests/errata.rs::the_remark_has_another_scale_than_the_equation_before_it`, `tests/errata.rs::a_momentum_is_kept_if_its_differential_is_killed` |

@@ -234,6 +234,11 @@ where
         if self.is_balanced(e) { None } else { self.correct(&root.u, end, e) }
     }
 
+    /// Whether the ends of geodesics are good to a few roundings.
+    fn has_closed_geodesics(&self) -> bool {
+        self.system.metric().accuracy() <= 4.0 * f64::EPSILON
+    }
+
     /// Whether an error of the energy is its round-off.
     #[inline]
     fn is_balanced(&self, e: f64) -> bool {
@@ -248,8 +253,7 @@ where
         end: &Point<Y>,
         e: f64,
     ) -> Option<LastCorrection<Y::Manifold>> {
-        let closed = self.system.metric().accuracy() <= 4.0 * f64::EPSILON;
-        let balanced = if closed { self.balance(u, e) } else { None };
+        let balanced = if self.has_closed_geodesics() { self.balance(u, e) } else { None };
         let (u, at) = balanced.as_ref().map_or((u, end), |(u, end)| (u, end));
         if let Some(end) = self.settle(u, at) {
             return Some(LastCorrection { u: *u, end, moved: true });
@@ -257,8 +261,8 @@ where
         balanced.map(|(u, end)| LastCorrection { u, end, moved: false })
     }
 
-    /// The end `x'` moved onto the level of the energy, within the accuracy of geodesics, and along the
-    /// levels of the entropy and the further invariants.
+    /// The end `x'` moved onto the level of the energy, within the accuracy of geodesics: by the shortest
+    /// way within a rounding, and along the levels of the entropy and the further invariants beyond it.
     fn settle(&self, u: &Vector<Y::Manifold>, end: &Point<Y>) -> Option<Point<Y>> {
         let e = self.imbalance(end);
         if self.is_balanced(e) {
@@ -266,10 +270,11 @@ where
         }
         let w = differentials(self.system, &ChartPoint::<Y::Manifold>::centre(end));
         let mut kept = Orthogonal::<Dim<Y>>::default();
-        if self.is_exact() {
+        let rounded = self.has_closed_geodesics();
+        if self.is_exact() && !rounded {
             kept.push(&Canonical, &w.entropy);
         }
-        for (_, l) in w.invariants.as_ref().iter().flatten() {
+        for (_, l) in w.invariants.as_ref().iter().flatten().filter(|_| !rounded) {
             kept.push(&Canonical, l);
         }
         let across = kept.off_covector(0, &w.energy);

@@ -22,6 +22,10 @@ test:
     PROPTEST_RNG_SEED=2401 cargo test --workspace --all-features --tests
     cargo test --workspace --all-features --doc
 
+# what verification refuses, and that it accepts the models of the tests that build many, and of the examples
+verification: examples
+    cargo test --all-features --test verification --test problems --test laws --test second_law --test hard_corpus --test random_systems --test dissipations --test invariants --test equations --test errata --test euler_poincare --test metrics --test bad_input --test fuzz
+
 # build the documentation with rendered formulas, warnings are errors
 doc:
     RUSTDOCFLAGS="-D warnings --html-in-header {{ justfile_directory() / "docs/katex.html" }}" cargo doc --workspace --no-deps --all-features
@@ -56,6 +60,14 @@ study:
 # random input without sense for ten minutes: a third of the seconds for each of six searches, two at a time
 fuzz seconds="600":
     FUZZ_SECONDS=$(({{ seconds }} / 3)) cargo test --release --all-features --test fuzz -- --nocapture --test-threads 2
+
+# change the integrators and the dynamics in small ways, one shard of all, and list the changes that no test notices
+mutants shard="0/64": (need "cargo mutants --version" "cargo install cargo-mutants --locked")
+    cargo mutants --package metriplectic-integrators --package metriplectic-dynamics \
+        --shard {{ shard }} --sharding round-robin --all-features --output target --timeout 300 \
+        --test-package metriplectic \
+        --cargo-arg=--test=mutations --cargo-arg=--test=conservation \
+        --cargo-arg=--test=second_law --cargo-arg=--test=jacobian
 
 # time steps, and print the table of orders
 bench:

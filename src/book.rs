@@ -10,6 +10,9 @@ struct FirstSystem;
 #[doc = include_str!("../book/src/closures.md")]
 struct Closures;
 
+#[doc = include_str!("../book/src/compiler_messages.md")]
+struct CompilerMessages;
+
 #[doc = include_str!("../book/src/manifolds.md")]
 struct Manifolds;
 
@@ -18,6 +21,9 @@ struct Schemes;
 
 #[doc = include_str!("../book/src/verification.md")]
 struct Verification;
+
+#[doc = include_str!("../book/src/units.md")]
+struct Units;
 
 #[doc = include_str!("../book/src/performance.md")]
 struct Performance;

@@ -60,9 +60,10 @@ pub use nalgebra;
 /// Everything that a program usually needs.
 pub mod prelude {
     pub use metriplectic_dynamics::{
-        AreaForm, CasimirDissipation, CometricDissipation, FieldDissipation, KulkarniNomizu,
-        Legendre, LiePoisson, MetricDissipation, Metriplectic, ModelError, Nambu, Poisson,
-        ProjectedDissipation, Scaled, SecondLaw, Symplectic, System, Zero,
+        AlmostPoisson, AreaForm, CasimirDissipation, CometricDissipation, FieldDissipation, Force,
+        ForcedLiePoisson, KulkarniNomizu, Legendre, LiePoisson, MetricDissipation, Metriplectic,
+        ModelError, Nambu, Poisson, ProjectedDissipation, Scaled, SecondLaw, Symplectic, System,
+        Zero,
     };
     pub use metriplectic_fields::{MatrixField, Real, Scalar, ScalarField};
     pub use metriplectic_integrators::{

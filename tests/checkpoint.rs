@@ -2,7 +2,7 @@
 
 mod models;
 
-use metriplectic::integrators::{Checkpoint, Course, ResumeError, Steps};
+use metriplectic::integrators::{Checkpoint, Course, ResumeError, SpanError, Steps};
 use metriplectic::manifolds::PointError;
 use metriplectic::prelude::*;
 use models::{TUMBLING, UNSTABLE, free_body, half_square, relaxing_body, top};
@@ -186,7 +186,7 @@ fn a_damaged_checkpoint_is_refused() {
     };
     assert_eq!(with(&|_| ()), None);
     let error = with(&|tree| tree["version"] = 7.into());
-    assert_eq!(error, Some(ResumeError::Version { found: 7, expected: 1 }));
+    assert_eq!(error, Some(ResumeError::Version { found: 7, expected: 2 }));
     let error = with(&|tree| tree["point"][1] = "NaN".into());
     assert!(matches!(error, Some(ResumeError::Point(PointError::NotFinite { index: 1, .. }))));
     let error = with(&|tree| tree["time"] = "-1.0".into());
@@ -204,6 +204,168 @@ fn a_damaged_checkpoint_is_refused() {
     let mut unread = tree.clone();
     unread["enegry"] = "1.0".into();
     assert!(serde_json::from_value::<Checkpoint>(unread).is_err());
+}
+
+#[test]
+fn every_number_of_a_checkpoint_is_compared_with_the_others() {
+    let body = relaxing_body();
+    let tree = |course: Course| {
+        let mut steps = WeylMidpoint.steps(&body, UNSTABLE, course).unwrap();
+        for _ in 0..20 {
+            steps.advance().unwrap();
+        }
+        serde_json::to_value(steps.checkpoint()).unwrap()
+    };
+    let fixed = tree(Span::steps(0.1, 50).into());
+    let adaptive = tree(Span::until(10.0).tolerance(1e-4).until_rest(1e-9).into());
+    let with = |tree: &serde_json::Value, path: &str, value: serde_json::Value| {
+        let mut tree = tree.clone();
+        *tree.pointer_mut(path).expect(path) = value;
+        let checkpoint = serde_json::from_value::<Checkpoint>(tree).expect(path);
+        WeylMidpoint.resume(&body, &checkpoint).err()
+    };
+    assert_eq!(with(&fixed, "/every", 1.into()), None);
+    assert_eq!(with(&adaptive, "/every", 1.into()), None);
+    for (path, value, what) in [
+        ("/balance/initial_energy", "NaN", "initial energy"),
+        ("/balance/initial_energy", "0.4", "initial energy"),
+        ("/balance/max_energy_error", "-1.0", "largest error of the energy"),
+        ("/balance/initial_entropy", "inf", "initial entropy"),
+        ("/balance/initial_entropy", "0.4", "growth of the entropy"),
+        ("/balance/entropy_gained", "1e9", "growth of the entropy"),
+        ("/balance/min_entropy_increment", "NaN", "smallest growth of the entropy"),
+        ("/balance/min_entropy_slope", "NaN", "least slope of the entropy"),
+        ("/balance/max_manifold_defect", "NaN", "largest defect"),
+        ("/balance/smallest_step", "1e9", "smallest step"),
+        ("/kept_entropy", "1e9", "kept entropy"),
+        ("/kept_entropy", "NaN", "kept entropy"),
+        ("/start", "NaN", "start"),
+        ("/start", "7.0", "time"),
+        ("/time", "1e9", "time"),
+        ("/largest_velocity/0", "NaN", "largest velocities"),
+        ("/largest_velocity/0", "-1.0", "largest velocity of an entry"),
+        ("/carry/0", "1e-3", "lost digits of an entry"),
+        ("/sizes/1", "-1.0", "size of an entry"),
+    ] {
+        for tree in [&fixed, &adaptive] {
+            match with(tree, path, value.into()) {
+                Some(ResumeError::Damaged { what: found, .. }) => assert_eq!(found, what, "{path}"),
+                other => panic!("{path} {value}: {other:?}"),
+            }
+        }
+    }
+    for (tree, path, value, what) in [
+        (&fixed, "/step", 19.into(), "number of steps in the balance"),
+        (&fixed, "/count", 19.into(), "number of steps to take"),
+        (&fixed, "/pace/Fixed/h", "0.2".into(), "time"),
+        (&fixed, "/ending", "Span".into(), "number of steps"),
+        (&adaptive, "/ending", "Span".into(), "time"),
+        (&adaptive, "/pace/Adaptive/end", "1e-3".into(), "time"),
+        (&adaptive, "/pace/Adaptive/end", "NaN".into(), "end"),
+        (&adaptive, "/pace/Adaptive/tolerance", "NaN".into(), "tolerance"),
+        (&adaptive, "/sizes/1", "0.5".into(), "size of an entry"),
+        (&adaptive, "/rest", "2.0".into(), "tolerance of rest"),
+        (&adaptive, "/most", 1.into(), "number of states to record"),
+    ] as [(_, _, serde_json::Value, _); 11]
+    {
+        match with(tree, path, value.clone()) {
+            Some(ResumeError::Damaged { what: found, .. }) => assert_eq!(found, what, "{path}"),
+            other => panic!("{path} {value}: {other:?}"),
+        }
+    }
+    // A file that is not damaged, of a run that has ended, is not taken for one that has not.
+    let mut steps = WeylMidpoint.steps(&body, UNSTABLE, Span::steps(0.1, 5)).unwrap();
+    while steps.next().is_some() {}
+    let tree = serde_json::to_value(steps.checkpoint()).unwrap();
+    let error = with(&tree, "/ending", serde_json::Value::Null);
+    assert!(matches!(error, Some(ResumeError::Damaged { what: "number of steps", .. })));
+}
+
+/// An oscillator with the energy `(a p² + q²)/2` times a unit, and friction `b` into its entropy.
+fn oscillator(a: f64, b: f64, unit: f64) -> impl Metriplectic<Manifold = Euclidean<3>> {
+    System::on(Euclidean::<3>)
+        .bracket(
+            Poisson::constant(Matrix3::new(0.0, 1.0, 0.0, -1.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+                .expect("it is skew"),
+        )
+        .energy(move |x: &Vector3<Real>| ((x.y.powi(2) * a + x.x.powi(2)) * 0.5 + x.z) * unit)
+        .entropy(|x: &Vector3<Real>| x.z)
+        .dissipation(FieldDissipation(move |_: &Vector3<Real>, w: &Vector3<Real>| {
+            let b_ = Vector3::new(Real::from(0.0), w.z, -w.y);
+            b_ * b_.transpose() * (w.z.recip() * b)
+        }))
+        .build()
+        .expect("the parts make a system")
+}
+
+#[test]
+fn another_system_is_noticed_in_any_unit() {
+    for unit in [1.0, 1e-20, 1e20] {
+        let system = oscillator(1.0, 0.1, unit);
+        let start = vector![0.3, 0.2, 0.0];
+        let mut steps = WeylMidpoint.steps(&system, start, 0.01 / unit).unwrap();
+        steps.advance().unwrap();
+        let checkpoint = steps.checkpoint();
+        assert!(WeylMidpoint.resume(&system, &checkpoint).is_ok());
+        let refused = |other| match WeylMidpoint.resume(&other, &checkpoint).err() {
+            Some(ResumeError::AnotherSystem { field, .. }) => field,
+            other => panic!("{unit:e}: {other:?}"),
+        };
+        assert_eq!(refused(oscillator(1.0 + 1e-9, 0.1, unit)), "energy");
+        // The same energy and entropy, and other friction.
+        assert_eq!(refused(oscillator(1.0, 0.1 * (1.0 + 1e-9), unit)), "velocity");
+    }
+}
+
+#[test]
+fn a_run_that_has_reached_its_end_goes_on() {
+    let body = relaxing_body();
+    let whole = WeylMidpoint.run(&body, UNSTABLE, Span::steps(0.1, 300)).unwrap();
+    let first = WeylMidpoint.run(&body, UNSTABLE, Span::steps(0.1, 100)).unwrap();
+    let later = first.checkpoint().clone().with_steps(300).unwrap();
+    let second = WeylMidpoint.resume(&body, &through_a_file(&later)).unwrap().run().unwrap();
+    let joined = first.iter().chain(second.iter().skip(1)).map(bits);
+    assert!(joined.eq(whole.iter().map(bits)));
+    assert_eq!(second.certificate(), whole.certificate());
+    assert_eq!(second.checkpoint(), whole.checkpoint());
+
+    // In steps of a controller, before one is shortened to meet the end, the same bits.
+    let span = |end: f64| Span::until(end).tolerance(1e-4).starting_at(-20.0);
+    let whole = WeylMidpoint.run(&body, UNSTABLE, span(20.0)).unwrap();
+    let mut steps = WeylMidpoint.steps(&body, UNSTABLE, span(0.0)).unwrap();
+    for _ in 0..100 {
+        steps.advance().unwrap();
+    }
+    let later = through_a_file(&steps.checkpoint()).with_end(20.0).unwrap();
+    let second = WeylMidpoint.resume(&body, &later).unwrap().run().unwrap();
+    assert!(second.iter().map(bits).eq(whole.iter().skip(100).map(bits)));
+    // After its end, the same motion.
+    let first = WeylMidpoint.run(&body, UNSTABLE, span(0.0)).unwrap();
+    let later = first.checkpoint().clone().with_end(20.0).unwrap();
+    let second = WeylMidpoint.resume(&body, &later).unwrap().run().unwrap();
+    assert_eq!(second.last().time.to_bits(), 20.0_f64.to_bits());
+    assert!((second.last().point - whole.last().point).norm() < 1e-3);
+    assert!(second.certificate().keeps_energy() && second.certificate().keeps_entropy());
+
+    // What cannot go on so.
+    let fixed = WeylMidpoint.run(&body, UNSTABLE, Span::steps(0.1, 10)).unwrap();
+    let fixed = || fixed.checkpoint().clone();
+    assert!(matches!(fixed().with_steps(10), Err(ResumeError::Span(SpanError::NoSteps))));
+    assert_eq!(fixed().with_end(20.0), Err(ResumeError::FixedSteps));
+    let adaptive = || first.checkpoint().clone();
+    assert_eq!(adaptive().with_steps(20), Err(ResumeError::AdaptiveSteps));
+    assert!(matches!(adaptive().with_end(0.0), Err(ResumeError::Span(SpanError::End { .. }))));
+    assert!(matches!(adaptive().with_end(f64::NAN), Err(ResumeError::Span(SpanError::End { .. }))));
+}
+
+#[test]
+fn a_run_that_failed_goes_on_with_another_scheme() {
+    let body = relaxing_body();
+    let span = Span::until(10.0).tolerance(1e-9).least_step(1e-2);
+    let error = WeylMidpoint.run(&body, UNSTABLE, span).unwrap_err();
+    let stopped = error.trajectory().expect("it had started");
+    let resumed = WeylMidpoint.resume(&body, stopped.checkpoint()).unwrap();
+    assert_eq!(resumed.state(), stopped.last());
 }
 
 #[test]

@@ -260,8 +260,48 @@ fn the_compiler_explains_what_is_not_a_field() {
     let cases = trybuild::TestCases::new();
     cases.pass("tests/doors/a_closure_is_a_field.rs");
     cases.pass("tests/doors/a_type_of_your_own_has_every_order.rs");
+    cases.compile_fail("tests/doors/bracket_*.rs");
     cases.compile_fail("tests/doors/closure_*.rs");
     cases.compile_fail("tests/doors/dissipation_*.rs");
     cases.compile_fail("tests/doors/energy_*.rs");
+    cases.compile_fail("tests/doors/force_*.rs");
     cases.compile_fail("tests/doors/matrix_*.rs");
+}
+
+/// The first line of a message without the paths of its types.
+fn short(message: &str) -> String {
+    let mut words = message.to_owned();
+    for path in
+        ["metriplectic::prelude::", "metriplectic::nalgebra::", "num_dual::datatypes::hyperdual::"]
+    {
+        words = words.replace(path, "");
+    }
+    while let Some(start) = words.find("{closure@") {
+        let end = words[start..].find('}').map_or(words.len(), |at| start + at + 1);
+        words.replace_range(start..end, "{closure}");
+    }
+    words
+}
+
+/// A reader who searches for a message finds it as a heading of the book. `…` stands for the rest of it.
+#[test]
+fn every_message_is_a_heading_of_the_book() {
+    let page = include_str!("../book/src/compiler_messages.md");
+    let headings: Vec<&str> = page.lines().filter_map(|line| line.strip_prefix("## ")).collect();
+    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doors");
+    let mut messages = 0;
+    for entry in std::fs::read_dir(folder).expect("the folder of the messages") {
+        let path = entry.expect("a file").path();
+        if path.extension().is_some_and(|extension| extension == "stderr") {
+            let text = std::fs::read_to_string(&path).expect("a message");
+            let message = short(text.lines().next().expect("a first line"));
+            let found = headings.iter().any(|heading| {
+                let beginning = heading.split('…').next().unwrap_or(heading);
+                message.starts_with(beginning)
+            });
+            assert!(found, "{} is no heading: {message}", path.display());
+            messages += 1;
+        }
+    }
+    assert!(messages >= 12, "{messages} messages");
 }

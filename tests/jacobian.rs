@@ -1,6 +1,6 @@
 //! The Jacobian of a step, assembled from jets, against nested dual numbers.
 
-use metriplectic::dynamics::velocity::independence;
+use metriplectic::dynamics::velocity::{independence, projected_shares};
 use metriplectic::fields::{Column, Square, jacobian};
 use metriplectic::integrators::{DiscreteGradient, Equation, Residual};
 use metriplectic::manifolds::Riemannian;
@@ -60,6 +60,16 @@ impl<const N: usize> ScalarField<Euclidean<N>> for Wavy<N> {
 impl<const N: usize> ScalarField<LieDual<N>> for Wavy<N> {
     fn at<D: Scalar>(&self, x: &SVector<D, N>) -> D {
         waves(&self.0, x)
+    }
+}
+
+/// Waves for a force, as a type with a generic method.
+#[derive(Clone, Copy)]
+struct Waves<const N: usize>([Coefficients<N>; N]);
+
+impl<const N: usize> Force<N> for Waves<N> {
+    fn at<D: Scalar>(&self, xi: &SVector<D, N>) -> SVector<D, N> {
+        SVector::from_fn(|i, _| waves(&self.0[i], xi))
     }
 }
 
@@ -280,6 +290,38 @@ proptest! {
         gradients_agree(&with_both, &x, &u)?;
     }
 
+    /// Where invariants are nearly dependent, the weights of the projections have derivatives too.
+    #[test]
+    fn where_invariants_fade_out(
+        h in coefficients::<4>(), s in coefficients::<4>(), c in coefficients::<4>(),
+        waves in prop::array::uniform4(-0.3..0.3), digits in 3.0..5.0_f64,
+        skew in prop::array::uniform::<_, 4>(columns::<4>(1.0)),
+        x in columns::<4>(1.0), u in displacements::<4>(),
+    ) {
+        let b = SMatrix::<f64, 4, 4>::from_columns(&skew);
+        let near = |by: f64| move |x: &SVector<Real, 4>| wavy(s)(x) + wavy(c)(x) * by;
+        let metric = move |x: &SVector<Real, 4>| {
+            let wave = SVector::<Real, 4>::from_fn(|i, _| x[(i + 1) % 4].sin() * waves[i]);
+            SMatrix::<Real, 4, 4>::identity() + wave * wave.transpose()
+        };
+        let system = System::on(Euclidean::<4>)
+            .bracket(Poisson::constant(b - b.transpose()).unwrap())
+            .energy(wavy(h))
+            .entropy(Wavy(s));
+        let fading = 10.0_f64.powf(-digits);
+        let casimir = system.clone().casimir(near(fading)).build().unwrap();
+        let momentum = system.clone().momentum(near(0.01 * fading)).build().unwrap();
+        let curved = system.metric(Metric::field(metric)).casimir(near(fading)).build().unwrap();
+        let centre = metriplectic::fields::ChartPoint::centre(&(x + u * 0.5));
+        let share = projected_shares(&casimir, &centre).unwrap()[0];
+        prop_assume!(share > 1e-5);
+        // A direction is off by ε/σ, and its derivatives by another 1/σ, which is in their size.
+        let digits = 10.0 / share;
+        agrees_with(((&WeylMidpoint, &Gonzalez), digits), &casimir, &x, &u)?;
+        agrees_with(((&WeylMidpoint, &Gonzalez), digits), &curved, &x, &u)?;
+        agrees_with(((&WeylMidpoint, &Gonzalez), 100.0 * digits), &momentum, &x, &u)?;
+    }
+
     #[test]
     fn with_an_exact_second_law_and_a_metric_that_varies(
         h in coefficients::<3>(), s in coefficients::<3>(), j in coefficients::<3>(),
@@ -300,6 +342,70 @@ proptest! {
         let centre = metriplectic::fields::ChartPoint::centre(&(x + u * 0.5));
         prop_assume!(independence(&system, &centre).unwrap()[0] > 0.3);
         agrees(&system, &x, &u)?;
+    }
+
+    /// A force, alone, with an exact second law, beside friction, and with invariants that it changes: the
+    /// Jacobian does not ask.
+    #[test]
+    fn with_a_force(
+        h in coefficients::<3>(), s in coefficients::<3>(), j in coefficients::<3>(),
+        g in metrics::<3>(), c in prop::array::uniform3(-0.3..0.3),
+        f in prop::array::uniform3(coefficients::<3>()),
+        x in columns::<3>(1.0), u in displacements::<3>(),
+    ) {
+        let force = move |xi: &Vector3<Real>| Vector3::from_fn(|i, _| waves(&f[i], xi));
+        let body = System::on(LieDual::so3()).metric(Metric::constant(g).unwrap()).energy(wavy(h));
+        agrees(&body.clone().force(force).build().unwrap(), &x, &u)?;
+        agrees(&body.clone().force(Waves(f)).build().unwrap(), &x, &u)?;
+        let exact = body.entropy(Wavy(s)).force(force);
+        agrees(&exact.clone().build().unwrap(), &x, &u)?;
+        let published = exact.second_law(SecondLaw::Published);
+        gradients_agree(&published.clone().build().unwrap(), &x, &u)?;
+        agrees(&published.dissipation(MetricDissipation).build().unwrap(), &x, &u)?;
+        // A metric that varies, and a momentum beside the energy.
+        let metric = move |q: &Vector3<Real>| {
+            let wave = Vector3::new(q.y.sin() * c[0], q.z.cos() * c[1], q.x * c[2]);
+            Matrix3::from_diagonal_element(Real::from(1.0)) + wave * wave.transpose()
+        };
+        let varies = System::on(LieDual::so3())
+            .metric(Metric::field(metric))
+            .energy(wavy(h))
+            .force(force)
+            .momentum(wavy(j))
+            .build()
+            .unwrap();
+        let x = x * 0.5;
+        let centre = metriplectic::fields::ChartPoint::centre(&(x + u * 0.5));
+        prop_assume!(independence(&varies, &centre).unwrap()[0] > 0.3);
+        agrees(&varies, &x, &u)?;
+    }
+
+    #[test]
+    fn with_a_force_on_se3_and_on_a_product(
+        h in coefficients::<6>(), s in coefficients::<6>(), c in coefficients::<6>(),
+        j in coefficients::<6>(), f in coefficients::<6>(), x in columns::<6>(1.0), u in displacements::<6>(),
+    ) {
+        let force = move |xi: &Vector6<Real>| {
+            let k = waves(&f, xi);
+            Vector6::from_fn(|i, _| xi[(i + 1) % 6].sin() * f[0][i] + k * f[1][i])
+        };
+        let system = System::on(LieDual::se3()).energy(Wavy(h)).force(force).entropy(wavy(s));
+        agrees(&system.clone().build().unwrap(), &x, &u)?;
+        let with_casimir = system.clone().casimir(wavy(c)).build().unwrap();
+        let with_both = system.casimir(wavy(c)).momentum(wavy(j)).build().unwrap();
+        let centre = metriplectic::fields::ChartPoint::centre(&(x + u * 0.5));
+        let shares = independence(&with_both, &centre).unwrap();
+        prop_assume!(shares.iter().all(|share| *share > 0.3));
+        agrees(&with_casimir, &x, &u)?;
+        agrees(&with_both, &x, &u)?;
+        let pair = System::on(Product(LieDual::so3(), LieDual::sl2()))
+            .bracket((ForcedLiePoisson(move |xi: &Vector3<Real>| xi.map(|xi| (xi * f[2][0]).sin())), LiePoisson))
+            .energy(move |x: &(Vector3<Real>, Vector3<Real>)| {
+                waves(&h, &Vector6::from_fn(|i, _| if i < 3 { x.0[i] } else { x.1[i - 3] }))
+            })
+            .build()
+            .unwrap();
+        agrees(&pair, &(x.fixed_rows::<3>(0).into_owned(), x.fixed_rows::<3>(3).into_owned()), &u)?;
     }
 
     #[test]

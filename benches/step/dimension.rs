@@ -1,5 +1,7 @@
 //! The cost of a step against the dimension: a ring of anharmonic oscillators on Rⁿ.
 
+use metriplectic::dynamics::bracket::EvenDimension;
+use metriplectic::nalgebra::Const;
 use metriplectic::prelude::*;
 
 use crate::Row;
@@ -16,7 +18,10 @@ fn ring<const N: usize>(x: &SVector<Real, N>) -> Real {
     energy
 }
 
-fn row<const N: usize>() -> Row {
+fn row<const N: usize>() -> Row
+where
+    Const<N>: EvenDimension,
+{
     let system = System::on(Euclidean::<N>)
         .bracket(Symplectic)
         .energy(ring::<N>)

@@ -24,6 +24,8 @@
 //! | [`Symplectic`](crate::dynamics::Symplectic) | for positions and momenta, R²ⁿ or `T*SO(3)` | constants only |
 //! | [`Poisson::constant`](crate::dynamics::Poisson::constant) | the same with further variables, such as `s` in `(q, p, s)` | functions of the variables with zero rows |
 //! | [`Poisson::field`](crate::dynamics::Poisson::field) | for a matrix that varies; Jacobi's identity is checked, not assumed | yours to know |
+//! | [`AlmostPoisson::field`](crate::dynamics::AlmostPoisson::field) | for a nonholonomic system, whose bracket is skew and breaks Jacobi's identity | yours to know |
+//! | [`.force(f)`](crate::dynamics::SystemBuilder::force) on a `LieDual` | for a force without work, `μ' = ad*_ξ(μ + 𝓕(ξ))`, such as a feedback torque | conserved only where `⟨𝓕, [ξ, dC]⟩ = 0` |
 //! | [`AreaForm`](type@crate::dynamics::AreaForm) | on a surface: spins, point vortices | constants only |
 //! | [`Nambu`](crate::dynamics::Nambu) | on a 3-manifold, if only `H`, `S` and a metric are known | `S`, by construction |
 //! | `Nambu::default().and(c)`, once for each further Casimir | the same on an `n`-manifold, `n ≤ 8`, with `n − 3` functions more | `S`, and each `c` |
@@ -38,7 +40,7 @@
 //! | `≠ 0`, but a bath would make sense | `S = s` on a `Product` with a factor for `s` | friction has to put the energy somewhere: `H = h + e(s)`, temperature `e'(s)` |
 //! | `≠ 0`, on a 3-manifold | `Nambu` | it has any `S` for a Casimir; in `n` dimensions, too, with `n − 3` further ones |
 //! | `≠ 0`, and meant so | [`SecondLaw::Published`](crate::dynamics::SecondLaw::Published) | `H` is kept; the entropy then also changes reversibly, and nothing can be promised of it |
-//! | there is no `S` | leave it out | the system is Hamiltonian, without a projection |
+//! | there is no `S` | leave it out | `H` is kept, without a projection |
 //!
 //! On a surface a bracket other than `Zero` never has a non-constant Casimir, and `T*SO(3)` has none
 //! either, so the second line is for spins and for attitudes
@@ -53,6 +55,7 @@
 //! | which variables have friction | [`CometricDissipation`](crate::dynamics::CometricDissipation) | a semidefinite cometric; rows of zeros are left alone |
 //! | two such forms | [`KulkarniNomizu`](crate::dynamics::KulkarniNomizu) | metriplectic 4-brackets (Morrison and Updike 2024) |
 //! | a form on the Lie algebra | [`CasimirDissipation`](crate::dynamics::CasimirDissipation) | a Casimir grows by forced Euler-Poincaré equations, eq. (ops1) |
+//! | any other force `𝓕(ξ)` on it | [`.force(f)`](crate::dynamics::SystemBuilder::force) | `C' = ⟨𝓕(ξ), [ξ, dC]⟩`, whose sign is verified |
 //! | Onsager's matrix, heat conduction, Stokes friction | [`FieldDissipation`](crate::dynamics::FieldDissipation) | `K(x, w)` with `w` for `dH`: temperatures are components of `w`, and the law is exact |
 //! | a matrix `K(x)` that you do not want to rewrite | [`ProjectedDissipation`](crate::dynamics::ProjectedDissipation) | it is projected off `w`, which may spread friction; the certificate says so |
 //!
@@ -106,7 +109,7 @@
 //!
 //! # 9. Which step?
 //!
-//! Both laws hold for every step that is solved, so `h` is a question of accuracy alone.
+//! Both laws hold for every step that is solved, so `h` is a question of accuracy.
 //!
 //! | sign | do |
 //! |---|---|
@@ -114,7 +117,8 @@
 //! | [`retries`](crate::integrators::Certificate) in the certificate | steps were split in halves; a smaller `h` is cheaper |
 //! | six sweeps or more in the worst step | the step is long for Newton's method; the same |
 //! | an arc near the cut locus, half a turn of a body in one step | ten steps a turn |
-//! | the rate of entropy is fast beside the motion | resolve it only if you need its transient; the rest point is found by large steps, too |
+//! | `friction not damped: h\|K'\| = …` in the certificate | friction is faster than a step, which does not damp it: large steps exchange hot and cold and do not find the rest point. Take steps with `h\|K'\|` below 10, or [`Span::until`](crate::integrators::Span::until), or eliminate the fast variable |
+//! | [`StiffFriction`](crate::integrators::StepError::StiffFriction) | the same, and the step is not solved; the error has the step size |
 //!
 //! # 10. Which metric?
 //!

@@ -2,6 +2,7 @@
 
 mod constant;
 mod field;
+mod force;
 mod lie_poisson;
 mod nambu;
 mod product;
@@ -10,9 +11,10 @@ mod zero;
 
 pub use constant::ConstantPoisson;
 pub use field::FieldPoisson;
+pub use force::{Force, ForcedLiePoisson};
 pub use lie_poisson::LiePoisson;
-pub use nambu::{AreaForm, Casimirs, Nambu, OfEntropy, Rows};
-pub use symplectic::Symplectic;
+pub use nambu::{AreaForm, Casimirs, Nambu, NoCasimir, OfEntropy, Rows};
+pub use symplectic::{EvenDimension, Symplectic};
 pub use zero::Zero;
 
 use metriplectic_fields::{ChartPoint, Column, Dimension, Matrix, Scalar, Square, Vector};
@@ -39,8 +41,9 @@ pub struct Site<'a, M: Manifold, G, D: Scalar = f64> {
 /// The one method to write is [`apply`](Self::apply), at any scalar.
 ///
 /// Laws ([`laws::bracket`](crate::laws::bracket)): 1. `Π` is skew; 2. Jacobi identity
-/// `Π^{il}∂_lΠ^{jk} + cyclic = 0`; 3. `linearise` is the derivative of `apply`;
-/// 4. `Π α` is linear in `α`.
+/// `Π^{il}∂_lΠ^{jk} + cyclic = 0`, unless [`is_poisson`](Self::is_poisson) says otherwise;
+/// 3. `linearise` is the derivative of `apply`; 4. `Π α` is linear in `α`; 5. `⟨w, force(w)⟩ = 0`,
+/// and `linearise_force` is the derivative of `force`.
 #[diagnostic::on_unimplemented(
     message = "`{Self}` is not a bracket on `{M}`",
     note = "a Poisson tensor of your own is `Poisson::field(|x| matrix)` or `Poisson::constant(matrix)?`"
@@ -87,6 +90,46 @@ pub trait Bracket<M: Manifold, G: Riemannian<M>> {
         Ok(tensor)
     }
 
+    /// Whether `Π` satisfies the Jacobi identity. A skew tensor that does not is an almost Poisson
+    /// tensor ([`AlmostPoisson`]): it conserves the energy, and verification does not ask for more.
+    fn is_poisson(&self) -> bool {
+        true
+    }
+
+    /// Whether there is a [`force`](Self::force).
+    fn is_forced(&self) -> bool {
+        false
+    }
+
+    /// The vector that a force adds to `Πw + K_w dS`, for the covector `w` of the energy. `w` annihilates
+    /// it, as in `Πw`, but it need not be linear in `w`. Zero unless [`is_forced`](Self::is_forced);
+    /// [`ForcedLiePoisson`] has one.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`apply`](Self::apply).
+    fn force<D: Scalar>(
+        &self,
+        _at: &Site<'_, M, G, D>,
+        _w: &Vector<M, D>,
+    ) -> Result<Vector<M, D>, MetricError> {
+        Ok(Vector::<M, D>::zero())
+    }
+
+    /// The force at the centre of a chart with its derivatives along the point and the covector of the
+    /// entropy, and in the place of the tensor its derivative along `w`.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`apply`](Self::apply).
+    fn linearise_force(
+        &self,
+        at: &Site<'_, M, G>,
+        w: &Vector<M>,
+    ) -> Result<BracketJet<M>, MetricError> {
+        force_by_dual_numbers(self, at, w)
+    }
+
     /// Whether the bracket is zero by construction, so that nothing moves reversibly.
     fn is_zero(&self) -> bool {
         false
@@ -120,6 +163,33 @@ pub(crate) fn by_dual_numbers<M: Manifold, G: Riemannian<M>>(
         for i in 0..M::Dim::LEN {
             jet.along_z[(i, k)] = along_z[i].eps;
             jet.along_s[(i, k)] = along_s[i].eps;
+        }
+    }
+    Ok(jet)
+}
+
+/// The definition of [`Bracket::linearise_force`]: one dual number for each direction.
+pub(crate) fn force_by_dual_numbers<M: Manifold, G: Riemannian<M>>(
+    bracket: &(impl Bracket<M, G> + ?Sized),
+    at: &Site<'_, M, G>,
+    w: &Vector<M>,
+) -> Result<BracketJet<M>, MetricError> {
+    let zero = Matrix::<M>::zeros();
+    let value = bracket.force(at, w)?;
+    let mut jet = BracketJet::<M> { value, along_z: zero, along_s: zero, tensor: zero };
+    let (s, w) = (Vector::<M, Dual64>::embed(at.s), Vector::<M, Dual64>::embed(w));
+    let still = ChartPoint::centre(&at.x.base);
+    let Site { space, metric, .. } = *at;
+    for k in 0..M::Dim::LEN {
+        let e = epsilon::<M>(k);
+        let moved = ChartPoint { base: at.x.base.clone(), q: e };
+        let along_z = bracket.force(&Site { space, metric, x: &moved, s: &s }, &w)?;
+        let along_s = bracket.force(&Site { space, metric, x: &still, s: &(s + e) }, &w)?;
+        let along_w = bracket.force(&Site { space, metric, x: &still, s: &s }, &(w + e))?;
+        for i in 0..M::Dim::LEN {
+            jet.along_z[(i, k)] = along_z[i].eps;
+            jet.along_s[(i, k)] = along_s[i].eps;
+            jet.tensor[(i, k)] = along_w[i].eps;
         }
     }
     Ok(jet)
@@ -182,12 +252,55 @@ impl Poisson {
     /// The tensor `Π(x)` from a closure or any other
     /// [`MatrixField`](metriplectic_fields::MatrixField), acting on covectors dual to the
     /// [`velocity`](metriplectic_fields::Space::velocity) of the space. It is checked at sampled
-    /// points to be skew and to satisfy the Jacobi identity.
+    /// points to be skew and to satisfy the Jacobi identity; [`AlmostPoisson::field`] is one that need not.
     ///
     /// On a sphere the matrix is a bivector of the space around, `x' = A ∇H`; on S²,
     /// `|x: &Vector3<Real>| x.cross_matrix()` is the area form. On SO(3) it acts on body covectors and gives `Ω`.
     pub const fn field<F>(field: F) -> FieldPoisson<F> {
         FieldPoisson::new(field)
+    }
+}
+
+/// Skew tensors of your own that need not be Poisson, as those of nonholonomic systems are not.
+///
+/// The energy is conserved by skewness alone. The Jacobi identity is not asked for, and a
+/// [`report`](crate::Metriplectic::report) prints its defect without judging it.
+#[derive(Clone, Copy, Debug)]
+pub enum AlmostPoisson {}
+
+impl AlmostPoisson {
+    /// The tensor of [`Poisson::field`], without the Jacobi identity: an almost Poisson bracket (van der
+    /// Schaft and Maschke 1994; Cantrijn, de León and Martín de Diego 1999).
+    ///
+    /// A blade on the plane that does not slip sideways, at `(x, y)` with the direction `θ`, the momentum
+    /// `p` along the blade, and the momentum `l` about it, is turned but not moved by a bracket with
+    /// `{x, p} = cos θ`, `{y, p} = sin θ`, `{θ, l} = 1`:
+    ///
+    /// ```
+    /// use metriplectic_dynamics::{AlmostPoisson, ModelError, Metriplectic, Poisson, System};
+    /// use metriplectic_fields::Real;
+    /// use metriplectic_manifolds::Euclidean;
+    /// use nalgebra::{SMatrix, SVector, vector};
+    /// use num_dual::DualNum;
+    ///
+    /// let bracket = |x: &SVector<Real, 5>| {
+    ///     let mut pi = SMatrix::<Real, 5, 5>::zeros();
+    ///     for (i, j, value) in [(0, 3, x[2].cos()), (1, 3, x[2].sin()), (2, 4, 1.0.into())] {
+    ///         (pi[(i, j)], pi[(j, i)]) = (value, -value);
+    ///     }
+    ///     pi
+    /// };
+    /// let energy = |x: &SVector<Real, 5>| (x[3] * x[3] + x[4] * x[4]) * 0.5;
+    /// let start = vector![0.0, 0.0, 0.3, 1.0, 0.5];
+    /// let blade = System::on(Euclidean::<5>).bracket(AlmostPoisson::field(bracket)).energy(energy);
+    /// assert!(blade.build()?.verify(&start, 0.1).is_ok());
+    /// let refused = System::on(Euclidean::<5>).bracket(Poisson::field(bracket)).energy(energy);
+    /// let error = refused.build()?.verify(&start, 0.1);
+    /// assert!(matches!(error, Err(ModelError::NoJacobiIdentity { .. })));
+    /// # Ok::<(), metriplectic_dynamics::BuildError>(())
+    /// ```
+    pub const fn field<F>(field: F) -> FieldPoisson<F> {
+        FieldPoisson::almost(field)
     }
 }
 

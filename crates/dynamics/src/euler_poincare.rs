@@ -14,7 +14,7 @@
 //!
 //! which keep `h` whatever `F` is. With the force of a positive semidefinite form,
 //! `⟨F(ξ), η⟩ = κ(η, [ξ, dC])`, a Casimir `C` grows, and they are the metriplectic system of
-//! [`LiePoisson`](crate::LiePoisson), [`CasimirDissipation`](crate::CasimirDissipation), energy
+//! [`LiePoisson`], [`CasimirDissipation`](crate::CasimirDissipation), energy
 //! `h` and entropy `C`:
 //!
 //! ```
@@ -33,6 +33,21 @@
 //!     .build();
 //! assert!(relaxed_rigid_body.is_ok());
 //! ```
+//!
+//! Any other force is a closure `|ξ| -> F(ξ)`, or a [`Force`] of your own. `C' = ⟨F(ξ), [ξ, dC]⟩` may then
+//! have any sign, and an entropy is not needed:
+//!
+//! ```
+//! use metriplectic_dynamics::System;
+//! use metriplectic_fields::Real;
+//! use metriplectic_manifolds::LieDual;
+//! use nalgebra::Vector3;
+//! let body_in_a_vortex = System::on(LieDual::so3())
+//!     .lagrangian(|xi: &Vector3<Real>| xi.norm_squared() * 0.5)
+//!     .force(|xi: &Vector3<Real>| Vector3::new(-xi.y, xi.x, xi.z * 0.0) * xi.norm_squared())
+//!     .build();
+//! assert!(body_in_a_vortex.is_ok());
+//! ```
 
 use std::fmt;
 
@@ -40,7 +55,29 @@ use metriplectic_fields::{Column, Factors, Jet1, Jet2, Scalar, ScalarField, Squa
 use metriplectic_manifolds::{Euclidean, LieDual};
 use nalgebra::{SMatrix, SVector};
 
-use crate::SystemBuilder;
+use crate::dissipation::Choice;
+use crate::{Force, ForcedLiePoisson, LiePoisson, SystemBuilder};
+
+impl<G, K: Choice, H, S, I, const N: usize> SystemBuilder<LieDual<N>, G, LiePoisson, K, H, S, I> {
+    /// The force `𝓕: g → g*` of the equations `μ' = ad*_ξ(μ + 𝓕(ξ))`, `ξ = dH`: a closure
+    /// `|ξ| -> SVector<Real, N>` or any other [`Force`], which conserves `H` whatever it is.
+    ///
+    /// With a force an entropy changes by `S' = ⟨𝓕(ξ), [ξ, dS]⟩` alone, unless a
+    /// [`dissipation`](Self::dissipation) is given too; there is none of the metric. A force under which an
+    /// entropy falls is refused by the verification of a model, unless the second law is
+    /// [`Published`](crate::SecondLaw::Published), not promised. Each of the further invariants must stay as
+    /// it is, `⟨dL, ad*_ξ 𝓕⟩ = 0`.
+    #[allow(
+        clippy::type_complexity,
+        reason = "the type of a builder lists the parts of the system, and a name for it would hide them"
+    )]
+    pub fn force<F: Force<N>>(
+        self,
+        force: F,
+    ) -> SystemBuilder<LieDual<N>, G, ForcedLiePoisson<F>, K::WithForce, H, S, I> {
+        self.bracket(ForcedLiePoisson(force)).choose(K::with_force)
+    }
+}
 
 impl<G, B, K, H, S, I, const N: usize> SystemBuilder<LieDual<N>, G, B, K, H, S, I> {
     /// The energy `h(μ) = ⟨μ, ξ⟩ − l(ξ)` of a reduced Lagrangian `l`, a closure `|ξ| -> Real` on the

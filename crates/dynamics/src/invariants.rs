@@ -16,6 +16,7 @@ use metriplectic_fields::{Real, ScalarField, Space};
 
 /// Why a function is conserved.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Kind {
     /// The bracket kills it: `Π dC = 0`.
     Casimir,

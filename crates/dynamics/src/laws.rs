@@ -6,57 +6,71 @@ use metriplectic_fields::{
 };
 use metriplectic_manifolds::{Manifold, MetricError};
 
-use crate::bracket::{by_dual_numbers as by_dual_numbers_bracket, epsilon};
+use crate::bracket::{
+    Site, by_dual_numbers as by_dual_numbers_bracket, epsilon, force_by_dual_numbers,
+};
 use crate::dissipation::by_dual_numbers;
 use crate::system::{Metriplectic, Point, SecondLaw};
+use crate::verify::balance::{Balance, Violation, asymmetry, largest, worse};
+use crate::verify::sampling::Sizes;
 use crate::{Bracket, Dissipation};
 
 /// Round-off of a tensor contraction whose terms have the size `scale`.
 fn round_off<M: Manifold>(scale: f64) -> f64 {
     let n = M::Dim::LEN as f64;
-    64.0 * n * n * f64::EPSILON * scale.max(f64::MIN_POSITIVE)
+    64.0 * n * n * f64::EPSILON * scale
 }
 
-/// The largest violations of the laws of a Poisson tensor at one point, each with the size of the
-/// terms that should cancel.
+/// A Poisson tensor at one point, and the largest violations of its laws relative to the terms that should
+/// cancel.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct BracketDefects {
-    pub(crate) skewness: f64,
-    pub(crate) jacobi: f64,
-    pub(crate) size: f64,
-    pub(crate) jacobi_size: f64,
+pub(crate) struct BracketDefects<M: Space> {
+    pub(crate) tensor: Matrix<M>,
+    pub(crate) skewness: Violation,
+    pub(crate) jacobi: Violation,
+    /// Whether the derivatives of the tensor are numbers.
+    pub(crate) is_finite: bool,
 }
 
-/// Evaluates skewness and the Jacobi identity `Π^{il}∂_lΠ^{jk} + cyclic` at `x`.
+/// Evaluates skewness and the Jacobi identity `Π^{il}∂_lΠ^{jk} + cyclic` at `x`, in chart coordinates of the
+/// sizes `units`. The terms may all be round-off: beside them, the `rounding` of the largest ones elsewhere
+/// is allowed for, and that of a generic product `Π^{il} Π^{jk} / ℓ_l`.
 pub(crate) fn bracket_defects<Y: Metriplectic + ?Sized>(
     system: &Y,
     x: &Point<Y>,
-) -> Result<BracketDefects, MetricError> {
+    units: &Vector<Y::Manifold>,
+    rounding: f64,
+) -> Result<BracketDefects<Y::Manifold>, MetricError> {
     let n = <Y::Manifold as Space>::Dim::LEN;
     let tensor = tensor(system, &ChartPoint::<Y::Manifold>::centre(x))?;
     let mut slopes = Vec::with_capacity(n);
     for l in 0..n {
         let moved = ChartPoint { base: x.clone(), q: epsilon::<Y::Manifold>(l) };
-        slopes.push(self::tensor(system, &moved)?);
+        let dual = self::tensor(system, &moved)?;
+        slopes.push(Matrix::<Y::Manifold>::from_entries(|i, j| dual[(i, j)].eps));
     }
-    let mut defects =
-        BracketDefects { skewness: 0.0, jacobi: 0.0, size: tensor.max_abs(), jacobi_size: 0.0 };
-    let worst = |old: f64, new: f64| if new > old || new.is_nan() { new } else { old };
-    for i in 0..n {
-        for j in 0..n {
-            defects.skewness = worst(defects.skewness, (tensor[(i, j)] + tensor[(j, i)]).abs());
-            for k in 0..n {
-                let term = |a: usize, b: usize, c: usize| {
-                    (0..n).map(|l| tensor[(a, l)] * slopes[l][(b, c)].eps).sum::<f64>()
-                };
-                let terms = [term(i, j, k), term(j, k, i), term(k, i, j)];
-                defects.jacobi = worst(defects.jacobi, terms.iter().sum::<f64>().abs());
-                let size = terms.iter().map(|term| term.abs()).fold(0.0, f64::max);
-                defects.jacobi_size = worst(defects.jacobi_size, size);
+    let steepest = (0..n).map(|l| largest::<Y::Manifold>(&slopes[l], units) * units[l]);
+    let top = largest::<Y::Manifold>(&tensor, units);
+    let top = top * steepest.fold(top, worse);
+    let term = |a: usize, b: usize, c: usize| {
+        let slopes = &slopes;
+        (0..n).map(move |l| tensor[(a, l)] * slopes[l][(b, c)])
+    };
+    // The cyclic sum of a skew tensor is totally skew, and that of a constant one is zero.
+    let mut jacobi = Violation::default();
+    let constant = slopes.iter().all(|slope| slope.max_abs() == 0.0);
+    for k in 0..if constant { 0 } else { n } {
+        for j in 0..k {
+            for i in 0..j {
+                let terms = term(i, j, k).chain(term(j, k, i)).chain(term(k, i, j));
+                let size = rounding * top * units[i] * units[j] * units[k];
+                jacobi = jacobi.or_worse(terms.collect::<Balance>().beside(size));
             }
         }
     }
-    Ok(defects)
+    let skewness = asymmetry::<Y::Manifold>(&tensor, -1.0, units, rounding);
+    let is_finite = slopes.iter().all(|slope| slope.max_abs().is_finite());
+    Ok(BracketDefects { tensor, skewness, jacobi, is_finite })
 }
 
 /// The Poisson tensor of a system at any scalar.
@@ -69,9 +83,10 @@ fn tensor<Y: Metriplectic + ?Sized, D: Scalar>(
 
 /// Checks the bracket of a system at `x` with the covectors `α`, `β`:
 ///
-/// 1. `Π` is skew; 2. Jacobi identity; 3. `linearise` is the derivative of `apply`;
-/// 4. `apply` is linear in the covector (which is Leibniz' rule); 5. `Π dS = 0`, if the system has
-///    [`SecondLaw::Exact`].
+/// 1. `Π` is skew; 2. Jacobi identity, if the bracket is to be Poisson; 3. `linearise` is the
+///    derivative of `apply`; 4. `apply` is linear in the covector (which is Leibniz' rule); 5. `Π dS = 0`, if
+///    the system has [`SecondLaw::Exact`]; 6. a force does no work, `⟨α, force(α)⟩ = 0`, and
+///    `linearise_force` is its derivative.
 ///
 /// # Errors
 ///
@@ -84,23 +99,25 @@ pub fn bracket<Y: Metriplectic>(
 ) -> Result<(), BrokenLaw> {
     let exists = |_| BrokenLaw { law: "Π exists", size: f64::NAN, bound: 0.0 };
     let bracket = system.bracket();
-    let defects = bracket_defects(system, x).map_err(exists)?;
-    let round_off = round_off::<Y::Manifold>;
-    BrokenLaw::unless("Π is skew", defects.skewness, round_off(defects.size))?;
-    // The terms may vanish one by one, so the size of a generic product Π ∂Π is allowed for.
-    let size = defects.jacobi_size + defects.size;
-    BrokenLaw::unless("Jacobi identity", defects.jacobi, round_off(size))?;
+    let units = Sizes::at(system, x).units;
+    let defects = bracket_defects(system, x, &units, 1.0).map_err(exists)?;
+    let (round_off, tensor_size) = (round_off::<Y::Manifold>, defects.tensor.max_abs());
+    let BracketDefects { skewness, jacobi, .. } = defects;
+    BrokenLaw::unless("Π is skew", skewness.size, round_off(skewness.terms))?;
+    if bracket.is_poisson() {
+        BrokenLaw::unless("Jacobi identity", jacobi.size, round_off(jacobi.terms))?;
+    }
 
     let centre = ChartPoint::centre(x);
     let s = system.entropy().jet1(x).df;
     let site = system.site(&centre, &s);
     let jet = bracket.linearise(&site, alpha).map_err(exists)?;
     let defined = by_dual_numbers_bracket(bracket, &site, alpha).map_err(exists)?;
-    let size = defects.size * (alpha.magnitude() + beta.magnitude());
+    let size = tensor_size * (alpha.magnitude() + beta.magnitude());
     let off = (defined.value - jet.value).magnitude();
     BrokenLaw::unless("linearise has the value of apply", off, round_off(size))?;
     let off = (defined.tensor - jet.tensor).max_abs();
-    BrokenLaw::unless("linearise has the tensor of apply", off, round_off(defects.size))?;
+    BrokenLaw::unless("linearise has the tensor of apply", off, round_off(tensor_size))?;
     let slopes = jet.along_z.max_abs() + jet.along_s.max_abs();
     let off = (defined.along_z - jet.along_z).max_abs();
     BrokenLaw::unless("linearise is the derivative along x", off, round_off(size + slopes))?;
@@ -110,11 +127,50 @@ pub fn bracket<Y: Metriplectic>(
     let apart = jet.value + bracket.apply(&site, beta).map_err(exists)? * 3.0;
     let off = (combined - apart).magnitude();
     BrokenLaw::unless("Π(α + 3β) = Πα + 3Πβ", off, round_off(4.0 * size))?;
+    if bracket.is_forced() {
+        force(system, &site, alpha)?;
+    }
     if system.second_law() != SecondLaw::Exact {
         return Ok(());
     }
     let left = bracket.apply(&site, &s).map_err(exists)?.magnitude();
-    BrokenLaw::unless("Π dS = 0", left, round_off(defects.size * s.magnitude()))
+    BrokenLaw::unless("Π dS = 0", left, round_off(tensor_size * s.magnitude()))
+}
+
+/// Checks the force of a bracket: it does no work, and `linearise_force` is its derivative.
+fn force<Y: Metriplectic>(
+    system: &Y,
+    site: &Site<'_, Y::Manifold, Y::Metric>,
+    alpha: &Vector<Y::Manifold>,
+) -> Result<(), BrokenLaw> {
+    let exists = |_| BrokenLaw { law: "the force exists", size: f64::NAN, bound: 0.0 };
+    let round_off = round_off::<Y::Manifold>;
+    let jet = system.bracket().linearise_force(site, alpha).map_err(exists)?;
+    let defined = force_by_dual_numbers(system.bracket(), site, alpha).map_err(exists)?;
+    let size = defined.tensor.max_abs() * alpha.magnitude();
+    let power = alpha.dot(&defined.value).abs();
+    BrokenLaw::unless("⟨α, force(α)⟩ = 0", power, round_off(size * alpha.magnitude()))?;
+    for (law, off, size) in [
+        ("linearise_force has the value of force", (defined.value - jet.value).magnitude(), size),
+        (
+            "linearise_force is the derivative along α",
+            (defined.tensor - jet.tensor).max_abs(),
+            defined.tensor.max_abs(),
+        ),
+        (
+            "linearise_force is the derivative along x",
+            (defined.along_z - jet.along_z).max_abs(),
+            size + defined.along_z.max_abs(),
+        ),
+        (
+            "linearise_force is the derivative along dS",
+            (defined.along_s - jet.along_s).max_abs(),
+            size + defined.along_s.max_abs(),
+        ),
+    ] {
+        BrokenLaw::unless(law, off, round_off(size))?;
+    }
+    Ok(())
 }
 
 /// Checks the dissipation of a system at `x` with the covector `w` to be killed and two more covectors:
@@ -148,14 +204,21 @@ pub fn dissipation<Y: Metriplectic>(
 
     let jet = dissipation.linearise(metric, x, w, alpha).map_err(broken("K exists"))?;
     let defined = by_dual_numbers(dissipation, metric, x, w, alpha).map_err(broken("K exists"))?;
-    // The terms have the sizes of ∂K α, K α / |w| and K.
-    let relative = 1e2 * (1.0 + alpha.magnitude()) * (1.0 + w.magnitude().recip());
-    for (law, left, right) in [
-        ("linearise is the derivative along x", defined.along_z, jet.along_z),
-        ("linearise is the derivative along w", defined.along_w, jet.along_w),
-        ("linearise is the derivative along α", defined.tensor, jet.tensor),
+    // The terms have the sizes K α / ℓ, K α / |w| and K.
+    let units = Sizes::at(system, x).units;
+    let shortest = (0..<Y::Manifold as Space>::Dim::LEN).map(|i| units[i]).fold(f64::MAX, f64::min);
+    let image = size * alpha.magnitude();
+    for (law, left, right, terms) in [
+        ("linearise is the derivative along x", defined.along_z, jet.along_z, image / shortest),
+        (
+            "linearise is the derivative along w",
+            defined.along_w,
+            jet.along_w,
+            image / w.magnitude(),
+        ),
+        ("linearise is the derivative along α", defined.tensor, jet.tensor, size),
     ] {
-        let bound = relative * round_off::<Y::Manifold>(left.max_abs() + size);
+        let bound = 1e2 * round_off::<Y::Manifold>(left.max_abs() + terms);
         BrokenLaw::unless(law, (left - right).max_abs(), bound)?;
     }
     Ok(())

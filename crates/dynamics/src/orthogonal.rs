@@ -11,6 +11,16 @@
 //! other by Gram and Schmidt, which is the inverse `C^{ab}` of their Gram matrix in the remark of
 //! Bloch, Farré Puiggalí, Martín de Diego (2024, §2.2), without forming it: a covector that depends
 //! on those before it is found by what is left of it, and left out.
+//!
+//! This jumps where a covector becomes dependent. The faded projections do not: with the independent share
+//! `σ = |n|/|w|` of the covector `w` whose orthogonal part is `n`, each has the weight `1/(1 + r)`,
+//! `r = (μ/σ)⁴`,
+//!
+//! ```math
+//! P_\mu^T\alpha = \alpha - \frac{1}{1 + r}\, \frac{G^*(n,\alpha)}{G^*(n,n)}\, n .
+//! ```
+//!
+//! The first covector has `σ = 1` and full weight, up to `μ⁴`.
 
 use metriplectic_fields::{Column, Dimension, Scalar, Square};
 use metriplectic_manifolds::InnerProduct;
@@ -19,17 +29,11 @@ use metriplectic_manifolds::InnerProduct;
 /// is their combination up to round-off.
 const INDEPENDENT: f64 = 1e-10;
 
-/// The independent share of a momentum's covector at which it starts to be left out.
-///
-/// Where the covectors are dependent, at a relative equilibrium, the projection off all of them jumps,
-/// and nearby it amplifies round-off by the reciprocal of the share `σ`. There the momentum is kept
-/// without it: it is a function of the others to first order, so a step that keeps the others changes it
-/// by no more than the order of `h³σ`.
-const SOFT: f64 = 1e-6;
-
-/// The weight of a projection off a momentum's covector with the independent share `σ`.
-fn weight(share: f64) -> f64 {
-    (1.0 + (SOFT / share).powi(4)).recip()
+/// `square/w`, where the weight `w = 1/(1 + r)`, `r = (μ/σ)⁴`, fades out a projection off a covector whose
+/// independent share `σ = √(square/size)` falls below `μ`.
+#[inline]
+fn faded<D: Scalar>(square: D, size: D, mu: f64) -> D {
+    square + square * (size / square * (mu * mu)).powi(2)
 }
 
 /// Covectors made orthogonal to each other.
@@ -48,8 +52,8 @@ struct Normal<N: Dimension, D: Scalar> {
     sharp: N::Vector<D>,
     /// `G*(n, n)`.
     square: D,
-    /// The share that it is of the covector it was made of.
-    share: f64,
+    /// `G*(w, w)` of the covector `w` that it was made of.
+    size: D,
 }
 
 impl<N: Dimension, D: Scalar> Default for Orthogonal<N, D> {
@@ -72,16 +76,18 @@ impl<N: Dimension, D: Scalar> Orthogonal<N, D> {
     /// Adds a covector, and gives the share of it that is orthogonal to those before it. It is left
     /// out if this is round-off.
     pub fn push(&mut self, g: &impl InnerProduct<N::Vector<D>>, w: &N::Vector<D>) -> f64 {
-        let size = g.orthonormal(w).magnitude();
+        let whole = g.orthonormal(w);
         // A second pass takes out what the rounding of the first has left.
         let mut n = *w;
         for _ in 0..2 {
             n = self.off_covector(0, &n);
         }
         let hat = g.orthonormal(&n);
+        let size = whole.magnitude();
         let share = if size > 0.0 { hat.magnitude() / size } else { 0.0 };
         if share > INDEPENDENT && self.len < N::LEN {
-            let normal = Normal { n, sharp: g.raise(&hat), square: hat.dot(&hat), share };
+            let (square, size) = (hat.dot(&hat), whole.dot(&whole));
+            let normal = Normal { n, sharp: g.raise(&hat), square, size };
             self.normals[self.len] = Some(normal);
             self.len += 1;
         }
@@ -108,15 +114,46 @@ impl<N: Dimension, D: Scalar> Orthogonal<N, D> {
         v
     }
 
-    /// The same for momenta: a projection off a covector that is nearly dependent on those before it
-    /// fades out.
+    /// [`off_covector`](Self::off_covector) with projections that fade out below the share `mu`.
     #[inline]
-    pub fn off_momenta(&self, first: usize, v: &N::Vector<D>) -> N::Vector<D> {
+    pub fn faded_covector(&self, first: usize, alpha: &N::Vector<D>, mu: f64) -> N::Vector<D> {
+        let mut alpha = *alpha;
+        for Normal { n, sharp, square, size } in self.normals.as_ref()[first..].iter().flatten() {
+            alpha -= *n * (sharp.dot(&alpha) / faded(*square, *size, mu));
+        }
+        alpha
+    }
+
+    /// [`off_vector`](Self::off_vector) with projections that fade out below the share `mu`.
+    #[inline]
+    pub fn faded_vector(&self, first: usize, v: &N::Vector<D>, mu: f64) -> N::Vector<D> {
         let mut v = *v;
-        for Normal { n, sharp, square, share } in self.normals.as_ref()[first..].iter().flatten() {
-            v -= *sharp * (n.dot(&v) / *square * weight(*share));
+        for Normal { n, sharp, square, size } in self.normals.as_ref()[first..].iter().flatten() {
+            v -= *sharp * (n.dot(&v) / faded(*square, *size, mu));
         }
         v
+    }
+}
+
+impl<N: Dimension, D: Scalar> Orthogonal<N, D> {
+    /// Adds the covector `w`, and returns the vector `v − ⟨w, v⟩ ♯n/G*(n, n)` with the part `n` of `w` that
+    /// is orthogonal to the covectors before it: `w` annihilates this vector, and they act on it as on
+    /// `v`. Fades out below the share `mu`.
+    pub fn without(
+        &mut self,
+        g: &impl InnerProduct<N::Vector<D>>,
+        w: &N::Vector<D>,
+        v: &N::Vector<D>,
+        mu: f64,
+    ) -> N::Vector<D> {
+        let len = self.len;
+        self.push(g, w);
+        match self.normals.as_ref().get(len).and_then(Option::as_ref) {
+            Some(Normal { sharp, square, size, .. }) => {
+                *v - *sharp * (w.dot(v) / faded(*square, *size, mu))
+            }
+            None => *v,
+        }
     }
 }
 
@@ -126,16 +163,35 @@ impl<N: Dimension, D: Scalar> Orthogonal<N, D> {
 pub struct OrthogonalJet<N: Dimension> {
     normals: N::Array<Option<NormalJet<N>>>,
     len: usize,
-    amplification: f64,
 }
 
 #[derive(Clone, Copy, Debug)]
 struct NormalJet<N: Dimension> {
     n: Moving<N>,
     sharp: Moving<N>,
-    square: f64,
+    square: Number<N>,
+    size: Number<N>,
+}
+
+impl<N: Dimension> NormalJet<N> {
+    /// [`faded`] with derivatives: with `σ² = square/size` it is
+    /// `d(square/w) = (1 − r) d square + 2 r σ² d size`.
+    #[inline]
+    fn faded(&self, mu: f64) -> Number<N> {
+        let share = self.square.value / self.size.value;
+        let r = (mu * mu / share).powi(2);
+        Number {
+            value: faded(self.square.value, self.size.value, mu),
+            slope: self.square.slope * (1.0 - r) + self.size.slope * (2.0 * r * share),
+        }
+    }
+}
+
+/// A number, and its derivatives along the unknown of a step.
+#[derive(Clone, Copy, Debug)]
+struct Number<N: Dimension> {
+    value: f64,
     slope: N::Vector<f64>,
-    share: f64,
 }
 
 /// The components of a vector or covector, and their derivatives along the unknown of a step.
@@ -148,21 +204,14 @@ pub struct Moving<N: Dimension> {
 }
 
 impl<N: Dimension> Moving<N> {
-    /// `self − weight along (functional·self) / square`, where the quotient has derivatives too.
+    /// `self − along (functional·self) / square`, where the quotient has derivatives too.
     #[inline]
-    fn without(
-        &self,
-        (along, weight): (&Self, f64),
-        functional: &Self,
-        square: f64,
-        slope: &N::Vector<f64>,
-    ) -> Self {
-        let square = square / weight;
-        let slope = *slope * weight.recip();
-        let c = functional.value.dot(&self.value) / square;
+    fn without(&self, along: &Self, functional: &Self, square: &Number<N>) -> Self {
+        let Number { value: square, slope } = square;
+        let c = functional.value.dot(&self.value) / *square;
         let dc = (functional.slope.transpose_times(&self.value)
             + self.slope.transpose_times(&functional.value)
-            - slope * c)
+            - *slope * c)
             * square.recip();
         Self {
             value: self.value - along.value * c,
@@ -173,7 +222,7 @@ impl<N: Dimension> Moving<N> {
 
 impl<N: Dimension> Default for OrthogonalJet<N> {
     fn default() -> Self {
-        Self { normals: N::array(|_| None), len: 0, amplification: 0.0 }
+        Self { normals: N::array(|_| None), len: 0 }
     }
 }
 
@@ -188,10 +237,51 @@ impl<N: Dimension> OrthogonalJet<N> {
         self.len == 0
     }
 
-    /// By how much projections amplify round-off: the sum of the reciprocal shares of the covectors
-    /// that are independent of those before them.
-    pub const fn amplification(&self) -> f64 {
-        self.amplification
+    /// By how much projections amplify round-off, if they fade out below the share `mu`: the sum of
+    /// `w/σ` over the covectors from the `first` on.
+    pub fn amplification(&self, first: usize, mu: f64) -> f64 {
+        let normals = self.normals.as_ref()[first..].iter().flatten();
+        normals
+            .map(|NormalJet { square, size, .. }| {
+                let share = (square.value / size.value).sqrt();
+                square.value / (faded(square.value, size.value, mu) * share)
+            })
+            .sum()
+    }
+
+    /// The absolute terms that the projection of `v` off the covectors from the `first` on subtracts, if it
+    /// fades out below the share `mu`.
+    #[must_use]
+    pub fn terms_of_vector(&self, first: usize, v: &N::Vector<f64>, mu: f64) -> N::Vector<f64> {
+        self.terms(first, v, mu, |normal| (&normal.n, &normal.sharp))
+    }
+
+    /// The same for a covector.
+    #[must_use]
+    pub fn terms_of_covector(
+        &self,
+        first: usize,
+        alpha: &N::Vector<f64>,
+        mu: f64,
+    ) -> N::Vector<f64> {
+        self.terms(first, alpha, mu, |normal| (&normal.sharp, &normal.n))
+    }
+
+    /// `Σ |along_i| Σ_j |functional_j v_j| / square` over the covectors from the `first` on.
+    fn terms(
+        &self,
+        first: usize,
+        v: &N::Vector<f64>,
+        mu: f64,
+        parts: impl Fn(&NormalJet<N>) -> (&Moving<N>, &Moving<N>),
+    ) -> N::Vector<f64> {
+        let mut terms = N::Vector::<f64>::zero();
+        for normal in self.normals.as_ref()[first..].iter().flatten() {
+            let (functional, along) = parts(normal);
+            let square = faded(normal.square.value, normal.size.value, mu);
+            terms += along.value.abs() * (functional.value.abs().dot(&v.abs()) / square);
+        }
+        terms
     }
 
     /// Adds a covector; `turned(v)` is the derivative of `g v` along the unknown, for a fixed `v`.
@@ -201,21 +291,19 @@ impl<N: Dimension> OrthogonalJet<N> {
         turned: impl Fn(&N::Vector<f64>) -> N::Matrix<f64>,
         w: &Moving<N>,
     ) {
-        let size = g.orthonormal(&w.value).magnitude();
+        let whole = g.orthonormal(&w.value);
         let n = self.off_covector(0, &self.off_covector(0, w));
         let hat = g.orthonormal(&n.value);
-        if hat.magnitude() > INDEPENDENT * size && self.len < N::LEN {
+        if hat.magnitude() > INDEPENDENT * whole.magnitude() && self.len < N::LEN {
             let value = g.raise(&hat);
             // g ♯n = n, so g ∂♯n = ∂n − (∂g) ♯n.
             let bend = n.slope - turned(&value);
             let slope = N::Matrix::<f64>::from_columns(|k| g.sharp(&bend.column_at(k)));
             let sharp = Moving { value, slope };
-            let slope = slope.transpose_times(&n.value) + n.slope.transpose_times(&value);
-            let share = hat.magnitude() / size;
-            let normal = NormalJet { n, sharp, square: hat.dot(&hat), slope, share };
-            self.normals[self.len] = Some(normal);
+            let square = square_jet(g, &turned, &n, &hat);
+            let size = if self.is_empty() { square } else { square_jet(g, &turned, w, &whole) };
+            self.normals[self.len] = Some(NormalJet { n, sharp, square, size });
             self.len += 1;
-            self.amplification += weight(share) / share;
         }
     }
 
@@ -224,8 +312,8 @@ impl<N: Dimension> OrthogonalJet<N> {
     #[must_use]
     pub fn off_covector(&self, first: usize, alpha: &Moving<N>) -> Moving<N> {
         let normals = self.normals.as_ref()[first..].iter().flatten();
-        normals.fold(*alpha, |alpha, NormalJet { n, sharp, square, slope, .. }| {
-            alpha.without((n, 1.0), sharp, *square, slope)
+        normals.fold(*alpha, |alpha, NormalJet { n, sharp, square, .. }| {
+            alpha.without(n, sharp, square)
         })
     }
 
@@ -234,17 +322,56 @@ impl<N: Dimension> OrthogonalJet<N> {
     #[must_use]
     pub fn off_vector(&self, first: usize, v: &Moving<N>) -> Moving<N> {
         let normals = self.normals.as_ref()[first..].iter().flatten();
-        normals.fold(*v, |v, NormalJet { n, sharp, square, slope, .. }| {
-            v.without((sharp, 1.0), n, *square, slope)
-        })
+        normals.fold(*v, |v, NormalJet { n, sharp, square, .. }| v.without(sharp, n, square))
     }
-    /// [`Orthogonal::off_momenta`] with derivatives, for weights that stay what they are.
+
+    /// [`Orthogonal::faded_covector`] with derivatives.
     #[inline]
     #[must_use]
-    pub fn off_momenta(&self, first: usize, v: &Moving<N>) -> Moving<N> {
+    pub fn faded_covector(&self, first: usize, alpha: &Moving<N>, mu: f64) -> Moving<N> {
         let normals = self.normals.as_ref()[first..].iter().flatten();
-        normals.fold(*v, |v, NormalJet { n, sharp, square, slope, share }| {
-            v.without((sharp, weight(*share)), n, *square, slope)
+        normals.fold(*alpha, |alpha, normal| {
+            alpha.without(&normal.n, &normal.sharp, &normal.faded(mu))
         })
     }
+
+    /// [`Orthogonal::faded_vector`] with derivatives.
+    #[inline]
+    #[must_use]
+    pub fn faded_vector(&self, first: usize, v: &Moving<N>, mu: f64) -> Moving<N> {
+        let normals = self.normals.as_ref()[first..].iter().flatten();
+        normals.fold(*v, |v, normal| v.without(&normal.sharp, &normal.n, &normal.faded(mu)))
+    }
+
+    /// [`Orthogonal::without`] with derivatives.
+    #[must_use]
+    pub fn without(
+        &mut self,
+        g: &impl InnerProduct<N::Vector<f64>>,
+        turned: impl Fn(&N::Vector<f64>) -> N::Matrix<f64>,
+        w: &Moving<N>,
+        v: &Moving<N>,
+        mu: f64,
+    ) -> Moving<N> {
+        let len = self.len;
+        self.push(g, turned, w);
+        match self.normals.as_ref().get(len).and_then(Option::as_ref) {
+            Some(normal) => v.without(&normal.sharp, w, &normal.faded(mu)),
+            None => *v,
+        }
+    }
+}
+
+/// The square `G*(n, n)` of a covector with the orthonormal components `hat`, and its derivatives:
+/// `∂(n·g⁻¹n) = 2 ♯n·∂n − ♯n·(∂g)♯n`.
+#[inline]
+fn square_jet<N: Dimension>(
+    g: &impl InnerProduct<N::Vector<f64>>,
+    turned: &impl Fn(&N::Vector<f64>) -> N::Matrix<f64>,
+    n: &Moving<N>,
+    hat: &N::Vector<f64>,
+) -> Number<N> {
+    let sharp = g.raise(hat);
+    let slope = n.slope.transpose_times(&sharp) * 2.0 - turned(&sharp).transpose_times(&sharp);
+    Number { value: hat.dot(hat), slope }
 }

@@ -11,8 +11,8 @@ use crate::bracket::Site;
 use crate::dissipation::{Choice, Given};
 use crate::invariants::{Casimir, Invariants, Momentum, Symmetry};
 use crate::velocity;
-use crate::verify::{self, ModelError, Report};
-use crate::{Bracket, Dissipation, NaturalBracket, NoDissipation};
+use crate::verify;
+use crate::{Bracket, Dissipation, ModelError, NaturalBracket, NoDissipation, Report, Verified};
 
 /// What an integrator asks of a system `x' = Π dH + K dS`; [`System`] is the one to build.
 pub trait Metriplectic {
@@ -85,20 +85,40 @@ pub trait Metriplectic {
         Ok(reversible + velocity::irreversible(self, x, &w)?)
     }
 
-    /// Checks the laws of the model at `x0` and at sampled points within `radius` of it, in chart
-    /// coordinates. Every run does this first.
+    /// Checks the laws of the model at `x0` and at 16 points around it, each coordinate within `radius` times
+    /// its [size](Manifold::scales) there. A run does this first, with a radius of 0.1.
     ///
     /// # Errors
     ///
     /// [`ModelError`] that names the law, the point and the size of the violation.
     fn verify(&self, x0: &Point<Self>, radius: f64) -> Result<(), ModelError> {
-        verify::verify(self, x0, radius)
+        verify::report(self, x0, radius).verdict
     }
 
     /// The residual of every law of the model around `x0`: the page to read when a new model
     /// misbehaves.
     fn report(&self, x0: &Point<Self>) -> Report {
-        verify::report(self, x0, verify::default_radius::<Self::Manifold>(x0))
+        verify::report(self, x0, verify::RADIUS)
+    }
+
+    /// The system with the certificate that its model was verified around `x0`: runs of it from any start
+    /// verify no more than that start. For a study of many runs.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`verify`](Self::verify).
+    fn verified(&self, x0: &Point<Self>) -> Result<Verified<'_, Self>, ModelError> {
+        Verified::around(self, x0)
+    }
+
+    /// What a run checks before its first step: everything that [`verify`](Self::verify) does, unless the
+    /// system is [`Verified`].
+    ///
+    /// # Errors
+    ///
+    /// Those of [`verify`](Self::verify).
+    fn check_start(&self, x0: &Point<Self>) -> Result<(), ModelError> {
+        self.verify(x0, verify::RADIUS)
     }
 }
 
@@ -115,6 +135,9 @@ pub enum SecondLaw {
     /// Both laws exactly, in each step: `ΔS = h K(w_S, w_S) ≥ 0` with a discrete gradient `w_S` of the
     /// entropy, which takes the place of `dS` and is killed by the bracket. `S` must be a Casimir,
     /// `Π dS = 0`, and verification refuses the model otherwise: there is no such scheme then.
+    ///
+    /// A force `𝓕` adds `h ⟨𝓕(w_H), [w_H, w_S]⟩` to `ΔS`, and verification refuses one that makes this
+    /// negative, at the sampled points or on a step from them.
     Exact,
     /// The scheme as published (Bloch, Farré Puiggalí, Martín de Diego 2024, §4.4), with `dS(z)` at
     /// the base point and `Π(z)` as it is. The first law holds exactly; `ΔS ≥ −O(h³)`, of either sign,
@@ -176,6 +199,7 @@ impl System<(), (), (), (), (), ()> {
             energy: NoEnergy,
             entropy: NoEntropy,
             invariants: (),
+            has_entropy: false,
             second_law: SecondLaw::NoEntropy,
         }
     }
@@ -192,6 +216,7 @@ pub struct SystemBuilder<M, G, B, K, H, S, L = ()> {
     energy: H,
     entropy: S,
     invariants: L,
+    has_entropy: bool,
     second_law: SecondLaw,
 }
 
@@ -219,7 +244,15 @@ impl<M: Manifold, G, B, K, H, S, L> SystemBuilder<M, G, B, K, H, S, L> {
     /// The energy `H`: a closure `|x| -> Real` or any other [`ScalarField`].
     pub fn energy<F: ScalarField<M>>(self, energy: F) -> SystemBuilder<M, G, B, K, F, S, L> {
         let Self {
-            manifold, metric, bracket, dissipation, entropy, invariants, second_law, ..
+            manifold,
+            metric,
+            bracket,
+            dissipation,
+            entropy,
+            invariants,
+            has_entropy,
+            second_law,
+            ..
         } = self;
         SystemBuilder {
             manifold,
@@ -229,14 +262,15 @@ impl<M: Manifold, G, B, K, H, S, L> SystemBuilder<M, G, B, K, H, S, L> {
             energy,
             entropy,
             invariants,
+            has_entropy,
             second_law,
         }
     }
 
     /// The entropy `S`: a closure `|x| -> Real` or any other [`ScalarField`]. It must be a Casimir
     /// of the bracket unless [`second_law`](Self::second_law) says otherwise, and it is produced by
-    /// the dissipation of the metric ([`MetricDissipation`](crate::MetricDissipation)) unless
-    /// [`dissipation`](Self::dissipation) gives another one, before or after.
+    /// the dissipation of the metric ([`MetricDissipation`](crate::MetricDissipation)) unless a
+    /// [`dissipation`](Self::dissipation) or a force is given, before or after.
     pub fn entropy<F: ScalarField<M>>(
         self,
         entropy: F,
@@ -259,6 +293,7 @@ impl<M: Manifold, G, B, K, H, S, L> SystemBuilder<M, G, B, K, H, S, L> {
             energy,
             entropy,
             invariants,
+            has_entropy: true,
             second_law,
         }
     }
@@ -266,8 +301,26 @@ impl<M: Manifold, G, B, K, H, S, L> SystemBuilder<M, G, B, K, H, S, L> {
     /// What produces the entropy, in place of the dissipation of the metric: any
     /// [`Dissipation`], such as those of the table in [`dissipation`](crate::dissipation).
     pub fn dissipation<F>(self, dissipation: F) -> SystemBuilder<M, G, B, Given<F>, H, S, L> {
-        let Self { manifold, metric, bracket, energy, entropy, invariants, second_law, .. } = self;
-        let dissipation = Given(dissipation);
+        self.choose(|_| Given(dissipation))
+    }
+
+    /// The same with another choice of the dissipation.
+    pub(crate) fn choose<F>(
+        self,
+        choose: impl FnOnce(K) -> F,
+    ) -> SystemBuilder<M, G, B, F, H, S, L> {
+        let Self {
+            manifold,
+            metric,
+            bracket,
+            dissipation,
+            energy,
+            entropy,
+            invariants,
+            has_entropy,
+            second_law,
+        } = self;
+        let dissipation = choose(dissipation);
         SystemBuilder {
             manifold,
             metric,
@@ -276,6 +329,7 @@ impl<M: Manifold, G, B, K, H, S, L> SystemBuilder<M, G, B, K, H, S, L> {
             energy,
             entropy,
             invariants,
+            has_entropy,
             second_law,
         }
     }
@@ -284,7 +338,15 @@ impl<M: Manifold, G, B, K, H, S, L> SystemBuilder<M, G, B, K, H, S, L> {
     /// [`Metric::field`](metriplectic_manifolds::Metric::field).
     pub fn metric<F: Riemannian<M>>(self, metric: F) -> SystemBuilder<M, F, B, K, H, S, L> {
         let Self {
-            manifold, bracket, dissipation, energy, entropy, invariants, second_law, ..
+            manifold,
+            bracket,
+            dissipation,
+            energy,
+            entropy,
+            invariants,
+            has_entropy,
+            second_law,
+            ..
         } = self;
         SystemBuilder {
             manifold,
@@ -294,6 +356,7 @@ impl<M: Manifold, G, B, K, H, S, L> SystemBuilder<M, G, B, K, H, S, L> {
             energy,
             entropy,
             invariants,
+            has_entropy,
             second_law,
         }
     }
@@ -301,10 +364,20 @@ impl<M: Manifold, G, B, K, H, S, L> SystemBuilder<M, G, B, K, H, S, L> {
     /// The Poisson tensor: [`LiePoisson`](crate::LiePoisson), [`Zero`](crate::Zero),
     /// [`Poisson::constant`](crate::Poisson::constant), [`Poisson::field`](crate::Poisson::field),
     /// [`Symplectic`](crate::Symplectic), [`AreaForm`](type@crate::AreaForm) or [`Nambu`](crate::Nambu);
-    /// on a product a pair of them, one for each factor.
+    /// on a product a pair of them, one for each factor. A skew tensor that is not Poisson is
+    /// [`AlmostPoisson::field`](crate::AlmostPoisson::field).
     pub fn bracket<F>(self, bracket: F) -> SystemBuilder<M, G, F, K, H, S, L> {
-        let Self { manifold, metric, dissipation, energy, entropy, invariants, second_law, .. } =
-            self;
+        let Self {
+            manifold,
+            metric,
+            dissipation,
+            energy,
+            entropy,
+            invariants,
+            has_entropy,
+            second_law,
+            ..
+        } = self;
         SystemBuilder {
             manifold,
             metric,
@@ -313,6 +386,7 @@ impl<M: Manifold, G, B, K, H, S, L> SystemBuilder<M, G, B, K, H, S, L> {
             energy,
             entropy,
             invariants,
+            has_entropy,
             second_law,
         }
     }
@@ -370,6 +444,7 @@ impl<M: Manifold, G, B, K, H, S, L> SystemBuilder<M, G, B, K, H, S, L> {
             energy,
             entropy,
             invariants,
+            has_entropy,
             second_law,
         } = self;
         let invariants = (invariants, one);
@@ -381,6 +456,7 @@ impl<M: Manifold, G, B, K, H, S, L> SystemBuilder<M, G, B, K, H, S, L> {
             energy,
             entropy,
             invariants,
+            has_entropy,
             second_law,
         }
     }
@@ -422,14 +498,17 @@ impl<M: Manifold, G, B, K, H, S, L> SystemBuilder<M, G, B, K, H, S, L> {
             energy,
             entropy,
             invariants,
+            has_entropy,
             second_law,
         } = self;
         let dissipation = dissipation.chosen();
-        let has_entropy = !Dissipation::<M, G>::is_none(&dissipation);
-        if !has_entropy && Bracket::<M, G>::is_zero(&bracket) {
+        let dissipates = !Dissipation::<M, G>::is_none(&dissipation);
+        if !dissipates && Bracket::<M, G>::is_zero(&bracket) {
             return Err(BuildError::NothingMoves);
         }
-        if has_entropy == (second_law == SecondLaw::NoEntropy) {
+        let changes = dissipates || Bracket::<M, G>::is_forced(&bracket);
+        let promises = second_law != SecondLaw::NoEntropy;
+        if promises != (has_entropy && changes) || dissipates && !has_entropy {
             return Err(BuildError::SecondLawWithoutEntropy);
         }
         if L::COUNT >= M::Dim::LEN {
@@ -443,6 +522,7 @@ impl<M: Manifold, G, B, K, H, S, L> SystemBuilder<M, G, B, K, H, S, L> {
             energy,
             entropy,
             invariants,
+            has_entropy,
             second_law,
         };
         Ok(System { parts })

@@ -5,7 +5,7 @@
 //! [`SVector`] and [`SMatrix`], so concrete code has all of nalgebra.
 
 use std::fmt::Debug;
-use std::ops::{Add, AddAssign, Index, IndexMut, Mul, Neg, Sub, SubAssign};
+use std::ops::{Add, AddAssign, Index, IndexMut, Mul, Neg, RangeInclusive, Sub, SubAssign};
 
 use approx::RelativeEq;
 use nalgebra::{Const, DimAdd, SMatrix, SVector};
@@ -108,14 +108,24 @@ pub trait Column<D: Scalar>:
         R::from_index(|i| self[i].re())
     }
 
-    /// The Euclidean norm of the real parts.
+    /// The Euclidean norm of the real parts, also where their squares leave the range of numbers.
     #[inline]
     fn magnitude(&self) -> f64 {
         let mut sum = 0.0;
         for i in 0..Self::LEN {
             sum += self[i].re() * self[i].re();
         }
-        sum.sqrt()
+        if SQUARES.contains(&sum) {
+            sum.sqrt()
+        } else {
+            scaled_norm((0..Self::LEN).map(|i| self[i].re()))
+        }
+    }
+
+    /// The column of the absolute values of the real parts.
+    #[inline]
+    fn abs(&self) -> Self {
+        Self::from_index(|i| D::from(self[i].re().abs()))
     }
 
     /// Whether every real part is finite.
@@ -141,6 +151,29 @@ impl<D: Scalar, const N: usize> Column<D> for SVector<D, N> {
         }
         sum
     }
+}
+
+/// The sums of squares that have all their digits.
+const SQUARES: RangeInclusive<f64> = 1e-280..=1e280;
+
+/// The norm of numbers whose squares underflow or overflow, from the numbers in units of a power of two
+/// near the largest.
+#[cold]
+fn scaled_norm(entries: impl Iterator<Item = f64> + Clone) -> f64 {
+    let largest = entries.clone().fold(0.0_f64, |most, entry| most.max(entry.abs()));
+    if largest == 0.0 || !largest.is_finite() {
+        // A NaN is not the largest of anything, and has to come through.
+        return entries.fold(largest, |sum, entry| sum + entry.abs());
+    }
+    let unit = power_of_two(largest);
+    entries.fold(0.0, |sum, entry| sum + (entry / unit).powi(2)).sqrt() * unit
+}
+
+/// The power of two at or below a positive number, at least the least normal one: a unit in which
+/// numbers keep their digits.
+#[must_use]
+pub fn power_of_two(x: f64) -> f64 {
+    f64::from_bits(x.max(f64::MIN_POSITIVE).to_bits() & f64::INFINITY.to_bits())
 }
 
 /// A square matrix of scalars.
@@ -251,7 +284,18 @@ pub trait Square<D: Scalar>:
                 sum += self[(i, j)].re() * self[(i, j)].re();
             }
         }
-        sum.sqrt()
+        let n = Self::Column::LEN;
+        if SQUARES.contains(&sum) {
+            sum.sqrt()
+        } else {
+            scaled_norm((0..n * n).map(|k| self[(k / n, k % n)].re()))
+        }
+    }
+
+    /// The matrix of the absolute values of the real parts.
+    #[inline]
+    fn abs(&self) -> Self {
+        Self::from_entries(|i, j| D::from(self[(i, j)].re().abs()))
     }
 
     /// The lower triangular `L` with `A = L Lᵀ` (Cholesky), read from the lower triangle of `A`.

@@ -34,7 +34,7 @@ pub mod series;
 pub mod space;
 
 pub use differential::{differential, differential_at, hessian, hessian_at, jacobian};
-pub use dimension::{Column, Dimension, Factors, NotPositive, Plus, Square};
+pub use dimension::{Column, Dimension, Factors, NotPositive, Plus, Square, power_of_two};
 pub use field::{Jet1, Jet2, MatrixField, MatrixJet, ScalarField, along_slopes};
 pub use laws::BrokenLaw;
 pub use scalar::{Real, Scalar};

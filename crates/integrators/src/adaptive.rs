@@ -29,16 +29,26 @@
 //!
 //! # The tolerance
 //!
-//! A step is accepted if `|e| ≤ τ^{3/2} max(|x|, 1)`, where `τ` is the tolerance, `|x|` the size of the
-//! entries of the point ([`Manifold::magnitude`]) and `|e|` that of the velocity with the components
-//! `e`. A local error of `τ^{3/2}` belongs to steps `h ∝ τ^{1/2}`, and these to an error `∝ h² ∝ τ` at
+//! A step is accepted if the error of each entry is small against the size of this entry:
+//!
+//! ```math
+//! r = \Bigl( \sum_i \bigl(e_i/(\tau^{3/2} s_i + a_i)\bigr)^2 \Bigr)^{1/2} \le 1 .
+//! ```
+//!
+//! `τ` is the tolerance, and `s_i` the largest `|x_i|` of the run so far, or what an entry reaches soon that
+//! starts at zero ([`Manifold::scales`](metriplectic_manifolds::Manifold::scales), [`Until::scale`]); `a_i` is zero unless you say otherwise
+//! ([`Until::absolute`]). The round-off of the estimate is allowed too. No unit enters: entries of 10⁻⁹ and of 300 are followed equally well, and the same
+//! problem in other units takes the same steps. On a curved factor, whose frame is arbitrary, all directions
+//! have one size, and the Euclidean norm is the same in each frame.
+//!
+//! A local error of `τ^{3/2}` belongs to steps `h ∝ τ^{1/2}`, and these to an error `∝ h² ∝ τ` at
 //! the end of a run: with this exponent a tenth of the tolerance is a tenth of the error, and `τ` is
 //! about the error that a run collects while the state moves by its own size (Söderlind, Wang 2006, on the
 //! calibration of tolerances).
 //!
 //! # The controller
 //!
-//! With `r = |e|/(τ^{3/2} max(|x|, 1))` in this step and `r₋` in the one before, the next step is
+//! With `r` in this step and `r₋` in the one before, the next step is
 //!
 //! ```math
 //! h_+ = h \, \min\bigl(5, \max(\tfrac15, \; 0.9\, r^{-0.7/3}\, r_-^{0.4/3}) \bigr) ,
@@ -48,13 +58,14 @@
 //! §IV.2). A step with `r > 1` is rejected and tried again with `0.9 r^{−1/3}` of its size, a
 //! step that Newton's method does not solve, or that leaves the domain, with a quarter; after a
 //! rejection the step does not grow. The last step is shortened so that the run ends at the time that was
-//! asked for, to the last bit. The first step is that of Hairer, Nørsett, Wanner (Solving ODEs I, §II.4).
+//! asked for, to the last bit. The first step is that of Hairer, Nørsett, Wanner (Solving ODEs I, §II.4),
+//! with the sizes of the entries in place of their absolute numbers.
 
 use metriplectic_dynamics::{Metriplectic, system::Point};
 use metriplectic_fields::{ChartPoint, Column, Dimension, Space, Vector};
-use metriplectic_manifolds::Manifold;
 
-use crate::span::{Course, Size, Span, SpanError, check_step_size};
+use crate::scales::{Scales, relative};
+use crate::span::{Course, Size, Span, SpanError, check_end, check_step_size};
 use crate::step::Memory;
 
 /// A run to a time, in steps that follow a tolerance; made by [`Span::until`].
@@ -63,18 +74,34 @@ use crate::step::Memory;
 /// use metriplectic_integrators::Span;
 /// // To t = 50, with an error of about 10⁻⁶ in each turn of the motion; every tenth state is recorded.
 /// let span = Span::until(50.0).tolerance(1e-6).every(10);
-/// // The same, or less if the motion comes to rest.
-/// let span = span.until_rest(1e-9);
+/// // From t = 20; or less, if the motion comes to rest.
+/// let span = span.starting_at(20.0).until_rest(1e-9);
+/// // A displacement that starts at zero, and whose usual size is 10⁻⁹, beside two other entries.
+/// let span = span.scale([1e-9, 0.0, 0.0]);
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Until {
+pub struct Until<const N: usize = 0> {
+    pub(crate) start: f64,
     end: f64,
     tolerance: f64,
     first: Option<f64>,
     least: Option<f64>,
     largest: Option<f64>,
     pub(crate) every: usize,
+    pub(crate) most: Option<usize>,
     pub(crate) rest: Option<f64>,
+    entries: Entries<[f64; N]>,
+}
+
+/// What is known of the errors of the entries, one number for each direction of the chart.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Entries<V> {
+    /// Nothing: errors are relative to the sizes that the entries have.
+    Automatic,
+    /// The sizes of some entries; zero for an automatic one.
+    Scale(V),
+    /// Errors that are allowed in addition.
+    Absolute(V),
 }
 
 /// The tolerance without another one.
@@ -106,17 +133,49 @@ impl Span {
     /// # }
     /// ```
     pub const fn until(end: f64) -> Until {
-        let (first, least, largest, rest) = (None, None, None, None);
-        Until { end, tolerance: TOLERANCE, first, least, largest, every: 1, rest }
+        let (first, least, largest, most, rest) = (None, None, None, None, None);
+        let (start, every, entries) = (0.0, 1, Entries::Automatic);
+        let tolerance = TOLERANCE;
+        Until { start, end, tolerance, first, least, largest, every, most, rest, entries }
     }
 }
 
 impl Until {
-    /// About the error, relative to `max(|x|, 1)`, that the run collects while its state moves by
-    /// its own size; the error at the end is proportional to it. At least 10⁻¹⁰.
+    /// The sizes of the entries that their errors are relative to, one for each direction of the chart, in
+    /// the units of the entries. Zero stands for the automatic size: the largest one of the run so far.
+    ///
+    /// Say the size of an entry that starts at zero and moves late, or of one whose changes matter and are
+    /// far smaller than the entry: heights of metres beside an earth's radius.
+    #[must_use]
+    pub const fn scale<const N: usize>(self, sizes: [f64; N]) -> Until<N> {
+        self.with(Entries::Scale(sizes))
+    }
+
+    /// The error of each entry that is allowed in a step, in addition to `τ^{3/2}` of its size: one for
+    /// each direction of the chart, in the units of the entries.
+    #[must_use]
+    pub const fn absolute<const N: usize>(self, errors: [f64; N]) -> Until<N> {
+        self.with(Entries::Absolute(errors))
+    }
+
+    const fn with<const N: usize>(self, entries: Entries<[f64; N]>) -> Until<N> {
+        let Self { start, end, tolerance, first, least, largest, every, most, rest, .. } = self;
+        Until { start, end, tolerance, first, least, largest, every, most, rest, entries }
+    }
+}
+
+impl<const N: usize> Until<N> {
+    /// About the error, relative to the sizes of the entries, that the run collects while its state
+    /// moves by its own size; the error at the end is proportional to it. At least 10⁻¹⁰.
     #[must_use]
     pub const fn tolerance(self, tolerance: f64) -> Self {
         Self { tolerance, ..self }
+    }
+
+    /// The time at which the run starts, 0 without another one.
+    #[must_use]
+    pub const fn starting_at(self, start: f64) -> Self {
+        Self { start, ..self }
     }
 
     /// The first step to try, instead of the automatic one.
@@ -125,7 +184,7 @@ impl Until {
         Self { first: Some(h), ..self }
     }
 
-    /// The step size below which the run ends in an error; `16 ε · end` without another one.
+    /// The step size below which the run ends in an error; `16 ε max(|start|, |end|)` without another one.
     #[must_use]
     pub const fn least_step(self, h: f64) -> Self {
         Self { least: Some(h), ..self }
@@ -143,17 +202,72 @@ impl Until {
         Self { every, ..self }
     }
 
+    /// Records at most `states` states: whenever there are more, every second one is given up, and from
+    /// then on half as many are recorded. The start and the last state are always recorded, so two are the
+    /// fewest.
+    ///
+    /// ```
+    /// # use metriplectic_dynamics::System;
+    /// # use metriplectic_fields::Real;
+    /// # use metriplectic_integrators::{Run, Span};
+    /// # use metriplectic_manifolds::{LieDual, WeylMidpoint};
+    /// # use nalgebra::Vector3;
+    /// # fn main() -> Result<(), metriplectic_integrators::Error> {
+    /// # let body = System::on(LieDual::so3())
+    /// #     .energy(|p: &Vector3<Real>| p.x * p.x * 0.5 + p.y * p.y + p.z * p.z * 1.5)
+    /// #     .build()?;
+    /// let span = Span::until(50.0).tolerance(1e-5).at_most(100);
+    /// let run = WeylMidpoint.run(&body, Vector3::new(0.4, 0.5, 0.3), span)?;
+    /// assert!(run.certificate().steps > 1000);
+    /// assert!((50..=100).contains(&run.states().len()) && run.last().time == 50.0);
+    /// # Ok(())
+    /// # }
+    /// ```
+    #[must_use]
+    pub const fn at_most(self, states: usize) -> Self {
+        Self { most: Some(if states > 2 { states } else { 2 }), ..self }
+    }
+
     /// Ends the run as soon as the state is at rest, see [`Ending::Rest`](crate::Ending::Rest).
     #[must_use]
     pub const fn until_rest(self, tolerance: f64) -> Self {
         Self { rest: Some(tolerance), ..self }
     }
+}
 
-    pub(crate) fn check(&self) -> Result<(), SpanError> {
+impl<const N: usize> From<Until<N>> for Course {
+    fn from(until: Until<N>) -> Self {
+        let Until { start, end, tolerance, first, least, largest, every, most, rest, entries } =
+            until;
+        let entries = match entries {
+            Entries::Automatic => Entries::Automatic,
+            Entries::Scale(sizes) => Entries::Scale(sizes.into()),
+            Entries::Absolute(errors) => Entries::Absolute(errors.into()),
+        };
+        let size = Size::Tolerance(Adaptive { end, tolerance, first, least, largest, entries });
+        Self { size, start, count: None, every, most, rest }
+    }
+}
+
+/// What a course says of steps that follow a tolerance.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Adaptive {
+    end: f64,
+    tolerance: f64,
+    first: Option<f64>,
+    least: Option<f64>,
+    largest: Option<f64>,
+    entries: Entries<Box<[f64]>>,
+}
+
+impl Adaptive {
+    pub(crate) const fn end(&self) -> f64 {
+        self.end
+    }
+
+    pub(crate) fn check(&self, start: f64) -> Result<(), SpanError> {
         let Self { end, tolerance, .. } = *self;
-        if !(end > 0.0 && end.is_finite()) {
-            return Err(SpanError::End { end });
-        }
+        check_end(start, end)?;
         if !(tolerance >= LEAST_TOLERANCE && tolerance.is_finite()) {
             return Err(SpanError::Tolerance { tolerance, least: LEAST_TOLERANCE });
         }
@@ -168,47 +282,69 @@ impl Until {
         Ok(())
     }
 
-    /// The controller of a run from `x`.
-    pub(crate) fn controller<Y: Metriplectic>(&self, system: &Y, x: &Point<Y>) -> Controller {
-        let least = self.least.unwrap_or(16.0 * f64::EPSILON * self.end);
+    /// The numbers for the entries of a point with `expected` directions.
+    fn entries<V: Column<f64>>(&self) -> Result<Entries<V>, SpanError> {
+        let vector = |list: &[f64]| {
+            if list.len() != V::LEN {
+                return Err(SpanError::Entries { found: list.len(), expected: V::LEN });
+            }
+            let bad = list.iter().position(|x| !(*x >= 0.0 && x.is_finite()));
+            match bad {
+                Some(index) => Err(SpanError::Entry { index, value: list[index] }),
+                None => Ok(V::from_index(|i| list[i])),
+            }
+        };
+        Ok(match &self.entries {
+            Entries::Automatic => Entries::Automatic,
+            Entries::Scale(list) => Entries::Scale(vector(list)?),
+            Entries::Absolute(list) => Entries::Absolute(vector(list)?),
+        })
+    }
+
+    /// The controller of a run from `x`, whose entries have these sizes.
+    pub(crate) fn controller<Y: Metriplectic>(
+        &self,
+        system: &Y,
+        (x, start): (&Point<Y>, f64),
+        scales: &Scales<<Y::Manifold as Space>::Dim>,
+    ) -> Result<Controller<<Y::Manifold as Space>::Dim>, SpanError> {
         let mut controller = Controller {
+            start,
             end: self.end,
             tolerance: self.tolerance,
-            least,
-            largest: self.largest.unwrap_or(self.end).max(least),
+            entries: self.entries()?,
+            least: self.least,
+            largest: self.largest,
             next: 0.0,
             taken: None,
             error: None,
             rejected: false,
         };
-        let first = self.first.unwrap_or_else(|| controller.first_step(system, x));
-        controller.next = first.clamp(least, controller.largest);
-        controller
-    }
-}
-
-impl From<Until> for Course {
-    fn from(until: Until) -> Self {
-        Self { size: Size::Tolerance(until), count: None, every: until.every, rest: until.rest }
+        let first = self.first.unwrap_or_else(|| controller.first_step(system, x, scales));
+        controller.next = controller.within(first);
+        Ok(controller)
     }
 }
 
 /// How large the steps of a run are.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Pace {
+pub(crate) enum Pace<N: Dimension> {
     /// All of one size.
     Fixed(f64),
     /// As the tolerance says.
-    Adaptive(Controller),
+    Adaptive(Controller<N>),
 }
 
 /// Says how large the next step is, from the errors of those before it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Controller {
+pub(crate) struct Controller<N: Dimension> {
+    /// When the run starts.
+    pub(crate) start: f64,
     pub(crate) end: f64,
     pub(crate) tolerance: f64,
-    pub(crate) least: f64,
-    pub(crate) largest: f64,
+    pub(crate) entries: Entries<N::Vector<f64>>,
+    pub(crate) least: Option<f64>,
+    pub(crate) largest: Option<f64>,
     /// The size to try next.
     pub(crate) next: f64,
     /// The size of the step taken last.
@@ -230,7 +366,18 @@ const UNSOLVED: f64 = 0.25;
 /// The least error that the controller remembers: a step without any is no reason to be bold later.
 const LEAST_ERROR: f64 = 1e-4;
 
-impl Controller {
+impl<N: Dimension> Controller<N> {
+    /// The step size below which the run ends in an error.
+    pub(crate) fn least(&self) -> f64 {
+        self.least.unwrap_or(16.0 * f64::EPSILON * self.start.abs().max(self.end.abs()))
+    }
+
+    /// A step size within the bounds.
+    fn within(&self, h: f64) -> f64 {
+        let least = self.least();
+        h.clamp(least, self.largest.unwrap_or(self.end - self.start).max(least))
+    }
+
     /// The size of the step to try from time `t`, so that `t + h` has no round-off, and whether it
     /// is the last one.
     pub(crate) fn attempt(&self, t: f64) -> (f64, bool) {
@@ -241,7 +388,10 @@ impl Controller {
             // Rather two steps of one size than one that is cut to a sliver.
             ((t + 0.5 * left) - t, false)
         } else {
-            ((t + h) - t, false)
+            let end = t + h;
+            // A step that was rejected must be tried with a smaller size, not with one rounded up to it.
+            let end = if self.rejected && end - t > h { end.next_down() } else { end };
+            (end - t, false)
         }
     }
 
@@ -251,7 +401,7 @@ impl Controller {
         let ratio = SAFETY * error.powf(-0.7 / 3.0) * proportional;
         let most = if self.rejected { 1.0 } else { LARGEST_RATIO };
         let next = h * ratio.clamp(LEAST_RATIO, most);
-        self.next = next.clamp(self.least, self.largest);
+        self.next = self.within(next);
         self.taken = Some(h);
         self.error = Some(error.max(LEAST_ERROR));
         self.rejected = false;
@@ -265,39 +415,55 @@ impl Controller {
         self.rejected = true;
     }
 
-    /// The error allowed in a step from `x`.
-    fn allowed<M: Manifold>(&self, x: &M::Point<f64>) -> f64 {
-        self.tolerance.powf(1.5).max(8.0 * f64::EPSILON) * M::magnitude(x).max(1.0)
+    /// The error `τ^{3/2} s_i + a_i` that is allowed in a step of size `h`, entry by entry, and what
+    /// rounding may make of the estimate.
+    fn allowed(&self, scales: &Scales<N>, h: f64) -> N::Vector<f64> {
+        let tolerance = self.tolerance.powf(1.5).max(8.0 * f64::EPSILON);
+        let (sizes, noise) = (&scales.sizes, scales.noise(h));
+        Column::from_index(|i| match &self.entries {
+            Entries::Scale(known) if known[i] > 0.0 => tolerance * known[i] + noise[i],
+            Entries::Absolute(errors) => tolerance * sizes[i] + errors[i] + noise[i],
+            _ => tolerance * sizes[i] + noise[i],
+        })
     }
 
     /// The error of the step from `x` to `end` in units of the one allowed; `None` if the equation
     /// of motion cannot be evaluated on the way, or in another chart only.
-    pub(crate) fn error_of<Y: Metriplectic>(
+    pub(crate) fn error_of<Y>(
         &self,
         system: &Y,
-        x: &Point<Y>,
-        end: &Point<Y>,
+        (x, end): (&Point<Y>, &Point<Y>),
         h: f64,
-    ) -> Option<f64> {
-        let e = local_error(system, x, end, h)?;
-        let error = speed::<Y>(x, &e) / self.allowed::<Y::Manifold>(x);
+        scales: &Scales<N>,
+    ) -> Option<f64>
+    where
+        Y: Metriplectic,
+        Y::Manifold: Space<Dim = N>,
+    {
+        let error = relative(&local_error(system, x, end, h)?, &self.allowed(scales, h));
         error.is_finite().then_some(error)
     }
 
     /// The first step, after Hairer, Nørsett, Wanner (Solving ODEs I, §II.4): a short step of Euler's
     /// method gives the rate `ω = |f'f|/|f|` of the motion, and `h³ω²|f|` is to be a hundredth of the
-    /// error allowed.
-    fn first_step<Y: Metriplectic>(&self, system: &Y, x: &Point<Y>) -> f64 {
-        let speed = |v: &Vector<Y::Manifold>| speed::<Y>(x, v);
+    /// error allowed, all in units of it.
+    fn first_step<Y>(&self, system: &Y, x: &Point<Y>, scales: &Scales<N>) -> f64
+    where
+        Y: Metriplectic,
+        Y::Manifold: Space<Dim = N>,
+    {
+        let (span, allowed) = (self.end - self.start, self.allowed(scales, 0.0));
         let h = system.velocity(&ChartPoint::centre(x)).ok().and_then(|v| {
-            let own_time = Y::Manifold::magnitude(x).max(1.0) / speed(&v);
-            let euler = 0.01 * own_time.min(self.end);
+            let own_time = scales.speed(&v).recip().min(span);
+            let euler = 0.01 * own_time;
             let there = ChartPoint { base: x.clone(), q: v * euler };
-            let rate = speed(&(system.velocity(&there).ok()? - v)) / (euler * speed(&v));
-            let error = 0.01 * self.allowed::<Y::Manifold>(x);
-            Some((error / (rate.powi(2) * speed(&v))).cbrt().min(own_time))
+            let change = system.velocity(&there).ok()? - v;
+            // h = T ∛(0.01 / (|Tf| (ωT)²)), with |f| (ωT)² = |100² Δf|²/|f| for Δf over T/100.
+            let (speed, bend) = (relative(&v, &allowed), 100.0 * relative(&change, &allowed));
+            let error = own_time * speed * (bend / speed).powi(2);
+            Some(own_time * (0.01 / error).cbrt().min(1.0))
         });
-        h.filter(|h| h.is_finite()).unwrap_or(1e-3 * self.end)
+        h.filter(|h| *h > 0.0).unwrap_or(1e-3 * span)
     }
 }
 
@@ -317,11 +483,6 @@ fn local_error<Y: Metriplectic>(
     let (start, there) = (f(Vector::<Y::Manifold>::zero())?, f(q)?);
     let middle = f(q * 0.5 - (there - start) * (h / 8.0))?;
     Some(q - (start + middle * 4.0 + there) * (h / 6.0))
-}
-
-/// The size of the velocity at `x` with the components `v`, in the units of the entries.
-pub(crate) fn speed<Y: Metriplectic>(x: &Point<Y>, v: &Vector<Y::Manifold>) -> f64 {
-    Y::Manifold::velocity(&ChartPoint::centre(x), v).magnitude()
 }
 
 impl<N: Dimension> Memory<N> {
@@ -437,11 +598,13 @@ mod tests {
 
     #[test]
     fn the_controller_stays_within_its_bounds() {
-        let mut controller = Controller {
+        let mut controller = Controller::<Const<1>> {
+            start: 0.0,
             end: 10.0,
             tolerance: 1e-4,
-            least: 1e-6,
-            largest: 2.0,
+            entries: Entries::Automatic,
+            least: Some(1e-6),
+            largest: Some(2.0),
             next: 1.0,
             taken: None,
             error: None,

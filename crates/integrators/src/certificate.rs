@@ -7,17 +7,25 @@ use metriplectic_dynamics::system::Point;
 use metriplectic_dynamics::{Metriplectic, SecondLaw};
 use metriplectic_fields::ScalarField;
 
+use crate::digits::Digits;
+use crate::residual::size_of_terms;
+use crate::step::STIFF;
+
 /// The balance of a run: what became of the two laws, of the manifold, and what it cost.
 ///
 /// All figures of the laws are evaluated from the closures at the stored points, none from the
 /// terms of the scheme.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[non_exhaustive]
 pub struct Certificate {
     /// The energy `H(x₀)`.
     pub initial_energy: f64,
     /// `max |H(x_k) − H(x₀)|`.
     pub max_energy_error: f64,
+    /// The size `|H| + Σ_i |∂_iH x_i|` of the terms of the energy, to which its round-off is relative: at
+    /// the start, or where the error asked for a larger one.
+    pub energy_scale: f64,
     /// The entropy `S(x₀)`; 0 without an entropy.
     pub initial_entropy: f64,
     /// `min (S(x_{k+1}) − S(x_k))`; 0 before the first step.
@@ -25,7 +33,7 @@ pub struct Certificate {
     /// `S(x_n) − S(x₀)`.
     pub entropy_gained: f64,
     /// Steps on which the entropy fell by more than its round-off
-    /// `4ε (max(|S|, 1) + |dS||x|)`.
+    /// `4ε (|S| + Σ_i |∂_iS x_i|)`.
     pub entropy_falls: usize,
     /// `min |w_S|`, the size of the discrete gradient of the entropy in the exact scheme, which has
     /// order 2 as long as this is large against `h²`; infinite (in JSON, null) without such a one.
@@ -56,6 +64,10 @@ pub struct Certificate {
     /// What the model promises about its entropy; serialized as the name of the variant.
     #[cfg_attr(feature = "serde", serde(serialize_with = "by_name"))]
     pub second_law: SecondLaw,
+    /// The largest rate `h|K'|` of the friction in a step, with `K'` the derivative of `K dS` along the
+    /// state, from the Jacobians that were formed; 0 without dissipation. The midpoint rule damps no
+    /// deviation that decays much faster than a step: it is multiplied by almost −1.
+    pub friction: f64,
     /// Whether the dissipation was projected so that it keeps the energy, and is not quite the tensor
     /// that was written down ([`ProjectedDissipation`](metriplectic_dynamics::ProjectedDissipation)).
     pub projected: bool,
@@ -64,6 +76,7 @@ pub struct Certificate {
 /// What became of a further invariant.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[non_exhaustive]
 pub struct Kept {
     /// Why it is conserved; serialized as its name.
     #[cfg_attr(feature = "serde", serde(serialize_with = "by_name"))]
@@ -72,6 +85,8 @@ pub struct Kept {
     pub initial: f64,
     /// `max |L(x_k) − L(x₀)|`.
     pub max_error: f64,
+    /// The size `|L| + Σ_i |∂_iL x_i|` of its terms, like [`Certificate::energy_scale`].
+    pub scale: f64,
 }
 
 impl Kept {
@@ -80,7 +95,8 @@ impl Kept {
         struct At<'a, Y: Metriplectic>(&'a Point<Y>, Vec<Kept>);
         impl<Y: Metriplectic> Visitor<Y::Manifold> for At<'_, Y> {
             fn visit(&mut self, kind: Kind, f: &impl ScalarField<Y::Manifold>) {
-                self.1.push(Kept { kind, initial: f.at(self.0), max_error: 0.0 });
+                let scale = size_of_terms::<Y::Manifold>(f, self.0);
+                self.1.push(Kept { kind, initial: f.at(self.0), max_error: 0.0, scale });
             }
         }
         let mut at = At::<Y>(x0, Vec::new());
@@ -88,10 +104,16 @@ impl Kept {
         at.1
     }
 
-    /// Whether it was kept to round-off: `|L − L₀| ≤ 50 ε max(|L₀|, 1)`.
-    pub fn is_kept(&self) -> bool {
-        self.max_error <= 50.0 * f64::EPSILON * self.initial.abs().max(1.0)
+    /// Whether it was kept to round-off: `|L − L₀| ≤ 50 ε (|L| + Σ_i |∂_iL x_i|)`.
+    pub const fn is_kept(&self) -> bool {
+        self.max_error <= round_off(self.scale)
     }
+}
+
+/// The round-off of a conserved function whose terms have this size: a step evaluates it at two rounded
+/// points, and runs of 10⁷ steps stay within 50 roundings.
+pub(crate) const fn round_off(scale: f64) -> f64 {
+    50.0 * f64::EPSILON * scale
 }
 
 #[cfg(feature = "serde")]
@@ -109,9 +131,14 @@ impl Certificate {
         }
     }
 
-    /// Whether the first law was kept to round-off: `|H − H₀| ≤ 50 ε max(|H₀|, 1)`.
-    pub fn keeps_energy(&self) -> bool {
-        self.max_energy_error <= 50.0 * f64::EPSILON * self.initial_energy.abs().max(1.0)
+    /// Whether the first law was kept to round-off: `|H − H₀| ≤ 50 ε (|H| + Σ_i |∂_iH x_i|)`.
+    pub const fn keeps_energy(&self) -> bool {
+        self.max_energy_error <= round_off(self.energy_scale)
+    }
+
+    /// Whether friction is so stiff at these step sizes that the midpoint rule does not damp it.
+    pub const fn is_stiff(&self) -> bool {
+        self.friction > STIFF
     }
 
     /// Whether the entropy fell on no step by more than its round-off.
@@ -127,15 +154,19 @@ impl Certificate {
 
 impl fmt::Display for Certificate {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(
-            f,
-            "first law:   |H − H₀| ≤ {:.1e}{}, over {}",
-            self.max_energy_error,
-            self.relative_to(),
-            counted(self.steps, "step", "steps")
-        )?;
+        let steps = counted(self.steps, "step", "steps");
+        let (error, relative) = (self.max_energy_error, self.relative_to());
+        if self.keeps_energy() {
+            writeln!(f, "first law:   |H − H₀| ≤ {error:.1e}{relative}, over {steps}")?;
+        } else {
+            let allowed = round_off(self.energy_scale);
+            writeln!(
+                f,
+                "first law:   BROKEN: |H − H₀| = {error:.1e}{relative}, round-off is {allowed:.1e}, over {steps}"
+            )?;
+        }
         match self.second_law {
-            SecondLaw::NoEntropy => writeln!(f, "second law:  no entropy, a Hamiltonian system"),
+            SecondLaw::NoEntropy => writeln!(f, "second law:  no entropy"),
             SecondLaw::Published => {
                 writeln!(f, "second law: not promised; {}", self.entropy_line())
             }
@@ -144,11 +175,17 @@ impl fmt::Display for Certificate {
         if self.projected {
             writeln!(f, "friction:    projected so that K dH = 0, not quite the tensor given")?;
         }
-        for (index, Kept { kind, initial, max_error }) in self.invariants.iter().enumerate() {
+        if self.is_stiff() {
+            writeln!(f, "friction not damped: h|K'| = {:.1e}", self.friction)?;
+        }
+        for (index, kept) in self.invariants.iter().enumerate() {
+            let Kept { kind, initial, max_error, .. } = kept;
             writeln!(
                 f,
-                "{:<13}|L − L₀| ≤ {max_error:.1e}, L₀ = {initial:.6}",
-                format!("{kind} {}:", index + 1)
+                "{:<13}{}|L − L₀| ≤ {max_error:.1e}, L₀ = {}",
+                format!("{kind} {}:", index + 1),
+                if kept.is_kept() { "" } else { "BROKEN: " },
+                Digits(*initial)
             )?;
         }
         writeln!(f, "manifold:    defect ≤ {:.1e}", self.max_manifold_defect)?;
@@ -182,7 +219,7 @@ impl Certificate {
     fn relative_to(&self) -> String {
         let start = self.initial_energy;
         if start.abs() > 0.0 {
-            format!(", {:.1e} of H₀ = {start:.6}", self.max_relative_energy_error())
+            format!(", {:.1e} of H₀ = {}", self.max_relative_energy_error(), Digits(start))
         } else {
             " from H₀ = 0".to_owned()
         }
@@ -217,6 +254,7 @@ mod tests {
     const ONE_FALL: Certificate = Certificate {
         initial_energy: 0.5,
         max_energy_error: 1e-16,
+        energy_scale: 0.5,
         initial_entropy: 1.0,
         min_entropy_increment: -2e-9,
         entropy_gained: 0.25,
@@ -234,6 +272,7 @@ mod tests {
         continued: 0,
         globalised: 0,
         second_law: SecondLaw::Exact,
+        friction: 0.0,
         projected: false,
     };
 

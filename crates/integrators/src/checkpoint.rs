@@ -38,8 +38,39 @@
 //! ```
 //!
 //! The system and the scheme are not in it, since closures cannot be written down: resume with the same
-//! ones. Another system is noticed if its energy, its entropy or a further invariant has another value at the
-//! point. The model is not verified again.
+//! ones. Another system is noticed if its energy, its entropy, a further invariant or its velocity has
+//! another value at the point, by more than the round-off of its terms. The model is not verified again. All
+//! numbers of a checkpoint are compared with each other, and with what the system says at the point.
+//!
+//! # Going on
+//!
+//! A run that has reached its end goes on from its last [checkpoint](crate::Trajectory::checkpoint), with a
+//! later one:
+//!
+//! ```
+//! # use metriplectic_dynamics::System;
+//! # use metriplectic_fields::Real;
+//! # use metriplectic_integrators::{Run, Span};
+//! # use metriplectic_manifolds::{LieDual, WeylMidpoint};
+//! # use nalgebra::Vector3;
+//! # fn main() -> Result<(), metriplectic_integrators::Error> {
+//! # let body = System::on(LieDual::so3())
+//! #     .energy(|p: &Vector3<Real>| p.x * p.x * 0.5 + p.y * p.y + p.z * p.z * 1.5)
+//! #     .entropy(|p: &Vector3<Real>| p.norm_squared() * 0.5)
+//! #     .build()?;
+//! # let start = Vector3::new(0.4, 0.5, 0.3);
+//! let first = WeylMidpoint.run(&body, start, Span::steps(0.1, 100))?;
+//! let later = first.checkpoint().clone().with_steps(300)?;
+//! let extended = WeylMidpoint.resume(&body, &later)?.run()?;
+//! let whole = WeylMidpoint.run(&body, start, Span::steps(0.1, 300))?;
+//! assert_eq!(extended.last(), whole.last());
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! With steps of one size this is the run that would have gone on, bit for bit. With steps that follow a
+//! tolerance ([`Checkpoint::with_end`]) it is this run as long as no step has been shortened to meet the
+//! former end, as those at the end are.
 //!
 //! # Digits
 //!
@@ -57,17 +88,20 @@
 //! another way or contract `a*b + c`; and another processor has another library. There the laws hold all the
 //! same, to the same round-off, but the digits of two long runs need not agree.
 
+mod validation;
+
 use metriplectic_dynamics::Metriplectic;
 use metriplectic_dynamics::system::Point;
-use metriplectic_fields::{Column, Dimension, Square};
+use metriplectic_fields::{ChartPoint, Column, Dimension, Square};
 use metriplectic_manifolds::{Manifold, PointError, Retraction};
 
-use crate::adaptive::{Controller, Pace};
+use crate::adaptive::{Controller, Entries, Pace};
 use crate::certificate::{Certificate, Kept};
 use crate::discrete_gradient::DiscreteGradient;
 use crate::newton::Inverse;
-use crate::residual::{Dim, Numbers, Sizes};
-use crate::span::check_step_size;
+use crate::residual::Dim;
+use crate::scales::Scales;
+use crate::span::{SpanError, check_end, check_step_size, check_steps};
 use crate::step::{Linearisation, Memory, Scheme};
 use crate::trajectory::{Ending, Progress, State, Steps};
 
@@ -78,8 +112,11 @@ use crate::trajectory::{Ending, Progress, State, Steps};
 pub struct Checkpoint {
     version: u32,
     step: usize,
+    start: Exact,
     time: Exact,
     point: Vec<Exact>,
+    /// The velocity there; empty where it cannot be evaluated.
+    velocity: Vec<Exact>,
     energy: Exact,
     entropy: Exact,
     /// The entropy after the last step that dissipated.
@@ -92,8 +129,13 @@ pub struct Checkpoint {
     pace: SavedPace,
     count: Option<usize>,
     every: usize,
+    most: Option<usize>,
+    /// The sizes of the entries so far, and those of the terms of their velocities.
+    sizes: Vec<Exact>,
+    terms: Vec<Exact>,
     rest: Option<Exact>,
-    largest_speed: Exact,
+    /// The largest velocity of each entry.
+    largest_velocity: Vec<Exact>,
     ending: Option<SavedEnding>,
 }
 
@@ -105,14 +147,17 @@ struct SavedLinearisation {
     inverse: Vec<Exact>,
     contraction: Exact,
     first: Exact,
-    sizes: [Exact; 2],
+    /// The round-off of the solution.
+    round_off: Vec<Exact>,
+    floor: Exact,
+    friction: Exact,
     h: Exact,
     length: Exact,
     steps: u32,
 }
 
 /// The version of the format that is written and read.
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 
 /// A number that keeps its bits in every format.
 #[derive(Clone, Copy, Debug)]
@@ -130,13 +175,15 @@ impl PartialEq for Exact {
 struct Balance {
     initial_energy: Exact,
     max_energy_error: Exact,
+    energy_scale: Exact,
     initial_entropy: Exact,
     min_entropy_increment: Exact,
     entropy_gained: Exact,
     entropy_falls: usize,
     min_entropy_slope: Exact,
-    /// Initial value and largest error of each further invariant.
-    invariants: Vec<(Exact, Exact)>,
+    /// Initial value, largest error and scale of each further invariant.
+    invariants: Vec<(Exact, Exact, Exact)>,
+    friction: Exact,
     max_manifold_defect: Exact,
     steps: usize,
     smallest_step: Exact,
@@ -158,13 +205,23 @@ enum SavedPace {
     Adaptive {
         end: Exact,
         tolerance: Exact,
-        least: Exact,
-        largest: Exact,
+        entries: SavedEntries,
+        least: Option<Exact>,
+        largest: Option<Exact>,
         next: Exact,
         taken: Option<Exact>,
         error: Option<Exact>,
         rejected: bool,
     },
+}
+
+/// What is known of the errors of the entries.
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+enum SavedEntries {
+    Automatic,
+    Scale(Vec<Exact>),
+    Absolute(Vec<Exact>),
 }
 
 #[derive(Clone, Debug, PartialEq)]
@@ -216,8 +273,24 @@ pub enum ResumeError {
         /// Its value in the system.
         found: f64,
     },
-    /// A number in it is impossible.
-    #[error("the {what} of the checkpoint is {value}, which no run has; the file is damaged")]
+    /// The end that it is to be given cannot be that of the run.
+    #[error(transparent)]
+    Span(#[from] SpanError),
+    /// It is of a run in steps of one size, and is to be given a time at which it ends.
+    #[error(
+        "the run takes steps of one size; say how many with `with_steps` instead of `with_end`"
+    )]
+    FixedSteps,
+    /// It is of a run whose steps follow a tolerance, and is to be given a number of steps.
+    #[error(
+        "the steps of the run follow a tolerance; say when it ends with `with_end` instead of `with_steps`"
+    )]
+    AdaptiveSteps,
+    /// A number in it is impossible: by itself, beside the others, or for the system.
+    #[error(
+        "the {what} of the checkpoint is {value}, which no run has that agrees with its other numbers; the \
+         file is damaged: write another one"
+    )]
     Damaged {
         /// Which number.
         what: &'static str,
@@ -246,6 +319,47 @@ impl Checkpoint {
     /// The entries of the point reached.
     pub fn point(&self) -> impl Iterator<Item = f64> {
         self.point.iter().map(|x| x.0)
+    }
+
+    /// The same run in so many steps of one size, those taken so far among them: a run that has reached
+    /// its end goes on. One that has come to rest stays there.
+    ///
+    /// # Errors
+    ///
+    /// [`ResumeError::AdaptiveSteps`] if its steps follow a tolerance; [`ResumeError::Span`] if it has taken
+    /// as many already, or the end would be too late for a number.
+    pub fn with_steps(mut self, count: usize) -> Result<Self, ResumeError> {
+        let SavedPace::Fixed { h } = self.pace else { return Err(ResumeError::AdaptiveSteps) };
+        if count <= self.step {
+            return Err(SpanError::NoSteps.into());
+        }
+        check_steps(self.start.0, h.0, count)?;
+        self.count = Some(count);
+        self.go_on();
+        Ok(self)
+    }
+
+    /// The same run to another time, in steps that follow its tolerance: a run that has reached its end
+    /// goes on. One that has come to rest stays there.
+    ///
+    /// # Errors
+    ///
+    /// [`ResumeError::FixedSteps`] if its steps are of one size; [`ResumeError::Span`] if the end is not
+    /// after the time reached.
+    pub fn with_end(mut self, end: f64) -> Result<Self, ResumeError> {
+        let SavedPace::Adaptive { end: old, .. } = &mut self.pace else {
+            return Err(ResumeError::FixedSteps);
+        };
+        check_end(self.time.0, end)?;
+        *old = Exact(end);
+        self.go_on();
+        Ok(self)
+    }
+
+    fn go_on(&mut self) {
+        if self.ending == Some(SavedEnding::Span) {
+            self.ending = None;
+        }
     }
 }
 
@@ -281,13 +395,17 @@ where
     /// All that the next steps depend on, but for the system and the scheme.
     pub fn checkpoint(&self) -> Checkpoint {
         let State { step, time, point, energy, entropy } = &self.state;
-        let Progress { pace, count, every, rest, largest_speed, ending } = self.progress;
+        let Progress { pace, start, count, every, most, scales, rest, largest_velocity, ending } =
+            self.progress;
+        let velocity = self.system.velocity(&ChartPoint::centre(point));
         let known = self.certificate.invariants.len();
         Checkpoint {
             version: VERSION,
             step: *step,
+            start: Exact(start),
             time: Exact(*time),
             point: exact(Y::Manifold::entries(point)),
+            velocity: velocity.map_or_else(|_| Vec::new(), |v| column(&v)),
             energy: Exact(*energy),
             entropy: Exact(*entropy),
             kept_entropy: Exact(self.entropy),
@@ -299,8 +417,11 @@ where
             pace: SavedPace::of(pace),
             count,
             every,
+            most,
+            sizes: column(&scales.sizes),
+            terms: column(&scales.terms),
             rest: rest.map(Exact),
-            largest_speed: Exact(largest_speed),
+            largest_velocity: column(&largest_velocity),
             ending: ending.map(SavedEnding::of),
         }
     }
@@ -328,12 +449,16 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
         }
         let entries: Vec<f64> = c.point().collect();
         let point = system.manifold().from_entries(&entries)?;
-        same("energy", c.energy, system.energy_at(&point))?;
-        same("entropy", c.entropy, system.entropy_at(&point))?;
-        let invariants = invariants(system, &point, c)?;
         let certificate = c.balance.certificate(system, &point)?;
         let progress = progress(c)?;
         let memory = memory(c)?;
+        expect_length("further invariants", c.invariants.len(), certificate.invariants.len())?;
+        validation::of_the_system(system, &point, c)?;
+        validation::of_the_balance(system, &point, c)?;
+        validation::of_the_course(c, &progress)?;
+        validation::of_the_entries::<Y>(&point, &progress, &memory)?;
+        let invariants =
+            Dim::<Y>::array(|k| c.invariants.get(k).map_or(0.0, |invariant| invariant.0));
         let (energy, entropy, time) = (c.energy.0, c.entropy.0, c.time.0);
         let state = State { step: c.step, time, point, energy, entropy };
         let (entropy, failed) = (c.kept_entropy.0, false);
@@ -350,29 +475,6 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
             failed,
         })
     }
-}
-
-/// Accepts a value of a field that is the stored one, up to another mathematical library.
-fn same(field: &'static str, stored: Exact, found: f64) -> Result<(), ResumeError> {
-    let stored = stored.0;
-    if (stored - found).abs() <= 1e-9 * stored.abs().max(1.0) {
-        Ok(())
-    } else {
-        Err(ResumeError::AnotherSystem { field, stored, found })
-    }
-}
-
-fn invariants<Y: Metriplectic>(
-    system: &Y,
-    point: &Point<Y>,
-    c: &Checkpoint,
-) -> Result<Numbers<Y>, ResumeError> {
-    let here = Kept::of(system, point);
-    expect_length("further invariants", c.invariants.len(), here.len())?;
-    for (stored, found) in c.invariants.iter().zip(&here) {
-        same("further invariant", *stored, found.initial)?;
-    }
-    Ok(Dim::<Y>::array(|k| c.invariants.get(k).map_or(0.0, |x| x.0)))
 }
 
 fn memory<N: Dimension>(c: &Checkpoint) -> Result<Memory<N>, ResumeError> {
@@ -392,13 +494,16 @@ fn memory<N: Dimension>(c: &Checkpoint) -> Result<Memory<N>, ResumeError> {
 
 impl SavedLinearisation {
     fn of<N: Dimension>(known: &Linearisation<N>) -> Self {
-        let Linearisation { inverse, sizes, h, length, steps } = *known;
-        let n = N::Vector::<f64>::LEN;
+        let Linearisation { inverse, friction, h, length, steps } = *known;
+        let n = N::LEN;
+        let rows = |matrix: &N::Matrix<f64>| exact((0..n * n).map(|k| matrix[(k / n, k % n)]));
         Self {
-            inverse: exact((0..n * n).map(|k| inverse.matrix[(k / n, k % n)])),
+            inverse: rows(&inverse.matrix),
             contraction: Exact(inverse.contraction),
             first: Exact(inverse.first),
-            sizes: [Exact(sizes.terms), Exact(sizes.gain)],
+            round_off: exact((0..n).map(|i| inverse.round_off[i])),
+            floor: Exact(inverse.floor),
+            friction: Exact(friction),
             h: Exact(h),
             length: Exact(length),
             steps,
@@ -406,21 +511,25 @@ impl SavedLinearisation {
     }
 
     fn restore<N: Dimension>(&self) -> Result<Linearisation<N>, ResumeError> {
-        let n = N::Vector::<f64>::LEN;
-        expect_length("entries of an inverse", self.inverse.len(), n * n)?;
-        let matrix = N::Matrix::<f64>::from_entries(|i, j| self.inverse[i * n + j].0);
+        let n = N::LEN;
         let number = |what, x: Exact| {
             if x.0.is_finite() { Ok(x.0) } else { Err(ResumeError::Damaged { what, value: x.0 }) }
         };
-        number("inverse of a Jacobian", Exact(matrix.magnitude()))?;
-        let contraction = number("contraction", self.contraction)?;
-        let [terms, gain] = self.sizes;
+        let matrix = |what, rows: &[Exact]| -> Result<N::Matrix<f64>, ResumeError> {
+            expect_length(what, rows.len(), n * n)?;
+            rows.iter().try_for_each(|entry| number(what, *entry).map(drop))?;
+            Ok(N::Matrix::<f64>::from_entries(|i, j| rows[i * n + j].0))
+        };
+        let inverse = Inverse {
+            matrix: matrix("entries of an inverse", &self.inverse)?,
+            round_off: vector("round-off of the solution", &self.round_off)?,
+            floor: number("round-off of the residual", self.floor)?,
+            contraction: number("contraction", self.contraction)?,
+            first: self.first.0,
+        };
         Ok(Linearisation {
-            inverse: Inverse { matrix, contraction, first: self.first.0 },
-            sizes: Sizes {
-                terms: number("size of its terms", terms)?,
-                gain: number("gain", gain)?,
-            },
+            inverse,
+            friction: number("rate of friction", self.friction)?,
             h: number("step size", self.h)?,
             length: number("length of a step", self.length)?,
             steps: self.steps,
@@ -428,16 +537,10 @@ impl SavedLinearisation {
     }
 }
 
-fn progress(c: &Checkpoint) -> Result<Progress, ResumeError> {
+fn progress<N: Dimension>(c: &Checkpoint) -> Result<Progress<N>, ResumeError> {
     let damaged = |what, value| Err(ResumeError::Damaged { what, value });
-    if !(c.time.0 >= 0.0 && c.time.0.is_finite()) {
-        return damaged("time", c.time.0);
-    }
     if c.every == 0 {
         return damaged("interval of its records", 0.0);
-    }
-    if !(c.largest_speed.0 >= 0.0 && c.largest_speed.0.is_finite()) {
-        return damaged("largest speed", c.largest_speed.0);
     }
     let positive = |what, h: Exact| match check_step_size(h.0) {
         Ok(()) => Ok(h.0),
@@ -445,44 +548,79 @@ fn progress(c: &Checkpoint) -> Result<Progress, ResumeError> {
     };
     let pace = match &c.pace {
         SavedPace::Fixed { h } => Pace::Fixed(positive("step size", *h)?),
-        SavedPace::Adaptive { end, tolerance, least, largest, next, taken, error, rejected } => {
-            Pace::Adaptive(Controller {
-                end: positive("end", *end)?,
-                tolerance: positive("tolerance", *tolerance)?,
-                least: positive("least step", *least)?,
-                largest: positive("largest step", *largest)?,
-                next: positive("next step", *next)?,
-                taken: taken.map(|h| positive("last step", h)).transpose()?,
-                error: error.map(|e| positive("last error", e)).transpose()?,
-                rejected: *rejected,
-            })
-        }
+        SavedPace::Adaptive {
+            end,
+            tolerance,
+            entries,
+            least,
+            largest,
+            next,
+            taken,
+            error,
+            rejected,
+        } => Pace::Adaptive(Controller {
+            start: c.start.0,
+            end: end.0,
+            tolerance: positive("tolerance", *tolerance)?,
+            entries: entries.restore()?,
+            least: least.map(|h| positive("least step", h)).transpose()?,
+            largest: largest.map(|h| positive("largest step", h)).transpose()?,
+            next: positive("next step", *next)?,
+            taken: taken.map(|h| positive("last step", h)).transpose()?,
+            error: error.map(|e| positive("last error", e)).transpose()?,
+            rejected: *rejected,
+        }),
     };
     Ok(Progress {
         pace,
+        start: c.start.0,
         count: c.count,
         every: c.every,
+        most: c.most,
+        scales: Scales {
+            sizes: vector("sizes of the entries", &c.sizes)?,
+            terms: vector("sizes of the terms", &c.terms)?,
+        },
         rest: c.rest.map(|x| positive("tolerance of rest", x)).transpose()?,
-        largest_speed: c.largest_speed.0,
+        largest_velocity: vector("largest velocities", &c.largest_velocity)?,
         ending: c.ending.as_ref().map(SavedEnding::ending),
     })
 }
 
 impl SavedPace {
-    fn of(pace: Pace) -> Self {
+    fn of<N: Dimension>(pace: Pace<N>) -> Self {
         match pace {
             Pace::Fixed(h) => Self::Fixed { h: Exact(h) },
             Pace::Adaptive(c) => Self::Adaptive {
                 end: Exact(c.end),
                 tolerance: Exact(c.tolerance),
-                least: Exact(c.least),
-                largest: Exact(c.largest),
+                entries: SavedEntries::of(&c.entries),
+                least: c.least.map(Exact),
+                largest: c.largest.map(Exact),
                 next: Exact(c.next),
                 taken: c.taken.map(Exact),
                 error: c.error.map(Exact),
                 rejected: c.rejected,
             },
         }
+    }
+}
+
+impl SavedEntries {
+    fn of<V: Column<f64>>(entries: &Entries<V>) -> Self {
+        match entries {
+            Entries::Automatic => Self::Automatic,
+            Entries::Scale(sizes) => Self::Scale(column(sizes)),
+            Entries::Absolute(errors) => Self::Absolute(column(errors)),
+        }
+    }
+
+    fn restore<V: Column<f64>>(&self) -> Result<Entries<V>, ResumeError> {
+        Ok(match self {
+            Self::Automatic => Entries::Automatic,
+            Self::Scale(list) => Entries::Scale(vector("sizes of entries", list)?),
+            Self::Absolute(list) => Entries::Absolute(vector("errors of entries", list)?),
+        })
     }
 }
 
@@ -511,6 +649,8 @@ impl Balance {
         Self {
             initial_energy: Exact(c.initial_energy),
             max_energy_error: Exact(c.max_energy_error),
+            energy_scale: Exact(c.energy_scale),
+            friction: Exact(c.friction),
             initial_entropy: Exact(c.initial_entropy),
             min_entropy_increment: Exact(c.min_entropy_increment),
             entropy_gained: Exact(c.entropy_gained),
@@ -519,7 +659,7 @@ impl Balance {
             invariants: c
                 .invariants
                 .iter()
-                .map(|k| (Exact(k.initial), Exact(k.max_error)))
+                .map(|k| (Exact(k.initial), Exact(k.max_error), Exact(k.scale)))
                 .collect(),
             max_manifold_defect: Exact(c.max_manifold_defect),
             steps: c.steps,
@@ -542,12 +682,14 @@ impl Balance {
         use metriplectic_dynamics::Dissipation as _;
         let mut invariants = Kept::of(system, point);
         expect_length("further invariants", self.invariants.len(), invariants.len())?;
-        for (kept, (initial, max_error)) in invariants.iter_mut().zip(&self.invariants) {
-            (kept.initial, kept.max_error) = (initial.0, max_error.0);
+        for (kept, (initial, max_error, scale)) in invariants.iter_mut().zip(&self.invariants) {
+            (kept.initial, kept.max_error, kept.scale) = (initial.0, max_error.0, scale.0);
         }
         Ok(Certificate {
             initial_energy: self.initial_energy.0,
             max_energy_error: self.max_energy_error.0,
+            energy_scale: self.energy_scale.0,
+            friction: self.friction.0,
             initial_entropy: self.initial_entropy.0,
             min_entropy_increment: self.min_entropy_increment.0,
             entropy_gained: self.entropy_gained.0,

@@ -2,14 +2,17 @@
 
 use metriplectic_dynamics::{Metriplectic, SecondLaw, system::Point};
 use metriplectic_fields::{
-    BrokenLaw, ChartPoint, Column, ScalarField, Space, Vector, differential,
+    BrokenLaw, ChartPoint, Column, Dimension, ScalarField, Space, Vector, differential,
 };
 use metriplectic_manifolds::{Arc, Manifold, Retraction, Riemannian};
 
+use crate::certificate::round_off;
 use crate::discrete_gradient::{DiscreteGradient, along as along_arc};
 use crate::residual::Recall;
+use crate::residual::{Dim, size_of_terms};
+use crate::span::Course;
 use crate::step::{Memory, Scheme, Start};
-use crate::trajectory::entropy_round_off;
+use crate::trajectory::{State, entropy_round_off};
 
 /// Checks a discrete gradient of `f` on the arc of `u` from `x`:
 ///
@@ -40,14 +43,16 @@ where
         let arc: Arc<M> = retraction.arc(metric, x, u).map_err(missing("the arc exists"))?;
         let g = metric.at(&arc.z).map_err(missing("the metric exists"))?;
         let w = gradient.covector(f, &g, (x, start), &arc);
-        let df = differential(f, &ChartPoint::centre(&arc.z.point()));
+        let df: Vector<M> = differential(f, &ChartPoint::centre(&arc.z.point()));
         let end: f64 = f.at(&arc.end);
         let safe = along_arc(gradient, f, metric, retraction, (x, u))
             .map_err(missing("the arc exists"))?;
         Ok((arc, w, safe, df, end))
     };
     let (arc, w, safe, df, end) = along(u)?;
-    let size = start.abs() + end.abs() + df.magnitude() * (M::magnitude(&arc.end) + 1.0);
+    let (sizes, n) = (M::scales(&arc.end), M::Dim::LEN);
+    let terms: f64 = (0..n).map(|i| df[i].abs() * (sizes[i] + arc.d[i].abs())).sum();
+    let size = start.abs() + end.abs() + terms;
     let bound = 64.0 * f64::EPSILON * size;
     let off = (w.dot(&arc.d) - (end - start)).abs();
     BrokenLaw::unless("⟨w, d⟩ = F(x') − F(x)", off, bound)?;
@@ -64,8 +69,8 @@ where
 
 /// Checks one step of size `h` from `x`:
 ///
-/// 1. the energy is kept to `50 ε max(|H|, 1)`; 2. with [`SecondLaw::Exact`] and `h > 0` the entropy
-///    does not fall by more than its round-off `4ε (max(|S|, 1) + |dS||x|)`.
+/// 1. the energy is conserved to `50 ε (|H| + Σ_i |∂_iH x_i|)`; 2. with [`SecondLaw::Exact`] and `h > 0` the
+///    entropy does not fall by more than its round-off `4ε (|S| + Σ_i |∂_iS x_i|)`.
 ///
 /// # Errors
 ///
@@ -83,11 +88,12 @@ where
 {
     let end = one(scheme, system, x, h)?;
     let energy = system.energy_at(x);
-    let bound = 50.0 * f64::EPSILON * energy.abs().max(1.0);
+    let sizes = [x, &end].map(|x| size_of_terms::<Y::Manifold>(system.energy(), x));
+    let bound = round_off(sizes[0].max(sizes[1]));
     BrokenLaw::unless("a step keeps the energy", (system.energy_at(&end) - energy).abs(), bound)?;
     if system.second_law() == SecondLaw::Exact && h > 0.0 {
         let entropy = system.entropy_at(x);
-        let bound = entropy_round_off(system, x, entropy);
+        let bound = entropy_round_off(system, [x, &end]);
         let fall = entropy - system.entropy_at(&end);
         BrokenLaw::unless("a step does not lower the entropy", fall, bound)?;
     }
@@ -113,9 +119,94 @@ where
     W: DiscreteGradient,
 {
     let back = one(scheme, system, &one(scheme, system, x, h)?, -h)?;
-    let off = Y::Manifold::coordinates(x, &back).magnitude();
-    let bound = 1e-13 * Y::Manifold::magnitude(x).max(1.0);
-    BrokenLaw::unless("steps of h and −h lead back", off, bound)
+    let (q, scales) = (Y::Manifold::coordinates(x, &back), Y::Manifold::scales(x));
+    let there = Y::Manifold::scales(&back);
+    for i in 0..Dim::<Y>::LEN {
+        let bound = 1e-13 * scales[i].max(there[i]);
+        BrokenLaw::unless("steps of h and −h lead back", q[i].abs(), bound)?;
+    }
+    Ok(())
+}
+
+/// The same system in other units: the numbers of its entries, times, energies and entropies are
+/// those of the original one times these factors.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Units {
+    /// For each entry of a point, in the order of [`Manifold::entries`]; 1 on a curved space, whose entries
+    /// have no unit.
+    pub entries: Vec<f64>,
+    /// For times.
+    pub time: f64,
+    /// For energies.
+    pub energy: f64,
+    /// For entropies.
+    pub entropy: f64,
+}
+
+/// Checks the scaling law: a run of `scaled` is the run of `system` in other units, `x̃ = D x`, `t̃ = T t`,
+/// `H̃(x̃) = E H(x)`, `S̃(x̃) = Σ S(x)`, if its tensors are too: `Π̃ = D Π D/(ET)`, `K̃ = D K D/(ΣT)`,
+/// `g̃ ∝ D⁻¹ g D⁻¹`.
+///
+/// Laws: 1. both take as many steps; 2. entries, energies and entropies agree up to `tolerance`, relative to
+/// the largest of the run: in every state of steps of one size, at the end of adaptive ones, whose times
+/// differ by round-off; with a tolerance of zero and factors that are powers of two, 3. all states have the
+/// same bits, and Newton's method takes as many iterations.
+///
+/// # Errors
+///
+/// The law if it is broken, or a run that ends in an error.
+pub fn scaling<Y, Z, R, W>(
+    scheme: &Scheme<R, W>,
+    run: &UnitRun<'_, Y>,
+    scaled: &UnitRun<'_, Z>,
+    units: &Units,
+    tolerance: f64,
+) -> Result<(), BrokenLaw>
+where
+    Y: Metriplectic,
+    Z: Metriplectic<Manifold = Y::Manifold>,
+    R: Retraction<Y::Manifold, Y::Metric> + Retraction<Y::Manifold, Z::Metric> + Clone,
+    W: DiscreteGradient,
+{
+    let failed = |_| BrokenLaw::unless("a run ends without an error", 1.0, 0.0);
+    let a = scheme.clone().run(run.system, run.x0.clone(), run.course.clone());
+    let b = scheme.clone().run(scaled.system, scaled.x0.clone(), scaled.course.clone());
+    let (a, b) = match (a, b) {
+        (Ok(a), Ok(b)) => (a, b),
+        (Err(_), _) | (_, Err(_)) => return failed(()),
+    };
+    let (c, d) = (a.certificate(), b.certificate());
+    let counts = [c.steps.abs_diff(d.steps), c.sweeps.abs_diff(d.sweeps)];
+    let counted = if tolerance > 0.0 { counts[0] } else { counts[0] + counts[1] };
+    BrokenLaw::unless("as many steps and iterations", counted as f64, 0.0)?;
+    let numbers = |state: &State<Y::Manifold>| {
+        let mut numbers = vec![state.time, state.energy, state.entropy];
+        numbers.extend(Y::Manifold::entries(&state.point));
+        numbers
+    };
+    let factors = [&[units.time, units.energy, units.entropy], units.entries.as_slice()].concat();
+    let rows: Vec<_> = a.iter().zip(&b).map(|(a, b)| (numbers(a), numbers(b))).collect();
+    let fixed = run.course.is_fixed() || tolerance == 0.0;
+    let compared =
+        if fixed { rows.as_slice() } else { rows.last_chunk::<1>().map_or(&[][..], |last| last) };
+    for (k, factor) in factors.iter().enumerate() {
+        let largest = rows.iter().fold(0.0_f64, |most, (a, _)| most.max(a[k].abs()));
+        let off =
+            compared.iter().fold(0.0_f64, |most, (a, b)| most.max((b[k] / factor - a[k]).abs()));
+        BrokenLaw::unless("a run in other units is the same run", off, tolerance * largest)?;
+    }
+    Ok(())
+}
+
+/// A run of the scaling law.
+#[derive(Debug)]
+pub struct UnitRun<'a, Y: Metriplectic> {
+    /// The system.
+    pub system: &'a Y,
+    /// Where it starts.
+    pub x0: Point<Y>,
+    /// How it runs.
+    pub course: Course,
 }
 
 /// A single step, with nothing remembered.

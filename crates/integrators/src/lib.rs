@@ -9,6 +9,7 @@
 //! | `globaliser` | L-BFGS from argmin, which brings a lost Newton back (feature `argmin`) |
 //! | [`span`](mod@span) | [`Span`]: step size, number of steps, what is recorded |
 //! | [`adaptive`] | [`Until`]: steps of a size that follows the motion, and the estimate of their error |
+//! | `scales` | the sizes of the entries in the course of a run, which their errors are relative to |
 //! | [`step`] | [`Scheme`] and one step of it |
 //! | [`trajectory`] | [`Steps`], the endless iterator, and [`Trajectory`], the record |
 //! | [`observables`] | [`Observables`]: named numbers of a state, streamed to CSV or NPY |
@@ -17,11 +18,21 @@
 //! | [`certificate`] | [`Certificate`]: what a run did to its laws |
 //! | [`error`](mod@error) | [`Error`], [`RunError`], [`StepError`] |
 //! | [`laws`] | what a step promises, and the function that checks it |
+//!
+//! # What a later version may add
+//!
+//! Results are `#[non_exhaustive]`: [`Certificate`], [`Kept`], [`State`], [`Tried`], [`Work`], and the report of a
+//! model. A later version may add a field to them; a pattern ends in `..`, and a changed copy is a clone whose
+//! fields are assigned. So are errors and the other enums that may grow. Options are not, because
+//! `Newton { sweeps: 50, ..Newton::default() }` and `Scheme { splits: 4, ..Scheme::new(WeylMidpoint) }` are
+//! how they are written: write the last part, and a new option has its default. What you pass to an equation
+//! or return from one ([`Linearised`], [`Root`], [`NoRoot`]) has all of its fields.
 
 pub mod adaptive;
 pub mod attitude;
 pub mod certificate;
 pub mod checkpoint;
+mod digits;
 pub mod discrete_gradient;
 pub mod error;
 #[cfg(feature = "argmin")]
@@ -31,6 +42,7 @@ pub mod newton;
 pub mod observables;
 pub mod residual;
 pub mod root_finder;
+mod scales;
 pub mod span;
 pub mod step;
 pub mod trajectory;
@@ -44,9 +56,9 @@ pub use discrete_gradient::{
 };
 pub use error::{Error, RunError, StepError, Tried};
 pub use newton::Newton;
-pub use observables::{Csv, Npy, Observables};
+pub use observables::{Csv, Npy, Observables, TableError};
 pub use residual::Residual;
-pub use root_finder::{Equation, Linearised, NoRoot, Root, RootFinder};
+pub use root_finder::{Equation, Linearised, NoRoot, Root, RootFinder, Rounding};
 pub use span::{Course, Span, SpanError};
 pub use step::{Scheme, Work};
 pub use trajectory::{Ending, Run, State, Steps, Trajectory};

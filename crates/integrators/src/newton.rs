@@ -1,8 +1,8 @@
-//! Newton's method with a residual floor that follows the scale of the state.
+//! Newton's method, down to the round-off of each component.
 
 use metriplectic_fields::{Column, Dimension, Space, Square, Vector};
 
-use crate::root_finder::{Equation, Linearised, NoRoot, Root, RootFinder};
+use crate::root_finder::{Equation, Linearised, NoRoot, Root, RootFinder, Rounding};
 
 /// Newton's method, damped, down to round-off.
 ///
@@ -11,12 +11,17 @@ use crate::root_finder::{Equation, Linearised, NoRoot, Root, RootFinder};
 /// used where three corrections are expected to be enough, by the contraction that it has shown of late;
 /// otherwise a new one is formed, at the guess or where the first correction has led.
 ///
-/// The last correction is not followed by another residual if the contraction so far says that it would
-/// be a hundredth of the floor: in other directions the next contraction may be slower.
+/// Components of a solution may have different units, so **convergence is measured per component**: by
+/// the correction `δ = J⁻¹F` in units of the round-off of the solution, `η_i = Σ_j |J⁻¹_ij| r_j +
+/// |J⁻¹G|_ij η_j + |1 − J⁻¹|_ij ξ_j + ε|u_i|` with the [round-off of the equation](Rounding). The measure is the root mean
+/// square of `δ_i/η_i`; it is the same number in all units (Deuflhard 2004, on affine covariance). The
+/// norm of the residual only decides whether a correction is taken, and whether the method has failed.
 ///
-/// It stops where the residual is at the floor that the equation states, or where it no longer
-/// falls within a small multiple of it: a stall *at* the floor is convergence, a stall above it is
-/// not.
+/// The last correction is not followed by another residual if the contraction so far says that the next one
+/// would be a hundredth of the round-off: in other directions the next contraction may be slower.
+///
+/// It stops where the correction is round-off, or where it no longer falls and the residual is within a
+/// small multiple of its round-off. Stagnation above that multiple is not convergence.
 ///
 /// ```
 /// use metriplectic_integrators::Newton;
@@ -24,11 +29,11 @@ use crate::root_finder::{Equation, Linearised, NoRoot, Root, RootFinder};
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Newton {
-    /// The residual that counts as solved, in units of the round-off floor.
+    /// The correction that counts as solved, in units of the round-off of the solution.
     pub tolerance: f64,
-    /// The multiple of the floor at which a residual that no longer falls counts as solved.
+    /// The multiple of its round-off at which a residual that no longer falls counts as solved.
     pub stall: f64,
-    /// A correction that leaves more than this share of the residual asks for a new Jacobian.
+    /// If a correction is followed by one of more than this fraction of it, a new Jacobian is formed.
     pub reuse: f64,
     /// Linear systems that may be solved.
     pub sweeps: usize,
@@ -48,19 +53,44 @@ impl<M: Space> RootFinder<M> for Newton {
     }
 }
 
-/// The inverse of a Jacobian, kept up to date by Broyden's rank-one corrections.
+/// The inverse of a Jacobian, kept up to date by Broyden's rank-one corrections, and what it makes of
+/// the round-off of the equation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Inverse<N: Dimension> {
     pub(crate) matrix: N::Matrix<f64>,
+    /// The round-off `|J⁻¹| r + |J⁻¹G| η + |1 − J⁻¹| ξ` of the solution, where the Jacobian was formed.
+    pub(crate) round_off: N::Vector<f64>,
+    /// The norm of the round-off of the residual, where the Jacobian was formed.
+    pub(crate) floor: f64,
     /// The share of a residual that the first correction by a kept inverse has left of late.
     pub(crate) contraction: f64,
-    /// The residual of the guess in the last step, in units of its floor.
+    /// The residual of the guess in the last step, in units of its round-off.
     pub(crate) first: f64,
 }
 
 impl<N: Dimension> Inverse<N> {
-    fn of(jacobian: &N::Matrix<f64>) -> Option<Self> {
-        Some(Self { matrix: jacobian.inverse()?, contraction: 0.0, first: 0.0 })
+    fn of<M: Space<Dim = N>>(
+        jacobian: &N::Matrix<f64>,
+        Rounding { terms, gain, noise, argument }: &Rounding<M>,
+        floor: f64,
+    ) -> Option<Self> {
+        let matrix = jacobian.inverse()?;
+        // In mixed units only the diagonal of J⁻¹J has none, and tells whether the inverse has digits.
+        let digits = |i| {
+            let product: f64 = (0..N::LEN).map(|j| matrix[(i, j)] * jacobian[(j, i)]).sum();
+            (product - 1.0).abs() < INVERTED
+        };
+        if !(0..N::LEN).all(digits) {
+            return None;
+        }
+        // J⁻¹(J − 1) = 1 − J⁻¹.
+        let moved = (N::Matrix::<f64>::one() - matrix).abs();
+        // A point and its compensation have twice the digits: smaller displacements move nothing.
+        let round_off = matrix.abs() * *terms
+            + (matrix * *gain).abs() * *noise
+            + moved * *argument
+            + *argument * f64::EPSILON;
+        Some(Self { matrix, round_off, floor, contraction: 0.0, first: 0.0 })
     }
 
     /// Whether three corrections of the next guess are expected to be enough, the last one unchecked.
@@ -74,39 +104,85 @@ impl<N: Dimension> Inverse<N> {
         self.matrix * *residual
     }
 
+    /// The round-off of each component of a solution near `u`.
+    #[inline]
+    fn round_off(&self, u: &N::Vector<f64>) -> N::Vector<f64> {
+        (self.round_off + u.abs() * f64::EPSILON) * MARGIN
+    }
+
     /// Broyden's update: the least change of the inverse after which the step `s` has the change `y`
     /// of the residual, `s = J⁻¹y`, with `predicted = J⁻¹y` before it (Broyden 1965, in the form of
     /// Sherman and Morrison).
     #[inline]
     fn learn(&mut self, s: &N::Vector<f64>, predicted: &N::Vector<f64>) {
         let along = s.dot(predicted);
-        // Beyond a factor of four the step says little about the slope.
-        if along > 0.25 * s.dot(s) {
+        // Beyond a factor of four the step says little about the slope, and nothing where its square
+        // underflows.
+        if along > 0.25 * s.dot(s) && along > 1e-280 {
             let row = self.matrix.transpose_times(s);
             self.matrix += N::Matrix::<f64>::outer(&((*s - *predicted) * along.recip()), &row);
         }
     }
 }
 
-/// The multiple of the floor below which the change of a residual says nothing of the Jacobian.
+/// A measure of corrections: the root mean square of their components in units of round-off.
+struct Measure<N: Dimension> {
+    /// The reciprocals of the round-off of each component.
+    reciprocals: N::Vector<f64>,
+}
+
+impl<N: Dimension> Measure<N> {
+    #[inline]
+    fn new(round_off: &N::Vector<f64>) -> Self {
+        // A component without round-off is exact, and so is its correction.
+        Self {
+            reciprocals: N::Vector::<f64>::from_index(|i| {
+                round_off[i].max(f64::MIN_POSITIVE).recip()
+            }),
+        }
+    }
+
+    /// The size of a correction; infinite if it is not finite.
+    #[inline]
+    fn of(&self, correction: &N::Vector<f64>) -> f64 {
+        let mut sum = 0.0;
+        for i in 0..N::LEN {
+            let units = correction[i] * self.reciprocals[i];
+            sum += units * units;
+        }
+        if sum.is_finite() { (sum / N::LEN as f64).sqrt() } else { f64::INFINITY }
+    }
+}
+
+/// The factor between the bound of round-off to first order and what is taken for round-off.
+const MARGIN: f64 = 3.0;
+/// The norm of a residual that is taken for round-off, in units of the norm of its bounds.
+pub(crate) const NORM: f64 = 1.0;
+/// The multiple of its round-off that the last correction may leave of a component, where the norm of the
+/// residual has fallen to a hundredth of its own.
+const HIDDEN: f64 = 1.0;
+/// The error of `J⁻¹J` at which an inverse has no digits: the Jacobian is singular to round-off, as with
+/// friction that is 10¹⁶ times faster than the motion along no axis.
+const INVERTED: f64 = 0.01;
+/// The multiple of round-off below which the change of a residual says nothing of the Jacobian.
 const NOISE: f64 = 1e3;
-/// The share of the floor that the last correction has to promise.
+/// The share of the round-off that the last correction has to promise.
 const SURE: f64 = 0.01;
-/// The multiple of the floor below which a residual says little about its Jacobian.
+/// The multiple of round-off below which a residual says little about its Jacobian.
 const NEAR: f64 = 10.0;
 
 /// Where a Jacobian is first used.
 struct Start<M: Space> {
     residual: Vector<M>,
-    floor: f64,
-    /// Whether the Jacobian is that of the equation itself, and not of one near by.
-    own: bool,
+    /// The norm at which a stagnating residual counts as solved: zero where the Jacobian is not that of
+    /// the equation itself, because its stagnation does not prove that round-off was reached.
+    stalled: f64,
 }
 
 /// How far one Jacobian has brought the iteration.
-enum Progress {
-    /// The residual is round-off.
-    Solved,
+enum Progress<M: Space> {
+    /// The correction is round-off, of this size in each component of the solution.
+    Solved(Vector<M>),
     /// It falls too slowly for this Jacobian.
     Slow,
     /// It does not fall.
@@ -124,27 +200,25 @@ impl Newton {
         known: &mut Option<Inverse<M::Dim>>,
     ) -> Result<Root<M>, NoRoot<M>> {
         let mut best = NoRoot { best: *guess, residual: f64::INFINITY, sweeps: 0 };
-        let (mut contraction, mut first) = (0.0, None);
+        let mut history = None;
         if let Some(inverse) = known {
             if inverse.serves()
-                && let Some((residual, floor)) = equation.value_and_floor(guess)
+                && let Some(residual) = equation.value(guess)
             {
                 best.residual = residual.magnitude();
-                inverse.first = best.residual / floor;
-                first = Some(inverse.first);
-                let here = Start { residual, floor, own: false };
-                if let Progress::Solved = self.correct(equation, here, Some(inverse), &mut best) {
-                    return Ok(best.solved(floor));
+                let here = Start { residual, stalled: 0.0 };
+                if let Progress::Solved(noise) = self.correct(equation, &here, inverse, &mut best) {
+                    return Ok(best.solved(noise, inverse.floor / NORM));
                 }
+                history = Some((inverse.contraction, Some(inverse.first)));
             } else {
                 // What has not served is forgotten, and tried again some steps later.
-                inverse.contraction *= 0.8;
+                history = Some((0.8 * inverse.contraction, None));
             }
-            contraction = inverse.contraction;
         }
         *known = None;
         let solved = self.solve_afresh(equation, best, known);
-        if let Some(inverse) = known {
+        if let (Some(inverse), Some((contraction, first))) = (known, history) {
             inverse.contraction = contraction;
             inverse.first = first.unwrap_or(inverse.first);
         }
@@ -160,15 +234,24 @@ impl Newton {
         known: &mut Option<Inverse<M::Dim>>,
     ) -> Result<Root<M>, NoRoot<M>> {
         let mut first = None;
-        while let Some(Linearised { residual, jacobian, floor }) = equation.linearise(&best.best) {
+        while let Some(Linearised { residual, jacobian, rounding }) = equation.linearise(&best.best)
+        {
             best.residual = residual.magnitude();
-            let first = *first.get_or_insert(best.residual / floor);
-            let mut inverse = Inverse::of(&jacobian).map(|inverse| Inverse { first, ..inverse });
-            let here = Start { residual, floor, own: true };
-            match self.correct(equation, here, inverse.as_mut(), &mut best) {
-                Progress::Solved => {
-                    *known = inverse;
-                    return Ok(best.solved(floor));
+            let bounds = rounding.bounds(&jacobian) + best.best.abs() * f64::EPSILON;
+            let floor = bounds.magnitude();
+            let stalled = self.stall * floor;
+            let Some(mut inverse) = Inverse::of(&jacobian, &rounding, NORM * floor) else {
+                // The equation does not determine a solution here, however small the residual is.
+                break;
+            };
+            let here = Start { residual, stalled };
+            let progress = self.correct(equation, &here, &mut inverse, &mut best);
+            inverse.first = *first.get_or_insert(inverse.first);
+            match progress {
+                Progress::Solved(noise) => {
+                    inverse.contraction = 0.0;
+                    *known = Some(inverse);
+                    return Ok(best.solved(noise, floor));
                 }
                 Progress::Slow if best.sweeps < self.sweeps => {}
                 Progress::Slow | Progress::Stuck => break,
@@ -182,106 +265,114 @@ impl Newton {
     fn correct<M: Space>(
         &self,
         equation: &impl Equation<M>,
-        here: Start<M>,
-        mut inverse: Option<&mut Inverse<M::Dim>>,
+        here: &Start<M>,
+        inverse: &mut Inverse<M::Dim>,
         best: &mut NoRoot<M>,
-    ) -> Progress {
-        let floor = self.tolerance * here.floor;
-        // A stall of another equation's Jacobian is no round-off: the equation's own is to say so.
-        let stalled = if here.own { self.stall * here.floor } else { floor };
-        let correct = |inverse: &Inverse<M::Dim>, residual: &Vector<M>| {
-            Some(inverse.times(residual)).filter(|correction| correction.is_finite())
-        };
+    ) -> Progress<M> {
+        let round_off = inverse.round_off(&best.best);
+        let measure = Measure::<M::Dim>::new(&round_off);
+        let solved = || Progress::Solved(round_off);
+        let (floor, most) = (self.tolerance * inverse.floor, self.tolerance);
+        let own = here.stalled > 0.0;
         let mut residual = here.residual;
-        let mut correction = inverse.as_deref().and_then(|inverse| correct(inverse, &residual));
+        let mut correction = inverse.times(&residual);
+        let mut size = measure.of(&correction);
+        inverse.first = best.residual / inverse.floor;
         // Before a Jacobian has been seen to contract here, nothing is left to it: the frame may have
         // turned since the last step, as that of a sphere does across its equator.
-        let mut contraction = f64::INFINITY;
+        let (mut contraction, mut expected) = (f64::INFINITY, 1.0);
         // Whether the equation's own Jacobian has had so little left to do that what remains is noise.
         let mut settled = false;
-        loop {
-            // A displacement within the floor is that of a state at rest.
-            let rests = best.best.magnitude() <= here.floor;
-            let enough = if rests {
+        for taken in 0_usize.. {
+            // A displacement within its round-off is that of a state at rest.
+            let enough = if measure.of(&best.best) <= 1.0 {
                 1.0
             } else if settled {
                 0.3
             } else {
                 0.1
             };
-            if best.residual <= enough * floor {
-                return Progress::Solved;
+            if best.residual <= enough * floor && size <= enough * most {
+                return solved();
             }
             best.sweeps += 1;
-            let last =
-                best.residual <= floor || contraction * best.residual <= self.sure(here.floor);
-            if last {
-                // What a slow contraction leaves below the floor has the same sign in each step; it
-                // costs one more solution to take it out.
-                if let Some(last) = correction {
-                    best.best -= last;
-                    best.residual *= contraction.min(1.0);
-                }
-                return Progress::Solved;
+            let round = best.residual <= floor || contraction * best.residual <= SURE * floor;
+            if round && expected * size <= HIDDEN * most {
+                // What a slow contraction leaves below round-off has the same sign in each step; it costs
+                // one more solution to take it out.
+                best.best -= correction;
+                best.residual *= contraction.min(1.0);
+                return solved();
             }
-            let next = correction.and_then(|c| self.descend(equation, best, &c));
-            let (Some(next), Some(inverse), Some(step)) = (next, inverse.as_mut(), correction)
-            else {
-                return if best.residual <= stalled { Progress::Solved } else { Progress::Stuck };
+            let Some(next) = self.descend(equation, best, &correction, |value| {
+                measure.of(&inverse.times(value)) < 0.5 * size
+            }) else {
+                return if own && taken > 0 && size > self.stall {
+                    // The Jacobian is no longer that of this point.
+                    Progress::Slow
+                } else if best.residual <= if own { here.stalled } else { floor }
+                    && (own || size <= NEAR * most)
+                {
+                    solved()
+                } else {
+                    Progress::Stuck
+                };
             };
-            let before = best.residual;
+            let (before, size_before, step) = (best.residual, size, correction);
             residual = next.value;
             (best.best, best.residual) = (next.u, residual.magnitude());
-            contraction = best.residual / before;
-            settled = here.own && before <= NOISE * floor;
-            if !here.own && best.sweeps == 1 {
+            correction = inverse.times(&residual);
+            size = measure.of(&correction);
+            (contraction, expected) = (best.residual / before, size / size_before);
+            settled = own && before <= NOISE * floor;
+            if !own && taken == 0 {
                 inverse.contraction = contraction;
             }
-            if best.residual > self.reuse * before && best.residual > floor {
-                if best.residual <= stalled && best.residual > 0.5 * before {
-                    return Progress::Solved;
+            // The norm of the residual falls too slowly, or that of a component which the norm hides.
+            let slow = best.residual > f64::max(self.reuse * before, floor);
+            let hidden = best.residual <= floor && size > f64::max(self.reuse * size_before, most);
+            if slow || hidden {
+                let stagnates = best.residual > 0.5 * before && size > 0.5 * size_before;
+                if stagnates && best.residual <= here.stalled {
+                    return solved();
                 }
-                // Close to the floor it is the round-off that is slow, not the Jacobian.
-                if best.residual > NEAR * floor {
+                // Close to round-off it is the noise that is slow, not the Jacobian.
+                if best.residual > NEAR * floor || hidden && size > NEAR * most {
                     return Progress::Slow;
                 }
             }
-            correction = correct(inverse, &residual);
-            // The change of a residual near its floor is noise.
-            if let Some(ahead) = &mut correction
-                && before > NOISE * floor
-            {
+            // The change of a residual near its round-off is noise.
+            if before > NOISE * floor {
                 let taken = step * -next.length;
-                let predicted = *ahead - step;
+                let predicted = correction - step;
                 inverse.learn(&taken, &predicted);
-                *ahead = inverse.times(&residual);
+                correction = inverse.times(&residual);
             }
             // Another equation's Jacobian gets two corrections, and the last one.
-            let left = contraction.powi(if best.sweeps == 1 { 2 } else { 1 }) * best.residual;
-            if !here.own && best.residual > floor && left > self.sure(here.floor) {
+            let left = contraction.powi(if taken == 0 { 2 } else { 1 }) * best.residual;
+            if !own && best.residual > floor && left > SURE * floor {
                 return Progress::Slow;
             }
         }
+        Progress::Slow
     }
 
-    /// The residual that needs no evaluation to be believed.
-    const fn sure(&self, floor: f64) -> f64 {
-        SURE * self.tolerance * floor
-    }
-
-    /// The longest of the corrections `δ, δ/2, δ/4, …` that reduces the residual.
+    /// The longest of the corrections `δ, δ/2, δ/4, …` that reduces the residual, or the whole one if it
+    /// `contracts` all the same: in mixed units a component that is solved hides the others in the norm.
     #[inline]
     fn descend<M: Space>(
         &self,
         equation: &impl Equation<M>,
         best: &NoRoot<M>,
         correction: &Vector<M>,
+        contracts: impl Fn(&Vector<M>) -> bool,
     ) -> Option<Descent<M>> {
         let mut length = 1.0;
-        for _ in 0..=self.halvings {
+        for halving in 0..=self.halvings {
             let u = best.best - *correction * length;
             if let Some(value) = equation.value(&u)
-                && value.magnitude() < best.residual * (1.0 - 1e-4 * length)
+                && (value.magnitude() < best.residual * (1.0 - 1e-4 * length)
+                    || halving == 0 && contracts(&value))
             {
                 return Some(Descent { u, value, length });
             }
@@ -291,7 +382,7 @@ impl Newton {
     }
 }
 
-/// A point with a smaller residual, and the share of the correction that led to it.
+/// A point with a smaller residual, and the fraction of the correction that led to it.
 struct Descent<M: Space> {
     u: Vector<M>,
     value: Vector<M>,
@@ -301,8 +392,15 @@ struct Descent<M: Space> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use metriplectic_fields::Matrix;
     use metriplectic_manifolds::Euclidean;
     use nalgebra::{Matrix1, Matrix2, Vector1, Vector2, vector};
+
+    /// Round-off of the terms alone.
+    fn rounding<M: Space>(terms: Vector<M>) -> Rounding<M> {
+        let zero = Vector::<M>::zero();
+        Rounding { terms, gain: Matrix::<M>::zeros(), noise: zero, argument: zero }
+    }
 
     /// `x² + y² = 4`, `xy = 1`.
     struct CircleAndHyperbola;
@@ -316,7 +414,7 @@ mod tests {
             Some(Linearised {
                 residual: vector![u.norm_squared() - 4.0, u.x * u.y - 1.0],
                 jacobian: Matrix2::new(2.0 * u.x, 2.0 * u.y, u.y, u.x),
-                floor: 8.0 * f64::EPSILON,
+                rounding: rounding(Vector2::repeat(8.0 * f64::EPSILON)),
             })
         }
     }
@@ -341,7 +439,8 @@ mod tests {
         fn linearise(&self, u: &Vector1<f64>) -> Option<Linearised<Euclidean<1>>> {
             let residual = vector![u.x.ln() - 1.0];
             let jacobian = Matrix1::new(u.x.recip());
-            (u.x > 0.0).then_some(Linearised { residual, jacobian, floor: 4.0 * f64::EPSILON })
+            let rounding = rounding(Vector1::new(4.0 * f64::EPSILON));
+            (u.x > 0.0).then_some(Linearised { residual, jacobian, rounding })
         }
     }
 
@@ -364,7 +463,7 @@ mod tests {
             Some(Linearised {
                 residual: vector![u.x * u.x + 1.0],
                 jacobian: Matrix1::new(2.0 * u.x),
-                floor: f64::EPSILON,
+                rounding: rounding(Vector1::new(f64::EPSILON)),
             })
         }
     }

@@ -41,6 +41,11 @@
 //! In both the file holds whole rows whenever something is written to it, and what is still in
 //! memory is written when the table is finished or dropped: a run that is interrupted leaves a file
 //! that can be read. The first column is always the time.
+//!
+//! If the disk is full, the error says how many rows are in the file as a whole ([`TableError`]). What
+//! could not be written stays in memory, and the next call goes on where this one ended: once there is room,
+//! the file is the one that it would have been. Until then an array has the rows that its header counts, and
+//! a table of comma-separated values may end in a cut line, which has no line break.
 
 use std::fmt;
 use std::io::{self, Seek, SeekFrom, Write};
@@ -49,6 +54,36 @@ use metriplectic_dynamics::Metriplectic;
 use metriplectic_fields::Space;
 
 use crate::trajectory::State;
+
+/// A table that cannot be written; the source of an [`io::Error`] of this module.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum TableError {
+    /// Two columns have one name, and no reader could tell them apart.
+    #[error("two columns have the name {name:?}; the time has the name \"t\" already")]
+    SameName {
+        /// The name.
+        name: String,
+    },
+    /// Writing has failed; what was not written is kept for the next call.
+    #[error("{source}; {rows} rows are in the file as a whole, and the others are kept in memory")]
+    Write {
+        /// The rows that are in the file as a whole.
+        rows: usize,
+        /// What has failed.
+        source: io::Error,
+    },
+}
+
+impl From<TableError> for io::Error {
+    fn from(error: TableError) -> Self {
+        let kind = match &error {
+            TableError::SameName { .. } => io::ErrorKind::InvalidInput,
+            TableError::Write { source, .. } => source.kind(),
+        };
+        Self::new(kind, error)
+    }
+}
 
 /// Named numbers of a state; the time comes first.
 pub struct Observables<'a, M: Space> {
@@ -107,10 +142,11 @@ impl<'a, M: Space> Observables<'a, M> {
     ///
     /// # Errors
     ///
-    /// Those of writing to `to`.
+    /// [`TableError`]: two columns of one name, and those of writing to `to`.
     pub fn csv<W: Write>(&self, to: W) -> io::Result<Csv<'_, M, W>> {
+        self.check_names()?;
         let names: Vec<_> = self.names().map(quoted).collect();
-        let mut table = Csv { of: self, to: Some(to), lines: names.join(",") };
+        let mut table = Csv { of: self, to: Some(to), lines: names.join(","), rows: 0 };
         table.lines.push('\n');
         table.flush()?;
         Ok(table)
@@ -124,12 +160,22 @@ impl<'a, M: Space> Observables<'a, M> {
     ///
     /// # Errors
     ///
-    /// Those of writing to `to`.
+    /// [`TableError`]: two columns of one name, and those of writing to `to`.
     pub fn npy<W: Write + Seek>(&self, mut to: W) -> io::Result<Npy<'_, M, W>> {
+        self.check_names()?;
         let origin = to.stream_position()?;
         let mut table = Npy { of: self, to: Some(to), origin, rows: 0, bytes: Vec::new() };
         table.flush()?;
         Ok(table)
+    }
+
+    fn check_names(&self) -> Result<(), TableError> {
+        for (index, name) in self.names().enumerate() {
+            if self.names().take(index).any(|before| before == name) {
+                return Err(TableError::SameName { name: name.to_owned() });
+            }
+        }
+        Ok(())
     }
 }
 
@@ -163,7 +209,10 @@ pub struct Csv<'a, M: Space, W: Write> {
     of: &'a Observables<'a, M>,
     /// `None` once the table is finished.
     to: Option<W>,
+    /// What has not been written; it begins in the middle of a line if writing has failed there.
     lines: String,
+    /// The rows that were given to it.
+    rows: usize,
 }
 
 impl<M: Space, W: Write> Csv<'_, M, W> {
@@ -179,6 +228,7 @@ impl<M: Space, W: Write> Csv<'_, M, W> {
                 .map_err(io::Error::other)?;
         }
         self.lines.push('\n');
+        self.rows += 1;
         if self.lines.len() < BUFFER { Ok(()) } else { self.flush() }
     }
 
@@ -189,10 +239,13 @@ impl<M: Space, W: Write> Csv<'_, M, W> {
     /// Those of writing.
     pub fn flush(&mut self) -> io::Result<()> {
         let Some(to) = &mut self.to else { return Ok(()) };
-        // Rows that were written in part are not written again.
-        let lines = std::mem::take(&mut self.lines);
-        to.write_all(lines.as_bytes())?;
-        to.flush()
+        // No byte is written twice, and none is left out.
+        let (written, result) = write(to, self.lines.as_bytes());
+        self.lines.drain(..written);
+        result.and_then(|()| to.flush()).map_err(|source| {
+            let left = self.lines.bytes().filter(|&byte| byte == b'\n').count();
+            TableError::Write { rows: self.rows.saturating_sub(left), source }.into()
+        })
     }
 
     /// Writes the rows that are still in memory, and gives back what was written to.
@@ -213,6 +266,20 @@ impl<M: Space, W: Write> Drop for Csv<'_, M, W> {
     }
 }
 
+/// Writes as much as there is room for, and says how many bytes that are: `write_all` does not.
+fn write(to: &mut impl Write, bytes: &[u8]) -> (usize, io::Result<()>) {
+    let mut written = 0;
+    while written < bytes.len() {
+        match to.write(&bytes[written..]) {
+            Ok(0) => return (written, Err(io::ErrorKind::WriteZero.into())),
+            Ok(more) => written += more,
+            Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+            Err(error) => return (written, Err(error)),
+        }
+    }
+    (written, Ok(()))
+}
+
 /// An array of `numpy`; made by [`Observables::npy`].
 #[derive(Debug)]
 pub struct Npy<'a, M: Space, W: Write + Seek> {
@@ -220,7 +287,9 @@ pub struct Npy<'a, M: Space, W: Write + Seek> {
     to: Option<W>,
     /// Where the header starts.
     origin: u64,
+    /// The rows in the file, all of which its header counts.
     rows: usize,
+    /// The rows that have not been written.
     bytes: Vec<u8>,
 }
 
@@ -232,7 +301,6 @@ impl<M: Space, W: Write + Seek> Npy<'_, M, W> {
     /// Those of writing.
     pub fn write(&mut self, state: &State<M>) -> io::Result<()> {
         self.bytes.extend(self.of.row(state).flat_map(f64::to_le_bytes));
-        self.rows += 1;
         if self.bytes.len() < BUFFER { Ok(()) } else { self.flush() }
     }
 
@@ -242,18 +310,27 @@ impl<M: Space, W: Write + Seek> Npy<'_, M, W> {
     ///
     /// Those of writing.
     pub fn flush(&mut self) -> io::Result<()> {
-        let header = header(self.of.names(), self.rows);
+        let (origin, rows, row) = (self.origin, self.rows, 8 * self.of.list.len());
         let Some(to) = &mut self.to else { return Ok(()) };
-        let bytes = std::mem::take(&mut self.bytes);
-        if self.rows > 0 {
+        let all = rows + self.bytes.len() / row;
+        let header = header(self.of.names(), all);
+        // The rows first, over what an earlier call has written in part, then the header that counts them.
+        let mut append = || {
+            if all > rows {
+                let end = origin + header.len() as u64 + (rows * row) as u64;
+                to.seek(SeekFrom::Start(end))?;
+                to.write_all(&self.bytes)?;
+                to.flush()?;
+            }
+            to.seek(SeekFrom::Start(origin))?;
+            to.write_all(&header)?;
             to.seek(SeekFrom::End(0))?;
-            to.write_all(&bytes)?;
-            to.flush()?;
-        }
-        to.seek(SeekFrom::Start(self.origin))?;
-        to.write_all(&header)?;
-        to.seek(SeekFrom::End(0))?;
-        to.flush()
+            to.flush()
+        };
+        append().map_err(|source| TableError::Write { rows, source })?;
+        self.bytes.clear();
+        self.rows = all;
+        Ok(())
     }
 
     /// Writes the rows that are still in memory, and gives back what was written to.
@@ -412,5 +489,126 @@ mod tests {
         assert!(writes > 2 && writes < 20, "{writes}");
         drop(table);
         assert_eq!(file.0.borrow().iter().filter(|&&byte| byte == b'\n').count(), 20_001);
+    }
+
+    /// A disk with room for so many bytes.
+    #[derive(Debug, Default)]
+    struct Disk {
+        file: io::Cursor<Vec<u8>>,
+        room: usize,
+    }
+
+    impl Write for Disk {
+        fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+            let at = usize::try_from(self.file.position()).unwrap_or(usize::MAX);
+            let left = self.room.saturating_sub(at);
+            match left.min(bytes.len()) {
+                0 if !bytes.is_empty() => Err(io::ErrorKind::StorageFull.into()),
+                some => self.file.write(&bytes[..some]),
+            }
+        }
+
+        fn flush(&mut self) -> io::Result<()> {
+            Ok(())
+        }
+    }
+
+    impl Seek for Disk {
+        fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+            self.file.seek(to)
+        }
+    }
+
+    /// How many rows an error says are in the file.
+    fn rows_of(error: &io::Error) -> usize {
+        assert_eq!(error.kind(), io::ErrorKind::StorageFull, "{error}");
+        match error.get_ref().and_then(|source| source.downcast_ref()) {
+            Some(TableError::Write { rows, .. }) => *rows,
+            other => panic!("{other:?}"),
+        }
+    }
+
+    #[test]
+    fn a_full_disk_leaves_rows_that_can_be_read_and_room_to_go_on() {
+        let watch = Observables::<Line>::new().of("x", |x: &Vector1<f64>| x.x);
+        let whole = |rows: usize| {
+            let mut csv = watch.csv(Vec::new()).unwrap();
+            let mut npy = watch.npy(io::Cursor::new(Vec::new())).unwrap();
+            for step in 0..rows {
+                csv.write(&state(step, 0.1 * step as f64)).unwrap();
+                npy.write(&state(step, 0.1 * step as f64)).unwrap();
+            }
+            (csv.finish().unwrap(), npy.finish().unwrap().into_inner())
+        };
+        let (lines, array) = whole(20);
+        for room in 0..array.len() {
+            let mut table = match watch.npy(Disk { room, ..Disk::default() }) {
+                Ok(table) => table,
+                Err(error) => {
+                    assert!(rows_of(&error) == 0 && room < 128, "{error}");
+                    continue;
+                }
+            };
+            for step in 0..20 {
+                table.write(&state(step, 0.1 * step as f64)).unwrap();
+                if step % 7 == 6 {
+                    let _ = table.flush();
+                }
+            }
+            let error = table.flush().unwrap_err();
+            let rows = rows_of(&error);
+            let there = table.to.as_ref().unwrap().file.get_ref();
+            let (header, numbers) = read(&there[..128 + 16 * rows]);
+            assert!(header.contains(&format!("'shape': ({rows},)")), "{header}");
+            assert_eq!(numbers.len(), 2 * rows);
+            assert_eq!(there[128..128 + 16 * rows], array[128..128 + 16 * rows]);
+            // Somebody makes room.
+            table.to.as_mut().unwrap().room = usize::MAX;
+            assert!(*table.finish().unwrap().file.get_ref() == array, "{room}");
+        }
+        for room in 0..lines.len() {
+            let Ok(mut table) = watch.csv(Disk { room, ..Disk::default() }) else {
+                assert!(room < 4);
+                continue;
+            };
+            for step in 0..20 {
+                table.write(&state(step, 0.1 * step as f64)).unwrap();
+                if step % 7 == 6 {
+                    let _ = table.flush();
+                }
+            }
+            let rows = rows_of(&table.flush().unwrap_err());
+            let there = table.to.as_ref().unwrap().file.get_ref();
+            assert_eq!(*there, lines[..room]);
+            assert_eq!(there.iter().filter(|&&byte| byte == b'\n').count(), rows + 1);
+            table.to.as_mut().unwrap().room = usize::MAX;
+            assert!(*table.finish().unwrap().file.get_ref() == lines, "{room}");
+        }
+    }
+
+    #[test]
+    fn two_columns_of_one_name_are_refused() {
+        let twice = Observables::<Line>::new().of("x", |x| x.x).of_state("x", |s| s.entropy);
+        let time = Observables::<Line>::new().of("t", |x: &Vector1<f64>| x.x);
+        for (watch, name) in [(twice, "x"), (time, "t")] {
+            let csv = watch.csv(Vec::new()).map(|_| ()).unwrap_err();
+            let npy = watch.npy(io::Cursor::new(Vec::new())).map(|_| ()).unwrap_err();
+            for error in [csv, npy] {
+                assert_eq!(error.kind(), io::ErrorKind::InvalidInput);
+                let source = error.get_ref().and_then(|source| source.downcast_ref());
+                assert!(
+                    matches!(source, Some(TableError::SameName { name: other }) if other == name)
+                );
+            }
+        }
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn a_device_without_room_is_an_error() {
+        let watch = Observables::<Line>::new().of("x", |x: &Vector1<f64>| x.x);
+        let full = || std::fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
+        assert_eq!(rows_of(&watch.csv(full()).unwrap_err()), 0);
+        assert_eq!(rows_of(&watch.npy(full()).unwrap_err()), 0);
     }
 }

@@ -11,11 +11,12 @@ use metriplectic_fields::{
     ChartPoint, Column, Dimension, Matrix, Scalar, ScalarField, Space, Square, Vector, differential,
 };
 use metriplectic_manifolds::{
-    Arc, ArcJet, Canonical, InnerProduct, Manifold, MetricError, Nodes, Retraction, Riemannian,
+    Arc, ArcJet, InnerProduct, Manifold, MetricError, Nodes, Retraction, Riemannian,
 };
 
 use crate::discrete_gradient::{Chord, DiscreteGradient, Segment};
-use crate::root_finder::{Equation, Linearised, Root};
+
+use crate::root_finder::{Equation, Linearised, Root, Rounding};
 
 /// The equation of one step (Bloch, Farré Puiggalí, Martín de Diego 2024, §4.4), as a function of
 /// the initial displacement `u ∈ T_xM` of the arc:
@@ -41,26 +42,8 @@ pub struct Residual<'a, Y: Metriplectic, R, W> {
     recall: Recall<Y>,
     entropy_slope: Cell<f64>,
     dissipates: Cell<bool>,
-    sizes: Cell<Option<Sizes>>,
-}
-
-/// The sizes of the terms of an equation, by which its round-off is judged.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Sizes {
-    /// Of the terms that the velocity is summed of.
-    pub(crate) terms: f64,
-    /// Of the derivative of the velocity along `w_H`.
-    pub(crate) gain: f64,
-}
-
-impl Sizes {
-    /// The round-off of the equation of a step of size `h` and length `length`: the terms of `Πw` and
-    /// `K dS` are rounded, and so are `w`, by `noise`, and `d`.
-    #[inline]
-    fn floor(&self, h: f64, length: f64, noise: f64) -> f64 {
-        let h = h.abs();
-        f64::EPSILON * (4.0 * h * self.terms + length) + h * self.gain * noise
-    }
+    friction: Cell<Option<f64>>,
+    rotation: Cell<f64>,
 }
 
 /// What earlier steps have left over of the energy, the entropy and the further invariants, and this step
@@ -93,13 +76,43 @@ pub(crate) struct LastCorrection<M: Manifold> {
     pub(crate) moved: bool,
 }
 
+/// A few roundings, relative to the size of what is rounded.
+const ROUNDED: f64 = 4.0 * f64::EPSILON;
+
 /// The dimension of the manifold of a system.
 pub(crate) type Dim<Y> = <<Y as Metriplectic>::Manifold as Space>::Dim;
 
-/// The residual with its Jacobian, and the discrete gradient `w_H` in it.
+/// The residual with its Jacobian, the discrete gradient `w_H` and the displacement in it.
 struct Jet<M: Space> {
     at: Linearised<M>,
     w: Vector<M>,
+    d: Vector<M>,
+}
+
+/// The inner product in which `sizes` are units: `G(u, v) = Σ u_i v_i / s_i²`. The shortest way to a level of
+/// a function is then the one that changes each component by a like fraction of its size.
+#[derive(Clone, Copy)]
+struct InUnits<V>(V);
+
+impl<V: Column<f64>> InnerProduct<V> for InUnits<V> {
+    fn flat(&self, v: &V) -> V {
+        V::from_index(|i| v[i] / self.0[i] / self.0[i])
+    }
+
+    fn orthonormal(&self, alpha: &V) -> V {
+        V::from_index(|i| alpha[i] * self.0[i])
+    }
+
+    fn raise(&self, a: &V) -> V {
+        V::from_index(|i| a[i] * self.0[i])
+    }
+}
+
+/// The size `|F| + Σ_i |∂_iF x_i|` of the terms of a field at a point, to which the round-off of its value
+/// is relative.
+pub(crate) fn size_of_terms<M: Manifold>(f: &impl ScalarField<M>, x: &M::Point<f64>) -> f64 {
+    let jet = f.jet1(x);
+    jet.value.abs() + jet.df.abs().dot(&M::scales(x))
 }
 
 impl<'a, Y, R, W> Residual<'a, Y, R, W>
@@ -129,7 +142,7 @@ where
         recall: Recall<Y>,
     ) -> Self {
         let (entropy_slope, dissipates) = (Cell::new(f64::INFINITY), Cell::new(true));
-        let sizes = Cell::new(None);
+        let (friction, rotation) = (Cell::new(None), Cell::new(0.0));
         Self {
             system,
             retraction,
@@ -141,15 +154,14 @@ where
             recall,
             entropy_slope,
             dissipates,
-            sizes,
+            friction,
+            rotation,
         }
     }
 
-    /// The same with the sizes of an equation near by, so that the Jacobian need not be formed.
-    #[inline]
-    pub(crate) fn with_sizes(self, sizes: Option<Sizes>) -> Self {
-        self.sizes.set(sizes);
-        self
+    /// The rate of the reversible motion in a step, where the Jacobian was formed last.
+    pub(crate) const fn rotation(&self) -> f64 {
+        self.rotation.get()
     }
 
     /// The equation of a step of a share of the size, which takes nothing back.
@@ -159,9 +171,11 @@ where
         Self::recalling(self.system, parts, start, self.h * share, Recall::nothing())
     }
 
-    /// The sizes that round-off is judged by, if they are known.
-    pub(crate) const fn sizes(&self) -> Option<Sizes> {
-        self.sizes.get()
+    /// The rate `h|K'|` of the friction in a step, where the Jacobian was formed last; `None` if it never
+    /// was. The midpoint rule multiplies a deviation that decays at the rate `λ` by
+    /// `(1 − hλ/2)/(1 + hλ/2)`, which tends to −1.
+    pub(crate) const fn friction(&self) -> Option<f64> {
+        self.friction.get()
     }
 
     /// The residual by its definition, at any scalar.
@@ -199,15 +213,26 @@ where
         self.entropy_slope.get().sqrt()
     }
 
-    /// Whether `K̃ w_S` was not zero at the point evaluated last.
+    /// Whether the entropy production `⟨w_S, K̃ w_S⟩` is more than the square of its round-off: a million
+    /// steps of it change the entropy by more than a rounding.
+    fn is_dissipation(&self, production: f64) -> bool {
+        self.h.abs() * production > 1e-6 * f64::EPSILON * self.entropy.abs()
+    }
+
+    /// Whether anything was dissipated at the point evaluated last.
     pub(crate) const fn dissipates(&self) -> bool {
         self.dissipates.get()
     }
 
-    /// The error `e = H(x') − H(x) + recall` of the energy at the end of an arc.
+    /// The error `e = H(x') − H(x) + recall` of the energy at the end of an arc, where it is `energy`.
     #[inline]
-    fn imbalance(&self, end: &Point<Y>) -> f64 {
-        self.system.energy_at(end) - self.energy + self.recall.energy
+    fn imbalance(&self, energy: f64) -> f64 {
+        energy - self.energy + self.recall.energy
+    }
+
+    /// The same at a point.
+    fn imbalance_at(&self, end: &Point<Y>) -> f64 {
+        self.imbalance(self.system.energy_at(end))
     }
 
     /// One more correction for a root with the end `x'` at which the energy is not kept to round-off:
@@ -216,7 +241,8 @@ where
     /// Both brackets kill `w`, so `⟨w, F(u)⟩ = e` for every `u`. Once `h|Π|` is large the sum
     /// `d − h(Πw + K dS)` has lost digits of this number that the difference `H(x') − H(x)` has. So
     /// the last correction is that of the residual whose part along `w` is exact,
-    /// `F + (e − ⟨w, F⟩) w/|w|²`, as long as this changes `F` within its round-off and reduces `e`.
+    /// `F + (e − ⟨w, F⟩) ♯w/⟨w, ♯w⟩`, with `♯` in units of the round-off of each component, as long as this
+    /// changes `F` within its round-off and reduces `e`.
     ///
     /// Where the end is nearer to the edge of a domain than the displacement has digits, no `u` has the
     /// right energy, and a numerical geodesic has an error of its own: there the end itself is moved, within
@@ -226,33 +252,40 @@ where
         &self,
         root: &Root<Y::Manifold>,
         end: &Point<Y>,
+        energy: f64,
     ) -> Option<LastCorrection<Y::Manifold>> {
-        // A floor near the rounding of the entries of x' needs no correction.
-        let accuracy = self.system.metric().accuracy().max(root.floor);
-        let coarse = accuracy > 8.0 * f64::EPSILON * Y::Manifold::magnitude(self.x);
-        let e = if coarse { self.imbalance(end) } else { 0.0 };
-        if self.is_balanced(e) { None } else { self.correct(&root.u, end, e) }
+        let e = self.imbalance(energy);
+        if self.is_balanced(e) { None } else { self.correct(root, end, e) }
     }
 
     /// Whether the ends of geodesics are good to a few roundings.
     fn has_closed_geodesics(&self) -> bool {
-        self.system.metric().accuracy() <= 4.0 * f64::EPSILON
+        self.system.metric().accuracy() <= ROUNDED
     }
 
-    /// Whether an error of the energy is its round-off.
+    /// Whether an error of the energy is within a few roundings of its value.
     #[inline]
     fn is_balanced(&self, e: f64) -> bool {
-        e.abs() <= 4.0 * f64::EPSILON * self.energy.abs()
+        e.abs() <= ROUNDED * self.energy.abs()
     }
 
     /// The last correction, for an error `e` of the energy.
     #[cold]
     fn correct(
         &self,
-        u: &Vector<Y::Manifold>,
+        Root { u, floor, .. }: &Root<Y::Manifold>,
         end: &Point<Y>,
         e: f64,
     ) -> Option<LastCorrection<Y::Manifold>> {
+        // Where the round-off of the equation is near that of the entries of x', an error within the
+        // roundings of the energy's terms needs no correction.
+        let coarse = *floor > 2.0 * ROUNDED * Y::Manifold::magnitude(self.x);
+        if self.has_closed_geodesics()
+            && !coarse
+            && e.abs() <= 2.0 * ROUNDED * size_of_terms::<Y::Manifold>(self.system.energy(), end)
+        {
+            return None;
+        }
         let balanced = if self.has_closed_geodesics() { self.balance(u, e) } else { None };
         let (u, at) = balanced.as_ref().map_or((u, end), |(u, end)| (u, end));
         if let Some(end) = self.settle(u, at) {
@@ -264,48 +297,57 @@ where
     /// The end `x'` moved onto the level of the energy, within the accuracy of geodesics: by the shortest
     /// way within a rounding, and along the levels of the entropy and the further invariants beyond it.
     fn settle(&self, u: &Vector<Y::Manifold>, end: &Point<Y>) -> Option<Point<Y>> {
-        let e = self.imbalance(end);
+        let e = self.imbalance_at(end);
         if self.is_balanced(e) {
             return None;
         }
+        // The entries of x' = x + u are rounded in units of x and of u, however small they are.
+        let sizes = Y::Manifold::scales(self.x) + u.abs();
+        let g = InUnits(sizes);
         let w = differentials(self.system, &ChartPoint::<Y::Manifold>::centre(end));
         let mut kept = Orthogonal::<Dim<Y>>::default();
         let rounded = self.has_closed_geodesics();
         if self.is_exact() && !rounded {
-            kept.push(&Canonical, &w.entropy);
+            kept.push(&g, &w.entropy);
         }
         for (_, l) in w.invariants.as_ref().iter().flatten().filter(|_| !rounded) {
-            kept.push(&Canonical, l);
+            kept.push(&g, l);
         }
-        let across = kept.off_covector(0, &w.energy);
+        let across = g.sharp(&kept.off_covector(0, &w.energy));
         let off = across * (-e / across.dot(&w.energy));
-        let inaccuracy =
-            self.system.metric().accuracy() * (Y::Manifold::magnitude(self.x) + u.magnitude());
+        let accuracy = self.system.metric().accuracy();
+        let limit = accuracy * (Dim::<Y>::LEN as f64).sqrt();
+        let within = (0..Dim::<Y>::LEN).all(|i| off[i].abs() <= limit * sizes[i]);
         let settled = Y::Manifold::chart(end, &off);
-        let better = self.imbalance(&settled).abs() < e.abs();
-        (off.magnitude() <= inaccuracy && better).then_some(settled)
+        let better = self.imbalance_at(&settled).abs() < e.abs();
+        (within && better).then_some(settled)
     }
 
     /// The root with the energy corrected by its error `e`.
     fn balance(&self, u: &Vector<Y::Manifold>, e: f64) -> Option<(Vector<Y::Manifold>, Point<Y>)> {
-        let Jet { at, w } = self.jet(u)?;
-        let lost = w * ((e - w.dot(&at.residual)) / w.dot(&w));
+        let Jet { at, w, d } = self.jet(u)?;
+        let rounding = at.rounding.bounds(&at.jacobian) + d.abs() * f64::EPSILON;
+        // Each component takes its part in units of its own round-off, and of what is left of it.
+        let bounds = rounding + at.residual.abs();
+        let across = InUnits(bounds).sharp(&w);
+        let lost = across * ((e - w.dot(&at.residual)) / across.dot(&w));
         let u = *u - at.jacobian.solve(&(at.residual + lost))?;
         let end = self.retraction.end(self.system.metric(), self.x, &u).ok()?;
-        let better = self.imbalance(&end).abs() < e.abs();
-        (lost.magnitude() <= at.floor && better).then_some((u, end))
+        let better = self.imbalance_at(&end).abs() < e.abs();
+        let within = (0..Dim::<Y>::LEN).all(|i| lost[i].abs() <= bounds[i]);
+        (within && better).then_some((u, end))
     }
 
-    /// The residual, safe against round-off, and that of `w_H`.
+    /// The residual, safe against round-off.
     #[inline]
-    fn evaluate(&self, u: &Vector<Y::Manifold>) -> Option<(Vector<Y::Manifold>, f64)> {
+    fn evaluate(&self, u: &Vector<Y::Manifold>) -> Option<Vector<Y::Manifold>> {
         let (system, metric) = (self.system, self.system.metric());
         let arc = self.retraction.real_arc(metric, self.x, u).ok()?;
         let g = metric.at(&arc.z).ok()?;
         let along = Along::new(self, u, &g, Segment::new(&arc.d, &arc.end));
-        let (energy, noise) = along.value(system.energy(), (self.energy, self.recall.energy), &arc);
+        let energy = along.value(system.energy(), (self.energy, self.recall.energy), &arc);
         let entropy = if self.is_exact() {
-            let (w, _) = along.value(system.entropy(), (self.entropy, self.recall.entropy), &arc);
+            let w = along.value(system.entropy(), (self.entropy, self.recall.entropy), &arc);
             self.entropy_slope.set(w.dot(&w));
             w
         } else {
@@ -314,10 +356,10 @@ where
         let mut values = Values { along: &along, arc: &arc, seen: 0 };
         let w = Covectors::new([energy, entropy], system.invariants(), &mut values);
         let friction = irreversible(system, &arc.z, &w).ok()?;
-        self.dissipates.set((0..Dim::<Y>::LEN).any(|i| friction[i].abs() > 0.0));
+        self.dissipates.set(self.is_dissipation(w.entropy.dot(&friction)));
         let velocity = reversible(system, &arc.z, &w).ok()? + friction;
         let residual = arc.d - velocity * self.h;
-        residual.is_finite().then_some((residual, noise))
+        residual.is_finite().then_some(residual)
     }
 
     /// The residual with its Jacobian, and `w_H`, from the jets `(f, df, Hf)` of the fields: no nested
@@ -340,19 +382,29 @@ where
         };
         let mut jets = Jets { along: &along, arc: &arc, slopes, seen: 0 };
         let w = Covectors::new([energy, entropy], system.invariants(), &mut jets);
-        let VelocityJet { velocity, terms, gain, irreversible } =
+        let VelocityJet { velocity, terms, gain, production, friction, rotation } =
             velocity_jet(system, &arc.z, &arc.dz, &w).ok()?;
-        self.dissipates.set(irreversible > 0.0);
+        self.dissipates.set(self.is_dissipation(production));
+        // Half of a displacement reaches z.
+        self.friction.set(Some(2.0 * h.abs() * friction));
+        self.rotation.set(2.0 * h.abs() * rotation);
 
         let residual = arc.d - velocity.value * h;
         let jacobian = arc.dd - velocity.slope * h;
-        let (length, sizes) = (along.segment.length, Sizes { terms, gain });
         // Near the edge of a domain dH is far steeper at x' than at z, and the rounding of d counts there.
-        let noise = chord.noise(length) + f64::EPSILON * steepness;
-        let floor = sizes.floor(h, length, noise);
-        self.sizes.set(Some(sizes));
+        let noise = chord.noise(&g, &arc.d) + steepness * f64::EPSILON;
+        let rounding = Rounding {
+            // What underflows is no larger than the least normal number.
+            terms: Vector::<Y::Manifold>::from_index(|i| {
+                ROUNDED * h.abs() * terms[i] + f64::MIN_POSITIVE * (1.0 + h.abs())
+            }),
+            gain: gain * h,
+            noise,
+            argument: (Y::Manifold::scales(self.x) + arc.d.abs()) * f64::EPSILON,
+        };
         let usable = residual.is_finite() && jacobian.magnitude().is_finite();
-        usable.then_some(Jet { at: Linearised { residual, jacobian, floor }, w: energy.value })
+        let at = Linearised { residual, jacobian, rounding };
+        usable.then_some(Jet { at, w: energy.value, d: arc.d })
     }
 }
 
@@ -365,14 +417,7 @@ where
     /// The residual, safe against round-off.
     #[inline]
     fn value(&self, u: &Vector<Y::Manifold>) -> Option<Vector<Y::Manifold>> {
-        self.evaluate(u).map(|(residual, _)| residual)
-    }
-
-    #[inline]
-    fn value_and_floor(&self, u: &Vector<Y::Manifold>) -> Option<(Vector<Y::Manifold>, f64)> {
-        let sizes = self.sizes.get()?;
-        let (residual, noise) = self.evaluate(u)?;
-        Some((residual, sizes.floor(self.h, u.magnitude(), noise)))
+        self.evaluate(u)
     }
 
     #[inline]
@@ -452,21 +497,21 @@ where
         Chord::new(f, mean, &self.segment, values, base, nodes)
     }
 
-    /// The discrete gradient of `f`, with `⟨w, d⟩ = f(x') − start + recall`, and its round-off.
+    /// The discrete gradient of `f`, with `⟨w, d⟩ = f(x') − start + recall`.
     #[inline]
     fn value(
         &self,
         f: &impl ScalarField<Y::Manifold>,
         (start, recall): (f64, f64),
         arc: &Arc<Y::Manifold>,
-    ) -> (Vector<Y::Manifold>, f64) {
+    ) -> Vector<Y::Manifold> {
         let mean = self.step.gradient.real_mean(f, self.step.x, arc);
         let values = [start, f.at(&arc.end)];
         let chord = self.chord(f, &mean, [&arc.z.base, &arc.end], values);
-        (chord.covector(recall, self.g, &arc.d), chord.noise(self.segment.length))
+        chord.covector(recall, self.g, &arc.d)
     }
 
-    /// The same with its derivatives, and the size of `dF(x')`.
+    /// The same with its derivatives, and the absolute components of `dF(x')`.
     #[inline]
     fn jet(
         &self,
@@ -474,15 +519,18 @@ where
         (start, recall): (f64, f64),
         arc: &ArcJet<Y::Manifold>,
         slopes: Option<&Slopes<Y::Manifold>>,
-    ) -> (Moving<Dim<Y>>, Chord<Y::Manifold>, f64) {
+    ) -> CovectorJet<Y::Manifold> {
         let (mean, dmean) = self.step.gradient.mean_jet(f, self.step.x, arc);
         let end = f.jet1(&arc.end);
         let chord = self.chord(f, &mean, [&arc.z, &arc.end], [start, end.value]);
         let value = chord.covector(recall, self.g, &arc.d);
         let slope = chord.slope(recall, (self.g, slopes), arc, &dmean, &end.df);
-        (Moving { value, slope }, chord, end.df.magnitude())
+        (Moving { value, slope }, chord, end.df.abs())
     }
 }
+
+/// A discrete gradient with its derivatives, its data, and the absolute components of `dF(x')`.
+type CovectorJet<M> = (Moving<<M as Space>::Dim>, Chord<M>, Vector<M>);
 
 /// The derivatives of a metric along the chart.
 type Slopes<M> = <<M as Space>::Dim as Dimension>::Array<Matrix<M>>;
@@ -507,7 +555,7 @@ where
         let Residual { x, recall, .. } = self.along.step;
         let recall = recall.invariants[self.seen];
         self.seen += 1;
-        self.along.value(f, (f.at(x), recall), self.arc).0
+        self.along.value(f, (f.at(x), recall), self.arc)
     }
 }
 

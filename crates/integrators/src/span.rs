@@ -1,6 +1,6 @@
 //! How far a run goes, in which steps, and what of it is recorded.
 
-use crate::adaptive::Until;
+use crate::adaptive::Adaptive;
 
 /// The time span of a run: the step size, the number of steps, and every how many a state is kept.
 ///
@@ -11,6 +11,7 @@ use crate::adaptive::Until;
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Span {
+    start: f64,
     step: f64,
     count: usize,
     every: usize,
@@ -23,7 +24,19 @@ pub(crate) const ROOM: usize = 1 << 12;
 impl Span {
     /// `count` steps of size `step`, each of them recorded.
     pub const fn steps(step: f64, count: usize) -> Self {
-        Self { step, count, every: 1, rest: None }
+        Self { start: 0.0, step, count, every: 1, rest: None }
+    }
+
+    /// The time at which the run starts, 0 without another one.
+    ///
+    /// ```
+    /// use metriplectic_integrators::Span;
+    /// // From t = 100 to t = 200.
+    /// let span = Span::steps(0.1, 1000).starting_at(100.0);
+    /// ```
+    #[must_use]
+    pub const fn starting_at(self, start: f64) -> Self {
+        Self { start, ..self }
     }
 
     /// Records the start and every `every`-th state after it, and always the last.
@@ -77,44 +90,64 @@ impl Span {
 /// | a number `h` | of size `h` | you stop |
 /// | [`Span::steps`]`(h, count)` | of size `h` | `count` of them |
 /// | [`Span::until`]`(end)` | that follow a tolerance | `t = end` |
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Course {
     pub(crate) size: Size,
+    /// The time at which the run starts.
+    pub(crate) start: f64,
     pub(crate) count: Option<usize>,
     pub(crate) every: usize,
+    /// The most states to record.
+    pub(crate) most: Option<usize>,
     pub(crate) rest: Option<f64>,
 }
 
 /// How large the steps of a course are.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Size {
     Fixed(f64),
-    Tolerance(Until),
+    Tolerance(Adaptive),
 }
 
 impl From<f64> for Course {
     fn from(h: f64) -> Self {
-        Self { size: Size::Fixed(h), count: None, every: 1, rest: None }
+        let (start, every, most, rest) = (0.0, 1, None, None);
+        Self { size: Size::Fixed(h), start, count: None, every, most, rest }
     }
 }
 
 impl From<Span> for Course {
-    fn from(Span { step, count, every, rest }: Span) -> Self {
-        Self { size: Size::Fixed(step), count: Some(count), every, rest }
+    fn from(Span { start, step, count, every, rest }: Span) -> Self {
+        Self { size: Size::Fixed(step), start, count: Some(count), every, most: None, rest }
     }
 }
 
 impl Course {
+    /// Whether all steps have one size.
+    pub(crate) const fn is_fixed(&self) -> bool {
+        matches!(self.size, Size::Fixed(_))
+    }
+
+    /// How long the run may last, if the sizes of the entries matter to it: to its errors, or to its rest.
+    pub(crate) fn span(&self) -> Option<f64> {
+        match &self.size {
+            Size::Tolerance(adaptive) => Some(adaptive.end() - self.start),
+            Size::Fixed(h) if self.rest.is_some() => {
+                Some(self.count.map_or(*h, |count| count as f64 * h))
+            }
+            Size::Fixed(_) => None,
+        }
+    }
+
     pub(crate) fn check(&self) -> Result<(), SpanError> {
         match &self.size {
             Size::Fixed(h) => {
                 check_step_size(*h)?;
-                let end = self.count.map_or(0.0, |count| count as f64 * h);
-                if end.is_infinite() {
-                    return Err(SpanError::End { end });
+                if let Some(count) = self.count.filter(|count| *count > 0) {
+                    check_steps(self.start, *h, count)?;
                 }
             }
-            Size::Tolerance(until) => until.check()?,
+            Size::Tolerance(adaptive) => adaptive.check(self.start)?,
         }
         if self.count == Some(0) {
             return Err(SpanError::NoSteps);
@@ -136,6 +169,25 @@ pub(crate) fn check_step_size(h: f64) -> Result<(), SpanError> {
     if h > 0.0 && h.is_finite() { Ok(()) } else { Err(SpanError::StepSize { h }) }
 }
 
+/// Accepts a finite time after `start`.
+pub(crate) fn check_end(start: f64, end: f64) -> Result<(), SpanError> {
+    if start.is_finite() && end > start && end.is_finite() {
+        Ok(())
+    } else {
+        Err(SpanError::End { start, end })
+    }
+}
+
+/// Accepts steps of one size that end at a finite time, and of which the first is seen in the time. Times are
+/// products of the count, so later ones are no shorter than their last digit by more than a rounding.
+pub(crate) fn check_steps(start: f64, h: f64, count: usize) -> Result<(), SpanError> {
+    let end = start + count as f64 * h;
+    if start.is_finite() && start + h <= start {
+        return Err(SpanError::Standstill { time: start, h });
+    }
+    check_end(start, end)
+}
+
 /// A span that cannot be run.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -148,13 +200,49 @@ pub enum SpanError {
         /// The step size.
         h: f64,
     },
-    /// The end is zero, negative, infinite or NaN; that of steps of one size may be infinite.
+    /// The end is not after the start, or one of them is infinite or NaN; with steps of one size the end
+    /// may be too large for a number.
     #[error(
-        "the run would end at t = {end}; it starts at 0, and its end must be a later, finite time"
+        "the run would start at t = {start} and end at t = {end}; its end must be a later, finite time"
     )]
     End {
+        /// The time at which it starts.
+        start: f64,
         /// The time asked for.
         end: f64,
+    },
+    /// The steps are shorter than the last digit of the time.
+    #[error(
+        "at t = {time:.6e} a step of size {h:.1e} does not change the time; let the run start at t = 0, or \
+         take larger steps"
+    )]
+    Standstill {
+        /// The time, the largest one of the run.
+        time: f64,
+        /// The step size.
+        h: f64,
+    },
+    /// The list of `scale` or `absolute` has another length than the point has directions.
+    #[error(
+        "{found} numbers were given for the entries, and the chart has {expected} directions; give one for \
+         each"
+    )]
+    Entries {
+        /// How many there are.
+        found: usize,
+        /// How many directions the chart has.
+        expected: usize,
+    },
+    /// A number in the list of `scale` or `absolute` is negative, infinite or NaN.
+    #[error(
+        "the number for direction {index} is {value}; it must be finite and positive, or zero for the \
+         automatic one"
+    )]
+    Entry {
+        /// Which direction.
+        index: usize,
+        /// The number.
+        value: f64,
     },
     /// The tolerance is zero, negative, NaN, or finer than round-off.
     #[error("the tolerance is {tolerance}; it must be a finite number of at least {least:.0e}")]

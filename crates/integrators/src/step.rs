@@ -20,21 +20,25 @@
 //! 5. **Halves**: the step is taken as two of half the size, each by 1 and 2 alone, and each that
 //!    fails is halved again, [`Scheme::splits`] times at most. Both laws hold for each part.
 //! 6. [`StepError`]: `OutOfDomain` if in the smallest part the edge of a domain is in Newton's way,
-//!    `NotConverged` if it is not; either with all that was tried.
+//!    `DependentInvariants` if it starts where a further invariant depends on the other fields, otherwise
+//!    `NotConverged`; the first and the last with all that was tried.
 //!
 //! Steps of adaptive size are tried by 1 and 2, and then by a smaller step.
 //!
 //! Of the 242 starts of `tests/hard_corpus.rs` 218 have a solution that continuation in 60 digits finds.
 //! All of them end in a certified step.
 
+use metriplectic_dynamics::velocity::{differentials, projected_shares};
 use metriplectic_dynamics::{Bracket, Dissipation, Invariants, Metriplectic, system::Point};
-use metriplectic_fields::{ChartPoint, Column, Dimension, ScalarField, Square, Vector};
-use metriplectic_manifolds::{Manifold, Retraction, Riemannian};
+use metriplectic_fields::{
+    ChartPoint, Column, Dimension, Matrix, ScalarField, Space, Square, Vector,
+};
+use metriplectic_manifolds::{InnerProduct, Manifold, Retraction, Riemannian};
 
 use crate::discrete_gradient::{DiscreteGradient, Gonzalez};
 use crate::error::{StepError, Tried};
 use crate::newton::{Inverse, Newton};
-use crate::residual::{Dim, LastCorrection, Numbers, Recall, Residual, Sizes};
+use crate::residual::{Dim, LastCorrection, Numbers, Recall, Residual, size_of_terms};
 use crate::root_finder::{Equation, NoRoot, Root};
 
 /// A scheme: a retraction, and how hard to try to solve its equation.
@@ -97,42 +101,69 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
     {
         let mut work = Work::default();
         let whole = self.attempt(system, start, memory, Effort::Whole, &mut work);
-        let end = whole.or_else(|Lost { .. }| {
+        let end = whole.or_else(|lost| {
             *memory = Memory::new();
+            if self.splits == 0 {
+                return Err((lost, start.x.clone()));
+            }
             self.halves(system, start, 1, &mut work)
         });
         match end {
             Ok(end) => Ok((end, work)),
-            Err(smallest) => Err(self.failure(start, smallest, &work)),
+            Err((smallest, x)) => Err(self.failure(system, start, (smallest, &x), &work)),
         }
     }
 
-    /// What a user is told of a step that was not solved, by what became of its smallest part.
+    /// What a user is told of a step that was not solved, by what became of its smallest part, which
+    /// starts at `x`.
     #[cold]
-    fn failure<Y: Metriplectic>(
+    fn failure<Y>(
         &self,
-        &Start { time, h, .. }: &Start<'_, Y>,
-        Lost { residual, edge }: Lost,
+        system: &Y,
+        start: &Start<'_, Y>,
+        (Lost { residual, cause }, x): (Lost, &Point<Y>),
         work: &Work,
-    ) -> StepError {
+    ) -> StepError
+    where
+        Y: Metriplectic,
+        R: Retraction<Y::Manifold, Y::Metric>,
+    {
+        let Start { time, h, .. } = *start;
         let Work { sweeps, continued, globalised, splits, .. } = *work;
         let tried = Tried { sweeps, continued, globalised, splits };
-        if edge {
-            StepError::OutOfDomain { time, h, tried }
-        } else {
-            let suggested = smallest_part(h, self.splits);
-            StepError::NotConverged { time, h, residual, tried, suggested }
+        if let Some(error) = (Lost { residual, cause }).first_law(time, h) {
+            return error;
+        }
+        let suggested = smallest_part(h, self.splits);
+        let equation =
+            Residual::new(system, (&self.retraction, &self.gradient), start.x, suggested);
+        equation.linearise(&Vector::<Y::Manifold>::zero());
+        // Where friction is slow against the smallest part, or slower than the reversible motion, something
+        // else is in the way.
+        let stiffness = equation.friction().unwrap_or(0.0);
+        if stiffness > f64::max(1.0, equation.rotation()) {
+            let stiffness = stiffness * (h / suggested);
+            return StepError::StiffFriction { time, h, stiffness, residual, tried };
+        }
+        match (cause, dependent_invariant(system, x)) {
+            (Cause::Edge, _) => StepError::OutOfDomain { time, h, tried },
+            (_, Some((index, share))) => {
+                let change = start.left_over.invariants[index].abs();
+                StepError::DependentInvariants { time, index, change, share }
+            }
+            _ => StepError::NotConverged { time, h, residual, tried, suggested },
         }
     }
 
-    /// The two halves of a step that was not solved whole.
+    /// The two halves of a step that was not solved whole; if they were not solved either, where the
+    /// smallest part of them starts.
     fn halves<Y>(
         &self,
         system: &Y,
         start: &Start<'_, Y>,
         depth: usize,
         work: &mut Work,
-    ) -> Result<Point<Y>, Lost>
+    ) -> Result<Point<Y>, (Lost, Point<Y>)>
     where
         Y: Metriplectic,
         R: Retraction<Y::Manifold, Y::Metric>,
@@ -140,18 +171,17 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
         work.splits += 1;
         let mut memory = Memory::new();
         let mut point = start.x.clone();
-        for half in 0..2 {
-            let h = 0.5 * start.h;
+        let h = 0.5 * start.h;
+        for _ in 0..2 {
             let [energy, entropy] = [system.energy_at(&point), system.entropy_at(&point)];
             let left_over = Recall {
                 energy: start.left_over.energy + (energy - start.energy),
                 ..start.left_over
             };
-            let time = start.time + f64::from(half) * h;
-            let part = Start { x: &point, time, h, energy, entropy, left_over, ..*start };
+            let part = Start { x: &point, h, energy, entropy, left_over, ..*start };
             let end = match self.attempt(system, &part, &mut memory, Effort::Part, work) {
                 Ok(end) => end,
-                Err(failure) if depth >= self.splits => return Err(failure),
+                Err(failure) if depth >= self.splits => return Err((failure, point)),
                 Err(_) => self.halves(system, &part, depth + 1, work)?,
             };
             point = end;
@@ -178,8 +208,7 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
         let recall = recall(system, start, &guess);
         let values = [start.energy, start.entropy];
         let known = memory.linearised.take().filter(|known| known.serves(start.h, &guess));
-        let residual = Residual::recalling(system, parts, (start.x, values), start.h, recall)
-            .with_sizes(known.map(|known| known.sizes));
+        let residual = Residual::recalling(system, parts, (start.x, values), start.h, recall);
         let mut inverse = known.map(|known| known.inverse);
         let root = self.newton.solve_near(&residual, &guess, &mut inverse);
         work.sweeps += sweeps(&root);
@@ -187,23 +216,37 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
             Ok(root) => root,
             Err(failure) => self.rescue(&residual, failure, effort, &mut inverse, work)?,
         };
-        memory.linearised = inverse.zip(residual.sizes()).map(|(inverse, sizes)| match known {
-            Some(known) if known.sizes == sizes => {
-                Linearisation { inverse, steps: known.steps + 1, ..known }
+        memory.linearised = inverse.map(|inverse| match (residual.friction(), known) {
+            // No Jacobian was formed in this step.
+            (None, Some(known)) => Linearisation { inverse, steps: known.steps + 1, ..known },
+            (friction, _) => {
+                let friction = friction.unwrap_or(0.0);
+                Linearisation {
+                    inverse,
+                    friction,
+                    h: start.h,
+                    length: root.u.magnitude(),
+                    steps: 0,
+                }
             }
-            _ => Linearisation { inverse, sizes, h: start.h, length: root.u.magnitude(), steps: 0 },
         });
         work.entropy_slope = work.entropy_slope.min(residual.entropy_slope());
         work.dissipates |= residual.dissipates();
-        if root.u.magnitude() <= 2.0 * root.floor {
+        let friction = memory.linearised.map_or(0.0, |known| known.friction);
+        work.friction = work.friction.max(friction);
+        if friction > VERY_STIFF && !has_digits(system, start, &root) {
+            return Err(Lost { residual: root.residual, cause: Cause::Unsolved });
+        }
+        work.rests = (0..Dim::<Y>::LEN).all(|i| root.u[i].abs() <= 2.0 * root.noise[i]);
+        if work.rests {
             // The state is at rest: what the solver found is its own round-off, and following it
             // would make a random walk of the energy.
             (work.energy, work.entropy) = (start.energy, start.entropy);
             return Ok(start.x.clone());
         }
-        let lost = || Lost { residual: root.residual, edge: true };
+        let lost = || Lost { residual: root.residual, cause: Cause::Edge };
         let end = self.retraction.end(system.metric(), start.x, &root.u).map_err(|_| lost())?;
-        let last = residual.last_correction(&root, &end);
+        let last = residual.last_correction(&root, &end, system.energy_at(&end));
         work.sweeps += usize::from(last.is_some());
         let LastCorrection { u, end, moved } =
             last.unwrap_or(LastCorrection { u: root.u, end, moved: false });
@@ -221,9 +264,14 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
         }
         // The last digits of the end, which no residual has seen, may be beyond the edge.
         (work.energy, work.entropy) = (system.energy_at(&end), system.entropy_at(&end));
-        let has_digits =
-            (work.energy - start.energy).abs() <= NO_DIGITS * start.energy.abs().max(1.0);
-        if has_digits && work.entropy.is_finite() { Ok(end) } else { Err(lost()) }
+        let change = work.energy - start.energy;
+        if !work.entropy.is_finite() {
+            Err(lost())
+        } else if let Some(size) = breaks_first_law(system, change, [start.x, &end], work.energy) {
+            Err(Lost { residual: root.residual, cause: Cause::Energy { change, size } })
+        } else {
+            Ok(end)
+        }
     }
 
     /// A root where Newton's method has lost its way from the guess, in the order of the
@@ -270,7 +318,10 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
             work.globalised += 1;
             solved = newton(&self.newton, &closer, work);
         }
-        solved.map_err(|at| Lost { residual: best.residual, edge: at_edge(residual, &at) })
+        solved.map_err(|at| {
+            let cause = if at_edge(residual, &at) { Cause::Edge } else { Cause::Unsolved };
+            Lost { residual: best.residual, cause }
+        })
     }
 
     /// The displacement of the last of a row of steps of growing sizes from the same start, up to
@@ -286,7 +337,8 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
         R: Retraction<Y::Manifold, Y::Metric>,
     {
         work.continued += 1;
-        let newton = Newton { sweeps: DIRECT, halvings: 2, ..self.newton };
+        // The points on the way need not be solved to round-off.
+        let newton = Newton { tolerance: 1e3, sweeps: DIRECT, halvings: 2, ..self.newton };
         let (mut u, mut share, mut increment) = (Vector::<Y::Manifold>::zero(), 0.0, 0.125);
         for _ in 0..STAGES {
             let next = f64::min(share + increment, 1.0);
@@ -319,9 +371,56 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
     }
 }
 
-/// A step that changes the energy by this share of it ends so near to the edge of a domain that the energy
-/// has no digits there.
-const NO_DIGITS: f64 = 1e-3;
+/// The change of the energy, relative to the size of its terms, that is no round-off: no step is taken
+/// that changes it by more.
+const BROKEN: f64 = 1e-6;
+
+/// The size `|H| + Σ_i |∂_iH| (|x_i| + |d_i|)` of the terms of the energy on the step `d` between two points,
+/// if a change of the energy is more than a millionth of it, or no number.
+///
+/// It is the smaller one of those at the two ends. At the edge of a logarithm `|∂_iH x_i|` is as large as the
+/// reciprocal of round-off, and would excuse any error; at a point where all terms vanish `|∂_iH d_i|` does not.
+pub(crate) fn breaks_first_law<Y: Metriplectic>(
+    system: &Y,
+    change: f64,
+    [x, end]: [&Point<Y>; 2],
+    energy: f64,
+) -> Option<f64> {
+    // Most often the energy itself is large enough, and needs no differential; an infinite one is not.
+    if energy.is_finite() && change.abs() <= BROKEN * energy.abs() {
+        return None;
+    }
+    let d = Y::Manifold::coordinates(x, end).abs();
+    let sizes = [x, end].map(|x| {
+        let exchanged = system.energy().jet1(x).df.abs().dot(&d);
+        size_of_terms::<Y::Manifold>(system.energy(), x) + exchanged
+    });
+    let holds = sizes.iter().all(|&size| change.abs() <= BROKEN * size && size.is_finite());
+    if holds { None } else { Some(sizes[0].min(sizes[1])) }
+}
+
+/// The rate `h|K'|` of friction from which on the round-off of a solution may be large.
+const VERY_STIFF: f64 = 1e8;
+
+/// Whether the round-off of a solution is small: if friction is so stiff that the slow motion has no digits
+/// beside it, the round-off of the displacement is as large as the displacement, and a state would seem to
+/// rest. It is measured by the energy that goes with it, which has one unit for all components.
+fn has_digits<Y: Metriplectic>(
+    system: &Y,
+    start: &Start<'_, Y>,
+    Root { u, noise, .. }: &Root<Y::Manifold>,
+) -> bool {
+    let scales = Y::Manifold::scales(start.x);
+    if (0..Dim::<Y>::LEN).all(|i| noise[i] <= 1e-2 * BROKEN * (scales[i] + u[i].abs())) {
+        return true;
+    }
+    let dh = system.energy().jet1(start.x).df.abs();
+    dh.dot(noise) <= BROKEN * (start.energy.abs() + dh.dot(&scales))
+}
+
+/// The rate `h|K'|` of friction from which on a step is stiff: the midpoint rule leaves two thirds of a
+/// deviation that decays at this rate, with the opposite sign.
+pub(crate) const STIFF: f64 = 10.0;
 
 /// What Newton's method has cost.
 fn sweeps<M: Manifold>(solved: &Result<Root<M>, NoRoot<M>>) -> usize {
@@ -353,8 +452,31 @@ pub(crate) enum Effort {
 pub(crate) struct Lost {
     /// The smallest residual that was found.
     residual: f64,
-    /// Whether the domain of the model is in the way.
-    edge: bool,
+    /// Why it was not solved.
+    cause: Cause,
+}
+
+impl Lost {
+    /// The error that names the first law, if the step was refused because its end has another energy.
+    pub(crate) const fn first_law(self, time: f64, h: f64) -> Option<StepError> {
+        match self.cause {
+            Cause::Energy { change, size } => {
+                Some(StepError::FirstLawBroken { time, h, change, size })
+            }
+            Cause::Edge | Cause::Unsolved => None,
+        }
+    }
+}
+
+/// Why a step was not solved.
+#[derive(Clone, Copy, Debug)]
+enum Cause {
+    /// The domain of the model is in the way.
+    Edge,
+    /// The equation is solved, but its end has another energy.
+    Energy { change: f64, size: f64 },
+    /// Newton's method does not converge.
+    Unsolved,
 }
 
 /// Whether it is the edge of the domain that stops Newton's method at `u`: its correction leads out,
@@ -367,6 +489,20 @@ fn at_edge<M: Manifold>(equation: &impl Equation<M>, u: &Vector<M>) -> bool {
     equation.value(&(*u - step * share.min(1.0))).is_none()
 }
 
+/// The further invariant that has the least independent share at `x`, and this share, if it is small
+/// enough to be the cause of a failure.
+pub(crate) fn dependent_invariant<Y: Metriplectic>(
+    system: &Y,
+    x: &Point<Y>,
+) -> Option<(usize, f64)> {
+    let shares = projected_shares(system, &ChartPoint::centre(x)).ok()?;
+    let least = shares.into_iter().enumerate().min_by(|a, b| a.1.total_cmp(&b.1));
+    least.filter(|(_, share)| *share < DEPENDENT)
+}
+
+/// The independent share of a further invariant's differential that explains a failure.
+const DEPENDENT: f64 = 1e-3;
+
 /// The size of the smallest part of a step that was split `splits` times.
 fn smallest_part(h: f64, splits: usize) -> f64 {
     (0..splits).fold(h, |part, _| 0.5 * part)
@@ -377,7 +513,7 @@ fn smallest_part(h: f64, splits: usize) -> f64 {
 pub struct Start<'a, Y: Metriplectic> {
     /// The point `x`.
     pub x: &'a Point<Y>,
-    /// The time.
+    /// The time at which the step starts, for its errors; that of the whole step for a part of it.
     pub time: f64,
     /// The step size.
     pub h: f64,
@@ -394,6 +530,7 @@ pub struct Start<'a, Y: Metriplectic> {
 
 /// What a step cost.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Work {
     /// Linear systems solved by Newton's method.
     pub sweeps: usize,
@@ -408,6 +545,10 @@ pub struct Work {
     pub entropy_slope: f64,
     /// Whether anything was dissipated.
     pub dissipates: bool,
+    /// The largest rate `h|K'|` of the friction.
+    pub friction: f64,
+    /// Whether the state is at rest: the displacement is no more than its own round-off.
+    pub rests: bool,
     /// The energy at the end.
     pub energy: f64,
     /// The entropy there.
@@ -423,6 +564,8 @@ impl Default for Work {
             globalised: 0,
             entropy_slope: f64::INFINITY,
             dissipates: false,
+            friction: 0.0,
+            rests: false,
             energy: f64::NAN,
             entropy: f64::NAN,
         }
@@ -439,10 +582,14 @@ fn explicit<Y: Metriplectic>(system: &Y, start: &Start<'_, Y>) -> Option<Vector<
 ///
 /// What the solver leaves in each step would make the energy a random walk over millions of them, so
 /// a step aims at `H(x₀)` instead of `H(x)`, once they differ by more than a few units of round-off.
-/// Asking for `⟨w, d⟩ = F(x') − F(x) + φe` changes the covector by `φ|e|/|d|`, and with it the
-/// displacement by `h|Π|φ|e|/|d|`, which must stay small against `|d|`. Hence `φ = r²/(1 + r²)` with
-/// `r = |d|² / (10² h|Π||e|)`: all of it while the state moves, nothing of it at rest, where it
-/// would hold the state fast. The further invariants are treated alike.
+/// Asking for `⟨w, d⟩ = F(x') − F(x) + φe` changes the covector by `φe ♭d/G(d, d)`, and with it the
+/// displacement by some `δ`, which must stay small against `d`. Both are compared by the change of `F` that goes
+/// with them, which has one unit: `φ = r²/(1 + r²)` with `r = Σ|∂_iF d_i| / (10² Σ|∂_iF δ_i|)` for `φ = 1`. It is
+/// all of `e` while the state moves, and nothing of it at rest, where it would hold the state fast.
+///
+/// For the energy `δ_i = h Σ_j (|Π| + |K'|)_ij |♭d_j| |e|/G(d, d)`. The covectors of the entropy and of the
+/// further invariants enter by the projections, where `Σ|∂_iF δ_i| = |e|`, and that of the entropy by `K` as
+/// well.
 fn recall<Y: Metriplectic>(system: &Y, start: &Start<'_, Y>, d: &Vector<Y::Manifold>) -> Recall<Y> {
     let Recall { energy, entropy, invariants } = start.left_over;
     let far = |e: f64, size: f64| e.abs() > 4.0 * f64::EPSILON * size;
@@ -453,20 +600,38 @@ fn recall<Y: Metriplectic>(system: &Y, start: &Start<'_, Y>, d: &Vector<Y::Manif
     if !off {
         return Recall::nothing();
     }
-    let (dh, ds) = (system.energy().jet1(start.x).df, system.entropy().jet1(start.x).df);
     let x = ChartPoint::<Y::Manifold>::centre(start.x);
-    let pi = system.bracket().linearise(&system.site(&x, &ds), &dh);
-    let k = system.dissipation().linearise(system.metric(), start.x, &dh, &ds);
-    let sizes = (pi.map_or(0.0, |pi| pi.tensor.max_abs()), k.map_or(0.0, |k| k.along_w.max_abs()));
-    let gain = start.h * (sizes.0 + sizes.1);
-    let share = |e: f64, size: f64| {
-        let r = d.dot(d) / (1e2 * gain * e.abs()).max(f64::MIN_POSITIVE);
+    let w = differentials(system, &x);
+    let site = system.site(&x, &w.entropy);
+    let pi = system.bracket().linearise(&site, &w.energy);
+    let k = system.dissipation().linearise(system.metric(), start.x, &w.energy, &w.entropy);
+    let (Ok(pi), Ok(k), Ok(g)) = (pi, k, system.metric().at(&x)) else { return Recall::nothing() };
+    let mut gain = pi.tensor.abs() + k.along_w.abs();
+    if system.bracket().is_forced()
+        && let Ok(force) = system.bracket().linearise_force(&site, &w.energy)
+    {
+        gain += force.tensor.abs();
+    }
+    let (flat, length) = (g.flat(d), d.abs());
+    // Σ|∂_iF δ_i|/|e| for a δ by a tensor.
+    let moved = |df: &Vector<Y::Manifold>, tensor: Matrix<Y::Manifold>| {
+        df.abs().dot(&(tensor * flat.abs())) * start.h.abs() / flat.dot(d)
+    };
+    let fraction = |e: f64, size: f64, df: &Vector<Y::Manifold>, sensitivity: f64| {
+        let r = df.abs().dot(&length) / (1e2 * sensitivity * e.abs());
         if far(e, size) && r.is_finite() { e / (1.0 + r.powi(-2)) } else { 0.0 }
     };
+    let of_energy = moved(&w.energy, gain);
+    let of_entropy = 1.0 + moved(&w.entropy, k.tensor.abs());
     Recall {
-        energy: share(energy, start.energy.abs()),
-        entropy: share(entropy, start.entropy.abs()),
-        invariants: Dim::<Y>::array(|k| share(invariants[k], start.invariants[k].abs())),
+        energy: fraction(energy, start.energy.abs(), &w.energy, of_energy),
+        // An entropy that has risen by round-off comes back by less than a fall in each step.
+        entropy: fraction(entropy, start.entropy.abs(), &w.entropy, of_entropy)
+            .min(2.0 * f64::EPSILON * start.entropy.abs()),
+        invariants: Dim::<Y>::array(|k| {
+            let size = start.invariants[k].abs();
+            w.invariants[k].map_or(0.0, |(_, dl)| fraction(invariants[k], size, &dl, 1e6))
+        }),
     }
 }
 
@@ -493,7 +658,8 @@ const DIFFERENCES: usize = 4;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Linearisation<N: Dimension> {
     pub(crate) inverse: Inverse<N>,
-    pub(crate) sizes: Sizes,
+    /// The rate `h|K'|` of the friction there.
+    pub(crate) friction: f64,
     pub(crate) h: f64,
     pub(crate) length: f64,
     pub(crate) steps: u32,

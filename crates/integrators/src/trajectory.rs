@@ -1,27 +1,29 @@
 //! Steps in a row, with their certificate.
 
 use approx::{AbsDiffEq, RelativeEq};
-use metriplectic_dynamics::velocity::{Covectors, Gradient, independence};
+use metriplectic_dynamics::velocity::{Covectors, Gradient};
 use metriplectic_dynamics::{Dissipation, Invariants, Metriplectic, SecondLaw, system::Point};
-use metriplectic_fields::{ChartPoint, Column, Dimension, ScalarField, Space};
+use metriplectic_fields::{ChartPoint, Column, Dimension, ScalarField, Space, Vector};
 use metriplectic_manifolds::{Cayley, Exponential, Manifold, Projection, Retraction, WeylMidpoint};
 
-use crate::adaptive::{self, Controller, Pace};
-use crate::certificate::{Certificate, Kept};
+use crate::adaptive::{Controller, Pace};
+use crate::certificate::{Certificate, Kept, round_off};
 use crate::checkpoint::{Checkpoint, ResumeError};
 use crate::discrete_gradient::{DiscreteGradient, Gonzalez};
 use crate::error::{RunError, StepError};
-use crate::residual::{Dim, Numbers, Recall};
+use crate::residual::{Dim, Numbers, Recall, size_of_terms};
+use crate::scales::{Scales, larger};
 use crate::span::{Course, ROOM, Size, SpanError};
-use crate::step::{Effort, Memory, Scheme, Start, Work};
+use crate::step::{Effort, Memory, Scheme, Start, Work, breaks_first_law, dependent_invariant};
 
 /// A state of a run: time, point, and the two fields there.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize), serde(bound = "M: Manifold"))]
+#[non_exhaustive]
 pub struct State<M: Space> {
     /// Steps taken.
     pub step: usize,
-    /// The time: `step · h` in steps of one size, their sum in others.
+    /// The time: `t₀ + step · h` in steps of one size, `t₀` and their sum in others.
     pub time: f64,
     /// The point; serialized as the list of its entries, in the order of [`Manifold::entries`].
     #[cfg_attr(feature = "serde", serde(serialize_with = "entries::<M, _>"))]
@@ -56,7 +58,7 @@ fn entries<M: Manifold, S: serde::Serializer>(
 /// let span = Span::until(1e4).tolerance(1e-5).until_rest(1e-8);
 /// let run = WeylMidpoint.run(&body, Vector3::new(0.4, 0.5, 0.3), span)?;
 /// match run.ending() {
-///     Ending::Rest { speed, .. } => println!("at rest at t = {}, |x'| = {speed:.1e}", run.last().time),
+///     Ending::Rest { speed, .. } => println!("at rest at t = {}, speed {speed:.1e}", run.last().time),
 ///     Ending::Span => println!("still moving at t = {}", run.last().time),
 ///     _ => unreachable!("a run that stops is an error"),
 /// }
@@ -70,8 +72,11 @@ fn entries<M: Manifold, S: serde::Serializer>(
 pub enum Ending {
     /// It went the whole span.
     Span,
-    /// The state came to rest: the speed `|Π dH + K dS|`, in the units of the point's entries, fell
-    /// below the tolerance times the largest speed of the run, or a step left every entry as it was.
+    /// The state came to rest: the speed fell below the tolerance times the one with the largest velocity of
+    /// each entry, or a step changed neither an entry nor its lost digits.
+    ///
+    /// The speed is the norm of `(Π dH + K dS)_i / s_i`, each entry relative to its own size, in units of
+    /// one over the time: `1/speed` is how long the state would take to move by its own size.
     Rest {
         /// The speed at the end.
         speed: f64,
@@ -97,7 +102,7 @@ impl Ending {
 pub struct Steps<'a, Y: Metriplectic, R, W = Gonzalez> {
     pub(crate) scheme: Scheme<R, W>,
     pub(crate) system: &'a Y,
-    pub(crate) progress: Progress,
+    pub(crate) progress: Progress<Dim<Y>>,
     pub(crate) state: State<Y::Manifold>,
     pub(crate) invariants: Numbers<Y>,
     /// The entropy after the last step that dissipated.
@@ -109,15 +114,28 @@ pub struct Steps<'a, Y: Metriplectic, R, W = Gonzalez> {
 
 /// Where a run is on its course.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Progress {
-    pub(crate) pace: Pace,
+pub(crate) struct Progress<N: Dimension> {
+    pub(crate) pace: Pace<N>,
+    /// The time at which the run started.
+    pub(crate) start: f64,
     pub(crate) count: Option<usize>,
     pub(crate) every: usize,
+    /// The most states to record.
+    pub(crate) most: Option<usize>,
+    /// The sizes of the entries so far, where errors or rest are judged by them.
+    pub(crate) scales: Scales<N>,
     /// The tolerance of rest.
     pub(crate) rest: Option<f64>,
-    /// The largest speed so far, where rest is looked for.
-    pub(crate) largest_speed: f64,
+    /// The largest velocity of each entry so far, where rest is looked for.
+    pub(crate) largest_velocity: N::Vector<f64>,
     pub(crate) ending: Option<Ending>,
+}
+
+impl<N: Dimension> Progress<N> {
+    /// Whether errors or rest are judged by the sizes of the entries.
+    pub(crate) const fn judges_sizes(&self) -> bool {
+        self.rest.is_some() || matches!(self.pace, Pace::Adaptive(_))
+    }
 }
 
 impl<'a, Y, R, W> Steps<'a, Y, R, W>
@@ -126,12 +144,18 @@ where
     R: Retraction<Y::Manifold, Y::Metric>,
     W: DiscreteGradient,
 {
-    fn start(scheme: Scheme<R, W>, system: &'a Y, x0: Point<Y>, course: Course) -> Self {
+    fn start(
+        scheme: Scheme<R, W>,
+        system: &'a Y,
+        x0: Point<Y>,
+        course: Course,
+    ) -> Result<Self, SpanError> {
         let energy = system.energy_at(&x0);
         let entropy = system.entropy_at(&x0);
         let certificate = Certificate {
             initial_energy: energy,
             max_energy_error: 0.0,
+            energy_scale: size_of_terms::<Y::Manifold>(system.energy(), &x0),
             initial_entropy: entropy,
             min_entropy_increment: 0.0,
             entropy_gained: 0.0,
@@ -149,16 +173,22 @@ where
             continued: 0,
             globalised: 0,
             second_law: system.second_law(),
+            friction: 0.0,
             projected: system.dissipation().is_projected(),
         };
-        let Course { size, count, every, rest } = course;
+        let scales = course.span().map_or_else(Scales::zero, |span| Scales::at(system, &x0, span));
+        let Course { size, start, count, every, most, rest } = course;
         let pace = match size {
             Size::Fixed(h) => Pace::Fixed(h),
-            Size::Tolerance(until) => Pace::Adaptive(until.controller(system, &x0)),
+            Size::Tolerance(adaptive) => {
+                Pace::Adaptive(adaptive.controller(system, (&x0, start), &scales)?)
+            }
         };
-        let progress = Progress { pace, count, every, rest, largest_speed: 0.0, ending: None };
+        let (largest_velocity, ending) = (Column::zero(), None);
+        let progress =
+            Progress { pace, start, count, every, most, scales, rest, largest_velocity, ending };
         let invariants = values(system, &x0);
-        let state = State { step: 0, time: 0.0, point: x0, energy, entropy };
+        let state = State { step: 0, time: start, point: x0, energy, entropy };
         let memory = Memory::new();
         let mut steps = Self {
             scheme,
@@ -172,7 +202,7 @@ where
             failed: false,
         };
         steps.rest(true);
-        steps
+        Ok(steps)
     }
 
     /// The state reached so far.
@@ -206,11 +236,17 @@ where
                 let kept = (&self.invariants, self.entropy);
                 let start = from(&self.state, kept, &self.certificate, h);
                 let (point, work) = scheme.step(system, &start, &mut self.memory)?;
-                Taken { point, work, h, time: step as f64 * h }
+                Taken { point, work, h, time: self.progress.start + step as f64 * h }
             }
             Pace::Adaptive(controller) => self.controlled(controller)?,
         };
         let next = State { step, time, energy: work.energy, entropy: work.entropy, point };
+        let change = next.energy - self.certificate.initial_energy;
+        let ends = [&self.state.point, &next.point];
+        if let Some(size) = breaks_first_law(self.system, change, ends, next.energy) {
+            let time = self.state.time;
+            return Err(StepError::FirstLawBroken { time, h, change, size });
+        }
         self.account(&next, work, h);
         if work.dissipates {
             self.entropy = next.entropy;
@@ -226,29 +262,49 @@ where
         if over {
             self.progress.ending = Some(Ending::Span);
         }
-        self.rest(self.state.point != before.point);
+        if self.progress.judges_sizes() {
+            let here = Y::Manifold::scales(&self.state.point);
+            self.progress.scales = self.progress.scales.or(&here);
+        }
+        self.rest(!work.rests);
         Ok(&self.state)
     }
 
     /// Tries steps until the controller accepts one. Not part of the loop over steps of one size, which
     /// is compiled for every system.
     #[inline(never)]
-    fn controlled(&mut self, mut controller: Controller) -> Result<Taken<Y>, StepError> {
+    fn controlled(&mut self, mut controller: Controller<Dim<Y>>) -> Result<Taken<Y>, StepError> {
         let (system, time, mut work) = (self.system, self.state.time, Work::default());
+        let (mut tries, mut broken) = (0, None);
         loop {
+            tries += 1;
+            if tries == TRIES {
+                // An entry that begins to move only now has no size yet.
+                let here = Scales::at(system, &self.state.point, controller.end - time);
+                self.progress.scales = self.progress.scales.and(&here);
+            }
             let (h, last) = controller.attempt(time);
-            if controller.next < controller.least && !last {
-                let (h, least) = (controller.next, controller.least);
-                return Err(StepError::TooSmall { time, h, least });
+            if controller.next < controller.least() && !last {
+                let (h, least) = (controller.next, controller.least());
+                let too_small = StepError::TooSmall { time, h, least };
+                let cause = broken.or_else(|| self.dependent(&self.state));
+                return Err(cause.unwrap_or(too_small));
+            }
+            if time + h <= time {
+                let standstill = StepError::Standstill { time, h: controller.next };
+                return Err(broken.unwrap_or(standstill));
             }
             let ratio = controller.taken.map_or(1.0, |taken| h / taken);
             let mut memory = self.memory.rescaled(ratio);
-            work.entropy_slope = f64::INFINITY;
+            (work.entropy_slope, work.friction) = (f64::INFINITY, 0.0);
             let kept = (&self.invariants, self.entropy);
             let start = from::<Y>(&self.state, kept, &self.certificate, h);
-            let end =
-                self.scheme.attempt(system, &start, &mut memory, Effort::Part, &mut work).ok();
-            let error = end.as_ref().and_then(|end| controller.error_of(system, start.x, end, h));
+            let end = self.scheme.attempt(system, &start, &mut memory, Effort::Part, &mut work);
+            let end = end.map_err(|lost| broken = lost.first_law(time, h).or(broken)).ok();
+            let error = end.as_ref().and_then(|end| {
+                let scales = self.progress.scales.or(&Y::Manifold::scales(end));
+                controller.error_of(system, (start.x, end), h, &scales)
+            });
             match (end, error) {
                 (Some(point), Some(error)) if error <= 1.0 => {
                     controller.accept(h, error);
@@ -269,10 +325,11 @@ where
     fn rest(&mut self, moved: bool) {
         let Some(tolerance) = self.progress.rest else { return };
         let x = &self.state.point;
-        let Ok(v) = self.system.velocity(&ChartPoint::centre(x)) else { return };
-        let speed = adaptive::speed::<Y>(x, &v);
-        let largest = self.progress.largest_speed.max(speed);
-        self.progress.largest_speed = largest;
+        let Ok(v) = self.system.velocity(&ChartPoint::<Y::Manifold>::centre(x)) else { return };
+        let Progress { scales, largest_velocity, .. } = &mut self.progress;
+        *largest_velocity = larger(largest_velocity, &Column::from_index(|i| v[i].abs()));
+        // In units of the same sizes: an entry has been smaller than it is.
+        let (speed, largest) = (scales.speed(&v), scales.speed(largest_velocity));
         if !moved || speed <= tolerance * largest {
             self.progress.ending = Some(Ending::Rest { speed, largest });
         }
@@ -285,7 +342,7 @@ where
     /// [`RunError::Step`] if a step failed, with the trajectory so far;
     /// [`SpanError::Endless`] if the course has no end.
     pub fn run(mut self) -> Result<Trajectory<Y::Manifold>, RunError<Y::Manifold>> {
-        let Progress { count, every, pace, .. } = self.progress;
+        let Progress { count, mut every, most, pace, .. } = self.progress;
         if count.is_none() && matches!(pace, Pace::Fixed(_)) {
             return Err(SpanError::Endless.into());
         }
@@ -301,39 +358,47 @@ where
             if (due || over) && states.last().is_none_or(|last| last.step != state.step) {
                 states.push(state.clone());
             }
+            while most.is_some_and(|most| states.len() > most) {
+                every = every.saturating_mul(2);
+                thin_out(&mut states, every, over);
+            }
         }
         let ending = self.progress.ending.unwrap_or(Ending::Stopped);
-        let trajectory = Trajectory { states, certificate: self.certificate, ending };
+        let checkpoint = self.checkpoint();
+        let trajectory = Trajectory { states, certificate: self.certificate, ending, checkpoint };
         match failure {
             Some(cause) => Err(RunError::Step { cause, trajectory: Box::new(trajectory) }),
             None => Ok(trajectory),
         }
     }
 
+    /// The further invariant that depends on the other fields at a state, as an error.
+    #[cold]
+    fn dependent(&self, &State { time, ref point, .. }: &State<Y::Manifold>) -> Option<StepError> {
+        let (index, share) = dependent_invariant(self.system, point)?;
+        let change = self.certificate.invariants[index].max_error;
+        Some(StepError::DependentInvariants { time, index, change, share })
+    }
+
     /// Enters the further invariants into the certificate.
     ///
     /// # Errors
     ///
-    /// [`StepError::DependentInvariants`] if one was lost because its differential depends on those
-    /// of the others.
+    /// [`StepError::DependentInvariants`] if one is no longer conserved because its differential depends
+    /// on those of the others.
     fn account_invariants(&mut self, before: &State<Y::Manifold>) -> Result<(), StepError> {
-        let last = std::mem::replace(&mut self.invariants, values(self.system, &self.state.point));
+        self.invariants = values(self.system, &self.state.point);
+        let mut lost = false;
         for (index, kept) in self.certificate.invariants.iter_mut().enumerate() {
-            let value = self.invariants[index];
-            kept.max_error = kept.max_error.max((value - kept.initial).abs());
-            let change = (value - last[index]).abs();
-            if change > LOST * kept.initial.abs().max(1.0) {
-                let x = ChartPoint::centre(&before.point);
-                let shares = independence(self.system, &x).unwrap_or_default();
-                if let Some(&share) = shares.get(index)
-                    && share < DEPENDENT
-                {
-                    let time = before.time;
-                    return Err(StepError::DependentInvariants { time, index, change, share });
-                }
+            kept.max_error = kept.max_error.max((self.invariants[index] - kept.initial).abs());
+            // The terms are evaluated where the error asks for them, and not in every step.
+            if kept.max_error > round_off(kept.scale) {
+                let size = sizes::<Y>(self.system, &self.state.point)[index];
+                kept.scale = kept.scale.max(size);
             }
+            lost |= kept.max_error > LOST * kept.scale;
         }
-        Ok(())
+        if lost { self.dependent(before).map_or(Ok(()), Err) } else { Ok(()) }
     }
 
     /// Enters a step into the certificate.
@@ -341,13 +406,19 @@ where
         let c = &mut self.certificate;
         c.smallest_step = if c.steps == 0 { h } else { c.smallest_step.min(h) };
         c.largest_step = c.largest_step.max(h);
-        c.max_energy_error = c.max_energy_error.max((next.energy - c.initial_energy).abs());
+        let error = (next.energy - c.initial_energy).abs();
+        c.max_energy_error = c.max_energy_error.max(error);
+        // The terms of the energy are evaluated where the error asks for them, and not in every step.
+        if error > round_off(c.energy_scale) {
+            let size = size_of_terms::<Y::Manifold>(self.system.energy(), &next.point);
+            c.energy_scale = c.energy_scale.max(size);
+        }
         let increment = next.entropy - self.state.entropy;
         c.min_entropy_increment =
             if c.steps == 0 { increment } else { c.min_entropy_increment.min(increment) };
         c.entropy_gained = next.entropy - c.initial_entropy;
         if increment < 0.0
-            && increment < -entropy_round_off(self.system, &self.state.point, self.state.entropy)
+            && increment < -entropy_round_off(self.system, [&self.state.point, &next.point])
         {
             c.entropy_falls += 1;
         }
@@ -358,9 +429,24 @@ where
         c.sweeps += work.sweeps;
         c.worst_sweeps = c.worst_sweeps.max(work.sweeps);
         c.retries += work.splits;
+        c.friction = c.friction.max(work.friction);
         c.continued += work.continued;
         c.globalised += work.globalised;
     }
+}
+
+/// Steps that are tried before the sizes of the entries are estimated anew.
+const TRIES: usize = 3;
+
+/// Gives up the states between the first and the last that no multiple of `every` steps leads to, and
+/// the last one too unless it is to be kept.
+fn thin_out<M: Space>(states: &mut Vec<State<M>>, every: usize, keeps_last: bool) {
+    let last = states.len() - 1;
+    let mut index = 0..;
+    states.retain(|state| {
+        let index = index.next().unwrap_or(last);
+        index == 0 || index == last && keeps_last || state.step.is_multiple_of(every)
+    });
 }
 
 /// A step that was taken.
@@ -397,10 +483,9 @@ fn from<'a, Y: Metriplectic>(
     }
 }
 
-/// The change of a further invariant in one step that is more than round-off.
-const LOST: f64 = 1e-10;
-/// The independent share of a further invariant's differential that explains such a change.
-const DEPENDENT: f64 = 1e-6;
+/// The error of a further invariant, relative to its terms, above which it is no longer conserved. What
+/// fades out of `Π̃` stays far below it: `10⁻⁴h²`.
+const LOST: f64 = 1e-4;
 
 /// The further invariants of a system at a point.
 fn values<Y: Metriplectic>(system: &Y, x: &Point<Y>) -> Numbers<Y> {
@@ -412,15 +497,41 @@ fn values<Y: Metriplectic>(system: &Y, x: &Point<Y>) -> Numbers<Y> {
             f.at(self.0)
         }
     }
-    let values = Covectors::new([0.0; 2], system.invariants(), &mut Values::<Y::Manifold>(x));
-    Dim::<Y>::array(|k| values.invariants[k].map_or(0.0, |(_, value)| value))
+    of_each::<Y>(system, &mut Values::<Y::Manifold>(x))
 }
 
-/// The round-off `4ε (max(|S|, 1) + |dS||x|)` of an entropy increment: `S` is evaluated twice, at
-/// points whose entries are rounded.
-pub(crate) fn entropy_round_off<Y: Metriplectic>(system: &Y, x: &Point<Y>, entropy: f64) -> f64 {
-    let ds = system.entropy().jet1(x).df.magnitude();
-    4.0 * f64::EPSILON * (entropy.abs().max(1.0) + ds * Y::Manifold::magnitude(x))
+/// The sizes of the terms of the further invariants at a point.
+fn sizes<Y: Metriplectic>(system: &Y, x: &Point<Y>) -> Numbers<Y> {
+    struct Sizes<'a, M: Space>(&'a M::Point<f64>);
+    impl<M: Manifold> Gradient<M> for Sizes<'_, M> {
+        type Covector = f64;
+
+        fn of(&mut self, f: &impl ScalarField<M>) -> f64 {
+            size_of_terms::<M>(f, self.0)
+        }
+    }
+    of_each::<Y>(system, &mut Sizes::<Y::Manifold>(x))
+}
+
+/// A number for each of the further invariants.
+fn of_each<Y: Metriplectic>(
+    system: &Y,
+    number: &mut impl Gradient<Y::Manifold, Covector = f64>,
+) -> Numbers<Y> {
+    let numbers = Covectors::new([0.0; 2], system.invariants(), number);
+    Dim::<Y>::array(|k| numbers.invariants[k].map_or(0.0, |(_, value)| value))
+}
+
+/// The round-off `4ε (|S| + Σ_i |∂_iS x_i|)` of an entropy increment, the larger one of the two ends. The
+/// entries of `x' = x + u` are rounded in units of the larger end, so `x_i` is that of both.
+pub(crate) fn entropy_round_off<Y: Metriplectic>(system: &Y, ends: [&Point<Y>; 2]) -> f64 {
+    let [x, y] = ends.map(Y::Manifold::scales);
+    let scales = Vector::<Y::Manifold>::from_index(|i| x[i].max(y[i]));
+    let sizes = ends.map(|x| {
+        let jet = system.entropy().jet1(x);
+        jet.value.abs() + jet.df.abs().dot(&scales)
+    });
+    4.0 * f64::EPSILON * sizes[0].max(sizes[1])
 }
 
 impl<Y, R, W> Iterator for Steps<'_, Y, R, W>
@@ -448,6 +559,8 @@ pub struct Trajectory<M: Manifold> {
     states: Vec<State<M>>,
     certificate: Certificate,
     ending: Ending,
+    #[cfg_attr(feature = "serde", serde(skip))]
+    checkpoint: Checkpoint,
 }
 
 impl<M: Manifold> Trajectory<M> {
@@ -469,6 +582,12 @@ impl<M: Manifold> Trajectory<M> {
     /// How the run ended.
     pub const fn ending(&self) -> Ending {
         self.ending
+    }
+
+    /// Where the run was put down: at its end, or before the step that failed. From here it goes on,
+    /// with a later end ([`Checkpoint::with_steps`], [`Checkpoint::with_end`]) or another scheme.
+    pub const fn checkpoint(&self) -> &Checkpoint {
+        &self.checkpoint
     }
 
     /// The recorded states in order.
@@ -568,8 +687,8 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
     {
         let course = course.into();
         course.check()?;
-        system.report(&x0).verdict?;
-        Ok(Steps::start(self, system, x0, course))
+        system.check_start(&x0)?;
+        Ok(Steps::start(self, system, x0, course)?)
     }
 
     /// Verifies the model, runs it over a [`Span`](crate::Span) or [`Until`](crate::Until), and records the states.

@@ -149,6 +149,11 @@ impl<const N: usize> Manifold for Chart<N> {
         Column::magnitude(x)
     }
 
+    #[inline]
+    fn scales(x: &SVector<f64, N>) -> SVector<f64, N> {
+        x.abs()
+    }
+
     /// The point itself: the nearest one of the domain is not known.
     fn project(&self, x: &SVector<f64, N>) -> SVector<f64, N> {
         *x

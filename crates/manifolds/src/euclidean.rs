@@ -103,6 +103,11 @@ macro_rules! vector_space {
                 Column::magnitude(x)
             }
 
+            #[inline]
+            fn scales(x: &SVector<f64, N>) -> SVector<f64, N> {
+                x.abs()
+            }
+
             fn project(&self, x: &SVector<f64, N>) -> SVector<f64, N> {
                 *x
             }

@@ -204,8 +204,9 @@ fn stretch<M: Space, G: Riemannian<M>>(metric: &G, x: &M::Point<f64>, line: &Vec
     if stretch.is_finite() && stretch > 0.0 { stretch } else { 1.0 }
 }
 
-/// Newton's method for `exp_x(v) = y`, damped, from a first aim.
-fn hit<M: Space, G: Riemannian<M>>(
+/// Newton's method for `exp_x(v) = y`, damped, from a first aim. The end is hit to the rounding of the
+/// coordinates of the chart.
+fn hit<M: Manifold, G: Riemannian<M>>(
     metric: &G,
     (x, y): (&M::Point<f64>, &M::Point<f64>),
     aim: &Vector<M>,
@@ -213,6 +214,8 @@ fn hit<M: Space, G: Riemannian<M>>(
     shots: &Cell<u32>,
 ) -> Result<Vector<M>, MetricError> {
     let size = M::coordinates(x, y).magnitude();
+    let scales = M::scales(x);
+    let rounded = size + (0..M::Dim::LEN).map(|i| scales[i]).fold(0.0, f64::max);
     let miss = |v: &Vector<M>| {
         shots.set(shots.get() + 1);
         if shots.get() > SHOTS {
@@ -224,7 +227,7 @@ fn hit<M: Space, G: Riemannian<M>>(
     let mut v = *aim;
     let (mut off, mut slope) = miss(&v)?;
     for _ in 0..CORRECTIONS {
-        if off.magnitude() <= 4.0 * f64::EPSILON * (1.0 + size) {
+        if off.magnitude() <= 4.0 * f64::EPSILON * rounded {
             return Ok(v);
         }
         let missed = MetricError::NoLogarithm { distance: size, missed_by: off.magnitude() };
@@ -240,7 +243,7 @@ fn hit<M: Space, G: Riemannian<M>>(
         match closer {
             Some(next) => (v, off, slope) = next,
             // The geodesic itself is good to 1e-13: a stall there is the end.
-            None if off.magnitude() <= 1e-12 * (1.0 + size) => return Ok(v),
+            None if off.magnitude() <= 1e-12 * rounded => return Ok(v),
             None => return Err(missed),
         }
     }
@@ -292,6 +295,19 @@ mod tests {
             let v = Riemannian::<Euclidean<2>>::log(&g, &x, &y).unwrap();
             let distance = (1.0 + (y - x).norm_squared() / (2.0 * x.y * y.y)).acosh();
             assert!((v.norm() / x.y - distance).abs() < 1e-11 * (1.0 + distance));
+        }
+    }
+
+    #[test]
+    fn geodesics_and_logarithms_have_no_unit_of_length() {
+        // The metric of the half plane is the same in every unit.
+        let (g, x, v, y) =
+            (half_plane(), vector![0.3, 1.2], vector![0.8, -0.5], vector![-0.7, 0.4]);
+        let end = |s: f64| Riemannian::<Euclidean<2>>::end(&g, &(x * s), &(v * s)).unwrap();
+        let log = |s: f64| Riemannian::<Euclidean<2>>::log(&g, &(x * s), &(y * s)).unwrap();
+        for s in [-40, -3, 60].map(|k| 2.0_f64.powi(k)) {
+            assert_eq!(end(s), end(1.0) * s);
+            assert_eq!(log(s), log(1.0) * s);
         }
     }
 

@@ -24,10 +24,10 @@ use metriplectic_fields::{
 };
 use num_dual::{Dual, Dual64};
 
-use crate::MetricError;
 pub(crate) use crate::extrapolation::TOLERANCE as ACCURACY;
 use crate::extrapolation::{self, State};
 use crate::metric::GeodesicEnd;
+use crate::{Manifold, MetricError};
 
 /// A piece of a geodesic shorter than this, in a unit of time, is not worth pursuing.
 const SHORTEST: f64 = 1e-6;
@@ -40,6 +40,8 @@ const PIECES: usize = 1024;
 struct Phase<M: Space, D: Scalar> {
     q: Vector<M, D>,
     p: Vector<M, D>,
+    /// The size of the chart's coordinates where the geodesic starts, that its accuracy is relative to.
+    size: f64,
 }
 
 // By hand, because a derive would ask it of `M`.
@@ -54,18 +56,29 @@ impl<M: Space, D: Scalar> Copy for Phase<M, D> {}
 impl<M: Space, D: Scalar> State for Phase<M, D> {
     fn plus(&self, other: &Self, h: f64) -> Self {
         let h = D::from(h);
-        Self { q: self.q + other.q * h, p: self.p + other.p * h }
+        Self { q: self.q + other.q * h, p: self.p + other.p * h, size: self.size }
     }
 
     fn distance(&self, other: &Self) -> f64 {
-        let q = (self.q - other.q).magnitude() / (1.0 + self.q.magnitude());
-        let p = (self.p - other.p).magnitude() / self.p.magnitude().max(f64::MIN_POSITIVE);
+        let q = relative((self.q - other.q).magnitude(), self.size + self.q.magnitude());
+        let p = relative((self.p - other.p).magnitude(), self.p.magnitude());
         q.max(p)
     }
 
     fn is_finite(&self) -> bool {
         self.q.is_finite() && self.p.is_finite()
     }
+}
+
+/// `difference / size`, where no difference is none.
+fn relative(difference: f64, size: f64) -> f64 {
+    if difference == 0.0 { 0.0 } else { difference / size }
+}
+
+/// The size of the coordinates of the chart at a point.
+fn size_at<M: Manifold>(x: &M::Point<f64>) -> f64 {
+    let scales = M::scales(x);
+    (0..M::Dim::LEN).map(|i| scales[i]).fold(0.0, f64::max)
 }
 
 /// A point of the phase space with its derivatives along the initial velocity.
@@ -90,8 +103,9 @@ impl<M: Space> State for Bundle<M> {
     }
 
     fn distance(&self, other: &Self) -> f64 {
+        // The derivative of one displacement by another, which begins as a number of order one.
         let dq = (self.dq - other.dq).magnitude() / (1.0 + self.dq.magnitude());
-        let dp = (self.dp - other.dp).magnitude() / self.dp.magnitude().max(f64::MIN_POSITIVE);
+        let dp = relative((self.dp - other.dp).magnitude(), self.dp.magnitude());
         self.at.distance(&other.at).max(dq).max(dp)
     }
 
@@ -150,7 +164,7 @@ fn rate<M: Space>(
     let g = metric_jet(field, x, &at.q);
     let v = g.value.solve(&at.p)?;
     let force = Vector::<M>::from_index(|k| 0.5 * v.dot(&(g.slopes[k] * v)));
-    Some(Phase { q: v, p: force })
+    Some(Phase { q: v, p: force, size: at.size })
 }
 
 /// The rate of a phase point with its derivatives, from `n(n+1)/2` evaluations of the metric.
@@ -189,7 +203,11 @@ fn rate_of_bundle<M: Space>(
         }
     }
     let transposed = Matrix::<M>::from_entries(|i, j| turned[(j, i)]);
-    Some(Bundle { at: Phase { q: v, p: force }, dq: dv, dp: transposed * dv + bend * *dq })
+    Some(Bundle {
+        at: Phase { q: v, p: force, size: at.size },
+        dq: dv,
+        dp: transposed * dv + bend * *dq,
+    })
 }
 
 /// The rate at any scalar, by one more dual number: the definition.
@@ -209,7 +227,7 @@ fn rate_at_scalar<M: Space, D: Scalar>(
     });
     let v = value.solve(&at.p)?;
     let p = Vector::<M, D>::from_index(|k| v.dot(&(slopes[k] * v)) * 0.5);
-    Some(Phase { q: v, p })
+    Some(Phase { q: v, p, size: at.size })
 }
 
 /// A point and a velocity of one chart, in the chart centred at the point itself.
@@ -316,7 +334,7 @@ fn travel<M: Space, Y: State>(
 /// # Errors
 ///
 /// Those of [`travel`].
-pub(crate) fn follow<M: Space, D: Scalar>(
+pub(crate) fn follow<M: Manifold, D: Scalar>(
     field: &impl MatrixField<M>,
     x: &ChartPoint<M, D>,
     v: &Vector<M, D>,
@@ -325,9 +343,10 @@ pub(crate) fn follow<M: Space, D: Scalar>(
         let g = metric(field, &ChartPoint { base: base.clone(), q: y.q });
         let (at, v) = centred::<M, D>(base, &y.q, &g.solve(&y.p)?);
         let p = metric(field, &at) * v;
-        Some((at.base, Phase { q: at.q, p }))
+        Some((at.base, Phase { q: at.q, p, size: y.size }))
     };
-    let start = Phase::<M, D> { q: x.q, p: metric(field, x) * *v };
+    let size = size_at::<M>(&x.base);
+    let start = Phase::<M, D> { q: x.q, p: metric(field, x) * *v, size };
     let rate = |base: &M::Point<f64>, y: &Phase<M, D>| rate_at_scalar(field, base, y);
     let (base, end) = travel::<M, _>(field, &x.base, start, rate, |y| y.q.real(), recentre)?;
     let end_point = ChartPoint { base, q: end.q };
@@ -341,7 +360,7 @@ pub(crate) fn follow<M: Space, D: Scalar>(
 /// # Errors
 ///
 /// Those of [`follow`].
-pub(crate) fn follow_real<M: Space>(
+pub(crate) fn follow_real<M: Manifold>(
     field: &impl MatrixField<M>,
     x: &M::Point<f64>,
     v: &Vector<M>,
@@ -351,9 +370,10 @@ pub(crate) fn follow_real<M: Space>(
         let g = value(&ChartPoint { base: base.clone(), q: y.q });
         let (at, v) = centred::<M, f64>(base, &y.q, &g.solve(&y.p)?);
         let p = value(&at) * v;
-        Some((at.base, Phase { q: Vector::<M>::zero(), p }))
+        Some((at.base, Phase { q: Vector::<M>::zero(), p, size: y.size }))
     };
-    let start = Phase::<M, f64> { q: Vector::<M>::zero(), p: value(&ChartPoint::centre(x)) * *v };
+    let (q, p) = (Vector::<M>::zero(), value(&ChartPoint::centre(x)) * *v);
+    let start = Phase::<M, f64> { q, p, size: size_at::<M>(x) };
     let (end, y) =
         travel::<M, _>(field, x, start, |base, y| rate(field, base, y), |y| y.q, recentre)?;
     let v = value(&ChartPoint::centre(&end)).solve(&y.p);
@@ -375,17 +395,17 @@ pub(crate) struct GeodesicJet<M: Space> {
 /// # Errors
 ///
 /// Those of [`follow`].
-pub(crate) fn follow_jet<M: Space>(
+pub(crate) fn follow_jet<M: Manifold>(
     field: &impl MatrixField<M>,
     start: &GeodesicJet<M>,
 ) -> Result<GeodesicJet<M>, MetricError> {
     let recentre = |base: &M::Point<f64>, y: &Bundle<M>| {
         let jet = into_velocities(field, base, y)?;
         let centred = recentred(base, &y.at.q, &jet);
-        let bundle = into_momenta(field, &centred);
+        let bundle = into_momenta(field, &centred, y.at.size);
         Some((centred.point, bundle))
     };
-    let bundle = into_momenta(field, start);
+    let bundle = into_momenta(field, start, size_at::<M>(&start.point));
     let rate = |base: &M::Point<f64>, y: &Bundle<M>| rate_of_bundle(field, base, y);
     let (base, end) = travel::<M, _>(field, &start.point, bundle, rate, |y| y.at.q, recentre)?;
     ended(field, &base, into_velocities(field, &base, &end))
@@ -403,10 +423,14 @@ fn turned<M: Space>(
 }
 
 /// `p = g v` and `δp = g δv + (∂_δq g) v`, at the centre of a chart.
-fn into_momenta<M: Space>(field: &impl MatrixField<M>, jet: &GeodesicJet<M>) -> Bundle<M> {
+fn into_momenta<M: Space>(
+    field: &impl MatrixField<M>,
+    jet: &GeodesicJet<M>,
+    size: f64,
+) -> Bundle<M> {
     let (g, turned) = turned(field, &jet.point, &Vector::<M>::zero(), &jet.velocity);
     Bundle {
-        at: Phase { q: Vector::<M>::zero(), p: g * jet.velocity },
+        at: Phase { q: Vector::<M>::zero(), p: g * jet.velocity, size },
         dq: jet.dpoint,
         dp: g * jet.dvelocity + turned * jet.dpoint,
     }

@@ -88,6 +88,12 @@ impl Manifold for HalfLine {
         x.x.abs()
     }
 
+    /// 1: the chart is the logarithm of a ratio, and has no unit.
+    #[inline]
+    fn scales(_: &Vector1<f64>) -> Vector1<f64> {
+        Vector1::new(1.0)
+    }
+
     /// No positive number is nearest to one that is not: `2.2·10⁻³⁰⁸`, the smallest of full precision,
     /// stands for zero.
     fn project(&self, x: &Vector1<f64>) -> Vector1<f64> {

@@ -14,7 +14,19 @@ use crate::{InnerProduct, Manifold, Retraction, Riemannian, Tangent};
 
 /// Round-off of a handful of operations on numbers of size `scale`.
 fn round_off<M: Manifold>(scale: f64) -> f64 {
-    64.0 * M::Dim::LEN as f64 * f64::EPSILON * scale.max(1.0)
+    64.0 * M::Dim::LEN as f64 * f64::EPSILON * scale
+}
+
+/// The size of the coordinates of the chart at `x`, which have another unit than the entries of `x` on a
+/// half line.
+fn chart_size<M: Manifold>(x: &M::Point<f64>) -> f64 {
+    M::scales(x).magnitude()
+}
+
+/// A length of the chart at `x` without its unit.
+fn pure<M: Manifold>(x: &M::Point<f64>, length: f64) -> f64 {
+    let size = chart_size::<M>(x);
+    if size > 0.0 { length / size } else { 0.0 }
 }
 
 /// Checks a manifold at `x`, with coordinates `q` inside the domain of the chart:
@@ -28,19 +40,20 @@ fn round_off<M: Manifold>(scale: f64) -> f64 {
 ///
 /// The first law that is broken.
 pub fn manifold<M: Manifold>(space: &M, x: &M::Point<f64>, q: &Vector<M>) -> Result<(), BrokenLaw> {
-    let bound = round_off::<M>(M::magnitude(x) + q.magnitude());
+    let bound = round_off::<M>(chart_size::<M>(x) + q.magnitude());
+    let pure = round_off::<M>(1.0 + pure::<M>(x, q.magnitude()));
     let distance = |a: &M::Point<f64>, b: &M::Point<f64>| {
         let difference = M::entries(a).into_iter().zip(M::entries(b)).map(|(a, b)| (a - b).abs());
         difference.fold(0.0, f64::max)
     };
     let origin = M::chart(x, &Vector::<M>::zero());
-    BrokenLaw::unless("φ_x(0) = x", distance(&origin, x), bound)?;
+    BrokenLaw::unless("φ_x(0) = x", distance(&origin, x), round_off::<M>(M::magnitude(x)))?;
     let y: M::Point<f64> = M::chart(x, q);
     let back = M::coordinates(x, &y);
     BrokenLaw::unless("φ_x⁻¹(φ_x(q)) = q", (back - *q).magnitude(), bound)?;
     let there_and_back = jacobian::<M, f64>(|q| M::coordinates(x, &M::chart::<Dual<f64>>(x, q)), q);
     let off = (there_and_back - Matrix::<M>::one()).max_abs();
-    BrokenLaw::unless("the derivative of φ_x⁻¹ φ_x is 1", off, bound)?;
+    BrokenLaw::unless("the derivative of φ_x⁻¹ φ_x is 1", off, pure)?;
     for i in 0..=M::Dim::LEN {
         for j in 0..=M::Dim::LEN {
             let seed = M::coordinates(x, &M::seeds(x)(i, j));
@@ -49,7 +62,7 @@ pub fn manifold<M: Manifold>(space: &M, x: &M::Point<f64>, q: &Vector<M>) -> Res
                 let (a, b) = (seed[k].eps1 - expected(k, i), seed[k].eps2 - expected(k, j));
                 worst.max(a.abs()).max(b.abs()).max(seed[k].eps1eps2.abs())
             });
-            BrokenLaw::unless("seeded points are the chart at its seeds", off, bound)?;
+            BrokenLaw::unless("seeded points are the chart at its seeds", off, pure)?;
         }
     }
     let allowed = round_off::<M>(M::magnitude(&y));
@@ -87,11 +100,15 @@ pub fn metric<M: Manifold, G: Riemannian<M>>(
     // The condition number of g enters the round-off of ♯♭.
     let bound = round_off::<M>(v.magnitude()) * condition::<M>(&g);
     BrokenLaw::unless("♯♭v = v", (at.sharp(&flat) - *v).magnitude(), bound)?;
-    BrokenLaw::unless("♭v = g v", (g * *v - flat).magnitude(), round_off::<M>(g.max_abs()))?;
+    BrokenLaw::unless(
+        "♭v = g v",
+        (g * *v - flat).magnitude(),
+        round_off::<M>(g.max_abs() * v.magnitude()),
+    )?;
     let square = flat.dot(v);
     BrokenLaw::unless("G(v, v) > 0", -square, 0.0)?;
     let orthonormal = at.orthonormal(&flat).magnitude().powi(2);
-    let off = (orthonormal - square).abs() / square.max(f64::MIN_POSITIVE);
+    let off = relative(orthonormal - square, square);
     BrokenLaw::unless("|L⁻¹♭v|² = G(v, v)", off, round_off::<M>(1.0) * condition::<M>(&g))?;
 
     let volume = usable("g is positive", metric.volume(&centre))?;
@@ -105,13 +122,13 @@ pub fn metric<M: Manifold, G: Riemannian<M>>(
 
     let (start, _) = usable("geodesics exist", metric.exp(&centre, &Vector::<M>::zero()))?;
     let moved = M::coordinates(x, &start.point()).magnitude();
-    BrokenLaw::unless("exp_x(0) = x", moved, round_off::<M>(M::magnitude(x)))?;
+    BrokenLaw::unless("exp_x(0) = x", moved, round_off::<M>(chart_size::<M>(x)))?;
     let (end, velocity) = usable("geodesics exist", metric.exp(&centre, v))?;
     let there = usable("g is positive", metric.at(&end))?;
     let speed = there.flat(&velocity).dot(&velocity);
     // Numerical geodesics promise 10⁻¹³ of the momentum in each of their pieces, and the condition
     // number of g is what that becomes in p·g⁻¹p.
-    let off = (speed - square).abs() / square.max(f64::MIN_POSITIVE);
+    let off = relative(speed - square, square);
     let bound = 1e-11 * condition::<M>(&g).max(condition::<M>(&metric.matrix(&end)));
     BrokenLaw::unless("geodesics have constant speed", off, bound)?;
 
@@ -125,6 +142,8 @@ pub fn metric<M: Manifold, G: Riemannian<M>>(
         turn = turn.max((begin[k].eps1eps2 + v.dot(&(*gamma * *v))).abs());
         size = size.max(gamma.max_abs());
     }
+    // Symbols that are round-off have the size of g⁻¹ ∂g over the size of the chart.
+    size += pure::<M>(x, 1.0);
     let bound = round_off::<M>(size) * condition::<M>(&g);
     BrokenLaw::unless("the connection has no torsion", torsion, bound)?;
     let bound = round_off::<M>(size * square_of(v)) * condition::<M>(&g);
@@ -157,9 +176,9 @@ pub fn retraction<M: Manifold, G: Riemannian<M>, R: Retraction<M, G>>(
         Ok((M::coordinates(x, &end) - M::coordinates(x, &start) - tangent.vector).magnitude())
     };
     // Of second order it is a hundredth on a tenth of the way, of first order a tenth.
-    let round_off = round_off::<M>(M::magnitude(x));
+    let round_off = round_off::<M>(chart_size::<M>(x));
     BrokenLaw::unless("x' − x = d + O(|d|²)", apart(1e-3)?, 0.05 * apart(1e-2)? + round_off)?;
-    let bound = 1e-12 * (M::magnitude(x) + u.magnitude()).max(1.0);
+    let bound = 1e-12 * (chart_size::<M>(x) + u.magnitude());
     let jet = usable(exists, retraction.arc_jet(metric, x, u))?;
     let tangent = Tangent { base: jet.z.clone(), vector: jet.d };
     let (start, end) = usable(exists, retraction.pair(metric, &tangent))?;
@@ -190,7 +209,7 @@ pub fn retraction<M: Manifold, G: Riemannian<M>, R: Retraction<M, G>>(
         };
         // Two numerical geodesics, each with its own steps; their derivatives are those of the
         // variational equations, which grow along the way and are not what the steps are chosen by.
-        let bound = 100.0 * bound;
+        let bound = 1e-10 * (1.0 + pure::<M>(x, u.magnitude()));
         BrokenLaw::unless("∂z/∂u is the derivative of z", off(&z, &jet.dz), bound)?;
         BrokenLaw::unless("∂d/∂u is the derivative of d", off(&arc.d, &jet.dd), bound)?;
         BrokenLaw::unless("∂x'/∂u is the derivative of x'", off(&end, &jet.dend), bound)?;
@@ -213,7 +232,7 @@ pub fn symmetric_retraction<M: Manifold, G: Riemannian<M>, R: Retraction<M, G>>(
     let exists = "the retraction is defined";
     let there = usable(exists, retraction.inverse(metric, x, y))?;
     let back = usable(exists, retraction.inverse(metric, y, x))?;
-    let bound = 1e-12 * (M::magnitude(x) + there.vector.magnitude()).max(1.0);
+    let bound = 1e-12 * (chart_size::<M>(x) + there.vector.magnitude());
     let opposite = Tangent { vector: -back.vector, ..back };
     same("R_h⁻¹(y, x) is the opposite of R_h⁻¹(x, y)", &opposite, &there, bound)
 }
@@ -230,6 +249,11 @@ fn same<M: Manifold>(
     }
     let apart = M::coordinates(&a.base, &b.base).magnitude();
     Err(BrokenLaw { law, size: apart.max((a.vector - b.vector).magnitude()), bound })
+}
+
+/// `|difference| / size`, where no difference is none.
+fn relative(difference: f64, size: f64) -> f64 {
+    if difference == 0.0 { 0.0 } else { difference.abs() / size }
 }
 
 /// A metric that cannot be used breaks the law that it exists.

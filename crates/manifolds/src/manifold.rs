@@ -9,7 +9,7 @@
 //! for which the laws have been solved, and it lies on the manifold; a projection after the step would
 //! move it, and `H` with it. The defects of all points of a run are in its certificate.
 
-use metriplectic_fields::{Space, Vector};
+use metriplectic_fields::{Column, Space, Vector};
 use rand::Rng;
 
 /// A space of states.
@@ -65,6 +65,27 @@ pub trait Manifold: Space {
     /// The size `|x|` of the entries, which sets the scale of round-off.
     fn magnitude(x: &Self::Point<f64>) -> f64;
 
+    /// The sizes of the entries, one for each direction of the chart: what round-off and tolerances are
+    /// relative to.
+    ///
+    /// On a flat space they are `|x_i|`, each in the unit of its entry, and zero for an entry that is zero.
+    /// On a curved space all directions have the one size of the space, because its frame is arbitrary; on
+    /// a half line the chart is a logarithm, of size 1. A product has those of its factors in a row. The
+    /// default is [`magnitude`](Self::magnitude) for each direction.
+    ///
+    /// ```
+    /// use metriplectic_manifolds::{Euclidean, Manifold, Product, Sphere};
+    /// use nalgebra::vector;
+    /// type Spin = Product<Sphere<2>, Euclidean<2>>;
+    /// let x = (vector![0.0, 0.6, 0.8], vector![3e-9, -300.0]);
+    /// assert_eq!(Spin::scales(&x), vector![1.0, 1.0, 3e-9, 300.0]);
+    /// ```
+    #[inline]
+    fn scales(x: &Self::Point<f64>) -> Vector<Self> {
+        let size = Self::magnitude(x);
+        Vector::<Self>::from_index(|_| size)
+    }
+
     /// The nearest point of the manifold, for an array of numbers that is off it: one of them, where
     /// there are several. What is not finite stays so, and where no point is nearest (the centre of a
     /// sphere) the entries are not numbers: [`check`](Self::check) finds both.
@@ -100,12 +121,13 @@ pub trait Manifold: Space {
         if let Some(index) = entries.iter().position(|entry| !entry.is_finite()) {
             return Err(PointError::NotFinite { index, value: entries[index] });
         }
-        let (defect, allowed) = (self.defect(x), POINT_TOLERANCE * Self::magnitude(x).max(1.0));
+        let (defect, allowed) = (self.defect(x), POINT_TOLERANCE * Self::magnitude(x));
         if defect <= allowed { Ok(()) } else { Err(PointError::OffManifold { defect, allowed }) }
     }
 }
 
-/// A start that a user typed in with ten digits is accepted, a mistaken one is not.
+/// A start that a user typed in with ten digits is accepted, a mistaken one is not. Relative to the size of
+/// the point.
 const POINT_TOLERANCE: f64 = 1e-10;
 
 /// A point that is not on the manifold.

@@ -171,6 +171,11 @@ impl<A: Manifold + Times<B>, B: Manifold> Manifold for Product<A, B> {
         A::magnitude(a).hypot(B::magnitude(b))
     }
 
+    #[inline]
+    fn scales((a, b): &Self::Point<f64>) -> Vector<Self> {
+        Self::join(&A::scales(a), &B::scales(b))
+    }
+
     fn project(&self, (a, b): &Self::Point<f64>) -> Self::Point<f64> {
         (self.0.project(a), self.1.project(b))
     }

@@ -7,10 +7,12 @@ use metriplectic_manifolds::{Manifold, MetricError, Riemannian};
 
 use super::{Bracket, BracketJet, Site};
 
-/// The tensor `Π(x)` of a matrix field; see [`Poisson::field`](super::Poisson::field).
+/// The tensor `Π(x)` of a matrix field; see [`Poisson::field`](super::Poisson::field) and
+/// [`AlmostPoisson::field`](super::AlmostPoisson::field).
 #[derive(Clone, Copy)]
 pub struct FieldPoisson<F> {
     field: F,
+    poisson: bool,
 }
 
 impl<F> fmt::Debug for FieldPoisson<F> {
@@ -21,7 +23,11 @@ impl<F> fmt::Debug for FieldPoisson<F> {
 
 impl<F> FieldPoisson<F> {
     pub(super) const fn new(field: F) -> Self {
-        Self { field }
+        Self { field, poisson: true }
+    }
+
+    pub(super) const fn almost(field: F) -> Self {
+        Self { field, poisson: false }
     }
 }
 
@@ -42,6 +48,10 @@ impl<M: Manifold, G: Riemannian<M>, F: MatrixField<M>> Bracket<M, G> for FieldPo
         let jet = self.field.contravariant_jet(&at.x.point());
         let (value, along_z) = (jet.value * *alpha, along_slopes::<M>(&jet.slopes, alpha));
         Ok(BracketJet { value, along_z, along_s: Matrix::<M>::zeros(), tensor: jet.value })
+    }
+
+    fn is_poisson(&self) -> bool {
+        self.poisson
     }
 }
 

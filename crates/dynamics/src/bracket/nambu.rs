@@ -55,6 +55,10 @@ pub struct Nambu<C = OfEntropy, L = f64> {
     casimirs: C,
 }
 
+/// The empty list of Casimirs, that of an area form.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct NoCasimir;
+
 /// The Casimir that is the entropy of the system.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct OfEntropy;
@@ -68,11 +72,11 @@ pub struct OfEntropy;
 /// which on the round sphere is `x' = x × dH` (Marsden and Ratiu 1999, §2). It is nondegenerate: only
 /// constants are Casimirs, so an entropy on a surface needs a bracket of [`Zero`],
 /// [`SecondLaw::Published`](crate::SecondLaw::Published), or a factor of its own.
-pub type AreaForm = Nambu<()>;
+pub type AreaForm = Nambu<NoCasimir>;
 
 /// The value of the type [`AreaForm`](type@AreaForm).
 #[expect(non_upper_case_globals, reason = "it reads as the value of a unit struct does")]
-pub const AreaForm: AreaForm = Nambu { factor: 1.0, casimirs: () };
+pub const AreaForm: AreaForm = Nambu { factor: 1.0, casimirs: NoCasimir };
 
 impl Default for Nambu {
     fn default() -> Self {
@@ -80,10 +84,10 @@ impl Default for Nambu {
     }
 }
 
-impl<F> Nambu<((), F)> {
+impl<F> Nambu<(NoCasimir, F)> {
     /// The bracket on a 3-manifold with the Casimir `c`, which need not be an entropy.
     pub const fn of(c: F) -> Self {
-        Self { factor: 1.0, casimirs: ((), c) }
+        Self { factor: 1.0, casimirs: (NoCasimir, c) }
     }
 }
 
@@ -109,8 +113,10 @@ impl<C, L> fmt::Debug for Nambu<C, L> {
 
 /// A list of the `N − 2` Casimirs of a [`Nambu`] bracket on an `N`-manifold.
 #[diagnostic::on_unimplemented(
-    message = "`{Self}` are not the {N} − 2 Casimirs that a Nambu bracket needs on a manifold of dimension {N}",
-    note = "`AreaForm` has none; `Nambu::default()` has the entropy, and `Nambu::of(c)` a function of your own; `.and(c)` adds one"
+    message = "a bracket with the Casimirs `{Self}` does not fit a manifold of dimension {N}, where it needs {N} − 2 of them",
+    label = "a bracket for another dimension",
+    note = "`AreaForm` has none and is for surfaces, dimension 2",
+    note = "`Nambu::default()` has the entropy and `Nambu::of(c)` a function of your own, for dimension 3; each `.and(c)` adds a function and a dimension"
 )]
 pub trait Casimirs<M: Space, const N: usize> {
     /// Whether the entropy is the first of them.
@@ -132,7 +138,7 @@ pub trait Casimirs<M: Space, const N: usize> {
 /// Covectors, one after another.
 pub type Rows<M, D = f64> = <<M as Space>::Dim as Dimension>::Array<Vector<M, D>>;
 
-impl<M: Space> Casimirs<M, 2> for () {
+impl<M: Space> Casimirs<M, 2> for NoCasimir {
     const ENTROPY: bool = false;
 
     #[inline]

@@ -41,13 +41,41 @@ where
         let (m, n) = (&at.space.0, &at.space.1);
         let a = self.0.linearise(&Site { space: m, metric: left, x: &x, s: &sx }, &a)?;
         let b = self.1.linearise(&Site { space: n, metric: right, x: &y, s: &sy }, &b)?;
-        let block = |a: &Matrix<A>, b: &Matrix<B>| Product::<A, B>::block(a, b);
-        Ok(BracketJet {
-            value: Product::<A, B>::join(&a.value, &b.value),
-            along_z: block(&a.along_z, &b.along_z),
-            along_s: block(&a.along_s, &b.along_s),
-            tensor: block(&a.tensor, &b.tensor),
-        })
+        Ok(joined(&a, &b))
+    }
+
+    fn is_poisson(&self) -> bool {
+        Bracket::<A, G::Left>::is_poisson(&self.0) && Bracket::<B, G::Right>::is_poisson(&self.1)
+    }
+
+    fn is_forced(&self) -> bool {
+        Bracket::<A, G::Left>::is_forced(&self.0) || Bracket::<B, G::Right>::is_forced(&self.1)
+    }
+
+    fn force<D: Scalar>(
+        &self,
+        at: &Site<'_, Product<A, B>, G, D>,
+        w: &Vector<Product<A, B>, D>,
+    ) -> Result<Vector<Product<A, B>, D>, MetricError> {
+        let ((x, y), (sx, sy)) = (Product::parts(at.x), Product::<A, B>::split(at.s));
+        let ((left, right), (a, b)) = (at.metric.halves(), Product::<A, B>::split(w));
+        let (m, n) = (&at.space.0, &at.space.1);
+        let a = self.0.force(&Site { space: m, metric: left, x: &x, s: &sx }, &a)?;
+        let b = self.1.force(&Site { space: n, metric: right, x: &y, s: &sy }, &b)?;
+        Ok(Product::<A, B>::join(&a, &b))
+    }
+
+    fn linearise_force(
+        &self,
+        at: &Site<'_, Product<A, B>, G>,
+        w: &Vector<Product<A, B>>,
+    ) -> Result<BracketJet<Product<A, B>>, MetricError> {
+        let ((x, y), (sx, sy)) = (Product::parts(at.x), Product::<A, B>::split(at.s));
+        let ((left, right), (a, b)) = (at.metric.halves(), Product::<A, B>::split(w));
+        let (m, n) = (&at.space.0, &at.space.1);
+        let a = self.0.linearise_force(&Site { space: m, metric: left, x: &x, s: &sx }, &a)?;
+        let b = self.1.linearise_force(&Site { space: n, metric: right, x: &y, s: &sy }, &b)?;
+        Ok(joined(&a, &b))
     }
 
     fn is_zero(&self) -> bool {
@@ -57,6 +85,20 @@ where
     fn kills_its_entropy(&self) -> bool {
         Bracket::<A, G::Left>::kills_its_entropy(&self.0)
             && Bracket::<B, G::Right>::kills_its_entropy(&self.1)
+    }
+}
+
+/// The jet of a pair, block by block.
+fn joined<A: Manifold + Times<B>, B: Manifold>(
+    a: &BracketJet<A>,
+    b: &BracketJet<B>,
+) -> BracketJet<Product<A, B>> {
+    let block = |a: &Matrix<A>, b: &Matrix<B>| Product::<A, B>::block(a, b);
+    BracketJet {
+        value: Product::<A, B>::join(&a.value, &b.value),
+        along_z: block(&a.along_z, &b.along_z),
+        along_s: block(&a.along_s, &b.along_s),
+        tensor: block(&a.tensor, &b.tensor),
     }
 }
 

@@ -5,7 +5,7 @@ use metriplectic_manifolds::rotations::dexp_inverse;
 use metriplectic_manifolds::{
     Chart, Euclidean, MetricError, Product, Riemannian, Rotations, Sphere, Times,
 };
-use nalgebra::{SVector, Vector3, Vector6};
+use nalgebra::{Const, SVector, Vector3, Vector6};
 
 use super::{Bracket, Site};
 
@@ -26,16 +26,36 @@ use super::{Bracket, Site};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Symplectic;
 
+/// A dimension in which every position has its momentum: 2, 4, …, 128.
+#[diagnostic::on_unimplemented(
+    message = "`Symplectic` needs a momentum for every position, an even dimension up to 128, and this is `{Self}`",
+    label = "this space has another dimension",
+    note = "a constant bracket with further variables, such as `s` in `(q, p, s)`, is `Poisson::constant(matrix)?`"
+)]
+pub trait EvenDimension {}
+
+macro_rules! even {
+    ($($n:literal)+) => {$(
+        #[diagnostic::do_not_recommend]
+        impl EvenDimension for Const<$n> {}
+    )+};
+}
+even!(2 4 6 8 10 12 14 16 18 20 22 24 26 28 30 32 34 36 38 40 42 44 46 48 50 52 54 56 58 60 62 64);
+even!(66 68 70 72 74 76 78 80 82 84 86 88 90 92 94 96 98 100 102 104 106 108 110 112 114 116 118);
+even!(120 122 124 126 128);
+
 /// Positions and momenta in one column.
 macro_rules! on_a_column {
     ($($space:ident),+) => {$(
-        impl<const N: usize, G: Riemannian<$space<N>>> Bracket<$space<N>, G> for Symplectic {
+        impl<const N: usize, G: Riemannian<$space<N>>> Bracket<$space<N>, G> for Symplectic
+        where
+            Const<N>: EvenDimension,
+        {
             fn apply<D: Scalar>(
                 &self,
                 _: &Site<'_, $space<N>, G, D>,
                 alpha: &SVector<D, N>,
             ) -> Result<SVector<D, N>, MetricError> {
-                const { assert!(N.is_multiple_of(2), "positions and momenta come in pairs: R²ⁿ") }
                 let n = N / 2;
                 Ok(SVector::from_index(|i| if i < n { alpha[i + n] } else { -alpha[i - n] }))
             }

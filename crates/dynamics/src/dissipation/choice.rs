@@ -3,27 +3,38 @@
 use super::{MetricDissipation, NoDissipation};
 
 /// What a [`SystemBuilder`](crate::SystemBuilder) holds for a dissipation: none yet, that of the
-/// metric since there is an entropy, or one that was [`Given`] and stays.
+/// metric since there is an entropy, none since there is a force, or one that was [`Given`] and stays.
 pub trait Choice {
     /// The dissipation that the system will have.
     type Dissipation;
     /// The choice once there is an entropy.
     type WithEntropy;
 
+    /// The choice once there is a force, which produces the entropy in place of the metric.
+    type WithForce;
+
     /// The choice once there is an entropy.
     fn with_entropy(self) -> Self::WithEntropy;
+
+    /// The choice once there is a force.
+    fn with_force(self) -> Self::WithForce;
 
     /// The dissipation that the system will have.
     fn chosen(self) -> Self::Dissipation;
 }
 
-/// A dissipation that was given, whatever is said of the entropy before or after.
+/// A dissipation that was given, whatever is said of an entropy or a force before or after.
 #[derive(Clone, Copy, Debug)]
 pub struct Given<K>(pub(crate) K);
 
 impl Choice for NoDissipation {
     type Dissipation = Self;
     type WithEntropy = MetricDissipation;
+    type WithForce = Given<Self>;
+
+    fn with_force(self) -> Given<Self> {
+        Given(self)
+    }
 
     fn with_entropy(self) -> MetricDissipation {
         MetricDissipation
@@ -37,6 +48,11 @@ impl Choice for NoDissipation {
 impl Choice for MetricDissipation {
     type Dissipation = Self;
     type WithEntropy = Self;
+    type WithForce = Given<NoDissipation>;
+
+    fn with_force(self) -> Given<NoDissipation> {
+        Given(NoDissipation)
+    }
 
     fn with_entropy(self) -> Self {
         self
@@ -50,6 +66,11 @@ impl Choice for MetricDissipation {
 impl<K> Choice for Given<K> {
     type Dissipation = K;
     type WithEntropy = Self;
+    type WithForce = Self;
+
+    fn with_force(self) -> Self {
+        self
+    }
 
     fn with_entropy(self) -> Self {
         self

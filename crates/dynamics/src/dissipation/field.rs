@@ -19,7 +19,7 @@ use super::{Dissipation, DissipationJet};
 /// `w` is `dH` in the equations of motion and a discrete gradient of `H` in a step, so the closure
 /// builds `K` from the `w` that it is given and never from its own `dH(x)`. That `K` is symmetric and
 /// positive semidefinite and that `K(x, w) w = 0` is checked at sampled points, for `dH` and for
-/// covectors near it. A matrix that knows nothing of `w` is a
+/// discrete gradients of `H`. A matrix that knows nothing of `w` is a
 /// [`ProjectedDissipation`](super::ProjectedDissipation).
 ///
 /// `w` and `K` are written in the terms dual to the

@@ -3,7 +3,7 @@
 use std::borrow::Borrow;
 
 use metriplectic_fields::{
-    Column, Dimension, Matrix, Real, ScalarField, Space, Square, Vector, along_slopes,
+    Column, Dimension, Matrix, Real, ScalarField, Space, Square, Vector, along_slopes, power_of_two,
 };
 use metriplectic_manifolds::{ArcJet, InnerProduct, Manifold, Nodes};
 
@@ -28,6 +28,8 @@ pub struct Chord<M: Space> {
     mean: Vector<M>,
     /// The defect `F(x') − F(x) − ⟨w̄, d⟩`.
     defect: f64,
+    /// The sum `Σ_i |w̄_i d_i|` of the absolute terms of the slope.
+    change: f64,
     /// The size of a rounding error in a difference of two values of `F`.
     rounding: f64,
     /// The part of it that is left in the defect.
@@ -39,21 +41,19 @@ pub struct Chord<M: Space> {
 pub struct Segment<'a, M: Space> {
     /// The displacement `d` at the base point.
     pub d: &'a Vector<M>,
-    /// Its length in components.
-    pub length: f64,
-    /// The size of the entries of the end `x'`.
-    pub size: f64,
+    /// The sizes of the entries of the end `x'`, one for each component ([`Manifold::scales`]).
+    pub scales: Vector<M>,
 }
 
 impl<'a, M: Manifold> Segment<'a, M> {
     /// That of an arc with the displacement `d` and the end `x'`.
     #[inline]
     pub fn new(d: &'a Vector<M>, end: &M::Point<f64>) -> Self {
-        Self { d, length: d.magnitude(), size: M::magnitude(end) }
+        Self { d, scales: M::scales(end) }
     }
 }
 
-/// The share of `|F| + |dF||x|` by which a step changes `F`, at which a difference of two values of
+/// The share of `|F| + Σ_i |∂_iF x_i|` by which a step changes `F`, at which a difference of two values of
 /// `F` starts to be trusted; from four times that share on it is trusted alone.
 const SHORT: f64 = 1e-3;
 
@@ -89,25 +89,28 @@ impl<M: Manifold> Chord<M> {
     pub fn new<N: Borrow<Nodes<M>>>(
         f: &impl ScalarField<M>,
         mean: &Vector<M>,
-        &Segment { d, length, size }: &Segment<'_, M>,
+        Segment { d, scales }: &Segment<'_, M>,
         [start, end]: [f64; 2],
         base: impl FnOnce() -> f64,
         nodes: impl FnOnce() -> N,
     ) -> Self {
         let slope = mean.dot(d);
-        let steepness = mean.magnitude();
-        let size = start.abs() + end.abs() + size * steepness;
+        let (mut change, mut size) = (0.0, start.abs() + end.abs());
+        for i in 0..M::Dim::LEN {
+            change += (mean[i] * d[i]).abs();
+            size += mean[i].abs() * scales[i];
+        }
         let rounding = f64::EPSILON * size;
         let difference = (end - start) - slope;
         // Far from round-off, and most often, the difference is all.
-        let share = short(steepness * length, size);
+        let share = short(change, size);
         let (mut defect, mut noise) = (difference, rounding);
         if share > 0.0 {
             let (better, weight) = safer(f, nodes().borrow(), (base, slope), rounding);
             defect += share * weight * (better - difference);
             noise *= 1.0 - share * weight;
         }
-        Self { mean: *mean, defect, rounding, noise }
+        Self { mean: *mean, defect, change, rounding, noise }
     }
 
     /// The covector `w` with `⟨w, d⟩ = F(x') − F(x) + recall`.
@@ -121,18 +124,23 @@ impl<M: Manifold> Chord<M> {
         d: &Vector<M>,
     ) -> Vector<M> {
         let flat = g.flat(d);
-        self.mean + flat * self.correction(recall, flat.dot(d))
+        let square = flat.dot(d);
+        if square < SQUARE {
+            return self.mean + along_short(self.defect + recall, g, d);
+        }
+        self.mean + flat * ((self.defect + recall) / square)
     }
 
-    /// The round-off of the covector on an arc of length `|d|`, beside that of its mean.
+    /// The round-off of each component of the covector, beside that of its mean.
     #[inline]
-    pub fn noise(&self, length: f64) -> f64 {
-        if length > 0.0 { self.noise / length } else { 0.0 }
-    }
-
-    /// The factor of `♭d` in the covector; zero on an arc without length.
-    fn correction(&self, recall: f64, square: f64) -> f64 {
-        if square > 0.0 { (self.defect + recall) / square } else { 0.0 }
+    pub fn noise(&self, g: &impl InnerProduct<Vector<M>>, d: &Vector<M>) -> Vector<M> {
+        let flat = g.flat(d);
+        let square = flat.dot(d);
+        if square < SQUARE {
+            // The defect has underflowed.
+            return along_short(self.noise + f64::EPSILON * f64::MIN_POSITIVE * 16.0, g, d).abs();
+        }
+        flat.abs() * (self.noise / square)
     }
 
     /// The derivative of the covector along the unknown of the arc, from that of its mean and the
@@ -149,17 +157,16 @@ impl<M: Manifold> Chord<M> {
         let mut slope = *dmean;
         let flat = g.flat(&arc.d);
         let square = flat.dot(&arc.d);
-        if square <= 0.0 {
+        if square < SQUARE {
             return slope;
         }
-        let c = self.correction(recall, square);
+        let c = (self.defect + recall) / square;
         // ∂δ = dF(x') ∂x' − ∂⟨w̄, d⟩, a difference of nearly equal rows, which counts only as far
         // as it is above its own round-off.
         let rows = arc.dend.transpose_times(df_end)
             - arc.dd.transpose_times(&self.mean)
             - slope.transpose_times(&arc.d);
-        let signal = self.mean.magnitude() * arc.d.magnitude();
-        let noise = 1e3 * self.rounding / signal.max(f64::MIN_POSITIVE);
+        let noise = 1e3 * self.rounding / self.change.max(f64::MIN_POSITIVE);
         let trust = (1.0 + noise.powi(2)).recip();
         let mut along = rows * trust - arc.dd.transpose_times(&flat) * (2.0 * c);
         if let Some(slopes) = slopes {
@@ -171,6 +178,19 @@ impl<M: Manifold> Chord<M> {
         slope += Matrix::<M>::outer(&flat, &(along * square.recip()));
         slope + Matrix::<M>::from_columns(|k| g.flat(&arc.dd.column_at(k))) * c
     }
+}
+
+/// The squared length below which an arc is measured in units of its own.
+const SQUARE: f64 = 1e-280;
+
+/// `♭d defect/G(d, d)` on an arc so short that its squared length leaves the range of numbers, in units of
+/// a power of two near that length; zero on an arc without length.
+#[cold]
+fn along_short<V: Column<f64>>(defect: f64, g: &impl InnerProduct<V>, d: &V) -> V {
+    let unit = power_of_two(d.magnitude());
+    let flat = g.flat(&V::from_index(|i| d[i] / unit));
+    let square = flat.dot(d) / unit;
+    if square > 0.0 { flat * (defect / unit / square) } else { V::zero() }
 }
 
 /// The derivatives of a metric along the chart.

@@ -1,0 +1,277 @@
+//! How a model breaks its laws, with the numbers.
+
+use std::fmt;
+
+use metriplectic_manifolds::{MetricError, PointError};
+
+/// A model that breaks one of its laws. `size` is relative to the terms that should cancel.
+#[derive(Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ModelError {
+    /// The start is not a point of the manifold.
+    #[error("the start: {0}")]
+    Start(#[from] PointError),
+    /// A value at the start is not a finite number.
+    #[error("the {field} is {value} at {point:?}; start where the model is defined")]
+    ValueNotFinite {
+        /// Which part of the model.
+        field: &'static str,
+        /// Its value there.
+        value: f64,
+        /// The entries of the point.
+        point: Vec<f64>,
+    },
+    /// A value is finite, but a derivative is not.
+    #[error(
+        "the {field} has a finite value but a derivative that is not finite at {point:?}; a square \
+         root or a norm at zero does this: write `norm_squared()`, or keep the start away from it"
+    )]
+    DerivativeNotFinite {
+        /// Which part of the model.
+        field: &'static str,
+        /// The entries of the point.
+        point: Vec<f64>,
+    },
+    /// A derivative is not that of the values.
+    #[error(
+        "the {field} has the derivative {derivative:.6e} along direction {axis} of the chart at {point:?}, \
+         but its values change at the rate {quotient:.6e}: the closure loses a derivative, as `x.re` and \
+         `Real::from(f64)` do; compute with `Real` from the arguments to the result, and use `.re` only to \
+         choose a branch"
+    )]
+    WrongDerivative {
+        /// Which part of the model.
+        field: &'static str,
+        /// The direction of the chart, counted from 0: the entry, on a vector space.
+        axis: usize,
+        /// The entries of the point.
+        point: Vec<f64>,
+        /// The derivative by dual numbers.
+        derivative: f64,
+        /// The difference quotient of the values.
+        quotient: f64,
+    },
+    /// The model has values at too few points around the start.
+    #[error(
+        "the model was judged at {judged} of {wanted} points around {point:?}, because it has no values at \
+         the others, however near they are; start inside its domain"
+    )]
+    TooFewPoints {
+        /// Points at which every part of the model has a value.
+        judged: usize,
+        /// Points asked for, with the start.
+        wanted: usize,
+        /// The entries of the start.
+        point: Vec<f64>,
+    },
+    /// The values are finite, but products of them overflow.
+    #[error(
+        "the terms of the law {law} overflow at {point:?}: products of the values are beyond 10³⁰⁸; write \
+         the model in larger units"
+    )]
+    Overflow {
+        /// The law whose terms are too large.
+        law: &'static str,
+        /// The entries of the point.
+        point: Vec<f64>,
+    },
+    /// `⟨w, f⟩ ≠ 0` for `dH` or a covector near it.
+    #[error(
+        "the force does work at {point:?}: ⟨w, force⟩ is {size:.1e} of its terms for w = dH or a covector \
+         near it; build the force so that the covector it is given annihilates it"
+    )]
+    ForceDoesWork {
+        /// The entries of the point.
+        point: Vec<f64>,
+        /// The relative size of the violation.
+        size: f64,
+    },
+    /// A force under which the entropy falls.
+    #[error(
+        "the force destroys entropy at {point:?}, or on a step from there: ⟨dS, force⟩ is negative by \
+         {size:.1e} of its terms; ask for `SecondLaw::Published`, which does not promise the second law, or \
+         leave the entropy out"
+    )]
+    ForceDestroysEntropy {
+        /// The entries of the point.
+        point: Vec<f64>,
+        /// The relative size of the violation.
+        size: f64,
+    },
+    /// A force changes a further invariant.
+    #[error(
+        "the force changes an invariant at {point:?}: ⟨dL, force⟩ is {size:.1e} of its terms; leave the \
+         invariant out of the list"
+    )]
+    ForceChangesInvariant {
+        /// The entries of the point.
+        point: Vec<f64>,
+        /// The relative size of the violation.
+        size: f64,
+    },
+    /// The metric cannot be used.
+    #[error("at {point:?}: {source}")]
+    Metric {
+        /// What is wrong with it.
+        source: MetricError,
+        /// The entries of the point.
+        point: Vec<f64>,
+    },
+    /// `Π` is not skew.
+    #[error(
+        "the bracket is not skew at {point:?}: Π + Πᵀ is {size:.1e} of its entries; energy would not be kept"
+    )]
+    BracketNotSkew {
+        /// The entries of the point.
+        point: Vec<f64>,
+        /// The relative size of the violation.
+        size: f64,
+    },
+    /// `Π` breaks the Jacobi identity.
+    #[error(
+        "the bracket breaks the Jacobi identity at {point:?} by {size:.1e} of its terms; a skew tensor that \
+         need not be Poisson, as in a nonholonomic system, is `AlmostPoisson::field(..)`"
+    )]
+    NoJacobiIdentity {
+        /// The entries of the point.
+        point: Vec<f64>,
+        /// The relative size of the violation.
+        size: f64,
+    },
+    /// `Π dS ≠ 0`.
+    #[error(
+        "the entropy is not a Casimir of the bracket at {point:?}: Π dS is {size:.1e} of its terms; \
+         use a Casimir, give S a factor of its own, or ask for `SecondLaw::Published`"
+    )]
+    EntropyNotCasimir {
+        /// The entries of the point.
+        point: Vec<f64>,
+        /// The relative size of the violation.
+        size: f64,
+    },
+    /// A function listed as a Casimir is none.
+    #[error(
+        "an invariant listed as a Casimir is not one at {point:?}: Π dC is {size:.1e} of its terms; if it \
+         is conserved because the energy is symmetric, list it by `.momentum(..)`"
+    )]
+    NotCasimir {
+        /// The entries of the point.
+        point: Vec<f64>,
+        /// The relative size of the violation.
+        size: f64,
+    },
+    /// A function listed as a momentum is not conserved.
+    #[error(
+        "an invariant listed as a momentum is not conserved at {point:?}: ⟨dJ, Π dH⟩ is {size:.1e} of \
+         its terms"
+    )]
+    NotMomentum {
+        /// The entries of the point.
+        point: Vec<f64>,
+        /// The relative size of the violation.
+        size: f64,
+    },
+    /// The dissipation changes a further invariant.
+    #[error(
+        "the dissipation changes an invariant at {point:?}: K dL is {size:.1e} of its terms; use a \
+         dissipation that kills it, or that of the metric, which is projected"
+    )]
+    InvariantNotKept {
+        /// The entries of the point.
+        point: Vec<f64>,
+        /// The relative size of the violation.
+        size: f64,
+    },
+    /// A further invariant is a function of the other fields.
+    #[error(
+        "invariant {index} depends on the other fields around the start: only {share:.1e} of its \
+         differential is independent of theirs; leave it out of the list"
+    )]
+    DependentInvariant {
+        /// Which one, in the order of the list, counted from 0.
+        index: usize,
+        /// The share of its differential that is independent.
+        share: f64,
+    },
+    /// An action changes the energy.
+    #[error(
+        "the action is no symmetry of the energy at {point:?}: it changes by {size:.1e} of itself"
+    )]
+    EnergyNotSymmetric {
+        /// The entries of the point.
+        point: Vec<f64>,
+        /// The relative size of the violation.
+        size: f64,
+    },
+    /// An action changes the bracket.
+    #[error(
+        "the action does not preserve the bracket at {point:?}: it changes Π by {size:.1e} of it, so \
+         it is no Poisson map"
+    )]
+    ActionNotPoisson {
+        /// The entries of the point.
+        point: Vec<f64>,
+        /// The relative size of the violation.
+        size: f64,
+    },
+    /// An action and its momentum map do not belong together.
+    #[error(
+        "the action does not belong to its momentum map at {point:?}: dΦ_t/dt at t = 0 and Π dJ \
+         differ by {size:.1e} of their size; check the sign, and that Φ_0(x) = x"
+    )]
+    ActionNotOfMomentum {
+        /// The entries of the point.
+        point: Vec<f64>,
+        /// The relative size of the violation.
+        size: f64,
+    },
+    /// `K` is not symmetric.
+    #[error("the dissipation is not symmetric at {point:?}: K − Kᵀ is {size:.1e} of K")]
+    DissipationNotSymmetric {
+        /// The entries of the point.
+        point: Vec<f64>,
+        /// The relative size of the violation.
+        size: f64,
+    },
+    /// `K` is not positive semidefinite.
+    #[error(
+        "the dissipation destroys entropy at {point:?}: scaled to a diagonal of ones, K has the pivot \
+         −{size:.1e}; a semidefinite K has K_ii ≥ 0 and K_ij² ≤ K_ii K_jj"
+    )]
+    DissipationNotPositive {
+        /// The entries of the point.
+        point: Vec<f64>,
+        /// The relative size of the violation.
+        size: f64,
+    },
+    /// `K dH ≠ 0`.
+    #[error(
+        "the dissipation does not keep the energy at {point:?}: K dH is {size:.1e} of its terms; build \
+         K from the covector w that it is told to kill, or ask for `ProjectedDissipation`"
+    )]
+    EnergyNotKept {
+        /// The entries of the point.
+        point: Vec<f64>,
+        /// The relative size of the violation.
+        size: f64,
+    },
+    /// `K_w w ≠ 0` for a discrete gradient `w` of the energy.
+    #[error(
+        "the dissipation annihilates dH at {point:?}, but not the discrete gradient w of the energy that a \
+         step gives it in the place of dH: K_w w is {size:.1e} of its terms; build K from w and not from \
+         dH(x), or ask for `ProjectedDissipation`"
+    )]
+    CovectorNotKilled {
+        /// The entries of the point.
+        point: Vec<f64>,
+        /// The relative size of the violation.
+        size: f64,
+    },
+}
+
+/// The sentence of the `Display` form, which is what a `main` that returns the error prints.
+impl fmt::Debug for ModelError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        fmt::Display::fmt(self, f)
+    }
+}

@@ -1,0 +1,206 @@
+//! Sums that should vanish, relative to the terms that should cancel in them.
+//!
+//! The entries of a state have units of their own, so no norm of a vector means anything here. A sum
+//! `Σ_j A_ij w_j` is compared with `Σ_j |A_ij||w_j|`, row by row, in which every term has one unit.
+
+use metriplectic_fields::{Column, Dimension, Matrix, Space, Square, Vector};
+
+/// The violation of a law that is taken for round-off, relative to the terms that cancel. Models
+/// are written with transcendental functions of their own, so this is far above `ε` and far below
+/// any mistake.
+pub(crate) const TOLERANCE: f64 = 1e-10;
+
+/// The weight of the largest terms of all rows in the size of one: a row of which nothing is left but the
+/// rounding of other rows, a few `ε` of them, satisfies its law.
+pub(crate) const ROUNDING: f64 = 16.0 * f64::EPSILON / TOLERANCE;
+
+/// A sum that should vanish, and the sum of the absolute values of its terms.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Balance {
+    sum: f64,
+    terms: f64,
+}
+
+impl Balance {
+    /// Adds a term.
+    pub(crate) fn add(&mut self, term: f64) {
+        self.sum += term;
+        self.terms += term.abs();
+    }
+
+    /// The sum.
+    pub(crate) const fn sum(&self) -> f64 {
+        self.sum
+    }
+
+    /// The sum of the absolute values.
+    pub(crate) const fn terms(&self) -> f64 {
+        self.terms
+    }
+
+    /// The sum with its terms and a size beside them.
+    pub(crate) fn beside(self, size: f64) -> Violation {
+        Violation { size: self.sum.abs(), terms: self.terms + size }
+    }
+
+    /// The sum relative to its terms, where rounding may be `ε` of the `largest` terms elsewhere.
+    pub(crate) fn relative(self, largest: f64) -> f64 {
+        self.beside(ROUNDING * largest).relative()
+    }
+}
+
+/// The size of what should vanish, and of the terms that should cancel in it.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Violation {
+    pub(crate) size: f64,
+    pub(crate) terms: f64,
+}
+
+impl Violation {
+    /// The one relative to the other, where a law about nothing holds.
+    pub(crate) fn relative(&self) -> f64 {
+        if self.size == 0.0 { 0.0 } else { self.size / self.terms }
+    }
+
+    /// The one that is larger relative to its terms.
+    pub(crate) fn or_worse(self, other: Self) -> Self {
+        let (old, new) = (self.relative(), other.relative());
+        if new > old || new.is_nan() { other } else { self }
+    }
+}
+
+impl Extend<f64> for Balance {
+    fn extend<I: IntoIterator<Item = f64>>(&mut self, terms: I) {
+        terms.into_iter().for_each(|term| self.add(term));
+    }
+}
+
+impl FromIterator<f64> for Balance {
+    fn from_iter<I: IntoIterator<Item = f64>>(terms: I) -> Self {
+        let mut balance = Self::default();
+        balance.extend(terms);
+        balance
+    }
+}
+
+/// The larger of two sizes; a size that is not a number is the largest.
+pub(crate) fn worse(old: f64, new: f64) -> f64 {
+    if new > old || new.is_nan() { new } else { old }
+}
+
+/// The largest relative size of a row of `A w`, in chart coordinates of the sizes `units`.
+pub(crate) fn product<M: Space>(a: &Matrix<M>, w: &Vector<M>, units: &Vector<M>) -> f64 {
+    let n = M::Dim::LEN;
+    let rates = Matrix::<M>::from_entries(|i, j| (a[(i, j)] * w[j] / units[i]).abs());
+    let largest = largest_in_blocks::<M>(a, &rates);
+    let row = |i| (0..n).map(|j| a[(i, j)] * w[j]).collect::<Balance>();
+    (0..n).map(|i| row(i).relative(units[i] * largest[i])).fold(0.0, worse)
+}
+
+/// For each index the largest size of an entry in its block: the rows and columns that entries of `a` which
+/// are not zero connect it with. Rounding comes from nowhere else.
+fn largest_in_blocks<M: Space>(a: &Matrix<M>, sizes: &Matrix<M>) -> Vec<f64> {
+    let n = M::Dim::LEN;
+    let mut block: Vec<usize> = (0..n).collect();
+    for (i, j) in pairs(n).filter(|&ij| a[ij] != 0.0) {
+        let (kept, joined) = (block[i], block[j]);
+        block.iter_mut().filter(|b| **b == joined).for_each(|b| *b = kept);
+    }
+    let mut largest = vec![0.0; n];
+    for (i, j) in pairs(n) {
+        largest[block[i]] = worse(largest[block[i]], sizes[(i, j)]);
+    }
+    block.into_iter().map(|b| largest[b]).collect()
+}
+
+/// The relative size of the number `⟨α, A β⟩`.
+pub(crate) fn form<M: Space>(
+    a: &Matrix<M>,
+    (alpha, beta): (&Vector<M>, &Vector<M>),
+    units: &Vector<M>,
+) -> f64 {
+    let n = M::Dim::LEN;
+    let rate = pairs(n).map(|(i, j)| (a[(i, j)] * beta[j] / units[i]).abs()).fold(0.0, f64::max);
+    let size = (0..n).map(|i| (alpha[i] * units[i]).abs()).fold(0.0, f64::max);
+    let terms = pairs(n).map(|(i, j)| alpha[i] * a[(i, j)] * beta[j]);
+    terms.collect::<Balance>().relative(size * rate)
+}
+
+/// The relative size of the number `⟨α, v⟩`.
+pub(crate) fn pairing<M: Space>(alpha: &Vector<M>, v: &Vector<M>, units: &Vector<M>) -> f64 {
+    let n = M::Dim::LEN;
+    let rate = (0..n).map(|i| (v[i] / units[i]).abs()).fold(0.0, f64::max);
+    let size = (0..n).map(|i| (alpha[i] * units[i]).abs()).fold(0.0, f64::max);
+    (0..n).map(|i| alpha[i] * v[i]).collect::<Balance>().relative(size * rate)
+}
+
+/// The sizes of the entries of a tensor on covectors in the given units.
+fn scaled<M: Space>(a: &Matrix<M>, units: &Vector<M>) -> Matrix<M> {
+    Matrix::<M>::from_entries(|i, j| (a[(i, j)] / units[i] / units[j]).abs())
+}
+
+/// The largest entry of a tensor on covectors in the given units.
+pub(crate) fn largest<M: Space>(a: &Matrix<M>, units: &Vector<M>) -> f64 {
+    let sizes = scaled::<M>(a, units);
+    pairs(M::Dim::LEN).map(|ij| sizes[ij]).fold(0.0, worse)
+}
+
+/// The largest relative difference of an entry of a tensor from the transposed one times the `sign`. Beside
+/// the two entries, `√(A_ii A_jj)` and the `rounding` of the largest entry are what they are relative to.
+pub(crate) fn asymmetry<M: Space>(
+    a: &Matrix<M>,
+    sign: f64,
+    units: &Vector<M>,
+    rounding: f64,
+) -> Violation {
+    let top = largest_in_blocks::<M>(a, &scaled::<M>(a, units));
+    let root = |i: usize| if sign > 0.0 { a[(i, i)].abs().sqrt() } else { 0.0 };
+    let off = |(i, j): (usize, usize)| {
+        let balance: Balance = [a[(i, j)], -sign * a[(j, i)]].into_iter().collect();
+        let size = rounding * top[i] * units[i] * units[j];
+        balance.beside(root(i) * root(j) + size)
+    };
+    pairs(M::Dim::LEN).map(off).fold(Violation::default(), Violation::or_worse)
+}
+
+/// By how much a symmetric tensor on covectors is not positive semidefinite: the most negative pivot of
+/// its `LDLᵀ` decomposition with diagonal pivoting, after a scaling to a diagonal of ones.
+///
+/// The scaling `K_ij / √(K_ii K_jj)` removes all units. Rows that are round-off of others keep
+/// entries below the tolerance.
+pub(crate) fn indefiniteness<M: Space>(k: &Matrix<M>, units: &Vector<M>) -> f64 {
+    let (n, sizes) = (M::Dim::LEN, scaled::<M>(k, units));
+    let top = largest_in_blocks::<M>(k, &sizes);
+    if !top.iter().all(|top| top.is_finite()) {
+        return f64::NAN;
+    }
+    let hat = Matrix::<M>::from_entries(|i, j| {
+        let entry = 0.5 * (k[(i, j)] + k[(j, i)]);
+        if entry == 0.0 { 0.0 } else { entry / units[i] / units[j] / top[i] }
+    });
+    let diagonal = Vector::<M>::from_index(|i| hat[(i, i)].abs() + ROUNDING);
+    let mut a = Matrix::<M>::from_entries(|i, j| hat[(i, j)] / (diagonal[i] * diagonal[j]).sqrt());
+    let mut left: Vec<usize> = (0..n).collect();
+    let mut negative = 0.0_f64;
+    while let Some(&p) = left.iter().max_by(|&&i, &&j| a[(i, i)].total_cmp(&a[(j, j)])) {
+        negative = left.iter().map(|&i| -a[(i, i)]).fold(negative, f64::max);
+        if a[(p, p)] <= TOLERANCE {
+            // |a_ij| ≤ √(a_ii a_jj) in a semidefinite matrix, and the diagonal is zero here.
+            let off = |&i: &usize| left.iter().map(|&j| a[(i, j)].abs()).fold(0.0, f64::max);
+            return left.iter().map(off).fold(negative, f64::max);
+        }
+        left.retain(|&i| i != p);
+        for &i in &left {
+            for &j in &left {
+                let rank_one = a[(i, p)] * a[(p, j)] / a[(p, p)];
+                a[(i, j)] -= rank_one;
+            }
+        }
+    }
+    negative
+}
+
+/// All pairs of indices below `n`.
+pub(crate) fn pairs(n: usize) -> impl Iterator<Item = (usize, usize)> {
+    (0..n).flat_map(move |i| (0..n).map(move |j| (i, j)))
+}

@@ -1,0 +1,196 @@
+//! Derivatives against values.
+//!
+//! A closure can lose a derivative: `x.re` and `Real::from(f64)` are constants to a dual number. Its values
+//! are then right and the motion wrong, so every derivative that a step uses is compared with difference
+//! quotients of the values,
+//!
+//! ```math
+//! D_k = \frac{f(\varphi_x(\delta_k e_i)) - f(\varphi_x(-\delta_k e_i))}{2 \delta_k}, \qquad
+//! \delta_k = 0.45^k\, \ell_i .
+//! ```
+//!
+//! The error of `D_k` falls by five from one `k` to the next until it is rounding, which doubles. Both are
+//! seen in the differences of quotients: `|D_k − D_{k−1}|` bounds the first, and the largest
+//! `δ_k |D_k − D_{k−1}|` at the finest `k` is the rounding `η` of the values, with all that cancels inside
+//! of the field. The derivative is wrong if it differs from the quotient with the smallest bound
+//!
+//! ```math
+//! 8\, |D_k - D_{k-1}| + 8\, \eta / \delta_k + 64\, \varepsilon\, |f| / \delta_k
+//! ```
+//!
+//! by more than this bound. Where it is wide, nothing is decided.
+
+/// The ratio of one `δ` to the next. Not a half: values that are integers times some rounding would then
+/// give the same wrong quotient again and again.
+const RATIO: f64 = 0.45;
+/// The first `δ` that is tried, `3·10⁻⁴ ℓ`: of most fields, nothing else is evaluated.
+const FIRST: i32 = 10;
+/// The coarsest and the finest `δ`, from `4·10⁻³ ℓ` to `3·10⁻⁶ ℓ`.
+const COARSEST: i32 = 7;
+const FINEST: i32 = 16;
+/// The finest `δ` of a field that has no values at coarser ones, or changes too fast for them.
+const LIMIT: i32 = 36;
+/// Quotients that the rounding of the values is read off.
+const NOISY: usize = 5;
+/// A bound is narrow if it is below this fraction of the derivative, or of the values over `ℓ`; to agree
+/// at once, it must be narrower.
+const NARROW: f64 = 1e-2;
+const NARROW_AT_ONCE: f64 = 1e-4;
+const NARROW_BESIDE_VALUES: f64 = 1e-8;
+/// The rounding of a derivative, relative to itself and to the largest one of the other entries.
+#[derive(Clone, Copy)]
+pub(super) struct Rounding {
+    itself: f64,
+    others: f64,
+}
+
+/// That of a closure, evaluated by dual numbers.
+pub(super) const OF_CLOSURES: Rounding = Rounding { itself: 1e-9, others: 64.0 * f64::EPSILON };
+
+/// That of a tensor that solves with a metric, whose condition number it is multiplied by.
+pub(super) const OF_SOLUTIONS: Rounding = Rounding { itself: 1e-6, others: 1e-9 };
+
+/// A derivative that is not that of the values.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Mismatch {
+    /// What the dual numbers say.
+    pub(super) derivative: f64,
+    /// What the values say.
+    pub(super) quotient: f64,
+}
+
+/// The derivatives of the entries of a field along a direction.
+pub(super) struct Derivatives {
+    /// The size of the coordinate along which they are taken.
+    pub(super) scale: f64,
+    /// The derivatives.
+    pub(super) df: Vec<f64>,
+    /// The units of the entries.
+    pub(super) units: Vec<f64>,
+    pub(super) rounding: Rounding,
+}
+
+/// No quotient has a narrow bound.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Undecided;
+
+/// A difference quotient of one entry.
+#[derive(Clone, Copy)]
+struct Quotient {
+    delta: f64,
+    slope: f64,
+    /// The size of the values.
+    size: f64,
+}
+
+impl Quotient {
+    /// That of two values; `None` if it is not finite.
+    fn of(delta: f64, right: f64, left: f64) -> Option<Self> {
+        let slope = (right - left) / (2.0 * delta);
+        let size = right.abs().max(left.abs());
+        slope.is_finite().then_some(Self { delta, slope, size })
+    }
+}
+
+impl Derivatives {
+    /// Compares them with the values of the entries: `f(t, values)` appends those at the distance `t` along
+    /// the direction, which there may be none of.
+    pub(super) fn compare(&self, f: impl Fn(f64, &mut Vec<f64>) -> Option<()>) -> Option<Mismatch> {
+        let at = |k| self.quotients(k, &f);
+        if self.agree_at_once(&f).is_some() {
+            return None;
+        }
+        let mut levels: Vec<_> = (COARSEST..=FINEST).filter_map(at).collect();
+        let compared = |levels: &[Vec<Quotient>]| -> Vec<_> {
+            (0..self.df.len()).map(|i| self.mismatch(i, levels)).collect()
+        };
+        let agrees = |found: &Result<Option<Mismatch>, Undecided>| *found == Ok(None);
+        if levels.len() < NOISY || !compared(&levels).iter().all(agrees) {
+            levels.extend((FINEST + 1..=LIMIT).filter_map(at));
+        }
+        compared(&levels).into_iter().find_map(|found| found.ok().flatten())
+    }
+
+    /// The mismatch of the `i`-th entry with the quotient of the smallest bound.
+    fn mismatch(&self, i: usize, levels: &[Vec<Quotient>]) -> Result<Option<Mismatch>, Undecided> {
+        let (quotient, bound) = self.best(i, levels)?;
+        let derivative = self.df[i];
+        let wrong = (quotient - derivative).abs() > bound + self.rounded(i);
+        Ok(wrong.then_some(Mismatch { derivative, quotient }))
+    }
+
+    /// The quotients of all entries at `δ_k`; `None` where a value is not finite.
+    fn quotients(
+        &self,
+        k: i32,
+        f: &impl Fn(f64, &mut Vec<f64>) -> Option<()>,
+    ) -> Option<Vec<Quotient>> {
+        let (delta, n) = (self.scale * RATIO.powi(k), self.df.len());
+        let mut values = Vec::with_capacity(2 * n);
+        f(delta, &mut values)?;
+        f(-delta, &mut values)?;
+        (0..n).map(|i| Quotient::of(delta, values[i], values[i + n])).collect()
+    }
+
+    /// Something if each derivative agrees with a quotient of a narrow bound, without a look at its rounding.
+    fn agree_at_once(&self, f: &impl Fn(f64, &mut Vec<f64>) -> Option<()>) -> Option<()> {
+        let (deltas, n) = ([FIRST - 1, FIRST].map(|k| self.scale * RATIO.powi(k)), self.df.len());
+        let mut values = Vec::with_capacity(4 * n);
+        for delta in deltas {
+            f(delta, &mut values)?;
+            f(-delta, &mut values)?;
+        }
+        for i in 0..n {
+            let coarse = Quotient::of(deltas[0], values[i], values[i + n])?;
+            let fine = Quotient::of(deltas[1], values[i + 2 * n], values[i + 3 * n])?;
+            let bound = 8.0 * (fine.slope - coarse.slope).abs() + self.rounding(i, &fine);
+            let agrees = (fine.slope - self.df[i]).abs() <= bound + self.rounded(i);
+            (agrees && self.is_narrow(i, &fine, bound, NARROW_AT_ONCE)).then_some(())?;
+        }
+        Some(())
+    }
+
+    /// The quotient of the `i`-th entry with the smallest bound, and this bound, if it is narrow. A finer
+    /// quotient that contradicts it is believed instead: at the coarser `δ` the field was not resolved.
+    fn best(&self, i: usize, levels: &[Vec<Quotient>]) -> Result<(f64, f64), Undecided> {
+        // Equal values may be values that rounding cannot tell apart: `1 − cos q` at q = 10⁻⁹.
+        let seen: Vec<_> = levels.iter().map(|level| level[i]).filter(|q| q.slope != 0.0).collect();
+        if seen.is_empty() {
+            return Ok((self.df[i], 0.0));
+        }
+        let change = |pair: &[Quotient]| (pair[1].slope - pair[0].slope).abs();
+        let noise = seen.windows(2).rev().take(NOISY).map(|pair| change(pair) * pair[1].delta);
+        let noise = noise.fold(0.0, f64::max);
+        // Two quotients may agree by chance: no bound is trusted that falls faster than they converge.
+        let (mut error, mut best) = (f64::INFINITY, None);
+        for pair in seen.windows(2) {
+            error = change(pair).max(if error.is_finite() { error / 8.0 } else { 0.0 });
+            let here = pair[1];
+            let bound = 8.0 * (error + noise / here.delta) + self.rounding(i, &here);
+            let better = best.is_none_or(|(slope, smallest): (f64, f64)| {
+                bound < smallest || (here.slope - slope).abs() > bound + smallest
+            });
+            if better && self.is_narrow(i, &here, bound, NARROW) {
+                best = Some((here.slope, bound));
+            }
+        }
+        best.ok_or(Undecided)
+    }
+
+    /// The rounding of a quotient, from that of the values and of the points.
+    fn rounding(&self, i: usize, at: &Quotient) -> f64 {
+        f64::EPSILON * (64.0 * at.size + 4.0 * self.df[i].abs() * self.scale) / at.delta
+    }
+
+    /// The rounding of a derivative.
+    fn rounded(&self, i: usize) -> f64 {
+        let others = self.df.iter().zip(&self.units).map(|(df, unit)| (df / unit).abs());
+        let largest = others.fold(0.0, f64::max) * self.units[i];
+        self.rounding.itself * self.df[i].abs() + self.rounding.others * largest
+    }
+
+    fn is_narrow(&self, i: usize, at: &Quotient, bound: f64, fraction: f64) -> bool {
+        let change = NARROW_BESIDE_VALUES * at.size / self.scale;
+        bound <= fraction * (at.slope.abs() + self.df[i].abs()) + change
+    }
+}

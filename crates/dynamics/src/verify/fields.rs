@@ -1,0 +1,181 @@
+//! The derivatives of every part of a model, compared with its values.
+
+use metriplectic_fields::{
+    ChartPoint, Column, Dimension, Matrix, ScalarField, Space, Square, Vector,
+};
+use metriplectic_manifolds::{Manifold, Riemannian};
+
+use super::balance::pairs;
+use super::derivatives::{Derivatives, Mismatch, OF_CLOSURES, OF_SOLUTIONS};
+use super::{Dim, Place, unusable};
+use crate::invariants::{Invariants, Kind, Visitor};
+use crate::system::Metriplectic;
+use crate::{Bracket, Dissipation, ModelError};
+
+/// Compares the derivatives of the fields, of the metric, and of the bracket along one axis of the chart.
+///
+/// Second derivatives are not compared. They only enter the Jacobian of Newton's method, which solves the
+/// same equation without them, in more iterations or not at all.
+pub(super) fn compare<Y: Metriplectic + ?Sized>(
+    place: &Place<'_, Y>,
+    axis: usize,
+) -> Result<(), ModelError> {
+    let along = Along { place, axis };
+    along.scalar("energy", place.system.energy(), &place.energy.df)?;
+    along.scalar("entropy", place.system.entropy(), &place.entropy.df)?;
+    along.invariants()?;
+    along.metric()?;
+    along.bracket()
+}
+
+/// Compares those of the dissipation, also along the covector that it annihilates. No law is judged by
+/// them, so a law that it breaks by its values is named first.
+pub(super) fn compare_dissipation<Y: Metriplectic + ?Sized>(
+    place: &Place<'_, Y>,
+    axis: usize,
+) -> Result<(), ModelError> {
+    Along { place, axis }.dissipation()
+}
+
+/// One axis of the chart at a point.
+struct Along<'a, 'b, Y: Metriplectic + ?Sized> {
+    place: &'a Place<'b, Y>,
+    axis: usize,
+}
+
+impl<Y: Metriplectic + ?Sized> Along<'_, '_, Y> {
+    /// The point at the distance `t`.
+    fn at(&self, t: f64) -> ChartPoint<Y::Manifold> {
+        let q = Vector::<Y::Manifold>::basis(self.axis) * t;
+        ChartPoint { base: self.place.x.clone(), q }
+    }
+
+    fn compare(
+        &self,
+        field: &'static str,
+        derivatives: &Derivatives,
+        f: impl Fn(f64, &mut Vec<f64>) -> Option<()>,
+    ) -> Result<(), ModelError> {
+        derivatives.compare(f).map_or(Ok(()), |Mismatch { derivative, quotient }| {
+            let (axis, point) = (self.axis, Y::Manifold::entries(self.place.x));
+            Err(ModelError::WrongDerivative { field, axis, point, derivative, quotient })
+        })
+    }
+
+    fn scalar(
+        &self,
+        field: &'static str,
+        f: &impl ScalarField<Y::Manifold>,
+        df: &Vector<Y::Manifold>,
+    ) -> Result<(), ModelError> {
+        let (scale, df) = (self.place.units[self.axis], vec![df[self.axis]]);
+        let value = |t, values: &mut Vec<f64>| {
+            values.push(f.at::<f64>(&self.at(t).point()));
+            Some(())
+        };
+        self.compare(
+            field,
+            &Derivatives { scale, df, units: vec![1.0], rounding: OF_CLOSURES },
+            value,
+        )
+    }
+
+    fn invariants(&self) -> Result<(), ModelError> {
+        let mut compared = Compared { along: self, outcome: Ok(()) };
+        self.place.system.invariants().each(&mut compared);
+        compared.outcome
+    }
+
+    fn metric(&self) -> Result<(), ModelError> {
+        let (metric, n) = (self.place.system.metric(), Dim::<Y>::LEN);
+        let Some(slopes) = metric.slopes(self.place.x) else { return Ok(()) };
+        let value = |t, values: &mut Vec<f64>| {
+            let g: Matrix<Y::Manifold> = metric.matrix(&self.at(t));
+            values.extend(pairs(n).map(|ij| g[ij]));
+            Some(())
+        };
+        let sizes = self.place.units;
+        let df = pairs(n).map(|ij| slopes[self.axis][ij]).collect();
+        let scale = sizes[self.axis];
+        let units = pairs(n).map(|(i, j)| (sizes[i] * sizes[j]).recip()).collect();
+        self.compare("metric", &Derivatives { scale, df, units, rounding: OF_CLOSURES }, value)
+    }
+
+    fn bracket(&self) -> Result<(), ModelError> {
+        let &Place { system, x, units, ref entropy, .. } = self.place;
+        let bracket = system.bracket();
+        if bracket.is_zero() {
+            return Ok(());
+        }
+        let (alpha, centre) = (generic::<Y::Manifold>(units), ChartPoint::centre(x));
+        let jet = bracket.linearise(&system.site(&centre, &entropy.df), &alpha);
+        let slopes = jet.map_err(unusable::<Y::Manifold>(x))?.along_z.column_at(self.axis);
+        let value = |t, values: &mut Vec<f64>| {
+            let at = self.at(t);
+            let column = bracket.apply(&system.site(&at, &entropy.df), &alpha).ok()?;
+            append(values, &column)
+        };
+        let (scale, df, units) = (units[self.axis], components(&slopes), components(units));
+        self.compare("bracket", &Derivatives { scale, df, units, rounding: OF_CLOSURES }, value)
+    }
+
+    fn dissipation(&self) -> Result<(), ModelError> {
+        let &Place { system, x, units, ref energy, .. } = self.place;
+        let (k, metric) = (system.dissipation(), system.metric());
+        if k.is_none() {
+            return Ok(());
+        }
+        let (alpha, w, axis) = (generic::<Y::Manifold>(units), energy.df, self.axis);
+        let jet = k.linearise(metric, x, &w, &alpha).map_err(unusable::<Y::Manifold>(x))?;
+        let (scale, df) = (units[axis], components(&jet.along_z.column_at(axis)));
+        let value = |t, values: &mut Vec<f64>| {
+            append(values, &k.apply(metric, &self.at(t), &w, &alpha).ok()?)
+        };
+        let along_z = Derivatives { scale, df, units: components(units), rounding: OF_SOLUTIONS };
+        self.compare("dissipation", &along_z, value)?;
+
+        // A component of dH has the size of the largest energy of all of them, unless it has its own.
+        let largest = (0..Dim::<Y>::LEN).map(|i| (w[i] * units[i]).abs()).fold(0.0, f64::max);
+        let (own, borrowed) = (w[axis].abs(), largest / units[axis]);
+        let scale = if own > 1e-6 * borrowed { own } else { borrowed };
+        if scale == 0.0 {
+            return Ok(());
+        }
+        let (df, centre) = (components(&jet.along_w.column_at(axis)), self.at(0.0));
+        let value = |t, values: &mut Vec<f64>| {
+            let w = w + Vector::<Y::Manifold>::basis(axis) * t;
+            append(values, &k.apply(metric, &centre, &w, &alpha).ok()?)
+        };
+        let along_w = Derivatives { df, scale, ..along_z };
+        self.compare("dissipation, as a function of w,", &along_w, value)
+    }
+}
+
+/// Compares the invariants, one after the other.
+struct Compared<'a, 'b, 'c, Y: Metriplectic + ?Sized> {
+    along: &'a Along<'b, 'c, Y>,
+    outcome: Result<(), ModelError>,
+}
+
+impl<Y: Metriplectic + ?Sized> Visitor<Y::Manifold> for Compared<'_, '_, '_, Y> {
+    fn visit(&mut self, _: Kind, f: &impl ScalarField<Y::Manifold>) {
+        if self.outcome.is_ok() {
+            self.outcome = self.along.scalar("invariant", f, &f.jet1(self.along.place.x).df);
+        }
+    }
+}
+
+/// A covector with which every column of a tensor is seen.
+fn generic<M: Space>(units: &Vector<M>) -> Vector<M> {
+    Vector::<M>::from_index(|i| (1.0 + i as f64).sin() / units[i])
+}
+
+fn components<V: Column<f64>>(v: &V) -> Vec<f64> {
+    (0..V::LEN).map(|i| v[i]).collect()
+}
+
+/// Appends the components.
+fn append<V: Column<f64>>(values: &mut Vec<f64>, v: &V) -> Option<()> {
+    values.extend((0..V::LEN).map(|i| v[i]));
+    Some(())
+}

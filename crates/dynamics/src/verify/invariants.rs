@@ -1,0 +1,161 @@
+//! The laws of further invariants and of symmetries.
+
+use metriplectic_fields::{
+    ChartPoint, Column, Dimension, Matrix, Real, ScalarField, Space, Square, Vector,
+};
+
+use super::balance::{self, Balance, TOLERANCE, pairs, worse};
+use super::{Dim, Findings, Place, jet, sampling, unusable};
+use crate::invariants::{Action, Invariants, Kind, Visitor};
+use crate::system::{Metriplectic, Point};
+use crate::{Bracket, Dissipation, ModelError};
+
+/// Each further invariant has finite derivatives, is conserved for the reason it is listed for, and
+/// the dissipation leaves it alone.
+pub(super) fn examine<Y: Metriplectic + ?Sized>(
+    place: &Place<'_, Y>,
+    findings: &mut Findings<'_>,
+) -> Result<(), ModelError> {
+    let mut examined = Invariance { place, findings, dj: None, failed: Ok(()) };
+    place.system.invariants().each(&mut examined);
+    examined.failed
+}
+
+/// Examines the invariants, one after the other.
+struct Invariance<'a, 'b, 'c, Y: Metriplectic + ?Sized> {
+    place: &'a Place<'b, Y>,
+    findings: &'a mut Findings<'c>,
+    /// The differential of the one visited last.
+    dj: Option<Vector<Y::Manifold>>,
+    failed: Result<(), ModelError>,
+}
+
+impl<Y: Metriplectic + ?Sized> Visitor<Y::Manifold> for Invariance<'_, '_, '_, Y> {
+    fn visit(&mut self, kind: Kind, f: &impl ScalarField<Y::Manifold>) {
+        let outcome = self.conserved(kind, f);
+        self.failed = std::mem::replace(&mut self.failed, Ok(())).and(outcome);
+    }
+
+    fn acts(&mut self, action: &Action<'_, Y::Manifold>) {
+        let outcome = self.symmetric(action);
+        self.failed = std::mem::replace(&mut self.failed, Ok(())).and(outcome);
+    }
+}
+
+impl<Y: Metriplectic + ?Sized> Invariance<'_, '_, '_, Y> {
+    fn conserved(
+        &mut self,
+        kind: Kind,
+        f: &impl ScalarField<Y::Manifold>,
+    ) -> Result<(), ModelError> {
+        let &Place { system, x, units, ref energy, ref entropy } = self.place;
+        let findings = &mut *self.findings;
+        let dl = jet(f, "invariant", x)?.df;
+        self.dj = Some(dl);
+        let centre = ChartPoint::<Y::Manifold>::centre(x);
+        let site = system.site(&centre, &entropy.df);
+        let tensor = system.bracket().tensor(&site).map_err(unusable::<Y::Manifold>(x))?;
+        match kind {
+            Kind::Casimir => {
+                let size = balance::product::<Y::Manifold>(&tensor, &dl, units);
+                findings.note("Π dC = 0", size, |point| ModelError::NotCasimir { point, size });
+            }
+            Kind::Momentum => {
+                let size = balance::form::<Y::Manifold>(&tensor, (&dl, &energy.df), units);
+                findings.note("⟨dJ, Π dH⟩ = 0", size, |point| ModelError::NotMomentum {
+                    point,
+                    size,
+                });
+            }
+        }
+        if system.bracket().is_forced() {
+            let force = system.bracket().linearise_force(&site, &energy.df);
+            let force = force.map_err(unusable::<Y::Manifold>(x))?;
+            let size = balance::pairing::<Y::Manifold>(&dl, &force.value, units);
+            let error = |point| ModelError::ForceChangesInvariant { point, size };
+            findings.note("⟨dL, force⟩ = 0", size, error);
+        }
+        let k = system.dissipation();
+        if !k.is_none() && !k.adapts() {
+            let tensor = k.tensor(system.metric(), &centre, &energy.df);
+            let tensor = tensor.map_err(unusable::<Y::Manifold>(x))?;
+            let size = balance::product::<Y::Manifold>(&tensor, &dl, units);
+            findings.note("K dL = 0", size, |point| ModelError::InvariantNotKept { point, size });
+        }
+        Ok(())
+    }
+
+    /// The action preserves the bracket and the energy, and moves points along `Π dJ`.
+    fn symmetric(&mut self, action: &Action<'_, Y::Manifold>) -> Result<(), ModelError> {
+        let &Place { system, x, units, ref energy, ref entropy } = self.place;
+        let (findings, n) = (&mut *self.findings, Dim::<Y>::LEN);
+        let moved = |t: Real, q: &Vector<Y::Manifold, Real>| action(t, &Y::Manifold::chart(x, q));
+        let still = Vector::<Y::Manifold, Real>::zero();
+        let along = moved(Real::new(0.0, 1.0, 0.0, 0.0), &still);
+        let at_rest = Y::Manifold::coordinates(x, &along);
+        let generator = Vector::<Y::Manifold>::from_index(|i| at_rest[i].eps1);
+        // The parameter has a unit of its own: a length, an angle.
+        let rate = (0..n).map(|i| (generator[i] / units[i]).abs()).fold(0.0, f64::max);
+        let far = Real::from(if rate > 0.0 { FAR / rate } else { FAR });
+
+        let y = Y::Manifold::real(&moved(far, &still));
+        let there = system.energy().jet2(&y);
+        let change: Balance = [there.value, -energy.value].into_iter().collect();
+        let size = sampling::terms(energy, units) + sampling::terms(&there, units);
+        let size = change.sum().abs() / (size + ROUNDED * change.terms());
+        let size = if change.sum() == 0.0 { 0.0 } else { size };
+        findings.note("H∘Φ = H", size, |point| ModelError::EnergyNotSymmetric { point, size });
+
+        // T Π(x) Tᵀ = Π(Φ(x)) with the derivative T of the map.
+        let tangent = jacobian_of::<Y>(&y, &|q| moved(far, q));
+        let tensor = |x: &Point<Y>, ds: &Vector<Y::Manifold>| {
+            let centre = ChartPoint::<Y::Manifold>::centre(x);
+            let tensor = system.bracket().tensor(&system.site(&centre, ds));
+            tensor.map_err(unusable::<Y::Manifold>(x))
+        };
+        let (here, there) = (tensor(x, &entropy.df)?, tensor(&y, &system.entropy().jet1(&y).df)?);
+        let top = balance::largest::<Y::Manifold>(&here, units)
+            .max(balance::largest::<Y::Manifold>(&there, units));
+        let off = |(i, j): (usize, usize)| {
+            let pushed = pairs(n).map(|(k, l)| tangent[(i, k)] * here[(k, l)] * tangent[(j, l)]);
+            let balance: Balance = pushed.chain([-there[(i, j)]]).collect();
+            balance.relative(top * units[i] * units[j])
+        };
+        let size = pairs(n).map(off).fold(0.0, worse);
+        findings.note("Φ is Poisson", size, |point| ModelError::ActionNotPoisson { point, size });
+
+        let Some(dj) = &self.dj else { return Ok(()) };
+        let largest = pairs(n).map(|(i, j)| (here[(i, j)] * dj[j] / units[i]).abs());
+        let largest = largest.fold(0.0, f64::max);
+        let off = |i: usize| {
+            let terms = (0..n).map(|j| here[(i, j)] * dj[j]);
+            let balance: Balance = terms.chain([-generator[i]]).collect();
+            balance.relative(units[i] * largest).max((at_rest[i].re / units[i]).abs())
+        };
+        let size = (0..n).map(off).fold(0.0, worse);
+        findings.note("Π dJ = Φ'", size, |point| ModelError::ActionNotOfMomentum { point, size });
+        Ok(())
+    }
+}
+
+/// How far along an action a symmetry is tried, relative to the sizes of the coordinates.
+const FAR: f64 = 0.7;
+
+/// What the values of an energy may differ by, beside their terms: their rounding, in the tolerance.
+const ROUNDED: f64 = 64.0 * f64::EPSILON / TOLERANCE;
+
+/// A map from the coordinates of a chart to points.
+type ChartMap<'a, M> = dyn Fn(&Vector<M, Real>) -> <M as Space>::Point<Real> + 'a;
+
+/// The derivative of a map from the chart at some point to the chart at `y`.
+fn jacobian_of<Y: Metriplectic + ?Sized>(
+    y: &Point<Y>,
+    map: &ChartMap<'_, Y::Manifold>,
+) -> Matrix<Y::Manifold> {
+    Matrix::<Y::Manifold>::from_columns(|k| {
+        let seed = |i| Real::new(0.0, if i == k { 1.0 } else { 0.0 }, 0.0, 0.0);
+        let moved =
+            Y::Manifold::coordinates(y, &map(&Vector::<Y::Manifold, Real>::from_index(seed)));
+        Vector::<Y::Manifold>::from_index(|i| moved[i].eps1)
+    })
+}

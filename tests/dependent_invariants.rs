@@ -1,0 +1,221 @@
+//! Casimirs whose differentials become dependent on the way of a run: the energy and the entropy keep their
+//! laws, the run goes on, and the certificate shows what the Casimir has changed by.
+
+use metriplectic::fields::Space;
+use metriplectic::integrators::{Course, StepError};
+use metriplectic::prelude::*;
+
+type State6 = SVector<Real, 6>;
+type State10 = SVector<Real, 10>;
+/// Function pointers, so that one compiled system serves all choices of entropy and Casimir.
+type Field6 = fn(&State6) -> Real;
+type Field10 = fn(&State10) -> Real;
+
+/// A run must end with the energy at round-off, no fall of the entropy and the Casimir within `bound`.
+fn certified<Y: Metriplectic>(
+    name: &str,
+    system: &Y,
+    start: &<Y::Manifold as Space>::Point<f64>,
+    course: impl Into<Course>,
+    bound: f64,
+) where
+    WeylMidpoint: Retraction<Y::Manifold, Y::Metric>,
+{
+    let course = course.into();
+    let mut steps = WeylMidpoint.steps(system, start.clone(), course).expect("a model");
+    while steps.ending().is_none() {
+        if let Err(error) = steps.advance() {
+            panic!("{name}: {error}\n{}", steps.certificate());
+        }
+    }
+    let certificate = steps.certificate();
+    let change = certificate.invariants[0].max_error;
+    println!("{name}: {certificate}");
+    assert!(certificate.keeps_energy() && certificate.keeps_entropy(), "{name}: {certificate}");
+    assert!(change <= bound, "{name}: C changed by {change:.1e} > {bound:.1e}");
+    assert_eq!(certificate.retries, 0, "{name}: {certificate}");
+}
+
+/// `H = Σ x_k²/(2 I_k)` on so(4)*.
+fn energy6(x: &State6) -> Real {
+    let inertia = [1.0, 1.3, 1.7, 2.2, 2.8, 3.5];
+    (0..6).map(|k| x[k] * x[k] * (0.5 / inertia[k])).sum()
+}
+
+/// `J·N`, which is at most `|x|²/2`, with equality on the singular orbits `J = N`.
+fn alignment(x: &State6) -> Real {
+    x[0] * x[3] + x[1] * x[4] + x[2] * x[5]
+}
+
+fn square(x: &State6) -> Real {
+    x.norm_squared()
+}
+
+fn on_so4(
+    entropy: Field6,
+    casimir: Field6,
+) -> impl Metriplectic<Manifold = LieDual<6>, Metric = Canonical> {
+    System::on(LieDual::so4())
+        .energy(energy6 as Field6)
+        .entropy(entropy)
+        .casimir(casimir)
+        .build()
+        .expect("it is a system")
+}
+
+const START: [f64; 6] = [0.3, -0.2, 0.9, 0.1, 0.8, 0.4];
+/// On a singular orbit: `J = N`.
+const SINGULAR: [f64; 6] = [0.3, -0.2, 0.9, 0.3, -0.2, 0.9];
+
+/// The flow tends to `J = N`, where `dS` and `dC` are parallel, and goes on there.
+#[test]
+fn a_run_goes_through_dependence_at_every_step_size() {
+    let system = on_so4(alignment, square);
+    let start = START.into();
+    // All fields are quadratic, so what fades out is round-off too.
+    for per_unit in [5_u16, 10, 20, 40] {
+        let h = f64::from(per_unit).recip();
+        let span = Span::steps(h, 300 * usize::from(per_unit));
+        certified(&format!("so(4)*, h = {h}"), &system, &start, span, 1e-12);
+    }
+    certified("so(4)*, adaptive", &system, &start, Span::until(300.0), 1e-12);
+}
+
+#[test]
+fn a_long_run_stays_at_round_off_where_casimirs_are_dependent() {
+    let system = on_so4(alignment, square);
+    certified("so(4)*, t = 10⁴", &system, &START.into(), Span::steps(0.1, 100_000), 1e-12);
+    // On the singular orbit nothing is dissipated: the entropy is constant, and the Casimir with it.
+    certified("J = N, t = 5000", &system, &SINGULAR.into(), Span::steps(0.05, 100_000), 1e-12);
+}
+
+#[test]
+fn other_casimirs_of_so4_become_dependent_without_an_error() {
+    let cases: [(&str, Field6, Field6); 4] = [
+        ("exchanged, least |x|²", |x| -square(x), alignment),
+        ("exchanged, largest |x|²", square, alignment),
+        ("quartic S", |x| alignment(x) + alignment(x).powi(2) * 0.3, square),
+        ("quartic C", alignment, |x| square(x) + alignment(x).powi(2) * 0.3),
+    ];
+    for (name, entropy, casimir) in cases {
+        let system = on_so4(entropy, casimir);
+        for per_unit in [5_u16, 10, 20] {
+            let h = f64::from(per_unit).recip();
+            let span = Span::steps(h, 200 * usize::from(per_unit));
+            certified(&format!("{name}, h = {h}"), &system, &START.into(), span, 1e-4 * h * h);
+            certified(&format!("{name}, J = N"), &system, &SINGULAR.into(), span, 1e-4 * h * h);
+        }
+        certified(name, &system, &START.into(), Span::until(100.0).tolerance(1e-4), 1e-10);
+    }
+}
+
+#[test]
+fn casimirs_become_dependent_under_a_metric_that_varies_too() {
+    let metric = |x: &State6| {
+        let wave = State6::from_fn(|i, _| (x[(i + 1) % 6] * 0.7).sin());
+        SMatrix::<Real, 6, 6>::identity() + wave * wave.transpose() * Real::from(0.5)
+    };
+    let system = System::on(LieDual::so4())
+        .metric(Metric::field(metric))
+        .energy(energy6 as Field6)
+        .entropy(alignment as Field6)
+        .casimir(square as Field6)
+        .build()
+        .unwrap();
+    for per_unit in [5_u16, 10] {
+        let h = f64::from(per_unit).recip();
+        let span = Span::steps(h, 100 * usize::from(per_unit));
+        certified(&format!("metric, h = {h}"), &system, &START.into(), span, 1e-4 * h * h);
+    }
+    certified("metric, adaptive", &system, &START.into(), Span::until(60.0), 1e-10);
+}
+
+/// `so(5)*` in the basis of the elementary rotations of R⁵.
+fn so5() -> LieDual<10> {
+    let basis = planes().map(|(i, j)| {
+        let mut generator = SMatrix::<f64, 5, 5>::zeros();
+        (generator[(j, i)], generator[(i, j)]) = (1.0, -1.0);
+        generator
+    });
+    LieDual::of(LieAlgebra::of_matrices(&basis).expect("an algebra"))
+}
+
+/// The coordinate planes of R⁵.
+fn planes() -> [(usize, usize); 10] {
+    let mut planes = (0..5).flat_map(|i| (i + 1..5).map(move |j| (i, j)));
+    [(); 10].map(|()| planes.next().expect("ten planes"))
+}
+
+/// `tr X⁴` of the skew matrix `X` with the entries `x`, beside `|x|²` the other Casimir of so(5)*.
+fn quartic(x: &State10) -> Real {
+    let mut matrix = SMatrix::<Real, 5, 5>::zeros();
+    for ((i, j), entry) in planes().into_iter().zip(x.iter()) {
+        (matrix[(j, i)], matrix[(i, j)]) = (*entry, -*entry);
+    }
+    (matrix * matrix).norm_squared()
+}
+
+fn square10(x: &State10) -> Real {
+    x.norm_squared()
+}
+
+fn energy10(x: &State10) -> Real {
+    (0..10).map(|k| x[k] * x[k] * (0.5 / (1.0 + 0.3 * k as f64))).sum()
+}
+
+/// The eigenvalues `±iλ₁, ±iλ₂` of `X` become equal, or one of them zero.
+#[test]
+fn a_quartic_casimir_of_so5_becomes_dependent_without_an_error() {
+    let start = SVector::from([0.3, -0.2, 0.9, 0.1, 0.8, 0.4, -0.5, 0.2, 0.6, -0.1]) * 0.7;
+    let (u, v) = ([0.3, -0.2, 0.9, 0.1, 0.8], [0.4, -0.5, 0.2, 0.6, -0.1]);
+    let plane = SVector::from(planes().map(|(i, j)| u[i] * v[j] - u[j] * v[i]));
+    let cases: [(&str, Field10, Field10, SVector<f64, 10>); 5] = [
+        ("S = tr X⁴", quartic, square10, start),
+        ("S = −tr X⁴", |x| -quartic(x), square10, start),
+        ("S = |x|²", square10, quartic, start),
+        ("S = −|x|²", |x| -square10(x), quartic, start),
+        ("S = tr X⁴, λ₂ = 0", quartic, square10, plane),
+    ];
+    for (name, entropy, casimir, start) in cases {
+        let system = System::on(so5())
+            .energy(energy10 as Field10)
+            .entropy(entropy)
+            .casimir(casimir)
+            .build()
+            .unwrap();
+        for per_unit in [5_u16, 10, 20] {
+            let h = f64::from(per_unit).recip();
+            let span = Span::steps(h, 100 * usize::from(per_unit));
+            certified(&format!("{name}, h = {h}"), &system, &start, span, 1e-4 * h * h);
+        }
+        certified(name, &system, &start, Span::until(50.0).tolerance(1e-4), 1e-8);
+    }
+}
+
+/// On the level set of `H = z` and `C = z + y² − x³` the entropy `−x` drives the state into a cusp, where
+/// `dC` and `dH` are parallel and the level set ends.
+#[test]
+fn a_run_that_dependence_ends_says_so() {
+    let system = System::on(Euclidean::<3>)
+        .energy(|x: &Vector3<Real>| x.z)
+        .entropy(|x: &Vector3<Real>| -x.x)
+        .casimir(|x: &Vector3<Real>| x.z + x.y.powi(2) - x.x.powi(3))
+        .build()
+        .unwrap();
+    let start = vector![0.25, 0.125, 0.0];
+    let ends: [Course; 3] =
+        [Span::steps(0.1, 30).into(), Span::steps(0.01, 300).into(), Span::until(3.0).into()];
+    for course in ends {
+        match WeylMidpoint.run(&system, start, course) {
+            Err(RunError::Step { cause, trajectory }) => {
+                println!("{cause}\n{}", trajectory.certificate());
+                assert!(
+                    matches!(cause, StepError::DependentInvariants { index: 0, share, .. } if share < 1e-3),
+                    "{cause}"
+                );
+            }
+            Err(error) => panic!("{error}"),
+            Ok(run) => panic!("{:?}\n{}", run.last().point, run.certificate()),
+        }
+    }
+}

@@ -1,0 +1,8 @@
+use metriplectic::prelude::*;
+
+fn main() {
+    let _ = System::on(Euclidean::<3>)
+        .bracket(AreaForm)
+        .energy(|x: &Vector3<Real>| x.norm_squared())
+        .build();
+}

@@ -1,0 +1,5 @@
+use metriplectic::prelude::*;
+
+fn main() {
+    let _ = System::on(LieDual::so3()).force(|xi: &Vector3<f64>| xi * 0.1);
+}

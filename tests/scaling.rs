@@ -1,0 +1,563 @@
+//! Nothing in a run assumes a scale: the scaling law, stiff friction, SI units, spectators, tiny fields.
+
+use metriplectic::integrators::laws::{self, UnitRun, Units};
+use metriplectic::integrators::{Course, RunError, StepError};
+use metriplectic::manifolds::Constant;
+use metriplectic::prelude::*;
+
+/// A problem on Rⁿ that can be written in any units, one for each entry.
+struct Problem<const N: usize> {
+    name: &'static str,
+    energy: fn(&SVector<Real, N>) -> Real,
+    entropy: fn(&SVector<Real, N>) -> Real,
+    bracket: fn(&SVector<Real, N>) -> SMatrix<Real, N, N>,
+    /// `K` of the point and the covector that it annihilates.
+    dissipation: fn(&SVector<Real, N>, &SVector<Real, N>) -> SMatrix<Real, N, N>,
+    x0: SVector<f64, N>,
+    h: f64,
+}
+
+/// The exponents of factors that are powers of two.
+#[derive(Clone, Copy)]
+struct Factors<const N: usize> {
+    entries: [i32; N],
+    time: i32,
+    energy: i32,
+    entropy: i32,
+}
+
+const fn one<const N: usize>() -> Factors<N> {
+    Factors { entries: [0; N], time: 0, energy: 0, entropy: 0 }
+}
+
+impl<const N: usize> Problem<N> {
+    /// The problem in other units: `H̃(x̃) = E H(x)` with `x̃ = D x`, and the tensors that belong to it.
+    fn system(
+        &self,
+        units: Factors<N>,
+    ) -> impl Metriplectic<Manifold = Euclidean<N>, Metric = Constant<N>> + use<N> {
+        let d = units.entries.map(|k| 2.0_f64.powi(k));
+        let [t, e, s] = [units.time, units.energy, units.entropy].map(|k| 2.0_f64.powi(k));
+        let Self { energy, entropy, bracket, dissipation, .. } = *self;
+        let own =
+            move |x: &SVector<Real, N>| SVector::<Real, N>::from_fn(|i, _| x[i] * d[i].recip());
+        let tensor = move |a: SMatrix<Real, N, N>, factor: f64| {
+            SMatrix::<Real, N, N>::from_fn(|i, j| a[(i, j)] * (d[i] * d[j] / factor))
+        };
+        let metric =
+            SMatrix::<f64, N, N>::from_fn(|i, j| if i == j { (d[i] * d[i]).recip() } else { 0.0 });
+        System::on(Euclidean::<N>)
+            .metric(Metric::constant(metric).expect("a metric"))
+            .bracket(Poisson::field(move |x: &SVector<Real, N>| tensor(bracket(&own(x)), e * t)))
+            .energy(move |x: &SVector<Real, N>| energy(&own(x)) * e)
+            .entropy(move |x: &SVector<Real, N>| entropy(&own(x)) * s)
+            .dissipation(FieldDissipation(
+                move |x: &SVector<Real, N>, w: &SVector<Real, N>| -> SMatrix<Real, N, N> {
+                    let w = SVector::<Real, N>::from_fn(|i, _| w[i] * (d[i] / e));
+                    tensor(dissipation(&own(x), &w), s * t)
+                },
+            ))
+            .build()
+            .expect("the parts make a system")
+    }
+
+    /// The scaling law in fixed and in adaptive steps.
+    fn obeys_the_law(&self, units: Factors<N>, [fixed, adaptive]: [f64; 2]) {
+        let factors = Units {
+            entries: units.entries.map(|k| 2.0_f64.powi(k)).to_vec(),
+            time: 2.0_f64.powi(units.time),
+            energy: 2.0_f64.powi(units.energy),
+            entropy: 2.0_f64.powi(units.entropy),
+        };
+        let (system, scaled) = (self.system(one()), self.system(units));
+        let start = SVector::<f64, N>::from_fn(|i, _| self.x0[i] * factors.entries[i]);
+        let t = factors.time;
+        let until = |t: f64| Course::from(Span::until(40.0 * self.h * t).tolerance(1e-5));
+        let courses: [(Course, Course, f64); 2] = [
+            (Span::steps(self.h, 60).into(), Span::steps(self.h * t, 60).into(), fixed),
+            (until(1.0), until(t), adaptive),
+        ];
+        for (course, other, tolerance) in courses {
+            let run = UnitRun { system: &system, x0: self.x0, course };
+            let twin = UnitRun { system: &scaled, x0: start, course: other };
+            laws::scaling(&Scheme::new(WeylMidpoint), &run, &twin, &factors, tolerance)
+                .unwrap_or_else(|law| panic!("{}: {law}", self.name));
+        }
+        println!("{:<24} x · 2^{:?}, t · 2^{}: holds", self.name, units.entries, units.time);
+    }
+
+    /// The two parts of the law.
+    fn obeys_both_laws(&self) {
+        for [x, t, e, s] in [[20, -7, 11, -13], [-31, 40, -23, 17], [0, 3, -60, 0], [44, 0, 0, -50]]
+        {
+            let units = Factors { entries: [x; N], time: t, energy: e, entropy: s };
+            self.obeys_the_law(units, [0.0, 0.0]);
+        }
+        for sign in [1, -1] {
+            let entries = std::array::from_fn(|i| sign * [17, -23, 5, -9, 30][i % 5]);
+            let units = Factors { entries, time: 4 * sign, energy: -6, entropy: 9 };
+            self.obeys_the_law(units, [1e-12, 1e-9]);
+        }
+    }
+}
+
+/// A tensor from its entries above the diagonal.
+fn skew<const N: usize>(entries: &[(usize, usize, Real)]) -> SMatrix<Real, N, N> {
+    let mut pi = SMatrix::<Real, N, N>::zeros();
+    for &(i, j, value) in entries {
+        (pi[(i, j)], pi[(j, i)]) = (value, -value);
+    }
+    pi
+}
+
+fn none<const N: usize>(_: &SVector<Real, N>, _: &SVector<Real, N>) -> SMatrix<Real, N, N> {
+    SMatrix::zeros()
+}
+
+/// `rate · b bᵀ`.
+fn onsager<const N: usize>(b: SVector<Real, N>, rate: Real) -> SMatrix<Real, N, N> {
+    b * b.transpose() * rate
+}
+
+fn real(x: f64) -> Real {
+    Real::from(x)
+}
+
+#[test]
+fn the_oscillators_obey_the_scaling_law() {
+    let canonical = |_: &Vector3<Real>| skew::<3>(&[(0, 1, real(1.0))]);
+    let friction = |_: &Vector3<Real>, w: &Vector3<Real>| {
+        onsager(Vector3::new(real(0.0), w.z, -w.y), w.z.recip() * 0.3)
+    };
+    let damped = Problem {
+        name: "damped oscillator",
+        energy: |x: &Vector3<Real>| (x.x * x.x + x.y * x.y) * 0.5 + x.z,
+        entropy: |x| x.z,
+        bracket: canonical,
+        dissipation: friction,
+        x0: vector![2.0, 0.25, 0.125],
+        h: 0.1,
+    };
+    damped.obeys_both_laws();
+    let pendulum = Problem {
+        name: "pendulum with a bath",
+        energy: |x: &Vector3<Real>| x.y * x.y * 0.5 - x.x.cos() + x.z.exp(),
+        ..damped
+    };
+    pendulum.obeys_both_laws();
+    Problem { name: "without friction", dissipation: none, ..pendulum }.obeys_both_laws();
+}
+
+#[test]
+fn the_bodies_obey_the_scaling_law() {
+    let turn = |p: &Vector3<Real>| skew::<3>(&[(0, 1, -p.z), (0, 2, p.y), (1, 2, -p.x)]);
+    let relaxing = Problem {
+        name: "relaxing body",
+        energy: |p: &Vector3<Real>| p.x * p.x * 0.05 + p.y * p.y * 0.1 + p.z * p.z * 0.5,
+        entropy: |p: &Vector3<Real>| p.norm_squared() * 0.5,
+        bracket: turn,
+        dissipation: |_, w: &Vector3<Real>| {
+            Matrix3::from_diagonal_element(w.norm_squared()) - w * w.transpose()
+        },
+        x0: vector![0.3, -1.0, 0.4],
+        h: 0.1,
+    };
+    relaxing.obeys_both_laws();
+    Problem { name: "free body", dissipation: none, ..relaxing }.obeys_both_laws();
+    Problem {
+        name: "body with a quartic entropy",
+        energy: |p: &Vector3<Real>| p.x.powi(4) * 0.05 + p.y * p.y * 0.1 + p.z.powi(3) * 0.2,
+        entropy: |p: &Vector3<Real>| p.norm_squared().powi(2) * 0.25,
+        ..relaxing
+    }
+    .obeys_both_laws();
+}
+
+#[test]
+fn the_thermal_models_obey_the_scaling_law() {
+    let gas = Problem {
+        name: "gas containers",
+        energy: |x: &Vector4<Real>| x.y.powi(2) * 0.5 + x.z + x.w,
+        entropy: |x| x.x.ln() + (-x.x + 2.0).ln() + (x.z.ln() + x.w.ln()) * 1.5,
+        bracket: |x| {
+            let (left, right) = (-x.z / x.x * (2.0 / 3.0), x.w / (-x.x + 2.0) * (2.0 / 3.0));
+            skew::<4>(&[(0, 1, real(1.0)), (2, 1, left), (3, 1, right)])
+        },
+        dissipation: |_, w| onsager(Vector4::new(real(0.0), real(0.0), w.w, -w.z), real(0.5)),
+        x0: vector![1.0, 2.0, 2.0, 2.5],
+        h: 0.05,
+    };
+    gas.obeys_both_laws();
+    let heat = Problem {
+        name: "two temperatures",
+        energy: |x: &Vector2<Real>| x.x + x.x * x.x * 0.5 + x.y + x.y * x.y * 0.5,
+        entropy: |x| x.x.ln() + x.x + x.y.ln() + x.y,
+        bracket: |_| SMatrix::zeros(),
+        dissipation: |_, w| onsager(Vector2::new(w.x.recip(), -w.y.recip()), real(1.0)),
+        x0: vector![0.5, 3.0],
+        h: 0.02,
+    };
+    heat.obeys_both_laws();
+}
+
+#[test]
+fn the_orbits_obey_the_scaling_law() {
+    let pairs = |_: &Vector5| skew::<5>(&[(0, 2, real(1.0)), (1, 3, real(1.0))]);
+    let kepler = Problem {
+        name: "Kepler",
+        energy: |x: &Vector5| {
+            (x[2] * x[2] + x[3] * x[3]) * 0.5 - (x[0] * x[0] + x[1] * x[1]).sqrt().recip() + x[4]
+        },
+        entropy: |x| x[4],
+        bracket: pairs,
+        dissipation: none,
+        x0: vector![0.75, 0.0, 0.0, 1.25, 0.5],
+        h: 0.05,
+    };
+    kepler.obeys_both_laws();
+    Problem {
+        name: "Kepler with drag",
+        dissipation: |_, w: &Vector5| {
+            let b = |p: usize| {
+                let mut b = Vector5::zeros();
+                (b[p], b[4]) = (w[4], -w[p]);
+                onsager(b, w[4].recip() * 0.05)
+            };
+            b(2) + b(3)
+        },
+        ..kepler
+    }
+    .obeys_both_laws();
+}
+
+type Vector5 = SVector<Real, 5>;
+
+/// The overdamped oscillator `x = (q, p, s)`, its plane turned by `angle`: `H = ½p² + ½q² + s`, `S = s`,
+/// `K = (γ/w_s) b bᵀ` with `b = (0, w_s, −w_p)`.
+fn overdamped(
+    gamma: f64,
+    angle: f64,
+) -> impl Metriplectic<Manifold = Euclidean<3>, Metric = Canonical> {
+    let (sin, cos) = angle.sin_cos();
+    let pi = Matrix3::new(0.0, 1.0, 0.0, -1.0, 0.0, 0.0, 0.0, 0.0, 0.0);
+    System::on(Euclidean::<3>)
+        .bracket(Poisson::constant(pi).expect("it is skew"))
+        .energy(|x: &Vector3<Real>| (x.x * x.x + x.y * x.y) * 0.5 + x.z)
+        .entropy(|x: &Vector3<Real>| x.z)
+        .dissipation(FieldDissipation(move |_: &Vector3<Real>, w: &Vector3<Real>| {
+            // The momentum is p = y cos − x sin in the turned plane.
+            let p = w.y * cos - w.x * sin;
+            onsager(Vector3::new(w.z * -sin, w.z * cos, -p), w.z.recip() * gamma)
+        }))
+        .build()
+        .expect("the parts make a system")
+}
+
+/// `q` after 300 steps of 0.01 γ from `q = 1` on the slow manifold, where `q = e^{−t/γ}` up to γ⁻².
+fn slow_decay(gamma: f64, angle: f64) -> Result<(f64, Certificate), StepError> {
+    let (sin, cos) = angle.sin_cos();
+    let (q, p) = (1.0, -gamma.recip());
+    let start = vector![q * cos - p * sin, q * sin + p * cos, 0.0];
+    let span = Span::steps(0.01 * gamma, 300);
+    match WeylMidpoint.run(&overdamped(gamma, angle), start, span) {
+        Ok(run) => {
+            let x = run.last().point;
+            Ok((x.x * cos + x.y * sin, run.certificate().clone()))
+        }
+        Err(RunError::Step { cause, .. }) => Err(cause),
+        Err(error) => panic!("{error}"),
+    }
+}
+
+#[test]
+fn a_stiff_state_is_not_taken_for_one_at_rest() {
+    let exact = (-3.0_f64).exp();
+    for gamma in [1e6, 1e7, 1e8, 1e9, 1e10] {
+        let (q, certificate) = slow_decay(gamma, 0.0).expect("it is solved");
+        println!("γ = {gamma:.0e}: q = {q:.6}\n{certificate}");
+        assert!((q - exact).abs() < 1e-4 * exact.recip().min(1.0), "γ = {gamma:e}: {q}");
+        assert!(certificate.keeps_energy() && certificate.keeps_entropy(), "{certificate}");
+        assert!(certificate.to_string().contains("friction not damped: h|K'| = "), "{certificate}");
+    }
+}
+
+#[test]
+fn a_slow_direction_off_the_axes_is_right_or_an_error() {
+    let exact = (-3.0_f64).exp();
+    for gamma in [1e6, 1e7, 1e8, 1e9, 1e10] {
+        match slow_decay(gamma, 0.6) {
+            Ok((q, certificate)) => {
+                println!("γ = {gamma:.0e}: q = {q:.6}\n{certificate}");
+                assert!((q - exact).abs() < 1e-4, "γ = {gamma:e}: {q}");
+            }
+            Err(cause) => {
+                println!("γ = {gamma:.0e}: {cause}");
+                assert!(gamma > 1e8, "{cause}");
+                // The slow motion has no digits beside the fast one, or the energy has none.
+                assert!(
+                    matches!(
+                        cause,
+                        StepError::StiffFriction { .. } | StepError::FirstLawBroken { .. }
+                    ),
+                    "{cause}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn states_at_rest_stay_where_they_are_for_a_million_steps() {
+    let (q, p) = (vector![0.0, 0.0, 0.5], vector![1.4, 0.0, 0.0]);
+    let oscillator = overdamped(0.3, 0.0);
+    let body = System::on(LieDual::so3())
+        .energy(|p: &Vector3<Real>| p.x * p.x * 0.05 + p.y * p.y * 0.1 + p.z * p.z * 0.5)
+        .entropy(|p: &Vector3<Real>| p.norm_squared() * 0.5)
+        .build()
+        .unwrap();
+    let temperatures = System::on(Euclidean::<4>)
+        .energy(|x: &Vector4<Real>| x.x + x.y + x.z + x.w)
+        .entropy(|x: &Vector4<Real>| x.x.ln() + x.y.ln() + x.z.ln() + x.w.ln())
+        .build()
+        .unwrap();
+    let span = Span::steps(0.1, 1_000_000).at_most(2);
+    let rested = |certificate: &Certificate, change: f64, size: f64| {
+        println!("{certificate}\nmoved by {change:.1e}");
+        let bound = 16.0 * f64::EPSILON;
+        assert!(certificate.max_energy_error <= bound * certificate.initial_energy.abs());
+        assert!(change <= bound * size && certificate.keeps_entropy(), "{change:e}");
+    };
+    let run = WeylMidpoint.run(&oscillator, q, span).unwrap();
+    rested(run.certificate(), (run.last().point - q).amax(), q.amax());
+    let run = WeylMidpoint.run(&body, p, span).unwrap();
+    rested(run.certificate(), (run.last().point - p).amax(), p.amax());
+    // Not exactly at rest: the last digits of a third.
+    let x = vector![1.0 / 3.0, 1.0 / 3.0, (1.0 / 3.0) * (1.0 + f64::EPSILON), 1.0 / 3.0];
+    let run = WeylMidpoint.run(&temperatures, x, span).unwrap();
+    rested(run.certificate(), (run.last().point - x).amax(), x.amax());
+}
+
+#[test]
+fn a_uniform_motion_far_from_the_origin_is_not_at_rest() {
+    // A step of 1 at 10¹⁷ changes no digit of the position; sixteen of them do.
+    let free = System::on(Euclidean::<2>)
+        .bracket(Symplectic)
+        .energy(|x: &Vector2<Real>| x.y * x.y * 0.5)
+        .build()
+        .unwrap();
+    let start = vector![1e17, 1.0];
+    let run = WeylMidpoint.run(&free, start, Span::steps(1.0, 1600).until_rest(1e-9)).unwrap();
+    assert_eq!((run.ending(), run.last().point.x), (Ending::Span, 1e17 + 1600.0));
+}
+
+#[test]
+fn a_field_whose_square_underflows_moves_its_state() {
+    for tiny in [1e-150, 1e-160, 1e-200, 1e-290] {
+        // q' = tiny p, p' = −tiny q: a turn by one radian in a time of 1/tiny.
+        let oscillator = System::on(Euclidean::<2>)
+            .bracket(Symplectic)
+            .energy(move |x: &Vector2<Real>| (x.x * x.x + x.y * x.y) * (0.5 * tiny))
+            .build()
+            .unwrap();
+        let span = Span::steps(0.01 / tiny, 100);
+        let x = WeylMidpoint.run(&oscillator, vector![1.0, 0.0], span).unwrap().last().point;
+        // The midpoint rule turns by 2 atan(h/2) in a step.
+        let angle = 200.0 * 0.005_f64.atan();
+        assert!((x - vector![angle.cos(), -angle.sin()]).amax() < 1e-13, "{tiny:e}: {x}");
+        let slow = WeylMidpoint.run(&oscillator, vector![1.0, 0.0], Span::steps(1.0, 10)).unwrap();
+        let p = slow.last().point.y;
+        assert!((p / (-10.0 * tiny) - 1.0).abs() < 1e-12, "{tiny:e}: {p:e}");
+    }
+}
+
+/// A colloid in a harmonic trap, `x = (q, p, s)`: `H = p²/2m + ½kq² + C T e^{s/C}` with a bath of heat
+/// capacity `C` that starts at the temperature `T`, `S = s`, and Stokes' friction `−γ p/m`.
+#[derive(Clone, Copy)]
+struct Colloid {
+    mass: f64,
+    friction: f64,
+    stiffness: f64,
+    capacity: f64,
+    temperature: f64,
+}
+
+impl Colloid {
+    /// `q/q₀` after 300 steps of `0.01 γ/k` from the slow manifold, its error, and the balance.
+    fn relaxes(self, q: f64) -> (f64, f64, Certificate) {
+        let Self { mass, friction, stiffness, capacity, temperature } = self;
+        let pi = Matrix3::new(0.0, 1.0, 0.0, -1.0, 0.0, 0.0, 0.0, 0.0, 0.0);
+        let system = System::on(Euclidean::<3>)
+            .bracket(Poisson::constant(pi).expect("it is skew"))
+            .energy(move |x: &Vector3<Real>| {
+                x.y * x.y * (0.5 / mass)
+                    + x.x * x.x * (0.5 * stiffness)
+                    + (x.z / capacity).exp() * (capacity * temperature)
+            })
+            .entropy(|x: &Vector3<Real>| x.z)
+            .dissipation(FieldDissipation(move |_: &Vector3<Real>, w: &Vector3<Real>| {
+                onsager(Vector3::new(real(0.0), w.z, -w.y), w.z.recip() * friction)
+            }))
+            .build()
+            .expect("the parts make a system");
+        // The slow root of m r² + γ r + k = 0.
+        let discriminant = (friction * friction - 4.0 * mass * stiffness).sqrt();
+        let rate = -2.0 * stiffness / (friction + discriminant);
+        let h = 0.01 * friction / stiffness;
+        let start = vector![q, mass * rate * q, 0.0];
+        let run = WeylMidpoint.run(&system, start, Span::steps(h, 300)).expect("it is solved");
+        let end = run.last().point.x / q;
+        (end, end - (rate * 300.0 * h).exp(), run.certificate().clone())
+    }
+}
+
+#[test]
+fn a_colloid_in_si_units_relaxes_like_its_dimensionless_twin() {
+    let (q, si) = (
+        1e-7,
+        Colloid {
+            mass: 5e-16,
+            friction: 1e-8,
+            stiffness: 1e-6,
+            capacity: 4e-12,
+            temperature: 300.0,
+        },
+    );
+    // Lengths in q₀, times in γ/k, energies in kq₀², entropies in kq₀²/T.
+    let unit = si.stiffness * q * q / si.temperature;
+    let twin = Colloid {
+        mass: si.mass * si.stiffness / si.friction.powi(2),
+        friction: 1.0,
+        stiffness: 1.0,
+        capacity: si.capacity / unit,
+        temperature: 1.0,
+    };
+    let (end, error, certificate) = si.relaxes(q);
+    let (other, twins, _) = twin.relaxes(1.0);
+    println!(
+        "q/q₀ = {end:.6}, off by {error:.1e}; dimensionless {other:.6}, off by {twins:.1e}\n{certificate}"
+    );
+    assert!(error.abs() <= 2.0 * twins.abs() && error.abs() < 1e-4);
+    assert!(certificate.keeps_energy() && certificate.keeps_entropy(), "{certificate}");
+}
+
+/// Kepler's problem `x = (r, p)` of a body of mass `m` around `μ = GM`.
+fn kepler(mass: f64, mu: f64) -> impl Metriplectic<Manifold = Euclidean<4>, Metric = Canonical> {
+    System::on(Euclidean::<4>)
+        .bracket(Symplectic)
+        .energy(move |x: &Vector4<Real>| {
+            let r = (x.x * x.x + x.y * x.y).sqrt();
+            (x.z * x.z + x.w * x.w) * (0.5 / mass) - r.recip() * (mu * mass)
+        })
+        .build()
+        .expect("the parts make a system")
+}
+
+#[test]
+fn an_orbit_in_si_units_is_that_in_astronomical_ones() {
+    let (unit, mu, mass) = (1.495_978_707e11, 1.327_124_4e20, 5.972e24);
+    let time = (unit * unit * unit / mu).sqrt();
+    let speed = unit / time;
+    // An eccentric orbit from its aphelion, 2000 steps of 0.02.
+    let x = vector![1.0, 0.0, 0.0, 0.6];
+    let scale = vector![unit, unit, mass * speed, mass * speed];
+    let run = |system: &_, x, h| WeylMidpoint.run(system, x, Span::steps(h, 2000)).unwrap();
+    let twin = run(&kepler(1.0, 1.0), x, 0.02);
+    let si = run(&kepler(mass, mu), x.component_mul(&scale), 0.02 * time);
+    let fine = WeylMidpoint.run(&kepler(1.0, 1.0), x, Span::steps(0.001, 40_000)).unwrap();
+    let error = |y: Vector4<f64>| (y - fine.last().point).amax();
+    let (a, b) = (error(twin.last().point), error(si.last().point.component_div(&scale)));
+    println!(
+        "{a:.3e} in units of one, {b:.3e} in SI\n{}\n{}",
+        twin.certificate(),
+        si.certificate()
+    );
+    assert!(b <= 2.0 * a && a > 0.0);
+    for run in [&twin, &si] {
+        assert!(run.certificate().keeps_energy(), "{}", run.certificate());
+        assert!(run.certificate().max_relative_energy_error() < 2e-14);
+    }
+}
+
+/// A Morse molecule `x = (r, p)`: `H = p²/2μ + D (1 − e^{−a(r − r₀)})²`.
+fn molecule(
+    [mass, depth, width, length]: [f64; 4],
+) -> impl Metriplectic<Manifold = Euclidean<2>, Metric = Canonical> {
+    System::on(Euclidean::<2>)
+        .bracket(Symplectic)
+        .energy(move |x: &Vector2<Real>| {
+            let stretch = -((-x.x + length) * width).exp() + 1.0;
+            x.y * x.y * (0.5 / mass) + stretch * stretch * depth
+        })
+        .build()
+        .expect("the parts make a system")
+}
+
+#[test]
+fn a_molecule_in_si_units_vibrates_like_its_dimensionless_twin() {
+    // Hydrogen: the reduced mass, the depth, the width and the length of the bond.
+    let [mass, depth, width, length] = [8.367e-28, 7.61e-19, 1.943e10, 7.414e-11];
+    let time = (mass / depth).sqrt() / width;
+    let scale = vector![width.recip(), (mass * depth).sqrt()];
+    let start = vector![length * width + 0.5, 0.1];
+    let twin = molecule([1.0, 1.0, 1.0, length * width]);
+    let si = molecule([mass, depth, width, length]);
+    let courses: [fn(f64) -> Course; 2] =
+        [|t| Span::steps(0.05 * t, 2000).into(), |t| Span::until(100.0 * t).into()];
+    let exact = WeylMidpoint.run(&twin, start, Span::steps(0.001, 100_000)).unwrap();
+    for course in courses {
+        let a = WeylMidpoint.run(&twin, start, course(1.0)).unwrap();
+        let b = WeylMidpoint.run(&si, start.component_mul(&scale), course(time)).unwrap();
+        let error = |x: Vector2<f64>| (x - exact.last().point).amax();
+        let errors = [error(a.last().point), error(b.last().point.component_div(&scale))];
+        println!("{errors:.2?}\n{}\n{}", a.certificate(), b.certificate());
+        assert!(errors[1] <= 2.0 * errors[0] && errors[0] > 0.0);
+        assert!(b.certificate().keeps_energy(), "{}", b.certificate());
+        assert!(b.certificate().max_relative_energy_error() < 2e-14);
+    }
+}
+
+#[test]
+fn an_entropy_in_tiny_units_falls_where_it_falls() {
+    // The published scheme lowers the entropy of the gas containers on half of the steps, in any unit.
+    let falls = |unit: f64, spectator: f64| {
+        let system = System::on(Euclidean::<5>)
+            .bracket(Poisson::field(|x: &Vector5| {
+                let (left, right) =
+                    (-x[2] / x[0] * (2.0 / 3.0), x[3] / (-x[0] + 2.0) * (2.0 / 3.0));
+                skew::<5>(&[(0, 1, real(1.0)), (2, 1, left), (3, 1, right)])
+            }))
+            .energy(|x: &Vector5| x[1].powi(2) * 0.5 + x[2] + x[3])
+            .entropy(move |x: &Vector5| {
+                (x[0].ln() + (-x[0] + 2.0).ln() + (x[2].ln() + x[3].ln()) * 1.5) * unit
+            })
+            .dissipation(FieldDissipation(move |_: &Vector5, w: &Vector5| {
+                let zero = real(0.0);
+                onsager(Vector5::from([zero, zero, w[3], -w[2], zero]), real(1e-3 / unit))
+            }))
+            .second_law(SecondLaw::Published)
+            .build()
+            .expect("the parts make a system");
+        let x = SVector::from([1.0, 2.0, 2.0, 2.0, spectator]);
+        let run = WeylMidpoint.run(&system, x, Span::steps(0.1, 300)).expect("it runs");
+        run.certificate().entropy_falls
+    };
+    assert_eq!(falls(1.0, 0.0), 150);
+    assert_eq!([falls(1e-16, 0.0), falls(1e20, 0.0), falls(1.0, 1e12)], [150; 3]);
+}
+
+#[test]
+fn an_energy_in_tiny_units_is_printed_with_its_digits() {
+    let tiny = System::on(Euclidean::<2>)
+        .bracket(Symplectic)
+        .energy(|x: &Vector2<Real>| (x.x * x.x + x.y * x.y) * 1.5e-16)
+        .build()
+        .unwrap();
+    let run = WeylMidpoint.run(&tiny, vector![1.0, 0.0], Span::steps(1e14, 10)).unwrap();
+    let certificate = run.certificate();
+    assert!(certificate.keeps_energy(), "{certificate}");
+    assert!(certificate.to_string().contains("H₀ = 1.500000e-16"), "{certificate}");
+    // Most of the energy is lost, and no bound of scale one hides it.
+    let mut lost = certificate.clone();
+    lost.max_energy_error = 1.2e-16;
+    assert!(!lost.keeps_energy() && lost.to_string().contains("first law:   BROKEN"), "{lost}");
+}

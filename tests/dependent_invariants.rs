@@ -122,7 +122,7 @@ fn casimirs_become_dependent_under_a_metric_that_varies_too() {
         .casimir(square as Field6)
         .build()
         .unwrap();
-    for per_unit in [5_u16, 10] {
+    for per_unit in [5_u16, 10, 20] {
         let h = f64::from(per_unit).recip();
         let span = Span::steps(h, 100 * usize::from(per_unit));
         certified(&format!("metric, h = {h}"), &system, &START.into(), span, 1e-4 * h * h);

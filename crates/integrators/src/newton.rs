@@ -157,7 +157,7 @@ impl<N: Dimension> Measure<N> {
 /// The factor between the bound of round-off to first order and what is taken for round-off.
 const MARGIN: f64 = 3.0;
 /// The norm of a residual that is taken for round-off, in units of the norm of its bounds.
-pub(crate) const NORM: f64 = 1.0;
+pub(crate) const NORM: f64 = 3.0;
 /// The multiple of its round-off that the last correction may leave of a component, where the norm of the
 /// residual has fallen to a hundredth of its own.
 const HIDDEN: f64 = 1.0;

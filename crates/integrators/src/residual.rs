@@ -17,6 +17,7 @@ use metriplectic_manifolds::{
 use crate::discrete_gradient::{Chord, DiscreteGradient, Segment};
 
 use crate::root_finder::{Equation, Linearised, Root, Rounding};
+use crate::trajectory::entropy_round_off;
 
 /// The equation of one step (Bloch, Farré Puiggalí, Martín de Diego 2024, §4.4), as a function of
 /// the initial displacement `u ∈ T_xM` of the arc:
@@ -82,11 +83,14 @@ const ROUNDED: f64 = 4.0 * f64::EPSILON;
 /// The dimension of the manifold of a system.
 pub(crate) type Dim<Y> = <<Y as Metriplectic>::Manifold as Space>::Dim;
 
-/// The residual with its Jacobian, the discrete gradient `w_H` and the displacement in it.
+/// The residual with its Jacobian, and what is in it: the discrete gradients `w_H` and `w_S`, the displacement,
+/// and the growth of the entropy by friction, `h⟨w_S, K̃ w_S⟩`.
 struct Jet<M: Space> {
     at: Linearised<M>,
-    w: Vector<M>,
+    energy: Vector<M>,
+    entropy: Vector<M>,
     d: Vector<M>,
+    growth: f64,
 }
 
 /// The inner product in which `sizes` are units: `G(u, v) = Σ u_i v_i / s_i²`. The shortest way to a level of
@@ -252,10 +256,34 @@ where
         &self,
         root: &Root<Y::Manifold>,
         end: &Point<Y>,
-        energy: f64,
+        [energy, entropy]: [f64; 2],
     ) -> Option<LastCorrection<Y::Manifold>> {
         let e = self.imbalance(energy);
-        if self.is_balanced(e) { None } else { self.correct(root, end, e) }
+        let corrected = if self.is_balanced(e) { None } else { self.correct(root, end, e) };
+        let falls = entropy - self.entropy < -ROUNDED * self.entropy.abs();
+        if corrected.is_none() && falls && self.is_exact() {
+            return self.correct_entropy(root, end, e);
+        }
+        corrected
+    }
+
+    /// One more correction for a root at whose end the entropy has fallen by nearly its round-off, if it then
+    /// falls by less.
+    #[cold]
+    fn correct_entropy(
+        &self,
+        Root { u, .. }: &Root<Y::Manifold>,
+        end: &Point<Y>,
+        e: f64,
+    ) -> Option<LastCorrection<Y::Manifold>> {
+        let entropy = self.system.entropy_at(end);
+        if self.entropy - entropy <= 0.5 * entropy_round_off(self.system, [self.x, end]) {
+            return None;
+        }
+        let (u, end) = self.corrected(u, e, Some(entropy - self.entropy + self.recall.entropy))?;
+        let better = self.system.entropy_at(&end) > entropy;
+        let balanced = self.imbalance_at(&end).abs() <= e.abs().max(ROUNDED * self.energy.abs());
+        (better && balanced).then_some(LastCorrection { u, end, moved: false })
     }
 
     /// Whether the ends of geodesics are good to a few roundings.
@@ -282,20 +310,27 @@ where
         let coarse = *floor > 2.0 * ROUNDED * Y::Manifold::magnitude(self.x);
         if self.has_closed_geodesics()
             && !coarse
-            && e.abs() <= 2.0 * ROUNDED * size_of_terms::<Y::Manifold>(self.system.energy(), end)
+            && e.abs() <= ROUNDED * size_of_terms::<Y::Manifold>(self.system.energy(), end)
         {
             return None;
         }
-        let balanced = if self.has_closed_geodesics() { self.balance(u, e) } else { None };
+        let closed = self.has_closed_geodesics();
+        if !closed && let Some(end) = self.settle(u, end) {
+            return Some(LastCorrection { u: *u, end, moved: true });
+        }
+        let balanced = self.balance(u, e);
         let (u, at) = balanced.as_ref().map_or((u, end), |(u, end)| (u, end));
-        if let Some(end) = self.settle(u, at) {
+        if (closed || balanced.is_some())
+            && let Some(end) = self.settle(u, at)
+        {
             return Some(LastCorrection { u: *u, end, moved: true });
         }
         balanced.map(|(u, end)| LastCorrection { u, end, moved: false })
     }
 
     /// The end `x'` moved onto the level of the energy, within the accuracy of geodesics: by the shortest
-    /// way within a rounding, and along the levels of the entropy and the further invariants beyond it.
+    /// way within a rounding; beyond it along the levels of the entropy and the further invariants, or of the
+    /// entropy alone where the differential of the energy hardly differs from theirs.
     fn settle(&self, u: &Vector<Y::Manifold>, end: &Point<Y>) -> Option<Point<Y>> {
         let e = self.imbalance_at(end);
         if self.is_balanced(e) {
@@ -305,37 +340,61 @@ where
         let sizes = Y::Manifold::scales(self.x) + u.abs();
         let g = InUnits(sizes);
         let w = differentials(self.system, &ChartPoint::<Y::Manifold>::centre(end));
+        let limit = self.system.metric().accuracy() * (Dim::<Y>::LEN as f64).sqrt();
+        let moved = |kept: &Orthogonal<Dim<Y>>| {
+            let across = g.sharp(&kept.off_covector(0, &w.energy));
+            let off = across * (-e / across.dot(&w.energy));
+            let within = (0..Dim::<Y>::LEN).all(|i| off[i].abs() <= limit * sizes[i]);
+            let settled = Y::Manifold::chart(end, &off);
+            let better = self.imbalance_at(&settled).abs() < e.abs();
+            (within && better).then_some(settled)
+        };
         let mut kept = Orthogonal::<Dim<Y>>::default();
-        let rounded = self.has_closed_geodesics();
-        if self.is_exact() && !rounded {
+        if self.has_closed_geodesics() {
+            return moved(&kept);
+        }
+        if self.is_exact() {
             kept.push(&g, &w.entropy);
         }
-        for (_, l) in w.invariants.as_ref().iter().flatten().filter(|_| !rounded) {
+        let entropy = kept;
+        for (_, l) in w.invariants.as_ref().iter().flatten() {
             kept.push(&g, l);
         }
-        let across = g.sharp(&kept.off_covector(0, &w.energy));
-        let off = across * (-e / across.dot(&w.energy));
-        let accuracy = self.system.metric().accuracy();
-        let limit = accuracy * (Dim::<Y>::LEN as f64).sqrt();
-        let within = (0..Dim::<Y>::LEN).all(|i| off[i].abs() <= limit * sizes[i]);
-        let settled = Y::Manifold::chart(end, &off);
-        let better = self.imbalance_at(&settled).abs() < e.abs();
-        (within && better).then_some(settled)
+        moved(&kept).or_else(|| moved(&entropy))
     }
 
-    /// The root with the energy corrected by its error `e`.
+    /// The root with the energy corrected by its error `e`, if that makes it smaller.
     fn balance(&self, u: &Vector<Y::Manifold>, e: f64) -> Option<(Vector<Y::Manifold>, Point<Y>)> {
-        let Jet { at, w, d } = self.jet(u)?;
+        let (u, end) = self.corrected(u, e, None)?;
+        (self.imbalance_at(&end).abs() < e.abs()).then_some((u, end))
+    }
+
+    /// A root after one more correction, in whose residual the part along `w_H` is the error `e` of the energy,
+    /// and the one along `w_S` belongs to the `change` of the entropy, if this is given.
+    fn corrected(
+        &self,
+        u: &Vector<Y::Manifold>,
+        e: f64,
+        change: Option<f64>,
+    ) -> Option<(Vector<Y::Manifold>, Point<Y>)> {
+        let Jet { at, energy, entropy, d, growth } = self.jet(u)?;
         let rounding = at.rounding.bounds(&at.jacobian) + d.abs() * f64::EPSILON;
         // Each component takes its part in units of its own round-off, and of what is left of it.
         let bounds = rounding + at.residual.abs();
-        let across = InUnits(bounds).sharp(&w);
-        let lost = across * ((e - w.dot(&at.residual)) / across.dot(&w));
-        let u = *u - at.jacobian.solve(&(at.residual + lost))?;
+        let g = InUnits(bounds);
+        let mut exact = at.residual;
+        let mut across = Orthogonal::<Dim<Y>>::default();
+        let parts = [Some((energy, e)), change.map(|change| (entropy, change - growth))];
+        for (w, part) in parts.into_iter().flatten() {
+            let sharp = g.sharp(&across.off_covector(0, &w));
+            across.push(&g, &w);
+            exact += sharp * ((part - w.dot(&exact)) / sharp.dot(&w));
+        }
+        let u = *u - at.jacobian.solve(&exact)?;
         let end = self.retraction.end(self.system.metric(), self.x, &u).ok()?;
-        let better = self.imbalance_at(&end).abs() < e.abs();
+        let lost = exact - at.residual;
         let within = (0..Dim::<Y>::LEN).all(|i| lost[i].abs() <= bounds[i]);
-        (within && better).then_some((u, end))
+        within.then_some((u, end))
     }
 
     /// The residual, safe against round-off.
@@ -404,7 +463,13 @@ where
         };
         let usable = residual.is_finite() && jacobian.magnitude().is_finite();
         let at = Linearised { residual, jacobian, rounding };
-        usable.then_some(Jet { at, w: energy.value, d: arc.d })
+        usable.then_some(Jet {
+            at,
+            energy: energy.value,
+            entropy: entropy.value,
+            d: arc.d,
+            growth: h * production,
+        })
     }
 }
 

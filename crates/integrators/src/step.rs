@@ -246,7 +246,8 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
         }
         let lost = || Lost { residual: root.residual, cause: Cause::Edge };
         let end = self.retraction.end(system.metric(), start.x, &root.u).map_err(|_| lost())?;
-        let last = residual.last_correction(&root, &end, system.energy_at(&end));
+        let values = [system.energy_at(&end), system.entropy_at(&end)];
+        let last = residual.last_correction(&root, &end, values);
         work.sweeps += usize::from(last.is_some());
         let LastCorrection { u, end, moved } =
             last.unwrap_or(LastCorrection { u: root.u, end, moved: false });

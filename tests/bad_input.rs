@@ -413,11 +413,8 @@ fn a_step_that_fails_passes_on_with_a_question_mark() {
         Ok(steps.advance()?.point)
     }
     assert!(program(0.1).is_ok());
-    let refused = program(1e300);
-    assert!(matches!(
-        refused,
-        Err(Error::Step(StepError::OutOfDomain { .. } | StepError::NotConverged { .. }))
-    ));
+    // No domain has an edge here: it is the solver that finds nothing.
+    assert!(matches!(program(1e300), Err(Error::Step(StepError::NotConverged { .. }))));
 }
 
 #[test]

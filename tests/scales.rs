@@ -386,3 +386,27 @@ fn an_overflow_is_called_one() {
         assert!(error.to_string().contains("overflow"), "{error}");
     }
 }
+
+#[test]
+fn an_underflow_is_called_one() {
+    // ½(q² + p²) is 10⁻³²⁰, which has three digits left.
+    let oscillator = System::on(Euclidean::<2>)
+        .bracket(Symplectic)
+        .energy(|x: &Vector2<Real>| x.norm_squared() * 0.5)
+        .build()
+        .unwrap();
+    for size in [1e-160, 1e-150] {
+        let start = vector![1.0, 0.5] * size;
+        let error = WeylMidpoint.run(&oscillator, start, Span::steps(0.1, 10)).unwrap_err();
+        let RunError::Model(ModelError::Underflow { field: "energy", .. }) = &error else {
+            panic!("another error: {error}");
+        };
+        assert!(error.to_string().contains("smaller units"), "{error}");
+    }
+    // All digits are there at 10⁻¹⁴⁰, and none is needed at the equilibrium.
+    for size in [1e-140, 0.0] {
+        let start = vector![1.0, 0.5] * size;
+        let run = WeylMidpoint.run(&oscillator, start, Span::steps(0.1, 100)).unwrap();
+        assert!(run.certificate().keeps_energy(), "{}", run.certificate());
+    }
+}

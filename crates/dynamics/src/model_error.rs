@@ -75,6 +75,19 @@ pub enum ModelError {
         /// The entries of the point.
         point: Vec<f64>,
     },
+    /// The values are so small that their last digits underflow.
+    #[error(
+        "the {field} has terms of size {size:.1e} at {point:?}: their last digits are below 10⁻³⁰⁸ and are lost; \
+         write the model in smaller units"
+    )]
+    Underflow {
+        /// Which field.
+        field: &'static str,
+        /// The size `|F| + Σ_i |∂_iF x_i|` of its terms.
+        size: f64,
+        /// The entries of the start.
+        point: Vec<f64>,
+    },
     /// `⟨w, f⟩ ≠ 0` for `dH` or a covector near it.
     #[error(
         "the force does work at {point:?}: ⟨w, force⟩ is {size:.1e} of its terms for w = dH or a covector \

@@ -69,6 +69,8 @@ fn examine<Y: Metriplectic + ?Sized>(
 ) -> Result<(), ModelError> {
     system.manifold().check(x0)?;
     value_not_finite(system, x0).map_or(Ok(()), Err)?;
+    has_digits(system.energy(), "energy", x0)?;
+    has_digits(system.entropy(), "entropy", x0)?;
     let mut independent = vec![0.0_f64; Y::Invariants::COUNT];
     let mut widen = |x: &Point<Y>| {
         let shares = independence(system, &ChartPoint::centre(x)).unwrap_or_default();
@@ -127,6 +129,20 @@ fn value_not_finite<Y: Metriplectic + ?Sized>(system: &Y, x: &Point<Y>) -> Optio
     ];
     let (field, value) = values.into_iter().find(|(_, value)| !value.is_finite())?;
     Some(ModelError::ValueNotFinite { field, value, point: Y::Manifold::entries(x) })
+}
+
+/// The terms of a field at the start are zero, or their last digits are numbers.
+fn has_digits<M: Manifold>(
+    f: &impl ScalarField<M>,
+    field: &'static str,
+    x0: &M::Point<f64>,
+) -> Result<(), ModelError> {
+    let jet = f.jet1(x0);
+    let size = jet.value.abs() + jet.df.abs().dot(&M::scales(x0));
+    if size > 0.0 && size * f64::EPSILON < f64::MIN_POSITIVE {
+        return Err(ModelError::Underflow { field, size, point: M::entries(x0) });
+    }
+    Ok(())
 }
 
 /// An examination of a model around a start.

@@ -7,6 +7,11 @@ use std::fmt;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Digits(pub(crate) f64);
 
+/// The number in a message about a field of this name.
+pub(crate) const fn digits(number: &f64) -> Digits {
+    Digits(*number)
+}
+
 impl fmt::Display for Digits {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let size = self.0.abs();

@@ -11,6 +11,7 @@ use metriplectic_manifolds::{AlgebraError, Manifold, MetricError, PointError};
 use crate::attitude::AttitudeError;
 use crate::certificate::counted;
 use crate::checkpoint::ResumeError;
+use crate::digits::digits;
 use crate::span::SpanError;
 use crate::trajectory::Trajectory;
 
@@ -48,8 +49,9 @@ impl fmt::Display for Tried {
 pub enum StepError {
     /// The implicit equation was not solved.
     #[error(
-        "the step of size {h:.3e} from t = {time:.6} was not solved: residual {residual:.1e} after \
-         {tried}; try a smaller step, below {suggested:.1e}"
+        "the step of size {h:.3e} from t = {} was not solved: residual {residual:.1e} after \
+         {tried}; try a smaller step, below {suggested:.1e}",
+        digits(.time)
     )]
     NotConverged {
         /// The time at which the step starts.
@@ -65,9 +67,10 @@ pub enum StepError {
     },
     /// The equation was not solved, and friction is stiff at this step size.
     #[error(
-        "the step of size {h:.3e} from t = {time:.6} was not solved, because the friction is stiff: \
+        "the step of size {h:.3e} from t = {} was not solved, because the friction is stiff: \
          h|K'| = {stiffness:.1e} (residual {residual:.1e} after {tried}); take steps below {:.1e} while the fast \
          variables relax, as `Span::until` does, or eliminate these",
+        digits(.time),
         .h * 10.0 / .stiffness
     )]
     StiffFriction {
@@ -86,9 +89,10 @@ pub enum StepError {
     /// was. The size is `|H| + Σ_i |∂_iH| (|x_i| + |d_i|)` with the displacement `d` of the step, at the end of
     /// the step where it is smaller.
     #[error(
-        "the first law is broken in the step of size {h:.3e} from t = {time:.6}: the energy would be off by \
+        "the first law is broken in the step of size {h:.3e} from t = {}: the energy would be off by \
          {change:.1e}, and its terms are of size {size:.1e}; the energy has too few digits there for this \
-         step: try a smaller one, or variables in which large terms do not cancel"
+         step: try a smaller one, or variables in which large terms do not cancel",
+        digits(.time)
     )]
     FirstLawBroken {
         /// The time at which the step starts.
@@ -103,9 +107,10 @@ pub enum StepError {
     /// A further invariant depends on the other fields at the start of the step: its differential is a
     /// combination of theirs. The step was not solved, or the invariant is no longer conserved.
     #[error(
-        "invariant {index} depends on the other fields at t = {time:.6}: only {share:.1e} of its \
+        "invariant {index} depends on the other fields at t = {}: only {share:.1e} of its \
          differential is independent of theirs, and no step from there conserves it (it has changed by \
-         {change:.1e} since the start); leave it out of the list, or keep away from such states"
+         {change:.1e} since the start); leave it out of the list, or keep away from such states",
+        digits(.time)
     )]
     DependentInvariants {
         /// The time at which the step starts.
@@ -119,9 +124,10 @@ pub enum StepError {
     },
     /// The controller asks for a step below the least one.
     #[error(
-        "the step from t = {time:.6} would have to be {h:.1e} long to keep the tolerance, below the least \
+        "the step from t = {} would have to be {h:.1e} long to keep the tolerance, below the least \
          step {least:.1e}; the motion may end there: see the energy and the entropy around this \
-         state, or ask for a coarser tolerance"
+         state, or ask for a coarser tolerance",
+        digits(.time)
     )]
     TooSmall {
         /// The time at which the step starts.
@@ -133,9 +139,10 @@ pub enum StepError {
     },
     /// The step that the controller asks for is shorter than the last digit of the time.
     #[error(
-        "the step from t = {time:.6} would have to be {h:.1e} long to keep the tolerance, below the last \
+        "the step from t = {} would have to be {h:.1e} long to keep the tolerance, below the last \
          digit of the time; the motion may end there: see the energy and the entropy around this state, \
-         let the run start at t = 0, or ask for a coarser tolerance"
+         let the run start at t = 0, or ask for a coarser tolerance",
+        digits(.time)
     )]
     Standstill {
         /// The time at which the step starts.
@@ -146,8 +153,9 @@ pub enum StepError {
     /// Even in the smallest part of the step the way to a solution leads out of the domain of a field, of
     /// the metric or of the chart.
     #[error(
-        "the step of size {h:.3e} from t = {time:.6} leaves the domain of the model wherever it goes \
-         ({tried}); try a smaller step, or check energy and entropy there"
+        "the step of size {h:.3e} from t = {} leaves the domain of the model wherever it goes \
+         ({tried}); try a smaller step, or check energy and entropy there",
+        digits(.time)
     )]
     OutOfDomain {
         /// The time at which the step starts.

@@ -118,9 +118,11 @@ where
     R: Retraction<Y::Manifold, Y::Metric>,
     W: DiscreteGradient,
 {
-    let back = one(scheme, system, &one(scheme, system, x, h)?, -h)?;
+    let end = one(scheme, system, x, h)?;
+    let back = one(scheme, system, &end, -h)?;
     let (q, scales) = (Y::Manifold::coordinates(x, &back), Y::Manifold::scales(x));
-    let there = Y::Manifold::scales(&back);
+    // An entry that starts at zero has the size that it reaches.
+    let there = Y::Manifold::scales(&end);
     for i in 0..Dim::<Y>::LEN {
         let bound = 1e-13 * scales[i].max(there[i]);
         BrokenLaw::unless("steps of h and −h lead back", q[i].abs(), bound)?;

@@ -57,6 +57,10 @@ examples:
 study:
     cargo test --release --workspace -- --ignored
 
+# compare the bits of many runs with tests/golden.txt, or write it with `--bless`: for this machine and compiler
+golden *flags:
+    {{ if flags == "--bless" { "BLESS=1" } else { "" } }} cargo test --release --all-features --test golden -- --ignored --nocapture
+
 # random input without sense for ten minutes: a third of the seconds for each of six searches, two at a time
 fuzz seconds="600":
     FUZZ_SECONDS=$(({{ seconds }} / 3)) cargo test --release --all-features --test fuzz -- --nocapture --test-threads 2

@@ -1,0 +1,75 @@
+//! The bits of many runs, compared with a record of them: a change of structure must not change a result.
+//!
+//! Not part of the gate, because the elementary functions of another machine may round otherwise:
+//! `just golden`, and `just golden --bless` writes the record.
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::path::Path;
+use std::process::Command;
+
+use metriplectic::integrators::Course;
+use metriplectic::prelude::*;
+use metriplectic_studies::problems::{self, Problem, Study};
+
+/// A record of every problem with each of its retractions, in steps of one size and of many.
+struct Record(BTreeMap<String, String>);
+
+impl Study for Record {
+    fn visit<Y, R>(&mut self, problem: &Problem<Y>, scheme: &'static str, retraction: R, _: f64)
+    where
+        Y: Metriplectic,
+        R: Retraction<Y::Manifold, Y::Metric> + Copy,
+    {
+        let fixed = Span::steps(problem.time / 60.0, 60);
+        let courses: [(&str, Course); 2] = [
+            ("fixed", fixed.into()),
+            ("adaptive", Span::until(problem.time).tolerance(1e-4).into()),
+        ];
+        for (kind, course) in courses {
+            let run = Scheme::new(retraction).run(&problem.system, problem.start.clone(), course);
+            let run = run.unwrap_or_else(|error| panic!("{}: {error}", problem.name));
+            let mut bits = String::new();
+            for number in Y::Manifold::entries(&run.last().point) {
+                write!(bits, "{:016x} ", number.to_bits()).unwrap();
+            }
+            let counts = run.certificate();
+            write!(bits, "after {} steps", counts.steps).unwrap();
+            self.0.insert(format!("{}, {scheme}, {kind}", problem.name), bits);
+        }
+    }
+}
+
+/// The final state of every example, with all digits.
+fn examples(record: &mut Record) {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples");
+    for file in std::fs::read_dir(folder).unwrap() {
+        let name = file.unwrap().path().file_stem().unwrap().to_str().unwrap().to_owned();
+        let output = Command::new(env!("CARGO"))
+            .args(["run", "--quiet", "--release", "--all-features", "--example", &name])
+            .args(["--", "--json"])
+            .output()
+            .unwrap();
+        let report: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+        if !report["final_state"].is_null() {
+            record.0.insert(format!("example {name}"), report["final_state"].to_string());
+        }
+    }
+}
+
+#[test]
+#[ignore = "the record is of one machine"]
+fn every_run_has_the_bits_of_the_record() {
+    let mut record = Record(BTreeMap::new());
+    problems::each(&mut record);
+    examples(&mut record);
+    let text: String = record.0.iter().map(|(name, bits)| format!("{name}: {bits}\n")).collect();
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden.txt");
+    if std::env::var_os("BLESS").is_some() {
+        std::fs::write(&path, &text).unwrap();
+    }
+    let known = std::fs::read_to_string(&path).unwrap();
+    let changed: Vec<&str> = text.lines().filter(|line| !known.lines().any(|k| k == *line)).collect();
+    println!("{} rows", record.0.len());
+    assert!(changed.is_empty(), "{} rows have changed:\n{}", changed.len(), changed.join("\n"));
+}

@@ -1,7 +1,7 @@
 //! The damped oscillator and its bath: friction of your own, beside a closed form.
 //!
 //! `x = (q, p, s)` with a bath of temperature 1, `H = ½p² + ½q² + s`, `S = s` and `K = (γ/w_s) b bᵀ`,
-//! `b = (0, w_s, −w_p)`. It is made of the covector `w` that it has to kill: `dH` in the equations of
+//! `b = (0, w_s, −w_p)`. It is made of the covector `w` that it has to annihilate: `dH` in the equations of
 //! motion, a discrete gradient of `H` in a step (after Öttinger 2018). From `(2, 0, 0)`
 //!
 //! ```text

@@ -11,7 +11,7 @@
 //!
 //! The leak makes less entropy in a step than a step of order 2 has of error. The published scheme,
 //! with `dS` at the midpoint, lowers `S` on 150 of 300 steps, by 1.4e-3 at worst; the exact one, with a
-//! discrete gradient of `S` that its bracket kills, raises `S` on every step. Both keep the energy.
+//! discrete gradient of `S` that its bracket annihilates, raises `S` on every step. Both keep the energy.
 
 use std::error::Error;
 
@@ -30,7 +30,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         let push = Vector4::new(1.0.into(), 0.0.into(), -left, right);
         push * Vector4::y().transpose() - Vector4::y() * push.transpose()
     };
-    // K = α b bᵀ kills every w, and for w = dH it is α [[1, −1], [−1, 1]] on (U₁, U₂).
+    // K = α b bᵀ annihilates every w, and for w = dH it is α [[1, −1], [−1, 1]] on (U₁, U₂).
     let leak = |_: &Vector4<Real>, w: &Vector4<Real>| {
         let b = Vector4::new(0.0.into(), 0.0.into(), w.w, -w.z);
         b * b.transpose() * Real::from(ALPHA)

@@ -1,6 +1,6 @@
 //! Relaxation on S²: without a bracket, entropy climbs along a level curve of the energy.
 //!
-//! `x' = K dS`, where `K = |dH|² G* − dH ⊗ dH` of the round metric kills `dH`, with
+//! `x' = K dS`, where `K = |dH|² G* − dH ⊗ dH` of the round metric annihilates `dH`, with
 //! `H = ½ Σ D_i (x_i² + ⅔ x_i³)`, `D = (1, ½, ¼)`, and `S = x₃ + 0.3 x₁x₂`. The state starts
 //! near the least entropy on the level curve `H = H₀` and comes to rest at the greatest, where `dS ∥ dH`.
 //! The curve itself is the orbit of the same energy under the bracket of the area form,

@@ -5,7 +5,7 @@
 //! of `T*SO(3)` for attitude `R` and body momentum `p`, `H = ½p·Ω + ce^{s/c}`, `Ω = I⁻¹p`, and `S = s`, let
 //! `N α = p × α_p − α_R` be the torque of a differential `α`: it is `p × Ω` for `dH`, and 0 for a component
 //! `a·Rp` of the momentum, whose differential is `(p × b, b, 0)` with `b = Rᵀa`. So
-//! `K(α, β) = γ B α · B β`, `B α = w_s N α − α_s N w`, is positive and kills `w = dH` and `d(Rp)`. As
+//! `K(α, β) = γ B α · B β`, `B α = w_s N α − α_s N w`, is positive and annihilates `w = dH` and `d(Rp)`. As
 //! `B dS = −N w`, with the temperature `T = w_s` the equations are
 //! `R' = R Ω̃^`, `p' = p × Ω̃`, `s' = γ |p × Ω|²`, with `Ω̃ = Ω + γT p × Ω`. Listed as three momenta `Rp` is kept
 //! by the steps too. The least kinetic energy is `½|p|²/I₁`: the end is a spin about the axis `e₁`.

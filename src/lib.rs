@@ -42,7 +42,7 @@
 //! | [`Riemannian`](manifolds::Riemannian) metric | flat, sharp, norm, geodesics | [`manifolds`] |
 //! | [`Retraction`](manifolds::Retraction) | `R_h`, `R_h⁻¹`: [`WeylMidpoint`](manifolds::WeylMidpoint), [`Exponential`](manifolds::Exponential) | [`manifolds`] |
 //! | [`Bracket`](dynamics::Bracket) | `Π` | [`dynamics`] |
-//! | [`Dissipation`](dynamics::Dissipation) | `K`, given the covector it must kill | [`dynamics`] |
+//! | [`Dissipation`](dynamics::Dissipation) | `K`, given the covector it must annihilate | [`dynamics`] |
 //! | [`System`](dynamics::System) | all of these with `H` and `S` | [`dynamics`] |
 //! | [`DiscreteGradient`](integrators::DiscreteGradient) | a covector with `⟨w, d⟩ = ΔH` | [`integrators`] |
 //! | [`RootFinder`](integrators::RootFinder) | [`Newton`](integrators::Newton), and argmin as the globaliser | [`integrators`] |

@@ -2,9 +2,9 @@
 
 mod models;
 
-use metriplectic::integrators::residual::Recall;
+use metriplectic::integrators::residual::DriftCorrection;
 use metriplectic::integrators::step::{Memory, Start};
-use metriplectic::integrators::{Course, SpanError, StepError};
+use metriplectic::integrators::{Schedule, SpanError, StepError};
 use metriplectic::prelude::*;
 use metriplectic_studies::Order;
 use models::{TUMBLING, UNSTABLE, free_body, half_square, relaxing_body, top};
@@ -84,9 +84,18 @@ fn the_laws_hold_in_steps_of_random_sizes() {
     for step in 1..100_000 {
         let fraction = (f64::from(step) * 0.618_033_988_749_894_9).fract();
         let h = 1e-4 * 1e4_f64.powf(fraction);
-        let left_over = Recall { energy: energy(&x) - start, ..Recall::nothing() };
+        let accumulated_error =
+            DriftCorrection { energy: energy(&x) - start, ..DriftCorrection::nothing() };
         let (here, entropy) = (energy(&x), 0.5 * x.norm_squared());
-        let from = Start { x: &x, time, h, energy: here, entropy, invariants: [0.0; 3], left_over };
+        let from = Start {
+            x: &x,
+            time,
+            h,
+            energy: here,
+            entropy,
+            invariants: [0.0; 3],
+            accumulated_error,
+        };
         let (end, _) = scheme.step(&body, &from, &mut memory).expect("the step is solved");
         let (before, after) = (0.5 * x.norm_squared(), 0.5 * end.norm_squared());
         let round_off = 4.0 * f64::EPSILON * (before.max(1.0) + 2.0 * before);
@@ -383,7 +392,7 @@ fn a_further_invariant_and_a_metric_from_a_closure_change_nothing() {
 #[test]
 fn an_attitude_follows_steps_of_any_size() {
     let body = relaxing_body();
-    let end = |course: Course| {
+    let end = |course: Schedule| {
         let run = WeylMidpoint.run(&body, UNSTABLE, course).expect("it runs");
         let attitudes = Attitude::along(&body, &run, Matrix3::identity()).expect("it follows");
         attitudes[attitudes.len() - 1]

@@ -108,7 +108,7 @@ fn a_metric_or_bracket_that_is_not_a_number_is_named_and_so_is_its_derivative() 
 
 #[test]
 fn a_dissipation_that_changes_an_invariant_is_refused() {
-    // K = |w|² − w wᵀ kills w, and nothing else.
+    // K = |w|² − w wᵀ annihilates w, and nothing else.
     let friction = |_: &Vector3<Real>, w: &Vector3<Real>| {
         Matrix3::from_diagonal_element(w.norm_squared()) - w * w.transpose()
     };

@@ -2,7 +2,7 @@
 
 mod models;
 
-use metriplectic::integrators::{Checkpoint, Course, ResumeError, SpanError, Steps};
+use metriplectic::integrators::{Checkpoint, ResumeError, Schedule, SpanError, Steps};
 use metriplectic::manifolds::PointError;
 use metriplectic::prelude::*;
 use models::{TUMBLING, UNSTABLE, free_body, half_square, relaxing_body, top};
@@ -40,8 +40,12 @@ fn through_a_file(checkpoint: &Checkpoint) -> Checkpoint {
 }
 
 /// Puts a run down at several places and takes it up again.
-fn resumes<Y: Metriplectic>(name: &str, system: &Y, x0: Start<Y>, course: impl Into<Course> + Copy)
-where
+fn resumes<Y: Metriplectic>(
+    name: &str,
+    system: &Y,
+    x0: Start<Y>,
+    course: impl Into<Schedule> + Copy,
+) where
     WeylMidpoint: Retraction<Y::Manifold, Y::Metric>,
 {
     let mut whole =
@@ -195,7 +199,7 @@ fn a_damaged_checkpoint_is_refused() {
     assert!(matches!(error, Some(ResumeError::Damaged { what: "next step", .. })));
     let error = with(&|tree| tree["every"] = 0.into());
     assert!(matches!(error, Some(ResumeError::Damaged { .. })));
-    let error = with(&|tree| tree["carry"] = serde_json::json!(["0.0"]));
+    let error = with(&|tree| tree["compensation"] = serde_json::json!(["0.0"]));
     assert!(matches!(error, Some(ResumeError::Length { found: 1, expected: 3, .. })));
     // What is no number, and what is no field, is not even read.
     let mut unread = tree.clone();
@@ -209,7 +213,7 @@ fn a_damaged_checkpoint_is_refused() {
 #[test]
 fn every_number_of_a_checkpoint_is_compared_with_the_others() {
     let body = relaxing_body();
-    let tree = |course: Course| {
+    let tree = |course: Schedule| {
         let mut steps = WeylMidpoint.steps(&body, UNSTABLE, course).unwrap();
         for _ in 0..20 {
             steps.advance().unwrap();
@@ -244,7 +248,7 @@ fn every_number_of_a_checkpoint_is_compared_with_the_others() {
         ("/time", "1e9", "time"),
         ("/largest_velocity/0", "NaN", "largest velocities"),
         ("/largest_velocity/0", "-1.0", "largest velocity of an entry"),
-        ("/carry/0", "1e-3", "lost digits of an entry"),
+        ("/compensation/0", "1e-3", "lost digits of an entry"),
         ("/sizes/1", "-1.0", "size of an entry"),
     ] {
         for tree in [&fixed, &adaptive] {

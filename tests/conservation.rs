@@ -221,7 +221,7 @@ fn an_equilibrium_stays_where_it_is() {
         assert!(run.iter().all(|state| state.point == start));
         let certificate = run.certificate();
         assert!(certificate.keeps_energy() && certificate.keeps_entropy());
-        assert_eq!((certificate.retries, certificate.sweeps), (0, 0));
+        assert_eq!((certificate.retries, certificate.iterations), (0, 0));
     }
 }
 
@@ -229,7 +229,7 @@ fn an_equilibrium_stays_where_it_is() {
 fn the_origin_of_a_dual_is_an_equilibrium_too() {
     let run = WeylMidpoint.run(&relaxing_body(), Vector3::zeros(), Span::steps(0.1, 10)).unwrap();
     assert_eq!(run.last().point, Vector3::zeros());
-    assert_eq!((run.certificate().retries, run.certificate().sweeps), (0, 0));
+    assert_eq!((run.certificate().retries, run.certificate().iterations), (0, 0));
 }
 
 #[test]

@@ -5,7 +5,7 @@
 mod models;
 
 use metriplectic::fields::{ChartPoint, Matrix};
-use metriplectic::manifolds::{ArcJet, GeodesicEnd, MetricError, Riemannian};
+use metriplectic::manifolds::{GeodesicEnd, MetricError, Riemannian, StepPathJet};
 use metriplectic::prelude::*;
 use metriplectic_studies::Order;
 use models::top;
@@ -244,7 +244,7 @@ impl<G: Riemannian<Euclidean<3>>> Riemannian<Euclidean<3>> for Straight<G> {
         &self,
         x: &Vector3<f64>,
         d: &Vector3<f64>,
-    ) -> Result<ArcJet<Euclidean<3>>, MetricError> {
+    ) -> Result<StepPathJet<Euclidean<3>>, MetricError> {
         Riemannian::<Euclidean<3>>::weyl_jet(&Canonical, x, d)
     }
 

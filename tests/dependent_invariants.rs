@@ -2,7 +2,7 @@
 //! laws, the run goes on, and the certificate shows what the Casimir has changed by.
 
 use metriplectic::fields::Space;
-use metriplectic::integrators::{Course, StepError};
+use metriplectic::integrators::{Schedule, StepError};
 use metriplectic::prelude::*;
 
 type State6 = SVector<Real, 6>;
@@ -16,7 +16,7 @@ fn certified<Y: Metriplectic>(
     name: &str,
     system: &Y,
     start: &<Y::Manifold as Space>::Point<f64>,
-    course: impl Into<Course>,
+    course: impl Into<Schedule>,
     bound: f64,
 ) where
     WeylMidpoint: Retraction<Y::Manifold, Y::Metric>,
@@ -203,14 +203,14 @@ fn a_run_that_dependence_ends_says_so() {
         .build()
         .unwrap();
     let start = vector![0.25, 0.125, 0.0];
-    let ends: [Course; 3] =
+    let ends: [Schedule; 3] =
         [Span::steps(0.1, 30).into(), Span::steps(0.01, 300).into(), Span::until(3.0).into()];
     for course in ends {
         match WeylMidpoint.run(&system, start, course) {
             Err(RunError::Step { cause, trajectory }) => {
                 println!("{cause}\n{}", trajectory.certificate());
                 assert!(
-                    matches!(cause, StepError::DependentInvariants { index: 0, share, .. } if share < 1e-3),
+                    matches!(cause, StepError::DependentInvariants { index: 0, fraction, .. } if fraction < 1e-3),
                     "{cause}"
                 );
             }

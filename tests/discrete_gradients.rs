@@ -13,7 +13,7 @@ use proptest::prelude::*;
 use rand::SeedableRng;
 use rand::rngs::ChaCha8Rng;
 
-/// The laws of each of them, on the arc of `u` from `x`.
+/// The laws of each of them, on the path of `u` from `x`.
 fn each<M: Manifold>(
     f: &impl ScalarField<M>,
     metric: &impl Riemannian<M>,
@@ -97,7 +97,7 @@ fn the_covector_of_gonzalez_has_its_digits_at_every_distance() {
             &WeylMidpoint,
             (&x, &(y - x)),
         )
-        .expect("the arc exists");
+        .expect("the path exists");
         let value = ScalarField::<Euclidean<2>>::at::<f64>(&f, &x).abs();
         let size = exact.norm() + value / (y - x).norm().max(1e-2);
         let error = (w - exact).norm() / (f64::EPSILON * size);
@@ -227,7 +227,7 @@ fn the_other_gradients_keep_both_laws_over_many_steps() {
 
 #[test]
 fn a_centre_is_all_there_is_at_rest() {
-    // An arc without length has the differential itself.
+    // A path without length has the differential itself.
     let x = vector![0.3, -0.4, 0.5];
     let df =
         metriplectic::fields::differential::<Euclidean<3>, f64>(&height, &ChartPoint::centre(&x));
@@ -238,5 +238,5 @@ fn a_centre_is_all_there_is_at_rest() {
         &WeylMidpoint,
         (&x, &Vector3::zeros()),
     );
-    assert!((w.expect("the arc exists") - df).norm() <= 4.0 * f64::EPSILON * df.norm());
+    assert!((w.expect("the path exists") - df).norm() <= 4.0 * f64::EPSILON * df.norm());
 }

@@ -6,7 +6,7 @@ mod models;
 use metriplectic::dynamics::{Bracket, Dissipation, laws};
 use metriplectic::fields::{BrokenLaw, ChartPoint};
 use metriplectic::integrators::DiscreteGradient;
-use metriplectic::manifolds::{Arc, rotations};
+use metriplectic::manifolds::{StepPath, rotations};
 use metriplectic::prelude::*;
 use models::{half_square, kinetic, relaxing_body, top};
 use proptest::prelude::*;
@@ -44,7 +44,7 @@ proptest! {
     ) {
         let body = System::on(LieDual::so3()).energy(kinetic(Vector3::from(I))).build().unwrap();
         let (x, dh) = (ChartPoint::centre(&p), velocity(&p));
-        let pi = body.bracket().tensor(&body.site(&x, &Vector3::zeros())).unwrap();
+        let pi = body.bracket().tensor(&body.bracket_args(&x, &Vector3::zeros())).unwrap();
         let field = body.velocity(&x).unwrap();
         let bracket = |f: &Vector3<f64>, g: &Vector3<f64>| {
             (0..3).flat_map(|i| (0..3).map(move |j| (i, j)))
@@ -150,8 +150,8 @@ proptest! {
             (I[2] - I[1]) * o.y * o.z, (I[0] - I[2]) * o.x * o.z, (I[1] - I[0]) * o.x * o.y
         ];
         same(&force, &example)?;
-        let turned = algebra.bracket(&o, &p);
-        equal(p.dot(&algebra.coadjoint(&o, &(p + force))), turned.norm_squared())?;
+        let dg_v = algebra.bracket(&o, &p);
+        equal(p.dot(&algebra.coadjoint(&o, &(p + force))), dg_v.norm_squared())?;
     }
 
     /// §3 and §4.3: the relaxed rigid body, printed twice, and its matrix `K`.
@@ -201,20 +201,20 @@ proptest! {
             vector![3.0 * p.x * p.x * p.y, p.x.powi(3) + p.z, p.z.powi(3) + p.y]
         };
         let at = |p: &Vector3<f64>| ScalarField::<Euclidean<3>>::at::<f64>(&f, p);
-        let arc: Arc<Euclidean<3>> = WeylMidpoint.arc(&Canonical, &x, &d).unwrap();
+        let path: StepPath<Euclidean<3>> = WeylMidpoint.step_path(&Canonical, &x, &d).unwrap();
         let (y, z) = (x + d, x + d * 0.5);
         let close = |a: Vector3<f64>, b: Vector3<f64>| {
             BrokenLaw::unless("the printed covector", (a - b).norm(), 1e-12 * (1.0 + b.norm()))
         };
         // Simpson's rule is exact to degree 3, that of a gradient of a polynomial of degree 4.
         let mean = (df(x) + df(z) * 4.0 + df(y)) / 6.0;
-        close(MeanValue.mean(&f, &x, &arc), mean)?;
+        close(MeanValue.mean(&f, &x, &path), mean)?;
         let slope = (at(&y) - at(&x) - df(z).dot(&d)) / d.norm_squared();
-        close(Gonzalez.covector(&f, &Canonical, (&x, at(&x)), &arc), df(z) + d * slope)?;
+        close(Gonzalez.covector(&f, &Canonical, (&x, at(&x)), &path), df(z) + d * slope)?;
         let corners = [x, vector![y.x, x.y, x.z], vector![y.x, y.y, x.z], y];
         let quotients =
             Vector3::from_fn(|i, _| (at(&corners[i + 1]) - at(&corners[i])) / (y[i] - x[i]));
-        close(ItohAbe.mean(&f, &x, &arc), quotients)?;
+        close(ItohAbe.mean(&f, &x, &path), quotients)?;
         for w in [mean, df(z) + d * slope, quotients] {
             equal(w.dot(&d) / 10.0, (at(&y) - at(&x)) / 10.0)?;
         }

@@ -6,7 +6,7 @@ mod models;
 use metriplectic::dynamics::{Bracket, Dissipation, NoDissipation};
 use metriplectic::fields::{ChartPoint, differential};
 use metriplectic::integrators::DiscreteGradient;
-use metriplectic::manifolds::{Arc, Riemannian, Tangent, rotations};
+use metriplectic::manifolds::{Riemannian, StepPath, Tangent, rotations};
 use metriplectic::prelude::*;
 use metriplectic_studies::Order;
 use models::{TUMBLING, UNSTABLE, free_body, half_square, kinetic, relaxing_body, top};
@@ -108,7 +108,7 @@ fn the_remark_has_another_scale_than_the_equation_before_it() {
     stated(near, 1e-8 * semid.norm(), 1e-14);
     assert!((off(w * 1e-4).norm() - SQRT_2).abs() <= 8.0 * EPS);
 
-    // With the factor C it is an extension, which two functions are killed by: the velocity of the
+    // With the factor C it is an extension, which two functions are annihilated by: the velocity of the
     // library on R³, where nothing moves but by friction, and L = p₁ + p₂³ is kept, too.
     let system = System::on(Euclidean::<3>)
         .energy(kinetic(INERTIA))
@@ -142,7 +142,7 @@ fn of_the_plane() -> metriplectic::dynamics::ConstantPoisson<5> {
 }
 
 #[test]
-fn a_momentum_is_kept_if_its_differential_is_killed() {
+fn a_momentum_is_kept_if_its_differential_is_annihilated() {
     let start = vector![1.0, 0.0, 0.0, 0.8, 0.0];
     let span = Span::steps(0.01, 100);
     let angular_momentum = |x: &Vector5<Real>| x[0] * x[3] - x[1] * x[2];
@@ -158,7 +158,7 @@ fn a_momentum_is_kept_if_its_differential_is_killed() {
     let left = angular_momentum(&run.last().point.cast()).re / 0.8;
     stated(left, (-2.0_f64).exp(), 1e-3);
 
-    // The form of the remark with L = (H, J), times C_H, kills the differential dJ.
+    // The form of the remark with L = (H, J), times C_H, annihilates the differential dJ.
     let kept = builder().momentum(angular_momentum).build().unwrap();
     let run = WeylMidpoint.run(&kept, start, span).unwrap();
     let certificate = run.certificate();
@@ -221,7 +221,7 @@ fn before_reduction_the_entropy_is_no_casimir_and_a_function_of_the_momentum() {
     // The canonical bracket of T*SO(3) has no Casimir but constants: Π dC = (p, 0).
     let system = body_in_space();
     let (x, dc) = (ChartPoint::centre(&(r, P)), vector![0.0, 0.0, 0.0, P.x, P.y, P.z]);
-    let moved = system.bracket().apply(&system.site(&x, &dc), &dc).unwrap();
+    let moved = system.bracket().apply(&system.bracket_args(&x, &dc), &dc).unwrap();
     stated(moved.norm(), P.norm(), 1e-14);
     // On so(3)* it is one.
     assert!((P.cross(&P)).norm() <= EPS);
@@ -342,7 +342,7 @@ fn the_published_scheme_lowers_the_entropy_and_by_third_order_only() {
         -run(0.0, n, SecondLaw::Published).min_entropy_increment
     });
     assert!(worst.agrees(3.0, 0.05), "{worst}");
-    // With a discrete gradient of S, and a bracket that kills it, there is no loss at all.
+    // With a discrete gradient of S, and a bracket that annihilates it, there is no loss at all.
     let exact = run(1e-3, 300, SecondLaw::Exact);
     assert!(exact.keeps_entropy() && exact.entropy_gained > 5e-3, "{exact}");
     let isolated = run(0.0, 300, SecondLaw::Exact);
@@ -459,10 +459,10 @@ fn a_discrete_gradient_is_a_function_of_two_points() {
     let (z, d) = ((P + y) * 0.5, y - P);
     let at = |f: &dyn Fn(&Vector3<Real>) -> Real, p: &Vector3<f64>| f(&p.cast()).re;
     let gradient = |f: &dyn Fn(&Vector3<Real>) -> Real| {
-        let arc: Arc<LieDual<3>> = Arc { z: ChartPoint::centre(&z), d, end: y };
+        let path: StepPath<LieDual<3>> = StepPath { z: ChartPoint::centre(&z), d, end: y };
         let field = |p: &Vector3<Real>| f(p);
-        let g = Riemannian::<LieDual<3>>::at(&Canonical, &arc.z).expect("a metric");
-        Gonzalez.covector(&field, &g, (&P, at(f, &P)), &arc)
+        let g = Riemannian::<LieDual<3>>::at(&Canonical, &path.z).expect("a metric");
+        Gonzalez.covector(&field, &g, (&P, at(f, &P)), &path)
     };
     // For the quadratic energy of the example, ∇H(z) and the discrete gradient of (p, P) are one.
     let body = kinetic(INERTIA);
@@ -489,7 +489,7 @@ fn the_base_of_a_pair_is_a_point_and_not_a_vector() {
         )
         .expect("a pair");
         Retraction::<Sphere<2>, Canonical>::inverse(&WeylMidpoint, &Canonical, &x, &y)
-            .expect("an arc")
+            .expect("a path")
     });
     // Two elements of TP, |v| apart, with one z = τ(R⁻¹(x, x')) in P.
     assert!((short.base - long.base).norm() <= 4.0 * EPS && (short.base - z).norm() <= 4.0 * EPS);
@@ -500,18 +500,18 @@ fn the_base_of_a_pair_is_a_point_and_not_a_vector() {
 fn a_discrete_gradient_on_a_manifold_counts_the_step() {
     let h = 0.1;
     let start = vector![0.6, 0.0, 0.8];
-    // An arc of the sphere that keeps no energy, and the covectors of both formulas on it.
+    // A path of the sphere that keeps no energy, and the covectors of both formulas on it.
     let both = |length: f64| {
         let u = vector![0.6, 0.8] * length;
-        let arc: Arc<Sphere<2>> =
-            WeylMidpoint.arc(&Canonical, &start, &u).expect("an arc of the sphere");
-        let g = Riemannian::<Sphere<2>>::at(&Canonical, &arc.z).expect("a metric");
+        let path: StepPath<Sphere<2>> =
+            WeylMidpoint.step_path(&Canonical, &start, &u).expect("a path of the sphere");
+        let g = Riemannian::<Sphere<2>>::at(&Canonical, &path.z).expect("a metric");
         let (from, to): (f64, f64) = (
             ScalarField::<Sphere<2>>::at(&top, &start),
-            ScalarField::<Sphere<2>>::at(&top, &arc.end),
+            ScalarField::<Sphere<2>>::at(&top, &path.end),
         );
-        let corrected = Gonzalez.covector(&top, &g, (&start, from), &arc);
-        let (v, df) = (arc.d / h, differential::<Sphere<2>, f64>(&top, &arc.z));
+        let corrected = Gonzalez.covector(&top, &g, (&start, from), &path);
+        let (v, df) = (path.d / h, differential::<Sphere<2>, f64>(&top, &path.z));
         let printed = df + v * ((to - from - df.dot(&v)) / v.norm_squared());
         (printed, corrected, df, v, to - from)
     };
@@ -521,23 +521,23 @@ fn a_discrete_gradient_on_a_manifold_counts_the_step() {
     // h times the change of the energy.
     assert!((h * corrected.dot(&v) - change).abs() <= 8.0 * EPS);
     stated(h * printed.dot(&v) / change, h, 1e-12);
-    // Nor does it tend to dH as the points meet: it misses (1 − h) of the part along the arc.
+    // Nor does it tend to dH as the points meet: it misses (1 − h) of the part along the path.
     let (printed, corrected, df, v, _) = both(1e-4);
     assert!((corrected - df).norm() < 1e-8);
     let along = df.dot(&v) / v.norm();
     stated((printed - df).norm() / along.abs(), 1.0 - h, 1e-4);
     stated(along.abs(), 0.3312, 1e-3);
-    // On the arcs that solve a step both agree, since H does not change: the scheme itself is right.
+    // On the paths that solve a step both agree, since H does not change: the scheme itself is right.
     let system = System::on(Sphere::<2>::round()).bracket(AreaForm).energy(top).build().unwrap();
     let y = end(&system, start, Span::steps(h, 1));
     let Tangent { base, vector: d } =
         Retraction::<Sphere<2>, Canonical>::inverse(&WeylMidpoint, &Canonical, &start, &y).unwrap();
-    let arc: Arc<Sphere<2>> = Arc { z: ChartPoint::centre(&base), d, end: y };
-    let g = Riemannian::<Sphere<2>>::at(&Canonical, &arc.z).unwrap();
+    let path: StepPath<Sphere<2>> = StepPath { z: ChartPoint::centre(&base), d, end: y };
+    let g = Riemannian::<Sphere<2>>::at(&Canonical, &path.z).unwrap();
     let (from, to): (f64, f64) =
         (ScalarField::<Sphere<2>>::at(&top, &start), ScalarField::<Sphere<2>>::at(&top, &y));
-    let w = Gonzalez.covector(&top, &g, (&start, from), &arc);
-    let (v, df) = (d / h, differential::<Sphere<2>, f64>(&top, &arc.z));
+    let w = Gonzalez.covector(&top, &g, (&start, from), &path);
+    let (v, df) = (d / h, differential::<Sphere<2>, f64>(&top, &path.z));
     let printed = df + v * ((to - from - df.dot(&v)) / v.norm_squared());
     assert!(v.norm() > 0.1 && (printed - w).norm() <= 64.0 * EPS, "{:e}", (printed - w).norm());
 }

@@ -183,7 +183,7 @@ where
 {
     // A start without a solution is given up sooner than usual.
     let scheme = Scheme { splits: 3, ..Scheme::new(WeylMidpoint) }
-        .newton(Newton { sweeps: 12, ..Newton::default() });
+        .newton(Newton { iterations: 12, ..Newton::default() });
     let (state, certificate, failure) = if adaptive {
         let mut steps = match scheme.steps(system, x0, Span::until(h).tolerance(1e-2)) {
             Ok(steps) => steps,
@@ -316,7 +316,10 @@ fn metrics_and_their_geodesics() {
         finite("exp", Riemannian::<Euclidean<2>>::end(&metric, &x, &v).map(|y| m(&y)))?;
         finite("log", Riemannian::<Euclidean<2>>::log(&metric, &x, &y).map(|v| m(&v)))?;
         finite("norm", Riemannian::<Euclidean<2>>::norm(&metric, &x, &v).map(|l| vec![l]))?;
-        finite("volume", Riemannian::<Euclidean<2>>::volume(&metric, &centre).map(|l| vec![l]))
+        finite(
+            "volume",
+            Riemannian::<Euclidean<2>>::volume_density(&metric, &centre).map(|l| vec![l]),
+        )
     });
 }
 

@@ -8,7 +8,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 use std::process::Command;
 
-use metriplectic::integrators::Course;
+use metriplectic::integrators::Schedule;
 use metriplectic::prelude::*;
 use metriplectic_studies::problems::{self, Problem, Study};
 
@@ -22,7 +22,7 @@ impl Study for Record {
         R: Retraction<Y::Manifold, Y::Metric> + Copy,
     {
         let fixed = Span::steps(problem.time / 60.0, 60);
-        let courses: [(&str, Course); 2] = [
+        let courses: [(&str, Schedule); 2] = [
             ("fixed", fixed.into()),
             ("adaptive", Span::until(problem.time).tolerance(1e-4).into()),
         ];
@@ -69,7 +69,8 @@ fn every_run_has_the_bits_of_the_record() {
         std::fs::write(&path, &text).unwrap();
     }
     let known = std::fs::read_to_string(&path).unwrap();
-    let changed: Vec<&str> = text.lines().filter(|line| !known.lines().any(|k| k == *line)).collect();
+    let changed: Vec<&str> =
+        text.lines().filter(|line| !known.lines().any(|k| k == *line)).collect();
     println!("{} rows", record.0.len());
     assert!(changed.is_empty(), "{} rows have changed:\n{}", changed.len(), changed.join("\n"));
 }

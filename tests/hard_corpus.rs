@@ -10,7 +10,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::{Duration, Instant};
 
 use metriplectic::dynamics::system::Point;
-use metriplectic::integrators::{RunError, StepError, Tried};
+use metriplectic::integrators::{Attempts, RunError, StepError};
 use metriplectic::prelude::*;
 use serde_json::Value;
 
@@ -44,7 +44,7 @@ impl Case {
         self.0["solvable"].as_bool().expect("a label")
     }
 
-    /// The distance of a point from the end of the branch, in shares of its size.
+    /// The distance of a point from the end of the branch, in fractions of its size.
     fn off(&self, end: &[f64]) -> f64 {
         let exact = self.numbers("end");
         let distance = |a: &[f64], b: &[f64]| {
@@ -248,7 +248,7 @@ enum Outcome {
     },
     Refused {
         error: Error,
-        tried: Tried,
+        tried: Attempts,
     },
     /// Anything else, which is always wrong.
     Wrong(String),
@@ -284,8 +284,8 @@ impl fmt::Display for Outcome {
             Self::Refused { tried, .. } => write!(f, "{tried}"),
             Self::Step { certificate, .. } => write!(
                 f,
-                "{} sweeps, {} splits, |ΔH|/|H| {:.1e}, ΔS {:.1e}",
-                certificate.sweeps,
+                "{} iterations, {} splits, |ΔH|/|H| {:.1e}, ΔS {:.1e}",
+                certificate.iterations,
                 certificate.retries,
                 certificate.max_relative_energy_error(),
                 certificate.min_entropy_increment
@@ -426,7 +426,7 @@ fn a_blow_up_on_the_dual_of_se3_ends_in_the_error_of_the_step_it_cannot_take() {
     assert!(matches!(cause, StepError::NotConverged { .. } | StepError::OutOfDomain { .. }));
     let certificate = trajectory.certificate();
     assert!(certificate.keeps_energy() && certificate.keeps_entropy(), "{certificate}");
-    for part in ["Newton sweeps", "1 continuation in", "of the globaliser", "halvings"] {
+    for part in ["Newton iterations", "1 continuation in", "of the globaliser", "halvings"] {
         assert!(error.to_string().contains(part), "\"{part}\" is missing in: {error}");
     }
 }

@@ -87,7 +87,7 @@ fn a_further_casimir_of_the_heavy_top_is_kept_at_second_order() {
 
 #[test]
 fn casimirs_of_a_hamiltonian_system_are_kept_on_a_curved_space_too() {
-    // A metric that varies has curved arcs, on which the midpoint rule keeps no quadratic function.
+    // A metric that varies has curved paths, on which the midpoint rule keeps no quadratic function.
     let metric = |x: &State6| {
         let wave = SVector::<Real, 6>::from_fn(|i, _| (x[(i + 1) % 6] * 0.7).sin());
         SMatrix::<Real, 6, 6>::identity() + wave * wave.transpose() * Real::from(0.5)
@@ -128,7 +128,7 @@ fn angular_momentum(x: &State10) -> Real {
 }
 
 /// `q ↦ Q(t) q`, `p ↦ Q(t) p` for both masses.
-fn turned(t: Real, x: &State10) -> State10 {
+fn dg_v(t: Real, x: &State10) -> State10 {
     let (sine, cosine) = (t.sin(), t.cos());
     State10::from_fn(|i, _| match i {
         8 | 9 => x[i],
@@ -161,7 +161,7 @@ fn the_angular_momentum_of_a_pendulum_is_kept_at_second_order() {
         .energy(pendulum_energy)
         .entropy(|x: &State10| x[8] + x[9])
         .dissipation(FieldDissipation(heat_exchange))
-        .symmetry(turned, angular_momentum)
+        .symmetry(dg_v, angular_momentum)
         .build()
         .unwrap();
     let start = SVector::from(PENDULUM);
@@ -251,9 +251,13 @@ fn mistakes_in_the_list_are_refused_with_numbers() {
     assert!(matches!(error, ModelError::NotMomentum { size, .. } if size > 1e-3));
     // A function of the entropy, and of the energy.
     let error = refused!(top().casimir(|x: &State6| alignment(x).powi(2)));
-    assert!(matches!(error, ModelError::DependentInvariant { index: 0, share } if share < 1e-8));
+    assert!(
+        matches!(error, ModelError::DependentInvariant { index: 0, fraction } if fraction < 1e-8)
+    );
     let error = refused!(top().casimir(gamma_squared).momentum(|x: &State6| heavy(x) * 2.0));
-    assert!(matches!(error, ModelError::DependentInvariant { index: 1, share } if share < 1e-8));
+    assert!(
+        matches!(error, ModelError::DependentInvariant { index: 1, fraction } if fraction < 1e-8)
+    );
     // A dissipation of one's own that changes it.
     let friction = CasimirDissipation::new(LieDual::se3().algebra(), SMatrix::identity()).unwrap();
     let error = refused!(top().dissipation(friction).momentum(|x: &State6| heavy(x) + x[0]));
@@ -285,13 +289,13 @@ fn an_action_that_is_no_symmetry_is_refused() {
             .unwrap();
         WeylMidpoint.run(&system, SVector::from(PENDULUM), Span::steps(0.05, 1)).map(|_| ())
     };
-    assert!(system(turned, pendulum_energy).is_ok());
-    let error = system(|t, x| turned(-t, x), pendulum_energy).unwrap_err();
+    assert!(system(dg_v, pendulum_energy).is_ok());
+    let error = system(|t, x| dg_v(-t, x), pendulum_energy).unwrap_err();
     assert!(matches!(error, RunError::Model(ModelError::ActionNotOfMomentum { .. })), "{error}");
     let error = system(|t, x| x * (t + 1.0), pendulum_energy).unwrap_err();
     assert!(matches!(error, RunError::Model(ModelError::EnergyNotSymmetric { .. })), "{error}");
     let scaled = |t: Real, x: &State10| {
-        let mut x = turned(t, x);
+        let mut x = dg_v(t, x);
         x[8] += t;
         x[9] += t;
         x
@@ -329,7 +333,7 @@ fn the_velocity_of_a_bracket_with_two_casimirs_is_the_cross_product_of_the_space
     let x = SVector::from(ON_S4);
     let z = ChartPoint::<Sphere<4>>::centre(&x);
     let w = differentials(&system, &z);
-    let v = Sphere::<4>::velocity(&z, &reversible(&system, &z, &w).unwrap());
+    let v = Sphere::<4>::embed(&z, &reversible(&system, &z, &w).unwrap());
     // By hand: gradients in R⁵, and det[x, ∇S, ∇C, ∇H, e_i].
     let ds = vector![1.0, -x[3], 2.0 * x[2], -x[1], 0.0];
     let dc = vector![0.3 * x[1], 0.3 * x[0], 0.0, 0.0, 1.0];

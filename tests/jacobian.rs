@@ -1,6 +1,6 @@
 //! The Jacobian of a step, assembled from jets, against nested dual numbers.
 
-use metriplectic::dynamics::velocity::{independence, projected_shares};
+use metriplectic::dynamics::velocity::{independence, projected_fractions};
 use metriplectic::fields::{Column, Square, jacobian};
 use metriplectic::integrators::{DiscreteGradient, Equation, Residual};
 use metriplectic::manifolds::Riemannian;
@@ -162,7 +162,7 @@ macro_rules! on_flat_spaces {
                 agrees(&system, &x, &u)?;
                 gradients_agree(&system, &x, &u)?;
                 // The exact scheme, with a bracket that varies; its Jacobian does not ask whether
-                // the tensor satisfies Jacobi's identity, and kills dS.
+                // the tensor satisfies Jacobi's identity, and annihilates dS.
                 let tensor = move |x: &SVector<Real, $n>| {
                     let wave = x.map(|x| (x * 0.7).sin());
                     let b = b.cast::<Real>() + wave * x.transpose();
@@ -282,8 +282,8 @@ proptest! {
         let with_momentum = system.clone().momentum(Wavy(j)).build().unwrap();
         let with_both = system.casimir(wavy(c)).momentum(Wavy(j)).build().unwrap();
         let centre = metriplectic::fields::ChartPoint::centre(&(x + u * 0.5));
-        let shares = independence(&with_both, &centre).unwrap();
-        prop_assume!(shares.iter().all(|share| *share > 0.3));
+        let fractions = independence(&with_both, &centre).unwrap();
+        prop_assume!(fractions.iter().all(|fraction| *fraction > 0.3));
         agrees(&with_casimir, &x, &u)?;
         agrees(&with_momentum, &x, &u)?;
         agrees(&with_both, &x, &u)?;
@@ -313,10 +313,10 @@ proptest! {
         let momentum = system.clone().momentum(near(0.01 * fading)).build().unwrap();
         let curved = system.metric(Metric::field(metric)).casimir(near(fading)).build().unwrap();
         let centre = metriplectic::fields::ChartPoint::centre(&(x + u * 0.5));
-        let share = projected_shares(&casimir, &centre).unwrap()[0];
-        prop_assume!(share > 1e-5);
+        let fraction = projected_fractions(&casimir, &centre).unwrap()[0];
+        prop_assume!(fraction > 1e-5);
         // A direction is off by ε/σ, and its derivatives by another 1/σ, which is in their size.
-        let digits = 10.0 / share;
+        let digits = 10.0 / fraction;
         agrees_with(((&WeylMidpoint, &Gonzalez), digits), &casimir, &x, &u)?;
         agrees_with(((&WeylMidpoint, &Gonzalez), digits), &curved, &x, &u)?;
         agrees_with(((&WeylMidpoint, &Gonzalez), 100.0 * digits), &momentum, &x, &u)?;
@@ -394,8 +394,8 @@ proptest! {
         let with_casimir = system.clone().casimir(wavy(c)).build().unwrap();
         let with_both = system.casimir(wavy(c)).momentum(wavy(j)).build().unwrap();
         let centre = metriplectic::fields::ChartPoint::centre(&(x + u * 0.5));
-        let shares = independence(&with_both, &centre).unwrap();
-        prop_assume!(shares.iter().all(|share| *share > 0.3));
+        let fractions = independence(&with_both, &centre).unwrap();
+        prop_assume!(fractions.iter().all(|fraction| *fraction > 0.3));
         agrees(&with_casimir, &x, &u)?;
         agrees(&with_both, &x, &u)?;
         let pair = System::on(Product(LieDual::so3(), LieDual::sl2()))

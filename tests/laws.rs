@@ -1,6 +1,6 @@
 //! The laws of brackets and dissipations, with negative controls.
 
-use metriplectic::dynamics::bracket::{BracketJet, Site};
+use metriplectic::dynamics::bracket::{BracketArgs, BracketJet};
 use metriplectic::dynamics::dissipation::DissipationJet;
 use metriplectic::dynamics::{Bracket, Dissipation, MetricDissipation, laws};
 use metriplectic::fields::{BrokenLaw, ChartPoint};
@@ -375,7 +375,7 @@ where
 {
     fn apply<D: Scalar>(
         &self,
-        at: &Site<'_, Euclidean<3>, G, D>,
+        at: &BracketArgs<'_, Euclidean<3>, G, D>,
         a: &Vector3<D>,
     ) -> Result<Vector3<D>, MetricError> {
         let p = at.x.point();
@@ -395,7 +395,7 @@ where
 
     fn linearise(
         &self,
-        at: &Site<'_, Euclidean<3>, G>,
+        at: &BracketArgs<'_, Euclidean<3>, G>,
         a: &Vector3<f64>,
     ) -> Result<BracketJet<Euclidean<3>>, MetricError> {
         // The derivatives of a × b are those of a cross product.
@@ -513,7 +513,7 @@ where
         let mut k = MetricDissipation.apply(metric, x, w, a)?;
         let off = 1e-6;
         match self {
-            // w × α kills w and adds nothing to the form; only symmetry is lost.
+            // w × α annihilates w and adds nothing to the form; only symmetry is lost.
             Self::NotSymmetric => {
                 k.x += (w.y * a.z - w.z * a.y) * off;
                 k.y += (w.z * a.x - w.x * a.z) * off;

@@ -70,7 +70,7 @@ impl LongRun {
             entropy(c.entropy_falls.to_string()),
             entropy(scientific(c.entropy_gained)),
             format!("{}, {}", ends(&self.defect), growth(&self.defect)),
-            format!("{:.2}", c.sweeps as f64 / c.steps as f64),
+            format!("{:.2}", c.iterations as f64 / c.steps as f64),
             format!("{:.2}", 1e6 * self.seconds / c.steps as f64),
         ]);
     }
@@ -138,7 +138,7 @@ fn runs(steps: usize) -> [LongRun; 7] {
         "falls of S",
         "S − S₀",
         "manifold defect, first → last tenth",
-        "sweeps a step",
+        "iterations a step",
         "µs a step",
     ]);
     for run in &all {

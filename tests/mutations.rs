@@ -209,7 +209,7 @@ fn a_momentum_fades_out_on_a_circular_orbit() {
     let run = WeylMidpoint.run(&spring, start, Span::steps(0.01, 500)).unwrap();
     let certificate = run.certificate();
     assert!(certificate.keeps_energy(), "{certificate}");
-    // Of the order of h³ times the share 10⁻⁶ at which it fades out, in each of 500 steps.
+    // Of the order of h³ times the fraction 10⁻⁶ at which it fades out, in each of 500 steps.
     assert!(certificate.invariants[0].max_error < 1e-9, "{certificate}");
 }
 
@@ -217,7 +217,7 @@ fn a_momentum_fades_out_on_a_circular_orbit() {
 fn each_part_of_a_step_aims_at_the_energy_of_its_start() {
     // A steep wall, and a solver that gives up soon.
     let system = line(|x| x.y.powi(2) * 0.5 + (x.x * 10.0).exp());
-    let scheme = Scheme::new(WeylMidpoint).newton(Newton { sweeps: 3, ..Newton::default() });
+    let scheme = Scheme::new(WeylMidpoint).newton(Newton { iterations: 3, ..Newton::default() });
     // Only the parts near the wall are short: a step of twice the size is split once more.
     for (h, splits) in [(0.05, 5), (0.1, 6), (0.2, 7)] {
         let run = scheme.run(&system, vector![1.0, 0.5], Span::steps(h, 1)).unwrap();
@@ -283,7 +283,7 @@ fn a_jacobian_is_not_kept_for_steps_of_another_length() {
     let system = body(kinetic, half_square, |p| (p.x * 4.0).exp() * 0.01, SecondLaw::Exact);
     let run =
         WeylMidpoint.run(&system, vector![0.001, -1.0, 0.001], Span::steps(0.05, 400)).unwrap();
-    assert!(run.certificate().sweeps <= 400 * 43 / 20, "{}", run.certificate());
+    assert!(run.certificate().iterations <= 400 * 43 / 20, "{}", run.certificate());
 }
 
 #[test]
@@ -350,7 +350,7 @@ fn an_invariant_that_is_not_conserved_where_it_depends_on_the_others_is_an_error
     let scheme = Scheme::new(WeylMidpoint).newton(Newton { tolerance: 1e14, ..Newton::default() });
     let run = scheme.run(&system, vector![0.25, 0.125, 0.0], Span::steps(0.3, 10));
     let Err(RunError::Step { cause, trajectory }) = run else { panic!("{run:?}") };
-    let StepError::DependentInvariants { index, share, .. } = cause else { panic!("{cause}") };
-    assert!(index == 0 && share < 1e-3, "{cause}");
+    let StepError::DependentInvariants { index, fraction, .. } = cause else { panic!("{cause}") };
+    assert!(index == 0 && fraction < 1e-3, "{cause}");
     assert!(!trajectory.certificate().keeps_invariants(), "{}", trajectory.certificate());
 }

@@ -178,9 +178,9 @@ fn by_hand(problem: &str, x: &[f64]) -> Parts {
             let turn = ds.cross(&dh) / form.determinant().sqrt();
             let cometric = dynamic(&form.try_inverse().expect("a positive form"));
             // A tenth of the friction with the metrics from closures.
-            let share = if problem.contains("canonical") { 1.0 } else { 0.1 };
+            let fraction = if problem.contains("canonical") { 1.0 } else { 0.1 };
             let column = |v: Vector3<f64>| join(v.as_slice(), &[]);
-            Parts { turn: column(turn), cometric, dh: column(dh), ds: column(ds * share) }
+            Parts { turn: column(turn), cometric, dh: column(dh), ds: column(ds * fraction) }
         }
         "area form on 2-chart (non-diagonal)" => {
             let across = 0.4 * x[0].sin();
@@ -232,8 +232,8 @@ fn by_hand(problem: &str, x: &[f64]) -> Parts {
                 return Parts { turn, cometric: one, dh: all, ds: DVector::zeros(6) };
             }
             let lean = DVector::from_vec(vec![r.m13, r.m23, r.m33, 0.5, r.m31, 0.0]);
-            let share = 0.3 / (1.0 + 0.3 * lean.norm_squared());
-            let cometric = one - &lean * lean.transpose() * share;
+            let fraction = 0.3 / (1.0 + 0.3 * lean.norm_squared());
+            let cometric = one - &lean * lean.transpose() * fraction;
             let ds = join(ds.as_slice(), (p * -0.6).as_slice());
             Parts { turn: DVector::zeros(6), cometric, dh: all, ds }
         }
@@ -261,7 +261,7 @@ impl Study for Velocities {
             let x = system.manifold().random(&mut rng);
             let centre = ChartPoint::<Y::Manifold>::centre(&x);
             let velocity = system.velocity(&centre).expect("a velocity");
-            let velocity = Y::Manifold::velocity(&centre, &velocity);
+            let velocity = Y::Manifold::embed(&centre, &velocity);
             let expected = by_hand(&label, &Y::Manifold::entries(&x)).velocity();
             let entries = <Y::Manifold as Space>::Velocity::LEN;
             let off = (0..entries).map(|i| (velocity[i] - expected[i]).abs()).fold(0.0, f64::max);

@@ -39,8 +39,8 @@ struct Outcome {
     steps: usize,
     /// Runs in which the published scheme lost entropy.
     lost_by_published: usize,
-    exact_sweeps: usize,
-    published_sweeps: usize,
+    exact_iterations: usize,
+    published_iterations: usize,
 }
 
 impl Outcome {
@@ -64,14 +64,17 @@ impl Outcome {
         self.runs += 1;
         self.steps += exact.steps;
         self.lost_by_published += usize::from(published.entropy_falls > 0);
-        self.exact_sweeps += exact.sweeps;
-        self.published_sweeps += published.sweeps;
+        self.exact_iterations += exact.iterations;
+        self.published_iterations += published.iterations;
     }
 
     fn is_as_claimed(&self) {
         println!("{self:?}");
         assert!(2 * self.lost_by_published >= self.runs, "{self:?}");
-        assert!(self.exact_sweeps as f64 <= 1.15 * self.published_sweeps as f64, "{self:?}");
+        assert!(
+            self.exact_iterations as f64 <= 1.15 * self.published_iterations as f64,
+            "{self:?}"
+        );
     }
 }
 

@@ -3,7 +3,7 @@
 mod models;
 
 use metriplectic::dynamics::ModelError;
-use metriplectic::integrators::{Course, SpanError, StepError, Until};
+use metriplectic::integrators::{Schedule, SpanError, StepError, Until};
 use metriplectic::manifolds::Constant;
 use metriplectic::prelude::*;
 
@@ -255,7 +255,7 @@ fn the_size_of_an_entry_can_be_said() {
         .build()
         .unwrap();
     let start = vector![radius + 1.0, 0.0];
-    let end = |course: Course| {
+    let end = |course: Schedule| {
         let run = WeylMidpoint.run(&system, start, course).expect("it runs");
         (run.last().point, run.certificate().steps)
     };
@@ -275,7 +275,7 @@ fn the_size_of_an_entry_can_be_said() {
     println!("{coarse}: {fewer} steps, {many} without absolute errors");
     assert!(fewer < many);
     for (given, expected) in [
-        (Course::from(span.scale([1.0])), SpanError::Entries { found: 1, expected: 2 }),
+        (Schedule::from(span.scale([1.0])), SpanError::Entries { found: 1, expected: 2 }),
         (span.scale([1.0, -2.0]).into(), SpanError::Entry { index: 1, value: -2.0 }),
         (
             span.absolute([f64::INFINITY, 1.0]).into(),
@@ -331,7 +331,7 @@ fn a_run_starts_when_it_is_told() {
     let row: Vec<f64> = watch.row(late.last()).collect();
     assert!((row[0] - 74.0).abs() < 1e-15);
     for (course, late) in [
-        (Course::from(Span::until(1.0).starting_at(1.0)), true),
+        (Schedule::from(Span::until(1.0).starting_at(1.0)), true),
         (Span::until(1.0).starting_at(f64::NAN).into(), true),
         (Span::steps(0.1, 10).starting_at(f64::INFINITY).into(), true),
         (Span::steps(1e-9, 10).starting_at(1e12).into(), false),

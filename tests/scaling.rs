@@ -1,7 +1,7 @@
 //! Nothing in a run assumes a scale: the scaling law, stiff friction, SI units, spectators, tiny fields.
 
 use metriplectic::integrators::laws::{self, UnitRun, Units};
-use metriplectic::integrators::{Course, RunError, StepError};
+use metriplectic::integrators::{RunError, Schedule, StepError};
 use metriplectic::manifolds::Constant;
 use metriplectic::prelude::*;
 
@@ -72,8 +72,8 @@ impl<const N: usize> Problem<N> {
         let (system, scaled) = (self.system(one()), self.system(units));
         let start = SVector::<f64, N>::from_fn(|i, _| self.x0[i] * factors.entries[i]);
         let t = factors.time;
-        let until = |t: f64| Course::from(Span::until(40.0 * self.h * t).tolerance(1e-5));
-        let courses: [(Course, Course, f64); 2] = [
+        let until = |t: f64| Schedule::from(Span::until(40.0 * self.h * t).tolerance(1e-5));
+        let courses: [(Schedule, Schedule, f64); 2] = [
             (Span::steps(self.h, 60).into(), Span::steps(self.h * t, 60).into(), fixed),
             (until(1.0), until(t), adaptive),
         ];
@@ -232,7 +232,7 @@ fn the_orbits_obey_the_scaling_law() {
 
 type Vector5 = SVector<Real, 5>;
 
-/// The overdamped oscillator `x = (q, p, s)`, its plane turned by `angle`: `H = ½p² + ½q² + s`, `S = s`,
+/// The overdamped oscillator `x = (q, p, s)`, its plane dg_v by `angle`: `H = ½p² + ½q² + s`, `S = s`,
 /// `K = (γ/w_s) b bᵀ` with `b = (0, w_s, −w_p)`.
 fn overdamped(
     gamma: f64,
@@ -245,7 +245,7 @@ fn overdamped(
         .energy(|x: &Vector3<Real>| (x.x * x.x + x.y * x.y) * 0.5 + x.z)
         .entropy(|x: &Vector3<Real>| x.z)
         .dissipation(FieldDissipation(move |_: &Vector3<Real>, w: &Vector3<Real>| {
-            // The momentum is p = y cos − x sin in the turned plane.
+            // The momentum is p = y cos − x sin in the dg_v plane.
             let p = w.y * cos - w.x * sin;
             onsager(Vector3::new(w.z * -sin, w.z * cos, -p), w.z.recip() * gamma)
         }))
@@ -501,7 +501,7 @@ fn a_molecule_in_si_units_vibrates_like_its_dimensionless_twin() {
     let start = vector![length * width + 0.5, 0.1];
     let twin = molecule([1.0, 1.0, 1.0, length * width]);
     let si = molecule([mass, depth, width, length]);
-    let courses: [fn(f64) -> Course; 2] =
+    let courses: [fn(f64) -> Schedule; 2] =
         [|t| Span::steps(0.05 * t, 2000).into(), |t| Span::until(100.0 * t).into()];
     let exact = WeylMidpoint.run(&twin, start, Span::steps(0.001, 100_000)).unwrap();
     for course in courses {

@@ -5,7 +5,7 @@
 //! `S = s(T₁) + s(T₂)` with `s = ln T + T`, so that `s' = e'/T`, and `K = κ b bᵀ` with `b = (1/w₁, −1/w₂)`:
 //! `e₁' = κ (1/T₁ − 1/T₂)`.
 
-use metriplectic::integrators::{Course, StepError};
+use metriplectic::integrators::{Schedule, StepError};
 use metriplectic::prelude::*;
 
 /// A cold and a hot body.
@@ -42,7 +42,7 @@ fn outcome<M: Manifold>(
 }
 
 /// The temperatures as two numbers.
-fn flat(kappa: f64, [cold, hot]: [f64; 2], course: Course) -> Outcome {
+fn flat(kappa: f64, [cold, hot]: [f64; 2], course: Schedule) -> Outcome {
     type X = Vector2<Real>;
     let system = System::on(Euclidean::<2>)
         .energy(|x: &X| energy(x.x) + energy(x.y))
@@ -54,7 +54,7 @@ fn flat(kappa: f64, [cold, hot]: [f64; 2], course: Course) -> Outcome {
 }
 
 /// The temperatures as two points of the half line, where zero is infinitely far.
-fn positive(kappa: f64, [cold, hot]: [f64; 2], course: Course) -> Outcome {
+fn positive(kappa: f64, [cold, hot]: [f64; 2], course: Schedule) -> Outcome {
     type X = (Vector1<Real>, Vector1<Real>);
     let system = System::on(Product(HalfLine, HalfLine))
         .energy(|x: &X| energy(x.0.x) + energy(x.1.x))
@@ -67,7 +67,7 @@ fn positive(kappa: f64, [cold, hot]: [f64; 2], course: Course) -> Outcome {
 }
 
 /// A run of the pair for a conductance from two temperatures.
-type Pair = fn(f64, [f64; 2], Course) -> Outcome;
+type Pair = fn(f64, [f64; 2], Schedule) -> Outcome;
 
 const SPACES: [(&str, Pair); 2] = [("R × R", flat), ("R₊ × R₊", positive)];
 
@@ -204,7 +204,7 @@ fn long_steps_keep_the_energy_to_its_round_off_or_say_that_they_do_not() {
 const EARTH: [f64; 2] = [3.986_004_418e14, 6.371e6];
 
 /// A body of unit mass above the ground, `x` its height and its velocity, from an energy of both.
-fn thrown(energy: fn(Real, Real) -> Real, start: [f64; 2], course: Course) -> Fall {
+fn thrown(energy: fn(Real, Real) -> Real, start: [f64; 2], course: Schedule) -> Fall {
     let system = System::on(Euclidean::<2>)
         .bracket(Symplectic)
         .energy(move |x: &Vector2<Real>| energy(x.x, x.y))
@@ -236,7 +236,7 @@ fn throw() -> [f64; 2] {
 #[test]
 fn an_energy_without_digits_ends_the_run_with_the_first_law_broken() {
     // In the last one each try of a step is refused, down to the least step size.
-    let cases: [(&str, [f64; 2], Course); 3] = [
+    let cases: [(&str, [f64; 2], Schedule); 3] = [
         ("fixed", throw(), Span::steps(1e-3, 200).into()),
         ("adaptive", throw(), Span::until(0.2).tolerance(1e-5).into()),
         ("from rest", [1e-5, 0.0], Span::until(0.2).into()),

@@ -9,7 +9,7 @@ use metriplectic_studies::LogLog;
 
 use crate::Row;
 
-/// A count that differs by more than this share from the snapshot is an error.
+/// A count that differs by more than this fraction from the snapshot is an error.
 const ALLOWED: f64 = 0.03;
 /// A count is the difference of two runs, so that the start of the program drops out.
 const RUNS: [usize; 2] = [100, 300];
@@ -51,15 +51,15 @@ pub(crate) fn compare(rows: &[Row], bless: bool) {
             Some((words.next()?.to_owned(), words.next()?.parse().ok()?))
         })
         .collect();
-    let head = "# row, instructions, Newton sweeps, calls of the closure: each in one step\n";
+    let head = "# row, instructions, Newton iterations, calls of the closure: each in one step\n";
     let (mut table, mut worse) = (String::from(head), false);
     let mut rings = Vec::new();
     for row in rows {
         let [few, many] = RUNS.map(|steps| collected(&row.name, steps).expect("callgrind counts"));
         let each = (many - few) / (RUNS[1] - RUNS[0]) as f64;
-        let sweeps = (row.run)(RUNS[1]).sweeps as f64 / RUNS[1] as f64;
+        let iterations = (row.run)(RUNS[1]).iterations as f64 / RUNS[1] as f64;
         let calls = row.calls.map_or("-".to_owned(), |calls| format!("{calls:.1}"));
-        let line = format!("{:32} {each:10.0} {sweeps:6.2} {calls:>6}", row.name);
+        let line = format!("{:32} {each:10.0} {iterations:6.2} {calls:>6}", row.name);
         writeln!(table, "{line}").expect("a string takes it all");
         if let Some(n) = row.name.strip_prefix("step/ring/") {
             rings.push((n.parse::<f64>().expect("a dimension"), each));

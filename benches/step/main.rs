@@ -18,16 +18,16 @@ use std::hint::black_box;
 use criterion::Criterion;
 use metriplectic::dynamics::system::Point;
 use metriplectic::integrators::DiscreteGradient;
-use metriplectic::integrators::residual::Recall;
+use metriplectic::integrators::residual::DriftCorrection;
 use metriplectic::integrators::step::{Memory, Start};
 use metriplectic::prelude::*;
 
-mod chord;
 mod dimension;
 mod instructions;
 mod rigid_body;
 mod so3_nambu;
 mod spinning_top;
+mod stable_gradient;
 
 /// Steps in one measurement.
 const STEPS: usize = 100;
@@ -40,7 +40,7 @@ trait Step: Clone {
     fn step(&mut self, x: &Self::Point, h: f64) -> Self::Point;
 
     /// The corrections of Newton's method so far.
-    fn sweeps(&self) -> usize;
+    fn iterations(&self) -> usize;
 
     /// The entries of a point, in the order of [`Manifold::entries`].
     fn entries(x: &Self::Point) -> Vec<f64>;
@@ -50,8 +50,8 @@ trait Step: Clone {
 struct Outcome {
     /// The entries of the last point.
     end: Vec<f64>,
-    /// Newton sweeps.
-    sweeps: usize,
+    /// Newton iterations.
+    iterations: usize,
 }
 
 /// One line of the comparison: what is timed, and counted.
@@ -88,17 +88,18 @@ impl Row {
         WeylMidpoint: Retraction<Y::Manifold, Y::Metric>,
     {
         let run = move |steps| {
-            let (mut memory, mut x, mut sweeps) = (Memory::new(), black_box(start.clone()), 0);
+            let (mut memory, mut x, mut iterations) = (Memory::new(), black_box(start.clone()), 0);
             let [mut energy, mut entropy] = [system.energy_at(&x), system.entropy_at(&x)];
             for _ in 0..steps {
-                let left_over = Recall::nothing();
-                let invariants = left_over.invariants;
-                let start = Start { x: &x, time: 0.0, h, energy, entropy, invariants, left_over };
+                let accumulated_error = DriftCorrection::nothing();
+                let invariants = accumulated_error.invariants;
+                let start =
+                    Start { x: &x, time: 0.0, h, energy, entropy, invariants, accumulated_error };
                 let Ok((end, work)) = scheme.step(&system, &start, &mut memory) else { break };
-                sweeps += work.sweeps;
+                iterations += work.iterations;
                 (x, energy, entropy) = (end, work.energy, work.entropy);
             }
-            Outcome { end: Y::Manifold::entries(&x), sweeps }
+            Outcome { end: Y::Manifold::entries(&x), iterations }
         };
         Self { name: name.into(), run: Box::new(run), calls: None }
     }
@@ -128,7 +129,7 @@ impl Row {
         let run = move |steps| {
             let mut hand = black_box(hand.clone());
             let end = (0..steps).fold(black_box(start), |x, _| hand.step(&x, h));
-            Outcome { end: B::entries(&end), sweeps: hand.sweeps() }
+            Outcome { end: B::entries(&end), iterations: hand.iterations() }
         };
         Self { name: name.into(), run: Box::new(run), calls: None }
     }
@@ -162,7 +163,11 @@ fn main() {
     }
     let mut criterion = Criterion::default().configure_from_args();
     for row in rows() {
-        println!("{}: {} Newton sweeps in {STEPS} steps", row.name, (row.run)(STEPS).sweeps);
+        println!(
+            "{}: {} Newton iterations in {STEPS} steps",
+            row.name,
+            (row.run)(STEPS).iterations
+        );
         // The time of a hundred steps: read tens of nanoseconds for microseconds.
         criterion.bench_function(&row.name, |bencher| bencher.iter(|| black_box((row.run)(STEPS))));
     }

@@ -6,7 +6,7 @@ use std::rc::Rc;
 use metriplectic::fields::{Jet1, Jet2};
 use metriplectic::prelude::*;
 
-use crate::chord::{self, Displacements, Linearised};
+use crate::stable_gradient::{self, Displacements, Linearised};
 use crate::{Row, Step, check};
 
 type V = [f64; 3];
@@ -121,13 +121,13 @@ pub(crate) fn rows() -> Vec<Row> {
 struct HandCoded {
     inverse_inertia: Vector3<f64>,
     displacements: Displacements<3>,
-    sweeps: usize,
+    iterations: usize,
 }
 
 impl HandCoded {
     fn new(inertia: &V) -> Self {
         let inverse_inertia = Vector3::from(inertia.map(f64::recip));
-        Self { inverse_inertia, displacements: Displacements::new(), sweeps: 0 }
+        Self { inverse_inertia, displacements: Displacements::new(), iterations: 0 }
     }
 
     /// `z × w + |w|² z − (w·z) w` at the midpoint, where `w = I⁻¹z` is the discrete gradient of
@@ -165,14 +165,14 @@ impl Step for HandCoded {
         let guess = self.displacements.extrapolate();
         let guess = guess.unwrap_or_else(|| -self.residual(x, &Vector3::zeros(), h));
         let here = self.linearise(x, &guess, h);
-        let (d, sweeps) = chord::solve(guess, &here, |d| self.residual(x, d, h));
-        self.sweeps += sweeps;
+        let (d, iterations) = stable_gradient::solve(guess, &here, |d| self.residual(x, d, h));
+        self.iterations += iterations;
         self.displacements.note(d);
         x + d
     }
 
-    fn sweeps(&self) -> usize {
-        self.sweeps
+    fn iterations(&self) -> usize {
+        self.iterations
     }
 
     fn entries(x: &Vector3<f64>) -> Vec<f64> {

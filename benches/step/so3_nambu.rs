@@ -6,7 +6,7 @@ use std::rc::Rc;
 use metriplectic::manifolds::rotations;
 use metriplectic::prelude::*;
 
-use crate::chord::{self, Displacements, Linearised};
+use crate::stable_gradient::{self, Displacements, Linearised};
 use crate::{Row, Step, check};
 
 const STEP_SIZE: f64 = 0.005;
@@ -44,7 +44,7 @@ pub(crate) fn rows() -> Vec<Row> {
         .entropy(Entropy)
         .second_law(SecondLaw::Published);
     let (start, h) = (rotations::exp(&Vector3::new(0.3, -0.2, 0.5)), STEP_SIZE);
-    let hand = HandCoded { displacements: Displacements::new(), sweeps: 0 };
+    let hand = HandCoded { displacements: Displacements::new(), iterations: 0 };
     let mut rows = vec![
         Row::new("step/so3_nambu/closure", frame().build().expect(WELL), start, h),
         Row::new("step/so3_nambu/typed", typed.build().expect(WELL), start, h),
@@ -80,7 +80,7 @@ pub(crate) fn rows() -> Vec<Row> {
 #[derive(Clone)]
 struct HandCoded {
     displacements: Displacements<3>,
-    sweeps: usize,
+    iterations: usize,
 }
 
 /// `H = R₁₁ + 2R₂₂ + 3R₃₃ + ½R₁₂R₂₃`
@@ -106,7 +106,7 @@ fn differential(a: &Matrix3<f64>) -> Vector3<f64> {
 
 /// The derivative of the differential along the body frame, `A − tr A`, without the second
 /// derivatives of `f`.
-fn turned(a: &Matrix3<f64>) -> Matrix3<f64> {
+fn dg_v(a: &Matrix3<f64>) -> Matrix3<f64> {
     a - Matrix3::from_diagonal_element(a.trace())
 }
 
@@ -165,8 +165,8 @@ impl Equation {
         let (p, q) = (Vector3::y().cross(&r1), Vector3::z().cross(&r2));
         let t = Vector3::new(1.0, 1.0, 0.0).cross(&r3);
         let dz = dhalf * 0.5;
-        let ddh = (turned(&energy_slope_z) + (p * q.transpose() + q * p.transpose()) * 0.5) * dz;
-        let ds = (turned(&entropy_slope_z) + t * t.transpose() * 0.5) * dz;
+        let ddh = (dg_v(&energy_slope_z) + (p * q.transpose() + q * p.transpose()) * 0.5) * dz;
+        let ds = (dg_v(&entropy_slope_z) + t * t.transpose() * 0.5) * dz;
         let (_, dend) = exp(u);
         let rows =
             dend.tr_mul(&differential(&energy_slope(&end))) - ddh.tr_mul(u) - dh - u * (2.0 * c);
@@ -198,8 +198,8 @@ impl Step for HandCoded {
             velocity(&differential(&entropy_slope(x)), &differential(&energy_slope(x))) * h
         });
         let here = equation.linearise(&guess);
-        let (u, sweeps) = chord::solve(guess, &here, |u| equation.residual(u));
-        self.sweeps += sweeps;
+        let (u, iterations) = stable_gradient::solve(guess, &here, |u| equation.residual(u));
+        self.iterations += iterations;
         self.displacements.note(u);
         let (turn, _) = exp(&u);
         let end = x * turn;
@@ -207,8 +207,8 @@ impl Step for HandCoded {
         end * (Matrix3::from_diagonal_element(1.5) - end.tr_mul(&end) * 0.5)
     }
 
-    fn sweeps(&self) -> usize {
-        self.sweeps
+    fn iterations(&self) -> usize {
+        self.iterations
     }
 
     fn entries(x: &Matrix3<f64>) -> Vec<f64> {

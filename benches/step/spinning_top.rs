@@ -6,7 +6,7 @@ use std::rc::Rc;
 use metriplectic::nalgebra::Matrix3x2;
 use metriplectic::prelude::*;
 
-use crate::chord::{self, Displacements, Linearised};
+use crate::stable_gradient::{self, Displacements, Linearised};
 use crate::{Row, Step, check};
 
 const D: Vector3<f64> = Vector3::new(1.0, 0.5, 0.25);
@@ -31,7 +31,7 @@ pub(crate) fn rows() -> Vec<Row> {
     };
     let typed = System::on(Sphere::<2>::round()).bracket(AreaForm).energy(Energy);
     let (start, h) = (Vector3::repeat(3.0_f64.sqrt().recip()), STEP_SIZE);
-    let hand = HandCoded { displacements: Displacements::new(), sweeps: 0 };
+    let hand = HandCoded { displacements: Displacements::new(), iterations: 0 };
     let mut rows = vec![
         Row::new("step/spinning_top/closure", top().build().expect(WELL), start, h),
         Row::new("step/spinning_top/typed", typed.build().expect(WELL), start, h),
@@ -74,11 +74,11 @@ fn gradient(x: &Vector3<f64>) -> Vector3<f64> {
 #[derive(Clone)]
 struct HandCoded {
     displacements: Displacements<3>,
-    sweeps: usize,
+    iterations: usize,
 }
 
-/// The middle, the displacement and the end of an arc, with `cos θ/2` and `sin(θ/2)/θ`.
-struct Arc {
+/// The middle, the displacement and the end of a path, with `cos θ/2` and `sin(θ/2)/θ`.
+struct StepPath {
     tangent: Vector3<f64>,
     z: Vector3<f64>,
     d: Vector3<f64>,
@@ -88,7 +88,7 @@ struct Arc {
     sine: f64,
 }
 
-impl Arc {
+impl StepPath {
     /// `z = cos(θ/2) x + sin(θ/2)/θ U`, `d = cos(θ/2) U − θ sin(θ/2) x`, `x' = cos θ x + sin θ/θ U`.
     fn new(x: &Vector3<f64>, e: &Matrix3x2<f64>, u: &Vector2<f64>) -> Self {
         let (tangent, s) = (e * u, u.norm_squared());
@@ -117,19 +117,19 @@ struct Equation {
 
 impl Equation {
     fn residual(&self, u: &Vector2<f64>) -> Vector2<f64> {
-        let arc = Arc::new(&self.x, &self.e, u);
-        let dh = gradient(&arc.z);
-        let w = dh + arc.d * arc.correction(&dh, energy(&arc.end) - self.energy);
-        self.e.tr_mul(&(arc.d - arc.z.cross(&w) * self.h))
+        let path = StepPath::new(&self.x, &self.e, u);
+        let dh = gradient(&path.z);
+        let w = dh + path.d * path.correction(&dh, energy(&path.end) - self.energy);
+        self.e.tr_mul(&(path.d - path.z.cross(&w) * self.h))
     }
 
     fn linearise(&self, u: &Vector2<f64>) -> Linearised<2> {
         let Self { x, e, h, .. } = self;
-        let arc = Arc::new(x, e, u);
-        let Arc { tangent, z, d, s, cosine, sine, .. } = &arc;
-        let (dh, end) = (gradient(z), energy(&arc.end));
-        let c = arc.correction(&dh, end - self.energy);
-        let (w, dh_end) = (dh + d * c, gradient(&arc.end));
+        let path = StepPath::new(x, e, u);
+        let StepPath { tangent, z, d, s, cosine, sine, .. } = &path;
+        let (dh, end) = (gradient(z), energy(&path.end));
+        let c = path.correction(&dh, end - self.energy);
+        let (w, dh_end) = (dh + d * c, gradient(&path.end));
         let velocity = z.cross(&w);
         let hessian = D.component_mul(&(z * 2.0).add_scalar(1.0));
         // d(sin(θ/2)/θ)/du = u · bend
@@ -170,15 +170,15 @@ impl Step for HandCoded {
         let guess = self.displacements.extrapolate();
         let guess = equation.e.tr_mul(&guess.unwrap_or_else(|| x.cross(&gradient(x)) * h));
         let here = equation.linearise(&guess);
-        let (u, sweeps) = chord::solve(guess, &here, |u| equation.residual(u));
-        self.sweeps += sweeps;
-        let arc = Arc::new(x, &equation.e, &u);
-        self.displacements.note(arc.tangent);
-        arc.end.normalize()
+        let (u, iterations) = stable_gradient::solve(guess, &here, |u| equation.residual(u));
+        self.iterations += iterations;
+        let path = StepPath::new(x, &equation.e, &u);
+        self.displacements.note(path.tangent);
+        path.end.normalize()
     }
 
-    fn sweeps(&self) -> usize {
-        self.sweeps
+    fn iterations(&self) -> usize {
+        self.iterations
     }
 
     fn entries(x: &Vector3<f64>) -> Vec<f64> {

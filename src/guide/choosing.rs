@@ -76,7 +76,7 @@
 //!
 //! | gradient | order | use it |
 //! |---|---|---|
-//! | **[`Gonzalez`](crate::integrators::Gonzalez)** | 2 | by default: one differential and a correction along the arc; on flat spaces it is `dH(z)` if `H` is quadratic |
+//! | **[`Gonzalez`](crate::integrators::Gonzalez)** | 2 | by default: one differential and a correction along the path; on flat spaces it is `dH(z)` if `H` is quadratic |
 //! | [`MeanValue`](crate::integrators::MeanValue) | 2 | if the metric is arbitrary: on flat spaces it does not depend on it, nor on affine coordinates; four differentials |
 //! | [`SymmetricItohAbe`](crate::integrators::SymmetricItohAbe) | 2 | to compare: differences of values, coordinate by coordinate, and slopes only where those are small |
 //! | [`ItohAbe`](crate::integrators::ItohAbe) | 1 | to compare; it depends on the order of the coordinates |
@@ -99,12 +99,12 @@
 //!
 //! | the function | say | because |
 //! |---|---|---|
-//! | a Casimir beside `S` (`\|Γ\|²` of a heavy top) | `.casimir(f)` | the bracket is projected until it kills a discrete gradient of `f` |
+//! | a Casimir beside `S` (`\|Γ\|²` of a heavy top) | `.casimir(f)` | the bracket is projected until it annihilates a discrete gradient of `f` |
 //! | a momentum (an angular momentum) | `.momentum(f)` | `Π df ≠ 0`, so projecting the bracket would change the flow; its drift alone is taken out |
 //! | a momentum, and the symmetry is to be checked | `.symmetry(action, f)` | verification also tries the action: Poisson, `H∘Φ = H`, and `X_J` its generator |
 //!
 //! They are methods of the [`SystemBuilder`](crate::dynamics::SystemBuilder). The dissipation of the metric
-//! is made to kill these functions, too; any other one has to, and is refused if it does not. Do not
+//! is made to annihilate these functions, too; any other one has to, and is refused if it does not. Do not
 //! list what depends on the other fields, such as a function of `H` and `S`: that is refused by name.
 //!
 //! # 9. Which step?
@@ -115,15 +115,15 @@
 //! |---|---|
 //! | runs with `h` and `h/2` differ by more than three times the error you want | halve `h`: the error of order 2 is a third of the difference |
 //! | [`retries`](crate::integrators::Certificate) in the certificate | steps were split in halves; a smaller `h` is cheaper |
-//! | six sweeps or more in the worst step | the step is long for Newton's method; the same |
-//! | an arc near the cut locus, half a turn of a body in one step | ten steps a turn |
+//! | six iterations or more in the worst step | the step is long for Newton's method; the same |
+//! | a path near the cut locus, half a turn of a body in one step | ten steps a turn |
 //! | `friction not damped: h\|K'\| = …` in the certificate | friction is faster than a step, which does not damp it: large steps exchange hot and cold and do not find the rest point. Take steps with `h\|K'\|` below 10, or [`Span::until`](crate::integrators::Span::until), or eliminate the fast variable |
 //! | [`StiffFriction`](crate::integrators::StepError::StiffFriction) | the same, and the step is not solved; the error has the step size |
 //!
 //! # 10. Which metric?
 //!
-//! The metric decides what friction is (question 4), the volume in `Nambu` and `AreaForm`, and the arcs of
-//! a step. If it is only there for the arcs, leave it **canonical**.
+//! The metric decides what friction is (question 4), the volume in `Nambu` and `AreaForm`, and the paths of
+//! a step. If it is only there for the paths, leave it **canonical**.
 //!
 //! | metric | cost | use it |
 //! |---|---|---|

@@ -25,7 +25,7 @@
 //! | `Π = ½ Π^{ij} ∂_i ∧ ∂_j` † | the matrix `Π^{ij}` itself, [`Poisson::field`](crate::dynamics::Poisson::field) | `tests/errata.rs::a_double_sum_over_wedges_counts_every_bracket_twice` |
 //! | `♯_Π(α) = Π(·, α)` | [`Bracket::apply`](crate::dynamics::Bracket::apply) | `tests/laws.rs::each_law_of_a_bracket_can_break` |
 //! | (hamil-eq) `x' = X_H(x) = ♯_Π(dH)` | a [`System`](crate::dynamics::System) without an entropy | `tests/order.rs::the_free_body_is_integrated_to_second_order`, `tests/reference.rs::the_free_body_extrapolated_to_no_step_follows_its_elliptic_functions` |
-//! | `{f, H} = 0`, first integrals; `{H, H} = 0` | listed by [`momentum`](crate::dynamics::SystemBuilder::momentum), and then checked and kept | `tests/equations.rs::a_hamiltonian_vector_field_is_the_bracket_with_the_energy`, `tests/errata.rs::a_momentum_is_kept_if_its_differential_is_killed` |
+//! | `{f, H} = 0`, first integrals; `{H, H} = 0` | listed by [`momentum`](crate::dynamics::SystemBuilder::momentum), and then checked and kept | `tests/equations.rs::a_hamiltonian_vector_field_is_the_bracket_with_the_energy`, `tests/errata.rs::a_momentum_is_kept_if_its_differential_is_annihilated` |
 //! | Casimirs, `{C, g} = 0` for all `g` | `Π dS = 0`, in every [`verify`](crate::dynamics::Metriplectic::verify) | `tests/laws.rs::the_casimirs_of_se3_are_entropies_and_the_angular_momentum_is_not` |
 //! | the rank of `Π` is even | not computed | — |
 //!
@@ -38,7 +38,7 @@
 //! | `G*(df, dg) = G(grad f, grad g)` | [`InnerProduct`](crate::manifolds::InnerProduct), [`Riemannian`](crate::manifolds::Riemannian) | `crates/manifolds/src/laws.rs::flat_spaces_keep_the_laws`, `tests/metrics.rs::metrics_that_vary_keep_the_laws_on_rotations_and_products` |
 //! | (semid) `K(α, β) = G*(dH,dH) G*(α,β) − G*(dH,α) G*(dH,β)`, both lines | [`MetricDissipation`](crate::dynamics::MetricDissipation) | `tests/equations.rs::the_form_of_the_metric_is_the_printed_one_on_each_line` |
 //! | `K^{ij} = C_H g^{ij} − (g⁻¹dH)^i (g⁻¹dH)^j` | the same | `tests/equations.rs::the_form_of_the_metric_is_the_printed_one_on_each_line` |
-//! | remark: `K(α, β) = G*(Qα, Qβ)` off all `dL_a` † | [`SystemBuilder::casimir`](crate::dynamics::SystemBuilder::casimir), [`momentum`](crate::dynamics::SystemBuilder::momentum), with the scale `G*(dH, dH)` | `tests/errata.rs::the_remark_has_another_scale_than_the_equation_before_it`, `tests/errata.rs::a_momentum_is_kept_if_its_differential_is_killed` |
+//! | remark: `K(α, β) = G*(Qα, Qβ)` off all `dL_a` † | [`SystemBuilder::casimir`](crate::dynamics::SystemBuilder::casimir), [`momentum`](crate::dynamics::SystemBuilder::momentum), with the scale `G*(dH, dH)` | `tests/errata.rs::the_remark_has_another_scale_than_the_equation_before_it`, `tests/errata.rs::a_momentum_is_kept_if_its_differential_is_annihilated` |
 //!
 //! # §2.3 Metriplectic systems
 //!
@@ -60,9 +60,9 @@
 //! | the action `Φ`, `Φ_e = 1`, `Φ_g Φ_h = Φ_{gh}`; `ξ_P(x) = d/dt exp(tξ)·x` | [`SystemBuilder::symmetry`](crate::dynamics::SystemBuilder::symmetry), one closure `(t, x)` for each one-parameter group `exp(tξ)` | `tests/equations.rs::an_action_is_checked_against_bracket_energy_and_momentum_map` |
 //! | Poisson actions, `Φ_g^*{f, h} = {Φ_g^* f, Φ_g^* h}` | [`SystemBuilder::symmetry`](crate::dynamics::SystemBuilder::symmetry), checked as `T Π(x) Tᵀ = Π(Φ(x))` | `tests/equations.rs::an_action_is_checked_against_bracket_energy_and_momentum_map` |
 //! | momentum maps, `X_{J_ξ} = ξ_P`, `{f, J_ξ} = ξ_P(f)` | [`SystemBuilder::symmetry`](crate::dynamics::SystemBuilder::symmetry), checked as `Π dJ_ξ = dΦ_t/dt` | `tests/equations.rs::an_action_is_checked_against_bracket_energy_and_momentum_map`, `tests/errata.rs::the_momentum_of_a_body_is_a_covector_and_its_velocity_is_not_kept` |
-//! | `H∘Φ_g = H` makes `J_ξ` a first integral | [`SystemBuilder::momentum`](crate::dynamics::SystemBuilder::momentum), kept to round-off | `tests/errata.rs::a_momentum_is_kept_if_its_differential_is_killed` |
-//! | `(f, J_ξ) = 0`, `♯_K(dJ_ξ) = 0` † | by projection for [`MetricDissipation`](crate::dynamics::MetricDissipation); asked of any other one | `tests/errata.rs::a_momentum_is_kept_if_its_differential_is_killed` |
-//! | `dJ_ξ/dt = {J_ξ, H} + (J_ξ, S) = 0` | the same | `tests/errata.rs::a_momentum_is_kept_if_its_differential_is_killed` |
+//! | `H∘Φ_g = H` makes `J_ξ` a first integral | [`SystemBuilder::momentum`](crate::dynamics::SystemBuilder::momentum), kept to round-off | `tests/errata.rs::a_momentum_is_kept_if_its_differential_is_annihilated` |
+//! | `(f, J_ξ) = 0`, `♯_K(dJ_ξ) = 0` † | by projection for [`MetricDissipation`](crate::dynamics::MetricDissipation); asked of any other one | `tests/errata.rs::a_momentum_is_kept_if_its_differential_is_annihilated` |
+//! | `dJ_ξ/dt = {J_ξ, H} + (J_ξ, S) = 0` | the same | `tests/errata.rs::a_momentum_is_kept_if_its_differential_is_annihilated` |
 //! | `P = T*G`, `Ψ_g = T*L_{g⁻¹}` † | [`Symplectic`](crate::dynamics::Symplectic) on `Product<Rotations, Euclidean<3>>` | `tests/errata.rs::the_pull_back_by_a_left_translation_acts_from_the_right`, `tests/errata.rs::before_reduction_the_entropy_is_no_casimir_and_a_function_of_the_momentum` |
 //!
 //! # §3 Forced Euler-Poincaré equations and metriplectic dynamics
@@ -92,7 +92,7 @@
 //! | `H' = ∇HᵀΠ∇H = 0` | [`Bracket`](crate::dynamics::Bracket) | `tests/laws.rs::each_law_of_a_bracket_can_break` |
 //! | (discGrad) `∇̄H·(x' − x) = ΔH`, `∇̄H(x, x) = ∇H(x)` | [`laws::discrete_gradient`](crate::integrators::laws::discrete_gradient) | `crates/integrators/src/laws.rs::the_discrete_gradient_keeps_its_laws` |
 //! | (AVF) `∫₀¹ ∇H((1−ξ)x + ξx') dξ` | [`MeanValue`](crate::integrators::MeanValue) | `tests/equations.rs::three_discrete_gradients_are_the_printed_ones`, `crates/integrators/src/laws.rs::the_discrete_gradient_keeps_its_laws` |
-//! | (gonzalez) `∇H(z) + (ΔH − ∇H(z)·d) d/\|d\|²` | [`Gonzalez`](crate::integrators::Gonzalez); safe against round-off, [`Chord`](crate::integrators::Chord) | `tests/equations.rs::three_discrete_gradients_are_the_printed_ones`, `crates/integrators/src/discrete_gradient/chord.rs::the_covector_keeps_its_digits_on_short_arcs` |
+//! | (gonzalez) `∇H(z) + (ΔH − ∇H(z)·d) d/\|d\|²` | [`Gonzalez`](crate::integrators::Gonzalez); safe against round-off, [`StableGradient`](crate::integrators::StableGradient) | `tests/equations.rs::three_discrete_gradients_are_the_printed_ones`, `crates/integrators/src/discrete_gradient/chord.rs::the_covector_keeps_its_digits_on_short_arcs` |
 //! | (itoAbe) quotients, one coordinate after another | [`ItohAbe`](crate::integrators::ItohAbe); symmetrised, [`SymmetricItohAbe`](crate::integrators::SymmetricItohAbe) | `tests/equations.rs::three_discrete_gradients_are_the_printed_ones`, `crates/integrators/src/laws.rs::the_discrete_gradient_keeps_its_laws` |
 //!
 //! # §4.2 Construction of metriplectic or generic integrators
@@ -102,7 +102,7 @@
 //! | (ops) `(x' − x)/h = Π(z) ∇̄₂H + K_d(z) ∇S(z)` | [`Scheme`](crate::integrators::Scheme), [`Residual`](crate::integrators::Residual) | `tests/reference.rs::one_step_of_the_rigid_body_is_the_published_one`, `tests/order.rs::a_heavy_top_is_integrated_to_the_order_of_the_retraction` |
 //! | `x_k = φ(x_{k−1}, h)`, for `h ≤ h̄` | [`Steps`](crate::integrators::Steps); a step that is not solved is split in halves | `tests/conservation.rs::the_iterator_takes_the_steps_of_the_run`, `tests/conservation.rs::steps_far_too_large_keep_the_energy` |
 //! | second law, `ΔS ≥ −C h³` † | [`SecondLaw::Published`](crate::dynamics::SecondLaw::Published) | `tests/errata.rs::the_published_scheme_lowers_the_entropy_and_by_third_order_only` |
-//! | (semid-d) `K_d(α, β) = G*(w,w) G*(α,β) − G*(w,α) G*(w,β)` † | [`MetricDissipation`](crate::dynamics::MetricDissipation), told to kill `w` | `tests/errata.rs::the_factor_in_the_discrete_form_makes_another_equation_of_it` |
+//! | (semid-d) `K_d(α, β) = G*(w,w) G*(α,β) − G*(w,α) G*(w,β)` † | [`MetricDissipation`](crate::dynamics::MetricDissipation), told to annihilate `w` | `tests/errata.rs::the_factor_in_the_discrete_form_makes_another_equation_of_it` |
 //! | first law, `H(x_{k+1}) = H(x_k)` | [`laws::step`](crate::integrators::laws::step) | `crates/integrators/src/laws.rs::a_midpoint_step_is_symmetric_and_keeps_the_energy`, `tests/conservation.rs::a_million_steps_of_the_relaxing_body_keep_the_energy`, `tests/conservation.rs::a_million_steps_of_a_heavy_body_keep_energy_and_orthogonality` |
 //!
 //! # §4.3 Example: the relaxing rigid body
@@ -129,7 +129,7 @@
 //! | `exp_x(v) = γ_v(1)`, geodesics of `G` | [`Riemannian::exp`](crate::manifolds::Riemannian::exp), [`Riemannian::log`](crate::manifolds::Riemannian::log) | `tests/metrics.rs::geodesics_of_a_left_invariant_metric_are_euler_s_rigid_body`, `crates/manifolds/src/field_metric.rs::geodesics_of_the_half_plane_are_its_semicircles` |
 //! | (weyl) `(exp_z(−hv/2), exp_z(hv/2))` | [`WeylMidpoint`](crate::manifolds::WeylMidpoint) | `tests/equations.rs::both_retractions_are_the_printed_pairs`, `tests/reference.rs::the_spinning_top_has_the_published_errors` |
 //! | second order † | [`WeylMidpoint`](crate::manifolds::WeylMidpoint) 2, [`Exponential`](crate::manifolds::Exponential) 1 | `tests/errata.rs::the_exponential_at_the_start_is_of_first_order`, `tests/problems.rs::canonical_metrics_are_integrated_to_the_order_of_the_retraction` |
-//! | the diagram `π_P ∘ ∇̄H = τ_P ∘ R_h⁻¹` | covectors of a step are at the base `z` of its [`Arc`](crate::manifolds::Arc) | `crates/manifolds/src/laws.rs::metrics_that_vary_keep_the_laws` |
+//! | the diagram `π_P ∘ ∇̄H = τ_P ∘ R_h⁻¹` | covectors of a step are at the base `z` of its [`StepPath`](crate::manifolds::StepPath) | `crates/manifolds/src/laws.rs::metrics_that_vary_keep_the_laws` |
 //! | (discGrad-m) `h⟨w, v⟩ = ΔH` †, `w → dH` | [`laws::discrete_gradient`](crate::integrators::laws::discrete_gradient) | `crates/integrators/src/laws.rs::the_discrete_gradient_keeps_its_laws`, `tests/errata.rs::a_discrete_gradient_on_a_manifold_counts_the_step` |
 //! | (gonzalez-m) `w = dH(z) + (ΔH/h − dH(z)v) ♭v/G(v,v)` † | [`Gonzalez`](crate::integrators::Gonzalez) | `tests/errata.rs::a_discrete_gradient_on_a_manifold_counts_the_step`, `tests/covariance.rs::a_step_on_the_sphere_is_the_same_in_colatitude_and_longitude` |
 //! | `♭(u)(v) = G(u, v)` | [`InnerProduct::flat`](crate::manifolds::InnerProduct::flat) | `crates/manifolds/src/laws.rs::flat_spaces_keep_the_laws` |

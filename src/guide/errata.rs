@@ -69,7 +69,7 @@
 //! ```
 //!
 //! So the same letter has two scales, and the remark does not contain the equation that it follows.
-//! *Correct*, if it shall be an extension: `K(α, β) = C_H G*(Qα, Qβ)`. Both kill the `dL_a` and are
+//! *Correct*, if it shall be an extension: `K(α, β) = C_H G*(Qα, Qβ)`. Both annihilate the `dL_a` and are
 //! positive semidefinite; they differ in time scale, `C_H = |Ω|²` for a body, so that entropy at the start
 //! of the paper's example would be produced 25 times as fast, and near an equilibrium of `H`, where
 //! `K` of (semid) vanishes like `|dH|²` and that of the remark keeps its norm and has no limit. The library
@@ -88,7 +88,7 @@
 //! `(J, S) = −G*(dH, dJ) = −2J`, and the angular momentum `J` dies as `exp(−2t)`: 0.135 of it is left at
 //! `t = 1`. With `J` among the `L_a` of the remark,
 //! [`momentum`](crate::dynamics::SystemBuilder::momentum), it is kept to round-off.
-//! (`tests/errata.rs::a_momentum_is_kept_if_its_differential_is_killed`)
+//! (`tests/errata.rs::a_momentum_is_kept_if_its_differential_is_annihilated`)
 //!
 //! **The bundle.** *Printed:* "the case when `P = TG`". *Correct:* `P = T*G`, which the next line of the paper
 //! uses. `TG` has no Poisson bracket before a Lagrangian is chosen, and momentum maps take values in `g*`.
@@ -145,7 +145,7 @@
 //! K(\alpha, \beta) = \kappa([\xi, \alpha], [\xi, \beta]), \quad \xi = dH ,
 //! ```
 //!
-//! which kills `dH` because `[ξ, ξ] = 0`. That is
+//! which annihilates `dH` because `[ξ, ξ] = 0`. That is
 //! [`CasimirDissipation`](crate::dynamics::CasimirDissipation). `κ` itself in the place of `K` would give
 //! `H' = κ(dH, dC)`; for the body with `κ = 1` and `C = ½|p|²` this is `Ω·p = 2H`, 0.924 at the point of
 //! the test. (On so(3) with `κ = 1` the `K` of `κ` is (semid), which invites the confusion. This `κ` has
@@ -252,7 +252,7 @@
 //! ```
 //!
 //! not to `dH`: it depends on the direction in which `x'` approaches `x`, and is not continuous. In the test it
-//! misses 0.900 of the slope along the arc, at `h = 0.1`. Why the scheme works all the same: its equation
+//! misses 0.900 of the slope along the path, at `h = 0.1`. Why the scheme works all the same: its equation
 //! implies `⟨w, v⟩ = 0`, hence `H(x') = H(x)` by either formula, and then both have the same correction
 //! `−dH(z)v/G(v,v)`. A solution of one is a solution of the other. This rescue is for `H` alone; the
 //! covector of an entropy, which does change, would be wrong at order 0. The library writes the displacement

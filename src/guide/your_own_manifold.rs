@@ -49,7 +49,7 @@
 //!         Vector2::new(y.x - x.x, y.y - x.y)
 //!     }
 //!     /// The velocity of `φ_x(q)` for `q' = v`; `x₁x₁' + x₂x₂' = x₃x₃'` on the sheet.
-//!     fn velocity<D: Scalar>(at: &ChartPoint<Self, D>, v: &Vector2<D>) -> Vector3<D> {
+//!     fn embed<D: Scalar>(at: &ChartPoint<Self, D>, v: &Vector2<D>) -> Vector3<D> {
 //!         let x = at.point();
 //!         Vector3::new(v.x, v.y, (x.x * v.x + x.y * v.y) / x.z)
 //!     }
@@ -100,7 +100,7 @@
 //!
 //! // And a closed form: cosh d(x, y) = x₃y₃ − x₁y₁ − x₂y₂.
 //! let v: Vector2<f64> = Riemannian::<HyperbolicPlane>::log(&metric, &x, &y)?;
-//! let w = HyperbolicPlane::velocity(&ChartPoint::centre(&x), &v);
+//! let w = HyperbolicPlane::embed(&ChartPoint::centre(&x), &v);
 //! let length = (w.x.powi(2) + w.y.powi(2) - w.z.powi(2)).sqrt();
 //! let distance = (x.z * y.z - x.x * y.x - x.y * y.y).acosh();
 //! assert!((length - distance).abs() < 1e-12);
@@ -135,7 +135,7 @@
 //!
 //! Write the chart so that it ends *on* the manifold, whatever `q` is (here the third entry is computed
 //! anew, on a sphere the norm is divided out): the states of a run are chart points, and then they never
-//! drift off. Where a square root or an arc function is not smooth at `q = 0`, its derivatives there are
+//! drift off. Where a square root or a path function is not smooth at `q = 0`, its derivatives there are
 //! not numbers; [`series`](crate::fields::series) has the functions that are.
 //!
 //! # What may be left out

@@ -113,7 +113,7 @@
 //!
 //! | | what happens | what helps |
 //! |---|---|---|
-//! | the edge of a chart is at a finite distance | [`MetricError::Edge`](crate::manifolds::MetricError::Edge), with the share of the way; a run halves the step, and ends in an error that has the trajectory so far | a smaller step; coordinates or a metric in which the edge is far, as `ds²/s²` on R₊ |
+//! | the edge of a chart is at a finite distance | [`MetricError::Edge`](crate::manifolds::MetricError::Edge), with the fraction of the way; a run halves the step, and ends in an error that has the trajectory so far | a smaller step; coordinates or a metric in which the edge is far, as `ds²/s²` on R₊ |
 //! | `A` is not positive somewhere | [`NotPositive`](crate::manifolds::MetricError::NotPositive) with the pivot, on the way of a geodesic [`Degenerate`](crate::manifolds::MetricError::Degenerate) | the domain of the [`Chart`](crate::manifolds::Chart) |
 //! | a step beyond the cut locus, where geodesics stop being shortest | [`CutLocus`](crate::manifolds::MetricError::CutLocus) for canonical metrics; with a closure the cut locus is not known, and the logarithm is *a* geodesic, up to where the chart ends: antipodes and half turns are [`OutOfChart`](crate::manifolds::MetricError::OutOfChart) | a smaller step |
 //! | two points far apart | [`NoLogarithm`](crate::manifolds::MetricError::NoLogarithm), with the miss; steps need no logarithm | points closer together |

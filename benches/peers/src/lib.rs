@@ -163,9 +163,9 @@ impl Problem<4> for Gas {
     }
 
     fn velocity<T: Number>(&self, &[q, p, left, right]: &[T; 4]) -> [T; 4] {
-        let share = T::from(2.0) / T::from(3.0);
-        let pressures = [share * left / q, share * right / (T::from(2.0) - q)];
-        let leak = T::from(self.alpha) / share * (T::from(1.0) / left - T::from(1.0) / right);
+        let fraction = T::from(2.0) / T::from(3.0);
+        let pressures = [fraction * left / q, fraction * right / (T::from(2.0) - q)];
+        let leak = T::from(self.alpha) / fraction * (T::from(1.0) / left - T::from(1.0) / right);
         [p, pressures[0] - pressures[1], -pressures[0] * p + leak, pressures[1] * p - leak]
     }
 

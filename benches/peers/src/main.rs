@@ -1,4 +1,4 @@
-//! Work and precision beside the solvers that one would use instead: `just peers`.
+//! Effort and precision beside the solvers that one would use instead: `just peers`.
 //!
 //! Prints the tables of `docs/peers.md`; the first argument is where the figure goes. With `--all`
 //! every setting has its row.
@@ -276,7 +276,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         println!("\n### {}, T = {}\n", comparison.problem, comparison.time);
         println!("{}", comparison.table(every).markdown());
     }
-    let mut figure = Panels::new("Work and precision: the error over the time").columns(4);
+    let mut figure = Panels::new("Effort and precision: the error over the time").columns(4);
     for comparison in &all {
         let title = format!("{}: error at T = {}", comparison.problem, comparison.time);
         figure = figure.panel(comparison.panel(title, |o| o.error));

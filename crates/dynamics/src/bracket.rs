@@ -24,7 +24,7 @@ use num_dual::Dual64;
 
 /// Where a bracket is evaluated, and what of the system it may look at.
 #[derive(Debug)]
-pub struct Site<'a, M: Manifold, G, D: Scalar = f64> {
+pub struct BracketArgs<'a, M: Manifold, G, D: Scalar = f64> {
     /// The manifold.
     pub space: &'a M,
     /// Its metric, whose volume form the Nambu brackets need.
@@ -56,7 +56,7 @@ pub trait Bracket<M: Manifold, G: Riemannian<M>> {
     /// [`MetricError`] if the bracket needs the metric and it cannot be used at `x`.
     fn apply<D: Scalar>(
         &self,
-        at: &Site<'_, M, G, D>,
+        at: &BracketArgs<'_, M, G, D>,
         alpha: &Vector<M, D>,
     ) -> Result<Vector<M, D>, MetricError>;
 
@@ -68,7 +68,7 @@ pub trait Bracket<M: Manifold, G: Riemannian<M>> {
     /// Those of [`apply`](Self::apply).
     fn linearise(
         &self,
-        at: &Site<'_, M, G>,
+        at: &BracketArgs<'_, M, G>,
         alpha: &Vector<M>,
     ) -> Result<BracketJet<M>, MetricError> {
         by_dual_numbers(self, at, alpha)
@@ -79,7 +79,10 @@ pub trait Bracket<M: Manifold, G: Riemannian<M>> {
     /// # Errors
     ///
     /// Those of [`apply`](Self::apply).
-    fn tensor<D: Scalar>(&self, at: &Site<'_, M, G, D>) -> Result<Matrix<M, D>, MetricError> {
+    fn tensor<D: Scalar>(
+        &self,
+        at: &BracketArgs<'_, M, G, D>,
+    ) -> Result<Matrix<M, D>, MetricError> {
         let mut tensor = Matrix::<M, D>::zeros();
         for j in 0..M::Dim::LEN {
             let column = self.apply(at, &Vector::<M, D>::basis(j))?;
@@ -110,7 +113,7 @@ pub trait Bracket<M: Manifold, G: Riemannian<M>> {
     /// Those of [`apply`](Self::apply).
     fn force<D: Scalar>(
         &self,
-        _at: &Site<'_, M, G, D>,
+        _at: &BracketArgs<'_, M, G, D>,
         _w: &Vector<M, D>,
     ) -> Result<Vector<M, D>, MetricError> {
         Ok(Vector::<M, D>::zero())
@@ -124,7 +127,7 @@ pub trait Bracket<M: Manifold, G: Riemannian<M>> {
     /// Those of [`apply`](Self::apply).
     fn linearise_force(
         &self,
-        at: &Site<'_, M, G>,
+        at: &BracketArgs<'_, M, G>,
         w: &Vector<M>,
     ) -> Result<BracketJet<M>, MetricError> {
         force_by_dual_numbers(self, at, w)
@@ -135,9 +138,9 @@ pub trait Bracket<M: Manifold, G: Riemannian<M>> {
         false
     }
 
-    /// Whether `Π` is built from the covector of the entropy at its [`Site`] and kills it, whatever
-    /// covector it is. A discrete gradient of the entropy is then killed too.
-    fn kills_its_entropy(&self) -> bool {
+    /// Whether `Π` is built from the covector of the entropy at its [`BracketArgs`] and annihilates it, whatever
+    /// covector it is. A discrete gradient of the entropy is then annihilated too.
+    fn annihilates_entropy(&self) -> bool {
         self.is_zero()
     }
 }
@@ -145,7 +148,7 @@ pub trait Bracket<M: Manifold, G: Riemannian<M>> {
 /// The definition of [`Bracket::linearise`]: one dual number for each direction.
 pub(crate) fn by_dual_numbers<M: Manifold, G: Riemannian<M>>(
     bracket: &(impl Bracket<M, G> + ?Sized),
-    at: &Site<'_, M, G>,
+    at: &BracketArgs<'_, M, G>,
     alpha: &Vector<M>,
 ) -> Result<BracketJet<M>, MetricError> {
     let zero = Matrix::<M>::zeros();
@@ -157,9 +160,10 @@ pub(crate) fn by_dual_numbers<M: Manifold, G: Riemannian<M>>(
     for k in 0..M::Dim::LEN {
         let e = epsilon::<M>(k);
         let moved = ChartPoint { base: at.x.base.clone(), q: e };
-        let Site { space, metric, .. } = *at;
-        let along_z = bracket.apply(&Site { space, metric, x: &moved, s: &s }, &alpha)?;
-        let along_s = bracket.apply(&Site { space, metric, x: &still, s: &(s + e) }, &alpha)?;
+        let BracketArgs { space, metric, .. } = *at;
+        let along_z = bracket.apply(&BracketArgs { space, metric, x: &moved, s: &s }, &alpha)?;
+        let along_s =
+            bracket.apply(&BracketArgs { space, metric, x: &still, s: &(s + e) }, &alpha)?;
         for i in 0..M::Dim::LEN {
             jet.along_z[(i, k)] = along_z[i].eps;
             jet.along_s[(i, k)] = along_s[i].eps;
@@ -171,7 +175,7 @@ pub(crate) fn by_dual_numbers<M: Manifold, G: Riemannian<M>>(
 /// The definition of [`Bracket::linearise_force`]: one dual number for each direction.
 pub(crate) fn force_by_dual_numbers<M: Manifold, G: Riemannian<M>>(
     bracket: &(impl Bracket<M, G> + ?Sized),
-    at: &Site<'_, M, G>,
+    at: &BracketArgs<'_, M, G>,
     w: &Vector<M>,
 ) -> Result<BracketJet<M>, MetricError> {
     let zero = Matrix::<M>::zeros();
@@ -179,13 +183,13 @@ pub(crate) fn force_by_dual_numbers<M: Manifold, G: Riemannian<M>>(
     let mut jet = BracketJet::<M> { value, along_z: zero, along_s: zero, tensor: zero };
     let (s, w) = (Vector::<M, Dual64>::embed(at.s), Vector::<M, Dual64>::embed(w));
     let still = ChartPoint::centre(&at.x.base);
-    let Site { space, metric, .. } = *at;
+    let BracketArgs { space, metric, .. } = *at;
     for k in 0..M::Dim::LEN {
         let e = epsilon::<M>(k);
         let moved = ChartPoint { base: at.x.base.clone(), q: e };
-        let along_z = bracket.force(&Site { space, metric, x: &moved, s: &s }, &w)?;
-        let along_s = bracket.force(&Site { space, metric, x: &still, s: &(s + e) }, &w)?;
-        let along_w = bracket.force(&Site { space, metric, x: &still, s: &s }, &(w + e))?;
+        let along_z = bracket.force(&BracketArgs { space, metric, x: &moved, s: &s }, &w)?;
+        let along_s = bracket.force(&BracketArgs { space, metric, x: &still, s: &(s + e) }, &w)?;
+        let along_w = bracket.force(&BracketArgs { space, metric, x: &still, s: &s }, &(w + e))?;
         for i in 0..M::Dim::LEN {
             jet.along_z[(i, k)] = along_z[i].eps;
             jet.along_s[(i, k)] = along_s[i].eps;
@@ -251,7 +255,7 @@ impl Poisson {
 
     /// The tensor `Π(x)` from a closure or any other
     /// [`MatrixField`](metriplectic_fields::MatrixField), acting on covectors dual to the
-    /// [`velocity`](metriplectic_fields::Space::velocity) of the space. It is checked at sampled
+    /// [`velocity`](metriplectic_fields::Space::embed) of the space. It is checked at sampled
     /// points to be skew and to satisfy the Jacobi identity; [`AlmostPoisson::field`] is one that need not.
     ///
     /// On a sphere the matrix is a bivector of the space around, `x' = A ∇H`; on S²,
@@ -273,7 +277,7 @@ impl AlmostPoisson {
     /// Schaft and Maschke 1994; Cantrijn, de León and Martín de Diego 1999).
     ///
     /// A blade on the plane that does not slip sideways, at `(x, y)` with the direction `θ`, the momentum
-    /// `p` along the blade, and the momentum `l` about it, is turned but not moved by a bracket with
+    /// `p` along the blade, and the momentum `l` about it, is dg_v but not moved by a bracket with
     /// `{x, p} = cos θ`, `{y, p} = sin θ`, `{θ, l} = 1`:
     ///
     /// ```

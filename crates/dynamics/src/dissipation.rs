@@ -6,7 +6,7 @@
 //! | [`CometricDissipation`] | the same | a semidefinite matrix `G*(x)` on covectors |
 //! | [`KulkarniNomizu`] | `σ(w,w) μ(α,β) − σ(w,α) μ(w,β) − μ(w,α) σ(w,β) + μ(w,w) σ(α,β)` | two of them |
 //! | [`CasimirDissipation`] | `κ([w,α], [w,β])` | a semidefinite form `κ` on a Lie algebra |
-//! | [`FieldDissipation`] | `K(x, w)(α, β)` | a closure that kills `w` itself |
+//! | [`FieldDissipation`] | `K(x, w)(α, β)` | a closure that annihilates `w` itself |
 //! | [`ProjectedDissipation`] | `K(x)(Qᵀα, Qᵀβ)`, `Qᵀα = α − w G*(w,α)/G*(w,w)` | a closure that knows nothing of `w` |
 //! | [`Scaled`] | `κ(x) K_w(α, β)` | any of these, and a number `κ(x) ≥ 0` |
 //! | [`NoDissipation`] | 0 | |
@@ -37,7 +37,7 @@ use num_dual::Dual64;
 
 use crate::bracket::epsilon;
 
-/// A dissipation `K`, given the covector `w` that it must kill: `dH` in the equations of motion,
+/// A dissipation `K`, given the covector `w` that it must annihilate: `dH` in the equations of motion,
 /// the discrete gradient in a step. Both are then the same code.
 ///
 /// The one method to write is [`apply`](Self::apply), at any scalar.
@@ -46,7 +46,7 @@ use crate::bracket::epsilon;
 /// 3. `K_w w = 0`; 4. `linearise` is the derivative of `apply`.
 #[diagnostic::on_unimplemented(
     message = "`{Self}` is not a dissipation on `{M}`",
-    note = "a dissipation of your own is `FieldDissipation(|x, w| matrix)`, which kills `w`, or `ProjectedDissipation(|x| matrix)`"
+    note = "a dissipation of your own is `FieldDissipation(|x, w| matrix)`, which annihilates `w`, or `ProjectedDissipation(|x| matrix)`"
 )]
 pub trait Dissipation<M: Manifold, G: Riemannian<M>> {
     /// The vector `K_w(x) α`, components in the frame of the chart of `x`.
@@ -103,13 +103,13 @@ pub trait Dissipation<M: Manifold, G: Riemannian<M>> {
         false
     }
 
-    /// Whether it is defined by what it has to kill, so that further invariants of a system are
-    /// projected out of it too. Any other dissipation must kill them of its own.
+    /// Whether it is defined by what it has to annihilate, so that further invariants of a system are
+    /// projected out of it too. Any other dissipation must annihilate them of its own.
     fn adapts(&self) -> bool {
         false
     }
 
-    /// Whether a tensor that does not kill `w` was projected until it does, so that `K` is not quite
+    /// Whether a tensor that does not annihilate `w` was projected until it does, so that `K` is not quite
     /// the one that was written down; see [`ProjectedDissipation`].
     fn is_projected(&self) -> bool {
         false

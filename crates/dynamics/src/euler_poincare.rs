@@ -151,7 +151,7 @@ impl<L: ScalarField<Euclidean<N>>, const N: usize> Legendre<L, N> {
     pub fn velocity(&self, mu: &SVector<f64, N>) -> Result<SVector<f64, N>, LegendreError> {
         let mut xi = self.start;
         let mut jet = self.finite_jet(&xi).ok_or_else(|| not_finite(&xi))?;
-        for sweeps in 0..SWEEPS {
+        for iterations in 0..SWEEPS {
             let off = mu - jet.df;
             let step = regular(&jet.hf, &xi)? * off;
             let next = xi + step;
@@ -161,7 +161,7 @@ impl<L: ScalarField<Euclidean<N>>, const N: usize> Legendre<L, N> {
             if step.norm() <= f64::EPSILON.sqrt() * next.norm() || off.norm() <= rounding {
                 return Ok(next);
             }
-            let missed = LegendreError::NoVelocity { residual: off.norm(), sweeps };
+            let missed = LegendreError::NoVelocity { residual: off.norm(), iterations };
             (xi, jet) = (0..HALVINGS)
                 .find_map(|k| {
                     let next = xi + step * 0.5_f64.powi(i32::try_from(k).ok()?);
@@ -170,7 +170,7 @@ impl<L: ScalarField<Euclidean<N>>, const N: usize> Legendre<L, N> {
                 })
                 .ok_or(missed)?;
         }
-        Err(LegendreError::NoVelocity { residual: (mu - jet.df).norm(), sweeps: SWEEPS })
+        Err(LegendreError::NoVelocity { residual: (mu - jet.df).norm(), iterations: SWEEPS })
     }
 
     /// The jet of `l`, if it is a number.
@@ -292,14 +292,14 @@ pub enum LegendreError {
     },
     /// Newton's method has not found a velocity.
     #[error(
-        "no velocity was found: |∂l/∂ξ − μ| is still {residual:.1e} after {sweeps} Newton sweeps; the \
+        "no velocity was found: |∂l/∂ξ − μ| is still {residual:.1e} after {iterations} Newton iterations; the \
          momentum may be out of reach of this Lagrangian, or start nearer, `Legendre::of(l).near(xi)`"
     )]
     NoVelocity {
         /// `|∂l/∂ξ − μ|` at the best velocity.
         residual: f64,
-        /// Newton sweeps taken.
-        sweeps: usize,
+        /// Newton iterations taken.
+        iterations: usize,
     },
 }
 

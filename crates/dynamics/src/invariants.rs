@@ -2,7 +2,7 @@
 //!
 //! There are two kinds, and a scheme keeps them in two ways:
 //!
-//! - a **Casimir** is conserved because the bracket kills it, `Π dC = 0`, whatever the energy is:
+//! - a **Casimir** is conserved because the bracket annihilates it, `Π dC = 0`, whatever the energy is:
 //!   `|Γ|²` of a heavy top, which lives on se(3)*;
 //! - a **momentum** is conserved because the energy is symmetric, `⟨dJ, Π dH⟩ = 0` while
 //!   `Π dJ ≠ 0`: the angular momentum of a pendulum.
@@ -18,7 +18,7 @@ use metriplectic_fields::{Real, ScalarField, Space};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Kind {
-    /// The bracket kills it: `Π dC = 0`.
+    /// The bracket annihilates it: `Π dC = 0`.
     Casimir,
     /// The energy is symmetric: `⟨dJ, Π dH⟩ = 0`.
     Momentum,

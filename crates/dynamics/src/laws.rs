@@ -7,7 +7,7 @@ use metriplectic_fields::{
 use metriplectic_manifolds::{Manifold, MetricError};
 
 use crate::bracket::{
-    Site, by_dual_numbers as by_dual_numbers_bracket, epsilon, force_by_dual_numbers,
+    BracketArgs, by_dual_numbers as by_dual_numbers_bracket, epsilon, force_by_dual_numbers,
 };
 use crate::dissipation::by_dual_numbers;
 use crate::system::{Metriplectic, Point, SecondLaw};
@@ -78,7 +78,7 @@ fn tensor<Y: Metriplectic + ?Sized, D: Scalar>(
     system: &Y,
     x: &ChartPoint<Y::Manifold, D>,
 ) -> Result<Matrix<Y::Manifold, D>, MetricError> {
-    system.bracket().tensor(&system.site(x, &differential(system.entropy(), x)))
+    system.bracket().tensor(&system.bracket_args(x, &differential(system.entropy(), x)))
 }
 
 /// Checks the bracket of a system at `x` with the covectors `α`, `β`:
@@ -110,9 +110,9 @@ pub fn bracket<Y: Metriplectic>(
 
     let centre = ChartPoint::centre(x);
     let s = system.entropy().jet1(x).df;
-    let site = system.site(&centre, &s);
-    let jet = bracket.linearise(&site, alpha).map_err(exists)?;
-    let defined = by_dual_numbers_bracket(bracket, &site, alpha).map_err(exists)?;
+    let args = system.bracket_args(&centre, &s);
+    let jet = bracket.linearise(&args, alpha).map_err(exists)?;
+    let defined = by_dual_numbers_bracket(bracket, &args, alpha).map_err(exists)?;
     let size = tensor_size * (alpha.magnitude() + beta.magnitude());
     let off = (defined.value - jet.value).magnitude();
     BrokenLaw::unless("linearise has the value of apply", off, round_off(size))?;
@@ -123,30 +123,30 @@ pub fn bracket<Y: Metriplectic>(
     BrokenLaw::unless("linearise is the derivative along x", off, round_off(size + slopes))?;
     let off = (defined.along_s - jet.along_s).max_abs();
     BrokenLaw::unless("linearise is the derivative along dS", off, round_off(size + slopes))?;
-    let combined = bracket.apply(&site, &(*alpha + *beta * 3.0)).map_err(exists)?;
-    let apart = jet.value + bracket.apply(&site, beta).map_err(exists)? * 3.0;
+    let combined = bracket.apply(&args, &(*alpha + *beta * 3.0)).map_err(exists)?;
+    let apart = jet.value + bracket.apply(&args, beta).map_err(exists)? * 3.0;
     let off = (combined - apart).magnitude();
     BrokenLaw::unless("Π(α + 3β) = Πα + 3Πβ", off, round_off(4.0 * size))?;
     if bracket.is_forced() {
-        force(system, &site, alpha)?;
+        force(system, &args, alpha)?;
     }
     if system.second_law() != SecondLaw::Exact {
         return Ok(());
     }
-    let left = bracket.apply(&site, &s).map_err(exists)?.magnitude();
+    let left = bracket.apply(&args, &s).map_err(exists)?.magnitude();
     BrokenLaw::unless("Π dS = 0", left, round_off(tensor_size * s.magnitude()))
 }
 
 /// Checks the force of a bracket: it does no work, and `linearise_force` is its derivative.
 fn force<Y: Metriplectic>(
     system: &Y,
-    site: &Site<'_, Y::Manifold, Y::Metric>,
+    args: &BracketArgs<'_, Y::Manifold, Y::Metric>,
     alpha: &Vector<Y::Manifold>,
 ) -> Result<(), BrokenLaw> {
     let exists = |_| BrokenLaw { law: "the force exists", size: f64::NAN, bound: 0.0 };
     let round_off = round_off::<Y::Manifold>;
-    let jet = system.bracket().linearise_force(site, alpha).map_err(exists)?;
-    let defined = force_by_dual_numbers(system.bracket(), site, alpha).map_err(exists)?;
+    let jet = system.bracket().linearise_force(args, alpha).map_err(exists)?;
+    let defined = force_by_dual_numbers(system.bracket(), args, alpha).map_err(exists)?;
     let size = defined.tensor.max_abs() * alpha.magnitude();
     let power = alpha.dot(&defined.value).abs();
     BrokenLaw::unless("⟨α, force(α)⟩ = 0", power, round_off(size * alpha.magnitude()))?;
@@ -173,7 +173,7 @@ fn force<Y: Metriplectic>(
     Ok(())
 }
 
-/// Checks the dissipation of a system at `x` with the covector `w` to be killed and two more covectors:
+/// Checks the dissipation of a system at `x` with the covector `w` to be annihilated and two more covectors:
 ///
 /// 1. `K_w` is symmetric; 2. `K_w ⪰ 0`; 3. `K_w w = 0`; 4. `linearise` is the derivative of
 ///    `apply` along `x`, `w` and `α`.
@@ -198,8 +198,8 @@ pub fn dissipation<Y: Metriplectic>(
     let form = alpha.dot(&(tensor * *alpha));
     let scale = size * alpha.magnitude().powi(2);
     BrokenLaw::unless("K is positive semidefinite", -form, round_off::<Y::Manifold>(scale))?;
-    let killed = dissipation.apply(metric, &centre, w, w).map_err(broken("K exists"))?;
-    let off = killed.magnitude();
+    let annihilated = dissipation.apply(metric, &centre, w, w).map_err(broken("K exists"))?;
+    let off = annihilated.magnitude();
     BrokenLaw::unless("K_w w = 0", off, round_off::<Y::Manifold>(size * w.magnitude()))?;
 
     let jet = dissipation.linearise(metric, x, w, alpha).map_err(broken("K exists"))?;

@@ -8,11 +8,11 @@
 //! | module | what it holds |
 //! |---|---|
 //! | [`bracket`] | [`Bracket`]: `Π`; [`LiePoisson`], [`AreaForm`](type@AreaForm), [`Nambu`], [`Symplectic`], [`Poisson::constant`], [`Poisson::field`], [`AlmostPoisson::field`], [`Zero`]; with a [`Force`], [`ForcedLiePoisson`] |
-//! | [`dissipation`] | [`Dissipation`]: `K`, given the covector it must kill; [`MetricDissipation`], [`CometricDissipation`], [`KulkarniNomizu`], [`CasimirDissipation`], [`FieldDissipation`], [`ProjectedDissipation`], [`Scaled`] |
+//! | [`dissipation`] | [`Dissipation`]: `K`, given the covector it must annihilate; [`MetricDissipation`], [`CometricDissipation`], [`KulkarniNomizu`], [`CasimirDissipation`], [`FieldDissipation`], [`ProjectedDissipation`], [`Scaled`] |
 //! | [`euler_poincare`] | [`Legendre`]: a reduced Lagrangian on a Lie algebra, as an energy on its dual |
 //! | [`system`] | [`System`] and its builder |
 //! | [`invariants`] | further Casimirs and momenta `L_a`, and symmetries |
-//! | [`orthogonal`] | projections off covectors, by which a tensor is made to kill them |
+//! | [`orthogonal`] | projections off covectors, by which a tensor is made to annihilate them |
 //! | [`velocity`](mod@velocity) | `Π w_H + K w_S` for given covectors: differentials, or discrete gradients |
 //! | [`verify`] | the laws of a model, sampled: [`System::verify`], [`System::report`], [`Verified`] |
 //! | [`laws`] | what brackets and dissipations promise, and the functions that check it |
@@ -31,8 +31,8 @@ pub mod verified;
 pub mod verify;
 
 pub use bracket::{
-    AlmostPoisson, AreaForm, Bracket, BracketJet, ConstantPoisson, FieldPoisson, Force,
-    ForcedLiePoisson, LiePoisson, Nambu, NaturalBracket, OfEntropy, Poisson, PoissonError, Site,
+    AlmostPoisson, AreaForm, Bracket, BracketArgs, BracketJet, ConstantPoisson, FieldPoisson,
+    Force, ForcedLiePoisson, LiePoisson, Nambu, NaturalBracket, OfEntropy, Poisson, PoissonError,
     Symplectic, Zero,
 };
 pub use dissipation::{

@@ -187,7 +187,7 @@ pub enum ModelError {
     /// The dissipation changes a further invariant.
     #[error(
         "the dissipation changes an invariant at {point:?}: K dL is {size:.1e} of its terms; use a \
-         dissipation that kills it, or that of the metric, which is projected"
+         dissipation that annihilates it, or that of the metric, which is projected"
     )]
     InvariantNotKept {
         /// The entries of the point.
@@ -197,14 +197,14 @@ pub enum ModelError {
     },
     /// A further invariant is a function of the other fields.
     #[error(
-        "invariant {index} depends on the other fields around the start: only {share:.1e} of its \
+        "invariant {index} depends on the other fields around the start: only {fraction:.1e} of its \
          differential is independent of theirs; leave it out of the list"
     )]
     DependentInvariant {
         /// Which one, in the order of the list, counted from 0.
         index: usize,
-        /// The share of its differential that is independent.
-        share: f64,
+        /// The fraction of its differential that is independent.
+        fraction: f64,
     },
     /// An action changes the energy.
     #[error(
@@ -260,7 +260,7 @@ pub enum ModelError {
     /// `K dH ≠ 0`.
     #[error(
         "the dissipation does not keep the energy at {point:?}: K dH is {size:.1e} of its terms; build \
-         K from the covector w that it is told to kill, or ask for `ProjectedDissipation`"
+         K from the covector w that it is told to annihilate, or ask for `ProjectedDissipation`"
     )]
     EnergyNotKept {
         /// The entries of the point.
@@ -274,7 +274,7 @@ pub enum ModelError {
          step gives it in the place of dH: K_w w is {size:.1e} of its terms; build K from w and not from \
          dH(x), or ask for `ProjectedDissipation`"
     )]
-    CovectorNotKilled {
+    CovectorNotAnnihilated {
         /// The entries of the point.
         point: Vec<f64>,
         /// The relative size of the violation.

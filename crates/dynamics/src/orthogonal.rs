@@ -1,6 +1,6 @@
 //! Projections off covectors, one after another.
 //!
-//! A tensor is made to kill a covector `w` by the projections
+//! A tensor is made to annihilate a covector `w` by the projections
 //!
 //! ```math
 //! P^T\alpha = \alpha - \frac{G^*(w,\alpha)}{G^*(w,w)}\, w, \qquad
@@ -12,7 +12,7 @@
 //! Bloch, Farré Puiggalí, Martín de Diego (2024, §2.2), without forming it: a covector that depends
 //! on those before it is found by what is left of it, and left out.
 //!
-//! This jumps where a covector becomes dependent. The faded projections do not: with the independent share
+//! This jumps where a covector becomes dependent. The faded projections do not: with the independent fraction
 //! `σ = |n|/|w|` of the covector `w` whose orthogonal part is `n`, each has the weight `1/(1 + r)`,
 //! `r = (μ/σ)⁴`,
 //!
@@ -25,12 +25,12 @@
 use metriplectic_fields::{Column, Dimension, Scalar, Square};
 use metriplectic_manifolds::InnerProduct;
 
-/// The share of a covector that has to be left after those before it are taken out of it; below, it
+/// The fraction of a covector that has to be left after those before it are taken out of it; below, it
 /// is their combination up to round-off.
 const INDEPENDENT: f64 = 1e-10;
 
 /// `square/w`, where the weight `w = 1/(1 + r)`, `r = (μ/σ)⁴`, fades out a projection off a covector whose
-/// independent share `σ = √(square/size)` falls below `μ`.
+/// independent fraction `σ = √(square/size)` falls below `μ`.
 #[inline]
 fn faded<D: Scalar>(square: D, size: D, mu: f64) -> D {
     square + square * (size / square * (mu * mu)).powi(2)
@@ -73,30 +73,30 @@ impl<N: Dimension, D: Scalar> Orthogonal<N, D> {
         self.len == 0
     }
 
-    /// Adds a covector, and gives the share of it that is orthogonal to those before it. It is left
+    /// Adds a covector, and gives the fraction of it that is orthogonal to those before it. It is left
     /// out if this is round-off.
     pub fn push(&mut self, g: &impl InnerProduct<N::Vector<D>>, w: &N::Vector<D>) -> f64 {
         let whole = g.orthonormal(w);
         // A second pass takes out what the rounding of the first has left.
         let mut n = *w;
         for _ in 0..2 {
-            n = self.off_covector(0, &n);
+            n = self.project_covector(0, &n);
         }
         let hat = g.orthonormal(&n);
         let size = whole.magnitude();
-        let share = if size > 0.0 { hat.magnitude() / size } else { 0.0 };
-        if share > INDEPENDENT && self.len < N::LEN {
+        let fraction = if size > 0.0 { hat.magnitude() / size } else { 0.0 };
+        if fraction > INDEPENDENT && self.len < N::LEN {
             let (square, size) = (hat.dot(&hat), whole.dot(&whole));
-            let normal = Normal { n, sharp: g.raise(&hat), square, size };
+            let normal = Normal { n, sharp: g.from_orthonormal(&hat), square, size };
             self.normals[self.len] = Some(normal);
             self.len += 1;
         }
-        share
+        fraction
     }
 
     /// The covector `Pᵀα` without its parts along the covectors from the `first` on.
     #[inline]
-    pub fn off_covector(&self, first: usize, alpha: &N::Vector<D>) -> N::Vector<D> {
+    pub fn project_covector(&self, first: usize, alpha: &N::Vector<D>) -> N::Vector<D> {
         let mut alpha = *alpha;
         for Normal { n, sharp, square, .. } in self.normals.as_ref()[first..].iter().flatten() {
             alpha -= *n * (sharp.dot(&alpha) / *square);
@@ -104,9 +104,9 @@ impl<N: Dimension, D: Scalar> Orthogonal<N, D> {
         alpha
     }
 
-    /// The vector `Pv` that the covectors from the `first` on kill.
+    /// The vector `Pv` that the covectors from the `first` on annihilate.
     #[inline]
-    pub fn off_vector(&self, first: usize, v: &N::Vector<D>) -> N::Vector<D> {
+    pub fn project_vector(&self, first: usize, v: &N::Vector<D>) -> N::Vector<D> {
         let mut v = *v;
         for Normal { n, sharp, square, .. } in self.normals.as_ref()[first..].iter().flatten() {
             v -= *sharp * (n.dot(&v) / *square);
@@ -114,7 +114,7 @@ impl<N: Dimension, D: Scalar> Orthogonal<N, D> {
         v
     }
 
-    /// [`off_covector`](Self::off_covector) with projections that fade out below the share `mu`.
+    /// [`project_covector`](Self::project_covector) with projections that fade out below the fraction `mu`.
     #[inline]
     pub fn faded_covector(&self, first: usize, alpha: &N::Vector<D>, mu: f64) -> N::Vector<D> {
         let mut alpha = *alpha;
@@ -124,7 +124,7 @@ impl<N: Dimension, D: Scalar> Orthogonal<N, D> {
         alpha
     }
 
-    /// [`off_vector`](Self::off_vector) with projections that fade out below the share `mu`.
+    /// [`project_vector`](Self::project_vector) with projections that fade out below the fraction `mu`.
     #[inline]
     pub fn faded_vector(&self, first: usize, v: &N::Vector<D>, mu: f64) -> N::Vector<D> {
         let mut v = *v;
@@ -138,7 +138,7 @@ impl<N: Dimension, D: Scalar> Orthogonal<N, D> {
 impl<N: Dimension, D: Scalar> Orthogonal<N, D> {
     /// Adds the covector `w`, and returns the vector `v − ⟨w, v⟩ ♯n/G*(n, n)` with the part `n` of `w` that
     /// is orthogonal to the covectors before it: `w` annihilates this vector, and they act on it as on
-    /// `v`. Fades out below the share `mu`.
+    /// `v`. Fades out below the fraction `mu`.
     pub fn without(
         &mut self,
         g: &impl InnerProduct<N::Vector<D>>,
@@ -167,8 +167,8 @@ pub struct OrthogonalJet<N: Dimension> {
 
 #[derive(Clone, Copy, Debug)]
 struct NormalJet<N: Dimension> {
-    n: Moving<N>,
-    sharp: Moving<N>,
+    n: WithJacobian<N>,
+    sharp: WithJacobian<N>,
     square: Number<N>,
     size: Number<N>,
 }
@@ -178,11 +178,11 @@ impl<N: Dimension> NormalJet<N> {
     /// `d(square/w) = (1 − r) d square + 2 r σ² d size`.
     #[inline]
     fn faded(&self, mu: f64) -> Number<N> {
-        let share = self.square.value / self.size.value;
-        let r = (mu * mu / share).powi(2);
+        let fraction = self.square.value / self.size.value;
+        let r = (mu * mu / fraction).powi(2);
         Number {
             value: faded(self.square.value, self.size.value, mu),
-            slope: self.square.slope * (1.0 - r) + self.size.slope * (2.0 * r * share),
+            slope: self.square.slope * (1.0 - r) + self.size.slope * (2.0 * r * fraction),
         }
     }
 }
@@ -196,14 +196,14 @@ struct Number<N: Dimension> {
 
 /// The components of a vector or covector, and their derivatives along the unknown of a step.
 #[derive(Clone, Copy, Debug)]
-pub struct Moving<N: Dimension> {
+pub struct WithJacobian<N: Dimension> {
     /// The components.
     pub value: N::Vector<f64>,
     /// Their derivatives, a column for each direction.
     pub slope: N::Matrix<f64>,
 }
 
-impl<N: Dimension> Moving<N> {
+impl<N: Dimension> WithJacobian<N> {
     /// `self − along (functional·self) / square`, where the quotient has derivatives too.
     #[inline]
     fn without(&self, along: &Self, functional: &Self, square: &Number<N>) -> Self {
@@ -237,20 +237,20 @@ impl<N: Dimension> OrthogonalJet<N> {
         self.len == 0
     }
 
-    /// By how much projections amplify round-off, if they fade out below the share `mu`: the sum of
+    /// By how much projections amplify round-off, if they fade out below the fraction `mu`: the sum of
     /// `w/σ` over the covectors from the `first` on.
     pub fn amplification(&self, first: usize, mu: f64) -> f64 {
         let normals = self.normals.as_ref()[first..].iter().flatten();
         normals
             .map(|NormalJet { square, size, .. }| {
-                let share = (square.value / size.value).sqrt();
-                square.value / (faded(square.value, size.value, mu) * share)
+                let fraction = (square.value / size.value).sqrt();
+                square.value / (faded(square.value, size.value, mu) * fraction)
             })
             .sum()
     }
 
     /// The absolute terms that the projection of `v` off the covectors from the `first` on subtracts, if it
-    /// fades out below the share `mu`.
+    /// fades out below the fraction `mu`.
     #[must_use]
     pub fn terms_of_vector(&self, first: usize, v: &N::Vector<f64>, mu: f64) -> N::Vector<f64> {
         self.terms(first, v, mu, |normal| (&normal.n, &normal.sharp))
@@ -273,7 +273,7 @@ impl<N: Dimension> OrthogonalJet<N> {
         first: usize,
         v: &N::Vector<f64>,
         mu: f64,
-        parts: impl Fn(&NormalJet<N>) -> (&Moving<N>, &Moving<N>),
+        parts: impl Fn(&NormalJet<N>) -> (&WithJacobian<N>, &WithJacobian<N>),
     ) -> N::Vector<f64> {
         let mut terms = N::Vector::<f64>::zero();
         for normal in self.normals.as_ref()[first..].iter().flatten() {
@@ -284,43 +284,43 @@ impl<N: Dimension> OrthogonalJet<N> {
         terms
     }
 
-    /// Adds a covector; `turned(v)` is the derivative of `g v` along the unknown, for a fixed `v`.
+    /// Adds a covector; `dg_v(v)` is the derivative of `g v` along the unknown, for a fixed `v`.
     pub fn push(
         &mut self,
         g: &impl InnerProduct<N::Vector<f64>>,
-        turned: impl Fn(&N::Vector<f64>) -> N::Matrix<f64>,
-        w: &Moving<N>,
+        dg_v: impl Fn(&N::Vector<f64>) -> N::Matrix<f64>,
+        w: &WithJacobian<N>,
     ) {
         let whole = g.orthonormal(&w.value);
-        let n = self.off_covector(0, &self.off_covector(0, w));
+        let n = self.project_covector(0, &self.project_covector(0, w));
         let hat = g.orthonormal(&n.value);
         if hat.magnitude() > INDEPENDENT * whole.magnitude() && self.len < N::LEN {
-            let value = g.raise(&hat);
+            let value = g.from_orthonormal(&hat);
             // g ♯n = n, so g ∂♯n = ∂n − (∂g) ♯n.
-            let bend = n.slope - turned(&value);
+            let bend = n.slope - dg_v(&value);
             let slope = N::Matrix::<f64>::from_columns(|k| g.sharp(&bend.column_at(k)));
-            let sharp = Moving { value, slope };
-            let square = square_jet(g, &turned, &n, &hat);
-            let size = if self.is_empty() { square } else { square_jet(g, &turned, w, &whole) };
+            let sharp = WithJacobian { value, slope };
+            let square = square_jet(g, &dg_v, &n, &hat);
+            let size = if self.is_empty() { square } else { square_jet(g, &dg_v, w, &whole) };
             self.normals[self.len] = Some(NormalJet { n, sharp, square, size });
             self.len += 1;
         }
     }
 
-    /// [`Orthogonal::off_covector`] with derivatives.
+    /// [`Orthogonal::project_covector`] with derivatives.
     #[inline]
     #[must_use]
-    pub fn off_covector(&self, first: usize, alpha: &Moving<N>) -> Moving<N> {
+    pub fn project_covector(&self, first: usize, alpha: &WithJacobian<N>) -> WithJacobian<N> {
         let normals = self.normals.as_ref()[first..].iter().flatten();
         normals.fold(*alpha, |alpha, NormalJet { n, sharp, square, .. }| {
             alpha.without(n, sharp, square)
         })
     }
 
-    /// [`Orthogonal::off_vector`] with derivatives.
+    /// [`Orthogonal::project_vector`] with derivatives.
     #[inline]
     #[must_use]
-    pub fn off_vector(&self, first: usize, v: &Moving<N>) -> Moving<N> {
+    pub fn project_vector(&self, first: usize, v: &WithJacobian<N>) -> WithJacobian<N> {
         let normals = self.normals.as_ref()[first..].iter().flatten();
         normals.fold(*v, |v, NormalJet { n, sharp, square, .. }| v.without(sharp, n, square))
     }
@@ -328,7 +328,12 @@ impl<N: Dimension> OrthogonalJet<N> {
     /// [`Orthogonal::faded_covector`] with derivatives.
     #[inline]
     #[must_use]
-    pub fn faded_covector(&self, first: usize, alpha: &Moving<N>, mu: f64) -> Moving<N> {
+    pub fn faded_covector(
+        &self,
+        first: usize,
+        alpha: &WithJacobian<N>,
+        mu: f64,
+    ) -> WithJacobian<N> {
         let normals = self.normals.as_ref()[first..].iter().flatten();
         normals.fold(*alpha, |alpha, normal| {
             alpha.without(&normal.n, &normal.sharp, &normal.faded(mu))
@@ -338,7 +343,7 @@ impl<N: Dimension> OrthogonalJet<N> {
     /// [`Orthogonal::faded_vector`] with derivatives.
     #[inline]
     #[must_use]
-    pub fn faded_vector(&self, first: usize, v: &Moving<N>, mu: f64) -> Moving<N> {
+    pub fn faded_vector(&self, first: usize, v: &WithJacobian<N>, mu: f64) -> WithJacobian<N> {
         let normals = self.normals.as_ref()[first..].iter().flatten();
         normals.fold(*v, |v, normal| v.without(&normal.sharp, &normal.n, &normal.faded(mu)))
     }
@@ -348,13 +353,13 @@ impl<N: Dimension> OrthogonalJet<N> {
     pub fn without(
         &mut self,
         g: &impl InnerProduct<N::Vector<f64>>,
-        turned: impl Fn(&N::Vector<f64>) -> N::Matrix<f64>,
-        w: &Moving<N>,
-        v: &Moving<N>,
+        dg_v: impl Fn(&N::Vector<f64>) -> N::Matrix<f64>,
+        w: &WithJacobian<N>,
+        v: &WithJacobian<N>,
         mu: f64,
-    ) -> Moving<N> {
+    ) -> WithJacobian<N> {
         let len = self.len;
-        self.push(g, turned, w);
+        self.push(g, dg_v, w);
         match self.normals.as_ref().get(len).and_then(Option::as_ref) {
             Some(normal) => v.without(&normal.sharp, w, &normal.faded(mu)),
             None => *v,
@@ -367,11 +372,11 @@ impl<N: Dimension> OrthogonalJet<N> {
 #[inline]
 fn square_jet<N: Dimension>(
     g: &impl InnerProduct<N::Vector<f64>>,
-    turned: &impl Fn(&N::Vector<f64>) -> N::Matrix<f64>,
-    n: &Moving<N>,
+    dg_v: &impl Fn(&N::Vector<f64>) -> N::Matrix<f64>,
+    n: &WithJacobian<N>,
     hat: &N::Vector<f64>,
 ) -> Number<N> {
-    let sharp = g.raise(hat);
-    let slope = n.slope.transpose_times(&sharp) * 2.0 - turned(&sharp).transpose_times(&sharp);
+    let sharp = g.from_orthonormal(hat);
+    let slope = n.slope.transpose_times(&sharp) * 2.0 - dg_v(&sharp).transpose_times(&sharp);
     Number { value: hat.dot(hat), slope }
 }

@@ -7,7 +7,7 @@ use metriplectic_fields::{
 };
 use metriplectic_manifolds::{Canonical, Manifold, MetricError, Riemannian};
 
-use crate::bracket::Site;
+use crate::bracket::BracketArgs;
 use crate::dissipation::{Choice, Given};
 use crate::invariants::{Casimir, Invariants, Momentum, Symmetry};
 use crate::velocity;
@@ -62,16 +62,16 @@ pub trait Metriplectic {
 
     /// Where the bracket is evaluated: the point `x` with the covector `s` of the entropy there.
     #[inline]
-    fn site<'a, D: Scalar>(
+    fn bracket_args<'a, D: Scalar>(
         &'a self,
         x: &'a ChartPoint<Self::Manifold, D>,
         s: &'a Vector<Self::Manifold, D>,
-    ) -> Site<'a, Self::Manifold, Self::Metric, D> {
-        Site { space: self.manifold(), metric: self.metric(), x, s }
+    ) -> BracketArgs<'a, Self::Manifold, Self::Metric, D> {
+        BracketArgs { space: self.manifold(), metric: self.metric(), x, s }
     }
 
     /// The velocity `Π dH + K dS`, by the definition and at any scalar. Further invariants are
-    /// killed by `K`.
+    /// annihilated by `K`.
     ///
     /// # Errors
     ///
@@ -81,7 +81,7 @@ pub trait Metriplectic {
         x: &ChartPoint<Self::Manifold, D>,
     ) -> Result<Vector<Self::Manifold, D>, MetricError> {
         let w = velocity::differentials(self, x);
-        let reversible = self.bracket().apply(&self.site(x, &w.entropy), &w.energy)?;
+        let reversible = self.bracket().apply(&self.bracket_args(x, &w.entropy), &w.energy)?;
         Ok(reversible + velocity::irreversible(self, x, &w)?)
     }
 
@@ -133,7 +133,7 @@ pub enum SecondLaw {
     #[default]
     NoEntropy,
     /// Both laws exactly, in each step: `ΔS = h K(w_S, w_S) ≥ 0` with a discrete gradient `w_S` of the
-    /// entropy, which takes the place of `dS` and is killed by the bracket. `S` must be a Casimir,
+    /// entropy, which takes the place of `dS` and is annihilated by the bracket. `S` must be a Casimir,
     /// `Π dS = 0`, and verification refuses the model otherwise: there is no such scheme then.
     ///
     /// A force `𝓕` adds `h ⟨𝓕(w_H), [w_H, w_S]⟩` to `ΔS`, and verification refuses one that makes this

@@ -8,18 +8,18 @@
 //! along a step it is the scheme, which then keeps what the equation keeps:
 //!
 //! - `Π̃ = P Π Pᵀ`, where `Pᵀ` takes the discrete gradients of the entropy and of the further
-//!   Casimirs out of a covector. It is skew and kills them, so `⟨w_H, Π̃w_H⟩ = 0` and
-//!   `⟨w_S, Π̃w_H⟩ = 0` to round-off; and it differs from `Π` by `O(h²)`, *because* `Π` kills their
+//!   Casimirs out of a covector. It is skew and annihilates them, so `⟨w_H, Π̃w_H⟩ = 0` and
+//!   `⟨w_S, Π̃w_H⟩ = 0` to round-off; and it differs from `Π` by `O(h²)`, *because* `Π` annihilates their
 //!   differentials. A bracket that is built from the covector of its Casimir
-//!   ([`Bracket::kills_its_entropy`]) needs no `P` for it. Where a Casimir's covector depends on those
+//!   ([`Bracket::annihilates_entropy`]) needs no `P` for it. Where a Casimir's covector depends on those
 //!   before it, its projection fades out of `P` and of `Pᵀ` with the same weight. So `Π̃` stays skew and
 //!   conserves the energy. The entropy comes first and has full weight.
 //! - A momentum `J` must not enter `P`, which would change the flow: `Π dJ ≠ 0`. With
 //!   `a = Π̃w_H`, the number `⟨w_J, a⟩` is `O(h²)`; it is taken out of `a` along the vector `♯n`, where
-//!   `n` is the part of `w_J` orthogonal to all that `a` kills already. Near a relative equilibrium, where
+//!   `n` is the part of `w_J` orthogonal to all that `a` annihilates already. Near a relative equilibrium, where
 //!   `n` vanishes, this fades out ([`Orthogonal::faded_vector`]).
 //! - `K̃_w = Q K_w Qᵀ`, where `Q` takes out the parts of the further invariants orthogonal to `w_H`: it
-//!   is symmetric and positive semidefinite, and kills `w_H` and all of them. For the dissipation of
+//!   is symmetric and positive semidefinite, and annihilates `w_H` and all of them. For the dissipation of
 //!   the metric this is `κ G*(Pα, Pβ)` with `κ = G*(w_H, w_H)` and `P = 1 − C^{ab} L_b ⊗ L_a` (Bloch,
 //!   Farré Puiggalí, Martín de Diego 2024, remark in §2.2).
 //! - A force adds `f = ad*_{w_H} 𝓕(w_H)`, with `⟨w_H, f⟩ = 0` and `⟨w_S, f⟩ = ⟨𝓕(w_H), [w_H, w_S]⟩`. Where it
@@ -35,15 +35,15 @@ use metriplectic_fields::{
 use metriplectic_manifolds::{InnerProduct, MetricError, Riemannian};
 
 use crate::invariants::{Invariants, Kind, Visitor};
-use crate::orthogonal::{Moving, Orthogonal, OrthogonalJet};
+use crate::orthogonal::{Orthogonal, OrthogonalJet, WithJacobian};
 use crate::system::{Metriplectic, SecondLaw};
 use crate::{Bracket, Dissipation};
 
-/// The independent share `σ = μ` of a Casimir's covector at which its projection in `Π̃` has half its weight,
+/// The independent fraction `σ = μ` of a Casimir's covector at which its projection in `Π̃` has half its weight,
 /// `1/(1 + (μ/σ)⁴)`.
 ///
 /// Where the Casimir depends on the entropy or on the Casimirs before it, `σ = 0`, the projection jumps. A
-/// discrete gradient differs from a differential by `O(h²)`, so a share below that is an error of the
+/// discrete gradient differs from a differential by `O(h²)`, so a fraction below that is an error of the
 /// discretisation: its direction is arbitrary, and the equation of a step is then stiff in it. `μ = 10⁻⁶` is
 /// too small for the quartic Casimir of so(5)* at `h = 0.2`. Without its projection a Casimir changes by
 /// less than `μ|dC||v|` per unit of time.
@@ -146,8 +146,8 @@ pub fn differentials<Y: Metriplectic + ?Sized, D: Scalar>(
     Covectors::new(laws, system.invariants(), &mut d)
 }
 
-/// Which covectors the bracket is made to kill.
-struct Killed {
+/// Which covectors the bracket is made to annihilate.
+struct ProjectionPlan {
     /// The entropy's.
     entropy: bool,
     /// Whether the bracket has to be projected off them, and off those of the Casimirs.
@@ -156,7 +156,7 @@ struct Killed {
     momenta: bool,
 }
 
-impl Killed {
+impl ProjectionPlan {
     #[inline]
     fn of<Y, V>(system: &Y, w: &Covectors<Dim<Y>, V>) -> Self
     where
@@ -165,7 +165,7 @@ impl Killed {
     {
         let entropy = system.second_law() == SecondLaw::Exact;
         let moves = !system.bracket().is_zero();
-        let already = system.bracket().kills_its_entropy();
+        let already = system.bracket().annihilates_entropy();
         let projected = moves && (entropy && !already || w.has(Kind::Casimir));
         Self { entropy, projected, momenta: moves && w.has(Kind::Momentum) }
     }
@@ -182,9 +182,9 @@ pub fn reversible<Y: Metriplectic + ?Sized, D: Scalar>(
     x: &Place<Y, D>,
     w: &Covectors<Dim<Y>, Components<Y, D>>,
 ) -> Result<Components<Y, D>, MetricError> {
-    let killed = Killed::of(system, w);
-    let bracket = |alpha: &_| system.bracket().apply(&system.site(x, &w.entropy), alpha);
-    if !killed.projected && !killed.momenta {
+    let annihilated = ProjectionPlan::of(system, w);
+    let bracket = |alpha: &_| system.bracket().apply(&system.bracket_args(x, &w.entropy), alpha);
+    if !annihilated.projected && !annihilated.momenta {
         return bracket(&w.energy);
     }
     let g = system.metric().at(x)?;
@@ -193,27 +193,27 @@ pub fn reversible<Y: Metriplectic + ?Sized, D: Scalar>(
         let w_hat = g.orthonormal(&w.entropy);
         let square = w_hat.dot(&w_hat);
         if square.re() > 0.0 {
-            let (sharp, share) = (g.raise(&w_hat), square.recip());
-            let alpha = w.energy - w.entropy * (sharp.dot(&w.energy) * share);
+            let (sharp, fraction) = (g.from_orthonormal(&w_hat), square.recip());
+            let alpha = w.energy - w.entropy * (sharp.dot(&w.energy) * fraction);
             let v = bracket(&alpha)?;
-            return Ok(v - sharp * (w.entropy.dot(&v) * share));
+            return Ok(v - sharp * (w.entropy.dot(&v) * fraction));
         }
         return bracket(&w.energy);
     }
     let mut off = Orthogonal::<Dim<Y>, D>::default();
-    if killed.entropy {
+    if annihilated.entropy {
         off.push(&g, &w.entropy);
     }
     for c in w.of_kind(Kind::Casimir) {
         off.push(&g, c);
     }
-    let mut a = if killed.projected {
+    let mut a = if annihilated.projected {
         let alpha = off.faded_covector(0, &w.energy, CASIMIR);
         off.faded_vector(0, &bracket(&alpha)?, CASIMIR)
     } else {
         bracket(&w.energy)?
     };
-    if killed.momenta {
+    if annihilated.momenta {
         off.push(&g, &w.energy);
         let first = off.len();
         for j in w.of_kind(Kind::Momentum) {
@@ -245,7 +245,7 @@ fn force<Y: Metriplectic + ?Sized, D: Scalar>(
     x: &Place<Y, D>,
     w: &Covectors<Dim<Y>, Components<Y, D>>,
 ) -> Result<Components<Y, D>, MetricError> {
-    let force = system.bracket().force(&system.site(x, &w.entropy), &w.energy)?;
+    let force = system.bracket().force(&system.bracket_args(x, &w.entropy), &w.energy)?;
     if Y::Invariants::COUNT == 0 {
         return Ok(force);
     }
@@ -270,7 +270,7 @@ fn friction<Y: Metriplectic + ?Sized, D: Scalar>(
         return k(&w.entropy);
     }
     let (off, first) = orthogonal_to_energy::<Y, D>(&system.metric().at(x)?, w);
-    Ok(off.off_vector(first, &k(&off.off_covector(first, &w.entropy))?))
+    Ok(off.project_vector(first, &k(&off.project_covector(first, &w.entropy))?))
 }
 
 /// The covector of the energy and the parts of the further invariants orthogonal to it, which start
@@ -288,7 +288,7 @@ fn orthogonal_to_energy<Y: Metriplectic + ?Sized, D: Scalar>(
     (off, first)
 }
 
-/// The smallest share of a further invariant's differential at `x` that is independent of those of
+/// The smallest fraction of a further invariant's differential at `x` that is independent of those of
 /// the other fields with which it is projected out; 1 without further invariants.
 ///
 /// # Errors
@@ -320,23 +320,23 @@ pub fn independence<Y: Metriplectic + ?Sized>(
         .collect())
 }
 
-/// For each further invariant, the smallest independent share of its differential at `x` in a projection
+/// For each further invariant, the smallest independent fraction of its differential at `x` in a projection
 /// that a step makes: of a Casimir beside the entropy and the Casimirs before it, of a momentum beside
 /// these, the energy and the momenta before it, of either beside the energy and the list before it.
 ///
-/// [`independence`] also asks for shares beside the entropy *and* the energy. These vanish at every
+/// [`independence`] also asks for fractions beside the entropy *and* the energy. These vanish at every
 /// equilibrium and disturb no step.
 ///
 /// # Errors
 ///
 /// [`MetricError`] if the metric cannot be used at `x`.
-pub fn projected_shares<Y: Metriplectic + ?Sized>(
+pub fn projected_fractions<Y: Metriplectic + ?Sized>(
     system: &Y,
     x: &Place<Y, f64>,
 ) -> Result<Vec<f64>, MetricError> {
     let (w, g) = (differentials(system, x), system.metric().at(x)?);
     let mut bracket = Orthogonal::<Dim<Y>>::default();
-    if Killed::of(system, &w).entropy {
+    if ProjectionPlan::of(system, &w).entropy {
         bracket.push(&g, &w.entropy);
     }
     let casimirs: Vec<f64> = w.of_kind(Kind::Casimir).map(|c| bracket.push(&g, c)).collect();
@@ -354,7 +354,7 @@ pub fn projected_shares<Y: Metriplectic + ?Sized>(
                 Kind::Momentum => momenta.next(),
             };
             let in_friction = friction.push(&g, l);
-            in_bracket.map_or(in_friction, |share| share.min(in_friction))
+            in_bracket.map_or(in_friction, |fraction| fraction.min(in_friction))
         })
         .collect())
 }
@@ -363,7 +363,7 @@ pub fn projected_shares<Y: Metriplectic + ?Sized>(
 #[derive(Clone, Copy, Debug)]
 pub struct VelocityJet<N: Dimension> {
     /// The velocity, and its derivatives.
-    pub velocity: Moving<N>,
+    pub velocity: WithJacobian<N>,
     /// For each component the sum of the absolute terms that it is made of,
     /// `Σ_j |Π_ij||w_j| + |K_ij||s_j|` and those of the projections: what its round-off is relative to.
     pub terms: N::Vector<f64>,
@@ -389,33 +389,33 @@ pub fn velocity_jet<Y: Metriplectic + ?Sized>(
     system: &Y,
     z: &<Y::Manifold as Space>::Point<f64>,
     dz: &Matrix<Y::Manifold>,
-    w: &Covectors<Dim<Y>, Moving<Dim<Y>>>,
+    w: &Covectors<Dim<Y>, WithJacobian<Dim<Y>>>,
 ) -> Result<VelocityJet<Dim<Y>>, MetricError> {
     let (metric, centre) = (system.metric(), ChartPoint::<Y::Manifold>::centre(z));
-    let slopes = if Y::Invariants::COUNT > 0 || Killed::of(system, w).projected {
+    let slopes = if Y::Invariants::COUNT > 0 || ProjectionPlan::of(system, w).projected {
         metric.slopes(z)
     } else {
         None
     };
-    let turned = |v: &Vector<Y::Manifold>| match &slopes {
+    let dg_v = |v: &Vector<Y::Manifold>| match &slopes {
         Some(slopes) => along_slopes::<Y::Manifold>(slopes, v) * *dz,
         None => Matrix::<Y::Manifold>::zeros(),
     };
     let g = metric.at(&centre)?;
-    let pi = reversible_jet(system, &centre, (&g, &turned), dz, w)?;
+    let pi = reversible_jet(system, &centre, (&g, &dg_v), dz, w)?;
 
     let mut off = OrthogonalJet::<Dim<Y>>::default();
     let mut first = 0;
     let mut alpha = w.entropy;
     if Y::Invariants::COUNT > 0 {
-        off.push(&g, turned, &w.energy);
+        off.push(&g, dg_v, &w.energy);
         first = off.len();
-        w.invariants.as_ref().iter().flatten().for_each(|(_, l)| off.push(&g, turned, l));
-        alpha = off.off_covector(first, &alpha);
+        w.invariants.as_ref().iter().flatten().for_each(|(_, l)| off.push(&g, dg_v, l));
+        alpha = off.project_covector(first, &alpha);
     }
     let k = system.dissipation().linearise(metric, z, &w.energy.value, &alpha.value)?;
     let slope = k.along_z * *dz + k.along_w * w.energy.slope + k.tensor * alpha.slope;
-    let k_s = off.off_vector(first, &Moving { value: k.value, slope });
+    let k_s = off.project_vector(first, &WithJacobian { value: k.value, slope });
     let projection = off.terms_of_vector(first, &k.value, MOMENTUM);
     let mut terms = pi.terms
         + k.tensor.abs() * alpha.value.abs()
@@ -423,13 +423,16 @@ pub fn velocity_jet<Y: Metriplectic + ?Sized>(
     let mut gain = pi.tensor + k.along_w;
     let mut irreversible = k_s;
     if system.bracket().is_forced() {
-        let (force, tensor, rounded) = force_jet(system, &centre, (&g, &turned), dz, w)?;
-        irreversible = Moving { value: k_s.value + force.value, slope: k_s.slope + force.slope };
+        let (force, tensor, rounded) = force_jet(system, &centre, (&g, &dg_v), dz, w)?;
+        irreversible =
+            WithJacobian { value: k_s.value + force.value, slope: k_s.slope + force.slope };
         terms += tensor.abs() * w.energy.value.abs() + rounded;
         gain += tensor;
     }
-    let velocity =
-        Moving { value: pi.a.value + irreversible.value, slope: pi.a.slope + irreversible.slope };
+    let velocity = WithJacobian {
+        value: pi.a.value + irreversible.value,
+        slope: pi.a.slope + irreversible.slope,
+    };
     let production = w.entropy.value.dot(&irreversible.value);
     let friction = trace_of_square::<Dim<Y>>(&irreversible.slope).abs().sqrt();
     let rotation = trace_of_square::<Dim<Y>>(&pi.a.slope).abs().sqrt();
@@ -440,36 +443,39 @@ pub fn velocity_jet<Y: Metriplectic + ?Sized>(
 fn force_jet<Y: Metriplectic + ?Sized>(
     system: &Y,
     z: &Place<Y, f64>,
-    (g, turned): (
+    (g, dg_v): (
         &<Y::Metric as Riemannian<Y::Manifold>>::At<f64>,
         &impl Fn(&Vector<Y::Manifold>) -> Matrix<Y::Manifold>,
     ),
     dz: &Matrix<Y::Manifold>,
-    w: &Covectors<Dim<Y>, Moving<Dim<Y>>>,
+    w: &Covectors<Dim<Y>, WithJacobian<Dim<Y>>>,
 ) -> Result<ForceJet<Y>, MetricError> {
-    let site = system.site(z, &w.entropy.value);
-    let jet = system.bracket().linearise_force(&site, &w.energy.value)?;
+    let args = system.bracket_args(z, &w.entropy.value);
+    let jet = system.bracket().linearise_force(&args, &w.energy.value)?;
     let slope = jet.along_z * *dz + jet.tensor * w.energy.slope + jet.along_s * w.entropy.slope;
-    let force = Moving { value: jet.value, slope };
+    let force = WithJacobian { value: jet.value, slope };
     if Y::Invariants::COUNT == 0 {
         return Ok((force, jet.tensor, Vector::<Y::Manifold>::zero()));
     }
     let mut off = OrthogonalJet::<Dim<Y>>::default();
-    off.push(g, turned, &w.energy);
+    off.push(g, dg_v, &w.energy);
     if system.second_law() == SecondLaw::Exact {
-        off.push(g, turned, &w.entropy);
+        off.push(g, dg_v, &w.entropy);
     }
     let first = off.len();
     let listed = w.invariants.as_ref().iter().flatten();
-    let force = listed.fold(force, |force, (_, l)| off.without(g, turned, l, &force, MOMENTUM));
+    let force = listed.fold(force, |force, (_, l)| off.without(g, dg_v, l, &force, MOMENTUM));
     let amplification = 1.0 + off.amplification(first, MOMENTUM);
     let rounded = off.terms_of_vector(first, &jet.value, MOMENTUM) * amplification;
     Ok((force, jet.tensor, rounded))
 }
 
 /// A force with its derivatives, its derivative along `w_H`, and absolute terms.
-type ForceJet<Y> =
-    (Moving<Dim<Y>>, Matrix<<Y as Metriplectic>::Manifold>, Vector<<Y as Metriplectic>::Manifold>);
+type ForceJet<Y> = (
+    WithJacobian<Dim<Y>>,
+    Matrix<<Y as Metriplectic>::Manifold>,
+    Vector<<Y as Metriplectic>::Manifold>,
+);
 
 /// `tr A²`.
 fn trace_of_square<N: Dimension>(a: &N::Matrix<f64>) -> f64 {
@@ -478,7 +484,7 @@ fn trace_of_square<N: Dimension>(a: &N::Matrix<f64>) -> f64 {
 
 /// [`reversible`] with its derivatives, the tensor `Π`, and the terms that the vector is summed of.
 struct ReversibleJet<N: Dimension> {
-    a: Moving<N>,
+    a: WithJacobian<N>,
     tensor: N::Matrix<f64>,
     terms: N::Vector<f64>,
 }
@@ -488,42 +494,44 @@ struct ReversibleJet<N: Dimension> {
 fn reversible_jet<Y: Metriplectic + ?Sized>(
     system: &Y,
     z: &Place<Y, f64>,
-    (g, turned): (
+    (g, dg_v): (
         &<Y::Metric as Riemannian<Y::Manifold>>::At<f64>,
         &impl Fn(&Vector<Y::Manifold>) -> Matrix<Y::Manifold>,
     ),
     dz: &Matrix<Y::Manifold>,
-    w: &Covectors<Dim<Y>, Moving<Dim<Y>>>,
+    w: &Covectors<Dim<Y>, WithJacobian<Dim<Y>>>,
 ) -> Result<ReversibleJet<Dim<Y>>, MetricError> {
-    let killed = Killed::of(system, w);
-    let bracket = |alpha: &Moving<Dim<Y>>| {
-        let jet = system.bracket().linearise(&system.site(z, &w.entropy.value), &alpha.value)?;
+    let annihilated = ProjectionPlan::of(system, w);
+    let bracket = |alpha: &WithJacobian<Dim<Y>>| {
+        let jet =
+            system.bracket().linearise(&system.bracket_args(z, &w.entropy.value), &alpha.value)?;
         let slope = jet.along_z * *dz + jet.tensor * alpha.slope + jet.along_s * w.entropy.slope;
         let terms = jet.tensor.abs() * alpha.value.abs();
-        let a = Moving { value: jet.value, slope };
+        let a = WithJacobian { value: jet.value, slope };
         Ok::<_, MetricError>(ReversibleJet { a, tensor: jet.tensor, terms })
     };
-    if !killed.projected && !killed.momenta {
+    if !annihilated.projected && !annihilated.momenta {
         return bracket(&w.energy);
     }
     let mut off = OrthogonalJet::<Dim<Y>>::default();
-    if killed.entropy {
-        off.push(g, turned, &w.entropy);
+    if annihilated.entropy {
+        off.push(g, dg_v, &w.entropy);
     }
-    w.of_kind(Kind::Casimir).for_each(|c| off.push(g, turned, c));
-    let alpha = if killed.projected { off.faded_covector(0, &w.energy, CASIMIR) } else { w.energy };
+    w.of_kind(Kind::Casimir).for_each(|c| off.push(g, dg_v, c));
+    let alpha =
+        if annihilated.projected { off.faded_covector(0, &w.energy, CASIMIR) } else { w.energy };
     let mut pi = bracket(&alpha)?;
-    if killed.projected {
+    if annihilated.projected {
         // The covector has been projected by terms of its own. Those of a Casimir that fades out are not
         // amplified: such a bound would stop Newton's method where energy and entropy still gain digits.
         pi.terms += pi.tensor.abs() * off.terms_of_covector(0, &w.energy.value, CASIMIR);
         pi.terms += off.terms_of_vector(0, &pi.a.value, CASIMIR);
         pi.a = off.faded_vector(0, &pi.a, CASIMIR);
     }
-    if killed.momenta {
-        off.push(g, turned, &w.energy);
+    if annihilated.momenta {
+        off.push(g, dg_v, &w.energy);
         let first = off.len();
-        w.of_kind(Kind::Momentum).for_each(|j| off.push(g, turned, j));
+        w.of_kind(Kind::Momentum).for_each(|j| off.push(g, dg_v, j));
         let amplification = 1.0 + off.amplification(first, MOMENTUM);
         pi.terms += off.terms_of_vector(first, &pi.a.value, MOMENTUM) * amplification;
         pi.a = off.faded_vector(first, &pi.a, MOMENTUM);

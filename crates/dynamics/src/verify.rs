@@ -73,8 +73,11 @@ fn examine<Y: Metriplectic + ?Sized>(
     has_digits(system.entropy(), "entropy", x0)?;
     let mut independent = vec![0.0_f64; Y::Invariants::COUNT];
     let mut widen = |x: &Point<Y>| {
-        let shares = independence(system, &ChartPoint::centre(x)).unwrap_or_default();
-        independent.iter_mut().zip(shares).for_each(|(most, share)| *most = most.max(share));
+        let fractions = independence(system, &ChartPoint::centre(x)).unwrap_or_default();
+        independent
+            .iter_mut()
+            .zip(fractions)
+            .for_each(|(most, fraction)| *most = most.max(fraction));
     };
     let mut examination = Examination::around(system, x0, radius);
     let n = Dim::<Y>::LEN;
@@ -93,13 +96,13 @@ fn examine<Y: Metriplectic + ?Sized>(
         let (judged, wanted) = (report.judged, SAMPLES + 1);
         return Err(ModelError::TooFewPoints { judged, wanted, point: Y::Manifold::entries(x0) });
     }
-    match independent.iter().position(|share| *share < DEPENDENT) {
-        Some(index) => Err(ModelError::DependentInvariant { index, share: independent[index] }),
+    match independent.iter().position(|fraction| *fraction < DEPENDENT) {
+        Some(index) => Err(ModelError::DependentInvariant { index, fraction: independent[index] }),
         None => Ok(()),
     }
 }
 
-/// The share of an invariant's differential that is independent of the other fields' somewhere near
+/// The fraction of an invariant's differential that is independent of the other fields' somewhere near
 /// the start, below which it is taken for a function of them.
 const DEPENDENT: f64 = 1e-8;
 
@@ -110,9 +113,9 @@ type Dim<Y> = <<Y as Metriplectic>::Manifold as Space>::Dim;
 fn value_not_finite<Y: Metriplectic + ?Sized>(system: &Y, x: &Point<Y>) -> Option<ModelError> {
     let at = ChartPoint::<Y::Manifold>::centre(x);
     let ds = system.entropy().jet1(x).df;
-    let bracket = system.bracket().tensor(&system.site(&at, &ds));
+    let bracket = system.bracket().tensor(&system.bracket_args(&at, &ds));
     let dh = system.energy().jet1(x).df;
-    let force = system.bracket().force(&system.site(&at, &ds), &dh);
+    let force = system.bracket().force(&system.bracket_args(&at, &ds), &dh);
     let dissipation = system.dissipation().tensor(system.metric(), &at, &dh);
     let values = [
         ("energy", system.energy().at::<f64>(x)),
@@ -335,7 +338,10 @@ fn examine_dissipation<Y: Metriplectic + ?Sized>(
         let tensor = k.tensor(g, &centre, w).map_err(&metric)?;
         if tensor.max_abs().is_finite() {
             let size = balance::product::<Y::Manifold>(&tensor, w, units);
-            findings.note("K_w w = 0", size, |point| ModelError::CovectorNotKilled { point, size });
+            findings.note("K_w w = 0", size, |point| ModelError::CovectorNotAnnihilated {
+                point,
+                size,
+            });
         }
     }
     Ok(())

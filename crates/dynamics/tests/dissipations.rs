@@ -269,11 +269,11 @@ proptest! {
     ) {
         let (se3, kappa) = (LieDual::se3(), c.transpose() * c);
         let k = CasimirDissipation::new(se3.algebra(), kappa)?;
-        let turned = se3.algebra().bracket(&xi, &dc);
-        prop_assert!((k.force(&xi, &dc) - kappa * turned).norm() <= 1e-13 * kappa.norm() * (1.0 + turned.norm()));
+        let dg_v = se3.algebra().bracket(&xi, &dc);
+        prop_assert!((k.force(&xi, &dc) - kappa * dg_v).norm() <= 1e-13 * kappa.norm() * (1.0 + dg_v.norm()));
         let x = ChartPoint::<LieDual<6>>::centre(&xi);
         let rate = dc.dot(&k.apply(&Canonical, &x, &xi, &dc).unwrap());
-        let expected = turned.dot(&(kappa * turned));
+        let expected = dg_v.dot(&(kappa * dg_v));
         prop_assert!((rate - expected).abs() <= 1e-13 * kappa.norm() * (xi.norm() * dc.norm()).powi(2));
     }
 
@@ -430,25 +430,28 @@ fn each_part_of_a_dissipation_can_break_a_law() {
 }
 
 #[test]
-fn a_run_accepts_a_closure_that_kills_the_covector_it_is_given_and_refuses_the_others() {
+fn a_run_accepts_a_closure_that_annihilates_the_covector_it_is_given_and_refuses_the_others() {
     let energy = |x: &Vector3<Real>| (x.x * x.x + x.y * x.y) * 0.5 + x.z * 0.7;
     let builder = || System::on(Euclidean::<3>).energy(energy).entropy(|x: &Vector3<Real>| x.z);
     builder().dissipation(oscillator()).build().unwrap().verify(&X, 0.1).unwrap();
 
-    // K ignores w and does not kill dH.
+    // K ignores w and does not annihilate dH.
     let deaf = FieldDissipation(|_: &Vector3<Real>, _: &Vector3<Real>| {
         Matrix3::from_diagonal(&vector![0.0, 1.0, 1.0]).cast::<Real>()
     });
     let error = builder().dissipation(deaf).build().unwrap().verify(&X, 0.1).unwrap_err();
     assert!(matches!(error, ModelError::EnergyNotKept { size, .. } if size > 0.1), "{error}");
 
-    // K kills dH(x), and not the w of a step.
+    // K annihilates dH(x), and not the w of a step.
     let own = FieldDissipation(|x: &Vector3<Real>, _: &Vector3<Real>| {
         let b = Vector3::new(Real::from(0.0), Real::from(0.7), -x.y);
         b * b.transpose()
     });
     let error = builder().dissipation(own).build().unwrap().verify(&X, 0.1).unwrap_err();
-    assert!(matches!(error, ModelError::CovectorNotKilled { size, .. } if size > 1e-6), "{error}");
+    assert!(
+        matches!(error, ModelError::CovectorNotAnnihilated { size, .. } if size > 1e-6),
+        "{error}"
+    );
 
     // The same matrix is accepted when it is projected, and the system knows.
     let projected = ProjectedDissipation(|x: &Vector3<Real>| {

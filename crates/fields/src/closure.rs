@@ -22,7 +22,7 @@ where
     #[inline]
     fn at<D: Scalar>(&self, x: &M::Point<D>) -> D {
         let mut sum = D::zero();
-        sweep::<M, D>(x, |point, weights| sum += weights.of(&self(point)));
+        taylor_seeds::<M, D>(x, |point, weights| sum += weights.of(&self(point)));
         sum
     }
 
@@ -39,7 +39,7 @@ where
 {
     fn at<D: Scalar>(&self, x: &M::Point<D>) -> Form<M, D> {
         let mut sum = Form::<M, D>::zeros();
-        sweep::<M, D>(x, |point, weights| {
+        taylor_seeds::<M, D>(x, |point, weights| {
             let a = self(point);
             sum += Form::<M, D>::from_entries(|i, j| weights.of(&a[(i, j)]));
         });
@@ -78,7 +78,7 @@ impl<D: Scalar> Weights<D> {
 /// Visits the seeded points of a Taylor expansion about the real part of `x`: one for order 0,
 /// `⌈n/2⌉` for order 1, `n(n+1)/2` for order 2.
 #[inline]
-fn sweep<M: Space, D: Scalar>(
+fn taylor_seeds<M: Space, D: Scalar>(
     x: &M::Point<D>,
     mut visit: impl FnMut(&M::Point<Real>, &Weights<D>),
 ) {

@@ -69,7 +69,7 @@ pub trait Space: Clone + Debug + PartialEq + Send + Sync + 'static {
 
     /// The velocity `θ(x) v` of a tangent vector with the components `v` in the frame of the chart of
     /// `x`: linear in `v`, and one to one.
-    fn velocity<D: Scalar>(x: &ChartPoint<Self, D>, v: &Vector<Self, D>) -> Velocity<Self, D>;
+    fn embed<D: Scalar>(x: &ChartPoint<Self, D>, v: &Vector<Self, D>) -> Velocity<Self, D>;
 
     /// The matrix `θᵀ A θ` of a bilinear form on velocities, in the frame of the chart.
     fn covariant<D: Scalar>(x: &ChartPoint<Self, D>, a: &Form<Self, D>) -> Matrix<Self, D> {
@@ -167,7 +167,7 @@ fn inner(n: usize, f: impl Fn(usize) -> f64) -> f64 {
 fn frame<M: Space, D: Scalar>(
     x: &ChartPoint<M, D>,
 ) -> <M::Dim as Dimension>::Array<Velocity<M, D>> {
-    M::Dim::array(|k| M::velocity(x, &Vector::<M, D>::basis(k)))
+    M::Dim::array(|k| M::embed(x, &Vector::<M, D>::basis(k)))
 }
 
 /// A point `φ_x(q)` written in the chart at the real point `x`: the place where a tensor is

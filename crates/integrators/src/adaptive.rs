@@ -65,7 +65,7 @@ use metriplectic_dynamics::{Metriplectic, system::Point};
 use metriplectic_fields::{ChartPoint, Column, Dimension, Space, Vector};
 
 use crate::scales::{Scales, relative};
-use crate::span::{Course, Size, Span, SpanError, check_end, check_step_size};
+use crate::span::{Schedule, Size, Span, SpanError, check_end, check_step_size};
 use crate::step::Memory;
 
 /// A run to a time, in steps that follow a tolerance; made by [`Span::until`].
@@ -235,7 +235,7 @@ impl<const N: usize> Until<N> {
     }
 }
 
-impl<const N: usize> From<Until<N>> for Course {
+impl<const N: usize> From<Until<N>> for Schedule {
     fn from(until: Until<N>) -> Self {
         let Until { start, end, tolerance, first, least, largest, every, most, rest, entries } =
             until;
@@ -328,7 +328,7 @@ impl Adaptive {
 
 /// How large the steps of a run are.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Pace<N: Dimension> {
+pub(crate) enum StepSize<N: Dimension> {
     /// All of one size.
     Fixed(f64),
     /// As the tolerance says.
@@ -550,12 +550,12 @@ mod tests {
             .entropy(|r: &Matrix3<Real>| r.m13 - r.m21 * 0.5 + (r.m31 + r.m32).powi(2) * 0.25)
             .build()
             .unwrap();
-        let turned = Rotations::bi_invariant().from_quaternion([0.8, 0.3, -0.4, 0.33]).unwrap();
+        let dg_v = Rotations::bi_invariant().from_quaternion([0.8, 0.3, -0.4, 0.33]).unwrap();
         let steps = [0.1, 0.05, 0.025];
         for (name, off) in [
             ("S²", steps.map(|h| off(WeylMidpoint, &top, &start, h))),
             ("S², based at the start", steps.map(|h| off(Exponential, &top, &start, h))),
-            ("SO(3)", steps.map(|h| off(WeylMidpoint, &group, &turned, 0.03 * h))),
+            ("SO(3)", steps.map(|h| off(WeylMidpoint, &group, &dg_v, 0.03 * h))),
         ] {
             println!("{name}: {off:.4?}");
             // Of order one: the estimate is the local error, and no multiple of it.

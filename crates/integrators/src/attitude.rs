@@ -13,7 +13,7 @@
 //! space. Two rotations compete for the step:
 //!
 //! - `cay(hw)` keeps this balance to round-off, but it turns by `2 atan(h|w|/2)` instead of `h|w|`: a body
-//!   that spins about an axis falls behind by the share `h²|w|²/12`;
+//!   that spins about an axis falls behind by the fraction `h²|w|²/12`;
 //! - `exp(hw)` is exact for that body, but it moves the momentum in space by `O(h²)`.
 //!
 //! So the step is the exponential, and then the smallest rotation `exp(τ)` that restores the balance:
@@ -24,7 +24,7 @@
 //! ```
 //!
 //! `|τ| = O(h³)`, so the order is 2. The balance is kept as a sum `ℓ` in space, to which each step adds
-//! `R_k (cay(hw) p_{k+1} − p_k)`, what the dissipation has done, and `R_{k+1} p_{k+1}` is turned to `ℓ`: the
+//! `R_k (cay(hw) p_{k+1} − p_k)`, what the dissipation has done, and `R_{k+1} p_{k+1}` is dg_v to `ℓ`: the
 //! rounding of the rotations does not add up to a drift.
 //!
 //! Of a free body `R p` is constant to round-off, and `τ = 0` for one that spins about a principal axis.
@@ -40,7 +40,7 @@ use metriplectic_manifolds::{
 };
 use nalgebra::{Matrix3, Vector3};
 
-use crate::discrete_gradient::{Chord, Segment};
+use crate::discrete_gradient::{Segment, StableGradient};
 use crate::trajectory::{State, Trajectory};
 
 /// The attitude `R(t)` of a body, a rotation from its frame to space, along a run on so(3)*; see the
@@ -147,7 +147,7 @@ impl<'a, Y: Metriplectic<Manifold = LieDual<3>>> Attitude<'a, Y> {
         let nodes = WeylMidpoint.along(&Canonical, x, &d)?;
         let df = energy.jet1(&z).df;
         let (segment, values) = (Segment::new(&d, &next.point), [self.state.energy, next.energy]);
-        let chord = Chord::new(energy, &df, &segment, values, || df.dot(&d), || nodes);
+        let chord = StableGradient::new(energy, &df, &segment, values, || df.dot(&d), || nodes);
         let g = self.system.metric().at(&ChartPoint::<LieDual<3>>::centre(&z))?;
         Ok(chord.covector(0.0, &g, &d))
     }

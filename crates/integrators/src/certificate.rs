@@ -39,7 +39,7 @@ pub struct Certificate {
     /// order 2 as long as this is large against `h²`; infinite (in JSON, null) without such a one.
     pub min_entropy_slope: f64,
     /// What became of the further invariants, in their order.
-    pub invariants: Vec<Kept>,
+    pub invariants: Vec<InvariantBalance>,
     /// `max` of the manifold's defect.
     pub max_manifold_defect: f64,
     /// Steps taken.
@@ -52,9 +52,9 @@ pub struct Certificate {
     /// they were not solved.
     pub rejected: usize,
     /// Linear systems solved by Newton's method, in all steps.
-    pub sweeps: usize,
+    pub iterations: usize,
     /// The same in the worst step.
-    pub worst_sweeps: usize,
+    pub worst_iterations: usize,
     /// How often a step was retried as two halves.
     pub retries: usize,
     /// How often a step was approached through smaller ones from the same start.
@@ -77,7 +77,7 @@ pub struct Certificate {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
-pub struct Kept {
+pub struct InvariantBalance {
     /// Why it is conserved; serialized as its name.
     #[cfg_attr(feature = "serde", serde(serialize_with = "by_name"))]
     pub kind: Kind,
@@ -89,14 +89,19 @@ pub struct Kept {
     pub scale: f64,
 }
 
-impl Kept {
+impl InvariantBalance {
     /// The further invariants of a system at the start of a run.
     pub(crate) fn of<Y: Metriplectic>(system: &Y, x0: &Point<Y>) -> Vec<Self> {
-        struct At<'a, Y: Metriplectic>(&'a Point<Y>, Vec<Kept>);
+        struct At<'a, Y: Metriplectic>(&'a Point<Y>, Vec<InvariantBalance>);
         impl<Y: Metriplectic> Visitor<Y::Manifold> for At<'_, Y> {
             fn visit(&mut self, kind: Kind, f: &impl ScalarField<Y::Manifold>) {
                 let scale = size_of_terms::<Y::Manifold>(f, self.0);
-                self.1.push(Kept { kind, initial: f.at(self.0), max_error: 0.0, scale });
+                self.1.push(InvariantBalance {
+                    kind,
+                    initial: f.at(self.0),
+                    max_error: 0.0,
+                    scale,
+                });
             }
         }
         let mut at = At::<Y>(x0, Vec::new());
@@ -148,7 +153,7 @@ impl Certificate {
 
     /// Whether every further invariant was kept to round-off.
     pub fn keeps_invariants(&self) -> bool {
-        self.invariants.iter().all(Kept::is_kept)
+        self.invariants.iter().all(InvariantBalance::is_kept)
     }
 }
 
@@ -179,7 +184,7 @@ impl fmt::Display for Certificate {
             writeln!(f, "friction not damped: h|K'| = {:.1e}", self.friction)?;
         }
         for (index, kept) in self.invariants.iter().enumerate() {
-            let Kept { kind, initial, max_error, .. } = kept;
+            let InvariantBalance { kind, initial, max_error, .. } = kept;
             writeln!(
                 f,
                 "{:<13}{}|L − L₀| ≤ {max_error:.1e}, L₀ = {}",
@@ -199,8 +204,8 @@ impl fmt::Display for Certificate {
         write!(
             f,
             "solver:      {} ({} in the worst step), {}",
-            counted(self.sweeps, "Newton sweep", "Newton sweeps"),
-            self.worst_sweeps,
+            counted(self.iterations, "Newton iteration", "Newton iterations"),
+            self.worst_iterations,
             counted(self.retries, "retry", "retries")
         )?;
         if self.continued > 0 {
@@ -266,8 +271,8 @@ mod tests {
         smallest_step: 0.1,
         largest_step: 0.1,
         rejected: 0,
-        sweeps: 9,
-        worst_sweeps: 2,
+        iterations: 9,
+        worst_iterations: 2,
         retries: 1,
         continued: 0,
         globalised: 0,
@@ -279,14 +284,15 @@ mod tests {
     #[test]
     fn one_is_no_plural() {
         let text = ONE_FALL.to_string();
-        for part in ["over 7 steps", "fell on 1 step;", "9 Newton sweeps", "1 retry"] {
+        for part in ["over 7 steps", "fell on 1 step;", "9 Newton iterations", "1 retry"] {
             assert!(text.contains(part), "\"{part}\" is missing in: {text}");
         }
         assert!(!text.contains("step sizes"), "{text}");
         let adaptive = Certificate { smallest_step: 1e-3, rejected: 2, ..ONE_FALL }.to_string();
         assert!(adaptive.contains("step sizes:  1.0e-3 to 1.0e-1, 2 rejected"), "{adaptive}");
-        let text = Certificate { entropy_falls: 2, steps: 1, sweeps: 1, ..ONE_FALL }.to_string();
-        for part in ["over 1 step\n", "fell on 2 steps;", "1 Newton sweep ("] {
+        let text =
+            Certificate { entropy_falls: 2, steps: 1, iterations: 1, ..ONE_FALL }.to_string();
+        for part in ["over 1 step\n", "fell on 2 steps;", "1 Newton iteration ("] {
             assert!(text.contains(part), "\"{part}\" is missing in: {text}");
         }
     }

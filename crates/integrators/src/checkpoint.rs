@@ -95,8 +95,8 @@ use metriplectic_dynamics::system::Point;
 use metriplectic_fields::{ChartPoint, Column, Dimension, Square};
 use metriplectic_manifolds::{Manifold, PointError, Retraction};
 
-use crate::adaptive::{Controller, Entries, Pace};
-use crate::certificate::{Certificate, Kept};
+use crate::adaptive::{Controller, Entries, StepSize};
+use crate::certificate::{Certificate, InvariantBalance};
 use crate::discrete_gradient::DiscreteGradient;
 use crate::newton::Inverse;
 use crate::residual::Dim;
@@ -124,7 +124,7 @@ pub struct Checkpoint {
     invariants: Vec<Exact>,
     differences: Vec<Vec<Exact>>,
     linearised: Option<SavedLinearisation>,
-    carry: Option<Vec<Exact>>,
+    compensation: Option<Vec<Exact>>,
     balance: Balance,
     pace: SavedPace,
     count: Option<usize>,
@@ -189,8 +189,8 @@ struct Balance {
     smallest_step: Exact,
     largest_step: Exact,
     rejected: usize,
-    sweeps: usize,
-    worst_sweeps: usize,
+    iterations: usize,
+    worst_iterations: usize,
     retries: usize,
     continued: usize,
     globalised: usize,
@@ -412,7 +412,7 @@ where
             invariants: exact((0..known).map(|k| self.invariants[k])),
             differences: self.memory.differences[..self.memory.known].iter().map(column).collect(),
             linearised: self.memory.linearised.as_ref().map(SavedLinearisation::of),
-            carry: self.memory.carry.as_ref().map(column),
+            compensation: self.memory.compensation.as_ref().map(column),
             balance: Balance::of(&self.certificate),
             pace: SavedPace::of(pace),
             count,
@@ -486,8 +486,9 @@ fn memory<N: Dimension>(c: &Checkpoint) -> Result<Memory<N>, ResumeError> {
     for (slot, list) in memory.differences.iter_mut().zip(&c.differences) {
         *slot = vector("components of a displacement", list)?;
     }
-    let carry = c.carry.as_deref().map(|list| vector("components of the carry", list));
-    memory.carry = carry.transpose()?;
+    let compensation =
+        c.compensation.as_deref().map(|list| vector("components of the compensation", list));
+    memory.compensation = compensation.transpose()?;
     memory.linearised = c.linearised.as_ref().map(SavedLinearisation::restore).transpose()?;
     Ok(memory)
 }
@@ -547,7 +548,7 @@ fn progress<N: Dimension>(c: &Checkpoint) -> Result<Progress<N>, ResumeError> {
         Err(_) => Err(ResumeError::Damaged { what, value: h.0 }),
     };
     let pace = match &c.pace {
-        SavedPace::Fixed { h } => Pace::Fixed(positive("step size", *h)?),
+        SavedPace::Fixed { h } => StepSize::Fixed(positive("step size", *h)?),
         SavedPace::Adaptive {
             end,
             tolerance,
@@ -558,7 +559,7 @@ fn progress<N: Dimension>(c: &Checkpoint) -> Result<Progress<N>, ResumeError> {
             taken,
             error,
             rejected,
-        } => Pace::Adaptive(Controller {
+        } => StepSize::Adaptive(Controller {
             start: c.start.0,
             end: end.0,
             tolerance: positive("tolerance", *tolerance)?,
@@ -588,10 +589,10 @@ fn progress<N: Dimension>(c: &Checkpoint) -> Result<Progress<N>, ResumeError> {
 }
 
 impl SavedPace {
-    fn of<N: Dimension>(pace: Pace<N>) -> Self {
+    fn of<N: Dimension>(pace: StepSize<N>) -> Self {
         match pace {
-            Pace::Fixed(h) => Self::Fixed { h: Exact(h) },
-            Pace::Adaptive(c) => Self::Adaptive {
+            StepSize::Fixed(h) => Self::Fixed { h: Exact(h) },
+            StepSize::Adaptive(c) => Self::Adaptive {
                 end: Exact(c.end),
                 tolerance: Exact(c.tolerance),
                 entries: SavedEntries::of(&c.entries),
@@ -666,8 +667,8 @@ impl Balance {
             smallest_step: Exact(c.smallest_step),
             largest_step: Exact(c.largest_step),
             rejected: c.rejected,
-            sweeps: c.sweeps,
-            worst_sweeps: c.worst_sweeps,
+            iterations: c.iterations,
+            worst_iterations: c.worst_iterations,
             retries: c.retries,
             continued: c.continued,
             globalised: c.globalised,
@@ -680,7 +681,7 @@ impl Balance {
         point: &Point<Y>,
     ) -> Result<Certificate, ResumeError> {
         use metriplectic_dynamics::Dissipation as _;
-        let mut invariants = Kept::of(system, point);
+        let mut invariants = InvariantBalance::of(system, point);
         expect_length("further invariants", self.invariants.len(), invariants.len())?;
         for (kept, (initial, max_error, scale)) in invariants.iter_mut().zip(&self.invariants) {
             (kept.initial, kept.max_error, kept.scale) = (initial.0, max_error.0, scale.0);
@@ -701,8 +702,8 @@ impl Balance {
             smallest_step: self.smallest_step.0,
             largest_step: self.largest_step.0,
             rejected: self.rejected,
-            sweeps: self.sweeps,
-            worst_sweeps: self.worst_sweeps,
+            iterations: self.iterations,
+            worst_iterations: self.worst_iterations,
             retries: self.retries,
             continued: self.continued,
             globalised: self.globalised,

@@ -14,29 +14,29 @@
 //! \qquad \langle w, d\rangle = F(x') - F(x) ,
 //! ```
 //!
-//! with the displacement `d = hv` of the step's arc. It is all there is to [`Gonzalez`]; for the
+//! with the displacement `d = hv` of the step's path. It is all there is to [`Gonzalez`]; for the
 //! others it is the defect of the quadrature, and of a chart that is not normal for the metric.
 
-mod chord;
 mod gonzalez;
 mod itoh_abe;
 mod mean_value;
+mod stable_gradient;
 
-pub use chord::{Chord, Segment};
 pub use gonzalez::Gonzalez;
 pub use itoh_abe::{ItohAbe, SymmetricItohAbe};
 pub use mean_value::MeanValue;
+pub use stable_gradient::{Segment, StableGradient};
 
 use std::fmt::Debug;
 
 use metriplectic_fields::{ChartPoint, Column, Matrix, Scalar, ScalarField, Space, Square, Vector};
 use metriplectic_manifolds::{
-    Arc, ArcJet, InnerProduct, Manifold, MetricError, Retraction, Riemannian,
+    InnerProduct, Manifold, MetricError, Retraction, Riemannian, StepPath, StepPathJet,
 };
 use num_dual::Dual64;
 
 /// A discrete gradient on a manifold (Bloch, Farré Puiggalí, Martín de Diego 2024, eq. "discGrad-m",
-/// with the missing step size restored): a covector `w` at the base `z` of an arc from `x` to `x'`
+/// with the missing step size restored): a covector `w` at the base `z` of a path from `x` to `x'`
 /// with the displacement `d`.
 ///
 /// The one method to write is [`mean`](Self::mean), at any scalar.
@@ -49,7 +49,7 @@ pub trait DiscreteGradient: Copy + Debug + Send + Sync {
         &self,
         f: &impl ScalarField<M>,
         x: &M::Point<f64>,
-        arc: &Arc<M, D>,
+        path: &StepPath<M, D>,
     ) -> Vector<M, D>;
 
     /// The same at real points.
@@ -58,21 +58,21 @@ pub trait DiscreteGradient: Copy + Debug + Send + Sync {
         &self,
         f: &impl ScalarField<M>,
         x: &M::Point<f64>,
-        arc: &Arc<M>,
+        path: &StepPath<M>,
     ) -> Vector<M> {
-        self.mean(f, x, arc)
+        self.mean(f, x, path)
     }
 
-    /// The same at real points, with its derivatives along the unknown of the arc, in a chart that
+    /// The same at real points, with its derivatives along the unknown of the path, in a chart that
     /// stays where it is.
     #[inline]
     fn mean_jet<M: Manifold>(
         &self,
         f: &impl ScalarField<M>,
         x: &M::Point<f64>,
-        arc: &ArcJet<M>,
+        path: &StepPathJet<M>,
     ) -> (Vector<M>, Matrix<M>) {
-        by_dual_numbers(self, f, x, arc)
+        by_dual_numbers(self, f, x, path)
     }
 
     /// The slope `⟨dF(z), d⟩` at the base point.
@@ -88,27 +88,27 @@ pub trait DiscreteGradient: Copy + Debug + Send + Sync {
     }
 
     /// The covector `w` by its definition, from the value `start = F(x)`; a step evaluates it by
-    /// [`Chord`], which is safe against round-off.
+    /// [`StableGradient`], which is safe against round-off.
     fn covector<M: Manifold, D: Scalar>(
         &self,
         f: &impl ScalarField<M>,
         g: &impl InnerProduct<Vector<M, D>>,
         (x, start): (&M::Point<f64>, f64),
-        arc: &Arc<M, D>,
+        path: &StepPath<M, D>,
     ) -> Vector<M, D> {
-        let mean = self.mean(f, x, arc);
-        let flat = g.flat(&arc.d);
-        let defect = f.at(&arc.end) - start - mean.dot(&arc.d);
-        mean + flat * (defect / flat.dot(&arc.d))
+        let mean = self.mean(f, x, path);
+        let flat = g.flat(&path.d);
+        let defect = f.at(&path.end) - start - mean.dot(&path.d);
+        mean + flat * (defect / flat.dot(&path.d))
     }
 }
 
-/// The discrete gradient of `f` on the arc with the initial displacement `u` from `x`, safe against
+/// The discrete gradient of `f` on the path with the initial displacement `u` from `x`, safe against
 /// round-off: the covector at the base point with `⟨w, d⟩ = F(x') − F(x)`.
 ///
 /// # Errors
 ///
-/// [`MetricError`] if the arc cannot be followed.
+/// [`MetricError`] if the path cannot be followed.
 pub fn along<M, G, R, W>(
     gradient: &W,
     f: &impl ScalarField<M>,
@@ -122,13 +122,14 @@ where
     R: Retraction<M, G>,
     W: DiscreteGradient,
 {
-    let arc = retraction.real_arc(metric, x, u)?;
-    let (g, mean) = (metric.at(&arc.z)?, gradient.real_mean(f, x, &arc));
-    let values = [f.at(x), f.at(&arc.end)];
+    let path = retraction.real_step_path(metric, x, u)?;
+    let (g, mean) = (metric.at(&path.z)?, gradient.real_mean(f, x, &path));
+    let values = [f.at(x), f.at(&path.end)];
     let nodes = retraction.along(metric, x, u)?;
-    let base = || gradient.slope_at_base(f, &arc.z.base, &arc.d, &mean);
-    let chord = Chord::new(f, &mean, &Segment::new(&arc.d, &arc.end), values, base, || nodes);
-    Ok(chord.covector(0.0, &g, &arc.d))
+    let base = || gradient.slope_at_base(f, &path.z.base, &path.d, &mean);
+    let chord =
+        StableGradient::new(f, &mean, &Segment::new(&path.d, &path.end), values, base, || nodes);
+    Ok(chord.covector(0.0, &g, &path.d))
 }
 
 /// The definition of [`DiscreteGradient::mean_jet`]: one dual number for each direction.
@@ -136,32 +137,32 @@ fn by_dual_numbers<M: Manifold>(
     gradient: &impl DiscreteGradient,
     f: &impl ScalarField<M>,
     x: &M::Point<f64>,
-    jet: &ArcJet<M>,
+    jet: &StepPathJet<M>,
 ) -> (Vector<M>, Matrix<M>) {
     let along = |value: &Vector<M>, slope: &Matrix<M>, k: usize| {
         Vector::<M, Dual64>::from_index(|i| Dual64::new(value[i], slope[(i, k)]))
     };
     let (zero, mut value) = (Vector::<M>::zero(), Vector::<M>::zero());
     let slope = Matrix::<M>::from_columns(|k| {
-        let arc = Arc {
+        let path = StepPath {
             z: ChartPoint { base: jet.z.clone(), q: along(&zero, &jet.dz, k) },
             d: along(&jet.d, &jet.dd, k),
             end: M::chart(&jet.end, &along(&zero, &jet.dend, k)),
         };
-        let mean = gradient.mean(f, x, &arc);
+        let mean = gradient.mean(f, x, &path);
         value = mean.real();
         Vector::<M>::from_index(|i| mean[i].eps)
     });
     (value, slope)
 }
 
-/// The ends of an arc in the chart at its base.
+/// The ends of a path in the chart at its base.
 fn segment<M: Manifold, D: Scalar>(
     x: &M::Point<f64>,
-    arc: &Arc<M, D>,
+    path: &StepPath<M, D>,
 ) -> (Vector<M, D>, Vector<M, D>) {
-    let base = &arc.z.base;
-    (M::coordinates(base, &M::constant(x)), M::coordinates(base, &arc.end))
+    let base = &path.z.base;
+    (M::coordinates(base, &M::constant(x)), M::coordinates(base, &path.end))
 }
 
 /// The partial derivative `∂f/∂qⁱ` at the coordinates `q` in the chart at `x`.

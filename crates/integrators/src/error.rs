@@ -18,9 +18,9 @@ use crate::trajectory::Trajectory;
 /// What was done to solve a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
-pub struct Tried {
+pub struct Attempts {
     /// Linear systems solved by Newton's method, over all attempts.
-    pub sweeps: usize,
+    pub iterations: usize,
     /// How often the step was approached through smaller ones from the same start.
     pub continued: usize,
     /// How often the globaliser was called.
@@ -29,13 +29,13 @@ pub struct Tried {
     pub splits: usize,
 }
 
-impl fmt::Display for Tried {
+impl fmt::Display for Attempts {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { sweeps, continued, globalised, splits } = self;
+        let Self { iterations, continued, globalised, splits } = self;
         write!(
             f,
             "{}, {} in the step size, {} of the globaliser and {} of the step",
-            counted(*sweeps, "Newton sweep", "Newton sweeps"),
+            counted(*iterations, "Newton iteration", "Newton iterations"),
             counted(*continued, "continuation", "continuations"),
             counted(*globalised, "call", "calls"),
             counted(*splits, "halving", "halvings"),
@@ -61,7 +61,7 @@ pub enum StepError {
         /// The residual that was left in the smallest step tried.
         residual: f64,
         /// What was done to solve it.
-        tried: Tried,
+        tried: Attempts,
         /// A step size to try next.
         suggested: f64,
     },
@@ -83,7 +83,7 @@ pub enum StepError {
         /// The residual that was left in the smallest step tried.
         residual: f64,
         /// What was done to solve it.
-        tried: Tried,
+        tried: Attempts,
     },
     /// The energy is not conserved: it differs by more than a millionth of the size of its terms from what it
     /// was. The size is `|H| + Σ_i |∂_iH| (|x_i| + |d_i|)` with the displacement `d` of the step, at the end of
@@ -107,7 +107,7 @@ pub enum StepError {
     /// A further invariant depends on the other fields at the start of the step: its differential is a
     /// combination of theirs. The step was not solved, or the invariant is no longer conserved.
     #[error(
-        "invariant {index} depends on the other fields at t = {}: only {share:.1e} of its \
+        "invariant {index} depends on the other fields at t = {}: only {fraction:.1e} of its \
          differential is independent of theirs, and no step from there conserves it (it has changed by \
          {change:.1e} since the start); leave it out of the list, or keep away from such states",
         digits(.time)
@@ -119,8 +119,8 @@ pub enum StepError {
         index: usize,
         /// By how much it has changed since the start of the run.
         change: f64,
-        /// The share of its differential that is independent.
-        share: f64,
+        /// The fraction of its differential that is independent.
+        fraction: f64,
     },
     /// The controller asks for a step below the least one.
     #[error(
@@ -163,7 +163,7 @@ pub enum StepError {
         /// The size of the step that was asked for.
         h: f64,
         /// What was done to solve it.
-        tried: Tried,
+        tried: Attempts,
     },
 }
 

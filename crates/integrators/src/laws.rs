@@ -4,19 +4,19 @@ use metriplectic_dynamics::{Metriplectic, SecondLaw, system::Point};
 use metriplectic_fields::{
     BrokenLaw, ChartPoint, Column, Dimension, ScalarField, Space, Vector, differential,
 };
-use metriplectic_manifolds::{Arc, Manifold, Retraction, Riemannian};
+use metriplectic_manifolds::{Manifold, Retraction, Riemannian, StepPath};
 
 use crate::certificate::round_off;
-use crate::discrete_gradient::{DiscreteGradient, along as along_arc};
-use crate::residual::Recall;
+use crate::discrete_gradient::{DiscreteGradient, along as along_path};
+use crate::residual::DriftCorrection;
 use crate::residual::{Dim, size_of_terms};
-use crate::span::Course;
+use crate::span::Schedule;
 use crate::step::{Memory, Scheme, Start};
 use crate::trajectory::{State, entropy_round_off};
 
-/// Checks a discrete gradient of `f` on the arc of `u` from `x`:
+/// Checks a discrete gradient of `f` on the path of `u` from `x`:
 ///
-/// 1. mean value: `⟨w, d⟩ = F(x') − F(x)`; 2. consistency: `w → dF(z)` like `|d|²` on arcs that
+/// 1. mean value: `⟨w, d⟩ = F(x') − F(x)`; 2. consistency: `w → dF(z)` like `|d|²` on paths that
 ///    shrink; 3. the covector that is safe against round-off agrees with the definition as far as
 ///    the definition has digits.
 ///
@@ -40,30 +40,31 @@ where
     let missing = |law| move |_| BrokenLaw { law, size: f64::NAN, bound: 0.0 };
     let start: f64 = f.at(x);
     let along = |u: &Vector<M>| -> Result<_, BrokenLaw> {
-        let arc: Arc<M> = retraction.arc(metric, x, u).map_err(missing("the arc exists"))?;
-        let g = metric.at(&arc.z).map_err(missing("the metric exists"))?;
-        let w = gradient.covector(f, &g, (x, start), &arc);
-        let df: Vector<M> = differential(f, &ChartPoint::centre(&arc.z.point()));
-        let end: f64 = f.at(&arc.end);
-        let safe = along_arc(gradient, f, metric, retraction, (x, u))
-            .map_err(missing("the arc exists"))?;
-        Ok((arc, w, safe, df, end))
+        let path: StepPath<M> =
+            retraction.step_path(metric, x, u).map_err(missing("the path exists"))?;
+        let g = metric.at(&path.z).map_err(missing("the metric exists"))?;
+        let w = gradient.covector(f, &g, (x, start), &path);
+        let df: Vector<M> = differential(f, &ChartPoint::centre(&path.z.point()));
+        let end: f64 = f.at(&path.end);
+        let safe = along_path(gradient, f, metric, retraction, (x, u))
+            .map_err(missing("the path exists"))?;
+        Ok((path, w, safe, df, end))
     };
-    let (arc, w, safe, df, end) = along(u)?;
-    let (sizes, n) = (M::scales(&arc.end), M::Dim::LEN);
-    let terms: f64 = (0..n).map(|i| df[i].abs() * (sizes[i] + arc.d[i].abs())).sum();
+    let (path, w, safe, df, end) = along(u)?;
+    let (sizes, n) = (M::scales(&path.end), M::Dim::LEN);
+    let terms: f64 = (0..n).map(|i| df[i].abs() * (sizes[i] + path.d[i].abs())).sum();
     let size = start.abs() + end.abs() + terms;
     let bound = 64.0 * f64::EPSILON * size;
-    let off = (w.dot(&arc.d) - (end - start)).abs();
+    let off = (w.dot(&path.d) - (end - start)).abs();
     BrokenLaw::unless("⟨w, d⟩ = F(x') − F(x)", off, bound)?;
     let off = (w - safe).magnitude();
-    BrokenLaw::unless("the safe covector is the defined one", off, bound / arc.d.magnitude())?;
+    BrokenLaw::unless("the safe covector is the defined one", off, bound / path.d.magnitude())?;
 
-    // On an arc a hundred times shorter the deviation is 10⁴ times smaller; a first-order one
+    // On a path a hundred times shorter the deviation is 10⁴ times smaller; a first-order one
     // would be a hundred times smaller only.
     let deviation = |t: f64| along(&(*u * t)).map(|(_, _, safe, df, _)| (safe - df).magnitude());
     let long = deviation(1.0)?.max(4.0 * deviation(0.5)?).max(16.0 * deviation(0.25)?);
-    let allowed = 1e-4 * (10.0 * long + df.magnitude()) + 1e2 * bound / arc.d.magnitude();
+    let allowed = 1e-4 * (10.0 * long + df.magnitude()) + 1e2 * bound / path.d.magnitude();
     BrokenLaw::unless("w − dF(z) falls like |d|²", deviation(1e-2)?, allowed)
 }
 
@@ -178,7 +179,7 @@ where
         (Err(_), _) | (_, Err(_)) => return failed(()),
     };
     let (c, d) = (a.certificate(), b.certificate());
-    let counts = [c.steps.abs_diff(d.steps), c.sweeps.abs_diff(d.sweeps)];
+    let counts = [c.steps.abs_diff(d.steps), c.iterations.abs_diff(d.iterations)];
     let counted = if tolerance > 0.0 { counts[0] } else { counts[0] + counts[1] };
     BrokenLaw::unless("as many steps and iterations", counted as f64, 0.0)?;
     let numbers = |state: &State<Y::Manifold>| {
@@ -208,7 +209,7 @@ pub struct UnitRun<'a, Y: Metriplectic> {
     /// Where it starts.
     pub x0: Point<Y>,
     /// How it runs.
-    pub course: Course,
+    pub course: Schedule,
 }
 
 /// A single step, with nothing remembered.
@@ -223,10 +224,10 @@ where
     R: Retraction<Y::Manifold, Y::Metric>,
     W: DiscreteGradient,
 {
-    let left_over = Recall::nothing();
+    let accumulated_error = DriftCorrection::nothing();
     let [energy, entropy] = [system.energy_at(x), system.entropy_at(x)];
-    let invariants = left_over.invariants;
-    let start = Start { x, time: 0.0, h, energy, entropy, invariants, left_over };
+    let invariants = accumulated_error.invariants;
+    let start = Start { x, time: 0.0, h, energy, entropy, invariants, accumulated_error };
     let missing = |_| BrokenLaw { law: "the step exists", size: f64::NAN, bound: 0.0 };
     scheme.step(system, &start, &mut Memory::new()).map(|(end, _)| end).map_err(missing)
 }

@@ -21,12 +21,12 @@
 //!
 //! # What a later version may add
 //!
-//! Results are `#[non_exhaustive]`: [`Certificate`], [`Kept`], [`State`], [`Tried`], [`Work`], and the report of a
+//! Results are `#[non_exhaustive]`: [`Certificate`], [`InvariantBalance`], [`State`], [`Attempts`], [`Effort`], and the report of a
 //! model. A later version may add a field to them; a pattern ends in `..`, and a changed copy is a clone whose
 //! fields are assigned. So are errors and the other enums that may grow. Options are not, because
-//! `Newton { sweeps: 50, ..Newton::default() }` and `Scheme { splits: 4, ..Scheme::new(WeylMidpoint) }` are
+//! `Newton { iterations: 50, ..Newton::default() }` and `Scheme { splits: 4, ..Scheme::new(WeylMidpoint) }` are
 //! how they are written: write the last part, and a new option has its default. What you pass to an equation
-//! or return from one ([`Linearised`], [`Root`], [`NoRoot`]) has all of its fields.
+//! or return from one ([`Linearised`], [`Root`], [`Iterate`]) has all of its fields.
 
 pub mod adaptive;
 pub mod attitude;
@@ -49,16 +49,16 @@ pub mod trajectory;
 
 pub use adaptive::Until;
 pub use attitude::{Attitude, AttitudeError};
-pub use certificate::{Certificate, Kept};
+pub use certificate::{Certificate, InvariantBalance};
 pub use checkpoint::{Checkpoint, ResumeError};
 pub use discrete_gradient::{
-    Chord, DiscreteGradient, Gonzalez, ItohAbe, MeanValue, SymmetricItohAbe,
+    DiscreteGradient, Gonzalez, ItohAbe, MeanValue, StableGradient, SymmetricItohAbe,
 };
-pub use error::{Error, RunError, StepError, Tried};
+pub use error::{Attempts, Error, RunError, StepError};
 pub use newton::Newton;
 pub use observables::{Csv, Npy, Observables, TableError};
 pub use residual::Residual;
-pub use root_finder::{Equation, Linearised, NoRoot, Root, RootFinder, Rounding};
-pub use span::{Course, Span, SpanError};
-pub use step::{Scheme, Work};
+pub use root_finder::{Equation, Iterate, Linearised, Root, RootFinder, Rounding};
+pub use span::{Schedule, Span, SpanError};
+pub use step::{Effort, Scheme};
 pub use trajectory::{Ending, Run, State, Steps, Trajectory};

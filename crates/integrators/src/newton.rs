@@ -2,7 +2,7 @@
 
 use metriplectic_fields::{Column, Dimension, Space, Square, Vector};
 
-use crate::root_finder::{Equation, Linearised, NoRoot, Root, RootFinder, Rounding};
+use crate::root_finder::{Equation, Iterate, Linearised, Root, RootFinder, Rounding};
 
 /// Newton's method, damped, down to round-off.
 ///
@@ -25,7 +25,7 @@ use crate::root_finder::{Equation, Linearised, NoRoot, Root, RootFinder, Roundin
 ///
 /// ```
 /// use metriplectic_integrators::Newton;
-/// let patient = Newton { sweeps: 50, ..Newton::default() };
+/// let patient = Newton { iterations: 50, ..Newton::default() };
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Newton {
@@ -36,19 +36,19 @@ pub struct Newton {
     /// If a correction is followed by one of more than this fraction of it, a new Jacobian is formed.
     pub reuse: f64,
     /// Linear systems that may be solved.
-    pub sweeps: usize,
+    pub iterations: usize,
     /// Halvings of one correction that does not reduce the residual.
     pub halvings: usize,
 }
 
 impl Default for Newton {
     fn default() -> Self {
-        Self { tolerance: 1.0, stall: 100.0, reuse: 0.05, sweeps: 30, halvings: 8 }
+        Self { tolerance: 1.0, stall: 100.0, reuse: 0.05, iterations: 30, halvings: 8 }
     }
 }
 
 impl<M: Space> RootFinder<M> for Newton {
-    fn solve(&self, equation: &impl Equation<M>, guess: &Vector<M>) -> Result<Root<M>, NoRoot<M>> {
+    fn solve(&self, equation: &impl Equation<M>, guess: &Vector<M>) -> Result<Root<M>, Iterate<M>> {
         self.solve_near(equation, guess, &mut None)
     }
 }
@@ -62,7 +62,7 @@ pub(crate) struct Inverse<N: Dimension> {
     pub(crate) round_off: N::Vector<f64>,
     /// The norm of the round-off of the residual, where the Jacobian was formed.
     pub(crate) floor: f64,
-    /// The share of a residual that the first correction by a kept inverse has left of late.
+    /// The fraction of a residual that the first correction by a kept inverse has left of late.
     pub(crate) contraction: f64,
     /// The residual of the guess in the last step, in units of its round-off.
     pub(crate) first: f64,
@@ -166,7 +166,7 @@ const HIDDEN: f64 = 1.0;
 const INVERTED: f64 = 0.01;
 /// The multiple of round-off below which the change of a residual says nothing of the Jacobian.
 const NOISE: f64 = 1e3;
-/// The share of the round-off that the last correction has to promise.
+/// The fraction of the round-off that the last correction has to promise.
 const SURE: f64 = 0.01;
 /// The multiple of round-off below which a residual says little about its Jacobian.
 const NEAR: f64 = 10.0;
@@ -198,8 +198,8 @@ impl Newton {
         equation: &impl Equation<M>,
         guess: &Vector<M>,
         known: &mut Option<Inverse<M::Dim>>,
-    ) -> Result<Root<M>, NoRoot<M>> {
-        let mut best = NoRoot { best: *guess, residual: f64::INFINITY, sweeps: 0 };
+    ) -> Result<Root<M>, Iterate<M>> {
+        let mut best = Iterate { best: *guess, residual: f64::INFINITY, iterations: 0 };
         let mut history = None;
         if let Some(inverse) = known {
             if inverse.serves()
@@ -230,9 +230,9 @@ impl Newton {
     fn solve_afresh<M: Space>(
         &self,
         equation: &impl Equation<M>,
-        mut best: NoRoot<M>,
+        mut best: Iterate<M>,
         known: &mut Option<Inverse<M::Dim>>,
-    ) -> Result<Root<M>, NoRoot<M>> {
+    ) -> Result<Root<M>, Iterate<M>> {
         let mut first = None;
         while let Some(Linearised { residual, jacobian, rounding }) = equation.linearise(&best.best)
         {
@@ -253,7 +253,7 @@ impl Newton {
                     *known = Some(inverse);
                     return Ok(best.solved(noise, floor));
                 }
-                Progress::Slow if best.sweeps < self.sweeps => {}
+                Progress::Slow if best.iterations < self.iterations => {}
                 Progress::Slow | Progress::Stuck => break,
             }
         }
@@ -267,7 +267,7 @@ impl Newton {
         equation: &impl Equation<M>,
         here: &Start<M>,
         inverse: &mut Inverse<M::Dim>,
-        best: &mut NoRoot<M>,
+        best: &mut Iterate<M>,
     ) -> Progress<M> {
         let round_off = inverse.round_off(&best.best);
         let measure = Measure::<M::Dim>::new(&round_off);
@@ -279,7 +279,7 @@ impl Newton {
         let mut size = measure.of(&correction);
         inverse.first = best.residual / inverse.floor;
         // Before a Jacobian has been seen to contract here, nothing is left to it: the frame may have
-        // turned since the last step, as that of a sphere does across its equator.
+        // dg_v since the last step, as that of a sphere does across its equator.
         let (mut contraction, mut expected) = (f64::INFINITY, 1.0);
         // Whether the equation's own Jacobian has had so little left to do that what remains is noise.
         let mut settled = false;
@@ -295,7 +295,7 @@ impl Newton {
             if best.residual <= enough * floor && size <= enough * most {
                 return solved();
             }
-            best.sweeps += 1;
+            best.iterations += 1;
             let round = best.residual <= floor || contraction * best.residual <= SURE * floor;
             if round && expected * size <= HIDDEN * most {
                 // What a slow contraction leaves below round-off has the same sign in each step; it costs
@@ -363,7 +363,7 @@ impl Newton {
     fn descend<M: Space>(
         &self,
         equation: &impl Equation<M>,
-        best: &NoRoot<M>,
+        best: &Iterate<M>,
         correction: &Vector<M>,
         contracts: impl Fn(&Vector<M>) -> bool,
     ) -> Option<Descent<M>> {
@@ -425,7 +425,7 @@ mod tests {
         let root = fresh.solve(&CircleAndHyperbola, &vector![2.0, 0.4]).unwrap();
         // x² = 2 + √3 in closed form.
         assert!((root.u.x - (2.0 + 3.0_f64.sqrt()).sqrt()).abs() < 1e-15);
-        assert!(root.sweeps <= 5, "{} sweeps", root.sweeps);
+        assert!(root.iterations <= 5, "{} iterations", root.iterations);
     }
 
     /// `ln u = 1`, defined for `u > 0` only.

@@ -2,7 +2,7 @@
 
 use std::cell::{Cell, OnceCell};
 
-use metriplectic_dynamics::orthogonal::{Moving, Orthogonal};
+use metriplectic_dynamics::orthogonal::{Orthogonal, WithJacobian};
 use metriplectic_dynamics::velocity::{
     Covectors, Gradient, VelocityJet, differentials, irreversible, reversible, velocity_jet,
 };
@@ -11,26 +11,26 @@ use metriplectic_fields::{
     ChartPoint, Column, Dimension, Matrix, Scalar, ScalarField, Space, Square, Vector, differential,
 };
 use metriplectic_manifolds::{
-    Arc, ArcJet, InnerProduct, Manifold, MetricError, Nodes, Retraction, Riemannian,
+    InnerProduct, Manifold, MetricError, Nodes, Retraction, Riemannian, StepPath, StepPathJet,
 };
 
-use crate::discrete_gradient::{Chord, DiscreteGradient, Segment};
+use crate::discrete_gradient::{DiscreteGradient, Segment, StableGradient};
 
 use crate::root_finder::{Equation, Linearised, Root, Rounding};
 use crate::trajectory::entropy_round_off;
 
 /// The equation of one step (Bloch, Farré Puiggalí, Martín de Diego 2024, §4.4), as a function of
-/// the initial displacement `u ∈ T_xM` of the arc:
+/// the initial displacement `u ∈ T_xM` of the path:
 ///
 /// ```math
 /// F(u) = d - h \bigl( \tilde\Pi\, w_H + \tilde K_{w_H} w_S \bigr) = 0 ,
 /// ```
 ///
-/// with `(z, d) = R_h⁻¹(x, x')` the base point and displacement of the arc, and `w_H` a discrete
-/// gradient of `H` along it. Both tensors kill `w_H`, so a root keeps `H`. In the scheme as published
+/// with `(z, d) = R_h⁻¹(x, x')` the base point and displacement of the path, and `w_H` a discrete
+/// gradient of `H` along it. Both tensors annihilate `w_H`, so a root keeps `H`. In the scheme as published
 /// `w_S` is `dS(z)` and `Π̃ = Π(z)`; in the exact one `w_S` is a discrete gradient of `S`, which `Π̃`
-/// kills, so that `ΔS = h K̃(w_S, w_S) ≥ 0` ([`velocity`](metriplectic_dynamics::velocity)). No logarithm is
-/// taken: the arc is shot from `x`.
+/// annihilates, so that `ΔS = h K̃(w_S, w_S) ≥ 0` ([`velocity`](metriplectic_dynamics::velocity)). No logarithm is
+/// taken: the path is shot from `x`.
 #[derive(Debug)]
 pub struct Residual<'a, Y: Metriplectic, R, W> {
     system: &'a Y,
@@ -40,7 +40,7 @@ pub struct Residual<'a, Y: Metriplectic, R, W> {
     h: f64,
     energy: f64,
     entropy: f64,
-    recall: Recall<Y>,
+    drift_correction: DriftCorrection<Y>,
     entropy_slope: Cell<f64>,
     dissipates: Cell<bool>,
     friction: Cell<Option<f64>>,
@@ -50,7 +50,7 @@ pub struct Residual<'a, Y: Metriplectic, R, W> {
 /// What earlier steps have left over of the energy, the entropy and the further invariants, and this step
 /// takes back.
 #[derive(Clone, Copy, Debug)]
-pub struct Recall<Y: Metriplectic> {
+pub struct DriftCorrection<Y: Metriplectic> {
     /// Of the energy.
     pub energy: f64,
     /// Of the entropy, as long as nothing is dissipated.
@@ -62,7 +62,7 @@ pub struct Recall<Y: Metriplectic> {
 /// A number for each further invariant of a system.
 pub type Numbers<Y> = <<<Y as Metriplectic>::Manifold as Space>::Dim as Dimension>::Array<f64>;
 
-impl<Y: Metriplectic> Recall<Y> {
+impl<Y: Metriplectic> DriftCorrection<Y> {
     /// Nothing is taken back, as in the definition of the scheme.
     pub fn nothing() -> Self {
         Self { energy: 0.0, entropy: 0.0, invariants: Dim::<Y>::array(|_| 0.0) }
@@ -107,7 +107,7 @@ impl<V: Column<f64>> InnerProduct<V> for InUnits<V> {
         V::from_index(|i| alpha[i] * self.0[i])
     }
 
-    fn raise(&self, a: &V) -> V {
+    fn from_orthonormal(&self, a: &V) -> V {
         V::from_index(|i| a[i] * self.0[i])
     }
 }
@@ -133,17 +133,23 @@ where
         h: f64,
     ) -> Self {
         let values = [system.energy_at(x), system.entropy_at(x)];
-        Self::recalling(system, (retraction, gradient), (x, values), h, Recall::nothing())
+        Self::with_drift_correction(
+            system,
+            (retraction, gradient),
+            (x, values),
+            h,
+            DriftCorrection::nothing(),
+        )
     }
 
     /// The same for a point with known energy and entropy, and errors of earlier steps to take back.
     #[inline]
-    pub(crate) fn recalling(
+    pub(crate) fn with_drift_correction(
         system: &'a Y,
         (retraction, gradient): (&'a R, &'a W),
         (x, [energy, entropy]): (&'a Point<Y>, [f64; 2]),
         h: f64,
-        recall: Recall<Y>,
+        drift_correction: DriftCorrection<Y>,
     ) -> Self {
         let (entropy_slope, dissipates) = (Cell::new(f64::INFINITY), Cell::new(true));
         let (friction, rotation) = (Cell::new(None), Cell::new(0.0));
@@ -155,7 +161,7 @@ where
             h,
             energy,
             entropy,
-            recall,
+            drift_correction,
             entropy_slope,
             dissipates,
             friction,
@@ -168,11 +174,17 @@ where
         self.rotation.get()
     }
 
-    /// The equation of a step of a share of the size, which takes nothing back.
-    pub(crate) fn of_share(&self, share: f64) -> Self {
+    /// The equation of a step of a fraction of the size, which takes nothing back.
+    pub(crate) fn of_fraction(&self, fraction: f64) -> Self {
         let parts = (self.retraction, self.gradient);
         let start = (self.x, [self.energy, self.entropy]);
-        Self::recalling(self.system, parts, start, self.h * share, Recall::nothing())
+        Self::with_drift_correction(
+            self.system,
+            parts,
+            start,
+            self.h * fraction,
+            DriftCorrection::nothing(),
+        )
     }
 
     /// The rate `h|K'|` of the friction in a step, where the Jacobian was formed last; `None` if it never
@@ -186,25 +198,25 @@ where
     ///
     /// # Errors
     ///
-    /// [`MetricError`] if the arc cannot be followed.
+    /// [`MetricError`] if the path cannot be followed.
     pub fn at<D: Scalar>(
         &self,
         u: &Vector<Y::Manifold, D>,
     ) -> Result<Vector<Y::Manifold, D>, MetricError> {
         let metric = self.system.metric();
-        let arc = self.retraction.arc(metric, self.x, u)?;
-        let g = metric.at(&arc.z)?;
-        let mut defined = Defined { gradient: self.gradient, g: &g, x: self.x, arc: &arc };
+        let path = self.retraction.step_path(metric, self.x, u)?;
+        let g = metric.at(&path.z)?;
+        let mut defined = Defined { gradient: self.gradient, g: &g, x: self.x, path: &path };
         let entropy = if self.is_exact() {
             defined.of(self.system.entropy())
         } else {
-            differential(self.system.entropy(), &arc.z)
+            differential(self.system.entropy(), &path.z)
         };
         let laws = [defined.of(self.system.energy()), entropy];
         let w = Covectors::new(laws, self.system.invariants(), &mut defined);
         let velocity =
-            reversible(self.system, &arc.z, &w)? + irreversible(self.system, &arc.z, &w)?;
-        Ok(arc.d - velocity * D::from(self.h))
+            reversible(self.system, &path.z, &w)? + irreversible(self.system, &path.z, &w)?;
+        Ok(path.d - velocity * D::from(self.h))
     }
 
     /// Whether the entropy has a discrete gradient.
@@ -228,10 +240,10 @@ where
         self.dissipates.get()
     }
 
-    /// The error `e = H(x') − H(x) + recall` of the energy at the end of an arc, where it is `energy`.
+    /// The error `e = H(x') − H(x) + drift_correction` of the energy at the end of a path, where it is `energy`.
     #[inline]
     fn imbalance(&self, energy: f64) -> f64 {
-        energy - self.energy + self.recall.energy
+        energy - self.energy + self.drift_correction.energy
     }
 
     /// The same at a point.
@@ -242,7 +254,7 @@ where
     /// One more correction for a root with the end `x'` at which the energy is not kept to round-off:
     /// the corrected root, and its end.
     ///
-    /// Both brackets kill `w`, so `⟨w, F(u)⟩ = e` for every `u`. Once `h|Π|` is large the sum
+    /// Both brackets annihilate `w`, so `⟨w, F(u)⟩ = e` for every `u`. Once `h|Π|` is large the sum
     /// `d − h(Πw + K dS)` has lost digits of this number that the difference `H(x') − H(x)` has. So
     /// the last correction is that of the residual whose part along `w` is exact,
     /// `F + (e − ⟨w, F⟩) ♯w/⟨w, ♯w⟩`, with `♯` in units of the round-off of each component, as long as this
@@ -280,7 +292,8 @@ where
         if self.entropy - entropy <= 0.5 * entropy_round_off(self.system, [self.x, end]) {
             return None;
         }
-        let (u, end) = self.corrected(u, e, Some(entropy - self.entropy + self.recall.entropy))?;
+        let (u, end) =
+            self.corrected(u, e, Some(entropy - self.entropy + self.drift_correction.entropy))?;
         let better = self.system.entropy_at(&end) > entropy;
         let balanced = self.imbalance_at(&end).abs() <= e.abs().max(ROUNDED * self.energy.abs());
         (better && balanced).then_some(LastCorrection { u, end, moved: false })
@@ -342,7 +355,7 @@ where
         let w = differentials(self.system, &ChartPoint::<Y::Manifold>::centre(end));
         let limit = self.system.metric().accuracy() * (Dim::<Y>::LEN as f64).sqrt();
         let moved = |kept: &Orthogonal<Dim<Y>>| {
-            let across = g.sharp(&kept.off_covector(0, &w.energy));
+            let across = g.sharp(&kept.project_covector(0, &w.energy));
             let off = across * (-e / across.dot(&w.energy));
             let within = (0..Dim::<Y>::LEN).all(|i| off[i].abs() <= limit * sizes[i]);
             let settled = Y::Manifold::chart(end, &off);
@@ -386,7 +399,7 @@ where
         let mut across = Orthogonal::<Dim<Y>>::default();
         let parts = [Some((energy, e)), change.map(|change| (entropy, change - growth))];
         for (w, part) in parts.into_iter().flatten() {
-            let sharp = g.sharp(&across.off_covector(0, &w));
+            let sharp = g.sharp(&across.project_covector(0, &w));
             across.push(&g, &w);
             exact += sharp * ((part - w.dot(&exact)) / sharp.dot(&w));
         }
@@ -401,23 +414,25 @@ where
     #[inline]
     fn evaluate(&self, u: &Vector<Y::Manifold>) -> Option<Vector<Y::Manifold>> {
         let (system, metric) = (self.system, self.system.metric());
-        let arc = self.retraction.real_arc(metric, self.x, u).ok()?;
-        let g = metric.at(&arc.z).ok()?;
-        let along = Along::new(self, u, &g, Segment::new(&arc.d, &arc.end));
-        let energy = along.value(system.energy(), (self.energy, self.recall.energy), &arc);
+        let path = self.retraction.real_step_path(metric, self.x, u).ok()?;
+        let g = metric.at(&path.z).ok()?;
+        let along = Along::new(self, u, &g, Segment::new(&path.d, &path.end));
+        let energy =
+            along.value(system.energy(), (self.energy, self.drift_correction.energy), &path);
         let entropy = if self.is_exact() {
-            let w = along.value(system.entropy(), (self.entropy, self.recall.entropy), &arc);
+            let w =
+                along.value(system.entropy(), (self.entropy, self.drift_correction.entropy), &path);
             self.entropy_slope.set(w.dot(&w));
             w
         } else {
-            system.entropy().jet1(&arc.z.base).df
+            system.entropy().jet1(&path.z.base).df
         };
-        let mut values = Values { along: &along, arc: &arc, seen: 0 };
+        let mut values = Values { along: &along, path: &path, seen: 0 };
         let w = Covectors::new([energy, entropy], system.invariants(), &mut values);
-        let friction = irreversible(system, &arc.z, &w).ok()?;
+        let friction = irreversible(system, &path.z, &w).ok()?;
         self.dissipates.set(self.is_dissipation(w.entropy.dot(&friction)));
-        let velocity = reversible(system, &arc.z, &w).ok()? + friction;
-        let residual = arc.d - velocity * self.h;
+        let velocity = reversible(system, &path.z, &w).ok()? + friction;
+        let residual = path.d - velocity * self.h;
         residual.is_finite().then_some(residual)
     }
 
@@ -426,32 +441,34 @@ where
     #[inline]
     fn jet(&self, u: &Vector<Y::Manifold>) -> Option<Jet<Y::Manifold>> {
         let (system, metric, h) = (self.system, self.system.metric(), self.h);
-        let arc = self.retraction.arc_jet(metric, self.x, u).ok()?;
-        let g = metric.at(&ChartPoint::<Y::Manifold>::centre(&arc.z)).ok()?;
-        let slopes = metric.slopes(&arc.z);
-        let segment = Segment::new(&arc.d, &arc.end);
+        let path = self.retraction.step_path_jet(metric, self.x, u).ok()?;
+        let g = metric.at(&ChartPoint::<Y::Manifold>::centre(&path.z)).ok()?;
+        let slopes = metric.slopes(&path.z);
+        let segment = Segment::new(&path.d, &path.end);
         let (along, slopes) = (Along::new(self, u, &g, segment), slopes.as_ref());
-        let start = (self.energy, self.recall.energy);
-        let (energy, chord, steepness) = along.jet(system.energy(), start, &arc, slopes);
+        let start = (self.energy, self.drift_correction.energy);
+        let (energy, chord, steepness) = along.jet(system.energy(), start, &path, slopes);
         let entropy = if self.is_exact() {
-            along.jet(system.entropy(), (self.entropy, self.recall.entropy), &arc, slopes).0
+            along
+                .jet(system.entropy(), (self.entropy, self.drift_correction.entropy), &path, slopes)
+                .0
         } else {
-            let jet = system.entropy().jet2(&arc.z);
-            Moving { value: jet.df, slope: jet.hf * arc.dz }
+            let jet = system.entropy().jet2(&path.z);
+            WithJacobian { value: jet.df, slope: jet.hf * path.dz }
         };
-        let mut jets = Jets { along: &along, arc: &arc, slopes, seen: 0 };
+        let mut jets = Jets { along: &along, path: &path, slopes, seen: 0 };
         let w = Covectors::new([energy, entropy], system.invariants(), &mut jets);
         let VelocityJet { velocity, terms, gain, production, friction, rotation } =
-            velocity_jet(system, &arc.z, &arc.dz, &w).ok()?;
+            velocity_jet(system, &path.z, &path.dz, &w).ok()?;
         self.dissipates.set(self.is_dissipation(production));
         // Half of a displacement reaches z.
         self.friction.set(Some(2.0 * h.abs() * friction));
         self.rotation.set(2.0 * h.abs() * rotation);
 
-        let residual = arc.d - velocity.value * h;
-        let jacobian = arc.dd - velocity.slope * h;
+        let residual = path.d - velocity.value * h;
+        let jacobian = path.dd - velocity.slope * h;
         // Near the edge of a domain dH is far steeper at x' than at z, and the rounding of d counts there.
-        let noise = chord.noise(&g, &arc.d) + steepness * f64::EPSILON;
+        let noise = chord.noise(&g, &path.d) + steepness * f64::EPSILON;
         let rounding = Rounding {
             // What underflows is no larger than the least normal number.
             terms: Vector::<Y::Manifold>::from_index(|i| {
@@ -459,7 +476,7 @@ where
             }),
             gain: gain * h,
             noise,
-            argument: (Y::Manifold::scales(self.x) + arc.d.abs()) * f64::EPSILON,
+            argument: (Y::Manifold::scales(self.x) + path.d.abs()) * f64::EPSILON,
         };
         let usable = residual.is_finite() && jacobian.magnitude().is_finite();
         let at = Linearised { residual, jacobian, rounding };
@@ -467,7 +484,7 @@ where
             at,
             energy: energy.value,
             entropy: entropy.value,
-            d: arc.d,
+            d: path.d,
             growth: h * production,
         })
     }
@@ -491,12 +508,12 @@ where
     }
 }
 
-/// Discrete gradients along one arc by their definition.
+/// Discrete gradients along one path by their definition.
 struct Defined<'a, M: Manifold, D: Scalar, G, W> {
     gradient: &'a W,
     g: &'a G,
     x: &'a M::Point<f64>,
-    arc: &'a Arc<M, D>,
+    path: &'a StepPath<M, D>,
 }
 
 impl<M, D, G, W> Gradient<M> for Defined<'_, M, D, G, W>
@@ -509,11 +526,11 @@ where
     type Covector = Vector<M, D>;
 
     fn of(&mut self, f: &impl ScalarField<M>) -> Vector<M, D> {
-        self.gradient.covector(f, self.g, (self.x, f.at(self.x)), self.arc)
+        self.gradient.covector(f, self.g, (self.x, f.at(self.x)), self.path)
     }
 }
 
-/// One arc at real points, along which fields get discrete gradients that are safe against
+/// One path at real points, along which fields get discrete gradients that are safe against
 /// round-off.
 struct Along<'a, Y: Metriplectic, R, W, G> {
     step: &'a Residual<'a, Y, R, W>,
@@ -539,7 +556,7 @@ where
         Self { step, u, g, segment, nodes: OnceCell::new() }
     }
 
-    /// The data of the discrete gradient of `f` on the arc with the base `z` and the end `x'`, from its
+    /// The data of the discrete gradient of `f` on the path with the base `z` and the end `x'`, from its
     /// values at `x` and `x'`.
     #[inline]
     fn chord(
@@ -548,32 +565,32 @@ where
         mean: &Vector<Y::Manifold>,
         [z, end]: [&Point<Y>; 2],
         values: [f64; 2],
-    ) -> Chord<Y::Manifold> {
+    ) -> StableGradient<Y::Manifold> {
         let base = || self.step.gradient.slope_at_base(f, z, self.segment.d, mean);
         let nodes = || {
             let Residual { system, retraction, x, .. } = self.step;
-            // The same arc has been followed to its end, so the alternative is not reached.
+            // The same path has been followed to its end, so the alternative is not reached.
             retraction.along(system.metric(), x, self.u).unwrap_or_else(|_| Nodes {
                 ends: [*x, end].map(Y::Manifold::constant),
                 middle: None,
             })
         };
         let nodes = || self.nodes.get_or_init(nodes);
-        Chord::new(f, mean, &self.segment, values, base, nodes)
+        StableGradient::new(f, mean, &self.segment, values, base, nodes)
     }
 
-    /// The discrete gradient of `f`, with `⟨w, d⟩ = f(x') − start + recall`.
+    /// The discrete gradient of `f`, with `⟨w, d⟩ = f(x') − start + drift_correction`.
     #[inline]
     fn value(
         &self,
         f: &impl ScalarField<Y::Manifold>,
-        (start, recall): (f64, f64),
-        arc: &Arc<Y::Manifold>,
+        (start, drift_correction): (f64, f64),
+        path: &StepPath<Y::Manifold>,
     ) -> Vector<Y::Manifold> {
-        let mean = self.step.gradient.real_mean(f, self.step.x, arc);
-        let values = [start, f.at(&arc.end)];
-        let chord = self.chord(f, &mean, [&arc.z.base, &arc.end], values);
-        chord.covector(recall, self.g, &arc.d)
+        let mean = self.step.gradient.real_mean(f, self.step.x, path);
+        let values = [start, f.at(&path.end)];
+        let chord = self.chord(f, &mean, [&path.z.base, &path.end], values);
+        chord.covector(drift_correction, self.g, &path.d)
     }
 
     /// The same with its derivatives, and the absolute components of `dF(x')`.
@@ -581,21 +598,21 @@ where
     fn jet(
         &self,
         f: &impl ScalarField<Y::Manifold>,
-        (start, recall): (f64, f64),
-        arc: &ArcJet<Y::Manifold>,
+        (start, drift_correction): (f64, f64),
+        path: &StepPathJet<Y::Manifold>,
         slopes: Option<&Slopes<Y::Manifold>>,
     ) -> CovectorJet<Y::Manifold> {
-        let (mean, dmean) = self.step.gradient.mean_jet(f, self.step.x, arc);
-        let end = f.jet1(&arc.end);
-        let chord = self.chord(f, &mean, [&arc.z, &arc.end], [start, end.value]);
-        let value = chord.covector(recall, self.g, &arc.d);
-        let slope = chord.slope(recall, (self.g, slopes), arc, &dmean, &end.df);
-        (Moving { value, slope }, chord, end.df.abs())
+        let (mean, dmean) = self.step.gradient.mean_jet(f, self.step.x, path);
+        let end = f.jet1(&path.end);
+        let chord = self.chord(f, &mean, [&path.z, &path.end], [start, end.value]);
+        let value = chord.covector(drift_correction, self.g, &path.d);
+        let slope = chord.slope(drift_correction, (self.g, slopes), path, &dmean, &end.df);
+        (WithJacobian { value, slope }, chord, end.df.abs())
     }
 }
 
 /// A discrete gradient with its derivatives, its data, and the absolute components of `dF(x')`.
-type CovectorJet<M> = (Moving<<M as Space>::Dim>, Chord<M>, Vector<M>);
+type CovectorJet<M> = (WithJacobian<<M as Space>::Dim>, StableGradient<M>, Vector<M>);
 
 /// The derivatives of a metric along the chart.
 type Slopes<M> = <<M as Space>::Dim as Dimension>::Array<Matrix<M>>;
@@ -603,7 +620,7 @@ type Slopes<M> = <<M as Space>::Dim as Dimension>::Array<Matrix<M>>;
 /// The discrete gradients of the further invariants, one after the other.
 struct Values<'a, Y: Metriplectic, R, W, G> {
     along: &'a Along<'a, Y, R, W, G>,
-    arc: &'a Arc<Y::Manifold>,
+    path: &'a StepPath<Y::Manifold>,
     seen: usize,
 }
 
@@ -617,17 +634,17 @@ where
     type Covector = Vector<Y::Manifold>;
 
     fn of(&mut self, f: &impl ScalarField<Y::Manifold>) -> Vector<Y::Manifold> {
-        let Residual { x, recall, .. } = self.along.step;
-        let recall = recall.invariants[self.seen];
+        let Residual { x, drift_correction, .. } = self.along.step;
+        let drift_correction = drift_correction.invariants[self.seen];
         self.seen += 1;
-        self.along.value(f, (f.at(x), recall), self.arc)
+        self.along.value(f, (f.at(x), drift_correction), self.path)
     }
 }
 
 /// The same with their derivatives.
 struct Jets<'a, Y: Metriplectic, R, W, G> {
     along: &'a Along<'a, Y, R, W, G>,
-    arc: &'a ArcJet<Y::Manifold>,
+    path: &'a StepPathJet<Y::Manifold>,
     slopes: Option<&'a Slopes<Y::Manifold>>,
     seen: usize,
 }
@@ -639,12 +656,12 @@ where
     W: DiscreteGradient,
     G: InnerProduct<Vector<Y::Manifold>>,
 {
-    type Covector = Moving<Dim<Y>>;
+    type Covector = WithJacobian<Dim<Y>>;
 
-    fn of(&mut self, f: &impl ScalarField<Y::Manifold>) -> Moving<Dim<Y>> {
-        let Residual { x, recall, .. } = self.along.step;
-        let recall = recall.invariants[self.seen];
+    fn of(&mut self, f: &impl ScalarField<Y::Manifold>) -> WithJacobian<Dim<Y>> {
+        let Residual { x, drift_correction, .. } = self.along.step;
+        let drift_correction = drift_correction.invariants[self.seen];
         self.seen += 1;
-        self.along.jet(f, (f.at(x), recall), self.arc, self.slopes).0
+        self.along.jet(f, (f.at(x), drift_correction), self.path, self.slopes).0
     }
 }

@@ -66,25 +66,25 @@ pub struct Root<M: Space> {
     /// The norm of the round-off of the residual.
     pub floor: f64,
     /// Linear systems solved.
-    pub sweeps: usize,
+    pub iterations: usize,
 }
 
 /// An equation that was not solved.
 #[derive(Clone, Debug)]
-pub struct NoRoot<M: Space> {
+pub struct Iterate<M: Space> {
     /// The best point found.
     pub best: Vector<M>,
     /// The norm of the residual there; infinite if it was defined nowhere.
     pub residual: f64,
     /// Linear systems solved.
-    pub sweeps: usize,
+    pub iterations: usize,
 }
 
-impl<M: Space> NoRoot<M> {
+impl<M: Space> Iterate<M> {
     /// The best point as the root, with its round-off.
     pub(crate) fn solved(self, noise: Vector<M>, floor: f64) -> Root<M> {
-        let Self { best: u, residual, sweeps } = self;
-        Root { u, residual, noise, floor, sweeps }
+        let Self { best: u, residual, iterations } = self;
+        Root { u, residual, noise, floor, iterations }
     }
 }
 
@@ -94,6 +94,6 @@ pub trait RootFinder<M: Space> {
     ///
     /// # Errors
     ///
-    /// [`NoRoot`] with the best point found.
-    fn solve(&self, equation: &impl Equation<M>, guess: &Vector<M>) -> Result<Root<M>, NoRoot<M>>;
+    /// [`Iterate`] with the best point found.
+    fn solve(&self, equation: &impl Equation<M>, guess: &Vector<M>) -> Result<Root<M>, Iterate<M>>;
 }

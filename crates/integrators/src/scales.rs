@@ -150,7 +150,7 @@ fn reach<Y: Metriplectic>(
 const CUTS: usize = 30;
 /// A nonlinear part that grows faster than `δ⁴` is that of a wall: `2⁴`, and a quarter more.
 const STEEPEST: f64 = 20.0;
-/// The share of the terms of a velocity below which it may be noise: 2⁻¹⁶, far above round-off.
+/// The fraction of the terms of a velocity below which it may be noise: 2⁻¹⁶, far above round-off.
 const NOISE: f64 = 1.0 / 65_536.0;
 
 /// The shortest time of the motion, and at most `span`.
@@ -180,7 +180,7 @@ fn terms<Y: Metriplectic>(
 ) -> Option<Vector<Y::Manifold>> {
     let centre = ChartPoint::<Y::Manifold>::centre(x);
     let w = differentials(system, &centre);
-    let pi = system.bracket().tensor(&system.site(&centre, &w.entropy)).ok()?;
+    let pi = system.bracket().tensor(&system.bracket_args(&centre, &w.entropy)).ok()?;
     let k = system.dissipation().tensor(system.metric(), &centre, &w.energy).ok()?;
     Some(Column::from_index(|i| {
         let n = Vector::<Y::Manifold>::LEN;

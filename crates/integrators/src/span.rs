@@ -91,7 +91,7 @@ impl Span {
 /// | [`Span::steps`]`(h, count)` | of size `h` | `count` of them |
 /// | [`Span::until`]`(end)` | that follow a tolerance | `t = end` |
 #[derive(Clone, Debug, PartialEq)]
-pub struct Course {
+pub struct Schedule {
     pub(crate) size: Size,
     /// The time at which the run starts.
     pub(crate) start: f64,
@@ -109,20 +109,20 @@ pub(crate) enum Size {
     Tolerance(Adaptive),
 }
 
-impl From<f64> for Course {
+impl From<f64> for Schedule {
     fn from(h: f64) -> Self {
         let (start, every, most, rest) = (0.0, 1, None, None);
         Self { size: Size::Fixed(h), start, count: None, every, most, rest }
     }
 }
 
-impl From<Span> for Course {
+impl From<Span> for Schedule {
     fn from(Span { start, step, count, every, rest }: Span) -> Self {
         Self { size: Size::Fixed(step), start, count: Some(count), every, most: None, rest }
     }
 }
 
-impl Course {
+impl Schedule {
     /// Whether all steps have one size.
     pub(crate) const fn is_fixed(&self) -> bool {
         matches!(self.size, Size::Fixed(_))
@@ -295,11 +295,11 @@ mod tests {
                 let closer = count.div_ceil(span.every.saturating_sub(1).max(1)) + 1;
                 assert!(span.every == 1 || closer > states.max(2), "{states}, {count} steps");
                 assert!(
-                    span.records(0) && span.records(count) && Course::from(span).check().is_ok()
+                    span.records(0) && span.records(count) && Schedule::from(span).check().is_ok()
                 );
             }
         }
-        let none = Course::from(Span::steps(0.1, 0).at_most(10));
+        let none = Schedule::from(Span::steps(0.1, 0).at_most(10));
         assert_eq!(none.check(), Err(SpanError::NoSteps));
         assert_eq!(
             Span::steps(0.1, usize::MAX).at_most(2),

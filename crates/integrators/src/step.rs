@@ -5,14 +5,14 @@
 //! 1. **Newton's method from the guess**: the displacement extrapolated from the steps before, with the
 //!    Jacobian that they have left, else that of explicit Euler. It is damped: a correction that
 //!    leaves the domain of a field, or does not reduce the residual, is halved up to
-//!    [`Newton::halvings`] times. At most [`Newton::sweeps`] corrections.
+//!    [`Newton::halvings`] times. At most [`Newton::iterations`] corrections.
 //! 2. **Newton's method from rest**, `u = 0`, where all is defined that is defined at the start. Its first
 //!    correction is the linearly implicit step, which stiff friction does not drive off. At most 8
 //!    corrections.
 //! 3. **Continuation in the step size**: the solution that begins at rest is followed along its tangent
 //!    from a step of size 0 to the one that is asked for, by increments that double where Newton's
 //!    method ends near the prediction and are quartered where it does not. At most 200 increments, and
-//!    none below 10⁻⁴ of the size reached: there the solution has turned back, or has met the edge of the
+//!    none below 10⁻⁴ of the size reached: there the solution has dg_v back, or has met the edge of the
 //!    domain.
 //! 4. **The globaliser**, 100 iterations of argmin's L-BFGS on `½|F(u)|²` from the best point of 1 and 2,
 //!    then Newton's method from where it ends (with the feature `argmin`). What it finds is a solution,
@@ -28,7 +28,7 @@
 //! Of the 242 starts of `tests/hard_corpus.rs` 218 have a solution that continuation in 60 digits finds.
 //! All of them end in a certified step.
 
-use metriplectic_dynamics::velocity::{differentials, projected_shares};
+use metriplectic_dynamics::velocity::{differentials, projected_fractions};
 use metriplectic_dynamics::{Bracket, Dissipation, Invariants, Metriplectic, system::Point};
 use metriplectic_fields::{
     ChartPoint, Column, Dimension, Matrix, ScalarField, Space, Square, Vector,
@@ -36,10 +36,10 @@ use metriplectic_fields::{
 use metriplectic_manifolds::{InnerProduct, Manifold, Retraction, Riemannian};
 
 use crate::discrete_gradient::{DiscreteGradient, Gonzalez};
-use crate::error::{StepError, Tried};
+use crate::error::{Attempts, StepError};
 use crate::newton::{Inverse, Newton};
-use crate::residual::{Dim, LastCorrection, Numbers, Recall, Residual, size_of_terms};
-use crate::root_finder::{Equation, NoRoot, Root};
+use crate::residual::{Dim, DriftCorrection, LastCorrection, Numbers, Residual, size_of_terms};
+use crate::root_finder::{Equation, Iterate, Root};
 
 /// A scheme: a retraction, and how hard to try to solve its equation.
 ///
@@ -47,7 +47,7 @@ use crate::root_finder::{Equation, NoRoot, Root};
 /// use metriplectic_integrators::{Newton, Scheme};
 /// use metriplectic_manifolds::WeylMidpoint;
 /// let scheme = Scheme { splits: 4, ..Scheme::new(WeylMidpoint) };
-/// let patient = scheme.newton(Newton { sweeps: 60, ..Newton::default() });
+/// let patient = scheme.newton(Newton { iterations: 60, ..Newton::default() });
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scheme<R, W = Gonzalez> {
@@ -94,13 +94,13 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
         system: &Y,
         start: &Start<'_, Y>,
         memory: &mut Memory<Dim<Y>>,
-    ) -> Result<(Point<Y>, Work), StepError>
+    ) -> Result<(Point<Y>, Effort), StepError>
     where
         Y: Metriplectic,
         R: Retraction<Y::Manifold, Y::Metric>,
     {
-        let mut work = Work::default();
-        let whole = self.attempt(system, start, memory, Effort::Whole, &mut work);
+        let mut work = Effort::default();
+        let whole = self.attempt(system, start, memory, Fallbacks::All, &mut work);
         let end = whole.or_else(|lost| {
             *memory = Memory::new();
             if self.splits == 0 {
@@ -121,17 +121,17 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
         &self,
         system: &Y,
         start: &Start<'_, Y>,
-        (Lost { residual, cause }, x): (Lost, &Point<Y>),
-        work: &Work,
+        (StepFailure { residual, cause }, x): (StepFailure, &Point<Y>),
+        work: &Effort,
     ) -> StepError
     where
         Y: Metriplectic,
         R: Retraction<Y::Manifold, Y::Metric>,
     {
         let Start { time, h, .. } = *start;
-        let Work { sweeps, continued, globalised, splits, .. } = *work;
-        let tried = Tried { sweeps, continued, globalised, splits };
-        if let Some(error) = (Lost { residual, cause }).first_law(time, h) {
+        let Effort { iterations, continued, globalised, splits, .. } = *work;
+        let tried = Attempts { iterations, continued, globalised, splits };
+        if let Some(error) = (StepFailure { residual, cause }).first_law(time, h) {
             return error;
         }
         let suggested = smallest_part(h, self.splits);
@@ -147,9 +147,9 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
         }
         match (cause, dependent_invariant(system, x)) {
             (Cause::Edge, _) => StepError::OutOfDomain { time, h, tried },
-            (_, Some((index, share))) => {
-                let change = start.left_over.invariants[index].abs();
-                StepError::DependentInvariants { time, index, change, share }
+            (_, Some((index, fraction))) => {
+                let change = start.accumulated_error.invariants[index].abs();
+                StepError::DependentInvariants { time, index, change, fraction }
             }
             _ => StepError::NotConverged { time, h, residual, tried, suggested },
         }
@@ -162,8 +162,8 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
         system: &Y,
         start: &Start<'_, Y>,
         depth: usize,
-        work: &mut Work,
-    ) -> Result<Point<Y>, (Lost, Point<Y>)>
+        work: &mut Effort,
+    ) -> Result<Point<Y>, (StepFailure, Point<Y>)>
     where
         Y: Metriplectic,
         R: Retraction<Y::Manifold, Y::Metric>,
@@ -174,12 +174,12 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
         let h = 0.5 * start.h;
         for _ in 0..2 {
             let [energy, entropy] = [system.energy_at(&point), system.entropy_at(&point)];
-            let left_over = Recall {
-                energy: start.left_over.energy + (energy - start.energy),
-                ..start.left_over
+            let accumulated_error = DriftCorrection {
+                energy: start.accumulated_error.energy + (energy - start.energy),
+                ..start.accumulated_error
             };
-            let part = Start { x: &point, h, energy, entropy, left_over, ..*start };
-            let end = match self.attempt(system, &part, &mut memory, Effort::Part, work) {
+            let part = Start { x: &point, h, energy, entropy, accumulated_error, ..*start };
+            let end = match self.attempt(system, &part, &mut memory, Fallbacks::NewtonOnly, work) {
                 Ok(end) => end,
                 Err(failure) if depth >= self.splits => return Err((failure, point)),
                 Err(_) => self.halves(system, &part, depth + 1, work)?,
@@ -195,9 +195,9 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
         system: &Y,
         start: &Start<'_, Y>,
         memory: &mut Memory<Dim<Y>>,
-        effort: Effort,
-        work: &mut Work,
-    ) -> Result<Point<Y>, Lost>
+        effort: Fallbacks,
+        work: &mut Effort,
+    ) -> Result<Point<Y>, StepFailure>
     where
         Y: Metriplectic,
         R: Retraction<Y::Manifold, Y::Metric>,
@@ -205,13 +205,19 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
         let guess = memory.extrapolate().or_else(|| explicit(system, start));
         let guess = guess.unwrap_or_else(Vector::<Y::Manifold>::zero);
         let parts = (&self.retraction, &self.gradient);
-        let recall = recall(system, start, &guess);
+        let drift_correction = drift_correction(system, start, &guess);
         let values = [start.energy, start.entropy];
         let known = memory.linearised.take().filter(|known| known.serves(start.h, &guess));
-        let residual = Residual::recalling(system, parts, (start.x, values), start.h, recall);
+        let residual = Residual::with_drift_correction(
+            system,
+            parts,
+            (start.x, values),
+            start.h,
+            drift_correction,
+        );
         let mut inverse = known.map(|known| known.inverse);
         let root = self.newton.solve_near(&residual, &guess, &mut inverse);
-        work.sweeps += sweeps(&root);
+        work.iterations += iterations(&root);
         let root = match root {
             Ok(root) => root,
             Err(failure) => self.rescue(&residual, failure, effort, &mut inverse, work)?,
@@ -235,7 +241,7 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
         let friction = memory.linearised.map_or(0.0, |known| known.friction);
         work.friction = work.friction.max(friction);
         if friction > VERY_STIFF && !has_digits(system, start, &root) {
-            return Err(Lost { residual: root.residual, cause: Cause::Unsolved });
+            return Err(StepFailure { residual: root.residual, cause: Cause::Unsolved });
         }
         work.rests = (0..Dim::<Y>::LEN).all(|i| root.u[i].abs() <= 2.0 * root.noise[i]);
         if work.rests {
@@ -244,11 +250,11 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
             (work.energy, work.entropy) = (start.energy, start.entropy);
             return Ok(start.x.clone());
         }
-        let lost = || Lost { residual: root.residual, cause: Cause::Edge };
+        let lost = || StepFailure { residual: root.residual, cause: Cause::Edge };
         let end = self.retraction.end(system.metric(), start.x, &root.u).map_err(|_| lost())?;
         let values = [system.energy_at(&end), system.entropy_at(&end)];
         let last = residual.last_correction(&root, &end, values);
-        work.sweeps += usize::from(last.is_some());
+        work.iterations += usize::from(last.is_some());
         let LastCorrection { u, end, moved } =
             last.unwrap_or(LastCorrection { u: root.u, end, moved: false });
         // Outside an open chart the defect is infinite: there is no state to go on from.
@@ -256,12 +262,12 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
             return Err(lost());
         }
         if moved {
-            memory.carry = None;
+            memory.compensation = None;
         }
         let end = memory.note::<Y::Manifold, _>(system.metric(), start.x, &u, end);
         if moved {
             // What the end has been moved by is not lost.
-            memory.carry = None;
+            memory.compensation = None;
         }
         // The last digits of the end, which no residual has seen, may be beyond the edge.
         (work.energy, work.entropy) = (system.energy_at(&end), system.entropy_at(&end));
@@ -269,7 +275,7 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
         if !work.entropy.is_finite() {
             Err(lost())
         } else if let Some(size) = breaks_first_law(system, change, [start.x, &end], work.energy) {
-            Err(Lost { residual: root.residual, cause: Cause::Energy { change, size } })
+            Err(StepFailure { residual: root.residual, cause: Cause::Energy { change, size } })
         } else {
             Ok(end)
         }
@@ -281,19 +287,19 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
     fn rescue<Y>(
         &self,
         residual: &Residual<'_, Y, R, W>,
-        failure: NoRoot<Y::Manifold>,
-        effort: Effort,
+        failure: Iterate<Y::Manifold>,
+        effort: Fallbacks,
         inverse: &mut Option<Inverse<Dim<Y>>>,
-        work: &mut Work,
-    ) -> Result<Root<Y::Manifold>, Lost>
+        work: &mut Effort,
+    ) -> Result<Root<Y::Manifold>, StepFailure>
     where
         Y: Metriplectic,
         R: Retraction<Y::Manifold, Y::Metric>,
     {
         let mut best = failure;
-        let mut newton = |newton: &Newton, guess: &Vector<Y::Manifold>, work: &mut Work| {
+        let mut newton = |newton: &Newton, guess: &Vector<Y::Manifold>, work: &mut Effort| {
             let solved = newton.solve_near(residual, guess, inverse);
-            work.sweeps += sweeps(&solved);
+            work.iterations += iterations(&solved);
             solved
                 .map_err(|lost| {
                     if lost.residual < best.residual {
@@ -302,9 +308,9 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
                 })
                 .or(Err(best.best))
         };
-        let direct = Newton { sweeps: DIRECT.min(self.newton.sweeps), ..self.newton };
+        let direct = Newton { iterations: DIRECT.min(self.newton.iterations), ..self.newton };
         let mut solved = newton(&direct, &Vector::<Y::Manifold>::zero(), work);
-        let whole = effort == Effort::Whole;
+        let whole = effort == Fallbacks::All;
         if whole
             && solved.is_err()
             && let Some(near) = self.follow(residual, work)
@@ -321,7 +327,7 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
         }
         solved.map_err(|at| {
             let cause = if at_edge(residual, &at) { Cause::Edge } else { Cause::Unsolved };
-            Lost { residual: best.residual, cause }
+            StepFailure { residual: best.residual, cause }
         })
     }
 
@@ -331,7 +337,7 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
     fn follow<Y>(
         &self,
         residual: &Residual<'_, Y, R, W>,
-        work: &mut Work,
+        work: &mut Effort,
     ) -> Option<Vector<Y::Manifold>>
     where
         Y: Metriplectic,
@@ -339,32 +345,32 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
     {
         work.continued += 1;
         // The points on the way need not be solved to round-off.
-        let newton = Newton { tolerance: 1e3, sweeps: DIRECT, halvings: 2, ..self.newton };
-        let (mut u, mut share, mut increment) = (Vector::<Y::Manifold>::zero(), 0.0, 0.125);
+        let newton = Newton { tolerance: 1e3, iterations: DIRECT, halvings: 2, ..self.newton };
+        let (mut u, mut fraction, mut increment) = (Vector::<Y::Manifold>::zero(), 0.0, 0.125);
         for _ in 0..STAGES {
-            let next = f64::min(share + increment, 1.0);
-            let equation = residual.of_share(next);
-            work.sweeps += 1;
+            let next = f64::min(fraction + increment, 1.0);
+            let equation = residual.of_fraction(next);
+            work.iterations += 1;
             let near = equation.linearise(&u).and_then(|at| {
                 let step = at.jacobian.solve(&at.residual)?;
                 // The branch begins as a straight line: the implicit displacement is the explicit one.
                 let bends = (step - at.residual).magnitude() > NEARBY * step.magnitude();
-                if share <= 0.0 && bends {
+                if fraction <= 0.0 && bends {
                     return None;
                 }
                 let predicted = u - step;
                 let solved = newton.solve_near(&equation, &predicted, &mut None);
-                work.sweeps += sweeps(&solved);
+                work.iterations += iterations(&solved);
                 let root = solved.ok()?.u;
                 let off = (root - predicted).magnitude();
                 (off <= NEARBY * (root - u).magnitude()).then_some(root)
             });
             match near {
                 Some(root) if next >= 1.0 => return Some(root),
-                Some(root) => (u, share, increment) = (root, next, 2.0 * increment),
+                Some(root) => (u, fraction, increment) = (root, next, 2.0 * increment),
                 None => increment *= 0.25,
             }
-            if increment <= LEAST * share {
+            if increment <= LEAST * fraction {
                 return None;
             }
         }
@@ -424,40 +430,40 @@ fn has_digits<Y: Metriplectic>(
 pub(crate) const STIFF: f64 = 10.0;
 
 /// What Newton's method has cost.
-fn sweeps<M: Manifold>(solved: &Result<Root<M>, NoRoot<M>>) -> usize {
-    solved.as_ref().map_or_else(|lost| lost.sweeps, |root| root.sweeps)
+fn iterations<M: Manifold>(solved: &Result<Root<M>, Iterate<M>>) -> usize {
+    solved.as_ref().map_or_else(|lost| lost.iterations, |root| root.iterations)
 }
 
-/// A solution belongs to a branch if it is off its prediction by no more than this share of the way.
+/// A solution belongs to a branch if it is off its prediction by no more than this fraction of the way.
 const NEARBY: f64 = 0.1;
 /// Linear systems after which a way from rest is no longer direct, and its end no longer likely to be
 /// the solution that belongs to the start.
 const DIRECT: usize = 8;
 /// Steps of growing sizes that may be tried to get to the size that is asked for.
 const STAGES: usize = 200;
-/// The share of what has been reached below which an increment of the size means that the branch of
+/// The fraction of what has been reached below which an increment of the size means that the branch of
 /// solutions ends there.
 const LEAST: f64 = 1e-4;
 
 /// How hard to try.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Effort {
+pub(crate) enum Fallbacks {
     /// Everything, because only halving the step comes after it.
-    Whole,
+    All,
     /// Newton's method alone, because a smaller step is tried next.
-    Part,
+    NewtonOnly,
 }
 
 /// A step that was not solved.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Lost {
+pub(crate) struct StepFailure {
     /// The smallest residual that was found.
     residual: f64,
     /// Why it was not solved.
     cause: Cause,
 }
 
-impl Lost {
+impl StepFailure {
     /// The error that names the first law, if the step was refused because its end has another energy.
     pub(crate) const fn first_law(self, time: f64, h: f64) -> Option<StepError> {
         match self.cause {
@@ -486,22 +492,22 @@ enum Cause {
 fn at_edge<M: Manifold>(equation: &impl Equation<M>, u: &Vector<M>) -> bool {
     let Some(at) = equation.linearise(u) else { return true };
     let Some(step) = at.jacobian.solve(&at.residual) else { return false };
-    let share = (u.magnitude() + at.residual.magnitude()) / step.magnitude();
-    equation.value(&(*u - step * share.min(1.0))).is_none()
+    let fraction = (u.magnitude() + at.residual.magnitude()) / step.magnitude();
+    equation.value(&(*u - step * fraction.min(1.0))).is_none()
 }
 
-/// The further invariant that has the least independent share at `x`, and this share, if it is small
+/// The further invariant that has the least independent fraction at `x`, and this fraction, if it is small
 /// enough to be the cause of a failure.
 pub(crate) fn dependent_invariant<Y: Metriplectic>(
     system: &Y,
     x: &Point<Y>,
 ) -> Option<(usize, f64)> {
-    let shares = projected_shares(system, &ChartPoint::centre(x)).ok()?;
-    let least = shares.into_iter().enumerate().min_by(|a, b| a.1.total_cmp(&b.1));
-    least.filter(|(_, share)| *share < DEPENDENT)
+    let fractions = projected_fractions(system, &ChartPoint::centre(x)).ok()?;
+    let least = fractions.into_iter().enumerate().min_by(|a, b| a.1.total_cmp(&b.1));
+    least.filter(|(_, fraction)| *fraction < DEPENDENT)
 }
 
-/// The independent share of a further invariant's differential that explains a failure.
+/// The independent fraction of a further invariant's differential that explains a failure.
 const DEPENDENT: f64 = 1e-3;
 
 /// The size of the smallest part of a step that was split `splits` times.
@@ -526,15 +532,15 @@ pub struct Start<'a, Y: Metriplectic> {
     pub invariants: Numbers<Y>,
     /// The round-off `H(x) − H(x₀)` that earlier steps have left, and that of the entropy, since
     /// something was dissipated, and of the further invariants.
-    pub left_over: Recall<Y>,
+    pub accumulated_error: DriftCorrection<Y>,
 }
 
 /// What a step cost.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
-pub struct Work {
+pub struct Effort {
     /// Linear systems solved by Newton's method.
-    pub sweeps: usize,
+    pub iterations: usize,
     /// How often the step, or a part of it, was split in halves.
     pub splits: usize,
     /// How often a step was approached through smaller ones from the same start.
@@ -556,10 +562,10 @@ pub struct Work {
     pub entropy: f64,
 }
 
-impl Default for Work {
+impl Default for Effort {
     fn default() -> Self {
         Self {
-            sweeps: 0,
+            iterations: 0,
             splits: 0,
             continued: 0,
             globalised: 0,
@@ -579,7 +585,7 @@ fn explicit<Y: Metriplectic>(system: &Y, start: &Start<'_, Y>) -> Option<Vector<
     displacement.is_finite().then_some(displacement)
 }
 
-/// The shares `φ e` of the left-over errors `e` that the step takes back.
+/// The fractions `φ e` of the left-over errors `e` that the step takes back.
 ///
 /// What the solver leaves in each step would make the energy a random walk over millions of them, so
 /// a step aims at `H(x₀)` instead of `H(x)`, once they differ by more than a few units of round-off.
@@ -591,25 +597,31 @@ fn explicit<Y: Metriplectic>(system: &Y, start: &Start<'_, Y>) -> Option<Vector<
 /// For the energy `δ_i = h Σ_j (|Π| + |K'|)_ij |♭d_j| |e|/G(d, d)`. The covectors of the entropy and of the
 /// further invariants enter by the projections, where `Σ|∂_iF δ_i| = |e|`, and that of the entropy by `K` as
 /// well.
-fn recall<Y: Metriplectic>(system: &Y, start: &Start<'_, Y>, d: &Vector<Y::Manifold>) -> Recall<Y> {
-    let Recall { energy, entropy, invariants } = start.left_over;
+fn drift_correction<Y: Metriplectic>(
+    system: &Y,
+    start: &Start<'_, Y>,
+    d: &Vector<Y::Manifold>,
+) -> DriftCorrection<Y> {
+    let DriftCorrection { energy, entropy, invariants } = start.accumulated_error;
     let far = |e: f64, size: f64| e.abs() > 4.0 * f64::EPSILON * size;
     let mut off = far(energy, start.energy.abs()) || far(entropy, start.entropy.abs());
     for k in 0..Y::Invariants::COUNT {
         off |= far(invariants[k], start.invariants[k].abs());
     }
     if !off {
-        return Recall::nothing();
+        return DriftCorrection::nothing();
     }
     let x = ChartPoint::<Y::Manifold>::centre(start.x);
     let w = differentials(system, &x);
-    let site = system.site(&x, &w.entropy);
-    let pi = system.bracket().linearise(&site, &w.energy);
+    let args = system.bracket_args(&x, &w.entropy);
+    let pi = system.bracket().linearise(&args, &w.energy);
     let k = system.dissipation().linearise(system.metric(), start.x, &w.energy, &w.entropy);
-    let (Ok(pi), Ok(k), Ok(g)) = (pi, k, system.metric().at(&x)) else { return Recall::nothing() };
+    let (Ok(pi), Ok(k), Ok(g)) = (pi, k, system.metric().at(&x)) else {
+        return DriftCorrection::nothing();
+    };
     let mut gain = pi.tensor.abs() + k.along_w.abs();
     if system.bracket().is_forced()
-        && let Ok(force) = system.bracket().linearise_force(&site, &w.energy)
+        && let Ok(force) = system.bracket().linearise_force(&args, &w.energy)
     {
         gain += force.tensor.abs();
     }
@@ -624,7 +636,7 @@ fn recall<Y: Metriplectic>(system: &Y, start: &Start<'_, Y>, d: &Vector<Y::Manif
     };
     let of_energy = moved(&w.energy, gain);
     let of_entropy = 1.0 + moved(&w.entropy, k.tensor.abs());
-    Recall {
+    DriftCorrection {
         energy: fraction(energy, start.energy.abs(), &w.energy, of_energy),
         // An entropy that has risen by round-off comes back by less than a fall in each step.
         entropy: fraction(entropy, start.entropy.abs(), &w.entropy, of_entropy)
@@ -649,7 +661,7 @@ pub struct Memory<N: Dimension> {
     pub(crate) differences: [N::Vector<f64>; DIFFERENCES],
     pub(crate) known: usize,
     pub(crate) linearised: Option<Linearisation<N>>,
-    pub(crate) carry: Option<N::Vector<f64>>,
+    pub(crate) compensation: Option<N::Vector<f64>>,
 }
 
 /// Displacements that are remembered.
@@ -674,8 +686,8 @@ impl<N: Dimension> Linearisation<N> {
     /// that the round-off is judged by are those of steps that are about as long.
     #[inline]
     fn serves(&self, h: f64, guess: &N::Vector<f64>) -> bool {
-        let share = guess.magnitude() / self.length;
-        self.h.to_bits() == h.to_bits() && self.steps < STEPS && (0.7..1.5).contains(&share)
+        let fraction = guess.magnitude() / self.length;
+        self.h.to_bits() == h.to_bits() && self.steps < STEPS && (0.7..1.5).contains(&fraction)
     }
 }
 
@@ -690,7 +702,7 @@ impl<N: Dimension> Memory<N> {
     #[must_use]
     pub fn new() -> Self {
         let differences = [N::Vector::<f64>::zero(); DIFFERENCES];
-        Self { differences, known: 0, linearised: None, carry: None }
+        Self { differences, known: 0, linearised: None, compensation: None }
     }
 
     /// The next displacement `Σ_{j<k} ∇ʲd`, on the polynomial through the last `k` of them; `k` is the
@@ -739,14 +751,14 @@ impl<N: Dimension> Memory<N> {
         M::transport_all(x, &end, &mut self.differences);
         self.known = DIFFERENCES.min(self.known + 1);
         let lost = metric.lost(x, d, &end);
-        match self.carry {
-            Some(carry) if carry.magnitude() > 0.0 => {
-                let settled = M::chart(&end, &carry);
-                self.carry = Some(lost + metric.lost(&end, &carry, &settled));
+        match self.compensation {
+            Some(compensation) if compensation.magnitude() > 0.0 => {
+                let settled = M::chart(&end, &compensation);
+                self.compensation = Some(lost + metric.lost(&end, &compensation, &settled));
                 settled
             }
             _ => {
-                self.carry = Some(lost);
+                self.compensation = Some(lost);
                 end
             }
         }

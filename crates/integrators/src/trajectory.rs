@@ -6,15 +6,17 @@ use metriplectic_dynamics::{Dissipation, Invariants, Metriplectic, SecondLaw, sy
 use metriplectic_fields::{ChartPoint, Column, Dimension, ScalarField, Space, Vector};
 use metriplectic_manifolds::{Cayley, Exponential, Manifold, Projection, Retraction, WeylMidpoint};
 
-use crate::adaptive::{Controller, Pace};
-use crate::certificate::{Certificate, Kept, round_off};
+use crate::adaptive::{Controller, StepSize};
+use crate::certificate::{Certificate, InvariantBalance, round_off};
 use crate::checkpoint::{Checkpoint, ResumeError};
 use crate::discrete_gradient::{DiscreteGradient, Gonzalez};
 use crate::error::{RunError, StepError};
-use crate::residual::{Dim, Numbers, Recall, size_of_terms};
+use crate::residual::{Dim, DriftCorrection, Numbers, size_of_terms};
 use crate::scales::{Scales, larger};
-use crate::span::{Course, ROOM, Size, SpanError};
-use crate::step::{Effort, Memory, Scheme, Start, Work, breaks_first_law, dependent_invariant};
+use crate::span::{ROOM, Schedule, Size, SpanError};
+use crate::step::{
+    Effort, Fallbacks, Memory, Scheme, Start, breaks_first_law, dependent_invariant,
+};
 
 /// A state of a run: time, point, and the two fields there.
 #[derive(Clone, Debug, PartialEq)]
@@ -115,7 +117,7 @@ pub struct Steps<'a, Y: Metriplectic, R, W = Gonzalez> {
 /// Where a run is on its course.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Progress<N: Dimension> {
-    pub(crate) pace: Pace<N>,
+    pub(crate) pace: StepSize<N>,
     /// The time at which the run started.
     pub(crate) start: f64,
     pub(crate) count: Option<usize>,
@@ -134,7 +136,7 @@ pub(crate) struct Progress<N: Dimension> {
 impl<N: Dimension> Progress<N> {
     /// Whether errors or rest are judged by the sizes of the entries.
     pub(crate) const fn judges_sizes(&self) -> bool {
-        self.rest.is_some() || matches!(self.pace, Pace::Adaptive(_))
+        self.rest.is_some() || matches!(self.pace, StepSize::Adaptive(_))
     }
 }
 
@@ -148,7 +150,7 @@ where
         scheme: Scheme<R, W>,
         system: &'a Y,
         x0: Point<Y>,
-        course: Course,
+        course: Schedule,
     ) -> Result<Self, SpanError> {
         let energy = system.energy_at(&x0);
         let entropy = system.entropy_at(&x0);
@@ -161,14 +163,14 @@ where
             entropy_gained: 0.0,
             entropy_falls: 0,
             min_entropy_slope: f64::INFINITY,
-            invariants: Kept::of(system, &x0),
+            invariants: InvariantBalance::of(system, &x0),
             max_manifold_defect: system.manifold().defect(&x0),
             steps: 0,
             smallest_step: 0.0,
             largest_step: 0.0,
             rejected: 0,
-            sweeps: 0,
-            worst_sweeps: 0,
+            iterations: 0,
+            worst_iterations: 0,
             retries: 0,
             continued: 0,
             globalised: 0,
@@ -177,11 +179,11 @@ where
             projected: system.dissipation().is_projected(),
         };
         let scales = course.span().map_or_else(Scales::zero, |span| Scales::at(system, &x0, span));
-        let Course { size, start, count, every, most, rest } = course;
+        let Schedule { size, start, count, every, most, rest } = course;
         let pace = match size {
-            Size::Fixed(h) => Pace::Fixed(h),
+            Size::Fixed(h) => StepSize::Fixed(h),
             Size::Tolerance(adaptive) => {
-                Pace::Adaptive(adaptive.controller(system, (&x0, start), &scales)?)
+                StepSize::Adaptive(adaptive.controller(system, (&x0, start), &scales)?)
             }
         };
         let (largest_velocity, ending) = (Column::zero(), None);
@@ -231,14 +233,14 @@ where
         }
         let step = self.state.step + 1;
         let Taken { point, work, h, time } = match self.progress.pace {
-            Pace::Fixed(h) => {
+            StepSize::Fixed(h) => {
                 let (scheme, system) = (&self.scheme, self.system);
                 let kept = (&self.invariants, self.entropy);
                 let start = from(&self.state, kept, &self.certificate, h);
                 let (point, work) = scheme.step(system, &start, &mut self.memory)?;
                 Taken { point, work, h, time: self.progress.start + step as f64 * h }
             }
-            Pace::Adaptive(controller) => self.controlled(controller)?,
+            StepSize::Adaptive(controller) => self.controlled(controller)?,
         };
         let next = State { step, time, energy: work.energy, entropy: work.entropy, point };
         let change = next.energy - self.certificate.initial_energy;
@@ -256,8 +258,8 @@ where
             self.account_invariants(&before)?;
         }
         let over = match self.progress.pace {
-            Pace::Fixed(_) => self.progress.count.is_some_and(|count| step >= count),
-            Pace::Adaptive(Controller { end, .. }) => self.state.time >= end,
+            StepSize::Fixed(_) => self.progress.count.is_some_and(|count| step >= count),
+            StepSize::Adaptive(Controller { end, .. }) => self.state.time >= end,
         };
         if over {
             self.progress.ending = Some(Ending::Span);
@@ -274,7 +276,7 @@ where
     /// is compiled for every system.
     #[inline(never)]
     fn controlled(&mut self, mut controller: Controller<Dim<Y>>) -> Result<Taken<Y>, StepError> {
-        let (system, time, mut work) = (self.system, self.state.time, Work::default());
+        let (system, time, mut work) = (self.system, self.state.time, Effort::default());
         let (mut tries, mut broken) = (0, None);
         loop {
             tries += 1;
@@ -299,7 +301,8 @@ where
             (work.entropy_slope, work.friction) = (f64::INFINITY, 0.0);
             let kept = (&self.invariants, self.entropy);
             let start = from::<Y>(&self.state, kept, &self.certificate, h);
-            let end = self.scheme.attempt(system, &start, &mut memory, Effort::Part, &mut work);
+            let end =
+                self.scheme.attempt(system, &start, &mut memory, Fallbacks::NewtonOnly, &mut work);
             let end = end.map_err(|lost| broken = lost.first_law(time, h).or(broken)).ok();
             let error = end.as_ref().and_then(|end| {
                 let scales = self.progress.scales.or(&Y::Manifold::scales(end));
@@ -309,7 +312,7 @@ where
                 (Some(point), Some(error)) if error <= 1.0 => {
                     controller.accept(h, error);
                     self.memory = memory;
-                    self.progress.pace = Pace::Adaptive(controller);
+                    self.progress.pace = StepSize::Adaptive(controller);
                     let time = if last { controller.end } else { time + h };
                     return Ok(Taken { point, work, h, time });
                 }
@@ -343,7 +346,7 @@ where
     /// [`SpanError::Endless`] if the course has no end.
     pub fn run(mut self) -> Result<Trajectory<Y::Manifold>, RunError<Y::Manifold>> {
         let Progress { count, mut every, most, pace, .. } = self.progress;
-        if count.is_none() && matches!(pace, Pace::Fixed(_)) {
+        if count.is_none() && matches!(pace, StepSize::Fixed(_)) {
             return Err(SpanError::Endless.into());
         }
         let room = count.map_or(ROOM, |count| (count - self.state.step.min(count)) / every);
@@ -375,9 +378,9 @@ where
     /// The further invariant that depends on the other fields at a state, as an error.
     #[cold]
     fn dependent(&self, &State { time, ref point, .. }: &State<Y::Manifold>) -> Option<StepError> {
-        let (index, share) = dependent_invariant(self.system, point)?;
+        let (index, fraction) = dependent_invariant(self.system, point)?;
         let change = self.certificate.invariants[index].max_error;
-        Some(StepError::DependentInvariants { time, index, change, share })
+        Some(StepError::DependentInvariants { time, index, change, fraction })
     }
 
     /// Enters the further invariants into the certificate.
@@ -402,7 +405,7 @@ where
     }
 
     /// Enters a step into the certificate.
-    fn account(&mut self, next: &State<Y::Manifold>, work: Work, h: f64) {
+    fn account(&mut self, next: &State<Y::Manifold>, work: Effort, h: f64) {
         let c = &mut self.certificate;
         c.smallest_step = if c.steps == 0 { h } else { c.smallest_step.min(h) };
         c.largest_step = c.largest_step.max(h);
@@ -426,8 +429,8 @@ where
         c.max_manifold_defect =
             c.max_manifold_defect.max(self.system.manifold().defect(&next.point));
         c.steps += 1;
-        c.sweeps += work.sweeps;
-        c.worst_sweeps = c.worst_sweeps.max(work.sweeps);
+        c.iterations += work.iterations;
+        c.worst_iterations = c.worst_iterations.max(work.iterations);
         c.retries += work.splits;
         c.friction = c.friction.max(work.friction);
         c.continued += work.continued;
@@ -452,7 +455,7 @@ fn thin_out<M: Space>(states: &mut Vec<State<M>>, every: usize, keeps_last: bool
 /// A step that was taken.
 struct Taken<Y: Metriplectic> {
     point: Point<Y>,
-    work: Work,
+    work: Effort,
     h: f64,
     time: f64,
 }
@@ -472,7 +475,7 @@ fn from<'a, Y: Metriplectic>(
         energy: state.energy,
         entropy: state.entropy,
         invariants: *invariants,
-        left_over: Recall {
+        accumulated_error: DriftCorrection {
             energy: state.energy - certificate.initial_energy,
             entropy: if exact { state.entropy - entropy } else { 0.0 },
             invariants: Dim::<Y>::array(|k| {
@@ -679,7 +682,7 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
         self,
         system: &Y,
         x0: Point<Y>,
-        course: impl Into<Course>,
+        course: impl Into<Schedule>,
     ) -> Result<Steps<'_, Y, R, W>, RunError<Y::Manifold>>
     where
         Y: Metriplectic,
@@ -700,7 +703,7 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
         self,
         system: &Y,
         x0: Point<Y>,
-        course: impl Into<Course>,
+        course: impl Into<Schedule>,
     ) -> Result<Trajectory<Y::Manifold>, RunError<Y::Manifold>>
     where
         Y: Metriplectic,
@@ -724,7 +727,7 @@ pub trait Run: Sized {
         self,
         system: &Y,
         x0: Point<Y>,
-        course: impl Into<Course>,
+        course: impl Into<Schedule>,
     ) -> Result<Trajectory<Y::Manifold>, RunError<Y::Manifold>>
     where
         Y: Metriplectic,
@@ -742,7 +745,7 @@ pub trait Run: Sized {
         self,
         system: &Y,
         x0: Point<Y>,
-        course: impl Into<Course>,
+        course: impl Into<Schedule>,
     ) -> Result<Steps<'_, Y, Self>, RunError<Y::Manifold>>
     where
         Y: Metriplectic,

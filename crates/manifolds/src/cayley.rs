@@ -6,7 +6,7 @@ use nalgebra::{Matrix3, Vector3};
 use crate::metric::{MetricError, stretched};
 use crate::retraction::jet_by_dual_numbers;
 use crate::rotations::{dexp_inverse, hat, orthogonal};
-use crate::{Arc, ArcJet, Nodes, PointPair, Retraction, Riemannian, Rotations, Tangent};
+use crate::{Nodes, PointPair, Retraction, Riemannian, Rotations, StepPath, StepPathJet, Tangent};
 
 /// The symmetric Cayley retraction of SO(3), for any metric:
 ///
@@ -29,28 +29,28 @@ fn cayley<D: Scalar>(a: &Vector3<D>) -> Matrix3<D> {
 }
 
 /// `R cay(a)`, orthogonal to round-off.
-fn turned<D: Scalar>(r: &Matrix3<D>, a: &Vector3<D>) -> Matrix3<D> {
+fn dg_v<D: Scalar>(r: &Matrix3<D>, a: &Vector3<D>) -> Matrix3<D> {
     orthogonal(&(r * cayley(a)))
 }
 
 impl<G: Riemannian<Rotations>> Retraction<Rotations, G> for Cayley {
-    fn arc<D: Scalar>(
+    fn step_path<D: Scalar>(
         &self,
         _: &G,
         x: &Matrix3<f64>,
         u: &Vector3<D>,
-    ) -> Result<Arc<Rotations, D>, MetricError> {
+    ) -> Result<StepPath<Rotations, D>, MetricError> {
         let half = u * D::from(0.5);
-        let middle = turned(&Rotations::constant(x), &half);
+        let middle = dg_v(&Rotations::constant(x), &half);
         let z = ChartPoint::<Rotations, D>::around(&middle);
         // The body velocity u in the frame of the chart at z.
         let d = dexp_inverse(&z.q) * u;
-        Ok(Arc { z, d, end: turned(&middle, &half) })
+        Ok(StepPath { z, d, end: dg_v(&middle, &half) })
     }
 
     fn end(&self, _: &G, x: &Matrix3<f64>, u: &Vector3<f64>) -> Result<Matrix3<f64>, MetricError> {
         let half = u * 0.5;
-        Ok(turned(&turned(x, &half), &half))
+        Ok(dg_v(&dg_v(x, &half), &half))
     }
 
     fn along(
@@ -61,16 +61,16 @@ impl<G: Riemannian<Rotations>> Retraction<Rotations, G> for Cayley {
     ) -> Result<Nodes<Rotations>, MetricError> {
         Nodes::of(|t| {
             let half = stretched::<Rotations>(&(u * 0.5), t);
-            Ok(turned(&turned(&Rotations::constant(x), &half), &half))
+            Ok(dg_v(&dg_v(&Rotations::constant(x), &half), &half))
         })
     }
 
-    fn arc_jet(
+    fn step_path_jet(
         &self,
         metric: &G,
         x: &Matrix3<f64>,
         u: &Vector3<f64>,
-    ) -> Result<ArcJet<Rotations>, MetricError> {
+    ) -> Result<StepPathJet<Rotations>, MetricError> {
         jet_by_dual_numbers(self, metric, x, u)
     }
 
@@ -80,7 +80,7 @@ impl<G: Riemannian<Rotations>> Retraction<Rotations, G> for Cayley {
         tangent: &Tangent<Rotations>,
     ) -> Result<PointPair<Rotations>, MetricError> {
         let half = tangent.vector * 0.5;
-        Ok((turned(&tangent.base, &-half), turned(&tangent.base, &half)))
+        Ok((dg_v(&tangent.base, &-half), dg_v(&tangent.base, &half)))
     }
 
     /// `d = 4 tan(θ/4)` about the axis of `xᵀy`, and `z` half way.

@@ -31,7 +31,7 @@ pub struct Euclidean<const N: usize>;
 macro_rules! components_are_velocities {
     ($n:expr) => {
         #[inline]
-        fn velocity<D: Scalar>(_: &ChartPoint<Self, D>, v: &SVector<D, $n>) -> SVector<D, $n> {
+        fn embed<D: Scalar>(_: &ChartPoint<Self, D>, v: &SVector<D, $n>) -> SVector<D, $n> {
             *v
         }
 

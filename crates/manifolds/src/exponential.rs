@@ -2,7 +2,9 @@
 
 use metriplectic_fields::{ChartPoint, Matrix, Scalar, Square, Vector};
 
-use crate::{Arc, ArcJet, Manifold, MetricError, PointPair, Retraction, Riemannian, Tangent};
+use crate::{
+    Manifold, MetricError, PointPair, Retraction, Riemannian, StepPath, StepPathJet, Tangent,
+};
 
 /// The Riemannian exponential based at the start of the step,
 ///
@@ -17,38 +19,38 @@ pub struct Exponential;
 
 impl<M: Manifold, G: Riemannian<M>> Retraction<M, G> for Exponential {
     #[inline]
-    fn arc<D: Scalar>(
+    fn step_path<D: Scalar>(
         &self,
         metric: &G,
         x: &M::Point<f64>,
         u: &Vector<M, D>,
-    ) -> Result<Arc<M, D>, MetricError> {
+    ) -> Result<StepPath<M, D>, MetricError> {
         let z = ChartPoint::centre(x);
         let (end, _) = metric.exp(&z, u)?;
-        Ok(Arc { z, d: *u, end: end.point() })
+        Ok(StepPath { z, d: *u, end: end.point() })
     }
 
     #[inline]
-    fn real_arc(
+    fn real_step_path(
         &self,
         metric: &G,
         x: &M::Point<f64>,
         u: &Vector<M>,
-    ) -> Result<Arc<M>, MetricError> {
-        // The midpoint arc ends at the same point.
-        let Arc { end, .. } = metric.weyl_arc(x, u)?;
-        Ok(Arc { z: ChartPoint::centre(x), d: *u, end })
+    ) -> Result<StepPath<M>, MetricError> {
+        // The midpoint path ends at the same point.
+        let StepPath { end, .. } = metric.weyl_arc(x, u)?;
+        Ok(StepPath { z: ChartPoint::centre(x), d: *u, end })
     }
 
-    fn arc_jet(
+    fn step_path_jet(
         &self,
         metric: &G,
         x: &M::Point<f64>,
         u: &Vector<M>,
-    ) -> Result<ArcJet<M>, MetricError> {
-        let ArcJet { end, dend, .. } = metric.weyl_jet(x, u)?;
+    ) -> Result<StepPathJet<M>, MetricError> {
+        let StepPathJet { end, dend, .. } = metric.weyl_jet(x, u)?;
         let (zero, one) = (Matrix::<M>::zeros(), Matrix::<M>::one());
-        Ok(ArcJet { z: x.clone(), dz: zero, d: *u, dd: one, end, dend })
+        Ok(StepPathJet { z: x.clone(), dz: zero, d: *u, dd: one, end, dend })
     }
 
     fn pair(&self, metric: &G, tangent: &Tangent<M>) -> Result<PointPair<M>, MetricError> {

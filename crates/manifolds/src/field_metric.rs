@@ -9,7 +9,7 @@ use metriplectic_fields::{
 
 use crate::geodesic::{self, GeodesicJet};
 use crate::metric::{Factored, GeodesicEnd, MetricError, finite};
-use crate::{Arc, ArcJet, Manifold, Riemannian};
+use crate::{Manifold, Riemannian, StepPath, StepPathJet};
 
 /// A metric given as a matrix field; see [`Metric::field`](crate::Metric::field).
 #[derive(Clone, Copy)]
@@ -49,15 +49,15 @@ impl<M: Manifold, F: MatrixField<M>> Riemannian<M> for FieldMetric<F> {
     }
 
     fn end(&self, x: &M::Point<f64>, v: &Vector<M>) -> Result<M::Point<f64>, MetricError> {
-        // With the very roundings of a step's arc, whose energy a step has been solved for.
+        // With the very roundings of a step's path, whose energy a step has been solved for.
         Ok(self.weyl_arc(x, v)?.end)
     }
 
-    fn weyl_arc(&self, x: &M::Point<f64>, d: &Vector<M>) -> Result<Arc<M>, MetricError> {
+    fn weyl_arc(&self, x: &M::Point<f64>, d: &Vector<M>) -> Result<StepPath<M>, MetricError> {
         let (z, velocity) =
             geodesic::follow_real(&self.field, x, &(*d * 0.5)).map_err(on_first_half)?;
         let (end, _) = geodesic::follow_real(&self.field, &z, &velocity).map_err(on_second_half)?;
-        Ok(Arc { z: ChartPoint::centre(&z), d: velocity * 2.0, end })
+        Ok(StepPath { z: ChartPoint::centre(&z), d: velocity * 2.0, end })
     }
 
     fn along(
@@ -89,7 +89,7 @@ impl<M: Manifold, F: MatrixField<M>> Riemannian<M> for FieldMetric<F> {
         shoot(self, x, y)
     }
 
-    fn weyl_jet(&self, x: &M::Point<f64>, d: &Vector<M>) -> Result<ArcJet<M>, MetricError> {
+    fn weyl_jet(&self, x: &M::Point<f64>, d: &Vector<M>) -> Result<StepPathJet<M>, MetricError> {
         let half = GeodesicJet {
             point: x.clone(),
             velocity: *d * 0.5,
@@ -98,14 +98,14 @@ impl<M: Manifold, F: MatrixField<M>> Riemannian<M> for FieldMetric<F> {
         };
         let z = geodesic::follow_jet(&self.field, &half).map_err(on_first_half)?;
         let end = geodesic::follow_jet(&self.field, &z).map_err(on_second_half)?;
-        // The arc itself is the one without derivatives, with its roundings.
-        let arc = self.weyl_arc(x, d)?;
-        Ok(ArcJet {
-            z: arc.z.base,
+        // The path itself is the one without derivatives, with its roundings.
+        let path = self.weyl_arc(x, d)?;
+        Ok(StepPathJet {
+            z: path.z.base,
             dz: z.dpoint,
-            d: arc.d,
+            d: path.d,
             dd: z.dvelocity * 2.0,
-            end: arc.end,
+            end: path.end,
             dend: end.dpoint,
         })
     }
@@ -221,7 +221,7 @@ fn hit<M: Manifold, G: Riemannian<M>>(
         if shots.get() > SHOTS {
             return Err(MetricError::NoLogarithm { distance: size, missed_by: size });
         }
-        let ArcJet { end, dend, .. } = metric.weyl_jet(x, v)?;
+        let StepPathJet { end, dend, .. } = metric.weyl_jet(x, v)?;
         Ok::<_, MetricError>((M::coordinates(&end, y), dend))
     };
     let mut v = *aim;
@@ -393,13 +393,13 @@ mod tests {
         // Half a turn has two straight lines, and which one is found would be a matter of rounding.
         let body = Metric::field(|_: &Matrix3<Real>| Matrix3::identity());
         let r = rotations::exp(&vector![0.3, -0.2, 0.5]);
-        let turned = |angle: f64| r * rotations::exp(&(vector![2.0, -1.0, 2.0] / 3.0 * angle));
-        let log = Riemannian::<Rotations>::log(&body, &r, &turned(PI));
+        let dg_v = |angle: f64| r * rotations::exp(&(vector![2.0, -1.0, 2.0] / 3.0 * angle));
+        let log = Riemannian::<Rotations>::log(&body, &r, &dg_v(PI));
         assert!(
             matches!(log, Err(MetricError::OutOfChart { distance }) if (distance - PI).abs() < 1e-14)
         );
-        assert!(Riemannian::<Rotations>::log(&Canonical, &r, &turned(PI)).is_err());
-        let log = Riemannian::<Rotations>::log(&body, &r, &turned(PI - 1e-9)).unwrap();
+        assert!(Riemannian::<Rotations>::log(&Canonical, &r, &dg_v(PI)).is_err());
+        let log = Riemannian::<Rotations>::log(&body, &r, &dg_v(PI - 1e-9)).unwrap();
         assert!((log.norm() - (PI - 1e-9)).abs() < 1e-12);
     }
 
@@ -440,7 +440,7 @@ mod tests {
         let reached = |t: f64| (t - 4.0 / 15.0).abs() < 1e-4;
         let error = Riemannian::<Euclidean<2>>::end(&slit, &x, &v).unwrap_err();
         assert!(matches!(error, MetricError::Edge { time } if reached(time)), "{error}");
-        // In the first and in the second half of an arc, and on the way to an inner point.
+        // In the first and in the second half of a path, and on the way to an inner point.
         let error = Riemannian::<Euclidean<2>>::weyl_jet(&slit, &x, &v).unwrap_err();
         assert!(matches!(error, MetricError::Edge { time } if reached(time)), "{error}");
         let error = Riemannian::<Euclidean<2>>::weyl_arc(&slit, &x, &(v / 3.0)).unwrap_err();

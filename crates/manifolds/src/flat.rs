@@ -4,7 +4,7 @@ use metriplectic_fields::{ChartPoint, Dimension, Matrix, Real, Scalar, Space, Sq
 use nalgebra::{Const, SMatrix};
 
 use crate::metric::{Factored, GeodesicEnd, MetricError, finite_column, stretched};
-use crate::{Arc, ArcJet, Canonical, Riemannian};
+use crate::{Canonical, Riemannian, StepPath, StepPathJet};
 
 /// A manifold whose charts are global and linear: straight lines are the geodesics of every metric
 /// that is constant in them.
@@ -49,14 +49,18 @@ macro_rules! straight_geodesics {
         }
 
         #[inline]
-        fn weyl_arc(&self, x: &M::Point<f64>, d: &Vector<M>) -> Result<Arc<M>, MetricError> {
+        fn weyl_arc(&self, x: &M::Point<f64>, d: &Vector<M>) -> Result<StepPath<M>, MetricError> {
             let z = ChartPoint::centre(&M::chart(x, &(*d * 0.5)));
-            Ok(Arc { z, d: *d, end: M::chart(x, d) })
+            Ok(StepPath { z, d: *d, end: M::chart(x, d) })
         }
 
         #[inline]
-        fn weyl_jet(&self, x: &M::Point<f64>, d: &Vector<M>) -> Result<ArcJet<M>, MetricError> {
-            Ok(ArcJet::straight(x, d))
+        fn weyl_jet(
+            &self,
+            x: &M::Point<f64>,
+            d: &Vector<M>,
+        ) -> Result<StepPathJet<M>, MetricError> {
+            Ok(StepPathJet::straight(x, d))
         }
 
         fn slopes(&self, _: &M::Point<f64>) -> Option<<M::Dim as Dimension>::Array<Matrix<M>>> {
@@ -78,7 +82,7 @@ impl<M: Flat> Riemannian<M> for Canonical {
     }
 
     #[inline]
-    fn volume<D: Scalar>(&self, _: &ChartPoint<M, D>) -> Result<D, MetricError> {
+    fn volume_density<D: Scalar>(&self, _: &ChartPoint<M, D>) -> Result<D, MetricError> {
         Ok(D::one())
     }
 

@@ -179,7 +179,7 @@ fn rate_of_bundle<M: Space>(
     let factors = part::<M>(&first, |g| g.re).factor()?;
     let v = factors.solve(&at.p)?;
     // Columns (∂_k g) v, and the symmetric matrix ½ vᵀ (∂_j ∂_k g) v.
-    let (mut turned, mut bend) = (Matrix::<M>::zeros(), Matrix::<M>::zeros());
+    let (mut dg_v, mut bend) = (Matrix::<M>::zeros(), Matrix::<M>::zeros());
     for k in 0..n {
         for j in k..n {
             let g = if (j, k) == (0, 0) { first } else { seeded(field, x, &at.q, [k, j]) };
@@ -188,13 +188,13 @@ fn rate_of_bundle<M: Space>(
             if j == k {
                 let column = part::<M>(&g, |g| g.eps1) * v;
                 for i in 0..n {
-                    turned[(i, k)] = column[i];
+                    dg_v[(i, k)] = column[i];
                 }
             }
         }
     }
-    let force = turned.transpose_times(&v) * 0.5;
-    let (lag, mut dv) = (*dp - turned * *dq, Matrix::<M>::zeros());
+    let force = dg_v.transpose_times(&v) * 0.5;
+    let (lag, mut dv) = (*dp - dg_v * *dq, Matrix::<M>::zeros());
     for k in 0..n {
         let column = Vector::<M>::from_index(|i| lag[(i, k)]);
         let column = factors.solve(&column)?;
@@ -202,7 +202,7 @@ fn rate_of_bundle<M: Space>(
             dv[(i, k)] = column[i];
         }
     }
-    let transposed = Matrix::<M>::from_entries(|i, j| turned[(j, i)]);
+    let transposed = Matrix::<M>::from_entries(|i, j| dg_v[(j, i)]);
     Some(Bundle {
         at: Phase { q: v, p: force, size: at.size },
         dq: dv,
@@ -412,7 +412,7 @@ pub(crate) fn follow_jet<M: Manifold>(
 }
 
 /// Columns `(∂_k g) v` at a real point of a chart, with `g` itself.
-fn turned<M: Space>(
+fn dg_v<M: Space>(
     field: &impl MatrixField<M>,
     x: &M::Point<f64>,
     q: &Vector<M>,
@@ -428,11 +428,11 @@ fn into_momenta<M: Space>(
     jet: &GeodesicJet<M>,
     size: f64,
 ) -> Bundle<M> {
-    let (g, turned) = turned(field, &jet.point, &Vector::<M>::zero(), &jet.velocity);
+    let (g, dg_v) = dg_v(field, &jet.point, &Vector::<M>::zero(), &jet.velocity);
     Bundle {
         at: Phase { q: Vector::<M>::zero(), p: g * jet.velocity, size },
         dq: jet.dpoint,
-        dp: g * jet.dvelocity + turned * jet.dpoint,
+        dp: g * jet.dvelocity + dg_v * jet.dpoint,
     }
 }
 
@@ -442,11 +442,11 @@ fn into_velocities<M: Space>(
     x: &M::Point<f64>,
     y: &Bundle<M>,
 ) -> Option<GeodesicJet<M>> {
-    let (g, _) = turned(field, x, &y.at.q, &Vector::<M>::zero());
+    let (g, _) = dg_v(field, x, &y.at.q, &Vector::<M>::zero());
     let factors = g.factor()?;
     let velocity = factors.solve(&y.at.p)?;
-    let (_, turned) = turned(field, x, &y.at.q, &velocity);
-    let lag = y.dp - turned * y.dq;
+    let (_, dg_v) = dg_v(field, x, &y.at.q, &velocity);
+    let lag = y.dp - dg_v * y.dq;
     let mut dvelocity = Matrix::<M>::zeros();
     for k in 0..M::Dim::LEN {
         let column = Vector::<M>::from_index(|i| lag[(i, k)]);
@@ -489,6 +489,6 @@ pub(crate) fn acceleration<M: Space>(
     x: &M::Point<f64>,
     v: &Vector<M>,
 ) -> Option<Vector<M>> {
-    let (g, turned) = turned(field, x, &Vector::<M>::zero(), v);
-    g.solve(&(turned.transpose_times(v) * 0.5 - turned * *v))
+    let (g, dg_v) = dg_v(field, x, &Vector::<M>::zero(), v);
+    g.solve(&(dg_v.transpose_times(v) * 0.5 - dg_v * *v))
 }

@@ -63,7 +63,7 @@ impl Space for HalfLine {
 
     /// `s' = s e^q v`.
     #[inline]
-    fn velocity<D: Scalar>(at: &ChartPoint<Self, D>, v: &Vector1<D>) -> Vector1<D> {
+    fn embed<D: Scalar>(at: &ChartPoint<Self, D>, v: &Vector1<D>) -> Vector1<D> {
         at.point() * v.x
     }
 }

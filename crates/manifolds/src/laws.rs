@@ -111,7 +111,7 @@ pub fn metric<M: Manifold, G: Riemannian<M>>(
     let off = relative(orthonormal - square, square);
     BrokenLaw::unless("|L⁻¹♭v|² = G(v, v)", off, round_off::<M>(1.0) * condition::<M>(&g))?;
 
-    let volume = usable("g is positive", metric.volume(&centre))?;
+    let volume = usable("g is positive", metric.volume_density(&centre))?;
     let root = g.root_determinant().map_err(|_| BrokenLaw {
         law: "g is positive",
         size: f64::NAN,
@@ -157,8 +157,8 @@ fn square_of<V: Column<f64>>(v: &V) -> f64 {
 
 /// Checks a retraction at `x` with the displacement `u`:
 ///
-/// 1. `R_h⁻¹(R_h(d)) = d`; 2. the arc from `x` is the pair of its own `(z, d)`; 3. `real_arc` is the same
-///    arc, and `arc_jet` the derivative of `arc` at dual numbers; 4. consistency, `x' − x = d + O(|d|²)`.
+/// 1. `R_h⁻¹(R_h(d)) = d`; 2. the path from `x` is the pair of its own `(z, d)`; 3. `real_step_path` is the same
+///    path, and `step_path_jet` the derivative of `path` at dual numbers; 4. consistency, `x' − x = d + O(|d|²)`.
 ///
 /// # Errors
 ///
@@ -179,30 +179,30 @@ pub fn retraction<M: Manifold, G: Riemannian<M>, R: Retraction<M, G>>(
     let round_off = round_off::<M>(chart_size::<M>(x));
     BrokenLaw::unless("x' − x = d + O(|d|²)", apart(1e-3)?, 0.05 * apart(1e-2)? + round_off)?;
     let bound = 1e-12 * (chart_size::<M>(x) + u.magnitude());
-    let jet = usable(exists, retraction.arc_jet(metric, x, u))?;
+    let jet = usable(exists, retraction.step_path_jet(metric, x, u))?;
     let tangent = Tangent { base: jet.z.clone(), vector: jet.d };
     let (start, end) = usable(exists, retraction.pair(metric, &tangent))?;
     let off = M::coordinates(x, &start).magnitude();
-    BrokenLaw::unless("the arc starts where its pair does", off, bound)?;
+    BrokenLaw::unless("the path starts where its pair does", off, bound)?;
     let off = M::coordinates(&jet.end, &end).magnitude();
-    BrokenLaw::unless("the arc ends where its pair does", off, bound)?;
+    BrokenLaw::unless("the path ends where its pair does", off, bound)?;
     let alone: M::Point<f64> = usable(exists, retraction.end(metric, x, u))?;
     let off = M::coordinates(&jet.end, &alone).magnitude();
-    BrokenLaw::unless("the end alone is the end of the arc", off, bound)?;
-    let real = usable(exists, retraction.real_arc(metric, x, u))?;
+    BrokenLaw::unless("the end alone is the end of the path", off, bound)?;
+    let real = usable(exists, retraction.real_step_path(metric, x, u))?;
     let off = M::coordinates(&jet.z, &real.z.point()).magnitude();
-    BrokenLaw::unless("the real arc has the base point of its jet", off, bound)?;
+    BrokenLaw::unless("the real path has the base point of its jet", off, bound)?;
     let off = (real.d - jet.d).magnitude() + M::coordinates(&jet.end, &real.end).magnitude();
-    BrokenLaw::unless("the real arc is that of its jet", off, bound)?;
+    BrokenLaw::unless("the real path is that of its jet", off, bound)?;
     let back = usable(exists, retraction.inverse(metric, &start, &end))?;
     same("R_h⁻¹ R_h = 1", &back, &tangent, bound)?;
 
     for k in 0..M::Dim::LEN {
         let seeded =
             Vector::<M, Dual64>::from_index(|i| Dual64::new(u[i], if i == k { 1.0 } else { 0.0 }));
-        let arc = usable(exists, retraction.arc(metric, x, &seeded))?;
-        let end = M::coordinates(&jet.end, &arc.end);
-        let z = M::coordinates(&jet.z, &arc.z.point());
+        let path = usable(exists, retraction.step_path(metric, x, &seeded))?;
+        let end = M::coordinates(&jet.end, &path.end);
+        let z = M::coordinates(&jet.z, &path.z.point());
         let off = |dual: &Vector<M, Dual64>, slope: &Matrix<M>| {
             let column = Vector::<M>::from_index(|i| dual[i].eps - slope[(i, k)]);
             column.magnitude()
@@ -211,7 +211,7 @@ pub fn retraction<M: Manifold, G: Riemannian<M>, R: Retraction<M, G>>(
         // variational equations, which grow along the way and are not what the steps are chosen by.
         let bound = 1e-10 * (1.0 + pure::<M>(x, u.magnitude()));
         BrokenLaw::unless("∂z/∂u is the derivative of z", off(&z, &jet.dz), bound)?;
-        BrokenLaw::unless("∂d/∂u is the derivative of d", off(&arc.d, &jet.dd), bound)?;
+        BrokenLaw::unless("∂d/∂u is the derivative of d", off(&path.d, &jet.dd), bound)?;
         BrokenLaw::unless("∂x'/∂u is the derivative of x'", off(&end, &jet.dend), bound)?;
     }
     Ok(())

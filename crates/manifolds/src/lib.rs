@@ -60,7 +60,7 @@ pub use manifold::{Manifold, PointError};
 pub use metric::{Canonical, GeodesicEnd, InnerProduct, Metric, MetricError, Riemannian};
 pub use product::{Product, Split, Times};
 pub use projection::Projection;
-pub use retraction::{Arc, ArcJet, Nodes, PointPair, Retraction, Tangent};
+pub use retraction::{Nodes, PointPair, Retraction, StepPath, StepPathJet, Tangent};
 pub use rotations::Rotations;
 pub use sphere::Sphere;
 pub use weyl_midpoint::WeylMidpoint;

@@ -2,7 +2,7 @@
 //!
 //! # Why points do not drift
 //!
-//! The unknown of a step is a tangent vector `u` at `x`, and its end is the end of an arc, `φ_x(u)` for a
+//! The unknown of a step is a tangent vector `u` at `x`, and its end is the end of a path, `φ_x(u)` for a
 //! geodesic in a normal chart. On a curved space the chart itself ends on the manifold: its last operation is
 //! one step of Newton's iteration for `|x| = 1` or `RᵀR = 1`, which squares a defect of round-off. The
 //! equation of the step has `H` and `S` at that very end in it. So the point that a run keeps is the one

@@ -9,12 +9,12 @@ use metriplectic_fields::{
 };
 use nalgebra::SMatrix;
 
-use crate::{Arc, ArcJet, Constant, FieldMetric};
+use crate::{Constant, FieldMetric, StepPath, StepPathJet};
 
 /// The metric at one point: an inner product `G(u, v) = uᵀ g v` on tangent vectors, factored as
 /// `g = L Lᵀ`.
 ///
-/// Laws: 1. `sharp` undoes `flat`; 2. `raise(orthonormal(α)) = sharp(α)`;
+/// Laws: 1. `sharp` undoes `flat`; 2. `from_orthonormal(orthonormal(α)) = sharp(α)`;
 /// 3. `orthonormal(α)·orthonormal(β) = G*(α, β)`.
 pub trait InnerProduct<V>: Copy {
     /// The covector `♭v = g v`.
@@ -24,12 +24,12 @@ pub trait InnerProduct<V>: Copy {
     fn orthonormal(&self, alpha: &V) -> V;
 
     /// The vector `L⁻ᵀ a` with the orthonormal components `a`.
-    fn raise(&self, a: &V) -> V;
+    fn from_orthonormal(&self, a: &V) -> V;
 
     /// The vector `♯α = g⁻¹α`.
     #[inline]
     fn sharp(&self, alpha: &V) -> V {
-        self.raise(&self.orthonormal(alpha))
+        self.from_orthonormal(&self.orthonormal(alpha))
     }
 }
 
@@ -44,7 +44,7 @@ pub type GeodesicEnd<M, D> = (ChartPoint<M, D>, Vector<M, D>);
 ///
 /// Laws ([`laws::metric`](crate::laws::metric)): 1. `g` is symmetric; 2. and positive; 3. the laws
 /// of its inner product; 4. `exp_x(0) = x`; 5. geodesics have constant speed; 6. `weyl_jet` is the
-/// derivative of the midpoint arc.
+/// derivative of the midpoint path.
 #[diagnostic::on_unimplemented(
     message = "`{Self}` is not a metric on `{M}`",
     note = "a metric is `Metric::constant(matrix)?`, or `Metric::field(closure)` with a closure from a point over `Real` to the symmetric matrix g"
@@ -110,17 +110,17 @@ pub trait Riemannian<M: Space> {
     ///
     /// Those of [`exp`](Self::exp).
     #[inline]
-    fn weyl_arc(&self, x: &M::Point<f64>, d: &Vector<M>) -> Result<Arc<M>, MetricError> {
-        let ArcJet { z, d, end, .. } = self.weyl_jet(x, d)?;
-        Ok(Arc { z: ChartPoint::centre(&z), d, end })
+    fn weyl_arc(&self, x: &M::Point<f64>, d: &Vector<M>) -> Result<StepPath<M>, MetricError> {
+        let StepPathJet { z, d, end, .. } = self.weyl_jet(x, d)?;
+        Ok(StepPath { z: ChartPoint::centre(&z), d, end })
     }
 
-    /// The same arc, with the derivatives along `d`.
+    /// The same path, with the derivatives along `d`.
     ///
     /// # Errors
     ///
     /// Those of [`exp`](Self::exp).
-    fn weyl_jet(&self, x: &M::Point<f64>, d: &Vector<M>) -> Result<ArcJet<M>, MetricError>;
+    fn weyl_jet(&self, x: &M::Point<f64>, d: &Vector<M>) -> Result<StepPathJet<M>, MetricError>;
 
     /// The length `√G(v, v)` of a tangent vector at a real point.
     ///
@@ -186,7 +186,7 @@ pub trait Riemannian<M: Space> {
     /// # Errors
     ///
     /// [`MetricError`] if the matrix is not symmetric and positive.
-    fn volume<D: Scalar>(&self, x: &ChartPoint<M, D>) -> Result<D, MetricError> {
+    fn volume_density<D: Scalar>(&self, x: &ChartPoint<M, D>) -> Result<D, MetricError> {
         finite("√det g", self.matrix(x).root_determinant()?)
     }
 
@@ -211,7 +211,7 @@ impl<V: Copy> InnerProduct<V> for Canonical {
     }
 
     #[inline]
-    fn raise(&self, a: &V) -> V {
+    fn from_orthonormal(&self, a: &V) -> V {
         *a
     }
 }
@@ -254,7 +254,7 @@ impl<N: Dimension, D: Scalar> InnerProduct<N::Vector<D>> for Factored<N, D> {
     }
 
     #[inline]
-    fn raise(&self, a: &N::Vector<D>) -> N::Vector<D> {
+    fn from_orthonormal(&self, a: &N::Vector<D>) -> N::Vector<D> {
         self.l.solve_lower_transpose(a)
     }
 }
@@ -315,7 +315,7 @@ impl Metric {
 
     /// The metric `G(u, v) = θ(u)·A(x) θ(v)` from a closure `A` or any other
     /// [`MatrixField`](metriplectic_fields::MatrixField), with `θ` the
-    /// [`velocity`](metriplectic_fields::Space::velocity) of a tangent vector:
+    /// [`velocity`](metriplectic_fields::Space::embed) of a tangent vector:
     ///
     /// | on | a velocity is | the closure returns |
     /// |---|---|---|
@@ -441,7 +441,7 @@ pub enum MetricError {
          finite number; take a smaller step, or a metric in which the edge is far"
     )]
     Edge {
-        /// The share of the way that was followed.
+        /// The fraction of the way that was followed.
         time: f64,
     },
     /// A geodesic comes to a place where its metric is not positive.
@@ -450,7 +450,7 @@ pub enum MetricError {
          leave the place out of the domain"
     )]
     Degenerate {
-        /// The share of the way that was followed.
+        /// The fraction of the way that was followed.
         time: f64,
         /// The pivot.
         not_positive: NotPositive,
@@ -461,7 +461,7 @@ pub enum MetricError {
          uneven to go on; take a smaller step, and look for what is not smooth in the metric"
     )]
     Uneven {
-        /// The share of the way that was followed.
+        /// The fraction of the way that was followed.
         time: f64,
         /// The pieces that were tried.
         pieces: usize,
@@ -499,9 +499,9 @@ impl MetricError {
         Some(if edge { Self::Edge { time } } else { Self::Degenerate { time, not_positive } })
     }
 
-    /// The error on a part of a way that begins at `start` and has the length `share`.
-    pub(crate) fn on_part(self, start: f64, share: f64) -> Self {
-        let whole = |time| start + share * time;
+    /// The error on a part of a way that begins at `start` and has the length `fraction`.
+    pub(crate) fn on_part(self, start: f64, fraction: f64) -> Self {
+        let whole = |time| start + fraction * time;
         match self {
             Self::Edge { time } => Self::Edge { time: whole(time) },
             Self::Degenerate { time, not_positive } => {

@@ -33,7 +33,7 @@ impl<D: Scalar, const N: usize> Normal<D, N> {
 
     /// The density `√det g = σⁿ⁻¹`.
     #[inline]
-    pub(crate) fn volume(&self) -> D {
+    pub(crate) fn volume_density(&self) -> D {
         (1..N).fold(D::one(), |product, _| product * self.across)
     }
 
@@ -62,7 +62,7 @@ impl<D: Scalar, const N: usize> InnerProduct<SVector<D, N>> for Normal<D, N> {
     }
 
     #[inline]
-    fn raise(&self, a: &SVector<D, N>) -> SVector<D, N> {
+    fn from_orthonormal(&self, a: &SVector<D, N>) -> SVector<D, N> {
         self.orthonormal(a)
     }
 }

@@ -28,7 +28,9 @@ use metriplectic_fields::{
 use rand::Rng;
 
 use crate::metric::GeodesicEnd;
-use crate::{Arc, ArcJet, Canonical, InnerProduct, Manifold, MetricError, PointError, Riemannian};
+use crate::{
+    Canonical, InnerProduct, Manifold, MetricError, PointError, Riemannian, StepPath, StepPathJet,
+};
 
 /// The product `A × B`: a state with two parts, such as a direction with an internal energy
 /// (`S² × R`) or an attitude with an angular momentum (`SO(3) × R³`). A factor may be a product again.
@@ -137,9 +139,9 @@ impl<A: Times<B>, B: Space> Space for Product<A, B> {
     }
 
     #[inline]
-    fn velocity<D: Scalar>(x: &ChartPoint<Self, D>, v: &Vector<Self, D>) -> Velocity<Self, D> {
+    fn embed<D: Scalar>(x: &ChartPoint<Self, D>, v: &Vector<Self, D>) -> Velocity<Self, D> {
         let ((xa, xb), (va, vb)) = (Self::parts(x), Self::split(v));
-        stack(&A::velocity(&xa, &va), &B::velocity(&xb, &vb))
+        stack(&A::embed(&xa, &va), &B::embed(&xb, &vb))
     }
 
     #[inline]
@@ -278,9 +280,9 @@ where
     }
 
     #[inline]
-    fn raise(&self, alpha: &Vector<Product<A, B>, D>) -> Vector<Product<A, B>, D> {
+    fn from_orthonormal(&self, alpha: &Vector<Product<A, B>, D>) -> Vector<Product<A, B>, D> {
         let (a, b) = Product::<A, B>::split(alpha);
-        Product::<A, B>::join(&self.left.raise(&a), &self.right.raise(&b))
+        Product::<A, B>::join(&self.left.from_orthonormal(&a), &self.right.from_orthonormal(&b))
     }
 }
 
@@ -309,9 +311,12 @@ macro_rules! metric_of_the_factors {
             Product::<A, B>::block(&g.matrix(&a), &f.matrix(&b))
         }
 
-        fn volume<D: Scalar>(&self, x: &ChartPoint<Product<A, B>, D>) -> Result<D, MetricError> {
+        fn volume_density<D: Scalar>(
+            &self,
+            x: &ChartPoint<Product<A, B>, D>,
+        ) -> Result<D, MetricError> {
             let ((g, f), (a, b)) = (Split::<A, B>::halves(self), Product::parts(x));
-            Ok(g.volume(&a)? * f.volume(&b)?)
+            Ok(g.volume_density(&a)? * f.volume_density(&b)?)
         }
 
         fn exp<D: Scalar>(
@@ -362,13 +367,13 @@ macro_rules! metric_of_the_factors {
             &self,
             x: &(A::Point<f64>, B::Point<f64>),
             d: &Vector<Product<A, B>>,
-        ) -> Result<Arc<Product<A, B>>, MetricError> {
+        ) -> Result<StepPath<Product<A, B>>, MetricError> {
             let ((g, f), (da, db)) = (Split::<A, B>::halves(self), Product::<A, B>::split(d));
             let (a, b) = (
                 Riemannian::<A>::weyl_arc(g, &x.0, &da)?,
                 Riemannian::<B>::weyl_arc(f, &x.1, &db)?,
             );
-            Ok(Arc {
+            Ok(StepPath {
                 z: ChartPoint {
                     base: (a.z.base, b.z.base),
                     q: Product::<A, B>::join(&a.z.q, &b.z.q),
@@ -382,13 +387,13 @@ macro_rules! metric_of_the_factors {
             &self,
             x: &(A::Point<f64>, B::Point<f64>),
             d: &Vector<Product<A, B>>,
-        ) -> Result<ArcJet<Product<A, B>>, MetricError> {
+        ) -> Result<StepPathJet<Product<A, B>>, MetricError> {
             let ((g, f), (da, db)) = (Split::<A, B>::halves(self), Product::<A, B>::split(d));
             let (a, b) = (
                 Riemannian::<A>::weyl_jet(g, &x.0, &da)?,
                 Riemannian::<B>::weyl_jet(f, &x.1, &db)?,
             );
-            Ok(ArcJet {
+            Ok(StepPathJet {
                 z: (a.z, b.z),
                 dz: Product::<A, B>::block(&a.dz, &b.dz),
                 d: Product::<A, B>::join(&a.d, &b.d),

@@ -7,7 +7,7 @@ use num_dual::Dual;
 use crate::metric::{MetricError, finite_column, stretched, within};
 use crate::retraction::jet_by_dual_numbers;
 use crate::sphere::{angle, components, frame, normalised, spread};
-use crate::{Arc, ArcJet, Nodes, PointPair, Retraction, Riemannian, Sphere, Tangent};
+use crate::{Nodes, PointPair, Retraction, Riemannian, Sphere, StepPath, StepPathJet, Tangent};
 
 /// The symmetric projection retraction of Sⁿ, for any metric:
 ///
@@ -23,7 +23,7 @@ use crate::{Arc, ArcJet, Nodes, PointPair, Retraction, Riemannian, Sphere, Tange
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Projection;
 
-/// The arc from `x` whose displacement is `U` at `x` and `d` at `z`, by the rotation in the plane of the
+/// The path from `x` whose displacement is `U` at `x` and `d` at `z`, by the rotation in the plane of the
 /// two: with `s = |U|²/4`, `z = (x + U/2)/√(1+s)`, `d = (U − 2s x)/√(1+s)` and
 /// `x' = ((1 − s) x + U)/(1 + s)`.
 struct Ambient<D: Scalar, const A: usize> {
@@ -48,18 +48,18 @@ impl<D: Scalar, const A: usize> Ambient<D, A> {
 macro_rules! projection {
     ($n:literal in $a:literal) => {
         impl<G: Riemannian<Sphere<$n>>> Retraction<Sphere<$n>, G> for Projection {
-            fn arc<D: Scalar>(
+            fn step_path<D: Scalar>(
                 &self,
                 _: &G,
                 x: &SVector<f64, $a>,
                 u: &SVector<D, $n>,
-            ) -> Result<Arc<Sphere<$n>, D>, MetricError> {
+            ) -> Result<StepPath<Sphere<$n>, D>, MetricError> {
                 let ambient = Ambient::new(x, &spread(&frame::<$a, $n>(x), u));
                 // The chart at the base reads its velocity by one more dual number.
                 let base = Column::real(&normalised(&ambient.z));
                 let q = Sphere::<$n>::coordinates(&base, &ambient.z.zip_map(&ambient.d, Dual::new));
                 let z = ChartPoint { base, q: q.map(|q| q.re) };
-                Ok(Arc { z, d: q.map(|q| q.eps), end: normalised(&ambient.end) })
+                Ok(StepPath { z, d: q.map(|q| q.eps), end: normalised(&ambient.end) })
             }
 
             fn end(
@@ -84,12 +84,12 @@ macro_rules! projection {
                 })
             }
 
-            fn arc_jet(
+            fn step_path_jet(
                 &self,
                 metric: &G,
                 x: &SVector<f64, $a>,
                 u: &SVector<f64, $n>,
-            ) -> Result<ArcJet<Sphere<$n>>, MetricError> {
+            ) -> Result<StepPathJet<Sphere<$n>>, MetricError> {
                 jet_by_dual_numbers(self, metric, x, u)
             }
 

@@ -13,42 +13,42 @@ use crate::{Manifold, MetricError, Riemannian};
 ///
 /// Everything here is written in the displacement `d = hv`, so no step size appears.
 ///
-/// Laws ([`laws::retraction`](crate::laws::retraction)): 1. `R_h⁻¹ R_h = 1`; 2. the arc from `x`
-/// ends where the pair does; 3. `real_arc` is `arc`, and `arc_jet` its derivative; 4. a symmetric one returns
+/// Laws ([`laws::retraction`](crate::laws::retraction)): 1. `R_h⁻¹ R_h = 1`; 2. the path from `x`
+/// ends where the pair does; 3. `real_step_path` is `path`, and `step_path_jet` its derivative; 4. a symmetric one returns
 /// the same base and the opposite vector for the swapped pair.
 pub trait Retraction<M: Manifold, G: Riemannian<M>> {
-    /// The arc that leaves `x` with initial displacement `u ∈ T_xM`: the unknown of a step.
+    /// The path that leaves `x` with initial displacement `u ∈ T_xM`: the unknown of a step.
     ///
     /// # Errors
     ///
     /// [`MetricError`] if the geodesic cannot be followed.
-    fn arc<D: Scalar>(
+    fn step_path<D: Scalar>(
         &self,
         metric: &G,
         x: &M::Point<f64>,
         u: &Vector<M, D>,
-    ) -> Result<Arc<M, D>, MetricError>;
+    ) -> Result<StepPath<M, D>, MetricError>;
 
-    /// The same arc at `f64`, in the charts at its own points.
+    /// The same path at `f64`, in the charts at its own points.
     ///
     /// # Errors
     ///
-    /// Those of [`arc`](Self::arc).
+    /// Those of [`step_path`](Self::step_path).
     #[inline]
-    fn real_arc(
+    fn real_step_path(
         &self,
         metric: &G,
         x: &M::Point<f64>,
         u: &Vector<M>,
-    ) -> Result<Arc<M>, MetricError> {
-        self.arc(metric, x, u)
+    ) -> Result<StepPath<M>, MetricError> {
+        self.step_path(metric, x, u)
     }
 
-    /// The end of the arc of `u` alone; that of a geodesic, unless the retraction says otherwise.
+    /// The end of the path of `u` alone; that of a geodesic, unless the retraction says otherwise.
     ///
     /// # Errors
     ///
-    /// Those of [`arc`](Self::arc).
+    /// Those of [`step_path`](Self::step_path).
     #[inline]
     fn end(
         &self,
@@ -59,28 +59,28 @@ pub trait Retraction<M: Manifold, G: Riemannian<M>> {
         metric.end(x, u)
     }
 
-    /// A curve from the start of the arc to its end; the geodesic, unless the retraction says
+    /// A curve from the start of the path to its end; the geodesic, unless the retraction says
     /// otherwise.
     ///
     /// # Errors
     ///
-    /// Those of [`arc`](Self::arc).
+    /// Those of [`step_path`](Self::step_path).
     #[inline]
     fn along(&self, metric: &G, x: &M::Point<f64>, u: &Vector<M>) -> Result<Nodes<M>, MetricError> {
         Nodes::of(|t| metric.along(x, u, t))
     }
 
-    /// The same arc at `f64`, with its derivatives along `u`.
+    /// The same path at `f64`, with its derivatives along `u`.
     ///
     /// # Errors
     ///
-    /// Those of [`arc`](Self::arc).
-    fn arc_jet(
+    /// Those of [`step_path`](Self::step_path).
+    fn step_path_jet(
         &self,
         metric: &G,
         x: &M::Point<f64>,
         u: &Vector<M>,
-    ) -> Result<ArcJet<M>, MetricError>;
+    ) -> Result<StepPathJet<M>, MetricError>;
 
     /// `R_h(v)`: the pair `(x, x')` of the displacement `d = hv` at `z`.
     ///
@@ -130,9 +130,9 @@ impl<M: Space> Nodes<M> {
     }
 }
 
-/// A step's arc: its base point, its displacement there, and its end.
+/// A step's path: its base point, its displacement there, and its end.
 #[derive(Clone, Debug)]
-pub struct Arc<M: Space, D: Scalar = f64> {
+pub struct StepPath<M: Space, D: Scalar = f64> {
     /// The base point `z`.
     pub z: ChartPoint<M, D>,
     /// The displacement `d = hv ∈ T_zM`.
@@ -141,9 +141,9 @@ pub struct Arc<M: Space, D: Scalar = f64> {
     pub end: M::Point<D>,
 }
 
-/// A step's arc at `f64`, with its derivatives along the unknown `u`.
+/// A step's path at `f64`, with its derivatives along the unknown `u`.
 #[derive(Clone, Debug)]
-pub struct ArcJet<M: Space> {
+pub struct StepPathJet<M: Space> {
     /// The base point `z`.
     pub z: M::Point<f64>,
     /// `∂z/∂u` in the chart at `z`.
@@ -158,7 +158,7 @@ pub struct ArcJet<M: Space> {
     pub dend: Matrix<M>,
 }
 
-impl<M: Space> ArcJet<M> {
+impl<M: Space> StepPathJet<M> {
     /// The straight line of a flat space, with its middle as the base: `z = x + u/2`, `d = u`,
     /// `x' = x + u`.
     #[inline]
@@ -208,29 +208,29 @@ impl<M: Manifold> RelativeEq for Tangent<M> {
     }
 }
 
-/// The derivatives of an arc by its definition: one dual number for each direction.
+/// The derivatives of a path by its definition: one dual number for each direction.
 pub(crate) fn jet_by_dual_numbers<M: Manifold, G: Riemannian<M>>(
     retraction: &impl Retraction<M, G>,
     metric: &G,
     x: &M::Point<f64>,
     u: &Vector<M>,
-) -> Result<ArcJet<M>, MetricError> {
+) -> Result<StepPathJet<M>, MetricError> {
     let along = |k| {
         let part = |i| if i == k { 1.0 } else { 0.0 };
         let seeded = Vector::<M, Dual64>::from_index(|i| Dual64::new(u[i], part(i)));
-        retraction.arc(metric, x, &seeded)
+        retraction.step_path(metric, x, &seeded)
     };
-    let (mut arc, zero) = (along(0)?, Matrix::<M>::zeros());
-    let (z, d, end) = (arc.z.base.clone(), arc.d.real(), M::real(&arc.end));
-    let mut jet = ArcJet::<M> { z, dz: zero, d, dd: zero, end, dend: zero };
+    let (mut path, zero) = (along(0)?, Matrix::<M>::zeros());
+    let (z, d, end) = (path.z.base.clone(), path.d.real(), M::real(&path.end));
+    let mut jet = StepPathJet::<M> { z, dz: zero, d, dd: zero, end, dend: zero };
     for k in 0..M::Dim::LEN {
         if k > 0 {
-            arc = along(k)?;
+            path = along(k)?;
         }
-        let moved = M::coordinates(&jet.end, &arc.end);
+        let moved = M::coordinates(&jet.end, &path.end);
         for i in 0..M::Dim::LEN {
-            jet.dz[(i, k)] = arc.z.q[i].eps;
-            jet.dd[(i, k)] = arc.d[i].eps;
+            jet.dz[(i, k)] = path.z.q[i].eps;
+            jet.dd[(i, k)] = path.d[i].eps;
             jet.dend[(i, k)] = moved[i].eps;
         }
     }

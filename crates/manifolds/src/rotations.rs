@@ -47,7 +47,7 @@ use rand::{Rng, RngExt};
 use crate::metric::{GeodesicEnd, MetricError, finite, finite_column, within};
 use crate::normal::Normal;
 use crate::sphere::along;
-use crate::{Arc, ArcJet, Canonical, Manifold, PointError, Riemannian};
+use crate::{Canonical, Manifold, PointError, Riemannian, StepPath, StepPathJet};
 
 /// The rotation group `SO(3)`: 3 × 3 rotation matrices, with tangent vectors in the body frame and the
 /// bi-invariant metric as the canonical one; see the [module](mod@crate::rotations).
@@ -228,9 +228,9 @@ impl Space for Rotations {
     #[inline]
     fn seeds(x: &Matrix3<f64>) -> impl Fn(usize, usize) -> Matrix3<Real> {
         let x = *x;
-        let turned = [spun(&x, &Vector3::x()), spun(&x, &Vector3::y()), spun(&x, &Vector3::z())];
+        let dg_v = [spun(&x, &Vector3::x()), spun(&x, &Vector3::y()), spun(&x, &Vector3::z())];
         move |i, j| {
-            let turn = |k: usize, r, c| if k < 3 { turned[k][(r, c)] } else { 0.0 };
+            let turn = |k: usize, r, c| if k < 3 { dg_v[k][(r, c)] } else { 0.0 };
             let half = |k: usize, r| if k < 3 { 0.5 * x[(r, k)] } else { 0.0 };
             Matrix3::from_fn(|r, c| {
                 let mut bend = if i == j && i < 3 { -x[(r, c)] } else { 0.0 };
@@ -252,7 +252,7 @@ impl Space for Rotations {
 
     /// The body angular velocity `Ω = dexp(q) v` of `R' = R Ω̂`.
     #[inline]
-    fn velocity<D: Scalar>(at: &ChartPoint<Self, D>, v: &Vector3<D>) -> Vector3<D> {
+    fn embed<D: Scalar>(at: &ChartPoint<Self, D>, v: &Vector3<D>) -> Vector3<D> {
         dexp(&at.q) * v
     }
 
@@ -381,8 +381,8 @@ impl Riemannian<Rotations> for Canonical {
     }
 
     #[inline]
-    fn volume<D: Scalar>(&self, x: &ChartPoint<Rotations, D>) -> Result<D, MetricError> {
-        Ok(Normal::at(&x.q, CURVATURE).volume())
+    fn volume_density<D: Scalar>(&self, x: &ChartPoint<Rotations, D>) -> Result<D, MetricError> {
+        Ok(Normal::at(&x.q, CURVATURE).volume_density())
     }
 
     fn exp<D: Scalar>(
@@ -395,8 +395,8 @@ impl Riemannian<Rotations> for Canonical {
         let end = orthogonal(&(x.point() * exp(&omega)));
         let base = Rotations::real(&end);
         // The body velocity is constant; the chart at the end reads it by one more dual number.
-        let turned = end * hat(&omega);
-        let moved = end.zip_map(&turned, Dual::new);
+        let dg_v = end * hat(&omega);
+        let moved = end.zip_map(&dg_v, Dual::new);
         let q = Rotations::coordinates(&base, &moved);
         let at = ChartPoint { base, q: finite_column("a coordinate of the end", q.map(|q| q.re))? };
         Ok((at, q.map(|q| q.eps)))
@@ -435,10 +435,14 @@ impl Riemannian<Rotations> for Canonical {
     }
 
     #[inline]
-    fn weyl_arc(&self, x: &Matrix3<f64>, d: &Vector3<f64>) -> Result<Arc<Rotations>, MetricError> {
+    fn weyl_arc(
+        &self,
+        x: &Matrix3<f64>,
+        d: &Vector3<f64>,
+    ) -> Result<StepPath<Rotations>, MetricError> {
         within(PI, d.norm())?;
         let z = ChartPoint::centre(&moved(x, &exp(&(d * 0.5))));
-        Ok(Arc { z, d: *d, end: Rotations::chart(x, d) })
+        Ok(StepPath { z, d: *d, end: Rotations::chart(x, d) })
     }
 
     /// With the constant body velocity `u`: `z = R exp(û/2)`, `x' = R exp(û)`, differentiated by
@@ -449,11 +453,11 @@ impl Riemannian<Rotations> for Canonical {
         &self,
         x: &Matrix3<f64>,
         d: &Vector3<f64>,
-    ) -> Result<ArcJet<Rotations>, MetricError> {
+    ) -> Result<StepPathJet<Rotations>, MetricError> {
         within(PI, d.norm())?;
         let half = d * 0.5;
         let [_, c1, c2, c3] = stumpff(half.norm_squared());
-        Ok(ArcJet {
+        Ok(StepPathJet {
             z: moved(x, &rodrigues(&half, c1, c2)),
             dz: rodrigues(&half, -c2, c3) * 0.5,
             d: *d,
@@ -613,10 +617,10 @@ mod tests {
             prop_assert!(Rotations.defect(&r) < 1e-15);
             prop_assert!((r - Rotations.from_quaternion((-q).into()).unwrap()).amax() < 1e-15);
             let v = vector![q[1], q[2], q[3]];
-            let turned = v * (2.0 * v.dot(&Vector3::x()))
+            let dg_v = v * (2.0 * v.dot(&Vector3::x()))
                 + Vector3::x() * (q[0] * q[0] - v.norm_squared())
                 + v.cross(&Vector3::x()) * (2.0 * q[0]);
-            prop_assert!((r.column(0) - turned).norm() < 1e-15);
+            prop_assert!((r.column(0) - dg_v).norm() < 1e-15);
             let back = Vector4::from(Rotations.to_quaternion(&r));
             prop_assert!(back[0] >= 0.0);
             prop_assert!((back - q * 1_f64.copysign(q[0])).norm() < 1e-15);

@@ -46,7 +46,7 @@ use rand::{Rng, RngExt};
 
 use crate::metric::{GeodesicEnd, MetricError, finite_column, within};
 use crate::normal::Normal;
-use crate::{Arc, ArcJet, Canonical, Manifold, Riemannian};
+use crate::{Canonical, Manifold, Riemannian, StepPath, StepPathJet};
 
 /// The unit sphere `Sⁿ = { x ∈ Rⁿ⁺¹ : |x| = 1 }` for `n = 1 … 7`, with the round metric as its
 /// canonical one; see the [module](mod@crate::sphere).
@@ -204,7 +204,7 @@ macro_rules! sphere {
                 tangent * angle_over_sine(tangent.dot(&tangent), cosine)
             }
 
-            fn velocity<D: Scalar>(at: &ChartPoint<Self, D>, v: &SVector<D, $n>) -> SVector<D, $a> {
+            fn embed<D: Scalar>(at: &ChartPoint<Self, D>, v: &SVector<D, $n>) -> SVector<D, $a> {
                 let theta = pushforward(&at.base, &at.q);
                 SVector::from_fn(|i, _| {
                     (0..$n).fold(D::zero(), |sum, k| sum + theta[(i, k)] * v[k])
@@ -305,8 +305,11 @@ macro_rules! sphere {
             }
 
             #[inline]
-            fn volume<D: Scalar>(&self, x: &ChartPoint<Sphere<$n>, D>) -> Result<D, MetricError> {
-                Ok(Normal::at(&x.q, 1.0).volume())
+            fn volume_density<D: Scalar>(
+                &self,
+                x: &ChartPoint<Sphere<$n>, D>,
+            ) -> Result<D, MetricError> {
+                Ok(Normal::at(&x.q, 1.0).volume_density())
             }
 
             fn exp<D: Scalar>(
@@ -377,12 +380,16 @@ macro_rules! sphere {
                 &self,
                 x: &SVector<f64, $a>,
                 d: &SVector<f64, $n>,
-            ) -> Result<Arc<Sphere<$n>>, MetricError> {
+            ) -> Result<StepPath<Sphere<$n>>, MetricError> {
                 within(PI, d.norm())?;
                 let [z, velocity] = great_circle(x, &(frame::<$a, $n>(x) * d), 0.5);
                 let z = polished(&z);
                 let d_at_z = frame::<$a, $n>(&z).tr_mul(&velocity);
-                Ok(Arc { z: ChartPoint::centre(&z), d: d_at_z, end: Sphere::<$n>::chart(x, d) })
+                Ok(StepPath {
+                    z: ChartPoint::centre(&z),
+                    d: d_at_z,
+                    end: Sphere::<$n>::chart(x, d),
+                })
             }
 
             #[inline]
@@ -390,7 +397,7 @@ macro_rules! sphere {
                 &self,
                 x: &SVector<f64, $a>,
                 d: &SVector<f64, $n>,
-            ) -> Result<ArcJet<Sphere<$n>>, MetricError> {
+            ) -> Result<StepPathJet<Sphere<$n>>, MetricError> {
                 within(PI, d.norm())?;
                 Ok(weyl_jet_in::<Sphere<$n>, $a, $n>(x, d))
             }
@@ -414,7 +421,7 @@ sphere!(5 in 6);
 sphere!(6 in 7);
 sphere!(7 in 8);
 
-/// The midpoint arc in closed form. With `U = E(x) d`, `s = |d|²` and the Stumpff functions at
+/// The midpoint path in closed form. With `U = E(x) d`, `s = |d|²` and the Stumpff functions at
 /// `s/4`: `z = c₀ x + ½c₁ U`, `γ'(½) = c₀ U − ½s c₁ x`, differentiated by `c₀' = −½c₁` and
 /// `c₁' = −½(c₂ − c₃)`. The frames at `z` and `x'` turn ambient vectors into components; the chart at
 /// `z` is normal, so the derivative of components is the projected ambient derivative.
@@ -422,7 +429,7 @@ sphere!(7 in 8);
 fn weyl_jet_in<M, const A: usize, const N: usize>(
     x: &SVector<f64, A>,
     d: &SVector<f64, N>,
-) -> ArcJet<M>
+) -> StepPathJet<M>
 where
     M: Space<Dim = Const<N>>,
     M::Point<f64>: From<[f64; A]>,
@@ -447,7 +454,14 @@ where
     let end = polished(&(x * c0 + u * c1));
     let (turn, along_x, along_u) = seen_from(&end);
     let dend = turn * c1 - (along_x * c1 + along_u * (c2 - c3)) * d.transpose();
-    ArcJet { z: entries_of(&z).into(), dz, d: velocity, dd: dv, end: entries_of(&end).into(), dend }
+    StepPathJet {
+        z: entries_of(&z).into(),
+        dz,
+        d: velocity,
+        dd: dv,
+        end: entries_of(&end).into(),
+        dend,
+    }
 }
 
 /// The entries of a column as an array.

@@ -4,7 +4,7 @@ use metriplectic_fields::{ChartPoint, Scalar, Vector};
 
 use crate::retraction::half;
 use crate::{
-    Arc, ArcJet, Manifold, MetricError, Nodes, PointPair, Retraction, Riemannian, Tangent,
+    Manifold, MetricError, Nodes, PointPair, Retraction, Riemannian, StepPath, StepPathJet, Tangent,
 };
 
 /// Weyl's midpoint retraction (Bloch, Farré Puiggalí, Martín de Diego 2024, eq. "weyl"):
@@ -19,25 +19,25 @@ pub struct WeylMidpoint;
 
 impl<M: Manifold, G: Riemannian<M>> Retraction<M, G> for WeylMidpoint {
     #[inline]
-    fn arc<D: Scalar>(
+    fn step_path<D: Scalar>(
         &self,
         metric: &G,
         x: &M::Point<f64>,
         u: &Vector<M, D>,
-    ) -> Result<Arc<M, D>, MetricError> {
+    ) -> Result<StepPath<M, D>, MetricError> {
         let half = *u * D::from(0.5);
         let (z, velocity) = metric.exp(&ChartPoint::centre(x), &half)?;
         let (end, _) = metric.exp(&z, &velocity)?;
-        Ok(Arc { z, d: velocity * D::from(2.0), end: end.point() })
+        Ok(StepPath { z, d: velocity * D::from(2.0), end: end.point() })
     }
 
     #[inline]
-    fn real_arc(
+    fn real_step_path(
         &self,
         metric: &G,
         x: &M::Point<f64>,
         u: &Vector<M>,
-    ) -> Result<Arc<M>, MetricError> {
+    ) -> Result<StepPath<M>, MetricError> {
         metric.weyl_arc(x, u)
     }
 
@@ -47,12 +47,12 @@ impl<M: Manifold, G: Riemannian<M>> Retraction<M, G> for WeylMidpoint {
     }
 
     #[inline]
-    fn arc_jet(
+    fn step_path_jet(
         &self,
         metric: &G,
         x: &M::Point<f64>,
         u: &Vector<M>,
-    ) -> Result<ArcJet<M>, MetricError> {
+    ) -> Result<StepPathJet<M>, MetricError> {
         metric.weyl_jet(x, u)
     }
 

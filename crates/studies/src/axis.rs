@@ -28,7 +28,7 @@ enum Scale {
 }
 
 impl Axis {
-    /// A linear axis over `[low, high]` and a share of `padding` on either side, with about
+    /// A linear axis over `[low, high]` and a fraction of `padding` on either side, with about
     /// `count` ticks. Values that agree in their first three digits are written without them.
     pub(crate) fn linear(
         (low, high): (f64, f64),

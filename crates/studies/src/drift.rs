@@ -240,14 +240,14 @@ impl Sums {
 
     fn merged(&self, other: &Self) -> Self {
         let count = self.count + other.count;
-        let share = if count > 0.0 { other.count / count } else { 0.0 };
+        let fraction = if count > 0.0 { other.count / count } else { 0.0 };
         let (dn, de) = (other.mean_n - self.mean_n, other.mean_e - self.mean_e);
         Self {
             count,
-            mean_n: self.mean_n + share * dn,
-            mean_e: self.mean_e + share * de,
-            spread: self.spread + other.spread + self.count * share * dn * dn,
-            joint: self.joint + other.joint + self.count * share * dn * de,
+            mean_n: self.mean_n + fraction * dn,
+            mean_e: self.mean_e + fraction * de,
+            spread: self.spread + other.spread + self.count * fraction * dn * dn,
+            joint: self.joint + other.joint + self.count * fraction * dn * de,
         }
     }
 

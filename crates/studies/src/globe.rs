@@ -222,28 +222,28 @@ impl View {
     }
 
     /// The parts of a curve on one side, each up to the limb.
-    fn arcs(&self, points: &[Vector], side: Side) -> Vec<Vec<Vector>> {
-        let (mut arcs, mut arc): (Vec<_>, Vec<Vector>) = (Vec::new(), Vec::new());
+    fn paths(&self, points: &[Vector], side: Side) -> Vec<Vec<Vector>> {
+        let (mut paths, mut path): (Vec<_>, Vec<Vector>) = (Vec::new(), Vec::new());
         let mut before: Option<Vector> = None;
         for x in points.iter().copied().map(unit) {
             if let Some(before) = before
                 && self.side(&before) != self.side(&x)
             {
-                arc.push(self.limb(&before, &x));
+                path.push(self.limb(&before, &x));
             }
             if self.side(&x) == side {
-                arc.push(x);
+                path.push(x);
             } else {
-                arcs.push(std::mem::take(&mut arc));
+                paths.push(std::mem::take(&mut path));
             }
             before = Some(x);
         }
-        arcs.push(arc);
-        arcs.retain(|arc| arc.len() > 1);
-        arcs
+        paths.push(path);
+        paths.retain(|path| path.len() > 1);
+        paths
     }
 
-    /// Where the arc from `x` to `y` passes from one side to the other.
+    /// Where the path from `x` to `y` passes from one side to the other.
     fn limb(&self, x: &Vector, y: &Vector) -> Vector {
         let t = self.depth(x) / (self.depth(x) - self.depth(y));
         unit([0, 1, 2].map(|i| x[i] + t * (y[i] - x[i])))
@@ -256,9 +256,9 @@ impl View {
         side: Side,
         ink: Ink,
     ) -> Result<(), PlotError> {
-        let arcs = self.arcs(points, side);
-        arcs.iter().try_for_each(|arc| {
-            let places: Vec<At> = arc.iter().map(|x| self.at(x)).collect();
+        let paths = self.paths(points, side);
+        paths.iter().try_for_each(|path| {
+            let places: Vec<At> = path.iter().map(|x| self.at(x)).collect();
             canvas.line(spaced(&places), ink.color, ink.width)
         })
     }
@@ -384,18 +384,19 @@ mod tests {
     #[test]
     fn a_curve_is_cut_at_the_limb_into_arcs_that_make_it_up() {
         let view = view([1.0, 2.0, 0.5]);
-        let (front, back) = (view.arcs(&equator(), Side::Front), view.arcs(&equator(), Side::Back));
-        // The curve starts in front: behind it is one arc, in front the two ends of it.
+        let (front, back) =
+            (view.paths(&equator(), Side::Front), view.paths(&equator(), Side::Back));
+        // The curve starts in front: behind it is one path, in front the two ends of it.
         assert_eq!((front.len(), back.len()), (2, 1));
-        for arc in &back {
-            assert!(arc.iter().all(|x| view.depth(x) < 1e-12));
-            for end in [arc[0], arc[arc.len() - 1]] {
+        for path in &back {
+            assert!(path.iter().all(|x| view.depth(x) < 1e-12));
+            for end in [path[0], path[path.len() - 1]] {
                 assert!((view.distance(view.at(&end)) - 1.0).abs() < 1e-12);
             }
         }
-        let length = |arcs: &[Vec<Vector>]| -> f64 {
+        let length = |paths: &[Vec<Vector>]| -> f64 {
             let step = |x: &Vector, y: &Vector| norm(&[0, 1, 2].map(|i| x[i] - y[i]));
-            arcs.iter().flat_map(|arc| arc.windows(2)).map(|pair| step(&pair[0], &pair[1])).sum()
+            paths.iter().flat_map(|path| path.windows(2)).map(|pair| step(&pair[0], &pair[1])).sum()
         };
         assert!((length(&front) + length(&back) - TAU).abs() < 1e-3);
         assert!((length(&back) - 0.5 * TAU).abs() < 1e-3);

@@ -277,7 +277,7 @@ impl Series {
             Some(order) => order.used.iter().rev().map(|&index| self.given[index]).collect(),
             None => self.points.clone(),
         };
-        let at = |share: usize| kept[(kept.len() - 1) * share / 6];
+        let at = |fraction: usize| kept[(kept.len() - 1) * fraction / 6];
         (at(2), at(4))
     }
 }

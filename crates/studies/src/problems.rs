@@ -288,10 +288,10 @@ impl SecondLaws {
         runs.0
     }
 
-    /// The share by which the exact scheme solves more linear systems, over all problems.
-    pub fn extra_sweeps(&self) -> f64 {
+    /// The fraction by which the exact scheme solves more linear systems, over all problems.
+    pub fn extra_iterations(&self) -> f64 {
         let sum = |of: fn(&Comparison) -> usize| self.rows.iter().map(of).sum::<usize>() as f64;
-        sum(|row| row.exact.sweeps) / sum(|row| row.published.sweeps) - 1.0
+        sum(|row| row.exact.iterations) / sum(|row| row.published.iterations) - 1.0
     }
 }
 

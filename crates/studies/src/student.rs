@@ -6,7 +6,7 @@ use std::f64::consts::{FRAC_2_PI, FRAC_PI_2};
 /// [`enclosed`] in `θ = arctan(t/√ν)`, on which it rises from 0 to 1 over `(0, π/2)`.
 pub(crate) fn two_sided(confidence: f64, degrees: usize) -> f64 {
     let (mut low, mut high) = (0.0, FRAC_PI_2);
-    // Each sweep halves the bracket: 60 of them exhaust the 53 bits of θ.
+    // Each iteration halves the bracket: 60 of them exhaust the 53 bits of θ.
     for _ in 0..60 {
         let middle = 0.5 * (low + high);
         if enclosed(middle, degrees) < confidence { low = middle } else { high = middle }

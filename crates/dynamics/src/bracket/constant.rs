@@ -4,7 +4,7 @@ use metriplectic_fields::{Matrix, Scalar, Square};
 use metriplectic_manifolds::{Flat, Manifold, MetricError, Riemannian};
 use nalgebra::{Const, SMatrix, SVector};
 
-use super::{Bracket, BracketJet, PoissonError, Site};
+use super::{Bracket, BracketArgs, BracketJet, PoissonError};
 
 /// The same skew matrix everywhere on a flat space; see [`Poisson::constant`](super::Poisson::constant).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -36,7 +36,7 @@ where
 {
     fn apply<D: Scalar>(
         &self,
-        _: &Site<'_, M, G, D>,
+        _: &BracketArgs<'_, M, G, D>,
         alpha: &SVector<D, N>,
     ) -> Result<SVector<D, N>, MetricError> {
         Ok(SMatrix::<D, N, N>::from_entries(|i, j| D::from(self.tensor[(i, j)])) * *alpha)
@@ -45,7 +45,7 @@ where
     #[inline]
     fn linearise(
         &self,
-        _: &Site<'_, M, G>,
+        _: &BracketArgs<'_, M, G>,
         alpha: &SVector<f64, N>,
     ) -> Result<BracketJet<M>, MetricError> {
         let zero = Matrix::<M>::zeros();

@@ -5,7 +5,7 @@ use std::fmt;
 use metriplectic_fields::{Matrix, MatrixField, Scalar, Square, Vector, along_slopes};
 use metriplectic_manifolds::{Manifold, MetricError, Riemannian};
 
-use super::{Bracket, BracketJet, Site};
+use super::{Bracket, BracketArgs, BracketJet};
 
 /// The tensor `Π(x)` of a matrix field; see [`Poisson::field`](super::Poisson::field) and
 /// [`AlmostPoisson::field`](super::AlmostPoisson::field).
@@ -34,7 +34,7 @@ impl<F> FieldPoisson<F> {
 impl<M: Manifold, G: Riemannian<M>, F: MatrixField<M>> Bracket<M, G> for FieldPoisson<F> {
     fn apply<D: Scalar>(
         &self,
-        at: &Site<'_, M, G, D>,
+        at: &BracketArgs<'_, M, G, D>,
         alpha: &Vector<M, D>,
     ) -> Result<Vector<M, D>, MetricError> {
         Ok(self.tensor_at(at)? * *alpha)
@@ -42,7 +42,7 @@ impl<M: Manifold, G: Riemannian<M>, F: MatrixField<M>> Bracket<M, G> for FieldPo
 
     fn linearise(
         &self,
-        at: &Site<'_, M, G>,
+        at: &BracketArgs<'_, M, G>,
         alpha: &Vector<M>,
     ) -> Result<BracketJet<M>, MetricError> {
         let jet = self.field.contravariant_jet(&at.x.point());
@@ -59,7 +59,7 @@ impl<F> FieldPoisson<F> {
     /// The matrix in the frame of the chart.
     fn tensor_at<M: Manifold, G, D: Scalar>(
         &self,
-        at: &Site<'_, M, G, D>,
+        at: &BracketArgs<'_, M, G, D>,
     ) -> Result<Matrix<M, D>, MetricError>
     where
         F: MatrixField<M>,

@@ -6,7 +6,7 @@ use metriplectic_fields::{Column, Real, Scalar, ScalarField, Space};
 use metriplectic_manifolds::{Euclidean, LieDual, MetricError, Riemannian};
 use nalgebra::{SMatrix, SVector};
 
-use super::{Bracket, BracketJet, LiePoisson, Site};
+use super::{Bracket, BracketArgs, BracketJet, LiePoisson};
 
 /// A smooth force `𝓕: g → g*` on a Lie algebra of dimension `N`, in a basis and its dual basis; any
 /// such map will do.
@@ -114,7 +114,7 @@ where
     #[inline]
     fn apply<D: Scalar>(
         &self,
-        at: &Site<'_, LieDual<N>, G, D>,
+        at: &BracketArgs<'_, LieDual<N>, G, D>,
         alpha: &SVector<D, N>,
     ) -> Result<SVector<D, N>, MetricError> {
         LiePoisson.apply(at, alpha)
@@ -123,7 +123,7 @@ where
     #[inline]
     fn linearise(
         &self,
-        at: &Site<'_, LieDual<N>, G>,
+        at: &BracketArgs<'_, LieDual<N>, G>,
         alpha: &SVector<f64, N>,
     ) -> Result<BracketJet<LieDual<N>>, MetricError> {
         LiePoisson.linearise(at, alpha)
@@ -136,7 +136,7 @@ where
     #[inline]
     fn force<D: Scalar>(
         &self,
-        at: &Site<'_, LieDual<N>, G, D>,
+        at: &BracketArgs<'_, LieDual<N>, G, D>,
         w: &SVector<D, N>,
     ) -> Result<SVector<D, N>, MetricError> {
         Ok(at.space.algebra().coadjoint(w, &self.0.at(w)))
@@ -145,22 +145,22 @@ where
     #[inline]
     fn linearise_force(
         &self,
-        at: &Site<'_, LieDual<N>, G>,
+        at: &BracketArgs<'_, LieDual<N>, G>,
         w: &SVector<f64, N>,
     ) -> Result<BracketJet<LieDual<N>>, MetricError> {
         let (force, slope) = self.0.jet1(w);
         let zero = SMatrix::<f64, N, N>::zeros();
         // ad*_δ 𝓕 = f δ with f_ba = C_ab^d 𝓕_d, and (ad*_w)_bd = C_ab^d w^a.
-        let (mut turned, mut coadjoint) = (zero, zero);
+        let (mut dg_v, mut coadjoint) = (zero, zero);
         for c in at.space.algebra().constants() {
-            turned[(c.b, c.a)] += c.value * force[c.d];
+            dg_v[(c.b, c.a)] += c.value * force[c.d];
             coadjoint[(c.b, c.d)] += c.value * w[c.a];
         }
         Ok(BracketJet {
             value: coadjoint * force,
             along_z: zero,
             along_s: zero,
-            tensor: turned + coadjoint * slope,
+            tensor: dg_v + coadjoint * slope,
         })
     }
 }

@@ -4,7 +4,7 @@ use metriplectic_fields::{Column, Scalar};
 use metriplectic_manifolds::{LieDual, MetricError, Riemannian};
 use nalgebra::{SMatrix, SVector};
 
-use super::{Bracket, BracketJet, NaturalBracket, Site};
+use super::{Bracket, BracketArgs, BracketJet, NaturalBracket};
 
 /// The Lie-Poisson bracket `{f, g}(μ) = ⟨μ, [df, dg]⟩` up to the sign of the left-invariant
 /// convention: `x' = Π dH` reads
@@ -22,7 +22,7 @@ impl<const N: usize, G: Riemannian<LieDual<N>>> Bracket<LieDual<N>, G> for LiePo
     #[inline]
     fn apply<D: Scalar>(
         &self,
-        at: &Site<'_, LieDual<N>, G, D>,
+        at: &BracketArgs<'_, LieDual<N>, G, D>,
         alpha: &SVector<D, N>,
     ) -> Result<SVector<D, N>, MetricError> {
         Ok(at.space.algebra().coadjoint(alpha, &at.x.point()))
@@ -31,7 +31,7 @@ impl<const N: usize, G: Riemannian<LieDual<N>>> Bracket<LieDual<N>, G> for LiePo
     #[inline]
     fn linearise(
         &self,
-        at: &Site<'_, LieDual<N>, G>,
+        at: &BracketArgs<'_, LieDual<N>, G>,
         alpha: &SVector<f64, N>,
     ) -> Result<BracketJet<LieDual<N>>, MetricError> {
         let (z, zero) = (at.x.point(), SMatrix::zeros());

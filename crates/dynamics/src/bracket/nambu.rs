@@ -9,7 +9,7 @@ use metriplectic_fields::{
 use metriplectic_manifolds::{InnerProduct, Manifold, MetricError, Riemannian, Rotations, Sphere};
 use nalgebra::Const;
 
-use super::{Bracket, BracketJet, NaturalBracket, Site, Zero};
+use super::{Bracket, BracketArgs, BracketJet, NaturalBracket, Zero};
 
 /// The generalised Nambu bracket of an oriented Riemannian `n`-manifold with `n − 2` Casimirs `C_a`
 /// (Nambu 1973 for `n = 3`; Takhtajan 1994, eq. 5, with all arguments but two held fixed):
@@ -280,10 +280,10 @@ where
     #[inline]
     fn apply<D: Scalar>(
         &self,
-        at: &Site<'_, M, G, D>,
+        at: &BracketArgs<'_, M, G, D>,
         alpha: &Vector<M, D>,
     ) -> Result<Vector<M, D>, MetricError> {
-        let density = self.factor.at(&at.x.point()) / at.metric.volume(at.x)?;
+        let density = self.factor.at(&at.x.point()) / at.metric.volume_density(at.x)?;
         let mut rows = Const::<N>::array(|_| Vector::<M, D>::zero());
         self.casimirs.covectors(at.x, at.s, &mut rows);
         rows[N - 2] = *alpha;
@@ -293,10 +293,10 @@ where
     #[inline]
     fn linearise(
         &self,
-        at: &Site<'_, M, G>,
+        at: &BracketArgs<'_, M, G>,
         alpha: &Vector<M>,
     ) -> Result<BracketJet<M>, MetricError> {
-        let (volume, factor) = (at.metric.volume(at.x)?, self.factor.jet1(&at.x.base));
+        let (volume, factor) = (at.metric.volume_density(at.x)?, self.factor.jet1(&at.x.base));
         let density = factor.value / volume;
         let zero = Matrix::<M>::zeros();
         let (mut rows, mut slopes) =
@@ -322,7 +322,7 @@ where
         Ok(BracketJet { value: plain * density, along_z, along_s, tensor: along(N - 2, &one) })
     }
 
-    fn kills_its_entropy(&self) -> bool {
+    fn annihilates_entropy(&self) -> bool {
         C::ENTROPY
     }
 }

@@ -3,7 +3,7 @@
 use metriplectic_fields::{Matrix, Scalar, Vector};
 use metriplectic_manifolds::{Manifold, MetricError, Product, Riemannian, Split, Times};
 
-use super::{Bracket, BracketJet, NaturalBracket, Site, Zero};
+use super::{Bracket, BracketArgs, BracketJet, NaturalBracket, Zero};
 
 /// `Π_A ⊕ Π_B` on `A × B`: `{f, g} = {f, g}_A + {f, g}_B`. The Casimirs are functions of the Casimirs
 /// of both; with `(AreaForm, Zero)` on `S² × R` every function of the second factor is one.
@@ -20,27 +20,27 @@ where
 {
     fn apply<D: Scalar>(
         &self,
-        at: &Site<'_, Product<A, B>, G, D>,
+        at: &BracketArgs<'_, Product<A, B>, G, D>,
         alpha: &Vector<Product<A, B>, D>,
     ) -> Result<Vector<Product<A, B>, D>, MetricError> {
         let ((x, y), (sx, sy)) = (Product::parts(at.x), Product::<A, B>::split(at.s));
         let ((left, right), (a, b)) = (at.metric.halves(), Product::<A, B>::split(alpha));
         let (m, n) = (&at.space.0, &at.space.1);
-        let a = self.0.apply(&Site { space: m, metric: left, x: &x, s: &sx }, &a)?;
-        let b = self.1.apply(&Site { space: n, metric: right, x: &y, s: &sy }, &b)?;
+        let a = self.0.apply(&BracketArgs { space: m, metric: left, x: &x, s: &sx }, &a)?;
+        let b = self.1.apply(&BracketArgs { space: n, metric: right, x: &y, s: &sy }, &b)?;
         Ok(Product::<A, B>::join(&a, &b))
     }
 
     fn linearise(
         &self,
-        at: &Site<'_, Product<A, B>, G>,
+        at: &BracketArgs<'_, Product<A, B>, G>,
         alpha: &Vector<Product<A, B>>,
     ) -> Result<BracketJet<Product<A, B>>, MetricError> {
         let ((x, y), (sx, sy)) = (Product::parts(at.x), Product::<A, B>::split(at.s));
         let ((left, right), (a, b)) = (at.metric.halves(), Product::<A, B>::split(alpha));
         let (m, n) = (&at.space.0, &at.space.1);
-        let a = self.0.linearise(&Site { space: m, metric: left, x: &x, s: &sx }, &a)?;
-        let b = self.1.linearise(&Site { space: n, metric: right, x: &y, s: &sy }, &b)?;
+        let a = self.0.linearise(&BracketArgs { space: m, metric: left, x: &x, s: &sx }, &a)?;
+        let b = self.1.linearise(&BracketArgs { space: n, metric: right, x: &y, s: &sy }, &b)?;
         Ok(joined(&a, &b))
     }
 
@@ -54,27 +54,29 @@ where
 
     fn force<D: Scalar>(
         &self,
-        at: &Site<'_, Product<A, B>, G, D>,
+        at: &BracketArgs<'_, Product<A, B>, G, D>,
         w: &Vector<Product<A, B>, D>,
     ) -> Result<Vector<Product<A, B>, D>, MetricError> {
         let ((x, y), (sx, sy)) = (Product::parts(at.x), Product::<A, B>::split(at.s));
         let ((left, right), (a, b)) = (at.metric.halves(), Product::<A, B>::split(w));
         let (m, n) = (&at.space.0, &at.space.1);
-        let a = self.0.force(&Site { space: m, metric: left, x: &x, s: &sx }, &a)?;
-        let b = self.1.force(&Site { space: n, metric: right, x: &y, s: &sy }, &b)?;
+        let a = self.0.force(&BracketArgs { space: m, metric: left, x: &x, s: &sx }, &a)?;
+        let b = self.1.force(&BracketArgs { space: n, metric: right, x: &y, s: &sy }, &b)?;
         Ok(Product::<A, B>::join(&a, &b))
     }
 
     fn linearise_force(
         &self,
-        at: &Site<'_, Product<A, B>, G>,
+        at: &BracketArgs<'_, Product<A, B>, G>,
         w: &Vector<Product<A, B>>,
     ) -> Result<BracketJet<Product<A, B>>, MetricError> {
         let ((x, y), (sx, sy)) = (Product::parts(at.x), Product::<A, B>::split(at.s));
         let ((left, right), (a, b)) = (at.metric.halves(), Product::<A, B>::split(w));
         let (m, n) = (&at.space.0, &at.space.1);
-        let a = self.0.linearise_force(&Site { space: m, metric: left, x: &x, s: &sx }, &a)?;
-        let b = self.1.linearise_force(&Site { space: n, metric: right, x: &y, s: &sy }, &b)?;
+        let a =
+            self.0.linearise_force(&BracketArgs { space: m, metric: left, x: &x, s: &sx }, &a)?;
+        let b =
+            self.1.linearise_force(&BracketArgs { space: n, metric: right, x: &y, s: &sy }, &b)?;
         Ok(joined(&a, &b))
     }
 
@@ -82,9 +84,9 @@ where
         Bracket::<A, G::Left>::is_zero(&self.0) && Bracket::<B, G::Right>::is_zero(&self.1)
     }
 
-    fn kills_its_entropy(&self) -> bool {
-        Bracket::<A, G::Left>::kills_its_entropy(&self.0)
-            && Bracket::<B, G::Right>::kills_its_entropy(&self.1)
+    fn annihilates_entropy(&self) -> bool {
+        Bracket::<A, G::Left>::annihilates_entropy(&self.0)
+            && Bracket::<B, G::Right>::annihilates_entropy(&self.1)
     }
 }
 

@@ -7,7 +7,7 @@ use metriplectic_manifolds::{
 };
 use nalgebra::{Const, SVector, Vector3, Vector6};
 
-use super::{Bracket, Site};
+use super::{Bracket, BracketArgs};
 
 /// The canonical bracket of positions and momenta, without Casimirs:
 ///
@@ -53,7 +53,7 @@ macro_rules! on_a_column {
         {
             fn apply<D: Scalar>(
                 &self,
-                _: &Site<'_, $space<N>, G, D>,
+                _: &BracketArgs<'_, $space<N>, G, D>,
                 alpha: &SVector<D, N>,
             ) -> Result<SVector<D, N>, MetricError> {
                 let n = N / 2;
@@ -74,7 +74,7 @@ macro_rules! on_a_cotangent_product {
         {
             fn apply<D: Scalar>(
                 &self,
-                _: &Site<'_, Product<$space, $fibre>, G, D>,
+                _: &BracketArgs<'_, Product<$space, $fibre>, G, D>,
                 alpha: &Vector<Product<$space, $fibre>, D>,
             ) -> Result<Vector<Product<$space, $fibre>, D>, MetricError> {
                 let (along_q, along_p) = Product::<$space, $fibre>::split(alpha);
@@ -98,7 +98,7 @@ where
 {
     fn apply<D: Scalar>(
         &self,
-        at: &Site<'_, Product<Rotations, Euclidean<3>>, G, D>,
+        at: &BracketArgs<'_, Product<Rotations, Euclidean<3>>, G, D>,
         alpha: &Vector6<D>,
     ) -> Result<Vector6<D>, MetricError> {
         let (attitude, p) = Product::parts(at.x);

@@ -3,7 +3,7 @@
 use metriplectic_fields::{Column, Matrix, Scalar, Square, Vector};
 use metriplectic_manifolds::{Chart, Euclidean, HalfLine, Manifold, MetricError, Riemannian};
 
-use super::{Bracket, BracketJet, NaturalBracket, Site};
+use super::{Bracket, BracketArgs, BracketJet, NaturalBracket};
 
 /// `Π = 0`: the state climbs `S` along a level set of `H`, and nothing moves reversibly.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -13,14 +13,18 @@ impl<M: Manifold, G: Riemannian<M>> Bracket<M, G> for Zero {
     #[inline]
     fn apply<D: Scalar>(
         &self,
-        _: &Site<'_, M, G, D>,
+        _: &BracketArgs<'_, M, G, D>,
         _: &Vector<M, D>,
     ) -> Result<Vector<M, D>, MetricError> {
         Ok(Vector::<M, D>::zero())
     }
 
     #[inline]
-    fn linearise(&self, _: &Site<'_, M, G>, _: &Vector<M>) -> Result<BracketJet<M>, MetricError> {
+    fn linearise(
+        &self,
+        _: &BracketArgs<'_, M, G>,
+        _: &Vector<M>,
+    ) -> Result<BracketJet<M>, MetricError> {
         let (value, zero) = (Vector::<M>::zero(), Matrix::<M>::zeros());
         Ok(BracketJet { value, along_z: zero, along_s: zero, tensor: zero })
     }

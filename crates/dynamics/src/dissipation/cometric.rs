@@ -18,7 +18,7 @@ use super::{Dissipation, DissipationJet, turn};
 /// ```
 ///
 /// The field is a closure `|x| -> matrix` or any other [`MatrixField`], acting on covectors dual to
-/// the [`velocity`](metriplectic_fields::Space::velocity) of the space. It is `G*(w, w)` times the
+/// the [`velocity`](metriplectic_fields::Space::embed) of the space. It is `G*(w, w)` times the
 /// form `G*` off `w`, or 0: `K_w ⪰ 0` by Cauchy and Schwarz. A `G*` of rank one has `K = 0`. It is
 /// evaluated as `K_w α = −(♯w ∧ ♯α) w`, so that `⟨w, K_w α⟩` cancels in pairs.
 ///

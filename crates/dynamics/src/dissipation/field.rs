@@ -1,4 +1,4 @@
-//! A dissipation from a closure of the point and the covector to be killed.
+//! A dissipation from a closure of the point and the covector to be annihilated.
 
 use std::fmt;
 
@@ -9,7 +9,7 @@ use metriplectic_manifolds::{Manifold, MetricError, Riemannian};
 
 use super::{Dissipation, DissipationJet};
 
-/// The dissipation of a closure `|x, w| -> K` of the point and of the covector to be killed, which
+/// The dissipation of a closure `|x, w| -> K` of the point and of the covector to be annihilated, which
 /// is used as it is written:
 ///
 /// ```math
@@ -23,7 +23,7 @@ use super::{Dissipation, DissipationJet};
 /// [`ProjectedDissipation`](super::ProjectedDissipation).
 ///
 /// `w` and `K` are written in the terms dual to the
-/// [`velocity`](metriplectic_fields::Space::velocity) of the space: on a vector space in components,
+/// [`velocity`](metriplectic_fields::Space::embed) of the space: on a vector space in components,
 /// on SO(3) as body covectors, and on a sphere in the space around, where `w` is tangent and what `K`
 /// does across the sphere is not looked at.
 ///
@@ -36,7 +36,7 @@ use super::{Dissipation, DissipationJet};
 /// use metriplectic_fields::Real;
 /// use metriplectic_manifolds::Euclidean;
 /// use nalgebra::{Matrix3, Vector3};
-/// // The damped oscillator x = (q, p, s): K = (γ/w_s) b bᵀ with b = (0, w_s, −w_p) kills w.
+/// // The damped oscillator x = (q, p, s): K = (γ/w_s) b bᵀ with b = (0, w_s, −w_p) annihilates w.
 /// let friction = |_: &Vector3<Real>, w: &Vector3<Real>| -> Matrix3<Real> {
 ///     let b = Vector3::new(0.0.into(), w.z, -w.y);
 ///     b * b.transpose() * (w.z.recip() * 0.01)
@@ -126,7 +126,7 @@ fn along_velocities<M: Manifold, D: Scalar>(
     x: &ChartPoint<M, D>,
     w: &Vector<M, D>,
 ) -> Option<Velocity<M, D>> {
-    let theta = M::Dim::array(|k| M::velocity(x, &Vector::<M, D>::basis(k)));
+    let theta = M::Dim::array(|k| M::embed(x, &Vector::<M, D>::basis(k)));
     let gram = Matrix::<M, D>::from_entries(|i, j| theta[i].dot(&theta[j]));
     let weights = gram.factor()?.solve(w)?;
     let mut sum = Velocity::<M, D>::zero();

@@ -19,7 +19,7 @@ use super::{Dissipation, DissipationJet, turn};
 /// ```
 ///
 /// The two fields are closures `|x| -> matrix` or any other [`MatrixField`], acting on covectors dual
-/// to the [`velocity`](metriplectic_fields::Space::velocity) of the space. By Cauchy and Schwarz
+/// to the [`velocity`](metriplectic_fields::Space::embed) of the space. By Cauchy and Schwarz
 /// `2|σ(w,α) μ(w,α)| ≤ σ(w,w) μ(α,α) + μ(w,w) σ(α,α)`, so `K_w ⪰ 0`; `σ = μ = G*/√2` is
 /// [`MetricDissipation`](super::MetricDissipation). It is evaluated as `K_w α = −N w` with the
 /// bivector `N = σw ∧ μα + μw ∧ σα`, so that `⟨w, K_w α⟩` cancels in pairs.

@@ -12,7 +12,7 @@ use super::{Dissipation, DissipationJet, Scaled, turn};
 /// K_w(\alpha, \beta) = G^*(w, w)\, G^*(\alpha, \beta) - G^*(w, \alpha)\, G^*(w, \beta) .
 /// ```
 ///
-/// It is `G*(w, w)` times the projection off `w`: symmetric, positive semidefinite, and it kills
+/// It is `G*(w, w)` times the projection off `w`: symmetric, positive semidefinite, and it annihilates
 /// `w`. In an orthonormal coframe with components `w_i`, `s_i` it is evaluated by antisymmetry,
 ///
 /// ```math
@@ -55,7 +55,7 @@ impl<M: Manifold, G: Riemannian<M>> Dissipation<M, G> for MetricDissipation {
     ) -> Result<Vector<M, D>, MetricError> {
         let g = metric.at(x)?;
         let w_hat = g.orthonormal(w);
-        Ok(g.raise(&turn::<M, D>(&w_hat, &g.orthonormal(alpha), &w_hat)))
+        Ok(g.from_orthonormal(&turn::<M, D>(&w_hat, &g.orthonormal(alpha), &w_hat)))
     }
 
     #[inline]
@@ -68,8 +68,8 @@ impl<M: Manifold, G: Riemannian<M>> Dissipation<M, G> for MetricDissipation {
     ) -> Result<DissipationJet<M>, MetricError> {
         let g = metric.at(&ChartPoint::centre(z))?;
         let (w_hat, a_hat) = (g.orthonormal(w), g.orthonormal(alpha));
-        let value = g.raise(&turn::<M, f64>(&w_hat, &a_hat, &w_hat));
-        let (w_sharp, a_sharp) = (g.raise(&w_hat), g.raise(&a_hat));
+        let value = g.from_orthonormal(&turn::<M, f64>(&w_hat, &a_hat, &w_hat));
+        let (w_sharp, a_sharp) = (g.from_orthonormal(&w_hat), g.from_orthonormal(&a_hat));
         let (ww, wa) = (w_hat.dot(&w_hat), w_hat.dot(&a_hat));
         // K = (w·w) g⁻¹ − ♯w ♯wᵀ, and K_w α = (w·w) ♯α − (w·α) ♯w differentiated along w.
         let mut tensor = Matrix::<M>::zeros();

@@ -9,18 +9,18 @@ use super::Dissipation;
 use super::kulkarni_nomizu::form;
 
 /// The dissipation of a symmetric positive semidefinite matrix field `K` that knows nothing of the
-/// covector to be killed, projected off it with the metric of the system:
+/// covector to be annihilated, projected off it with the metric of the system:
 ///
 /// ```math
 /// K_w = Q\, K\, Q^T, \qquad Q = 1 - \frac{♯w \otimes w}{\langle w, ♯w \rangle} .
 /// ```
 ///
 /// The field is a closure `|x| -> K` or any other [`MatrixField`], acting on covectors dual to the
-/// [`velocity`](metriplectic_fields::Space::velocity) of the space. `Qᵀw = 0`, so `K_w` kills `w`
-/// whatever `K` is; where `K` kills it already, nothing changes. Otherwise the projection spreads
+/// [`velocity`](metriplectic_fields::Space::embed) of the space. `Qᵀw = 0`, so `K_w` annihilates `w`
+/// whatever `K` is; where `K` annihilates it already, nothing changes. Otherwise the projection spreads
 /// friction onto variables that had none, [`is_projected`](Dissipation::is_projected) says so, and a
-/// closure `|x, w| -> K` that kills `w` of itself ([`FieldDissipation`](super::FieldDissipation)) is
-/// the better model. Every `K` kills `w = 0`, and is left alone there.
+/// closure `|x, w| -> K` that annihilates `w` of itself ([`FieldDissipation`](super::FieldDissipation)) is
+/// the better model. Every `K` annihilates `w = 0`, and is left alone there.
 ///
 /// ```
 /// use metriplectic_dynamics::{ProjectedDissipation, System};

@@ -9,7 +9,7 @@ use super::{Dissipation, DissipationJet};
 
 /// The dissipation `κ(x) K_w` with a scalar field `κ`, first, and any dissipation `K`, second.
 ///
-/// It is symmetric and kills `w` as `K` does, and positive semidefinite if `κ(x) ≥ 0`, which is
+/// It is symmetric and annihilates `w` as `K` does, and positive semidefinite if `κ(x) ≥ 0`, which is
 /// checked at sampled points.
 #[derive(Clone, Copy)]
 pub struct Scaled<F, K>(pub F, pub K);

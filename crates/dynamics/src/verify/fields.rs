@@ -108,11 +108,11 @@ impl<Y: Metriplectic + ?Sized> Along<'_, '_, Y> {
             return Ok(());
         }
         let (alpha, centre) = (generic::<Y::Manifold>(units), ChartPoint::centre(x));
-        let jet = bracket.linearise(&system.site(&centre, &entropy.df), &alpha);
+        let jet = bracket.linearise(&system.bracket_args(&centre, &entropy.df), &alpha);
         let slopes = jet.map_err(unusable::<Y::Manifold>(x))?.along_z.column_at(self.axis);
         let value = |t, values: &mut Vec<f64>| {
             let at = self.at(t);
-            let column = bracket.apply(&system.site(&at, &entropy.df), &alpha).ok()?;
+            let column = bracket.apply(&system.bracket_args(&at, &entropy.df), &alpha).ok()?;
             append(values, &column)
         };
         let (scale, df, units) = (units[self.axis], components(&slopes), components(units));

@@ -21,15 +21,15 @@ pub(super) fn examine<Y: Metriplectic + ?Sized>(
     }
     let metric = unusable::<Y::Manifold>(x);
     let centre = ChartPoint::<Y::Manifold>::centre(x);
-    let site = system.site(&centre, &entropy.df);
-    let jet = system.bracket().linearise_force(&site, &energy.df).map_err(&metric)?;
+    let args = system.bracket_args(&centre, &entropy.df);
+    let jet = system.bracket().linearise_force(&args, &energy.df).map_err(&metric)?;
     let derivatives = jet.along_z.max_abs() + jet.along_s.max_abs() + jet.tensor.max_abs();
     if !derivatives.is_finite() {
         let point = findings.point.clone();
         return Err(ModelError::DerivativeNotFinite { field: "force", point });
     }
     for w in [Some(&energy.df), w].into_iter().flatten() {
-        let force = system.bracket().force(&site, w).map_err(&metric)?;
+        let force = system.bracket().force(&args, w).map_err(&metric)?;
         let size = balance::pairing::<Y::Manifold>(w, &force, units);
         findings
             .note("⟨dH, force⟩ = 0", size, |point| ModelError::ForceDoesWork { point, size });
@@ -38,7 +38,8 @@ pub(super) fn examine<Y: Metriplectic + ?Sized>(
         let here = [energy.df, entropy.df];
         let terms = jet.tensor.abs() * energy.df.abs();
         for [w, s] in [here].into_iter().chain(covectors_of_a_step(place, &terms)) {
-            let force = system.bracket().force(&system.site(&centre, &s), &w).map_err(&metric)?;
+            let force =
+                system.bracket().force(&system.bracket_args(&centre, &s), &w).map_err(&metric)?;
             let falls = s.dot(&force) < 0.0;
             let size = if falls { balance::pairing::<Y::Manifold>(&s, &force, units) } else { 0.0 };
             let error = |point| ModelError::ForceDestroysEntropy { point, size };
@@ -60,7 +61,7 @@ fn covectors_of_a_step<Y: Metriplectic + ?Sized>(
 ) -> Option<[Vector<Y::Manifold>; 2]> {
     let centre = ChartPoint::<Y::Manifold>::centre(x);
     let w = differentials(system, &centre);
-    let tensor = system.bracket().tensor(&system.site(&centre, &w.entropy)).ok()?;
+    let tensor = system.bracket().tensor(&system.bracket_args(&centre, &w.entropy)).ok()?;
     let terms = tensor.abs() * w.energy.abs() + *force;
     let rate = (0..Dim::<Y>::LEN).map(|i| terms[i] / units[i]).fold(0.0, f64::max);
     let half = system.velocity(&centre).ok()? * (0.5 * STEP / rate);

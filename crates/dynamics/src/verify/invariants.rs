@@ -53,8 +53,8 @@ impl<Y: Metriplectic + ?Sized> Invariance<'_, '_, '_, Y> {
         let dl = jet(f, "invariant", x)?.df;
         self.dj = Some(dl);
         let centre = ChartPoint::<Y::Manifold>::centre(x);
-        let site = system.site(&centre, &entropy.df);
-        let tensor = system.bracket().tensor(&site).map_err(unusable::<Y::Manifold>(x))?;
+        let args = system.bracket_args(&centre, &entropy.df);
+        let tensor = system.bracket().tensor(&args).map_err(unusable::<Y::Manifold>(x))?;
         match kind {
             Kind::Casimir => {
                 let size = balance::product::<Y::Manifold>(&tensor, &dl, units);
@@ -69,7 +69,7 @@ impl<Y: Metriplectic + ?Sized> Invariance<'_, '_, '_, Y> {
             }
         }
         if system.bracket().is_forced() {
-            let force = system.bracket().linearise_force(&site, &energy.df);
+            let force = system.bracket().linearise_force(&args, &energy.df);
             let force = force.map_err(unusable::<Y::Manifold>(x))?;
             let size = balance::pairing::<Y::Manifold>(&dl, &force.value, units);
             let error = |point| ModelError::ForceChangesInvariant { point, size };
@@ -110,7 +110,7 @@ impl<Y: Metriplectic + ?Sized> Invariance<'_, '_, '_, Y> {
         let tangent = jacobian_of::<Y>(&y, &|q| moved(far, q));
         let tensor = |x: &Point<Y>, ds: &Vector<Y::Manifold>| {
             let centre = ChartPoint::<Y::Manifold>::centre(x);
-            let tensor = system.bracket().tensor(&system.site(&centre, ds));
+            let tensor = system.bracket().tensor(&system.bracket_args(&centre, ds));
             tensor.map_err(unusable::<Y::Manifold>(x))
         };
         let (here, there) = (tensor(x, &entropy.df)?, tensor(&y, &system.entropy().jet1(&y).df)?);

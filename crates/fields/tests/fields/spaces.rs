@@ -37,7 +37,7 @@ impl<const N: usize> Space for Plain<N> {
         SVector::from_fn(|i, _| y[i] - x[i])
     }
 
-    fn velocity<D: Scalar>(_: &ChartPoint<Self, D>, v: &SVector<D, N>) -> SVector<D, N> {
+    fn embed<D: Scalar>(_: &ChartPoint<Self, D>, v: &SVector<D, N>) -> SVector<D, N> {
         *v
     }
 }
@@ -78,7 +78,7 @@ impl Space for Circle {
         vector![(y[1] * x[0] - y[0] * x[1]).atan2(y[0] * x[0] + y[1] * x[1])]
     }
 
-    fn velocity<D: Scalar>(_: &ChartPoint<Self, D>, v: &SVector<D, 1>) -> SVector<D, 1> {
+    fn embed<D: Scalar>(_: &ChartPoint<Self, D>, v: &SVector<D, 1>) -> SVector<D, 1> {
         *v
     }
 }
@@ -121,7 +121,7 @@ impl Space for Affine {
         vector![(y[0] / x[0]).ln(), (y[1] - x[1]) / y[0]]
     }
 
-    fn velocity<D: Scalar>(_: &ChartPoint<Self, D>, v: &SVector<D, 2>) -> SVector<D, 2> {
+    fn embed<D: Scalar>(_: &ChartPoint<Self, D>, v: &SVector<D, 2>) -> SVector<D, 2> {
         *v
     }
 }

@@ -7,7 +7,7 @@ use metriplectic_fields::{Column, Dimension, ScalarField, Vector};
 use metriplectic_manifolds::Manifold;
 
 use super::{Checkpoint, Exact, ResumeError, SavedEnding};
-use crate::adaptive::Pace;
+use crate::adaptive::StepSize;
 use crate::residual::Dim;
 use crate::scales;
 use crate::span::{check_end, check_steps};
@@ -149,7 +149,7 @@ pub(super) fn of_the_course<N: Dimension>(
         return damaged("tolerance of rest", progress.rest.unwrap_or(f64::NAN));
     }
     match progress.pace {
-        Pace::Fixed(h) => {
+        StepSize::Fixed(h) => {
             if Exact(start + c.step as f64 * h) != c.time {
                 return damaged("time", time);
             }
@@ -162,7 +162,7 @@ pub(super) fn of_the_course<N: Dimension>(
                 }
             }
         }
-        Pace::Adaptive(controller) => {
+        StepSize::Adaptive(controller) => {
             let end = controller.end;
             if check_end(start, end).is_err() {
                 return damaged("end", end);
@@ -195,7 +195,7 @@ pub(super) fn of_the_entries<Y: Metriplectic>(
         size("largest velocity of an entry", Exact(progress.largest_velocity[i]))?;
         // Both ends of the last step were rounded.
         let moved = if memory.known > 0 { memory.differences[0][i].abs() } else { 0.0 };
-        let lost = memory.carry.map_or(0.0, |carry| carry[i]);
+        let lost = memory.compensation.map_or(0.0, |compensation| compensation[i]);
         if lost.abs() > LIBRARIES * (here[i] + moved) {
             return damaged("lost digits of an entry", lost);
         }

@@ -1,7 +1,7 @@
 //! The midpoint discrete gradient.
 
 use metriplectic_fields::{Matrix, Scalar, ScalarField, Vector, differential};
-use metriplectic_manifolds::{Arc, ArcJet, Manifold};
+use metriplectic_manifolds::{Manifold, StepPath, StepPathJet};
 
 use super::DiscreteGradient;
 
@@ -22,9 +22,9 @@ impl DiscreteGradient for Gonzalez {
         &self,
         f: &impl ScalarField<M>,
         _: &M::Point<f64>,
-        arc: &Arc<M, D>,
+        path: &StepPath<M, D>,
     ) -> Vector<M, D> {
-        differential(f, &arc.z)
+        differential(f, &path.z)
     }
 
     #[inline]
@@ -32,9 +32,9 @@ impl DiscreteGradient for Gonzalez {
         &self,
         f: &impl ScalarField<M>,
         _: &M::Point<f64>,
-        arc: &Arc<M>,
+        path: &StepPath<M>,
     ) -> Vector<M> {
-        f.jet1(&arc.z.base).df
+        f.jet1(&path.z.base).df
     }
 
     #[inline]
@@ -42,10 +42,10 @@ impl DiscreteGradient for Gonzalez {
         &self,
         f: &impl ScalarField<M>,
         _: &M::Point<f64>,
-        arc: &ArcJet<M>,
+        path: &StepPathJet<M>,
     ) -> (Vector<M>, Matrix<M>) {
-        let jet = f.jet2(&arc.z);
-        (jet.df, jet.hf * arc.dz)
+        let jet = f.jet2(&path.z);
+        (jet.df, jet.hf * path.dz)
     }
 
     #[inline]

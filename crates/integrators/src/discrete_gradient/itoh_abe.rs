@@ -1,9 +1,9 @@
 //! The coordinate increment discrete gradient, and its symmetric mean.
 
 use metriplectic_fields::{Column, Scalar, ScalarField, Vector};
-use metriplectic_manifolds::{Arc, Manifold};
+use metriplectic_manifolds::{Manifold, StepPath};
 
-use super::chord::short;
+use super::stable_gradient::short;
 use super::{DiscreteGradient, GAUSS, partial, segment};
 
 /// The coordinate increment discrete gradient (Itoh and Abe 1988) in the chart at the base point: with
@@ -28,10 +28,10 @@ impl DiscreteGradient for ItohAbe {
         &self,
         f: &impl ScalarField<M>,
         x: &M::Point<f64>,
-        arc: &Arc<M, D>,
+        path: &StepPath<M, D>,
     ) -> Vector<M, D> {
-        let (start, end) = segment(x, arc);
-        increments::<M, D>(f, &arc.z.base, &start, &end)
+        let (start, end) = segment(x, path);
+        increments::<M, D>(f, &path.z.base, &start, &end)
     }
 }
 
@@ -40,11 +40,11 @@ impl DiscreteGradient for SymmetricItohAbe {
         &self,
         f: &impl ScalarField<M>,
         x: &M::Point<f64>,
-        arc: &Arc<M, D>,
+        path: &StepPath<M, D>,
     ) -> Vector<M, D> {
-        let (start, end) = segment(x, arc);
-        let there = increments::<M, D>(f, &arc.z.base, &start, &end);
-        let back = increments::<M, D>(f, &arc.z.base, &end, &start);
+        let (start, end) = segment(x, path);
+        let there = increments::<M, D>(f, &path.z.base, &start, &end);
+        let back = increments::<M, D>(f, &path.z.base, &end, &start);
         (there + back) * D::from(0.5)
     }
 }

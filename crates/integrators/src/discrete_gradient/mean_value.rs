@@ -4,7 +4,7 @@ use metriplectic_fields::{
     ChartPoint, Column, Matrix, Scalar, ScalarField, Square, Vector, differential, differential_at,
     hessian_at,
 };
-use metriplectic_manifolds::{Arc, ArcJet, Manifold};
+use metriplectic_manifolds::{Manifold, StepPath, StepPathJet};
 use num_dual::Dual64;
 
 use super::{DiscreteGradient, GAUSS, segment};
@@ -28,12 +28,12 @@ impl DiscreteGradient for MeanValue {
         &self,
         f: &impl ScalarField<M>,
         x: &M::Point<f64>,
-        arc: &Arc<M, D>,
+        path: &StepPath<M, D>,
     ) -> Vector<M, D> {
-        let (start, end) = segment(x, arc);
+        let (start, end) = segment(x, path);
         GAUSS.iter().fold(Vector::<M, D>::zero(), |mean, &(s, weight)| {
             let q = start * D::from(1.0 - s) + end * D::from(s);
-            let at = ChartPoint { base: arc.z.base.clone(), q };
+            let at = ChartPoint { base: path.z.base.clone(), q };
             mean + differential(f, &at) * D::from(weight)
         })
     }
@@ -42,12 +42,12 @@ impl DiscreteGradient for MeanValue {
         &self,
         f: &impl ScalarField<M>,
         x: &M::Point<f64>,
-        arc: &Arc<M>,
+        path: &StepPath<M>,
     ) -> Vector<M> {
-        let (start, end) = segment(x, arc);
+        let (start, end) = segment(x, path);
         GAUSS.iter().fold(Vector::<M>::zero(), |mean, &(s, weight)| {
             let q = start * (1.0 - s) + end * s;
-            mean + differential_at(f, &arc.z.base, &q) * weight
+            mean + differential_at(f, &path.z.base, &q) * weight
         })
     }
 
@@ -55,20 +55,20 @@ impl DiscreteGradient for MeanValue {
         &self,
         f: &impl ScalarField<M>,
         x: &M::Point<f64>,
-        arc: &ArcJet<M>,
+        path: &StepPathJet<M>,
     ) -> (Vector<M>, Matrix<M>) {
-        let start: Vector<M> = M::coordinates(&arc.z, x);
-        let end: Vector<M> = M::coordinates(&arc.z, &arc.end);
+        let start: Vector<M> = M::coordinates(&path.z, x);
+        let end: Vector<M> = M::coordinates(&path.z, &path.end);
         let dend = Matrix::<M>::from_columns(|k| {
-            let q = Vector::<M, Dual64>::from_index(|i| Dual64::new(0.0, arc.dend[(i, k)]));
-            let moved = M::coordinates(&arc.z, &M::chart(&arc.end, &q));
+            let q = Vector::<M, Dual64>::from_index(|i| Dual64::new(0.0, path.dend[(i, k)]));
+            let moved = M::coordinates(&path.z, &M::chart(&path.end, &q));
             Vector::<M>::from_index(|i| moved[i].eps)
         });
         let (mut mean, mut slope) = (Vector::<M>::zero(), Matrix::<M>::zeros());
         for &(s, weight) in &GAUSS {
             let q = start * (1.0 - s) + end * s;
-            mean += differential_at(f, &arc.z, &q) * weight;
-            slope += hessian_at(f, &arc.z, &q) * (weight * s);
+            mean += differential_at(f, &path.z, &q) * weight;
+            slope += hessian_at(f, &path.z, &q) * (weight * s);
         }
         (mean, slope * dend)
     }

@@ -5,9 +5,9 @@ use std::borrow::Borrow;
 use metriplectic_fields::{
     Column, Dimension, Matrix, Real, ScalarField, Space, Square, Vector, along_slopes, power_of_two,
 };
-use metriplectic_manifolds::{ArcJet, InnerProduct, Manifold, Nodes};
+use metriplectic_manifolds::{InnerProduct, Manifold, Nodes, StepPathJet};
 
-/// What a field does along one arc: the data of a discrete gradient at `f64`.
+/// What a field does along one path: the data of a discrete gradient at `f64`.
 ///
 /// The defect `δ = F(x') − F(x) − ⟨w̄, d⟩` of a mean covector `w̄` is of third order, so the difference of the two values
 /// loses it in round-off as the step gets short: its error `ε|F|` enters the covector as `ε|F|/|d|`.
@@ -23,7 +23,7 @@ use metriplectic_manifolds::{ArcJet, InnerProduct, Manifold, Nodes};
 /// is short of digits the two are averaged with the inverse squares of their error estimates; the
 /// weight changes smoothly and switches nothing off.
 #[derive(Clone, Debug)]
-pub struct Chord<M: Space> {
+pub struct StableGradient<M: Space> {
     /// The mean covector `w̄`.
     mean: Vector<M>,
     /// The defect `F(x') − F(x) − ⟨w̄, d⟩`.
@@ -36,7 +36,7 @@ pub struct Chord<M: Space> {
     noise: f64,
 }
 
-/// What the chords of all fields along one arc share.
+/// What the stable gradients of all fields along one path share.
 #[derive(Debug)]
 pub struct Segment<'a, M: Space> {
     /// The displacement `d` at the base point.
@@ -46,30 +46,30 @@ pub struct Segment<'a, M: Space> {
 }
 
 impl<'a, M: Manifold> Segment<'a, M> {
-    /// That of an arc with the displacement `d` and the end `x'`.
+    /// That of a path with the displacement `d` and the end `x'`.
     #[inline]
     pub fn new(d: &'a Vector<M>, end: &M::Point<f64>) -> Self {
         Self { d, scales: M::scales(end) }
     }
 }
 
-/// The share of `|F| + Σ_i |∂_iF x_i|` by which a step changes `F`, at which a difference of two values of
-/// `F` starts to be trusted; from four times that share on it is trusted alone.
+/// The fraction of `|F| + Σ_i |∂_iF x_i|` by which a step changes `F`, at which a difference of two values of
+/// `F` starts to be trusted; from four times that fraction on it is trusted alone.
 const SHORT: f64 = 1e-3;
 
 /// The weight of an integral against a difference of two values of size `size` that is about
-/// `change`: it falls from 1 to 0 between one and four times the short share, with zero slope at both.
+/// `change`: it falls from 1 to 0 between one and four times the short fraction, with zero slope at both.
 #[inline]
 pub(super) fn short(change: f64, size: f64) -> f64 {
     if change.abs() >= 4.0 * SHORT * size && size > 0.0 {
         return 0.0;
     }
-    let share = change.abs() / (SHORT * size).max(f64::MIN_POSITIVE);
-    let t = ((share - 1.0) / 3.0).clamp(0.0, 1.0);
+    let fraction = change.abs() / (SHORT * size).max(f64::MIN_POSITIVE);
+    let t = ((fraction - 1.0) / 3.0).clamp(0.0, 1.0);
     1.0 - t * t * (3.0 - 2.0 * t)
 }
 
-/// The defect as an integral over the nodes of the arc, and its weight against a difference with the
+/// The defect as an integral over the nodes of the path, and its weight against a difference with the
 /// error `rounding`.
 fn safer<M: Space>(
     f: &impl ScalarField<M>,
@@ -82,9 +82,9 @@ fn safer<M: Space>(
     (integral.value, integral.weight(rounding))
 }
 
-impl<M: Manifold> Chord<M> {
-    /// Evaluates `f` along an arc with the mean covector `mean`. `start` is `F(x)`, `end` is `F(x')`,
-    /// `base` the slope `⟨dF(z), d⟩` at the base point, and `nodes` those of the arc.
+impl<M: Manifold> StableGradient<M> {
+    /// Evaluates `f` along a path with the mean covector `mean`. `start` is `F(x)`, `end` is `F(x')`,
+    /// `base` the slope `⟨dF(z), d⟩` at the base point, and `nodes` those of the path.
     #[inline]
     pub fn new<N: Borrow<Nodes<M>>>(
         f: &impl ScalarField<M>,
@@ -103,32 +103,32 @@ impl<M: Manifold> Chord<M> {
         let rounding = f64::EPSILON * size;
         let difference = (end - start) - slope;
         // Far from round-off, and most often, the difference is all.
-        let share = short(change, size);
+        let fraction = short(change, size);
         let (mut defect, mut noise) = (difference, rounding);
-        if share > 0.0 {
+        if fraction > 0.0 {
             let (better, weight) = safer(f, nodes().borrow(), (base, slope), rounding);
-            defect += share * weight * (better - difference);
-            noise *= 1.0 - share * weight;
+            defect += fraction * weight * (better - difference);
+            noise *= 1.0 - fraction * weight;
         }
         Self { mean: *mean, defect, change, rounding, noise }
     }
 
-    /// The covector `w` with `⟨w, d⟩ = F(x') − F(x) + recall`.
+    /// The covector `w` with `⟨w, d⟩ = F(x') − F(x) + drift_correction`.
     ///
-    /// `recall` is what earlier steps have left over; it is zero in the definition.
+    /// `drift_correction` is what earlier steps have left over; it is zero in the definition.
     #[inline]
     pub fn covector(
         &self,
-        recall: f64,
+        drift_correction: f64,
         g: &impl InnerProduct<Vector<M>>,
         d: &Vector<M>,
     ) -> Vector<M> {
         let flat = g.flat(d);
         let square = flat.dot(d);
         if square < SQUARE {
-            return self.mean + along_short(self.defect + recall, g, d);
+            return self.mean + along_short(self.defect + drift_correction, g, d);
         }
-        self.mean + flat * ((self.defect + recall) / square)
+        self.mean + flat * ((self.defect + drift_correction) / square)
     }
 
     /// The round-off of each component of the covector, beside that of its mean.
@@ -143,48 +143,48 @@ impl<M: Manifold> Chord<M> {
         flat.abs() * (self.noise / square)
     }
 
-    /// The derivative of the covector along the unknown of the arc, from that of its mean and the
+    /// The derivative of the covector along the unknown of the path, from that of its mean and the
     /// differential at `x'`; `slopes` are the derivatives of the metric at `z`, if it has any.
     #[inline]
     pub fn slope(
         &self,
-        recall: f64,
+        drift_correction: f64,
         (g, slopes): (&impl InnerProduct<Vector<M>>, Option<&Slopes<M>>),
-        arc: &ArcJet<M>,
+        path: &StepPathJet<M>,
         dmean: &Matrix<M>,
         df_end: &Vector<M>,
     ) -> Matrix<M> {
         let mut slope = *dmean;
-        let flat = g.flat(&arc.d);
-        let square = flat.dot(&arc.d);
+        let flat = g.flat(&path.d);
+        let square = flat.dot(&path.d);
         if square < SQUARE {
             return slope;
         }
-        let c = (self.defect + recall) / square;
+        let c = (self.defect + drift_correction) / square;
         // ∂δ = dF(x') ∂x' − ∂⟨w̄, d⟩, a difference of nearly equal rows, which counts only as far
         // as it is above its own round-off.
-        let rows = arc.dend.transpose_times(df_end)
-            - arc.dd.transpose_times(&self.mean)
-            - slope.transpose_times(&arc.d);
+        let rows = path.dend.transpose_times(df_end)
+            - path.dd.transpose_times(&self.mean)
+            - slope.transpose_times(&path.d);
         let noise = 1e3 * self.rounding / self.change.max(f64::MIN_POSITIVE);
         let trust = (1.0 + noise.powi(2)).recip();
-        let mut along = rows * trust - arc.dd.transpose_times(&flat) * (2.0 * c);
+        let mut along = rows * trust - path.dd.transpose_times(&flat) * (2.0 * c);
         if let Some(slopes) = slopes {
             // ∂g along z, in ♭d and in G(d, d).
-            let turned = along_slopes::<M>(slopes, &arc.d) * arc.dz;
-            along -= turned.transpose_times(&arc.d) * c;
-            slope += turned * c;
+            let dg_v = along_slopes::<M>(slopes, &path.d) * path.dz;
+            along -= dg_v.transpose_times(&path.d) * c;
+            slope += dg_v * c;
         }
         slope += Matrix::<M>::outer(&flat, &(along * square.recip()));
-        slope + Matrix::<M>::from_columns(|k| g.flat(&arc.dd.column_at(k))) * c
+        slope + Matrix::<M>::from_columns(|k| g.flat(&path.dd.column_at(k))) * c
     }
 }
 
-/// The squared length below which an arc is measured in units of its own.
+/// The squared length below which a path is measured in units of its own.
 const SQUARE: f64 = 1e-280;
 
-/// `♭d defect/G(d, d)` on an arc so short that its squared length leaves the range of numbers, in units of
-/// a power of two near that length; zero on an arc without length.
+/// `♭d defect/G(d, d)` on a path so short that its squared length leaves the range of numbers, in units of
+/// a power of two near that length; zero on a path without length.
 #[cold]
 fn along_short<V: Column<f64>>(defect: f64, g: &impl InnerProduct<V>, d: &V) -> V {
     let unit = power_of_two(d.magnitude());
@@ -203,7 +203,7 @@ struct Integral {
 }
 
 impl Integral {
-    /// From `f`, `f'` at both ends of the arc (first and second derivative of `F`) and `f` in its
+    /// From `f`, `f'` at both ends of the path (first and second derivative of `F`) and `f` in its
     /// middle, less the slope `⟨w̄, d⟩`. The error is estimated by the difference to Simpson's rule.
     #[inline]
     fn new([start, end]: [Real; 2], middle: f64, slope: f64) -> Self {
@@ -244,11 +244,11 @@ mod tests {
             let length = 10.0_f64.powf(-0.1 * f64::from(k));
             let d = direction * length;
             let (x, y) = (z - d * 0.5, z + d * 0.5);
-            // The arc of the rounded points, as a step would have it.
+            // The path of the rounded points, as a step would have it.
             let d: Vector2<f64> = y - x;
             let [start, end]: [f64; 2] =
                 [x, y].map(|p| ScalarField::<Euclidean<2>>::at(&cubic, &p));
-            let chord = Chord::<Euclidean<2>>::new(
+            let chord = StableGradient::<Euclidean<2>>::new(
                 &cubic,
                 &df,
                 &Segment::new(&d, &y),
@@ -274,7 +274,7 @@ mod tests {
     fn an_arc_without_length_has_the_differential_itself() {
         let (x, df, d) = (vector![0.7, -0.4], vector![1.47, 0.96], Vector2::zeros());
         let start = ScalarField::<Euclidean<2>>::at(&cubic, &x);
-        let chord = Chord::<Euclidean<2>>::new(
+        let chord = StableGradient::<Euclidean<2>>::new(
             &cubic,
             &df,
             &Segment::new(&d, &x),

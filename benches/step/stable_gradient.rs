@@ -1,4 +1,4 @@
-//! What the steps by hand share: the guess, and Newton's method with one Jacobian.
+//! What the steps by hand fraction: the guess, and Newton's method with one Jacobian.
 
 use metriplectic::prelude::{SMatrix, SVector};
 
@@ -40,15 +40,15 @@ pub(crate) fn solve<const N: usize>(
     residual: impl Fn(&SVector<f64, N>) -> SVector<f64, N>,
 ) -> (SVector<f64, N>, usize) {
     let (mut r, mut size, mut contraction) = (here.residual, here.residual.norm(), f64::INFINITY);
-    let mut sweeps = 0;
-    while size > 0.1 * here.floor && sweeps < 30 {
+    let mut iterations = 0;
+    while size > 0.1 * here.floor && iterations < 30 {
         u -= here.inverse * r;
-        sweeps += 1;
+        iterations += 1;
         if size <= here.floor || contraction * size <= 0.01 * here.floor {
             break;
         }
         r = residual(&u);
         (contraction, size) = (r.norm() / size, r.norm());
     }
-    (u, sweeps)
+    (u, iterations)
 }

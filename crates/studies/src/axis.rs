@@ -1,214 +1,159 @@
-//! From numbers to places on an axis, and what is written along it.
+//! What is taken off the numbers of an axis before they are drawn, and what is written along it.
 
-use crate::plot::PlotError;
+use std::sync::Arc;
 
-/// An axis from `u = 0` at its lower to `u = 1` at its upper end.
+use kuva::render::layout::{Layout, TickFormat};
+use kuva::render::render_utils::compute_tick_step;
+
+use crate::plot::{NAME, NUMBER, PlotError, theme};
+
+/// An axis over `[low, high]` of `(number − offset)/10^exponent`, its numbers written in a common power
+/// of ten and without the digits they share.
 #[derive(Clone, Debug)]
 pub(crate) struct Axis {
     low: f64,
     high: f64,
-    scale: Scale,
-    pub(crate) ticks: Vec<Tick>,
-}
-
-#[derive(Clone, Debug)]
-pub(crate) struct Tick {
-    /// Place in `[0, 1]`.
-    pub(crate) place: f64,
-    /// What is written there; empty for a grid line only.
-    pub(crate) label: String,
-}
-
-#[derive(Clone, Copy, Debug)]
-enum Scale {
-    /// `(value − offset) / 10^exponent`, the offset written with so many digits after the point.
-    Linear { offset: f64, digits: usize, exponent: i32 },
-    /// `log₁₀ value`
-    Logarithmic,
+    offset: f64,
+    /// Digits of the offset after the point.
+    digits: usize,
+    exponent: i32,
+    /// About how many ticks there are.
+    ticks: usize,
+    logarithmic: bool,
 }
 
 impl Axis {
-    /// A linear axis over `[low, high]` and a fraction of `padding` on either side, with about
-    /// `count` ticks. Values that agree in their first three digits are written without them.
+    /// A linear axis over `[low, high]` and a fraction of `padding` on either side, with about so many
+    /// ticks. It begins at 0 where that is near.
     pub(crate) fn linear(
         (low, high): (f64, f64),
         padding: f64,
-        count: f64,
+        ticks: f64,
     ) -> Result<Self, PlotError> {
-        let (low, high) = widened(low, high, padding);
-        if !(high - low).is_finite() {
+        let low = if low > 0.0 && low < 0.1 * high { 0.0 } else { low };
+        let margin = match (high > low, low.abs() > 0.0) {
+            (true, _) => padding * (high - low),
+            // A single value gets a tenth of itself on either side.
+            (false, true) => 0.1 * low.abs(),
+            (false, false) => 1.0,
+        };
+        let (low, high) = (low - margin, high + margin);
+        let range = high - low;
+        if !range.is_finite() {
             return Err(PlotError::Range { low, high });
         }
-        let scale = Scale::of(low, high);
-        let (low, high) = (scale.reading(low), scale.reading(high));
-        let axis = Self { low, high, scale, ticks: Vec::new() };
-        Ok(Self { ticks: axis.linear_ticks(count), ..axis })
+        let grain = range.log10().ceil();
+        let unit = 10_f64.powf(grain);
+        let shared = low.abs().max(high.abs()) > 1e3 * range;
+        let offset = if shared { ((0.5 * low + 0.5 * high) / unit).round() * unit } else { 0.0 };
+        let decade = (low - offset).abs().max((high - offset).abs()).log10().floor();
+        let exponent =
+            if (-2.0..5.0).contains(&decade) { 0 } else { integer(decade.clamp(-300.0, 300.0)) };
+        let (digits, ticks) = (count(-grain), count(ticks).max(2));
+        let axis = Self { low, high, offset, digits, exponent, ticks, logarithmic: false };
+        Ok(Self { low: axis.reading(low), high: axis.reading(high), ..axis })
     }
 
-    /// A logarithmic axis over `[low, high]`, both positive, widened to the next 1, 2 or 5.
+    /// A logarithmic axis over `[low, high]`, both positive, and a little more on either side.
+    ///
+    /// The numbers are divided by a power of ten, so that the least is about 1: `kuva` draws nothing below
+    /// 1e-10 on logarithmic axes.
     pub(crate) fn logarithmic((low, high): (f64, f64)) -> Self {
         let (low, high) = (low.log10(), high.log10());
-        let margin = 0.05 + 0.03 * (high - low);
-        let (low, high) = (below(low - margin), above(high + margin));
-        let axis = Self { low, high, scale: Scale::Logarithmic, ticks: Vec::new() };
-        Self { ticks: axis.logarithmic_ticks(), ..axis }
+        let (exponent, margin) = (integer(low.floor()), 0.05 + 0.03 * (high - low));
+        let [low, high] =
+            [low - margin, high + margin].map(|x| 10_f64.powf(x - f64::from(exponent)));
+        Self { low, high, offset: 0.0, digits: 0, exponent, ticks: 8, logarithmic: true }
     }
 
-    /// Where a value lies between the ends of the axis.
-    pub(crate) fn place(&self, value: f64) -> f64 {
-        self.fraction(self.scale.reading(value))
+    /// The number that is drawn for a value.
+    pub(crate) fn reading(&self, value: f64) -> f64 {
+        (value - self.offset) / 10_f64.powi(self.exponent)
     }
 
-    /// The name of the axis with what is taken off its numbers: `H − 0.5 (units of 10⁻¹⁶)`.
-    pub(crate) fn label(&self, name: &str) -> String {
-        let Scale::Linear { offset, digits, exponent } = self.scale else { return name.into() };
-        let sign = if offset > 0.0 { '−' } else { '+' };
-        let taken = match (offset.abs() > 0.0, name.is_empty()) {
-            (false, _) => name.into(),
-            (true, false) => format!("{name} {sign} {:.digits$}", offset.abs()),
-            (true, true) => format!("value {sign} {:.digits$}", offset.abs()),
-        };
-        match (exponent, taken.is_empty()) {
-            (0, _) => taken,
-            (_, true) => format!("units of {}", power(exponent)),
-            (_, false) => format!("{taken} (units of {})", power(exponent)),
+    /// The factor between two numbers that are so far from each other on a logarithmic axis.
+    pub(crate) fn fraction(&self, part: f64) -> f64 {
+        (self.high / self.low).powf(part)
+    }
+
+    /// The quantity, with what is taken off it, and the unit: `H − 0.5 (10⁻¹⁶ J)`.
+    pub(crate) fn label(&self, quantity: &str, unit: &str) -> String {
+        let mut label = quantity.to_owned();
+        if self.offset.abs() > 0.0 {
+            let sign = if self.offset > 0.0 { '−' } else { '+' };
+            let named = if label.is_empty() { "value" } else { &label };
+            let shown = format!("{:.*}", self.digits, self.offset.abs());
+            let shown = shown.split_once('.').map_or(shown.clone(), |(whole, fraction)| {
+                format!("{whole}.{}", fraction.trim_end_matches('0'))
+            });
+            label = format!("{named} {sign} {}", shown.trim_end_matches('.'));
+        }
+        let scaled = self.exponent != 0 && !self.logarithmic;
+        let factor = if scaled { power(self.exponent) } else { String::new() };
+        match [factor.as_str(), unit].map(str::is_empty) {
+            [true, true] => label,
+            [false, false] => format!("{label} ({factor} {unit})"),
+            _ => format!("{label} ({factor}{unit})"),
         }
     }
 
-    fn fraction(&self, reading: f64) -> f64 {
-        (reading - self.low) / (self.high - self.low)
-    }
-
-    fn linear_ticks(&self, count: f64) -> Vec<Tick> {
-        let step = round_step((self.high - self.low) / count);
-        let digits = digits_of(step);
-        let inside = (self.low / step - 1e-6).ceil()..=(self.high / step + 1e-6).floor();
-        let label = |value: f64| format!("{value:.digits$}").replace('-', "−");
-        multiples(inside)
-            // Adding zero turns −0 into 0.
-            .map(|n| n * step + 0.0)
-            .map(|value| Tick { place: self.fraction(value), label: label(value) })
-            .collect()
-    }
-
-    /// Powers of ten; 2 and 5 times them on less than two decades; grid lines on less than 2.5.
-    fn logarithmic_ticks(&self) -> Vec<Tick> {
-        let decades = self.high - self.low;
-        let every = (decades / 7.0).ceil().max(1.0);
-        let written = |digit: f64, exponent: f64| match digit {
-            1.0 => exponent.rem_euclid(every) < 0.5,
-            2.0 | 5.0 => decades < 2.0,
-            _ => false,
-        };
-        let drawn = |digit: f64| decades < 2.5 || digit < 2.0;
-        let tick = |digit: f64, exponent: f64| Tick {
-            place: self.fraction(exponent + digit.log10()),
-            label: if written(digit, exponent) { decimal(digit, exponent) } else { String::new() },
-        };
-        multiples(self.low.floor()..=self.high.ceil())
-            .flat_map(|exponent| multiples(1.0..=9.0).map(move |digit| (digit, exponent)))
-            .filter(|(digit, exponent)| {
-                drawn(*digit) && (*digit > 1.5 || exponent.rem_euclid(every) < 0.5)
-            })
-            .map(|(digit, exponent)| tick(digit, exponent))
-            .filter(|tick| (-1e-9..=1.0 + 1e-9).contains(&tick.place))
-            .collect()
-    }
-}
-
-impl Scale {
-    fn of(low: f64, high: f64) -> Self {
-        let (range, size) = (high - low, low.abs().max(high.abs()));
-        let grain = range.log10().ceil();
-        let offset = if size > 1e3 * range {
-            let unit = 10_f64.powf(grain);
-            ((0.5 * low + 0.5 * high) / unit).round() * unit
-        } else {
-            0.0
-        };
-        let left = (low - offset).abs().max((high - offset).abs());
-        let decade = left.log10().floor().clamp(-300.0, 300.0);
-        let exponent = if (-2.0..5.0).contains(&decade) { 0.0 } else { decade };
-        Self::Linear { offset, digits: shortest(offset, -grain), exponent: integer(exponent) }
-    }
-
-    fn reading(self, value: f64) -> f64 {
-        match self {
-            Self::Linear { offset, exponent, .. } => (value - offset) * 10_f64.powi(-exponent),
-            Self::Logarithmic => value.log10(),
+    /// How the numbers along the axis are written.
+    fn format(&self) -> TickFormat {
+        if self.logarithmic {
+            let decades = (self.high / self.low).log10();
+            let (shift, every) = (self.exponent, integer((decades / 7.0).ceil()).max(1));
+            return TickFormat::Custom(Arc::new(move |tick| {
+                let exponent = integer((tick.log10() + 1e-9).floor());
+                let (digit, total) = (tick / 10_f64.powi(exponent), exponent + shift);
+                match digit.round() {
+                    1.0 if total.rem_euclid(every) == 0 => power(total),
+                    digit if digit > 1.0 && decades < 1.5 => format!("{digit}×{}", power(total)),
+                    _ => String::new(),
+                }
+            }));
         }
+        let step = compute_tick_step(self.low, self.high, self.ticks);
+        let digits = (0..9).find(|&n| {
+            let scaled = step * 10_f64.powi(n);
+            (scaled - scaled.round()).abs() < 1e-6 * scaled
+        });
+        let digits = usize::try_from(digits.unwrap_or(9)).unwrap_or(9);
+        TickFormat::Custom(Arc::new(move |tick| {
+            let zero = tick.abs() < 1e-9 * step;
+            if zero { "0".into() } else { format!("{tick:.digits$}").replace('-', "−") }
+        }))
     }
 }
 
-/// The range with its padding; a single value gets a tenth of itself on either side, zero gets 1.
-fn widened(low: f64, high: f64, padding: f64) -> (f64, f64) {
-    let margin = if high > low {
-        padding * (high - low)
-    } else if low.abs() > 0.0 {
-        0.1 * low.abs()
-    } else {
-        1.0
-    };
-    (low - margin, high + margin)
-}
-
-/// The 1, 2 or 5 times a power of ten whose ratio to `step` is nearest to one.
-fn round_step(step: f64) -> f64 {
-    let unit = 10_f64.powf(step.log10().floor());
-    let misfit = |digit: &f64| (digit * unit / step).ln().abs();
-    let digits = [1.0, 2.0, 5.0, 10.0].into_iter();
-    unit * digits.min_by(|a, b| misfit(a).total_cmp(&misfit(b))).unwrap_or(1.0)
-}
-
-/// The `log₁₀` of the largest of 1, 2, 5 times a power of ten that is not above `10^x`.
-fn below(x: f64) -> f64 {
-    let digits = [0.0, 2_f64.log10(), 5_f64.log10()];
-    digits.into_iter().rev().map(|d| x.floor() + d).find(|y| *y <= x).unwrap_or(x)
-}
-
-/// The `log₁₀` of the smallest of 1, 2, 5 times a power of ten that is not below `10^x`: as 1/2 and
-/// 1/5 are 5 and 2 tenths, the mirror image of [`below`].
-fn above(x: f64) -> f64 {
-    -below(-x)
-}
-
-/// Digits after the point that a multiple of `step` needs.
-fn digits_of(step: f64) -> usize {
-    count((-step.log10() - 1e-9).ceil())
-}
-
-/// Digits after the point, up to `most`, that `value` needs.
-fn shortest(value: f64, most: f64) -> usize {
-    let most = count(most);
-    let exact = format!("{value:.most$}");
-    exact.split_once('.').map_or(0, |(_, fraction)| fraction.trim_end_matches('0').len())
-}
-
-fn multiples(range: std::ops::RangeInclusive<f64>) -> impl Iterator<Item = f64> {
-    let (first, last) = range.into_inner();
-    (0..).map(move |n: u16| first + f64::from(n)).take_while(move |n| *n <= last + 0.5)
-}
-
-/// `2×10⁻³`, `10⁻³`.
-fn decimal(digit: f64, exponent: f64) -> String {
-    let power = power(integer(exponent));
-    if digit > 1.5 { format!("{digit}×{power}") } else { power }
+/// A pair of axes in the style of all figures.
+pub(crate) fn layout(x: &Axis, y: &Axis) -> Layout {
+    let mut layout = Layout::new((x.low, x.high), (y.low, y.high))
+        .with_theme(theme())
+        .with_box_axes()
+        .with_label_size(NAME)
+        .with_tick_size(NUMBER)
+        .with_body_size(NUMBER)
+        .with_axis_line_width(0.8)
+        .with_grid_line_width(0.8)
+        .with_tick_width(0.8)
+        .with_tick_length(4.0)
+        .with_x_axis_min(x.low)
+        .with_x_axis_max(x.high)
+        .with_y_axis_min(y.low)
+        .with_y_axis_max(y.high)
+        .with_x_tick_format(x.format())
+        .with_y_tick_format(y.format());
+    (layout.log_x, layout.log_y) = (x.logarithmic, y.logarithmic);
+    for (axis, step) in [(x, &mut layout.x_tick_step), (y, &mut layout.y_tick_step)] {
+        *step = (!axis.logarithmic).then(|| compute_tick_step(axis.low, axis.high, axis.ticks));
+    }
+    layout
 }
 
 /// `10⁻³`
 fn power(exponent: i32) -> String {
-    let raised = |c: char| match c {
-        '-' => '⁻',
-        '1' => '¹',
-        '2' => '²',
-        '3' => '³',
-        '4' => '⁴',
-        '5' => '⁵',
-        '6' => '⁶',
-        '7' => '⁷',
-        '8' => '⁸',
-        '9' => '⁹',
-        _ => '⁰',
+    let raised = |c: char| {
+        c.to_digit(10).map_or('⁻', |n| "⁰¹²³⁴⁵⁶⁷⁸⁹".chars().nth(n as usize).unwrap_or(c))
     };
     format!("10{}", exponent.to_string().chars().map(raised).collect::<String>())
 }
@@ -224,90 +169,58 @@ fn count(x: f64) -> usize {
 
 #[cfg(test)]
 mod tests {
-    use proptest::prelude::*;
-
     use super::*;
 
-    fn labels(axis: &Axis) -> Vec<&str> {
-        axis.ticks.iter().map(|t| t.label.as_str()).filter(|label| !label.is_empty()).collect()
+    fn written(axis: &Axis, tick: f64) -> String {
+        axis.format().format(tick)
     }
 
     #[test]
     fn round_off_is_written_in_its_own_units() {
         let axis = Axis::linear((-2.2e-16, 4.4e-16), 0.05, 5.0).unwrap();
-        assert_eq!(labels(&axis), ["−2", "0", "2", "4"]);
-        assert_eq!(axis.label("|ΔH|"), "|ΔH| (units of 10⁻¹⁶)");
-        assert_eq!(axis.label(""), "units of 10⁻¹⁶");
+        assert_eq!(axis.label("|ΔH|", ""), "|ΔH| (10⁻¹⁶)");
+        assert_eq!(axis.label("|ΔH|", "J"), "|ΔH| (10⁻¹⁶ J)");
+        assert!((axis.reading(2.2e-16) - 2.2).abs() < 1e-12);
     }
 
     #[test]
     fn ordinary_numbers_are_written_as_they_are() {
         let axis = Axis::linear((0.0, 1.0), 0.0, 5.0).unwrap();
-        assert_eq!(labels(&axis), ["0.0", "0.2", "0.4", "0.6", "0.8", "1.0"]);
-        assert_eq!(axis.label("t"), "t");
+        assert_eq!([0.0, 0.2, -0.4].map(|x| written(&axis, x)), ["0", "0.2", "−0.4"]);
+        assert_eq!((axis.label("t", ""), axis.label("t", "s")), ("t".into(), "t (s)".into()));
         let long = Axis::linear((0.0, 2e4), 0.0, 4.0).unwrap();
-        assert_eq!(labels(&long), ["0", "5000", "10000", "15000", "20000"]);
+        assert_eq!(written(&long, 5e3), "5000");
     }
 
     #[test]
     fn common_digits_are_taken_off() {
         let axis = Axis::linear((0.5 - 2e-13, 0.5 + 3.1e-13), 0.0, 5.0).unwrap();
-        assert_eq!(axis.label("H"), "H − 0.5 (units of 10⁻¹³)");
-        assert_eq!(labels(&axis), ["−2", "−1", "0", "1", "2", "3"]);
+        assert_eq!(axis.label("H", ""), "H − 0.5 (10⁻¹³)");
         let negative = Axis::linear((-12.3456789, -12.3456786), 0.0, 5.0).unwrap();
-        assert_eq!(negative.label(""), "value + 12.345679 (units of 10⁻⁷)");
+        assert_eq!(negative.label("", ""), "value + 12.345679 (10⁻⁷)");
     }
 
     #[test]
-    fn a_single_value_has_an_axis() {
-        assert_eq!(
-            labels(&Axis::linear((0.0, 0.0), 0.05, 4.0).unwrap()),
-            ["−1.0", "−0.5", "0.0", "0.5", "1.0"]
-        );
-        let axis = Axis::linear((3.0, 3.0), 0.05, 4.0).unwrap();
-        assert!((axis.place(3.0) - 0.5).abs() < 1e-12);
-        assert!(labels(&axis).contains(&"3.0"));
+    fn an_axis_begins_at_zero_where_that_is_near() {
+        let axis = |low| Axis::linear((low, 30.0), 0.0, 4.0).unwrap();
+        assert_eq!((axis(0.1).low, axis(10.0).low), (0.0, 10.0));
+        let single = Axis::linear((3.0, 3.0), 0.05, 4.0).unwrap();
+        assert!(single.low < 3.0 && single.high > 3.0);
     }
 
     #[test]
     fn decades_are_powers_of_ten() {
-        assert_eq!(labels(&Axis::logarithmic((3e-4, 0.5))), ["10⁻³", "10⁻²", "10⁻¹", "10⁰"]);
-        assert_eq!(
-            labels(&Axis::logarithmic((1e-15, 0.5))),
-            ["10⁻¹⁵", "10⁻¹²", "10⁻⁹", "10⁻⁶", "10⁻³", "10⁰"]
-        );
-        assert_eq!(labels(&Axis::logarithmic((0.03, 0.04))), ["2×10⁻²", "5×10⁻²"]);
+        let axis = Axis::logarithmic((1e-15, 0.5));
+        let labels: Vec<String> =
+            (0..=15).map(|n| written(&axis, 10_f64.powi(n))).filter(|l| !l.is_empty()).collect();
+        assert_eq!(labels, ["10⁻¹⁵", "10⁻¹²", "10⁻⁹", "10⁻⁶", "10⁻³", "10⁰"]);
+        let narrow = Axis::logarithmic((0.03, 0.04));
+        assert_eq!([2.0, 5.0].map(|x| written(&narrow, x)), ["2×10⁻²", "5×10⁻²"]);
     }
 
     #[test]
     fn an_endless_axis_is_refused() {
         let result = Axis::linear((-f64::MAX, f64::MAX), 0.0, 5.0);
         assert!(matches!(result, Err(PlotError::Range { .. })));
-    }
-
-    proptest! {
-        #[test]
-        fn every_axis_has_a_few_ticks_that_differ(
-            centre in -10.0..10.0_f64, size in -18.0..18.0_f64, at in -18.0..18.0_f64
-        ) {
-            let (half, centre) = (10_f64.powf(size), centre * 10_f64.powf(at));
-            let ends = (centre - half, centre + half);
-            let axis = Axis::linear(ends, 0.05, 5.0).unwrap();
-            let mut labels = labels(&axis);
-            prop_assert!((2..=8).contains(&labels.len()), "{labels:?}");
-            labels.dedup();
-            prop_assert_eq!(labels.len(), axis.ticks.len());
-            prop_assert!(labels.iter().all(|label| label.chars().count() <= 9), "{:?}", labels);
-            prop_assert!((0.0..=1.0).contains(&axis.place(ends.0)), "{:?}", axis);
-            prop_assert!((0.0..=1.0).contains(&axis.place(ends.1)), "{:?}", axis);
-        }
-
-        #[test]
-        fn every_logarithmic_axis_has_a_few_labels(low in -18.0..3.0_f64, decades in 0.0..20.0_f64) {
-            let ends = (10_f64.powf(low), 10_f64.powf(low + decades));
-            let axis = Axis::logarithmic(ends);
-            prop_assert!((2..=9).contains(&labels(&axis).len()), "{axis:?}");
-            prop_assert!(axis.place(ends.0) > 0.0 && axis.place(ends.1) < 1.0);
-        }
     }
 }

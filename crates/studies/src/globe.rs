@@ -2,13 +2,11 @@
 
 use std::f64::consts::{FRAC_PI_6, TAU};
 
-use plotters::style::RGBColor;
+use kuva::render::render::{Primitive, TextAnchor};
 
 use crate::{
-    canvas::{At, Canvas, GREY, INK, Type, color},
-    frame,
-    header::Header,
-    plot::PlotError,
+    header::{Entry, Header},
+    plot::{At, GREY, INK, NAME, PlotError, color, line, text},
 };
 
 /// How far from 1 the norm of a point may be: what an integrator that leaves the sphere makes of it
@@ -18,13 +16,11 @@ const SLACK: f64 = 0.05;
 const MARGIN: f64 = 40.0;
 /// How far the axes stick out of the sphere, and their names out of the axes, in pixels.
 const AXIS: [f64; 2] = [22.0, 10.0];
-/// Points of a curve nearer than this to the last one drawn are left out, in pixels.
-const GRAIN: f64 = 0.3;
 /// Points of a circle of the graticule.
 const FINE: u8 = 120;
 
-const SURFACE: RGBColor = RGBColor(247, 249, 251);
-const GRATICULE: RGBColor = RGBColor(218, 222, 226);
+const SURFACE: &str = "#F7F9FB";
+const GRATICULE: &str = "#DADEE2";
 
 type Vector = [f64; 3];
 
@@ -102,12 +98,12 @@ impl Globe {
     /// Width and height of a globe whose disc has this diameter.
     pub(crate) fn size(&self, diameter: f64) -> At {
         let width = diameter + 2.0 * MARGIN;
-        (width, width + self.header().height(width))
+        (width, width + self.header(width).height())
     }
 
     /// The largest disc with which the globe is not higher than this.
     pub(crate) fn diameter_within(&self, height: f64) -> f64 {
-        height - 2.0 * MARGIN - self.header().height(height)
+        height - 2.0 * MARGIN - self.header(height).height()
     }
 
     pub(crate) fn check(&self) -> Result<(), PlotError> {
@@ -132,55 +128,45 @@ impl Globe {
         }
     }
 
-    /// Draws the globe with its upper left corner here.
-    pub(crate) fn draw(
-        &self,
-        canvas: &Canvas<'_>,
-        (left, top): At,
-        diameter: f64,
-    ) -> Result<(), PlotError> {
+    /// The parts, with the upper left corner of the header at the origin.
+    pub(crate) fn parts(&self, letter: char, diameter: f64) -> Vec<Primitive> {
         let (width, height) = self.size(diameter);
-        let upper = top + height - width;
+        let centre = (0.5 * width, height - 0.5 * width);
         let radius = 0.5 * diameter;
-        let centre = (left + 0.5 * width, upper + 0.5 * width);
         let view = View::from(self.viewer, centre, radius);
-        canvas.disc(centre, radius, SURFACE)?;
-        let pale = Ink { color: faded(GREY), width: 0.7 };
-        self.levels.iter().try_for_each(|(_, x)| view.draw(canvas, x, Side::Back, pale))?;
-        for (line, (_, x)) in self.curves.iter().enumerate() {
-            view.draw(canvas, x, Side::Back, Ink { color: faded(color(line)), width: 0.9 })?;
+        let curves = || self.curves.iter().enumerate().map(|(k, (_, x))| (x, color(k)));
+        let mut parts = vec![circle(centre, radius, SURFACE, GREY, 0.9)];
+        for (_, x) in &self.levels {
+            parts.extend(view.lines(x, Side::Back, &faded(GREY), 0.7));
         }
-        let thin = Ink { color: GRATICULE, width: 0.6 };
-        graticule().iter().try_for_each(|x| view.draw(canvas, x, Side::Front, thin))?;
-        canvas.circle(centre, radius, GREY, 0.9)?;
-        view.draw_axes(canvas)?;
-        let grey = Ink { color: GREY, width: 1.0 };
-        self.levels.iter().try_for_each(|(_, x)| view.draw(canvas, x, Side::Front, grey))?;
-        for (line, (_, x)) in self.curves.iter().enumerate() {
-            view.draw(canvas, x, Side::Front, Ink { color: color(line), width: 1.6 })?;
+        for (x, color) in curves() {
+            parts.extend(view.lines(x, Side::Back, &faded(color), 0.9));
         }
-        for (line, (_, x)) in self.curves.iter().enumerate() {
-            view.draw_ends(canvas, x, color(line))?;
+        for x in &graticule() {
+            parts.extend(view.lines(x, Side::Front, GRATICULE, 0.6));
         }
-        self.header().draw(canvas, (left, upper), width)
+        parts.push(circle(centre, radius, "none", GREY, 0.9));
+        parts.extend(view.axes());
+        for (_, x) in &self.levels {
+            parts.extend(view.lines(x, Side::Front, GREY, 1.0));
+        }
+        for (x, color) in curves() {
+            parts.extend(view.lines(x, Side::Front, color, 1.6));
+        }
+        parts.extend(curves().flat_map(|(x, color)| view.ends(x, color)));
+        parts.extend(self.header(width).parts(letter, (4.0, height - width)));
+        parts
     }
 
-    fn header(&self) -> Header<'_> {
+    fn header(&self, width: f64) -> Header<'_> {
         let curves = self.curves.iter().enumerate();
-        let mut entries: Vec<_> =
-            curves.map(|(k, (label, _))| (label.as_str(), color(k))).collect();
+        let mut entries: Vec<Entry<'_>> =
+            curves.map(|(k, (label, _))| (label.as_str(), color(k), false)).collect();
         let mut levels: Vec<_> = self.levels.iter().map(|(label, _)| label.as_str()).collect();
         levels.dedup();
-        entries.extend(levels.into_iter().map(|label| (label, GREY)));
-        Header { title: &self.title, entries }
+        entries.extend(levels.into_iter().map(|label| (label, GREY, false)));
+        Header::of(&self.title, entries, width)
     }
-}
-
-/// How a line is drawn.
-#[derive(Clone, Copy)]
-struct Ink {
-    color: RGBColor,
-    width: f64,
 }
 
 /// A side of the sphere, as the viewer has it.
@@ -249,38 +235,32 @@ impl View {
         unit([0, 1, 2].map(|i| x[i] + t * (y[i] - x[i])))
     }
 
-    fn draw(
+    /// The parts of a curve on one side, as lines.
+    fn lines(
         &self,
-        canvas: &Canvas<'_>,
         points: &[Vector],
         side: Side,
-        ink: Ink,
-    ) -> Result<(), PlotError> {
-        let paths = self.paths(points, side);
-        paths.iter().try_for_each(|path| {
-            let places: Vec<At> = path.iter().map(|x| self.at(x)).collect();
-            canvas.line(spaced(&places), ink.color, ink.width)
-        })
+        color: &str,
+        width: f64,
+    ) -> impl Iterator<Item = Primitive> {
+        let paths = self.paths(points, side).into_iter();
+        paths.map(move |path| line(path.iter().map(|x| self.at(x)).collect(), color, width))
     }
 
-    fn draw_ends(
-        &self,
-        canvas: &Canvas<'_>,
-        points: &[Vector],
-        color: RGBColor,
-    ) -> Result<(), PlotError> {
-        let mark = |x: Vector, filled| {
-            let color = if self.side(&x) == Side::Front { color } else { faded(color) };
-            let inside = if filled { color } else { SURFACE };
-            canvas.disc(self.at(&x), 4.0, inside)?;
-            canvas.circle(self.at(&x), 4.0, color, 1.4)
+    /// A hollow disc at the start of a curve and a filled one at its end.
+    fn ends(&self, points: &[Vector], color: &str) -> Vec<Primitive> {
+        let mark = |x: Vector, filled: bool| {
+            let front = self.side(&x) == Side::Front;
+            let color = if front { color.to_owned() } else { faded(color) };
+            circle(self.at(&x), 4.0, if filled { &color } else { SURFACE }, &color, 1.4)
         };
-        points.first().map_or(Ok(()), |x| mark(unit(*x), false))?;
-        points.last().map_or(Ok(()), |x| mark(unit(*x), true))
+        let start = points.first().map(|x| mark(unit(*x), false));
+        start.into_iter().chain(points.last().map(|x| mark(unit(*x), true))).collect()
     }
 
     /// The ends of the coordinate axes that stick out of the sphere.
-    fn draw_axes(&self, canvas: &Canvas<'_>) -> Result<(), PlotError> {
+    fn axes(&self) -> Vec<Primitive> {
+        let mut parts = Vec::new();
         let tip = 1.0 + AXIS[0] / self.radius;
         for (i, name) in ["x₁", "x₂", "x₃"].into_iter().enumerate() {
             let axis = |length: f64| [0, 1, 2].map(|j| if i == j { length } else { 0.0 });
@@ -288,12 +268,12 @@ impl View {
             // Behind the sphere an axis begins where the disc does not cover it.
             let start = if self.side(&axis(1.0)) == Side::Front { 1.0 } else { across.recip() };
             if start < tip {
-                canvas.line([self.at(&axis(start)), self.at(&axis(tip))], INK, 1.0)?;
+                parts.push(line(vec![self.at(&axis(start)), self.at(&axis(tip))], INK, 1.0));
                 let name_at = self.at(&axis(tip + AXIS[1] / (self.radius * across.max(1e-3))));
-                canvas.text(name, name_at, Type::centred(frame::NAME))?;
+                parts.push(text(name, name_at, NAME, TextAnchor::Middle));
             }
         }
-        Ok(())
+        parts
     }
 
     /// The distance from the centre of the disc, in radii.
@@ -302,16 +282,10 @@ impl View {
     }
 }
 
-/// The points with those left out that are too near to the one before to be told from it.
-fn spaced(places: &[At]) -> Vec<At> {
-    let mut kept: Vec<At> = Vec::new();
-    for (k, &(x, y)) in places.iter().enumerate() {
-        let far = |&(a, b): &At| (x - a).hypot(y - b) >= GRAIN;
-        if k + 1 == places.len() || kept.last().is_none_or(far) {
-            kept.push((x, y));
-        }
-    }
-    kept
+/// A disc with its outline.
+fn circle((cx, cy): At, r: f64, inside: &str, outline: &str, width: f64) -> Primitive {
+    let (fill, stroke, stroke_width) = (inside.into(), Some(outline.into()), Some(width));
+    Primitive::Circle { cx, cy, r, fill, fill_opacity: None, stroke, stroke_width }
 }
 
 /// Meridians and parallels, 30° apart.
@@ -333,12 +307,13 @@ fn graticule() -> Vec<Vec<Vector>> {
 }
 
 /// Two thirds of the way to the colour of the surface.
-fn faded(color: RGBColor) -> RGBColor {
-    let mix = |ink: u8, paper: u8| {
-        let mixed = (u16::from(ink) + 2 * u16::from(paper)) / 3;
-        u8::try_from(mixed).unwrap_or(u8::MAX)
+fn faded(color: &str) -> String {
+    let part = |text: &str, k: usize| {
+        let digits = text.get(2 * k + 1..2 * k + 3).unwrap_or("0");
+        u32::from_str_radix(digits, 16).unwrap_or(0)
     };
-    RGBColor(mix(color.0, SURFACE.0), mix(color.1, SURFACE.1), mix(color.2, SURFACE.2))
+    let mixed = [0, 1, 2].map(|k| (part(color, k) + 2 * part(SURFACE, k)) / 3);
+    format!("#{:02X}{:02X}{:02X}", mixed[0], mixed[1], mixed[2])
 }
 
 fn dot(a: &Vector, b: &Vector) -> f64 {
@@ -412,20 +387,12 @@ mod tests {
     }
 
     #[test]
-    fn points_too_near_to_be_told_apart_are_left_out() {
-        let line: Vec<At> = (0..=1000).map(|n| (0.01 * f64::from(n), 0.0)).collect();
-        let kept = spaced(&line);
-        assert!((30..=36).contains(&kept.len()), "{}", kept.len());
-        assert_eq!((kept[0], kept[kept.len() - 1]), (line[0], line[1000]));
-    }
-
-    #[test]
     fn levels_of_one_name_share_their_entry() {
         let one = Globe::new("globe").level("H", equator()).level("H", equator());
-        assert_eq!(one.header().entries.len(), 1);
-        assert_eq!(one.clone().curve("x", equator()).header().entries.len(), 2);
+        assert_eq!(one.header(400.0).entries().len(), 0);
+        assert_eq!(one.clone().curve("x", equator()).header(400.0).entries().len(), 2);
         let svg = Panels::new("").globe(one.curve("x", equator())).svg().unwrap();
-        assert_eq!(svg.matches("\nH\n").count(), 1);
+        assert_eq!(svg.matches(">H<").count(), 1);
     }
 
     #[test]

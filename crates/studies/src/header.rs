@@ -1,76 +1,84 @@
-//! What stands above a picture: its title, and a legend as soon as there is something to tell apart.
+//! What stands above a picture: its letter, its title, and a legend as soon as there is something to tell
+//! apart.
 
-use plotters::style::RGBColor;
+use kuva::render::render::{Primitive, TextAnchor};
 
-use crate::{
-    canvas::{At, Canvas, Type, length},
-    frame,
-    plot::PlotError,
-};
+use crate::plot::{At, INK, NAME, NUMBER, fitting, length, line, text};
 
-/// Height of a row of the legend.
+/// Height of a row.
 const ROW: f64 = 18.0;
-/// Room for the title.
-const TITLE: f64 = 26.0;
-/// Room for the line that stands before a label.
+/// Room for the letter, for the line before a label, and between two entries.
+const LETTER: f64 = 22.0;
 const SAMPLE: f64 = 24.0;
-/// Room between two entries.
-const GAP: f64 = 16.0;
+const GAP: f64 = 14.0;
 
-/// A title with the labels and colours of what is drawn under it.
+/// A line of the legend: its label, its colour, and whether it is dashed.
+pub(crate) type Entry<'a> = (&'a str, &'static str, bool);
+
+/// A title and a legend, set in rows of a given width.
 pub(crate) struct Header<'a> {
-    pub(crate) title: &'a str,
-    pub(crate) entries: Vec<(&'a str, RGBColor)>,
+    title: &'a str,
+    /// The entries with their distances from the left and their rows.
+    entries: Vec<(Entry<'a>, f64, f64)>,
+    rows: f64,
+    width: f64,
 }
 
-impl Header<'_> {
-    /// Its height above a picture of this width.
-    pub(crate) fn height(&self, width: f64) -> f64 {
-        TITLE + ROW * self.rows(width).len() as f64
+impl<'a> Header<'a> {
+    pub(crate) fn of(title: &'a str, entries: Vec<Entry<'a>>, width: f64) -> Self {
+        let start = if title.is_empty() { LETTER } else { LETTER + length(title, NAME) + GAP };
+        let (mut x, mut row) = (start, 0.0);
+        let several = entries.len() > 1;
+        let set = entries.into_iter().filter(|_| several).map(|entry| {
+            let needed = SAMPLE + length(entry.0, NUMBER);
+            if x + needed > width && x > LETTER {
+                (x, row) = (LETTER, row + 1.0);
+            }
+            let placed = (entry, x, row);
+            x += needed + GAP;
+            placed
+        });
+        let entries = set.collect();
+        Self { title, entries, rows: row + 1.0, width }
     }
 
-    /// Draws it over the edge of a picture, from its upper left corner to the right.
-    pub(crate) fn draw(
-        &self,
-        canvas: &Canvas<'_>,
-        (left, top): At,
-        width: f64,
-    ) -> Result<(), PlotError> {
-        let rows = self.rows(width);
-        let first = top - ROW * rows.len() as f64;
-        let set = Type::centred(frame::SUBTITLE).fitting(self.title, width);
-        canvas.text(self.title, (left + 0.5 * width, first - 12.0), set)?;
-        for (row, entries) in rows.iter().enumerate() {
-            let y = first + ROW * (row as f64 + 0.4);
-            for &(entry, place) in entries {
-                let (x, (label, color)) = (left + place, self.entries[entry]);
-                let set = Type::left(frame::NUMBER).fitting(label, width - place - SAMPLE);
-                canvas.line([(x, y), (x + 18.0, y)], color, 2.0)?;
-                canvas.text(label, (x + SAMPLE, y), set)?;
-            }
-        }
-        Ok(())
+    /// Its height above the picture.
+    pub(crate) fn height(&self) -> f64 {
+        ROW * self.rows + 6.0
     }
 
-    /// The rows of the legend, in the middle, each of entries `(number, place)`.
-    fn rows(&self, width: f64) -> Vec<Vec<(usize, f64)>> {
-        if self.entries.len() < 2 {
-            return Vec::new();
-        }
-        let mut rows = vec![(Vec::new(), -GAP)];
-        for (number, (label, _)) in self.entries.iter().enumerate() {
-            let entry = SAMPLE + length(label, frame::NUMBER) + GAP;
-            if let Some((row, used)) = rows.last_mut().filter(|(_, used)| used + entry <= width) {
-                row.push((number, *used + GAP));
-                *used += entry;
-            } else {
-                rows.push((vec![(number, 0.0)], entry - GAP));
+    #[cfg(test)]
+    pub(crate) fn entries(&self) -> Vec<&str> {
+        self.entries.iter().map(|(entry, ..)| entry.0).collect()
+    }
+
+    /// The parts, with the upper left corner of the picture at a place.
+    pub(crate) fn parts(&self, letter: char, (left, top): At) -> Vec<Primitive> {
+        let middle = |row: f64| top - self.height() + ROW * (row + 0.5);
+        let mut parts = vec![
+            Primitive::Text {
+                x: left,
+                y: middle(0.0) + 5.0,
+                content: letter.into(),
+                size: NAME + 2,
+                anchor: TextAnchor::Start,
+                rotate: None,
+                bold: true,
+                color: Some(INK.into()),
+            },
+            text(self.title, (left + LETTER, middle(0.0)), NAME, TextAnchor::Start),
+        ];
+        for &((label, color, dashed), x, row) in &self.entries {
+            let (x, y) = (left + x, middle(row));
+            let mut sample = line(vec![(x, y), (x + 18.0, y)], color, 2.0);
+            if let Primitive::PolyLine { stroke_dasharray, stroke_width, .. } = &mut sample
+                && dashed
+            {
+                (*stroke_dasharray, *stroke_width) = (Some("5 4".into()), 1.0);
             }
+            let size = fitting(label, NUMBER, self.width - (x - left) - SAMPLE);
+            parts.extend([sample, text(label, (x + SAMPLE, y), size, TextAnchor::Start)]);
         }
-        let centred = |(row, used): (Vec<(usize, f64)>, f64)| {
-            let margin = (0.5 * (width - used)).max(0.0);
-            row.into_iter().map(|(number, place)| (number, margin + place)).collect::<Vec<_>>()
-        };
-        rows.into_iter().map(centred).filter(|row| !row.is_empty()).collect()
+        parts
     }
 }

@@ -55,8 +55,6 @@ pub mod report;
 pub mod table;
 
 mod axis;
-mod canvas;
-mod frame;
 mod globe;
 mod header;
 mod log_log;

@@ -2,20 +2,24 @@
 
 use std::path::PathBuf;
 
+use kuva::plot::{LineStyle, scatter::MarkerShape};
+use kuva::prelude::{LegendEntry, LegendPosition, LegendShape, LinePlot, Plot, ScatterPlot};
+use kuva::render::annotations::TextAnnotation;
+use kuva::render::layout::{ComputedLayout, Layout};
+use kuva::render::render::render_multiple;
+
 use crate::{
-    axis::Axis,
-    canvas::{self, At, Canvas, GREY, INK, Marker, Type, color, length},
-    frame::{self, Frame},
+    axis::{Axis, layout},
     order::Order,
-    plot::{self, PlotError},
+    plot::{self, GREY, INK, NUMBER, PlotError, color},
 };
 
-/// Height of an entry of the legend, of one below it for the same problem, and between two problems.
-const ROW: f64 = 36.0;
-const RIVAL: f64 = 20.0;
-const GAP: f64 = 6.0;
-/// Length of the line that stands in it.
-const SAMPLE: f64 = 30.0;
+/// Width and height of the frame, and the room for the title above it and the name below it.
+const FRAME: (f64, f64) = (440.0, 360.0);
+const TOP: f64 = 40.0;
+const BELOW: f64 = 46.0;
+/// Height of a row of the legend.
+const ROW: f64 = 18.0;
 
 /// A figure of errors over step sizes, with the fitted [`Order`] of each series in the legend.
 ///
@@ -113,22 +117,24 @@ impl LogLog {
     /// [`PlotError::Empty`] without series or points, [`PlotError::NonPositive`] and
     /// [`PlotError::NonFinite`] for a point without logarithms.
     pub fn svg(&self) -> Result<String, PlotError> {
-        let frame = self.frame()?;
-        let column = frame.lower_right.0 + 20.0;
-        let legend = self.series.iter().map(Series::legend_width).fold(0.0, f64::max);
-        let title = length(&self.title, frame::TITLE) + 20.0;
-        let width = (column + legend + 8.0).max(title);
-        let rows = frame.upper_left.1 + self.series.iter().map(Series::height).sum::<f64>();
-        let height = rows.max(frame.lower_right.1 + frame::BELOW) + 6.0;
-        canvas::sheet((width, height), |canvas| {
-            let middle = 0.5 * (frame.upper_left.0 + frame.lower_right.0);
-            let centre = middle.max(0.5 * title);
-            canvas.text(&self.title, (centre, 22.0), Type::centred(frame::TITLE))?;
-            frame.draw(canvas, (&self.horizontal, &self.vertical))?;
-            self.guides.iter().try_for_each(|&p| self.draw_guide(canvas, &frame, p))?;
-            self.draw_series(canvas, &frame)?;
-            self.draw_legend(canvas, (column, frame.upper_left.1 + 10.0))
-        })
+        let (x, y) = self.axes()?;
+        let mut plots = self.guides.iter().flat_map(|&p| self.guide_plot((&x, &y), p)).collect();
+        self.series.iter().for_each(|series| series.plots((&x, &y), &mut plots));
+        let mut layout = self.layout((&x, &y));
+        let computed = ComputedLayout::from_layout(&layout);
+        let (left, right) = (computed.margin_left.ceil(), computed.margin_right.ceil());
+        let rows: usize = self.series.iter().map(|series| 2 - series.look.rank.min(1)).sum();
+        let height = (FRAME.1 + BELOW).max(ROW * rows as f64 + 24.0);
+        let size = (left + FRAME.0 + right, TOP + height);
+        (layout.width, layout.height) = (Some(size.0), Some(size.1));
+        layout = layout
+            .with_force_margins(left, right)
+            .with_force_margins_y(TOP, height - FRAME.1);
+        layout.x_label_offset = (0.0, FRAME.1 + BELOW - height);
+        let middle = left + 0.5 * FRAME.0;
+        let mut sheet = plot::sheet(size, &self.title, middle);
+        plot::place(&mut sheet, (0.0, 0.0), render_multiple(plots, layout).elements);
+        Ok(plot::svg(&sheet))
     }
 
     /// Writes the figure to a file.
@@ -140,74 +146,69 @@ impl LogLog {
         plot::save(path.into(), &self.svg()?)
     }
 
-    fn frame(&self) -> Result<Frame, PlotError> {
+    fn axes(&self) -> Result<(Axis, Axis), PlotError> {
         if self.series.is_empty() {
             return Err(PlotError::Empty { name: self.title.clone() });
         }
         self.series.iter().try_for_each(Series::check)?;
         let points = || self.series.iter().flat_map(|series| &series.points);
         let (x, y) = (ends(points().map(|p| p.0)), ends(points().map(|p| p.1)));
-        let (x, y) = (Axis::logarithmic(x), Axis::logarithmic(y));
-        let left = 8.0 + frame::margin(&y, &self.vertical);
-        Ok(Frame { x, y, upper_left: (left, 46.0), lower_right: (left + 440.0, 406.0) })
+        Ok((Axis::logarithmic(x), Axis::logarithmic(y)))
     }
 
-    fn draw_series(&self, canvas: &Canvas<'_>, frame: &Frame) -> Result<(), PlotError> {
-        for series in &self.series {
-            let path: Vec<At> = series.points.iter().map(|&point| frame.at(point)).collect();
-            let line = series.look.line;
-            series.look.draw(canvas, &path)?;
-            for (index, &point) in series.given.iter().enumerate() {
-                let filled = !series.is_round_off(index);
-                canvas.marker(frame.at(point), Marker { line, filled })?;
-            }
-        }
-        Ok(())
+    /// The axes, their names and the legend, for `kuva`.
+    fn layout(&self, (x, y): (&Axis, &Axis)) -> Layout {
+        let layout = layout(x, y)
+            .with_x_label(&self.horizontal)
+            .with_y_label(&self.vertical)
+            .with_legend_position(LegendPosition::OutsideRightTop)
+            .with_legend_box(false);
+        let labels = self.guides.iter().filter_map(|&p| self.guide_points((x, y), p)).map(
+            |(p, [_, corner, end])| {
+                let (x, y) = (end.0 * 1.12, (corner.1 * end.1).sqrt());
+                TextAnnotation::new(p, x, y).with_color(INK).with_font_size(NUMBER)
+            },
+        );
+        let layout = labels.fold(layout, Layout::with_annotation);
+        let mut problems = self.series.chunk_by(|_, next| next.look.rank > 0);
+        problems.by_ref().fold(layout, |layout, problem| {
+            let entries = problem.iter().map(Series::legend).collect();
+            layout.with_legend_group(&problem[0].label, entries)
+        })
     }
 
-    fn draw_legend(&self, canvas: &Canvas<'_>, (left, top): At) -> Result<(), PlotError> {
-        let mut bottom = top - GAP;
-        for series in &self.series {
-            let y = bottom + if series.look.rank == 0 { GAP } else { 0.0 };
-            bottom += series.height();
-            series.look.draw(canvas, &[(left, y), (left + SAMPLE, y)])?;
-            let marker = Marker { line: series.look.line, filled: true };
-            canvas.marker((left + 0.5 * SAMPLE, y), marker)?;
-            let beside = left + SAMPLE + 8.0;
-            let small = Type::left(frame::NUMBER).grey();
-            if series.look.rank == 0 {
-                canvas.text(&series.label, (beside, y), Type::left(frame::NAME))?;
-                canvas.text(&series.slope_label(), (beside, y + 16.0), small)?;
-            } else {
-                canvas.text(&series.rival_label(), (beside, y), small)?;
-            }
-        }
-        Ok(())
-    }
-
-    /// A triangle to the lower right of the middle of the series.
-    fn draw_guide(&self, canvas: &Canvas<'_>, frame: &Frame, p: f64) -> Result<(), PlotError> {
+    /// A triangle of slope `p` to the lower right of the middle of the series it fits best: its label and
+    /// the corners in readings of the axes.
+    fn guide_points(&self, (x, y): (&Axis, &Axis), p: f64) -> Option<(String, [(f64, f64); 3])> {
         let misfit = |series: &&Series| (series.slope() - p).abs();
-        let nearest = self.series.iter().min_by(|a, b| misfit(a).total_cmp(&misfit(b)));
-        let Some((low, high)) = nearest.map(Series::middle) else { return Ok(()) };
-        let rise = |x: f64| high.1 * (x / high.0).powf(p);
-        let shift = |(x, y): At| (x + 12.0, y + 8.0);
-        let (start, end) = (shift(frame.at((low.0, rise(low.0)))), shift(frame.at(high)));
-        let corner = (end.0, start.1);
-        canvas.line([start, corner, end, start], GREY, 1.0)?;
-        let beside = (end.0 + 6.0, 0.5 * (corner.1 + end.1));
-        let label = Type { color: INK, ..Type::left(frame::NUMBER) };
-        canvas.text(&format!("{p}"), beside, label)
+        let nearest = self.series.iter().min_by(|a, b| misfit(a).total_cmp(&misfit(b)))?;
+        let (low, high) = nearest.middle();
+        let (right, down) = (x.fraction(0.025), y.fraction(-0.025));
+        let at = |(a, b)| (x.reading(a) * right, y.reading(b) * down);
+        let (start, end) = (at((low.0, high.1 * (low.0 / high.0).powf(p))), at(high));
+        Some((p.to_string(), [start, (end.0, start.1), end]))
+    }
+
+    fn guide_plot(&self, axes: (&Axis, &Axis), p: f64) -> Option<Plot> {
+        let (_, [start, corner, end]) = self.guide_points(axes, p)?;
+        let line = LinePlot::new().with_data([start, corner, end, start]).with_color(GREY);
+        Some(Plot::Line(line.with_stroke_width(1.0)))
     }
 }
 
 impl Look {
-    fn draw(self, canvas: &Canvas<'_>, path: &[At]) -> Result<(), PlotError> {
+    fn style(self) -> LineStyle {
         match self.rank {
-            0 => canvas.line(path.iter().copied(), color(self.line), 1.2),
-            1 => canvas.dashed(path, color(self.line)),
-            _ => canvas.dotted(path, color(self.line)),
+            0 => LineStyle::Solid,
+            1 => LineStyle::Custom("5 4".into()),
+            _ => LineStyle::Custom("0.5 4".into()),
         }
+    }
+
+    /// Shapes that differ, for those who cannot go by colour.
+    fn marker(self) -> MarkerShape {
+        use MarkerShape::{Circle, Diamond, Pentagon, Square, Triangle, TriangleDown};
+        [Circle, Square, Triangle, Diamond, Pentagon, TriangleDown][self.line % 6]
     }
 }
 
@@ -241,30 +242,37 @@ impl Series {
         self.order.as_ref().map_or(0.0, |order| order.slope)
     }
 
-    fn slope_label(&self) -> String {
-        self.order
-            .as_ref()
-            .map_or_else(|| "no slope fitted".into(), |order| format!("slope {order}"))
+    /// Its line, its markers, and the hollow markers of round-off, for `kuva`.
+    fn plots(&self, (x, y): (&Axis, &Axis), plots: &mut Vec<Plot>) {
+        let at = |(a, b): &(f64, f64)| (x.reading(*a), y.reading(*b));
+        let (color, style) = (color(self.look.line), self.look.style());
+        let line = LinePlot::new().with_data(self.points.iter().map(at)).with_color(color);
+        plots.push(Plot::Line(line.with_stroke_width(1.2).with_line_style(style)));
+        for round_off in [false, true] {
+            let given = self.given.iter().enumerate();
+            let chosen = given.filter(|(index, _)| self.is_round_off(*index) == round_off);
+            let markers = ScatterPlot::new()
+                .with_data(chosen.map(|(_, point)| at(point)))
+                .with_color(color)
+                .with_size(3.6)
+                .with_marker(self.look.marker())
+                .with_marker_stroke_width(1.2);
+            let opacity = if round_off { 0.0 } else { 1.0 };
+            plots.push(Plot::Scatter(markers.with_marker_opacity(opacity)));
+        }
     }
 
-    /// The slope with the name of a rival, on one line.
-    fn rival_label(&self) -> String {
-        format!("{}, {}", self.label, self.slope_label())
-    }
-
-    /// The height of its entry in the legend, with the gap above it.
-    const fn height(&self) -> f64 {
-        if self.look.rank == 0 { GAP + ROW } else { RIVAL }
-    }
-
-    fn legend_width(&self) -> f64 {
-        let number = |text: String| length(&text, frame::NUMBER);
-        let text = if self.look.rank == 0 {
-            length(&self.label, frame::NAME).max(number(self.slope_label()))
-        } else {
-            number(self.rival_label())
+    /// The slope; for a rival with its name and its line.
+    fn legend(&self) -> LegendEntry {
+        let order = self.order.as_ref();
+        let slope =
+            order.map_or_else(|| "no slope fitted".into(), |order| format!("slope {order}"));
+        let (color, dasharray) = (color(self.look.line).into(), self.look.style().dasharray());
+        let (label, shape) = match self.look.rank {
+            0 => (slope, LegendShape::Marker(self.look.marker())),
+            _ => (format!("{}, {slope}", self.label), LegendShape::Line),
         };
-        SAMPLE + 8.0 + text
+        LegendEntry { label, color, shape, dasharray }
     }
 
     fn is_round_off(&self, index: usize) -> bool {
@@ -300,11 +308,11 @@ mod tests {
         assert!(svg.contains("slope 4.00 [4.00, 4.00]"));
         let order =
             Series::of("s".into(), &with_plateau(), Look { line: 0, rank: 0 }).order.unwrap();
-        let polygons =
-            |fill: &str| svg.matches(&format!("<polygon opacity=\"1\" fill=\"{fill}\"")).count();
-        assert_eq!(polygons("#FFFFFF"), order.plateau.len());
-        // One of the filled ones is in the legend.
-        assert_eq!(polygons("#0072B2"), order.used.len() + 1);
+        let markers = |opacity: &str| {
+            let circles = svg.lines().filter(|line| line.contains("<circle"));
+            circles.filter(|line| line.contains(&format!("fill-opacity=\"{opacity}\""))).count()
+        };
+        assert_eq!((markers("0"), markers("1")), (order.plateau.len(), order.used.len()));
         assert!(order.plateau.len() >= 4);
     }
 
@@ -324,11 +332,10 @@ mod tests {
         let looks: Vec<_> = all.series.iter().map(|series| series.look).collect();
         let look = |line, rank| Look { line, rank };
         assert_eq!(looks, [look(0, 0), look(0, 1), look(0, 2), look(1, 0)]);
-        let lines = |figure: LogLog| figure.svg().unwrap().matches("<polyline").count();
-        let [solid, dashed, dotted] =
-            [figure().series("b", with_plateau()), rival(), rival().rival("c", with_plateau())]
-                .map(lines);
-        assert!(solid < dashed && dashed - solid < dotted - dashed);
+        let dashed = rival().rival("c", with_plateau()).svg().unwrap();
+        // On the line and in the legend.
+        let count = |style: &str| dashed.matches(&format!("stroke-dasharray=\"{style}\"")).count();
+        assert_eq!((count("5 4"), count("0.5 4")), (2, 2));
     }
 
     #[test]

@@ -2,13 +2,18 @@
 
 use std::path::PathBuf;
 
+use kuva::plot::annotations::ReferenceLine;
+use kuva::prelude::{LinePlot, Plot, ScatterPlot};
+use kuva::render::{
+    layout::{ComputedLayout, Layout},
+    render::{Primitive, render_multiple},
+};
+
 use crate::{
-    axis::Axis,
-    canvas::{self, At, Canvas, Marker, Type, color},
-    frame::{self, Frame},
+    axis::{Axis, layout},
     globe::Globe,
-    header::Header,
-    plot::{self, PlotError},
+    header::{Entry, Header},
+    plot::{self, At, INK, NAME, PlotError, color, fitting},
 };
 
 /// Stretches of a line of which the lowest and the highest point are drawn, at most.
@@ -16,7 +21,15 @@ const STRETCHES: usize = 700;
 /// Stretches of all lines of a figure: what keeps its file below some 300 kB.
 const ALL_STRETCHES: usize = 12_000;
 
-/// A figure of titled panels in a grid, with globes to the left of it.
+/// Room around the sheet, for the title, to the right of a panel, and for the numbers and the name below it.
+const EDGE: f64 = 8.0;
+const HEAD: f64 = 36.0;
+const RIGHT: f64 = 16.0;
+const BELOW: f64 = 46.0;
+/// The diameter of a globe, from beside a low grid to beside a high one.
+const DISC: (f64, f64) = (300.0, 440.0);
+
+/// A figure of panels in a grid, with globes to the left of it. Each has a letter.
 ///
 /// # Examples
 ///
@@ -26,9 +39,9 @@ const ALL_STRETCHES: usize = 12_000;
 /// let energy: Vec<(f64, f64)> =
 ///     (0..100).map(f64::from).map(|t| (t, 2.2e-16 * t.sin())).collect();
 /// let svg = Panels::new("A free rigid body")
-///     .panel(Panel::new("energy", "t").vertical("ΔH").line("Weyl midpoint", &energy).level(0.0))
+///     .panel(Panel::new("energy H − H₀", "t").line("Weyl midpoint", &energy).level(0.0))
 ///     .svg()?;
-/// assert!(svg.contains("ΔH (units of 10⁻¹⁶)"));
+/// assert!(svg.contains("energy H − H₀ (10⁻¹⁶)"));
 /// # Ok::<(), metriplectic_studies::PlotError>(())
 /// ```
 #[derive(Clone, Debug)]
@@ -39,14 +52,15 @@ pub struct Panels {
     panels: Vec<Panel>,
 }
 
-/// A titled pair of axes with lines on it.
+/// A pair of axes with lines on it.
 #[derive(Clone, Debug)]
 pub struct Panel {
     title: String,
     horizontal: String,
     vertical: String,
+    unit: String,
     lines: Vec<(String, Vec<(f64, f64)>)>,
-    levels: Vec<f64>,
+    levels: Vec<(String, f64)>,
     /// The lower end of a logarithmic axis.
     floor: Option<f64>,
     /// Whether a unit has the same length on both axes.
@@ -54,13 +68,14 @@ pub struct Panel {
 }
 
 impl Panel {
-    /// A panel with a title and the name of its horizontal axis.
+    /// A panel with the quantity on its vertical axis and the name of its horizontal axis.
     #[must_use]
-    pub fn new(title: impl Into<String>, horizontal: impl Into<String>) -> Self {
+    pub fn new(quantity: impl Into<String>, horizontal: impl Into<String>) -> Self {
         Self {
-            title: title.into(),
+            title: String::new(),
             horizontal: horizontal.into(),
-            vertical: String::new(),
+            vertical: quantity.into(),
+            unit: String::new(),
             lines: Vec::new(),
             levels: Vec::new(),
             floor: None,
@@ -68,10 +83,17 @@ impl Panel {
         }
     }
 
-    /// Names the vertical axis.
+    /// Puts a title above the panel, where the quantity does not say enough.
     #[must_use]
-    pub fn vertical(mut self, name: impl Into<String>) -> Self {
-        self.vertical = name.into();
+    pub fn title(mut self, title: impl Into<String>) -> Self {
+        self.title = title.into();
+        self
+    }
+
+    /// Names the unit of the vertical axis.
+    #[must_use]
+    pub fn unit(mut self, unit: impl Into<String>) -> Self {
+        self.unit = unit.into();
         self
     }
 
@@ -85,8 +107,14 @@ impl Panel {
 
     /// Adds a dashed line at height `y`.
     #[must_use]
-    pub fn level(mut self, y: f64) -> Self {
-        self.levels.push(y);
+    pub fn level(self, y: f64) -> Self {
+        self.named_level("", y)
+    }
+
+    /// Adds a dashed line at height `y` with an entry in the legend.
+    #[must_use]
+    pub fn named_level(mut self, label: impl Into<String>, y: f64) -> Self {
+        self.levels.push((label.into(), y));
         self
     }
 
@@ -113,60 +141,61 @@ impl Panel {
     /// The points of the lines and the levels, checked, as `(least, greatest)` of `x` and `y`.
     fn ranges(&self) -> Result<[(f64, f64); 2], PlotError> {
         if self.lines.is_empty() {
-            return Err(PlotError::Empty { name: self.title.clone() });
+            return Err(PlotError::Empty { name: self.vertical.clone() });
+        }
+        if let Some(low) = self.floor.filter(|low| !(low.is_normal() && *low > 0.0)) {
+            return Err(PlotError::Range { low, high: low });
         }
         let mut ranges = [(f64::INFINITY, f64::NEG_INFINITY); 2];
         for (label, points) in &self.lines {
-            check(label, points)?;
-            self.check_logarithms(label, points)?;
-            points.iter().for_each(|(x, y)| ranges = [wider(ranges[0], *x), wider(ranges[1], *y)]);
-        }
-        for (index, &y) in self.levels.iter().enumerate() {
-            if !y.is_finite() {
-                return Err(PlotError::NonFinite { name: self.title.clone(), index, x: 0.0, y });
+            if points.is_empty() {
+                return Err(PlotError::Empty { name: label.clone() });
             }
-            self.check_logarithms(&self.title, &[(0.0, y)])?;
-            ranges[1] = wider(ranges[1], y);
-        }
-        ranges[1] = (self.shown(ranges[1].0), self.shown(ranges[1].1));
-        match self.floor {
-            Some(low) if !(low.is_normal() && low > 0.0) => {
-                Err(PlotError::Range { low, high: ranges[1].1 })
+            for (index, &(x, y)) in points.iter().enumerate() {
+                self.check(label, index, (x, y))?;
+                ranges = [wider(ranges[0], x), wider(ranges[1], self.shown(y))];
             }
-            _ => Ok(ranges),
         }
+        for (index, &(_, y)) in self.levels.iter().enumerate() {
+            self.check(&self.vertical, index, (0.0, y))?;
+            ranges[1] = wider(ranges[1], self.shown(y));
+        }
+        Ok(ranges)
     }
 
-    /// Whether all ordinates have a place on the axis, if it is logarithmic.
-    fn check_logarithms(&self, label: &str, points: &[(f64, f64)]) -> Result<(), PlotError> {
-        let negative = |(_, y): &(f64, f64)| *y < 0.0;
-        match points.iter().position(negative).filter(|_| self.floor.is_some()) {
-            Some(index) => {
-                let (x, y) = points[index];
-                Err(PlotError::NonPositive { name: label.to_owned(), index, x, y })
-            }
-            None => Ok(()),
+    /// Whether a point has a place on the axes.
+    fn check(&self, label: &str, index: usize, (x, y): At) -> Result<(), PlotError> {
+        let name = || label.to_owned();
+        if !(x.is_finite() && y.is_finite()) {
+            return Err(PlotError::NonFinite { name: name(), index, x, y });
         }
+        if self.floor.is_some() && y < 0.0 {
+            return Err(PlotError::NonPositive { name: name(), index, x, y });
+        }
+        Ok(())
     }
 
     fn axes(&self, (width, height): At) -> Result<(Axis, Axis), PlotError> {
-        let [x, y] = self.ranges()?;
+        let [mut x, mut y] = self.ranges()?;
+        let ticks = (width / 65.0, height / 42.0);
+        let mut padding = 0.06;
         if self.equal {
             let unit = (1.06 * (x.1 - x.0) / width).max(1.12 * (y.1 - y.0) / height);
-            let (x, y) = (around(x, unit * width), around(y, unit * height));
-            return Ok((Axis::linear(x, 0.0, width / 65.0)?, Axis::linear(y, 0.0, height / 42.0)?));
+            (x, y, padding) = (around(x, unit * width), around(y, unit * height), 0.0);
         }
         let vertical = match self.floor {
             Some(_) => Axis::logarithmic(y),
-            None => Axis::linear(y, 0.06, height / 42.0)?,
+            None => Axis::linear(y, padding, ticks.1)?,
         };
-        Ok((Axis::linear(x, 0.0, width / 65.0)?, vertical))
+        Ok((Axis::linear(x, 0.0, ticks.0)?, vertical))
     }
 
-    fn header(&self) -> Header<'_> {
-        let labels = self.labels().into_iter().enumerate();
-        let entries = labels.map(|(k, label)| (label, color(k))).collect();
-        Header { title: &self.title, entries }
+    fn header(&self, width: f64) -> Header<'_> {
+        let lines = self.labels().into_iter().enumerate();
+        let lines = lines.map(|(k, label)| (label, color(k), false));
+        let levels = self.levels.iter().filter(|(label, _)| !label.is_empty());
+        let levels = levels.map(|(label, _)| (label.as_str(), INK, true));
+        Header::of(&self.title, lines.chain(levels).collect::<Vec<Entry<'_>>>(), width)
     }
 
     /// The labels of the lines, each once.
@@ -180,21 +209,38 @@ impl Panel {
         labels
     }
 
-    fn draw(&self, canvas: &Canvas<'_>, frame: &Frame, stretches: usize) -> Result<(), PlotError> {
-        frame.draw(canvas, (&self.horizontal, &self.vertical))?;
-        let labels = self.labels();
-        for (label, points) in &self.lines {
-            let line = labels.iter().position(|other| other == label).unwrap_or(0);
-            let shown = thinned(points, stretches).map(|(x, y)| frame.at((x, self.shown(y))));
-            canvas.line(shown, color(line), 1.4)?;
-            if let &[(x, y)] = points.as_slice() {
-                canvas.marker(frame.at((x, self.shown(y))), Marker { line, filled: true })?;
-            }
+    /// The axes, their names and the levels, for `kuva`.
+    fn layout(&self, frame: At) -> Result<Layout, PlotError> {
+        let (x, y) = self.axes(frame)?;
+        let vertical = y.label(&self.vertical, &self.unit);
+        let size = fitting(&vertical, NAME, frame.1 + 24.0);
+        let mut layout =
+            layout(&x, &y).with_x_label(x.label(&self.horizontal, "")).with_label_size(size);
+        if !vertical.is_empty() {
+            layout = layout.with_y_label(vertical);
         }
-        // Last, since the lines of a long run may cover everything.
-        self.levels.iter().try_for_each(|&y| frame.level(canvas, self.shown(y)))?;
-        let width = frame.lower_right.0 - frame.upper_left.0;
-        self.header().draw(canvas, frame.upper_left, width)
+        for (_, level) in &self.levels {
+            let line = ReferenceLine::horizontal(y.reading(self.shown(*level)));
+            layout = layout.with_reference_line(line.with_color(INK).with_dasharray("5 4"));
+        }
+        Ok(layout)
+    }
+
+    /// The lines, for `kuva`; a single point is a disc.
+    fn plots(&self, frame: At, stretches: usize) -> Result<Vec<Plot>, PlotError> {
+        let ((x, y), labels) = (self.axes(frame)?, self.labels());
+        let place = |(a, b)| (x.reading(a), y.reading(self.shown(b)));
+        let plot = |(label, points): &(String, Vec<At>)| {
+            let colour = color(labels.iter().position(|other| other == label).unwrap_or(0));
+            let shown = thinned(points, stretches).map(place);
+            if points.len() == 1 {
+                Plot::Scatter(ScatterPlot::new().with_data(shown).with_color(colour).with_size(4.0))
+            } else {
+                let line = LinePlot::new().with_data(shown).with_color(colour);
+                Plot::Line(line.with_stroke_width(1.4))
+            }
+        };
+        Ok(self.lines.iter().map(plot).collect())
     }
 }
 
@@ -235,19 +281,32 @@ impl Panels {
     /// [`PlotError::OffSphere`] for one that has none on a globe, [`PlotError::Range`] for numbers too
     /// far apart.
     pub fn svg(&self) -> Result<String, PlotError> {
-        let layout = Layout::of(self)?;
-        canvas::sheet(layout.sheet(), |canvas| {
-            let middle = 0.5 * layout.sheet().0;
-            let set = Type::centred(frame::TITLE).fitting(&self.title, 2.0 * middle - 16.0);
-            canvas.text(&self.title, (middle, 22.0), set)?;
-            for (globe, (at, diameter)) in self.globes.iter().zip(layout.globes(self)) {
-                globe.draw(canvas, at, diameter)?;
-            }
-            let lines: usize = self.panels.iter().map(|panel| panel.lines.len()).sum();
-            let stretches = STRETCHES.min(ALL_STRETCHES / lines.max(1)).max(1);
-            let mut pairs = self.panels.iter().zip(layout.frames());
-            pairs.try_for_each(|(panel, frame)| panel.draw(canvas, &frame, stretches))
-        })
+        if self.panels.is_empty() && self.globes.is_empty() {
+            return Err(PlotError::Empty { name: self.title.clone() });
+        }
+        self.globes.iter().try_for_each(Globe::check)?;
+        let grid = self.grid()?;
+        // Globes are as high as the grid, as far as that is sensible.
+        let disc = |globe: &Globe| globe.diameter_within(grid.height).clamp(DISC.0, DISC.1);
+        let globes: Vec<_> = self.globes.iter().map(|globe| (globe, disc(globe))).collect();
+        let sizes = || globes.iter().map(|(globe, diameter)| globe.size(*diameter));
+        let left: f64 = EDGE + sizes().map(|size| size.0).sum::<f64>();
+        let height = sizes().map(|size| size.1).fold(grid.height, f64::max);
+        let width = left + grid.width;
+        let mut sheet = plot::sheet((width, HEAD + height + EDGE), &self.title, 0.5 * width);
+        let (mut letters, mut x) = ('a'..='z', EDGE);
+        for (globe, diameter) in &globes {
+            let size = globe.size(*diameter);
+            let letter = letters.next().unwrap_or(' ');
+            let at = (x, HEAD + 0.5 * (height - size.1));
+            plot::place(&mut sheet, at, globe.parts(letter, *diameter));
+            x += size.0;
+        }
+        let top = HEAD + 0.5 * (height - grid.height);
+        for (at, parts) in grid.parts(letters)? {
+            plot::place(&mut sheet, (left + at.0, top + at.1), parts);
+        }
+        Ok(plot::svg(&sheet))
     }
 
     /// Writes the figure to a file.
@@ -267,124 +326,71 @@ impl Panels {
         };
         self.columns.unwrap_or(usual).min(self.panels.len())
     }
-}
 
-/// Where the panels go: the frames are of one size, and line up in columns and rows.
-struct Layout {
-    axes: Vec<(Axis, Axis)>,
-    frame: At,
-    /// Diameters of the globes.
-    diameters: Vec<f64>,
-    /// Upper left corner of the grid.
-    grid: At,
-    /// Height of the globes, at least.
-    body: f64,
-    /// Room to the left of the frames of each column.
-    lefts: Vec<f64>,
-    /// Room above the frames of each row.
-    tops: Vec<f64>,
-}
-
-impl Layout {
-    const EDGE: f64 = 8.0;
-    const HEAD: f64 = 40.0;
-    const RIGHT: f64 = 22.0;
-    /// The diameter of a globe, from beside a low grid to beside a high one.
-    const DISC: (f64, f64) = (320.0, 460.0);
-
-    fn of(figure: &Panels) -> Result<Self, PlotError> {
-        if figure.panels.is_empty() && figure.globes.is_empty() {
-            return Err(PlotError::Empty { name: figure.title.clone() });
-        }
-        figure.globes.iter().try_for_each(Globe::check)?;
-        let columns = figure.columns_or_usual();
-        let frame = match columns + figure.globes.len() {
+    /// Where the panels go: the frames are of one size, and line up in columns and rows.
+    fn grid(&self) -> Result<Grid<'_>, PlotError> {
+        let columns = self.columns_or_usual();
+        let frame = match columns + self.globes.len() {
             0 | 1 => (560.0, 280.0),
             2 => (340.0, 210.0),
             _ => (260.0, 180.0),
         };
-        let axes = figure.panels.iter().map(|panel| panel.axes(frame));
-        let axes = axes.collect::<Result<Vec<_>, PlotError>>()?;
         let mut lefts = vec![0.0_f64; columns];
-        let mut tops = vec![0.0_f64; figure.panels.len().div_ceil(columns.max(1))];
-        for (index, (panel, (_, y))) in figure.panels.iter().zip(&axes).enumerate() {
-            let (column, row) = (index % columns, index / columns);
-            lefts[column] = lefts[column].max(frame::margin(y, &panel.vertical));
-            tops[row] = tops[row].max(panel.header().height(frame.0));
+        let mut tops = vec![0.0_f64; self.panels.len().div_ceil(columns.max(1))];
+        for (index, panel) in self.panels.iter().enumerate() {
+            let (left, top) = (&mut lefts[index % columns], &mut tops[index / columns]);
+            let margin = ComputedLayout::from_layout(&panel.layout(frame)?).margin_left.ceil();
+            *left = left.max(margin);
+            *top = top.max(panel.header(frame.0 + margin).height());
         }
-        let grid = (Self::EDGE, Self::HEAD);
-        let alone = Self { axes, frame, diameters: Vec::new(), grid, body: 0.0, lefts, tops };
-        Ok(alone.beside(&figure.globes))
-    }
-
-    /// The same grid with globes to its left.
-    fn beside(mut self, globes: &[Globe]) -> Self {
-        let (_, bottom) = self.upper_left(self.lefts.len(), self.tops.len());
-        let height = bottom - Self::HEAD;
-        for globe in globes {
-            let diameter = globe.diameter_within(height).clamp(Self::DISC.0, Self::DISC.1);
-            let size = globe.size(diameter);
-            self.diameters.push(diameter);
-            self.grid.0 += size.0 + Self::EDGE;
-            self.body = self.body.max(size.1);
-        }
-        self.grid.1 += 0.5 * (self.body - height).max(0.0);
-        self
-    }
-
-    fn sheet(&self) -> At {
-        let (right, bottom) = self.upper_left(self.lefts.len(), self.tops.len());
-        (right, bottom.max(Self::HEAD + self.body + Self::EDGE))
-    }
-
-    /// Upper left corner and diameter of each globe.
-    fn globes(&self, figure: &Panels) -> Vec<(At, f64)> {
-        let height = self.sheet().1 - Self::HEAD - Self::EDGE;
-        let mut left = Self::EDGE;
-        let pairs = figure.globes.iter().zip(&self.diameters);
-        let place = |(globe, &diameter): (&Globe, &f64)| {
-            let size = globe.size(diameter);
-            let at = (left, Self::HEAD + 0.5 * (height - size.1));
-            left += size.0 + Self::EDGE;
-            (at, diameter)
-        };
-        pairs.map(place).collect()
-    }
-
-    fn frames(&self) -> Vec<Frame> {
-        self.axes.iter().enumerate().map(|(index, axes)| self.frame_at(index, axes)).collect()
-    }
-
-    fn frame_at(&self, index: usize, (x, y): &(Axis, Axis)) -> Frame {
-        let (column, row) = (index % self.lefts.len(), index / self.lefts.len());
-        let (left, top) = self.upper_left(column, row);
-        let upper_left = (left + self.lefts[column], top + self.tops[row]);
-        let lower_right = (upper_left.0 + self.frame.0, upper_left.1 + self.frame.1);
-        Frame { x: x.clone(), y: y.clone(), upper_left, lower_right }
-    }
-
-    /// Where a cell of the grid begins; past the last, where the grid ends.
-    fn upper_left(&self, column: usize, row: usize) -> At {
-        let width = |left: &f64| left + self.frame.0 + Self::RIGHT;
-        let height = |top: &f64| top + self.frame.1 + frame::BELOW + 8.0;
-        let left = self.grid.0 + self.lefts[..column].iter().map(width).sum::<f64>();
-        (left, self.grid.1 + self.tops[..row].iter().map(height).sum::<f64>())
+        let width = lefts.iter().map(|left| left + frame.0 + RIGHT).sum();
+        let height = tops.iter().map(|top| top + frame.1 + BELOW).sum();
+        Ok(Grid { figure: self, frame, lefts, tops, width, height })
     }
 }
 
-fn check(label: &str, points: &[(f64, f64)]) -> Result<(), PlotError> {
-    let name = || label.to_owned();
-    if points.is_empty() {
-        return Err(PlotError::Empty { name: name() });
-    }
-    match points.iter().position(|(x, y)| !(x.is_finite() && y.is_finite())) {
-        Some(index) => Err(PlotError::NonFinite {
-            name: name(),
-            index,
-            x: points[index].0,
-            y: points[index].1,
-        }),
-        None => Ok(()),
+/// The panels of a figure with the room to the left of each column and above each row.
+struct Grid<'a> {
+    figure: &'a Panels,
+    frame: At,
+    lefts: Vec<f64>,
+    tops: Vec<f64>,
+    width: f64,
+    height: f64,
+}
+
+impl Grid<'_> {
+    /// Each panel with its place in the grid.
+    fn parts(
+        &self,
+        letters: impl Iterator<Item = char>,
+    ) -> Result<Vec<(At, Vec<Primitive>)>, PlotError> {
+        let panels = &self.figure.panels;
+        let lines: usize = panels.iter().map(|panel| panel.lines.len()).sum();
+        let stretches = STRETCHES.min(ALL_STRETCHES / lines.max(1)).max(1);
+        let (mut parts, mut at) = (Vec::new(), (0.0, 0.0));
+        for (index, (panel, letter)) in
+            panels.iter().zip(letters.chain([' '].into_iter().cycle())).enumerate()
+        {
+            let (column, row) = (index % self.lefts.len(), index / self.lefts.len());
+            let (left, top) = (self.lefts[column], self.tops[row]);
+            let mut layout = panel
+                .layout(self.frame)?
+                .with_force_margins(left, RIGHT)
+                .with_force_margins_y(top, BELOW);
+            layout.width = Some(left + self.frame.0 + RIGHT);
+            layout.height = Some(top + self.frame.1 + BELOW);
+            let plots = panel.plots(self.frame, stretches)?;
+            let mut picture = render_multiple(plots, layout).elements;
+            let header = panel.header(self.frame.0 + left);
+            picture.extend(header.parts(letter, (4.0, top)));
+            parts.push((at, picture));
+            at.0 += left + self.frame.0 + RIGHT;
+            if column + 1 == self.lefts.len() {
+                at = (0.0, at.1 + top + self.frame.1 + BELOW);
+            }
+        }
+        Ok(parts)
     }
 }
 
@@ -433,7 +439,7 @@ mod tests {
         let svg = figure().svg().unwrap();
         assert_eq!(svg, figure().svg().unwrap());
         assert!(svg.len() < 100_000, "{} bytes", svg.len());
-        assert!(svg.starts_with("<svg width=\"") && svg.trim_end().ends_with("</svg>"));
+        assert!(svg.starts_with("<svg ") && svg.trim_end().ends_with("</svg>"));
     }
 
     #[test]
@@ -442,12 +448,15 @@ mod tests {
             .map(|k| f64::from(k).to_radians())
             .map(|t| (3.0 + t.cos(), 5.0 + t.sin()))
             .collect();
-        let panel = Panel::new("", "x").line("", circle).equal();
-        let (x, y) = panel.axes((340.0, 210.0)).unwrap();
-        let width = 340.0 * (x.place(4.0) - x.place(2.0));
-        let height = 210.0 * (y.place(6.0) - y.place(4.0));
+        let panel = Panel::new("y", "x").line("", circle).equal();
+        let mut layout = panel.layout((340.0, 210.0)).unwrap();
+        (layout.width, layout.height) = (Some(340.0), Some(210.0));
+        let layout = layout.with_force_margins(0.0, 0.0).with_force_margins_y(0.0, 0.0);
+        let axes = ComputedLayout::from_layout(&layout);
+        let (width, height) =
+            (axes.map_x(4.0) - axes.map_x(2.0), axes.map_y(4.0) - axes.map_y(6.0));
         assert!((width - height).abs() < 1e-9 && (150.0..210.0).contains(&height));
-        assert!((x.place(3.0) - 0.5).abs() < 1e-12 && (y.place(5.0) - 0.5).abs() < 1e-12);
+        assert!((axes.map_x(3.0) - 170.0).abs() < 1e-9 && (axes.map_y(5.0) - 105.0).abs() < 1e-9);
     }
 
     #[test]
@@ -465,62 +474,28 @@ mod tests {
     }
 
     #[test]
-    fn the_lines_stay_in_their_frame() {
-        let svg = Panels::new("").panel(Panel::new("", "").line("", wave(10_000))).svg().unwrap();
-        let places = |line: &str| -> Vec<(i32, i32)> {
-            let points = line.split("points=\"").nth(1).unwrap().split('"').next().unwrap();
-            let number = |text: &str| text.parse::<i32>().unwrap();
-            points
-                .split_whitespace()
-                .map(|p| p.split_once(',').unwrap())
-                .map(|(x, y)| (number(x), number(y)))
-                .collect()
-        };
-        let longest = svg.lines().max_by_key(|line| line.len()).unwrap();
-        let line = places(longest);
-        let closed = |points: &Vec<(i32, i32)>| points.len() == 5 && points[0] == points[4];
-        let frames = svg.lines().filter(|line| line.contains("points=")).map(places);
-        let frame = frames.into_iter().find(closed).unwrap();
-        let ((left, bottom), (right, top)) = (frame[0], frame[2]);
-        assert!(line.iter().all(|(x, y)| (left..=right).contains(x) && (top..=bottom).contains(y)));
-        assert_eq!((line[0].0, line[line.len() - 1].0), (left, right));
-        let sheet = svg.split("viewBox=\"0 0 ").nth(1).unwrap().split(' ').next().unwrap();
-        assert!(left > 0 && right + 200 < sheet.parse().unwrap(), "{left} to {right} of {sheet}");
-    }
-
-    #[test]
-    fn the_sheet_is_measured_in_pixels() {
-        let svg = Panels::new("").panel(Panel::new("", "").line("", [(0.0, 0.0)])).svg().unwrap();
-        let header = svg.lines().next().unwrap();
-        let number = |after: &str| -> f64 {
-            let start = header.split(after).nth(1).unwrap();
-            start.split(['"', ' ']).next().unwrap().parse().unwrap()
-        };
-        assert!(number("width=\"") < 700.0, "{header}");
-        assert!((number("viewBox=\"0 0 ") / number("width=\"") - 10.0).abs() < 0.02, "{header}");
-    }
-
-    #[test]
-    fn a_globe_stands_to_the_left_and_the_panels_keep_their_width() {
+    fn panels_and_globes_have_letters_from_the_left() {
         let globe = Globe::new("globe").curve("c", [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]);
-        let beside = figure().columns(1).globe(globe.clone());
-        let layout = Layout::of(&beside).unwrap();
-        let (at, diameter) = layout.globes(&beside)[0];
-        let frames = layout.frames();
-        assert!(at.0 + globe.size(diameter).0 < frames[0].upper_left.0);
-        assert!(at.1 >= Layout::HEAD && at.1 + globe.size(diameter).1 <= layout.sheet().1);
-        let width = |frame: &Frame| frame.lower_right.0 - frame.upper_left.0;
-        assert!((width(&frames[0]) - width(&frames[1])).abs() < 1e-9);
-        assert!(frames[1].lower_right.1 <= layout.sheet().1);
-        let alone = Panels::new("title").globe(globe).svg().unwrap();
-        assert!(alone.len() < beside.svg().unwrap().len());
+        let svg = figure().columns(1).globe(globe).svg().unwrap();
+        let x = |letter: char| -> f64 {
+            let end = svg.find(&format!(">{letter}</text>")).unwrap();
+            let group = &svg[svg[..end].rfind("translate(").unwrap() + 10..];
+            group[..group.find(',').unwrap()].parse().unwrap()
+        };
+        assert!(x('a') < x('b') && x('b') <= x('c'), "{svg}");
+    }
+
+    #[test]
+    fn a_point_alone_is_a_disc() {
+        let svg = Panels::new("").panel(Panel::new("", "").line("", [(0.0, 0.0)])).svg().unwrap();
+        assert!(svg.contains("<circle"));
     }
 
     #[test]
     fn a_logarithmic_panel_has_decades_and_a_floor() {
         let panel = |y| Panel::new("p", "t").logarithmic(1e-16).line("l", [(0.0, 1e-3), (1.0, y)]);
         let svg = |y| Panels::new("f").panel(panel(y)).svg().unwrap();
-        assert!(svg(1e-15).contains("\n10⁻¹²\n"));
+        assert!(svg(1e-15).contains(">10⁻¹²<"));
         assert_eq!(svg(0.0), svg(1e-16));
         let error = |panel| Panels::new("f").panel(panel).svg().unwrap_err();
         assert!(matches!(error(panel(-1e-3)), PlotError::NonPositive { index: 1, .. }));
@@ -530,9 +505,11 @@ mod tests {
 
     #[test]
     fn a_legend_needs_two_lines() {
-        assert!(figure().svg().unwrap().contains("\na\n"));
-        let one = Panels::new("title").panel(Panel::new("one", "t").line("alone", wave(10)));
-        assert!(!one.svg().unwrap().contains("alone"));
+        let labelled = |panel: Panel| Panels::new("title").panel(panel).svg().unwrap();
+        let one = Panel::new("one", "t").line("alone", wave(10));
+        assert!(!labelled(one.clone()).contains("alone"));
+        let limited = labelled(one.named_level("limit", 0.5));
+        assert!(limited.contains(">alone<") && limited.contains(">limit<"));
     }
 
     #[test]

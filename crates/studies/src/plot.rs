@@ -1,10 +1,14 @@
 //! Figures as SVG: the same bytes for the same numbers.
 //!
-//! [`Panels`] draws lines over time and, beside them, curves on a sphere ([`Globe`]); [`LogLog`] draws
-//! convergence. All use the colours of Okabe & Ito (2008), which the colour-blind tell apart, and
-//! thin long lines out to what can be seen.
+//! [`Panels`] draws lines over time and, beside them, curves on a sphere ([`Globe`]). [`LogLog`] draws
+//! convergence. Axes, grids, ticks, lines and markers are those of the crate `kuva`. The colours are those
+//! of Okabe and Ito (2008), which the colour-blind tell apart.
 
-use std::{error::Error, fs, io, path::PathBuf};
+use std::{fs, io, path::PathBuf};
+
+use kuva::backend::svg::SvgBackend;
+use kuva::render::render::{PathData, Primitive, Scene, TextAnchor};
+use kuva::render::theme::Theme;
 
 pub use crate::{
     globe::Globe,
@@ -67,12 +71,6 @@ pub enum PlotError {
         /// Upper end.
         high: f64,
     },
-    /// The drawing library failed.
-    #[error("the figure could not be drawn; simplify its labels")]
-    Backend {
-        /// What it says.
-        source: Box<dyn Error + Send + Sync>,
-    },
     /// The file could not be written.
     #[error("cannot write {}: {source}; does its folder exist?", path.display())]
     Io {
@@ -81,6 +79,108 @@ pub enum PlotError {
         /// What the system says.
         source: io::Error,
     },
+}
+
+pub(crate) const INK: &str = "#222222";
+pub(crate) const GREY: &str = "#777777";
+
+/// Sizes of text, in pixels.
+pub(crate) const TITLE: u32 = 16;
+pub(crate) const NAME: u32 = 12;
+pub(crate) const NUMBER: u32 = 11;
+
+/// Points of a curve nearer than this to the last one drawn are left out, in pixels.
+const GRAIN: f64 = 0.2;
+
+/// A place on the sheet, in pixels, `y` downwards.
+pub(crate) type At = (f64, f64);
+
+/// The colour of the line of this number, by Okabe and Ito (2008), the dark ones first.
+pub(crate) fn color(line: usize) -> &'static str {
+    ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9"][line % 6]
+}
+
+/// The colours of axes and grids.
+pub(crate) fn theme() -> Theme {
+    Theme {
+        axis_color: GREY.into(),
+        grid_color: "#E5E5E5".into(),
+        tick_color: GREY.into(),
+        text_color: INK.into(),
+        ..Theme::light()
+    }
+}
+
+/// The length of a text, on the wide side: only the viewer knows the font.
+pub(crate) fn length(text: &str, size: u32) -> f64 {
+    0.6 * f64::from(size) * text.chars().count() as f64
+}
+
+/// The size of a text that is not longer than this, at most the one asked for.
+pub(crate) fn fitting(text: &str, size: u32, most: f64) -> u32 {
+    (7..=size).rev().find(|&size| length(text, size) <= most).unwrap_or(7)
+}
+
+/// A line of text around a place, half of its height above it.
+pub(crate) fn text(content: &str, (x, y): At, size: u32, anchor: TextAnchor) -> Primitive {
+    let (content, y) = (content.to_owned(), y + 0.35 * f64::from(size));
+    Primitive::Text { x, y, content, size, anchor, rotate: None, bold: false, color: None }
+}
+
+/// A line through places.
+pub(crate) fn line(points: Vec<At>, stroke: &str, stroke_width: f64) -> Primitive {
+    Primitive::PolyLine { points, stroke: stroke.into(), stroke_width, stroke_dasharray: None }
+}
+
+/// An empty sheet of this size with a title over `middle`.
+pub(crate) fn sheet((width, height): At, title: &str, middle: f64) -> Scene {
+    let mut sheet = Scene::new(width, height);
+    (sheet.background_color, sheet.text_color) = (Some("white".into()), Some(INK.into()));
+    sheet.font_family = Some("DejaVu Sans, Verdana, Liberation Sans, Arial, sans-serif".into());
+    let size = fitting(title, TITLE, 2.0 * middle - 16.0);
+    sheet.add(text(title, (middle, 20.0), size, TextAnchor::Middle));
+    sheet
+}
+
+/// Puts a picture on the sheet with its upper left corner at a place.
+pub(crate) fn place(sheet: &mut Scene, (x, y): At, picture: impl IntoIterator<Item = Primitive>) {
+    sheet.add(Primitive::GroupStart {
+        transform: Some(format!("translate({x:.1},{y:.1})")),
+        title: None,
+        extra_attrs: Some(r#"stroke-linejoin="round" stroke-linecap="round""#.into()),
+    });
+    // Clips have numbers that count all figures of a process, and every line is inside its frame.
+    let drawn = |part: &Primitive| match part {
+        Primitive::ClipStart { .. } | Primitive::ClipEnd => false,
+        Primitive::Text { content, .. } => !content.is_empty(),
+        _ => true,
+    };
+    picture.into_iter().filter(drawn).for_each(|part| sheet.add(compact(part)));
+    sheet.add(Primitive::GroupEnd);
+}
+
+/// A line without the points that cannot be told from their neighbours, in hundredths of a pixel. The
+/// backend writes up to 17 digits.
+fn compact(part: Primitive) -> Primitive {
+    let Primitive::PolyLine { points, stroke, stroke_width, stroke_dasharray } = part else {
+        return part;
+    };
+    let mut kept: Vec<At> = Vec::new();
+    for (k, &(x, y)) in points.iter().enumerate() {
+        let far = |&(a, b): &At| (x - a).hypot(y - b) >= GRAIN;
+        if k + 1 == points.len() || kept.last().is_none_or(far) {
+            kept.push((x, y));
+        }
+    }
+    let path = kept.iter().map(|(x, y)| format!("{x:.2} {y:.2}")).collect::<Vec<_>>().join("L");
+    let d = format!("M{path}");
+    let (fill, opacity) = (None, None);
+    Primitive::Path(Box::new(PathData { d, fill, stroke, stroke_width, opacity, stroke_dasharray }))
+}
+
+/// The sheet as SVG, an element in each line.
+pub(crate) fn svg(sheet: &Scene) -> String {
+    SvgBackend::new().with_pretty(true).render_scene(sheet)
 }
 
 /// The file of a figure.

@@ -13,32 +13,30 @@
 use std::{error::Error, fs::File};
 
 use metriplectic::prelude::*;
-use metriplectic_studies::{Gallery, Options, Panel, Panels, Report, interrupted, print};
+use metriplectic_studies::{Example, Gallery, Panel, Panels, Record, interrupted};
 
 const INERTIA: Vector3<f64> = Vector3::new(10.0, 5.0, 1.0);
-const START: Vector3<f64> = Vector3::new(1e-6, -1.0, 1e-6);
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let options = Options::read();
-    let (count, largest) = (options.steps_or(usize::MAX), options.step_size_or(1e3));
-
     let body = System::on(LieDual::so3())
         .energy(|p: &Vector3<Real>| p.component_mul(p).component_div(&INERTIA.cast()).sum() * 0.5)
         .entropy(|p: &Vector3<Real>| p.norm_squared() * 0.5)
         .build()?;
-    let span = Span::until(1e4).tolerance(1e-5).largest_step(largest).until_rest(1e-9);
-    let mut steps = WeylMidpoint.steps(&body, START, span)?;
+    let start = Vector3::new(1e-6, -1.0, 1e-6);
 
-    let (gallery, energy) = (Gallery::open()?, steps.state().energy);
+    let about = "A body waits, tumbles and comes to rest, in steps that follow the motion.";
+    let example = Example::adaptive(about, 1e3);
+    let span = Span::until(1e4).tolerance(1e-5).largest_step(example.step_size).until_rest(1e-9);
+    let mut steps = WeylMidpoint.steps(&body, start, span)?;
     let watch = Observables::on(&body)
         .of("p1", |p| p.x)
         .of("p2", |p| p.y)
         .of("p3", |p| p.z)
         .of_state("entropy", |state| state.entropy);
-    let mut table = watch.csv(File::create(gallery.path("adaptive_relaxation.csv"))?)?;
+    let mut table = watch.csv(File::create(Gallery::open()?.path("adaptive_relaxation.csv"))?)?;
     table.write(steps.state())?;
     let mut states = vec![steps.state().clone()];
-    for state in steps.by_ref().take(count) {
+    for state in steps.by_ref().take(example.steps) {
         states.push(state?);
         table.write(&states[states.len() - 1])?;
         if interrupted() {
@@ -46,32 +44,22 @@ fn main() -> Result<(), Box<dyn Error>> {
         }
     }
     table.finish()?;
-    let (certificate, end) = (steps.certificate(), steps.state());
-    let line = |value: &dyn Fn(&State<LieDual<3>>) -> f64| -> Vec<_> {
-        states.iter().map(|state| (state.time, value(state))).collect()
-    };
-    let sizes = states.windows(2).map(|pair| (pair[1].time, pair[1].time - pair[0].time));
-    let momentum = Panel::new("angular momentum", "t").line("p₁", line(&|s| s.point.x));
-    let entropy = Panel::new("entropy S, maximum H I₁", "t").line("S", line(&|s| s.entropy));
-    let error = Panel::new("energy H − H₀", "t").line("H", line(&|s| s.energy - energy));
-    Panels::new("A body that waits, tumbles and rests, in steps that follow the motion")
-        .columns(2)
-        .panel(
-            Panel::new("step size h", "t").line("h", sizes.collect::<Vec<_>>()).logarithmic(1e-9),
-        )
-        .panel(momentum.line("p₂", line(&|s| s.point.y)).line("p₃", line(&|s| s.point.z)))
-        .panel(entropy.level(energy * INERTIA.x))
-        .panel(error.level(0.0))
-        .save(gallery.path("adaptive_relaxation.svg"))?;
+    let run = Record { states, certificate: steps.certificate().clone() };
 
-    if options.json {
-        let rested = steps.ending().is_some_and(|ending| ending.is_rest());
-        let report = Report::new(certificate, end)?.with("time", end.time);
-        report.with("rested", rested).print()?;
-    } else {
-        print(certificate)?;
-        print(format_args!("ended at t = {:.3}: {:?}", end.time, steps.ending()))?;
-        print(format_args!("figure:      {}", gallery.path("adaptive_relaxation.svg").display()))?;
-    }
-    Ok(())
+    let momenta = Panel::new("angular momentum", "t")
+        .line("p₁", run.series(|s| s.point.x))
+        .line("p₂", run.series(|s| s.point.y))
+        .line("p₃", run.series(|s| s.point.z));
+    let sizes = run.changes(|before, after| after.time - before.time);
+    let maximum = run.certificate.initial_energy * INERTIA.x;
+    let figure =
+        Panels::new("A body that waits, tumbles and rests, in steps that follow the motion")
+            .columns(2)
+            .panel(Panel::new("step size h", "t").line("h", sizes).logarithmic(1e-9))
+            .panel(momenta)
+            .panel(run.panel("entropy S", |s| s.entropy).named_level("maximum H I₁", maximum))
+            .panel(run.energy_error());
+    let rested = steps.ending().is_some_and(|ending| ending.is_rest());
+    let report = example.report(&run).with("time", run.last().time);
+    report.with("rested", rested).figure(figure).print()
 }

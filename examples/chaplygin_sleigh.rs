@@ -15,7 +15,7 @@
 use std::error::Error;
 
 use metriplectic::prelude::*;
-use metriplectic_studies::{Gallery, Options, Order, Panel, Panels, Report, print};
+use metriplectic_studies::{Example, Order, Panel, Panels};
 
 const MASS: f64 = 1.0;
 const AHEAD: f64 = 0.5;
@@ -23,15 +23,7 @@ const INERTIA: f64 = 0.75 + MASS * AHEAD * AHEAD;
 type Place = SVector<Real, 5>;
 type Sleigh = State<Euclidean<5>>;
 
-/// The velocity along the blade and the angular velocity at time `t`, with `V = 1` and `t₀ = 10`.
-fn exact(t: f64) -> Vector2<f64> {
-    let tau = MASS * AHEAD / INERTIA * (t - 10.0);
-    Vector2::new(tau.tanh(), (MASS / INERTIA).sqrt() / tau.cosh())
-}
-
 fn main() -> Result<(), Box<dyn Error>> {
-    let options = Options::read();
-    let (count, h) = (options.steps_or(200), options.step_size_or(0.1));
     let bracket = |x: &Place| {
         let ((sin, cos), turn) = (x[2].sin_cos(), x[4] * (MASS * AHEAD / INERTIA));
         let mut pi = SMatrix::<Real, 5, 5>::zeros();
@@ -45,36 +37,39 @@ fn main() -> Result<(), Box<dyn Error>> {
         .energy(|x: &Place| (x[3] * x[3] / MASS + x[4] * x[4] / INERTIA) * 0.5)
         .build()?;
     let start = vector![0.0, 0.0, 0.0, MASS * exact(0.0).x, INERTIA * exact(0.0).y];
-    let sizes = [1.0, 0.5, 0.25, 0.125].map(|part| part * h);
-    let runs = (0..4).map(|k| WeylMidpoint.run(&sleigh, start, Span::steps(sizes[k], count << k)));
-    let runs = runs.collect::<Result<Vec<_>, _>>()?;
+
+    let about = "The Chaplygin sleigh: a skew bracket that is not Poisson, and its closed form.";
+    let example = Example::new(about, 200, 0.1);
+    let sizes = [1.0, 0.5, 0.25, 0.125].map(|part| part * example.step_size);
+    let run = |k: usize| example.run(&sleigh, start, Span::steps(sizes[k], example.steps << k));
+    let runs = (0..4).map(run).collect::<Result<Vec<_>, _>>()?;
+
     let velocities = |s: &Sleigh| vector![s.point[3] / MASS, s.point[4] / INERTIA];
     let error = |s: &Sleigh| (velocities(s) - exact(s.time)).norm();
-    let errors = [0, 1, 2, 3].map(|k: usize| runs[k].iter().map(error).fold(0.0, f64::max));
+    let errors = [0, 1, 2, 3].map(|k: usize| runs[k].states.iter().map(error).fold(0.0, f64::max));
     let (run, order) = (&runs[0], Order::fit(&sizes, &errors)?);
-
-    let (path, certificate) = (Gallery::open()?.path("chaplygin_sleigh.svg"), run.certificate());
-    let points = |value: &dyn Fn(&Sleigh) -> (f64, f64)| run.iter().map(value).collect::<Vec<_>>();
-    let beside = |title: &str, i: usize| {
-        let closed = points(&|s| (s.time, exact(s.time)[i]));
-        let scheme = points(&|s| (s.time, velocities(s)[i]));
-        Panel::new(title, "t").line("closed form", closed).line("scheme", scheme)
+    let beside = |quantity: &str, i: usize| {
+        let closed = run.series(|s| exact(s.time)[i]);
+        let scheme = run.series(|s| velocities(s)[i]);
+        Panel::new(quantity, "t").line("closed form", closed).line("scheme", scheme)
     };
-    let trace = points(&|s| (s.point[0], s.point[1]));
-    let energy = points(&|s| (s.time, s.energy - certificate.initial_energy));
-    Panels::new(format!("The Chaplygin sleigh turns round, h = {h}"))
-        .panel(Panel::new("trace of the blade", "x").vertical("y").line("", trace).equal())
+    let trace: Vec<_> = run.states.iter().map(|s| (s.point[0], s.point[1])).collect();
+    let title = format!("The Chaplygin sleigh turns round, h = {}", example.step_size);
+    let figure = Panels::new(title)
+        .panel(Panel::new("y", "x").title("trace of the blade").line("", trace).equal())
         .panel(beside("velocity v along the blade", 0))
         .panel(beside("angular velocity ω", 1))
-        .panel(Panel::new("energy H − H₀", "t").line("", energy).level(0.0))
-        .save(&path)?;
+        .panel(run.energy_error());
+    example
+        .report(run)
+        .text(format_args!("{}\nerrors:      {errors:.6?}", sleigh.report(&start)))
+        .with("order", order.slope)
+        .figure(figure)
+        .print()
+}
 
-    if options.json {
-        Report::new(certificate, run.last())?.with("order", order.slope).print()?;
-    } else {
-        print(format_args!("{}\n{certificate}", sleigh.report(&start)))?;
-        print(format_args!("errors:      {errors:.6?}\norder:       {order}"))?;
-        print(format_args!("figure:      {}", path.display()))?;
-    }
-    Ok(())
+/// The velocity along the blade and the angular velocity at time `t`, with `V = 1` and `t₀ = 10`.
+fn exact(t: f64) -> Vector2<f64> {
+    let tau = MASS * AHEAD / INERTIA * (t - 10.0);
+    Vector2::new(tau.tanh(), (MASS / INERTIA).sqrt() / tau.cosh())
 }

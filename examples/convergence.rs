@@ -7,41 +7,46 @@
 use std::error::Error;
 
 use metriplectic_studies::problems::Orders;
-use metriplectic_studies::{Convergence, Gallery, Options, print};
+use metriplectic_studies::{Convergence, Example, Progress};
 use serde_json::{Value, json};
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let options = Options::read();
-    let orders = Orders::of_every_problem();
-    if !orders.failures.is_empty() {
-        return Err(orders.failures.join("\n").into());
+    let about = "Orders of convergence, measured: retraction × manifold × metric × problem.";
+    let example = Example::study(about);
+
+    let (mut studies, mut worst, mut progress) = (Vec::new(), 0.0_f64, Progress::over(3));
+    for part in [Orders::canonical, Orders::closures, Orders::products] {
+        let orders = part();
+        if !orders.failures.is_empty() {
+            return Err(orders.failures.join("\n").into());
+        }
+        studies.extend(orders.studies);
+        worst = worst.max(orders.energy_error);
+        progress.step();
     }
-    let gallery = Gallery::open()?;
-    for (place, name) in [
-        ("spheres", "convergence.svg"),
-        ("rotations", "convergence_rotations.svg"),
-        ("charts and products", "convergence_charts.svg"),
-    ] {
-        let there = |study: &&Convergence| kind(&study.manifold) == place;
-        let studies: Vec<Convergence> = orders.studies.iter().filter(there).cloned().collect();
-        let figure = Convergence::figure(&format!("Order of convergence: {place}"), &studies);
-        figure.guide(2.0).guide(1.0).save(gallery.path(name))?;
-    }
-    if options.json {
-        let rows = orders.studies.iter().map(|s| {
-            json!({
-                "problem": s.problem, "manifold": s.manifold, "metric": s.metric,
-                "scheme": s.scheme, "steps": s.steps, "errors": s.errors,
-                "order": s.order.slope, "order_interval": s.order.interval,
-            })
-        });
-        print(Value::Array(rows.collect()))?;
-    } else {
-        print(Convergence::table(&orders.studies))?;
-        print(format_args!("worst energy error {:.1e}", orders.energy_error))?;
-        print(format_args!("figures: {}", gallery.path("convergence*.svg").display()))?;
-    }
-    Ok(())
+    drop(progress);
+
+    let rows = studies.iter().map(|s| {
+        json!({
+            "problem": s.problem, "manifold": s.manifold, "metric": s.metric,
+            "scheme": s.scheme, "steps": s.steps, "errors": s.errors,
+            "order": s.order.slope, "order_interval": s.order.interval,
+        })
+    });
+    let figure = |place: &str| {
+        let there = studies.iter().filter(|study| kind(&study.manifold) == place);
+        let there: Vec<Convergence> = there.cloned().collect();
+        let title = format!("Order of convergence: {place}");
+        Convergence::figure(&title, &there).guide(2.0).guide(1.0)
+    };
+    example
+        .report_of_many()
+        .text(Convergence::table(&studies))
+        .with("worst_energy_error", worst)
+        .convergence("", &figure("spheres"))
+        .convergence("_rotations", &figure("rotations"))
+        .convergence("_charts", &figure("charts and products"))
+        .print_as(&Value::Array(rows.collect()))
 }
 
 /// Which figure a manifold is in; none has more problems than there are colours.

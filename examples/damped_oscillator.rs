@@ -12,22 +12,11 @@
 use std::error::Error;
 
 use metriplectic::prelude::*;
-use metriplectic_studies::{Gallery, Options, Order, Panel, Panels, Report, print};
+use metriplectic_studies::{Example, Order, Panel, Panels};
 
 const GAMMA: f64 = 0.01;
 
-/// The exact state at time `t`.
-fn exact(t: f64) -> Vector3<f64> {
-    let omega = (1.0 - 0.25 * GAMMA * GAMMA).sqrt();
-    let (amplitude, (sin, cos)) = (2.0 * (-0.5 * GAMMA * t).exp(), (omega * t).sin_cos());
-    let (q, p) = (amplitude * (cos + 0.5 * GAMMA * sin / omega), -amplitude * sin / omega);
-    Vector3::new(q, p, 2.0 - 0.5 * (p * p + q * q))
-}
-
 fn main() -> Result<(), Box<dyn Error>> {
-    let options = Options::read();
-    let (count, h) = (options.steps_or(1000), options.step_size_or(0.1));
-
     let friction = |_: &Vector3<Real>, w: &Vector3<Real>| {
         let b = Vector3::new(0.0.into(), w.z, -w.y);
         b * b.transpose() * (w.z.recip() * GAMMA)
@@ -38,40 +27,41 @@ fn main() -> Result<(), Box<dyn Error>> {
         .energy(|x: &Vector3<Real>| (x.x.powi(2) + x.y.powi(2)) * 0.5 + x.z)
         .entropy(|x: &Vector3<Real>| x.z)
         .build()?;
-    let sizes = [1.0, 0.5, 0.25, 0.125].map(|part| part * h);
-    let span = |k: usize| Span::steps(sizes[k], count << k).at_most(1000);
-    let runs = (0..4).map(|k| WeylMidpoint.run(&oscillator, exact(0.0), span(k)));
+    let start = exact(0.0);
+
+    let about = "The damped oscillator and its bath: friction of your own, beside a closed form.";
+    let example = Example::new(about, 1000, 0.1);
+    let sizes = [1.0, 0.5, 0.25, 0.125].map(|part| part * example.step_size);
+    let span = |k: usize| Span::steps(sizes[k], example.steps << k).at_most(1000);
+    let runs = (0..4).map(|k| example.run(&oscillator, start, span(k)));
     let runs = runs.collect::<Result<Vec<_>, _>>()?;
+
     let error = |s: &State<Euclidean<3>>| (s.point - exact(s.time)).norm();
     let errors: Vec<f64> = runs.iter().map(|run| error(run.last())).collect();
     let (run, order) = (&runs[0], Order::fit(&sizes, &errors)?);
-
-    let (path, end) = (Gallery::open()?.path("damped_oscillator.svg"), run.last());
-    let beside = |title: &str, i: usize, since: f64| {
-        let late: Vec<_> = run.iter().filter(|state| state.time >= since * end.time).collect();
-        let closed: Vec<_> = late.iter().map(|s| (s.time, exact(s.time)[i])).collect();
-        let scheme: Vec<_> = late.iter().map(|s| (s.time, s.point[i])).collect();
-        Panel::new(title, "t").line("closed form", closed).line("scheme", scheme)
+    let beside = |quantity: &str, i: usize, since: f64| {
+        let late = |(t, _): &(f64, f64)| *t >= since * run.last().time;
+        let closed: Vec<_> = run.series(|s| exact(s.time)[i]).into_iter().filter(late).collect();
+        let scheme: Vec<_> = run.series(|s| s.point[i]).into_iter().filter(late).collect();
+        Panel::new(quantity, "t").line("closed form", closed).line("scheme", scheme)
     };
     let mut distance = Panel::new("distance from the closed form", "t").logarithmic(1e-5);
     for (run, h) in runs.iter().zip(sizes) {
-        let points: Vec<_> = run.iter().map(|state| (state.time, error(state))).collect();
-        distance = distance.line(format!("h = {h}"), points);
+        distance = distance.line(format!("h = {h}"), run.series(error));
     }
-    Panels::new(format!("The damped oscillator and its bath, γ = {GAMMA}, h = {h}"))
+    let title = format!("The damped oscillator, γ = {GAMMA}, h = {}", example.step_size);
+    let figure = Panels::new(title)
         .panel(beside("position q", 0, 0.0))
-        .panel(beside("momentum p, last fifth of the run", 1, 0.8))
-        .panel(beside("entropy s, at rest 2", 2, 0.0).level(2.0))
-        .panel(distance)
-        .save(&path)?;
+        .panel(beside("momentum p", 1, 0.8).title("end of the run"))
+        .panel(beside("entropy s", 2, 0.0).named_level("at rest", 2.0))
+        .panel(distance);
+    example.report(run).with("errors", errors).with("order", order.slope).figure(figure).print()
+}
 
-    let certificate = run.certificate();
-    if options.json {
-        let report = Report::new(certificate, end)?.with("errors", errors);
-        report.with("order", order.slope).print()?;
-    } else {
-        print(format_args!("{certificate}\nerrors:      {errors:.4?} at h = {sizes:?}"))?;
-        print(format_args!("order:       {order}\nfigure:      {}", path.display()))?;
-    }
-    Ok(())
+/// The exact state at time `t`.
+fn exact(t: f64) -> Vector3<f64> {
+    let omega = (1.0 - 0.25 * GAMMA * GAMMA).sqrt();
+    let (amplitude, (sin, cos)) = (2.0 * (-0.5 * GAMMA * t).exp(), (omega * t).sin_cos());
+    let (q, p) = (amplitude * (cos + 0.5 * GAMMA * sin / omega), -amplitude * sin / omega);
+    Vector3::new(q, p, 2.0 - 0.5 * (p * p + q * q))
 }

@@ -14,63 +14,56 @@
 use std::error::Error;
 
 use metriplectic::prelude::*;
-use metriplectic_studies::{Gallery, Options, Panel, Panels, Report, print};
+use metriplectic_studies::{Example, Panel, Panels};
 
 const INERTIA: Vector3<f64> = Vector3::new(10.0, 5.0, 1.0);
-const START: Vector3<f64> = Vector3::new(0.2, 0.1, 1.0);
 type Body = LieDual<3>;
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let options = Options::read();
-    let (count, h) = (options.steps_or(1000), options.step_size_or(0.1));
-
     let entropy = |p: &Vector3<Real>| p.norm_squared() * 0.5;
-    let span = Span::steps(h, count).at_most(2001);
-    let forced = |kappa: Vector3<f64>| -> Result<Trajectory<Body>, Box<dyn Error>> {
+    let forced = |kappa: Vector3<f64>| -> Result<_, Box<dyn Error>> {
         let form = Matrix3::from_diagonal(&kappa);
         let body = System::on(LieDual::so3())
             .lagrangian(|w: &Vector3<Real>| w.component_mul(w).dot(&INERTIA.cast()) * 0.5)
             .dissipation(CasimirDissipation::new(LieDual::so3().algebra(), form)?)
             .entropy(entropy)
             .build()?;
-        Ok(WeylMidpoint.run(&body, START, span)?)
+        Ok(body)
     };
-    let (all, one) = (forced(vector![1.0, 1.0, 1.0])?, forced(vector![1.0, 0.0, 0.0])?);
     let flat = System::on(LieDual::so3())
         .energy(|p: &Vector3<Real>| p.component_mul(p).component_div(&INERTIA.cast()).sum() * 0.5)
         .entropy(entropy)
         .build()?;
-    let metric = WeylMidpoint.run(&flat, START, span)?;
+    let start = Vector3::new(0.2, 0.1, 1.0);
+
+    let about = "A rigid body from its Lagrangian and a force, beside one from its metric.";
+    let example = Example::new(about, 1000, 0.1);
+    let all = example.run(&forced(vector![1.0, 1.0, 1.0])?, start, example.span())?;
+    let one = example.run(&forced(vector![1.0, 0.0, 0.0])?, start, example.span())?;
+    let metric = example.run(&flat, start, example.span())?;
+
     let distance = |(a, b): (&State<Body>, &State<Body>)| (a.time, (a.point - b.point).norm());
-    let apart: Vec<_> = all.iter().zip(&metric).map(distance).collect();
+    let apart: Vec<_> = all.states.iter().zip(&metric.states).map(distance).collect();
     let worst = apart.iter().fold(0.0, |worst: f64, (_, off)| worst.max(*off));
-
-    let (gallery, certificate) = (Gallery::open()?, all.certificate());
-    let energy = certificate.initial_energy;
-    let line = |run: &Trajectory<Body>, value: &dyn Fn(&State<Body>) -> f64| -> Vec<_> {
-        run.iter().map(|state| (state.time, value(state))).collect()
+    let both = |quantity: &str, value: &dyn Fn(&State<Body>) -> f64| {
+        let panel = Panel::new(quantity, "t").line("κ = 1", all.series(value));
+        panel.line("κ = e₁e₁ᵀ", one.series(value))
     };
-    let both = |title: &str, value: &dyn Fn(&State<Body>) -> f64| {
-        let panel = Panel::new(title, "t").line("κ = 1", line(&all, value));
-        panel.line("κ = e₁e₁ᵀ", line(&one, value))
-    };
-    Panels::new(format!("The rigid body from its Lagrangian and a force, I = (10, 5, 1), h = {h}"))
+    let energy = all.certificate.initial_energy;
+    let title =
+        format!("The rigid body from its Lagrangian and a force, h = {}", example.step_size);
+    let figure = Panels::new(title)
         .columns(3)
-        .panel(both("p₁", &|s| s.point.x))
-        .panel(both("p₂", &|s| s.point.y))
-        .panel(both("p₃", &|s| s.point.z))
+        .panel(both("angular momentum p₁", &|s| s.point.x))
+        .panel(both("angular momentum p₂", &|s| s.point.y))
+        .panel(both("angular momentum p₃", &|s| s.point.z))
         .panel(both("energy H − H₀", &|s| s.energy - energy).level(0.0))
-        .panel(both("entropy S, maximum H I₁", &|s| s.entropy).level(energy * INERTIA.x))
-        .panel(Panel::new("κ = 1: |p − p of the metric|", "t").logarithmic(1e-17).line("", apart))
-        .save(gallery.path("forced_rigid_body.svg"))?;
-
-    if options.json {
-        let report = Report::new(certificate, all.last())?.with("apart", worst);
-        report.with("about_one_axis", serde_json::to_value(one.certificate())?).print()?;
-    } else {
-        print(format_args!("κ = 1\n{certificate}\nκ = e₁e₁ᵀ\n{}", one.certificate()))?;
-        print(format_args!("routes:      |p − p of the metric| ≤ {worst:.1e}"))?;
-        print(format_args!("figure:      {}", gallery.path("forced_rigid_body.svg").display()))?;
-    }
-    Ok(())
+        .panel(both("entropy S", &|s| s.entropy).named_level("H I₁", energy * INERTIA.x))
+        .panel(Panel::new("|p − p of the metric|", "t").logarithmic(1e-17).line("κ = 1", apart));
+    example
+        .report(&all)
+        .with("apart", worst)
+        .certificate("about_one_axis", &one.certificate)
+        .figure(figure)
+        .print()
 }

@@ -16,15 +16,11 @@
 use std::error::Error;
 
 use metriplectic::prelude::*;
-use metriplectic_studies::{Gallery, Options, Panel, Panels, Report, print};
+use metriplectic_studies::{Example, Panel, Panels};
 
 const ALPHA: f64 = 1e-3;
-type Space = Euclidean<4>;
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let options = Options::read();
-    let (count, h) = (options.steps_or(300), options.step_size_or(0.1));
-
     let wall = |x: &Vector4<Real>| {
         let [left, right] = [x.z / x.x, x.w / (-x.x + 2.0)].map(|density| density * (2.0 / 3.0));
         let push = Vector4::new(1.0.into(), 0.0.into(), -left, right);
@@ -35,45 +31,38 @@ fn main() -> Result<(), Box<dyn Error>> {
         let b = Vector4::new(0.0.into(), 0.0.into(), w.w, -w.z);
         b * b.transpose() * Real::from(ALPHA)
     };
-    let [published, exact] = [SecondLaw::Published, SecondLaw::Exact].map(|law| {
-        let containers = System::on(Euclidean::<4>)
-            .bracket(Poisson::field(wall))
-            .dissipation(FieldDissipation(leak))
-            .energy(|x: &Vector4<Real>| x.y.powi(2) * 0.5 + x.z + x.w)
-            .entropy(|x: &Vector4<Real>| (x.x * (-x.x + 2.0)).ln() + (x.z * x.w).ln() * 1.5)
-            .second_law(law)
-            .build();
-        let start = Vector4::new(1.0, 2.0, 2.0, 2.0);
-        WeylMidpoint.run(&containers?, start, Span::steps(h, count)).map_err(Box::<dyn Error>::from)
-    });
-    let (published, exact) = (published?, exact?);
-    let (path, begin) = (Gallery::open()?.path("gas_containers.svg"), &exact.states()[0]);
-    let line = |run: &Trajectory<Space>, value: &dyn Fn(&State<Space>, &State<Space>) -> f64| {
-        let pairs = run.states().windows(2).map(|s| (s[1].time, value(&s[0], &s[1])));
-        pairs.collect::<Vec<_>>()
-    };
-    let both = |title, value: &dyn Fn(&State<Space>, &State<Space>) -> f64| {
-        let panel = Panel::new(title, "t").line("exact", line(&exact, value));
-        panel.line("published", line(&published, value)).level(0.0)
-    };
-    let entry = |i: usize| line(&exact, &|_, s| s.point[i]);
-    let rise = |s: &State<Space>, next: &State<Space>| next.entropy - s.entropy;
-    Panels::new(format!("Two gas containers, α = {ALPHA}, h = {h}"))
-        .panel(Panel::new("position q of the wall", "t").line("q", entry(0)).level(1.0))
-        .panel(Panel::new("energies", "t").line("gas U₁", entry(2)).line("gas U₂", entry(3)))
-        .panel(both("energy H − H₀", &|_, s| s.energy - begin.energy))
-        .panel(both("entropy S − S₀", &|_, s| s.entropy - begin.entropy))
-        .panel(both("ΔS of each step", &rise))
-        .panel(Panel::new("ΔS, exact alone", "t").line("ΔS", line(&exact, &rise)).level(0.0))
-        .save(&path)?;
+    let containers = System::on(Euclidean::<4>)
+        .bracket(Poisson::field(wall))
+        .dissipation(FieldDissipation(leak))
+        .energy(|x: &Vector4<Real>| x.y.powi(2) * 0.5 + x.z + x.w)
+        .entropy(|x: &Vector4<Real>| (x.x * (-x.x + 2.0)).ln() + (x.z * x.w).ln() * 1.5);
+    let start = Vector4::new(1.0, 2.0, 2.0, 2.0);
 
-    let (published, exact, end) = (published.certificate(), exact.certificate(), exact.last());
-    if options.json {
-        let report = Report::new(exact, end)?;
-        report.with("published", serde_json::to_value(published)?).print()?;
-    } else {
-        print(format_args!("published scheme\n{published}\n\nexact scheme\n{exact}"))?;
-        print(format_args!("\nfigure:       {}", path.display()))?;
-    }
-    Ok(())
+    let about =
+        "Two gases push a wall: the published scheme lowers the entropy, the exact one never.";
+    let example = Example::new(about, 300, 0.1);
+    let span = Span::steps(example.step_size, example.steps);
+    let exact = example.run(&containers.clone().build()?, start, span)?;
+    let published = containers.second_law(SecondLaw::Published).build()?;
+    let published = example.run(&published, start, span)?;
+
+    let both = |quantity: &str, value: &dyn Fn(&State<Euclidean<4>>) -> f64| {
+        let panel = Panel::new(quantity, "t").line("exact", exact.series(value));
+        panel.line("published", published.series(value)).level(0.0)
+    };
+    let begin = &exact.states[0];
+    let energies = Panel::new("energies of the gases", "t")
+        .line("U₁", exact.series(|s| s.point.z))
+        .line("U₂", exact.series(|s| s.point.w));
+    let rises = [&exact, &published].map(|run| run.changes(|s, next| next.entropy - s.entropy));
+    let rise = Panel::new("ΔS of each step", "t").line("exact", &rises[0]).level(0.0);
+    let title = format!("Two gas containers, α = {ALPHA}, h = {}", example.step_size);
+    let figure = Panels::new(title)
+        .panel(exact.panel("position q of the wall", |s| s.point.x).level(1.0))
+        .panel(energies)
+        .panel(both("energy H − H₀", &|s| s.energy - begin.energy))
+        .panel(both("entropy S − S₀", &|s| s.entropy - begin.entropy))
+        .panel(rise.clone().line("published", &rises[1]))
+        .panel(rise.title("exact scheme alone"));
+    example.report(&exact).certificate("published", &published.certificate).figure(figure).print()
 }

@@ -14,12 +14,14 @@
 use std::error::Error;
 
 use metriplectic::prelude::*;
-use metriplectic_studies::{Gallery, Options, Panel, Panels, Report, print};
-
-type Motion = Trajectory<Euclidean<3>>;
+use metriplectic_studies::{Example, Panel, Panels, Record};
 
 /// A run in the units of `μ`, `D`, `a`, `r₀`, `γ`, `C` and `T₀`, from a bond that is stretched by `½/a`.
-fn run([mu, d, a, r0, gamma, c, t0]: [f64; 7], span: Span) -> Result<Motion, Box<dyn Error>> {
+fn run(
+    [mu, d, a, r0, gamma, c, t0]: [f64; 7],
+    example: &Example,
+    span: Span,
+) -> Result<Record<Euclidean<3>>, Box<dyn Error>> {
     let friction = move |_: &Vector3<Real>, w: &Vector3<Real>| {
         let b = Vector3::new(0.0.into(), w.z, -w.y);
         b * b.transpose() * (w.z.recip() * gamma)
@@ -34,43 +36,41 @@ fn run([mu, d, a, r0, gamma, c, t0]: [f64; 7], span: Span) -> Result<Motion, Box
         .entropy(|x: &Vector3<Real>| x.z)
         .dissipation(FieldDissipation(friction))
         .build()?;
-    Ok(WeylMidpoint.run(&system, vector![r0 + 0.5 / a, 0.0, 0.0], span.at_most(2000))?)
+    example.run(&system, vector![r0 + 0.5 / a, 0.0, 0.0], span.at_most(2000))
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let options = Options::read();
-    let (count, h) = (options.steps_or(4000), options.step_size_or(1e-16));
     // In kg, J, 1/m, m, kg/s, J/K and K; then without units.
     let [mu, d, a, r0, gamma, c, t0] =
         [1.6266e-27, 7.399e-19, 1.868e10, 1.2746e-10, 3e-14, 1.38e-21, 300.0];
     let time = (mu / d).sqrt() / a;
     let reduced = [1.0, 1.0, 1.0, r0 * a, gamma * time / mu, c * t0 / d, 1.0];
-    let si = run([mu, d, a, r0, gamma, c, t0], Span::steps(h, count))?;
-    let twin = run(reduced, Span::steps(h / time, count))?;
-    let apart = si.iter().zip(&twin).map(|(s, t)| (s.point.x * a - t.point.x).abs());
-    let (apart, certificate, end) = (apart.fold(0.0, f64::max), si.certificate(), si.last());
+
+    let about = "Hydrogen chloride vibrates and warms a bath, in SI units and without units.";
+    let example = Example::new(about, 4000, 1e-16);
+    let (count, h) = (example.steps, example.step_size);
+    let si = run([mu, d, a, r0, gamma, c, t0], &example, Span::steps(h, count))?;
+    let twin = run(reduced, &example, Span::steps(h / time, count))?;
+
+    let apart = si.states.iter().zip(&twin.states);
+    let apart = apart.map(|(s, t)| (s.point.x * a - t.point.x).abs()).fold(0.0, f64::max);
     let temperature = |state: &State<Euclidean<3>>| t0 * (state.point.z / c).exp();
-    let (energy, last) = (certificate.initial_energy, temperature(end));
-
-    let path = Gallery::open()?.path("molecule_in_si_units.svg");
-    let panel = |title: &str, value: &dyn Fn(&State<Euclidean<3>>) -> f64| {
-        let points: Vec<_> = si.iter().map(|state| (state.time * 1e15, value(state))).collect();
-        Panel::new(title, "t in fs").line("", points)
+    let (energy, last) = (si.certificate.initial_energy, temperature(si.last()));
+    let panel = |quantity: &str, unit: &str, value: &dyn Fn(&State<Euclidean<3>>) -> f64| {
+        let points: Vec<_> = si.states.iter().map(|s| (s.time * 1e15, value(s))).collect();
+        Panel::new(quantity, "t (fs)").unit(unit).line(quantity, points)
     };
-    Panels::new(format!("Hydrogen chloride in a bath, in SI units, h = {h:.0e} s"))
-        .panel(panel("bond r in pm, at rest r₀", &|s| s.point.x * 1e12).level(r0 * 1e12))
-        .panel(panel("temperature T in K, at rest H₀/C", &temperature).level(energy / c))
-        .panel(panel("entropy S in J/K", &|s| s.entropy))
-        .panel(panel("energy H − H₀ in J", &|s| s.energy - energy).level(0.0))
-        .save(&path)?;
-
-    if options.json {
-        let report = Report::new(certificate, end)?.with("apart", apart);
-        report.with("temperature", last).with("temperature_at_rest", energy / c).print()?;
-    } else {
-        print(format_args!("{certificate}\ntwin:        bonds differ by {apart:.1e}/a"))?;
-        print(format_args!("temperature: {last:.3} K, at rest {:.3} K", energy / c))?;
-        print(format_args!("figure:      {}", path.display()))?;
-    }
-    Ok(())
+    let bond = panel("bond length r", "pm", &|s| s.point.x * 1e12);
+    let figure = Panels::new(format!("Hydrogen chloride in a bath, in SI units, h = {h:.0e} s"))
+        .panel(bond.named_level("r₀, at rest", r0 * 1e12))
+        .panel(panel("temperature T", "K", &temperature).named_level("H₀/C, at rest", energy / c))
+        .panel(panel("entropy S", "J/K", &|s| s.entropy))
+        .panel(panel("energy H − H₀", "J", &|s| s.energy - energy).level(0.0));
+    example
+        .report(&si)
+        .with("apart", apart)
+        .with("temperature", last)
+        .with("temperature_at_rest", energy / c)
+        .figure(figure)
+        .print()
 }

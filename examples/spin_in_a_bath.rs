@@ -15,15 +15,12 @@
 use std::error::Error;
 
 use metriplectic::prelude::*;
-use metriplectic_studies::{Gallery, Globe, Options, Panel, Panels, Report, print, write_csv};
+use metriplectic_studies::{Example, Globe, Panel, Panels};
 
 const CAPACITY: f64 = 20.0;
 type Space = Product<Sphere<2>, Euclidean<1>>;
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let options = Options::read();
-    let (count, h) = (options.steps_or(700), options.step_size_or(0.1));
-
     let spin = |n: &Vector3<Real>| n.x.powi(2) * 0.25 - n.z;
     let bath = |s: Real| (s / CAPACITY).exp();
     let system = System::on(Product(Sphere::<2>::round(), Euclidean::<1>))
@@ -32,42 +29,35 @@ fn main() -> Result<(), Box<dyn Error>> {
         .entropy(|(_, s): &(Vector3<Real>, Vector1<Real>)| s.x)
         .build()?;
     let start = (Vector3::new(0.48, 0.36, -0.8), Vector1::new(0.0));
-    let span = Span::steps(h, count).every(count.div_ceil(2000));
-    let run = WeylMidpoint.run(&system, start, span)?;
-    let (certificate, end) = (run.certificate(), run.last());
+
+    let about = "A spin in a heat bath: precession, friction and both laws, on S² × R.";
+    let example = Example::new(about, 700, 0.1);
+    let run = example.run(&system, start, example.span())?;
+
     let stored = |state: &State<Space>| bath(state.point.1.x.into()).re;
-    let energy = certificate.initial_energy;
-    let (last, rest) = (stored(end) / CAPACITY, (energy + 1.0) / CAPACITY);
-
-    let gallery = Gallery::open()?;
-    let line = |value: &dyn Fn(&State<Space>) -> f64| -> Vec<_> {
-        run.iter().map(|state| (state.time, value(state))).collect()
-    };
-    let energies = Panel::new("energies, dashed H = h + e", "t")
-        .line("spin h(n)", line(&|s| spin(&s.point.0.cast()).re))
-        .line("bath e(s)", line(&stored));
-    let temperature = Panel::new("temperature T, at rest (H₀ + 1)/c", "t");
-    let error = Panel::new("energy H − H₀", "t").line("H", line(&|s| s.energy - energy));
+    let energy = run.certificate.initial_energy;
+    let (last, rest) = (stored(run.last()) / CAPACITY, (energy + 1.0) / CAPACITY);
+    let energies = Panel::new("energies", "t")
+        .line("spin h(n)", run.series(|s| spin(&s.point.0.cast()).re))
+        .line("bath e(s)", run.series(stored))
+        .named_level("H", energy);
+    let temperature = run.panel("temperature T", |s| stored(s) / CAPACITY);
     let globe = Globe::new("the spin n(t), from ○ to ●").seen_from([0.8, 0.6, 0.4]);
-    Panels::new(format!("A spin in a heat bath, on S² × R, h = {h}"))
-        .columns(2)
-        .globe(globe.curve("n(t)", run.iter().map(|s| s.point.0)))
-        .panel(energies.level(energy))
-        .panel(temperature.line("T", line(&|s| stored(s) / CAPACITY)).level(rest))
-        .panel(Panel::new("entropy S", "t").line("S", line(&|s| s.entropy)))
-        .panel(error.level(0.0))
-        .save(gallery.path("spin_in_a_bath.svg"))?;
-    let rows = run.iter().map(|s| [s.time, s.point.0.x, s.point.0.y, s.point.0.z, s.point.1.x]);
-    write_csv(gallery.path("spin_in_a_bath.csv"), ["t", "n1", "n2", "n3", "s"], rows)?;
-
-    if options.json {
-        let report = Report::new(certificate, end)?.with("temperature", last);
-        report.with("temperature_at_rest", rest).print()?;
-    } else {
-        let (t, [x, y, z]): (f64, [f64; 3]) = (end.time, end.point.0.into());
-        print(format_args!("{certificate}\nat t = {t:.1}:   n = ({x:.6}, {y:.6}, {z:.6})"))?;
-        print(format_args!("temperature:  {:.6}, at rest {rest:.6}", last))?;
-        print(format_args!("figure:       {}", gallery.path("spin_in_a_bath.svg").display()))?;
-    }
-    Ok(())
+    let figure =
+        Panels::new(format!("A spin in a heat bath, on S² × R, h = {}", example.step_size))
+            .columns(2)
+            .globe(globe.curve("n(t)", run.states.iter().map(|s| s.point.0)))
+            .panel(energies)
+            .panel(temperature.named_level("(H₀ + 1)/c, at rest", rest))
+            .panel(run.panel("entropy S", |s| s.entropy))
+            .panel(run.energy_error());
+    let rows = run.states.iter();
+    let rows = rows.map(|s| [s.time, s.point.0.x, s.point.0.y, s.point.0.z, s.point.1.x]);
+    example
+        .report(&run)
+        .with("temperature", last)
+        .with("temperature_at_rest", rest)
+        .table(["t", "n1", "n2", "n3", "s"], rows)
+        .figure(figure)
+        .print()
 }

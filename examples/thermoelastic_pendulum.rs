@@ -13,9 +13,8 @@
 use std::error::Error;
 
 use metriplectic::prelude::*;
-use metriplectic_studies::{Gallery, Options, Panel, Panels, Report, print};
+use metriplectic_studies::{Example, Panel, Panels};
 
-type Space = Product<Euclidean<8>, Euclidean<2>>;
 type Point<D> = (SVector<D, 8>, Vector2<D>); // ((q₁, q₂, p₁, p₂), (s₁, s₂))
 
 /// The logarithms of the lengths of the threads.
@@ -29,9 +28,6 @@ fn angular_momentum<D: Scalar>((x, _): &Point<D>) -> D {
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let options = Options::read();
-    let (count, h) = (options.steps_or(800), options.step_size_or(0.05));
-
     let conduction = |_: &Point<Real>, w: &SVector<Real, 10>| {
         let b = SVector::<Real, 10>::ith(8, w[9]) - SVector::<Real, 10>::ith(9, w[8]);
         b * b.transpose() * (w[8] * w[9]).recip()
@@ -48,30 +44,26 @@ fn main() -> Result<(), Box<dyn Error>> {
         .momentum(angular_momentum)
         .build()?;
     let start = (vector![1.0, 0.0, 2.2, 0.0, 0.0, 2.0, 1.0, 0.0], Vector2::new(1.0, 0.2));
-    let run = WeylMidpoint.run(&pendulum, start, Span::steps(h, count))?;
 
-    let (certificate, end) = (run.certificate(), run.last());
-    let path = Gallery::open()?.path("thermoelastic_pendulum.svg");
-    let line = |value: &dyn Fn(&State<Space>) -> f64| -> Vec<_> {
-        run.iter().map(|state| (state.time, value(state))).collect()
+    let about = "The thermoelastic double pendulum: heat, both laws and a symmetry.";
+    let example = Example::new(about, 800, 0.05);
+    let run = example.run(&pendulum, start, Span::steps(example.step_size, example.steps))?;
+
+    let orbit = |i: usize| -> Vec<_> {
+        run.states.iter().map(|s| (s.point.0[i], s.point.0[i + 1])).collect()
     };
-    let orbit = |i: usize| run.iter().map(|s| (s.point.0[i], s.point.0[i + 1])).collect::<Vec<_>>();
-    let theta = |i: usize| line(&|s| (s.point.1 - stretch(&s.point))[i].exp());
-    let gained = line(&|s| s.energy - certificate.initial_energy);
-    let dg_v = line(&|s| angular_momentum(&s.point) - 2.0);
-    let motion = Panel::new("the motion", "x").vertical("y").equal().line("q₁", orbit(0));
-    Panels::new(format!("The thermoelastic double pendulum, h = {h}"))
-        .panel(motion.line("q₂", orbit(2)).line("threads at t = 0", [(0.0, 0.0), (2.2, 0.0)]))
+    let theta = |i: usize| run.series(|s| (s.point.1 - stretch(&s.point))[i].exp());
+    let motion = Panel::new("y", "x").equal().line("q₁", orbit(0)).line("q₂", orbit(2));
+    let errors = Panel::new("errors", "t")
+        .line("H − H₀", run.energy_errors())
+        .line("L − L₀", run.series(|s| angular_momentum(&s.point) - 2.0))
+        .level(0.0);
+    let title = format!("The thermoelastic double pendulum, h = {}", example.step_size);
+    let figure = Panels::new(title)
+        .panel(motion.line("threads at t = 0", [(0.0, 0.0), (2.2, 0.0)]))
         .panel(Panel::new("temperatures", "t").line("θ₁", theta(0)).line("θ₂", theta(1)))
-        .panel(Panel::new("entropy S", "t").line("S", line(&|s| s.entropy)))
-        .panel(Panel::new("errors", "t").line("H − H₀", gained).line("L − L₀", dg_v).level(0.0))
-        .save(&path)?;
-
-    if options.json {
-        Report::new(certificate, end)?.with("final_entropy", end.entropy).print()?;
-    } else {
-        print(format_args!("{certificate}\nat t = {:.1}:  S = {:.6}", end.time, end.entropy))?;
-        print(format_args!("figure:      {}", path.display()))?;
-    }
-    Ok(())
+        .panel(run.panel("entropy S", |s| s.entropy))
+        .panel(errors);
+    let entropy = run.last().entropy;
+    example.report(&run).with("final_entropy", entropy).figure(figure).print()
 }

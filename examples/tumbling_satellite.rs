@@ -13,7 +13,7 @@
 use std::error::Error;
 
 use metriplectic::prelude::*;
-use metriplectic_studies::{Gallery, Globe, Options, Panel, Panels, Report, print};
+use metriplectic_studies::{Example, Globe, Panels};
 
 const INERTIA: Vector3<f64> = Vector3::new(3.0, 2.5, 1.0);
 const CAPACITY: f64 = 4.0;
@@ -21,9 +21,6 @@ type Space = Product<Product<Rotations, Euclidean<3>>, Euclidean<1>>;
 type Point = ((Matrix3<Real>, Vector3<Real>), Vector1<Real>);
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let options = Options::read();
-    let (count, h) = (options.steps_or(2000), options.step_size_or(0.05));
-
     let spin = |p: &Vector3<Real>| p.component_mul(p).component_div(&INERTIA.cast()).sum() * 0.5;
     let rubbing = |((_, p), _): &Point, w: &SVector<Real, 7>| {
         let torque = |a: &SVector<Real, 7>| p.cross(&vector![a[3], a[4], a[5]]) - a.xyz();
@@ -44,34 +41,23 @@ fn main() -> Result<(), Box<dyn Error>> {
         .build()?;
     let p0 = vector![0.15, 0.1, 2.0];
     let start = ((Matrix3::identity(), p0), Vector1::new(0.0));
-    let run = WeylMidpoint.run(&satellite, start, Span::steps(h, count).at_most(2001))?;
-    let (certificate, end) = (run.certificate(), run.last());
+
+    let about = "A satellite goes into a flat spin: attitude, momentum and heat.";
+    let example = Example::new(about, 2000, 0.05);
+    let run = example.run(&satellite, start, example.span())?;
+
     let kinetic = |state: &State<Space>| spin(&state.point.0.1.cast()).re;
     let momentum = |state: &State<Space>| (state.point.0.0 * state.point.0.1 - p0).norm();
     let flat = 0.5 * p0.norm_squared() / INERTIA.x;
-
-    let (gallery, energy) = (Gallery::open()?, certificate.initial_energy);
-    let panel = |title: &str, value: &dyn Fn(&State<Space>) -> f64| {
-        let points: Vec<_> = run.iter().map(|state| (state.time, value(state))).collect();
-        Panel::new(title, "t").line(title, points)
-    };
-    let axis = run.iter().map(|s| s.point.0.0.column(2).into_owned());
-    Panels::new(format!("A satellite goes into a flat spin, on SO(3) × R³ × R, h = {h}"))
+    let axis = run.states.iter().map(|s| s.point.0.0.column(2).into_owned());
+    let title = format!("A satellite goes into a flat spin, h = {}", example.step_size);
+    let figure = Panels::new(title)
         .columns(2)
         .globe(Globe::new("the long axis in space, from ○ to ●").curve("R e₃", axis))
-        .panel(panel("kinetic energy, dashed ½|p|²/I₁", &kinetic).level(flat))
-        .panel(panel("temperature T", &|s| (s.point.1.x / CAPACITY).exp()))
-        .panel(panel("energy H − H₀", &|s| s.energy - energy).level(0.0))
-        .panel(panel("momentum in space |Rp − p₀|", &momentum))
-        .save(gallery.path("tumbling_satellite.svg"))?;
-
-    if options.json {
-        let energies = vec![kinetic(&run.states()[0]), kinetic(end), flat];
-        Report::new(certificate, end)?.with("kinetic_energies", energies).print()?;
-    } else {
-        print(certificate)?;
-        print(format_args!("kinetic:     {:.6}, in a flat spin {flat:.6}", kinetic(end)))?;
-        print(format_args!("figure:      {}", gallery.path("tumbling_satellite.svg").display()))?;
-    }
-    Ok(())
+        .panel(run.panel("kinetic energy", kinetic).named_level("½|p|²/I₁, flat spin", flat))
+        .panel(run.panel("temperature T", |s| (s.point.1.x / CAPACITY).exp()))
+        .panel(run.energy_error())
+        .panel(run.panel("error of the momentum |Rp − p₀|", momentum));
+    let energies = vec![kinetic(&run.states[0]), kinetic(run.last()), flat];
+    example.report(&run).with("kinetic_energies", energies).figure(figure).print()
 }

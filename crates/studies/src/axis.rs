@@ -104,10 +104,13 @@ impl Axis {
             let (shift, every) = (self.exponent, integer((decades / 7.0).ceil()).max(1));
             return TickFormat::Custom(Arc::new(move |tick| {
                 let exponent = integer((tick.log10() + 1e-9).floor());
-                let (digit, total) = (tick / 10_f64.powi(exponent), exponent + shift);
-                match digit.round() {
-                    1.0 if total.rem_euclid(every) == 0 => power(total),
-                    digit if digit > 1.0 && decades < 1.5 => format!("{digit}×{}", power(total)),
+                let (digit, total) = ((tick / 10_f64.powi(exponent)).round(), exponent + shift);
+                match (digit > 1.5, decades < 2.0) {
+                    (_, true) if (0..4).contains(&total) => {
+                        format!("{}", digit * 10_f64.powi(total))
+                    }
+                    (true, true) => format!("{digit}×{}", power(total)),
+                    (false, _) if total.rem_euclid(every) == 0 => power(total),
                     _ => String::new(),
                 }
             }));
@@ -216,6 +219,8 @@ mod tests {
         assert_eq!(labels, ["10⁻¹⁵", "10⁻¹²", "10⁻⁹", "10⁻⁶", "10⁻³", "10⁰"]);
         let narrow = Axis::logarithmic((0.03, 0.04));
         assert_eq!([2.0, 5.0].map(|x| written(&narrow, x)), ["2×10⁻²", "5×10⁻²"]);
+        let counts = Axis::logarithmic((2.0, 12.0));
+        assert_eq!([2.0, 10.0].map(|x| written(&counts, x)), ["2", "10"]);
     }
 
     #[test]

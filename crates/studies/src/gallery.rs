@@ -1,4 +1,4 @@
-//! What every example shares: its options, its folder, its data files, what it prints and its progress.
+//! The folder of the pictures, data files, lines on standard output, and a bar for long runs.
 
 use std::{
     env,
@@ -9,64 +9,12 @@ use std::{
     time::{Duration, Instant},
 };
 
-use clap::{Parser, builder::RangedU64ValueParser};
 use indicatif::{ProgressBar, ProgressStyle};
 
 /// How long a run stays silent.
 const PATIENCE: Duration = Duration::from_secs(1);
 /// How often a bar looks at the clock, at most.
 const GLANCE: Duration = Duration::from_millis(50);
-
-/// The command line of an example.
-///
-/// # Examples
-///
-/// ```
-/// use metriplectic_studies::Options;
-///
-/// let options = Options { steps: Some(10), ..Options::default() };
-/// assert_eq!(options.steps_or(1000), 10);
-/// assert_eq!(options.step_size_or(0.1), 0.1);
-/// ```
-#[derive(Clone, Debug, Default, PartialEq, Parser)]
-#[command(about = None, long_about = None)]
-pub struct Options {
-    /// Print the certificate as JSON
-    #[arg(long)]
-    pub json: bool,
-    /// Number of steps
-    #[arg(long, value_name = "N", value_parser = RangedU64ValueParser::<usize>::new().range(1..))]
-    pub steps: Option<usize>,
-    /// Size of a step
-    #[arg(long, value_name = "h", value_parser = positive, allow_negative_numbers = true)]
-    pub step_size: Option<f64>,
-}
-
-impl Options {
-    /// Reads the command line; on a mistake or `--help`, prints what is possible and exits.
-    #[must_use]
-    pub fn read() -> Self {
-        Self::parse()
-    }
-
-    /// The number of steps asked for, or the example's own.
-    #[must_use]
-    pub fn steps_or(&self, default: usize) -> usize {
-        self.steps.unwrap_or(default)
-    }
-
-    /// The step size asked for, or the example's own.
-    #[must_use]
-    pub fn step_size_or(&self, default: f64) -> f64 {
-        self.step_size.unwrap_or(default)
-    }
-}
-
-fn positive(text: &str) -> Result<f64, String> {
-    let value: f64 = text.parse().map_err(|_| format!("`{text}` is not a number"))?;
-    let valid = value.is_finite() && value > 0.0;
-    if valid { Ok(value) } else { Err(format!("a step size is positive and finite, not {value}")) }
-}
 
 /// The folder the examples draw into, `target/gallery` of the workspace.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -291,27 +239,6 @@ mod tests {
 
     fn scratch(name: &str) -> PathBuf {
         env::temp_dir().join(format!("metriplectic-{name}-{}", std::process::id()))
-    }
-
-    #[test]
-    fn options_are_read() {
-        let line = ["example", "--json", "--steps", "12", "--step-size", "0.5"];
-        let options = Options::try_parse_from(line).unwrap();
-        let expected = Options { json: true, steps: Some(12), step_size: Some(0.5) };
-        assert_eq!(options, expected);
-        assert_eq!((options.steps_or(3), options.step_size_or(0.1)), (12, 0.5));
-        let none = Options::try_parse_from(["example"]).unwrap();
-        assert_eq!((none.json, none.steps_or(3), none.step_size_or(0.1)), (false, 3, 0.1));
-    }
-
-    #[test]
-    fn impossible_steps_are_refused() {
-        for (option, value) in
-            [("--steps", "0"), ("--step-size", "0"), ("--step-size", "-1"), ("--step-size", "NaN")]
-        {
-            let line = ["example".into(), format!("{option}={value}")];
-            assert!(Options::try_parse_from(line).is_err(), "{option} {value}");
-        }
     }
 
     #[test]

@@ -165,6 +165,7 @@ impl Globe {
         let mut levels: Vec<_> = self.levels.iter().map(|(label, _)| label.as_str()).collect();
         levels.dedup();
         entries.extend(levels.into_iter().map(|label| (label, GREY, false)));
+        entries.truncate(if entries.len() > 1 { entries.len() } else { 0 });
         Header::of(&self.title, entries, width)
     }
 }

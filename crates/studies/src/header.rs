@@ -1,5 +1,4 @@
-//! What stands above a picture: its letter, its title, and a legend as soon as there is something to tell
-//! apart.
+//! What stands above a picture: its letter, its title and its legend.
 
 use kuva::render::render::{Primitive, TextAnchor};
 
@@ -28,8 +27,7 @@ impl<'a> Header<'a> {
     pub(crate) fn of(title: &'a str, entries: Vec<Entry<'a>>, width: f64) -> Self {
         let start = if title.is_empty() { LETTER } else { LETTER + length(title, NAME) + GAP };
         let (mut x, mut row) = (start, 0.0);
-        let several = entries.len() > 1;
-        let set = entries.into_iter().filter(|_| several).map(|entry| {
+        let set = entries.into_iter().map(|entry| {
             let needed = SAMPLE + length(entry.0, NUMBER);
             if x + needed > width && x > LETTER {
                 (x, row) = (LETTER, row + 1.0);

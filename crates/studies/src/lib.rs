@@ -12,8 +12,9 @@
 //! | [`drift`] | does the error grow with time? | [`Drift`]: flat, a random walk or a linear drift, in constant memory |
 //! | [`table`] | what does the study say, in rows? | [`Table`]: plain text and Markdown |
 //! | [`plot`] | what does it look like? | [`Panels`] of lines, with a [`Globe`] beside them, and [`LogLog`]: SVG, the same bytes every time |
-//! | [`gallery`] | where do the pictures and the words of an example go? | [`Options`], [`Gallery`], [`Progress`], [`print()`], [`write_csv`] |
-//! | [`report`] | what does a program read of it? | [`Report`]: one JSON object |
+//! | [`example`] | what surrounds the model of an example? | [`Example`]: options, progress and the run; [`Record`]: its states |
+//! | [`report`] | what does an example write? | [`Report`]: files, and text or one JSON object |
+//! | [`gallery`] | where do pictures and words go? | [`Gallery`], [`Progress`], [`print()`], [`write_csv`] |
 //! | [`interrupt`] | has Ctrl-C been pressed? | [`interrupted()`]: a long run stops where its file is whole |
 //!
 //! # Example
@@ -45,6 +46,7 @@
 
 pub mod convergence;
 pub mod drift;
+pub mod example;
 pub mod gallery;
 pub mod interrupt;
 pub mod order;
@@ -63,7 +65,8 @@ mod student;
 
 pub use convergence::Convergence;
 pub use drift::{Drift, Growth, Slope};
-pub use gallery::{Gallery, GalleryError, Options, Progress, print, write_csv};
+pub use example::{Example, Record};
+pub use gallery::{Gallery, GalleryError, Progress, print, write_csv};
 pub use interrupt::interrupted;
 pub use order::{Order, OrderError};
 pub use plot::{Globe, LogLog, Panel, Panels, PlotError};

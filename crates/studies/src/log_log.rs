@@ -127,9 +127,7 @@ impl LogLog {
         let height = (FRAME.1 + BELOW).max(ROW * rows as f64 + 24.0);
         let size = (left + FRAME.0 + right, TOP + height);
         (layout.width, layout.height) = (Some(size.0), Some(size.1));
-        layout = layout
-            .with_force_margins(left, right)
-            .with_force_margins_y(TOP, height - FRAME.1);
+        layout = layout.with_force_margins(left, right).with_force_margins_y(TOP, height - FRAME.1);
         layout.x_label_offset = (0.0, FRAME.1 + BELOW - height);
         let middle = left + 0.5 * FRAME.0;
         let mut sheet = plot::sheet(size, &self.title, middle);
@@ -165,7 +163,7 @@ impl LogLog {
             .with_legend_box(false);
         let labels = self.guides.iter().filter_map(|&p| self.guide_points((x, y), p)).map(
             |(p, [_, corner, end])| {
-                let (x, y) = (end.0 * 1.12, (corner.1 * end.1).sqrt());
+                let (x, y) = (end.0 * x.fraction(0.025), (corner.1 * end.1).sqrt());
                 TextAnnotation::new(p, x, y).with_color(INK).with_font_size(NUMBER)
             },
         );

@@ -25,7 +25,7 @@ const ALL_STRETCHES: usize = 12_000;
 const EDGE: f64 = 8.0;
 const HEAD: f64 = 36.0;
 const RIGHT: f64 = 16.0;
-const BELOW: f64 = 46.0;
+const BELOW: f64 = 42.0;
 /// The diameter of a globe, from beside a low grid to beside a high one.
 const DISC: (f64, f64) = (300.0, 440.0);
 
@@ -191,7 +191,9 @@ impl Panel {
     }
 
     fn header(&self, width: f64) -> Header<'_> {
-        let lines = self.labels().into_iter().enumerate();
+        let labels = self.labels();
+        let several = labels.len() > 1;
+        let lines = labels.into_iter().enumerate().filter(|_| several);
         let lines = lines.map(|(k, label)| (label, color(k), false));
         let levels = self.levels.iter().filter(|(label, _)| !label.is_empty());
         let levels = levels.map(|(label, _)| (label.as_str(), INK, true));
@@ -509,7 +511,7 @@ mod tests {
         let one = Panel::new("one", "t").line("alone", wave(10));
         assert!(!labelled(one.clone()).contains("alone"));
         let limited = labelled(one.named_level("limit", 0.5));
-        assert!(limited.contains(">alone<") && limited.contains(">limit<"));
+        assert!(!limited.contains(">alone<") && limited.contains(">limit<"));
     }
 
     #[test]

@@ -111,9 +111,9 @@ pub(crate) fn theme() -> Theme {
     }
 }
 
-/// The length of a text, on the wide side: only the viewer knows the font.
+/// The length of a text, about: only the viewer knows the font.
 pub(crate) fn length(text: &str, size: u32) -> f64 {
-    0.6 * f64::from(size) * text.chars().count() as f64
+    0.54 * f64::from(size) * text.chars().count() as f64
 }
 
 /// The size of a text that is not longer than this, at most the one asked for.

@@ -13,7 +13,7 @@
 use std::{error::Error, fs::File};
 
 use metriplectic::prelude::*;
-use metriplectic_studies::{Example, Gallery, Panel, Panels, Record, interrupted};
+use metriplectic_studies::{Example, Gallery, Panel, Panels, Progress, Record, interrupted};
 
 const INERTIA: Vector3<f64> = Vector3::new(10.0, 5.0, 1.0);
 
@@ -36,13 +36,16 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut table = watch.csv(File::create(Gallery::open()?.path("adaptive_relaxation.csv"))?)?;
     table.write(steps.state())?;
     let mut states = vec![steps.state().clone()];
+    let mut progress = Progress::over(example.steps);
     for state in steps.by_ref().take(example.steps) {
         states.push(state?);
         table.write(&states[states.len() - 1])?;
+        progress.step();
         if interrupted() {
             break;
         }
     }
+    drop(progress);
     table.finish()?;
     let run = Record { states, certificate: steps.certificate().clone() };
 

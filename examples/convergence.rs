@@ -43,9 +43,9 @@ fn main() -> Result<(), Box<dyn Error>> {
         .report_of_many()
         .text(Convergence::table(&studies))
         .with("worst_energy_error", worst)
-        .convergence("", &figure("spheres"))
-        .convergence("_rotations", &figure("rotations"))
-        .convergence("_charts", &figure("charts and products"))
+        .log_log("", &figure("spheres"))
+        .log_log("_rotations", &figure("rotations"))
+        .log_log("_charts", &figure("charts and products"))
         .print_as(&Value::Array(rows.collect()))
 }
 

@@ -58,11 +58,14 @@ fn the_relaxing_rigid_body_draws_its_figure_and_writes_its_table() {
         std::fs::read_to_string(format!("{folder}/{name}")).expect("the example writes it")
     };
     let figure = read("relaxing_rigid_body.svg");
-    for title in ["p₁", "p₂", "p₃", "H − H₀", "entropy S"] {
-        assert!(figure.contains(title), "{title} is missing");
+    for quantity in ["p₁", "p₂", "p₃", "H − H₀", "entropy S"] {
+        assert!(figure.contains(quantity), "{quantity} is missing");
+    }
+    for letter in 'a'..='e' {
+        assert!(figure.contains(&format!(">{letter}</text>")), "panel {letter} is missing");
     }
     // So that one sees that it is exact.
-    assert!(["10⁻¹⁶", "10⁻¹⁷"].iter().any(|unit| figure.contains(&format!("units of {unit}"))));
+    assert!(["10⁻¹⁶", "10⁻¹⁷"].iter().any(|unit| figure.contains(&format!("({unit})"))));
     let table = read("relaxing_rigid_body.csv");
     let mut lines = table.lines();
     assert_eq!(lines.next(), Some("t,p1,p2,p3,energy,entropy"));
@@ -363,6 +366,18 @@ fn the_run_of_an_example_can_be_changed() {
     let refused = example("relaxing_rigid_body", &["--step-size", "-1"]);
     assert!(!refused.status.success() && refused.stdout.is_empty());
     assert!(String::from_utf8_lossy(&refused.stderr).contains("positive"));
+}
+
+#[test]
+fn help_says_what_an_example_is_and_its_defaults() {
+    let help = example("heavy_top", &["--help"]);
+    let text = String::from_utf8_lossy(&help.stdout);
+    for part in ["A heavy top rises", "[default: 1200]", "[default: 0.05]", "--json"] {
+        assert!(help.status.success() && text.contains(part), "{part} in {text}");
+    }
+    // A study of many runs has no step of its own.
+    let refused = example("convergence", &["--steps", "10"]);
+    assert!(!refused.status.success() && refused.stdout.is_empty());
 }
 
 #[test]

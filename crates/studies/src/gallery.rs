@@ -172,7 +172,7 @@ pub struct Progress {
 }
 
 impl Progress {
-    /// Progress of a run of so many steps.
+    /// Progress of a run of so many steps; `usize::MAX` if their number is not known.
     #[must_use]
     pub fn over(total: usize) -> Self {
         Self::starting(total, io::stderr().is_terminal())
@@ -210,7 +210,8 @@ impl Progress {
     fn draw(&mut self) {
         if !self.shown {
             self.shown = true;
-            self.bar = ProgressBar::new(self.total as u64).with_style(style());
+            self.bar =
+                ProgressBar::new(self.total as u64).with_style(style(self.total < usize::MAX));
         }
         self.bar.set_position(self.done as u64);
     }
@@ -228,9 +229,13 @@ impl fmt::Debug for Progress {
     }
 }
 
-fn style() -> ProgressStyle {
-    ProgressStyle::with_template("{bar:40} {percent:>3} %  {human_pos} steps  {eta} left")
-        .unwrap_or_else(|_| ProgressStyle::default_bar())
+fn style(bounded: bool) -> ProgressStyle {
+    let template = if bounded {
+        "{bar:40} {percent:>3} %  {human_pos} steps  {eta} left"
+    } else {
+        "{spinner} {human_pos} steps in {elapsed}"
+    };
+    ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar())
 }
 
 #[cfg(test)]

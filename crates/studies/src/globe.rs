@@ -14,6 +14,8 @@ use crate::{
 const SLACK: f64 = 0.05;
 /// Room around the disc for the ends of the axes and their names.
 const MARGIN: f64 = 40.0;
+/// The diameter of the disc, from beside a low grid to beside a high one.
+const DISC: At = (300.0, 440.0);
 /// How far the axes stick out of the sphere, and their names out of the axes, in pixels.
 const AXIS: [f64; 2] = [22.0, 10.0];
 /// Points of a circle of the graticule.
@@ -95,44 +97,38 @@ impl Globe {
         self
     }
 
-    /// Width and height of a globe whose disc has this diameter.
-    pub(crate) fn size(&self, diameter: f64) -> At {
-        let width = diameter + 2.0 * MARGIN;
-        (width, width + self.header(width).height())
-    }
-
-    /// The largest disc with which the globe is not higher than this.
-    pub(crate) fn diameter_within(&self, height: f64) -> f64 {
-        height - 2.0 * MARGIN - self.header(height).height()
+    /// Width and height beside a grid of this height.
+    pub(crate) fn size(&self, height: f64) -> At {
+        let room = height - self.header(height).height - 2.0 * MARGIN;
+        let width = room.clamp(DISC.0, DISC.1) + 2.0 * MARGIN;
+        (width, width + self.header(width).height)
     }
 
     pub(crate) fn check(&self) -> Result<(), PlotError> {
         if self.curves.is_empty() && self.levels.is_empty() {
             return Err(PlotError::Empty { name: self.title.clone() });
         }
+        let off = |name: &str, index, point: &Vector| {
+            let (name, point) = (name.to_owned(), point.to_vec());
+            PlotError::Point { name, index, point, place: "the unit sphere" }
+        };
         for (label, points) in self.curves.iter().chain(&self.levels) {
             if points.is_empty() {
                 return Err(PlotError::Empty { name: label.clone() });
             }
             let on = |x: &Vector| (norm(x) - 1.0).abs() <= SLACK;
             if let Some(index) = points.iter().position(|x| !on(x)) {
-                let norm = norm(&points[index]);
-                return Err(PlotError::OffSphere { name: label.clone(), index, norm });
+                return Err(off(label, index, &points[index]));
             }
         }
         let far = norm(&self.viewer);
-        if far.is_finite() && far > 0.0 {
-            Ok(())
-        } else {
-            Err(PlotError::OffSphere { name: "the viewer".into(), index: 0, norm: far })
-        }
+        if far.is_normal() { Ok(()) } else { Err(off("the viewer", 0, &self.viewer)) }
     }
 
-    /// The parts, with the upper left corner of the header at the origin.
-    pub(crate) fn parts(&self, letter: char, diameter: f64) -> Vec<Primitive> {
-        let (width, height) = self.size(diameter);
+    /// The parts of a globe of this size, with its upper left corner at the origin.
+    pub(crate) fn parts(&self, letter: char, (width, height): At) -> Vec<Primitive> {
         let centre = (0.5 * width, height - 0.5 * width);
-        let radius = 0.5 * diameter;
+        let radius = 0.5 * width - MARGIN;
         let view = View::from(self.viewer, centre, radius);
         let curves = || self.curves.iter().enumerate().map(|(k, (_, x))| (x, color(k)));
         let mut parts = vec![circle(centre, radius, SURFACE, GREY, 0.9)];
@@ -154,7 +150,7 @@ impl Globe {
             parts.extend(view.lines(x, Side::Front, color, 1.6));
         }
         parts.extend(curves().flat_map(|(x, color)| view.ends(x, color)));
-        parts.extend(self.header(width).parts(letter, (4.0, height - width)));
+        parts.extend(self.header(width).parts(letter, (4.0, 0.0)));
         parts
     }
 
@@ -245,7 +241,7 @@ impl View {
         width: f64,
     ) -> impl Iterator<Item = Primitive> {
         let paths = self.paths(points, side).into_iter();
-        paths.map(move |path| line(path.iter().map(|x| self.at(x)).collect(), color, width))
+        paths.map(move |path| line(path.iter().map(|x| self.at(x)).collect(), color, width, None))
     }
 
     /// A hollow disc at the start of a curve and a filled one at its end.
@@ -269,7 +265,7 @@ impl View {
             // Behind the sphere an axis begins where the disc does not cover it.
             let start = if self.side(&axis(1.0)) == Side::Front { 1.0 } else { across.recip() };
             if start < tip {
-                parts.push(line(vec![self.at(&axis(start)), self.at(&axis(tip))], INK, 1.0));
+                parts.push(line(vec![self.at(&axis(start)), self.at(&axis(tip))], INK, 1.0, None));
                 let name_at = self.at(&axis(tip + AXIS[1] / (self.radius * across.max(1e-3))));
                 parts.push(text(name, name_at, NAME, TextAnchor::Middle));
             }
@@ -390,8 +386,8 @@ mod tests {
     #[test]
     fn levels_of_one_name_share_their_entry() {
         let one = Globe::new("globe").level("H", equator()).level("H", equator());
-        assert_eq!(one.header(400.0).entries().len(), 0);
-        assert_eq!(one.clone().curve("x", equator()).header(400.0).entries().len(), 2);
+        assert_eq!(one.header(400.0).entries.len(), 0);
+        assert_eq!(one.clone().curve("x", equator()).header(400.0).entries.len(), 2);
         let svg = Panels::new("").globe(one.curve("x", equator())).svg().unwrap();
         assert_eq!(svg.matches(">H<").count(), 1);
     }
@@ -406,10 +402,10 @@ mod tests {
             matches!(error(globe().curve("c", none)), PlotError::Empty { name } if name == "c")
         );
         let off = error(globe().curve("c", [[1.0, 0.0, 0.0], [1.0, 1.0, 0.0]]));
-        assert!(matches!(off, PlotError::OffSphere { index: 1, .. }), "{off}");
+        assert!(matches!(off, PlotError::Point { index: 1, .. }), "{off}");
         let nan = error(globe().level("l", [[f64::NAN, 0.0, 0.0]]));
-        assert!(matches!(nan, PlotError::OffSphere { index: 0, .. }), "{nan}");
+        assert!(matches!(nan, PlotError::Point { index: 0, .. }), "{nan}");
         let nowhere = error(globe().curve("c", equator()).seen_from([0.0; 3]));
-        assert!(matches!(nowhere, PlotError::OffSphere { .. }), "{nowhere}");
+        assert!(matches!(nowhere, PlotError::Point { .. }), "{nowhere}");
     }
 }

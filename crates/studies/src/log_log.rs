@@ -5,12 +5,13 @@ use std::path::PathBuf;
 use kuva::plot::{LineStyle, scatter::MarkerShape};
 use kuva::prelude::{LegendEntry, LegendPosition, LegendShape, LinePlot, Plot, ScatterPlot};
 use kuva::render::annotations::TextAnnotation;
-use kuva::render::layout::{ComputedLayout, Layout};
+use kuva::render::layout::ComputedLayout;
 use kuva::render::render::render_multiple;
 
 use crate::{
     axis::{Axis, layout},
     order::Order,
+    panels::range,
     plot::{self, GREY, INK, NUMBER, PlotError, color},
 };
 
@@ -114,23 +115,44 @@ impl LogLog {
     ///
     /// # Errors
     ///
-    /// [`PlotError::Empty`] without series or points, [`PlotError::NonPositive`] and
-    /// [`PlotError::NonFinite`] for a point without logarithms.
+    /// [`PlotError::Empty`] without series or points, [`PlotError::Point`] for a point without logarithms.
     pub fn svg(&self) -> Result<String, PlotError> {
-        let (x, y) = self.axes()?;
-        let mut plots = self.guides.iter().flat_map(|&p| self.guide_plot((&x, &y), p)).collect();
+        if self.series.is_empty() {
+            return Err(PlotError::Empty { name: self.title.clone() });
+        }
+        self.series.iter().try_for_each(Series::check)?;
+        let points = || self.series.iter().flat_map(|series| &series.points);
+        let x = Axis::logarithmic(range(points().map(|p| p.0)));
+        let y = Axis::logarithmic(range(points().map(|p| p.1)));
+        let mut plots = Vec::new();
+        let mut layout = layout(&x, &y)
+            .with_x_label(&self.horizontal)
+            .with_y_label(&self.vertical)
+            .with_legend_position(LegendPosition::OutsideRightTop)
+            .with_legend_box(false);
+        for &p in &self.guides {
+            let [start, corner, end] = self.guide_points((&x, &y), p);
+            let line = LinePlot::new().with_data([start, corner, end, start]).with_color(GREY);
+            plots.push(Plot::Line(line.with_stroke_width(1.0)));
+            let beside = (end.0 * x.fraction(0.025), (corner.1 * end.1).sqrt());
+            let label = TextAnnotation::new(p.to_string(), beside.0, beside.1);
+            layout = layout.with_annotation(label.with_color(INK).with_font_size(NUMBER));
+        }
         self.series.iter().for_each(|series| series.plots((&x, &y), &mut plots));
-        let mut layout = self.layout((&x, &y));
+        for problem in self.series.chunk_by(|_, next| next.look.rank > 0) {
+            let entries = problem.iter().map(Series::legend).collect();
+            layout = layout.with_legend_group(&problem[0].label, entries);
+        }
         let computed = ComputedLayout::from_layout(&layout);
         let (left, right) = (computed.margin_left.ceil(), computed.margin_right.ceil());
         let rows: usize = self.series.iter().map(|series| 2 - series.look.rank.min(1)).sum();
         let height = (FRAME.1 + BELOW).max(ROW * rows as f64 + 24.0);
         let size = (left + FRAME.0 + right, TOP + height);
         (layout.width, layout.height) = (Some(size.0), Some(size.1));
-        layout = layout.with_force_margins(left, right).with_force_margins_y(TOP, height - FRAME.1);
         layout.x_label_offset = (0.0, FRAME.1 + BELOW - height);
-        let middle = left + 0.5 * FRAME.0;
-        let mut sheet = plot::sheet(size, &self.title, middle);
+        let layout =
+            layout.with_force_margins(left, right).with_force_margins_y(TOP, height - FRAME.1);
+        let mut sheet = plot::sheet(size, &self.title, left + 0.5 * FRAME.0);
         plot::place(&mut sheet, (0.0, 0.0), render_multiple(plots, layout).elements);
         Ok(plot::svg(&sheet))
     }
@@ -144,53 +166,16 @@ impl LogLog {
         plot::save(path.into(), &self.svg()?)
     }
 
-    fn axes(&self) -> Result<(Axis, Axis), PlotError> {
-        if self.series.is_empty() {
-            return Err(PlotError::Empty { name: self.title.clone() });
-        }
-        self.series.iter().try_for_each(Series::check)?;
-        let points = || self.series.iter().flat_map(|series| &series.points);
-        let (x, y) = (ends(points().map(|p| p.0)), ends(points().map(|p| p.1)));
-        Ok((Axis::logarithmic(x), Axis::logarithmic(y)))
-    }
-
-    /// The axes, their names and the legend, for `kuva`.
-    fn layout(&self, (x, y): (&Axis, &Axis)) -> Layout {
-        let layout = layout(x, y)
-            .with_x_label(&self.horizontal)
-            .with_y_label(&self.vertical)
-            .with_legend_position(LegendPosition::OutsideRightTop)
-            .with_legend_box(false);
-        let labels = self.guides.iter().filter_map(|&p| self.guide_points((x, y), p)).map(
-            |(p, [_, corner, end])| {
-                let (x, y) = (end.0 * x.fraction(0.025), (corner.1 * end.1).sqrt());
-                TextAnnotation::new(p, x, y).with_color(INK).with_font_size(NUMBER)
-            },
-        );
-        let layout = labels.fold(layout, Layout::with_annotation);
-        let mut problems = self.series.chunk_by(|_, next| next.look.rank > 0);
-        problems.by_ref().fold(layout, |layout, problem| {
-            let entries = problem.iter().map(Series::legend).collect();
-            layout.with_legend_group(&problem[0].label, entries)
-        })
-    }
-
-    /// A triangle of slope `p` to the lower right of the middle of the series it fits best: its label and
-    /// the corners in readings of the axes.
-    fn guide_points(&self, (x, y): (&Axis, &Axis), p: f64) -> Option<(String, [(f64, f64); 3])> {
+    /// A triangle of slope `p` to the lower right of the middle of the series it fits best, in readings of
+    /// the axes.
+    fn guide_points(&self, (x, y): (&Axis, &Axis), p: f64) -> [(f64, f64); 3] {
         let misfit = |series: &&Series| (series.slope() - p).abs();
-        let nearest = self.series.iter().min_by(|a, b| misfit(a).total_cmp(&misfit(b)))?;
-        let (low, high) = nearest.middle();
+        let nearest = self.series.iter().min_by(|a, b| misfit(a).total_cmp(&misfit(b)));
+        let (low, high) = nearest.map_or_else(Default::default, Series::middle);
         let (right, down) = (x.fraction(0.025), y.fraction(-0.025));
         let at = |(a, b)| (x.reading(a) * right, y.reading(b) * down);
         let (start, end) = (at((low.0, high.1 * (low.0 / high.0).powf(p))), at(high));
-        Some((p.to_string(), [start, (end.0, start.1), end]))
-    }
-
-    fn guide_plot(&self, axes: (&Axis, &Axis), p: f64) -> Option<Plot> {
-        let (_, [start, corner, end]) = self.guide_points(axes, p)?;
-        let line = LinePlot::new().with_data([start, corner, end, start]).with_color(GREY);
-        Some(Plot::Line(line.with_stroke_width(1.0)))
+        [start, (end.0, start.1), end]
     }
 }
 
@@ -221,19 +206,18 @@ impl Series {
     }
 
     fn check(&self) -> Result<(), PlotError> {
+        let name = self.label.clone();
         if self.given.is_empty() {
-            return Err(PlotError::Empty { name: self.label.clone() });
+            return Err(PlotError::Empty { name });
         }
-        let name = || self.label.clone();
-        for (index, &(x, y)) in self.given.iter().enumerate() {
-            if !(x.is_finite() && y.is_finite()) {
-                return Err(PlotError::NonFinite { name: name(), index, x, y });
+        let fits = |(x, y): &(f64, f64)| x.min(*y) > 0.0 && (x * y).is_finite();
+        match self.given.iter().position(|point| !fits(point)) {
+            Some(index) => {
+                let point = vec![self.given[index].0, self.given[index].1];
+                Err(PlotError::Point { name, index, point, place: "logarithmic axes" })
             }
-            if x.min(y) <= 0.0 {
-                return Err(PlotError::NonPositive { name: name(), index, x, y });
-            }
+            None => Ok(()),
         }
-        Ok(())
     }
 
     fn slope(&self) -> f64 {
@@ -286,10 +270,6 @@ impl Series {
         let at = |fraction: usize| kept[(kept.len() - 1) * fraction / 6];
         (at(2), at(4))
     }
-}
-
-fn ends(values: impl Iterator<Item = f64> + Clone) -> (f64, f64) {
-    (values.clone().fold(f64::INFINITY, f64::min), values.fold(0.0, f64::max))
 }
 
 #[cfg(test)]
@@ -352,8 +332,8 @@ mod tests {
         assert!(matches!(empty, PlotError::Empty { name } if name == "title"));
         assert!(matches!(error(&[]), PlotError::Empty { name } if name == "s"));
         let zero = error(&[(0.1, 1.0), (0.2, 0.0)]);
-        assert!(matches!(zero, PlotError::NonPositive { index: 1, .. }), "{zero}");
+        assert!(matches!(zero, PlotError::Point { index: 1, .. }), "{zero}");
         let nan = error(&[(f64::NAN, 1.0)]);
-        assert!(matches!(nan, PlotError::NonFinite { index: 0, .. }), "{nan}");
+        assert!(matches!(nan, PlotError::Point { index: 0, .. }), "{nan}");
     }
 }

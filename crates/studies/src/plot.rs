@@ -8,7 +8,6 @@ use std::{fs, io, path::PathBuf};
 
 use kuva::backend::svg::SvgBackend;
 use kuva::render::render::{PathData, Primitive, Scene, TextAnchor};
-use kuva::render::theme::Theme;
 
 pub use crate::{
     globe::Globe,
@@ -26,50 +25,18 @@ pub enum PlotError {
         /// Title or label.
         name: String,
     },
-    /// A point has no place on the paper.
-    #[error("point {index} of `{name}` is ({x}, {y}); leave out what is not finite")]
-    NonFinite {
-        /// Title of the panel or label of the line.
+    /// A point has no place on the paper: it is not finite, not positive on a logarithmic axis, or not on
+    /// the unit sphere.
+    #[error("point {index} of `{name}` is {point:?}, which has no place on {place}; leave it out")]
+    Point {
+        /// Label of the line.
         name: String,
         /// Index of the point.
         index: usize,
-        /// Its abscissa.
-        x: f64,
-        /// Its ordinate.
-        y: f64,
-    },
-    /// A point has no place on logarithmic axes.
-    #[error(
-        "point {index} of `{name}` is ({x}, {y}); logarithmic axes need positive numbers: \
-         leave it out"
-    )]
-    NonPositive {
-        /// Label of the series.
-        name: String,
-        /// Index of the point.
-        index: usize,
-        /// Its abscissa.
-        x: f64,
-        /// Its ordinate.
-        y: f64,
-    },
-    /// A point is not on the unit sphere.
-    #[error("point {index} of `{name}` has the norm {norm}; a globe shows points of norm 1")]
-    OffSphere {
-        /// Label of the curve.
-        name: String,
-        /// Index of the point.
-        index: usize,
-        /// Its norm.
-        norm: f64,
-    },
-    /// The length of an axis is not finite.
-    #[error("an axis cannot reach from {low:e} to {high:e}; rescale the numbers")]
-    Range {
-        /// Lower end.
-        low: f64,
-        /// Upper end.
-        high: f64,
+        /// Its entries.
+        point: Vec<f64>,
+        /// Where it was to be drawn.
+        place: &'static str,
     },
     /// The file could not be written.
     #[error("cannot write {}: {source}; does its folder exist?", path.display())]
@@ -100,17 +67,6 @@ pub(crate) fn color(line: usize) -> &'static str {
     ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9"][line % 6]
 }
 
-/// The colours of axes and grids.
-pub(crate) fn theme() -> Theme {
-    Theme {
-        axis_color: GREY.into(),
-        grid_color: "#E5E5E5".into(),
-        tick_color: GREY.into(),
-        text_color: INK.into(),
-        ..Theme::light()
-    }
-}
-
 /// The length of a text, about: only the viewer knows the font.
 pub(crate) fn length(text: &str, size: u32) -> f64 {
     0.54 * f64::from(size) * text.chars().count() as f64
@@ -127,9 +83,14 @@ pub(crate) fn text(content: &str, (x, y): At, size: u32, anchor: TextAnchor) -> 
     Primitive::Text { x, y, content, size, anchor, rotate: None, bold: false, color: None }
 }
 
-/// A line through places.
-pub(crate) fn line(points: Vec<At>, stroke: &str, stroke_width: f64) -> Primitive {
-    Primitive::PolyLine { points, stroke: stroke.into(), stroke_width, stroke_dasharray: None }
+/// A line through places, perhaps dashed.
+pub(crate) fn line(points: Vec<At>, color: &str, width: f64, dashes: Option<&str>) -> Primitive {
+    Primitive::PolyLine {
+        points,
+        stroke: color.into(),
+        stroke_width: width,
+        stroke_dasharray: dashes.map(str::to_owned),
+    }
 }
 
 /// An empty sheet of this size with a title over `middle`.

@@ -80,8 +80,8 @@ impl Report {
         self.file("svg", |path| Ok(figure.save(path)?))
     }
 
-    /// Draws one of several figures, with this added to its name.
-    pub fn convergence(self, suffix: &str, figure: &LogLog) -> Self {
+    /// Draws a figure of errors over step sizes, with this added to its name.
+    pub fn log_log(self, suffix: &str, figure: &LogLog) -> Self {
         self.file(&format!("{suffix}.svg"), |path| Ok(figure.save(path)?))
     }
 

@@ -3,10 +3,11 @@
 use std::f64::consts::{FRAC_PI_6, TAU};
 
 use kuva::render::render::{Primitive, TextAnchor};
+use nalgebra::Vector3;
 
 use crate::{
     header::{Entry, Header},
-    plot::{At, GREY, INK, NAME, PlotError, color, line, text},
+    plot::{self, At, GREY, INK, NAME, PlotError, color, line, text},
 };
 
 /// How far from 1 the norm of a point may be: what an integrator that leaves the sphere makes of it
@@ -24,7 +25,7 @@ const FINE: u8 = 120;
 const SURFACE: &str = "#F7F9FB";
 const GRATICULE: &str = "#DADEE2";
 
-type Vector = [f64; 3];
+type Vector = Vector3<f64>;
 
 /// The unit sphere with curves on it, seen from far away: the orthographic projection
 ///
@@ -62,14 +63,14 @@ impl Globe {
     /// A sphere with a title, seen from the octant where all coordinates are positive.
     #[must_use]
     pub fn new(title: impl Into<String>) -> Self {
-        let viewer = [0.72, 0.52, 0.46];
+        let viewer = Vector::new(0.72, 0.52, 0.46);
         Self { title: title.into(), viewer, curves: Vec::new(), levels: Vec::new() }
     }
 
     /// Puts the viewer in this direction, which need not be a unit vector.
     #[must_use]
     pub fn seen_from(mut self, viewer: impl Into<[f64; 3]>) -> Self {
-        self.viewer = viewer.into();
+        self.viewer = viewer.into().into();
         self
     }
 
@@ -81,7 +82,7 @@ impl Globe {
         label: impl Into<String>,
         points: impl IntoIterator<Item = impl Into<[f64; 3]>>,
     ) -> Self {
-        self.curves.push((label.into(), points.into_iter().map(Into::into).collect()));
+        self.curves.push((label.into(), entries(points)));
         self
     }
 
@@ -93,7 +94,7 @@ impl Globe {
         label: impl Into<String>,
         points: impl IntoIterator<Item = impl Into<[f64; 3]>>,
     ) -> Self {
-        self.levels.push((label.into(), points.into_iter().map(Into::into).collect()));
+        self.levels.push((label.into(), entries(points)));
         self
     }
 
@@ -105,24 +106,14 @@ impl Globe {
     }
 
     pub(crate) fn check(&self) -> Result<(), PlotError> {
-        if self.curves.is_empty() && self.levels.is_empty() {
-            return Err(PlotError::Empty { name: self.title.clone() });
-        }
-        let off = |name: &str, index, point: &Vector| {
-            let (name, point) = (name.to_owned(), point.to_vec());
-            PlotError::Point { name, index, point, place: "the unit sphere" }
-        };
+        let on = |x: &[f64]| (Vector::from_column_slice(x).norm() - 1.0).abs() <= SLACK;
         for (label, points) in self.curves.iter().chain(&self.levels) {
-            if points.is_empty() {
-                return Err(PlotError::Empty { name: label.clone() });
-            }
-            let on = |x: &Vector| (norm(x) - 1.0).abs() <= SLACK;
-            if let Some(index) = points.iter().position(|x| !on(x)) {
-                return Err(off(label, index, &points[index]));
-            }
+            plot::check(label, points.iter().map(|x| x.as_slice()), "the unit sphere", on)?;
         }
-        let far = norm(&self.viewer);
-        if far.is_normal() { Ok(()) } else { Err(off("the viewer", 0, &self.viewer)) }
+        let viewers = (!self.curves.is_empty() || !self.levels.is_empty()).then_some(self.viewer);
+        let somewhere = |x: &[f64]| Vector::from_column_slice(x).norm().is_normal();
+        let viewers = viewers.iter().map(|x| x.as_slice());
+        plot::check(&self.title, viewers, "a direction", somewhere)
     }
 
     /// The parts of a globe of this size, with its upper left corner at the origin.
@@ -131,25 +122,36 @@ impl Globe {
         let radius = 0.5 * width - MARGIN;
         let view = View::from(self.viewer, centre, radius);
         let curves = || self.curves.iter().enumerate().map(|(k, (_, x))| (x, color(k)));
+        let levels = || self.levels.iter().map(|(_, x)| (x, GREY));
+        let ends = |front| {
+            let ends = curves()
+                .flat_map(|(x, color)| [(x[0], color, SURFACE), (x[x.len() - 1], color, color)]);
+            let there = ends.filter(move |(x, ..)| view.front(x) == front);
+            there
+                .map(|(x, color, inside)| circle(view.at(&x), 4.0, inside, color, 1.4))
+                .collect::<Vec<_>>()
+        };
         let mut parts = vec![circle(centre, radius, SURFACE, GREY, 0.9)];
-        for (_, x) in &self.levels {
-            parts.extend(view.lines(x, Side::Back, &faded(GREY), 0.7));
+        // What lies behind is pale.
+        let attributes = Some(r#"opacity="0.35""#.into());
+        parts.push(Primitive::GroupStart { transform: None, title: None, extra_attrs: attributes });
+        for (x, color) in levels().chain(curves()) {
+            parts.extend(view.lines(x, false, color, 0.9));
         }
-        for (x, color) in curves() {
-            parts.extend(view.lines(x, Side::Back, &faded(color), 0.9));
-        }
+        parts.extend(ends(false));
+        parts.push(Primitive::GroupEnd);
         for x in &graticule() {
-            parts.extend(view.lines(x, Side::Front, GRATICULE, 0.6));
+            parts.extend(view.lines(x, true, GRATICULE, 0.6));
         }
         parts.push(circle(centre, radius, "none", GREY, 0.9));
         parts.extend(view.axes());
-        for (_, x) in &self.levels {
-            parts.extend(view.lines(x, Side::Front, GREY, 1.0));
+        for (x, color) in levels() {
+            parts.extend(view.lines(x, true, color, 1.0));
         }
         for (x, color) in curves() {
-            parts.extend(view.lines(x, Side::Front, color, 1.6));
+            parts.extend(view.lines(x, true, color, 1.6));
         }
-        parts.extend(curves().flat_map(|(x, color)| view.ends(x, color)));
+        parts.extend(ends(true));
         parts.extend(self.header(width).parts(letter, (4.0, 0.0)));
         parts
     }
@@ -166,14 +168,8 @@ impl Globe {
     }
 }
 
-/// A side of the sphere, as the viewer has it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Side {
-    Front,
-    Back,
-}
-
 /// Where the points of the sphere are on the sheet.
+#[derive(Clone, Copy)]
 struct View {
     right: Vector,
     up: Vector,
@@ -184,98 +180,70 @@ struct View {
 
 impl View {
     fn from(viewer: Vector, centre: At, radius: f64) -> Self {
-        let forward = unit(viewer);
+        let forward = viewer.normalize();
         // From above a pole the second axis points to the right.
-        let level = [-forward[1], forward[0], 0.0];
-        let right = if norm(&level) > 1e-6 { unit(level) } else { [0.0, 1.0, 0.0] };
-        Self { right, up: cross(&forward, &right), forward, centre, radius }
+        let level = Vector::z().cross(&forward);
+        let right = level.try_normalize(1e-6).unwrap_or_else(Vector::y);
+        Self { right, up: forward.cross(&right), forward, centre, radius }
     }
 
-    fn depth(&self, x: &Vector) -> f64 {
-        dot(x, &self.forward)
-    }
-
-    fn side(&self, x: &Vector) -> Side {
-        if self.depth(x) >= 0.0 { Side::Front } else { Side::Back }
+    /// Whether the viewer is on this side of a point.
+    fn front(&self, x: &Vector) -> bool {
+        x.dot(&self.forward) >= 0.0
     }
 
     fn at(&self, x: &Vector) -> At {
-        let (x, y) = (dot(x, &self.right), dot(x, &self.up));
+        let (x, y) = (x.dot(&self.right), x.dot(&self.up));
         (self.centre.0 + self.radius * x, self.centre.1 - self.radius * y)
     }
 
     /// The parts of a curve on one side, each up to the limb.
-    fn paths(&self, points: &[Vector], side: Side) -> Vec<Vec<Vector>> {
-        let (mut paths, mut path): (Vec<_>, Vec<Vector>) = (Vec::new(), Vec::new());
+    fn paths(&self, points: &[Vector], front: bool) -> Vec<Vec<Vector>> {
+        let mut paths = vec![Vec::new()];
         let mut before: Option<Vector> = None;
-        for x in points.iter().copied().map(unit) {
-            if let Some(before) = before
-                && self.side(&before) != self.side(&x)
-            {
-                path.push(self.limb(&before, &x));
+        for x in points.iter().map(Vector::normalize) {
+            if let Some(y) = before.filter(|y| self.front(y) != self.front(&x)) {
+                // Where the path passes from one side to the other.
+                let [a, b] = [y, x].map(|x| x.dot(&self.forward));
+                let limb = (y + (x - y) * (a / (a - b))).normalize();
+                if self.front(&x) == front {
+                    paths.push(vec![limb]);
+                } else if let Some(path) = paths.last_mut() {
+                    path.push(limb);
+                }
             }
-            if self.side(&x) == side {
+            if let Some(path) = paths.last_mut().filter(|_| self.front(&x) == front) {
                 path.push(x);
-            } else {
-                paths.push(std::mem::take(&mut path));
             }
             before = Some(x);
         }
-        paths.push(path);
         paths.retain(|path| path.len() > 1);
         paths
     }
 
-    /// Where the path from `x` to `y` passes from one side to the other.
-    fn limb(&self, x: &Vector, y: &Vector) -> Vector {
-        let t = self.depth(x) / (self.depth(x) - self.depth(y));
-        unit([0, 1, 2].map(|i| x[i] + t * (y[i] - x[i])))
-    }
-
     /// The parts of a curve on one side, as lines.
-    fn lines(
-        &self,
-        points: &[Vector],
-        side: Side,
-        color: &str,
-        width: f64,
-    ) -> impl Iterator<Item = Primitive> {
-        let paths = self.paths(points, side).into_iter();
-        paths.map(move |path| line(path.iter().map(|x| self.at(x)).collect(), color, width, None))
-    }
-
-    /// A hollow disc at the start of a curve and a filled one at its end.
-    fn ends(&self, points: &[Vector], color: &str) -> Vec<Primitive> {
-        let mark = |x: Vector, filled: bool| {
-            let front = self.side(&x) == Side::Front;
-            let color = if front { color.to_owned() } else { faded(color) };
-            circle(self.at(&x), 4.0, if filled { &color } else { SURFACE }, &color, 1.4)
-        };
-        let start = points.first().map(|x| mark(unit(*x), false));
-        start.into_iter().chain(points.last().map(|x| mark(unit(*x), true))).collect()
+    fn lines(&self, points: &[Vector], front: bool, color: &str, width: f64) -> Vec<Primitive> {
+        let place = |path: &Vec<Vector>| path.iter().map(|x| self.at(x)).collect();
+        let paths = self.paths(points, front);
+        paths.iter().map(|path| line(place(path), color, width, None)).collect()
     }
 
     /// The ends of the coordinate axes that stick out of the sphere.
     fn axes(&self) -> Vec<Primitive> {
         let mut parts = Vec::new();
         let tip = 1.0 + AXIS[0] / self.radius;
-        for (i, name) in ["x₁", "x₂", "x₃"].into_iter().enumerate() {
-            let axis = |length: f64| [0, 1, 2].map(|j| if i == j { length } else { 0.0 });
-            let across = self.distance(self.at(&axis(1.0)));
+        for (axis, name) in [(Vector::x(), "x₁"), (Vector::y(), "x₂"), (Vector::z(), "x₃")] {
+            let across = axis.dot(&self.right).hypot(axis.dot(&self.up));
             // Behind the sphere an axis begins where the disc does not cover it.
-            let start = if self.side(&axis(1.0)) == Side::Front { 1.0 } else { across.recip() };
+            let start = if self.front(&axis) { 1.0 } else { across.recip() };
             if start < tip {
-                parts.push(line(vec![self.at(&axis(start)), self.at(&axis(tip))], INK, 1.0, None));
-                let name_at = self.at(&axis(tip + AXIS[1] / (self.radius * across.max(1e-3))));
-                parts.push(text(name, name_at, NAME, TextAnchor::Middle));
+                let ends = vec![self.at(&(axis * start)), self.at(&(axis * tip))];
+                let beside = tip + AXIS[1] / (self.radius * across.max(1e-3));
+                parts.push(line(ends, INK, 1.0, None));
+                parts.push(text(name, self.at(&(axis * beside)), NAME, TextAnchor::Middle));
             }
         }
         parts
-    }
-
-    /// The distance from the centre of the disc, in radii.
-    fn distance(&self, (x, y): At) -> f64 {
-        (x - self.centre.0).hypot(y - self.centre.1) / self.radius
     }
 }
 
@@ -288,45 +256,19 @@ fn circle((cx, cy): At, r: f64, inside: &str, outline: &str, width: f64) -> Prim
 /// Meridians and parallels, 30° apart.
 fn graticule() -> Vec<Vec<Vector>> {
     let point = |latitude: f64, longitude: f64| {
-        let width = latitude.cos();
-        [width * longitude.cos(), width * longitude.sin(), latitude.sin()]
+        let (height, width) = latitude.sin_cos();
+        Vector::new(width * longitude.cos(), width * longitude.sin(), height)
     };
-    let turn = |k: u8| TAU * f64::from(k) / f64::from(FINE);
-    let meridian = |k: u8| {
-        let longitude = FRAC_PI_6 * f64::from(k);
-        (0..=FINE).map(|n| point(turn(n), longitude)).collect()
-    };
-    let parallel = |k: i8| {
-        let latitude = FRAC_PI_6 * f64::from(k);
-        (0..=FINE).map(|n| point(latitude, turn(n))).collect()
-    };
-    (0..6).map(meridian).chain((-2..=2).map(parallel)).collect()
+    let turn = |n: u8| TAU * f64::from(n) / f64::from(FINE);
+    let turns = || (0..=FINE).map(turn);
+    let at = |k: i8| FRAC_PI_6 * f64::from(k);
+    let meridians = (0..6).map(|k| turns().map(|t| point(t, at(k))).collect());
+    let parallels = (-2..=2).map(|k| turns().map(|t| point(at(k), t)).collect());
+    meridians.chain(parallels).collect()
 }
 
-/// Two thirds of the way to the colour of the surface.
-fn faded(color: &str) -> String {
-    let part = |text: &str, k: usize| {
-        let digits = text.get(2 * k + 1..2 * k + 3).unwrap_or("0");
-        u32::from_str_radix(digits, 16).unwrap_or(0)
-    };
-    let mixed = [0, 1, 2].map(|k| (part(color, k) + 2 * part(SURFACE, k)) / 3);
-    format!("#{:02X}{:02X}{:02X}", mixed[0], mixed[1], mixed[2])
-}
-
-fn dot(a: &Vector, b: &Vector) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
-}
-
-fn cross(a: &Vector, b: &Vector) -> Vector {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
-
-fn norm(x: &Vector) -> f64 {
-    dot(x, x).sqrt()
-}
-
-fn unit(x: Vector) -> Vector {
-    x.map(|entry| entry / norm(&x))
+fn entries(points: impl IntoIterator<Item = impl Into<[f64; 3]>>) -> Vec<Vector> {
+    points.into_iter().map(|x| Vector::from(x.into())).collect()
 }
 
 #[cfg(test)]
@@ -335,40 +277,45 @@ mod tests {
     use crate::Panels;
 
     fn equator() -> Vec<Vector> {
-        (0..=360).map(|k| f64::from(k).to_radians()).map(|t| [t.cos(), t.sin(), 0.0]).collect()
+        (0..=360)
+            .map(|k| f64::from(k).to_radians())
+            .map(|t| Vector::new(t.cos(), t.sin(), 0.0))
+            .collect()
     }
 
-    fn view(viewer: Vector) -> View {
-        View::from(viewer, (0.0, 0.0), 1.0)
+    fn view(viewer: [f64; 3]) -> View {
+        View::from(viewer.into(), (0.0, 0.0), 1.0)
     }
 
     #[test]
     fn the_third_axis_points_up_and_the_frame_is_right_handed() {
         let view = view([1.0, 0.0, 0.0]);
-        assert_eq!(view.at(&[0.0, 0.0, 1.0]), (0.0, -1.0));
-        assert_eq!(view.at(&[0.0, 1.0, 0.0]), (1.0, 0.0));
-        assert_eq!(view.side(&[1.0, 0.0, 0.0]), Side::Front);
-        assert_eq!(view.side(&[-1.0, 0.0, 0.0]), Side::Back);
-        let above = View::from([0.0, 0.0, 2.0], (0.0, 0.0), 1.0);
-        assert_eq!(above.at(&[0.0, 1.0, 0.0]), (1.0, 0.0));
+        assert_eq!(view.at(&Vector::z()), (0.0, -1.0));
+        assert_eq!(view.at(&Vector::y()), (1.0, 0.0));
+        assert!(view.front(&Vector::x()) && !view.front(&-Vector::x()));
+        let above = View::from(Vector::z() * 2.0, (0.0, 0.0), 1.0);
+        assert_eq!(above.at(&Vector::y()), (1.0, 0.0));
     }
 
     #[test]
     fn a_curve_is_cut_at_the_limb_into_arcs_that_make_it_up() {
         let view = view([1.0, 2.0, 0.5]);
-        let (front, back) =
-            (view.paths(&equator(), Side::Front), view.paths(&equator(), Side::Back));
+        let (front, back) = (view.paths(&equator(), true), view.paths(&equator(), false));
         // The curve starts in front: behind it is one path, in front the two ends of it.
         assert_eq!((front.len(), back.len()), (2, 1));
         for path in &back {
-            assert!(path.iter().all(|x| view.depth(x) < 1e-12));
+            assert!(path.iter().all(|x| x.dot(&view.forward) < 1e-12));
             for end in [path[0], path[path.len() - 1]] {
-                assert!((view.distance(view.at(&end)) - 1.0).abs() < 1e-12);
+                let (x, y) = view.at(&end);
+                assert!((x.hypot(y) - 1.0).abs() < 1e-12);
             }
         }
         let length = |paths: &[Vec<Vector>]| -> f64 {
-            let step = |x: &Vector, y: &Vector| norm(&[0, 1, 2].map(|i| x[i] - y[i]));
-            paths.iter().flat_map(|path| path.windows(2)).map(|pair| step(&pair[0], &pair[1])).sum()
+            paths
+                .iter()
+                .flat_map(|path| path.windows(2))
+                .map(|pair| (pair[0] - pair[1]).norm())
+                .sum()
         };
         assert!((length(&front) + length(&back) - TAU).abs() < 1e-3);
         assert!((length(&back) - 0.5 * TAU).abs() < 1e-3);
@@ -397,7 +344,7 @@ mod tests {
         let error = |globe| Panels::new("title").globe(globe).svg().unwrap_err();
         let globe = || Globe::new("globe");
         assert!(matches!(error(globe()), PlotError::Empty { name } if name == "globe"));
-        let none: [Vector; 0] = [];
+        let none: [[f64; 3]; 0] = [];
         assert!(
             matches!(error(globe().curve("c", none)), PlotError::Empty { name } if name == "c")
         );

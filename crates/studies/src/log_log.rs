@@ -46,12 +46,11 @@ pub struct LogLog {
     guides: Vec<f64>,
 }
 
-/// How a series is drawn.
+/// How a series is drawn: the number of its colour and marker, and its place among the series of this
+/// number, which are solid, dashed, and dotted from the third on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Look {
-    /// The number of its colour and marker.
     line: usize,
-    /// Its place among the series of this number: solid, dashed, and dotted from the third on.
     rank: usize,
 }
 
@@ -120,7 +119,11 @@ impl LogLog {
         if self.series.is_empty() {
             return Err(PlotError::Empty { name: self.title.clone() });
         }
-        self.series.iter().try_for_each(Series::check)?;
+        for series in &self.series {
+            let fits = |p: &[f64]| p[0].min(p[1]) > 0.0 && (p[0] * p[1]).is_finite();
+            let points = series.given.iter().map(|&(h, error)| [h, error]);
+            plot::check(&series.label, points, "logarithmic axes", fits)?;
+        }
         let points = || self.series.iter().flat_map(|series| &series.points);
         let x = Axis::logarithmic(range(points().map(|p| p.0)));
         let y = Axis::logarithmic(range(points().map(|p| p.1)));
@@ -203,21 +206,6 @@ impl Series {
         // Four points make an order; a figure of three is still a figure.
         let order = Order::fit(&steps, &errors).ok();
         Self { label, look, points, given: given.to_vec(), order }
-    }
-
-    fn check(&self) -> Result<(), PlotError> {
-        let name = self.label.clone();
-        if self.given.is_empty() {
-            return Err(PlotError::Empty { name });
-        }
-        let fits = |(x, y): &(f64, f64)| x.min(*y) > 0.0 && (x * y).is_finite();
-        match self.given.iter().position(|point| !fits(point)) {
-            Some(index) => {
-                let point = vec![self.given[index].0, self.given[index].1];
-                Err(PlotError::Point { name, index, point, place: "logarithmic axes" })
-            }
-            None => Ok(()),
-        }
     }
 
     fn slope(&self) -> f64 {

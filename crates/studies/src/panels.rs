@@ -138,24 +138,15 @@ impl Panel {
 
     /// Whether every point has a place on the axes.
     fn check(&self) -> Result<(), PlotError> {
-        let (place, least) = match self.floor {
-            Some(_) => ("a logarithmic axis", 0.0),
-            None => ("an axis", f64::NEG_INFINITY),
-        };
-        let levels: Vec<_> = self.levels.iter().map(|(_, y)| (0.0, *y)).collect();
-        let lines = self.lines.iter().map(|(label, points)| (label, points));
-        for (name, points) in lines.chain([(&self.vertical, &levels)]) {
-            let fits = |&(x, y): &At| x.abs().max(y.abs()) < 1e300 && y >= least;
-            if let Some(index) = points.iter().position(|point| !fits(point)) {
-                let point = vec![points[index].0, points[index].1];
-                return Err(PlotError::Point { name: name.clone(), index, point, place });
-            }
+        let least = if self.floor.is_some() { 0.0 } else { f64::NEG_INFINITY };
+        let place = if self.floor.is_some() { "a logarithmic axis" } else { "an axis" };
+        let fits = |point: &[f64]| point.iter().all(|x| x.abs() < 1e300) && point[1] >= least;
+        for (label, points) in &self.lines {
+            plot::check(label, points.iter().map(|&(x, y)| [x, y]), place, fits)?;
         }
-        let empty = self.lines.iter().find(|(_, points)| points.is_empty());
-        match empty.map(|(label, _)| label).or(self.lines.is_empty().then_some(&self.vertical)) {
-            Some(name) => Err(PlotError::Empty { name: name.clone() }),
-            None => Ok(()),
-        }
+        let levels = self.levels.iter().map(|(_, y)| [0.0, *y]);
+        let first = self.lines.iter().map(|(_, points)| [0.0, points[0].1]).take(1);
+        plot::check(&self.vertical, first.chain(levels), place, fits)
     }
 
     fn axes(&self) -> (Axis, Axis) {

@@ -59,6 +59,24 @@ pub(crate) const NUMBER: u32 = 11;
 /// Points of a curve nearer than this to the last one drawn are left out, in pixels.
 const GRAIN: f64 = 0.2;
 
+/// Whether a line has points and each has a place on the paper.
+pub(crate) fn check<P: AsRef<[f64]>>(
+    name: &str,
+    points: impl IntoIterator<Item = P>,
+    place: &'static str,
+    fits: impl Fn(&[f64]) -> bool,
+) -> Result<(), PlotError> {
+    let (name, mut count) = (name.to_owned(), 0);
+    for point in points {
+        if !fits(point.as_ref()) {
+            let point = point.as_ref().to_vec();
+            return Err(PlotError::Point { name, index: count, point, place });
+        }
+        count += 1;
+    }
+    if count > 0 { Ok(()) } else { Err(PlotError::Empty { name }) }
+}
+
 /// A place on the sheet, in pixels, `y` downwards.
 pub(crate) type At = (f64, f64);
 

@@ -162,7 +162,7 @@ mod tests {
             std::env::temp_dir().join(format!("metriplectic-report-{}", std::process::id()));
         let report = || Report::new(false, Some(folder.clone()));
         assert!(report().with("answer", 42).figure(Panels::new("nothing")).print().is_err());
-        assert!(report().table(["t"], [[0.0]]).with("answer", 42).print().is_ok());
+        assert!(report().table(["t"], [[0.0]]).with("answer", 42).gallery.is_ok());
         let files = std::fs::read_dir(&folder).unwrap();
         assert_eq!(files.count(), 1);
         std::fs::remove_dir_all(folder).unwrap();

@@ -57,7 +57,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         .panel(run.panel("kinetic energy", kinetic).named_level("½|p|²/I₁, flat spin", flat))
         .panel(run.panel("temperature T", |s| (s.point.1.x / CAPACITY).exp()))
         .panel(run.energy_error())
-        .panel(run.panel("error of the momentum |Rp − p₀|", momentum));
+        .panel(run.panel("momentum |Rp − p₀|", momentum));
     let energies = vec![kinetic(&run.states[0]), kinetic(run.last()), flat];
     example.report(&run).with("kinetic_energies", energies).figure(figure).print()
 }

@@ -29,7 +29,11 @@ impl Axis {
         let margin = if high > low { padding * (high - low) } else { alone };
         let exponent = Some(decade(size)).filter(|d| !(-2..5).contains(d)).unwrap_or(0);
         let [low, high] = [low - margin, high + margin].map(|x| x / 10_f64.powi(exponent));
-        Self { low, high, exponent, step: Some(compute_tick_step(low, high, ticks)) }
+        let step = compute_tick_step(low, high, ticks);
+        // A last tick that is nearly reached belongs to the axis.
+        let last = (high / step).ceil() * step;
+        let high = if last - high < 0.01 * (high - low) { last } else { high };
+        Self { low, high, exponent, step: Some(step) }
     }
 
     /// A logarithmic axis over `[low, high]`, both positive, and a little more on either side.

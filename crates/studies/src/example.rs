@@ -152,13 +152,11 @@ impl Example {
     }
 
     /// Begins the report of a run: its certificate and its last state.
-    #[must_use]
     pub fn report<M: Manifold>(&self, run: &Record<M>) -> Report {
         self.report_of_many().run(run)
     }
 
     /// Begins a report that is not of one run.
-    #[must_use]
     pub fn report_of_many(&self) -> Report {
         Report::new(self.json, self.folder.clone())
     }

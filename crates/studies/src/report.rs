@@ -142,7 +142,7 @@ fn shown(value: &Value) -> String {
 
 /// A number with some digits: `0.142880`, `1.2e-15`.
 fn readable(x: f64) -> String {
-    let ordinary = x.abs() < 1e6 && (x.abs() >= 1e-3 || !(x.abs() > 0.0));
+    let ordinary = x.abs() < 1e6 && (x.abs() >= 1e-3 || x.abs() < f64::MIN_POSITIVE);
     if ordinary { format!("{x:.6}") } else { format!("{x:.5e}") }
 }
 

@@ -321,8 +321,8 @@ fn an_interrupted_example_leaves_a_whole_file() {
         assert!(begin.elapsed() < Duration::from_secs(60), "no row after a minute");
         std::thread::sleep(Duration::from_millis(5));
     }
-    let annihilate = Command::new("annihilate").args(["-INT", &child.id().to_string()]).status();
-    assert!(annihilate.expect("annihilate starts").success());
+    let interrupt = Command::new("kill").args(["-INT", &child.id().to_string()]).status();
+    assert!(interrupt.expect("kill starts").success());
     let output = child.wait_with_output().expect("the example ends");
     assert!(output.status.success(), "{:?}", output.status);
     let report: serde_json::Value = serde_json::from_slice(&output.stdout).expect("one JSON value");

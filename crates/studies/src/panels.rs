@@ -6,7 +6,7 @@ use kuva::plot::annotations::ReferenceLine;
 use kuva::prelude::{LinePlot, Plot, ScatterPlot};
 use kuva::render::{
     layout::{ComputedLayout, Layout},
-    render::render_multiple,
+    render::{Primitive, render_multiple},
 };
 
 use crate::{
@@ -195,6 +195,11 @@ impl Panel {
             layout = layout.with_reference_line(line.with_color(INK).with_dasharray("5 4"));
         }
         layout.equal_aspect = self.equal;
+        if self.equal {
+            // The axis that `kuva` makes longer has room for the ticks of the other one, and few more.
+            let step = layout.x_tick_step.into_iter().chain(layout.y_tick_step).fold(0.0, f64::max);
+            (layout.x_tick_step, layout.y_tick_step) = (Some(2.0 * step), Some(2.0 * step));
+        }
         layout
     }
 
@@ -214,6 +219,25 @@ impl Panel {
         };
         self.lines.iter().map(plot).collect()
     }
+
+    /// The parts, with the upper left corner at the origin.
+    fn parts(&self, letter: char, room: &Room, stretches: usize) -> Vec<Primitive> {
+        let &Room { frame, left, top } = room;
+        let mut layout =
+            self.layout(frame).with_force_margins(left, RIGHT).with_force_margins_y(top, BELOW);
+        (layout.width, layout.height) = (Some(left + frame.0 + RIGHT), Some(top + frame.1 + BELOW));
+        let header = self.header(left + frame.0);
+        let mut parts = render_multiple(self.plots(stretches), layout).elements;
+        parts.extend(header.parts(letter, (4.0, top - header.height)));
+        parts
+    }
+}
+
+/// The size of a frame, with the room to the left of it and above it.
+struct Room {
+    frame: At,
+    left: f64,
+    top: f64,
 }
 
 impl Panels {
@@ -262,13 +286,8 @@ impl Panels {
             2 => (340.0, 210.0),
             _ => (260.0, 180.0),
         };
-        // All panels have the same room, so that their frames line up.
-        let left = self.panels.iter().map(|panel| panel.layout(frame));
-        let left = left.map(|layout| ComputedLayout::from_layout(&layout).margin_left);
-        let left = left.fold(0.0, f64::max).ceil();
-        let headers = self.panels.iter().map(|panel| panel.header(left + frame.0).height);
-        let top = headers.fold(0.0, f64::max);
-        let cell = (left + frame.0 + RIGHT, top + frame.1 + BELOW);
+        let room = self.room(frame);
+        let cell = (room.left + frame.0 + RIGHT, room.top + frame.1 + BELOW);
         let rows = self.panels.len().div_ceil(columns.max(1));
         let grid = (cell.0 * columns as f64, cell.1 * rows as f64);
 
@@ -290,15 +309,7 @@ impl Panels {
         let lines: usize = self.panels.iter().map(|panel| panel.lines.len()).sum();
         let stretches = STRETCHES.min(ALL_STRETCHES / lines.max(1)).max(1);
         for (index, panel) in self.panels.iter().enumerate() {
-            let mut layout = panel
-                .layout(frame)
-                .with_force_margins(left, RIGHT)
-                .with_force_margins_y(top, BELOW);
-            (layout.width, layout.height) = (Some(cell.0), Some(cell.1));
-            let mut parts = render_multiple(panel.plots(stretches), layout).elements;
-            let header = panel.header(left + frame.0);
-            let letter = letters.next().unwrap_or(' ');
-            parts.extend(header.parts(letter, (4.0, top - header.height)));
+            let parts = panel.parts(letters.next().unwrap_or(' '), &room, stretches);
             let (column, row) = ((index % columns) as f64, (index / columns) as f64);
             let y = HEAD + 0.5 * (height - grid.1) + row * cell.1;
             plot::place(&mut sheet, (start + column * cell.0, y), parts);
@@ -313,6 +324,15 @@ impl Panels {
     /// Those of [`Panels::svg`], and [`PlotError::Io`] if the file cannot be written.
     pub fn save(&self, path: impl Into<PathBuf>) -> Result<(), PlotError> {
         plot::save(path.into(), &self.svg()?)
+    }
+
+    /// The room of each panel: the same for all, so that their frames line up.
+    fn room(&self, frame: At) -> Room {
+        let layouts = self.panels.iter().map(|panel| panel.layout(frame));
+        let margins = layouts.map(|layout| ComputedLayout::from_layout(&layout).margin_left);
+        let left = margins.fold(0.0, f64::max).ceil();
+        let headers = self.panels.iter().map(|panel| panel.header(left + frame.0).height);
+        Room { frame, left, top: headers.fold(0.0, f64::max) }
     }
 
     fn columns_or_usual(&self) -> usize {

@@ -57,7 +57,7 @@ examples:
 study:
     cargo test --release --workspace -- --ignored
 
-# compare the bits of many runs with tests/golden.txt, or write it with `--bless`: for this machine and compiler
+# compare the bits of many runs with tests/golden, or write it with `--bless`: for this machine and compiler
 golden *flags:
     {{ if flags == "--bless" { "BLESS=1" } else { "" } }} cargo test --release --all-features --test golden -- --ignored --nocapture
 

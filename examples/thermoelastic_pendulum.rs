@@ -58,13 +58,13 @@ fn main() -> Result<(), Box<dyn Error>> {
     let orbit = |i: usize| run.iter().map(|s| (s.point.0[i], s.point.0[i + 1])).collect::<Vec<_>>();
     let theta = |i: usize| line(&|s| (s.point.1 - stretch(&s.point))[i].exp());
     let gained = line(&|s| s.energy - certificate.initial_energy);
-    let dg_v = line(&|s| angular_momentum(&s.point) - 2.0);
+    let turned = line(&|s| angular_momentum(&s.point) - 2.0);
     let motion = Panel::new("the motion", "x").vertical("y").equal().line("q₁", orbit(0));
     Panels::new(format!("The thermoelastic double pendulum, h = {h}"))
         .panel(motion.line("q₂", orbit(2)).line("threads at t = 0", [(0.0, 0.0), (2.2, 0.0)]))
         .panel(Panel::new("temperatures", "t").line("θ₁", theta(0)).line("θ₂", theta(1)))
         .panel(Panel::new("entropy S", "t").line("S", line(&|s| s.entropy)))
-        .panel(Panel::new("errors", "t").line("H − H₀", gained).line("L − L₀", dg_v).level(0.0))
+        .panel(Panel::new("errors", "t").line("H − H₀", gained).line("L − L₀", turned).level(0.0))
         .save(&path)?;
 
     if options.json {

@@ -45,7 +45,8 @@
 //! | [`Dissipation`](dynamics::Dissipation) | `K`, given the covector it must annihilate | [`dynamics`] |
 //! | [`System`](dynamics::System) | all of these with `H` and `S` | [`dynamics`] |
 //! | [`DiscreteGradient`](integrators::DiscreteGradient) | a covector with `⟨w, d⟩ = ΔH` | [`integrators`] |
-//! | [`RootFinder`](integrators::RootFinder) | [`Newton`](integrators::Newton), and argmin as the globaliser | [`integrators`] |
+//! | [`Newton`](integrators::Newton) | solves the equation of a step | [`integrators`] |
+//! | [`Method`](integrators::Method) | a one-step method, such as [`Scheme`](integrators::Scheme) | [`integrators`] |
 //! | [`Scheme`](integrators::Scheme) | one step: guess, solve, retract | [`integrators`] |
 //! | [`Trajectory`](integrators::Trajectory) | steps in a row, with their [`Certificate`](integrators::Certificate) | [`integrators`] |
 
@@ -67,8 +68,9 @@ pub mod prelude {
     };
     pub use metriplectic_fields::{MatrixField, Real, Scalar, ScalarField};
     pub use metriplectic_integrators::{
-        Attitude, AttitudeError, Certificate, Ending, Error, Gonzalez, ItohAbe, MeanValue, Newton,
-        Observables, Run, RunError, Scheme, Span, State, SymmetricItohAbe, Trajectory,
+        Attitude, AttitudeError, Certificate, Checkpoint, Ending, Error, Gonzalez, ItohAbe,
+        MeanValue, Method, Newton, Observables, ResumeError, Run, RunError, Scheme, Span,
+        SpanError, State, StepError, Steps, SymmetricItohAbe, Trajectory, Until,
     };
     pub use metriplectic_manifolds::{
         Canonical, Cayley, Chart, Euclidean, Exponential, HalfLine, LieAlgebra, LieDual, Manifold,

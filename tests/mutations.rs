@@ -173,9 +173,9 @@ fn a_step_that_breaks_the_first_law_is_taken_in_halves() {
     let system = relaxing();
     let run = careless().run(&system, START, Span::steps(0.01, 1)).unwrap();
     // The energy of the whole step would be off by 4.5e-6, that of each half by a quarter of it.
-    assert_eq!(run.certificate().retries, 1);
+    assert_eq!(run.certificate().effort.splits, 1);
     let halves = careless().run(&system, START, Span::steps(0.005, 2)).unwrap();
-    assert_eq!(halves.certificate().retries, 0);
+    assert_eq!(halves.certificate().effort.splits, 0);
     assert_eq!(run.last().point, halves.last().point);
 }
 
@@ -222,7 +222,7 @@ fn each_part_of_a_step_aims_at_the_energy_of_its_start() {
     for (h, splits) in [(0.05, 5), (0.1, 6), (0.2, 7)] {
         let run = scheme.run(&system, vector![1.0, 0.5], Span::steps(h, 1)).unwrap();
         let certificate = run.certificate();
-        assert_eq!(certificate.retries, splits, "h = {h}");
+        assert_eq!(certificate.effort.splits, splits, "h = {h}");
         // What is more than four roundings is corrected in the next part; 5.2 without that, and none with it.
         let error = certificate.max_relative_energy_error();
         assert!(error <= 4.0 * f64::EPSILON, "h = {h}: {} ε", error / f64::EPSILON);
@@ -235,7 +235,7 @@ fn a_step_is_split_as_often_as_asked_for() {
     for splits in [0, 1, 2] {
         let scheme = Scheme { splits, ..careless() };
         match scheme.run(&relaxing(), START, Span::steps(0.01, 1)) {
-            Ok(run) => assert!(splits > 0 && run.certificate().retries == 1),
+            Ok(run) => assert!(splits > 0 && run.certificate().effort.splits == 1),
             Err(RunError::Step { cause, .. }) => {
                 assert!(
                     splits == 0 && matches!(cause, StepError::FirstLawBroken { .. }),
@@ -283,7 +283,7 @@ fn a_jacobian_is_not_kept_for_steps_of_another_length() {
     let system = body(kinetic, half_square, |p| (p.x * 4.0).exp() * 0.01, SecondLaw::Exact);
     let run =
         WeylMidpoint.run(&system, vector![0.001, -1.0, 0.001], Span::steps(0.05, 400)).unwrap();
-    assert!(run.certificate().iterations <= 400 * 43 / 20, "{}", run.certificate());
+    assert!(run.certificate().effort.iterations <= 400 * 43 / 20, "{}", run.certificate());
 }
 
 #[test]

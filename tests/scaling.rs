@@ -232,7 +232,7 @@ fn the_orbits_obey_the_scaling_law() {
 
 type Vector5 = SVector<Real, 5>;
 
-/// The overdamped oscillator `x = (q, p, s)`, its plane dg_v by `angle`: `H = ½p² + ½q² + s`, `S = s`,
+/// The overdamped oscillator `x = (q, p, s)`, its plane turned by `angle`: `H = ½p² + ½q² + s`, `S = s`,
 /// `K = (γ/w_s) b bᵀ` with `b = (0, w_s, −w_p)`.
 fn overdamped(
     gamma: f64,
@@ -245,7 +245,7 @@ fn overdamped(
         .energy(|x: &Vector3<Real>| (x.x * x.x + x.y * x.y) * 0.5 + x.z)
         .entropy(|x: &Vector3<Real>| x.z)
         .dissipation(FieldDissipation(move |_: &Vector3<Real>, w: &Vector3<Real>| {
-            // The momentum is p = y cos − x sin in the dg_v plane.
+            // The momentum is p = y cos − x sin in the turned plane.
             let p = w.y * cos - w.x * sin;
             onsager(Vector3::new(w.z * -sin, w.z * cos, -p), w.z.recip() * gamma)
         }))

@@ -277,7 +277,7 @@ impl AlmostPoisson {
     /// Schaft and Maschke 1994; Cantrijn, de León and Martín de Diego 1999).
     ///
     /// A blade on the plane that does not slip sideways, at `(x, y)` with the direction `θ`, the momentum
-    /// `p` along the blade, and the momentum `l` about it, is dg_v but not moved by a bracket with
+    /// `p` along the blade, and the momentum `l` about it, is turned but not moved by a bracket with
     /// `{x, p} = cos θ`, `{y, p} = sin θ`, `{θ, l} = 1`:
     ///
     /// ```

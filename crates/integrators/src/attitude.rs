@@ -24,7 +24,7 @@
 //! ```
 //!
 //! `|τ| = O(h³)`, so the order is 2. The balance is kept as a sum `ℓ` in space, to which each step adds
-//! `R_k (cay(hw) p_{k+1} − p_k)`, what the dissipation has done, and `R_{k+1} p_{k+1}` is dg_v to `ℓ`: the
+//! `R_k (cay(hw) p_{k+1} − p_k)`, what the dissipation has done, and `R_{k+1} p_{k+1}` is turned to `ℓ`: the
 //! rounding of the rotations does not add up to a drift.
 //!
 //! Of a free body `R p` is constant to round-off, and `τ = 0` for one that spins about a principal axis.
@@ -40,8 +40,8 @@ use metriplectic_manifolds::{
 };
 use nalgebra::{Matrix3, Vector3};
 
-use crate::discrete_gradient::{Segment, StableGradient};
-use crate::trajectory::{State, Trajectory};
+use crate::round_off::stable_gradient::{Segment, StableGradient};
+use crate::run::trajectory::{State, Trajectory};
 
 /// The attitude `R(t)` of a body, a rotation from its frame to space, along a run on so(3)*; see the
 /// [module](mod@crate::attitude).

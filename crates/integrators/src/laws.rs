@@ -6,13 +6,12 @@ use metriplectic_fields::{
 };
 use metriplectic_manifolds::{Manifold, Retraction, Riemannian, StepPath};
 
-use crate::certificate::round_off;
 use crate::discrete_gradient::{DiscreteGradient, along as along_path};
-use crate::residual::DriftCorrection;
-use crate::residual::{Dim, size_of_terms};
-use crate::span::Schedule;
-use crate::step::{Memory, Scheme, Start};
-use crate::trajectory::{State, entropy_round_off};
+use crate::method::{Method as _, StepStart};
+use crate::midpoint::{Dim, MidpointMemory, Scheme};
+use crate::round_off::bound::{of_a_law, of_an_increment, size_of_terms};
+use crate::run::span::Schedule;
+use crate::run::trajectory::State;
 
 /// Checks a discrete gradient of `f` on the path of `u` from `x`:
 ///
@@ -90,11 +89,11 @@ where
     let end = one(scheme, system, x, h)?;
     let energy = system.energy_at(x);
     let sizes = [x, &end].map(|x| size_of_terms::<Y::Manifold>(system.energy(), x));
-    let bound = round_off(sizes[0].max(sizes[1]));
+    let bound = of_a_law(sizes[0].max(sizes[1]));
     BrokenLaw::unless("a step keeps the energy", (system.energy_at(&end) - energy).abs(), bound)?;
     if system.second_law() == SecondLaw::Exact && h > 0.0 {
         let entropy = system.entropy_at(x);
-        let bound = entropy_round_off(system, [x, &end]);
+        let bound = of_an_increment(system, [x, &end]);
         let fall = entropy - system.entropy_at(&end);
         BrokenLaw::unless("a step does not lower the entropy", fall, bound)?;
     }
@@ -179,7 +178,7 @@ where
         (Err(_), _) | (_, Err(_)) => return failed(()),
     };
     let (c, d) = (a.certificate(), b.certificate());
-    let counts = [c.steps.abs_diff(d.steps), c.iterations.abs_diff(d.iterations)];
+    let counts = [c.steps.abs_diff(d.steps), c.effort.iterations.abs_diff(d.effort.iterations)];
     let counted = if tolerance > 0.0 { counts[0] } else { counts[0] + counts[1] };
     BrokenLaw::unless("as many steps and iterations", counted as f64, 0.0)?;
     let numbers = |state: &State<Y::Manifold>| {
@@ -224,12 +223,9 @@ where
     R: Retraction<Y::Manifold, Y::Metric>,
     W: DiscreteGradient,
 {
-    let accumulated_error = DriftCorrection::nothing();
-    let [energy, entropy] = [system.energy_at(x), system.entropy_at(x)];
-    let invariants = accumulated_error.invariants;
-    let start = Start { x, time: 0.0, h, energy, entropy, invariants, accumulated_error };
     let missing = |_| BrokenLaw { law: "the step exists", size: f64::NAN, bound: 0.0 };
-    scheme.step(system, &start, &mut Memory::new()).map(|(end, _)| end).map_err(missing)
+    let (start, mut memory) = (StepStart::first(system, x), MidpointMemory::default());
+    scheme.step(system, &start, h, &mut memory).map(|taken| taken.x).map_err(missing)
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! How far a run goes, in which steps, and what of it is recorded.
 
-use crate::adaptive::Adaptive;
+use crate::run::controller::Adaptive;
 
 /// The time span of a run: the step size, the number of steps, and every how many a state is kept.
 ///

@@ -61,12 +61,9 @@
 //! asked for, to the last bit. The first step is that of Hairer, Nørsett, Wanner (Solving ODEs I, §II.4),
 //! with the sizes of the entries in place of their absolute numbers.
 
-use metriplectic_dynamics::{Metriplectic, system::Point};
-use metriplectic_fields::{ChartPoint, Column, Dimension, Space, Vector};
-
-use crate::scales::{Scales, relative};
-use crate::span::{Schedule, Size, Span, SpanError, check_end, check_step_size};
-use crate::step::Memory;
+use crate::method::{Element, Flow, Vector};
+use crate::run::scales::{Scales, relative};
+use crate::run::span::{Schedule, Size, Span, SpanError, check_end, check_step_size};
 
 /// A run to a time, in steps that follow a tolerance; made by [`Span::until`].
 ///
@@ -283,15 +280,15 @@ impl Adaptive {
     }
 
     /// The numbers for the entries of a point with `expected` directions.
-    fn entries<V: Column<f64>>(&self) -> Result<Entries<V>, SpanError> {
+    fn entries<V: Vector>(&self, like: &V) -> Result<Entries<V>, SpanError> {
         let vector = |list: &[f64]| {
-            if list.len() != V::LEN {
-                return Err(SpanError::Entries { found: list.len(), expected: V::LEN });
+            if list.len() != like.len() {
+                return Err(SpanError::Entries { found: list.len(), expected: like.len() });
             }
             let bad = list.iter().position(|x| !(*x >= 0.0 && x.is_finite()));
             match bad {
                 Some(index) => Err(SpanError::Entry { index, value: list[index] }),
-                None => Ok(V::from_index(|i| list[i])),
+                None => Ok(like.with(|i| list[i])),
             }
         };
         Ok(match &self.entries {
@@ -301,18 +298,20 @@ impl Adaptive {
         })
     }
 
-    /// The controller of a run from `x`, whose entries have these sizes.
-    pub(crate) fn controller<Y: Metriplectic>(
+    /// The controller of a run from `x` by a method of this order, with entries of these sizes.
+    pub(crate) fn controller<F: Flow>(
         &self,
-        system: &Y,
-        (x, start): (&Point<Y>, f64),
-        scales: &Scales<<Y::Manifold as Space>::Dim>,
-    ) -> Result<Controller<<Y::Manifold as Space>::Dim>, SpanError> {
+        flow: &F,
+        (x, start): (&Element<F>, f64),
+        scales: &Scales<F::Vector>,
+        order: u32,
+    ) -> Result<Controller<F::Vector>, SpanError> {
         let mut controller = Controller {
+            order,
             start,
             end: self.end,
             tolerance: self.tolerance,
-            entries: self.entries()?,
+            entries: self.entries(&scales.sizes)?,
             least: self.least,
             largest: self.largest,
             next: 0.0,
@@ -320,29 +319,31 @@ impl Adaptive {
             error: None,
             rejected: false,
         };
-        let first = self.first.unwrap_or_else(|| controller.first_step(system, x, scales));
+        let first = self.first.unwrap_or_else(|| controller.first_step(flow, x, scales));
         controller.next = controller.within(first);
         Ok(controller)
     }
 }
 
 /// How large the steps of a run are.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum StepSize<N: Dimension> {
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum StepSize<V> {
     /// All of one size.
     Fixed(f64),
     /// As the tolerance says.
-    Adaptive(Controller<N>),
+    Adaptive(Controller<V>),
 }
 
 /// Says how large the next step is, from the errors of those before it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Controller<N: Dimension> {
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Controller<V> {
+    /// The order of the method.
+    pub(crate) order: u32,
     /// When the run starts.
     pub(crate) start: f64,
     pub(crate) end: f64,
     pub(crate) tolerance: f64,
-    pub(crate) entries: Entries<N::Vector<f64>>,
+    pub(crate) entries: Entries<V>,
     pub(crate) least: Option<f64>,
     pub(crate) largest: Option<f64>,
     /// The size to try next.
@@ -366,7 +367,12 @@ const UNSOLVED: f64 = 0.25;
 /// The least error that the controller remembers: a step without any is no reason to be bold later.
 const LEAST_ERROR: f64 = 1e-4;
 
-impl<N: Dimension> Controller<N> {
+impl<V: Vector> Controller<V> {
+    /// The order of the local error.
+    fn local_order(&self) -> f64 {
+        f64::from(self.order + 1)
+    }
+
     /// The step size below which the run ends in an error.
     pub(crate) fn least(&self) -> f64 {
         self.least.unwrap_or(16.0 * f64::EPSILON * self.start.abs().max(self.end.abs()))
@@ -397,8 +403,8 @@ impl<N: Dimension> Controller<N> {
 
     /// A step of size `h` was taken.
     pub(crate) fn accept(&mut self, h: f64, error: f64) {
-        let proportional = self.error.map_or(1.0, |before| before.powf(0.4 / 3.0));
-        let ratio = SAFETY * error.powf(-0.7 / 3.0) * proportional;
+        let proportional = self.error.map_or(1.0, |before| before.powf(0.4 / self.local_order()));
+        let ratio = SAFETY * error.powf(-0.7 / self.local_order()) * proportional;
         let most = if self.rejected { 1.0 } else { LARGEST_RATIO };
         let next = h * ratio.clamp(LEAST_RATIO, most);
         self.next = self.within(next);
@@ -409,115 +415,67 @@ impl<N: Dimension> Controller<N> {
 
     /// A step of size `h` was not taken, with this error or because it was not solved.
     pub(crate) fn reject(&mut self, h: f64, error: Option<f64>) {
-        let ratio = error
-            .map_or(UNSOLVED, |error| (SAFETY * error.powf(-1.0 / 3.0)).clamp(LEAST_RATIO, SAFETY));
+        let ratio = error.map_or(UNSOLVED, |error| {
+            (SAFETY * error.powf(-1.0 / self.local_order())).clamp(LEAST_RATIO, SAFETY)
+        });
         self.next = h * ratio;
         self.rejected = true;
     }
 
-    /// The error `τ^{3/2} s_i + a_i` that is allowed in a step of size `h`, entry by entry, and what
+    /// The error `τ^{(p+1)/p} s_i + a_i` that is allowed in a step of size `h`, entry by entry, and what
     /// rounding may make of the estimate.
-    fn allowed(&self, scales: &Scales<N>, h: f64) -> N::Vector<f64> {
-        let tolerance = self.tolerance.powf(1.5).max(8.0 * f64::EPSILON);
-        let (sizes, noise) = (&scales.sizes, scales.noise(h));
-        Column::from_index(|i| match &self.entries {
-            Entries::Scale(known) if known[i] > 0.0 => tolerance * known[i] + noise[i],
-            Entries::Absolute(errors) => tolerance * sizes[i] + errors[i] + noise[i],
-            _ => tolerance * sizes[i] + noise[i],
+    fn allowed(&self, scales: &Scales<V>, h: f64) -> V {
+        let exponent = self.local_order() / f64::from(self.order);
+        let tolerance = self.tolerance.powf(exponent).max(8.0 * f64::EPSILON);
+        let noise = scales.rounding(h);
+        scales.sizes.with(|i| {
+            let (size, noise) = (scales.sizes.get(i), noise.get(i));
+            match &self.entries {
+                Entries::Scale(known) if known.get(i) > 0.0 => tolerance * known.get(i) + noise,
+                Entries::Absolute(errors) => tolerance * size + errors.get(i) + noise,
+                _ => tolerance * size + noise,
+            }
         })
     }
 
-    /// The error of the step from `x` to `end` in units of the one allowed; `None` if the equation
-    /// of motion cannot be evaluated on the way, or in another chart only.
-    pub(crate) fn error_of<Y>(
-        &self,
-        system: &Y,
-        (x, end): (&Point<Y>, &Point<Y>),
-        h: f64,
-        scales: &Scales<N>,
-    ) -> Option<f64>
-    where
-        Y: Metriplectic,
-        Y::Manifold: Space<Dim = N>,
-    {
-        let error = relative(&local_error(system, x, end, h)?, &self.allowed(scales, h));
+    /// An error of a step of size `h` in units of the one allowed; `None` if it is no number.
+    pub(crate) fn relative_error(&self, error: &V, h: f64, scales: &Scales<V>) -> Option<f64> {
+        let error = relative(error, &self.allowed(scales, h));
         error.is_finite().then_some(error)
     }
 
     /// The first step, after Hairer, Nørsett, Wanner (Solving ODEs I, §II.4): a short step of Euler's
-    /// method gives the rate `ω = |f'f|/|f|` of the motion, and `h³ω²|f|` is to be a hundredth of the
+    /// method gives the rate `ω = |f'f|/|f|` of the motion, and `h^{p+1}ω^p|f|` is to be a hundredth of the
     /// error allowed, all in units of it.
-    fn first_step<Y>(&self, system: &Y, x: &Point<Y>, scales: &Scales<N>) -> f64
-    where
-        Y: Metriplectic,
-        Y::Manifold: Space<Dim = N>,
-    {
+    fn first_step<F: Flow<Vector = V>>(&self, flow: &F, x: &Element<F>, scales: &Scales<V>) -> f64 {
         let (span, allowed) = (self.end - self.start, self.allowed(scales, 0.0));
-        let h = system.velocity(&ChartPoint::centre(x)).ok().and_then(|v| {
+        let h = flow.rates(x, &scales.sizes.map(|_| 0.0)).and_then(|v| {
             let own_time = scales.speed(&v).recip().min(span);
             let euler = 0.01 * own_time;
-            let there = ChartPoint { base: x.clone(), q: v * euler };
-            let change = system.velocity(&there).ok()? - v;
-            // h = T ∛(0.01 / (|Tf| (ωT)²)), with |f| (ωT)² = |100² Δf|²/|f| for Δf over T/100.
+            let there = flow.rates(x, &v.map(|v| v * euler))?;
+            let change = v.with(|i| there.get(i) - v.get(i));
+            // h = T (0.01 / (|Tf| (ωT)^p))^{1/(p+1)}, with |f| (ωT)² = |100² Δf|²/|f| for Δf over T/100.
             let (speed, bend) = (relative(&v, &allowed), 100.0 * relative(&change, &allowed));
-            let error = own_time * speed * (bend / speed).powi(2);
-            Some(own_time * (0.01 / error).cbrt().min(1.0))
+            let error = own_time * speed * (bend / speed).powi(self.order.cast_signed());
+            Some(own_time * self.local_root(0.01 / error).min(1.0))
         });
         h.filter(|h| *h > 0.0).unwrap_or(1e-3 * span)
     }
-}
 
-/// The estimate `e` of the local error, in the chart at `x`.
-#[inline(never)]
-fn local_error<Y: Metriplectic>(
-    system: &Y,
-    x: &Point<Y>,
-    end: &Point<Y>,
-    h: f64,
-) -> Option<Vector<Y::Manifold>> {
-    let q = Y::Manifold::coordinates(x, end);
-    if !Y::Manifold::is_near(&q) {
-        return None;
-    }
-    let f = |q| system.velocity(&ChartPoint { base: x.clone(), q }).ok();
-    let (start, there) = (f(Vector::<Y::Manifold>::zero())?, f(q)?);
-    let middle = f(q * 0.5 - (there - start) * (h / 8.0))?;
-    Some(q - (start + middle * 4.0 + there) * (h / 6.0))
-}
-
-impl<N: Dimension> Memory<N> {
-    /// The same displacements for steps of another size: with the parabola `D(s)` through the last
-    /// three, where `s` counts the steps from the middle of the last one, those of a step `ρ` times
-    /// as long are `ρ D(½ − ρ/2)`, `ρ D(½ − 3ρ/2)` and `ρ D(½ − 5ρ/2)`, each with `ρ(ρ² − 1)D''/24`
-    /// for the shorter mean: exact where the state is a cubic of the time.
-    pub(crate) fn rescaled(&self, ratio: f64) -> Self {
-        if ratio.to_bits() == 1.0_f64.to_bits() {
-            return *self;
-        }
-        // Far from the three points their parabola says nothing.
-        let known = if ratio > 2.0 { self.known.min(1) } else { self.known.min(3) };
-        let difference = |j| if j < known { self.differences[j] } else { N::Vector::<f64>::zero() };
-        let [d, slope, bend] = [0, 1, 2].map(difference);
-        let mean = d + bend * ((ratio * ratio - 1.0) / 24.0);
-        let at = |k: f64| {
-            let s = 0.5 - (k + 0.5) * ratio;
-            (mean + slope * s + bend * (0.5 * s * (s + 1.0))) * ratio
-        };
-        let [a, b, c] = [0.0, 1.0, 2.0].map(at);
-        let mut rescaled = Self { known: if ratio > 2.0 { 2 * known } else { known }, ..*self };
-        rescaled.differences[..3].copy_from_slice(&[a, a - b, a - b * 2.0 + c]);
-        rescaled
+    /// The root of the order of the local error.
+    fn local_root(&self, x: f64) -> f64 {
+        if self.order == 2 { x.cbrt() } else { x.powf(self.local_order().recip()) }
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Run;
-    use metriplectic_dynamics::{AreaForm, Nambu, System};
-    use metriplectic_fields::Real;
+    use crate::{Method as _, Run};
+    use metriplectic_dynamics::{AreaForm, Metriplectic, Nambu, System, system::Point};
+    use metriplectic_fields::{Column as _, Real, Space as _};
     use metriplectic_manifolds::{Exponential, Retraction, Rotations, Sphere, WeylMidpoint};
-    use nalgebra::{Const, Matrix3, Vector1, Vector3};
+    use nalgebra::{Matrix3, Vector3};
     use num_dual::DualNum;
 
     /// How far the estimate is off the local error, relative to it; that is found by 200 steps.
@@ -532,7 +490,7 @@ mod tests {
         let fine = WeylMidpoint.run(system, x.clone(), Span::steps(h / 200.0, 200)).unwrap();
         let at = |y| Y::Manifold::coordinates(x, y);
         let exact = at(&end) - at(&fine.last().point);
-        let estimate = local_error(system, x, &end, h).unwrap();
+        let estimate = system.local_error(x, &end, h).unwrap().0;
         (estimate - exact).magnitude() / exact.magnitude()
     }
 
@@ -550,12 +508,12 @@ mod tests {
             .entropy(|r: &Matrix3<Real>| r.m13 - r.m21 * 0.5 + (r.m31 + r.m32).powi(2) * 0.25)
             .build()
             .unwrap();
-        let dg_v = Rotations::bi_invariant().from_quaternion([0.8, 0.3, -0.4, 0.33]).unwrap();
+        let turned = Rotations::bi_invariant().from_quaternion([0.8, 0.3, -0.4, 0.33]).unwrap();
         let steps = [0.1, 0.05, 0.025];
         for (name, off) in [
             ("S²", steps.map(|h| off(WeylMidpoint, &top, &start, h))),
             ("S², based at the start", steps.map(|h| off(Exponential, &top, &start, h))),
-            ("SO(3)", steps.map(|h| off(WeylMidpoint, &group, &dg_v, 0.03 * h))),
+            ("SO(3)", steps.map(|h| off(WeylMidpoint, &group, &turned, 0.03 * h))),
         ] {
             println!("{name}: {off:.4?}");
             // Of order one: the estimate is the local error, and no multiple of it.
@@ -565,40 +523,9 @@ mod tests {
     }
 
     #[test]
-    fn displacements_of_a_cubic_are_those_of_every_step_size() {
-        type Line = Memory<Const<1>>;
-        // The last `n` steps of size `h` along x(t), up to t = 0.
-        let memory = |x: &dyn Fn(f64) -> f64, h: f64, n: usize| {
-            let step = |k: f64| x(-k * h) - x(-(k + 1.0) * h);
-            let [a, b, c] = [0.0, 1.0, 2.0].map(step);
-            let mut memory = Line { known: n, ..Line::new() };
-            for (slot, d) in memory.differences.iter_mut().zip([a, a - b, a - b * 2.0 + c]).take(n)
-            {
-                *slot = Vector1::new(d);
-            }
-            memory
-        };
-        let close = |a: &Line, b: &Line| {
-            assert_eq!(a.known, b.known);
-            for (a, b) in a.differences.iter().zip(&b.differences).take(a.known) {
-                assert!((a - b).norm() < 1e-15, "{a} for {b}");
-            }
-        };
-        let cubic = |t: f64| 0.3 * t - 0.7 * t * t + 0.2 * t * t * t;
-        for ratio in [0.2, 0.7, 1.0, 1.3, 2.0] {
-            close(&memory(&cubic, 0.1, 3).rescaled(ratio), &memory(&cubic, 0.1 * ratio, 3));
-        }
-        // Two displacements make a line, one a constant.
-        let parabola = |t: f64| 0.3 * t - 0.7 * t * t;
-        close(&memory(&parabola, 0.1, 2).rescaled(0.5), &memory(&parabola, 0.05, 2));
-        let line = |t: f64| 0.3 * t;
-        close(&memory(&line, 0.1, 1).rescaled(0.5), &memory(&line, 0.05, 1));
-        close(&memory(&line, 0.1, 3).rescaled(3.0), &memory(&line, 0.3, 2));
-    }
-
-    #[test]
     fn the_controller_stays_within_its_bounds() {
-        let mut controller = Controller::<Const<1>> {
+        let mut controller = Controller::<Vec<f64>> {
+            order: 2,
             start: 0.0,
             end: 10.0,
             tolerance: 1e-4,

@@ -1,18 +1,10 @@
 //! Whether the numbers of a checkpoint agree: with the system at its point, and with each other.
 
-use metriplectic_dynamics::invariants::{Invariants as _, Kind, Visitor};
-use metriplectic_dynamics::system::Point;
-use metriplectic_dynamics::{Metriplectic, SecondLaw};
-use metriplectic_fields::{Column, Dimension, ScalarField, Vector};
-use metriplectic_manifolds::Manifold;
-
 use super::{Checkpoint, Exact, ResumeError, SavedEnding};
-use crate::adaptive::StepSize;
-use crate::residual::Dim;
-use crate::scales;
-use crate::span::{check_end, check_steps};
-use crate::step::Memory;
-use crate::trajectory::Progress;
+use crate::method::{Element, Flow, Memory, Promises, Vector};
+use crate::run::controller::StepSize;
+use crate::run::span::{check_end, check_steps};
+use crate::run::steps::Progress;
 
 /// Units of round-off by which the values of one field differ between two mathematical libraries: some
 /// units for each function in it, and far less than any change of a model.
@@ -45,50 +37,36 @@ fn same(field: &'static str, stored: Exact, found: f64, terms: f64) -> Result<()
     }
 }
 
-/// The value of a field, and the size `|F| + Σ_i |∂_iF| |x_i|` of its terms.
-fn value<Y: Metriplectic>(f: &impl ScalarField<Y::Manifold>, x: &Point<Y>) -> [f64; 2] {
-    let (jet, sizes) = (f.jet1(x), Y::Manifold::scales(x));
-    let slopes = (0..Vector::<Y::Manifold>::LEN).map(|i| (jet.df[i] * sizes[i]).abs());
-    [f.at(x), jet.value.abs() + slopes.sum::<f64>()]
-}
-
-/// The fields of the system and its velocity, at the stored point.
-pub(super) fn of_the_system<Y: Metriplectic>(
-    system: &Y,
-    x: &Point<Y>,
+/// The laws of the system and its velocity, at the stored point.
+pub(super) fn of_the_system<F: Flow>(
+    flow: &F,
+    x: &Element<F>,
     c: &Checkpoint,
 ) -> Result<(), ResumeError> {
-    struct Values<'a, Y: Metriplectic>(&'a Point<Y>, Vec<[f64; 2]>);
-    impl<Y: Metriplectic> Visitor<Y::Manifold> for Values<'_, Y> {
-        fn visit(&mut self, _: Kind, f: &impl ScalarField<Y::Manifold>) {
-            self.1.push(value::<Y>(f, self.0));
-        }
-    }
-    let [energy, energy_terms] = value::<Y>(system.energy(), x);
-    same("energy", c.energy, energy, energy_terms)?;
-    let [entropy, entropy_terms] = value::<Y>(system.entropy(), x);
-    same("entropy", c.entropy, entropy, entropy_terms)?;
-    let mut values = Values::<Y>(x, Vec::new());
-    system.invariants().each(&mut values);
-    for (stored, [found, terms]) in c.invariants.iter().zip(values.1) {
+    let (laws, sizes) = (flow.laws(x), flow.term_sizes(x));
+    same("energy", c.energy, laws.energy, sizes.energy)?;
+    same("entropy", c.entropy, laws.entropy, sizes.entropy)?;
+    for (k, stored) in c.invariants.iter().enumerate() {
+        let (found, terms) = (laws.invariants.as_ref()[k], sizes.invariants.as_ref()[k]);
         same("further invariant", *stored, found, terms)?;
     }
-    if let Some([velocity, terms]) = scales::velocity_and_terms(system, x)
+    if let Some([velocity, terms]) = flow.rates_and_terms(x)
         && !c.velocity.is_empty()
     {
-        super::expect_length("entries of the velocity", c.velocity.len(), Dim::<Y>::LEN)?;
+        super::expect_length("entries of the velocity", c.velocity.len(), velocity.len())?;
         for (i, stored) in c.velocity.iter().enumerate() {
-            same("velocity", *stored, velocity[i], terms[i])?;
+            same("velocity", *stored, velocity.get(i), terms.get(i))?;
         }
     }
     Ok(())
 }
 
 /// The balance beside the state that it is the balance of.
-pub(super) fn of_the_balance<Y: Metriplectic>(
-    system: &Y,
-    x: &Point<Y>,
+pub(super) fn of_the_balance<F: Flow>(
+    flow: &F,
+    x: &Element<F>,
     c: &Checkpoint,
+    promises: Promises,
 ) -> Result<(), ResumeError> {
     let b = &c.balance;
     finite("initial energy", &[b.initial_energy])?;
@@ -126,19 +104,18 @@ pub(super) fn of_the_balance<Y: Metriplectic>(
         return damaged("smallest step", b.smallest_step.0);
     }
     // What the steps without friction have changed of the entropy is round-off, at worst a sum of it.
-    let [_, terms] = value::<Y>(system.entropy(), x);
+    let terms = flow.term_sizes(x).entropy;
     let allowed = (64.0 + c.step as f64) * f64::EPSILON * (terms + c.entropy.0.abs());
-    let exact = system.second_law() == SecondLaw::Exact;
-    if exact && (c.kept_entropy.0 - c.entropy.0).abs() > allowed {
+    if promises.entropy && (c.kept_entropy.0 - c.entropy.0).abs() > allowed {
         return damaged("kept entropy", c.kept_entropy.0);
     }
     Ok(())
 }
 
 /// The time beside the steps, and the end that has been reached or not.
-pub(super) fn of_the_course<N: Dimension>(
+pub(super) fn of_the_schedule<V>(
     c: &Checkpoint,
-    progress: &Progress<N>,
+    progress: &Progress<V>,
 ) -> Result<(), ResumeError> {
     let (start, time, ended) = (c.start.0, c.time.0, c.ending == Some(SavedEnding::Span));
     finite("start", &[c.start])?;
@@ -148,8 +125,8 @@ pub(super) fn of_the_course<N: Dimension>(
     if progress.rest.is_some_and(|tolerance| tolerance >= 1.0) {
         return damaged("tolerance of rest", progress.rest.unwrap_or(f64::NAN));
     }
-    match progress.pace {
-        StepSize::Fixed(h) => {
+    match &progress.step_size {
+        &StepSize::Fixed(h) => {
             if Exact(start + c.step as f64 * h) != c.time {
                 return damaged("time", time);
             }
@@ -179,24 +156,26 @@ pub(super) fn of_the_course<N: Dimension>(
 }
 
 /// The sizes of the entries, and the digits that rounding has lost of them.
-pub(super) fn of_the_entries<Y: Metriplectic>(
-    x: &Point<Y>,
-    progress: &Progress<Dim<Y>>,
-    memory: &Memory<Dim<Y>>,
+pub(super) fn of_the_entries<F: Flow>(
+    flow: &F,
+    x: &Element<F>,
+    progress: &Progress<F::Vector>,
+    memory: &impl Memory,
 ) -> Result<(), ResumeError> {
-    let here = Y::Manifold::scales(x);
-    for i in 0..Dim::<Y>::LEN {
-        let known = progress.scales.sizes[i];
+    let here = flow.sizes(x);
+    let [moved, lost] = memory.moved_and_lost();
+    let of = |list: &[f64], i: usize| list.get(i).copied().unwrap_or(0.0);
+    for i in 0..here.len() {
+        let (here, known) = (here.get(i), progress.scales.sizes.get(i));
         size("size of an entry", Exact(known))?;
-        if progress.judges_sizes() && known < here[i] {
+        if progress.judges_sizes() && known < here {
             return damaged("size of an entry", known);
         }
-        size("size of the terms of an entry", Exact(progress.scales.terms[i]))?;
-        size("largest velocity of an entry", Exact(progress.largest_velocity[i]))?;
+        size("size of the terms of an entry", Exact(progress.scales.terms.get(i)))?;
+        size("largest velocity of an entry", Exact(progress.largest_velocity.get(i)))?;
         // Both ends of the last step were rounded.
-        let moved = if memory.known > 0 { memory.differences[0][i].abs() } else { 0.0 };
-        let lost = memory.compensation.map_or(0.0, |compensation| compensation[i]);
-        if lost.abs() > LIBRARIES * (here[i] + moved) {
+        let (moved, lost) = (of(&moved, i).abs(), of(&lost, i));
+        if lost.abs() > LIBRARIES * (here + moved) {
             return damaged("lost digits of an entry", lost);
         }
     }

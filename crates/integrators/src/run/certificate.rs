@@ -2,14 +2,13 @@
 
 use std::fmt;
 
-use metriplectic_dynamics::invariants::{Invariants as _, Kind, Visitor};
-use metriplectic_dynamics::system::Point;
-use metriplectic_dynamics::{Metriplectic, SecondLaw};
-use metriplectic_fields::ScalarField;
+use metriplectic_dynamics::SecondLaw;
+use metriplectic_dynamics::invariants::Kind;
 
-use crate::digits::Digits;
-use crate::residual::size_of_terms;
-use crate::step::STIFF;
+use crate::digits::{Digits, counted};
+use crate::method::{Effort, Element, Evidence, Flow, Laws, Promises, Vector as _};
+use crate::round_off::bound::{ROUNDED, of_a_law};
+use crate::run::scales::{larger, relative};
 
 /// The balance of a run: what became of the two laws, of the manifold, and what it cost.
 ///
@@ -51,16 +50,16 @@ pub struct Certificate {
     /// Steps that were tried and given up, because their error was above the tolerance or because
     /// they were not solved.
     pub rejected: usize,
-    /// Linear systems solved by Newton's method, in all steps.
-    pub iterations: usize,
-    /// The same in the worst step.
+    /// What the solver did, in all steps.
+    #[cfg_attr(feature = "serde", serde(flatten))]
+    pub effort: Effort,
+    /// Linear systems solved in the worst step.
     pub worst_iterations: usize,
-    /// How often a step was retried as two halves.
-    pub retries: usize,
-    /// How often a step was approached through smaller ones from the same start.
-    pub continued: usize,
-    /// How often the globaliser was called.
-    pub globalised: usize,
+    /// The largest local error of a step, relative to the sizes of the entries, as estimated on a few steps:
+    /// those whose number is a power of two. `None` where there is no estimate.
+    pub local_error: Option<f64>,
+    /// What the method promises.
+    pub promises: Promises,
     /// What the model promises about its entropy; serialized as the name of the variant.
     #[cfg_attr(feature = "serde", serde(serialize_with = "by_name"))]
     pub second_law: SecondLaw,
@@ -90,36 +89,18 @@ pub struct InvariantBalance {
 }
 
 impl InvariantBalance {
-    /// The further invariants of a system at the start of a run.
-    pub(crate) fn of<Y: Metriplectic>(system: &Y, x0: &Point<Y>) -> Vec<Self> {
-        struct At<'a, Y: Metriplectic>(&'a Point<Y>, Vec<InvariantBalance>);
-        impl<Y: Metriplectic> Visitor<Y::Manifold> for At<'_, Y> {
-            fn visit(&mut self, kind: Kind, f: &impl ScalarField<Y::Manifold>) {
-                let scale = size_of_terms::<Y::Manifold>(f, self.0);
-                self.1.push(InvariantBalance {
-                    kind,
-                    initial: f.at(self.0),
-                    max_error: 0.0,
-                    scale,
-                });
-            }
-        }
-        let mut at = At::<Y>(x0, Vec::new());
-        system.invariants().each(&mut at);
-        at.1
-    }
-
     /// Whether it was kept to round-off: `|L − L₀| ≤ 50 ε (|L| + Σ_i |∂_iL x_i|)`.
     pub const fn is_kept(&self) -> bool {
-        self.max_error <= round_off(self.scale)
+        self.max_error <= of_a_law(self.scale)
     }
 }
 
-/// The round-off of a conserved function whose terms have this size: a step evaluates it at two rounded
-/// points, and runs of 10⁷ steps stay within 50 roundings.
-pub(crate) const fn round_off(scale: f64) -> f64 {
-    50.0 * f64::EPSILON * scale
-}
+/// The rate `h|K'|` of friction from which on a step is stiff: the midpoint rule leaves two thirds of a
+/// deviation that decays at this rate, with the opposite sign.
+const STIFF: f64 = 10.0;
+
+/// The local error, relative to the sizes of the entries, from which on a motion is not resolved.
+const UNRESOLVED: f64 = 0.1;
 
 #[cfg(feature = "serde")]
 fn by_name<S: serde::Serializer>(name: &impl fmt::Debug, to: S) -> Result<S::Ok, S::Error> {
@@ -127,6 +108,98 @@ fn by_name<S: serde::Serializer>(name: &impl fmt::Debug, to: S) -> Result<S::Ok,
 }
 
 impl Certificate {
+    /// That of a run that starts at `x0`.
+    pub(crate) fn start<F: Flow>(flow: &F, x0: &Element<F>, promises: Promises) -> Self {
+        let (laws, sizes) = (flow.laws(x0), flow.term_sizes(x0));
+        let kinds = flow.kinds().into_iter().enumerate();
+        Self {
+            initial_energy: laws.energy,
+            max_energy_error: 0.0,
+            energy_scale: sizes.energy,
+            initial_entropy: laws.entropy,
+            min_entropy_increment: 0.0,
+            entropy_gained: 0.0,
+            entropy_falls: 0,
+            min_entropy_slope: f64::INFINITY,
+            invariants: kinds
+                .map(|(k, kind)| InvariantBalance {
+                    kind,
+                    initial: laws.invariants.as_ref()[k],
+                    max_error: 0.0,
+                    scale: sizes.invariants.as_ref()[k],
+                })
+                .collect(),
+            max_manifold_defect: flow.defect(x0),
+            steps: 0,
+            smallest_step: 0.0,
+            largest_step: 0.0,
+            rejected: 0,
+            effort: Effort::default(),
+            worst_iterations: 0,
+            local_error: None,
+            promises,
+            second_law: flow.entropy_law(),
+            friction: 0.0,
+            projected: flow.is_projected(),
+        }
+    }
+
+    /// Enters a step of size `h` between two states with these laws.
+    #[inline]
+    pub(crate) fn enter<F: Flow>(
+        &mut self,
+        flow: &F,
+        [(x, before), (next, after)]: [(&Element<F>, &Laws<F::Numbers>); 2],
+        h: f64,
+        (evidence, effort): (Evidence, Effort),
+    ) {
+        self.smallest_step = if self.steps == 0 { h } else { self.smallest_step.min(h) };
+        self.largest_step = self.largest_step.max(h);
+        let error = (after.energy - self.initial_energy).abs();
+        self.max_energy_error = self.max_energy_error.max(error);
+        // The terms of the energy are evaluated where the error asks for them, and not in every step.
+        if error > of_a_law(self.energy_scale) {
+            self.energy_scale = self.energy_scale.max(flow.term_sizes(next).energy);
+        }
+        let increment = after.entropy - before.entropy;
+        self.min_entropy_increment =
+            if self.steps == 0 { increment } else { self.min_entropy_increment.min(increment) };
+        self.entropy_gained = after.entropy - self.initial_entropy;
+        if increment < 0.0 && increment < -flow.entropy_round_off([x, next]) {
+            self.entropy_falls += 1;
+        }
+        for (k, balance) in self.invariants.iter_mut().enumerate() {
+            let error = (after.invariants.as_ref()[k] - balance.initial).abs();
+            balance.max_error = balance.max_error.max(error);
+            if balance.max_error > of_a_law(balance.scale) {
+                let size = flow.term_sizes(next).invariants.as_ref()[k];
+                balance.scale = balance.scale.max(size);
+            }
+        }
+        self.min_entropy_slope = self.min_entropy_slope.min(evidence.entropy_slope);
+        self.friction = self.friction.max(evidence.friction);
+        self.max_manifold_defect = self.max_manifold_defect.max(flow.defect(next));
+        self.steps += 1;
+        self.effort += effort;
+        self.worst_iterations = self.worst_iterations.max(effort.iterations);
+        if self.steps.is_power_of_two() {
+            self.sample(flow, [x, next], h);
+        }
+    }
+
+    /// Notes an estimate of the local error.
+    #[cold]
+    fn sample<F: Flow>(&mut self, flow: &F, [x, next]: [&Element<F>; 2], h: f64) {
+        if let Some(error) = flow.local_error(x, next, h) {
+            // The sizes that a step brings about count too.
+            let sizes = larger(&flow.sizes(x), &flow.sizes(next));
+            let rounding = sizes.map(|size| ROUNDED * size);
+            let error = error.with(|i| (error.get(i).abs() - rounding.get(i)).max(0.0));
+            let relative = relative(&error, &sizes);
+            self.local_error = Some(self.local_error.unwrap_or(0.0).max(relative));
+        }
+    }
+
     /// `max |H(x_k) − H(x₀)| / |H(x₀)|`; the absolute error if `H(x₀) = 0`.
     pub fn max_relative_energy_error(&self) -> f64 {
         if self.initial_energy == 0.0 {
@@ -138,7 +211,7 @@ impl Certificate {
 
     /// Whether the first law was kept to round-off: `|H − H₀| ≤ 50 ε (|H| + Σ_i |∂_iH x_i|)`.
     pub const fn keeps_energy(&self) -> bool {
-        self.max_energy_error <= round_off(self.energy_scale)
+        self.max_energy_error <= of_a_law(self.energy_scale)
     }
 
     /// Whether friction is so stiff at these step sizes that the midpoint rule does not damp it.
@@ -161,10 +234,15 @@ impl fmt::Display for Certificate {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let steps = counted(self.steps, "step", "steps");
         let (error, relative) = (self.max_energy_error, self.relative_to());
-        if self.keeps_energy() {
+        if !self.promises.energy {
+            writeln!(
+                f,
+                "first law:   not promised; |H − H₀| ≤ {error:.1e}{relative}, over {steps}"
+            )?;
+        } else if self.keeps_energy() {
             writeln!(f, "first law:   |H − H₀| ≤ {error:.1e}{relative}, over {steps}")?;
         } else {
-            let allowed = round_off(self.energy_scale);
+            let allowed = of_a_law(self.energy_scale);
             writeln!(
                 f,
                 "first law:   BROKEN: |H − H₀| = {error:.1e}{relative}, round-off is {allowed:.1e}, over {steps}"
@@ -172,7 +250,7 @@ impl fmt::Display for Certificate {
         }
         match self.second_law {
             SecondLaw::NoEntropy => writeln!(f, "second law:  no entropy"),
-            SecondLaw::Published => {
+            _ if !self.promises.entropy => {
                 writeln!(f, "second law: not promised; {}", self.entropy_line())
             }
             _ => writeln!(f, "second law:  {}", self.entropy_line()),
@@ -189,7 +267,13 @@ impl fmt::Display for Certificate {
                 f,
                 "{:<13}{}|L − L₀| ≤ {max_error:.1e}, L₀ = {}",
                 format!("{kind} {}:", index + 1),
-                if kept.is_kept() { "" } else { "BROKEN: " },
+                if !self.promises.invariants {
+                    "not promised; "
+                } else if kept.is_kept() {
+                    ""
+                } else {
+                    "BROKEN: "
+                },
                 Digits(*initial)
             )?;
         }
@@ -201,19 +285,25 @@ impl fmt::Display for Certificate {
                 self.smallest_step, self.largest_step, self.rejected
             )?;
         }
+        if let Some(error) = self.local_error.filter(|error| *error > UNRESOLVED) {
+            writeln!(
+                f,
+                "accuracy:    the motion is not resolved: local errors up to {error:.1e} of the state in a step"
+            )?;
+        }
         write!(
             f,
             "solver:      {} ({} in the worst step), {}",
-            counted(self.iterations, "Newton iteration", "Newton iterations"),
+            counted(self.effort.iterations, "Newton iteration", "Newton iterations"),
             self.worst_iterations,
-            counted(self.retries, "retry", "retries")
+            counted(self.effort.splits, "retry", "retries")
         )?;
-        if self.continued > 0 {
-            let steps = counted(self.continued, "continuation", "continuations");
+        if self.effort.continued > 0 {
+            let steps = counted(self.effort.continued, "continuation", "continuations");
             write!(f, ", {steps} in the step size")?;
         }
-        if self.globalised > 0 {
-            write!(f, ", {} of the globaliser", counted(self.globalised, "call", "calls"))?;
+        if self.effort.globalised > 0 {
+            write!(f, ", {} of the globaliser", counted(self.effort.globalised, "call", "calls"))?;
         }
         Ok(())
     }
@@ -247,11 +337,6 @@ impl Certificate {
     }
 }
 
-/// A number with its noun.
-pub(crate) fn counted(n: usize, one: &str, many: &str) -> String {
-    format!("{n} {}", if n == 1 { one } else { many })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -271,11 +356,10 @@ mod tests {
         smallest_step: 0.1,
         largest_step: 0.1,
         rejected: 0,
-        iterations: 9,
+        effort: Effort { iterations: 9, continued: 0, globalised: 0, splits: 1 },
         worst_iterations: 2,
-        retries: 1,
-        continued: 0,
-        globalised: 0,
+        local_error: None,
+        promises: Promises::all_laws(true),
         second_law: SecondLaw::Exact,
         friction: 0.0,
         projected: false,
@@ -290,8 +374,13 @@ mod tests {
         assert!(!text.contains("step sizes"), "{text}");
         let adaptive = Certificate { smallest_step: 1e-3, rejected: 2, ..ONE_FALL }.to_string();
         assert!(adaptive.contains("step sizes:  1.0e-3 to 1.0e-1, 2 rejected"), "{adaptive}");
-        let text =
-            Certificate { entropy_falls: 2, steps: 1, iterations: 1, ..ONE_FALL }.to_string();
+        let text = Certificate {
+            entropy_falls: 2,
+            steps: 1,
+            effort: Effort { iterations: 1, ..ONE_FALL.effort },
+            ..ONE_FALL
+        }
+        .to_string();
         for part in ["over 1 step\n", "fell on 2 steps;", "1 Newton iteration ("] {
             assert!(text.contains(part), "\"{part}\" is missing in: {text}");
         }

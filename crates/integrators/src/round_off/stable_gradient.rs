@@ -60,7 +60,7 @@ const SHORT: f64 = 1e-3;
 /// The weight of an integral against a difference of two values of size `size` that is about
 /// `change`: it falls from 1 to 0 between one and four times the short fraction, with zero slope at both.
 #[inline]
-pub(super) fn short(change: f64, size: f64) -> f64 {
+pub(crate) fn short(change: f64, size: f64) -> f64 {
     if change.abs() >= 4.0 * SHORT * size && size > 0.0 {
         return 0.0;
     }

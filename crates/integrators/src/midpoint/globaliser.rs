@@ -11,7 +11,7 @@ use argmin::solver::linesearch::MoreThuenteLineSearch;
 use argmin::solver::quasinewton::LBFGS;
 use metriplectic_fields::{Column, Space, Square, Vector};
 
-use crate::root_finder::{Equation, Linearised};
+use crate::newton::{Equation, Linearised};
 
 /// Iterations that a globaliser may take.
 const ITERATIONS: u64 = 100;
@@ -31,7 +31,7 @@ struct LeastSquares<'a, M: Space, E> {
 
 impl<M: Space, E: Equation<M>> LeastSquares<'_, M, E> {
     /// The equation at `u`, as long as there may be more evaluations.
-    fn at(&self, u: &[f64]) -> Result<Option<Linearised<M>>, argmin::core::Error> {
+    fn at(&self, u: &[f64]) -> Result<Option<Linearised<M, E::Evidence>>, argmin::core::Error> {
         self.evaluations.set(self.evaluations.get() + 1);
         if self.evaluations.get() > EVALUATIONS {
             return Err(argmin::core::Error::msg("no root is found in the evaluations allowed"));

@@ -50,10 +50,8 @@
 use std::fmt;
 use std::io::{self, Seek, SeekFrom, Write};
 
-use metriplectic_dynamics::Metriplectic;
-use metriplectic_fields::Space;
-
-use crate::trajectory::State;
+use crate::method::{Flow, StateSpace};
+use crate::run::trajectory::State;
 
 /// A table that cannot be written; the source of an [`io::Error`] of this module.
 #[derive(Debug, thiserror::Error)]
@@ -86,14 +84,14 @@ impl From<TableError> for io::Error {
 }
 
 /// Named numbers of a state; the time comes first.
-pub struct Observables<'a, M: Space> {
+pub struct Observables<'a, M: StateSpace> {
     list: Vec<Observable<'a, M>>,
 }
 
 /// A name, and what it stands for.
 type Observable<'a, M> = (String, Box<dyn Fn(&State<M>) -> f64 + Send + Sync + 'a>);
 
-impl<'a, M: Space> Observables<'a, M> {
+impl<'a, M: StateSpace> Observables<'a, M> {
     /// The time alone.
     #[must_use]
     pub fn new() -> Self {
@@ -102,7 +100,7 @@ impl<'a, M: Space> Observables<'a, M> {
 
     /// The time alone, for runs of this system: the compiler then knows the points of the closures.
     #[must_use]
-    pub fn on<Y: Metriplectic<Manifold = M>>(_system: &Y) -> Self {
+    pub fn on<F: Flow<Space = M>>(_flow: &F) -> Self {
         Self::new()
     }
 
@@ -111,7 +109,7 @@ impl<'a, M: Space> Observables<'a, M> {
     pub fn of(
         self,
         name: impl Into<String>,
-        f: impl Fn(&M::Point<f64>) -> f64 + Send + Sync + 'a,
+        f: impl Fn(&M::Element) -> f64 + Send + Sync + 'a,
     ) -> Self {
         self.of_state(name, move |state| f(&state.point))
     }
@@ -179,13 +177,13 @@ impl<'a, M: Space> Observables<'a, M> {
     }
 }
 
-impl<M: Space> Default for Observables<'_, M> {
+impl<M: StateSpace> Default for Observables<'_, M> {
     fn default() -> Self {
         Self::new()
     }
 }
 
-impl<M: Space> fmt::Debug for Observables<'_, M> {
+impl<M: StateSpace> fmt::Debug for Observables<'_, M> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_list().entries(self.names()).finish()
     }
@@ -205,7 +203,7 @@ const BUFFER: usize = 1 << 16;
 
 /// A table of comma-separated values; made by [`Observables::csv`].
 #[derive(Debug)]
-pub struct Csv<'a, M: Space, W: Write> {
+pub struct Csv<'a, M: StateSpace, W: Write> {
     of: &'a Observables<'a, M>,
     /// `None` once the table is finished.
     to: Option<W>,
@@ -215,7 +213,7 @@ pub struct Csv<'a, M: Space, W: Write> {
     rows: usize,
 }
 
-impl<M: Space, W: Write> Csv<'_, M, W> {
+impl<M: StateSpace, W: Write> Csv<'_, M, W> {
     /// One row more.
     ///
     /// # Errors
@@ -259,7 +257,7 @@ impl<M: Space, W: Write> Csv<'_, M, W> {
     }
 }
 
-impl<M: Space, W: Write> Drop for Csv<'_, M, W> {
+impl<M: StateSpace, W: Write> Drop for Csv<'_, M, W> {
     /// Writes what is still in memory; an error is lost, so prefer [`finish`](Self::finish).
     fn drop(&mut self) {
         let _ = self.flush();
@@ -282,7 +280,7 @@ fn write(to: &mut impl Write, bytes: &[u8]) -> (usize, io::Result<()>) {
 
 /// An array of `numpy`; made by [`Observables::npy`].
 #[derive(Debug)]
-pub struct Npy<'a, M: Space, W: Write + Seek> {
+pub struct Npy<'a, M: StateSpace, W: Write + Seek> {
     of: &'a Observables<'a, M>,
     to: Option<W>,
     /// Where the header starts.
@@ -293,7 +291,7 @@ pub struct Npy<'a, M: Space, W: Write + Seek> {
     bytes: Vec<u8>,
 }
 
-impl<M: Space, W: Write + Seek> Npy<'_, M, W> {
+impl<M: StateSpace, W: Write + Seek> Npy<'_, M, W> {
     /// One row more.
     ///
     /// # Errors
@@ -344,7 +342,7 @@ impl<M: Space, W: Write + Seek> Npy<'_, M, W> {
     }
 }
 
-impl<M: Space, W: Write + Seek> Drop for Npy<'_, M, W> {
+impl<M: StateSpace, W: Write + Seek> Drop for Npy<'_, M, W> {
     /// Writes what is still in memory; an error is lost, so prefer [`finish`](Self::finish).
     fn drop(&mut self) {
         let _ = self.flush();

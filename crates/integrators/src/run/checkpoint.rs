@@ -88,22 +88,21 @@
 //! another way or contract `a*b + c`; and another processor has another library. There the laws hold all the
 //! same, to the same round-off, but the digits of two long runs need not agree.
 
+mod saved;
 mod validation;
 
-use metriplectic_dynamics::Metriplectic;
-use metriplectic_dynamics::system::Point;
-use metriplectic_fields::{ChartPoint, Column, Dimension, Square};
-use metriplectic_manifolds::{Manifold, PointError, Retraction};
+use metriplectic_manifolds::PointError;
 
-use crate::adaptive::{Controller, Entries, StepSize};
-use crate::certificate::{Certificate, InvariantBalance};
-use crate::discrete_gradient::DiscreteGradient;
-use crate::newton::Inverse;
-use crate::residual::Dim;
-use crate::scales::Scales;
-use crate::span::{SpanError, check_end, check_step_size, check_steps};
-use crate::step::{Linearisation, Memory, Scheme};
-use crate::trajectory::{Ending, Progress, State, Steps};
+use crate::method::{Effort, Flow, Memory, Method, StateSpace, Vector};
+use crate::run::certificate::Certificate;
+use crate::run::controller::{Controller, Entries, StepSize};
+use crate::run::scales::Scales;
+use crate::run::span::{SpanError, check_end, check_step_size, check_steps};
+use crate::run::steps::{Progress, Steps};
+use crate::run::trajectory::{Ending, State};
+
+pub(crate) use saved::Exact;
+pub use saved::Saved;
 
 /// Where a run was put down; made by [`Steps::checkpoint`], taken up by [`Scheme::resume`].
 #[derive(Clone, Debug, PartialEq)]
@@ -122,11 +121,9 @@ pub struct Checkpoint {
     /// The entropy after the last step that dissipated.
     kept_entropy: Exact,
     invariants: Vec<Exact>,
-    differences: Vec<Vec<Exact>>,
-    linearised: Option<SavedLinearisation>,
-    compensation: Option<Vec<Exact>>,
+    memory: Saved,
     balance: Balance,
-    pace: SavedPace,
+    step_size: SavedStepSize,
     count: Option<usize>,
     every: usize,
     most: Option<usize>,
@@ -139,35 +136,8 @@ pub struct Checkpoint {
     ending: Option<SavedEnding>,
 }
 
-/// The Jacobian that the next step tries first.
-#[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-struct SavedLinearisation {
-    /// The inverse, row by row.
-    inverse: Vec<Exact>,
-    contraction: Exact,
-    first: Exact,
-    /// The round-off of the solution.
-    round_off: Vec<Exact>,
-    floor: Exact,
-    friction: Exact,
-    h: Exact,
-    length: Exact,
-    steps: u32,
-}
-
 /// The version of the format that is written and read.
-const VERSION: u32 = 2;
-
-/// A number that keeps its bits in every format.
-#[derive(Clone, Copy, Debug)]
-struct Exact(f64);
-
-impl PartialEq for Exact {
-    fn eq(&self, other: &Self) -> bool {
-        self.0.to_bits() == other.0.to_bits()
-    }
-}
+const VERSION: u32 = 3;
 
 /// The figures of a certificate that the system does not know.
 #[derive(Clone, Debug, PartialEq)]
@@ -189,16 +159,14 @@ struct Balance {
     smallest_step: Exact,
     largest_step: Exact,
     rejected: usize,
-    iterations: usize,
+    effort: Effort,
     worst_iterations: usize,
-    retries: usize,
-    continued: usize,
-    globalised: usize,
+    local_error: Option<Exact>,
 }
 
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-enum SavedPace {
+enum SavedStepSize {
     Fixed {
         h: Exact,
     },
@@ -329,7 +297,9 @@ impl Checkpoint {
     /// [`ResumeError::AdaptiveSteps`] if its steps follow a tolerance; [`ResumeError::Span`] if it has taken
     /// as many already, or the end would be too late for a number.
     pub fn with_steps(mut self, count: usize) -> Result<Self, ResumeError> {
-        let SavedPace::Fixed { h } = self.pace else { return Err(ResumeError::AdaptiveSteps) };
+        let SavedStepSize::Fixed { h } = self.step_size else {
+            return Err(ResumeError::AdaptiveSteps);
+        };
         if count <= self.step {
             return Err(SpanError::NoSteps.into());
         }
@@ -347,7 +317,7 @@ impl Checkpoint {
     /// [`ResumeError::FixedSteps`] if its steps are of one size; [`ResumeError::Span`] if the end is not
     /// after the time reached.
     pub fn with_end(mut self, end: f64) -> Result<Self, ResumeError> {
-        let SavedPace::Adaptive { end: old, .. } = &mut self.pace else {
+        let SavedStepSize::Adaptive { end: old, .. } = &mut self.step_size else {
             return Err(ResumeError::FixedSteps);
         };
         check_end(self.time.0, end)?;
@@ -367,15 +337,17 @@ fn exact(numbers: impl IntoIterator<Item = f64>) -> Vec<Exact> {
     numbers.into_iter().map(Exact).collect()
 }
 
-fn column<V: Column<f64>>(v: &V) -> Vec<Exact> {
-    exact((0..V::LEN).map(|i| v[i]))
+fn column(v: &impl Vector) -> Vec<Exact> {
+    exact(v.to_list())
 }
 
-/// The vector with these components.
-fn vector<V: Column<f64>>(what: &'static str, list: &[Exact]) -> Result<V, ResumeError> {
-    expect_length(what, list.len(), V::LEN)?;
-    let v = V::from_index(|i| list[i].0);
-    if v.is_finite() { Ok(v) } else { Err(ResumeError::Damaged { what, value: v.magnitude() }) }
+/// The numbers of a list, as many as there are in `like`.
+fn vector<V: Vector>(what: &'static str, list: &[Exact], like: &V) -> Result<V, ResumeError> {
+    expect_length(what, list.len(), like.len())?;
+    match list.iter().find(|number| !number.0.is_finite()) {
+        Some(number) => Err(ResumeError::Damaged { what, value: number.0 }),
+        None => Ok(like.with(|i| list[i].0)),
+    }
 }
 
 const fn expect_length(
@@ -386,159 +358,79 @@ const fn expect_length(
     if found == expected { Ok(()) } else { Err(ResumeError::Length { what, found, expected }) }
 }
 
-impl<Y, R, W> Steps<'_, Y, R, W>
-where
-    Y: Metriplectic,
-    R: Retraction<Y::Manifold, Y::Metric>,
-    W: DiscreteGradient,
-{
-    /// All that the next steps depend on, but for the system and the scheme.
+impl<'a, F: Flow, M: Method<F>> Steps<'a, F, M> {
+    /// All that the next steps depend on, but for the system and the method.
     pub fn checkpoint(&self) -> Checkpoint {
         let State { step, time, point, energy, entropy } = &self.state;
-        let Progress { pace, start, count, every, most, scales, rest, largest_velocity, ending } =
-            self.progress;
-        let velocity = self.system.velocity(&ChartPoint::centre(point));
+        let Progress { step_size, scales, largest_velocity, .. } = &self.progress;
+        let velocity = self.flow.rates(point, &self.flow.sizes(point).map(|_| 0.0));
         let known = self.certificate.invariants.len();
+        let mut memory = Saved::default();
+        self.memory.save(&mut memory);
         Checkpoint {
             version: VERSION,
             step: *step,
-            start: Exact(start),
+            start: Exact(self.progress.start),
             time: Exact(*time),
-            point: exact(Y::Manifold::entries(point)),
-            velocity: velocity.map_or_else(|_| Vec::new(), |v| column(&v)),
+            point: exact(F::Space::numbers(point)),
+            velocity: velocity.map_or_else(Vec::new, |v| column(&v)),
             energy: Exact(*energy),
             entropy: Exact(*entropy),
             kept_entropy: Exact(self.entropy),
-            invariants: exact((0..known).map(|k| self.invariants[k])),
-            differences: self.memory.differences[..self.memory.known].iter().map(column).collect(),
-            linearised: self.memory.linearised.as_ref().map(SavedLinearisation::of),
-            compensation: self.memory.compensation.as_ref().map(column),
+            invariants: exact(self.values.invariants.as_ref()[..known].iter().copied()),
+            memory,
             balance: Balance::of(&self.certificate),
-            pace: SavedPace::of(pace),
-            count,
-            every,
-            most,
+            step_size: SavedStepSize::of(step_size),
+            count: self.progress.count,
+            every: self.progress.every,
+            most: self.progress.most,
             sizes: column(&scales.sizes),
             terms: column(&scales.terms),
-            rest: rest.map(Exact),
-            largest_velocity: column(&largest_velocity),
-            ending: ending.map(SavedEnding::of),
+            rest: self.progress.rest.map(Exact),
+            largest_velocity: column(largest_velocity),
+            ending: self.progress.ending.map(SavedEnding::of),
         }
     }
-}
 
-impl<R, W: DiscreteGradient> Scheme<R, W> {
-    /// Takes up a run where it was put down. With the system and the scheme of that run the steps
-    /// are those that it would have taken, bit for bit.
-    ///
-    /// # Errors
-    ///
-    /// [`ResumeError`] if the checkpoint does not belong to the system, or is damaged.
-    pub fn resume<'a, Y>(
-        self,
-        system: &'a Y,
-        checkpoint: &Checkpoint,
-    ) -> Result<Steps<'a, Y, R, W>, ResumeError>
-    where
-        Y: Metriplectic,
-        R: Retraction<Y::Manifold, Y::Metric>,
-    {
-        let c = checkpoint;
+    /// A run that was put down.
+    pub(crate) fn resume(method: M, flow: &'a F, c: &Checkpoint) -> Result<Self, ResumeError> {
         if c.version != VERSION {
             return Err(ResumeError::Version { found: c.version, expected: VERSION });
         }
         let entries: Vec<f64> = c.point().collect();
-        let point = system.manifold().from_entries(&entries)?;
-        let certificate = c.balance.certificate(system, &point)?;
-        let progress = progress(c)?;
-        let memory = memory(c)?;
+        let point = flow.element(&entries)?;
+        let mut certificate = Certificate::start(flow, &point, method.promises(flow));
+        c.balance.restore(&mut certificate)?;
+        let progress = progress(c, &flow.sizes(&point), method.order())?;
+        let memory = M::Memory::restore(&c.memory)?;
         expect_length("further invariants", c.invariants.len(), certificate.invariants.len())?;
-        validation::of_the_system(system, &point, c)?;
-        validation::of_the_balance(system, &point, c)?;
-        validation::of_the_course(c, &progress)?;
-        validation::of_the_entries::<Y>(&point, &progress, &memory)?;
-        let invariants =
-            Dim::<Y>::array(|k| c.invariants.get(k).map_or(0.0, |invariant| invariant.0));
+        validation::of_the_system(flow, &point, c)?;
+        validation::of_the_balance(flow, &point, c, certificate.promises)?;
+        validation::of_the_schedule(c, &progress)?;
+        validation::of_the_entries(flow, &point, &progress, &memory)?;
+        let mut values = flow.laws(&point);
+        (values.energy, values.entropy) = (c.energy.0, c.entropy.0);
+        for (k, stored) in c.invariants.iter().enumerate() {
+            values.invariants[k] = stored.0;
+        }
         let (energy, entropy, time) = (c.energy.0, c.entropy.0, c.time.0);
         let state = State { step: c.step, time, point, energy, entropy };
-        let (entropy, failed) = (c.kept_entropy.0, false);
-        let scheme = self;
-        Ok(Steps {
-            scheme,
-            system,
+        Ok(Self {
+            promises: certificate.promises,
+            method,
+            flow,
             progress,
             state,
-            invariants,
-            entropy,
+            values,
+            entropy: c.kept_entropy.0,
             memory,
             certificate,
-            failed,
+            failed: false,
         })
     }
 }
 
-fn memory<N: Dimension>(c: &Checkpoint) -> Result<Memory<N>, ResumeError> {
-    let mut memory = Memory::new();
-    if c.differences.len() > memory.differences.len() {
-        expect_length("displacements", c.differences.len(), memory.differences.len())?;
-    }
-    memory.known = c.differences.len();
-    for (slot, list) in memory.differences.iter_mut().zip(&c.differences) {
-        *slot = vector("components of a displacement", list)?;
-    }
-    let compensation =
-        c.compensation.as_deref().map(|list| vector("components of the compensation", list));
-    memory.compensation = compensation.transpose()?;
-    memory.linearised = c.linearised.as_ref().map(SavedLinearisation::restore).transpose()?;
-    Ok(memory)
-}
-
-impl SavedLinearisation {
-    fn of<N: Dimension>(known: &Linearisation<N>) -> Self {
-        let Linearisation { inverse, friction, h, length, steps } = *known;
-        let n = N::LEN;
-        let rows = |matrix: &N::Matrix<f64>| exact((0..n * n).map(|k| matrix[(k / n, k % n)]));
-        Self {
-            inverse: rows(&inverse.matrix),
-            contraction: Exact(inverse.contraction),
-            first: Exact(inverse.first),
-            round_off: exact((0..n).map(|i| inverse.round_off[i])),
-            floor: Exact(inverse.floor),
-            friction: Exact(friction),
-            h: Exact(h),
-            length: Exact(length),
-            steps,
-        }
-    }
-
-    fn restore<N: Dimension>(&self) -> Result<Linearisation<N>, ResumeError> {
-        let n = N::LEN;
-        let number = |what, x: Exact| {
-            if x.0.is_finite() { Ok(x.0) } else { Err(ResumeError::Damaged { what, value: x.0 }) }
-        };
-        let matrix = |what, rows: &[Exact]| -> Result<N::Matrix<f64>, ResumeError> {
-            expect_length(what, rows.len(), n * n)?;
-            rows.iter().try_for_each(|entry| number(what, *entry).map(drop))?;
-            Ok(N::Matrix::<f64>::from_entries(|i, j| rows[i * n + j].0))
-        };
-        let inverse = Inverse {
-            matrix: matrix("entries of an inverse", &self.inverse)?,
-            round_off: vector("round-off of the solution", &self.round_off)?,
-            floor: number("round-off of the residual", self.floor)?,
-            contraction: number("contraction", self.contraction)?,
-            first: self.first.0,
-        };
-        Ok(Linearisation {
-            inverse,
-            friction: number("rate of friction", self.friction)?,
-            h: number("step size", self.h)?,
-            length: number("length of a step", self.length)?,
-            steps: self.steps,
-        })
-    }
-}
-
-fn progress<N: Dimension>(c: &Checkpoint) -> Result<Progress<N>, ResumeError> {
+fn progress<V: Vector>(c: &Checkpoint, like: &V, order: u32) -> Result<Progress<V>, ResumeError> {
     let damaged = |what, value| Err(ResumeError::Damaged { what, value });
     if c.every == 0 {
         return damaged("interval of its records", 0.0);
@@ -547,9 +439,9 @@ fn progress<N: Dimension>(c: &Checkpoint) -> Result<Progress<N>, ResumeError> {
         Ok(()) => Ok(h.0),
         Err(_) => Err(ResumeError::Damaged { what, value: h.0 }),
     };
-    let pace = match &c.pace {
-        SavedPace::Fixed { h } => StepSize::Fixed(positive("step size", *h)?),
-        SavedPace::Adaptive {
+    let step_size = match &c.step_size {
+        SavedStepSize::Fixed { h } => StepSize::Fixed(positive("step size", *h)?),
+        SavedStepSize::Adaptive {
             end,
             tolerance,
             entries,
@@ -560,10 +452,11 @@ fn progress<N: Dimension>(c: &Checkpoint) -> Result<Progress<N>, ResumeError> {
             error,
             rejected,
         } => StepSize::Adaptive(Controller {
+            order,
             start: c.start.0,
             end: end.0,
             tolerance: positive("tolerance", *tolerance)?,
-            entries: entries.restore()?,
+            entries: entries.restore(like)?,
             least: least.map(|h| positive("least step", h)).transpose()?,
             largest: largest.map(|h| positive("largest step", h)).transpose()?,
             next: positive("next step", *next)?,
@@ -573,25 +466,25 @@ fn progress<N: Dimension>(c: &Checkpoint) -> Result<Progress<N>, ResumeError> {
         }),
     };
     Ok(Progress {
-        pace,
+        step_size,
         start: c.start.0,
         count: c.count,
         every: c.every,
         most: c.most,
         scales: Scales {
-            sizes: vector("sizes of the entries", &c.sizes)?,
-            terms: vector("sizes of the terms", &c.terms)?,
+            sizes: vector("sizes of the entries", &c.sizes, like)?,
+            terms: vector("sizes of the terms", &c.terms, like)?,
         },
         rest: c.rest.map(|x| positive("tolerance of rest", x)).transpose()?,
-        largest_velocity: vector("largest velocities", &c.largest_velocity)?,
+        largest_velocity: vector("largest velocities", &c.largest_velocity, like)?,
         ending: c.ending.as_ref().map(SavedEnding::ending),
     })
 }
 
-impl SavedPace {
-    fn of<N: Dimension>(pace: StepSize<N>) -> Self {
-        match pace {
-            StepSize::Fixed(h) => Self::Fixed { h: Exact(h) },
+impl SavedStepSize {
+    fn of<V: Vector>(step_size: &StepSize<V>) -> Self {
+        match step_size {
+            StepSize::Fixed(h) => Self::Fixed { h: Exact(*h) },
             StepSize::Adaptive(c) => Self::Adaptive {
                 end: Exact(c.end),
                 tolerance: Exact(c.tolerance),
@@ -608,7 +501,7 @@ impl SavedPace {
 }
 
 impl SavedEntries {
-    fn of<V: Column<f64>>(entries: &Entries<V>) -> Self {
+    fn of<V: Vector>(entries: &Entries<V>) -> Self {
         match entries {
             Entries::Automatic => Self::Automatic,
             Entries::Scale(sizes) => Self::Scale(column(sizes)),
@@ -616,11 +509,11 @@ impl SavedEntries {
         }
     }
 
-    fn restore<V: Column<f64>>(&self) -> Result<Entries<V>, ResumeError> {
+    fn restore<V: Vector>(&self, like: &V) -> Result<Entries<V>, ResumeError> {
         Ok(match self {
             Self::Automatic => Entries::Automatic,
-            Self::Scale(list) => Entries::Scale(vector("sizes of entries", list)?),
-            Self::Absolute(list) => Entries::Absolute(vector("errors of entries", list)?),
+            Self::Scale(list) => Entries::Scale(vector("sizes of entries", list, like)?),
+            Self::Absolute(list) => Entries::Absolute(vector("errors of entries", list, like)?),
         })
     }
 }
@@ -667,84 +560,35 @@ impl Balance {
             smallest_step: Exact(c.smallest_step),
             largest_step: Exact(c.largest_step),
             rejected: c.rejected,
-            iterations: c.iterations,
+            effort: c.effort,
             worst_iterations: c.worst_iterations,
-            retries: c.retries,
-            continued: c.continued,
-            globalised: c.globalised,
+            local_error: c.local_error.map(Exact),
         }
     }
 
-    fn certificate<Y: Metriplectic>(
-        &self,
-        system: &Y,
-        point: &Point<Y>,
-    ) -> Result<Certificate, ResumeError> {
-        use metriplectic_dynamics::Dissipation as _;
-        let mut invariants = InvariantBalance::of(system, point);
-        expect_length("further invariants", self.invariants.len(), invariants.len())?;
-        for (kept, (initial, max_error, scale)) in invariants.iter_mut().zip(&self.invariants) {
-            (kept.initial, kept.max_error, kept.scale) = (initial.0, max_error.0, scale.0);
+    /// Enters these figures into the certificate of the system.
+    fn restore(&self, c: &mut Certificate) -> Result<(), ResumeError> {
+        expect_length("further invariants", self.invariants.len(), c.invariants.len())?;
+        for (balance, (initial, error, scale)) in c.invariants.iter_mut().zip(&self.invariants) {
+            (balance.initial, balance.max_error, balance.scale) = (initial.0, error.0, scale.0);
         }
-        Ok(Certificate {
-            initial_energy: self.initial_energy.0,
-            max_energy_error: self.max_energy_error.0,
-            energy_scale: self.energy_scale.0,
-            friction: self.friction.0,
-            initial_entropy: self.initial_entropy.0,
-            min_entropy_increment: self.min_entropy_increment.0,
-            entropy_gained: self.entropy_gained.0,
-            entropy_falls: self.entropy_falls,
-            min_entropy_slope: self.min_entropy_slope.0,
-            invariants,
-            max_manifold_defect: self.max_manifold_defect.0,
-            steps: self.steps,
-            smallest_step: self.smallest_step.0,
-            largest_step: self.largest_step.0,
-            rejected: self.rejected,
-            iterations: self.iterations,
-            worst_iterations: self.worst_iterations,
-            retries: self.retries,
-            continued: self.continued,
-            globalised: self.globalised,
-            second_law: system.second_law(),
-            projected: system.dissipation().is_projected(),
-        })
-    }
-}
-
-#[cfg(feature = "serde")]
-impl serde::Serialize for Exact {
-    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        if serializer.is_human_readable() {
-            serializer.collect_str(&format_args!("{:?}", self.0))
-        } else {
-            serializer.serialize_f64(self.0)
-        }
-    }
-}
-
-#[cfg(feature = "serde")]
-impl<'de> serde::Deserialize<'de> for Exact {
-    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct Digits;
-        impl serde::de::Visitor<'_> for Digits {
-            type Value = f64;
-
-            fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-                f.write_str("the digits of a number in a string, such as \"0.1\"")
-            }
-
-            fn visit_str<E: serde::de::Error>(self, digits: &str) -> Result<f64, E> {
-                digits
-                    .parse()
-                    .map_err(|_| E::invalid_value(serde::de::Unexpected::Str(digits), &self))
-            }
-        }
-        if deserializer.is_human_readable() {
-            deserializer.deserialize_str(Digits).map(Self)
-        } else {
-            f64::deserialize(deserializer).map(Self)
-        }
+        c.initial_energy = self.initial_energy.0;
+        c.max_energy_error = self.max_energy_error.0;
+        c.energy_scale = self.energy_scale.0;
+        c.friction = self.friction.0;
+        c.initial_entropy = self.initial_entropy.0;
+        c.min_entropy_increment = self.min_entropy_increment.0;
+        c.entropy_gained = self.entropy_gained.0;
+        c.entropy_falls = self.entropy_falls;
+        c.min_entropy_slope = self.min_entropy_slope.0;
+        c.max_manifold_defect = self.max_manifold_defect.0;
+        c.steps = self.steps;
+        c.smallest_step = self.smallest_step.0;
+        c.largest_step = self.largest_step.0;
+        c.rejected = self.rejected;
+        c.effort = self.effort;
+        c.worst_iterations = self.worst_iterations;
+        c.local_error = self.local_error.map(|error| error.0);
+        Ok(())
     }
 }

@@ -1,26 +1,60 @@
-//! What solves the equation of a step.
+//! The equation of a step, and what its solution tells.
+
+use std::fmt::Debug;
 
 use metriplectic_fields::{Matrix, Space, Square, Vector};
 
 /// An equation `F(u) = 0` for a tangent vector `u`.
 pub trait Equation<M: Space> {
+    /// What an evaluation tells beside the residual.
+    type Evidence: Copy + Debug;
+
     /// `F(u)`, or `None` where it is not defined: outside the domain of a field, or beyond the reach
     /// of a geodesic.
-    fn value(&self, u: &Vector<M>) -> Option<Vector<M>>;
+    fn evaluate(&self, u: &Vector<M>) -> Option<Evaluated<M, Self::Evidence>>;
 
     /// `F(u)` with its Jacobian, or `None` where it is not defined.
-    fn linearise(&self, u: &Vector<M>) -> Option<Linearised<M>>;
+    fn linearise(&self, u: &Vector<M>) -> Option<Linearised<M, Self::Evidence>>;
+
+    /// `F(u)` alone.
+    fn value(&self, u: &Vector<M>) -> Option<Vector<M>> {
+        self.evaluate(u).map(|at| at.residual)
+    }
+}
+
+/// The residual of an equation at one point.
+#[derive(Clone, Copy, Debug)]
+pub struct Evaluated<M: Space, E> {
+    /// `F(u)`.
+    pub residual: Vector<M>,
+    /// What else the evaluation tells.
+    pub evidence: E,
 }
 
 /// An equation at one point.
 #[derive(Clone, Debug)]
-pub struct Linearised<M: Space> {
+pub struct Linearised<M: Space, E> {
     /// `F(u)`.
     pub residual: Vector<M>,
     /// `∂F/∂u`.
     pub jacobian: Matrix<M>,
     /// The round-off of `F(u)`.
     pub rounding: Rounding<M>,
+    /// The rates of what the equation discretises.
+    pub stiffness: Stiffness,
+    /// What else the evaluation tells.
+    pub evidence: E,
+}
+
+/// The rates of a motion in one step: the roots of the sums of squared eigenvalues, the same numbers in all
+/// units.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Stiffness {
+    /// `h|K'|` of the friction. The midpoint rule multiplies a deviation that decays at the rate `λ` by
+    /// `(1 − hλ/2)/(1 + hλ/2)`, which tends to −1.
+    pub friction: f64,
+    /// `h|Π'|` of the reversible motion.
+    pub rotation: f64,
 }
 
 /// The round-off of `F(u)`, for each component in its own unit: the terms of a component are rounded
@@ -56,7 +90,7 @@ impl<M: Space> Rounding<M> {
 
 /// A solved equation.
 #[derive(Clone, Debug)]
-pub struct Root<M: Space> {
+pub struct Root<M: Space, E> {
     /// The solution.
     pub u: Vector<M>,
     /// The norm of the residual that is left.
@@ -67,9 +101,11 @@ pub struct Root<M: Space> {
     pub floor: f64,
     /// Linear systems solved.
     pub iterations: usize,
+    /// What the last evaluation told.
+    pub evidence: E,
 }
 
-/// An equation that was not solved.
+/// The best point of an equation that was not solved.
 #[derive(Clone, Debug)]
 pub struct Iterate<M: Space> {
     /// The best point found.
@@ -82,18 +118,8 @@ pub struct Iterate<M: Space> {
 
 impl<M: Space> Iterate<M> {
     /// The best point as the root, with its round-off.
-    pub(crate) fn solved(self, noise: Vector<M>, floor: f64) -> Root<M> {
+    pub(super) fn solved<E>(self, (noise, evidence): (Vector<M>, E), floor: f64) -> Root<M, E> {
         let Self { best: u, residual, iterations } = self;
-        Root { u, residual, noise, floor, iterations }
+        Root { u, residual, noise, floor, iterations, evidence }
     }
-}
-
-/// A method that solves `F(u) = 0` from a guess.
-pub trait RootFinder<M: Space> {
-    /// A root near the guess.
-    ///
-    /// # Errors
-    ///
-    /// [`Iterate`] with the best point found.
-    fn solve(&self, equation: &impl Equation<M>, guess: &Vector<M>) -> Result<Root<M>, Iterate<M>>;
 }

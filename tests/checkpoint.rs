@@ -195,7 +195,7 @@ fn a_damaged_checkpoint_is_refused() {
     assert!(matches!(error, Some(ResumeError::Point(PointError::NotFinite { index: 1, .. }))));
     let error = with(&|tree| tree["time"] = "-1.0".into());
     assert!(matches!(error, Some(ResumeError::Damaged { what: "time", .. })));
-    let error = with(&|tree| tree["pace"]["Adaptive"]["next"] = "0.0".into());
+    let error = with(&|tree| tree["step_size"]["Adaptive"]["next"] = "0.0".into());
     assert!(matches!(error, Some(ResumeError::Damaged { what: "next step", .. })));
     let error = with(&|tree| tree["every"] = 0.into());
     assert!(matches!(error, Some(ResumeError::Damaged { .. })));

@@ -182,6 +182,10 @@ impl<'a, F: Flow, M: Method<F>> Steps<'a, F, M> {
             StepSize::Adaptive(controller) => self.controlled(controller.clone())?,
         };
         let Taken { x, values, evidence, effort } = taken;
+        if !is_finite(&values) {
+            let time = self.state.time;
+            return Err(StepError::OutOfDomain { time, h, tried: effort });
+        }
         let change = values.energy - self.certificate.initial_energy;
         let sizes = || self.flow.energy_sizes([&self.state.point, &x]);
         if self.promises.energy
@@ -248,7 +252,7 @@ impl<'a, F: Flow, M: Method<F>> Steps<'a, F, M> {
             let end = match end {
                 Ok(taken) => {
                     effort += taken.effort;
-                    Some(taken)
+                    is_finite(&taken.values).then_some(taken)
                 }
                 Err(Refusal { effort: wasted, error }) => {
                     effort += wasted;
@@ -351,6 +355,11 @@ impl<'a, F: Flow, M: Method<F>> Steps<'a, F, M> {
             Ok(())
         }
     }
+}
+
+/// Whether the laws are numbers: a method without an equation to solve may step over the edge of a domain.
+fn is_finite<L>(laws: &Laws<L>) -> bool {
+    laws.energy.is_finite() && laws.entropy.is_finite()
 }
 
 /// Steps that are tried before the sizes of the entries are estimated anew.

@@ -147,9 +147,9 @@ impl<'a, Y: Metriplectic<Manifold = LieDual<3>>> Attitude<'a, Y> {
         let nodes = WeylMidpoint.along(&Canonical, x, &d)?;
         let df = energy.jet1(&z).df;
         let (segment, values) = (Segment::new(&d, &next.point), [self.state.energy, next.energy]);
-        let chord = StableGradient::new(energy, &df, &segment, values, || df.dot(&d), || nodes);
+        let stable = StableGradient::new(energy, &df, &segment, values, || df.dot(&d), || nodes);
         let g = self.system.metric().at(&ChartPoint::<LieDual<3>>::centre(&z))?;
-        Ok(chord.covector(0.0, &g, &d))
+        Ok(stable.covector(0.0, &g, &d))
     }
 }
 

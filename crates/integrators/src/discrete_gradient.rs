@@ -127,9 +127,9 @@ where
     let values = [f.at(x), f.at(&path.end)];
     let nodes = retraction.along(metric, x, u)?;
     let base = || gradient.slope_at_base(f, &path.z.base, &path.d, &mean);
-    let chord =
+    let stable =
         StableGradient::new(f, &mean, &Segment::new(&path.d, &path.end), values, base, || nodes);
-    Ok(chord.covector(0.0, &g, &path.d))
+    Ok(stable.covector(0.0, &g, &path.d))
 }
 
 /// The definition of [`DiscreteGradient::mean_jet`]: one dual number for each direction.

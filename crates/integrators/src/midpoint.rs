@@ -234,7 +234,7 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
 
 /// What a solution tells of the motion.
 fn evidence<M: Manifold>(root: &Root<M, Dissipated>, friction: f64) -> Evidence {
-    let rests = (0..Vector::<M>::LEN).all(|i| root.u[i].abs() <= 2.0 * root.noise[i]);
+    let rests = (0..Vector::<M>::LEN).all(|i| root.u[i].abs() <= 2.0 * root.round_off[i]);
     let Dissipated { slope_squared, dissipates } = root.evidence;
     Evidence { entropy_slope: slope_squared.sqrt(), dissipates, friction, rests }
 }
@@ -248,18 +248,18 @@ const VERY_STIFF: f64 = 1e8;
 fn has_digits<Y: Metriplectic>(
     system: &Y,
     start: &Start<'_, Y>,
-    Root { u, noise, .. }: &Root<Y::Manifold, Dissipated>,
+    Root { u, round_off, .. }: &Root<Y::Manifold, Dissipated>,
     friction: f64,
 ) -> bool {
     if friction <= VERY_STIFF {
         return true;
     }
     let scales = Y::Manifold::scales(start.x);
-    if (0..Dim::<Y>::LEN).all(|i| noise[i] <= 1e-2 * BROKEN * (scales[i] + u[i].abs())) {
+    if (0..Dim::<Y>::LEN).all(|i| round_off[i] <= 1e-2 * BROKEN * (scales[i] + u[i].abs())) {
         return true;
     }
     let dh = system.energy().jet1(start.x).df.abs();
-    dh.dot(noise) <= BROKEN * (start.values.energy.abs() + dh.dot(&scales))
+    dh.dot(round_off) <= BROKEN * (start.values.energy.abs() + dh.dot(&scales))
 }
 
 /// The further invariant that has the least independent fraction at `x`, and this fraction, if it is small

@@ -57,7 +57,7 @@ pub(crate) struct Inverse<N: Dimension> {
     /// The round-off `|J⁻¹| r + |J⁻¹G| η + |1 − J⁻¹| ξ` of the solution, where the Jacobian was formed.
     pub(crate) round_off: N::Vector<f64>,
     /// The norm of the round-off of the residual, where the Jacobian was formed.
-    pub(crate) floor: f64,
+    pub(crate) residual_bound: f64,
     /// The fraction of a residual that the first correction by a kept inverse has left of late.
     pub(crate) contraction: f64,
     /// The residual of the guess in the last step, in units of its round-off.
@@ -71,9 +71,9 @@ pub(crate) struct Inverse<N: Dimension> {
 impl<N: Dimension> Inverse<N> {
     fn of<M: Space<Dim = N>, E>(
         Linearised { jacobian, rounding, stiffness, .. }: &Linearised<M, E>,
-        floor: f64,
+        residual_bound: f64,
     ) -> Option<Self> {
-        let Rounding { terms, gain, noise, argument } = rounding;
+        let Rounding { terms, sensitivity, covector, argument } = rounding;
         let matrix = jacobian.inverse()?;
         // In mixed units only the diagonal of J⁻¹J has none, and tells whether the inverse has digits.
         let digits = |i| {
@@ -87,11 +87,19 @@ impl<N: Dimension> Inverse<N> {
         let moved = (N::Matrix::<f64>::one() - matrix).abs();
         // A point and its compensation have twice the digits: smaller displacements move nothing.
         let round_off = matrix.abs() * *terms
-            + (matrix * *gain).abs() * *noise
+            + (matrix * *sensitivity).abs() * *covector
             + moved * *argument
             + *argument * f64::EPSILON;
         let Stiffness { friction, .. } = *stiffness;
-        Some(Self { matrix, round_off, floor, contraction: 0.0, first: 0.0, friction, age: 0 })
+        Some(Self {
+            matrix,
+            round_off,
+            residual_bound,
+            contraction: 0.0,
+            first: 0.0,
+            friction,
+            age: 0,
+        })
     }
 
     /// Whether three corrections of the next guess are expected to be enough, the last one unchecked.
@@ -223,9 +231,11 @@ impl Newton {
             {
                 best.residual = residual.magnitude();
                 let here = Start { residual, evidence, stalled: 0.0 };
-                if let Progress::Solved(noise) = self.correct(equation, &here, inverse, &mut best) {
+                if let Progress::Solved(solution) =
+                    self.correct(equation, &here, inverse, &mut best)
+                {
                     inverse.age += 1;
-                    return Ok(best.solved(noise, inverse.floor / NORM));
+                    return Ok(best.solved(solution, inverse.residual_bound / NORM));
                 }
                 history = Some((inverse.contraction, Some(inverse.first)));
             } else {
@@ -255,9 +265,9 @@ impl Newton {
             let Linearised { residual, evidence, .. } = at;
             best.residual = residual.magnitude();
             let bounds = at.rounding.bounds(&at.jacobian) + best.best.abs() * f64::EPSILON;
-            let floor = bounds.magnitude();
-            let stalled = self.stall * floor;
-            let Some(mut inverse) = Inverse::of(&at, NORM * floor) else {
+            let residual_bound = bounds.magnitude();
+            let stalled = self.stall * residual_bound;
+            let Some(mut inverse) = Inverse::of(&at, NORM * residual_bound) else {
                 // The equation does not determine a solution here, however small the residual is.
                 break;
             };
@@ -265,10 +275,10 @@ impl Newton {
             let progress = self.correct(equation, &here, &mut inverse, &mut best);
             inverse.first = *first.get_or_insert(inverse.first);
             match progress {
-                Progress::Solved(noise) => {
+                Progress::Solved(solution) => {
                     inverse.contraction = 0.0;
                     *known = Some(inverse);
-                    return Ok(best.solved(noise, floor));
+                    return Ok(best.solved(solution, residual_bound));
                 }
                 Progress::Slow if best.iterations < self.iterations => {}
                 Progress::Slow | Progress::Stuck => break,
@@ -289,31 +299,32 @@ impl Newton {
         let round_off = inverse.round_off(&best.best);
         let measure = Measure::<M::Dim>::new(&round_off);
         let solved = |evidence| Progress::Solved((round_off, evidence));
-        let (floor, most) = (self.tolerance * inverse.floor, self.tolerance);
+        let (residual_bound, most) = (self.tolerance * inverse.residual_bound, self.tolerance);
         let own = here.stalled > 0.0;
         let Start { mut residual, mut evidence, .. } = *here;
         let mut correction = inverse.times(&residual);
         let mut size = measure.of(&correction);
-        inverse.first = best.residual / inverse.floor;
+        inverse.first = best.residual / inverse.residual_bound;
         // Before a Jacobian has been seen to contract here, nothing is left to it: the frame may have
         // turned since the last step, as that of a sphere does across its equator.
         let (mut contraction, mut expected) = (f64::INFINITY, 1.0);
         // Whether the equation's own Jacobian has had so little left to do that what remains is noise.
-        let mut settled = false;
+        let mut is_noise = false;
         for taken in 0_usize.. {
             // A displacement within its round-off is that of a state at rest.
             let enough = if measure.of(&best.best) <= 1.0 {
                 1.0
-            } else if settled {
+            } else if is_noise {
                 0.3
             } else {
                 0.1
             };
-            if best.residual <= enough * floor && size <= enough * most {
+            if best.residual <= enough * residual_bound && size <= enough * most {
                 return solved(evidence);
             }
             best.iterations += 1;
-            let round = best.residual <= floor || contraction * best.residual <= SURE * floor;
+            let round = best.residual <= residual_bound
+                || contraction * best.residual <= SURE * residual_bound;
             if round && expected * size <= HIDDEN * most {
                 // What a slow contraction leaves below round-off has the same sign in each step; it costs
                 // one more solution to take it out.
@@ -327,7 +338,7 @@ impl Newton {
                 return if own && taken > 0 && size > self.stall {
                     // The Jacobian is no longer that of this point.
                     Progress::Slow
-                } else if best.residual <= if own { here.stalled } else { floor }
+                } else if best.residual <= if own { here.stalled } else { residual_bound }
                     && (own || size <= NEAR * most)
                 {
                     solved(evidence)
@@ -341,25 +352,26 @@ impl Newton {
             correction = inverse.times(&residual);
             size = measure.of(&correction);
             (contraction, expected) = (best.residual / before, size / size_before);
-            settled = own && before <= NOISE * floor;
+            is_noise = own && before <= NOISE * residual_bound;
             if !own && taken == 0 {
                 inverse.contraction = contraction;
             }
             // The norm of the residual falls too slowly, or that of a component which the norm hides.
-            let slow = best.residual > f64::max(self.reuse * before, floor);
-            let hidden = best.residual <= floor && size > f64::max(self.reuse * size_before, most);
+            let slow = best.residual > f64::max(self.reuse * before, residual_bound);
+            let hidden =
+                best.residual <= residual_bound && size > f64::max(self.reuse * size_before, most);
             if slow || hidden {
                 let stagnates = best.residual > 0.5 * before && size > 0.5 * size_before;
                 if stagnates && best.residual <= here.stalled {
                     return solved(evidence);
                 }
                 // Close to round-off it is the noise that is slow, not the Jacobian.
-                if best.residual > NEAR * floor || hidden && size > NEAR * most {
+                if best.residual > NEAR * residual_bound || hidden && size > NEAR * most {
                     return Progress::Slow;
                 }
             }
             // The change of a residual near its round-off is noise.
-            if before > NOISE * floor {
+            if before > NOISE * residual_bound {
                 let taken = step * -next.length;
                 let predicted = correction - step;
                 inverse.learn(&taken, &predicted);
@@ -367,7 +379,7 @@ impl Newton {
             }
             // Another equation's Jacobian gets two corrections, and the last one.
             let left = contraction.powi(if taken == 0 { 2 } else { 1 }) * best.residual;
-            if !own && best.residual > floor && left > SURE * floor {
+            if !own && best.residual > residual_bound && left > SURE * residual_bound {
                 return Progress::Slow;
             }
         }
@@ -416,7 +428,7 @@ mod tests {
     /// Round-off of the terms alone.
     fn rounding<M: Space>(terms: Vector<M>) -> Rounding<M> {
         let zero = Vector::<M>::zero();
-        Rounding { terms, gain: Matrix::<M>::zeros(), noise: zero, argument: zero }
+        Rounding { terms, sensitivity: Matrix::<M>::zeros(), covector: zero, argument: zero }
     }
 
     /// `x² + y² = 4`, `xy = 1`.

@@ -226,8 +226,8 @@ where
             terms: Vector::<Y::Manifold>::from_index(|i| {
                 ROUNDED * h.abs() * velocity.terms[i] + f64::MIN_POSITIVE * (1.0 + h.abs())
             }),
-            gain: velocity.gain * h,
-            noise,
+            sensitivity: velocity.gain * h,
+            covector: noise,
             argument: (Y::Manifold::scales(self.x) + path.d.abs()) * f64::EPSILON,
         };
         // Half of a displacement reaches z.

@@ -1,4 +1,4 @@
-//! Brings a lost Newton iteration back: `½|F(u)|²` is minimised by argmin's L-BFGS.
+//! Finds a better guess where Newton's method fails: argmin's L-BFGS minimises `½|F(u)|²`.
 //!
 //! It stalls far above round-off and costs many evaluations, so it only delivers a better guess;
 //! Newton's method polishes.

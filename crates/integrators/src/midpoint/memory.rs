@@ -50,10 +50,12 @@ impl<N: Dimension> Memory for MidpointMemory<N> {
             saved.put(name, column(difference));
         }
         if let Some(KeptJacobian { inverse, h, length }) = &self.jacobian {
-            let Inverse { matrix, round_off, floor, contraction, first, friction, age } = inverse;
+            let Inverse { matrix, round_off, residual_bound, contraction, first, friction, age } =
+                inverse;
             saved.put("inverse", (0..n * n).map(|k| matrix[(k / n, k % n)]));
             saved.put("round-off of the solution", column(round_off));
-            let numbers = [*floor, *contraction, *first, *friction, f64::from(*age), *h, *length];
+            let numbers =
+                [*residual_bound, *contraction, *first, *friction, f64::from(*age), *h, *length];
             saved.put("what the inverse was formed for", numbers);
         }
         if let Some(lost) = &self.compensation.0 {
@@ -77,7 +79,7 @@ impl<N: Dimension> Memory for MidpointMemory<N> {
         let round_off = column("round-off of the solution")?;
         let numbers = saved.get("what the inverse was formed for", 7)?;
         if let (Some(matrix), Some(round_off), Some(numbers)) = (matrix, round_off, numbers) {
-            let [floor, contraction, first, friction, age, h, length] =
+            let [residual_bound, contraction, first, friction, age, h, length] =
                 [0, 1, 2, 3, 4, 5, 6].map(|k| numbers[k]);
             if !(0.0..=f64::from(u32::MAX)).contains(&age) {
                 return Err(ResumeError::Damaged { what: "age of the inverse", value: age });
@@ -89,7 +91,8 @@ impl<N: Dimension> Memory for MidpointMemory<N> {
             )]
             let age = age as u32;
             let matrix = N::Matrix::<f64>::from_entries(|i, j| matrix[i * n + j]);
-            let inverse = Inverse { matrix, round_off, floor, contraction, first, friction, age };
+            let inverse =
+                Inverse { matrix, round_off, residual_bound, contraction, first, friction, age };
             memory.jacobian = Some(KeptJacobian { inverse, h, length });
         }
         memory.compensation = Compensation(column("compensation")?);

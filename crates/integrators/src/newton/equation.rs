@@ -72,9 +72,9 @@ pub struct Rounding<M: Space> {
     /// The round-off `r_i` of the terms.
     pub terms: Vector<M>,
     /// The derivative `G = ∂F/∂η`.
-    pub gain: Matrix<M>,
+    pub sensitivity: Matrix<M>,
     /// The sizes of `η_j`.
-    pub noise: Vector<M>,
+    pub covector: Vector<M>,
     /// The sizes of `ξ_j`.
     pub argument: Vector<M>,
 }
@@ -84,7 +84,7 @@ impl<M: Space> Rounding<M> {
     #[must_use]
     pub fn bounds(&self, jacobian: &Matrix<M>) -> Vector<M> {
         let moved = (*jacobian - Matrix::<M>::one()).abs();
-        self.terms + self.gain.abs() * self.noise + moved * self.argument
+        self.terms + self.sensitivity.abs() * self.covector + moved * self.argument
     }
 }
 
@@ -96,9 +96,9 @@ pub struct Root<M: Space, E> {
     /// The norm of the residual that is left.
     pub residual: f64,
     /// The round-off of each component of the solution.
-    pub noise: Vector<M>,
+    pub round_off: Vector<M>,
     /// The norm of the round-off of the residual.
-    pub floor: f64,
+    pub residual_bound: f64,
     /// Linear systems solved.
     pub iterations: usize,
     /// What the last evaluation told.
@@ -118,8 +118,12 @@ pub struct Iterate<M: Space> {
 
 impl<M: Space> Iterate<M> {
     /// The best point as the root, with its round-off.
-    pub(super) fn solved<E>(self, (noise, evidence): (Vector<M>, E), floor: f64) -> Root<M, E> {
+    pub(super) fn solved<E>(
+        self,
+        (round_off, evidence): (Vector<M>, E),
+        residual_bound: f64,
+    ) -> Root<M, E> {
         let Self { best: u, residual, iterations } = self;
-        Root { u, residual, noise, floor, iterations, evidence }
+        Root { u, residual, round_off, residual_bound, iterations, evidence }
     }
 }

@@ -24,7 +24,7 @@ pub(crate) fn nothing<Y: Metriplectic>() -> DriftCorrection<Y> {
 /// Asking for `⟨w, d⟩ = F(x') − F(x) + φe` changes the covector by `φe ♭d/G(d, d)`, and with it the
 /// displacement by some `δ`, which must stay small against `d`. Both are compared by the change of `F` that goes
 /// with them, which has one unit: `φ = r²/(1 + r²)` with `r = Σ|∂_iF d_i| / (10² Σ|∂_iF δ_i|)` for `φ = 1`. It is
-/// all of `e` while the state moves, and nothing of it at rest, where it would hold the state fast.
+/// all of `e` while the state moves, and nothing of it at rest, where the correction would stop every motion.
 ///
 /// For the energy `δ_i = h Σ_j (|Π| + |K'|)_ij |♭d_j| |e|/G(d, d)`. The covectors of the entropy and of the
 /// further invariants enter by the projections, where `Σ|∂_iF δ_i| = |e|`, and that of the entropy by `K` as
@@ -50,11 +50,11 @@ pub(crate) fn target<Y: Metriplectic>(
     let pi = system.bracket().linearise(&args, &w.energy);
     let k = system.dissipation().linearise(system.metric(), start.x, &w.energy, &w.entropy);
     let (Ok(pi), Ok(k), Ok(g)) = (pi, k, system.metric().at(&x)) else { return nothing::<Y>() };
-    let mut gain = pi.tensor.abs() + k.along_w.abs();
+    let mut sensitivity = pi.tensor.abs() + k.along_w.abs();
     if system.bracket().is_forced()
         && let Ok(force) = system.bracket().linearise_force(&args, &w.energy)
     {
-        gain += force.tensor.abs();
+        sensitivity += force.tensor.abs();
     }
     let (flat, length) = (g.flat(d), d.abs());
     // Σ|∂_iF δ_i|/|e| for a δ by a tensor.
@@ -65,7 +65,7 @@ pub(crate) fn target<Y: Metriplectic>(
         let r = df.abs().dot(&length) / (1e2 * sensitivity * e.abs());
         if far(e, size) && r.is_finite() { e / (1.0 + r.powi(-2)) } else { 0.0 }
     };
-    let of_energy = moved(&w.energy, gain);
+    let of_energy = moved(&w.energy, sensitivity);
     let of_entropy = 1.0 + moved(&w.entropy, k.tensor.abs());
     DriftCorrection::<Y> {
         energy: fraction(energy, values.energy.abs(), &w.energy, of_energy),

@@ -121,14 +121,14 @@ where
     #[cold]
     fn energy(
         &self,
-        Root { u, floor, .. }: &Root<Y::Manifold, Dissipated>,
+        Root { u, residual_bound, .. }: &Root<Y::Manifold, Dissipated>,
         end: &Point<Y>,
         e: f64,
     ) -> Option<Polished<Y>> {
         let Residual { system, x, .. } = self.equation;
         // Where the round-off of the equation is near that of the entries of x', an error within the
         // roundings of the energy's terms needs no correction.
-        let coarse = *floor > 2.0 * ROUNDED * Y::Manifold::magnitude(x);
+        let coarse = *residual_bound > 2.0 * ROUNDED * Y::Manifold::magnitude(x);
         let closed = self.has_closed_geodesics();
         if closed
             && !coarse

@@ -248,7 +248,7 @@ mod tests {
             let d: Vector2<f64> = y - x;
             let [start, end]: [f64; 2] =
                 [x, y].map(|p| ScalarField::<Euclidean<2>>::at(&cubic, &p));
-            let chord = StableGradient::<Euclidean<2>>::new(
+            let stable = StableGradient::<Euclidean<2>>::new(
                 &cubic,
                 &df,
                 &Segment::new(&d, &y),
@@ -260,7 +260,7 @@ mod tests {
                     Nodes { ends: [at(0.0), at(1.0)], middle: Some(at(0.5)) }
                 },
             );
-            let w = chord.covector(0.0, &Canonical, &d);
+            let w = stable.covector(0.0, &Canonical, &d);
             let defect = 0.25 * (d.x.powi(3) + 2.0 * d.y.powi(3));
             let exact = df + d * (defect / d.norm_squared());
             let size = df.norm() + end.abs() / d.norm().max(1e-2);
@@ -274,7 +274,7 @@ mod tests {
     fn an_arc_without_length_has_the_differential_itself() {
         let (x, df, d) = (vector![0.7, -0.4], vector![1.47, 0.96], Vector2::zeros());
         let start = ScalarField::<Euclidean<2>>::at(&cubic, &x);
-        let chord = StableGradient::<Euclidean<2>>::new(
+        let stable = StableGradient::<Euclidean<2>>::new(
             &cubic,
             &df,
             &Segment::new(&d, &x),
@@ -282,6 +282,6 @@ mod tests {
             || 0.0,
             || Nodes { ends: [x.cast(); 2], middle: None },
         );
-        assert_eq!(chord.covector(0.0, &Canonical, &d), df);
+        assert_eq!(stable.covector(0.0, &Canonical, &d), df);
     }
 }

@@ -471,7 +471,7 @@ impl<V: Vector> Controller<V> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Method as _, Run};
+    use crate::Run;
     use metriplectic_dynamics::{AreaForm, Metriplectic, Nambu, System, system::Point};
     use metriplectic_fields::{Column as _, Real, Space as _};
     use metriplectic_manifolds::{Exponential, Retraction, Rotations, Sphere, WeylMidpoint};

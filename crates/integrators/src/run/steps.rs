@@ -348,7 +348,8 @@ impl<'a, F: Flow, M: Method<F>> Steps<'a, F, M> {
     /// [`StepError::DependentInvariants`] if one is no longer conserved because its differential depends
     /// on those of the others.
     fn check_invariants(&self, before: &State<F::Space>) -> Result<(), StepError> {
-        let broken = |balance: &crate::InvariantBalance| balance.max_error > LOST * balance.scale;
+        let broken =
+            |balance: &crate::InvariantBalance| balance.max_error > NOT_CONSERVED * balance.scale;
         if self.promises.invariants && self.certificate.invariants.iter().any(broken) {
             self.dependent(before).map_or(Ok(()), Err)
         } else {
@@ -367,7 +368,7 @@ const TRIES: usize = 3;
 
 /// The error of a further invariant, relative to its terms, above which it is no longer conserved. What
 /// fades out of `Π̃` stays far below it: `10⁻⁴h²`.
-const LOST: f64 = 1e-4;
+const NOT_CONSERVED: f64 = 1e-4;
 
 impl<F: Flow, M: Method<F>> Iterator for Steps<'_, F, M> {
     type Item = Result<State<F::Space>, StepError>;

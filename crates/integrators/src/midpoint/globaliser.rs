@@ -3,60 +3,68 @@
 //! It stalls far above round-off and costs many evaluations, so it only delivers a better guess;
 //! Newton's method polishes.
 
-use std::cell::Cell;
-use std::rc::Rc;
+use std::cell::{Cell, RefCell};
 
 use argmin::core::{CostFunction, Executor, Gradient};
 use argmin::solver::linesearch::MoreThuenteLineSearch;
 use argmin::solver::quasinewton::LBFGS;
 use metriplectic_fields::{Column, Space, Square, Vector};
 
-use crate::newton::{Equation, Linearised};
+use crate::newton::Equation;
 
 /// Iterations that a globaliser may take.
 const ITERATIONS: u64 = 100;
-/// Evaluations that it may take: a line search through a residual that is not smooth has no end of its
-/// own.
+/// Evaluations that it may take: a line search through a residual that is not smooth may never end.
 const EVALUATIONS: u32 = 1000;
 /// Pairs of differences that L-BFGS remembers.
 const MEMORY: usize = 7;
 
-/// `u ↦ ½|F(u)|²` and its gradient `Jᵀ F`.
-struct LeastSquares<'a, M: Space, E> {
-    equation: &'a E,
-    evaluations: Cell<u32>,
-    /// The least `|F(u)|` so far, and where.
-    best: Rc<Cell<(f64, Vector<M>)>>,
+/// The least squares at one point.
+struct Squares {
+    /// `|F(u)|`.
+    residual: f64,
+    /// `½|F(u)|²`.
+    cost: f64,
+    /// Its gradient `Jᵀ F`.
+    gradient: Vec<f64>,
 }
 
-impl<M: Space, E: Equation<M>> LeastSquares<'_, M, E> {
-    /// The equation at `u`, as long as there may be more evaluations.
-    fn at(&self, u: &[f64]) -> Result<Option<Linearised<M, E::Evidence>>, argmin::core::Error> {
+/// `u ↦ ½|F(u)|²`. The equation is behind a pointer, so that the minimisation is compiled once and not for
+/// every system.
+struct LeastSquares<'a> {
+    squares: &'a dyn Fn(&[f64]) -> Option<Squares>,
+    evaluations: Cell<u32>,
+    /// The least `|F(u)|` so far, and where.
+    best: &'a RefCell<(f64, Vec<f64>)>,
+}
+
+impl LeastSquares<'_> {
+    /// The squares at `u`, as long as there may be more evaluations.
+    fn at(&self, u: &[f64]) -> Result<Option<Squares>, argmin::core::Error> {
         self.evaluations.set(self.evaluations.get() + 1);
         if self.evaluations.get() > EVALUATIONS {
             return Err(argmin::core::Error::msg("no root is found in the evaluations allowed"));
         }
-        let u = column::<M>(u);
-        let at = self.equation.linearise(&u);
+        let at = (self.squares)(u);
         if let Some(at) = &at
-            && at.residual.magnitude() < self.best.get().0
+            && at.residual < self.best.borrow().0
         {
-            self.best.set((at.residual.magnitude(), u));
+            *self.best.borrow_mut() = (at.residual, u.to_vec());
         }
         Ok(at)
     }
 }
 
-impl<M: Space, E: Equation<M>> CostFunction for LeastSquares<'_, M, E> {
+impl CostFunction for LeastSquares<'_> {
     type Param = Vec<f64>;
     type Output = f64;
 
     fn cost(&self, u: &Vec<f64>) -> Result<f64, argmin::core::Error> {
-        Ok(self.at(u)?.map_or(f64::INFINITY, |at| 0.5 * at.residual.dot(&at.residual)))
+        Ok(self.at(u)?.map_or(f64::INFINITY, |at| at.cost))
     }
 }
 
-impl<M: Space, E: Equation<M>> Gradient for LeastSquares<'_, M, E> {
+impl Gradient for LeastSquares<'_> {
     type Param = Vec<f64>;
     type Gradient = Vec<f64>;
 
@@ -64,31 +72,38 @@ impl<M: Space, E: Equation<M>> Gradient for LeastSquares<'_, M, E> {
         let at = self.at(u)?;
         let at =
             at.ok_or_else(|| argmin::core::Error::msg("outside the domain of the equation"))?;
-        Ok(entries::<M>(&at.jacobian.transpose_times(&at.residual)))
+        Ok(at.gradient)
     }
 }
 
-/// A point with a smaller residual than `start`, if one is found.
-pub(crate) fn descend<M: Space>(
-    equation: &impl Equation<M>,
-    start: &Vector<M>,
-) -> Option<Vector<M>> {
-    let before = equation.linearise(start)?.residual.magnitude();
-    let (evaluations, best) = (Cell::new(0), Rc::new(Cell::new((before, *start))));
-    let problem = LeastSquares { equation, evaluations, best: Rc::clone(&best) };
+/// Where the residual is smaller than at `start`, if such a point is found.
+fn minimise(squares: &dyn Fn(&[f64]) -> Option<Squares>, start: Vec<f64>) -> Option<Vec<f64>> {
+    let before = squares(&start)?.residual;
+    let best = RefCell::new((before, start.clone()));
+    let problem = LeastSquares { squares, evaluations: Cell::new(0), best: &best };
     let solver = LBFGS::new(MoreThuenteLineSearch::new(), MEMORY);
     // How the search ends does not matter: what it has found counts, and is polished.
     let _ = Executor::new(problem, solver)
-        .configure(|state| state.param(entries::<M>(start)).max_iters(ITERATIONS))
+        .configure(|state| state.param(start).max_iters(ITERATIONS))
         .run();
-    let (after, u) = best.get();
+    let (after, u) = best.into_inner();
     (after < before).then_some(u)
 }
 
-fn column<M: Space>(entries: &[f64]) -> Vector<M> {
-    Vector::<M>::from_index(|i| entries[i])
-}
-
-fn entries<M: Space>(column: &Vector<M>) -> Vec<f64> {
-    (0..Vector::<M>::LEN).map(|i| column[i]).collect()
+/// A point with a smaller residual than `start`, if one is found.
+pub(super) fn descend<M: Space>(
+    equation: &impl Equation<M>,
+    start: &Vector<M>,
+) -> Option<Vector<M>> {
+    let squares = |u: &[f64]| {
+        let at = equation.linearise(&Vector::<M>::from_index(|i| u[i]))?;
+        let gradient = at.jacobian.transpose_times(&at.residual);
+        Some(Squares {
+            residual: at.residual.magnitude(),
+            cost: 0.5 * at.residual.dot(&at.residual),
+            gradient: (0..Vector::<M>::LEN).map(|i| gradient[i]).collect(),
+        })
+    };
+    let start = (0..Vector::<M>::LEN).map(|i| start[i]).collect();
+    minimise(&squares, start).map(|u| Vector::<M>::from_index(|i| u[i]))
 }

@@ -1,17 +1,17 @@
-//! Every equation of the paper: what computes it, and which test checks it.
+//! The equations of the paper, the code that computes each, and the test that checks it.
 //!
 //! The paper is A. Bloch, M. Farré Puiggalí and D. Martín de Diego, *Metriplectic Euler-Poincaré equations:
-//! smooth and discrete dynamics* ([arXiv:2401.05220](https://arxiv.org/abs/2401.05220)). The rows are in its order, under
-//! its headings; equations with a label are named by it. `†` marks an equation that is not as printed, with
-//! its derivation on the page [`errata`](super::errata). A test is given by its file and name; that each of them
-//! exists is itself a test (`tests/equations.rs::every_test_that_the_guide_names_exists`). What the library does
-//! not have says so.
+//! smooth and discrete dynamics* ([arXiv:2401.05220](https://arxiv.org/abs/2401.05220)). The rows follow the
+//! order and the headings of the paper. A labelled equation is named by its label. `†` marks an equation that differs
+//! from the printed one; its derivation is on the page [`errata`](super::errata). A test is given by its file and name.
+//! Another test checks that each of them exists
+//! (`tests/equations.rs::every_test_that_the_guide_names_exists`). A row says so if the library lacks the equation.
 //!
 //! # §1 Introduction
 //!
 //! | equation | in the library | checked by |
 //! |---|---|---|
-//! | `x' = Π(x) ∇H(x)`, `Π` skew, not necessarily Poisson | [`AlmostPoisson::field`](crate::dynamics::AlmostPoisson::field); of every other [`Bracket`](crate::dynamics::Bracket) the Jacobi identity is asked, and [`report`](crate::dynamics::Metriplectic::report) has its defect | `tests/nonholonomic.rs::the_sleigh_follows_its_closed_form_to_second_order_and_keeps_its_energy`, `tests/nonholonomic.rs::the_jacobi_identity_is_reported_and_not_asked_for` |
+//! | `x' = Π(x) ∇H(x)`, `Π` skew, not necessarily Poisson | [`AlmostPoisson::field`](crate::dynamics::AlmostPoisson::field); every other [`Bracket`](crate::dynamics::Bracket) must satisfy the Jacobi identity, and [`report`](crate::dynamics::Metriplectic::report) prints its defect | `tests/nonholonomic.rs::the_sleigh_follows_its_closed_form_to_second_order_and_keeps_its_energy`, `tests/nonholonomic.rs::the_jacobi_identity_is_reported_and_not_asked_for` |
 //! | `x' − x = h Π̄ ∇̄H` † | [`Scheme::step`](crate::integrators::Scheme::step) | `tests/errata.rs::a_step_without_its_size_is_a_step_of_size_one` |
 //!
 //! # §2.1 Poisson structures
@@ -47,7 +47,7 @@
 //! | `{f, g} = ⟨df, ♯_Π(dg)⟩`, `(f, g) = ⟨df, ♯_K(dg)⟩` | [`Bracket::apply`](crate::dynamics::Bracket::apply), [`Dissipation::apply`](crate::dynamics::Dissipation::apply) | `tests/equations.rs::a_hamiltonian_vector_field_is_the_bracket_with_the_energy`, `tests/equations.rs::the_form_of_the_metric_is_the_printed_one_on_each_line` |
 //! | `♯_K(dH) = 0` | [`verify`](crate::dynamics::Metriplectic::verify), and by construction for every [`Dissipation`](crate::dynamics::Dissipation) | `tests/laws.rs::each_law_of_a_dissipation_can_break` |
 //! | `♯_Π(dS) = 0` | [`verify`](crate::dynamics::Metriplectic::verify) | `tests/bad_input.rs::an_entropy_that_is_no_casimir_is_refused_unless_the_published_scheme_is_asked_for` |
-//! | `x' = ♯_Π(dE) + ♯_K(dE)`, `E = H + S` | `H` and `S` are kept apart; it is the same velocity | `tests/equations.rs::the_equations_of_motion_have_both_laws` |
+//! | `x' = ♯_Π(dE) + ♯_K(dE)`, `E = H + S` | `H` and `S` are separate; the velocity is the same | `tests/equations.rs::the_equations_of_motion_have_both_laws` |
 //! | `x' = X_H + grad^K S` | [`System`](crate::dynamics::System), [`Metriplectic::velocity`](crate::dynamics::Metriplectic::velocity) | `tests/equations.rs::the_equations_of_motion_have_both_laws` |
 //! | first law, `H' = {H, H} + (H, S) = 0` | [`Certificate::keeps_energy`](crate::integrators::Certificate::keeps_energy) | `tests/equations.rs::the_equations_of_motion_have_both_laws`, `tests/problems.rs::the_energy_is_kept_where_a_step_spans_two_radians` |
 //! | second law, `S' = (S, S) ≥ 0` | [`Certificate::keeps_entropy`](crate::integrators::Certificate::keeps_entropy) | `tests/equations.rs::the_equations_of_motion_have_both_laws` |
@@ -61,7 +61,7 @@
 //! | Poisson actions, `Φ_g^*{f, h} = {Φ_g^* f, Φ_g^* h}` | [`SystemBuilder::symmetry`](crate::dynamics::SystemBuilder::symmetry), checked as `T Π(x) Tᵀ = Π(Φ(x))` | `tests/equations.rs::an_action_is_checked_against_bracket_energy_and_momentum_map` |
 //! | momentum maps, `X_{J_ξ} = ξ_P`, `{f, J_ξ} = ξ_P(f)` | [`SystemBuilder::symmetry`](crate::dynamics::SystemBuilder::symmetry), checked as `Π dJ_ξ = dΦ_t/dt` | `tests/equations.rs::an_action_is_checked_against_bracket_energy_and_momentum_map`, `tests/errata.rs::the_momentum_of_a_body_is_a_covector_and_its_velocity_is_not_kept` |
 //! | `H∘Φ_g = H` makes `J_ξ` a first integral | [`SystemBuilder::momentum`](crate::dynamics::SystemBuilder::momentum), kept to round-off | `tests/errata.rs::a_momentum_is_kept_if_its_differential_is_annihilated` |
-//! | `(f, J_ξ) = 0`, `♯_K(dJ_ξ) = 0` † | by projection for [`MetricDissipation`](crate::dynamics::MetricDissipation); asked of any other one | `tests/errata.rs::a_momentum_is_kept_if_its_differential_is_annihilated` |
+//! | `(f, J_ξ) = 0`, `♯_K(dJ_ξ) = 0` † | by projection for [`MetricDissipation`](crate::dynamics::MetricDissipation); required of any other dissipation | `tests/errata.rs::a_momentum_is_kept_if_its_differential_is_annihilated` |
 //! | `dJ_ξ/dt = {J_ξ, H} + (J_ξ, S) = 0` | the same | `tests/errata.rs::a_momentum_is_kept_if_its_differential_is_annihilated` |
 //! | `P = T*G`, `Ψ_g = T*L_{g⁻¹}` † | [`Symplectic`](crate::dynamics::Symplectic) on `Product<Rotations, Euclidean<3>>` | `tests/errata.rs::the_pull_back_by_a_left_translation_acts_from_the_right`, `tests/errata.rs::before_reduction_the_entropy_is_no_casimir_and_a_function_of_the_momentum` |
 //!

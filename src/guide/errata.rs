@@ -84,9 +84,9 @@
 //!
 //! **A function where its differential is meant.** *Printed:* `(f, J_ξ) = 0` for all `f`, "or equivalently
 //! `♯_K(J_ξ) = 0`". *Correct:* `♯_K(dJ_ξ) = 0`, since `♯_K` acts on covectors and `J_ξ` is a number at each
-//! point. The condition is not automatic: an oscillator in the plane with a bath, `H = ½|q|² + ½|p|² + s`
-//! and `S = s`, is invariant under rotations together with its metric, yet (semid) gives
-//! `(J, S) = −G*(dH, dJ) = −2J`, so the angular momentum `J` decays as `exp(−2t)`, to 0.135 of its value at
+//! point. The condition is not automatic. An oscillator in the plane with a bath, `H = ½|q|² + ½|p|² + s`
+//! and `S = s`, is invariant under rotations, and so is its metric. Yet (semid) gives
+//! `(J, S) = −G*(dH, dJ) = −2J`. So the angular momentum `J` decays as `exp(−2t)`, to 0.135 of its value at
 //! `t = 1`. If `J` is one of the `L_a` of the remark,
 //! [`momentum`](crate::dynamics::SystemBuilder::momentum), it is conserved to round-off.
 //! (`tests/errata.rs::a_momentum_is_kept_if_its_differential_is_annihilated`)
@@ -146,9 +146,9 @@
 //! K(\alpha, \beta) = \kappa([\xi, \alpha], [\xi, \beta]), \quad \xi = dH ,
 //! ```
 //!
-//! which annihilates `dH` because `[ξ, ξ] = 0`. That is
-//! [`CasimirDissipation`](crate::dynamics::CasimirDissipation). `κ` itself in the place of `K` would give
-//! `H' = κ(dH, dC)`; for the body with `κ = 1` and `C = ½|p|²` this is `Ω·p = 2H`, 0.924 at the point of
+//! which annihilates `dH` because `[ξ, ξ] = 0`. This is
+//! [`CasimirDissipation`](crate::dynamics::CasimirDissipation). `κ` in the place of `K` would give
+//! `H' = κ(dH, dC)`. For the body with `κ = 1` and `C = ½|p|²` this is `Ω·p = 2H`, 0.924 at the point of
 //! the test. (On so(3) with `κ = 1` the `K` of `κ` is (semid), which invites the confusion. This `κ` is not the factor
 //! `κ(x)` above.)
 //! (`tests/errata.rs::the_form_on_the_algebra_is_not_the_form_on_covectors`)
@@ -165,9 +165,9 @@
 //! x + h f(x) + \tfrac{1}{2} h^2 f'(x) f(x) + O(h^3), \qquad f = \Pi\, dH + K\, dS .
 //! ```
 //!
-//! The second-order term `½ f' f` needs `Π` and `K` half a step later, but they are evaluated at `x`. With `z` in the
-//! middle of the geodesic and Gonzalez' covector, exchanging `x` with `x'` and `h` with `−h` gives the same
-//! equation, so the method is symmetric and its order even. The orders fitted on the spinning top of Celledoni,
+//! The second-order term `½ f' f` needs `Π` and `K` half a step later, but they are evaluated at `x`. Now let `z`
+//! be the middle of the geodesic and `w` Gonzalez' covector. Exchanging `x` with `x'` and `h` with `−h` gives the same
+//! equation. So the method is symmetric and its order even. The orders fitted on the spinning top of Celledoni,
 //! Eidnes, Owren and Ringholm ([arXiv:1805.07578](https://arxiv.org/abs/1805.07578)) are 1.00 and 2.00.
 //! (`tests/errata.rs::the_exponential_at_the_start_is_of_first_order`)
 //!
@@ -181,14 +181,15 @@
 //! ```
 //!
 //! and the last term is absent if `S` is quadratic and `P` flat, as in the example: there
-//! `ΔS = h K_d(dS(z), dS(z)) ≥ 0` exactly. Elsewhere the law fails where the entropy production is
-//! smaller than `h²`: two gas containers with a wall that hardly conducts (Shang and Öttinger 2020) lose
-//! entropy on 150 of 300 steps of `h = 0.1`, up to 1.4e-3 at once, and on 500 of 1200 of `h = 0.025`.
-//! Without conduction the largest loss in a step falls with the fitted order 3. The remedy is a discrete
-//! gradient `w_S` of `S` in the place of `dS(z)`, and the bracket `PΠPᵀ` with `Pᵀ` the projection off `w_S`:
-//! then `ΔS = h ⟨w_S, v⟩ = h K(w_S, w_S) ≥ 0`, and the order is 2 because `Π dS = 0` makes `P` a change of
+//! `ΔS = h K_d(dS(z), dS(z)) ≥ 0` exactly. In other cases the law fails if the entropy production is
+//! smaller than `h²`. Two gas containers with a wall that hardly conducts (Shang and Öttinger 2020) lose entropy on 150
+//! of 300 steps of `h = 0.1`, up to 1.4e-3 in a step. With `h = 0.025` they lose entropy on 500 of 1200 steps. Without
+//! conduction the largest loss in a step falls with the fitted order 3.
+//!
+//! The remedy is a discrete gradient `w_S` of `S` in the place of `dS(z)`, and the bracket `PΠPᵀ`, where `Pᵀ` projects
+//! off `w_S`. Then `ΔS = h ⟨w_S, v⟩ = h K(w_S, w_S) ≥ 0`. The order is 2, because `Π dS = 0` makes `P` a change of
 //! `O(h²)`. This is [`SecondLaw::Exact`](crate::dynamics::SecondLaw::Exact), the default (for a flat space, with
-//! other tensors, Romero 2009). With it the entropy of the containers falls on no step.
+//! other tensors, Romero 2009). It lowers the entropy of the containers on no step.
 //! (`tests/errata.rs::the_published_scheme_lowers_the_entropy_and_by_third_order_only`)
 //!
 //! **The factor in (semid-d).** *Printed:*
@@ -224,8 +225,8 @@
 //!
 //! **The arguments of the discrete gradient.** *Printed:* `∇̄₂H((P₁+p₁)/2, …) = (z₁/I₁, …)`. *Correct:*
 //! `∇̄₂H(p, P) = (z₁/I₁, …)`: a discrete gradient is a function of two points. The value is right, since the
-//! defect `H(P) − H(p) − ∇H(z)·(P − p)` vanishes for a quadratic `H`. Taken literally, as the gradient at the
-//! midpoint, it is no discrete gradient of any other energy: with `¼|p|⁴` added to `H` it misses the change
+//! defect `H(P) − H(p) − ∇H(z)·(P − p)` vanishes for a quadratic `H`. The gradient at the midpoint, as literally
+//! printed, is a discrete gradient only of a quadratic energy. With `¼|p|⁴` added to `H` it misses the change
 //! of the energy by `¼|P − p|² z·(P − p)`, −0.0170 in the test.
 //! (`tests/errata.rs::a_discrete_gradient_is_a_function_of_two_points`)
 //!
@@ -263,9 +264,9 @@
 //! **The last formula.** *Printed:* `R_h⁻¹(x_k, x_{k+1}) = Π(z_τ) ∇̄₂H + K_d(z) ∇C(z)`. *Correct:*
 //! `R_h⁻¹(x_k, x_{k+1}) = Π(z) w + K_d(z) dS(z)`. `z_τ` is not defined; the point is the `z` of the next line.
 //! `C` is the Casimir of §3, which is the entropy `S` here; and `K_d` acts on covectors. A gradient
-//! `∇S = g⁻¹dS` in its place would make the equation depend on coordinates and lose the second law: for
-//! `w = (1, 1, 0)`, `dS = (1, 0.2, 0)` on R³ entropy production is `K(dS, dS) = 0.64`; in the coordinate `3p_2` for
-//! `p_2`, with the metric pulled back, `⟨dS, K ∇S⟩ = −0.64`, and `K(dS, dS)` is 0.64 still.
+//! `∇S = g⁻¹dS` in its place would make the equation depend on coordinates and violate the second law. For
+//! `w = (1, 1, 0)`, `dS = (1, 0.2, 0)` on R³ the entropy production is `K(dS, dS) = 0.64`. Now replace the coordinate
+//! `p_2` by `3p_2` and pull back the metric: `⟨dS, K ∇S⟩ = −0.64`, and `K(dS, dS)` is still 0.64.
 //! (`tests/errata.rs::the_dissipation_acts_on_the_differential_and_not_on_the_gradient`)
 //!
 //! # Names only

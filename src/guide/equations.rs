@@ -92,7 +92,7 @@
 //! | `H' = ∇HᵀΠ∇H = 0` | [`Bracket`](crate::dynamics::Bracket) | `tests/laws.rs::each_law_of_a_bracket_can_break` |
 //! | (discGrad) `∇̄H·(x' − x) = ΔH`, `∇̄H(x, x) = ∇H(x)` | [`laws::discrete_gradient`](crate::integrators::laws::discrete_gradient) | `crates/integrators/src/laws.rs::the_discrete_gradient_keeps_its_laws` |
 //! | (AVF) `∫₀¹ ∇H((1−ξ)x + ξx') dξ` | [`MeanValue`](crate::integrators::MeanValue) | `tests/equations.rs::three_discrete_gradients_are_the_printed_ones`, `crates/integrators/src/laws.rs::the_discrete_gradient_keeps_its_laws` |
-//! | (gonzalez) `∇H(z) + (ΔH − ∇H(z)·d) d/\|d\|²` | [`Gonzalez`](crate::integrators::Gonzalez); safe against round-off, [`StableGradient`](crate::integrators::StableGradient) | `tests/equations.rs::three_discrete_gradients_are_the_printed_ones`, `crates/integrators/src/discrete_gradient/stable_gradient.rs::the_covector_keeps_its_digits_on_short_arcs` |
+//! | (gonzalez) `∇H(z) + (ΔH − ∇H(z)·d) d/\|d\|²` | [`Gonzalez`](crate::integrators::Gonzalez); safe against round-off, [`StableGradient`](crate::integrators::StableGradient) | `tests/equations.rs::three_discrete_gradients_are_the_printed_ones`, `crates/integrators/src/round_off/stable_gradient.rs::the_covector_keeps_its_digits_on_short_arcs` |
 //! | (itoAbe) quotients, one coordinate after another | [`ItohAbe`](crate::integrators::ItohAbe); symmetrised, [`SymmetricItohAbe`](crate::integrators::SymmetricItohAbe) | `tests/equations.rs::three_discrete_gradients_are_the_printed_ones`, `crates/integrators/src/laws.rs::the_discrete_gradient_keeps_its_laws` |
 //!
 //! # §4.2 Construction of metriplectic or generic integrators

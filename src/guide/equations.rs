@@ -12,7 +12,7 @@
 //! | equation | in the library | checked by |
 //! |---|---|---|
 //! | `x' = Π(x) ∇H(x)`, `Π` skew, not necessarily Poisson | [`AlmostPoisson::field`](crate::dynamics::AlmostPoisson::field); every other [`Bracket`](crate::dynamics::Bracket) must satisfy the Jacobi identity, and [`report`](crate::dynamics::Metriplectic::report) prints its defect | `tests/nonholonomic.rs::the_sleigh_follows_its_closed_form_to_second_order_and_keeps_its_energy`, `tests/nonholonomic.rs::the_jacobi_identity_is_reported_and_not_asked_for` |
-//! | `x' − x = h Π̄ ∇̄H` † | [`Scheme::step`](crate::integrators::Scheme::step) | `tests/errata.rs::a_step_without_its_size_is_a_step_of_size_one` |
+//! | `x' − x = h Π̄ ∇̄H` † | [`Scheme`](crate::integrators::Scheme), by [`Method::step`](crate::integrators::Method::step) | `tests/errata.rs::a_step_without_its_size_is_a_step_of_size_one` |
 //!
 //! # §2.1 Poisson structures
 //!

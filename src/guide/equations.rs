@@ -11,7 +11,7 @@
 //!
 //! | equation | in the library | checked by |
 //! |---|---|---|
-//! | `x' = Π(x) ∇H(x)`, `Π` skew, not necessarily Poisson | [`AlmostPoisson::field`](crate::dynamics::AlmostPoisson::field); every other [`Bracket`](crate::dynamics::Bracket) must satisfy the Jacobi identity, and [`report`](crate::dynamics::Metriplectic::report) prints its defect | `tests/nonholonomic.rs::the_sleigh_follows_its_closed_form_to_second_order_and_keeps_its_energy`, `tests/nonholonomic.rs::the_jacobi_identity_is_reported_and_not_asked_for` |
+//! | `x' = Π(x) ∇H(x)`, `Π` skew, not necessarily Poisson | [`AlmostPoisson::field`](crate::dynamics::AlmostPoisson::field); of every other [`Bracket`](crate::dynamics::Bracket) the Jacobi identity is asked, and [`report`](crate::dynamics::Metriplectic::report) has its defect | `tests/nonholonomic.rs::the_sleigh_follows_its_closed_form_to_second_order_and_keeps_its_energy`, `tests/nonholonomic.rs::the_jacobi_identity_is_reported_and_not_asked_for` |
 //! | `x' − x = h Π̄ ∇̄H` † | [`Scheme`](crate::integrators::Scheme), by [`Method::step`](crate::integrators::Method::step) | `tests/errata.rs::a_step_without_its_size_is_a_step_of_size_one` |
 //!
 //! # §2.1 Poisson structures
@@ -47,7 +47,7 @@
 //! | `{f, g} = ⟨df, ♯_Π(dg)⟩`, `(f, g) = ⟨df, ♯_K(dg)⟩` | [`Bracket::apply`](crate::dynamics::Bracket::apply), [`Dissipation::apply`](crate::dynamics::Dissipation::apply) | `tests/equations.rs::a_hamiltonian_vector_field_is_the_bracket_with_the_energy`, `tests/equations.rs::the_form_of_the_metric_is_the_printed_one_on_each_line` |
 //! | `♯_K(dH) = 0` | [`verify`](crate::dynamics::Metriplectic::verify), and by construction for every [`Dissipation`](crate::dynamics::Dissipation) | `tests/laws.rs::each_law_of_a_dissipation_can_break` |
 //! | `♯_Π(dS) = 0` | [`verify`](crate::dynamics::Metriplectic::verify) | `tests/bad_input.rs::an_entropy_that_is_no_casimir_is_refused_unless_the_published_scheme_is_asked_for` |
-//! | `x' = ♯_Π(dE) + ♯_K(dE)`, `E = H + S` | `H` and `S` are separate; the velocity is the same | `tests/equations.rs::the_equations_of_motion_have_both_laws` |
+//! | `x' = ♯_Π(dE) + ♯_K(dE)`, `E = H + S` | `H` and `S` are kept apart; it is the same velocity | `tests/equations.rs::the_equations_of_motion_have_both_laws` |
 //! | `x' = X_H + grad^K S` | [`System`](crate::dynamics::System), [`Metriplectic::velocity`](crate::dynamics::Metriplectic::velocity) | `tests/equations.rs::the_equations_of_motion_have_both_laws` |
 //! | first law, `H' = {H, H} + (H, S) = 0` | [`Certificate::keeps_energy`](crate::integrators::Certificate::keeps_energy) | `tests/equations.rs::the_equations_of_motion_have_both_laws`, `tests/problems.rs::the_energy_is_kept_where_a_step_spans_two_radians` |
 //! | second law, `S' = (S, S) ≥ 0` | [`Certificate::keeps_entropy`](crate::integrators::Certificate::keeps_entropy) | `tests/equations.rs::the_equations_of_motion_have_both_laws` |

@@ -102,6 +102,10 @@ features: (need "cargo hack --version" "cargo install cargo-hack --locked")
 msrv: (need ("rustup run " + msrv + " cargo --version") ("rustup toolchain install " + msrv + " --profile minimal"))
     cargo +{{ msrv }} check --workspace --all-features
 
+# check spelling and vocabulary: `_typos.toml` has the words to avoid and what to write instead
+words: (need "typos --version" "cargo install typos-cli --locked")
+    typos
+
 # check licenses, advisories and duplicate dependencies
 deny: (need "cargo deny --version" "cargo install cargo-deny --locked")
     cargo deny check

@@ -1,18 +1,18 @@
-//! Every equation of the paper: what computes it, and which test checks it.
+//! The equations of the paper, the code that computes each, and the test that checks it.
 //!
 //! The paper is A. Bloch, M. Farré Puiggalí and D. Martín de Diego, *Metriplectic Euler-Poincaré equations:
-//! smooth and discrete dynamics* ([arXiv:2401.05220](https://arxiv.org/abs/2401.05220)). The rows are in its order, under
-//! its headings; equations with a label are named by it. `†` marks an equation that is not as printed, with
-//! its derivation on the page [`errata`](super::errata). A test is given by its file and name; that each of them
-//! exists is itself a test (`tests/equations.rs::every_test_that_the_guide_names_exists`). What the library does
-//! not have says so.
+//! smooth and discrete dynamics* ([arXiv:2401.05220](https://arxiv.org/abs/2401.05220)). The rows follow the
+//! order and the headings of the paper. A labelled equation is named by its label. `†` marks an equation that differs
+//! from the printed one; its derivation is on the page [`errata`](super::errata). A test is given by its file and name.
+//! Another test checks that each of them exists
+//! (`tests/equations.rs::every_test_that_the_guide_names_exists`). A row says so if the library lacks the equation.
 //!
 //! # §1 Introduction
 //!
 //! | equation | in the library | checked by |
 //! |---|---|---|
 //! | `x' = Π(x) ∇H(x)`, `Π` skew, not necessarily Poisson | [`AlmostPoisson::field`](crate::dynamics::AlmostPoisson::field); of every other [`Bracket`](crate::dynamics::Bracket) the Jacobi identity is asked, and [`report`](crate::dynamics::Metriplectic::report) has its defect | `tests/nonholonomic.rs::the_sleigh_follows_its_closed_form_to_second_order_and_keeps_its_energy`, `tests/nonholonomic.rs::the_jacobi_identity_is_reported_and_not_asked_for` |
-//! | `x' − x = h Π̄ ∇̄H` † | [`Scheme::step`](crate::integrators::Scheme::step) | `tests/errata.rs::a_step_without_its_size_is_a_step_of_size_one` |
+//! | `x' − x = h Π̄ ∇̄H` † | [`Scheme`](crate::integrators::Scheme), by [`Method::step`](crate::integrators::Method::step) | `tests/errata.rs::a_step_without_its_size_is_a_step_of_size_one` |
 //!
 //! # §2.1 Poisson structures
 //!
@@ -61,7 +61,7 @@
 //! | Poisson actions, `Φ_g^*{f, h} = {Φ_g^* f, Φ_g^* h}` | [`SystemBuilder::symmetry`](crate::dynamics::SystemBuilder::symmetry), checked as `T Π(x) Tᵀ = Π(Φ(x))` | `tests/equations.rs::an_action_is_checked_against_bracket_energy_and_momentum_map` |
 //! | momentum maps, `X_{J_ξ} = ξ_P`, `{f, J_ξ} = ξ_P(f)` | [`SystemBuilder::symmetry`](crate::dynamics::SystemBuilder::symmetry), checked as `Π dJ_ξ = dΦ_t/dt` | `tests/equations.rs::an_action_is_checked_against_bracket_energy_and_momentum_map`, `tests/errata.rs::the_momentum_of_a_body_is_a_covector_and_its_velocity_is_not_kept` |
 //! | `H∘Φ_g = H` makes `J_ξ` a first integral | [`SystemBuilder::momentum`](crate::dynamics::SystemBuilder::momentum), kept to round-off | `tests/errata.rs::a_momentum_is_kept_if_its_differential_is_annihilated` |
-//! | `(f, J_ξ) = 0`, `♯_K(dJ_ξ) = 0` † | by projection for [`MetricDissipation`](crate::dynamics::MetricDissipation); asked of any other one | `tests/errata.rs::a_momentum_is_kept_if_its_differential_is_annihilated` |
+//! | `(f, J_ξ) = 0`, `♯_K(dJ_ξ) = 0` † | by projection for [`MetricDissipation`](crate::dynamics::MetricDissipation); required of any other dissipation | `tests/errata.rs::a_momentum_is_kept_if_its_differential_is_annihilated` |
 //! | `dJ_ξ/dt = {J_ξ, H} + (J_ξ, S) = 0` | the same | `tests/errata.rs::a_momentum_is_kept_if_its_differential_is_annihilated` |
 //! | `P = T*G`, `Ψ_g = T*L_{g⁻¹}` † | [`Symplectic`](crate::dynamics::Symplectic) on `Product<Rotations, Euclidean<3>>` | `tests/errata.rs::the_pull_back_by_a_left_translation_acts_from_the_right`, `tests/errata.rs::before_reduction_the_entropy_is_no_casimir_and_a_function_of_the_momentum` |
 //!
@@ -92,7 +92,7 @@
 //! | `H' = ∇HᵀΠ∇H = 0` | [`Bracket`](crate::dynamics::Bracket) | `tests/laws.rs::each_law_of_a_bracket_can_break` |
 //! | (discGrad) `∇̄H·(x' − x) = ΔH`, `∇̄H(x, x) = ∇H(x)` | [`laws::discrete_gradient`](crate::integrators::laws::discrete_gradient) | `crates/integrators/src/laws.rs::the_discrete_gradient_keeps_its_laws` |
 //! | (AVF) `∫₀¹ ∇H((1−ξ)x + ξx') dξ` | [`MeanValue`](crate::integrators::MeanValue) | `tests/equations.rs::three_discrete_gradients_are_the_printed_ones`, `crates/integrators/src/laws.rs::the_discrete_gradient_keeps_its_laws` |
-//! | (gonzalez) `∇H(z) + (ΔH − ∇H(z)·d) d/\|d\|²` | [`Gonzalez`](crate::integrators::Gonzalez); safe against round-off, [`StableGradient`](crate::integrators::StableGradient) | `tests/equations.rs::three_discrete_gradients_are_the_printed_ones`, `crates/integrators/src/discrete_gradient/chord.rs::the_covector_keeps_its_digits_on_short_arcs` |
+//! | (gonzalez) `∇H(z) + (ΔH − ∇H(z)·d) d/\|d\|²` | [`Gonzalez`](crate::integrators::Gonzalez); safe against round-off, [`StableGradient`](crate::integrators::StableGradient) | `tests/equations.rs::three_discrete_gradients_are_the_printed_ones`, `crates/integrators/src/round_off/stable_gradient.rs::the_covector_keeps_its_digits_on_short_arcs` |
 //! | (itoAbe) quotients, one coordinate after another | [`ItohAbe`](crate::integrators::ItohAbe); symmetrised, [`SymmetricItohAbe`](crate::integrators::SymmetricItohAbe) | `tests/equations.rs::three_discrete_gradients_are_the_printed_ones`, `crates/integrators/src/laws.rs::the_discrete_gradient_keeps_its_laws` |
 //!
 //! # §4.2 Construction of metriplectic or generic integrators
@@ -143,5 +143,5 @@
 //! | Nambu, `ε^{ijk} S_j H_k/√det g`; area form, `−ε^{ij} H_j/√det g` | [`Nambu`](crate::dynamics::Nambu), [`AreaForm`](type@crate::dynamics::AreaForm) | `tests/laws.rs::brackets_of_a_volume_form_keep_the_laws`, `tests/covariance.rs::a_nambu_step_on_rotations_is_the_same_in_rotation_vectors` |
 //! | with `n − 2` Casimirs, `det[dC_1, …, dC_{n−2}, dH, eⁱ]/√det g` | [`Nambu`](crate::dynamics::Nambu) | `tests/laws.rs::brackets_with_several_casimirs_keep_the_laws`, `tests/invariants.rs::the_velocity_of_a_bracket_with_two_casimirs_is_the_cross_product_of_the_space_around` |
 //! | Kulkarni-Nomizu product of two forms (Morrison and Updike 2024) | [`KulkarniNomizu`](crate::dynamics::KulkarniNomizu) | `tests/equations.rs::dissipations_beside_that_of_the_metric_keep_the_laws` |
-//! | `K(x, w)` from a closure; a semidefinite cometric; a scale `κ(x)` | [`FieldDissipation`](crate::dynamics::FieldDissipation), [`CometricDissipation`](crate::dynamics::CometricDissipation), [`Scaled`](crate::dynamics::Scaled) | `tests/dissipations.rs::a_closure_of_the_killed_covector_damps_an_oscillator_as_its_closed_form`, `tests/dissipations.rs::a_scaled_dissipation_relaxes_a_symmetric_body_on_time` |
+//! | `K(x, w)` from a closure; a semidefinite cometric; a scale `κ(x)` | [`FieldDissipation`](crate::dynamics::FieldDissipation), [`CometricDissipation`](crate::dynamics::CometricDissipation), [`Scaled`](crate::dynamics::Scaled) | `tests/dissipations.rs::a_closure_of_the_annihilated_covector_damps_an_oscillator_as_its_closed_form`, `tests/dissipations.rs::a_scaled_dissipation_relaxes_a_symmetric_body_on_time` |
 //! | `hv = 2 tan(θ/2)` on Sⁿ, `4 tan(θ/4)` on SO(3) | [`Projection`](crate::manifolds::Projection), [`Cayley`](crate::manifolds::Cayley) | `crates/manifolds/src/projection.rs::the_projection_of_the_sphere_keeps_the_laws`, `crates/manifolds/src/cayley.rs::the_cayley_retraction_keeps_the_laws` |

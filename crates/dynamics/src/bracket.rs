@@ -268,7 +268,7 @@ impl Poisson {
 /// Skew tensors of your own that need not be Poisson, as those of nonholonomic systems are not.
 ///
 /// The energy is conserved by skewness alone. The Jacobi identity is not asked for, and a
-/// [`report`](crate::Metriplectic::report) prints its defect without judging it.
+/// [`report`](crate::Verify::report) prints its defect without judging it.
 #[derive(Clone, Copy, Debug)]
 pub enum AlmostPoisson {}
 
@@ -277,11 +277,11 @@ impl AlmostPoisson {
     /// Schaft and Maschke 1994; Cantrijn, de León and Martín de Diego 1999).
     ///
     /// A blade on the plane that does not slip sideways, at `(x, y)` with the direction `θ`, the momentum
-    /// `p` along the blade, and the momentum `l` about it, is dg_v but not moved by a bracket with
+    /// `p` along the blade, and the momentum `l` about it, is turned but not moved by a bracket with
     /// `{x, p} = cos θ`, `{y, p} = sin θ`, `{θ, l} = 1`:
     ///
     /// ```
-    /// use metriplectic_dynamics::{AlmostPoisson, ModelError, Metriplectic, Poisson, System};
+    /// use metriplectic_dynamics::{AlmostPoisson, ModelError, Poisson, System, Verify};
     /// use metriplectic_fields::Real;
     /// use metriplectic_manifolds::Euclidean;
     /// use nalgebra::{SMatrix, SVector, vector};

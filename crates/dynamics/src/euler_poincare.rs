@@ -55,8 +55,9 @@ use metriplectic_fields::{Column, Factors, Jet1, Jet2, Scalar, ScalarField, Squa
 use metriplectic_manifolds::{Euclidean, LieDual};
 use nalgebra::{SMatrix, SVector};
 
+use crate::bracket::{Force, ForcedLiePoisson, LiePoisson};
+use crate::builder::SystemBuilder;
 use crate::dissipation::Choice;
-use crate::{Force, ForcedLiePoisson, LiePoisson, SystemBuilder};
 
 impl<G, K: Choice, H, S, I, const N: usize> SystemBuilder<LieDual<N>, G, LiePoisson, K, H, S, I> {
     /// The force `𝓕: g → g*` of the equations `μ' = ad*_ξ(μ + 𝓕(ξ))`, `ξ = dH`: a closure

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use crate::ModelError;
+use crate::model_error::ModelError;
 
 /// A law of the model, with its largest violation among the samples.
 #[derive(Clone, Debug, PartialEq)]
@@ -26,7 +26,7 @@ impl LawResidual {
 }
 
 /// The residual of every law of a model, and the first error if there is one; see
-/// [`Metriplectic::report`](crate::Metriplectic::report).
+/// [`Verify::report`](crate::Verify::report).
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Report {
@@ -36,7 +36,7 @@ pub struct Report {
     pub judged: usize,
     /// Points passed over, because a value was not finite there; each was drawn again, nearer to the start.
     pub passed_over: usize,
-    /// What [`Metriplectic::verify`](crate::Metriplectic::verify) says.
+    /// What [`Verify::verify`](crate::Verify::verify) says.
     pub verdict: Result<(), ModelError>,
 }
 

@@ -4,7 +4,7 @@ use metriplectic_dynamics::BuildError;
 use metriplectic_dynamics::{
     CasimirDissipation, CometricDissipation, Dissipation, FieldDissipation, KulkarniNomizu,
     MetricDissipation, Metriplectic, ModelError, NoDissipation, ProjectedDissipation, Scaled,
-    System, laws,
+    System, Verify, laws,
 };
 use metriplectic_fields::{ChartPoint, Column, Dimension, Real, Space, Square, Vector};
 use metriplectic_manifolds::{
@@ -269,11 +269,11 @@ proptest! {
     ) {
         let (se3, kappa) = (LieDual::se3(), c.transpose() * c);
         let k = CasimirDissipation::new(se3.algebra(), kappa)?;
-        let dg_v = se3.algebra().bracket(&xi, &dc);
-        prop_assert!((k.force(&xi, &dc) - kappa * dg_v).norm() <= 1e-13 * kappa.norm() * (1.0 + dg_v.norm()));
+        let turned = se3.algebra().bracket(&xi, &dc);
+        prop_assert!((k.force(&xi, &dc) - kappa * turned).norm() <= 1e-13 * kappa.norm() * (1.0 + turned.norm()));
         let x = ChartPoint::<LieDual<6>>::centre(&xi);
         let rate = dc.dot(&k.apply(&Canonical, &x, &xi, &dc).unwrap());
-        let expected = dg_v.dot(&(kappa * dg_v));
+        let expected = turned.dot(&(kappa * turned));
         prop_assert!((rate - expected).abs() <= 1e-13 * kappa.norm() * (xi.norm() * dc.norm()).powi(2));
     }
 

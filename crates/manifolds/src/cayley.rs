@@ -29,7 +29,7 @@ fn cayley<D: Scalar>(a: &Vector3<D>) -> Matrix3<D> {
 }
 
 /// `R cay(a)`, orthogonal to round-off.
-fn dg_v<D: Scalar>(r: &Matrix3<D>, a: &Vector3<D>) -> Matrix3<D> {
+fn turned<D: Scalar>(r: &Matrix3<D>, a: &Vector3<D>) -> Matrix3<D> {
     orthogonal(&(r * cayley(a)))
 }
 
@@ -41,16 +41,16 @@ impl<G: Riemannian<Rotations>> Retraction<Rotations, G> for Cayley {
         u: &Vector3<D>,
     ) -> Result<StepPath<Rotations, D>, MetricError> {
         let half = u * D::from(0.5);
-        let middle = dg_v(&Rotations::constant(x), &half);
+        let middle = turned(&Rotations::constant(x), &half);
         let z = ChartPoint::<Rotations, D>::around(&middle);
         // The body velocity u in the frame of the chart at z.
         let d = dexp_inverse(&z.q) * u;
-        Ok(StepPath { z, d, end: dg_v(&middle, &half) })
+        Ok(StepPath { z, d, end: turned(&middle, &half) })
     }
 
     fn end(&self, _: &G, x: &Matrix3<f64>, u: &Vector3<f64>) -> Result<Matrix3<f64>, MetricError> {
         let half = u * 0.5;
-        Ok(dg_v(&dg_v(x, &half), &half))
+        Ok(turned(&turned(x, &half), &half))
     }
 
     fn along(
@@ -61,7 +61,7 @@ impl<G: Riemannian<Rotations>> Retraction<Rotations, G> for Cayley {
     ) -> Result<Nodes<Rotations>, MetricError> {
         Nodes::of(|t| {
             let half = stretched::<Rotations>(&(u * 0.5), t);
-            Ok(dg_v(&dg_v(&Rotations::constant(x), &half), &half))
+            Ok(turned(&turned(&Rotations::constant(x), &half), &half))
         })
     }
 
@@ -80,7 +80,7 @@ impl<G: Riemannian<Rotations>> Retraction<Rotations, G> for Cayley {
         tangent: &Tangent<Rotations>,
     ) -> Result<PointPair<Rotations>, MetricError> {
         let half = tangent.vector * 0.5;
-        Ok((dg_v(&tangent.base, &-half), dg_v(&tangent.base, &half)))
+        Ok((turned(&tangent.base, &-half), turned(&tangent.base, &half)))
     }
 
     /// `d = 4 tan(θ/4)` about the axis of `xᵀy`, and `z` half way.

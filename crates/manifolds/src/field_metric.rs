@@ -393,13 +393,13 @@ mod tests {
         // Half a turn has two straight lines, and which one is found would be a matter of rounding.
         let body = Metric::field(|_: &Matrix3<Real>| Matrix3::identity());
         let r = rotations::exp(&vector![0.3, -0.2, 0.5]);
-        let dg_v = |angle: f64| r * rotations::exp(&(vector![2.0, -1.0, 2.0] / 3.0 * angle));
-        let log = Riemannian::<Rotations>::log(&body, &r, &dg_v(PI));
+        let turned = |angle: f64| r * rotations::exp(&(vector![2.0, -1.0, 2.0] / 3.0 * angle));
+        let log = Riemannian::<Rotations>::log(&body, &r, &turned(PI));
         assert!(
             matches!(log, Err(MetricError::OutOfChart { distance }) if (distance - PI).abs() < 1e-14)
         );
-        assert!(Riemannian::<Rotations>::log(&Canonical, &r, &dg_v(PI)).is_err());
-        let log = Riemannian::<Rotations>::log(&body, &r, &dg_v(PI - 1e-9)).unwrap();
+        assert!(Riemannian::<Rotations>::log(&Canonical, &r, &turned(PI)).is_err());
+        let log = Riemannian::<Rotations>::log(&body, &r, &turned(PI - 1e-9)).unwrap();
         assert!((log.norm() - (PI - 1e-9)).abs() < 1e-12);
     }
 

@@ -228,9 +228,9 @@ impl Space for Rotations {
     #[inline]
     fn seeds(x: &Matrix3<f64>) -> impl Fn(usize, usize) -> Matrix3<Real> {
         let x = *x;
-        let dg_v = [spun(&x, &Vector3::x()), spun(&x, &Vector3::y()), spun(&x, &Vector3::z())];
+        let turned = [spun(&x, &Vector3::x()), spun(&x, &Vector3::y()), spun(&x, &Vector3::z())];
         move |i, j| {
-            let turn = |k: usize, r, c| if k < 3 { dg_v[k][(r, c)] } else { 0.0 };
+            let turn = |k: usize, r, c| if k < 3 { turned[k][(r, c)] } else { 0.0 };
             let half = |k: usize, r| if k < 3 { 0.5 * x[(r, k)] } else { 0.0 };
             Matrix3::from_fn(|r, c| {
                 let mut bend = if i == j && i < 3 { -x[(r, c)] } else { 0.0 };
@@ -395,8 +395,8 @@ impl Riemannian<Rotations> for Canonical {
         let end = orthogonal(&(x.point() * exp(&omega)));
         let base = Rotations::real(&end);
         // The body velocity is constant; the chart at the end reads it by one more dual number.
-        let dg_v = end * hat(&omega);
-        let moved = end.zip_map(&dg_v, Dual::new);
+        let turned = end * hat(&omega);
+        let moved = end.zip_map(&turned, Dual::new);
         let q = Rotations::coordinates(&base, &moved);
         let at = ChartPoint { base, q: finite_column("a coordinate of the end", q.map(|q| q.re))? };
         Ok((at, q.map(|q| q.eps)))
@@ -617,10 +617,10 @@ mod tests {
             prop_assert!(Rotations.defect(&r) < 1e-15);
             prop_assert!((r - Rotations.from_quaternion((-q).into()).unwrap()).amax() < 1e-15);
             let v = vector![q[1], q[2], q[3]];
-            let dg_v = v * (2.0 * v.dot(&Vector3::x()))
+            let turned = v * (2.0 * v.dot(&Vector3::x()))
                 + Vector3::x() * (q[0] * q[0] - v.norm_squared())
                 + v.cross(&Vector3::x()) * (2.0 * q[0]);
-            prop_assert!((r.column(0) - dg_v).norm() < 1e-15);
+            prop_assert!((r.column(0) - turned).norm() < 1e-15);
             let back = Vector4::from(Rotations.to_quaternion(&r));
             prop_assert!(back[0] >= 0.0);
             prop_assert!((back - q * 1_f64.copysign(q[0])).norm() < 1e-15);

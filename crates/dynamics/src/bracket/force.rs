@@ -151,16 +151,16 @@ where
         let (force, slope) = self.0.jet1(w);
         let zero = SMatrix::<f64, N, N>::zeros();
         // ad*_δ 𝓕 = f δ with f_ba = C_ab^d 𝓕_d, and (ad*_w)_bd = C_ab^d w^a.
-        let (mut dg_v, mut coadjoint) = (zero, zero);
+        let (mut turned, mut coadjoint) = (zero, zero);
         for c in at.space.algebra().constants() {
-            dg_v[(c.b, c.a)] += c.value * force[c.d];
+            turned[(c.b, c.a)] += c.value * force[c.d];
             coadjoint[(c.b, c.d)] += c.value * w[c.a];
         }
         Ok(BracketJet {
             value: coadjoint * force,
             along_z: zero,
             along_s: zero,
-            tensor: dg_v + coadjoint * slope,
+            tensor: turned + coadjoint * slope,
         })
     }
 }

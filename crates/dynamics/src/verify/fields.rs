@@ -7,10 +7,12 @@ use metriplectic_manifolds::{Manifold, Riemannian};
 
 use super::balance::pairs;
 use super::derivatives::{Derivatives, Mismatch, OF_CLOSURES, OF_SOLUTIONS};
-use super::{Dim, Place, unusable};
+use super::place::{Place, unusable};
+use crate::bracket::Bracket;
+use crate::dissipation::Dissipation;
 use crate::invariants::{Invariants, Kind, Visitor};
-use crate::system::Metriplectic;
-use crate::{Bracket, Dissipation, ModelError};
+use crate::metriplectic::{Dim, Metriplectic};
+use crate::model_error::ModelError;
 
 /// Compares the derivatives of the fields, of the metric, and of the bracket along one axis of the chart.
 ///

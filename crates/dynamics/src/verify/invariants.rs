@@ -5,10 +5,14 @@ use metriplectic_fields::{
 };
 
 use super::balance::{self, Balance, TOLERANCE, pairs, worse};
-use super::{Dim, Findings, Place, jet, sampling, unusable};
+use super::findings::Findings;
+use super::place::{Place, jet, unusable};
+use super::sampling;
+use crate::bracket::Bracket;
+use crate::dissipation::Dissipation;
 use crate::invariants::{Action, Invariants, Kind, Visitor};
-use crate::system::{Metriplectic, Point};
-use crate::{Bracket, Dissipation, ModelError};
+use crate::metriplectic::{Dim, Metriplectic, Point};
+use crate::model_error::ModelError;
 
 /// Each further invariant has finite derivatives, is conserved for the reason it is listed for, and
 /// the dissipation leaves it alone.

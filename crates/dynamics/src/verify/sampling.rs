@@ -5,7 +5,7 @@ use metriplectic_manifolds::Manifold;
 use rand::RngExt;
 use rand::rngs::ChaCha8Rng;
 
-use crate::system::{Metriplectic, Point};
+use crate::metriplectic::{Metriplectic, Point};
 
 /// How often a sample is drawn nearer to the start, by a quarter, until the model has values there.
 const DRAWS: i32 = 12;
@@ -15,14 +15,14 @@ const NEGLIGIBLE: f64 = 1e-6;
 
 /// The sizes of a state: one number for each direction of the chart, in the unit of its entry.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Sizes<M: Space> {
+pub(crate) struct CoordinateScales<M: Space> {
     /// The sizes that round-off and difference quotients are relative to. None is zero.
     pub(crate) units: Vector<M>,
     /// The same, but the entry's own size however small it is, unless it is zero.
     own: Vector<M>,
 }
 
-impl<M: Manifold> Sizes<M> {
+impl<M: Manifold> CoordinateScales<M> {
     /// The sizes at `x`.
     ///
     /// An entry has its own [size](Manifold::scales). One that is zero, or as good as zero, has none:

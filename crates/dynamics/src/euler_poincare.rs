@@ -51,6 +51,7 @@
 
 use std::fmt;
 
+use metriplectic_fields::newton::{self, Cause, Limits, Problem, Progress};
 use metriplectic_fields::{Column, Factors, Jet1, Jet2, Scalar, ScalarField, Square};
 use metriplectic_manifolds::{Euclidean, LieDual};
 use nalgebra::{SMatrix, SVector};
@@ -117,9 +118,8 @@ impl<L, const N: usize> fmt::Debug for Legendre<L, N> {
     }
 }
 
-/// Corrections that Newton's method may take, and halvings of one that comes no closer.
-const SWEEPS: usize = 100;
-const HALVINGS: usize = 40;
+/// What Newton's method may take. A correction is tried at 40 lengths.
+const LIMITS: Limits = Limits { iterations: 100, halvings: 39 };
 
 /// A Hessian is degenerate if its reciprocal condition number is below this: not a digit of a
 /// solution would be right.
@@ -150,28 +150,9 @@ impl<L: ScalarField<Euclidean<N>>, const N: usize> Legendre<L, N> {
     /// [`LegendreError`] if `l` is not a number on the way, if its Hessian is degenerate, or if there
     /// is no such `ξ` that is found.
     pub fn velocity(&self, mu: &SVector<f64, N>) -> Result<SVector<f64, N>, LegendreError> {
-        let mut xi = self.start;
-        let mut jet = self.finite_jet(&xi).ok_or_else(|| not_finite(&xi))?;
-        for iterations in 0..SWEEPS {
-            let off = mu - jet.df;
-            let step = regular(&jet.hf, &xi)? * off;
-            let next = xi + step;
-            // Newton squares the relative error, so this correction is the last; and so it is at the
-            // rounding of dl.
-            let rounding = 16.0 * f64::EPSILON * (mu.norm() + jet.hf.norm() * xi.norm());
-            if step.norm() <= f64::EPSILON.sqrt() * next.norm() || off.norm() <= rounding {
-                return Ok(next);
-            }
-            let missed = LegendreError::NoVelocity { residual: off.norm(), iterations };
-            (xi, jet) = (0..HALVINGS)
-                .find_map(|k| {
-                    let next = xi + step * 0.5_f64.powi(i32::try_from(k).ok()?);
-                    let jet = self.finite_jet(&next)?;
-                    ((mu - jet.df).norm() < off.norm()).then_some((next, jet))
-                })
-                .ok_or(missed)?;
-        }
-        Err(LegendreError::NoVelocity { residual: (mu - jet.df).norm(), iterations: SWEEPS })
+        let problem = Inversion { legendre: self, mu };
+        let start = self.finite_jet(&self.start).ok_or_else(|| not_finite(&self.start))?;
+        newton::solve(&problem, (self.start, start), LIMITS)
     }
 
     /// The jet of `l`, if it is a number.
@@ -182,6 +163,54 @@ impl<L: ScalarField<Euclidean<N>>, const N: usize> Legendre<L, N> {
     /// `ξ(μ)`, or not a number.
     fn velocity_or_nan(&self, mu: &SVector<f64, N>) -> SVector<f64, N> {
         self.velocity(mu).unwrap_or_else(|_| SVector::repeat(f64::NAN))
+    }
+}
+
+/// The equation `∂l/∂ξ = μ`, to be solved for `ξ`.
+struct Inversion<'a, L, const N: usize> {
+    legendre: &'a Legendre<L, N>,
+    mu: &'a SVector<f64, N>,
+}
+
+impl<L: ScalarField<Euclidean<N>>, const N: usize> Problem for Inversion<'_, L, N> {
+    type Iterate = (SVector<f64, N>, Jet2<Euclidean<N>>);
+    type Correction = SVector<f64, N>;
+    type Root = SVector<f64, N>;
+    type Error = LegendreError;
+
+    fn correct(
+        &self,
+        (xi, jet): &Self::Iterate,
+    ) -> Result<Progress<Self::Root, Self::Correction>, LegendreError> {
+        let error = self.mu - jet.df;
+        let step = regular(&jet.hf, xi)? * error;
+        let next = xi + step;
+        // Newton's method squares the relative error, so this correction is the last one; and so it is at
+        // the rounding of dl.
+        let rounding = 16.0 * f64::EPSILON * (self.mu.norm() + jet.hf.norm() * xi.norm());
+        let last = step.norm() <= f64::EPSILON.sqrt() * next.norm() || error.norm() <= rounding;
+        Ok(if last { Progress::Root(next) } else { Progress::Correction(step, 1.0) })
+    }
+
+    fn advance(
+        &self,
+        (xi, jet): &Self::Iterate,
+        step: &SVector<f64, N>,
+        length: f64,
+    ) -> Option<Self::Iterate> {
+        let next = xi + step * length;
+        let next_jet = self.legendre.finite_jet(&next)?;
+        let closer = (self.mu - next_jet.df).norm() < (self.mu - jet.df).norm();
+        closer.then_some((next, next_jet))
+    }
+
+    fn stop(
+        &self,
+        (_, jet): Self::Iterate,
+        _: Cause,
+        iterations: usize,
+    ) -> Result<Self::Root, LegendreError> {
+        Err(LegendreError::NoVelocity { residual: (self.mu - jet.df).norm(), iterations })
     }
 }
 

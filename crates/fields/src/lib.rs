@@ -8,6 +8,7 @@
 //! | [`field`](mod@field) | [`ScalarField`] (`H`, `S`) and [`MatrixField`] (`g`, `Π`) |
 //! | [`closure`](mod@closure) | ordinary closures are fields, lifted to every scalar of order ≤ 2 |
 //! | [`differential`](mod@differential) | differential, Hessian and Jacobian at any scalar |
+//! | [`newton`] | damped Newton iterations, for unknowns of any kind |
 //! | [`series`] | the functions of a small angle, right under dual numbers |
 //! | [`laws`] | what a field promises, and the function that checks it |
 //!
@@ -29,6 +30,7 @@ pub mod differential;
 pub mod dimension;
 pub mod field;
 pub mod laws;
+pub mod newton;
 pub mod scalar;
 pub mod series;
 pub mod space;

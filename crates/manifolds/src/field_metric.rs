@@ -1,15 +1,14 @@
 //! A metric from a closure, with numerical geodesics.
 
-use std::cell::Cell;
 use std::fmt;
 
 use metriplectic_fields::{
-    ChartPoint, Column, Dimension, Matrix, MatrixField, Real, Scalar, Space, Square, Vector,
+    ChartPoint, Column, Dimension, Matrix, MatrixField, Real, Scalar, Square, Vector,
 };
 
 use crate::geodesic::{self, GeodesicJet};
-use crate::metric::{Factored, GeodesicEnd, MetricError, finite};
-use crate::{Manifold, Riemannian, StepPath, StepPathJet};
+use crate::metric::{Factored, GeodesicEnd, MetricError};
+use crate::{Manifold, Riemannian, StepPath, StepPathJet, shooting};
 
 /// A metric given as a matrix field; see [`Metric::field`](crate::Metric::field).
 #[derive(Clone, Copy)]
@@ -86,7 +85,7 @@ impl<M: Manifold, F: MatrixField<M>> Riemannian<M> for FieldMetric<F> {
     /// at the other one does not reach is refused ([`MetricError::OutOfChart`]): the antipode, and a
     /// rotation half a turn away.
     fn log(&self, x: &M::Point<f64>, y: &M::Point<f64>) -> Result<Vector<M>, MetricError> {
-        shoot(self, x, y)
+        shooting::log(self, &self.field, x, y)
     }
 
     fn weyl_jet(&self, x: &M::Point<f64>, d: &Vector<M>) -> Result<StepPathJet<M>, MetricError> {
@@ -125,129 +124,6 @@ fn on_first_half(error: MetricError) -> MetricError {
 
 fn on_second_half(error: MetricError) -> MetricError {
     error.on_part(0.5, 0.5)
-}
-
-/// Geodesics that a logarithm may follow.
-const SHOTS: u32 = 500;
-/// Corrections that one shot of a logarithm may take.
-const CORRECTIONS: usize = 16;
-/// Halvings of a correction that comes no closer: none at first, while there is a better aim to be had.
-const EAGER: usize = 0;
-const PATIENT: usize = 6;
-/// Stages of the continuation of a logarithm, until it is given up.
-const STAGES: [u32; 3] = [4, 16, 64];
-
-/// The logarithm by shooting: Newton's method for `exp_x(v) = y`, aimed along the straight line of the
-/// chart. If it does not get there, the line is relaxed to a short path, which aims again; and then the
-/// end is moved from `x` to `y` in stages, each shot aimed by the one before.
-fn shoot<M: Manifold, F: MatrixField<M>>(
-    metric: &FieldMetric<F>,
-    x: &M::Point<f64>,
-    y: &M::Point<f64>,
-) -> Result<Vector<M>, MetricError> {
-    let shots = Cell::new(0);
-    let straight = line::<M>(x, y)?;
-    let aim = straight * stretch(metric, x, &straight);
-    let mut last = hit(metric, (x, y), &aim, EAGER, &shots);
-    #[cfg(feature = "argmin")]
-    if last.is_err()
-        && let Some(aim) = crate::path::aim(&metric.field, x, &straight)
-    {
-        last = hit(metric, (x, y), &aim, PATIENT, &shots).or(last);
-    }
-    for stages in STAGES {
-        if last.is_ok() || shots.get() >= SHOTS {
-            break;
-        }
-        let mut v = straight * f64::from(stages).recip();
-        last = (1..=stages).try_fold(v, |_, stage| {
-            let target = M::chart(x, &(straight * (f64::from(stage) / f64::from(stages))));
-            let grown = f64::from(stage) / f64::from((stage - 1).max(1));
-            v = hit(metric, (x, &target), &(v * grown), PATIENT, &shots)?;
-            Ok(v)
-        });
-    }
-    last
-}
-
-/// The straight line of the chart from `x` to `y`, if there is one and no other.
-///
-/// # Errors
-///
-/// [`MetricError::NotFinite`] if a point is not, and [`MetricError::OutOfChart`] at the edge of the
-/// chart, of which [`is_near`](Space::is_near) accepts the half: beyond it a line of other coordinates
-/// leads to the same point, as at half a turn on SO(3), and aims at another geodesic.
-fn line<M: Manifold>(x: &M::Point<f64>, y: &M::Point<f64>) -> Result<Vector<M>, MetricError> {
-    for entry in M::entries(x).into_iter().chain(M::entries(y)) {
-        finite("an entry of a point", entry)?;
-    }
-    let straight = M::coordinates(x, y);
-    // Half of it, and the rounding of half a turn.
-    if straight.is_finite() && M::is_near(&(straight * (0.5 + f64::EPSILON))) {
-        Ok(straight)
-    } else {
-        Err(MetricError::OutOfChart { distance: straight.magnitude() })
-    }
-}
-
-/// The length of the straight line of the chart, over that of its velocity at the start: where the
-/// metric changes much along the line, an aim with the length of the line is the better one.
-fn stretch<M: Space, G: Riemannian<M>>(metric: &G, x: &M::Point<f64>, line: &Vector<M>) -> f64 {
-    const PIECES: u32 = 16;
-    let speed = |t: f64| {
-        let at = ChartPoint::<M> { base: x.clone(), q: *line * t };
-        let g: Matrix<M> = metric.matrix(&at);
-        line.dot(&(g * *line)).sqrt()
-    };
-    let middles = (0..PIECES).map(|k| speed((f64::from(k) + 0.5) / f64::from(PIECES)));
-    let stretch = middles.sum::<f64>() / (f64::from(PIECES) * speed(0.0));
-    if stretch.is_finite() && stretch > 0.0 { stretch } else { 1.0 }
-}
-
-/// Newton's method for `exp_x(v) = y`, damped, from a first aim. The end is hit to the rounding of the
-/// coordinates of the chart.
-fn hit<M: Manifold, G: Riemannian<M>>(
-    metric: &G,
-    (x, y): (&M::Point<f64>, &M::Point<f64>),
-    aim: &Vector<M>,
-    halvings: usize,
-    shots: &Cell<u32>,
-) -> Result<Vector<M>, MetricError> {
-    let size = M::coordinates(x, y).magnitude();
-    let scales = M::scales(x);
-    let rounded = size + (0..M::Dim::LEN).map(|i| scales[i]).fold(0.0, f64::max);
-    let miss = |v: &Vector<M>| {
-        shots.set(shots.get() + 1);
-        if shots.get() > SHOTS {
-            return Err(MetricError::NoLogarithm { distance: size, missed_by: size });
-        }
-        let StepPathJet { end, dend, .. } = metric.weyl_jet(x, v)?;
-        Ok::<_, MetricError>((M::coordinates(&end, y), dend))
-    };
-    let mut v = *aim;
-    let (mut off, mut slope) = miss(&v)?;
-    for _ in 0..CORRECTIONS {
-        if off.magnitude() <= 4.0 * f64::EPSILON * rounded {
-            return Ok(v);
-        }
-        let missed = MetricError::NoLogarithm { distance: size, missed_by: off.magnitude() };
-        let correction = slope.solve(&off).ok_or(missed)?;
-        // A correction longer than the vector itself is not to be believed.
-        let mut length = (v.magnitude() / correction.magnitude()).min(1.0);
-        let closer = (0..=halvings).find_map(|_| {
-            let next = v + correction * length;
-            length *= 0.5;
-            let (off_next, slope_next) = miss(&next).ok()?;
-            (off_next.magnitude() < off.magnitude()).then_some((next, off_next, slope_next))
-        });
-        match closer {
-            Some(next) => (v, off, slope) = next,
-            // The geodesic itself is good to 1e-13: a stall there is the end.
-            None if off.magnitude() <= 1e-12 * rounded => return Ok(v),
-            None => return Err(missed),
-        }
-    }
-    Err(MetricError::NoLogarithm { distance: size, missed_by: off.magnitude() })
 }
 
 #[cfg(test)]

@@ -45,6 +45,7 @@ pub mod product;
 pub mod projection;
 pub mod retraction;
 pub mod rotations;
+mod shooting;
 pub mod sphere;
 pub mod weyl_midpoint;
 

@@ -24,6 +24,10 @@ pub trait InnerProduct<V>: Copy {
     fn orthonormal(&self, alpha: &V) -> V;
 
     /// The vector `L⁻ᵀ a` with the orthonormal components `a`.
+    #[allow(
+        clippy::wrong_self_convention,
+        reason = "the inverse of `orthonormal`; the inner product converts, and is not what is made"
+    )]
     fn from_orthonormal(&self, a: &V) -> V;
 
     /// The vector `♯α = g⁻¹α`.

@@ -20,7 +20,8 @@
 //! | [`metriplectic`] | [`Metriplectic`]: the parts of a system |
 //! | [`system`] | [`System`], which holds these parts |
 //! | [`builder`] | [`SystemBuilder`], which makes it |
-//! | [`euler_poincare`] | [`Legendre`]: a reduced Lagrangian on a Lie algebra, as an energy on its dual |
+//! | [`legendre`] | [`Legendre`]: a reduced Lagrangian on a Lie algebra, as an energy on its dual |
+//! | [`euler_poincare`] | `.lagrangian(..)` and `.force(..)` of the builder |
 //! | [`velocity`](mod@velocity) | `Π w_H + K w_S` for given covectors: differentials, or discrete gradients |
 //! | [`verify`] | the laws of a model, sampled |
 //! | [`laws`] | what brackets and dissipations promise, and the functions that check it |
@@ -31,6 +32,7 @@ pub mod dissipation;
 pub mod euler_poincare;
 pub mod invariants;
 pub mod laws;
+pub mod legendre;
 pub mod metriplectic;
 pub mod model_error;
 pub mod orthogonal;
@@ -52,8 +54,8 @@ pub use dissipation::{
     CasimirDissipation, CometricDissipation, Dissipation, DissipationJet, FieldDissipation,
     FormError, KulkarniNomizu, MetricDissipation, NoDissipation, ProjectedDissipation, Scaled,
 };
-pub use euler_poincare::{Legendre, LegendreError};
 pub use invariants::Invariants;
+pub use legendre::{Legendre, LegendreError};
 pub use metriplectic::{Metriplectic, Point, SecondLaw};
 pub use model_error::ModelError;
 pub use report::{LawResidual, Report};

@@ -6,7 +6,9 @@ use metriplectic_fields::{
     ChartPoint, Column, Dimension, Matrix, MatrixField, Real, Scalar, Square, Vector,
 };
 
-use crate::geodesic::{self, GeodesicJet};
+use crate::chart_metric;
+use crate::geodesic;
+use crate::geodesic_jet::{self, GeodesicJet};
 use crate::metric::{Factored, GeodesicEnd, MetricError};
 use crate::{Manifold, Riemannian, StepPath, StepPathJet, shooting};
 
@@ -32,11 +34,11 @@ impl<M: Manifold, F: MatrixField<M>> Riemannian<M> for FieldMetric<F> {
     type At<D: Scalar> = Factored<M::Dim, D>;
 
     fn at<D: Scalar>(&self, x: &ChartPoint<M, D>) -> Result<Self::At<D>, MetricError> {
-        Factored::new(geodesic::metric(&self.field, x))
+        Factored::new(chart_metric::metric(&self.field, x))
     }
 
     fn matrix<D: Scalar>(&self, x: &ChartPoint<M, D>) -> Matrix<M, D> {
-        geodesic::metric(&self.field, x)
+        chart_metric::metric(&self.field, x)
     }
 
     fn exp<D: Scalar>(
@@ -73,7 +75,7 @@ impl<M: Manifold, F: MatrixField<M>> Riemannian<M> for FieldMetric<F> {
             (x.clone(), *v)
         };
         let bend = geodesic::acceleration(&self.field, &here, &velocity).ok_or_else(|| {
-            let g = geodesic::metric(&self.field, &ChartPoint::<M>::centre(&here));
+            let g = chart_metric::metric(&self.field, &ChartPoint::<M>::centre(&here));
             MetricError::stopped(t, &g).unwrap_or(MetricError::Edge { time: t })
         })?;
         let jet =
@@ -95,8 +97,8 @@ impl<M: Manifold, F: MatrixField<M>> Riemannian<M> for FieldMetric<F> {
             dpoint: Matrix::<M>::zeros(),
             dvelocity: Matrix::<M>::one() * 0.5,
         };
-        let z = geodesic::follow_jet(&self.field, &half).map_err(on_first_half)?;
-        let end = geodesic::follow_jet(&self.field, &z).map_err(on_second_half)?;
+        let z = geodesic_jet::follow(&self.field, &half).map_err(on_first_half)?;
+        let end = geodesic_jet::follow(&self.field, &z).map_err(on_second_half)?;
         // The path itself is the one without derivatives, with its roundings.
         let path = self.weyl_arc(x, d)?;
         Ok(StepPathJet {

@@ -3,7 +3,8 @@
 use metriplectic_fields::{ChartPoint, Dimension, Matrix, Real, Scalar, Space, Square, Vector};
 use nalgebra::{Const, SMatrix};
 
-use crate::metric::{Factored, GeodesicEnd, MetricError, finite_column, stretched};
+use crate::metric::{Factored, GeodesicEnd, MetricError, stretched};
+use crate::metric_error::finite_column;
 use crate::{Canonical, Riemannian, StepPath, StepPathJet};
 
 /// A manifold whose charts are global and linear: straight lines are the geodesics of every metric

@@ -27,23 +27,30 @@
 
 pub mod cayley;
 pub mod chart;
+mod chart_metric;
 pub mod euclidean;
 pub mod exponential;
 mod extrapolation;
 pub mod field_metric;
 pub mod flat;
 mod geodesic;
+mod geodesic_jet;
 pub mod half_line;
+pub mod inner_product;
 pub mod laws;
+pub mod lie_algebra;
 pub mod lie_dual;
 pub mod manifold;
 pub mod metric;
+pub mod metric_error;
 pub mod normal;
 #[cfg(feature = "argmin")]
 mod path;
 pub mod product;
+pub mod product_metric;
 pub mod projection;
 pub mod retraction;
+pub mod rotation_vector;
 pub mod rotations;
 mod shooting;
 pub mod sphere;

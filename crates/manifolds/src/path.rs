@@ -17,7 +17,8 @@ use metriplectic_fields::{
 use nalgebra::{DMatrix, DVector};
 
 use crate::Manifold;
-use crate::geodesic::{self, GeodesicJet};
+use crate::chart_metric;
+use crate::geodesic_jet::{self, GeodesicJet};
 
 /// Pieces of the path.
 const PIECES: usize = 24;
@@ -62,7 +63,7 @@ impl<M: Space, F: MatrixField<M>> PathEnergy<'_, M, F> {
     /// A piece, and the metric with its derivatives in its middle.
     fn piece(&self, path: &[f64], k: usize) -> (Vector<M>, MatrixJet<M>) {
         let (a, b) = (self.corner(path, k), self.corner(path, k + 1));
-        (b - a, geodesic::metric_jet(self.field, self.x, &((a + b) * 0.5)))
+        (b - a, chart_metric::metric_jet(self.field, self.x, &((a + b) * 0.5)))
     }
 }
 
@@ -265,7 +266,7 @@ fn shots<M: Manifold>(
     let (zero, one) = (Matrix::<M>::zeros(), Matrix::<M>::one());
     let shot = |dpoint, dvelocity| {
         let start = GeodesicJet { point: x.clone(), velocity: *v, dpoint, dvelocity };
-        geodesic::follow_jet(field, &start).ok()
+        geodesic_jet::follow(field, &start).ok()
     };
     Some((shot(one, zero)?, shot(zero, one)?))
 }

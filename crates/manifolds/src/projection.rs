@@ -4,7 +4,8 @@ use metriplectic_fields::{ChartPoint, Column, Scalar, Space};
 use nalgebra::SVector;
 use num_dual::Dual;
 
-use crate::metric::{MetricError, finite_column, stretched, within};
+use crate::metric::{MetricError, stretched};
+use crate::metric_error::{finite_column, within};
 use crate::retraction::jet_by_dual_numbers;
 use crate::sphere::{angle, components, frame, normalised, spread};
 use crate::{Nodes, PointPair, Retraction, Riemannian, Sphere, StepPath, StepPathJet, Tangent};

@@ -7,7 +7,7 @@ use metriplectic_fields::{
     ChartPoint, Column, Dimension, Matrix, MatrixField, Space, Square, Vector,
 };
 
-use crate::metric::{MetricError, finite};
+use crate::metric_error::{MetricError, finite};
 use crate::{Manifold, Riemannian, StepPathJet};
 
 /// Geodesics that a logarithm may follow.

@@ -44,7 +44,8 @@ use nalgebra::{Const, SMatrix, SVector};
 use num_dual::{Dual, Dual64};
 use rand::{Rng, RngExt};
 
-use crate::metric::{GeodesicEnd, MetricError, finite_column, within};
+use crate::metric::{GeodesicEnd, MetricError};
+use crate::metric_error::{finite_column, within};
 use crate::normal::Normal;
 use crate::{Canonical, Manifold, Riemannian, StepPath, StepPathJet};
 

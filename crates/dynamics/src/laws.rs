@@ -52,19 +52,19 @@ pub fn bracket<Y: Metriplectic>(
     let jet = bracket.linearise(&args, alpha).map_err(exists)?;
     let defined = by_dual_numbers_bracket(bracket, &args, alpha).map_err(exists)?;
     let size = tensor_size * (alpha.magnitude() + beta.magnitude());
-    let off = (defined.value - jet.value).magnitude();
-    BrokenLaw::unless("linearise has the value of apply", off, round_off(size))?;
-    let off = (defined.tensor - jet.tensor).max_abs();
-    BrokenLaw::unless("linearise has the tensor of apply", off, round_off(tensor_size))?;
+    let error = (defined.value - jet.value).magnitude();
+    BrokenLaw::unless("linearise has the value of apply", error, round_off(size))?;
+    let error = (defined.tensor - jet.tensor).max_abs();
+    BrokenLaw::unless("linearise has the tensor of apply", error, round_off(tensor_size))?;
     let slopes = jet.along_z.max_abs() + jet.along_s.max_abs();
-    let off = (defined.along_z - jet.along_z).max_abs();
-    BrokenLaw::unless("linearise is the derivative along x", off, round_off(size + slopes))?;
-    let off = (defined.along_s - jet.along_s).max_abs();
-    BrokenLaw::unless("linearise is the derivative along dS", off, round_off(size + slopes))?;
+    let error = (defined.along_z - jet.along_z).max_abs();
+    BrokenLaw::unless("linearise is the derivative along x", error, round_off(size + slopes))?;
+    let error = (defined.along_s - jet.along_s).max_abs();
+    BrokenLaw::unless("linearise is the derivative along dS", error, round_off(size + slopes))?;
     let combined = bracket.apply(&args, &(*alpha + *beta * 3.0)).map_err(exists)?;
     let apart = jet.value + bracket.apply(&args, beta).map_err(exists)? * 3.0;
-    let off = (combined - apart).magnitude();
-    BrokenLaw::unless("Π(α + 3β) = Πα + 3Πβ", off, round_off(4.0 * size))?;
+    let error = (combined - apart).magnitude();
+    BrokenLaw::unless("Π(α + 3β) = Πα + 3Πβ", error, round_off(4.0 * size))?;
     if bracket.is_forced() {
         force(system, &args, alpha)?;
     }
@@ -88,7 +88,7 @@ fn force<Y: Metriplectic>(
     let size = defined.tensor.max_abs() * alpha.magnitude();
     let power = alpha.dot(&defined.value).abs();
     BrokenLaw::unless("⟨α, force(α)⟩ = 0", power, round_off(size * alpha.magnitude()))?;
-    for (law, off, size) in [
+    for (law, error, size) in [
         ("linearise_force has the value of force", (defined.value - jet.value).magnitude(), size),
         (
             "linearise_force is the derivative along α",
@@ -106,7 +106,7 @@ fn force<Y: Metriplectic>(
             size + defined.along_s.max_abs(),
         ),
     ] {
-        BrokenLaw::unless(law, off, round_off(size))?;
+        BrokenLaw::unless(law, error, round_off(size))?;
     }
     Ok(())
 }
@@ -137,8 +137,8 @@ pub fn dissipation<Y: Metriplectic>(
     let scale = size * alpha.magnitude().powi(2);
     BrokenLaw::unless("K is positive semidefinite", -form, round_off::<Y::Manifold>(scale))?;
     let annihilated = dissipation.apply(metric, &centre, w, w).map_err(broken("K exists"))?;
-    let off = annihilated.magnitude();
-    BrokenLaw::unless("K_w w = 0", off, round_off::<Y::Manifold>(size * w.magnitude()))?;
+    let error = annihilated.magnitude();
+    BrokenLaw::unless("K_w w = 0", error, round_off::<Y::Manifold>(size * w.magnitude()))?;
 
     let jet = dissipation.linearise(metric, x, w, alpha).map_err(broken("K exists"))?;
     let defined = by_dual_numbers(dissipation, metric, x, w, alpha).map_err(broken("K exists"))?;

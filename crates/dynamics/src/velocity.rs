@@ -11,13 +11,13 @@
 //!   Casimirs out of a covector. It is skew and annihilates them, so `⟨w_H, Π̃w_H⟩ = 0` and
 //!   `⟨w_S, Π̃w_H⟩ = 0` to round-off; and it differs from `Π` by `O(h²)`, *because* `Π` annihilates their
 //!   differentials. A bracket that is built from the covector of its Casimir
-//!   ([`Bracket::annihilates_entropy`]) needs no `P` for it. Where a Casimir's covector depends on those
+//!   ([`Bracket::annihilates_entropy`](crate::Bracket::annihilates_entropy)) needs no `P` for it. Where a Casimir's covector depends on those
 //!   before it, its projection fades out of `P` and of `Pᵀ` with the same weight. So `Π̃` stays skew and
 //!   conserves the energy. The entropy comes first and has full weight.
 //! - A momentum `J` must not enter `P`, which would change the flow: `Π dJ ≠ 0`. With
 //!   `a = Π̃w_H`, the number `⟨w_J, a⟩` is `O(h²)`; it is taken out of `a` along the vector `♯n`, where
 //!   `n` is the part of `w_J` orthogonal to all that `a` annihilates already. Near a relative equilibrium, where
-//!   `n` vanishes, this fades out ([`Orthogonal::faded_vector`]).
+//!   `n` vanishes, this fades out ([`Orthogonal::faded_vector`](crate::orthogonal::Orthogonal::faded_vector)).
 //! - `K̃_w = Q K_w Qᵀ`, where `Q` takes out the parts of the further invariants orthogonal to `w_H`: it
 //!   is symmetric and positive semidefinite, and annihilates `w_H` and all of them. For the dissipation of
 //!   the metric this is `κ G*(Pα, Pβ)` with `κ = G*(w_H, w_H)` and `P = 1 − C^{ab} L_b ⊗ L_a` (Bloch,

@@ -61,24 +61,24 @@ pub fn scalar_field<M: Space>(
     // One side alone, `a t² + b t³`, may be caught at its zero `t = −a/b`; both sides together,
     // `2 max(|a| t², |b| t³)`, have none.
     let remainder = |t: f64, second: f64| one_sided(t, second) + one_sided(-t, second);
-    let floor = 100.0 * f64::EPSILON * (size + slope.abs() + curvature.abs());
-    taylor_order("df is the derivative of the field", 2.0, floor, |t| remainder(t, 0.0))?;
-    taylor_order("Hf is the second derivative", 3.0, floor, |t| remainder(t, curvature))
+    let round_off = 100.0 * f64::EPSILON * (size + slope.abs() + curvature.abs());
+    taylor_order("df is the derivative of the field", 2.0, round_off, |t| remainder(t, 0.0))?;
+    taylor_order("Hf is the second derivative", 3.0, round_off, |t| remainder(t, curvature))
 }
 
 /// Checks that `remainder(t)` falls at least like `t^order` over `t = 2⁻⁴ … 2⁻¹²`, as far as it
-/// stays above the round-off `floor`.
+/// stays above the `round_off`.
 fn taylor_order(
     law: &'static str,
     order: f64,
-    floor: f64,
+    round_off: f64,
     remainder: impl Fn(f64) -> f64,
 ) -> Result<(), BrokenLaw> {
     let sizes: Vec<f64> = (4..=12)
         .map(|k| remainder(2.0_f64.powi(-k)))
-        .take_while(|r| r.is_nan() || *r > 1e2 * floor)
+        .take_while(|r| r.is_nan() || *r > 1e2 * round_off)
         .collect();
-    // The finest pair above the floor is the most asymptotic one; where it starts by chance at a
+    // The finest pair above the round-off is the most asymptotic one; where it starts by chance at a
     // zero of the remainder, the next one tells. A NaN in the finest pair stays.
     let orders = sizes.windows(2).rev().take(2).map(|pair| (pair[0] / pair[1]).log2());
     let Some(measured) = orders.reduce(|fine, coarse| if fine < coarse { coarse } else { fine })

@@ -38,7 +38,7 @@ impl<M: Manifold, G: Riemannian<M>> Retraction<M, G> for Exponential {
         u: &Vector<M>,
     ) -> Result<StepPath<M>, MetricError> {
         // The midpoint path ends at the same point.
-        let StepPath { end, .. } = metric.weyl_arc(x, u)?;
+        let StepPath { end, .. } = metric.weyl_path(x, u)?;
         Ok(StepPath { z: ChartPoint::centre(x), d: *u, end })
     }
 

@@ -51,10 +51,10 @@ impl<M: Manifold, F: MatrixField<M>> Riemannian<M> for FieldMetric<F> {
 
     fn end(&self, x: &M::Point<f64>, v: &Vector<M>) -> Result<M::Point<f64>, MetricError> {
         // With the very roundings of a step's path, whose energy a step has been solved for.
-        Ok(self.weyl_arc(x, v)?.end)
+        Ok(self.weyl_path(x, v)?.end)
     }
 
-    fn weyl_arc(&self, x: &M::Point<f64>, d: &Vector<M>) -> Result<StepPath<M>, MetricError> {
+    fn weyl_path(&self, x: &M::Point<f64>, d: &Vector<M>) -> Result<StepPath<M>, MetricError> {
         let (z, velocity) =
             geodesic::follow_real(&self.field, x, &(*d * 0.5)).map_err(on_first_half)?;
         let (end, _) = geodesic::follow_real(&self.field, &z, &velocity).map_err(on_second_half)?;
@@ -100,7 +100,7 @@ impl<M: Manifold, F: MatrixField<M>> Riemannian<M> for FieldMetric<F> {
         let z = geodesic_jet::follow(&self.field, &half).map_err(on_first_half)?;
         let end = geodesic_jet::follow(&self.field, &z).map_err(on_second_half)?;
         // The path itself is the one without derivatives, with its roundings.
-        let path = self.weyl_arc(x, d)?;
+        let path = self.weyl_path(x, d)?;
         Ok(StepPathJet {
             z: path.z.base,
             dz: z.dpoint,
@@ -321,7 +321,7 @@ mod tests {
         // In the first and in the second half of a path, and on the way to an inner point.
         let error = Riemannian::<Euclidean<2>>::weyl_jet(&slit, &x, &v).unwrap_err();
         assert!(matches!(error, MetricError::Edge { time } if reached(time)), "{error}");
-        let error = Riemannian::<Euclidean<2>>::weyl_arc(&slit, &x, &(v / 3.0)).unwrap_err();
+        let error = Riemannian::<Euclidean<2>>::weyl_path(&slit, &x, &(v / 3.0)).unwrap_err();
         assert!(matches!(error, MetricError::Edge { time } if reached(time / 3.0)), "{error}");
         let error = Riemannian::<Euclidean<2>>::along(&slit, &x, &v, 0.5).unwrap_err();
         assert!(matches!(error, MetricError::Edge { time } if reached(time)), "{error}");

@@ -50,7 +50,7 @@ macro_rules! straight_geodesics {
         }
 
         #[inline]
-        fn weyl_arc(&self, x: &M::Point<f64>, d: &Vector<M>) -> Result<StepPath<M>, MetricError> {
+        fn weyl_path(&self, x: &M::Point<f64>, d: &Vector<M>) -> Result<StepPath<M>, MetricError> {
             let z = ChartPoint::centre(&M::chart(x, &(*d * 0.5)));
             Ok(StepPath { z, d: *d, end: M::chart(x, d) })
         }

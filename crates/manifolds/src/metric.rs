@@ -1,16 +1,15 @@
 //! Riemannian metrics: flat, sharp, norm, geodesics.
 //!
 //! A metric is the canonical one of its manifold ([`Canonical`]), a constant matrix
-//! ([`Metric::constant`]), or a closure that gives the matrix `g(x)` in the coordinate frame at
-//! each point ([`Metric::field`]), whose geodesics are integrated numerically.
+//! ([`Metric::constant`](crate::Metric::constant)), or a closure that returns the matrix `g(x)` in the
+//! coordinate frame at each point ([`Metric::field`](crate::Metric::field)).
 
 use metriplectic_fields::{
     ChartPoint, Column, Dimension, Matrix, Real, Scalar, Space, Square, Vector,
 };
-use nalgebra::SMatrix;
 
 use crate::metric_error::finite;
-use crate::{Constant, FieldMetric, StepPath, StepPathJet};
+use crate::step_path::{StepPath, StepPathJet};
 
 pub use crate::inner_product::{Canonical, Factored, InnerProduct};
 pub use crate::metric_error::MetricError;
@@ -92,7 +91,7 @@ pub trait Riemannian<M: Space> {
     ///
     /// Those of [`exp`](Self::exp).
     #[inline]
-    fn weyl_arc(&self, x: &M::Point<f64>, d: &Vector<M>) -> Result<StepPath<M>, MetricError> {
+    fn weyl_path(&self, x: &M::Point<f64>, d: &Vector<M>) -> Result<StepPath<M>, MetricError> {
         let StepPathJet { z, d, end, .. } = self.weyl_jet(x, d)?;
         Ok(StepPath { z: ChartPoint::centre(&z), d, end })
     }
@@ -175,56 +174,6 @@ pub trait Riemannian<M: Space> {
     /// The derivatives `∂g/∂qᵏ` at a real point; `None` for a metric that is constant by
     /// construction.
     fn slopes(&self, x: &M::Point<f64>) -> Option<<M::Dim as Dimension>::Array<Matrix<M>>>;
-}
-
-/// Ready-made metrics.
-#[derive(Clone, Copy, Debug)]
-pub enum Metric {}
-
-impl Metric {
-    /// The metric with the same matrix everywhere on a flat space.
-    ///
-    /// ```
-    /// use metriplectic_manifolds::Metric;
-    /// use nalgebra::Matrix2;
-    /// assert!(Metric::constant(Matrix2::new(2.0, 0.5, 0.5, 1.0)).is_ok());
-    /// assert!(Metric::constant(Matrix2::new(1.0, 2.0, 2.0, 1.0)).is_err());
-    /// ```
-    ///
-    /// # Errors
-    ///
-    /// [`MetricError`] if the matrix is not finite, symmetric and positive.
-    pub fn constant<const N: usize>(g: SMatrix<f64, N, N>) -> Result<Constant<N>, MetricError> {
-        Constant::new(g)
-    }
-
-    /// The metric `G(u, v) = θ(u)·A(x) θ(v)` from a closure `A` or any other
-    /// [`MatrixField`](metriplectic_fields::MatrixField), with `θ` the
-    /// [`velocity`](metriplectic_fields::Space::embed) of a tangent vector:
-    ///
-    /// | on | a velocity is | the closure returns |
-    /// |---|---|---|
-    /// | a vector space, a chart | `x'` | `g`, `n × n` |
-    /// | Sⁿ | `x'` in Rⁿ⁺¹ | a form on Rⁿ⁺¹, `(n+1) × (n+1)`; what it does off the sphere is not looked at |
-    /// | SO(3) | the body angular velocity `Ω` | the inner product on so(3), `3 × 3` |
-    /// | R₊ | `s'` | `1 × 1` |
-    /// | a product | both, one below the other | the full matrix |
-    ///
-    /// Whether it is symmetric and positive is checked at every point where it is used. Geodesics are
-    /// integrated with an estimated error of 10⁻¹³ in each piece; their derivatives come from dual
-    /// numbers.
-    ///
-    /// ```
-    /// use metriplectic_fields::Real;
-    /// use num_dual::DualNum;
-    /// use metriplectic_manifolds::Metric;
-    /// use nalgebra::{Matrix2, Vector2};
-    /// let _half_plane =
-    ///     Metric::field(|q: &Vector2<Real>| Matrix2::from_diagonal_element(q.y.powi(-2)));
-    /// ```
-    pub const fn field<F>(field: F) -> FieldMetric<F> {
-        FieldMetric::new(field)
-    }
 }
 
 /// The vector `(t + ε₁ + ε₂) v`.

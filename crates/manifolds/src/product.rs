@@ -26,8 +26,6 @@ use rand::Rng;
 
 use crate::{Manifold, PointError};
 
-pub use crate::product_metric::{Block, Split};
-
 /// The product `A × B`: a state with two parts, such as a direction with an internal energy
 /// (`S² × R`) or an attitude with an angular momentum (`SO(3) × R³`). A factor may be a product again.
 /// See the [module](mod@crate::product).

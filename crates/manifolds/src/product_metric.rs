@@ -168,15 +168,15 @@ macro_rules! metric_of_the_factors {
             ))
         }
 
-        fn weyl_arc(
+        fn weyl_path(
             &self,
             x: &(A::Point<f64>, B::Point<f64>),
             d: &Vector<Product<A, B>>,
         ) -> Result<StepPath<Product<A, B>>, MetricError> {
             let ((g, f), (da, db)) = (Split::<A, B>::halves(self), Product::<A, B>::split(d));
             let (a, b) = (
-                Riemannian::<A>::weyl_arc(g, &x.0, &da)?,
-                Riemannian::<B>::weyl_arc(f, &x.1, &db)?,
+                Riemannian::<A>::weyl_path(g, &x.0, &da)?,
+                Riemannian::<B>::weyl_path(f, &x.1, &db)?,
             );
             Ok(StepPath {
                 z: ChartPoint {

@@ -1,12 +1,12 @@
 //! Retractions: how a tangent vector becomes a pair of points.
 
 use approx::{AbsDiffEq, RelativeEq};
-use metriplectic_fields::{
-    ChartPoint, Column, Dimension, Matrix, Real, Scalar, Space, Square, Vector,
-};
+use metriplectic_fields::{Column, Dimension, Matrix, Real, Scalar, Space, Square, Vector};
 use num_dual::Dual64;
 
 use crate::{Manifold, MetricError, Riemannian};
+
+pub use crate::step_path::{StepPath, StepPathJet};
 
 /// A discrete derivative `R_h: TM → M × M` (Bloch, Farré Puiggalí, Martín de Diego 2024, §4.4):
 /// a base point `z` and a vector `v ∈ T_zM` stand for a pair `(x, x')`.
@@ -127,51 +127,6 @@ impl<M: Space> Nodes<M> {
         at: impl Fn(f64) -> Result<M::Point<Real>, MetricError>,
     ) -> Result<Self, MetricError> {
         Ok(Self { ends: [at(0.0)?, at(1.0)?], middle: Some(at(0.5)?) })
-    }
-}
-
-/// A step's path: its base point, its displacement there, and its end.
-#[derive(Clone, Debug)]
-pub struct StepPath<M: Space, D: Scalar = f64> {
-    /// The base point `z`.
-    pub z: ChartPoint<M, D>,
-    /// The displacement `d = hv ∈ T_zM`.
-    pub d: Vector<M, D>,
-    /// The end `x'`.
-    pub end: M::Point<D>,
-}
-
-/// A step's path at `f64`, with its derivatives along the unknown `u`.
-#[derive(Clone, Debug)]
-pub struct StepPathJet<M: Space> {
-    /// The base point `z`.
-    pub z: M::Point<f64>,
-    /// `∂z/∂u` in the chart at `z`.
-    pub dz: Matrix<M>,
-    /// The displacement `d = hv ∈ T_zM`.
-    pub d: Vector<M>,
-    /// `∂d/∂u` in the chart at `z`.
-    pub dd: Matrix<M>,
-    /// The end `x'`.
-    pub end: M::Point<f64>,
-    /// `∂x'/∂u` in the chart at `x'`.
-    pub dend: Matrix<M>,
-}
-
-impl<M: Space> StepPathJet<M> {
-    /// The straight line of a flat space, with its middle as the base: `z = x + u/2`, `d = u`,
-    /// `x' = x + u`.
-    #[inline]
-    pub fn straight(x: &M::Point<f64>, u: &Vector<M>) -> Self {
-        let one = Matrix::<M>::one();
-        Self {
-            z: M::chart(x, &(*u * 0.5)),
-            dz: one * 0.5,
-            d: *u,
-            dd: one,
-            end: M::chart(x, u),
-            dend: one,
-        }
     }
 }
 

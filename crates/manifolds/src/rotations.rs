@@ -306,7 +306,7 @@ impl Riemannian<Rotations> for Canonical {
     }
 
     #[inline]
-    fn weyl_arc(
+    fn weyl_path(
         &self,
         x: &Matrix3<f64>,
         d: &Vector3<f64>,

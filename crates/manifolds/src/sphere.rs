@@ -377,7 +377,7 @@ macro_rules! sphere {
 
             /// `γ'(½) = c₀ U − ½s c₁ x` with `U = E(x) d` and the Stumpff functions at `s/4 = |d|²/4`.
             #[inline]
-            fn weyl_arc(
+            fn weyl_path(
                 &self,
                 x: &SVector<f64, $a>,
                 d: &SVector<f64, $n>,

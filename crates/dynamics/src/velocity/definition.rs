@@ -52,26 +52,26 @@ pub fn reversible<Y: Metriplectic + ?Sized, D: Scalar>(
         }
         return bracket(&w.energy);
     }
-    let mut off = Orthogonal::<Dim<Y>, D>::default();
+    let mut normals = Orthogonal::<Dim<Y>, D>::default();
     if annihilated.entropy {
-        off.push(&g, &w.entropy);
+        normals.push(&g, &w.entropy);
     }
     for c in w.of_kind(Kind::Casimir) {
-        off.push(&g, c);
+        normals.push(&g, c);
     }
     let mut a = if annihilated.projected {
-        let alpha = off.faded_covector(0, &w.energy, CASIMIR);
-        off.faded_vector(0, &bracket(&alpha)?, CASIMIR)
+        let alpha = normals.faded_covector(0, &w.energy, CASIMIR);
+        normals.faded_vector(0, &bracket(&alpha)?, CASIMIR)
     } else {
         bracket(&w.energy)?
     };
     if annihilated.momenta {
-        off.push(&g, &w.energy);
-        let first = off.len();
+        normals.push(&g, &w.energy);
+        let first = normals.len();
         for j in w.of_kind(Kind::Momentum) {
-            off.push(&g, j);
+            normals.push(&g, j);
         }
-        a = off.faded_vector(first, &a, MOMENTUM);
+        a = normals.faded_vector(first, &a, MOMENTUM);
     }
     Ok(a)
 }
@@ -101,13 +101,13 @@ fn force<Y: Metriplectic + ?Sized, D: Scalar>(
     if Y::Invariants::COUNT == 0 {
         return Ok(force);
     }
-    let (g, mut off) = (system.metric().at(x)?, Orthogonal::<Dim<Y>, D>::default());
-    off.push(&g, &w.energy);
+    let (g, mut normals) = (system.metric().at(x)?, Orthogonal::<Dim<Y>, D>::default());
+    normals.push(&g, &w.energy);
     if system.second_law() == SecondLaw::Exact {
-        off.push(&g, &w.entropy);
+        normals.push(&g, &w.entropy);
     }
     let listed = w.invariants.as_ref().iter().flatten();
-    Ok(listed.fold(force, |force, (_, l)| off.without(&g, l, &force, MOMENTUM)))
+    Ok(listed.fold(force, |force, (_, l)| normals.without(&g, l, &force, MOMENTUM)))
 }
 
 /// The vector `K̃ w_S`.
@@ -121,8 +121,8 @@ fn friction<Y: Metriplectic + ?Sized, D: Scalar>(
     if Y::Invariants::COUNT == 0 {
         return k(&w.entropy);
     }
-    let (off, first) = orthogonal_to_energy::<Y, D>(&system.metric().at(x)?, w);
-    Ok(off.project_vector(first, &k(&off.project_covector(first, &w.entropy))?))
+    let (normals, first) = orthogonal_to_energy::<Y, D>(&system.metric().at(x)?, w);
+    Ok(normals.project_vector(first, &k(&normals.project_covector(first, &w.entropy))?))
 }
 
 /// The covector of the energy and the parts of the further invariants orthogonal to it, which start
@@ -131,11 +131,11 @@ fn orthogonal_to_energy<Y: Metriplectic + ?Sized, D: Scalar>(
     g: &<Y::Metric as Riemannian<Y::Manifold>>::At<D>,
     w: &Covectors<Dim<Y>, Components<Y, D>>,
 ) -> (Orthogonal<Dim<Y>, D>, usize) {
-    let mut off = Orthogonal::default();
-    off.push(g, &w.energy);
-    let first = off.len();
+    let mut normals = Orthogonal::default();
+    normals.push(g, &w.energy);
+    let first = normals.len();
     for (_, l) in w.invariants.as_ref().iter().flatten() {
-        off.push(g, l);
+        normals.push(g, l);
     }
-    (off, first)
+    (normals, first)
 }

@@ -116,7 +116,8 @@ fn largest_in_blocks<M: Space>(a: &Matrix<M>, sizes: &Matrix<M>) -> Vec<f64> {
 /// The relative size of the number `⟨α, A β⟩`.
 pub(crate) fn form<M: Space>(
     a: &Matrix<M>,
-    (alpha, beta): (&Vector<M>, &Vector<M>),
+    alpha: &Vector<M>,
+    beta: &Vector<M>,
     units: &Vector<M>,
 ) -> f64 {
     let n = M::Dim::LEN;
@@ -155,12 +156,12 @@ pub(crate) fn asymmetry<M: Space>(
 ) -> Violation {
     let top = largest_in_blocks::<M>(a, &scaled::<M>(a, units));
     let root = |i: usize| if sign > 0.0 { a[(i, i)].abs().sqrt() } else { 0.0 };
-    let off = |(i, j): (usize, usize)| {
+    let violation = |(i, j): (usize, usize)| {
         let balance: Balance = [a[(i, j)], -sign * a[(j, i)]].into_iter().collect();
         let size = rounding * top[i] * units[i] * units[j];
         balance.beside(root(i) * root(j) + size)
     };
-    pairs(M::Dim::LEN).map(off).fold(Violation::default(), Violation::or_worse)
+    pairs(M::Dim::LEN).map(violation).fold(Violation::default(), Violation::or_worse)
 }
 
 /// By how much a symmetric tensor on covectors is not positive semidefinite: the most negative pivot of
@@ -186,8 +187,8 @@ pub(crate) fn indefiniteness<M: Space>(k: &Matrix<M>, units: &Vector<M>) -> f64 
         negative = left.iter().map(|&i| -a[(i, i)]).fold(negative, f64::max);
         if a[(p, p)] <= TOLERANCE {
             // |a_ij| ≤ √(a_ii a_jj) in a semidefinite matrix, and the diagonal is zero here.
-            let off = |&i: &usize| left.iter().map(|&j| a[(i, j)].abs()).fold(0.0, f64::max);
-            return left.iter().map(off).fold(negative, f64::max);
+            let violation = |&i: &usize| left.iter().map(|&j| a[(i, j)].abs()).fold(0.0, f64::max);
+            return left.iter().map(violation).fold(negative, f64::max);
         }
         left.retain(|&i| i != p);
         for &i in &left {

@@ -159,14 +159,14 @@ impl Derivatives {
             return Ok((self.df[i], 0.0));
         }
         let change = |pair: &[Quotient]| (pair[1].slope - pair[0].slope).abs();
-        let noise = seen.windows(2).rev().take(NOISY).map(|pair| change(pair) * pair[1].delta);
-        let noise = noise.fold(0.0, f64::max);
+        let rounding = seen.windows(2).rev().take(NOISY).map(|pair| change(pair) * pair[1].delta);
+        let rounding = rounding.fold(0.0, f64::max);
         // Two quotients may agree by chance: no bound is trusted that falls faster than they converge.
         let (mut error, mut best) = (f64::INFINITY, None);
         for pair in seen.windows(2) {
             error = change(pair).max(if error.is_finite() { error / 8.0 } else { 0.0 });
             let here = pair[1];
-            let bound = 8.0 * (error + noise / here.delta) + self.rounding(i, &here);
+            let bound = 8.0 * (error + rounding / here.delta) + self.rounding(i, &here);
             let better = best.is_none_or(|(slope, smallest): (f64, f64)| {
                 bound < smallest || (here.slope - slope).abs() > bound + smallest
             });

@@ -59,7 +59,7 @@ impl<'a, Y: Metriplectic + ?Sized> Examination<'a, Y> {
         metric::examine(system, x)?;
         let w = self.discrete_gradient(x, &energy);
         let place = Place { system, x, units: &self.sizes.units, energy, entropy };
-        // A lost derivative breaks other laws too, and is their cause.
+        // A wrong derivative breaks other laws too, and is reported as their cause.
         let compared = axes.clone().try_for_each(|axis| fields::compare(&place, axis));
         let mut findings =
             Findings { point: Y::Manifold::entries(x), laws: &mut report.laws, first: None };

@@ -65,7 +65,7 @@ impl<Y: Metriplectic + ?Sized> Invariance<'_, '_, '_, Y> {
                 findings.note("Π dC = 0", size, |point| ModelError::NotCasimir { point, size });
             }
             Kind::Momentum => {
-                let size = balance::form::<Y::Manifold>(&tensor, (&dl, &energy.df), units);
+                let size = balance::form::<Y::Manifold>(&tensor, &dl, &energy.df, units);
                 findings.note("⟨dJ, Π dH⟩ = 0", size, |point| ModelError::NotMomentum {
                     point,
                     size,
@@ -120,23 +120,23 @@ impl<Y: Metriplectic + ?Sized> Invariance<'_, '_, '_, Y> {
         let (here, there) = (tensor(x, &entropy.df)?, tensor(&y, &system.entropy().jet1(&y).df)?);
         let top = balance::largest::<Y::Manifold>(&here, units)
             .max(balance::largest::<Y::Manifold>(&there, units));
-        let off = |(i, j): (usize, usize)| {
+        let violation = |(i, j): (usize, usize)| {
             let pushed = pairs(n).map(|(k, l)| tangent[(i, k)] * here[(k, l)] * tangent[(j, l)]);
             let balance: Balance = pushed.chain([-there[(i, j)]]).collect();
             balance.relative(top * units[i] * units[j])
         };
-        let size = pairs(n).map(off).fold(0.0, worse);
+        let size = pairs(n).map(violation).fold(0.0, worse);
         findings.note("Φ is Poisson", size, |point| ModelError::ActionNotPoisson { point, size });
 
         let Some(dj) = &self.dj else { return Ok(()) };
         let largest = pairs(n).map(|(i, j)| (here[(i, j)] * dj[j] / units[i]).abs());
         let largest = largest.fold(0.0, f64::max);
-        let off = |i: usize| {
+        let violation = |i: usize| {
             let terms = (0..n).map(|j| here[(i, j)] * dj[j]);
             let balance: Balance = terms.chain([-generator[i]]).collect();
             balance.relative(units[i] * largest).max((at_rest[i].re / units[i]).abs())
         };
-        let size = (0..n).map(off).fold(0.0, worse);
+        let size = (0..n).map(violation).fold(0.0, worse);
         findings.note("Π dJ = Φ'", size, |point| ModelError::ActionNotOfMomentum { point, size });
         Ok(())
     }

@@ -132,7 +132,7 @@ impl<M: Space> Jet2<M> {
 }
 
 /// A smooth field of square matrices on `M`: a metric `g` that acts on velocities, a Poisson tensor
-/// `Π` that acts on covectors dual to them. Velocities are those of [`Space::velocity`]: components
+/// `Π` that acts on covectors dual to them. Velocities are those of [`Space::embed`]: components
 /// on a vector space, entries of `x'` on a sphere, the body angular velocity on SO(3).
 ///
 /// Implemented by every closure `Fn(&M::Point<Real>) -> Form<M, Real>`, and by hand with the one

@@ -14,7 +14,7 @@ pub type Vector<M, D = f64> = <<M as Space>::Dim as Dimension>::Vector<D>;
 pub type Matrix<M, D = f64> = <<M as Space>::Dim as Dimension>::Matrix<D>;
 
 /// A velocity as it is written by hand: entries of a tangent vector of the embedding, a body angular
-/// velocity; see [`Space::velocity`].
+/// velocity; see [`Space::embed`].
 pub type Velocity<M, D = f64> = <<M as Space>::Velocity as Dimension>::Vector<D>;
 
 /// A tensor as it is written by hand: a square matrix that acts on velocities (a metric) or on
@@ -29,7 +29,7 @@ pub type Form<M, D = f64> = <<M as Space>::Velocity as Dimension>::Matrix<D>;
 /// frame `∂φ_x/∂qⁱ`.
 ///
 /// The frame of a chart is a matter of computation. A tensor is written by hand in the terms of a
-/// [`velocity`](Self::velocity), which needs no chart: the components themselves on a vector space,
+/// [`embed`](Self::embed), which needs no chart: the components themselves on a vector space,
 /// the entries of `x'` on a sphere, the body angular velocity on SO(3).
 ///
 /// Laws: 1. `φ_x(0) = x`; 2. `φ_x⁻¹(φ_x(q)) = q` near `q = 0`; 3. both at dual numbers too;

@@ -12,8 +12,8 @@
 //! \mu' = \mathrm{ad}^*_\xi \bigl( \mu + F(\xi) \bigr), \qquad \xi = dh(\mu),
 //! ```
 //!
-//! which keep `h` whatever `F` is. With the force of a positive semidefinite form,
-//! `⟨F(ξ), η⟩ = κ(η, [ξ, dC])`, a Casimir `C` grows, and they are the metriplectic system of
+//! which conserve `h` for every `F`. With the force of a positive semidefinite form,
+//! `⟨F(ξ), η⟩ = κ(η, [ξ, dC])`, a Casimir `C` grows. The equations are then the metriplectic system of
 //! [`LiePoisson`], [`CasimirDissipation`](crate::CasimirDissipation), energy
 //! `h` and entropy `C`:
 //!
@@ -59,14 +59,13 @@ use crate::dissipation::Choice;
 pub use crate::legendre::{Legendre, LegendreError};
 
 impl<G, K: Choice, H, S, I, const N: usize> SystemBuilder<LieDual<N>, G, LiePoisson, K, H, S, I> {
-    /// The force `𝓕: g → g*` of the equations `μ' = ad*_ξ(μ + 𝓕(ξ))`, `ξ = dH`: a closure
-    /// `|ξ| -> SVector<Real, N>` or any other [`Force`], which conserves `H` whatever it is.
+    /// Sets the force `𝓕: g → g*` of the equations `μ' = ad*_ξ(μ + 𝓕(ξ))`, `ξ = dH`: a closure
+    /// `|ξ| -> SVector<Real, N>` or any other [`Force`]. Every force conserves `H`.
     ///
     /// With a force an entropy changes by `S' = ⟨𝓕(ξ), [ξ, dS]⟩` alone, unless a
-    /// [`dissipation`](Self::dissipation) is given too; there is none of the metric. A force under which an
-    /// entropy falls is refused by the verification of a model, unless the second law is
-    /// [`Published`](crate::SecondLaw::Published), not promised. Each of the further invariants must stay as
-    /// it is, `⟨dL, ad*_ξ 𝓕⟩ = 0`.
+    /// [`dissipation`](Self::dissipation) is given too; the metric adds none. Verification refuses a force under
+    /// which an entropy falls, unless the second law is [`Published`](crate::SecondLaw::Published). The force
+    /// must conserve the further invariants, `⟨dL, ad*_ξ 𝓕⟩ = 0`.
     #[allow(
         clippy::type_complexity,
         reason = "the type of a builder lists the parts of the system, and a name for it would hide them"
@@ -80,8 +79,8 @@ impl<G, K: Choice, H, S, I, const N: usize> SystemBuilder<LieDual<N>, G, LiePois
 }
 
 impl<G, B, K, H, S, I, const N: usize> SystemBuilder<LieDual<N>, G, B, K, H, S, I> {
-    /// The energy `h(μ) = ⟨μ, ξ⟩ − l(ξ)` of a reduced Lagrangian `l`, a closure `|ξ| -> Real` on the
-    /// Lie algebra or any other [`ScalarField`] on it: that of [`Legendre::of`].
+    /// Sets the energy `h(μ) = ⟨μ, ξ⟩ − l(ξ)` of a reduced Lagrangian `l` by [`Legendre::of`]. `l` is a closure
+    /// `|ξ| -> Real` on the Lie algebra, or any other [`ScalarField`] on it.
     pub fn lagrangian<L: ScalarField<Euclidean<N>>>(
         self,
         l: L,

@@ -1,4 +1,4 @@
-//! What brackets and dissipations promise, and the functions that check it.
+//! The laws of brackets and dissipations, and the functions that check them.
 
 use metriplectic_fields::{
     BrokenLaw, ChartPoint, Column, Dimension, Matrix, ScalarField, Space, Square, Vector,
@@ -13,7 +13,7 @@ use crate::metriplectic::{Metriplectic, Point, SecondLaw};
 use crate::verify::bracket::{BracketDefects, bracket_defects};
 use crate::verify::sampling::CoordinateScales;
 
-/// Round-off of a tensor contraction whose terms have the size `scale`.
+/// The round-off of a tensor contraction whose terms have the size `scale`.
 fn round_off<M: Manifold>(scale: f64) -> f64 {
     let n = M::Dim::LEN as f64;
     64.0 * n * n * f64::EPSILON * scale

@@ -14,12 +14,12 @@ use nalgebra::{SMatrix, SVector};
 /// \qquad dh = \xi(\mu), \qquad \mathrm{Hess}\, h = (\mathrm{Hess}\, l)^{-1} .
 /// ```
 ///
-/// `ξ(μ)` is found to round-off by Newton's method with the Hessian of `l`, damped, from `ξ = 0` or
-/// another [start](Self::near); differential and Hessian of `h` are then the formulas above, at every
-/// scalar of derivative order ≤ 2, by the second-order Taylor expansion that is exact there.
+/// Damped Newton iterations with the Hessian of `l` find `ξ(μ)` to round-off, from `ξ = 0` or another
+/// [start](Self::near). The formulas above then give differential and Hessian of `h`. The second-order Taylor
+/// expansion, which is exact there, gives `h` at every scalar of derivative order ≤ 2.
 ///
-/// Where there is no `ξ(μ)`, `h` is not a number, which the verification of a model names;
-/// [`velocity`](Self::velocity) says why.
+/// Where there is no `ξ(μ)`, `h` is NaN, which the verification of a model names.
+/// [`velocity`](Self::velocity) returns the reason.
 #[derive(Clone, Copy)]
 pub struct Legendre<L, const N: usize> {
     lagrangian: L,
@@ -36,8 +36,8 @@ impl<L, const N: usize> fmt::Debug for Legendre<L, N> {
 /// What Newton's method may take. A correction is tried at 40 lengths.
 const LIMITS: Limits = Limits { iterations: 100, halvings: 39 };
 
-/// A Hessian is degenerate if its reciprocal condition number is below this: not a digit of a
-/// solution would be right.
+/// A Hessian is degenerate if its reciprocal condition number is below this. No digit of a solution would be
+/// right.
 const DEGENERATE: f64 = 16.0 * f64::EPSILON;
 
 impl<L: ScalarField<Euclidean<N>>, const N: usize> Legendre<L, N> {
@@ -46,24 +46,24 @@ impl<L: ScalarField<Euclidean<N>>, const N: usize> Legendre<L, N> {
         Self { lagrangian: l, start: SVector::zeros() }
     }
 
-    /// Starts Newton's method at `xi` instead of 0: where `l` has a degenerate Hessian at 0, or
-    /// momenta have several velocities, of which the one near `xi` is meant.
+    /// Starts Newton's method at `xi` instead of 0. Use it if the Hessian of `l` is degenerate at 0, or if a
+    /// momentum has several velocities and you need the velocity near `xi`.
     #[must_use]
     pub fn near(self, xi: SVector<f64, N>) -> Self {
         Self { start: xi, ..self }
     }
 
-    /// The momentum `μ = ∂l/∂ξ`.
+    /// Computes the momentum `μ = ∂l/∂ξ`.
     pub fn momentum(&self, xi: &SVector<f64, N>) -> SVector<f64, N> {
         self.lagrangian.jet1(xi).df
     }
 
-    /// The velocity `ξ(μ)`, where `∂l/∂ξ = μ`.
+    /// Computes the velocity `ξ(μ)`, at which `∂l/∂ξ = μ`.
     ///
     /// # Errors
     ///
-    /// [`LegendreError`] if `l` is not a number on the way, if its Hessian is degenerate, or if there
-    /// is no such `ξ` that is found.
+    /// [`LegendreError`] if `l` is not finite at the start, if its Hessian is degenerate, or if no such `ξ` is
+    /// found.
     pub fn velocity(&self, mu: &SVector<f64, N>) -> Result<SVector<f64, N>, LegendreError> {
         let problem = Inversion { legendre: self, mu };
         let start = self.finite_jet(&self.start).ok_or_else(|| not_finite(&self.start))?;

@@ -1,5 +1,5 @@
-//! What drives the state: a bracket turns energy into reversible motion, a dissipation turns
-//! entropy into irreversible motion, and a [`System`] puts them together and checks them.
+//! Metriplectic systems: a bracket turns the differential of the energy into reversible motion, a dissipation
+//! turns the differential of the entropy into irreversible motion, and a [`System`] combines them.
 //!
 //! ```math
 //! \dot x = \Pi\, dH + K\, dS .
@@ -24,7 +24,7 @@
 //! | [`euler_poincare`] | `.lagrangian(..)` and `.force(..)` of the builder |
 //! | [`velocity`](mod@velocity) | `Π w_H + K w_S` for given covectors: differentials, or discrete gradients |
 //! | [`verify`] | the laws of a model, sampled |
-//! | [`laws`] | what brackets and dissipations promise, and the functions that check it |
+//! | [`laws`] | the laws of brackets and dissipations, and the functions that check them |
 
 pub mod bracket;
 pub mod builder;

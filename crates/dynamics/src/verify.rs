@@ -1,12 +1,11 @@
 //! The laws of a model, checked at the start and at sampled points around it.
 //!
-//! Nothing here has a scale. A point is sampled within a tenth of the size of each coordinate, and a law
-//! is judged row by row relative to the terms that should cancel in it (the module `balance`), so that a
-//! model in other units gets the same verdict with the same residuals.
+//! The verdict does not depend on units. A point is sampled within a tenth of the size of each coordinate. A
+//! law is judged row by row, relative to the terms that should cancel in it (module `balance`).
 //!
-//! A model has a domain (a logarithm, a square root), and is only judged where it lives: a sample at which
-//! a *value* is not finite is drawn again, nearer to the start. A value that is finite while a derivative
-//! is not is an error wherever it happens; it is how `x.norm()` at zero shows itself.
+//! A model has a domain (a logarithm, a square root), and is judged inside it. If a *value* is not finite at a
+//! sample, the sample is drawn again, nearer to the start. If a value is finite and a derivative is not, the
+//! model is refused, as with `x.norm()` at zero.
 
 pub(crate) mod balance;
 pub(crate) mod bracket;
@@ -34,17 +33,17 @@ use crate::report::Report;
 use crate::velocity::independence;
 use crate::verification::{Verified, Verify};
 
-/// Points sampled around the start, beside the start itself.
+/// The number of points sampled around the start.
 const SAMPLES: usize = 16;
 
-/// The least number of points at which a model has to have values, out of 17.
+/// The least number of points at which a model must have values, of 17 with the start.
 const ENOUGH: usize = 12;
 
-/// How far from the start a run samples its model, relative to the size of each coordinate.
+/// The distance from the start within which a run samples its model, relative to the size of each coordinate.
 const RADIUS: f64 = 0.1;
 
-/// The fraction of an invariant's differential that is independent of the other fields' somewhere near
-/// the start, below which it is taken for a function of them.
+/// An invariant is taken for a function of the other fields if less than this fraction of its differential is
+/// independent of theirs at every sample.
 const DEPENDENT: f64 = 1e-8;
 
 impl<Y: Metriplectic + ?Sized> Verify<Y::Manifold> for Y {
@@ -72,7 +71,7 @@ fn report<Y: Metriplectic + ?Sized>(system: &Y, x0: &Point<Y>, radius: f64) -> R
     report
 }
 
-/// Judges the model at one point alone, where its values have to be finite.
+/// Judges the model at one point, where its values must be finite.
 fn at_one_point<Y: Metriplectic + ?Sized>(system: &Y, x: &Point<Y>) -> Result<(), ModelError> {
     system.manifold().check(x)?;
     value_not_finite(system, x).map_or(Ok(()), Err)?;

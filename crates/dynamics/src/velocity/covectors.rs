@@ -15,28 +15,29 @@ pub(super) type Place<Y, D> = ChartPoint<<Y as Metriplectic>::Manifold, D>;
 /// Components of a vector or covector of a system, at a scalar.
 pub(super) type Components<Y, D> = Vector<<Y as Metriplectic>::Manifold, D>;
 
-/// A way to make a covector of a field: its differential at a point, or a discrete gradient.
+/// A map from fields to covectors: the differential at a point, or a discrete gradient.
 pub trait Gradient<M: Space> {
     /// Components, with their derivatives or without.
     type Covector: Copy + Debug + Send + Sync;
 
-    /// The covector of one field.
+    /// Computes the covector of a field.
     fn of(&mut self, f: &impl ScalarField<M>) -> Self::Covector;
 }
 
 /// One covector for each field of a system.
 #[derive(Clone, Copy, Debug)]
 pub struct Covectors<N: Dimension, V: Copy + Debug + Send + Sync> {
-    /// That of the energy, `w_H`.
+    /// The covector of the energy, `w_H`.
     pub energy: V,
-    /// That of the entropy, `w_S`; zero without one.
+    /// The covector of the entropy, `w_S`; zero without an entropy.
     pub entropy: V,
-    /// Those of the further invariants, in their order.
+    /// The covectors of the further invariants, in their order.
     pub invariants: N::Array<Option<(Kind, V)>>,
 }
 
 impl<N: Dimension, V: Copy + Debug + Send + Sync> Covectors<N, V> {
-    /// Those of energy and entropy, and the ones that `gradient` makes of the further `invariants`.
+    /// Collects the covectors of energy and entropy, and those that `gradient` computes for the further
+    /// `invariants`.
     #[inline]
     pub fn new<M: Space<Dim = N>, W: Gradient<M, Covector = V>>(
         [energy, entropy]: [V; 2],
@@ -48,14 +49,14 @@ impl<N: Dimension, V: Copy + Debug + Send + Sync> Covectors<N, V> {
         Self { energy, entropy, invariants: collected.covectors }
     }
 
-    /// Those of the further invariants of one kind.
+    /// Returns the covectors of the further invariants of one kind.
     #[inline]
     pub fn of_kind(&self, kind: Kind) -> impl Iterator<Item = &V> {
         let listed = self.invariants.as_ref().iter().flatten();
         listed.filter_map(move |(k, w)| (*k == kind).then_some(w))
     }
 
-    /// Whether there are further invariants of one kind.
+    /// Returns whether there are further invariants of one kind.
     #[inline]
     pub fn has(&self, kind: Kind) -> bool {
         self.of_kind(kind).next().is_some()
@@ -77,7 +78,7 @@ impl<M: Space, W: Gradient<M>> Visitor<M> for Collected<'_, M, W> {
     }
 }
 
-/// Differentials at a point.
+/// The differentials of fields at a point.
 #[derive(Debug)]
 pub struct Differentials<'a, M: Space, D: Scalar>(pub &'a ChartPoint<M, D>);
 
@@ -89,7 +90,7 @@ impl<M: Space, D: Scalar> Gradient<M> for Differentials<'_, M, D> {
     }
 }
 
-/// The differentials of all fields of a system at a point.
+/// Computes the differentials of all fields of a system at a point.
 pub fn differentials<Y: Metriplectic + ?Sized, D: Scalar>(
     system: &Y,
     x: &Place<Y, D>,

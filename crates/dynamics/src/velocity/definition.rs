@@ -23,7 +23,7 @@ impl<Y: Metriplectic + ?Sized> VectorField<Y::Manifold> for Y {
     }
 }
 
-/// The vector `Π̃ w_H`.
+/// Computes the vector `Π̃ w_H`.
 ///
 /// # Errors
 ///
@@ -41,7 +41,7 @@ pub fn reversible<Y: Metriplectic + ?Sized, D: Scalar>(
     }
     let g = system.metric().at(x)?;
     if Y::Invariants::COUNT == 0 {
-        // The entropy alone: the same projections, without a list.
+        // With the entropy alone, the same projections need no list.
         let w_hat = g.orthonormal(&w.entropy);
         let square = w_hat.dot(&w_hat);
         if square.re() > 0.0 {
@@ -76,7 +76,7 @@ pub fn reversible<Y: Metriplectic + ?Sized, D: Scalar>(
     Ok(a)
 }
 
-/// The vector `K̃ w_S`, and that of a force.
+/// Computes the vector `K̃ w_S`, and adds the vector of a force.
 ///
 /// # Errors
 ///

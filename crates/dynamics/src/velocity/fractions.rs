@@ -1,4 +1,4 @@
-//! How independent the further invariants are of the other fields.
+//! The independence of the further invariants from the other fields.
 
 use metriplectic_manifolds::{MetricError, Riemannian};
 
@@ -9,8 +9,8 @@ use crate::invariants::Kind;
 use crate::metriplectic::{Dim, Metriplectic, SecondLaw};
 use crate::orthogonal::Orthogonal;
 
-/// The smallest fraction of a further invariant's differential at `x` that is independent of those of
-/// the other fields with which it is projected out; 1 without further invariants.
+/// Computes for each further invariant the smallest fraction of its differential at `x` that is independent of
+/// the differentials of the other fields in its projections.
 ///
 /// # Errors
 ///
@@ -41,12 +41,13 @@ pub fn independence<Y: Metriplectic + ?Sized>(
         .collect())
 }
 
-/// For each further invariant, the smallest independent fraction of its differential at `x` in a projection
-/// that a step makes: of a Casimir beside the entropy and the Casimirs before it, of a momentum beside
-/// these, the energy and the momenta before it, of either beside the energy and the list before it.
+/// Computes for each further invariant the smallest independent fraction of its differential at `x` in a
+/// projection of a step. A Casimir is projected beside the entropy and the Casimirs before it. A momentum is
+/// projected beside these, the energy and the momenta before it. Both are projected beside the energy and the
+/// list before them.
 ///
-/// [`independence`] also asks for fractions beside the entropy *and* the energy. These vanish at every
-/// equilibrium and disturb no step.
+/// [`independence`] also includes fractions beside the entropy *and* the energy. These vanish at every
+/// equilibrium without an effect on a step.
 ///
 /// # Errors
 ///

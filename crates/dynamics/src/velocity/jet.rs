@@ -18,22 +18,22 @@ use crate::orthogonal::{OrthogonalJet, WithJacobian};
 pub struct VelocityJet<N: Dimension> {
     /// The velocity, and its derivatives.
     pub velocity: WithJacobian<N>,
-    /// For each component the sum of the absolute terms that it is made of,
-    /// `Σ_j |Π_ij||w_j| + |K_ij||s_j|` and those of the projections: what its round-off is relative to.
+    /// The sum of the absolute terms of each component, `Σ_j |Π_ij||w_j| + |K_ij||s_j|` and those of the
+    /// projections. Its round-off is relative to this sum.
     pub terms: N::Vector<f64>,
-    /// Its derivative along `w_H`, without that of the projections.
+    /// The derivative of the velocity along `w_H`, without the derivative of the projections.
     pub gain: N::Matrix<f64>,
     /// The entropy production `⟨w_S, K̃ w_S⟩`.
     pub production: f64,
-    /// The rate of the friction, `√|tr A²|` with `A` the derivative of `K̃ w_S` along the unknown: the
-    /// root of the sum of its squared eigenvalues, the same number in all units.
+    /// The rate of the friction, `√|tr A²|` with `A` the derivative of `K̃ w_S` along the unknown. It is the
+    /// root of the sum of the squared eigenvalues, the same number in all units.
     pub friction: f64,
     /// The same for the derivative of `Π̃ w_H`.
     pub rotation: f64,
 }
 
-/// The velocity `Π̃ w_H + K̃ w_S` at a real point `z` with its derivatives along the unknown of a step,
-/// from those of the covectors and of the point: `∂z` in the chart at `z`.
+/// Computes the velocity `Π̃ w_H + K̃ w_S` at a real point `z` with its derivatives along the unknown of a
+/// step, from the derivatives of the covectors and of the point, `∂z` in the chart at `z`.
 ///
 /// # Errors
 ///

@@ -23,9 +23,9 @@ pub(super) const MOMENTUM: f64 = 1e-6;
 
 /// Which covectors the bracket is made to annihilate.
 pub(super) struct ProjectionPlan {
-    /// The entropy's.
+    /// Whether it annihilates the covector of the entropy.
     pub(super) entropy: bool,
-    /// Whether the bracket has to be projected off them, and off those of the Casimirs.
+    /// Whether it must be projected for this, or for the covectors of the Casimirs.
     pub(super) projected: bool,
     /// Whether there are momenta.
     pub(super) momenta: bool,

@@ -19,13 +19,13 @@ pub(crate) struct BracketDefects<M: Space> {
     pub(crate) tensor: Matrix<M>,
     pub(crate) skewness: Violation,
     pub(crate) jacobi: Violation,
-    /// Whether the derivatives of the tensor are numbers.
+    /// Whether the derivatives of the tensor are finite.
     pub(crate) is_finite: bool,
 }
 
 /// Evaluates skewness and the Jacobi identity `Π^{il}∂_lΠ^{jk} + cyclic` at `x`, in chart coordinates of the
-/// sizes `units`. The terms may all be round-off: beside them, the `rounding` of the largest ones elsewhere
-/// is allowed for, and that of a generic product `Π^{il} Π^{jk} / ℓ_l`.
+/// sizes `units`. The terms may all be round-off. So their sizes include the `rounding` of the largest terms
+/// elsewhere, and of a generic product `Π^{il} Π^{jk} / ℓ_l`.
 pub(crate) fn bracket_defects<Y: Metriplectic + ?Sized>(
     system: &Y,
     x: &Point<Y>,
@@ -72,7 +72,7 @@ fn tensor<Y: Metriplectic + ?Sized, D: Scalar>(
     system.bracket().tensor(&system.bracket_args(x, &differential(system.entropy(), x)))
 }
 
-/// `Π` is skew, satisfies the Jacobi identity, and has `S` as a Casimir.
+/// Checks that `Π` is skew, satisfies the Jacobi identity, and has `S` as a Casimir.
 pub(super) fn examine<Y: Metriplectic + ?Sized>(
     place: &Place<'_, Y>,
     findings: &mut Findings<'_>,

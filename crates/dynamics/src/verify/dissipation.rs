@@ -9,8 +9,8 @@ use crate::dissipation::Dissipation;
 use crate::metriplectic::Metriplectic;
 use crate::model_error::ModelError;
 
-/// `K` is symmetric and positive semidefinite, and annihilates `dH`, and the discrete gradient `w` in its
-/// place.
+/// Checks that `K` is symmetric and positive semidefinite, and that it annihilates `dH` and the discrete
+/// gradient `w`.
 pub(super) fn examine<Y: Metriplectic + ?Sized>(
     place: &Place<'_, Y>,
     w: Option<&Vector<Y::Manifold>>,

@@ -8,7 +8,7 @@ use crate::dissipation::Dissipation;
 use crate::metriplectic::{Metriplectic, Point};
 use crate::model_error::ModelError;
 
-/// A field whose value at `x` is not a finite number.
+/// Finds a field whose value at `x` is not a finite number.
 pub(super) fn value_not_finite<Y: Metriplectic + ?Sized>(
     system: &Y,
     x: &Point<Y>,
@@ -23,9 +23,9 @@ pub(super) fn value_not_finite<Y: Metriplectic + ?Sized>(
         ("energy", system.energy().at::<f64>(x)),
         ("entropy", system.entropy().at::<f64>(x)),
         ("metric", system.metric().matrix(&at).max_abs()),
-        // A metric that cannot be used is reported as such, not as a bracket without a value.
+        // If the metric cannot be used, it is reported, and not a bracket without a value.
         ("bracket", bracket.map_or(0.0, |tensor| tensor.max_abs())),
-        // A derivative of the energy that is not finite is reported as such.
+        // If a derivative of the energy is not finite, it is reported, and not the force.
         ("force", force.map_or(0.0, |f| if dh.is_finite() { f.magnitude() } else { 0.0 })),
         (
             "dissipation",
@@ -36,7 +36,7 @@ pub(super) fn value_not_finite<Y: Metriplectic + ?Sized>(
     Some(ModelError::ValueNotFinite { field, value, point: Y::Manifold::entries(x) })
 }
 
-/// The terms of a field at the start are zero, or their last digits are numbers.
+/// Checks that the terms of a field at the start are zero, or that their last digits do not underflow.
 pub(super) fn has_digits<M: Manifold>(
     f: &impl ScalarField<M>,
     field: &'static str,

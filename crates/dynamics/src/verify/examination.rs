@@ -23,7 +23,7 @@ pub(super) struct Examination<'a, Y: Metriplectic + ?Sized> {
     system: &'a Y,
     /// The sizes of the coordinates at the start.
     sizes: CoordinateScales<Y::Manifold>,
-    /// How far points are drawn from it, relative to these.
+    /// The distance within which points are drawn, relative to these sizes.
     radius: f64,
     rng: ChaCha8Rng,
 }
@@ -34,10 +34,10 @@ impl<'a, Y: Metriplectic + ?Sized> Examination<'a, Y> {
         Self { system, sizes: CoordinateScales::at(system, x0), radius, rng }
     }
 
-    /// A point around the start at which the model has values.
+    /// Draws a point around the start at which the model has values.
     pub(super) fn sample(&mut self, x0: &Point<Y>, report: &mut Report) -> Option<Point<Y>> {
         let Self { system, sizes, radius, rng } = self;
-        // Beyond an open chart's edge, where its defect is infinite, or a field's, there is no model to judge.
+        // Outside the domain of an open chart, where the defect is infinite, or of a field, there is no model.
         let inside = |x: &Point<Y>| {
             system.manifold().defect(x).is_finite() && value_not_finite(*system, x).is_none()
         };
@@ -72,16 +72,15 @@ impl<'a, Y: Metriplectic + ?Sized> Examination<'a, Y> {
         axes.clone().try_for_each(|axis| fields::compare_dissipation(&place, axis))
     }
 
-    /// A discrete gradient of the energy between `x` and a point near it, in the chart at `x`: the mean of
-    /// the two differentials with Gonzalez' correction,
+    /// Computes a discrete gradient of the energy between `x` and a point near it, in the chart at `x`: the
+    /// mean of the two differentials with Gonzalez' correction,
     ///
     /// ```math
     /// w = \bar w + \frac{H(y) - H(x) - \langle \bar w, d \rangle}{G(d, d)}\, ♭d, \qquad
     /// \bar w = \tfrac12 (dH(x) + dH(y)), \qquad y = \varphi_x(d) .
     /// ```
     ///
-    /// It differs from `dH(x)` unless `H` is linear, of which every discrete gradient is `dH`. `None` if the
-    /// energy has no value nearby.
+    /// It differs from `dH(x)` unless `H` is linear. `None` if the energy has no value nearby.
     fn discrete_gradient(
         &mut self,
         x: &Point<Y>,
@@ -96,7 +95,7 @@ impl<'a, Y: Metriplectic + ?Sized> Examination<'a, Y> {
         let end = system.energy_at(&y);
         let along: Balance = (0..Dim::<Y>::LEN).map(|i| -mean[i] * d[i]).collect();
         let defect = end - energy.value + along.sum();
-        // The correction of a linear energy is the rounding of its values.
+        // For a linear energy, the correction is the rounding of its values.
         let rounding = 64.0 * f64::EPSILON * (end.abs() + energy.value.abs() + along.terms());
         if defect.abs() <= rounding {
             return Some(mean);

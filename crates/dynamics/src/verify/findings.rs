@@ -4,7 +4,7 @@ use super::balance::TOLERANCE;
 use crate::model_error::ModelError;
 use crate::report::LawResidual;
 
-/// What is found at one point: the laws' residuals and the first error.
+/// The findings at one point: the residuals of the laws, and the first error.
 pub(super) struct Findings<'a> {
     pub(super) point: Vec<f64>,
     pub(super) laws: &'a mut Vec<LawResidual>,
@@ -12,7 +12,7 @@ pub(super) struct Findings<'a> {
 }
 
 impl Findings<'_> {
-    /// Notes the violation of a law here, and keeps the worst of all points.
+    /// Records the violation of a law, and the first error.
     pub(super) fn note(
         &mut self,
         law: &'static str,
@@ -21,7 +21,7 @@ impl Findings<'_> {
     ) {
         if !self.record(law, size, TOLERANCE) && self.first.is_none() {
             let point = self.point.clone();
-            // All values of the model are finite here, so it is their products that are not.
+            // All values of the model are finite here, so their products overflow.
             self.first = Some(if size.is_finite() {
                 error(point)
             } else {
@@ -30,7 +30,7 @@ impl Findings<'_> {
         }
     }
 
-    /// Records the violation of a law here among the worst of all points, and returns whether it is
+    /// Records the violation of a law here if it is the worst of all points, and returns whether it is
     /// allowed.
     pub(super) fn record(&mut self, law: &'static str, size: f64, allowed: f64) -> bool {
         let known = self.laws.iter_mut().find(|residual| residual.law == law);

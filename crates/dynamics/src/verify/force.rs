@@ -10,8 +10,8 @@ use crate::metriplectic::{Dim, Metriplectic, SecondLaw};
 use crate::model_error::ModelError;
 use crate::velocity::differentials;
 
-/// `⟨w, f(w)⟩ = 0` for `dH` and for the discrete gradient `w`; `⟨dS, f⟩ ≥ 0` at the point and on a step from
-/// there.
+/// Checks that `⟨w, f(w)⟩ = 0` for `dH` and for the discrete gradient `w`, and that `⟨dS, f⟩ ≥ 0` at the point
+/// and on a step from it.
 pub(super) fn examine<Y: Metriplectic + ?Sized>(
     place: &Place<'_, Y>,
     w: Option<&Vector<Y::Manifold>>,

@@ -14,8 +14,8 @@ use crate::invariants::{Action, Invariants, Kind, Visitor};
 use crate::metriplectic::{Dim, Metriplectic, Point};
 use crate::model_error::ModelError;
 
-/// Each further invariant has finite derivatives, is conserved for the reason it is listed for, and
-/// the dissipation leaves it alone.
+/// Checks that each further invariant has finite derivatives, is conserved by the bracket as its kind says, and
+/// is conserved by the dissipation.
 pub(super) fn examine<Y: Metriplectic + ?Sized>(
     place: &Place<'_, Y>,
     findings: &mut Findings<'_>,
@@ -29,7 +29,7 @@ pub(super) fn examine<Y: Metriplectic + ?Sized>(
 struct Invariance<'a, 'b, 'c, Y: Metriplectic + ?Sized> {
     place: &'a Place<'b, Y>,
     findings: &'a mut Findings<'c>,
-    /// The differential of the one visited last.
+    /// The differential of the invariant visited last.
     dj: Option<Vector<Y::Manifold>>,
     failed: Result<(), ModelError>,
 }
@@ -89,7 +89,7 @@ impl<Y: Metriplectic + ?Sized> Invariance<'_, '_, '_, Y> {
         Ok(())
     }
 
-    /// The action preserves the bracket and the energy, and moves points along `Π dJ`.
+    /// Checks that the action preserves the bracket and the energy, and moves points along `Π dJ`.
     fn symmetric(&mut self, action: &Action<'_, Y::Manifold>) -> Result<(), ModelError> {
         let &Place { system, x, units, ref energy, ref entropy } = self.place;
         let (findings, n) = (&mut *self.findings, Dim::<Y>::LEN);
@@ -142,10 +142,10 @@ impl<Y: Metriplectic + ?Sized> Invariance<'_, '_, '_, Y> {
     }
 }
 
-/// How far along an action a symmetry is tried, relative to the sizes of the coordinates.
+/// How far along its action a symmetry is tested, relative to the sizes of the coordinates.
 const FAR: f64 = 0.7;
 
-/// What the values of an energy may differ by, beside their terms: their rounding, in the tolerance.
+/// The rounding of the values of an energy, in units of the tolerance.
 const ROUNDED: f64 = 64.0 * f64::EPSILON / TOLERANCE;
 
 /// A map from the coordinates of a chart to points.

@@ -7,7 +7,7 @@ use super::place::unusable;
 use crate::metriplectic::{Metriplectic, Point};
 use crate::model_error::ModelError;
 
-/// The metric can be factored, differentiated, and followed along a geodesic.
+/// Checks that the metric can be factored and differentiated, and that it has a geodesic.
 pub(super) fn examine<Y: Metriplectic + ?Sized>(
     system: &Y,
     x: &Point<Y>,

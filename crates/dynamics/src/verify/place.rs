@@ -16,12 +16,12 @@ pub(super) struct Place<'a, Y: Metriplectic + ?Sized> {
     pub(super) entropy: Jet2<Y::Manifold>,
 }
 
-/// The error of a metric that cannot be used at `x`.
+/// Converts the error of a metric that cannot be used at `x`.
 pub(super) fn unusable<M: Manifold>(x: &M::Point<f64>) -> impl Fn(MetricError) -> ModelError + '_ {
     |source| ModelError::Metric { source, point: M::entries(x) }
 }
 
-/// Value, differential and Hessian, all finite.
+/// Evaluates value, differential and Hessian, which must be finite.
 pub(super) fn jet<M: Manifold>(
     f: &impl ScalarField<M>,
     field: &'static str,

@@ -28,10 +28,10 @@ pub trait Column<D: Scalar>:
     /// The number of components.
     const LEN: usize;
 
-    /// The column whose `i`-th component is `f(i)`.
+    /// Makes the column whose `i`-th component is `f(i)`.
     fn from_index(f: impl FnMut(usize) -> D) -> Self;
 
-    /// `Σ_i a_i b_i`: a covector on a vector.
+    /// Computes `Σ_i a_i b_i`, a covector on a vector.
     fn dot(&self, other: &Self) -> D;
 
     /// The column of zeros.
@@ -58,7 +58,7 @@ pub trait Column<D: Scalar>:
         R::from_index(|i| self[i].re())
     }
 
-    /// The Euclidean norm of the real parts, also where their squares leave the range of numbers.
+    /// Computes the Euclidean norm of the real parts, also if their squares overflow or underflow.
     #[inline]
     fn magnitude(&self) -> f64 {
         let mut sum = 0.0;
@@ -78,7 +78,7 @@ pub trait Column<D: Scalar>:
         Self::from_index(|i| D::from(self[i].re().abs()))
     }
 
-    /// Whether every real part is finite.
+    /// Returns whether every real part is finite.
     #[inline]
     fn is_finite(&self) -> bool {
         (0..Self::LEN).all(|i| self[i].re().is_finite())
@@ -103,7 +103,7 @@ impl<D: Scalar, const N: usize> Column<D> for SVector<D, N> {
     }
 }
 
-/// The sums of squares that have all their digits.
+/// The sums of squares without overflow or underflow.
 pub(crate) const SQUARES: RangeInclusive<f64> = 1e-280..=1e280;
 
 /// The norm of numbers whose squares underflow or overflow, from the numbers in units of a power of two
@@ -112,15 +112,15 @@ pub(crate) const SQUARES: RangeInclusive<f64> = 1e-280..=1e280;
 pub(crate) fn scaled_norm(entries: impl Iterator<Item = f64> + Clone) -> f64 {
     let largest = entries.clone().fold(0.0_f64, |most, entry| most.max(entry.abs()));
     if largest == 0.0 || !largest.is_finite() {
-        // A NaN is not the largest of anything, and has to come through.
+        // `max` ignores NaN, which must appear in the result.
         return entries.fold(largest, |sum, entry| sum + entry.abs());
     }
     let unit = power_of_two(largest);
     entries.fold(0.0, |sum, entry| sum + (entry / unit).powi(2)).sqrt() * unit
 }
 
-/// The power of two at or below a positive number, at least the least normal one: a unit in which
-/// numbers keep their digits.
+/// Returns the power of two at or below a positive number, at least the least normal number. A division by it
+/// is exact.
 #[must_use]
 pub fn power_of_two(x: f64) -> f64 {
     f64::from_bits(x.max(f64::MIN_POSITIVE).to_bits() & f64::INFINITY.to_bits())

@@ -1,8 +1,8 @@
-//! Sizes that the compiler knows.
+//! Dimensions that the compiler knows.
 //!
-//! A manifold names its [`Dimension`] once; [`Column`] and [`Square`] are then all that generic
-//! code needs, without an allocator bound in sight. The concrete types are nalgebra's
-//! [`SVector`] and [`SMatrix`], so concrete code has all of nalgebra.
+//! A manifold names its [`Dimension`] once. Generic code then needs only [`Column`] and [`Square`], without
+//! allocator bounds. The concrete types are nalgebra's [`SVector`] and [`SMatrix`], so concrete code can use all
+//! of nalgebra.
 
 use std::fmt::Debug;
 use std::ops::IndexMut;
@@ -13,7 +13,7 @@ use crate::column::Column;
 use crate::scalar::Scalar;
 use crate::square::Square;
 
-/// The dimension of a manifold; [`Const<N>`] is the one implementation.
+/// The dimension of a manifold. [`Const<N>`] is the only implementation.
 pub trait Dimension: Copy + Debug + Send + Sync + 'static {
     /// The dimension as a number.
     const LEN: usize;

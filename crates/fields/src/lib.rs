@@ -1,17 +1,17 @@
-//! What the user writes, smooth functions as closures, and their derivatives.
+//! Smooth functions, which the user writes as closures, and their derivatives.
 //!
 //! | module | what it holds |
 //! |---|---|
 //! | [`scalar`] | [`Scalar`]: `f64` or a dual number over it; [`Real`], the one a closure uses |
 //! | [`column`](mod@column), [`square`] | [`Column`], [`Square`]: vectors and matrices of a size that the compiler knows |
 //! | [`dimension`] | [`Dimension`]: the size, and the types that have it |
-//! | [`space`] | [`Space`]: how a point looks at each scalar, and the chart around it |
+//! | [`space`] | [`Space`]: points at each scalar, and the chart around a point |
 //! | [`field`](mod@field) | [`ScalarField`] (`H`, `S`) and [`MatrixField`] (`g`, `Π`) |
 //! | [`closure`](mod@closure) | ordinary closures are fields, lifted to every scalar of order ≤ 2 |
 //! | [`differential`](mod@differential) | differential, Hessian and Jacobian at any scalar |
 //! | [`newton`] | damped Newton iterations, for unknowns of any kind |
-//! | [`series`] | the functions of a small angle, right under dual numbers |
-//! | [`laws`] | what a field promises, and the function that checks it |
+//! | [`series`] | functions of a small angle, right under dual numbers |
+//! | [`laws`] | the laws of a field, and the function that checks them |
 //!
 //! # Two doors
 //!

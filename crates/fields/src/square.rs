@@ -32,10 +32,10 @@ pub trait Square<D: Scalar>:
     /// A column of the same height.
     type Column: Column<D>;
 
-    /// The matrix whose entry in row `i`, column `j` is `f(i, j)`.
+    /// Makes the matrix whose entry in row `i`, column `j` is `f(i, j)`.
     fn from_entries(f: impl FnMut(usize, usize) -> D) -> Self;
 
-    /// The matrix whose `j`-th column is `f(j)`.
+    /// Makes the matrix whose `j`-th column is `f(j)`.
     #[inline]
     fn from_columns(mut f: impl FnMut(usize) -> Self::Column) -> Self {
         let mut matrix = Self::zeros();
@@ -57,16 +57,16 @@ pub trait Square<D: Scalar>:
     /// The matrix, factored.
     type Factors: Factors<Self::Column>;
 
-    /// The LU decomposition with row pivoting; `None` if the matrix is singular or not a number.
+    /// Computes the LU decomposition with row pivoting; `None` if the matrix is singular or not a number.
     fn factor(&self) -> Option<Self::Factors>;
 
-    /// The solution of `A x = b`; `None` if `A` is singular or not a number.
+    /// Solves `A x = b`; `None` if `A` is singular or not a number.
     #[inline]
     fn solve(&self, b: &Self::Column) -> Option<Self::Column> {
         self.factor()?.solve(b)
     }
 
-    /// The inverse; `None` if the matrix is singular or not a number.
+    /// Computes the inverse; `None` if the matrix is singular or not a number.
     fn inverse(&self) -> Option<Self> {
         let factors = self.factor()?;
         let mut inverse = Self::zeros();
@@ -109,7 +109,7 @@ pub trait Square<D: Scalar>:
         })
     }
 
-    /// The Frobenius norm of the real parts.
+    /// Computes the Frobenius norm of the real parts.
     #[inline]
     fn magnitude(&self) -> f64 {
         let mut sum = 0.0;
@@ -132,7 +132,7 @@ pub trait Square<D: Scalar>:
         Self::from_entries(|i, j| D::from(self[(i, j)].re().abs()))
     }
 
-    /// The lower triangular `L` with `A = L Lᵀ` (Cholesky), read from the lower triangle of `A`.
+    /// Computes the lower triangular `L` with `A = L Lᵀ` (Cholesky), read from the lower triangle of `A`.
     ///
     /// # Errors
     ///
@@ -160,7 +160,7 @@ pub trait Square<D: Scalar>:
         Ok(l)
     }
 
-    /// The solution of `L x = b` for a lower triangular `L` with nonzero diagonal.
+    /// Solves `L x = b` for a lower triangular `L` with nonzero diagonal.
     #[inline]
     fn solve_lower(&self, b: &Self::Column) -> Self::Column {
         let mut x = *b;
@@ -174,7 +174,7 @@ pub trait Square<D: Scalar>:
         x
     }
 
-    /// The solution of `Lᵀ x = b` for a lower triangular `L` with nonzero diagonal.
+    /// Solves `Lᵀ x = b` for a lower triangular `L` with nonzero diagonal.
     #[inline]
     fn solve_lower_transpose(&self, b: &Self::Column) -> Self::Column {
         let mut x = *b;
@@ -188,7 +188,7 @@ pub trait Square<D: Scalar>:
         x
     }
 
-    /// The root of the determinant of a symmetric positive matrix, from its Cholesky factor.
+    /// Computes the root of the determinant of a symmetric positive matrix, from its Cholesky factor.
     ///
     /// # Errors
     ///
@@ -199,7 +199,7 @@ pub trait Square<D: Scalar>:
         Ok((0..Self::Column::LEN).fold(D::one(), |product, i| product * l[(i, i)]))
     }
 
-    /// The largest `|A_ij|` over the real parts; NaN if any entry is.
+    /// Returns the largest `|A_ij|` over the real parts; NaN if any entry is NaN.
     #[inline]
     fn max_abs(&self) -> f64 {
         let mut worst = 0.0_f64;
@@ -217,7 +217,7 @@ pub trait Square<D: Scalar>:
 
 /// A factored matrix, which solves for any number of right-hand sides.
 pub trait Factors<V> {
-    /// The solution of `A x = b`; `None` if it is not a number.
+    /// Solves `A x = b`; `None` if it is not a number.
     fn solve(&self, b: &V) -> Option<V>;
 }
 

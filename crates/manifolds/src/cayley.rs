@@ -16,7 +16,8 @@ use crate::{Nodes, PointPair, Retraction, Riemannian, Rotations, StepPath, StepP
 /// = 1 + \frac{\hat a + \hat a^2/2}{1 + |a|^2/4} .
 /// ```
 ///
-/// Rational, of order 2, and exact in the energy like every other retraction (Cayley 1846; Bogfjellmo
+/// It is rational, has order 2, and conserves the energy exactly like every other retraction
+/// (Cayley 1846; Bogfjellmo
 /// and Marthinsen 2016 for its use in integrators). `cay(a)` turns by `2 atan(|a|/2)` about `a`, so the
 /// displacement of a step by the angle `θ` has the length `4 tan(θ/4)`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -12,8 +12,8 @@ use crate::{
 /// R_h(v_x) = \bigl(x,\ \exp_x(hv)\bigr).
 /// ```
 ///
-/// Schemes built on it have order 1; [`WeylMidpoint`](crate::WeylMidpoint) has order 2 at the same
-/// price.
+/// Schemes built on it have order 1. [`WeylMidpoint`](crate::WeylMidpoint) has order 2 at the same
+/// cost.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Exponential;
 

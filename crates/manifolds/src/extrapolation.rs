@@ -1,7 +1,7 @@
 //! Extrapolation of the modified midpoint rule (Gragg 1965, Bulirsch and Stoer 1966): an explicit
-//! method that finds its own order, for any state that can be added and compared.
+//! method of variable order, for any state that can be added and compared.
 
-/// What a solution is made of.
+/// A state of a solution.
 pub(crate) trait State: Copy {
     /// `self + other · h`.
     fn plus(&self, other: &Self, h: f64) -> Self;
@@ -44,7 +44,7 @@ fn midpoint_rule<Y: State>(
     smooth.is_finite().then_some(smooth)
 }
 
-/// Where a step ends.
+/// The end of a step.
 pub(crate) struct End<Y> {
     /// The state there.
     pub(crate) state: Y,

@@ -50,7 +50,7 @@ impl<M: Manifold, F: MatrixField<M>> Riemannian<M> for FieldMetric<F> {
     }
 
     fn end(&self, x: &M::Point<f64>, v: &Vector<M>) -> Result<M::Point<f64>, MetricError> {
-        // With the very roundings of a step's path, whose energy a step has been solved for.
+        // A step is solved for the energy at the end of its path, so the end must have the same roundings.
         Ok(self.weyl_path(x, v)?.end)
     }
 
@@ -83,9 +83,9 @@ impl<M: Manifold, F: MatrixField<M>> Riemannian<M> for FieldMetric<F> {
         Ok(M::chart(&here, &jet))
     }
 
-    /// By shooting: *a* geodesic, since the cut locus of a closure is not known. A point that the chart
-    /// at the other one does not reach is refused ([`MetricError::OutOfChart`]): the antipode, and a
-    /// rotation half a turn away.
+    /// Finds *a* geodesic by shooting, because the cut locus of a closure is not known. It refuses a point that
+    /// the chart at the other point does not reach ([`MetricError::OutOfChart`]): the antipode, and a rotation
+    /// by half a turn.
     fn log(&self, x: &M::Point<f64>, y: &M::Point<f64>) -> Result<Vector<M>, MetricError> {
         shooting::log(self, &self.field, x, y)
     }
@@ -99,7 +99,7 @@ impl<M: Manifold, F: MatrixField<M>> Riemannian<M> for FieldMetric<F> {
         };
         let z = geodesic_jet::follow(&self.field, &half).map_err(on_first_half)?;
         let end = geodesic_jet::follow(&self.field, &z).map_err(on_second_half)?;
-        // The path itself is the one without derivatives, with its roundings.
+        // The path without derivatives, so that both have the same roundings.
         let path = self.weyl_path(x, d)?;
         Ok(StepPathJet {
             z: path.z.base,

@@ -118,7 +118,7 @@ impl<M: Flat + Space<Dim = Const<N>>, const N: usize> Riemannian<M> for Constant
     straight_geodesics!();
 }
 
-/// Where the flat geodesic through `x` arrives: `x + v`, with the same velocity.
+/// The end of the flat geodesic through `x`: `x + v`, with the same velocity.
 #[inline]
 fn straight<M: Flat, D: Scalar>(
     x: &ChartPoint<M, D>,

@@ -15,8 +15,8 @@
 //!             + \tfrac12\, v^T (\partial_{\delta q} \partial_k g)\, v .
 //! ```
 //!
-//! Hyper-dual numbers give `g`, `∂g` and `∂∂g`. A geodesic that comes near the edge of its chart goes
-//! on in the chart around the point it has reached.
+//! Hyper-dual numbers give `g`, `∂g` and `∂∂g`. A geodesic near the edge of its chart continues in the chart
+//! around the point that it has reached.
 
 use metriplectic_fields::{
     ChartPoint, Column, Dimension, Matrix, MatrixField, Scalar, Space, Square, Vector,
@@ -29,18 +29,18 @@ use crate::extrapolation::{self, State};
 use crate::metric::GeodesicEnd;
 use crate::{Manifold, MetricError};
 
-/// A piece of a geodesic shorter than this, in a unit of time, is not worth pursuing.
+/// The shortest piece of a geodesic, in a unit of time.
 const SHORTEST: f64 = 1e-6;
-/// Doublings of a piece of that length, over which an obstacle is looked for.
+/// Doublings of this length, over which an obstacle is looked for.
 const LOOK_AHEAD: i32 = 9;
-/// Pieces that a geodesic may take, so that one through a very uneven metric comes to an end.
+/// The number of pieces of a geodesic, which bounds the cost in a very uneven metric.
 const PIECES: usize = 1024;
 
 /// A point of the phase space of geodesics.
 pub(crate) struct Phase<M: Space, D: Scalar> {
     pub(crate) q: Vector<M, D>,
     pub(crate) p: Vector<M, D>,
-    /// The size of the chart's coordinates where the geodesic starts, that its accuracy is relative to.
+    /// The size of the coordinates of the chart at the start of the geodesic. The accuracy is relative to it.
     pub(crate) size: f64,
 }
 
@@ -70,7 +70,7 @@ impl<M: Space, D: Scalar> State for Phase<M, D> {
     }
 }
 
-/// `difference / size`, where no difference is none.
+/// Divides a difference by a size; 0 if the difference is 0.
 pub(crate) fn relative(difference: f64, size: f64) -> f64 {
     if difference == 0.0 { 0.0 } else { difference / size }
 }
@@ -93,7 +93,7 @@ fn rate<M: Space>(
     Some(Phase { q: v, p: force, size: at.size })
 }
 
-/// The rate at any scalar, by one more dual number: the definition.
+/// The rate at any scalar by its definition, with one more dual number.
 fn rate_at_scalar<M: Space, D: Scalar>(
     field: &impl MatrixField<M>,
     x: &M::Point<f64>,
@@ -113,7 +113,7 @@ fn rate_at_scalar<M: Space, D: Scalar>(
     Some(Phase { q: v, p, size: at.size })
 }
 
-/// A point and a velocity of one chart, in the chart centred at the point itself.
+/// Converts a point and a velocity of a chart to the chart centred at the point.
 pub(crate) fn centred<M: Space, D: Scalar>(
     x: &M::Point<f64>,
     q: &Vector<M, D>,
@@ -127,7 +127,7 @@ pub(crate) fn centred<M: Space, D: Scalar>(
     (ChartPoint { base, q: Vector::<M, D>::from_index(|i| q[i].re) }, velocity)
 }
 
-/// What stops a geodesic at a real point of a chart, or a little ahead of it.
+/// Finds what stops a geodesic at a real point of a chart, or a little ahead of it.
 #[cold]
 fn obstacle<M: Space>(
     field: &impl MatrixField<M>,
@@ -142,7 +142,7 @@ fn obstacle<M: Space>(
     })
 }
 
-/// The end of a geodesic, unless its metric has no inverse there.
+/// Returns the end of a geodesic, or the error of a metric without an inverse there.
 pub(crate) fn ended<M: Space, T>(
     field: &impl MatrixField<M>,
     end: &M::Point<f64>,
@@ -211,8 +211,8 @@ pub(crate) fn travel<M: Space, Y: State>(
     Err(MetricError::Uneven { time, pieces: PIECES })
 }
 
-/// The geodesic from `x` with velocity `v`, followed for a unit of time at any scalar: its end,
-/// centred, and its velocity there.
+/// Follows the geodesic from `x` with velocity `v` for a unit of time, at any scalar. Returns its end, centred,
+/// and its velocity there.
 ///
 /// # Errors
 ///
@@ -238,7 +238,7 @@ pub(crate) fn follow<M: Manifold, D: Scalar>(
     Ok((end_point, v))
 }
 
-/// The same from a real point: the end and the velocity there, in the frame of the chart at the end.
+/// Follows a geodesic from a real point. Returns the end, and the velocity in the frame of the chart there.
 ///
 /// # Errors
 ///
@@ -264,7 +264,7 @@ pub(crate) fn follow_real<M: Manifold>(
     Ok((end, v))
 }
 
-/// The acceleration `−Γ(v, v)` of the geodesic through a real point, with the Christoffel symbols of
+/// Computes the acceleration `−Γ(v, v)` of the geodesic through a real point, with the Christoffel symbols of
 /// the metric: `g a = ½∇(vᵀ g v) − (∂_v g) v`.
 pub(crate) fn acceleration<M: Space>(
     field: &impl MatrixField<M>,

@@ -30,7 +30,7 @@ impl<M: Space> State for Bundle<M> {
     }
 
     fn distance(&self, other: &Self) -> f64 {
-        // The derivative of one displacement by another, which begins as a number of order one.
+        // The derivative of a displacement by another, which is of order one at the start.
         let dq = (self.dq - other.dq).magnitude() / (1.0 + self.dq.magnitude());
         let dp = relative((self.dp - other.dp).magnitude(), self.dp.magnitude());
         self.at.distance(&other.at).max(dq).max(dp)
@@ -150,7 +150,7 @@ fn into_velocities<M: Space>(
     Some(GeodesicJet { point: x.clone(), velocity, dpoint: y.dq, dvelocity })
 }
 
-/// A jet at the point with coordinates `q` of the chart at `x`, in the chart at that point.
+/// Converts a jet at the point with coordinates `q` of the chart at `x` to the chart at this point.
 fn recentred<M: Space>(x: &M::Point<f64>, q: &Vector<M>, jet: &GeodesicJet<M>) -> GeodesicJet<M> {
     let mut result = GeodesicJet::<M> {
         point: x.clone(),

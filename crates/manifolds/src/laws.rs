@@ -1,7 +1,6 @@
-//! What manifolds, metrics and retractions promise, and the functions that check it.
+//! The laws of manifolds, metrics and retractions, and the functions that check them.
 //!
-//! A manifold, metric or retraction of your own is checked by the same line as the ones of this
-//! crate.
+//! The same line checks a manifold, metric or retraction that you write and those of this crate.
 
 use approx::AbsDiffEq;
 use metriplectic_fields::{
@@ -12,7 +11,7 @@ use num_dual::{Dual, Dual64};
 use crate::metric::MetricError;
 use crate::{InnerProduct, Manifold, Retraction, Riemannian, Tangent};
 
-/// Round-off of a handful of operations on numbers of size `scale`.
+/// The round-off of a few operations on numbers of size `scale`.
 fn round_off<M: Manifold>(scale: f64) -> f64 {
     64.0 * M::Dim::LEN as f64 * f64::EPSILON * scale
 }
@@ -130,8 +129,8 @@ pub fn metric<M: Manifold, G: Riemannian<M>>(
     let (end, velocity) = usable("geodesics exist", metric.exp(&centre, v))?;
     let there = usable("g is positive", metric.at(&end))?;
     let speed = there.flat(&velocity).dot(&velocity);
-    // Numerical geodesics promise 10⁻¹³ of the momentum in each of their pieces, and the condition
-    // number of g is what that becomes in p·g⁻¹p.
+    // Numerical geodesics have an error of 10⁻¹³ of the momentum in each piece. In p·g⁻¹p the condition
+    // number of g multiplies it.
     let error = relative(speed - square, square);
     let bound = 1e-11 * condition::<M>(&g).max(condition::<M>(&metric.matrix(&end)));
     BrokenLaw::unless("geodesics have constant speed", error, bound)?;
@@ -211,8 +210,8 @@ pub fn retraction<M: Manifold, G: Riemannian<M>, R: Retraction<M, G>>(
             let column = Vector::<M>::from_index(|i| dual[i].eps - slope[(i, k)]);
             column.magnitude()
         };
-        // Two numerical geodesics, each with its own steps; their derivatives are those of the
-        // variational equations, which grow along the way and are not what the steps are chosen by.
+        // The two numerical geodesics have different steps. The variational equations grow along the way, and
+        // the steps are not chosen for them.
         let bound = 1e-10 * (1.0 + pure::<M>(x, u.magnitude()));
         BrokenLaw::unless("∂z/∂u is the derivative of z", error(&z, &jet.dz), bound)?;
         BrokenLaw::unless("∂d/∂u is the derivative of d", error(&path.d, &jet.dd), bound)?;
@@ -255,12 +254,12 @@ fn same<M: Manifold>(
     Err(BrokenLaw { law, size: apart.max((a.vector - b.vector).magnitude()), bound })
 }
 
-/// `|difference| / size`, where no difference is none.
+/// Computes `|difference| / size`; 0 if the difference is 0.
 fn relative(difference: f64, size: f64) -> f64 {
     if difference == 0.0 { 0.0 } else { difference.abs() / size }
 }
 
-/// A metric that cannot be used breaks the law that it exists.
+/// Converts the error of a metric into the law that the metric exists.
 fn usable<T>(law: &'static str, result: Result<T, MetricError>) -> Result<T, BrokenLaw> {
     result.map_err(|_| BrokenLaw { law, size: f64::NAN, bound: 0.0 })
 }

@@ -1,12 +1,11 @@
-//! Where the state lives: manifolds, their metrics, and the retractions that turn a tangent vector
-//! into a pair of points.
+//! Manifolds, their metrics, and the retractions that map a tangent vector to a pair of points.
 //!
 //! The page of each space is its chapter: points and velocities, frame and chart, geodesics with their
 //! accuracy, and the brackets that live there, with the sources of what is not elementary.
 //!
 //! | module | what it holds |
 //! |---|---|
-//! | [`manifold`](mod@manifold) | [`Manifold`]: what every space of states answers |
+//! | [`manifold`](mod@manifold) | [`Manifold`]: a space of states |
 //! | [`euclidean`](mod@euclidean) | [`Euclidean`]: Rⁿ |
 //! | [`lie_algebra`] | [`LieAlgebra`]: structure constants |
 //! | [`lie_dual`] | [`LieDual`]: the dual of a Lie algebra, with the ready-made algebras |
@@ -17,7 +16,7 @@
 //! | [`chart`](mod@chart) | [`Chart`]: an open part of Rⁿ, in coordinates of your own |
 //! | [`product`](mod@product) | [`Product`]: `A × B` |
 //! | [`normal`] | normal coordinates on a space of constant curvature |
-//! | [`metric_error`] | [`MetricError`]: why a metric cannot be used |
+//! | [`metric_error`] | [`MetricError`]: errors of metrics and geodesics |
 //! | [`inner_product`] | [`InnerProduct`]: flat and sharp at one point; [`Canonical`] |
 //! | [`metric`] | [`Riemannian`]: norm, distance, geodesics |
 //! | [`flat`] | metrics that are constant in a global chart, with straight geodesics: [`Metric::constant`] |
@@ -29,7 +28,7 @@
 //! | [`exponential`] | [`Exponential`]: based at the start, order 1 |
 //! | [`projection`] | [`Projection`]: symmetric, rational but for a root, on spheres |
 //! | [`cayley`] | [`Cayley`]: symmetric, rational, on SO(3) |
-//! | [`laws`] | what each of them promises, and the functions that check it |
+//! | [`laws`] | the laws of each of them, and the functions that check them |
 
 pub mod cayley;
 pub mod chart;

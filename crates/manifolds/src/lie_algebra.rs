@@ -5,14 +5,13 @@ use nalgebra::{SMatrix, SVector};
 
 /// A Lie algebra of dimension `N` by its structure constants, `[e_a, e_b] = C_ab^d e_d`.
 ///
-/// Only the nonzero constants are kept.
+/// It stores only the nonzero constants.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LieAlgebra<const N: usize> {
     nonzero: Vec<StructureConstant>,
 }
 
-/// Matrices of a basis are taken to be dependent, and commutators to lie in their span, up to this
-/// relative size.
+/// The relative size below which matrices of a basis count as dependent, and commutators as in their span.
 const SPAN_TOLERANCE: f64 = 1e-12;
 
 /// One nonzero `C_ab^d`.
@@ -29,7 +28,7 @@ pub struct StructureConstant {
 }
 
 impl<const N: usize> LieAlgebra<N> {
-    /// The algebra with `[e_a, e_b] = constants[a][b][d] e_d`.
+    /// Makes the algebra with `[e_a, e_b] = constants[a][b][d] e_d`.
     ///
     /// # Errors
     ///
@@ -41,7 +40,7 @@ impl<const N: usize> LieAlgebra<N> {
         Self::checked(constants, 6.0 * N as f64 * f64::EPSILON)
     }
 
-    /// The algebra of the given constants if their laws hold to a relative `tolerance`.
+    /// Makes the algebra of the given constants if their laws hold to a relative `tolerance`.
     fn checked(constants: &[[[f64; N]; N]; N], tolerance: f64) -> Result<Self, AlgebraError> {
         let c = |a: usize, b: usize, d: usize| constants[a][b][d];
         let largest = finite_maximum(constants)?;
@@ -69,7 +68,7 @@ impl<const N: usize> LieAlgebra<N> {
         Ok(Self { nonzero })
     }
 
-    /// The algebra spanned by matrices, with the commutator `[A, B] = AB − BA`.
+    /// Makes the algebra spanned by matrices, with the commutator `[A, B] = AB − BA`.
     ///
     /// # Errors
     ///
@@ -102,7 +101,7 @@ impl<const N: usize> LieAlgebra<N> {
         Self::checked(&constants, SPAN_TOLERANCE)
     }
 
-    /// The algebra of constants that are known to satisfy the laws.
+    /// Makes the algebra of constants that are known to satisfy the laws.
     pub(crate) const fn known(nonzero: Vec<StructureConstant>) -> Self {
         Self { nonzero }
     }
@@ -112,7 +111,7 @@ impl<const N: usize> LieAlgebra<N> {
         &self.nonzero
     }
 
-    /// The bracket `[ξ, η]^d = C_ab^d ξ^a η^b`.
+    /// Computes the bracket `[ξ, η]^d = C_ab^d ξ^a η^b`.
     pub fn bracket<D: Scalar>(&self, xi: &SVector<D, N>, eta: &SVector<D, N>) -> SVector<D, N> {
         let mut sum = <SVector<D, N> as Column<D>>::zero();
         for c in &self.nonzero {
@@ -121,7 +120,7 @@ impl<const N: usize> LieAlgebra<N> {
         sum
     }
 
-    /// The coadjoint action `(ad*_ξ μ)_b = C_ab^d ξ^a μ_d`, that is `⟨ad*_ξ μ, η⟩ = ⟨μ, [ξ, η]⟩`.
+    /// Computes the coadjoint action `(ad*_ξ μ)_b = C_ab^d ξ^a μ_d`, that is `⟨ad*_ξ μ, η⟩ = ⟨μ, [ξ, η]⟩`.
     #[inline]
     pub fn coadjoint<D: Scalar>(&self, xi: &SVector<D, N>, mu: &SVector<D, N>) -> SVector<D, N> {
         let mut sum = <SVector<D, N> as Column<D>>::zero();

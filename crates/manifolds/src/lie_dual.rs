@@ -1,22 +1,22 @@
-//! The dual `g*` of a Lie algebra, where reduced mechanical systems live.
+//! The dual `g*` of a Lie algebra, the phase space of reduced mechanical systems.
 //!
-//! A mechanical system on a group `G` whose energy is left-invariant forgets its configuration: what
-//! remains is the momentum in the body frame, `μ ∈ g*` (Marsden and Ratiu 1999, ch. 13; Bloch, Farré
+//! If the energy of a mechanical system on a group `G` is left-invariant, the configuration drops out of the
+//! equations. The state is then the momentum in the body frame, `μ ∈ g*` (Marsden and Ratiu 1999, ch. 13; Bloch, Farré
 //! Puiggalí and Martín de Diego 2024, §3). With `[e_a, e_b] = C_ab^d e_d`:
 //!
 //! - **Point and velocity**: columns of the components `μ_a = ⟨μ, e_a⟩` and of `μ'_a`.
 //! - **Frame**: the dual basis `e^a`, the same everywhere.
 //! - **Chart**: `φ_μ(q) = μ + q`.
 //! - **Geodesics**: straight lines, as on [Rⁿ](mod@crate::euclidean).
-//! - **Bracket**: `LiePoisson`, which every dual starts with,
+//! - **Bracket**: `LiePoisson` by default,
 //!
 //! ```math
 //! \mu' = \mathrm{ad}^*_{\xi}\, \mu, \qquad
 //! \mu'_b = C_{ab}^d\, \xi^a \mu_d, \qquad \xi = dH(\mu) .
 //! ```
 //!
-//! The flow stays on a coadjoint orbit, a level set of the Casimirs: the functions with
-//! `ad*_{dC} μ = 0`, of which an entropy is made.
+//! The flow stays on a coadjoint orbit, on which the Casimirs are constant: the functions with
+//! `ad*_{dC} μ = 0`. An entropy is a function of Casimirs.
 //!
 //! | dual | brackets | Casimirs |
 //! |---|---|---|
@@ -102,7 +102,7 @@ impl<const N: usize> LieDual<N> {
 }
 
 impl LieDual<3> {
-    /// `so(3)*`, the angular momenta of a body in its own frame: `[e_a, e_b] = ε_abc e_c`.
+    /// `so(3)*`, the angular momenta of a body in the body frame: `[e_a, e_b] = ε_abc e_c`.
     pub fn so3() -> Self {
         Self::su2(1.0)
     }

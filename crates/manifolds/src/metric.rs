@@ -17,8 +17,7 @@ pub use crate::metric_error::MetricError;
 /// A few roundings: the accuracy of a closed form.
 pub(crate) const ROUNDED: f64 = 4.0 * f64::EPSILON;
 
-/// Where a geodesic arrives: the point in the chart centred at its real part, and the velocity in
-/// that frame.
+/// The end of a geodesic: the point in the chart centred at its real part, and the velocity in this frame.
 pub type GeodesicEnd<M, D> = (ChartPoint<M, D>, Vector<M, D>);
 
 /// A Riemannian metric on `M`, and its geodesics.
@@ -34,17 +33,17 @@ pub trait Riemannian<M: Space> {
     /// The metric at one point.
     type At<D: Scalar>: InnerProduct<Vector<M, D>>;
 
-    /// The metric at a point, in the frame of its chart.
+    /// Evaluates the metric at a point, in the frame of its chart.
     ///
     /// # Errors
     ///
     /// [`MetricError`] if the matrix is not symmetric and positive.
     fn at<D: Scalar>(&self, x: &ChartPoint<M, D>) -> Result<Self::At<D>, MetricError>;
 
-    /// The matrix `g` itself, unchecked.
+    /// Evaluates the matrix `g`, without a check.
     fn matrix<D: Scalar>(&self, x: &ChartPoint<M, D>) -> Matrix<M, D>;
 
-    /// The geodesic with `γ(0) = x` and `γ'(0) = v`, at time 1.
+    /// Follows the geodesic with `γ(0) = x` and `γ'(0) = v` to time 1.
     ///
     /// # Errors
     ///
@@ -55,7 +54,7 @@ pub trait Riemannian<M: Space> {
         v: &Vector<M, D>,
     ) -> Result<GeodesicEnd<M, D>, MetricError>;
 
-    /// The end `exp_x(v)` of a geodesic from a real point: a faster answer where the chart is normal.
+    /// Computes the end `exp_x(v)` of a geodesic from a real point. It is faster where the chart is normal.
     ///
     /// # Errors
     ///
@@ -64,7 +63,7 @@ pub trait Riemannian<M: Space> {
         Ok(self.exp(&ChartPoint::centre(x), v)?.0.point())
     }
 
-    /// The geodesic from a real point with velocity `v`, at time `t`, with its first and second
+    /// Follows the geodesic from a real point with velocity `v` to time `t`, with its first and second
     /// derivative along `t`: the point `γ(t + ε₁ + ε₂)`.
     ///
     /// # Errors
@@ -77,15 +76,15 @@ pub trait Riemannian<M: Space> {
         t: f64,
     ) -> Result<M::Point<Real>, MetricError>;
 
-    /// The vector `v` at `x` with `exp_x(v) = y`. Of an open [`Chart`](crate::Chart) the domain is not
-    /// known here: the way may lead through what it leaves out.
+    /// Finds the vector `v` at `x` with `exp_x(v) = y`. It does not know the domain of an open
+    /// [`Chart`](crate::Chart), so the geodesic may leave the domain.
     ///
     /// # Errors
     ///
-    /// [`MetricError`] if there is none that is found.
+    /// [`MetricError`] if no vector is found.
     fn log(&self, x: &M::Point<f64>, y: &M::Point<f64>) -> Result<Vector<M>, MetricError>;
 
-    /// The geodesic of time 1 from `x` with velocity `d`, at its middle and its end.
+    /// Follows the geodesic of time 1 from `x` with velocity `d`, to its middle and its end.
     ///
     /// # Errors
     ///
@@ -96,14 +95,14 @@ pub trait Riemannian<M: Space> {
         Ok(StepPath { z: ChartPoint::centre(&z), d, end })
     }
 
-    /// The same path, with the derivatives along `d`.
+    /// Follows the same path, with the derivatives along `d`.
     ///
     /// # Errors
     ///
     /// Those of [`exp`](Self::exp).
     fn weyl_jet(&self, x: &M::Point<f64>, d: &Vector<M>) -> Result<StepPathJet<M>, MetricError>;
 
-    /// The length `√G(v, v)` of a tangent vector at a real point.
+    /// Computes the length `√G(v, v)` of a tangent vector at a real point.
     ///
     /// # Errors
     ///
@@ -113,8 +112,8 @@ pub trait Riemannian<M: Space> {
         finite("the length of a vector", at.orthonormal(&at.flat(v)).magnitude())
     }
 
-    /// The length of the geodesic that [`log`](Self::log) finds between two points: their distance,
-    /// where it is the shortest.
+    /// Computes the length of the geodesic that [`log`](Self::log) finds between two points. It is their
+    /// distance if the geodesic is the shortest.
     ///
     /// # Errors
     ///
@@ -123,7 +122,7 @@ pub trait Riemannian<M: Space> {
         self.norm(x, &self.log(x, y)?)
     }
 
-    /// The Christoffel symbols at a real point in the chart centred there: the `k`-th matrix is
+    /// Computes the Christoffel symbols at a real point in the chart centred there. The `k`-th matrix is
     /// `Γᵏ_ij = ½ g^{kl} (∂_i g_lj + ∂_j g_li − ∂_l g_ij)`. They vanish where the chart is normal.
     ///
     /// # Errors
@@ -155,8 +154,8 @@ pub trait Riemannian<M: Space> {
         ROUNDED
     }
 
-    /// What rounding has lost of the displacement `v` on the way from `x` to `y = exp_x(v)`, so that
-    /// the next step can make up for it; zero where it is not known.
+    /// Computes the rounding error of the displacement `v` on the way from `x` to `y = exp_x(v)`, which the next
+    /// step compensates; zero where it is not known.
     #[inline]
     fn lost(&self, _x: &M::Point<f64>, _v: &Vector<M>, _y: &M::Point<f64>) -> Vector<M> {
         Vector::<M>::zero()

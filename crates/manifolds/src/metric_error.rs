@@ -1,4 +1,4 @@
-//! Why a metric cannot be used, and the checks that tell.
+//! Errors of metrics and geodesics, and the checks that find them.
 
 use metriplectic_fields::{ChartPoint, Column, NotPositive, Scalar, Space, Square};
 
@@ -36,7 +36,7 @@ pub enum MetricError {
          a smaller step, or points that are closer together"
     )]
     OutOfChart {
-        /// The norm of the coordinates; not a number where there are none.
+        /// The norm of the coordinates; NaN where there are no coordinates.
         distance: f64,
     },
     /// `g ≠ gᵀ`.
@@ -54,7 +54,7 @@ pub enum MetricError {
     /// Not positive definite.
     #[error("the metric is {0}")]
     NotPositive(#[from] NotPositive),
-    /// A geodesic runs out of the chart: the metric beyond is not a number.
+    /// A geodesic leaves the chart: the metric beyond is not a number.
     #[error(
         "the geodesic runs into the edge of the chart at {time:.3} of its way, where the metric is not a \
          finite number; take a smaller step, or a metric in which the edge is far"
@@ -96,8 +96,8 @@ pub enum MetricError {
         /// How far off the best geodesic ends.
         missed_by: f64,
     },
-    /// Two points, or the ends of a step, are so far apart that no shortest geodesic, or more than
-    /// one, joins them.
+    /// Two points, or the ends of a step, are so far apart that no shortest geodesic, or more than one shortest
+    /// geodesic, joins them.
     #[error(
         "a geodesic of length {length:.6} reaches the cut locus, which starts at {radius:.6}; take a \
          smaller step, or points that are closer together"
@@ -111,14 +111,14 @@ pub enum MetricError {
 }
 
 impl MetricError {
-    /// The error of a geodesic that stops at `time`, if it is the matrix `g` there that stops it.
+    /// Returns the error of a geodesic that stops at `time`, if the matrix `g` there is the cause.
     pub(crate) fn stopped<D: Scalar>(time: f64, g: &impl Square<D>) -> Option<Self> {
         let not_positive = g.cholesky().err()?;
         let edge = !not_positive.pivot.is_finite();
         Some(if edge { Self::Edge { time } } else { Self::Degenerate { time, not_positive } })
     }
 
-    /// The error on a part of a way that begins at `start` and has the length `fraction`.
+    /// Converts the times of an error on a part of a geodesic, from `start` with the length `fraction`.
     pub(crate) fn on_part(self, start: f64, fraction: f64) -> Self {
         let whole = |time| start + fraction * time;
         match self {
@@ -131,7 +131,7 @@ impl MetricError {
         }
     }
 
-    /// The error of a point that is at the edge of its chart.
+    /// Makes the error of a point at the edge of its chart.
     #[cold]
     pub fn out_of_chart<M: Space, D: Scalar>(x: &ChartPoint<M, D>) -> Self {
         Self::OutOfChart { distance: x.q.magnitude() }
@@ -144,7 +144,7 @@ pub(crate) fn within(radius: f64, length: f64) -> Result<(), MetricError> {
     if length < radius - 4.0 * f64::EPSILON { Ok(()) } else { Err(beyond(radius, length)) }
 }
 
-/// A length that is not a number has not reached anything.
+/// Makes the error of a length that is too large, or NaN.
 #[cold]
 fn beyond(radius: f64, length: f64) -> MetricError {
     if length.is_nan() {
@@ -154,14 +154,14 @@ fn beyond(radius: f64, length: f64) -> MetricError {
     }
 }
 
-/// A number that has not left the range of numbers.
+/// Refuses a number that is not finite.
 #[inline]
 pub(crate) fn finite<D: Scalar>(quantity: &'static str, number: D) -> Result<D, MetricError> {
     let value = number.re();
     if value.is_finite() { Ok(number) } else { Err(MetricError::NotFinite { quantity, value }) }
 }
 
-/// A column whose components have not left the range of numbers.
+/// Refuses a column with a component that is not finite.
 #[inline]
 pub(crate) fn finite_column<D: Scalar, V: Column<D>>(
     quantity: &'static str,

@@ -40,8 +40,8 @@ struct PathEnergy<'a, M: Space, F> {
 }
 
 impl<M: Space, F: MatrixField<M>> PathEnergy<'_, M, F> {
-    /// Notes an evaluation, as long as there may be more: a line search through a metric that is not
-    /// smooth has no end of its own.
+    /// Counts an evaluation, and fails at the limit. Without it, a line search through a metric that is not
+    /// smooth may not end.
     fn spend(&self) -> Result<(), argmin::core::Error> {
         self.evaluations.set(self.evaluations.get() + 1);
         if self.evaluations.get() <= EVALUATIONS {
@@ -51,7 +51,7 @@ impl<M: Space, F: MatrixField<M>> PathEnergy<'_, M, F> {
         }
     }
 
-    /// The corner `k`, the ends among them.
+    /// The corner `k`, where the first and the last corner are the ends.
     fn corner(&self, path: &[f64], k: usize) -> Vector<M> {
         match k {
             0 => Vector::<M>::zero(),
@@ -249,7 +249,7 @@ impl<M: Manifold, F: MatrixField<M>> Problem for MultipleShooting<'_, M, F> {
     }
 
     fn stop(&self, last: Pieces<M>, _: Cause, _: usize) -> Result<Vector<M>, Unsolved> {
-        // Single shooting judges what there is.
+        // Single shooting decides whether the aim is good.
         Ok(last.velocity())
     }
 }

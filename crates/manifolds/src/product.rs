@@ -3,14 +3,14 @@
 //! - **Point and velocity**: a pair of points, which a closure takes apart; the velocity of the first
 //!   factor, with that of the second below it.
 //! - **Frame and chart**: those of the factors, `φ_{(a,b)}(q, r) = (φ_a(q), φ_b(r))`.
-//! - **Geodesics**: of a pair of metrics `(gA, gB)`, and of [`Canonical`](crate::Canonical), which is the
-//!   pair of the canonical ones, pairs of geodesics, as accurate as those of the factors, with
-//!   `d² = d_A² + d_B²` (Lee 2018, ch. 2, for the product metric); none is longer than the factors allow.
+//! - **Geodesics** of a pair of metrics `(gA, gB)` are pairs of geodesics, as accurate as those of the
+//!   factors, with `d² = d_A² + d_B²` (Lee 2018, ch. 2, for the product metric). The limits of the factors
+//!   apply. [`Canonical`](crate::Canonical) is the pair of the canonical metrics.
 //!   One [closure](crate::Metric::field) for the full matrix couples the
 //!   factors, and its geodesics are numerical.
-//! - **Brackets**: none unless one is asked for. A pair, `{f, g} = {f, g}_A + {f, g}_B`, whose Casimirs
-//!   are functions of the Casimirs of both: with `(AreaForm, Zero)` on `S² × R` each function of the
-//!   second factor is one, and so an entropy there leaves the precession alone. `Symplectic` on
+//! - **Brackets**: none by default. The Casimirs of a pair, `{f, g} = {f, g}_A + {f, g}_B`, are functions of
+//!   the Casimirs of both. With `(AreaForm, Zero)` on `S² × R` each function of the second factor is a
+//!   Casimir, so an entropy there does not change the precession. `Symplectic` on
 //!   `Rⁿ × Rⁿ`, and on `SO(3) × R³` trivialised from the left,
 //!
 //! ```math
@@ -42,8 +42,8 @@ use crate::{Manifold, PointError};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Product<A, B>(pub A, pub B);
 
-/// Spaces whose dimensions can be added: the left and the right factor of a product. Nothing to
-/// implement.
+/// Spaces whose dimensions can be added: the left and the right factor of a product. It is implemented for
+/// all such spaces.
 pub trait Times<B: Space>: Space {
     /// The dimension of the product.
     type SumDim: Dimension;
@@ -146,7 +146,7 @@ impl<A: Times<B>, B: Space> Space for Product<A, B> {
 }
 
 impl<A: Manifold + Times<B>, B: Manifold> Manifold for Product<A, B> {
-    /// The larger one of the factors' defects.
+    /// Returns the larger defect of the two factors.
     fn defect(&self, (a, b): &Self::Point<f64>) -> f64 {
         let (a, b) = (self.0.defect(a), self.1.defect(b));
         if a.is_nan() || a > b { a } else { b }
@@ -186,7 +186,7 @@ impl<A: Manifold + Times<B>, B: Manifold> Manifold for Product<A, B> {
         (self.0.random(rng), self.1.random(rng))
     }
 
-    /// Each factor checks its own half; an entry is counted in the whole point.
+    /// Lets each factor check its part. An entry is counted in the whole point.
     fn check(&self, (a, b): &Self::Point<f64>) -> Result<(), PointError> {
         self.0.check(a)?;
         self.1.check(b).map_err(|error| match error {

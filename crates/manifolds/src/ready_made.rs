@@ -11,7 +11,7 @@ use crate::metric_error::MetricError;
 pub enum Metric {}
 
 impl Metric {
-    /// The metric with the same matrix everywhere on a flat space.
+    /// Makes the metric with the same matrix everywhere on a flat space.
     ///
     /// ```
     /// use metriplectic_manifolds::Metric;
@@ -27,21 +27,20 @@ impl Metric {
         Constant::new(g)
     }
 
-    /// The metric `G(u, v) = θ(u)·A(x) θ(v)` from a closure `A` or any other
+    /// Makes the metric `G(u, v) = θ(u)·A(x) θ(v)` from a closure `A` or any other
     /// [`MatrixField`](metriplectic_fields::MatrixField), with `θ` the
     /// [`velocity`](metriplectic_fields::Space::embed) of a tangent vector:
     ///
     /// | on | a velocity is | the closure returns |
     /// |---|---|---|
     /// | a vector space, a chart | `x'` | `g`, `n × n` |
-    /// | Sⁿ | `x'` in Rⁿ⁺¹ | a form on Rⁿ⁺¹, `(n+1) × (n+1)`; what it does off the sphere is not looked at |
+    /// | Sⁿ | `x'` in Rⁿ⁺¹ | a form on Rⁿ⁺¹, `(n+1) × (n+1)`; only its part along the sphere is used |
     /// | SO(3) | the body angular velocity `Ω` | the inner product on so(3), `3 × 3` |
     /// | R₊ | `s'` | `1 × 1` |
     /// | a product | both, one below the other | the full matrix |
     ///
-    /// Whether it is symmetric and positive is checked at every point where it is used. Geodesics are
-    /// integrated with an estimated error of 10⁻¹³ in each piece; their derivatives come from dual
-    /// numbers.
+    /// Every use of the matrix checks that it is symmetric and positive. Geodesics are integrated with an
+    /// estimated error of 10⁻¹³ in each piece. Their derivatives come from dual numbers.
     ///
     /// ```
     /// use metriplectic_fields::Real;

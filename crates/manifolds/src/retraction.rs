@@ -1,4 +1,4 @@
-//! Retractions: how a tangent vector becomes a pair of points.
+//! Retractions, which map a tangent vector to a pair of points.
 
 use approx::{AbsDiffEq, RelativeEq};
 use metriplectic_fields::{Column, Dimension, Matrix, Real, Scalar, Space, Square, Vector};
@@ -11,13 +11,13 @@ pub use crate::step_path::{StepPath, StepPathJet};
 /// A discrete derivative `R_h: TM → M × M` (Bloch, Farré Puiggalí, Martín de Diego 2024, §4.4):
 /// a base point `z` and a vector `v ∈ T_zM` stand for a pair `(x, x')`.
 ///
-/// Everything here is written in the displacement `d = hv`, so no step size appears.
+/// The methods use the displacement `d = hv`, so no step size appears.
 ///
 /// Laws ([`laws::retraction`](crate::laws::retraction)): 1. `R_h⁻¹ R_h = 1`; 2. the path from `x`
-/// ends where the pair does; 3. `real_step_path` is `path`, and `step_path_jet` its derivative; 4. a symmetric one returns
-/// the same base and the opposite vector for the swapped pair.
+/// ends where the pair does; 3. `real_step_path` is `path`, and `step_path_jet` its derivative; 4. a symmetric retraction
+/// returns the same base and the opposite vector for the swapped pair.
 pub trait Retraction<M: Manifold, G: Riemannian<M>> {
-    /// The path that leaves `x` with initial displacement `u ∈ T_xM`: the unknown of a step.
+    /// Follows the path that leaves `x` with initial displacement `u ∈ T_xM`, the unknown of a step.
     ///
     /// # Errors
     ///
@@ -29,7 +29,7 @@ pub trait Retraction<M: Manifold, G: Riemannian<M>> {
         u: &Vector<M, D>,
     ) -> Result<StepPath<M, D>, MetricError>;
 
-    /// The same path at `f64`, in the charts at its own points.
+    /// Follows the same path at `f64`, in the charts at its points.
     ///
     /// # Errors
     ///
@@ -44,7 +44,7 @@ pub trait Retraction<M: Manifold, G: Riemannian<M>> {
         self.step_path(metric, x, u)
     }
 
-    /// The end of the path of `u` alone; that of a geodesic, unless the retraction says otherwise.
+    /// Computes the end of the path of `u`. By default it is the end of a geodesic.
     ///
     /// # Errors
     ///
@@ -59,8 +59,7 @@ pub trait Retraction<M: Manifold, G: Riemannian<M>> {
         metric.end(x, u)
     }
 
-    /// A curve from the start of the path to its end; the geodesic, unless the retraction says
-    /// otherwise.
+    /// Computes a curve from the start of the path to its end. By default it is the geodesic.
     ///
     /// # Errors
     ///
@@ -70,7 +69,7 @@ pub trait Retraction<M: Manifold, G: Riemannian<M>> {
         Nodes::of(|t| metric.along(x, u, t))
     }
 
-    /// The same path at `f64`, with its derivatives along `u`.
+    /// Follows the same path at `f64`, with its derivatives along `u`.
     ///
     /// # Errors
     ///
@@ -82,14 +81,14 @@ pub trait Retraction<M: Manifold, G: Riemannian<M>> {
         u: &Vector<M>,
     ) -> Result<StepPathJet<M>, MetricError>;
 
-    /// `R_h(v)`: the pair `(x, x')` of the displacement `d = hv` at `z`.
+    /// Computes `R_h(v)`, the pair `(x, x')` of the displacement `d = hv` at `z`.
     ///
     /// # Errors
     ///
     /// [`MetricError`] if the geodesic cannot be followed.
     fn pair(&self, metric: &G, tangent: &Tangent<M>) -> Result<PointPair<M>, MetricError>;
 
-    /// `R_h⁻¹(x, y)`: the base point and the displacement `d = hv`.
+    /// Computes `R_h⁻¹(x, y)`, the base point and the displacement `d = hv`.
     ///
     /// # Errors
     ///

@@ -15,7 +15,7 @@ pub fn vee<D: Scalar>(m: &Matrix3<D>) -> Vector3<D> {
     Vector3::new(m.m32 - m.m23, m.m13 - m.m31, m.m21 - m.m12) * D::from(0.5)
 }
 
-/// `1 + a q̂ + b q̂²`, the form of all that follows, with `q̂² = q qᵀ − |q|²`.
+/// `1 + a q̂ + b q̂²`, the form of the functions below, with `q̂² = q qᵀ − |q|²`.
 #[inline]
 pub(crate) fn rodrigues<D: Scalar>(q: &Vector3<D>, a: D, b: D) -> Matrix3<D> {
     let (turn, bend) = (q * a, q * b);
@@ -73,7 +73,7 @@ pub(crate) fn quaternion<D: Scalar>(r: &Matrix3<D>) -> [D; 4] {
     if q[0].re() < 0.0 { q.map(|entry| -entry) } else { q }
 }
 
-/// The rotation of a quaternion `(w, x, y, z)` that is not too short to be divided by its norm.
+/// The rotation of a quaternion `(w, x, y, z)` whose norm does not underflow.
 pub(crate) fn turn([w, x, y, z]: [f64; 4]) -> Matrix3<f64> {
     UnitQuaternion::new_normalize(Quaternion::new(w, x, y, z)).to_rotation_matrix().into_inner()
 }
@@ -97,7 +97,7 @@ pub fn dexp_inverse<D: Scalar>(q: &Vector3<D>) -> Matrix3<D> {
     rodrigues(q, D::from(0.5), (c2 - c3) / c1 * 0.25)
 }
 
-/// `A B`: nalgebra's product is not made for so few entries.
+/// `A B`, faster than the general product of nalgebra for so few entries.
 #[inline]
 pub(crate) fn product<D: Scalar>(a: &Matrix3<D>, b: &Matrix3<D>) -> Matrix3<D> {
     Matrix3::from_fn(|i, j| a[(i, 0)] * b[(0, j)] + a[(i, 1)] * b[(1, j)] + a[(i, 2)] * b[(2, j)])
@@ -127,7 +127,7 @@ pub(crate) fn spun(a: &Matrix3<f64>, omega: &Vector3<f64>) -> Matrix3<f64> {
 }
 
 /// One step of Newton's iteration for the polar factor, `R ← R(3 − RᵀR)/2` with the real part of
-/// `RᵀR`, which squares the defect and leaves derivatives along the group alone.
+/// `RᵀR`. It squares the defect and does not change derivatives along the group.
 #[inline]
 pub(crate) fn orthogonal<D: Scalar>(r: &Matrix3<D>) -> Matrix3<D> {
     let real = r.map(|entry| entry.re());

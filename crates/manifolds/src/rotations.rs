@@ -13,19 +13,19 @@
 //!
 //! The chart ends with one step `R ← R(3 − RᵀR)/2` of the polar iteration (Higham 2008, ch. 8), so that
 //! every matrix of a run is orthogonal to round-off and
-//! [never drifts](mod@crate::manifold#why-points-do-not-drift). The logarithm goes through the quaternion of
-//! largest pivot (Shepperd 1978); from `θ = 10⁻¹⁵` to `π − 10⁻¹⁰` that of a rounded rotation was measured
-//! within `3ε` of the exact one, relative to `θ`. The functions [`exp`], [`log`], [`dexp`] and [`dexp_inverse`] are right at `q = 0` for
+//! [never drifts](mod@crate::manifold#why-points-do-not-drift). The logarithm uses the quaternion of largest
+//! pivot (Shepperd 1978). From `θ = 10⁻¹⁵` to `π − 10⁻¹⁰` the logarithm of a rounded rotation was measured
+//! within `3ε` of the exact logarithm, relative to `θ`. The functions [`exp`], [`log`], [`dexp`] and [`dexp_inverse`] are right at `q = 0` for
 //! dual numbers of every order.
 //!
 //! - **Geodesics** of the bi-invariant metric `⟨â, b̂⟩ = a·b` are `R exp(tΩ̂)`, `log_R(Y) = log(RᵀY)`, up to
-//!   the injectivity radius π, beyond which they are refused; the curvature is ¼ (do Carmo 1992, ch. 4,
+//!   the injectivity radius π. Longer geodesics are refused. The curvature is ¼ (do Carmo 1992, ch. 4,
 //!   exercise 1).
 //! - **Other metrics** are inner products on so(3), by [`Metric::field`](crate::Metric::field), whose
-//!   logarithms are refused at half a turn too, where two straight lines of the chart are equally long. A
-//!   constant one, `J`, is left-invariant, and its geodesics are the motions of the free rigid body,
+//!   logarithms are also refused at half a turn, where two straight lines of the chart are equally long. A
+//!   constant inner product `J` is left-invariant. Its geodesics are the motions of the free rigid body,
 //!   `JΩ' = JΩ × Ω` (Euler; Arnold 1966). [`Cayley`](crate::Cayley) is a retraction for all of them.
-//! - **Brackets**: none unless one is asked for. `Nambu`, with the entropy as its Casimir,
+//! - **Brackets**: none by default. `Nambu`, with the entropy as its Casimir,
 //!
 //! ```math
 //! R' = R\, \hat\Omega, \qquad \Omega = \lambda \frac{dS \times dH}{\sqrt{\det g}},
@@ -169,8 +169,8 @@ impl Manifold for Rotations {
         1.0
     }
 
-    /// The polar factor `R`, with `RᵀA` symmetric: the nearest rotation in the Frobenius norm, one of
-    /// them for a matrix that has several (Higham 1989). A matrix that is not finite is left alone.
+    /// Returns the polar factor `R`, with `RᵀA` symmetric: the nearest rotation in the Frobenius norm, or one of
+    /// several (Higham 1989). It returns a matrix that is not finite without change.
     fn project(&self, x: &Matrix3<f64>) -> Matrix3<f64> {
         let largest = x.max_abs();
         if !largest.is_finite() {

@@ -1,8 +1,8 @@
-//! The path of a step: where it is based, and where it ends.
+//! The path of a step: its base point, its displacement and its end.
 
 use metriplectic_fields::{ChartPoint, Matrix, Scalar, Space, Square, Vector};
 
-/// A step's path: its base point, its displacement there, and its end.
+/// The path of a step: its base point, its displacement there, and its end.
 #[derive(Clone, Debug)]
 pub struct StepPath<M: Space, D: Scalar = f64> {
     /// The base point `z`.
@@ -13,7 +13,7 @@ pub struct StepPath<M: Space, D: Scalar = f64> {
     pub end: M::Point<D>,
 }
 
-/// A step's path at `f64`, with its derivatives along the unknown `u`.
+/// The path of a step at `f64`, with its derivatives along the unknown `u`.
 #[derive(Clone, Debug)]
 pub struct StepPathJet<M: Space> {
     /// The base point `z`.
@@ -31,7 +31,7 @@ pub struct StepPathJet<M: Space> {
 }
 
 impl<M: Space> StepPathJet<M> {
-    /// The straight line of a flat space, with its middle as the base: `z = x + u/2`, `d = u`,
+    /// Makes the straight line of a flat space, with its middle as the base: `z = x + u/2`, `d = u`,
     /// `x' = x + u`.
     #[inline]
     pub fn straight(x: &M::Point<f64>, u: &Vector<M>) -> Self {

@@ -66,7 +66,7 @@ pub mod prelude {
         AlmostPoisson, AreaForm, CasimirDissipation, CometricDissipation, FieldDissipation, Force,
         ForcedLiePoisson, KulkarniNomizu, Legendre, LiePoisson, MetricDissipation, Metriplectic,
         ModelError, Nambu, Poisson, ProjectedDissipation, Scaled, SecondLaw, Symplectic, System,
-        Zero,
+        VectorField, Verify, Zero,
     };
     pub use metriplectic_fields::{MatrixField, Real, Scalar, ScalarField};
     pub use metriplectic_integrators::{

@@ -4,7 +4,7 @@ use metriplectic_dynamics::BuildError;
 use metriplectic_dynamics::{
     CasimirDissipation, CometricDissipation, Dissipation, FieldDissipation, KulkarniNomizu,
     MetricDissipation, Metriplectic, ModelError, NoDissipation, ProjectedDissipation, Scaled,
-    System, laws,
+    System, Verify, laws,
 };
 use metriplectic_fields::{ChartPoint, Column, Dimension, Real, Space, Square, Vector};
 use metriplectic_manifolds::{
@@ -82,12 +82,12 @@ fn agree<M: Manifold, G: Riemannian<M>>(
 ) -> Result<(), TestCaseError> {
     let (l, r) = (left.linearise(metric, x, w, a), right.linearise(metric, x, w, a));
     let (l, r) = (l.expect("K exists"), r.expect("K exists"));
-    let off = (l.value - r.value).magnitude();
+    let error = (l.value - r.value).magnitude();
     let bound = 1e-13 * (1.0 + w.magnitude().powi(2)) * (1.0 + a.magnitude());
-    prop_assert!(off <= bound, "{off:.1e}");
+    prop_assert!(error <= bound, "{error:.1e}");
     for (l, r) in [(l.along_w, r.along_w), (l.along_z, r.along_z), (l.tensor, r.tensor)] {
-        let off = Square::max_abs(&(l - r));
-        prop_assert!(off <= 10.0 * bound, "{off:.1e}");
+        let error = Square::max_abs(&(l - r));
+        prop_assert!(error <= 10.0 * bound, "{error:.1e}");
     }
     Ok(())
 }

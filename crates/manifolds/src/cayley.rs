@@ -5,7 +5,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::metric::{MetricError, stretched};
 use crate::retraction::jet_by_dual_numbers;
-use crate::rotations::{dexp_inverse, hat, orthogonal};
+use crate::rotation_vector::{dexp_inverse, hat, orthogonal};
 use crate::{Nodes, PointPair, Retraction, Riemannian, Rotations, StepPath, StepPathJet, Tangent};
 
 /// The symmetric Cayley retraction of SO(3), for any metric:
@@ -16,7 +16,8 @@ use crate::{Nodes, PointPair, Retraction, Riemannian, Rotations, StepPath, StepP
 /// = 1 + \frac{\hat a + \hat a^2/2}{1 + |a|^2/4} .
 /// ```
 ///
-/// Rational, of order 2, and exact in the energy like every other retraction (Cayley 1846; Bogfjellmo
+/// It is rational, has order 2, and conserves the energy exactly like every other retraction
+/// (Cayley 1846; Bogfjellmo
 /// and Marthinsen 2016 for its use in integrators). `cay(a)` turns by `2 atan(|a|/2)` about `a`, so the
 /// displacement of a step by the angle `θ` has the length `4 tan(θ/4)`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -91,7 +92,7 @@ impl<G: Riemannian<Rotations>> Retraction<Rotations, G> for Cayley {
         y: &Matrix3<f64>,
     ) -> Result<Tangent<Rotations>, MetricError> {
         let q = Rotations::coordinates(x, y);
-        crate::metric::within(std::f64::consts::PI, q.norm())?;
+        crate::metric_error::within(std::f64::consts::PI, q.norm())?;
         let theta = Column::magnitude(&q);
         let stretch = if theta > 0.0 { (0.25 * theta).tan() / (0.25 * theta) } else { 1.0 };
         Ok(Tangent { base: Rotations::chart(x, &(q * 0.5)), vector: q * stretch })

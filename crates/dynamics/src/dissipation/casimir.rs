@@ -45,7 +45,7 @@ pub struct CasimirDissipation<const N: usize> {
     form: SMatrix<f64, N, N>,
 }
 
-/// An eigenvalue of a form may be negative by the rounding of its entries, relative to the largest.
+/// The negative eigenvalue, relative to the largest, that the rounding of the entries may cause.
 const ROUND_OFF: f64 = 64.0 * f64::EPSILON;
 
 impl<const N: usize> CasimirDissipation<N> {
@@ -148,7 +148,7 @@ pub enum FormError {
         /// `|κ_ij − κ_ji|`.
         size: f64,
     },
-    /// `κ` has a negative eigenvalue, with which it would destroy entropy.
+    /// `κ` has a negative eigenvalue, so it would destroy entropy.
     #[error("the form is not positive semidefinite: it has the eigenvalue {eigenvalue:.3e}")]
     NotPositive {
         /// The least eigenvalue.

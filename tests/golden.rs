@@ -31,10 +31,10 @@ impl Study for Record {
             let run = run.unwrap_or_else(|error| panic!("{}: {error}", problem.name));
             let mut bits = String::new();
             for number in Y::Manifold::entries(&run.last().point) {
-                write!(bits, "{:016x} ", number.to_bits()).unwrap();
+                write!(bits, "{:016x} ", number.to_bits()).expect("a string takes it all");
             }
             let counts = run.certificate();
-            write!(bits, "after {} steps", counts.steps).unwrap();
+            write!(bits, "after {} steps", counts.steps).expect("a string takes it all");
             self.0.insert(format!("{}, {scheme}, {kind}", problem.name), bits);
         }
     }
@@ -45,9 +45,9 @@ fn compare(name: &str, record: &BTreeMap<String, String>) {
     let text: String = record.iter().map(|(name, bits)| format!("{name}: {bits}\n")).collect();
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden").join(name);
     if std::env::var_os("BLESS").is_some() {
-        std::fs::write(&path, &text).unwrap();
+        std::fs::write(&path, &text).expect("the record is written");
     }
-    let known = std::fs::read_to_string(&path).unwrap();
+    let known = std::fs::read_to_string(&path).expect("a record");
     let known: Vec<&str> = known.lines().collect();
     let changed: Vec<&str> = text.lines().filter(|line| !known.contains(line)).collect();
     println!("{name}: {} rows", record.len());

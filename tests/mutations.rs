@@ -49,11 +49,6 @@ fn line(energy: Field2) -> impl Metriplectic<Manifold = Euclidean<2>, Metric = C
 
 const START: Vector3<f64> = Vector3::new(0.6, 0.5, 0.4);
 
-/// A solver that takes the first guess for a solution, whose energy is then off by the order of `h²`.
-fn careless() -> Scheme<WeylMidpoint> {
-    Scheme::new(WeylMidpoint).newton(Newton { tolerance: 1e16, ..Newton::default() })
-}
-
 #[test]
 fn no_step_is_accepted_whose_error_is_above_the_one_allowed() {
     let system = relaxing();

@@ -41,7 +41,7 @@ macro_rules! straight_geodesics {
         }
 
         #[inline]
-        fn lost(&self, x: &M::Point<f64>, v: &Vector<M>, y: &M::Point<f64>) -> Vector<M> {
+        fn lost_digits(&self, x: &M::Point<f64>, v: &Vector<M>, y: &M::Point<f64>) -> Vector<M> {
             *v - M::coordinates(x, y)
         }
 

@@ -157,7 +157,7 @@ pub trait Riemannian<M: Space> {
     /// Computes the rounding error of the displacement `v` on the way from `x` to `y = exp_x(v)`, which the next
     /// step compensates; zero where it is not known.
     #[inline]
-    fn lost(&self, _x: &M::Point<f64>, _v: &Vector<M>, _y: &M::Point<f64>) -> Vector<M> {
+    fn lost_digits(&self, _x: &M::Point<f64>, _v: &Vector<M>, _y: &M::Point<f64>) -> Vector<M> {
         Vector::<M>::zero()
     }
 

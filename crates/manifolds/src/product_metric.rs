@@ -214,7 +214,7 @@ macro_rules! metric_of_the_factors {
         }
 
         #[inline]
-        fn lost(
+        fn lost_digits(
             &self,
             x: &(A::Point<f64>, B::Point<f64>),
             v: &Vector<Product<A, B>>,
@@ -222,8 +222,8 @@ macro_rules! metric_of_the_factors {
         ) -> Vector<Product<A, B>> {
             let ((g, f), (a, b)) = (Split::<A, B>::halves(self), Product::<A, B>::split(v));
             Product::<A, B>::join(
-                &Riemannian::<A>::lost(g, &x.0, &a, &y.0),
-                &Riemannian::<B>::lost(f, &x.1, &b, &y.1),
+                &Riemannian::<A>::lost_digits(g, &x.0, &a, &y.0),
+                &Riemannian::<B>::lost_digits(f, &x.1, &b, &y.1),
             )
         }
 

@@ -22,7 +22,7 @@ pub struct VelocityJet<N: Dimension> {
     /// projections. Its round-off is relative to this sum.
     pub terms: N::Vector<f64>,
     /// The derivative of the velocity along `w_H`, without the derivative of the projections.
-    pub gain: N::Matrix<f64>,
+    pub sensitivity: N::Matrix<f64>,
     /// The entropy production `⟨w_S, K̃ w_S⟩`.
     pub production: f64,
     /// The rate of the friction, `√|tr A²|` with `A` the derivative of `K̃ w_S` along the unknown. It is the
@@ -75,7 +75,7 @@ pub fn velocity_jet<Y: Metriplectic + ?Sized>(
     let mut terms = pi.terms
         + k.tensor.abs() * alpha.value.abs()
         + projection * (1.0 + normals.amplification(first, MOMENTUM));
-    let mut gain = pi.tensor + k.along_w;
+    let mut sensitivity = pi.tensor + k.along_w;
     let mut irreversible = k_s;
     if system.bracket().is_forced() {
         let force = at.force()?;
@@ -84,7 +84,7 @@ pub fn velocity_jet<Y: Metriplectic + ?Sized>(
             slope: k_s.slope + force.vector.slope,
         };
         terms += force.terms;
-        gain += force.tensor;
+        sensitivity += force.tensor;
     }
     let velocity = WithJacobian {
         value: pi.vector.value + irreversible.value,
@@ -93,7 +93,7 @@ pub fn velocity_jet<Y: Metriplectic + ?Sized>(
     let production = w.entropy.value.dot(&irreversible.value);
     let friction = trace_of_square::<Dim<Y>>(&irreversible.slope).abs().sqrt();
     let rotation = trace_of_square::<Dim<Y>>(&pi.vector.slope).abs().sqrt();
-    Ok(VelocityJet { velocity, terms, gain, production, friction, rotation })
+    Ok(VelocityJet { velocity, terms, sensitivity, production, friction, rotation })
 }
 
 /// `tr A²`.

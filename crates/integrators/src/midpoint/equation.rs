@@ -226,7 +226,7 @@ where
             terms: Vector::<Y::Manifold>::from_index(|i| {
                 ROUNDED * h.abs() * velocity.terms[i] + f64::MIN_POSITIVE * (1.0 + h.abs())
             }),
-            sensitivity: velocity.gain * h,
+            sensitivity: velocity.sensitivity * h,
             covector: noise,
             argument: (Y::Manifold::scales(self.x) + path.d.abs()) * f64::EPSILON,
         };

@@ -28,11 +28,11 @@ impl<N: Dimension> Compensation<N> {
         (x, d): (&M::Point<f64>, &N::Vector<f64>),
         end: M::Point<f64>,
     ) -> M::Point<f64> {
-        let lost = metric.lost(x, d, &end);
+        let lost = metric.lost_digits(x, d, &end);
         match self.0 {
             Some(before) if before.magnitude() > 0.0 => {
                 let compensated = M::chart(&end, &before);
-                self.0 = Some(lost + metric.lost(&end, &before, &compensated));
+                self.0 = Some(lost + metric.lost_digits(&end, &before, &compensated));
                 compensated
             }
             _ => {

@@ -17,10 +17,9 @@ fmt:
 lint:
     cargo clippy --workspace --all-targets --all-features -- -D warnings
 
-# unit tests, integration tests and doctests; the random cases are the same in each run
+# unit tests, integration tests, examples and doctests; the random cases are the same in each run
 test:
-    PROPTEST_RNG_SEED=2401 cargo test --workspace --all-features --tests
-    cargo test --workspace --all-features --doc
+    PROPTEST_RNG_SEED=2401 cargo test --workspace --all-features
 
 # what verification refuses, and that it accepts the models of the tests that build many, and of the examples
 verification: examples
@@ -57,7 +56,7 @@ examples:
 study:
     cargo test --release --workspace -- --ignored
 
-# compare the bits of many runs with tests/golden.txt, or write it with `--bless`: for this machine and compiler
+# compare the bits of many runs with tests/golden, or write it with `--bless`: for this machine and compiler
 golden *flags:
     {{ if flags == "--bless" { "BLESS=1" } else { "" } }} cargo test --release --all-features --test golden -- --ignored --nocapture
 
@@ -102,6 +101,10 @@ features: (need "cargo hack --version" "cargo install cargo-hack --locked")
 msrv: (need ("rustup run " + msrv + " cargo --version") ("rustup toolchain install " + msrv + " --profile minimal"))
     cargo +{{ msrv }} check --workspace --all-features
 
+# check spelling and vocabulary: `_typos.toml` has the words to avoid and what to write instead
+words: (need "typos --version" "cargo install typos-cli --locked")
+    typos
+
 # check licenses, advisories and duplicate dependencies
 deny: (need "cargo deny --version" "cargo install cargo-deny --locked")
     cargo deny check
@@ -111,7 +114,7 @@ package:
     cargo publish --workspace --dry-run
 
 # everything a change has to pass; ends on the closing line of `test`
-ci: fmt lint doc examples test
+ci: fmt lint doc test
 
 # stop, saying how to install it, where a tool is missing
 [no-exit-message]

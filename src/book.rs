@@ -19,11 +19,20 @@ struct Manifolds;
 #[doc = include_str!("../book/src/schemes.md")]
 struct Schemes;
 
+#[doc = include_str!("../book/src/recipes.md")]
+struct Recipes;
+
 #[doc = include_str!("../book/src/verification.md")]
 struct Verification;
 
 #[doc = include_str!("../book/src/units.md")]
 struct Units;
+
+#[doc = include_str!("../book/src/guarantees.md")]
+struct Guarantees;
+
+#[doc = include_str!("../book/src/operations.md")]
+struct Operations;
 
 #[doc = include_str!("../book/src/performance.md")]
 struct Performance;
@@ -33,3 +42,6 @@ struct Errata;
 
 #[doc = include_str!("../book/src/other_libraries.md")]
 struct OtherLibraries;
+
+#[doc = include_str!("../book/src/from_0_1.md")]
+struct From01;

@@ -1,5 +1,5 @@
-//! Bring your own: a manifold or a metric that is not in the box. Choose: which scheme, bracket and
-//! dissipation. And the paper, equation by equation.
+//! Guides: how to choose the parts of a model, how to add a manifold or a metric, and the paper equation by
+//! equation.
 //!
 //! - [`choosing`]: which space, bracket, dissipation and scheme, in short tables with reasons;
 //! - [`your_own_manifold`]: the hyperbolic plane, from nothing to a metriplectic run;

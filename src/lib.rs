@@ -1,13 +1,13 @@
-//! Integrates metriplectic (GENERIC) systems from closures for energy, entropy and metric.
+//! Structure-preserving integrators for metriplectic (GENERIC) systems, from closures for energy, entropy and metric.
 //!
 //! ```math
 //! \dot x = \Pi(x)\, dH(x) + K(x)\, dS(x)
 //! ```
 //!
-//! A Poisson tensor `Π` drives the reversible flow of the energy `H`; a positive semidefinite `K`,
-//! built from a Riemannian metric, produces the entropy `S` and leaves `H` alone. You write `H`,
-//! `S` and, if it is not the canonical one, the metric; dual numbers differentiate them, and every
-//! step of the scheme keeps `H` to round-off.
+//! The Poisson tensor `Π` generates the reversible flow of the energy `H`. The positive semidefinite tensor `K`,
+//! built from a Riemannian metric, produces the entropy `S` and conserves `H`. You write `H`, `S` and, if it is not the
+//! canonical one, the metric. Dual numbers differentiate them. Every step conserves `H` to round-off, and `S` never
+//! decreases.
 //!
 //! ```
 //! use metriplectic::prelude::*;
@@ -28,9 +28,11 @@
 //! }
 //! ```
 //!
-//! [Bring your own metric](guide::your_own_metric), on any of the spaces here, or [your own
-//! manifold](guide::your_own_manifold), in sixty lines; [choose](guide::choosing) bracket, dissipation and
-//! scheme; or read the paper [equation by equation](guide::equations), with its [errata](guide::errata).
+//! The guides go on from here:
+//!
+//! - [choose](guide::choosing) bracket, dissipation and scheme;
+//! - write [your own metric](guide::your_own_metric), or [your own manifold](guide::your_own_manifold) in sixty lines;
+//! - read the paper [equation by equation](guide::equations), with its [errata](guide::errata).
 //!
 //! # The vocabulary
 //!
@@ -45,9 +47,10 @@
 //! | [`Dissipation`](dynamics::Dissipation) | `K`, given the covector it must annihilate | [`dynamics`] |
 //! | [`System`](dynamics::System) | all of these with `H` and `S` | [`dynamics`] |
 //! | [`DiscreteGradient`](integrators::DiscreteGradient) | a covector with `⟨w, d⟩ = ΔH` | [`integrators`] |
-//! | [`RootFinder`](integrators::RootFinder) | [`Newton`](integrators::Newton), and argmin as the globaliser | [`integrators`] |
+//! | [`Newton`](integrators::Newton) | solves the equation of a step | [`integrators`] |
+//! | [`Method`](integrators::Method) | a one-step method, such as [`Scheme`](integrators::Scheme) | [`integrators`] |
 //! | [`Scheme`](integrators::Scheme) | one step: guess, solve, retract | [`integrators`] |
-//! | [`Trajectory`](integrators::Trajectory) | steps in a row, with their [`Certificate`](integrators::Certificate) | [`integrators`] |
+//! | [`Trajectory`](integrators::Trajectory) | the steps of a run, with their [`Certificate`](integrators::Certificate) | [`integrators`] |
 
 pub mod guide;
 
@@ -63,12 +66,13 @@ pub mod prelude {
         AlmostPoisson, AreaForm, CasimirDissipation, CometricDissipation, FieldDissipation, Force,
         ForcedLiePoisson, KulkarniNomizu, Legendre, LiePoisson, MetricDissipation, Metriplectic,
         ModelError, Nambu, Poisson, ProjectedDissipation, Scaled, SecondLaw, Symplectic, System,
-        Zero,
+        VectorField, Verify, Zero,
     };
     pub use metriplectic_fields::{MatrixField, Real, Scalar, ScalarField};
     pub use metriplectic_integrators::{
-        Attitude, AttitudeError, Certificate, Ending, Error, Gonzalez, ItohAbe, MeanValue, Newton,
-        Observables, Run, RunError, Scheme, Span, State, SymmetricItohAbe, Trajectory,
+        Attitude, AttitudeError, Certificate, Checkpoint, Ending, Error, Gonzalez, ItohAbe,
+        MeanValue, Method, Newton, Observables, ResumeError, Run, RunError, Scheme, Span,
+        SpanError, State, StepError, Steps, SymmetricItohAbe, Trajectory, Until,
     };
     pub use metriplectic_manifolds::{
         Canonical, Cayley, Chart, Euclidean, Exponential, HalfLine, LieAlgebra, LieDual, Manifold,

@@ -17,7 +17,7 @@ fn bits<M: Manifold>(state: &State<M>) -> Vec<u64> {
 }
 
 /// All states of a run from where it is.
-fn rest<Y: Metriplectic>(steps: &mut Steps<'_, Y, WeylMidpoint>) -> Vec<Vec<u64>>
+fn rest<Y: Metriplectic>(steps: &mut Steps<'_, Y, Scheme<WeylMidpoint>>) -> Vec<Vec<u64>>
 where
     WeylMidpoint: Retraction<Y::Manifold, Y::Metric>,
 {
@@ -190,16 +190,16 @@ fn a_damaged_checkpoint_is_refused() {
     };
     assert_eq!(with(&|_| ()), None);
     let error = with(&|tree| tree["version"] = 7.into());
-    assert_eq!(error, Some(ResumeError::Version { found: 7, expected: 2 }));
+    assert_eq!(error, Some(ResumeError::Version { found: 7, expected: 3 }));
     let error = with(&|tree| tree["point"][1] = "NaN".into());
     assert!(matches!(error, Some(ResumeError::Point(PointError::NotFinite { index: 1, .. }))));
     let error = with(&|tree| tree["time"] = "-1.0".into());
     assert!(matches!(error, Some(ResumeError::Damaged { what: "time", .. })));
-    let error = with(&|tree| tree["pace"]["Adaptive"]["next"] = "0.0".into());
+    let error = with(&|tree| tree["step_size"]["Adaptive"]["next"] = "0.0".into());
     assert!(matches!(error, Some(ResumeError::Damaged { what: "next step", .. })));
     let error = with(&|tree| tree["every"] = 0.into());
     assert!(matches!(error, Some(ResumeError::Damaged { .. })));
-    let error = with(&|tree| tree["compensation"] = serde_json::json!(["0.0"]));
+    let error = with(&|tree| tree["memory"]["compensation"] = serde_json::json!(["0.0"]));
     assert!(matches!(error, Some(ResumeError::Length { found: 1, expected: 3, .. })));
     // What is no number, and what is no field, is not even read.
     let mut unread = tree.clone();
@@ -248,7 +248,7 @@ fn every_number_of_a_checkpoint_is_compared_with_the_others() {
         ("/time", "1e9", "time"),
         ("/largest_velocity/0", "NaN", "largest velocities"),
         ("/largest_velocity/0", "-1.0", "largest velocity of an entry"),
-        ("/compensation/0", "1e-3", "lost digits of an entry"),
+        ("/memory/compensation/0", "1e-3", "lost digits of an entry"),
         ("/sizes/1", "-1.0", "size of an entry"),
     ] {
         for tree in [&fixed, &adaptive] {
@@ -261,12 +261,12 @@ fn every_number_of_a_checkpoint_is_compared_with_the_others() {
     for (tree, path, value, what) in [
         (&fixed, "/step", 19.into(), "number of steps in the balance"),
         (&fixed, "/count", 19.into(), "number of steps to take"),
-        (&fixed, "/pace/Fixed/h", "0.2".into(), "time"),
+        (&fixed, "/step_size/Fixed/h", "0.2".into(), "time"),
         (&fixed, "/ending", "Span".into(), "number of steps"),
         (&adaptive, "/ending", "Span".into(), "time"),
-        (&adaptive, "/pace/Adaptive/end", "1e-3".into(), "time"),
-        (&adaptive, "/pace/Adaptive/end", "NaN".into(), "end"),
-        (&adaptive, "/pace/Adaptive/tolerance", "NaN".into(), "tolerance"),
+        (&adaptive, "/step_size/Adaptive/end", "1e-3".into(), "time"),
+        (&adaptive, "/step_size/Adaptive/end", "NaN".into(), "end"),
+        (&adaptive, "/step_size/Adaptive/tolerance", "NaN".into(), "tolerance"),
         (&adaptive, "/sizes/1", "0.5".into(), "size of an entry"),
         (&adaptive, "/rest", "2.0".into(), "tolerance of rest"),
         (&adaptive, "/most", 1.into(), "number of states to record"),

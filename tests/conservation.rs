@@ -60,7 +60,7 @@ fn a_million_steps_of_the_relaxing_body_keep_the_energy() {
     assert_eq!((falls, certificate.entropy_falls), (0, 0));
     assert!(drift.worst() <= 5e-15, "{drift}");
     assert!(is_flat(&drift), "{drift}");
-    assert_eq!(certificate.retries, 0);
+    assert_eq!(certificate.effort.splits, 0);
 }
 
 #[test]
@@ -221,7 +221,7 @@ fn an_equilibrium_stays_where_it_is() {
         assert!(run.iter().all(|state| state.point == start));
         let certificate = run.certificate();
         assert!(certificate.keeps_energy() && certificate.keeps_entropy());
-        assert_eq!((certificate.retries, certificate.iterations), (0, 0));
+        assert_eq!((certificate.effort.splits, certificate.effort.iterations), (0, 0));
     }
 }
 
@@ -229,7 +229,7 @@ fn an_equilibrium_stays_where_it_is() {
 fn the_origin_of_a_dual_is_an_equilibrium_too() {
     let run = WeylMidpoint.run(&relaxing_body(), Vector3::zeros(), Span::steps(0.1, 10)).unwrap();
     assert_eq!(run.last().point, Vector3::zeros());
-    assert_eq!((run.certificate().retries, run.certificate().iterations), (0, 0));
+    assert_eq!((run.certificate().effort.splits, run.certificate().effort.iterations), (0, 0));
 }
 
 #[test]
@@ -239,7 +239,7 @@ fn a_body_at_its_greatest_entropy_stays_there_to_round_off() {
     let start = vector![-(5.0_f64.sqrt()), 0.0, 0.0];
     let run = WeylMidpoint.run(&relaxing_body(), start, Span::steps(0.1, 10_000)).unwrap();
     assert!(run.iter().all(|state| state.point == start));
-    assert_eq!(run.certificate().retries, 0);
+    assert_eq!(run.certificate().effort.splits, 0);
     // Displaced by 10⁻⁹ across the axis it comes back, keeps H, and asks for no retry.
     let displaced = start + vector![0.0, 1e-9, 0.0];
     let run = WeylMidpoint.run(&relaxing_body(), displaced, Span::steps(0.1, 10_000)).unwrap();
@@ -247,7 +247,7 @@ fn a_body_at_its_greatest_entropy_stays_there_to_round_off() {
     // It rests where its velocity, 0.2 |(y, z)| at least, is round-off: the terms of Π w and K dS are
     // of size 0.9 there, and 4ε · 0.9/0.2 = 4·10⁻¹⁵.
     assert!(run.last().point.yz().norm() < 1e-14, "{}", run.last().point);
-    assert_eq!(run.certificate().retries, 0);
+    assert_eq!(run.certificate().effort.splits, 0);
     assert!(run.certificate().keeps_energy() && run.certificate().keeps_entropy());
 }
 

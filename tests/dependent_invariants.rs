@@ -33,7 +33,7 @@ fn certified<Y: Metriplectic>(
     println!("{name}: {certificate}");
     assert!(certificate.keeps_energy() && certificate.keeps_entropy(), "{name}: {certificate}");
     assert!(change <= bound, "{name}: C changed by {change:.1e} > {bound:.1e}");
-    assert_eq!(certificate.retries, 0, "{name}: {certificate}");
+    assert_eq!(certificate.effort.splits, 0, "{name}: {certificate}");
 }
 
 /// `H = Σ x_k²/(2 I_k)` on so(4)*.

@@ -221,7 +221,7 @@ fn the_other_gradients_keep_both_laws_over_many_steps() {
         let certificate = run.certificate();
         println!("{certificate}\n");
         assert!(certificate.keeps_energy() && certificate.keeps_entropy(), "{certificate}");
-        assert!(certificate.retries == 0);
+        assert!(certificate.effort.splits == 0);
     }
 }
 

@@ -68,7 +68,7 @@ fn a_scaled_dissipation_relaxes_a_symmetric_body_on_time() {
 
 /// A damped oscillator that warms a bath (Öttinger 2018), `x = (q, p, s)`, in closed form.
 #[test]
-fn a_closure_of_the_killed_covector_damps_an_oscillator_as_its_closed_form() {
+fn a_closure_of_the_annihilated_covector_damps_an_oscillator_as_its_closed_form() {
     const GAMMA: f64 = 0.01;
     let friction = FieldDissipation(|_: &Vector3<Real>, w: &Vector3<Real>| {
         let b = Vector3::new(Real::from(0.0), w.z, -w.y);

@@ -150,8 +150,8 @@ proptest! {
             (I[2] - I[1]) * o.y * o.z, (I[0] - I[2]) * o.x * o.z, (I[1] - I[0]) * o.x * o.y
         ];
         same(&force, &example)?;
-        let dg_v = algebra.bracket(&o, &p);
-        equal(p.dot(&algebra.coadjoint(&o, &(p + force))), dg_v.norm_squared())?;
+        let turned = algebra.bracket(&o, &p);
+        equal(p.dot(&algebra.coadjoint(&o, &(p + force))), turned.norm_squared())?;
     }
 
     /// §3 and §4.3: the relaxed rigid body, printed twice, and its matrix `K`.

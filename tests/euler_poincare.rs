@@ -75,7 +75,7 @@ where
     let certificate = run.certificate();
     assert!(certificate.keeps_energy(), "{certificate}");
     // Newton's method has the right Jacobian.
-    assert!(certificate.worst_iterations <= 6 && certificate.retries == 0, "{certificate}");
+    assert!(certificate.worst_iterations <= 6 && certificate.effort.splits == 0, "{certificate}");
     certificate.clone()
 }
 

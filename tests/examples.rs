@@ -1,27 +1,63 @@
 //! What the examples print when a program reads them.
 
+use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
+use std::sync::LazyLock;
+use std::time::SystemTime;
 
-/// Builds an example for release, which takes no time if `just examples` has just done it, and runs
-/// it. Each call draws into a folder of its own, so that the gallery keeps the pictures of a reader.
+/// Runs an example. Each call draws into a folder of its own, so that the gallery keeps the pictures of a
+/// reader.
 fn example(name: &str, arguments: &[&str]) -> Output {
     command(name, arguments).output().expect("the example starts")
 }
 
 /// The same, not yet started.
 fn command(name: &str, arguments: &[&str]) -> Command {
+    let mut run = Command::new(program(name));
+    run.args(arguments).env("CARGO_TARGET_DIR", gallery(name, arguments));
+    run
+}
+
+/// The program of an example. A `cargo test` of everything has built it beside this test; a `cargo test` of
+/// this test alone may have left one that is older than the sources, and then it is built for release.
+fn program(name: &str) -> PathBuf {
     let tests = std::env::current_exe().expect("a test has a path");
     let folder = tests.ancestors().nth(2).expect("tests are in `deps` of a profile's folder");
+    let beside = folder.join("examples").join(name);
+    if modified(&beside).is_some_and(|time| time >= newest_source()) {
+        return beside;
+    }
     let mut build = Command::new(env!("CARGO"));
     build.args(["build", "--quiet", "--example", name, "--target-dir"]);
     build.arg(folder.parent().expect("a profile is in the build folder"));
     build.args(["--release", "--all-features"]);
     assert!(build.status().expect("cargo starts").success(), "{name} is not built");
+    folder.with_file_name("release").join("examples").join(name)
+}
 
-    let release = folder.with_file_name("release");
-    let mut run = Command::new(release.join("examples").join(name));
-    run.args(arguments).env("CARGO_TARGET_DIR", gallery(name, arguments));
-    run
+fn modified(path: &Path) -> Option<SystemTime> {
+    path.metadata().and_then(|data| data.modified()).ok()
+}
+
+/// When a source was changed last.
+fn newest_source() -> SystemTime {
+    static NEWEST: LazyLock<SystemTime> = LazyLock::new(|| {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+        let mut folders = ["src", "crates", "examples"].map(|name| root.join(name)).to_vec();
+        let mut newest = modified(&root.join("Cargo.toml")).expect("a manifest");
+        while let Some(folder) = folders.pop() {
+            for entry in std::fs::read_dir(folder).expect("a folder of sources") {
+                let path = entry.expect("an entry").path();
+                if path.is_dir() {
+                    folders.push(path);
+                } else {
+                    newest = newest.max(modified(&path).expect("a source"));
+                }
+            }
+        }
+        newest
+    });
+    *NEWEST
 }
 
 /// Where such a call draws.

@@ -10,7 +10,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::{Duration, Instant};
 
 use metriplectic::dynamics::system::Point;
-use metriplectic::integrators::{Attempts, RunError, StepError};
+use metriplectic::integrators::Effort;
 use metriplectic::prelude::*;
 use serde_json::Value;
 
@@ -248,7 +248,7 @@ enum Outcome {
     },
     Refused {
         error: Error,
-        tried: Attempts,
+        tried: Effort,
     },
     /// Anything else, which is always wrong.
     Wrong(String),
@@ -262,10 +262,10 @@ impl Outcome {
             Self::Refused { error: Error::NotConverged, .. } => "not converged",
             Self::Refused { error: Error::OutOfDomain, .. } => "out of domain",
             Self::Step { end, certificate } => {
-                let Certificate { retries, continued, globalised, .. } = **certificate;
+                let Effort { splits, continued, globalised, .. } = certificate.effort;
                 let kept = certificate.keeps_energy() && certificate.keeps_entropy();
                 let finite = end.iter().all(|entry| entry.is_finite());
-                match (kept && finite, retries, globalised, continued) {
+                match (kept && finite, splits, globalised, continued) {
                     (false, ..) => "not certified",
                     (_, 0, 0, 0) => "plain",
                     (_, 0, 0, _) => "continued",
@@ -285,8 +285,8 @@ impl fmt::Display for Outcome {
             Self::Step { certificate, .. } => write!(
                 f,
                 "{} iterations, {} splits, |ΔH|/|H| {:.1e}, ΔS {:.1e}",
-                certificate.iterations,
-                certificate.retries,
+                certificate.effort.iterations,
+                certificate.effort.splits,
                 certificate.max_relative_energy_error(),
                 certificate.min_entropy_increment
             ),
@@ -341,7 +341,7 @@ fn every_hard_start_ends_in_a_certified_step_or_in_the_right_error() {
     let of_others = counts(not.map(|(_, outcome)| outcome));
     println!("all, {} {of_solvable:?}\nall, {} {of_others:?}", label(true), label(false));
     let splits = |(_, outcome): &(Case, Outcome)| match outcome {
-        Outcome::Step { certificate, .. } => certificate.retries,
+        Outcome::Step { certificate, .. } => certificate.effort.splits,
         Outcome::Refused { tried, .. } => tried.splits,
         Outcome::Wrong(_) => 0,
     };
@@ -383,7 +383,7 @@ fn every_hard_start_ends_in_a_certified_step_or_in_the_right_error() {
 
     // Without a split, the end is the one of the branch, but for other solutions of the same equation.
     let ends = solvable.filter_map(|(case, outcome)| match outcome {
-        Outcome::Step { end, certificate } if certificate.retries == 0 => {
+        Outcome::Step { end, certificate } if certificate.effort.splits == 0 => {
             Some((case.family(), case.off(end), case))
         }
         _ => None,

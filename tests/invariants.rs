@@ -128,7 +128,7 @@ fn angular_momentum(x: &State10) -> Real {
 }
 
 /// `q ↦ Q(t) q`, `p ↦ Q(t) p` for both masses.
-fn dg_v(t: Real, x: &State10) -> State10 {
+fn turned(t: Real, x: &State10) -> State10 {
     let (sine, cosine) = (t.sin(), t.cos());
     State10::from_fn(|i, _| match i {
         8 | 9 => x[i],
@@ -161,7 +161,7 @@ fn the_angular_momentum_of_a_pendulum_is_kept_at_second_order() {
         .energy(pendulum_energy)
         .entropy(|x: &State10| x[8] + x[9])
         .dissipation(FieldDissipation(heat_exchange))
-        .symmetry(dg_v, angular_momentum)
+        .symmetry(turned, angular_momentum)
         .build()
         .unwrap();
     let start = SVector::from(PENDULUM);
@@ -289,13 +289,13 @@ fn an_action_that_is_no_symmetry_is_refused() {
             .unwrap();
         WeylMidpoint.run(&system, SVector::from(PENDULUM), Span::steps(0.05, 1)).map(|_| ())
     };
-    assert!(system(dg_v, pendulum_energy).is_ok());
-    let error = system(|t, x| dg_v(-t, x), pendulum_energy).unwrap_err();
+    assert!(system(turned, pendulum_energy).is_ok());
+    let error = system(|t, x| turned(-t, x), pendulum_energy).unwrap_err();
     assert!(matches!(error, RunError::Model(ModelError::ActionNotOfMomentum { .. })), "{error}");
     let error = system(|t, x| x * (t + 1.0), pendulum_energy).unwrap_err();
     assert!(matches!(error, RunError::Model(ModelError::EnergyNotSymmetric { .. })), "{error}");
     let scaled = |t: Real, x: &State10| {
-        let mut x = dg_v(t, x);
+        let mut x = turned(t, x);
         x[8] += t;
         x[9] += t;
         x

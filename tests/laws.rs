@@ -495,7 +495,7 @@ enum Leaky {
     Negative,
     LosesEnergy,
     AlongPoint,
-    AlongKilled,
+    AlongAnnihilated,
     AlongCovector,
 }
 
@@ -536,7 +536,7 @@ where
         let mut jet = MetricDissipation.linearise(metric, z, w, a)?;
         match self {
             Self::AlongPoint => jet.along_z.m12 += 1e-6,
-            Self::AlongKilled => jet.along_w.m31 += 1e-6,
+            Self::AlongAnnihilated => jet.along_w.m31 += 1e-6,
             Self::AlongCovector => jet.tensor.m23 += 1e-6,
             _ => {}
         }
@@ -561,7 +561,7 @@ fn each_law_of_a_dissipation_can_break() {
     assert_eq!(law(Leaky::Negative), Some("K is positive semidefinite"));
     assert_eq!(law(Leaky::LosesEnergy), Some("K_w w = 0"));
     assert_eq!(law(Leaky::AlongPoint), Some("linearise is the derivative along x"));
-    assert_eq!(law(Leaky::AlongKilled), Some("linearise is the derivative along w"));
+    assert_eq!(law(Leaky::AlongAnnihilated), Some("linearise is the derivative along w"));
     assert_eq!(law(Leaky::AlongCovector), Some("linearise is the derivative along α"));
 
     // A run refuses the same faults, as far as a step can see them.

@@ -70,7 +70,7 @@ impl LongRun {
             entropy(c.entropy_falls.to_string()),
             entropy(scientific(c.entropy_gained)),
             format!("{}, {}", ends(&self.defect), growth(&self.defect)),
-            format!("{:.2}", c.iterations as f64 / c.steps as f64),
+            format!("{:.2}", c.effort.iterations as f64 / c.steps as f64),
             format!("{:.2}", 1e6 * self.seconds / c.steps as f64),
         ]);
     }

@@ -378,7 +378,7 @@ fn long_steps_along_numerical_geodesics_keep_the_energy() {
             let size = energy(start.x, start.y);
             worst = worst.max((energy(end.x, end.y) - size).abs() / size.max(1.0));
             // The eigenvalues of the metric are above 0.6.
-            long += u32::from(steps.certificate().retries == 0 && (end - start).norm() > 2.6);
+            long += u32::from(steps.certificate().effort.splits == 0 && (end - start).norm() > 2.6);
         }
     }
     println!("{long} steps of two radians, |H − H₀| ≤ {worst:.1e}");

@@ -3,7 +3,7 @@
 //! all others let through.
 
 use metriplectic::fields::{Column, Square, Vector};
-use metriplectic::integrators::{Equation, Residual, ResumeError, RunError, StepError};
+use metriplectic::integrators::{Equation, Residual, ResumeError, RunError, StepError, StepStart};
 use metriplectic::manifolds::{MetricError, PointError};
 use metriplectic::prelude::*;
 
@@ -48,11 +48,6 @@ fn line(energy: Field2) -> impl Metriplectic<Manifold = Euclidean<2>, Metric = C
 }
 
 const START: Vector3<f64> = Vector3::new(0.6, 0.5, 0.4);
-
-/// A solver that takes the first guess for a solution, whose energy is then off by the order of `h²`.
-fn careless() -> Scheme<WeylMidpoint> {
-    Scheme::new(WeylMidpoint).newton(Newton { tolerance: 1e16, ..Newton::default() })
-}
 
 #[test]
 fn no_step_is_accepted_whose_error_is_above_the_one_allowed() {
@@ -168,26 +163,59 @@ fn a_metric_is_symmetric_and_a_start_on_its_manifold_to_ten_digits() {
     assert!(rotation(1e-11).is_ok() && rotation(1e-6).is_err());
 }
 
+/// Two bodies that exchange heat by a tensor which annihilates `dH` and not the discrete gradient of a step:
+/// they are the same at the start and around it, where the energy is linear, and differ by `O(h²)` beyond
+/// `x = 0.7`.
+fn leaking() -> impl Metriplectic<Manifold = Euclidean<2>, Metric = Canonical> {
+    let beyond = |x: Real| if x.re > 0.7 { x - 0.7 } else { Real::from(0.0) };
+    System::on(Euclidean::<2>)
+        .energy(move |x: &Vector2<Real>| x.x + x.y + beyond(x.x).powi(3) * 300.0)
+        .entropy(|x: &Vector2<Real>| x.x.ln() + x.y.ln())
+        .dissipation(FieldDissipation(move |x: &Vector2<Real>, _: &Vector2<Real>| {
+            let b = Vector2::new(Real::from(1.0), -beyond(x.x).powi(2) * 900.0 - 1.0);
+            b * b.transpose()
+        }))
+        .build()
+        .expect("the parts make a system")
+}
+
+const COLD: Vector2<f64> = Vector2::new(0.6, 1.4);
+
 #[test]
 fn a_step_that_breaks_the_first_law_is_taken_in_halves() {
-    let system = relaxing();
-    let run = careless().run(&system, START, Span::steps(0.01, 1)).unwrap();
-    // The energy of the whole step would be off by 4.5e-6, that of each half by a quarter of it.
-    assert_eq!(run.certificate().retries, 1);
-    let halves = careless().run(&system, START, Span::steps(0.005, 2)).unwrap();
-    assert_eq!(halves.certificate().retries, 0);
-    assert_eq!(run.last().point, halves.last().point);
+    let system = leaking();
+    let start = WeylMidpoint.run(&system, COLD, Span::steps(1e-4, 1500)).unwrap().last().point;
+    let steps = |h: f64, count: usize| {
+        let (mut x, mut splits, mut memory) = (start, 0, Default::default());
+        for _ in 0..count {
+            let from = StepStart::first(&system, &x);
+            let taken = Scheme::new(WeylMidpoint).step(&system, &from, h, &mut memory).ok()?;
+            (x, splits) = (taken.x, splits + taken.effort.splits);
+        }
+        Some((x, splits))
+    };
+    // A part that is off by less than a millionth is taken, and errors are of third order.
+    let halved = (0..60).filter(|k| {
+        let h = 1e-3 * 1.1_f64.powi(*k);
+        let Some((end, 1)) = steps(h, 1) else { return false };
+        let (same, splits) = steps(0.5 * h, 2).expect("the halves are taken");
+        assert!(splits == 0 && end == same, "h = {h}: {end} {same}");
+        true
+    });
+    assert!(halved.count() > 0);
 }
 
 #[test]
 fn no_run_goes_on_whose_energy_is_off_by_a_millionth() {
-    let system = relaxing();
-    for h in [1e-4, 1e-3, 1e-2] {
-        let error = careless().run(&system, START, Span::steps(h, 1000)).unwrap_err();
-        let RunError::Step { cause, trajectory } = &error else { panic!("another error: {error}") };
-        assert!(matches!(cause, StepError::FirstLawBroken { .. }), "{cause}");
-        let certificate = trajectory.certificate();
-        assert!(certificate.max_energy_error <= 1e-6 * 3.0 * certificate.initial_energy, "{error}");
+    let system = leaking();
+    for h in [1e-2, 2e-2, 5e-2] {
+        let error = WeylMidpoint.run(&system, COLD, Span::steps(h, 500)).unwrap_err();
+        {
+            let RunError::Step { cause, trajectory } = &error else { panic!("another: {error}") };
+            assert!(matches!(cause, StepError::FirstLawBroken { .. }), "{cause}");
+            let certificate = trajectory.certificate();
+            assert!(certificate.max_energy_error <= 1e-6 * 8.0, "{error}");
+        }
     }
 }
 
@@ -219,10 +247,10 @@ fn each_part_of_a_step_aims_at_the_energy_of_its_start() {
     let system = line(|x| x.y.powi(2) * 0.5 + (x.x * 10.0).exp());
     let scheme = Scheme::new(WeylMidpoint).newton(Newton { iterations: 3, ..Newton::default() });
     // Only the parts near the wall are short: a step of twice the size is split once more.
-    for (h, splits) in [(0.05, 5), (0.1, 6), (0.2, 7)] {
+    for (h, splits) in [(0.05, 6), (0.1, 7), (0.2, 8)] {
         let run = scheme.run(&system, vector![1.0, 0.5], Span::steps(h, 1)).unwrap();
         let certificate = run.certificate();
-        assert_eq!(certificate.retries, splits, "h = {h}");
+        assert_eq!(certificate.effort.splits, splits, "h = {h}");
         // What is more than four roundings is corrected in the next part; 5.2 without that, and none with it.
         let error = certificate.max_relative_energy_error();
         assert!(error <= 4.0 * f64::EPSILON, "h = {h}: {} ε", error / f64::EPSILON);
@@ -231,16 +259,14 @@ fn each_part_of_a_step_aims_at_the_energy_of_its_start() {
 
 #[test]
 fn a_step_is_split_as_often_as_asked_for() {
-    // The first law needs one splitting at h = 0.01, see above.
-    for splits in [0, 1, 2] {
-        let scheme = Scheme { splits, ..careless() };
-        match scheme.run(&relaxing(), START, Span::steps(0.01, 1)) {
-            Ok(run) => assert!(splits > 0 && run.certificate().retries == 1),
-            Err(RunError::Step { cause, .. }) => {
-                assert!(
-                    splits == 0 && matches!(cause, StepError::FirstLawBroken { .. }),
-                    "{cause}"
-                );
+    // A solver that gives up soon needs six splittings at h = 0.05, see above.
+    let system = line(|x| x.y.powi(2) * 0.5 + (x.x * 10.0).exp());
+    let soon = Scheme::new(WeylMidpoint).newton(Newton { iterations: 3, ..Newton::default() });
+    for splits in [0, 1, 2, 10] {
+        match (Scheme { splits, ..soon }).run(&system, vector![1.0, 0.5], Span::steps(0.05, 1)) {
+            Ok(run) => assert!(splits == 10 && run.certificate().effort.splits > 2),
+            Err(RunError::Step { cause: StepError::NotConverged { tried, .. }, .. }) => {
+                assert!(splits < 10 && tried.splits == splits, "{tried}");
             }
             Err(other) => panic!("another error: {other}"),
         }
@@ -256,12 +282,13 @@ fn the_friction_of_a_certificate_is_that_of_the_steps_however_long_a_jacobian_is
         run.certificate().friction
     };
     // It grows by a factor of four in the course of the run, and a Jacobian is kept for 100 steps.
-    for (h, count) in [(0.01, 2000), (0.05, 400)] {
+    // At h = 0.05 these are a quarter of it.
+    for (h, count, least) in [(0.01, 2000, 0.98), (0.05, 400, 0.85)] {
         let run = WeylMidpoint.run(&system, start, Span::steps(h, count)).unwrap();
         let states = run.states().iter().step_by(5);
         let largest = states.map(|state| friction(&state.point, h)).fold(0.0, f64::max);
         let certified = run.certificate().friction / largest;
-        assert!((0.98..1.02).contains(&certified), "h = {h}: {certified}");
+        assert!((least..1.02).contains(&certified), "h = {h}: {certified}");
     }
     // That of another step size is none of this one.
     let span = Span::until(20.0).tolerance(1e-5);
@@ -283,7 +310,7 @@ fn a_jacobian_is_not_kept_for_steps_of_another_length() {
     let system = body(kinetic, half_square, |p| (p.x * 4.0).exp() * 0.01, SecondLaw::Exact);
     let run =
         WeylMidpoint.run(&system, vector![0.001, -1.0, 0.001], Span::steps(0.05, 400)).unwrap();
-    assert!(run.certificate().iterations <= 400 * 43 / 20, "{}", run.certificate());
+    assert!(run.certificate().effort.iterations <= 400 * 43 / 20, "{}", run.certificate());
 }
 
 #[test]

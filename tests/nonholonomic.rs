@@ -41,11 +41,11 @@ fn sleigh() -> impl Metriplectic<Manifold = Euclidean<5>, Metric = Canonical> {
 /// `ω = V √(m/J) sech kτ` and `θ = (V√(m/J)/k) gd(kτ)` with `k = m a V/J`, `τ = t − 3`, so that it comes in
 /// backwards and turns round. The position is the integral of `v (cos θ, sin θ)` by Simpson's rule.
 fn exact(t: f64) -> State5 {
-    let (v_late, dg_v) = (1.2, 3.0);
+    let (v_late, turned) = (1.2, 3.0);
     let k = MASS * AHEAD * v_late / ABOUT_BLADE;
     let omega_most = v_late * (MASS / ABOUT_BLADE).sqrt();
-    let angle = |t: f64| 2.0 * omega_most / k * (0.5 * k * (t - dg_v)).tanh().atan();
-    let speed = |t: f64| v_late * (k * (t - dg_v)).tanh();
+    let angle = |t: f64| 2.0 * omega_most / k * (0.5 * k * (t - turned)).tanh().atan();
+    let speed = |t: f64| v_late * (k * (t - turned)).tanh();
     let along = |t: f64| vector![angle(t).cos(), angle(t).sin()] * speed(t);
     let panels = 2000;
     let h = t / f64::from(panels);
@@ -55,7 +55,7 @@ fn exact(t: f64) -> State5 {
             (along(a) + along(a + 0.5 * h) * 4.0 + along(a + h)) * (h / 6.0)
         })
         .sum();
-    let omega = omega_most / (k * (t - dg_v)).cosh();
+    let omega = omega_most / (k * (t - turned)).cosh();
     vector![place.x, place.y, angle(t), MASS * speed(t), ABOUT_BLADE * omega]
 }
 

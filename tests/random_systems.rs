@@ -64,8 +64,8 @@ impl Outcome {
         self.runs += 1;
         self.steps += exact.steps;
         self.lost_by_published += usize::from(published.entropy_falls > 0);
-        self.exact_iterations += exact.iterations;
-        self.published_iterations += published.iterations;
+        self.exact_iterations += exact.effort.iterations;
+        self.published_iterations += published.effort.iterations;
     }
 
     fn is_as_claimed(&self) {

@@ -232,7 +232,7 @@ fn the_orbits_obey_the_scaling_law() {
 
 type Vector5 = SVector<Real, 5>;
 
-/// The overdamped oscillator `x = (q, p, s)`, its plane dg_v by `angle`: `H = ½p² + ½q² + s`, `S = s`,
+/// The overdamped oscillator `x = (q, p, s)`, its plane turned by `angle`: `H = ½p² + ½q² + s`, `S = s`,
 /// `K = (γ/w_s) b bᵀ` with `b = (0, w_s, −w_p)`.
 fn overdamped(
     gamma: f64,
@@ -245,7 +245,7 @@ fn overdamped(
         .energy(|x: &Vector3<Real>| (x.x * x.x + x.y * x.y) * 0.5 + x.z)
         .entropy(|x: &Vector3<Real>| x.z)
         .dissipation(FieldDissipation(move |_: &Vector3<Real>, w: &Vector3<Real>| {
-            // The momentum is p = y cos − x sin in the dg_v plane.
+            // The momentum is p = y cos − x sin in the turned plane.
             let p = w.y * cos - w.x * sin;
             onsager(Vector3::new(w.z * -sin, w.z * cos, -p), w.z.recip() * gamma)
         }))
@@ -560,4 +560,78 @@ fn an_energy_in_tiny_units_is_printed_with_its_digits() {
     let mut lost = certificate.clone();
     lost.max_energy_error = 1.2e-16;
     assert!(!lost.keeps_energy() && lost.to_string().contains("first law:   BROKEN"), "{lost}");
+}
+
+/// A curved space has no unit of length, but times, energies and entropies have units there too.
+fn curved<Y: Metriplectic>(
+    name: &str,
+    [system, scaled]: [&Y; 2],
+    start: &<Y::Manifold as metriplectic::fields::Space>::Point<f64>,
+    h: f64,
+    units: [i32; 3],
+) where
+    WeylMidpoint: Retraction<Y::Manifold, Y::Metric>,
+{
+    let [time, energy, entropy] = units.map(|k| 2.0_f64.powi(k));
+    let entries = vec![1.0; Y::Manifold::entries(start).len()];
+    let factors = Units { entries, time, energy, entropy };
+    let until = |t: f64| Schedule::from(Span::until(40.0 * h * t).tolerance(1e-5));
+    let courses: [(Schedule, Schedule); 2] =
+        [(Span::steps(h, 60).into(), Span::steps(h * time, 60).into()), (until(1.0), until(time))];
+    for (course, other) in courses {
+        let run = UnitRun { system, x0: start.clone(), course };
+        let twin = UnitRun { system: scaled, x0: start.clone(), course: other };
+        laws::scaling(&Scheme::new(WeylMidpoint), &run, &twin, &factors, 0.0)
+            .unwrap_or_else(|law| panic!("{name}, {units:?}: {law}"));
+    }
+}
+
+#[test]
+fn curved_spaces_obey_the_scaling_law_in_times_energies_and_entropies() {
+    // x' = x × dH: an energy in units of E makes times of 1/E.
+    let top = |e: f64| {
+        System::on(Sphere::<2>::round())
+            .bracket(AreaForm)
+            .energy(move |x: &Vector3<Real>| {
+                (x.x.powi(2) * 0.5 + x.y.powi(3) * 0.4 + x.z * x.x) * e
+            })
+            .build()
+            .unwrap()
+    };
+    for k in [-70, -9, 13, 60] {
+        let systems = [&top(1.0), &top(2.0_f64.powi(k))];
+        curved("top on S²", systems, &vector![0.48, 0.6, 0.64], 0.1, [-k, k, 0]);
+    }
+    // Nambu's bracket is linear in S, and K dS = κ (|dH|² − dH ⊗ dH) dS in S and quadratic in H.
+    let group = |e: f64, s: f64| {
+        System::on(Rotations::bi_invariant())
+            .bracket(Nambu::default())
+            .energy(move |r: &Matrix3<Real>| {
+                (r.m11 + r.m22 * 2.0 + r.m33 * 3.0 + r.m12 * r.m23 * 0.5) * e
+            })
+            .entropy(move |r: &Matrix3<Real>| {
+                (r.m13 - r.m21 * 0.5 + (r.m31 + r.m32).powi(2) * 0.25) * s
+            })
+            .dissipation(MetricDissipation::scaled(move |_: &Matrix3<Real>| Real::from(0.1 / e)))
+            .build()
+            .unwrap()
+    };
+    let start = metriplectic::manifolds::rotations::exp(&vector![0.3, -0.2, 0.5]);
+    for [e, s] in [[20, 0], [0, -17], [-33, 40], [7, -50]] {
+        let systems = [&group(1.0, 1.0), &group(2.0_f64.powi(e), 2.0_f64.powi(s))];
+        curved("Nambu on SO(3)", systems, &start, 0.05, [-e - s, e, s]);
+    }
+    // A relaxation on S³: both laws, and no bracket.
+    let sphere = |e: f64, s: f64| {
+        System::on(Sphere::<3>::round())
+            .bracket(Zero)
+            .energy(move |x: &Vector4<Real>| (x.x.powi(2) + x.y * x.z * 0.3 + x.w) * e)
+            .entropy(move |x: &Vector4<Real>| (x.w * 0.5 - x.x * x.y) * s)
+            .build()
+            .unwrap()
+    };
+    for [e, s] in [[11, 0], [0, 31], [-20, 3]] {
+        let systems = [&sphere(1.0, 1.0), &sphere(2.0_f64.powi(e), 2.0_f64.powi(s))];
+        curved("S³", systems, &vector![0.5, 0.5, 0.5, 0.5], 0.1, [-2 * e - s, e, s]);
+    }
 }

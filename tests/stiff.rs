@@ -111,7 +111,7 @@ fn stiff_friction_is_damped_or_named() {
                          exchanges, {} retries, {:.1e}",
                         certificate.friction,
                         exchanges(&states),
-                        certificate.retries,
+                        certificate.effort.splits,
                         certificate.max_energy_error,
                     );
                     assert!(certificate.keeps_energy() && certificate.keeps_entropy());

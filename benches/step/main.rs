@@ -18,8 +18,7 @@ use std::hint::black_box;
 use criterion::Criterion;
 use metriplectic::dynamics::system::Point;
 use metriplectic::integrators::DiscreteGradient;
-use metriplectic::integrators::residual::DriftCorrection;
-use metriplectic::integrators::step::{Memory, Start};
+use metriplectic::integrators::{Flow as _, StepStart};
 use metriplectic::prelude::*;
 
 mod dimension;
@@ -88,16 +87,14 @@ impl Row {
         WeylMidpoint: Retraction<Y::Manifold, Y::Metric>,
     {
         let run = move |steps| {
-            let (mut memory, mut x, mut iterations) = (Memory::new(), black_box(start.clone()), 0);
-            let [mut energy, mut entropy] = [system.energy_at(&x), system.entropy_at(&x)];
+            let (mut memory, mut x, mut iterations) =
+                (Default::default(), black_box(start.clone()), 0);
+            let mut values = system.laws(&x);
             for _ in 0..steps {
-                let accumulated_error = DriftCorrection::nothing();
-                let invariants = accumulated_error.invariants;
-                let start =
-                    Start { x: &x, time: 0.0, h, energy, entropy, invariants, accumulated_error };
-                let Ok((end, work)) = scheme.step(&system, &start, &mut memory) else { break };
-                iterations += work.iterations;
-                (x, energy, entropy) = (end, work.energy, work.entropy);
+                let start = StepStart { x: &x, time: 0.0, values, reference: values };
+                let Ok(taken) = scheme.step(&system, &start, h, &mut memory) else { break };
+                iterations += taken.effort.iterations;
+                (x, values) = (taken.x, taken.values);
             }
             Outcome { end: Y::Manifold::entries(&x), iterations }
         };

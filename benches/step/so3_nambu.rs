@@ -106,7 +106,7 @@ fn differential(a: &Matrix3<f64>) -> Vector3<f64> {
 
 /// The derivative of the differential along the body frame, `A − tr A`, without the second
 /// derivatives of `f`.
-fn dg_v(a: &Matrix3<f64>) -> Matrix3<f64> {
+fn turned(a: &Matrix3<f64>) -> Matrix3<f64> {
     a - Matrix3::from_diagonal_element(a.trace())
 }
 
@@ -165,8 +165,8 @@ impl Equation {
         let (p, q) = (Vector3::y().cross(&r1), Vector3::z().cross(&r2));
         let t = Vector3::new(1.0, 1.0, 0.0).cross(&r3);
         let dz = dhalf * 0.5;
-        let ddh = (dg_v(&energy_slope_z) + (p * q.transpose() + q * p.transpose()) * 0.5) * dz;
-        let ds = (dg_v(&entropy_slope_z) + t * t.transpose() * 0.5) * dz;
+        let ddh = (turned(&energy_slope_z) + (p * q.transpose() + q * p.transpose()) * 0.5) * dz;
+        let ds = (turned(&entropy_slope_z) + t * t.transpose() * 0.5) * dz;
         let (_, dend) = exp(u);
         let rows =
             dend.tr_mul(&differential(&energy_slope(&end))) - ddh.tr_mul(u) - dh - u * (2.0 * c);

@@ -1,20 +1,20 @@
-//! Choose a space, a bracket, a dissipation and a scheme: ten questions, each with a short table.
+//! Ten questions that lead to a space, a bracket, a dissipation and a scheme, each with a short table.
 //!
-//! The defaults are in **bold**. A program that states only what is not one, for each of the three most
-//! common kinds of model, stands at the [end](#three-programs).
+//! The defaults are in **bold**. The [last section](#three-programs) has a program for each of the three most common
+//! kinds of model. It states only what differs from the defaults.
 //!
 //! # 1. Where does the state live?
 //!
 //! | the state is | space | because |
 //! |---|---|---|
-//! | the momentum of a body or fluid in its own frame | [`LieDual`](crate::manifolds::LieDual) | its bracket comes with it, and its Casimirs are entropies |
+//! | the momentum of a body or fluid in the body frame | [`LieDual`](crate::manifolds::LieDual) | it includes its bracket, and its Casimirs are entropies |
 //! | positions, momenta, entropies, without constraints | [`Euclidean`](crate::manifolds::Euclidean) | geodesics are straight lines, steps are cheapest |
 //! | a direction, a spin, a unit quaternion | [`Sphere`](crate::manifolds::Sphere) | no chart has a pole, and the norm cannot drift |
 //! | an attitude | [`Rotations`](crate::manifolds::Rotations) | no gimbal lock |
 //! | a temperature, a volume, an internal energy | [`HalfLine`](crate::manifolds::HalfLine) | zero is infinitely far |
-//! | coordinates with an edge | [`Chart`](crate::manifolds::Chart) | a step that leaves the domain is taken in halves, or is an error |
+//! | coordinates with an edge | [`Chart`](crate::manifolds::Chart) | a step that leaves the domain is split in halves, or is an error |
 //! | several of these | [`Product`](crate::manifolds::Product) | pairs nest |
-//! | something else | [your own](super::your_own_manifold) | two traits |
+//! | another space | [your own](super::your_own_manifold) | it takes two traits |
 //!
 //! # 2. What moves it reversibly?
 //!
@@ -23,56 +23,55 @@
 //! | [`LiePoisson`](crate::dynamics::LiePoisson), **of every `LieDual`** | for momenta in the body frame, heavy tops, fluids truncated to a Lie algebra | functions that the coadjoint action leaves alone: `½\|p\|²` on so(3)*, `\|Γ\|²` and `M·Γ` on se(3)* |
 //! | [`Symplectic`](crate::dynamics::Symplectic) | for positions and momenta, R²ⁿ or `T*SO(3)` | constants only |
 //! | [`Poisson::constant`](crate::dynamics::Poisson::constant) | the same with further variables, such as `s` in `(q, p, s)` | functions of the variables with zero rows |
-//! | [`Poisson::field`](crate::dynamics::Poisson::field) | for a matrix that varies; Jacobi's identity is checked, not assumed | yours to know |
-//! | [`AlmostPoisson::field`](crate::dynamics::AlmostPoisson::field) | for a nonholonomic system, whose bracket is skew and breaks Jacobi's identity | yours to know |
+//! | [`Poisson::field`](crate::dynamics::Poisson::field) | for a matrix that varies; Jacobi's identity is checked | those of your matrix |
+//! | [`AlmostPoisson::field`](crate::dynamics::AlmostPoisson::field) | for a nonholonomic system, whose bracket is skew and breaks Jacobi's identity | those of your matrix |
 //! | [`.force(f)`](crate::dynamics::SystemBuilder::force) on a `LieDual` | for a force without work, `μ' = ad*_ξ(μ + 𝓕(ξ))`, such as a feedback torque | conserved only where `⟨𝓕, [ξ, dC]⟩ = 0` |
 //! | [`AreaForm`](type@crate::dynamics::AreaForm) | on a surface: spins, point vortices | constants only |
 //! | [`Nambu`](crate::dynamics::Nambu) | on a 3-manifold, if only `H`, `S` and a metric are known | `S`, by construction |
 //! | `Nambu::default().and(c)`, once for each further Casimir | the same on an `n`-manifold, `n ≤ 8`, with `n − 3` functions more | `S`, and each `c` |
 //! | a pair, `(AreaForm, Zero)` | on a product | those of both factors; every function of a factor with `Zero` |
-//! | [`Zero`](crate::dynamics::Zero), **elsewhere** | if nothing does: `S` climbs along a level set of `H` | all functions |
+//! | [`Zero`](crate::dynamics::Zero), **elsewhere** | without reversible motion: `S` rises along a level set of `H` | all functions |
 //!
 //! # 3. Is the entropy a Casimir of the bracket?
 //!
 //! | `Π dS` | then | because |
 //! |---|---|---|
 //! | `= 0` | nothing; [`SecondLaw::Exact`](crate::dynamics::SecondLaw::Exact) is the **default** | both laws hold in each step |
-//! | `≠ 0`, but a bath would make sense | `S = s` on a `Product` with a factor for `s` | friction has to put the energy somewhere: `H = h + e(s)`, temperature `e'(s)` |
-//! | `≠ 0`, on a 3-manifold | `Nambu` | it has any `S` for a Casimir; in `n` dimensions, too, with `n − 3` further ones |
-//! | `≠ 0`, and meant so | [`SecondLaw::Published`](crate::dynamics::SecondLaw::Published) | `H` is kept; the entropy then also changes reversibly, and nothing can be promised of it |
-//! | there is no `S` | leave it out | `H` is kept, without a projection |
+//! | `≠ 0`, but a bath would make sense | `S = s` on a `Product` with a factor for `s` | a bath takes the energy of friction: `H = h + e(s)`, temperature `e'(s)` |
+//! | `≠ 0`, on a 3-manifold | `Nambu` | every `S` is a Casimir; in `n` dimensions too, with `n − 3` further ones |
+//! | `≠ 0`, on purpose | [`SecondLaw::Published`](crate::dynamics::SecondLaw::Published) | `H` is conserved; the entropy also changes reversibly, so no second law is promised |
+//! | there is no `S` | leave it out | `H` is conserved, without a projection |
 //!
-//! On a surface a bracket other than `Zero` never has a non-constant Casimir, and `T*SO(3)` has none
-//! either, so the second line is for spins and for attitudes
-//! ([`errata`](super::errata#24-symmetry-preservation) says why the last one is often overlooked).
+//! On a surface a bracket other than `Zero` has only constant Casimirs, and so has `T*SO(3)`. So the second line is for
+//! spins and for attitudes ([`errata`](super::errata#24-symmetry-preservation) has the reason for attitudes).
 //!
 //! # 4. What produces entropy?
 //!
 //! | you know | dissipation | because |
 //! |---|---|---|
-//! | nothing but a metric | **[`MetricDissipation`](crate::dynamics::MetricDissipation)** | steepest ascent of `S` off `dH`, times `\|dH\|²` |
+//! | only a metric | **[`MetricDissipation`](crate::dynamics::MetricDissipation)** | steepest ascent of `S` orthogonal to `dH`, times `\|dH\|²` |
 //! | the same, and a rate | [`MetricDissipation::scaled`](crate::dynamics::MetricDissipation::scaled), or [`Scaled`](crate::dynamics::Scaled) around any other | `κ(x) ≥ 0`; a constant is a time scale |
-//! | which variables have friction | [`CometricDissipation`](crate::dynamics::CometricDissipation) | a semidefinite cometric; rows of zeros are left alone |
+//! | which variables have friction | [`CometricDissipation`](crate::dynamics::CometricDissipation) | a semidefinite cometric; variables with rows of zeros have no friction |
 //! | two such forms | [`KulkarniNomizu`](crate::dynamics::KulkarniNomizu) | metriplectic 4-brackets (Morrison and Updike 2024) |
 //! | a form on the Lie algebra | [`CasimirDissipation`](crate::dynamics::CasimirDissipation) | a Casimir grows by forced Euler-Poincaré equations, eq. (ops1) |
 //! | any other force `𝓕(ξ)` on it | [`.force(f)`](crate::dynamics::SystemBuilder::force) | `C' = ⟨𝓕(ξ), [ξ, dC]⟩`, whose sign is verified |
-//! | Onsager's matrix, heat conduction, Stokes friction | [`FieldDissipation`](crate::dynamics::FieldDissipation) | `K(x, w)` with `w` for `dH`: temperatures are components of `w`, and the law is exact |
-//! | a matrix `K(x)` that you do not want to rewrite | [`ProjectedDissipation`](crate::dynamics::ProjectedDissipation) | it is projected off `w`, which may spread friction; the certificate says so |
+//! | Onsager's matrix, heat conduction, Stokes friction | [`FieldDissipation`](crate::dynamics::FieldDissipation) | `K(x, w)` with `w` for `dH`: temperatures are components of `w`, and the law is exact; the book's recipes have programs |
+//! | a matrix `K(x)` that you do not want to rewrite | [`ProjectedDissipation`](crate::dynamics::ProjectedDissipation) | it is projected orthogonally to `w`, which may spread friction to other variables; the certificate says so |
 //!
 //! # 5. Which retraction?
 //!
 //! | retraction | order | use it |
 //! |---|---|---|
-//! | **[`WeylMidpoint`](crate::manifolds::WeylMidpoint)** | 2 | always, unless a row below applies |
+//! | **[`WeylMidpoint`](crate::manifolds::WeylMidpoint)** | 2 | unless a row below applies |
 //! | [`Projection`](crate::manifolds::Projection) on spheres, [`Cayley`](crate::manifolds::Cayley) on SO(3) | 2 | with a metric from a closure, whose geodesics they do not integrate |
 //! | [`Exponential`](crate::manifolds::Exponential) | 1 | for comparison with schemes based at `x`; it costs as much |
 //!
-//! On flat spaces all of them have straight lines, and `WeylMidpoint` is the midpoint rule.
+//! On flat spaces all paths are straight lines, and `WeylMidpoint` is the midpoint rule.
 //!
 //! # 6. Which discrete gradient?
 //!
-//! `Scheme::new(WeylMidpoint).gradient(MeanValue)` in place of `WeylMidpoint`. All keep `H` to round-off, and
-//! `S` has the same gradient.
+//! Write `Scheme::new(WeylMidpoint).gradient(MeanValue)` in place of `WeylMidpoint`. All gradients conserve `H` to
+//! round-off. The scheme uses the same gradient for `S`.
 //!
 //! | gradient | order | use it |
 //! |---|---|---|
@@ -81,37 +80,38 @@
 //! | [`SymmetricItohAbe`](crate::integrators::SymmetricItohAbe) | 2 | to compare: differences of values, coordinate by coordinate, and slopes only where those are small |
 //! | [`ItohAbe`](crate::integrators::ItohAbe) | 1 | to compare; it depends on the order of the coordinates |
 //!
-//! Accuracy is no reason. On the spinning top of Celledoni, Eidnes, Owren and Ringholm (2020) the errors at
-//! `t = 5`, with 25 steps, are 3.57e-4, 3.16e-4 and 5.42e-5 for the three of order 2
-//! (`tests/equations.rs::the_discrete_gradients_have_small_errors_on_the_spinning_top`), and another
-//! energy will sort them in another way.
+//! Accuracy does not decide between them. On the spinning top of Celledoni, Eidnes, Owren and Ringholm (2020) the
+//! errors at `t = 5`, with 25 steps, are 3.57e-4, 3.16e-4 and 5.42e-5 for the three of order 2
+//! (`tests/equations.rs::the_discrete_gradients_have_small_errors_on_the_spinning_top`). With another energy the
+//! order of these errors differs.
 //!
 //! # 7. Which second law?
 //!
 //! | `.second_law(..)` | `ΔS` in a step | use it |
 //! |---|---|---|
 //! | **[`Exact`](crate::dynamics::SecondLaw::Exact)** | `h K(w_S, w_S) ≥ 0` to round-off | if `S` is a Casimir. Its order is 2 as long as `\|w_S\|` is large against `h²`; [`Certificate::min_entropy_slope`](crate::integrators::Certificate) has the least one |
-//! | [`Published`](crate::dynamics::SecondLaw::Published) | `≥ −C h³` | to reproduce the paper, and if `S` is none |
+//! | [`Published`](crate::dynamics::SecondLaw::Published) | `≥ −C h³` | to reproduce the paper, and if `S` is not a Casimir |
 //!
-//! Where `S` is quadratic, space flat and `Π` linear, as in the paper's example, the two are the same map.
+//! If `S` is quadratic, the space flat and `Π` linear, as in the paper's example, the two are the same map.
 //!
 //! # 8. Is anything else conserved?
 //!
-//! | the function | say | because |
+//! | the function | call | because |
 //! |---|---|---|
 //! | a Casimir beside `S` (`\|Γ\|²` of a heavy top) | `.casimir(f)` | the bracket is projected until it annihilates a discrete gradient of `f` |
-//! | a momentum (an angular momentum) | `.momentum(f)` | `Π df ≠ 0`, so projecting the bracket would change the flow; its drift alone is taken out |
-//! | a momentum, and the symmetry is to be checked | `.symmetry(action, f)` | verification also tries the action: Poisson, `H∘Φ = H`, and `X_J` its generator |
+//! | a momentum (an angular momentum) | `.momentum(f)` | `Π df ≠ 0`, so a projection of the bracket would change the flow; only the drift of `f` is corrected |
+//! | a momentum whose symmetry is to be checked | `.symmetry(action, f)` | verification also tries the action: Poisson, `H∘Φ = H`, and `X_J` its generator |
 //!
-//! They are methods of the [`SystemBuilder`](crate::dynamics::SystemBuilder). The dissipation of the metric
-//! is made to annihilate these functions, too; any other one has to, and is refused if it does not. Do not
-//! list what depends on the other fields, such as a function of `H` and `S`: that is refused by name.
+//! They are methods of the [`SystemBuilder`](crate::dynamics::SystemBuilder). The dissipation of the metric annihilates
+//! the differentials of these functions. Any other dissipation must do so too, otherwise the model is refused. Do
+//! not list a function that depends on the other fields, such as a function of `H` and `S`: it is refused with its
+//! numbers.
 //!
 //! # 9. Which step?
 //!
-//! Both laws hold for every step that is solved, so `h` is a question of accuracy.
+//! Both laws hold for every step that is solved, so choose `h` by accuracy.
 //!
-//! | sign | do |
+//! | you see | do |
 //! |---|---|
 //! | runs with `h` and `h/2` differ by more than three times the error you want | halve `h`: the error of order 2 is a third of the difference |
 //! | [`retries`](crate::integrators::Certificate) in the certificate | steps were split in halves; a smaller `h` is cheaper |
@@ -122,17 +122,17 @@
 //!
 //! # 10. Which metric?
 //!
-//! The metric decides what friction is (question 4), the volume in `Nambu` and `AreaForm`, and the paths of
-//! a step. If it is only there for the paths, leave it **canonical**.
+//! The metric defines the friction (question 4), the volume in `Nambu` and `AreaForm`, and the paths of the steps. If
+//! it only defines the paths, take the **canonical** one.
 //!
 //! | metric | cost | use it |
 //! |---|---|---|
 //! | **[`Canonical`](crate::manifolds::Canonical)** | closed forms | unless friction says otherwise |
 //! | [`Metric::constant`](crate::manifolds::Metric::constant) | closed forms | on flat spaces, for units and weights: a variable in other units needs another weight |
-//! | a pair | that of its parts | on products, `(Canonical, bath)` |
-//! | [`Metric::field`](crate::manifolds::Metric::field) | geodesics are integrated, 50 to 70 times the time | where friction varies with the state; or take `Canonical` with `CometricDissipation`, which costs nothing of the kind |
+//! | a pair | the sum of its parts | on products, `(Canonical, bath)` |
+//! | [`Metric::field`](crate::manifolds::Metric::field) | geodesics are integrated, 50 to 70 times the time | if friction varies with the state; `Canonical` with `CometricDissipation` has the same friction without this cost |
 //!
-//! More on the last line in [`your_own_metric`](super::your_own_metric).
+//! More on the last line is in [`your_own_metric`](super::your_own_metric).
 //!
 //! # Three programs
 //!
@@ -180,5 +180,5 @@
 //! # }
 //! ```
 //!
-//! A spin with a bath, on `S² × R` with the brackets `(AreaForm, Zero)`, is the example
-//! `spin_in_a_bath`; energy, entropy and nothing else on SO(3) is `rotations`.
+//! Two examples show more: `spin_in_a_bath` is a spin with a bath on `S² × R`, with the brackets `(AreaForm, Zero)`;
+//! `rotations` has only an energy and an entropy on SO(3).

@@ -1,13 +1,13 @@
-//! Where the library departs from the paper, and why.
+//! Errata of the paper, with derivations, and how the library differs.
 //!
 //! The scheme is that of A. Bloch, M. Farré Puiggalí and D. Martín de Diego, *Metriplectic
 //! Euler-Poincaré equations: smooth and discrete dynamics*
-//! ([arXiv:2401.05220](https://arxiv.org/abs/2401.05220)). To implement it, each of its formulas had to
-//! be derived anew. Most are as printed; those below are not. None of them touches the idea: the
-//! integrator is right where it is worked out, in the example of the rigid body.
+//! ([arXiv:2401.05220](https://arxiv.org/abs/2401.05220)). For the implementation each
+//! formula was derived again. Most are right as printed, and this page lists the others. None of them affects the idea:
+//! the worked-out integrator, in the example of the rigid body, is right.
 //!
-//! Every entry has a test in `tests/errata.rs`, which evaluates both forms: the printed one fails by the
-//! number given here, the corrected one holds to round-off or has its order. Sections are those of the
+//! Every entry has a test in `tests/errata.rs`, which evaluates both forms. The printed form fails by the number
+//! given here. The corrected form holds to round-off or has its order. Sections are those of the
 //! paper, `w` is a discrete gradient of `H`, `z` the base point, `G*` the cometric, and the page
 //! [`equations`](super::equations) lists everything else.
 //!
@@ -35,8 +35,8 @@
 //!
 //! **A step without its size.** *Printed:* discrete gradient methods are `x' − x = Π̄(x, x') ∇̄H(x, x')`
 //! with `Π̄` an approximation of `Π`. *Correct:* `x' − x = h Π̄ ∇̄H`. Divide by `h` and let it go to zero:
-//! only with the factor is the limit `x' = Π ∇H`; without it, the map is one step of size 1, whatever `h`
-//! was meant to be. Energy is kept by both, so conservation does not notice. The tumbling free body of the
+//! only with the factor is the limit `x' = Π ∇H`. Without the factor the map is a step of size 1 for every `h`. Both
+//! forms conserve the energy, so a test of conservation does not notice. The tumbling free body of the
 //! tests moves 91 times too far for `h = 0.01`.
 //! (`tests/errata.rs::a_step_without_its_size_is_a_step_of_size_one`)
 //!
@@ -68,26 +68,27 @@
 //!   = \frac{1}{C_H}\, K_{\text{(semid)}}(\alpha, \beta) .
 //! ```
 //!
-//! So the same letter has two scales, and the remark does not contain the equation that it follows.
-//! *Correct*, if it shall be an extension: `K(α, β) = C_H G*(Qα, Qβ)`. Both annihilate the `dL_a` and are
-//! positive semidefinite; they differ in time scale, `C_H = |Ω|²` for a body, so that entropy at the start
-//! of the paper's example would be produced 25 times as fast, and near an equilibrium of `H`, where
-//! `K` of (semid) vanishes like `|dH|²` and that of the remark keeps its norm and has no limit. The library
-//! has `C_H G*(Qα, Qβ)` in both cases, [`MetricDissipation`](crate::dynamics::MetricDissipation) with or
-//! without further invariants, so that listing one does not change the clock. Any other scale is a number
-//! `κ(x)` in front, [`MetricDissipation::scaled`](crate::dynamics::MetricDissipation::scaled); that of the
-//! remark is `κ = 1/C_H`.
+//! So the same letter has two scales, and the remark does not extend the equation before it. *Correct*, as an
+//! extension: `K(α, β) = C_H G*(Qα, Qβ)`. Both annihilate the `dL_a` and are positive semidefinite. They differ in time
+//! scale, by `C_H = |Ω|²` for a body: at the start of the paper's example the remark produces entropy 25 times as fast.
+//! They also differ near an equilibrium of `H`. There `K` of (semid) vanishes like `|dH|²`, and `K` of the remark keeps
+//! its norm and has no limit.
+//!
+//! The library uses `C_H G*(Qα, Qβ)` in both cases, [`MetricDissipation`](crate::dynamics::MetricDissipation) with or
+//! without further invariants, so listing an invariant does not change the time scale. For another scale put `κ(x)` in
+//! front, [`MetricDissipation::scaled`](crate::dynamics::MetricDissipation::scaled). The scale of the remark is
+//! `κ = 1/C_H`.
 //! (`tests/errata.rs::the_remark_has_another_scale_than_the_equation_before_it`)
 //!
 //! # §2.4 Symmetry preservation
 //!
 //! **A function where its differential is meant.** *Printed:* `(f, J_ξ) = 0` for all `f`, "or equivalently
 //! `♯_K(J_ξ) = 0`". *Correct:* `♯_K(dJ_ξ) = 0`, since `♯_K` acts on covectors and `J_ξ` is a number at each
-//! point. The condition is not automatic: an oscillator in the plane with a bath, `H = ½|q|² + ½|p|² + s`
-//! and `S = s`, is invariant under rotations together with its metric, yet (semid) gives
-//! `(J, S) = −G*(dH, dJ) = −2J`, and the angular momentum `J` dies as `exp(−2t)`: 0.135 of it is left at
-//! `t = 1`. With `J` among the `L_a` of the remark,
-//! [`momentum`](crate::dynamics::SystemBuilder::momentum), it is kept to round-off.
+//! point. The condition is not automatic. An oscillator in the plane with a bath, `H = ½|q|² + ½|p|² + s`
+//! and `S = s`, is invariant under rotations, and so is its metric. Yet (semid) gives
+//! `(J, S) = −G*(dH, dJ) = −2J`. So the angular momentum `J` decays as `exp(−2t)`, to 0.135 of its value at
+//! `t = 1`. If `J` is one of the `L_a` of the remark,
+//! [`momentum`](crate::dynamics::SystemBuilder::momentum), it is conserved to round-off.
 //! (`tests/errata.rs::a_momentum_is_kept_if_its_differential_is_annihilated`)
 //!
 //! **The bundle.** *Printed:* "the case when `P = TG`". *Correct:* `P = T*G`, which the next line of the paper
@@ -122,7 +123,7 @@
 //!
 //! # §3 Forced Euler-Poincaré equations
 //!
-//! **Which velocity turns the force.** *Printed:* `F(ξ') = ad*_ξ 𝓕(ξ')` for `ξ' ∈ g`, with a `ξ` that is not an
+//! **Which velocity turns the force.** *Printed:* `F(ξ') = ad*_ξ 𝓕(ξ')` for `ξ' ∈ g`, where `ξ` is not an
 //! argument. *Correct:* `F(ξ) = ad*_ξ 𝓕(ξ)`, with one velocity, as in eq. (fel). The energy changes by the
 //! power of the force at the velocity of the motion,
 //!
@@ -135,8 +136,8 @@
 //! (`tests/errata.rs::a_force_turned_by_another_velocity_does_work`)
 //!
 //! **One letter for two forms.** §2 has `𝒦` on covectors of `P`, with `𝒦(dH, ·) = 0`. Eq. (sem) has `𝒦` on `g`,
-//! "an arbitrary positive semidefinite scalar product", and covectors of `g*` are elements of `g`; so the
-//! two can be taken for each other, and must not be. Here the form on the algebra is `κ`. With
+//! "an arbitrary positive semidefinite scalar product". Covectors of `g*` are elements of `g`, so the two are easily
+//! confused. Here the form on the algebra is `κ`. With
 //! `⟨F(ξ), η⟩ = κ(η, [ξ, dC])`, eq. (ops1),
 //!
 //! ```math
@@ -145,17 +146,17 @@
 //! K(\alpha, \beta) = \kappa([\xi, \alpha], [\xi, \beta]), \quad \xi = dH ,
 //! ```
 //!
-//! which annihilates `dH` because `[ξ, ξ] = 0`. That is
-//! [`CasimirDissipation`](crate::dynamics::CasimirDissipation). `κ` itself in the place of `K` would give
-//! `H' = κ(dH, dC)`; for the body with `κ = 1` and `C = ½|p|²` this is `Ω·p = 2H`, 0.924 at the point of
-//! the test. (On so(3) with `κ = 1` the `K` of `κ` is (semid), which invites the confusion. This `κ` has
-//! nothing to do with the factor `κ(x)` above, either.)
+//! which annihilates `dH` because `[ξ, ξ] = 0`. This is
+//! [`CasimirDissipation`](crate::dynamics::CasimirDissipation). `κ` in the place of `K` would give
+//! `H' = κ(dH, dC)`. For the body with `κ = 1` and `C = ½|p|²` this is `Ω·p = 2H`, 0.924 at the point of
+//! the test. (On so(3) with `κ = 1` the `K` of `κ` is (semid), which invites the confusion. This `κ` is not the factor
+//! `κ(x)` above.)
 //! (`tests/errata.rs::the_form_on_the_algebra_is_not_the_form_on_covectors`)
 //!
 //! # §4 Generic integrators
 //!
 //! **The order.** *Printed:* the section opens with "a second order integrator", and §4.4 offers two
-//! retractions for it. *Correct:* order 2 with the base point in the middle,
+//! retractions for it. *Correct:* the order is 2 with the base point in the middle,
 //! [`WeylMidpoint`](crate::manifolds::WeylMidpoint); order 1 with the exponential at `x`,
 //! [`Exponential`](crate::manifolds::Exponential). On Rⁿ with `z = x` the scheme is
 //! `x' = x + h (Π(x) w + K_w(x) dS(x))`, and `w = dH(x) + O(h)`, while the flow is
@@ -164,14 +165,14 @@
 //! x + h f(x) + \tfrac{1}{2} h^2 f'(x) f(x) + O(h^3), \qquad f = \Pi\, dH + K\, dS .
 //! ```
 //!
-//! The second-order term `½ f' f` needs `Π` and `K` half a step on, but sees them at `x`. With `z` in the
-//! middle of the geodesic and Gonzalez' covector, exchanging `x` with `x'` and `h` with `−h` gives the same
-//! equation, so the method is symmetric and its order even. Fitted on the spinning top of Celledoni,
-//! Eidnes, Owren and Ringholm ([arXiv:1805.07578](https://arxiv.org/abs/1805.07578)): 1.00 and 2.00.
+//! The second-order term `½ f' f` needs `Π` and `K` half a step later, but they are evaluated at `x`. Now let `z`
+//! be the middle of the geodesic and `w` Gonzalez' covector. Exchanging `x` with `x'` and `h` with `−h` gives the same
+//! equation. So the method is symmetric and its order even. The orders fitted on the spinning top of Celledoni,
+//! Eidnes, Owren and Ringholm ([arXiv:1805.07578](https://arxiv.org/abs/1805.07578)) are 1.00 and 2.00.
 //! (`tests/errata.rs::the_exponential_at_the_start_is_of_first_order`)
 //!
 //! **The second law.** *Printed:* the proposition "second law", `S(x_{k+1}) − S(x_k) ≥ O(h³)`. *Correct:*
-//! `S(x_{k+1}) − S(x_k) ≥ −C h³`, which is a bound on the loss and not a law; the term has either sign.
+//! `S(x_{k+1}) − S(x_k) ≥ −C h³`, a bound on the loss, not a law, because the term has either sign.
 //! The proof is a Taylor expansion about the midpoint,
 //!
 //! ```math
@@ -180,21 +181,22 @@
 //! ```
 //!
 //! and the last term is absent if `S` is quadratic and `P` flat, as in the example: there
-//! `ΔS = h K_d(dS(z), dS(z)) ≥ 0` exactly. Elsewhere the law fails where the entropy production is
-//! smaller than `h²`: two gas containers with a wall that hardly conducts (Shang and Öttinger 2020) lose
-//! entropy on 150 of 300 steps of `h = 0.1`, up to 1.4e-3 at once, and on 500 of 1200 of `h = 0.025`.
-//! Without conduction the largest loss in a step falls with the fitted order 3. The remedy is a discrete
-//! gradient `w_S` of `S` in the place of `dS(z)`, and the bracket `PΠPᵀ` with `Pᵀ` the projection off `w_S`:
-//! then `ΔS = h ⟨w_S, v⟩ = h K(w_S, w_S) ≥ 0`, and the order is 2 because `Π dS = 0` makes `P` a change of
+//! `ΔS = h K_d(dS(z), dS(z)) ≥ 0` exactly. In other cases the law fails if the entropy production is
+//! smaller than `h²`. Two gas containers with a wall that hardly conducts (Shang and Öttinger 2020) lose entropy on 150
+//! of 300 steps of `h = 0.1`, up to 1.4e-3 in a step. With `h = 0.025` they lose entropy on 500 of 1200 steps. Without
+//! conduction the largest loss in a step falls with the fitted order 3.
+//!
+//! The remedy is a discrete gradient `w_S` of `S` in the place of `dS(z)`, and the bracket `PΠPᵀ`, where `Pᵀ` projects
+//! off `w_S`. Then `ΔS = h ⟨w_S, v⟩ = h K(w_S, w_S) ≥ 0`. The order is 2, because `Π dS = 0` makes `P` a change of
 //! `O(h²)`. This is [`SecondLaw::Exact`](crate::dynamics::SecondLaw::Exact), the default (for a flat space, with
-//! other tensors, Romero 2009). With it the entropy of the containers falls on no step.
+//! other tensors, Romero 2009). It lowers the entropy of the containers on no step.
 //! (`tests/errata.rs::the_published_scheme_lowers_the_entropy_and_by_third_order_only`)
 //!
 //! **The factor in (semid-d).** *Printed:*
 //! `K_d(α, β) = G*(w, w) [G*(w, w) G*(α, β) − G*(w, α) G*(w, β)]`. *Correct:* the bracket alone. It is eq. (semid)
-//! with `dH` replaced by `w`; the factor in front remains as the points meet, `K_d → C_H K`, so the step
-//! is consistent with `x' = Π dH + C_H K dS`, another equation, and its order is 0. Energy and the sign
-//! of entropy production are those of a metriplectic scheme, so again conservation does not notice. The
+//! with `dH` replaced by `w`; the factor in front remains as the points meet, `K_d → C_H K`. So the step
+//! is consistent with another equation, `x' = Π dH + C_H K dS`, and its order is 0. Energy and the sign of entropy
+//! production are those of a metriplectic scheme, so a test of conservation does not notice. The
 //! example of §4.3 has no such factor. With it, the relaxing body is off by 8.86e-3 at `t = 10` with 200
 //! and with 3200 steps; without it the error falls with order 2.
 //! (`tests/errata.rs::the_factor_in_the_discrete_form_makes_another_equation_of_it`)
@@ -216,15 +218,15 @@
 //!
 //! the printed equations of motion. With the printed entries `(Π ∇H)_1 = (I_2^2 − I_3^2)/(I_2 I_3) p_2 p_3`, too
 //! large by `I_2 + I_3`; the factors are 6, 11 and 15 for the three components, and `Π ∇S = (Ip) × p` is
-//! 4.34 instead of zero. It is the right matrix in terms of velocities, `I_i Ω_i = p_i`. Nothing in it looks wrong
-//! to a test of the bracket alone: it is skew and satisfies the Jacobi identity, with the Casimir
+//! 4.34 instead of zero. It is the right matrix in terms of velocities, `I_i Ω_i = p_i`. A test of the bracket
+//! alone does not notice: the matrix is skew and satisfies the Jacobi identity, with the Casimir
 //! `½ Σ I_i p_i²`. A run with it is refused, because `S` is not that Casimir.
 //! (`tests/errata.rs::a_tensor_of_velocities_and_momenta_is_not_the_bracket_of_the_body`)
 //!
 //! **The arguments of the discrete gradient.** *Printed:* `∇̄₂H((P₁+p₁)/2, …) = (z₁/I₁, …)`. *Correct:*
 //! `∇̄₂H(p, P) = (z₁/I₁, …)`: a discrete gradient is a function of two points. The value is right, since the
-//! defect `H(P) − H(p) − ∇H(z)·(P − p)` vanishes for a quadratic `H`. Taken literally, as the gradient at the
-//! midpoint, it is no discrete gradient of any other energy: with `¼|p|⁴` added to `H` it misses the change
+//! defect `H(P) − H(p) − ∇H(z)·(P − p)` vanishes for a quadratic `H`. The gradient at the midpoint, as literally
+//! printed, is a discrete gradient only of a quadratic energy. With `¼|p|⁴` added to `H` it misses the change
 //! of the energy by `¼|P − p|² z·(P − p)`, −0.0170 in the test.
 //! (`tests/errata.rs::a_discrete_gradient_is_a_function_of_two_points`)
 //!
@@ -234,7 +236,7 @@
 //! paragraph `τ_Q` should be `τ_P`.) Two vectors at one base point, `v` and `2v`, are different elements of `TP` with
 //! the same `z`. (`tests/errata.rs::the_base_of_a_pair_is_a_point_and_not_a_vector`)
 //!
-//! **The lost step size.** *Printed:* `⟨∇̄H(x, x'), R_h⁻¹(x, x')⟩ = H(x') − H(x)`, and (gonzalez-m) to match. *Correct:*
+//! **The missing step size.** *Printed:* `⟨∇̄H(x, x'), R_h⁻¹(x, x')⟩ = H(x') − H(x)`, and (gonzalez-m) to match. *Correct:*
 //!
 //! ```math
 //! h\, \langle w, v \rangle = H(x') - H(x), \qquad
@@ -243,8 +245,8 @@
 //! ```
 //!
 //! Both retractions of the section have `R_h⁻¹(x, x') = v` with a displacement `hv`; in Rⁿ it is `(x' − x)/h`, and
-//! eq. (discGrad) is about `x' − x`. The last formula of the paper, `R_h⁻¹ = Π w + K_d dS`, needs the velocity, too,
-//! so the `h` belongs here. What goes wrong is consistency. Let `e = v/|v|`; as the points meet,
+//! eq. (discGrad) is about `x' − x`. The last formula of the paper, `R_h⁻¹ = Π w + K_d dS`, also needs the velocity,
+//! so the `h` belongs here. The printed form is not consistent. Let `e = v/|v|`; as the points meet,
 //! `H(x') − H(x) ≈ h dH(v)`, and the printed covector tends to
 //!
 //! ```math
@@ -252,24 +254,24 @@
 //! ```
 //!
 //! not to `dH`: it depends on the direction in which `x'` approaches `x`, and is not continuous. In the test it
-//! misses 0.900 of the slope along the path, at `h = 0.1`. Why the scheme works all the same: its equation
-//! implies `⟨w, v⟩ = 0`, hence `H(x') = H(x)` by either formula, and then both have the same correction
-//! `−dH(z)v/G(v,v)`. A solution of one is a solution of the other. This rescue is for `H` alone; the
-//! covector of an entropy, which does change, would be wrong at order 0. The library writes the displacement
+//! misses 0.900 of the slope along the path, at `h = 0.1`. The scheme works nevertheless, because its equation
+//! implies `⟨w, v⟩ = 0`. Hence `H(x') = H(x)` by either formula, and both have the same correction
+//! `−dH(z)v/G(v,v)`. A solution of one is a solution of the other. This argument holds for `H` alone. An entropy does
+//! change, and its covector would be wrong at order 0. The library writes the displacement
 //! `d = hv` throughout, [`Gonzalez`](crate::integrators::Gonzalez), and no `h` appears.
 //! (`tests/errata.rs::a_discrete_gradient_on_a_manifold_counts_the_step`)
 //!
 //! **The last formula.** *Printed:* `R_h⁻¹(x_k, x_{k+1}) = Π(z_τ) ∇̄₂H + K_d(z) ∇C(z)`. *Correct:*
-//! `R_h⁻¹(x_k, x_{k+1}) = Π(z) w + K_d(z) dS(z)`. There is no `z_τ`; the point is the `z` of the next line.
+//! `R_h⁻¹(x_k, x_{k+1}) = Π(z) w + K_d(z) dS(z)`. `z_τ` is not defined; the point is the `z` of the next line.
 //! `C` is the Casimir of §3, which is the entropy `S` here; and `K_d` acts on covectors. A gradient
-//! `∇S = g⁻¹dS` in its place would make the equation depend on coordinates and lose the second law: for
-//! `w = (1, 1, 0)`, `dS = (1, 0.2, 0)` on R³ entropy production is `K(dS, dS) = 0.64`; in the coordinate `3p_2` for
-//! `p_2`, with the metric pulled back, `⟨dS, K ∇S⟩ = −0.64`, and `K(dS, dS)` is 0.64 still.
+//! `∇S = g⁻¹dS` in its place would make the equation depend on coordinates and violate the second law. For
+//! `w = (1, 1, 0)`, `dS = (1, 0.2, 0)` on R³ the entropy production is `K(dS, dS) = 0.64`. Now replace the coordinate
+//! `p_2` by `3p_2` and pull back the metric: `⟨dS, K ∇S⟩ = −0.64`, and `K(dS, dS)` is still 0.64.
 //! (`tests/errata.rs::the_dissipation_acts_on_the_differential_and_not_on_the_gradient`)
 //!
 //! # Names only
 //!
-//! Without consequences, and not tested: the symmetric bracket is written `(df, dg)` once and `(f, g)` elsewhere
+//! The following have no consequences and are not tested: the symmetric bracket is written `(df, dg)` once and `(f, g)` elsewhere
 //! (§2.2); dimensions are `m` and `n` by turns (§2.1, §2.3), and eq. (matricial) has a range for an
 //! index that it does not contain; eqs. (fel) and (flp) are called forced Euler-Lagrange equations, and
 //! are the forced Euler-Poincaré and Lie-Poisson equations; `L(ξ(μ))` is `l(ξ(μ))` (§3); `K_d(z)` depends on

@@ -1,4 +1,4 @@
-//! Bring your own manifold.
+//! A manifold of your own, in sixty lines: the hyperbolic plane.
 //!
 //! A space of states is a type with two traits. [`Space`](crate::fields::Space) says what a point is,
 //! at every scalar, and gives a chart `φ_x` around each real point `x`;
@@ -105,7 +105,7 @@
 //! let distance = (x.z * y.z - x.x * y.x - x.y * y.y).acosh();
 //! assert!((length - distance).abs() < 1e-12);
 //!
-//! // A metriplectic run: precession about the least h = x₃ − ½x₁, with friction into a bath.
+//! // A metriplectic run: precession about the minimum of h = x₃ − ½x₁, with friction into a bath.
 //! let system = System::on(Product(HyperbolicPlane, Euclidean::<1>))
 //!     .metric((metric, Canonical))
 //!     .bracket((AreaForm, Zero))
@@ -125,18 +125,18 @@
 //!
 //! # What the traits ask for
 //!
-//! | | is | is checked by |
+//! | item | meaning | checked by |
 //! |---|---|---|
 //! | `Point<D>` | any type that holds numbers of `D`: a column, a matrix, a pair | the compiler |
 //! | `chart`, `coordinates` | `φ_x` and `φ_x⁻¹`, with `φ_x(0) = x`, written once for `f64` and all dual numbers | [`laws::manifold`](crate::manifolds::laws::manifold) |
-//! | `velocity` | `θ(q) v`, in the terms in which tensors shall be written; the derivative of `φ_x`, or a frame of your choice | geodesics of constant speed, [`laws::metric`](crate::manifolds::laws::metric) |
-//! | `defect`, `project`, `entries`, `magnitude`, `scales`, `random` | how far off, the nearest point, the scale of round-off (of a point, and of each direction of its chart), samples for the checks of a model | [`laws::manifold`](crate::manifolds::laws::manifold), in part |
+//! | `embed` | `θ(q) v`, the velocity to which tensors refer: the derivative of `φ_x`, or a frame of your choice | geodesics of constant speed, [`laws::metric`](crate::manifolds::laws::metric) |
+//! | `defect`, `project`, `entries`, `magnitude`, `scales`, `random` | the distance from the manifold, the nearest point, the scale of round-off (of a point, and of each direction of its chart), samples for the checks of a model | [`laws::manifold`](crate::manifolds::laws::manifold), in part |
 //! | `NaturalBracket` | the bracket that [`System::on`](crate::dynamics::System::on) starts with | [`laws::bracket`](crate::dynamics::laws::bracket) |
 //!
-//! Write the chart so that it ends *on* the manifold, whatever `q` is (here the third entry is computed
-//! anew, on a sphere the norm is divided out): the states of a run are chart points, and then they never
-//! drift off. Where a square root or a path function is not smooth at `q = 0`, its derivatives there are
-//! not numbers; [`series`](crate::fields::series) has the functions that are.
+//! Write the chart so that it ends *on* the manifold for every `q`. Here the third entry is computed from the others; on
+//! a sphere the norm is divided out. The states of a run are chart points, so they then never leave the manifold. If a
+//! square root or an angle is not smooth at `q = 0`, its derivatives there are not numbers.
+//! [`series`](crate::fields::series) has functions that are smooth there.
 //!
 //! # What may be left out
 //!
@@ -145,9 +145,9 @@
 //! - [`Space::seeds`](crate::fields::Space::seeds),
 //!   [`Space::covariant`](crate::fields::Space::covariant) and
 //!   [`Space::contravariant`](crate::fields::Space::contravariant) are derived from `chart` and
-//!   `velocity`; a closed form is faster.
-//! - [`Manifold::transport`](crate::manifolds::Manifold::transport) makes the guess of a step better
-//!   where frames turn.
+//!   `embed`; a closed form is faster.
+//! - [`Manifold::transport`](crate::manifolds::Manifold::transport) improves the guess of a step
+//!   where frames rotate.
 //! - Geodesics in closed form: implement [`Riemannian`](crate::manifolds::Riemannian) for
 //!   [`Canonical`](crate::manifolds::Canonical) on your space, as the modules
 //!   [`sphere`](crate::manifolds::sphere) and [`rotations`](crate::manifolds::rotations) do. The

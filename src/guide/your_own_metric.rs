@@ -1,4 +1,4 @@
-//! Bring your own metric.
+//! A metric of your own, on a chart, a sphere, SO(3) and a product.
 //!
 //! A metric is a closure from a point over [`Real`](crate::fields::Real) to a symmetric matrix
 //! `A(x)`, which measures *velocities*:
@@ -9,8 +9,8 @@
 //! ```
 //!
 //! [`Metric::field`](crate::manifolds::Metric::field) has the table of what a velocity is on each space:
-//! `x'` on Rⁿ and on spheres, the body angular velocity on SO(3), one below the other on a product. No
-//! chart has to be known, but for your own coordinates. A metric without a closure is
+//! `x'` on Rⁿ and on spheres, the body angular velocity on SO(3), both in one column on a product. You need
+//! no chart, except for your own coordinates. A metric without a closure is
 //! [`Canonical`](crate::manifolds::Canonical) or
 //! [`Metric::constant`](crate::manifolds::Metric::constant), with geodesics in closed form.
 //!
@@ -58,7 +58,7 @@
 //! laws::metric::<Product<Sphere<2>, Euclidean<1>>, _>(&pair, &point, &v)?;
 //! laws::metric::<Product<Sphere<2>, Euclidean<1>>, _>(&coupled, &point, &v)?;
 //!
-//! // In a system: friction is measured by the metric, and the second law is the metric's.
+//! // In a system the metric defines the friction, and so the second law.
 //! let system = System::on(Rotations::bi_invariant())
 //!     .metric(body)
 //!     .bracket(Nambu::default())
@@ -69,10 +69,10 @@
 //! assert!(run.certificate().keeps_energy());
 //! # assert!(run.certificate().min_entropy_increment > 0.0);
 //!
-//! // What goes wrong has a name. √(1 − x) ends at x = 1, a finite way from here.
+//! // Every failure has a name. √(1 − x) ends at x = 1, at a finite distance from here.
 //! let slit = Metric::field(|q: &Vector2<Real>| Matrix2::from_diagonal_element((-q.x + 1.0).sqrt()));
-//! let lost = Riemannian::<Chart<2>>::end(&slit, &Vector2::zeros(), &Vector2::new(3.0, 0.0));
-//! assert!(matches!(lost, Err(MetricError::Edge { time }) if time < 1.0));
+//! let beyond_edge = Riemannian::<Chart<2>>::end(&slit, &Vector2::zeros(), &Vector2::new(3.0, 0.0));
+//! assert!(matches!(beyond_edge, Err(MetricError::Edge { time }) if time < 1.0));
 //! let beyond = Riemannian::<Sphere<2>>::end(&Canonical, &x, &Vector2::new(3.5, 0.0));
 //! assert!(matches!(beyond, Err(MetricError::CutLocus { .. })));
 //! let indefinite = Metric::constant(Matrix2::new(1.0, 2.0, 2.0, 1.0));
@@ -83,14 +83,14 @@
 //!
 //! # What is checked
 //!
-//! - At every point where it is used: entries finite, symmetric up to the rounding of its entries,
-//!   positive in the frame of the chart (so a form on R³ may be indefinite off the tangent plane).
-//! - Before every run, at sampled points around the start.
-//! - By [`laws::metric`](crate::manifolds::laws::metric), when you call it: also that geodesics have
-//!   constant speed, which a wrong derivative breaks.
+//! - Every point where the metric is used: the entries are finite, the matrix is symmetric up to the rounding of its
+//!   entries, and positive in the frame of the chart. So a form on R³ may be indefinite off the tangent plane.
+//! - Sampled points around the start, before every run.
+//! - [`laws::metric`](crate::manifolds::laws::metric), when you call it, also checks that geodesics have constant speed. A
+//!   wrong derivative breaks this.
 //!
-//! Not checked: that it is the metric you meant. A tensor in the wrong coordinates is a metric, too;
-//! compare a length with a closed form, or one step with the same step in another chart.
+//! No check can know whether it is the metric you meant: a tensor in the wrong coordinates is a metric too. Compare a
+//! length with a closed form, or one step with the same step in another chart.
 //!
 //! # What it costs
 //!
@@ -98,12 +98,12 @@
 //! in each evaluation of the equation of a step. A step of `h = 0.1` then takes, on average
 //! (`benches/step/snapshot.txt`),
 //!
-//! | | evaluations of the closure |
+//! | problem | evaluations of the closure |
 //! |---|---|
 //! | S², the spinning top | 173 |
 //! | SO(3), Nambu's bracket | 325 |
 //!
-//! which is some 50 times the time of the canonical metric on S², and 70 times on SO(3)
+//! which takes about 50 times the time of the canonical metric on S², and 70 times on SO(3)
 //! (`benches/README.md`).
 //!
 //! So write a constant matrix as [`Metric::constant`](crate::manifolds::Metric::constant), and a
@@ -111,12 +111,12 @@
 //!
 //! # What can go wrong
 //!
-//! | | what happens | what helps |
+//! | cause | effect | remedy |
 //! |---|---|---|
-//! | the edge of a chart is at a finite distance | [`MetricError::Edge`](crate::manifolds::MetricError::Edge), with the fraction of the way; a run halves the step, and ends in an error that has the trajectory so far | a smaller step; coordinates or a metric in which the edge is far, as `ds²/s²` on R₊ |
-//! | `A` is not positive somewhere | [`NotPositive`](crate::manifolds::MetricError::NotPositive) with the pivot, on the way of a geodesic [`Degenerate`](crate::manifolds::MetricError::Degenerate) | the domain of the [`Chart`](crate::manifolds::Chart) |
+//! | the edge of a chart is at a finite distance | [`MetricError::Edge`](crate::manifolds::MetricError::Edge), with the fraction of the way; a run halves the step, and otherwise ends in an error with the trajectory so far | a smaller step; coordinates or a metric in which the edge is far, as `ds²/s²` on R₊ |
+//! | `A` is not positive somewhere | [`NotPositive`](crate::manifolds::MetricError::NotPositive) with the pivot, along a geodesic [`Degenerate`](crate::manifolds::MetricError::Degenerate) | the domain of the [`Chart`](crate::manifolds::Chart) |
 //! | a step beyond the cut locus, where geodesics stop being shortest | [`CutLocus`](crate::manifolds::MetricError::CutLocus) for canonical metrics; with a closure the cut locus is not known, and the logarithm is *a* geodesic, up to where the chart ends: antipodes and half turns are [`OutOfChart`](crate::manifolds::MetricError::OutOfChart) | a smaller step |
-//! | two points far apart | [`NoLogarithm`](crate::manifolds::MetricError::NoLogarithm), with the miss; steps need no logarithm | points closer together |
+//! | two points far apart | [`NoLogarithm`](crate::manifolds::MetricError::NoLogarithm), with the remaining distance; steps need no logarithm | points closer together |
 //! | a metric with waves shorter than a thousandth of a step | [`Uneven`](crate::manifolds::MetricError::Uneven), with the pieces | a smaller step |
 //! | `sqrt`, `norm` at zero | derivatives that are not numbers: the run refuses to start | `norm_squared`, even powers |
 //! | friction too strong or weak | `K` is of second order in `A⁻¹`, and [`Nambu`](crate::dynamics::Nambu) and [`AreaForm`](type@crate::dynamics::AreaForm) have `1/√det g` | scale `A`, or the factor of the bracket |

@@ -22,7 +22,7 @@ use metriplectic_manifolds::{Manifold, MetricError, Riemannian};
 use nalgebra::SMatrix;
 use num_dual::Dual64;
 
-/// Where a bracket is evaluated, and what of the system it may look at.
+/// The arguments of a bracket: the point, and the parts of the system that it may use.
 #[derive(Debug)]
 pub struct BracketArgs<'a, M: Manifold, G, D: Scalar = f64> {
     /// The manifold.
@@ -31,14 +31,14 @@ pub struct BracketArgs<'a, M: Manifold, G, D: Scalar = f64> {
     pub metric: &'a G,
     /// The point, and the chart that components refer to.
     pub x: &'a ChartPoint<M, D>,
-    /// The covector of the entropy there: `dS`, or a discrete gradient of it. Only brackets that are
-    /// built from their Casimir look at it.
+    /// The covector of the entropy there: `dS`, or a discrete gradient of `S`. Only brackets that are
+    /// built from their Casimir use it.
     pub s: &'a Vector<M, D>,
 }
 
 /// A Poisson tensor `Π`, acting on covectors: `{f, g} = Π(df, dg)`, `x' = Π dH`.
 ///
-/// The one method to write is [`apply`](Self::apply), at any scalar.
+/// An implementation writes one method, [`apply`](Self::apply), at any scalar.
 ///
 /// Laws ([`laws::bracket`](crate::laws::bracket)): 1. `Π` is skew; 2. Jacobi identity
 /// `Π^{il}∂_lΠ^{jk} + cyclic = 0`, unless [`is_poisson`](Self::is_poisson) says otherwise;
@@ -49,7 +49,7 @@ pub struct BracketArgs<'a, M: Manifold, G, D: Scalar = f64> {
     note = "a Poisson tensor of your own is `Poisson::field(|x| matrix)` or `Poisson::constant(matrix)?`"
 )]
 pub trait Bracket<M: Manifold, G: Riemannian<M>> {
-    /// The vector `Π(x) α`, components in the frame of the chart of `x`.
+    /// Computes the vector `Π(x) α`, with components in the frame of the chart of `x`.
     ///
     /// # Errors
     ///
@@ -60,8 +60,8 @@ pub trait Bracket<M: Manifold, G: Riemannian<M>> {
         alpha: &Vector<M, D>,
     ) -> Result<Vector<M, D>, MetricError>;
 
-    /// `Πα` at the centre of a chart with its derivatives along the point, the covector of the
-    /// entropy, and `α`.
+    /// Computes `Πα` at the centre of a chart, with its derivatives along the point, along the covector of
+    /// the entropy, and along `α`.
     ///
     /// # Errors
     ///
@@ -74,7 +74,7 @@ pub trait Bracket<M: Manifold, G: Riemannian<M>> {
         by_dual_numbers(self, at, alpha)
     }
 
-    /// The matrix `Π(x)`.
+    /// Computes the matrix `Π(x)`.
     ///
     /// # Errors
     ///
@@ -93,20 +93,20 @@ pub trait Bracket<M: Manifold, G: Riemannian<M>> {
         Ok(tensor)
     }
 
-    /// Whether `Π` satisfies the Jacobi identity. A skew tensor that does not is an almost Poisson
-    /// tensor ([`AlmostPoisson`]): it conserves the energy, and verification does not ask for more.
+    /// Returns whether `Π` satisfies the Jacobi identity. A skew tensor that violates it is an almost Poisson
+    /// tensor ([`AlmostPoisson`]). It conserves the energy, so verification accepts it.
     fn is_poisson(&self) -> bool {
         true
     }
 
-    /// Whether there is a [`force`](Self::force).
+    /// Returns whether there is a [`force`](Self::force).
     fn is_forced(&self) -> bool {
         false
     }
 
-    /// The vector that a force adds to `Πw + K_w dS`, for the covector `w` of the energy. `w` annihilates
-    /// it, as in `Πw`, but it need not be linear in `w`. Zero unless [`is_forced`](Self::is_forced);
-    /// [`ForcedLiePoisson`] has one.
+    /// Computes the vector that a force adds to `Πw + K_w dS`, for the covector `w` of the energy. `w`
+    /// annihilates this vector, as it annihilates `Πw`. The vector need not be linear in `w`. It is zero unless
+    /// [`is_forced`](Self::is_forced). [`ForcedLiePoisson`] has a force.
     ///
     /// # Errors
     ///
@@ -119,8 +119,8 @@ pub trait Bracket<M: Manifold, G: Riemannian<M>> {
         Ok(Vector::<M, D>::zero())
     }
 
-    /// The force at the centre of a chart with its derivatives along the point and the covector of the
-    /// entropy, and in the place of the tensor its derivative along `w`.
+    /// Computes the force at the centre of a chart, with its derivatives along the point and along the covector
+    /// of the entropy. The derivative along `w` takes the place of the tensor.
     ///
     /// # Errors
     ///
@@ -133,13 +133,13 @@ pub trait Bracket<M: Manifold, G: Riemannian<M>> {
         force_by_dual_numbers(self, at, w)
     }
 
-    /// Whether the bracket is zero by construction, so that nothing moves reversibly.
+    /// Returns whether the bracket is zero by construction, so that nothing moves reversibly.
     fn is_zero(&self) -> bool {
         false
     }
 
-    /// Whether `Π` is built from the covector of the entropy at its [`BracketArgs`] and annihilates it, whatever
-    /// covector it is. A discrete gradient of the entropy is then annihilated too.
+    /// Returns whether `Π` is built from the covector of the entropy in [`BracketArgs`] and annihilates every
+    /// such covector. It then also annihilates a discrete gradient of the entropy.
     fn annihilates_entropy(&self) -> bool {
         self.is_zero()
     }
@@ -217,16 +217,16 @@ pub struct BracketJet<M: Manifold> {
     pub tensor: Matrix<M>,
 }
 
-/// A manifold that comes with a bracket; the others start from [`Zero`].
+/// A manifold that comes with a bracket. The others start from [`Zero`].
 #[diagnostic::on_unimplemented(
     message = "a system on `{Self}` has no bracket to start from",
     note = "a manifold of your own implements `NaturalBracket`, with `Zero` if no bracket comes with it"
 )]
 pub trait NaturalBracket: Manifold {
-    /// The bracket a system has unless it is given another one.
+    /// The bracket of a system that is given no other.
     type Bracket;
 
-    /// That bracket.
+    /// Returns this bracket.
     fn natural_bracket(&self) -> Self::Bracket;
 }
 
@@ -255,8 +255,8 @@ impl Poisson {
 
     /// The tensor `Π(x)` from a closure or any other
     /// [`MatrixField`](metriplectic_fields::MatrixField), acting on covectors dual to the
-    /// [`velocity`](metriplectic_fields::Space::embed) of the space. It is checked at sampled
-    /// points to be skew and to satisfy the Jacobi identity; [`AlmostPoisson::field`] is one that need not.
+    /// [`velocity`](metriplectic_fields::Space::embed) of the space. Verification checks at sampled
+    /// points that it is skew and satisfies the Jacobi identity. [`AlmostPoisson::field`] need not satisfy it.
     ///
     /// On a sphere the matrix is a bivector of the space around, `x' = A ∇H`; on S²,
     /// `|x: &Vector3<Real>| x.cross_matrix()` is the area form. On SO(3) it acts on body covectors and gives `Ω`.
@@ -267,8 +267,8 @@ impl Poisson {
 
 /// Skew tensors of your own that need not be Poisson, as those of nonholonomic systems are not.
 ///
-/// The energy is conserved by skewness alone. The Jacobi identity is not asked for, and a
-/// [`report`](crate::Metriplectic::report) prints its defect without judging it.
+/// Skewness alone conserves the energy. Verification does not require the Jacobi identity, and a
+/// [`report`](crate::Verify::report) prints its defect without a verdict.
 #[derive(Clone, Copy, Debug)]
 pub enum AlmostPoisson {}
 
@@ -277,11 +277,11 @@ impl AlmostPoisson {
     /// Schaft and Maschke 1994; Cantrijn, de León and Martín de Diego 1999).
     ///
     /// A blade on the plane that does not slip sideways, at `(x, y)` with the direction `θ`, the momentum
-    /// `p` along the blade, and the momentum `l` about it, is dg_v but not moved by a bracket with
+    /// `p` along the blade, and the momentum `l` about it, is turned but not moved by a bracket with
     /// `{x, p} = cos θ`, `{y, p} = sin θ`, `{θ, l} = 1`:
     ///
     /// ```
-    /// use metriplectic_dynamics::{AlmostPoisson, ModelError, Metriplectic, Poisson, System};
+    /// use metriplectic_dynamics::{AlmostPoisson, ModelError, Poisson, System, Verify};
     /// use metriplectic_fields::Real;
     /// use metriplectic_manifolds::Euclidean;
     /// use nalgebra::{SMatrix, SVector, vector};

@@ -7,7 +7,7 @@
 //! | [`KulkarniNomizu`] | `σ(w,w) μ(α,β) − σ(w,α) μ(w,β) − μ(w,α) σ(w,β) + μ(w,w) σ(α,β)` | two of them |
 //! | [`CasimirDissipation`] | `κ([w,α], [w,β])` | a semidefinite form `κ` on a Lie algebra |
 //! | [`FieldDissipation`] | `K(x, w)(α, β)` | a closure that annihilates `w` itself |
-//! | [`ProjectedDissipation`] | `K(x)(Qᵀα, Qᵀβ)`, `Qᵀα = α − w G*(w,α)/G*(w,w)` | a closure that knows nothing of `w` |
+//! | [`ProjectedDissipation`] | `K(x)(Qᵀα, Qᵀβ)`, `Qᵀα = α − w G*(w,α)/G*(w,w)` | a closure of the point alone |
 //! | [`Scaled`] | `κ(x) K_w(α, β)` | any of these, and a number `κ(x) ≥ 0` |
 //! | [`NoDissipation`] | 0 | |
 
@@ -38,9 +38,9 @@ use num_dual::Dual64;
 use crate::bracket::epsilon;
 
 /// A dissipation `K`, given the covector `w` that it must annihilate: `dH` in the equations of motion,
-/// the discrete gradient in a step. Both are then the same code.
+/// a discrete gradient in a step. The same code serves both.
 ///
-/// The one method to write is [`apply`](Self::apply), at any scalar.
+/// An implementation writes one method, [`apply`](Self::apply), at any scalar.
 ///
 /// Laws ([`laws::dissipation`](crate::laws::dissipation)): 1. `K_w` is symmetric; 2. `K_w ⪰ 0`;
 /// 3. `K_w w = 0`; 4. `linearise` is the derivative of `apply`.
@@ -49,7 +49,7 @@ use crate::bracket::epsilon;
     note = "a dissipation of your own is `FieldDissipation(|x, w| matrix)`, which annihilates `w`, or `ProjectedDissipation(|x| matrix)`"
 )]
 pub trait Dissipation<M: Manifold, G: Riemannian<M>> {
-    /// The vector `K_w(x) α`, components in the frame of the chart of `x`.
+    /// Computes the vector `K_w(x) α`, with components in the frame of the chart of `x`.
     ///
     /// # Errors
     ///
@@ -62,7 +62,7 @@ pub trait Dissipation<M: Manifold, G: Riemannian<M>> {
         alpha: &Vector<M, D>,
     ) -> Result<Vector<M, D>, MetricError>;
 
-    /// `K_w α` at a real point with its derivatives along `x`, `w` and `α`.
+    /// Computes `K_w α` at a real point, with its derivatives along `x`, `w` and `α`.
     ///
     /// # Errors
     ///
@@ -77,7 +77,7 @@ pub trait Dissipation<M: Manifold, G: Riemannian<M>> {
         by_dual_numbers(self, metric, z, w, alpha)
     }
 
-    /// The matrix `K_w(x)`.
+    /// Computes the matrix `K_w(x)`.
     ///
     /// # Errors
     ///
@@ -98,19 +98,19 @@ pub trait Dissipation<M: Manifold, G: Riemannian<M>> {
         Ok(tensor)
     }
 
-    /// Whether there is no dissipation by construction, so that no entropy is produced.
+    /// Returns whether there is no dissipation by construction, so that no entropy is produced.
     fn is_none(&self) -> bool {
         false
     }
 
-    /// Whether it is defined by what it has to annihilate, so that further invariants of a system are
-    /// projected out of it too. Any other dissipation must annihilate them of its own.
+    /// Returns whether the dissipation is defined by the covectors that it annihilates. Then the further
+    /// invariants of a system are projected out of it too. Any other dissipation must annihilate them by itself.
     fn adapts(&self) -> bool {
         false
     }
 
-    /// Whether a tensor that does not annihilate `w` was projected until it does, so that `K` is not quite
-    /// the one that was written down; see [`ProjectedDissipation`].
+    /// Returns whether a projection makes the tensor annihilate `w`. `K` then differs from the tensor that was
+    /// given; see [`ProjectedDissipation`].
     fn is_projected(&self) -> bool {
         false
     }

@@ -12,8 +12,8 @@
 //! \mu' = \mathrm{ad}^*_\xi \bigl( \mu + F(\xi) \bigr), \qquad \xi = dh(\mu),
 //! ```
 //!
-//! which keep `h` whatever `F` is. With the force of a positive semidefinite form,
-//! `⟨F(ξ), η⟩ = κ(η, [ξ, dC])`, a Casimir `C` grows, and they are the metriplectic system of
+//! which conserve `h` for every `F`. With the force of a positive semidefinite form,
+//! `⟨F(ξ), η⟩ = κ(η, [ξ, dC])`, a Casimir `C` grows. The equations are then the metriplectic system of
 //! [`LiePoisson`], [`CasimirDissipation`](crate::CasimirDissipation), energy
 //! `h` and entropy `C`:
 //!
@@ -49,24 +49,23 @@
 //! assert!(body_in_a_vortex.is_ok());
 //! ```
 
-use std::fmt;
-
-use metriplectic_fields::{Column, Factors, Jet1, Jet2, Scalar, ScalarField, Square};
+use metriplectic_fields::ScalarField;
 use metriplectic_manifolds::{Euclidean, LieDual};
-use nalgebra::{SMatrix, SVector};
 
+use crate::bracket::{Force, ForcedLiePoisson, LiePoisson};
+use crate::builder::SystemBuilder;
 use crate::dissipation::Choice;
-use crate::{Force, ForcedLiePoisson, LiePoisson, SystemBuilder};
+
+pub use crate::legendre::{Legendre, LegendreError};
 
 impl<G, K: Choice, H, S, I, const N: usize> SystemBuilder<LieDual<N>, G, LiePoisson, K, H, S, I> {
-    /// The force `𝓕: g → g*` of the equations `μ' = ad*_ξ(μ + 𝓕(ξ))`, `ξ = dH`: a closure
-    /// `|ξ| -> SVector<Real, N>` or any other [`Force`], which conserves `H` whatever it is.
+    /// Sets the force `𝓕: g → g*` of the equations `μ' = ad*_ξ(μ + 𝓕(ξ))`, `ξ = dH`: a closure
+    /// `|ξ| -> SVector<Real, N>` or any other [`Force`]. Every force conserves `H`.
     ///
     /// With a force an entropy changes by `S' = ⟨𝓕(ξ), [ξ, dS]⟩` alone, unless a
-    /// [`dissipation`](Self::dissipation) is given too; there is none of the metric. A force under which an
-    /// entropy falls is refused by the verification of a model, unless the second law is
-    /// [`Published`](crate::SecondLaw::Published), not promised. Each of the further invariants must stay as
-    /// it is, `⟨dL, ad*_ξ 𝓕⟩ = 0`.
+    /// [`dissipation`](Self::dissipation) is given too; the metric adds none. Verification refuses a force under
+    /// which an entropy falls, unless the second law is [`Published`](crate::SecondLaw::Published). The force
+    /// must conserve the further invariants, `⟨dL, ad*_ξ 𝓕⟩ = 0`.
     #[allow(
         clippy::type_complexity,
         reason = "the type of a builder lists the parts of the system, and a name for it would hide them"
@@ -80,361 +79,12 @@ impl<G, K: Choice, H, S, I, const N: usize> SystemBuilder<LieDual<N>, G, LiePois
 }
 
 impl<G, B, K, H, S, I, const N: usize> SystemBuilder<LieDual<N>, G, B, K, H, S, I> {
-    /// The energy `h(μ) = ⟨μ, ξ⟩ − l(ξ)` of a reduced Lagrangian `l`, a closure `|ξ| -> Real` on the
-    /// Lie algebra or any other [`ScalarField`] on it: that of [`Legendre::of`].
+    /// Sets the energy `h(μ) = ⟨μ, ξ⟩ − l(ξ)` of a reduced Lagrangian `l` by [`Legendre::of`]. `l` is a closure
+    /// `|ξ| -> Real` on the Lie algebra, or any other [`ScalarField`] on it.
     pub fn lagrangian<L: ScalarField<Euclidean<N>>>(
         self,
         l: L,
     ) -> SystemBuilder<LieDual<N>, G, B, K, Legendre<L, N>, S, I> {
         self.energy(Legendre::of(l))
-    }
-}
-
-/// The Legendre transform of a reduced Lagrangian `l: g → R`, as the energy that it is on `g*`:
-///
-/// ```math
-/// \mu = \frac{\partial l}{\partial \xi}, \qquad h(\mu) = \langle \mu, \xi(\mu) \rangle - l(\xi(\mu)),
-/// \qquad dh = \xi(\mu), \qquad \mathrm{Hess}\, h = (\mathrm{Hess}\, l)^{-1} .
-/// ```
-///
-/// `ξ(μ)` is found to round-off by Newton's method with the Hessian of `l`, damped, from `ξ = 0` or
-/// another [start](Self::near); differential and Hessian of `h` are then the formulas above, at every
-/// scalar of derivative order ≤ 2, by the second-order Taylor expansion that is exact there.
-///
-/// Where there is no `ξ(μ)`, `h` is not a number, which the verification of a model names;
-/// [`velocity`](Self::velocity) says why.
-#[derive(Clone, Copy)]
-pub struct Legendre<L, const N: usize> {
-    lagrangian: L,
-    start: SVector<f64, N>,
-}
-
-// By hand, because closures have no `Debug`.
-impl<L, const N: usize> fmt::Debug for Legendre<L, N> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Legendre").field("start", &self.start).finish_non_exhaustive()
-    }
-}
-
-/// Corrections that Newton's method may take, and halvings of one that comes no closer.
-const SWEEPS: usize = 100;
-const HALVINGS: usize = 40;
-
-/// A Hessian is degenerate if its reciprocal condition number is below this: not a digit of a
-/// solution would be right.
-const DEGENERATE: f64 = 16.0 * f64::EPSILON;
-
-impl<L: ScalarField<Euclidean<N>>, const N: usize> Legendre<L, N> {
-    /// The transform of the Lagrangian `l`, a closure `|ξ| -> Real` or any other [`ScalarField`].
-    pub fn of(l: L) -> Self {
-        Self { lagrangian: l, start: SVector::zeros() }
-    }
-
-    /// Starts Newton's method at `xi` instead of 0: where `l` has a degenerate Hessian at 0, or
-    /// momenta have several velocities, of which the one near `xi` is meant.
-    #[must_use]
-    pub fn near(self, xi: SVector<f64, N>) -> Self {
-        Self { start: xi, ..self }
-    }
-
-    /// The momentum `μ = ∂l/∂ξ`.
-    pub fn momentum(&self, xi: &SVector<f64, N>) -> SVector<f64, N> {
-        self.lagrangian.jet1(xi).df
-    }
-
-    /// The velocity `ξ(μ)`, where `∂l/∂ξ = μ`.
-    ///
-    /// # Errors
-    ///
-    /// [`LegendreError`] if `l` is not a number on the way, if its Hessian is degenerate, or if there
-    /// is no such `ξ` that is found.
-    pub fn velocity(&self, mu: &SVector<f64, N>) -> Result<SVector<f64, N>, LegendreError> {
-        let mut xi = self.start;
-        let mut jet = self.finite_jet(&xi).ok_or_else(|| not_finite(&xi))?;
-        for iterations in 0..SWEEPS {
-            let off = mu - jet.df;
-            let step = regular(&jet.hf, &xi)? * off;
-            let next = xi + step;
-            // Newton squares the relative error, so this correction is the last; and so it is at the
-            // rounding of dl.
-            let rounding = 16.0 * f64::EPSILON * (mu.norm() + jet.hf.norm() * xi.norm());
-            if step.norm() <= f64::EPSILON.sqrt() * next.norm() || off.norm() <= rounding {
-                return Ok(next);
-            }
-            let missed = LegendreError::NoVelocity { residual: off.norm(), iterations };
-            (xi, jet) = (0..HALVINGS)
-                .find_map(|k| {
-                    let next = xi + step * 0.5_f64.powi(i32::try_from(k).ok()?);
-                    let jet = self.finite_jet(&next)?;
-                    ((mu - jet.df).norm() < off.norm()).then_some((next, jet))
-                })
-                .ok_or(missed)?;
-        }
-        Err(LegendreError::NoVelocity { residual: (mu - jet.df).norm(), iterations: SWEEPS })
-    }
-
-    /// The jet of `l`, if it is a number.
-    fn finite_jet(&self, xi: &SVector<f64, N>) -> Option<Jet2<Euclidean<N>>> {
-        Some(self.lagrangian.jet2(xi)).filter(Jet2::is_finite)
-    }
-
-    /// `ξ(μ)`, or not a number.
-    fn velocity_or_nan(&self, mu: &SVector<f64, N>) -> SVector<f64, N> {
-        self.velocity(mu).unwrap_or_else(|_| SVector::repeat(f64::NAN))
-    }
-}
-
-// What is missing where an energy should be is a closure.
-#[diagnostic::do_not_recommend]
-impl<L: ScalarField<Euclidean<N>>, const N: usize> ScalarField<LieDual<N>> for Legendre<L, N> {
-    fn at<D: Scalar>(&self, mu: &SVector<D, N>) -> D {
-        const {
-            assert!(
-                D::NDERIV <= 2,
-                "the energy of a Lagrangian has derivatives up to order 2, and this scalar asks for \
-                 more"
-            );
-        }
-        let real = mu.map(|m| m.re());
-        let d = |i: usize| mu[i] - real[i];
-        match D::NDERIV {
-            0 => {
-                let xi = self.velocity_or_nan(&real);
-                D::from(
-                    real.dot(&xi) - ScalarField::<Euclidean<N>>::at::<f64>(&self.lagrangian, &xi),
-                )
-            }
-            1 => {
-                let jet: Jet1<LieDual<N>> = self.jet1(&real);
-                (0..N).fold(D::from(jet.value), |h, i| h + d(i) * jet.df[i])
-            }
-            _ => {
-                let jet: Jet2<LieDual<N>> = self.jet2(&real);
-                (0..N).fold(D::from(jet.value), |h, i| {
-                    let bend = (0..N).fold(D::zero(), |sum, j| sum + d(j) * jet.hf[(i, j)]);
-                    h + d(i) * (bend * 0.5 + jet.df[i])
-                })
-            }
-        }
-    }
-
-    fn jet1(&self, mu: &SVector<f64, N>) -> Jet1<LieDual<N>> {
-        let xi = self.velocity_or_nan(mu);
-        let l: f64 = ScalarField::<Euclidean<N>>::at(&self.lagrangian, &xi);
-        Jet1 { value: mu.dot(&xi) - l, df: xi }
-    }
-
-    fn jet2(&self, mu: &SVector<f64, N>) -> Jet2<LieDual<N>> {
-        let xi = self.velocity_or_nan(mu);
-        let l = self.lagrangian.jet2(&xi);
-        let hf = inverse(&l.hf).unwrap_or_else(|| SMatrix::repeat(f64::NAN));
-        Jet2 { value: mu.dot(&xi) - l.value, df: xi, hf: (hf + hf.transpose()) * 0.5 }
-    }
-}
-
-/// The inverse of a matrix, column by column.
-fn inverse<const N: usize>(a: &SMatrix<f64, N, N>) -> Option<SMatrix<f64, N, N>> {
-    let (factors, mut inverse) = (a.factor()?, SMatrix::<f64, N, N>::zeros());
-    for j in 0..N {
-        let column: SVector<f64, N> = Factors::solve(&factors, &Column::basis(j))?;
-        inverse.set_column(j, &column);
-    }
-    Some(inverse)
-}
-
-/// The inverse of a Hessian, unless it is degenerate.
-fn regular<const N: usize>(
-    hessian: &SMatrix<f64, N, N>,
-    xi: &SVector<f64, N>,
-) -> Result<SMatrix<f64, N, N>, LegendreError> {
-    let inverse = inverse(hessian).ok_or_else(|| degenerate(0.0, xi))?;
-    let reciprocal_condition = (hessian.norm() * inverse.norm()).recip();
-    if reciprocal_condition > DEGENERATE {
-        Ok(inverse)
-    } else {
-        Err(degenerate(reciprocal_condition, xi))
-    }
-}
-
-fn degenerate<const N: usize>(reciprocal_condition: f64, xi: &SVector<f64, N>) -> LegendreError {
-    LegendreError::Degenerate { reciprocal_condition, xi: xi.iter().copied().collect() }
-}
-
-fn not_finite<const N: usize>(xi: &SVector<f64, N>) -> LegendreError {
-    LegendreError::NotFinite { xi: xi.iter().copied().collect() }
-}
-
-/// A momentum without a velocity.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum LegendreError {
-    /// The Lagrangian or a derivative is not a number where Newton's method starts.
-    #[error(
-        "the Lagrangian or one of its derivatives is not a finite number at ξ = {xi:?}; start \
-         elsewhere, `Legendre::of(l).near(xi)`"
-    )]
-    NotFinite {
-        /// Where.
-        xi: Vec<f64>,
-    },
-    /// The Hessian of the Lagrangian is singular to round-off, so that momenta do not determine
-    /// velocities.
-    #[error(
-        "the Hessian of the Lagrangian is degenerate at ξ = {xi:?}: its reciprocal condition number \
-         is {reciprocal_condition:.1e}; if it is regular elsewhere, start there, \
-         `Legendre::of(l).near(xi)`"
-    )]
-    Degenerate {
-        /// `1/(|A||A⁻¹|)` of the Hessian `A`, 0 if it is singular.
-        reciprocal_condition: f64,
-        /// Where.
-        xi: Vec<f64>,
-    },
-    /// Newton's method has not found a velocity.
-    #[error(
-        "no velocity was found: |∂l/∂ξ − μ| is still {residual:.1e} after {iterations} Newton iterations; the \
-         momentum may be out of reach of this Lagrangian, or start nearer, `Legendre::of(l).near(xi)`"
-    )]
-    NoVelocity {
-        /// `|∂l/∂ξ − μ|` at the best velocity.
-        residual: f64,
-        /// Newton iterations taken.
-        iterations: usize,
-    },
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use metriplectic_fields::{ChartPoint, Real, hessian, laws};
-    use nalgebra::{Matrix3, Vector3, vector};
-    use num_dual::{Dual, Dual64, DualNum};
-    use proptest::prelude::*;
-
-    fn columns() -> impl Strategy<Value = Vector3<f64>> {
-        prop::array::uniform3(-3.0..3.0).prop_map(Vector3::from)
-    }
-
-    /// `l = −√(1 − |ξ|²)`, `h = √(1 + |μ|²)`: defined inside the unit ball only.
-    fn relativistic(xi: &Vector3<Real>) -> Real {
-        -(-xi.norm_squared() + 1.0).sqrt()
-    }
-
-    /// Convex, and of no special form.
-    fn quartic(xi: &Vector3<Real>) -> Real {
-        let weighted = xi.x * xi.x * 2.0 + xi.y * xi.y + xi.z * xi.z * 0.5;
-        weighted * 0.5 + weighted * weighted * 0.25 + xi.x * xi.y * 0.3 + xi.z * 0.2
-    }
-
-    proptest! {
-        #[test]
-        fn the_energy_of_a_lagrangian_is_a_field(mu in columns(), v in columns()) {
-            laws::scalar_field::<LieDual<3>>(&Legendre::of(quartic), &mu, &v)?;
-            laws::scalar_field::<LieDual<3>>(&Legendre::of(relativistic), &mu, &(v * 0.2))?;
-        }
-
-        #[test]
-        fn the_velocity_undoes_the_momentum(mu in columns()) {
-            let legendre = Legendre::<_, 3>::of(quartic);
-            let back = legendre.momentum(&legendre.velocity(&mu)?);
-            prop_assert!((back - mu).norm() <= 1e-14 * (1.0 + mu.norm()));
-        }
-
-        #[test]
-        fn the_transform_of_a_root_is_its_closed_form_at_every_scalar(mu in columns(), v in columns()) {
-            let legendre = Legendre::<_, 3>::of(relativistic);
-            let jet: Jet2<LieDual<3>> = legendre.jet2(&mu);
-            let h = (1.0 + mu.norm_squared()).sqrt();
-            let xi = mu / h;
-            prop_assert!((jet.value - h).abs() <= 1e-14 * h.powi(2), "{:e}", jet.value - h);
-            // Near the speed of light ξ(μ) is well conditioned and Hess l grows like h³.
-            prop_assert!((jet.df - xi).norm() <= 1e-13);
-            let bend = (Matrix3::identity() - xi * xi.transpose()) / h;
-            prop_assert!((jet.hf - bend).norm() <= 1e-11);
-            let nested = mu.zip_map(&v, |m, v| Dual::new(Dual64::new(m, v), Dual64::new(1.0 - v, 0.3 * m)));
-            let lifted: Dual<Dual64> = legendre.at(&nested);
-            let defined = (nested.dot(&nested) + 1.0).sqrt();
-            for (l, d) in [
-                (lifted.re.re, defined.re.re),
-                (lifted.re.eps, defined.re.eps),
-                (lifted.eps.re, defined.eps.re),
-                (lifted.eps.eps, defined.eps.eps),
-            ] {
-                prop_assert!((l - d).abs() <= 1e-10 * (1.0 + d.abs()), "{l} {d}");
-            }
-            let nested: Matrix3<f64> = hessian::<LieDual<3>, f64>(&legendre, &ChartPoint::centre(&mu));
-            prop_assert!((nested - jet.hf).norm() <= 1e-13);
-        }
-
-        /// `h = ½ μᵀA⁻¹μ` for `l = ½ ξᵀAξ`, which is one correction and one refinement.
-        #[test]
-        fn a_quadratic_lagrangian_has_a_quadratic_energy(mu in columns(), b in columns()) {
-            let a = Matrix3::identity() + b * b.transpose();
-            let legendre =
-                Legendre::<_, 3>::of(move |xi: &Vector3<Real>| xi.dot(&(a.cast::<Real>() * xi)) * 0.5);
-            let expected = a.try_inverse().unwrap() * mu;
-            let jet: Jet1<LieDual<3>> = legendre.jet1(&mu);
-            prop_assert!((jet.df - expected).norm() <= 1e-13 * (1.0 + mu.norm()));
-            prop_assert!((jet.value - 0.5 * mu.dot(&expected)).abs() <= 1e-13 * (1.0 + mu.norm_squared()));
-        }
-    }
-
-    #[test]
-    fn a_degenerate_hessian_is_an_error_with_its_number() {
-        // The third velocity is not in the Lagrangian.
-        let flat = Legendre::<_, 3>::of(|xi: &Vector3<Real>| xi.x * xi.x + xi.y * xi.y);
-        let error = flat.velocity(&vector![1.0, 2.0, 0.0]).unwrap_err();
-        assert_eq!(
-            error,
-            LegendreError::Degenerate { reciprocal_condition: 0.0, xi: vec![0.0; 3] }
-        );
-        // Hardly in it.
-        let thin = Legendre::<_, 3>::of(|xi: &Vector3<Real>| {
-            xi.norm_squared() - xi.z * xi.z * (1.0 - 1e-15)
-        });
-        let error = thin.velocity(&vector![1.0, 2.0, 0.0]).unwrap_err();
-        assert!(
-            matches!(error, LegendreError::Degenerate { reciprocal_condition, .. }
-                if reciprocal_condition > 0.0 && reciprocal_condition < 1e-14),
-            "{error}"
-        );
-        assert!(ScalarField::<LieDual<3>>::at::<f64>(&flat, &vector![1.0, 2.0, 0.0]).is_nan());
-    }
-
-    #[test]
-    fn a_start_chooses_among_velocities_and_avoids_degenerate_ones() {
-        // l = |ξ|⁴/4 has no Hessian at 0; h = ¾ |μ|^(4/3).
-        let l = |xi: &Vector3<Real>| xi.norm_squared().powi(2) * 0.25;
-        let mu = vector![0.0, 8.0, 0.0];
-        let error = Legendre::of(l).velocity(&mu).unwrap_err();
-        assert!(matches!(error, LegendreError::Degenerate { .. }), "{error}");
-        let legendre = Legendre::of(l).near(vector![1.0, 1.0, 1.0]);
-        assert!((legendre.velocity(&mu).unwrap() - vector![0.0, 2.0, 0.0]).norm() < 1e-14);
-        assert!((ScalarField::<LieDual<3>>::at::<f64>(&legendre, &mu) - 12.0).abs() < 1e-13);
-    }
-
-    #[test]
-    fn a_momentum_out_of_reach_is_an_error_with_its_number() {
-        // |∂l/∂ξ| < 1 everywhere.
-        let l = |xi: &Vector3<Real>| (xi.norm_squared() + 1.0).sqrt();
-        let error = Legendre::of(l).velocity(&vector![0.0, 1.5, 0.0]).unwrap_err();
-        // The search runs off to where l is straight.
-        assert!(
-            matches!(&error, LegendreError::Degenerate { reciprocal_condition, xi }
-                if *reciprocal_condition < 1e-14 && xi[1] > 1e3),
-            "{error}"
-        );
-        // A step that ends before μ is reached: dl = ξ exp(−ξ²) turns back at ξ² = ½.
-        let l = |xi: &Vector3<Real>| -(-xi.norm_squared()).exp() * 0.5;
-        let error = Legendre::of(l).velocity(&vector![0.0, 1.5, 0.0]).unwrap_err();
-        assert!(
-            matches!(error, LegendreError::NoVelocity { residual, .. } if residual >= 1.0),
-            "{error}"
-        );
-        // The start is outside the domain.
-        let error = Legendre::of(relativistic)
-            .near(vector![2.0, 0.0, 0.0])
-            .velocity(&vector![0.1, 0.0, 0.0]);
-        assert_eq!(error, Err(LegendreError::NotFinite { xi: vec![2.0, 0.0, 0.0] }));
     }
 }

@@ -1,20 +1,20 @@
 //! Further conserved functions `L_a`, beside the energy.
 //!
-//! There are two kinds, and a scheme keeps them in two ways:
+//! There are two kinds, and a scheme conserves them in two ways:
 //!
 //! - a **Casimir** is conserved because the bracket annihilates it, `Π dC = 0`, whatever the energy is:
 //!   `|Γ|²` of a heavy top, which lives on se(3)*;
 //! - a **momentum** is conserved because the energy is symmetric, `⟨dJ, Π dH⟩ = 0` while
 //!   `Π dJ ≠ 0`: the angular momentum of a pendulum.
 //!
-//! Neither is produced by the dissipation, `K dL_a = 0`. That of the metric is projected until it
-//! is so ([`orthogonal`](crate::orthogonal)); any other one must have this property of its own.
+//! The dissipation must conserve both, `K dL_a = 0`. The dissipation of the metric is projected so that it
+//! does ([`orthogonal`](crate::orthogonal)). Any other dissipation must do so by itself.
 
 use std::fmt;
 
 use metriplectic_fields::{Real, ScalarField, Space};
 
-/// Why a function is conserved.
+/// The reason why a function is conserved.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Kind {
@@ -33,23 +33,23 @@ impl fmt::Display for Kind {
     }
 }
 
-/// A list of further invariants: `()`, or a shorter list with one more, made by
+/// A list of further invariants: `()`, or a shorter list and an invariant. It is made by
 /// [`SystemBuilder::casimir`](crate::SystemBuilder::casimir),
 /// [`momentum`](crate::SystemBuilder::momentum) and [`symmetry`](crate::SystemBuilder::symmetry).
 pub trait Invariants<M: Space> {
     /// How many there are.
     const COUNT: usize;
 
-    /// Shows them to the visitor, in the order in which they were listed.
+    /// Passes each invariant to the visitor, in the order of the list.
     fn each(&self, visitor: &mut impl Visitor<M>);
 }
 
-/// Looks at each invariant of a list.
+/// A visitor of the invariants of a list.
 pub trait Visitor<M: Space> {
-    /// Looks at one.
+    /// Visits an invariant.
     fn visit(&mut self, kind: Kind, f: &impl ScalarField<M>);
 
-    /// Looks at the action that the momentum visited last belongs to.
+    /// Visits the action to which the momentum visited last belongs.
     fn acts(&mut self, _action: &Action<'_, M>) {}
 }
 
@@ -67,11 +67,11 @@ impl<M: Space> Invariants<M> for () {
 #[derive(Clone, Copy)]
 pub struct Casimir<F>(pub F);
 
-/// A momentum: conserved because the energy is symmetric.
+/// A momentum, conserved because the energy is symmetric.
 #[derive(Clone, Copy)]
 pub struct Momentum<F>(pub F);
 
-/// A momentum with the one-parameter group of symmetries that it belongs to.
+/// A momentum with its one-parameter group of symmetries.
 #[derive(Clone, Copy)]
 pub struct Symmetry<A, F> {
     /// The action `(t, x) ↦ Φ_t(x)`.

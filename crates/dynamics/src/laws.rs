@@ -1,84 +1,22 @@
-//! What brackets and dissipations promise, and the functions that check it.
+//! The laws of brackets and dissipations, and the functions that check them.
 
 use metriplectic_fields::{
-    BrokenLaw, ChartPoint, Column, Dimension, Matrix, Scalar, ScalarField, Space, Square, Vector,
-    differential,
+    BrokenLaw, ChartPoint, Column, Dimension, Matrix, ScalarField, Space, Square, Vector,
 };
-use metriplectic_manifolds::{Manifold, MetricError};
+use metriplectic_manifolds::Manifold;
 
 use crate::bracket::{
-    BracketArgs, by_dual_numbers as by_dual_numbers_bracket, epsilon, force_by_dual_numbers,
+    Bracket, BracketArgs, by_dual_numbers as by_dual_numbers_bracket, force_by_dual_numbers,
 };
-use crate::dissipation::by_dual_numbers;
-use crate::system::{Metriplectic, Point, SecondLaw};
-use crate::verify::balance::{Balance, Violation, asymmetry, largest, worse};
-use crate::verify::sampling::Sizes;
-use crate::{Bracket, Dissipation};
+use crate::dissipation::{Dissipation, by_dual_numbers};
+use crate::metriplectic::{Metriplectic, Point, SecondLaw};
+use crate::verify::bracket::{BracketDefects, bracket_defects};
+use crate::verify::sampling::CoordinateScales;
 
-/// Round-off of a tensor contraction whose terms have the size `scale`.
+/// The round-off of a tensor contraction whose terms have the size `scale`.
 fn round_off<M: Manifold>(scale: f64) -> f64 {
     let n = M::Dim::LEN as f64;
     64.0 * n * n * f64::EPSILON * scale
-}
-
-/// A Poisson tensor at one point, and the largest violations of its laws relative to the terms that should
-/// cancel.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct BracketDefects<M: Space> {
-    pub(crate) tensor: Matrix<M>,
-    pub(crate) skewness: Violation,
-    pub(crate) jacobi: Violation,
-    /// Whether the derivatives of the tensor are numbers.
-    pub(crate) is_finite: bool,
-}
-
-/// Evaluates skewness and the Jacobi identity `Π^{il}∂_lΠ^{jk} + cyclic` at `x`, in chart coordinates of the
-/// sizes `units`. The terms may all be round-off: beside them, the `rounding` of the largest ones elsewhere
-/// is allowed for, and that of a generic product `Π^{il} Π^{jk} / ℓ_l`.
-pub(crate) fn bracket_defects<Y: Metriplectic + ?Sized>(
-    system: &Y,
-    x: &Point<Y>,
-    units: &Vector<Y::Manifold>,
-    rounding: f64,
-) -> Result<BracketDefects<Y::Manifold>, MetricError> {
-    let n = <Y::Manifold as Space>::Dim::LEN;
-    let tensor = tensor(system, &ChartPoint::<Y::Manifold>::centre(x))?;
-    let mut slopes = Vec::with_capacity(n);
-    for l in 0..n {
-        let moved = ChartPoint { base: x.clone(), q: epsilon::<Y::Manifold>(l) };
-        let dual = self::tensor(system, &moved)?;
-        slopes.push(Matrix::<Y::Manifold>::from_entries(|i, j| dual[(i, j)].eps));
-    }
-    let steepest = (0..n).map(|l| largest::<Y::Manifold>(&slopes[l], units) * units[l]);
-    let top = largest::<Y::Manifold>(&tensor, units);
-    let top = top * steepest.fold(top, worse);
-    let term = |a: usize, b: usize, c: usize| {
-        let slopes = &slopes;
-        (0..n).map(move |l| tensor[(a, l)] * slopes[l][(b, c)])
-    };
-    // The cyclic sum of a skew tensor is totally skew, and that of a constant one is zero.
-    let mut jacobi = Violation::default();
-    let constant = slopes.iter().all(|slope| slope.max_abs() == 0.0);
-    for k in 0..if constant { 0 } else { n } {
-        for j in 0..k {
-            for i in 0..j {
-                let terms = term(i, j, k).chain(term(j, k, i)).chain(term(k, i, j));
-                let size = rounding * top * units[i] * units[j] * units[k];
-                jacobi = jacobi.or_worse(terms.collect::<Balance>().beside(size));
-            }
-        }
-    }
-    let skewness = asymmetry::<Y::Manifold>(&tensor, -1.0, units, rounding);
-    let is_finite = slopes.iter().all(|slope| slope.max_abs().is_finite());
-    Ok(BracketDefects { tensor, skewness, jacobi, is_finite })
-}
-
-/// The Poisson tensor of a system at any scalar.
-fn tensor<Y: Metriplectic + ?Sized, D: Scalar>(
-    system: &Y,
-    x: &ChartPoint<Y::Manifold, D>,
-) -> Result<Matrix<Y::Manifold, D>, MetricError> {
-    system.bracket().tensor(&system.bracket_args(x, &differential(system.entropy(), x)))
 }
 
 /// Checks the bracket of a system at `x` with the covectors `α`, `β`:
@@ -99,7 +37,7 @@ pub fn bracket<Y: Metriplectic>(
 ) -> Result<(), BrokenLaw> {
     let exists = |_| BrokenLaw { law: "Π exists", size: f64::NAN, bound: 0.0 };
     let bracket = system.bracket();
-    let units = Sizes::at(system, x).units;
+    let units = CoordinateScales::at(system, x).units;
     let defects = bracket_defects(system, x, &units, 1.0).map_err(exists)?;
     let (round_off, tensor_size) = (round_off::<Y::Manifold>, defects.tensor.max_abs());
     let BracketDefects { skewness, jacobi, .. } = defects;
@@ -114,19 +52,19 @@ pub fn bracket<Y: Metriplectic>(
     let jet = bracket.linearise(&args, alpha).map_err(exists)?;
     let defined = by_dual_numbers_bracket(bracket, &args, alpha).map_err(exists)?;
     let size = tensor_size * (alpha.magnitude() + beta.magnitude());
-    let off = (defined.value - jet.value).magnitude();
-    BrokenLaw::unless("linearise has the value of apply", off, round_off(size))?;
-    let off = (defined.tensor - jet.tensor).max_abs();
-    BrokenLaw::unless("linearise has the tensor of apply", off, round_off(tensor_size))?;
+    let error = (defined.value - jet.value).magnitude();
+    BrokenLaw::unless("linearise has the value of apply", error, round_off(size))?;
+    let error = (defined.tensor - jet.tensor).max_abs();
+    BrokenLaw::unless("linearise has the tensor of apply", error, round_off(tensor_size))?;
     let slopes = jet.along_z.max_abs() + jet.along_s.max_abs();
-    let off = (defined.along_z - jet.along_z).max_abs();
-    BrokenLaw::unless("linearise is the derivative along x", off, round_off(size + slopes))?;
-    let off = (defined.along_s - jet.along_s).max_abs();
-    BrokenLaw::unless("linearise is the derivative along dS", off, round_off(size + slopes))?;
+    let error = (defined.along_z - jet.along_z).max_abs();
+    BrokenLaw::unless("linearise is the derivative along x", error, round_off(size + slopes))?;
+    let error = (defined.along_s - jet.along_s).max_abs();
+    BrokenLaw::unless("linearise is the derivative along dS", error, round_off(size + slopes))?;
     let combined = bracket.apply(&args, &(*alpha + *beta * 3.0)).map_err(exists)?;
     let apart = jet.value + bracket.apply(&args, beta).map_err(exists)? * 3.0;
-    let off = (combined - apart).magnitude();
-    BrokenLaw::unless("Π(α + 3β) = Πα + 3Πβ", off, round_off(4.0 * size))?;
+    let error = (combined - apart).magnitude();
+    BrokenLaw::unless("Π(α + 3β) = Πα + 3Πβ", error, round_off(4.0 * size))?;
     if bracket.is_forced() {
         force(system, &args, alpha)?;
     }
@@ -150,7 +88,7 @@ fn force<Y: Metriplectic>(
     let size = defined.tensor.max_abs() * alpha.magnitude();
     let power = alpha.dot(&defined.value).abs();
     BrokenLaw::unless("⟨α, force(α)⟩ = 0", power, round_off(size * alpha.magnitude()))?;
-    for (law, off, size) in [
+    for (law, error, size) in [
         ("linearise_force has the value of force", (defined.value - jet.value).magnitude(), size),
         (
             "linearise_force is the derivative along α",
@@ -168,7 +106,7 @@ fn force<Y: Metriplectic>(
             size + defined.along_s.max_abs(),
         ),
     ] {
-        BrokenLaw::unless(law, off, round_off(size))?;
+        BrokenLaw::unless(law, error, round_off(size))?;
     }
     Ok(())
 }
@@ -199,13 +137,13 @@ pub fn dissipation<Y: Metriplectic>(
     let scale = size * alpha.magnitude().powi(2);
     BrokenLaw::unless("K is positive semidefinite", -form, round_off::<Y::Manifold>(scale))?;
     let annihilated = dissipation.apply(metric, &centre, w, w).map_err(broken("K exists"))?;
-    let off = annihilated.magnitude();
-    BrokenLaw::unless("K_w w = 0", off, round_off::<Y::Manifold>(size * w.magnitude()))?;
+    let error = annihilated.magnitude();
+    BrokenLaw::unless("K_w w = 0", error, round_off::<Y::Manifold>(size * w.magnitude()))?;
 
     let jet = dissipation.linearise(metric, x, w, alpha).map_err(broken("K exists"))?;
     let defined = by_dual_numbers(dissipation, metric, x, w, alpha).map_err(broken("K exists"))?;
     // The terms have the sizes K α / ℓ, K α / |w| and K.
-    let units = Sizes::at(system, x).units;
+    let units = CoordinateScales::at(system, x).units;
     let shortest = (0..<Y::Manifold as Space>::Dim::LEN).map(|i| units[i]).fold(f64::MAX, f64::min);
     let image = size * alpha.magnitude();
     for (law, left, right, terms) in [

@@ -1,33 +1,47 @@
-//! What drives the state: a bracket turns energy into reversible motion, a dissipation turns
-//! entropy into irreversible motion, and a [`System`] puts them together and checks them.
+//! Metriplectic systems: a bracket turns the differential of the energy into reversible motion, a dissipation
+//! turns the differential of the entropy into irreversible motion, and a [`System`] combines them.
 //!
 //! ```math
 //! \dot x = \Pi\, dH + K\, dS .
 //! ```
 //!
+//! Each module uses only modules above it in this table.
+//!
 //! | module | what it holds |
 //! |---|---|
 //! | [`bracket`] | [`Bracket`]: `Π`; [`LiePoisson`], [`AreaForm`](type@AreaForm), [`Nambu`], [`Symplectic`], [`Poisson::constant`], [`Poisson::field`], [`AlmostPoisson::field`], [`Zero`]; with a [`Force`], [`ForcedLiePoisson`] |
 //! | [`dissipation`] | [`Dissipation`]: `K`, given the covector it must annihilate; [`MetricDissipation`], [`CometricDissipation`], [`KulkarniNomizu`], [`CasimirDissipation`], [`FieldDissipation`], [`ProjectedDissipation`], [`Scaled`] |
-//! | [`euler_poincare`] | [`Legendre`]: a reduced Lagrangian on a Lie algebra, as an energy on its dual |
-//! | [`system`] | [`System`] and its builder |
 //! | [`invariants`] | further Casimirs and momenta `L_a`, and symmetries |
 //! | [`orthogonal`] | projections off covectors, by which a tensor is made to annihilate them |
+//! | [`model_error`] | [`ModelError`]: the law that a model violates, with the numbers |
+//! | [`report`](mod@report) | [`Report`]: the residual of every law |
+//! | [`vector_field`] | [`VectorField`]: `system.velocity(x)` |
+//! | [`verification`] | [`Verify`]: `system.verify(x0, radius)`, `system.report(x0)`; [`Verified`] |
+//! | [`metriplectic`] | [`Metriplectic`]: the parts of a system |
+//! | [`system`] | [`System`], which holds these parts |
+//! | [`builder`] | [`SystemBuilder`], which makes it |
+//! | [`legendre`] | [`Legendre`]: a reduced Lagrangian on a Lie algebra, as an energy on its dual |
+//! | [`euler_poincare`] | `.lagrangian(..)` and `.force(..)` of the builder |
 //! | [`velocity`](mod@velocity) | `Π w_H + K w_S` for given covectors: differentials, or discrete gradients |
-//! | [`verify`] | the laws of a model, sampled: [`System::verify`], [`System::report`], [`Verified`] |
-//! | [`laws`] | what brackets and dissipations promise, and the functions that check it |
+//! | [`verify`] | the laws of a model, sampled |
+//! | [`laws`] | the laws of brackets and dissipations, and the functions that check them |
 
 pub mod bracket;
+pub mod builder;
 pub mod dissipation;
 pub mod euler_poincare;
 pub mod invariants;
 pub mod laws;
+pub mod legendre;
+pub mod metriplectic;
 pub mod model_error;
 pub mod orthogonal;
 pub mod report;
 pub mod system;
+pub mod vector_field;
 pub mod velocity;
-pub mod verified;
+pub mod verification;
+mod verified;
 pub mod verify;
 
 pub use bracket::{
@@ -35,15 +49,16 @@ pub use bracket::{
     Force, ForcedLiePoisson, LiePoisson, Nambu, NaturalBracket, OfEntropy, Poisson, PoissonError,
     Symplectic, Zero,
 };
+pub use builder::{NoEnergy, SystemBuilder};
 pub use dissipation::{
     CasimirDissipation, CometricDissipation, Dissipation, DissipationJet, FieldDissipation,
     FormError, KulkarniNomizu, MetricDissipation, NoDissipation, ProjectedDissipation, Scaled,
 };
-pub use euler_poincare::{Legendre, LegendreError};
 pub use invariants::Invariants;
+pub use legendre::{Legendre, LegendreError};
+pub use metriplectic::{Metriplectic, Point, SecondLaw};
 pub use model_error::ModelError;
 pub use report::{LawResidual, Report};
-pub use system::{
-    BuildError, Metriplectic, NoEnergy, NoEntropy, Point, SecondLaw, System, SystemBuilder,
-};
-pub use verified::Verified;
+pub use system::{BuildError, NoEntropy, System};
+pub use vector_field::VectorField;
+pub use verification::{Verified, Verify};

@@ -1,4 +1,4 @@
-//! How a model breaks its laws, with the numbers.
+//! The laws that a model violates, with the numbers.
 
 use std::fmt;
 

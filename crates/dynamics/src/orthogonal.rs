@@ -8,11 +8,11 @@
 //! ```
 //!
 //! of covectors and of vectors: `⟨w, Pv⟩ = 0`. Several covectors are first made orthogonal to each
-//! other by Gram and Schmidt, which is the inverse `C^{ab}` of their Gram matrix in the remark of
-//! Bloch, Farré Puiggalí, Martín de Diego (2024, §2.2), without forming it: a covector that depends
-//! on those before it is found by what is left of it, and left out.
+//! other by Gram and Schmidt. This has the effect of the inverse `C^{ab}` of their Gram matrix in the remark
+//! of Bloch, Farré Puiggalí, Martín de Diego (2024, §2.2), without forming it. A covector whose orthogonal
+//! part is round-off depends on those before it, and is omitted.
 //!
-//! This jumps where a covector becomes dependent. The faded projections do not: with the independent fraction
+//! This projection jumps where a covector becomes dependent. The faded projections do not. With the independent fraction
 //! `σ = |n|/|w|` of the covector `w` whose orthogonal part is `n`, each has the weight `1/(1 + r)`,
 //! `r = (μ/σ)⁴`,
 //!
@@ -25,8 +25,8 @@
 use metriplectic_fields::{Column, Dimension, Scalar, Square};
 use metriplectic_manifolds::InnerProduct;
 
-/// The fraction of a covector that has to be left after those before it are taken out of it; below, it
-/// is their combination up to round-off.
+/// The fraction of a covector that must be orthogonal to those before it. A covector with a smaller
+/// fraction is their combination up to round-off.
 const INDEPENDENT: f64 = 1e-10;
 
 /// `square/w`, where the weight `w = 1/(1 + r)`, `r = (μ/σ)⁴`, fades out a projection off a covector whose
@@ -43,7 +43,7 @@ pub struct Orthogonal<N: Dimension, D: Scalar = f64> {
     len: usize,
 }
 
-/// One of them.
+/// A covector made orthogonal, and what projections off it need.
 #[derive(Clone, Copy, Debug)]
 struct Normal<N: Dimension, D: Scalar> {
     /// The covector `n`.
@@ -52,7 +52,7 @@ struct Normal<N: Dimension, D: Scalar> {
     sharp: N::Vector<D>,
     /// `G*(n, n)`.
     square: D,
-    /// `G*(w, w)` of the covector `w` that it was made of.
+    /// `G*(w, w)` of the covector `w` whose orthogonal part is `n`.
     size: D,
 }
 
@@ -63,21 +63,21 @@ impl<N: Dimension, D: Scalar> Default for Orthogonal<N, D> {
 }
 
 impl<N: Dimension, D: Scalar> Orthogonal<N, D> {
-    /// The number of covectors.
+    /// Returns the number of covectors.
     pub const fn len(&self) -> usize {
         self.len
     }
 
-    /// Whether there are none.
+    /// Returns whether there are no covectors.
     pub const fn is_empty(&self) -> bool {
         self.len == 0
     }
 
-    /// Adds a covector, and gives the fraction of it that is orthogonal to those before it. It is left
-    /// out if this is round-off.
+    /// Adds a covector, and returns the fraction of it that is orthogonal to those before it. If this fraction
+    /// is round-off, the covector is omitted.
     pub fn push(&mut self, g: &impl InnerProduct<N::Vector<D>>, w: &N::Vector<D>) -> f64 {
         let whole = g.orthonormal(w);
-        // A second pass takes out what the rounding of the first has left.
+        // The second pass removes the rounding error of the first.
         let mut n = *w;
         for _ in 0..2 {
             n = self.project_covector(0, &n);
@@ -94,7 +94,7 @@ impl<N: Dimension, D: Scalar> Orthogonal<N, D> {
         fraction
     }
 
-    /// The covector `Pᵀα` without its parts along the covectors from the `first` on.
+    /// Projects a covector: `Pᵀα`, without its parts along the covectors from the `first` on.
     #[inline]
     pub fn project_covector(&self, first: usize, alpha: &N::Vector<D>) -> N::Vector<D> {
         let mut alpha = *alpha;
@@ -104,7 +104,7 @@ impl<N: Dimension, D: Scalar> Orthogonal<N, D> {
         alpha
     }
 
-    /// The vector `Pv` that the covectors from the `first` on annihilate.
+    /// Projects a vector: `Pv`, which the covectors from the `first` on annihilate.
     #[inline]
     pub fn project_vector(&self, first: usize, v: &N::Vector<D>) -> N::Vector<D> {
         let mut v = *v;
@@ -157,8 +157,7 @@ impl<N: Dimension, D: Scalar> Orthogonal<N, D> {
     }
 }
 
-/// The same at real points, with the derivatives along the unknown of a step: every quantity comes
-/// with the matrix of its derivatives.
+/// [`Orthogonal`] at real points, where every quantity has its derivatives along the unknown of a step.
 #[derive(Clone, Copy, Debug)]
 pub struct OrthogonalJet<N: Dimension> {
     normals: N::Array<Option<NormalJet<N>>>,
@@ -227,18 +226,18 @@ impl<N: Dimension> Default for OrthogonalJet<N> {
 }
 
 impl<N: Dimension> OrthogonalJet<N> {
-    /// The number of covectors.
+    /// Returns the number of covectors.
     pub const fn len(&self) -> usize {
         self.len
     }
 
-    /// Whether there are none.
+    /// Returns whether there are no covectors.
     pub const fn is_empty(&self) -> bool {
         self.len == 0
     }
 
-    /// By how much projections amplify round-off, if they fade out below the fraction `mu`: the sum of
-    /// `w/σ` over the covectors from the `first` on.
+    /// Returns the factor by which projections amplify round-off, if they fade out below the fraction `mu`:
+    /// the sum of `w/σ` over the covectors from the `first` on.
     pub fn amplification(&self, first: usize, mu: f64) -> f64 {
         let normals = self.normals.as_ref()[first..].iter().flatten();
         normals
@@ -249,8 +248,8 @@ impl<N: Dimension> OrthogonalJet<N> {
             .sum()
     }
 
-    /// The absolute terms that the projection of `v` off the covectors from the `first` on subtracts, if it
-    /// fades out below the fraction `mu`.
+    /// Returns the absolute terms that the projection of `v` off the covectors from the `first` on subtracts,
+    /// if it fades out below the fraction `mu`.
     #[must_use]
     pub fn terms_of_vector(&self, first: usize, v: &N::Vector<f64>, mu: f64) -> N::Vector<f64> {
         self.terms(first, v, mu, |normal| (&normal.n, &normal.sharp))
@@ -284,7 +283,7 @@ impl<N: Dimension> OrthogonalJet<N> {
         terms
     }
 
-    /// Adds a covector; `dg_v(v)` is the derivative of `g v` along the unknown, for a fixed `v`.
+    /// Adds a covector. `dg_v(v)` is the derivative of `g v` along the unknown, for a fixed `v`.
     pub fn push(
         &mut self,
         g: &impl InnerProduct<N::Vector<f64>>,

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use crate::ModelError;
+use crate::model_error::ModelError;
 
 /// A law of the model, with its largest violation among the samples.
 #[derive(Clone, Debug, PartialEq)]
@@ -12,21 +12,21 @@ pub struct LawResidual {
     pub law: &'static str,
     /// The violation, relative to the terms that should cancel.
     pub size: f64,
-    /// The violation that is taken for round-off; infinite if the law is not asked for.
+    /// The violation that is taken for round-off; infinite if the law is not required.
     pub allowed: f64,
     /// The entries of the point where it is largest.
     pub point: Vec<f64>,
 }
 
 impl LawResidual {
-    /// Whether the law holds at every sample.
+    /// Returns whether the law holds at every sample.
     pub fn holds(&self) -> bool {
         self.size <= self.allowed
     }
 }
 
 /// The residual of every law of a model, and the first error if there is one; see
-/// [`Metriplectic::report`](crate::Metriplectic::report).
+/// [`Verify::report`](crate::Verify::report).
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Report {
@@ -34,9 +34,9 @@ pub struct Report {
     pub laws: Vec<LawResidual>,
     /// Points at which the model was judged.
     pub judged: usize,
-    /// Points passed over, because a value was not finite there; each was drawn again, nearer to the start.
+    /// Points at which a value was not finite. Each was drawn again, nearer to the start.
     pub passed_over: usize,
-    /// What [`Metriplectic::verify`](crate::Metriplectic::verify) says.
+    /// The result of [`Verify::verify`](crate::Verify::verify).
     pub verdict: Result<(), ModelError>,
 }
 

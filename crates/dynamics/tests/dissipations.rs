@@ -4,7 +4,7 @@ use metriplectic_dynamics::BuildError;
 use metriplectic_dynamics::{
     CasimirDissipation, CometricDissipation, Dissipation, FieldDissipation, KulkarniNomizu,
     MetricDissipation, Metriplectic, ModelError, NoDissipation, ProjectedDissipation, Scaled,
-    System, laws,
+    System, Verify, laws,
 };
 use metriplectic_fields::{ChartPoint, Column, Dimension, Real, Space, Square, Vector};
 use metriplectic_manifolds::{
@@ -82,12 +82,12 @@ fn agree<M: Manifold, G: Riemannian<M>>(
 ) -> Result<(), TestCaseError> {
     let (l, r) = (left.linearise(metric, x, w, a), right.linearise(metric, x, w, a));
     let (l, r) = (l.expect("K exists"), r.expect("K exists"));
-    let off = (l.value - r.value).magnitude();
+    let error = (l.value - r.value).magnitude();
     let bound = 1e-13 * (1.0 + w.magnitude().powi(2)) * (1.0 + a.magnitude());
-    prop_assert!(off <= bound, "{off:.1e}");
+    prop_assert!(error <= bound, "{error:.1e}");
     for (l, r) in [(l.along_w, r.along_w), (l.along_z, r.along_z), (l.tensor, r.tensor)] {
-        let off = Square::max_abs(&(l - r));
-        prop_assert!(off <= 10.0 * bound, "{off:.1e}");
+        let error = Square::max_abs(&(l - r));
+        prop_assert!(error <= 10.0 * bound, "{error:.1e}");
     }
     Ok(())
 }
@@ -269,16 +269,16 @@ proptest! {
     ) {
         let (se3, kappa) = (LieDual::se3(), c.transpose() * c);
         let k = CasimirDissipation::new(se3.algebra(), kappa)?;
-        let dg_v = se3.algebra().bracket(&xi, &dc);
-        prop_assert!((k.force(&xi, &dc) - kappa * dg_v).norm() <= 1e-13 * kappa.norm() * (1.0 + dg_v.norm()));
+        let turned = se3.algebra().bracket(&xi, &dc);
+        prop_assert!((k.force(&xi, &dc) - kappa * turned).norm() <= 1e-13 * kappa.norm() * (1.0 + turned.norm()));
         let x = ChartPoint::<LieDual<6>>::centre(&xi);
         let rate = dc.dot(&k.apply(&Canonical, &x, &xi, &dc).unwrap());
-        let expected = dg_v.dot(&(kappa * dg_v));
+        let expected = turned.dot(&(kappa * turned));
         prop_assert!((rate - expected).abs() <= 1e-13 * kappa.norm() * (xi.norm() * dc.norm()).powi(2));
     }
 
     #[test]
-    fn closures_of_the_covector_to_be_killed_keep_the_laws(
+    fn closures_of_the_covector_to_be_annihilated_keep_the_laws(
         seed in any::<u64>(), x in columns::<3>(), w in columns::<3>(), a in columns::<3>(),
         x6 in columns::<6>(), w6 in columns::<6>(), a6 in columns::<6>(),
     ) {
@@ -297,9 +297,9 @@ proptest! {
         laws::dissipation(&with!(Euclidean::<6>, square::<6>, exchange), &x6, &w6, &a6)?;
         let sphere = Sphere::<2>::round();
         let point = sphere.random(&mut rng);
-        laws::dissipation(&with!(sphere, square::<3>, kills_on_vectors()), &point, &w.xy(), &a.xy())?;
+        laws::dissipation(&with!(sphere, square::<3>, annihilates_on_vectors()), &point, &w.xy(), &a.xy())?;
         let point = Rotations.random(&mut rng);
-        laws::dissipation(&with!(Rotations, of_matrix, kills_on_rotations()), &point, &w, &a)?;
+        laws::dissipation(&with!(Rotations, of_matrix, annihilates_on_rotations()), &point, &w, &a)?;
         // A direction and a temperature: a spin that is warmed by its friction.
         let warm = Product(sphere, HalfLine);
         let friction = FieldDissipation(
@@ -323,7 +323,7 @@ proptest! {
         let base = Rotations.random(&mut rng);
         let x = ChartPoint::<Rotations, _> { base, q: nested(&(q * 0.3), 0.1) };
         let (w, a) = (nested(&w, 0.7), nested(&a, -0.4));
-        let k = kills_on_rotations();
+        let k = annihilates_on_rotations();
         let lifted = k.apply(&Canonical, &x, &w, &a).unwrap();
         let defined = MetricDissipation.apply(&Canonical, &x, &w, &a).unwrap();
         for i in 0..3 {
@@ -374,7 +374,7 @@ fn oscillator() -> FieldDissipation<impl Fn(&Vector3<Real>, &Vector3<Real>) -> M
 }
 
 /// `|w|² − w wᵀ` in the space around a sphere.
-fn kills_on_vectors()
+fn annihilates_on_vectors()
 -> FieldDissipation<impl Fn(&Vector3<Real>, &Vector3<Real>) -> Matrix3<Real> + Copy> {
     FieldDissipation(|x: &Vector3<Real>, w: &Vector3<Real>| {
         (eye() * w.norm_squared() - w * w.transpose()) * (x.x * x.y + 2.0)
@@ -382,7 +382,7 @@ fn kills_on_vectors()
 }
 
 /// The dissipation of the bi-invariant metric, on body covectors.
-fn kills_on_rotations()
+fn annihilates_on_rotations()
 -> FieldDissipation<impl Fn(&Matrix3<Real>, &Vector3<Real>) -> Matrix3<Real> + Copy> {
     FieldDissipation(|_: &Matrix3<Real>, w: &Vector3<Real>| {
         eye() * w.norm_squared() - w * w.transpose()

@@ -1,4 +1,4 @@
-//! Ordinary closures are fields.
+//! Closures as fields.
 //!
 //! A closure is written over the one scalar [`Real`]. At another scalar `D` of derivative order
 //! ≤ 2 it is lifted by its second-order Taylor expansion about the real part `x` of the point,
@@ -12,7 +12,7 @@
 
 use crate::{Dimension, Form, MatrixField, Real, Scalar, ScalarField, Space, Square};
 
-// A closure that returns an `f64` is then told what a scalar field is, not what `Fn` is.
+// For a closure that returns an `f64`, the compiler then explains scalar fields, and not `Fn`.
 #[diagnostic::do_not_recommend]
 impl<M, F> ScalarField<M> for F
 where
@@ -52,7 +52,7 @@ where
     }
 }
 
-/// What one evaluation contributes to the Taylor sum: a factor for each part of a [`Real`].
+/// The weights of one evaluation in the Taylor sum: a factor for each part of a [`Real`].
 struct Weights<D> {
     re: f64,
     eps1: D,
@@ -61,9 +61,8 @@ struct Weights<D> {
 }
 
 impl<D: Scalar> Weights<D> {
-    /// The weighted sum of the parts that the order of `D` asks for. The others are not multiplied
-    /// by zero but left out: they may be infinite where the wanted ones are not (the slope of a
-    /// norm at zero).
+    /// Computes the weighted sum of the parts that the order of `D` needs. It omits the others instead of
+    /// multiplying them by zero, because they may be infinite (the slope of a norm at zero).
     #[inline]
     fn of(&self, f: &Real) -> D {
         let value = D::from(self.re * f.re);

@@ -1,7 +1,7 @@
 //! Derivatives at any scalar, by nesting dual numbers.
 //!
-//! These are the definitions; at real points [`ScalarField::jet1`] and [`ScalarField::jet2`] are
-//! the faster answers to the same question.
+//! These are the definitions. At real points [`ScalarField::jet1`] and [`ScalarField::jet2`] compute the same
+//! faster.
 
 use num_dual::Dual;
 

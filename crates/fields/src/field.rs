@@ -5,8 +5,8 @@ use crate::{ChartPoint, Column, Dimension, Form, Matrix, Real, Scalar, Space, Sq
 
 /// A smooth function `f: M → R`.
 ///
-/// Implemented by every closure `Fn(&M::Point<Real>) -> Real`. Implement it by hand, with the one
-/// method [`at`](Self::at), for a type that should be evaluated at each scalar directly:
+/// Every closure `Fn(&M::Point<Real>) -> Real` implements it. To evaluate a type at each scalar directly,
+/// implement the one method [`at`](Self::at):
 ///
 /// ```
 /// # use metriplectic_fields::{Scalar, ScalarField};
@@ -31,16 +31,16 @@ use crate::{ChartPoint, Column, Dimension, Form, Matrix, Real, Scalar, Space, Sq
     note = "a type of your own implements `ScalarField` with the generic method `at`"
 )]
 pub trait ScalarField<M: Space> {
-    /// The value `f(x)` at any scalar.
+    /// Evaluates `f(x)` at any scalar.
     fn at<D: Scalar>(&self, x: &M::Point<D>) -> D;
 
-    /// The value `f(x)` at the scalar of closures, which a closure answers without a lift.
+    /// Evaluates `f(x)` at the scalar of closures, at which a closure needs no lift.
     #[inline]
     fn at_real(&self, x: &M::Point<Real>) -> Real {
         self.at(x)
     }
 
-    /// Value and differential at a real point, in `⌈n/2⌉` evaluations.
+    /// Computes value and differential at a real point, in `⌈n/2⌉` evaluations.
     #[inline]
     fn jet1(&self, x: &M::Point<f64>) -> Jet1<M> {
         let n = M::Dim::LEN;
@@ -58,7 +58,7 @@ pub trait ScalarField<M: Space> {
         Jet1 { value, df }
     }
 
-    /// Value, differential and Hessian at a real point, in `n(n+1)/2` evaluations.
+    /// Computes value, differential and Hessian at a real point, in `n(n+1)/2` evaluations.
     #[inline]
     fn jet2(&self, x: &M::Point<f64>) -> Jet2<M> {
         let mut value = f64::NAN;
@@ -107,7 +107,7 @@ pub struct Jet1<M: Space> {
 }
 
 impl<M: Space> Jet1<M> {
-    /// Whether value and differential are finite numbers.
+    /// Returns whether value and differential are finite.
     pub fn is_finite(&self) -> bool {
         self.value.is_finite() && self.df.is_finite()
     }
@@ -125,17 +125,17 @@ pub struct Jet2<M: Space> {
 }
 
 impl<M: Space> Jet2<M> {
-    /// Whether value, differential and Hessian are finite numbers.
+    /// Returns whether value, differential and Hessian are finite.
     pub fn is_finite(&self) -> bool {
         self.value.is_finite() && self.df.is_finite() && self.hf.max_abs().is_finite()
     }
 }
 
 /// A smooth field of square matrices on `M`: a metric `g` that acts on velocities, a Poisson tensor
-/// `Π` that acts on covectors dual to them. Velocities are those of [`Space::velocity`]: components
+/// `Π` that acts on covectors dual to them. Velocities are those of [`Space::embed`]: components
 /// on a vector space, entries of `x'` on a sphere, the body angular velocity on SO(3).
 ///
-/// Implemented by every closure `Fn(&M::Point<Real>) -> Form<M, Real>`, and by hand with the one
+/// Every closure `Fn(&M::Point<Real>) -> Form<M, Real>` implements it. Another type implements the one
 /// method [`at`](Self::at).
 #[diagnostic::on_unimplemented(
     message = "`{Self}` is not a matrix field on `{M}`",
@@ -144,23 +144,23 @@ impl<M: Space> Jet2<M> {
     note = "a type of your own implements `MatrixField` with the generic method `at`"
 )]
 pub trait MatrixField<M: Space> {
-    /// The matrix at `x`, at any scalar.
+    /// Evaluates the matrix at `x`, at any scalar.
     fn at<D: Scalar>(&self, x: &M::Point<D>) -> Form<M, D>;
 
-    /// The matrix at the scalar of closures, which a closure answers without a lift.
+    /// Evaluates the matrix at the scalar of closures, at which a closure needs no lift.
     #[inline]
     fn at_real(&self, x: &M::Point<Real>) -> Form<M, Real> {
         self.at(x)
     }
 
-    /// A metric in the frame of the chart at a real point, with its first derivatives along the
+    /// Computes a metric in the frame of the chart at a real point, with its first derivatives along the
     /// chart, in `⌈n/2⌉` evaluations.
     fn covariant_jet(&self, x: &M::Point<f64>) -> MatrixJet<M> {
         let seeded = M::seeds(x);
         M::covariant_jet(x, &Vector::<M>::zero(), |i, j| self.at_real(&seeded(i, j)))
     }
 
-    /// A Poisson tensor in the frame of the chart at a real point, with its first derivatives along
+    /// Computes a Poisson tensor in the frame of the chart at a real point, with its first derivatives along
     /// the chart, in `⌈n/2⌉` evaluations.
     fn contravariant_jet(&self, x: &M::Point<f64>) -> MatrixJet<M> {
         let seeded = M::seeds(x);

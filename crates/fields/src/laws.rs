@@ -1,4 +1,4 @@
-//! What a field promises, and the one function that checks it.
+//! The laws of a field, and the function that checks them.
 
 use crate::{ChartPoint, Column, Dimension, Matrix, ScalarField, Space, Square, Vector, hessian};
 
@@ -8,14 +8,14 @@ use crate::{ChartPoint, Column, Dimension, Matrix, ScalarField, Space, Square, V
 pub struct BrokenLaw {
     /// The law as a sentence.
     pub law: &'static str,
-    /// How far off it is.
+    /// The size of the violation.
     pub size: f64,
-    /// How far off it may be.
+    /// The size that is allowed.
     pub bound: f64,
 }
 
 impl BrokenLaw {
-    /// `Ok` if `size ≤ bound`; a NaN breaks every law.
+    /// Returns `Ok` if `size ≤ bound`. NaN breaks every law.
     ///
     /// # Errors
     ///
@@ -44,7 +44,7 @@ pub fn scalar_field<M: Space>(
     let value: f64 = f.at(x);
     let centre = ChartPoint::centre(x);
     let hf: Matrix<M> = hessian(f, &centre);
-    // A few operations on dual numbers lose a few ε of the largest part.
+    // A few operations on dual numbers have an error of a few ε of the largest part.
     let size = value.abs() + jet.df.magnitude() + jet.hf.max_abs();
     let bound = 200.0 * f64::EPSILON * M::Dim::LEN as f64 * size.max(f64::MIN_POSITIVE);
     BrokenLaw::unless("jet2 has the value of the field", (jet.value - value).abs(), bound)?;
@@ -58,28 +58,28 @@ pub fn scalar_field<M: Space>(
         let shifted: f64 = f.at(&M::chart(x, &(*v * t)));
         (shifted - value - slope * t - second * t * t * 0.5).abs()
     };
-    // One side alone, `a t² + b t³`, may be caught at its zero `t = −a/b`; both sides together,
-    // `2 max(|a| t², |b| t³)`, have none.
+    // One side, `a t² + b t³`, may be evaluated at its zero `t = −a/b`. Both sides together,
+    // `2 max(|a| t², |b| t³)`, have no zero.
     let remainder = |t: f64, second: f64| one_sided(t, second) + one_sided(-t, second);
-    let floor = 100.0 * f64::EPSILON * (size + slope.abs() + curvature.abs());
-    taylor_order("df is the derivative of the field", 2.0, floor, |t| remainder(t, 0.0))?;
-    taylor_order("Hf is the second derivative", 3.0, floor, |t| remainder(t, curvature))
+    let round_off = 100.0 * f64::EPSILON * (size + slope.abs() + curvature.abs());
+    taylor_order("df is the derivative of the field", 2.0, round_off, |t| remainder(t, 0.0))?;
+    taylor_order("Hf is the second derivative", 3.0, round_off, |t| remainder(t, curvature))
 }
 
 /// Checks that `remainder(t)` falls at least like `t^order` over `t = 2⁻⁴ … 2⁻¹²`, as far as it
-/// stays above the round-off `floor`.
+/// stays above the `round_off`.
 fn taylor_order(
     law: &'static str,
     order: f64,
-    floor: f64,
+    round_off: f64,
     remainder: impl Fn(f64) -> f64,
 ) -> Result<(), BrokenLaw> {
     let sizes: Vec<f64> = (4..=12)
         .map(|k| remainder(2.0_f64.powi(-k)))
-        .take_while(|r| r.is_nan() || *r > 1e2 * floor)
+        .take_while(|r| r.is_nan() || *r > 1e2 * round_off)
         .collect();
-    // The finest pair above the floor is the most asymptotic one; where it starts by chance at a
-    // zero of the remainder, the next one tells. A NaN in the finest pair stays.
+    // The finest pair above the round-off is the most asymptotic. If it starts at a zero of the remainder, the
+    // next pair decides. A NaN in the finest pair stays.
     let orders = sizes.windows(2).rev().take(2).map(|pair| (pair[0] / pair[1]).log2());
     let Some(measured) = orders.reduce(|fine, coarse| if fine < coarse { coarse } else { fine })
     else {

@@ -1,15 +1,17 @@
-//! What the user writes, smooth functions as closures, and their derivatives.
+//! Smooth functions, which the user writes as closures, and their derivatives.
 //!
 //! | module | what it holds |
 //! |---|---|
 //! | [`scalar`] | [`Scalar`]: `f64` or a dual number over it; [`Real`], the one a closure uses |
-//! | [`dimension`] | [`Dimension`]: vectors and matrices of a size the compiler knows |
-//! | [`space`] | [`Space`]: how a point looks at each scalar, and the chart around it |
+//! | [`column`](mod@column), [`square`] | [`Column`], [`Square`]: vectors and matrices of a size that the compiler knows |
+//! | [`dimension`] | [`Dimension`]: the size, and the types that have it |
+//! | [`space`] | [`Space`]: points at each scalar, and the chart around a point |
 //! | [`field`](mod@field) | [`ScalarField`] (`H`, `S`) and [`MatrixField`] (`g`, `Π`) |
 //! | [`closure`](mod@closure) | ordinary closures are fields, lifted to every scalar of order ≤ 2 |
 //! | [`differential`](mod@differential) | differential, Hessian and Jacobian at any scalar |
-//! | [`series`] | the functions of a small angle, right under dual numbers |
-//! | [`laws`] | what a field promises, and the function that checks it |
+//! | [`newton`] | damped Newton iterations, for unknowns of any kind |
+//! | [`series`] | functions of a small angle, right under dual numbers |
+//! | [`laws`] | the laws of a field, and the function that checks them |
 //!
 //! # Two doors
 //!
@@ -25,17 +27,22 @@
 //! returned closures and plain functions.
 
 pub mod closure;
+pub mod column;
 pub mod differential;
 pub mod dimension;
 pub mod field;
 pub mod laws;
+pub mod newton;
 pub mod scalar;
 pub mod series;
 pub mod space;
+pub mod square;
 
+pub use column::{Column, power_of_two};
 pub use differential::{differential, differential_at, hessian, hessian_at, jacobian};
-pub use dimension::{Column, Dimension, Factors, NotPositive, Plus, Square, power_of_two};
+pub use dimension::{Dimension, Plus};
 pub use field::{Jet1, Jet2, MatrixField, MatrixJet, ScalarField, along_slopes};
 pub use laws::BrokenLaw;
 pub use scalar::{Real, Scalar};
 pub use space::{ChartPoint, Form, Matrix, Space, Vector, Velocity, product_rule};
+pub use square::{Factors, NotPositive, Square};

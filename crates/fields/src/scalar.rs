@@ -1,4 +1,4 @@
-//! The numbers that a field is evaluated at.
+//! The numbers at which a field is evaluated.
 
 use approx::RelativeEq;
 use num_dual::{DualNum, HyperDual64};
@@ -6,11 +6,11 @@ use simba::scalar::SupersetOf;
 
 /// `f64`, or a dual number over it of any order and nesting.
 ///
-/// What generic code may do with one: arithmetic with itself and with `f64` on the *right*
+/// Generic code may use arithmetic with itself and with `f64` on the *right*
 /// (`x * 0.5` compiles, `0.5 * x` does not), the elementary functions of [`DualNum`], and
 /// [`cast`](nalgebra::Matrix::cast) of constant vectors and matrices into it.
 ///
-/// The remainder `%` is the one operator to avoid: it panics inside `num_dual`.
+/// Avoid the remainder `%`, which panics inside `num_dual`.
 pub trait Scalar:
     DualNum<Primitive = f64> + Copy + Send + Sync + SupersetOf<f64> + RelativeEq<Epsilon = Self>
 {
@@ -22,7 +22,7 @@ impl<T> Scalar for T where
 }
 
 /// The scalar of a closure: a hyper-dual number `a + b ε₁ + c ε₂ + d ε₁ε₂` with `ε₁² = ε₂² = 0`,
-/// which carries a value, two first derivatives and their mixed second derivative
+/// which contains a value, two first derivatives and their mixed second derivative
 /// (Fike and Alonso 2011).
 ///
 /// Use it as you would use `f64`. Three habits keep its derivatives finite and the compiler content:

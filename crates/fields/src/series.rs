@@ -1,16 +1,16 @@
-//! The functions of a small angle, in one place.
+//! Functions of a small angle, right under dual numbers.
 //!
 //! Exponentials and logarithms of rotations and spheres are entire functions of the *squared* angle
 //! `s = θ²`, but their textbook formulas divide by `θ` and take its square root, whose derivative at
-//! zero is not a number. Every solver starts there. The functions here are evaluated by their power
-//! series near zero, so that they and their derivatives of every order are right under dual numbers.
+//! zero is not a number. Every solver starts at zero. The functions of this module use their power series near
+//! zero, so they and their derivatives of every order are right under dual numbers.
 
 use crate::Scalar;
 
-/// Below this squared angle the power series are used: their terms fall from the first, and the
-/// closed forms lose no more than a digit above it.
+/// The squared angle below which the power series are used. Their terms decrease there, and above it the closed
+/// forms cancel at most one digit.
 const NEAR: f64 = 1.0;
-/// Below this one a few of their terms are enough.
+/// The squared angle below which a few terms are enough.
 const TINY: f64 = 1.0 / 32.0;
 
 /// The Stumpff functions `[c_0, c_1, c_2, c_3]`, `c_n(s) = Σ_k (−s)^k / (2k + n)!`, for `s ≥ 0`
@@ -33,7 +33,7 @@ const TINY: f64 = 1.0 / 32.0;
 /// ```
 #[inline]
 pub fn stumpff<D: Scalar>(s: D) -> [D; 4] {
-    // Each derivative takes a term away from the end of a series.
+    // Each derivative removes a term from the end of a series.
     match s.re().abs() {
         size if size < TINY => power_series(s, 5 + D::NDERIV),
         size if size < NEAR => power_series(s, 9 + D::NDERIV),
@@ -72,7 +72,7 @@ const RECIPROCAL_FACTORIALS: [f64; 40] = {
 
 /// `θ / sin θ` from the squared sine and the cosine of an angle `0 ≤ θ < π`.
 ///
-/// At `θ = π` it is infinite: the direction of the logarithm is lost at the antipode.
+/// At `θ = π` it is infinite: the direction of the logarithm is undefined at the antipode.
 pub fn angle_over_sine<D: Scalar>(squared_sine: D, cosine: D) -> D {
     if cosine.re() > 0.0 && squared_sine.re() < 0.1 * NEAR {
         // atan(t)/t for t = tan θ, in t².

@@ -1,4 +1,4 @@
-//! How a point looks at each scalar, and the chart around it.
+//! Points at each scalar, and the chart around a point.
 
 use std::fmt::Debug;
 
@@ -14,7 +14,7 @@ pub type Vector<M, D = f64> = <<M as Space>::Dim as Dimension>::Vector<D>;
 pub type Matrix<M, D = f64> = <<M as Space>::Dim as Dimension>::Matrix<D>;
 
 /// A velocity as it is written by hand: entries of a tangent vector of the embedding, a body angular
-/// velocity; see [`Space::velocity`].
+/// velocity; see [`Space::embed`].
 pub type Velocity<M, D = f64> = <<M as Space>::Velocity as Dimension>::Vector<D>;
 
 /// A tensor as it is written by hand: a square matrix that acts on velocities (a metric) or on
@@ -28,8 +28,8 @@ pub type Form<M, D = f64> = <<M as Space>::Velocity as Dimension>::Matrix<D>;
 /// entries of a point, and components of tangent vectors and covectors refer to its coordinate
 /// frame `∂φ_x/∂qⁱ`.
 ///
-/// The frame of a chart is a matter of computation. A tensor is written by hand in the terms of a
-/// [`velocity`](Self::velocity), which needs no chart: the components themselves on a vector space,
+/// Users do not see the frame of a chart. They write a tensor in the terms of a velocity
+/// ([`embed`](Self::embed)), which needs no chart: the components themselves on a vector space,
 /// the entries of `x'` on a sphere, the body angular velocity on SO(3).
 ///
 /// Laws: 1. `φ_x(0) = x`; 2. `φ_x⁻¹(φ_x(q)) = q` near `q = 0`; 3. both at dual numbers too;
@@ -43,16 +43,16 @@ pub trait Space: Clone + Debug + PartialEq + Send + Sync + 'static {
     /// A point with entries in `D`: a vector in Rⁿ, a matrix on a group, a pair on a product.
     type Point<D: Scalar>: Clone + Debug + PartialEq + Send + Sync + 'static;
 
-    /// The real point, embedded in the scalar `D`.
+    /// Embeds a real point in the scalar `D`.
     fn constant<D: Scalar>(x: &Self::Point<f64>) -> Self::Point<D>;
 
-    /// The real part of a point.
+    /// Returns the real part of a point.
     fn real<D: Scalar>(x: &Self::Point<D>) -> Self::Point<f64>;
 
-    /// The point `φ_x(q)`.
+    /// Computes the point `φ_x(q)`.
     fn chart<D: Scalar>(x: &Self::Point<f64>, q: &Vector<Self, D>) -> Self::Point<D>;
 
-    /// The points `φ_x(ε₁ e_i + ε₂ e_j)` that derivatives are read off, by `i` and `j`; an index
+    /// Returns the points `φ_x(ε₁ e_i + ε₂ e_j)`, by `i` and `j`, which give the derivatives of fields. An index
     /// beyond the dimension seeds nothing.
     #[inline]
     fn seeds(x: &Self::Point<f64>) -> impl Fn(usize, usize) -> Self::Point<Real> {
@@ -64,21 +64,21 @@ pub trait Space: Clone + Debug + PartialEq + Send + Sync + 'static {
         }
     }
 
-    /// The coordinates `φ_x⁻¹(y)`, for `y` near `x`.
+    /// Computes the coordinates `φ_x⁻¹(y)`, for `y` near `x`.
     fn coordinates<D: Scalar>(x: &Self::Point<f64>, y: &Self::Point<D>) -> Vector<Self, D>;
 
-    /// The velocity `θ(x) v` of a tangent vector with the components `v` in the frame of the chart of
+    /// Computes the velocity `θ(x) v` of a tangent vector with the components `v` in the frame of the chart of
     /// `x`: linear in `v`, and one to one.
     fn embed<D: Scalar>(x: &ChartPoint<Self, D>, v: &Vector<Self, D>) -> Velocity<Self, D>;
 
-    /// The matrix `θᵀ A θ` of a bilinear form on velocities, in the frame of the chart.
+    /// Computes the matrix `θᵀ A θ` of a bilinear form on velocities, in the frame of the chart.
     fn covariant<D: Scalar>(x: &ChartPoint<Self, D>, a: &Form<Self, D>) -> Matrix<Self, D> {
         let theta = frame(x);
         let image = Self::Dim::array(|j| *a * theta[j]);
         Matrix::<Self, D>::from_entries(|i, j| theta[i].dot(&image[j]))
     }
 
-    /// The same with its first derivatives along the chart, at the real coordinates `q` of the chart at
+    /// Computes the same matrix with its first derivatives along the chart, at the real coordinates `q` of the chart at
     /// `x`, from the form `a(i, j)` at `φ_x(q + ε₁ e_i + ε₂ e_j)`.
     fn covariant_jet(
         x: &Self::Point<f64>,
@@ -93,7 +93,7 @@ pub trait Space: Clone + Debug + PartialEq + Send + Sync + 'static {
         })
     }
 
-    /// The matrix `θ⁺ A θ⁺ᵀ` of a bilinear form on covectors dual to velocities, in the frame of the
+    /// Computes the matrix `θ⁺ A θ⁺ᵀ` of a bilinear form on covectors dual to velocities, in the frame of the
     /// chart, with `θ⁺ = (θᵀθ)⁻¹θᵀ`; `None` at the edge of the chart, where it has no frame.
     fn contravariant<D: Scalar>(
         x: &ChartPoint<Self, D>,
@@ -115,9 +115,9 @@ pub trait Space: Clone + Debug + PartialEq + Send + Sync + 'static {
         Some(Matrix::<Self, D>::from_entries(|i, j| dual[i].dot(&image[j])))
     }
 
-    /// Whether the point with coordinates `q` is well inside the chart, less than half the way to its
-    /// edge; always, for a chart of the whole space. Curves that are followed over long distances
-    /// change to another chart in time, and a logarithm is not looked for beyond twice as far.
+    /// Returns whether the point with coordinates `q` is less than half the way to the edge of the chart. A
+    /// chart of the whole space has no edge. Long curves change to another chart before the edge, and a logarithm
+    /// is not looked for beyond twice this distance.
     #[inline]
     fn is_near(_q: &Vector<Self>) -> bool {
         true
@@ -125,8 +125,8 @@ pub trait Space: Clone + Debug + PartialEq + Send + Sync + 'static {
 }
 
 /// The derivatives of a symmetric form in the frame of a chart by the product rule,
-/// `∂_k(θᵀAθ) = θᵀ(∂_kA)θ + B + Bᵀ` with `B = (∂_kθ)ᵀ A θ`, in real numbers alone: the faster
-/// [`Space::covariant_jet`] of a space whose `theta(k)` is `θ` with its derivative along the `k`-th
+/// `∂_k(θᵀAθ) = θᵀ(∂_kA)θ + B + Bᵀ` with `B = (∂_kθ)ᵀ A θ`, in real numbers: a faster
+/// [`Space::covariant_jet`] for a space whose `theta(k)` is `θ` with its derivative along the `k`-th
 /// direction of the chart.
 #[inline]
 pub fn product_rule<M, const A: usize, const N: usize>(
@@ -181,19 +181,19 @@ pub struct ChartPoint<M: Space, D: Scalar = f64> {
 }
 
 impl<M: Space, D: Scalar> ChartPoint<M, D> {
-    /// The centre of its own chart, `q = 0`.
+    /// Makes the centre of the chart at `x`, `q = 0`.
     pub fn centre(x: &M::Point<f64>) -> Self {
         Self { base: x.clone(), q: Vector::<M, D>::zero() }
     }
 
-    /// A point in the chart centred at its own real part.
+    /// Makes a point in the chart centred at its real part.
     pub fn around(x: &M::Point<D>) -> Self {
         let base = M::real(x);
         let q = M::coordinates(&base, x);
         Self { base, q }
     }
 
-    /// The point `φ_x(q)` itself.
+    /// Computes the point `φ_x(q)`.
     pub fn point(&self) -> M::Point<D> {
         M::chart(&self.base, &self.q)
     }

@@ -24,7 +24,7 @@
 //! ```
 //!
 //! `|τ| = O(h³)`, so the order is 2. The balance is kept as a sum `ℓ` in space, to which each step adds
-//! `R_k (cay(hw) p_{k+1} − p_k)`, what the dissipation has done, and `R_{k+1} p_{k+1}` is dg_v to `ℓ`: the
+//! `R_k (cay(hw) p_{k+1} − p_k)`, what the dissipation has done, and `R_{k+1} p_{k+1}` is turned to `ℓ`: the
 //! rounding of the rotations does not add up to a drift.
 //!
 //! Of a free body `R p` is constant to round-off, and `τ = 0` for one that spins about a principal axis.
@@ -40,8 +40,8 @@ use metriplectic_manifolds::{
 };
 use nalgebra::{Matrix3, Vector3};
 
-use crate::discrete_gradient::{Segment, StableGradient};
-use crate::trajectory::{State, Trajectory};
+use crate::round_off::stable_gradient::{Segment, StableGradient};
+use crate::run::trajectory::{State, Trajectory};
 
 /// The attitude `R(t)` of a body, a rotation from its frame to space, along a run on so(3)*; see the
 /// [module](mod@crate::attitude).
@@ -147,9 +147,9 @@ impl<'a, Y: Metriplectic<Manifold = LieDual<3>>> Attitude<'a, Y> {
         let nodes = WeylMidpoint.along(&Canonical, x, &d)?;
         let df = energy.jet1(&z).df;
         let (segment, values) = (Segment::new(&d, &next.point), [self.state.energy, next.energy]);
-        let chord = StableGradient::new(energy, &df, &segment, values, || df.dot(&d), || nodes);
+        let stable = StableGradient::new(energy, &df, &segment, values, || df.dot(&d), || nodes);
         let g = self.system.metric().at(&ChartPoint::<LieDual<3>>::centre(&z))?;
-        Ok(chord.covector(0.0, &g, &d))
+        Ok(stable.covector(0.0, &g, &d))
     }
 }
 

@@ -23,6 +23,11 @@ impl fmt::Display for Digits {
     }
 }
 
+/// A number with its noun.
+pub(crate) fn counted(n: usize, one: &str, many: &str) -> String {
+    format!("{n} {}", if n == 1 { one } else { many })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -20,12 +20,10 @@
 mod gonzalez;
 mod itoh_abe;
 mod mean_value;
-mod stable_gradient;
 
 pub use gonzalez::Gonzalez;
 pub use itoh_abe::{ItohAbe, SymmetricItohAbe};
 pub use mean_value::MeanValue;
-pub use stable_gradient::{Segment, StableGradient};
 
 use std::fmt::Debug;
 
@@ -34,6 +32,8 @@ use metriplectic_manifolds::{
     InnerProduct, Manifold, MetricError, Retraction, Riemannian, StepPath, StepPathJet,
 };
 use num_dual::Dual64;
+
+use crate::round_off::stable_gradient::{Segment, StableGradient};
 
 /// A discrete gradient on a manifold (Bloch, Farré Puiggalí, Martín de Diego 2024, eq. "discGrad-m",
 /// with the missing step size restored): a covector `w` at the base `z` of a path from `x` to `x'`
@@ -127,9 +127,9 @@ where
     let values = [f.at(x), f.at(&path.end)];
     let nodes = retraction.along(metric, x, u)?;
     let base = || gradient.slope_at_base(f, &path.z.base, &path.d, &mean);
-    let chord =
+    let stable =
         StableGradient::new(f, &mean, &Segment::new(&path.d, &path.end), values, base, || nodes);
-    Ok(chord.covector(0.0, &g, &path.d))
+    Ok(stable.covector(0.0, &g, &path.d))
 }
 
 /// The definition of [`DiscreteGradient::mean_jet`]: one dual number for each direction.

@@ -6,13 +6,12 @@ use metriplectic_fields::{
 };
 use metriplectic_manifolds::{Manifold, Retraction, Riemannian, StepPath};
 
-use crate::certificate::round_off;
 use crate::discrete_gradient::{DiscreteGradient, along as along_path};
-use crate::residual::DriftCorrection;
-use crate::residual::{Dim, size_of_terms};
-use crate::span::Schedule;
-use crate::step::{Memory, Scheme, Start};
-use crate::trajectory::{State, entropy_round_off};
+use crate::method::{Element, Flow, Method, StateSpace as _, StepStart};
+use crate::midpoint::{Dim, MidpointMemory, Scheme};
+use crate::round_off::bound::{of_a_law, of_an_increment, size_of_terms};
+use crate::run::span::{Schedule, Span};
+use crate::run::trajectory::State;
 
 /// Checks a discrete gradient of `f` on the path of `u` from `x`:
 ///
@@ -90,11 +89,11 @@ where
     let end = one(scheme, system, x, h)?;
     let energy = system.energy_at(x);
     let sizes = [x, &end].map(|x| size_of_terms::<Y::Manifold>(system.energy(), x));
-    let bound = round_off(sizes[0].max(sizes[1]));
+    let bound = of_a_law(sizes[0].max(sizes[1]));
     BrokenLaw::unless("a step keeps the energy", (system.energy_at(&end) - energy).abs(), bound)?;
     if system.second_law() == SecondLaw::Exact && h > 0.0 {
         let entropy = system.entropy_at(x);
-        let bound = entropy_round_off(system, [x, &end]);
+        let bound = of_an_increment(system, [x, &end]);
         let fall = entropy - system.entropy_at(&end);
         BrokenLaw::unless("a step does not lower the entropy", fall, bound)?;
     }
@@ -129,6 +128,56 @@ where
         BrokenLaw::unless("steps of h and −h lead back", q[i].abs(), bound)?;
     }
     Ok(())
+}
+
+/// Checks a method from `x` in steps of size `h`: 1. its [order](Method::order) is the slope of its error, from
+/// runs of 32 steps and of twice and four times as many; 2. what it [promises](Method::promises) holds on these
+/// steps; 3. a run that is resumed from a checkpoint is the same run, bit for bit.
+///
+/// # Errors
+///
+/// The first law that is broken, or a run that ends in an error.
+pub fn method<F: Flow, M: Method<F> + Clone>(
+    method: M,
+    flow: &F,
+    x: &Element<F>,
+    h: f64,
+) -> Result<(), BrokenLaw> {
+    let failed = || BrokenLaw { law: "a run ends without an error", size: 1.0, bound: 0.0 };
+    let run = |refined: u32| {
+        let span = Span::steps(h / f64::from(refined), 32 * refined as usize);
+        method.clone().run(flow, x.clone(), span).map_err(|_| failed())
+    };
+    let runs = [run(1)?, run(2)?, run(4)?];
+    for run in &runs {
+        let (certificate, promises) = (run.certificate(), method.promises(flow));
+        let broken = [
+            ("the promised energy is conserved", promises.energy && !certificate.keeps_energy()),
+            ("the promised entropy never falls", promises.entropy && !certificate.keeps_entropy()),
+        ];
+        for (law, broken) in broken {
+            BrokenLaw::unless(law, f64::from(u8::from(broken)), 0.0)?;
+        }
+    }
+    let [a, b, c] = runs.map(|run| F::Space::numbers(&run.last().point));
+    let distance =
+        |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt();
+    let slope = (distance(&a, &b) / distance(&b, &c)).log2();
+    let off = (slope - f64::from(method.order())).abs();
+    BrokenLaw::unless("the order of a method is the slope of its error", off, 0.25)?;
+
+    let span = Span::steps(h, 16);
+    let mut steps = method.clone().steps(flow, x.clone(), span).map_err(|_| failed())?;
+    for _ in 0..8 {
+        steps.advance().map_err(|_| failed())?;
+    }
+    let resumed = method.resume(flow, &steps.checkpoint()).map_err(|_| failed())?;
+    let ends = [steps.run(), resumed.run()].map(|run| run.map_err(|_| failed()));
+    let [Ok(whole), Ok(resumed)] = ends else { return Err(failed()) };
+    let bits =
+        |x: &Element<F>| F::Space::numbers(x).into_iter().map(f64::to_bits).collect::<Vec<_>>();
+    let differs = bits(&whole.last().point) != bits(&resumed.last().point);
+    BrokenLaw::unless("a resumed run is the same run", f64::from(u8::from(differs)), 0.0)
 }
 
 /// The same system in other units: the numbers of its entries, times, energies and entropies are
@@ -179,7 +228,7 @@ where
         (Err(_), _) | (_, Err(_)) => return failed(()),
     };
     let (c, d) = (a.certificate(), b.certificate());
-    let counts = [c.steps.abs_diff(d.steps), c.iterations.abs_diff(d.iterations)];
+    let counts = [c.steps.abs_diff(d.steps), c.effort.iterations.abs_diff(d.effort.iterations)];
     let counted = if tolerance > 0.0 { counts[0] } else { counts[0] + counts[1] };
     BrokenLaw::unless("as many steps and iterations", counted as f64, 0.0)?;
     let numbers = |state: &State<Y::Manifold>| {
@@ -224,12 +273,9 @@ where
     R: Retraction<Y::Manifold, Y::Metric>,
     W: DiscreteGradient,
 {
-    let accumulated_error = DriftCorrection::nothing();
-    let [energy, entropy] = [system.energy_at(x), system.entropy_at(x)];
-    let invariants = accumulated_error.invariants;
-    let start = Start { x, time: 0.0, h, energy, entropy, invariants, accumulated_error };
     let missing = |_| BrokenLaw { law: "the step exists", size: f64::NAN, bound: 0.0 };
-    scheme.step(system, &start, &mut Memory::new()).map(|(end, _)| end).map_err(missing)
+    let (start, mut memory) = (StepStart::first(system, x), MidpointMemory::default());
+    scheme.step(system, &start, h, &mut memory).map(|taken| taken.x).map_err(missing)
 }
 
 #[cfg(test)]

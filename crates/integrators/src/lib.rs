@@ -1,64 +1,55 @@
 //! How a metriplectic system moves in discrete time, with the first law kept to round-off.
 //!
-//! | module | what it holds |
-//! |---|---|
-//! | [`discrete_gradient`] | [`DiscreteGradient`]: [`Gonzalez`], [`MeanValue`], [`ItohAbe`], [`SymmetricItohAbe`], safe against round-off |
-//! | [`residual`] | the implicit equation of one step, and its Jacobian |
-//! | [`root_finder`] | [`RootFinder`]: what solves an equation |
-//! | [`newton`] | [`Newton`]: the solver of every step |
-//! | `globaliser` | L-BFGS from argmin, which brings a lost Newton back (feature `argmin`) |
-//! | [`span`](mod@span) | [`Span`]: step size, number of steps, what is recorded |
-//! | [`adaptive`] | [`Until`]: steps of a size that follows the motion, and the estimate of their error |
-//! | `scales` | the sizes of the entries in the course of a run, which their errors are relative to |
-//! | [`step`] | [`Scheme`] and one step of it |
-//! | [`trajectory`] | [`Steps`], the endless iterator, and [`Trajectory`], the record |
-//! | [`observables`] | [`Observables`]: named numbers of a state, streamed to CSV or NPY |
-//! | [`checkpoint`] | [`Checkpoint`]: a run that is put down and taken up again, bit for bit |
-//! | [`attitude`] | [`Attitude`]: where a body points along a run of its angular momentum |
-//! | [`certificate`] | [`Certificate`]: what a run did to its laws |
-//! | [`error`](mod@error) | [`Error`], [`RunError`], [`StepError`] |
-//! | [`laws`] | what a step promises, and the function that checks it |
+//! | module | what it holds | knows |
+//! |---|---|---|
+//! | [`step_error`] | [`StepError`]: what can go wrong in a step | |
+//! | [`run`] | [`Span`], [`Until`], [`Steps`], [`Trajectory`], [`Certificate`], [`Checkpoint`], [`Observables`]: what a user does with a run of any method | [`method`] |
+//! | [`method`] | [`Flow`] and [`Method`]: what a run knows of a system and of a method | |
+//! | [`newton`] | [`Newton`]: the solver of every implicit step | |
+//! | [`discrete_gradient`] | [`DiscreteGradient`]: [`Gonzalez`], [`MeanValue`], [`ItohAbe`], [`SymmetricItohAbe`] | |
+//! | [`round_off`] | covectors, laws and positions that are safe against round-off | |
+//! | [`midpoint`] | [`Scheme`]: the method of the paper, its equation and its fallbacks | [`newton`], [`discrete_gradient`], [`round_off`] |
+//! | [`attitude`] | [`Attitude`]: where a body points along a run of its angular momentum | [`run`] |
+//! | [`laws`] | what a step and a method promise, and the functions that check it | |
+//! | [`error`](mod@error) | [`Error`], [`RunError`] | |
 //!
 //! # What a later version may add
 //!
-//! Results are `#[non_exhaustive]`: [`Certificate`], [`InvariantBalance`], [`State`], [`Attempts`], [`Effort`], and the report of a
+//! Results are `#[non_exhaustive]`: [`Certificate`], [`InvariantBalance`], [`State`], [`Effort`], [`Evidence`], and the report of a
 //! model. A later version may add a field to them; a pattern ends in `..`, and a changed copy is a clone whose
 //! fields are assigned. So are errors and the other enums that may grow. Options are not, because
 //! `Newton { iterations: 50, ..Newton::default() }` and `Scheme { splits: 4, ..Scheme::new(WeylMidpoint) }` are
 //! how they are written: write the last part, and a new option has its default. What you pass to an equation
 //! or return from one ([`Linearised`], [`Root`], [`Iterate`]) has all of its fields.
 
-pub mod adaptive;
 pub mod attitude;
-pub mod certificate;
-pub mod checkpoint;
 mod digits;
 pub mod discrete_gradient;
 pub mod error;
-#[cfg(feature = "argmin")]
-mod globaliser;
 pub mod laws;
+pub mod method;
+pub mod midpoint;
 pub mod newton;
-pub mod observables;
-pub mod residual;
-pub mod root_finder;
-mod scales;
-pub mod span;
-pub mod step;
-pub mod trajectory;
+pub mod round_off;
+pub mod run;
+pub mod step_error;
 
-pub use adaptive::Until;
 pub use attitude::{Attitude, AttitudeError};
-pub use certificate::{Certificate, InvariantBalance};
-pub use checkpoint::{Checkpoint, ResumeError};
-pub use discrete_gradient::{
-    DiscreteGradient, Gonzalez, ItohAbe, MeanValue, StableGradient, SymmetricItohAbe,
+pub use discrete_gradient::{DiscreteGradient, Gonzalez, ItohAbe, MeanValue, SymmetricItohAbe};
+pub use error::{Error, RunError};
+pub use method::{
+    Components, Effort, Element, Evidence, Flow, Laws, Memory, Method, Promises, Refusal,
+    StateSpace, StepStart, Taken, Vector,
 };
-pub use error::{Attempts, Error, RunError, StepError};
-pub use newton::Newton;
-pub use observables::{Csv, Npy, Observables, TableError};
-pub use residual::Residual;
-pub use root_finder::{Equation, Iterate, Linearised, Root, RootFinder, Rounding};
-pub use span::{Schedule, Span, SpanError};
-pub use step::{Effort, Scheme};
-pub use trajectory::{Ending, Run, State, Steps, Trajectory};
+pub use midpoint::{Residual, Run, Scheme};
+pub use newton::{Equation, Iterate, Linearised, Newton, Root, Rounding};
+pub use round_off::stable_gradient::StableGradient;
+pub use run::certificate::{Certificate, InvariantBalance};
+pub use run::checkpoint::{Checkpoint, ResumeError, Saved};
+pub use run::controller::Until;
+pub use run::observables::{Csv, Npy, Observables, TableError};
+pub use run::scales::Scales;
+pub use run::span::{Schedule, Span, SpanError};
+pub use run::steps::Steps;
+pub use run::trajectory::{Ending, State, Trajectory};
+pub use step_error::StepError;

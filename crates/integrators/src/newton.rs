@@ -1,8 +1,10 @@
 //! Newton's method, down to the round-off of each component.
 
+mod equation;
+
 use metriplectic_fields::{Column, Dimension, Space, Square, Vector};
 
-use crate::root_finder::{Equation, Iterate, Linearised, Root, RootFinder, Rounding};
+pub use equation::{Equation, Evaluated, Iterate, Linearised, Root, Rounding, Stiffness};
 
 /// Newton's method, damped, down to round-off.
 ///
@@ -47,12 +49,6 @@ impl Default for Newton {
     }
 }
 
-impl<M: Space> RootFinder<M> for Newton {
-    fn solve(&self, equation: &impl Equation<M>, guess: &Vector<M>) -> Result<Root<M>, Iterate<M>> {
-        self.solve_near(equation, guess, &mut None)
-    }
-}
-
 /// The inverse of a Jacobian, kept up to date by Broyden's rank-one corrections, and what it makes of
 /// the round-off of the equation.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -61,19 +57,23 @@ pub(crate) struct Inverse<N: Dimension> {
     /// The round-off `|J⁻¹| r + |J⁻¹G| η + |1 − J⁻¹| ξ` of the solution, where the Jacobian was formed.
     pub(crate) round_off: N::Vector<f64>,
     /// The norm of the round-off of the residual, where the Jacobian was formed.
-    pub(crate) floor: f64,
+    pub(crate) residual_bound: f64,
     /// The fraction of a residual that the first correction by a kept inverse has left of late.
     pub(crate) contraction: f64,
     /// The residual of the guess in the last step, in units of its round-off.
     pub(crate) first: f64,
+    /// The rate of the friction where the Jacobian was formed.
+    pub(crate) friction: f64,
+    /// Equations that it has solved since the one whose Jacobian it is.
+    pub(crate) age: u32,
 }
 
 impl<N: Dimension> Inverse<N> {
-    fn of<M: Space<Dim = N>>(
-        jacobian: &N::Matrix<f64>,
-        Rounding { terms, gain, noise, argument }: &Rounding<M>,
-        floor: f64,
+    fn of<M: Space<Dim = N>, E>(
+        Linearised { jacobian, rounding, stiffness, .. }: &Linearised<M, E>,
+        residual_bound: f64,
     ) -> Option<Self> {
+        let Rounding { terms, sensitivity, covector, argument } = rounding;
         let matrix = jacobian.inverse()?;
         // In mixed units only the diagonal of J⁻¹J has none, and tells whether the inverse has digits.
         let digits = |i| {
@@ -87,10 +87,19 @@ impl<N: Dimension> Inverse<N> {
         let moved = (N::Matrix::<f64>::one() - matrix).abs();
         // A point and its compensation have twice the digits: smaller displacements move nothing.
         let round_off = matrix.abs() * *terms
-            + (matrix * *gain).abs() * *noise
+            + (matrix * *sensitivity).abs() * *covector
             + moved * *argument
             + *argument * f64::EPSILON;
-        Some(Self { matrix, round_off, floor, contraction: 0.0, first: 0.0 })
+        let Stiffness { friction, .. } = *stiffness;
+        Some(Self {
+            matrix,
+            round_off,
+            residual_bound,
+            contraction: 0.0,
+            first: 0.0,
+            friction,
+            age: 0,
+        })
     }
 
     /// Whether three corrections of the next guess are expected to be enough, the last one unchecked.
@@ -172,17 +181,19 @@ const SURE: f64 = 0.01;
 const NEAR: f64 = 10.0;
 
 /// Where a Jacobian is first used.
-struct Start<M: Space> {
+struct Start<M: Space, E> {
     residual: Vector<M>,
+    evidence: E,
     /// The norm at which a stagnating residual counts as solved: zero where the Jacobian is not that of
     /// the equation itself, because its stagnation does not prove that round-off was reached.
     stalled: f64,
 }
 
 /// How far one Jacobian has brought the iteration.
-enum Progress<M: Space> {
-    /// The correction is round-off, of this size in each component of the solution.
-    Solved(Vector<M>),
+enum Progress<M: Space, E> {
+    /// The correction is round-off, of this size in each component of the solution; with what the last
+    /// evaluation told.
+    Solved((Vector<M>, E)),
     /// It falls too slowly for this Jacobian.
     Slow,
     /// It does not fall.
@@ -190,25 +201,41 @@ enum Progress<M: Space> {
 }
 
 impl Newton {
+    /// A root near the guess.
+    ///
+    /// # Errors
+    ///
+    /// [`Iterate`] with the best point found.
+    pub fn solve<M: Space, Q: Equation<M>>(
+        &self,
+        equation: &Q,
+        guess: &Vector<M>,
+    ) -> Result<Root<M, Q::Evidence>, Iterate<M>> {
+        self.solve_near(equation, guess, &mut None)
+    }
+
     /// A root near the guess, first with the inverse of the Jacobian of an equation near by; the
     /// inverse that solved the equation is left in its place.
     #[inline]
-    pub(crate) fn solve_near<M: Space>(
+    pub(crate) fn solve_near<M: Space, Q: Equation<M>>(
         &self,
-        equation: &impl Equation<M>,
+        equation: &Q,
         guess: &Vector<M>,
         known: &mut Option<Inverse<M::Dim>>,
-    ) -> Result<Root<M>, Iterate<M>> {
+    ) -> Result<Root<M, Q::Evidence>, Iterate<M>> {
         let mut best = Iterate { best: *guess, residual: f64::INFINITY, iterations: 0 };
         let mut history = None;
         if let Some(inverse) = known {
             if inverse.serves()
-                && let Some(residual) = equation.value(guess)
+                && let Some(Evaluated { residual, evidence }) = equation.evaluate(guess)
             {
                 best.residual = residual.magnitude();
-                let here = Start { residual, stalled: 0.0 };
-                if let Progress::Solved(noise) = self.correct(equation, &here, inverse, &mut best) {
-                    return Ok(best.solved(noise, inverse.floor / NORM));
+                let here = Start { residual, evidence, stalled: 0.0 };
+                if let Progress::Solved(solution) =
+                    self.correct(equation, &here, inverse, &mut best)
+                {
+                    inverse.age += 1;
+                    return Ok(best.solved(solution, inverse.residual_bound / NORM));
                 }
                 history = Some((inverse.contraction, Some(inverse.first)));
             } else {
@@ -227,31 +254,31 @@ impl Newton {
 
     /// A root near the best point so far, with Jacobians of the equation itself.
     #[cold]
-    fn solve_afresh<M: Space>(
+    fn solve_afresh<M: Space, Q: Equation<M>>(
         &self,
-        equation: &impl Equation<M>,
+        equation: &Q,
         mut best: Iterate<M>,
         known: &mut Option<Inverse<M::Dim>>,
-    ) -> Result<Root<M>, Iterate<M>> {
+    ) -> Result<Root<M, Q::Evidence>, Iterate<M>> {
         let mut first = None;
-        while let Some(Linearised { residual, jacobian, rounding }) = equation.linearise(&best.best)
-        {
+        while let Some(at) = equation.linearise(&best.best) {
+            let Linearised { residual, evidence, .. } = at;
             best.residual = residual.magnitude();
-            let bounds = rounding.bounds(&jacobian) + best.best.abs() * f64::EPSILON;
-            let floor = bounds.magnitude();
-            let stalled = self.stall * floor;
-            let Some(mut inverse) = Inverse::of(&jacobian, &rounding, NORM * floor) else {
+            let bounds = at.rounding.bounds(&at.jacobian) + best.best.abs() * f64::EPSILON;
+            let residual_bound = bounds.magnitude();
+            let stalled = self.stall * residual_bound;
+            let Some(mut inverse) = Inverse::of(&at, NORM * residual_bound) else {
                 // The equation does not determine a solution here, however small the residual is.
                 break;
             };
-            let here = Start { residual, stalled };
+            let here = Start { residual, evidence, stalled };
             let progress = self.correct(equation, &here, &mut inverse, &mut best);
             inverse.first = *first.get_or_insert(inverse.first);
             match progress {
-                Progress::Solved(noise) => {
+                Progress::Solved(solution) => {
                     inverse.contraction = 0.0;
                     *known = Some(inverse);
-                    return Ok(best.solved(noise, floor));
+                    return Ok(best.solved(solution, residual_bound));
                 }
                 Progress::Slow if best.iterations < self.iterations => {}
                 Progress::Slow | Progress::Stuck => break,
@@ -262,47 +289,48 @@ impl Newton {
 
     /// Corrects the best point with one Jacobian as long as the residual falls fast.
     #[inline]
-    fn correct<M: Space>(
+    fn correct<M: Space, Q: Equation<M>>(
         &self,
-        equation: &impl Equation<M>,
-        here: &Start<M>,
+        equation: &Q,
+        here: &Start<M, Q::Evidence>,
         inverse: &mut Inverse<M::Dim>,
         best: &mut Iterate<M>,
-    ) -> Progress<M> {
+    ) -> Progress<M, Q::Evidence> {
         let round_off = inverse.round_off(&best.best);
         let measure = Measure::<M::Dim>::new(&round_off);
-        let solved = || Progress::Solved(round_off);
-        let (floor, most) = (self.tolerance * inverse.floor, self.tolerance);
+        let solved = |evidence| Progress::Solved((round_off, evidence));
+        let (residual_bound, most) = (self.tolerance * inverse.residual_bound, self.tolerance);
         let own = here.stalled > 0.0;
-        let mut residual = here.residual;
+        let Start { mut residual, mut evidence, .. } = *here;
         let mut correction = inverse.times(&residual);
         let mut size = measure.of(&correction);
-        inverse.first = best.residual / inverse.floor;
+        inverse.first = best.residual / inverse.residual_bound;
         // Before a Jacobian has been seen to contract here, nothing is left to it: the frame may have
-        // dg_v since the last step, as that of a sphere does across its equator.
+        // turned since the last step, as that of a sphere does across its equator.
         let (mut contraction, mut expected) = (f64::INFINITY, 1.0);
         // Whether the equation's own Jacobian has had so little left to do that what remains is noise.
-        let mut settled = false;
+        let mut is_noise = false;
         for taken in 0_usize.. {
             // A displacement within its round-off is that of a state at rest.
             let enough = if measure.of(&best.best) <= 1.0 {
                 1.0
-            } else if settled {
+            } else if is_noise {
                 0.3
             } else {
                 0.1
             };
-            if best.residual <= enough * floor && size <= enough * most {
-                return solved();
+            if best.residual <= enough * residual_bound && size <= enough * most {
+                return solved(evidence);
             }
             best.iterations += 1;
-            let round = best.residual <= floor || contraction * best.residual <= SURE * floor;
+            let round = best.residual <= residual_bound
+                || contraction * best.residual <= SURE * residual_bound;
             if round && expected * size <= HIDDEN * most {
                 // What a slow contraction leaves below round-off has the same sign in each step; it costs
                 // one more solution to take it out.
                 best.best -= correction;
                 best.residual *= contraction.min(1.0);
-                return solved();
+                return solved(evidence);
             }
             let Some(next) = self.descend(equation, best, &correction, |value| {
                 measure.of(&inverse.times(value)) < 0.5 * size
@@ -310,39 +338,40 @@ impl Newton {
                 return if own && taken > 0 && size > self.stall {
                     // The Jacobian is no longer that of this point.
                     Progress::Slow
-                } else if best.residual <= if own { here.stalled } else { floor }
+                } else if best.residual <= if own { here.stalled } else { residual_bound }
                     && (own || size <= NEAR * most)
                 {
-                    solved()
+                    solved(evidence)
                 } else {
                     Progress::Stuck
                 };
             };
             let (before, size_before, step) = (best.residual, size, correction);
-            residual = next.value;
+            (residual, evidence) = (next.at.residual, next.at.evidence);
             (best.best, best.residual) = (next.u, residual.magnitude());
             correction = inverse.times(&residual);
             size = measure.of(&correction);
             (contraction, expected) = (best.residual / before, size / size_before);
-            settled = own && before <= NOISE * floor;
+            is_noise = own && before <= NOISE * residual_bound;
             if !own && taken == 0 {
                 inverse.contraction = contraction;
             }
             // The norm of the residual falls too slowly, or that of a component which the norm hides.
-            let slow = best.residual > f64::max(self.reuse * before, floor);
-            let hidden = best.residual <= floor && size > f64::max(self.reuse * size_before, most);
+            let slow = best.residual > f64::max(self.reuse * before, residual_bound);
+            let hidden =
+                best.residual <= residual_bound && size > f64::max(self.reuse * size_before, most);
             if slow || hidden {
                 let stagnates = best.residual > 0.5 * before && size > 0.5 * size_before;
                 if stagnates && best.residual <= here.stalled {
-                    return solved();
+                    return solved(evidence);
                 }
                 // Close to round-off it is the noise that is slow, not the Jacobian.
-                if best.residual > NEAR * floor || hidden && size > NEAR * most {
+                if best.residual > NEAR * residual_bound || hidden && size > NEAR * most {
                     return Progress::Slow;
                 }
             }
             // The change of a residual near its round-off is noise.
-            if before > NOISE * floor {
+            if before > NOISE * residual_bound {
                 let taken = step * -next.length;
                 let predicted = correction - step;
                 inverse.learn(&taken, &predicted);
@@ -350,7 +379,7 @@ impl Newton {
             }
             // Another equation's Jacobian gets two corrections, and the last one.
             let left = contraction.powi(if taken == 0 { 2 } else { 1 }) * best.residual;
-            if !own && best.residual > floor && left > SURE * floor {
+            if !own && best.residual > residual_bound && left > SURE * residual_bound {
                 return Progress::Slow;
             }
         }
@@ -360,21 +389,21 @@ impl Newton {
     /// The longest of the corrections `δ, δ/2, δ/4, …` that reduces the residual, or the whole one if it
     /// `contracts` all the same: in mixed units a component that is solved hides the others in the norm.
     #[inline]
-    fn descend<M: Space>(
+    fn descend<M: Space, Q: Equation<M>>(
         &self,
-        equation: &impl Equation<M>,
+        equation: &Q,
         best: &Iterate<M>,
         correction: &Vector<M>,
         contracts: impl Fn(&Vector<M>) -> bool,
-    ) -> Option<Descent<M>> {
+    ) -> Option<Descent<M, Q::Evidence>> {
         let mut length = 1.0;
         for halving in 0..=self.halvings {
             let u = best.best - *correction * length;
-            if let Some(value) = equation.value(&u)
-                && (value.magnitude() < best.residual * (1.0 - 1e-4 * length)
-                    || halving == 0 && contracts(&value))
+            if let Some(at) = equation.evaluate(&u)
+                && (at.residual.magnitude() < best.residual * (1.0 - 1e-4 * length)
+                    || halving == 0 && contracts(&at.residual))
             {
-                return Some(Descent { u, value, length });
+                return Some(Descent { u, at, length });
             }
             length *= 0.5;
         }
@@ -383,9 +412,9 @@ impl Newton {
 }
 
 /// A point with a smaller residual, and the fraction of the correction that led to it.
-struct Descent<M: Space> {
+struct Descent<M: Space, E> {
     u: Vector<M>,
-    value: Vector<M>,
+    at: Evaluated<M, E>,
     length: f64,
 }
 
@@ -399,22 +428,26 @@ mod tests {
     /// Round-off of the terms alone.
     fn rounding<M: Space>(terms: Vector<M>) -> Rounding<M> {
         let zero = Vector::<M>::zero();
-        Rounding { terms, gain: Matrix::<M>::zeros(), noise: zero, argument: zero }
+        Rounding { terms, sensitivity: Matrix::<M>::zeros(), covector: zero, argument: zero }
     }
 
     /// `x² + y² = 4`, `xy = 1`.
     struct CircleAndHyperbola;
 
     impl Equation<Euclidean<2>> for CircleAndHyperbola {
-        fn value(&self, u: &Vector2<f64>) -> Option<Vector2<f64>> {
-            self.linearise(u).map(|at| at.residual)
+        type Evidence = ();
+
+        fn evaluate(&self, u: &Vector2<f64>) -> Option<Evaluated<Euclidean<2>, ()>> {
+            self.linearise(u).map(|at| Evaluated { residual: at.residual, evidence: () })
         }
 
-        fn linearise(&self, u: &Vector2<f64>) -> Option<Linearised<Euclidean<2>>> {
+        fn linearise(&self, u: &Vector2<f64>) -> Option<Linearised<Euclidean<2>, ()>> {
             Some(Linearised {
                 residual: vector![u.norm_squared() - 4.0, u.x * u.y - 1.0],
                 jacobian: Matrix2::new(2.0 * u.x, 2.0 * u.y, u.y, u.x),
                 rounding: rounding(Vector2::repeat(8.0 * f64::EPSILON)),
+                stiffness: Stiffness::default(),
+                evidence: (),
             })
         }
     }
@@ -432,15 +465,18 @@ mod tests {
     struct Logarithm;
 
     impl Equation<Euclidean<1>> for Logarithm {
-        fn value(&self, u: &Vector1<f64>) -> Option<Vector1<f64>> {
-            self.linearise(u).map(|at| at.residual)
+        type Evidence = ();
+
+        fn evaluate(&self, u: &Vector1<f64>) -> Option<Evaluated<Euclidean<1>, ()>> {
+            self.linearise(u).map(|at| Evaluated { residual: at.residual, evidence: () })
         }
 
-        fn linearise(&self, u: &Vector1<f64>) -> Option<Linearised<Euclidean<1>>> {
+        fn linearise(&self, u: &Vector1<f64>) -> Option<Linearised<Euclidean<1>, ()>> {
             let residual = vector![u.x.ln() - 1.0];
             let jacobian = Matrix1::new(u.x.recip());
             let rounding = rounding(Vector1::new(4.0 * f64::EPSILON));
-            (u.x > 0.0).then_some(Linearised { residual, jacobian, rounding })
+            let (stiffness, evidence) = (Stiffness::default(), ());
+            (u.x > 0.0).then_some(Linearised { residual, jacobian, rounding, stiffness, evidence })
         }
     }
 
@@ -455,15 +491,19 @@ mod tests {
     struct NoRealRoot;
 
     impl Equation<Euclidean<1>> for NoRealRoot {
-        fn value(&self, u: &Vector1<f64>) -> Option<Vector1<f64>> {
-            self.linearise(u).map(|at| at.residual)
+        type Evidence = ();
+
+        fn evaluate(&self, u: &Vector1<f64>) -> Option<Evaluated<Euclidean<1>, ()>> {
+            self.linearise(u).map(|at| Evaluated { residual: at.residual, evidence: () })
         }
 
-        fn linearise(&self, u: &Vector1<f64>) -> Option<Linearised<Euclidean<1>>> {
+        fn linearise(&self, u: &Vector1<f64>) -> Option<Linearised<Euclidean<1>, ()>> {
             Some(Linearised {
                 residual: vector![u.x * u.x + 1.0],
                 jacobian: Matrix1::new(2.0 * u.x),
                 rounding: rounding(Vector1::new(f64::EPSILON)),
+                stiffness: Stiffness::default(),
+                evidence: (),
             })
         }
     }

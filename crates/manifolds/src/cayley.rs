@@ -5,7 +5,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::metric::{MetricError, stretched};
 use crate::retraction::jet_by_dual_numbers;
-use crate::rotations::{dexp_inverse, hat, orthogonal};
+use crate::rotation_vector::{dexp_inverse, hat, orthogonal};
 use crate::{Nodes, PointPair, Retraction, Riemannian, Rotations, StepPath, StepPathJet, Tangent};
 
 /// The symmetric Cayley retraction of SO(3), for any metric:
@@ -16,7 +16,8 @@ use crate::{Nodes, PointPair, Retraction, Riemannian, Rotations, StepPath, StepP
 /// = 1 + \frac{\hat a + \hat a^2/2}{1 + |a|^2/4} .
 /// ```
 ///
-/// Rational, of order 2, and exact in the energy like every other retraction (Cayley 1846; Bogfjellmo
+/// It is rational, has order 2, and conserves the energy exactly like every other retraction
+/// (Cayley 1846; Bogfjellmo
 /// and Marthinsen 2016 for its use in integrators). `cay(a)` turns by `2 atan(|a|/2)` about `a`, so the
 /// displacement of a step by the angle `θ` has the length `4 tan(θ/4)`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -29,7 +30,7 @@ fn cayley<D: Scalar>(a: &Vector3<D>) -> Matrix3<D> {
 }
 
 /// `R cay(a)`, orthogonal to round-off.
-fn dg_v<D: Scalar>(r: &Matrix3<D>, a: &Vector3<D>) -> Matrix3<D> {
+fn turned<D: Scalar>(r: &Matrix3<D>, a: &Vector3<D>) -> Matrix3<D> {
     orthogonal(&(r * cayley(a)))
 }
 
@@ -41,16 +42,16 @@ impl<G: Riemannian<Rotations>> Retraction<Rotations, G> for Cayley {
         u: &Vector3<D>,
     ) -> Result<StepPath<Rotations, D>, MetricError> {
         let half = u * D::from(0.5);
-        let middle = dg_v(&Rotations::constant(x), &half);
+        let middle = turned(&Rotations::constant(x), &half);
         let z = ChartPoint::<Rotations, D>::around(&middle);
         // The body velocity u in the frame of the chart at z.
         let d = dexp_inverse(&z.q) * u;
-        Ok(StepPath { z, d, end: dg_v(&middle, &half) })
+        Ok(StepPath { z, d, end: turned(&middle, &half) })
     }
 
     fn end(&self, _: &G, x: &Matrix3<f64>, u: &Vector3<f64>) -> Result<Matrix3<f64>, MetricError> {
         let half = u * 0.5;
-        Ok(dg_v(&dg_v(x, &half), &half))
+        Ok(turned(&turned(x, &half), &half))
     }
 
     fn along(
@@ -61,7 +62,7 @@ impl<G: Riemannian<Rotations>> Retraction<Rotations, G> for Cayley {
     ) -> Result<Nodes<Rotations>, MetricError> {
         Nodes::of(|t| {
             let half = stretched::<Rotations>(&(u * 0.5), t);
-            Ok(dg_v(&dg_v(&Rotations::constant(x), &half), &half))
+            Ok(turned(&turned(&Rotations::constant(x), &half), &half))
         })
     }
 
@@ -80,7 +81,7 @@ impl<G: Riemannian<Rotations>> Retraction<Rotations, G> for Cayley {
         tangent: &Tangent<Rotations>,
     ) -> Result<PointPair<Rotations>, MetricError> {
         let half = tangent.vector * 0.5;
-        Ok((dg_v(&tangent.base, &-half), dg_v(&tangent.base, &half)))
+        Ok((turned(&tangent.base, &-half), turned(&tangent.base, &half)))
     }
 
     /// `d = 4 tan(θ/4)` about the axis of `xᵀy`, and `z` half way.
@@ -91,7 +92,7 @@ impl<G: Riemannian<Rotations>> Retraction<Rotations, G> for Cayley {
         y: &Matrix3<f64>,
     ) -> Result<Tangent<Rotations>, MetricError> {
         let q = Rotations::coordinates(x, y);
-        crate::metric::within(std::f64::consts::PI, q.norm())?;
+        crate::metric_error::within(std::f64::consts::PI, q.norm())?;
         let theta = Column::magnitude(&q);
         let stretch = if theta > 0.0 { (0.25 * theta).tan() / (0.25 * theta) } else { 1.0 };
         Ok(Tangent { base: Rotations::chart(x, &(q * 0.5)), vector: q * stretch })

@@ -1,24 +1,23 @@
 //! An open chart of Rⁿ.
 //!
-//! Where one system of coordinates covers all states, they need not be embedded anywhere: the half plane
-//! with `g = 1/y²`, polar coordinates away from the pole, a shape space.
+//! If one system of coordinates covers all states, they need no embedding. Examples are the half plane with
+//! `g = 1/y²`, polar coordinates away from the pole, and a shape space.
 //!
 //! - **Point and velocity**: columns of `n` coordinates and their rates, on the open set
 //!   `{ x : domain(x) }`.
 //! - **Frame**: `∂/∂xⁱ`.
 //! - **Chart**: `φ_x(q) = x + q`.
 //! - **Geodesics** of the dot product and of constant matrices are straight lines. Those of a metric
-//!   `g(x)` [from a closure](crate::Metric::field) are straight in its own terms, with the Christoffel
-//!   symbols in the place of forces (do Carmo 1992, ch. 3; Lee 2018, ch. 4 and 5),
+//!   `g(x)` [from a closure](crate::Metric::field) satisfy an equation of motion with the Christoffel
+//!   symbols as forces (do Carmo 1992, ch. 3; Lee 2018, ch. 4 and 5),
 //!
 //! ```math
 //! \ddot x^k + \Gamma^k_{ij}\, \dot x^i \dot x^j = 0, \qquad
 //! \Gamma^k_{ij} = \tfrac12\, g^{kl} (\partial_i g_{lj} + \partial_j g_{li} - \partial_l g_{ij}) .
 //! ```
 //!
-//! They are the motions of a free particle with the energy `½ pᵀg⁻¹p`. That is how they are computed, by
-//! the Hamiltonian equations (Hairer, Lubich and Wanner 2006, §VI.1), which ask only for first derivatives
-//! of `g`,
+//! They are the motions of a free particle with the energy `½ pᵀg⁻¹p`. They are computed by its Hamiltonian
+//! equations (Hairer, Lubich and Wanner 2006, §VI.1), which need only first derivatives of `g`,
 //!
 //! ```math
 //! \dot x = g^{-1} p, \qquad
@@ -31,15 +30,15 @@
 //! were measured within 2·10⁻¹⁵ of the closed form and all within 2·10⁻¹³.
 //!
 //! - **Exponential and logarithm**: `exp_x(v) = γ(1)` for the geodesic with `γ(0) = x` and `γ'(0) = v`, and
-//!   `log_x(y)` is a `v` with `exp_x(v) = y`. It is found by shooting, Newton's method for `v` with the
-//!   derivative of the end from the equations of variation, aimed along the straight line; it is *a*
-//!   geodesic, and the shortest one for points that are near. The logarithms of the same 4000 ends were
-//!   all found, within 10⁻¹³.
-//! - **Domain**: asked of the points of a run, not of the way between two of them. A geodesic knows the
-//!   matrix `g` and no more: one that passes a hole of the domain where `g` is defined and positive
-//!   goes on, and a logarithm may lead through it. Write a hole that matters into the metric, as `1/y²`
-//!   writes the edge of the half plane.
-//! - **Brackets**: none unless one is asked for. With `√g` the density of the metric, `AreaForm` on a
+//!   `log_x(y)` is a `v` with `exp_x(v) = y`. Shooting finds it: Newton's method for `v`, with the
+//!   derivative of the end from the equations of variation, starts along the straight line. It is *a*
+//!   geodesic, and the shortest one for points that are near. It found the logarithms of the same 4000
+//!   ends within 10⁻¹³.
+//! - **Domain**: checked at the points of a run, not along the path between two points. A geodesic depends
+//!   on the matrix `g` alone. If `g` is defined and positive in a hole of the domain, a geodesic or a logarithm
+//!   may lead through the hole. To exclude a hole, let the metric diverge there, as `1/y²` does at the edge of
+//!   the half plane.
+//! - **Brackets**: none by default. With `√g` the density of the metric, `AreaForm` on a
 //!   2-chart and `Nambu` on a 3-chart,
 //!
 //! ```math
@@ -49,8 +48,8 @@
 //!
 //! the coordinates in the order of the orientation; or `Poisson::field`.
 //!
-//! Nothing keeps a state from the edge but the metric and the model: what ends outside is refused, and
-//! the step is taken in halves.
+//! Only the metric and the model keep a state from the edge. A run refuses a step that ends outside, and
+//! takes it in halves.
 
 use std::fmt;
 
@@ -61,11 +60,10 @@ use rand::{Rng, RngExt};
 use crate::euclidean::components_are_velocities;
 use crate::{Flat, Manifold, PointError};
 
-/// An open part of Rⁿ in coordinates of your own, to be given a metric of your own; see the
-/// [module](mod@crate::chart).
+/// An open part of Rⁿ, in coordinates and with a metric that you choose. See the [module](mod@crate::chart).
 ///
-/// The domain is a plain function or a closure without captures; a point outside of it is refused as
-/// the start of a run, and a step that ends there is taken in halves until it is given up.
+/// The domain is a plain function or a closure without captures. A run refuses a start outside it. A step that
+/// ends outside is taken in halves, until the run gives up.
 ///
 /// ```
 /// use metriplectic_manifolds::{Chart, Manifold};
@@ -80,7 +78,7 @@ pub struct Chart<const N: usize> {
 }
 
 impl<const N: usize> Chart<N> {
-    /// The chart whose points are those that `domain` accepts.
+    /// Makes the chart of the points that `domain` accepts.
     pub const fn new(domain: fn(&SVector<f64, N>) -> bool) -> Self {
         Self { domain }
     }
@@ -127,7 +125,7 @@ impl<const N: usize> Space for Chart<N> {
 }
 
 impl<const N: usize> Manifold for Chart<N> {
-    /// 0 inside the domain and infinite outside: how far off is not known.
+    /// Returns 0 inside the domain and infinity outside, where the distance is not known.
     fn defect(&self, x: &SVector<f64, N>) -> f64 {
         match x.is_finite() {
             true if (self.domain)(x) => 0.0,
@@ -154,14 +152,14 @@ impl<const N: usize> Manifold for Chart<N> {
         x.abs()
     }
 
-    /// The point itself: the nearest one of the domain is not known.
+    /// Returns the point itself, because the nearest point of the domain is not known.
     fn project(&self, x: &SVector<f64, N>) -> SVector<f64, N> {
         *x
     }
 
-    /// A point of the domain, by rejection: with entries in `−1 … 1`, or if a thousand of them are all
-    /// outside, in `−2 … 2`, and so on. A domain that is not met within `±10⁶` is too thin, and the
-    /// entries are not numbers, which [`check`](Manifold::check) finds.
+    /// Draws a point of the domain by rejection, with entries in `−1 … 1`. If a thousand points are all outside,
+    /// it continues in `−2 … 2`, and so on to `±10⁶`. If no point is found, the entries are NaN, which
+    /// [`check`](Manifold::check) finds.
     fn random(&self, rng: &mut impl Rng) -> SVector<f64, N> {
         for reach in (0..=20).map(|k| 2_f64.powi(k)) {
             for _ in 0..1000 {

@@ -4,10 +4,10 @@
 //! - **Frame**: the unit vectors, the same everywhere.
 //! - **Chart**: `φ_x(q) = x + q`.
 //! - **Geodesics** of the dot product and of every constant matrix are straight lines,
-//!   `exp_x(v) = x + v` and `log_x(y) = y − x`, each entry rounded once; what the addition has lost is
-//!   handed to the next step. A metric from a closure has the numerical ones of
+//!   `exp_x(v) = x + v` and `log_x(y) = y − x`, each entry rounded once. The next step compensates the rounding
+//!   error of the addition. A metric from a closure has the numerical geodesics of
 //!   [`field_metric`](mod@crate::field_metric).
-//! - **Brackets**: none unless one is asked for. `Symplectic` on R²ⁿ, `q' = ∂H/∂p` and `p' = −∂H/∂q`;
+//! - **Brackets**: none by default. `Symplectic` on R²ⁿ, `q' = ∂H/∂p` and `p' = −∂H/∂q`;
 //!   `Poisson::constant` for another skew matrix; `AreaForm` on R² and `Nambu` on R³,
 //!   `x' = ∇S × ∇H`; `Poisson::field` for a matrix that varies (Hairer, Lubich and Wanner 2006, §VII.2).
 
@@ -27,7 +27,7 @@ use crate::Manifold;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Euclidean<const N: usize>;
 
-/// A velocity is its components in the frame of the chart, the same everywhere.
+/// The velocity in a frame that is the same everywhere: its components.
 macro_rules! components_are_velocities {
     ($n:expr) => {
         #[inline]

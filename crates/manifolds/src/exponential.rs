@@ -12,8 +12,8 @@ use crate::{
 /// R_h(v_x) = \bigl(x,\ \exp_x(hv)\bigr).
 /// ```
 ///
-/// Schemes built on it have order 1; [`WeylMidpoint`](crate::WeylMidpoint) has order 2 at the same
-/// price.
+/// Schemes built on it have order 1. [`WeylMidpoint`](crate::WeylMidpoint) has order 2 at the same
+/// cost.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Exponential;
 
@@ -38,7 +38,7 @@ impl<M: Manifold, G: Riemannian<M>> Retraction<M, G> for Exponential {
         u: &Vector<M>,
     ) -> Result<StepPath<M>, MetricError> {
         // The midpoint path ends at the same point.
-        let StepPath { end, .. } = metric.weyl_arc(x, u)?;
+        let StepPath { end, .. } = metric.weyl_path(x, u)?;
         Ok(StepPath { z: ChartPoint::centre(x), d: *u, end })
     }
 

@@ -1,7 +1,7 @@
 //! Extrapolation of the modified midpoint rule (Gragg 1965, Bulirsch and Stoer 1966): an explicit
-//! method that finds its own order, for any state that can be added and compared.
+//! method of variable order, for any state that can be added and compared.
 
-/// What a solution is made of.
+/// A state of a solution.
 pub(crate) trait State: Copy {
     /// `self + other · h`.
     fn plus(&self, other: &Self, h: f64) -> Self;
@@ -18,16 +18,21 @@ pub(crate) const TOLERANCE: f64 = 1e-13;
 /// Substeps of the midpoint rule, before extrapolation.
 const SUBSTEPS: [u32; 8] = [2, 4, 6, 8, 10, 12, 14, 16];
 
+/// The start of a step, with the rate there, which is the same in every row.
+struct Start<'a, Y> {
+    state: &'a Y,
+    slope: &'a Y,
+}
+
 /// One row of the extrapolation: the midpoint rule with `n` substeps over `h`, smoothed by Gragg.
-/// `slope` is the rate at the start, the same in every row.
 fn midpoint_rule<Y: State>(
     rate: &impl Fn(&Y) -> Option<Y>,
-    (start, slope): (&Y, &Y),
+    Start { state: start, slope }: &Start<'_, Y>,
     h: f64,
     n: u32,
 ) -> Option<Y> {
     let step = h / f64::from(n);
-    let mut before = *start;
+    let mut before = **start;
     let mut here = start.plus(slope, step);
     for _ in 1..n {
         let next = before.plus(&rate(&here)?, 2.0 * step);
@@ -39,7 +44,7 @@ fn midpoint_rule<Y: State>(
     smooth.is_finite().then_some(smooth)
 }
 
-/// Where a step ends.
+/// The end of a step.
 pub(crate) struct End<Y> {
     /// The state there.
     pub(crate) state: Y,
@@ -54,11 +59,11 @@ const HOPELESS: f64 = 1e-9;
 
 /// One step of size `h`; `None` if it does not converge or leaves the domain of `rate`.
 pub(crate) fn step<Y: State>(rate: &impl Fn(&Y) -> Option<Y>, start: &Y, h: f64) -> Option<End<Y>> {
-    let slope = rate(start)?;
+    let start = &Start { state: start, slope: &rate(start)? };
     let mut table: [Option<Y>; SUBSTEPS.len()] = [None; SUBSTEPS.len()];
     for (row, &n) in SUBSTEPS.iter().enumerate() {
         // Aitken and Neville: the table of the row above is overwritten from the left.
-        let mut entry = midpoint_rule(rate, (start, &slope), h, n)?;
+        let mut entry = midpoint_rule(rate, start, h, n)?;
         let mut change = f64::INFINITY;
         let last = row.checked_sub(1).and_then(|above| table[above]);
         for column in 1..=row {

@@ -1,15 +1,16 @@
 //! A metric from a closure, with numerical geodesics.
 
-use std::cell::Cell;
 use std::fmt;
 
 use metriplectic_fields::{
-    ChartPoint, Column, Dimension, Matrix, MatrixField, Real, Scalar, Space, Square, Vector,
+    ChartPoint, Column, Dimension, Matrix, MatrixField, Real, Scalar, Square, Vector,
 };
 
-use crate::geodesic::{self, GeodesicJet};
-use crate::metric::{Factored, GeodesicEnd, MetricError, finite};
-use crate::{Manifold, Riemannian, StepPath, StepPathJet};
+use crate::chart_metric;
+use crate::geodesic;
+use crate::geodesic_jet::{self, GeodesicJet};
+use crate::metric::{Factored, GeodesicEnd, MetricError};
+use crate::{Manifold, Riemannian, StepPath, StepPathJet, shooting};
 
 /// A metric given as a matrix field; see [`Metric::field`](crate::Metric::field).
 #[derive(Clone, Copy)]
@@ -33,11 +34,11 @@ impl<M: Manifold, F: MatrixField<M>> Riemannian<M> for FieldMetric<F> {
     type At<D: Scalar> = Factored<M::Dim, D>;
 
     fn at<D: Scalar>(&self, x: &ChartPoint<M, D>) -> Result<Self::At<D>, MetricError> {
-        Factored::new(geodesic::metric(&self.field, x))
+        Factored::new(chart_metric::metric(&self.field, x))
     }
 
     fn matrix<D: Scalar>(&self, x: &ChartPoint<M, D>) -> Matrix<M, D> {
-        geodesic::metric(&self.field, x)
+        chart_metric::metric(&self.field, x)
     }
 
     fn exp<D: Scalar>(
@@ -49,11 +50,11 @@ impl<M: Manifold, F: MatrixField<M>> Riemannian<M> for FieldMetric<F> {
     }
 
     fn end(&self, x: &M::Point<f64>, v: &Vector<M>) -> Result<M::Point<f64>, MetricError> {
-        // With the very roundings of a step's path, whose energy a step has been solved for.
-        Ok(self.weyl_arc(x, v)?.end)
+        // A step is solved for the energy at the end of its path, so the end must have the same roundings.
+        Ok(self.weyl_path(x, v)?.end)
     }
 
-    fn weyl_arc(&self, x: &M::Point<f64>, d: &Vector<M>) -> Result<StepPath<M>, MetricError> {
+    fn weyl_path(&self, x: &M::Point<f64>, d: &Vector<M>) -> Result<StepPath<M>, MetricError> {
         let (z, velocity) =
             geodesic::follow_real(&self.field, x, &(*d * 0.5)).map_err(on_first_half)?;
         let (end, _) = geodesic::follow_real(&self.field, &z, &velocity).map_err(on_second_half)?;
@@ -74,7 +75,7 @@ impl<M: Manifold, F: MatrixField<M>> Riemannian<M> for FieldMetric<F> {
             (x.clone(), *v)
         };
         let bend = geodesic::acceleration(&self.field, &here, &velocity).ok_or_else(|| {
-            let g = geodesic::metric(&self.field, &ChartPoint::<M>::centre(&here));
+            let g = chart_metric::metric(&self.field, &ChartPoint::<M>::centre(&here));
             MetricError::stopped(t, &g).unwrap_or(MetricError::Edge { time: t })
         })?;
         let jet =
@@ -82,11 +83,11 @@ impl<M: Manifold, F: MatrixField<M>> Riemannian<M> for FieldMetric<F> {
         Ok(M::chart(&here, &jet))
     }
 
-    /// By shooting: *a* geodesic, since the cut locus of a closure is not known. A point that the chart
-    /// at the other one does not reach is refused ([`MetricError::OutOfChart`]): the antipode, and a
-    /// rotation half a turn away.
+    /// Finds *a* geodesic by shooting, because the cut locus of a closure is not known. It refuses a point that
+    /// the chart at the other point does not reach ([`MetricError::OutOfChart`]): the antipode, and a rotation
+    /// by half a turn.
     fn log(&self, x: &M::Point<f64>, y: &M::Point<f64>) -> Result<Vector<M>, MetricError> {
-        shoot(self, x, y)
+        shooting::log(self, &self.field, x, y)
     }
 
     fn weyl_jet(&self, x: &M::Point<f64>, d: &Vector<M>) -> Result<StepPathJet<M>, MetricError> {
@@ -96,10 +97,10 @@ impl<M: Manifold, F: MatrixField<M>> Riemannian<M> for FieldMetric<F> {
             dpoint: Matrix::<M>::zeros(),
             dvelocity: Matrix::<M>::one() * 0.5,
         };
-        let z = geodesic::follow_jet(&self.field, &half).map_err(on_first_half)?;
-        let end = geodesic::follow_jet(&self.field, &z).map_err(on_second_half)?;
-        // The path itself is the one without derivatives, with its roundings.
-        let path = self.weyl_arc(x, d)?;
+        let z = geodesic_jet::follow(&self.field, &half).map_err(on_first_half)?;
+        let end = geodesic_jet::follow(&self.field, &z).map_err(on_second_half)?;
+        // The path without derivatives, so that both have the same roundings.
+        let path = self.weyl_path(x, d)?;
         Ok(StepPathJet {
             z: path.z.base,
             dz: z.dpoint,
@@ -125,129 +126,6 @@ fn on_first_half(error: MetricError) -> MetricError {
 
 fn on_second_half(error: MetricError) -> MetricError {
     error.on_part(0.5, 0.5)
-}
-
-/// Geodesics that a logarithm may follow.
-const SHOTS: u32 = 500;
-/// Corrections that one shot of a logarithm may take.
-const CORRECTIONS: usize = 16;
-/// Halvings of a correction that comes no closer: none at first, while there is a better aim to be had.
-const EAGER: usize = 0;
-const PATIENT: usize = 6;
-/// Stages of the continuation of a logarithm, until it is given up.
-const STAGES: [u32; 3] = [4, 16, 64];
-
-/// The logarithm by shooting: Newton's method for `exp_x(v) = y`, aimed along the straight line of the
-/// chart. If it does not get there, the line is relaxed to a short path, which aims again; and then the
-/// end is moved from `x` to `y` in stages, each shot aimed by the one before.
-fn shoot<M: Manifold, F: MatrixField<M>>(
-    metric: &FieldMetric<F>,
-    x: &M::Point<f64>,
-    y: &M::Point<f64>,
-) -> Result<Vector<M>, MetricError> {
-    let shots = Cell::new(0);
-    let straight = line::<M>(x, y)?;
-    let aim = straight * stretch(metric, x, &straight);
-    let mut last = hit(metric, (x, y), &aim, EAGER, &shots);
-    #[cfg(feature = "argmin")]
-    if last.is_err()
-        && let Some(aim) = crate::path::aim(&metric.field, x, &straight)
-    {
-        last = hit(metric, (x, y), &aim, PATIENT, &shots).or(last);
-    }
-    for stages in STAGES {
-        if last.is_ok() || shots.get() >= SHOTS {
-            break;
-        }
-        let mut v = straight * f64::from(stages).recip();
-        last = (1..=stages).try_fold(v, |_, stage| {
-            let target = M::chart(x, &(straight * (f64::from(stage) / f64::from(stages))));
-            let grown = f64::from(stage) / f64::from((stage - 1).max(1));
-            v = hit(metric, (x, &target), &(v * grown), PATIENT, &shots)?;
-            Ok(v)
-        });
-    }
-    last
-}
-
-/// The straight line of the chart from `x` to `y`, if there is one and no other.
-///
-/// # Errors
-///
-/// [`MetricError::NotFinite`] if a point is not, and [`MetricError::OutOfChart`] at the edge of the
-/// chart, of which [`is_near`](Space::is_near) accepts the half: beyond it a line of other coordinates
-/// leads to the same point, as at half a turn on SO(3), and aims at another geodesic.
-fn line<M: Manifold>(x: &M::Point<f64>, y: &M::Point<f64>) -> Result<Vector<M>, MetricError> {
-    for entry in M::entries(x).into_iter().chain(M::entries(y)) {
-        finite("an entry of a point", entry)?;
-    }
-    let straight = M::coordinates(x, y);
-    // Half of it, and the rounding of half a turn.
-    if straight.is_finite() && M::is_near(&(straight * (0.5 + f64::EPSILON))) {
-        Ok(straight)
-    } else {
-        Err(MetricError::OutOfChart { distance: straight.magnitude() })
-    }
-}
-
-/// The length of the straight line of the chart, over that of its velocity at the start: where the
-/// metric changes much along the line, an aim with the length of the line is the better one.
-fn stretch<M: Space, G: Riemannian<M>>(metric: &G, x: &M::Point<f64>, line: &Vector<M>) -> f64 {
-    const PIECES: u32 = 16;
-    let speed = |t: f64| {
-        let at = ChartPoint::<M> { base: x.clone(), q: *line * t };
-        let g: Matrix<M> = metric.matrix(&at);
-        line.dot(&(g * *line)).sqrt()
-    };
-    let middles = (0..PIECES).map(|k| speed((f64::from(k) + 0.5) / f64::from(PIECES)));
-    let stretch = middles.sum::<f64>() / (f64::from(PIECES) * speed(0.0));
-    if stretch.is_finite() && stretch > 0.0 { stretch } else { 1.0 }
-}
-
-/// Newton's method for `exp_x(v) = y`, damped, from a first aim. The end is hit to the rounding of the
-/// coordinates of the chart.
-fn hit<M: Manifold, G: Riemannian<M>>(
-    metric: &G,
-    (x, y): (&M::Point<f64>, &M::Point<f64>),
-    aim: &Vector<M>,
-    halvings: usize,
-    shots: &Cell<u32>,
-) -> Result<Vector<M>, MetricError> {
-    let size = M::coordinates(x, y).magnitude();
-    let scales = M::scales(x);
-    let rounded = size + (0..M::Dim::LEN).map(|i| scales[i]).fold(0.0, f64::max);
-    let miss = |v: &Vector<M>| {
-        shots.set(shots.get() + 1);
-        if shots.get() > SHOTS {
-            return Err(MetricError::NoLogarithm { distance: size, missed_by: size });
-        }
-        let StepPathJet { end, dend, .. } = metric.weyl_jet(x, v)?;
-        Ok::<_, MetricError>((M::coordinates(&end, y), dend))
-    };
-    let mut v = *aim;
-    let (mut off, mut slope) = miss(&v)?;
-    for _ in 0..CORRECTIONS {
-        if off.magnitude() <= 4.0 * f64::EPSILON * rounded {
-            return Ok(v);
-        }
-        let missed = MetricError::NoLogarithm { distance: size, missed_by: off.magnitude() };
-        let correction = slope.solve(&off).ok_or(missed)?;
-        // A correction longer than the vector itself is not to be believed.
-        let mut length = (v.magnitude() / correction.magnitude()).min(1.0);
-        let closer = (0..=halvings).find_map(|_| {
-            let next = v + correction * length;
-            length *= 0.5;
-            let (off_next, slope_next) = miss(&next).ok()?;
-            (off_next.magnitude() < off.magnitude()).then_some((next, off_next, slope_next))
-        });
-        match closer {
-            Some(next) => (v, off, slope) = next,
-            // The geodesic itself is good to 1e-13: a stall there is the end.
-            None if off.magnitude() <= 1e-12 * rounded => return Ok(v),
-            None => return Err(missed),
-        }
-    }
-    Err(MetricError::NoLogarithm { distance: size, missed_by: off.magnitude() })
 }
 
 #[cfg(test)]
@@ -393,13 +271,13 @@ mod tests {
         // Half a turn has two straight lines, and which one is found would be a matter of rounding.
         let body = Metric::field(|_: &Matrix3<Real>| Matrix3::identity());
         let r = rotations::exp(&vector![0.3, -0.2, 0.5]);
-        let dg_v = |angle: f64| r * rotations::exp(&(vector![2.0, -1.0, 2.0] / 3.0 * angle));
-        let log = Riemannian::<Rotations>::log(&body, &r, &dg_v(PI));
+        let turned = |angle: f64| r * rotations::exp(&(vector![2.0, -1.0, 2.0] / 3.0 * angle));
+        let log = Riemannian::<Rotations>::log(&body, &r, &turned(PI));
         assert!(
             matches!(log, Err(MetricError::OutOfChart { distance }) if (distance - PI).abs() < 1e-14)
         );
-        assert!(Riemannian::<Rotations>::log(&Canonical, &r, &dg_v(PI)).is_err());
-        let log = Riemannian::<Rotations>::log(&body, &r, &dg_v(PI - 1e-9)).unwrap();
+        assert!(Riemannian::<Rotations>::log(&Canonical, &r, &turned(PI)).is_err());
+        let log = Riemannian::<Rotations>::log(&body, &r, &turned(PI - 1e-9)).unwrap();
         assert!((log.norm() - (PI - 1e-9)).abs() < 1e-12);
     }
 
@@ -443,7 +321,7 @@ mod tests {
         // In the first and in the second half of a path, and on the way to an inner point.
         let error = Riemannian::<Euclidean<2>>::weyl_jet(&slit, &x, &v).unwrap_err();
         assert!(matches!(error, MetricError::Edge { time } if reached(time)), "{error}");
-        let error = Riemannian::<Euclidean<2>>::weyl_arc(&slit, &x, &(v / 3.0)).unwrap_err();
+        let error = Riemannian::<Euclidean<2>>::weyl_path(&slit, &x, &(v / 3.0)).unwrap_err();
         assert!(matches!(error, MetricError::Edge { time } if reached(time / 3.0)), "{error}");
         let error = Riemannian::<Euclidean<2>>::along(&slit, &x, &v, 0.5).unwrap_err();
         assert!(matches!(error, MetricError::Edge { time } if reached(time)), "{error}");

@@ -3,7 +3,8 @@
 use metriplectic_fields::{ChartPoint, Dimension, Matrix, Real, Scalar, Space, Square, Vector};
 use nalgebra::{Const, SMatrix};
 
-use crate::metric::{Factored, GeodesicEnd, MetricError, finite_column, stretched};
+use crate::metric::{Factored, GeodesicEnd, MetricError, stretched};
+use crate::metric_error::finite_column;
 use crate::{Canonical, Riemannian, StepPath, StepPathJet};
 
 /// A manifold whose charts are global and linear: straight lines are the geodesics of every metric
@@ -40,7 +41,7 @@ macro_rules! straight_geodesics {
         }
 
         #[inline]
-        fn lost(&self, x: &M::Point<f64>, v: &Vector<M>, y: &M::Point<f64>) -> Vector<M> {
+        fn lost_digits(&self, x: &M::Point<f64>, v: &Vector<M>, y: &M::Point<f64>) -> Vector<M> {
             *v - M::coordinates(x, y)
         }
 
@@ -49,7 +50,7 @@ macro_rules! straight_geodesics {
         }
 
         #[inline]
-        fn weyl_arc(&self, x: &M::Point<f64>, d: &Vector<M>) -> Result<StepPath<M>, MetricError> {
+        fn weyl_path(&self, x: &M::Point<f64>, d: &Vector<M>) -> Result<StepPath<M>, MetricError> {
             let z = ChartPoint::centre(&M::chart(x, &(*d * 0.5)));
             Ok(StepPath { z, d: *d, end: M::chart(x, d) })
         }
@@ -117,7 +118,7 @@ impl<M: Flat + Space<Dim = Const<N>>, const N: usize> Riemannian<M> for Constant
     straight_geodesics!();
 }
 
-/// Where the flat geodesic through `x` arrives: `x + v`, with the same velocity.
+/// The end of the flat geodesic through `x`: `x + v`, with the same velocity.
 #[inline]
 fn straight<M: Flat, D: Scalar>(
     x: &ChartPoint<M, D>,

@@ -3,11 +3,11 @@
 //! - **Point and velocity**: columns of one number, `s` and `s'`.
 //! - **Frame**: `s' = s v`.
 //! - **Chart**: `φ_s(q) = s e^q`, onto the whole half line, and its inverse `ln(y/s)`, which is
-//!   `ln(1 + (y − s)/s)` within a factor of two, where only that has its digits.
-//! - **Geodesics** of the canonical metric `ds²/s²` are `s e^{tv}`, which come to zero in no finite
-//!   time: it is the metric of positive matrices for 1 × 1 matrices (Bhatia 2007, ch. 6). The logarithm is
-//!   within `2ε` of the exact one, relative to it. Numbers end before the half line does, at 5·10⁻³²⁴ and
-//!   2·10³⁰⁸; a geodesic that goes there is an error.
+//!   `ln(1 + (y − s)/s)` within a factor of two, where the first form has too few digits.
+//! - **Geodesics** of the canonical metric `ds²/s²` are `s e^{tv}`, which do not reach zero in
+//!   finite time. It is the metric of positive matrices for 1 × 1 matrices (Bhatia 2007, ch. 6). The logarithm
+//!   has a relative error below `2ε`. A geodesic that leaves the range of numbers, 5·10⁻³²⁴ to 2·10³⁰⁸, is an
+//!   error.
 //! - **Brackets**: none, as on every curve. The half line is a factor, for a temperature, a volume or
 //!   an internal energy, of a [`Product`](crate::Product).
 
@@ -17,7 +17,7 @@ use rand::{Rng, RngExt};
 
 use crate::{Flat, Manifold, PointError};
 
-/// The positive numbers R₊: a state that must not reach zero; see the [module](mod@crate::half_line).
+/// The positive numbers R₊, for a state that must not reach zero. See the [module](mod@crate::half_line).
 ///
 /// As a closure, the canonical metric is `Metric::field(|s| Matrix1::new(s.x.powi(-2)))`.
 ///
@@ -88,7 +88,7 @@ impl Manifold for HalfLine {
         x.x.abs()
     }
 
-    /// 1: the chart is the logarithm of a ratio, and has no unit.
+    /// Returns 1, because the chart is the logarithm of a ratio and has no unit.
     #[inline]
     fn scales(_: &Vector1<f64>) -> Vector1<f64> {
         Vector1::new(1.0)

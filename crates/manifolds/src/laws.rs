@@ -1,7 +1,6 @@
-//! What manifolds, metrics and retractions promise, and the functions that check it.
+//! The laws of manifolds, metrics and retractions, and the functions that check them.
 //!
-//! A manifold, metric or retraction of your own is checked by the same line as the ones of this
-//! crate.
+//! The same line checks a manifold, metric or retraction that you write and those of this crate.
 
 use approx::AbsDiffEq;
 use metriplectic_fields::{
@@ -12,7 +11,7 @@ use num_dual::{Dual, Dual64};
 use crate::metric::MetricError;
 use crate::{InnerProduct, Manifold, Retraction, Riemannian, Tangent};
 
-/// Round-off of a handful of operations on numbers of size `scale`.
+/// The round-off of a few operations on numbers of size `scale`.
 fn round_off<M: Manifold>(scale: f64) -> f64 {
     64.0 * M::Dim::LEN as f64 * f64::EPSILON * scale
 }
@@ -52,17 +51,17 @@ pub fn manifold<M: Manifold>(space: &M, x: &M::Point<f64>, q: &Vector<M>) -> Res
     let back = M::coordinates(x, &y);
     BrokenLaw::unless("φ_x⁻¹(φ_x(q)) = q", (back - *q).magnitude(), bound)?;
     let there_and_back = jacobian::<M, f64>(|q| M::coordinates(x, &M::chart::<Dual<f64>>(x, q)), q);
-    let off = (there_and_back - Matrix::<M>::one()).max_abs();
-    BrokenLaw::unless("the derivative of φ_x⁻¹ φ_x is 1", off, pure)?;
+    let error = (there_and_back - Matrix::<M>::one()).max_abs();
+    BrokenLaw::unless("the derivative of φ_x⁻¹ φ_x is 1", error, pure)?;
     for i in 0..=M::Dim::LEN {
         for j in 0..=M::Dim::LEN {
             let seed = M::coordinates(x, &M::seeds(x)(i, j));
             let expected = |k, direction| if k == direction { 1.0 } else { 0.0 };
-            let off = (0..M::Dim::LEN).fold(0.0_f64, |worst, k| {
+            let error = (0..M::Dim::LEN).fold(0.0_f64, |worst, k| {
                 let (a, b) = (seed[k].eps1 - expected(k, i), seed[k].eps2 - expected(k, j));
                 worst.max(a.abs()).max(b.abs()).max(seed[k].eps1eps2.abs())
             });
-            BrokenLaw::unless("seeded points are the chart at its seeds", off, pure)?;
+            BrokenLaw::unless("seeded points are the chart at its seeds", error, pure)?;
         }
     }
     let allowed = round_off::<M>(M::magnitude(&y));
@@ -73,8 +72,8 @@ pub fn manifold<M: Manifold>(space: &M, x: &M::Point<f64>, q: &Vector<M>) -> Res
     let same = left.next().is_none()
         && read.len() == entries.len()
         && read.iter().zip(&entries).all(|(a, b)| a.to_bits() == b.to_bits());
-    let off = if same { 0.0 } else { f64::INFINITY };
-    BrokenLaw::unless("a point is what its entries make", off, 0.0)
+    let error = if same { 0.0 } else { f64::INFINITY };
+    BrokenLaw::unless("a point is what its entries make", error, 0.0)
 }
 
 /// Checks a metric at `x` along the tangent vector `v`:
@@ -108,8 +107,8 @@ pub fn metric<M: Manifold, G: Riemannian<M>>(
     let square = flat.dot(v);
     BrokenLaw::unless("G(v, v) > 0", -square, 0.0)?;
     let orthonormal = at.orthonormal(&flat).magnitude().powi(2);
-    let off = relative(orthonormal - square, square);
-    BrokenLaw::unless("|L⁻¹♭v|² = G(v, v)", off, round_off::<M>(1.0) * condition::<M>(&g))?;
+    let error = relative(orthonormal - square, square);
+    BrokenLaw::unless("|L⁻¹♭v|² = G(v, v)", error, round_off::<M>(1.0) * condition::<M>(&g))?;
 
     let volume = usable("g is positive", metric.volume_density(&centre))?;
     let root = g.root_determinant().map_err(|_| BrokenLaw {
@@ -117,8 +116,12 @@ pub fn metric<M: Manifold, G: Riemannian<M>>(
         size: f64::NAN,
         bound: 0.0,
     })?;
-    let off = (volume / root - 1.0).abs();
-    BrokenLaw::unless("the volume form is √det g", off, round_off::<M>(1.0) * condition::<M>(&g))?;
+    let error = (volume / root - 1.0).abs();
+    BrokenLaw::unless(
+        "the volume form is √det g",
+        error,
+        round_off::<M>(1.0) * condition::<M>(&g),
+    )?;
 
     let (start, _) = usable("geodesics exist", metric.exp(&centre, &Vector::<M>::zero()))?;
     let moved = M::coordinates(x, &start.point()).magnitude();
@@ -126,11 +129,11 @@ pub fn metric<M: Manifold, G: Riemannian<M>>(
     let (end, velocity) = usable("geodesics exist", metric.exp(&centre, v))?;
     let there = usable("g is positive", metric.at(&end))?;
     let speed = there.flat(&velocity).dot(&velocity);
-    // Numerical geodesics promise 10⁻¹³ of the momentum in each of their pieces, and the condition
-    // number of g is what that becomes in p·g⁻¹p.
-    let off = relative(speed - square, square);
+    // Numerical geodesics have an error of 10⁻¹³ of the momentum in each piece. In p·g⁻¹p the condition
+    // number of g multiplies it.
+    let error = relative(speed - square, square);
     let bound = 1e-11 * condition::<M>(&g).max(condition::<M>(&metric.matrix(&end)));
-    BrokenLaw::unless("geodesics have constant speed", off, bound)?;
+    BrokenLaw::unless("geodesics have constant speed", error, bound)?;
 
     let symbols = usable("g is positive", metric.christoffel(x))?;
     let begin = M::coordinates(x, &usable("geodesics exist", metric.along(x, v, 0.0))?);
@@ -182,18 +185,18 @@ pub fn retraction<M: Manifold, G: Riemannian<M>, R: Retraction<M, G>>(
     let jet = usable(exists, retraction.step_path_jet(metric, x, u))?;
     let tangent = Tangent { base: jet.z.clone(), vector: jet.d };
     let (start, end) = usable(exists, retraction.pair(metric, &tangent))?;
-    let off = M::coordinates(x, &start).magnitude();
-    BrokenLaw::unless("the path starts where its pair does", off, bound)?;
-    let off = M::coordinates(&jet.end, &end).magnitude();
-    BrokenLaw::unless("the path ends where its pair does", off, bound)?;
+    let error = M::coordinates(x, &start).magnitude();
+    BrokenLaw::unless("the path starts where its pair does", error, bound)?;
+    let error = M::coordinates(&jet.end, &end).magnitude();
+    BrokenLaw::unless("the path ends where its pair does", error, bound)?;
     let alone: M::Point<f64> = usable(exists, retraction.end(metric, x, u))?;
-    let off = M::coordinates(&jet.end, &alone).magnitude();
-    BrokenLaw::unless("the end alone is the end of the path", off, bound)?;
+    let error = M::coordinates(&jet.end, &alone).magnitude();
+    BrokenLaw::unless("the end alone is the end of the path", error, bound)?;
     let real = usable(exists, retraction.real_step_path(metric, x, u))?;
-    let off = M::coordinates(&jet.z, &real.z.point()).magnitude();
-    BrokenLaw::unless("the real path has the base point of its jet", off, bound)?;
-    let off = (real.d - jet.d).magnitude() + M::coordinates(&jet.end, &real.end).magnitude();
-    BrokenLaw::unless("the real path is that of its jet", off, bound)?;
+    let error = M::coordinates(&jet.z, &real.z.point()).magnitude();
+    BrokenLaw::unless("the real path has the base point of its jet", error, bound)?;
+    let error = (real.d - jet.d).magnitude() + M::coordinates(&jet.end, &real.end).magnitude();
+    BrokenLaw::unless("the real path is that of its jet", error, bound)?;
     let back = usable(exists, retraction.inverse(metric, &start, &end))?;
     same("R_h⁻¹ R_h = 1", &back, &tangent, bound)?;
 
@@ -203,16 +206,16 @@ pub fn retraction<M: Manifold, G: Riemannian<M>, R: Retraction<M, G>>(
         let path = usable(exists, retraction.step_path(metric, x, &seeded))?;
         let end = M::coordinates(&jet.end, &path.end);
         let z = M::coordinates(&jet.z, &path.z.point());
-        let off = |dual: &Vector<M, Dual64>, slope: &Matrix<M>| {
+        let error = |dual: &Vector<M, Dual64>, slope: &Matrix<M>| {
             let column = Vector::<M>::from_index(|i| dual[i].eps - slope[(i, k)]);
             column.magnitude()
         };
-        // Two numerical geodesics, each with its own steps; their derivatives are those of the
-        // variational equations, which grow along the way and are not what the steps are chosen by.
+        // The two numerical geodesics have different steps. The variational equations grow along the way, and
+        // the steps are not chosen for them.
         let bound = 1e-10 * (1.0 + pure::<M>(x, u.magnitude()));
-        BrokenLaw::unless("∂z/∂u is the derivative of z", off(&z, &jet.dz), bound)?;
-        BrokenLaw::unless("∂d/∂u is the derivative of d", off(&path.d, &jet.dd), bound)?;
-        BrokenLaw::unless("∂x'/∂u is the derivative of x'", off(&end, &jet.dend), bound)?;
+        BrokenLaw::unless("∂z/∂u is the derivative of z", error(&z, &jet.dz), bound)?;
+        BrokenLaw::unless("∂d/∂u is the derivative of d", error(&path.d, &jet.dd), bound)?;
+        BrokenLaw::unless("∂x'/∂u is the derivative of x'", error(&end, &jet.dend), bound)?;
     }
     Ok(())
 }
@@ -251,12 +254,12 @@ fn same<M: Manifold>(
     Err(BrokenLaw { law, size: apart.max((a.vector - b.vector).magnitude()), bound })
 }
 
-/// `|difference| / size`, where no difference is none.
+/// Computes `|difference| / size`; 0 if the difference is 0.
 fn relative(difference: f64, size: f64) -> f64 {
     if difference == 0.0 { 0.0 } else { difference.abs() / size }
 }
 
-/// A metric that cannot be used breaks the law that it exists.
+/// Converts the error of a metric into the law that the metric exists.
 fn usable<T>(law: &'static str, result: Result<T, MetricError>) -> Result<T, BrokenLaw> {
     result.map_err(|_| BrokenLaw { law, size: f64::NAN, bound: 0.0 })
 }

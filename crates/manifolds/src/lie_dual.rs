@@ -1,22 +1,22 @@
-//! The dual `g*` of a Lie algebra, where reduced mechanical systems live.
+//! The dual `g*` of a Lie algebra, the phase space of reduced mechanical systems.
 //!
-//! A mechanical system on a group `G` whose energy is left-invariant forgets its configuration: what
-//! remains is the momentum in the body frame, `μ ∈ g*` (Marsden and Ratiu 1999, ch. 13; Bloch, Farré
+//! If the energy of a mechanical system on a group `G` is left-invariant, the configuration drops out of the
+//! equations. The state is then the momentum in the body frame, `μ ∈ g*` (Marsden and Ratiu 1999, ch. 13; Bloch, Farré
 //! Puiggalí and Martín de Diego 2024, §3). With `[e_a, e_b] = C_ab^d e_d`:
 //!
 //! - **Point and velocity**: columns of the components `μ_a = ⟨μ, e_a⟩` and of `μ'_a`.
 //! - **Frame**: the dual basis `e^a`, the same everywhere.
 //! - **Chart**: `φ_μ(q) = μ + q`.
 //! - **Geodesics**: straight lines, as on [Rⁿ](mod@crate::euclidean).
-//! - **Bracket**: `LiePoisson`, which every dual starts with,
+//! - **Bracket**: `LiePoisson` by default,
 //!
 //! ```math
 //! \mu' = \mathrm{ad}^*_{\xi}\, \mu, \qquad
 //! \mu'_b = C_{ab}^d\, \xi^a \mu_d, \qquad \xi = dH(\mu) .
 //! ```
 //!
-//! The flow stays on a coadjoint orbit, a level set of the Casimirs: the functions with
-//! `ad*_{dC} μ = 0`, of which an entropy is made.
+//! The flow stays on a coadjoint orbit, on which the Casimirs are constant: the functions with
+//! `ad*_{dC} μ = 0`. An entropy is a function of Casimirs.
 //!
 //! | dual | brackets | Casimirs |
 //! |---|---|---|
@@ -41,214 +41,14 @@
 //! assert_eq!(LieDual::so4().algebra().coadjoint(&area, &state).norm(), 0.0);
 //! ```
 
-use metriplectic_fields::{ChartPoint, Column, Scalar, Space, Square};
+use metriplectic_fields::{ChartPoint, Column, Scalar, Space};
 use nalgebra::{Const, SMatrix, SVector};
 use rand::{Rng, RngExt};
 
 use crate::Manifold;
 use crate::euclidean::vector_space;
 
-/// A Lie algebra of dimension `N` by its structure constants, `[e_a, e_b] = C_ab^d e_d`.
-///
-/// Only the nonzero constants are kept.
-#[derive(Clone, Debug, PartialEq)]
-pub struct LieAlgebra<const N: usize> {
-    nonzero: Vec<StructureConstant>,
-}
-
-/// Matrices of a basis are taken to be dependent, and commutators to lie in their span, up to this
-/// relative size.
-const SPAN_TOLERANCE: f64 = 1e-12;
-
-/// One nonzero `C_ab^d`.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct StructureConstant {
-    /// The first factor `e_a`.
-    pub a: usize,
-    /// The second factor `e_b`.
-    pub b: usize,
-    /// The component `e_d` of the bracket.
-    pub d: usize,
-    /// The value `C_ab^d`.
-    pub value: f64,
-}
-
-impl<const N: usize> LieAlgebra<N> {
-    /// The algebra with `[e_a, e_b] = constants[a][b][d] e_d`.
-    ///
-    /// # Errors
-    ///
-    /// [`AlgebraError`] with the failing indices if a constant is not finite, if `C_ab^d ≠ −C_ba^d`,
-    /// or if the Jacobi identity
-    /// `C_ab^e C_ec^d + C_bc^e C_ea^d + C_ca^e C_eb^d = 0` fails beyond round-off.
-    pub fn new(constants: &[[[f64; N]; N]; N]) -> Result<Self, AlgebraError> {
-        // Each of the 3N products of the Jacobi identity is rounded once and added once.
-        Self::checked(constants, 6.0 * N as f64 * f64::EPSILON)
-    }
-
-    /// The algebra of the given constants if their laws hold to a relative `tolerance`.
-    fn checked(constants: &[[[f64; N]; N]; N], tolerance: f64) -> Result<Self, AlgebraError> {
-        let c = |a: usize, b: usize, d: usize| constants[a][b][d];
-        let largest = finite_maximum(constants)?;
-        for (a, b, d) in triples(N) {
-            let size = (c(a, b, d) + c(b, a, d)).abs();
-            if size > tolerance * largest {
-                return Err(AlgebraError::NotAntisymmetric { a, b, d, size });
-            }
-        }
-        for (a, b, d) in triples(N) {
-            for k in 0..N {
-                let cyclic = |e: usize| {
-                    c(a, b, e) * c(e, k, d) + c(b, k, e) * c(e, a, d) + c(k, a, e) * c(e, b, d)
-                };
-                let size = (0..N).map(cyclic).sum::<f64>().abs();
-                if size > tolerance * largest * largest {
-                    return Err(AlgebraError::NoJacobiIdentity { a, b, c: k, d, size });
-                }
-            }
-        }
-        let nonzero = triples(N)
-            .map(|(a, b, d)| StructureConstant { a, b, d, value: c(a, b, d) })
-            .filter(|constant| constant.value != 0.0)
-            .collect();
-        Ok(Self { nonzero })
-    }
-
-    /// The algebra spanned by matrices, with the commutator `[A, B] = AB − BA`.
-    ///
-    /// # Errors
-    ///
-    /// [`AlgebraError::NotIndependent`] if the matrices are linearly dependent,
-    /// [`AlgebraError::NotClosed`] if a commutator leaves their span, and those of [`new`](Self::new).
-    pub fn of_matrices<const R: usize>(
-        basis: &[SMatrix<f64, R, R>; N],
-    ) -> Result<Self, AlgebraError> {
-        let gram = SMatrix::<f64, N, N>::from_fn(|a, b| basis[a].dot(&basis[b]));
-        let factor = Square::cholesky(&gram).map_err(|_| AlgebraError::NotIndependent)?;
-        if (0..N).any(|a| factor[(a, a)].powi(2) <= SPAN_TOLERANCE * gram[(a, a)]) {
-            return Err(AlgebraError::NotIndependent);
-        }
-        let mut constants = [[[0.0; N]; N]; N];
-        for a in 0..N {
-            for b in a + 1..N {
-                let commutator = basis[a] * basis[b] - basis[b] * basis[a];
-                let traces = SVector::<f64, N>::from_fn(|d, _| basis[d].dot(&commutator));
-                let components =
-                    Square::solve(&gram, &traces).ok_or(AlgebraError::NotIndependent)?;
-                let span: SMatrix<f64, R, R> = (0..N).map(|d| basis[d] * components[d]).sum();
-                let size = (commutator - span).norm();
-                if size > SPAN_TOLERANCE * commutator.norm() {
-                    return Err(AlgebraError::NotClosed { a, b, size });
-                }
-                constants[a][b] = components.into();
-                constants[b][a] = (-components).into();
-            }
-        }
-        Self::checked(&constants, SPAN_TOLERANCE)
-    }
-
-    /// The nonzero structure constants.
-    pub fn constants(&self) -> &[StructureConstant] {
-        &self.nonzero
-    }
-
-    /// The bracket `[ξ, η]^d = C_ab^d ξ^a η^b`.
-    pub fn bracket<D: Scalar>(&self, xi: &SVector<D, N>, eta: &SVector<D, N>) -> SVector<D, N> {
-        let mut sum = <SVector<D, N> as Column<D>>::zero();
-        for c in &self.nonzero {
-            sum[c.d] += xi[c.a] * eta[c.b] * c.value;
-        }
-        sum
-    }
-
-    /// The coadjoint action `(ad*_ξ μ)_b = C_ab^d ξ^a μ_d`, that is `⟨ad*_ξ μ, η⟩ = ⟨μ, [ξ, η]⟩`.
-    #[inline]
-    pub fn coadjoint<D: Scalar>(&self, xi: &SVector<D, N>, mu: &SVector<D, N>) -> SVector<D, N> {
-        let mut sum = <SVector<D, N> as Column<D>>::zero();
-        for c in &self.nonzero {
-            sum[c.b] += xi[c.a] * mu[c.d] * c.value;
-        }
-        sum
-    }
-}
-
-/// All `(a, b, d)` with each index below `n`.
-fn triples(n: usize) -> impl Iterator<Item = (usize, usize, usize)> {
-    (0..n * n * n).map(move |k| (k / (n * n), (k / n) % n, k % n))
-}
-
-/// The largest `|C_ab^d|`, or the first one that is not finite.
-fn finite_maximum<const N: usize>(constants: &[[[f64; N]; N]; N]) -> Result<f64, AlgebraError> {
-    let mut largest = 0.0_f64;
-    for (a, b, d) in triples(N) {
-        let value = constants[a][b][d];
-        if !value.is_finite() {
-            return Err(AlgebraError::NotFinite { a, b, d, value });
-        }
-        largest = largest.max(value.abs());
-    }
-    Ok(largest)
-}
-
-/// Structure constants that do not make a Lie algebra.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum AlgebraError {
-    /// A constant is NaN or infinite.
-    #[error("the structure constant C_({a},{b})^{d} is {value}; every one must be a finite number")]
-    NotFinite {
-        /// First index.
-        a: usize,
-        /// Second index.
-        b: usize,
-        /// Upper index.
-        d: usize,
-        /// The value.
-        value: f64,
-    },
-    /// `C_ab^d ≠ −C_ba^d`.
-    #[error("C_({a},{b})^{d} + C_({b},{a})^{d} = {size:.3e}, but a Lie bracket is antisymmetric")]
-    NotAntisymmetric {
-        /// First index.
-        a: usize,
-        /// Second index.
-        b: usize,
-        /// Upper index.
-        d: usize,
-        /// `|C_ab^d + C_ba^d|`.
-        size: f64,
-    },
-    /// The Jacobi identity fails.
-    #[error(
-        "[[e_{a}, e_{b}], e_{c}] + cyclic has the component {size:.3e} along e_{d}, \
-         but a Lie bracket satisfies the Jacobi identity"
-    )]
-    NoJacobiIdentity {
-        /// First element.
-        a: usize,
-        /// Second element.
-        b: usize,
-        /// Third element.
-        c: usize,
-        /// Component of the double bracket.
-        d: usize,
-        /// Its absolute value.
-        size: f64,
-    },
-    /// Basis matrices are linearly dependent.
-    #[error("the basis matrices are linearly dependent")]
-    NotIndependent,
-    /// A commutator leaves the span of the basis.
-    #[error("the commutator of basis matrices {a} and {b} leaves their span by {size:.3e}")]
-    NotClosed {
-        /// First matrix.
-        a: usize,
-        /// Second matrix.
-        b: usize,
-        /// Norm of the part outside the span.
-        size: f64,
-    },
-}
+pub use crate::lie_algebra::{AlgebraError, LieAlgebra, StructureConstant};
 
 /// The dual `g*` of a Lie algebra: momenta `μ = μ_a e^a`; see the [module](mod@crate::lie_dual).
 ///
@@ -297,12 +97,12 @@ impl<const N: usize> LieDual<N> {
                 ]
             })
             .collect();
-        Self::of(LieAlgebra { nonzero })
+        Self::of(LieAlgebra::known(nonzero))
     }
 }
 
 impl LieDual<3> {
-    /// `so(3)*`, the angular momenta of a body in its own frame: `[e_a, e_b] = ε_abc e_c`.
+    /// `so(3)*`, the angular momenta of a body in the body frame: `[e_a, e_b] = ε_abc e_c`.
     pub fn so3() -> Self {
         Self::su2(1.0)
     }
@@ -346,10 +146,9 @@ impl LieDual<6> {
     /// `so(4)* ≅ so(3)* ⊕ so(3)*` in the basis `(J, N)` of rotations and boosts of Euclidean
     /// four-space: `[J_a, J_b] = ε_abc J_c`, `[J_a, N_b] = ε_abc N_c`, `[N_a, N_b] = ε_abc J_c`.
     pub fn so4() -> Self {
-        let mut so4 = Self::se3();
         let boosts = Self::known(&[(3, 4, 2, 1.0), (4, 5, 0, 1.0), (5, 3, 1, 1.0)]);
-        so4.algebra.nonzero.extend(boosts.algebra.nonzero);
-        so4
+        let constants = [Self::se3(), boosts].map(|dual| dual.algebra.constants().to_vec());
+        Self::of(LieAlgebra::known(constants.concat()))
     }
 }
 

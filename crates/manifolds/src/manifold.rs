@@ -1,13 +1,13 @@
-//! What every space of states answers.
+//! Spaces of states.
 //!
 //! # Why points do not drift
 //!
 //! The unknown of a step is a tangent vector `u` at `x`, and its end is the end of a path, `φ_x(u)` for a
-//! geodesic in a normal chart. On a curved space the chart itself ends on the manifold: its last operation is
-//! one step of Newton's iteration for `|x| = 1` or `RᵀR = 1`, which squares a defect of round-off. The
-//! equation of the step has `H` and `S` at that very end in it. So the point that a run keeps is the one
-//! for which the laws have been solved, and it lies on the manifold; a projection after the step would
-//! move it, and `H` with it. The defects of all points of a run are in its certificate.
+//! geodesic in a normal chart. On a curved space the last operation of the chart is one step of Newton's
+//! iteration for `|x| = 1` or `RᵀR = 1`, which squares a defect of round-off. The equation of the step
+//! contains `H` and `S` at this end. So the point that a run stores satisfies the laws and lies on the
+//! manifold. A projection after the step would move the point, and change `H`. The certificate of a run
+//! contains the largest defect of its points.
 
 use metriplectic_fields::{Column, Space, Vector};
 use rand::Rng;
@@ -21,19 +21,18 @@ use rand::Rng;
 /// dual numbers too; 3. chart points and random points lie on the manifold; 4. a point that is read
 /// from its entries is the same point, bit for bit.
 pub trait Manifold: Space {
-    /// How far the point is off the manifold, in the units of its entries: 0 where every array of
-    /// numbers is a point, NaN or infinite if an entry is.
+    /// Measures how far the point is off the manifold, in the units of its entries. It is 0 where every array
+    /// of numbers is a point, and NaN or infinite if an entry is.
     fn defect(&self, x: &Self::Point<f64>) -> f64;
 
-    /// The entries of the point, in the order in which it is written.
+    /// Lists the entries of the point, in the order in which it is written.
     fn entries(x: &Self::Point<f64>) -> Vec<f64>;
 
-    /// The point whose entries are `next()`, `next()`, … in the order of [`entries`](Self::entries);
-    /// it asks for as many as a point has. Unchecked: [`from_entries`](Self::from_entries) is for
-    /// numbers that come from elsewhere.
+    /// Reads a point, without a check, whose entries are `next()`, `next()`, … in the order of
+    /// [`entries`](Self::entries). For numbers from outside, use [`from_entries`](Self::from_entries).
     fn assemble(next: &mut impl FnMut() -> f64) -> Self::Point<f64>;
 
-    /// The point with these entries, the inverse of [`entries`](Self::entries).
+    /// Makes the point with these entries, the inverse of [`entries`](Self::entries).
     ///
     /// ```
     /// use metriplectic_manifolds::{Manifold, PointError, Sphere};
@@ -65,8 +64,8 @@ pub trait Manifold: Space {
     /// The size `|x|` of the entries, which sets the scale of round-off.
     fn magnitude(x: &Self::Point<f64>) -> f64;
 
-    /// The sizes of the entries, one for each direction of the chart: what round-off and tolerances are
-    /// relative to.
+    /// The sizes of the entries, one for each direction of the chart. Round-off and tolerances are relative to
+    /// them.
     ///
     /// On a flat space they are `|x_i|`, each in the unit of its entry, and zero for an entry that is zero.
     /// On a curved space all directions have the one size of the space, because its frame is arbitrary; on
@@ -86,20 +85,20 @@ pub trait Manifold: Space {
         Vector::<Self>::from_index(|_| size)
     }
 
-    /// The nearest point of the manifold, for an array of numbers that is off it: one of them, where
-    /// there are several. What is not finite stays so, and where no point is nearest (the centre of a
-    /// sphere) the entries are not numbers: [`check`](Self::check) finds both.
+    /// Projects an array of numbers to the nearest point of the manifold, or to one of several. Entries that are
+    /// not finite stay so. If no point is nearest, as for the centre of a sphere, the entries are NaN.
+    /// [`check`](Self::check) finds both.
     fn project(&self, x: &Self::Point<f64>) -> Self::Point<f64>;
 
     /// The components at `y` of the tangent vector `v` at `x`, for `y` near `x`: a vector transport
-    /// (Absil, Mahony, Sepulchre 2008, §8.1), which only guesses are made of. The same components
-    /// where the frame is the same everywhere.
+    /// (Absil, Mahony, Sepulchre 2008, §8.1). Only guesses use it. The components do not change if the frame
+    /// is the same everywhere.
     #[inline]
     fn transport(_x: &Self::Point<f64>, _y: &Self::Point<f64>, v: &Vector<Self>) -> Vector<Self> {
         *v
     }
 
-    /// [`transport`](Self::transport) of several vectors at once.
+    /// Applies [`transport`](Self::transport) to several vectors at once.
     #[inline]
     fn transport_all(x: &Self::Point<f64>, y: &Self::Point<f64>, vectors: &mut [Vector<Self>]) {
         for v in vectors {
@@ -107,7 +106,7 @@ pub trait Manifold: Space {
         }
     }
 
-    /// A random point, spread over a unit scale.
+    /// Draws a random point, spread over a unit scale.
     fn random(&self, rng: &mut impl Rng) -> Self::Point<f64>;
 
     /// Accepts a point whose entries are finite and whose defect is round-off.
@@ -126,8 +125,8 @@ pub trait Manifold: Space {
     }
 }
 
-/// A start that a user typed in with ten digits is accepted, a mistaken one is not. Relative to the size of
-/// the point.
+/// The defect that is accepted, relative to the size of the point. A start that was typed with ten digits is
+/// accepted, and a mistaken start is refused.
 const POINT_TOLERANCE: f64 = 1e-10;
 
 /// A point that is not on the manifold.

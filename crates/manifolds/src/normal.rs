@@ -13,7 +13,7 @@ use crate::InnerProduct;
 /// \sigma = \frac{\sin(\sqrt K |q|)}{\sqrt K |q|} ,
 /// ```
 ///
-/// the identity at the centre: lengths along rays are kept, lengths across them shrink by `σ`
+/// the identity at the centre. Lengths along rays do not change, and lengths across them shrink by `σ`
 /// (do Carmo 1992, §5.2). The unit sphere has `K = 1`, SO(3) with `⟨â, b̂⟩ = a·b` has `K = ¼`.
 #[derive(Clone, Copy, Debug)]
 pub struct Normal<D, const N: usize> {

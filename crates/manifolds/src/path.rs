@@ -1,8 +1,8 @@
-//! Brings a lost logarithm back: the energy of a broken path between two points is minimised by
-//! argmin's L-BFGS.
+//! An aim for a logarithm that shooting alone does not find: argmin's L-BFGS minimises the energy of a broken
+//! path between the two points.
 //!
-//! It stalls far above round-off, so Newton's method polishes: first for the whole path, by multiple
-//! shooting, then for the one geodesic.
+//! L-BFGS stagnates far above round-off. So Newton's method refines the whole path by multiple shooting, and
+//! the caller then refines the one geodesic.
 
 use std::cell::Cell;
 use std::marker::PhantomData;
@@ -10,13 +10,15 @@ use std::marker::PhantomData;
 use argmin::core::{CostFunction, Executor, Gradient, State as _};
 use argmin::solver::linesearch::MoreThuenteLineSearch;
 use argmin::solver::quasinewton::LBFGS;
+use metriplectic_fields::newton::{self, Cause, Limits, Problem, Progress};
 use metriplectic_fields::{
     Column, Dimension, Matrix, MatrixField, MatrixJet, Space, Square, Vector,
 };
 use nalgebra::{DMatrix, DVector};
 
 use crate::Manifold;
-use crate::geodesic::{self, GeodesicJet};
+use crate::chart_metric;
+use crate::geodesic_jet::{self, GeodesicJet};
 
 /// Pieces of the path.
 const PIECES: usize = 24;
@@ -38,8 +40,8 @@ struct PathEnergy<'a, M: Space, F> {
 }
 
 impl<M: Space, F: MatrixField<M>> PathEnergy<'_, M, F> {
-    /// Notes an evaluation, as long as there may be more: a line search through a metric that is not
-    /// smooth has no end of its own.
+    /// Counts an evaluation, and fails at the limit. Without it, a line search through a metric that is not
+    /// smooth may not end.
     fn spend(&self) -> Result<(), argmin::core::Error> {
         self.evaluations.set(self.evaluations.get() + 1);
         if self.evaluations.get() <= EVALUATIONS {
@@ -49,7 +51,7 @@ impl<M: Space, F: MatrixField<M>> PathEnergy<'_, M, F> {
         }
     }
 
-    /// The corner `k`, the ends among them.
+    /// The corner `k`, where the first and the last corner are the ends.
     fn corner(&self, path: &[f64], k: usize) -> Vector<M> {
         match k {
             0 => Vector::<M>::zero(),
@@ -61,7 +63,7 @@ impl<M: Space, F: MatrixField<M>> PathEnergy<'_, M, F> {
     /// A piece, and the metric with its derivatives in its middle.
     fn piece(&self, path: &[f64], k: usize) -> (Vector<M>, MatrixJet<M>) {
         let (a, b) = (self.corner(path, k), self.corner(path, k + 1));
-        (b - a, geodesic::metric_jet(self.field, self.x, &((a + b) * 0.5)))
+        (b - a, chart_metric::metric_jet(self.field, self.x, &((a + b) * 0.5)))
     }
 }
 
@@ -135,74 +137,125 @@ pub(crate) fn aim<M: Manifold>(
         PIECES => M::chart(x, end),
         _ => M::chart(x, &Vector::<M>::from_index(|i| path[(k - 1) * n + i])),
     };
-    straightened(field, &std::array::from_fn(corner))
+    let corners: [M::Point<f64>; PIECES + 1] = std::array::from_fn(corner);
+    let velocities = std::array::from_fn(|k| M::coordinates(&corners[k], &corners[k + 1]));
+    let shooting = MultipleShooting { field, space: PhantomData };
+    newton::solve(&shooting, Pieces { corners, velocities }, LIMITS).ok()
 }
 
-/// Corrections of a path by multiple shooting, at most.
-const CORRECTIONS: usize = 12;
+/// What Newton's method may take for a path.
+const LIMITS: Limits = Limits { iterations: 12, halvings: 0 };
 
-/// Multiple shooting (Stoer and Bulirsch 2002, §7.3.5): Newton's method for the inner corners `q_k` and
-/// the velocities `v_k` of all pieces at once, so that each geodesic ends where the next one starts,
-/// with the velocity of the next one. It does not suffer from the exponential growth of errors along
-/// the whole way.
-fn straightened<M: Manifold>(
-    field: &impl MatrixField<M>,
-    corners: &[M::Point<f64>; PIECES + 1],
-) -> Option<Vector<M>> {
-    let n = M::Dim::LEN;
-    let mut corners = corners.clone();
-    let mut velocities: [Vector<M>; PIECES] =
-        std::array::from_fn(|k| M::coordinates(&corners[k], &corners[k + 1]));
-    // The unknowns in the order v₀, q₁, v₁, q₂, v₂, …
-    let (v_at, q_at) = (|k: usize| 2 * k * n, |k: usize| (2 * k - 1) * n);
-    for _ in 0..CORRECTIONS {
+/// The last correction of a path, relative to a piece, that single shooting can take over from.
+const CLOSE: f64 = 1e-9;
+
+/// The equations of multiple shooting (Stoer and Bulirsch 2002, §7.3.5): each geodesic ends where the next
+/// one starts, with the velocity of the next one. The unknowns are the inner corners `q_k` and the velocities
+/// `v_k` of all pieces, so that errors do not grow exponentially along the whole way.
+struct MultipleShooting<'a, M, F> {
+    field: &'a F,
+    space: PhantomData<M>,
+}
+
+/// The corners of a path, and the velocities of its pieces.
+struct Pieces<M: Space> {
+    corners: [M::Point<f64>; PIECES + 1],
+    velocities: [Vector<M>; PIECES],
+}
+
+impl<M: Manifold, F: MatrixField<M>> MultipleShooting<'_, M, F> {
+    /// The Newton correction, with the unknowns in the order v₀, q₁, v₁, q₂, v₂, …
+    fn correction(&self, Pieces { corners, velocities }: &Pieces<M>) -> Option<DVector<f64>> {
+        let n = M::Dim::LEN;
         let size = (2 * PIECES - 1) * n;
-        let (mut jacobian, mut off) = (DMatrix::zeros(size, size), DVector::zeros(size));
+        let (mut jacobian, mut errors) = (DMatrix::zeros(size, size), DVector::zeros(size));
         for k in 0..PIECES {
-            let (along_q, along_v) = shots(field, &corners[k], &velocities[k])?;
+            let (along_q, along_v) = shots(self.field, &corners[k], &velocities[k])?;
             let (row, next) = (2 * k * n, k + 1);
             let gap = M::coordinates(&along_v.point, &corners[next]);
             let velocity = M::transport(&along_v.point, &corners[next], &along_v.velocity);
             for i in 0..n {
-                off[row + i] = gap[i];
+                errors[row + i] = gap[i];
                 for j in 0..n {
-                    jacobian[(row + i, v_at(k) + j)] = along_v.dpoint[(i, j)];
+                    jacobian[(row + i, v_at::<M>(k) + j)] = along_v.dpoint[(i, j)];
                     if k > 0 {
-                        jacobian[(row + i, q_at(k) + j)] = along_q.dpoint[(i, j)];
+                        jacobian[(row + i, q_at::<M>(k) + j)] = along_q.dpoint[(i, j)];
                     }
                     if next < PIECES {
-                        jacobian[(row + n + i, v_at(k) + j)] = along_v.dvelocity[(i, j)];
+                        jacobian[(row + n + i, v_at::<M>(k) + j)] = along_v.dvelocity[(i, j)];
                         if k > 0 {
-                            jacobian[(row + n + i, q_at(k) + j)] = along_q.dvelocity[(i, j)];
+                            jacobian[(row + n + i, q_at::<M>(k) + j)] = along_q.dvelocity[(i, j)];
                         }
                     }
                 }
                 if next < PIECES {
-                    off[row + n + i] = velocities[next][i] - velocity[i];
-                    jacobian[(row + i, q_at(next) + i)] = -1.0;
-                    jacobian[(row + n + i, v_at(next) + i)] = -1.0;
+                    errors[row + n + i] = velocities[next][i] - velocity[i];
+                    jacobian[(row + i, q_at::<M>(next) + i)] = -1.0;
+                    jacobian[(row + n + i, v_at::<M>(next) + i)] = -1.0;
                 }
             }
         }
-        let correction = jacobian.lu().solve(&off).filter(|c| c.iter().all(|c| c.is_finite()))?;
+        jacobian.lu().solve(&errors).filter(|c| c.iter().all(|c| c.is_finite()))
+    }
+}
+
+/// The first row of the unknown `v_k`.
+fn v_at<M: Space>(k: usize) -> usize {
+    2 * k * M::Dim::LEN
+}
+
+/// The first row of the unknown `q_k`.
+fn q_at<M: Space>(k: usize) -> usize {
+    (2 * k - 1) * M::Dim::LEN
+}
+
+impl<M: Manifold> Pieces<M> {
+    /// The path after a Newton correction.
+    fn corrected(&self, correction: &DVector<f64>) -> Self {
+        let (mut corners, mut velocities) = (self.corners.clone(), self.velocities);
         for k in 0..PIECES {
-            velocities[k] += Vector::<M>::from_index(|i| correction[v_at(k) + i]);
+            velocities[k] += Vector::<M>::from_index(|i| correction[v_at::<M>(k) + i]);
             if k > 0 {
-                let q = Vector::<M>::from_index(|i| correction[q_at(k) + i]);
+                let q = Vector::<M>::from_index(|i| correction[q_at::<M>(k) + i]);
                 let moved = M::chart(&corners[k], &q);
                 velocities[k] = M::transport(&corners[k], &moved, &velocities[k]);
                 corners[k] = moved;
             }
         }
-        if correction.norm() <= CLOSE * velocities[0].magnitude() {
-            break;
-        }
+        Self { corners, velocities }
     }
-    Some(velocities[0] * PIECES as f64)
+
+    /// The initial velocity of the whole path.
+    fn velocity(&self) -> Vector<M> {
+        self.velocities[0] * PIECES as f64
+    }
 }
 
-/// The last correction of a path, relative to a piece, that single shooting can take over from.
-const CLOSE: f64 = 1e-9;
+impl<M: Manifold, F: MatrixField<M>> Problem for MultipleShooting<'_, M, F> {
+    type Iterate = Pieces<M>;
+    type Correction = Pieces<M>;
+    type Root = Vector<M>;
+    type Error = Unsolved;
+
+    fn correct(&self, here: &Pieces<M>) -> Result<Progress<Vector<M>, Pieces<M>>, Unsolved> {
+        let correction = self.correction(here).ok_or(Unsolved)?;
+        let next = here.corrected(&correction);
+        let close = correction.norm() <= CLOSE * next.velocities[0].magnitude();
+        Ok(if close { Progress::Root(next.velocity()) } else { Progress::Correction(next, 1.0) })
+    }
+
+    fn advance(&self, _: &Pieces<M>, next: &Pieces<M>, _: f64) -> Option<Pieces<M>> {
+        Some(Pieces { corners: next.corners.clone(), velocities: next.velocities })
+    }
+
+    fn stop(&self, last: Pieces<M>, _: Cause, _: usize) -> Result<Vector<M>, Unsolved> {
+        // Single shooting decides whether the aim is good.
+        Ok(last.velocity())
+    }
+}
+
+/// Multiple shooting meets a singular system, or a geodesic that ends early.
+struct Unsolved;
 
 /// A geodesic with its derivatives along its start and along its velocity.
 fn shots<M: Manifold>(
@@ -213,7 +266,7 @@ fn shots<M: Manifold>(
     let (zero, one) = (Matrix::<M>::zeros(), Matrix::<M>::one());
     let shot = |dpoint, dvelocity| {
         let start = GeodesicJet { point: x.clone(), velocity: *v, dpoint, dvelocity };
-        geodesic::follow_jet(field, &start).ok()
+        geodesic_jet::follow(field, &start).ok()
     };
     Some((shot(one, zero)?, shot(zero, one)?))
 }

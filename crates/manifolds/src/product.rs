@@ -3,14 +3,14 @@
 //! - **Point and velocity**: a pair of points, which a closure takes apart; the velocity of the first
 //!   factor, with that of the second below it.
 //! - **Frame and chart**: those of the factors, `φ_{(a,b)}(q, r) = (φ_a(q), φ_b(r))`.
-//! - **Geodesics**: of a pair of metrics `(gA, gB)`, and of [`Canonical`], which is the
-//!   pair of the canonical ones, pairs of geodesics, as accurate as those of the factors, with
-//!   `d² = d_A² + d_B²` (Lee 2018, ch. 2, for the product metric); none is longer than the factors allow.
+//! - **Geodesics** of a pair of metrics `(gA, gB)` are pairs of geodesics, as accurate as those of the
+//!   factors, with `d² = d_A² + d_B²` (Lee 2018, ch. 2, for the product metric). The limits of the factors
+//!   apply. [`Canonical`](crate::Canonical) is the pair of the canonical metrics.
 //!   One [closure](crate::Metric::field) for the full matrix couples the
 //!   factors, and its geodesics are numerical.
-//! - **Brackets**: none unless one is asked for. A pair, `{f, g} = {f, g}_A + {f, g}_B`, whose Casimirs
-//!   are functions of the Casimirs of both: with `(AreaForm, Zero)` on `S² × R` each function of the
-//!   second factor is one, and so an entropy there leaves the precession alone. `Symplectic` on
+//! - **Brackets**: none by default. The Casimirs of a pair, `{f, g} = {f, g}_A + {f, g}_B`, are functions of
+//!   the Casimirs of both. With `(AreaForm, Zero)` on `S² × R` each function of the second factor is a
+//!   Casimir, so an entropy there does not change the precession. `Symplectic` on
 //!   `Rⁿ × Rⁿ`, and on `SO(3) × R³` trivialised from the left,
 //!
 //! ```math
@@ -19,18 +19,12 @@
 //!
 //! (Marsden and Ratiu 1999, §13.5).
 
-use std::fmt;
-use std::marker::PhantomData;
-
 use metriplectic_fields::{
     ChartPoint, Column, Dimension, Matrix, Plus, Real, Scalar, Space, Square, Vector, Velocity,
 };
 use rand::Rng;
 
-use crate::metric::GeodesicEnd;
-use crate::{
-    Canonical, InnerProduct, Manifold, MetricError, PointError, Riemannian, StepPath, StepPathJet,
-};
+use crate::{Manifold, PointError};
 
 /// The product `A × B`: a state with two parts, such as a direction with an internal energy
 /// (`S² × R`) or an attitude with an angular momentum (`SO(3) × R³`). A factor may be a product again.
@@ -48,8 +42,8 @@ use crate::{
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Product<A, B>(pub A, pub B);
 
-/// Spaces whose dimensions can be added: the left and the right factor of a product. Nothing to
-/// implement.
+/// Spaces whose dimensions can be added: the left and the right factor of a product. It is implemented for
+/// all such spaces.
 pub trait Times<B: Space>: Space {
     /// The dimension of the product.
     type SumDim: Dimension;
@@ -152,7 +146,7 @@ impl<A: Times<B>, B: Space> Space for Product<A, B> {
 }
 
 impl<A: Manifold + Times<B>, B: Manifold> Manifold for Product<A, B> {
-    /// The larger one of the factors' defects.
+    /// Returns the larger defect of the two factors.
     fn defect(&self, (a, b): &Self::Point<f64>) -> f64 {
         let (a, b) = (self.0.defect(a), self.1.defect(b));
         if a.is_nan() || a > b { a } else { b }
@@ -192,7 +186,7 @@ impl<A: Manifold + Times<B>, B: Manifold> Manifold for Product<A, B> {
         (self.0.random(rng), self.1.random(rng))
     }
 
-    /// Each factor checks its own half; an entry is counted in the whole point.
+    /// Lets each factor check its part. An entry is counted in the whole point.
     fn check(&self, (a, b): &Self::Point<f64>) -> Result<(), PointError> {
         self.0.check(a)?;
         self.1.check(b).map_err(|error| match error {
@@ -204,268 +198,12 @@ impl<A: Manifold + Times<B>, B: Manifold> Manifold for Product<A, B> {
     }
 }
 
-/// A metric on a product that is the sum of one on each factor.
-pub trait Split<A: Space, B: Space> {
-    /// The metric on the left factor.
-    type Left: Riemannian<A>;
-    /// The metric on the right factor.
-    type Right: Riemannian<B>;
-
-    /// The metric on each factor.
-    fn halves(&self) -> (&Self::Left, &Self::Right);
-}
-
-impl<A: Space, B: Space, G: Riemannian<A>, F: Riemannian<B>> Split<A, B> for (G, F) {
-    type Left = G;
-    type Right = F;
-
-    #[inline]
-    fn halves(&self) -> (&G, &F) {
-        (&self.0, &self.1)
-    }
-}
-
-impl<A: Space, B: Space> Split<A, B> for Canonical
-where
-    Self: Riemannian<A> + Riemannian<B>,
-{
-    type Left = Self;
-    type Right = Self;
-
-    #[inline]
-    fn halves(&self) -> (&Self, &Self) {
-        (self, self)
-    }
-}
-
-/// The inner products on the factors, as one on the product.
-pub struct Block<A, B, D, P, Q> {
-    left: P,
-    right: Q,
-    factors: PhantomData<(A, B, D)>,
-}
-
-impl<A, B, D, P: Clone, Q: Clone> Clone for Block<A, B, D, P, Q> {
-    fn clone(&self) -> Self {
-        Self { left: self.left.clone(), right: self.right.clone(), factors: PhantomData }
-    }
-}
-
-impl<A, B, D, P: Copy, Q: Copy> Copy for Block<A, B, D, P, Q> {}
-
-impl<A, B, D, P: fmt::Debug, Q: fmt::Debug> fmt::Debug for Block<A, B, D, P, Q> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_tuple("Block").field(&self.left).field(&self.right).finish()
-    }
-}
-
-impl<A, B, D, P, Q> InnerProduct<Vector<Product<A, B>, D>> for Block<A, B, D, P, Q>
-where
-    A: Times<B>,
-    B: Space,
-    D: Scalar,
-    P: InnerProduct<Vector<A, D>>,
-    Q: InnerProduct<Vector<B, D>>,
-{
-    #[inline]
-    fn flat(&self, v: &Vector<Product<A, B>, D>) -> Vector<Product<A, B>, D> {
-        let (a, b) = Product::<A, B>::split(v);
-        Product::<A, B>::join(&self.left.flat(&a), &self.right.flat(&b))
-    }
-
-    #[inline]
-    fn orthonormal(&self, alpha: &Vector<Product<A, B>, D>) -> Vector<Product<A, B>, D> {
-        let (a, b) = Product::<A, B>::split(alpha);
-        Product::<A, B>::join(&self.left.orthonormal(&a), &self.right.orthonormal(&b))
-    }
-
-    #[inline]
-    fn from_orthonormal(&self, alpha: &Vector<Product<A, B>, D>) -> Vector<Product<A, B>, D> {
-        let (a, b) = Product::<A, B>::split(alpha);
-        Product::<A, B>::join(&self.left.from_orthonormal(&a), &self.right.from_orthonormal(&b))
-    }
-}
-
-/// The metric of a product, factor by factor.
-macro_rules! metric_of_the_factors {
-    () => {
-        type At<D: Scalar> = Block<
-            A,
-            B,
-            D,
-            <<Self as Split<A, B>>::Left as Riemannian<A>>::At<D>,
-            <<Self as Split<A, B>>::Right as Riemannian<B>>::At<D>,
-        >;
-
-        #[inline]
-        fn at<D: Scalar>(
-            &self,
-            x: &ChartPoint<Product<A, B>, D>,
-        ) -> Result<Self::At<D>, MetricError> {
-            let ((g, f), (a, b)) = (Split::<A, B>::halves(self), Product::parts(x));
-            Ok(Block { left: g.at(&a)?, right: f.at(&b)?, factors: PhantomData })
-        }
-
-        fn matrix<D: Scalar>(&self, x: &ChartPoint<Product<A, B>, D>) -> Matrix<Product<A, B>, D> {
-            let ((g, f), (a, b)) = (Split::<A, B>::halves(self), Product::parts(x));
-            Product::<A, B>::block(&g.matrix(&a), &f.matrix(&b))
-        }
-
-        fn volume_density<D: Scalar>(
-            &self,
-            x: &ChartPoint<Product<A, B>, D>,
-        ) -> Result<D, MetricError> {
-            let ((g, f), (a, b)) = (Split::<A, B>::halves(self), Product::parts(x));
-            Ok(g.volume_density(&a)? * f.volume_density(&b)?)
-        }
-
-        fn exp<D: Scalar>(
-            &self,
-            x: &ChartPoint<Product<A, B>, D>,
-            v: &Vector<Product<A, B>, D>,
-        ) -> Result<GeodesicEnd<Product<A, B>, D>, MetricError> {
-            let ((g, f), (a, b)) = (Split::<A, B>::halves(self), Product::parts(x));
-            let (va, vb) = Product::<A, B>::split(v);
-            let ((a, va), (b, vb)) = (g.exp(&a, &va)?, f.exp(&b, &vb)?);
-            let q = Product::<A, B>::join(&a.q, &b.q);
-            let end = ChartPoint { base: (a.base, b.base), q };
-            Ok((end, Product::<A, B>::join(&va, &vb)))
-        }
-
-        fn end(
-            &self,
-            x: &(A::Point<f64>, B::Point<f64>),
-            v: &Vector<Product<A, B>>,
-        ) -> Result<(A::Point<f64>, B::Point<f64>), MetricError> {
-            let ((g, f), (a, b)) = (Split::<A, B>::halves(self), Product::<A, B>::split(v));
-            Ok((Riemannian::<A>::end(g, &x.0, &a)?, Riemannian::<B>::end(f, &x.1, &b)?))
-        }
-
-        fn along(
-            &self,
-            x: &(A::Point<f64>, B::Point<f64>),
-            v: &Vector<Product<A, B>>,
-            t: f64,
-        ) -> Result<(A::Point<Real>, B::Point<Real>), MetricError> {
-            let ((g, f), (a, b)) = (Split::<A, B>::halves(self), Product::<A, B>::split(v));
-            Ok((Riemannian::<A>::along(g, &x.0, &a, t)?, Riemannian::<B>::along(f, &x.1, &b, t)?))
-        }
-
-        fn log(
-            &self,
-            x: &(A::Point<f64>, B::Point<f64>),
-            y: &(A::Point<f64>, B::Point<f64>),
-        ) -> Result<Vector<Product<A, B>>, MetricError> {
-            let (g, f) = Split::<A, B>::halves(self);
-            Ok(Product::<A, B>::join(
-                &Riemannian::<A>::log(g, &x.0, &y.0)?,
-                &Riemannian::<B>::log(f, &x.1, &y.1)?,
-            ))
-        }
-
-        fn weyl_arc(
-            &self,
-            x: &(A::Point<f64>, B::Point<f64>),
-            d: &Vector<Product<A, B>>,
-        ) -> Result<StepPath<Product<A, B>>, MetricError> {
-            let ((g, f), (da, db)) = (Split::<A, B>::halves(self), Product::<A, B>::split(d));
-            let (a, b) = (
-                Riemannian::<A>::weyl_arc(g, &x.0, &da)?,
-                Riemannian::<B>::weyl_arc(f, &x.1, &db)?,
-            );
-            Ok(StepPath {
-                z: ChartPoint {
-                    base: (a.z.base, b.z.base),
-                    q: Product::<A, B>::join(&a.z.q, &b.z.q),
-                },
-                d: Product::<A, B>::join(&a.d, &b.d),
-                end: (a.end, b.end),
-            })
-        }
-
-        fn weyl_jet(
-            &self,
-            x: &(A::Point<f64>, B::Point<f64>),
-            d: &Vector<Product<A, B>>,
-        ) -> Result<StepPathJet<Product<A, B>>, MetricError> {
-            let ((g, f), (da, db)) = (Split::<A, B>::halves(self), Product::<A, B>::split(d));
-            let (a, b) = (
-                Riemannian::<A>::weyl_jet(g, &x.0, &da)?,
-                Riemannian::<B>::weyl_jet(f, &x.1, &db)?,
-            );
-            Ok(StepPathJet {
-                z: (a.z, b.z),
-                dz: Product::<A, B>::block(&a.dz, &b.dz),
-                d: Product::<A, B>::join(&a.d, &b.d),
-                dd: Product::<A, B>::block(&a.dd, &b.dd),
-                end: (a.end, b.end),
-                dend: Product::<A, B>::block(&a.dend, &b.dend),
-            })
-        }
-
-        fn accuracy(&self) -> f64 {
-            let (g, f) = Split::<A, B>::halves(self);
-            Riemannian::<A>::accuracy(g).max(Riemannian::<B>::accuracy(f))
-        }
-
-        #[inline]
-        fn lost(
-            &self,
-            x: &(A::Point<f64>, B::Point<f64>),
-            v: &Vector<Product<A, B>>,
-            y: &(A::Point<f64>, B::Point<f64>),
-        ) -> Vector<Product<A, B>> {
-            let ((g, f), (a, b)) = (Split::<A, B>::halves(self), Product::<A, B>::split(v));
-            Product::<A, B>::join(
-                &Riemannian::<A>::lost(g, &x.0, &a, &y.0),
-                &Riemannian::<B>::lost(f, &x.1, &b, &y.1),
-            )
-        }
-
-        fn slopes(
-            &self,
-            x: &(A::Point<f64>, B::Point<f64>),
-        ) -> Option<<A::SumDim as Dimension>::Array<Matrix<Product<A, B>>>> {
-            let (g, f) = Split::<A, B>::halves(self);
-            let (a, b) = (Riemannian::<A>::slopes(g, &x.0), Riemannian::<B>::slopes(f, &x.1));
-            if a.is_none() && b.is_none() {
-                return None;
-            }
-            let (left, right) = (Matrix::<A>::zeros(), Matrix::<B>::zeros());
-            let n = A::Dim::LEN;
-            Some(A::SumDim::array(|k| match (k < n, &a, &b) {
-                (true, Some(a), _) => Product::<A, B>::block(&a[k], &right),
-                (false, _, Some(b)) => Product::<A, B>::block(&left, &b[k - n]),
-                _ => Matrix::<Product<A, B>>::zeros(),
-            }))
-        }
-    };
-}
-
-impl<A, B, G, F> Riemannian<Product<A, B>> for (G, F)
-where
-    A: Times<B>,
-    B: Space,
-    G: Riemannian<A>,
-    F: Riemannian<B>,
-{
-    metric_of_the_factors!();
-}
-
-impl<A, B> Riemannian<Product<A, B>> for Canonical
-where
-    A: Times<B>,
-    B: Space,
-    Self: Riemannian<A> + Riemannian<B>,
-{
-    metric_of_the_factors!();
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::{
-        Euclidean, Exponential, HalfLine, Metric, PointError, Rotations, Sphere, WeylMidpoint, laws,
+        Canonical, Euclidean, Exponential, HalfLine, Metric, PointError, Riemannian, Rotations,
+        Sphere, WeylMidpoint, laws,
     };
     use nalgebra::{Matrix3, SMatrix, SVector, Vector1, Vector3, Vector6, vector};
     use num_dual::DualNum;

@@ -4,7 +4,8 @@ use metriplectic_fields::{ChartPoint, Column, Scalar, Space};
 use nalgebra::SVector;
 use num_dual::Dual;
 
-use crate::metric::{MetricError, finite_column, stretched, within};
+use crate::metric::{MetricError, stretched};
+use crate::metric_error::{finite_column, within};
 use crate::retraction::jet_by_dual_numbers;
 use crate::sphere::{angle, components, frame, normalised, spread};
 use crate::{Nodes, PointPair, Retraction, Riemannian, Sphere, StepPath, StepPathJet, Tangent};
@@ -16,7 +17,7 @@ use crate::{Nodes, PointPair, Retraction, Riemannian, Sphere, StepPath, StepPath
 /// z = \frac{x + x'}{|x + x'|}, \quad d = \frac{2 (x' - x)}{|x + x'|} .
 /// ```
 ///
-/// Rational but for one root, of order 2, and exact in the energy like every other retraction
+/// It is rational but for one root, has order 2, and conserves the energy exactly like every other retraction
 /// (Absil, Mahony, Sepulchre 2008, §4.1.2, for the projection; symmetrised about `z`). It differs from
 /// [`WeylMidpoint`](crate::WeylMidpoint) in the length only: `|d| = 2 tan(θ/2)` for points at the angle
 /// `θ`, which grows without bound at the antipode.

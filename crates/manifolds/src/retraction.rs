@@ -1,23 +1,23 @@
-//! Retractions: how a tangent vector becomes a pair of points.
+//! Retractions, which map a tangent vector to a pair of points.
 
 use approx::{AbsDiffEq, RelativeEq};
-use metriplectic_fields::{
-    ChartPoint, Column, Dimension, Matrix, Real, Scalar, Space, Square, Vector,
-};
+use metriplectic_fields::{Column, Dimension, Matrix, Real, Scalar, Space, Square, Vector};
 use num_dual::Dual64;
 
 use crate::{Manifold, MetricError, Riemannian};
 
+pub use crate::step_path::{StepPath, StepPathJet};
+
 /// A discrete derivative `R_h: TM → M × M` (Bloch, Farré Puiggalí, Martín de Diego 2024, §4.4):
 /// a base point `z` and a vector `v ∈ T_zM` stand for a pair `(x, x')`.
 ///
-/// Everything here is written in the displacement `d = hv`, so no step size appears.
+/// The methods use the displacement `d = hv`, so no step size appears.
 ///
 /// Laws ([`laws::retraction`](crate::laws::retraction)): 1. `R_h⁻¹ R_h = 1`; 2. the path from `x`
-/// ends where the pair does; 3. `real_step_path` is `path`, and `step_path_jet` its derivative; 4. a symmetric one returns
-/// the same base and the opposite vector for the swapped pair.
+/// ends where the pair does; 3. `real_step_path` is `path`, and `step_path_jet` its derivative; 4. a symmetric retraction
+/// returns the same base and the opposite vector for the swapped pair.
 pub trait Retraction<M: Manifold, G: Riemannian<M>> {
-    /// The path that leaves `x` with initial displacement `u ∈ T_xM`: the unknown of a step.
+    /// Follows the path that leaves `x` with initial displacement `u ∈ T_xM`, the unknown of a step.
     ///
     /// # Errors
     ///
@@ -29,7 +29,7 @@ pub trait Retraction<M: Manifold, G: Riemannian<M>> {
         u: &Vector<M, D>,
     ) -> Result<StepPath<M, D>, MetricError>;
 
-    /// The same path at `f64`, in the charts at its own points.
+    /// Follows the same path at `f64`, in the charts at its points.
     ///
     /// # Errors
     ///
@@ -44,7 +44,7 @@ pub trait Retraction<M: Manifold, G: Riemannian<M>> {
         self.step_path(metric, x, u)
     }
 
-    /// The end of the path of `u` alone; that of a geodesic, unless the retraction says otherwise.
+    /// Computes the end of the path of `u`. By default it is the end of a geodesic.
     ///
     /// # Errors
     ///
@@ -59,8 +59,7 @@ pub trait Retraction<M: Manifold, G: Riemannian<M>> {
         metric.end(x, u)
     }
 
-    /// A curve from the start of the path to its end; the geodesic, unless the retraction says
-    /// otherwise.
+    /// Computes a curve from the start of the path to its end. By default it is the geodesic.
     ///
     /// # Errors
     ///
@@ -70,7 +69,7 @@ pub trait Retraction<M: Manifold, G: Riemannian<M>> {
         Nodes::of(|t| metric.along(x, u, t))
     }
 
-    /// The same path at `f64`, with its derivatives along `u`.
+    /// Follows the same path at `f64`, with its derivatives along `u`.
     ///
     /// # Errors
     ///
@@ -82,14 +81,14 @@ pub trait Retraction<M: Manifold, G: Riemannian<M>> {
         u: &Vector<M>,
     ) -> Result<StepPathJet<M>, MetricError>;
 
-    /// `R_h(v)`: the pair `(x, x')` of the displacement `d = hv` at `z`.
+    /// Computes `R_h(v)`, the pair `(x, x')` of the displacement `d = hv` at `z`.
     ///
     /// # Errors
     ///
     /// [`MetricError`] if the geodesic cannot be followed.
     fn pair(&self, metric: &G, tangent: &Tangent<M>) -> Result<PointPair<M>, MetricError>;
 
-    /// `R_h⁻¹(x, y)`: the base point and the displacement `d = hv`.
+    /// Computes `R_h⁻¹(x, y)`, the base point and the displacement `d = hv`.
     ///
     /// # Errors
     ///
@@ -127,51 +126,6 @@ impl<M: Space> Nodes<M> {
         at: impl Fn(f64) -> Result<M::Point<Real>, MetricError>,
     ) -> Result<Self, MetricError> {
         Ok(Self { ends: [at(0.0)?, at(1.0)?], middle: Some(at(0.5)?) })
-    }
-}
-
-/// A step's path: its base point, its displacement there, and its end.
-#[derive(Clone, Debug)]
-pub struct StepPath<M: Space, D: Scalar = f64> {
-    /// The base point `z`.
-    pub z: ChartPoint<M, D>,
-    /// The displacement `d = hv ∈ T_zM`.
-    pub d: Vector<M, D>,
-    /// The end `x'`.
-    pub end: M::Point<D>,
-}
-
-/// A step's path at `f64`, with its derivatives along the unknown `u`.
-#[derive(Clone, Debug)]
-pub struct StepPathJet<M: Space> {
-    /// The base point `z`.
-    pub z: M::Point<f64>,
-    /// `∂z/∂u` in the chart at `z`.
-    pub dz: Matrix<M>,
-    /// The displacement `d = hv ∈ T_zM`.
-    pub d: Vector<M>,
-    /// `∂d/∂u` in the chart at `z`.
-    pub dd: Matrix<M>,
-    /// The end `x'`.
-    pub end: M::Point<f64>,
-    /// `∂x'/∂u` in the chart at `x'`.
-    pub dend: Matrix<M>,
-}
-
-impl<M: Space> StepPathJet<M> {
-    /// The straight line of a flat space, with its middle as the base: `z = x + u/2`, `d = u`,
-    /// `x' = x + u`.
-    #[inline]
-    pub fn straight(x: &M::Point<f64>, u: &Vector<M>) -> Self {
-        let one = Matrix::<M>::one();
-        Self {
-            z: M::chart(x, &(*u * 0.5)),
-            dz: one * 0.5,
-            d: *u,
-            dd: one,
-            end: M::chart(x, u),
-            dend: one,
-        }
     }
 }
 

@@ -13,19 +13,19 @@
 //!
 //! The chart ends with one step `R ← R(3 − RᵀR)/2` of the polar iteration (Higham 2008, ch. 8), so that
 //! every matrix of a run is orthogonal to round-off and
-//! [never drifts](mod@crate::manifold#why-points-do-not-drift). The logarithm goes through the quaternion of
-//! largest pivot (Shepperd 1978); from `θ = 10⁻¹⁵` to `π − 10⁻¹⁰` that of a rounded rotation was measured
-//! within `3ε` of the exact one, relative to `θ`. The functions [`exp`], [`log`], [`dexp`] and [`dexp_inverse`] are right at `q = 0` for
+//! [never drifts](mod@crate::manifold#why-points-do-not-drift). The logarithm uses the quaternion of largest
+//! pivot (Shepperd 1978). From `θ = 10⁻¹⁵` to `π − 10⁻¹⁰` the logarithm of a rounded rotation was measured
+//! within `3ε` of the exact logarithm, relative to `θ`. The functions [`exp`], [`log`], [`dexp`] and [`dexp_inverse`] are right at `q = 0` for
 //! dual numbers of every order.
 //!
 //! - **Geodesics** of the bi-invariant metric `⟨â, b̂⟩ = a·b` are `R exp(tΩ̂)`, `log_R(Y) = log(RᵀY)`, up to
-//!   the injectivity radius π, beyond which they are refused; the curvature is ¼ (do Carmo 1992, ch. 4,
+//!   the injectivity radius π. Longer geodesics are refused. The curvature is ¼ (do Carmo 1992, ch. 4,
 //!   exercise 1).
 //! - **Other metrics** are inner products on so(3), by [`Metric::field`](crate::Metric::field), whose
-//!   logarithms are refused at half a turn too, where two straight lines of the chart are equally long. A
-//!   constant one, `J`, is left-invariant, and its geodesics are the motions of the free rigid body,
+//!   logarithms are also refused at half a turn, where two straight lines of the chart are equally long. A
+//!   constant inner product `J` is left-invariant. Its geodesics are the motions of the free rigid body,
 //!   `JΩ' = JΩ × Ω` (Euler; Arnold 1966). [`Cayley`](crate::Cayley) is a retraction for all of them.
-//! - **Brackets**: none unless one is asked for. `Nambu`, with the entropy as its Casimir,
+//! - **Brackets**: none by default. `Nambu`, with the entropy as its Casimir,
 //!
 //! ```math
 //! R' = R\, \hat\Omega, \qquad \Omega = \lambda \frac{dS \times dH}{\sqrt{\det g}},
@@ -36,18 +36,22 @@
 
 use std::f64::consts::PI;
 
-use metriplectic_fields::series::{angle_over_sine, stumpff};
+use metriplectic_fields::series::stumpff;
 use metriplectic_fields::{
     ChartPoint, Column, Dimension, MatrixJet, Real, Scalar, Space, Square, product_rule,
 };
-use nalgebra::{Const, Matrix3, Quaternion, SMatrix, UnitQuaternion, Vector3, Vector4};
+use nalgebra::{Const, Matrix3, SMatrix, Vector3, Vector4};
 use num_dual::Dual;
 use rand::{Rng, RngExt};
 
-use crate::metric::{GeodesicEnd, MetricError, finite, finite_column, within};
+use crate::metric::{GeodesicEnd, MetricError};
+use crate::metric_error::{finite, finite_column, within};
 use crate::normal::Normal;
+use crate::rotation_vector::{moved, orthogonal, product, quaternion, rodrigues, spun, turn};
 use crate::sphere::along;
 use crate::{Canonical, Manifold, PointError, Riemannian, StepPath, StepPathJet};
+
+pub use crate::rotation_vector::{dexp, dexp_inverse, exp, hat, log, vee};
 
 /// The rotation group `SO(3)`: 3 × 3 rotation matrices, with tangent vectors in the body frame and the
 /// bi-invariant metric as the canonical one; see the [module](mod@crate::rotations).
@@ -68,139 +72,6 @@ impl Rotations {
     pub const fn bi_invariant() -> Self {
         Self
     }
-}
-
-/// The matrix of `v ↦ a × v`.
-pub fn hat<D: Scalar>(a: &Vector3<D>) -> Matrix3<D> {
-    let zero = D::zero();
-    Matrix3::new(zero, -a.z, a.y, a.z, zero, -a.x, -a.y, a.x, zero)
-}
-
-/// The vector of the skew part of a matrix: `vee(hat(a)) = a`.
-pub fn vee<D: Scalar>(m: &Matrix3<D>) -> Vector3<D> {
-    Vector3::new(m.m32 - m.m23, m.m13 - m.m31, m.m21 - m.m12) * D::from(0.5)
-}
-
-/// `1 + a q̂ + b q̂²`, the form of all that follows, with `q̂² = q qᵀ − |q|²`.
-#[inline]
-fn rodrigues<D: Scalar>(q: &Vector3<D>, a: D, b: D) -> Matrix3<D> {
-    let (turn, bend) = (q * a, q * b);
-    let [xx, yy, zz] = [bend.x * q.x, bend.y * q.y, bend.z * q.z];
-    let [xy, xz, yz] = [bend.x * q.y, bend.x * q.z, bend.y * q.z];
-    Matrix3::new(
-        -(yy + zz) + 1.0,
-        xy - turn.z,
-        xz + turn.y,
-        xy + turn.z,
-        -(xx + zz) + 1.0,
-        yz - turn.x,
-        xz - turn.y,
-        yz + turn.x,
-        -(xx + yy) + 1.0,
-    )
-}
-
-/// The rotation by the vector `q`: `exp(q̂)` by Rodrigues' formula, right under dual numbers of
-/// every order at `q = 0`.
-#[inline]
-pub fn exp<D: Scalar>(q: &Vector3<D>) -> Matrix3<D> {
-    let [_, c1, c2, _] = stumpff(q.dot(q));
-    rodrigues(q, c1, c2)
-}
-
-/// The rotation vector of a matrix, `|q| ≤ π`: the inverse of [`exp`], accurate to a few `ε` up to
-/// half a turn.
-///
-/// Through the quaternion `(w, v) = (cos θ/2, sin θ/2 · axis)` of largest pivot, and
-/// `q = 2 atan2(|v|, w) v/|v|`.
-pub fn log<D: Scalar>(r: &Matrix3<D>) -> Vector3<D> {
-    let [w, x, y, z] = quaternion(r);
-    let v = Vector3::new(x, y, z);
-    v * (angle_over_sine(v.dot(&v), w) * 2.0)
-}
-
-/// The unit quaternion `(w, x, y, z)`, `w ≥ 0`, of a rotation matrix, from the largest of its four
-/// squared components (Shepperd 1978).
-fn quaternion<D: Scalar>(r: &Matrix3<D>) -> [D; 4] {
-    let trace = r.m11 + r.m22 + r.m33;
-    let squares = [trace, r.m11 * 2.0 - trace, r.m22 * 2.0 - trace, r.m33 * 2.0 - trace];
-    let pivot =
-        (1..4).fold(0, |best, k| if squares[k].re() > squares[best].re() { k } else { best });
-    let largest = (squares[pivot] + 1.0).sqrt() * 0.5;
-    let scale = (largest * 4.0).recip();
-    let skew = [r.m32 - r.m23, r.m13 - r.m31, r.m21 - r.m12].map(|entry| entry * scale);
-    let [xy, xz, yz] = [r.m12 + r.m21, r.m13 + r.m31, r.m23 + r.m32].map(|entry| entry * scale);
-    let q = match pivot {
-        0 => [largest, skew[0], skew[1], skew[2]],
-        1 => [skew[0], largest, xy, xz],
-        2 => [skew[1], xy, largest, yz],
-        _ => [skew[2], xz, yz, largest],
-    };
-    if q[0].re() < 0.0 { q.map(|entry| -entry) } else { q }
-}
-
-/// The rotation of a quaternion `(w, x, y, z)` that is not too short to be divided by its norm.
-fn turn([w, x, y, z]: [f64; 4]) -> Matrix3<f64> {
-    UnitQuaternion::new_normalize(Quaternion::new(w, x, y, z)).to_rotation_matrix().into_inner()
-}
-
-/// The left-trivialised derivative of the exponential: `exp(q̂)ᵀ d exp(q̂) = hat(dexp(q) dq)`,
-///
-/// ```math
-/// \mathrm{dexp}(q) = 1 - \frac{1 - \cos\theta}{\theta^2} \hat q
-///                      + \frac{\theta - \sin\theta}{\theta^3} \hat q^2 .
-/// ```
-#[inline]
-pub fn dexp<D: Scalar>(q: &Vector3<D>) -> Matrix3<D> {
-    let [_, _, c2, c3] = stumpff(q.dot(q));
-    rodrigues(q, -c2, c3)
-}
-
-/// The inverse of [`dexp`], `1 + ½q̂ + (1 − ½θ cot ½θ)/θ² q̂²`, for `|q| < 2π`.
-pub fn dexp_inverse<D: Scalar>(q: &Vector3<D>) -> Matrix3<D> {
-    // With t = θ²/4 the weight is (c₁ − c₀)/(4t c₁), and c₁ − c₀ = t (c₂ − c₃).
-    let [_, c1, c2, c3] = stumpff(q.dot(q) * 0.25);
-    rodrigues(q, D::from(0.5), (c2 - c3) / c1 * 0.25)
-}
-
-/// `A B`: nalgebra's product is not made for so few entries.
-#[inline]
-fn product<D: Scalar>(a: &Matrix3<D>, b: &Matrix3<D>) -> Matrix3<D> {
-    Matrix3::from_fn(|i, j| a[(i, 0)] * b[(0, j)] + a[(i, 1)] * b[(1, j)] + a[(i, 2)] * b[(2, j)])
-}
-
-/// `A B` with a real matrix `B`.
-#[inline]
-fn times<D: Scalar>(a: &Matrix3<D>, b: &Matrix3<f64>) -> Matrix3<D> {
-    Matrix3::from_fn(|i, j| a[(i, 0)] * b[(0, j)] + a[(i, 1)] * b[(1, j)] + a[(i, 2)] * b[(2, j)])
-}
-
-/// `A B` with a real matrix `A`.
-#[inline]
-fn moved<D: Scalar>(a: &Matrix3<f64>, b: &Matrix3<D>) -> Matrix3<D> {
-    Matrix3::from_fn(|i, j| b[(0, j)] * a[(i, 0)] + b[(1, j)] * a[(i, 1)] + b[(2, j)] * a[(i, 2)])
-}
-
-/// `A ω̂`.
-#[inline]
-fn spun(a: &Matrix3<f64>, omega: &Vector3<f64>) -> Matrix3<f64> {
-    let [x, y, z] = [a.column(0), a.column(1), a.column(2)];
-    Matrix3::from_columns(&[
-        y * omega.z - z * omega.y,
-        z * omega.x - x * omega.z,
-        x * omega.y - y * omega.x,
-    ])
-}
-
-/// One step of Newton's iteration for the polar factor, `R ← R(3 − RᵀR)/2` with the real part of
-/// `RᵀR`, which squares the defect and leaves derivatives along the group alone.
-#[inline]
-pub(crate) fn orthogonal<D: Scalar>(r: &Matrix3<D>) -> Matrix3<D> {
-    let real = r.map(|entry| entry.re());
-    let dot = |i, j| real.column(i).dot(&real.column(j));
-    let [xx, yy, zz] = [dot(0, 0), dot(1, 1), dot(2, 2)].map(|square| 1.5 - 0.5 * square);
-    let [xy, xz, yz] = [dot(0, 1), dot(0, 2), dot(1, 2)].map(|product| -0.5 * product);
-    times(r, &Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz))
 }
 
 impl Space for Rotations {
@@ -228,9 +99,9 @@ impl Space for Rotations {
     #[inline]
     fn seeds(x: &Matrix3<f64>) -> impl Fn(usize, usize) -> Matrix3<Real> {
         let x = *x;
-        let dg_v = [spun(&x, &Vector3::x()), spun(&x, &Vector3::y()), spun(&x, &Vector3::z())];
+        let turned = [spun(&x, &Vector3::x()), spun(&x, &Vector3::y()), spun(&x, &Vector3::z())];
         move |i, j| {
-            let turn = |k: usize, r, c| if k < 3 { dg_v[k][(r, c)] } else { 0.0 };
+            let turn = |k: usize, r, c| if k < 3 { turned[k][(r, c)] } else { 0.0 };
             let half = |k: usize, r| if k < 3 { 0.5 * x[(r, k)] } else { 0.0 };
             Matrix3::from_fn(|r, c| {
                 let mut bend = if i == j && i < 3 { -x[(r, c)] } else { 0.0 };
@@ -298,8 +169,8 @@ impl Manifold for Rotations {
         1.0
     }
 
-    /// The polar factor `R`, with `RᵀA` symmetric: the nearest rotation in the Frobenius norm, one of
-    /// them for a matrix that has several (Higham 1989). A matrix that is not finite is left alone.
+    /// Returns the polar factor `R`, with `RᵀA` symmetric: the nearest rotation in the Frobenius norm, or one of
+    /// several (Higham 1989). It returns a matrix that is not finite without change.
     fn project(&self, x: &Matrix3<f64>) -> Matrix3<f64> {
         let largest = x.max_abs();
         if !largest.is_finite() {
@@ -395,8 +266,8 @@ impl Riemannian<Rotations> for Canonical {
         let end = orthogonal(&(x.point() * exp(&omega)));
         let base = Rotations::real(&end);
         // The body velocity is constant; the chart at the end reads it by one more dual number.
-        let dg_v = end * hat(&omega);
-        let moved = end.zip_map(&dg_v, Dual::new);
+        let turned = end * hat(&omega);
+        let moved = end.zip_map(&turned, Dual::new);
         let q = Rotations::coordinates(&base, &moved);
         let at = ChartPoint { base, q: finite_column("a coordinate of the end", q.map(|q| q.re))? };
         Ok((at, q.map(|q| q.eps)))
@@ -435,7 +306,7 @@ impl Riemannian<Rotations> for Canonical {
     }
 
     #[inline]
-    fn weyl_arc(
+    fn weyl_path(
         &self,
         x: &Matrix3<f64>,
         d: &Vector3<f64>,
@@ -617,10 +488,10 @@ mod tests {
             prop_assert!(Rotations.defect(&r) < 1e-15);
             prop_assert!((r - Rotations.from_quaternion((-q).into()).unwrap()).amax() < 1e-15);
             let v = vector![q[1], q[2], q[3]];
-            let dg_v = v * (2.0 * v.dot(&Vector3::x()))
+            let turned = v * (2.0 * v.dot(&Vector3::x()))
                 + Vector3::x() * (q[0] * q[0] - v.norm_squared())
                 + v.cross(&Vector3::x()) * (2.0 * q[0]);
-            prop_assert!((r.column(0) - dg_v).norm() < 1e-15);
+            prop_assert!((r.column(0) - turned).norm() < 1e-15);
             let back = Vector4::from(Rotations.to_quaternion(&r));
             prop_assert!(back[0] >= 0.0);
             prop_assert!((back - q * 1_f64.copysign(q[0])).norm() < 1e-15);

@@ -22,15 +22,15 @@
 //! \theta = \mathrm{atan2}\bigl(|E^T (y \mp x)|,\ x^T y\bigr) ,
 //! ```
 //!
-//! with the sign that makes `y ∓ x` short: `Eᵀx = 0`, and a long one has lost digits.
+//! with the sign that makes `y ∓ x` short. `Eᵀx = 0`, so both signs are exact, and the short one has more digits.
 //! - **Geodesics** of the round metric are great circles, `exp_x(v) = φ_x(v)` and
-//!   `log_x(y) = φ_x⁻¹(y)`, up to the injectivity radius π, beyond which they are refused (Absil, Mahony
-//!   and Sepulchre 2008, §5.4). From `θ = 10⁻¹⁵` to `π − 10⁻¹⁰` the logarithm of rounded points was
-//!   measured within `8ε min(θ, 1)/(π − θ)` of the exact one of these very points, as its direction is
-//!   lost at the antipode, and their distance within `3ε min(θ, 1)`.
+//!   `log_x(y) = φ_x⁻¹(y)`, up to the injectivity radius π (Absil, Mahony and Sepulchre 2008, §5.4). Longer
+//!   geodesics are refused. From `θ = 10⁻¹⁵` to `π − 10⁻¹⁰` the logarithm of rounded points was measured within
+//!   `8ε min(θ, 1)/(π − θ)` of their exact logarithm, whose direction is undefined at the antipode. Their
+//!   distance was measured within `3ε min(θ, 1)`.
 //! - **Other metrics** are forms on Rⁿ⁺¹, by [`Metric::field`](crate::Metric::field);
 //!   [`Projection`](crate::Projection) is a retraction for all of them.
-//! - **Brackets**: none unless one is asked for. `AreaForm` on S², `x' = x × ∇H` (Marsden and Ratiu 1999,
+//! - **Brackets**: none by default. `AreaForm` on S², `x' = x × ∇H` (Marsden and Ratiu 1999,
 //!   §2), without a Casimir; `Nambu` on S³, with the volume `det[x, a, b, c]`, and with `n − 2` Casimirs on Sⁿ;
 //!   `Poisson::field` with a bivector of Rⁿ⁺¹.
 
@@ -44,7 +44,8 @@ use nalgebra::{Const, SMatrix, SVector};
 use num_dual::{Dual, Dual64};
 use rand::{Rng, RngExt};
 
-use crate::metric::{GeodesicEnd, MetricError, finite_column, within};
+use crate::metric::{GeodesicEnd, MetricError};
+use crate::metric_error::{finite_column, within};
 use crate::normal::Normal;
 use crate::{Canonical, Manifold, Riemannian, StepPath, StepPathJet};
 
@@ -376,7 +377,7 @@ macro_rules! sphere {
 
             /// `γ'(½) = c₀ U − ½s c₁ x` with `U = E(x) d` and the Stumpff functions at `s/4 = |d|²/4`.
             #[inline]
-            fn weyl_arc(
+            fn weyl_path(
                 &self,
                 x: &SVector<f64, $a>,
                 d: &SVector<f64, $n>,

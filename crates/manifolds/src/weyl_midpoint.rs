@@ -38,7 +38,7 @@ impl<M: Manifold, G: Riemannian<M>> Retraction<M, G> for WeylMidpoint {
         x: &M::Point<f64>,
         u: &Vector<M>,
     ) -> Result<StepPath<M>, MetricError> {
-        metric.weyl_arc(x, u)
+        metric.weyl_path(x, u)
     }
 
     #[inline]

@@ -38,12 +38,12 @@ macro_rules! logarithms_of_the_sphere {
                 let (x, y) = (column::<$a>(&case["x"]), column::<$a>(&case["y"]));
                 let (angle, gap) = (number(&case["angle"]), number(&case["gap"]));
                 let distance = Riemannian::<Sphere<$n>>::distance(&Canonical, &x, &y).unwrap();
-                let off = (distance - angle).abs() / EPSILON;
-                assert!(off <= 4.0 * angle.min(1.0), "θ = {angle}: off by {off:.2} ε");
+                let error = (distance - angle).abs() / EPSILON;
+                assert!(error <= 4.0 * angle.min(1.0), "θ = {angle}: off by {error:.2} ε");
                 let log = Riemannian::<Sphere<$n>>::log(&Canonical, &x, &y).unwrap();
-                let off = (log - column::<$n>(&case["log"])).norm() * gap / EPSILON;
+                let error = (log - column::<$n>(&case["log"])).norm() * gap / EPSILON;
                 let bound = if angle < 2.0 { 8.0 * angle.min(1.0) } else { 4.0 };
-                assert!(off <= bound, "θ = {angle}: off by {off:.2} ε/(π − θ)");
+                assert!(error <= bound, "θ = {angle}: off by {error:.2} ε/(π − θ)");
             }
         }
     };
@@ -59,8 +59,8 @@ fn logarithms_of_rotations_have_their_digits_up_to_half_a_turn() {
     for case in cases("rotations") {
         let r = Matrix3::from_row_slice(column::<9>(&case["rows"]).as_slice());
         let exact = column::<3>(&case["log"]);
-        let off = (rotations::log(&r) - exact).norm() / (exact.norm() * EPSILON);
-        assert!(off <= 4.0, "θ = {}: off by {off:.2} ε", exact.norm());
+        let error = (rotations::log(&r) - exact).norm() / (exact.norm() * EPSILON);
+        assert!(error <= 4.0, "θ = {}: off by {error:.2} ε", exact.norm());
         let log = Riemannian::<Rotations>::log(&Canonical, &Matrix3::identity(), &r).unwrap();
         assert_eq!(log, rotations::log(&r));
     }

@@ -11,7 +11,7 @@ use metriplectic_dynamics::{
     system::Point,
 };
 use metriplectic_fields::{ChartPoint, Column, Real, Space, Vector};
-use metriplectic_integrators::{Certificate, Run, Scheme, Span};
+use metriplectic_integrators::{Certificate, Method as _, Run, Scheme, Span};
 use metriplectic_manifolds::{
     Canonical, Cayley, Euclidean, Exponential, HalfLine, LieDual, Manifold, Metric, Product,
     Projection, Retraction, Riemannian as _, Rotations, Sphere, WeylMidpoint, rotations,
@@ -193,7 +193,7 @@ impl Study for LargeSteps {
             let (before, after) = (system.energy_at(&x), system.energy_at(y));
             let error = (after - before).abs() / before.abs().max(1.0);
             row.energy_error = row.energy_error.max(error);
-            if run.certificate().retries == 0
+            if run.certificate().effort.splits == 0
                 && let Ok(d) = retraction.inverse(system.metric(), &x, y)
                 && let Ok(length) = system.metric().norm(&d.base, &d.vector)
             {
@@ -291,7 +291,7 @@ impl SecondLaws {
     /// The fraction by which the exact scheme solves more linear systems, over all problems.
     pub fn extra_iterations(&self) -> f64 {
         let sum = |of: fn(&Comparison) -> usize| self.rows.iter().map(of).sum::<usize>() as f64;
-        sum(|row| row.exact.iterations) / sum(|row| row.published.iterations) - 1.0
+        sum(|row| row.exact.effort.iterations) / sum(|row| row.published.effort.iterations) - 1.0
     }
 }
 

@@ -8,8 +8,8 @@ use nalgebra::{SMatrix, SVector};
 
 use super::{Bracket, BracketArgs, BracketJet, LiePoisson};
 
-/// A smooth force `𝓕: g → g*` on a Lie algebra of dimension `N`, in a basis and its dual basis; any
-/// such map will do.
+/// A smooth force `𝓕: g → g*` on a Lie algebra of dimension `N`, in a basis and its dual basis. Any
+/// such map is a force.
 ///
 /// Implemented by every closure `Fn(&SVector<Real, N>) -> SVector<Real, N>`. Implement it by hand,
 /// with the one method [`at`](Self::at), for a type that should be evaluated at each scalar directly:
@@ -38,7 +38,7 @@ pub trait Force<const N: usize> {
     /// The components of `𝓕(ξ)` at any scalar.
     fn at<D: Scalar>(&self, xi: &SVector<D, N>) -> SVector<D, N>;
 
-    /// The same at the scalar of closures, which a closure answers without a lift.
+    /// The same at the scalar of closures, at which a closure needs no lift.
     #[inline]
     fn at_real(&self, xi: &SVector<Real, N>) -> SVector<Real, N> {
         self.at(xi)
@@ -90,11 +90,11 @@ where
 /// \mu' = \mathrm{ad}^*_\xi \bigl( \mu + \mathcal F(\xi) \bigr), \qquad \xi = dH(\mu) .
 /// ```
 ///
-/// `H` is conserved whatever `𝓕` is, because `⟨ad*_ξ 𝓕, ξ⟩ = ⟨𝓕, [ξ, ξ]⟩ = 0`; in a step it is `w_H`
-/// that stands for `ξ`, and the same line holds. A Casimir `C` changes at the rate
+/// Every `𝓕` conserves `H`, because `⟨ad*_ξ 𝓕, ξ⟩ = ⟨𝓕, [ξ, ξ]⟩ = 0`. In a step `w_H` takes the place of
+/// `ξ`, with the same result. A Casimir `C` changes at the rate
 /// `C' = ⟨𝓕(ξ), [ξ, dC]⟩` (eq. "cas").
 ///
-/// [`SystemBuilder::force`](crate::SystemBuilder::force) makes this bracket. On a product it is one of a
+/// [`SystemBuilder::force`](crate::SystemBuilder::force) makes this bracket. On a product it is part of a
 /// pair: `(ForcedLiePoisson(force), Zero)`.
 #[derive(Clone, Copy)]
 pub struct ForcedLiePoisson<F>(pub F);
@@ -151,16 +151,16 @@ where
         let (force, slope) = self.0.jet1(w);
         let zero = SMatrix::<f64, N, N>::zeros();
         // ad*_δ 𝓕 = f δ with f_ba = C_ab^d 𝓕_d, and (ad*_w)_bd = C_ab^d w^a.
-        let (mut dg_v, mut coadjoint) = (zero, zero);
+        let (mut turned, mut coadjoint) = (zero, zero);
         for c in at.space.algebra().constants() {
-            dg_v[(c.b, c.a)] += c.value * force[c.d];
+            turned[(c.b, c.a)] += c.value * force[c.d];
             coadjoint[(c.b, c.d)] += c.value * w[c.a];
         }
         Ok(BracketJet {
             value: coadjoint * force,
             along_z: zero,
             along_s: zero,
-            tensor: dg_v + coadjoint * slope,
+            tensor: turned + coadjoint * slope,
         })
     }
 }

@@ -30,8 +30,8 @@ use super::{Bracket, BracketArgs, BracketJet, NaturalBracket, Zero};
 /// On R³ with `S = |p|²/2` it is the Lie-Poisson bracket of so(3)*; on SO(3), in the body frame,
 /// `Ω = dS × dH / √det g` and `R' = R Ω̂`; on Sⁿ the orientation is `vol(a, …, b) = det[x, a, …, b]`.
 ///
-/// The entropy is a Casimir by construction, also discretely. A step keeps the others to round-off if they are
-/// listed, too: [`SystemBuilder::casimir`](crate::SystemBuilder::casimir).
+/// The entropy is a Casimir by construction, also discretely. A step conserves the others to round-off if they
+/// are listed too: [`SystemBuilder::casimir`](crate::SystemBuilder::casimir).
 ///
 /// ```
 /// use metriplectic_dynamics::{Nambu, System};
@@ -70,8 +70,8 @@ pub struct OfEntropy;
 /// ```
 ///
 /// which on the round sphere is `x' = x × dH` (Marsden and Ratiu 1999, §2). It is nondegenerate: only
-/// constants are Casimirs, so an entropy on a surface needs a bracket of [`Zero`],
-/// [`SecondLaw::Published`](crate::SecondLaw::Published), or a factor of its own.
+/// constants are Casimirs, so an entropy on a surface needs the bracket [`Zero`],
+/// [`SecondLaw::Published`](crate::SecondLaw::Published), or a separate factor.
 pub type AreaForm = Nambu<NoCasimir>;
 
 /// The value of the type [`AreaForm`](type@AreaForm).
@@ -92,7 +92,7 @@ impl<F> Nambu<(NoCasimir, F)> {
 }
 
 impl<C, L> Nambu<C, L> {
-    /// The bracket with one Casimir more, on a manifold of one dimension more.
+    /// Adds a Casimir, for a manifold of one dimension more.
     pub fn and<F>(self, c: F) -> Nambu<(C, F), L> {
         Nambu { factor: self.factor, casimirs: (self.casimirs, c) }
     }
@@ -119,7 +119,7 @@ impl<C, L> fmt::Debug for Nambu<C, L> {
     note = "`Nambu::default()` has the entropy and `Nambu::of(c)` a function of your own, for dimension 3; each `.and(c)` adds a function and a dimension"
 )]
 pub trait Casimirs<M: Space, const N: usize> {
-    /// Whether the entropy is the first of them.
+    /// Whether the entropy is the first Casimir.
     const ENTROPY: bool;
 
     /// Their covectors at `x`, from that of the entropy.
@@ -213,8 +213,8 @@ const LARGEST: usize = 8;
 
 /// The vector `v^i = det[r_1, …, r_{n−1}, e^i]`: in dimension 3 the cross product.
 ///
-/// By expansion, row by row, of the minors on all sets of columns: nothing is divided by, so the
-/// derivatives are right where the rows are dependent, too.
+/// It expands, row by row, the minors on all sets of columns. It divides by nothing, so the
+/// derivatives are also right where the rows are dependent.
 #[inline]
 fn cross<M: Space, D: Scalar>(rows: &Rows<M, D>) -> Vector<M, D> {
     let n = M::Dim::LEN;

@@ -8,8 +8,8 @@ use super::{Bracket, BracketArgs, BracketJet, NaturalBracket, Zero};
 /// `Π_A ⊕ Π_B` on `A × B`: `{f, g} = {f, g}_A + {f, g}_B`. The Casimirs are functions of the Casimirs
 /// of both; with `(AreaForm, Zero)` on `S² × R` every function of the second factor is one.
 ///
-/// The metric must be one of the factors (a pair, or [`Canonical`](metriplectic_manifolds::Canonical)),
-/// whose volume forms the brackets may ask for.
+/// The metric must be a metric of the factors (a pair, or [`Canonical`](metriplectic_manifolds::Canonical)),
+/// because the brackets may use the volume forms of the factors.
 impl<A, B, G, P, Q> Bracket<Product<A, B>, G> for (P, Q)
 where
     A: Manifold + Times<B>,

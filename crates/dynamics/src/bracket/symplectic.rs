@@ -78,7 +78,7 @@ macro_rules! on_a_cotangent_product {
                 alpha: &Vector<Product<$space, $fibre>, D>,
             ) -> Result<Vector<Product<$space, $fibre>, D>, MetricError> {
                 let (along_q, along_p) = Product::<$space, $fibre>::split(alpha);
-                // The two columns are of the same size, and of types that need not know it.
+                // The two columns have the same size, which their types do not show.
                 let forward = Column::from_index(|i| along_p[i]);
                 let back = Column::from_index(|i| -along_q[i]);
                 Ok(Product::<$space, $fibre>::join(&forward, &back))

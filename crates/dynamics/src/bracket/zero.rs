@@ -5,7 +5,7 @@ use metriplectic_manifolds::{Chart, Euclidean, HalfLine, Manifold, MetricError, 
 
 use super::{Bracket, BracketArgs, BracketJet, NaturalBracket};
 
-/// `Π = 0`: the state climbs `S` along a level set of `H`, and nothing moves reversibly.
+/// The bracket `Π = 0`: `S` grows along a level set of `H`, and nothing moves reversibly.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Zero;
 

@@ -45,7 +45,7 @@ pub struct CasimirDissipation<const N: usize> {
     form: SMatrix<f64, N, N>,
 }
 
-/// An eigenvalue of a form may be negative by the rounding of its entries, relative to the largest.
+/// The negative eigenvalue, relative to the largest, that the rounding of the entries may cause.
 const ROUND_OFF: f64 = 64.0 * f64::EPSILON;
 
 impl<const N: usize> CasimirDissipation<N> {
@@ -108,17 +108,17 @@ impl<const N: usize, G: Riemannian<LieDual<N>>> Dissipation<LieDual<N>, G>
         let force = self.force(w, alpha);
         // (ad_w)^d_b = C_ab^d w^a, ad_α likewise, and ad*_δ F = f δ with f_ba = C_ab^d F_d.
         let zero = SMatrix::<f64, N, N>::zeros();
-        let (mut ad_w, mut ad_alpha, mut dg_v) = (zero, zero, zero);
+        let (mut ad_w, mut ad_alpha, mut turned) = (zero, zero, zero);
         for c in self.algebra.constants() {
             ad_w[(c.d, c.b)] += c.value * w[c.a];
             ad_alpha[(c.d, c.b)] += c.value * alpha[c.a];
-            dg_v[(c.b, c.a)] += c.value * force[c.d];
+            turned[(c.b, c.a)] += c.value * force[c.d];
         }
         let lowered = ad_w.transpose() * self.form;
         Ok(DissipationJet {
             value: ad_w.transpose() * force,
             along_z: zero,
-            along_w: dg_v - lowered * ad_alpha,
+            along_w: turned - lowered * ad_alpha,
             tensor: lowered * ad_w,
         })
     }
@@ -148,7 +148,7 @@ pub enum FormError {
         /// `|κ_ij − κ_ji|`.
         size: f64,
     },
-    /// `κ` has a negative eigenvalue, with which it would destroy entropy.
+    /// `κ` has a negative eigenvalue, so it would destroy entropy.
     #[error("the form is not positive semidefinite: it has the eigenvalue {eigenvalue:.3e}")]
     NotPositive {
         /// The least eigenvalue.

@@ -2,8 +2,8 @@
 
 use super::{MetricDissipation, NoDissipation};
 
-/// What a [`SystemBuilder`](crate::SystemBuilder) holds for a dissipation: none yet, that of the
-/// metric since there is an entropy, none since there is a force, or one that was [`Given`] and stays.
+/// The dissipation that a [`SystemBuilder`](crate::SystemBuilder) holds: none yet, the dissipation of the
+/// metric once there is an entropy, none once there is a force, or one that was [`Given`].
 pub trait Choice {
     /// The dissipation that the system will have.
     type Dissipation;
@@ -23,7 +23,7 @@ pub trait Choice {
     fn chosen(self) -> Self::Dissipation;
 }
 
-/// A dissipation that was given, whatever is said of an entropy or a force before or after.
+/// A dissipation that was given. An entropy or a force, before or after, does not change it.
 #[derive(Clone, Copy, Debug)]
 pub struct Given<K>(pub(crate) K);
 

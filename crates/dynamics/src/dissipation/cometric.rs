@@ -9,9 +9,8 @@ use super::kulkarni_nomizu::{form, jet};
 use super::{Dissipation, DissipationJet, turn};
 
 /// The dissipation of [`MetricDissipation`](super::MetricDissipation) with a symmetric matrix field
-/// `G*` on covectors of your own, which need only be positive *semi*definite: no metric has to exist
-/// of which it is the inverse, and variables without friction have rows of zeros. Thermodynamic
-/// models are of this kind.
+/// `G*` on covectors that you give. `G*` need only be positive *semi*definite. It need not be the inverse
+/// of a metric, and variables without friction have rows of zeros. Thermodynamic models are of this kind.
 ///
 /// ```math
 /// K_w(\alpha, \beta) = G^*(w, w)\, G^*(\alpha, \beta) - G^*(w, \alpha)\, G^*(w, \beta) .

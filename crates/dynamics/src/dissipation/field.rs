@@ -9,27 +9,26 @@ use metriplectic_manifolds::{Manifold, MetricError, Riemannian};
 
 use super::{Dissipation, DissipationJet};
 
-/// The dissipation of a closure `|x, w| -> K` of the point and of the covector to be annihilated, which
-/// is used as it is written:
+/// The dissipation of a closure `|x, w| -> K` of the point and of the covector to be annihilated, used
+/// without change:
 ///
 /// ```math
 /// K_w(x)\, \alpha = K(x, w)\, \alpha .
 /// ```
 ///
-/// `w` is `dH` in the equations of motion and a discrete gradient of `H` in a step, so the closure
-/// builds `K` from the `w` that it is given and never from its own `dH(x)`. That `K` is symmetric and
-/// positive semidefinite and that `K(x, w) w = 0` is checked at sampled points, for `dH` and for
-/// discrete gradients of `H`. A matrix that knows nothing of `w` is a
+/// `w` is `dH` in the equations of motion and a discrete gradient of `H` in a step. So the closure
+/// builds `K` from its argument `w`, and never from `dH(x)`. Verification checks at sampled points, for `dH`
+/// and for discrete gradients of `H`, that `K` is symmetric and positive semidefinite and that
+/// `K(x, w) w = 0`. For a matrix that does not depend on `w`, use
 /// [`ProjectedDissipation`](super::ProjectedDissipation).
 ///
 /// `w` and `K` are written in the terms dual to the
 /// [`velocity`](metriplectic_fields::Space::embed) of the space: on a vector space in components,
-/// on SO(3) as body covectors, and on a sphere in the space around, where `w` is tangent and what `K`
-/// does across the sphere is not looked at.
+/// on SO(3) as body covectors, and on a sphere in the space around, where `w` is tangent and the part of `K`
+/// across the sphere has no effect.
 ///
 /// Like every closure it is written over [`Real`], and lifted to every scalar of derivative order
-/// ≤ 2. A dissipation at a scalar of any order is a type of your own that implements
-/// [`Dissipation`].
+/// ≤ 2. For scalars of any order, implement [`Dissipation`] for a type.
 ///
 /// ```
 /// use metriplectic_dynamics::{FieldDissipation, System};
@@ -137,7 +136,7 @@ fn along_velocities<M: Manifold, D: Scalar>(
 }
 
 /// The real parts of a chart point and a covector, with `ε₁` and `ε₂` in the directions `i` and `j`:
-/// those of the chart, then those of the covector; a direction beyond them is none.
+/// those of the chart, then those of the covector; an index beyond both seeds nothing.
 fn seeded<M: Manifold, D: Scalar>(
     x: &ChartPoint<M, D>,
     w: &Vector<M, D>,

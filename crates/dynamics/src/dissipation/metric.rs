@@ -24,8 +24,8 @@ use super::{Dissipation, DissipationJet, Scaled, turn};
 pub struct MetricDissipation;
 
 impl MetricDissipation {
-    /// The same `κ(x)` times over: `κ` is a closure `|x| -> Real` or any other
-    /// [`ScalarField`](metriplectic_fields::ScalarField), and nowhere negative.
+    /// Scales the dissipation by `κ(x) ≥ 0`, a closure `|x| -> Real` or any other
+    /// [`ScalarField`](metriplectic_fields::ScalarField).
     ///
     /// ```
     /// use metriplectic_dynamics::{MetricDissipation, System};
@@ -91,7 +91,7 @@ impl<M: Manifold, G: Riemannian<M>> Dissipation<M, G> for MetricDissipation {
     }
 }
 
-/// `∂(K_w α)/∂z`, which only a metric that varies has: with `P = ♯w`, `A = ♯α` and
+/// `∂(K_w α)/∂z`, which is zero for a constant metric. With `P = ♯w`, `A = ♯α` and
 /// `∂_k g⁻¹ = −g⁻¹ (∂_k g) g⁻¹`,
 /// `∂_k (K_w α) = −(P·∂_k g P) A + (w·P) ∂_k A + (A·∂_k g P) P − (w·A) ∂_k P`.
 #[inline]

@@ -1,4 +1,4 @@
-//! A dissipation from a closure of the point alone, projected.
+//! The dissipation of a closure of the point alone, projected.
 
 use std::fmt;
 
@@ -8,8 +8,8 @@ use metriplectic_manifolds::{InnerProduct, Manifold, MetricError, Riemannian};
 use super::Dissipation;
 use super::kulkarni_nomizu::form;
 
-/// The dissipation of a symmetric positive semidefinite matrix field `K` that knows nothing of the
-/// covector to be annihilated, projected off it with the metric of the system:
+/// The dissipation of a symmetric positive semidefinite matrix field `K` that does not depend on the
+/// covector `w` to be annihilated. The metric of the system projects it off `w`:
 ///
 /// ```math
 /// K_w = Q\, K\, Q^T, \qquad Q = 1 - \frac{♯w \otimes w}{\langle w, ♯w \rangle} .
@@ -17,10 +17,10 @@ use super::kulkarni_nomizu::form;
 ///
 /// The field is a closure `|x| -> K` or any other [`MatrixField`], acting on covectors dual to the
 /// [`velocity`](metriplectic_fields::Space::embed) of the space. `Qᵀw = 0`, so `K_w` annihilates `w`
-/// whatever `K` is; where `K` annihilates it already, nothing changes. Otherwise the projection spreads
-/// friction onto variables that had none, [`is_projected`](Dissipation::is_projected) says so, and a
-/// closure `|x, w| -> K` that annihilates `w` of itself ([`FieldDissipation`](super::FieldDissipation)) is
-/// the better model. Every `K` annihilates `w = 0`, and is left alone there.
+/// for every `K`. Where `K` annihilates `w` already, nothing changes. Otherwise the projection spreads
+/// friction onto variables that had none, and [`is_projected`](Dissipation::is_projected) reports it. A
+/// closure `|x, w| -> K` that annihilates `w` by itself ([`FieldDissipation`](super::FieldDissipation)) is
+/// then the better model. Where `w = 0`, `K` is not projected.
 ///
 /// ```
 /// use metriplectic_dynamics::{ProjectedDissipation, System};

@@ -7,10 +7,10 @@ use metriplectic_manifolds::{Manifold, MetricError, Riemannian};
 
 use super::{Dissipation, DissipationJet};
 
-/// The dissipation `κ(x) K_w` with a scalar field `κ`, first, and any dissipation `K`, second.
+/// The dissipation `κ(x) K_w`, from a scalar field `κ` and any dissipation `K`, in this order.
 ///
-/// It is symmetric and annihilates `w` as `K` does, and positive semidefinite if `κ(x) ≥ 0`, which is
-/// checked at sampled points.
+/// It is symmetric and annihilates `w` as `K` does. It is positive semidefinite if `κ(x) ≥ 0`, which
+/// verification checks at sampled points.
 #[derive(Clone, Copy)]
 pub struct Scaled<F, K>(pub F, pub K);
 

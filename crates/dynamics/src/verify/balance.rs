@@ -1,17 +1,16 @@
 //! Sums that should vanish, relative to the terms that should cancel in them.
 //!
-//! The entries of a state have units of their own, so no norm of a vector means anything here. A sum
+//! The entries of a state may have different units, so the norm of a vector has no meaning. A sum
 //! `Σ_j A_ij w_j` is compared with `Σ_j |A_ij||w_j|`, row by row, in which every term has one unit.
 
 use metriplectic_fields::{Column, Dimension, Matrix, Space, Square, Vector};
 
-/// The violation of a law that is taken for round-off, relative to the terms that cancel. Models
-/// are written with transcendental functions of their own, so this is far above `ε` and far below
-/// any mistake.
+/// The violation of a law that is taken for round-off, relative to the terms that cancel. Models contain
+/// transcendental functions, so it is far above `ε`. It is far below any mistake.
 pub(crate) const TOLERANCE: f64 = 1e-10;
 
-/// The weight of the largest terms of all rows in the size of one: a row of which nothing is left but the
-/// rounding of other rows, a few `ε` of them, satisfies its law.
+/// The weight of the largest terms of all rows in the size of a row. A row that is only the rounding of other
+/// rows, a few `ε` of them, satisfies its law.
 pub(crate) const ROUNDING: f64 = 16.0 * f64::EPSILON / TOLERANCE;
 
 /// A sum that should vanish, and the sum of the absolute values of its terms.
@@ -38,12 +37,12 @@ impl Balance {
         self.terms
     }
 
-    /// The sum with its terms and a size beside them.
+    /// Returns the sum as a violation, with a size added to its terms.
     pub(crate) fn beside(self, size: f64) -> Violation {
         Violation { size: self.sum.abs(), terms: self.terms + size }
     }
 
-    /// The sum relative to its terms, where rounding may be `ε` of the `largest` terms elsewhere.
+    /// Returns the sum relative to its terms, where rounding may be `ε` of the `largest` terms elsewhere.
     pub(crate) fn relative(self, largest: f64) -> f64 {
         self.beside(ROUNDING * largest).relative()
     }
@@ -57,12 +56,12 @@ pub(crate) struct Violation {
 }
 
 impl Violation {
-    /// The one relative to the other, where a law about nothing holds.
+    /// Returns the size relative to the terms, and 0 if the size is 0.
     pub(crate) fn relative(&self) -> f64 {
         if self.size == 0.0 { 0.0 } else { self.size / self.terms }
     }
 
-    /// The one that is larger relative to its terms.
+    /// Returns the violation that is larger relative to its terms.
     pub(crate) fn or_worse(self, other: Self) -> Self {
         let (old, new) = (self.relative(), other.relative());
         if new > old || new.is_nan() { other } else { self }
@@ -83,7 +82,7 @@ impl FromIterator<f64> for Balance {
     }
 }
 
-/// The larger of two sizes; a size that is not a number is the largest.
+/// Returns the larger of two sizes, where NaN is the largest.
 pub(crate) fn worse(old: f64, new: f64) -> f64 {
     if new > old || new.is_nan() { new } else { old }
 }
@@ -98,7 +97,7 @@ pub(crate) fn product<M: Space>(a: &Matrix<M>, w: &Vector<M>, units: &Vector<M>)
 }
 
 /// For each index the largest size of an entry in its block: the rows and columns that entries of `a` which
-/// are not zero connect it with. Rounding comes from nowhere else.
+/// are not zero connect it with. Rounding comes only from these.
 fn largest_in_blocks<M: Space>(a: &Matrix<M>, sizes: &Matrix<M>) -> Vec<f64> {
     let n = M::Dim::LEN;
     let mut block: Vec<usize> = (0..n).collect();
@@ -116,7 +115,8 @@ fn largest_in_blocks<M: Space>(a: &Matrix<M>, sizes: &Matrix<M>) -> Vec<f64> {
 /// The relative size of the number `⟨α, A β⟩`.
 pub(crate) fn form<M: Space>(
     a: &Matrix<M>,
-    (alpha, beta): (&Vector<M>, &Vector<M>),
+    alpha: &Vector<M>,
+    beta: &Vector<M>,
     units: &Vector<M>,
 ) -> f64 {
     let n = M::Dim::LEN;
@@ -155,15 +155,15 @@ pub(crate) fn asymmetry<M: Space>(
 ) -> Violation {
     let top = largest_in_blocks::<M>(a, &scaled::<M>(a, units));
     let root = |i: usize| if sign > 0.0 { a[(i, i)].abs().sqrt() } else { 0.0 };
-    let off = |(i, j): (usize, usize)| {
+    let violation = |(i, j): (usize, usize)| {
         let balance: Balance = [a[(i, j)], -sign * a[(j, i)]].into_iter().collect();
         let size = rounding * top[i] * units[i] * units[j];
         balance.beside(root(i) * root(j) + size)
     };
-    pairs(M::Dim::LEN).map(off).fold(Violation::default(), Violation::or_worse)
+    pairs(M::Dim::LEN).map(violation).fold(Violation::default(), Violation::or_worse)
 }
 
-/// By how much a symmetric tensor on covectors is not positive semidefinite: the most negative pivot of
+/// Measures how far a symmetric tensor on covectors is from positive semidefinite: the most negative pivot of
 /// its `LDLᵀ` decomposition with diagonal pivoting, after a scaling to a diagonal of ones.
 ///
 /// The scaling `K_ij / √(K_ii K_jj)` removes all units. Rows that are round-off of others keep
@@ -186,8 +186,8 @@ pub(crate) fn indefiniteness<M: Space>(k: &Matrix<M>, units: &Vector<M>) -> f64 
         negative = left.iter().map(|&i| -a[(i, i)]).fold(negative, f64::max);
         if a[(p, p)] <= TOLERANCE {
             // |a_ij| ≤ √(a_ii a_jj) in a semidefinite matrix, and the diagonal is zero here.
-            let off = |&i: &usize| left.iter().map(|&j| a[(i, j)].abs()).fold(0.0, f64::max);
-            return left.iter().map(off).fold(negative, f64::max);
+            let violation = |&i: &usize| left.iter().map(|&j| a[(i, j)].abs()).fold(0.0, f64::max);
+            return left.iter().map(violation).fold(negative, f64::max);
         }
         left.retain(|&i| i != p);
         for &i in &left {

@@ -1,16 +1,16 @@
 //! Derivatives against values.
 //!
-//! A closure can lose a derivative: `x.re` and `Real::from(f64)` are constants to a dual number. Its values
-//! are then right and the motion wrong, so every derivative that a step uses is compared with difference
-//! quotients of the values,
+//! A closure can drop a derivative: `x.re` and `Real::from(f64)` are constants to a dual number. Its values
+//! are then right and the motion is wrong. So verification compares every derivative that a step uses with
+//! difference quotients of the values,
 //!
 //! ```math
 //! D_k = \frac{f(\varphi_x(\delta_k e_i)) - f(\varphi_x(-\delta_k e_i))}{2 \delta_k}, \qquad
 //! \delta_k = 0.45^k\, \ell_i .
 //! ```
 //!
-//! The error of `D_k` falls by five from one `k` to the next until it is rounding, which doubles. Both are
-//! seen in the differences of quotients: `|D_k − D_{k−1}|` bounds the first, and the largest
+//! The error of `D_k` falls by five from one `k` to the next, until it is rounding, which doubles. The
+//! differences of quotients show both: `|D_k − D_{k−1}|` bounds the first, and the largest
 //! `δ_k |D_k − D_{k−1}|` at the finest `k` is the rounding `η` of the values, with all that cancels inside
 //! of the field. The derivative is wrong if it differs from the quotient with the smallest bound
 //!
@@ -18,12 +18,12 @@
 //! 8\, |D_k - D_{k-1}| + 8\, \eta / \delta_k + 64\, \varepsilon\, |f| / \delta_k
 //! ```
 //!
-//! by more than this bound. Where it is wide, nothing is decided.
+//! by more than this bound. A wide bound decides nothing.
 
-/// The ratio of one `δ` to the next. Not a half: values that are integers times some rounding would then
-/// give the same wrong quotient again and again.
+/// The ratio of one `δ` to the next. With a half, values that are integers times some rounding would give the
+/// same wrong quotient again and again.
 const RATIO: f64 = 0.45;
-/// The first `δ` that is tried, `3·10⁻⁴ ℓ`: of most fields, nothing else is evaluated.
+/// The first `δ` that is tried, `3·10⁻⁴ ℓ`. For most fields it decides.
 const FIRST: i32 = 10;
 /// The coarsest and the finest `δ`, from `4·10⁻³ ℓ` to `3·10⁻⁶ ℓ`.
 const COARSEST: i32 = 7;
@@ -44,18 +44,18 @@ pub(super) struct Rounding {
     others: f64,
 }
 
-/// That of a closure, evaluated by dual numbers.
+/// The rounding of a closure, evaluated by dual numbers.
 pub(super) const OF_CLOSURES: Rounding = Rounding { itself: 1e-9, others: 64.0 * f64::EPSILON };
 
-/// That of a tensor that solves with a metric, whose condition number it is multiplied by.
+/// The rounding of a tensor that solves with a metric, which multiplies it by the condition number.
 pub(super) const OF_SOLUTIONS: Rounding = Rounding { itself: 1e-6, others: 1e-9 };
 
 /// A derivative that is not that of the values.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Mismatch {
-    /// What the dual numbers say.
+    /// The derivative by dual numbers.
     pub(super) derivative: f64,
-    /// What the values say.
+    /// The difference quotient of the values.
     pub(super) quotient: f64,
 }
 
@@ -84,7 +84,7 @@ struct Quotient {
 }
 
 impl Quotient {
-    /// That of two values; `None` if it is not finite.
+    /// Computes the quotient of two values; `None` if it is not finite.
     fn of(delta: f64, right: f64, left: f64) -> Option<Self> {
         let slope = (right - left) / (2.0 * delta);
         let size = right.abs().max(left.abs());
@@ -93,8 +93,8 @@ impl Quotient {
 }
 
 impl Derivatives {
-    /// Compares them with the values of the entries: `f(t, values)` appends those at the distance `t` along
-    /// the direction, which there may be none of.
+    /// Compares the derivatives with the values of the entries. `f(t, values)` appends the values at the
+    /// distance `t` along the direction; `None` if there are no values.
     pub(super) fn compare(&self, f: impl Fn(f64, &mut Vec<f64>) -> Option<()>) -> Option<Mismatch> {
         let at = |k| self.quotients(k, &f);
         if self.agree_at_once(&f).is_some() {
@@ -132,7 +132,7 @@ impl Derivatives {
         (0..n).map(|i| Quotient::of(delta, values[i], values[i + n])).collect()
     }
 
-    /// Something if each derivative agrees with a quotient of a narrow bound, without a look at its rounding.
+    /// Returns `Some` if each derivative agrees with a quotient of a narrow bound, whatever the rounding is.
     fn agree_at_once(&self, f: &impl Fn(f64, &mut Vec<f64>) -> Option<()>) -> Option<()> {
         let (deltas, n) = ([FIRST - 1, FIRST].map(|k| self.scale * RATIO.powi(k)), self.df.len());
         let mut values = Vec::with_capacity(4 * n);
@@ -151,22 +151,22 @@ impl Derivatives {
     }
 
     /// The quotient of the `i`-th entry with the smallest bound, and this bound, if it is narrow. A finer
-    /// quotient that contradicts it is believed instead: at the coarser `δ` the field was not resolved.
+    /// quotient that contradicts it takes its place, because the coarser `δ` did not resolve the field.
     fn best(&self, i: usize, levels: &[Vec<Quotient>]) -> Result<(f64, f64), Undecided> {
-        // Equal values may be values that rounding cannot tell apart: `1 − cos q` at q = 10⁻⁹.
+        // Rounding may make different values equal: `1 − cos q` at q = 10⁻⁹.
         let seen: Vec<_> = levels.iter().map(|level| level[i]).filter(|q| q.slope != 0.0).collect();
         if seen.is_empty() {
             return Ok((self.df[i], 0.0));
         }
         let change = |pair: &[Quotient]| (pair[1].slope - pair[0].slope).abs();
-        let noise = seen.windows(2).rev().take(NOISY).map(|pair| change(pair) * pair[1].delta);
-        let noise = noise.fold(0.0, f64::max);
-        // Two quotients may agree by chance: no bound is trusted that falls faster than they converge.
+        let rounding = seen.windows(2).rev().take(NOISY).map(|pair| change(pair) * pair[1].delta);
+        let rounding = rounding.fold(0.0, f64::max);
+        // Two quotients may agree by chance. So no bound falls faster than quotients converge.
         let (mut error, mut best) = (f64::INFINITY, None);
         for pair in seen.windows(2) {
             error = change(pair).max(if error.is_finite() { error / 8.0 } else { 0.0 });
             let here = pair[1];
-            let bound = 8.0 * (error + noise / here.delta) + self.rounding(i, &here);
+            let bound = 8.0 * (error + rounding / here.delta) + self.rounding(i, &here);
             let better = best.is_none_or(|(slope, smallest): (f64, f64)| {
                 bound < smallest || (here.slope - slope).abs() > bound + smallest
             });

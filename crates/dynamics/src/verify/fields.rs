@@ -7,15 +7,17 @@ use metriplectic_manifolds::{Manifold, Riemannian};
 
 use super::balance::pairs;
 use super::derivatives::{Derivatives, Mismatch, OF_CLOSURES, OF_SOLUTIONS};
-use super::{Dim, Place, unusable};
+use super::place::{Place, unusable};
+use crate::bracket::Bracket;
+use crate::dissipation::Dissipation;
 use crate::invariants::{Invariants, Kind, Visitor};
-use crate::system::Metriplectic;
-use crate::{Bracket, Dissipation, ModelError};
+use crate::metriplectic::{Dim, Metriplectic};
+use crate::model_error::ModelError;
 
 /// Compares the derivatives of the fields, of the metric, and of the bracket along one axis of the chart.
 ///
-/// Second derivatives are not compared. They only enter the Jacobian of Newton's method, which solves the
-/// same equation without them, in more iterations or not at all.
+/// Second derivatives are not compared. They enter only the Jacobian of Newton's method. If they are wrong, it
+/// solves the same equation in more iterations, or fails.
 pub(super) fn compare<Y: Metriplectic + ?Sized>(
     place: &Place<'_, Y>,
     axis: usize,
@@ -28,8 +30,8 @@ pub(super) fn compare<Y: Metriplectic + ?Sized>(
     along.bracket()
 }
 
-/// Compares those of the dissipation, also along the covector that it annihilates. No law is judged by
-/// them, so a law that it breaks by its values is named first.
+/// Compares the derivatives of the dissipation, also along the covector that it annihilates. No law uses
+/// them, so a law that its values violate is named first.
 pub(super) fn compare_dissipation<Y: Metriplectic + ?Sized>(
     place: &Place<'_, Y>,
     axis: usize,
@@ -134,7 +136,7 @@ impl<Y: Metriplectic + ?Sized> Along<'_, '_, Y> {
         let along_z = Derivatives { scale, df, units: components(units), rounding: OF_SOLUTIONS };
         self.compare("dissipation", &along_z, value)?;
 
-        // A component of dH has the size of the largest energy of all of them, unless it has its own.
+        // If a component of dH is negligible, its size is that of the largest energy of all components.
         let largest = (0..Dim::<Y>::LEN).map(|i| (w[i] * units[i]).abs()).fold(0.0, f64::max);
         let (own, borrowed) = (w[axis].abs(), largest / units[axis]);
         let scale = if own > 1e-6 * borrowed { own } else { borrowed };
@@ -165,7 +167,7 @@ impl<Y: Metriplectic + ?Sized> Visitor<Y::Manifold> for Compared<'_, '_, '_, Y> 
     }
 }
 
-/// A covector with which every column of a tensor is seen.
+/// A covector that involves every column of a tensor.
 fn generic<M: Space>(units: &Vector<M>) -> Vector<M> {
     Vector::<M>::from_index(|i| (1.0 + i as f64).sin() / units[i])
 }

@@ -3,13 +3,15 @@
 use metriplectic_fields::{ChartPoint, Column, Dimension, Square, Vector};
 
 use super::balance::{self, worse};
-use super::{Dim, Findings, Place, unusable};
-use crate::system::{Metriplectic, SecondLaw};
+use super::findings::Findings;
+use super::place::{Place, unusable};
+use crate::bracket::Bracket;
+use crate::metriplectic::{Dim, Metriplectic, SecondLaw};
+use crate::model_error::ModelError;
 use crate::velocity::differentials;
-use crate::{Bracket, ModelError};
 
-/// `⟨w, f(w)⟩ = 0` for `dH` and for the discrete gradient `w`; `⟨dS, f⟩ ≥ 0` at the point and on a step from
-/// there.
+/// Checks that `⟨w, f(w)⟩ = 0` for `dH` and for the discrete gradient `w`, and that `⟨dS, f⟩ ≥ 0` at the point
+/// and on a step from it.
 pub(super) fn examine<Y: Metriplectic + ?Sized>(
     place: &Place<'_, Y>,
     w: Option<&Vector<Y::Manifold>>,

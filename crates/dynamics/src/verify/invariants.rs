@@ -5,13 +5,17 @@ use metriplectic_fields::{
 };
 
 use super::balance::{self, Balance, TOLERANCE, pairs, worse};
-use super::{Dim, Findings, Place, jet, sampling, unusable};
+use super::findings::Findings;
+use super::place::{Place, jet, unusable};
+use super::sampling;
+use crate::bracket::Bracket;
+use crate::dissipation::Dissipation;
 use crate::invariants::{Action, Invariants, Kind, Visitor};
-use crate::system::{Metriplectic, Point};
-use crate::{Bracket, Dissipation, ModelError};
+use crate::metriplectic::{Dim, Metriplectic, Point};
+use crate::model_error::ModelError;
 
-/// Each further invariant has finite derivatives, is conserved for the reason it is listed for, and
-/// the dissipation leaves it alone.
+/// Checks that each further invariant has finite derivatives, is conserved by the bracket as its kind says, and
+/// is conserved by the dissipation.
 pub(super) fn examine<Y: Metriplectic + ?Sized>(
     place: &Place<'_, Y>,
     findings: &mut Findings<'_>,
@@ -25,7 +29,7 @@ pub(super) fn examine<Y: Metriplectic + ?Sized>(
 struct Invariance<'a, 'b, 'c, Y: Metriplectic + ?Sized> {
     place: &'a Place<'b, Y>,
     findings: &'a mut Findings<'c>,
-    /// The differential of the one visited last.
+    /// The differential of the invariant visited last.
     dj: Option<Vector<Y::Manifold>>,
     failed: Result<(), ModelError>,
 }
@@ -61,7 +65,7 @@ impl<Y: Metriplectic + ?Sized> Invariance<'_, '_, '_, Y> {
                 findings.note("Π dC = 0", size, |point| ModelError::NotCasimir { point, size });
             }
             Kind::Momentum => {
-                let size = balance::form::<Y::Manifold>(&tensor, (&dl, &energy.df), units);
+                let size = balance::form::<Y::Manifold>(&tensor, &dl, &energy.df, units);
                 findings.note("⟨dJ, Π dH⟩ = 0", size, |point| ModelError::NotMomentum {
                     point,
                     size,
@@ -85,7 +89,7 @@ impl<Y: Metriplectic + ?Sized> Invariance<'_, '_, '_, Y> {
         Ok(())
     }
 
-    /// The action preserves the bracket and the energy, and moves points along `Π dJ`.
+    /// Checks that the action preserves the bracket and the energy, and moves points along `Π dJ`.
     fn symmetric(&mut self, action: &Action<'_, Y::Manifold>) -> Result<(), ModelError> {
         let &Place { system, x, units, ref energy, ref entropy } = self.place;
         let (findings, n) = (&mut *self.findings, Dim::<Y>::LEN);
@@ -116,32 +120,32 @@ impl<Y: Metriplectic + ?Sized> Invariance<'_, '_, '_, Y> {
         let (here, there) = (tensor(x, &entropy.df)?, tensor(&y, &system.entropy().jet1(&y).df)?);
         let top = balance::largest::<Y::Manifold>(&here, units)
             .max(balance::largest::<Y::Manifold>(&there, units));
-        let off = |(i, j): (usize, usize)| {
+        let violation = |(i, j): (usize, usize)| {
             let pushed = pairs(n).map(|(k, l)| tangent[(i, k)] * here[(k, l)] * tangent[(j, l)]);
             let balance: Balance = pushed.chain([-there[(i, j)]]).collect();
             balance.relative(top * units[i] * units[j])
         };
-        let size = pairs(n).map(off).fold(0.0, worse);
+        let size = pairs(n).map(violation).fold(0.0, worse);
         findings.note("Φ is Poisson", size, |point| ModelError::ActionNotPoisson { point, size });
 
         let Some(dj) = &self.dj else { return Ok(()) };
         let largest = pairs(n).map(|(i, j)| (here[(i, j)] * dj[j] / units[i]).abs());
         let largest = largest.fold(0.0, f64::max);
-        let off = |i: usize| {
+        let violation = |i: usize| {
             let terms = (0..n).map(|j| here[(i, j)] * dj[j]);
             let balance: Balance = terms.chain([-generator[i]]).collect();
             balance.relative(units[i] * largest).max((at_rest[i].re / units[i]).abs())
         };
-        let size = (0..n).map(off).fold(0.0, worse);
+        let size = (0..n).map(violation).fold(0.0, worse);
         findings.note("Π dJ = Φ'", size, |point| ModelError::ActionNotOfMomentum { point, size });
         Ok(())
     }
 }
 
-/// How far along an action a symmetry is tried, relative to the sizes of the coordinates.
+/// How far along its action a symmetry is tested, relative to the sizes of the coordinates.
 const FAR: f64 = 0.7;
 
-/// What the values of an energy may differ by, beside their terms: their rounding, in the tolerance.
+/// The rounding of the values of an energy, in units of the tolerance.
 const ROUNDED: f64 = 64.0 * f64::EPSILON / TOLERANCE;
 
 /// A map from the coordinates of a chart to points.

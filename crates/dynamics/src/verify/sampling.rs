@@ -1,41 +1,41 @@
-//! Where a model is judged: the start, and points around it at which it has values.
+//! The points at which a model is judged: the start, and points around it at which it has values.
 
 use metriplectic_fields::{Column, Dimension, Jet2, ScalarField, Space, Vector};
 use metriplectic_manifolds::Manifold;
 use rand::RngExt;
 use rand::rngs::ChaCha8Rng;
 
-use crate::system::{Metriplectic, Point};
+use crate::metriplectic::{Metriplectic, Point};
 
-/// How often a sample is drawn nearer to the start, by a quarter, until the model has values there.
+/// How often a sample is drawn again, at a quarter of the distance, until the model has values there.
 const DRAWS: i32 = 12;
 
-/// An entry this much smaller than the distance over which the energy changes is as good as zero.
+/// An entry below this fraction of the distance over which the energy changes counts as zero.
 const NEGLIGIBLE: f64 = 1e-6;
 
 /// The sizes of a state: one number for each direction of the chart, in the unit of its entry.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Sizes<M: Space> {
-    /// The sizes that round-off and difference quotients are relative to. None is zero.
+pub(crate) struct CoordinateScales<M: Space> {
+    /// The sizes that round-off and difference quotients are relative to. They are positive.
     pub(crate) units: Vector<M>,
-    /// The same, but the entry's own size however small it is, unless it is zero.
+    /// The same sizes, but the size of the entry itself wherever it is not zero, however small.
     own: Vector<M>,
 }
 
-impl<M: Manifold> Sizes<M> {
+impl<M: Manifold> CoordinateScales<M> {
     /// The sizes at `x`.
     ///
-    /// An entry has its own [size](Manifold::scales). One that is zero, or as good as zero, has none:
-    /// it gets the distance `ℓ_i` over which the energy changes by all that its terms are,
+    /// An entry has a [size](Manifold::scales). If this is zero or negligible, the size is the distance `ℓ_i`
+    /// over which the energy changes by the sum `E` of its terms,
     ///
     /// ```math
     /// |H_i|\, \ell_i + \tfrac12 |H_{ii}|\, \ell_i^2 = E, \qquad
     /// E = \sum_j |H_j x_j| + \tfrac12 |H_{jj}| x_j^2 ,
     /// ```
     ///
-    /// and the entropy is asked where the energy does not depend on the entry. The formula has the unit of
-    /// `x_i` in every unit of `H`. If neither field has a derivative along the entry, it gets the largest of
-    /// the other sizes, and if every entry is zero, 1: then nothing in the model tells a unit.
+    /// The entropy takes the place of an energy that does not depend on the entry. The formula has the unit of
+    /// `x_i` in every unit of `H`. If neither field depends on the entry, its size is the largest of the other
+    /// sizes. If every entry is zero, its size is 1, because nothing in the model tells a unit.
     pub(crate) fn at<Y: Metriplectic<Manifold = M> + ?Sized>(system: &Y, x: &Point<Y>) -> Self {
         let own = M::scales(x);
         let largest = (0..M::Dim::LEN).map(|i| own[i]).fold(0.0, f64::max);
@@ -50,8 +50,8 @@ impl<M: Manifold> Sizes<M> {
         Self { units, own }
     }
 
-    /// A random point around `x` that is `accepted`, within `radius` of these sizes or nearer. Each point
-    /// that is not accepted is counted in `passed_over`.
+    /// Draws a random point around `x` that is `accepted`, within `radius` of these sizes or nearer. It counts
+    /// each point that is not accepted in `passed_over`.
     pub(crate) fn draw(
         &self,
         x: &M::Point<f64>,

@@ -145,11 +145,11 @@ impl Sample {
 fn agree(what: &str, closure: &[f64], by_hand: &[f64], size: f64) -> Result<(), TestCaseError> {
     prop_assert_eq!(closure.len(), by_hand.len());
     for (k, (left, right)) in closure.iter().zip(by_hand).enumerate() {
-        let off = (left - right).abs();
+        let error = (left - right).abs();
         prop_assert!(
-            off <= ROUND_OFF * f64::EPSILON * size,
+            error <= ROUND_OFF * f64::EPSILON * size,
             "{what}: part {k} is {left:e} by the closure and {right:e} by hand, {:.1} ε apart",
-            off / (f64::EPSILON * size)
+            error / (f64::EPSILON * size)
         );
     }
     Ok(())

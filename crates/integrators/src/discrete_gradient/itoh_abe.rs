@@ -3,8 +3,8 @@
 use metriplectic_fields::{Column, Scalar, ScalarField, Vector};
 use metriplectic_manifolds::{Manifold, StepPath};
 
-use super::stable_gradient::short;
 use super::{DiscreteGradient, GAUSS, partial, segment};
+use crate::round_off::stable_gradient::short;
 
 /// The coordinate increment discrete gradient (Itoh and Abe 1988) in the chart at the base point: with
 /// the corners `q⁰ = φ_z⁻¹(x), q¹, …, qⁿ = φ_z⁻¹(x')` that change one coordinate after the other,

@@ -1,0 +1,251 @@
+//! The builder of a [`System`].
+
+use std::fmt;
+
+use metriplectic_fields::{Real, ScalarField};
+use metriplectic_manifolds::{Canonical, Manifold, Riemannian};
+
+use crate::bracket::{Bracket, NaturalBracket};
+use crate::dissipation::{Choice, Dissipation, Given, NoDissipation};
+use crate::invariants::{Casimir, Invariants, Momentum, Symmetry};
+use crate::metriplectic::SecondLaw;
+use crate::system::{BuildError, Fields, NoEntropy, System, Tensors};
+
+/// Stands for the energy that a builder has not been given yet.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct NoEnergy;
+
+/// The system that a builder makes, with the dissipation that its choice `K` has come to.
+pub type Built<M, G, B, K, H, S, L> = System<M, G, B, <K as Choice>::Dissipation, H, S, L>;
+
+impl System<(), (), (), (), (), ()> {
+    /// Starts a system on a manifold, with the manifold's canonical metric and its natural bracket
+    /// (Lie-Poisson on the dual of a Lie algebra, none elsewhere).
+    ///
+    /// ```
+    /// use metriplectic_dynamics::System;
+    /// use metriplectic_fields::Real;
+    /// use metriplectic_manifolds::LieDual;
+    /// use nalgebra::Vector3;
+    ///
+    /// let inertia = Vector3::new(10.0, 5.0, 1.0);
+    /// let body = System::on(LieDual::so3())
+    ///     .energy(move |p: &Vector3<Real>| p.component_mul(p).component_div(&inertia.cast()).sum() * 0.5)
+    ///     .entropy(|p: &Vector3<Real>| p.norm_squared() * 0.5)
+    ///     .build();
+    /// assert!(body.is_ok());
+    /// ```
+    pub fn on<M: NaturalBracket>(
+        manifold: M,
+    ) -> SystemBuilder<M, Canonical, M::Bracket, NoDissipation, NoEnergy, NoEntropy> {
+        let (metric, bracket) = (Canonical, manifold.natural_bracket());
+        SystemBuilder {
+            tensors: Tensors { manifold, metric, bracket, dissipation: NoDissipation },
+            fields: Fields { energy: NoEnergy, entropy: NoEntropy, invariants: () },
+            has_entropy: false,
+            second_law: SecondLaw::NoEntropy,
+        }
+    }
+}
+
+/// A system in the making: each method replaces one part.
+#[derive(Clone)]
+#[must_use = "a builder does nothing until `build` is called"]
+pub struct SystemBuilder<M, G, B, K, H, S, L = ()> {
+    tensors: Tensors<M, G, B, K>,
+    fields: Fields<H, S, L>,
+    has_entropy: bool,
+    second_law: SecondLaw,
+}
+
+// By hand, because closures have no `Debug`.
+impl<M: fmt::Debug, G, B, K, H, S, L> fmt::Debug for SystemBuilder<M, G, B, K, H, S, L> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("SystemBuilder")
+            .field("manifold", &self.tensors.manifold)
+            .field("second_law", &self.second_law)
+            .finish_non_exhaustive()
+    }
+}
+
+impl<M, G, B, K, H, S, L> SystemBuilder<M, G, B, K, H, S, L> {
+    /// Replaces tensors.
+    fn with_tensors<P, C, D>(
+        self,
+        replace: impl FnOnce(Tensors<M, G, B, K>) -> Tensors<M, P, C, D>,
+    ) -> SystemBuilder<M, P, C, D, H, S, L> {
+        let Self { tensors, fields, has_entropy, second_law } = self;
+        SystemBuilder { tensors: replace(tensors), fields, has_entropy, second_law }
+    }
+
+    /// Replaces scalar fields.
+    fn with_fields<E, F, I>(
+        self,
+        replace: impl FnOnce(Fields<H, S, L>) -> Fields<E, F, I>,
+    ) -> SystemBuilder<M, G, B, K, E, F, I> {
+        let Self { tensors, fields, has_entropy, second_law } = self;
+        SystemBuilder { tensors, fields: replace(fields), has_entropy, second_law }
+    }
+
+    /// Replaces the choice of the dissipation.
+    pub(crate) fn choose<F>(
+        self,
+        choose: impl FnOnce(K) -> F,
+    ) -> SystemBuilder<M, G, B, F, H, S, L> {
+        self.with_tensors(|Tensors { manifold, metric, bracket, dissipation }| Tensors {
+            manifold,
+            metric,
+            bracket,
+            dissipation: choose(dissipation),
+        })
+    }
+
+    /// Appends an invariant to the list.
+    fn with_invariant<T>(self, last: T) -> SystemBuilder<M, G, B, K, H, S, (L, T)> {
+        self.with_fields(|Fields { energy, entropy, invariants }| Fields {
+            energy,
+            entropy,
+            invariants: (invariants, last),
+        })
+    }
+}
+
+impl<M: Manifold, G, B, K, H, S, L> SystemBuilder<M, G, B, K, H, S, L> {
+    /// Sets the energy `H`: a closure `|x| -> Real` or any other [`ScalarField`].
+    pub fn energy<F: ScalarField<M>>(self, energy: F) -> SystemBuilder<M, G, B, K, F, S, L> {
+        self.with_fields(|Fields { entropy, invariants, .. }| Fields {
+            energy,
+            entropy,
+            invariants,
+        })
+    }
+
+    /// Sets the entropy `S`: a closure `|x| -> Real` or any other [`ScalarField`]. It must be a Casimir
+    /// of the bracket unless [`second_law`](Self::second_law) says otherwise. The dissipation of the metric
+    /// ([`MetricDissipation`](crate::MetricDissipation)) produces it unless a
+    /// [`dissipation`](Self::dissipation) or a force is given, before or after.
+    pub fn entropy<F: ScalarField<M>>(
+        self,
+        entropy: F,
+    ) -> SystemBuilder<M, G, B, K::WithEntropy, H, F, L>
+    where
+        K: Choice,
+    {
+        let second_law = match self.second_law {
+            SecondLaw::NoEntropy => SecondLaw::Exact,
+            chosen => chosen,
+        };
+        let produced = self.choose(K::with_entropy);
+        let with_entropy = produced.with_fields(|Fields { energy, invariants, .. }| Fields {
+            energy,
+            entropy,
+            invariants,
+        });
+        SystemBuilder { has_entropy: true, second_law, ..with_entropy }
+    }
+
+    /// Sets the dissipation that produces the entropy, in place of that of the metric: any
+    /// [`Dissipation`], such as those of the table in [`dissipation`](crate::dissipation).
+    pub fn dissipation<F>(self, dissipation: F) -> SystemBuilder<M, G, B, Given<F>, H, S, L> {
+        self.choose(|_| Given(dissipation))
+    }
+
+    /// Sets the Riemannian metric: [`Metric::constant`](metriplectic_manifolds::Metric::constant) or
+    /// [`Metric::field`](metriplectic_manifolds::Metric::field).
+    pub fn metric<F: Riemannian<M>>(self, metric: F) -> SystemBuilder<M, F, B, K, H, S, L> {
+        self.with_tensors(|Tensors { manifold, bracket, dissipation, .. }| Tensors {
+            manifold,
+            metric,
+            bracket,
+            dissipation,
+        })
+    }
+
+    /// Sets the Poisson tensor: [`LiePoisson`](crate::LiePoisson), [`Zero`](crate::Zero),
+    /// [`Poisson::constant`](crate::Poisson::constant), [`Poisson::field`](crate::Poisson::field),
+    /// [`Symplectic`](crate::Symplectic), [`AreaForm`](type@crate::AreaForm) or [`Nambu`](crate::Nambu);
+    /// on a product a pair of them, one for each factor. A skew tensor that is not Poisson is
+    /// [`AlmostPoisson::field`](crate::AlmostPoisson::field).
+    pub fn bracket<F>(self, bracket: F) -> SystemBuilder<M, G, F, K, H, S, L> {
+        self.with_tensors(|Tensors { manifold, metric, dissipation, .. }| Tensors {
+            manifold,
+            metric,
+            bracket,
+            dissipation,
+        })
+    }
+
+    /// Appends a further Casimir `C` of the bracket, `Π dC = 0`, which each step conserves to round-off: a
+    /// closure `|x| -> Real` or any other [`ScalarField`].
+    ///
+    /// The dissipation of the metric is projected off its differential; another dissipation must satisfy
+    /// `K dC = 0` by itself.
+    pub fn casimir<F: ScalarField<M>>(
+        self,
+        casimir: F,
+    ) -> SystemBuilder<M, G, B, K, H, S, (L, Casimir<F>)> {
+        self.with_invariant(Casimir(casimir))
+    }
+
+    /// Appends a momentum `J`, conserved because the energy is symmetric, `⟨dJ, Π dH⟩ = 0`. Each step
+    /// conserves it to round-off. It is a closure `|x| -> Real` or any other [`ScalarField`].
+    ///
+    /// The dissipation of the metric is projected off its differential; another dissipation must satisfy
+    /// `K dJ = 0` by itself.
+    pub fn momentum<F: ScalarField<M>>(
+        self,
+        momentum: F,
+    ) -> SystemBuilder<M, G, B, K, H, S, (L, Momentum<F>)> {
+        self.with_invariant(Momentum(momentum))
+    }
+
+    /// Appends a one-parameter group of symmetries, a closure `|t, x| -> Φ_t(x)` with `Φ_0(x) = x`, and
+    /// its momentum map `J`, with `Π dJ = dΦ_t/dt` at `t = 0`. Each step conserves `J` as a
+    /// [`momentum`](Self::momentum). Verification checks at sampled points that `Φ_t` preserves the
+    /// bracket and the energy, and belongs to `J`.
+    #[allow(
+        clippy::type_complexity,
+        reason = "the type of a builder lists the parts of the system, and a name for it would hide them"
+    )]
+    pub fn symmetry<A, F>(
+        self,
+        action: A,
+        momentum: F,
+    ) -> SystemBuilder<M, G, B, K, H, S, (L, Symmetry<A, F>)>
+    where
+        A: Fn(Real, &M::Point<Real>) -> M::Point<Real>,
+        F: ScalarField<M>,
+    {
+        self.with_invariant(Symmetry { action, momentum })
+    }
+
+    /// Chooses the scheme that treats the entropy. [`SecondLaw::Published`] allows an entropy that is not a
+    /// Casimir.
+    pub fn second_law(self, second_law: SecondLaw) -> Self {
+        Self { second_law, ..self }
+    }
+
+    /// Checks the structure and finishes the system. Every run checks the laws that need a point, by
+    /// [`Verify::check_start`](crate::Verify::check_start).
+    ///
+    /// # Errors
+    ///
+    /// [`BuildError`] if the parts do not make a system.
+    // The bounds stand on the method, so that a part that does not fit is explained as such.
+    #[allow(
+        clippy::type_complexity,
+        reason = "the type of a builder lists the parts of the system, and a name for it would hide them"
+    )]
+    pub fn build(self) -> Result<Built<M, G, B, K, H, S, L>, BuildError>
+    where
+        G: Riemannian<M>,
+        B: Bracket<M, G>,
+        K: Choice<Dissipation: Dissipation<M, G>>,
+        H: ScalarField<M>,
+        S: ScalarField<M>,
+        L: Invariants<M>,
+    {
+        let SystemBuilder { tensors, fields, has_entropy, second_law } = self.choose(K::chosen);
+        System::new(tensors, fields, second_law, has_entropy)
+    }
+}

@@ -1,0 +1,105 @@
+//! The parts of a metriplectic system: manifold, metric, bracket, dissipation, energy, entropy, invariants.
+
+use metriplectic_fields::{ChartPoint, Scalar, ScalarField, Space, Vector};
+use metriplectic_manifolds::{Manifold, Riemannian};
+
+use crate::bracket::{Bracket, BracketArgs};
+use crate::dissipation::Dissipation;
+use crate::invariants::Invariants;
+use crate::vector_field::VectorField;
+use crate::verification::Verify;
+
+/// The parts of a system `x' = Π dH + K dS`, which an integrator asks for. [`System`](crate::System) is the
+/// one to build.
+///
+/// The parts determine the [`VectorField`] of the system and how to [`Verify`] its model. Both are implemented
+/// for every type that has the parts, and both are supertraits, so that generic code needs one bound.
+pub trait Metriplectic:
+    VectorField<<Self as Metriplectic>::Manifold> + Verify<<Self as Metriplectic>::Manifold>
+{
+    /// The space of states.
+    type Manifold: Manifold;
+    /// The Riemannian metric.
+    type Metric: Riemannian<Self::Manifold>;
+    /// The Poisson tensor `Π`.
+    type Bracket: Bracket<Self::Manifold, Self::Metric>;
+    /// The dissipation `K`.
+    type Dissipation: Dissipation<Self::Manifold, Self::Metric>;
+    /// The energy `H`.
+    type Energy: ScalarField<Self::Manifold>;
+    /// The entropy `S`.
+    type Entropy: ScalarField<Self::Manifold>;
+    /// The further invariants `L_a`.
+    type Invariants: Invariants<Self::Manifold>;
+
+    /// Returns the space of states.
+    fn manifold(&self) -> &Self::Manifold;
+    /// Returns the Riemannian metric.
+    fn metric(&self) -> &Self::Metric;
+    /// Returns the Poisson tensor `Π`.
+    fn bracket(&self) -> &Self::Bracket;
+    /// Returns the dissipation `K`.
+    fn dissipation(&self) -> &Self::Dissipation;
+    /// Returns the energy `H`.
+    fn energy(&self) -> &Self::Energy;
+    /// Returns the entropy `S`.
+    fn entropy(&self) -> &Self::Entropy;
+    /// Returns the further invariants `L_a`.
+    fn invariants(&self) -> &Self::Invariants;
+    /// Returns which scheme treats the entropy, and what this scheme promises.
+    fn second_law(&self) -> SecondLaw;
+
+    /// Returns whether the model has been verified. [`Verify::check_start`] then checks the start alone.
+    #[inline]
+    fn is_verified(&self) -> bool {
+        false
+    }
+
+    /// Evaluates the energy `H(x)`.
+    #[inline]
+    fn energy_at(&self, x: &Point<Self>) -> f64 {
+        self.energy().at(x)
+    }
+
+    /// Evaluates the entropy `S(x)`; 0 without an entropy.
+    #[inline]
+    fn entropy_at(&self, x: &Point<Self>) -> f64 {
+        self.entropy().at(x)
+    }
+
+    /// Returns the arguments of the bracket: the point `x` with the covector `s` of the entropy there.
+    #[inline]
+    fn bracket_args<'a, D: Scalar>(
+        &'a self,
+        x: &'a ChartPoint<Self::Manifold, D>,
+        s: &'a Vector<Self::Manifold, D>,
+    ) -> BracketArgs<'a, Self::Manifold, Self::Metric, D> {
+        BracketArgs { space: self.manifold(), metric: self.metric(), x, s }
+    }
+}
+
+/// A state of the system `Y`.
+pub type Point<Y> = <<Y as Metriplectic>::Manifold as Space>::Point<f64>;
+
+/// The dimension of the manifold of the system `Y`.
+pub(crate) type Dim<Y> = <<Y as Metriplectic>::Manifold as Space>::Dim;
+
+/// What a system promises about its entropy.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum SecondLaw {
+    /// There is no entropy: the system is Hamiltonian.
+    #[default]
+    NoEntropy,
+    /// Each step satisfies both laws exactly: `ΔS = h K(w_S, w_S) ≥ 0`. A discrete gradient `w_S` of the
+    /// entropy takes the place of `dS`, and the bracket annihilates it. `S` must be a Casimir, `Π dS = 0`.
+    /// There is no such scheme otherwise, and verification refuses the model.
+    ///
+    /// A force `𝓕` adds `h ⟨𝓕(w_H), [w_H, w_S]⟩` to `ΔS`. Verification refuses a force that makes this
+    /// negative, at the sampled points or on a step from them.
+    Exact,
+    /// The scheme as published (Bloch, Farré Puiggalí, Martín de Diego 2024, §4.4), with `dS(z)` at
+    /// the base point and an unprojected `Π(z)`. The first law holds exactly. `ΔS ≥ −O(h³)` may have either
+    /// sign: it is not promised, and the certificate says so. `S` need not be a Casimir.
+    Published,
+}

@@ -1,0 +1,101 @@
+//! One covector for each field of a system.
+
+use std::fmt::Debug;
+
+use metriplectic_fields::{
+    ChartPoint, Dimension, Scalar, ScalarField, Space, Vector, differential,
+};
+
+use crate::invariants::{Invariants, Kind, Visitor};
+use crate::metriplectic::{Dim, Metriplectic};
+
+/// A point of a system in a chart, at a scalar.
+pub(super) type Place<Y, D> = ChartPoint<<Y as Metriplectic>::Manifold, D>;
+
+/// Components of a vector or covector of a system, at a scalar.
+pub(super) type Components<Y, D> = Vector<<Y as Metriplectic>::Manifold, D>;
+
+/// A map from fields to covectors: the differential at a point, or a discrete gradient.
+pub trait Gradient<M: Space> {
+    /// Components, with their derivatives or without.
+    type Covector: Copy + Debug + Send + Sync;
+
+    /// Computes the covector of a field.
+    fn of(&mut self, f: &impl ScalarField<M>) -> Self::Covector;
+}
+
+/// One covector for each field of a system.
+#[derive(Clone, Copy, Debug)]
+pub struct Covectors<N: Dimension, V: Copy + Debug + Send + Sync> {
+    /// The covector of the energy, `w_H`.
+    pub energy: V,
+    /// The covector of the entropy, `w_S`; zero without an entropy.
+    pub entropy: V,
+    /// The covectors of the further invariants, in their order.
+    pub invariants: N::Array<Option<(Kind, V)>>,
+}
+
+impl<N: Dimension, V: Copy + Debug + Send + Sync> Covectors<N, V> {
+    /// Collects the covectors of energy and entropy, and those that `gradient` computes for the further
+    /// `invariants`.
+    #[inline]
+    pub fn new<M: Space<Dim = N>, W: Gradient<M, Covector = V>>(
+        [energy, entropy]: [V; 2],
+        invariants: &impl Invariants<M>,
+        gradient: &mut W,
+    ) -> Self {
+        let mut collected = Collected { gradient, covectors: N::array(|_| None), len: 0 };
+        invariants.each(&mut collected);
+        Self { energy, entropy, invariants: collected.covectors }
+    }
+
+    /// Returns the covectors of the further invariants of one kind.
+    #[inline]
+    pub fn of_kind(&self, kind: Kind) -> impl Iterator<Item = &V> {
+        let listed = self.invariants.as_ref().iter().flatten();
+        listed.filter_map(move |(k, w)| (*k == kind).then_some(w))
+    }
+
+    /// Returns whether there are further invariants of one kind.
+    #[inline]
+    pub fn has(&self, kind: Kind) -> bool {
+        self.of_kind(kind).next().is_some()
+    }
+}
+
+/// The covectors of the invariants seen so far.
+struct Collected<'a, M: Space, W: Gradient<M>> {
+    gradient: &'a mut W,
+    covectors: <M::Dim as Dimension>::Array<Option<(Kind, W::Covector)>>,
+    len: usize,
+}
+
+impl<M: Space, W: Gradient<M>> Visitor<M> for Collected<'_, M, W> {
+    #[inline]
+    fn visit(&mut self, kind: Kind, f: &impl ScalarField<M>) {
+        self.covectors[self.len] = Some((kind, self.gradient.of(f)));
+        self.len += 1;
+    }
+}
+
+/// The differentials of fields at a point.
+#[derive(Debug)]
+pub struct Differentials<'a, M: Space, D: Scalar>(pub &'a ChartPoint<M, D>);
+
+impl<M: Space, D: Scalar> Gradient<M> for Differentials<'_, M, D> {
+    type Covector = Vector<M, D>;
+
+    fn of(&mut self, f: &impl ScalarField<M>) -> Vector<M, D> {
+        differential(f, self.0)
+    }
+}
+
+/// Computes the differentials of all fields of a system at a point.
+pub fn differentials<Y: Metriplectic + ?Sized, D: Scalar>(
+    system: &Y,
+    x: &Place<Y, D>,
+) -> Covectors<Dim<Y>, Components<Y, D>> {
+    let mut d = Differentials(x);
+    let laws = [d.of(system.energy()), d.of(system.entropy())];
+    Covectors::new(laws, system.invariants(), &mut d)
+}

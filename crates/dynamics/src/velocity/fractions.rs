@@ -1,0 +1,82 @@
+//! The independence of the further invariants from the other fields.
+
+use metriplectic_manifolds::{MetricError, Riemannian};
+
+use super::covectors::{Place, differentials};
+use super::plan::ProjectionPlan;
+use crate::bracket::Bracket;
+use crate::invariants::Kind;
+use crate::metriplectic::{Dim, Metriplectic, SecondLaw};
+use crate::orthogonal::Orthogonal;
+
+/// Computes for each further invariant the smallest fraction of its differential at `x` that is independent of
+/// the differentials of the other fields in its projections.
+///
+/// # Errors
+///
+/// [`MetricError`] if the metric cannot be used at `x`.
+pub fn independence<Y: Metriplectic + ?Sized>(
+    system: &Y,
+    x: &Place<Y, f64>,
+) -> Result<Vec<f64>, MetricError> {
+    let (w, g) = (differentials(system, x), system.metric().at(x)?);
+    let (mut casimirs, mut all) =
+        (Orthogonal::<Dim<Y>>::default(), Orthogonal::<Dim<Y>>::default());
+    if system.second_law() == SecondLaw::Exact && !system.bracket().is_zero() {
+        casimirs.push(&g, &w.entropy);
+    }
+    if system.second_law() == SecondLaw::Exact {
+        all.push(&g, &w.entropy);
+    }
+    all.push(&g, &w.energy);
+    let listed = w.invariants.as_ref().iter().flatten();
+    Ok(listed
+        .map(|(kind, l)| {
+            let among_all = all.push(&g, l);
+            match kind {
+                Kind::Casimir => casimirs.push(&g, l).min(among_all),
+                Kind::Momentum => among_all,
+            }
+        })
+        .collect())
+}
+
+/// Computes for each further invariant the smallest independent fraction of its differential at `x` in a
+/// projection of a step. A Casimir is projected beside the entropy and the Casimirs before it. A momentum is
+/// projected beside these, the energy and the momenta before it. Both are projected beside the energy and the
+/// list before them.
+///
+/// [`independence`] also includes fractions beside the entropy *and* the energy. These vanish at every
+/// equilibrium without an effect on a step.
+///
+/// # Errors
+///
+/// [`MetricError`] if the metric cannot be used at `x`.
+pub fn projected_fractions<Y: Metriplectic + ?Sized>(
+    system: &Y,
+    x: &Place<Y, f64>,
+) -> Result<Vec<f64>, MetricError> {
+    let (w, g) = (differentials(system, x), system.metric().at(x)?);
+    let mut bracket = Orthogonal::<Dim<Y>>::default();
+    if ProjectionPlan::of(system, &w).entropy {
+        bracket.push(&g, &w.entropy);
+    }
+    let casimirs: Vec<f64> = w.of_kind(Kind::Casimir).map(|c| bracket.push(&g, c)).collect();
+    bracket.push(&g, &w.energy);
+    let momenta: Vec<f64> = w.of_kind(Kind::Momentum).map(|j| bracket.push(&g, j)).collect();
+    let (mut casimirs, mut momenta) = (casimirs.into_iter(), momenta.into_iter());
+
+    let mut friction = Orthogonal::<Dim<Y>>::default();
+    friction.push(&g, &w.energy);
+    let listed = w.invariants.as_ref().iter().flatten();
+    Ok(listed
+        .map(|(kind, l)| {
+            let in_bracket = match kind {
+                Kind::Casimir => casimirs.next(),
+                Kind::Momentum => momenta.next(),
+            };
+            let in_friction = friction.push(&g, l);
+            in_bracket.map_or(in_friction, |fraction| fraction.min(in_friction))
+        })
+        .collect())
+}

@@ -1,0 +1,127 @@
+//! Columns of scalars, of a size that the compiler knows.
+
+use std::fmt::Debug;
+use std::ops::{Add, AddAssign, Index, IndexMut, Mul, Neg, RangeInclusive, Sub, SubAssign};
+
+use approx::RelativeEq;
+use nalgebra::SVector;
+
+use crate::scalar::Scalar;
+
+/// A column of scalars: a vector or a covector in components.
+pub trait Column<D: Scalar>:
+    Copy
+    + Debug
+    + Send
+    + Sync
+    + 'static
+    + RelativeEq<Epsilon = D>
+    + Index<usize, Output = D>
+    + IndexMut<usize>
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Neg<Output = Self>
+    + Mul<D, Output = Self>
+    + AddAssign
+    + SubAssign
+{
+    /// The number of components.
+    const LEN: usize;
+
+    /// Makes the column whose `i`-th component is `f(i)`.
+    fn from_index(f: impl FnMut(usize) -> D) -> Self;
+
+    /// Computes `Σ_i a_i b_i`, a covector on a vector.
+    fn dot(&self, other: &Self) -> D;
+
+    /// The column of zeros.
+    #[inline]
+    fn zero() -> Self {
+        Self::from_index(|_| D::zero())
+    }
+
+    /// The `k`-th basis vector.
+    #[inline]
+    fn basis(k: usize) -> Self {
+        Self::from_index(|i| if i == k { D::one() } else { D::zero() })
+    }
+
+    /// The real components, embedded in this scalar.
+    #[inline]
+    fn embed<R: Column<f64>>(real: &R) -> Self {
+        Self::from_index(|i| D::from(real[i]))
+    }
+
+    /// The real parts of the components.
+    #[inline]
+    fn real<R: Column<f64>>(&self) -> R {
+        R::from_index(|i| self[i].re())
+    }
+
+    /// Computes the Euclidean norm of the real parts, also if their squares overflow or underflow.
+    #[inline]
+    fn magnitude(&self) -> f64 {
+        let mut sum = 0.0;
+        for i in 0..Self::LEN {
+            sum += self[i].re() * self[i].re();
+        }
+        if SQUARES.contains(&sum) {
+            sum.sqrt()
+        } else {
+            scaled_norm((0..Self::LEN).map(|i| self[i].re()))
+        }
+    }
+
+    /// The column of the absolute values of the real parts.
+    #[inline]
+    fn abs(&self) -> Self {
+        Self::from_index(|i| D::from(self[i].re().abs()))
+    }
+
+    /// Returns whether every real part is finite.
+    #[inline]
+    fn is_finite(&self) -> bool {
+        (0..Self::LEN).all(|i| self[i].re().is_finite())
+    }
+}
+
+impl<D: Scalar, const N: usize> Column<D> for SVector<D, N> {
+    const LEN: usize = N;
+
+    #[inline]
+    fn from_index(mut f: impl FnMut(usize) -> D) -> Self {
+        Self::from_fn(|i, _| f(i))
+    }
+
+    #[inline]
+    fn dot(&self, other: &Self) -> D {
+        let mut sum = self[0] * other[0];
+        for i in 1..N {
+            sum += self[i] * other[i];
+        }
+        sum
+    }
+}
+
+/// The sums of squares without overflow or underflow.
+pub(crate) const SQUARES: RangeInclusive<f64> = 1e-280..=1e280;
+
+/// The norm of numbers whose squares underflow or overflow, from the numbers in units of a power of two
+/// near the largest.
+#[cold]
+pub(crate) fn scaled_norm(entries: impl Iterator<Item = f64> + Clone) -> f64 {
+    let largest = entries.clone().fold(0.0_f64, |most, entry| most.max(entry.abs()));
+    if largest == 0.0 || !largest.is_finite() {
+        // `max` ignores NaN, which must appear in the result.
+        return entries.fold(largest, |sum, entry| sum + entry.abs());
+    }
+    let unit = power_of_two(largest);
+    entries.fold(0.0, |sum, entry| sum + (entry / unit).powi(2)).sqrt() * unit
+}
+
+/// Returns the power of two at or below a positive number, at least the least normal number. A division by it
+/// is exact.
+#[must_use]
+pub fn power_of_two(x: f64) -> f64 {
+    f64::from_bits(x.max(f64::MIN_POSITIVE).to_bits() & f64::INFINITY.to_bits())
+}

@@ -1,0 +1,419 @@
+//! What a run knows of a system and of a method.
+//!
+//! A run needs little of a system: its laws, and how large things are. This is a [`Flow`]; every
+//! [`Metriplectic`](metriplectic_dynamics::Metriplectic) system is one. It knows of a method that it takes
+//! steps, what these promise, and what has to be saved between two of them: a [`Method`]. Everything that a
+//! user does with a run, from [`Span`](crate::Span) to [`Checkpoint`](crate::Checkpoint), works with any flow
+//! and any method.
+
+mod metriplectic;
+mod reach;
+mod vector;
+
+use std::fmt::Debug;
+use std::ops::IndexMut;
+
+use metriplectic_dynamics::invariants::Kind;
+use metriplectic_dynamics::{ModelError, SecondLaw};
+use metriplectic_manifolds::{Manifold, PointError};
+
+pub use vector::{Components, Vector};
+
+use crate::error::RunError;
+use crate::run::checkpoint::{Checkpoint, ResumeError, Saved};
+use crate::run::scales::Scales;
+use crate::run::span::Schedule;
+use crate::run::steps::Steps;
+use crate::run::trajectory::Trajectory;
+use crate::step_error::StepError;
+
+/// Where the states of a run live. Every [`Manifold`] is a state space.
+pub trait StateSpace: Clone + Debug + PartialEq + Send + Sync + 'static {
+    /// A state.
+    type Element: Clone + Debug + PartialEq + Send + Sync;
+
+    /// The entries of a state in their order.
+    fn numbers(x: &Self::Element) -> Vec<f64>;
+}
+
+impl<M: Manifold> StateSpace for M {
+    type Element = M::Point<f64>;
+
+    fn numbers(x: &M::Point<f64>) -> Vec<f64> {
+        M::entries(x)
+    }
+}
+
+/// A state of a flow.
+pub type Element<F> = <<F as Flow>::Space as StateSpace>::Element;
+
+/// One number for the energy, one for the entropy, and one for each further invariant: their values, the
+/// sizes of their terms, or their errors.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Laws<L> {
+    /// Of the energy `H`.
+    pub energy: f64,
+    /// Of the entropy `S`; 0 without one.
+    pub entropy: f64,
+    /// Of each further invariant, in their order.
+    pub invariants: L,
+}
+
+/// What a run needs of a system: its laws, its sizes, and its equation of motion.
+///
+/// Implement it for a system that is no [`Metriplectic`](metriplectic_dynamics::Metriplectic) one, such as one
+/// of a size that is known only at run time. The methods with a body serve adaptive steps, further invariants
+/// and checks of the model.
+pub trait Flow {
+    /// Where its states live.
+    type Space: StateSpace;
+    /// A number for each further invariant: an array, or `Vec<f64>`.
+    type Numbers: AsRef<[f64]> + IndexMut<usize, Output = f64> + Clone + Debug;
+    /// A number for each direction: `Vec<f64>`, or an array of a fixed length.
+    type Vector: Vector;
+
+    /// The laws at a state.
+    fn laws(&self, x: &Element<Self>) -> Laws<Self::Numbers>;
+
+    /// The sizes `|F| + Σ_i |∂_iF x_i|` of the terms of the laws at a state; their round-off is relative to
+    /// these.
+    fn term_sizes(&self, x: &Element<Self>) -> Laws<Self::Numbers>;
+
+    /// The velocity at the displacement `d` from a state; `None` where it has no value.
+    fn rates(&self, x: &Element<Self>, d: &Self::Vector) -> Option<Self::Vector>;
+
+    /// The size of a state in each direction, in the units of the entries.
+    fn sizes(&self, x: &Element<Self>) -> Self::Vector;
+
+    /// The end of the displacement `d` from a state.
+    fn moved(&self, x: &Element<Self>, d: &Self::Vector) -> Element<Self>;
+
+    /// The state with these entries.
+    ///
+    /// # Errors
+    ///
+    /// [`PointError`] if they are no state.
+    fn element(&self, entries: &[f64]) -> Result<Element<Self>, PointError>;
+
+    /// What the model says of its entropy.
+    fn entropy_law(&self) -> SecondLaw {
+        SecondLaw::NoEntropy
+    }
+
+    /// Why each further invariant is conserved.
+    fn kinds(&self) -> Vec<Kind> {
+        Vec::new()
+    }
+
+    /// Whether the dissipation is projected, and is not quite the tensor that was written down.
+    fn is_projected(&self) -> bool {
+        false
+    }
+
+    /// Verifies the model at the start of a run.
+    ///
+    /// # Errors
+    ///
+    /// The first law of the model that is broken.
+    fn check(&self, x0: &Element<Self>) -> Result<(), ModelError> {
+        let _ = x0;
+        Ok(())
+    }
+
+    /// The distance of a state from its space.
+    fn defect(&self, x: &Element<Self>) -> f64 {
+        let _ = x;
+        0.0
+    }
+
+    /// The sizes of the terms of the energy on a step, at its two ends.
+    fn energy_sizes(&self, ends: [&Element<Self>; 2]) -> [f64; 2] {
+        ends.map(|x| self.term_sizes(x).energy)
+    }
+
+    /// The round-off of the growth of the entropy in a step.
+    fn entropy_round_off(&self, ends: [&Element<Self>; 2]) -> f64 {
+        let sizes = ends.map(|x| self.term_sizes(x).entropy);
+        4.0 * f64::EPSILON * sizes[0].max(sizes[1])
+    }
+
+    /// The invariant that depends most on the other fields at a state, and its independent fraction, if this
+    /// explains a failure.
+    fn dependent_invariant(&self, x: &Element<Self>) -> Option<(usize, f64)> {
+        let _ = x;
+        None
+    }
+
+    /// The sizes that the entries reach soon in a run that lasts `span`.
+    fn reach(&self, x: &Element<Self>, span: f64) -> Option<Scales<Self::Vector>> {
+        let _ = (x, span);
+        None
+    }
+
+    /// The velocity at a state and the sizes of what it is summed of.
+    fn rates_and_terms(&self, x: &Element<Self>) -> Option<[Self::Vector; 2]> {
+        let rates = self.rates(x, &self.sizes(x).map(|_| 0.0))?;
+        let terms = rates.map(f64::abs);
+        Some([rates, terms])
+    }
+
+    /// An estimate of the local error of a step, for methods that have none; `None` if it has no value.
+    fn local_error(&self, x: &Element<Self>, end: &Element<Self>, h: f64) -> Option<Self::Vector> {
+        let _ = (x, end, h);
+        None
+    }
+}
+
+/// A one-step method.
+///
+/// Laws ([`laws::method`](crate::laws::method)): 1. [`order`](Self::order) is the slope of the error;
+/// 2. what [`promises`](Self::promises) says holds on every step; 3. a step from a saved memory is the same
+/// step, bit for bit.
+pub trait Method<F: Flow>: Sized {
+    /// What it keeps from one step to the next, [`saved`](Memory) by a checkpoint.
+    type Memory: Memory;
+
+    /// The order of convergence: it sets the exponents of adaptive step sizes.
+    fn order(&self) -> u32;
+
+    /// What holds exactly on every step.
+    fn promises(&self, flow: &F) -> Promises;
+
+    /// One step of size `h`, at any price.
+    ///
+    /// # Errors
+    ///
+    /// [`StepError`] if it cannot be taken.
+    fn step(
+        &self,
+        flow: &F,
+        start: &StepStart<'_, F>,
+        h: f64,
+        memory: &mut Self::Memory,
+    ) -> Result<Taken<F>, StepError>;
+
+    /// One step of size `h` where a smaller one may be tried instead: an error costs little.
+    ///
+    /// # Errors
+    ///
+    /// What became of the step.
+    fn attempt(
+        &self,
+        flow: &F,
+        start: &StepStart<'_, F>,
+        h: f64,
+        memory: &mut Self::Memory,
+    ) -> Result<Taken<F>, Refusal> {
+        self.step(flow, start, h, memory)
+            .map_err(|error| Refusal { effort: Effort::default(), error: Some(error) })
+    }
+
+    /// An estimate of the local error of a step; the one of the [`Flow`] unless the method has one of its own.
+    fn error(&self, flow: &F, x: &Element<F>, taken: &Taken<F>, h: f64) -> Option<F::Vector> {
+        flow.local_error(x, &taken.x, h)
+    }
+
+    /// Verifies the model and starts a run: endless in steps of size `h`, or over a [`Span`](crate::Span) or
+    /// [`Until`](crate::Until).
+    ///
+    /// # Errors
+    ///
+    /// [`RunError`] if the model breaks a law or the schedule cannot be run.
+    fn steps(
+        self,
+        flow: &F,
+        x0: Element<F>,
+        schedule: impl Into<Schedule>,
+    ) -> Result<Steps<'_, F, Self>, RunError<F::Space>> {
+        Steps::start(self, flow, x0, schedule.into())
+    }
+
+    /// Verifies the model, runs it over a [`Span`](crate::Span) or [`Until`](crate::Until), and records the states.
+    ///
+    /// # Errors
+    ///
+    /// [`RunError`]; if a step failed, the trajectory so far is in it.
+    fn run(
+        self,
+        flow: &F,
+        x0: Element<F>,
+        schedule: impl Into<Schedule>,
+    ) -> Result<Trajectory<F::Space>, RunError<F::Space>> {
+        self.steps(flow, x0, schedule)?.run()
+    }
+
+    /// Takes up a run where it was put down. With the system and the method of that run the steps
+    /// are those that it would have taken, bit for bit.
+    ///
+    /// # Errors
+    ///
+    /// [`ResumeError`] if the checkpoint does not belong to the system, or is damaged.
+    fn resume<'a>(
+        self,
+        flow: &'a F,
+        checkpoint: &Checkpoint,
+    ) -> Result<Steps<'a, F, Self>, ResumeError> {
+        Steps::resume(self, flow, checkpoint)
+    }
+}
+
+/// What a method keeps from one step to the next.
+pub trait Memory: Clone + Debug + Default {
+    /// The memory for steps of `ratio` times the size.
+    #[must_use]
+    fn rescaled(&self, ratio: f64) -> Self;
+
+    /// Puts all of its numbers into a checkpoint.
+    fn save(&self, saved: &mut Saved);
+
+    /// Reads them from a checkpoint.
+    ///
+    /// # Errors
+    ///
+    /// [`ResumeError`] if a number is missing or impossible.
+    fn restore(saved: &Saved) -> Result<Self, ResumeError>;
+
+    /// The displacement of the last step, and the digits that rounding has lost of the position: a checkpoint
+    /// compares them with the state. Empty where there are none.
+    fn moved_and_lost(&self) -> [Vec<f64>; 2] {
+        [Vec::new(), Vec::new()]
+    }
+}
+
+/// The memory of a method that has none.
+impl Memory for () {
+    fn rescaled(&self, _: f64) -> Self {}
+
+    fn save(&self, _: &mut Saved) {}
+
+    fn restore(_: &Saved) -> Result<Self, ResumeError> {
+        Ok(())
+    }
+}
+
+/// Where a step starts.
+#[derive(Debug)]
+pub struct StepStart<'a, F: Flow + ?Sized> {
+    /// The state.
+    pub x: &'a Element<F>,
+    /// The time.
+    pub time: f64,
+    /// The laws there.
+    pub values: Laws<F::Numbers>,
+    /// What they were at the start of the run; for the entropy, after the last step that dissipated. A method
+    /// may aim at these values, so that round-off does not add up.
+    pub reference: Laws<F::Numbers>,
+}
+
+impl<'a, F: Flow> StepStart<'a, F> {
+    /// The first step of a run from `x`.
+    pub fn first(flow: &F, x: &'a Element<F>) -> Self {
+        let values = flow.laws(x);
+        Self { x, time: 0.0, reference: values.clone(), values }
+    }
+}
+
+/// A step that was taken.
+#[derive(Clone, Debug)]
+pub struct Taken<F: Flow + ?Sized> {
+    /// The state at its end.
+    pub x: Element<F>,
+    /// The laws there.
+    pub values: Laws<F::Numbers>,
+    /// What the step tells of the motion.
+    pub evidence: Evidence,
+    /// What it cost.
+    pub effort: Effort,
+}
+
+/// A step that was not taken, where a smaller one may be.
+#[derive(Clone, Debug)]
+pub struct Refusal {
+    /// What was done.
+    pub effort: Effort,
+    /// The error that a run ends with if no smaller step is taken either, where there is a particular one.
+    pub error: Option<StepError>,
+}
+
+/// What holds exactly on every step of a method.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[non_exhaustive]
+pub struct Promises {
+    /// The energy is conserved.
+    pub energy: bool,
+    /// The entropy does not fall.
+    pub entropy: bool,
+    /// The further invariants are conserved.
+    pub invariants: bool,
+}
+
+impl Promises {
+    /// The energy and the further invariants are conserved, and the entropy does not fall if it is `entropy`
+    /// that is promised.
+    pub const fn all_laws(entropy: bool) -> Self {
+        Self { energy: true, entropy, invariants: true }
+    }
+
+    /// Nothing: the laws hold to the order of the method.
+    pub const fn nothing() -> Self {
+        Self { energy: false, entropy: false, invariants: false }
+    }
+}
+
+/// What a step tells of the motion.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Evidence {
+    /// The size `|w_S|` of the discrete gradient of the entropy, by which the bracket is projected;
+    /// infinite where it has none.
+    pub entropy_slope: f64,
+    /// Whether anything was dissipated.
+    pub dissipates: bool,
+    /// The largest rate `h|K'|` of the friction.
+    pub friction: f64,
+    /// Whether the state is at rest: the displacement is no more than its own round-off.
+    pub rests: bool,
+}
+
+impl Default for Evidence {
+    fn default() -> Self {
+        Self { entropy_slope: f64::INFINITY, dissipates: false, friction: 0.0, rests: false }
+    }
+}
+
+impl Evidence {
+    /// Of two parts of a step: rest is the last one's.
+    pub(crate) fn and(self, next: Self) -> Self {
+        Self {
+            entropy_slope: self.entropy_slope.min(next.entropy_slope),
+            dissipates: self.dissipates | next.dissipates,
+            friction: self.friction.max(next.friction),
+            rests: next.rests,
+        }
+    }
+}
+
+/// What the solver of a method did, in a step or in a run.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
+pub struct Effort {
+    /// Linear systems solved by Newton's method.
+    pub iterations: usize,
+    /// How often a step was approached through smaller ones from the same start.
+    pub continued: usize,
+    /// How often the globaliser was called.
+    pub globalised: usize,
+    /// How often a step, or a part of it, was split in halves.
+    pub splits: usize,
+}
+
+impl std::ops::AddAssign for Effort {
+    fn add_assign(&mut self, other: Self) {
+        self.iterations += other.iterations;
+        self.continued += other.continued;
+        self.globalised += other.globalised;
+        self.splits += other.splits;
+    }
+}

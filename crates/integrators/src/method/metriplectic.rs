@@ -1,0 +1,143 @@
+//! A metriplectic system as a flow.
+
+use metriplectic_dynamics::invariants::{Kind, Visitor};
+use metriplectic_dynamics::velocity::{Covectors, Gradient};
+use metriplectic_dynamics::{
+    Dissipation, Invariants, Metriplectic, ModelError, SecondLaw, system::Point,
+};
+use metriplectic_fields::{ChartPoint, Column, Dimension, ScalarField, Space};
+use metriplectic_manifolds::{Manifold, PointError};
+
+use super::{Components, Flow, Laws, reach};
+use crate::midpoint::{Dim, Numbers, dependent_invariant};
+use crate::round_off::bound::{SizesAt, of_an_increment, size_of_terms, sizes_on_a_step};
+use crate::run::scales::Scales;
+
+type Tangent<Y> = Components<metriplectic_fields::Vector<<Y as Metriplectic>::Manifold>>;
+
+impl<Y: Metriplectic> Flow for Y {
+    type Space = Y::Manifold;
+    type Numbers = Numbers<Y>;
+    type Vector = Tangent<Y>;
+
+    #[inline]
+    fn laws(&self, x: &Point<Y>) -> Laws<Numbers<Y>> {
+        let [energy, entropy] = [self.energy_at(x), self.entropy_at(x)];
+        Laws { energy, entropy, invariants: values(self, x) }
+    }
+
+    fn term_sizes(&self, x: &Point<Y>) -> Laws<Numbers<Y>> {
+        Laws {
+            energy: size_of_terms::<Y::Manifold>(self.energy(), x),
+            entropy: size_of_terms::<Y::Manifold>(self.entropy(), x),
+            invariants: of_each(self, &mut SizesAt::<Y::Manifold>(x)),
+        }
+    }
+
+    fn rates(&self, x: &Point<Y>, d: &Tangent<Y>) -> Option<Tangent<Y>> {
+        reach::velocity(self, x, d.0).map(Components)
+    }
+
+    #[inline]
+    fn sizes(&self, x: &Point<Y>) -> Tangent<Y> {
+        Components(Y::Manifold::scales(x))
+    }
+
+    fn moved(&self, x: &Point<Y>, d: &Tangent<Y>) -> Point<Y> {
+        Y::Manifold::chart(x, &d.0)
+    }
+
+    fn element(&self, entries: &[f64]) -> Result<Point<Y>, PointError> {
+        self.manifold().from_entries(entries)
+    }
+
+    #[inline]
+    fn entropy_law(&self) -> SecondLaw {
+        self.second_law()
+    }
+
+    fn kinds(&self) -> Vec<Kind> {
+        struct Kinds(Vec<Kind>);
+        impl<M: Space> Visitor<M> for Kinds {
+            fn visit(&mut self, kind: Kind, _: &impl ScalarField<M>) {
+                self.0.push(kind);
+            }
+        }
+        let mut kinds = Kinds(Vec::new());
+        self.invariants().each(&mut kinds);
+        kinds.0
+    }
+
+    fn is_projected(&self) -> bool {
+        self.dissipation().is_projected()
+    }
+
+    fn check(&self, x0: &Point<Y>) -> Result<(), ModelError> {
+        self.check_start(x0)
+    }
+
+    #[inline]
+    fn defect(&self, x: &Point<Y>) -> f64 {
+        self.manifold().defect(x)
+    }
+
+    fn energy_sizes(&self, ends: [&Point<Y>; 2]) -> [f64; 2] {
+        sizes_on_a_step(self, ends)
+    }
+
+    fn entropy_round_off(&self, ends: [&Point<Y>; 2]) -> f64 {
+        of_an_increment(self, ends)
+    }
+
+    fn dependent_invariant(&self, x: &Point<Y>) -> Option<(usize, f64)> {
+        dependent_invariant(self, x)
+    }
+
+    fn reach(&self, x: &Point<Y>, span: f64) -> Option<Scales<Tangent<Y>>> {
+        reach::reach(self, x, span)
+    }
+
+    fn rates_and_terms(&self, x: &Point<Y>) -> Option<[Tangent<Y>; 2]> {
+        reach::velocity_and_terms(self, x).map(|both| both.map(Components))
+    }
+
+    /// The estimate `e` of the local error, in the chart at `x`; see the [controller](crate::run::controller).
+    #[inline(never)]
+    fn local_error(&self, x: &Point<Y>, end: &Point<Y>, h: f64) -> Option<Tangent<Y>> {
+        let q = Y::Manifold::coordinates(x, end);
+        if !Y::Manifold::is_near(&q) {
+            return None;
+        }
+        let f = |q| self.velocity(&ChartPoint { base: x.clone(), q }).ok();
+        let (start, there) = (f(Column::zero())?, f(q)?);
+        let middle = f(q * 0.5 - (there - start) * (h / 8.0))?;
+        Some(Components(q - (start + middle * 4.0 + there) * (h / 6.0)))
+    }
+}
+
+/// The further invariants of a system at a point.
+fn values<Y: Metriplectic>(system: &Y, x: &Point<Y>) -> Numbers<Y> {
+    struct Values<'a, M: Space>(&'a M::Point<f64>);
+    impl<M: Space> Gradient<M> for Values<'_, M> {
+        type Covector = f64;
+
+        #[inline]
+        fn of(&mut self, f: &impl ScalarField<M>) -> f64 {
+            f.at(self.0)
+        }
+    }
+    of_each(system, &mut Values::<Y::Manifold>(x))
+}
+
+/// A number for each of the further invariants.
+#[inline]
+fn of_each<Y: Metriplectic>(
+    system: &Y,
+    number: &mut impl Gradient<Y::Manifold, Covector = f64>,
+) -> Numbers<Y> {
+    if Y::Invariants::COUNT == 0 {
+        return Dim::<Y>::array(|_| 0.0);
+    }
+    let numbers = Covectors::new([0.0; 2], system.invariants(), number);
+    Dim::<Y>::array(|k| numbers.invariants[k].map_or(0.0, |(_, value)| value))
+}

@@ -1,0 +1,182 @@
+//! How far the entries of a state move soon.
+//!
+//! An entry that starts at zero has no size yet. It gets the one that it reaches soon: with `v = f(x)`,
+//! `a = f'(x) v` and the nonlinear part `r = f(δv) − v − δa`,
+//!
+//! ```math
+//! s_i = \max\bigl(|x_i|, \; \delta |v_i|, \; \tfrac12\delta^2 |a_i|, \; \tfrac13\delta |r_i| \bigr) .
+//! ```
+//!
+//! `δ` is a quarter of the shortest time of the motion, of the span of the run, `1/|f'_ii|` and
+//! `1/√|f'_ij f'_ji|`, which no unit of an entry changes. It is cut until `r` grows no faster than a power
+//! of `δ`, so that a steep wall on the way does not count.
+//!
+//! The terms of a velocity have the sizes `t_i = Σ_j (|Π_ij||∂_jH| + |K_ij||∂_jS| + |f'_ij||x_j|)`.
+
+use metriplectic_dynamics::velocity::differentials;
+use metriplectic_dynamics::{Bracket, Dissipation, Metriplectic, system::Point};
+use metriplectic_fields::{ChartPoint, Column, Matrix, Scalar, Square, Vector, jacobian};
+use metriplectic_manifolds::Manifold;
+
+use crate::method::Components;
+use crate::run::scales::Scales;
+
+/// The velocity at `x`, and the sizes of what it is summed of; `None` if it cannot be evaluated there.
+pub(super) fn velocity_and_terms<Y: Metriplectic>(
+    system: &Y,
+    x: &Point<Y>,
+) -> Option<[Vector<Y::Manifold>; 2]> {
+    let v = velocity(system, x, Vector::<Y::Manifold>::zero())?;
+    Some([v, terms(system, x, &slopes(system, x), &Y::Manifold::scales(x))?])
+}
+
+/// The sizes that the entries reach soon; `None` if the equation of motion cannot be evaluated at `x`.
+pub(super) fn reach<Y: Metriplectic>(
+    system: &Y,
+    x: &Point<Y>,
+    span: f64,
+) -> Option<Scales<Components<Vector<Y::Manifold>>>> {
+    let (origin, sizes) = (Vector::<Y::Manifold>::zero(), Y::Manifold::scales(x));
+    let v = velocity(system, x, origin)?;
+    let slopes = slopes(system, x);
+    let (a, terms) = (slopes * v, terms(system, x, &slopes, &sizes)?);
+    let nonlinear = |delta: f64| Some(velocity(system, x, v * delta)? - v - a * delta);
+    let is_smooth = |delta: f64, whole: &Vector<Y::Manifold>, half: &Vector<Y::Manifold>| {
+        (0..Vector::<Y::Manifold>::LEN).all(|i| {
+            let linear = 1e-6 * (v[i].abs() + delta * a[i].abs());
+            whole[i].abs() <= STEEPEST * half[i].abs() + linear + NOISE * terms[i]
+        })
+    };
+    let (mut delta, mut r) = (0.25 * shortest_time(&slopes, span), origin);
+    for _ in 0..CUTS {
+        if let (Some(whole), Some(half)) = (nonlinear(delta), nonlinear(0.5 * delta))
+            && is_smooth(delta, &whole, &half)
+        {
+            r = whole;
+            break;
+        }
+        delta *= 0.25;
+    }
+    let sizes = Vector::<Y::Manifold>::from_index(|i| {
+        let linear = (delta * v[i].abs()).max(0.5 * delta * delta * a[i].abs());
+        linear.max(delta * r[i].abs() / 3.0)
+    });
+    (sizes.is_finite() && terms.is_finite())
+        .then_some(Scales { sizes: Components(sizes), terms: Components(terms) })
+}
+
+/// How often the time `δ` is cut before the nonlinear part is given up.
+const CUTS: usize = 30;
+/// A nonlinear part that grows faster than `δ⁴` is that of a wall: `2⁴`, and a quarter more.
+const STEEPEST: f64 = 20.0;
+/// The fraction of the terms of a velocity below which it may be noise: 2⁻¹⁶, far above round-off.
+const NOISE: f64 = 1.0 / 65_536.0;
+
+/// The shortest time of the motion, and at most `span`.
+fn shortest_time<V: Column<f64>>(slopes: &impl Square<f64, Column = V>, span: f64) -> f64 {
+    let mut time = span;
+    for i in 0..V::LEN {
+        for j in 0..=i {
+            let (there, back) = (slopes[(i, j)].abs(), slopes[(j, i)].abs());
+            let product = there * back;
+            // The product of two numbers that are not zero may be too small or too large for a number.
+            let rate =
+                if product.is_normal() { product.sqrt() } else { there.sqrt() * back.sqrt() };
+            if rate > 0.0 {
+                time = time.min(rate.recip());
+            }
+        }
+    }
+    time
+}
+
+/// The sizes `Σ_j (|Π_ij||∂_jH| + |K_ij||∂_jS| + |f'_ij||x_j|)` of what the velocity is summed of.
+fn terms<Y: Metriplectic>(
+    system: &Y,
+    x: &Point<Y>,
+    slopes: &Matrix<Y::Manifold>,
+    sizes: &Vector<Y::Manifold>,
+) -> Option<Vector<Y::Manifold>> {
+    let centre = ChartPoint::<Y::Manifold>::centre(x);
+    let w = differentials(system, &centre);
+    let pi = system.bracket().tensor(&system.bracket_args(&centre, &w.entropy)).ok()?;
+    let k = system.dissipation().tensor(system.metric(), &centre, &w.energy).ok()?;
+    Some(Column::from_index(|i| {
+        let n = Vector::<Y::Manifold>::LEN;
+        (0..n).fold(0.0, |sum: f64, j| {
+            let laws = (pi[(i, j)] * w.energy[j]).abs() + (k[(i, j)] * w.entropy[j]).abs();
+            sum + laws + (slopes[(i, j)] * sizes[j]).abs()
+        })
+    }))
+}
+
+/// The derivatives `f'` of the velocity along the chart at `x`; not numbers where there are none.
+fn slopes<Y: Metriplectic>(system: &Y, x: &Point<Y>) -> Matrix<Y::Manifold> {
+    jacobian::<Y::Manifold, f64>(
+        |&q| velocity(system, x, q).unwrap_or_else(|| Column::from_index(|_| f64::NAN.into())),
+        &Vector::<Y::Manifold>::zero(),
+    )
+}
+
+/// The velocity at `φ_x(q)`, if there is one.
+pub(super) fn velocity<Y: Metriplectic, D: Scalar>(
+    system: &Y,
+    x: &Point<Y>,
+    q: Vector<Y::Manifold, D>,
+) -> Option<Vector<Y::Manifold, D>> {
+    let v = system.velocity(&ChartPoint { base: x.clone(), q }).ok()?;
+    v.is_finite().then_some(v)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use metriplectic_dynamics::{FieldDissipation, Poisson, Symplectic, System};
+    use metriplectic_fields::Real;
+    use metriplectic_manifolds::Euclidean;
+    use nalgebra::{Matrix3, Vector2, Vector3, vector};
+    use num_dual::DualNum;
+
+    /// A damped oscillator with its entropy, in units of the entries that are powers of two.
+    fn oscillator(units: Vector3<f64>) -> Vector3<f64> {
+        let [a, b, c] = [units.x, units.y, units.z];
+        let pi = Matrix3::new(0.0, a * b, 0.0, -a * b, 0.0, 0.0, 0.0, 0.0, 0.0);
+        let system = System::on(Euclidean::<3>)
+            .bracket(Poisson::constant(pi).unwrap())
+            .energy(move |x: &Vector3<Real>| {
+                ((x.x / a).powi(2) + (x.y / b).powi(2)) * 0.5 + x.z / c
+            })
+            .entropy(move |x: &Vector3<Real>| x.z / c)
+            .dissipation(FieldDissipation(move |_: &Vector3<Real>, w: &Vector3<Real>| {
+                let force = Vector3::new(Real::from(0.0), w.z * (b * c), -w.y * (b * c));
+                force * force.transpose() * ((w.z * c).recip() * 0.1)
+            }))
+            .build()
+            .unwrap();
+        Scales::at(&system, &vector![a, 0.0, 0.0], Some(50.0)).sizes.0.component_div(&units)
+    }
+
+    #[test]
+    fn entries_at_zero_get_the_sizes_that_they_reach_in_units_of_their_own() {
+        let one = oscillator(vector![1.0, 1.0, 1.0]);
+        println!("{one}");
+        // After a quarter of the time 1: p = 1/4, s = p²t/30.
+        assert!((one.x - 1.0).abs() < 1e-15 && (0.2..0.3).contains(&one.y), "{one}");
+        assert!((1e-4..1e-2).contains(&one.z), "{one}");
+        for exponents in [[-30, -30, -30], [-80, 40, 7], [200, -200, 100]] {
+            let units = exponents.map(|k| 2_f64.powi(k)).into();
+            assert_eq!(oscillator(units), one, "{exponents:?}");
+        }
+    }
+
+    #[test]
+    fn a_wall_on_the_way_gives_no_size() {
+        let system = System::on(Euclidean::<2>)
+            .bracket(Symplectic)
+            .energy(|x: &Vector2<Real>| x.y.powi(2) * 0.5 + ((x.x - 1.0) * 20.0).exp())
+            .build()
+            .unwrap();
+        let sizes = Scales::at(&system, &vector![0.0, 1.0], Some(1000.0)).sizes.0;
+        assert!(sizes.x < 1.0 && sizes.y < 1.1, "{sizes}");
+    }
+}

@@ -1,0 +1,350 @@
+//! What is done where Newton's method does not solve the equation of a step; in the order of the
+//! [module](super).
+
+use metriplectic_dynamics::{Metriplectic, system::Point};
+use metriplectic_fields::{Column, Space, Square, Vector};
+use metriplectic_manifolds::{Manifold, Retraction};
+
+use super::equation::{Dissipated, Residual};
+use super::jacobian::KeptJacobian;
+use super::{Dim, MemoryOf, Scheme, Start, dependent_invariant};
+use crate::discrete_gradient::DiscreteGradient;
+use crate::method::{Effort, Flow as _, Laws, Taken};
+use crate::newton::{Equation, Inverse, Iterate, Newton, Root};
+use crate::step_error::StepError;
+
+/// How hard to try.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Fallbacks {
+    /// Everything, because only halving the step comes after it.
+    All,
+    /// Newton's method alone, because a smaller step is tried next.
+    NewtonOnly,
+}
+
+/// A step that was not taken.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct StepFailure {
+    /// The smallest residual that was found.
+    pub(super) residual: f64,
+    /// Why it was not taken.
+    pub(super) cause: Cause,
+    /// What was done.
+    pub(super) effort: Effort,
+}
+
+impl StepFailure {
+    /// The error that names the first law, if the step was refused because its end has another energy.
+    pub(super) const fn first_law(self, time: f64, h: f64) -> Option<StepError> {
+        match self.cause {
+            Cause::Energy { change, size } => {
+                Some(StepError::FirstLawBroken { time, h, change, size })
+            }
+            Cause::Edge | Cause::Unsolved => None,
+        }
+    }
+}
+
+/// Why a step was not taken.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Cause {
+    /// The domain of the model is in the way.
+    Edge,
+    /// The equation is solved, but its end has another energy.
+    Energy { change: f64, size: f64 },
+    /// Newton's method does not converge.
+    Unsolved,
+}
+
+/// The parts of a step that was not solved whole.
+struct Halves<'a, Y: Metriplectic, R, W> {
+    scheme: &'a Scheme<R, W>,
+    system: &'a Y,
+    /// What all of the parts took.
+    effort: Effort,
+}
+
+impl<R, W: DiscreteGradient> Scheme<R, W> {
+    /// The step, whole or in parts.
+    pub(super) fn with_halves<Y>(
+        &self,
+        system: &Y,
+        start: &Start<'_, Y>,
+        memory: &mut MemoryOf<Y>,
+    ) -> Result<Taken<Y>, StepError>
+    where
+        Y: Metriplectic,
+        R: Retraction<Y::Manifold, Y::Metric>,
+    {
+        let failure = match self.try_step(system, start, memory, Fallbacks::All) {
+            Ok(taken) => return Ok(taken),
+            Err(failure) => failure,
+        };
+        *memory = MemoryOf::<Y>::default();
+        let mut halves = Halves { scheme: self, system, effort: failure.effort };
+        let parts =
+            if self.splits == 0 { Err((failure, start.x.clone())) } else { halves.of(start, 1) };
+        let effort = halves.effort;
+        match parts {
+            Ok(taken) => Ok(Taken { effort, ..taken }),
+            Err((smallest, x)) => Err(self.error(system, start, (smallest, &x), effort)),
+        }
+    }
+
+    /// What a user is told of a step that was not solved, by what became of its smallest part, which
+    /// starts at `x`.
+    #[cold]
+    fn error<Y>(
+        &self,
+        system: &Y,
+        start: &Start<'_, Y>,
+        (failure, x): (StepFailure, &Point<Y>),
+        tried: Effort,
+    ) -> StepError
+    where
+        Y: Metriplectic,
+        R: Retraction<Y::Manifold, Y::Metric>,
+    {
+        let Start { time, h, .. } = *start;
+        let StepFailure { residual, cause, .. } = failure;
+        if let Some(error) = failure.first_law(time, h) {
+            return error;
+        }
+        let suggested = smallest_part(h, self.splits);
+        let equation =
+            Residual::new(system, (&self.retraction, &self.gradient), start.x, suggested);
+        let here = equation.linearise(&Vector::<Y::Manifold>::zero());
+        let rates = here.map(|at| at.stiffness).unwrap_or_default();
+        // Where friction is slow against the smallest part, or slower than the reversible motion, something
+        // else is in the way.
+        if rates.friction > f64::max(1.0, rates.rotation) {
+            let stiffness = rates.friction * (h / suggested);
+            return StepError::StiffFriction { time, h, stiffness, residual, tried };
+        }
+        match (cause, dependent_invariant(system, x)) {
+            (Cause::Edge, _) => StepError::OutOfDomain { time, h, tried },
+            (_, Some((index, fraction))) => {
+                let change = start.accumulated_error.invariants[index].abs();
+                StepError::DependentInvariants { time, index, change, fraction }
+            }
+            _ => StepError::NotConverged { time, h, residual, tried, suggested },
+        }
+    }
+}
+
+impl<Y, R, W> Halves<'_, Y, R, W>
+where
+    Y: Metriplectic,
+    R: Retraction<Y::Manifold, Y::Metric>,
+    W: DiscreteGradient,
+{
+    /// The two halves of a step that was not solved whole; if they were not solved either, where the
+    /// smallest part of them starts.
+    fn of(
+        &mut self,
+        start: &Start<'_, Y>,
+        depth: usize,
+    ) -> Result<Taken<Y>, (StepFailure, Point<Y>)> {
+        self.effort.splits += 1;
+        let mut memory = MemoryOf::<Y>::default();
+        let h = 0.5 * start.h;
+        let first = self.part(start, start.x, h, depth, &mut memory)?;
+        let second = self.part(start, &first.x, h, depth, &mut memory)?;
+        let evidence = first.evidence.and(second.evidence);
+        Ok(Taken { evidence, ..second })
+    }
+
+    /// One half, which starts at `x`.
+    fn part(
+        &mut self,
+        start: &Start<'_, Y>,
+        x: &Point<Y>,
+        h: f64,
+        depth: usize,
+        memory: &mut MemoryOf<Y>,
+    ) -> Result<Taken<Y>, (StepFailure, Point<Y>)> {
+        let laws = self.system.laws(x);
+        let energy = start.accumulated_error.energy + (laws.energy - start.values.energy);
+        let accumulated_error = Laws { energy, ..start.accumulated_error };
+        let values = Laws { energy: laws.energy, entropy: laws.entropy, ..start.values };
+        let part = Start { x, h, values, accumulated_error, ..*start };
+        match self.scheme.try_step(self.system, &part, memory, Fallbacks::NewtonOnly) {
+            Ok(taken) => {
+                self.effort += taken.effort;
+                Ok(taken)
+            }
+            Err(failure) => {
+                self.effort += failure.effort;
+                if depth >= self.scheme.splits {
+                    return Err((failure, x.clone()));
+                }
+                self.of(&part, depth + 1)
+            }
+        }
+    }
+}
+
+/// Solves the equation of a step near a guess, first with the Jacobian that is kept.
+pub(super) fn solve<Y, R, W>(
+    newton: &Newton,
+    equation: &Residual<'_, Y, R, W>,
+    guess: &Vector<Y::Manifold>,
+    kept: &mut Option<KeptJacobian<Dim<Y>>>,
+    fallbacks: Fallbacks,
+) -> Result<(Root<Y::Manifold, Dissipated>, Effort), StepFailure>
+where
+    Y: Metriplectic,
+    R: Retraction<Y::Manifold, Y::Metric>,
+    W: DiscreteGradient,
+{
+    let known = kept.take().filter(|known| known.serves(equation.step_size(), guess));
+    let mut inverse = known.map(|known| known.inverse);
+    let root = newton.solve_near(equation, guess, &mut inverse);
+    let mut effort = Effort { iterations: iterations(&root), ..Effort::default() };
+    let root = match root {
+        Ok(root) => root,
+        Err(failure) => {
+            let mut rescue = Rescue { newton, equation, inverse: &mut inverse, effort };
+            let rescued = rescue.solve(failure, fallbacks);
+            effort = rescue.effort;
+            rescued.map_err(|failure| StepFailure { effort, ..failure })?
+        }
+    };
+    *kept =
+        inverse.map(|inverse| KeptJacobian::after(known, inverse, equation.step_size(), &root.u));
+    Ok((root, effort))
+}
+
+/// What comes after Newton's method from the guess.
+struct Rescue<'a, 'b, Y: Metriplectic, R, W> {
+    newton: &'a Newton,
+    equation: &'a Residual<'b, Y, R, W>,
+    inverse: &'a mut Option<Inverse<Dim<Y>>>,
+    effort: Effort,
+}
+
+impl<Y, R, W> Rescue<'_, '_, Y, R, W>
+where
+    Y: Metriplectic,
+    R: Retraction<Y::Manifold, Y::Metric>,
+    W: DiscreteGradient,
+{
+    /// Newton's method from a guess, with its best point if it does not converge.
+    fn newton(
+        &mut self,
+        newton: &Newton,
+        guess: &Vector<Y::Manifold>,
+        best: &mut Iterate<Y::Manifold>,
+    ) -> Option<Root<Y::Manifold, Dissipated>> {
+        let solved = newton.solve_near(self.equation, guess, self.inverse);
+        self.effort.iterations += iterations(&solved);
+        solved
+            .map_err(|failure| {
+                if failure.residual < best.residual {
+                    *best = failure;
+                }
+            })
+            .ok()
+    }
+
+    /// A root, in the order of the [module](super).
+    #[cold]
+    fn solve(
+        &mut self,
+        failure: Iterate<Y::Manifold>,
+        fallbacks: Fallbacks,
+    ) -> Result<Root<Y::Manifold, Dissipated>, StepFailure> {
+        let mut best = failure;
+        let whole = *self.newton;
+        let direct = Newton { iterations: DIRECT.min(whole.iterations), ..whole };
+        let mut solved = self.newton(&direct, &Vector::<Y::Manifold>::zero(), &mut best);
+        if fallbacks == Fallbacks::All {
+            if solved.is_none()
+                && let Some(near) = self.continue_in_step_size()
+            {
+                solved = self.newton(&whole, &near, &mut best);
+            }
+            #[cfg(feature = "argmin")]
+            if solved.is_none()
+                && let Some(closer) = super::globaliser::descend(self.equation, &best.best)
+            {
+                self.effort.globalised += 1;
+                solved = self.newton(&whole, &closer, &mut best);
+            }
+        }
+        solved.ok_or_else(|| {
+            let edge = at_edge(self.equation, &best.best);
+            let cause = if edge { Cause::Edge } else { Cause::Unsolved };
+            StepFailure { residual: best.residual, cause, effort: self.effort }
+        })
+    }
+
+    /// The displacement of the last of a row of steps of growing sizes from the same start, up to
+    /// that of the equation: the branch of solutions that begins at rest is followed along its tangents. A
+    /// solution counts as one of this branch if it is near its prediction.
+    fn continue_in_step_size(&mut self) -> Option<Vector<Y::Manifold>> {
+        self.effort.continued += 1;
+        // The points on the way need not be solved to round-off.
+        let newton = Newton { tolerance: 1e3, iterations: DIRECT, halvings: 2, ..*self.newton };
+        let (mut u, mut fraction, mut increment) = (Vector::<Y::Manifold>::zero(), 0.0, 0.125);
+        for _ in 0..STAGES {
+            let next = f64::min(fraction + increment, 1.0);
+            let equation = self.equation.of_fraction(next);
+            self.effort.iterations += 1;
+            let near = equation.linearise(&u).and_then(|at| {
+                let step = at.jacobian.solve(&at.residual)?;
+                // The branch begins as a straight line: the implicit displacement is the explicit one.
+                let bends = (step - at.residual).magnitude() > NEARBY * step.magnitude();
+                if fraction <= 0.0 && bends {
+                    return None;
+                }
+                let predicted = u - step;
+                let solved = newton.solve_near(&equation, &predicted, &mut None);
+                self.effort.iterations += iterations(&solved);
+                let root = solved.ok()?.u;
+                let error = (root - predicted).magnitude();
+                (error <= NEARBY * (root - u).magnitude()).then_some(root)
+            });
+            match near {
+                Some(root) if next >= 1.0 => return Some(root),
+                Some(root) => (u, fraction, increment) = (root, next, 2.0 * increment),
+                None => increment *= 0.25,
+            }
+            if increment <= LEAST * fraction {
+                return None;
+            }
+        }
+        None
+    }
+}
+
+/// What Newton's method has cost.
+fn iterations<M: Space, E>(solved: &Result<Root<M, E>, Iterate<M>>) -> usize {
+    solved.as_ref().map_or_else(|best| best.iterations, |root| root.iterations)
+}
+
+/// A solution belongs to a branch if it is off its prediction by no more than this fraction of the way.
+const NEARBY: f64 = 0.1;
+/// Linear systems after which a way from rest is no longer direct, and its end no longer likely to be
+/// the solution that belongs to the start.
+const DIRECT: usize = 8;
+/// Steps of growing sizes that may be tried to get to the size that is asked for.
+const STAGES: usize = 200;
+/// The fraction of what has been reached below which an increment of the size means that the branch of
+/// solutions ends there.
+const LEAST: f64 = 1e-4;
+
+/// Whether it is the edge of the domain that stops Newton's method at `u`: its correction leads out,
+/// cut to the length of the step, because a far longer one, from a Jacobian that is nearly singular,
+/// leads out of any domain.
+fn at_edge<M: Manifold>(equation: &impl Equation<M>, u: &Vector<M>) -> bool {
+    let Some(at) = equation.linearise(u) else { return true };
+    let Some(step) = at.jacobian.solve(&at.residual) else { return false };
+    let fraction = (u.magnitude() + at.residual.magnitude()) / step.magnitude();
+    equation.evaluate(&(*u - step * fraction.min(1.0))).is_none()
+}
+
+/// The size of the smallest part of a step that was split `splits` times.
+fn smallest_part(h: f64, splits: usize) -> f64 {
+    (0..splits).fold(h, |part, _| 0.5 * part)
+}

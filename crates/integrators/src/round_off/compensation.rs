@@ -1,0 +1,44 @@
+//! What rounding loses of a position.
+
+use metriplectic_fields::{Column, Dimension};
+use metriplectic_manifolds::{Manifold, Riemannian};
+
+/// The digits that rounding has lost of the position in the steps so far.
+///
+/// The entries of a point are rounded in every step, and steps shorter than their last digit would
+/// be lost altogether. What is lost is added to the next displacement (compensated summation; Kahan
+/// 1965, Hairer, Lubich, Wanner 2006, §VIII.5).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Compensation<N: Dimension>(pub(crate) Option<N::Vector<f64>>);
+
+impl<N: Dimension> Compensation<N> {
+    /// Nothing is lost.
+    pub(crate) const NONE: Self = Self(None);
+
+    /// The end was moved for another reason, and what has been lost is no longer known.
+    pub(crate) fn clear(&mut self) {
+        self.0 = None;
+    }
+
+    /// The end of the step `d` from `x`, moved by what earlier steps have lost.
+    #[inline]
+    pub(crate) fn add<M: Manifold<Dim = N>, G: Riemannian<M>>(
+        &mut self,
+        metric: &G,
+        (x, d): (&M::Point<f64>, &N::Vector<f64>),
+        end: M::Point<f64>,
+    ) -> M::Point<f64> {
+        let lost = metric.lost_digits(x, d, &end);
+        match self.0 {
+            Some(before) if before.magnitude() > 0.0 => {
+                let compensated = M::chart(&end, &before);
+                self.0 = Some(lost + metric.lost_digits(&end, &before, &compensated));
+                compensated
+            }
+            _ => {
+                self.0 = Some(lost);
+                end
+            }
+        }
+    }
+}

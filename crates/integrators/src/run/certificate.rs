@@ -1,0 +1,388 @@
+//! What a run did to its laws.
+
+use std::fmt;
+
+use metriplectic_dynamics::SecondLaw;
+use metriplectic_dynamics::invariants::Kind;
+
+use crate::digits::{Digits, counted};
+use crate::method::{Effort, Element, Evidence, Flow, Laws, Promises, Vector as _};
+use crate::round_off::bound::{ROUNDED, of_a_law};
+use crate::run::scales::{larger, relative};
+
+/// The balance of a run: what became of the two laws, of the manifold, and what it cost.
+///
+/// All figures of the laws are evaluated from the closures at the stored points, none from the
+/// terms of the scheme.
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[non_exhaustive]
+pub struct Certificate {
+    /// The energy `H(x₀)`.
+    pub initial_energy: f64,
+    /// `max |H(x_k) − H(x₀)|`.
+    pub max_energy_error: f64,
+    /// The size `|H| + Σ_i |∂_iH x_i|` of the terms of the energy, to which its round-off is relative: at
+    /// the start, or where the error asked for a larger one.
+    pub energy_scale: f64,
+    /// The entropy `S(x₀)`; 0 without an entropy.
+    pub initial_entropy: f64,
+    /// `min (S(x_{k+1}) − S(x_k))`; 0 before the first step.
+    pub min_entropy_increment: f64,
+    /// `S(x_n) − S(x₀)`.
+    pub entropy_gained: f64,
+    /// Steps on which the entropy fell by more than its round-off
+    /// `4ε (|S| + Σ_i |∂_iS x_i|)`.
+    pub entropy_falls: usize,
+    /// `min |w_S|`, the size of the discrete gradient of the entropy in the exact scheme, which has
+    /// order 2 as long as this is large against `h²`; infinite (in JSON, null) without such a one.
+    pub min_entropy_slope: f64,
+    /// What became of the further invariants, in their order.
+    pub invariants: Vec<InvariantBalance>,
+    /// `max` of the manifold's defect.
+    pub max_manifold_defect: f64,
+    /// Steps taken.
+    pub steps: usize,
+    /// The size of the smallest step taken; 0 before the first step.
+    pub smallest_step: f64,
+    /// The size of the largest step taken; 0 before the first step.
+    pub largest_step: f64,
+    /// Steps that were tried and given up, because their error was above the tolerance or because
+    /// they were not solved.
+    pub rejected: usize,
+    /// What the solver did, in all steps.
+    #[cfg_attr(feature = "serde", serde(flatten))]
+    pub effort: Effort,
+    /// Linear systems solved in the worst step.
+    pub worst_iterations: usize,
+    /// The largest local error of a step, relative to the sizes of the entries, as estimated on a few steps:
+    /// those whose number is a power of two. `None` where there is no estimate.
+    pub local_error: Option<f64>,
+    /// What the method promises.
+    pub promises: Promises,
+    /// What the model promises about its entropy; serialized as the name of the variant.
+    #[cfg_attr(feature = "serde", serde(serialize_with = "by_name"))]
+    pub second_law: SecondLaw,
+    /// The largest rate `h|K'|` of the friction in a step, with `K'` the derivative of `K dS` along the
+    /// state, from the Jacobians that were formed; 0 without dissipation. The midpoint rule damps no
+    /// deviation that decays much faster than a step: it is multiplied by almost −1.
+    pub friction: f64,
+    /// Whether the dissipation was projected so that it keeps the energy, and is not quite the tensor
+    /// that was written down ([`ProjectedDissipation`](metriplectic_dynamics::ProjectedDissipation)).
+    pub projected: bool,
+}
+
+/// What became of a further invariant.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[non_exhaustive]
+pub struct InvariantBalance {
+    /// Why it is conserved; serialized as its name.
+    #[cfg_attr(feature = "serde", serde(serialize_with = "by_name"))]
+    pub kind: Kind,
+    /// Its value `L(x₀)`.
+    pub initial: f64,
+    /// `max |L(x_k) − L(x₀)|`.
+    pub max_error: f64,
+    /// The size `|L| + Σ_i |∂_iL x_i|` of its terms, like [`Certificate::energy_scale`].
+    pub scale: f64,
+}
+
+impl InvariantBalance {
+    /// Whether it was kept to round-off: `|L − L₀| ≤ 50 ε (|L| + Σ_i |∂_iL x_i|)`.
+    pub const fn is_kept(&self) -> bool {
+        self.max_error <= of_a_law(self.scale)
+    }
+}
+
+/// The rate `h|K'|` of friction from which on a step is stiff: the midpoint rule leaves two thirds of a
+/// deviation that decays at this rate, with the opposite sign.
+const STIFF: f64 = 10.0;
+
+/// The local error, relative to the sizes of the entries, from which on a motion is not resolved.
+const UNRESOLVED: f64 = 0.1;
+
+#[cfg(feature = "serde")]
+fn by_name<S: serde::Serializer>(name: &impl fmt::Debug, to: S) -> Result<S::Ok, S::Error> {
+    to.collect_str(&format_args!("{name:?}"))
+}
+
+impl Certificate {
+    /// That of a run that starts at `x0`.
+    pub(crate) fn start<F: Flow>(flow: &F, x0: &Element<F>, promises: Promises) -> Self {
+        let (laws, sizes) = (flow.laws(x0), flow.term_sizes(x0));
+        let kinds = flow.kinds().into_iter().enumerate();
+        Self {
+            initial_energy: laws.energy,
+            max_energy_error: 0.0,
+            energy_scale: sizes.energy,
+            initial_entropy: laws.entropy,
+            min_entropy_increment: 0.0,
+            entropy_gained: 0.0,
+            entropy_falls: 0,
+            min_entropy_slope: f64::INFINITY,
+            invariants: kinds
+                .map(|(k, kind)| InvariantBalance {
+                    kind,
+                    initial: laws.invariants.as_ref()[k],
+                    max_error: 0.0,
+                    scale: sizes.invariants.as_ref()[k],
+                })
+                .collect(),
+            max_manifold_defect: flow.defect(x0),
+            steps: 0,
+            smallest_step: 0.0,
+            largest_step: 0.0,
+            rejected: 0,
+            effort: Effort::default(),
+            worst_iterations: 0,
+            local_error: None,
+            promises,
+            second_law: flow.entropy_law(),
+            friction: 0.0,
+            projected: flow.is_projected(),
+        }
+    }
+
+    /// Enters a step of size `h` between two states with these laws.
+    #[inline]
+    pub(crate) fn enter<F: Flow>(
+        &mut self,
+        flow: &F,
+        [(x, before), (next, after)]: [(&Element<F>, &Laws<F::Numbers>); 2],
+        h: f64,
+        (evidence, effort): (Evidence, Effort),
+    ) {
+        self.smallest_step = if self.steps == 0 { h } else { self.smallest_step.min(h) };
+        self.largest_step = self.largest_step.max(h);
+        let error = (after.energy - self.initial_energy).abs();
+        self.max_energy_error = self.max_energy_error.max(error);
+        // The terms of the energy are evaluated where the error asks for them, and not in every step.
+        if error > of_a_law(self.energy_scale) {
+            self.energy_scale = self.energy_scale.max(flow.term_sizes(next).energy);
+        }
+        let increment = after.entropy - before.entropy;
+        self.min_entropy_increment =
+            if self.steps == 0 { increment } else { self.min_entropy_increment.min(increment) };
+        self.entropy_gained = after.entropy - self.initial_entropy;
+        if increment < 0.0 && increment < -flow.entropy_round_off([x, next]) {
+            self.entropy_falls += 1;
+        }
+        for (k, balance) in self.invariants.iter_mut().enumerate() {
+            let error = (after.invariants.as_ref()[k] - balance.initial).abs();
+            balance.max_error = balance.max_error.max(error);
+            if balance.max_error > of_a_law(balance.scale) {
+                let size = flow.term_sizes(next).invariants.as_ref()[k];
+                balance.scale = balance.scale.max(size);
+            }
+        }
+        self.min_entropy_slope = self.min_entropy_slope.min(evidence.entropy_slope);
+        self.friction = self.friction.max(evidence.friction);
+        self.max_manifold_defect = self.max_manifold_defect.max(flow.defect(next));
+        self.steps += 1;
+        self.effort += effort;
+        self.worst_iterations = self.worst_iterations.max(effort.iterations);
+        if self.steps.is_power_of_two() {
+            self.sample(flow, [x, next], h);
+        }
+    }
+
+    /// Notes an estimate of the local error.
+    #[cold]
+    fn sample<F: Flow>(&mut self, flow: &F, [x, next]: [&Element<F>; 2], h: f64) {
+        if let Some(error) = flow.local_error(x, next, h) {
+            // The sizes that a step brings about count too.
+            let sizes = larger(&flow.sizes(x), &flow.sizes(next));
+            let rounding = sizes.map(|size| ROUNDED * size);
+            let error = error.with(|i| (error.get(i).abs() - rounding.get(i)).max(0.0));
+            let relative = relative(&error, &sizes);
+            self.local_error = Some(self.local_error.unwrap_or(0.0).max(relative));
+        }
+    }
+
+    /// `max |H(x_k) − H(x₀)| / |H(x₀)|`; the absolute error if `H(x₀) = 0`.
+    pub fn max_relative_energy_error(&self) -> f64 {
+        if self.initial_energy == 0.0 {
+            self.max_energy_error
+        } else {
+            self.max_energy_error / self.initial_energy.abs()
+        }
+    }
+
+    /// Whether the first law was kept to round-off: `|H − H₀| ≤ 50 ε (|H| + Σ_i |∂_iH x_i|)`.
+    pub const fn keeps_energy(&self) -> bool {
+        self.max_energy_error <= of_a_law(self.energy_scale)
+    }
+
+    /// Whether friction is so stiff at these step sizes that the midpoint rule does not damp it.
+    pub const fn is_stiff(&self) -> bool {
+        self.friction > STIFF
+    }
+
+    /// Whether the entropy fell on no step by more than its round-off.
+    pub const fn keeps_entropy(&self) -> bool {
+        self.entropy_falls == 0
+    }
+
+    /// Whether every further invariant was kept to round-off.
+    pub fn keeps_invariants(&self) -> bool {
+        self.invariants.iter().all(InvariantBalance::is_kept)
+    }
+}
+
+impl fmt::Display for Certificate {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let steps = counted(self.steps, "step", "steps");
+        let (error, relative) = (self.max_energy_error, self.relative_to());
+        if !self.promises.energy {
+            writeln!(
+                f,
+                "first law:   not promised; |H − H₀| ≤ {error:.1e}{relative}, over {steps}"
+            )?;
+        } else if self.keeps_energy() {
+            writeln!(f, "first law:   |H − H₀| ≤ {error:.1e}{relative}, over {steps}")?;
+        } else {
+            let allowed = of_a_law(self.energy_scale);
+            writeln!(
+                f,
+                "first law:   BROKEN: |H − H₀| = {error:.1e}{relative}, round-off is {allowed:.1e}, over {steps}"
+            )?;
+        }
+        match self.second_law {
+            SecondLaw::NoEntropy => writeln!(f, "second law:  no entropy"),
+            _ if !self.promises.entropy => {
+                writeln!(f, "second law: not promised; {}", self.entropy_line())
+            }
+            _ => writeln!(f, "second law:  {}", self.entropy_line()),
+        }?;
+        if self.projected {
+            writeln!(f, "friction:    projected so that K dH = 0, not quite the tensor given")?;
+        }
+        if self.is_stiff() {
+            writeln!(f, "friction not damped: h|K'| = {:.1e}", self.friction)?;
+        }
+        for (index, kept) in self.invariants.iter().enumerate() {
+            let InvariantBalance { kind, initial, max_error, .. } = kept;
+            writeln!(
+                f,
+                "{:<13}{}|L − L₀| ≤ {max_error:.1e}, L₀ = {}",
+                format!("{kind} {}:", index + 1),
+                if !self.promises.invariants {
+                    "not promised; "
+                } else if kept.is_kept() {
+                    ""
+                } else {
+                    "BROKEN: "
+                },
+                Digits(*initial)
+            )?;
+        }
+        writeln!(f, "manifold:    defect ≤ {:.1e}", self.max_manifold_defect)?;
+        if self.smallest_step < self.largest_step || self.rejected > 0 {
+            writeln!(
+                f,
+                "step sizes:  {:.1e} to {:.1e}, {} rejected",
+                self.smallest_step, self.largest_step, self.rejected
+            )?;
+        }
+        if let Some(error) = self.local_error.filter(|error| *error > UNRESOLVED) {
+            writeln!(
+                f,
+                "accuracy:    the motion is not resolved: local errors up to {error:.1e} of the state in a step"
+            )?;
+        }
+        write!(
+            f,
+            "solver:      {} ({} in the worst step), {}",
+            counted(self.effort.iterations, "Newton iteration", "Newton iterations"),
+            self.worst_iterations,
+            counted(self.effort.splits, "retry", "retries")
+        )?;
+        if self.effort.continued > 0 {
+            let steps = counted(self.effort.continued, "continuation", "continuations");
+            write!(f, ", {steps} in the step size")?;
+        }
+        if self.effort.globalised > 0 {
+            write!(f, ", {} of the globaliser", counted(self.effort.globalised, "call", "calls"))?;
+        }
+        Ok(())
+    }
+}
+
+impl Certificate {
+    /// The energy at the start, and the error relative to it where it is not zero.
+    fn relative_to(&self) -> String {
+        let start = self.initial_energy;
+        if start.abs() > 0.0 {
+            format!(", {:.1e} of H₀ = {}", self.max_relative_energy_error(), Digits(start))
+        } else {
+            " from H₀ = 0".to_owned()
+        }
+    }
+
+    fn entropy_line(&self) -> String {
+        let falls = match self.entropy_falls {
+            0 => "it never fell".to_owned(),
+            n => format!("it fell on {}", counted(n, "step", "steps")),
+        };
+        let slope = if self.min_entropy_slope.is_finite() {
+            format!(", |w_S| ≥ {:.1e}", self.min_entropy_slope)
+        } else {
+            String::new()
+        };
+        format!(
+            "ΔS ≥ {:.1e} on every step, {falls}; S rose by {:.6e}{slope}",
+            self.min_entropy_increment, self.entropy_gained
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const ONE_FALL: Certificate = Certificate {
+        initial_energy: 0.5,
+        max_energy_error: 1e-16,
+        energy_scale: 0.5,
+        initial_entropy: 1.0,
+        min_entropy_increment: -2e-9,
+        entropy_gained: 0.25,
+        entropy_falls: 1,
+        min_entropy_slope: 0.7,
+        invariants: Vec::new(),
+        max_manifold_defect: 0.0,
+        steps: 7,
+        smallest_step: 0.1,
+        largest_step: 0.1,
+        rejected: 0,
+        effort: Effort { iterations: 9, continued: 0, globalised: 0, splits: 1 },
+        worst_iterations: 2,
+        local_error: None,
+        promises: Promises::all_laws(true),
+        second_law: SecondLaw::Exact,
+        friction: 0.0,
+        projected: false,
+    };
+
+    #[test]
+    fn one_is_no_plural() {
+        let text = ONE_FALL.to_string();
+        for part in ["over 7 steps", "fell on 1 step;", "9 Newton iterations", "1 retry"] {
+            assert!(text.contains(part), "\"{part}\" is missing in: {text}");
+        }
+        assert!(!text.contains("step sizes"), "{text}");
+        let adaptive = Certificate { smallest_step: 1e-3, rejected: 2, ..ONE_FALL }.to_string();
+        assert!(adaptive.contains("step sizes:  1.0e-3 to 1.0e-1, 2 rejected"), "{adaptive}");
+        let text = Certificate {
+            entropy_falls: 2,
+            steps: 1,
+            effort: Effort { iterations: 1, ..ONE_FALL.effort },
+            ..ONE_FALL
+        }
+        .to_string();
+        for part in ["over 1 step\n", "fell on 2 steps;", "1 Newton iteration ("] {
+            assert!(text.contains(part), "\"{part}\" is missing in: {text}");
+        }
+    }
+}

@@ -1,0 +1,111 @@
+//! The sizes of the entries of a state in the course of a run.
+//!
+//! The entries of a state have units of their own: lengths of 10⁻⁹ stand beside temperatures of 300. An
+//! error is judged entry by entry, relative to a size `s_i` for each direction: the largest `|x_i|` of the run
+//! so far, or what an entry that starts at zero [reaches soon](crate::Flow::reach).
+//!
+//! An entry may also stay at zero because its forces cancel, and has no size then. Its velocity is noise of
+//! the size `ε t_i`, where `t_i` is the size of the terms that it is summed of. Noise is no error of a step,
+//! and no speed.
+//!
+//! No number with a unit stands in these formulas: if each entry is written in another unit that is a power
+//! of two, the sizes are the same numbers in these units.
+
+use crate::method::{Element, Flow, Vector};
+
+/// The sizes of the entries so far, and those of the terms of their velocities.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Scales<V> {
+    /// The sizes of the entries.
+    pub sizes: V,
+    /// The sizes of the terms of their velocities.
+    pub terms: V,
+}
+
+impl<V: Vector> Scales<V> {
+    /// The sizes at `x`, where a run starts that lasts `span`, or where entries begin to move. Without a span
+    /// nothing is known.
+    pub(crate) fn at<F: Flow<Vector = V>>(flow: &F, x: &Element<F>, span: Option<f64>) -> Self {
+        let sizes = flow.sizes(x);
+        let zero = sizes.map(|_| 0.0);
+        let Some(span) = span else { return Self { sizes: zero.clone(), terms: zero } };
+        match flow.reach(x, span) {
+            Some(reached) => reached.or(&sizes),
+            None => Self { sizes, terms: zero },
+        }
+    }
+
+    /// These sizes, or the ones of another state where they are larger.
+    pub(crate) fn or(&self, sizes: &V) -> Self {
+        Self { sizes: larger(&self.sizes, sizes), terms: self.terms.clone() }
+    }
+
+    /// The larger ones of two.
+    pub(crate) fn and(&self, other: &Self) -> Self {
+        Self { terms: larger(&self.terms, &other.terms), ..self.or(&other.sizes) }
+    }
+
+    /// What rounding may make of a displacement in the time `h`.
+    pub(crate) fn rounding(&self, h: f64) -> V {
+        self.terms.map(|terms| terms * (16.0 * f64::EPSILON * h))
+    }
+
+    /// The norm of the velocity relative to the sizes, without what is noise.
+    pub(crate) fn speed(&self, v: &V) -> f64 {
+        let noise = self.rounding(1.0);
+        let above = v.with(|i| if v.get(i).abs() <= noise.get(i) { 0.0 } else { v.get(i) });
+        relative(&above, &self.sizes)
+    }
+}
+
+/// The larger one of two sizes, entry by entry.
+pub(crate) fn larger<V: Vector>(a: &V, b: &V) -> V {
+    a.with(|i| a.get(i).max(b.get(i)))
+}
+
+/// The Euclidean norm of the ratios `v_i/s_i`, without a unit, where `0/0 = 0`: a bound of each of them
+/// that no rotation of the frame of a curved factor changes.
+pub(crate) fn relative<V: Vector>(v: &V, sizes: &V) -> f64 {
+    let ratio = |i| if v.get(i) == 0.0 { 0.0 } else { (v.get(i) / sizes.get(i)).abs() };
+    // Squares of 10⁻²⁰⁰ are zero; those of numbers up to 1 are not too large.
+    let mut largest = 0.0;
+    for i in 0..v.len() {
+        if ratio(i).is_nan() {
+            return f64::NAN;
+        }
+        largest = f64::max(largest, ratio(i));
+    }
+    if largest > 0.0 && largest.is_finite() {
+        let unit = largest.recip();
+        let sum = (0..v.len()).fold(0.0, |sum, i| sum + (ratio(i) * unit) * (ratio(i) * unit));
+        largest * sum.sqrt()
+    } else {
+        largest
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::method::Components;
+    use nalgebra::vector;
+
+    #[test]
+    fn a_norm_of_ratios_has_no_unit() {
+        let cases = [
+            (vector![3.0, 4.0], vector![1.0, 1.0], 5.0),
+            (vector![3e-200, 4e200], vector![1e-200, 1e200], 5.0),
+            (vector![3e-300, 4e-300], vector![1.0, 1.0], 5e-300),
+            (vector![0.0, 0.0], vector![0.0, 1.0], 0.0),
+            (vector![1.0, 0.0], vector![0.0, 1.0], f64::INFINITY),
+        ];
+        for (v, sizes, expected) in cases {
+            approx::assert_relative_eq!(
+                relative(&Components(v), &Components(sizes)),
+                expected,
+                max_relative = 1e-15
+            );
+        }
+        assert!(relative(&vec![1.0, f64::NAN], &vec![1.0, 1.0]).is_nan());
+    }
+}

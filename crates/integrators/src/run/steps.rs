@@ -1,0 +1,384 @@
+//! Steps in a row.
+
+use std::fmt;
+
+use crate::error::RunError;
+use crate::method::{
+    Effort, Element, Flow, Laws, Memory as _, Method, Promises, Refusal, StepStart, Taken,
+    Vector as _,
+};
+use crate::round_off::bound::breaks_first_law;
+use crate::run::certificate::Certificate;
+use crate::run::controller::{Controller, StepSize};
+use crate::run::scales::{Scales, larger};
+use crate::run::span::{ROOM, Schedule, Size, SpanError};
+use crate::run::trajectory::{Ending, State, Trajectory, thin_out};
+use crate::step_error::StepError;
+
+/// The iterator over the states of a run after its start, in constant memory; ended by an error, or
+/// where its schedule ends. With a step size alone it is endless.
+///
+/// Made by [`Method::steps`] or [`Run::steps`](crate::Run::steps).
+pub struct Steps<'a, F: Flow, M: Method<F>> {
+    pub(super) method: M,
+    pub(super) flow: &'a F,
+    pub(super) progress: Progress<F::Vector>,
+    pub(super) state: State<F::Space>,
+    /// The laws at the state.
+    pub(super) values: Laws<F::Numbers>,
+    /// The entropy after the last step that dissipated.
+    pub(super) entropy: f64,
+    pub(super) memory: M::Memory,
+    pub(super) promises: Promises,
+    pub(super) certificate: Certificate,
+    pub(super) failed: bool,
+}
+
+/// Where a run is on its schedule.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Progress<V> {
+    pub(crate) step_size: StepSize<V>,
+    /// The time at which the run started.
+    pub(crate) start: f64,
+    pub(crate) count: Option<usize>,
+    pub(crate) every: usize,
+    /// The most states to record.
+    pub(crate) most: Option<usize>,
+    /// The sizes of the entries so far, where errors or rest are judged by them.
+    pub(crate) scales: Scales<V>,
+    /// The tolerance of rest.
+    pub(crate) rest: Option<f64>,
+    /// The largest velocity of each entry so far, where rest is looked for.
+    pub(crate) largest_velocity: V,
+    pub(crate) ending: Option<Ending>,
+}
+
+impl<V> Progress<V> {
+    /// Whether errors or rest are judged by the sizes of the entries.
+    pub(crate) const fn judges_sizes(&self) -> bool {
+        self.rest.is_some() || matches!(self.step_size, StepSize::Adaptive(_))
+    }
+}
+
+impl<F: Flow, M: Method<F>> fmt::Debug for Steps<'_, F, M> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { state, certificate, memory, .. } = self;
+        f.debug_struct("Steps")
+            .field("state", state)
+            .field("memory", memory)
+            .field("certificate", certificate)
+            .finish_non_exhaustive()
+    }
+}
+
+/// A step of a run.
+struct Advance<F: Flow> {
+    taken: Taken<F>,
+    h: f64,
+    time: f64,
+}
+
+impl<'a, F: Flow, M: Method<F>> Steps<'a, F, M> {
+    /// Verifies the model, and starts.
+    pub(crate) fn start(
+        method: M,
+        flow: &'a F,
+        x0: Element<F>,
+        schedule: Schedule,
+    ) -> Result<Self, RunError<F::Space>> {
+        schedule.check()?;
+        flow.check(&x0)?;
+        let promises = method.promises(flow);
+        let certificate = Certificate::start(flow, &x0, promises);
+        let scales = Scales::at(flow, &x0, schedule.span());
+        let Schedule { size, start, count, every, most, rest } = schedule;
+        let step_size = match size {
+            Size::Fixed(h) => StepSize::Fixed(h),
+            Size::Tolerance(adaptive) => {
+                let order = method.order();
+                StepSize::Adaptive(adaptive.controller(flow, (&x0, start), &scales, order)?)
+            }
+        };
+        let largest_velocity = scales.sizes.map(|_| 0.0);
+        let progress = Progress {
+            step_size,
+            start,
+            count,
+            every,
+            most,
+            scales,
+            rest,
+            largest_velocity,
+            ending: None,
+        };
+        let values = flow.laws(&x0);
+        let (energy, entropy) = (values.energy, values.entropy);
+        let state = State { step: 0, time: start, point: x0, energy, entropy };
+        let mut steps = Self {
+            method,
+            flow,
+            progress,
+            state,
+            values,
+            entropy,
+            memory: M::Memory::default(),
+            promises,
+            certificate,
+            failed: false,
+        };
+        steps.rest(true);
+        Ok(steps)
+    }
+
+    /// The state reached so far.
+    pub const fn state(&self) -> &State<F::Space> {
+        &self.state
+    }
+
+    /// The balance of the steps taken so far.
+    pub const fn certificate(&self) -> &Certificate {
+        &self.certificate
+    }
+
+    /// How the run ended; `None` as long as there are steps to take.
+    pub const fn ending(&self) -> Option<Ending> {
+        if self.failed { Some(Ending::Stopped) } else { self.progress.ending }
+    }
+
+    /// Where the next step starts.
+    #[inline]
+    fn from(&self) -> StepStart<'_, F> {
+        let invariants = || {
+            let mut initial = self.values.invariants.clone();
+            for (k, balance) in self.certificate.invariants.iter().enumerate() {
+                initial[k] = balance.initial;
+            }
+            initial
+        };
+        let entropy = if self.promises.entropy { self.entropy } else { self.values.entropy };
+        let reference =
+            Laws { energy: self.certificate.initial_energy, entropy, invariants: invariants() };
+        let values = self.values.clone();
+        StepStart { x: &self.state.point, time: self.state.time, values, reference }
+    }
+
+    /// Takes one step. A run that has [ended](Self::ending) stays where it is.
+    ///
+    /// # Errors
+    ///
+    /// [`StepError`]; the state is then the last one reached.
+    pub fn advance(&mut self) -> Result<&State<F::Space>, StepError> {
+        if self.progress.ending.is_some() {
+            return Ok(&self.state);
+        }
+        let step = self.state.step + 1;
+        let Advance { taken, h, time } = match &self.progress.step_size {
+            &StepSize::Fixed(h) => {
+                let mut memory = std::mem::take(&mut self.memory);
+                let taken = self.method.step(self.flow, &self.from(), h, &mut memory);
+                self.memory = memory;
+                Advance { taken: taken?, h, time: self.progress.start + step as f64 * h }
+            }
+            StepSize::Adaptive(controller) => self.controlled(controller.clone())?,
+        };
+        let Taken { x, values, evidence, effort } = taken;
+        if !is_finite(&values) {
+            let time = self.state.time;
+            return Err(StepError::OutOfDomain { time, h, tried: effort });
+        }
+        let change = values.energy - self.certificate.initial_energy;
+        let sizes = || self.flow.energy_sizes([&self.state.point, &x]);
+        if self.promises.energy
+            && let Some(size) = breaks_first_law(change, values.energy, sizes)
+        {
+            let time = self.state.time;
+            return Err(StepError::FirstLawBroken { time, h, change, size });
+        }
+        let ends = [(&self.state.point, &self.values), (&x, &values)];
+        self.certificate.enter(self.flow, ends, h, (evidence, effort));
+        if evidence.dissipates {
+            self.entropy = values.entropy;
+        }
+        let (energy, entropy) = (values.energy, values.entropy);
+        self.values = values;
+        let next = State { step, time, point: x, energy, entropy };
+        let before = std::mem::replace(&mut self.state, next);
+        self.check_invariants(&before)?;
+        let over = match &self.progress.step_size {
+            StepSize::Fixed(_) => self.progress.count.is_some_and(|count| step >= count),
+            StepSize::Adaptive(Controller { end, .. }) => self.state.time >= *end,
+        };
+        if over {
+            self.progress.ending = Some(Ending::Span);
+        }
+        if self.progress.judges_sizes() {
+            let here = self.flow.sizes(&self.state.point);
+            self.progress.scales = self.progress.scales.or(&here);
+        }
+        self.rest(!evidence.rests);
+        Ok(&self.state)
+    }
+
+    /// Tries steps until the controller accepts one. Not part of the loop over steps of one size, which
+    /// is compiled for every system.
+    #[inline(never)]
+    fn controlled(
+        &mut self,
+        mut controller: Controller<F::Vector>,
+    ) -> Result<Advance<F>, StepError> {
+        let (flow, time, mut effort) = (self.flow, self.state.time, Effort::default());
+        let (mut tries, mut broken) = (0, None);
+        loop {
+            tries += 1;
+            if tries == TRIES {
+                // An entry that begins to move only now has no size yet.
+                let here = Scales::at(flow, &self.state.point, Some(controller.end - time));
+                self.progress.scales = self.progress.scales.and(&here);
+            }
+            let (h, last) = controller.attempt(time);
+            if controller.next < controller.least() && !last {
+                let (h, least) = (controller.next, controller.least());
+                let too_small = StepError::TooSmall { time, h, least };
+                let cause = broken.or_else(|| self.dependent(&self.state));
+                return Err(cause.unwrap_or(too_small));
+            }
+            if time + h <= time {
+                let standstill = StepError::Standstill { time, h: controller.next };
+                return Err(broken.unwrap_or(standstill));
+            }
+            let ratio = controller.taken.map_or(1.0, |taken| h / taken);
+            let mut memory = self.memory.rescaled(ratio);
+            let end = self.method.attempt(flow, &self.from(), h, &mut memory);
+            let end = match end {
+                Ok(taken) => {
+                    effort += taken.effort;
+                    is_finite(&taken.values).then_some(taken)
+                }
+                Err(Refusal { effort: wasted, error }) => {
+                    effort += wasted;
+                    broken = error.or(broken);
+                    None
+                }
+            };
+            let error = end.as_ref().and_then(|taken| {
+                let scales = self.progress.scales.or(&flow.sizes(&taken.x));
+                let error = self.method.error(flow, &self.state.point, taken, h)?;
+                controller.relative_error(&error, h, &scales)
+            });
+            match (end, error) {
+                (Some(taken), Some(error)) if error <= 1.0 => {
+                    controller.accept(h, error);
+                    self.memory = memory;
+                    let time = if last { controller.end } else { time + h };
+                    self.progress.step_size = StepSize::Adaptive(controller);
+                    return Ok(Advance { taken: Taken { effort, ..taken }, h, time });
+                }
+                (_, error) => {
+                    controller.reject(h, error);
+                    self.certificate.rejected += 1;
+                }
+            }
+        }
+    }
+
+    /// Ends the run if the state is at rest.
+    fn rest(&mut self, moved: bool) {
+        let Some(tolerance) = self.progress.rest else { return };
+        let x = &self.state.point;
+        let zero = self.progress.largest_velocity.map(|_| 0.0);
+        let Some(v) = self.flow.rates(x, &zero) else { return };
+        let Progress { scales, largest_velocity, .. } = &mut self.progress;
+        *largest_velocity = larger(largest_velocity, &v.map(f64::abs));
+        // In units of the same sizes: an entry has been smaller than it is.
+        let (speed, largest) = (scales.speed(&v), scales.speed(largest_velocity));
+        if !moved || speed <= tolerance * largest {
+            self.progress.ending = Some(Ending::Rest { speed, largest });
+        }
+    }
+
+    /// Takes all steps that are left, and records the states from here on.
+    ///
+    /// # Errors
+    ///
+    /// [`RunError::Step`] if a step failed, with the trajectory so far;
+    /// [`SpanError::Endless`] if the schedule has no end.
+    pub fn run(mut self) -> Result<Trajectory<F::Space>, RunError<F::Space>> {
+        let Progress { count, mut every, most, .. } = self.progress;
+        if count.is_none() && matches!(self.progress.step_size, StepSize::Fixed(_)) {
+            return Err(SpanError::Endless.into());
+        }
+        let room = count.map_or(ROOM, |count| (count - self.state.step.min(count)) / every);
+        let mut states = Vec::with_capacity(room.min(ROOM) + 2);
+        states.push(self.state.clone());
+        let mut failure = None;
+        while self.progress.ending.is_none() && failure.is_none() {
+            failure = self.advance().err();
+            let state = &self.state;
+            let due = state.step.is_multiple_of(every) && failure.is_none();
+            let over = self.progress.ending.is_some() || failure.is_some();
+            if (due || over) && states.last().is_none_or(|last| last.step != state.step) {
+                states.push(state.clone());
+            }
+            while most.is_some_and(|most| states.len() > most) {
+                every = every.saturating_mul(2);
+                thin_out(&mut states, every, over);
+            }
+        }
+        let ending = self.progress.ending.unwrap_or(Ending::Stopped);
+        let checkpoint = self.checkpoint();
+        let trajectory = Trajectory { states, certificate: self.certificate, ending, checkpoint };
+        match failure {
+            Some(cause) => Err(RunError::Step { cause, trajectory: Box::new(trajectory) }),
+            None => Ok(trajectory),
+        }
+    }
+
+    /// The further invariant that depends on the other fields at a state, as an error.
+    #[cold]
+    fn dependent(&self, &State { time, ref point, .. }: &State<F::Space>) -> Option<StepError> {
+        let (index, fraction) = self.flow.dependent_invariant(point)?;
+        let change = self.certificate.invariants[index].max_error;
+        Some(StepError::DependentInvariants { time, index, change, fraction })
+    }
+
+    /// Looks at the further invariants after a step.
+    ///
+    /// # Errors
+    ///
+    /// [`StepError::DependentInvariants`] if one is no longer conserved because its differential depends
+    /// on those of the others.
+    fn check_invariants(&self, before: &State<F::Space>) -> Result<(), StepError> {
+        let broken =
+            |balance: &crate::InvariantBalance| balance.max_error > NOT_CONSERVED * balance.scale;
+        if self.promises.invariants && self.certificate.invariants.iter().any(broken) {
+            self.dependent(before).map_or(Ok(()), Err)
+        } else {
+            Ok(())
+        }
+    }
+}
+
+/// Whether the laws are numbers: a method without an equation to solve may step over the edge of a domain.
+fn is_finite<L>(laws: &Laws<L>) -> bool {
+    laws.energy.is_finite() && laws.entropy.is_finite()
+}
+
+/// Steps that are tried before the sizes of the entries are estimated anew.
+const TRIES: usize = 3;
+
+/// The error of a further invariant, relative to its terms, above which it is no longer conserved. What
+/// fades out of `Π̃` stays far below it: `10⁻⁴h²`.
+const NOT_CONSERVED: f64 = 1e-4;
+
+impl<F: Flow, M: Method<F>> Iterator for Steps<'_, F, M> {
+    type Item = Result<State<F::Space>, StepError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        if self.ending().is_some() {
+            return None;
+        }
+        let advanced = self.advance().cloned();
+        self.failed = advanced.is_err();
+        Some(advanced)
+    }
+}

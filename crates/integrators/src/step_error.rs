@@ -1,0 +1,150 @@
+//! What can go wrong in a step.
+
+use std::fmt;
+
+use crate::digits::{counted, digits};
+use crate::method::Effort;
+
+impl fmt::Display for Effort {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { iterations, continued, globalised, splits } = self;
+        write!(
+            f,
+            "{}, {} in the step size, {} of the globaliser and {} of the step",
+            counted(*iterations, "Newton iteration", "Newton iterations"),
+            counted(*continued, "continuation", "continuations"),
+            counted(*globalised, "call", "calls"),
+            counted(*splits, "halving", "halvings"),
+        )
+    }
+}
+
+/// A step that could not be taken, after its halves had been tried too.
+#[derive(Clone, Copy, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum StepError {
+    /// The implicit equation was not solved.
+    #[error(
+        "the step of size {h:.3e} from t = {} was not solved: residual {residual:.1e} after \
+         {tried}; try a smaller step, below {suggested:.1e}",
+        digits(.time)
+    )]
+    NotConverged {
+        /// The time at which the step starts.
+        time: f64,
+        /// The size of the step that was asked for.
+        h: f64,
+        /// The residual that was left in the smallest step tried.
+        residual: f64,
+        /// What was done to solve it.
+        tried: Effort,
+        /// A step size to try next.
+        suggested: f64,
+    },
+    /// The equation was not solved, and friction is stiff at this step size.
+    #[error(
+        "the step of size {h:.3e} from t = {} was not solved, because the friction is stiff: \
+         h|K'| = {stiffness:.1e} (residual {residual:.1e} after {tried}); take steps below {:.1e} while the fast \
+         variables relax, as `Span::until` does, or eliminate these",
+        digits(.time),
+        .h * 10.0 / .stiffness
+    )]
+    StiffFriction {
+        /// The time at which the step starts.
+        time: f64,
+        /// The size of the step that was asked for.
+        h: f64,
+        /// The rate `h|K'|`, with `K'` the derivative of `K dS` along the state.
+        stiffness: f64,
+        /// The residual that was left in the smallest step tried.
+        residual: f64,
+        /// What was done to solve it.
+        tried: Effort,
+    },
+    /// The energy is not conserved: it differs by more than a millionth of the size of its terms from what it
+    /// was. The size is `|H| + Σ_i |∂_iH| (|x_i| + |d_i|)` with the displacement `d` of the step, at the end of
+    /// the step where it is smaller.
+    #[error(
+        "the first law is broken in the step of size {h:.3e} from t = {}: the energy would be off by \
+         {change:.1e}, and its terms are of size {size:.1e}; the energy has too few digits there for this \
+         step: try a smaller one, or variables in which large terms do not cancel",
+        digits(.time)
+    )]
+    FirstLawBroken {
+        /// The time at which the step starts.
+        time: f64,
+        /// The size of the step.
+        h: f64,
+        /// The error of the energy.
+        change: f64,
+        /// The size of the terms of the energy.
+        size: f64,
+    },
+    /// A further invariant depends on the other fields at the start of the step: its differential is a
+    /// combination of theirs. The step was not solved, or the invariant is no longer conserved.
+    #[error(
+        "invariant {index} depends on the other fields at t = {}: only {fraction:.1e} of its \
+         differential is independent of theirs, and no step from there conserves it (it has changed by \
+         {change:.1e} since the start); leave it out of the list, or keep away from such states",
+        digits(.time)
+    )]
+    DependentInvariants {
+        /// The time at which the step starts.
+        time: f64,
+        /// Which one, in the order of the list, counted from 0.
+        index: usize,
+        /// By how much it has changed since the start of the run.
+        change: f64,
+        /// The fraction of its differential that is independent.
+        fraction: f64,
+    },
+    /// The controller asks for a step below the least one.
+    #[error(
+        "the step from t = {} would have to be {h:.1e} long to keep the tolerance, below the least \
+         step {least:.1e}; the motion may end there: see the energy and the entropy around this \
+         state, or ask for a coarser tolerance",
+        digits(.time)
+    )]
+    TooSmall {
+        /// The time at which the step starts.
+        time: f64,
+        /// The size that it would have to have.
+        h: f64,
+        /// The least step size.
+        least: f64,
+    },
+    /// The step that the controller asks for is shorter than the last digit of the time.
+    #[error(
+        "the step from t = {} would have to be {h:.1e} long to keep the tolerance, below the last \
+         digit of the time; the motion may end there: see the energy and the entropy around this state, \
+         let the run start at t = 0, or ask for a coarser tolerance",
+        digits(.time)
+    )]
+    Standstill {
+        /// The time at which the step starts.
+        time: f64,
+        /// The size that it would have to have.
+        h: f64,
+    },
+    /// Even in the smallest part of the step the way to a solution leads out of the domain of a field, of
+    /// the metric or of the chart.
+    #[error(
+        "the step of size {h:.3e} from t = {} leaves the domain of the model wherever it goes \
+         ({tried}); try a smaller step, or check energy and entropy there",
+        digits(.time)
+    )]
+    OutOfDomain {
+        /// The time at which the step starts.
+        time: f64,
+        /// The size of the step that was asked for.
+        h: f64,
+        /// What was done to solve it.
+        tried: Effort,
+    },
+}
+
+impl fmt::Debug for StepError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        fmt::Display::fmt(self, f)
+    }
+}

@@ -1,0 +1,267 @@
+//! Metrics on a product that are sums of metrics on the factors.
+
+use std::fmt;
+use std::marker::PhantomData;
+
+use metriplectic_fields::{ChartPoint, Dimension, Matrix, Real, Scalar, Space, Square, Vector};
+
+use crate::metric::GeodesicEnd;
+use crate::product::{Product, Times};
+use crate::{Canonical, InnerProduct, MetricError, Riemannian, StepPath, StepPathJet};
+
+/// A metric on a product that is the sum of one on each factor.
+pub trait Split<A: Space, B: Space> {
+    /// The metric on the left factor.
+    type Left: Riemannian<A>;
+    /// The metric on the right factor.
+    type Right: Riemannian<B>;
+
+    /// The metric on each factor.
+    fn halves(&self) -> (&Self::Left, &Self::Right);
+}
+
+impl<A: Space, B: Space, G: Riemannian<A>, F: Riemannian<B>> Split<A, B> for (G, F) {
+    type Left = G;
+    type Right = F;
+
+    #[inline]
+    fn halves(&self) -> (&G, &F) {
+        (&self.0, &self.1)
+    }
+}
+
+impl<A: Space, B: Space> Split<A, B> for Canonical
+where
+    Self: Riemannian<A> + Riemannian<B>,
+{
+    type Left = Self;
+    type Right = Self;
+
+    #[inline]
+    fn halves(&self) -> (&Self, &Self) {
+        (self, self)
+    }
+}
+
+/// The inner products on the factors, as one on the product.
+pub struct Block<A, B, D, P, Q> {
+    left: P,
+    right: Q,
+    factors: PhantomData<(A, B, D)>,
+}
+
+impl<A, B, D, P: Clone, Q: Clone> Clone for Block<A, B, D, P, Q> {
+    fn clone(&self) -> Self {
+        Self { left: self.left.clone(), right: self.right.clone(), factors: PhantomData }
+    }
+}
+
+impl<A, B, D, P: Copy, Q: Copy> Copy for Block<A, B, D, P, Q> {}
+
+impl<A, B, D, P: fmt::Debug, Q: fmt::Debug> fmt::Debug for Block<A, B, D, P, Q> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_tuple("Block").field(&self.left).field(&self.right).finish()
+    }
+}
+
+impl<A, B, D, P, Q> InnerProduct<Vector<Product<A, B>, D>> for Block<A, B, D, P, Q>
+where
+    A: Times<B>,
+    B: Space,
+    D: Scalar,
+    P: InnerProduct<Vector<A, D>>,
+    Q: InnerProduct<Vector<B, D>>,
+{
+    #[inline]
+    fn flat(&self, v: &Vector<Product<A, B>, D>) -> Vector<Product<A, B>, D> {
+        let (a, b) = Product::<A, B>::split(v);
+        Product::<A, B>::join(&self.left.flat(&a), &self.right.flat(&b))
+    }
+
+    #[inline]
+    fn orthonormal(&self, alpha: &Vector<Product<A, B>, D>) -> Vector<Product<A, B>, D> {
+        let (a, b) = Product::<A, B>::split(alpha);
+        Product::<A, B>::join(&self.left.orthonormal(&a), &self.right.orthonormal(&b))
+    }
+
+    #[inline]
+    fn from_orthonormal(&self, alpha: &Vector<Product<A, B>, D>) -> Vector<Product<A, B>, D> {
+        let (a, b) = Product::<A, B>::split(alpha);
+        Product::<A, B>::join(&self.left.from_orthonormal(&a), &self.right.from_orthonormal(&b))
+    }
+}
+
+/// The metric of a product, factor by factor.
+macro_rules! metric_of_the_factors {
+    () => {
+        type At<D: Scalar> = Block<
+            A,
+            B,
+            D,
+            <<Self as Split<A, B>>::Left as Riemannian<A>>::At<D>,
+            <<Self as Split<A, B>>::Right as Riemannian<B>>::At<D>,
+        >;
+
+        #[inline]
+        fn at<D: Scalar>(
+            &self,
+            x: &ChartPoint<Product<A, B>, D>,
+        ) -> Result<Self::At<D>, MetricError> {
+            let ((g, f), (a, b)) = (Split::<A, B>::halves(self), Product::parts(x));
+            Ok(Block { left: g.at(&a)?, right: f.at(&b)?, factors: PhantomData })
+        }
+
+        fn matrix<D: Scalar>(&self, x: &ChartPoint<Product<A, B>, D>) -> Matrix<Product<A, B>, D> {
+            let ((g, f), (a, b)) = (Split::<A, B>::halves(self), Product::parts(x));
+            Product::<A, B>::block(&g.matrix(&a), &f.matrix(&b))
+        }
+
+        fn volume_density<D: Scalar>(
+            &self,
+            x: &ChartPoint<Product<A, B>, D>,
+        ) -> Result<D, MetricError> {
+            let ((g, f), (a, b)) = (Split::<A, B>::halves(self), Product::parts(x));
+            Ok(g.volume_density(&a)? * f.volume_density(&b)?)
+        }
+
+        fn exp<D: Scalar>(
+            &self,
+            x: &ChartPoint<Product<A, B>, D>,
+            v: &Vector<Product<A, B>, D>,
+        ) -> Result<GeodesicEnd<Product<A, B>, D>, MetricError> {
+            let ((g, f), (a, b)) = (Split::<A, B>::halves(self), Product::parts(x));
+            let (va, vb) = Product::<A, B>::split(v);
+            let ((a, va), (b, vb)) = (g.exp(&a, &va)?, f.exp(&b, &vb)?);
+            let q = Product::<A, B>::join(&a.q, &b.q);
+            let end = ChartPoint { base: (a.base, b.base), q };
+            Ok((end, Product::<A, B>::join(&va, &vb)))
+        }
+
+        fn end(
+            &self,
+            x: &(A::Point<f64>, B::Point<f64>),
+            v: &Vector<Product<A, B>>,
+        ) -> Result<(A::Point<f64>, B::Point<f64>), MetricError> {
+            let ((g, f), (a, b)) = (Split::<A, B>::halves(self), Product::<A, B>::split(v));
+            Ok((Riemannian::<A>::end(g, &x.0, &a)?, Riemannian::<B>::end(f, &x.1, &b)?))
+        }
+
+        fn along(
+            &self,
+            x: &(A::Point<f64>, B::Point<f64>),
+            v: &Vector<Product<A, B>>,
+            t: f64,
+        ) -> Result<(A::Point<Real>, B::Point<Real>), MetricError> {
+            let ((g, f), (a, b)) = (Split::<A, B>::halves(self), Product::<A, B>::split(v));
+            Ok((Riemannian::<A>::along(g, &x.0, &a, t)?, Riemannian::<B>::along(f, &x.1, &b, t)?))
+        }
+
+        fn log(
+            &self,
+            x: &(A::Point<f64>, B::Point<f64>),
+            y: &(A::Point<f64>, B::Point<f64>),
+        ) -> Result<Vector<Product<A, B>>, MetricError> {
+            let (g, f) = Split::<A, B>::halves(self);
+            Ok(Product::<A, B>::join(
+                &Riemannian::<A>::log(g, &x.0, &y.0)?,
+                &Riemannian::<B>::log(f, &x.1, &y.1)?,
+            ))
+        }
+
+        fn weyl_path(
+            &self,
+            x: &(A::Point<f64>, B::Point<f64>),
+            d: &Vector<Product<A, B>>,
+        ) -> Result<StepPath<Product<A, B>>, MetricError> {
+            let ((g, f), (da, db)) = (Split::<A, B>::halves(self), Product::<A, B>::split(d));
+            let (a, b) = (
+                Riemannian::<A>::weyl_path(g, &x.0, &da)?,
+                Riemannian::<B>::weyl_path(f, &x.1, &db)?,
+            );
+            Ok(StepPath {
+                z: ChartPoint {
+                    base: (a.z.base, b.z.base),
+                    q: Product::<A, B>::join(&a.z.q, &b.z.q),
+                },
+                d: Product::<A, B>::join(&a.d, &b.d),
+                end: (a.end, b.end),
+            })
+        }
+
+        fn weyl_jet(
+            &self,
+            x: &(A::Point<f64>, B::Point<f64>),
+            d: &Vector<Product<A, B>>,
+        ) -> Result<StepPathJet<Product<A, B>>, MetricError> {
+            let ((g, f), (da, db)) = (Split::<A, B>::halves(self), Product::<A, B>::split(d));
+            let (a, b) = (
+                Riemannian::<A>::weyl_jet(g, &x.0, &da)?,
+                Riemannian::<B>::weyl_jet(f, &x.1, &db)?,
+            );
+            Ok(StepPathJet {
+                z: (a.z, b.z),
+                dz: Product::<A, B>::block(&a.dz, &b.dz),
+                d: Product::<A, B>::join(&a.d, &b.d),
+                dd: Product::<A, B>::block(&a.dd, &b.dd),
+                end: (a.end, b.end),
+                dend: Product::<A, B>::block(&a.dend, &b.dend),
+            })
+        }
+
+        fn accuracy(&self) -> f64 {
+            let (g, f) = Split::<A, B>::halves(self);
+            Riemannian::<A>::accuracy(g).max(Riemannian::<B>::accuracy(f))
+        }
+
+        #[inline]
+        fn lost_digits(
+            &self,
+            x: &(A::Point<f64>, B::Point<f64>),
+            v: &Vector<Product<A, B>>,
+            y: &(A::Point<f64>, B::Point<f64>),
+        ) -> Vector<Product<A, B>> {
+            let ((g, f), (a, b)) = (Split::<A, B>::halves(self), Product::<A, B>::split(v));
+            Product::<A, B>::join(
+                &Riemannian::<A>::lost_digits(g, &x.0, &a, &y.0),
+                &Riemannian::<B>::lost_digits(f, &x.1, &b, &y.1),
+            )
+        }
+
+        fn slopes(
+            &self,
+            x: &(A::Point<f64>, B::Point<f64>),
+        ) -> Option<<A::SumDim as Dimension>::Array<Matrix<Product<A, B>>>> {
+            let (g, f) = Split::<A, B>::halves(self);
+            let (a, b) = (Riemannian::<A>::slopes(g, &x.0), Riemannian::<B>::slopes(f, &x.1));
+            if a.is_none() && b.is_none() {
+                return None;
+            }
+            let (left, right) = (Matrix::<A>::zeros(), Matrix::<B>::zeros());
+            let n = A::Dim::LEN;
+            Some(A::SumDim::array(|k| match (k < n, &a, &b) {
+                (true, Some(a), _) => Product::<A, B>::block(&a[k], &right),
+                (false, _, Some(b)) => Product::<A, B>::block(&left, &b[k - n]),
+                _ => Matrix::<Product<A, B>>::zeros(),
+            }))
+        }
+    };
+}
+
+impl<A, B, G, F> Riemannian<Product<A, B>> for (G, F)
+where
+    A: Times<B>,
+    B: Space,
+    G: Riemannian<A>,
+    F: Riemannian<B>,
+{
+    metric_of_the_factors!();
+}
+
+impl<A, B> Riemannian<Product<A, B>> for Canonical
+where
+    A: Times<B>,
+    B: Space,
+    Self: Riemannian<A> + Riemannian<B>,
+{
+    metric_of_the_factors!();
+}

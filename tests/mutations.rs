@@ -242,6 +242,25 @@ fn a_momentum_fades_out_on_a_circular_orbit() {
 }
 
 #[test]
+fn each_part_of_a_step_conserves_the_momentum_of_its_start() {
+    let canonical = Matrix4::from_fn(|i, j| f64::from(j == i + 2) - f64::from(i == j + 2));
+    let spring = System::on(Euclidean::<4>)
+        .bracket(Poisson::constant(canonical).unwrap())
+        .energy(|x: &Vector4<Real>| {
+            let r = x.x.powi(2) + x.y.powi(2);
+            (x.z.powi(2) + x.w.powi(2)) * 0.5 + (r * 10.0).exp() * 1e-2
+        })
+        .momentum(|x: &Vector4<Real>| x.x * x.w - x.y * x.z)
+        .build()
+        .unwrap();
+    let soon = Scheme::new(WeylMidpoint).newton(Newton { iterations: 3, ..Newton::default() });
+    let run = soon.run(&spring, vector![1.0, 0.0, 0.3, 0.8], Span::steps(0.2, 40)).unwrap();
+    let certificate = run.certificate();
+    assert!(certificate.effort.splits > 5, "{certificate}");
+    assert!(certificate.keeps_energy() && certificate.keeps_invariants(), "{certificate}");
+}
+
+#[test]
 fn each_part_of_a_step_aims_at_the_energy_of_its_start() {
     // A steep wall, and a solver that gives up soon.
     let system = line(|x| x.y.powi(2) * 0.5 + (x.x * 10.0).exp());

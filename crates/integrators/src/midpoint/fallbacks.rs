@@ -166,8 +166,7 @@ where
         let laws = self.system.laws(x);
         let energy = start.accumulated_error.energy + (laws.energy - start.values.energy);
         let accumulated_error = Laws { energy, ..start.accumulated_error };
-        let values = Laws { energy: laws.energy, entropy: laws.entropy, ..start.values };
-        let part = Start { x, h, values, accumulated_error, ..*start };
+        let part = Start { x, h, values: laws, accumulated_error, ..*start };
         match self.scheme.try_step(self.system, &part, memory, Fallbacks::NewtonOnly) {
             Ok(taken) => {
                 self.effort += taken.effort;
@@ -258,19 +257,20 @@ where
         let whole = *self.newton;
         let direct = Newton { iterations: DIRECT.min(whole.iterations), ..whole };
         let mut solved = self.newton(&direct, &Vector::<Y::Manifold>::zero(), &mut best);
-        if fallbacks == Fallbacks::All {
-            if solved.is_none()
-                && let Some(near) = self.continue_in_step_size()
-            {
-                solved = self.newton(&whole, &near, &mut best);
-            }
-            #[cfg(feature = "argmin")]
-            if solved.is_none()
-                && let Some(closer) = super::globaliser::descend(self.equation, &best.best)
-            {
-                self.effort.globalised += 1;
-                solved = self.newton(&whole, &closer, &mut best);
-            }
+        let all = fallbacks == Fallbacks::All;
+        if all
+            && solved.is_none()
+            && let Some(near) = self.continue_in_step_size()
+        {
+            solved = self.newton(&whole, &near, &mut best);
+        }
+        #[cfg(feature = "argmin")]
+        if all
+            && solved.is_none()
+            && let Some(closer) = super::globaliser::descend(self.equation, &best.best)
+        {
+            self.effort.globalised += 1;
+            solved = self.newton(&whole, &closer, &mut best);
         }
         solved.ok_or_else(|| {
             let edge = at_edge(self.equation, &best.best);

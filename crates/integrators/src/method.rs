@@ -3,7 +3,7 @@
 //! A run needs little of a system: its laws, and how large things are. This is a [`Flow`]; every
 //! [`Metriplectic`](metriplectic_dynamics::Metriplectic) system is one. It knows of a method that it takes
 //! steps, what these promise, and what has to be saved between two of them: a [`Method`]. Everything that a
-//! user does with a run, from [`Span`](crate::Span) to [`Checkpoint`](crate::Checkpoint), works with any flow
+//! user does with a run, from [`Span`](crate::Span) to [`Checkpoint`], works with any flow
 //! and any method.
 
 mod metriplectic;

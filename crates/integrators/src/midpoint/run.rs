@@ -16,11 +16,11 @@ use crate::run::trajectory::Trajectory;
 ///
 /// A retraction of your own runs by `Scheme::new(mine).run(..)`.
 pub trait Run: Sized {
-    /// [`Method::run`] with the defaults.
+    /// [`Method::run`](crate::Method::run) with the defaults.
     ///
     /// # Errors
     ///
-    /// Those of [`Method::run`].
+    /// Those of [`Method::run`](crate::Method::run).
     fn run<Y>(
         self,
         system: &Y,
@@ -34,11 +34,11 @@ pub trait Run: Sized {
         Scheme::new(self).run(system, x0, schedule)
     }
 
-    /// [`Method::steps`] with the defaults.
+    /// [`Method::steps`](crate::Method::steps) with the defaults.
     ///
     /// # Errors
     ///
-    /// Those of [`Method::steps`].
+    /// Those of [`Method::steps`](crate::Method::steps).
     fn steps<Y>(
         self,
         system: &Y,
@@ -52,11 +52,11 @@ pub trait Run: Sized {
         Scheme::new(self).steps(system, x0, schedule)
     }
 
-    /// [`Method::resume`] with the defaults.
+    /// [`Method::resume`](crate::Method::resume) with the defaults.
     ///
     /// # Errors
     ///
-    /// Those of [`Method::resume`].
+    /// Those of [`Method::resume`](crate::Method::resume).
     fn resume<'a, Y>(
         self,
         system: &'a Y,

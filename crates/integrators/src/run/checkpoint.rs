@@ -104,7 +104,7 @@ use crate::run::trajectory::{Ending, State};
 pub(crate) use saved::Exact;
 pub use saved::Saved;
 
-/// Where a run was put down; made by [`Steps::checkpoint`], taken up by [`Scheme::resume`].
+/// Where a run was put down; made by [`Steps::checkpoint`], taken up by [`Method::resume`].
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]

@@ -82,7 +82,7 @@ impl Span {
     }
 }
 
-/// How a run goes: what [`Scheme::steps`](crate::Scheme::steps) and [`Scheme::run`](crate::Scheme::run)
+/// How a run goes: what [`Method::steps`](crate::Method::steps) and [`Method::run`](crate::Method::run)
 /// make of what they are given.
 ///
 /// | given | steps | until |

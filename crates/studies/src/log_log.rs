@@ -147,7 +147,8 @@ impl LogLog {
             layout = layout.with_legend_group(&problem[0].label, entries);
         }
         let computed = ComputedLayout::from_layout(&layout);
-        let (left, right) = (computed.margin_left.ceil(), computed.margin_right.ceil());
+        // Numbers such as 2×10⁴ are wider than the room that is computed for them.
+        let (left, right) = (computed.margin_left.ceil() + 12.0, computed.margin_right.ceil());
         let rows: usize = self.series.iter().map(|series| 2 - series.look.rank.min(1)).sum();
         let height = (FRAME.1 + BELOW).max(ROW * rows as f64 + 24.0);
         let size = (left + FRAME.0 + right, TOP + height);

@@ -56,7 +56,8 @@ pub struct Certificate {
     /// Linear systems solved in the worst step.
     pub worst_iterations: usize,
     /// The largest local error of a step, relative to the sizes of the entries, as estimated on a few steps:
-    /// those whose number is a power of two. `None` where there is no estimate.
+    /// those whose number is a power of two. `None` where there is no estimate. Where friction is stiff it is
+    /// too large by a factor of about `h|K'|`.
     pub local_error: Option<f64>,
     /// What the method promises.
     pub promises: Promises,
@@ -285,7 +286,10 @@ impl fmt::Display for Certificate {
                 self.smallest_step, self.largest_step, self.rejected
             )?;
         }
-        if let Some(error) = self.local_error.filter(|error| *error > UNRESOLVED) {
+        // Where friction is stiff the estimate is far too large, and the line above says so.
+        if !self.is_stiff()
+            && let Some(error) = self.local_error.filter(|error| *error > UNRESOLVED)
+        {
             writeln!(
                 f,
                 "accuracy:    the motion is not resolved: local errors up to {error:.1e} of the state in a step"
@@ -374,6 +378,12 @@ mod tests {
         assert!(!text.contains("step sizes"), "{text}");
         let adaptive = Certificate { smallest_step: 1e-3, rejected: 2, ..ONE_FALL }.to_string();
         assert!(adaptive.contains("step sizes:  1.0e-3 to 1.0e-1, 2 rejected"), "{adaptive}");
+        let coarse = Certificate { local_error: Some(0.5), ..ONE_FALL };
+        assert!(
+            coarse.to_string().contains("the motion is not resolved: local errors up to 5.0e-1")
+        );
+        let stiff = Certificate { friction: 1e6, ..coarse };
+        assert!(!stiff.to_string().contains("not resolved"), "{stiff}");
         let text = Certificate {
             entropy_falls: 2,
             steps: 1,

@@ -88,6 +88,32 @@ pub trait Flow {
     /// The end of the displacement `d` from a state.
     fn moved(&self, x: &Element<Self>, d: &Self::Vector) -> Element<Self>;
 
+    /// The displacement from a state to another one, the inverse of [`moved`](Self::moved); `None` beyond the
+    /// edge of its chart, or if the flow does not say. States inside a step need it.
+    fn displacement(&self, x: &Element<Self>, y: &Element<Self>) -> Option<Self::Vector> {
+        let _ = (x, y);
+        None
+    }
+
+    /// The entropy `⟨dS, K dS⟩` that is produced at a state per unit of time; `None` where it has no value.
+    fn production(&self, x: &Element<Self>) -> Option<f64> {
+        let _ = x;
+        Some(0.0)
+    }
+
+    /// Moves a state that is near the given values of its laws onto them: those of the energy and of the
+    /// further invariants, and that of the entropy if there is one in `entropy`. `None` if it is too far from
+    /// them. A flow that does not say leaves the state as it is.
+    fn onto(
+        &self,
+        y: &Element<Self>,
+        laws: &Laws<Self::Numbers>,
+        entropy: Option<f64>,
+    ) -> Option<Element<Self>> {
+        let _ = (laws, entropy);
+        Some(y.clone())
+    }
+
     /// The state with these entries.
     ///
     /// # Errors

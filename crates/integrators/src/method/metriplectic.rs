@@ -1,7 +1,7 @@
 //! A metriplectic system as a flow.
 
 use metriplectic_dynamics::invariants::{Kind, Visitor};
-use metriplectic_dynamics::velocity::{Covectors, Gradient};
+use metriplectic_dynamics::velocity::{Covectors, Gradient, differentials, irreversible};
 use metriplectic_dynamics::{
     Dissipation, Invariants, Metriplectic, ModelError, SecondLaw, system::Point,
 };
@@ -45,6 +45,18 @@ impl<Y: Metriplectic> Flow for Y {
 
     fn moved(&self, x: &Point<Y>, d: &Tangent<Y>) -> Point<Y> {
         Y::Manifold::chart(x, &d.0)
+    }
+
+    fn displacement(&self, x: &Point<Y>, y: &Point<Y>) -> Option<Tangent<Y>> {
+        let q = Y::Manifold::coordinates(x, y);
+        (q.is_finite() && Y::Manifold::is_near(&q)).then_some(Components(q))
+    }
+
+    fn production(&self, x: &Point<Y>) -> Option<f64> {
+        let centre = ChartPoint::centre(x);
+        let w = differentials(self, &centre);
+        let production = w.entropy.dot(&irreversible(self, &centre, &w).ok()?);
+        production.is_finite().then_some(production)
     }
 
     fn element(&self, entries: &[f64]) -> Result<Point<Y>, PointError> {

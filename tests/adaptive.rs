@@ -85,7 +85,7 @@ fn the_laws_hold_in_steps_of_random_sizes() {
         let entropy = 0.5 * x.norm_squared();
         let values = Laws { energy: energy(&x), entropy, invariants: [0.0; 3] };
         let reference = Laws { energy: start, ..values };
-        let from = StepStart { x: &x, time, values, reference };
+        let from = StepStart { x: &x, time, values, reference, allowed: None };
         let taken = scheme.step(&body, &from, h, &mut memory).expect("the step is solved");
         let end = taken.x;
         let (before, after) = (0.5 * x.norm_squared(), 0.5 * end.norm_squared());

@@ -38,13 +38,13 @@ pub use attitude::{Attitude, AttitudeError};
 pub use discrete_gradient::{DiscreteGradient, Gonzalez, ItohAbe, MeanValue, SymmetricItohAbe};
 pub use error::{Error, RunError};
 pub use method::{
-    Components, Effort, Element, Evidence, Flow, Laws, Memory, Method, Promises, Refusal,
-    StateSpace, StepStart, Taken, Vector,
+    Components, Control, Effort, Element, EntropyStep, Evidence, Flow, Laws, Memory, Method,
+    Promises, Refusal, StateSpace, StepEnds, StepStart, Taken, Vector,
 };
 pub use midpoint::{Residual, Run, Scheme};
 pub use newton::{Equation, Iterate, Linearised, Newton, Root, Rounding};
 pub use round_off::stable_gradient::StableGradient;
-pub use run::certificate::{Certificate, InvariantBalance};
+pub use run::certificate::{Certificate, InvariantBalance, ProjectedSteps};
 pub use run::checkpoint::{Checkpoint, ResumeError, Saved};
 pub use run::controller::Until;
 pub use run::observables::{Csv, Npy, Observables, TableError};

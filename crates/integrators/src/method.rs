@@ -230,13 +230,46 @@ pub trait Method<F: Flow>: Sized {
         h: f64,
         memory: &mut Self::Memory,
     ) -> Result<Taken<F>, Refusal> {
-        self.step(flow, start, h, memory)
-            .map_err(|error| Refusal { effort: Effort::default(), error: Some(error) })
+        self.step(flow, start, h, memory).map_err(|error| Refusal {
+            effort: Effort::default(),
+            error: Some(error),
+            second_law: false,
+        })
     }
 
-    /// An estimate of the local error of a step; the one of the [`Flow`] unless the method has one of its own.
-    fn error(&self, flow: &F, x: &Element<F>, taken: &Taken<F>, h: f64) -> Option<F::Vector> {
-        flow.local_error(x, &taken.x, h)
+    /// How steps follow a tolerance; [`Control::of_order`] unless the method has a rule of its own.
+    fn control(&self) -> Control {
+        Control::of_order(self.order())
+    }
+
+    /// The error of a step in units of the one allowed, by a norm that gives it for a displacement. The
+    /// estimate of the [`Flow`] serves methods that have none of their own in their memory.
+    fn error(
+        &self,
+        flow: &F,
+        step: &StepEnds<'_, F>,
+        memory: &Self::Memory,
+        norm: impl Fn(&F::Vector) -> f64,
+    ) -> Option<f64> {
+        let _ = memory;
+        Some(norm(&flow.local_error(step.x, step.end, step.h)?))
+    }
+
+    /// The state at the fraction `θ` of a step that was taken, from the memory after it; `None` if the flow
+    /// does not say what [lies between](Flow::displacement) two states.
+    ///
+    /// The default is the cubic of Hermite in the chart at the start, of order 3, moved
+    /// [onto](Flow::onto) the laws: the energy and the further invariants that the run began with, and an
+    /// entropy that does not fall from one fraction to a later one.
+    fn between(
+        &self,
+        flow: &F,
+        step: &StepEnds<'_, F>,
+        memory: &mut Self::Memory,
+        theta: f64,
+    ) -> Option<Element<F>> {
+        let _ = (flow, step, memory, theta);
+        None
     }
 
     /// Verifies the model and starts a run: endless in steps of size `h`, or over a [`Span`](crate::Span) or
@@ -289,6 +322,11 @@ pub trait Memory: Clone + Debug + Default {
     #[must_use]
     fn rescaled(&self, ratio: f64) -> Self;
 
+    /// Notes what a try that was refused has left in its own copy of this memory.
+    fn refused(&mut self, tried: Self) {
+        let _ = tried;
+    }
+
     /// Puts all of its numbers into a checkpoint.
     fn save(&self, saved: &mut Saved);
 
@@ -329,13 +367,66 @@ pub struct StepStart<'a, F: Flow + ?Sized> {
     /// What they were at the start of the run; for the entropy, after the last step that dissipated. A method
     /// may aim at these values, so that round-off does not add up.
     pub reference: Laws<F::Numbers>,
+    /// The error that each entry is allowed in this step, if the steps follow a tolerance.
+    pub allowed: Option<F::Vector>,
 }
 
 impl<'a, F: Flow> StepStart<'a, F> {
     /// The first step of a run from `x`.
     pub fn first(flow: &F, x: &'a Element<F>) -> Self {
         let values = flow.laws(x);
-        Self { x, time: 0.0, reference: values.clone(), values }
+        Self { x, time: 0.0, reference: values.clone(), values, allowed: None }
+    }
+}
+
+/// The two ends of a step that was taken.
+#[derive(Debug)]
+pub struct StepEnds<'a, F: Flow + ?Sized> {
+    /// The state at its start.
+    pub x: &'a Element<F>,
+    /// The state at its end.
+    pub end: &'a Element<F>,
+    /// Its size.
+    pub h: f64,
+    /// The laws at both.
+    pub values: [&'a Laws<F::Numbers>; 2],
+    /// What the laws were at the start of the run, as in [`StepStart::reference`].
+    pub reference: &'a Laws<F::Numbers>,
+}
+
+/// How steps follow a tolerance: with the error `r` of a step in units of the one allowed, and that of the step
+/// before it, `r₋`,
+///
+/// ```math
+/// h_+ = h \, \min\bigl(r_{\max}, \max(r_{\min}, \; s\, r^{-\alpha} r_-^{\beta}) \bigr) .
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Control {
+    /// The power of the tolerance to which the error of a step is held.
+    pub power: f64,
+    /// The exponent `α`.
+    pub alpha: f64,
+    /// The exponent `β`.
+    pub beta: f64,
+    /// The exponent of a step that is rejected, without `r₋`.
+    pub rejected: f64,
+    /// The least ratio of two steps, and the largest.
+    pub ratios: [f64; 2],
+}
+
+impl Control {
+    /// The PI controller of Gustafsson (1991) for a method of order `p`, with local errors `∝ τ^{(p+1)/p}`: the
+    /// error at the end of a run is proportional to the tolerance.
+    #[must_use]
+    pub fn of_order(p: u32) -> Self {
+        let local = f64::from(p + 1);
+        Self {
+            power: local / f64::from(p),
+            alpha: 0.7 / local,
+            beta: 0.4 / local,
+            rejected: 1.0 / local,
+            ratios: [0.2, 5.0],
+        }
     }
 }
 
@@ -359,6 +450,8 @@ pub struct Refusal {
     pub effort: Effort,
     /// The error that a run ends with if no smaller step is taken either, where there is a particular one.
     pub error: Option<StepError>,
+    /// Whether the entropy would have fallen. Steps then stay smaller for a while.
+    pub second_law: bool,
 }
 
 /// What holds exactly on every step of a method.
@@ -400,11 +493,34 @@ pub struct Evidence {
     pub friction: f64,
     /// Whether the state is at rest: the displacement is no more than its own round-off.
     pub rests: bool,
+    /// How the entropy at the end was found, by a method that projects onto it.
+    pub entropy_step: Option<EntropyStep>,
+    /// Whether the size of the step is near the edge of the region of stability of an explicit method.
+    pub stability: bool,
+}
+
+/// How a method that projects onto the laws found the entropy at the end of a step.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum EntropyStep {
+    /// By its production, `S(x') = S(x) + h Σ b_i σ_i`.
+    Targeted,
+    /// The other laws leave it free: near an equilibrium, where it depends on them.
+    Free,
+    /// The state was held, because the entropy would have fallen by round-off in any step.
+    Held,
 }
 
 impl Default for Evidence {
     fn default() -> Self {
-        Self { entropy_slope: f64::INFINITY, dissipates: false, friction: 0.0, rests: false }
+        Self {
+            entropy_slope: f64::INFINITY,
+            dissipates: false,
+            friction: 0.0,
+            rests: false,
+            entropy_step: None,
+            stability: false,
+        }
     }
 }
 
@@ -416,6 +532,8 @@ impl Evidence {
             dissipates: self.dissipates | next.dissipates,
             friction: self.friction.max(next.friction),
             rests: next.rests,
+            entropy_step: next.entropy_step.or(self.entropy_step),
+            stability: self.stability | next.stability,
         }
     }
 }

@@ -124,7 +124,7 @@ pub(crate) struct Start<'a, Y: Metriplectic> {
 }
 
 impl<'a, Y: Metriplectic> Start<'a, Y> {
-    fn of(&StepStart { x, time, values, reference }: &StepStart<'a, Y>, h: f64) -> Self {
+    fn of(&StepStart { x, time, values, reference, .. }: &StepStart<'a, Y>, h: f64) -> Self {
         let accumulated_error = Laws {
             energy: values.energy - reference.energy,
             entropy: values.entropy - reference.entropy,
@@ -171,6 +171,7 @@ where
         self.try_step(system, &start, memory, Fallbacks::NewtonOnly).map_err(|failure| Refusal {
             effort: failure.effort,
             error: failure.first_law(start.time, h),
+            second_law: false,
         })
     }
 }
@@ -236,7 +237,13 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
 fn evidence<M: Manifold>(root: &Root<M, Dissipated>, friction: f64) -> Evidence {
     let rests = (0..Vector::<M>::LEN).all(|i| root.u[i].abs() <= 2.0 * root.round_off[i]);
     let Dissipated { slope_squared, dissipates } = root.evidence;
-    Evidence { entropy_slope: slope_squared.sqrt(), dissipates, friction, rests }
+    Evidence {
+        entropy_slope: slope_squared.sqrt(),
+        dissipates,
+        friction,
+        rests,
+        ..Evidence::default()
+    }
 }
 
 /// The rate `h|K'|` of friction from which on the round-off of a solution may be large.

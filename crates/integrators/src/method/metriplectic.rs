@@ -53,7 +53,7 @@ impl<Y: Metriplectic> Flow for Y {
     }
 
     fn production(&self, x: &Point<Y>) -> Option<f64> {
-        let centre = ChartPoint::centre(x);
+        let centre = ChartPoint::<Y::Manifold>::centre(x);
         let w = differentials(self, &centre);
         let production = w.entropy.dot(&irreversible(self, &centre, &w).ok()?);
         production.is_finite().then_some(production)

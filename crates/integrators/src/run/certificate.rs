@@ -6,7 +6,7 @@ use metriplectic_dynamics::SecondLaw;
 use metriplectic_dynamics::invariants::Kind;
 
 use crate::digits::{Digits, counted};
-use crate::method::{Effort, Element, Evidence, Flow, Laws, Promises, Vector as _};
+use crate::method::{Effort, Element, EntropyStep, Evidence, Flow, Laws, Promises, Vector as _};
 use crate::round_off::bound::{ROUNDED, of_a_law};
 use crate::run::scales::{larger, relative};
 
@@ -50,6 +50,10 @@ pub struct Certificate {
     /// Steps that were tried and given up, because their error was above the tolerance or because
     /// they were not solved.
     pub rejected: usize,
+    /// Those of them on which the entropy would have fallen.
+    pub falls_avoided: usize,
+    /// Steps of a method that projects onto the laws, by how the entropy was found.
+    pub projected_steps: ProjectedSteps,
     /// What the solver did, in all steps.
     #[cfg_attr(feature = "serde", serde(flatten))]
     pub effort: Effort,
@@ -71,6 +75,39 @@ pub struct Certificate {
     /// Whether the dissipation was projected so that it keeps the energy, and is not quite the tensor
     /// that was written down ([`ProjectedDissipation`](metriplectic_dynamics::ProjectedDissipation)).
     pub projected: bool,
+}
+
+/// Steps of a method that projects onto the laws; all are zero for another one.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
+pub struct ProjectedSteps {
+    /// Steps whose entropy is the one that their production asks for.
+    pub targeted: usize,
+    /// Steps near an equilibrium, where the other laws leave the entropy free, and it has not fallen.
+    pub free: usize,
+    /// Steps that leave the state where it is, because each one would have let the entropy fall by round-off.
+    pub held: usize,
+    /// Steps whose size is near the edge of the region of stability: stability, and not the tolerance, sets it.
+    pub stability: usize,
+}
+
+impl ProjectedSteps {
+    /// All steps.
+    #[must_use]
+    pub const fn all(&self) -> usize {
+        self.targeted + self.free + self.held
+    }
+
+    fn enter(&mut self, evidence: &Evidence) {
+        match evidence.entropy_step {
+            Some(EntropyStep::Targeted) => self.targeted += 1,
+            Some(EntropyStep::Free) => self.free += 1,
+            Some(EntropyStep::Held) => self.held += 1,
+            None => {}
+        }
+        self.stability += usize::from(evidence.stability);
+    }
 }
 
 /// What became of a further invariant.
@@ -135,6 +172,8 @@ impl Certificate {
             smallest_step: 0.0,
             largest_step: 0.0,
             rejected: 0,
+            falls_avoided: 0,
+            projected_steps: ProjectedSteps::default(),
             effort: Effort::default(),
             worst_iterations: 0,
             local_error: None,
@@ -181,6 +220,7 @@ impl Certificate {
         self.friction = self.friction.max(evidence.friction);
         self.max_manifold_defect = self.max_manifold_defect.max(flow.defect(next));
         self.steps += 1;
+        self.projected_steps.enter(&evidence);
         self.effort += effort;
         self.worst_iterations = self.worst_iterations.max(effort.iterations);
         if self.steps.is_power_of_two() {
@@ -360,6 +400,8 @@ mod tests {
         smallest_step: 0.1,
         largest_step: 0.1,
         rejected: 0,
+        falls_avoided: 0,
+        projected_steps: ProjectedSteps { targeted: 0, free: 0, held: 0, stability: 0 },
         effort: Effort { iterations: 9, continued: 0, globalised: 0, splits: 1 },
         worst_iterations: 2,
         local_error: None,

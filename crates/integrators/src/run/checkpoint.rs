@@ -93,9 +93,9 @@ mod validation;
 
 use metriplectic_manifolds::PointError;
 
-use crate::method::{Effort, Flow, Memory, Method, StateSpace, Vector};
-use crate::run::certificate::Certificate;
-use crate::run::controller::{Controller, Entries, StepSize};
+use crate::method::{Control, Effort, Flow, Memory, Method, StateSpace, Vector};
+use crate::run::certificate::{Certificate, ProjectedSteps};
+use crate::run::controller::{Cap, Controller, Entries, StepSize};
 use crate::run::scales::Scales;
 use crate::run::span::{SpanError, check_end, check_step_size, check_steps};
 use crate::run::steps::{Progress, Steps};
@@ -137,7 +137,7 @@ pub struct Checkpoint {
 }
 
 /// The version of the format that is written and read.
-const VERSION: u32 = 3;
+const VERSION: u32 = 4;
 
 /// The figures of a certificate that the system does not know.
 #[derive(Clone, Debug, PartialEq)]
@@ -159,6 +159,8 @@ struct Balance {
     smallest_step: Exact,
     largest_step: Exact,
     rejected: usize,
+    falls_avoided: usize,
+    projected_steps: ProjectedSteps,
     effort: Effort,
     worst_iterations: usize,
     local_error: Option<Exact>,
@@ -180,7 +182,17 @@ enum SavedStepSize {
         taken: Option<Exact>,
         error: Option<Exact>,
         rejected: bool,
+        cap: Option<SavedCap>,
     },
+}
+
+/// What the second law says of the size of a step.
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+struct SavedCap {
+    size: Exact,
+    before: Exact,
+    steps: u32,
 }
 
 /// What is known of the errors of the entries.
@@ -401,7 +413,7 @@ impl<'a, F: Flow, M: Method<F>> Steps<'a, F, M> {
         let point = flow.element(&entries)?;
         let mut certificate = Certificate::start(flow, &point, method.promises(flow));
         c.balance.restore(&mut certificate)?;
-        let progress = progress(c, &flow.sizes(&point), method.order())?;
+        let progress = progress(c, &flow.sizes(&point), (method.order(), method.control()))?;
         let memory = M::Memory::restore(&c.memory)?;
         expect_length("further invariants", c.invariants.len(), certificate.invariants.len())?;
         validation::of_the_system(flow, &point, c)?;
@@ -430,7 +442,11 @@ impl<'a, F: Flow, M: Method<F>> Steps<'a, F, M> {
     }
 }
 
-fn progress<V: Vector>(c: &Checkpoint, like: &V, order: u32) -> Result<Progress<V>, ResumeError> {
+fn progress<V: Vector>(
+    c: &Checkpoint,
+    like: &V,
+    (order, control): (u32, Control),
+) -> Result<Progress<V>, ResumeError> {
     let damaged = |what, value| Err(ResumeError::Damaged { what, value });
     if c.every == 0 {
         return damaged("interval of its records", 0.0);
@@ -451,8 +467,10 @@ fn progress<V: Vector>(c: &Checkpoint, like: &V, order: u32) -> Result<Progress<
             taken,
             error,
             rejected,
+            cap,
         } => StepSize::Adaptive(Controller {
             order,
+            control,
             start: c.start.0,
             end: end.0,
             tolerance: positive("tolerance", *tolerance)?,
@@ -463,6 +481,14 @@ fn progress<V: Vector>(c: &Checkpoint, like: &V, order: u32) -> Result<Progress<
             taken: taken.map(|h| positive("last step", h)).transpose()?,
             error: error.map(|e| positive("last error", e)).transpose()?,
             rejected: *rejected,
+            cap: match cap {
+                Some(SavedCap { size, before, steps }) => Some(Cap {
+                    size: positive("bound of the step size", *size)?,
+                    before: before.0,
+                    steps: *steps,
+                }),
+                None => None,
+            },
         }),
     };
     Ok(Progress {
@@ -495,6 +521,11 @@ impl SavedStepSize {
                 taken: c.taken.map(Exact),
                 error: c.error.map(Exact),
                 rejected: c.rejected,
+                cap: c.cap.map(|Cap { size, before, steps }| SavedCap {
+                    size: Exact(size),
+                    before: Exact(before),
+                    steps,
+                }),
             },
         }
     }
@@ -560,6 +591,8 @@ impl Balance {
             smallest_step: Exact(c.smallest_step),
             largest_step: Exact(c.largest_step),
             rejected: c.rejected,
+            falls_avoided: c.falls_avoided,
+            projected_steps: c.projected_steps,
             effort: c.effort,
             worst_iterations: c.worst_iterations,
             local_error: c.local_error.map(Exact),
@@ -586,6 +619,8 @@ impl Balance {
         c.smallest_step = self.smallest_step.0;
         c.largest_step = self.largest_step.0;
         c.rejected = self.rejected;
+        c.falls_avoided = self.falls_avoided;
+        c.projected_steps = self.projected_steps;
         c.effort = self.effort;
         c.worst_iterations = self.worst_iterations;
         c.local_error = self.local_error.map(|error| error.0);

@@ -61,7 +61,7 @@
 //! asked for, to the last bit. The first step is that of Hairer, Nørsett, Wanner (Solving ODEs I, §II.4),
 //! with the sizes of the entries in place of their absolute numbers.
 
-use crate::method::{Element, Flow, Vector};
+use crate::method::{Control, Element, Flow, Vector};
 use crate::run::scales::{Scales, relative};
 use crate::run::span::{Schedule, Size, Span, SpanError, check_end, check_step_size};
 
@@ -304,10 +304,11 @@ impl Adaptive {
         flow: &F,
         (x, start): (&Element<F>, f64),
         scales: &Scales<F::Vector>,
-        order: u32,
+        (order, control): (u32, Control),
     ) -> Result<Controller<F::Vector>, SpanError> {
         let mut controller = Controller {
             order,
+            control,
             start,
             end: self.end,
             tolerance: self.tolerance,
@@ -318,6 +319,7 @@ impl Adaptive {
             taken: None,
             error: None,
             rejected: false,
+            cap: None,
         };
         let first = self.first.unwrap_or_else(|| controller.first_step(flow, x, scales));
         controller.next = controller.within(first);
@@ -339,6 +341,8 @@ pub(crate) enum StepSize<V> {
 pub(crate) struct Controller<V> {
     /// The order of the method.
     pub(crate) order: u32,
+    /// Its rule.
+    pub(crate) control: Control,
     /// When the run starts.
     pub(crate) start: f64,
     pub(crate) end: f64,
@@ -354,14 +358,37 @@ pub(crate) struct Controller<V> {
     pub(crate) error: Option<f64>,
     /// Whether the last try was rejected.
     pub(crate) rejected: bool,
+    /// What the second law says of the size.
+    pub(crate) cap: Option<Cap>,
+}
+
+/// A bound of the step size after a step on which the entropy would have fallen.
+///
+/// Near an equilibrium a step of an explicit method lets the entropy fall exactly where it is larger than the
+/// method's region of stability. The error says nothing of that, and would let the steps grow again at once.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Cap {
+    /// The largest size.
+    pub(crate) size: f64,
+    /// The size at which the tries in a row began.
+    pub(crate) before: f64,
+    /// Steps taken since.
+    pub(crate) steps: u32,
+}
+
+impl Cap {
+    /// Steps after which the bound is raised.
+    const PATIENCE: u32 = 20;
+    /// The ratio by which it is raised in each step after those.
+    const RAISED: f64 = 1.3;
+    /// The ratio of a step on which the entropy would have fallen.
+    const REDUCED: f64 = 0.7;
+    /// The ratio to the size before the tries after a step that was held.
+    const HELD: f64 = 1.5;
 }
 
 /// Of the size at which the error would be the one allowed.
 const SAFETY: f64 = 0.9;
-/// The least ratio of two steps.
-const LEAST_RATIO: f64 = 0.2;
-/// The largest ratio of two steps.
-const LARGEST_RATIO: f64 = 5.0;
 /// The ratio after a step that was not solved.
 const UNSOLVED: f64 = 0.25;
 /// The least error that the controller remembers: a step without any is no reason to be bold later.
@@ -403,30 +430,59 @@ impl<V: Vector> Controller<V> {
 
     /// A step of size `h` was taken.
     pub(crate) fn accept(&mut self, h: f64, error: f64) {
-        let proportional = self.error.map_or(1.0, |before| before.powf(0.4 / self.local_order()));
-        let ratio = SAFETY * error.powf(-0.7 / self.local_order()) * proportional;
-        let most = if self.rejected { 1.0 } else { LARGEST_RATIO };
-        let next = h * ratio.clamp(LEAST_RATIO, most);
+        let Control { alpha, beta, ratios: [least, largest], .. } = self.control;
+        let proportional = match self.error {
+            Some(before) if beta != 0.0 => before.powf(beta),
+            _ => 1.0,
+        };
+        let ratio = SAFETY * error.powf(-alpha) * proportional;
+        let most = if self.rejected { 1.0 } else { largest };
+        let mut next = h * ratio.clamp(least, most);
+        self.cap = self.cap.filter(|_| ratio >= 1.0).map(|cap| {
+            let raised = if cap.steps >= Cap::PATIENCE { Cap::RAISED } else { 1.0 };
+            Cap { size: cap.size * raised, before: 0.0, steps: cap.steps.saturating_add(1) }
+        });
+        if let Some(cap) = self.cap {
+            next = next.min(cap.size);
+        }
         self.next = self.within(next);
         self.taken = Some(h);
         self.error = Some(error.max(LEAST_ERROR));
         self.rejected = false;
     }
 
+    /// A step of size `h` was taken that leaves the state where it is, because no smaller one moves it.
+    pub(crate) fn accept_held(&mut self, h: f64) {
+        let before = self.cap.map_or(h, |cap| cap.before.max(h));
+        self.next = self.within(Cap::HELD * before);
+        self.taken = Some(h);
+        self.rejected = false;
+        self.cap = None;
+    }
+
+    /// The entropy would have fallen on a step of size `h`.
+    pub(crate) fn reject_fall(&mut self, h: f64) {
+        let before = self.cap.map_or(h, |cap| cap.before.max(h));
+        self.next = Cap::REDUCED * h;
+        self.cap = Some(Cap { size: self.next, before, steps: 0 });
+        self.rejected = true;
+    }
+
     /// A step of size `h` was not taken, with this error or because it was not solved.
     pub(crate) fn reject(&mut self, h: f64, error: Option<f64>) {
-        let ratio = error.map_or(UNSOLVED, |error| {
-            (SAFETY * error.powf(-1.0 / self.local_order())).clamp(LEAST_RATIO, SAFETY)
-        });
+        let Control { rejected, ratios: [least, _], .. } = self.control;
+        let ratio =
+            error.map_or(UNSOLVED, |error| (SAFETY * error.powf(-rejected)).clamp(least, SAFETY));
         self.next = h * ratio;
         self.rejected = true;
     }
 
     /// The error `τ^{(p+1)/p} s_i + a_i` that is allowed in a step of size `h`, entry by entry, and what
     /// rounding may make of the estimate.
-    fn allowed(&self, scales: &Scales<V>, h: f64) -> V {
-        let exponent = self.local_order() / f64::from(self.order);
-        let tolerance = self.tolerance.powf(exponent).max(8.0 * f64::EPSILON);
+    pub(crate) fn allowed(&self, scales: &Scales<V>, h: f64) -> V {
+        let power = self.control.power;
+        let tolerance = if power == 1.0 { self.tolerance } else { self.tolerance.powf(power) };
+        let tolerance = tolerance.max(8.0 * f64::EPSILON);
         let noise = scales.rounding(h);
         scales.sizes.with(|i| {
             let (size, noise) = (scales.sizes.get(i), noise.get(i));
@@ -436,12 +492,6 @@ impl<V: Vector> Controller<V> {
                 _ => tolerance * size + noise,
             }
         })
-    }
-
-    /// An error of a step of size `h` in units of the one allowed; `None` if it is no number.
-    pub(crate) fn relative_error(&self, error: &V, h: f64, scales: &Scales<V>) -> Option<f64> {
-        let error = relative(error, &self.allowed(scales, h));
-        error.is_finite().then_some(error)
     }
 
     /// The first step, after Hairer, Nørsett, Wanner (Solving ODEs I, §II.4): a short step of Euler's
@@ -526,6 +576,7 @@ mod tests {
     fn the_controller_stays_within_its_bounds() {
         let mut controller = Controller::<Vec<f64>> {
             order: 2,
+            control: Control::of_order(2),
             start: 0.0,
             end: 10.0,
             tolerance: 1e-4,
@@ -536,6 +587,7 @@ mod tests {
             taken: None,
             error: None,
             rejected: false,
+            cap: None,
         };
         controller.accept(1.0, 0.0);
         assert!((controller.next - 2.0).abs() < 1e-15);

@@ -4,13 +4,13 @@ use std::fmt;
 
 use crate::error::RunError;
 use crate::method::{
-    Effort, Element, Flow, Laws, Memory as _, Method, Promises, Refusal, StepStart, Taken,
-    Vector as _,
+    Effort, Element, EntropyStep, Flow, Laws, Memory as _, Method, Promises, Refusal, StepEnds,
+    StepStart, Taken, Vector as _,
 };
 use crate::round_off::bound::breaks_first_law;
 use crate::run::certificate::Certificate;
 use crate::run::controller::{Controller, StepSize};
-use crate::run::scales::{Scales, larger};
+use crate::run::scales::{Scales, larger, relative};
 use crate::run::span::{ROOM, Schedule, Size, SpanError};
 use crate::run::trajectory::{Ending, State, Trajectory, thin_out};
 use crate::step_error::StepError;
@@ -95,8 +95,8 @@ impl<'a, F: Flow, M: Method<F>> Steps<'a, F, M> {
         let step_size = match size {
             Size::Fixed(h) => StepSize::Fixed(h),
             Size::Tolerance(adaptive) => {
-                let order = method.order();
-                StepSize::Adaptive(adaptive.controller(flow, (&x0, start), &scales, order)?)
+                let rule = (method.order(), method.control());
+                StepSize::Adaptive(adaptive.controller(flow, (&x0, start), &scales, rule)?)
             }
         };
         let largest_velocity = scales.sizes.map(|_| 0.0);
@@ -147,7 +147,7 @@ impl<'a, F: Flow, M: Method<F>> Steps<'a, F, M> {
 
     /// Where the next step starts.
     #[inline]
-    fn from(&self) -> StepStart<'_, F> {
+    fn from(&self, allowed: Option<F::Vector>) -> StepStart<'_, F> {
         let invariants = || {
             let mut initial = self.values.invariants.clone();
             for (k, balance) in self.certificate.invariants.iter().enumerate() {
@@ -159,7 +159,7 @@ impl<'a, F: Flow, M: Method<F>> Steps<'a, F, M> {
         let reference =
             Laws { energy: self.certificate.initial_energy, entropy, invariants: invariants() };
         let values = self.values.clone();
-        StepStart { x: &self.state.point, time: self.state.time, values, reference }
+        StepStart { x: &self.state.point, time: self.state.time, values, reference, allowed }
     }
 
     /// Takes one step. A run that has [ended](Self::ending) stays where it is.
@@ -175,7 +175,7 @@ impl<'a, F: Flow, M: Method<F>> Steps<'a, F, M> {
         let Advance { taken, h, time } = match &self.progress.step_size {
             &StepSize::Fixed(h) => {
                 let mut memory = std::mem::take(&mut self.memory);
-                let taken = self.method.step(self.flow, &self.from(), h, &mut memory);
+                let taken = self.method.step(self.flow, &self.from(None), h, &mut memory);
                 self.memory = memory;
                 Advance { taken: taken?, h, time: self.progress.start + step as f64 * h }
             }
@@ -248,24 +248,45 @@ impl<'a, F: Flow, M: Method<F>> Steps<'a, F, M> {
             }
             let ratio = controller.taken.map_or(1.0, |taken| h / taken);
             let mut memory = self.memory.rescaled(ratio);
-            let end = self.method.attempt(flow, &self.from(), h, &mut memory);
+            let allowed = controller.allowed(&self.progress.scales, h);
+            let start = self.from(Some(allowed));
+            let end = self.method.attempt(flow, &start, h, &mut memory);
+            let mut falls = false;
             let end = match end {
                 Ok(taken) => {
                     effort += taken.effort;
                     is_finite(&taken.values).then_some(taken)
                 }
-                Err(Refusal { effort: wasted, error }) => {
+                Err(Refusal { effort: wasted, error, second_law }) => {
                     effort += wasted;
                     broken = error.or(broken);
+                    falls = second_law;
                     None
                 }
             };
             let error = end.as_ref().and_then(|taken| {
                 let scales = self.progress.scales.or(&flow.sizes(&taken.x));
-                let error = self.method.error(flow, &self.state.point, taken, h)?;
-                controller.relative_error(&error, h, &scales)
+                let allowed = controller.allowed(&scales, h);
+                let values = [&self.values, &taken.values];
+                let (x, reference) = (&self.state.point, &start.reference);
+                let step = StepEnds { x, end: &taken.x, h, values, reference };
+                let norm = |error: &F::Vector| relative(error, &allowed);
+                self.method.error(flow, &step, &memory, norm).filter(|error| error.is_finite())
             });
             match (end, error) {
+                (Some(taken), _) if taken.evidence.entropy_step == Some(EntropyStep::Held) => {
+                    controller.accept_held(h);
+                    self.memory = memory;
+                    let time = if last { controller.end } else { time + h };
+                    self.progress.step_size = StepSize::Adaptive(controller);
+                    return Ok(Advance { taken: Taken { effort, ..taken }, h, time });
+                }
+                (None, _) if falls => {
+                    controller.reject_fall(h);
+                    self.memory.refused(memory);
+                    self.certificate.rejected += 1;
+                    self.certificate.falls_avoided += 1;
+                }
                 (Some(taken), Some(error)) if error <= 1.0 => {
                     controller.accept(h, error);
                     self.memory = memory;

@@ -4,6 +4,7 @@
 //! References are the ends of the method of order 5 at a tolerance of 10⁻¹⁴ for that of order 8, and the other way
 //! round. They agree with the classical method of order 4 without laws.
 
+use metriplectic::dynamics::SecondLaw;
 use metriplectic::dynamics::system::Point;
 use metriplectic::prelude::*;
 use metriplectic_studies::problems::flow;
@@ -238,4 +239,176 @@ fn nothing_drifts_in_a_million_steps() {
     println!("{c}");
     assert!(c.max_relative_energy_error() <= 3e-15 && c.entropy_falls == 0, "{c}");
     assert!(c.entropy_gained.abs() <= 1e-14, "{c}");
+}
+
+/// The certificate of a run of order 8 over a span, in which the laws must hold.
+fn certified<Y: Metriplectic>(
+    system: &Y,
+    x0: &Point<Y>,
+    span: impl Into<metriplectic::integrators::Schedule>,
+) -> (Certificate, Point<Y>) {
+    let run = DormandPrince8.run(system, x0.clone(), span).unwrap();
+    let c = run.certificate();
+    assert!(c.keeps_energy() && c.keeps_entropy() && c.keeps_invariants(), "{c}");
+    assert!(c.max_manifold_defect <= 1e-15, "{c}");
+    (c.clone(), run.last().point.clone())
+}
+
+#[test]
+fn unstable_equilibria_are_left_or_kept() {
+    let body = models::relaxing_body();
+    // The second axis is the unstable one; on it nothing moves.
+    let on = vector![0.0, -1.0, 0.0];
+    let (c, end) = certified(&body, &on, Span::until(1e4).tolerance(1e-8).at_most(2));
+    assert!(end == on && c.entropy_gained == 0.0 && c.steps < 100, "{c}");
+    for tolerance in [1e-4, 1e-10] {
+        let beside = vector![1e-9, -1.0, 1e-9];
+        let span = Span::until(1e4).tolerance(tolerance).at_most(2);
+        let (c, end) = certified(&body, &beside, span);
+        // It goes over to the first axis, with the energy 1/10 of a rotation there.
+        assert!((end.x.abs() - 2_f64.sqrt()).abs() < 1e-9, "{end}");
+        assert!((c.entropy_gained - 0.5).abs() < 1e-9 && c.steps < 1500, "{c}");
+    }
+    // No differential is left at the origin.
+    let (c, end) = certified(&body, &Vector3::zeros(), Span::until(10.0).tolerance(1e-8));
+    assert!(end == Vector3::zeros() && c.steps < 100, "{c}");
+}
+
+#[test]
+fn a_run_comes_to_rest_and_is_resumed_bit_for_bit() {
+    let body = models::relaxing_body();
+    let span = Span::until(1e6).tolerance(1e-6).until_rest(1e-6);
+    let run = DormandPrince8.run(&body, models::UNSTABLE, span).unwrap();
+    assert!(run.ending().is_rest() && run.last().time < 1e4, "{:?}", run.ending());
+    // Taken up in the middle, near the equilibrium, and at every step of the start.
+    let span = Span::until(400.0).tolerance(1e-6);
+    let whole = DormandPrince8.run(&body, models::UNSTABLE, span).unwrap();
+    let mut steps = DormandPrince8.steps(&body, models::UNSTABLE, span).unwrap();
+    let mut state = Some(steps.state().clone());
+    let mut k = 0;
+    while state.is_some() {
+        if k < 20 || k % 13 == 0 {
+            let resumed = DormandPrince8.resume(&body, &steps.checkpoint()).unwrap().run().unwrap();
+            assert_eq!(resumed.last(), whole.last(), "from step {k}");
+            assert_eq!(resumed.certificate(), whole.certificate(), "from step {k}");
+        }
+        k += 1;
+        state = steps.next().map(|state| state.unwrap());
+    }
+    assert!(k > 40 && whole.certificate().projected_steps.free > 0, "{}", whole.certificate());
+}
+
+#[test]
+fn weak_friction_and_none_keep_the_entropy() {
+    for alpha in [0.0, 1e-6] {
+        let span = Span::until(1e3).tolerance(1e-6).at_most(2);
+        let (c, _) = certified(&gas(alpha), &GAS, span);
+        assert_eq!(c.projected_steps.targeted, c.steps, "{c}");
+        // S' = α (1/T₁ − 1/T₂)², with differences of the order of one.
+        let bound = if alpha == 0.0 { 1e-14 } else { 1e3 * alpha };
+        assert!(c.entropy_gained.abs() <= bound, "{c}");
+        assert!(alpha == 0.0 || c.entropy_gained > 1e-3 * bound, "{c}");
+    }
+}
+
+#[test]
+fn invariants_that_depend_on_others_are_left_out() {
+    let twice = System::on(LieDual::se3())
+        .energy(models::heavy)
+        .entropy(models::alignment)
+        .casimir(models::gamma_squared)
+        .casimir(models::gamma_squared)
+        .build()
+        .unwrap();
+    let error = DormandPrince8.run(&twice, SVector::from(models::HEAVY), Span::until(20.0));
+    assert!(matches!(error, Err(RunError::Model(_))), "a law that is listed twice is refused");
+
+    // A plane oscillator on a circle: dJ = ±dH/ω, at every point of the way.
+    let circle = System::on(Euclidean::<4>)
+        .bracket(Symplectic)
+        .energy(|x: &Vector4<Real>| x.norm_squared() * 0.5)
+        .momentum(|x: &Vector4<Real>| x.x * x.w - x.y * x.z)
+        .build()
+        .unwrap();
+    let start = vector![1.0, 0.0, 0.0, 1.0];
+    let (_, end) = certified(&circle, &start, Span::until(100.0).tolerance(1e-10).at_most(2));
+    let (sin, cos) = 100_f64.sin_cos();
+    assert!((end - vector![cos, sin, -sin, cos]).norm() < 1e-7, "{end}");
+}
+
+#[test]
+fn stiff_friction_is_resolved_and_named() {
+    let (c, _) = certified(&gas(1e4), &GAS, Span::until(2.0).tolerance(1e-6).at_most(2));
+    println!("{c}");
+    assert!(c.is_limited_by_stability() && c.to_string().contains("an implicit method"), "{c}");
+    let (c, _) = certified(&gas(0.5), &GAS, Span::until(2.0).tolerance(1e-6).at_most(2));
+    assert!(!c.is_limited_by_stability(), "{c}");
+    // Steps that are far too large are split, and the laws hold.
+    let body = models::relaxing_body();
+    let (c, _) = certified(&body, &vector![0.3, -0.9, 0.2], Span::steps(100.0, 10));
+    assert!(c.effort.splits > 0, "{c}");
+}
+
+#[test]
+fn an_edge_is_an_error_or_is_not_crossed() {
+    // A fall to the edge of the half plane, which is reached with a finite speed.
+    let half_plane = Chart::<2>::new(|x| x.x > 0.0);
+    let falling = System::on(half_plane)
+        .bracket(Poisson::constant(Matrix2::new(0.0, 1.0, -1.0, 0.0)).unwrap())
+        .energy(|x: &Vector2<Real>| x.y * x.y * 0.5 + x.x)
+        .build()
+        .unwrap();
+    let start = vector![1.0, 0.0];
+    for error in [
+        DormandPrince8.run(&falling, start, Span::until(10.0).tolerance(1e-6)).unwrap_err(),
+        DormandPrince8.run(&falling, start, Span::steps(0.1, 100)).unwrap_err(),
+    ] {
+        let RunError::Step { cause, trajectory } = error else { panic!("{error}") };
+        let last = trajectory.last();
+        assert!((last.time - 2_f64.sqrt()).abs() < 0.1, "{cause} at {}", last.time);
+        let c = trajectory.certificate();
+        assert!(last.point.x > 0.0, "{cause} at {}", last.point);
+        assert!(c.keeps_energy(), "{cause}: {c}");
+    }
+}
+
+#[test]
+fn spheres_of_other_dimensions_and_products_of_three() {
+    let sphere = System::on(Sphere::<5>::round())
+        .energy(|x: &Vector6<Real>| x.x * x.x * 0.5 + x.y * x.z - x.w * 0.3)
+        .entropy(|x: &Vector6<Real>| x[4] + x[5] * x[0] * 0.4)
+        .build()
+        .unwrap();
+    let start = Vector6::repeat(6_f64.sqrt().recip());
+    let (c, _) = certified(&sphere, &start, Span::until(20.0).tolerance(1e-8));
+    assert!(c.entropy_gained > 0.1, "{c}");
+
+    type Three = ((Vector3<Real>, Matrix3<Real>), Vector1<Real>);
+    let space = Product(Product(Sphere::<2>::round(), Rotations::bi_invariant()), Euclidean::<1>);
+    let three = System::on(space)
+        .bracket(((AreaForm, Zero), Zero))
+        .energy(|((x, r), e): &Three| x.z + x.x * r.m11 * 0.3 + e.x.exp())
+        .entropy(|((_, r), e): &Three| e.x + r.m13 * 0.2)
+        .build()
+        .unwrap();
+    let start = ((vector![0.6, 0.0, 0.8], Matrix3::identity()), Vector1::new(0.0));
+    let (c, _) = certified(&three, &start, Span::until(5.0).tolerance(1e-8));
+    assert!(c.steps > 5 && c.entropy_gained > 0.1, "{c}");
+}
+
+#[test]
+fn what_is_not_promised_is_said() {
+    let published = System::on(Euclidean::<3>)
+        .bracket(
+            Poisson::constant(Matrix3::new(0.0, 1.0, 0.0, -1.0, 0.0, 0.0, 0.0, 0.0, 0.0)).unwrap(),
+        )
+        .energy(|x: &Vector3<Real>| x.norm_squared() * 0.5 + x.z)
+        .entropy(|x: &Vector3<Real>| x.z + x.x * 0.1)
+        .second_law(SecondLaw::Published)
+        .build()
+        .unwrap();
+    let run =
+        DormandPrince8.run(&published, vector![0.5, 0.2, 0.1], Span::until(5.0).tolerance(1e-8));
+    let certificate = run.unwrap().certificate().to_string();
+    assert!(certificate.contains("second law: not promised"), "{certificate}");
 }

@@ -73,6 +73,25 @@ fn timed<T>(mut run: impl FnMut() -> T) -> (T, f64) {
     (result, least.min(clock.elapsed().as_secs_f64()))
 }
 
+/// Repeats a run of ours, which times itself; what it gives with the least seconds.
+fn fastest<const N: usize>(
+    mut run: impl FnMut() -> Result<Ran<N>, String>,
+) -> Result<Ran<N>, String> {
+    let mut best = run()?;
+    let mut all = best.seconds;
+    for _ in 0..4 {
+        if all > PATIENCE {
+            break;
+        }
+        let next = run()?;
+        all += next.seconds;
+        if next.seconds < best.seconds {
+            best = next;
+        }
+    }
+    Ok(best)
+}
+
 fn distance<const N: usize>(a: &[f64; N], b: &[f64; N]) -> f64 {
     norm(&std::array::from_fn::<f64, N, _>(|i| a[i] - b[i]))
 }
@@ -110,9 +129,9 @@ fn audited<P: Problem<N>, const N: usize>(
 fn certified<P: Problem<N>, const N: usize>(
     problem: &P,
     exact: &[f64; N],
-    (ran, seconds): (Result<Ran<N>, String>, f64),
+    ran: Result<Ran<N>, String>,
 ) -> Result<Outcome, String> {
-    let Ran { end, certificate, calls } = ran?;
+    let Ran { end, certificate, calls, seconds } = ran?;
     let entropy = (certificate.min_entropy_increment, certificate.entropy_falls);
     Ok(Outcome {
         steps: certificate.steps,
@@ -131,7 +150,7 @@ fn compare<P: Ours<N>, const N: usize>(problem: &P, time: u32, entries: &mut Vec
     for (n, d) in STEPS {
         let h = f64::from(d) / f64::from(n);
         let how = How::Midpoint { h, steps: (time * n / d) as usize };
-        let outcome = certified(problem, &exact, timed(|| problem.run(how)));
+        let outcome = certified(problem, &exact, fastest(|| problem.run(how)));
         let shown = SHOWN_STEPS.contains(&(n, d));
         entries.push(Entry { method: OURS, setting: format!("h = {h}"), shown, outcome });
     }
@@ -141,7 +160,7 @@ fn compare<P: Ours<N>, const N: usize>(problem: &P, time: u32, entries: &mut Vec
         for k in OUR_TOLERANCES {
             let tolerance = 10.0_f64.powi(-k);
             let outcome =
-                certified(problem, &exact, timed(|| problem.run(how(end, tolerance))));
+                certified(problem, &exact, fastest(|| problem.run(how(end, tolerance))));
             let (setting, shown) = (format!("{tolerance:.0e}"), SHOWN_TOLERANCES.contains(&k));
             entries.push(Entry { method, setting, shown, outcome });
         }

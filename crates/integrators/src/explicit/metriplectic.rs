@@ -329,9 +329,10 @@ impl<N: Dimension> Normals<N> {
     /// are asked for.
     fn correction(&self, with_entropy: bool, last_digits: bool) -> N::Vector<f64> {
         let entropy = self.entropy.iter().filter(|entropy| with_entropy && !entropy.dependent);
+        let least = if last_digits { 0.0 } else { 0.5 };
         self.before()
             .chain(entropy)
-            .filter(|normal| normal.excess() > 0.5)
+            .filter(|normal| normal.excess() > least)
             .fold(N::Vector::<f64>::zero(), |sum, normal| {
                 sum + normal.hat * (normal.residual / normal.square)
             })

@@ -16,6 +16,9 @@ struct CompilerMessages;
 #[doc = include_str!("../book/src/manifolds.md")]
 struct Manifolds;
 
+#[doc = include_str!("../book/src/methods.md")]
+struct Methods;
+
 #[doc = include_str!("../book/src/schemes.md")]
 struct Schemes;
 

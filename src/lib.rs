@@ -70,9 +70,9 @@ pub mod prelude {
     };
     pub use metriplectic_fields::{MatrixField, Real, Scalar, ScalarField};
     pub use metriplectic_integrators::{
-        Attitude, AttitudeError, Certificate, Checkpoint, Ending, Error, Gonzalez, ItohAbe,
+        Attitude, AttitudeError, Certificate, Checkpoint, Ending, Error, Event, Gonzalez, ItohAbe,
         MeanValue, Method, Newton, Observables, ResumeError, Run, RunError, Scheme, Span,
-        SpanError, State, StepError, Steps, SymmetricItohAbe, Trajectory, Until,
+        SpanError, State, StepError, Steps, SymmetricItohAbe, Trajectory, Until, Watch,
     };
     pub use metriplectic_manifolds::{
         Canonical, Cayley, Chart, Euclidean, Exponential, HalfLine, LieAlgebra, LieDual, Manifold,

@@ -115,6 +115,42 @@ pub trait Space: Clone + Debug + PartialEq + Send + Sync + 'static {
         Some(Matrix::<Self, D>::from_entries(|i, j| dual[i].dot(&image[j])))
     }
 
+    /// Computes the point `ψ_x(q)` of the chart in which explicit methods take their stages. It agrees with
+    /// `φ_x` to first order at `q = 0`, and may be cheaper: rational where `φ_x` has angles. The default is `φ_x`.
+    ///
+    /// Laws: 1. `ψ_x(0) = x`, in the frame of `φ_x`; 2. [`stage_coordinates`](Self::stage_coordinates) is its
+    /// inverse; 3. [`stage_rates`](Self::stage_rates) is the derivative of this inverse.
+    #[inline]
+    fn stage(x: &Self::Point<f64>, q: &Vector<Self>) -> Self::Point<f64> {
+        Self::chart(x, q)
+    }
+
+    /// Computes the coordinates `ψ_x⁻¹(y)`.
+    #[inline]
+    fn stage_coordinates(x: &Self::Point<f64>, y: &Self::Point<f64>) -> Vector<Self> {
+        Self::coordinates(x, y)
+    }
+
+    /// Computes the rates `q'` at `y = ψ_x(q)` for the velocity `v` in the frame of the chart at `y`. The default
+    /// is `d/dε φ_x⁻¹(φ_y(εv))`, by a dual number.
+    #[inline]
+    fn stage_rates(
+        x: &Self::Point<f64>,
+        (q, y): (&Vector<Self>, &Self::Point<f64>),
+        v: &Vector<Self>,
+    ) -> Vector<Self> {
+        let _ = q;
+        let moved = Vector::<Self, Dual64>::from_index(|i| Dual64::new(0.0, v[i]));
+        let rates = Self::coordinates(x, &Self::chart(y, &moved));
+        Vector::<Self>::from_index(|i| rates[i].eps)
+    }
+
+    /// Returns whether a stage may be taken at the coordinates `q`. The default is [`is_near`](Self::is_near).
+    #[inline]
+    fn is_stage(q: &Vector<Self>) -> bool {
+        Self::is_near(q)
+    }
+
     /// Returns whether the point with coordinates `q` is less than half the way to the edge of the chart. A
     /// chart of the whole space has no edge. Long curves change to another chart before the edge, and a logarithm
     /// is not looked for beyond twice this distance.

@@ -121,6 +121,16 @@ impl<const N: usize> Space for Chart<N> {
         Column::from_index(|i| y[i] - x[i])
     }
 
+    /// The chart is a translation.
+    #[inline]
+    fn stage_rates(
+        _: &SVector<f64, N>,
+        _: (&SVector<f64, N>, &SVector<f64, N>),
+        v: &SVector<f64, N>,
+    ) -> SVector<f64, N> {
+        *v
+    }
+
     components_are_velocities!(N);
 }
 
@@ -132,6 +142,11 @@ impl<const N: usize> Manifold for Chart<N> {
             true => f64::INFINITY,
             false => f64::NAN,
         }
+    }
+
+    #[inline]
+    fn is_inside(&self, x: &SVector<f64, N>) -> bool {
+        (self.domain)(x)
     }
 
     fn entries(x: &SVector<f64, N>) -> Vec<f64> {

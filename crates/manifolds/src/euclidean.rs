@@ -82,6 +82,16 @@ macro_rules! vector_space {
                 Column::from_index(|i| y[i] - x[i])
             }
 
+            /// The chart is a translation.
+            #[inline]
+            fn stage_rates(
+                _: &SVector<f64, N>,
+                _: (&SVector<f64, N>, &SVector<f64, N>),
+                v: &SVector<f64, N>,
+            ) -> SVector<f64, N> {
+                *v
+            }
+
             $crate::euclidean::components_are_velocities!(N);
         }
 

@@ -61,6 +61,16 @@ impl Space for HalfLine {
         })
     }
 
+    /// The chart is a translation of the logarithm.
+    #[inline]
+    fn stage_rates(
+        _: &Vector1<f64>,
+        _: (&Vector1<f64>, &Vector1<f64>),
+        v: &Vector1<f64>,
+    ) -> Vector1<f64> {
+        *v
+    }
+
     /// `s' = s e^q v`.
     #[inline]
     fn embed<D: Scalar>(at: &ChartPoint<Self, D>, v: &Vector1<D>) -> Vector1<D> {

@@ -33,7 +33,8 @@ fn pure<M: Manifold>(x: &M::Point<f64>, length: f64) -> f64 {
 /// 1. `φ_x(0) = x`;
 /// 2. `φ_x⁻¹(φ_x(q)) = q`, and the chain rule gives the identity at dual numbers;
 /// 3. `seeds` are the chart at dual numbers; 4. `φ_x(q)` lies on the manifold; 5. a point read from
-///    its entries is that point, bit for bit.
+///    its entries is that point, bit for bit; 6. the chart of the stages begins at `x` in the frame of `φ_x`, and
+///    has the inverse and the rates that it says.
 ///
 /// # Errors
 ///
@@ -64,6 +65,7 @@ pub fn manifold<M: Manifold>(space: &M, x: &M::Point<f64>, q: &Vector<M>) -> Res
             BrokenLaw::unless("seeded points are the chart at its seeds", error, pure)?;
         }
     }
+    stage_chart::<M>(x, q)?;
     let allowed = round_off::<M>(M::magnitude(&y));
     BrokenLaw::unless("chart points lie on the manifold", space.defect(&y), allowed)?;
     let entries = M::entries(&y);
@@ -74,6 +76,38 @@ pub fn manifold<M: Manifold>(space: &M, x: &M::Point<f64>, q: &Vector<M>) -> Res
         && read.iter().zip(&entries).all(|(a, b)| a.to_bits() == b.to_bits());
     let error = if same { 0.0 } else { f64::INFINITY };
     BrokenLaw::unless("a point is what its entries make", error, 0.0)
+}
+
+/// Checks the chart of the stages of explicit methods: `ψ_x(0) = x`, its inverse, and the rates, also those of
+/// the frame at `x`.
+fn stage_chart<M: Manifold>(x: &M::Point<f64>, q: &Vector<M>) -> Result<(), BrokenLaw> {
+    if !M::is_stage(q) {
+        return Ok(());
+    }
+    let origin = Vector::<M>::zero();
+    let back = M::stage_coordinates(x, &M::stage(x, &origin)).magnitude();
+    BrokenLaw::unless("ψ_x(0) = x", back, round_off::<M>(chart_size::<M>(x)))?;
+    // The condition number of a chart that reaches far grows with the square of its coordinates.
+    let far = 1.0 + pure::<M>(x, q.magnitude()).powi(2);
+    let bound = round_off::<M>(chart_size::<M>(x) + q.magnitude()) * far;
+    let y = M::stage(x, q);
+    let error = (M::stage_coordinates(x, &y) - *q).magnitude();
+    BrokenLaw::unless("ψ_x⁻¹(ψ_x(q)) = q", error, bound)?;
+    for k in 0..M::Dim::LEN {
+        let v = Vector::<M>::basis(k);
+        let here = (M::stage_rates(x, (&origin, x), &v) - v).magnitude();
+        BrokenLaw::unless("ψ_x has the frame of φ_x", here, round_off::<M>(1.0))?;
+        // The rates by differences of fourth order along φ_y(εv), which is exact to ε⁴ of their size.
+        let step = 1e-3 * chart_size::<M>(x);
+        if step == 0.0 {
+            continue;
+        }
+        let at = |t: f64| M::stage_coordinates(x, &M::chart(&y, &(v * (t * step))));
+        let slope = ((at(1.0) - at(-1.0)) * 8.0 - (at(2.0) - at(-2.0))) * (1.0 / (12.0 * step));
+        let error = (M::stage_rates(x, (q, &y), &v) - slope).magnitude();
+        BrokenLaw::unless("q' is the derivative of ψ_x⁻¹", error, 1e-9 * far * far)?;
+    }
+    Ok(())
 }
 
 /// Checks a metric at `x` along the tangent vector `v`:

@@ -25,6 +25,13 @@ pub trait Manifold: Space {
     /// of numbers is a point, and NaN or infinite if an entry is.
     fn defect(&self, x: &Self::Point<f64>) -> f64;
 
+    /// Returns whether a point of a chart is in the domain of the space. Only an open part of a space has points
+    /// of its chart outside.
+    #[inline]
+    fn is_inside(&self, _x: &Self::Point<f64>) -> bool {
+        true
+    }
+
     /// Lists the entries of the point, in the order in which it is written.
     fn entries(x: &Self::Point<f64>) -> Vec<f64>;
 

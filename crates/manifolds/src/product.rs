@@ -139,6 +139,34 @@ impl<A: Times<B>, B: Space> Space for Product<A, B> {
     }
 
     #[inline]
+    fn stage((a, b): &Self::Point<f64>, q: &Vector<Self>) -> Self::Point<f64> {
+        let (qa, qb) = Self::split(q);
+        (A::stage(a, &qa), B::stage(b, &qb))
+    }
+
+    #[inline]
+    fn stage_coordinates((a, b): &Self::Point<f64>, y: &Self::Point<f64>) -> Vector<Self> {
+        Self::join(&A::stage_coordinates(a, &y.0), &B::stage_coordinates(b, &y.1))
+    }
+
+    #[inline]
+    fn stage_rates(
+        (a, b): &Self::Point<f64>,
+        (q, y): (&Vector<Self>, &Self::Point<f64>),
+        v: &Vector<Self>,
+    ) -> Vector<Self> {
+        let ((qa, qb), (va, vb)) = (Self::split(q), Self::split(v));
+        let first = A::stage_rates(a, (&qa, &y.0), &va);
+        Self::join(&first, &B::stage_rates(b, (&qb, &y.1), &vb))
+    }
+
+    #[inline]
+    fn is_stage(q: &Vector<Self>) -> bool {
+        let (a, b) = Self::split(q);
+        A::is_stage(&a) && B::is_stage(&b)
+    }
+
+    #[inline]
     fn is_near(q: &Vector<Self>) -> bool {
         let (a, b) = Self::split(q);
         A::is_near(&a) && B::is_near(&b)
@@ -150,6 +178,11 @@ impl<A: Manifold + Times<B>, B: Manifold> Manifold for Product<A, B> {
     fn defect(&self, (a, b): &Self::Point<f64>) -> f64 {
         let (a, b) = (self.0.defect(a), self.1.defect(b));
         if a.is_nan() || a > b { a } else { b }
+    }
+
+    #[inline]
+    fn is_inside(&self, (a, b): &Self::Point<f64>) -> bool {
+        self.0.is_inside(a) && self.1.is_inside(b)
     }
 
     fn entries((a, b): &Self::Point<f64>) -> Vec<f64> {

@@ -18,6 +18,7 @@
 //! within `3ε` of the exact logarithm, relative to `θ`. The functions [`exp`], [`log`], [`dexp`] and [`dexp_inverse`] are right at `q = 0` for
 //! dual numbers of every order.
 //!
+//! - **Stages** of explicit methods: Cayley's map, `ψ_R(q) = R (1 + (q̂ + ½q̂²)/(1 + |q|²/4))`, up to `|q| = 4`.
 //! - **Geodesics** of the bi-invariant metric `⟨â, b̂⟩ = a·b` are `R exp(tΩ̂)`, `log_R(Y) = log(RᵀY)`, up to
 //!   the injectivity radius π. Longer geodesics are refused. The curvature is ¼ (do Carmo 1992, ch. 4,
 //!   exercise 1).
@@ -140,6 +141,35 @@ impl Space for Rotations {
         a: impl Fn(usize, usize) -> Matrix3<Real>,
     ) -> MatrixJet<Self> {
         product_rule(|k| dexp(&along(q, k)), a)
+    }
+
+    /// Cayley's map, `R (1 + (q̂ + ½q̂²)/(1 + |q|²/4))`.
+    #[inline]
+    fn stage(x: &Matrix3<f64>, q: &Vector3<f64>) -> Matrix3<f64> {
+        let scale = (1.0 + 0.25 * q.norm_squared()).recip();
+        orthogonal(&moved(x, &rodrigues(q, scale, 0.5 * scale)))
+    }
+
+    /// Twice the ratio of the vector of the quaternion to its scalar.
+    #[inline]
+    fn stage_coordinates(x: &Matrix3<f64>, y: &Matrix3<f64>) -> Vector3<f64> {
+        let [w, i, j, k] = quaternion(&x.tr_mul(y));
+        Vector3::new(i, j, k) * (2.0 / w)
+    }
+
+    /// `v + ½ q×v + ¼ q (q·v)`.
+    #[inline]
+    fn stage_rates(
+        _: &Matrix3<f64>,
+        (q, _): (&Vector3<f64>, &Matrix3<f64>),
+        v: &Vector3<f64>,
+    ) -> Vector3<f64> {
+        v + q.cross(v) * 0.5 + q * (0.25 * q.dot(v))
+    }
+
+    #[inline]
+    fn is_stage(q: &Vector3<f64>) -> bool {
+        q.norm_squared() <= 16.0
     }
 
     #[inline]

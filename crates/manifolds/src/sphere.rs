@@ -28,6 +28,8 @@
 //!   geodesics are refused. From `θ = 10⁻¹⁵` to `π − 10⁻¹⁰` the logarithm of rounded points was measured within
 //!   `8ε min(θ, 1)/(π − θ)` of their exact logarithm, whose direction is undefined at the antipode. Their
 //!   distance was measured within `3ε min(θ, 1)`.
+//! - **Stages** of explicit methods: stereographic coordinates, `ψ_x(q) = ((1 − s) x + E q)/(1 + s)` with
+//!   `s = |q|²/4`, up to `|q| = 4`.
 //! - **Other metrics** are forms on Rⁿ⁺¹, by [`Metric::field`](crate::Metric::field);
 //!   [`Projection`](crate::Projection) is a retraction for all of them.
 //! - **Brackets**: none by default. `AreaForm` on S², `x' = x × ∇H` (Marsden and Ratiu 1999,
@@ -229,6 +231,36 @@ macro_rules! sphere {
                 a: impl Fn(usize, usize) -> SMatrix<Real, $a, $a>,
             ) -> MatrixJet<Self> {
                 product_rule(|k| pushforward(x, &along(q, k)), a)
+            }
+
+            /// Stereographic, `((1 − s) x + E q)/(1 + s)` with `s = |q|²/4`.
+            #[inline]
+            fn stage(x: &SVector<f64, $a>, q: &SVector<f64, $n>) -> SVector<f64, $a> {
+                let s = 0.25 * q.norm_squared();
+                polished(&((x * (1.0 - s) + frame::<$a, $n>(x) * q) / (1.0 + s)))
+            }
+
+            /// `q = 2Eᵀy/(1 + x·y)`.
+            #[inline]
+            fn stage_coordinates(x: &SVector<f64, $a>, y: &SVector<f64, $a>) -> SVector<f64, $n> {
+                // Eᵀx = 0, and y − x has the digits of y across x.
+                frame::<$a, $n>(x).tr_mul(&(y - x)) * (2.0 / (1.0 + x.dot(y)))
+            }
+
+            /// `(2Eᵀa − q (x·a))/(1 + x·y)` with `a = E(y) v`.
+            #[inline]
+            fn stage_rates(
+                x: &SVector<f64, $a>,
+                (q, y): (&SVector<f64, $n>, &SVector<f64, $a>),
+                v: &SVector<f64, $n>,
+            ) -> SVector<f64, $n> {
+                let a = frame::<$a, $n>(y) * v;
+                (frame::<$a, $n>(x).tr_mul(&a) * 2.0 - q * x.dot(&a)) / (1.0 + x.dot(y))
+            }
+
+            #[inline]
+            fn is_stage(q: &SVector<f64, $n>) -> bool {
+                q.norm_squared() <= 16.0
             }
 
             #[inline]

@@ -9,6 +9,7 @@ use metriplectic_fields::{ChartPoint, Column, Dimension, ScalarField, Space};
 use metriplectic_manifolds::{Manifold, PointError};
 
 use super::{Components, Flow, Laws, reach};
+use crate::explicit::{StageFlow as _, Target};
 use crate::midpoint::{Dim, Numbers, dependent_invariant};
 use crate::round_off::bound::{SizesAt, of_an_increment, size_of_terms, sizes_on_a_step};
 use crate::run::scales::Scales;
@@ -57,6 +58,12 @@ impl<Y: Metriplectic> Flow for Y {
         let w = differentials(self, &centre);
         let production = w.entropy.dot(&irreversible(self, &centre, &w).ok()?);
         production.is_finite().then_some(production)
+    }
+
+    fn onto(&self, y: &Point<Y>, laws: &Laws<Numbers<Y>>, entropy: Option<f64>) -> Option<Point<Y>> {
+        let laws = Laws { entropy: entropy.unwrap_or(laws.entropy), ..*laws };
+        let target = Target { laws: &laws, with_entropy: entropy.is_some(), limit: None };
+        self.project(y.clone(), &target).ok().map(|end| end.x)
     }
 
     fn element(&self, entries: &[f64]) -> Result<Point<Y>, PointError> {

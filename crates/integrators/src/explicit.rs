@@ -1,0 +1,186 @@
+//! Explicit Runge-Kutta methods of order 5 and 8, and then back onto the laws.
+//!
+//! The stages of [`DormandPrince8`] and [`DormandPrince5`] are taken in a cheap chart `ψ_x` of the space
+//! ([`Space::stage`](metriplectic_fields::Space::stage)). Any chart keeps the order (Munthe-Kaas 1998; Hairer,
+//! Lubich, Wanner 2006, §IV.5).
+//!
+//! # The entropy
+//!
+//! `S` is one more component of the equation, `S' = σ = ⟨dS, K dS⟩`, and
+//!
+//! ```math
+//! S^* = \bar S + h \sum_i b_i \sigma_i
+//! ```
+//!
+//! is of the same order as the state. It is *trusted* if it does not fall, and, for order 8, if its embedded error
+//! is at most half of its rise.
+//!
+//! # The laws
+//!
+//! The end of the step is moved onto `{H = H₀, L_a = L_a⁰, S = S*}` by Newton's method along the differentials,
+//! made orthogonal to each other in the user's metric. The targets are those of the start of the run, so
+//! nothing drifts. A projection keeps the order (Hairer, Lubich, Wanner 2006, §IV.4).
+//!
+//! Near an equilibrium `dS = β dH + γ_a dL_a`, and a round-off of the energy moves `S` by more than its own. So
+//! the entropy is compared as `S − β (H − H₀) − γ_a (L_a − L_a⁰)`.
+//!
+//! | step | when | entropy |
+//! |---|---|---|
+//! | targeted | `S*` is trusted and reached | `S*` |
+//! | free | else, on `{H₀, L_a⁰}` alone | what it is, if it does not fall |
+//! | rejected | it would fall | `h ← 0.7 h`, and no larger steps for a while |
+//! | held | it would fall in any step, by round-off | as before; the state stays |
+//!
+//! At an equilibrium the entropy falls exactly where the step is beyond the region of stability, so the free
+//! steps find its edge.
+//!
+//! # What is promised
+//!
+//! `H` and `L_a` are conserved to round-off at any tolerance. `S` does not fall by more than its round-off.
+//! A model with [`SecondLaw::Published`](metriplectic_dynamics::SecondLaw::Published) keeps `H` and `L_a`. The
+//! methods are not symmetric in time, and stiff friction bounds their steps; the certificate says when it does.
+
+mod dense;
+mod flow;
+mod memory;
+mod metriplectic;
+mod step;
+mod tableau;
+
+use metriplectic_dynamics::SecondLaw;
+
+pub use flow::{Projected, ProjectionError, StageFlow, Target};
+pub use memory::ExplicitMemory;
+use memory::MemoryOf;
+pub use metriplectic::LawJets;
+
+use crate::method::{
+    Control, Element, Method, Promises, Refusal, StepEnds, StepStart, Taken,
+};
+use crate::step_error::StepError;
+use tableau::{EIGHT, FIVE, Tableau};
+
+/// The method of Dormand and Prince of order 8, with both laws exact: for high accuracy, and for smooth motions at
+/// any accuracy.
+///
+/// ```
+/// use metriplectic_dynamics::System;
+/// use metriplectic_fields::Real;
+/// use metriplectic_integrators::{DormandPrince8, Method, Span};
+/// use metriplectic_manifolds::LieDual;
+/// use nalgebra::Vector3;
+/// # fn main() -> Result<(), metriplectic_integrators::Error> {
+/// let body = System::on(LieDual::so3())
+///     .energy(|p: &Vector3<Real>| p.x * p.x * 0.5 + p.y * p.y + p.z * p.z * 1.5)
+///     .entropy(|p: &Vector3<Real>| p.norm_squared() * 0.5)
+///     .build()?;
+/// let span = Span::until(50.0).tolerance(1e-8);
+/// let run = DormandPrince8.run(&body, Vector3::new(0.4, 0.5, 0.3), span)?;
+/// let certificate = run.certificate();
+/// assert!(certificate.keeps_energy() && certificate.keeps_entropy());
+/// assert!(certificate.steps < 200);
+/// # Ok(())
+/// # }
+/// ```
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct DormandPrince8;
+
+/// The method of Dormand and Prince of order 5, with both laws exact: for errors of 1e-3 to 1e-6, and where
+/// steps are short for other reasons.
+///
+/// ```
+/// use metriplectic_dynamics::System;
+/// use metriplectic_fields::Real;
+/// use metriplectic_integrators::{DormandPrince5, Method, Span};
+/// use metriplectic_manifolds::Euclidean;
+/// use nalgebra::Vector2;
+/// # use metriplectic_dynamics::Symplectic;
+/// # use num_dual::DualNum;
+/// # fn main() -> Result<(), metriplectic_integrators::Error> {
+/// let pendulum = System::on(Euclidean::<2>)
+///     .bracket(Symplectic)
+///     .energy(|x: &Vector2<Real>| x.y * x.y * 0.5 - x.x.cos())
+///     .build()?;
+/// let run = DormandPrince5.run(&pendulum, Vector2::new(2.0, 0.0), Span::until(20.0).tolerance(1e-5))?;
+/// assert!(run.certificate().keeps_energy());
+/// # Ok(())
+/// # }
+/// ```
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct DormandPrince5;
+
+macro_rules! method {
+    ($name:ident, $tableau:expr, $control:expr) => {
+        impl $name {
+            const TABLEAU: &'static Tableau = &$tableau;
+        }
+
+        impl<F: StageFlow> Method<F> for $name {
+            type Memory = MemoryOf<F>;
+
+            fn order(&self) -> u32 {
+                Self::TABLEAU.order
+            }
+
+            fn control(&self) -> Control {
+                $control
+            }
+
+            fn promises(&self, flow: &F) -> Promises {
+                Promises::all_laws(flow.entropy_law() == SecondLaw::Exact)
+            }
+
+            fn step(
+                &self,
+                flow: &F,
+                start: &StepStart<'_, F>,
+                h: f64,
+                memory: &mut MemoryOf<F>,
+            ) -> Result<Taken<F>, StepError> {
+                step::with_halves(Self::TABLEAU, flow, start, h, memory)
+            }
+
+            #[inline]
+            fn attempt(
+                &self,
+                flow: &F,
+                start: &StepStart<'_, F>,
+                h: f64,
+                memory: &mut MemoryOf<F>,
+            ) -> Result<Taken<F>, Refusal> {
+                step::attempt(Self::TABLEAU, flow, start, h, memory)
+            }
+
+            fn error(
+                &self,
+                _: &F,
+                step: &StepEnds<'_, F>,
+                memory: &MemoryOf<F>,
+                norm: impl Fn(&F::Vector) -> f64,
+            ) -> Option<f64> {
+                step::error::<F>(Self::TABLEAU, step.h, memory, norm)
+            }
+
+            fn between(
+                &self,
+                flow: &F,
+                step: &StepEnds<'_, F>,
+                memory: &mut MemoryOf<F>,
+                theta: f64,
+            ) -> Option<Element<F>> {
+                dense::between(Self::TABLEAU, flow, step, memory, theta)
+            }
+        }
+    };
+}
+
+method!(
+    DormandPrince8,
+    EIGHT,
+    Control { power: 1.0, alpha: 1.0 / 8.0, beta: 0.0, rejected: 1.0 / 8.0, ratios: [1.0 / 3.0, 6.0] }
+);
+method!(
+    DormandPrince5,
+    FIVE,
+    Control { power: 1.0, alpha: 0.17, beta: 0.04, rejected: 0.2, ratios: [0.2, 10.0] }
+);

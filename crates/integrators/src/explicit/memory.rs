@@ -1,0 +1,118 @@
+//! What an explicit method keeps from one step to the next.
+
+use std::fmt::Debug;
+
+use super::flow::StageFlow;
+use crate::method::{Flow, Memory, Vector};
+use crate::run::checkpoint::{ResumeError, Saved};
+
+/// The most stages of a step: those of order 8, its end, and three for its dense output.
+pub(super) const STAGES: usize = 16;
+
+/// What [`DormandPrince8`](crate::DormandPrince8) and [`DormandPrince5`](crate::DormandPrince5) keep from one step
+/// to the next: the sum of the entropy that was produced, and what is known at the state reached.
+#[derive(Clone, Debug)]
+pub struct ExplicitMemory<V, G> {
+    /// The entropy that the steps aim at; `None` before the first step.
+    pub(super) entropy: Option<Produced>,
+    /// How often in a row the entropy would have fallen.
+    pub(super) falls: u32,
+    /// The differentials and rates at the state reached, a function of this state alone.
+    pub(super) here: Option<Here<V, G>>,
+    /// The step taken last.
+    pub(super) last: Option<LastStep<V>>,
+}
+
+/// The memory of an explicit method for a flow.
+pub(super) type MemoryOf<F> = ExplicitMemory<<F as Flow>::Vector, <F as StageFlow>::Gradients>;
+
+/// The sum of what was produced, with compensation.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Produced {
+    /// The sum.
+    pub(super) sum: f64,
+    /// What rounding has lost of it.
+    pub(super) lost: f64,
+    /// The largest entropy of a state so far.
+    pub(super) largest: f64,
+}
+
+impl Produced {
+    /// From a state with this entropy.
+    pub(super) const fn from(entropy: f64) -> Self {
+        Self { sum: entropy, lost: 0.0, largest: entropy }
+    }
+
+    /// The sum with one more rise, by the algorithm of Kahan (1965).
+    #[must_use]
+    pub(super) fn plus(self, rise: f64) -> Self {
+        let rise = rise + self.lost;
+        let sum = self.sum + rise;
+        Self { sum, lost: rise - (sum - self.sum), ..self }
+    }
+}
+
+/// What is known at a state.
+#[derive(Clone, Debug)]
+pub(super) struct Here<V, G> {
+    pub(super) gradients: G,
+    pub(super) velocity: V,
+    pub(super) production: f64,
+}
+
+/// A step, for its error and its dense output.
+#[derive(Clone, Debug)]
+pub(super) struct LastStep<V> {
+    /// The rates of the stages in the chart at its start, and their entropy production.
+    pub(super) stages: [(V, f64); STAGES],
+    /// The stages that are known.
+    pub(super) known: usize,
+    /// The coordinates of its end.
+    pub(super) end: V,
+    /// The rise of the entropy.
+    pub(super) rise: f64,
+}
+
+impl<V, G> Default for ExplicitMemory<V, G> {
+    fn default() -> Self {
+        Self { entropy: None, falls: 0, here: None, last: None }
+    }
+}
+
+impl<V: Vector, G: Clone + Debug> Memory for ExplicitMemory<V, G> {
+    fn rescaled(&self, _: f64) -> Self {
+        Self { last: None, here: self.here.clone(), ..*self }
+    }
+
+    fn refused(&mut self, tried: Self) {
+        self.falls = tried.falls;
+        // Known before the step was tried.
+        self.here = self.here.take().or(tried.here);
+    }
+
+    /// What is known at the state is evaluated anew, with the same bits.
+    fn save(&self, saved: &mut Saved) {
+        if let Some(Produced { sum, lost, largest }) = self.entropy {
+            saved.put("entropy produced", [sum, lost, largest, f64::from(self.falls)]);
+        }
+    }
+
+    fn restore(saved: &Saved) -> Result<Self, ResumeError> {
+        let mut memory = Self::default();
+        if let Some(numbers) = saved.get("entropy produced", 4)? {
+            let [sum, lost, largest] = [0, 1, 2].map(|k| numbers[k]);
+            memory.entropy = Some(Produced { sum, lost, largest });
+            // At most a few: a step is held after five.
+            memory.falls = if numbers[3] > 0.0 { (numbers[3].min(255.0)) as u32 } else { 0 };
+        }
+        Ok(memory)
+    }
+}
+
+/// `Σ_j w_j k_j` over the stages.
+#[inline]
+pub(super) fn combined<V: Vector>(row: super::tableau::Row, stages: &[(V, f64)]) -> (V, f64) {
+    let (first, _) = &stages[0];
+    let sum = first.with(|i| row.iter().fold(0.0, |sum, &(j, w)| w.mul_add(stages[j].0.get(i), sum)));
+    (sum, row.iter().fold(0.0, |sum, &(j, w)| sum + w * stages[j].1))
+}

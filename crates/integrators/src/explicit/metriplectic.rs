@@ -1,0 +1,333 @@
+//! A metriplectic system as a flow for explicit methods.
+
+use metriplectic_dynamics::velocity::{Covectors, Gradient, irreversible};
+use metriplectic_dynamics::{Bracket, Metriplectic, SecondLaw, system::Point};
+use metriplectic_fields::{ChartPoint, Column, Dimension, Jet1, ScalarField, Space, Vector};
+use metriplectic_manifolds::{InnerProduct, Manifold, Riemannian};
+
+use super::flow::{Projected, ProjectionError, StageFlow, Target};
+use crate::method::{Components, Laws};
+use crate::midpoint::{Dim, Numbers};
+
+type Tangent<Y> = Components<Vector<<Y as Metriplectic>::Manifold>>;
+
+/// The values and differentials of all fields at a point.
+struct Jets<'a, M: Space>(&'a M::Point<f64>);
+
+/// The value of a field and its differential.
+#[derive(Clone, Copy, Debug)]
+struct Jet<V> {
+    value: f64,
+    df: V,
+}
+
+impl<M: Space> Gradient<M> for Jets<'_, M> {
+    type Covector = Jet<Vector<M>>;
+
+    #[inline]
+    fn of(&mut self, f: &impl ScalarField<M>) -> Self::Covector {
+        let Jet1 { value, df } = f.jet1(self.0);
+        Jet { value, df }
+    }
+}
+
+/// The laws of a system at a point, with their differentials.
+#[derive(Clone, Copy, Debug)]
+pub struct LawJets<N: Dimension> {
+    values: Laws<N::Array<f64>>,
+    /// The differentials.
+    w: Covectors<N, N::Vector<f64>>,
+}
+
+impl<N: Dimension> LawJets<N> {
+    #[inline]
+    fn at<Y: Metriplectic<Manifold: Space<Dim = N>>>(system: &Y, x: &Point<Y>) -> Self {
+        let mut jets = Jets::<Y::Manifold>(x);
+        let laws = [jets.of(system.energy()), jets.of(system.entropy())];
+        let jets = Covectors::new(laws, system.invariants(), &mut jets);
+        let listed = jets.invariants.as_ref();
+        let values = Laws {
+            energy: jets.energy.value,
+            entropy: jets.entropy.value,
+            invariants: N::array(|k| listed[k].map_or(0.0, |(_, l)| l.value)),
+        };
+        let invariants = N::array(|k| listed[k].map(|(kind, l)| (kind, l.df)));
+        let w = Covectors { energy: jets.energy.df, entropy: jets.entropy.df, invariants };
+        Self { values, w }
+    }
+
+    fn is_finite(&self) -> bool {
+        let Self { values, w } = self;
+        values.energy.is_finite()
+            && values.entropy.is_finite()
+            && w.energy.is_finite()
+            && w.entropy.is_finite()
+    }
+}
+
+impl<Y: Metriplectic> StageFlow for Y {
+    type Gradients = LawJets<Dim<Y>>;
+
+    #[inline]
+    fn gradients(&self, x: &Point<Y>) -> Option<LawJets<Dim<Y>>> {
+        let jets = LawJets::at(self, x);
+        jets.is_finite().then_some(jets)
+    }
+
+    #[inline]
+    fn values(&self, gradients: &LawJets<Dim<Y>>) -> Laws<Numbers<Y>> {
+        gradients.values
+    }
+
+    #[inline]
+    fn velocity(&self, x: &Point<Y>, LawJets { w, .. }: &LawJets<Dim<Y>>) -> Option<(Tangent<Y>, f64)> {
+        let x = ChartPoint::<Y::Manifold>::centre(x);
+        let reversible = self.bracket().apply(&self.bracket_args(&x, &w.entropy), &w.energy).ok()?;
+        let friction = irreversible(self, &x, w).ok()?;
+        let velocity = reversible + friction;
+        velocity.is_finite().then(|| (Components(velocity), w.entropy.dot(&friction)))
+    }
+
+    #[inline]
+    fn stage(&self, x: &Point<Y>, q: &Tangent<Y>) -> Option<Point<Y>> {
+        if !Y::Manifold::is_stage(&q.0) {
+            return None;
+        }
+        let y = Y::Manifold::stage(x, &q.0);
+        self.manifold().is_inside(&y).then_some(y)
+    }
+
+    #[inline]
+    fn stage_rates(
+        &self,
+        x: &Point<Y>,
+        (q, y): (&Tangent<Y>, &Point<Y>),
+        v: &Tangent<Y>,
+    ) -> Tangent<Y> {
+        Components(Y::Manifold::stage_rates(x, (&q.0, y), &v.0))
+    }
+
+    #[inline]
+    fn stage_coordinates(&self, x: &Point<Y>, y: &Point<Y>) -> Tangent<Y> {
+        Components(Y::Manifold::stage_coordinates(x, y))
+    }
+
+    #[inline]
+    fn project(
+        &self,
+        y: Point<Y>,
+        target: &Target<'_, Y>,
+    ) -> Result<Projected<Y>, ProjectionError> {
+        Projection { system: self, target }.from(y)
+    }
+}
+
+/// A law made independent of those before it: by Gram and Schmidt on their differentials, with the same
+/// combination of their residuals.
+#[derive(Clone, Copy, Debug)]
+struct Normal<V> {
+    /// The components of its differential in an orthonormal frame.
+    hat: V,
+    /// The square of its length.
+    square: f64,
+    /// The target less the value.
+    residual: f64,
+    /// The round-off of the residual.
+    round_off: f64,
+    /// Whether its differential depends on those before it.
+    dependent: bool,
+}
+
+impl<V> Normal<V> {
+    /// The residual in units of its round-off. What depends on other laws has their residual.
+    fn excess(&self) -> f64 {
+        if self.dependent || self.residual == 0.0 {
+            0.0
+        } else {
+            self.residual.abs() / self.round_off
+        }
+    }
+}
+
+/// The laws of a system at a point, made independent of each other.
+struct Normals<N: Dimension> {
+    energy: Normal<N::Vector<f64>>,
+    invariants: N::Array<Option<Normal<N::Vector<f64>>>>,
+    entropy: Option<Normal<N::Vector<f64>>>,
+}
+
+/// The independent fraction of a differential below which it is a combination of others.
+const INDEPENDENT: f64 = 1e-10;
+/// The most corrections.
+const CORRECTIONS: usize = 8;
+/// Residuals, in units of round-off, with which a state is accepted that no correction improves.
+const STAGNATED: f64 = 2.0;
+/// The same where no entropy is asked for.
+const CONSERVED: f64 = 64.0;
+
+struct Projection<'a, Y: Metriplectic> {
+    system: &'a Y,
+    target: &'a Target<'a, Y>,
+}
+
+impl<Y: Metriplectic> Projection<'_, Y> {
+    fn from(&self, mut y: Point<Y>) -> Result<Projected<Y>, ProjectionError> {
+        let Self { system, target } = *self;
+        let mut moved = 0.0;
+        let mut best: Option<(f64, Projected<Y>)> = None;
+        for _ in 0..=CORRECTIONS {
+            let gradients = LawJets::at(system, &y);
+            if !gradients.is_finite() || !system.manifold().is_inside(&y) {
+                return Err(ProjectionError::Outside);
+            }
+            let at = ChartPoint::<Y::Manifold>::centre(&y);
+            let Ok(g) = system.metric().at(&at) else { return Err(ProjectionError::Outside) };
+            let normals = self.normals(&y, &gradients, &g);
+            let excess = normals.excess(target.with_entropy)?;
+            let here = normals.projected(y.clone(), gradients, target);
+            if excess <= 1.0 {
+                return Ok(here);
+            }
+            if let Some((before, better)) = best.take() {
+                if before <= excess {
+                    // No correction improves it.
+                    return self.stagnated(before, better);
+                }
+            }
+            let correction = normals.correction(target.with_entropy);
+            moved += correction.magnitude();
+            let limit = target.limit.map(|limit| g.orthonormal(&g.flat(&limit.0)).magnitude());
+            if !moved.is_finite() || limit.is_some_and(|limit| moved > limit) {
+                return Err(ProjectionError::Far);
+            }
+            let u = g.from_orthonormal(&correction);
+            let scales = Y::Manifold::scales(&y);
+            let unseen = (0..Dim::<Y>::LEN).all(|i| u[i].abs() <= f64::EPSILON * scales[i]);
+            if unseen && excess <= CONSERVED {
+                return Ok(here);
+            }
+            best = Some((excess, here));
+            y = Y::Manifold::chart(&y, &u);
+        }
+        match best {
+            Some((excess, here)) => self.stagnated(excess, here),
+            None => Err(ProjectionError::Far),
+        }
+    }
+
+    /// What becomes of the best state, if no correction improves it.
+    fn stagnated(&self, excess: f64, best: Projected<Y>) -> Result<Projected<Y>, ProjectionError> {
+        match self.target.with_entropy {
+            _ if excess <= STAGNATED => Ok(best),
+            true => Err(ProjectionError::NoEntropy),
+            false if excess <= CONSERVED => Ok(best),
+            false => Err(ProjectionError::Far),
+        }
+    }
+
+    fn normals(
+        &self,
+        y: &Point<Y>,
+        LawJets { values, w }: &LawJets<Dim<Y>>,
+        g: &<Y::Metric as Riemannian<Y::Manifold>>::At<f64>,
+    ) -> Normals<Dim<Y>> {
+        let laws = self.target.laws;
+        let scales = Y::Manifold::scales(y);
+        let normal = |w: &Vector<Y::Manifold>, target: f64, value: f64| {
+            let hat = g.orthonormal(w);
+            let terms = 2.0 * target.abs() + w.abs().dot(&scales);
+            Normal {
+                hat,
+                square: hat.dot(&hat),
+                residual: target - value,
+                round_off: f64::EPSILON * terms,
+                dependent: false,
+            }
+        };
+        let energy = normal(&w.energy, laws.energy, values.energy);
+        let mut normals = Normals::<Dim<Y>> {
+            energy: Normal { dependent: energy.square == 0.0, ..energy },
+            invariants: Dim::<Y>::array(|_| None),
+            entropy: None,
+        };
+        for (k, listed) in w.invariants.as_ref().iter().enumerate() {
+            let Some((_, l)) = listed else { break };
+            let whole = normal(l, laws.invariants[k], values.invariants[k]);
+            normals.enter(k, whole);
+        }
+        if self.system.second_law() == SecondLaw::Exact {
+            let whole = normal(&w.entropy, laws.entropy, values.entropy);
+            normals.entropy = Some(normals.independent(whole));
+        }
+        normals
+    }
+}
+
+impl<N: Dimension> Normals<N> {
+    fn enter(&mut self, k: usize, whole: Normal<N::Vector<f64>>) {
+        let independent = self.independent(whole);
+        self.invariants[k] = Some(independent);
+    }
+
+    /// Removes the part of a law that depends on those before it.
+    fn independent(&self, whole: Normal<N::Vector<f64>>) -> Normal<N::Vector<f64>> {
+        let mut normal = whole;
+        // The second pass removes the rounding error of the first.
+        for _ in 0..2 {
+            for before in self.before() {
+                let share = before.hat.dot(&normal.hat) / before.square;
+                normal.hat -= before.hat * share;
+                normal.residual -= share * before.residual;
+                normal.round_off += share.abs() * before.round_off;
+            }
+        }
+        normal.square = normal.hat.dot(&normal.hat);
+        let independent = normal.square > INDEPENDENT * INDEPENDENT * whole.square;
+        Normal { dependent: !independent, ..normal }
+    }
+
+    /// The independent laws so far.
+    fn before(&self) -> impl Iterator<Item = &Normal<N::Vector<f64>>> {
+        let listed = self.invariants.as_ref().iter().flatten();
+        std::iter::once(&self.energy).chain(listed).filter(|normal| !normal.dependent)
+    }
+
+    /// The largest residual in units of its round-off.
+    ///
+    /// # Errors
+    ///
+    /// [`ProjectionError::NoEntropy`] if the entropy depends on the other laws, and has another value.
+    fn excess(&self, with_entropy: bool) -> Result<f64, ProjectionError> {
+        let conserved = self.before().map(Normal::excess).fold(0.0, f64::max);
+        match &self.entropy {
+            Some(entropy) if with_entropy => {
+                if entropy.dependent && entropy.residual.abs() > entropy.round_off {
+                    return Err(ProjectionError::NoEntropy);
+                }
+                Ok(conserved.max(entropy.excess()))
+            }
+            _ => Ok(conserved),
+        }
+    }
+
+    /// The correction, in the orthonormal frame; a residual below half its round-off is left.
+    fn correction(&self, with_entropy: bool) -> N::Vector<f64> {
+        let entropy = self.entropy.iter().filter(|entropy| with_entropy && !entropy.dependent);
+        self.before().chain(entropy).filter(|normal| normal.excess() > 0.5).fold(
+            N::Vector::<f64>::zero(),
+            |sum, normal| sum + normal.hat * (normal.residual / normal.square),
+        )
+    }
+
+    fn projected<Y: Metriplectic<Manifold: Space<Dim = N>>>(
+        &self,
+        x: Point<Y>,
+        gradients: LawJets<N>,
+        target: &Target<'_, Y>,
+    ) -> Projected<Y> {
+        let (residual, entropy_round_off) =
+            self.entropy.map_or((0.0, 0.0), |entropy| (entropy.residual, entropy.round_off));
+        let entropy = target.laws.entropy - residual;
+        Projected { x, gradients, entropy, entropy_round_off }
+    }
+}

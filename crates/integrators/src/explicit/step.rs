@@ -1,0 +1,349 @@
+//! One explicit step.
+
+use metriplectic_dynamics::SecondLaw;
+
+use super::flow::{Projected, ProjectionError, StageFlow, Target};
+use super::memory::{ExplicitMemory, MemoryOf, Here, LastStep, Produced, STAGES, combined};
+use super::tableau::Tableau;
+use crate::method::{
+    Effort, Element, EntropyStep, Evidence, Laws, Refusal, StepStart, Taken, Vector,
+};
+use crate::run::scales::relative;
+use crate::step_error::StepError;
+
+/// Falls of the entropy in a row after which a state that hardly moves is held.
+const FALLS: u32 = 5;
+/// A displacement, relative to the size of its entry, that hardly moves a state.
+const HARDLY: f64 = 1e-6;
+/// The same relative to the error that is allowed.
+const HARDLY_ALLOWED: f64 = 1e-3;
+/// The fraction of the round-off of an increment by which the entropy may fall: less than what the certificate
+/// counts as a fall.
+const FALL: f64 = 0.875;
+/// How often a step of a fixed size is halved.
+const HALVES: u32 = 12;
+/// The length of a projection in units of the error that is allowed.
+const FAR: f64 = 10.0;
+
+/// Why a step is not taken.
+enum Refused {
+    /// A stage is beyond the edge of the chart or the domain, or has no value.
+    Outside,
+    /// No state near by has the laws of the run.
+    Far,
+    /// The entropy would fall.
+    Falls,
+}
+
+impl Refused {
+    const fn into_refusal(self) -> Refusal {
+        const EFFORT: Effort = Effort { iterations: 0, continued: 0, globalised: 0, splits: 0 };
+        Refusal { effort: EFFORT, error: None, second_law: matches!(self, Self::Falls) }
+    }
+}
+
+/// Tries a step.
+#[inline]
+pub(super) fn attempt<F: StageFlow>(
+    tableau: &'static Tableau,
+    flow: &F,
+    start: &StepStart<'_, F>,
+    h: f64,
+    memory: &mut MemoryOf<F>,
+) -> Result<Taken<F>, Refusal> {
+    try_step(tableau, flow, start, h, memory).map_err(Refused::into_refusal)
+}
+
+/// Takes a step of a fixed size, in halves where it is refused.
+pub(super) fn with_halves<F: StageFlow>(
+    tableau: &'static Tableau,
+    flow: &F,
+    start: &StepStart<'_, F>,
+    h: f64,
+    memory: &mut MemoryOf<F>,
+) -> Result<Taken<F>, StepError> {
+    halves(tableau, flow, start, h, memory, HALVES)
+}
+
+fn halves<F: StageFlow>(
+    tableau: &'static Tableau,
+    flow: &F,
+    start: &StepStart<'_, F>,
+    h: f64,
+    memory: &mut MemoryOf<F>,
+    left: u32,
+) -> Result<Taken<F>, StepError> {
+    let refused = match try_step(tableau, flow, start, h, memory) {
+        Ok(taken) => return Ok(taken),
+        Err(refused) => refused,
+    };
+    if left == 0 {
+        let tried = Effort { splits: HALVES as usize, ..Effort::default() };
+        let time = start.time;
+        return Err(match refused {
+            Refused::Outside => StepError::OutOfDomain { time, h, tried },
+            Refused::Far | Refused::Falls => StepError::NotConverged {
+                time,
+                h,
+                residual: f64::NAN,
+                tried,
+                suggested: 0.5 * h,
+            },
+        });
+    }
+    let first = halves(tableau, flow, start, 0.5 * h, memory, left - 1)?;
+    let middle = StepStart {
+        x: &first.x,
+        time: start.time + 0.5 * h,
+        values: first.values.clone(),
+        reference: start.reference.clone(),
+        allowed: start.allowed.clone(),
+    };
+    let mut second = halves(tableau, flow, &middle, 0.5 * h, memory, left - 1)?;
+    second.effort += first.effort;
+    second.effort.splits += 1;
+    second.evidence = first.evidence.and(second.evidence);
+    // The stages are those of the second half.
+    memory.last = None;
+    Ok(second)
+}
+
+/// Stages, end, projection, decision.
+#[inline]
+fn try_step<F: StageFlow>(
+    tableau: &'static Tableau,
+    flow: &F,
+    start: &StepStart<'_, F>,
+    h: f64,
+    memory: &mut MemoryOf<F>,
+) -> Result<Taken<F>, Refused> {
+    let x = start.x;
+    let here = match memory.here.take() {
+        Some(here) => here,
+        None => here_at(flow, x, None).ok_or(Refused::Outside)?,
+    };
+    let stages = stages(tableau, flow, x, h, &here);
+    let dissipates = here.production != 0.0;
+    memory.here = Some(here);
+    let mut last = stages.ok_or(Refused::Outside)?;
+    let y = flow.stage(x, &last.end).ok_or(Refused::Outside)?;
+
+    let produced = memory.entropy.unwrap_or_else(|| Produced::from(start.values.entropy));
+    let projection = Onto { tableau, flow, start, h, last: &last, produced };
+    let Landed { end, produced, how } = match projection.decide(y) {
+        Ok(landed) => landed,
+        Err(Refused::Falls) => {
+            memory.falls += 1;
+            if memory.falls > FALLS && hardly_moves(flow, start, &last.end) {
+                memory.falls = 0;
+                return Ok(held(start));
+            }
+            return Err(Refused::Falls);
+        }
+        Err(refused) => return Err(refused),
+    };
+    let next = here_at(flow, &end.x, Some(end.gradients)).ok_or(Refused::Outside)?;
+    last.end = flow.stage_coordinates(x, &end.x);
+    let rates = flow.stage_rates(x, (&last.end, &end.x), &next.velocity);
+    let rests = end.x == *x && is_zero(&last.stages[0].0);
+    let stability = is_at_the_edge(tableau, flow, x, h, &last, &rates);
+    last.stages[last.known] = (rates, next.production);
+    last.known += 1;
+
+    let values = flow.values(&next.gradients);
+    let entropy_step = (flow.entropy_law() == SecondLaw::Exact).then_some(how);
+    let evidence =
+        Evidence { dissipates, rests, entropy_step, stability, ..Evidence::default() };
+    *memory =
+        ExplicitMemory { entropy: Some(produced), falls: 0, here: Some(next), last: Some(last) };
+    Ok(Taken { x: end.x, values, evidence, effort: Effort::default() })
+}
+
+/// The step that leaves the state where it is.
+fn held<F: StageFlow>(start: &StepStart<'_, F>) -> Taken<F> {
+    let evidence = Evidence { entropy_step: Some(EntropyStep::Held), ..Evidence::default() };
+    let (x, values) = (start.x.clone(), start.values.clone());
+    Taken { x, values, evidence, effort: Effort::default() }
+}
+
+/// What is known at a state.
+#[inline]
+fn here_at<F: StageFlow>(
+    flow: &F,
+    x: &Element<F>,
+    gradients: Option<F::Gradients>,
+) -> Option<Here<F::Vector, F::Gradients>> {
+    let gradients = match gradients {
+        Some(gradients) => gradients,
+        None => flow.gradients(x)?,
+    };
+    let (velocity, production) = flow.velocity(x, &gradients)?;
+    Some(Here { gradients, velocity, production })
+}
+
+/// The stages of a step, and the coordinates of its end.
+#[inline]
+fn stages<F: StageFlow>(
+    tableau: &'static Tableau,
+    flow: &F,
+    x: &Element<F>,
+    h: f64,
+    here: &Here<F::Vector, F::Gradients>,
+) -> Option<LastStep<F::Vector>> {
+    let zero = here.velocity.map(|_| 0.0);
+    let mut stages: [(F::Vector, f64); STAGES] = std::array::from_fn(|_| (zero.clone(), 0.0));
+    stages[0] = (here.velocity.clone(), here.production);
+    for (i, row) in tableau.stages.iter().enumerate() {
+        let q = combined(row, &stages).0.map(|q| h * q);
+        stages[i + 1] = stage(flow, x, &q)?;
+    }
+    let (end, rise) = combined(tableau.end, &stages);
+    let end = end.map(|q| h * q);
+    Some(LastStep { stages, known: tableau.stages.len() + 1, end, rise: h * rise })
+}
+
+/// The rates and the entropy production of a stage at the coordinates `q`.
+#[inline]
+pub(super) fn stage<F: StageFlow>(
+    flow: &F,
+    x: &Element<F>,
+    q: &F::Vector,
+) -> Option<(F::Vector, f64)> {
+    let y = flow.stage(x, q)?;
+    let (v, production) = flow.velocity(&y, &flow.gradients(&y)?)?;
+    Some((flow.stage_rates(x, (q, &y), &v), production))
+}
+
+fn is_zero(v: &impl Vector) -> bool {
+    (0..v.len()).all(|i| v.get(i) == 0.0)
+}
+
+/// Whether a displacement is too small to matter.
+fn hardly_moves<F: StageFlow>(flow: &F, start: &StepStart<'_, F>, q: &F::Vector) -> bool {
+    let sizes = flow.sizes(start.x);
+    (0..q.len()).all(|i| {
+        let allowed = start.allowed.as_ref().map_or(0.0, |allowed| allowed.get(i));
+        q.get(i).abs() <= (HARDLY * sizes.get(i)).max(HARDLY_ALLOWED * allowed)
+    })
+}
+
+/// Whether the rates between the last stage and the end differ by as much as at the edge of the region of
+/// stability: `h |k_e − k_s| / |q_e − q_s|` of Hairer, Wanner (Solving ODEs II, §IV.2), relative to the sizes of
+/// the entries.
+fn is_at_the_edge<F: StageFlow>(
+    tableau: &'static Tableau,
+    flow: &F,
+    x: &Element<F>,
+    h: f64,
+    last: &LastStep<F::Vector>,
+    rates: &F::Vector,
+) -> bool {
+    let Some(row) = tableau.stages.last() else { return false };
+    let stage = combined(row, &last.stages).0;
+    let sizes = flow.sizes(x);
+    let sizes = sizes.with(|i| sizes.get(i).max(last.end.get(i).abs()));
+    let apart = last.end.with(|i| last.end.get(i) - h * stage.get(i));
+    let before = &last.stages[tableau.stages.len()].0;
+    let change = rates.with(|i| h * (rates.get(i) - before.get(i)));
+    let distance = relative(&apart, &sizes);
+    distance > 64.0 * f64::EPSILON && relative(&change, &sizes) > tableau.stability * distance
+}
+
+/// The error of a step in units of the one allowed.
+pub(super) fn error<F: StageFlow>(
+    tableau: &'static Tableau,
+    h: f64,
+    memory: &MemoryOf<F>,
+    norm: impl Fn(&F::Vector) -> f64,
+) -> Option<f64> {
+    let last = memory.last.as_ref()?;
+    let [fifth, third] = tableau.errors.map(|row| norm(&combined(row, &last.stages).0.map(|e| h * e)));
+    // Hairer's e₅²/√(e₅² + e₃²/100) is of the order of the method; a method with one error has that.
+    Some(if third > 0.0 { fifth * (fifth / fifth.hypot(0.1 * third)) } else { fifth })
+}
+
+/// Where a step ends.
+struct Landed<F: StageFlow> {
+    end: Projected<F>,
+    produced: Produced,
+    how: EntropyStep,
+}
+
+/// The projection of the end of a step onto the laws, and the decision whether it is taken.
+struct Onto<'a, F: StageFlow> {
+    tableau: &'static Tableau,
+    flow: &'a F,
+    start: &'a StepStart<'a, F>,
+    h: f64,
+    last: &'a LastStep<F::Vector>,
+    produced: Produced,
+}
+
+impl<F: StageFlow> Onto<'_, F> {
+    #[inline]
+    fn decide(&self, y: Element<F>) -> Result<Landed<F>, Refused> {
+        let Self { flow, start, last, produced, .. } = *self;
+        let limit = match &start.allowed {
+            Some(allowed) => allowed.map(|error| FAR * error),
+            None => last.end.map(|q| 0.5 * q),
+        };
+        let mut laws = start.reference.clone();
+        if flow.entropy_law() != SecondLaw::Exact {
+            let target = Target { laws: &laws, with_entropy: false, limit: Some(&limit) };
+            let end = flow.project(y, &target).map_err(refused)?;
+            return Ok(Landed { end, produced, how: EntropyStep::Free });
+        }
+        if self.is_trusted() {
+            let target = produced.plus(last.rise);
+            laws.entropy = target.sum;
+            let onto = Target { laws: &laws, with_entropy: true, limit: Some(&limit) };
+            if let Ok(end) = flow.project(y.clone(), &onto)
+                && !self.falls(&end)
+            {
+                let largest = produced.largest.max(end.entropy);
+                let produced = Produced { largest, ..target };
+                return Ok(Landed { end, produced, how: EntropyStep::Targeted });
+            }
+        }
+        laws.entropy = produced.sum;
+        let onto = Target { laws: &laws, with_entropy: false, limit: Some(&limit) };
+        let end = flow.project(y, &onto).map_err(refused)?;
+        let least = produced.largest - 2.0 * end.entropy_round_off;
+        if end.entropy < least || self.falls(&end) {
+            return Err(Refused::Falls);
+        }
+        let largest = produced.largest.max(end.entropy);
+        let produced = Produced { largest, ..Produced::from(end.entropy) };
+        Ok(Landed { end, produced, how: EntropyStep::Free })
+    }
+
+    /// Whether the entropy that was produced may be aimed at.
+    fn is_trusted(&self) -> bool {
+        let Self { tableau, h, last, .. } = *self;
+        let doubt = if tableau.order == 8 {
+            (h * combined(tableau.errors[0], &last.stages).1).abs()
+        } else {
+            0.0
+        };
+        last.rise >= 0.0 && doubt <= 0.5 * last.rise
+    }
+
+    /// Whether the entropy at the end is below the one at the start by more than its round-off.
+    fn falls(&self, end: &Projected<F>) -> bool {
+        let (flow, start) = (self.flow, self.start);
+        let rise = flow.values(&end.gradients).entropy - start.values.entropy;
+        rise < 0.0 && rise < -FALL * flow.entropy_round_off([start.x, &end.x])
+    }
+}
+
+fn refused(error: ProjectionError) -> Refused {
+    match error {
+        ProjectionError::Outside => Refused::Outside,
+        ProjectionError::NoEntropy | ProjectionError::Far => Refused::Far,
+    }
+}
+
+/// The laws with another entropy.
+pub(super) fn with_entropy<L: Clone>(laws: &Laws<L>, entropy: f64) -> Laws<L> {
+    Laws { entropy, ..laws.clone() }
+}

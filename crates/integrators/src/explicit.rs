@@ -54,9 +54,7 @@ pub use memory::ExplicitMemory;
 use memory::MemoryOf;
 pub use metriplectic::LawJets;
 
-use crate::method::{
-    Control, Element, Method, Promises, Refusal, StepEnds, StepStart, Taken,
-};
+use crate::method::{Control, Element, Method, Promises, Refusal, StepEnds, StepStart, Taken};
 use crate::step_error::StepError;
 use tableau::{EIGHT, FIVE, Tableau};
 
@@ -177,7 +175,13 @@ macro_rules! method {
 method!(
     DormandPrince8,
     EIGHT,
-    Control { power: 1.0, alpha: 1.0 / 8.0, beta: 0.0, rejected: 1.0 / 8.0, ratios: [1.0 / 3.0, 6.0] }
+    Control {
+        power: 1.0,
+        alpha: 1.0 / 8.0,
+        beta: 0.0,
+        rejected: 1.0 / 8.0,
+        ratios: [1.0 / 3.0, 6.0]
+    }
 );
 method!(
     DormandPrince5,

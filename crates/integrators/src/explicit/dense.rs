@@ -9,7 +9,7 @@
 use metriplectic_dynamics::SecondLaw;
 
 use super::flow::{StageFlow, Target};
-use super::memory::{MemoryOf, LastStep, combined};
+use super::memory::{LastStep, MemoryOf, combined};
 use super::step::{stage, with_entropy};
 use super::tableau::Tableau;
 use crate::method::{Element, StepEnds, Vector};

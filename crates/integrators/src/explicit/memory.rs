@@ -113,6 +113,7 @@ impl<V: Vector, G: Clone + Debug> Memory for ExplicitMemory<V, G> {
 #[inline]
 pub(super) fn combined<V: Vector>(row: super::tableau::Row, stages: &[(V, f64)]) -> (V, f64) {
     let (first, _) = &stages[0];
-    let sum = first.with(|i| row.iter().fold(0.0, |sum, &(j, w)| w.mul_add(stages[j].0.get(i), sum)));
+    let sum =
+        first.with(|i| row.iter().fold(0.0, |sum, &(j, w)| w.mul_add(stages[j].0.get(i), sum)));
     (sum, row.iter().fold(0.0, |sum, &(j, w)| sum + w * stages[j].1))
 }

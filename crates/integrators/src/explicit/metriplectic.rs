@@ -80,9 +80,14 @@ impl<Y: Metriplectic> StageFlow for Y {
     }
 
     #[inline]
-    fn velocity(&self, x: &Point<Y>, LawJets { w, .. }: &LawJets<Dim<Y>>) -> Option<(Tangent<Y>, f64)> {
+    fn velocity(
+        &self,
+        x: &Point<Y>,
+        LawJets { w, .. }: &LawJets<Dim<Y>>,
+    ) -> Option<(Tangent<Y>, f64)> {
         let x = ChartPoint::<Y::Manifold>::centre(x);
-        let reversible = self.bracket().apply(&self.bracket_args(&x, &w.entropy), &w.energy).ok()?;
+        let reversible =
+            self.bracket().apply(&self.bracket_args(&x, &w.entropy), &w.energy).ok()?;
         let friction = irreversible(self, &x, w).ok()?;
         let velocity = reversible + friction;
         velocity.is_finite().then(|| (Components(velocity), w.entropy.dot(&friction)))
@@ -313,10 +318,12 @@ impl<N: Dimension> Normals<N> {
     /// The correction, in the orthonormal frame; a residual below half its round-off is left.
     fn correction(&self, with_entropy: bool) -> N::Vector<f64> {
         let entropy = self.entropy.iter().filter(|entropy| with_entropy && !entropy.dependent);
-        self.before().chain(entropy).filter(|normal| normal.excess() > 0.5).fold(
-            N::Vector::<f64>::zero(),
-            |sum, normal| sum + normal.hat * (normal.residual / normal.square),
-        )
+        self.before()
+            .chain(entropy)
+            .filter(|normal| normal.excess() > 0.5)
+            .fold(N::Vector::<f64>::zero(), |sum, normal| {
+                sum + normal.hat * (normal.residual / normal.square)
+            })
     }
 
     fn projected<Y: Metriplectic<Manifold: Space<Dim = N>>>(

@@ -3,7 +3,7 @@
 use metriplectic_dynamics::SecondLaw;
 
 use super::flow::{Projected, ProjectionError, StageFlow, Target};
-use super::memory::{ExplicitMemory, MemoryOf, Here, LastStep, Produced, STAGES, combined};
+use super::memory::{ExplicitMemory, Here, LastStep, MemoryOf, Produced, STAGES, combined};
 use super::tableau::Tableau;
 use crate::method::{
     Effort, Element, EntropyStep, Evidence, Laws, Refusal, StepStart, Taken, Vector,
@@ -82,13 +82,9 @@ fn halves<F: StageFlow>(
         let time = start.time;
         return Err(match refused {
             Refused::Outside => StepError::OutOfDomain { time, h, tried },
-            Refused::Far | Refused::Falls => StepError::NotConverged {
-                time,
-                h,
-                residual: f64::NAN,
-                tried,
-                suggested: 0.5 * h,
-            },
+            Refused::Far | Refused::Falls => {
+                StepError::NotConverged { time, h, residual: f64::NAN, tried, suggested: 0.5 * h }
+            }
         });
     }
     let first = halves(tableau, flow, start, 0.5 * h, memory, left - 1)?;
@@ -152,8 +148,7 @@ fn try_step<F: StageFlow>(
 
     let values = flow.values(&next.gradients);
     let entropy_step = (flow.entropy_law() == SecondLaw::Exact).then_some(how);
-    let evidence =
-        Evidence { dissipates, rests, entropy_step, stability, ..Evidence::default() };
+    let evidence = Evidence { dissipates, rests, entropy_step, stability, ..Evidence::default() };
     *memory =
         ExplicitMemory { entropy: Some(produced), falls: 0, here: Some(next), last: Some(last) };
     Ok(Taken { x: end.x, values, evidence, effort: Effort::default() })
@@ -257,7 +252,8 @@ pub(super) fn error<F: StageFlow>(
     norm: impl Fn(&F::Vector) -> f64,
 ) -> Option<f64> {
     let last = memory.last.as_ref()?;
-    let [fifth, third] = tableau.errors.map(|row| norm(&combined(row, &last.stages).0.map(|e| h * e)));
+    let [fifth, third] =
+        tableau.errors.map(|row| norm(&combined(row, &last.stages).0.map(|e| h * e)));
     // Hairer's e₅²/√(e₅² + e₃²/100) is of the order of the method; a method with one error has that.
     Some(if third > 0.0 { fifth * (fifth / fifth.hypot(0.1 * third)) } else { fifth })
 }

@@ -60,7 +60,12 @@ impl<Y: Metriplectic> Flow for Y {
         production.is_finite().then_some(production)
     }
 
-    fn onto(&self, y: &Point<Y>, laws: &Laws<Numbers<Y>>, entropy: Option<f64>) -> Option<Point<Y>> {
+    fn onto(
+        &self,
+        y: &Point<Y>,
+        laws: &Laws<Numbers<Y>>,
+        entropy: Option<f64>,
+    ) -> Option<Point<Y>> {
         let laws = Laws { entropy: entropy.unwrap_or(laws.entropy), ..*laws };
         let target = Target { laws: &laws, with_entropy: entropy.is_some(), limit: None };
         self.project(y.clone(), &target).ok().map(|end| end.x)

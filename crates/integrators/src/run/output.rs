@@ -4,7 +4,8 @@ use std::collections::VecDeque;
 
 use metriplectic_dynamics::SecondLaw;
 
-use crate::method::{Flow, Laws, Method, StateSpace, StepEnds};
+use crate::method::{Element, Flow, Laws, Method, StateSpace, StepEnds};
+use crate::run::dense::between;
 use crate::run::event::{Event, Events};
 use crate::run::span::{Schedule, SpanError};
 use crate::run::steps::Steps;
@@ -191,7 +192,7 @@ impl<F: Flow, M: Method<F>> Steps<'_, F, M> {
         }
     }
 
-    /// The ends of the last step.
+    /// What the laws were at the start of the run, and the entropy before the last step.
     fn reference(&self) -> Laws<F::Numbers> {
         let mut reference = self.values.clone();
         reference.energy = self.certificate.initial_energy;
@@ -202,20 +203,38 @@ impl<F: Flow, M: Method<F>> Steps<'_, F, M> {
         reference
     }
 
+    /// Whether the entropy never falls.
+    fn has_entropy(&self) -> bool {
+        self.promises.entropy && self.flow.entropy_law() != SecondLaw::NoEntropy
+    }
+
     /// The state at a fraction of the last step.
     fn inside(&mut self, theta: f64) -> Option<State<F::Space>> {
         if theta >= 1.0 {
             return Some(self.state.clone());
         }
-        let reference = self.reference();
+        let (has_entropy, reference) = (self.has_entropy(), self.reference());
         let Self { method, flow, before, state, values, memory, .. } = self;
         let (x, end, h) = (&before.state.point, &state.point, before.h);
         let step = StepEnds { x, end, h, values: [&before.values, values], reference: &reference };
-        let point = method.between(flow, &step, memory, theta)?;
-        let Laws { energy, entropy, .. } = flow.laws(&point);
-        let [start, end] = [before.state.time, state.time];
-        let time = (start + theta * (end - start)).min(end);
-        Some(State { step: before.state.step, time, point, energy, entropy })
+        let times = [before.state.time, state.time];
+        let at = |point: Element<F>| {
+            let Laws { energy, entropy, .. } = flow.laws(&point);
+            let time = (times[0] + theta * (times[1] - times[0])).min(times[1]);
+            State { step: before.state.step, time, point, energy, entropy }
+        };
+        let is_between = |inside: &State<F::Space>| {
+            let round_off = || flow.entropy_round_off([x, end]);
+            let out = (before.state.entropy - inside.entropy).max(inside.entropy - state.entropy);
+            inside.energy.is_finite() && (!has_entropy || out <= 0.0 || out <= round_off())
+        };
+        // A method may not know what lies in this step, as after its halves, or find no entropy between those
+        // of the ends. The output of any method then serves it.
+        method
+            .between(flow, &step, memory, theta)
+            .map(at)
+            .filter(is_between)
+            .or_else(|| between(*flow, &step, method.promises(flow), theta).map(at))
     }
 
     /// Looks at the step that was just taken.
@@ -270,24 +289,17 @@ impl<F: Flow, M: Method<F>> Steps<'_, F, M> {
         Some(())
     }
 
-    /// The state at a time, after another one in the same step. The entropy has not fallen in between: where the
-    /// dense output says so by more than round-off, the state is the nearer one of that before and the end of the
-    /// step.
+    /// The state at a time, after another one in the same step. Where the entropy has fallen in between by more
+    /// than round-off, it is the nearer one of that state and the end of the step.
     fn output(&mut self, time: f64, before: &State<F::Space>) -> Option<State<F::Space>> {
-        let theta = self.fraction(time);
-        let state = self.inside(theta)?;
-        let has_entropy = self.promises.entropy && self.flow.entropy_law() != SecondLaw::NoEntropy;
+        let state = self.inside(self.fraction(time))?;
         let round_off = || self.flow.entropy_round_off([&before.point, &state.point]);
-        let state = if has_entropy
-            && state.entropy < before.entropy
-            && state.entropy < before.entropy - round_off()
-        {
-            let other =
-                if time - before.time < self.state.time - time { before } else { &self.state };
-            State { step: state.step, ..other.clone() }
-        } else {
-            state
-        };
+        let fall = before.entropy - state.entropy;
+        if self.has_entropy() && fall > 0.0 && fall > round_off() {
+            let is_early = time - before.time < self.state.time - time;
+            let nearer = if is_early { before } else { &self.state };
+            return Some(State { time, step: state.step, ..nearer.clone() });
+        }
         Some(State { time, ..state })
     }
 }

@@ -2,7 +2,7 @@
 
 use metriplectic::dynamics::bracket::{BracketArgs, BracketJet};
 use metriplectic::dynamics::dissipation::DissipationJet;
-use metriplectic::dynamics::{Bracket, Dissipation, MetricDissipation, laws};
+use metriplectic::dynamics::{Bracket, Dissipation, MetricDissipation, laws, parts_of};
 use metriplectic::fields::{BrokenLaw, ChartPoint};
 use metriplectic::manifolds::MetricError;
 use metriplectic::prelude::*;
@@ -446,40 +446,15 @@ struct With<Y, K> {
 }
 
 impl<Y: Metriplectic, K: Dissipation<Y::Manifold, Y::Metric>> Metriplectic for With<Y, K> {
-    type Manifold = Y::Manifold;
-    type Metric = Y::Metric;
-    type Bracket = Y::Bracket;
+    parts_of!(self.system: Y {
+        manifold: Manifold, metric: Metric, bracket: Bracket, energy: Energy, entropy: Entropy,
+        invariants: Invariants,
+    });
+
     type Dissipation = K;
-    type Energy = Y::Energy;
-    type Entropy = Y::Entropy;
-    type Invariants = Y::Invariants;
-
-    fn manifold(&self) -> &Y::Manifold {
-        self.system.manifold()
-    }
-
-    fn metric(&self) -> &Y::Metric {
-        self.system.metric()
-    }
-
-    fn bracket(&self) -> &Y::Bracket {
-        self.system.bracket()
-    }
 
     fn dissipation(&self) -> &K {
         &self.dissipation
-    }
-
-    fn energy(&self) -> &Y::Energy {
-        self.system.energy()
-    }
-
-    fn entropy(&self) -> &Y::Entropy {
-        self.system.entropy()
-    }
-
-    fn invariants(&self) -> &Y::Invariants {
-        self.system.invariants()
     }
 
     fn second_law(&self) -> SecondLaw {

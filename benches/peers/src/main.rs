@@ -7,19 +7,23 @@ use std::{env, error::Error, time::Instant};
 
 use metriplectic_peers::{
     Gas, Problem, RelaxingBody, SpinningTop, exact, norm,
-    ours::{Ours, Ran},
+    ours::{How, Ours, Ran},
     rivals::{self, Path, Solver},
 };
 use metriplectic_studies::{Panel, Panels, Table, scientific};
 
 const TIMES: [u32; 2] = [100, 10_000];
 /// Exponents of the tolerances, and those in the tables.
-const TOLERANCES: [i32; 5] = [4, 6, 8, 10, 12];
+const TOLERANCES: [i32; 10] = [3, 4, 5, 6, 7, 8, 9, 10, 11, 12];
 const SHOWN_TOLERANCES: [i32; 3] = [4, 8, 12];
 /// Steps in a unit of time, and those in the tables.
 const STEPS: [(u32, u32); 6] = [(5, 2), (5, 1), (10, 1), (20, 1), (40, 1), (80, 1)];
 const SHOWN_STEPS: [(u32, u32); 3] = [(5, 1), (20, 1), (80, 1)];
 const OURS: &str = "metriplectic";
+const EIGHT: &str = "DormandPrince8";
+const FIVE: &str = "DormandPrince5";
+/// Exponents of the tolerances of the explicit methods.
+const OUR_TOLERANCES: [i32; 10] = [3, 4, 5, 6, 7, 8, 9, 10, 11, 12];
 /// A run is repeated until it has taken so many seconds, at most five times; the least time counts.
 const PATIENCE: f64 = 0.5;
 
@@ -126,9 +130,21 @@ fn compare<P: Ours<N>, const N: usize>(problem: &P, time: u32, entries: &mut Vec
     let exact = exact::flow(problem, end, 16 * time).map(f64::from);
     for (n, d) in STEPS {
         let h = f64::from(d) / f64::from(n);
-        let outcome = certified(problem, &exact, timed(|| problem.run(h, (time * n / d) as usize)));
+        let how = How::Midpoint { h, steps: (time * n / d) as usize };
+        let outcome = certified(problem, &exact, timed(|| problem.run(how)));
         let shown = SHOWN_STEPS.contains(&(n, d));
         entries.push(Entry { method: OURS, setting: format!("h = {h}"), shown, outcome });
+    }
+    let explicit: [(&'static str, fn(f64, f64) -> How); 2] =
+        [(EIGHT, How::Eight), (FIVE, How::Five)];
+    for (method, how) in explicit {
+        for k in OUR_TOLERANCES {
+            let tolerance = 10.0_f64.powi(-k);
+            let outcome =
+                certified(problem, &exact, timed(|| problem.run(how(end, tolerance))));
+            let (setting, shown) = (format!("{tolerance:.0e}"), SHOWN_TOLERANCES.contains(&k));
+            entries.push(Entry { method, setting, shown, outcome });
+        }
     }
     let rivals: [(&str, Solver<P, N>); 4] = [
         ("differential-equations", rivals::differential_equations),
@@ -240,10 +256,10 @@ impl Comparison {
 }
 
 /// The least milliseconds of each method to an error at the end.
-fn summary(all: &[Comparison]) -> Table<8> {
+fn summary(all: &[Comparison]) -> Table<10> {
     let mut header = vec!["problem".to_owned(), "T".into(), "error below".into()];
     header.extend(all[0].methods().into_iter().map(String::from));
-    let header: [String; 8] = std::array::from_fn(|i| header[i].clone());
+    let header: [String; 10] = std::array::from_fn(|i| header[i].clone());
     let mut table = Table::new(header);
     for comparison in all {
         for error in [1e-2, 1e-4, 1e-8] {
@@ -253,7 +269,7 @@ fn summary(all: &[Comparison]) -> Table<8> {
                 let fastest = comparison.fastest(method, error);
                 row.push(fastest.map_or("–".into(), |s| format!("{:.2}", 1e3 * s)));
             }
-            let row: [String; 8] = std::array::from_fn(|i| row[i].clone());
+            let row: [String; 10] = std::array::from_fn(|i| row[i].clone());
             table.row(row);
         }
     }

@@ -1,4 +1,7 @@
-//! The same problems from closures, by this library's default scheme.
+//! The same problems from closures, by this library's methods.
+//!
+//! The closures are written in components, `p.x * p.x * 0.05`: so the compiler removes the parts of the dual
+//! numbers that are zero. A quotient of vectors of dual numbers, or their outer product, costs ten times more.
 
 use std::cell::Cell;
 
@@ -19,82 +22,107 @@ pub struct Ran<const N: usize> {
     pub calls: u64,
 }
 
+/// By which method, and how accurately.
+#[derive(Clone, Copy, Debug)]
+pub enum How {
+    /// The method of order 2, in so many steps of this size.
+    Midpoint {
+        /// The size.
+        h: f64,
+        /// How many.
+        steps: usize,
+    },
+    /// The method of order 5, to this time with this tolerance.
+    Five(f64, f64),
+    /// The method of order 8.
+    Eight(f64, f64),
+}
+
 /// A problem that runs from closures.
 pub trait Ours<const N: usize>: crate::Problem<N> {
-    /// A run of `steps` steps of size `h`.
+    /// A run.
     ///
     /// # Errors
     ///
     /// The library's.
-    fn run(&self, h: f64, steps: usize) -> Result<Ran<N>, String>;
+    fn run(&self, how: How) -> Result<Ran<N>, String>;
 }
 
 fn ran<Y: Metriplectic, const N: usize>(
     system: &Y,
     start: Point<Y>,
-    (h, steps): (f64, usize),
+    how: How,
     calls: &Cell<u64>,
 ) -> Result<Ran<N>, String>
 where
     WeylMidpoint: Retraction<Y::Manifold, Y::Metric>,
 {
-    let span = Span::steps(h, steps).at_most(2);
-    let run = WeylMidpoint.run(system, start, span).map_err(|error| error.to_string())?;
+    let span = |(time, tolerance)| Span::until(time).tolerance(tolerance).at_most(2);
+    let run = match how {
+        How::Midpoint { h, steps } => {
+            WeylMidpoint.run(system, start, Span::steps(h, steps).at_most(2))
+        }
+        How::Five(time, tolerance) => DormandPrince5.run(system, start, span((time, tolerance))),
+        How::Eight(time, tolerance) => DormandPrince8.run(system, start, span((time, tolerance))),
+    };
+    let run = run.map_err(|error| error.to_string())?;
     let entries = Y::Manifold::entries(&run.last().point);
     let end = std::array::from_fn(|i| entries[i]);
     Ok(Ran { end, certificate: run.certificate().clone(), calls: calls.get() })
 }
 
 impl Ours<3> for RelaxingBody {
-    fn run(&self, h: f64, steps: usize) -> Result<Ran<3>, String> {
+    fn run(&self, how: How) -> Result<Ran<3>, String> {
         let calls = Cell::new(0);
-        let inertia = Vector3::from(INERTIA);
+        let [a, b, c] = INERTIA.map(|moment| 0.5 / moment);
         let energy = |p: &Vector3<Real>| {
             calls.set(calls.get() + 1);
-            p.component_mul(p).component_div(&inertia.cast()).sum() * 0.5
+            p.x * p.x * a + p.y * p.y * b + p.z * p.z * c
         };
         let body = System::on(LieDual::so3())
             .energy(energy)
-            .entropy(|p: &Vector3<Real>| p.norm_squared() * 0.5)
+            .entropy(|p: &Vector3<Real>| (p.x * p.x + p.y * p.y + p.z * p.z) * 0.5)
             .build()
             .map_err(|error| error.to_string())?;
-        ran(&body, crate::Problem::start(self).into(), (h, steps), &calls)
+        ran(&body, crate::Problem::start(self).into(), how, &calls)
     }
 }
 
 impl Ours<3> for SpinningTop {
-    fn run(&self, h: f64, steps: usize) -> Result<Ran<3>, String> {
+    fn run(&self, how: How) -> Result<Ran<3>, String> {
         let calls = Cell::new(0);
         let energy = |x: &Vector3<Real>| -> Real {
             calls.set(calls.get() + 1);
-            let term = |i: usize| (x[i].powi(2) + x[i].powi(3) * (2.0 / 3.0)) * (0.5 * WEIGHTS[i]);
-            (0..3).map(term).sum()
+            let term = |x: Real, weight: f64| x * x * (x * (2.0 / 3.0) + 1.0) * (0.5 * weight);
+            let [a, b, c] = WEIGHTS;
+            term(x.x, a) + term(x.y, b) + term(x.z, c)
         };
         let top = System::on(Sphere::<2>::round())
             .bracket(AreaForm)
             .energy(energy)
             .build()
             .map_err(|error| error.to_string())?;
-        ran(&top, crate::Problem::start(self).into(), (h, steps), &calls)
+        ran(&top, crate::Problem::start(self).into(), how, &calls)
     }
 }
 
 impl Ours<4> for Gas {
-    fn run(&self, h: f64, steps: usize) -> Result<Ran<4>, String> {
+    fn run(&self, how: How) -> Result<Ran<4>, String> {
         let calls = Cell::new(0);
         let alpha = self.alpha;
         let wall = |x: &Vector4<Real>| {
             let [left, right] = [x.z / x.x, x.w / (-x.x + 2.0)].map(|d| d * (2.0 / 3.0));
-            let push = Vector4::new(1.0.into(), 0.0.into(), -left, right);
-            push * Vector4::y().transpose() - Vector4::y() * push.transpose()
+            let (o, one) = (Real::from(0.0), Real::from(1.0));
+            Matrix4::new(o, one, o, o, -one, o, left, -right, o, -left, o, o, o, right, o, o)
         };
         let leak = move |_: &Vector4<Real>, w: &Vector4<Real>| {
-            let b = Vector4::new(0.0.into(), 0.0.into(), w.w, -w.z);
-            b * b.transpose() * Real::from(alpha)
+            let o = Real::from(0.0);
+            let (one, both, two) = (w.w * w.w * alpha, w.z * w.w * -alpha, w.z * w.z * alpha);
+            Matrix4::new(o, o, o, o, o, o, o, o, o, o, one, both, o, o, both, two)
         };
         let energy = |x: &Vector4<Real>| {
             calls.set(calls.get() + 1);
-            x.y.powi(2) * 0.5 + x.z + x.w
+            x.y * x.y * 0.5 + x.z + x.w
         };
         let containers = System::on(Euclidean::<4>)
             .bracket(Poisson::field(wall))
@@ -103,6 +131,6 @@ impl Ours<4> for Gas {
             .entropy(|x: &Vector4<Real>| (x.x * (-x.x + 2.0)).ln() + (x.z * x.w).ln() * 1.5)
             .build()
             .map_err(|error| error.to_string())?;
-        ran(&containers, crate::Problem::start(self).into(), (h, steps), &calls)
+        ran(&containers, crate::Problem::start(self).into(), how, &calls)
     }
 }

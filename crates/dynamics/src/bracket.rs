@@ -17,7 +17,7 @@ pub use nambu::{AreaForm, Casimirs, Nambu, NoCasimir, OfEntropy, Rows};
 pub use symplectic::{EvenDimension, Symplectic};
 pub use zero::Zero;
 
-use metriplectic_fields::{ChartPoint, Column, Dimension, Matrix, Scalar, Square, Vector};
+use metriplectic_fields::{ChartPoint, Column, Dimension, Matrix, Scalar, Space, Square, Vector};
 use metriplectic_manifolds::{Manifold, MetricError, Riemannian};
 use nalgebra::SMatrix;
 use num_dual::Dual64;
@@ -200,7 +200,7 @@ pub(crate) fn force_by_dual_numbers<M: Manifold, G: Riemannian<M>>(
 }
 
 /// Chart coordinates `ε e_k`.
-pub(crate) fn epsilon<M: Manifold>(k: usize) -> Vector<M, Dual64> {
+pub(crate) fn epsilon<M: Space>(k: usize) -> Vector<M, Dual64> {
     Vector::<M, Dual64>::from_index(|i| Dual64::new(0.0, if i == k { 1.0 } else { 0.0 }))
 }
 

@@ -78,6 +78,38 @@ pub trait Metriplectic:
     }
 }
 
+/// Takes parts of another system, in an implementation of [`Metriplectic`] for a type that replaces the
+/// other parts.
+///
+/// ```
+/// use metriplectic_dynamics::{Metriplectic, SecondLaw, parts_of};
+///
+/// /// A system with the published scheme.
+/// struct Published<Y>(Y);
+///
+/// impl<Y: Metriplectic> Metriplectic for Published<Y> {
+///     parts_of!(self.0: Y {
+///         manifold: Manifold, metric: Metric, bracket: Bracket, dissipation: Dissipation,
+///         energy: Energy, entropy: Entropy, invariants: Invariants,
+///     });
+///
+///     fn second_law(&self) -> SecondLaw {
+///         SecondLaw::Published
+///     }
+/// }
+/// ```
+#[macro_export]
+macro_rules! parts_of {
+    ($this:ident.$system:tt: $other:ty { $($part:ident: $kind:ident),+ $(,)? }) => {$(
+        type $kind = <$other as $crate::Metriplectic>::$kind;
+
+        #[inline]
+        fn $part(&$this) -> &Self::$kind {
+            $this.$system.$part()
+        }
+    )+};
+}
+
 /// A state of the system `Y`.
 pub type Point<Y> = <<Y as Metriplectic>::Manifold as Space>::Point<f64>;
 

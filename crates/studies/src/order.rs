@@ -11,6 +11,9 @@ const COARSE: usize = 3;
 /// A point used in the fit stands this far above the plateau, so that round-off contaminates it by
 /// a tenth at most.
 const CLEARANCE: f64 = 10.0;
+/// The order of the lowest schemes. Errors that fall by less than half of this order have ceased to fall,
+/// whatever the slope before: on data that are mostly plateau, the median slope is small too.
+const LOWEST_ORDER: f64 = 1.0;
 
 /// The fitted order `p` of `error ≈ C hᵖ`, with its uncertainty and the points it rests on.
 ///
@@ -259,7 +262,7 @@ fn is_plateau(points: &[Point], k: usize, typical: f64) -> bool {
     let above = |p: &Point| p.y - line.at(p.x) > 0.5 * line.slope * (start - p.x);
     // A single point has a slope only with its neighbour.
     let tail = if rest.len() < 2 { &points[k - 1..] } else { rest };
-    let flat = Line::through(tail).slope < 0.5 * typical.max(1.0);
+    let flat = Line::through(tail).slope < 0.5 * typical.max(LOWEST_ORDER);
     line.slope > 0.0 && flat && rest.iter().all(above)
 }
 

@@ -49,6 +49,15 @@ impl<Y: Metriplectic> Problem<Y> {
     }
 }
 
+/// The unit of energy of every problem: its entries and the terms of its `H` are of this size, and `H`, a sum
+/// of terms of both signs, may be nearly zero. So an error is relative to `|H|`, or to this where it is larger.
+const UNIT_OF_ENERGY: f64 = 1.0;
+
+/// An error of the energy relative to the size of the energy.
+fn relative(error: f64, energy: f64) -> f64 {
+    error.abs() / energy.abs().max(UNIT_OF_ENERGY)
+}
+
 /// What is done with every problem, and each of the retractions that its manifold has.
 pub trait Study {
     /// Called once for each problem and retraction; `order` is what theory says.
@@ -90,7 +99,7 @@ pub struct Orders {
     pub studies: Vec<Convergence>,
     /// The order that theory gives for each of them.
     pub expected: Vec<f64>,
-    /// The worst energy error of any step, relative to `max(|H|, 1)`.
+    /// The worst energy error of any step, relative to `|H|` or to the unit of energy, 1, if that is larger.
     pub energy_error: f64,
     /// What went wrong, where an order could not be fitted.
     pub failures: Vec<String>,
@@ -162,7 +171,8 @@ pub struct Strides {
     /// The largest `√G(d, d)` of the displacements `d = hv`, from `R_h⁻¹(x, x')`, of the steps that
     /// were taken whole.
     pub longest: f64,
-    /// The largest `|H(x') − H(x)|`, relative to `max(|H|, 1)`, of all of them.
+    /// The largest `|H(x') − H(x)|` of all of them, relative to `|H|` or to the unit of energy, 1, if that is
+    /// larger.
     pub energy_error: f64,
 }
 
@@ -191,8 +201,7 @@ impl Study for LargeSteps {
             let Ok(run) = Scheme::new(retraction).run(system, x.clone(), span) else { continue };
             let y = &run.last().point;
             let (before, after) = (system.energy_at(&x), system.energy_at(y));
-            let error = (after - before).abs() / before.abs().max(1.0);
-            row.energy_error = row.energy_error.max(error);
+            row.energy_error = row.energy_error.max(relative(after - before, before));
             if run.certificate().effort.splits == 0
                 && let Ok(d) = retraction.inverse(system.metric(), &x, y)
                 && let Ok(length) = system.metric().norm(&d.base, &d.vector)
@@ -221,8 +230,8 @@ impl Study for Orders {
             let run = Scheme::new(retraction).run(system, start.clone(), Span::steps(h, n));
             run.map_or(f64::NAN, |run| {
                 let certificate = run.certificate();
-                let scale = certificate.initial_energy.abs().max(1.0);
-                self.energy_error = self.energy_error.max(certificate.max_energy_error / scale);
+                let error = relative(certificate.max_energy_error, certificate.initial_energy);
+                self.energy_error = self.energy_error.max(error);
                 Problem::<Y>::distance(&run.last().point, &exact)
             })
         });

@@ -6,6 +6,7 @@ use metriplectic_fields::{Column, Real, Scalar, ScalarField, Space};
 use metriplectic_manifolds::{Euclidean, LieDual, MetricError, Riemannian};
 use nalgebra::{SMatrix, SVector};
 
+use super::lie_poisson::coadjoint_jet;
 use super::{Bracket, BracketArgs, BracketJet, LiePoisson};
 
 /// A smooth force `𝓕: g → g*` on a Lie algebra of dimension `N`, in a basis and its dual basis. Any
@@ -149,18 +150,12 @@ where
         w: &SVector<f64, N>,
     ) -> Result<BracketJet<LieDual<N>>, MetricError> {
         let (force, slope) = self.0.jet1(w);
-        let zero = SMatrix::<f64, N, N>::zeros();
-        // ad*_δ 𝓕 = f δ with f_ba = C_ab^d 𝓕_d, and (ad*_w)_bd = C_ab^d w^a.
-        let (mut turned, mut coadjoint) = (zero, zero);
-        for c in at.space.algebra().constants() {
-            turned[(c.b, c.a)] += c.value * force[c.d];
-            coadjoint[(c.b, c.d)] += c.value * w[c.a];
-        }
+        let jet = coadjoint_jet(at.space.algebra(), w, &force);
+        // The force depends on `w` and not on the point.
         Ok(BracketJet {
-            value: coadjoint * force,
-            along_z: zero,
-            along_s: zero,
-            tensor: turned + coadjoint * slope,
+            along_z: SMatrix::zeros(),
+            tensor: jet.tensor + jet.along_z * slope,
+            ..jet
         })
     }
 }

@@ -1,7 +1,7 @@
 //! The Lie-Poisson bracket on the dual of a Lie algebra.
 
 use metriplectic_fields::{Column, Scalar};
-use metriplectic_manifolds::{LieDual, MetricError, Riemannian};
+use metriplectic_manifolds::{LieAlgebra, LieDual, MetricError, Riemannian};
 use nalgebra::{SMatrix, SVector};
 
 use super::{Bracket, BracketArgs, BracketJet, NaturalBracket};
@@ -34,21 +34,31 @@ impl<const N: usize, G: Riemannian<LieDual<N>>> Bracket<LieDual<N>, G> for LiePo
         at: &BracketArgs<'_, LieDual<N>, G>,
         alpha: &SVector<f64, N>,
     ) -> Result<BracketJet<LieDual<N>>, MetricError> {
-        let (z, zero) = (at.x.point(), SMatrix::zeros());
-        let mut jet = BracketJet::<LieDual<N>> {
-            value: Column::zero(),
-            along_z: zero,
-            along_s: zero,
-            tensor: zero,
-        };
-        for c in at.space.algebra().constants() {
-            let (slope, entry) = (c.value * alpha[c.a], c.value * z[c.d]);
-            jet.value[c.b] += slope * z[c.d];
-            jet.along_z[(c.b, c.d)] += slope;
-            jet.tensor[(c.b, c.a)] += entry;
-        }
-        Ok(jet)
+        Ok(coadjoint_jet(at.space.algebra(), alpha, &at.x.point()))
     }
+}
+
+/// `ad*_ξ μ`, with its derivatives along `μ` and, as the tensor, along `ξ`.
+#[inline]
+pub(super) fn coadjoint_jet<const N: usize>(
+    algebra: &LieAlgebra<N>,
+    xi: &SVector<f64, N>,
+    mu: &SVector<f64, N>,
+) -> BracketJet<LieDual<N>> {
+    let zero = SMatrix::zeros();
+    let mut jet = BracketJet::<LieDual<N>> {
+        value: Column::zero(),
+        along_z: zero,
+        along_s: zero,
+        tensor: zero,
+    };
+    for c in algebra.constants() {
+        let (slope, entry) = (c.value * xi[c.a], c.value * mu[c.d]);
+        jet.value[c.b] += slope * mu[c.d];
+        jet.along_z[(c.b, c.d)] += slope;
+        jet.tensor[(c.b, c.a)] += entry;
+    }
+    jet
 }
 
 impl<const N: usize> NaturalBracket for LieDual<N> {

@@ -70,7 +70,13 @@ where
         w: &Vector<M, D>,
         alpha: &Vector<M, D>,
     ) -> Result<Vector<M, D>, MetricError> {
-        let tensor = lift::<M, D>(x, w, |x, w| self.tensor_at(x, w));
+        let tensor = if D::NDERIV == 0 {
+            let real = ChartPoint::<M> { base: x.base.clone(), q: x.q.real() };
+            let tensor = self.real_tensor(&real, &w.real());
+            tensor.map(|k| Matrix::<M, D>::from_entries(|i, j| D::from(k[(i, j)])))
+        } else {
+            lift::<M, D>(x, w, |x, w| self.tensor_at(x, w))
+        };
         Ok(tensor.ok_or_else(|| MetricError::out_of_chart(x))? * *alpha)
     }
 
@@ -115,21 +121,44 @@ impl<F> FieldDissipation<F> {
     where
         F: Fn(&M::Point<Real>, &Velocity<M, Real>) -> Form<M, Real>,
     {
-        M::contravariant(x, &(self.0)(&x.point(), &along_velocities(x, w)?))
+        let still = |a: &Real| [a.re, a.eps1, a.eps2, a.eps1eps2].iter().all(|part| *part == 0.0);
+        M::contravariant(x, &(self.0)(&x.point(), &along_velocities(x, w, still)?))
+    }
+
+    /// The same at `f64`, where the frame has no derivatives to carry.
+    fn real_tensor<M: Manifold>(&self, x: &ChartPoint<M>, w: &Vector<M>) -> Option<Matrix<M>>
+    where
+        F: Fn(&M::Point<Real>, &Velocity<M, Real>) -> Form<M, Real>,
+    {
+        let w = along_velocities(x, w, |a| *a == 0.0)?;
+        let tensor = (self.0)(&M::constant(&x.point()), &Velocity::<M, Real>::embed(&w));
+        M::contravariant(x, &Form::<M>::from_entries(|i, j| tensor[(i, j)].re))
     }
 }
 
 /// The covector `θ (θᵀθ)⁻¹ w` on velocities that is `w` on the frame `θ` of the chart, and zero
-/// across the manifold.
+/// across the manifold. `is_zero` compares all parts of a number.
+///
+/// Where `θ` is the identity, as on every vector space, this is `w` itself. The LU decomposition of the
+/// identity in dual numbers would take longer than all the rest of the velocity.
+#[inline]
 fn along_velocities<M: Manifold, D: Scalar>(
     x: &ChartPoint<M, D>,
     w: &Vector<M, D>,
+    is_zero: impl Fn(&D) -> bool,
 ) -> Option<Velocity<M, D>> {
+    let n = M::Dim::LEN;
     let theta = M::Dim::array(|k| M::embed(x, &Vector::<M, D>::basis(k)));
+    let one = |i: usize, k: usize| if i == k { D::one() } else { D::zero() };
+    let is_identity = Velocity::<M, D>::LEN == n
+        && (0..n).all(|k| (0..n).all(|i| is_zero(&(theta[k][i] - one(i, k)))));
+    if is_identity {
+        return w.is_finite().then(|| Velocity::<M, D>::from_index(|i| w[i]));
+    }
     let gram = Matrix::<M, D>::from_entries(|i, j| theta[i].dot(&theta[j]));
     let weights = gram.factor()?.solve(w)?;
     let mut sum = Velocity::<M, D>::zero();
-    for k in 0..M::Dim::LEN {
+    for k in 0..n {
         sum += theta[k] * weights[k];
     }
     Some(sum)

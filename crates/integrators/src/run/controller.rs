@@ -104,8 +104,9 @@ pub(crate) enum Entries<V> {
 
 /// The tolerance without another one.
 const TOLERANCE: f64 = 1e-6;
-/// The least tolerance: `τ^{3/2}` is some units of round-off.
-const LEAST_TOLERANCE: f64 = 1e-10;
+/// The least error `τ^p` of a step, with the power of its [`Control`]: some units of round-off. So the least
+/// tolerance is 10⁻¹⁰ for order 2, and this for a method that holds errors to the tolerance itself.
+const LEAST_LOCAL: f64 = 1e-15;
 
 impl Span {
     /// From `t = 0` to `t = end`, in steps that follow a [tolerance](Until::tolerance) of 10⁻⁶ or
@@ -266,8 +267,8 @@ impl Adaptive {
     pub(crate) fn check(&self, start: f64) -> Result<(), SpanError> {
         let Self { end, tolerance, .. } = *self;
         check_end(start, end)?;
-        if !(tolerance >= LEAST_TOLERANCE && tolerance.is_finite()) {
-            return Err(SpanError::Tolerance { tolerance, least: LEAST_TOLERANCE });
+        if !(tolerance > 0.0 && tolerance.is_finite()) {
+            return Err(SpanError::Tolerance { tolerance, least: LEAST_LOCAL });
         }
         for h in [self.first, self.least, self.largest].into_iter().flatten() {
             check_step_size(h)?;
@@ -307,6 +308,10 @@ impl Adaptive {
         scales: &Scales<F::Vector>,
         (order, control): (u32, Control),
     ) -> Result<Controller<F::Vector>, SpanError> {
+        let least = 10_f64.powf(LEAST_LOCAL.log10() / control.power);
+        if self.tolerance < least {
+            return Err(SpanError::Tolerance { tolerance: self.tolerance, least });
+        }
         let mut controller = Controller {
             order,
             control,

@@ -1,0 +1,155 @@
+//! The explicit methods: their orders with the laws on, on every kind of space.
+//!
+//! References are the ends of the method of order 5 at a tolerance of 10⁻¹⁴ for that of order 8, and the other way
+//! round. They agree with the classical method of order 4 without laws.
+
+use metriplectic::dynamics::system::Point;
+use metriplectic::prelude::*;
+use metriplectic_studies::problems::flow;
+
+mod models;
+
+use models::{Globe, gas, top};
+
+/// The slope of the errors that are above round-off, by least squares.
+fn slope(steps: &[f64], errors: &[f64], floor: f64) -> f64 {
+    let points: Vec<(f64, f64)> = steps
+        .iter()
+        .zip(errors)
+        .filter(|(_, error)| **error > floor)
+        .map(|(h, error)| (h.ln(), error.ln()))
+        .collect();
+    assert!(points.len() >= 3, "{errors:?} are round-off");
+    let n = points.len() as f64;
+    let (x, y) = points.iter().fold((0.0, 0.0), |(x, y), p| (x + p.0 / n, y + p.1 / n));
+    let both: f64 = points.iter().map(|p| (p.0 - x) * (p.1 - y)).sum();
+    both / points.iter().map(|p| (p.0 - x).powi(2)).sum::<f64>()
+}
+
+fn distance<M: Manifold>(a: &M::Point<f64>, b: &M::Point<f64>) -> f64 {
+    let both = M::entries(a).into_iter().zip(M::entries(b));
+    both.map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
+}
+
+/// What a run keeps, and its end.
+fn end<Y: Metriplectic, M: Method<Y>>(
+    method: M,
+    system: &Y,
+    x0: &Point<Y>,
+    span: impl Into<metriplectic::integrators::Schedule>,
+) -> Point<Y> {
+    let run = method.run(system, x0.clone(), span).unwrap();
+    let certificate = run.certificate();
+    let laws = certificate.keeps_energy() && certificate.keeps_invariants();
+    assert!(laws && certificate.keeps_entropy(), "{certificate}");
+    assert!(certificate.max_relative_energy_error() <= 3e-15, "{certificate}");
+    assert!(certificate.max_manifold_defect <= 1e-15, "{certificate}");
+    run.last().point.clone()
+}
+
+/// The orders of both methods in so many steps, `coarsest` of order 8 and twice as many of order 5.
+fn orders<Y: Metriplectic>(name: &str, system: &Y, x0: &Point<Y>, time: f64, coarsest: usize) {
+    let fine = Span::until(time).tolerance(1e-14);
+    let (five, eight) =
+        (end(DormandPrince5, system, x0, fine), end(DormandPrince8, system, x0, fine));
+    let apart = distance::<Y::Manifold>(&five, &eight);
+    let classical = distance::<Y::Manifold>(&flow(system, x0, time).unwrap(), &eight);
+    assert!(apart < 1e-12 && classical < 1e-8, "{name}: {apart:.1e}, {classical:.1e}");
+    let span = |n: usize| Span::steps(time / n as f64, n);
+    let counts = [2, 3, 4, 6, 8].map(|k| k * coarsest / 2);
+    let steps = |factor: usize| counts.map(|n| time / (factor * n) as f64);
+    let errors = |end: &dyn Fn(usize) -> Point<Y>, reference: &Point<Y>, factor: usize| {
+        counts.map(|n| distance::<Y::Manifold>(&end(factor * n), reference))
+    };
+    let of_five = errors(&|n| end(DormandPrince5, system, x0, span(n)), &eight, 2);
+    let of_eight = errors(&|n| end(DormandPrince8, system, x0, span(n)), &five, 1);
+    let floor = 30.0 * apart.max(1e-15);
+    let slopes = [slope(&steps(2), &of_five, floor), slope(&steps(1), &of_eight, floor)];
+    println!("{name}: {slopes:.2?}; {of_five:?} {of_eight:?}, {apart:.1e}, {classical:.1e}");
+    assert!(slopes[0] >= 4.7 && slopes[1] >= 7.5, "{name}: {slopes:.2?}");
+}
+
+#[test]
+fn on_lie_algebra_duals() {
+    orders("so(3)*", &models::relaxing_body(), &vector![0.3, -0.9, 0.2], 30.0, 12);
+    let body = System::on(LieDual::se3())
+        .energy(models::heavy)
+        .entropy(models::alignment)
+        .casimir(models::gamma_squared)
+        .build()
+        .unwrap();
+    orders("se(3)*", &body, &SVector::from(models::HEAVY), 4.0, 8);
+}
+
+#[test]
+fn on_spheres_and_products_with_them() {
+    let spin = System::on(Sphere::<2>::round()).bracket(AreaForm).energy(top).build().unwrap();
+    orders("S²", &spin, &Vector3::repeat(3_f64.sqrt().recip()), 20.0, 16);
+    type Warm = (Vector3<Real>, Vector1<Real>);
+    let warm = System::on(Product(Sphere::<2>::round(), Euclidean::<1>))
+        .bracket((AreaForm, Zero))
+        .energy(|(x, s): &Warm| x.z + x.x * x.x * 0.3 + s.x.exp() * 0.2)
+        .entropy(|(_, s): &Warm| s.x)
+        .build()
+        .unwrap();
+    orders("S² × R", &warm, &(vector![0.6, 0.0, 0.8], Vector1::new(0.0)), 6.0, 16);
+}
+
+#[test]
+fn on_gas_containers() {
+    orders("gas, α = 0.5", &gas(0.5), &vector![1.0, 2.0, 2.0, 2.0], 2.0, 16);
+    orders("gas, α = 0.001", &gas(1e-3), &vector![1.0, 2.0, 2.0, 2.0], 2.0, 16);
+}
+
+#[test]
+fn on_rotations() {
+    let group = System::on(Rotations::bi_invariant())
+        .bracket(Nambu::default())
+        .energy(|r: &Matrix3<Real>| r.m11 + r.m22 * 2.0 + r.m33 * 3.0 + r.m12 * r.m23 * 0.5)
+        .entropy(|r: &Matrix3<Real>| r.m13 - r.m21 * 0.5 + (r.m31 + r.m32).powi(2) * 0.25)
+        .build()
+        .unwrap();
+    let start = Rotations::bi_invariant().from_quaternion([0.8, 0.3, -0.4, 0.33]).unwrap();
+    orders("SO(3)", &group, &start, 0.4, 6);
+}
+
+#[test]
+fn on_a_chart_with_a_metric_of_its_own() {
+    let metric = |x: &Vector3<Real>| {
+        let [a, b] = [x.x * 0.3, x.y * 0.2];
+        let (o, one) = (Real::from(0.0), Real::from(1.0));
+        Matrix3::new(a * a + 1.0, a * b, o, a * b, b * b + 1.5, o, o, o, one + x.z * x.z * 0.1)
+    };
+    let system = System::on(Chart::<3>::new(|x| x.norm() < 4.0))
+        .metric(Metric::field(metric))
+        .bracket(Nambu::default())
+        .energy(|x: &Vector3<Real>| x.x * x.x * 0.5 + x.y * x.y + x.z * x.z * 1.5 + x.x * x.y * 0.3)
+        .entropy(|x: &Vector3<Real>| x.norm_squared() * 0.5 + x.z * 0.2)
+        .build()
+        .unwrap();
+    orders("chart", &system, &vector![0.5, -0.6, 0.4], 2.0, 8);
+}
+
+#[test]
+fn with_a_listed_momentum() {
+    let system = System::on(Euclidean::<10>)
+        .bracket(Poisson::constant(models::pendulum_bracket()).unwrap())
+        .energy(models::pendulum_energy)
+        .entropy(|x: &models::State10| x[8] + x[9])
+        .dissipation(FieldDissipation(models::heat_exchange))
+        .momentum(models::angular_momentum)
+        .build()
+        .unwrap();
+    orders("double pendulum", &system, &SVector::from(models::PENDULUM), 2.0, 16);
+}
+
+#[test]
+fn on_a_manifold_of_a_user() {
+    let globe = System::on(Globe)
+        .metric(Metric::field(|_: &Vector3<Real>| Matrix3::identity()))
+        .bracket(AreaForm)
+        .energy(|x: &Vector3<Real>| x.z + x.x * x.x * 0.3 + x.y * x.x * 0.2)
+        .build()
+        .unwrap();
+    orders("globe", &globe, &Globe::point(vector![0.6, 0.0, 0.8]), 6.0, 12);
+}

@@ -70,8 +70,11 @@ impl<M: StateSpace> fmt::Display for Event<M> {
     }
 }
 
-/// A function of the time and of a state.
-struct Function<P>(Box<dyn Fn(f64, &P) -> f64 + Send + Sync>);
+/// A function of the time and of a point.
+type OfPoint<P> = dyn Fn(f64, &P) -> f64 + Send + Sync;
+
+/// The same as a type that can be recovered from `dyn Any`.
+struct Function<P>(Box<OfPoint<P>>);
 
 /// An event that was asked for.
 #[derive(Clone)]

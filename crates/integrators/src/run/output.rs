@@ -192,17 +192,6 @@ impl<F: Flow, M: Method<F>> Steps<'_, F, M> {
         }
     }
 
-    /// What the laws were at the start of the run, and the entropy before the last step.
-    fn reference(&self) -> Laws<F::Numbers> {
-        let mut reference = self.values.clone();
-        reference.energy = self.certificate.initial_energy;
-        reference.entropy = self.before.entropy;
-        for (k, balance) in self.certificate.invariants.iter().enumerate() {
-            reference.invariants[k] = balance.initial;
-        }
-        reference
-    }
-
     /// Whether the entropy never falls.
     fn has_entropy(&self) -> bool {
         self.promises.entropy && self.flow.entropy_law() != SecondLaw::NoEntropy
@@ -213,7 +202,7 @@ impl<F: Flow, M: Method<F>> Steps<'_, F, M> {
         if theta >= 1.0 {
             return Some(self.state.clone());
         }
-        let (has_entropy, reference) = (self.has_entropy(), self.reference());
+        let (has_entropy, reference) = (self.has_entropy(), self.reference(self.before.entropy));
         let Self { method, flow, before, state, values, memory, .. } = self;
         let (x, end, h) = (&before.state.point, &state.point, before.h);
         let step = StepEnds { x, end, h, values: [&before.values, values], reference: &reference };
@@ -253,8 +242,10 @@ impl<F: Flow, M: Method<F>> Steps<'_, F, M> {
         let mut stopped_at = None;
         if !watching.events.is_empty() {
             let ends = [self.before.state.clone(), self.state.clone()];
-            let (laws, reference) =
-                ([self.before.values.clone(), self.values.clone()], self.reference());
+            let (laws, reference) = (
+                [self.before.values.clone(), self.values.clone()],
+                self.reference(self.before.entropy),
+            );
             let (x, end, values) = (&ends[0].point, &ends[1].point, laws.each_ref());
             let step = StepEnds { x, end, h: self.before.h, values, reference: &reference };
             let flow = self.flow;

@@ -92,7 +92,8 @@ mod tests {
 
     #[test]
     fn smooth_functions_take_few_evaluations() {
-        let functions: [(fn(f64) -> f64, f64, usize); 8] = [
+        type Case = (fn(f64) -> f64, f64, usize);
+        let functions: [Case; 8] = [
             (|x| x - 0.3, 0.3, 4),
             (|x| 0.7 - x, 0.7, 4),
             (|x| (x - 0.4) * (2.0 + x), 0.4, 8),

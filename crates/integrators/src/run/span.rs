@@ -91,6 +91,8 @@ impl Span {
 /// | a number `h` | of size `h` | you stop |
 /// | [`Span::steps`]`(h, count)` | of size `h` | `count` of them |
 /// | [`Span::until`]`(end)` | that follow a tolerance | `t = end` |
+///
+/// Each of them may ask for states at given times and for events: see [`Watch`](crate::Watch).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Schedule {
     pub(crate) size: Size,

@@ -17,7 +17,8 @@ use crate::run::trajectory::{Ending, State};
 use crate::step_error::StepError;
 
 /// The iterator over the states of a run after its start, in constant memory; ended by an error, or
-/// where its schedule ends. With a step size alone it is endless.
+/// where its schedule ends. With a step size alone it is endless. It yields the state after each step, or those at
+/// the [times asked for](crate::Watch::output_at) and the last one.
 ///
 /// Made by [`Method::steps`] or [`Run::steps`](crate::Run::steps).
 pub struct Steps<'a, F: Flow, M: Method<F>> {
@@ -163,19 +164,21 @@ impl<'a, F: Flow, M: Method<F>> Steps<'a, F, M> {
         if self.failed { Some(Ending::Stopped) } else { self.progress.ending }
     }
 
+    /// What the laws were at the start of the run, with this entropy.
+    #[inline]
+    pub(super) fn reference(&self, entropy: f64) -> Laws<F::Numbers> {
+        let mut invariants = self.values.invariants.clone();
+        for (k, balance) in self.certificate.invariants.iter().enumerate() {
+            invariants[k] = balance.initial;
+        }
+        Laws { energy: self.certificate.initial_energy, entropy, invariants }
+    }
+
     /// Where the next step starts.
     #[inline]
     fn from(&self, allowed: Option<F::Vector>) -> StepStart<'_, F> {
-        let invariants = || {
-            let mut initial = self.values.invariants.clone();
-            for (k, balance) in self.certificate.invariants.iter().enumerate() {
-                initial[k] = balance.initial;
-            }
-            initial
-        };
         let entropy = if self.promises.entropy { self.entropy } else { self.values.entropy };
-        let reference =
-            Laws { energy: self.certificate.initial_energy, entropy, invariants: invariants() };
+        let reference = self.reference(entropy);
         let values = self.values.clone();
         StepStart { x: &self.state.point, time: self.state.time, values, reference, allowed }
     }

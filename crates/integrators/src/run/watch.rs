@@ -95,7 +95,6 @@ pub trait Watch: Into<Schedule> {
     /// # Ok(())
     /// # }
     /// ```
-    #[must_use]
     fn event<P: 'static>(
         self,
         name: impl Into<String>,
@@ -123,7 +122,6 @@ pub trait Watch: Into<Schedule> {
     /// # Ok(())
     /// # }
     /// ```
-    #[must_use]
     fn event_in_time<P: 'static>(
         self,
         name: impl Into<String>,

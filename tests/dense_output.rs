@@ -176,6 +176,12 @@ fn outputs_are_as_accurate_as_the_steps() {
         accuracy("S² × R", (&spin(), &SPIN), scheme, (h, 20));
         accuracy("SO(3)", (&group(), &attitude()), scheme, (h / 5.0, 20));
         accuracy("se(3)*", (&heavy_top(), &TOP), scheme, (h, 20));
+        accuracy(
+            "so(3)*, order 5",
+            (&relaxing_body(), &vector![0.2, -1.0, 0.3]),
+            DormandPrince5,
+            (h, 20),
+        );
     }
 }
 
@@ -193,6 +199,8 @@ fn stiff_friction_keeps_the_laws_of_its_outputs() {
         .unwrap();
     let span = Span::steps(0.5, 40);
     keeps_the_laws("stiff", (&bodies, &vector![1.0, 3.0]), Scheme::new(WeylMidpoint), span, 0.025);
+    // An explicit method takes these steps in many halves, and knows its stages of the last one alone.
+    keeps_the_laws("stiff, order 5", (&bodies, &vector![1.0, 3.0]), DormandPrince5, span, 0.025);
 }
 
 #[test]

@@ -1,4 +1,5 @@
-//! The explicit methods: their orders with the laws on, on every kind of space.
+//! The explicit methods: their orders with the laws on, on every kind of space, the laws at every tolerance, and
+//! what they do where the laws depend on each other.
 //!
 //! References are the ends of the method of order 5 at a tolerance of 10⁻¹⁴ for that of order 8, and the other way
 //! round. They agree with the classical method of order 4 without laws.
@@ -47,8 +48,8 @@ fn end<Y: Metriplectic, M: Method<Y>>(
     run.last().point.clone()
 }
 
-/// The orders of both methods in so many steps, `coarsest` of order 8 and twice as many of order 5.
-fn orders<Y: Metriplectic>(name: &str, system: &Y, x0: &Point<Y>, time: f64, coarsest: usize) {
+/// The orders of both methods, from so many steps on: of order 5, and of order 8.
+fn orders<Y: Metriplectic>(name: &str, system: &Y, x0: &Point<Y>, time: f64, coarsest: [usize; 2]) {
     let fine = Span::until(time).tolerance(1e-14);
     let (five, eight) =
         (end(DormandPrince5, system, x0, fine), end(DormandPrince8, system, x0, fine));
@@ -56,35 +57,34 @@ fn orders<Y: Metriplectic>(name: &str, system: &Y, x0: &Point<Y>, time: f64, coa
     let classical = distance::<Y::Manifold>(&flow(system, x0, time).unwrap(), &eight);
     assert!(apart < 1e-12 && classical < 1e-8, "{name}: {apart:.1e}, {classical:.1e}");
     let span = |n: usize| Span::steps(time / n as f64, n);
-    let counts = [2, 3, 4, 6, 8].map(|k| k * coarsest / 2);
-    let steps = |factor: usize| counts.map(|n| time / (factor * n) as f64);
-    let errors = |end: &dyn Fn(usize) -> Point<Y>, reference: &Point<Y>, factor: usize| {
-        counts.map(|n| distance::<Y::Manifold>(&end(factor * n), reference))
-    };
-    let of_five = errors(&|n| end(DormandPrince5, system, x0, span(n)), &eight, 2);
-    let of_eight = errors(&|n| end(DormandPrince8, system, x0, span(n)), &five, 1);
-    let floor = 30.0 * apart.max(1e-15);
-    let slopes = [slope(&steps(2), &of_five, floor), slope(&steps(1), &of_eight, floor)];
+    let counts = coarsest.map(|coarsest| [4, 5, 6, 8, 10, 12].map(|k| k * coarsest / 4));
+    let steps = counts.map(|counts| counts.map(|n| time / n as f64));
+    let of_five = counts[0]
+        .map(|n| distance::<Y::Manifold>(&end(DormandPrince5, system, x0, span(n)), &eight));
+    let of_eight = counts[1]
+        .map(|n| distance::<Y::Manifold>(&end(DormandPrince8, system, x0, span(n)), &five));
+    let floor = 10.0 * apart.max(1e-15);
+    let slopes = [slope(&steps[0], &of_five, floor), slope(&steps[1], &of_eight, floor)];
     println!("{name}: {slopes:.2?}; {of_five:?} {of_eight:?}, {apart:.1e}, {classical:.1e}");
     assert!(slopes[0] >= 4.7 && slopes[1] >= 7.5, "{name}: {slopes:.2?}");
 }
 
 #[test]
 fn on_lie_algebra_duals() {
-    orders("so(3)*", &models::relaxing_body(), &vector![0.3, -0.9, 0.2], 30.0, 12);
+    orders("so(3)*", &models::relaxing_body(), &vector![0.3, -0.9, 0.2], 30.0, [64, 24]);
     let body = System::on(LieDual::se3())
         .energy(models::heavy)
         .entropy(models::alignment)
         .casimir(models::gamma_squared)
         .build()
         .unwrap();
-    orders("se(3)*", &body, &SVector::from(models::HEAVY), 4.0, 8);
+    orders("se(3)*", &body, &SVector::from(models::HEAVY), 4.0, [32, 24]);
 }
 
 #[test]
 fn on_spheres_and_products_with_them() {
     let spin = System::on(Sphere::<2>::round()).bracket(AreaForm).energy(top).build().unwrap();
-    orders("S²", &spin, &Vector3::repeat(3_f64.sqrt().recip()), 20.0, 16);
+    orders("S²", &spin, &Vector3::repeat(3_f64.sqrt().recip()), 20.0, [64, 24]);
     type Warm = (Vector3<Real>, Vector1<Real>);
     let warm = System::on(Product(Sphere::<2>::round(), Euclidean::<1>))
         .bracket((AreaForm, Zero))
@@ -92,13 +92,13 @@ fn on_spheres_and_products_with_them() {
         .entropy(|(_, s): &Warm| s.x)
         .build()
         .unwrap();
-    orders("S² × R", &warm, &(vector![0.6, 0.0, 0.8], Vector1::new(0.0)), 6.0, 16);
+    orders("S² × R", &warm, &(vector![0.6, 0.0, 0.8], Vector1::new(0.0)), 6.0, [64, 16]);
 }
 
 #[test]
 fn on_gas_containers() {
-    orders("gas, α = 0.5", &gas(0.5), &vector![1.0, 2.0, 2.0, 2.0], 2.0, 16);
-    orders("gas, α = 0.001", &gas(1e-3), &vector![1.0, 2.0, 2.0, 2.0], 2.0, 16);
+    orders("gas, α = 0.5", &gas(0.5), &vector![1.0, 2.0, 2.0, 2.0], 2.0, [128, 48]);
+    orders("gas, α = 0.001", &gas(1e-3), &vector![1.0, 2.0, 2.0, 2.0], 2.0, [128, 48]);
 }
 
 #[test]
@@ -110,7 +110,7 @@ fn on_rotations() {
         .build()
         .unwrap();
     let start = Rotations::bi_invariant().from_quaternion([0.8, 0.3, -0.4, 0.33]).unwrap();
-    orders("SO(3)", &group, &start, 0.4, 6);
+    orders("SO(3)", &group, &start, 0.4, [32, 20]);
 }
 
 #[test]
@@ -127,7 +127,7 @@ fn on_a_chart_with_a_metric_of_its_own() {
         .entropy(|x: &Vector3<Real>| x.norm_squared() * 0.5 + x.z * 0.2)
         .build()
         .unwrap();
-    orders("chart", &system, &vector![0.5, -0.6, 0.4], 2.0, 8);
+    orders("chart", &system, &vector![0.5, -0.6, 0.4], 2.0, [32, 8]);
 }
 
 #[test]
@@ -140,7 +140,7 @@ fn with_a_listed_momentum() {
         .momentum(models::angular_momentum)
         .build()
         .unwrap();
-    orders("double pendulum", &system, &SVector::from(models::PENDULUM), 2.0, 16);
+    orders("double pendulum", &system, &SVector::from(models::PENDULUM), 2.0, [64, 16]);
 }
 
 #[test]
@@ -151,5 +151,91 @@ fn on_a_manifold_of_a_user() {
         .energy(|x: &Vector3<Real>| x.z + x.x * x.x * 0.3 + x.y * x.x * 0.2)
         .build()
         .unwrap();
-    orders("globe", &globe, &Globe::point(vector![0.6, 0.0, 0.8]), 6.0, 12);
+    orders("globe", &globe, &Globe::point(vector![0.6, 0.0, 0.8]), 12.0, [64, 16]);
+}
+
+/// Runs with tolerances, by both methods; the steps and the distance from `exact` of each one of order 8.
+fn sweep<Y: Metriplectic>(
+    name: &str,
+    system: &Y,
+    x0: &Point<Y>,
+    time: f64,
+    tolerances: &[i32],
+) -> Vec<(usize, Point<Y>)> {
+    let run = |k: i32| {
+        let span = Span::until(time).tolerance(10_f64.powi(-k)).at_most(2);
+        let five = DormandPrince5.run(system, x0.clone(), span).unwrap();
+        let eight = DormandPrince8.run(system, x0.clone(), span).unwrap();
+        for run in [&five, &eight] {
+            let c = run.certificate();
+            println!(
+                "{name}, T = {time}, 1e-{k}: {} steps, {} rejected, |ΔH| {:.1e}, {:?}",
+                c.steps,
+                c.rejected,
+                c.max_relative_energy_error(),
+                c.projected_steps
+            );
+            assert!(c.max_relative_energy_error() <= 3e-15, "{name}, 1e-{k}: {c}");
+            assert_eq!(c.entropy_falls, 0, "{name}, 1e-{k}: {c}");
+            assert!(c.max_manifold_defect <= 1e-15 && c.keeps_invariants(), "{name}: {c}");
+        }
+        (eight.certificate().steps, eight.last().point.clone())
+    };
+    tolerances.iter().map(|&k| run(k)).collect()
+}
+
+const ALL: [i32; 4] = [3, 6, 9, 12];
+
+#[test]
+fn the_laws_hold_at_every_tolerance() {
+    let (body, spin) = (models::relaxing_body(), spin());
+    for time in [100.0, 1e4] {
+        let ends = sweep("body", &body, &models::UNSTABLE, time, &ALL);
+        if time > 1e3 {
+            // The energy is that of a rotation about the first axis.
+            let energy = body.energy_at(&models::UNSTABLE);
+            for (_, end) in &ends {
+                let off = (end.x.abs() - (20.0 * energy).sqrt()).abs() + end.y.abs() + end.z.abs();
+                assert!(off <= 1e-9, "{end}");
+            }
+            assert!(ends[0].0 <= 800, "{} steps", ends[0].0);
+        }
+        sweep("spinning top", &spin, &Vector3::repeat(3_f64.sqrt().recip()), time, &ALL);
+        sweep("gas, α = 0.5", &gas(0.5), &GAS, time, &ALL);
+        let tolerances: &[i32] = if time > 1e3 { &[4, 8] } else { &ALL };
+        sweep("gas, α = 0.001", &gas(1e-3), &GAS, time, tolerances);
+    }
+}
+
+const GAS: Vector4<f64> = Vector4::new(1.0, 2.0, 2.0, 2.0);
+
+fn spin() -> impl Metriplectic<Manifold = Sphere<2>, Metric = Canonical> {
+    System::on(Sphere::<2>::round()).bracket(AreaForm).energy(top).build().unwrap()
+}
+
+/// Errors are proportional to the tolerance: a method may keep the laws and still be wrong.
+#[test]
+fn a_tenth_of_the_tolerance_is_about_a_tenth_of_the_error() {
+    let exact = end(DormandPrince5, &gas(0.5), &GAS, Span::until(20.0).tolerance(1e-14));
+    let tolerances = [4, 5, 6, 7, 8, 9, 10];
+    let of = |end: &dyn Fn(Until) -> Vector4<f64>| {
+        tolerances.map(|k| (end(Span::until(20.0).tolerance(10_f64.powi(-k))) - exact).norm())
+    };
+    let five = of(&|span| end(DormandPrince5, &gas(0.5), &GAS, span));
+    let eight = of(&|span| end(DormandPrince8, &gas(0.5), &GAS, span));
+    println!("{five:?} {eight:?}");
+    for errors in [five, eight] {
+        let powers = slope(&tolerances.map(|k| 10_f64.powi(-k)), &errors, 1e-13);
+        assert!((0.75..1.35).contains(&powers), "{powers}: {errors:?}");
+    }
+}
+
+#[test]
+fn nothing_drifts_in_a_million_steps() {
+    // Without a leak the entropy is conserved.
+    let run = DormandPrince8.run(&gas(0.0), GAS, Span::steps(0.02, 1_000_000).at_most(2)).unwrap();
+    let c = run.certificate();
+    println!("{c}");
+    assert!(c.max_relative_energy_error() <= 3e-15 && c.entropy_falls == 0, "{c}");
+    assert!(c.entropy_gained.abs() <= 1e-14, "{c}");
 }

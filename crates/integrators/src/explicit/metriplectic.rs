@@ -6,7 +6,7 @@ use metriplectic_fields::{ChartPoint, Column, Dimension, Jet1, ScalarField, Spac
 use metriplectic_manifolds::{InnerProduct, Manifold, Riemannian};
 
 use super::flow::{Projected, ProjectionError, StageFlow, Target};
-use crate::method::{Components, Laws};
+use crate::method::{Components, Flow, Laws};
 use crate::midpoint::{Dim, Numbers};
 
 type Tangent<Y> = Components<Vector<<Y as Metriplectic>::Manifold>>;
@@ -190,7 +190,7 @@ impl<Y: Metriplectic> Projection<'_, Y> {
             let normals = self.normals(&y, &gradients, &g);
             let excess = normals.excess(target.with_entropy)?;
             let here = normals.projected(y.clone(), gradients, target);
-            if excess <= 1.0 {
+            if excess <= target.accepted {
                 return Ok(here);
             }
             if let Some((before, better)) = best.take() {
@@ -199,7 +199,7 @@ impl<Y: Metriplectic> Projection<'_, Y> {
                     return self.stagnated(before, better);
                 }
             }
-            let correction = normals.correction(target.with_entropy);
+            let correction = normals.correction(target);
             moved += correction.magnitude();
             let limit = target.limit.map(|limit| g.orthonormal(&g.flat(&limit.0)).magnitude());
             if !moved.is_finite() || limit.is_some_and(|limit| moved > limit) {
@@ -315,9 +315,9 @@ impl<N: Dimension> Normals<N> {
         }
     }
 
-    /// The correction, in the orthonormal frame; a residual below half its round-off is left.
-    fn correction(&self, with_entropy: bool) -> N::Vector<f64> {
-        let entropy = self.entropy.iter().filter(|entropy| with_entropy && !entropy.dependent);
+    /// The correction, in the orthonormal frame; a residual far below its round-off is left.
+    fn correction<F: Flow>(&self, target: &Target<'_, F>) -> N::Vector<f64> {
+        let entropy = self.entropy.iter().filter(|entropy| target.with_entropy && !entropy.dependent);
         self.before()
             .chain(entropy)
             .filter(|normal| normal.excess() > 0.5)

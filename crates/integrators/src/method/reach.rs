@@ -8,7 +8,8 @@
 //! ```
 //!
 //! `δ` is a quarter of the shortest time of the motion, of the span of the run, `1/|f'_ii|` and
-//! `1/√|f'_ij f'_ji|`, which no unit of an entry changes. It is cut until `r` grows no faster than a power
+//! `1/√|f'_ij f'_ji|`, which no unit of an entry changes. An entry that begins to move with a higher power of time
+//! gets the displacement of a step of size `δ` of the classical method of order 4. `δ` is cut until `r` grows no faster than a power
 //! of `δ`, so that a steep wall on the way does not count.
 //!
 //! The terms of a velocity have the sizes `t_i = Σ_j (|Π_ij||∂_jH| + |K_ij||∂_jS| + |f'_ij||x_j|)`.
@@ -57,14 +58,31 @@ pub(super) fn reach<Y: Metriplectic>(
         }
         delta *= 0.25;
     }
+    let classical = classical_step(system, x, v, delta).unwrap_or(origin);
     let sizes = Vector::<Y::Manifold>::from_index(|i| {
         let linear = (delta * v[i].abs()).max(0.5 * delta * delta * a[i].abs());
-        linear.max(delta * r[i].abs() / 3.0)
+        let first = linear.max(delta * r[i].abs() / 3.0);
+        if first < LATE * classical[i].abs() { classical[i].abs() } else { first }
     });
     (sizes.is_finite() && terms.is_finite())
         .then_some(Scales { sizes: Components(sizes), terms: Components(terms) })
 }
 
+/// The displacement of a step of the classical Runge-Kutta method; `None` if it leaves the domain.
+fn classical_step<Y: Metriplectic>(
+    system: &Y,
+    x: &Point<Y>,
+    v: Vector<Y::Manifold>,
+    h: f64,
+) -> Option<Vector<Y::Manifold>> {
+    let second = velocity(system, x, v * (0.5 * h))?;
+    let third = velocity(system, x, second * (0.5 * h))?;
+    let last = velocity(system, x, third * h)?;
+    Some((v + (second + third) * 2.0 + last) * (h / 6.0))
+}
+
+/// The fraction of a displacement below which the first powers of time say nothing of it.
+const LATE: f64 = 1e-6;
 /// How often the time `δ` is cut before the nonlinear part is given up.
 const CUTS: usize = 30;
 /// A nonlinear part that grows faster than `δ⁴` is that of a wall: `2⁴`, and a quarter more.
@@ -167,6 +185,25 @@ mod tests {
             let units = exponents.map(|k| 2_f64.powi(k)).into();
             assert_eq!(oscillator(units), one, "{exponents:?}");
         }
+    }
+
+    /// `x' = y`, `y' = z`, `z' = u`, `u' = 1` from rest, in a Hamiltonian system: `x = t⁴/24`.
+    #[test]
+    fn an_entry_that_moves_late_has_a_size() {
+        let mut pi = nalgebra::Matrix6::zeros();
+        for i in 0..3 {
+            (pi[(i, i + 3)], pi[(i + 3, i)]) = (1.0, -1.0);
+        }
+        let system = System::on(Euclidean::<6>)
+            .bracket(Poisson::constant(pi).unwrap())
+            .energy(|x: &nalgebra::Vector6<Real>| {
+                // q₁' = q₂, q₂' = q₃, q₃' = p₃, p₃' = 1.
+                x[3] * x[1] + x[4] * x[2] + x[5] * x[5] * 0.5 - x[2]
+            })
+            .build()
+            .unwrap();
+        let sizes = Scales::at(&system, &nalgebra::Vector6::zeros(), Some(4.0)).sizes.0;
+        assert!(sizes[0] > 0.01 && sizes[1] > 0.05, "{sizes}");
     }
 
     #[test]

@@ -335,6 +335,14 @@ impl fmt::Display for Certificate {
                 "accuracy:    the motion is not resolved: local errors up to {error:.1e} of the state in a step"
             )?;
         }
+        self.projections(f)?;
+        if self.effort == Effort::default() {
+            return write!(f, "solver:      explicit steps, none split");
+        }
+        if self.effort.iterations == 0 {
+            let splits = counted(self.effort.splits, "split", "splits");
+            return write!(f, "solver:      explicit steps, {splits}");
+        }
         write!(
             f,
             "solver:      {} ({} in the worst step), {}",
@@ -353,7 +361,36 @@ impl fmt::Display for Certificate {
     }
 }
 
+/// The fraction of steps at the edge of stability from which on stability sets the steps of a run.
+const AT_THE_EDGE: f64 = 0.5;
+
 impl Certificate {
+    /// Whether stability, and not the tolerance, sets the steps of an explicit method.
+    pub const fn is_limited_by_stability(&self) -> bool {
+        self.projected_steps.stability as f64 > AT_THE_EDGE * self.steps as f64
+    }
+
+    /// How the steps of an explicit method found the entropy, and what has set their size.
+    fn projections(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let ProjectedSteps { targeted, free, held, stability } = self.projected_steps;
+        if self.projected_steps.all() > 0 {
+            let falls = counted(self.falls_avoided, "fall", "falls");
+            writeln!(
+                f,
+                "entropy:     {targeted} steps targeted, {free} free, {held} held; {falls} avoided by a smaller step"
+            )?;
+        }
+        if self.is_limited_by_stability() {
+            let steps = counted(self.steps, "step", "steps");
+            writeln!(
+                f,
+                "stability:   it sets the size of {stability} of {steps}, and not the tolerance; an implicit method, \
+                 such as `WeylMidpoint`, takes larger ones"
+            )?;
+        }
+        Ok(())
+    }
+
     /// The energy at the start, and the error relative to it where it is not zero.
     fn relative_to(&self) -> String {
         let start = self.initial_energy;

@@ -176,12 +176,6 @@ fn outputs_are_as_accurate_as_the_steps() {
         accuracy("S² × R", (&spin(), &SPIN), scheme, (h, 20));
         accuracy("SO(3)", (&group(), &attitude()), scheme, (h / 5.0, 20));
         accuracy("se(3)*", (&heavy_top(), &TOP), scheme, (h, 20));
-        accuracy(
-            "so(3)*, order 5",
-            (&relaxing_body(), &vector![0.2, -1.0, 0.3]),
-            DormandPrince5,
-            (h, 20),
-        );
     }
 }
 

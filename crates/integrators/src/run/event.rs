@@ -36,7 +36,7 @@ use crate::run::trajectory::State;
 /// let watch = Observables::on(&body).of("p1", |p| p.x);
 /// let mut table = watch.csv(Vec::new())?;
 /// for event in run.events() {
-///     println!("{event}"); // node falls at t = 2.208157
+///     println!("{event}"); // node falls at t = 1.268901
 ///     table.write(&event.state)?;
 /// }
 /// # assert!(run.events().len() > 1 && run.events()[0].to_string().starts_with("node falls at t ="));

@@ -130,7 +130,7 @@
 //! | `Point<D>` | any type that holds numbers of `D`: a column, a matrix, a pair | the compiler |
 //! | `chart`, `coordinates` | `φ_x` and `φ_x⁻¹`, with `φ_x(0) = x`, written once for `f64` and all dual numbers | [`laws::manifold`](crate::manifolds::laws::manifold) |
 //! | `embed` | `θ(q) v`, the velocity to which tensors refer: the derivative of `φ_x`, or a frame of your choice | geodesics of constant speed, [`laws::metric`](crate::manifolds::laws::metric) |
-//! | `defect`, `project`, `entries`, `magnitude`, `scales`, `random` | the distance from the manifold, the nearest point, the scale of round-off (of a point, and of each direction of its chart), samples for the checks of a model | [`laws::manifold`](crate::manifolds::laws::manifold), in part |
+//! | `defect`, `project`, `entries`, `magnitude`, `scales`, `pairing_size`, `random` | the distance from the manifold, the nearest point, the scale of round-off (of a point, of each direction of its chart, and of a slope), samples for the checks of a model | [`laws::manifold`](crate::manifolds::laws::manifold), in part |
 //! | `NaturalBracket` | the bracket that [`System::on`](crate::dynamics::System::on) starts with | [`laws::bracket`](crate::dynamics::laws::bracket) |
 //!
 //! Write the chart so that it ends *on* the manifold for every `q`. Here the third entry is computed from the others; on

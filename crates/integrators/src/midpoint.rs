@@ -38,7 +38,7 @@ mod predictor;
 mod run;
 
 use metriplectic_dynamics::velocity::projected_fractions;
-use metriplectic_dynamics::{Metriplectic, SecondLaw, system::Point};
+use metriplectic_dynamics::{Invariants, Metriplectic, SecondLaw, system::Point};
 use metriplectic_fields::{ChartPoint, Column, Dimension, ScalarField, Space, Vector};
 use metriplectic_manifolds::{Manifold, Retraction};
 
@@ -207,20 +207,28 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
         }
         let end = self.retraction.end(system.metric(), start.x, &root.u);
         let end = end.map_err(|_| failed(Cause::Edge, effort))?;
-        let level::Polished { u, end, moved } = level::polish(&equation, &root, end, &mut effort);
+        let level::Polished { u, end, moved, evaluated } =
+            level::polish(&equation, &root, end, &mut effort);
         // Outside an open chart the defect is infinite: there is no state to go on from.
         if system.manifold().defect(&end).is_infinite() {
             return Err(failed(Cause::Edge, effort));
         }
         memory.predictor.note::<Y::Manifold>(start.x, &u, &end);
-        let x = if moved {
+        let compensated = if moved {
             memory.compensation.clear();
-            end
+            None
         } else {
-            memory.compensation.add(system.metric(), (start.x, &u), end)
+            memory.compensation.add(system.metric(), (start.x, &u), &end)
         };
+        let evaluated = if compensated.is_some() { None } else { evaluated };
+        let x = compensated.unwrap_or(end);
         // The last digits of the end, which no residual has seen, may be beyond the edge.
-        let values = system.laws(&x);
+        let values = match evaluated {
+            Some([energy, entropy]) if Y::Invariants::COUNT == 0 => {
+                Laws { energy, entropy, ..start.values }
+            }
+            _ => system.laws(&x),
+        };
         let change = values.energy - start.values.energy;
         if !values.entropy.is_finite() {
             return Err(failed(Cause::Edge, effort));

@@ -57,7 +57,7 @@ use metriplectic_fields::{ChartPoint, Column, Scalar, Space};
 use nalgebra::{Const, SMatrix, SVector};
 use rand::{Rng, RngExt};
 
-use crate::euclidean::components_are_velocities;
+use crate::euclidean::{components_are_velocities, sum_of_terms};
 use crate::{Flat, Manifold, PointError};
 
 /// An open part of Rⁿ, in coordinates and with a metric that you choose. See the [module](mod@crate::chart).
@@ -165,6 +165,11 @@ impl<const N: usize> Manifold for Chart<N> {
     #[inline]
     fn scales(x: &SVector<f64, N>) -> SVector<f64, N> {
         x.abs()
+    }
+
+    #[inline]
+    fn pairing_size(w: &SVector<f64, N>, v: &SVector<f64, N>) -> f64 {
+        sum_of_terms(w, v)
     }
 
     /// Returns the point itself, because the nearest point of the domain is not known.

@@ -54,6 +54,12 @@ macro_rules! components_are_velocities {
 }
 pub(crate) use components_are_velocities;
 
+/// The sum `Σ_i |w_i v_i|`, in which the unit of an entry cancels.
+#[inline]
+pub(crate) fn sum_of_terms<V: Column<f64>>(w: &V, v: &V) -> f64 {
+    (0..V::LEN).fold(0.0, |sum, i| sum + (w[i] * v[i]).abs())
+}
+
 /// The charts of a vector space, and its membership: every finite column of numbers is a point.
 macro_rules! vector_space {
     ($space:ident) => {
@@ -116,6 +122,11 @@ macro_rules! vector_space {
             #[inline]
             fn scales(x: &SVector<f64, N>) -> SVector<f64, N> {
                 x.abs()
+            }
+
+            #[inline]
+            fn pairing_size(w: &SVector<f64, N>, v: &SVector<f64, N>) -> f64 {
+                $crate::euclidean::sum_of_terms(w, v)
             }
 
             fn project(&self, x: &SVector<f64, N>) -> SVector<f64, N> {

@@ -104,6 +104,11 @@ impl Manifold for HalfLine {
         Vector1::new(1.0)
     }
 
+    #[inline]
+    fn pairing_size(w: &Vector1<f64>, v: &Vector1<f64>) -> f64 {
+        (w.x * v.x).abs()
+    }
+
     /// No positive number is nearest to one that is not: `2.2·10⁻³⁰⁸`, the smallest of full precision,
     /// stands for zero.
     fn project(&self, x: &Vector1<f64>) -> Vector1<f64> {

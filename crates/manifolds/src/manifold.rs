@@ -92,6 +92,23 @@ pub trait Manifold: Space {
         Vector::<Self>::from_index(|_| size)
     }
 
+    /// The size of the terms of the slope `⟨w, v⟩` of a covector along a vector.
+    ///
+    /// On a flat space it is `Σ_i |w_i v_i|`, where the unit of an entry cancels. On a curved space the frame is
+    /// arbitrary, and the default `|w||v|` is the same in all frames. A product has the sum over its factors.
+    ///
+    /// ```
+    /// use metriplectic_manifolds::{Euclidean, Manifold, Product, Sphere};
+    /// use nalgebra::vector;
+    /// type Spin = Product<Sphere<2>, Euclidean<2>>;
+    /// let (w, v) = (vector![3.0, 4.0, 1e9, 2.0], vector![4.0, -3.0, 1e-9, -3.0]);
+    /// assert_eq!(Spin::pairing_size(&w, &v), 25.0 + 7.0);
+    /// ```
+    #[inline]
+    fn pairing_size(w: &Vector<Self>, v: &Vector<Self>) -> f64 {
+        w.magnitude() * v.magnitude()
+    }
+
     /// Projects an array of numbers to the nearest point of the manifold, or to one of several. Entries that are
     /// not finite stay so. If no point is nearest, as for the centre of a sphere, the entries are NaN.
     /// [`check`](Self::check) finds both.

@@ -205,6 +205,12 @@ impl<A: Manifold + Times<B>, B: Manifold> Manifold for Product<A, B> {
         Self::join(&A::scales(a), &B::scales(b))
     }
 
+    #[inline]
+    fn pairing_size(w: &Vector<Self>, v: &Vector<Self>) -> f64 {
+        let ((wa, wb), (va, vb)) = (Self::split(w), Self::split(v));
+        A::pairing_size(&wa, &va) + B::pairing_size(&wb, &vb)
+    }
+
     fn project(&self, (a, b): &Self::Point<f64>) -> Self::Point<f64> {
         (self.0.project(a), self.1.project(b))
     }

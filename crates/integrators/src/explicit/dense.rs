@@ -49,7 +49,7 @@ pub(super) fn between<F: StageFlow>(
     };
     let laws = with_entropy(step.reference, entropy);
     let onto = |with_entropy| {
-        let target = Target { laws: &laws, with_entropy, limit: None, accepted: 1.0 };
+        let target = Target { laws: &laws, with_entropy, limit: None };
         flow.project(y.clone(), &target).ok().map(|end| end.x)
     };
     if exact { onto(true).or_else(|| onto(false)) } else { onto(false) }

@@ -57,8 +57,6 @@ pub struct Target<'a, F: Flow + ?Sized> {
     pub with_entropy: bool,
     /// A displacement, longer than which none is allowed.
     pub limit: Option<&'a F::Vector>,
-    /// Residuals, in units of their round-off, that are not corrected: 1, or less for the last digits.
-    pub accepted: f64,
 }
 
 /// A state on its laws.

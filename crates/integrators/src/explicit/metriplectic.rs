@@ -6,7 +6,7 @@ use metriplectic_fields::{ChartPoint, Column, Dimension, Jet1, ScalarField, Spac
 use metriplectic_manifolds::{InnerProduct, Manifold, Riemannian};
 
 use super::flow::{Projected, ProjectionError, StageFlow, Target};
-use crate::method::{Components, Flow, Laws};
+use crate::method::{Components, Laws};
 use crate::midpoint::{Dim, Numbers};
 
 type Tangent<Y> = Components<Vector<<Y as Metriplectic>::Manifold>>;
@@ -159,10 +159,15 @@ struct Normals<N: Dimension> {
     energy: Normal<N::Vector<f64>>,
     invariants: N::Array<Option<Normal<N::Vector<f64>>>>,
     entropy: Option<Normal<N::Vector<f64>>>,
+    /// The residual of the entropy in units of its round-off, whatever it depends on.
+    off: f64,
 }
 
 /// The independent fraction of a differential below which it is a combination of others.
 const INDEPENDENT: f64 = 1e-10;
+/// The residual of an entropy, in units of its round-off, from which on the round-off of the other laws, which
+/// moves it too, is corrected.
+const OFF: f64 = 0.8;
 /// The most corrections.
 const CORRECTIONS: usize = 8;
 /// Residuals, in units of round-off, with which a state is accepted that no correction improves.
@@ -190,16 +195,19 @@ impl<Y: Metriplectic> Projection<'_, Y> {
             let normals = self.normals(&y, &gradients, &g);
             let excess = normals.excess(target.with_entropy)?;
             let here = normals.projected(y.clone(), gradients, target);
-            if excess <= target.accepted {
+            // Two ends whose entropies are each off by less cannot differ by a fall.
+            let is_off = target.with_entropy && normals.off > OFF;
+            if excess <= 1.0 && !is_off {
                 return Ok(here);
             }
+            let excess = if is_off { excess.max(normals.off / OFF) } else { excess };
             if let Some((before, better)) = best.take() {
                 if before <= excess {
                     // No correction improves it.
                     return self.stagnated(before, better);
                 }
             }
-            let correction = normals.correction(target);
+            let correction = normals.correction(target.with_entropy, is_off);
             moved += correction.magnitude();
             let limit = target.limit.map(|limit| g.orthonormal(&g.flat(&limit.0)).magnitude());
             if !moved.is_finite() || limit.is_some_and(|limit| moved > limit) {
@@ -254,6 +262,7 @@ impl<Y: Metriplectic> Projection<'_, Y> {
             energy: Normal { dependent: energy.square == 0.0, ..energy },
             invariants: Dim::<Y>::array(|_| None),
             entropy: None,
+            off: 0.0,
         };
         for (k, listed) in w.invariants.as_ref().iter().enumerate() {
             let Some((_, l)) = listed else { break };
@@ -262,6 +271,7 @@ impl<Y: Metriplectic> Projection<'_, Y> {
         }
         if self.system.second_law() == SecondLaw::Exact {
             let whole = normal(&w.entropy, laws.entropy, values.entropy);
+            normals.off = whole.excess();
             normals.entropy = Some(normals.independent(whole));
         }
         normals
@@ -315,9 +325,10 @@ impl<N: Dimension> Normals<N> {
         }
     }
 
-    /// The correction, in the orthonormal frame; a residual far below its round-off is left.
-    fn correction<F: Flow>(&self, target: &Target<'_, F>) -> N::Vector<f64> {
-        let entropy = self.entropy.iter().filter(|entropy| target.with_entropy && !entropy.dependent);
+    /// The correction, in the orthonormal frame. A residual below half its round-off is left, unless the last digits
+    /// are asked for.
+    fn correction(&self, with_entropy: bool, last_digits: bool) -> N::Vector<f64> {
+        let entropy = self.entropy.iter().filter(|entropy| with_entropy && !entropy.dependent);
         self.before()
             .chain(entropy)
             .filter(|normal| normal.excess() > 0.5)

@@ -20,8 +20,6 @@ const HARDLY_ALLOWED: f64 = 1e-3;
 /// The fraction of the round-off of an increment by which the entropy may fall: less than what the certificate
 /// counts as a fall.
 const FALL: f64 = 0.875;
-/// The residual, in units of its round-off, that is left where the last digits count.
-const LAST_DIGITS: f64 = 0.125;
 /// How often a step of a fixed size is halved.
 const HALVES: u32 = 12;
 /// The length of a projection in units of the error that is allowed.
@@ -287,17 +285,15 @@ impl<F: StageFlow> Onto<'_, F> {
         };
         let mut laws = start.reference.clone();
         if flow.entropy_law() != SecondLaw::Exact {
-            let target =
-                Target { laws: &laws, with_entropy: false, limit: Some(&limit), accepted: 1.0 };
+            let target = Target { laws: &laws, with_entropy: false, limit: Some(&limit) };
             let end = flow.project(y, &target).map_err(refused)?;
             return Ok(Landed { end, produced, how: EntropyStep::Free });
         }
         if self.is_trusted() {
             let target = produced.plus(last.rise);
             laws.entropy = target.sum;
-            let onto =
-                Target { laws: &laws, with_entropy: true, limit: Some(&limit), accepted: 1.0 };
-            if let Ok(end) = self.land(y.clone(), onto)
+            let onto = Target { laws: &laws, with_entropy: true, limit: Some(&limit) };
+            if let Ok(end) = flow.project(y.clone(), &onto)
                 && !self.falls(&end)
             {
                 let largest = produced.largest.max(end.entropy);
@@ -306,8 +302,8 @@ impl<F: StageFlow> Onto<'_, F> {
             }
         }
         laws.entropy = produced.sum;
-        let onto = Target { laws: &laws, with_entropy: false, limit: Some(&limit), accepted: 1.0 };
-        let end = self.land(y, onto).map_err(refused)?;
+        let onto = Target { laws: &laws, with_entropy: false, limit: Some(&limit) };
+        let end = flow.project(y, &onto).map_err(refused)?;
         let least = produced.largest - 2.0 * end.entropy_round_off;
         if end.entropy < least || self.falls(&end) {
             return Err(Refused::Falls);
@@ -315,17 +311,6 @@ impl<F: StageFlow> Onto<'_, F> {
         let largest = produced.largest.max(end.entropy);
         let produced = Produced { largest, ..Produced::from(end.entropy) };
         Ok(Landed { end, produced, how: EntropyStep::Free })
-    }
-
-    /// Projects the end of the step. The round-off of the energy moves the entropy too: where this alone makes it
-    /// fall, the last digits are corrected.
-    #[inline]
-    fn land(&self, y: Element<F>, onto: Target<'_, F>) -> Result<Projected<F>, ProjectionError> {
-        let end = self.flow.project(y, &onto)?;
-        if !self.falls(&end) {
-            return Ok(end);
-        }
-        self.flow.project(end.x, &Target { accepted: LAST_DIGITS, ..onto })
     }
 
     /// Whether the entropy that was produced may be aimed at.

@@ -67,7 +67,7 @@ impl<Y: Metriplectic> Flow for Y {
         entropy: Option<f64>,
     ) -> Option<Point<Y>> {
         let laws = Laws { entropy: entropy.unwrap_or(laws.entropy), ..*laws };
-        let target = Target { laws: &laws, with_entropy: entropy.is_some(), limit: None, accepted: 1.0 };
+        let target = Target { laws: &laws, with_entropy: entropy.is_some(), limit: None };
         self.project(y.clone(), &target).ok().map(|end| end.x)
     }
 

@@ -1,6 +1,6 @@
 //! What rounding loses of a position.
 
-use metriplectic_fields::{Column, Dimension};
+use metriplectic_fields::Dimension;
 use metriplectic_manifolds::{Manifold, Riemannian};
 
 /// The digits that rounding has lost of the position in the steps so far.
@@ -20,24 +20,24 @@ impl<N: Dimension> Compensation<N> {
         self.0 = None;
     }
 
-    /// The end of the step `d` from `x`, moved by what earlier steps have lost.
+    /// The end of the step `d` from `x`, moved by what earlier steps have lost; `None` if it does not move.
     #[inline]
     pub(crate) fn add<M: Manifold<Dim = N>, G: Riemannian<M>>(
         &mut self,
         metric: &G,
         (x, d): (&M::Point<f64>, &N::Vector<f64>),
-        end: M::Point<f64>,
-    ) -> M::Point<f64> {
-        let lost = metric.lost_digits(x, d, &end);
+        end: &M::Point<f64>,
+    ) -> Option<M::Point<f64>> {
+        let lost = metric.lost_digits(x, d, end);
         match self.0 {
-            Some(before) if before.magnitude() > 0.0 => {
-                let compensated = M::chart(&end, &before);
-                self.0 = Some(lost + metric.lost_digits(&end, &before, &compensated));
-                compensated
+            Some(before) if (0..N::LEN).any(|i| before[i].abs() > 0.0) => {
+                let compensated = M::chart(end, &before);
+                self.0 = Some(lost + metric.lost_digits(end, &before, &compensated));
+                Some(compensated)
             }
             _ => {
                 self.0 = Some(lost);
-                end
+                None
             }
         }
     }

@@ -33,6 +33,8 @@ pub(crate) struct Polished<Y: Metriplectic> {
     pub(crate) end: Point<Y>,
     /// Whether the end is no longer that of `u`.
     pub(crate) moved: bool,
+    /// Energy and entropy at the end, where they are known.
+    pub(crate) evaluated: Option<[f64; 2]>,
 }
 
 /// Corrects a root with the end `x'` at which the energy is not conserved to round-off, or the entropy falls.
@@ -48,30 +50,32 @@ where
     R: Retraction<Y::Manifold, Y::Metric>,
     W: DiscreteGradient,
 {
-    match corrected(equation, root, &end) {
+    let laws = [equation.system.energy_at(&end), equation.system.entropy_at(&end)];
+    match corrected(equation, root, &end, laws) {
         Some(corrected) => {
             effort.iterations += 1;
             corrected
         }
-        None => Polished { u: root.u, end, moved: false },
+        None => Polished { u: root.u, end, moved: false, evaluated: Some(laws) },
     }
 }
 
-/// The corrected root; `None` if there is nothing to correct.
+/// The corrected root of an end with this energy and entropy; `None` if there is nothing to correct.
 #[inline]
 fn corrected<Y, R, W>(
     equation: &Residual<'_, Y, R, W>,
     root: &Root<Y::Manifold, Dissipated>,
     end: &Point<Y>,
+    [energy, entropy]: [f64; 2],
 ) -> Option<Polished<Y>>
 where
     Y: Metriplectic,
     R: Retraction<Y::Manifold, Y::Metric>,
     W: DiscreteGradient,
 {
-    let Residual { system, values, .. } = equation;
-    let e = imbalance(equation, end);
-    let growth = system.entropy_at(end) - values.entropy;
+    let Residual { values, drift, .. } = equation;
+    let e = energy - values.energy + drift.energy;
+    let growth = entropy - values.entropy;
     let balanced = e.abs() <= ROUNDED * values.energy.abs();
     let corrected = if balanced { None } else { Level { equation }.energy(root, end, e) };
     let falls = growth < -ROUNDED * values.entropy.abs();
@@ -137,7 +141,7 @@ where
             return None;
         }
         if !closed && let Some(end) = self.move_onto_level(u, end) {
-            return Some(Polished { u: *u, end, moved: true });
+            return Some(Polished { u: *u, end, moved: true, evaluated: None });
         }
         let balanced = self.corrected(u, e, None);
         let balanced = balanced.filter(|(_, end)| imbalance(self.equation, end).abs() < e.abs());
@@ -145,9 +149,9 @@ where
         if (closed || balanced.is_some())
             && let Some(end) = self.move_onto_level(u, at)
         {
-            return Some(Polished { u: *u, end, moved: true });
+            return Some(Polished { u: *u, end, moved: true, evaluated: None });
         }
-        balanced.map(|(u, end)| Polished { u, end, moved: false })
+        balanced.map(|(u, end)| Polished { u, end, moved: false, evaluated: None })
     }
 
     /// The correction for an entropy that has fallen by nearly its round-off, if it then falls by less.
@@ -167,7 +171,7 @@ where
         let better = system.entropy_at(&end) > entropy;
         let allowed = e.abs().max(ROUNDED * values.energy.abs());
         let balanced = imbalance(self.equation, &end).abs() <= allowed;
-        (better && balanced).then_some(Polished { u, end, moved: false })
+        (better && balanced).then_some(Polished { u, end, moved: false, evaluated: None })
     }
 
     /// A root after one more correction, in whose residual the part along `w_H` is the error `e` of the energy,

@@ -28,7 +28,7 @@ pub struct StableGradient<M: Space> {
     mean: Vector<M>,
     /// The defect `F(x') − F(x) − ⟨w̄, d⟩`.
     defect: f64,
-    /// The sum `Σ_i |w̄_i d_i|` of the absolute terms of the slope.
+    /// The size of the terms of the slope `⟨w̄, d⟩` ([`Manifold::pairing_size`]).
     change: f64,
     /// The size of a rounding error in a difference of two values of `F`.
     rounding: f64,
@@ -95,9 +95,9 @@ impl<M: Manifold> StableGradient<M> {
         nodes: impl FnOnce() -> N,
     ) -> Self {
         let slope = mean.dot(d);
-        let (mut change, mut size) = (0.0, start.abs() + end.abs());
+        let change = M::pairing_size(mean, d);
+        let mut size = start.abs() + end.abs();
         for i in 0..M::Dim::LEN {
-            change += (mean[i] * d[i]).abs();
             size += mean[i].abs() * scales[i];
         }
         let rounding = f64::EPSILON * size;

@@ -7,7 +7,7 @@ pub(crate) struct Sample {
     pub(crate) value: f64,
 }
 
-/// Evaluations after which a bracket is halved if they have not done so; one less each time that happens.
+/// Evaluations after which a bracket is halved if they have not done so; one less each time that happens, and in the end it is bisected.
 const PATIENCE: usize = 4;
 
 /// Narrows a bracket across which a function changes its sign, until it is `width` wide or the function is zero at
@@ -34,7 +34,7 @@ pub(crate) fn narrow(
         let is_close = !(secant >= start.at + margin && secant <= end.at - margin);
         let halves = since >= patience || !secant.is_finite();
         if halves {
-            patience = (patience - 1).max(1);
+            patience = patience.saturating_sub(1);
         }
         let at = if halves {
             start.at + 0.5 * length

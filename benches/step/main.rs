@@ -91,7 +91,8 @@ impl Row {
                 (Default::default(), black_box(start.clone()), 0);
             let mut values = system.laws(&x);
             for _ in 0..steps {
-                let start = StepStart { x: &x, time: 0.0, values, reference: values };
+                let start =
+                    StepStart { x: &x, time: 0.0, values, reference: values, allowed: None };
                 let Ok(taken) = scheme.step(&system, &start, h, &mut memory) else { break };
                 iterations += taken.effort.iterations;
                 (x, values) = (taken.x, taken.values);

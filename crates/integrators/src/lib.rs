@@ -3,7 +3,7 @@
 //! | module | what it holds | knows |
 //! |---|---|---|
 //! | [`step_error`] | [`StepError`]: what can go wrong in a step | |
-//! | [`run`] | [`Span`], [`Until`], [`Steps`], [`Trajectory`], [`Certificate`], [`Checkpoint`], [`Observables`]: what a user does with a run of any method | [`method`] |
+//! | [`run`] | [`Span`], [`Until`], [`Watch`], [`Steps`], [`Trajectory`], [`Event`], [`Certificate`], [`Checkpoint`], [`Observables`]: what a user does with a run of any method | [`method`] |
 //! | [`method`] | [`Flow`] and [`Method`]: what a run knows of a system and of a method | |
 //! | [`newton`] | [`Newton`]: the solver of every implicit step | |
 //! | [`discrete_gradient`] | [`DiscreteGradient`]: [`Gonzalez`], [`MeanValue`], [`ItohAbe`], [`SymmetricItohAbe`] | |
@@ -50,9 +50,11 @@ pub use round_off::stable_gradient::StableGradient;
 pub use run::certificate::{Certificate, InvariantBalance, ProjectedSteps};
 pub use run::checkpoint::{Checkpoint, ResumeError, Saved};
 pub use run::controller::Until;
+pub use run::event::Event;
 pub use run::observables::{Csv, Npy, Observables, TableError};
 pub use run::scales::Scales;
 pub use run::span::{Schedule, Span, SpanError};
 pub use run::steps::Steps;
 pub use run::trajectory::{Ending, State, Trajectory};
+pub use run::watch::{Watch, Watched};
 pub use step_error::StepError;

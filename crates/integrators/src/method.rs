@@ -268,8 +268,8 @@ pub trait Method<F: Flow>: Sized {
         memory: &mut Self::Memory,
         theta: f64,
     ) -> Option<Element<F>> {
-        let _ = (flow, step, memory, theta);
-        None
+        let _ = memory;
+        crate::run::dense::between(flow, step, self.promises(flow), theta)
     }
 
     /// Verifies the model and starts a run: endless in steps of size `h`, or over a [`Span`](crate::Span) or

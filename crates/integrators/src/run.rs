@@ -3,8 +3,14 @@
 pub mod certificate;
 pub mod checkpoint;
 pub mod controller;
+pub mod dense;
+pub mod event;
 pub mod observables;
+mod output;
+mod record;
+mod root;
 pub mod scales;
 pub mod span;
 pub mod steps;
 pub mod trajectory;
+pub mod watch;

@@ -141,6 +141,19 @@ pub enum StepError {
         /// What was done to solve it.
         tried: Effort,
     },
+    /// A state inside a step was asked for, and the flow gives no displacement between the ends of the step, or
+    /// none as large as this one.
+    #[error(
+        "the step of size {h:.3e} from t = {} was taken, and the flow does not say what lies inside it, where an \
+         output or an event was asked for; take a smaller step, or implement `Flow::displacement`",
+        digits(.time)
+    )]
+    NothingBetween {
+        /// The time at which the step starts.
+        time: f64,
+        /// The size of the step.
+        h: f64,
+    },
 }
 
 impl fmt::Debug for StepError {

@@ -38,7 +38,7 @@
 //! ```
 //!
 //! The system and the scheme are not in it, since closures cannot be written down: resume with the same
-//! ones. Another system is noticed if its energy, its entropy, a further invariant or its velocity has
+//! ones. Nor are outputs at given times and events: say them again ([`Steps::watching`]). Another system is noticed if its energy, its entropy, a further invariant or its velocity has
 //! another value at the point, by more than the round-off of its terms. The model is not verified again. All
 //! numbers of a checkpoint are compared with each other, and with what the system says at the point.
 //!
@@ -96,6 +96,7 @@ use metriplectic_manifolds::PointError;
 use crate::method::{Control, Effort, Flow, Memory, Method, StateSpace, Vector};
 use crate::run::certificate::{Certificate, ProjectedSteps};
 use crate::run::controller::{Cap, Controller, Entries, StepSize};
+use crate::run::output::StepBefore;
 use crate::run::scales::Scales;
 use crate::run::span::{SpanError, check_end, check_step_size, check_steps};
 use crate::run::steps::{Progress, Steps};
@@ -209,6 +210,7 @@ enum SavedEntries {
 enum SavedEnding {
     Span,
     Rest { speed: Exact, largest: Exact },
+    Event { index: usize },
     Stopped,
 }
 
@@ -339,7 +341,7 @@ impl Checkpoint {
     }
 
     fn go_on(&mut self) {
-        if self.ending == Some(SavedEnding::Span) {
+        if matches!(self.ending, Some(SavedEnding::Span | SavedEnding::Event { .. })) {
             self.ending = None;
         }
     }
@@ -427,14 +429,18 @@ impl<'a, F: Flow, M: Method<F>> Steps<'a, F, M> {
         }
         let (energy, entropy, time) = (c.energy.0, c.entropy.0, c.time.0);
         let state = State { step: c.step, time, point, energy, entropy };
+        let (kept, h) = (c.kept_entropy.0, 0.0);
+        let before = StepBefore { state: state.clone(), values: values.clone(), entropy: kept, h };
         Ok(Self {
             promises: certificate.promises,
+            before,
+            watching: None,
             method,
             flow,
             progress,
             state,
             values,
-            entropy: c.kept_entropy.0,
+            entropy: kept,
             memory,
             certificate,
             failed: false,
@@ -556,6 +562,7 @@ impl SavedEnding {
             Ending::Rest { speed, largest } => {
                 Self::Rest { speed: Exact(speed), largest: Exact(largest) }
             }
+            Ending::Event { index } => Self::Event { index },
             Ending::Stopped => Self::Stopped,
         }
     }
@@ -564,6 +571,7 @@ impl SavedEnding {
         match self {
             Self::Span => Ending::Span,
             Self::Rest { speed, largest } => Ending::Rest { speed: speed.0, largest: largest.0 },
+            Self::Event { index } => Ending::Event { index: *index },
             Self::Stopped => Ending::Stopped,
         }
     }

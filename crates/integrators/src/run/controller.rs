@@ -64,6 +64,7 @@
 use crate::method::{Control, Element, Flow, Vector};
 use crate::run::scales::{Scales, relative};
 use crate::run::span::{Schedule, Size, Span, SpanError, check_end, check_step_size};
+use crate::run::watch::Requests;
 
 /// A run to a time, in steps that follow a tolerance; made by [`Span::until`].
 ///
@@ -243,7 +244,7 @@ impl<const N: usize> From<Until<N>> for Schedule {
             Entries::Absolute(errors) => Entries::Absolute(errors.into()),
         };
         let size = Size::Tolerance(Adaptive { end, tolerance, first, least, largest, entries });
-        Self { size, start, count: None, every, most, rest }
+        Self { size, start, count: None, every, most, rest, watch: Requests::default() }
     }
 }
 

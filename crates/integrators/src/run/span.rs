@@ -1,6 +1,7 @@
 //! How far a run goes, in which steps, and what of it is recorded.
 
 use crate::run::controller::Adaptive;
+use crate::run::watch::Requests;
 
 /// The time span of a run: the step size, the number of steps, and every how many a state is kept.
 ///
@@ -90,6 +91,8 @@ impl Span {
 /// | a number `h` | of size `h` | you stop |
 /// | [`Span::steps`]`(h, count)` | of size `h` | `count` of them |
 /// | [`Span::until`]`(end)` | that follow a tolerance | `t = end` |
+///
+/// Each of them may ask for states at given times and for events: see [`Watch`](crate::Watch).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Schedule {
     pub(crate) size: Size,
@@ -100,6 +103,8 @@ pub struct Schedule {
     /// The most states to record.
     pub(crate) most: Option<usize>,
     pub(crate) rest: Option<f64>,
+    /// The outputs and the events.
+    pub(crate) watch: Requests,
 }
 
 /// How large the steps of a course are.
@@ -112,13 +117,15 @@ pub(crate) enum Size {
 impl From<f64> for Schedule {
     fn from(h: f64) -> Self {
         let (start, every, most, rest) = (0.0, 1, None, None);
-        Self { size: Size::Fixed(h), start, count: None, every, most, rest }
+        let watch = Requests::default();
+        Self { size: Size::Fixed(h), start, count: None, every, most, rest, watch }
     }
 }
 
 impl From<Span> for Schedule {
     fn from(Span { start, step, count, every, rest }: Span) -> Self {
-        Self { size: Size::Fixed(step), start, count: Some(count), every, most: None, rest }
+        let (size, watch) = (Size::Fixed(step), Requests::default());
+        Self { size, start, count: Some(count), every, most: None, rest, watch }
     }
 }
 
@@ -154,6 +161,9 @@ impl Schedule {
         }
         if self.every == 0 {
             return Err(SpanError::RecordsNothing);
+        }
+        if self.watch.has_outputs() && (self.every != 1 || self.most.is_some()) {
+            return Err(SpanError::TwoRecords);
         }
         match self.rest {
             Some(tolerance) if !(tolerance > 0.0 && tolerance < 1.0) => {
@@ -278,6 +288,41 @@ pub enum SpanError {
     /// `every(0)`.
     #[error("`every(0)` records nothing; use `every(1)` to record each step")]
     RecordsNothing,
+    /// Outputs are asked for, and `every` or `at_most` too.
+    #[error(
+        "outputs at given times are recorded in place of steps; leave out `every` and `at_most`, or the \
+         outputs"
+    )]
+    TwoRecords,
+    /// A time of an output is not one of the run.
+    #[error("an output was asked for at t = {time}; the run goes from t = {start} to t = {end}")]
+    Output {
+        /// The time asked for.
+        time: f64,
+        /// The time at which the run starts.
+        start: f64,
+        /// The time at which it ends.
+        end: f64,
+    },
+    /// The interval between outputs is zero, negative, infinite or NaN.
+    #[error("the interval between outputs is {interval}; it must be a positive finite number")]
+    OutputInterval {
+        /// The interval.
+        interval: f64,
+    },
+    /// The function of an event has points of another type than the run.
+    #[error(
+        "event {index} is a function of {found}, and the points of the run are {expected}; say this type in \
+         the closure"
+    )]
+    EventPoint {
+        /// Which event, in the order in which they were asked for, counted from 0.
+        index: usize,
+        /// The type of its points.
+        found: &'static str,
+        /// The type of the points of the run.
+        expected: &'static str,
+    },
 }
 
 #[cfg(test)]

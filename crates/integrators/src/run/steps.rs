@@ -10,13 +10,15 @@ use crate::method::{
 use crate::round_off::bound::breaks_first_law;
 use crate::run::certificate::Certificate;
 use crate::run::controller::{Controller, StepSize};
+use crate::run::output::{StepBefore, Watching};
 use crate::run::scales::{Scales, larger, relative};
-use crate::run::span::{ROOM, Schedule, Size, SpanError};
-use crate::run::trajectory::{Ending, State, Trajectory, thin_out};
+use crate::run::span::{Schedule, Size};
+use crate::run::trajectory::{Ending, State};
 use crate::step_error::StepError;
 
 /// The iterator over the states of a run after its start, in constant memory; ended by an error, or
-/// where its schedule ends. With a step size alone it is endless.
+/// where its schedule ends. With a step size alone it is endless. It yields the state after each step, or those at
+/// the [times asked for](crate::Watch::output_at) and the last one.
 ///
 /// Made by [`Method::steps`] or [`Run::steps`](crate::Run::steps).
 pub struct Steps<'a, F: Flow, M: Method<F>> {
@@ -32,6 +34,9 @@ pub struct Steps<'a, F: Flow, M: Method<F>> {
     pub(super) promises: Promises,
     pub(super) certificate: Certificate,
     pub(super) failed: bool,
+    /// The step before the state, for what lies between them.
+    pub(super) before: StepBefore<F>,
+    pub(super) watching: Option<Box<Watching<F::Space>>>,
 }
 
 /// Where a run is on its schedule.
@@ -57,6 +62,16 @@ impl<V> Progress<V> {
     /// Whether errors or rest are judged by the sizes of the entries.
     pub(crate) const fn judges_sizes(&self) -> bool {
         self.rest.is_some() || matches!(self.step_size, StepSize::Adaptive(_))
+    }
+
+    /// When the run ends; infinite if it does not.
+    pub(crate) fn end(&self) -> f64 {
+        match &self.step_size {
+            StepSize::Fixed(h) => {
+                self.count.map_or(f64::INFINITY, |count| self.start + count as f64 * h)
+            }
+            StepSize::Adaptive(controller) => controller.end,
+        }
     }
 }
 
@@ -91,7 +106,7 @@ impl<'a, F: Flow, M: Method<F>> Steps<'a, F, M> {
         let promises = method.promises(flow);
         let certificate = Certificate::start(flow, &x0, promises);
         let scales = Scales::at(flow, &x0, schedule.span());
-        let Schedule { size, start, count, every, most, rest } = schedule;
+        let Schedule { size, start, count, every, most, rest, watch } = schedule;
         let step_size = match size {
             Size::Fixed(h) => StepSize::Fixed(h),
             Size::Tolerance(adaptive) => {
@@ -114,11 +129,15 @@ impl<'a, F: Flow, M: Method<F>> Steps<'a, F, M> {
         let values = flow.laws(&x0);
         let (energy, entropy) = (values.energy, values.entropy);
         let state = State { step: 0, time: start, point: x0, energy, entropy };
+        let watching = Watching::new(watch, [start, progress.end()], &state)?;
+        let before = StepBefore { state: state.clone(), values: values.clone(), entropy, h: 0.0 };
         let mut steps = Self {
             method,
             flow,
             progress,
             state,
+            before,
+            watching,
             values,
             entropy,
             memory: M::Memory::default(),
@@ -145,19 +164,21 @@ impl<'a, F: Flow, M: Method<F>> Steps<'a, F, M> {
         if self.failed { Some(Ending::Stopped) } else { self.progress.ending }
     }
 
+    /// What the laws were at the start of the run, with this entropy.
+    #[inline]
+    pub(super) fn reference(&self, entropy: f64) -> Laws<F::Numbers> {
+        let mut invariants = self.values.invariants.clone();
+        for (k, balance) in self.certificate.invariants.iter().enumerate() {
+            invariants[k] = balance.initial;
+        }
+        Laws { energy: self.certificate.initial_energy, entropy, invariants }
+    }
+
     /// Where the next step starts.
     #[inline]
     fn from(&self, allowed: Option<F::Vector>) -> StepStart<'_, F> {
-        let invariants = || {
-            let mut initial = self.values.invariants.clone();
-            for (k, balance) in self.certificate.invariants.iter().enumerate() {
-                initial[k] = balance.initial;
-            }
-            initial
-        };
         let entropy = if self.promises.entropy { self.entropy } else { self.values.entropy };
-        let reference =
-            Laws { energy: self.certificate.initial_energy, entropy, invariants: invariants() };
+        let reference = self.reference(entropy);
         let values = self.values.clone();
         StepStart { x: &self.state.point, time: self.state.time, values, reference, allowed }
     }
@@ -196,14 +217,15 @@ impl<'a, F: Flow, M: Method<F>> Steps<'a, F, M> {
         }
         let ends = [(&self.state.point, &self.values), (&x, &values)];
         self.certificate.enter(self.flow, ends, h, (evidence, effort));
+        (self.before.h, self.before.entropy) = (h, self.entropy);
         if evidence.dissipates {
             self.entropy = values.entropy;
         }
         let (energy, entropy) = (values.energy, values.entropy);
-        self.values = values;
+        self.before.values = std::mem::replace(&mut self.values, values);
         let next = State { step, time, point: x, energy, entropy };
-        let before = std::mem::replace(&mut self.state, next);
-        self.check_invariants(&before)?;
+        self.before.state = std::mem::replace(&mut self.state, next);
+        self.check_invariants(&self.before.state)?;
         let over = match &self.progress.step_size {
             StepSize::Fixed(_) => self.progress.count.is_some_and(|count| step >= count),
             StepSize::Adaptive(Controller { end, .. }) => self.state.time >= *end,
@@ -216,6 +238,9 @@ impl<'a, F: Flow, M: Method<F>> Steps<'a, F, M> {
             self.progress.scales = self.progress.scales.or(&here);
         }
         self.rest(!evidence.rests);
+        if self.watching.is_some() {
+            self.look()?;
+        }
         Ok(&self.state)
     }
 
@@ -317,43 +342,6 @@ impl<'a, F: Flow, M: Method<F>> Steps<'a, F, M> {
         }
     }
 
-    /// Takes all steps that are left, and records the states from here on.
-    ///
-    /// # Errors
-    ///
-    /// [`RunError::Step`] if a step failed, with the trajectory so far;
-    /// [`SpanError::Endless`] if the schedule has no end.
-    pub fn run(mut self) -> Result<Trajectory<F::Space>, RunError<F::Space>> {
-        let Progress { count, mut every, most, .. } = self.progress;
-        if count.is_none() && matches!(self.progress.step_size, StepSize::Fixed(_)) {
-            return Err(SpanError::Endless.into());
-        }
-        let room = count.map_or(ROOM, |count| (count - self.state.step.min(count)) / every);
-        let mut states = Vec::with_capacity(room.min(ROOM) + 2);
-        states.push(self.state.clone());
-        let mut failure = None;
-        while self.progress.ending.is_none() && failure.is_none() {
-            failure = self.advance().err();
-            let state = &self.state;
-            let due = state.step.is_multiple_of(every) && failure.is_none();
-            let over = self.progress.ending.is_some() || failure.is_some();
-            if (due || over) && states.last().is_none_or(|last| last.step != state.step) {
-                states.push(state.clone());
-            }
-            while most.is_some_and(|most| states.len() > most) {
-                every = every.saturating_mul(2);
-                thin_out(&mut states, every, over);
-            }
-        }
-        let ending = self.progress.ending.unwrap_or(Ending::Stopped);
-        let checkpoint = self.checkpoint();
-        let trajectory = Trajectory { states, certificate: self.certificate, ending, checkpoint };
-        match failure {
-            Some(cause) => Err(RunError::Step { cause, trajectory: Box::new(trajectory) }),
-            None => Ok(trajectory),
-        }
-    }
-
     /// The further invariant that depends on the other fields at a state, as an error.
     #[cold]
     fn dependent(&self, &State { time, ref point, .. }: &State<F::Space>) -> Option<StepError> {
@@ -390,16 +378,3 @@ const TRIES: usize = 3;
 /// The error of a further invariant, relative to its terms, above which it is no longer conserved. What
 /// fades out of `Π̃` stays far below it: `10⁻⁴h²`.
 const NOT_CONSERVED: f64 = 1e-4;
-
-impl<F: Flow, M: Method<F>> Iterator for Steps<'_, F, M> {
-    type Item = Result<State<F::Space>, StepError>;
-
-    fn next(&mut self) -> Option<Self::Item> {
-        if self.ending().is_some() {
-            return None;
-        }
-        let advanced = self.advance().cloned();
-        self.failed = advanced.is_err();
-        Some(advanced)
-    }
-}

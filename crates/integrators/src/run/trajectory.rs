@@ -5,13 +5,14 @@ use approx::{AbsDiffEq, RelativeEq};
 use crate::method::StateSpace;
 use crate::run::certificate::Certificate;
 use crate::run::checkpoint::Checkpoint;
+use crate::run::event::Event;
 
 /// A state of a run: time, point, and the two fields there.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize), serde(bound = "M: StateSpace"))]
 #[non_exhaustive]
 pub struct State<M: StateSpace> {
-    /// Steps taken.
+    /// Steps taken; for a state inside a step, those before it.
     pub step: usize,
     /// The time: `t₀ + step · h` in steps of one size, `t₀` and their sum in others.
     pub time: f64,
@@ -74,6 +75,12 @@ pub enum Ending {
         /// The largest speed of the run, to which the tolerance is relative.
         largest: f64,
     },
+    /// It stopped at an [event](crate::Watched::stop).
+    Event {
+        /// Which one of the events that were asked for, counted from 0. Its name is that of the last one in
+        /// [`Trajectory::events`].
+        index: usize,
+    },
     /// It stopped on the way: a step failed, or nobody asked for the next.
     Stopped,
 }
@@ -82,6 +89,16 @@ impl Ending {
     /// Whether the state came to rest.
     pub const fn is_rest(&self) -> bool {
         matches!(self, Self::Rest { .. })
+    }
+
+    /// Whether the run stopped at an event.
+    ///
+    /// ```
+    /// use metriplectic_integrators::Ending;
+    /// assert!(Ending::Event { index: 0 }.is_event() && !Ending::Span.is_event());
+    /// ```
+    pub const fn is_event(self) -> bool {
+        matches!(self, Self::Event { .. })
     }
 }
 
@@ -101,6 +118,8 @@ pub(super) fn thin_out<M: StateSpace>(states: &mut Vec<State<M>>, every: usize, 
 #[cfg_attr(feature = "serde", derive(serde::Serialize), serde(bound = "M: StateSpace"))]
 pub struct Trajectory<M: StateSpace> {
     pub(super) states: Vec<State<M>>,
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Vec::is_empty"))]
+    pub(super) events: Vec<Event<M>>,
     pub(super) certificate: Certificate,
     pub(super) ending: Ending,
     #[cfg_attr(feature = "serde", serde(skip))]
@@ -111,6 +130,29 @@ impl<M: StateSpace> Trajectory<M> {
     /// The recorded states, the start first.
     pub fn states(&self) -> &[State<M>] {
         &self.states
+    }
+
+    /// The [events](crate::Watch::event) that were asked for, in the order of their times.
+    ///
+    /// ```
+    /// # use metriplectic_dynamics::System;
+    /// # use metriplectic_fields::Real;
+    /// # use metriplectic_integrators::{Run, Span, Watch};
+    /// # use metriplectic_manifolds::{LieDual, WeylMidpoint};
+    /// # use nalgebra::Vector3;
+    /// # fn main() -> Result<(), metriplectic_integrators::Error> {
+    /// # let body = System::on(LieDual::so3())
+    /// #     .energy(|p: &Vector3<Real>| p.x * p.x * 0.5 + p.y * p.y + p.z * p.z * 1.5)
+    /// #     .build()?;
+    /// let span = Span::steps(0.1, 100).event("node", |p: &Vector3<f64>| p.y);
+    /// let run = WeylMidpoint.run(&body, Vector3::new(0.4, 0.5, 0.3), span)?;
+    /// let times: Vec<f64> = run.events().iter().map(|event| event.state.time).collect();
+    /// assert!(times.len() > 1 && times.is_sorted());
+    /// # Ok(())
+    /// # }
+    /// ```
+    pub fn events(&self) -> &[Event<M>] {
+        &self.events
     }
 
     /// The state at the end of the run.

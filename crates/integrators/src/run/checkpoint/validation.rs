@@ -118,6 +118,8 @@ pub(super) fn of_the_schedule<V>(
     progress: &Progress<V>,
 ) -> Result<(), ResumeError> {
     let (start, time, ended) = (c.start.0, c.time.0, c.ending == Some(SavedEnding::Span));
+    // An event that stops a run may lie in its last step.
+    let stopped = matches!(c.ending, Some(SavedEnding::Event { .. }));
     finite("start", &[c.start])?;
     if c.most.is_some_and(|most| most < 2) {
         return damaged("number of states to record", 0.0);
@@ -134,7 +136,7 @@ pub(super) fn of_the_schedule<V>(
                 if check_steps(start, h, count).is_err() || c.step > count {
                     return damaged("number of steps to take", count as f64);
                 }
-                if ended != (c.step == count) {
+                if !stopped && ended != (c.step == count) {
                     return damaged("number of steps", c.step as f64);
                 }
             }
@@ -147,7 +149,7 @@ pub(super) fn of_the_schedule<V>(
             let taken = controller.taken.unwrap_or(0.0);
             // The first steps end after the start, and no step ends after the end.
             let begun = if c.step == 0 { c.time == c.start } else { time > start && taken > 0.0 };
-            if !(begun && time <= end) || ended != (time >= end) {
+            if !(begun && time <= end) || !stopped && ended != (time >= end) {
                 return damaged("time", time);
             }
         }

@@ -1,0 +1,296 @@
+//! States between steps: at the times that were asked for, at events, and at any time of the last step.
+
+use std::collections::VecDeque;
+
+use metriplectic_dynamics::SecondLaw;
+
+use crate::method::{Element, Flow, Laws, Method, StateSpace, StepEnds};
+use crate::run::dense::between;
+use crate::run::event::{Event, Events};
+use crate::run::span::{Schedule, SpanError};
+use crate::run::steps::Steps;
+use crate::run::trajectory::{Ending, State};
+use crate::run::watch::{Outputs, Requests, rounding};
+use crate::step_error::StepError;
+
+/// The start of the last step.
+#[derive(Clone, Debug)]
+pub(super) struct StepBefore<F: Flow> {
+    pub(super) state: State<F::Space>,
+    /// The laws there.
+    pub(super) values: Laws<F::Numbers>,
+    /// The entropy after the last step before it that dissipated.
+    pub(super) entropy: f64,
+    /// The size of the step; 0 before the first one.
+    pub(super) h: f64,
+}
+
+/// What a run looks at between its steps.
+pub(super) struct Watching<M: StateSpace> {
+    outputs: Outputs,
+    events: Events<M>,
+    /// The states to record of the last step, if they replace the one at its end.
+    queue: VecDeque<State<M>>,
+    found: Vec<Event<M>>,
+}
+
+impl<M: StateSpace> Watching<M> {
+    /// What is asked for in a run from `start` to `end` that is at this state; nothing if nothing is.
+    pub(super) fn new(
+        requests: Requests,
+        [start, end]: [f64; 2],
+        state: &State<M>,
+    ) -> Result<Option<Box<Self>>, SpanError> {
+        requests.check(start, end)?;
+        let Requests { times, interval, events } = requests;
+        let outputs = Outputs::after(state.time, start, times, interval);
+        let events = Events::new(events, state)?;
+        if outputs.is_empty() && events.is_empty() {
+            return Ok(None);
+        }
+        let (queue, found) = (VecDeque::new(), Vec::new());
+        Ok(Some(Box::new(Self { outputs, events, queue, found })))
+    }
+
+    /// Whether the states of the queue are recorded in place of the one at the end of the step.
+    pub(super) fn replaces_steps(&self) -> bool {
+        !self.outputs.is_empty() || !self.queue.is_empty()
+    }
+
+    pub(super) const fn queue(&mut self) -> &mut VecDeque<State<M>> {
+        &mut self.queue
+    }
+}
+
+impl<F: Flow, M: Method<F>> Steps<'_, F, M> {
+    /// The state at a time in the last step, on the [dense output](Method::between) of the method; `None` at other
+    /// times, or if the flow does not say what lies between two states.
+    ///
+    /// ```
+    /// # use metriplectic_dynamics::System;
+    /// # use metriplectic_fields::Real;
+    /// # use metriplectic_integrators::{Run, Span};
+    /// # use metriplectic_manifolds::{LieDual, WeylMidpoint};
+    /// # use nalgebra::Vector3;
+    /// # fn main() -> Result<(), metriplectic_integrators::Error> {
+    /// # let body = System::on(LieDual::so3())
+    /// #     .energy(|p: &Vector3<Real>| p.x * p.x * 0.5 + p.y * p.y + p.z * p.z * 1.5)
+    /// #     .build()?;
+    /// let mut steps = WeylMidpoint.steps(&body, Vector3::new(0.4, 0.5, 0.3), 0.1)?;
+    /// while steps.state().time < 1.0 {
+    ///     steps.advance()?;
+    /// }
+    /// let state = steps.at(0.98).expect("it lies in the last step");
+    /// assert_eq!(state.time, 0.98);
+    /// assert!(steps.at(0.5).is_none());
+    /// # Ok(())
+    /// # }
+    /// ```
+    pub fn at(&mut self, time: f64) -> Option<State<F::Space>> {
+        let [start, end] = [self.before.state.time, self.state.time];
+        let allowed = rounding(self.progress.start, end);
+        let inside = time >= start - allowed && time <= end + allowed;
+        if inside { self.inside(self.fraction(time)) } else { None }
+            .map(|state| State { time, ..state })
+    }
+
+    /// The states at the [times asked for](crate::Watch::output_at) in the last step, as far as the iterator has not
+    /// yielded them.
+    ///
+    /// ```
+    /// # use metriplectic_dynamics::System;
+    /// # use metriplectic_fields::Real;
+    /// # use metriplectic_integrators::{Run, Span, Watch};
+    /// # use metriplectic_manifolds::{LieDual, WeylMidpoint};
+    /// # use nalgebra::Vector3;
+    /// # fn main() -> Result<(), metriplectic_integrators::Error> {
+    /// # let body = System::on(LieDual::so3())
+    /// #     .energy(|p: &Vector3<Real>| p.x * p.x * 0.5 + p.y * p.y + p.z * p.z * 1.5)
+    /// #     .build()?;
+    /// let span = Span::steps(0.1, 10).output_every(0.04);
+    /// let mut steps = WeylMidpoint.steps(&body, Vector3::new(0.4, 0.5, 0.3), span)?;
+    /// steps.advance()?;
+    /// let times: Vec<f64> = steps.outputs().map(|state| state.time).collect();
+    /// assert_eq!(times, [0.04, 0.08]);
+    /// # Ok(())
+    /// # }
+    /// ```
+    pub fn outputs(&self) -> impl Iterator<Item = &State<F::Space>> {
+        self.watching.iter().flat_map(|watching| &watching.queue)
+    }
+
+    /// The [events](crate::Watch::event) found since the last call.
+    ///
+    /// ```
+    /// # use metriplectic_dynamics::System;
+    /// # use metriplectic_fields::Real;
+    /// # use metriplectic_integrators::{Run, Span, Watch};
+    /// # use metriplectic_manifolds::{LieDual, WeylMidpoint};
+    /// # use nalgebra::Vector3;
+    /// # fn main() -> Result<(), metriplectic_integrators::Error> {
+    /// # let body = System::on(LieDual::so3())
+    /// #     .energy(|p: &Vector3<Real>| p.x * p.x * 0.5 + p.y * p.y + p.z * p.z * 1.5)
+    /// #     .build()?;
+    /// let span = Span::until(20.0).event("node", |p: &Vector3<f64>| p.y);
+    /// let mut steps = WeylMidpoint.steps(&body, Vector3::new(0.4, 0.5, 0.3), span)?;
+    /// while let Some(state) = steps.next() {
+    ///     state?;
+    ///     for event in steps.take_events() {
+    ///         println!("{event}");
+    ///     }
+    /// }
+    /// # Ok(())
+    /// # }
+    /// ```
+    pub fn take_events(&mut self) -> Vec<Event<F::Space>> {
+        self.watching.as_mut().map_or_else(Vec::new, |watching| std::mem::take(&mut watching.found))
+    }
+
+    /// The outputs and events of a schedule, for a run that was resumed: closures are not in a checkpoint. Nothing
+    /// else of the schedule is used. What lies before the present time is over, and the rest is as in the run that
+    /// was put down, bit for bit.
+    ///
+    /// ```
+    /// # use metriplectic_dynamics::System;
+    /// # use metriplectic_fields::Real;
+    /// # use metriplectic_integrators::{Run, Span, Watch};
+    /// # use metriplectic_manifolds::{LieDual, WeylMidpoint};
+    /// # use nalgebra::Vector3;
+    /// # fn main() -> Result<(), metriplectic_integrators::Error> {
+    /// # let body = System::on(LieDual::so3())
+    /// #     .energy(|p: &Vector3<Real>| p.x * p.x * 0.5 + p.y * p.y + p.z * p.z * 1.5)
+    /// #     .build()?;
+    /// # let start = Vector3::new(0.4, 0.5, 0.3);
+    /// let span = Span::steps(0.1, 100).output_every(0.25);
+    /// let mut steps = WeylMidpoint.steps(&body, start, span.clone())?;
+    /// for _ in 0..50 {
+    ///     steps.advance()?;
+    /// }
+    /// let resumed = WeylMidpoint.resume(&body, &steps.checkpoint())?.watching(span.clone())?.run()?;
+    /// let whole = WeylMidpoint.run(&body, start, span)?;
+    /// assert_eq!(resumed.states()[1..], whole.states()[21..]);
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
+    /// # Errors
+    ///
+    /// [`SpanError`] if a time is outside of the run, or an event is one of other points.
+    pub fn watching(mut self, schedule: impl Into<Schedule>) -> Result<Self, SpanError> {
+        let span = [self.progress.start, self.progress.end()];
+        self.watching = Watching::new(schedule.into().watch, span, &self.state)?;
+        Ok(self)
+    }
+
+    /// A time of the last step as a fraction of it.
+    fn fraction(&self, time: f64) -> f64 {
+        let [start, end] = [self.before.state.time, self.state.time];
+        if (end - time).abs() <= rounding(self.progress.start, end) {
+            1.0
+        } else {
+            ((time - start) / (end - start)).max(0.0)
+        }
+    }
+
+    /// Whether the entropy never falls.
+    fn has_entropy(&self) -> bool {
+        self.promises.entropy && self.flow.entropy_law() != SecondLaw::NoEntropy
+    }
+
+    /// The state at a fraction of the last step.
+    fn inside(&mut self, theta: f64) -> Option<State<F::Space>> {
+        if theta >= 1.0 {
+            return Some(self.state.clone());
+        }
+        let (has_entropy, reference) = (self.has_entropy(), self.reference(self.before.entropy));
+        let Self { method, flow, before, state, values, memory, .. } = self;
+        let (x, end, h) = (&before.state.point, &state.point, before.h);
+        let step = StepEnds { x, end, h, values: [&before.values, values], reference: &reference };
+        let times = [before.state.time, state.time];
+        let at = |point: Element<F>| {
+            let Laws { energy, entropy, .. } = flow.laws(&point);
+            let time = (times[0] + theta * (times[1] - times[0])).min(times[1]);
+            State { step: before.state.step, time, point, energy, entropy }
+        };
+        let is_between = |inside: &State<F::Space>| {
+            let round_off = || flow.entropy_round_off([x, end]);
+            let out = (before.state.entropy - inside.entropy).max(inside.entropy - state.entropy);
+            inside.energy.is_finite() && (!has_entropy || out <= 0.0 || out <= round_off())
+        };
+        // A method may not know what lies in this step, as after its halves, or find no entropy between those
+        // of the ends. The output of any method then serves it.
+        method
+            .between(flow, &step, memory, theta)
+            .map(at)
+            .filter(is_between)
+            .or_else(|| between(*flow, &step, method.promises(flow), theta).map(at))
+    }
+
+    /// Looks at the step that was just taken.
+    #[inline(never)]
+    pub(super) fn look(&mut self) -> Result<(), StepError> {
+        let Some(mut watching) = self.watching.take() else { return Ok(()) };
+        watching.queue.clear();
+        let found = self.find(&mut watching);
+        self.watching = Some(watching);
+        let (time, h) = (self.before.state.time, self.before.h);
+        found.ok_or(StepError::NothingBetween { time, h })
+    }
+
+    /// Finds the events in the last step, and then the outputs up to its end or to the event that stops the run.
+    fn find(&mut self, watching: &mut Watching<F::Space>) -> Option<()> {
+        let mut stopped_at = None;
+        if !watching.events.is_empty() {
+            let ends = [self.before.state.clone(), self.state.clone()];
+            let (laws, reference) = (
+                [self.before.values.clone(), self.values.clone()],
+                self.reference(self.before.entropy),
+            );
+            let (x, end, values) = (&ends[0].point, &ends[1].point, laws.each_ref());
+            let step = StepEnds { x, end, h: self.before.h, values, reference: &reference };
+            let flow = self.flow;
+            let (found, stops) =
+                watching
+                    .events
+                    .of_step(flow, &step, ends.each_ref(), &mut |theta| self.inside(theta))?;
+            if let Some(event) = found.last().filter(|_| stops) {
+                stopped_at = Some(event.state.clone());
+                self.progress.ending = Some(Ending::Event { index: event.index });
+            }
+            watching.found.extend(found);
+        }
+        if !watching.outputs.is_empty() {
+            let last = stopped_at.as_ref().map_or(self.state.time, |state| state.time);
+            let mut before = self.before.state.clone();
+            while let Some(time) = watching.outputs.next(last) {
+                let state = self.output(time.min(last), &before)?;
+                before.clone_from(&state);
+                watching.queue.push_back(state);
+            }
+        }
+        if self.progress.ending.is_some() {
+            let last = stopped_at.unwrap_or_else(|| self.state.clone());
+            if watching.replaces_steps() || self.ending().is_some_and(Ending::is_event) {
+                while watching.queue.back().is_some_and(|state| state.time >= last.time) {
+                    watching.queue.pop_back();
+                }
+                watching.queue.push_back(last);
+            }
+        }
+        Some(())
+    }
+
+    /// The state at a time, after another one in the same step. Where the entropy has fallen in between by more
+    /// than round-off, it is the nearer one of that state and the end of the step.
+    fn output(&mut self, time: f64, before: &State<F::Space>) -> Option<State<F::Space>> {
+        let state = self.inside(self.fraction(time))?;
+        let round_off = || self.flow.entropy_round_off([&before.point, &state.point]);
+        let fall = before.entropy - state.entropy;
+        if self.has_entropy() && fall > 0.0 && fall > round_off() {
+            let is_early = time - before.time < self.state.time - time;
+            let nearer = if is_early { before } else { &self.state };
+            return Some(State { time, step: state.step, ..nearer.clone() });
+        }
+        Some(State { time, ..state })
+    }
+}

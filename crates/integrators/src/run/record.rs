@@ -1,0 +1,88 @@
+//! The states of a run in a row: one after the other, or all in a trajectory.
+
+use crate::error::RunError;
+use crate::method::{Flow, Method};
+use crate::run::controller::StepSize;
+use crate::run::span::{ROOM, SpanError};
+use crate::run::steps::{Progress, Steps};
+use crate::run::trajectory::{Ending, State, Trajectory, thin_out};
+use crate::step_error::StepError;
+
+impl<F: Flow, M: Method<F>> Steps<'_, F, M> {
+    /// Takes all steps that are left, and records the states from here on.
+    ///
+    /// # Errors
+    ///
+    /// [`RunError::Step`] if a step failed, with the trajectory so far;
+    /// [`SpanError::Endless`] if the schedule has no end.
+    pub fn run(mut self) -> Result<Trajectory<F::Space>, RunError<F::Space>> {
+        let Progress { count, mut every, most, .. } = self.progress;
+        if count.is_none() && matches!(self.progress.step_size, StepSize::Fixed(_)) {
+            return Err(SpanError::Endless.into());
+        }
+        let room = count.map_or(ROOM, |count| (count - self.state.step.min(count)) / every);
+        let mut states = Vec::with_capacity(room.min(ROOM) + 2);
+        states.push(self.state.clone());
+        let mut failure = None;
+        while self.progress.ending.is_none() && failure.is_none() {
+            failure = self.advance().err();
+            if self.watched(&mut states, failure.is_some()) {
+                continue;
+            }
+            let state = &self.state;
+            let due = state.step.is_multiple_of(every) && failure.is_none();
+            let over = self.progress.ending.is_some() || failure.is_some();
+            if (due || over) && states.last().is_none_or(|last| last.step != state.step) {
+                states.push(state.clone());
+            }
+            while most.is_some_and(|most| states.len() > most) {
+                every = every.saturating_mul(2);
+                thin_out(&mut states, every, over);
+            }
+        }
+        let ending = self.progress.ending.unwrap_or(Ending::Stopped);
+        let (checkpoint, events) = (self.checkpoint(), self.take_events());
+        let certificate = self.certificate;
+        let trajectory = Trajectory { states, events, certificate, ending, checkpoint };
+        match failure {
+            Some(cause) => Err(RunError::Step { cause, trajectory: Box::new(trajectory) }),
+            None => Ok(trajectory),
+        }
+    }
+
+    /// Records the states that were asked for in the last step, if they replace the one at its end.
+    fn watched(&mut self, states: &mut Vec<State<F::Space>>, failed: bool) -> bool {
+        let Some(watching) = self.watching.as_mut().filter(|watching| watching.replaces_steps())
+        else {
+            return false;
+        };
+        states.extend(watching.queue().drain(..));
+        if failed && states.last().is_none_or(|last| last.time < self.state.time) {
+            states.push(self.state.clone());
+        }
+        true
+    }
+}
+
+impl<F: Flow, M: Method<F>> Iterator for Steps<'_, F, M> {
+    type Item = Result<State<F::Space>, StepError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        while !self.failed {
+            if let Some(watching) = &mut self.watching
+                && let Some(state) = watching.queue().pop_front()
+            {
+                return Some(Ok(state));
+            }
+            if self.progress.ending.is_some() {
+                return None;
+            }
+            let advanced = self.advance().cloned();
+            self.failed = advanced.is_err();
+            if self.failed || self.watching.as_ref().is_none_or(|w| !w.replaces_steps()) {
+                return Some(advanced);
+            }
+        }
+        None
+    }
+}

@@ -1,0 +1,367 @@
+//! States at any time of a run: they keep the laws, they are as accurate as the steps, and they change no step.
+
+mod models;
+
+use metriplectic::dynamics::system::Point;
+use metriplectic::integrators::{
+    DormandPrince5, DormandPrince8, Element, Evidence, Flow, Laws, Promises, Schedule, SpanError,
+    StepStart, Taken, Vector,
+};
+use metriplectic::prelude::*;
+use models::{TUMBLING, UNSTABLE, free_body, relaxing_body};
+
+/// The bits of a state.
+fn bits<M: Manifold>(state: &State<M>) -> Vec<u64> {
+    let laws = [state.time, state.energy, state.entropy];
+    let numbers = M::entries(&state.point).into_iter().chain(laws).map(f64::to_bits);
+    numbers.chain([state.step as u64]).collect()
+}
+
+/// A spin with a bath.
+fn spin() -> impl Metriplectic<Manifold = Product<Sphere<2>, Euclidean<1>>, Metric = Canonical> {
+    System::on(Product(Sphere::<2>::round(), Euclidean::<1>))
+        .bracket((AreaForm, Zero))
+        .energy(|(n, s): &(Vector3<Real>, Vector1<Real>)| {
+            n.x.powi(2) * 0.25 - n.z + (s.x * 0.05).exp()
+        })
+        .entropy(|(_, s): &(Vector3<Real>, Vector1<Real>)| s.x)
+        .build()
+        .expect("the parts make a system")
+}
+
+const SPIN: (Vector3<f64>, Vector1<f64>) = (Vector3::new(0.48, 0.36, -0.8), Vector1::new(0.0));
+
+fn group() -> impl Metriplectic<Manifold = Rotations> {
+    System::on(Rotations::bi_invariant())
+        .bracket(Nambu::default())
+        .energy(|r: &Matrix3<Real>| r.m11 + r.m22 * 2.0 + r.m33 * 3.0 + r.m12 * r.m23 * 0.5)
+        .entropy(|r: &Matrix3<Real>| r.m13 - r.m21 * 0.5 + (r.m31 + r.m32).powi(2) * 0.25)
+        .build()
+        .expect("the parts make a system")
+}
+
+fn attitude() -> Matrix3<f64> {
+    Rotations::bi_invariant().from_quaternion([0.8, 0.3, -0.4, 0.33]).expect("a quaternion")
+}
+
+/// A top with friction on se(3)*, with a Casimir.
+fn heavy_top() -> impl Metriplectic<Manifold = LieDual<6>, Metric = Canonical> {
+    System::on(LieDual::se3())
+        .energy(|x: &Vector6<Real>| {
+            let weights = [1.0, 0.5, 0.25, 0.2, 0.15, 0.1];
+            (0..6).map(|i| x[i].powi(2) * weights[i]).sum()
+        })
+        .entropy(|x: &Vector6<Real>| (3..6).map(|i| x[i].powi(2) * 0.5).sum())
+        .casimir(|x: &Vector6<Real>| (0..3).map(|i| x[i] * x[i + 3]).sum())
+        .build()
+        .expect("the parts make a system")
+}
+
+const TOP: Vector6<f64> = Vector6::new(0.1, 0.2, 1.0, 0.0, 0.6, 0.8);
+
+/// Runs with twenty outputs in each step, and compares with the run that has none.
+fn keeps_the_laws<Y: Metriplectic, M: Method<Y> + Clone>(
+    name: &str,
+    (system, x0): (&Y, &Point<Y>),
+    method: M,
+    schedule: impl Into<Schedule>,
+    interval: f64,
+) {
+    let schedule = schedule.into();
+    let plain = method.clone().run(system, x0.clone(), schedule.clone()).expect("it runs");
+    let run = method.run(system, x0.clone(), schedule.output_every(interval)).expect("it runs");
+    assert_eq!(run.certificate(), plain.certificate(), "{name}");
+    assert_eq!(run.last().point, plain.last().point, "{name}");
+    assert!(run.states().len() > 300, "{name}: {} states", run.states().len());
+    let start = &run.states()[0];
+    let laws = system.laws(x0);
+    let (mut energy, mut invariants, mut fall, mut defect) = (0.0_f64, 0.0_f64, 0.0_f64, 0.0_f64);
+    for pair in run.states().windows(2) {
+        let [before, state] = pair else { unreachable!("windows of two") };
+        assert!(state.time > before.time, "{name}");
+        energy = energy.max((state.energy - start.energy).abs() / start.energy.abs());
+        let here = system.laws(&state.point);
+        assert_eq!((here.energy, here.entropy), (state.energy, state.entropy));
+        for (a, b) in laws.invariants.as_ref().iter().zip(here.invariants.as_ref()) {
+            invariants = invariants.max((a - b).abs());
+        }
+        let round_off = system.entropy_round_off([&before.point, &state.point]);
+        fall = fall.max((before.entropy - state.entropy) / round_off);
+        defect = defect.max(system.defect(&state.point));
+    }
+    println!(
+        "{name}: {} outputs of {} steps, |H − H₀| ≤ {energy:.1e} H₀, |L − L₀| ≤ {invariants:.1e}, falls of S ≤ {fall:.2} \
+         of round-off, defect {defect:.1e}",
+        run.states().len(),
+        run.certificate().steps
+    );
+    assert!(energy <= 5e-15, "{name}: {energy:.1e}");
+    assert!(invariants <= 1e-14, "{name}: {invariants:.1e}");
+    assert!(fall <= 1.0, "{name}: S falls by {fall} of its round-off");
+    assert!(defect <= 1e-15, "{name}: {defect:.1e}");
+}
+
+#[test]
+fn outputs_keep_the_laws_and_change_no_step() {
+    let scheme = Scheme::new(WeylMidpoint);
+    let (body, spin, group, top) = (relaxing_body(), spin(), group(), heavy_top());
+    for (h, count) in [(0.05, 200), (0.7, 60), (2.0, 60)] {
+        let span = Span::steps(h, count);
+        let name = |space| format!("{space}, h = {h}");
+        keeps_the_laws(&name("so(3)*"), (&body, &UNSTABLE), scheme, span, h / 20.0);
+        keeps_the_laws(&name("so(3)*"), (&body, &vector![0.2, -1.0, 0.3]), scheme, span, h / 20.0);
+        keeps_the_laws(&name("se(3)*"), (&top, &TOP), scheme, span, h / 20.0);
+        if h < 1.0 {
+            keeps_the_laws(&name("S² × R"), (&spin, &SPIN), scheme, span, h / 20.0);
+            // The group is fast: steps of at most a right angle have a chart.
+            let span = Span::steps(h / 5.0, count);
+            keeps_the_laws(
+                &name("SO(3), five times"),
+                (&group, &attitude()),
+                scheme,
+                span,
+                h / 100.0,
+            );
+        }
+    }
+    // To the rest of the body, where the entropy hardly grows.
+    for tolerance in [1e-2, 1e-4] {
+        let span = Span::until(400.0).tolerance(tolerance);
+        keeps_the_laws("so(3)*, adaptive", (&body, &UNSTABLE), scheme, span, 0.013);
+        keeps_the_laws("so(3)*, order 8", (&body, &UNSTABLE), DormandPrince8, span, 0.013);
+        keeps_the_laws("so(3)*, order 5", (&body, &UNSTABLE), DormandPrince5, span, 0.013);
+    }
+    let span = Span::until(100.0).tolerance(1e-3);
+    keeps_the_laws("se(3)*, order 8", (&top, &TOP), DormandPrince8, span, 0.013);
+}
+
+/// The largest ratio of the error inside a step to that at its end, over the first steps.
+fn accuracy<Y: Metriplectic, M: Method<Y> + Clone>(
+    name: &str,
+    (system, x0): (&Y, &Point<Y>),
+    method: M,
+    (h, count): (f64, usize),
+) {
+    const PARTS: usize = 8;
+    let fine = Span::until(h * count as f64).tolerance(1e-10).output_every(h / PARTS as f64);
+    let fine = DormandPrince8.run(system, x0.clone(), fine).expect("it runs");
+    let span = Span::steps(h, count).output_every(h / PARTS as f64);
+    let run = method.run(system, x0.clone(), span).expect("it runs");
+    assert_eq!(run.states().len(), count * PARTS + 1);
+    let errors: Vec<f64> = run
+        .iter()
+        .zip(&fine)
+        .map(|(a, b)| {
+            let both =
+                Y::Manifold::entries(&a.point).into_iter().zip(Y::Manifold::entries(&b.point));
+            both.map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
+        })
+        .collect();
+    let worst = errors[1..]
+        .chunks(PARTS)
+        .map(|step| step.iter().fold(0.0_f64, |most, e| most.max(*e)) / step[PARTS - 1])
+        .fold(0.0, f64::max);
+    let last = errors[errors.len() - 1];
+    println!(
+        "{name}, h = {h}: error at the end {last:.1e}, inside a step up to {worst:.2} times that at its end"
+    );
+    assert!(worst <= 50.0, "{name}, h = {h}: {worst}");
+}
+
+#[test]
+fn outputs_are_as_accurate_as_the_steps() {
+    let scheme = Scheme::new(WeylMidpoint);
+    for h in [0.4, 0.1, 0.025] {
+        accuracy("so(3)*", (&relaxing_body(), &vector![0.2, -1.0, 0.3]), scheme, (h, 20));
+        accuracy("S² × R", (&spin(), &SPIN), scheme, (h, 20));
+        accuracy("SO(3)", (&group(), &attitude()), scheme, (h / 5.0, 20));
+        accuracy("se(3)*", (&heavy_top(), &TOP), scheme, (h, 20));
+    }
+}
+
+#[test]
+fn stiff_friction_keeps_the_laws_of_its_outputs() {
+    // Two bodies that exchange heat a thousand times as fast as a step resolves.
+    let bodies = System::on(Euclidean::<2>)
+        .energy(|e: &Vector2<Real>| e.x + e.y)
+        .entropy(|e: &Vector2<Real>| e.x.ln() + e.y.ln())
+        .dissipation(FieldDissipation(|_: &Vector2<Real>, w: &Vector2<Real>| {
+            let b = Vector2::new(w.y, -w.x);
+            b * b.transpose() * Real::from(1e3)
+        }))
+        .build()
+        .unwrap();
+    let span = Span::steps(0.5, 40);
+    keeps_the_laws("stiff", (&bodies, &vector![1.0, 3.0]), Scheme::new(WeylMidpoint), span, 0.025);
+    // An explicit method takes these steps in many halves, and knows its stages of the last one alone.
+    keeps_the_laws("stiff, order 5", (&bodies, &vector![1.0, 3.0]), DormandPrince5, span, 0.025);
+}
+
+#[test]
+fn the_iterator_the_trajectory_and_a_step_have_the_same_outputs() {
+    let body = free_body();
+    let span = Span::until(3.0).tolerance(1e-4).output_at([2.5, 0.1, 0.1, 0.0, 3.0, 1.0]);
+    let run = WeylMidpoint.run(&body, TUMBLING, span.clone()).unwrap();
+    let times: Vec<f64> = run.iter().map(|state| state.time).collect();
+    assert_eq!(times, [0.0, 0.1, 1.0, 2.5, 3.0]);
+    let steps = WeylMidpoint.steps(&body, TUMBLING, span.clone()).unwrap();
+    let yielded: Vec<_> = steps.map(|state| bits(&state.unwrap())).collect();
+    assert_eq!(yielded, run.states()[1..].iter().map(bits).collect::<Vec<_>>());
+    let mut steps = WeylMidpoint.steps(&body, TUMBLING, span).unwrap();
+    let mut seen = Vec::new();
+    while steps.ending().is_none() {
+        steps.advance().unwrap();
+        let outputs: Vec<_> = steps.outputs().cloned().collect();
+        for state in &outputs {
+            let again = steps.at(state.time).unwrap();
+            assert_eq!(bits(&again), bits(state));
+        }
+        seen.extend(outputs.iter().map(bits));
+    }
+    assert_eq!(seen, yielded);
+    assert!(steps.at(f64::NAN).is_none() && steps.at(4.0).is_none() && steps.at(0.0).is_none());
+
+    // A run that comes to rest ends there.
+    let relaxing = relaxing_body();
+    let span = Span::until(1e4).tolerance(1e-4).until_rest(1e-8).output_every(100.0);
+    let run = WeylMidpoint.run(&relaxing, UNSTABLE, span).unwrap();
+    let last = &run.states()[run.states().len() - 2..];
+    assert!(run.ending().is_rest() && last[1].time - last[0].time < 100.0);
+}
+
+#[test]
+fn a_resumed_run_has_the_same_outputs() {
+    let body = relaxing_body();
+    let schedules: [Schedule; 2] = [
+        Span::steps(0.1, 60).output_every(0.03).output_at([0.1, 0.25, 4.0]),
+        Span::until(6.0).tolerance(1e-4).output_every(0.03).output_at([0.1, 0.25, 4.0]),
+    ];
+    for schedule in schedules {
+        let whole: Vec<_> = WeylMidpoint
+            .steps(&body, UNSTABLE, schedule.clone())
+            .unwrap()
+            .map(|state| bits(&state.unwrap()))
+            .collect();
+        for put_down in [0, 1, 7, 20] {
+            let mut steps = WeylMidpoint.steps(&body, UNSTABLE, schedule.clone()).unwrap();
+            let mut seen = Vec::new();
+            for _ in 0..put_down {
+                steps.advance().unwrap();
+                seen.extend(steps.outputs().map(bits));
+            }
+            let resumed = WeylMidpoint.resume(&body, &steps.checkpoint()).unwrap();
+            let resumed = resumed.watching(schedule.clone()).unwrap();
+            seen.extend(resumed.map(|state| bits(&state.unwrap())));
+            assert!(seen == whole, "{} and {} outputs", seen.len(), whole.len());
+        }
+    }
+}
+
+#[test]
+fn times_that_are_not_of_the_run_are_errors() {
+    let body = free_body();
+    let refused = |schedule: Schedule| match WeylMidpoint.run(&body, TUMBLING, schedule) {
+        Err(RunError::Span(error)) => error,
+        other => panic!("{other:?}"),
+    };
+    let (span, until) = (Span::steps(0.1, 3), Span::until(1.0).starting_at(0.5));
+    let error = refused(span.output_at([0.2, 0.31]));
+    assert!(matches!(error, SpanError::Output { .. }), "{error}");
+    // The end in another expression is the end: 3 · 0.1 > 0.3.
+    let run = WeylMidpoint.run(&body, TUMBLING, Span::until(0.3).output_at([3.0 * 0.1])).unwrap();
+    assert_eq!((run.states().len(), run.last().time), (2, 0.3));
+    assert!(matches!(refused(until.output_at([0.2])), SpanError::Output { .. }));
+    assert!(matches!(refused(until.output_at([f64::NAN])), SpanError::Output { .. }));
+    for interval in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+        let error = refused(span.output_every(interval));
+        assert!(matches!(error, SpanError::OutputInterval { .. }), "{error}");
+    }
+    assert_eq!(refused(span.every(2).output_every(0.1)), SpanError::TwoRecords);
+    assert_eq!(refused(until.at_most(9).output_at([0.7])), SpanError::TwoRecords);
+}
+
+/// The explicit midpoint rule, which keeps no law.
+#[derive(Clone, Copy, Debug)]
+struct ExplicitMidpoint;
+
+impl<F: Flow> Method<F> for ExplicitMidpoint {
+    type Memory = ();
+
+    fn order(&self) -> u32 {
+        2
+    }
+
+    fn promises(&self, _: &F) -> Promises {
+        Promises::nothing()
+    }
+
+    fn step(
+        &self,
+        flow: &F,
+        start: &StepStart<'_, F>,
+        h: f64,
+        (): &mut (),
+    ) -> Result<Taken<F>, StepError> {
+        let outside = StepError::OutOfDomain { time: start.time, h, tried: Default::default() };
+        let rates = |d: &F::Vector| flow.rates(start.x, d).ok_or(outside);
+        let first = rates(&flow.sizes(start.x).map(|_| 0.0))?;
+        let middle = rates(&first.map(|v| 0.5 * h * v))?;
+        let x = flow.moved(start.x, &middle.map(|v| h * v));
+        let (values, evidence) = (flow.laws(&x), Evidence::default());
+        Ok(Taken { x, values, evidence, effort: Default::default() })
+    }
+}
+
+/// An oscillator whose flow does not say what lies between two states.
+struct Oscillator;
+
+impl Flow for Oscillator {
+    type Space = Euclidean<2>;
+    type Numbers = [f64; 0];
+    type Vector = Vec<f64>;
+
+    fn laws(&self, x: &Element<Self>) -> Laws<[f64; 0]> {
+        Laws { energy: 0.5 * x.norm_squared(), entropy: 0.0, invariants: [] }
+    }
+
+    fn term_sizes(&self, x: &Element<Self>) -> Laws<[f64; 0]> {
+        Laws { energy: 1.5 * x.norm_squared(), entropy: 0.0, invariants: [] }
+    }
+
+    fn rates(&self, x: &Element<Self>, d: &Vec<f64>) -> Option<Vec<f64>> {
+        Some(vec![x.y + d[1], -x.x - d[0]])
+    }
+
+    fn sizes(&self, x: &Element<Self>) -> Vec<f64> {
+        vec![x.x.abs(), x.y.abs()]
+    }
+
+    fn moved(&self, x: &Element<Self>, d: &Vec<f64>) -> Vector2<f64> {
+        x + Vector2::new(d[0], d[1])
+    }
+
+    fn element(
+        &self,
+        entries: &[f64],
+    ) -> Result<Vector2<f64>, metriplectic::manifolds::PointError> {
+        Euclidean::<2>.from_entries(entries)
+    }
+}
+
+#[test]
+fn a_method_without_laws_has_outputs_of_its_order() {
+    accuracy("explicit midpoint, so(3)*", (&free_body(), &TUMBLING), ExplicitMidpoint, (0.1, 20));
+    accuracy("explicit midpoint, SO(3)", (&group(), &attitude()), ExplicitMidpoint, (0.02, 20));
+}
+
+#[test]
+fn a_flow_that_does_not_say_what_lies_between_is_an_error() {
+    let (span, start) = (Span::steps(0.1, 10), vector![1.0, 0.0]);
+    let run = ExplicitMidpoint.run(&Oscillator, start, span.output_every(0.2)).unwrap();
+    assert_eq!(run.states().len(), 6); // at the ends of steps
+    let error = ExplicitMidpoint.run(&Oscillator, start, span.output_at([0.25, 0.5])).unwrap_err();
+    let RunError::Step { cause: StepError::NothingBetween { .. }, trajectory } = error else {
+        panic!("{error}")
+    };
+    assert!((trajectory.last().time - 0.3).abs() < 1e-15);
+}

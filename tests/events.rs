@@ -1,0 +1,318 @@
+//! Events: their times against closed forms, their states on the laws, their cost, and what becomes of a run.
+
+mod models;
+
+use std::f64::consts::PI;
+use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
+
+use metriplectic::integrators::{
+    Control, DormandPrince8, Element, Flow, Promises, Refusal, Schedule, SpanError, StepEnds,
+    StepStart, Taken, Watched,
+};
+use metriplectic::prelude::*;
+use models::{free_body, relaxing_body};
+
+type Plane = Vector2<f64>;
+
+/// `H = (q² + p²)/2`, with `x(t) = (cos t, −sin t)`.
+fn oscillator() -> impl Metriplectic<Manifold = Euclidean<2>, Metric = Canonical> {
+    System::on(Euclidean::<2>)
+        .bracket(Symplectic)
+        .energy(|x: &Vector2<Real>| x.norm_squared() * 0.5)
+        .build()
+        .expect("the parts make a system")
+}
+
+const START: Plane = Plane::new(1.0, 0.0);
+
+/// A method that counts how often its dense output is evaluated.
+#[derive(Clone, Debug)]
+struct Counted<'a, M>(M, &'a AtomicUsize);
+
+impl<F: Flow, M: Method<F>> Method<F> for Counted<'_, M> {
+    type Memory = M::Memory;
+
+    fn order(&self) -> u32 {
+        self.0.order()
+    }
+
+    fn promises(&self, flow: &F) -> Promises {
+        self.0.promises(flow)
+    }
+
+    fn step(
+        &self,
+        flow: &F,
+        start: &StepStart<'_, F>,
+        h: f64,
+        memory: &mut M::Memory,
+    ) -> Result<Taken<F>, StepError> {
+        self.0.step(flow, start, h, memory)
+    }
+
+    fn attempt(
+        &self,
+        flow: &F,
+        start: &StepStart<'_, F>,
+        h: f64,
+        memory: &mut M::Memory,
+    ) -> Result<Taken<F>, Refusal> {
+        self.0.attempt(flow, start, h, memory)
+    }
+
+    fn control(&self) -> Control {
+        self.0.control()
+    }
+
+    fn error(
+        &self,
+        flow: &F,
+        step: &StepEnds<'_, F>,
+        memory: &M::Memory,
+        norm: impl Fn(&F::Vector) -> f64,
+    ) -> Option<f64> {
+        self.0.error(flow, step, memory, norm)
+    }
+
+    fn between(
+        &self,
+        flow: &F,
+        step: &StepEnds<'_, F>,
+        memory: &mut M::Memory,
+        theta: f64,
+    ) -> Option<Element<F>> {
+        self.1.fetch_add(1, Relaxed);
+        self.0.between(flow, step, memory, theta)
+    }
+}
+
+/// The times of the events, after checks of their states.
+fn times<M: Method<Y> + Clone, Y: Metriplectic<Manifold = Euclidean<2>>>(
+    name: &str,
+    method: M,
+    system: &Y,
+    schedule: impl Into<Schedule>,
+) -> Vec<f64> {
+    let schedule = schedule.into().event("node", |x: &Plane| x.x);
+    let count = AtomicUsize::new(0);
+    let run = Counted(method, &count).run(system, START, schedule).expect("it runs");
+    let found = run.events().len();
+    let evaluations = count.load(Relaxed) as f64 / found as f64;
+    let worst = run.events().iter().map(|event| event.state.point.x.abs()).fold(0.0, f64::max);
+    let energy = run.events().iter().map(|event| (event.state.energy - 0.5).abs() / 0.5);
+    let energy = energy.fold(0.0, f64::max);
+    println!(
+        "{name}: {found} events, |g| ≤ {worst:.1e}, |H − H₀| ≤ {energy:.1e} H₀, {evaluations:.1} evaluations an event"
+    );
+    assert!(worst <= 1e-14 && energy <= 5e-15 && evaluations <= 10.0, "{name}");
+    for event in run.events() {
+        // The state has the later sign.
+        assert!(if event.rises { event.state.point.x >= 0.0 } else { event.state.point.x <= 0.0 });
+    }
+    run.events().iter().map(|event| event.state.time).collect()
+}
+
+#[test]
+fn events_of_an_oscillator_are_at_the_times_of_its_closed_form() {
+    let system = oscillator();
+    // The scheme turns by 2 atan(h/2) in a step; its dense output is off by h³/100 of that or less.
+    for (h, count) in [(1e-3, 40_000_u32), (0.01, 4000), (0.1, 400), (0.3, 133), (1.0, 40)] {
+        let rate = 2.0 * (0.5_f64 * h).atan() / h;
+        let name = format!("midpoint, h = {h}");
+        let found =
+            times(&name, Scheme::new(WeylMidpoint), &system, Span::steps(h, count as usize));
+        let all = (h * f64::from(count) * rate / PI + 0.5).floor();
+        assert!((found.len() as f64 - all).abs() < 0.5, "h = {h}: {} events", found.len());
+        for (k, time) in found.iter().enumerate() {
+            let exact = (k as f64 + 0.5) * PI / rate;
+            let off = (time - exact).abs();
+            assert!(off < 0.02 * h.powi(3) + 4e-13, "h = {h}: {off:.1e} at {exact}");
+        }
+    }
+    for tolerance in [1e-4, 1e-8, 1e-12] {
+        let name = format!("order 8, tolerance {tolerance:.0e}");
+        let span = Span::until(40.0).tolerance(tolerance);
+        let found = times(&name, DormandPrince8, &system, span);
+        assert_eq!(found.len(), 13);
+        let off = |(k, time): (usize, &f64)| (time - (k as f64 + 0.5) * PI).abs();
+        let worst = found.iter().enumerate().map(off).fold(0.0, f64::max);
+        println!("   off by {worst:.1e}");
+        assert!(worst < 1e3 * tolerance, "{worst:.1e}");
+    }
+}
+
+/// The events of a short run from `START` in steps of 0.1, by a function of the position.
+fn events(steps: usize, ask: impl Fn(Span) -> Watched) -> Vec<(String, f64)> {
+    let run =
+        WeylMidpoint.run(&oscillator(), START, ask(Span::steps(0.1, steps))).expect("it runs");
+    run.events().iter().map(|event| (event.to_string(), event.state.time)).collect()
+}
+
+#[test]
+fn directions_names_and_two_changes_in_one_step() {
+    // Up at 3π/2, down at π/2 and 5π/2.
+    let found = events(100, |span| {
+        let node = |x: &Plane| x.x;
+        span.event("up", node).rising().event("down", node).falling().event("both", node)
+    });
+    let names: Vec<_> = found.iter().map(|(text, _)| text.split(" at").next().unwrap()).collect();
+    let expected =
+        ["down falls", "both falls", "up rises", "both rises", "down falls", "both falls"];
+    assert_eq!(names, expected);
+    assert!(found.iter().map(|(_, t)| t).is_sorted());
+    // The speed −p = sin t passes 0.9999 twice, 0.028 apart, within the step from 1.5 to 1.6 of the scheme.
+    let found = events(20, |span| span.event("fast", |x: &Plane| -x.y - 0.9999));
+    println!("{found:?}");
+    assert_eq!(found.len(), 2);
+    let (apart, rate) = (found[1].1 - found[0].1, 2.0 * 0.05_f64.atan() / 0.1);
+    assert!((apart - 2.0 * 0.9999_f64.acos() / rate).abs() < 1e-5, "{apart}");
+    // Three functions of one step in the order of their times.
+    let found = events(20, |span| {
+        span.event("b", |x: &Plane| x.x - 0.54).event("a", |x: &Plane| x.x - 0.55)
+    });
+    assert!(found[0].0.starts_with('a') && found[1].0.starts_with('b'), "{found:?}");
+}
+
+#[test]
+fn an_event_that_stops_ends_the_run_there() {
+    let system = oscillator();
+    let until = Span::until(50.0).tolerance(1e-5);
+    let span = until
+        .output_every(0.5)
+        .event("other", |x: &Plane| x.y)
+        .event("node", |x: &Plane| x.x)
+        .rising()
+        .stop();
+    let run = WeylMidpoint.run(&system, START, span.clone()).unwrap();
+    assert_eq!(run.ending(), Ending::Event { index: 1 });
+    assert!((run.last().time - 1.5 * PI).abs() < 1e-4 && run.last().point.x.abs() < 1e-15);
+    assert_eq!(run.last(), &run.events().last().unwrap().state);
+    assert_eq!(&*run.events().last().unwrap().name, "node");
+    // 0, 0.5, …, 4.5, and the event at 4.71.
+    assert_eq!(run.states().len(), 11);
+    let steps = WeylMidpoint.steps(&system, START, span).unwrap();
+    let yielded: Vec<_> = steps.map(Result::unwrap).collect();
+    assert_eq!(yielded, run.states()[1..]);
+    // Without outputs: the steps, and the event in place of the end of the last one.
+    let span = Span::steps(0.1, 100).event("node", |x: &Plane| x.x).stop();
+    let run = WeylMidpoint.run(&system, START, span.clone()).unwrap();
+    let times: Vec<f64> = run.iter().map(|state| state.time).collect();
+    assert!(
+        times.len() == 17 && (times[16] - 0.5 * PI).abs() < 2e-3 && (times[15] - 1.5).abs() < 1e-15
+    );
+    let mut steps = WeylMidpoint.steps(&system, START, span).unwrap();
+    let yielded: Vec<_> = (&mut steps).map(Result::unwrap).collect();
+    assert_eq!(yielded, run.states()[1..]);
+    assert!(steps.state().time > times[16] && steps.certificate() == run.certificate());
+    // From the checkpoint the steps go on as if nothing had stopped them.
+    let later = run.checkpoint().clone().with_steps(40).unwrap();
+    let resumed = WeylMidpoint.resume(&system, &later).unwrap().run().unwrap();
+    let whole = WeylMidpoint.run(&system, START, Span::steps(0.1, 40)).unwrap();
+    assert_eq!(resumed.last(), whole.last());
+    // A stop within the last step of a run, through a file.
+    let span = Span::steps(0.1, 16).event("node", |x: &Plane| x.x).stop();
+    let run = WeylMidpoint.run(&system, START, span).unwrap();
+    let text = serde_json::to_string(run.checkpoint()).unwrap();
+    let checkpoint: Checkpoint = serde_json::from_str(&text).unwrap();
+    let resumed = WeylMidpoint.resume(&system, &checkpoint).unwrap();
+    assert_eq!(resumed.ending(), Some(Ending::Event { index: 0 }));
+    let json = serde_json::to_value(&run).unwrap();
+    assert_eq!(json["events"][0]["name"], "node");
+}
+
+#[test]
+fn an_event_at_the_start_does_not_fire_again() {
+    let system = oscillator();
+    let ask = || Span::until(7.0).event("node", |x: &Plane| x.x).stop();
+    let mut x = vector![0.0, 1.0]; // exactly zero
+    for _ in 0..5 {
+        let run = WeylMidpoint.run(&system, x, ask()).unwrap();
+        assert!(run.ending().is_event() && run.events().len() == 1);
+        assert!((run.last().time - PI).abs() < 1e-4, "{}", run.last().time);
+        x = run.last().point; // zero to the last digit
+    }
+    // Exactly zero at the ends of steps: once each.
+    let found = events(100, |span| {
+        span.event_in_time("tick", |t, _: &Plane| (t - 0.35).abs() - 0.25 + 0.1 * 0.5)
+    });
+    assert_eq!(found.len(), 2, "{found:?}");
+    let found = events(100, |span| span.event("equilibrium", |_: &Plane| 0.0));
+    assert!(found.is_empty(), "{found:?}");
+}
+
+#[test]
+fn functions_without_a_value_are_left_out() {
+    // √ of a negative number, and one that is never a number.
+    let found = events(63, |span| {
+        span.event("root", |x: &Plane| x.x.sqrt() - 0.5).event("none", |_: &Plane| f64::NAN)
+    });
+    assert_eq!(found.len(), 2, "{found:?}");
+    assert!((found[0].1 - 0.25_f64.acos()).abs() < 2e-3, "{found:?}");
+    // A jump, and an infinite value.
+    let found = events(30, |span| {
+        span.event("jump", |x: &Plane| if x.x > 0.2 { 1.0 } else { -3.0 })
+            .event("pole", |x: &Plane| 1.0 / x.x)
+            .event(
+                "infinite",
+                |x: &Plane| if x.x > 0.2 { f64::INFINITY } else { f64::NEG_INFINITY },
+            )
+    });
+    assert_eq!(found.len(), 3, "{found:?}");
+    assert!((found[0].1 - 0.2_f64.acos()).abs() < 2e-3, "{found:?}");
+}
+
+#[test]
+fn a_function_of_other_points_is_an_error() {
+    let span = Span::steps(0.1, 9).event("a", |x: &Plane| x.x).event("b", |x: &Vector3<f64>| x.x);
+    let error = WeylMidpoint.run(&oscillator(), START, span).unwrap_err();
+    assert!(matches!(error, RunError::Span(SpanError::EventPoint { index: 1, .. })), "{error}");
+    println!("{error}");
+}
+
+/// Puts a run down at several places and takes it up again.
+fn resumes<Y: Metriplectic<Manifold = LieDual<3>, Metric = Canonical>>(system: &Y, most: usize) {
+    const START: Vector3<f64> = Vector3::new(0.4, 0.5, 0.3);
+    let schedules: [Schedule; 2] =
+        [Span::steps(0.1, 400).into(), Span::until(40.0).tolerance(1e-4).into()];
+    for plain in schedules {
+        let schedule = plain.clone().event("node", |p: &Vector3<f64>| p.y);
+        let schedule = schedule.event("node of another", |p: &Vector3<f64>| p.z - p.x);
+        let schedule = schedule.event_in_time("rate", |t, p: &Vector3<f64>| p.x - 0.01 * t);
+        let run = WeylMidpoint.run(system, START, schedule.clone()).expect("it runs");
+        let bits = |event: &Event<LieDual<3>>| {
+            let State { time, point, energy, entropy, .. } = &event.state;
+            let numbers = [*time, point.x, point.y, point.z, *energy, *entropy].map(f64::to_bits);
+            (event.index, event.rises, numbers)
+        };
+        let whole: Vec<_> = run.events().iter().map(bits).collect();
+        println!("{} events in {} steps", whole.len(), run.certificate().steps);
+        assert!(whole.len() >= most, "{} events", whole.len());
+        for put_down in [0, 1, 30, 100, 300] {
+            let mut steps = WeylMidpoint.steps(system, START, schedule.clone()).expect("it runs");
+            let mut seen = Vec::new();
+            for _ in 0..put_down {
+                steps.advance().expect("it runs");
+                seen.extend(steps.take_events().iter().map(bits));
+            }
+            let resumed = WeylMidpoint.resume(system, &steps.checkpoint()).expect("it runs");
+            let resumed =
+                resumed.watching(schedule.clone()).expect("it runs").run().expect("it runs");
+            seen.extend(resumed.events().iter().map(bits));
+            assert!(seen == whole, "{} events", seen.len());
+        }
+        // The states keep the laws, S grows from event to event, and no step is another one.
+        let start = run.states()[0].energy;
+        let energy = run.events().iter().map(|event| (event.state.energy - start).abs() / start);
+        assert!(energy.fold(0.0, f64::max) <= 5e-15);
+        let entropies = run.events().iter().map(|event| event.state.entropy);
+        assert!(entropies.is_sorted_by(|a, b| *b >= a - 6.0 * f64::EPSILON));
+        let plain = WeylMidpoint.run(system, START, plain).expect("it runs");
+        assert!(run.states() == plain.states() && run.certificate() == plain.certificate());
+    }
+}
+
+#[test]
+fn a_resumed_run_has_the_same_events() {
+    resumes(&free_body(), 5);
+    resumes(&relaxing_body(), 2);
+}

@@ -166,7 +166,8 @@ macro_rules! method {
                 memory: &mut MemoryOf<F>,
                 theta: f64,
             ) -> Option<Element<F>> {
-                dense::between(Self::TABLEAU, flow, step, memory, theta)
+                let promises = self.promises(flow);
+                dense::between(Self::TABLEAU, flow, step, promises, memory, theta)
             }
         }
     };

@@ -6,53 +6,50 @@
 //! ends and limited slopes (Fritsch, Carlson 1980); and where the entropy has not risen, a constant. The state
 //! is then moved onto the laws.
 
-use metriplectic_dynamics::SecondLaw;
-
-use super::flow::{StageFlow, Target};
+use super::flow::StageFlow;
 use super::memory::{LastStep, MemoryOf, combined};
-use super::step::{stage, with_entropy};
+use super::step::stage;
 use super::tableau::Tableau;
-use crate::method::{Element, StepEnds, Vector};
+use crate::method::{Element, Promises, StepEnds, Vector};
+use crate::run::dense;
 
 /// The state at the fraction `θ` of a step.
 pub(super) fn between<F: StageFlow>(
     tableau: &'static Tableau,
     flow: &F,
     step: &StepEnds<'_, F>,
+    promises: Promises,
     memory: &mut MemoryOf<F>,
     theta: f64,
 ) -> Option<Element<F>> {
-    if step.x == step.end {
+    if theta <= 0.0 || step.x == step.end {
         return Some(step.x.clone());
     }
-    let last = memory.last.as_mut()?;
-    more_stages(tableau, flow, step, last)?;
-    let last = &*last;
-    let rows = tableau.dense.iter().map(|row| combined(row, &last.stages));
-    let h = step.h;
-    let (rates, end) = (&last.stages[0].0, &last.stages[tableau.stages.len() + 1].0);
-    let mut higher = rows.clone().map(|(row, _)| row).collect::<Vec<_>>();
-    higher.iter_mut().for_each(|row| *row = row.map(|q| h * q));
-    let q = last.end.with(|i| {
-        let numbers: Vec<f64> = higher.iter().map(|row| row.get(i)).collect();
-        polynomial([last.end.get(i), h * rates.get(i), h * end.get(i)], &numbers, theta)
+    if theta >= 1.0 {
+        return Some(step.end.clone());
+    }
+    let known = memory.last.as_mut().and_then(|last| {
+        more_stages(tableau, flow, step, last)?;
+        Some(&*last)
     });
-    let y = flow.stage(step.x, &q)?;
-    let exact = flow.entropy_law() == SecondLaw::Exact;
-    let entropy = if exact {
-        let ends = step.values.map(|laws| laws.entropy);
-        let slopes = [h * last.stages[0].1, h * last.stages[tableau.stages.len() + 1].1];
-        let higher: Vec<f64> = rows.map(|(_, row)| h * row).collect();
-        entropy(ends, slopes, &higher, theta)
-    } else {
-        0.0
-    };
-    let laws = with_entropy(step.reference, entropy);
-    let onto = |with_entropy| {
-        let target = Target { laws: &laws, with_entropy, limit: None };
-        flow.project(y.clone(), &target).ok().map(|end| end.x)
-    };
-    if exact { onto(true).or_else(|| onto(false)) } else { onto(false) }
+    // A step that was taken in parts has no stages.
+    let Some(last) = known else { return dense::between(flow, step, promises, theta) };
+    let (h, line) = (step.h, last.end.map(|q| theta * q));
+    let ends = [&last.stages[0], &last.stages[tableau.stages.len() + 1]];
+    let rows = tableau.dense.iter().map(|row| combined(row, &last.stages));
+    let rows: Vec<(F::Vector, f64)> = rows.collect();
+    let q = last.end.with(|i| {
+        let slopes = ends.map(|(rates, _)| h * rates.get(i));
+        polynomial(last.end.get(i), slopes, rows.iter().map(|(row, _)| h * row.get(i)), theta)
+    });
+    let target = promises.entropy.then(|| {
+        let slopes = ends.map(|(_, production)| h * production);
+        let higher = rows.iter().map(|(_, row)| h * row);
+        entropy(step.values.map(|laws| laws.entropy), slopes, higher, theta)
+    });
+    let on_line = || flow.stage(step.x, &line).unwrap_or_else(|| step.x.clone());
+    let y = flow.stage(step.x, &q).unwrap_or_else(on_line);
+    Some(dense::onto_laws(flow, step, promises, (theta, target), (y, on_line)))
 }
 
 /// Takes the stages that only the dense output needs, once.
@@ -74,31 +71,70 @@ fn more_stages<F: StageFlow>(
 }
 
 /// The dense output of one entry, from 0 to `end`, with the slopes at both ends.
-fn polynomial([end, first, last]: [f64; 3], higher: &[f64], theta: f64) -> f64 {
+fn polynomial(
+    end: f64,
+    slopes: [f64; 2],
+    higher: impl DoubleEndedIterator<Item = f64> + ExactSizeIterator,
+    theta: f64,
+) -> f64 {
     let rest = 1.0 - theta;
-    let bend = first - end;
-    // θ (c₁ + (1 − θ) (c₂ + θ (c₃ + (1 − θ) (c₄ + …)))).
-    let nested = higher.iter().enumerate().rev().fold(0.0, |sum, (k, c)| {
+    // (1 − θ) (c₁ + θ (c₂ + (1 − θ) (c₃ + …))).
+    let nested = higher.enumerate().rev().fold(0.0, |sum, (k, c)| {
         let factor = if k % 2 == 0 { rest } else { theta };
         factor * (c + sum)
     });
-    theta * (end + rest * (bend + theta * (end - last - bend + nested)))
+    dense::cubic(end, slopes, theta) + theta * rest * theta * nested
 }
 
-/// The entropy at the fraction `θ`, between that of the start and that of the end, and never falling.
-fn entropy([start, end]: [f64; 2], slopes: [f64; 2], higher: &[f64], theta: f64) -> f64 {
+/// The entropy at the fraction `θ`, between that of the start and that of the end, and never falling. A rise
+/// that is not positive is round-off: the entropy is then the one at the start.
+fn entropy(
+    [start, end]: [f64; 2],
+    slopes: [f64; 2],
+    higher: impl DoubleEndedIterator<Item = f64> + ExactSizeIterator + Clone,
+    theta: f64,
+) -> f64 {
     let rise = end - start;
     if rise <= 0.0 {
         return start;
     }
-    let at = |theta: f64| polynomial([rise, slopes[0], slopes[1]], higher, theta);
-    let n = 64;
-    let nodes = (0..=n).map(|k| at(f64::from(k) / f64::from(n)));
-    let is_monotone = nodes.clone().zip(nodes.skip(1)).all(|(a, b)| a <= b);
-    if is_monotone {
-        return start + at(theta).clamp(0.0, rise);
+    let at = |theta: f64| polynomial(rise, slopes, higher.clone(), theta);
+    let nodes = (0..=NODES).map(|k| at(f64::from(k) / f64::from(NODES)));
+    let is_monotone = nodes.clone().zip(nodes.skip(1)).all(|(a, b)| a < b);
+    let risen = if is_monotone {
+        at(theta)
+    } else {
+        dense::cubic(rise, dense::limited(rise, slopes), theta)
+    };
+    (start + risen.clamp(0.0, rise)).min(end)
+}
+
+/// Intervals on which the polynomial of the entropy is compared with a monotone function. One of degree 7 that is
+/// monotone on these nodes has no room for a fall that is more than a small fraction of the rise of an interval.
+const NODES: u32 = 32;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_first_rows_of_the_polynomial_are_the_cubic_of_hermite() {
+        // f = t² (1 − t)² vanishes at both ends with its slope, and is the first higher row.
+        for theta in [0.1, 0.4, 0.9_f64] {
+            let value = polynomial(0.0, [0.0; 2], [1.0].into_iter(), theta);
+            assert!((value - theta.powi(2) * (1.0 - theta).powi(2)).abs() < 1e-16);
+        }
     }
-    // Slopes of at most three times the mean make the cubic monotone.
-    let [first, last] = slopes.map(|slope| slope.clamp(0.0, 3.0 * rise));
-    start + polynomial([rise, first, last], &[], theta).clamp(0.0, rise)
+
+    #[test]
+    fn an_entropy_between_two_states_never_falls() {
+        let falling = [0.5, -3.0, 2.0, -1.0];
+        for rise in [1.0, 1e-9, 0.0, -1e-16] {
+            let at = |k: u32| {
+                entropy([2.0, 2.0 + rise], [0.0, 9.0], falling.into_iter(), f64::from(k) / 40.0)
+            };
+            assert!((0..40).all(|k| at(k) <= at(k + 1)), "{rise}");
+            assert!(at(40) <= 2.0 + rise.max(0.0));
+        }
+    }
 }

@@ -5,9 +5,7 @@ use metriplectic_dynamics::SecondLaw;
 use super::flow::{Projected, ProjectionError, StageFlow, Target};
 use super::memory::{ExplicitMemory, Here, LastStep, MemoryOf, Produced, STAGES, combined};
 use super::tableau::Tableau;
-use crate::method::{
-    Effort, Element, EntropyStep, Evidence, Laws, Refusal, StepStart, Taken, Vector,
-};
+use crate::method::{Effort, Element, EntropyStep, Evidence, Refusal, StepStart, Taken, Vector};
 use crate::run::scales::relative;
 use crate::step_error::StepError;
 
@@ -337,9 +335,4 @@ fn refused(error: ProjectionError) -> Refused {
         ProjectionError::Outside => Refused::Outside,
         ProjectionError::NoEntropy | ProjectionError::Far => Refused::Far,
     }
-}
-
-/// The laws with another entropy.
-pub(super) fn with_entropy<L: Clone>(laws: &Laws<L>, entropy: f64) -> Laws<L> {
-    Laws { entropy, ..laws.clone() }
 }

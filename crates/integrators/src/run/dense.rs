@@ -41,14 +41,14 @@ impl<V: Vector> Hermite<V> {
 }
 
 /// The cubic from 0 to `rise` with these slopes.
-fn cubic(rise: f64, [start, end]: [f64; 2], theta: f64) -> f64 {
+pub(crate) fn cubic(rise: f64, [start, end]: [f64; 2], theta: f64) -> f64 {
     let rest = 1.0 - theta;
     theta * (theta * (3.0 - 2.0 * theta) * rise + rest * (rest * start - theta * end))
 }
 
 /// The largest slopes for which the cubic from 0 to `rise` is monotone, at most the given ones (Fritsch, Carlson
 /// 1980, eq. 4): those in the circle of radius 3 around 0 in units of the rise.
-fn limited(rise: f64, slopes: [f64; 2]) -> [f64; 2] {
+pub(crate) fn limited(rise: f64, slopes: [f64; 2]) -> [f64; 2] {
     let units = slopes.map(|slope| (slope / rise).max(0.0));
     let radius = units[0].hypot(units[1]);
     let factor = if radius > 3.0 { 3.0 / radius } else { 1.0 };
@@ -93,9 +93,6 @@ fn targets<F: Flow>(step: &StepEnds<'_, F>, promises: Promises, theta: f64) -> L
 }
 
 /// The state at the fraction `θ` of a step; `None` if the flow does not say what lies between its ends.
-///
-/// If the state on the cubic is too far from the laws, that on the straight line is moved onto them, and at last
-/// the state is the nearer end, where the laws hold.
 #[inline(never)]
 pub(crate) fn between<F: Flow>(
     flow: &F,
@@ -110,25 +107,39 @@ pub(crate) fn between<F: Flow>(
         return Some(step.end.clone());
     }
     let curve = Hermite::through(flow, step)?;
-    let laws = targets(step, promises, theta);
     let has_entropy = promises.entropy && flow.entropy_law() != SecondLaw::NoEntropy;
     let target = has_entropy.then(|| entropy(flow, step, theta));
+    let y = flow.moved(step.x, &curve.at(theta));
+    let line = || flow.moved(step.x, &curve.end.map(|q| theta * q));
+    Some(onto_laws(flow, step, promises, (theta, target), (y, line)))
+}
+
+/// The state at the fraction `θ` that is near `y` and has the laws of the run with this entropy. If `y` is too far
+/// from them, the state on the straight line is moved onto them, and at last it is the nearer end, where the laws
+/// hold.
+pub(crate) fn onto_laws<F: Flow>(
+    flow: &F,
+    step: &StepEnds<'_, F>,
+    promises: Promises,
+    (theta, entropy): (f64, Option<f64>),
+    (y, line): (Element<F>, impl FnOnce() -> Element<F>),
+) -> Element<F> {
+    let laws = targets(step, promises, theta);
     let [least, most] = step.values.map(|laws| laws.entropy);
-    let onto = |q: &F::Vector| {
-        let y = flow.moved(step.x, q);
-        let on_all = flow.onto(&y, &laws, target);
-        if on_all.is_some() || target.is_none() {
+    let onto = |y: &Element<F>| {
+        let on_all = flow.onto(y, &laws, entropy);
+        if on_all.is_some() || entropy.is_none() {
             return on_all;
         }
         // Near an equilibrium the other laws determine the entropy.
         let round_off = flow.entropy_round_off([step.x, step.end]);
-        flow.onto(&y, &laws, None).filter(|y| {
+        flow.onto(y, &laws, None).filter(|y| {
             let entropy = flow.laws(y).entropy;
             entropy >= least - round_off && entropy <= most + round_off
         })
     };
     let near = || if theta < 0.5 { step.x.clone() } else { step.end.clone() };
-    onto(&curve.at(theta)).or_else(|| onto(&curve.end.map(|q| theta * q))).or_else(|| Some(near()))
+    onto(&y).or_else(|| onto(&line())).unwrap_or_else(near)
 }
 
 #[cfg(test)]

@@ -7,7 +7,8 @@ pub(crate) struct Sample {
     pub(crate) value: f64,
 }
 
-/// Evaluations after which a bracket is halved if they have not done so; one less each time that happens, and in the end it is bisected.
+/// Evaluations after which a bracket is halved if they have not done so; one less each time that happens, so that in
+/// the end it is bisected.
 const PATIENCE: usize = 4;
 
 /// Narrows a bracket across which a function changes its sign, until it is `width` wide or the function is zero at

@@ -3,6 +3,7 @@
 use std::fmt::Debug;
 
 use super::flow::StageFlow;
+use super::tableau::Row;
 use crate::method::{Flow, Memory, Vector};
 use crate::run::checkpoint::{ResumeError, Saved};
 
@@ -67,6 +68,8 @@ pub(super) struct LastStep<V> {
     pub(super) stages: [(V, f64); STAGES],
     /// The stages that are known.
     pub(super) known: usize,
+    /// The coordinates of the last stage before the end.
+    pub(super) before: V,
     /// The coordinates of its end.
     pub(super) end: V,
     /// The rise of the entropy.
@@ -109,11 +112,19 @@ impl<V: Vector, G: Clone + Debug> Memory for ExplicitMemory<V, G> {
     }
 }
 
-/// `Σ_j w_j k_j` over the stages.
+/// `Σ_j w_j k_j` over the rates of the stages.
 #[inline]
-pub(super) fn combined<V: Vector>(row: super::tableau::Row, stages: &[(V, f64)]) -> (V, f64) {
-    let (first, _) = &stages[0];
-    let sum =
-        first.with(|i| row.iter().fold(0.0, |sum, &(j, w)| w.mul_add(stages[j].0.get(i), sum)));
-    (sum, row.iter().fold(0.0, |sum, &(j, w)| sum + w * stages[j].1))
+pub(super) fn combined<V: Vector>(row: Row, stages: &[(V, f64); STAGES]) -> V {
+    let Some(&(first, w)) = row.first() else { return stages[0].0.map(|_| 0.0) };
+    let start = stages[first].0.map(|k| w * k);
+    row[1..].iter().fold(start, |sum, &(j, w)| {
+        let rates = &stages[j].0;
+        sum.with(|i| sum.get(i) + w * rates.get(i))
+    })
+}
+
+/// `Σ_j w_j σ_j` over the entropy production of the stages.
+#[inline]
+pub(super) fn produced<V>(row: Row, stages: &[(V, f64); STAGES]) -> f64 {
+    row.iter().fold(0.0, |sum, &(j, w)| sum + w * stages[j].1)
 }

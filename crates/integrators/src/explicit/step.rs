@@ -3,7 +3,9 @@
 use metriplectic_dynamics::SecondLaw;
 
 use super::flow::{Projected, ProjectionError, StageFlow, Target};
-use super::memory::{ExplicitMemory, Here, LastStep, MemoryOf, Produced, STAGES, combined};
+use super::memory::{
+    ExplicitMemory, Here, LastStep, MemoryOf, Produced, STAGES, combined, produced,
+};
 use super::tableau::Tableau;
 use crate::method::{Effort, Element, EntropyStep, Evidence, Refusal, StepStart, Taken, Vector};
 use crate::run::scales::relative;
@@ -186,13 +188,14 @@ fn stages<F: StageFlow>(
     let zero = here.velocity.map(|_| 0.0);
     let mut stages: [(F::Vector, f64); STAGES] = std::array::from_fn(|_| (zero.clone(), 0.0));
     stages[0] = (here.velocity.clone(), here.production);
+    let mut before = zero;
     for (i, row) in tableau.stages.iter().enumerate() {
-        let q = combined(row, &stages).0.map(|q| h * q);
-        stages[i + 1] = stage(flow, x, &q)?;
+        before = combined(row, &stages).map(|q| h * q);
+        stages[i + 1] = stage(flow, x, &before)?;
     }
-    let (end, rise) = combined(tableau.end, &stages);
-    let end = end.map(|q| h * q);
-    Some(LastStep { stages, known: tableau.stages.len() + 1, end, rise: h * rise })
+    let end = combined(tableau.end, &stages).map(|q| h * q);
+    let rise = h * produced(tableau.end, &stages);
+    Some(LastStep { stages, known: tableau.stages.len() + 1, before, end, rise })
 }
 
 /// The rates and the entropy production of a stage at the coordinates `q`.
@@ -231,11 +234,9 @@ fn is_at_the_edge<F: StageFlow>(
     last: &LastStep<F::Vector>,
     rates: &F::Vector,
 ) -> bool {
-    let Some(row) = tableau.stages.last() else { return false };
-    let stage = combined(row, &last.stages).0;
     let sizes = flow.sizes(x);
     let sizes = sizes.with(|i| sizes.get(i).max(last.end.get(i).abs()));
-    let apart = last.end.with(|i| last.end.get(i) - h * stage.get(i));
+    let apart = last.end.with(|i| last.end.get(i) - last.before.get(i));
     let before = &last.stages[tableau.stages.len()].0;
     let change = rates.with(|i| h * (rates.get(i) - before.get(i)));
     let distance = relative(&apart, &sizes);
@@ -251,7 +252,7 @@ pub(super) fn error<F: StageFlow>(
 ) -> Option<f64> {
     let last = memory.last.as_ref()?;
     let [fifth, third] =
-        tableau.errors.map(|row| norm(&combined(row, &last.stages).0.map(|e| h * e)));
+        tableau.errors.map(|row| norm(&combined(row, &last.stages).map(|e| h * e)));
     // Hairer's e₅²/√(e₅² + e₃²/100) is of the order of the method; a method with one error has that.
     Some(if third > 0.0 { fifth * (fifth / fifth.hypot(0.1 * third)) } else { fifth })
 }
@@ -315,7 +316,7 @@ impl<F: StageFlow> Onto<'_, F> {
     fn is_trusted(&self) -> bool {
         let Self { tableau, h, last, .. } = *self;
         let doubt = if tableau.order == 8 {
-            (h * combined(tableau.errors[0], &last.stages).1).abs()
+            (h * produced(tableau.errors[0], &last.stages)).abs()
         } else {
             0.0
         };

@@ -400,6 +400,11 @@ const UNSOLVED: f64 = 0.25;
 /// The least error that the controller remembers: a step without any is no reason to be bold later.
 const LEAST_ERROR: f64 = 1e-4;
 
+/// `x^{-α}`, for order 8 by three square roots.
+fn inverse_root(x: f64, alpha: f64) -> f64 {
+    if alpha == 0.125 { x.sqrt().sqrt().sqrt().recip() } else { x.powf(-alpha) }
+}
+
 impl<V: Vector> Controller<V> {
     /// The order of the local error.
     fn local_order(&self) -> f64 {
@@ -441,7 +446,7 @@ impl<V: Vector> Controller<V> {
             Some(before) if beta != 0.0 => before.powf(beta),
             _ => 1.0,
         };
-        let ratio = SAFETY * error.powf(-alpha) * proportional;
+        let ratio = SAFETY * inverse_root(error, alpha) * proportional;
         let most = if self.rejected { 1.0 } else { largest };
         let mut next = h * ratio.clamp(least, most);
         self.cap = self.cap.filter(|_| ratio >= 1.0).map(|cap| {

@@ -11,6 +11,19 @@ use metriplectic::prelude::*;
 use models::{TUMBLING, UNSTABLE, free_body, half_square, kinetic, relaxing_body};
 
 const INERTIA: Vector3<f64> = Vector3::new(10.0, 5.0, 1.0);
+/// Function pointers and boxes, so that one compiled system serves all choices of the fields.
+type Field3 = fn(&Vector3<Real>) -> Real;
+
+fn body_energy(p: &Vector3<Real>) -> Real {
+    kinetic(INERTIA)(p)
+}
+
+type Form3 = Box<dyn Fn(&Vector3<Real>) -> Matrix3<Real>>;
+
+fn form(f: impl Fn(&Vector3<Real>) -> Matrix3<Real> + 'static) -> Form3 {
+    Box::new(f)
+}
+
 const TEN_STEPS: Span = Span::steps(0.1, 10);
 
 /// What a run of the model says that it should refuse.
@@ -36,10 +49,18 @@ fn a_start_that_is_not_finite_names_its_entry() {
 #[test]
 fn a_field_that_is_not_a_number_is_named() {
     let nan = |p: &Vector3<Real>| p.x * f64::NAN;
-    let system = System::on(LieDual::so3()).energy(nan).entropy(half_square).build().unwrap();
+    let system = System::on(LieDual::so3())
+        .energy(nan as Field3)
+        .entropy(half_square as Field3)
+        .build()
+        .unwrap();
     let error = refused(&system, UNSTABLE);
     assert!(matches!(error, ModelError::ValueNotFinite { field: "energy", .. }), "{error}");
-    let system = System::on(LieDual::so3()).energy(kinetic(INERTIA)).entropy(nan).build().unwrap();
+    let system = System::on(LieDual::so3())
+        .energy(body_energy as Field3)
+        .entropy(nan as Field3)
+        .build()
+        .unwrap();
     let error = refused(&system, UNSTABLE);
     assert!(matches!(error, ModelError::ValueNotFinite { field: "entropy", .. }), "{error}");
 }
@@ -47,8 +68,8 @@ fn a_field_that_is_not_a_number_is_named() {
 #[test]
 fn a_derivative_that_is_not_a_number_is_found_under_a_finite_value() {
     let system = System::on(LieDual::so3())
-        .energy(|p: &Vector3<Real>| p.norm() + p.x)
-        .entropy(half_square)
+        .energy((|p: &Vector3<Real>| p.norm() + p.x) as Field3)
+        .entropy(half_square as Field3)
         .build()
         .unwrap();
     let error = refused(&system, Vector3::zeros());
@@ -68,9 +89,9 @@ fn bad_metrics_are_refused() {
     ));
     let with = |g: Matrix3<f64>| {
         let system = System::on(LieDual::so3())
-            .metric(Metric::field(move |_: &Vector3<Real>| g.cast::<Real>()))
-            .energy(kinetic(INERTIA))
-            .entropy(half_square)
+            .metric(Metric::field(form(move |_: &Vector3<Real>| g.cast::<Real>())))
+            .energy(body_energy as Field3)
+            .entropy(half_square as Field3)
             .build()
             .unwrap();
         match refused(&system, UNSTABLE) {
@@ -86,12 +107,15 @@ fn bad_metrics_are_refused() {
 fn a_metric_or_bracket_that_is_not_a_number_is_named_and_so_is_its_derivative() {
     let with = |factor: fn(&Vector3<Real>) -> Real| {
         let metric = move |p: &Vector3<Real>| Matrix3::from_diagonal_element(factor(p) + 1.0);
-        let body = System::on(LieDual::so3()).metric(Metric::field(metric));
+        let body = System::on(LieDual::so3()).metric(Metric::field(form(metric)));
         let tensor = move |p: &Vector3<Real>| Vector3::x().cross_matrix() * (factor(p) + 1.0);
-        let bracket = System::on(LieDual::so3()).bracket(Poisson::field(tensor));
+        let bracket = System::on(LieDual::so3()).bracket(Poisson::field(form(tensor)));
         [
-            refused(&body.energy(kinetic(INERTIA)).entropy(half_square).build().unwrap(), ORIGIN),
-            refused(&bracket.energy(kinetic(INERTIA)).build().unwrap(), ORIGIN),
+            refused(
+                &body.energy(body_energy as Field3).entropy(half_square as Field3).build().unwrap(),
+                ORIGIN,
+            ),
+            refused(&bracket.energy(body_energy as Field3).build().unwrap(), ORIGIN),
         ]
     };
     const ORIGIN: Vector3<f64> = Vector3::new(0.0, 0.0, 0.0);
@@ -131,9 +155,9 @@ fn a_dissipation_that_changes_an_invariant_is_refused() {
 fn a_metric_that_ends_nearby_stops_the_run_with_what_it_has() {
     // g = 1 + 2p₁ is positive at the start and for p₁ > −½, and the body turns towards −1.41.
     let system = System::on(LieDual::so3())
-        .metric(Metric::field(|p: &Vector3<Real>| Matrix3::from_diagonal_element(p.x * 2.0 + 1.0)))
-        .energy(kinetic(INERTIA))
-        .entropy(half_square)
+        .metric(Metric::field(form(|p| Matrix3::from_diagonal_element(p.x * 2.0 + 1.0))))
+        .energy(body_energy as Field3)
+        .entropy(half_square as Field3)
         .build()
         .unwrap();
     let error = WeylMidpoint.run(&system, UNSTABLE, Span::steps(0.1, 2000)).unwrap_err();
@@ -178,8 +202,8 @@ fn an_absurd_step_ends_soon_in_an_error_with_the_trajectory_so_far() {
 fn a_run_that_fails_on_its_way_keeps_what_it_has() {
     // The entropy climbs without bound along H = 1, and blows up in finite time.
     let system = System::on(LieDual::so3())
-        .energy(|p: &Vector3<Real>| p.x.powi(2) * 0.5 + p.y.powi(2) * 0.25 + p.z.exp())
-        .entropy(|p: &Vector3<Real>| p.norm_squared().powi(2))
+        .energy((|p: &Vector3<Real>| p.x.powi(2) * 0.5 + p.y.powi(2) * 0.25 + p.z.exp()) as Field3)
+        .entropy((|p: &Vector3<Real>| p.norm_squared().powi(2)) as Field3)
         .build()
         .unwrap();
     let start = vector![0.5, -0.3, -0.1];
@@ -267,7 +291,9 @@ fn a_state_as_small_or_large_as_a_number_can_be_is_integrated() {
 #[test]
 fn an_entropy_that_is_no_casimir_is_refused_unless_the_published_scheme_is_asked_for() {
     let builder = || {
-        System::on(LieDual::so3()).energy(kinetic(INERTIA)).entropy(|p: &Vector3<Real>| p.x * 0.1)
+        System::on(LieDual::so3())
+            .energy(body_energy as Field3)
+            .entropy((|p: &Vector3<Real>| p.x * 0.1) as Field3)
     };
     let error = refused(&builder().build().unwrap(), UNSTABLE);
     let ModelError::EntropyNotCasimir { point, size } = &error else { panic!("{error}") };
@@ -288,8 +314,8 @@ fn bad_brackets_are_refused() {
     ));
     let with = |tensor: fn(&Vector3<Real>) -> Matrix3<Real>| {
         let system = System::on(LieDual::so3())
-            .bracket(Poisson::field(tensor))
-            .energy(kinetic(INERTIA))
+            .bracket(Poisson::field(form(tensor)))
+            .energy(body_energy as Field3)
             .build()
             .unwrap();
         refused(&system, UNSTABLE)
@@ -329,7 +355,7 @@ fn a_system_in_which_nothing_moves_is_not_built() {
     let error = System::on(Euclidean::<2>).energy(|x: &Vector2<Real>| x.x).build().unwrap_err();
     assert_eq!(error, BuildError::NothingMoves);
     let error = System::on(LieDual::so3())
-        .energy(kinetic(INERTIA))
+        .energy(body_energy as Field3)
         .second_law(SecondLaw::Exact)
         .build()
         .unwrap_err();

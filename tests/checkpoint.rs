@@ -5,7 +5,7 @@ mod models;
 use metriplectic::integrators::{Checkpoint, ResumeError, Schedule, SpanError, Steps};
 use metriplectic::manifolds::PointError;
 use metriplectic::prelude::*;
-use models::{TUMBLING, UNSTABLE, free_body, half_square, relaxing_body, top};
+use models::{TUMBLING, UNSTABLE, free_body, half_square, relaxing_body, spring, top};
 
 type Start<Y> = <<Y as Metriplectic>::Manifold as metriplectic::fields::Space>::Point<f64>;
 
@@ -119,18 +119,7 @@ fn a_resumed_run_with_a_further_invariant_is_the_run() {
         .build()
         .unwrap();
     resumes_both("so(3)*", &free, TUMBLING);
-    // A spring in the plane that is not linear, with its angular momentum.
-    let canonical = Matrix4::from_fn(|i, j| f64::from(j == i + 2) - f64::from(i == j + 2));
-    let spring = System::on(Euclidean::<4>)
-        .bracket(Poisson::constant(canonical).unwrap())
-        .energy(|x: &Vector4<Real>| {
-            let r = x.x.powi(2) + x.y.powi(2);
-            (x.z.powi(2) + x.w.powi(2) + r) * 0.5 + r.powi(2) * 0.25
-        })
-        .momentum(|x: &Vector4<Real>| x.x * x.w - x.y * x.z)
-        .build()
-        .unwrap();
-    resumes_both("R⁴", &spring, vector![1.0, 0.2, -0.3, 0.6]);
+    resumes_both("R⁴", &spring(), vector![1.0, 0.2, -0.3, 0.6]);
 }
 
 #[test]

@@ -1,9 +1,12 @@
 //! Casimirs whose differentials become dependent on the way of a run: the energy and the entropy keep their
 //! laws, the run goes on, and the certificate shows what the Casimir has changed by.
 
+mod models;
+
 use metriplectic::fields::Space;
 use metriplectic::integrators::{Schedule, StepError};
 use metriplectic::prelude::*;
+use models::{BEFORE_THE_CUSP, cusp};
 
 type State6 = SVector<Real, 6>;
 type State10 = SVector<Real, 10>;
@@ -192,21 +195,13 @@ fn a_quartic_casimir_of_so5_becomes_dependent_without_an_error() {
     }
 }
 
-/// On the level set of `H = z` and `C = z + y² − x³` the entropy `−x` drives the state into a cusp, where
-/// `dC` and `dH` are parallel and the level set ends.
 #[test]
 fn a_run_that_dependence_ends_says_so() {
-    let system = System::on(Euclidean::<3>)
-        .energy(|x: &Vector3<Real>| x.z)
-        .entropy(|x: &Vector3<Real>| -x.x)
-        .casimir(|x: &Vector3<Real>| x.z + x.y.powi(2) - x.x.powi(3))
-        .build()
-        .unwrap();
-    let start = vector![0.25, 0.125, 0.0];
+    let system = cusp();
     let ends: [Schedule; 3] =
         [Span::steps(0.1, 30).into(), Span::steps(0.01, 300).into(), Span::until(3.0).into()];
     for course in ends {
-        match WeylMidpoint.run(&system, start, course) {
+        match WeylMidpoint.run(&system, BEFORE_THE_CUSP, course) {
             Err(RunError::Step { cause, trajectory }) => {
                 println!("{cause}\n{}", trajectory.certificate());
                 assert!(

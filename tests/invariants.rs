@@ -6,30 +6,10 @@ use metriplectic::dynamics::BuildError;
 use metriplectic::prelude::*;
 use metriplectic_studies::Order;
 use metriplectic_studies::problems::flow;
-use models::kinetic;
-
-type State6 = SVector<Real, 6>;
-
-fn split(x: &State6) -> (Vector3<Real>, Vector3<Real>) {
-    (x.fixed_rows::<3>(0).into_owned(), x.fixed_rows::<3>(3).into_owned())
-}
-
-/// Heavy top on se(3)*: `H = ½ M·I⁻¹M + Γ·χ`.
-fn heavy(x: &State6) -> Real {
-    let (m, gamma) = split(x);
-    kinetic(vector![1.0, 1.5, 2.0])(&m) + gamma.x * 0.2 + gamma.z * 0.7
-}
-
-fn gamma_squared(x: &State6) -> Real {
-    split(x).1.norm_squared()
-}
-
-fn alignment(x: &State6) -> Real {
-    let (m, gamma) = split(x);
-    m.dot(&gamma)
-}
-
-const HEAVY: [f64; 6] = [0.4, -0.7, 0.9, 0.3, 0.5, 0.8];
+use models::{
+    HEAVY, PENDULUM, State6, State10, alignment, angular_momentum, gamma_squared, heat_exchange,
+    heavy, kinetic, pendulum_bracket, pendulum_energy,
+};
 
 /// Orders on four step sizes, with certificates that must keep everything.
 fn order<Y: Metriplectic>(
@@ -103,30 +83,6 @@ fn casimirs_of_a_hamiltonian_system_are_kept_on_a_curved_space_too() {
     assert!(change.abs() > 1e-6, "{change}");
 }
 
-/// The thermoelastic double pendulum (Romero 2009), all constants 1, as `(q₁, q₂, p₁, p₂, s₁, s₂)`.
-type State10 = SVector<Real, 10>;
-
-fn pair(x: &State10, i: usize) -> Vector2<Real> {
-    Vector2::new(x[i], x[i + 1])
-}
-
-fn stored(length: Real, s: Real) -> Real {
-    let stretch = length.ln();
-    stretch.powi(2) * 0.5 + stretch + (s - stretch).exp() - 1.0
-}
-
-fn pendulum_energy(x: &State10) -> Real {
-    let lengths =
-        [pair(x, 0).norm_squared().sqrt(), (pair(x, 2) - pair(x, 0)).norm_squared().sqrt()];
-    (pair(x, 4).norm_squared() + pair(x, 6).norm_squared()) * 0.5
-        + stored(lengths[0], x[8])
-        + stored(lengths[1], x[9])
-}
-
-fn angular_momentum(x: &State10) -> Real {
-    x[0] * x[5] - x[1] * x[4] + x[2] * x[7] - x[3] * x[6]
-}
-
 /// `q ↦ Q(t) q`, `p ↦ Q(t) p` for both masses.
 fn turned(t: Real, x: &State10) -> State10 {
     let (sine, cosine) = (t.sin(), t.cos());
@@ -136,23 +92,6 @@ fn turned(t: Real, x: &State10) -> State10 {
         i => x[i] * cosine + x[i - 1] * sine,
     })
 }
-
-fn pendulum_bracket() -> SMatrix<f64, 10, 10> {
-    let mut pi = SMatrix::zeros();
-    for i in 0..4 {
-        (pi[(i, i + 4)], pi[(i + 4, i)]) = (1.0, -1.0);
-    }
-    pi
-}
-
-fn heat_exchange(_: &State10, w: &State10) -> SMatrix<Real, 10, 10> {
-    // Temperatures are θᵢ = w_{sᵢ}; K = b bᵀ/(θ₁θ₂) with b = (θ₂, −θ₁) on the entropies.
-    let mut b = State10::zeros();
-    (b[8], b[9]) = (w[9], -w[8]);
-    b * b.transpose() * (w[8] * w[9]).recip()
-}
-
-const PENDULUM: [f64; 10] = [1.0, 0.0, 2.2, 0.0, 0.0, 2.0, 1.0, 0.0, 1.0, 0.2];
 
 #[test]
 fn the_angular_momentum_of_a_pendulum_is_kept_at_second_order() {

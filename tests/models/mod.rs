@@ -213,3 +213,37 @@ impl NaturalBracket for Globe {
         AreaForm
     }
 }
+
+/// A spring in the plane that is not linear, `x = (q, p)`, with its angular momentum.
+pub(crate) fn spring() -> impl Metriplectic<Manifold = Euclidean<4>, Metric = Canonical> {
+    spring_with(|r| r * 0.5 + r.powi(2) * 0.25)
+}
+
+/// The same with a potential of `r = |q|²`.
+pub(crate) fn spring_with(
+    potential: fn(Real) -> Real,
+) -> impl Metriplectic<Manifold = Euclidean<4>, Metric = Canonical> {
+    let canonical = Matrix4::from_fn(|i, j| f64::from(j == i + 2) - f64::from(i == j + 2));
+    System::on(Euclidean::<4>)
+        .bracket(Poisson::constant(canonical).expect("it is skew"))
+        .energy(move |x: &Vector4<Real>| {
+            (x.z.powi(2) + x.w.powi(2)) * 0.5 + potential(x.x.powi(2) + x.y.powi(2))
+        })
+        .momentum(|x: &Vector4<Real>| x.x * x.w - x.y * x.z)
+        .build()
+        .expect("the spring is a system")
+}
+
+/// A level set of `H = z` and `C = z + y² − x³` with a cusp, into which the entropy `−x` drives the state. There
+/// `dC` and `dH` are parallel, and the level set ends.
+pub(crate) fn cusp() -> impl Metriplectic<Manifold = Euclidean<3>, Metric = Canonical> {
+    System::on(Euclidean::<3>)
+        .energy(|x: &Vector3<Real>| x.z)
+        .entropy(|x: &Vector3<Real>| -x.x)
+        .casimir(|x: &Vector3<Real>| x.z + x.y.powi(2) - x.x.powi(3))
+        .build()
+        .expect("the cusp is a system")
+}
+
+/// Where it starts.
+pub(crate) const BEFORE_THE_CUSP: Vector3<f64> = Vector3::new(0.25, 0.125, 0.0);

@@ -8,7 +8,8 @@
 //! | [`order`] | how fast does the error fall with the step? | [`Order`]: the fitted slope, its 95 % interval, the points left out as round-off |
 //! | [`convergence`] | how do schemes compare? | [`Convergence`]: errors, order, table and figure |
 //! | [`problems`] | on what, on every manifold and metric? | [`problems::Orders`], [`problems::LargeSteps`], with flows by another method, [`problems::flow`] |
-//! | [`published`] | and by the scheme as published? | [`Published`], [`problems::SecondLaws`] |
+//! | [`either`] | with which retraction and gradient? | [`Either`] and [`AnyGradient`], chosen at run time |
+//! | [`published`] | and by the scheme as published? | [`Compared`], [`problems::SecondLaws`] |
 //! | [`drift`] | does the error grow with time? | [`Drift`]: flat, a random walk or a linear drift, in constant memory |
 //! | [`table`] | what does the study say, in rows? | [`Table`]: plain text and Markdown |
 //! | [`plot`] | what does it look like? | [`Panels`] of lines, with a [`Globe`] beside them, and [`LogLog`]: SVG, the same bytes every time |
@@ -46,6 +47,7 @@
 
 pub mod convergence;
 pub mod drift;
+pub mod either;
 pub mod example;
 pub mod gallery;
 pub mod interrupt;
@@ -65,11 +67,12 @@ mod student;
 
 pub use convergence::Convergence;
 pub use drift::{Drift, Growth, Slope};
+pub use either::{AnyGradient, Either};
 pub use example::{Example, Record};
 pub use gallery::{Gallery, GalleryError, Progress, print, write_csv};
 pub use interrupt::interrupted;
 pub use order::{Order, OrderError};
 pub use plot::{Globe, LogLog, Panel, Panels, PlotError};
-pub use published::Published;
+pub use published::Compared;
 pub use report::Report;
 pub use table::{Table, scientific};

@@ -19,7 +19,7 @@ use metriplectic_manifolds::{
 use nalgebra::{Matrix2, Matrix3, SVector, Vector1, Vector2, Vector3, Vector6, vector};
 use num_dual::DualNum;
 
-use crate::{Convergence, Published};
+use crate::{Compared, Convergence, Either};
 
 /// A system with a start, and names for tables.
 #[derive(Clone, Debug)]
@@ -282,9 +282,9 @@ impl SecondLaws {
                     return;
                 }
                 let span = Span::steps(self.1, self.2).at_most(2);
-                let exact = WeylMidpoint.run(system, start.clone(), span);
-                let published = WeylMidpoint.run(&Published(system), start.clone(), span);
-                if let (Ok(exact), Ok(published)) = (exact, published) {
+                let schemes = [Compared::given(system), Compared::published(system)];
+                let runs = schemes.map(|system| WeylMidpoint.run(&system, start.clone(), span));
+                if let [Ok(exact), Ok(published)] = runs {
                     let problem = format!("{name} on {manifold}");
                     let [exact, published] =
                         [exact, published].map(|run| run.certificate().clone());
@@ -372,23 +372,47 @@ pub fn each(study: &mut impl Study) {
     products(study);
 }
 
-/// Both geodesic retractions.
+/// Both geodesic retractions, as one type: the code of a study is made once for each problem.
 fn geodesic<Y: Metriplectic>(study: &mut impl Study, problem: &Problem<Y>) {
-    study.visit(problem, "Weyl midpoint", WeylMidpoint, 2.0);
-    study.visit(problem, "exponential", Exponential, 1.0);
+    type Geodesic = Either<WeylMidpoint, Exponential>;
+    study.visit(problem, "Weyl midpoint", Geodesic::First(WeylMidpoint), 2.0);
+    study.visit(problem, "exponential", Geodesic::Second(Exponential), 1.0);
+}
+
+/// Both geodesic retractions, and a third one of order 2.
+fn with<Y: Metriplectic, R>(
+    study: &mut impl Study,
+    problem: &Problem<Y>,
+    scheme: &'static str,
+    retraction: R,
+) where
+    R: Retraction<Y::Manifold, Y::Metric> + Copy,
+{
+    type Three<R> = Either<Either<WeylMidpoint, Exponential>, R>;
+    let first = |retraction| Three::<R>::First(retraction);
+    study.visit(problem, "Weyl midpoint", first(Either::First(WeylMidpoint)), 2.0);
+    study.visit(problem, "exponential", first(Either::Second(Exponential)), 1.0);
+    study.visit(problem, scheme, Three::Second(retraction), 2.0);
 }
 
 /// Canonical metrics.
 fn canonical(study: &mut impl Study) {
     let problem = |name, manifold, time| (name, manifold, CANONICAL, time);
     macro_rules! visit {
-        ($labels:expr, $start:expr, $strides:expr, $system:expr $(, $scheme:literal by $retraction:expr)?) => {{
+        ($labels:expr, $start:expr, $strides:expr, $system:expr, $scheme:literal by $retraction:expr) => {
+            visit!(@ $labels, $start, $strides, $system, |study, problem| {
+                with(study, problem, $scheme, $retraction)
+            })
+        };
+        ($labels:expr, $start:expr, $strides:expr, $system:expr) => {
+            visit!(@ $labels, $start, $strides, $system, geodesic)
+        };
+        (@ $labels:expr, $start:expr, $strides:expr, $system:expr, $all:expr) => {{
             let (name, manifold, metric, time) = $labels;
             let system = $system.build().expect("a problem is a system");
             let strides = $strides.to_vec();
             let problem = Problem { name, manifold, metric, system, start: $start, time, strides };
-            geodesic(study, &problem);
-            $(study.visit(&problem, $scheme, $retraction, 2.0);)?
+            $all(study, &problem);
         }};
     }
     visit!(
@@ -472,8 +496,7 @@ fn closures(study: &mut impl Study) {
     let strides = vec![(vector![0.7, -1.5], 32.0)];
     let (name, manifold, metric) = ("relaxation", "S²", "ambient closure");
     let problem = Problem { name, manifold, metric, system, start, time: 2.0, strides };
-    geodesic(study, &problem);
-    study.visit(&problem, "projection", Projection, 2.0);
+    with(study, &problem, "projection", Projection);
 
     // One closure for both, and so one type.
     let diagonal = Matrix3::from_diagonal(&vector![1.0, 1.5, 2.0]);
@@ -497,8 +520,7 @@ fn closures(study: &mut impl Study) {
         let (name, manifold, strides) = ("Nambu", "SO(3)", strides.to_vec());
         let problem =
             Problem { name, manifold, metric, system, start: attitude(), time: 1.0, strides };
-        geodesic(study, &problem);
-        study.visit(&problem, "Cayley", Cayley, 2.0);
+        with(study, &problem, "Cayley", Cayley);
     }
 
     let leaning = |q: &Vector2<Real>| {

@@ -40,7 +40,7 @@ fn end<Y: Metriplectic, M: Method<Y>>(
     x0: &Point<Y>,
     span: impl Into<metriplectic::integrators::Schedule>,
 ) -> Point<Y> {
-    let run = method.run(system, x0.clone(), span).unwrap();
+    let run = method.run(system, x0.clone(), span).expect("it runs");
     let certificate = run.certificate();
     let laws = certificate.keeps_energy() && certificate.keeps_invariants();
     assert!(laws && certificate.keeps_entropy(), "{certificate}");
@@ -55,7 +55,8 @@ fn orders<Y: Metriplectic>(name: &str, system: &Y, x0: &Point<Y>, time: f64, coa
     let (five, eight) =
         (end(DormandPrince5, system, x0, fine), end(DormandPrince8, system, x0, fine));
     let apart = distance::<Y::Manifold>(&five, &eight);
-    let classical = distance::<Y::Manifold>(&flow(system, x0, time).unwrap(), &eight);
+    let classical =
+        distance::<Y::Manifold>(&flow(system, x0, time).expect("it has a flow"), &eight);
     assert!(apart < 1e-12 && classical < 1e-8, "{name}: {apart:.1e}, {classical:.1e}");
     let span = |n: usize| Span::steps(time / n as f64, n);
     let counts = coarsest.map(|coarsest| [4, 5, 6, 8, 10, 12].map(|k| k * coarsest / 4));
@@ -165,8 +166,8 @@ fn sweep<Y: Metriplectic>(
 ) -> Vec<(usize, Point<Y>)> {
     let run = |k: i32| {
         let span = Span::until(time).tolerance(10_f64.powi(-k)).at_most(2);
-        let five = DormandPrince5.run(system, x0.clone(), span).unwrap();
-        let eight = DormandPrince8.run(system, x0.clone(), span).unwrap();
+        let five = DormandPrince5.run(system, x0.clone(), span).expect("it runs");
+        let eight = DormandPrince8.run(system, x0.clone(), span).expect("it runs");
         for run in [&five, &eight] {
             let c = run.certificate();
             println!(
@@ -211,7 +212,7 @@ fn the_laws_hold_at_every_tolerance() {
 const GAS: Vector4<f64> = Vector4::new(1.0, 2.0, 2.0, 2.0);
 
 fn spin() -> impl Metriplectic<Manifold = Sphere<2>, Metric = Canonical> {
-    System::on(Sphere::<2>::round()).bracket(AreaForm).energy(top).build().unwrap()
+    System::on(Sphere::<2>::round()).bracket(AreaForm).energy(top).build().expect("it is a system")
 }
 
 /// Errors are proportional to the tolerance: a method may keep the laws and still be wrong.
@@ -247,7 +248,7 @@ fn certified<Y: Metriplectic>(
     x0: &Point<Y>,
     span: impl Into<metriplectic::integrators::Schedule>,
 ) -> (Certificate, Point<Y>) {
-    let run = DormandPrince8.run(system, x0.clone(), span).unwrap();
+    let run = DormandPrince8.run(system, x0.clone(), span).expect("it runs");
     let c = run.certificate();
     assert!(c.keeps_energy() && c.keeps_entropy() && c.keeps_invariants(), "{c}");
     assert!(c.max_manifold_defect <= 1e-15, "{c}");

@@ -106,7 +106,8 @@ impl<V: Vector, G: Clone + Debug> Memory for ExplicitMemory<V, G> {
             let [sum, lost, largest] = [0, 1, 2].map(|k| numbers[k]);
             memory.entropy = Some(Produced { sum, lost, largest });
             // At most a few: a step is held after five.
-            memory.falls = if numbers[3] > 0.0 { (numbers[3].min(255.0)) as u32 } else { 0 };
+            memory.falls =
+                (0..u32::from(u8::MAX)).find(|&k| f64::from(k) >= numbers[3]).unwrap_or(0);
         }
         Ok(memory)
     }

@@ -7,7 +7,9 @@ use super::memory::{
     ExplicitMemory, Here, LastStep, MemoryOf, Produced, STAGES, combined, produced,
 };
 use super::tableau::Tableau;
-use crate::method::{Effort, Element, EntropyStep, Evidence, Refusal, StepStart, Taken, Vector};
+use crate::method::{
+    Effort, Element, EntropyStep, Evidence, Refusal, StepEnds, StepStart, Taken, Vector,
+};
 use crate::run::scales::relative;
 use crate::step_error::StepError;
 
@@ -243,14 +245,18 @@ fn is_at_the_edge<F: StageFlow>(
     distance > 64.0 * f64::EPSILON && relative(&change, &sizes) > tableau.stability * distance
 }
 
-/// The error of a step in units of the one allowed.
+/// The error of a step in units of the one allowed. A step that was taken in parts has the estimate of the flow.
 pub(super) fn error<F: StageFlow>(
     tableau: &'static Tableau,
-    h: f64,
+    flow: &F,
+    step: &StepEnds<'_, F>,
     memory: &MemoryOf<F>,
     norm: impl Fn(&F::Vector) -> f64,
 ) -> Option<f64> {
-    let last = memory.last.as_ref()?;
+    let h = step.h;
+    let Some(last) = memory.last.as_ref() else {
+        return Some(norm(&flow.local_error(step.x, step.end, h)?));
+    };
     let [fifth, third] =
         tableau.errors.map(|row| norm(&combined(row, &last.stages).map(|e| h * e)));
     // Hairer's e₅²/√(e₅² + e₃²/100) is of the order of the method; a method with one error has that.

@@ -300,6 +300,27 @@ fn a_run_comes_to_rest_and_is_resumed_bit_for_bit() {
 }
 
 #[test]
+fn steps_of_one_size_come_to_rest() {
+    let body = models::relaxing_body();
+    let (c, end) = certified(&body, &vector![0.3, -0.9, 0.2], Span::steps(1.0, 20_000).at_most(2));
+    assert!(end.y.abs() + end.z.abs() < 1e-9 && c.effort.splits < 100, "{end} {c}");
+    let (c, end) = certified(&gas(0.5), &GAS, Span::steps(0.05, 40_000).at_most(2));
+    assert!((end.x - 1.0).abs() < 1e-9 && end.y.abs() < 1e-9, "{end} {c}");
+}
+
+/// A motion whose steps are far below the last digit of its position.
+#[test]
+fn no_digit_of_a_slow_motion_is_lost() {
+    let free = System::on(Euclidean::<2>)
+        .bracket(Symplectic)
+        .energy(|x: &Vector2<Real>| x.y * x.y * 0.5)
+        .build()
+        .unwrap();
+    let run = DormandPrince8.run(&free, vector![1e17, 1.0], Span::steps(1.0, 1000)).unwrap();
+    assert!((run.last().point.x - 1e17 - 1000.0).abs() <= 16.0, "{}", run.last().point);
+}
+
+#[test]
 fn weak_friction_and_none_keep_the_entropy() {
     for alpha in [0.0, 1e-6] {
         let span = Span::until(1e3).tolerance(1e-6).at_most(2);

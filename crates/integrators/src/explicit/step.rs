@@ -22,6 +22,8 @@ const HARDLY_ALLOWED: f64 = 1e-3;
 /// The fraction of the round-off of an increment by which the entropy may fall: less than what the certificate
 /// counts as a fall.
 const FALL: f64 = 0.875;
+/// The same relative to the sizes of the entries: some units of round-off.
+const NEAR: f64 = 64.0 * f64::EPSILON;
 /// How often a step of a fixed size is halved.
 const HALVES: u32 = 12;
 /// The length of a projection in units of the error that is allowed.
@@ -124,7 +126,15 @@ fn try_step<F: StageFlow>(
     let dissipates = here.production != 0.0;
     memory.here = Some(here);
     let mut last = stages.ok_or(Refused::Outside)?;
+    if let Some(lost) = &memory.lost {
+        last.end = last.end.with(|i| last.end.get(i) + lost.get(i));
+    } else if !memory.read.is_empty() {
+        let lost = |i| <[f64]>::get(&memory.read, i).copied().unwrap_or(0.0);
+        last.end = last.end.with(|i| last.end.get(i) + lost(i));
+    }
     let y = flow.stage(x, &last.end).ok_or(Refused::Outside)?;
+    let reached = flow.stage_coordinates(x, &y);
+    let lost = reached.with(|i| last.end.get(i) - reached.get(i));
 
     let produced = memory.entropy.unwrap_or_else(|| Produced::from(start.values.entropy));
     let projection = Onto { tableau, flow, start, h, last: &last, produced };
@@ -151,8 +161,14 @@ fn try_step<F: StageFlow>(
     let values = flow.values(&next.gradients);
     let entropy_step = (flow.entropy_law() == SecondLaw::Exact).then_some(how);
     let evidence = Evidence { dissipates, rests, entropy_step, stability, ..Evidence::default() };
-    *memory =
-        ExplicitMemory { entropy: Some(produced), falls: 0, here: Some(next), last: Some(last) };
+    *memory = ExplicitMemory {
+        entropy: Some(produced),
+        falls: 0,
+        lost: Some(lost),
+        read: Vec::new(),
+        here: Some(next),
+        last: Some(last),
+    };
     Ok(Taken { x: end.x, values, evidence, effort: Effort::default() })
 }
 
@@ -286,7 +302,11 @@ impl<F: StageFlow> Onto<'_, F> {
         let Self { flow, start, last, produced, .. } = *self;
         let limit = match &start.allowed {
             Some(allowed) => allowed.map(|error| FAR * error),
-            None => last.end.map(|q| 0.5 * q),
+            // Round-off is never too far.
+            None => {
+                let sizes = flow.sizes(start.x);
+                last.end.with(|i| (0.5 * last.end.get(i).abs()).max(NEAR * sizes.get(i)))
+            }
         };
         let mut laws = start.reference.clone();
         if flow.entropy_law() != SecondLaw::Exact {

@@ -66,7 +66,14 @@ pub(super) fn with_halves<F: StageFlow>(
     h: f64,
     memory: &mut MemoryOf<F>,
 ) -> Result<Taken<F>, StepError> {
-    halves(tableau, flow, start, h, memory, HALVES)
+    halves(tableau, flow, start, h, memory, HALVES).map_err(|refused| {
+        let tried = Effort { splits: HALVES as usize, ..Effort::default() };
+        let time = start.time;
+        match refused {
+            Refused::Outside => StepError::OutOfDomain { time, h, tried },
+            Refused::Far | Refused::Falls => StepError::NotProjected { time, h, tried },
+        }
+    })
 }
 
 fn halves<F: StageFlow>(
@@ -76,20 +83,10 @@ fn halves<F: StageFlow>(
     h: f64,
     memory: &mut MemoryOf<F>,
     left: u32,
-) -> Result<Taken<F>, StepError> {
-    let refused = match try_step(tableau, flow, start, h, memory) {
-        Ok(taken) => return Ok(taken),
-        Err(refused) => refused,
-    };
-    if left == 0 {
-        let tried = Effort { splits: HALVES as usize, ..Effort::default() };
-        let time = start.time;
-        return Err(match refused {
-            Refused::Outside => StepError::OutOfDomain { time, h, tried },
-            Refused::Far | Refused::Falls => {
-                StepError::NotConverged { time, h, residual: f64::NAN, tried, suggested: 0.5 * h }
-            }
-        });
+) -> Result<Taken<F>, Refused> {
+    match try_step(tableau, flow, start, h, memory) {
+        Err(_) if left > 0 => {}
+        taken => return taken,
     }
     let first = halves(tableau, flow, start, 0.5 * h, memory, left - 1)?;
     let middle = StepStart {

@@ -82,7 +82,7 @@ pub(crate) type At = (f64, f64);
 
 /// The colour of the line of this number, by Okabe and Ito (2008), the dark ones first.
 pub(crate) fn color(line: usize) -> &'static str {
-    ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9"][line % 6]
+    ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#555555"][line % 7]
 }
 
 /// The length of a text, about: only the viewer knows the font.

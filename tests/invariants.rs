@@ -8,7 +8,7 @@ use metriplectic_studies::Order;
 use metriplectic_studies::problems::flow;
 use models::{
     HEAVY, PENDULUM, State6, State10, alignment, angular_momentum, gamma_squared, heat_exchange,
-    heavy, kinetic, pendulum_bracket, pendulum_energy,
+    heavy, kinetic, pair, pendulum_bracket, pendulum_energy,
 };
 
 /// Orders on four step sizes, with certificates that must keep everything.

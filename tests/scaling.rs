@@ -80,8 +80,14 @@ impl<const N: usize> Problem<N> {
         for (course, other, tolerance) in courses {
             let run = UnitRun { system: &system, x0: self.x0, course };
             let twin = UnitRun { system: &scaled, x0: start, course: other };
-            laws::scaling(&Scheme::new(WeylMidpoint), &run, &twin, &factors, tolerance)
-                .unwrap_or_else(|law| panic!("{}: {law}", self.name));
+            let laws = [
+                laws::scaling(&Scheme::new(WeylMidpoint), &run, &twin, &factors, tolerance),
+                laws::scaling(&DormandPrince8, &run, &twin, &factors, tolerance),
+                laws::scaling(&DormandPrince5, &run, &twin, &factors, tolerance),
+            ];
+            for law in laws {
+                law.unwrap_or_else(|law| panic!("{}: {law}", self.name));
+            }
         }
         println!("{:<24} x · 2^{:?}, t · 2^{}: holds", self.name, units.entries, units.time);
     }
@@ -478,6 +484,32 @@ fn an_orbit_in_si_units_is_that_in_astronomical_ones() {
     }
 }
 
+/// The inner product of a projection onto the laws has no unit of its own to go by.
+#[test]
+fn explicit_methods_have_the_errors_of_the_dimensionless_twin_in_si_units() {
+    let (unit, mu, mass) = (1.495_978_707e11, 1.327_124_4e20, 5.972e24);
+    let time = (unit * unit * unit / mu).sqrt();
+    let speed = unit / time;
+    let x = vector![1.0, 0.0, 0.0, 0.6];
+    let scale = vector![unit, unit, mass * speed, mass * speed];
+    let (twin, si) = (kepler(1.0, 1.0), kepler(mass, mu));
+    let fine = DormandPrince5.run(&twin, x, Span::until(40.0).tolerance(1e-14)).unwrap();
+    for tolerance in [1e-4, 1e-6, 1e-8, 1e-10] {
+        let a = DormandPrince8.run(&twin, x, Span::until(40.0).tolerance(tolerance)).unwrap();
+        let span = Span::until(40.0 * time).tolerance(tolerance);
+        let b = DormandPrince8.run(&si, x.component_mul(&scale), span).unwrap();
+        let error = |y: Vector4<f64>| (y - fine.last().point).amax();
+        let errors = [error(a.last().point), error(b.last().point.component_div(&scale))];
+        println!(
+            "{tolerance:.0e}: {errors:?}, {} and {} steps",
+            a.certificate().steps,
+            b.certificate().steps
+        );
+        assert!(errors[1] <= 2.0 * errors[0], "{errors:?}");
+        assert!(b.certificate().keeps_energy(), "{}", b.certificate());
+    }
+}
+
 /// A Morse molecule `x = (r, p)`: `H = p²/2μ + D (1 − e^{−a(r − r₀)})²`.
 fn molecule(
     [mass, depth, width, length]: [f64; 4],
@@ -581,8 +613,13 @@ fn curved<Y: Metriplectic>(
     for (course, other) in courses {
         let run = UnitRun { system, x0: start.clone(), course };
         let twin = UnitRun { system: scaled, x0: start.clone(), course: other };
-        laws::scaling(&Scheme::new(WeylMidpoint), &run, &twin, &factors, 0.0)
-            .unwrap_or_else(|law| panic!("{name}, {units:?}: {law}"));
+        let laws = [
+            laws::scaling(&Scheme::new(WeylMidpoint), &run, &twin, &factors, 0.0),
+            laws::scaling(&DormandPrince8, &run, &twin, &factors, 0.0),
+        ];
+        for law in laws {
+            law.unwrap_or_else(|law| panic!("{name}, {units:?}: {law}"));
+        }
     }
 }
 

@@ -94,7 +94,7 @@ pub(crate) const HEAVY: [f64; 6] = [0.4, -0.7, 0.9, 0.3, 0.5, 0.8];
 /// The thermoelastic double pendulum (Romero 2009), all constants 1, as `(q₁, q₂, p₁, p₂, s₁, s₂)`.
 pub(crate) type State10 = SVector<Real, 10>;
 
-fn pair(x: &State10, i: usize) -> Vector2<Real> {
+pub(crate) fn pair(x: &State10, i: usize) -> Vector2<Real> {
     Vector2::new(x[i], x[i + 1])
 }
 

@@ -151,12 +151,12 @@ macro_rules! method {
 
             fn error(
                 &self,
-                _: &F,
+                flow: &F,
                 step: &StepEnds<'_, F>,
                 memory: &MemoryOf<F>,
                 norm: impl Fn(&F::Vector) -> f64,
             ) -> Option<f64> {
-                step::error::<F>(Self::TABLEAU, step.h, memory, norm)
+                step::error(Self::TABLEAU, flow, step, memory, norm)
             }
 
             fn between(

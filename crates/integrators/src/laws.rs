@@ -207,8 +207,8 @@ pub struct Units {
 /// # Errors
 ///
 /// The law if it is broken, or a run that ends in an error.
-pub fn scaling<Y, Z, R, W>(
-    scheme: &Scheme<R, W>,
+pub fn scaling<Y, Z, M>(
+    method: &M,
     run: &UnitRun<'_, Y>,
     scaled: &UnitRun<'_, Z>,
     units: &Units,
@@ -217,12 +217,12 @@ pub fn scaling<Y, Z, R, W>(
 where
     Y: Metriplectic,
     Z: Metriplectic<Manifold = Y::Manifold>,
-    R: Retraction<Y::Manifold, Y::Metric> + Retraction<Y::Manifold, Z::Metric> + Clone,
-    W: DiscreteGradient,
+    M: Method<Y> + Method<Z> + Clone,
 {
     let failed = |_| BrokenLaw::unless("a run ends without an error", 1.0, 0.0);
-    let a = scheme.clone().run(run.system, run.x0.clone(), run.course.clone());
-    let b = scheme.clone().run(scaled.system, scaled.x0.clone(), scaled.course.clone());
+    let a = Method::<Y>::run(method.clone(), run.system, run.x0.clone(), run.course.clone());
+    let (x0, course) = (scaled.x0.clone(), scaled.course.clone());
+    let b = Method::<Z>::run(method.clone(), scaled.system, x0, course);
     let (a, b) = match (a, b) {
         (Ok(a), Ok(b)) => (a, b),
         (Err(_), _) | (_, Err(_)) => return failed(()),

@@ -98,6 +98,22 @@ pub enum StepError {
         /// The fraction of its differential that is independent.
         fraction: f64,
     },
+    /// No state near the end of an explicit step has the energy and the further invariants of the run, or the
+    /// entropy would fall there.
+    #[error(
+        "the step of size {h:.3e} from t = {} was not taken: no state near its end has the energy and the \
+         invariants of the run, or the entropy would fall there, however small its part ({tried}); take smaller \
+         steps, or let them follow a tolerance with `Span::until`",
+        digits(.time)
+    )]
+    NotProjected {
+        /// The time at which the step starts.
+        time: f64,
+        /// The size of the step that was asked for.
+        h: f64,
+        /// What was done.
+        tried: Effort,
+    },
     /// The controller asks for a step below the least one.
     #[error(
         "the step from t = {} would have to be {h:.1e} long to keep the tolerance, below the least \

@@ -18,6 +18,10 @@ pub struct ExplicitMemory<V, G> {
     pub(super) entropy: Option<Produced>,
     /// How often in a row the entropy would have fallen.
     pub(super) falls: u32,
+    /// The digits that rounding has lost of the position, as displacements (Kahan 1965).
+    pub(super) lost: Option<V>,
+    /// The same as it was read from a checkpoint.
+    pub(super) read: Vec<f64>,
     /// The differentials and rates at the state reached, a function of this state alone.
     pub(super) here: Option<Here<V, G>>,
     /// The step taken last.
@@ -78,13 +82,15 @@ pub(super) struct LastStep<V> {
 
 impl<V, G> Default for ExplicitMemory<V, G> {
     fn default() -> Self {
-        Self { entropy: None, falls: 0, here: None, last: None }
+        Self { entropy: None, falls: 0, lost: None, read: Vec::new(), here: None, last: None }
     }
 }
 
 impl<V: Vector, G: Clone + Debug> Memory for ExplicitMemory<V, G> {
     fn rescaled(&self, _: f64) -> Self {
-        Self { last: None, here: self.here.clone(), ..*self }
+        let Self { entropy, falls, lost, read, here, .. } = self;
+        let (lost, read, here) = (lost.clone(), read.clone(), here.clone());
+        Self { entropy: *entropy, falls: *falls, lost, read, here, last: None }
     }
 
     fn refused(&mut self, tried: Self) {
@@ -98,17 +104,29 @@ impl<V: Vector, G: Clone + Debug> Memory for ExplicitMemory<V, G> {
         if let Some(Produced { sum, lost, largest }) = self.entropy {
             saved.put("entropy produced", [sum, lost, largest, f64::from(self.falls)]);
         }
+        if let Some(lost) = &self.lost {
+            saved.put("compensation", lost.to_list());
+        } else if !self.read.is_empty() {
+            saved.put("compensation", self.read.iter().copied());
+        }
     }
 
     fn restore(saved: &Saved) -> Result<Self, ResumeError> {
-        let mut memory = Self::default();
+        let read = saved.list("compensation")?.unwrap_or_default();
+        let mut memory = Self { read, ..Self::default() };
         if let Some(numbers) = saved.get("entropy produced", 4)? {
             let [sum, lost, largest] = [0, 1, 2].map(|k| numbers[k]);
             memory.entropy = Some(Produced { sum, lost, largest });
             // At most a few: a step is held after five.
-            memory.falls = if numbers[3] > 0.0 { (numbers[3].min(255.0)) as u32 } else { 0 };
+            memory.falls =
+                (0..u32::from(u8::MAX)).find(|&k| f64::from(k) >= numbers[3]).unwrap_or(0);
         }
         Ok(memory)
+    }
+
+    fn moved_and_lost(&self) -> [Vec<f64>; 2] {
+        let lost = self.lost.as_ref().map_or_else(|| self.read.clone(), Vector::to_list);
+        [Vec::new(), lost]
     }
 }
 

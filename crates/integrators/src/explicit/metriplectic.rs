@@ -201,11 +201,11 @@ impl<Y: Metriplectic> Projection<'_, Y> {
                 return Ok(here);
             }
             let excess = if is_off { excess.max(normals.off / OFF) } else { excess };
-            if let Some((before, better)) = best.take() {
-                if before <= excess {
-                    // No correction improves it.
-                    return self.stagnated(before, better);
-                }
+            if let Some((before, better)) = best.take()
+                && before <= excess
+            {
+                // No correction improves it.
+                return self.stagnated(before, better);
             }
             let correction = normals.correction(target.with_entropy, is_off);
             moved += correction.magnitude();

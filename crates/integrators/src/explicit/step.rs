@@ -7,7 +7,9 @@ use super::memory::{
     ExplicitMemory, Here, LastStep, MemoryOf, Produced, STAGES, combined, produced,
 };
 use super::tableau::Tableau;
-use crate::method::{Effort, Element, EntropyStep, Evidence, Refusal, StepStart, Taken, Vector};
+use crate::method::{
+    Effort, Element, EntropyStep, Evidence, Refusal, StepEnds, StepStart, Taken, Vector,
+};
 use crate::run::scales::relative;
 use crate::step_error::StepError;
 
@@ -20,6 +22,8 @@ const HARDLY_ALLOWED: f64 = 1e-3;
 /// The fraction of the round-off of an increment by which the entropy may fall: less than what the certificate
 /// counts as a fall.
 const FALL: f64 = 0.875;
+/// The same relative to the sizes of the entries: some units of round-off.
+const NEAR: f64 = 64.0 * f64::EPSILON;
 /// How often a step of a fixed size is halved.
 const HALVES: u32 = 12;
 /// The length of a projection in units of the error that is allowed.
@@ -62,7 +66,14 @@ pub(super) fn with_halves<F: StageFlow>(
     h: f64,
     memory: &mut MemoryOf<F>,
 ) -> Result<Taken<F>, StepError> {
-    halves(tableau, flow, start, h, memory, HALVES)
+    halves(tableau, flow, start, h, memory, HALVES).map_err(|refused| {
+        let tried = Effort { splits: HALVES as usize, ..Effort::default() };
+        let time = start.time;
+        match refused {
+            Refused::Outside => StepError::OutOfDomain { time, h, tried },
+            Refused::Far | Refused::Falls => StepError::NotProjected { time, h, tried },
+        }
+    })
 }
 
 fn halves<F: StageFlow>(
@@ -72,20 +83,10 @@ fn halves<F: StageFlow>(
     h: f64,
     memory: &mut MemoryOf<F>,
     left: u32,
-) -> Result<Taken<F>, StepError> {
-    let refused = match try_step(tableau, flow, start, h, memory) {
-        Ok(taken) => return Ok(taken),
-        Err(refused) => refused,
-    };
-    if left == 0 {
-        let tried = Effort { splits: HALVES as usize, ..Effort::default() };
-        let time = start.time;
-        return Err(match refused {
-            Refused::Outside => StepError::OutOfDomain { time, h, tried },
-            Refused::Far | Refused::Falls => {
-                StepError::NotConverged { time, h, residual: f64::NAN, tried, suggested: 0.5 * h }
-            }
-        });
+) -> Result<Taken<F>, Refused> {
+    match try_step(tableau, flow, start, h, memory) {
+        Err(_) if left > 0 => {}
+        taken => return taken,
     }
     let first = halves(tableau, flow, start, 0.5 * h, memory, left - 1)?;
     let middle = StepStart {
@@ -122,7 +123,15 @@ fn try_step<F: StageFlow>(
     let dissipates = here.production != 0.0;
     memory.here = Some(here);
     let mut last = stages.ok_or(Refused::Outside)?;
+    if let Some(lost) = &memory.lost {
+        last.end = last.end.with(|i| last.end.get(i) + lost.get(i));
+    } else if !memory.read.is_empty() {
+        let lost = |i| <[f64]>::get(&memory.read, i).copied().unwrap_or(0.0);
+        last.end = last.end.with(|i| last.end.get(i) + lost(i));
+    }
     let y = flow.stage(x, &last.end).ok_or(Refused::Outside)?;
+    let reached = flow.stage_coordinates(x, &y);
+    let lost = reached.with(|i| last.end.get(i) - reached.get(i));
 
     let produced = memory.entropy.unwrap_or_else(|| Produced::from(start.values.entropy));
     let projection = Onto { tableau, flow, start, h, last: &last, produced };
@@ -149,8 +158,14 @@ fn try_step<F: StageFlow>(
     let values = flow.values(&next.gradients);
     let entropy_step = (flow.entropy_law() == SecondLaw::Exact).then_some(how);
     let evidence = Evidence { dissipates, rests, entropy_step, stability, ..Evidence::default() };
-    *memory =
-        ExplicitMemory { entropy: Some(produced), falls: 0, here: Some(next), last: Some(last) };
+    *memory = ExplicitMemory {
+        entropy: Some(produced),
+        falls: 0,
+        lost: Some(lost),
+        read: Vec::new(),
+        here: Some(next),
+        last: Some(last),
+    };
     Ok(Taken { x: end.x, values, evidence, effort: Effort::default() })
 }
 
@@ -243,14 +258,18 @@ fn is_at_the_edge<F: StageFlow>(
     distance > 64.0 * f64::EPSILON && relative(&change, &sizes) > tableau.stability * distance
 }
 
-/// The error of a step in units of the one allowed.
+/// The error of a step in units of the one allowed. A step that was taken in parts has the estimate of the flow.
 pub(super) fn error<F: StageFlow>(
     tableau: &'static Tableau,
-    h: f64,
+    flow: &F,
+    step: &StepEnds<'_, F>,
     memory: &MemoryOf<F>,
     norm: impl Fn(&F::Vector) -> f64,
 ) -> Option<f64> {
-    let last = memory.last.as_ref()?;
+    let h = step.h;
+    let Some(last) = memory.last.as_ref() else {
+        return Some(norm(&flow.local_error(step.x, step.end, h)?));
+    };
     let [fifth, third] =
         tableau.errors.map(|row| norm(&combined(row, &last.stages).map(|e| h * e)));
     // Hairer's e₅²/√(e₅² + e₃²/100) is of the order of the method; a method with one error has that.
@@ -280,7 +299,11 @@ impl<F: StageFlow> Onto<'_, F> {
         let Self { flow, start, last, produced, .. } = *self;
         let limit = match &start.allowed {
             Some(allowed) => allowed.map(|error| FAR * error),
-            None => last.end.map(|q| 0.5 * q),
+            // Round-off is never too far.
+            None => {
+                let sizes = flow.sizes(start.x);
+                last.end.with(|i| (0.5 * last.end.get(i).abs()).max(NEAR * sizes.get(i)))
+            }
         };
         let mut laws = start.reference.clone();
         if flow.entropy_law() != SecondLaw::Exact {

@@ -6,9 +6,8 @@ use metriplectic_dynamics::SecondLaw;
 use metriplectic_dynamics::invariants::Kind;
 
 use crate::digits::{Digits, counted};
-use crate::method::{Effort, Element, EntropyStep, Evidence, Flow, Laws, Promises, Vector as _};
-use crate::round_off::bound::{ROUNDED, of_a_law};
-use crate::run::scales::{larger, relative};
+use crate::method::{Effort, Element, EntropyStep, Evidence, Flow, Laws, Promises};
+use crate::round_off::bound::of_a_law;
 
 /// The balance of a run: what became of the two laws, of the manifold, and what it cost.
 ///
@@ -223,22 +222,15 @@ impl Certificate {
         self.projected_steps.enter(&evidence);
         self.effort += effort;
         self.worst_iterations = self.worst_iterations.max(effort.iterations);
-        if self.steps.is_power_of_two() {
-            self.sample(flow, [x, next], h);
-        }
     }
 
-    /// Notes an estimate of the local error.
-    #[cold]
-    fn sample<F: Flow>(&mut self, flow: &F, [x, next]: [&Element<F>; 2], h: f64) {
-        if let Some(error) = flow.local_error(x, next, h) {
-            // The sizes that a step brings about count too.
-            let sizes = larger(&flow.sizes(x), &flow.sizes(next));
-            let rounding = sizes.map(|size| ROUNDED * size);
-            let error = error.with(|i| (error.get(i).abs() - rounding.get(i)).max(0.0));
-            let relative = relative(&error, &sizes);
-            self.local_error = Some(self.local_error.unwrap_or(0.0).max(relative));
-        }
+    /// Notes an estimate of the local error, relative to the state.
+    pub(crate) const fn note_local_error(&mut self, error: f64) {
+        let before = match self.local_error {
+            Some(before) => before,
+            None => 0.0,
+        };
+        self.local_error = Some(before.max(error));
     }
 
     /// `max |H(x_k) − H(x₀)| / |H(x₀)|`; the absolute error if `H(x₀) = 0`.

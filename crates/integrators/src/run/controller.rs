@@ -401,9 +401,14 @@ const UNSOLVED: f64 = 0.25;
 /// The least error that the controller remembers: a step without any is no reason to be bold later.
 const LEAST_ERROR: f64 = 1e-4;
 
+/// Whether an exponent is this one.
+const fn is(exponent: f64, this: f64) -> bool {
+    (exponent - this).abs() < f64::EPSILON
+}
+
 /// `x^{-α}`, for order 8 by three square roots.
 fn inverse_root(x: f64, alpha: f64) -> f64 {
-    if alpha == 0.125 { x.sqrt().sqrt().sqrt().recip() } else { x.powf(-alpha) }
+    if is(alpha, 0.125) { x.sqrt().sqrt().sqrt().recip() } else { x.powf(-alpha) }
 }
 
 impl<V: Vector> Controller<V> {
@@ -493,7 +498,7 @@ impl<V: Vector> Controller<V> {
     /// rounding may make of the estimate.
     pub(crate) fn allowed(&self, scales: &Scales<V>, h: f64) -> V {
         let power = self.control.power;
-        let tolerance = if power == 1.0 { self.tolerance } else { self.tolerance.powf(power) };
+        let tolerance = if is(power, 1.0) { self.tolerance } else { self.tolerance.powf(power) };
         let tolerance = tolerance.max(8.0 * f64::EPSILON);
         let noise = scales.rounding(h);
         scales.sizes.with(|i| {

@@ -7,7 +7,7 @@ use crate::method::{
     Effort, Element, EntropyStep, Flow, Laws, Memory as _, Method, Promises, Refusal, StepEnds,
     StepStart, Taken, Vector as _,
 };
-use crate::round_off::bound::breaks_first_law;
+use crate::round_off::bound::{ROUNDED, breaks_first_law};
 use crate::run::certificate::Certificate;
 use crate::run::controller::{Controller, StepSize};
 use crate::run::output::{StepBefore, Watching};
@@ -217,6 +217,9 @@ impl<'a, F: Flow, M: Method<F>> Steps<'a, F, M> {
         }
         let ends = [(&self.state.point, &self.values), (&x, &values)];
         self.certificate.enter(self.flow, ends, h, (evidence, effort));
+        if step.is_power_of_two() {
+            self.sample((&x, &values), h);
+        }
         (self.before.h, self.before.entropy) = (h, self.entropy);
         if evidence.dissipates {
             self.entropy = values.entropy;
@@ -242,6 +245,24 @@ impl<'a, F: Flow, M: Method<F>> Steps<'a, F, M> {
             self.look()?;
         }
         Ok(&self.state)
+    }
+
+    /// Notes the local error of a step, on the few whose number is a power of two.
+    #[cold]
+    fn sample(&mut self, (end, values): (&Element<F>, &Laws<F::Numbers>), h: f64) {
+        let (flow, x) = (self.flow, &self.state.point);
+        // The sizes that a step brings about count too.
+        let sizes = larger(&flow.sizes(x), &flow.sizes(end));
+        let norm = |error: &F::Vector| {
+            let rounding = |i| ROUNDED * sizes.get(i);
+            let above = error.with(|i| (error.get(i).abs() - rounding(i)).max(0.0));
+            relative(&above, &sizes)
+        };
+        let reference = self.reference(self.entropy);
+        let step = StepEnds { x, end, h, values: [&self.values, values], reference: &reference };
+        if let Some(error) = self.method.error(flow, &step, &self.memory, norm) {
+            self.certificate.note_local_error(error);
+        }
     }
 
     /// Tries steps until the controller accepts one. Not part of the loop over steps of one size, which

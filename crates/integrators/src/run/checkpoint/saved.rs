@@ -21,8 +21,20 @@ impl Saved {
     ///
     /// [`ResumeError`] if it has another length, or a number that is not finite.
     pub fn get(&self, name: &'static str, length: usize) -> Result<Option<Vec<f64>>, ResumeError> {
+        let list = self.list(name)?;
+        if let Some(list) = &list {
+            super::expect_length(name, list.len(), length)?;
+        }
+        Ok(list)
+    }
+
+    /// The list under a name, of any length; `None` if it was not put.
+    ///
+    /// # Errors
+    ///
+    /// [`ResumeError`] if it has a number that is not finite.
+    pub fn list(&self, name: &'static str) -> Result<Option<Vec<f64>>, ResumeError> {
         let Some(list) = self.0.get(name) else { return Ok(None) };
-        super::expect_length(name, list.len(), length)?;
         match list.iter().find(|number| !number.0.is_finite()) {
             Some(number) => Err(ResumeError::Damaged { what: name, value: number.0 }),
             None => Ok(Some(list.iter().map(|number| number.0).collect())),

@@ -166,6 +166,9 @@ pub(super) fn of_the_entries<F: Flow>(
 ) -> Result<(), ResumeError> {
     let here = flow.sizes(x);
     let [moved, lost] = memory.moved_and_lost();
+    for list in [&moved, &lost].into_iter().filter(|list| !list.is_empty()) {
+        super::expect_length("numbers of a displacement", list.len(), here.len())?;
+    }
     let of = |list: &[f64], i: usize| list.get(i).copied().unwrap_or(0.0);
     for i in 0..here.len() {
         let (here, known) = (here.get(i), progress.scales.sizes.get(i));

@@ -579,3 +579,44 @@ fn every_model_keeps_both_laws_over_a_hundred_thousand_steps() {
         }
     }
 }
+
+#[test]
+fn the_top_crosses_a_plane_after_one_period_each() {
+    let report = json(&example("plane_crossings", &["--json"]));
+    let ([energy, entropy, defect], _) = certified(&report);
+    assert!(energy <= 5e-15 && entropy == 0.0 && defect <= 1e-15, "{report}");
+    // Twice in each of ten periods up to t = 200.
+    assert_eq!((&report["crossings"], &report["outputs"]), (&20.into(), &1000.into()));
+    assert!(figure(&report, "period_error") < 1e-10, "{report}");
+    // With half the step a period is the same to the error of order 8.
+    let fine =
+        json(&example("plane_crossings", &["--json", "--steps", "1600", "--step-size", "0.125"]));
+    assert!(
+        (figure(&report, "period") - figure(&fine, "period")).abs() < 1e-10,
+        "{report}, {fine}"
+    );
+    assert!(figure(&fine, "period_error") < 1e-12, "{fine}");
+    // The exact flow at t = 30.
+    let short = json(&example("plane_crossings", &["--json", "--steps", "120"]));
+    let exact = [-0.203_053_235_046, 0.965_621_558_204, -0.162_309_550_149];
+    assert!(distance(&certified(&short).1, &exact) < 1e-9, "{short}");
+}
+
+#[test]
+fn both_laws_make_the_long_run_of_the_gases_more_accurate() {
+    let report = json(&example("gas_containers_long", &["--json"]));
+    let ([energy, entropy, _], state) = certified(&report);
+    assert!(energy <= 5e-15 && entropy > 0.0 && report["entropy_falls"] == 0, "{report}");
+    // Both take the same steps, to one in a thousand.
+    let (with, without) = (figure(&report, "steps"), figure(&report, "steps_without_laws"));
+    assert!((with / without - 1.0).abs() < 1e-3, "{report}");
+    let error = |of: &str, run: &str| figure(&report, &format!("{of}_error_{run}"));
+    for (of, gain) in [("entropy", 1e3), ("position", 1e3), ("energy", 1e8)] {
+        let (with, without) = (error(of, "with_both_laws"), error(of, "without"));
+        assert!(gain * with < without, "{of}: {with:.1e}, {without:.1e}");
+    }
+    // The flow at t = 10⁴ in numbers of twice the digits, by `benches/peers`.
+    let flow =
+        [0.697_372_907_244_776, 0.543_261_789_486_713, 3.526_959_397_033_727, 2.325_473_917_008_12];
+    assert!(distance(&state, &flow) < 1e-5, "{report}");
+}

@@ -37,8 +37,8 @@
 //! # What is promised
 //!
 //! `H` and `L_a` are conserved to round-off at any tolerance. `S` does not fall by more than its round-off.
-//! A model with [`SecondLaw::Published`](metriplectic_dynamics::SecondLaw::Published) keeps `H` and `L_a`. The
-//! methods are not symmetric in time, and stiff friction bounds their steps; the certificate says when it does.
+//! A model with [`SecondLaw::Published`] keeps `H` and `L_a`. The methods are not symmetric in time, and stiff
+//! friction bounds their steps; the certificate says when it does.
 
 mod dense;
 mod flow;

@@ -80,7 +80,7 @@ impl<M: Space, W: Gradient<M>> Visitor<M> for Collected<'_, M, W> {
     }
 }
 
-/// The differentials of fields at a point, each the same as [`differential`] of the field.
+/// The differentials of fields at a point, each the same as [`differential()`] of the field.
 ///
 /// At `f64` the derivatives of the chart are computed once. A field then costs one first derivative, `⌈n/2⌉`
 /// evaluations of a closure in place of `n⌈n/2⌉`.

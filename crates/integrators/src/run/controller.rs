@@ -165,7 +165,8 @@ impl Until {
 
 impl<const N: usize> Until<N> {
     /// About the error, relative to the sizes of the entries, that the run collects while its state
-    /// moves by its own size; the error at the end is proportional to it. At least 10⁻¹⁰.
+    /// moves by its own size; the error at the end is proportional to it. At least 10⁻¹⁰ for
+    /// methods of order 2, and 10⁻¹⁵ for the explicit methods.
     #[must_use]
     pub const fn tolerance(self, tolerance: f64) -> Self {
         Self { tolerance, ..self }

@@ -180,6 +180,7 @@ fn sweep<Y: Metriplectic>(
             assert!(c.max_relative_energy_error() <= 3e-15, "{name}, 1e-{k}: {c}");
             assert_eq!(c.entropy_falls, 0, "{name}, 1e-{k}: {c}");
             assert!(c.max_manifold_defect <= 1e-15 && c.keeps_invariants(), "{name}: {c}");
+            assert!(!c.to_string().contains("not resolved"), "{name}, 1e-{k}: {c}");
         }
         (eight.certificate().steps, eight.last().point.clone())
     };
@@ -304,6 +305,7 @@ fn steps_of_one_size_come_to_rest() {
     let body = models::relaxing_body();
     let (c, end) = certified(&body, &vector![0.3, -0.9, 0.2], Span::steps(1.0, 20_000).at_most(2));
     assert!(end.y.abs() + end.z.abs() < 1e-9 && c.effort.splits < 100, "{end} {c}");
+    assert!(!c.to_string().contains("not resolved"), "{c}");
     let (c, end) = certified(&gas(0.5), &GAS, Span::steps(0.05, 40_000).at_most(2));
     assert!((end.x - 1.0).abs() < 1e-9 && end.y.abs() < 1e-9, "{end} {c}");
 }

@@ -251,8 +251,11 @@ impl<'a, F: Flow, M: Method<F>> Steps<'a, F, M> {
     #[cold]
     fn sample(&mut self, (end, values): (&Element<F>, &Laws<F::Numbers>), h: f64) {
         let (flow, x) = (self.flow, &self.state.point);
-        // The sizes that a step brings about count too.
+        // The sizes that a step brings about count too, and the largest ones so far: an entry that has decayed to
+        // round-off has no error relative to itself.
         let sizes = larger(&flow.sizes(x), &flow.sizes(end));
+        self.progress.scales = self.progress.scales.or(&sizes);
+        let sizes = self.progress.scales.sizes.clone();
         let norm = |error: &F::Vector| {
             let rounding = |i| ROUNDED * sizes.get(i);
             let above = error.with(|i| (error.get(i).abs() - rounding(i)).max(0.0));

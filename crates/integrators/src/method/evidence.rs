@@ -1,0 +1,109 @@
+//! What a step promises, what it tells of the motion, and what it cost.
+
+/// What holds exactly on every step of a method.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[non_exhaustive]
+pub struct Promises {
+    /// The energy is conserved.
+    pub energy: bool,
+    /// The entropy does not fall.
+    pub entropy: bool,
+    /// The further invariants are conserved.
+    pub invariants: bool,
+}
+
+impl Promises {
+    /// The energy and the further invariants are conserved, and the entropy does not fall if it is `entropy`
+    /// that is promised.
+    pub const fn all_laws(entropy: bool) -> Self {
+        Self { energy: true, entropy, invariants: true }
+    }
+
+    /// Nothing: the laws hold to the order of the method.
+    pub const fn nothing() -> Self {
+        Self { energy: false, entropy: false, invariants: false }
+    }
+}
+
+/// What a step tells of the motion.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Evidence {
+    /// The size `|w_S|` of the discrete gradient of the entropy, by which the bracket is projected;
+    /// infinite where it has none.
+    pub entropy_slope: f64,
+    /// Whether anything was dissipated.
+    pub dissipates: bool,
+    /// The largest rate `h|K'|` of the friction.
+    pub friction: f64,
+    /// Whether the state is at rest: the displacement is no more than its own round-off.
+    pub rests: bool,
+    /// How the entropy at the end was found, by a method that projects onto it.
+    pub entropy_step: Option<EntropyStep>,
+    /// Whether the size of the step is near the edge of the region of stability of an explicit method.
+    pub stability: bool,
+}
+
+/// How a method that projects onto the laws found the entropy at the end of a step.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum EntropyStep {
+    /// By its production, `S(x') = S(x) + h Σ b_i σ_i`.
+    Targeted,
+    /// The other laws leave it free: near an equilibrium, where it depends on them.
+    Free,
+    /// The state was held, because the entropy would have fallen by round-off in any step.
+    Held,
+}
+
+impl Default for Evidence {
+    fn default() -> Self {
+        Self {
+            entropy_slope: f64::INFINITY,
+            dissipates: false,
+            friction: 0.0,
+            rests: false,
+            entropy_step: None,
+            stability: false,
+        }
+    }
+}
+
+impl Evidence {
+    /// Of two parts of a step: rest is the last one's.
+    pub(crate) fn and(self, next: Self) -> Self {
+        Self {
+            entropy_slope: self.entropy_slope.min(next.entropy_slope),
+            dissipates: self.dissipates | next.dissipates,
+            friction: self.friction.max(next.friction),
+            rests: next.rests,
+            entropy_step: next.entropy_step.or(self.entropy_step),
+            stability: self.stability | next.stability,
+        }
+    }
+}
+
+/// What the solver of a method did, in a step or in a run.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
+pub struct Effort {
+    /// Linear systems solved by Newton's method.
+    pub iterations: usize,
+    /// How often a step was approached through smaller ones from the same start.
+    pub continued: usize,
+    /// How often the globaliser was called.
+    pub globalised: usize,
+    /// How often a step, or a part of it, was split in halves.
+    pub splits: usize,
+}
+
+impl std::ops::AddAssign for Effort {
+    fn add_assign(&mut self, other: Self) {
+        self.iterations += other.iterations;
+        self.continued += other.continued;
+        self.globalised += other.globalised;
+        self.splits += other.splits;
+    }
+}

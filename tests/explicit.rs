@@ -157,7 +157,7 @@ fn on_a_manifold_of_a_user() {
 }
 
 /// Runs with tolerances, by both methods; the steps and the distance from `exact` of each one of order 8.
-fn sweep<Y: Metriplectic>(
+fn at_tolerances<Y: Metriplectic>(
     name: &str,
     system: &Y,
     x0: &Point<Y>,
@@ -193,7 +193,7 @@ const ALL: [i32; 4] = [3, 6, 9, 12];
 fn the_laws_hold_at_every_tolerance() {
     let (body, spin) = (models::relaxing_body(), spin());
     for time in [100.0, 1e4] {
-        let ends = sweep("body", &body, &models::UNSTABLE, time, &ALL);
+        let ends = at_tolerances("body", &body, &models::UNSTABLE, time, &ALL);
         if time > 1e3 {
             // The energy is that of a rotation about the first axis.
             let energy = body.energy_at(&models::UNSTABLE);
@@ -205,10 +205,10 @@ fn the_laws_hold_at_every_tolerance() {
             }
             assert!(ends[0].0 <= 800, "{} steps", ends[0].0);
         }
-        sweep("spinning top", &spin, &Vector3::repeat(3_f64.sqrt().recip()), time, &ALL);
-        sweep("gas, α = 0.5", &gas(0.5), &GAS, time, &ALL);
+        at_tolerances("spinning top", &spin, &Vector3::repeat(3_f64.sqrt().recip()), time, &ALL);
+        at_tolerances("gas, α = 0.5", &gas(0.5), &GAS, time, &ALL);
         let tolerances: &[i32] = if time > 1e3 { &[4, 8] } else { &ALL };
-        sweep("gas, α = 0.001", &gas(1e-3), &GAS, time, tolerances);
+        at_tolerances("gas, α = 0.001", &gas(1e-3), &GAS, time, tolerances);
     }
 }
 
@@ -395,6 +395,40 @@ fn an_edge_is_an_error_or_is_not_crossed() {
         let c = trajectory.certificate();
         assert!(last.point.x > 0.0, "{cause} at {}", last.point);
         assert!(c.keeps_energy(), "{cause}: {c}");
+    }
+}
+
+/// A step that fails leaves nothing of its parts behind.
+#[test]
+fn a_failed_step_is_not_in_the_checkpoint() {
+    let falling = System::on(Chart::<2>::new(|x| x.x > 0.0))
+        .bracket(Poisson::constant(Matrix2::new(0.0, 1.0, -1.0, 0.0)).unwrap())
+        .energy(|x: &Vector2<Real>| x.y * x.y * 0.5 + x.x)
+        .build()
+        .unwrap();
+    let mut steps =
+        DormandPrince8.steps(&falling, vector![1.0, 0.0], Span::steps(0.1, 100)).unwrap();
+    for _ in 0..14 {
+        steps.advance().unwrap();
+    }
+    let before = steps.checkpoint();
+    let errors = [steps.advance().unwrap_err(), steps.advance().unwrap_err()];
+    assert!(errors[0] == errors[1] && steps.checkpoint() == before, "{errors:?}");
+}
+
+#[test]
+fn an_invariant_without_a_value_ends_the_run() {
+    let body = System::on(LieDual::so3())
+        .energy(|p: &Vector3<Real>| p.x * p.x * 0.5 + p.y * p.y + p.z * p.z * 1.5)
+        .casimir(|p: &Vector3<Real>| p.norm_squared() + (p.x + 0.5).sqrt() * 0.0)
+        .build()
+        .unwrap();
+    let start = vector![0.4, 0.2, 0.9];
+    for run in [
+        DormandPrince8.run(&body, start, Span::until(50.0).tolerance(1e-6)),
+        DormandPrince8.run(&body, start, Span::steps(0.05, 1000)),
+    ] {
+        assert!(run.is_err(), "p₁ goes below −0.5, where the Casimir is no number");
     }
 }
 

@@ -58,10 +58,12 @@ impl<N: Dimension> LawJets<N> {
 
     fn is_finite(&self) -> bool {
         let Self { values, w } = self;
+        let mut listed = w.invariants.as_ref().iter().flatten().zip(values.invariants.as_ref());
         values.energy.is_finite()
             && values.entropy.is_finite()
             && w.energy.is_finite()
             && w.entropy.is_finite()
+            && listed.all(|((_, l), value)| l.is_finite() && value.is_finite())
     }
 }
 

@@ -66,7 +66,13 @@ pub(super) fn with_halves<F: StageFlow>(
     h: f64,
     memory: &mut MemoryOf<F>,
 ) -> Result<Taken<F>, StepError> {
+    if let Ok(whole) = try_step(tableau, flow, start, h, memory) {
+        return Ok(whole);
+    }
+    let kept = memory.clone();
     halves(tableau, flow, start, h, memory, HALVES).map_err(|refused| {
+        // What the parts that were taken have left belongs to no state of the run.
+        *memory = kept;
         let tried = Effort { splits: HALVES as usize, ..Effort::default() };
         let time = start.time;
         match refused {
@@ -140,7 +146,7 @@ fn try_step<F: StageFlow>(
         Err(Refused::Falls) => {
             memory.falls += 1;
             if memory.falls > FALLS && hardly_moves(flow, start, &last.end) {
-                memory.falls = 0;
+                (memory.falls, memory.last) = (0, None);
                 return Ok(held(start));
             }
             return Err(Refused::Falls);

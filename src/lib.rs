@@ -76,8 +76,9 @@ pub mod prelude {
         Until, Watch,
     };
     pub use metriplectic_manifolds::{
-        Canonical, Cayley, Chart, Euclidean, Exponential, HalfLine, LieAlgebra, LieDual, Manifold,
-        Metric, Product, Projection, Retraction, Rotations, Sphere, WeylMidpoint,
+        Canonical, Cayley, Chart, ChartMidpoint, Euclidean, Exponential, HalfLine, LieAlgebra,
+        LieDual, Manifold, Metric, Product, Projection, Retraction, Rotations, Sphere,
+        WeylMidpoint,
     };
     /// The linear algebra of this library; its macros, such as `vector!`, look for it under this name.
     pub use nalgebra;

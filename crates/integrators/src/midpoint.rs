@@ -51,6 +51,7 @@ use crate::discrete_gradient::{DiscreteGradient, Gonzalez};
 use crate::method::{Evidence, Flow as _, Laws, Method, Promises, Refusal, StepStart, Taken};
 use crate::newton::{Newton, Root};
 use crate::round_off::bound::{BROKEN, breaks_first_law, sizes_on_a_step};
+use crate::round_off::compensation::Displaced;
 use crate::round_off::drift::{self, DriftCorrection};
 use crate::round_off::level;
 use crate::step_error::StepError;
@@ -218,7 +219,10 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
             memory.compensation.clear();
             None
         } else {
-            memory.compensation.add(system.metric(), (start.x, &u), &end)
+            let lost =
+                |x: &_, d: &_, end: &_| self.retraction.lost_digits(system.metric(), x, d, end);
+            let step = Displaced { x: start.x, d: &u, end: &end };
+            memory.compensation.add::<Y::Manifold>(lost, &step)
         };
         let evaluated = if compensated.is_some() { None } else { evaluated };
         let x = compensated.unwrap_or(end);

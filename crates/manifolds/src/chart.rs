@@ -58,6 +58,7 @@ use nalgebra::{Const, SMatrix, SVector};
 use rand::{Rng, RngExt};
 
 use crate::euclidean::{components_are_velocities, sum_of_terms};
+use crate::flat::straight_lines;
 use crate::{Flat, Manifold, PointError};
 
 /// An open part of Rⁿ, in coordinates and with a metric that you choose. See the [module](mod@crate::chart).
@@ -135,6 +136,8 @@ impl<const N: usize> Space for Chart<N> {
 }
 
 impl<const N: usize> Manifold for Chart<N> {
+    straight_lines!();
+
     /// Returns 0 inside the domain and infinity outside, where the distance is not known.
     fn defect(&self, x: &SVector<f64, N>) -> f64 {
         match x.is_finite() {

@@ -102,6 +102,8 @@ macro_rules! vector_space {
         }
 
         impl<const N: usize> Manifold for $space<N> {
+            $crate::flat::straight_lines!();
+
             fn defect(&self, x: &SVector<f64, N>) -> f64 {
                 if x.is_finite() { 0.0 } else { f64::NAN }
             }

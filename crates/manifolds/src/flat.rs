@@ -42,7 +42,7 @@ macro_rules! straight_geodesics {
 
         #[inline]
         fn lost_digits(&self, x: &M::Point<f64>, v: &Vector<M>, y: &M::Point<f64>) -> Vector<M> {
-            *v - M::coordinates(x, y)
+            lost_digits::<M>(x, v, y)
         }
 
         fn log(&self, x: &M::Point<f64>, y: &M::Point<f64>) -> Result<Vector<M>, MetricError> {
@@ -51,8 +51,7 @@ macro_rules! straight_geodesics {
 
         #[inline]
         fn weyl_path(&self, x: &M::Point<f64>, d: &Vector<M>) -> Result<StepPath<M>, MetricError> {
-            let z = ChartPoint::centre(&M::chart(x, &(*d * 0.5)));
-            Ok(StepPath { z, d: *d, end: M::chart(x, d) })
+            Ok(StepPath::straight(x, d))
         }
 
         #[inline]
@@ -117,6 +116,47 @@ impl<M: Flat + Space<Dim = Const<N>>, const N: usize> Riemannian<M> for Constant
 
     straight_geodesics!();
 }
+
+/// What rounding loses of a translation by `v`.
+#[inline]
+pub(crate) fn lost_digits<M: Space>(
+    x: &M::Point<f64>,
+    v: &Vector<M>,
+    y: &M::Point<f64>,
+) -> Vector<M> {
+    *v - M::coordinates(x, y)
+}
+
+/// The straight lines of a flat manifold, for its implementation of [`Manifold`](crate::Manifold).
+macro_rules! straight_lines {
+    () => {
+        #[inline]
+        fn line(
+            x: &Self::Point<f64>,
+            u: &metriplectic_fields::Vector<Self>,
+        ) -> $crate::StepPath<Self> {
+            $crate::StepPath::straight(x, u)
+        }
+
+        #[inline]
+        fn line_jet(
+            x: &Self::Point<f64>,
+            u: &metriplectic_fields::Vector<Self>,
+        ) -> $crate::StepPathJet<Self> {
+            $crate::StepPathJet::straight(x, u)
+        }
+
+        #[inline]
+        fn lost_digits(
+            x: &Self::Point<f64>,
+            u: &metriplectic_fields::Vector<Self>,
+            y: &Self::Point<f64>,
+        ) -> metriplectic_fields::Vector<Self> {
+            $crate::flat::lost_digits::<Self>(x, u, y)
+        }
+    };
+}
+pub(crate) use straight_lines;
 
 /// The end of the flat geodesic through `x`: `x + v`, with the same velocity.
 #[inline]

@@ -15,6 +15,7 @@ use metriplectic_fields::{ChartPoint, Column, Scalar, Space};
 use nalgebra::{Const, SVector, Vector1};
 use rand::{Rng, RngExt};
 
+use crate::flat::straight_lines;
 use crate::{Flat, Manifold, PointError};
 
 /// The positive numbers R₊, for a state that must not reach zero. See the [module](mod@crate::half_line).
@@ -79,6 +80,8 @@ impl Space for HalfLine {
 }
 
 impl Manifold for HalfLine {
+    straight_lines!();
+
     /// The distance to the [projection](Self::project): how far a number is below zero, and not quite
     /// nothing for zero itself.
     fn defect(&self, x: &Vector1<f64>) -> f64 {

@@ -25,6 +25,7 @@
 //! | [`step_path`] | [`StepPath`]: the base point, the displacement and the end of a step |
 //! | [`retraction`] | [`Retraction`]: `R_h` and `R_h⁻¹` |
 //! | [`weyl_midpoint`] | [`WeylMidpoint`]: the symmetric one, order 2 |
+//! | [`chart_midpoint`] | [`ChartMidpoint`]: the symmetric one of the canonical metric, for any metric, order 2 |
 //! | [`exponential`] | [`Exponential`]: based at the start, order 1 |
 //! | [`projection`] | [`Projection`]: symmetric, rational but for a root, on spheres |
 //! | [`cayley`] | [`Cayley`]: symmetric, rational, on SO(3) |
@@ -33,6 +34,7 @@
 pub mod cayley;
 pub mod chart;
 mod chart_metric;
+pub mod chart_midpoint;
 pub mod euclidean;
 pub mod exponential;
 mod extrapolation;
@@ -65,6 +67,7 @@ pub mod weyl_midpoint;
 
 pub use cayley::Cayley;
 pub use chart::Chart;
+pub use chart_midpoint::ChartMidpoint;
 pub use euclidean::Euclidean;
 pub use exponential::Exponential;
 pub use field_metric::FieldMetric;

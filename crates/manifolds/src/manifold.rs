@@ -9,8 +9,11 @@
 //! manifold. A projection after the step would move the point, and change `H`. The certificate of a run
 //! contains the largest defect of its points.
 
-use metriplectic_fields::{Column, Space, Vector};
+use metriplectic_fields::{Column, Real, Space, Vector};
 use rand::Rng;
+
+use crate::chart_midpoint;
+use crate::step_path::{StepPath, StepPathJet};
 
 /// A space of states.
 ///
@@ -128,6 +131,38 @@ pub trait Manifold: Space {
         for v in vectors {
             *v = Self::transport(x, y, v);
         }
+    }
+
+    /// Follows the straight line `t ↦ φ_x(tu)` of the chart at `x`: its middle `z = φ_x(u/2)`, the displacement
+    /// `d` there, which is its velocity in the chart at `z`, and its end `φ_x(u)`. The path of
+    /// [`ChartMidpoint`](crate::ChartMidpoint). By default a dual number carries the velocity.
+    #[inline]
+    fn line(x: &Self::Point<f64>, u: &Vector<Self>) -> StepPath<Self> {
+        chart_midpoint::line(x, u)
+    }
+
+    /// Follows the same line with its derivatives along `u`. By default dual numbers carry them.
+    #[inline]
+    fn line_jet(x: &Self::Point<f64>, u: &Vector<Self>) -> StepPathJet<Self> {
+        chart_midpoint::line_jet(x, u)
+    }
+
+    /// Computes the point of the same line at time `t`, with its first and second derivative along `t`: the
+    /// point `φ_x((t + ε₁ + ε₂) u)`.
+    #[inline]
+    fn line_at(x: &Self::Point<f64>, u: &Vector<Self>, t: f64) -> Self::Point<Real> {
+        chart_midpoint::line_at::<Self>(x, u, t)
+    }
+
+    /// Computes the rounding error of the displacement `u` on the way from `x` to `y = φ_x(u)`, which the next
+    /// step compensates; zero where it is not known, as on a curved space.
+    #[inline]
+    fn lost_digits(
+        _x: &Self::Point<f64>,
+        _u: &Vector<Self>,
+        _y: &Self::Point<f64>,
+    ) -> Vector<Self> {
+        Vector::<Self>::zero()
     }
 
     /// Draws a random point, spread over a unit scale.

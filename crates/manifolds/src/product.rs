@@ -24,7 +24,7 @@ use metriplectic_fields::{
 };
 use rand::Rng;
 
-use crate::{Manifold, PointError};
+use crate::{Manifold, PointError, StepPath, StepPathJet};
 
 /// The product `A × B`: a state with two parts, such as a direction with an internal energy
 /// (`S² × R`) or an attitude with an angular momentum (`SO(3) × R³`). A factor may be a product again.
@@ -173,6 +173,34 @@ impl<A: Times<B>, B: Space> Space for Product<A, B> {
     }
 }
 
+impl<A: Times<B>, B: Space> StepPath<Product<A, B>> {
+    /// Puts the paths of the factors together.
+    #[inline]
+    pub fn of_factors(a: StepPath<A>, b: StepPath<B>) -> Self {
+        let q = Product::<A, B>::join(&a.z.q, &b.z.q);
+        Self {
+            z: ChartPoint { base: (a.z.base, b.z.base), q },
+            d: Product::<A, B>::join(&a.d, &b.d),
+            end: (a.end, b.end),
+        }
+    }
+}
+
+impl<A: Times<B>, B: Space> StepPathJet<Product<A, B>> {
+    /// Puts the paths of the factors together, with their derivatives.
+    #[inline]
+    pub fn of_factors(a: StepPathJet<A>, b: StepPathJet<B>) -> Self {
+        Self {
+            z: (a.z, b.z),
+            dz: Product::<A, B>::block(&a.dz, &b.dz),
+            d: Product::<A, B>::join(&a.d, &b.d),
+            dd: Product::<A, B>::block(&a.dd, &b.dd),
+            end: (a.end, b.end),
+            dend: Product::<A, B>::block(&a.dend, &b.dend),
+        }
+    }
+}
+
 impl<A: Manifold + Times<B>, B: Manifold> Manifold for Product<A, B> {
     /// Returns the larger defect of the two factors.
     fn defect(&self, (a, b): &Self::Point<f64>) -> f64 {
@@ -219,6 +247,30 @@ impl<A: Manifold + Times<B>, B: Manifold> Manifold for Product<A, B> {
     fn transport(x: &Self::Point<f64>, y: &Self::Point<f64>, v: &Vector<Self>) -> Vector<Self> {
         let (a, b) = Self::split(v);
         Self::join(&A::transport(&x.0, &y.0, &a), &B::transport(&x.1, &y.1, &b))
+    }
+
+    #[inline]
+    fn line(x: &Self::Point<f64>, u: &Vector<Self>) -> StepPath<Self> {
+        let (a, b) = Self::split(u);
+        StepPath::of_factors(A::line(&x.0, &a), B::line(&x.1, &b))
+    }
+
+    #[inline]
+    fn line_jet(x: &Self::Point<f64>, u: &Vector<Self>) -> StepPathJet<Self> {
+        let (a, b) = Self::split(u);
+        StepPathJet::of_factors(A::line_jet(&x.0, &a), B::line_jet(&x.1, &b))
+    }
+
+    #[inline]
+    fn line_at(x: &Self::Point<f64>, u: &Vector<Self>, t: f64) -> Self::Point<Real> {
+        let (a, b) = Self::split(u);
+        (A::line_at(&x.0, &a, t), B::line_at(&x.1, &b, t))
+    }
+
+    #[inline]
+    fn lost_digits(x: &Self::Point<f64>, u: &Vector<Self>, y: &Self::Point<f64>) -> Vector<Self> {
+        let (a, b) = Self::split(u);
+        Self::join(&A::lost_digits(&x.0, &a, &y.0), &B::lost_digits(&x.1, &b, &y.1))
     }
 
     fn random(&self, rng: &mut impl Rng) -> Self::Point<f64> {

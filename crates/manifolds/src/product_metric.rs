@@ -174,18 +174,10 @@ macro_rules! metric_of_the_factors {
             d: &Vector<Product<A, B>>,
         ) -> Result<StepPath<Product<A, B>>, MetricError> {
             let ((g, f), (da, db)) = (Split::<A, B>::halves(self), Product::<A, B>::split(d));
-            let (a, b) = (
+            Ok(StepPath::of_factors(
                 Riemannian::<A>::weyl_path(g, &x.0, &da)?,
                 Riemannian::<B>::weyl_path(f, &x.1, &db)?,
-            );
-            Ok(StepPath {
-                z: ChartPoint {
-                    base: (a.z.base, b.z.base),
-                    q: Product::<A, B>::join(&a.z.q, &b.z.q),
-                },
-                d: Product::<A, B>::join(&a.d, &b.d),
-                end: (a.end, b.end),
-            })
+            ))
         }
 
         fn weyl_jet(
@@ -194,18 +186,10 @@ macro_rules! metric_of_the_factors {
             d: &Vector<Product<A, B>>,
         ) -> Result<StepPathJet<Product<A, B>>, MetricError> {
             let ((g, f), (da, db)) = (Split::<A, B>::halves(self), Product::<A, B>::split(d));
-            let (a, b) = (
+            Ok(StepPathJet::of_factors(
                 Riemannian::<A>::weyl_jet(g, &x.0, &da)?,
                 Riemannian::<B>::weyl_jet(f, &x.1, &db)?,
-            );
-            Ok(StepPathJet {
-                z: (a.z, b.z),
-                dz: Product::<A, B>::block(&a.dz, &b.dz),
-                d: Product::<A, B>::join(&a.d, &b.d),
-                dd: Product::<A, B>::block(&a.dd, &b.dd),
-                end: (a.end, b.end),
-                dend: Product::<A, B>::block(&a.dend, &b.dend),
-            })
+            ))
         }
 
         fn accuracy(&self) -> f64 {

@@ -69,6 +69,24 @@ pub trait Retraction<M: Manifold, G: Riemannian<M>> {
         Nodes::of(|t| metric.along(x, u, t))
     }
 
+    /// Computes the rounding error of the displacement `u` on the way from `x` to the `end` of its path, which the
+    /// next step compensates; zero where it is not known. By default it is the metric's.
+    #[inline]
+    fn lost_digits(
+        &self,
+        metric: &G,
+        x: &M::Point<f64>,
+        u: &Vector<M>,
+        end: &M::Point<f64>,
+    ) -> Vector<M> {
+        metric.lost_digits(x, u, end)
+    }
+
+    /// The relative accuracy of the ends of paths. By default it is the accuracy of the metric's geodesics.
+    fn accuracy(&self, metric: &G) -> f64 {
+        metric.accuracy()
+    }
+
     /// Follows the same path at `f64`, with its derivatives along `u`.
     ///
     /// # Errors

@@ -199,6 +199,42 @@ impl Manifold for Rotations {
         1.0
     }
 
+    /// The one-parameter subgroup of the body velocity `u`.
+    #[inline]
+    fn line(x: &Matrix3<f64>, u: &Vector3<f64>) -> StepPath<Self> {
+        let z = ChartPoint::centre(&moved(x, &exp(&(u * 0.5))));
+        StepPath { z, d: *u, end: Self::chart(x, u) }
+    }
+
+    /// With the constant body velocity `u`: `z = R exp(û/2)`, `x' = R exp(û)`, differentiated by
+    /// [`dexp`]. The chart at `z` reads the body velocity `Ω` at `q` as `dexp⁻¹(q) Ω = Ω + ½q × Ω + …`,
+    /// so `∂d/∂u = 1 − ½û ∂z/∂u = ½(1 + exp(−û/2))`.
+    #[inline]
+    fn line_jet(x: &Matrix3<f64>, u: &Vector3<f64>) -> StepPathJet<Self> {
+        let half = u * 0.5;
+        let [_, c1, c2, c3] = stumpff(half.norm_squared());
+        StepPathJet {
+            z: moved(x, &rodrigues(&half, c1, c2)),
+            dz: rodrigues(&half, -c2, c3) * 0.5,
+            d: *u,
+            dd: rodrigues(&half, -0.5 * c1, 0.5 * c2),
+            end: Self::chart(x, u),
+            dend: dexp(u),
+        }
+    }
+
+    /// `R(t)` with `R' = R Ω̂` and `R'' = R Ω̂²`.
+    #[inline]
+    fn line_at(x: &Matrix3<f64>, omega: &Vector3<f64>, t: f64) -> Matrix3<Real> {
+        let r = if t > 0.0 { moved(x, &exp(&(omega * t))) } else { *x };
+        let velocity = spun(&r, omega);
+        let bend = spun(&velocity, omega);
+        Matrix3::from_fn(|i, j| {
+            let v = velocity[(i, j)];
+            Real::new(r[(i, j)], v, v, bend[(i, j)])
+        })
+    }
+
     /// Returns the polar factor `R`, with `RᵀA` symmetric: the nearest rotation in the Frobenius norm, or one of
     /// several (Higham 1989). It returns a matrix that is not finite without change.
     fn project(&self, x: &Matrix3<f64>) -> Matrix3<f64> {
@@ -311,7 +347,6 @@ impl Riemannian<Rotations> for Canonical {
         Ok(end)
     }
 
-    /// `R(t)` with `R' = R Ω̂` and `R'' = R Ω̂²`.
     #[inline]
     fn along(
         &self,
@@ -320,13 +355,7 @@ impl Riemannian<Rotations> for Canonical {
         t: f64,
     ) -> Result<Matrix3<Real>, MetricError> {
         within(PI, omega.norm())?;
-        let r = if t > 0.0 { moved(x, &exp(&(omega * t))) } else { *x };
-        let velocity = spun(&r, omega);
-        let bend = spun(&velocity, omega);
-        Ok(Matrix3::from_fn(|i, j| {
-            let v = velocity[(i, j)];
-            Real::new(r[(i, j)], v, v, bend[(i, j)])
-        }))
+        Ok(Rotations::line_at(x, omega, t))
     }
 
     fn log(&self, x: &Matrix3<f64>, y: &Matrix3<f64>) -> Result<Vector3<f64>, MetricError> {
@@ -342,13 +371,9 @@ impl Riemannian<Rotations> for Canonical {
         d: &Vector3<f64>,
     ) -> Result<StepPath<Rotations>, MetricError> {
         within(PI, d.norm())?;
-        let z = ChartPoint::centre(&moved(x, &exp(&(d * 0.5))));
-        Ok(StepPath { z, d: *d, end: Rotations::chart(x, d) })
+        Ok(Rotations::line(x, d))
     }
 
-    /// With the constant body velocity `u`: `z = R exp(û/2)`, `x' = R exp(û)`, differentiated by
-    /// [`dexp`]. The chart at `z` reads the body velocity `Ω` at `q` as `dexp⁻¹(q) Ω = Ω + ½q × Ω + …`,
-    /// so `∂d/∂u = 1 − ½û ∂z/∂u = ½(1 + exp(−û/2))`.
     #[inline]
     fn weyl_jet(
         &self,
@@ -356,16 +381,7 @@ impl Riemannian<Rotations> for Canonical {
         d: &Vector3<f64>,
     ) -> Result<StepPathJet<Rotations>, MetricError> {
         within(PI, d.norm())?;
-        let half = d * 0.5;
-        let [_, c1, c2, c3] = stumpff(half.norm_squared());
-        Ok(StepPathJet {
-            z: moved(x, &rodrigues(&half, c1, c2)),
-            dz: rodrigues(&half, -c2, c3) * 0.5,
-            d: *d,
-            dd: rodrigues(&half, -0.5 * c1, 0.5 * c2),
-            end: Rotations::chart(x, d),
-            dend: dexp(d),
-        })
+        Ok(Rotations::line_jet(x, d))
     }
 
     fn slopes(&self, _: &Matrix3<f64>) -> Option<<Const<3> as Dimension>::Array<Matrix3<f64>>> {

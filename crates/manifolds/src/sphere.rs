@@ -309,6 +309,29 @@ macro_rules! sphere {
                 }
             }
 
+            /// The great circle, with `γ'(½) = c₀ U − ½s c₁ x`, `U = E(x) u` and the Stumpff functions at
+            /// `s/4 = |u|²/4`.
+            #[inline]
+            fn line(x: &SVector<f64, $a>, u: &SVector<f64, $n>) -> StepPath<Self> {
+                let [z, velocity] = great_circle(x, &(frame::<$a, $n>(x) * u), 0.5);
+                let z = polished(&z);
+                let d = frame::<$a, $n>(&z).tr_mul(&velocity);
+                StepPath { z: ChartPoint::centre(&z), d, end: Self::chart(x, u) }
+            }
+
+            #[inline]
+            fn line_jet(x: &SVector<f64, $a>, u: &SVector<f64, $n>) -> StepPathJet<Self> {
+                great_circle_jet::<Self, $a, $n>(x, u)
+            }
+
+            /// With the velocity of the great circle, and `γ'' = −|u|² γ`.
+            #[inline]
+            fn line_at(x: &SVector<f64, $a>, u: &SVector<f64, $n>, t: f64) -> SVector<Real, $a> {
+                let (v, s) = (frame::<$a, $n>(x) * u, u.norm_squared());
+                let [y, dy] = if t > 0.0 { great_circle(x, &v, t) } else { [*x, v] };
+                SVector::from_fn(|i, _| Real::new(y[i], dy[i], dy[i], -s * y[i]))
+            }
+
             /// `x/|x|`; the centre is equally far from all points, and has entries that are not
             /// numbers.
             fn project(&self, x: &SVector<f64, $a>) -> SVector<f64, $a> {
@@ -373,7 +396,6 @@ macro_rules! sphere {
                 finite_column("an entry of the end", Sphere::<$n>::chart(x, v))
             }
 
-            /// With the velocity of the great circle, and `γ'' = −|v|² γ`.
             #[inline]
             fn along(
                 &self,
@@ -382,9 +404,7 @@ macro_rules! sphere {
                 t: f64,
             ) -> Result<SVector<Real, $a>, MetricError> {
                 within(PI, v.norm())?;
-                let (u, s) = (frame::<$a, $n>(x) * v, v.norm_squared());
-                let [y, dy] = if t > 0.0 { great_circle(x, &u, t) } else { [*x, u] };
-                Ok(SVector::from_fn(|i, _| Real::new(y[i], dy[i], dy[i], -s * y[i])))
+                Ok(Sphere::<$n>::line_at(x, v, t))
             }
 
             fn log(
@@ -407,7 +427,6 @@ macro_rules! sphere {
                 Ok(if length < 1.0 { Sphere::<$n>::coordinates(x, y).norm() } else { length })
             }
 
-            /// `γ'(½) = c₀ U − ½s c₁ x` with `U = E(x) d` and the Stumpff functions at `s/4 = |d|²/4`.
             #[inline]
             fn weyl_path(
                 &self,
@@ -415,14 +434,7 @@ macro_rules! sphere {
                 d: &SVector<f64, $n>,
             ) -> Result<StepPath<Sphere<$n>>, MetricError> {
                 within(PI, d.norm())?;
-                let [z, velocity] = great_circle(x, &(frame::<$a, $n>(x) * d), 0.5);
-                let z = polished(&z);
-                let d_at_z = frame::<$a, $n>(&z).tr_mul(&velocity);
-                Ok(StepPath {
-                    z: ChartPoint::centre(&z),
-                    d: d_at_z,
-                    end: Sphere::<$n>::chart(x, d),
-                })
+                Ok(Sphere::<$n>::line(x, d))
             }
 
             #[inline]
@@ -432,7 +444,7 @@ macro_rules! sphere {
                 d: &SVector<f64, $n>,
             ) -> Result<StepPathJet<Sphere<$n>>, MetricError> {
                 within(PI, d.norm())?;
-                Ok(weyl_jet_in::<Sphere<$n>, $a, $n>(x, d))
+                Ok(Sphere::<$n>::line_jet(x, d))
             }
 
             fn slopes(
@@ -459,7 +471,7 @@ sphere!(7 in 8);
 /// `c₁' = −½(c₂ − c₃)`. The frames at `z` and `x'` turn ambient vectors into components; the chart at
 /// `z` is normal, so the derivative of components is the projected ambient derivative.
 #[inline]
-fn weyl_jet_in<M, const A: usize, const N: usize>(
+fn great_circle_jet<M, const A: usize, const N: usize>(
     x: &SVector<f64, A>,
     d: &SVector<f64, N>,
 ) -> StepPathJet<M>

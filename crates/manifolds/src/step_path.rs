@@ -13,6 +13,16 @@ pub struct StepPath<M: Space, D: Scalar = f64> {
     pub end: M::Point<D>,
 }
 
+impl<M: Space> StepPath<M> {
+    /// Makes the straight line of a flat space, with its middle as the base: `z = x + u/2`, `d = u`,
+    /// `x' = x + u`.
+    #[inline]
+    pub fn straight(x: &M::Point<f64>, u: &Vector<M>) -> Self {
+        let z = ChartPoint::centre(&M::chart(x, &(*u * 0.5)));
+        Self { z, d: *u, end: M::chart(x, u) }
+    }
+}
+
 /// The path of a step at `f64`, with its derivatives along the unknown `u`.
 #[derive(Clone, Debug)]
 pub struct StepPathJet<M: Space> {
@@ -31,8 +41,7 @@ pub struct StepPathJet<M: Space> {
 }
 
 impl<M: Space> StepPathJet<M> {
-    /// Makes the straight line of a flat space, with its middle as the base: `z = x + u/2`, `d = u`,
-    /// `x' = x + u`.
+    /// Makes the same straight line as [`StepPath::straight`].
     #[inline]
     pub fn straight(x: &M::Point<f64>, u: &Vector<M>) -> Self {
         let one = Matrix::<M>::one();

@@ -65,6 +65,20 @@ where
         of_either!(self.along(metric, x, u))
     }
 
+    fn lost_digits(
+        &self,
+        metric: &G,
+        x: &M::Point<f64>,
+        u: &Vector<M>,
+        end: &M::Point<f64>,
+    ) -> Vector<M> {
+        of_either!(self.lost_digits(metric, x, u, end))
+    }
+
+    fn accuracy(&self, metric: &G) -> f64 {
+        of_either!(self.accuracy(metric))
+    }
+
     fn step_path_jet(
         &self,
         metric: &G,

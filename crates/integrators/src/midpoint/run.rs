@@ -1,7 +1,9 @@
 //! Runs with the default scheme.
 
 use metriplectic_dynamics::{Metriplectic, system::Point};
-use metriplectic_manifolds::{Cayley, Exponential, Projection, Retraction, WeylMidpoint};
+use metriplectic_manifolds::{
+    Cayley, ChartMidpoint, Exponential, Projection, Retraction, WeylMidpoint,
+};
 
 use super::Scheme;
 use crate::error::RunError;
@@ -71,6 +73,7 @@ pub trait Run: Sized {
 }
 
 impl Run for WeylMidpoint {}
+impl Run for ChartMidpoint {}
 impl Run for Exponential {}
 impl Run for Projection {}
 impl Run for Cayley {}

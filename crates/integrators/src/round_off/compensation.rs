@@ -1,7 +1,7 @@
 //! What rounding loses of a position.
 
-use metriplectic_fields::Dimension;
-use metriplectic_manifolds::{Manifold, Riemannian};
+use metriplectic_fields::{Dimension, Vector};
+use metriplectic_manifolds::Manifold;
 
 /// The digits that rounding has lost of the position in the steps so far.
 ///
@@ -10,6 +10,13 @@ use metriplectic_manifolds::{Manifold, Riemannian};
 /// 1965, Hairer, Lubich, Wanner 2006, §VIII.5).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Compensation<N: Dimension>(pub(crate) Option<N::Vector<f64>>);
+
+/// A step by the displacement `d` from `x`, with its rounded end.
+pub(crate) struct Displaced<'a, M: Manifold> {
+    pub(crate) x: &'a M::Point<f64>,
+    pub(crate) d: &'a Vector<M>,
+    pub(crate) end: &'a M::Point<f64>,
+}
 
 impl<N: Dimension> Compensation<N> {
     /// Nothing is lost.
@@ -20,19 +27,19 @@ impl<N: Dimension> Compensation<N> {
         self.0 = None;
     }
 
-    /// The end of the step `d` from `x`, moved by what earlier steps have lost; `None` if it does not move.
+    /// The end of the `step`, moved by what earlier steps have lost; `None` if it does not move.
     #[inline]
-    pub(crate) fn add<M: Manifold<Dim = N>, G: Riemannian<M>>(
+    pub(crate) fn add<M: Manifold<Dim = N>>(
         &mut self,
-        metric: &G,
-        (x, d): (&M::Point<f64>, &N::Vector<f64>),
-        end: &M::Point<f64>,
+        lost_digits: impl Fn(&M::Point<f64>, &N::Vector<f64>, &M::Point<f64>) -> N::Vector<f64>,
+        step: &Displaced<'_, M>,
     ) -> Option<M::Point<f64>> {
-        let lost = metric.lost_digits(x, d, end);
+        let Displaced { x, d, end } = step;
+        let lost = lost_digits(x, d, end);
         match self.0 {
             Some(before) if (0..N::LEN).any(|i| before[i].abs() > 0.0) => {
                 let compensated = M::chart(end, &before);
-                self.0 = Some(lost + metric.lost_digits(end, &before, &compensated));
+                self.0 = Some(lost + lost_digits(end, &before, &compensated));
                 Some(compensated)
             }
             _ => {

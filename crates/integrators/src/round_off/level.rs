@@ -19,7 +19,7 @@ use metriplectic_dynamics::orthogonal::Orthogonal;
 use metriplectic_dynamics::velocity::differentials;
 use metriplectic_dynamics::{Metriplectic, system::Point};
 use metriplectic_fields::{ChartPoint, Column, Dimension, Space, Square, Vector};
-use metriplectic_manifolds::{InnerProduct, Manifold, Retraction, Riemannian};
+use metriplectic_manifolds::{InnerProduct, Manifold, Retraction};
 
 use crate::discrete_gradient::DiscreteGradient;
 use crate::method::Effort;
@@ -203,9 +203,15 @@ where
         within.then_some((u, end))
     }
 
+    /// The relative accuracy of the ends of paths.
+    fn accuracy(&self) -> f64 {
+        let Residual { system, retraction, .. } = self.equation;
+        retraction.accuracy(system.metric())
+    }
+
     /// Whether the ends of geodesics are good to a few roundings.
     fn has_closed_geodesics(&self) -> bool {
-        self.equation.system.metric().accuracy() <= ROUNDED
+        self.accuracy() <= ROUNDED
     }
 
     /// The end `x'` moved onto the level of the energy, within the accuracy of geodesics: by the shortest
@@ -221,7 +227,7 @@ where
         let sizes = Y::Manifold::scales(x) + u.abs();
         let g = InUnits(sizes);
         let w = differentials(*system, &ChartPoint::<Y::Manifold>::centre(end));
-        let limit = system.metric().accuracy() * (Dim::<Y>::LEN as f64).sqrt();
+        let limit = self.accuracy() * (Dim::<Y>::LEN as f64).sqrt();
         let moved = |kept: &Orthogonal<Dim<Y>>| {
             let across = g.sharp(&kept.project_covector(0, &w.energy));
             let step = across * (-e / across.dot(&w.energy));

@@ -254,6 +254,10 @@ impl<G: Riemannian<Euclidean<3>>> Riemannian<Euclidean<3>> for Straight<G> {
         Riemannian::<Euclidean<3>>::weyl_jet(&Canonical, x, d)
     }
 
+    fn volume_density<D: Scalar>(at: &Self::At<D>) -> Result<D, MetricError> {
+        <G as Riemannian<Euclidean<3>>>::volume_density(at)
+    }
+
     fn slopes(&self, x: &Vector3<f64>) -> Option<[Matrix3<f64>; 3]> {
         self.0.slopes(x)
     }

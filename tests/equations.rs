@@ -6,7 +6,7 @@ mod models;
 use metriplectic::dynamics::{Bracket, Dissipation, laws};
 use metriplectic::fields::{BrokenLaw, ChartPoint};
 use metriplectic::integrators::DiscreteGradient;
-use metriplectic::manifolds::{StepPath, rotations};
+use metriplectic::manifolds::{MetricAt, StepPath, rotations};
 use metriplectic::prelude::*;
 use models::{half_square, kinetic, relaxing_body, top};
 use proptest::prelude::*;
@@ -44,7 +44,7 @@ proptest! {
     ) {
         let body = System::on(LieDual::so3()).energy(kinetic(Vector3::from(I))).build().unwrap();
         let (x, dh) = (ChartPoint::centre(&p), velocity(&p));
-        let pi = body.bracket().tensor(&body.bracket_args(&x, &Vector3::zeros())).unwrap();
+        let pi = body.bracket().tensor(&body.bracket_args(&body.metric_at(&x), &Vector3::zeros())).unwrap();
         let field = body.velocity(&x).unwrap();
         let bracket = |f: &Vector3<f64>, g: &Vector3<f64>| {
             (0..3).flat_map(|i| (0..3).map(move |j| (i, j)))
@@ -69,7 +69,9 @@ proptest! {
         let g = Matrix3::identity() + (b * b.transpose() + (b * b.transpose()).transpose()) * 0.5;
         let inverse = g.try_inverse().unwrap();
         let k = Dissipation::<Euclidean<3>, _>::tensor(
-            &MetricDissipation, &Metric::constant(g).unwrap(), &ChartPoint::centre(&w), &w,
+            &MetricDissipation,
+            &MetricAt::new(&Metric::constant(g).unwrap(), &ChartPoint::centre(&w)),
+            &w,
         ).unwrap();
         let star = |a: &Vector3<f64>, b: &Vector3<f64>| a.dot(&(inverse * b));
         let c = star(&w, &w);
@@ -88,7 +90,7 @@ proptest! {
         let body = relaxing_body();
         let x = ChartPoint::centre(&p);
         let v = body.velocity(&x).unwrap();
-        let k = body.dissipation().tensor(&Canonical, &x, &velocity(&p)).unwrap();
+        let k = body.dissipation().tensor(&body.metric_at(&x), &velocity(&p)).unwrap();
         same(&v, &(p.cross(&velocity(&p)) + k * p))?;
         // The same with E = H + S for both, since Π dS = 0 and K dH = 0.
         let de = velocity(&p) + p;
@@ -171,7 +173,7 @@ proptest! {
         same(&rate, &third)?;
         same(&rate, &printed(&p))?;
         let o = velocity(&p);
-        let k = body.dissipation().tensor(&Canonical, &x, &o).unwrap();
+        let k = body.dissipation().tensor(&body.metric_at(&x), &o).unwrap();
         let matrix = Matrix3::new(
             o.y * o.y + o.z * o.z, -o.x * o.y, -o.x * o.z,
             -o.x * o.y, o.x * o.x + o.z * o.z, -o.y * o.z,
@@ -248,8 +250,8 @@ proptest! {
             Matrix6::from_diagonal_element(std::f64::consts::FRAC_1_SQRT_2).cast::<Real>()
         };
         let at = ChartPoint::<Euclidean<6>>::centre(&x);
-        let product = KulkarniNomizu(half, half).apply(&Canonical, &at, &w, &a).unwrap();
-        same(&product, &MetricDissipation.apply(&Canonical, &at, &w, &a).unwrap())?;
+        let product = KulkarniNomizu(half, half).apply(&MetricAt::new(&Canonical, &at), &w, &a).unwrap();
+        same(&product, &MetricDissipation.apply(&MetricAt::new(&Canonical, &at), &w, &a).unwrap())?;
     }
 
     /// §4.4: `exp_h(v) = (x, exp_x(hv))` and eq. (weyl), by the closed form on SO(3).

@@ -6,7 +6,7 @@ mod models;
 use metriplectic::dynamics::{Bracket, Dissipation, NoDissipation};
 use metriplectic::fields::{ChartPoint, differential};
 use metriplectic::integrators::DiscreteGradient;
-use metriplectic::manifolds::{Riemannian, StepPath, Tangent, rotations};
+use metriplectic::manifolds::{MetricAt, Riemannian, StepPath, Tangent, rotations};
 use metriplectic::prelude::*;
 use metriplectic_studies::Order;
 use models::{TUMBLING, UNSTABLE, free_body, half_square, kinetic, relaxing_body, top};
@@ -41,7 +41,8 @@ where
 
 /// The matrix of a dissipation on so(3)*.
 fn tensor(k: &impl Dissipation<LieDual<3>, Canonical>, w: &Vector3<f64>) -> Matrix3<f64> {
-    k.tensor(&Canonical, &ChartPoint::centre(&P), w).expect("a matrix")
+    let x = ChartPoint::centre(&P);
+    k.tensor(&MetricAt::new(&Canonical, &x), w).expect("a matrix")
 }
 
 /// The order fitted to errors at the given steps.
@@ -221,7 +222,8 @@ fn before_reduction_the_entropy_is_no_casimir_and_a_function_of_the_momentum() {
     // The canonical bracket of T*SO(3) has no Casimir but constants: Π dC = (p, 0).
     let system = body_in_space();
     let (x, dc) = (ChartPoint::centre(&(r, P)), vector![0.0, 0.0, 0.0, P.x, P.y, P.z]);
-    let moved = system.bracket().apply(&system.bracket_args(&x, &dc), &dc).unwrap();
+    let moved =
+        system.bracket().apply(&system.bracket_args(&system.metric_at(&x), &dc), &dc).unwrap();
     stated(moved.norm(), P.norm(), 1e-14);
     // On so(3)* it is one.
     assert!((P.cross(&P)).norm() <= EPS);
@@ -548,10 +550,10 @@ fn the_dissipation_acts_on_the_differential_and_not_on_the_gradient() {
     let (w, s, scale) = (vector![1.0, 1.0, 0.0], vector![1.0, 0.2, 0.0], vector![1.0, 3.0, 1.0]);
     let metric = Metric::constant(Matrix3::from_diagonal(&scale.map(|d: f64| d.powi(-2)))).unwrap();
     let (wy, sy) = (w.component_div(&scale), s.component_div(&scale));
+    let x = ChartPoint::<Euclidean<3>>::centre(&Vector3::zeros());
     let k = Dissipation::<Euclidean<3>, _>::tensor(
         &MetricDissipation,
-        &metric,
-        &ChartPoint::centre(&Vector3::zeros()),
+        &MetricAt::new(&metric, &x),
         &wy,
     )
     .unwrap();

@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 use metriplectic::dynamics::BuildError;
 use metriplectic::fields::{ChartPoint, Form, Space};
 use metriplectic::integrators::{Newton, RunError, Scheme};
-use metriplectic::manifolds::{MetricError, Riemannian, rotations};
+use metriplectic::manifolds::{MetricAt, MetricError, Riemannian, rotations};
 use metriplectic::prelude::*;
 use proptest::prelude::*;
 use proptest::test_runner::{Config, RngSeed, TestCaseResult, TestRunner};
@@ -318,7 +318,7 @@ fn metrics_and_their_geodesics() {
         finite("norm", Riemannian::<Euclidean<2>>::norm(&metric, &x, &v).map(|l| vec![l]))?;
         finite(
             "volume",
-            Riemannian::<Euclidean<2>>::volume_density(&metric, &centre).map(|l| vec![l]),
+            MetricAt::<Euclidean<2>, _>::new(&metric, &centre).volume_density().map(|l| vec![l]),
         )
     });
 }

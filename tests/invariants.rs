@@ -272,7 +272,7 @@ fn the_velocity_of_a_bracket_with_two_casimirs_is_the_cross_product_of_the_space
     let x = SVector::from(ON_S4);
     let z = ChartPoint::<Sphere<4>>::centre(&x);
     let w = differentials(&system, &z);
-    let v = Sphere::<4>::embed(&z, &reversible(&system, &z, &w).unwrap());
+    let v = Sphere::<4>::embed(&z, &reversible(&system, &system.metric_at(&z), &w).unwrap());
     // By hand: gradients in R⁵, and det[x, ∇S, ∇C, ∇H, e_i].
     let ds = vector![1.0, -x[3], 2.0 * x[2], -x[1], 0.0];
     let dc = vector![0.3 * x[1], 0.3 * x[0], 0.0, 0.0, 1.0];

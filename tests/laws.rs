@@ -4,7 +4,7 @@ use metriplectic::dynamics::bracket::{BracketArgs, BracketJet};
 use metriplectic::dynamics::dissipation::DissipationJet;
 use metriplectic::dynamics::{Bracket, Dissipation, MetricDissipation, laws, parts_of};
 use metriplectic::fields::{BrokenLaw, ChartPoint};
-use metriplectic::manifolds::MetricError;
+use metriplectic::manifolds::{MetricAt, MetricError};
 use metriplectic::prelude::*;
 use proptest::prelude::*;
 
@@ -378,7 +378,7 @@ where
         at: &BracketArgs<'_, Euclidean<3>, G, D>,
         a: &Vector3<D>,
     ) -> Result<Vector3<D>, MetricError> {
-        let p = at.x.point();
+        let p = at.g.x.point();
         let mut turn =
             Vector3::new(p.y * a.z - p.z * a.y, p.z * a.x - p.x * a.z, p.x * a.y - p.y * a.x);
         match self {
@@ -399,7 +399,7 @@ where
         a: &Vector3<f64>,
     ) -> Result<BracketJet<Euclidean<3>>, MetricError> {
         // The derivatives of a × b are those of a cross product.
-        let p = at.x.point();
+        let p = at.g.x.point();
         let mut jet = BracketJet::<Euclidean<3>> {
             value: Bracket::<_, G>::apply(self, at, a)?,
             along_z: -a.cross_matrix(),
@@ -480,12 +480,11 @@ where
 {
     fn apply<D: Scalar>(
         &self,
-        metric: &G,
-        x: &ChartPoint<LieDual<3>, D>,
+        g: &MetricAt<'_, LieDual<3>, G, D>,
         w: &Vector3<D>,
         a: &Vector3<D>,
     ) -> Result<Vector3<D>, MetricError> {
-        let mut k = MetricDissipation.apply(metric, x, w, a)?;
+        let mut k = MetricDissipation.apply(g, w, a)?;
         let off = 1e-6;
         match self {
             // w × α annihilates w and adds nothing to the form; only symmetry is lost.
@@ -503,12 +502,11 @@ where
 
     fn linearise(
         &self,
-        metric: &G,
-        z: &Vector3<f64>,
+        g: &MetricAt<'_, LieDual<3>, G>,
         w: &Vector3<f64>,
         a: &Vector3<f64>,
     ) -> Result<DissipationJet<LieDual<3>>, MetricError> {
-        let mut jet = MetricDissipation.linearise(metric, z, w, a)?;
+        let mut jet = MetricDissipation.linearise(g, w, a)?;
         match self {
             Self::AlongPoint => jet.along_z.m12 += 1e-6,
             Self::AlongAnnihilated => jet.along_w.m31 += 1e-6,

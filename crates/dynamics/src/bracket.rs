@@ -18,19 +18,17 @@ pub use symplectic::{EvenDimension, Symplectic};
 pub use zero::Zero;
 
 use metriplectic_fields::{ChartPoint, Column, Dimension, Matrix, Scalar, Space, Square, Vector};
-use metriplectic_manifolds::{Manifold, MetricError, Riemannian};
+use metriplectic_manifolds::{Manifold, MetricAt, MetricError, Riemannian};
 use nalgebra::SMatrix;
 use num_dual::Dual64;
 
 /// The arguments of a bracket: the point, and the parts of the system that it may use.
 #[derive(Debug)]
-pub struct BracketArgs<'a, M: Manifold, G, D: Scalar = f64> {
+pub struct BracketArgs<'a, M: Manifold, G: Riemannian<M>, D: Scalar = f64> {
     /// The manifold.
     pub space: &'a M,
-    /// Its metric, whose volume form the Nambu brackets need.
-    pub metric: &'a G,
-    /// The point, and the chart that components refer to.
-    pub x: &'a ChartPoint<M, D>,
+    /// The point `g.x` with the metric there, whose volume form the Nambu brackets need.
+    pub g: &'a MetricAt<'a, M, G, D>,
     /// The covector of the entropy there: `dS`, or a discrete gradient of `S`. Only brackets that are
     /// built from their Casimir use it.
     pub s: &'a Vector<M, D>,
@@ -156,14 +154,15 @@ pub(crate) fn by_dual_numbers<M: Manifold, G: Riemannian<M>>(
     let mut jet =
         BracketJet::<M> { value, along_z: zero, along_s: zero, tensor: bracket.tensor(at)? };
     let (s, alpha) = (Vector::<M, Dual64>::embed(at.s), Vector::<M, Dual64>::embed(alpha));
-    let still = ChartPoint::centre(&at.x.base);
+    let &BracketArgs { space, g: &MetricAt { metric, x, .. }, .. } = at;
+    let still = ChartPoint::centre(&x.base);
+    let still = MetricAt::new(metric, &still);
     for k in 0..M::Dim::LEN {
         let e = epsilon::<M>(k);
-        let moved = ChartPoint { base: at.x.base.clone(), q: e };
-        let BracketArgs { space, metric, .. } = *at;
-        let along_z = bracket.apply(&BracketArgs { space, metric, x: &moved, s: &s }, &alpha)?;
-        let along_s =
-            bracket.apply(&BracketArgs { space, metric, x: &still, s: &(s + e) }, &alpha)?;
+        let moved = ChartPoint { base: x.base.clone(), q: e };
+        let moved = MetricAt::new(metric, &moved);
+        let along_z = bracket.apply(&BracketArgs { space, g: &moved, s: &s }, &alpha)?;
+        let along_s = bracket.apply(&BracketArgs { space, g: &still, s: &(s + e) }, &alpha)?;
         for i in 0..M::Dim::LEN {
             jet.along_z[(i, k)] = along_z[i].eps;
             jet.along_s[(i, k)] = along_s[i].eps;
@@ -182,14 +181,16 @@ pub(crate) fn force_by_dual_numbers<M: Manifold, G: Riemannian<M>>(
     let value = bracket.force(at, w)?;
     let mut jet = BracketJet::<M> { value, along_z: zero, along_s: zero, tensor: zero };
     let (s, w) = (Vector::<M, Dual64>::embed(at.s), Vector::<M, Dual64>::embed(w));
-    let still = ChartPoint::centre(&at.x.base);
-    let BracketArgs { space, metric, .. } = *at;
+    let &BracketArgs { space, g: &MetricAt { metric, x, .. }, .. } = at;
+    let still = ChartPoint::centre(&x.base);
+    let still = MetricAt::new(metric, &still);
     for k in 0..M::Dim::LEN {
         let e = epsilon::<M>(k);
-        let moved = ChartPoint { base: at.x.base.clone(), q: e };
-        let along_z = bracket.force(&BracketArgs { space, metric, x: &moved, s: &s }, &w)?;
-        let along_s = bracket.force(&BracketArgs { space, metric, x: &still, s: &(s + e) }, &w)?;
-        let along_w = bracket.force(&BracketArgs { space, metric, x: &still, s: &s }, &(w + e))?;
+        let moved = ChartPoint { base: x.base.clone(), q: e };
+        let moved = MetricAt::new(metric, &moved);
+        let along_z = bracket.force(&BracketArgs { space, g: &moved, s: &s }, &w)?;
+        let along_s = bracket.force(&BracketArgs { space, g: &still, s: &(s + e) }, &w)?;
+        let along_w = bracket.force(&BracketArgs { space, g: &still, s: &s }, &(w + e))?;
         for i in 0..M::Dim::LEN {
             jet.along_z[(i, k)] = along_z[i].eps;
             jet.along_s[(i, k)] = along_s[i].eps;

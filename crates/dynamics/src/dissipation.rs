@@ -32,7 +32,7 @@ pub use projected::ProjectedDissipation;
 pub use scaled::Scaled;
 
 use metriplectic_fields::{ChartPoint, Column, Dimension, Matrix, Scalar, Square, Vector};
-use metriplectic_manifolds::{Manifold, MetricError, Riemannian};
+use metriplectic_manifolds::{Manifold, MetricAt, MetricError, Riemannian};
 use num_dual::Dual64;
 
 use crate::bracket::epsilon;
@@ -49,32 +49,30 @@ use crate::bracket::epsilon;
     note = "a dissipation of your own is `FieldDissipation(|x, w| matrix)`, which annihilates `w`, or `ProjectedDissipation(|x| matrix)`"
 )]
 pub trait Dissipation<M: Manifold, G: Riemannian<M>> {
-    /// Computes the vector `K_w(x) α`, with components in the frame of the chart of `x`.
+    /// Computes the vector `K_w(x) α` at the point `x` of `g`, with components in the frame of its chart.
     ///
     /// # Errors
     ///
     /// [`MetricError`] if the metric cannot be used at `x`.
     fn apply<D: Scalar>(
         &self,
-        metric: &G,
-        x: &ChartPoint<M, D>,
+        g: &MetricAt<'_, M, G, D>,
         w: &Vector<M, D>,
         alpha: &Vector<M, D>,
     ) -> Result<Vector<M, D>, MetricError>;
 
-    /// Computes `K_w α` at a real point, with its derivatives along `x`, `w` and `α`.
+    /// Computes `K_w α` at the centre of a chart, with its derivatives along `x`, `w` and `α`.
     ///
     /// # Errors
     ///
     /// Those of [`apply`](Self::apply).
     fn linearise(
         &self,
-        metric: &G,
-        z: &M::Point<f64>,
+        g: &MetricAt<'_, M, G>,
         w: &Vector<M>,
         alpha: &Vector<M>,
     ) -> Result<DissipationJet<M>, MetricError> {
-        by_dual_numbers(self, metric, z, w, alpha)
+        by_dual_numbers(self, g, w, alpha)
     }
 
     /// Computes the matrix `K_w(x)`.
@@ -82,15 +80,10 @@ pub trait Dissipation<M: Manifold, G: Riemannian<M>> {
     /// # Errors
     ///
     /// Those of [`apply`](Self::apply).
-    fn tensor(
-        &self,
-        metric: &G,
-        x: &ChartPoint<M>,
-        w: &Vector<M>,
-    ) -> Result<Matrix<M>, MetricError> {
+    fn tensor(&self, g: &MetricAt<'_, M, G>, w: &Vector<M>) -> Result<Matrix<M>, MetricError> {
         let mut tensor = Matrix::<M>::zeros();
         for j in 0..M::Dim::LEN {
-            let column = self.apply(metric, x, w, &Vector::<M>::basis(j))?;
+            let column = self.apply(g, w, &Vector::<M>::basis(j))?;
             for i in 0..M::Dim::LEN {
                 tensor[(i, j)] = column[i];
             }
@@ -138,23 +131,23 @@ fn turn<M: Manifold, D: Scalar>(
 /// The definition of [`Dissipation::linearise`]: one dual number for each direction.
 pub(crate) fn by_dual_numbers<M: Manifold, G: Riemannian<M>>(
     dissipation: &(impl Dissipation<M, G> + ?Sized),
-    metric: &G,
-    z: &M::Point<f64>,
+    g: &MetricAt<'_, M, G>,
     w: &Vector<M>,
     alpha: &Vector<M>,
 ) -> Result<DissipationJet<M>, MetricError> {
-    let still = ChartPoint::centre(z);
-    let value = dissipation.apply(metric, &still, w, alpha)?;
+    let value = dissipation.apply(g, w, alpha)?;
     let zero = Matrix::<M>::zeros();
     let mut jet = DissipationJet::<M> { value, along_z: zero, along_w: zero, tensor: zero };
-    let still = ChartPoint::centre(z);
+    let base = &g.x.base;
+    let still = ChartPoint::centre(base);
+    let still = MetricAt::new(g.metric, &still);
     let (w, alpha) = (Vector::<M, Dual64>::embed(w), Vector::<M, Dual64>::embed(alpha));
     for k in 0..M::Dim::LEN {
         let e = epsilon::<M>(k);
-        let moved = ChartPoint { base: z.clone(), q: e };
-        let along_z = dissipation.apply(metric, &moved, &w, &alpha)?;
-        let along_w = dissipation.apply(metric, &still, &(w + e), &alpha)?;
-        let along_alpha = dissipation.apply(metric, &still, &w, &(alpha + e))?;
+        let moved = ChartPoint { base: base.clone(), q: e };
+        let along_z = dissipation.apply(&MetricAt::new(g.metric, &moved), &w, &alpha)?;
+        let along_w = dissipation.apply(&still, &(w + e), &alpha)?;
+        let along_alpha = dissipation.apply(&still, &w, &(alpha + e))?;
         for i in 0..M::Dim::LEN {
             jet.along_z[(i, k)] = along_z[i].eps;
             jet.along_w[(i, k)] = along_w[i].eps;

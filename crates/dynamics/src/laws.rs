@@ -48,7 +48,8 @@ pub fn bracket<Y: Metriplectic>(
 
     let centre = ChartPoint::centre(x);
     let s = system.entropy().jet1(x).df;
-    let args = system.bracket_args(&centre, &s);
+    let g = system.metric_at(&centre);
+    let args = system.bracket_args(&g, &s);
     let jet = bracket.linearise(&args, alpha).map_err(exists)?;
     let defined = by_dual_numbers_bracket(bracket, &args, alpha).map_err(exists)?;
     let size = tensor_size * (alpha.magnitude() + beta.magnitude());
@@ -125,10 +126,11 @@ pub fn dissipation<Y: Metriplectic>(
     w: &Vector<Y::Manifold>,
     alpha: &Vector<Y::Manifold>,
 ) -> Result<(), BrokenLaw> {
-    let (dissipation, metric) = (system.dissipation(), system.metric());
+    let dissipation = system.dissipation();
     let broken = |law| move |_| BrokenLaw { law, size: f64::NAN, bound: 0.0 };
     let centre = ChartPoint::<Y::Manifold>::centre(x);
-    let tensor = dissipation.tensor(metric, &centre, w).map_err(broken("K exists"))?;
+    let g = system.metric_at(&centre);
+    let tensor = dissipation.tensor(&g, w).map_err(broken("K exists"))?;
     let size = tensor.max_abs();
     let asymmetry =
         Matrix::<Y::Manifold>::from_entries(|i, j| tensor[(i, j)] - tensor[(j, i)]).max_abs();
@@ -136,12 +138,12 @@ pub fn dissipation<Y: Metriplectic>(
     let form = alpha.dot(&(tensor * *alpha));
     let scale = size * alpha.magnitude().powi(2);
     BrokenLaw::unless("K is positive semidefinite", -form, round_off::<Y::Manifold>(scale))?;
-    let annihilated = dissipation.apply(metric, &centre, w, w).map_err(broken("K exists"))?;
+    let annihilated = dissipation.apply(&g, w, w).map_err(broken("K exists"))?;
     let error = annihilated.magnitude();
     BrokenLaw::unless("K_w w = 0", error, round_off::<Y::Manifold>(size * w.magnitude()))?;
 
-    let jet = dissipation.linearise(metric, x, w, alpha).map_err(broken("K exists"))?;
-    let defined = by_dual_numbers(dissipation, metric, x, w, alpha).map_err(broken("K exists"))?;
+    let jet = dissipation.linearise(&g, w, alpha).map_err(broken("K exists"))?;
+    let defined = by_dual_numbers(dissipation, &g, w, alpha).map_err(broken("K exists"))?;
     // The terms have the sizes K α / ℓ, K α / |w| and K.
     let units = CoordinateScales::at(system, x).units;
     let shortest = (0..<Y::Manifold as Space>::Dim::LEN).map(|i| units[i]).fold(f64::MAX, f64::min);

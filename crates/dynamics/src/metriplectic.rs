@@ -1,7 +1,7 @@
 //! The parts of a metriplectic system: manifold, metric, bracket, dissipation, energy, entropy, invariants.
 
 use metriplectic_fields::{ChartPoint, Scalar, ScalarField, Space, Vector};
-use metriplectic_manifolds::{Manifold, Riemannian};
+use metriplectic_manifolds::{Manifold, MetricAt, Riemannian};
 
 use crate::bracket::{Bracket, BracketArgs};
 use crate::dissipation::Dissipation;
@@ -67,14 +67,23 @@ pub trait Metriplectic:
         self.entropy().at(x)
     }
 
-    /// Returns the arguments of the bracket: the point `x` with the covector `s` of the entropy there.
+    /// Returns the metric at `x`, which is evaluated when it is first used there.
+    #[inline]
+    fn metric_at<'a, D: Scalar>(
+        &'a self,
+        x: &'a ChartPoint<Self::Manifold, D>,
+    ) -> MetricAt<'a, Self::Manifold, Self::Metric, D> {
+        MetricAt::new(self.metric(), x)
+    }
+
+    /// Returns the arguments of the bracket: the metric `g` at a point, and the covector `s` of the entropy there.
     #[inline]
     fn bracket_args<'a, D: Scalar>(
         &'a self,
-        x: &'a ChartPoint<Self::Manifold, D>,
+        g: &'a MetricAt<'a, Self::Manifold, Self::Metric, D>,
         s: &'a Vector<Self::Manifold, D>,
     ) -> BracketArgs<'a, Self::Manifold, Self::Metric, D> {
-        BracketArgs { space: self.manifold(), metric: self.metric(), x, s }
+        BracketArgs { space: self.manifold(), g, s }
     }
 }
 

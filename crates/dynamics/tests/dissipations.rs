@@ -8,8 +8,8 @@ use metriplectic_dynamics::{
 };
 use metriplectic_fields::{ChartPoint, Column, Dimension, Real, Space, Square, Vector};
 use metriplectic_manifolds::{
-    Canonical, Euclidean, HalfLine, LieAlgebra, LieDual, Manifold, Metric, Product, Riemannian,
-    Rotations, Sphere,
+    Canonical, Euclidean, HalfLine, LieAlgebra, LieDual, Manifold, Metric, MetricAt, Product,
+    Riemannian, Rotations, Sphere,
 };
 use nalgebra::{
     Matrix3, Matrix4, Matrix5, Matrix6, SMatrix, SVector, Vector3, Vector5, Vector6, matrix, vector,
@@ -64,7 +64,7 @@ fn keeps_the_laws<Y: Metriplectic>(
 ) -> Result<(), TestCaseError> {
     let size = |w: &Vector<Y::Manifold>| {
         let at = ChartPoint::<Y::Manifold>::centre(x);
-        system.dissipation().tensor(system.metric(), &at, w).expect("K exists").max_abs()
+        system.dissipation().tensor(&system.metric_at(&at), w).expect("K exists").max_abs()
     };
     let other = |k| size(&(Vector::<Y::Manifold>::basis(k) * w.magnitude()));
     let largest = (0..<Y::Manifold as Space>::Dim::LEN).map(other).fold(0.0, f64::max);
@@ -80,7 +80,9 @@ fn agree<M: Manifold, G: Riemannian<M>>(
     w: &Vector<M>,
     a: &Vector<M>,
 ) -> Result<(), TestCaseError> {
-    let (l, r) = (left.linearise(metric, x, w, a), right.linearise(metric, x, w, a));
+    let x = ChartPoint::<M>::centre(x);
+    let g = MetricAt::new(metric, &x);
+    let (l, r) = (left.linearise(&g, w, a), right.linearise(&g, w, a));
     let (l, r) = (l.expect("K exists"), r.expect("K exists"));
     let error = (l.value - r.value).magnitude();
     let bound = 1e-13 * (1.0 + w.magnitude().powi(2)) * (1.0 + a.magnitude());
@@ -230,7 +232,7 @@ proptest! {
             move |_: &SVector<Real, 4>| m.cast::<Real>(),
         );
         let x = ChartPoint::<Euclidean<4>>::centre(&w);
-        let value = beta.dot(&product.apply(&Canonical, &x, &w, &a).unwrap());
+        let value = beta.dot(&product.apply(&MetricAt::new(&Canonical, &x), &w, &a).unwrap());
         let expected = bracket(&a, &w, &beta, &w);
         let scale = s.norm() * m.norm() * w.norm_squared() * a.norm() * beta.norm();
         prop_assert!((value - expected).abs() <= 1e-14 * scale);
@@ -272,7 +274,7 @@ proptest! {
         let turned = se3.algebra().bracket(&xi, &dc);
         prop_assert!((k.force(&xi, &dc) - kappa * turned).norm() <= 1e-13 * kappa.norm() * (1.0 + turned.norm()));
         let x = ChartPoint::<LieDual<6>>::centre(&xi);
-        let rate = dc.dot(&k.apply(&Canonical, &x, &xi, &dc).unwrap());
+        let rate = dc.dot(&k.apply(&MetricAt::new(&Canonical, &x), &xi, &dc).unwrap());
         let expected = turned.dot(&(kappa * turned));
         prop_assert!((rate - expected).abs() <= 1e-13 * kappa.norm() * (xi.norm() * dc.norm()).powi(2));
     }
@@ -324,8 +326,8 @@ proptest! {
         let x = ChartPoint::<Rotations, _> { base, q: nested(&(q * 0.3), 0.1) };
         let (w, a) = (nested(&w, 0.7), nested(&a, -0.4));
         let k = annihilates_on_rotations();
-        let lifted = k.apply(&Canonical, &x, &w, &a).unwrap();
-        let defined = MetricDissipation.apply(&Canonical, &x, &w, &a).unwrap();
+        let lifted = k.apply(&MetricAt::new(&Canonical, &x), &w, &a).unwrap();
+        let defined = MetricDissipation.apply(&MetricAt::new(&Canonical, &x), &w, &a).unwrap();
         for i in 0..3 {
             let (l, d): (Dual<Dual64>, Dual<Dual64>) = (lifted[i], defined[i]);
             for (l, d) in [(l.re.re, d.re.re), (l.re.eps, d.re.eps), (l.eps.re, d.eps.re), (l.eps.eps, d.eps.eps)] {

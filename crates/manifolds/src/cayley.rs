@@ -4,7 +4,6 @@ use metriplectic_fields::{ChartPoint, Column, Scalar, Space};
 use nalgebra::{Matrix3, Vector3};
 
 use crate::metric::{MetricError, stretched};
-use crate::retraction::jet_by_dual_numbers;
 use crate::rotation_vector::{dexp_inverse, hat, orthogonal};
 use crate::{Nodes, PointPair, Retraction, Riemannian, Rotations, StepPath, StepPathJet, Tangent};
 
@@ -49,6 +48,18 @@ impl<G: Riemannian<Rotations>> Retraction<Rotations, G> for Cayley {
         Ok(StepPath { z, d, end: turned(&middle, &half) })
     }
 
+    #[inline]
+    fn real_step_path(
+        &self,
+        _: &G,
+        x: &Matrix3<f64>,
+        u: &Vector3<f64>,
+    ) -> Result<StepPath<Rotations>, MetricError> {
+        let half = u * 0.5;
+        let z = turned(x, &half);
+        Ok(StepPath { z: ChartPoint::centre(&z), d: *u, end: turned(&z, &half) })
+    }
+
     fn end(&self, _: &G, x: &Matrix3<f64>, u: &Vector3<f64>) -> Result<Matrix3<f64>, MetricError> {
         let half = u * 0.5;
         Ok(turned(&turned(x, &half), &half))
@@ -66,13 +77,22 @@ impl<G: Riemannian<Rotations>> Retraction<Rotations, G> for Cayley {
         })
     }
 
+    /// `cay(a)` turns its body by `B(a) δa` for a change `δa`, `B(a) = (1 − â/2)/(1 + |a|²/4)`. With `a = u/2`:
+    /// `∂z = ½B`, `∂x' = ½(cay(a)ᵀ + 1) B`, and `∂d = 1 − ½û ∂z`, because the chart at `z` reads the body velocity
+    /// `u` at `q` as `u + ½q × u + …`.
+    #[inline]
     fn step_path_jet(
         &self,
         metric: &G,
         x: &Matrix3<f64>,
         u: &Vector3<f64>,
     ) -> Result<StepPathJet<Rotations>, MetricError> {
-        jet_by_dual_numbers(self, metric, x, u)
+        let StepPath { z, d, end } = self.real_step_path(metric, x, u)?;
+        let half = u * 0.5;
+        let one = Matrix3::identity();
+        let dz = (one - hat(&half) * 0.5) * (0.5 / (1.0 + 0.25 * half.norm_squared()));
+        let dend = (cayley(&half).transpose() + one) * dz;
+        Ok(StepPathJet { z: z.base, dz, d, dd: one - hat(u) * dz * 0.5, end, dend })
     }
 
     fn pair(

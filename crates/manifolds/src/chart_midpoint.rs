@@ -195,7 +195,6 @@ pub(crate) fn line_at<M: Manifold>(x: &M::Point<f64>, u: &Vector<M>, t: f64) -> 
 mod tests {
     use super::*;
     use crate::{Canonical, Euclidean, HalfLine, Product, Rotations, Sphere, laws};
-    use metriplectic_fields::Space as _;
     use proptest::prelude::*;
     use rand::SeedableRng;
     use rand::rngs::ChaCha8Rng;

@@ -3,14 +3,14 @@
 use std::fmt;
 
 use metriplectic_fields::{
-    ChartPoint, Column, Dimension, Matrix, MatrixField, Real, Scalar, Square, Vector,
+    ChartPoint, Column, Matrix, MatrixField, MatrixJet, Real, Scalar, Square, Vector,
 };
 
 use crate::chart_metric;
 use crate::geodesic;
 use crate::geodesic_jet::{self, GeodesicJet};
 use crate::metric::{Factored, GeodesicEnd, MetricError};
-use crate::{Manifold, Riemannian, StepPath, StepPathJet, shooting};
+use crate::{Manifold, MetricJet, Riemannian, Slopes, StepPath, StepPathJet, shooting};
 
 /// A metric given as a matrix field; see [`Metric::field`](crate::Metric::field).
 #[derive(Clone, Copy)]
@@ -115,8 +115,19 @@ impl<M: Manifold, F: MatrixField<M>> Riemannian<M> for FieldMetric<F> {
         geodesic::ACCURACY
     }
 
-    fn slopes(&self, x: &M::Point<f64>) -> Option<<M::Dim as Dimension>::Array<Matrix<M>>> {
+    #[inline]
+    fn volume_density<D: Scalar>(at: &Self::At<D>) -> Result<D, MetricError> {
+        at.root_determinant()
+    }
+
+    fn slopes(&self, x: &M::Point<f64>) -> Slopes<M> {
         Some(self.field.covariant_jet(x).slopes)
+    }
+
+    #[inline]
+    fn jet(&self, x: &M::Point<f64>) -> Result<MetricJet<M, Self>, MetricError> {
+        let MatrixJet { value, slopes } = self.field.covariant_jet(x);
+        Ok(MetricJet { at: Factored::new(value)?, slopes: Some(slopes) })
     }
 }
 

@@ -1,11 +1,11 @@
 //! Metrics that are constant in a global chart: their geodesics are straight lines.
 
-use metriplectic_fields::{ChartPoint, Dimension, Matrix, Real, Scalar, Space, Square, Vector};
+use metriplectic_fields::{ChartPoint, Matrix, Real, Scalar, Space, Square, Vector};
 use nalgebra::{Const, SMatrix};
 
 use crate::metric::{Factored, GeodesicEnd, MetricError, stretched};
 use crate::metric_error::finite_column;
-use crate::{Canonical, Riemannian, StepPath, StepPathJet};
+use crate::{Canonical, Riemannian, Slopes, StepPath, StepPathJet};
 
 /// A manifold whose charts are global and linear: straight lines are the geodesics of every metric
 /// that is constant in them.
@@ -63,7 +63,7 @@ macro_rules! straight_geodesics {
             Ok(StepPathJet::straight(x, d))
         }
 
-        fn slopes(&self, _: &M::Point<f64>) -> Option<<M::Dim as Dimension>::Array<Matrix<M>>> {
+        fn slopes(&self, _: &M::Point<f64>) -> Slopes<M> {
             None
         }
     };
@@ -82,7 +82,7 @@ impl<M: Flat> Riemannian<M> for Canonical {
     }
 
     #[inline]
-    fn volume_density<D: Scalar>(&self, _: &ChartPoint<M, D>) -> Result<D, MetricError> {
+    fn volume_density<D: Scalar>(_: &Self) -> Result<D, MetricError> {
         Ok(D::one())
     }
 
@@ -112,6 +112,11 @@ impl<M: Flat + Space<Dim = Const<N>>, const N: usize> Riemannian<M> for Constant
 
     fn matrix<D: Scalar>(&self, _: &ChartPoint<M, D>) -> SMatrix<D, N, N> {
         SMatrix::from_entries(|i, j| D::from(self.factored.g[(i, j)]))
+    }
+
+    #[inline]
+    fn volume_density<D: Scalar>(at: &Self::At<D>) -> Result<D, MetricError> {
+        at.root_determinant()
     }
 
     straight_geodesics!();

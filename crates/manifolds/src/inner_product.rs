@@ -2,7 +2,7 @@
 
 use metriplectic_fields::{Column, Dimension, Scalar, Square};
 
-use crate::metric_error::MetricError;
+use crate::metric_error::{MetricError, finite};
 
 /// The metric at one point: an inner product `G(u, v) = uᵀ g v` on tangent vectors, factored as
 /// `g = L Lᵀ`.
@@ -68,6 +68,16 @@ impl<N: Dimension, D: Scalar> Factored<N, D> {
         symmetric(&g)?;
         let l = g.cholesky()?;
         Ok(Self { g, l })
+    }
+
+    /// Computes `√det g`, the product of the pivots of `L`.
+    ///
+    /// # Errors
+    ///
+    /// [`MetricError::NotFinite`] if it is beyond the range of numbers.
+    pub(crate) fn root_determinant(&self) -> Result<D, MetricError> {
+        let pivots = (0..N::LEN).map(|i| self.l[(i, i)]);
+        finite("√det g", pivots.fold(D::one(), |product, pivot| product * pivot))
     }
 }
 

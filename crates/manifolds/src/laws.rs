@@ -144,7 +144,7 @@ pub fn metric<M: Manifold, G: Riemannian<M>>(
     let error = relative(orthonormal - square, square);
     BrokenLaw::unless("|L⁻¹♭v|² = G(v, v)", error, round_off::<M>(1.0) * condition::<M>(&g))?;
 
-    let volume = usable("g is positive", metric.volume_density(&centre))?;
+    let volume = usable("√det g is finite", G::volume_density(&at))?;
     let root = g.root_determinant().map_err(|_| BrokenLaw {
         law: "g is positive",
         size: f64::NAN,

@@ -19,6 +19,7 @@
 //! | [`metric_error`] | [`MetricError`]: errors of metrics and geodesics |
 //! | [`inner_product`] | [`InnerProduct`]: flat and sharp at one point; [`Canonical`] |
 //! | [`metric`] | [`Riemannian`]: norm, distance, geodesics |
+//! | [`metric_at`] | [`MetricAt`]: a metric at one point, evaluated once |
 //! | [`flat`] | metrics that are constant in a global chart, with straight geodesics: [`Metric::constant`] |
 //! | [`field_metric`] | a metric from a closure, with numerical geodesics: [`Metric::field`] |
 //! | [`product_metric`] | metrics on a product, factor by factor |
@@ -49,6 +50,7 @@ pub mod lie_algebra;
 pub mod lie_dual;
 pub mod manifold;
 pub mod metric;
+pub mod metric_at;
 pub mod metric_error;
 pub mod normal;
 #[cfg(feature = "argmin")]
@@ -78,6 +80,7 @@ pub use lie_algebra::{AlgebraError, LieAlgebra};
 pub use lie_dual::LieDual;
 pub use manifold::{Manifold, PointError};
 pub use metric::{GeodesicEnd, Riemannian};
+pub use metric_at::{MetricAt, MetricJet, Slopes};
 pub use metric_error::MetricError;
 pub use product::{Product, Times};
 pub use product_metric::Split;

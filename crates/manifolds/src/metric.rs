@@ -8,6 +8,7 @@ use metriplectic_fields::{
     ChartPoint, Column, Dimension, Matrix, Real, Scalar, Space, Square, Vector,
 };
 
+use crate::metric_at::{MetricJet, Slopes};
 use crate::metric_error::finite;
 use crate::step_path::{StepPath, StepPathJet};
 
@@ -161,18 +162,29 @@ pub trait Riemannian<M: Space> {
         Vector::<M>::zero()
     }
 
-    /// The density `√det g` of the volume form in the chart.
+    /// Computes the density `√det g` of the volume form in the chart, from the metric at a point.
     ///
     /// # Errors
     ///
-    /// [`MetricError`] if the matrix is not symmetric and positive.
-    fn volume_density<D: Scalar>(&self, x: &ChartPoint<M, D>) -> Result<D, MetricError> {
-        finite("√det g", self.matrix(x).root_determinant()?)
-    }
+    /// [`MetricError::NotFinite`] if it is beyond the range of numbers.
+    fn volume_density<D: Scalar>(at: &Self::At<D>) -> Result<D, MetricError>;
 
     /// The derivatives `∂g/∂qᵏ` at a real point; `None` for a metric that is constant by
     /// construction.
-    fn slopes(&self, x: &M::Point<f64>) -> Option<<M::Dim as Dimension>::Array<Matrix<M>>>;
+    fn slopes(&self, x: &M::Point<f64>) -> Slopes<M>;
+
+    /// Evaluates the metric at a real point together with its derivatives.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`at`](Self::at).
+    #[inline]
+    fn jet(&self, x: &M::Point<f64>) -> Result<MetricJet<M, Self>, MetricError>
+    where
+        Self: Sized,
+    {
+        Ok(MetricJet { at: self.at(&ChartPoint::centre(x))?, slopes: self.slopes(x) })
+    }
 }
 
 /// The vector `(t + ε₁ + ε₂) v`.

@@ -7,10 +7,13 @@ use metriplectic_fields::{ChartPoint, Dimension, Matrix, Real, Scalar, Space, Sq
 
 use crate::metric::GeodesicEnd;
 use crate::product::{Product, Times};
-use crate::{Canonical, InnerProduct, MetricError, Riemannian, StepPath, StepPathJet};
+use crate::{
+    Canonical, InnerProduct, MetricAt, MetricError, MetricJet, Riemannian, Slopes, StepPath,
+    StepPathJet,
+};
 
 /// A metric on a product that is the sum of one on each factor.
-pub trait Split<A: Space, B: Space> {
+pub trait Split<A: Times<B>, B: Space>: Riemannian<Product<A, B>> {
     /// The metric on the left factor.
     type Left: Riemannian<A>;
     /// The metric on the right factor.
@@ -18,9 +21,39 @@ pub trait Split<A: Space, B: Space> {
 
     /// The metric on each factor.
     fn halves(&self) -> (&Self::Left, &Self::Right);
+
+    /// The inner product on each factor.
+    fn inner_halves<D: Scalar>(at: &Self::At<D>) -> InnerHalves<A, B, Self, D>;
 }
 
-impl<A: Space, B: Space, G: Riemannian<A>, F: Riemannian<B>> Split<A, B> for (G, F) {
+/// The inner products of a product metric on the factors.
+pub type InnerHalves<A, B, G, D> = (
+    <<G as Split<A, B>>::Left as Riemannian<A>>::At<D>,
+    <<G as Split<A, B>>::Right as Riemannian<B>>::At<D>,
+);
+
+impl<'a, A: Times<B>, B: Space, G: Split<A, B>, D: Scalar> MetricAt<'a, Product<A, B>, G, D> {
+    /// Returns the metric of each factor at its part of the point.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`inner`](MetricAt::inner).
+    #[inline]
+    pub fn halves<'b>(
+        &self,
+        x: &'b ChartPoint<A, D>,
+        y: &'b ChartPoint<B, D>,
+    ) -> Result<(MetricAt<'b, A, G::Left, D>, MetricAt<'b, B, G::Right, D>), MetricError>
+    where
+        'a: 'b,
+    {
+        let (left, right) = self.metric.halves();
+        let (a, b) = G::inner_halves(self.inner()?);
+        Ok((MetricAt::known(left, x, a), MetricAt::known(right, y, b)))
+    }
+}
+
+impl<A: Times<B>, B: Space, G: Riemannian<A>, F: Riemannian<B>> Split<A, B> for (G, F) {
     type Left = G;
     type Right = F;
 
@@ -28,9 +61,14 @@ impl<A: Space, B: Space, G: Riemannian<A>, F: Riemannian<B>> Split<A, B> for (G,
     fn halves(&self) -> (&G, &F) {
         (&self.0, &self.1)
     }
+
+    #[inline]
+    fn inner_halves<D: Scalar>(at: &Self::At<D>) -> (G::At<D>, F::At<D>) {
+        (at.left, at.right)
+    }
 }
 
-impl<A: Space, B: Space> Split<A, B> for Canonical
+impl<A: Times<B>, B: Space> Split<A, B> for Canonical
 where
     Self: Riemannian<A> + Riemannian<B>,
 {
@@ -40,6 +78,13 @@ where
     #[inline]
     fn halves(&self) -> (&Self, &Self) {
         (self, self)
+    }
+
+    #[inline]
+    fn inner_halves<D: Scalar>(
+        at: &<Self as Riemannian<Product<A, B>>>::At<D>,
+    ) -> InnerHalves<A, B, Self, D> {
+        (at.left, at.right)
     }
 }
 
@@ -91,6 +136,20 @@ where
     }
 }
 
+/// The derivatives of a sum of metrics on the factors.
+fn of_factors<A: Times<B>, B: Space>(a: &Slopes<A>, b: &Slopes<B>) -> Slopes<Product<A, B>> {
+    if a.is_none() && b.is_none() {
+        return None;
+    }
+    let (left, right) = (Matrix::<A>::zeros(), Matrix::<B>::zeros());
+    let n = A::Dim::LEN;
+    Some(A::SumDim::array(|k| match (k < n, a, b) {
+        (true, Some(a), _) => Product::<A, B>::block(&a[k], &right),
+        (false, _, Some(b)) => Product::<A, B>::block(&left, &b[k - n]),
+        _ => Matrix::<Product<A, B>>::zeros(),
+    }))
+}
+
 /// The metric of a product, factor by factor.
 macro_rules! metric_of_the_factors {
     () => {
@@ -116,12 +175,10 @@ macro_rules! metric_of_the_factors {
             Product::<A, B>::block(&g.matrix(&a), &f.matrix(&b))
         }
 
-        fn volume_density<D: Scalar>(
-            &self,
-            x: &ChartPoint<Product<A, B>, D>,
-        ) -> Result<D, MetricError> {
-            let ((g, f), (a, b)) = (Split::<A, B>::halves(self), Product::parts(x));
-            Ok(g.volume_density(&a)? * f.volume_density(&b)?)
+        #[inline]
+        fn volume_density<D: Scalar>(at: &Self::At<D>) -> Result<D, MetricError> {
+            let left = <<Self as Split<A, B>>::Left as Riemannian<A>>::volume_density(&at.left)?;
+            Ok(left * <<Self as Split<A, B>>::Right as Riemannian<B>>::volume_density(&at.right)?)
         }
 
         fn exp<D: Scalar>(
@@ -211,22 +268,20 @@ macro_rules! metric_of_the_factors {
             )
         }
 
-        fn slopes(
-            &self,
-            x: &(A::Point<f64>, B::Point<f64>),
-        ) -> Option<<A::SumDim as Dimension>::Array<Matrix<Product<A, B>>>> {
+        fn slopes(&self, x: &(A::Point<f64>, B::Point<f64>)) -> Slopes<Product<A, B>> {
             let (g, f) = Split::<A, B>::halves(self);
             let (a, b) = (Riemannian::<A>::slopes(g, &x.0), Riemannian::<B>::slopes(f, &x.1));
-            if a.is_none() && b.is_none() {
-                return None;
-            }
-            let (left, right) = (Matrix::<A>::zeros(), Matrix::<B>::zeros());
-            let n = A::Dim::LEN;
-            Some(A::SumDim::array(|k| match (k < n, &a, &b) {
-                (true, Some(a), _) => Product::<A, B>::block(&a[k], &right),
-                (false, _, Some(b)) => Product::<A, B>::block(&left, &b[k - n]),
-                _ => Matrix::<Product<A, B>>::zeros(),
-            }))
+            of_factors::<A, B>(&a, &b)
+        }
+
+        fn jet(
+            &self,
+            x: &(A::Point<f64>, B::Point<f64>),
+        ) -> Result<MetricJet<Product<A, B>, Self>, MetricError> {
+            let (g, f) = Split::<A, B>::halves(self);
+            let (a, b) = (Riemannian::<A>::jet(g, &x.0)?, Riemannian::<B>::jet(f, &x.1)?);
+            let at = Block { left: a.at, right: b.at, factors: PhantomData };
+            Ok(MetricJet { at, slopes: of_factors::<A, B>(&a.slopes, &b.slopes) })
         }
     };
 }

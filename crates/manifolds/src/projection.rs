@@ -1,12 +1,11 @@
 //! The symmetric projection retraction of the spheres.
 
 use metriplectic_fields::{ChartPoint, Column, Scalar, Space};
-use nalgebra::SVector;
+use nalgebra::{SMatrix, SVector};
 use num_dual::Dual;
 
 use crate::metric::{MetricError, stretched};
 use crate::metric_error::{finite_column, within};
-use crate::retraction::jet_by_dual_numbers;
 use crate::sphere::{angle, components, frame, normalised, spread};
 use crate::{Nodes, PointPair, Retraction, Riemannian, Sphere, StepPath, StepPathJet, Tangent};
 
@@ -46,6 +45,25 @@ impl<D: Scalar, const A: usize> Ambient<D, A> {
     }
 }
 
+/// The path at real points with `E = E(x)`, `s` and `c = 1/√(1+s)`, for its derivatives along `u`.
+///
+/// With `δU = E`, `δs = u/2` and `δc = −½c³δs`, and without the parts along `z` and `x'` that the frames there
+/// leave out: `∂z = ½c E`, `∂d = c E − (c x + ¼c² d) uᵀ` and `∂x' = (E − ½x uᵀ)/(1 + s)`.
+struct Parts<const A: usize, const N: usize> {
+    e: SMatrix<f64, A, N>,
+    ambient: Ambient<f64, A>,
+    s: f64,
+    c: f64,
+}
+
+impl<const A: usize, const N: usize> Parts<A, N> {
+    #[inline]
+    fn new(x: &SVector<f64, A>, u: &SVector<f64, N>) -> Self {
+        let (e, s) = (frame::<A, N>(x), 0.25 * u.norm_squared());
+        Self { e, ambient: Ambient::new(x, &(e * u)), s, c: (1.0 + s).sqrt().recip() }
+    }
+}
+
 macro_rules! projection {
     ($n:literal in $a:literal) => {
         impl<G: Riemannian<Sphere<$n>>> Retraction<Sphere<$n>, G> for Projection {
@@ -61,6 +79,19 @@ macro_rules! projection {
                 let q = Sphere::<$n>::coordinates(&base, &ambient.z.zip_map(&ambient.d, Dual::new));
                 let z = ChartPoint { base, q: q.map(|q| q.re) };
                 Ok(StepPath { z, d: q.map(|q| q.eps), end: normalised(&ambient.end) })
+            }
+
+            #[inline]
+            fn real_step_path(
+                &self,
+                _: &G,
+                x: &SVector<f64, $a>,
+                u: &SVector<f64, $n>,
+            ) -> Result<StepPath<Sphere<$n>>, MetricError> {
+                let ambient = Ambient::new(x, &(frame::<$a, $n>(x) * u));
+                let z = normalised(&ambient.z);
+                let d = frame::<$a, $n>(&z).tr_mul(&ambient.d);
+                Ok(StepPath { z: ChartPoint::centre(&z), d, end: normalised(&ambient.end) })
             }
 
             fn end(
@@ -85,13 +116,28 @@ macro_rules! projection {
                 })
             }
 
+            #[inline]
             fn step_path_jet(
                 &self,
-                metric: &G,
+                _: &G,
                 x: &SVector<f64, $a>,
                 u: &SVector<f64, $n>,
             ) -> Result<StepPathJet<Sphere<$n>>, MetricError> {
-                jet_by_dual_numbers(self, metric, x, u)
+                let Parts { e, ambient, s, c } = Parts::<$a, $n>::new(x, u);
+                let (z, end) = (normalised(&ambient.z), normalised(&ambient.end));
+                let (at_z, at_end) = (frame::<$a, $n>(&z), frame::<$a, $n>(&end));
+                let (turn, along_x) = (at_z.tr_mul(&e), at_z.tr_mul(x));
+                let d = at_z.tr_mul(&ambient.d);
+                let lean = along_x * c + d * (0.25 * c * c);
+                Ok(StepPathJet {
+                    z,
+                    dz: turn * (0.5 * c),
+                    d,
+                    dd: turn * c - lean * u.transpose(),
+                    end,
+                    dend: (at_end.tr_mul(&e) - at_end.tr_mul(x) * (u * 0.5).transpose())
+                        / (1.0 + s),
+                })
             }
 
             fn pair(

@@ -1,8 +1,7 @@
 //! Retractions, which map a tangent vector to a pair of points.
 
 use approx::{AbsDiffEq, RelativeEq};
-use metriplectic_fields::{Column, Dimension, Matrix, Real, Scalar, Space, Square, Vector};
-use num_dual::Dual64;
+use metriplectic_fields::{Column, Real, Scalar, Space, Vector};
 
 use crate::{Manifold, MetricError, Riemannian};
 
@@ -178,35 +177,6 @@ impl<M: Manifold> RelativeEq for Tangent<M> {
         M::entries(&self.base).relative_eq(&M::entries(&other.base), epsilon, max_relative)
             && self.vector.relative_eq(&other.vector, epsilon, max_relative)
     }
-}
-
-/// The derivatives of a path by its definition: one dual number for each direction.
-pub(crate) fn jet_by_dual_numbers<M: Manifold, G: Riemannian<M>>(
-    retraction: &impl Retraction<M, G>,
-    metric: &G,
-    x: &M::Point<f64>,
-    u: &Vector<M>,
-) -> Result<StepPathJet<M>, MetricError> {
-    let along = |k| {
-        let part = |i| if i == k { 1.0 } else { 0.0 };
-        let seeded = Vector::<M, Dual64>::from_index(|i| Dual64::new(u[i], part(i)));
-        retraction.step_path(metric, x, &seeded)
-    };
-    let (mut path, zero) = (along(0)?, Matrix::<M>::zeros());
-    let (z, d, end) = (path.z.base.clone(), path.d.real(), M::real(&path.end));
-    let mut jet = StepPathJet::<M> { z, dz: zero, d, dd: zero, end, dend: zero };
-    for k in 0..M::Dim::LEN {
-        if k > 0 {
-            path = along(k)?;
-        }
-        let moved = M::coordinates(&jet.end, &path.end);
-        for i in 0..M::Dim::LEN {
-            jet.dz[(i, k)] = path.z.q[i].eps;
-            jet.dd[(i, k)] = path.d[i].eps;
-            jet.dend[(i, k)] = moved[i].eps;
-        }
-    }
-    Ok(jet)
 }
 
 /// The middle of two vectors' components, for the inverse of a midpoint rule.

@@ -39,7 +39,7 @@ use std::f64::consts::PI;
 
 use metriplectic_fields::series::stumpff;
 use metriplectic_fields::{
-    ChartPoint, Column, Dimension, MatrixJet, Real, Scalar, Space, Square, product_rule,
+    ChartPoint, Column, MatrixJet, Real, Scalar, Space, Square, product_rule,
 };
 use nalgebra::{Const, Matrix3, SMatrix, Vector3, Vector4};
 use num_dual::Dual;
@@ -50,7 +50,7 @@ use crate::metric_error::{finite, finite_column, within};
 use crate::normal::Normal;
 use crate::rotation_vector::{moved, orthogonal, product, quaternion, rodrigues, spun, turn};
 use crate::sphere::along;
-use crate::{Canonical, Manifold, PointError, Riemannian, StepPath, StepPathJet};
+use crate::{Canonical, Manifold, PointError, Riemannian, Slopes, StepPath, StepPathJet};
 
 pub use crate::rotation_vector::{dexp, dexp_inverse, exp, hat, log, vee};
 
@@ -318,8 +318,8 @@ impl Riemannian<Rotations> for Canonical {
     }
 
     #[inline]
-    fn volume_density<D: Scalar>(&self, x: &ChartPoint<Rotations, D>) -> Result<D, MetricError> {
-        Ok(Normal::at(&x.q, CURVATURE).volume_density())
+    fn volume_density<D: Scalar>(at: &Normal<D, 3>) -> Result<D, MetricError> {
+        Ok(at.volume_density())
     }
 
     fn exp<D: Scalar>(
@@ -384,7 +384,7 @@ impl Riemannian<Rotations> for Canonical {
         Ok(Rotations::line_jet(x, d))
     }
 
-    fn slopes(&self, _: &Matrix3<f64>) -> Option<<Const<3> as Dimension>::Array<Matrix3<f64>>> {
+    fn slopes(&self, _: &Matrix3<f64>) -> Slopes<Rotations> {
         // In normal coordinates the metric is constant to first order.
         None
     }

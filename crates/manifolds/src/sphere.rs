@@ -39,9 +39,7 @@
 use std::f64::consts::PI;
 
 use metriplectic_fields::series::{angle_over_sine, stumpff};
-use metriplectic_fields::{
-    ChartPoint, Column, Dimension, MatrixJet, Real, Scalar, Space, product_rule,
-};
+use metriplectic_fields::{ChartPoint, Column, MatrixJet, Real, Scalar, Space, product_rule};
 use nalgebra::{Const, SMatrix, SVector};
 use num_dual::{Dual, Dual64};
 use rand::{Rng, RngExt};
@@ -49,7 +47,7 @@ use rand::{Rng, RngExt};
 use crate::metric::{GeodesicEnd, MetricError};
 use crate::metric_error::{finite_column, within};
 use crate::normal::Normal;
-use crate::{Canonical, Manifold, Riemannian, StepPath, StepPathJet};
+use crate::{Canonical, Manifold, Riemannian, Slopes, StepPath, StepPathJet};
 
 /// The unit sphere `Sⁿ = { x ∈ Rⁿ⁺¹ : |x| = 1 }` for `n = 1 … 7`, with the round metric as its
 /// canonical one; see the [module](mod@crate::sphere).
@@ -361,11 +359,8 @@ macro_rules! sphere {
             }
 
             #[inline]
-            fn volume_density<D: Scalar>(
-                &self,
-                x: &ChartPoint<Sphere<$n>, D>,
-            ) -> Result<D, MetricError> {
-                Ok(Normal::at(&x.q, 1.0).volume_density())
+            fn volume_density<D: Scalar>(at: &Normal<D, $n>) -> Result<D, MetricError> {
+                Ok(at.volume_density())
             }
 
             fn exp<D: Scalar>(
@@ -447,10 +442,7 @@ macro_rules! sphere {
                 Ok(Sphere::<$n>::line_jet(x, d))
             }
 
-            fn slopes(
-                &self,
-                _: &SVector<f64, $a>,
-            ) -> Option<<Const<$n> as Dimension>::Array<SMatrix<f64, $n, $n>>> {
+            fn slopes(&self, _: &SVector<f64, $a>) -> Slopes<Sphere<$n>> {
                 // In normal coordinates the metric is constant to first order.
                 None
             }

@@ -45,7 +45,7 @@ impl<M: Manifold, G: Riemannian<M>, F: MatrixField<M>> Bracket<M, G> for FieldPo
         at: &BracketArgs<'_, M, G>,
         alpha: &Vector<M>,
     ) -> Result<BracketJet<M>, MetricError> {
-        let jet = self.field.contravariant_jet(&at.x.point());
+        let jet = self.field.contravariant_jet(&at.g.x.point());
         let (value, along_z) = (jet.value * *alpha, along_slopes::<M>(&jet.slopes, alpha));
         Ok(BracketJet { value, along_z, along_s: Matrix::<M>::zeros(), tensor: jet.value })
     }
@@ -57,14 +57,14 @@ impl<M: Manifold, G: Riemannian<M>, F: MatrixField<M>> Bracket<M, G> for FieldPo
 
 impl<F> FieldPoisson<F> {
     /// The matrix in the frame of the chart.
-    fn tensor_at<M: Manifold, G, D: Scalar>(
+    fn tensor_at<M: Manifold, G: Riemannian<M>, D: Scalar>(
         &self,
         at: &BracketArgs<'_, M, G, D>,
     ) -> Result<Matrix<M, D>, MetricError>
     where
         F: MatrixField<M>,
     {
-        M::contravariant(at.x, &self.field.at(&at.x.point()))
-            .ok_or_else(|| MetricError::out_of_chart(at.x))
+        M::contravariant(at.g.x, &self.field.at(&at.g.x.point()))
+            .ok_or_else(|| MetricError::out_of_chart(at.g.x))
     }
 }

@@ -25,7 +25,7 @@ impl<const N: usize, G: Riemannian<LieDual<N>>> Bracket<LieDual<N>, G> for LiePo
         at: &BracketArgs<'_, LieDual<N>, G, D>,
         alpha: &SVector<D, N>,
     ) -> Result<SVector<D, N>, MetricError> {
-        Ok(at.space.algebra().coadjoint(alpha, &at.x.point()))
+        Ok(at.space.algebra().coadjoint(alpha, &at.g.x.point()))
     }
 
     #[inline]
@@ -34,7 +34,7 @@ impl<const N: usize, G: Riemannian<LieDual<N>>> Bracket<LieDual<N>, G> for LiePo
         at: &BracketArgs<'_, LieDual<N>, G>,
         alpha: &SVector<f64, N>,
     ) -> Result<BracketJet<LieDual<N>>, MetricError> {
-        Ok(coadjoint_jet(at.space.algebra(), alpha, &at.x.point()))
+        Ok(coadjoint_jet(at.space.algebra(), alpha, &at.g.x.point()))
     }
 }
 

@@ -6,7 +6,9 @@ use std::fmt;
 use metriplectic_fields::{
     ChartPoint, Column, Dimension, Matrix, Scalar, ScalarField, Space, Square, Vector, differential,
 };
-use metriplectic_manifolds::{InnerProduct, Manifold, MetricError, Riemannian, Rotations, Sphere};
+use metriplectic_manifolds::{
+    InnerProduct, Manifold, MetricAt, MetricError, Riemannian, Rotations, Sphere,
+};
 use nalgebra::Const;
 
 use super::{Bracket, BracketArgs, BracketJet, NaturalBracket, Zero};
@@ -255,14 +257,13 @@ fn cross<M: Space, D: Scalar>(rows: &Rows<M, D>) -> Vector<M, D> {
 /// The derivative of `ln(1/√det g)` along the chart at its centre, `−½ tr(g⁻¹ ∂_k g)`.
 #[inline]
 fn density_slope<M: Manifold, G: Riemannian<M>>(
-    metric: &G,
-    x: &ChartPoint<M>,
+    g: &MetricAt<'_, M, G>,
 ) -> Result<Vector<M>, MetricError> {
     let mut slope = Vector::<M>::zero();
-    let Some(slopes) = metric.slopes(&x.base) else { return Ok(slope) };
-    let g = metric.at(x)?;
+    let Some(slopes) = g.slopes()? else { return Ok(slope) };
+    let inner = g.inner()?;
     for i in 0..M::Dim::LEN {
-        let row = g.sharp(&Vector::<M>::basis(i));
+        let row = inner.sharp(&Vector::<M>::basis(i));
         for k in 0..M::Dim::LEN {
             slope[k] -= 0.5 * (slopes[k] * row)[i];
         }
@@ -283,9 +284,10 @@ where
         at: &BracketArgs<'_, M, G, D>,
         alpha: &Vector<M, D>,
     ) -> Result<Vector<M, D>, MetricError> {
-        let density = self.factor.at(&at.x.point()) / at.metric.volume_density(at.x)?;
+        let x = at.g.x;
+        let density = self.factor.at(&x.point()) / at.g.volume_density()?;
         let mut rows = Const::<N>::array(|_| Vector::<M, D>::zero());
-        self.casimirs.covectors(at.x, at.s, &mut rows);
+        self.casimirs.covectors(x, at.s, &mut rows);
         rows[N - 2] = *alpha;
         Ok(cross::<M, D>(&rows) * density)
     }
@@ -296,12 +298,15 @@ where
         at: &BracketArgs<'_, M, G>,
         alpha: &Vector<M>,
     ) -> Result<BracketJet<M>, MetricError> {
-        let (volume, factor) = (at.metric.volume_density(at.x)?, self.factor.jet1(&at.x.base));
+        let x = &at.g.x.base;
+        // The derivatives first, so that the metric is evaluated once.
+        let density_slope = density_slope(at.g)?;
+        let (volume, factor) = (at.g.volume_density()?, self.factor.jet1(x));
         let density = factor.value / volume;
         let zero = Matrix::<M>::zeros();
         let (mut rows, mut slopes) =
             (Const::<N>::array(|_| Vector::<M>::zero()), Const::<N>::array(|_| zero));
-        self.casimirs.jets(&at.x.base, at.s, &mut rows, &mut slopes);
+        self.casimirs.jets(x, at.s, &mut rows, &mut slopes);
         rows[N - 2] = *alpha;
         // The determinant is linear in each row.
         let along = |row: usize, slope: &Matrix<M>| -> Matrix<M> {
@@ -312,7 +317,7 @@ where
             })
         };
         let (one, plain) = (<Matrix<M>>::one(), cross::<M, f64>(&rows));
-        let slope = density_slope(at.metric, at.x)? * density + factor.df * volume.recip();
+        let slope = density_slope * density + factor.df * volume.recip();
         let mut along_z = <Matrix<M> as Square<f64>>::outer(&plain, &slope);
         let moving = slopes.iter().enumerate().take(N - 2).skip(usize::from(C::ENTROPY));
         for (row, slope) in moving {

@@ -1,7 +1,7 @@
 //! The sum of two brackets, on a product.
 
 use metriplectic_fields::{Matrix, Scalar, Vector};
-use metriplectic_manifolds::{Manifold, MetricError, Product, Riemannian, Split, Times};
+use metriplectic_manifolds::{Manifold, MetricError, Product, Split, Times};
 
 use super::{Bracket, BracketArgs, BracketJet, NaturalBracket, Zero};
 
@@ -14,7 +14,7 @@ impl<A, B, G, P, Q> Bracket<Product<A, B>, G> for (P, Q)
 where
     A: Manifold + Times<B>,
     B: Manifold,
-    G: Riemannian<Product<A, B>> + Split<A, B>,
+    G: Split<A, B>,
     P: Bracket<A, G::Left>,
     Q: Bracket<B, G::Right>,
 {
@@ -23,11 +23,11 @@ where
         at: &BracketArgs<'_, Product<A, B>, G, D>,
         alpha: &Vector<Product<A, B>, D>,
     ) -> Result<Vector<Product<A, B>, D>, MetricError> {
-        let ((x, y), (sx, sy)) = (Product::parts(at.x), Product::<A, B>::split(at.s));
-        let ((left, right), (a, b)) = (at.metric.halves(), Product::<A, B>::split(alpha));
+        let ((x, y), (sx, sy)) = (Product::parts(at.g.x), Product::<A, B>::split(at.s));
+        let ((left, right), (a, b)) = (at.g.halves(&x, &y)?, Product::<A, B>::split(alpha));
         let (m, n) = (&at.space.0, &at.space.1);
-        let a = self.0.apply(&BracketArgs { space: m, metric: left, x: &x, s: &sx }, &a)?;
-        let b = self.1.apply(&BracketArgs { space: n, metric: right, x: &y, s: &sy }, &b)?;
+        let a = self.0.apply(&BracketArgs { space: m, g: &left, s: &sx }, &a)?;
+        let b = self.1.apply(&BracketArgs { space: n, g: &right, s: &sy }, &b)?;
         Ok(Product::<A, B>::join(&a, &b))
     }
 
@@ -36,11 +36,11 @@ where
         at: &BracketArgs<'_, Product<A, B>, G>,
         alpha: &Vector<Product<A, B>>,
     ) -> Result<BracketJet<Product<A, B>>, MetricError> {
-        let ((x, y), (sx, sy)) = (Product::parts(at.x), Product::<A, B>::split(at.s));
-        let ((left, right), (a, b)) = (at.metric.halves(), Product::<A, B>::split(alpha));
+        let ((x, y), (sx, sy)) = (Product::parts(at.g.x), Product::<A, B>::split(at.s));
+        let ((left, right), (a, b)) = (at.g.halves(&x, &y)?, Product::<A, B>::split(alpha));
         let (m, n) = (&at.space.0, &at.space.1);
-        let a = self.0.linearise(&BracketArgs { space: m, metric: left, x: &x, s: &sx }, &a)?;
-        let b = self.1.linearise(&BracketArgs { space: n, metric: right, x: &y, s: &sy }, &b)?;
+        let a = self.0.linearise(&BracketArgs { space: m, g: &left, s: &sx }, &a)?;
+        let b = self.1.linearise(&BracketArgs { space: n, g: &right, s: &sy }, &b)?;
         Ok(joined(&a, &b))
     }
 
@@ -57,11 +57,11 @@ where
         at: &BracketArgs<'_, Product<A, B>, G, D>,
         w: &Vector<Product<A, B>, D>,
     ) -> Result<Vector<Product<A, B>, D>, MetricError> {
-        let ((x, y), (sx, sy)) = (Product::parts(at.x), Product::<A, B>::split(at.s));
-        let ((left, right), (a, b)) = (at.metric.halves(), Product::<A, B>::split(w));
+        let ((x, y), (sx, sy)) = (Product::parts(at.g.x), Product::<A, B>::split(at.s));
+        let ((left, right), (a, b)) = (at.g.halves(&x, &y)?, Product::<A, B>::split(w));
         let (m, n) = (&at.space.0, &at.space.1);
-        let a = self.0.force(&BracketArgs { space: m, metric: left, x: &x, s: &sx }, &a)?;
-        let b = self.1.force(&BracketArgs { space: n, metric: right, x: &y, s: &sy }, &b)?;
+        let a = self.0.force(&BracketArgs { space: m, g: &left, s: &sx }, &a)?;
+        let b = self.1.force(&BracketArgs { space: n, g: &right, s: &sy }, &b)?;
         Ok(Product::<A, B>::join(&a, &b))
     }
 
@@ -70,13 +70,11 @@ where
         at: &BracketArgs<'_, Product<A, B>, G>,
         w: &Vector<Product<A, B>>,
     ) -> Result<BracketJet<Product<A, B>>, MetricError> {
-        let ((x, y), (sx, sy)) = (Product::parts(at.x), Product::<A, B>::split(at.s));
-        let ((left, right), (a, b)) = (at.metric.halves(), Product::<A, B>::split(w));
+        let ((x, y), (sx, sy)) = (Product::parts(at.g.x), Product::<A, B>::split(at.s));
+        let ((left, right), (a, b)) = (at.g.halves(&x, &y)?, Product::<A, B>::split(w));
         let (m, n) = (&at.space.0, &at.space.1);
-        let a =
-            self.0.linearise_force(&BracketArgs { space: m, metric: left, x: &x, s: &sx }, &a)?;
-        let b =
-            self.1.linearise_force(&BracketArgs { space: n, metric: right, x: &y, s: &sy }, &b)?;
+        let a = self.0.linearise_force(&BracketArgs { space: m, g: &left, s: &sx }, &a)?;
+        let b = self.1.linearise_force(&BracketArgs { space: n, g: &right, s: &sy }, &b)?;
         Ok(joined(&a, &b))
     }
 

@@ -101,7 +101,7 @@ where
         at: &BracketArgs<'_, Product<Rotations, Euclidean<3>>, G, D>,
         alpha: &Vector6<D>,
     ) -> Result<Vector6<D>, MetricError> {
-        let (attitude, p) = Product::parts(at.x);
+        let (attitude, p) = Product::parts(at.g.x);
         let (along_q, omega) = Product::<Rotations, Euclidean<3>>::split(alpha);
         // Chart velocities are dexp⁻¹ Ω, so body covectors are dexp⁻ᵀ α.
         let from_body = dexp_inverse(&attitude.q);

@@ -1,7 +1,7 @@
 //! The dissipation of a form on a Lie algebra, which makes a Casimir grow.
 
-use metriplectic_fields::{ChartPoint, Scalar, Square};
-use metriplectic_manifolds::{LieAlgebra, LieDual, MetricError, Riemannian};
+use metriplectic_fields::{Scalar, Square};
+use metriplectic_manifolds::{LieAlgebra, LieDual, MetricAt, MetricError, Riemannian};
 use nalgebra::{DMatrix, SMatrix, SVector};
 
 use super::{Dissipation, DissipationJet};
@@ -89,8 +89,7 @@ impl<const N: usize, G: Riemannian<LieDual<N>>> Dissipation<LieDual<N>, G>
     #[inline]
     fn apply<D: Scalar>(
         &self,
-        _: &G,
-        _: &ChartPoint<LieDual<N>, D>,
+        _: &MetricAt<'_, LieDual<N>, G, D>,
         w: &SVector<D, N>,
         alpha: &SVector<D, N>,
     ) -> Result<SVector<D, N>, MetricError> {
@@ -100,8 +99,7 @@ impl<const N: usize, G: Riemannian<LieDual<N>>> Dissipation<LieDual<N>, G>
     #[inline]
     fn linearise(
         &self,
-        _: &G,
-        _: &SVector<f64, N>,
+        _: &MetricAt<'_, LieDual<N>, G>,
         w: &SVector<f64, N>,
         alpha: &SVector<f64, N>,
     ) -> Result<DissipationJet<LieDual<N>>, MetricError> {

@@ -2,8 +2,8 @@
 
 use std::fmt;
 
-use metriplectic_fields::{ChartPoint, Dimension, MatrixField, MatrixJet, Scalar, Vector};
-use metriplectic_manifolds::{Manifold, MetricError, Riemannian};
+use metriplectic_fields::{Dimension, MatrixField, MatrixJet, Scalar, Vector};
+use metriplectic_manifolds::{Manifold, MetricAt, MetricError, Riemannian};
 
 use super::kulkarni_nomizu::{form, jet};
 use super::{Dissipation, DissipationJet, turn};
@@ -49,24 +49,22 @@ impl<M: Manifold, G: Riemannian<M>, F: MatrixField<M>> Dissipation<M, G>
 {
     fn apply<D: Scalar>(
         &self,
-        _: &G,
-        x: &ChartPoint<M, D>,
+        g: &MetricAt<'_, M, G, D>,
         w: &Vector<M, D>,
         alpha: &Vector<M, D>,
     ) -> Result<Vector<M, D>, MetricError> {
-        let cometric = form(&self.0, x)?;
+        let cometric = form(&self.0, g.x)?;
         Ok(turn::<M, D>(&(cometric * *w), &(cometric * *alpha), w))
     }
 
     fn linearise(
         &self,
-        _: &G,
-        z: &M::Point<f64>,
+        g: &MetricAt<'_, M, G>,
         w: &Vector<M>,
         alpha: &Vector<M>,
     ) -> Result<DissipationJet<M>, MetricError> {
         // The Kulkarni-Nomizu product of G* with its own half.
-        let g = self.0.contravariant_jet(z);
+        let g = self.0.contravariant_jet(&g.x.base);
         let half = MatrixJet { value: g.value * 0.5, slopes: M::Dim::array(|k| g.slopes[k] * 0.5) };
         Ok(jet(&g, &half, w, alpha))
     }

@@ -5,7 +5,7 @@ use std::fmt;
 use metriplectic_fields::{
     ChartPoint, Column, Dimension, Factors, Form, Matrix, Real, Scalar, Square, Vector, Velocity,
 };
-use metriplectic_manifolds::{Manifold, MetricError, Riemannian};
+use metriplectic_manifolds::{Manifold, MetricAt, MetricError, Riemannian};
 
 use super::{Dissipation, DissipationJet};
 
@@ -65,11 +65,11 @@ where
 {
     fn apply<D: Scalar>(
         &self,
-        _: &G,
-        x: &ChartPoint<M, D>,
+        g: &MetricAt<'_, M, G, D>,
         w: &Vector<M, D>,
         alpha: &Vector<M, D>,
     ) -> Result<Vector<M, D>, MetricError> {
+        let x = g.x;
         let tensor = if D::NDERIV == 0 {
             let real = ChartPoint::<M> { base: x.base.clone(), q: x.q.real() };
             let tensor = self.real_tensor(&real, &w.real());
@@ -82,12 +82,11 @@ where
 
     fn linearise(
         &self,
-        _: &G,
-        z: &M::Point<f64>,
+        g: &MetricAt<'_, M, G>,
         w: &Vector<M>,
         alpha: &Vector<M>,
     ) -> Result<DissipationJet<M>, MetricError> {
-        let (zero, x) = (Matrix::<M>::zeros(), ChartPoint::centre(z));
+        let (zero, x) = (Matrix::<M>::zeros(), g.x);
         let mut jet = DissipationJet::<M> {
             value: Vector::<M>::zero(),
             along_z: zero,
@@ -97,7 +96,7 @@ where
         let real = Vector::<M, Real>::embed(alpha);
         let n = M::Dim::LEN;
         for k in 0..n {
-            let (x, w) = seeded::<M, f64>(&x, w, k, n + k);
+            let (x, w) = seeded::<M, f64>(x, w, k, n + k);
             let tensor = self.tensor_at(&x, &w).ok_or_else(|| MetricError::out_of_chart(&x))?;
             let column = tensor * real;
             for i in 0..n {

@@ -5,7 +5,7 @@ use std::fmt;
 use metriplectic_fields::{
     ChartPoint, Column, Dimension, Matrix, MatrixField, MatrixJet, Scalar, Square, Vector,
 };
-use metriplectic_manifolds::{Manifold, MetricError, Riemannian};
+use metriplectic_manifolds::{Manifold, MetricAt, MetricError, Riemannian};
 
 use super::{Dissipation, DissipationJet, turn};
 
@@ -57,22 +57,21 @@ where
 {
     fn apply<D: Scalar>(
         &self,
-        _: &G,
-        x: &ChartPoint<M, D>,
+        g: &MetricAt<'_, M, G, D>,
         w: &Vector<M, D>,
         alpha: &Vector<M, D>,
     ) -> Result<Vector<M, D>, MetricError> {
-        let (sigma, mu) = (form(&self.0, x)?, form(&self.1, x)?);
+        let (sigma, mu) = (form(&self.0, g.x)?, form(&self.1, g.x)?);
         Ok(product::<M, D>(&sigma, &mu, w, alpha))
     }
 
     fn linearise(
         &self,
-        _: &G,
-        z: &M::Point<f64>,
+        g: &MetricAt<'_, M, G>,
         w: &Vector<M>,
         alpha: &Vector<M>,
     ) -> Result<DissipationJet<M>, MetricError> {
+        let z = &g.x.base;
         Ok(jet(&self.0.contravariant_jet(z), &self.1.contravariant_jet(z), w, alpha))
     }
 }

@@ -1,7 +1,7 @@
 //! The dissipation built from the metric.
 
-use metriplectic_fields::{ChartPoint, Column, Dimension, Matrix, Scalar, Square, Vector};
-use metriplectic_manifolds::{InnerProduct, Manifold, MetricError, Riemannian};
+use metriplectic_fields::{Column, Dimension, Matrix, Scalar, Square, Vector};
+use metriplectic_manifolds::{InnerProduct, Manifold, MetricAt, MetricError, Riemannian};
 
 use super::{Dissipation, DissipationJet, Scaled, turn};
 
@@ -48,12 +48,11 @@ impl<M: Manifold, G: Riemannian<M>> Dissipation<M, G> for MetricDissipation {
     #[inline]
     fn apply<D: Scalar>(
         &self,
-        metric: &G,
-        x: &ChartPoint<M, D>,
+        g: &MetricAt<'_, M, G, D>,
         w: &Vector<M, D>,
         alpha: &Vector<M, D>,
     ) -> Result<Vector<M, D>, MetricError> {
-        let g = metric.at(x)?;
+        let g = g.inner()?;
         let w_hat = g.orthonormal(w);
         Ok(g.from_orthonormal(&turn::<M, D>(&w_hat, &g.orthonormal(alpha), &w_hat)))
     }
@@ -61,12 +60,12 @@ impl<M: Manifold, G: Riemannian<M>> Dissipation<M, G> for MetricDissipation {
     #[inline]
     fn linearise(
         &self,
-        metric: &G,
-        z: &M::Point<f64>,
+        g: &MetricAt<'_, M, G>,
         w: &Vector<M>,
         alpha: &Vector<M>,
     ) -> Result<DissipationJet<M>, MetricError> {
-        let g = metric.at(&ChartPoint::centre(z))?;
+        let along_z = slope_along_z(g, w, alpha)?;
+        let g = g.inner()?;
         let (w_hat, a_hat) = (g.orthonormal(w), g.orthonormal(alpha));
         let value = g.from_orthonormal(&turn::<M, f64>(&w_hat, &a_hat, &w_hat));
         let (w_sharp, a_sharp) = (g.from_orthonormal(&w_hat), g.from_orthonormal(&a_hat));
@@ -82,7 +81,6 @@ impl<M: Manifold, G: Riemannian<M>> Dissipation<M, G> for MetricDissipation {
                     2.0 * a_sharp[i] * w_sharp[j] - w_sharp[i] * a_sharp[j] - wa * cometric[i];
             }
         }
-        let along_z = slope_along_z::<M, G>(metric, z, w, alpha)?;
         Ok(DissipationJet { value, along_z, along_w, tensor })
     }
 
@@ -96,14 +94,13 @@ impl<M: Manifold, G: Riemannian<M>> Dissipation<M, G> for MetricDissipation {
 /// `∂_k (K_w α) = −(P·∂_k g P) A + (w·P) ∂_k A + (A·∂_k g P) P − (w·A) ∂_k P`.
 #[inline]
 fn slope_along_z<M: Manifold, G: Riemannian<M>>(
-    metric: &G,
-    z: &M::Point<f64>,
+    g: &MetricAt<'_, M, G>,
     w: &Vector<M>,
     alpha: &Vector<M>,
 ) -> Result<Matrix<M>, MetricError> {
     let mut slope = Matrix::<M>::zeros();
-    let Some(slopes) = metric.slopes(z) else { return Ok(slope) };
-    let g = metric.at(&ChartPoint::centre(z))?;
+    let Some(slopes) = g.slopes()? else { return Ok(slope) };
+    let g = g.inner()?;
     let (p, a) = (g.sharp(w), g.sharp(alpha));
     for k in 0..M::Dim::LEN {
         let (gp, ga) = (slopes[k] * p, slopes[k] * a);

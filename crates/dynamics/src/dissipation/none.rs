@@ -1,7 +1,7 @@
 //! No dissipation: a Hamiltonian system.
 
-use metriplectic_fields::{ChartPoint, Column, Matrix, Scalar, Square, Vector};
-use metriplectic_manifolds::{Manifold, MetricError, Riemannian};
+use metriplectic_fields::{Column, Matrix, Scalar, Square, Vector};
+use metriplectic_manifolds::{Manifold, MetricAt, MetricError, Riemannian};
 
 use super::{Dissipation, DissipationJet};
 
@@ -13,8 +13,7 @@ impl<M: Manifold, G: Riemannian<M>> Dissipation<M, G> for NoDissipation {
     #[inline]
     fn apply<D: Scalar>(
         &self,
-        _: &G,
-        _: &ChartPoint<M, D>,
+        _: &MetricAt<'_, M, G, D>,
         _: &Vector<M, D>,
         _: &Vector<M, D>,
     ) -> Result<Vector<M, D>, MetricError> {
@@ -24,8 +23,7 @@ impl<M: Manifold, G: Riemannian<M>> Dissipation<M, G> for NoDissipation {
     #[inline]
     fn linearise(
         &self,
-        _: &G,
-        _: &M::Point<f64>,
+        _: &MetricAt<'_, M, G>,
         _: &Vector<M>,
         _: &Vector<M>,
     ) -> Result<DissipationJet<M>, MetricError> {

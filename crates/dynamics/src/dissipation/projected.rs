@@ -2,8 +2,8 @@
 
 use std::fmt;
 
-use metriplectic_fields::{ChartPoint, Column, MatrixField, Scalar, Vector};
-use metriplectic_manifolds::{InnerProduct, Manifold, MetricError, Riemannian};
+use metriplectic_fields::{Column, MatrixField, Scalar, Vector};
+use metriplectic_manifolds::{InnerProduct, Manifold, MetricAt, MetricError, Riemannian};
 
 use super::Dissipation;
 use super::kulkarni_nomizu::form;
@@ -49,13 +49,12 @@ impl<M: Manifold, G: Riemannian<M>, F: MatrixField<M>> Dissipation<M, G>
 {
     fn apply<D: Scalar>(
         &self,
-        metric: &G,
-        x: &ChartPoint<M, D>,
+        g: &MetricAt<'_, M, G, D>,
         w: &Vector<M, D>,
         alpha: &Vector<M, D>,
     ) -> Result<Vector<M, D>, MetricError> {
-        let tensor = form(&self.0, x)?;
-        let sharp = metric.at(x)?.sharp(w);
+        let tensor = form(&self.0, g.x)?;
+        let sharp = g.inner()?.sharp(w);
         let square = w.dot(&sharp);
         if square.re() == 0.0 {
             return Ok(tensor * *alpha);

@@ -2,8 +2,8 @@
 
 use std::fmt;
 
-use metriplectic_fields::{ChartPoint, Matrix, Scalar, ScalarField, Square, Vector};
-use metriplectic_manifolds::{Manifold, MetricError, Riemannian};
+use metriplectic_fields::{Matrix, Scalar, ScalarField, Square, Vector};
+use metriplectic_manifolds::{Manifold, MetricAt, MetricError, Riemannian};
 
 use super::{Dissipation, DissipationJet};
 
@@ -30,23 +30,21 @@ where
     #[inline]
     fn apply<D: Scalar>(
         &self,
-        metric: &G,
-        x: &ChartPoint<M, D>,
+        g: &MetricAt<'_, M, G, D>,
         w: &Vector<M, D>,
         alpha: &Vector<M, D>,
     ) -> Result<Vector<M, D>, MetricError> {
-        Ok(self.1.apply(metric, x, w, alpha)? * self.0.at(&x.point()))
+        Ok(self.1.apply(g, w, alpha)? * self.0.at(&g.x.point()))
     }
 
     #[inline]
     fn linearise(
         &self,
-        metric: &G,
-        z: &M::Point<f64>,
+        g: &MetricAt<'_, M, G>,
         w: &Vector<M>,
         alpha: &Vector<M>,
     ) -> Result<DissipationJet<M>, MetricError> {
-        let (jet, kappa) = (self.1.linearise(metric, z, w, alpha)?, self.0.jet1(z));
+        let (jet, kappa) = (self.1.linearise(g, w, alpha)?, self.0.jet1(&g.x.base));
         Ok(DissipationJet {
             value: jet.value * kappa.value,
             along_z: jet.along_z * kappa.value + Matrix::<M>::outer(&jet.value, &kappa.df),

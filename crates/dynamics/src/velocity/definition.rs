@@ -1,9 +1,9 @@
 //! The velocity by its definition, at every scalar.
 
 use metriplectic_fields::{ChartPoint, Column, Scalar, Vector};
-use metriplectic_manifolds::{InnerProduct, MetricError, Riemannian};
+use metriplectic_manifolds::{InnerProduct, MetricAt, MetricError, Riemannian};
 
-use super::covectors::{Components, Covectors, Place, differentials};
+use super::covectors::{Components, Covectors, differentials};
 use super::plan::{CASIMIR, MOMENTUM, ProjectionPlan};
 use crate::bracket::Bracket;
 use crate::dissipation::Dissipation;
@@ -12,14 +12,17 @@ use crate::metriplectic::{Dim, Metriplectic, SecondLaw};
 use crate::orthogonal::Orthogonal;
 use crate::vector_field::VectorField;
 
+/// The metric of a system at a point, at a scalar.
+type At<'a, Y, D> = MetricAt<'a, <Y as Metriplectic>::Manifold, <Y as Metriplectic>::Metric, D>;
+
 impl<Y: Metriplectic + ?Sized> VectorField<Y::Manifold> for Y {
     fn velocity<D: Scalar>(
         &self,
         x: &ChartPoint<Y::Manifold, D>,
     ) -> Result<Vector<Y::Manifold, D>, MetricError> {
-        let w = differentials(self, x);
-        let reversible = self.bracket().apply(&self.bracket_args(x, &w.entropy), &w.energy)?;
-        Ok(reversible + irreversible(self, x, &w)?)
+        let (g, w) = (self.metric_at(x), differentials(self, x));
+        let reversible = self.bracket().apply(&self.bracket_args(&g, &w.entropy), &w.energy)?;
+        Ok(reversible + irreversible(self, &g, &w)?)
     }
 }
 
@@ -27,19 +30,19 @@ impl<Y: Metriplectic + ?Sized> VectorField<Y::Manifold> for Y {
 ///
 /// # Errors
 ///
-/// [`MetricError`] if the metric cannot be used at `x`.
+/// [`MetricError`] if the metric cannot be used at the point.
 #[inline]
 pub fn reversible<Y: Metriplectic + ?Sized, D: Scalar>(
     system: &Y,
-    x: &Place<Y, D>,
+    g: &At<'_, Y, D>,
     w: &Covectors<Dim<Y>, Components<Y, D>>,
 ) -> Result<Components<Y, D>, MetricError> {
     let annihilated = ProjectionPlan::of(system, w);
-    let bracket = |alpha: &_| system.bracket().apply(&system.bracket_args(x, &w.entropy), alpha);
+    let bracket = |alpha: &_| system.bracket().apply(&system.bracket_args(g, &w.entropy), alpha);
     if !annihilated.projected && !annihilated.momenta {
         return bracket(&w.energy);
     }
-    let g = system.metric().at(x)?;
+    let g = g.inner()?;
     if Y::Invariants::COUNT == 0 {
         // With the entropy alone, the same projections need no list.
         let w_hat = g.orthonormal(&w.entropy);
@@ -54,10 +57,10 @@ pub fn reversible<Y: Metriplectic + ?Sized, D: Scalar>(
     }
     let mut normals = Orthogonal::<Dim<Y>, D>::default();
     if annihilated.entropy {
-        normals.push(&g, &w.entropy);
+        normals.push(g, &w.entropy);
     }
     for c in w.of_kind(Kind::Casimir) {
-        normals.push(&g, c);
+        normals.push(g, c);
     }
     let mut a = if annihilated.projected {
         let alpha = normals.faded_covector(0, &w.energy, CASIMIR);
@@ -66,10 +69,10 @@ pub fn reversible<Y: Metriplectic + ?Sized, D: Scalar>(
         bracket(&w.energy)?
     };
     if annihilated.momenta {
-        normals.push(&g, &w.energy);
+        normals.push(g, &w.energy);
         let first = normals.len();
         for j in w.of_kind(Kind::Momentum) {
-            normals.push(&g, j);
+            normals.push(g, j);
         }
         a = normals.faded_vector(first, &a, MOMENTUM);
     }
@@ -80,48 +83,48 @@ pub fn reversible<Y: Metriplectic + ?Sized, D: Scalar>(
 ///
 /// # Errors
 ///
-/// [`MetricError`] if the metric cannot be used at `x`.
+/// [`MetricError`] if the metric cannot be used at the point.
 #[inline]
 pub fn irreversible<Y: Metriplectic + ?Sized, D: Scalar>(
     system: &Y,
-    x: &Place<Y, D>,
+    g: &At<'_, Y, D>,
     w: &Covectors<Dim<Y>, Components<Y, D>>,
 ) -> Result<Components<Y, D>, MetricError> {
-    let friction = friction(system, x, w)?;
-    if system.bracket().is_forced() { Ok(friction + force(system, x, w)?) } else { Ok(friction) }
+    let friction = friction(system, g, w)?;
+    if system.bracket().is_forced() { Ok(friction + force(system, g, w)?) } else { Ok(friction) }
 }
 
 /// The vector of the force, which conserves the further invariants.
 fn force<Y: Metriplectic + ?Sized, D: Scalar>(
     system: &Y,
-    x: &Place<Y, D>,
+    g: &At<'_, Y, D>,
     w: &Covectors<Dim<Y>, Components<Y, D>>,
 ) -> Result<Components<Y, D>, MetricError> {
-    let force = system.bracket().force(&system.bracket_args(x, &w.entropy), &w.energy)?;
+    let force = system.bracket().force(&system.bracket_args(g, &w.entropy), &w.energy)?;
     if Y::Invariants::COUNT == 0 {
         return Ok(force);
     }
-    let (g, mut normals) = (system.metric().at(x)?, Orthogonal::<Dim<Y>, D>::default());
-    normals.push(&g, &w.energy);
+    let (g, mut normals) = (g.inner()?, Orthogonal::<Dim<Y>, D>::default());
+    normals.push(g, &w.energy);
     if system.second_law() == SecondLaw::Exact {
-        normals.push(&g, &w.entropy);
+        normals.push(g, &w.entropy);
     }
     let listed = w.invariants.as_ref().iter().flatten();
-    Ok(listed.fold(force, |force, (_, l)| normals.without(&g, l, &force, MOMENTUM)))
+    Ok(listed.fold(force, |force, (_, l)| normals.without(g, l, &force, MOMENTUM)))
 }
 
 /// The vector `K̃ w_S`.
 #[inline]
 fn friction<Y: Metriplectic + ?Sized, D: Scalar>(
     system: &Y,
-    x: &Place<Y, D>,
+    g: &At<'_, Y, D>,
     w: &Covectors<Dim<Y>, Components<Y, D>>,
 ) -> Result<Components<Y, D>, MetricError> {
-    let k = |alpha: &_| system.dissipation().apply(system.metric(), x, &w.energy, alpha);
+    let k = |alpha: &_| system.dissipation().apply(g, &w.energy, alpha);
     if Y::Invariants::COUNT == 0 {
         return k(&w.entropy);
     }
-    let (normals, first) = orthogonal_to_energy::<Y, D>(&system.metric().at(x)?, w);
+    let (normals, first) = orthogonal_to_energy::<Y, D>(g.inner()?, w);
     Ok(normals.project_vector(first, &k(&normals.project_covector(first, &w.entropy))?))
 }
 

@@ -1,11 +1,9 @@
 //! The velocity with its derivatives along the unknown of a step.
 
-use metriplectic_fields::{
-    ChartPoint, Column, Dimension, Matrix, Space, Square, Vector, along_slopes,
-};
-use metriplectic_manifolds::{MetricError, Riemannian};
+use metriplectic_fields::{Column, Dimension, Matrix, Square, Vector, along_slopes};
+use metriplectic_manifolds::{MetricAt, MetricError, Riemannian};
 
-use super::covectors::{Covectors, Place};
+use super::covectors::Covectors;
 use super::plan::{CASIMIR, MOMENTUM, ProjectionPlan};
 use crate::bracket::Bracket;
 use crate::dissipation::Dissipation;
@@ -32,8 +30,8 @@ pub struct VelocityJet<N: Dimension> {
     pub rotation: f64,
 }
 
-/// Computes the velocity `Π̃ w_H + K̃ w_S` at a real point `z` with its derivatives along the unknown of a
-/// step, from the derivatives of the covectors and of the point, `∂z` in the chart at `z`.
+/// Computes the velocity `Π̃ w_H + K̃ w_S` at the real point `z` of the metric, the centre of its chart, with the
+/// derivatives along the unknown of a step, from those of the covectors and of the point, `∂z` in the chart at `z`.
 ///
 /// # Errors
 ///
@@ -41,34 +39,33 @@ pub struct VelocityJet<N: Dimension> {
 #[inline]
 pub fn velocity_jet<Y: Metriplectic + ?Sized>(
     system: &Y,
-    z: &<Y::Manifold as Space>::Point<f64>,
+    metric: &MetricAt<'_, Y::Manifold, Y::Metric>,
     dz: &Matrix<Y::Manifold>,
     w: &Covectors<Dim<Y>, WithJacobian<Dim<Y>>>,
 ) -> Result<VelocityJet<Dim<Y>>, MetricError> {
-    let (metric, centre) = (system.metric(), ChartPoint::<Y::Manifold>::centre(z));
     let slopes = if Y::Invariants::COUNT > 0 || ProjectionPlan::of(system, w).projected {
-        metric.slopes(z)
+        metric.slopes()?.as_ref()
     } else {
         None
     };
-    let dg_v = |v: &Vector<Y::Manifold>| match &slopes {
+    let dg_v = |v: &Vector<Y::Manifold>| match slopes {
         Some(slopes) => along_slopes::<Y::Manifold>(slopes, v) * *dz,
         None => Matrix::<Y::Manifold>::zeros(),
     };
-    let g = metric.at(&centre)?;
-    let at = Linearisation { system, z: &centre, dz, g: &g, dg_v: &dg_v, w };
+    let g = metric.inner()?;
+    let at = Linearisation { system, metric, dz, g, dg_v: &dg_v, w };
     let pi = at.reversible()?;
 
     let mut normals = OrthogonalJet::<Dim<Y>>::default();
     let mut first = 0;
     let mut alpha = w.entropy;
     if Y::Invariants::COUNT > 0 {
-        normals.push(&g, dg_v, &w.energy);
+        normals.push(g, dg_v, &w.energy);
         first = normals.len();
-        w.invariants.as_ref().iter().flatten().for_each(|(_, l)| normals.push(&g, dg_v, l));
+        w.invariants.as_ref().iter().flatten().for_each(|(_, l)| normals.push(g, dg_v, l));
         alpha = normals.project_covector(first, &alpha);
     }
-    let k = system.dissipation().linearise(metric, z, &w.energy.value, &alpha.value)?;
+    let k = system.dissipation().linearise(metric, &w.energy.value, &alpha.value)?;
     let slope = k.along_z * *dz + k.along_w * w.energy.slope + k.tensor * alpha.slope;
     let k_s = normals.project_vector(first, &WithJacobian { value: k.value, slope });
     let projection = normals.terms_of_vector(first, &k.value, MOMENTUM);
@@ -114,11 +111,11 @@ struct Part<N: Dimension> {
 /// Where the velocity of a system is linearised, along the unknown of a step.
 struct Linearisation<'a, Y: Metriplectic + ?Sized, F> {
     system: &'a Y,
-    /// The real point.
-    z: &'a Place<Y, f64>,
-    /// Its derivative.
+    /// The real point with the metric there.
+    metric: &'a MetricAt<'a, Y::Manifold, Y::Metric>,
+    /// The derivative of the point.
     dz: &'a Matrix<Y::Manifold>,
-    /// The metric there.
+    /// The inner product there.
     g: &'a <Y::Metric as Riemannian<Y::Manifold>>::At<f64>,
     /// The derivative of `g v`, for a fixed `v`.
     dg_v: &'a F,
@@ -134,10 +131,10 @@ where
     /// Linearises `Π̃ w_H`.
     #[inline]
     fn reversible(&self) -> Result<Part<Dim<Y>>, MetricError> {
-        let &Self { system, z, dz, g, dg_v, w } = self;
+        let &Self { system, metric, dz, g, dg_v, w } = self;
         let annihilated = ProjectionPlan::of(system, w);
         let bracket = |alpha: &WithJacobian<Dim<Y>>| {
-            let args = system.bracket_args(z, &w.entropy.value);
+            let args = system.bracket_args(metric, &w.entropy.value);
             let jet = system.bracket().linearise(&args, &alpha.value)?;
             let slope =
                 jet.along_z * *dz + jet.tensor * alpha.slope + jet.along_s * w.entropy.slope;
@@ -179,8 +176,8 @@ where
 
     /// Linearises the vector of a force.
     fn force(&self) -> Result<Part<Dim<Y>>, MetricError> {
-        let &Self { system, z, dz, g, dg_v, w } = self;
-        let args = system.bracket_args(z, &w.entropy.value);
+        let &Self { system, metric, dz, g, dg_v, w } = self;
+        let args = system.bracket_args(metric, &w.entropy.value);
         let jet = system.bracket().linearise_force(&args, &w.energy.value)?;
         let slope = jet.along_z * *dz + jet.tensor * w.energy.slope + jet.along_s * w.entropy.slope;
         let vector = WithJacobian { value: jet.value, slope };

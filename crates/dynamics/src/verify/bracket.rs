@@ -69,7 +69,8 @@ fn tensor<Y: Metriplectic + ?Sized, D: Scalar>(
     system: &Y,
     x: &ChartPoint<Y::Manifold, D>,
 ) -> Result<Matrix<Y::Manifold, D>, MetricError> {
-    system.bracket().tensor(&system.bracket_args(x, &differential(system.entropy(), x)))
+    let (g, ds) = (system.metric_at(x), differential(system.entropy(), x));
+    system.bracket().tensor(&system.bracket_args(&g, &ds))
 }
 
 /// Checks that `Π` is skew, satisfies the Jacobi identity, and has `S` as a Casimir.

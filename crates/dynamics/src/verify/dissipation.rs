@@ -22,13 +22,13 @@ pub(super) fn examine<Y: Metriplectic + ?Sized>(
     }
     let metric = unusable::<Y::Manifold>(x);
     let centre = ChartPoint::<Y::Manifold>::centre(x);
-    let (k, g) = (system.dissipation(), system.metric());
-    let jet = k.linearise(g, x, &energy.df, &entropy.df).map_err(&metric)?;
+    let (k, g) = (system.dissipation(), system.metric_at(&centre));
+    let jet = k.linearise(&g, &energy.df, &entropy.df).map_err(&metric)?;
     if !(jet.along_z.max_abs() + jet.along_w.max_abs()).is_finite() {
         let point = findings.point.clone();
         return Err(ModelError::DerivativeNotFinite { field: "dissipation", point });
     }
-    let tensor = k.tensor(g, &centre, &energy.df).map_err(&metric)?;
+    let tensor = k.tensor(&g, &energy.df).map_err(&metric)?;
     let size = balance::asymmetry::<Y::Manifold>(&tensor, 1.0, units, ROUNDING).relative();
     findings.note("Kᵀ = K", size, |point| ModelError::DissipationNotSymmetric { point, size });
     let size = balance::indefiniteness::<Y::Manifold>(&tensor, units);
@@ -36,7 +36,7 @@ pub(super) fn examine<Y: Metriplectic + ?Sized>(
     let size = balance::product::<Y::Manifold>(&tensor, &energy.df, units);
     findings.note("K dH = 0", size, |point| ModelError::EnergyNotKept { point, size });
     if let Some(w) = w {
-        let tensor = k.tensor(g, &centre, w).map_err(&metric)?;
+        let tensor = k.tensor(&g, w).map_err(&metric)?;
         if tensor.max_abs().is_finite() {
             let size = balance::product::<Y::Manifold>(&tensor, w, units);
             findings.note("K_w w = 0", size, |point| ModelError::CovectorNotAnnihilated {

@@ -15,10 +15,11 @@ pub(super) fn value_not_finite<Y: Metriplectic + ?Sized>(
 ) -> Option<ModelError> {
     let at = ChartPoint::<Y::Manifold>::centre(x);
     let ds = system.entropy().jet1(x).df;
-    let bracket = system.bracket().tensor(&system.bracket_args(&at, &ds));
+    let g = system.metric_at(&at);
+    let bracket = system.bracket().tensor(&system.bracket_args(&g, &ds));
     let dh = system.energy().jet1(x).df;
-    let force = system.bracket().force(&system.bracket_args(&at, &ds), &dh);
-    let dissipation = system.dissipation().tensor(system.metric(), &at, &dh);
+    let force = system.bracket().force(&system.bracket_args(&g, &ds), &dh);
+    let dissipation = system.dissipation().tensor(&g, &dh);
     let values = [
         ("energy", system.energy().at::<f64>(x)),
         ("entropy", system.entropy().at::<f64>(x)),

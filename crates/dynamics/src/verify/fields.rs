@@ -110,11 +110,13 @@ impl<Y: Metriplectic + ?Sized> Along<'_, '_, Y> {
             return Ok(());
         }
         let (alpha, centre) = (generic::<Y::Manifold>(units), ChartPoint::centre(x));
-        let jet = bracket.linearise(&system.bracket_args(&centre, &entropy.df), &alpha);
+        let g = system.metric_at(&centre);
+        let jet = bracket.linearise(&system.bracket_args(&g, &entropy.df), &alpha);
         let slopes = jet.map_err(unusable::<Y::Manifold>(x))?.along_z.column_at(self.axis);
         let value = |t, values: &mut Vec<f64>| {
             let at = self.at(t);
-            let column = bracket.apply(&system.bracket_args(&at, &entropy.df), &alpha).ok()?;
+            let g = system.metric_at(&at);
+            let column = bracket.apply(&system.bracket_args(&g, &entropy.df), &alpha).ok()?;
             append(values, &column)
         };
         let (scale, df, units) = (units[self.axis], components(&slopes), components(units));
@@ -123,15 +125,17 @@ impl<Y: Metriplectic + ?Sized> Along<'_, '_, Y> {
 
     fn dissipation(&self) -> Result<(), ModelError> {
         let &Place { system, x, units, ref energy, .. } = self.place;
-        let (k, metric) = (system.dissipation(), system.metric());
+        let k = system.dissipation();
         if k.is_none() {
             return Ok(());
         }
         let (alpha, w, axis) = (generic::<Y::Manifold>(units), energy.df, self.axis);
-        let jet = k.linearise(metric, x, &w, &alpha).map_err(unusable::<Y::Manifold>(x))?;
+        let centre = self.at(0.0);
+        let g = system.metric_at(&centre);
+        let jet = k.linearise(&g, &w, &alpha).map_err(unusable::<Y::Manifold>(x))?;
         let (scale, df) = (units[axis], components(&jet.along_z.column_at(axis)));
         let value = |t, values: &mut Vec<f64>| {
-            append(values, &k.apply(metric, &self.at(t), &w, &alpha).ok()?)
+            append(values, &k.apply(&system.metric_at(&self.at(t)), &w, &alpha).ok()?)
         };
         let along_z = Derivatives { scale, df, units: components(units), rounding: OF_SOLUTIONS };
         self.compare("dissipation", &along_z, value)?;
@@ -143,10 +147,10 @@ impl<Y: Metriplectic + ?Sized> Along<'_, '_, Y> {
         if scale == 0.0 {
             return Ok(());
         }
-        let (df, centre) = (components(&jet.along_w.column_at(axis)), self.at(0.0));
+        let df = components(&jet.along_w.column_at(axis));
         let value = |t, values: &mut Vec<f64>| {
             let w = w + Vector::<Y::Manifold>::basis(axis) * t;
-            append(values, &k.apply(metric, &centre, &w, &alpha).ok()?)
+            append(values, &k.apply(&g, &w, &alpha).ok()?)
         };
         let along_w = Derivatives { df, scale, ..along_z };
         self.compare("dissipation, as a function of w,", &along_w, value)

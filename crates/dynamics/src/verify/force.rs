@@ -23,7 +23,8 @@ pub(super) fn examine<Y: Metriplectic + ?Sized>(
     }
     let metric = unusable::<Y::Manifold>(x);
     let centre = ChartPoint::<Y::Manifold>::centre(x);
-    let args = system.bracket_args(&centre, &entropy.df);
+    let g = system.metric_at(&centre);
+    let args = system.bracket_args(&g, &entropy.df);
     let jet = system.bracket().linearise_force(&args, &energy.df).map_err(&metric)?;
     let derivatives = jet.along_z.max_abs() + jet.along_s.max_abs() + jet.tensor.max_abs();
     if !derivatives.is_finite() {
@@ -41,7 +42,7 @@ pub(super) fn examine<Y: Metriplectic + ?Sized>(
         let terms = jet.tensor.abs() * energy.df.abs();
         for [w, s] in [here].into_iter().chain(covectors_of_a_step(place, &terms)) {
             let force =
-                system.bracket().force(&system.bracket_args(&centre, &s), &w).map_err(&metric)?;
+                system.bracket().force(&system.bracket_args(&g, &s), &w).map_err(&metric)?;
             let falls = s.dot(&force) < 0.0;
             let size = if falls { balance::pairing::<Y::Manifold>(&s, &force, units) } else { 0.0 };
             let error = |point| ModelError::ForceDestroysEntropy { point, size };
@@ -63,7 +64,8 @@ fn covectors_of_a_step<Y: Metriplectic + ?Sized>(
 ) -> Option<[Vector<Y::Manifold>; 2]> {
     let centre = ChartPoint::<Y::Manifold>::centre(x);
     let w = differentials(system, &centre);
-    let tensor = system.bracket().tensor(&system.bracket_args(&centre, &w.entropy)).ok()?;
+    let g = system.metric_at(&centre);
+    let tensor = system.bracket().tensor(&system.bracket_args(&g, &w.entropy)).ok()?;
     let terms = tensor.abs() * w.energy.abs() + *force;
     let rate = (0..Dim::<Y>::LEN).map(|i| terms[i] / units[i]).fold(0.0, f64::max);
     let half = system.velocity(&centre).ok()? * (0.5 * STEP / rate);

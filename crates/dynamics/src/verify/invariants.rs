@@ -57,7 +57,8 @@ impl<Y: Metriplectic + ?Sized> Invariance<'_, '_, '_, Y> {
         let dl = jet(f, "invariant", x)?.df;
         self.dj = Some(dl);
         let centre = ChartPoint::<Y::Manifold>::centre(x);
-        let args = system.bracket_args(&centre, &entropy.df);
+        let g = system.metric_at(&centre);
+        let args = system.bracket_args(&g, &entropy.df);
         let tensor = system.bracket().tensor(&args).map_err(unusable::<Y::Manifold>(x))?;
         match kind {
             Kind::Casimir => {
@@ -81,7 +82,7 @@ impl<Y: Metriplectic + ?Sized> Invariance<'_, '_, '_, Y> {
         }
         let k = system.dissipation();
         if !k.is_none() && !k.adapts() {
-            let tensor = k.tensor(system.metric(), &centre, &energy.df);
+            let tensor = k.tensor(&g, &energy.df);
             let tensor = tensor.map_err(unusable::<Y::Manifold>(x))?;
             let size = balance::product::<Y::Manifold>(&tensor, &dl, units);
             findings.note("K dL = 0", size, |point| ModelError::InvariantNotKept { point, size });
@@ -114,7 +115,8 @@ impl<Y: Metriplectic + ?Sized> Invariance<'_, '_, '_, Y> {
         let tangent = jacobian_of::<Y>(&y, &|q| moved(far, q));
         let tensor = |x: &Point<Y>, ds: &Vector<Y::Manifold>| {
             let centre = ChartPoint::<Y::Manifold>::centre(x);
-            let tensor = system.bracket().tensor(&system.bracket_args(&centre, ds));
+            let g = system.metric_at(&centre);
+            let tensor = system.bracket().tensor(&system.bracket_args(&g, ds));
             tensor.map_err(unusable::<Y::Manifold>(x))
         };
         let (here, there) = (tensor(x, &entropy.df)?, tensor(&y, &system.entropy().jet1(&y).df)?);

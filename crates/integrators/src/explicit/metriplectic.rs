@@ -88,9 +88,10 @@ impl<Y: Metriplectic> StageFlow for Y {
         LawJets { w, .. }: &LawJets<Dim<Y>>,
     ) -> Option<(Tangent<Y>, f64)> {
         let x = ChartPoint::<Y::Manifold>::centre(x);
+        let g = self.metric_at(&x);
         let reversible =
-            self.bracket().apply(&self.bracket_args(&x, &w.entropy), &w.energy).ok()?;
-        let friction = irreversible(self, &x, w).ok()?;
+            self.bracket().apply(&self.bracket_args(&g, &w.entropy), &w.energy).ok()?;
+        let friction = irreversible(self, &g, w).ok()?;
         let velocity = reversible + friction;
         velocity.is_finite().then(|| (Components(velocity), w.entropy.dot(&friction)))
     }

@@ -56,7 +56,7 @@ impl<Y: Metriplectic> Flow for Y {
     fn production(&self, x: &Point<Y>) -> Option<f64> {
         let centre = ChartPoint::<Y::Manifold>::centre(x);
         let w = differentials(self, &centre);
-        let production = w.entropy.dot(&irreversible(self, &centre, &w).ok()?);
+        let production = w.entropy.dot(&irreversible(self, &self.metric_at(&centre), &w).ok()?);
         production.is_finite().then_some(production)
     }
 

@@ -117,8 +117,9 @@ fn terms<Y: Metriplectic>(
 ) -> Option<Vector<Y::Manifold>> {
     let centre = ChartPoint::<Y::Manifold>::centre(x);
     let w = differentials(system, &centre);
-    let pi = system.bracket().tensor(&system.bracket_args(&centre, &w.entropy)).ok()?;
-    let k = system.dissipation().tensor(system.metric(), &centre, &w.energy).ok()?;
+    let g = system.metric_at(&centre);
+    let pi = system.bracket().tensor(&system.bracket_args(&g, &w.entropy)).ok()?;
+    let k = system.dissipation().tensor(&g, &w.energy).ok()?;
     Some(Column::from_index(|i| {
         let n = Vector::<Y::Manifold>::LEN;
         (0..n).fold(0.0, |sum: f64, j| {

@@ -12,7 +12,8 @@ use metriplectic_fields::{
     ChartPoint, Column, Dimension, Matrix, Scalar, ScalarField, Space, Square, Vector, differential,
 };
 use metriplectic_manifolds::{
-    InnerProduct, Manifold, MetricError, Nodes, Retraction, Riemannian, StepPath, StepPathJet,
+    InnerProduct, Manifold, MetricAt, MetricError, Nodes, Retraction, Riemannian, StepPath,
+    StepPathJet,
 };
 
 use super::{Dim, Numbers};
@@ -203,8 +204,8 @@ where
     ) -> Result<Vector<Y::Manifold, D>, MetricError> {
         let metric = self.system.metric();
         let path = self.retraction.step_path(metric, self.x, u)?;
-        let g = metric.at(&path.z)?;
-        let mut defined = Defined { step: self, g: &g, path: &path };
+        let g = self.system.metric_at(&path.z);
+        let mut defined = Defined { step: self, inner: g.inner()?, g: &g, path: &path };
         Ok(equation(self.system, self.h, &mut defined)?.residual)
     }
 
@@ -214,10 +215,12 @@ where
     pub(crate) fn jet(&self, u: &Vector<Y::Manifold>) -> Option<Jet<Y::Manifold>> {
         let (system, metric, h) = (self.system, self.system.metric(), self.h);
         let path = self.retraction.step_path_jet(metric, self.x, u).ok()?;
-        let g = metric.at(&ChartPoint::<Y::Manifold>::centre(&path.z)).ok()?;
-        let slopes = metric.slopes(&path.z);
-        let along = Along::new(self, u, &g, Segment::new(&path.d, &path.end));
-        let mut jets = Jets::new(&along, &path, slopes.as_ref());
+        let z = ChartPoint::<Y::Manifold>::centre(&path.z);
+        let g = system.metric_at(&z);
+        // The derivatives first, so that the metric is evaluated once.
+        let slopes = g.slopes().ok()?.as_ref();
+        let along = Along::new(self, u, g.inner().ok()?, Segment::new(&path.d, &path.end));
+        let mut jets = Jets::new(&along, &path, &g, slopes);
         let Terms { w, residual, production } = equation(system, h, &mut jets).ok()?;
         let (noise, velocity) = (jets.noise, jets.velocity?);
 
@@ -282,9 +285,9 @@ where
     fn evaluate(&self, u: &Vector<Y::Manifold>) -> Option<Evaluated<Y::Manifold, Dissipated>> {
         let metric = self.system.metric();
         let path = self.retraction.real_step_path(metric, self.x, u).ok()?;
-        let g = metric.at(&path.z).ok()?;
-        let along = Along::new(self, u, &g, Segment::new(&path.d, &path.end));
-        let mut values = Values { along: &along, path: &path };
+        let g = self.system.metric_at(&path.z);
+        let along = Along::new(self, u, g.inner().ok()?, Segment::new(&path.d, &path.end));
+        let mut values = Values { along: &along, path: &path, g: &g };
         let Terms { w, residual, production } = equation(self.system, self.h, &mut values).ok()?;
         let evidence = self.dissipated(&w.entropy, production);
         residual.is_finite().then_some(Evaluated { residual, evidence })
@@ -297,26 +300,26 @@ where
 }
 
 /// Discrete gradients along one path by their definition.
-struct Defined<'a, 'b, Y: Metriplectic, R, W, D: Scalar, G> {
+struct Defined<'a, 'b, Y: Metriplectic, R, W, D: Scalar> {
     step: &'a Residual<'b, Y, R, W>,
-    g: &'a G,
+    inner: &'a <Y::Metric as Riemannian<Y::Manifold>>::At<D>,
+    g: &'a MetricAt<'a, Y::Manifold, Y::Metric, D>,
     path: &'a StepPath<Y::Manifold, D>,
 }
 
-impl<Y, R, W, D, G> Provider for Defined<'_, '_, Y, R, W, D, G>
+impl<Y, R, W, D> Provider for Defined<'_, '_, Y, R, W, D>
 where
     Y: Metriplectic,
     R: Retraction<Y::Manifold, Y::Metric>,
     W: DiscreteGradient,
     D: Scalar,
-    G: InnerProduct<Vector<Y::Manifold, D>>,
 {
     type System = Y;
     type Components = Vector<Y::Manifold, D>;
 
     fn discrete(&mut self, _: Law, f: &impl ScalarField<Y::Manifold>) -> Vector<Y::Manifold, D> {
         let Residual { gradient, x, .. } = self.step;
-        gradient.covector(f, self.g, (x, f.at(x)), self.path)
+        gradient.covector(f, self.inner, (x, f.at(x)), self.path)
     }
 
     fn differential(&self, f: &impl ScalarField<Y::Manifold>) -> Vector<Y::Manifold, D> {
@@ -332,9 +335,9 @@ where
         system: &Y,
         w: &CovectorsOf<Self>,
     ) -> Result<(Vector<Y::Manifold, D>, f64), MetricError> {
-        let friction = irreversible(system, &self.path.z, w)?;
+        let friction = irreversible(system, self.g, w)?;
         let production = w.entropy.dot(&friction).re();
-        Ok((reversible(system, &self.path.z, w)? + friction, production))
+        Ok((reversible(system, self.g, w)? + friction, production))
     }
 }
 
@@ -392,6 +395,7 @@ where
 struct Values<'a, 'b, Y: Metriplectic, R, W, G> {
     along: &'a Along<'a, 'b, Y, R, W, G>,
     path: &'a StepPath<Y::Manifold>,
+    g: &'a MetricAt<'a, Y::Manifold, Y::Metric>,
 }
 
 impl<Y, R, W, G> Provider for Values<'_, '_, Y, R, W, G>
@@ -430,13 +434,13 @@ where
         system: &Y,
         w: &CovectorsOf<Self>,
     ) -> Result<(Vector<Y::Manifold>, f64), MetricError> {
-        let friction = irreversible(system, &self.path.z, w)?;
+        let friction = irreversible(system, self.g, w)?;
         let production = w.entropy.dot(&friction);
-        Ok((reversible(system, &self.path.z, w)? + friction, production))
+        Ok((reversible(system, self.g, w)? + friction, production))
     }
 }
 
-/// The derivatives of a metric along the chart.
+/// The derivatives of a metric that is not constant, along the chart.
 type Slopes<M> = <<M as Space>::Dim as Dimension>::Array<Matrix<M>>;
 
 /// The same with the derivatives along the unknown of the step, and what the round-off of the equation is
@@ -444,6 +448,7 @@ type Slopes<M> = <<M as Space>::Dim as Dimension>::Array<Matrix<M>>;
 struct Jets<'a, 'b, Y: Metriplectic, R, W, G> {
     along: &'a Along<'a, 'b, Y, R, W, G>,
     path: &'a StepPathJet<Y::Manifold>,
+    metric: &'a MetricAt<'a, Y::Manifold, Y::Metric>,
     slopes: Option<&'a Slopes<Y::Manifold>>,
     /// The round-off of `w_H`.
     noise: Vector<Y::Manifold>,
@@ -454,9 +459,10 @@ impl<'a, 'b, Y: Metriplectic, R, W, G> Jets<'a, 'b, Y, R, W, G> {
     fn new(
         along: &'a Along<'a, 'b, Y, R, W, G>,
         path: &'a StepPathJet<Y::Manifold>,
+        metric: &'a MetricAt<'a, Y::Manifold, Y::Metric>,
         slopes: Option<&'a Slopes<Y::Manifold>>,
     ) -> Self {
-        Self { along, path, slopes, noise: Column::zero(), velocity: None }
+        Self { along, path, metric, slopes, noise: Column::zero(), velocity: None }
     }
 }
 
@@ -504,7 +510,7 @@ where
         system: &Y,
         w: &CovectorsOf<Self>,
     ) -> Result<(WithJacobian<Dim<Y>>, f64), MetricError> {
-        let jet = velocity_jet(system, &self.path.z, &self.path.dz, w)?;
+        let jet = velocity_jet(system, self.metric, &self.path.dz, w)?;
         self.velocity = Some(jet);
         Ok((jet.velocity, jet.production))
     }

@@ -3,7 +3,7 @@
 use metriplectic_dynamics::velocity::differentials;
 use metriplectic_dynamics::{Bracket, Dissipation, Invariants, Metriplectic};
 use metriplectic_fields::{ChartPoint, Column, Dimension, Matrix, Square, Vector};
-use metriplectic_manifolds::{InnerProduct, Riemannian};
+use metriplectic_manifolds::InnerProduct;
 
 use crate::method::Laws;
 use crate::midpoint::{Dim, Numbers, Start};
@@ -46,10 +46,11 @@ pub(crate) fn target<Y: Metriplectic>(
     }
     let x = ChartPoint::<Y::Manifold>::centre(start.x);
     let w = differentials(system, &x);
-    let args = system.bracket_args(&x, &w.entropy);
+    let g = system.metric_at(&x);
+    let args = system.bracket_args(&g, &w.entropy);
     let pi = system.bracket().linearise(&args, &w.energy);
-    let k = system.dissipation().linearise(system.metric(), start.x, &w.energy, &w.entropy);
-    let (Ok(pi), Ok(k), Ok(g)) = (pi, k, system.metric().at(&x)) else { return nothing::<Y>() };
+    let k = system.dissipation().linearise(&g, &w.energy, &w.entropy);
+    let (Ok(pi), Ok(k), Ok(g)) = (pi, k, g.inner()) else { return nothing::<Y>() };
     let mut sensitivity = pi.tensor.abs() + k.along_w.abs();
     if system.bracket().is_forced()
         && let Ok(force) = system.bracket().linearise_force(&args, &w.energy)

@@ -21,6 +21,7 @@ use metriplectic::integrators::DiscreteGradient;
 use metriplectic::integrators::{Flow as _, StepStart};
 use metriplectic::prelude::*;
 
+mod chart_midpoint;
 mod dimension;
 mod instructions;
 mod rigid_body;
@@ -76,15 +77,15 @@ impl Row {
     }
 
     /// The same with another scheme.
-    fn with<Y: Metriplectic + 'static, W: DiscreteGradient + 'static>(
+    fn with<Y: Metriplectic + 'static, R, W: DiscreteGradient + 'static>(
         name: impl Into<String>,
-        scheme: Scheme<WeylMidpoint, W>,
+        scheme: Scheme<R, W>,
         system: Y,
         start: Point<Y>,
         h: f64,
     ) -> Self
     where
-        WeylMidpoint: Retraction<Y::Manifold, Y::Metric>,
+        R: Retraction<Y::Manifold, Y::Metric> + 'static,
     {
         let run = move |steps| {
             let (mut memory, mut x, mut iterations) =
@@ -135,7 +136,13 @@ impl Row {
 
 /// Every row.
 fn rows() -> Vec<Row> {
-    let all = [rigid_body::rows(), spinning_top::rows(), so3_nambu::rows(), dimension::rows()];
+    let all = [
+        rigid_body::rows(),
+        spinning_top::rows(),
+        so3_nambu::rows(),
+        chart_midpoint::rows(),
+        dimension::rows(),
+    ];
     all.into_iter().flatten().collect()
 }
 

@@ -73,9 +73,8 @@ impl<M: Manifold, G: Riemannian<M>> Retraction<M, G> for ChartMidpoint {
     #[inline]
     fn end(&self, _: &G, x: &M::Point<f64>, u: &Vector<M>) -> Result<M::Point<f64>, MetricError> {
         reached::<M>(u)?;
-        let end = M::chart(x, u);
-        finite_column("a coordinate of the end", M::coordinates(x, &end))?;
-        Ok(end)
+        let quantity = "a coordinate of the end";
+        M::line_end(x, u).ok_or(MetricError::NotFinite { quantity, value: f64::NAN })
     }
 
     #[inline]

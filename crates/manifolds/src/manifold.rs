@@ -154,6 +154,14 @@ pub trait Manifold: Space {
         chart_midpoint::line_at::<Self>(x, u, t)
     }
 
+    /// Computes the end `φ_x(u)` of the same line; `None` if its numbers are no longer a point. By default the
+    /// coordinates of the end must be finite.
+    #[inline]
+    fn line_end(x: &Self::Point<f64>, u: &Vector<Self>) -> Option<Self::Point<f64>> {
+        let end = Self::chart(x, u);
+        Self::coordinates(&end, &end).is_finite().then_some(end)
+    }
+
     /// Computes the rounding error of the displacement `u` on the way from `x` to `y = φ_x(u)`, which the next
     /// step compensates; zero where it is not known, as on a curved space.
     #[inline]

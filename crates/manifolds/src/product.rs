@@ -262,6 +262,12 @@ impl<A: Manifold + Times<B>, B: Manifold> Manifold for Product<A, B> {
     }
 
     #[inline]
+    fn line_end(x: &Self::Point<f64>, u: &Vector<Self>) -> Option<Self::Point<f64>> {
+        let (a, b) = Self::split(u);
+        Some((A::line_end(&x.0, &a)?, B::line_end(&x.1, &b)?))
+    }
+
+    #[inline]
     fn line_at(x: &Self::Point<f64>, u: &Vector<Self>, t: f64) -> Self::Point<Real> {
         let (a, b) = Self::split(u);
         (A::line_at(&x.0, &a, t), B::line_at(&x.1, &b, t))

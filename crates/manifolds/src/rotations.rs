@@ -223,6 +223,12 @@ impl Manifold for Rotations {
         }
     }
 
+    /// The end of a finite displacement is a point.
+    #[inline]
+    fn line_end(x: &Matrix3<f64>, u: &Vector3<f64>) -> Option<Matrix3<f64>> {
+        Some(Self::chart(x, u))
+    }
+
     /// `R(t)` with `R' = R Ω̂` and `R'' = R Ω̂²`.
     #[inline]
     fn line_at(x: &Matrix3<f64>, omega: &Vector3<f64>, t: f64) -> Matrix3<Real> {

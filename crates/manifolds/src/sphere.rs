@@ -322,6 +322,12 @@ macro_rules! sphere {
                 great_circle_jet::<Self, $a, $n>(x, u)
             }
 
+            /// The end of a finite displacement is a point.
+            #[inline]
+            fn line_end(x: &SVector<f64, $a>, u: &SVector<f64, $n>) -> Option<SVector<f64, $a>> {
+                Some(Self::chart(x, u))
+            }
+
             /// With the velocity of the great circle, and `γ'' = −|u|² γ`.
             #[inline]
             fn line_at(x: &SVector<f64, $a>, u: &SVector<f64, $n>, t: f64) -> SVector<Real, $a> {

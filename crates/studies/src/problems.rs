@@ -13,8 +13,8 @@ use metriplectic_dynamics::{
 use metriplectic_fields::{ChartPoint, Column, Real, Space, Vector};
 use metriplectic_integrators::{Certificate, Method as _, Run, Scheme, Span};
 use metriplectic_manifolds::{
-    Canonical, Cayley, Euclidean, Exponential, HalfLine, LieDual, Manifold, Metric, Product,
-    Projection, Retraction, Riemannian as _, Rotations, Sphere, WeylMidpoint, rotations,
+    Canonical, Cayley, ChartMidpoint, Euclidean, Exponential, HalfLine, LieDual, Manifold, Metric,
+    Product, Projection, Retraction, Riemannian as _, Rotations, Sphere, WeylMidpoint, rotations,
 };
 use nalgebra::{Matrix2, Matrix3, SVector, Vector1, Vector2, Vector3, Vector6, vector};
 use num_dual::DualNum;
@@ -379,8 +379,26 @@ fn geodesic<Y: Metriplectic>(study: &mut impl Study, problem: &Problem<Y>) {
     study.visit(problem, "exponential", Geodesic::Second(Exponential), 1.0);
 }
 
-/// Both geodesic retractions, and a third one of order 2.
+/// Both geodesic retractions, and further ones of order 2, as one type.
 fn with<Y: Metriplectic, R>(
+    study: &mut impl Study,
+    problem: &Problem<Y>,
+    further: &[(&'static str, R)],
+) where
+    R: Retraction<Y::Manifold, Y::Metric> + Copy,
+{
+    type Any<R> = Either<Either<WeylMidpoint, Exponential>, R>;
+    let first = |retraction| Any::<R>::First(retraction);
+    study.visit(problem, "Weyl midpoint", first(Either::First(WeylMidpoint)), 2.0);
+    study.visit(problem, "exponential", first(Either::Second(Exponential)), 1.0);
+    for &(scheme, retraction) in further {
+        study.visit(problem, scheme, Any::Second(retraction), 2.0);
+    }
+}
+
+/// The retractions for a metric from a closure: those of its geodesics, the chart midpoint, and one of the
+/// manifold's own.
+fn all<Y: Metriplectic, R>(
     study: &mut impl Study,
     problem: &Problem<Y>,
     scheme: &'static str,
@@ -388,12 +406,13 @@ fn with<Y: Metriplectic, R>(
 ) where
     R: Retraction<Y::Manifold, Y::Metric> + Copy,
 {
-    type Three<R> = Either<Either<WeylMidpoint, Exponential>, R>;
-    let first = |retraction| Three::<R>::First(retraction);
-    study.visit(problem, "Weyl midpoint", first(Either::First(WeylMidpoint)), 2.0);
-    study.visit(problem, "exponential", first(Either::Second(Exponential)), 1.0);
-    study.visit(problem, scheme, Three::Second(retraction), 2.0);
+    type Cheap<R> = Either<ChartMidpoint, R>;
+    let further =
+        [(CHART_MIDPOINT, Cheap::First(ChartMidpoint)), (scheme, Cheap::Second(retraction))];
+    with(study, problem, &further);
 }
+
+const CHART_MIDPOINT: &str = "chart midpoint";
 
 /// Canonical metrics.
 fn canonical(study: &mut impl Study) {
@@ -401,7 +420,7 @@ fn canonical(study: &mut impl Study) {
     macro_rules! visit {
         ($labels:expr, $start:expr, $strides:expr, $system:expr, $scheme:literal by $retraction:expr) => {
             visit!(@ $labels, $start, $strides, $system, |study, problem| {
-                with(study, problem, $scheme, $retraction)
+                with(study, problem, &[($scheme, $retraction)])
             })
         };
         ($labels:expr, $start:expr, $strides:expr, $system:expr) => {
@@ -496,7 +515,7 @@ fn closures(study: &mut impl Study) {
     let strides = vec![(vector![0.7, -1.5], 32.0)];
     let (name, manifold, metric) = ("relaxation", "S²", "ambient closure");
     let problem = Problem { name, manifold, metric, system, start, time: 2.0, strides };
-    with(study, &problem, "projection", Projection);
+    all(study, &problem, "projection", Projection);
 
     // One closure for both, and so one type.
     let diagonal = Matrix3::from_diagonal(&vector![1.0, 1.5, 2.0]);
@@ -520,7 +539,7 @@ fn closures(study: &mut impl Study) {
         let (name, manifold, strides) = ("Nambu", "SO(3)", strides.to_vec());
         let problem =
             Problem { name, manifold, metric, system, start: attitude(), time: 1.0, strides };
-        with(study, &problem, "Cayley", Cayley);
+        all(study, &problem, "Cayley", Cayley);
     }
 
     let leaning = |q: &Vector2<Real>| {
@@ -535,10 +554,9 @@ fn closures(study: &mut impl Study) {
         .expect("a problem is a system");
     let strides = vec![(vector![0.0, 0.55], 2.0)];
     let (name, manifold, metric) = ("area form", "2-chart", "non-diagonal");
-    geodesic(
-        study,
-        &Problem { name, manifold, metric, system, start: vector![0.6, 0.4], time: 2.0, strides },
-    );
+    let start = vector![0.6, 0.4];
+    let problem = Problem { name, manifold, metric, system, start, time: 2.0, strides };
+    with(study, &problem, &[(CHART_MIDPOINT, ChartMidpoint)]);
 
     let leaning = |q: &Vector3<Real>| {
         let wave = Vector3::new(q.y.sin(), q.z.cos(), q.x * 0.5);
@@ -555,7 +573,8 @@ fn closures(study: &mut impl Study) {
     let strides = vec![(vector![-1.1, 0.8, 0.9], 2.0)];
     let (name, manifold, metric) = ("Nambu", "3-chart", "non-diagonal");
     let start = vector![0.5, -0.4, 0.3];
-    geodesic(study, &Problem { name, manifold, metric, system, start, time: 2.0, strides });
+    let problem = Problem { name, manifold, metric, system, start, time: 2.0, strides };
+    with(study, &problem, &[(CHART_MIDPOINT, ChartMidpoint)]);
 }
 
 /// Products.
@@ -613,7 +632,9 @@ fn products(study: &mut impl Study) {
         .entropy(|(r, p): &(Matrix3<Real>, Vector3<Real>)| r.m12 - p.norm_squared() * 0.3)
         .build()
         .expect("a problem is a system");
-    let strides = vec![(vector![0.2, -0.3, 1.5, -1.3, -0.9, 0.3], 4.0)];
+    let away = vector![0.2, -0.3, 1.5, -1.3, -0.9, 0.3];
+    let strides = vec![(away, 4.0), (away, 2.0)];
     let (name, metric) = ("relaxation", "full closure");
-    geodesic(study, &Problem { name, manifold, metric, system, start, time: 1.0, strides });
+    let problem = Problem { name, manifold, metric, system, start, time: 1.0, strides };
+    with(study, &problem, &[(CHART_MIDPOINT, ChartMidpoint)]);
 }

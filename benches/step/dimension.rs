@@ -32,5 +32,15 @@ where
 }
 
 pub(crate) fn rows() -> Vec<Row> {
-    vec![row::<2>(), row::<4>(), row::<6>(), row::<8>(), row::<10>(), row::<12>()]
+    vec![
+        row::<2>(),
+        row::<4>(),
+        row::<6>(),
+        row::<8>(),
+        row::<10>(),
+        row::<12>(),
+        row::<16>(),
+        row::<32>(),
+        row::<64>(),
+    ]
 }

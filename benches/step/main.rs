@@ -23,6 +23,7 @@ use metriplectic::prelude::*;
 
 mod chart_midpoint;
 mod dimension;
+mod hand_generic;
 mod instructions;
 mod rigid_body;
 mod so3_nambu;

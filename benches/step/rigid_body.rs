@@ -6,6 +6,7 @@ use std::rc::Rc;
 use metriplectic::fields::{Jet1, Jet2};
 use metriplectic::prelude::*;
 
+use crate::hand_generic::{Field, Generic};
 use crate::stable_gradient::{self, Displacements, Linearised};
 use crate::{Row, Step, check};
 
@@ -69,6 +70,33 @@ impl ScalarField<LieDual<3>> for AnalyticEntropy {
     }
 }
 
+/// The two fields on paper, for the step that knows nothing else of them.
+#[derive(Clone, Copy)]
+struct KineticEnergy(Vector3<f64>);
+
+impl Field for KineticEnergy {
+    fn value(&self, p: &Vector3<f64>) -> f64 {
+        0.5 * p.component_mul(p).dot(&self.0)
+    }
+
+    fn gradient(&self, p: &Vector3<f64>) -> Vector3<f64> {
+        p.component_mul(&self.0)
+    }
+}
+
+#[derive(Clone, Copy)]
+struct HalfSquare;
+
+impl Field for HalfSquare {
+    fn value(&self, p: &Vector3<f64>) -> f64 {
+        0.5 * p.norm_squared()
+    }
+
+    fn gradient(&self, p: &Vector3<f64>) -> Vector3<f64> {
+        *p
+    }
+}
+
 pub(crate) fn rows() -> Vec<Row> {
     const WELL: &str = "the rigid body is a metriplectic system";
     let (start, h) = (Vector3::from(START), STEP_SIZE);
@@ -101,6 +129,12 @@ pub(crate) fn rows() -> Vec<Row> {
         Row::new("step/rigid_body/typed", typed.build().expect(WELL), start, h),
         Row::new("step/rigid_body/analytic", analytic.build().expect(WELL), start, h),
         Row::by_hand("step/rigid_body/hand_coded", HandCoded::new(&INERTIA), start, h),
+        Row::by_hand(
+            "step/rigid_body/hand_generic",
+            Generic::new(KineticEnergy(Vector3::from(INERTIA.map(f64::recip))), HalfSquare),
+            start,
+            h,
+        ),
         Row::new("step/rigid_body/published", published, start, h),
         Row::with("step/rigid_body/mean_value", scheme.gradient(MeanValue), mean, start, h),
         Row::with(

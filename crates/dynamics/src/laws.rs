@@ -38,7 +38,8 @@ pub fn bracket<Y: Metriplectic>(
     let exists = |_| BrokenLaw { law: "Π exists", size: f64::NAN, bound: 0.0 };
     let bracket = system.bracket();
     let units = CoordinateScales::at(system, x).units;
-    let defects = bracket_defects(system, x, &units, 1.0).map_err(exists)?;
+    let defects =
+        bracket_defects(system, x, &system.entropy().jet2(x), &units, 1.0).map_err(exists)?;
     let (round_off, tensor_size) = (round_off::<Y::Manifold>, defects.tensor.max_abs());
     let BracketDefects { skewness, jacobi, .. } = defects;
     BrokenLaw::unless("Π is skew", skewness.size, round_off(skewness.terms))?;

@@ -23,6 +23,9 @@ impl<M: Space> ScalarField<M> for NoEntropy {
     }
 }
 
+/// The largest dimension of a system.
+const MOST_VARIABLES: usize = 256;
+
 /// The tensors of a system, and the manifold that they live on.
 #[derive(Clone)]
 pub(crate) struct Tensors<M, G, B, K> {
@@ -75,6 +78,13 @@ where
         second_law: SecondLaw,
         has_entropy: bool,
     ) -> Result<Self, BuildError> {
+        const {
+            assert!(
+                M::Dim::LEN <= MOST_VARIABLES,
+                "a system has at most 256 variables, because the tensors of a larger one do not fit into memory that \
+                 is known to the compiler: write it as a lattice of sites and bonds, or as a flow of your own"
+            );
+        }
         let dissipates = !tensors.dissipation.is_none();
         if !dissipates && tensors.bracket.is_zero() {
             return Err(BuildError::NothingMoves);

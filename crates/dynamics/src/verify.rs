@@ -21,6 +21,7 @@ mod metric;
 mod place;
 pub(crate) mod sampling;
 
+use metriplectic_fields::stack::with_room;
 use metriplectic_fields::{ChartPoint, Dimension};
 use metriplectic_manifolds::Manifold;
 
@@ -67,7 +68,7 @@ impl<Y: Metriplectic + ?Sized> Verify<Y::Manifold> for Y {
 
 fn report<Y: Metriplectic + ?Sized>(system: &Y, x0: &Point<Y>, radius: f64) -> Report {
     let mut report = Report::new();
-    report.verdict = examine(system, x0, radius, &mut report);
+    report.verdict = with_room::<Dim<Y>, _>(|| examine(system, x0, radius, &mut report));
     report
 }
 

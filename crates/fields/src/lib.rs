@@ -11,6 +11,7 @@
 //! | [`differential`](mod@differential) | differential, Hessian and Jacobian at any scalar |
 //! | [`newton`] | damped Newton iterations, for unknowns of any kind |
 //! | [`series`] | functions of a small angle, right under dual numbers |
+//! | [`stack`] | room on the stack for large matrices |
 //! | [`laws`] | the laws of a field, and the function that checks them |
 //!
 //! # Two doors
@@ -37,6 +38,7 @@ pub mod scalar;
 pub mod series;
 pub mod space;
 pub mod square;
+pub mod stack;
 
 pub use column::{Column, power_of_two};
 pub use differential::{differential, differential_at, hessian, hessian_at, jacobian};

@@ -116,6 +116,12 @@ pub trait Flow {
         Some(y.clone())
     }
 
+    /// Calls `f` with the room on the stack that a step of this flow needs. A flow whose steps need little calls it
+    /// as it is.
+    fn with_room<T>(&self, f: impl FnOnce() -> T) -> T {
+        f()
+    }
+
     /// The state with these entries.
     ///
     /// # Errors
@@ -286,7 +292,8 @@ pub trait Method<F: Flow>: Sized {
         x0: Element<F>,
         schedule: impl Into<Schedule>,
     ) -> Result<Steps<'_, F, Self>, RunError<F::Space>> {
-        Steps::start(self, flow, x0, schedule.into())
+        let schedule = schedule.into();
+        flow.with_room(|| Steps::start(self, flow, x0, schedule))
     }
 
     /// Verifies the model, runs it over a [`Span`](crate::Span) or [`Until`](crate::Until), and records the states.
@@ -300,7 +307,8 @@ pub trait Method<F: Flow>: Sized {
         x0: Element<F>,
         schedule: impl Into<Schedule>,
     ) -> Result<Trajectory<F::Space>, RunError<F::Space>> {
-        self.steps(flow, x0, schedule)?.run()
+        let schedule = schedule.into();
+        flow.with_room(|| self.steps(flow, x0, schedule)?.run())
     }
 
     /// Takes up a run where it was put down. With the system and the method of that run the steps
@@ -314,7 +322,7 @@ pub trait Method<F: Flow>: Sized {
         flow: &'a F,
         checkpoint: &Checkpoint,
     ) -> Result<Steps<'a, F, Self>, ResumeError> {
-        Steps::resume(self, flow, checkpoint)
+        flow.with_room(|| Steps::resume(self, flow, checkpoint))
     }
 }
 

@@ -10,7 +10,8 @@ pub use equation::{Equation, Evaluated, Iterate, Linearised, Root, Rounding, Sti
 ///
 /// The inverse of a Jacobian is kept as long as it serves, from one step to the next: each correction
 /// then costs only a residual, from which the inverse learns (Broyden 1965). That of an earlier step is
-/// used where three corrections are expected to be enough, by the contraction that it has shown of late;
+/// used where three corrections, or `n/2` in a dimension above 6, are expected to be enough, by the contraction
+/// that it has shown of late;
 /// otherwise a new one is formed, at the guess or where the first correction has led.
 ///
 /// Components of a solution may have different units, so **convergence is measured per component**: by
@@ -102,9 +103,10 @@ impl<N: Dimension> Inverse<N> {
         })
     }
 
-    /// Whether three corrections of the next guess are expected to be enough, the last one unchecked.
+    /// Whether as many corrections of the next guess as a Jacobian is worth are expected to be enough, the last
+    /// one unchecked.
     fn serves(&self) -> bool {
-        self.contraction.powi(3) * self.first <= SURE
+        contracted(self.first, self.contraction, corrections::<N>()) <= SURE
     }
 
     /// The correction of a residual.
@@ -132,6 +134,18 @@ impl<N: Dimension> Inverse<N> {
             self.matrix += N::Matrix::<f64>::outer(&((*s - *predicted) * along.recip()), &row);
         }
     }
+}
+
+/// The corrections by a kept Jacobian that cost less than a new one. In dimension `n` the derivatives of the
+/// residual cost about as much as `n` residuals, and their factorisation grows with `n³`.
+const fn corrections<N: Dimension>() -> usize {
+    if N::LEN > 6 { N::LEN / 2 } else { 3 }
+}
+
+/// What a number of corrections with this contraction leave of a residual.
+#[inline]
+fn contracted(residual: f64, contraction: f64, corrections: usize) -> f64 {
+    (0..corrections).fold(residual, |left, _| left * contraction)
 }
 
 /// A measure of corrections: the root mean square of their components in units of round-off.
@@ -377,8 +391,9 @@ impl Newton {
                 inverse.learn(&taken, &predicted);
                 correction = inverse.times(&residual);
             }
-            // Another equation's Jacobian gets two corrections, and the last one.
-            let left = contraction.powi(if taken == 0 { 2 } else { 1 }) * best.residual;
+            // Another equation's Jacobian gets its corrections, the last one unchecked.
+            let remaining = corrections::<M::Dim>().saturating_sub(taken + 1).max(1);
+            let left = contracted(best.residual, contraction, remaining);
             if !own && best.residual > residual_bound && left > SURE * residual_bound {
                 return Progress::Slow;
             }

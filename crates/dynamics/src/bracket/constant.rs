@@ -39,7 +39,15 @@ where
         _: &BracketArgs<'_, M, G, D>,
         alpha: &SVector<D, N>,
     ) -> Result<SVector<D, N>, MetricError> {
-        Ok(SMatrix::<D, N, N>::from_entries(|i, j| D::from(self.tensor[(i, j)])) * *alpha)
+        let row = |i| (0..N).fold(D::zero(), |sum, j| sum + alpha[j] * self.tensor[(i, j)]);
+        Ok(SVector::from_fn(|i, _| row(i)))
+    }
+
+    fn tensor<D: Scalar>(
+        &self,
+        _: &BracketArgs<'_, M, G, D>,
+    ) -> Result<SMatrix<D, N, N>, MetricError> {
+        Ok(SMatrix::from_entries(|i, j| D::from(self.tensor[(i, j)])))
     }
 
     #[inline]

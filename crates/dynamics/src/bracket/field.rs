@@ -40,6 +40,13 @@ impl<M: Manifold, G: Riemannian<M>, F: MatrixField<M>> Bracket<M, G> for FieldPo
         Ok(self.tensor_at(at)? * *alpha)
     }
 
+    fn tensor<D: Scalar>(
+        &self,
+        at: &BracketArgs<'_, M, G, D>,
+    ) -> Result<Matrix<M, D>, MetricError> {
+        self.tensor_at(at)
+    }
+
     fn linearise(
         &self,
         at: &BracketArgs<'_, M, G>,

@@ -80,6 +80,10 @@ where
         Ok(tensor.ok_or_else(|| MetricError::out_of_chart(x))? * *alpha)
     }
 
+    fn tensor(&self, g: &MetricAt<'_, M, G>, w: &Vector<M>) -> Result<Matrix<M>, MetricError> {
+        self.real_tensor(g.x, w).ok_or_else(|| MetricError::out_of_chart(g.x))
+    }
+
     fn linearise(
         &self,
         g: &MetricAt<'_, M, G>,
@@ -93,18 +97,21 @@ where
             along_w: zero,
             tensor: zero,
         };
-        let real = Vector::<M, Real>::embed(alpha);
         let n = M::Dim::LEN;
         for k in 0..n {
             let (x, w) = seeded::<M, f64>(x, w, k, n + k);
             let tensor = self.tensor_at(&x, &w).ok_or_else(|| MetricError::out_of_chart(&x))?;
-            let column = tensor * real;
             for i in 0..n {
-                jet.value[i] = column[i].re;
-                jet.along_z[(i, k)] = column[i].eps1;
-                jet.along_w[(i, k)] = column[i].eps2;
+                let row = |part: fn(&Real) -> f64| {
+                    (0..n).fold(0.0, |sum, j| sum + part(&tensor[(i, j)]) * alpha[j])
+                };
+                jet.along_z[(i, k)] = row(|entry| entry.eps1);
+                jet.along_w[(i, k)] = row(|entry| entry.eps2);
             }
-            jet.tensor = Matrix::<M>::from_entries(|i, j| tensor[(i, j)].re);
+            if k == 0 {
+                jet.tensor = Matrix::<M>::from_entries(|i, j| tensor[(i, j)].re);
+                jet.value = jet.tensor * *alpha;
+            }
         }
         Ok(jet)
     }

@@ -60,7 +60,9 @@ impl<'a, Y: Metriplectic + ?Sized> Examination<'a, Y> {
         let w = self.discrete_gradient(x, &energy);
         let place = Place { system, x, units: &self.sizes.units, energy, entropy };
         // A wrong derivative breaks other laws too, and is reported as their cause.
-        let compared = axes.clone().try_for_each(|axis| fields::compare(&place, axis));
+        let compared = fields::TensorSlopes::at(&place).and_then(|slopes| {
+            axes.clone().try_for_each(|axis| fields::compare(&place, &slopes, axis))
+        });
         let mut findings =
             Findings { point: Y::Manifold::entries(x), laws: &mut report.laws, first: None };
         bracket::examine(&place, &mut findings)?;
@@ -69,7 +71,7 @@ impl<'a, Y: Metriplectic + ?Sized> Examination<'a, Y> {
         invariants::examine(&place, &mut findings)?;
         compared?;
         findings.first.map_or(Ok(()), Err)?;
-        axes.clone().try_for_each(|axis| fields::compare_dissipation(&place, axis))
+        fields::compare_dissipation(&place, axes)
     }
 
     /// Computes a discrete gradient of the energy between `x` and a point near it, in the chart at `x`: the

@@ -3,16 +3,38 @@
 use metriplectic_fields::{
     ChartPoint, Column, Dimension, Matrix, ScalarField, Space, Square, Vector,
 };
-use metriplectic_manifolds::{Manifold, Riemannian};
+use metriplectic_manifolds::{Manifold, Riemannian, Slopes};
 
 use super::balance::pairs;
 use super::derivatives::{Derivatives, Mismatch, OF_CLOSURES, OF_SOLUTIONS};
 use super::place::{Place, unusable};
 use crate::bracket::Bracket;
-use crate::dissipation::Dissipation;
+use crate::dissipation::{Dissipation, DissipationJet};
 use crate::invariants::{Invariants, Kind, Visitor};
 use crate::metriplectic::{Dim, Metriplectic};
 use crate::model_error::ModelError;
+
+/// The derivatives of the tensors of a model at a point, evaluated once for all axes.
+pub(super) struct TensorSlopes<M: Manifold> {
+    metric: Slopes<M>,
+    /// `∂(Πα)/∂z` for a generic covector.
+    bracket: Option<Matrix<M>>,
+}
+
+impl<M: Manifold> TensorSlopes<M> {
+    pub(super) fn at<Y: Metriplectic<Manifold = M> + ?Sized>(
+        &Place { system, x, units, ref entropy, .. }: &Place<'_, Y>,
+    ) -> Result<Self, ModelError> {
+        let (metric, bracket) = (system.metric().slopes(x), system.bracket());
+        if bracket.is_zero() {
+            return Ok(Self { metric, bracket: None });
+        }
+        let (alpha, centre) = (generic::<M>(units), ChartPoint::centre(x));
+        let g = system.metric_at(&centre);
+        let jet = bracket.linearise(&system.bracket_args(&g, &entropy.df), &alpha);
+        Ok(Self { metric, bracket: Some(jet.map_err(unusable::<M>(x))?.along_z) })
+    }
+}
 
 /// Compares the derivatives of the fields, of the metric, and of the bracket along one axis of the chart.
 ///
@@ -20,23 +42,33 @@ use crate::model_error::ModelError;
 /// solves the same equation in more iterations, or fails.
 pub(super) fn compare<Y: Metriplectic + ?Sized>(
     place: &Place<'_, Y>,
+    slopes: &TensorSlopes<Y::Manifold>,
     axis: usize,
 ) -> Result<(), ModelError> {
     let along = Along { place, axis };
     along.scalar("energy", place.system.energy(), &place.energy.df)?;
     along.scalar("entropy", place.system.entropy(), &place.entropy.df)?;
     along.invariants()?;
-    along.metric()?;
-    along.bracket()
+    along.metric(slopes)?;
+    along.bracket(slopes)
 }
 
-/// Compares the derivatives of the dissipation, also along the covector that it annihilates. No law uses
-/// them, so a law that its values violate is named first.
+/// Compares the derivatives of the dissipation along the `axes`, also along the covector that it annihilates. No
+/// law uses them, so a law that its values violate is named first.
 pub(super) fn compare_dissipation<Y: Metriplectic + ?Sized>(
     place: &Place<'_, Y>,
-    axis: usize,
+    axes: impl Iterator<Item = usize>,
 ) -> Result<(), ModelError> {
-    Along { place, axis }.dissipation()
+    let &Place { system, x, units, ref energy, .. } = place;
+    let mut axes = axes.peekable();
+    if system.dissipation().is_none() || axes.peek().is_none() {
+        return Ok(());
+    }
+    let (alpha, centre) = (generic::<Y::Manifold>(units), ChartPoint::centre(x));
+    let g = system.metric_at(&centre);
+    let jet = system.dissipation().linearise(&g, &energy.df, &alpha);
+    let jet = jet.map_err(unusable::<Y::Manifold>(x))?;
+    axes.try_for_each(|axis| Along { place, axis }.dissipation(&jet, &alpha))
 }
 
 /// One axis of the chart at a point.
@@ -88,9 +120,9 @@ impl<Y: Metriplectic + ?Sized> Along<'_, '_, Y> {
         compared.outcome
     }
 
-    fn metric(&self) -> Result<(), ModelError> {
+    fn metric(&self, slopes: &TensorSlopes<Y::Manifold>) -> Result<(), ModelError> {
         let (metric, n) = (self.place.system.metric(), Dim::<Y>::LEN);
-        let Some(slopes) = metric.slopes(self.place.x) else { return Ok(()) };
+        let Some(slopes) = &slopes.metric else { return Ok(()) };
         let value = |t, values: &mut Vec<f64>| {
             let g: Matrix<Y::Manifold> = metric.matrix(&self.at(t));
             values.extend(pairs(n).map(|ij| g[ij]));
@@ -103,16 +135,11 @@ impl<Y: Metriplectic + ?Sized> Along<'_, '_, Y> {
         self.compare("metric", &Derivatives { scale, df, units, rounding: OF_CLOSURES }, value)
     }
 
-    fn bracket(&self) -> Result<(), ModelError> {
-        let &Place { system, x, units, ref entropy, .. } = self.place;
-        let bracket = system.bracket();
-        if bracket.is_zero() {
-            return Ok(());
-        }
-        let (alpha, centre) = (generic::<Y::Manifold>(units), ChartPoint::centre(x));
-        let g = system.metric_at(&centre);
-        let jet = bracket.linearise(&system.bracket_args(&g, &entropy.df), &alpha);
-        let slopes = jet.map_err(unusable::<Y::Manifold>(x))?.along_z.column_at(self.axis);
+    fn bracket(&self, slopes: &TensorSlopes<Y::Manifold>) -> Result<(), ModelError> {
+        let &Place { system, units, ref entropy, .. } = self.place;
+        let (bracket, alpha) = (system.bracket(), generic::<Y::Manifold>(units));
+        let Some(slopes) = &slopes.bracket else { return Ok(()) };
+        let slopes = slopes.column_at(self.axis);
         let value = |t, values: &mut Vec<f64>| {
             let at = self.at(t);
             let g = system.metric_at(&at);
@@ -123,19 +150,16 @@ impl<Y: Metriplectic + ?Sized> Along<'_, '_, Y> {
         self.compare("bracket", &Derivatives { scale, df, units, rounding: OF_CLOSURES }, value)
     }
 
-    fn dissipation(&self) -> Result<(), ModelError> {
-        let &Place { system, x, units, ref energy, .. } = self.place;
-        let k = system.dissipation();
-        if k.is_none() {
-            return Ok(());
-        }
-        let (alpha, w, axis) = (generic::<Y::Manifold>(units), energy.df, self.axis);
-        let centre = self.at(0.0);
-        let g = system.metric_at(&centre);
-        let jet = k.linearise(&g, &w, &alpha).map_err(unusable::<Y::Manifold>(x))?;
+    fn dissipation(
+        &self,
+        jet: &DissipationJet<Y::Manifold>,
+        alpha: &Vector<Y::Manifold>,
+    ) -> Result<(), ModelError> {
+        let &Place { system, units, ref energy, .. } = self.place;
+        let (k, w, axis) = (system.dissipation(), energy.df, self.axis);
         let (scale, df) = (units[axis], components(&jet.along_z.column_at(axis)));
         let value = |t, values: &mut Vec<f64>| {
-            append(values, &k.apply(&system.metric_at(&self.at(t)), &w, &alpha).ok()?)
+            append(values, &k.apply(&system.metric_at(&self.at(t)), &w, alpha).ok()?)
         };
         let along_z = Derivatives { scale, df, units: components(units), rounding: OF_SOLUTIONS };
         self.compare("dissipation", &along_z, value)?;
@@ -147,10 +171,11 @@ impl<Y: Metriplectic + ?Sized> Along<'_, '_, Y> {
         if scale == 0.0 {
             return Ok(());
         }
-        let df = components(&jet.along_w.column_at(axis));
+        let (df, centre) = (components(&jet.along_w.column_at(axis)), self.at(0.0));
+        let g = system.metric_at(&centre);
         let value = |t, values: &mut Vec<f64>| {
             let w = w + Vector::<Y::Manifold>::basis(axis) * t;
-            append(values, &k.apply(&g, &w, &alpha).ok()?)
+            append(values, &k.apply(&g, &w, alpha).ok()?)
         };
         let along_w = Derivatives { df, scale, ..along_z };
         self.compare("dissipation, as a function of w,", &along_w, value)

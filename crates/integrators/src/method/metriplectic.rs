@@ -5,7 +5,7 @@ use metriplectic_dynamics::velocity::{Covectors, Gradient, differentials, irreve
 use metriplectic_dynamics::{
     Dissipation, Invariants, Metriplectic, ModelError, SecondLaw, system::Point,
 };
-use metriplectic_fields::{ChartPoint, Column, Dimension, ScalarField, Space};
+use metriplectic_fields::{ChartPoint, Column, Dimension, ScalarField, Space, stack};
 use metriplectic_manifolds::{Manifold, PointError};
 
 use super::{Components, Flow, Laws, reach};
@@ -20,6 +20,11 @@ impl<Y: Metriplectic> Flow for Y {
     type Space = Y::Manifold;
     type Numbers = Numbers<Y>;
     type Vector = Tangent<Y>;
+
+    #[inline]
+    fn with_room<T>(&self, f: impl FnOnce() -> T) -> T {
+        stack::with_room::<Dim<Y>, T>(f)
+    }
 
     #[inline]
     fn laws(&self, x: &Point<Y>) -> Laws<Numbers<Y>> {

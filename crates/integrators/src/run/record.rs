@@ -15,7 +15,13 @@ impl<F: Flow, M: Method<F>> Steps<'_, F, M> {
     ///
     /// [`RunError::Step`] if a step failed, with the trajectory so far;
     /// [`SpanError::Endless`] if the schedule has no end.
-    pub fn run(mut self) -> Result<Trajectory<F::Space>, RunError<F::Space>> {
+    pub fn run(self) -> Result<Trajectory<F::Space>, RunError<F::Space>> {
+        let flow = self.flow;
+        flow.with_room(|| self.record())
+    }
+
+    /// Takes all steps that are left, and records their states.
+    fn record(mut self) -> Result<Trajectory<F::Space>, RunError<F::Space>> {
         let Progress { count, mut every, most, .. } = self.progress;
         if count.is_none() && matches!(self.progress.step_size, StepSize::Fixed(_)) {
             return Err(SpanError::Endless.into());

@@ -189,9 +189,15 @@ impl<'a, F: Flow, M: Method<F>> Steps<'a, F, M> {
     ///
     /// [`StepError`]; the state is then the last one reached.
     pub fn advance(&mut self) -> Result<&State<F::Space>, StepError> {
-        if self.progress.ending.is_some() {
-            return Ok(&self.state);
+        if self.progress.ending.is_none() {
+            let flow = self.flow;
+            flow.with_room(|| self.take_step())?;
         }
+        Ok(&self.state)
+    }
+
+    /// Takes one step of a run that has not ended.
+    fn take_step(&mut self) -> Result<(), StepError> {
         let step = self.state.step + 1;
         let Advance { taken, h, time } = match &self.progress.step_size {
             &StepSize::Fixed(h) => {
@@ -244,7 +250,7 @@ impl<'a, F: Flow, M: Method<F>> Steps<'a, F, M> {
         if self.watching.is_some() {
             self.look()?;
         }
-        Ok(&self.state)
+        Ok(())
     }
 
     /// Notes the local error of a step, on the few whose number is a power of two.

@@ -82,14 +82,20 @@ impl<H: Field, S: Field> Step for Generic<H, S> {
         // The rounding of the terms of the residual, as in the step with derivatives on paper.
         let floor = f64::EPSILON * (4.0 * h * x.norm_squared() + d.norm());
         let mut residual = self.residual(&start, &d);
-        let (mut size, mut contraction) = (residual.norm(), f64::INFINITY);
-        while size > 0.1 * floor && self.iterations < usize::MAX {
+        // A residual that no longer falls near its rounding is solved.
+        let (mut size, mut contraction) = (residual.norm(), 0.0);
+        let mut first = true;
+        for _ in 0..30 {
+            if size <= 0.1 * floor || contraction > 0.5 && size <= 10.0 * floor {
+                break;
+            }
             let correction = inverse * residual;
             d -= correction;
             self.iterations += 1;
-            if size <= floor || contraction * size <= 0.01 * floor {
+            if size <= floor || !first && contraction * size <= 0.01 * floor {
                 break;
             }
+            first = false;
             residual = self.residual(&start, &d);
             (contraction, size) = (residual.norm() / size, residual.norm());
             if size > 1e3 * floor {

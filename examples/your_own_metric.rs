@@ -32,7 +32,8 @@ fn main() -> Result<(), Box<dyn Error>> {
 
     let about = "Geodesics, and a metriplectic run, from the closure of a metric.";
     let example = Example::new(about, 1200, 0.05);
-    let run = example.run(&system, start, Span::steps(example.step_size, example.steps))?;
+    let span = Span::steps(example.step_size, example.steps);
+    let run = example.run_with(Scheme::new(ChartMidpoint), &system, start, span)?;
 
     let (origin, mut deviation) = (Vector2::new(0.0, 1.0), 0.0_f64);
     let mut at = |angle: f64, t: f64| -> Result<(f64, f64), MetricError> {

@@ -63,10 +63,18 @@
 //! | retraction | order | use it |
 //! |---|---|---|
 //! | **[`WeylMidpoint`](crate::manifolds::WeylMidpoint)** | 2 | unless a row below applies |
-//! | [`Projection`](crate::manifolds::Projection) on spheres, [`Cayley`](crate::manifolds::Cayley) on SO(3) | 2 | with a metric from a closure, whose geodesics they do not integrate |
+//! | **[`ChartMidpoint`](crate::manifolds::ChartMidpoint)** | 2 | with a metric from a closure, on every space: it follows the straight lines of the chart, and integrates no geodesic |
+//! | [`Projection`](crate::manifolds::Projection) on spheres, [`Cayley`](crate::manifolds::Cayley) on SO(3) | 2 | rational paths; with a metric from a closure they cost what `ChartMidpoint` does |
 //! | [`Exponential`](crate::manifolds::Exponential) | 1 | for comparison with schemes based at `x`; it costs as much |
 //!
-//! On flat spaces all paths are straight lines, and `WeylMidpoint` is the midpoint rule.
+//! On flat spaces with a constant metric all paths are straight lines, and `WeylMidpoint` is the midpoint rule. With
+//! canonical metrics `ChartMidpoint` takes the same steps.
+//!
+//! With a metric from a closure `WeylMidpoint` integrates true geodesics, 170 to 320 evaluations of the closure in a
+//! step, and `ChartMidpoint` takes 2.2 to 3.4 (`cargo test --test chart_midpoint -- --nocapture`). Both laws are exact
+//! with both, and the errors are of one size. Take `WeylMidpoint` for the scheme of the paper, if a step must not
+//! depend on the coordinates (with `ChartMidpoint` it does, by `O(h³)`), or if an edge of the domain is infinitely
+//! far in the metric.
 //!
 //! # 6. Which discrete gradient?
 //!

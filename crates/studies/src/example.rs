@@ -4,7 +4,7 @@ use std::{env, error::Error};
 
 use clap::{Arg, ArgAction, Command, builder::RangedU64ValueParser};
 use metriplectic_dynamics::{Metriplectic, system::Point};
-use metriplectic_integrators::{Certificate, Run, Span, State};
+use metriplectic_integrators::{Certificate, Method, Scheme, Span, State};
 use metriplectic_manifolds::{Manifold, WeylMidpoint};
 
 use crate::{Panel, Progress, Report};
@@ -138,7 +138,22 @@ impl Example {
     where
         WeylMidpoint: metriplectic_manifolds::Retraction<Y::Manifold, Y::Metric>,
     {
-        let mut steps = WeylMidpoint.steps(system, start, span)?;
+        self.run_with(Scheme::new(WeylMidpoint), system, start, span)
+    }
+
+    /// Runs a system by another method in the same way.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`run`](Self::run).
+    pub fn run_with<Y: Metriplectic<Manifold: 'static>>(
+        &self,
+        method: impl Method<Y>,
+        system: &Y,
+        start: Point<Y>,
+        span: Span,
+    ) -> Result<Record<Y::Manifold>, Box<dyn Error>> {
+        let mut steps = method.steps(system, start, span)?;
         let mut states = vec![steps.state().clone()];
         let mut progress = Progress::over(span.count());
         for step in 1..=span.count() {

@@ -24,6 +24,7 @@
 //! or return from one ([`Linearised`], [`Root`], [`Iterate`]) has all of its fields.
 
 pub mod attitude;
+pub mod collocation;
 mod digits;
 pub mod discrete_gradient;
 pub mod error;
@@ -37,6 +38,7 @@ pub mod run;
 pub mod step_error;
 
 pub use attitude::{Attitude, AttitudeError};
+pub use collocation::{Gauss, Radau, StageMemory};
 pub use discrete_gradient::{DiscreteGradient, Gonzalez, ItohAbe, MeanValue, SymmetricItohAbe};
 pub use error::{Error, RunError};
 pub use explicit::{DormandPrince5, DormandPrince8, StageFlow};

@@ -1,0 +1,269 @@
+//! The equation of a step with stages.
+//!
+//! The unknowns are the velocities `k̃_i` of the stages at `x`. With `u = h Σ b_j k̃_j` the [chart](super::chart) of the
+//! step has its middle at `z`, and the stages are
+//!
+//! ```math
+//! k_i = T \tilde k_i, \qquad X_i = \varphi_z\Bigl(-\tfrac12 d + h \sum_j a_{ij} k_j\Bigr), \qquad
+//! v_i = T\varphi_z\, k_i = \tilde\Pi_i\, w_{H,i} + \tilde K_i\, w_{S,i} ,
+//! ```
+//!
+//! with the [covectors](super::covectors) that account for the change of each law.
+
+use metriplectic_dynamics::velocity::{Covectors, irreversible, reversible};
+use metriplectic_dynamics::{Metriplectic, SecondLaw, system::Point};
+use metriplectic_fields::{ChartPoint, Column, Dimension, Vector};
+use metriplectic_manifolds::Manifold;
+
+use super::chart::{StepChart, in_chart_at};
+use super::covectors::{
+    AlongStages, Correction, LawStart, OfInvariants, StageCovectors, StagePoints, Stages,
+    StepPolynomial, all_finite, combined,
+};
+use super::tableau::{STAGES, Tableau};
+use crate::method::Laws;
+use crate::midpoint::{Dim, Numbers};
+use crate::round_off::bound::ROUNDED;
+use crate::round_off::drift::{self, DriftCorrection};
+
+/// The velocities of the stages, in the frame at the start of the step.
+pub(super) type Unknowns<Y> = Stages<Vector<<Y as Metriplectic>::Manifold>>;
+
+/// The equation of a step.
+#[derive(Debug)]
+pub(super) struct StageEquation<'a, Y: Metriplectic> {
+    pub(super) tableau: &'static Tableau,
+    pub(super) system: &'a Y,
+    pub(super) x: &'a Point<Y>,
+    pub(super) h: f64,
+    /// The laws at `x`.
+    pub(super) values: Laws<Numbers<Y>>,
+    /// What is taken back of the errors of earlier steps.
+    pub(super) drift: DriftCorrection<Y>,
+    /// Whether the laws are integrated along short steps.
+    pub(super) integrals: bool,
+}
+
+/// The equation at given velocities.
+pub(super) struct Evaluated<Y: Metriplectic> {
+    /// What the velocities of the stages are less than they should be, at `x`.
+    pub(super) residual: Unknowns<Y>,
+    /// The end of the step.
+    pub(super) end: Point<Y>,
+    /// The displacement in the chart of the step.
+    pub(super) d: Vector<Y::Manifold>,
+    /// The laws at the end.
+    pub(super) values: Laws<Numbers<Y>>,
+    /// What the residual leaves of the laws, in units of their round-off.
+    pub(super) excess: f64,
+    /// The errors of the laws at the end, in the same units.
+    pub(super) error: f64,
+    /// The size of the terms of the energy.
+    pub(super) energy_size: f64,
+    /// The round-off of the covectors of the energy.
+    pub(super) noise: Vector<Y::Manifold>,
+    /// The least `|w_S|` of a stage; infinite if the entropy is not corrected.
+    pub(super) entropy_slope: f64,
+    /// What friction adds to the entropy.
+    pub(super) growth: f64,
+    /// What the entropy gains beside it.
+    pub(super) surplus: f64,
+}
+
+impl<'a, Y: Metriplectic> StageEquation<'a, Y> {
+    /// The equation of a step of a fraction of the size, which takes nothing back.
+    pub(super) fn of_fraction(&self, fraction: f64) -> Self {
+        let &Self { tableau, system, x, h, values, integrals, .. } = self;
+        let drift = drift::nothing::<Y>();
+        Self { tableau, system, x, h: h * fraction, values, drift, integrals }
+    }
+
+    /// The equation of a step from `x` with these laws, which takes nothing back.
+    pub(super) fn new(
+        tableau: &'static Tableau,
+        system: &'a Y,
+        (x, values): (&'a Point<Y>, Laws<Numbers<Y>>),
+        h: f64,
+    ) -> Self {
+        let drift = drift::nothing::<Y>();
+        Self { tableau, system, x, h, values, drift, integrals: true }
+    }
+
+    /// The displacement `u = h Σ b_j k̃_j`.
+    #[inline]
+    pub(super) fn displacement(&self, k: &Unknowns<Y>) -> Vector<Y::Manifold> {
+        combined(self.tableau.stages, &self.tableau.weights, k) * self.h
+    }
+
+    /// The chart of the step.
+    #[inline]
+    pub(super) fn chart(&self, k: &Unknowns<Y>) -> Option<StepChart<Y::Manifold>> {
+        StepChart::of(self.x, &self.displacement(k))
+    }
+
+    /// The polynomial of the step.
+    #[inline]
+    pub(super) fn polynomial<'b>(
+        &self,
+        chart: &'b StepChart<Y::Manifold>,
+        k: &Unknowns<Y>,
+    ) -> StepPolynomial<'b, Y::Manifold> {
+        let &Self { tableau, x, h, .. } = self;
+        let mut displacements = [chart.shift; STAGES];
+        for i in 0..tableau.stages {
+            displacements[i] += chart.to_middle(x, &k[i]) * h;
+        }
+        StepPolynomial { tableau, chart, k: displacements, h }
+    }
+
+    /// The equation at these velocities; `None` where it is not defined.
+    pub(super) fn evaluate(&self, k: &Unknowns<Y>) -> Option<Evaluated<Y>> {
+        let &Self { tableau, system, x, h, .. } = self;
+        let chart = self.chart(k)?;
+        let polynomial = self.polynomial(&chart, k);
+        let inside = |x: &Point<Y>| system.manifold().is_inside(x);
+        let stages = StagePoints::of(system.metric(), &polynomial, inside)?;
+        let w = self.covectors(&stages, &polynomial);
+        let mut residual = [Vector::<Y::Manifold>::zero(); STAGES];
+        let mut work = Work::<Dim<Y>>::default();
+        let (mut entropy_slope, mut production) = (f64::INFINITY, 0.0);
+        for i in 0..tableau.stages {
+            let at = ChartPoint::<Y::Manifold>::centre(&stages.x[i]);
+            let here = Covectors {
+                energy: w.energy.w[i],
+                entropy: w.entropy.w[i],
+                invariants: Dim::<Y>::array(|a| w.invariants[a].map(|(kind, l)| (kind, l.w[i]))),
+            };
+            let friction = irreversible(system, &at, &here).ok()?;
+            let off = reversible(system, &at, &here).ok()? + friction - stages.v[i];
+            let weight = h * tableau.weights[i];
+            work.add::<Y>(weight, &here, &off);
+            production += weight * here.entropy.dot(&friction);
+            entropy_slope = entropy_slope.min(here.entropy.magnitude());
+            let zero = Vector::<Y::Manifold>::zero();
+            let in_middle = in_chart_at::<Y::Manifold>(&chart.z, (&stages.x[i], &zero), &off);
+            residual[i] = chart.to_start(x, &in_middle);
+        }
+        let exact = self.is_exact();
+        let excess = work.relative::<Y>(&w, exact) / ROUNDED;
+        let values = Laws {
+            energy: w.energy.end,
+            entropy: w.entropy.end,
+            invariants: Dim::<Y>::array(|a| w.invariants[a].map_or(0.0, |(_, l)| l.end)),
+        };
+        let error = self.errors(&values, production + w.entropy.surplus);
+        let error = error.relative::<Y>(&w, exact) / ROUNDED;
+        let usable = all_finite::<Dim<Y>>(&residual) && !excess.is_nan();
+        usable.then_some(Evaluated {
+            residual,
+            d: chart.d,
+            end: chart.end,
+            values,
+            excess,
+            error,
+            energy_size: w.energy.size,
+            noise: w.energy.noise,
+            entropy_slope: if self.is_exact() { entropy_slope } else { f64::INFINITY },
+            growth: production,
+            surplus: w.entropy.surplus,
+        })
+    }
+
+    /// The changes of the laws, less what they are to be.
+    fn errors(&self, after: &Laws<Numbers<Y>>, rise: f64) -> Work<Dim<Y>> {
+        let Self { values: before, drift, .. } = self;
+        Work {
+            laws: Laws {
+                energy: after.energy - before.energy + drift.energy,
+                entropy: after.entropy - before.entropy + drift.entropy - rise,
+                invariants: Dim::<Y>::array(|a| {
+                    after.invariants[a] - before.invariants[a] + drift.invariants[a]
+                }),
+            },
+        }
+    }
+
+    /// Whether the entropy is corrected.
+    pub(super) fn is_exact(&self) -> bool {
+        self.system.second_law() == SecondLaw::Exact
+    }
+
+    /// The covectors of all laws at the stages.
+    #[inline]
+    fn covectors(
+        &self,
+        stages: &StagePoints<Y::Manifold>,
+        polynomial: &StepPolynomial<'_, Y::Manifold>,
+    ) -> Covectors<Dim<Y>, StageCovectors<Vector<Y::Manifold>>> {
+        let &Self { tableau, system, values, drift, integrals, .. } = self;
+        let scales = Y::Manifold::scales(&polynomial.chart.end);
+        let along = AlongStages { stages, polynomial, scales, integrals };
+        let of_entropy = match (self.is_exact(), tableau.one_sided) {
+            (false, _) => Correction::None,
+            (true, false) => Correction::TwoSided,
+            (true, true) => Correction::OneSided,
+        };
+        let energy = LawStart { value: values.energy, drift: drift.energy };
+        let entropy = LawStart { value: values.entropy, drift: drift.entropy };
+        let laws = [
+            along.of(system.energy(), energy, Correction::TwoSided),
+            along.of(system.entropy(), entropy, of_entropy),
+        ];
+        let start = |a: usize| LawStart { value: values.invariants[a], drift: drift.invariants[a] };
+        let mut invariants = OfInvariants { along: &along, start, seen: 0 };
+        Covectors::new(laws, system.invariants(), &mut invariants)
+    }
+}
+
+/// What a residual changes of each law.
+struct Work<N: Dimension> {
+    laws: Laws<N::Array<f64>>,
+}
+
+impl<N: Dimension> Default for Work<N> {
+    fn default() -> Self {
+        Self { laws: Laws { energy: 0.0, entropy: 0.0, invariants: N::array(|_| 0.0) } }
+    }
+}
+
+impl<N: Dimension> Work<N> {
+    #[inline]
+    fn add<Y: Metriplectic<Manifold: metriplectic_fields::Space<Dim = N>>>(
+        &mut self,
+        weight: f64,
+        w: &Covectors<N, N::Vector<f64>>,
+        off: &N::Vector<f64>,
+    ) {
+        self.laws.energy += weight * w.energy.dot(off);
+        self.laws.entropy += weight * w.entropy.dot(off);
+        for (a, listed) in w.invariants.as_ref().iter().enumerate() {
+            let Some((_, l)) = listed else { break };
+            self.laws.invariants[a] += weight * l.dot(off);
+        }
+    }
+
+    /// The largest, relative to the size of the terms of its law.
+    #[inline]
+    fn relative<Y: Metriplectic<Manifold: metriplectic_fields::Space<Dim = N>>>(
+        &self,
+        w: &Covectors<N, StageCovectors<N::Vector<f64>>>,
+        with_entropy: bool,
+    ) -> f64 {
+        // 0/0 = 0: a law without terms has no round-off, and nothing changes it.
+        let ratio = |work: f64, size: f64| if work == 0.0 { 0.0 } else { work.abs() / size };
+        let mut largest = ratio(self.laws.energy, w.energy.size);
+        if with_entropy {
+            largest = larger(largest, ratio(self.laws.entropy, w.entropy.size));
+        }
+        for (a, listed) in w.invariants.as_ref().iter().enumerate() {
+            let Some((_, l)) = listed else { break };
+            largest = larger(largest, ratio(self.laws.invariants[a], l.size));
+        }
+        largest
+    }
+}
+
+/// The larger one of two numbers; NaN if one is.
+fn larger(a: f64, b: f64) -> f64 {
+    if b.is_nan() || b > a { b } else { a }
+}

@@ -124,25 +124,44 @@ fn on_rotations() {
     orders("SO(3)", &group, &start, 0.4, [64, 32, 16, 12]);
 }
 #[test]
-fn debug() {
-    type Warm = (Vector3<Real>, Vector1<Real>);
-    let warm = System::on(Product(Sphere::<2>::round(), Euclidean::<1>))
-        .bracket((AreaForm, Zero))
-        .energy(|(x, s): &Warm| x.z + x.x * x.x * 0.3 + s.x.exp() * 0.2)
-        .entropy(|(_, s): &Warm| s.x)
+fn more() {
+    let body = System::on(LieDual::se3())
+        .energy(models::heavy)
+        .entropy(models::alignment)
+        .casimir(models::gamma_squared)
         .build()
         .unwrap();
-    let run = Gauss::<3>::default()
-        .run(&warm, (vector![0.6, 0.0, 0.8], Vector1::new(0.0)), Span::steps(6.0 / 16.0, 16))
+    orders("se(3)*", &body, &SVector::from(models::HEAVY), 4.0, [64, 32, 16, 12]);
+    let metric = |x: &Vector3<Real>| {
+        let [a, b] = [x.x * 0.3, x.y * 0.2];
+        let (o, one) = (Real::from(0.0), Real::from(1.0));
+        Matrix3::new(a * a + 1.0, a * b, o, a * b, b * b + 1.5, o, o, o, one + x.z * x.z * 0.1)
+    };
+    let system = System::on(Chart::<3>::new(|x| x.norm() < 4.0))
+        .metric(Metric::field(metric))
+        .bracket(Nambu::default())
+        .energy(|x: &Vector3<Real>| x.x * x.x * 0.5 + x.y * x.y + x.z * x.z * 1.5 + x.x * x.y * 0.3)
+        .entropy(|x: &Vector3<Real>| x.norm_squared() * 0.5 + x.z * 0.2)
+        .build()
         .unwrap();
-    for s in run.iter() {
-        println!(
-            "D {} {:.3e} {:.3e} {:?}",
-            s.step,
-            s.energy - run.certificate().initial_energy,
-            s.entropy,
-            s.point
-        );
-    }
-    println!("D {}", run.certificate());
+    orders("chart", &system, &vector![0.5, -0.6, 0.4], 2.0, [32, 16, 12, 8]);
+}
+#[test]
+fn more2() {
+    let system = System::on(Euclidean::<10>)
+        .bracket(Poisson::constant(models::pendulum_bracket()).unwrap())
+        .energy(models::pendulum_energy)
+        .entropy(|x: &models::State10| x[8] + x[9])
+        .dissipation(FieldDissipation(models::heat_exchange))
+        .momentum(models::angular_momentum)
+        .build()
+        .unwrap();
+    orders("double pendulum", &system, &SVector::from(models::PENDULUM), 2.0, [64, 32, 16, 12]);
+    let globe = System::on(models::Globe)
+        .metric(Metric::field(|_: &Vector3<Real>| Matrix3::identity()))
+        .bracket(AreaForm)
+        .energy(|x: &Vector3<Real>| x.z + x.x * x.x * 0.3 + x.y * x.x * 0.2)
+        .build()
+        .unwrap();
+    orders("globe", &globe, &models::Globe::point(vector![0.6, 0.0, 0.8]), 12.0, [128, 64, 32, 24]);
 }

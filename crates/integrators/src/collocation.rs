@@ -5,6 +5,7 @@ mod covectors;
 mod dense;
 mod equation;
 mod fallbacks;
+mod full;
 mod linear;
 mod memory;
 mod solve;

@@ -29,6 +29,9 @@ use crate::round_off::drift::{self, DriftCorrection};
 /// The velocities of the stages, in the frame at the start of the step.
 pub(super) type Unknowns<Y> = Stages<Vector<<Y as Metriplectic>::Manifold>>;
 
+/// Units of round-off up to which a velocity that changes the energy is one that has lost digits.
+const ROUNDINGS: f64 = 16.0;
+
 /// The equation of a step.
 #[derive(Debug)]
 pub(super) struct StageEquation<'a, Y: Metriplectic> {
@@ -42,7 +45,17 @@ pub(super) struct StageEquation<'a, Y: Metriplectic> {
     pub(super) drift: DriftCorrection<Y>,
     /// Whether the laws are integrated along short steps.
     pub(super) integrals: bool,
+    /// The round-off of the terms of a velocity; zero where it is not known.
+    pub(super) rounding: Vector<Y::Manifold>,
 }
+
+impl<Y: Metriplectic> Clone for StageEquation<'_, Y> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<Y: Metriplectic> Copy for StageEquation<'_, Y> {}
 
 /// The equation at given velocities.
 pub(super) struct Evaluated<Y: Metriplectic> {
@@ -54,9 +67,13 @@ pub(super) struct Evaluated<Y: Metriplectic> {
     pub(super) d: Vector<Y::Manifold>,
     /// The laws at the end.
     pub(super) values: Laws<Numbers<Y>>,
-    /// What the residual leaves of the laws, in units of their round-off.
+    /// What the residual leaves of the energy and the further invariants, in units of their round-off.
     pub(super) excess: f64,
-    /// The errors of the laws at the end, in the same units.
+    /// What it leaves of the entropy, and the size of its terms.
+    pub(super) entropy: Left,
+    /// The largest `|w_S|` of a stage, entry by entry.
+    pub(super) entropy_covector: Vector<Y::Manifold>,
+    /// The errors of the energy and the further invariants at the end, in units of their round-off.
     pub(super) error: f64,
     /// The size of the terms of the energy.
     pub(super) energy_size: f64,
@@ -70,12 +87,19 @@ pub(super) struct Evaluated<Y: Metriplectic> {
     pub(super) surplus: f64,
 }
 
+/// What a residual leaves of a law.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Left {
+    /// The change of the law, less what it is to be.
+    pub(super) work: f64,
+    /// The size of the terms of the law.
+    pub(super) size: f64,
+}
+
 impl<'a, Y: Metriplectic> StageEquation<'a, Y> {
     /// The equation of a step of a fraction of the size, which takes nothing back.
     pub(super) fn of_fraction(&self, fraction: f64) -> Self {
-        let &Self { tableau, system, x, h, values, integrals, .. } = self;
-        let drift = drift::nothing::<Y>();
-        Self { tableau, system, x, h: h * fraction, values, drift, integrals }
+        Self { h: self.h * fraction, drift: drift::nothing::<Y>(), ..*self }
     }
 
     /// The equation of a step from `x` with these laws, which takes nothing back.
@@ -85,8 +109,8 @@ impl<'a, Y: Metriplectic> StageEquation<'a, Y> {
         (x, values): (&'a Point<Y>, Laws<Numbers<Y>>),
         h: f64,
     ) -> Self {
-        let drift = drift::nothing::<Y>();
-        Self { tableau, system, x, h, values, drift, integrals: true }
+        let (drift, rounding) = (drift::nothing::<Y>(), Vector::<Y::Manifold>::zero());
+        Self { tableau, system, x, h, values, drift, integrals: true, rounding }
     }
 
     /// The displacement `u = h Σ b_j k̃_j`.
@@ -127,6 +151,7 @@ impl<'a, Y: Metriplectic> StageEquation<'a, Y> {
         let mut residual = [Vector::<Y::Manifold>::zero(); STAGES];
         let mut work = Work::<Dim<Y>>::default();
         let (mut entropy_slope, mut production) = (f64::INFINITY, 0.0);
+        let mut entropy_covector = Vector::<Y::Manifold>::zero();
         for i in 0..tableau.stages {
             let at = ChartPoint::<Y::Manifold>::centre(&stages.x[i]);
             let here = Covectors {
@@ -135,24 +160,30 @@ impl<'a, Y: Metriplectic> StageEquation<'a, Y> {
                 invariants: Dim::<Y>::array(|a| w.invariants[a].map(|(kind, l)| (kind, l.w[i]))),
             };
             let friction = irreversible(system, &at, &here).ok()?;
-            let off = reversible(system, &at, &here).ok()? + friction - stages.v[i];
+            let velocity = reversible(system, &at, &here).ok()? + friction;
+            let off = self.conserving(velocity, &here.energy) - stages.v[i];
             let weight = h * tableau.weights[i];
             work.add::<Y>(weight, &here, &off);
+            let sizes = here.entropy.abs();
+            entropy_covector =
+                Vector::<Y::Manifold>::from_index(|c| entropy_covector[c].max(sizes[c]));
             production += weight * here.entropy.dot(&friction);
             entropy_slope = entropy_slope.min(here.entropy.magnitude());
             let zero = Vector::<Y::Manifold>::zero();
             let in_middle = in_chart_at::<Y::Manifold>(&chart.z, (&stages.x[i], &zero), &off);
             residual[i] = chart.to_start(x, &in_middle);
         }
-        let exact = self.is_exact();
-        let excess = work.relative::<Y>(&w, exact) / ROUNDED;
+        let excess = work.relative::<Y>(&w) / ROUNDED;
+        let entropy = Left {
+            work: if self.is_exact() { work.laws.entropy } else { 0.0 },
+            size: w.entropy.size,
+        };
         let values = Laws {
             energy: w.energy.end,
             entropy: w.entropy.end,
             invariants: Dim::<Y>::array(|a| w.invariants[a].map_or(0.0, |(_, l)| l.end)),
         };
-        let error = self.errors(&values, production + w.entropy.surplus);
-        let error = error.relative::<Y>(&w, exact) / ROUNDED;
+        let error = self.errors(&values).relative::<Y>(&w) / ROUNDED;
         let usable = all_finite::<Dim<Y>>(&residual) && !excess.is_nan();
         usable.then_some(Evaluated {
             residual,
@@ -160,6 +191,8 @@ impl<'a, Y: Metriplectic> StageEquation<'a, Y> {
             end: chart.end,
             values,
             excess,
+            entropy,
+            entropy_covector,
             error,
             energy_size: w.energy.size,
             noise: w.energy.noise,
@@ -169,18 +202,37 @@ impl<'a, Y: Metriplectic> StageEquation<'a, Y> {
         })
     }
 
-    /// The changes of the laws, less what they are to be.
-    fn errors(&self, after: &Laws<Numbers<Y>>, rise: f64) -> Work<Dim<Y>> {
+    /// The changes of the energy and the further invariants, less what they are to be.
+    fn errors(&self, after: &Laws<Numbers<Y>>) -> Work<Dim<Y>> {
         let Self { values: before, drift, .. } = self;
         Work {
             laws: Laws {
                 energy: after.energy - before.energy + drift.energy,
-                entropy: after.entropy - before.entropy + drift.entropy - rise,
+                entropy: 0.0,
                 invariants: Dim::<Y>::array(|a| {
                     after.invariants[a] - before.invariants[a] + drift.invariants[a]
                 }),
             },
         }
+    }
+
+    /// A velocity that the covector of the energy annihilates. Where friction is stiff the sum of its terms has lost
+    /// digits of this number: they are made good within the round-off of each term.
+    fn conserving(
+        &self,
+        velocity: Vector<Y::Manifold>,
+        w: &Vector<Y::Manifold>,
+    ) -> Vector<Y::Manifold> {
+        let parts = Vector::<Y::Manifold>::from_index(|c| self.rounding[c] * w[c]);
+        let (work, size) = (w.dot(&velocity), parts.magnitude());
+        if !(work.abs() <= ROUNDINGS * size && size > 0.0) {
+            return velocity;
+        }
+        let fraction = work / size;
+        velocity
+            - Vector::<Y::Manifold>::from_index(|c| {
+                self.rounding[c] * (parts[c] / size) * fraction
+            })
     }
 
     /// Whether the entropy is corrected.
@@ -242,19 +294,15 @@ impl<N: Dimension> Work<N> {
         }
     }
 
-    /// The largest, relative to the size of the terms of its law.
+    /// The largest of the energy and the further invariants, relative to the size of the terms of the law.
     #[inline]
     fn relative<Y: Metriplectic<Manifold: metriplectic_fields::Space<Dim = N>>>(
         &self,
         w: &Covectors<N, StageCovectors<N::Vector<f64>>>,
-        with_entropy: bool,
     ) -> f64 {
         // 0/0 = 0: a law without terms has no round-off, and nothing changes it.
         let ratio = |work: f64, size: f64| if work == 0.0 { 0.0 } else { work.abs() / size };
         let mut largest = ratio(self.laws.energy, w.energy.size);
-        if with_entropy {
-            largest = larger(largest, ratio(self.laws.entropy, w.entropy.size));
-        }
         for (a, listed) in w.invariants.as_ref().iter().enumerate() {
             let Some((_, l)) = listed else { break };
             largest = larger(largest, ratio(self.laws.invariants[a], l.size));

@@ -8,7 +8,7 @@ use super::covectors::combined;
 use super::equation::{StageEquation, Unknowns};
 use super::linear::Linear;
 use super::memory::StageMemory;
-use super::solve::{Budget, Solved, Unsolved};
+use super::solve::{Budget, Derivatives, Solved, Unsolved};
 use super::step::try_step;
 use super::tableau::{STAGES, Tableau};
 use crate::method::{Effort, Laws, Taken};
@@ -58,12 +58,15 @@ impl StepFailure {
     }
 }
 
-/// Evaluations from the guess.
-const WHOLE: Budget = Budget { evaluations: 30, tolerance: 1.0 };
-/// Evaluations from rest.
-const FROM_REST: Budget = Budget { evaluations: 20, tolerance: 1.0 };
+/// Corrections from the guess.
+const WHOLE: Budget =
+    Budget { corrections: 30, tolerance: 1.0, derivatives: Derivatives::InTheMiddle };
+/// Corrections from rest.
+const FROM_REST: Budget = Budget { corrections: 20, ..WHOLE };
+/// The same with the derivatives of all stages.
+const FULL: Budget = Budget { derivatives: Derivatives::OfAllStages, ..WHOLE };
 /// Those of a step on the way to a larger one, which need not be solved to round-off.
-const ON_THE_WAY: Budget = Budget { evaluations: 12, tolerance: 1e6 };
+const ON_THE_WAY: Budget = Budget { corrections: 8, tolerance: 1e6, ..FULL };
 /// Steps of growing sizes that may be tried to get to the size that is asked for.
 const INCREMENTS: usize = 200;
 /// The fraction of what has been reached below which an increment of the size means that the branch of solutions
@@ -84,6 +87,7 @@ pub(super) fn solve<Y: Metriplectic>(
             Ok(solved) => solved.evaluations,
             Err(unsolved) => unsolved.evaluations,
         };
+        if let Err(e) = &solved { eprintln!("D failed {budget:?} {e:?}"); }
         solved.map_err(|unsolved| {
             if unsolved.residual < best.residual || best.evaluations == 0 {
                 best = unsolved;
@@ -99,9 +103,12 @@ pub(super) fn solve<Y: Metriplectic>(
     if let Ok(solved) = attempt(rest, FROM_REST, effort) {
         return Ok(solved);
     }
+    if let Ok(solved) = attempt(guess.unwrap_or(rest), FULL, effort) {
+        return Ok(solved);
+    }
     if fallbacks == Fallbacks::All
         && let Some(near) = continue_in_step_size(equation, effort)
-        && let Ok(solved) = attempt(near, WHOLE, effort)
+        && let Ok(solved) = attempt(near, FULL, effort)
     {
         return Ok(solved);
     }
@@ -121,14 +128,8 @@ fn continue_in_step_size<Y: Metriplectic>(
     let (mut fraction, mut increment) = (0.0, 0.125);
     for _ in 0..INCREMENTS {
         let next = f64::min(fraction + increment, 1.0);
-        let guess = if fraction > 0.0 {
-            let ratio = next / fraction;
-            std::array::from_fn(|i| {
-                combined(tableau.stages, &tableau.velocity(tableau.nodes[i] * ratio), &k)
-            })
-        } else {
-            k
-        };
+        // The same displacements: once a step is long for friction they hardly change with its size.
+        let guess = if fraction > 0.0 { k.map(|k| k * (fraction / next)) } else { k };
         let part = equation.of_fraction(next);
         let solved = part.solve(guess, ON_THE_WAY);
         effort.iterations += match &solved {

@@ -19,7 +19,7 @@ use metriplectic_fields::{Column, Dimension, Matrix, ScalarField, Space, Square}
 use metriplectic_manifolds::Manifold;
 
 use super::covectors::{Stages, combined};
-use super::equation::{Evaluated, StageEquation, Unknowns};
+use super::equation::{Evaluated, Left, StageEquation, Unknowns};
 use super::tableau::{STAGES, Tableau};
 use crate::midpoint::Dim;
 use crate::round_off::bound::ROUNDED;
@@ -33,7 +33,9 @@ pub(super) struct Linear<N: Dimension> {
     slope: N::Matrix<f64>,
     /// The matrix `M⁻¹`.
     inverse: N::Matrix<f64>,
-    /// The round-off of a displacement by that of the terms of the velocity.
+    /// The round-off of the terms of a displacement.
+    rounded: N::Vector<f64>,
+    /// What the solution makes of it.
     terms: N::Vector<f64>,
     /// The derivative of a displacement along the covector of the energy, and `M⁻¹` times it.
     sensitivity: N::Matrix<f64>,
@@ -99,6 +101,7 @@ impl<N: Dimension> Linear<N> {
             h,
             slope,
             inverse,
+            rounded: terms,
             terms: inverse.abs() * terms,
             sensitivity,
             moved,
@@ -123,6 +126,24 @@ impl<N: Dimension> Linear<N> {
         }
         let first = self.terms + self.sensitivity.abs() * at.noise + self.moved;
         (first + largest * f64::EPSILON) * MARGIN
+    }
+
+    /// The round-off of the terms of a velocity.
+    pub(super) fn rounding(&self) -> N::Vector<f64> {
+        self.rounded * self.h.abs().recip()
+    }
+
+    /// What a residual leaves of the laws, in units of round-off. That of the production of entropy is the one of its
+    /// terms, which may be large where friction is stiff.
+    pub(super) fn excess<Y>(&self, at: &Evaluated<Y>) -> f64
+    where
+        Y: Metriplectic<Manifold: Space<Dim = N>>,
+    {
+        let Left { work, size } = at.entropy;
+        if work == 0.0 {
+            return at.excess;
+        }
+        at.excess.max(work.abs() / (ROUNDED * size + at.entropy_covector.dot(&self.rounded)))
     }
 
     /// The root mean square of displacements by these velocities, in units of their round-off; infinite if it is not

@@ -5,6 +5,7 @@ use metriplectic_fields::Vector;
 
 use super::chart::StepChart;
 use super::equation::{Evaluated, StageEquation, Unknowns};
+use super::full::Full;
 use super::linear::Linear;
 use crate::method::{Flow as _, Laws};
 use crate::midpoint::{Dim, Numbers};
@@ -38,10 +39,21 @@ pub(super) struct Unsolved {
 /// How far the iteration goes.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Budget {
-    /// Evaluations of the equation.
-    pub(super) evaluations: usize,
+    /// Corrections.
+    pub(super) corrections: usize,
     /// The correction that counts as solved, in units of its round-off.
     pub(super) tolerance: f64,
+    /// Which derivatives they are computed with.
+    pub(super) derivatives: Derivatives,
+}
+
+/// The derivatives that a correction is computed with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Derivatives {
+    /// Those of the equation of motion in the middle of the step.
+    InTheMiddle,
+    /// Those of the equation of the step along all of its unknowns.
+    OfAllStages,
 }
 
 /// The multiple of round-off at which a correction that no longer falls counts as solved.
@@ -61,13 +73,16 @@ struct Iterate<Y: Metriplectic> {
     at: Evaluated<Y>,
     delta: Unknowns<Y>,
     round_off: Vector<Y::Manifold>,
+    /// The size of the correction, in units of round-off.
     size: f64,
+    /// What is left of the laws, in units of round-off.
+    excess: f64,
 }
 
 impl<Y: Metriplectic> Iterate<Y> {
     /// What is left, in units of the round-off of the solution and of the laws.
     fn total(&self) -> f64 {
-        self.size.max(self.at.excess)
+        self.size.max(self.excess)
     }
 
     /// Whether less than a fraction is left of another one; near round-off of the laws alone.
@@ -85,105 +100,15 @@ struct End<Y: Metriplectic> {
 }
 
 impl<Y: Metriplectic> StageEquation<'_, Y> {
-    fn iterate(&self, linear: &Linear<Dim<Y>>, k: Unknowns<Y>) -> Option<Iterate<Y>> {
-        let at = self.evaluate(&k)?;
-        let round_off = linear.round_off(&at, &k);
-        let (delta, size) = linear.correction(&at.residual, &round_off);
-        size.is_finite().then_some(Iterate { k, at, delta, round_off, size })
-    }
-
     /// The velocities near a guess, at which the laws hold.
     pub(super) fn solve(&self, guess: Unknowns<Y>, budget: Budget) -> Result<Solved<Y>, Unsolved> {
-        let solved = self.iterated(guess, budget)?;
+        let solved = Iteration::start(self, guess, budget)?;
         if solved.at.error <= STALLED_LAW || !self.integrals || budget.tolerance > 1.0 {
             return Ok(solved);
         }
         // An integral along the step is off by more than its estimate.
-        let equation = Self { integrals: false, ..*self };
-        let again = equation.iterated(solved.k, budget)?;
+        let again = Iteration::start(&Self { integrals: false, ..*self }, solved.k, budget)?;
         Ok(Solved { evaluations: solved.evaluations + again.evaluations, ..again })
-    }
-
-    fn iterated(&self, guess: Unknowns<Y>, budget: Budget) -> Result<Solved<Y>, Unsolved> {
-        let failed = |residual, edge, evaluations| Unsolved { residual, edge, evaluations };
-        let Some(mut linear) = Linear::of(self, &guess) else {
-            return Err(failed(f64::INFINITY, true, 0));
-        };
-        let Some(mut here) = self.iterate(&linear, guess) else {
-            return Err(failed(f64::INFINITY, true, 1));
-        };
-        let (mut evaluations, mut contraction) = (1, f64::INFINITY);
-        let mut fresh = true;
-        loop {
-            if here.total() <= budget.tolerance {
-                let Iterate { k, at, round_off, .. } = here;
-                return Ok(Solved { k, at, linear, round_off, evaluations });
-            }
-            let promised = contraction * here.total();
-            if promised <= SURE
-                && let Some(End { k, chart, values }) = self.last(&here)
-            {
-                let Iterate { at, round_off, .. } = here;
-                let at = Evaluated { end: chart.end, d: chart.d, values, ..at };
-                return Ok(Solved { k, at, linear, round_off, evaluations });
-            }
-            if evaluations >= budget.evaluations {
-                return Err(failed(here.size, false, evaluations));
-            }
-            let Some(next) = self.descend(&linear, &here, &mut evaluations) else {
-                if here.size <= STALL && here.at.excess <= STALLED_LAW {
-                    let Iterate { k, at, round_off, .. } = here;
-                    return Ok(Solved { k, at, linear, round_off, evaluations });
-                }
-                if !fresh && let Some(renewed) = Linear::of(self, &here.k) {
-                    (linear, fresh) = (renewed, true);
-                    (here.delta, here.size) = linear.correction(&here.at.residual, &here.round_off);
-                    contraction = f64::INFINITY;
-                    continue;
-                }
-                return Err(failed(
-                    here.size,
-                    self.evaluate(&moved(&here, 1.0)).is_none(),
-                    evaluations,
-                ));
-            };
-            contraction = (next.size / here.size).max(next.at.excess / here.at.excess);
-            let slow = next.size > SLOW * here.size;
-            here = next;
-            fresh = false;
-            if slow
-                && here.size > STALL
-                && let Some(renewed) = Linear::of(self, &here.k)
-            {
-                (linear, fresh) = (renewed, true);
-                here.round_off = linear.round_off(&here.at, &here.k);
-                (here.delta, here.size) = linear.correction(&here.at.residual, &here.round_off);
-                contraction = f64::INFINITY;
-            }
-        }
-    }
-
-    /// The longest of the corrections `Δ, Δ/2, Δ/4, …` after which the next one is shorter.
-    fn descend(
-        &self,
-        linear: &Linear<Dim<Y>>,
-        here: &Iterate<Y>,
-        evaluations: &mut usize,
-    ) -> Option<Iterate<Y>> {
-        let mut length = 1.0;
-        for _ in 0..=HALVINGS {
-            *evaluations += 1;
-            if let Some(next) = self.iterate(linear, moved(here, length))
-                && next.is_nearer(here, 1.0 - 0.25 * length)
-            {
-                return Some(next);
-            }
-            if here.size <= STALL {
-                return None;
-            }
-            length *= 0.5;
-        }
-        None
     }
 
     /// The end after the last correction, with the laws evaluated there; `None` if they are off.
@@ -198,6 +123,131 @@ impl<Y: Metriplectic> StageEquation<'_, Y> {
             return None;
         }
         Some(End { k, chart, values })
+    }
+}
+
+/// An iteration under way.
+struct Iteration<'a, Y: Metriplectic> {
+    equation: StageEquation<'a, Y>,
+    budget: Budget,
+    linear: Linear<Dim<Y>>,
+    /// The derivatives of all stages, where these are asked for.
+    full: Option<Full>,
+    evaluations: usize,
+    /// Corrections so far.
+    corrections: usize,
+}
+
+impl<'a, Y: Metriplectic> Iteration<'a, Y> {
+    /// Iterates from a guess.
+    fn start(
+        equation: &StageEquation<'a, Y>,
+        guess: Unknowns<Y>,
+        budget: Budget,
+    ) -> Result<Solved<Y>, Unsolved> {
+        let undefined = Unsolved { residual: f64::INFINITY, edge: true, evaluations: 1 };
+        let linear = Linear::of(equation, &guess).ok_or(undefined)?;
+        let equation = StageEquation { rounding: linear.rounding(), ..*equation };
+        let at = equation.evaluate(&guess).ok_or(undefined)?;
+        let mut iteration =
+            Self { equation, budget, linear, full: None, evaluations: 1, corrections: 0 };
+        if budget.derivatives == Derivatives::OfAllStages {
+            iteration.full = Full::of(&equation, &guess, &at);
+            iteration.evaluations += iteration.full.as_ref().map_or(0, |full| full.evaluations);
+        }
+        let here = iteration.corrected(guess, at).ok_or(undefined)?;
+        iteration.run(here)
+    }
+
+    /// An evaluation with its correction.
+    fn corrected(&self, k: Unknowns<Y>, at: Evaluated<Y>) -> Option<Iterate<Y>> {
+        let round_off = self.linear.round_off(&at, &k);
+        let (delta, size) = match &self.full {
+            Some(full) => {
+                let delta = full.solve(&at.residual);
+                (delta, self.linear.measure(&delta, &round_off))
+            }
+            None => self.linear.correction(&at.residual, &round_off),
+        };
+        let excess = self.linear.excess(&at);
+        size.is_finite().then_some(Iterate { k, at, delta, round_off, size, excess })
+    }
+
+    /// Forms the derivatives anew.
+    fn renew(&mut self, here: Iterate<Y>) -> Option<Iterate<Y>> {
+        let Iterate { k, at, .. } = here;
+        self.linear = Linear::of(&self.equation, &k)?;
+        self.equation.rounding = self.linear.rounding();
+        if self.full.is_some() {
+            self.full = Full::of(&self.equation, &k, &at);
+            self.evaluations += self.full.as_ref()?.evaluations;
+        }
+        self.corrected(k, at)
+    }
+
+    fn solved(self, here: Iterate<Y>) -> Solved<Y> {
+        let Iterate { k, at, round_off, .. } = here;
+        Solved { k, at, linear: self.linear, round_off, evaluations: self.evaluations }
+    }
+
+    fn run(mut self, mut here: Iterate<Y>) -> Result<Solved<Y>, Unsolved> {
+        let (mut contraction, mut is_fresh) = (f64::INFINITY, true);
+        loop {
+            if here.total() <= self.budget.tolerance {
+                return Ok(self.solved(here));
+            }
+            if contraction * here.total() <= SURE
+                && let Some(End { k, chart, values }) = self.equation.last(&here)
+            {
+                let at = Evaluated { end: chart.end, d: chart.d, values, ..here.at };
+                return Ok(self.solved(Iterate { k, at, ..here }));
+            }
+            let (size, evaluations) = (here.size, self.evaluations);
+            let failed = Unsolved { residual: size, edge: false, evaluations };
+            if self.corrections >= self.budget.corrections {
+                return Err(failed);
+            }
+            let Some(next) = self.descend(&here) else {
+                if here.size <= STALL && here.excess <= STALLED_LAW {
+                    return Ok(self.solved(here));
+                }
+                if is_fresh {
+                    let edge = self.equation.evaluate(&moved(&here, 1.0)).is_none();
+                    return Err(Unsolved { edge, evaluations: self.evaluations, ..failed });
+                }
+                here = self.renew(here).ok_or(failed)?;
+                (contraction, is_fresh) = (f64::INFINITY, true);
+                continue;
+            };
+            contraction = (next.size / here.size).max(next.excess / here.excess);
+            let is_slow = next.size > SLOW * here.size && next.size > STALL;
+            (here, is_fresh) = (next, false);
+            if is_slow {
+                here = self.renew(here).ok_or(failed)?;
+                (contraction, is_fresh) = (f64::INFINITY, true);
+            }
+        }
+    }
+
+    /// The longest of the corrections `Δ, Δ/2, Δ/4, …` after which the next one is shorter.
+    fn descend(&mut self, here: &Iterate<Y>) -> Option<Iterate<Y>> {
+        self.corrections += 1;
+        let mut length = 1.0;
+        for _ in 0..=HALVINGS {
+            self.evaluations += 1;
+            let k = moved(here, length);
+            if let Some(at) = self.equation.evaluate(&k)
+                && let Some(next) = self.corrected(k, at)
+                && next.is_nearer(here, 1.0 - 0.25 * length)
+            {
+                return Some(next);
+            }
+            if here.size <= STALL {
+                return None;
+            }
+            length *= 0.5;
+        }
+        None
     }
 }
 

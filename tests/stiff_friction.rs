@@ -36,7 +36,7 @@ fn gas_study() {
             report(&format!("{alpha:.0e} N {n} Radau 3"), Radau::<3>::default(), &system, &x0, span, Some(&exact));
             report(&format!("{alpha:.0e} N {n} Radau 4"), Radau::<4>::default(), &system, &x0, span, Some(&exact));
         }
-        for k in [4, 6, 8, 10] {
+        for k in [4, 8] {
             let span = Span::until(2.0).tolerance(10_f64.powi(-k)).at_most(2);
             report(&format!("{alpha:.0e} tol {k} Radau 2"), Radau::<2>::default(), &system, &x0, span, Some(&exact));
             report(&format!("{alpha:.0e} tol {k} Radau 3"), Radau::<3>::default(), &system, &x0, span, Some(&exact));
@@ -71,7 +71,7 @@ fn temperatures() {
         .build()
         .unwrap();
     for start in [[0.01, 3.0], [1.0, 3.0]] {
-        for k in -8..=3 {
+        for k in [-6, -4, -3, -2, 0, 2, 3] {
             let h = 10_f64.powi(k);
             let span = Span::steps(h, 20);
             let x = vector![start[0], start[1]];
@@ -79,9 +79,8 @@ fn temperatures() {
             report(&format!("flat {start:?} 1e{k} Radau 2"), Radau::<2>::default(), &flat, &x, span, None);
             report(&format!("flat {start:?} 1e{k} Radau 3"), Radau::<3>::default(), &flat, &x, span, None);
             report(&format!("flat {start:?} 1e{k} Radau 4"), Radau::<4>::default(), &flat, &x, span, None);
-            report(&format!("flat {start:?} 1e{k} Gauss 2"), Gauss::<2>::default(), &flat, &x, span, None);
             report(&format!("half {start:?} 1e{k} Radau 3"), Radau::<3>::default(), &positive, &p, span, None);
-            report(&format!("half {start:?} 1e{k} Gauss 3"), Gauss::<3>::default(), &positive, &p, span, None);
+            report(&format!("half {start:?} 1e{k} Radau 2"), Radau::<2>::default(), &positive, &p, span, None);
         }
     }
 }
@@ -110,7 +109,7 @@ fn oscillator() {
                 let x = (-t * slow).exp();
                 let e = 1.0 + 0.5 + 0.5 * p0 * p0;
                 let exact = vec![x, -x * slow, e - 0.5 * x * x];
-                for (m, run) in [("Radau 2", 2), ("Radau 3", 3), ("Radau 4", 4), ("Gauss 3", 5), ("Weyl", 6)] {
+                for (m, run) in [("Radau 2", 2), ("Radau 3", 3), ("Radau 4", 4)] {
                     let x0 = vector![1.0, p0, 1.0];
                     let name = format!("γ {gamma:.0e} {name} h {h:.0e} {m}");
                     let span = Span::steps(h, n);

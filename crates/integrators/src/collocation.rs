@@ -6,6 +6,7 @@ mod dense;
 mod equation;
 mod fallbacks;
 mod full;
+mod heat;
 mod linear;
 mod memory;
 mod solve;

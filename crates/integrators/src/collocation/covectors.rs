@@ -54,8 +54,8 @@ pub(super) struct StageCovectors<V> {
     pub(super) size: f64,
     /// The round-off of the covectors, the largest over the stages.
     pub(super) noise: V,
-    /// What a correction on one side leaves: the law gains this much more than its covectors say.
-    pub(super) surplus: f64,
+    /// The number `δ` with what is taken back of errors; zero if it is corrected.
+    pub(super) left: f64,
 }
 
 /// The start of a law: its value, and what is taken back of its error.
@@ -70,10 +70,10 @@ pub(super) struct LawStart {
 pub(super) enum Correction {
     /// Not at all: they are differentials.
     None,
+    /// Not here: they are differentials, and `δ` is known.
+    Later,
     /// So that the law has no error.
-    TwoSided,
-    /// So that the law gains no less than they say.
-    OneSided,
+    Here,
 }
 
 /// The polynomial of a step, in the chart at its middle.
@@ -151,6 +151,18 @@ impl<M: Manifold> StagePoints<M> {
     }
 }
 
+impl<M: Manifold> StagePoints<M> {
+    /// The covector `♭v_i`.
+    pub(super) fn flat(&self, i: usize) -> Vector<M> {
+        self.flat[i] * self.unit
+    }
+
+    /// The number `D`.
+    pub(super) const fn square(&self) -> f64 {
+        self.square * self.unit * self.unit
+    }
+}
+
 /// Computes the covectors of one field after the other.
 pub(super) struct AlongStages<'a, M: Space> {
     pub(super) stages: &'a StagePoints<M>,
@@ -182,7 +194,7 @@ impl<M: Manifold> AlongStages<'_, M> {
             change += tableau.weights[i] * h.abs() * M::pairing_size(&w[i], &stages.v[i]);
             size += tableau.weights[i] * w[i].abs().dot(scales);
         }
-        let none = StageCovectors { w, end, size, noise: zero, surplus: 0.0 };
+        let none = StageCovectors { w, end, size, noise: zero, left: 0.0 };
         if correction == Correction::None {
             return none;
         }
@@ -200,13 +212,12 @@ impl<M: Manifold> AlongStages<'_, M> {
             noise *= 1.0 - weight;
         }
         delta += start.drift;
-        let mut surplus = 0.0;
-        if correction == Correction::OneSided && delta > 0.0 {
-            (surplus, delta) = (delta, 0.0);
+        if correction == Correction::Later {
+            return StageCovectors { left: delta, ..none };
         }
         let squares = stages.square * stages.unit;
         if squares == 0.0 {
-            return StageCovectors { surplus, ..none };
+            return none;
         }
         let (scale, blur) = (delta / squares, (noise / squares).abs());
         let mut covector_noise = zero;
@@ -218,7 +229,7 @@ impl<M: Manifold> AlongStages<'_, M> {
                 here.max(covector_noise[c])
             });
         }
-        StageCovectors { w, end, size, noise: covector_noise, surplus }
+        StageCovectors { w, end, size, noise: covector_noise, left: 0.0 }
     }
 
     /// The change of a field along the polynomial of the step, as an integral.
@@ -247,7 +258,7 @@ impl<M: Manifold, F: Fn(usize) -> LawStart> Gradient<M> for OfInvariants<'_, '_,
     #[inline]
     fn of(&mut self, f: &impl ScalarField<M>) -> StageCovectors<Vector<M>> {
         self.seen += 1;
-        self.along.of(f, (self.start)(self.seen - 1), Correction::TwoSided)
+        self.along.of(f, (self.start)(self.seen - 1), Correction::Here)
     }
 }
 

@@ -10,7 +10,7 @@
 //!
 //! with the [covectors](super::covectors) that account for the change of each law.
 
-use metriplectic_dynamics::velocity::{Covectors, irreversible, reversible};
+use metriplectic_dynamics::velocity::{Covectors, differentials, irreversible, reversible};
 use metriplectic_dynamics::{Metriplectic, SecondLaw, system::Point};
 use metriplectic_fields::{ChartPoint, Column, Dimension, Vector};
 use metriplectic_manifolds::Manifold;
@@ -20,6 +20,7 @@ use super::covectors::{
     AlongStages, Correction, LawStart, OfInvariants, StageCovectors, StagePoints, Stages,
     StepPolynomial, all_finite, combined,
 };
+use super::heat;
 use super::tableau::{STAGES, Tableau};
 use crate::method::Laws;
 use crate::midpoint::{Dim, Numbers};
@@ -45,6 +46,8 @@ pub(super) struct StageEquation<'a, Y: Metriplectic> {
     pub(super) drift: DriftCorrection<Y>,
     /// Whether the laws are integrated along short steps.
     pub(super) integrals: bool,
+    /// Whether what is lost of the energy becomes heat.
+    pub(super) heats: bool,
     /// The round-off of the terms of a velocity; zero where it is not known.
     pub(super) rounding: Vector<Y::Manifold>,
 }
@@ -110,7 +113,11 @@ impl<'a, Y: Metriplectic> StageEquation<'a, Y> {
         h: f64,
     ) -> Self {
         let (drift, rounding) = (drift::nothing::<Y>(), Vector::<Y::Manifold>::zero());
-        Self { tableau, system, x, h, values, drift, integrals: true, rounding }
+        let heats = tableau.one_sided && system.second_law() == SecondLaw::Exact && {
+            let w = differentials(system, &ChartPoint::<Y::Manifold>::centre(x));
+            heat::is_directed(system, x, &w)
+        };
+        Self { tableau, system, x, h, values, drift, integrals: true, heats, rounding }
     }
 
     /// The displacement `u = h Σ b_j k̃_j`.
@@ -147,21 +154,25 @@ impl<'a, Y: Metriplectic> StageEquation<'a, Y> {
         let polynomial = self.polynomial(&chart, k);
         let inside = |x: &Point<Y>| system.manifold().is_inside(x);
         let stages = StagePoints::of(system.metric(), &polynomial, inside)?;
-        let w = self.covectors(&stages, &polynomial);
+        let mut w = self.covectors(&stages, &polynomial);
+        let (mut heat, mut surplus) = (None, 0.0);
+        if self.heats {
+            let added = heat::add(system, (tableau, h), &stages, &mut w, at_stage::<Y>)?;
+            (heat, surplus) = (Some(added.velocity), added.surplus);
+        }
         let mut residual = [Vector::<Y::Manifold>::zero(); STAGES];
         let mut work = Work::<Dim<Y>>::default();
         let (mut entropy_slope, mut production) = (f64::INFINITY, 0.0);
         let mut entropy_covector = Vector::<Y::Manifold>::zero();
         for i in 0..tableau.stages {
             let at = ChartPoint::<Y::Manifold>::centre(&stages.x[i]);
-            let here = Covectors {
-                energy: w.energy.w[i],
-                entropy: w.entropy.w[i],
-                invariants: Dim::<Y>::array(|a| w.invariants[a].map(|(kind, l)| (kind, l.w[i]))),
-            };
+            let here = at_stage::<Y>(&w, i);
             let friction = irreversible(system, &at, &here).ok()?;
             let velocity = reversible(system, &at, &here).ok()? + friction;
-            let off = self.conserving(velocity, &here.energy) - stages.v[i];
+            let mut off = self.conserving(velocity, &here.energy) - stages.v[i];
+            if let Some(heat) = &heat {
+                off += heat[i];
+            }
             let weight = h * tableau.weights[i];
             work.add::<Y>(weight, &here, &off);
             let sizes = here.entropy.abs();
@@ -198,7 +209,7 @@ impl<'a, Y: Metriplectic> StageEquation<'a, Y> {
             noise: w.energy.noise,
             entropy_slope: if self.is_exact() { entropy_slope } else { f64::INFINITY },
             growth: production,
-            surplus: w.entropy.surplus,
+            surplus,
         })
     }
 
@@ -247,23 +258,35 @@ impl<'a, Y: Metriplectic> StageEquation<'a, Y> {
         stages: &StagePoints<Y::Manifold>,
         polynomial: &StepPolynomial<'_, Y::Manifold>,
     ) -> Covectors<Dim<Y>, StageCovectors<Vector<Y::Manifold>>> {
-        let &Self { tableau, system, values, drift, integrals, .. } = self;
+        let &Self { system, values, drift, integrals, .. } = self;
         let scales = Y::Manifold::scales(&polynomial.chart.end);
         let along = AlongStages { stages, polynomial, scales, integrals };
-        let of_entropy = match (self.is_exact(), tableau.one_sided) {
-            (false, _) => Correction::None,
-            (true, false) => Correction::TwoSided,
-            (true, true) => Correction::OneSided,
+        let [of_energy, of_entropy] = match (self.is_exact(), self.heats) {
+            (false, _) => [Correction::Here, Correction::None],
+            (true, false) => [Correction::Here; 2],
+            (true, true) => [Correction::Later; 2],
         };
         let energy = LawStart { value: values.energy, drift: drift.energy };
         let entropy = LawStart { value: values.entropy, drift: drift.entropy };
         let laws = [
-            along.of(system.energy(), energy, Correction::TwoSided),
+            along.of(system.energy(), energy, of_energy),
             along.of(system.entropy(), entropy, of_entropy),
         ];
         let start = |a: usize| LawStart { value: values.invariants[a], drift: drift.invariants[a] };
         let mut invariants = OfInvariants { along: &along, start, seen: 0 };
         Covectors::new(laws, system.invariants(), &mut invariants)
+    }
+}
+
+/// The covectors at one stage.
+fn at_stage<Y: Metriplectic>(
+    w: &Covectors<Dim<Y>, StageCovectors<Vector<Y::Manifold>>>,
+    i: usize,
+) -> Covectors<Dim<Y>, Vector<Y::Manifold>> {
+    Covectors {
+        energy: w.energy.w[i],
+        entropy: w.entropy.w[i],
+        invariants: Dim::<Y>::array(|a| w.invariants[a].map(|(kind, l)| (kind, l.w[i]))),
     }
 }
 

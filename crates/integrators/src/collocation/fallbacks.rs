@@ -87,7 +87,6 @@ pub(super) fn solve<Y: Metriplectic>(
             Ok(solved) => solved.evaluations,
             Err(unsolved) => unsolved.evaluations,
         };
-        if let Err(e) = &solved { eprintln!("D failed {budget:?} {e:?}"); }
         solved.map_err(|unsolved| {
             if unsolved.residual < best.residual || best.evaluations == 0 {
                 best = unsolved;

@@ -7,16 +7,38 @@ mod models;
 
 use models::gas;
 
-fn report<Y: Metriplectic, M: Method<Y>>(name: &str, m: M, y: &Y, x0: &Point<Y>, span: impl Into<metriplectic::integrators::Schedule>, exact: Option<&Vec<f64>>) {
+fn report<Y: Metriplectic, M: Method<Y>>(
+    name: &str,
+    m: M,
+    y: &Y,
+    x0: &Point<Y>,
+    span: impl Into<metriplectic::integrators::Schedule>,
+    exact: Option<&Vec<f64>>,
+) {
     let t = std::time::Instant::now();
     match m.run(y, x0.clone(), span) {
         Ok(run) => {
             let c = run.certificate();
             let end = Y::Manifold::entries(&run.last().point);
-            let e = exact.map_or(f64::NAN, |x| x.iter().zip(&end).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt());
-            println!("{name}: err {e:.2e} steps {} its {} cont {} splits {} dH {:.1e} falls {} friction {:.1e} end {end:.6?} {:.0?}", c.steps, c.effort.iterations, c.effort.continued, c.effort.splits, c.max_relative_energy_error(), c.entropy_falls, c.friction, t.elapsed());
+            let e = exact.map_or(f64::NAN, |x| {
+                x.iter().zip(&end).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
+            });
+            println!(
+                "{name}: err {e:.2e} steps {} its {} cont {} splits {} dH {:.1e} falls {} friction {:.1e} end {end:.6?} {:.0?}",
+                c.steps,
+                c.effort.iterations,
+                c.effort.continued,
+                c.effort.splits,
+                c.max_relative_energy_error(),
+                c.entropy_falls,
+                c.friction,
+                t.elapsed()
+            );
         }
-        Err(e) => { let e = e.to_string(); println!("{name}: ERROR {} {:.0?}", &e[..60.min(e.len())], t.elapsed()) },
+        Err(e) => {
+            let e = e.to_string();
+            println!("{name}: ERROR {} {:.0?}", &e[..60.min(e.len())], t.elapsed())
+        }
     }
 }
 
@@ -25,29 +47,100 @@ fn gas_study() {
     for alpha in [1e4, 1e6] {
         let system = gas(alpha);
         let x0 = vector![1.0, 2.0, 2.01, 1.99];
-        let fine = Radau::<4>::default().run(&system, x0, Span::until(2.0).tolerance(1e-11).at_most(2)).unwrap();
+        let fine = Radau::<4>::default()
+            .run(&system, x0, Span::until(2.0).tolerance(1e-11).at_most(2))
+            .unwrap();
         println!("fine {} steps {:?}", fine.certificate().steps, fine.last().point);
         let exact = Euclidean::<4>::entries(&fine.last().point);
-        if alpha < 1e5 { report("DP8", DormandPrince8, &system, &x0, Span::until(2.0).tolerance(1e-12).at_most(2), Some(&exact)); }
+        if alpha < 1e5 {
+            report(
+                "DP8",
+                DormandPrince8,
+                &system,
+                &x0,
+                Span::until(2.0).tolerance(1e-12).at_most(2),
+                Some(&exact),
+            );
+        }
         for n in [40, 80, 160, 320] {
             let span = Span::steps(2.0 / n as f64, n);
-            report(&format!("{alpha:.0e} N {n} Gauss 3"), Gauss::<3>::default(), &system, &x0, span, Some(&exact));
-            report(&format!("{alpha:.0e} N {n} Radau 2"), Radau::<2>::default(), &system, &x0, span, Some(&exact));
-            report(&format!("{alpha:.0e} N {n} Radau 3"), Radau::<3>::default(), &system, &x0, span, Some(&exact));
-            report(&format!("{alpha:.0e} N {n} Radau 4"), Radau::<4>::default(), &system, &x0, span, Some(&exact));
+            report(
+                &format!("{alpha:.0e} N {n} Gauss 3"),
+                Gauss::<3>::default(),
+                &system,
+                &x0,
+                span,
+                Some(&exact),
+            );
+            report(
+                &format!("{alpha:.0e} N {n} Radau 2"),
+                Radau::<2>::default(),
+                &system,
+                &x0,
+                span,
+                Some(&exact),
+            );
+            report(
+                &format!("{alpha:.0e} N {n} Radau 3"),
+                Radau::<3>::default(),
+                &system,
+                &x0,
+                span,
+                Some(&exact),
+            );
+            report(
+                &format!("{alpha:.0e} N {n} Radau 4"),
+                Radau::<4>::default(),
+                &system,
+                &x0,
+                span,
+                Some(&exact),
+            );
         }
         for k in [4, 8] {
             let span = Span::until(2.0).tolerance(10_f64.powi(-k)).at_most(2);
-            report(&format!("{alpha:.0e} tol {k} Radau 2"), Radau::<2>::default(), &system, &x0, span, Some(&exact));
-            report(&format!("{alpha:.0e} tol {k} Radau 3"), Radau::<3>::default(), &system, &x0, span, Some(&exact));
-            report(&format!("{alpha:.0e} tol {k} Radau 4"), Radau::<4>::default(), &system, &x0, span, Some(&exact));
-            report(&format!("{alpha:.0e} tol {k} Gauss 3"), Gauss::<3>::default(), &system, &x0, span, Some(&exact));
+            report(
+                &format!("{alpha:.0e} tol {k} Radau 2"),
+                Radau::<2>::default(),
+                &system,
+                &x0,
+                span,
+                Some(&exact),
+            );
+            report(
+                &format!("{alpha:.0e} tol {k} Radau 3"),
+                Radau::<3>::default(),
+                &system,
+                &x0,
+                span,
+                Some(&exact),
+            );
+            report(
+                &format!("{alpha:.0e} tol {k} Radau 4"),
+                Radau::<4>::default(),
+                &system,
+                &x0,
+                span,
+                Some(&exact),
+            );
+            report(
+                &format!("{alpha:.0e} tol {k} Gauss 3"),
+                Gauss::<3>::default(),
+                &system,
+                &x0,
+                span,
+                Some(&exact),
+            );
         }
     }
 }
 
-fn energy(t: Real) -> Real { t + t * t * 0.5 }
-fn entropy(t: Real) -> Real { t.ln() + t }
+fn energy(t: Real) -> Real {
+    t + t * t * 0.5
+}
+fn entropy(t: Real) -> Real {
+    t.ln() + t
+}
 fn conduction(w: &Vector2<Real>, kappa: f64) -> Matrix2<Real> {
     let b = Vector2::new(w.x.recip(), -w.y.recip());
     b * b.transpose() * Real::from(kappa)
@@ -76,11 +169,46 @@ fn temperatures() {
             let span = Span::steps(h, 20);
             let x = vector![start[0], start[1]];
             let p = (vector![start[0]], vector![start[1]]);
-            report(&format!("flat {start:?} 1e{k} Radau 2"), Radau::<2>::default(), &flat, &x, span, None);
-            report(&format!("flat {start:?} 1e{k} Radau 3"), Radau::<3>::default(), &flat, &x, span, None);
-            report(&format!("flat {start:?} 1e{k} Radau 4"), Radau::<4>::default(), &flat, &x, span, None);
-            report(&format!("half {start:?} 1e{k} Radau 3"), Radau::<3>::default(), &positive, &p, span, None);
-            report(&format!("half {start:?} 1e{k} Radau 2"), Radau::<2>::default(), &positive, &p, span, None);
+            report(
+                &format!("flat {start:?} 1e{k} Radau 2"),
+                Radau::<2>::default(),
+                &flat,
+                &x,
+                span,
+                None,
+            );
+            report(
+                &format!("flat {start:?} 1e{k} Radau 3"),
+                Radau::<3>::default(),
+                &flat,
+                &x,
+                span,
+                None,
+            );
+            report(
+                &format!("flat {start:?} 1e{k} Radau 4"),
+                Radau::<4>::default(),
+                &flat,
+                &x,
+                span,
+                None,
+            );
+            report(
+                &format!("half {start:?} 1e{k} Radau 3"),
+                Radau::<3>::default(),
+                &positive,
+                &p,
+                span,
+                None,
+            );
+            report(
+                &format!("half {start:?} 1e{k} Radau 2"),
+                Radau::<2>::default(),
+                &positive,
+                &p,
+                span,
+                None,
+            );
         }
     }
 }
@@ -90,7 +218,10 @@ fn temperatures() {
 fn oscillator() {
     for gamma in [1e7, 1e8] {
         let system = System::on(Euclidean::<3>)
-            .bracket(Poisson::constant(Matrix3::new(0.0, 1.0, 0.0, -1.0, 0.0, 0.0, 0.0, 0.0, 0.0)).unwrap())
+            .bracket(
+                Poisson::constant(Matrix3::new(0.0, 1.0, 0.0, -1.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+                    .unwrap(),
+            )
             .energy(|x: &Vector3<Real>| (x.x * x.x + x.y * x.y) * 0.5 + x.z)
             .entropy(|x: &Vector3<Real>| x.z)
             .dissipation(FieldDissipation(move |_: &Vector3<Real>, w: &Vector3<Real>| {
@@ -118,7 +249,14 @@ fn oscillator() {
                         3 => report(&name, Radau::<3>::default(), &system, &x0, span, Some(&exact)),
                         4 => report(&name, Radau::<4>::default(), &system, &x0, span, Some(&exact)),
                         5 => report(&name, Gauss::<3>::default(), &system, &x0, span, Some(&exact)),
-                        _ => report(&name, Scheme::new(WeylMidpoint), &system, &x0, span, Some(&exact)),
+                        _ => report(
+                            &name,
+                            Scheme::new(WeylMidpoint),
+                            &system,
+                            &x0,
+                            span,
+                            Some(&exact),
+                        ),
                     }
                 }
             }

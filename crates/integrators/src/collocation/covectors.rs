@@ -33,6 +33,8 @@ pub(super) type Stages<V> = [V; STAGES];
 pub(super) struct StagePoints<M: Space> {
     /// The points `X_i`; those beyond the last stage repeat the middle.
     pub(super) x: Stages<M::Point<f64>>,
+    /// Their coordinates in the chart of the step.
+    pub(super) q: Stages<Vector<M>>,
     /// The velocities `v_i`.
     pub(super) v: Stages<Vector<M>>,
     /// The covectors `♭v_i/υ` with the unit `υ`.
@@ -120,6 +122,7 @@ impl<M: Manifold> StagePoints<M> {
         let zero = Vector::<M>::zero();
         let mut stages = Self {
             x: std::array::from_fn(|_| chart.z.clone()),
+            q: [zero; STAGES],
             v: [zero; STAGES],
             flat: [zero; STAGES],
             unit: 1.0,
@@ -134,7 +137,7 @@ impl<M: Manifold> StagePoints<M> {
                 return None;
             }
             stages.v[i] = super::chart::in_chart_at::<M>(&x, (&chart.z, &q), &k[i]) * h.recip();
-            stages.x[i] = x;
+            (stages.x[i], stages.q[i]) = (x, q);
             largest = largest.max(stages.v[i].magnitude());
         }
         if !largest.is_finite() {
@@ -212,24 +215,26 @@ impl<M: Manifold> AlongStages<'_, M> {
             noise *= 1.0 - weight;
         }
         delta += start.drift;
-        if correction == Correction::Later {
-            return StageCovectors { left: delta, ..none };
-        }
         let squares = stages.square * stages.unit;
+        let is_later = correction == Correction::Later;
         if squares == 0.0 {
-            return none;
+            return StageCovectors { left: if is_later { delta } else { 0.0 }, ..none };
         }
-        let (scale, blur) = (delta / squares, (noise / squares).abs());
-        let mut covector_noise = zero;
+        let blur = (noise / squares).abs();
+        let mut noise = zero;
         for i in 0..s {
-            let (flat, df) = (stages.flat[i], w[i]);
-            w[i] += flat * scale;
-            covector_noise = Vector::<M>::from_index(|c| {
-                let here = blur * flat[c].abs() + f64::EPSILON * df[c].abs();
-                here.max(covector_noise[c])
+            noise = Vector::<M>::from_index(|c| {
+                let here = blur * stages.flat[i][c].abs() + f64::EPSILON * w[i][c].abs();
+                here.max(noise[c])
             });
         }
-        StageCovectors { w, end, size, noise: covector_noise, left: 0.0 }
+        if is_later {
+            return StageCovectors { noise, left: delta, ..none };
+        }
+        for i in 0..s {
+            w[i] += stages.flat[i] * (delta / squares);
+        }
+        StageCovectors { w, end, size, noise, left: 0.0 }
     }
 
     /// The change of a field along the polynomial of the step, as an integral.

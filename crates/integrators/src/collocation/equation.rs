@@ -33,6 +33,10 @@ pub(super) type Unknowns<Y> = Stages<Vector<<Y as Metriplectic>::Manifold>>;
 /// Units of round-off up to which a velocity that changes the energy is one that has lost digits.
 const ROUNDINGS: f64 = 16.0;
 
+/// The covectors of all laws at the stages.
+pub(super) type StageCovectorsOf<Y> =
+    Covectors<Dim<Y>, StageCovectors<Vector<<Y as Metriplectic>::Manifold>>>;
+
 /// The equation of a step.
 #[derive(Debug)]
 pub(super) struct StageEquation<'a, Y: Metriplectic> {
@@ -46,8 +50,8 @@ pub(super) struct StageEquation<'a, Y: Metriplectic> {
     pub(super) drift: DriftCorrection<Y>,
     /// Whether the laws are integrated along short steps.
     pub(super) integrals: bool,
-    /// Whether what is lost of the energy becomes heat.
-    pub(super) heats: bool,
+    /// The differential of the energy at `x`, if what is lost of the energy becomes heat.
+    pub(super) heats: Option<Vector<Y::Manifold>>,
     /// The round-off of the terms of a velocity; zero where it is not known.
     pub(super) rounding: Vector<Y::Manifold>,
 }
@@ -113,10 +117,11 @@ impl<'a, Y: Metriplectic> StageEquation<'a, Y> {
         h: f64,
     ) -> Self {
         let (drift, rounding) = (drift::nothing::<Y>(), Vector::<Y::Manifold>::zero());
-        let heats = tableau.one_sided && system.second_law() == SecondLaw::Exact && {
+        let mut heats = None;
+        if tableau.one_sided && system.second_law() == SecondLaw::Exact {
             let w = differentials(system, &ChartPoint::<Y::Manifold>::centre(x));
-            heat::is_directed(system, x, &w)
-        };
+            heats = heat::is_directed(system, x, &w).then_some(w.energy);
+        }
         Self { tableau, system, x, h, values, drift, integrals: true, heats, rounding }
     }
 
@@ -156,8 +161,9 @@ impl<'a, Y: Metriplectic> StageEquation<'a, Y> {
         let stages = StagePoints::of(system.metric(), &polynomial, inside)?;
         let mut w = self.covectors(&stages, &polynomial);
         let (mut heat, mut surplus) = (None, 0.0);
-        if self.heats {
-            let added = heat::add(system, (tableau, h), &stages, &mut w, at_stage::<Y>)?;
+        if let Some(start) = &self.heats {
+            let step = heat::Step { system, tableau, chart: &chart, h, x, start };
+            let added = heat::add(&step, &stages, &mut w)?;
             (heat, surplus) = (Some(added.velocity), added.surplus);
         }
         let mut residual = [Vector::<Y::Manifold>::zero(); STAGES];
@@ -241,9 +247,7 @@ impl<'a, Y: Metriplectic> StageEquation<'a, Y> {
         }
         let fraction = work / size;
         velocity
-            - Vector::<Y::Manifold>::from_index(|c| {
-                self.rounding[c] * (parts[c] / size) * fraction
-            })
+            - Vector::<Y::Manifold>::from_index(|c| self.rounding[c] * (parts[c] / size) * fraction)
     }
 
     /// Whether the entropy is corrected.
@@ -261,7 +265,7 @@ impl<'a, Y: Metriplectic> StageEquation<'a, Y> {
         let &Self { system, values, drift, integrals, .. } = self;
         let scales = Y::Manifold::scales(&polynomial.chart.end);
         let along = AlongStages { stages, polynomial, scales, integrals };
-        let [of_energy, of_entropy] = match (self.is_exact(), self.heats) {
+        let [of_energy, of_entropy] = match (self.is_exact(), self.heats.is_some()) {
             (false, _) => [Correction::Here, Correction::None],
             (true, false) => [Correction::Here; 2],
             (true, true) => [Correction::Later; 2],
@@ -279,8 +283,8 @@ impl<'a, Y: Metriplectic> StageEquation<'a, Y> {
 }
 
 /// The covectors at one stage.
-fn at_stage<Y: Metriplectic>(
-    w: &Covectors<Dim<Y>, StageCovectors<Vector<Y::Manifold>>>,
+pub(super) fn at_stage<Y: Metriplectic>(
+    w: &StageCovectorsOf<Y>,
     i: usize,
 ) -> Covectors<Dim<Y>, Vector<Y::Manifold>> {
     Covectors {

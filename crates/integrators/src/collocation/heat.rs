@@ -22,12 +22,14 @@
 //! negative, and nothing is corrected.
 
 use metriplectic_dynamics::orthogonal::Orthogonal;
-use metriplectic_dynamics::velocity::Covectors;
+use metriplectic_dynamics::velocity::{self, Covectors};
 use metriplectic_dynamics::{Metriplectic, system::Point};
 use metriplectic_fields::{ChartPoint, Column, Vector};
 use metriplectic_manifolds::{InnerProduct, Manifold, Riemannian};
 
-use super::covectors::{StageCovectors, StagePoints, Stages};
+use super::chart::{StepChart, in_chart_at};
+use super::covectors::{StagePoints, Stages};
+use super::equation::{StageCovectorsOf, at_stage};
 use super::tableau::{STAGES, Tableau};
 use crate::midpoint::Dim;
 
@@ -70,32 +72,81 @@ pub(super) fn is_directed<Y: Metriplectic>(
     direction(system, x, w).is_some()
 }
 
-/// Adds heat to the stages, and corrects the covectors of the entropy; `None` where heat has no direction.
+/// A step that heats.
+#[derive(Debug)]
+pub(super) struct Step<'a, Y: Metriplectic> {
+    pub(super) system: &'a Y,
+    pub(super) tableau: &'static Tableau,
+    pub(super) chart: &'a StepChart<Y::Manifold>,
+    pub(super) h: f64,
+    pub(super) x: &'a Point<Y>,
+    /// The differential of the energy at `x`.
+    pub(super) start: &'a Vector<Y::Manifold>,
+}
+
+/// Corrects the covectors of energy and entropy with heat; `None` where heat has no direction.
 pub(super) fn add<Y: Metriplectic>(
-    system: &Y,
-    (tableau, h): (&Tableau, f64),
+    step: &Step<'_, Y>,
     stages: &StagePoints<Y::Manifold>,
-    w: &mut Covectors<Dim<Y>, StageCovectors<Vector<Y::Manifold>>>,
-    at: impl Fn(
-        &Covectors<Dim<Y>, StageCovectors<Vector<Y::Manifold>>>,
-        usize,
-    ) -> Covectors<Dim<Y>, Vector<Y::Manifold>>,
+    w: &mut StageCovectorsOf<Y>,
 ) -> Option<Heat<Vector<Y::Manifold>>> {
-    let rho = -w.energy.left / h;
+    let &Step { system, tableau, h, .. } = step;
+    let transient = transient(step, stages, w)?;
+    let (delta, square) = (w.energy.left, stages.square());
+    if square != 0.0 {
+        for i in 0..tableau.stages {
+            w.energy.w[i] += stages.flat(i) * ((1.0 - transient) * delta / square);
+        }
+    }
+    let rho = -transient * delta / h;
     let mut velocity = [Vector::<Y::Manifold>::zero(); STAGES];
     let (mut gain, mut along) = (w.entropy.left, 0.0);
     for i in 0..tableau.stages {
-        let u = direction(system, &stages.x[i], &at(w, i))?;
-        velocity[i] = u * rho;
+        velocity[i] = direction(system, &stages.x[i], &at_stage::<Y>(w, i))? * rho;
         let weight = h * tableau.weights[i];
         gain += weight * w.entropy.w[i].dot(&velocity[i]);
         along += weight * stages.flat(i).dot(&velocity[i]);
     }
-    let square = stages.square() - along;
+    let square = square - along;
     if gain < 0.0 && square != 0.0 {
         for i in 0..tableau.stages {
             w.entropy.w[i] += stages.flat(i) * (gain / square);
         }
     }
     Some(Heat { velocity, surplus: gain.max(0.0) })
+}
+
+/// The fraction `τ` of what is lost that becomes heat: what the energy loses is a quadratic form of the variations of
+/// the velocity and of `dH` in a step, and this is the part of friction in their pairings.
+fn transient<Y: Metriplectic>(
+    step: &Step<'_, Y>,
+    stages: &StagePoints<Y::Manifold>,
+    w: &StageCovectorsOf<Y>,
+) -> Option<f64> {
+    let &Step { system, tableau, chart, x, start, .. } = step;
+    let (s, zero) = (tableau.stages, Vector::<Y::Manifold>::zero());
+    let [mut reversible, mut friction] = [[zero; STAGES]; 2];
+    let [mut mean_reversible, mut mean_friction] = [zero; 2];
+    for i in 0..s {
+        let at = ChartPoint::<Y::Manifold>::centre(&stages.x[i]);
+        let moved = velocity::reversible(system, &at, &at_stage::<Y>(w, i)).ok()?;
+        let to_middle = |v| in_chart_at::<Y::Manifold>(&chart.z, (&stages.x[i], &zero), &v);
+        reversible[i] = to_middle(moved);
+        friction[i] = to_middle(stages.v[i] - moved);
+        mean_reversible += reversible[i] * tableau.weights[i];
+        mean_friction += friction[i] * tableau.weights[i];
+    }
+    let back = chart.d * -0.5;
+    let mut parts = [0.0; 2];
+    for i in 0..s {
+        let varied = [reversible[i] - mean_reversible, friction[i] - mean_friction];
+        for (part, v) in parts.iter_mut().zip(varied) {
+            let here = in_chart_at::<Y::Manifold>(&stages.x[i], (&chart.z, &stages.q[i]), &v);
+            let before = in_chart_at::<Y::Manifold>(x, (&chart.z, &back), &v);
+            let paired = w.energy.w[i].dot(&here) - start.dot(&before);
+            *part += tableau.weights[i] * paired.abs();
+        }
+    }
+    let sum = parts[0] + parts[1];
+    Some(if sum > 0.0 { parts[1] / sum } else { 0.0 })
 }

@@ -44,12 +44,12 @@ pub use error::{Error, RunError};
 pub use explicit::{DormandPrince5, DormandPrince8, StageFlow};
 pub use method::{
     Components, Control, Effort, Element, EntropyStep, Evidence, Flow, Laws, Memory, Method,
-    Promises, Refusal, StateSpace, StepEnds, StepStart, Taken, Vector,
+    Promises, Refusal, StageLaws, StateSpace, StepEnds, StepStart, Taken, Vector,
 };
 pub use midpoint::{Residual, Run, Scheme};
 pub use newton::{Equation, Iterate, Linearised, Newton, Root, Rounding};
 pub use round_off::stable_gradient::StableGradient;
-pub use run::certificate::{Certificate, InvariantBalance, ProjectedSteps};
+pub use run::certificate::{Certificate, InvariantBalance, ProjectedSteps, StageBalance};
 pub use run::checkpoint::{Checkpoint, ResumeError, Saved};
 pub use run::controller::Until;
 pub use run::event::Event;

@@ -82,8 +82,8 @@ pub(super) struct Evaluated<Y: Metriplectic> {
     pub(super) entropy_covector: Vector<Y::Manifold>,
     /// The errors of the energy and the further invariants at the end, in units of their round-off.
     pub(super) error: f64,
-    /// The size of the terms of the energy.
-    pub(super) energy_size: f64,
+    /// The sizes of the terms of the laws.
+    pub(super) sizes: Laws<Numbers<Y>>,
     /// The round-off of the covectors of the energy.
     pub(super) noise: Vector<Y::Manifold>,
     /// The least `|w_S|` of a stage; infinite if the entropy is not corrected.
@@ -92,6 +92,8 @@ pub(super) struct Evaluated<Y: Metriplectic> {
     pub(super) growth: f64,
     /// What the entropy gains beside it.
     pub(super) surplus: f64,
+    /// Whether friction is damped.
+    pub(super) damps: bool,
 }
 
 /// What a residual leaves of a law.
@@ -160,11 +162,12 @@ impl<'a, Y: Metriplectic> StageEquation<'a, Y> {
         let inside = |x: &Point<Y>| system.manifold().is_inside(x);
         let stages = StagePoints::of(system.metric(), &polynomial, inside)?;
         let mut w = self.covectors(&stages, &polynomial);
-        let (mut heat, mut surplus) = (None, 0.0);
+        let (mut heat, mut surplus, mut damps) = (None, 0.0, false);
         if let Some(start) = &self.heats {
             let step = heat::Step { system, tableau, chart: &chart, h, x, start };
             let added = heat::add(&step, &stages, &mut w)?;
-            (heat, surplus) = (Some(added.velocity), added.surplus);
+            (heat, surplus) = (Some(added.velocity), added.gain.max(0.0));
+            damps = added.gain >= -ROUNDED * w.entropy.size;
         }
         let mut residual = [Vector::<Y::Manifold>::zero(); STAGES];
         let mut work = Work::<Dim<Y>>::default();
@@ -190,7 +193,12 @@ impl<'a, Y: Metriplectic> StageEquation<'a, Y> {
             let in_middle = in_chart_at::<Y::Manifold>(&chart.z, (&stages.x[i], &zero), &off);
             residual[i] = chart.to_start(x, &in_middle);
         }
-        let excess = work.relative::<Y>(&w) / ROUNDED;
+        let sizes = Laws {
+            energy: w.energy.size,
+            entropy: w.entropy.size,
+            invariants: Dim::<Y>::array(|a| w.invariants[a].map_or(0.0, |(_, l)| l.size)),
+        };
+        let excess = relative::<Dim<Y>>(&work.laws, &sizes) / ROUNDED;
         let entropy = Left {
             work: if self.is_exact() { work.laws.entropy } else { 0.0 },
             size: w.entropy.size,
@@ -200,7 +208,7 @@ impl<'a, Y: Metriplectic> StageEquation<'a, Y> {
             entropy: w.entropy.end,
             invariants: Dim::<Y>::array(|a| w.invariants[a].map_or(0.0, |(_, l)| l.end)),
         };
-        let error = self.errors(&values).relative::<Y>(&w) / ROUNDED;
+        let error = self.error(&values, &sizes);
         let usable = all_finite::<Dim<Y>>(&residual) && !excess.is_nan();
         usable.then_some(Evaluated {
             residual,
@@ -211,26 +219,26 @@ impl<'a, Y: Metriplectic> StageEquation<'a, Y> {
             entropy,
             entropy_covector,
             error,
-            energy_size: w.energy.size,
+            sizes,
             noise: w.energy.noise,
             entropy_slope: if self.is_exact() { entropy_slope } else { f64::INFINITY },
             growth: production,
             surplus,
+            damps,
         })
     }
 
-    /// The changes of the energy and the further invariants, less what they are to be.
-    fn errors(&self, after: &Laws<Numbers<Y>>) -> Work<Dim<Y>> {
+    /// The errors of the energy and the further invariants at the end, in units of round-off.
+    pub(super) fn error(&self, after: &Laws<Numbers<Y>>, sizes: &Laws<Numbers<Y>>) -> f64 {
         let Self { values: before, drift, .. } = self;
-        Work {
-            laws: Laws {
-                energy: after.energy - before.energy + drift.energy,
-                entropy: 0.0,
-                invariants: Dim::<Y>::array(|a| {
-                    after.invariants[a] - before.invariants[a] + drift.invariants[a]
-                }),
-            },
-        }
+        let off = Laws {
+            energy: after.energy - before.energy + drift.energy,
+            entropy: 0.0,
+            invariants: Dim::<Y>::array(|a| {
+                after.invariants[a] - before.invariants[a] + drift.invariants[a]
+            }),
+        };
+        relative::<Dim<Y>>(&off, sizes) / ROUNDED
     }
 
     /// A velocity that the covector of the energy annihilates. Where friction is stiff the sum of its terms has lost
@@ -320,22 +328,17 @@ impl<N: Dimension> Work<N> {
             self.laws.invariants[a] += weight * l.dot(off);
         }
     }
+}
 
-    /// The largest of the energy and the further invariants, relative to the size of the terms of the law.
-    #[inline]
-    fn relative<Y: Metriplectic<Manifold: metriplectic_fields::Space<Dim = N>>>(
-        &self,
-        w: &Covectors<N, StageCovectors<N::Vector<f64>>>,
-    ) -> f64 {
-        // 0/0 = 0: a law without terms has no round-off, and nothing changes it.
-        let ratio = |work: f64, size: f64| if work == 0.0 { 0.0 } else { work.abs() / size };
-        let mut largest = ratio(self.laws.energy, w.energy.size);
-        for (a, listed) in w.invariants.as_ref().iter().enumerate() {
-            let Some((_, l)) = listed else { break };
-            largest = larger(largest, ratio(self.laws.invariants[a], l.size));
-        }
-        largest
-    }
+/// The largest change of the energy and the further invariants, relative to the size of the terms of the law.
+#[inline]
+fn relative<N: Dimension>(off: &Laws<N::Array<f64>>, sizes: &Laws<N::Array<f64>>) -> f64 {
+    // 0/0 = 0: a law without terms has no round-off, and nothing changes it.
+    let ratio = |off: f64, size: f64| if off == 0.0 { 0.0 } else { off.abs() / size };
+    let listed = off.invariants.as_ref().iter().zip(sizes.invariants.as_ref());
+    listed.fold(ratio(off.energy, sizes.energy), |largest, (&off, &size)| {
+        larger(largest, ratio(off, size))
+    })
 }
 
 /// The larger one of two numbers; NaN if one is.

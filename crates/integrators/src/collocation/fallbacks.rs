@@ -4,7 +4,6 @@
 use metriplectic_dynamics::Metriplectic;
 use metriplectic_fields::{Column, Vector};
 
-use super::covectors::combined;
 use super::equation::{StageEquation, Unknowns};
 use super::linear::Linear;
 use super::memory::StageMemory;
@@ -27,8 +26,6 @@ pub(super) enum Fallbacks {
 /// A step that was not taken.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct StepFailure {
-    /// The smallest correction that was found, in units of round-off.
-    pub(super) residual: f64,
     /// Why it was not taken.
     pub(super) cause: Cause,
     /// What was done.
@@ -112,7 +109,7 @@ pub(super) fn solve<Y: Metriplectic>(
         return Ok(solved);
     }
     let cause = if best.edge { Cause::Edge } else { Cause::Unsolved };
-    Err(StepFailure { residual: best.residual, cause, effort: *effort })
+    Err(StepFailure { cause, effort: *effort })
 }
 
 /// The velocities of the last of a row of steps of growing sizes from the same start, up to the size of the
@@ -122,7 +119,6 @@ fn continue_in_step_size<Y: Metriplectic>(
     effort: &mut Effort,
 ) -> Option<Unknowns<Y>> {
     effort.continued += 1;
-    let tableau = equation.tableau;
     let mut k = [Vector::<Y::Manifold>::zero(); STAGES];
     let (mut fraction, mut increment) = (0.0, 0.125);
     for _ in 0..INCREMENTS {

@@ -38,8 +38,8 @@ use crate::midpoint::Dim;
 pub(super) struct Heat<V> {
     /// The velocities `ρ u_i`.
     pub(super) velocity: Stages<V>,
-    /// The gain of the entropy beside the production of friction.
-    pub(super) surplus: f64,
+    /// The number `N`, the gain of the entropy beside the production of friction.
+    pub(super) gain: f64,
 }
 
 /// The fraction of its terms that is left of `⟨dH, ♯n⟩` where heat has a direction.
@@ -113,7 +113,7 @@ pub(super) fn add<Y: Metriplectic>(
             w.entropy.w[i] += stages.flat(i) * (gain / square);
         }
     }
-    Some(Heat { velocity, surplus: gain.max(0.0) })
+    Some(Heat { velocity, gain })
 }
 
 /// The fraction `τ` of what is lost that becomes heat: what the energy loses is a quadratic form of the variations of

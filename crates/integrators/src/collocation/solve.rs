@@ -9,7 +9,6 @@ use super::full::Full;
 use super::linear::Linear;
 use crate::method::{Flow as _, Laws};
 use crate::midpoint::{Dim, Numbers};
-use crate::round_off::bound::ROUNDED;
 
 /// A solved step.
 pub(super) struct Solved<Y: Metriplectic> {
@@ -97,6 +96,7 @@ struct End<Y: Metriplectic> {
     k: Unknowns<Y>,
     chart: StepChart<Y::Manifold>,
     values: Laws<Numbers<Y>>,
+    error: f64,
 }
 
 impl<Y: Metriplectic> StageEquation<'_, Y> {
@@ -116,13 +116,13 @@ impl<Y: Metriplectic> StageEquation<'_, Y> {
         let k = moved(here, 1.0);
         let chart = self.chart(&k)?;
         let values = self.system.laws(&chart.end);
-        let off = values.energy - self.values.energy + self.drift.energy;
+        let error = self.error(&values, &here.at.sizes);
         // Not so if it is not a number.
-        let conserved = off.abs() <= ROUNDED * here.at.energy_size;
+        let conserved = error <= 1.0;
         if !conserved || !values.entropy.is_finite() {
             return None;
         }
-        Some(End { k, chart, values })
+        Some(End { k, chart, values, error })
     }
 }
 
@@ -197,9 +197,9 @@ impl<'a, Y: Metriplectic> Iteration<'a, Y> {
                 return Ok(self.solved(here));
             }
             if contraction * here.total() <= SURE
-                && let Some(End { k, chart, values }) = self.equation.last(&here)
+                && let Some(End { k, chart, values, error }) = self.equation.last(&here)
             {
-                let at = Evaluated { end: chart.end, d: chart.d, values, ..here.at };
+                let at = Evaluated { end: chart.end, d: chart.d, values, error, ..here.at };
                 return Ok(self.solved(Iterate { k, at, ..here }));
             }
             let (size, evaluations) = (here.size, self.evaluations);

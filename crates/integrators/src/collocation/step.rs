@@ -9,9 +9,9 @@ use super::fallbacks::{self, Cause, Fallbacks, StepFailure};
 use super::memory::{LastStep, StageMemory};
 use super::solve::Solved;
 use super::tableau::Tableau;
-use crate::method::{Effort, Evidence, Flow as _, Laws, StepStart, Taken};
+use crate::method::{Effort, Evidence, Flow as _, Laws, StageLaws, StepStart, Taken};
 use crate::midpoint::{Dim, Start};
-use crate::round_off::bound::{breaks_first_law, sizes_on_a_step};
+use crate::round_off::bound::{ROUNDED, breaks_first_law, sizes_on_a_step};
 use crate::round_off::drift;
 
 /// The growth of the entropy, relative to its value, below which a step of friction is round-off.
@@ -51,7 +51,7 @@ pub(super) fn try_step<Y: Metriplectic>(
     let mut effort = Effort::default();
     let solved = fallbacks::solve(&equation, guess, fallbacks, &mut effort)?;
     let Solved { k, at, linear, round_off, .. } = solved;
-    let failed = |cause, effort| StepFailure { residual: 0.0, cause, effort };
+    let failed = |cause, effort| StepFailure { cause, effort };
     let rests = k[..tableau.stages]
         .iter()
         .all(|k| (0..Dim::<Y>::LEN).all(|c| (h * k[c]).abs() <= 2.0 * round_off[c]));
@@ -59,8 +59,9 @@ pub(super) fn try_step<Y: Metriplectic>(
     let evidence = Evidence {
         entropy_slope: at.entropy_slope,
         dissipates: rise.abs() > NOTHING * values.entropy.abs(),
-        friction: linear.friction,
+        friction: if at.damps { 0.0 } else { linear.friction },
         rests,
+        stages: Some(StageLaws::new(at.error * ROUNDED, at.surplus)),
         ..Evidence::default()
     };
     if rests {

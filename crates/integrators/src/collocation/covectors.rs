@@ -207,10 +207,14 @@ impl<M: Manifold> AlongStages<'_, M> {
         let fraction = short(change, size);
         if fraction > 0.0 && *integrals {
             let integral = self.integral(f) - slope;
-            let ratio = (integral / change).abs().powf(2.0 / s as f64);
-            // No terms, no error.
-            let error = if change > 0.0 { integral.abs() * ratio } else { 0.0 };
-            let weight = fraction * (1.0 + (error / rounding).powi(2)).recip();
+            // Without terms there is no error.
+            let error = if change > 0.0 {
+                integral.abs() * (integral / change).abs().powf(2.0 / s as f64)
+            } else {
+                0.0
+            };
+            let trust = if error > 0.0 { (1.0 + (error / rounding).powi(2)).recip() } else { 1.0 };
+            let weight = fraction * trust;
             delta += weight * (integral - delta);
             noise *= 1.0 - weight;
         }

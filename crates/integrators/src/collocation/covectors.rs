@@ -54,6 +54,8 @@ pub(super) struct StageCovectors<V> {
     pub(super) end: f64,
     /// The size of the terms of `F`, to which its round-off is relative.
     pub(super) size: f64,
+    /// The largest change of the law at a stage.
+    pub(super) excursion: f64,
     /// The round-off of the covectors, the largest over the stages.
     pub(super) noise: V,
     /// The number `δ` with what is taken back of errors; zero if it is corrected.
@@ -189,15 +191,17 @@ impl<M: Manifold> AlongStages<'_, M> {
         let StepPolynomial { tableau, chart, h, .. } = polynomial;
         let (s, end) = (tableau.stages, f.at(&chart.end));
         let mut w = [zero; STAGES];
-        let (mut slope, mut change) = (0.0, 0.0);
+        let (mut slope, mut change, mut excursion) = (0.0, 0.0, 0.0_f64);
         let mut size = start.value.abs() + end.abs();
         for i in 0..s {
-            w[i] = f.jet1(&stages.x[i]).df;
+            let jet = f.jet1(&stages.x[i]);
+            excursion = excursion.max((jet.value - start.value).abs());
+            w[i] = jet.df;
             slope += tableau.weights[i] * h * w[i].dot(&stages.v[i]);
             change += tableau.weights[i] * h.abs() * M::pairing_size(&w[i], &stages.v[i]);
             size += tableau.weights[i] * w[i].abs().dot(scales);
         }
-        let none = StageCovectors { w, end, size, noise: zero, left: 0.0 };
+        let none = StageCovectors { w, end, size, excursion, noise: zero, left: 0.0 };
         if correction == Correction::None {
             return none;
         }
@@ -238,7 +242,7 @@ impl<M: Manifold> AlongStages<'_, M> {
         for i in 0..s {
             w[i] += stages.flat[i] * (delta / squares);
         }
-        StageCovectors { w, end, size, noise, left: 0.0 }
+        StageCovectors { w, noise, ..none }
     }
 
     /// The change of a field along the polynomial of the step, as an integral.

@@ -33,6 +33,10 @@ pub(super) type Unknowns<Y> = Stages<Vector<<Y as Metriplectic>::Manifold>>;
 /// Units of round-off up to which a velocity that changes the energy is one that has lost digits.
 const ROUNDINGS: f64 = 16.0;
 
+/// The ratio of two productions of entropy, that of friction at the end and that of the step, from which on friction is
+/// not damped: without damping it is of the order of `hλ`.
+const UNDAMPED: f64 = 10.0;
+
 /// The covectors of all laws at the stages.
 pub(super) type StageCovectorsOf<Y> =
     Covectors<Dim<Y>, StageCovectors<Vector<<Y as Metriplectic>::Manifold>>>;
@@ -94,6 +98,8 @@ pub(super) struct Evaluated<Y: Metriplectic> {
     pub(super) surplus: f64,
     /// Whether friction is damped.
     pub(super) damps: bool,
+    /// The largest change of the energy at a stage.
+    pub(super) excursion: f64,
 }
 
 /// What a residual leaves of a law.
@@ -162,12 +168,15 @@ impl<'a, Y: Metriplectic> StageEquation<'a, Y> {
         let inside = |x: &Point<Y>| system.manifold().is_inside(x);
         let stages = StagePoints::of(system.metric(), &polynomial, inside)?;
         let mut w = self.covectors(&stages, &polynomial);
-        let (mut heat, mut surplus, mut damps) = (None, 0.0, false);
+        let (mut heat, mut surplus, mut left) = (None, 0.0, f64::INFINITY);
         if let Some(start) = &self.heats {
+            let last = tableau.stages - 1;
+            let (at, plain) = (&stages.x[last], at_stage::<Y>(&w, last));
+            let friction = irreversible(system, &ChartPoint::centre(at), &plain).ok()?;
+            left = h.abs() * plain.entropy.dot(&friction);
             let step = heat::Step { system, tableau, chart: &chart, h, x, start };
             let added = heat::add(&step, &stages, &mut w)?;
             (heat, surplus) = (Some(added.velocity), added.gain.max(0.0));
-            damps = added.gain >= -ROUNDED * w.entropy.size;
         }
         let mut residual = [Vector::<Y::Manifold>::zero(); STAGES];
         let mut work = Work::<Dim<Y>>::default();
@@ -224,7 +233,8 @@ impl<'a, Y: Metriplectic> StageEquation<'a, Y> {
             entropy_slope: if self.is_exact() { entropy_slope } else { f64::INFINITY },
             growth: production,
             surplus,
-            damps,
+            damps: left <= UNDAMPED * (production.abs() + surplus) + ROUNDED * w.entropy.size,
+            excursion: w.energy.excursion,
         })
     }
 

@@ -33,6 +33,9 @@ pub(super) fn start_of<'a, Y: Metriplectic>(
     Start { x, time, h, values, accumulated_error }
 }
 
+/// The change of the energy at a stage, relative to the size of its terms, that no motion makes.
+const FAR: f64 = 1.0;
+
 /// Tries a step whole.
 pub(super) fn try_step<Y: Metriplectic>(
     tableau: &'static Tableau,
@@ -64,6 +67,13 @@ pub(super) fn try_step<Y: Metriplectic>(
         stages: Some(StageLaws::new(at.error * ROUNDED, at.surplus)),
         ..Evidence::default()
     };
+    // A root whose stages have quite another energy belongs to no motion from here.
+    if at.excursion > FAR * values.energy.abs() {
+        let [before, after] = sizes_on_a_step(system, [x, &at.end]);
+        if at.excursion > FAR * before.max(after) {
+            return Err(failed(Cause::Unsolved, effort));
+        }
+    }
     if rests {
         return Ok(Taken { x: x.clone(), values, evidence, effort });
     }

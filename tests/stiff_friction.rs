@@ -142,7 +142,10 @@ fn two_temperatures_come_together() {
             assert!(near([a.x, b.x]), "h = 1e{exponent}: {a}, {b}");
         }
     }
-    for (exponent, cold) in [(-4, 1.0), (-2, 1.0), (0, 1.0), (3, 1.0), (-4, 0.01), (-2, 0.01), (2, 0.01)] {
+    // At h = 10⁻⁵ and colder starts the temperatures are still on their way.
+    let rows =
+        [(-4, 1.0), (-2, 1.0), (0, 1.0), (3, 1.0), (-4, 0.01), (-2, 0.01), (0, 0.01), (2, 0.01)];
+    for (exponent, cold) in rows {
         let span = Span::steps(10_f64.powi(exponent), 20);
         let (x, p) = (vector![cold, hot], (vector![cold], vector![hot]));
         let total: f64 = cold + 0.5 * cold * cold + hot + 0.5 * hot * hot;
@@ -150,11 +153,9 @@ fn two_temperatures_come_together() {
         let near = |t: [f64; 2]| t.iter().all(|t| (t - rest).abs() <= 1e-3);
         for method in [Gauss2, Gauss3, Radau2, Radau3, Radau4] {
             let silent = is_silent(method.run(&flat, x, span), |x| near((*x).into()));
-            assert!(!silent, "{method:?}, h = 1e{exponent}");
-                println!("{method:?} {exponent} {:?} {}", run.last().point, run.certificate());
-            }
+            assert!(!silent, "{method:?}, {cold}, h = 1e{exponent}");
             let silent = is_silent(method.run(&positive, p, span), |(a, b)| near([a.x, b.x]));
-            assert!(!silent, "{method:?}, R₊ × R₊, h = 1e{exponent}");
+            assert!(!silent, "{method:?}, R₊ × R₊, {cold}, h = 1e{exponent}");
         }
         let silent = is_silent(WeylMidpoint.run(&flat, x, span), |x| near((*x).into()));
         assert!(!silent, "midpoint, h = 1e{exponent}");

@@ -10,6 +10,7 @@
 //! | [`round_off`] | covectors, laws and positions that are safe against round-off | |
 //! | [`midpoint`] | [`Scheme`]: the method of the paper, its equation and its fallbacks | [`newton`], [`discrete_gradient`], [`round_off`] |
 //! | [`explicit`] | [`DormandPrince8`], [`DormandPrince5`]: explicit methods, and then back onto the laws | [`method`] |
+//! | [`collocation`] | [`Gauss`], [`Radau`]: methods with stages, of order `2s` and `2s − 1` | [`method`], [`round_off`] |
 //! | [`attitude`] | [`Attitude`]: where a body points along a run of its angular momentum | [`run`] |
 //! | [`laws`] | what a step and a method promise, and the functions that check it | |
 //! | [`error`](mod@error) | [`Error`], [`RunError`] | |

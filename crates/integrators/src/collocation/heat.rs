@@ -1,16 +1,16 @@
 //! Stiff friction that is damped: what a Radau method loses of the energy becomes heat.
 //!
-//! Radau's weights are algebraically stable: on a step that is long for friction the method loses energy where the
+//! Radau's weights are algebraically stable. On a step that is long for friction the method loses energy where the
 //! energy is convex, and gains entropy where the entropy is concave. To correct the covectors for both would undo the
-//! damping (see the [module](super)). So the covector of the energy stays `dH`, and the stages get a velocity that
-//! returns what was lost,
+//! damping. So the fraction `τ` of the energy that *friction* has lost is returned by a velocity along the entropy,
 //!
 //! ```math
-//! v_i = \tilde\Pi_i\, dH + \tilde K_i\, w_{S,i} + \rho\, u_i, \qquad
-//! u_i = \frac{♯n_i}{\langle dH, ♯n_i\rangle}, \qquad h\rho = -\delta_H ,
+//! v_i = \tilde\Pi_i\, w_{H,i} + \tilde K_i\, w_{S,i} + \rho\, u_i, \qquad
+//! u_i = \frac{♯n_i}{\langle w_{H,i}, ♯n_i\rangle}, \qquad h\rho = -\tau\,\delta_H ,
 //! ```
 //!
-//! with `n_i` the part of `dS` that is orthogonal to the covectors of the further invariants. Then `ΔH = 0` and
+//! with `n_i` the part of `dS` that is orthogonal to the covectors of the further invariants, and
+//! `w_H = dH + (1 − τ) δ_H ♭v/D`. Then `ΔH = 0` and
 //!
 //! ```math
 //! \Delta S = h \sum_i b_i \tilde K_i(w_{S,i}, w_{S,i}) + \max(N, 0), \qquad
@@ -18,8 +18,10 @@
 //! ```
 //!
 //! if the covector of the entropy is corrected where `N < 0`, by `a_S = N/(D - h\rho \sum_i b_i \langle ♭v_i, u_i\rangle)`.
-//! Near an equilibrium `dS = β dH`, and `N = δ_S − β δ_H` is the gain of `S − βH`, which has a maximum there: it is not
-//! negative, and nothing is corrected.
+//! Near an equilibrium `dS = β dH`, and with `τ = 1` the number `N = δ_S − β δ_H` is the gain of `S − βH`, which has a
+//! maximum there: it is not negative, and nothing is corrected.
+//!
+//! `u` is a choice: where an unresolved transient loses energy, the laws do not say which variable warms.
 
 use metriplectic_dynamics::orthogonal::Orthogonal;
 use metriplectic_dynamics::velocity::{self, Covectors};

@@ -403,8 +403,8 @@ impl Certificate {
             let steps = counted(self.steps, "step", "steps");
             writeln!(
                 f,
-                "stability:   it sets the size of {stability} of {steps}, and not the tolerance; `Radau` takes larger \
-                 ones"
+                "stability:   it sets the size of {stability} of {steps}, and not the tolerance; an implicit method, \
+                 such as `Radau`, takes larger ones"
             )?;
         }
         Ok(())

@@ -4,17 +4,17 @@
 //! References are ends of the explicit method of order 8 at a tolerance of 10⁻¹⁴.
 
 use metriplectic::dynamics::system::Point;
-use metriplectic::fields::Vector;
 use metriplectic::integrators::{StageMemory, StepStart, laws};
-use metriplectic::manifolds::{
-    MetricError, Nodes, PointPair, Riemannian, StepPath, StepPathJet, Tangent,
-};
+use metriplectic::manifolds::Riemannian;
 use metriplectic::prelude::*;
 
+#[path = "models/chart_midpoint.rs"]
+mod chart_midpoint;
 mod models;
 #[path = "models/stages.rs"]
 mod stages;
 
+use chart_midpoint::ChartMidpoint;
 use models::{Globe, gas, relaxing_body, top};
 use stages::*;
 
@@ -199,54 +199,6 @@ fn orders_with_a_metric_of_its_own_and_on_a_manifold_of_a_user() {
         .expect("it is a system");
     let start = Globe::point(vector![0.6, 0.0, 0.8]);
     orders("globe", &globe, &start, 12.0, ([64, 40, 24, 16], [40, 24, 16]));
-}
-
-/// The midpoint of the canonical metric with the inner product of another one.
-#[derive(Clone, Copy, Debug)]
-struct ChartMidpoint;
-
-impl<M: Manifold, G: Riemannian<M>> Retraction<M, G> for ChartMidpoint
-where
-    Canonical: Riemannian<M>,
-{
-    fn step_path<D: Scalar>(
-        &self,
-        _: &G,
-        x: &M::Point<f64>,
-        u: &Vector<M, D>,
-    ) -> Result<StepPath<M, D>, MetricError> {
-        WeylMidpoint.step_path(&Canonical, x, u)
-    }
-
-    fn end(&self, _: &G, x: &M::Point<f64>, u: &Vector<M>) -> Result<M::Point<f64>, MetricError> {
-        Retraction::<M, Canonical>::end(&WeylMidpoint, &Canonical, x, u)
-    }
-
-    fn along(&self, _: &G, x: &M::Point<f64>, u: &Vector<M>) -> Result<Nodes<M>, MetricError> {
-        Retraction::<M, Canonical>::along(&WeylMidpoint, &Canonical, x, u)
-    }
-
-    fn step_path_jet(
-        &self,
-        _: &G,
-        x: &M::Point<f64>,
-        u: &Vector<M>,
-    ) -> Result<StepPathJet<M>, MetricError> {
-        WeylMidpoint.step_path_jet(&Canonical, x, u)
-    }
-
-    fn pair(&self, _: &G, tangent: &Tangent<M>) -> Result<PointPair<M>, MetricError> {
-        WeylMidpoint.pair(&Canonical, tangent)
-    }
-
-    fn inverse(
-        &self,
-        _: &G,
-        x: &M::Point<f64>,
-        y: &M::Point<f64>,
-    ) -> Result<Tangent<M>, MetricError> {
-        WeylMidpoint.inverse(&Canonical, x, y)
-    }
 }
 
 /// How far the method of one stage is from a midpoint scheme after 100 steps.

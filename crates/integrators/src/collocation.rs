@@ -47,6 +47,11 @@
 //! velocity, Gonzalez (1996); averaged covectors of order `s`, Andrews and Farrell (2025); tableaux, Hairer and Wanner
 //! (Solving ODEs II, §IV.5).
 
+#![allow(
+    clippy::needless_range_loop,
+    reason = "a stage is an index of several lists and of the tableau"
+)]
+
 mod chart;
 mod covectors;
 mod dense;

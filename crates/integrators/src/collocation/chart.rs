@@ -16,7 +16,8 @@ use num_dual::Dual64;
 #[inline]
 pub(super) fn in_chart_at<M: Space>(
     y: &M::Point<f64>,
-    (x, q): (&M::Point<f64>, &Vector<M>),
+    x: &M::Point<f64>,
+    q: &Vector<M>,
     v: &Vector<M>,
 ) -> Vector<M> {
     let moved = Vector::<M, Dual64>::from_index(|i| Dual64::new(q[i], v[i]));
@@ -48,7 +49,7 @@ impl<M: Manifold> StepChart<M> {
     pub(super) fn of(x: &M::Point<f64>, u: &Vector<M>) -> Option<Self> {
         let half = *u * 0.5;
         let z = M::chart(x, &half);
-        let d = in_chart_at::<M>(&z, (x, &half), u);
+        let d = in_chart_at::<M>(&z, x, &half, u);
         let back = M::coordinates(&z, x) * -2.0;
         let (shift, sizes) = (back - d, M::scales(&z));
         if !(d.is_finite() && back.is_finite()) {
@@ -66,13 +67,13 @@ impl<M: Manifold> StepChart<M> {
     /// A velocity at `x` in the chart at the middle.
     #[inline]
     pub(super) fn to_middle(&self, x: &M::Point<f64>, v: &Vector<M>) -> Vector<M> {
-        in_chart_at::<M>(&self.z, (x, &self.half), v)
+        in_chart_at::<M>(&self.z, x, &self.half, v)
     }
 
     /// The inverse of [`to_middle`](Self::to_middle).
     #[inline]
     pub(super) fn to_start(&self, x: &M::Point<f64>, v: &Vector<M>) -> Vector<M> {
-        in_chart_at::<M>(x, (&self.z, &Vector::<M>::zero()), v)
+        in_chart_at::<M>(x, &self.z, &Vector::<M>::zero(), v)
     }
 
     /// A linear map in the chart at the middle, for velocities at `x`.

@@ -138,7 +138,7 @@ impl<M: Manifold> StagePoints<M> {
             if !is_inside(&x) {
                 return None;
             }
-            stages.v[i] = super::chart::in_chart_at::<M>(&x, (&chart.z, &q), &k[i]) * h.recip();
+            stages.v[i] = super::chart::in_chart_at::<M>(&x, &chart.z, &q, &k[i]) * h.recip();
             (stages.x[i], stages.q[i]) = (x, q);
             largest = largest.max(stages.v[i].magnitude());
         }

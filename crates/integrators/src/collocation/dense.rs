@@ -48,7 +48,7 @@ fn part<Y: Metriplectic>(
     theta: f64,
 ) -> Option<PointOf<Y>> {
     let (x, h, values) = (step.x, theta * step.h, *step.values[0]);
-    let equation = StageEquation::new(tableau, system, (x, values), h);
+    let equation = StageEquation::new(tableau, system, x, values, h);
     let guess = std::array::from_fn(|i| {
         combined(tableau.stages, &tableau.velocity(theta * tableau.nodes[i]), &last.k)
     });
@@ -89,16 +89,16 @@ pub(super) fn error<Y: Metriplectic>(
 ) -> Option<f64> {
     let &StepEnds { x, end, h, values, .. } = step;
     let LastStep { k, filter } = memory.last.as_ref()?;
-    let equation = StageEquation::new(tableau, system, (x, *values[0]), h);
+    let equation = StageEquation::new(tableau, system, x, *values[0], h);
     let chart = equation.chart(k)?;
     let polynomial = equation.polynomial(&chart, k);
     let zero = Vector::<Y::Manifold>::zero();
     let defect = |tau: f64, at: &PointOf<Y>| {
         let q = chart.d * (tau - 0.5);
         let slope = polynomial.combined(&tableau.velocity(tau));
-        let there = in_chart_at::<Y::Manifold>(at, (&chart.z, &q), &slope);
+        let there = in_chart_at::<Y::Manifold>(at, &chart.z, &q, &slope);
         let off = there - system.rates(at, &Components(zero))?.0 * h;
-        let middle = in_chart_at::<Y::Manifold>(&chart.z, (at, &zero), &off);
+        let middle = in_chart_at::<Y::Manifold>(&chart.z, at, &zero, &off);
         Some(norm(&Components(*filter * chart.to_start(x, &middle))))
     };
     Some(defect(0.0, x)?.max(defect(1.0, end)?))

@@ -121,7 +121,8 @@ impl<'a, Y: Metriplectic> StageEquation<'a, Y> {
     pub(super) fn new(
         tableau: &'static Tableau,
         system: &'a Y,
-        (x, values): (&'a Point<Y>, Laws<Numbers<Y>>),
+        x: &'a Point<Y>,
+        values: Laws<Numbers<Y>>,
         h: f64,
     ) -> Self {
         let (drift, rounding) = (drift::nothing::<Y>(), Vector::<Y::Manifold>::zero());
@@ -192,14 +193,14 @@ impl<'a, Y: Metriplectic> StageEquation<'a, Y> {
                 off += heat[i];
             }
             let weight = h * tableau.weights[i];
-            work.add::<Y>(weight, &here, &off);
+            work.add(weight, &here, &off);
             let sizes = here.entropy.abs();
             entropy_covector =
                 Vector::<Y::Manifold>::from_index(|c| entropy_covector[c].max(sizes[c]));
             production += weight * here.entropy.dot(&friction);
             entropy_slope = entropy_slope.min(here.entropy.magnitude());
             let zero = Vector::<Y::Manifold>::zero();
-            let in_middle = in_chart_at::<Y::Manifold>(&chart.z, (&stages.x[i], &zero), &off);
+            let in_middle = in_chart_at::<Y::Manifold>(&chart.z, &stages.x[i], &zero, &off);
             residual[i] = chart.to_start(x, &in_middle);
         }
         let sizes = Laws {
@@ -325,12 +326,7 @@ impl<N: Dimension> Default for Work<N> {
 
 impl<N: Dimension> Work<N> {
     #[inline]
-    fn add<Y: Metriplectic<Manifold: metriplectic_fields::Space<Dim = N>>>(
-        &mut self,
-        weight: f64,
-        w: &Covectors<N, N::Vector<f64>>,
-        off: &N::Vector<f64>,
-    ) {
+    fn add(&mut self, weight: f64, w: &Covectors<N, N::Vector<f64>>, off: &N::Vector<f64>) {
         self.laws.energy += weight * w.energy.dot(off);
         self.laws.entropy += weight * w.entropy.dot(off);
         for (a, listed) in w.invariants.as_ref().iter().enumerate() {

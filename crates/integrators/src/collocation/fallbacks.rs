@@ -168,7 +168,7 @@ pub(super) fn with_halves<Y: Metriplectic>(
         }
         Err((failure, x)) => {
             *memory = kept;
-            Err(halves.error(start, (failure, &x)))
+            Err(halves.error(start, failure, &x))
         }
     }
 }
@@ -235,7 +235,8 @@ impl<Y: Metriplectic> Halves<'_, Y> {
     fn error(
         &self,
         start: &Start<'_, Y>,
-        (failure, x): (StepFailure, &super::PointOf<Y>),
+        failure: StepFailure,
+        x: &super::PointOf<Y>,
     ) -> StepError {
         let &Start { time, h, values, .. } = start;
         let tried = self.effort;
@@ -243,7 +244,7 @@ impl<Y: Metriplectic> Halves<'_, Y> {
             return error;
         }
         let suggested = (0..self.splits).fold(h, |part, _| 0.5 * part);
-        let part = StageEquation::new(self.tableau, self.system, (start.x, values), suggested);
+        let part = StageEquation::new(self.tableau, self.system, start.x, values, suggested);
         let rest = [Vector::<Y::Manifold>::zero(); STAGES];
         let residual = part.evaluate(&rest).map_or(f64::INFINITY, |at| {
             at.residual.iter().map(Column::magnitude).fold(0.0, f64::max)

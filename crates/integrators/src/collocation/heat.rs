@@ -132,7 +132,7 @@ fn transient<Y: Metriplectic>(
     for i in 0..s {
         let at = ChartPoint::<Y::Manifold>::centre(&stages.x[i]);
         let moved = velocity::reversible(system, &at, &at_stage::<Y>(w, i)).ok()?;
-        let to_middle = |v| in_chart_at::<Y::Manifold>(&chart.z, (&stages.x[i], &zero), &v);
+        let to_middle = |v| in_chart_at::<Y::Manifold>(&chart.z, &stages.x[i], &zero, &v);
         reversible[i] = to_middle(moved);
         friction[i] = to_middle(stages.v[i] - moved);
         mean_reversible += reversible[i] * tableau.weights[i];
@@ -143,8 +143,8 @@ fn transient<Y: Metriplectic>(
     for i in 0..s {
         let varied = [reversible[i] - mean_reversible, friction[i] - mean_friction];
         for (part, v) in parts.iter_mut().zip(varied) {
-            let here = in_chart_at::<Y::Manifold>(&stages.x[i], (&chart.z, &stages.q[i]), &v);
-            let before = in_chart_at::<Y::Manifold>(x, (&chart.z, &back), &v);
+            let here = in_chart_at::<Y::Manifold>(&stages.x[i], &chart.z, &stages.q[i], &v);
+            let before = in_chart_at::<Y::Manifold>(x, &chart.z, &back, &v);
             let paired = w.energy.w[i].dot(&here) - start.dot(&before);
             *part += tableau.weights[i] * paired.abs();
         }

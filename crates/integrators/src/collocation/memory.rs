@@ -52,7 +52,7 @@ impl<N: Dimension> StageMemory<N> {
     pub(super) fn guess(&self, tableau: &Tableau, h: f64) -> Option<Stages<N::Vector<f64>>> {
         let Continued { k, stages, h: before } = self.velocities?;
         let ratio = h / before;
-        if stages != tableau.stages || !(ratio > 0.0) {
+        if stages != tableau.stages || ratio.is_nan() || ratio <= 0.0 {
             return None;
         }
         Some(std::array::from_fn(|i| {
@@ -65,15 +65,17 @@ impl<N: Dimension> StageMemory<N> {
     pub(super) fn note<M: Manifold<Dim = N>>(
         &mut self,
         tableau: &Tableau,
-        (x, h): (&M::Point<f64>, f64),
+        x: &M::Point<f64>,
+        h: f64,
         k: &Stages<Vector<M>>,
-        (chart, end): (&StepChart<M>, &M::Point<f64>),
+        chart: &StepChart<M>,
+        end: &M::Point<f64>,
     ) {
         let mut there = [Vector::<M>::zero(); STAGES];
         let half = chart.d * 0.5;
         for i in 0..tableau.stages {
             let middle = chart.to_middle(x, &k[i]);
-            there[i] = super::chart::in_chart_at::<M>(end, (&chart.z, &half), &middle);
+            there[i] = super::chart::in_chart_at::<M>(end, &chart.z, &half, &middle);
         }
         self.velocities = super::covectors::all_finite::<N>(&there).then_some(Continued {
             k: there,

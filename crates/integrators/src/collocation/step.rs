@@ -47,7 +47,7 @@ pub(super) fn try_step<Y: Metriplectic>(
     memory.last = None;
     let &Start { x, h, values, .. } = start;
     let guess = memory.guess(tableau, h);
-    let mut equation = StageEquation::new(tableau, system, (x, values), h);
+    let mut equation = StageEquation::new(tableau, system, x, values, h);
     if let Some(guess) = &guess {
         equation.drift = drift::target(system, start, &equation.displacement(guess));
     }
@@ -87,7 +87,7 @@ pub(super) fn try_step<Y: Metriplectic>(
     }
     let u = equation.displacement(&k);
     let Some(chart) = equation.chart(&k) else { return Err(failed(Cause::Edge, effort)) };
-    memory.note::<Y::Manifold>(tableau, (x, h), &k, (&chart, &end));
+    memory.note::<Y::Manifold>(tableau, x, h, &k, &chart, &end);
     memory.last = Some(LastStep { k, filter: *linear.filter() });
     let compensated = memory.compensation.add(system.metric(), (x, &u), &end);
     let (x_end, values_end) = match compensated {

@@ -106,31 +106,31 @@ const SIX: Rule<6> = Rule {
 
 /// Gauss methods of 1 to 4 stages.
 pub(super) static GAUSS: [Tableau; 4] = [
-    Tableau::new([0.5], &THREE, 0.5, false),
+    Tableau::new([0.5], &THREE, 0.5, 2),
     Tableau::new(
         [0.211_324_865_405_187_13, 0.788_675_134_594_812_9],
         &FOUR,
         0.288_675_134_594_812_87,
-        false,
+        4,
     ),
-    Tableau::new(THREE.nodes, &FIVE, 0.196_731_007_326_674_6, false),
-    Tableau::new(FOUR.nodes, &SIX, 0.147_520_223_716_694_6, false),
+    Tableau::new(THREE.nodes, &FIVE, 0.196_731_007_326_674_6, 6),
+    Tableau::new(FOUR.nodes, &SIX, 0.147_520_223_716_694_6, 8),
 ];
 
 /// Radau IIA methods of 2 to 4 stages.
 pub(super) static RADAU: [Tableau; 3] = [
-    Tableau::new([1.0 / 3.0, 1.0], &FOUR, 0.408_248_290_463_863, true),
+    Tableau::new([1.0 / 3.0, 1.0], &FOUR, 0.408_248_290_463_863, 3),
     Tableau::new(
         [0.155_051_025_721_682_2, 0.644_948_974_278_317_8, 1.0],
         &FIVE,
         0.246_232_757_526_440_72,
-        true,
+        5,
     ),
     Tableau::new(
         [0.088_587_959_512_703_95, 0.409_466_864_440_734_7, 0.787_659_461_760_847_1, 1.0],
         &SIX,
         0.173_802_707_401_796_62,
-        true,
+        7,
     ),
 ];
 
@@ -139,12 +139,12 @@ impl Tableau {
         nodes: [f64; S],
         rule: &Rule<M>,
         gamma: f64,
-        one_sided: bool,
+        order: u32,
     ) -> Self {
         let mut tableau = Self {
             stages: S,
-            order: if one_sided { 2 * S - 1 } else { 2 * S } as u32,
-            one_sided,
+            order,
+            one_sided: order % 2 == 1,
             nodes: [0.0; STAGES],
             weights: [0.0; STAGES],
             matrix: [[0.0; STAGES]; STAGES],
@@ -334,9 +334,8 @@ mod tests {
                 let mut v = [1.0, 0.3, -0.7, 0.4];
                 for _ in 0..powers {
                     let mut next = [0.0; STAGES];
-                    for i in 0..s {
-                        next[i] = tableau.gamma
-                            * (0..s).map(|j| tableau.inverse[i][j] * v[j]).sum::<f64>();
+                    for (next, row) in next.iter_mut().zip(&tableau.inverse).take(s) {
+                        *next = tableau.gamma * (0..s).map(|j| row[j] * v[j]).sum::<f64>();
                     }
                     v = next;
                 }

@@ -22,6 +22,9 @@ struct Methods;
 #[doc = include_str!("../book/src/schemes.md")]
 struct Schemes;
 
+#[doc = include_str!("../book/src/stages.md")]
+struct Stages;
+
 #[doc = include_str!("../book/src/recipes.md")]
 struct Recipes;
 

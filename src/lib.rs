@@ -71,9 +71,9 @@ pub mod prelude {
     pub use metriplectic_fields::{MatrixField, Real, Scalar, ScalarField};
     pub use metriplectic_integrators::{
         Attitude, AttitudeError, Certificate, Checkpoint, DormandPrince5, DormandPrince8, Ending,
-        Error, Event, Gonzalez, ItohAbe, MeanValue, Method, Newton, Observables, ResumeError, Run,
-        RunError, Scheme, Span, SpanError, State, StepError, Steps, SymmetricItohAbe, Trajectory,
-        Until, Watch,
+        Error, Event, Gauss, Gonzalez, ItohAbe, MeanValue, Method, Newton, Observables, Radau,
+        ResumeError, Run, RunError, Scheme, Span, SpanError, State, StepError, Steps,
+        SymmetricItohAbe, Trajectory, Until, Watch,
     };
     pub use metriplectic_manifolds::{
         Canonical, Cayley, Chart, ChartMidpoint, Euclidean, Exponential, HalfLine, LieAlgebra,

@@ -179,7 +179,7 @@ fn a_damaged_checkpoint_is_refused() {
     };
     assert_eq!(with(&|_| ()), None);
     let error = with(&|tree| tree["version"] = 7.into());
-    assert_eq!(error, Some(ResumeError::Version { found: 7, expected: 4 }));
+    assert_eq!(error, Some(ResumeError::Version { found: 7, expected: 5 }));
     let error = with(&|tree| tree["point"][1] = "NaN".into());
     assert!(matches!(error, Some(ResumeError::Point(PointError::NotFinite { index: 1, .. }))));
     let error = with(&|tree| tree["time"] = "-1.0".into());

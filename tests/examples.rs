@@ -620,3 +620,27 @@ fn both_laws_make_the_long_run_of_the_gases_more_accurate() {
         [0.697_372_907_244_776, 0.543_261_789_486_713, 3.526_959_397_033_727, 2.325_473_917_008_12];
     assert!(distance(&state, &flow) < 1e-5, "{report}");
 }
+
+#[test]
+fn the_colloid_follows_its_drift_and_is_damped() {
+    let report = json(&example("colloid", &["--json"]));
+    let ([energy, entropy, _], state) = certified(&report);
+    assert!(energy <= 1e-14 && entropy > 0.0, "{report}");
+    assert_eq!(report["entropy_falls"], 0);
+    // Of the 102 nm where the drift begins, in closed form; without damping the momentum is 10⁻¹⁷.
+    assert!(figure(&report, "apart") < 1e-10 && state[1].abs() < 1e-20, "{report}");
+    assert!(figure(&report, "friction") < 10.0 && figure(&report["midpoint"], "friction") > 100.0);
+}
+
+#[test]
+fn two_spins_keep_an_angular_momentum_that_is_not_listed() {
+    let run = |steps| {
+        let report = json(&example("two_spins", &["--json", "--steps", steps]));
+        let ([energy, _, _], _) = certified(&report);
+        assert!(energy <= 2e-14, "{report}");
+        ["momentum", "momentum_explicit", "momentum_radau"].map(|name| figure(&report, name))
+    };
+    let (short, long) = (run("1000"), run("5000"));
+    assert!(long[0] < 1e-5 && long[0] < 1.1 * short[0], "{long:?}");
+    assert!(long[1] > 4.0 * short[1] && long[2] > 4.0 * short[2], "{short:?}, {long:?}");
+}

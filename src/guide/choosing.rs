@@ -125,8 +125,8 @@
 //! | [`retries`](crate::integrators::Certificate) in the certificate | steps were split in halves; a smaller `h` is cheaper |
 //! | six iterations or more in the worst step | the step is long for Newton's method; the same |
 //! | a path near the cut locus, half a turn of a body in one step | ten steps a turn |
-//! | `friction not damped: h\|K'\| = …` in the certificate | friction is faster than a step, which does not damp it: large steps exchange hot and cold and do not find the rest point. Take steps with `h\|K'\|` below 10, or [`Span::until`](crate::integrators::Span::until), or eliminate the fast variable |
-//! | [`StiffFriction`](crate::integrators::StepError::StiffFriction) | the same, and the step is not solved; the error has the step size |
+//! | `friction not damped: h\|K'\| = …` in the certificate | friction is faster than a step, which does not damp it: large steps exchange hot and cold and do not find the rest point. Take [`Radau`](crate::integrators::Radau), which damps it, or steps with `h\|K'\|` below 10, or [`Span::until`](crate::integrators::Span::until) |
+//! | [`StiffFriction`](crate::integrators::StepError::StiffFriction) | the step is not solved, because friction is stiff: take [`Radau`](crate::integrators::Radau), and smaller steps while a fast transient lasts; the error has the step size |
 //!
 //! # 10. Which metric?
 //!

@@ -10,6 +10,7 @@
 //! | [`round_off`] | covectors, laws and positions that are safe against round-off | |
 //! | [`midpoint`] | [`Scheme`]: the method of the paper, its equation and its fallbacks | [`newton`], [`discrete_gradient`], [`round_off`] |
 //! | [`explicit`] | [`DormandPrince8`], [`DormandPrince5`]: explicit methods, and then back onto the laws | [`method`] |
+//! | [`collocation`] | [`Gauss`], [`Radau`]: methods with stages, of order `2s` and `2s − 1` | [`method`], [`round_off`] |
 //! | [`attitude`] | [`Attitude`]: where a body points along a run of its angular momentum | [`run`] |
 //! | [`laws`] | what a step and a method promise, and the functions that check it | |
 //! | [`error`](mod@error) | [`Error`], [`RunError`] | |
@@ -24,6 +25,7 @@
 //! or return from one ([`Linearised`], [`Root`], [`Iterate`]) has all of its fields.
 
 pub mod attitude;
+pub mod collocation;
 mod digits;
 pub mod discrete_gradient;
 pub mod error;
@@ -37,17 +39,18 @@ pub mod run;
 pub mod step_error;
 
 pub use attitude::{Attitude, AttitudeError};
+pub use collocation::{Gauss, Radau, StageMemory};
 pub use discrete_gradient::{DiscreteGradient, Gonzalez, ItohAbe, MeanValue, SymmetricItohAbe};
 pub use error::{Error, RunError};
 pub use explicit::{DormandPrince5, DormandPrince8, StageFlow};
 pub use method::{
     Components, Control, Effort, Element, EntropyStep, Evidence, Flow, Laws, Memory, Method,
-    Promises, Refusal, StateSpace, StepEnds, StepStart, Taken, Vector,
+    Promises, Refusal, StageLaws, StateSpace, StepEnds, StepStart, Taken, Vector,
 };
 pub use midpoint::{Residual, Run, Scheme};
 pub use newton::{Equation, Iterate, Linearised, Newton, Root, Rounding};
 pub use round_off::stable_gradient::StableGradient;
-pub use run::certificate::{Certificate, InvariantBalance, ProjectedSteps};
+pub use run::certificate::{Certificate, InvariantBalance, ProjectedSteps, StageBalance};
 pub use run::checkpoint::{Checkpoint, ResumeError, Saved};
 pub use run::controller::Until;
 pub use run::event::Event;

@@ -18,7 +18,7 @@ use metriplectic_dynamics::invariants::Kind;
 use metriplectic_dynamics::{ModelError, SecondLaw};
 use metriplectic_manifolds::{Manifold, PointError};
 
-pub use evidence::{Effort, EntropyStep, Evidence, Promises};
+pub use evidence::{Effort, EntropyStep, Evidence, Promises, StageLaws};
 pub use vector::{Components, Vector};
 
 use crate::error::RunError;

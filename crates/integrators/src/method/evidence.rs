@@ -35,7 +35,7 @@ pub struct Evidence {
     pub entropy_slope: f64,
     /// Whether anything was dissipated.
     pub dissipates: bool,
-    /// The largest rate `h|K'|` of the friction.
+    /// The largest rate `h|K'|` of friction that the step does not damp.
     pub friction: f64,
     /// Whether the state is at rest: the displacement is no more than its own round-off.
     pub rests: bool,
@@ -43,6 +43,31 @@ pub struct Evidence {
     pub entropy_step: Option<EntropyStep>,
     /// Whether the size of the step is near the edge of the region of stability of an explicit method.
     pub stability: bool,
+    /// What a method with stages tells of its laws.
+    pub stages: Option<StageLaws>,
+}
+
+/// What a step with stages tells of its laws.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct StageLaws {
+    /// The largest error of the energy and the further invariants in the step, relative to the sizes of their terms,
+    /// before the last digits of the end.
+    pub defect: f64,
+    /// What the entropy gains beside the production of friction: zero, but for a method that damps.
+    pub surplus: f64,
+}
+
+impl StageLaws {
+    /// Those of a step.
+    pub(crate) const fn new(defect: f64, surplus: f64) -> Self {
+        Self { defect, surplus }
+    }
+
+    /// Those of two parts.
+    fn and(self, next: Self) -> Self {
+        Self { defect: self.defect.max(next.defect), surplus: self.surplus + next.surplus }
+    }
 }
 
 /// How a method that projects onto the laws found the entropy at the end of a step.
@@ -66,6 +91,7 @@ impl Default for Evidence {
             rests: false,
             entropy_step: None,
             stability: false,
+            stages: None,
         }
     }
 }
@@ -80,6 +106,10 @@ impl Evidence {
             rests: next.rests,
             entropy_step: next.entropy_step.or(self.entropy_step),
             stability: self.stability | next.stability,
+            stages: match (self.stages, next.stages) {
+                (Some(a), Some(b)) => Some(a.and(b)),
+                (a, b) => a.or(b),
+            },
         }
     }
 }

@@ -53,6 +53,8 @@ pub struct Certificate {
     pub falls_avoided: usize,
     /// Steps of a method that projects onto the laws, by how the entropy was found.
     pub projected_steps: ProjectedSteps,
+    /// What became of the laws in steps with stages; `None` for another method.
+    pub stages: Option<StageBalance>,
     /// What the solver did, in all steps.
     #[cfg_attr(feature = "serde", serde(flatten))]
     pub effort: Effort,
@@ -68,8 +70,8 @@ pub struct Certificate {
     #[cfg_attr(feature = "serde", serde(serialize_with = "by_name"))]
     pub second_law: SecondLaw,
     /// The largest rate `h|K'|` of the friction in a step, with `K'` the derivative of `K dS` along the
-    /// state, from the Jacobians that were formed; 0 without dissipation. The midpoint rule damps no
-    /// deviation that decays much faster than a step: it is multiplied by almost −1.
+    /// state, from the Jacobians that were formed; 0 without dissipation, and in steps that damp it. The midpoint
+    /// rule damps no deviation that decays much faster than a step: it is multiplied by almost −1.
     pub friction: f64,
     /// Whether the dissipation was projected so that it keeps the energy, and is not quite the tensor
     /// that was written down ([`ProjectedDissipation`](metriplectic_dynamics::ProjectedDissipation)).
@@ -107,6 +109,18 @@ impl ProjectedSteps {
         }
         self.stability += usize::from(evidence.stability);
     }
+}
+
+/// What became of the laws in steps of a method with stages.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[non_exhaustive]
+pub struct StageBalance {
+    /// The largest error of the energy and the further invariants in one step, relative to the sizes of their terms.
+    pub defect: f64,
+    /// What the entropy has gained beside the production of friction: what
+    /// [`Radau`](crate::Radau) adds where it damps.
+    pub surplus: f64,
 }
 
 /// What became of a further invariant.
@@ -173,6 +187,7 @@ impl Certificate {
             rejected: 0,
             falls_avoided: 0,
             projected_steps: ProjectedSteps::default(),
+            stages: None,
             effort: Effort::default(),
             worst_iterations: 0,
             local_error: None,
@@ -220,6 +235,11 @@ impl Certificate {
         self.max_manifold_defect = self.max_manifold_defect.max(flow.defect(next));
         self.steps += 1;
         self.projected_steps.enter(&evidence);
+        if let Some(laws) = evidence.stages {
+            let balance = self.stages.get_or_insert_default();
+            balance.defect = balance.defect.max(laws.defect);
+            balance.surplus += laws.surplus;
+        }
         self.effort += effort;
         self.worst_iterations = self.worst_iterations.max(effort.iterations);
     }
@@ -247,7 +267,7 @@ impl Certificate {
         self.max_energy_error <= of_a_law(self.energy_scale)
     }
 
-    /// Whether friction is so stiff at these step sizes that the midpoint rule does not damp it.
+    /// Whether friction is so stiff at these step sizes that the method does not damp it.
     pub const fn is_stiff(&self) -> bool {
         self.friction > STIFF
     }
@@ -292,7 +312,7 @@ impl fmt::Display for Certificate {
             writeln!(f, "friction:    projected so that K dH = 0, not quite the tensor given")?;
         }
         if self.is_stiff() {
-            writeln!(f, "friction not damped: h|K'| = {:.1e}", self.friction)?;
+            writeln!(f, "friction not damped: h|K'| = {:.1e}; `Radau` damps it", self.friction)?;
         }
         for (index, kept) in self.invariants.iter().enumerate() {
             let InvariantBalance { kind, initial, max_error, .. } = kept;
@@ -326,6 +346,13 @@ impl fmt::Display for Certificate {
                 f,
                 "accuracy:    the motion is not resolved: local errors up to {error:.1e} of the state in a step"
             )?;
+        }
+        if let Some(StageBalance { defect, surplus }) = self.stages {
+            write!(f, "stages:      laws off by {defect:.1e} of their terms in the worst step")?;
+            if surplus > 0.0 {
+                write!(f, ", damping added {surplus:.1e} to S")?;
+            }
+            writeln!(f)?;
         }
         self.projections(f)?;
         if self.effort == Effort::default() {
@@ -377,7 +404,7 @@ impl Certificate {
             writeln!(
                 f,
                 "stability:   it sets the size of {stability} of {steps}, and not the tolerance; an implicit method, \
-                 such as `WeylMidpoint`, takes larger ones"
+                 such as `Radau`, takes larger ones"
             )?;
         }
         Ok(())
@@ -431,6 +458,7 @@ mod tests {
         rejected: 0,
         falls_avoided: 0,
         projected_steps: ProjectedSteps { targeted: 0, free: 0, held: 0, stability: 0 },
+        stages: None,
         effort: Effort { iterations: 9, continued: 0, globalised: 0, splits: 1 },
         worst_iterations: 2,
         local_error: None,

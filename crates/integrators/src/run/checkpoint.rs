@@ -94,7 +94,7 @@ mod validation;
 use metriplectic_manifolds::PointError;
 
 use crate::method::{Control, Effort, Flow, Memory, Method, StateSpace, Vector};
-use crate::run::certificate::{Certificate, ProjectedSteps};
+use crate::run::certificate::{Certificate, ProjectedSteps, StageBalance};
 use crate::run::controller::{Cap, Controller, Entries, StepSize};
 use crate::run::output::StepBefore;
 use crate::run::scales::Scales;
@@ -138,7 +138,7 @@ pub struct Checkpoint {
 }
 
 /// The version of the format that is written and read.
-const VERSION: u32 = 4;
+const VERSION: u32 = 5;
 
 /// The figures of a certificate that the system does not know.
 #[derive(Clone, Debug, PartialEq)]
@@ -162,6 +162,8 @@ struct Balance {
     rejected: usize,
     falls_avoided: usize,
     projected_steps: ProjectedSteps,
+    /// Largest defect and surplus of steps with stages.
+    stages: Option<(Exact, Exact)>,
     effort: Effort,
     worst_iterations: usize,
     local_error: Option<Exact>,
@@ -601,6 +603,7 @@ impl Balance {
             rejected: c.rejected,
             falls_avoided: c.falls_avoided,
             projected_steps: c.projected_steps,
+            stages: c.stages.map(|s| (Exact(s.defect), Exact(s.surplus))),
             effort: c.effort,
             worst_iterations: c.worst_iterations,
             local_error: c.local_error.map(Exact),
@@ -629,6 +632,9 @@ impl Balance {
         c.rejected = self.rejected;
         c.falls_avoided = self.falls_avoided;
         c.projected_steps = self.projected_steps;
+        c.stages = self
+            .stages
+            .map(|(defect, surplus)| StageBalance { defect: defect.0, surplus: surplus.0 });
         c.effort = self.effort;
         c.worst_iterations = self.worst_iterations;
         c.local_error = self.local_error.map(|error| error.0);

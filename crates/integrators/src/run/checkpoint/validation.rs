@@ -90,6 +90,10 @@ pub(super) fn of_the_balance<F: Flow>(
     }
     size("size of the terms of the energy", b.energy_scale)?;
     size("rate of the friction", b.friction)?;
+    if let Some((defect, surplus)) = b.stages {
+        size("defect of the stages", defect)?;
+        size("surplus of the entropy", surplus)?;
+    }
     for (here, (initial, error, scale)) in c.invariants.iter().zip(&b.invariants) {
         finite("initial value of a further invariant", &[*initial])?;
         size("size of the terms of a further invariant", *scale)?;

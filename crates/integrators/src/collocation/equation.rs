@@ -1,0 +1,355 @@
+//! The equation of a step with stages.
+//!
+//! The unknowns are the velocities `k̃_i` of the stages at `x`. With `u = h Σ b_j k̃_j` the [chart](super::chart) of the
+//! step has its middle at `z`, and the stages are
+//!
+//! ```math
+//! k_i = T \tilde k_i, \qquad X_i = \varphi_z\Bigl(-\tfrac12 d + h \sum_j a_{ij} k_j\Bigr), \qquad
+//! v_i = T\varphi_z\, k_i = \tilde\Pi_i\, w_{H,i} + \tilde K_i\, w_{S,i} ,
+//! ```
+//!
+//! with the [covectors](super::covectors) that account for the change of each law.
+
+use metriplectic_dynamics::velocity::{Covectors, differentials, irreversible, reversible};
+use metriplectic_dynamics::{Metriplectic, SecondLaw, system::Point};
+use metriplectic_fields::{ChartPoint, Column, Dimension, Vector};
+use metriplectic_manifolds::Manifold;
+
+use super::chart::{StepChart, in_chart_at};
+use super::covectors::{
+    AlongStages, Correction, LawStart, OfInvariants, StageCovectors, StagePoints, Stages,
+    StepPolynomial, all_finite, combined,
+};
+use super::heat;
+use super::tableau::{STAGES, Tableau};
+use crate::method::Laws;
+use crate::midpoint::{Dim, Numbers};
+use crate::round_off::bound::ROUNDED;
+use crate::round_off::drift::{self, DriftCorrection};
+
+/// The velocities of the stages, in the frame at the start of the step.
+pub(super) type Unknowns<Y> = Stages<Vector<<Y as Metriplectic>::Manifold>>;
+
+/// Units of round-off up to which a velocity that changes the energy is one that has lost digits.
+const ROUNDINGS: f64 = 16.0;
+
+/// The ratio of two productions of entropy, that of friction at the end and that of the step, from which on friction is
+/// not damped: without damping it is of the order of `hλ`.
+const UNDAMPED: f64 = 10.0;
+
+/// The covectors of all laws at the stages.
+pub(super) type StageCovectorsOf<Y> =
+    Covectors<Dim<Y>, StageCovectors<Vector<<Y as Metriplectic>::Manifold>>>;
+
+/// The equation of a step.
+#[derive(Debug)]
+pub(super) struct StageEquation<'a, Y: Metriplectic> {
+    pub(super) tableau: &'static Tableau,
+    pub(super) system: &'a Y,
+    pub(super) x: &'a Point<Y>,
+    pub(super) h: f64,
+    /// The laws at `x`.
+    pub(super) values: Laws<Numbers<Y>>,
+    /// What is taken back of the errors of earlier steps.
+    pub(super) drift: DriftCorrection<Y>,
+    /// Whether the laws are integrated along short steps.
+    pub(super) integrals: bool,
+    /// The differential of the energy at `x`, if what is lost of the energy becomes heat.
+    pub(super) heats: Option<Vector<Y::Manifold>>,
+    /// The round-off of the terms of a velocity; zero where it is not known.
+    pub(super) rounding: Vector<Y::Manifold>,
+}
+
+impl<Y: Metriplectic> Clone for StageEquation<'_, Y> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<Y: Metriplectic> Copy for StageEquation<'_, Y> {}
+
+/// The equation at given velocities.
+pub(super) struct Evaluated<Y: Metriplectic> {
+    /// What the velocities of the stages are less than they should be, at `x`.
+    pub(super) residual: Unknowns<Y>,
+    /// The end of the step.
+    pub(super) end: Point<Y>,
+    /// The displacement in the chart of the step.
+    pub(super) d: Vector<Y::Manifold>,
+    /// The laws at the end.
+    pub(super) values: Laws<Numbers<Y>>,
+    /// What the residual leaves of the energy and the further invariants, in units of their round-off.
+    pub(super) excess: f64,
+    /// What it leaves of the entropy, and the size of its terms.
+    pub(super) entropy: Left,
+    /// The largest `|w_S|` of a stage, entry by entry.
+    pub(super) entropy_covector: Vector<Y::Manifold>,
+    /// The errors of the energy and the further invariants at the end, in units of their round-off.
+    pub(super) error: f64,
+    /// The sizes of the terms of the laws.
+    pub(super) sizes: Laws<Numbers<Y>>,
+    /// The round-off of the covectors of the energy.
+    pub(super) noise: Vector<Y::Manifold>,
+    /// The least `|w_S|` of a stage; infinite if the entropy is not corrected.
+    pub(super) entropy_slope: f64,
+    /// What friction adds to the entropy.
+    pub(super) growth: f64,
+    /// What the entropy gains beside it.
+    pub(super) surplus: f64,
+    /// Whether friction is damped.
+    pub(super) damps: bool,
+    /// The largest change of the energy at a stage.
+    pub(super) excursion: f64,
+}
+
+/// What a residual leaves of a law.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Left {
+    /// The change of the law, less what it is to be.
+    pub(super) work: f64,
+    /// The size of the terms of the law.
+    pub(super) size: f64,
+}
+
+impl<'a, Y: Metriplectic> StageEquation<'a, Y> {
+    /// The equation of a step of a fraction of the size, which takes nothing back.
+    pub(super) fn of_fraction(&self, fraction: f64) -> Self {
+        Self { h: self.h * fraction, drift: drift::nothing::<Y>(), ..*self }
+    }
+
+    /// The equation of a step from `x` with these laws, which takes nothing back.
+    pub(super) fn new(
+        tableau: &'static Tableau,
+        system: &'a Y,
+        x: &'a Point<Y>,
+        values: Laws<Numbers<Y>>,
+        h: f64,
+    ) -> Self {
+        let (drift, rounding) = (drift::nothing::<Y>(), Vector::<Y::Manifold>::zero());
+        let mut heats = None;
+        if tableau.one_sided && system.second_law() == SecondLaw::Exact {
+            let w = differentials(system, &ChartPoint::<Y::Manifold>::centre(x));
+            heats = heat::is_directed(system, x, &w).then_some(w.energy);
+        }
+        Self { tableau, system, x, h, values, drift, integrals: true, heats, rounding }
+    }
+
+    /// The displacement `u = h Σ b_j k̃_j`.
+    #[inline]
+    pub(super) fn displacement(&self, k: &Unknowns<Y>) -> Vector<Y::Manifold> {
+        combined(self.tableau.stages, &self.tableau.weights, k) * self.h
+    }
+
+    /// The chart of the step.
+    #[inline]
+    pub(super) fn chart(&self, k: &Unknowns<Y>) -> Option<StepChart<Y::Manifold>> {
+        StepChart::of(self.x, &self.displacement(k))
+    }
+
+    /// The polynomial of the step.
+    #[inline]
+    pub(super) fn polynomial<'b>(
+        &self,
+        chart: &'b StepChart<Y::Manifold>,
+        k: &Unknowns<Y>,
+    ) -> StepPolynomial<'b, Y::Manifold> {
+        let &Self { tableau, x, h, .. } = self;
+        let mut displacements = [chart.shift; STAGES];
+        for i in 0..tableau.stages {
+            displacements[i] += chart.to_middle(x, &k[i]) * h;
+        }
+        StepPolynomial { tableau, chart, k: displacements, h }
+    }
+
+    /// The equation at these velocities; `None` where it is not defined.
+    pub(super) fn evaluate(&self, k: &Unknowns<Y>) -> Option<Evaluated<Y>> {
+        let &Self { tableau, system, x, h, .. } = self;
+        let chart = self.chart(k)?;
+        let polynomial = self.polynomial(&chart, k);
+        let inside = |x: &Point<Y>| system.manifold().is_inside(x);
+        let stages = StagePoints::of(system.metric(), &polynomial, inside)?;
+        let mut w = self.covectors(&stages, &polynomial);
+        let (mut heat, mut surplus, mut left) = (None, 0.0, f64::INFINITY);
+        if let Some(start) = &self.heats {
+            let last = tableau.stages - 1;
+            let (at, plain) = (&stages.x[last], at_stage::<Y>(&w, last));
+            let at = ChartPoint::centre(at);
+            let friction = irreversible(system, &system.metric_at(&at), &plain).ok()?;
+            left = h.abs() * plain.entropy.dot(&friction);
+            let step = heat::Step { system, tableau, chart: &chart, h, x, start };
+            let added = heat::add(&step, &stages, &mut w)?;
+            (heat, surplus) = (Some(added.velocity), added.gain.max(0.0));
+        }
+        let mut residual = [Vector::<Y::Manifold>::zero(); STAGES];
+        let mut work = Work::<Dim<Y>>::default();
+        let (mut entropy_slope, mut production) = (f64::INFINITY, 0.0);
+        let mut entropy_covector = Vector::<Y::Manifold>::zero();
+        for i in 0..tableau.stages {
+            let at = ChartPoint::<Y::Manifold>::centre(&stages.x[i]);
+            let here = at_stage::<Y>(&w, i);
+            let g = system.metric_at(&at);
+            let friction = irreversible(system, &g, &here).ok()?;
+            let velocity = reversible(system, &g, &here).ok()? + friction;
+            let mut off = self.conserving(velocity, &here.energy) - stages.v[i];
+            if let Some(heat) = &heat {
+                off += heat[i];
+            }
+            let weight = h * tableau.weights[i];
+            work.add(weight, &here, &off);
+            let sizes = here.entropy.abs();
+            entropy_covector =
+                Vector::<Y::Manifold>::from_index(|c| entropy_covector[c].max(sizes[c]));
+            production += weight * here.entropy.dot(&friction);
+            entropy_slope = entropy_slope.min(here.entropy.magnitude());
+            let zero = Vector::<Y::Manifold>::zero();
+            let in_middle = in_chart_at::<Y::Manifold>(&chart.z, &stages.x[i], &zero, &off);
+            residual[i] = chart.to_start(x, &in_middle);
+        }
+        let sizes = Laws {
+            energy: w.energy.size,
+            entropy: w.entropy.size,
+            invariants: Dim::<Y>::array(|a| w.invariants[a].map_or(0.0, |(_, l)| l.size)),
+        };
+        let excess = relative::<Dim<Y>>(&work.laws, &sizes) / ROUNDED;
+        let entropy = Left {
+            work: if self.is_exact() { work.laws.entropy } else { 0.0 },
+            size: w.entropy.size,
+        };
+        let values = Laws {
+            energy: w.energy.end,
+            entropy: w.entropy.end,
+            invariants: Dim::<Y>::array(|a| w.invariants[a].map_or(0.0, |(_, l)| l.end)),
+        };
+        let error = self.error(&values, &sizes);
+        let usable = all_finite::<Dim<Y>>(&residual) && !excess.is_nan();
+        usable.then_some(Evaluated {
+            residual,
+            d: chart.d,
+            end: chart.end,
+            values,
+            excess,
+            entropy,
+            entropy_covector,
+            error,
+            sizes,
+            noise: w.energy.noise,
+            entropy_slope: if self.is_exact() { entropy_slope } else { f64::INFINITY },
+            growth: production,
+            surplus,
+            damps: left <= UNDAMPED * (production.abs() + surplus) + ROUNDED * w.entropy.size,
+            excursion: w.energy.excursion,
+        })
+    }
+
+    /// The errors of the energy and the further invariants at the end, in units of round-off.
+    pub(super) fn error(&self, after: &Laws<Numbers<Y>>, sizes: &Laws<Numbers<Y>>) -> f64 {
+        let Self { values: before, drift, .. } = self;
+        let off = Laws {
+            energy: after.energy - before.energy + drift.energy,
+            entropy: 0.0,
+            invariants: Dim::<Y>::array(|a| {
+                after.invariants[a] - before.invariants[a] + drift.invariants[a]
+            }),
+        };
+        relative::<Dim<Y>>(&off, sizes) / ROUNDED
+    }
+
+    /// A velocity that the covector of the energy annihilates. Where friction is stiff the sum of its terms has lost
+    /// digits of this number: they are made good within the round-off of each term.
+    fn conserving(
+        &self,
+        velocity: Vector<Y::Manifold>,
+        w: &Vector<Y::Manifold>,
+    ) -> Vector<Y::Manifold> {
+        let parts = Vector::<Y::Manifold>::from_index(|c| self.rounding[c] * w[c]);
+        let (work, size) = (w.dot(&velocity), parts.magnitude());
+        if !(work.abs() <= ROUNDINGS * size && size > 0.0) {
+            return velocity;
+        }
+        let fraction = work / size;
+        velocity
+            - Vector::<Y::Manifold>::from_index(|c| self.rounding[c] * (parts[c] / size) * fraction)
+    }
+
+    /// Whether the entropy is corrected.
+    pub(super) fn is_exact(&self) -> bool {
+        self.system.second_law() == SecondLaw::Exact
+    }
+
+    /// The covectors of all laws at the stages.
+    #[inline]
+    fn covectors(
+        &self,
+        stages: &StagePoints<Y::Manifold>,
+        polynomial: &StepPolynomial<'_, Y::Manifold>,
+    ) -> Covectors<Dim<Y>, StageCovectors<Vector<Y::Manifold>>> {
+        let &Self { system, values, drift, integrals, .. } = self;
+        let scales = Y::Manifold::scales(&polynomial.chart.end);
+        let along = AlongStages { stages, polynomial, scales, integrals };
+        let [of_energy, of_entropy] = match (self.is_exact(), self.heats.is_some()) {
+            (false, _) => [Correction::Here, Correction::None],
+            (true, false) => [Correction::Here; 2],
+            (true, true) => [Correction::Later; 2],
+        };
+        let energy = LawStart { value: values.energy, drift: drift.energy };
+        let entropy = LawStart { value: values.entropy, drift: drift.entropy };
+        let laws = [
+            along.of(system.energy(), energy, of_energy),
+            along.of(system.entropy(), entropy, of_entropy),
+        ];
+        let start = |a: usize| LawStart { value: values.invariants[a], drift: drift.invariants[a] };
+        let mut invariants = OfInvariants { along: &along, start, seen: 0 };
+        Covectors::new(laws, system.invariants(), &mut invariants)
+    }
+}
+
+/// The covectors at one stage.
+pub(super) fn at_stage<Y: Metriplectic>(
+    w: &StageCovectorsOf<Y>,
+    i: usize,
+) -> Covectors<Dim<Y>, Vector<Y::Manifold>> {
+    Covectors {
+        energy: w.energy.w[i],
+        entropy: w.entropy.w[i],
+        invariants: Dim::<Y>::array(|a| w.invariants[a].map(|(kind, l)| (kind, l.w[i]))),
+    }
+}
+
+/// What a residual changes of each law.
+struct Work<N: Dimension> {
+    laws: Laws<N::Array<f64>>,
+}
+
+impl<N: Dimension> Default for Work<N> {
+    fn default() -> Self {
+        Self { laws: Laws { energy: 0.0, entropy: 0.0, invariants: N::array(|_| 0.0) } }
+    }
+}
+
+impl<N: Dimension> Work<N> {
+    #[inline]
+    fn add(&mut self, weight: f64, w: &Covectors<N, N::Vector<f64>>, off: &N::Vector<f64>) {
+        self.laws.energy += weight * w.energy.dot(off);
+        self.laws.entropy += weight * w.entropy.dot(off);
+        for (a, listed) in w.invariants.as_ref().iter().enumerate() {
+            let Some((_, l)) = listed else { break };
+            self.laws.invariants[a] += weight * l.dot(off);
+        }
+    }
+}
+
+/// The largest change of the energy and the further invariants, relative to the size of the terms of the law.
+#[inline]
+fn relative<N: Dimension>(off: &Laws<N::Array<f64>>, sizes: &Laws<N::Array<f64>>) -> f64 {
+    // 0/0 = 0: a law without terms has no round-off, and nothing changes it.
+    let ratio = |off: f64, size: f64| if off == 0.0 { 0.0 } else { off.abs() / size };
+    let listed = off.invariants.as_ref().iter().zip(sizes.invariants.as_ref());
+    listed.fold(ratio(off.energy, sizes.energy), |largest, (&off, &size)| {
+        larger(largest, ratio(off, size))
+    })
+}
+
+/// The larger one of two numbers; NaN if one is.
+fn larger(a: f64, b: f64) -> f64 {
+    if b.is_nan() || b > a { b } else { a }
+}

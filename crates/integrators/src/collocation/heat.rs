@@ -1,0 +1,155 @@
+//! Stiff friction that is damped: what a Radau method loses of the energy becomes heat.
+//!
+//! Radau's weights are algebraically stable. On a step that is long for friction the method loses energy where the
+//! energy is convex, and gains entropy where the entropy is concave. To correct the covectors for both would undo the
+//! damping. So the fraction `τ` of the energy that *friction* has lost is returned by a velocity along the entropy,
+//!
+//! ```math
+//! v_i = \tilde\Pi_i\, w_{H,i} + \tilde K_i\, w_{S,i} + \rho\, u_i, \qquad
+//! u_i = \frac{♯n_i}{\langle w_{H,i}, ♯n_i\rangle}, \qquad h\rho = -\tau\,\delta_H ,
+//! ```
+//!
+//! with `n_i` the part of `dS` that is orthogonal to the covectors of the further invariants, and
+//! `w_H = dH + (1 − τ) δ_H ♭v/D`. Then `ΔH = 0` and
+//!
+//! ```math
+//! \Delta S = h \sum_i b_i \tilde K_i(w_{S,i}, w_{S,i}) + \max(N, 0), \qquad
+//! N = \delta_S + h\rho \sum_i b_i \langle dS, u_i\rangle ,
+//! ```
+//!
+//! if the covector of the entropy is corrected where `N < 0`, by `a_S = N/(D - h\rho \sum_i b_i \langle ♭v_i, u_i\rangle)`.
+//! Near an equilibrium `dS = β dH`, and with `τ = 1` the number `N = δ_S − β δ_H` is the gain of `S − βH`, which has a
+//! maximum there: it is not negative, and nothing is corrected.
+//!
+//! `u` is a choice: where an unresolved transient loses energy, the laws do not say which variable warms.
+
+use metriplectic_dynamics::orthogonal::Orthogonal;
+use metriplectic_dynamics::velocity::{self, Covectors};
+use metriplectic_dynamics::{Metriplectic, system::Point};
+use metriplectic_fields::{ChartPoint, Column, Vector};
+use metriplectic_manifolds::{InnerProduct, Manifold, Riemannian};
+
+use super::chart::{StepChart, in_chart_at};
+use super::covectors::{StagePoints, Stages};
+use super::equation::{StageCovectorsOf, at_stage};
+use super::tableau::{STAGES, Tableau};
+use crate::midpoint::Dim;
+
+/// What is added to the stages.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Heat<V> {
+    /// The velocities `ρ u_i`.
+    pub(super) velocity: Stages<V>,
+    /// The number `N`, the gain of the entropy beside the production of friction.
+    pub(super) gain: f64,
+}
+
+/// The fraction of its terms that is left of `⟨dH, ♯n⟩` where heat has a direction.
+const DIRECTED: f64 = 1e-3;
+
+/// The vector `♯n` at a point; `None` where it does not change the energy.
+fn direction<Y: Metriplectic>(
+    system: &Y,
+    x: &Point<Y>,
+    w: &Covectors<Dim<Y>, Vector<Y::Manifold>>,
+) -> Option<Vector<Y::Manifold>> {
+    let g = system.metric().at(&ChartPoint::<Y::Manifold>::centre(x)).ok()?;
+    let mut normals = Orthogonal::<Dim<Y>>::default();
+    for (_, l) in w.invariants.as_ref().iter().flatten() {
+        normals.push(&g, l);
+    }
+    let sharp = g.sharp(&normals.project_covector(0, &w.entropy));
+    let warmed = w.energy.dot(&sharp);
+    let terms = Y::Manifold::pairing_size(&w.energy, &sharp);
+    let is_directed = warmed.abs() >= DIRECTED * terms && terms > 0.0 && warmed.is_finite();
+    is_directed.then(|| sharp * warmed.recip())
+}
+
+/// Whether heat has a direction at a point.
+pub(super) fn is_directed<Y: Metriplectic>(
+    system: &Y,
+    x: &Point<Y>,
+    w: &Covectors<Dim<Y>, Vector<Y::Manifold>>,
+) -> bool {
+    direction(system, x, w).is_some()
+}
+
+/// A step that heats.
+#[derive(Debug)]
+pub(super) struct Step<'a, Y: Metriplectic> {
+    pub(super) system: &'a Y,
+    pub(super) tableau: &'static Tableau,
+    pub(super) chart: &'a StepChart<Y::Manifold>,
+    pub(super) h: f64,
+    pub(super) x: &'a Point<Y>,
+    /// The differential of the energy at `x`.
+    pub(super) start: &'a Vector<Y::Manifold>,
+}
+
+/// Corrects the covectors of energy and entropy with heat; `None` where heat has no direction.
+pub(super) fn add<Y: Metriplectic>(
+    step: &Step<'_, Y>,
+    stages: &StagePoints<Y::Manifold>,
+    w: &mut StageCovectorsOf<Y>,
+) -> Option<Heat<Vector<Y::Manifold>>> {
+    let &Step { system, tableau, h, .. } = step;
+    let transient = transient(step, stages, w)?;
+    let (delta, square) = (w.energy.left, stages.square());
+    if square != 0.0 {
+        for i in 0..tableau.stages {
+            w.energy.w[i] += stages.flat(i) * ((1.0 - transient) * delta / square);
+        }
+    }
+    let rho = -transient * delta / h;
+    let mut velocity = [Vector::<Y::Manifold>::zero(); STAGES];
+    let (mut gain, mut along) = (w.entropy.left, 0.0);
+    for i in 0..tableau.stages {
+        velocity[i] = direction(system, &stages.x[i], &at_stage::<Y>(w, i))? * rho;
+        let weight = h * tableau.weights[i];
+        gain += weight * w.entropy.w[i].dot(&velocity[i]);
+        along += weight * stages.flat(i).dot(&velocity[i]);
+    }
+    let square = square - along;
+    if gain < 0.0 && square != 0.0 {
+        for i in 0..tableau.stages {
+            w.entropy.w[i] += stages.flat(i) * (gain / square);
+        }
+    }
+    Some(Heat { velocity, gain })
+}
+
+/// The fraction `τ` of what is lost that becomes heat: what the energy loses is a quadratic form of the variations of
+/// the velocity and of `dH` in a step, and this is the part of friction in their pairings.
+fn transient<Y: Metriplectic>(
+    step: &Step<'_, Y>,
+    stages: &StagePoints<Y::Manifold>,
+    w: &StageCovectorsOf<Y>,
+) -> Option<f64> {
+    let &Step { system, tableau, chart, x, start, .. } = step;
+    let (s, zero) = (tableau.stages, Vector::<Y::Manifold>::zero());
+    let [mut reversible, mut friction] = [[zero; STAGES]; 2];
+    let [mut mean_reversible, mut mean_friction] = [zero; 2];
+    for i in 0..s {
+        let at = ChartPoint::<Y::Manifold>::centre(&stages.x[i]);
+        let g = system.metric_at(&at);
+        let moved = velocity::reversible(system, &g, &at_stage::<Y>(w, i)).ok()?;
+        let to_middle = |v| in_chart_at::<Y::Manifold>(&chart.z, &stages.x[i], &zero, &v);
+        reversible[i] = to_middle(moved);
+        friction[i] = to_middle(stages.v[i] - moved);
+        mean_reversible += reversible[i] * tableau.weights[i];
+        mean_friction += friction[i] * tableau.weights[i];
+    }
+    let back = chart.d * -0.5;
+    let mut parts = [0.0; 2];
+    for i in 0..s {
+        let varied = [reversible[i] - mean_reversible, friction[i] - mean_friction];
+        for (part, v) in parts.iter_mut().zip(varied) {
+            let here = in_chart_at::<Y::Manifold>(&stages.x[i], &chart.z, &stages.q[i], &v);
+            let before = in_chart_at::<Y::Manifold>(x, &chart.z, &back, &v);
+            let paired = w.energy.w[i].dot(&here) - start.dot(&before);
+            *part += tableau.weights[i] * paired.abs();
+        }
+    }
+    let sum = parts[0] + parts[1];
+    Some(if sum > 0.0 { parts[1] / sum } else { 0.0 })
+}

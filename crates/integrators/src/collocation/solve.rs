@@ -1,0 +1,261 @@
+//! The iteration for the velocities of the stages.
+
+use metriplectic_dynamics::Metriplectic;
+use metriplectic_fields::Vector;
+
+use super::chart::StepChart;
+use super::equation::{Evaluated, StageEquation, Unknowns};
+use super::full::Full;
+use super::linear::Linear;
+use crate::method::{Flow as _, Laws};
+use crate::midpoint::{Dim, Numbers};
+
+/// A solved step.
+pub(super) struct Solved<Y: Metriplectic> {
+    /// The velocities of the stages, at the start of the step.
+    pub(super) k: Unknowns<Y>,
+    /// The last evaluation. Its end and its values are those of `k`.
+    pub(super) at: Evaluated<Y>,
+    /// The linear part that solved it.
+    pub(super) linear: Linear<Dim<Y>>,
+    /// The round-off of the displacements.
+    pub(super) round_off: Vector<Y::Manifold>,
+    /// Evaluations of the equation.
+    pub(super) evaluations: usize,
+}
+
+/// A step that was not solved.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Unsolved {
+    /// The smallest correction, in units of round-off.
+    pub(super) residual: f64,
+    /// Whether the equation was not defined on the way.
+    pub(super) edge: bool,
+    /// Evaluations of the equation.
+    pub(super) evaluations: usize,
+}
+
+/// How far the iteration goes.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Budget {
+    /// Corrections.
+    pub(super) corrections: usize,
+    /// The correction that counts as solved, in units of its round-off.
+    pub(super) tolerance: f64,
+    /// Which derivatives they are computed with.
+    pub(super) derivatives: Derivatives,
+}
+
+/// The derivatives that a correction is computed with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Derivatives {
+    /// Those of the equation of motion in the middle of the step.
+    InTheMiddle,
+    /// Those of the equation of the step along all of its unknowns.
+    OfAllStages,
+}
+
+/// The multiple of round-off at which a correction that no longer falls counts as solved.
+const STALL: f64 = 100.0;
+/// The multiple of its round-off that the residual may then leave of a law, of which runs are allowed 12.
+const STALLED_LAW: f64 = 8.0;
+/// The contraction from which on a linear part no longer serves.
+const SLOW: f64 = 0.3;
+/// Halvings of one correction.
+const HALVINGS: usize = 8;
+/// The fraction of the round-off that a last correction without an evaluation has to promise.
+const SURE: f64 = 0.03;
+
+/// An evaluation with its correction.
+struct Iterate<Y: Metriplectic> {
+    k: Unknowns<Y>,
+    at: Evaluated<Y>,
+    delta: Unknowns<Y>,
+    round_off: Vector<Y::Manifold>,
+    /// The size of the correction, in units of round-off.
+    size: f64,
+    /// What is left of the laws, in units of round-off.
+    excess: f64,
+}
+
+impl<Y: Metriplectic> Iterate<Y> {
+    /// What is left, in units of the round-off of the solution and of the laws.
+    fn total(&self) -> f64 {
+        self.size.max(self.excess)
+    }
+
+    /// Whether less than a fraction is left of another one; near round-off of the laws alone.
+    fn is_nearer(&self, other: &Self, fraction: f64) -> bool {
+        self.size < fraction * other.size
+            || other.size <= STALL && self.total() < fraction * other.total()
+    }
+}
+
+/// The end of a step after the last correction.
+struct End<Y: Metriplectic> {
+    k: Unknowns<Y>,
+    chart: StepChart<Y::Manifold>,
+    values: Laws<Numbers<Y>>,
+    error: f64,
+}
+
+impl<Y: Metriplectic> StageEquation<'_, Y> {
+    /// The velocities near a guess, at which the laws hold.
+    pub(super) fn solve(&self, guess: Unknowns<Y>, budget: Budget) -> Result<Solved<Y>, Unsolved> {
+        let solved = Iteration::start(self, guess, budget)?;
+        if solved.at.error <= STALLED_LAW || !self.integrals || budget.tolerance > 1.0 {
+            return Ok(solved);
+        }
+        // An integral along the step is off by more than its estimate.
+        let again = Iteration::start(&Self { integrals: false, ..*self }, solved.k, budget)?;
+        Ok(Solved { evaluations: solved.evaluations + again.evaluations, ..again })
+    }
+
+    /// The end after the last correction, with the laws evaluated there; `None` if they are off.
+    fn last(&self, here: &Iterate<Y>) -> Option<End<Y>> {
+        let k = moved(here, 1.0);
+        let chart = self.chart(&k)?;
+        let values = self.system.laws(&chart.end);
+        let error = self.error(&values, &here.at.sizes);
+        // Not so if it is not a number.
+        let conserved = error <= 1.0;
+        if !conserved || !values.entropy.is_finite() {
+            return None;
+        }
+        Some(End { k, chart, values, error })
+    }
+}
+
+/// An iteration under way.
+struct Iteration<'a, Y: Metriplectic> {
+    equation: StageEquation<'a, Y>,
+    budget: Budget,
+    linear: Linear<Dim<Y>>,
+    /// The derivatives of all stages, where these are asked for.
+    full: Option<Full>,
+    evaluations: usize,
+    /// Corrections so far.
+    corrections: usize,
+}
+
+impl<'a, Y: Metriplectic> Iteration<'a, Y> {
+    /// Iterates from a guess.
+    fn start(
+        equation: &StageEquation<'a, Y>,
+        guess: Unknowns<Y>,
+        budget: Budget,
+    ) -> Result<Solved<Y>, Unsolved> {
+        let undefined = Unsolved { residual: f64::INFINITY, edge: true, evaluations: 1 };
+        let linear = Linear::of(equation, &guess).ok_or(undefined)?;
+        let equation = StageEquation { rounding: linear.rounding(), ..*equation };
+        let at = equation.evaluate(&guess).ok_or(undefined)?;
+        let mut iteration =
+            Self { equation, budget, linear, full: None, evaluations: 1, corrections: 0 };
+        if budget.derivatives == Derivatives::OfAllStages {
+            iteration.full = Full::of(&equation, &guess, &at);
+            iteration.evaluations += iteration.full.as_ref().map_or(0, |full| full.evaluations);
+        }
+        let here = iteration.corrected(guess, at).ok_or(undefined)?;
+        iteration.run(here)
+    }
+
+    /// An evaluation with its correction.
+    fn corrected(&self, k: Unknowns<Y>, at: Evaluated<Y>) -> Option<Iterate<Y>> {
+        let round_off = self.linear.round_off(&at, &k);
+        let (delta, size) = match &self.full {
+            Some(full) => {
+                let delta = full.solve(&at.residual);
+                (delta, self.linear.measure(&delta, &round_off))
+            }
+            None => self.linear.correction(&at.residual, &round_off),
+        };
+        let excess = self.linear.excess(&at);
+        size.is_finite().then_some(Iterate { k, at, delta, round_off, size, excess })
+    }
+
+    /// Forms the derivatives anew.
+    fn renew(&mut self, here: Iterate<Y>) -> Option<Iterate<Y>> {
+        let Iterate { k, at, .. } = here;
+        self.linear = Linear::of(&self.equation, &k)?;
+        self.equation.rounding = self.linear.rounding();
+        if self.full.is_some() {
+            self.full = Full::of(&self.equation, &k, &at);
+            self.evaluations += self.full.as_ref()?.evaluations;
+        }
+        self.corrected(k, at)
+    }
+
+    fn solved(self, here: Iterate<Y>) -> Solved<Y> {
+        let Iterate { k, at, round_off, .. } = here;
+        Solved { k, at, linear: self.linear, round_off, evaluations: self.evaluations }
+    }
+
+    fn run(mut self, mut here: Iterate<Y>) -> Result<Solved<Y>, Unsolved> {
+        let (mut contraction, mut is_fresh) = (f64::INFINITY, true);
+        loop {
+            if here.total() <= self.budget.tolerance {
+                return Ok(self.solved(here));
+            }
+            if contraction * here.total() <= SURE
+                && let Some(End { k, chart, values, error }) = self.equation.last(&here)
+            {
+                let at = Evaluated { end: chart.end, d: chart.d, values, error, ..here.at };
+                return Ok(self.solved(Iterate { k, at, ..here }));
+            }
+            let (size, evaluations) = (here.size, self.evaluations);
+            let failed = Unsolved { residual: size, edge: false, evaluations };
+            if self.corrections >= self.budget.corrections {
+                return Err(failed);
+            }
+            let Some(next) = self.descend(&here) else {
+                if here.size <= STALL && here.excess <= STALLED_LAW {
+                    return Ok(self.solved(here));
+                }
+                if is_fresh {
+                    let edge = self.equation.evaluate(&moved(&here, 1.0)).is_none();
+                    return Err(Unsolved { edge, evaluations: self.evaluations, ..failed });
+                }
+                here = self.renew(here).ok_or(failed)?;
+                (contraction, is_fresh) = (f64::INFINITY, true);
+                continue;
+            };
+            contraction = (next.size / here.size).max(next.excess / here.excess);
+            let is_slow = next.size > SLOW * here.size && next.size > STALL;
+            (here, is_fresh) = (next, false);
+            if is_slow {
+                here = self.renew(here).ok_or(failed)?;
+                (contraction, is_fresh) = (f64::INFINITY, true);
+            }
+        }
+    }
+
+    /// The longest of the corrections `Δ, Δ/2, Δ/4, …` after which the next one is shorter.
+    fn descend(&mut self, here: &Iterate<Y>) -> Option<Iterate<Y>> {
+        self.corrections += 1;
+        let mut length = 1.0;
+        for _ in 0..=HALVINGS {
+            self.evaluations += 1;
+            let k = moved(here, length);
+            if let Some(at) = self.equation.evaluate(&k)
+                && let Some(next) = self.corrected(k, at)
+                && next.is_nearer(here, 1.0 - 0.25 * length)
+            {
+                return Some(next);
+            }
+            if here.size <= STALL {
+                return None;
+            }
+            length *= 0.5;
+        }
+        None
+    }
+}
+
+/// The velocities after a fraction of the correction.
+fn moved<Y: Metriplectic>(here: &Iterate<Y>, length: f64) -> Unknowns<Y> {
+    let mut k = here.k;
+    for (k, delta) in k.iter_mut().zip(&here.delta) {
+        *k += *delta * length;
+    }
+    k
+}

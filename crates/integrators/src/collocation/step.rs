@@ -1,0 +1,111 @@
+//! One step: guess, solve, end; then the last digits.
+
+use metriplectic_dynamics::Metriplectic;
+use metriplectic_fields::{Dimension, Space as _};
+use metriplectic_manifolds::Manifold;
+
+use super::equation::StageEquation;
+use super::fallbacks::{self, Cause, Fallbacks, StepFailure};
+use super::memory::{LastStep, StageMemory};
+use super::solve::Solved;
+use super::tableau::Tableau;
+use crate::method::{Effort, Evidence, Flow as _, Laws, StageLaws, StepStart, Taken};
+use crate::midpoint::{Dim, Start};
+use crate::round_off::bound::{ROUNDED, breaks_first_law, sizes_on_a_step};
+use crate::round_off::compensation::Displaced;
+use crate::round_off::drift;
+
+/// The growth of the entropy, relative to its value, below which a step of friction is round-off.
+const NOTHING: f64 = 1e-6 * f64::EPSILON;
+
+/// The start of a step with what earlier steps have left of the laws.
+pub(super) fn start_of<'a, Y: Metriplectic>(
+    tableau: &Tableau,
+    &StepStart { x, time, values, reference, .. }: &StepStart<'a, Y>,
+    h: f64,
+) -> Start<'a, Y> {
+    // The entropy that a correction on one side has added stays.
+    let entropy = if tableau.one_sided { 0.0 } else { values.entropy - reference.entropy };
+    let accumulated_error = Laws {
+        energy: values.energy - reference.energy,
+        entropy,
+        invariants: Dim::<Y>::array(|a| values.invariants[a] - reference.invariants[a]),
+    };
+    Start { x, time, h, values, accumulated_error }
+}
+
+/// The change of the energy at a stage, relative to the size of its terms, that no motion makes.
+const FAR: f64 = 1.0;
+
+/// Tries a step whole.
+pub(super) fn try_step<Y: Metriplectic>(
+    tableau: &'static Tableau,
+    system: &Y,
+    start: &Start<'_, Y>,
+    memory: &mut StageMemory<Dim<Y>>,
+    fallbacks: Fallbacks,
+) -> Result<Taken<Y>, StepFailure> {
+    memory.last = None;
+    let &Start { x, h, values, .. } = start;
+    let guess = memory.guess(tableau, h);
+    let mut equation = StageEquation::new(tableau, system, x, values, h);
+    if let Some(guess) = &guess {
+        equation.drift = drift::target(system, start, &equation.displacement(guess));
+    }
+    let mut effort = Effort::default();
+    let solved = fallbacks::solve(&equation, guess, fallbacks, &mut effort)?;
+    let Solved { k, at, linear, round_off, .. } = solved;
+    let failed = |cause, effort| StepFailure { cause, effort };
+    let rests = k[..tableau.stages]
+        .iter()
+        .all(|k| (0..Dim::<Y>::LEN).all(|c| (h * k[c]).abs() <= 2.0 * round_off[c]));
+    let rise = if tableau.one_sided { at.growth + at.surplus } else { at.growth };
+    let evidence = Evidence {
+        entropy_slope: at.entropy_slope,
+        dissipates: rise.abs() > NOTHING * values.entropy.abs(),
+        friction: if at.damps { 0.0 } else { linear.friction },
+        rests,
+        stages: Some(StageLaws::new(at.error * ROUNDED, at.surplus)),
+        ..Evidence::default()
+    };
+    // A root whose stages have quite another energy belongs to no motion from here.
+    if at.excursion > FAR * values.energy.abs() {
+        let [before, after] = sizes_on_a_step(system, [x, &at.end]);
+        if at.excursion > FAR * before.max(after) {
+            return Err(failed(Cause::Unsolved, effort));
+        }
+    }
+    if rests {
+        return Ok(Taken { x: x.clone(), values, evidence, effort });
+    }
+    // A root beyond the chart belongs to another way between the ends.
+    if !Y::Manifold::is_near(&(at.d * 0.5)) {
+        return Err(failed(Cause::Unsolved, effort));
+    }
+    let end = at.end;
+    if system.manifold().defect(&end).is_infinite() {
+        return Err(failed(Cause::Edge, effort));
+    }
+    let u = equation.displacement(&k);
+    let Some(chart) = equation.chart(&k) else { return Err(failed(Cause::Edge, effort)) };
+    memory.note::<Y::Manifold>(tableau, x, h, &k, &chart, &end);
+    memory.last = Some(LastStep { k, filter: *linear.filter() });
+    let step = Displaced { x, d: &u, end: &end };
+    let compensated = memory.compensation.add::<Y::Manifold>(Y::Manifold::lost_digits, &step);
+    let (x_end, values_end) = match compensated {
+        Some(moved) => {
+            let values = system.laws(&moved);
+            (moved, values)
+        }
+        None => (end, at.values),
+    };
+    let change = values_end.energy - values.energy;
+    if !values_end.entropy.is_finite() {
+        return Err(failed(Cause::Edge, effort));
+    }
+    let sizes = || sizes_on_a_step(system, [x, &x_end]);
+    if let Some(size) = breaks_first_law(change, values_end.energy, sizes) {
+        return Err(failed(Cause::Energy { change, size }, effort));
+    }
+    Ok(Taken { x: x_end, values: values_end, evidence, effort })
+}

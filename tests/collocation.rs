@@ -1,0 +1,394 @@
+//! Methods with stages: their orders on every kind of space with both laws, what they share with the scheme of the
+//! paper, their way back, and what every method of a run has.
+//!
+//! References are ends of the explicit method of order 8 at a tolerance of 10⁻¹⁴.
+
+use metriplectic::dynamics::system::Point;
+use metriplectic::integrators::{StageMemory, StepStart, laws};
+use metriplectic::manifolds::Riemannian;
+use metriplectic::prelude::*;
+
+#[path = "models/chart_midpoint.rs"]
+mod chart_midpoint;
+mod models;
+#[path = "models/stages.rs"]
+mod stages;
+
+use chart_midpoint::ChartMidpoint;
+use models::{Globe, gas, relaxing_body, top};
+use stages::*;
+
+const GAS: Vector4<f64> = Vector4::new(1.0, 2.0, 2.0, 2.0);
+
+/// The error of steps below which round-off may count.
+const ROUND_OFF: f64 = 2e-13;
+
+fn distance<M: Manifold>(a: &M::Point<f64>, b: &M::Point<f64>) -> f64 {
+    let both = M::entries(a).into_iter().zip(M::entries(b));
+    both.map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
+}
+
+/// The slope of the errors that are above round-off, by least squares.
+fn slope(steps: &[f64], errors: &[f64]) -> f64 {
+    let points: Vec<(f64, f64)> = steps
+        .iter()
+        .zip(errors)
+        .filter(|(_, error)| **error > ROUND_OFF)
+        .map(|(h, error)| (h.ln(), error.ln()))
+        .collect();
+    assert!(points.len() >= 3, "{errors:?} are round-off");
+    let n = points.len() as f64;
+    let (x, y) = points.iter().fold((0.0, 0.0), |(x, y), p| (x + p.0 / n, y + p.1 / n));
+    let both: f64 = points.iter().map(|p| (p.0 - x) * (p.1 - y)).sum();
+    both / points.iter().map(|p| (p.0 - x).powi(2)).sum::<f64>()
+}
+
+/// A run on which both laws and the further invariants are kept to round-off.
+fn kept<Y: Metriplectic>(
+    name: &str,
+    method: Stages,
+    system: &Y,
+    x0: &Point<Y>,
+    span: impl Into<metriplectic::integrators::Schedule>,
+) -> Trajectory<Y::Manifold> {
+    let run = method.run(system, x0.clone(), span).expect(name);
+    let c = run.certificate();
+    let all = c.keeps_energy() && c.keeps_entropy() && c.keeps_invariants();
+    assert!(all && c.max_manifold_defect < 1e-14, "{name}, {method:?}: {c}");
+    assert!(c.stages.is_some_and(|stages| stages.defect < 1e-14), "{name}, {method:?}: {c}");
+    run
+}
+
+/// The orders of all methods, with so many steps at the coarsest: for Gauss 1 to 4, and for Radau 2 to 4.
+fn orders<Y: Metriplectic>(
+    name: &str,
+    system: &Y,
+    x0: &Point<Y>,
+    time: f64,
+    (of_gauss, of_radau): ([usize; 4], [usize; 3]),
+) {
+    let fine = Span::until(time).tolerance(1e-14).at_most(2);
+    let exact = DormandPrince8.run(system, x0.clone(), fine).expect(name).last().point.clone();
+    let methods = GAUSS.into_iter().zip(of_gauss).chain(RADAU.into_iter().zip(of_radau));
+    for (method, coarsest) in methods {
+        let counts = [4, 5, 6, 8, 10].map(|k| k * coarsest / 4);
+        let steps = counts.map(|n| time / n as f64);
+        let mut per_step = 0.0;
+        let errors = counts.map(|n| {
+            let run = kept(name, method, system, x0, Span::steps(time / n as f64, n));
+            per_step = run.certificate().effort.iterations as f64 / n as f64;
+            assert_eq!(run.certificate().effort.splits, 0, "{name}, {method:?}");
+            distance::<Y::Manifold>(&run.last().point, &exact)
+        });
+        let (fitted, order) = (slope(&steps, &errors), f64::from(Method::<Y>::order(&method)));
+        println!("{name}, {method:?}: {fitted:.2} from {errors:?}, {per_step:.1} residuals");
+        assert!(fitted >= order - 0.3, "{name}, {method:?}: {fitted:.2} from {errors:?}");
+    }
+}
+
+fn spin() -> impl Metriplectic<Manifold = Sphere<2>, Metric = Canonical> {
+    System::on(Sphere::<2>::round()).bracket(AreaForm).energy(top).build().expect("it is a system")
+}
+
+/// A direction that precesses and warms its surroundings.
+fn warm_spin(
+    kappa: f64,
+) -> impl Metriplectic<Manifold = Product<Sphere<2>, Euclidean<1>>, Metric = Canonical> {
+    type Warm = (Vector3<Real>, Vector1<Real>);
+    System::on(Product(Sphere::<2>::round(), Euclidean::<1>))
+        .bracket((AreaForm, Zero))
+        .dissipation(Scaled(move |_: &Warm| Real::from(kappa), MetricDissipation))
+        .energy(|(x, s): &Warm| x.z + x.x * x.x * 0.3 + s.x.exp() * 0.2)
+        .entropy(|(_, s): &Warm| s.x)
+        .build()
+        .expect("it is a system")
+}
+
+const WARM: (Vector3<f64>, Vector1<f64>) = (Vector3::new(0.6, 0.0, 0.8), Vector1::new(0.0));
+
+fn rotations() -> impl Metriplectic<Manifold = Rotations, Metric = Canonical> {
+    System::on(Rotations::bi_invariant())
+        .bracket(Nambu::default())
+        .energy(|r: &Matrix3<Real>| r.m11 + r.m22 * 2.0 + r.m33 * 3.0 + r.m12 * r.m23 * 0.5)
+        .entropy(|r: &Matrix3<Real>| r.m13 - r.m21 * 0.5 + (r.m31 + r.m32).powi(2) * 0.25)
+        .build()
+        .expect("it is a system")
+}
+
+fn turned() -> Matrix3<f64> {
+    Rotations::bi_invariant().from_quaternion([0.8, 0.3, -0.4, 0.33]).expect("it is one")
+}
+
+#[test]
+fn orders_on_lie_algebra_duals() {
+    orders(
+        "so(3)*",
+        &relaxing_body(),
+        &vector![0.3, -0.9, 0.2],
+        30.0,
+        ([64, 48, 32, 20], [48, 32, 20]),
+    );
+    let body = System::on(LieDual::se3())
+        .energy(models::heavy)
+        .entropy(models::alignment)
+        .casimir(models::gamma_squared)
+        .build()
+        .expect("it is a system");
+    orders("se(3)*", &body, &SVector::from(models::HEAVY), 4.0, ([32, 32, 16, 12], [32, 16, 12]));
+}
+
+#[test]
+fn orders_on_spheres_and_products_with_them() {
+    orders(
+        "S²",
+        &spin(),
+        &Vector3::repeat(3_f64.sqrt().recip()),
+        20.0,
+        ([64, 64, 36, 36], [64, 36, 36]),
+    );
+    orders("S² × R", &warm_spin(1.0), &WARM, 6.0, ([64, 48, 40, 30], [48, 48, 28]));
+    orders("SO(3)", &rotations(), &turned(), 0.4, ([32, 32, 16, 16], [32, 16, 16]));
+}
+
+#[test]
+fn orders_on_gas_containers_and_with_a_listed_momentum() {
+    orders("gas", &gas(0.5), &GAS, 2.0, ([64, 48, 24, 20], [48, 24, 36]));
+    let pendulum = System::on(Euclidean::<10>)
+        .bracket(Poisson::constant(models::pendulum_bracket()).expect("it is skew"))
+        .energy(models::pendulum_energy)
+        .entropy(|x: &models::State10| x[8] + x[9])
+        .dissipation(FieldDissipation(models::heat_exchange))
+        .momentum(models::angular_momentum)
+        .build()
+        .expect("it is a system");
+    orders(
+        "double pendulum",
+        &pendulum,
+        &SVector::from(models::PENDULUM),
+        2.0,
+        ([32, 24, 16, 12], [24, 16, 12]),
+    );
+}
+
+/// A chart with a metric of its own.
+fn bent() -> impl Metriplectic<Manifold = Chart<3>, Metric: Riemannian<Chart<3>>> {
+    let metric = |x: &Vector3<Real>| {
+        let [a, b] = [x.x * 0.3, x.y * 0.2];
+        let (o, one) = (Real::from(0.0), Real::from(1.0));
+        Matrix3::new(a * a + 1.0, a * b, o, a * b, b * b + 1.5, o, o, o, one + x.z * x.z * 0.1)
+    };
+    System::on(Chart::<3>::new(|x| x.norm() < 4.0))
+        .metric(Metric::field(metric))
+        .bracket(Nambu::default())
+        .energy(|x: &Vector3<Real>| x.x * x.x * 0.5 + x.y * x.y + x.z * x.z * 1.5 + x.x * x.y * 0.3)
+        .entropy(|x: &Vector3<Real>| x.norm_squared() * 0.5 + x.z * 0.2)
+        .build()
+        .expect("it is a system")
+}
+
+const BENT: Vector3<f64> = Vector3::new(0.5, -0.6, 0.4);
+
+#[test]
+fn orders_with_a_metric_of_its_own_and_on_a_manifold_of_a_user() {
+    orders("chart", &bent(), &BENT, 4.0, ([48, 32, 16, 12], [32, 16, 16]));
+    let globe = System::on(Globe)
+        .metric(Metric::field(|_: &Vector3<Real>| Matrix3::identity()))
+        .bracket(AreaForm)
+        .energy(|x: &Vector3<Real>| x.z + x.x * x.x * 0.3 + x.y * x.x * 0.2)
+        .build()
+        .expect("it is a system");
+    let start = Globe::point(vector![0.6, 0.0, 0.8]);
+    orders("globe", &globe, &start, 12.0, ([64, 40, 24, 16], [40, 24, 16]));
+}
+
+/// How far the method of one stage is from a midpoint scheme after 100 steps.
+fn apart<Y: Metriplectic, R: Retraction<Y::Manifold, Y::Metric>>(
+    retraction: R,
+    system: &Y,
+    x0: &Point<Y>,
+    h: f64,
+) -> f64 {
+    let span = Span::steps(h, 100).every(100);
+    let scheme = Scheme::new(retraction).run(system, x0.clone(), span).expect("it runs");
+    let stage = Gauss1.run(system, x0.clone(), span).expect("it runs");
+    distance::<Y::Manifold>(&scheme.last().point, &stage.last().point)
+}
+
+#[test]
+fn one_stage_is_the_scheme_of_the_paper() {
+    let weyl = [
+        apart(WeylMidpoint, &relaxing_body(), &vector![0.3, -0.9, 0.2], 0.1),
+        apart(WeylMidpoint, &spin(), &Vector3::repeat(3_f64.sqrt().recip()), 0.1),
+        apart(WeylMidpoint, &rotations(), &turned(), 0.002),
+        apart(WeylMidpoint, &gas(0.5), &GAS, 0.02),
+    ];
+    let chart = apart(ChartMidpoint, &bent(), &BENT, 0.02);
+    println!("{weyl:?}, {chart:.1e}");
+    assert!(weyl.iter().all(|off| *off < 1e-13) && chart < 1e-13, "{weyl:?}, {chart:e}");
+    // The scheme with the geodesics of that metric is another one.
+    assert!(apart(WeylMidpoint, &bent(), &BENT, 0.02) > 1e-8);
+}
+
+/// The distance from the start after steps of `h` and of `−h`.
+fn way_back<Y: Metriplectic>(method: Stages, system: &Y, x: &Point<Y>, h: f64) -> f64 {
+    let step = |x: &Point<Y>, h| {
+        let (start, mut memory) = (StepStart::first(system, x), StageMemory::default());
+        method.step(system, &start, h, &mut memory).expect("it is taken").x
+    };
+    distance::<Y::Manifold>(x, &step(&step(x, h), -h))
+}
+
+#[test]
+fn gauss_steps_lead_back() {
+    for method in GAUSS {
+        let back = [
+            way_back(method, &spin(), &Vector3::repeat(3_f64.sqrt().recip()), 0.2),
+            way_back(method, &rotations(), &turned(), 0.02),
+            way_back(method, &gas(0.5), &GAS, 0.05),
+            way_back(method, &warm_spin(0.1), &WARM, 0.1),
+        ];
+        println!("{method:?}: {back:?}");
+        assert!(back.iter().all(|off| *off <= 1e-14), "{method:?}: {back:?}");
+    }
+    // Radau's nodes are not symmetric.
+    assert!(way_back(Radau2, &gas(0.5), &GAS, 0.05) > 1e-8);
+}
+
+#[test]
+fn weak_friction_keeps_both_laws() {
+    for exponent in [2, 5, 8, 11, 13] {
+        let kappa = 10_f64.powi(-exponent);
+        let run = kept("S² × R", Gauss3, &warm_spin(kappa), &WARM, Span::steps(0.2, 2000));
+        let gained = run.certificate().entropy_gained;
+        assert!(gained > 0.0, "κ = {kappa:e}: {gained:e}");
+    }
+    let run = kept("S² × R", Gauss3, &warm_spin(0.0), &WARM, Span::steps(0.2, 2000));
+    assert!(run.certificate().entropy_gained.abs() <= 2e-15, "{}", run.certificate());
+}
+
+/// The errors of energy and entropy of a run without friction, relative to their scales.
+fn drift(steps: usize) -> [f64; 2] {
+    let span = Span::steps(0.2, steps).at_most(1000);
+    let run = kept("S² × R", Gauss2, &warm_spin(0.0), &WARM, span);
+    let c = run.certificate();
+    println!("{steps} steps: {c}");
+    let of_entropy = run.iter().map(|state| state.entropy.abs()).fold(0.0, f64::max);
+    [c.max_energy_error / c.energy_scale, of_entropy]
+}
+
+#[test]
+fn nothing_drifts_in_many_steps() {
+    let [energy, entropy] = drift(50_000);
+    assert!(energy <= 2e-15 && entropy <= 2e-15, "{energy:e}, {entropy:e}");
+}
+
+#[test]
+#[ignore = "slow study: a million steps"]
+fn nothing_drifts_in_a_million_steps() {
+    let [energy, entropy] = drift(1_000_000);
+    assert!(energy <= 2e-15 && entropy <= 2e-15, "{energy:e}, {entropy:e}");
+}
+
+/// At errors of 10⁻⁸ three stages cost at most 5.5 residuals.
+#[test]
+fn a_step_costs_few_residuals() {
+    let cost = |run: Result<Certificate, ()>| {
+        let c = run.expect("it runs");
+        c.effort.iterations as f64 / c.steps as f64
+    };
+    let body = Gauss3.run(&relaxing_body(), vector![0.3, -0.9, 0.2], Span::steps(0.75, 40));
+    let gas = Gauss3.run(&gas(0.5), GAS, Span::steps(2.0 / 50.0, 50));
+    let group = Gauss3.run(&rotations(), turned(), Span::steps(0.4 / 32.0, 32));
+    let costs = [
+        cost(body.map(|run| run.certificate().clone()).map_err(|_| ())),
+        cost(gas.map(|run| run.certificate().clone()).map_err(|_| ())),
+        cost(group.map(|run| run.certificate().clone()).map_err(|_| ())),
+    ];
+    println!("{costs:.2?}");
+    assert!(costs.iter().all(|cost| *cost <= 5.5), "{costs:?}");
+}
+
+/// Two spins with an isotropic coupling and an anisotropy: `J_z` is conserved, and not listed.
+fn two_spins() -> impl Metriplectic<Manifold = Product<Sphere<2>, Sphere<2>>, Metric = Canonical> {
+    type Spins = (Vector3<Real>, Vector3<Real>);
+    System::on(Product(Sphere::<2>::round(), Sphere::<2>::round()))
+        .bracket((AreaForm, AreaForm))
+        .energy(|(a, b): &Spins| a.dot(b) + a.z * a.z * 0.4 - b.z * b.z * 0.3 + a.z * 0.5)
+        .build()
+        .expect("it is a system")
+}
+
+/// The largest error of `J_z` in the first and the second half of a run of steps of 0.2.
+fn momentum(method: Stages, steps: usize) -> [f64; 2] {
+    let start = (vector![0.6, 0.0, 0.8], vector![0.0, 0.28, -0.96]);
+    let run = kept("two spins", method, &two_spins(), &start, Span::steps(0.2, steps).every(20));
+    let errors: Vec<f64> =
+        run.iter().map(|state| (state.point.0.z + state.point.1.z + 0.16).abs()).collect();
+    let worst = |errors: &[f64]| errors.iter().copied().fold(0.0, f64::max);
+    let (first, second) = errors.split_at(errors.len() / 2);
+    [worst(first), worst(second)]
+}
+
+#[test]
+fn a_momentum_that_is_not_listed_stays_bounded() {
+    let [first, second] = momentum(Gauss2, 20_000);
+    println!("{first:.1e}, {second:.1e}");
+    assert!(second <= 1e-5 && second <= 1.2 * first, "{first:e}, {second:e}");
+    // A method that is not reversible does not bound it.
+    let [first, second] = momentum(Radau2, 20_000);
+    println!("{first:.1e}, {second:.1e}");
+    assert!(second > 1.5 * first, "{first:e}, {second:e}");
+}
+
+#[test]
+#[ignore = "slow study: a hundred thousand steps"]
+fn a_momentum_that_is_not_listed_stays_bounded_for_long() {
+    let [first, second] = momentum(Gauss2, 100_000);
+    println!("{first:.1e}, {second:.1e}");
+    assert!(second <= 1e-5 && second <= 1.1 * first, "{first:e}, {second:e}");
+}
+
+#[test]
+fn they_keep_the_laws_of_a_method() {
+    for (method, h) in [(Gauss2, 0.3), (Gauss3, 0.8), (Radau2, 0.2), (Radau3, 0.5)] {
+        laws::method(method, &relaxing_body(), &vector![0.3, -0.9, 0.2], h).expect("they hold");
+    }
+    laws::method(Gauss2, &warm_spin(0.3), &WARM, 0.1).expect("they hold");
+}
+
+/// Steps that follow a tolerance, outputs between them, and a run that is resumed.
+#[test]
+fn adaptive_runs_have_what_every_run_has() {
+    let exact = DormandPrince8.run(&gas(0.5), GAS, Span::until(5.0).tolerance(1e-14)).unwrap();
+    for method in [Gauss2, Gauss4, Radau3] {
+        let errors = [4, 6, 8].map(|k| {
+            let span = Span::until(5.0).tolerance(10_f64.powi(-k));
+            let run = kept("gas", method, &gas(0.5), &GAS, span);
+            (run.last().point - exact.last().point).norm()
+        });
+        println!("{method:?}: {errors:?}");
+        // Two decades of the tolerance are two decades of the error, but for a factor.
+        for pair in errors.windows(2) {
+            assert!((12.0..600.0).contains(&(pair[0] / pair[1])), "{method:?}: {errors:?}");
+        }
+        let times: Vec<f64> = (1..=99).map(|k| f64::from(k) * 0.05).collect();
+        let span = Span::until(5.0).tolerance(1e-6).output_at(times);
+        let dense = kept("gas", method, &gas(0.5), &GAS, span);
+        let states: Vec<_> = dense.iter().collect();
+        let energy = dense.certificate().initial_energy;
+        for pair in states.windows(2) {
+            assert!(pair[1].entropy >= pair[0].entropy - 4e-15, "{method:?}, t = {}", pair[1].time);
+            assert!((pair[1].energy - energy).abs() <= 2e-14, "{method:?}, t = {}", pair[1].time);
+        }
+    }
+    let system = gas(0.5);
+    let span = Span::until(5.0).tolerance(1e-6);
+    let whole = Radau3.run(&system, GAS, span).unwrap();
+    let mut steps = Radau3.steps(&system, GAS, span).unwrap();
+    for _ in 0..10 {
+        steps.advance().unwrap();
+    }
+    let resumed = Radau3.resume(&system, &steps.checkpoint()).unwrap().run().unwrap();
+    assert_eq!(resumed.last(), whole.last());
+    assert_eq!(resumed.certificate(), whole.certificate());
+}

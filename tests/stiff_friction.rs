@@ -1,0 +1,238 @@
+//! Friction that is much faster than a step: Radau's methods damp it with both laws, and every other method is right,
+//! names the cause in an error, or says in its certificate that friction is not damped.
+
+use metriplectic::dynamics::system::Point;
+use metriplectic::prelude::*;
+
+mod models;
+#[path = "models/stages.rs"]
+mod stages;
+
+use models::gas;
+use stages::*;
+
+fn off<M: Manifold>(x: &M::Point<f64>, exact: &[f64]) -> f64 {
+    M::entries(x).iter().zip(exact).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
+}
+
+/// The run of a Radau method, which keeps both laws and damps.
+fn damped<Y: Metriplectic>(
+    name: &str,
+    method: Stages,
+    system: &Y,
+    x0: &Point<Y>,
+    span: impl Into<metriplectic::integrators::Schedule>,
+) -> Trajectory<Y::Manifold> {
+    let run = method.run(system, x0.clone(), span).expect(name);
+    let c = run.certificate();
+    assert!(c.keeps_energy() && c.keeps_entropy() && !c.is_stiff(), "{name}, {method:?}: {c}");
+    assert!(!c.to_string().contains("not damped"), "{name}, {method:?}: {c}");
+    run
+}
+
+/// Whether a run is wrong without a word: an `Ok` that is off, and a certificate that does not say so.
+fn is_silent<M: Manifold>(
+    run: Result<Trajectory<M>, RunError<M>>,
+    is_right: impl Fn(&M::Point<f64>) -> bool,
+) -> bool {
+    run.is_ok_and(|run| {
+        let says = run.certificate().to_string().contains("friction not damped");
+        !says && !is_right(&run.last().point)
+    })
+}
+
+/// Gas containers whose wall leaks heat so fast that their temperatures are one, from a start 10⁻² off that.
+#[test]
+fn gas_containers_with_a_wall_that_leaks_fast() {
+    let start = vector![1.0, 2.0, 2.01, 1.99];
+    for (alpha, bounds) in [(1e4, [3e-5, 1e-6, 4e-8, 1e-9]), (1e6, [3e-5, 1e-6, 4e-8, 1e-9])] {
+        let system = gas(alpha);
+        let fine = Span::until(2.0).tolerance(1e-11).at_most(2);
+        let exact = damped("gas", Radau4, &system, &start, fine).last().point;
+        if alpha < 1e5 {
+            // Another method agrees.
+            let explicit =
+                DormandPrince8.run(&system, start, Span::until(2.0).tolerance(1e-11)).unwrap();
+            assert!((explicit.last().point - exact).norm() < 1e-10);
+        }
+        let errors = [40, 80, 160, 320].map(|n| {
+            let run =
+                damped("gas", Radau3, &system, &start, Span::steps(2.0 / f64::from(n), n as usize));
+            (run.last().point - exact).norm()
+        });
+        println!("α = {alpha:e}: {errors:?}");
+        assert!(errors.iter().zip(bounds).all(|(error, bound)| *error <= bound), "{errors:?}");
+        // The temperatures of a Gauss method stay apart.
+        let run = Gauss3.run(&system, start, Span::steps(0.05, 40)).unwrap();
+        assert!((run.last().point - exact).norm() > 10.0 * errors[0]);
+        assert!(run.certificate().is_stiff(), "{}", run.certificate());
+    }
+}
+
+/// The deviation `y` of a stiff component that is left after one step, with `S = −λy²/2` and the energy elsewhere.
+#[test]
+fn one_step_damps_a_stiff_component() {
+    let lambda = 1e3;
+    let system = System::on(Euclidean::<2>)
+        .energy(|x: &Vector2<Real>| x.y)
+        .entropy(move |x: &Vector2<Real>| x.x * x.x * (-0.5 * lambda) + x.y)
+        .dissipation(FieldDissipation(|_: &Vector2<Real>, w: &Vector2<Real>| {
+            // The covector of the energy annihilates the velocity along the other axis.
+            let b = Vector2::new(w.y, -w.x);
+            b * b.transpose()
+        }))
+        .build()
+        .unwrap();
+    let start = vector![1e-3, 1.0];
+    let left = |method: Stages| {
+        let run = method.run(&system, start, Span::steps(1.0, 1)).unwrap();
+        assert!(run.certificate().keeps_energy() && run.certificate().keeps_entropy());
+        (run.last().point.x / start.x).abs()
+    };
+    let (radau, gauss) = (RADAU.map(left), GAUSS.map(left));
+    println!("{radau:?}, {gauss:?}");
+    assert!(radau.iter().all(|left| *left <= 0.01), "{radau:?}");
+    // With an exact balance of the entropy nothing is damped.
+    assert!(gauss.iter().all(|left| (0.9..1.0).contains(left)), "{gauss:?}");
+}
+
+fn energy(t: Real) -> Real {
+    t + t * t * 0.5
+}
+
+fn entropy(t: Real) -> Real {
+    t.ln() + t
+}
+
+fn conduction(w: &Vector2<Real>) -> Matrix2<Real> {
+    let b = Vector2::new(w.x.recip(), -w.y.recip());
+    b * b.transpose() * Real::from(1e6)
+}
+
+/// Two temperatures that exchange heat with `K = 10⁶ b bᵀ`, as numbers and as points of half lines.
+#[test]
+fn two_temperatures_come_together() {
+    type X = Vector2<Real>;
+    type P = (Vector1<Real>, Vector1<Real>);
+    let flat = System::on(Euclidean::<2>)
+        .energy(|x: &X| energy(x.x) + energy(x.y))
+        .entropy(|x: &X| entropy(x.x) + entropy(x.y))
+        .dissipation(FieldDissipation(|_: &X, w: &X| conduction(w)))
+        .build()
+        .unwrap();
+    let positive = System::on(Product(HalfLine, HalfLine))
+        .energy(|x: &P| energy(x.0.x) + energy(x.1.x))
+        .entropy(|x: &P| entropy(x.0.x) + entropy(x.1.x))
+        .dissipation(FieldDissipation(|_: &P, w: &X| conduction(w)))
+        .build()
+        .unwrap();
+    let (cold, hot) = (1.0, 3.0);
+    // 2 (T + T²/2) = the energy.
+    let total: f64 = cold + 0.5 * cold * cold + hot + 0.5 * hot * hot;
+    let rest = (1.0 + total).sqrt() - 1.0;
+    let near = |t: [f64; 2]| t.iter().all(|t| (t - rest).abs() <= 1e-3);
+    let (x, p) = (vector![cold, hot], (vector![cold], vector![hot]));
+    for exponent in [-5, -4, -2, 0] {
+        let span = Span::steps(10_f64.powi(exponent), 20);
+        for method in [Radau2, Radau3] {
+            let run = damped("R × R", method, &flat, &x, span);
+            assert!(near(run.last().point.into()), "h = 1e{exponent}: {}", run.last().point);
+            let run = damped("R₊ × R₊", method, &positive, &p, span);
+            let (a, b) = &run.last().point;
+            assert!(near([a.x, b.x]), "h = 1e{exponent}: {a}, {b}");
+        }
+    }
+    // At h = 10⁻⁵ and colder starts the temperatures are still on their way.
+    let rows =
+        [(-4, 1.0), (-2, 1.0), (0, 1.0), (3, 1.0), (-4, 0.01), (-2, 0.01), (0, 0.01), (2, 0.01)];
+    for (exponent, cold) in rows {
+        let span = Span::steps(10_f64.powi(exponent), 20);
+        let (x, p) = (vector![cold, hot], (vector![cold], vector![hot]));
+        let total: f64 = cold + 0.5 * cold * cold + hot + 0.5 * hot * hot;
+        let rest = (1.0 + total).sqrt() - 1.0;
+        let near = |t: [f64; 2]| t.iter().all(|t| (t - rest).abs() <= 1e-3);
+        for method in [Gauss2, Gauss3, Radau2, Radau3, Radau4] {
+            let silent = is_silent(method.run(&flat, x, span), |x| near((*x).into()));
+            assert!(!silent, "{method:?}, {cold}, h = 1e{exponent}");
+            let silent = is_silent(method.run(&positive, p, span), |(a, b)| near([a.x, b.x]));
+            assert!(!silent, "{method:?}, R₊ × R₊, {cold}, h = 1e{exponent}");
+        }
+        let silent = is_silent(WeylMidpoint.run(&flat, x, span), |x| near((*x).into()));
+        assert!(!silent, "midpoint, h = 1e{exponent}");
+    }
+}
+
+/// An overdamped oscillator with its internal energy: `x' = p`, `p' = −x − γp`, `e' = γp²`. The slow decay is
+/// `e^{−t/γ}`.
+#[test]
+fn an_overdamped_oscillator_decays_slowly() {
+    for gamma in [1e7, 1e8] {
+        let canonical = Matrix3::new(0.0, 1.0, 0.0, -1.0, 0.0, 0.0, 0.0, 0.0, 0.0);
+        let system = System::on(Euclidean::<3>)
+            .bracket(Poisson::constant(canonical).unwrap())
+            .energy(|x: &Vector3<Real>| (x.x * x.x + x.y * x.y) * 0.5 + x.z)
+            .entropy(|x: &Vector3<Real>| x.z)
+            .dissipation(FieldDissipation(move |_: &Vector3<Real>, w: &Vector3<Real>| {
+                let b = Vector3::new(Real::from(0.0), w.z, -w.y);
+                b * b.transpose() * (w.z.recip() * gamma)
+            }))
+            .build()
+            .unwrap();
+        // On the slow manifold, and off it.
+        for momentum in [-1.0 / gamma, 0.5] {
+            for h in [10.0 / gamma, 1e-3, 1.0, 0.1 * gamma] {
+                // A fast transient and steps as long as the slow decay are too much for one step.
+                if momentum > 0.0 && h > 1.0 {
+                    continue;
+                }
+                let (start, time) = (vector![1.0, momentum, 1.0], 20.0 * h);
+                let x = (-time / gamma).exp();
+                let heat = 0.5 * (1.0 - x * x) + 0.5 * momentum * momentum;
+                let exact = [x, -x / gamma, 1.0 + heat];
+                for method in [Radau2, Radau3, Radau4] {
+                    let run = damped("oscillator", method, &system, &start, Span::steps(h, 20));
+                    let off = off::<Euclidean<3>>(&run.last().point, &exact);
+                    assert!(off <= 1e-3, "γ = {gamma:e}, p = {momentum:e}, h = {h:e}: {off:e}");
+                }
+                let right = |x: &Vector3<f64>| off::<Euclidean<3>>(x, &exact) <= 1e-3;
+                for silent in [
+                    is_silent(Gauss3.run(&system, start, Span::steps(h, 20)), right),
+                    is_silent(WeylMidpoint.run(&system, start, Span::steps(h, 20)), right),
+                ] {
+                    assert!(!silent, "γ = {gamma:e}, p = {momentum:e}, h = {h:e}");
+                }
+            }
+        }
+    }
+}
+
+/// Two bodies of constant heat capacity that exchange heat at the rate 10⁸, `H = T₁ + 2T₂`.
+#[test]
+fn heat_is_exchanged_in_steps_of_any_size() {
+    type X = Vector2<Real>;
+    let system = System::on(Euclidean::<2>)
+        .energy(|x: &X| x.x + x.y * 2.0)
+        .entropy(|x: &X| x.x.ln() + x.y.ln() * 2.0)
+        .dissipation(FieldDissipation(|x: &X, w: &X| {
+            let b = Vector2::new(w.y, -w.x);
+            b * b.transpose() * (x.x * x.y * 1e8)
+        }))
+        .build()
+        .unwrap();
+    let start = vector![300.0, 360.0];
+    for exponent in -3..=3 {
+        let span = Span::steps(10_f64.powi(exponent), 10);
+        let near = |x: &Vector2<f64>| x.iter().all(|t| (t - 340.0).abs() <= 0.34);
+        let mut right = 0;
+        for method in RADAU {
+            let run = method.run(&system, start, span);
+            right += usize::from(run.as_ref().is_ok_and(|run| near(&run.last().point)));
+            assert!(!is_silent(run, near), "{method:?}, h = 1e{exponent}");
+        }
+        println!("h = 1e{exponent}: {right} of 3 are right");
+        assert_eq!(right, 3, "h = 1e{exponent}");
+        for method in [Gauss1, Gauss2] {
+            assert!(!is_silent(method.run(&system, start, span), near), "{method:?}, 1e{exponent}");
+        }
+    }
+}

@@ -36,6 +36,11 @@ pub trait StageFlow: Flow {
     /// The coordinates `ψ_x⁻¹(y)`.
     fn stage_coordinates(&self, x: &Element<Self>, y: &Element<Self>) -> Self::Vector;
 
+    /// Whether [`project`](Self::project) uses an estimate of the local error; see [`Target::error`].
+    fn weighs_errors(&self) -> bool {
+        false
+    }
+
     /// Moves a state onto its laws, by Newton's method along their differentials.
     ///
     /// # Errors
@@ -57,6 +62,9 @@ pub struct Target<'a, F: Flow + ?Sized> {
     pub with_entropy: bool,
     /// A displacement, longer than which none is allowed.
     pub limit: Option<&'a F::Vector>,
+    /// An estimate of the local error of the step, if the flow [weighs errors](StageFlow::weighs_errors): a state
+    /// may be moved in proportion to it, so that nothing moves which the step has not moved.
+    pub error: Option<&'a F::Vector>,
 }
 
 /// A state on its laws.

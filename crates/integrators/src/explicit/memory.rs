@@ -130,14 +130,15 @@ impl<V: Vector, G: Clone + Debug> Memory for ExplicitMemory<V, G> {
     }
 }
 
-/// `Σ_j w_j k_j` over the rates of the stages.
+/// `h Σ_j w_j k_j` over the rates of the stages.
 #[inline]
-pub(super) fn combined<V: Vector>(row: Row, stages: &[(V, f64); STAGES]) -> V {
-    let Some(&(first, w)) = row.first() else { return stages[0].0.map(|_| 0.0) };
-    let start = stages[first].0.map(|k| w * k);
-    row[1..].iter().fold(start, |sum, &(j, w)| {
-        let rates = &stages[j].0;
-        sum.with(|i| sum.get(i) + w * rates.get(i))
+pub(super) fn combined<V: Vector>(h: f64, row: Row, stages: &[(V, f64); STAGES]) -> V {
+    if row.is_empty() {
+        return stages[0].0.zero();
+    }
+    V::combination(h, row.len(), |j| {
+        let (stage, w) = row[j];
+        (w, &stages[stage].0)
     })
 }
 

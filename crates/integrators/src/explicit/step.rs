@@ -8,7 +8,7 @@ use super::memory::{
 };
 use super::tableau::Tableau;
 use crate::method::{
-    Effort, Element, EntropyStep, Evidence, Refusal, StepEnds, StepStart, Taken, Vector,
+    Effort, Element, EntropyStep, Evidence, Laws, Refusal, StepEnds, StepStart, Taken, Vector,
 };
 use crate::run::scales::relative;
 use crate::step_error::StepError;
@@ -130,14 +130,14 @@ fn try_step<F: StageFlow>(
     memory.here = Some(here);
     let mut last = stages.ok_or(Refused::Outside)?;
     if let Some(lost) = &memory.lost {
-        last.end = last.end.with(|i| last.end.get(i) + lost.get(i));
+        last.end = Vector::zip([&last.end, lost], |[end, lost]| end + lost);
     } else if !memory.read.is_empty() {
         let lost = |i| <[f64]>::get(&memory.read, i).copied().unwrap_or(0.0);
         last.end = last.end.with(|i| last.end.get(i) + lost(i));
     }
     let y = flow.stage(x, &last.end).ok_or(Refused::Outside)?;
     let reached = flow.stage_coordinates(x, &y);
-    let lost = reached.with(|i| last.end.get(i) - reached.get(i));
+    let lost = Vector::zip([&last.end, &reached], |[end, reached]| end - reached);
 
     let produced = memory.entropy.unwrap_or_else(|| Produced::from(start.values.entropy));
     let projection = Onto { tableau, flow, start, h, last: &last, produced };
@@ -206,15 +206,15 @@ fn stages<F: StageFlow>(
     h: f64,
     here: &Here<F::Vector, F::Gradients>,
 ) -> Option<LastStep<F::Vector>> {
-    let zero = here.velocity.map(|_| 0.0);
+    let zero = here.velocity.zero();
     let mut stages: [(F::Vector, f64); STAGES] = std::array::from_fn(|_| (zero.clone(), 0.0));
     stages[0] = (here.velocity.clone(), here.production);
     let mut before = zero;
     for (i, row) in tableau.stages.iter().enumerate() {
-        before = combined(row, &stages).map(|q| h * q);
+        before = combined(h, row, &stages);
         stages[i + 1] = stage(flow, x, &before)?;
     }
-    let end = combined(tableau.end, &stages).map(|q| h * q);
+    let end = combined(h, tableau.end, &stages);
     let rise = h * produced(tableau.end, &stages);
     Some(LastStep { stages, known: tableau.stages.len() + 1, before, end, rise })
 }
@@ -256,10 +256,10 @@ fn is_at_the_edge<F: StageFlow>(
     rates: &F::Vector,
 ) -> bool {
     let sizes = flow.sizes(x);
-    let sizes = sizes.with(|i| sizes.get(i).max(last.end.get(i).abs()));
-    let apart = last.end.with(|i| last.end.get(i) - last.before.get(i));
+    let sizes = Vector::zip([&sizes, &last.end], |[size, end]| size.max(end.abs()));
+    let apart = Vector::zip([&last.end, &last.before], |[end, before]| end - before);
     let before = &last.stages[tableau.stages.len()].0;
-    let change = rates.with(|i| h * (rates.get(i) - before.get(i)));
+    let change = Vector::zip([rates, before], |[end, before]| h * (end - before));
     let distance = relative(&apart, &sizes);
     distance > 64.0 * f64::EPSILON && relative(&change, &sizes) > tableau.stability * distance
 }
@@ -277,7 +277,7 @@ pub(super) fn error<F: StageFlow>(
         return Some(norm(&flow.local_error(step.x, step.end, h)?));
     };
     let [fifth, third] =
-        tableau.errors.map(|row| norm(&combined(row, &last.stages).map(|e| h * e)));
+        tableau.errors.map(|row| norm(&combined(h, row, &last.stages)));
     // Hairer's e₅²/√(e₅² + e₃²/100) is of the order of the method; a method with one error has that.
     Some(if third > 0.0 { fifth * (fifth / fifth.hypot(0.1 * third)) } else { fifth })
 }
@@ -308,20 +308,22 @@ impl<F: StageFlow> Onto<'_, F> {
             // Round-off is never too far.
             None => {
                 let sizes = flow.sizes(start.x);
-                last.end.with(|i| (0.5 * last.end.get(i).abs()).max(NEAR * sizes.get(i)))
+                Vector::zip([&last.end, &sizes], |[end, size]| (0.5 * end.abs()).max(NEAR * size))
             }
         };
-        let mut laws = start.reference.clone();
+        let estimate = flow.weighs_errors().then(|| self.estimate());
+        let onto = |y, entropy, with_entropy| {
+            let laws = Laws { entropy, ..start.reference.clone() };
+            let (limit, error) = (Some(&limit), estimate.as_ref());
+            flow.project(y, &Target { laws: &laws, with_entropy, limit, error })
+        };
         if flow.entropy_law() != SecondLaw::Exact {
-            let target = Target { laws: &laws, with_entropy: false, limit: Some(&limit) };
-            let end = flow.project(y, &target).map_err(refused)?;
+            let end = onto(y, start.reference.entropy, false).map_err(refused)?;
             return Ok(Landed { end, produced, how: EntropyStep::Free });
         }
         if self.is_trusted() {
             let target = produced.plus(last.rise);
-            laws.entropy = target.sum;
-            let onto = Target { laws: &laws, with_entropy: true, limit: Some(&limit) };
-            if let Ok(end) = flow.project(y.clone(), &onto)
+            if let Ok(end) = onto(y.clone(), target.sum, true)
                 && !self.falls(&end)
             {
                 let largest = produced.largest.max(end.entropy);
@@ -329,9 +331,7 @@ impl<F: StageFlow> Onto<'_, F> {
                 return Ok(Landed { end, produced, how: EntropyStep::Targeted });
             }
         }
-        laws.entropy = produced.sum;
-        let onto = Target { laws: &laws, with_entropy: false, limit: Some(&limit) };
-        let end = flow.project(y, &onto).map_err(refused)?;
+        let end = onto(y, produced.sum, false).map_err(refused)?;
         let least = produced.largest - 2.0 * end.entropy_round_off;
         if end.entropy < least || self.falls(&end) {
             return Err(Refused::Falls);
@@ -339,6 +339,15 @@ impl<F: StageFlow> Onto<'_, F> {
         let largest = produced.largest.max(end.entropy);
         let produced = Produced { largest, ..Produced::from(end.entropy) };
         Ok(Landed { end, produced, how: EntropyStep::Free })
+    }
+
+    /// An estimate of the local error: the embedded one where it does not need the end of the step, and else the
+    /// velocity at its start.
+    fn estimate(&self) -> F::Vector {
+        let Self { tableau, h, last, .. } = *self;
+        let [row, _] = tableau.errors;
+        let known = row.iter().all(|&(stage, _)| stage < last.known);
+        if known { combined(h, row, &last.stages) } else { last.stages[0].0.clone() }
     }
 
     /// Whether the entropy that was produced may be aimed at.

@@ -22,6 +22,12 @@ pub trait StageFlow: Flow {
         gradients: &Self::Gradients,
     ) -> Option<(Self::Vector, f64)>;
 
+    /// The velocity and the production at a state of which nothing else is asked.
+    #[inline]
+    fn motion(&self, x: &Element<Self>) -> Option<(Self::Vector, f64)> {
+        self.velocity(x, &self.gradients(x)?)
+    }
+
     /// The state `ψ_x(q)` at which a stage is taken; `None` beyond the edge of the chart or the domain.
     fn stage(&self, x: &Element<Self>, q: &Self::Vector) -> Option<Element<Self>>;
 

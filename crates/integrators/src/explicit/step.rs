@@ -227,7 +227,7 @@ pub(super) fn stage<F: StageFlow>(
     q: &F::Vector,
 ) -> Option<(F::Vector, f64)> {
     let y = flow.stage(x, q)?;
-    let (v, production) = flow.velocity(&y, &flow.gradients(&y)?)?;
+    let (v, production) = flow.motion(&y)?;
     Some((flow.stage_rates(x, (q, &y), &v), production))
 }
 

@@ -8,17 +8,20 @@ const CANONICAL: Matrix3<f64> = Matrix3::new(0.0, 1.0, 0.0, -1.0, 0.0, 0.0, 0.0,
 
 pub(crate) type Pair = (Vector3<Real>, Vector3<Real>);
 
+#[inline]
 pub(crate) fn site(x: &Vector3<Real>) -> Real {
     x.y * x.y * 0.5 + (x.z * 0.5).exp() * 2.0
 }
 
 /// `½r² + r³/12 + ¼r⁴`, and a stress that depends on the temperature.
+#[inline]
 pub(crate) fn bond((x, y): &Pair) -> Real {
     let r = y.x - x.x;
     r * r * (r * r * 0.25 + r * (0.25 / 3.0) + 0.5) - r * (x.z + y.z) * 0.025
 }
 
 /// Friction of the relative velocity, whose heat goes to both sites in equal parts; and conduction.
+#[inline]
 pub(crate) fn onsager(bond: &BondState<'_, Euclidean<3>>) -> [Onsager<[Vector3<f64>; 2]>; 2] {
     let [u, v] = bond.w;
     let slip = 0.5 * (v.y - u.y);

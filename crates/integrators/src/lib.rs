@@ -12,7 +12,7 @@
 //! | [`explicit`] | [`DormandPrince8`], [`DormandPrince5`]: explicit methods, and then back onto the laws | [`method`] |
 //! | [`attitude`] | [`Attitude`]: where a body points along a run of its angular momentum | [`run`] |
 //! | [`laws`] | what a step and a method promise, and the functions that check it | |
-//! | [`error`](mod@error) | [`Error`], [`RunError`] | |
+//! | [`error`](mod@error) | [`Error`], [`RunError`], [`FlowError`] | |
 //!
 //! # What a later version may add
 //!
@@ -38,7 +38,7 @@ pub mod step_error;
 
 pub use attitude::{Attitude, AttitudeError};
 pub use discrete_gradient::{DiscreteGradient, Gonzalez, ItohAbe, MeanValue, SymmetricItohAbe};
-pub use error::{Error, RunError};
+pub use error::{Error, FlowError, RunError};
 pub use explicit::{DormandPrince5, DormandPrince8, StageFlow};
 pub use method::{
     Components, Control, Effort, Element, EntropyStep, Evidence, Flow, Laws, Memory, Method,

@@ -355,6 +355,9 @@ where
         if !has_friction && Bracket::<M, Canonical>::is_zero(&parts.bracket) {
             return Err(LatticeError::NothingMoves);
         }
+        if Bracket::<M, Canonical>::is_forced(&parts.bracket) {
+            return Err(LatticeError::ForcedBracket);
+        }
         let layout = Layout::new(&graph);
         if let Some(order) = layout.order() {
             parts.data.bonds.arrange(order);

@@ -66,6 +66,12 @@ pub enum LatticeError {
          `.bond_onsager(..)` or `.site_onsager(..)`"
     )]
     EntropyWithoutFriction,
+    /// A bracket with a force.
+    #[error(
+        "the bracket has a force, whose heat belongs to no entropy of the lattice; give the friction of a site by \
+         `.site_onsager(..)`"
+    )]
+    ForcedBracket,
     /// Points for another number of sites.
     #[error("the start has {found} points, and the graph has {expected} sites")]
     Points {

@@ -1,10 +1,10 @@
 //! A lattice as a flow.
 
 use metriplectic_dynamics::invariants::Kind;
-use metriplectic_dynamics::{ModelError, SecondLaw};
+use metriplectic_dynamics::SecondLaw;
 use metriplectic_fields::{Column, Space};
 use metriplectic_integrators::explicit::{Projected, ProjectionError, Target};
-use metriplectic_integrators::{Flow, Laws, StageFlow};
+use metriplectic_integrators::{Flow, FlowError, Laws, StageFlow};
 use metriplectic_manifolds::{Manifold, PointError};
 
 use crate::lattice::{Differentials, Lattice, Total, Totals, differentials_at, dimension};
@@ -155,8 +155,17 @@ impl<P: Model> Flow for Lattice<P> {
         vec![Kind::Momentum; P::SUMS]
     }
 
-    fn check(&self, _: &Points<P::Manifold>) -> Result<(), ModelError> {
-        Ok(())
+    fn examine(&self, x0: &Points<P::Manifold>) -> Result<(), FlowError> {
+        self.verify(x0).map_err(FlowError::new)
+    }
+
+    fn site_outside(&self, x: &Points<P::Manifold>, d: &SiteVector) -> Option<usize> {
+        let (manifold, d) = (self.parts.manifold(), d.reader());
+        let y = self.moved_by(x, d, |x, q| Some(P::Manifold::stage(x, q)))?;
+        let outside = |site: usize| {
+            !P::Manifold::is_stage(&d.at(site)) || !manifold.is_inside(&y[site])
+        };
+        (0..self.sites()).find(|&site| outside(site)).or_else(|| self.not_finite(&y))
     }
 
     fn defect(&self, x: &Points<P::Manifold>) -> f64 {

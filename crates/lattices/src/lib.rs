@@ -44,6 +44,7 @@ pub mod points;
 mod pool;
 mod projection;
 pub mod vector;
+mod verify;
 
 pub use builder::LatticeBuilder;
 pub use error::{LatticeError, Place};

@@ -42,7 +42,7 @@ pub trait Model: Sync {
     /// A conserved function at a site.
     fn sum(&self, index: usize, site: usize, x: &PointOf<Self>) -> Jet1<Self::Manifold>;
 
-    /// `Π w` at a site, and what a force of the bracket adds; not a number where it has no value.
+    /// `Π w` at a site; not a number where it has no value.
     fn reversible(
         &self,
         x: &PointOf<Self>,
@@ -81,6 +81,7 @@ pub(crate) type PairManifold<P> = Product<<P as Model>::Manifold, <P as Model>::
 
 /// The functions and tensors that a user has written.
 #[derive(Clone)]
+#[expect(missing_debug_implementations, reason = "closures have no `Debug`")]
 pub struct Parts<M, B, F, K, L, D> {
     pub(crate) manifold: M,
     pub(crate) bracket: B,
@@ -172,12 +173,7 @@ where
         let x = ChartPoint::<M>::centre(x);
         let at = BracketArgs { space: &self.manifold, metric: &Canonical, x: &x, s };
         let not_a_number = |_| Vector::<M>::from_index(|_| f64::NAN);
-        let v = self.bracket.apply(&at, w).unwrap_or_else(not_a_number);
-        if self.bracket.is_forced() {
-            v + self.bracket.force(&at, w).unwrap_or_else(not_a_number)
-        } else {
-            v
-        }
+        self.bracket.apply(&at, w).unwrap_or_else(not_a_number)
     }
 
     #[inline]

@@ -14,7 +14,7 @@ pub(crate) const CHUNK: usize = 1024;
 /// The results of `f` for each piece of work, in order.
 pub(crate) fn each<W: Send, R: Send>(work: Vec<W>, f: impl Fn(W) -> R + Sync) -> Vec<R> {
     #[cfg(feature = "rayon")]
-    if work.len() > 1 {
+    if work.len() > 1 && rayon::current_num_threads() > 1 {
         return work.into_par_iter().map(&f).collect();
     }
     work.into_iter().map(f).collect()

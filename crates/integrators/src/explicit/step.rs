@@ -31,8 +31,8 @@ const FAR: f64 = 10.0;
 
 /// Why a step is not taken.
 enum Refused {
-    /// A stage is beyond the edge of the chart or the domain, or has no value.
-    Outside,
+    /// A stage is beyond the edge of the chart or the domain, or has no value; at a site, if the flow says which.
+    Outside(Option<usize>),
     /// No state near by has the laws of the run.
     Far,
     /// The entropy would fall.
@@ -40,9 +40,22 @@ enum Refused {
 }
 
 impl Refused {
-    const fn into_refusal(self) -> Refusal {
-        const EFFORT: Effort = Effort { iterations: 0, continued: 0, globalised: 0, splits: 0 };
-        Refusal { effort: EFFORT, error: None, second_law: matches!(self, Self::Falls) }
+    /// What becomes of a step of size `h` from `time`.
+    fn into_refusal(self, time: f64, h: f64) -> Refusal {
+        let tried = Effort::default();
+        let error = match self {
+            Self::Outside(Some(site)) => {
+                Some(StepError::SiteOutOfDomain { time, h, site, tried })
+            }
+            _ => None,
+        };
+        Refusal { effort: tried, error, second_law: matches!(self, Self::Falls) }
+    }
+
+    /// A displacement leads out of the domain.
+    #[cold]
+    fn outside<F: StageFlow>(flow: &F, x: &Element<F>, d: &F::Vector) -> Self {
+        Self::Outside(flow.site_outside(x, d))
     }
 }
 
@@ -55,7 +68,7 @@ pub(super) fn attempt<F: StageFlow>(
     h: f64,
     memory: &mut MemoryOf<F>,
 ) -> Result<Taken<F>, Refusal> {
-    try_step(tableau, flow, start, h, memory).map_err(Refused::into_refusal)
+    try_step(tableau, flow, start, h, memory).map_err(|refused| refused.into_refusal(start.time, h))
 }
 
 /// Takes a step of a fixed size, in halves where it is refused.
@@ -76,7 +89,8 @@ pub(super) fn with_halves<F: StageFlow>(
         let tried = Effort { splits: HALVES as usize, ..Effort::default() };
         let time = start.time;
         match refused {
-            Refused::Outside => StepError::OutOfDomain { time, h, tried },
+            Refused::Outside(Some(site)) => StepError::SiteOutOfDomain { time, h, site, tried },
+            Refused::Outside(None) => StepError::OutOfDomain { time, h, tried },
             Refused::Far | Refused::Falls => StepError::NotProjected { time, h, tried },
         }
     })
@@ -121,21 +135,23 @@ fn try_step<F: StageFlow>(
     memory: &mut MemoryOf<F>,
 ) -> Result<Taken<F>, Refused> {
     let x = start.x;
+    // The stages of the step before it serve nobody any more.
+    memory.last = None;
     let here = match memory.here.take() {
         Some(here) => here,
-        None => here_at(flow, x, None).ok_or(Refused::Outside)?,
+        None => here_at(flow, x, None).ok_or(Refused::Outside(None))?,
     };
     let stages = stages(tableau, flow, x, h, &here);
     let dissipates = here.production != 0.0;
     memory.here = Some(here);
-    let mut last = stages.ok_or(Refused::Outside)?;
+    let mut last = stages?;
     if let Some(lost) = &memory.lost {
         last.end = Vector::zip([&last.end, lost], |[end, lost]| end + lost);
     } else if !memory.read.is_empty() {
         let lost = |i| <[f64]>::get(&memory.read, i).copied().unwrap_or(0.0);
         last.end = last.end.with(|i| last.end.get(i) + lost(i));
     }
-    let y = flow.stage(x, &last.end).ok_or(Refused::Outside)?;
+    let y = flow.stage(x, &last.end).ok_or_else(|| Refused::outside(flow, x, &last.end))?;
     let reached = flow.stage_coordinates(x, &y);
     let lost = Vector::zip([&last.end, &reached], |[end, reached]| end - reached);
 
@@ -153,7 +169,8 @@ fn try_step<F: StageFlow>(
         }
         Err(refused) => return Err(refused),
     };
-    let next = here_at(flow, &end.x, Some(end.gradients)).ok_or(Refused::Outside)?;
+    let next = here_at(flow, &end.x, Some(end.gradients))
+        .ok_or_else(|| Refused::outside(flow, x, &last.end))?;
     last.end = flow.stage_coordinates(x, &end.x);
     let rates = flow.stage_rates(x, (&last.end, &end.x), &next.velocity);
     let rests = end.x == *x && is_zero(&last.stages[0].0);
@@ -205,18 +222,19 @@ fn stages<F: StageFlow>(
     x: &Element<F>,
     h: f64,
     here: &Here<F::Vector, F::Gradients>,
-) -> Option<LastStep<F::Vector>> {
+) -> Result<LastStep<F::Vector>, Refused> {
     let zero = here.velocity.zero();
     let mut stages: [(F::Vector, f64); STAGES] = std::array::from_fn(|_| (zero.clone(), 0.0));
     stages[0] = (here.velocity.clone(), here.production);
     let mut before = zero;
     for (i, row) in tableau.stages.iter().enumerate() {
         before = combined(h, row, &stages);
-        stages[i + 1] = stage(flow, x, &before)?;
+        stages[i + 1] =
+            stage(flow, x, &before).ok_or_else(|| Refused::outside(flow, x, &before))?;
     }
     let end = combined(h, tableau.end, &stages);
     let rise = h * produced(tableau.end, &stages);
-    Some(LastStep { stages, known: tableau.stages.len() + 1, before, end, rise })
+    Ok(LastStep { stages, known: tableau.stages.len() + 1, before, end, rise })
 }
 
 /// The rates and the entropy production of a stage at the coordinates `q`.
@@ -371,7 +389,7 @@ impl<F: StageFlow> Onto<'_, F> {
 
 fn refused(error: ProjectionError) -> Refused {
     match error {
-        ProjectionError::Outside => Refused::Outside,
+        ProjectionError::Outside => Refused::Outside(None),
         ProjectionError::NoEntropy | ProjectionError::Far => Refused::Far,
     }
 }

@@ -103,6 +103,7 @@ impl<'a, F: Flow, M: Method<F>> Steps<'a, F, M> {
     ) -> Result<Self, RunError<F::Space>> {
         schedule.check()?;
         flow.check(&x0)?;
+        flow.examine(&x0)?;
         let promises = method.promises(flow);
         let certificate = Certificate::start(flow, &x0, promises);
         let scales = Scales::at(flow, &x0, schedule.span());

@@ -4,7 +4,7 @@ use metriplectic_dynamics::invariants::Kind;
 use metriplectic_dynamics::SecondLaw;
 use metriplectic_fields::{Column, Space};
 use metriplectic_integrators::explicit::{Projected, ProjectionError, Target};
-use metriplectic_integrators::{Flow, FlowError, Laws, StageFlow};
+use metriplectic_integrators::{Flow, FlowError, Laws, Scales, StageFlow};
 use metriplectic_manifolds::{Manifold, PointError};
 
 use crate::lattice::{Differentials, Lattice, Total, Totals, differentials_at, dimension};
@@ -174,6 +174,10 @@ impl<P: Model> Flow for Lattice<P> {
             defects.fold(0.0, larger)
         };
         parallel::map(self.sites(), of).into_iter().fold(0.0, larger)
+    }
+
+    fn reach(&self, x: &Points<P::Manifold>, span: f64) -> Option<Scales<SiteVector>> {
+        self.sizes_soon(x, span)
     }
 
     fn local_error(

@@ -43,6 +43,8 @@ mod parallel;
 pub mod points;
 mod pool;
 mod projection;
+mod random;
+mod reach;
 pub mod vector;
 mod verify;
 

@@ -29,6 +29,8 @@ const CORRECTIONS: usize = 8;
 /// The residual, in units of its round-off, below which no correction is begun. Sums have digits beyond their
 /// terms, so that a correction takes a residual far below.
 const SMALL: f64 = 0.125;
+/// The residual with which a corrected state is accepted.
+const ENOUGH: f64 = 0.5;
 /// The residual of an entropy from which on the round-off of the other laws, which moves it too, is corrected.
 const OFF: f64 = 0.8;
 /// Residuals, in units of round-off, with which a state is accepted that no correction improves.
@@ -83,7 +85,7 @@ impl<P: Model> Projection<'_, P> {
             let (normals, weights) = self.normals(&y, &jets)?;
             let excess = normals.excess(with_entropy)?;
             let off = if with_entropy { normals.off() / OFF } else { 0.0 };
-            let enough = if corrections == 0 { SMALL } else { 1.0 };
+            let enough = if corrections == 0 { SMALL } else { ENOUGH };
             if excess <= enough && off <= 1.0 {
                 return Ok(self.projected(&normals, y, jets));
             }

@@ -13,6 +13,7 @@ use crate::lattice::{Lattice, differentials_at, dimension};
 use crate::model::{Model, PairManifold, PointOf, VectorOf};
 use crate::parallel;
 use crate::points::Points;
+use crate::random::Random;
 
 /// Sites, and bonds, at which closures are tried.
 const SAMPLES: usize = 64;
@@ -23,24 +24,6 @@ const CANCELS: f64 = 1e-9;
 /// The step of a difference quotient, relative to the sizes of the entries, and its error.
 const STEP: f64 = 1e-5;
 const QUOTIENT: f64 = 1e-4;
-
-/// Numbers between −1 and 1 that are the same in each run (Steele, Lea, Flood 2014: SplitMix64).
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        // The 53 leading bits make a number between 0 and 2⁵³.
-        ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
-    }
-
-    fn vector<V: Column<f64>>(&mut self, sizes: &V) -> V {
-        V::from_index(|k| sizes[k] * self.next())
-    }
-}
 
 /// Up to [`SAMPLES`] numbers below `count`, with the first and the last one.
 fn samples(count: usize) -> impl Iterator<Item = usize> {
@@ -76,7 +59,7 @@ impl<P: Model> Lattice<P> {
         }
         self.verify_values(x)?;
         let y = self.near(x);
-        Trial { lattice: self, y: &y, random: Random(1) }.all()
+        Trial { lattice: self, y: &y, random: Random::new(1), mean: [0.0; 2] }.all()
     }
 
     fn place_of(&self, bond: usize) -> Place {
@@ -165,7 +148,7 @@ impl<P: Model> Lattice<P> {
         let sized = crate::SiteVector::zip([&v, &sizes], |[v, s]| if s > 0.0 { v } else { 0.0 });
         let speed = sized.relative_to(&sizes);
         let time = if speed > 0.0 { speed.recip() } else { 0.0 };
-        let mut random = Random(0);
+        let mut random = Random::new(0);
         let noise = v.with(|_| random.next());
         for moved in [MOVED, 1e-2 * MOVED, 1e-4 * MOVED] {
             let d = crate::SiteVector::zip([&v, &noise, &sizes], |[v, noise, size]| {
@@ -186,12 +169,16 @@ struct Trial<'a, P: Model> {
     lattice: &'a Lattice<P>,
     y: &'a Points<P::Manifold>,
     random: Random,
+    /// The sizes `|h|` and `|s|` of a site in the mean.
+    mean: [f64; 2],
 }
 
 impl<P: Model> Trial<'_, P> {
     fn all(&mut self) -> Result<(), LatticeError> {
         let Self { lattice, y, .. } = *self;
         let (all, totals) = lattice.differentials::<true>(y);
+        let count = lattice.sites() as f64;
+        self.mean = [totals.energy.size / count, totals.entropy.size / count];
         for site in samples(lattice.sites()) {
             self.site(site, &differentials_at::<P>(&all, site))?;
             self.derivatives(site, &totals.sizes)?;
@@ -265,10 +252,11 @@ impl<P: Model> Trial<'_, P> {
         let place = Place::Site(site);
         let energy = parts.energy(site, x);
         let [[h1, s1], [h0, s0]] = ends.each_ref().map(|x| parts.values(site, x));
-        quotient("energy", place, energy.value, Slope::of(&energy.df, &u), [h1, h0])?;
+        quotient("energy", place, energy.value.abs().max(self.mean[0]), Slope::of(&energy.df, &u), [h1, h0])?;
         if P::ENTROPY {
             let entropy = parts.entropy(site, x);
-            quotient("entropy", place, entropy.value, Slope::of(&entropy.df, &u), [s1, s0])?;
+            let size = entropy.value.abs().max(self.mean[1]);
+            quotient("entropy", place, size, Slope::of(&entropy.df, &u), [s1, s0])?;
         }
         for k in 0..P::SUMS {
             let sum = parts.sum(k, site, x);
@@ -288,7 +276,8 @@ impl<P: Model> Trial<'_, P> {
             lattice.parts.bond_value(bond, &PairManifold::<P>::chart(&x, &(u * t)))
         });
         let jet = lattice.parts.bond_energy(bond, &x);
-        quotient("energy", lattice.place_of(bond), jet.value, Slope::of(&jet.df, &u), ends)
+        let size = jet.value.abs().max(self.mean[0]);
+        quotient("energy", lattice.place_of(bond), size, Slope::of(&jet.df, &u), ends)
     }
 
     /// The derivative of the totals along one random direction.

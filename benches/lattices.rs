@@ -7,7 +7,12 @@ use chain::{chain, waves};
 use metriplectic::integrators::Method;
 use metriplectic::prelude::*;
 
-fn run<M: Method<F>, F: metriplectic::integrators::Flow>(method: M, flow: &F, start: &metriplectic::integrators::Element<F>, steps: usize) {
+fn run<M: Method<F>, F: metriplectic::integrators::Flow>(
+    method: M,
+    flow: &F,
+    start: &metriplectic::integrators::Element<F>,
+    steps: usize,
+) {
     let mut run = method.steps(flow, start.clone(), 0.05).unwrap();
     for _ in 0..steps {
         run.advance().unwrap();
@@ -20,6 +25,10 @@ fn main() {
     let lattice = chain(Graph::ring(n));
     let start = lattice.points(waves);
     let clock = std::time::Instant::now();
-    if order == 5 { run(DormandPrince5, &lattice, &start, steps) } else { run(DormandPrince8, &lattice, &start, steps) }
+    if order == 5 {
+        run(DormandPrince5, &lattice, &start, steps)
+    } else {
+        run(DormandPrince8, &lattice, &start, steps)
+    }
     println!("{:.0} ns", clock.elapsed().as_secs_f64() * 1e9 / (n * steps) as f64);
 }

@@ -229,7 +229,8 @@ fn runs_have_outputs_events_rest_and_checkpoints() {
     };
     // The mean height is cos θ(t), and an output has the error of the tolerance.
     let span = || Span::until(4.0).tolerance(1e-10);
-    let watched = span().output_at([0.3, 1.7, 3.1]).event("0.45", move |x: &Points<_>| height(x) - 0.45);
+    let watched =
+        span().output_at([0.3, 1.7, 3.1]).event("0.45", move |x: &Points<_>| height(x) - 0.45);
     let run = DormandPrince8.run(&lattice, start.clone(), watched).unwrap();
     let (event, states) = (&run.events()[0].state, run.states());
     for state in states.iter().chain([event]) {

@@ -51,9 +51,7 @@ pub(crate) mod helix {
     pub(crate) fn lattice(n: usize) -> Lattice<impl Model<Manifold = SpinSpace>> {
         Lattice::on(Graph::ring(n), Product(Sphere::<2>::round(), Euclidean::<1>))
             .bracket((AreaForm, Zero))
-            .energy(|(n, s): &Dual| {
-                (s.x / CAPACITY).exp() * CAPACITY - n.z * n.z * ANISOTROPY
-            })
+            .energy(|(n, s): &Dual| (s.x / CAPACITY).exp() * CAPACITY - n.z * n.z * ANISOTROPY)
             .bond_energy(|(x, y): &(Dual, Dual)| x.0.dot(&y.0) * -EXCHANGE)
             .entropy(|(_, s): &Dual| s.x)
             .site_onsager(|site| {

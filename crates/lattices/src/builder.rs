@@ -13,7 +13,9 @@ use crate::graph::Graph;
 use crate::lattice::Lattice;
 use crate::layout::Layout;
 use crate::model::{Data, Fields, Friction, Parts};
-use crate::onsager::{BondFriction, BondState, Frictionless, Onsager, SiteFriction, SiteState, Terms};
+use crate::onsager::{
+    BondFriction, BondState, Frictionless, Onsager, SiteFriction, SiteState, Terms,
+};
 
 /// A lattice in the making: each method gives or replaces one part.
 #[derive(Clone)]

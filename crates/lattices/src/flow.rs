@@ -1,7 +1,7 @@
 //! A lattice as a flow.
 
-use metriplectic_dynamics::invariants::Kind;
 use metriplectic_dynamics::SecondLaw;
+use metriplectic_dynamics::invariants::Kind;
 use metriplectic_fields::{Column, Space};
 use metriplectic_integrators::explicit::{Projected, ProjectionError, Target};
 use metriplectic_integrators::{Flow, FlowError, Laws, Scales, StageFlow};
@@ -162,9 +162,8 @@ impl<P: Model> Flow for Lattice<P> {
     fn site_outside(&self, x: &Points<P::Manifold>, d: &SiteVector) -> Option<usize> {
         let (manifold, d) = (self.parts.manifold(), d.reader());
         let y = self.moved_by(x, d, |x, q| Some(P::Manifold::stage(x, q)))?;
-        let outside = |site: usize| {
-            !P::Manifold::is_stage(&d.at(site)) || !manifold.is_inside(&y[site])
-        };
+        let outside =
+            |site: usize| !P::Manifold::is_stage(&d.at(site)) || !manifold.is_inside(&y[site]);
         (0..self.sites()).find(|&site| outside(site)).or_else(|| self.not_finite(&y))
     }
 
@@ -244,11 +243,7 @@ impl<P: Model> StageFlow for Lattice<P> {
         })
     }
 
-    fn stage_coordinates(
-        &self,
-        x: &Points<P::Manifold>,
-        y: &Points<P::Manifold>,
-    ) -> SiteVector {
+    fn stage_coordinates(&self, x: &Points<P::Manifold>, y: &Points<P::Manifold>) -> SiteVector {
         self.vector_of(|site| P::Manifold::stage_coordinates(&x[site], &y[site]))
     }
 

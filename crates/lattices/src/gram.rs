@@ -88,9 +88,8 @@ impl Normals {
                 whole: [law.residual, round_off],
             };
             for (b, before) in all.iter().enumerate() {
-                let known = (0..b).fold(0.0, |sum, c| {
-                    sum + normal.shares[c] * all[c].square * before.shares[c]
-                });
+                let known = (0..b)
+                    .fold(0.0, |sum, c| sum + normal.shares[c] * all[c].square * before.shares[c]);
                 let share =
                     if before.dependent { 0.0 } else { (product(b) - known) / before.square };
                 normal.square -= share * share * before.square;

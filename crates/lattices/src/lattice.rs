@@ -133,8 +133,10 @@ impl<P: Model> Lattice<P> {
         SiteVector::each(self.sites(), dimension::<P>(), numbers)
     }
 
-    fn slots(&self) -> Buffer<f64> {
-        self.slots.numbers(self.layout.slots * dimension::<P>())
+    /// A place for what bonds give to other chunks; none if they give nothing.
+    fn slots(&self, bonds_give: bool) -> Buffer<f64> {
+        let count = if bonds_give { self.layout.slots } else { 0 };
+        self.slots.numbers(count * dimension::<P>())
     }
 
     /// The differentials `w = dh + Σ ∂h₂` and `ds` at each site, and the totals if `TOTALS`.
@@ -145,7 +147,7 @@ impl<P: Model> Lattice<P> {
         let n = dimension::<P>();
         let mut all = self.differentials.numbers(self.sites() * width::<P>());
         let bonds = self.layout.bonds();
-        let totals = self.layout.scatter(&mut all, &mut self.slots(), |mut part| {
+        let totals = self.layout.scatter(&mut all, &mut self.slots(P::BOND_ENERGY), |mut part| {
             let mut totals = Totals::new();
             for site in part.sites.clone() {
                 let point = &x[site];
@@ -183,14 +185,10 @@ impl<P: Model> Lattice<P> {
 
     /// The velocity `v = Π w + Σ K s` at each site and the total production `Σ ρ (b·s)²`; `None` if a term is not a
     /// number.
-    pub(crate) fn motion_along(
-        &self,
-        x: &[PointOf<P>],
-        all: &[f64],
-    ) -> Option<(SiteVector, f64)> {
+    pub(crate) fn motion_along(&self, x: &[PointOf<P>], all: &[f64]) -> Option<(SiteVector, f64)> {
         let mut v = self.vectors.numbers(self.sites() * dimension::<P>());
         let bonds = self.layout.bonds();
-        let partial = self.layout.scatter(&mut v, &mut self.slots(), |mut part| {
+        let partial = self.layout.scatter(&mut v, &mut self.slots(P::BOND_FRICTION), |mut part| {
             // The second sum is not a number if a term is not finite.
             let (mut production, mut probe) = (0.0, 0.0);
             for site in part.sites.clone() {

@@ -101,7 +101,7 @@ impl Layout {
     }
 
     /// Sums over sites and bonds: `work` writes the numbers of the sites of its chunk, and adds those that bonds
-    /// give. Its results are in the order of the chunks.
+    /// give. Its results are in the order of the chunks. Without slots bonds give nothing.
     pub(crate) fn scatter<R: Send>(
         &self,
         out: &mut [f64],
@@ -112,14 +112,16 @@ impl Layout {
         let width = slots.len().checked_div(self.slots).unwrap_or(0);
         let mut rest = &mut *slots;
         let mut pieces = Vec::with_capacity(self.chunks.len());
-        for ((k, chunk), out) in self.chunks.iter().enumerate().zip(out.chunks_mut(CHUNK * stride)) {
-            let (own, after) = std::mem::take(&mut rest).split_at_mut(chunk.slots.len() * width);
+        for ((k, chunk), out) in self.chunks.iter().enumerate().zip(out.chunks_mut(CHUNK * stride))
+        {
+            let own = chunk.slots.len() * width;
+            let (own, after) = std::mem::take(&mut rest).split_at_mut(own);
             rest = after;
             let (bonds, sites) = (chunk.bonds.clone(), parallel::sites(k, self.sites));
             pieces.push(Part { sites, bonds, out, stride, slots: own, width, next: 0 });
         }
         let results = parallel::each(pieces, work);
-        if self.slots > 0 {
+        if width > 0 {
             let slots = &*slots;
             let pieces: Vec<_> = self.chunks.iter().zip(out.chunks_mut(CHUNK * stride)).collect();
             parallel::each(pieces, |(chunk, out)| {

@@ -70,8 +70,7 @@ pub trait Model: Sync {
 }
 
 /// A point of a site.
-pub(crate) type PointOf<P> =
-    <<P as Model>::Manifold as metriplectic_fields::Space>::Point<f64>;
+pub(crate) type PointOf<P> = <<P as Model>::Manifold as metriplectic_fields::Space>::Point<f64>;
 /// Components at a site.
 pub(crate) type VectorOf<P> = Vector<<P as Model>::Manifold>;
 /// The points of a bond.

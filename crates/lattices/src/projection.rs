@@ -12,8 +12,8 @@
 //! has fewer freedoms than there are laws, all `ω_i` are 1.
 
 use metriplectic_fields::{Column, Space};
-use metriplectic_integrators::explicit::{Projected, ProjectionError, Target};
 use metriplectic_integrators::Vector as _;
+use metriplectic_integrators::explicit::{Projected, ProjectionError, Target};
 use metriplectic_manifolds::Manifold;
 
 use crate::flow::LatticeJets;
@@ -69,10 +69,7 @@ type Jets<P> = LatticeJets<VectorOf<P>>;
 type State<P> = Points<<P as Model>::Manifold>;
 
 impl<P: Model> Projection<'_, P> {
-    pub(crate) fn from(
-        &self,
-        mut y: State<P>,
-    ) -> Result<Projected<Lattice<P>>, ProjectionError> {
+    pub(crate) fn from(&self, mut y: State<P>) -> Result<Projected<Lattice<P>>, ProjectionError> {
         let with_entropy = self.target.with_entropy;
         let mut moved = 0.0;
         let mut best: Option<(f64, Projected<Lattice<P>>)> = None;

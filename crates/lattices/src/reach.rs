@@ -134,4 +134,3 @@ impl<P: Model> Lattice<P> {
         Some(VectorOf::<P>::from_index(|k| reversible[k] + friction[k] + rounded[k]))
     }
 }
-

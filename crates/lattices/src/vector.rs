@@ -140,7 +140,8 @@ impl Vector for SiteVector {
             return Self::same(first.sites, numbers.collect(), &first.pool);
         }
         let mut slices = [&[][..]; K];
-        if vectors.iter().zip(&mut slices).all(|(v, slice)| v.slice().map(|s| *slice = s).is_some()) {
+        if vectors.iter().zip(&mut slices).all(|(v, slice)| v.slice().map(|s| *slice = s).is_some())
+        {
             return first.filled(|start, out| {
                 let slices = slices.map(|slice| &slice[start..start + out.len()]);
                 for (i, out) in out.iter_mut().enumerate() {

@@ -213,8 +213,8 @@ impl<P: Model> Trial<'_, P> {
         let mut result = Ok(());
         parts.site_friction(site, x, w, |term| {
             let rest = [term.b.dot(w), term.b.abs().dot(&w.abs())];
-            let checked = rate(term.rate, place)
-                .and_then(|()| cancels("b·dH = 0", rest, ANNIHILATES));
+            let checked =
+                rate(term.rate, place).and_then(|()| cancels("b·dH = 0", rest, ANNIHILATES));
             result = result.clone().and(checked);
         });
         result
@@ -252,7 +252,13 @@ impl<P: Model> Trial<'_, P> {
         let place = Place::Site(site);
         let energy = parts.energy(site, x);
         let [[h1, s1], [h0, s0]] = ends.each_ref().map(|x| parts.values(site, x));
-        quotient("energy", place, energy.value.abs().max(self.mean[0]), Slope::of(&energy.df, &u), [h1, h0])?;
+        quotient(
+            "energy",
+            place,
+            energy.value.abs().max(self.mean[0]),
+            Slope::of(&energy.df, &u),
+            [h1, h0],
+        )?;
         if P::ENTROPY {
             let entropy = parts.entropy(site, x);
             let size = entropy.value.abs().max(self.mean[1]);
@@ -272,9 +278,8 @@ impl<P: Model> Trial<'_, P> {
         let n = dimension::<P>();
         let both = Vector::<PairManifold<P>>::from_index(|k| sizes[k % n]);
         let u = self.random.vector(&both);
-        let ends = [STEP, -STEP].map(|t| {
-            lattice.parts.bond_value(bond, &PairManifold::<P>::chart(&x, &(u * t)))
-        });
+        let ends = [STEP, -STEP]
+            .map(|t| lattice.parts.bond_value(bond, &PairManifold::<P>::chart(&x, &(u * t))));
         let jet = lattice.parts.bond_energy(bond, &x);
         let size = jet.value.abs().max(self.mean[0]);
         quotient("energy", lattice.place_of(bond), size, Slope::of(&jet.df, &u), ends)
@@ -323,7 +328,8 @@ impl<P: Model> Trial<'_, P> {
     }
 }
 
-const ANNIHILATES: &str = "; build each b from the differentials of the energy that the closure is given";
+const ANNIHILATES: &str =
+    "; build each b from the differentials of the energy that the closure is given";
 
 fn rate(rate: f64, place: Place) -> Result<(), LatticeError> {
     if rate < 0.0 { Err(LatticeError::NegativeRate { place, rate }) } else { Ok(()) }

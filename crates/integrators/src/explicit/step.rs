@@ -44,9 +44,7 @@ impl Refused {
     fn into_refusal(self, time: f64, h: f64) -> Refusal {
         let tried = Effort::default();
         let error = match self {
-            Self::Outside(Some(site)) => {
-                Some(StepError::SiteOutOfDomain { time, h, site, tried })
-            }
+            Self::Outside(Some(site)) => Some(StepError::SiteOutOfDomain { time, h, site, tried }),
             _ => None,
         };
         Refusal { effort: tried, error, second_law: matches!(self, Self::Falls) }
@@ -167,6 +165,7 @@ fn try_step<F: StageFlow>(
             }
             return Err(Refused::Falls);
         }
+        Err(Refused::Outside(_)) => return Err(Refused::outside(flow, x, &last.end)),
         Err(refused) => return Err(refused),
     };
     let next = here_at(flow, &end.x, Some(end.gradients))
@@ -294,8 +293,7 @@ pub(super) fn error<F: StageFlow>(
     let Some(last) = memory.last.as_ref() else {
         return Some(norm(&flow.local_error(step.x, step.end, h)?));
     };
-    let [fifth, third] =
-        tableau.errors.map(|row| norm(&combined(h, row, &last.stages)));
+    let [fifth, third] = tableau.errors.map(|row| norm(&combined(h, row, &last.stages)));
     // Hairer's e₅²/√(e₅² + e₃²/100) is of the order of the method; a method with one error has that.
     Some(if third > 0.0 { fifth * (fifth / fifth.hypot(0.1 * third)) } else { fifth })
 }

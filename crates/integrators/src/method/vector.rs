@@ -66,8 +66,7 @@ pub trait Vector: Clone + Debug {
     /// factor changes.
     #[must_use]
     fn relative_to(&self, sizes: &Self) -> f64 {
-        let ratio =
-            |i| if self.get(i) == 0.0 { 0.0 } else { (self.get(i) / sizes.get(i)).abs() };
+        let ratio = |i| if self.get(i) == 0.0 { 0.0 } else { (self.get(i) / sizes.get(i)).abs() };
         // Squares of 10⁻²⁰⁰ are zero; those of numbers up to 1 are not too large.
         let mut largest = 0.0;
         for i in 0..self.len() {

@@ -503,9 +503,7 @@ impl<V: Vector> Controller<V> {
         let noise = scales.rounding(h);
         let sizes = &scales.sizes;
         match &self.entries {
-            Entries::Automatic => {
-                V::zip([sizes, &noise], |[size, noise]| tolerance * size + noise)
-            }
+            Entries::Automatic => V::zip([sizes, &noise], |[size, noise]| tolerance * size + noise),
             Entries::Scale(known) => V::zip([sizes, &noise, known], |[size, noise, known]| {
                 tolerance * if known > 0.0 { known } else { size } + noise
             }),

@@ -59,9 +59,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     };
     // Σ_j of the discrete kernel is erfc at half sites.
     let spread = (4.0 * CONDUCTIVITY * t / CAPACITY).sqrt();
-    let diffused = |i: usize| {
-        1.0 + 0.5 * (HOT - 1.0) * erfc((i as f64 + 0.5 - middle as f64) / spread)
-    };
+    let diffused =
+        |i: usize| 1.0 + 0.5 * (HOT - 1.0) * erfc((i as f64 + 0.5 - middle as f64) / spread);
     let width = (4.0 * spread) as usize + 1;
     let apart = |i: usize| (temperature(i) - diffused(i)).abs();
     let error = (middle - width..middle + width).map(apart).fold(0.0, f64::max);
@@ -80,7 +79,11 @@ fn main() -> Result<(), Box<dyn Error>> {
         );
     let entries = [0, wide, middle].map(|i| temperature(i)).to_vec();
     let report = example.report_of(certificate, t, entries);
-    report.with("temperature_error", error).with("velocity", end.point[middle].y).figure(figure).print()
+    report
+        .with("temperature_error", error)
+        .with("velocity", end.point[middle].y)
+        .figure(figure)
+        .print()
 }
 
 /// The complementary error function, by its series and its continued fraction.

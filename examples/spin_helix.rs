@@ -37,7 +37,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let start = helix.points(|i| exact(i, 0.0));
 
     let about = "A damped helix of spins that heats its bath, beside its closed form.";
-    let example = Example::new(about, 200, 0.1);
+    let example = Example::new(about, 600, 0.1);
     let mut run = DormandPrince8.steps(&helix, start, example.step_size)?;
     let mut rows = vec![row(run.state())];
     for _ in 0..example.steps {
@@ -57,7 +57,9 @@ fn main() -> Result<(), Box<dyn Error>> {
         .panel(beside("n_x of the first spin", 1, |n, _| n.x))
         .panel(beside("n_z", 2, |n, _| n.z))
         .panel(beside("temperature", 3, |_, s| (s / CAPACITY).exp()))
-        .panel(Panel::new("largest error of a site", "t").line("error", column(4)).logarithmic(1e-17));
+        .panel(
+            Panel::new("largest error of a site", "t").line("error", column(4)).logarithmic(1e-17),
+        );
     let worst = rows.iter().map(|row| row[4]).fold(0.0, f64::max);
     let (n, s) = end.point[0];
     let report = example.report_of(certificate, end.time, vec![n.x, n.y, n.z, s.x]);

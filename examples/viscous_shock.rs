@@ -61,7 +61,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         vector![q[i], becker(i as f64 - START).velocity, if i + 1 < SITES { s } else { 0.0 }]
     });
 
-    let about = "A viscous shock of Mach number 1.3 in 1000 cells, beside the closed form of Becker.";
+    let about =
+        "A viscous shock of Mach number 1.3 in 1000 cells, beside the closed form of Becker.";
     let example = Example::new(about, 3000, 0.08);
     let mut run = DormandPrince5.steps(&gas, start, example.step_size)?;
     for _ in 0..example.steps {
@@ -80,7 +81,9 @@ fn main() -> Result<(), Box<dyn Error>> {
         let line = |f: &dyn Fn(usize) -> Cell, shift: f64| -> Vec<(f64, f64)> {
             near.clone().map(|i| (i as f64 + shift, of(&f(i)))).collect()
         };
-        Panel::new(name, "cell").line("Becker", line(&exact, 0.5)).line("lattice", line(&computed, shift))
+        Panel::new(name, "cell")
+            .line("Becker", line(&exact, 0.5))
+            .line("lattice", line(&computed, shift))
     };
     let figure = Panels::new(format!("A shock of Mach number {MACH} at t = {:.0}", end.time))
         .panel(panel("density 1/V", |cell| 1.0 / cell.volume, 0.5))
@@ -88,6 +91,10 @@ fn main() -> Result<(), Box<dyn Error>> {
         .panel(panel("velocity p", |cell| cell.velocity, 0.0));
     let apart = |i: usize| (computed(i).temperature - exact(i).temperature).abs();
     let error = near.clone().map(apart).fold(0.0, f64::max);
+    let errors: Vec<_> = near.clone().map(|i| (i as f64 + 0.5, apart(i))).collect();
+    let figure = figure.columns(2).panel(
+        Panel::new("error of the temperature", "cell").line("error", errors).logarithmic(1e-9),
+    );
     let middle = computed(SITES / 2);
     let entries = vec![middle.volume, middle.temperature, middle.velocity];
     let report = example.report_of(certificate, end.time, entries);

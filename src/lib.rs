@@ -78,7 +78,7 @@ pub mod prelude {
         Until, Watch,
     };
     pub use metriplectic_lattices::{
-        BondState, Boundary, Graph, Lattice, LatticeError, Onsager, Points, SiteState,
+        BondState, Boundary, Graph, Lattice, LatticeError, Onsager, Points, Profiles, SiteState,
     };
     pub use metriplectic_manifolds::{
         Canonical, Cayley, Chart, Euclidean, Exponential, HalfLine, LieAlgebra, LieDual, Manifold,

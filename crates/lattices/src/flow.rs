@@ -156,7 +156,9 @@ impl<P: Model> Flow for Lattice<P> {
     }
 
     fn examine(&self, x0: &Points<P::Manifold>) -> Result<(), FlowError> {
-        self.verify(x0).map_err(FlowError::new)
+        let verified = self.verify(x0).map_err(FlowError::new);
+        self.clear();
+        verified
     }
 
     fn site_outside(&self, x: &Points<P::Manifold>, d: &SiteVector) -> Option<usize> {
@@ -176,7 +178,9 @@ impl<P: Model> Flow for Lattice<P> {
     }
 
     fn reach(&self, x: &Points<P::Manifold>, span: f64) -> Option<Scales<SiteVector>> {
-        self.sizes_soon(x, span)
+        let sizes = self.sizes_soon(x, span);
+        self.clear();
+        sizes
     }
 
     fn local_error(

@@ -118,6 +118,13 @@ impl<P: Model> Lattice<P> {
         Self { parts, layout, vectors, differentials, slots }
     }
 
+    /// Gives up the arrays that were used before a run and are used no more.
+    pub(crate) fn clear(&self) {
+        for pool in [&self.vectors, &self.differentials, &self.slots] {
+            pool.clear();
+        }
+    }
+
     /// The number of sites.
     pub const fn sites(&self) -> usize {
         self.layout.sites

@@ -25,6 +25,7 @@
 //! | [`onsager`] | friction at sites and in bonds: [`Onsager`], [`SiteState`], [`BondState`] |
 //! | [`lattice`] | [`Lattice`], and its loops |
 //! | [`points`] | [`Points`]: the states of a lattice |
+//! | [`profiles`] | [`Profiles`]: rows of numbers along the lattice, in a file |
 //! | [`flow`] | a lattice as a flow for the explicit methods |
 //! | [`error`](mod@error) | [`LatticeError`]: what can be wrong, with the site or bond |
 
@@ -42,6 +43,7 @@ pub mod onsager;
 mod parallel;
 pub mod points;
 mod pool;
+pub mod profiles;
 mod projection;
 mod random;
 mod reach;
@@ -55,4 +57,5 @@ pub use lattice::Lattice;
 pub use model::Model;
 pub use onsager::{BondState, Onsager, SiteState};
 pub use points::{Points, Sites};
+pub use profiles::Profiles;
 pub use vector::SiteVector;

@@ -27,6 +27,11 @@ impl<T> Pool<T> {
         Buffer { items, pool: self.clone() }
     }
 
+    /// Gives up the arrays that nobody uses.
+    pub(crate) fn clear(&self) {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).clear();
+    }
+
     /// Puts an array in place of those that come from elsewhere.
     pub(crate) fn adopt(&self, items: Vec<T>) -> Buffer<T> {
         Buffer { items, pool: self.clone() }

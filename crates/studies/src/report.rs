@@ -33,12 +33,7 @@ impl Report {
     }
 
     /// The same of a run of any flow, with these entries of its last state.
-    pub(crate) fn certified(
-        self,
-        certificate: &Certificate,
-        time: f64,
-        entries: Vec<f64>,
-    ) -> Self {
+    pub(crate) fn certified(self, certificate: &Certificate, time: f64, entries: Vec<f64>) -> Self {
         let shown: Vec<String> = entries.iter().map(|x| readable(*x)).collect();
         let mut report = self.text(certificate);
         match serde_json::to_value(certificate) {

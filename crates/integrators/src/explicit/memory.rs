@@ -1,8 +1,5 @@
 //! What an explicit method keeps from one step to the next.
 
-use std::fmt::Debug;
-
-use super::flow::StageFlow;
 use super::tableau::Row;
 use crate::method::{Flow, Memory, Vector};
 use crate::run::checkpoint::{ResumeError, Saved};
@@ -13,7 +10,7 @@ pub(super) const STAGES: usize = 16;
 /// What [`DormandPrince8`](crate::DormandPrince8) and [`DormandPrince5`](crate::DormandPrince5) keep from one step
 /// to the next: the sum of the entropy that was produced, and what is known at the state reached.
 #[derive(Clone, Debug)]
-pub struct ExplicitMemory<V, G> {
+pub struct ExplicitMemory<V> {
     /// The entropy that the steps aim at; `None` before the first step.
     pub(super) entropy: Option<Produced>,
     /// How often in a row the entropy would have fallen.
@@ -22,14 +19,14 @@ pub struct ExplicitMemory<V, G> {
     pub(super) lost: Option<V>,
     /// The same as it was read from a checkpoint.
     pub(super) read: Vec<f64>,
-    /// The differentials and rates at the state reached, a function of this state alone.
-    pub(super) here: Option<Here<V, G>>,
+    /// The velocity at the state reached, a function of this state alone.
+    pub(super) here: Option<Here<V>>,
     /// The step taken last.
     pub(super) last: Option<LastStep<V>>,
 }
 
 /// The memory of an explicit method for a flow.
-pub(super) type MemoryOf<F> = ExplicitMemory<<F as Flow>::Vector, <F as StageFlow>::Gradients>;
+pub(super) type MemoryOf<F> = ExplicitMemory<<F as Flow>::Vector>;
 
 /// The sum of what was produced, with compensation.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -59,8 +56,7 @@ impl Produced {
 
 /// What is known at a state.
 #[derive(Clone, Debug)]
-pub(super) struct Here<V, G> {
-    pub(super) gradients: G,
+pub(super) struct Here<V> {
     pub(super) velocity: V,
     pub(super) production: f64,
 }
@@ -80,13 +76,13 @@ pub(super) struct LastStep<V> {
     pub(super) rise: f64,
 }
 
-impl<V, G> Default for ExplicitMemory<V, G> {
+impl<V> Default for ExplicitMemory<V> {
     fn default() -> Self {
         Self { entropy: None, falls: 0, lost: None, read: Vec::new(), here: None, last: None }
     }
 }
 
-impl<V: Vector, G: Clone + Debug> Memory for ExplicitMemory<V, G> {
+impl<V: Vector> Memory for ExplicitMemory<V> {
     fn rescaled(&self, _: f64) -> Self {
         let Self { entropy, falls, lost, read, here, .. } = self;
         let (lost, read, here) = (lost.clone(), read.clone(), here.clone());

@@ -139,10 +139,30 @@ fn try_step<F: StageFlow>(
         Some(here) => here,
         None => here_at(flow, x, None).ok_or(Refused::Outside(None))?,
     };
-    let stages = stages(tableau, flow, x, h, &here);
-    let dissipates = here.production != 0.0;
-    memory.here = Some(here);
-    let mut last = stages?;
+    let mut last = stages(tableau, flow, x, h, here)?;
+    let taken = finished(tableau, flow, start, h, &mut last, memory);
+    if memory.here.is_some() {
+        memory.last = Some(last);
+    } else {
+        // The state has stayed where it was.
+        let [(velocity, production), ..] = last.stages;
+        memory.here = Some(Here { velocity, production });
+    }
+    taken
+}
+
+/// The end of a step from its stages: projection, decision.
+#[inline]
+fn finished<F: StageFlow>(
+    tableau: &'static Tableau,
+    flow: &F,
+    start: &StepStart<'_, F>,
+    h: f64,
+    last: &mut LastStep<F::Vector>,
+    memory: &mut MemoryOf<F>,
+) -> Result<Taken<F>, Refused> {
+    let x = start.x;
+    let dissipates = last.stages[0].1 != 0.0;
     if let Some(lost) = &memory.lost {
         last.end = Vector::zip([&last.end, lost], |[end, lost]| end + lost);
     } else if !memory.read.is_empty() {
@@ -150,17 +170,19 @@ fn try_step<F: StageFlow>(
         last.end = last.end.with(|i| last.end.get(i) + lost(i));
     }
     let y = flow.stage(x, &last.end).ok_or_else(|| Refused::outside(flow, x, &last.end))?;
-    let reached = flow.stage_coordinates(x, &y);
-    let lost = Vector::zip([&last.end, &reached], |[end, reached]| end - reached);
+    let lost = {
+        let reached = flow.stage_coordinates(x, &y);
+        Vector::zip([&last.end, &reached], |[end, reached]| end - reached)
+    };
 
     let produced = memory.entropy.unwrap_or_else(|| Produced::from(start.values.entropy));
-    let projection = Onto { tableau, flow, start, h, last: &last, produced };
+    let projection = Onto { tableau, flow, start, h, last: &*last, produced };
     let Landed { end, produced, how } = match projection.decide(y) {
         Ok(landed) => landed,
         Err(Refused::Falls) => {
             memory.falls += 1;
             if memory.falls > FALLS && hardly_moves(flow, start, &last.end) {
-                (memory.falls, memory.last) = (0, None);
+                memory.falls = 0;
                 return Ok(held(start));
             }
             return Err(Refused::Falls);
@@ -168,16 +190,16 @@ fn try_step<F: StageFlow>(
         Err(Refused::Outside(_)) => return Err(Refused::outside(flow, x, &last.end)),
         Err(refused) => return Err(refused),
     };
+    let values = flow.values(&end.gradients);
     let next = here_at(flow, &end.x, Some(end.gradients))
         .ok_or_else(|| Refused::outside(flow, x, &last.end))?;
     last.end = flow.stage_coordinates(x, &end.x);
     let rates = flow.stage_rates(x, (&last.end, &end.x), &next.velocity);
     let rests = end.x == *x && is_zero(&last.stages[0].0);
-    let stability = is_at_the_edge(tableau, flow, x, h, &last, &rates);
+    let stability = is_at_the_edge(tableau, flow, x, h, last, &rates);
     last.stages[last.known] = (rates, next.production);
     last.known += 1;
 
-    let values = flow.values(&next.gradients);
     let entropy_step = (flow.entropy_law() == SecondLaw::Exact).then_some(how);
     let evidence = Evidence { dissipates, rests, entropy_step, stability, ..Evidence::default() };
     *memory = ExplicitMemory {
@@ -186,7 +208,7 @@ fn try_step<F: StageFlow>(
         lost: Some(lost),
         read: Vec::new(),
         here: Some(next),
-        last: Some(last),
+        last: None,
     };
     Ok(Taken { x: end.x, values, evidence, effort: Effort::default() })
 }
@@ -204,13 +226,13 @@ fn here_at<F: StageFlow>(
     flow: &F,
     x: &Element<F>,
     gradients: Option<F::Gradients>,
-) -> Option<Here<F::Vector, F::Gradients>> {
+) -> Option<Here<F::Vector>> {
     let gradients = match gradients {
         Some(gradients) => gradients,
         None => flow.gradients(x)?,
     };
     let (velocity, production) = flow.velocity(x, &gradients)?;
-    Some(Here { gradients, velocity, production })
+    Some(Here { velocity, production })
 }
 
 /// The stages of a step, and the coordinates of its end.
@@ -220,11 +242,11 @@ fn stages<F: StageFlow>(
     flow: &F,
     x: &Element<F>,
     h: f64,
-    here: &Here<F::Vector, F::Gradients>,
+    here: Here<F::Vector>,
 ) -> Result<LastStep<F::Vector>, Refused> {
     let zero = here.velocity.zero();
     let mut stages: [(F::Vector, f64); STAGES] = std::array::from_fn(|_| (zero.clone(), 0.0));
-    stages[0] = (here.velocity.clone(), here.production);
+    stages[0] = (here.velocity, here.production);
     let mut before = zero;
     for (i, row) in tableau.stages.iter().enumerate() {
         before = combined(h, row, &stages);
@@ -233,6 +255,9 @@ fn stages<F: StageFlow>(
     }
     let end = combined(h, tableau.end, &stages);
     let rise = h * produced(tableau.end, &stages);
+    for &stage in tableau.passed {
+        stages[stage].0 = stages[0].0.zero();
+    }
     Ok(LastStep { stages, known: tableau.stages.len() + 1, before, end, rise })
 }
 
@@ -273,12 +298,19 @@ fn is_at_the_edge<F: StageFlow>(
     rates: &F::Vector,
 ) -> bool {
     let sizes = flow.sizes(x);
-    let sizes = Vector::zip([&sizes, &last.end], |[size, end]| size.max(end.abs()));
-    let apart = Vector::zip([&last.end, &last.before], |[end, before]| end - before);
-    let before = &last.stages[tableau.stages.len()].0;
-    let change = Vector::zip([rates, before], |[end, before]| h * (end - before));
-    let distance = relative(&apart, &sizes);
-    distance > 64.0 * f64::EPSILON && relative(&change, &sizes) > tableau.stability * distance
+    let one = sizes.map(|_| 1.0);
+    let before = [&last.before, &last.stages[tableau.stages.len()].0];
+    // One array at a time, because a large system has no room for more.
+    let norm = |end: &F::Vector, before: &F::Vector, factor: f64| {
+        let ratios =
+            Vector::zip([end, before, &sizes, &last.end], |[end, before, size, reached]| {
+                let change = factor * (end - before);
+                if change == 0.0 { 0.0 } else { change / size.max(reached.abs()) }
+            });
+        relative(&ratios, &one)
+    };
+    let distance = norm(&last.end, before[0], 1.0);
+    distance > 64.0 * f64::EPSILON && norm(rates, before[1], h) > tableau.stability * distance
 }
 
 /// The error of a step in units of the one allowed. A step that was taken in parts has the estimate of the flow.
@@ -327,19 +359,23 @@ impl<F: StageFlow> Onto<'_, F> {
                 Vector::zip([&last.end, &sizes], |[end, size]| (0.5 * end.abs()).max(NEAR * size))
             }
         };
-        let estimate = flow.weighs_errors().then(|| self.estimate());
+        let embedded = self.embedded_error();
+        let error = flow.weighs_errors().then(|| embedded.as_ref().unwrap_or(&last.stages[0].0));
         let onto = |y, entropy, with_entropy| {
             let laws = Laws { entropy, ..start.reference.clone() };
-            let (limit, error) = (Some(&limit), estimate.as_ref());
+            let limit = Some(&limit);
             flow.project(y, &Target { laws: &laws, with_entropy, limit, error })
         };
         if flow.entropy_law() != SecondLaw::Exact {
             let end = onto(y, start.reference.entropy, false).map_err(refused)?;
             return Ok(Landed { end, produced, how: EntropyStep::Free });
         }
-        if self.is_trusted() {
+        let mut y = Some(y);
+        if self.is_trusted()
+            && let Some(y) = y.take()
+        {
             let target = produced.plus(last.rise);
-            if let Ok(end) = onto(y.clone(), target.sum, true)
+            if let Ok(end) = onto(y, target.sum, true)
                 && !self.falls(&end)
             {
                 let largest = produced.largest.max(end.entropy);
@@ -347,6 +383,8 @@ impl<F: StageFlow> Onto<'_, F> {
                 return Ok(Landed { end, produced, how: EntropyStep::Targeted });
             }
         }
+        let again = || flow.stage(start.x, &last.end).ok_or(Refused::Outside(None));
+        let y = y.map_or_else(again, Ok)?;
         let end = onto(y, produced.sum, false).map_err(refused)?;
         let least = produced.largest - 2.0 * end.entropy_round_off;
         if end.entropy < least || self.falls(&end) {
@@ -357,13 +395,13 @@ impl<F: StageFlow> Onto<'_, F> {
         Ok(Landed { end, produced, how: EntropyStep::Free })
     }
 
-    /// An estimate of the local error: the embedded one where it does not need the end of the step, and else the
-    /// velocity at its start.
-    fn estimate(&self) -> F::Vector {
-        let Self { tableau, h, last, .. } = *self;
+    /// The embedded error, if the flow weighs errors and it does not need the end of the step. Otherwise the
+    /// velocity at the start takes its place.
+    fn embedded_error(&self) -> Option<F::Vector> {
+        let Self { tableau, flow, h, last, .. } = *self;
         let [row, _] = tableau.errors;
         let known = row.iter().all(|&(stage, _)| stage < last.known);
-        if known { combined(h, row, &last.stages) } else { last.stages[0].0.clone() }
+        (flow.weighs_errors() && known).then(|| combined(h, row, &last.stages))
     }
 
     /// Whether the entropy that was produced may be aimed at.

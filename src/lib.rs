@@ -74,8 +74,8 @@ pub mod prelude {
     pub use metriplectic_integrators::{
         Attitude, AttitudeError, Certificate, Checkpoint, DormandPrince5, DormandPrince8, Ending,
         Error, Event, Gonzalez, ItohAbe, MeanValue, Method, Newton, Observables, ResumeError, Run,
-        RunError, Scheme, Span, SpanError, State, StepError, Steps, SymmetricItohAbe, Trajectory,
-        Until, Watch,
+        RunError, RungeKuttaChebyshev, Scheme, Span, SpanError, State, StepError, Steps,
+        SymmetricItohAbe, Trajectory, Until, Watch,
     };
     pub use metriplectic_lattices::{
         BondState, Boundary, Graph, Lattice, LatticeError, Onsager, Points, Profiles, SiteState,

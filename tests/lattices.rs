@@ -5,6 +5,9 @@ mod chain;
 #[path = "models/lattices.rs"]
 mod models;
 
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
 use chain::{chain, waves};
 use metriplectic::integrators::{Flow, Vector};
 use metriplectic::prelude::*;
@@ -159,15 +162,15 @@ fn heat_spreads_as_the_discrete_kernel_says_in_every_unit() {
     let copper = [385.0 * density * 1e-3 * 1e-4, 401.0 * 1e-4 / 1e-3, 300.0];
     let errors = [[1.0, 1.0, 1.0], copper].map(|[c, kappa, theta]| {
         let n = 40;
-        let lattice = conduction::lattice(n, c, kappa);
+        let lattice = conduction::lattice(n, [c, kappa], Arc::default());
         let end = 2.0 * c / kappa;
-        let start = lattice.points(|i| conduction::at(n, i, [c, kappa, theta], 0.0));
+        let start = lattice.points(|i| conduction::at([n, i], 2.0, [c, kappa, theta], 0.0));
         let span = Span::until(end).tolerance(1e-15).at_most(2);
         let run = DormandPrince8.run(&lattice, start, span).unwrap();
         println!("{}", run.certificate());
         assert!(run.certificate().keeps_energy() && run.certificate().keeps_entropy());
         let off = |(i, x): (usize, &Vector1<f64>)| {
-            (x / conduction::at(n, i, [c, kappa, theta], end).x).x - 1.0
+            (x / conduction::at([n, i], 2.0, [c, kappa, theta], end).x).x - 1.0
         };
         let off = run.last().point.iter().enumerate().map(|ix| off(ix).abs()).fold(0.0, f64::max);
         (off, run.certificate().steps)
@@ -257,4 +260,37 @@ fn runs_have_outputs_events_rest_and_checkpoints() {
     let rest = DormandPrince5.run(&lattice, start, span).unwrap();
     println!("{} {:?}", rest.certificate(), rest.ending());
     assert!(rest.ending().is_rest() && height(&rest.last().point) > 1.0 - 1e-9);
+}
+
+#[test]
+fn stiff_conduction_takes_stages_in_proportion_to_the_root_of_its_stiffness() {
+    let (n, parameters) = (1000, [1.0, 1000.0, 1.0]);
+    let count = Arc::<AtomicUsize>::default();
+    let lattice = conduction::lattice(n, [1.0, 1000.0], count.clone());
+    let at = |i, t| conduction::at([n, i], 2.0, parameters, t);
+    let start = lattice.points(|i| at(i, 0.0));
+    let run = |tolerance: f64| {
+        count.store(0, Ordering::Relaxed);
+        let span = Span::until(2.0).tolerance(tolerance).at_most(2);
+        let run = RungeKuttaChebyshev.run(&lattice, start.clone(), span).unwrap();
+        println!("{}", run.certificate());
+        let certificate = run.certificate();
+        assert!(certificate.max_energy_error <= 4.0 * f64::EPSILON * certificate.initial_energy);
+        assert_eq!(certificate.entropy_falls, 0);
+        let off = |(i, x): (usize, &Vector1<f64>)| (x - at(i, 2.0)).amax();
+        let error = run.last().point.iter().enumerate().map(off).fold(0.0, f64::max);
+        let velocities = count.load(Ordering::Relaxed) / n;
+        println!("{tolerance:.0e}: {velocities} velocities, error {error:.1e}");
+        (error, velocities)
+    };
+    let runs = [1e-3, 1e-4, 1e-5].map(run);
+    println!("{runs:?}");
+    // The error is proportional to the tolerance, and the stages to the root of the number of steps.
+    for pair in runs.windows(2) {
+        let [(e0, v0), (e1, v1)] = pair else { unreachable!("windows of two") };
+        assert!((3.0..30.0).contains(&(e0 / e1)), "{runs:?}");
+        assert!(*v1 as f64 <= 2.0 * *v0 as f64, "{runs:?}");
+    }
+    // An explicit step is stable up to 3.3 / (4κ/c): 2400 steps to t = 2, seven velocities each.
+    assert!(runs[1].0 < 7e-6 && runs[1].1 < 700, "{runs:?}");
 }

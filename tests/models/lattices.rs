@@ -1,5 +1,8 @@
 //! Lattices with closed forms.
 
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
 use metriplectic::lattices::Model;
 use metriplectic::prelude::*;
 
@@ -89,15 +92,17 @@ pub(crate) mod helix {
 pub(crate) mod conduction {
     use super::*;
 
+    /// The lattice, and how often a bond was evaluated.
     pub(crate) fn lattice(
         n: usize,
-        c: f64,
-        kappa: f64,
+        [c, kappa]: [f64; 2],
+        count: Arc<AtomicUsize>,
     ) -> Lattice<impl Model<Manifold = Euclidean<1>>> {
         Lattice::on(Graph::ring(n), Euclidean::<1>)
             .energy(|e: &Vector1<Real>| e.x)
             .entropy(move |e: &Vector1<Real>| e.x.ln() * c)
             .bond_onsager(move |bond| {
+                count.fetch_add(1, Ordering::Relaxed);
                 let [x, y] = bond.x.map(|e| e.x / c);
                 [Onsager { rate: kappa * x * y, b: [vector![1.0], vector![-1.0]] }]
             })
@@ -105,9 +110,14 @@ pub(crate) mod conduction {
             .expect("the parts make a lattice")
     }
 
-    /// The energy of cell `i` at the time `t`, with a temperature of `theta` in the mean.
-    pub(crate) fn at(n: usize, i: usize, [c, kappa, theta]: [f64; 3], t: f64) -> Vector1<f64> {
-        let k = 2.0 * std::f64::consts::TAU / n as f64;
+    /// The energy of cell `i` at the time `t`, with a temperature of `theta` in the mean and so many waves.
+    pub(crate) fn at(
+        [n, i]: [usize; 2],
+        waves: f64,
+        [c, kappa, theta]: [f64; 3],
+        t: f64,
+    ) -> Vector1<f64> {
+        let k = waves * std::f64::consts::TAU / n as f64;
         let decay = (-2.0 * kappa * (1.0 - k.cos()) * t / c).exp();
         vector![c * theta * (1.0 + 0.4 * (k * i as f64).cos() * decay)]
     }

@@ -9,7 +9,7 @@
 //! | [`discrete_gradient`] | [`DiscreteGradient`]: [`Gonzalez`], [`MeanValue`], [`ItohAbe`], [`SymmetricItohAbe`] | |
 //! | [`round_off`] | covectors, laws and positions that are safe against round-off | |
 //! | [`midpoint`] | [`Scheme`]: the method of the paper, its equation and its fallbacks | [`newton`], [`discrete_gradient`], [`round_off`] |
-//! | [`explicit`] | [`DormandPrince8`], [`DormandPrince5`]: explicit methods, and then back onto the laws | [`method`] |
+//! | [`explicit`] | [`DormandPrince8`], [`DormandPrince5`], [`RungeKuttaChebyshev`]: explicit methods, and then back onto the laws | [`method`] |
 //! | [`attitude`] | [`Attitude`]: where a body points along a run of its angular momentum | [`run`] |
 //! | [`laws`] | what a step and a method promise, and the functions that check it | |
 //! | [`error`](mod@error) | [`Error`], [`RunError`], [`FlowError`] | |
@@ -39,7 +39,7 @@ pub mod step_error;
 pub use attitude::{Attitude, AttitudeError};
 pub use discrete_gradient::{DiscreteGradient, Gonzalez, ItohAbe, MeanValue, SymmetricItohAbe};
 pub use error::{Error, FlowError, RunError};
-pub use explicit::{DormandPrince5, DormandPrince8, StageFlow};
+pub use explicit::{DormandPrince5, DormandPrince8, RungeKuttaChebyshev, StageFlow};
 pub use method::{
     Components, Control, Effort, Element, EntropyStep, Evidence, Flow, Laws, Memory, Method,
     Promises, Refusal, StateSpace, StepEnds, StepStart, Taken, Vector,

@@ -1,5 +1,6 @@
 //! What an explicit method keeps from one step to the next.
 
+use super::chebyshev::Spectrum;
 use super::tableau::Row;
 use crate::method::{Flow, Memory, Vector};
 use crate::run::checkpoint::{ResumeError, Saved};
@@ -23,6 +24,8 @@ pub struct ExplicitMemory<V> {
     pub(super) here: Option<Here<V>>,
     /// The step taken last.
     pub(super) last: Option<LastStep<V>>,
+    /// The spectral radius of the equation of motion, if the method needs it.
+    pub(super) spectrum: Option<Spectrum<V>>,
 }
 
 /// The memory of an explicit method for a flow.
@@ -78,15 +81,24 @@ pub(super) struct LastStep<V> {
 
 impl<V> Default for ExplicitMemory<V> {
     fn default() -> Self {
-        Self { entropy: None, falls: 0, lost: None, read: Vec::new(), here: None, last: None }
+        Self {
+            entropy: None,
+            falls: 0,
+            lost: None,
+            read: Vec::new(),
+            here: None,
+            last: None,
+            spectrum: None,
+        }
     }
 }
 
 impl<V: Vector> Memory for ExplicitMemory<V> {
     fn rescaled(&self, _: f64) -> Self {
-        let Self { entropy, falls, lost, read, here, .. } = self;
+        let Self { entropy, falls, lost, read, here, spectrum, .. } = self;
+        let spectrum = spectrum.clone();
         let (lost, read, here) = (lost.clone(), read.clone(), here.clone());
-        Self { entropy: *entropy, falls: *falls, lost, read, here, last: None }
+        Self { entropy: *entropy, falls: *falls, lost, read, here, last: None, spectrum }
     }
 
     fn refused(&mut self, tried: Self) {
@@ -105,6 +117,11 @@ impl<V: Vector> Memory for ExplicitMemory<V> {
         } else if !self.read.is_empty() {
             saved.put("compensation", self.read.iter().copied());
         }
+        if let Some(Spectrum { radius, age, direction, read }) = &self.spectrum {
+            saved.put("spectral radius", [*radius, f64::from(*age)]);
+            let direction = direction.as_ref().map_or_else(|| read.clone(), Vector::to_list);
+            saved.put("spectral direction", direction);
+        }
     }
 
     fn restore(saved: &Saved) -> Result<Self, ResumeError> {
@@ -116,6 +133,12 @@ impl<V: Vector> Memory for ExplicitMemory<V> {
             // At most a few: a step is held after five.
             memory.falls =
                 (0..u32::from(u8::MAX)).find(|&k| f64::from(k) >= numbers[3]).unwrap_or(0);
+        }
+        if let Some(numbers) = saved.get("spectral radius", 2)? {
+            let age = (0..u32::from(u8::MAX)).find(|&k| f64::from(k) >= numbers[1]);
+            let read = saved.list("spectral direction")?.unwrap_or_default();
+            let (radius, age) = (numbers[0], age.unwrap_or(u32::from(u8::MAX)));
+            memory.spectrum = Some(Spectrum { radius, age, direction: None, read });
         }
         Ok(memory)
     }

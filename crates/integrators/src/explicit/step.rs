@@ -2,6 +2,7 @@
 
 use metriplectic_dynamics::SecondLaw;
 
+use super::chebyshev;
 use super::flow::{Projected, ProjectionError, StageFlow, Target};
 use super::memory::{
     ExplicitMemory, Here, LastStep, MemoryOf, Produced, STAGES, combined, produced,
@@ -30,7 +31,7 @@ const HALVES: u32 = 12;
 const FAR: f64 = 10.0;
 
 /// Why a step is not taken.
-enum Refused {
+pub(super) enum Refused {
     /// A stage is beyond the edge of the chart or the domain, or has no value; at a site, if the flow says which.
     Outside(Option<usize>),
     /// No state near by has the laws of the run.
@@ -52,7 +53,7 @@ impl Refused {
 
     /// A displacement leads out of the domain.
     #[cold]
-    fn outside<F: StageFlow>(flow: &F, x: &Element<F>, d: &F::Vector) -> Self {
+    pub(super) fn outside<F: StageFlow>(flow: &F, x: &Element<F>, d: &F::Vector) -> Self {
         Self::Outside(flow.site_outside(x, d))
     }
 }
@@ -139,7 +140,11 @@ fn try_step<F: StageFlow>(
         Some(here) => here,
         None => here_at(flow, x, None).ok_or(Refused::Outside(None))?,
     };
-    let mut last = stages(tableau, flow, x, h, here)?;
+    let mut last = if tableau.stages.is_empty() {
+        chebyshev::stages(flow, x, h, here, memory)?
+    } else {
+        stages(tableau, flow, x, h, here)?
+    };
     let taken = finished(tableau, flow, start, h, &mut last, memory);
     if memory.here.is_some() {
         memory.last = Some(last);
@@ -196,7 +201,8 @@ fn finished<F: StageFlow>(
     last.end = flow.stage_coordinates(x, &end.x);
     let rates = flow.stage_rates(x, (&last.end, &end.x), &next.velocity);
     let rests = end.x == *x && is_zero(&last.stages[0].0);
-    let stability = is_at_the_edge(tableau, flow, x, h, last, &rates);
+    let stability =
+        tableau.stability.is_finite() && is_at_the_edge(tableau, flow, x, h, last, &rates);
     last.stages[last.known] = (rates, next.production);
     last.known += 1;
 
@@ -209,6 +215,7 @@ fn finished<F: StageFlow>(
         read: Vec::new(),
         here: Some(next),
         last: None,
+        spectrum: memory.spectrum.take(),
     };
     Ok(Taken { x: end.x, values, evidence, effort: Effort::default() })
 }
@@ -325,6 +332,9 @@ pub(super) fn error<F: StageFlow>(
     let Some(last) = memory.last.as_ref() else {
         return Some(norm(&flow.local_error(step.x, step.end, h)?));
     };
+    if tableau.stages.is_empty() {
+        return Some(norm(&chebyshev::error(last, h)));
+    }
     let [fifth, third] = tableau.errors.map(|row| norm(&combined(h, row, &last.stages)));
     // Hairer's e₅²/√(e₅² + e₃²/100) is of the order of the method; a method with one error has that.
     Some(if third > 0.0 { fifth * (fifth / fifth.hypot(0.1 * third)) } else { fifth })
@@ -400,7 +410,7 @@ impl<F: StageFlow> Onto<'_, F> {
     fn embedded_error(&self) -> Option<F::Vector> {
         let Self { tableau, flow, h, last, .. } = *self;
         let [row, _] = tableau.errors;
-        let known = row.iter().all(|&(stage, _)| stage < last.known);
+        let known = !row.is_empty() && row.iter().all(|&(stage, _)| stage < last.known);
         (flow.weighs_errors() && known).then(|| combined(h, row, &last.stages))
     }
 

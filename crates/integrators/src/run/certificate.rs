@@ -377,7 +377,7 @@ impl Certificate {
             writeln!(
                 f,
                 "stability:   it sets the size of {stability} of {steps}, and not the tolerance; an implicit method, \
-                 such as `WeylMidpoint`, takes larger ones"
+                 such as `WeylMidpoint`, takes larger ones, and so does `RungeKuttaChebyshev` if friction sets it"
             )?;
         }
         Ok(())

@@ -19,6 +19,9 @@ struct Manifolds;
 #[doc = include_str!("../book/src/methods.md")]
 struct Methods;
 
+#[doc = include_str!("../book/src/lattices.md")]
+struct Lattices;
+
 #[doc = include_str!("../book/src/schemes.md")]
 struct Schemes;
 

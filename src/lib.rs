@@ -48,6 +48,7 @@
 //! | [`System`](dynamics::System) | all of these with `H` and `S` | [`dynamics`] |
 //! | [`DiscreteGradient`](integrators::DiscreteGradient) | a covector with `⟨w, d⟩ = ΔH` | [`integrators`] |
 //! | [`Newton`](integrators::Newton) | solves the equation of a step | [`integrators`] |
+//! | [`Lattice`](lattices::Lattice) | many sites, from closures of a site and of a bond | [`lattices`] |
 //! | [`Method`](integrators::Method) | a one-step method, such as [`Scheme`](integrators::Scheme) | [`integrators`] |
 //! | [`Scheme`](integrators::Scheme) | one step: guess, solve, retract | [`integrators`] |
 //! | [`Trajectory`](integrators::Trajectory) | the steps of a run, with their [`Certificate`](integrators::Certificate) | [`integrators`] |
@@ -57,6 +58,7 @@ pub mod guide;
 pub use metriplectic_dynamics as dynamics;
 pub use metriplectic_fields as fields;
 pub use metriplectic_integrators as integrators;
+pub use metriplectic_lattices as lattices;
 pub use metriplectic_manifolds as manifolds;
 pub use nalgebra;
 
@@ -72,8 +74,11 @@ pub mod prelude {
     pub use metriplectic_integrators::{
         Attitude, AttitudeError, Certificate, Checkpoint, DormandPrince5, DormandPrince8, Ending,
         Error, Event, Gauss, Gonzalez, ItohAbe, MeanValue, Method, Newton, Observables, Radau,
-        ResumeError, Run, RunError, Scheme, Span, SpanError, State, StepError, Steps,
-        SymmetricItohAbe, Trajectory, Until, Watch,
+        ResumeError, Run, RunError, RungeKuttaChebyshev, Scheme, Span, SpanError, State, StepError,
+        Steps, SymmetricItohAbe, Trajectory, Until, Watch,
+    };
+    pub use metriplectic_lattices::{
+        BondState, Boundary, Graph, Lattice, LatticeError, Onsager, Points, Profiles, SiteState,
     };
     pub use metriplectic_manifolds::{
         Canonical, Cayley, Chart, ChartMidpoint, Euclidean, Exponential, HalfLine, LieAlgebra,

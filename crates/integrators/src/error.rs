@@ -4,6 +4,7 @@
 //! the sentence of their `Display` form.
 
 use std::fmt;
+use std::sync::Arc;
 
 use metriplectic_dynamics::{BuildError, FormError, LegendreError, ModelError, PoissonError};
 use metriplectic_manifolds::{AlgebraError, MetricError, PointError};
@@ -22,6 +23,9 @@ pub enum RunError<M: StateSpace> {
     /// The model breaks one of its laws.
     #[error(transparent)]
     Model(#[from] ModelError),
+    /// The flow has found a fault of its own.
+    #[error(transparent)]
+    Flow(#[from] FlowError),
     /// The span cannot be run.
     #[error(transparent)]
     Span(#[from] SpanError),
@@ -40,8 +44,32 @@ impl<M: StateSpace> RunError<M> {
     pub fn trajectory(&self) -> Option<&Trajectory<M>> {
         match self {
             Self::Step { trajectory, .. } => Some(trajectory),
-            Self::Model(_) | Self::Span(_) => None,
+            Self::Model(_) | Self::Flow(_) | Self::Span(_) => None,
         }
+    }
+}
+
+/// A fault that a [`Flow`](crate::Flow) which is no metriplectic system has found at the start of a run. It is the
+/// flow's own error, which can be downcast from it.
+///
+/// ```
+/// use metriplectic_integrators::FlowError;
+/// let error = FlowError::new("7a".parse::<i32>().unwrap_err());
+/// assert!(error.downcast_ref::<std::num::ParseIntError>().is_some());
+/// ```
+#[derive(Clone, thiserror::Error)]
+#[error("{0}")]
+pub struct FlowError(#[source] Arc<dyn std::error::Error + Send + Sync>);
+
+impl FlowError {
+    /// Wraps the error of a flow.
+    pub fn new(error: impl std::error::Error + Send + Sync + 'static) -> Self {
+        Self(Arc::new(error))
+    }
+
+    /// The flow's own error, if it is of this type.
+    pub fn downcast_ref<E: std::error::Error + 'static>(&self) -> Option<&E> {
+        self.0.downcast_ref()
     }
 }
 
@@ -74,6 +102,9 @@ pub enum Error {
     /// A model that breaks one of its laws.
     #[error(transparent)]
     Model(#[from] ModelError),
+    /// A flow that has found a fault of its own.
+    #[error(transparent)]
+    Flow(#[from] FlowError),
     /// A span that cannot be run.
     #[error(transparent)]
     Span(#[from] SpanError),
@@ -95,6 +126,7 @@ impl<M: StateSpace> From<RunError<M>> for Error {
     fn from(error: RunError<M>) -> Self {
         match error {
             RunError::Model(error) => Self::Model(error),
+            RunError::Flow(error) => Self::Flow(error),
             RunError::Span(error) => Self::Span(error),
             error @ RunError::Step { .. } => Self::Run(Box::new(error)),
         }
@@ -102,6 +134,12 @@ impl<M: StateSpace> From<RunError<M>> for Error {
 }
 
 impl<M: StateSpace> fmt::Debug for RunError<M> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        fmt::Display::fmt(self, f)
+    }
+}
+
+impl fmt::Debug for FlowError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         fmt::Display::fmt(self, f)
     }

@@ -40,6 +40,7 @@
 //! A model with [`SecondLaw::Published`] keeps `H` and `L_a`. The methods are not symmetric in time, and stiff
 //! friction bounds their steps; the certificate says when it does.
 
+mod chebyshev;
 mod dense;
 mod flow;
 mod memory;
@@ -56,6 +57,7 @@ pub use metriplectic::LawJets;
 
 use crate::method::{Control, Element, Method, Promises, Refusal, StepEnds, StepStart, Taken};
 use crate::step_error::StepError;
+use chebyshev::CHEBYSHEV;
 use tableau::{EIGHT, FIVE, Tableau};
 
 /// The method of Dormand and Prince of order 8, with both laws exact: for high accuracy, and for smooth motions at
@@ -106,6 +108,42 @@ pub struct DormandPrince8;
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct DormandPrince5;
+
+/// The method of Runge, Kutta and Chebyshev of order 2, with both laws exact: for stiff friction and conduction, where
+/// stability bounds the steps of the other explicit methods.
+///
+/// A step takes as many stages as its size and the spectral radius `ρ` of the equation of motion ask for, about
+/// `1.25 √(hρ)`, where an explicit method of another kind takes a number of steps in proportion to `hρ` (Sommeijer,
+/// Shampine, Verwer 1997). The eigenvalues of the motion must lie near the negative axis: friction may be stiff, an
+/// oscillation may not.
+///
+/// ```
+/// use metriplectic_dynamics::{FieldDissipation, System};
+/// use metriplectic_fields::Real;
+/// use metriplectic_integrators::{Method, RungeKuttaChebyshev, Span};
+/// use metriplectic_manifolds::Euclidean;
+/// use nalgebra::{Matrix2, Vector2};
+/// # use num_dual::DualNum;
+/// # fn main() -> Result<(), metriplectic_integrators::Error> {
+/// // Two bodies that exchange heat 10⁴ times faster than they are looked at.
+/// let exchange = |_: &Vector2<Real>, w: &Vector2<Real>| {
+///     let b = Vector2::new(w.y, -w.x);
+///     b * b.transpose() * Real::from(1e4)
+/// };
+/// let bodies = System::on(Euclidean::<2>)
+///     .dissipation(FieldDissipation(exchange))
+///     .energy(|e: &Vector2<Real>| e.x + e.y)
+///     .entropy(|e: &Vector2<Real>| e.x.ln() + e.y.ln())
+///     .build()?;
+/// let span = Span::until(1.0).tolerance(1e-4);
+/// let run = RungeKuttaChebyshev.run(&bodies, Vector2::new(1.0, 3.0), span)?;
+/// assert!(run.certificate().keeps_energy() && run.certificate().keeps_entropy());
+/// assert!((run.last().point.x - 2.0).abs() < 1e-3 && run.certificate().steps < 200);
+/// # Ok(())
+/// # }
+/// ```
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct RungeKuttaChebyshev;
 
 macro_rules! method {
     ($name:ident, $tableau:expr, $control:expr) => {
@@ -188,4 +226,16 @@ method!(
     DormandPrince5,
     FIVE,
     Control { power: 1.0, alpha: 0.17, beta: 0.04, rejected: 0.2, ratios: [0.2, 10.0] }
+);
+// The PI controller of order 2, by which the error at the end is proportional to the tolerance.
+method!(
+    RungeKuttaChebyshev,
+    CHEBYSHEV,
+    Control {
+        power: 1.5,
+        alpha: 0.7 / 3.0,
+        beta: 0.4 / 3.0,
+        rejected: 1.0 / 3.0,
+        ratios: [0.2, 5.0]
+    }
 );

@@ -9,11 +9,11 @@
 //! | [`discrete_gradient`] | [`DiscreteGradient`]: [`Gonzalez`], [`MeanValue`], [`ItohAbe`], [`SymmetricItohAbe`] | |
 //! | [`round_off`] | covectors, laws and positions that are safe against round-off | |
 //! | [`midpoint`] | [`Scheme`]: the method of the paper, its equation and its fallbacks | [`newton`], [`discrete_gradient`], [`round_off`] |
-//! | [`explicit`] | [`DormandPrince8`], [`DormandPrince5`]: explicit methods, and then back onto the laws | [`method`] |
+//! | [`explicit`] | [`DormandPrince8`], [`DormandPrince5`], [`RungeKuttaChebyshev`]: explicit methods, and then back onto the laws | [`method`] |
 //! | [`collocation`] | [`Gauss`], [`Radau`]: methods with stages, of order `2s` and `2s − 1` | [`method`], [`round_off`] |
 //! | [`attitude`] | [`Attitude`]: where a body points along a run of its angular momentum | [`run`] |
 //! | [`laws`] | what a step and a method promise, and the functions that check it | |
-//! | [`error`](mod@error) | [`Error`], [`RunError`] | |
+//! | [`error`](mod@error) | [`Error`], [`RunError`], [`FlowError`] | |
 //!
 //! # What a later version may add
 //!
@@ -41,8 +41,8 @@ pub mod step_error;
 pub use attitude::{Attitude, AttitudeError};
 pub use collocation::{Gauss, Radau, StageMemory};
 pub use discrete_gradient::{DiscreteGradient, Gonzalez, ItohAbe, MeanValue, SymmetricItohAbe};
-pub use error::{Error, RunError};
-pub use explicit::{DormandPrince5, DormandPrince8, StageFlow};
+pub use error::{Error, FlowError, RunError};
+pub use explicit::{DormandPrince5, DormandPrince8, RungeKuttaChebyshev, StageFlow};
 pub use method::{
     Components, Control, Effort, Element, EntropyStep, Evidence, Flow, Laws, Memory, Method,
     Promises, Refusal, StageLaws, StateSpace, StepEnds, StepStart, Taken, Vector,

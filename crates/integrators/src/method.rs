@@ -21,7 +21,7 @@ use metriplectic_manifolds::{Manifold, PointError};
 pub use evidence::{Effort, EntropyStep, Evidence, Promises, StageLaws};
 pub use vector::{Components, Vector};
 
-use crate::error::RunError;
+use crate::error::{FlowError, RunError};
 use crate::run::checkpoint::{Checkpoint, ResumeError, Saved};
 use crate::run::scales::Scales;
 use crate::run::span::Schedule;
@@ -152,6 +152,23 @@ pub trait Flow {
     fn check(&self, x0: &Element<Self>) -> Result<(), ModelError> {
         let _ = x0;
         Ok(())
+    }
+
+    /// Verifies what only the flow knows of at the start of a run: its sites, its data.
+    ///
+    /// # Errors
+    ///
+    /// The flow's own error.
+    fn examine(&self, x0: &Element<Self>) -> Result<(), FlowError> {
+        let _ = x0;
+        Ok(())
+    }
+
+    /// The part of a system at which a displacement from a state leads out of the domain, if the system has parts
+    /// that are numbered, such as sites.
+    fn site_outside(&self, x: &Element<Self>, d: &Self::Vector) -> Option<usize> {
+        let _ = (x, d);
+        None
     }
 
     /// The distance of a state from its space.

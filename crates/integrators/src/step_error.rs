@@ -157,6 +157,22 @@ pub enum StepError {
         /// What was done to solve it.
         tried: Effort,
     },
+    /// A part of a large system leaves its domain.
+    #[error(
+        "the step of size {h:.3e} from t = {} leads out of the domain of the model at site {site} ({tried}); try a \
+         smaller step, or check energy and entropy there",
+        digits(.time)
+    )]
+    SiteOutOfDomain {
+        /// The time at which the step starts.
+        time: f64,
+        /// The size of the step that was asked for.
+        h: f64,
+        /// The first site that leaves.
+        site: usize,
+        /// What was done.
+        tried: Effort,
+    },
     /// A state inside a step was asked for, and the flow gives no displacement between the ends of the step, or
     /// none as large as this one.
     #[error(

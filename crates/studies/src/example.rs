@@ -171,6 +171,11 @@ impl Example {
         self.report_of_many().run(run)
     }
 
+    /// Begins the report of a run of any flow, of whose last state it has these entries.
+    pub fn report_of(&self, certificate: &Certificate, time: f64, entries: Vec<f64>) -> Report {
+        self.report_of_many().certified(certificate, time, entries)
+    }
+
     /// Begins a report that is not of one run.
     pub fn report_of_many(&self) -> Report {
         Report::new(self.json, self.folder.clone())

@@ -28,8 +28,12 @@ impl Report {
     /// The fields of the certificate, `max_relative_energy_error`, and `final_state` with the entries of
     /// the last point.
     pub(crate) fn run<M: Manifold>(self, run: &Record<M>) -> Self {
-        let (certificate, end) = (&run.certificate, run.last());
-        let entries = M::entries(&end.point);
+        let end = run.last();
+        self.certified(&run.certificate, end.time, M::entries(&end.point))
+    }
+
+    /// The same of a run of any flow, with these entries of its last state.
+    pub(crate) fn certified(self, certificate: &Certificate, time: f64, entries: Vec<f64>) -> Self {
         let shown: Vec<String> = entries.iter().map(|x| readable(*x)).collect();
         let mut report = self.text(certificate);
         match serde_json::to_value(certificate) {
@@ -40,7 +44,7 @@ impl Report {
         let error = certificate.max_relative_energy_error();
         report.fields.insert("max_relative_energy_error".into(), error.into());
         report.fields.insert("final_state".into(), entries.into());
-        report.line("end", format!("t = {}: ({})", readable(end.time), shown.join(", ")))
+        report.line("end", format!("t = {}: ({})", readable(time), shown.join(", ")))
     }
 
     /// Adds a value to the JSON object, and a line with its name to the text.

@@ -36,8 +36,10 @@ pub(super) fn between<F: StageFlow>(
     let Some(last) = known else { return dense::between(flow, step, promises, theta) };
     let (h, line) = (step.h, last.end.map(|q| theta * q));
     let ends = [&last.stages[0], &last.stages[tableau.stages.len() + 1]];
-    let rows =
-        tableau.dense.iter().map(|row| (combined(row, &last.stages), produced(row, &last.stages)));
+    let rows = tableau
+        .dense
+        .iter()
+        .map(|row| (combined(1.0, row, &last.stages), produced(row, &last.stages)));
     let rows: Vec<(F::Vector, f64)> = rows.collect();
     let q = last.end.with(|i| {
         let slopes = ends.map(|(rates, _)| h * rates.get(i));
@@ -64,7 +66,7 @@ fn more_stages<F: StageFlow>(
         if last.known == tableau.stages.len() + 2 + tableau.more_stages.len() {
             break;
         }
-        let q = combined(row, &last.stages).map(|q| step.h * q);
+        let q = combined(step.h, row, &last.stages);
         last.stages[last.known] = stage(flow, step.x, &q)?;
         last.known += 1;
     }

@@ -22,6 +22,12 @@ pub trait StageFlow: Flow {
         gradients: &Self::Gradients,
     ) -> Option<(Self::Vector, f64)>;
 
+    /// The velocity and the production at a state of which nothing else is asked.
+    #[inline]
+    fn motion(&self, x: &Element<Self>) -> Option<(Self::Vector, f64)> {
+        self.velocity(x, &self.gradients(x)?)
+    }
+
     /// The state `ψ_x(q)` at which a stage is taken; `None` beyond the edge of the chart or the domain.
     fn stage(&self, x: &Element<Self>, q: &Self::Vector) -> Option<Element<Self>>;
 
@@ -35,6 +41,11 @@ pub trait StageFlow: Flow {
 
     /// The coordinates `ψ_x⁻¹(y)`.
     fn stage_coordinates(&self, x: &Element<Self>, y: &Element<Self>) -> Self::Vector;
+
+    /// Whether [`project`](Self::project) uses an estimate of the local error; see [`Target::error`].
+    fn weighs_errors(&self) -> bool {
+        false
+    }
 
     /// Moves a state onto its laws, by Newton's method along their differentials.
     ///
@@ -57,6 +68,9 @@ pub struct Target<'a, F: Flow + ?Sized> {
     pub with_entropy: bool,
     /// A displacement, longer than which none is allowed.
     pub limit: Option<&'a F::Vector>,
+    /// An estimate of the local error of the step, if the flow [weighs errors](StageFlow::weighs_errors): a state
+    /// may be moved in proportion to it, so that nothing moves which the step has not moved.
+    pub error: Option<&'a F::Vector>,
 }
 
 /// A state on its laws.

@@ -1,8 +1,6 @@
 //! What an explicit method keeps from one step to the next.
 
-use std::fmt::Debug;
-
-use super::flow::StageFlow;
+use super::chebyshev::Spectrum;
 use super::tableau::Row;
 use crate::method::{Flow, Memory, Vector};
 use crate::run::checkpoint::{ResumeError, Saved};
@@ -13,7 +11,7 @@ pub(super) const STAGES: usize = 16;
 /// What [`DormandPrince8`](crate::DormandPrince8) and [`DormandPrince5`](crate::DormandPrince5) keep from one step
 /// to the next: the sum of the entropy that was produced, and what is known at the state reached.
 #[derive(Clone, Debug)]
-pub struct ExplicitMemory<V, G> {
+pub struct ExplicitMemory<V> {
     /// The entropy that the steps aim at; `None` before the first step.
     pub(super) entropy: Option<Produced>,
     /// How often in a row the entropy would have fallen.
@@ -22,14 +20,16 @@ pub struct ExplicitMemory<V, G> {
     pub(super) lost: Option<V>,
     /// The same as it was read from a checkpoint.
     pub(super) read: Vec<f64>,
-    /// The differentials and rates at the state reached, a function of this state alone.
-    pub(super) here: Option<Here<V, G>>,
+    /// The velocity at the state reached, a function of this state alone.
+    pub(super) here: Option<Here<V>>,
     /// The step taken last.
     pub(super) last: Option<LastStep<V>>,
+    /// The spectral radius of the equation of motion, if the method needs it.
+    pub(super) spectrum: Option<Spectrum<V>>,
 }
 
 /// The memory of an explicit method for a flow.
-pub(super) type MemoryOf<F> = ExplicitMemory<<F as Flow>::Vector, <F as StageFlow>::Gradients>;
+pub(super) type MemoryOf<F> = ExplicitMemory<<F as Flow>::Vector>;
 
 /// The sum of what was produced, with compensation.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -59,8 +59,7 @@ impl Produced {
 
 /// What is known at a state.
 #[derive(Clone, Debug)]
-pub(super) struct Here<V, G> {
-    pub(super) gradients: G,
+pub(super) struct Here<V> {
     pub(super) velocity: V,
     pub(super) production: f64,
 }
@@ -80,17 +79,26 @@ pub(super) struct LastStep<V> {
     pub(super) rise: f64,
 }
 
-impl<V, G> Default for ExplicitMemory<V, G> {
+impl<V> Default for ExplicitMemory<V> {
     fn default() -> Self {
-        Self { entropy: None, falls: 0, lost: None, read: Vec::new(), here: None, last: None }
+        Self {
+            entropy: None,
+            falls: 0,
+            lost: None,
+            read: Vec::new(),
+            here: None,
+            last: None,
+            spectrum: None,
+        }
     }
 }
 
-impl<V: Vector, G: Clone + Debug> Memory for ExplicitMemory<V, G> {
+impl<V: Vector> Memory for ExplicitMemory<V> {
     fn rescaled(&self, _: f64) -> Self {
-        let Self { entropy, falls, lost, read, here, .. } = self;
+        let Self { entropy, falls, lost, read, here, spectrum, .. } = self;
+        let spectrum = spectrum.clone();
         let (lost, read, here) = (lost.clone(), read.clone(), here.clone());
-        Self { entropy: *entropy, falls: *falls, lost, read, here, last: None }
+        Self { entropy: *entropy, falls: *falls, lost, read, here, last: None, spectrum }
     }
 
     fn refused(&mut self, tried: Self) {
@@ -109,6 +117,11 @@ impl<V: Vector, G: Clone + Debug> Memory for ExplicitMemory<V, G> {
         } else if !self.read.is_empty() {
             saved.put("compensation", self.read.iter().copied());
         }
+        if let Some(Spectrum { radius, age, direction, read }) = &self.spectrum {
+            saved.put("spectral radius", [*radius, f64::from(*age)]);
+            let direction = direction.as_ref().map_or_else(|| read.clone(), Vector::to_list);
+            saved.put("spectral direction", direction);
+        }
     }
 
     fn restore(saved: &Saved) -> Result<Self, ResumeError> {
@@ -121,6 +134,12 @@ impl<V: Vector, G: Clone + Debug> Memory for ExplicitMemory<V, G> {
             memory.falls =
                 (0..u32::from(u8::MAX)).find(|&k| f64::from(k) >= numbers[3]).unwrap_or(0);
         }
+        if let Some(numbers) = saved.get("spectral radius", 2)? {
+            let age = (0..u32::from(u8::MAX)).find(|&k| f64::from(k) >= numbers[1]);
+            let read = saved.list("spectral direction")?.unwrap_or_default();
+            let (radius, age) = (numbers[0], age.unwrap_or(u32::from(u8::MAX)));
+            memory.spectrum = Some(Spectrum { radius, age, direction: None, read });
+        }
         Ok(memory)
     }
 
@@ -130,14 +149,15 @@ impl<V: Vector, G: Clone + Debug> Memory for ExplicitMemory<V, G> {
     }
 }
 
-/// `Σ_j w_j k_j` over the rates of the stages.
+/// `h Σ_j w_j k_j` over the rates of the stages.
 #[inline]
-pub(super) fn combined<V: Vector>(row: Row, stages: &[(V, f64); STAGES]) -> V {
-    let Some(&(first, w)) = row.first() else { return stages[0].0.map(|_| 0.0) };
-    let start = stages[first].0.map(|k| w * k);
-    row[1..].iter().fold(start, |sum, &(j, w)| {
-        let rates = &stages[j].0;
-        sum.with(|i| sum.get(i) + w * rates.get(i))
+pub(super) fn combined<V: Vector>(h: f64, row: Row, stages: &[(V, f64); STAGES]) -> V {
+    if row.is_empty() {
+        return stages[0].0.zero();
+    }
+    V::combination(h, row.len(), |j| {
+        let (stage, w) = row[j];
+        (w, &stages[stage].0)
     })
 }
 

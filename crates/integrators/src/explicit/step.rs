@@ -2,13 +2,14 @@
 
 use metriplectic_dynamics::SecondLaw;
 
+use super::chebyshev;
 use super::flow::{Projected, ProjectionError, StageFlow, Target};
 use super::memory::{
     ExplicitMemory, Here, LastStep, MemoryOf, Produced, STAGES, combined, produced,
 };
 use super::tableau::Tableau;
 use crate::method::{
-    Effort, Element, EntropyStep, Evidence, Refusal, StepEnds, StepStart, Taken, Vector,
+    Effort, Element, EntropyStep, Evidence, Laws, Refusal, StepEnds, StepStart, Taken, Vector,
 };
 use crate::run::scales::relative;
 use crate::step_error::StepError;
@@ -30,9 +31,9 @@ const HALVES: u32 = 12;
 const FAR: f64 = 10.0;
 
 /// Why a step is not taken.
-enum Refused {
-    /// A stage is beyond the edge of the chart or the domain, or has no value.
-    Outside,
+pub(super) enum Refused {
+    /// A stage is beyond the edge of the chart or the domain, or has no value; at a site, if the flow says which.
+    Outside(Option<usize>),
     /// No state near by has the laws of the run.
     Far,
     /// The entropy would fall.
@@ -40,9 +41,20 @@ enum Refused {
 }
 
 impl Refused {
-    const fn into_refusal(self) -> Refusal {
-        const EFFORT: Effort = Effort { iterations: 0, continued: 0, globalised: 0, splits: 0 };
-        Refusal { effort: EFFORT, error: None, second_law: matches!(self, Self::Falls) }
+    /// What becomes of a step of size `h` from `time`.
+    fn into_refusal(self, time: f64, h: f64) -> Refusal {
+        let tried = Effort::default();
+        let error = match self {
+            Self::Outside(Some(site)) => Some(StepError::SiteOutOfDomain { time, h, site, tried }),
+            _ => None,
+        };
+        Refusal { effort: tried, error, second_law: matches!(self, Self::Falls) }
+    }
+
+    /// A displacement leads out of the domain.
+    #[cold]
+    pub(super) fn outside<F: StageFlow>(flow: &F, x: &Element<F>, d: &F::Vector) -> Self {
+        Self::Outside(flow.site_outside(x, d))
     }
 }
 
@@ -55,7 +67,7 @@ pub(super) fn attempt<F: StageFlow>(
     h: f64,
     memory: &mut MemoryOf<F>,
 ) -> Result<Taken<F>, Refusal> {
-    try_step(tableau, flow, start, h, memory).map_err(Refused::into_refusal)
+    try_step(tableau, flow, start, h, memory).map_err(|refused| refused.into_refusal(start.time, h))
 }
 
 /// Takes a step of a fixed size, in halves where it is refused.
@@ -76,7 +88,8 @@ pub(super) fn with_halves<F: StageFlow>(
         let tried = Effort { splits: HALVES as usize, ..Effort::default() };
         let time = start.time;
         match refused {
-            Refused::Outside => StepError::OutOfDomain { time, h, tried },
+            Refused::Outside(Some(site)) => StepError::SiteOutOfDomain { time, h, site, tried },
+            Refused::Outside(None) => StepError::OutOfDomain { time, h, tried },
             Refused::Far | Refused::Falls => StepError::NotProjected { time, h, tried },
         }
     })
@@ -121,47 +134,78 @@ fn try_step<F: StageFlow>(
     memory: &mut MemoryOf<F>,
 ) -> Result<Taken<F>, Refused> {
     let x = start.x;
+    // The stages of the step before it serve nobody any more.
+    memory.last = None;
     let here = match memory.here.take() {
         Some(here) => here,
-        None => here_at(flow, x, None).ok_or(Refused::Outside)?,
+        None => here_at(flow, x, None).ok_or(Refused::Outside(None))?,
     };
-    let stages = stages(tableau, flow, x, h, &here);
-    let dissipates = here.production != 0.0;
-    memory.here = Some(here);
-    let mut last = stages.ok_or(Refused::Outside)?;
+    let mut last = if tableau.stages.is_empty() {
+        chebyshev::stages(flow, x, h, here, memory)?
+    } else {
+        stages(tableau, flow, x, h, here)?
+    };
+    let taken = finished(tableau, flow, start, h, &mut last, memory);
+    if memory.here.is_some() {
+        memory.last = Some(last);
+    } else {
+        // The state has stayed where it was.
+        let [(velocity, production), ..] = last.stages;
+        memory.here = Some(Here { velocity, production });
+    }
+    taken
+}
+
+/// The end of a step from its stages: projection, decision.
+#[inline]
+fn finished<F: StageFlow>(
+    tableau: &'static Tableau,
+    flow: &F,
+    start: &StepStart<'_, F>,
+    h: f64,
+    last: &mut LastStep<F::Vector>,
+    memory: &mut MemoryOf<F>,
+) -> Result<Taken<F>, Refused> {
+    let x = start.x;
+    let dissipates = last.stages[0].1 != 0.0;
     if let Some(lost) = &memory.lost {
-        last.end = last.end.with(|i| last.end.get(i) + lost.get(i));
+        last.end = Vector::zip([&last.end, lost], |[end, lost]| end + lost);
     } else if !memory.read.is_empty() {
         let lost = |i| <[f64]>::get(&memory.read, i).copied().unwrap_or(0.0);
         last.end = last.end.with(|i| last.end.get(i) + lost(i));
     }
-    let y = flow.stage(x, &last.end).ok_or(Refused::Outside)?;
-    let reached = flow.stage_coordinates(x, &y);
-    let lost = reached.with(|i| last.end.get(i) - reached.get(i));
+    let y = flow.stage(x, &last.end).ok_or_else(|| Refused::outside(flow, x, &last.end))?;
+    let lost = {
+        let reached = flow.stage_coordinates(x, &y);
+        Vector::zip([&last.end, &reached], |[end, reached]| end - reached)
+    };
 
     let produced = memory.entropy.unwrap_or_else(|| Produced::from(start.values.entropy));
-    let projection = Onto { tableau, flow, start, h, last: &last, produced };
+    let projection = Onto { tableau, flow, start, h, last: &*last, produced };
     let Landed { end, produced, how } = match projection.decide(y) {
         Ok(landed) => landed,
         Err(Refused::Falls) => {
             memory.falls += 1;
             if memory.falls > FALLS && hardly_moves(flow, start, &last.end) {
-                (memory.falls, memory.last) = (0, None);
+                memory.falls = 0;
                 return Ok(held(start));
             }
             return Err(Refused::Falls);
         }
+        Err(Refused::Outside(_)) => return Err(Refused::outside(flow, x, &last.end)),
         Err(refused) => return Err(refused),
     };
-    let next = here_at(flow, &end.x, Some(end.gradients)).ok_or(Refused::Outside)?;
+    let values = flow.values(&end.gradients);
+    let next = here_at(flow, &end.x, Some(end.gradients))
+        .ok_or_else(|| Refused::outside(flow, x, &last.end))?;
     last.end = flow.stage_coordinates(x, &end.x);
     let rates = flow.stage_rates(x, (&last.end, &end.x), &next.velocity);
     let rests = end.x == *x && is_zero(&last.stages[0].0);
-    let stability = is_at_the_edge(tableau, flow, x, h, &last, &rates);
+    let stability =
+        tableau.stability.is_finite() && is_at_the_edge(tableau, flow, x, h, last, &rates);
     last.stages[last.known] = (rates, next.production);
     last.known += 1;
 
-    let values = flow.values(&next.gradients);
     let entropy_step = (flow.entropy_law() == SecondLaw::Exact).then_some(how);
     let evidence = Evidence { dissipates, rests, entropy_step, stability, ..Evidence::default() };
     *memory = ExplicitMemory {
@@ -170,7 +214,8 @@ fn try_step<F: StageFlow>(
         lost: Some(lost),
         read: Vec::new(),
         here: Some(next),
-        last: Some(last),
+        last: None,
+        spectrum: memory.spectrum.take(),
     };
     Ok(Taken { x: end.x, values, evidence, effort: Effort::default() })
 }
@@ -188,13 +233,13 @@ fn here_at<F: StageFlow>(
     flow: &F,
     x: &Element<F>,
     gradients: Option<F::Gradients>,
-) -> Option<Here<F::Vector, F::Gradients>> {
+) -> Option<Here<F::Vector>> {
     let gradients = match gradients {
         Some(gradients) => gradients,
         None => flow.gradients(x)?,
     };
     let (velocity, production) = flow.velocity(x, &gradients)?;
-    Some(Here { gradients, velocity, production })
+    Some(Here { velocity, production })
 }
 
 /// The stages of a step, and the coordinates of its end.
@@ -204,19 +249,23 @@ fn stages<F: StageFlow>(
     flow: &F,
     x: &Element<F>,
     h: f64,
-    here: &Here<F::Vector, F::Gradients>,
-) -> Option<LastStep<F::Vector>> {
-    let zero = here.velocity.map(|_| 0.0);
+    here: Here<F::Vector>,
+) -> Result<LastStep<F::Vector>, Refused> {
+    let zero = here.velocity.zero();
     let mut stages: [(F::Vector, f64); STAGES] = std::array::from_fn(|_| (zero.clone(), 0.0));
-    stages[0] = (here.velocity.clone(), here.production);
+    stages[0] = (here.velocity, here.production);
     let mut before = zero;
     for (i, row) in tableau.stages.iter().enumerate() {
-        before = combined(row, &stages).map(|q| h * q);
-        stages[i + 1] = stage(flow, x, &before)?;
+        before = combined(h, row, &stages);
+        stages[i + 1] =
+            stage(flow, x, &before).ok_or_else(|| Refused::outside(flow, x, &before))?;
     }
-    let end = combined(tableau.end, &stages).map(|q| h * q);
+    let end = combined(h, tableau.end, &stages);
     let rise = h * produced(tableau.end, &stages);
-    Some(LastStep { stages, known: tableau.stages.len() + 1, before, end, rise })
+    for &stage in tableau.passed {
+        stages[stage].0 = stages[0].0.zero();
+    }
+    Ok(LastStep { stages, known: tableau.stages.len() + 1, before, end, rise })
 }
 
 /// The rates and the entropy production of a stage at the coordinates `q`.
@@ -227,7 +276,7 @@ pub(super) fn stage<F: StageFlow>(
     q: &F::Vector,
 ) -> Option<(F::Vector, f64)> {
     let y = flow.stage(x, q)?;
-    let (v, production) = flow.velocity(&y, &flow.gradients(&y)?)?;
+    let (v, production) = flow.motion(&y)?;
     Some((flow.stage_rates(x, (q, &y), &v), production))
 }
 
@@ -256,12 +305,19 @@ fn is_at_the_edge<F: StageFlow>(
     rates: &F::Vector,
 ) -> bool {
     let sizes = flow.sizes(x);
-    let sizes = sizes.with(|i| sizes.get(i).max(last.end.get(i).abs()));
-    let apart = last.end.with(|i| last.end.get(i) - last.before.get(i));
-    let before = &last.stages[tableau.stages.len()].0;
-    let change = rates.with(|i| h * (rates.get(i) - before.get(i)));
-    let distance = relative(&apart, &sizes);
-    distance > 64.0 * f64::EPSILON && relative(&change, &sizes) > tableau.stability * distance
+    let one = sizes.map(|_| 1.0);
+    let before = [&last.before, &last.stages[tableau.stages.len()].0];
+    // One array at a time, because a large system has no room for more.
+    let norm = |end: &F::Vector, before: &F::Vector, factor: f64| {
+        let ratios =
+            Vector::zip([end, before, &sizes, &last.end], |[end, before, size, reached]| {
+                let change = factor * (end - before);
+                if change == 0.0 { 0.0 } else { change / size.max(reached.abs()) }
+            });
+        relative(&ratios, &one)
+    };
+    let distance = norm(&last.end, before[0], 1.0);
+    distance > 64.0 * f64::EPSILON && norm(rates, before[1], h) > tableau.stability * distance
 }
 
 /// The error of a step in units of the one allowed. A step that was taken in parts has the estimate of the flow.
@@ -276,8 +332,10 @@ pub(super) fn error<F: StageFlow>(
     let Some(last) = memory.last.as_ref() else {
         return Some(norm(&flow.local_error(step.x, step.end, h)?));
     };
-    let [fifth, third] =
-        tableau.errors.map(|row| norm(&combined(row, &last.stages).map(|e| h * e)));
+    if tableau.stages.is_empty() {
+        return Some(norm(&chebyshev::error(last, h)));
+    }
+    let [fifth, third] = tableau.errors.map(|row| norm(&combined(h, row, &last.stages)));
     // Hairer's e₅²/√(e₅² + e₃²/100) is of the order of the method; a method with one error has that.
     Some(if third > 0.0 { fifth * (fifth / fifth.hypot(0.1 * third)) } else { fifth })
 }
@@ -308,20 +366,26 @@ impl<F: StageFlow> Onto<'_, F> {
             // Round-off is never too far.
             None => {
                 let sizes = flow.sizes(start.x);
-                last.end.with(|i| (0.5 * last.end.get(i).abs()).max(NEAR * sizes.get(i)))
+                Vector::zip([&last.end, &sizes], |[end, size]| (0.5 * end.abs()).max(NEAR * size))
             }
         };
-        let mut laws = start.reference.clone();
+        let embedded = self.embedded_error();
+        let error = flow.weighs_errors().then(|| embedded.as_ref().unwrap_or(&last.stages[0].0));
+        let onto = |y, entropy, with_entropy| {
+            let laws = Laws { entropy, ..start.reference.clone() };
+            let limit = Some(&limit);
+            flow.project(y, &Target { laws: &laws, with_entropy, limit, error })
+        };
         if flow.entropy_law() != SecondLaw::Exact {
-            let target = Target { laws: &laws, with_entropy: false, limit: Some(&limit) };
-            let end = flow.project(y, &target).map_err(refused)?;
+            let end = onto(y, start.reference.entropy, false).map_err(refused)?;
             return Ok(Landed { end, produced, how: EntropyStep::Free });
         }
-        if self.is_trusted() {
+        let mut y = Some(y);
+        if self.is_trusted()
+            && let Some(y) = y.take()
+        {
             let target = produced.plus(last.rise);
-            laws.entropy = target.sum;
-            let onto = Target { laws: &laws, with_entropy: true, limit: Some(&limit) };
-            if let Ok(end) = flow.project(y.clone(), &onto)
+            if let Ok(end) = onto(y, target.sum, true)
                 && !self.falls(&end)
             {
                 let largest = produced.largest.max(end.entropy);
@@ -329,9 +393,9 @@ impl<F: StageFlow> Onto<'_, F> {
                 return Ok(Landed { end, produced, how: EntropyStep::Targeted });
             }
         }
-        laws.entropy = produced.sum;
-        let onto = Target { laws: &laws, with_entropy: false, limit: Some(&limit) };
-        let end = flow.project(y, &onto).map_err(refused)?;
+        let again = || flow.stage(start.x, &last.end).ok_or(Refused::Outside(None));
+        let y = y.map_or_else(again, Ok)?;
+        let end = onto(y, produced.sum, false).map_err(refused)?;
         let least = produced.largest - 2.0 * end.entropy_round_off;
         if end.entropy < least || self.falls(&end) {
             return Err(Refused::Falls);
@@ -339,6 +403,15 @@ impl<F: StageFlow> Onto<'_, F> {
         let largest = produced.largest.max(end.entropy);
         let produced = Produced { largest, ..Produced::from(end.entropy) };
         Ok(Landed { end, produced, how: EntropyStep::Free })
+    }
+
+    /// The embedded error, if the flow weighs errors and it does not need the end of the step. Otherwise the
+    /// velocity at the start takes its place.
+    fn embedded_error(&self) -> Option<F::Vector> {
+        let Self { tableau, flow, h, last, .. } = *self;
+        let [row, _] = tableau.errors;
+        let known = !row.is_empty() && row.iter().all(|&(stage, _)| stage < last.known);
+        (flow.weighs_errors() && known).then(|| combined(h, row, &last.stages))
     }
 
     /// Whether the entropy that was produced may be aimed at.
@@ -362,7 +435,7 @@ impl<F: StageFlow> Onto<'_, F> {
 
 fn refused(error: ProjectionError) -> Refused {
     match error {
-        ProjectionError::Outside => Refused::Outside,
+        ProjectionError::Outside => Refused::Outside(None),
         ProjectionError::NoEntropy | ProjectionError::Far => Refused::Far,
     }
 }

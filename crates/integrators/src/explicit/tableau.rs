@@ -23,6 +23,8 @@ pub(super) struct Tableau {
     pub(super) more_stages: &'static [Row],
     /// The rows of the dense output beyond those of a cubic.
     pub(super) dense: &'static [Row],
+    /// Stages that only other stages before the end need.
+    pub(super) passed: &'static [usize],
     /// `h|λ|` at the edge of the region of stability, on the negative axis.
     pub(super) stability: f64,
 }
@@ -205,6 +207,7 @@ pub(super) const EIGHT: Tableau = Tableau {
             (15, -149.72683625798564),
         ],
     ],
+    passed: &[1, 2, 3, 4],
     stability: 6.1,
 };
 
@@ -256,6 +259,7 @@ pub(super) const FIVE: Tableau = Tableau {
         (5, -1453857185.0 / 822651844.0),
         (6, 69997945.0 / 29380423.0),
     ]],
+    passed: &[1],
     stability: 3.25,
 };
 
@@ -297,6 +301,15 @@ mod tests {
                     "an error has its own order"
                 );
             }
+        }
+    }
+
+    #[test]
+    fn no_later_row_has_a_stage_that_was_passed() {
+        for tableau in [&EIGHT, &FIVE] {
+            let rows = tableau.errors.iter().chain(tableau.more_stages).chain(tableau.dense);
+            let mut stages = rows.copied().flatten().chain(tableau.end).map(|(j, _)| j);
+            assert!(stages.all(|j| !tableau.passed.contains(j)));
         }
     }
 

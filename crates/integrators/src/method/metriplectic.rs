@@ -72,7 +72,8 @@ impl<Y: Metriplectic> Flow for Y {
         entropy: Option<f64>,
     ) -> Option<Point<Y>> {
         let laws = Laws { entropy: entropy.unwrap_or(laws.entropy), ..*laws };
-        let target = Target { laws: &laws, with_entropy: entropy.is_some(), limit: None };
+        let with_entropy = entropy.is_some();
+        let target = Target { laws: &laws, with_entropy, limit: None, error: None };
         self.project(y.clone(), &target).ok().map(|end| end.x)
     }
 

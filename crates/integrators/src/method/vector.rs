@@ -22,10 +22,67 @@ pub trait Vector: Clone + Debug {
         self.len() == 0
     }
 
+    /// As many zeros.
+    #[must_use]
+    #[inline]
+    fn zero(&self) -> Self {
+        self.with(|_| 0.0)
+    }
+
     /// A function of each number.
     #[must_use]
+    #[inline]
     fn map(&self, f: impl Fn(f64) -> f64) -> Self {
         self.with(|i| f(self.get(i)))
+    }
+
+    /// A function of the numbers that several vectors of one length have at the same place.
+    #[must_use]
+    #[inline]
+    fn zip<const K: usize>(vectors: [&Self; K], f: impl Fn([f64; K]) -> f64 + Sync) -> Self {
+        const { assert!(K > 0, "a function of no vectors has no length") };
+        vectors[0].with(|i| f(vectors.map(|v| v.get(i))))
+    }
+
+    /// `h Σ_j w_j v_j` over `count > 0` vectors of one length, given with their weights by their index.
+    #[must_use]
+    #[inline]
+    fn combination<'a>(h: f64, count: usize, term: impl Fn(usize) -> (f64, &'a Self)) -> Self
+    where
+        Self: 'a,
+    {
+        let (w, first) = term(0);
+        let start = first.map(|k| w * k);
+        let sum = (1..count).fold(start, |sum, j| {
+            let (w, v) = term(j);
+            sum.with(|i| sum.get(i) + w * v.get(i))
+        });
+        sum.map(|q| h * q)
+    }
+
+    /// The norm of the ratios `v_i/s_i` to the sizes `s_i`, where `0/0 = 0`; NaN if a ratio is.
+    ///
+    /// The default is the Euclidean norm, which bounds each ratio and which no rotation of the frame of a curved
+    /// factor changes.
+    #[must_use]
+    fn relative_to(&self, sizes: &Self) -> f64 {
+        let ratio = |i| if self.get(i) == 0.0 { 0.0 } else { (self.get(i) / sizes.get(i)).abs() };
+        // Squares of 10⁻²⁰⁰ are zero; those of numbers up to 1 are not too large.
+        let mut largest = 0.0;
+        for i in 0..self.len() {
+            if ratio(i).is_nan() {
+                return f64::NAN;
+            }
+            largest = f64::max(largest, ratio(i));
+        }
+        if largest > 0.0 && largest.is_finite() {
+            let unit = largest.recip();
+            let sum =
+                (0..self.len()).fold(0.0, |sum, i| sum + (ratio(i) * unit) * (ratio(i) * unit));
+            largest * sum.sqrt()
+        } else {
+            largest
+        }
     }
 
     /// The numbers in a list.

@@ -404,7 +404,7 @@ impl Certificate {
             writeln!(
                 f,
                 "stability:   it sets the size of {stability} of {steps}, and not the tolerance; an implicit method, \
-                 such as `Radau`, takes larger ones"
+                 such as `Radau`, takes larger ones, and so does `RungeKuttaChebyshev` if friction sets it"
             )?;
         }
         Ok(())

@@ -501,14 +501,16 @@ impl<V: Vector> Controller<V> {
         let tolerance = if is(power, 1.0) { self.tolerance } else { self.tolerance.powf(power) };
         let tolerance = tolerance.max(8.0 * f64::EPSILON);
         let noise = scales.rounding(h);
-        scales.sizes.with(|i| {
-            let (size, noise) = (scales.sizes.get(i), noise.get(i));
-            match &self.entries {
-                Entries::Scale(known) if known.get(i) > 0.0 => tolerance * known.get(i) + noise,
-                Entries::Absolute(errors) => tolerance * size + errors.get(i) + noise,
-                _ => tolerance * size + noise,
-            }
-        })
+        let sizes = &scales.sizes;
+        match &self.entries {
+            Entries::Automatic => V::zip([sizes, &noise], |[size, noise]| tolerance * size + noise),
+            Entries::Scale(known) => V::zip([sizes, &noise, known], |[size, noise, known]| {
+                tolerance * if known > 0.0 { known } else { size } + noise
+            }),
+            Entries::Absolute(errors) => V::zip([sizes, &noise, errors], |[size, noise, error]| {
+                tolerance * size + error + noise
+            }),
+        }
     }
 
     /// The first step, after Hairer, Nørsett, Wanner (Solving ODEs I, §II.4): a short step of Euler's
@@ -516,11 +518,11 @@ impl<V: Vector> Controller<V> {
     /// error allowed, all in units of it.
     fn first_step<F: Flow<Vector = V>>(&self, flow: &F, x: &Element<F>, scales: &Scales<V>) -> f64 {
         let (span, allowed) = (self.end - self.start, self.allowed(scales, 0.0));
-        let h = flow.rates(x, &scales.sizes.map(|_| 0.0)).and_then(|v| {
+        let h = flow.rates(x, &scales.sizes.zero()).and_then(|v| {
             let own_time = scales.speed(&v).recip().min(span);
             let euler = 0.01 * own_time;
             let there = flow.rates(x, &v.map(|v| v * euler))?;
-            let change = v.with(|i| there.get(i) - v.get(i));
+            let change = V::zip([&there, &v], |[there, v]| there - v);
             // h = T (0.01 / (|Tf| (ωT)^p))^{1/(p+1)}, with |f| (ωT)² = |100² Δf|²/|f| for Δf over T/100.
             let (speed, bend) = (relative(&v, &allowed), 100.0 * relative(&change, &allowed));
             let error = own_time * speed * (bend / speed).powi(self.order.cast_signed());

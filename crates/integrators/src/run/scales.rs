@@ -27,7 +27,7 @@ impl<V: Vector> Scales<V> {
     /// nothing is known.
     pub(crate) fn at<F: Flow<Vector = V>>(flow: &F, x: &Element<F>, span: Option<f64>) -> Self {
         let sizes = flow.sizes(x);
-        let zero = sizes.map(|_| 0.0);
+        let zero = sizes.zero();
         let Some(span) = span else { return Self { sizes: zero.clone(), terms: zero } };
         match flow.reach(x, span) {
             Some(reached) => reached.or(&sizes),
@@ -53,35 +53,19 @@ impl<V: Vector> Scales<V> {
     /// The norm of the velocity relative to the sizes, without what is noise.
     pub(crate) fn speed(&self, v: &V) -> f64 {
         let noise = self.rounding(1.0);
-        let above = v.with(|i| if v.get(i).abs() <= noise.get(i) { 0.0 } else { v.get(i) });
+        let above = V::zip([v, &noise], |[v, noise]| if v.abs() <= noise { 0.0 } else { v });
         relative(&above, &self.sizes)
     }
 }
 
 /// The larger one of two sizes, entry by entry.
 pub(crate) fn larger<V: Vector>(a: &V, b: &V) -> V {
-    a.with(|i| a.get(i).max(b.get(i)))
+    V::zip([a, b], |[a, b]| a.max(b))
 }
 
-/// The Euclidean norm of the ratios `v_i/s_i`, without a unit, where `0/0 = 0`: a bound of each of them
-/// that no rotation of the frame of a curved factor changes.
+/// The [norm](Vector::relative_to) of the ratios `v_i/s_i`, without a unit.
 pub(crate) fn relative<V: Vector>(v: &V, sizes: &V) -> f64 {
-    let ratio = |i| if v.get(i) == 0.0 { 0.0 } else { (v.get(i) / sizes.get(i)).abs() };
-    // Squares of 10⁻²⁰⁰ are zero; those of numbers up to 1 are not too large.
-    let mut largest = 0.0;
-    for i in 0..v.len() {
-        if ratio(i).is_nan() {
-            return f64::NAN;
-        }
-        largest = f64::max(largest, ratio(i));
-    }
-    if largest > 0.0 && largest.is_finite() {
-        let unit = largest.recip();
-        let sum = (0..v.len()).fold(0.0, |sum, i| sum + (ratio(i) * unit) * (ratio(i) * unit));
-        largest * sum.sqrt()
-    } else {
-        largest
-    }
+    v.relative_to(sizes)
 }
 
 #[cfg(test)]

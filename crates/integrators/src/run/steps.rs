@@ -103,6 +103,7 @@ impl<'a, F: Flow, M: Method<F>> Steps<'a, F, M> {
     ) -> Result<Self, RunError<F::Space>> {
         schedule.check()?;
         flow.check(&x0)?;
+        flow.examine(&x0)?;
         let promises = method.promises(flow);
         let certificate = Certificate::start(flow, &x0, promises);
         let scales = Scales::at(flow, &x0, schedule.span());
@@ -114,7 +115,7 @@ impl<'a, F: Flow, M: Method<F>> Steps<'a, F, M> {
                 StepSize::Adaptive(adaptive.controller(flow, (&x0, start), &scales, rule)?)
             }
         };
-        let largest_velocity = scales.sizes.map(|_| 0.0);
+        let largest_velocity = scales.sizes.zero();
         let progress = Progress {
             step_size,
             start,
@@ -263,8 +264,8 @@ impl<'a, F: Flow, M: Method<F>> Steps<'a, F, M> {
         self.progress.scales = self.progress.scales.or(&sizes);
         let sizes = self.progress.scales.sizes.clone();
         let norm = |error: &F::Vector| {
-            let rounding = |i| ROUNDED * sizes.get(i);
-            let above = error.with(|i| (error.get(i).abs() - rounding(i)).max(0.0));
+            let above =
+                F::Vector::zip([error, &sizes], |[error, s]| (error.abs() - ROUNDED * s).max(0.0));
             relative(&above, &sizes)
         };
         let reference = self.reference(self.entropy);
@@ -361,7 +362,7 @@ impl<'a, F: Flow, M: Method<F>> Steps<'a, F, M> {
     fn rest(&mut self, moved: bool) {
         let Some(tolerance) = self.progress.rest else { return };
         let x = &self.state.point;
-        let zero = self.progress.largest_velocity.map(|_| 0.0);
+        let zero = self.progress.largest_velocity.zero();
         let Some(v) = self.flow.rates(x, &zero) else { return };
         let Progress { scales, largest_velocity, .. } = &mut self.progress;
         *largest_velocity = larger(largest_velocity, &v.map(f64::abs));

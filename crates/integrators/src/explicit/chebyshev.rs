@@ -1,0 +1,245 @@
+//! Stages for stiff friction: the method of Runge, Kutta and Chebyshev of order 2.
+//!
+//! With `s` stages the method is stable on `[−β, 0]`, `β ≈ 0.65 (s² − 1)`, so that the number of stages grows with the
+//! square root of `hρ`, where `ρ` is the spectral radius of the equation of motion (Sommeijer, Shampine, Verwer 1997,
+//! eqs. 2.2 to 2.7). In the chart at the start of a step, with `q₀ = 0` and the rates `k_j` at `q_j`,
+//!
+//! ```math
+//! q_1 = \tilde\mu_1 h k_0, \qquad
+//! q_j = \mu_j q_{j-1} + \nu_j q_{j-2} + \tilde\mu_j h k_{j-1} + \tilde\gamma_j h k_0 .
+//! ```
+//!
+//! The entropy that is produced obeys the same recursion. The spectral radius is found by the power method on
+//! differences of rates (§3 of the same), and again after some steps, from the direction that was found last.
+
+use super::flow::StageFlow;
+use super::memory::{Here, LastStep, MemoryOf, STAGES};
+use super::step::{Refused, stage};
+use super::tableau::Tableau;
+use crate::method::{Element, Vector};
+
+/// What is needed of a tableau after the stages.
+pub(super) const CHEBYSHEV: Tableau = Tableau {
+    order: 2,
+    stages: &[],
+    end: &[],
+    errors: [&[], &[]],
+    more_stages: &[],
+    dense: &[],
+    passed: &[],
+    stability: f64::INFINITY,
+};
+
+/// The damping `ε`.
+const DAMPING: f64 = 2.0 / 13.0;
+/// The most stages of a step; a step that needs more is too long.
+const MOST: u32 = 4000;
+/// Steps after which the spectral radius is found anew.
+const PATIENCE: u32 = 25;
+/// The most iterations of the power method, the change at which it ends, and what the estimate may miss.
+const ITERATIONS: u32 = 50;
+const CHANGE: f64 = 0.01;
+const SAFETY: f64 = 1.2;
+
+/// The spectral radius of the equation of motion, and a direction in which it is attained.
+#[derive(Clone, Debug)]
+pub(super) struct Spectrum<V> {
+    pub(super) radius: f64,
+    /// Steps since it was found.
+    pub(super) age: u32,
+    /// `None` after it was read from a checkpoint.
+    pub(super) direction: Option<V>,
+    /// The direction as it was read.
+    pub(super) read: Vec<f64>,
+}
+
+/// The stages of a step of size `h`.
+pub(super) fn stages<F: StageFlow>(
+    flow: &F,
+    x: &Element<F>,
+    h: f64,
+    here: Here<F::Vector>,
+    memory: &mut MemoryOf<F>,
+) -> Result<LastStep<F::Vector>, Refused> {
+    let Here { velocity: start, production } = here;
+    let spectrum = spectrum(flow, x, &start, memory.spectrum.take());
+    let count = spectrum.as_ref().map_or(2, |spectrum| stage_count(h * spectrum.radius));
+    memory.spectrum = spectrum;
+    if count > MOST {
+        return Err(Refused::Far);
+    }
+    let mut c = Coefficients::new(count);
+    let first = c.first;
+    let [mut before, mut q] = [start.zero(), start.map(|k| first * h * k)];
+    let [mut produced_before, mut produced] = [0.0, first * h * production];
+    for _ in 2..=count {
+        let Recursion { mu, nu, rate, start_rate } = c.next();
+        let (k, sigma) = stage(flow, x, &q).ok_or_else(|| Refused::outside(flow, x, &q))?;
+        let next = Vector::zip([&q, &before, &k, &start], |[q, before, k, start]| {
+            mu * q + nu * before + h * (rate * k + start_rate * start)
+        });
+        before = std::mem::replace(&mut q, next);
+        let next =
+            mu * produced + nu * produced_before + h * (rate * sigma + start_rate * production);
+        produced_before = std::mem::replace(&mut produced, next);
+    }
+    let zero = start.zero();
+    let mut stages: [(F::Vector, f64); STAGES] = std::array::from_fn(|_| (zero.clone(), 0.0));
+    stages[0] = (start, production);
+    Ok(LastStep { stages, known: 1, before: zero, end: q, rise: produced })
+}
+
+/// The estimate `0.8 (q₀ − q) + 0.4 h (k₀ + k)` of the local error (eq. 2.9).
+pub(super) fn error<V: Vector>(last: &LastStep<V>, h: f64) -> V {
+    let [(start, _), (end, _), ..] = &last.stages;
+    V::zip([&last.end, start, end], |[q, start, end]| 0.4 * h * (start + end) - 0.8 * q)
+}
+
+/// The least number of stages with `hρ ≤ β`.
+fn stage_count(radius: f64) -> u32 {
+    let count = (1.0 + 1.54 * radius).sqrt().floor() + 1.0;
+    // A number of stages that is too large, or none, is refused.
+    (2..=MOST).find(|&s| f64::from(s) >= count).unwrap_or(MOST + 1)
+}
+
+/// The coefficients of the stages, from the Chebyshev polynomials at `w₀ = 1 + ε/s²`.
+struct Coefficients {
+    w0: f64,
+    w1: f64,
+    first: f64,
+    /// `T_j`, `T_j'`, `T_j''` for the last `j` and the one before it.
+    last: [f64; 3],
+    before: [f64; 3],
+    /// `b_j` for both, and `a_j` for the last.
+    b: [f64; 2],
+    a: f64,
+}
+
+/// The coefficients of one stage.
+struct Recursion {
+    mu: f64,
+    nu: f64,
+    rate: f64,
+    start_rate: f64,
+}
+
+impl Coefficients {
+    fn new(count: u32) -> Self {
+        let w0 = 1.0 + DAMPING / f64::from(count).powi(2);
+        let mut polynomials = [[1.0, 0.0, 0.0], [w0, 1.0, 0.0]];
+        for _ in 2..=count {
+            polynomials = [polynomials[1], following(w0, polynomials)];
+        }
+        let [_, slope, bend] = polynomials[1];
+        let w1 = slope / bend;
+        // T₂'' / T₂'² = 4 / (4 w₀)².
+        let b = (4.0 * w0 * w0).recip();
+        let first = b * w1;
+        let [before, last] = [[1.0, 0.0, 0.0], [w0, 1.0, 0.0]];
+        Self { w0, w1, first, last, before, b: [b, b], a: 1.0 - b * w0 }
+    }
+
+    fn next(&mut self) -> Recursion {
+        let Self { w0, w1, b: [b_before, b_last], a, .. } = *self;
+        let polynomials = following(w0, [self.before, self.last]);
+        let [value, slope, bend] = polynomials;
+        let b = bend / (slope * slope);
+        let rate = 2.0 * b * w1 / b_last;
+        (self.before, self.last) = (self.last, polynomials);
+        (self.b, self.a) = ([b_last, b], 1.0 - b * value);
+        Recursion { mu: 2.0 * b * w0 / b_last, nu: -b / b_before, rate, start_rate: -a * rate }
+    }
+}
+
+/// `T_{j+1} = 2wT_j − T_{j−1}` with its two derivatives.
+fn following(w: f64, [before, last]: [[f64; 3]; 2]) -> [f64; 3] {
+    [
+        2.0 * w * last[0] - before[0],
+        2.0 * (last[0] + w * last[1]) - before[1],
+        2.0 * (2.0 * last[1] + w * last[2]) - before[2],
+    ]
+}
+
+/// The spectral radius at a state with this velocity; `None` if it cannot be found.
+fn spectrum<F: StageFlow>(
+    flow: &F,
+    x: &Element<F>,
+    velocity: &F::Vector,
+    known: Option<Spectrum<F::Vector>>,
+) -> Option<Spectrum<F::Vector>> {
+    let mut direction = match known {
+        Some(known) if known.age < PATIENCE => {
+            return Some(Spectrum { age: known.age + 1, ..known });
+        }
+        Some(Spectrum { direction: Some(direction), .. }) => direction,
+        Some(known) => velocity.with(|i| <[f64]>::get(&known.read, i).copied().unwrap_or(0.0)),
+        None => irregular(&flow.sizes(x)),
+    };
+    let sizes = flow.sizes(x);
+    let small = f64::EPSILON.sqrt();
+    let mut radius = 0.0;
+    for _ in 0..ITERATIONS {
+        let length = direction.relative_to(&sizes);
+        if !(length > 0.0 && length.is_finite()) {
+            break;
+        }
+        let factor = small / length;
+        let q = direction.map(|d| factor * d);
+        let (k, _) = stage(flow, x, &q)?;
+        direction = Vector::zip([&k, velocity], |[k, velocity]| k - velocity);
+        let found = direction.relative_to(&sizes) / small;
+        let converged = (found - radius).abs() <= CHANGE * found;
+        radius = found;
+        if converged {
+            break;
+        }
+    }
+    let radius = SAFETY * radius;
+    radius.is_finite().then_some(Spectrum {
+        radius,
+        age: 0,
+        direction: Some(direction),
+        read: Vec::new(),
+    })
+}
+
+/// A direction with a part along each other one: entries of both signs, without a pattern (Weyl 1916).
+fn irregular<V: Vector>(sizes: &V) -> V {
+    sizes.with(|i| {
+        let turn = (i as f64 * 0.618_033_988_749_894_9).fract();
+        sizes.get(i) * (2.0 * (turn * turn * 1e4).fract() - 1.0)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The factor of a step on `x' = λx`, `z = hλ`.
+    fn factor(count: u32, z: f64) -> f64 {
+        let mut c = Coefficients::new(count);
+        let [mut before, mut q] = [0.0, c.first * z];
+        for _ in 2..=count {
+            let Recursion { mu, nu, rate, start_rate } = c.next();
+            let next = mu * q + nu * before + z * (rate * (1.0 + q) + start_rate);
+            before = std::mem::replace(&mut q, next);
+        }
+        1.0 + q
+    }
+
+    #[test]
+    fn the_step_is_of_order_two_and_stable_where_its_number_of_stages_says() {
+        for count in [2, 3, 10, 60] {
+            let z = 1e-3;
+            // e^z = 1 + z + z²/2 + O(z³), with a third coefficient below 1/6.
+            assert!((factor(count, z) - 1.0 - z - 0.5 * z * z).abs() < z.powi(3) / 5.0, "{count}");
+        }
+        for radius in [0.5, 10.0, 300.0, 1e4] {
+            let count = stage_count(radius);
+            let largest = (1..=2000).map(|k| factor(count, -radius * f64::from(k) / 2000.0).abs());
+            assert!(largest.fold(0.0, f64::max) < 1.0, "{radius}");
+            // And no more stages than it needs.
+            assert!(count < 10 || factor(count, -1.2 * radius).abs() > 1.0, "{radius}: {count}");
+        }
+    }
+}

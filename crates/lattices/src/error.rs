@@ -1,0 +1,178 @@
+//! What can be wrong with a lattice.
+
+use std::fmt;
+
+use metriplectic_manifolds::PointError;
+
+/// A lattice that cannot be built, or that breaks a law at the start of a run. `size` is relative to the terms that
+/// should cancel.
+#[derive(Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum LatticeError {
+    /// A graph without sites.
+    #[error("the graph has no sites; give it at least one")]
+    NoSites,
+    /// More sites than can be numbered.
+    #[error("the graph has {sites} sites, and at most {most} can be numbered")]
+    TooManySites {
+        /// How many there are.
+        sites: usize,
+        /// The most.
+        most: usize,
+    },
+    /// A bond to a site that is not there.
+    #[error("bond {bond} ends at site {site}, and the graph has {sites} sites, numbered from 0")]
+    BondToNowhere {
+        /// The bond, in the order of the list.
+        bond: usize,
+        /// The site.
+        site: usize,
+        /// How many sites there are.
+        sites: usize,
+    },
+    /// A bond whose two sites are one.
+    #[error(
+        "bond {bond} joins site {site} to itself; what it contributes is a function of the site, and belongs \
+         into `.energy(..)`"
+    )]
+    BondToItself {
+        /// The bond, in the order of the list.
+        bond: usize,
+        /// The site.
+        site: usize,
+    },
+    /// Data for another number of sites or bonds.
+    #[error("there are data for {found} {of}, and the graph has {expected}")]
+    Data {
+        /// Sites or bonds.
+        of: &'static str,
+        /// How many data there are.
+        found: usize,
+        /// How many there should be.
+        expected: usize,
+    },
+    /// An entropy on bonds.
+    #[error(
+        "an entropy on bonds is refused: Π dS = 0 holds site by site only for a sum over sites; take the entropy, or \
+         the internal energy, of each site as one of its variables, and give the bonds an energy"
+    )]
+    EntropyOnBonds,
+    /// Neither a bracket nor friction.
+    #[error("nothing moves: the bracket is zero and there is no friction; give one of the two")]
+    NothingMoves,
+    /// Friction without an entropy, or an entropy without friction.
+    #[error(
+        "friction and entropy belong together, and only one of them is there; give `.entropy(..)` and \
+         `.bond_onsager(..)` or `.site_onsager(..)`"
+    )]
+    EntropyWithoutFriction,
+    /// A bracket with a force.
+    #[error(
+        "the bracket has a force, whose heat belongs to no entropy of the lattice; give the friction of a site by \
+         `.site_onsager(..)`"
+    )]
+    ForcedBracket,
+    /// Points for another number of sites.
+    #[error("the start has {found} points, and the graph has {expected} sites")]
+    Points {
+        /// How many there are.
+        found: usize,
+        /// How many there should be.
+        expected: usize,
+    },
+    /// The start is no point of the manifold at a site.
+    #[error("the start at {place}: {cause}")]
+    Start {
+        /// Where.
+        place: Place,
+        /// Why.
+        cause: PointError,
+    },
+    /// A value or a derivative at the start that is not a finite number.
+    #[error("the {what} at {place} is not a finite number; start where the model is defined")]
+    NotFinite {
+        /// Which part of the model.
+        what: &'static str,
+        /// Where.
+        place: Place,
+    },
+    /// A law that is broken at a site or a bond.
+    #[error("{law} is broken at {place}: the rest is {size:.1e} of the terms{remedy}")]
+    Broken {
+        /// The law.
+        law: &'static str,
+        /// Where.
+        place: Place,
+        /// What is left, relative to the terms that should cancel.
+        size: f64,
+        /// What to do.
+        remedy: &'static str,
+    },
+    /// A negative rate of friction.
+    #[error("the friction at {place} has the negative rate {rate:.3e}, and would destroy entropy")]
+    NegativeRate {
+        /// Where.
+        place: Place,
+        /// The rate.
+        rate: f64,
+    },
+    /// A derivative that is not the one of the values.
+    #[error(
+        "the {what} at {place} has the derivative {derivative:.6e} along a direction in which its values change at \
+         the rate {quotient:.6e}: the closure loses a derivative, as `x.re` and `Real::from(f64)` do"
+    )]
+    WrongDerivative {
+        /// Which part of the model.
+        what: &'static str,
+        /// Where.
+        place: Place,
+        /// The derivative by dual numbers.
+        derivative: f64,
+        /// The difference quotient of the values.
+        quotient: f64,
+    },
+    /// A sum that is not conserved.
+    #[error("conserved sum {index} changes at the start at a rate of {size:.1e} of its terms")]
+    NotConserved {
+        /// Which one, in the order of the list, counted from 0.
+        index: usize,
+        /// The rate, relative to the sizes of its terms.
+        size: f64,
+    },
+}
+
+/// The sentence of the `Display` form, which is what a `main` that returns the error prints.
+impl fmt::Debug for LatticeError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        fmt::Display::fmt(self, f)
+    }
+}
+
+/// A site, a bond, or all of them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Place {
+    /// A site.
+    Site(usize),
+    /// A bond, in the order of the graph, with its two sites.
+    Bond {
+        /// Its number.
+        bond: usize,
+        /// Its sites.
+        sites: [usize; 2],
+    },
+    /// The sum over all sites and bonds.
+    Total,
+}
+
+impl fmt::Display for Place {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Site(site) => write!(f, "site {site}"),
+            Self::Bond { bond, sites: [from, to] } => {
+                write!(f, "bond {bond}, from site {from} to site {to}")
+            }
+            Self::Total => f.write_str("the sum over the lattice"),
+        }
+    }
+}

@@ -1,0 +1,265 @@
+//! A lattice as a flow.
+
+use metriplectic_dynamics::SecondLaw;
+use metriplectic_dynamics::invariants::Kind;
+use metriplectic_fields::{Column, Space};
+use metriplectic_integrators::explicit::{Projected, ProjectionError, Target};
+use metriplectic_integrators::{Flow, FlowError, Laws, Scales, StageFlow};
+use metriplectic_manifolds::{Manifold, PointError};
+
+use crate::lattice::{Differentials, Lattice, Total, Totals, differentials_at, dimension};
+use crate::model::{Model, VectorOf};
+use crate::parallel;
+use crate::points::{Points, Sites};
+use crate::projection::Projection;
+use crate::vector::{SiteVector, larger};
+
+/// The differentials of the laws at a state, with their totals.
+#[derive(Clone, Debug)]
+pub struct LatticeJets<V> {
+    pub(crate) all: Differentials,
+    pub(crate) totals: Totals<V>,
+    pub(crate) sums: Vec<Total>,
+}
+
+impl<P: Model> Lattice<P> {
+    pub(crate) fn jets(&self, x: &Points<P::Manifold>) -> LatticeJets<VectorOf<P>> {
+        let (all, totals) = self.differentials::<true>(x);
+        LatticeJets { all, totals, sums: self.sums(x) }
+    }
+
+    /// The same numbers at all sites.
+    pub(crate) fn same(&self, numbers: &VectorOf<P>) -> SiteVector {
+        let numbers = (0..dimension::<P>()).map(|k| numbers[k]).collect();
+        SiteVector::same(self.sites(), numbers, &self.vectors)
+    }
+}
+
+impl<V> LatticeJets<V> {
+    pub(crate) fn is_finite(&self) -> bool {
+        let Totals { energy, entropy, .. } = &self.totals;
+        let all = [energy, entropy].into_iter().chain(&self.sums);
+        all.into_iter().all(|total| total.sum.value().is_finite())
+    }
+
+    pub(crate) fn laws(&self) -> Laws<Vec<f64>> {
+        let [energy, entropy] =
+            [&self.totals.energy, &self.totals.entropy].map(|total| total.sum.value());
+        Laws { energy, entropy, invariants: values(&self.sums) }
+    }
+}
+
+fn values(sums: &[Total]) -> Vec<f64> {
+    sums.iter().map(|total| total.sum.value()).collect()
+}
+
+impl<P: Model> Flow for Lattice<P> {
+    type Space = Sites<P::Manifold>;
+    type Numbers = Vec<f64>;
+    type Vector = SiteVector;
+
+    fn laws(&self, x: &Points<P::Manifold>) -> Laws<Vec<f64>> {
+        let [energy, entropy] = self.totals(x).map(|total| total.sum.value());
+        Laws { energy, entropy, invariants: values(&self.sums(x)) }
+    }
+
+    fn term_sizes(&self, x: &Points<P::Manifold>) -> Laws<Vec<f64>> {
+        let jets = self.jets(x);
+        let partial = parallel::map(self.sites(), |sites| {
+            let mut sums = vec![0.0; 2 + P::SUMS];
+            for site in sites {
+                let scales = P::Manifold::scales(&x[site]);
+                let differentials = differentials_at::<P>(&jets.all, site);
+                let further = (0..P::SUMS).map(|k| self.parts.sum(k, site, &x[site]).df);
+                for (sum, df) in sums.iter_mut().zip(differentials.into_iter().chain(further)) {
+                    *sum += df.abs().dot(&scales);
+                }
+            }
+            sums
+        });
+        let slopes = |k: usize| partial.iter().fold(0.0, |sum, part| sum + part[k]);
+        Laws {
+            energy: jets.totals.energy.size + slopes(0),
+            entropy: jets.totals.entropy.size + slopes(1),
+            invariants: (0..P::SUMS).map(|k| jets.sums[k].size + slopes(2 + k)).collect(),
+        }
+    }
+
+    fn rates(&self, x: &Points<P::Manifold>, d: &SiteVector) -> Option<SiteVector> {
+        let y = self.stage(x, d)?;
+        let (v, _) = self.motion(&y)?;
+        Some(self.stage_rates(x, (d, &y), &v))
+    }
+
+    /// The largest size of each entry on the lattice, at all sites: a site that is at rest is no more exact than its
+    /// neighbours.
+    fn sizes(&self, x: &Points<P::Manifold>) -> SiteVector {
+        self.same(&self.largest_sizes(x))
+    }
+
+    fn moved(&self, x: &Points<P::Manifold>, d: &SiteVector) -> Points<P::Manifold> {
+        let end = |x: &_, q: &_| Some(P::Manifold::stage(x, q));
+        self.moved_by(x, d.reader(), end).unwrap_or_else(|| x.clone())
+    }
+
+    fn displacement(&self, x: &Points<P::Manifold>, y: &Points<P::Manifold>) -> Option<SiteVector> {
+        let q = self.stage_coordinates(x, y);
+        let near = parallel::map(self.sites(), |mut sites| {
+            sites.all(|site| {
+                let q: VectorOf<P> = q.reader().at(site);
+                q.is_finite() && P::Manifold::is_stage(&q)
+            })
+        });
+        near.into_iter().all(|near| near).then_some(q)
+    }
+
+    fn production(&self, x: &Points<P::Manifold>) -> Option<f64> {
+        Some(self.motion(x)?.1)
+    }
+
+    fn onto(
+        &self,
+        y: &Points<P::Manifold>,
+        laws: &Laws<Vec<f64>>,
+        entropy: Option<f64>,
+    ) -> Option<Points<P::Manifold>> {
+        let laws = Laws { entropy: entropy.unwrap_or(laws.entropy), ..laws.clone() };
+        let (error, _) = self.motion(y)?;
+        let with_entropy = entropy.is_some();
+        let target = Target { laws: &laws, with_entropy, limit: None, error: Some(&error) };
+        self.project(y.clone(), &target).ok().map(|end| end.x)
+    }
+
+    fn element(&self, entries: &[f64]) -> Result<Points<P::Manifold>, PointError> {
+        let (found, expected) = (entries.len(), self.sites());
+        // All points of a manifold have as many entries as its first.
+        let mut length = 0;
+        P::Manifold::assemble(&mut || {
+            length += 1;
+            0.0
+        });
+        if found != expected * length {
+            return Err(PointError::Length { found, expected: expected * length });
+        }
+        let points = entries.chunks_exact(length.max(1));
+        let points: Result<Vec<_>, _> =
+            points.map(|entries| self.parts.manifold().from_entries(entries)).collect();
+        Ok(Points::from(points?))
+    }
+
+    fn entropy_law(&self) -> SecondLaw {
+        if P::ENTROPY { SecondLaw::Exact } else { SecondLaw::NoEntropy }
+    }
+
+    fn kinds(&self) -> Vec<Kind> {
+        vec![Kind::Momentum; P::SUMS]
+    }
+
+    fn examine(&self, x0: &Points<P::Manifold>) -> Result<(), FlowError> {
+        let verified = self.verify(x0).map_err(FlowError::new);
+        self.clear();
+        verified
+    }
+
+    fn site_outside(&self, x: &Points<P::Manifold>, d: &SiteVector) -> Option<usize> {
+        let (manifold, d) = (self.parts.manifold(), d.reader());
+        let y = self.moved_by(x, d, |x, q| Some(P::Manifold::stage(x, q)))?;
+        let outside =
+            |site: usize| !P::Manifold::is_stage(&d.at(site)) || !manifold.is_inside(&y[site]);
+        (0..self.sites()).find(|&site| outside(site)).or_else(|| self.not_finite(&y))
+    }
+
+    fn defect(&self, x: &Points<P::Manifold>) -> f64 {
+        let of = |sites: std::ops::Range<usize>| {
+            let defects = x[sites].iter().map(|x| self.parts.manifold().defect(x));
+            defects.fold(0.0, larger)
+        };
+        parallel::map(self.sites(), of).into_iter().fold(0.0, larger)
+    }
+
+    fn reach(&self, x: &Points<P::Manifold>, span: f64) -> Option<Scales<SiteVector>> {
+        let sizes = self.sizes_soon(x, span);
+        self.clear();
+        sizes
+    }
+
+    fn local_error(
+        &self,
+        x: &Points<P::Manifold>,
+        end: &Points<P::Manifold>,
+        h: f64,
+    ) -> Option<SiteVector> {
+        use metriplectic_integrators::Vector as _;
+        let q = self.displacement(x, end)?;
+        let (start, there) = (self.rates(x, &q.zero())?, self.rates(x, &q)?);
+        let middle = SiteVector::zip([&q, &there, &start], |[q, there, start]| {
+            0.5 * q - (there - start) * (h / 8.0)
+        });
+        let middle = self.rates(x, &middle)?;
+        Some(SiteVector::zip([&q, &start, &middle, &there], |[q, start, middle, there]| {
+            q - (start + 4.0 * middle + there) * (h / 6.0)
+        }))
+    }
+}
+
+impl<P: Model> StageFlow for Lattice<P> {
+    type Gradients = LatticeJets<VectorOf<P>>;
+
+    fn gradients(&self, x: &Points<P::Manifold>) -> Option<Self::Gradients> {
+        let jets = self.jets(x);
+        jets.is_finite().then_some(jets)
+    }
+
+    fn values(&self, gradients: &Self::Gradients) -> Laws<Vec<f64>> {
+        gradients.laws()
+    }
+
+    fn velocity(
+        &self,
+        x: &Points<P::Manifold>,
+        gradients: &Self::Gradients,
+    ) -> Option<(SiteVector, f64)> {
+        self.motion_along(x, &gradients.all)
+    }
+
+    fn motion(&self, x: &Points<P::Manifold>) -> Option<(SiteVector, f64)> {
+        let (all, _) = self.differentials::<false>(x);
+        self.motion_along(x, &all)
+    }
+
+    fn stage(&self, x: &Points<P::Manifold>, q: &SiteVector) -> Option<Points<P::Manifold>> {
+        let manifold = self.parts.manifold();
+        self.moved_by(x, q.reader(), |x, q| {
+            let y = P::Manifold::is_stage(q).then(|| P::Manifold::stage(x, q))?;
+            manifold.is_inside(&y).then_some(y)
+        })
+    }
+
+    fn stage_rates(
+        &self,
+        x: &Points<P::Manifold>,
+        (q, y): (&SiteVector, &Points<P::Manifold>),
+        v: &SiteVector,
+    ) -> SiteVector {
+        let [q, v] = [q.reader(), v.reader()];
+        self.vector_of(|site| {
+            P::Manifold::stage_rates(&x[site], (&q.at(site), &y[site]), &v.at(site))
+        })
+    }
+
+    fn stage_coordinates(&self, x: &Points<P::Manifold>, y: &Points<P::Manifold>) -> SiteVector {
+        self.vector_of(|site| P::Manifold::stage_coordinates(&x[site], &y[site]))
+    }
+
+    fn weighs_errors(&self) -> bool {
+        true
+    }
+
+    fn project(
+        &self,
+        y: Points<P::Manifold>,
+        target: &Target<'_, Self>,
+    ) -> Result<Projected<Self>, ProjectionError> {
+        Projection { lattice: self, target }.from(y)
+    }
+}

@@ -1,0 +1,139 @@
+//! Which sites are bonded.
+
+use crate::error::LatticeError;
+
+/// Sites `0, 1, …, n − 1` and the bonds between them.
+///
+/// A bond has a direction: the closures of a lattice are given its first site, then its second one. Two sites may
+/// have several bonds.
+///
+/// ```
+/// use metriplectic_lattices::{Boundary, Graph};
+/// assert_eq!(Graph::ring(5).bonds().last(), Some(&[4, 0]));
+/// assert_eq!(Graph::square([3, 4], Boundary::Open).bonds().len(), 2 * 4 + 3 * 3);
+/// assert_eq!(Graph::from_bonds(3, [[0, 2], [1, 2]]).sites(), 3);
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub struct Graph {
+    sites: usize,
+    bonds: Vec<[u32; 2]>,
+    /// The first bond that does not fit.
+    refused: Option<LatticeError>,
+}
+
+/// What is beyond the last site of a regular lattice.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Boundary {
+    /// Nothing.
+    Open,
+    /// The first site again.
+    Periodic,
+}
+
+impl Graph {
+    /// A row of sites, each bonded to the next.
+    #[must_use]
+    pub fn chain(sites: usize) -> Self {
+        Self::grid([sites], Boundary::Open)
+    }
+
+    /// A row of sites whose last one is bonded to the first.
+    #[must_use]
+    pub fn ring(sites: usize) -> Self {
+        Self::grid([sites], Boundary::Periodic)
+    }
+
+    /// A square lattice of `nx × ny` sites; site `(i, j)` has the number `i + nx j`.
+    #[must_use]
+    pub fn square(sizes: [usize; 2], boundary: Boundary) -> Self {
+        Self::grid(sizes, boundary)
+    }
+
+    /// A cubic lattice of `nx × ny × nz` sites; site `(i, j, k)` has the number `i + nx (j + ny k)`.
+    #[must_use]
+    pub fn cubic(sizes: [usize; 3], boundary: Boundary) -> Self {
+        Self::grid(sizes, boundary)
+    }
+
+    /// A graph of `sites` sites with these bonds, from the first to the second site of each pair. A bond that does
+    /// not fit is refused when the lattice is built.
+    #[must_use]
+    pub fn from_bonds(sites: usize, bonds: impl IntoIterator<Item = [usize; 2]>) -> Self {
+        let mut graph = Self::without_bonds(sites);
+        for [from, to] in bonds {
+            if graph.refused.is_some() {
+                break;
+            }
+            graph.bond(from, to);
+        }
+        graph
+    }
+
+    /// The number of sites.
+    #[must_use]
+    pub const fn sites(&self) -> usize {
+        self.sites
+    }
+
+    /// The bonds, each with its first and its second site.
+    #[must_use]
+    pub fn bonds(&self) -> &[[u32; 2]] {
+        &self.bonds
+    }
+
+    /// Returns the graph if it can carry a lattice.
+    pub(crate) fn checked(self) -> Result<Self, LatticeError> {
+        if self.sites == 0 {
+            return Err(LatticeError::NoSites);
+        }
+        match &self.refused {
+            Some(refused) => Err(refused.clone()),
+            None => Ok(self),
+        }
+    }
+
+    fn without_bonds(sites: usize) -> Self {
+        let most = u32::MAX as usize;
+        let refused = (sites > most).then_some(LatticeError::TooManySites { sites, most });
+        Self { sites, bonds: Vec::new(), refused }
+    }
+
+    fn grid<const D: usize>(sizes: [usize; D], boundary: Boundary) -> Self {
+        let sites = sizes.iter().try_fold(1_usize, |sites, &size| sites.checked_mul(size));
+        let mut graph = Self::without_bonds(sites.unwrap_or(usize::MAX));
+        if graph.refused.is_some() {
+            return graph;
+        }
+        for site in 0..graph.sites {
+            let mut stride = 1;
+            for size in sizes {
+                let place = site / stride % size;
+                if place + 1 < size {
+                    graph.bond(site, site + stride);
+                } else if boundary == Boundary::Periodic {
+                    graph.bond(site, site - place * stride);
+                }
+                stride *= size;
+            }
+        }
+        graph
+    }
+
+    fn bond(&mut self, from: usize, to: usize) {
+        let (bond, sites) = (self.bonds.len(), self.sites);
+        let number = |site: usize| u32::try_from(site).ok().filter(|_| site < sites);
+        match (number(from), number(to)) {
+            (Some(site), Some(_)) if from == to => {
+                let site = site as usize;
+                self.refused.get_or_insert(LatticeError::BondToItself { bond, site });
+            }
+            (Some(from), Some(to)) => self.bonds.push([from, to]),
+            (None, _) => {
+                self.refused.get_or_insert(LatticeError::BondToNowhere { bond, site: from, sites });
+            }
+            (_, None) => {
+                self.refused.get_or_insert(LatticeError::BondToNowhere { bond, site: to, sites });
+            }
+        }
+    }
+}

@@ -1,0 +1,322 @@
+//! A lattice, and its loops over sites and bonds.
+
+use std::fmt;
+
+use metriplectic_fields::{Column, Dimension, Space, Vector};
+use metriplectic_manifolds::Manifold;
+
+use crate::double::Double;
+use crate::layout::Layout;
+use crate::model::{Model, PointOf, VectorOf};
+use crate::parallel;
+use crate::points::Points;
+use crate::pool::{Buffer, Pool};
+use crate::vector::{Reader, SiteVector};
+
+/// Points of a manifold at the sites of a graph, with energies of sites and bonds, an entropy of sites, and friction
+/// at both; built by [`Lattice::on`].
+///
+/// It is a [`Flow`](metriplectic_integrators::Flow), and the explicit methods run it.
+pub struct Lattice<P> {
+    pub(crate) parts: P,
+    pub(crate) layout: Layout,
+    /// Arrays with a vector for each site.
+    pub(crate) vectors: Pool<f64>,
+    /// Arrays with the differentials of energy and entropy for each site.
+    differentials: Pool<f64>,
+    /// Arrays with a vector for each slot of the layout.
+    slots: Pool<f64>,
+}
+
+// By hand, because closures have no `Debug`.
+impl<P: Model> fmt::Debug for Lattice<P> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Lattice")
+            .field("manifold", self.parts.manifold())
+            .field("sites", &self.layout.sites)
+            .field("bonds", &self.layout.bonds().len())
+            .finish_non_exhaustive()
+    }
+}
+
+/// The dimension of a site.
+pub(crate) const fn dimension<P: Model>() -> usize {
+    <<P::Manifold as Space>::Dim as Dimension>::LEN
+}
+
+/// The numbers of a site among the differentials.
+pub(crate) const fn width<P: Model>() -> usize {
+    if P::ENTROPY { 2 * dimension::<P>() } else { dimension::<P>() }
+}
+
+/// The differentials of energy and entropy at each site.
+pub(crate) type Differentials = Buffer<f64>;
+
+/// The differentials of energy and entropy at a site.
+#[inline]
+pub(crate) fn differentials_at<P: Model>(all: &[f64], site: usize) -> [VectorOf<P>; 2] {
+    let start = site * width::<P>();
+    let numbers = &all[start..start + width::<P>()];
+    let energy = VectorOf::<P>::from_index(|k| numbers[k]);
+    let entropy = if P::ENTROPY {
+        VectorOf::<P>::from_index(|k| numbers[dimension::<P>() + k])
+    } else {
+        VectorOf::<P>::zero()
+    };
+    [energy, entropy]
+}
+
+/// A sum over the lattice, and the sum of the sizes of its terms.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Total {
+    pub(crate) sum: Double,
+    pub(crate) size: f64,
+}
+
+impl Total {
+    #[inline]
+    pub(crate) fn add(&mut self, term: f64) {
+        self.sum.add(term);
+        self.size += term.abs();
+    }
+
+    pub(crate) fn merge(&mut self, other: &Self) {
+        self.sum.merge(other.sum);
+        self.size += other.size;
+    }
+}
+
+/// The totals of energy and entropy, and the largest sizes of the entries.
+#[derive(Clone, Debug)]
+pub(crate) struct Totals<V> {
+    pub(crate) energy: Total,
+    pub(crate) entropy: Total,
+    pub(crate) sizes: V,
+}
+
+impl<V: Column<f64>> Totals<V> {
+    fn new() -> Self {
+        Self { energy: Total::default(), entropy: Total::default(), sizes: V::zero() }
+    }
+
+    fn merge(mut self, other: &Self) -> Self {
+        self.energy.merge(&other.energy);
+        self.entropy.merge(&other.entropy);
+        self.sizes = larger(&self.sizes, &other.sizes);
+        self
+    }
+}
+
+/// The larger one of two sizes, entry by entry.
+fn larger<V: Column<f64>>(a: &V, b: &V) -> V {
+    V::from_index(|k| a[k].max(b[k]))
+}
+
+impl<P: Model> Lattice<P> {
+    pub(crate) fn new(parts: P, layout: Layout) -> Self {
+        let [vectors, differentials, slots] = std::array::from_fn(|_| Pool::default());
+        Self { parts, layout, vectors, differentials, slots }
+    }
+
+    /// Gives up the arrays that were used before a run and are used no more.
+    pub(crate) fn clear(&self) {
+        for pool in [&self.vectors, &self.differentials, &self.slots] {
+            pool.clear();
+        }
+    }
+
+    /// The number of sites.
+    pub const fn sites(&self) -> usize {
+        self.layout.sites
+    }
+
+    /// A state, given by the point at each site.
+    pub fn points(&self, at: impl FnMut(usize) -> PointOf<P>) -> Points<P::Manifold> {
+        Points::from((0..self.sites()).map(at).collect::<Vec<_>>())
+    }
+
+    /// A vector with these numbers for each site.
+    pub(crate) fn vector(&self, numbers: Buffer<f64>) -> SiteVector {
+        SiteVector::each(self.sites(), dimension::<P>(), numbers)
+    }
+
+    /// A place for what bonds give to other chunks; none if they give nothing.
+    fn slots(&self, bonds_give: bool) -> Buffer<f64> {
+        let count = if bonds_give { self.layout.slots } else { 0 };
+        self.slots.numbers(count * dimension::<P>())
+    }
+
+    /// The differentials `w = dh + Σ ∂h₂` and `ds` at each site, and the totals if `TOTALS`.
+    pub(crate) fn differentials<const TOTALS: bool>(
+        &self,
+        x: &[PointOf<P>],
+    ) -> (Differentials, Totals<VectorOf<P>>) {
+        let n = dimension::<P>();
+        let mut all = self.differentials.numbers(self.sites() * width::<P>());
+        let bonds = self.layout.bonds();
+        let totals = self.layout.scatter(&mut all, &mut self.slots(P::BOND_ENERGY), |mut part| {
+            let mut totals = Totals::new();
+            for site in part.sites.clone() {
+                let point = &x[site];
+                let energy = self.parts.energy(site, point);
+                part.set(site, 0, &energy.df);
+                if TOTALS {
+                    totals.energy.add(energy.value);
+                    totals.sizes = larger(&totals.sizes, &P::Manifold::scales(point));
+                }
+                if P::ENTROPY {
+                    let entropy = self.parts.entropy(site, point);
+                    part.set(site, n, &entropy.df);
+                    if TOTALS {
+                        totals.entropy.add(entropy.value);
+                    }
+                }
+            }
+            if P::BOND_ENERGY {
+                for bond in part.bonds.clone() {
+                    let ends = bonds[bond];
+                    let pair = ends.map(|site| x[site as usize].clone()).into();
+                    let jet = self.parts.bond_energy(bond, &pair);
+                    let first = VectorOf::<P>::from_index(|k| jet.df[k]);
+                    let second = VectorOf::<P>::from_index(|k| jet.df[n + k]);
+                    part.add(ends, &[first, second]);
+                    if TOTALS {
+                        totals.energy.add(jet.value);
+                    }
+                }
+            }
+            totals
+        });
+        (all, totals.iter().fold(Totals::new(), Totals::merge))
+    }
+
+    /// The velocity `v = Π w + Σ K s` at each site and the total production `Σ ρ (b·s)²`; `None` if a term is not a
+    /// number.
+    pub(crate) fn motion_along(&self, x: &[PointOf<P>], all: &[f64]) -> Option<(SiteVector, f64)> {
+        let mut v = self.vectors.numbers(self.sites() * dimension::<P>());
+        let bonds = self.layout.bonds();
+        let partial = self.layout.scatter(&mut v, &mut self.slots(P::BOND_FRICTION), |mut part| {
+            // The second sum is not a number if a term is not finite.
+            let (mut production, mut probe) = (0.0, 0.0);
+            for site in part.sites.clone() {
+                let [w, s] = differentials_at::<P>(all, site);
+                let mut v = self.parts.reversible(&x[site], &w, &s);
+                self.parts.site_friction(site, &x[site], &w, |term| {
+                    let force = term.b.dot(&s);
+                    v += term.b * (term.rate * force);
+                    production += term.rate * force * force;
+                });
+                probe += probed(&v);
+                part.set(site, 0, &v);
+            }
+            if P::BOND_FRICTION {
+                for bond in part.bonds.clone() {
+                    let ends = bonds[bond];
+                    let [i, j] = ends.map(|site| site as usize);
+                    let [[wi, si], [wj, sj]] = [i, j].map(|site| differentials_at::<P>(all, site));
+                    let mut v = [VectorOf::<P>::zero(); 2];
+                    self.parts.bond_friction(bond, [&x[i], &x[j]], [&wi, &wj], |term| {
+                        let [bi, bj] = term.b;
+                        let force = bi.dot(&si) + bj.dot(&sj);
+                        v[0] += bi * (term.rate * force);
+                        v[1] += bj * (term.rate * force);
+                        production += term.rate * force * force;
+                    });
+                    probe += probed(&v[0]) + probed(&v[1]);
+                    part.add(ends, &v);
+                }
+            }
+            [production, probe]
+        });
+        let (mut production, mut probe) = (Double::default(), 0.0);
+        for [part, probed] in partial {
+            production.add(part);
+            probe += probed;
+        }
+        let production = production.value();
+        let is_finite = !f64::is_nan(probe) && production.is_finite();
+        is_finite.then(|| (self.vector(v), production))
+    }
+
+    /// The totals of the conserved sums.
+    pub(crate) fn sums(&self, x: &[PointOf<P>]) -> Vec<Total> {
+        let mut totals = vec![Total::default(); P::SUMS];
+        if P::SUMS == 0 {
+            return totals;
+        }
+        let partial = parallel::map(self.sites(), |sites| {
+            let mut totals = vec![Total::default(); P::SUMS];
+            for site in sites {
+                for (k, total) in totals.iter_mut().enumerate() {
+                    total.add(self.parts.sum(k, site, &x[site]).value);
+                }
+            }
+            totals
+        });
+        for part in partial {
+            totals.iter_mut().zip(&part).for_each(|(total, part)| total.merge(part));
+        }
+        totals
+    }
+
+    /// The totals of energy and entropy alone.
+    pub(crate) fn totals(&self, x: &[PointOf<P>]) -> [Total; 2] {
+        let (_, totals) = self.differentials::<true>(x);
+        [totals.energy, totals.entropy]
+    }
+
+    /// The largest size of each entry.
+    pub(crate) fn largest_sizes(&self, x: &[PointOf<P>]) -> VectorOf<P> {
+        let of = |sites: std::ops::Range<usize>| {
+            let zero = VectorOf::<P>::zero();
+            x[sites].iter().fold(zero, |most, x| larger(&most, &P::Manifold::scales(x)))
+        };
+        let zero = VectorOf::<P>::zero();
+        parallel::map(self.sites(), of).iter().fold(zero, |a, b| larger(&a, b))
+    }
+
+    /// The points `f(x_i, q_i)`; `None` if one of them is `None`.
+    pub(crate) fn moved_by(
+        &self,
+        x: &Points<P::Manifold>,
+        q: Reader<'_>,
+        f: impl Fn(&PointOf<P>, &Vector<P::Manifold>) -> Option<PointOf<P>> + Sync,
+    ) -> Option<Points<P::Manifold>> {
+        let mut y = x.like();
+        let all = parallel::fill(&mut y, 1, |sites, y| {
+            sites.zip(y).all(|(site, y)| match f(&x[site], &q.at(site)) {
+                Some(end) => {
+                    *y = end;
+                    true
+                }
+                None => false,
+            })
+        });
+        all.into_iter().all(|inside| inside).then_some(y)
+    }
+
+    /// A vector for each site.
+    pub(crate) fn vector_of(&self, f: impl Fn(usize) -> VectorOf<P> + Sync) -> SiteVector {
+        let n = dimension::<P>();
+        let mut numbers = self.vectors.numbers(self.sites() * n);
+        parallel::fill(&mut numbers, n, |sites, out| {
+            for (site, out) in sites.zip(out.chunks_exact_mut(n)) {
+                let v = f(site);
+                for (k, out) in out.iter_mut().enumerate() {
+                    *out = v[k];
+                }
+            }
+        });
+        self.vector(numbers)
+    }
+}
+
+/// Zero for finite numbers, and not a number otherwise.
+#[inline]
+fn probed<V: Column<f64>>(v: &V) -> f64 {
+    let mut sum = 0.0;
+    for k in 0..V::LEN {
+        sum += v[k];
+    }
+    sum * 0.0
+}

@@ -1,0 +1,202 @@
+//! What a lattice is made of, as its loops need it.
+
+use metriplectic_dynamics::{Bracket, BracketArgs};
+use metriplectic_fields::{ChartPoint, Column, Jet1, Vector};
+use metriplectic_manifolds::{Canonical, Manifold, MetricAt, Product, Riemannian, Times};
+
+use crate::fields::{ConservedSums, LocalData, LocalField};
+use crate::onsager::{BondFriction, BondState, Onsager, SiteFriction, SiteState};
+
+/// The functions and tensors of a lattice, site by site and bond by bond; [`Parts`] is the one implementation.
+pub trait Model: Sync {
+    /// The manifold of a site.
+    type Manifold: Manifold + Times<Self::Manifold>;
+
+    /// How many conserved sums there are.
+    const SUMS: usize;
+    /// Whether there is an entropy.
+    const ENTROPY: bool;
+    /// Whether bonds have an energy.
+    const BOND_ENERGY: bool;
+    /// Whether bonds have friction.
+    const BOND_FRICTION: bool;
+
+    /// The manifold.
+    fn manifold(&self) -> &Self::Manifold;
+
+    /// The energy of a site.
+    fn energy(&self, site: usize, x: &PointOf<Self>) -> Jet1<Self::Manifold>;
+
+    /// The energy of a bond.
+    fn bond_energy(&self, bond: usize, x: &PairOf<Self>) -> Jet1<PairManifold<Self>>;
+
+    /// The entropy of a site.
+    fn entropy(&self, site: usize, x: &PointOf<Self>) -> Jet1<Self::Manifold>;
+
+    /// The values of the same three functions.
+    fn values(&self, site: usize, x: &PointOf<Self>) -> [f64; 2];
+
+    /// The value of the energy of a bond.
+    fn bond_value(&self, bond: usize, x: &PairOf<Self>) -> f64;
+
+    /// A conserved function at a site.
+    fn sum(&self, index: usize, site: usize, x: &PointOf<Self>) -> Jet1<Self::Manifold>;
+
+    /// `Π w` at a site; not a number where it has no value.
+    fn reversible(
+        &self,
+        x: &PointOf<Self>,
+        w: &VectorOf<Self>,
+        s: &VectorOf<Self>,
+    ) -> VectorOf<Self>;
+
+    /// The terms of the friction at a site.
+    fn site_friction(
+        &self,
+        site: usize,
+        x: &PointOf<Self>,
+        w: &VectorOf<Self>,
+        visit: impl FnMut(Onsager<VectorOf<Self>>),
+    );
+
+    /// The terms of the friction in a bond.
+    fn bond_friction(
+        &self,
+        bond: usize,
+        x: [&PointOf<Self>; 2],
+        w: [&VectorOf<Self>; 2],
+        visit: impl FnMut(Onsager<[VectorOf<Self>; 2]>),
+    );
+}
+
+/// A point of a site.
+pub(crate) type PointOf<P> = <<P as Model>::Manifold as metriplectic_fields::Space>::Point<f64>;
+/// Components at a site.
+pub(crate) type VectorOf<P> = Vector<<P as Model>::Manifold>;
+/// The points of a bond.
+pub(crate) type PairOf<P> = (PointOf<P>, PointOf<P>);
+/// The manifold of a bond.
+pub(crate) type PairManifold<P> = Product<<P as Model>::Manifold, <P as Model>::Manifold>;
+
+/// The functions and tensors that a user has written.
+#[derive(Clone)]
+#[expect(missing_debug_implementations, reason = "closures have no `Debug`")]
+pub struct Parts<M, B, F, K, L, D> {
+    pub(crate) manifold: M,
+    pub(crate) bracket: B,
+    pub(crate) fields: F,
+    pub(crate) friction: K,
+    pub(crate) sums: L,
+    pub(crate) data: D,
+}
+
+/// The energy of a site, the energy of a bond, and the entropy of a site.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Fields<H, V, S> {
+    pub(crate) energy: H,
+    pub(crate) bond_energy: V,
+    pub(crate) entropy: S,
+}
+
+/// The friction in bonds and at sites.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Friction<KB, KS> {
+    pub(crate) bonds: KB,
+    pub(crate) sites: KS,
+}
+
+/// The data of the sites and of the bonds.
+#[derive(Clone, Debug, Default)]
+pub struct Data<D, E> {
+    pub(crate) sites: D,
+    pub(crate) bonds: E,
+}
+
+impl<M, B, H, V, S, KB, KS, L, D, E> Model
+    for Parts<M, B, Fields<H, V, S>, Friction<KB, KS>, L, Data<D, E>>
+where
+    M: Manifold + Times<M>,
+    Canonical: Riemannian<M>,
+    B: Bracket<M, Canonical> + Sync,
+    H: LocalField<M, D::Item>,
+    V: LocalField<Product<M, M>, E::Item>,
+    S: LocalField<M, D::Item>,
+    KB: BondFriction<M, E::Item>,
+    KS: SiteFriction<M, D::Item>,
+    L: ConservedSums<M, D::Item>,
+    D: LocalData,
+    E: LocalData,
+{
+    type Manifold = M;
+
+    const SUMS: usize = L::COUNT;
+    const ENTROPY: bool = S::PRESENT;
+    const BOND_ENERGY: bool = V::PRESENT;
+    const BOND_FRICTION: bool = KB::PRESENT;
+
+    fn manifold(&self) -> &M {
+        &self.manifold
+    }
+
+    #[inline]
+    fn energy(&self, site: usize, x: &M::Point<f64>) -> Jet1<M> {
+        self.fields.energy.jet(x, self.data.sites.of(site))
+    }
+
+    #[inline]
+    fn bond_energy(&self, bond: usize, x: &PairOf<Self>) -> Jet1<Product<M, M>> {
+        self.fields.bond_energy.jet(x, self.data.bonds.of(bond))
+    }
+
+    #[inline]
+    fn entropy(&self, site: usize, x: &M::Point<f64>) -> Jet1<M> {
+        self.fields.entropy.jet(x, self.data.sites.of(site))
+    }
+
+    fn values(&self, site: usize, x: &M::Point<f64>) -> [f64; 2] {
+        let (fields, data) = (&self.fields, self.data.sites.of(site));
+        [fields.energy.value(x, data), fields.entropy.value(x, data)]
+    }
+
+    fn bond_value(&self, bond: usize, x: &PairOf<Self>) -> f64 {
+        self.fields.bond_energy.value(x, self.data.bonds.of(bond))
+    }
+
+    #[inline]
+    fn sum(&self, index: usize, site: usize, x: &M::Point<f64>) -> Jet1<M> {
+        self.sums.jet(index, x, self.data.sites.of(site))
+    }
+
+    #[inline]
+    fn reversible(&self, x: &M::Point<f64>, w: &Vector<M>, s: &Vector<M>) -> Vector<M> {
+        let x = ChartPoint::<M>::centre(x);
+        let g = MetricAt::new(&Canonical, &x);
+        let at = BracketArgs { space: &self.manifold, g: &g, s };
+        let not_a_number = |_| Vector::<M>::from_index(|_| f64::NAN);
+        self.bracket.apply(&at, w).unwrap_or_else(not_a_number)
+    }
+
+    #[inline]
+    fn site_friction(
+        &self,
+        site: usize,
+        x: &M::Point<f64>,
+        w: &Vector<M>,
+        visit: impl FnMut(Onsager<Vector<M>>),
+    ) {
+        let data = self.data.sites.of(site);
+        self.friction.sites.each(&SiteState { x, w, data }, visit);
+    }
+
+    #[inline]
+    fn bond_friction(
+        &self,
+        bond: usize,
+        x: [&M::Point<f64>; 2],
+        w: [&Vector<M>; 2],
+        visit: impl FnMut(Onsager<[Vector<M>; 2]>),
+    ) {
+        let data = self.data.bonds.of(bond);
+        self.friction.bonds.each(&BondState { x, w, data }, visit);
+    }
+}

@@ -1,0 +1,286 @@
+//! A state moved onto its laws.
+//!
+//! A correction has the direction
+//!
+//! ```math
+//! u_i = \omega_i \sum_a c_a\, s^2\, dF_a(x_i), \qquad \omega_i = |e_i|^2 / \max_j |e_j|^2,
+//! ```
+//!
+//! with the sizes `s` of the entries, which cancel the units, and an estimate `e` of the local error of the step in
+//! units of them. So a step moves nothing that it has not moved before, and the correction needs only the Gram
+//! matrix `Σ_i ω_i ⟨s dF_a, s dF_b⟩` of the laws, a sum over the sites. Where this matrix is singular, because the error
+//! has fewer freedoms than there are laws, all `ω_i` are 1.
+
+use metriplectic_fields::{Column, Space};
+use metriplectic_integrators::Vector as _;
+use metriplectic_integrators::explicit::{Projected, ProjectionError, Target};
+use metriplectic_manifolds::Manifold;
+
+use crate::flow::LatticeJets;
+use crate::gram::{Gram, Law, Normals};
+use crate::lattice::{Lattice, Total, differentials_at, dimension};
+use crate::model::{Model, VectorOf};
+use crate::parallel;
+use crate::points::Points;
+use crate::vector::{Reader, larger};
+
+/// The most corrections.
+const CORRECTIONS: usize = 8;
+/// The residual, in units of its round-off, below which no correction is begun. Sums have digits beyond their
+/// terms, so that a correction takes a residual far below.
+const SMALL: f64 = 0.125;
+/// The residual with which a corrected state is accepted.
+const ENOUGH: f64 = 0.5;
+/// The residual of an entropy from which on the round-off of the other laws, which moves it too, is corrected.
+const OFF: f64 = 0.8;
+/// Residuals, in units of round-off, with which a state is accepted that no correction improves.
+const STAGNATED: f64 = 2.0;
+/// The same where no entropy is asked for.
+const CONSERVED: f64 = 64.0;
+
+pub(crate) struct Projection<'a, P: Model> {
+    pub(crate) lattice: &'a Lattice<P>,
+    pub(crate) target: &'a Target<'a, Lattice<P>>,
+}
+
+/// The weights `ω_i` of the sites.
+#[derive(Clone, Copy)]
+struct Weights<'a, V> {
+    error: Option<Reader<'a>>,
+    /// `s / max|e|` for each entry.
+    units: V,
+}
+
+impl<V: Column<f64>> Weights<'_, V> {
+    #[inline]
+    fn at(&self, site: usize) -> f64 {
+        let Some(error) = &self.error else { return 1.0 };
+        let e: V = error.at(site);
+        let mut sum = 0.0;
+        for k in 0..V::LEN {
+            let ratio = e[k] * self.units[k];
+            sum += ratio * ratio;
+        }
+        sum
+    }
+}
+
+type Jets<P> = LatticeJets<VectorOf<P>>;
+type State<P> = Points<<P as Model>::Manifold>;
+
+impl<P: Model> Projection<'_, P> {
+    pub(crate) fn from(&self, mut y: State<P>) -> Result<Projected<Lattice<P>>, ProjectionError> {
+        let with_entropy = self.target.with_entropy;
+        let mut moved = 0.0;
+        let mut best: Option<(f64, Projected<Lattice<P>>)> = None;
+        let mut before = f64::INFINITY;
+        for corrections in 0..=CORRECTIONS {
+            let jets = self.lattice.jets(&y);
+            if !jets.is_finite() {
+                return Err(ProjectionError::Outside);
+            }
+            let (normals, weights) = self.normals(&y, &jets)?;
+            let excess = normals.excess(with_entropy)?;
+            let off = if with_entropy { normals.off() / OFF } else { 0.0 };
+            let enough = if corrections == 0 { SMALL } else { ENOUGH };
+            if excess <= enough && off <= 1.0 {
+                return Ok(self.projected(&normals, y, jets));
+            }
+            let worst = excess.max(off);
+            if before <= worst {
+                // No correction improves it.
+                return self.stagnated(best);
+            }
+            before = worst;
+            let coefficients = normals.correction(with_entropy);
+            let next = self.corrected(&y, &jets, &coefficients, &weights);
+            moved += next.length;
+            let limit = self.target.limit.map(|limit| self.length(limit, &jets));
+            if !moved.is_finite() || limit.is_some_and(|limit| moved > limit) {
+                return Err(ProjectionError::Far);
+            }
+            if worst <= CONSERVED {
+                if next.length <= f64::EPSILON {
+                    return Ok(self.projected(&normals, y, jets));
+                }
+                best = Some((worst, self.projected(&normals, y, jets)));
+            }
+            y = next.points.ok_or(ProjectionError::Outside)?;
+        }
+        self.stagnated(best)
+    }
+
+    /// What becomes of the best state, if no correction improves it.
+    fn stagnated(
+        &self,
+        best: Option<(f64, Projected<Lattice<P>>)>,
+    ) -> Result<Projected<Lattice<P>>, ProjectionError> {
+        let failed = if self.target.with_entropy {
+            ProjectionError::NoEntropy
+        } else {
+            ProjectionError::Far
+        };
+        let most = if self.target.with_entropy { STAGNATED } else { CONSERVED };
+        best.filter(|(excess, _)| *excess <= most).map(|(_, state)| state).ok_or(failed)
+    }
+
+    fn projected(
+        &self,
+        normals: &Normals,
+        x: State<P>,
+        gradients: Jets<P>,
+    ) -> Projected<Lattice<P>> {
+        let [residual, entropy_round_off] = normals.entropy();
+        let entropy = self.target.laws.entropy - residual;
+        Projected { x, gradients, entropy, entropy_round_off }
+    }
+
+    /// The laws at a state, made independent of each other, and the weights with which they are.
+    fn normals(
+        &self,
+        y: &State<P>,
+        jets: &Jets<P>,
+    ) -> Result<(Normals, Weights<'_, VectorOf<P>>), ProjectionError> {
+        if let Some(weights) = self.weights(jets) {
+            let normals = Normals::new(&self.gram(y, jets, &weights), &self.laws(jets), P::ENTROPY);
+            if !normals.leaves_out(self.target.with_entropy) {
+                return Ok((normals, weights));
+            }
+        }
+        let weights = Weights { error: None, units: VectorOf::<P>::zero() };
+        let gram = self.gram(y, jets, &weights);
+        if !gram.is_finite() {
+            return Err(ProjectionError::Outside);
+        }
+        Ok((Normals::new(&gram, &self.laws(jets), P::ENTROPY), weights))
+    }
+
+    /// The weights of the sites by the error; `None` if there is none.
+    fn weights(&self, jets: &Jets<P>) -> Option<Weights<'_, VectorOf<P>>> {
+        let error = self.target.error?.reader();
+        let sizes = &jets.totals.sizes;
+        let reciprocal = |k: usize| if sizes[k] > 0.0 { sizes[k].recip() } else { 0.0 };
+        let units = VectorOf::<P>::from_index(reciprocal);
+        let weights = Weights { error: Some(error), units };
+        let largest = parallel::map(self.lattice.sites(), |sites| {
+            sites.map(|site| weights.at(site)).fold(0.0, larger)
+        });
+        let largest = largest.into_iter().fold(0.0, larger);
+        let unit = largest.sqrt().recip();
+        let units = VectorOf::<P>::from_index(|k| units[k] * unit);
+        (largest > 0.0 && unit.is_finite() && unit > 0.0)
+            .then_some(Weights { error: Some(error), units })
+    }
+
+    /// The target, the value and the sizes of each law.
+    fn laws(&self, jets: &Jets<P>) -> Vec<Law> {
+        let target = self.target.laws;
+        let law = |target: f64, total: &Total| Law {
+            residual: total.sum.below(target),
+            size: target.abs() + total.size,
+        };
+        let sums = jets.sums.iter().zip(&target.invariants);
+        std::iter::once(law(target.energy, &jets.totals.energy))
+            .chain(sums.map(|(sum, &target)| law(target, sum)))
+            .chain(P::ENTROPY.then(|| law(target.entropy, &jets.totals.entropy)))
+            .collect()
+    }
+
+    /// The differentials of the laws at a site: energy, further sums, entropy.
+    fn covectors(&self, y: &State<P>, jets: &Jets<P>, site: usize, w: &mut [VectorOf<P>]) {
+        let [energy, entropy] = differentials_at::<P>(&jets.all, site);
+        w[0] = energy;
+        for k in 0..P::SUMS {
+            w[1 + k] = self.lattice.parts.sum(k, site, &y[site]).df;
+        }
+        if P::ENTROPY {
+            w[1 + P::SUMS] = entropy;
+        }
+    }
+
+    fn gram(&self, y: &State<P>, jets: &Jets<P>, weights: &Weights<'_, VectorOf<P>>) -> Gram {
+        let laws = 1 + P::SUMS + usize::from(P::ENTROPY);
+        let sizes = &jets.totals.sizes;
+        let parts = parallel::map(self.lattice.sites(), |sites| {
+            let mut gram = Gram::new(laws);
+            let mut w = vec![VectorOf::<P>::zero(); laws];
+            for site in sites {
+                self.covectors(y, jets, site, &mut w);
+                let (weight, scales) = (weights.at(site), P::Manifold::scales(&y[site]));
+                for (a, w) in w.iter().enumerate() {
+                    gram.slopes[a] += w.abs().dot(&scales);
+                }
+                if weight > 0.0 {
+                    for w in &mut w {
+                        for k in 0..dimension::<P>() {
+                            w[k] *= sizes[k];
+                        }
+                    }
+                    for a in 0..laws {
+                        for b in 0..=a {
+                            gram.products[a * laws + b] += weight * w[a].dot(&w[b]);
+                        }
+                    }
+                }
+            }
+            gram
+        });
+        parts.iter().fold(Gram::new(laws), Gram::plus)
+    }
+
+    /// The length of a vector in units of the sizes of the entries: that of the largest site.
+    fn length(&self, v: &crate::vector::SiteVector, jets: &Jets<P>) -> f64 {
+        v.relative_to(&self.lattice.same(&jets.totals.sizes))
+    }
+
+    /// Moves the points by a combination of the differentials.
+    fn corrected(
+        &self,
+        y: &State<P>,
+        jets: &Jets<P>,
+        coefficients: &[f64],
+        weights: &Weights<'_, VectorOf<P>>,
+    ) -> Corrected<P> {
+        let sizes = &jets.totals.sizes;
+        let manifold = self.lattice.parts.manifold();
+        let mut points = y.like();
+        let parts = parallel::fill(&mut points, 1, |sites, out| {
+            let mut w = vec![VectorOf::<P>::zero(); coefficients.len()];
+            let (mut length, mut inside) = (0.0, true);
+            for (site, out) in sites.zip(out) {
+                let weight = weights.at(site);
+                if weight == 0.0 {
+                    out.clone_from(&y[site]);
+                    continue;
+                }
+                self.covectors(y, jets, site, &mut w);
+                let mut u = VectorOf::<P>::zero();
+                for (w, &c) in w.iter().zip(coefficients) {
+                    u += *w * c;
+                }
+                let mut square = 0.0;
+                for k in 0..dimension::<P>() {
+                    let ratio = u[k] * sizes[k] * weight;
+                    square += ratio * ratio;
+                    u[k] = ratio * sizes[k];
+                }
+                length = larger(length, square);
+                *out = P::Manifold::chart(&y[site], &u);
+                inside &= manifold.is_inside(out);
+            }
+            (length, inside)
+        });
+        let inside = parts.iter().all(|&(_, inside)| inside);
+        let largest = parts.iter().fold(0.0, |most, &(length, _)| larger(most, length));
+        let length = (largest / dimension::<P>() as f64).sqrt();
+        Corrected { points: inside.then_some(points), length }
+    }
+}
+
+/// A state that was moved.
+struct Corrected<P: Model> {
+    /// The points; `None` if one is outside of its domain.
+    points: Option<State<P>>,
+    /// The longest displacement of a site, in units of the sizes of the entries.
+    length: f64,
+}

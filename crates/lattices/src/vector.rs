@@ -1,0 +1,205 @@
+//! Numbers for the directions of a lattice.
+
+use metriplectic_fields::Column;
+use metriplectic_integrators::Vector;
+
+use crate::parallel;
+use crate::pool::{Buffer, Pool};
+
+/// A number for each direction at each site: one after the other, or the same ones at all sites.
+///
+/// Sizes of entries are the same at all sites, and cost no memory.
+#[derive(Clone, Debug)]
+pub struct SiteVector {
+    sites: usize,
+    stride: usize,
+    numbers: Numbers,
+    pool: Pool<f64>,
+}
+
+#[derive(Clone, Debug)]
+enum Numbers {
+    /// Those of one site, for all of them.
+    Same(Vec<f64>),
+    Each(Buffer<f64>),
+}
+
+impl std::fmt::Debug for Pool<f64> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("Pool")
+    }
+}
+
+/// Numbers that are read site by site.
+#[derive(Clone, Copy)]
+pub(crate) struct Reader<'a> {
+    numbers: &'a [f64],
+    stride: usize,
+}
+
+impl Reader<'_> {
+    #[inline]
+    pub(crate) fn at<V: Column<f64>>(&self, site: usize) -> V {
+        let start = site * self.stride;
+        let numbers = &self.numbers[start..start + V::LEN];
+        V::from_index(|k| numbers[k])
+    }
+}
+
+impl SiteVector {
+    /// The same numbers at all sites.
+    pub(crate) fn same(sites: usize, numbers: Vec<f64>, pool: &Pool<f64>) -> Self {
+        let stride = numbers.len();
+        Self { sites, stride, numbers: Numbers::Same(numbers), pool: pool.clone() }
+    }
+
+    /// `stride` numbers for each site.
+    pub(crate) fn each(sites: usize, stride: usize, numbers: Buffer<f64>) -> Self {
+        let pool = numbers.pool().clone();
+        Self { sites, stride, numbers: Numbers::Each(numbers), pool }
+    }
+
+    pub(crate) fn reader(&self) -> Reader<'_> {
+        match &self.numbers {
+            Numbers::Same(numbers) => Reader { numbers, stride: 0 },
+            Numbers::Each(numbers) => Reader { numbers, stride: self.stride },
+        }
+    }
+
+    fn filled(&self, f: impl Fn(usize, &mut [f64]) + Sync) -> Self {
+        let mut numbers = self.pool.numbers(self.sites * self.stride);
+        parallel::fill(&mut numbers, self.stride, |sites, out| f(sites.start * self.stride, out));
+        Self::each(self.sites, self.stride, numbers)
+    }
+
+    fn slice(&self) -> Option<&[f64]> {
+        match &self.numbers {
+            Numbers::Same(_) => None,
+            Numbers::Each(numbers) => Some(numbers),
+        }
+    }
+
+    /// The largest value of `f` over the sites, from the numbers of two vectors there.
+    fn largest<'a>(&'a self, other: &'a Self, f: impl Fn(&[f64], &[f64]) -> f64 + Sync) -> f64 {
+        let [here, there] = [self, other].map(Self::reader);
+        let stride = self.stride;
+        let at = |reader: Reader<'a>, site: usize| {
+            let start = site * reader.stride;
+            &reader.numbers[start..start + stride]
+        };
+        let of = |sites: std::ops::Range<usize>| {
+            sites.map(|site| f(at(here, site), at(there, site))).fold(0.0, larger)
+        };
+        parallel::map(self.sites, of).into_iter().fold(0.0, larger)
+    }
+}
+
+/// The larger number, or NaN if one is.
+pub(crate) fn larger(a: f64, b: f64) -> f64 {
+    if a >= b || a.is_nan() { a } else { b }
+}
+
+impl Vector for SiteVector {
+    fn len(&self) -> usize {
+        self.sites * self.stride
+    }
+
+    #[inline]
+    fn get(&self, i: usize) -> f64 {
+        match &self.numbers {
+            Numbers::Same(numbers) => numbers[i % self.stride],
+            Numbers::Each(numbers) => numbers[i],
+        }
+    }
+
+    fn with(&self, mut number: impl FnMut(usize) -> f64) -> Self {
+        let mut numbers = self.pool.numbers(self.len());
+        for (i, out) in numbers.iter_mut().enumerate() {
+            *out = number(i);
+        }
+        Self::each(self.sites, self.stride, numbers)
+    }
+
+    fn zero(&self) -> Self {
+        Self::same(self.sites, vec![0.0; self.stride], &self.pool)
+    }
+
+    fn map(&self, f: impl Fn(f64) -> f64) -> Self {
+        match &self.numbers {
+            Numbers::Same(numbers) => {
+                Self::same(self.sites, numbers.iter().map(|&x| f(x)).collect(), &self.pool)
+            }
+            Numbers::Each(numbers) => self.with(|i| f(numbers[i])),
+        }
+    }
+
+    fn zip<const K: usize>(vectors: [&Self; K], f: impl Fn([f64; K]) -> f64 + Sync) -> Self {
+        let first = vectors[0];
+        if vectors.iter().all(|v| v.slice().is_none()) {
+            let numbers = (0..first.stride).map(|k| f(vectors.map(|v| v.get(k))));
+            return Self::same(first.sites, numbers.collect(), &first.pool);
+        }
+        let mut slices = [&[][..]; K];
+        if vectors.iter().zip(&mut slices).all(|(v, slice)| v.slice().map(|s| *slice = s).is_some())
+        {
+            return first.filled(|start, out| {
+                let slices = slices.map(|slice| &slice[start..start + out.len()]);
+                for (i, out) in out.iter_mut().enumerate() {
+                    *out = f(slices.map(|slice| slice[i]));
+                }
+            });
+        }
+        let (readers, stride) = (vectors.map(Self::reader), first.stride);
+        first.filled(|start, out| {
+            for (site, out) in (start / stride..).zip(out.chunks_exact_mut(stride)) {
+                for (k, out) in out.iter_mut().enumerate() {
+                    *out = f(readers.map(|reader| reader.numbers[site * reader.stride + k]));
+                }
+            }
+        })
+    }
+
+    fn combination<'a>(h: f64, count: usize, term: impl Fn(usize) -> (f64, &'a Self)) -> Self
+    where
+        Self: 'a,
+    {
+        let first = term(0).1;
+        let terms: Vec<_> = (0..count).map(|j| (term(j).0, term(j).1.slice())).collect();
+        // A vector that is the same at all sites adds nothing but itself, and is rare.
+        let Some(terms) = terms.into_iter().map(|(w, v)| Some((w, v?))).collect::<Option<Vec<_>>>()
+        else {
+            let w = term(0).0;
+            let start = Self::zip([first], |[k]| w * k);
+            let add = |sum, j| {
+                let (w, v) = term(j);
+                Self::zip([&sum, v], |[sum, v]| sum + w * v)
+            };
+            return Self::zip([&(1..count).fold(start, add)], |[sum]| h * sum);
+        };
+        first.filled(|start, out| {
+            let end = start + out.len();
+            let (w, v) = terms[0];
+            let last = if count == 1 { h } else { 1.0 };
+            for (out, v) in out.iter_mut().zip(&v[start..end]) {
+                *out = last * (w * v);
+            }
+            for (j, (w, v)) in terms.iter().enumerate().skip(1) {
+                let last = if j + 1 == count { h } else { 1.0 };
+                for (out, v) in out.iter_mut().zip(&v[start..end]) {
+                    *out = last * (*out + w * v);
+                }
+            }
+        })
+    }
+
+    /// The largest site, and the root mean square over the directions of a site. A mean over the sites would allow
+    /// a pulse an error that grows with the length of the lattice around it.
+    fn relative_to(&self, sizes: &Self) -> f64 {
+        let mean = (self.stride as f64).recip();
+        self.largest(sizes, |v, sizes| {
+            let ratio = |(v, s): (&f64, &f64)| if *v == 0.0 { 0.0 } else { (v / s).abs() };
+            let sum = v.iter().zip(sizes).map(ratio).fold(0.0, |sum, r| sum + r * r);
+            (sum * mean).sqrt()
+        })
+    }
+}

@@ -1,0 +1,367 @@
+//! The laws of a lattice, verified at a start in `O(N)`.
+//!
+//! All points and values are looked at once. The laws of the closures are tried at up to 64 sites and bonds, with their
+//! true neighbours, at a state near the start: moved along the velocity and at random, so that no force and no
+//! velocity vanishes by the symmetry of the start.
+
+use metriplectic_fields::{Column, Space, Vector};
+use metriplectic_integrators::{Flow as _, StageFlow as _, Vector as _};
+use metriplectic_manifolds::Manifold;
+
+use crate::error::{LatticeError, Place};
+use crate::lattice::{Lattice, differentials_at, dimension};
+use crate::model::{Model, PairManifold, PointOf, VectorOf};
+use crate::parallel;
+use crate::points::Points;
+use crate::random::Random;
+
+/// Sites, and bonds, at which closures are tried.
+const SAMPLES: usize = 64;
+/// The displacement of the state at which they are, relative to the sizes of the entries.
+const MOVED: f64 = 1e-2;
+/// What is left of terms that should cancel, relative to them.
+const CANCELS: f64 = 1e-9;
+/// The step of a difference quotient, relative to the sizes of the entries, and its error.
+const STEP: f64 = 1e-5;
+const QUOTIENT: f64 = 1e-4;
+
+/// Up to [`SAMPLES`] numbers below `count`, with the first and the last one.
+fn samples(count: usize) -> impl Iterator<Item = usize> {
+    let most = SAMPLES.min(count);
+    // Strides of the golden ratio meet no period of a regular lattice.
+    let golden = |k: usize| (k as f64 * 0.618_033_988_749_894_9).fract();
+    (0..most).map(move |k| match k {
+        _ if most == count => k,
+        0 => 0,
+        1 => count - 1,
+        _ => std::cmp::min((golden(k) * count as f64) as usize, count - 1),
+    })
+}
+
+impl<P: Model> Lattice<P> {
+    /// Verifies the lattice at a state: the points, all values, and the laws at sampled sites and bonds. Every run
+    /// verifies its start.
+    ///
+    /// # Errors
+    ///
+    /// The first [`LatticeError`], with its site or bond.
+    pub fn verify(&self, x: &Points<P::Manifold>) -> Result<(), LatticeError> {
+        let (found, expected) = (x.len(), self.sites());
+        if found != expected {
+            return Err(LatticeError::Points { found, expected });
+        }
+        let wrong = parallel::map(self.sites(), |sites| {
+            let check = |site| self.parts.manifold().check(&x[site]).err().map(|e| (site, e));
+            sites.filter_map(check).next()
+        });
+        if let Some((site, cause)) = wrong.into_iter().flatten().next() {
+            return Err(LatticeError::Start { place: Place::Site(site), cause });
+        }
+        self.verify_values(x)?;
+        let y = self.near(x);
+        Trial { lattice: self, y: &y, random: Random::new(1), mean: [0.0; 2] }.all()
+    }
+
+    fn place_of(&self, bond: usize) -> Place {
+        let sites = self.layout.bonds()[bond].map(|site| site as usize);
+        Place::Bond { bond: self.layout.number(bond), sites }
+    }
+
+    /// A site with a value or a derivative that is no number.
+    pub(crate) fn not_finite(&self, x: &Points<P::Manifold>) -> Option<usize> {
+        match self.verify_values(x) {
+            Err(LatticeError::NotFinite { place: Place::Site(site), .. }) => Some(site),
+            Err(LatticeError::NotFinite { place: Place::Bond { sites, .. }, .. }) => Some(sites[0]),
+            _ => None,
+        }
+    }
+
+    /// Looks for values and derivatives that are no numbers.
+    fn verify_values(&self, x: &Points<P::Manifold>) -> Result<(), LatticeError> {
+        let not_finite = |what, place| Err(LatticeError::NotFinite { what, place });
+        let at = |site: usize| {
+            let point = &x[site];
+            if !self.parts.energy(site, point).is_finite() {
+                return not_finite("energy", Place::Site(site));
+            }
+            if P::ENTROPY && !self.parts.entropy(site, point).is_finite() {
+                return not_finite("entropy", Place::Site(site));
+            }
+            let sum = |k| self.parts.sum(k, site, point).is_finite();
+            if !(0..P::SUMS).all(sum) {
+                return not_finite("conserved sum", Place::Site(site));
+            }
+            Ok(())
+        };
+        let on = |bond: usize| {
+            let pair = self.pair(x, bond);
+            if self.parts.bond_energy(bond, &pair).is_finite() {
+                Ok(())
+            } else {
+                not_finite("energy", self.place_of(bond))
+            }
+        };
+        parallel::map(self.sites(), |mut sites| sites.try_for_each(at))
+            .into_iter()
+            .collect::<Result<(), _>>()?;
+        if P::BOND_ENERGY {
+            parallel::map(self.layout.bonds().len(), |mut bonds| bonds.try_for_each(on))
+                .into_iter()
+                .collect::<Result<(), _>>()?;
+        }
+        let (all, _) = self.differentials::<false>(x);
+        if self.motion_along(x, &all).is_some() {
+            return Ok(());
+        }
+        // A term of the velocity is no number: where is it?
+        for site in 0..self.sites() {
+            let [w, s] = differentials_at::<P>(&all, site);
+            let mut sum = self.parts.reversible(&x[site], &w, &s);
+            let add = |term: crate::Onsager<VectorOf<P>>| sum += term.b * term.rate;
+            self.parts.site_friction(site, &x[site], &w, add);
+            if !sum.is_finite() {
+                return not_finite("velocity", Place::Site(site));
+            }
+        }
+        for bond in 0..self.layout.bonds().len() {
+            let [i, j] = self.layout.bonds()[bond].map(|site| site as usize);
+            let [wi, wj] = [i, j].map(|site| differentials_at::<P>(&all, site)[0]);
+            let mut sum = VectorOf::<P>::zero();
+            self.parts.bond_friction(bond, [&x[i], &x[j]], [&wi, &wj], |term| {
+                sum += (term.b[0] + term.b[1]) * term.rate;
+            });
+            if !sum.is_finite() {
+                return not_finite("friction", self.place_of(bond));
+            }
+        }
+        not_finite("velocity", Place::Total)
+    }
+
+    fn pair(&self, x: &Points<P::Manifold>, bond: usize) -> (PointOf<P>, PointOf<P>) {
+        self.layout.bonds()[bond].map(|site| x[site as usize].clone()).into()
+    }
+
+    /// A state near a state, moved along the velocity and at random; the state itself if there is none.
+    fn near(&self, x: &Points<P::Manifold>) -> Points<P::Manifold> {
+        let sizes = self.sizes(x);
+        let Some((v, _)) = self.motion(x) else { return x.clone() };
+        let sized = crate::SiteVector::zip([&v, &sizes], |[v, s]| if s > 0.0 { v } else { 0.0 });
+        let speed = sized.relative_to(&sizes);
+        let time = if speed > 0.0 { speed.recip() } else { 0.0 };
+        let mut random = Random::new(0);
+        let noise = v.with(|_| random.next());
+        for moved in [MOVED, 1e-2 * MOVED, 1e-4 * MOVED] {
+            let d = crate::SiteVector::zip([&v, &noise, &sizes], |[v, noise, size]| {
+                moved * (time * v + noise * size)
+            });
+            if let Some(y) = self.stage(x, &d)
+                && self.motion(&y).is_some()
+            {
+                return y;
+            }
+        }
+        x.clone()
+    }
+}
+
+/// A state at which laws are tried.
+struct Trial<'a, P: Model> {
+    lattice: &'a Lattice<P>,
+    y: &'a Points<P::Manifold>,
+    random: Random,
+    /// The sizes `|h|` and `|s|` of a site in the mean.
+    mean: [f64; 2],
+}
+
+impl<P: Model> Trial<'_, P> {
+    fn all(&mut self) -> Result<(), LatticeError> {
+        let Self { lattice, y, .. } = *self;
+        let (all, totals) = lattice.differentials::<true>(y);
+        let count = lattice.sites() as f64;
+        self.mean = [totals.energy.size / count, totals.entropy.size / count];
+        for site in samples(lattice.sites()) {
+            self.site(site, &differentials_at::<P>(&all, site))?;
+            self.derivatives(site, &totals.sizes)?;
+        }
+        for bond in samples(lattice.layout.bonds().len()) {
+            self.bond(bond, &all)?;
+            if P::BOND_ENERGY {
+                self.bond_derivative(bond, &totals.sizes)?;
+            }
+        }
+        self.total_derivatives(&all, &totals.sizes)?;
+        self.conserved(&all)
+    }
+
+    /// The bracket and the friction of a site.
+    fn site(&mut self, site: usize, [w, s]: &[VectorOf<P>; 2]) -> Result<(), LatticeError> {
+        let (parts, x, place) = (&self.lattice.parts, &self.y[site], Place::Site(site));
+        let cancels = |law, [rest, terms]: [f64; 2], remedy| {
+            if rest.abs() <= CANCELS * terms {
+                return Ok(());
+            }
+            Err(LatticeError::Broken { law, place, size: rest.abs() / terms, remedy })
+        };
+        for _ in 0..2 {
+            let alpha = VectorOf::<P>::from_index(|k| w[k] * (1.0 + self.random.next()));
+            let v = parts.reversible(x, &alpha, s);
+            cancels("Π = −Πᵀ", [alpha.dot(&v), alpha.abs().dot(&v.abs())], "")?;
+        }
+        let v = parts.reversible(x, w, s);
+        let remedy = "; the entropy of a site must be a Casimir of its bracket";
+        cancels("Π dS = 0", [s.dot(&v), s.abs().dot(&v.abs())], remedy)?;
+        let mut result = Ok(());
+        parts.site_friction(site, x, w, |term| {
+            let rest = [term.b.dot(w), term.b.abs().dot(&w.abs())];
+            let checked =
+                rate(term.rate, place).and_then(|()| cancels("b·dH = 0", rest, ANNIHILATES));
+            result = result.clone().and(checked);
+        });
+        result
+    }
+
+    /// The friction of a bond.
+    fn bond(&self, bond: usize, all: &[f64]) -> Result<(), LatticeError> {
+        let Self { lattice, y, .. } = *self;
+        let place = lattice.place_of(bond);
+        let [i, j] = lattice.layout.bonds()[bond].map(|site| site as usize);
+        let [wi, wj] = [i, j].map(|site| differentials_at::<P>(all, site)[0]);
+        let mut result = Ok(());
+        lattice.parts.bond_friction(bond, [&y[i], &y[j]], [&wi, &wj], |term| {
+            let [bi, bj] = term.b;
+            let rest = (bi.dot(&wi) + bj.dot(&wj)).abs();
+            let terms = bi.abs().dot(&wi.abs()) + bj.abs().dot(&wj.abs());
+            let broken = (rest > CANCELS * terms).then(|| LatticeError::Broken {
+                law: "b·(dH_i, dH_j) = 0",
+                place,
+                size: rest / terms,
+                remedy: ANNIHILATES,
+            });
+            let checked = rate(term.rate, place).and(broken.map_or(Ok(()), Err));
+            result = result.clone().and(checked);
+        });
+        result
+    }
+
+    /// The derivatives of the functions of a site.
+    fn derivatives(&mut self, site: usize, sizes: &VectorOf<P>) -> Result<(), LatticeError> {
+        let (parts, x) = (&self.lattice.parts, &self.y[site]);
+        let u = self.random.vector(sizes);
+        let moved = |t: f64| P::Manifold::chart(x, &(u * t));
+        let ends = [moved(STEP), moved(-STEP)];
+        let place = Place::Site(site);
+        let energy = parts.energy(site, x);
+        let [[h1, s1], [h0, s0]] = ends.each_ref().map(|x| parts.values(site, x));
+        quotient(
+            "energy",
+            place,
+            energy.value.abs().max(self.mean[0]),
+            Slope::of(&energy.df, &u),
+            [h1, h0],
+        )?;
+        if P::ENTROPY {
+            let entropy = parts.entropy(site, x);
+            let size = entropy.value.abs().max(self.mean[1]);
+            quotient("entropy", place, size, Slope::of(&entropy.df, &u), [s1, s0])?;
+        }
+        for k in 0..P::SUMS {
+            let sum = parts.sum(k, site, x);
+            let ends = ends.each_ref().map(|x| parts.sum(k, site, x).value);
+            quotient("conserved sum", place, sum.value, Slope::of(&sum.df, &u), ends)?;
+        }
+        Ok(())
+    }
+
+    fn bond_derivative(&mut self, bond: usize, sizes: &VectorOf<P>) -> Result<(), LatticeError> {
+        let lattice = self.lattice;
+        let x = lattice.pair(self.y, bond);
+        let n = dimension::<P>();
+        let both = Vector::<PairManifold<P>>::from_index(|k| sizes[k % n]);
+        let u = self.random.vector(&both);
+        let ends = [STEP, -STEP]
+            .map(|t| lattice.parts.bond_value(bond, &PairManifold::<P>::chart(&x, &(u * t))));
+        let jet = lattice.parts.bond_energy(bond, &x);
+        let size = jet.value.abs().max(self.mean[0]);
+        quotient("energy", lattice.place_of(bond), size, Slope::of(&jet.df, &u), ends)
+    }
+
+    /// The derivative of the totals along one random direction.
+    fn total_derivatives(&mut self, all: &[f64], sizes: &VectorOf<P>) -> Result<(), LatticeError> {
+        let Self { lattice, y, .. } = *self;
+        let random = &mut self.random;
+        let u: Vec<VectorOf<P>> = (0..lattice.sites()).map(|_| random.vector(sizes)).collect();
+        let moved = |t: f64| {
+            let d = lattice.vector_of(|site| u[site] * t);
+            lattice.moved(y, &d)
+        };
+        let [[h1, s1], [h0, s0]] = [moved(STEP), moved(-STEP)].map(|x| lattice.totals(&x));
+        let mut slopes = [Slope::default(); 2];
+        for (site, u) in u.iter().enumerate() {
+            for (slope, df) in slopes.iter_mut().zip(differentials_at::<P>(all, site)) {
+                let next = Slope::of(&df, u);
+                *slope = Slope { sum: slope.sum + next.sum, terms: slope.terms + next.terms };
+            }
+        }
+        let ends = [h1, h0].map(|total| total.sum.value());
+        quotient("energy", Place::Total, h0.size, slopes[0], ends)?;
+        let ends = [s1, s0].map(|total| total.sum.value());
+        quotient("entropy", Place::Total, s0.size, slopes[1], ends)
+    }
+
+    /// The rates of the conserved sums.
+    fn conserved(&self, all: &[f64]) -> Result<(), LatticeError> {
+        let Self { lattice, y, .. } = *self;
+        let Some((v, _)) = lattice.motion_along(y, all) else { return Ok(()) };
+        for index in 0..P::SUMS {
+            let mut rate = Slope::default();
+            for site in 0..lattice.sites() {
+                let df = lattice.parts.sum(index, site, &y[site]).df;
+                let next = Slope::of(&df, &v.reader().at(site));
+                rate = Slope { sum: rate.sum + next.sum, terms: rate.terms + next.terms };
+            }
+            if rate.sum.abs() > CANCELS * rate.terms {
+                let size = rate.sum.abs() / rate.terms;
+                return Err(LatticeError::NotConserved { index, size });
+            }
+        }
+        Ok(())
+    }
+}
+
+const ANNIHILATES: &str =
+    "; build each b from the differentials of the energy that the closure is given";
+
+fn rate(rate: f64, place: Place) -> Result<(), LatticeError> {
+    if rate < 0.0 { Err(LatticeError::NegativeRate { place, rate }) } else { Ok(()) }
+}
+
+/// A derivative along a direction, and the sizes of its terms.
+#[derive(Clone, Copy, Default)]
+struct Slope {
+    sum: f64,
+    terms: f64,
+}
+
+impl Slope {
+    fn of<V: Column<f64>>(df: &V, u: &V) -> Self {
+        Self { sum: df.dot(u), terms: df.abs().dot(&u.abs()) }
+    }
+}
+
+/// Compares a derivative with the change of the values.
+fn quotient(
+    what: &'static str,
+    place: Place,
+    size: f64,
+    slope: Slope,
+    [after, before]: [f64; 2],
+) -> Result<(), LatticeError> {
+    let quotient = (after - before) / (2.0 * STEP);
+    let round_off = 16.0 * f64::EPSILON * size.abs().max(after.abs()) / STEP;
+    // The quotient is as large as the terms unless it is round-off, or a derivative is missing.
+    let terms = slope.terms.max(quotient.abs());
+    if (quotient - slope.sum).abs() <= QUOTIENT * terms + round_off || !quotient.is_finite() {
+        return Ok(());
+    }
+    Err(LatticeError::WrongDerivative { what, place, derivative: slope.sum, quotient })
+}

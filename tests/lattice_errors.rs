@@ -1,0 +1,166 @@
+//! Lattices that are refused, with the site or the bond.
+
+use metriplectic::integrators::FlowError;
+use metriplectic::lattices::Place;
+use metriplectic::prelude::*;
+
+type Pair = (Vector2<Real>, Vector2<Real>);
+type Term = Onsager<[Vector2<f64>; 2]>;
+
+/// `(p, e)` at each site: momenta with friction, and internal energies that take up its heat.
+fn friction(u: &Vector2<f64>, v: &Vector2<f64>) -> [Term; 1] {
+    // w = (p, 1).
+    let slip = v.x - u.x;
+    [Onsager { rate: 0.1, b: [vector![-1.0, -0.5 * slip], vector![1.0, -0.5 * slip]] }]
+}
+
+fn energy(x: &Vector2<Real>) -> Real {
+    x.x * x.x * 0.5 + x.y
+}
+
+fn entropy(x: &Vector2<Real>) -> Real {
+    x.y.ln()
+}
+
+/// What a builder says of this graph and this friction.
+fn refused(
+    graph: Graph,
+    terms: fn(&Vector2<f64>, &Vector2<f64>) -> [Term; 1],
+    start: impl FnMut(usize) -> Vector2<f64>,
+) -> LatticeError {
+    let lattice = Lattice::on(graph, Euclidean::<2>)
+        .energy(energy)
+        .entropy(entropy)
+        .bond_onsager(move |bond| terms(bond.w[0], bond.w[1]))
+        .conserved(|x: &Vector2<Real>| x.x)
+        .build();
+    let lattice = match lattice {
+        Ok(lattice) => lattice,
+        Err(error) => return error,
+    };
+    let start = lattice.points(start);
+    match DormandPrince5.run(&lattice, start, Span::steps(0.1, 2)) {
+        Err(RunError::Flow(error)) => own(&error),
+        other => panic!("not refused: {other:?}"),
+    }
+}
+
+fn own(error: &FlowError) -> LatticeError {
+    println!("{error}");
+    error.downcast_ref::<LatticeError>().expect("the error of a lattice").clone()
+}
+
+fn warm(i: usize) -> Vector2<f64> {
+    vector![(i as f64).sin(), 1.0]
+}
+
+#[test]
+fn a_graph_that_does_not_fit_is_refused() {
+    let of = |graph| refused(graph, friction, warm);
+    assert_eq!(of(Graph::chain(0)), LatticeError::NoSites);
+    let bonds = [[0, 1], [1, 4], [9, 9]];
+    let nowhere = LatticeError::BondToNowhere { bond: 1, site: 4, sites: 4 };
+    assert_eq!(of(Graph::from_bonds(4, bonds)), nowhere);
+    let itself = LatticeError::BondToItself { bond: 2, site: 2 };
+    assert_eq!(of(Graph::from_bonds(4, [[0, 1], [1, 3], [2, 2]])), itself);
+    assert_eq!(of(Graph::ring(1)), LatticeError::BondToItself { bond: 0, site: 0 });
+    let large = Graph::cubic([1 << 40, 1 << 40, 1], Boundary::Open);
+    assert!(matches!(of(large), LatticeError::TooManySites { .. }));
+}
+
+#[test]
+fn parts_that_make_no_lattice_are_refused() {
+    let base = || Lattice::on(Graph::chain(4), Euclidean::<2>).energy(energy);
+    assert_eq!(base().build().err(), Some(LatticeError::NothingMoves));
+    let no_friction = base().bracket(Symplectic).entropy(entropy).build();
+    assert_eq!(no_friction.err(), Some(LatticeError::EntropyWithoutFriction));
+    let on_bonds = base().bond_entropy(|(x, y): &Pair| x.x * y.x).build();
+    assert_eq!(on_bonds.err(), Some(LatticeError::EntropyOnBonds));
+    let data = base().bracket(Symplectic).bond_data(vec![1.0; 4]).build();
+    assert_eq!(data.err(), Some(LatticeError::Data { of: "bonds", found: 4, expected: 3 }));
+    // The entropy must be a Casimir.
+    let moved = base()
+        .bracket(Symplectic)
+        .entropy(|x: &Vector2<Real>| x.y)
+        .site_onsager(|_| [Onsager { rate: 0.0, b: vector![0.0, 0.0] }])
+        .build()
+        .unwrap();
+    let error = moved.verify(&moved.points(warm)).unwrap_err();
+    println!("{error}");
+    assert!(matches!(error, LatticeError::Broken { law: "Π dS = 0", place: Place::Site(0), .. }));
+}
+
+#[test]
+fn friction_that_breaks_a_law_is_refused_with_its_bond() {
+    let n = 3000;
+    let error = refused(
+        Graph::ring(n),
+        |_, _| [Onsager { rate: 0.1, b: [vector![-1.0, 0.0], vector![1.0, 0.0]] }],
+        warm,
+    );
+    assert!(
+        matches!(error, LatticeError::Broken { place: Place::Bond { .. }, size, .. } if size > 0.01)
+    );
+    let error =
+        refused(Graph::ring(n), |u, v| friction(u, v).map(|t| Onsager { rate: -0.1, ..t }), warm);
+    assert!(matches!(error, LatticeError::NegativeRate { place: Place::Bond { bond: 0, .. }, .. }));
+    // Friction against the frame of the sites does not conserve their momentum.
+    let error = refused(
+        Graph::ring(n),
+        |u, v| [Onsager { rate: 0.1, b: [vector![1.0, -u.x], vector![0.5, -0.5 * v.x]] }],
+        warm,
+    );
+    assert!(
+        matches!(error, LatticeError::NotConserved { index: 0, size } if size > 1e-4),
+        "{error}"
+    );
+}
+
+#[test]
+fn a_start_without_a_value_names_its_site() {
+    let n = 100_000;
+    let place = Place::Site(70_001);
+    let with = |x: Vector2<f64>| move |i: usize| if i == 70_001 { x } else { warm(i) };
+    let error = refused(Graph::ring(n), friction, with(vector![f64::NAN, 1.0]));
+    assert!(matches!(error, LatticeError::Start { place: at, .. } if at == place));
+    // The logarithm of a negative energy.
+    let error = refused(Graph::ring(n), friction, with(vector![0.0, -1.0]));
+    assert_eq!(error, LatticeError::NotFinite { what: "entropy", place });
+    let error = refused(
+        Graph::ring(n),
+        |u, v| {
+            // An infinite rate where the velocities agree.
+            friction(u, v).map(|t| Onsager { rate: 1.0 / (u.x - v.x).abs(), ..t })
+        },
+        |i| vector![(i / 2) as f64, 1.0],
+    );
+    let bond = Place::Bond { bond: 0, sites: [0, 1] };
+    assert_eq!(error, LatticeError::NotFinite { what: "friction", place: bond });
+    let lattice = Lattice::on(Graph::ring(4), Euclidean::<2>)
+        .bracket(Symplectic)
+        .energy(|x: &Vector2<Real>| x.x * x.x + Real::from(x.y.re * x.y.re))
+        .build()
+        .unwrap();
+    let error = lattice.verify(&lattice.points(warm)).unwrap_err();
+    assert!(
+        matches!(error, LatticeError::WrongDerivative { place: Place::Site(0), .. }),
+        "{error}"
+    );
+    let few: Points<Euclidean<2>> = vec![vector![0.0, 1.0]; 3].into();
+    assert_eq!(lattice.verify(&few), Err(LatticeError::Points { found: 3, expected: 4 }));
+}
+
+#[test]
+fn a_site_that_leaves_its_domain_is_named() {
+    // Sites fall into a well of infinite depth; one of them is faster.
+    let lattice = Lattice::on(Graph::chain(2000), Euclidean::<2>)
+        .bracket(Symplectic)
+        .energy(|x: &Vector2<Real>| x.y * x.y * 0.5 + x.x.ln())
+        .build()
+        .unwrap();
+    let start = lattice.points(|i| vector![1.0, if i == 1234 { -3.0 } else { 0.0 }]);
+    let fixed = DormandPrince5.run(&lattice, start.clone(), Span::steps(0.1, 9));
+    let Err(RunError::Step { cause, .. }) = fixed else { panic!("the step is taken") };
+    println!("{cause}");
+    assert!(matches!(cause, StepError::SiteOutOfDomain { site: 1234, .. }), "{cause}");
+}

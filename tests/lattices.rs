@@ -1,0 +1,296 @@
+//! Lattices: both laws, orders, closed forms, and the same bits on every number of threads.
+
+#[path = "models/chain.rs"]
+mod chain;
+#[path = "models/lattices.rs"]
+mod models;
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use chain::{chain, waves};
+use metriplectic::integrators::{Flow, Vector};
+use metriplectic::prelude::*;
+use models::{conduction, helix, toda};
+
+/// The velocity of the chain of `models/chain.rs`, with derivatives by hand.
+fn velocity_by_hand(bonds: &[[usize; 2]], x: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
+    let mut w: Vec<_> = x.iter().map(|x| vector![0.0, x.y, (0.5 * x.z).exp()]).collect();
+    for &[i, j] in bonds {
+        let (r, heat) = (x[j].x - x[i].x, x[i].z + x[j].z);
+        let force = r + 0.25 * r * r + r * r * r - 0.025 * heat;
+        w[i] += vector![-force, 0.0, -0.025 * r];
+        w[j] += vector![force, 0.0, -0.025 * r];
+    }
+    let mut v: Vec<_> = w.iter().map(|w| vector![w.y, -w.x, 0.0]).collect();
+    for &[i, j] in bonds {
+        let [u, t] = [w[i], w[j]];
+        // Friction f slip, whose heat f slip² is shared; conduction 0.1 (T − U).
+        let (slip, flux) = (0.5 * (t.y - u.y), 0.1 * (t.z - u.z));
+        let f = 0.2 * u.z * t.z / (u.z + t.z) * -slip * (u.z.recip() + t.z.recip());
+        v[i] += vector![0.0, -f, (-slip * f + flux) / u.z];
+        v[j] += vector![0.0, f, (-slip * f - flux) / t.z];
+    }
+    v
+}
+
+#[test]
+fn the_velocity_is_the_sum_of_local_terms_on_every_graph() {
+    // A ring whose bonds come in an arbitrary order and direction, over three chunks.
+    let n = 2500;
+    let shuffled = (0..n).map(|k| {
+        let i = k * 1009 % n;
+        let [i, j] = [i, (i + 1 + i % 3 * 600) % n];
+        if k % 2 == 0 { [i, j] } else { [j, i] }
+    });
+    let graphs: [(usize, Vec<[usize; 2]>); 2] =
+        [(n, shuffled.collect()), (40, (0..40).map(|i| [i, (i + 1) % 40]).collect())];
+    for (n, bonds) in graphs {
+        let lattice = chain(Graph::from_bonds(n, bonds.iter().copied()));
+        let x = lattice.points(waves);
+        let v = lattice.rates(&x, &lattice.sizes(&x).zero()).unwrap();
+        let by_hand = velocity_by_hand(&bonds, &x);
+        let largest = by_hand.iter().map(|v| v.amax()).fold(0.0, f64::max);
+        let off = (0..3 * n).map(|k| (v.get(k) - by_hand[k / 3][k % 3]).abs()).fold(0.0, f64::max);
+        // Some roundings in sums of a dozen terms.
+        assert!(off < 32.0 * f64::EPSILON * largest, "{off:.1e} of {largest:.1}");
+    }
+}
+
+#[test]
+fn both_laws_hold_on_every_step() {
+    let lattice = chain(Graph::ring(400));
+    let start = lattice.points(waves);
+    let energy = lattice.laws(&start).energy;
+    let check = |certificate: &Certificate| {
+        println!("{certificate}\n");
+        // All terms of this energy are positive but for the stress, which is below a fiftieth of them.
+        assert!(certificate.max_energy_error <= 4.0 * f64::EPSILON * 1.05 * energy);
+        assert!(certificate.keeps_entropy() && certificate.entropy_gained > 1.0);
+        assert!(certificate.invariants[0].max_error < 1e-13);
+        assert!(certificate.projected_steps.targeted == certificate.steps);
+    };
+    let fixed = Span::steps(0.05, 200).every(200);
+    let five = DormandPrince5.run(&lattice, start.clone(), fixed).unwrap();
+    check(five.certificate());
+    let span = Span::until(10.0).tolerance(1e-9).at_most(2);
+    let eight = DormandPrince8.run(&lattice, start, span).unwrap();
+    check(eight.certificate());
+    // Two methods come to one end.
+    let off = distance(&five.last().point, &eight.last().point);
+    assert!(off < 1e-6, "{off:.1e}");
+}
+
+fn distance(x: &[Vector3<f64>], y: &[Vector3<f64>]) -> f64 {
+    x.iter().zip(y).map(|(x, y)| (x - y).amax()).fold(0.0, f64::max)
+}
+
+#[test]
+fn the_bits_do_not_depend_on_the_number_of_threads() {
+    // Bonds within chunks and across them, in three directions.
+    let lattice = chain(Graph::cubic([20, 20, 10], Boundary::Periodic));
+    let start = lattice.points(waves);
+    let ends = [1, 2, 3, 7].map(|threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| {
+            let span = Span::until(0.6).tolerance(1e-6).at_most(2);
+            let run = DormandPrince5.run(&lattice, start.clone(), span).unwrap();
+            assert!(run.certificate().steps > 3);
+            (run.last().clone(), run.certificate().clone())
+        })
+    });
+    assert!(ends.iter().all(|end| *end == ends[0]));
+}
+
+#[test]
+fn a_soliton_moves_at_the_order_of_the_method() {
+    let lattice = toda::lattice(64);
+    let start = lattice.points(|i| toda::at(i, 0.0));
+    let error = |eight: bool, steps: usize| {
+        let span = Span::steps(8.0 / steps as f64, steps).every(steps);
+        let run = if eight {
+            DormandPrince8.run(&lattice, start.clone(), span).unwrap()
+        } else {
+            DormandPrince5.run(&lattice, start.clone(), span).unwrap()
+        };
+        // The terms of this energy, eᵣ and r and 1, are up to four times as large as it is.
+        let certificate = run.certificate();
+        assert!(certificate.max_energy_error <= 4.0 * f64::EPSILON * certificate.initial_energy);
+        let off = |(i, x): (usize, &Vector2<f64>)| (x - toda::at(i, 8.0)).amax();
+        run.last().point.iter().enumerate().map(off).fold(0.0, f64::max)
+    };
+    for (eight, least, steps) in [(false, 4.8, [40, 57, 80, 113]), (true, 7.65, [20, 25, 32, 40])] {
+        let errors = steps.map(|steps| error(eight, steps));
+        let points = steps.iter().zip(errors).map(|(&n, e)| [(n as f64).ln(), e.ln()]);
+        let slope = -slope(&points.collect::<Vec<_>>());
+        println!("order {slope:.2}: {errors:?}");
+        assert!(slope > least && slope < least + 1.5, "{slope}: {errors:?}");
+    }
+}
+
+/// The slope of the line of least squares.
+fn slope(points: &[[f64; 2]]) -> f64 {
+    let mean = |k: usize| points.iter().map(|p| p[k]).sum::<f64>() / points.len() as f64;
+    let [x, y] = [mean(0), mean(1)];
+    let product = points.iter().map(|p| (p[0] - x) * (p[1] - y)).sum::<f64>();
+    product / points.iter().map(|p| (p[0] - x).powi(2)).sum::<f64>()
+}
+
+#[test]
+fn a_damped_helix_turns_and_warms_as_in_closed_form() {
+    let n = 40;
+    let lattice = helix::lattice(n);
+    let start = lattice.points(|i| helix::at(n, i, 0.0));
+    let run = DormandPrince8.run(&lattice, start, Span::until(6.0).tolerance(1e-13).at_most(2));
+    let run = run.unwrap();
+    println!("{}", run.certificate());
+    assert!(run.certificate().keeps_energy() && run.certificate().keeps_entropy());
+    assert!(run.certificate().max_manifold_defect < 1e-15);
+    let off = |(i, x): (usize, &helix::Spin)| {
+        let exact = helix::at(n, i, 6.0);
+        (x.0 - exact.0).amax().max((x.1 - exact.1).amax())
+    };
+    let off = run.last().point.iter().enumerate().map(off).fold(0.0, f64::max);
+    println!("{off:.1e}");
+    assert!(off < 2e-12, "{off:.1e}");
+}
+
+#[test]
+fn heat_spreads_as_the_discrete_kernel_says_in_every_unit() {
+    // A ring in units of its own; and copper: cells of 1 mm and 1 cm², c in J/K and κ in W/K, at 300 K.
+    let density = 8960.0;
+    let copper = [385.0 * density * 1e-3 * 1e-4, 401.0 * 1e-4 / 1e-3, 300.0];
+    let errors = [[1.0, 1.0, 1.0], copper].map(|[c, kappa, theta]| {
+        let n = 40;
+        let lattice = conduction::lattice(n, [c, kappa], Arc::default());
+        let end = 2.0 * c / kappa;
+        let start = lattice.points(|i| conduction::at([n, i], 2.0, [c, kappa, theta], 0.0));
+        let span = Span::until(end).tolerance(1e-15).at_most(2);
+        let run = DormandPrince8.run(&lattice, start, span).unwrap();
+        println!("{}", run.certificate());
+        assert!(run.certificate().keeps_energy() && run.certificate().keeps_entropy());
+        let off = |(i, x): (usize, &Vector1<f64>)| {
+            (x / conduction::at([n, i], 2.0, [c, kappa, theta], end).x).x - 1.0
+        };
+        let off = run.last().point.iter().enumerate().map(|ix| off(ix).abs()).fold(0.0, f64::max);
+        (off, run.certificate().steps)
+    });
+    println!("{errors:?}");
+    assert!(errors.iter().all(|(off, _)| *off < 1e-13), "{errors:?}");
+    assert_eq!(errors[0].1, errors[1].1, "the steps have no unit");
+}
+
+#[test]
+fn the_error_is_proportional_to_the_tolerance() {
+    let n = 40;
+    let lattice = helix::lattice(n);
+    let start = lattice.points(|i| helix::at(n, i, 0.0));
+    let error = |eight: bool, tolerance: f64| {
+        let span = Span::until(20.0).tolerance(tolerance).at_most(2);
+        let run = if eight {
+            DormandPrince8.run(&lattice, start.clone(), span).unwrap()
+        } else {
+            DormandPrince5.run(&lattice, start.clone(), span).unwrap()
+        };
+        let off = |(i, x): (usize, &helix::Spin)| (x.0 - helix::at(n, i, 20.0).0).amax();
+        run.last().point.iter().enumerate().map(off).fold(0.0, f64::max)
+    };
+    for eight in [false, true] {
+        let errors = [1e-7, 1e-8, 1e-9, 1e-10].map(|tolerance| error(eight, tolerance));
+        println!("{errors:?}");
+        // Proportional within a factor of three per decade.
+        assert!(errors.windows(2).all(|e| (3.0..34.0).contains(&(e[0] / e[1]))), "{errors:?}");
+    }
+}
+
+#[test]
+fn a_pulse_leaves_the_sites_alone_that_it_has_not_reached() {
+    // One site is pushed in a chain at rest, where every force vanishes to the last bit.
+    let (n, steps) = (4000, 20);
+    let lattice = chain(Graph::ring(n));
+    let push = |i: usize| vector![0.0, if i == 2000 { 1.0 } else { 0.0 }, 0.0];
+    let start = lattice.points(push);
+    let run = DormandPrince5.run(&lattice, start.clone(), Span::steps(0.1, steps)).unwrap();
+    assert!(run.certificate().keeps_energy() && run.certificate().keeps_entropy());
+    assert!(run.certificate().max_energy_error <= 4.0 * f64::EPSILON * 2.0 * n as f64);
+    let end = &run.last().point;
+    // Forces reach the next site, and friction the one behind it, in each of six stages.
+    let reach = 2 * 6 * steps + 2;
+    let is_near = |i: usize| i.abs_diff(2000) <= reach;
+    assert!((0..n).all(|i| is_near(i) || end[i] == start[i]));
+    assert!((0..n).filter(|&i| end[i] != start[i]).count() > 100);
+}
+
+#[test]
+fn runs_have_outputs_events_rest_and_checkpoints() {
+    let n = 40;
+    let lattice = helix::lattice(n);
+    let start = lattice.points(|i| helix::at(n, i, 0.0));
+    let height = |x: &Points<_>| -> f64 {
+        let x: &[helix::Spin] = x;
+        x.iter().map(|spin| spin.0.z).sum::<f64>() / x.len() as f64
+    };
+    // The mean height is cos θ(t), and an output has the error of the tolerance.
+    let span = || Span::until(4.0).tolerance(1e-10);
+    let watched =
+        span().output_at([0.3, 1.7, 3.1]).event("0.45", move |x: &Points<_>| height(x) - 0.45);
+    let run = DormandPrince8.run(&lattice, start.clone(), watched).unwrap();
+    let (event, states) = (&run.events()[0].state, run.states());
+    for state in states.iter().chain([event]) {
+        let exact = helix::at(n, 0, state.time).0.z;
+        assert!((height(&state.point) - exact).abs() < 1e-8, "t = {}", state.time);
+        let energy = (state.energy - states[0].energy).abs();
+        assert!(energy <= 4.0 * f64::EPSILON * 2.0 * n as f64, "{energy:.1e}");
+    }
+    assert!((height(&event.point) - 0.45).abs() < 1e-9);
+    assert!(states.windows(2).all(|s| s[0].entropy <= s[1].entropy));
+    // Put down and taken up again.
+    let whole = DormandPrince8.run(&lattice, start.clone(), span().at_most(2)).unwrap();
+    let mut steps = DormandPrince8.steps(&lattice, start.clone(), span()).unwrap();
+    while steps.state().time < 2.0 {
+        steps.advance().unwrap();
+    }
+    let text = serde_json::to_string(&steps.checkpoint()).unwrap();
+    let checkpoint: Checkpoint = serde_json::from_str(&text).unwrap();
+    let resumed = DormandPrince8.resume(&lattice, &checkpoint).unwrap().run().unwrap();
+    assert_eq!(resumed.last(), whole.last());
+    assert_eq!(resumed.certificate(), whole.certificate());
+    // All spins are up in the end.
+    let span = Span::until(1e3).tolerance(1e-8).until_rest(1e-6).at_most(2);
+    let rest = DormandPrince5.run(&lattice, start, span).unwrap();
+    println!("{} {:?}", rest.certificate(), rest.ending());
+    assert!(rest.ending().is_rest() && height(&rest.last().point) > 1.0 - 1e-9);
+}
+
+#[test]
+fn stiff_conduction_takes_stages_in_proportion_to_the_root_of_its_stiffness() {
+    let (n, parameters) = (1000, [1.0, 1000.0, 1.0]);
+    let count = Arc::<AtomicUsize>::default();
+    let lattice = conduction::lattice(n, [1.0, 1000.0], count.clone());
+    let at = |i, t| conduction::at([n, i], 2.0, parameters, t);
+    let start = lattice.points(|i| at(i, 0.0));
+    let run = |tolerance: f64| {
+        count.store(0, Ordering::Relaxed);
+        let span = Span::until(2.0).tolerance(tolerance).at_most(2);
+        let run = RungeKuttaChebyshev.run(&lattice, start.clone(), span).unwrap();
+        println!("{}", run.certificate());
+        let certificate = run.certificate();
+        assert!(certificate.max_energy_error <= 4.0 * f64::EPSILON * certificate.initial_energy);
+        assert_eq!(certificate.entropy_falls, 0);
+        let off = |(i, x): (usize, &Vector1<f64>)| (x - at(i, 2.0)).amax();
+        let error = run.last().point.iter().enumerate().map(off).fold(0.0, f64::max);
+        let velocities = count.load(Ordering::Relaxed) / n;
+        println!("{tolerance:.0e}: {velocities} velocities, error {error:.1e}");
+        (error, velocities)
+    };
+    let runs = [1e-3, 1e-4, 1e-5].map(run);
+    println!("{runs:?}");
+    // The error is proportional to the tolerance, and the stages to the root of the number of steps.
+    for pair in runs.windows(2) {
+        let [(e0, v0), (e1, v1)] = pair else { unreachable!("windows of two") };
+        assert!((3.0..30.0).contains(&(e0 / e1)), "{runs:?}");
+        assert!(*v1 as f64 <= 2.0 * *v0 as f64, "{runs:?}");
+    }
+    // An explicit step is stable up to 3.3 / (4κ/c): 2400 steps to t = 2, seven velocities each.
+    assert!(runs[1].0 < 7e-6 && runs[1].1 < 700, "{runs:?}");
+}

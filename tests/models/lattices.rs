@@ -1,0 +1,124 @@
+//! Lattices with closed forms.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use metriplectic::lattices::Model;
+use metriplectic::prelude::*;
+
+/// The chain of Toda (1967) with the soliton `q_n = ln((1 + e^{2κ(n−1−c) − 2ωt}) / (1 + e^{2κ(n−c) − 2ωt}))`,
+/// `ω = sinh κ`, far from both ends.
+pub(crate) mod toda {
+    use super::*;
+
+    const KAPPA: f64 = 1.0;
+
+    pub(crate) fn lattice(n: usize) -> Lattice<impl Model<Manifold = Euclidean<2>>> {
+        Lattice::on(Graph::chain(n), Euclidean::<2>)
+            .bracket(Symplectic)
+            .energy(|x: &Vector2<Real>| x.y * x.y * 0.5)
+            .bond_energy(|(x, y): &(Vector2<Real>, Vector2<Real>)| {
+                let r = y.x - x.x;
+                (-r).exp() + r - 1.0
+            })
+            .build()
+            .expect("the parts make a lattice")
+    }
+
+    /// `(q_i, p_i)` at the time `t`.
+    pub(crate) fn at(i: usize, t: f64) -> Vector2<f64> {
+        let omega = KAPPA.sinh();
+        // With s = 1/(1 + e^{−z}), ln(1 + e^z)' = s z'.
+        let z = |n: f64| 2.0 * (KAPPA * (n - 24.0) - omega * t);
+        let [before, here] = [z(i as f64 - 1.0), z(i as f64)];
+        let logistic = |z: f64| (1.0 + (-z).exp()).recip();
+        let q = before.exp().ln_1p() - here.exp().ln_1p();
+        vector![q, -2.0 * omega * (logistic(before) - logistic(here))]
+    }
+}
+
+/// A ring of classical spins with heat, `H = −J Σ n·n' − K Σ n_z² + C Σ e^{s/C}`, whose friction is
+/// `n' = −λ w_tan`: a helix of the wave number `k` keeps its form.
+pub(crate) mod helix {
+    use super::*;
+
+    pub(crate) type Spin = (Vector3<f64>, Vector1<f64>);
+    type SpinSpace = Product<Sphere<2>, Euclidean<1>>;
+    type Dual = (Vector3<Real>, Vector1<Real>);
+
+    const EXCHANGE: f64 = 1.0;
+    const ANISOTROPY: f64 = 0.3;
+    const CAPACITY: f64 = 2.0;
+    const FRICTION: f64 = 0.1;
+
+    pub(crate) fn lattice(n: usize) -> Lattice<impl Model<Manifold = SpinSpace>> {
+        Lattice::on(Graph::ring(n), Product(Sphere::<2>::round(), Euclidean::<1>))
+            .bracket((AreaForm, Zero))
+            .energy(|(n, s): &Dual| (s.x / CAPACITY).exp() * CAPACITY - n.z * n.z * ANISOTROPY)
+            .bond_energy(|(x, y): &(Dual, Dual)| x.0.dot(&y.0) * -EXCHANGE)
+            .entropy(|(_, s): &Dual| s.x)
+            .site_onsager(|site| {
+                let w = site.w;
+                let term = |k: usize| {
+                    let mut b = Vector3::zeros();
+                    (b[k], b[2]) = (1.0, -w[k] / w[2]);
+                    Onsager { rate: FRICTION * w[2], b }
+                };
+                [term(0), term(1)]
+            })
+            .build()
+            .expect("the parts make a lattice")
+    }
+
+    /// `tan θ = tan θ₀ e^{−at}` and `φ = ki + (2b/a) [artanh cos θ]`, with `b = J (1 − cos k) + K` and `a = 2λb`; the
+    /// energy that the spins lose is heat.
+    pub(crate) fn at(n: usize, i: usize, t: f64) -> Spin {
+        let k = 3.0 * std::f64::consts::TAU / n as f64;
+        let b = EXCHANGE * (1.0 - k.cos()) + ANISOTROPY;
+        let a = 2.0 * FRICTION * b;
+        let start: f64 = 1.2;
+        let theta = (start.tan() * (-a * t).exp()).atan();
+        let turned = (2.0 * b / a) * (theta.cos().atanh() - start.cos().atanh());
+        let phi = k * i as f64 + turned;
+        // The energy of a site is const − b cos²θ + C e^{s/C}.
+        let heat = b * (theta.cos().powi(2) - start.cos().powi(2));
+        let s = CAPACITY * (1.0 + heat / CAPACITY).ln();
+        let up = theta.cos();
+        (vector![theta.sin() * phi.cos(), theta.sin() * phi.sin(), up], vector![s])
+    }
+}
+
+/// Conduction on a ring of cells with the internal energies `e = cT`: `θ = 1 + A cos(ki) e^{−2κ(1 − cos k)t/c}`.
+pub(crate) mod conduction {
+    use super::*;
+
+    /// The lattice, and how often a bond was evaluated.
+    pub(crate) fn lattice(
+        n: usize,
+        [c, kappa]: [f64; 2],
+        count: Arc<AtomicUsize>,
+    ) -> Lattice<impl Model<Manifold = Euclidean<1>>> {
+        Lattice::on(Graph::ring(n), Euclidean::<1>)
+            .energy(|e: &Vector1<Real>| e.x)
+            .entropy(move |e: &Vector1<Real>| e.x.ln() * c)
+            .bond_onsager(move |bond| {
+                count.fetch_add(1, Ordering::Relaxed);
+                let [x, y] = bond.x.map(|e| e.x / c);
+                [Onsager { rate: kappa * x * y, b: [vector![1.0], vector![-1.0]] }]
+            })
+            .build()
+            .expect("the parts make a lattice")
+    }
+
+    /// The energy of cell `i` at the time `t`, with a temperature of `theta` in the mean and so many waves.
+    pub(crate) fn at(
+        [n, i]: [usize; 2],
+        waves: f64,
+        [c, kappa, theta]: [f64; 3],
+        t: f64,
+    ) -> Vector1<f64> {
+        let k = waves * std::f64::consts::TAU / n as f64;
+        let decay = (-2.0 * kappa * (1.0 - k.cos()) * t / c).exp();
+        vector![c * theta * (1.0 + 0.4 * (k * i as f64).cos() * decay)]
+    }
+}

@@ -325,16 +325,18 @@ impl Newton {
         // Whether the equation's own Jacobian has had so little left to do that what remains is noise.
         let mut is_noise = false;
         for taken in 0_usize.. {
-            // A displacement within its round-off is that of a state at rest.
-            let enough = if measure.of(&best.best) <= 1.0 {
-                1.0
-            } else if is_noise {
-                0.3
-            } else {
-                0.1
-            };
-            if best.residual <= enough * residual_bound && size <= enough * most {
-                return solved(evidence);
+            if best.residual <= residual_bound && size <= most {
+                // A displacement within its round-off is that of a state at rest.
+                let enough = if measure.of(&best.best) <= 1.0 {
+                    1.0
+                } else if is_noise {
+                    0.3
+                } else {
+                    0.1
+                };
+                if best.residual <= enough * residual_bound && size <= enough * most {
+                    return solved(evidence);
+                }
             }
             best.iterations += 1;
             let round = best.residual <= residual_bound

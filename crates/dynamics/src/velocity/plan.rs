@@ -4,7 +4,7 @@ use std::fmt::Debug;
 
 use super::covectors::Covectors;
 use crate::bracket::Bracket;
-use crate::invariants::Kind;
+use crate::invariants::{Invariants, Kind};
 use crate::metriplectic::{Dim, Metriplectic, SecondLaw};
 
 /// The independent fraction `σ = μ` of a Casimir's covector at which its projection in `Π̃` has half its weight,
@@ -41,7 +41,8 @@ impl ProjectionPlan {
         let entropy = system.second_law() == SecondLaw::Exact;
         let moves = !system.bracket().is_zero();
         let already = system.bracket().annihilates_entropy();
-        let projected = moves && (entropy && !already || w.has(Kind::Casimir));
-        Self { entropy, projected, momenta: moves && w.has(Kind::Momentum) }
+        let has = |kind| Y::Invariants::COUNT > 0 && w.has(kind);
+        let projected = moves && (entropy && !already || has(Kind::Casimir));
+        Self { entropy, projected, momenta: moves && has(Kind::Momentum) }
     }
 }

@@ -1,7 +1,6 @@
 //! A step allocates nothing. A program of its own, because the allocator counts for the whole process,
 //! and the threads of a test harness allocate too.
 
-use metriplectic::integrators::DiscreteGradient;
 use metriplectic::prelude::*;
 
 #[global_allocator]
@@ -18,9 +17,9 @@ where
     blocks_of(Scheme::new(WeylMidpoint), system, x0)
 }
 
-/// The same with another scheme.
-fn blocks_of<Y: Metriplectic, R: Retraction<Y::Manifold, Y::Metric>, W: DiscreteGradient>(
-    scheme: Scheme<R, W>,
+/// The same with another method.
+fn blocks_of<Y: Metriplectic, M: Method<Y>>(
+    scheme: M,
     system: &Y,
     x0: <Y::Manifold as metriplectic::fields::Space>::Point<f64>,
 ) -> u64 {
@@ -45,6 +44,8 @@ fn main() {
         .build()
         .expect("it is a system");
     assert_eq!(blocks(&body, vector![0.5, -0.3, 0.1]), 0);
+    assert_eq!(blocks_of(Gauss::<4>::default(), &body, vector![0.5, -0.3, 0.1]), 0);
+    assert_eq!(blocks_of(Radau::<3>::default(), &body, vector![0.5, -0.3, 0.1]), 0);
 
     let top = System::on(LieDual::se3())
         .energy(|x: &Vector6<Real>| {

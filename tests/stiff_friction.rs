@@ -134,7 +134,7 @@ fn two_temperatures_come_together() {
     let (x, p) = (vector![cold, hot], (vector![cold], vector![hot]));
     for exponent in [-5, -4, -2, 0] {
         let span = Span::steps(10_f64.powi(exponent), 20);
-        for method in [Radau2, Radau3] {
+        for method in RADAU {
             let run = damped("R × R", method, &flat, &x, span);
             assert!(near(run.last().point.into()), "h = 1e{exponent}: {}", run.last().point);
             let run = damped("R₊ × R₊", method, &positive, &p, span);
@@ -234,5 +234,46 @@ fn heat_is_exchanged_in_steps_of_any_size() {
         for method in [Gauss1, Gauss2] {
             assert!(!is_silent(method.run(&system, start, span), near), "{method:?}, 1e{exponent}");
         }
+    }
+}
+
+/// A damped oscillator whose entries, times and energies are so many times those of the one without units.
+fn oscillator(units: [f64; 3], time: f64) -> impl Metriplectic<Manifold = Euclidean<3>> {
+    let [a, b, c] = units;
+    let (rate, zero) = (a * b / time, 0.0);
+    let canonical = Matrix3::new(zero, rate, zero, -rate, zero, zero, zero, zero, zero);
+    let metric = Matrix3::from_diagonal(&vector![a.powi(-2), b.powi(-2), c.powi(-2)]);
+    System::on(Euclidean::<3>)
+        .metric(Metric::constant(metric).expect("it is positive"))
+        .bracket(Poisson::constant(canonical).expect("it is skew"))
+        .energy(move |x: &Vector3<Real>| {
+            ((x.x / a).powi(2) + (x.y / b).powi(2)) * 0.5 + (x.z / c).exp()
+        })
+        .entropy(move |x: &Vector3<Real>| x.z / c)
+        .dissipation(FieldDissipation(move |_: &Vector3<Real>, w: &Vector3<Real>| {
+            let force = Vector3::new(Real::from(0.0), w.z * (b * c), -w.y * (b * c));
+            force * force.transpose() * ((w.z * c).recip() * (100.0 / time))
+        }))
+        .build()
+        .expect("it is a system")
+}
+
+/// Steps are the same numbers in other units, up to the order of the pivots of a stiff step.
+#[test]
+fn units_change_nothing() {
+    use metriplectic::integrators::laws::{UnitRun, Units, scaling};
+    let plain = oscillator([1.0; 3], 1.0);
+    let start = vector![1.0, 0.5, 0.0];
+    let (a, b, c, time) = (2_f64.powi(-30), 2_f64.powi(-80), 2_f64.powi(-70), 2_f64.powi(-43));
+    let scaled = oscillator([a, b, c], time);
+    let units = Units { entries: vec![a, b, c], time, energy: 1.0, entropy: 1.0 };
+    for method in [Gauss2, Radau3] {
+        let large = UnitRun { system: &plain, x0: start, course: Span::steps(0.1, 40).into() };
+        let small = UnitRun {
+            system: &scaled,
+            x0: vector![a, 0.5 * b, 0.0],
+            course: Span::steps(0.1 * time, 40).into(),
+        };
+        scaling(&method, &large, &small, &units, 1e-14).unwrap();
     }
 }

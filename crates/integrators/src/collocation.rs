@@ -1,6 +1,6 @@
 //! Methods with stages: [`Gauss`] of order `2s`, [`Radau`] of order `2s − 1`, with both laws exact on every space.
 //!
-//! A step has `s` stages `X_i` in a [chart](chart) around its middle, with velocities `v_i`. Each function `F` among
+//! A step has `s` stages `X_i` in a chart around its middle, with velocities `v_i`. Each function `F` among
 //! `H`, `S` and `L_a` gets one number for all stages,
 //!
 //! ```math
@@ -27,16 +27,16 @@
 //! # Stiff friction
 //!
 //! A method with an exact balance of the entropy cannot damp (the book has the proof). [`Radau`] gives up the
-//! balance on one side, `ΔS ≥ h Σ b_i K̃_i(w_S, w_S)`, and returns what it loses of the energy as [heat](heat). It damps
+//! balance on one side, `ΔS ≥ h Σ b_i K̃_i(w_S, w_S)`, and returns what it loses of the energy as heat. It damps
 //! friction that is much faster than a step.
 //!
 //! # The solver
 //!
 //! A step is solved by the following, in this order:
 //!
-//! 1. The [blended iteration](linear) from the continued polynomial of the step before, with one Jacobian for all stages.
+//! 1. The blended iteration from the continued polynomial of the step before, with one Jacobian for all stages.
 //! 2. The same from rest.
-//! 3. Newton's method with the [derivatives of all stages](full), for friction that is stiff and not linear.
+//! 3. Newton's method with the derivatives of all stages, for friction that is stiff and not linear.
 //! 4. Continuation in the step size, by steps that double and are quartered.
 //! 5. Halves, [`splits`](Gauss::splits) times at most.
 //!

@@ -33,10 +33,6 @@ pub(super) type Unknowns<Y> = Stages<Vector<<Y as Metriplectic>::Manifold>>;
 /// Units of round-off up to which a velocity that changes the energy is one that has lost digits.
 const ROUNDINGS: f64 = 16.0;
 
-/// The ratio of two productions of entropy, that of friction at the end and that of the step, from which on friction is
-/// not damped: without damping it is of the order of `hλ`.
-const UNDAMPED: f64 = 10.0;
-
 /// The covectors of all laws at the stages.
 pub(super) type StageCovectorsOf<Y> =
     Covectors<Dim<Y>, StageCovectors<Vector<<Y as Metriplectic>::Manifold>>>;
@@ -96,8 +92,8 @@ pub(super) struct Evaluated<Y: Metriplectic> {
     pub(super) growth: f64,
     /// What the entropy gains beside it.
     pub(super) surplus: f64,
-    /// Whether friction is damped.
-    pub(super) damps: bool,
+    /// What friction at the end would produce in a step of this size; infinite where nothing is damped.
+    pub(super) left: f64,
     /// The largest change of the energy at a stage.
     pub(super) excursion: f64,
 }
@@ -236,7 +232,7 @@ impl<'a, Y: Metriplectic> StageEquation<'a, Y> {
             entropy_slope: if self.is_exact() { entropy_slope } else { f64::INFINITY },
             growth: production,
             surplus,
-            damps: left <= UNDAMPED * (production.abs() + surplus) + ROUNDED * w.entropy.size,
+            left,
             excursion: w.energy.excursion,
         })
     }

@@ -26,12 +26,13 @@ pub(super) struct Full {
 const DIFFERENCE: f64 = 1e-7;
 
 impl Full {
-    /// The derivatives at these velocities, where the equation has been evaluated, by differences; `None` if they are
-    /// singular, or the equation is not defined around there.
+    /// The derivatives at these velocities, where the equation has been evaluated, by differences in units of the
+    /// entries and of a `correction`; `None` if they are singular, or the equation is not defined around there.
     pub(super) fn of<Y: Metriplectic>(
         equation: &StageEquation<'_, Y>,
         k: &Unknowns<Y>,
         at: &Evaluated<Y>,
+        correction: &Unknowns<Y>,
     ) -> Option<Self> {
         let (s, n) = (equation.tableau.stages, <Y::Manifold as Space>::Dim::LEN);
         let (size, scales) = (s * n, Y::Manifold::scales(equation.x) + at.d.abs());
@@ -39,8 +40,13 @@ impl Full {
         let mut evaluations = 0;
         for j in 0..s {
             for c in 0..n {
-                let largest = k[..s].iter().map(|k| (equation.h * k[c]).abs()).fold(0.0, f64::max);
-                let whole = DIFFERENCE * (scales[c] + largest).max(f64::MIN_POSITIVE);
+                let longest = |v: &Unknowns<Y>| {
+                    v[..s].iter().map(|v| (equation.h * v[c]).abs()).fold(0.0, f64::max)
+                };
+                let known = scales[c] + longest(k);
+                // An entry that starts at zero has the size that it is about to reach.
+                let entry = if known > 0.0 { known } else { longest(correction) };
+                let whole = (DIFFERENCE * entry).max(f64::MIN_POSITIVE);
                 // On the edge of a domain the other side is defined.
                 let sides = [whole, -whole, 1e-3 * whole, -1e-3 * whole];
                 let (there, step) = sides.into_iter().find_map(|step| {

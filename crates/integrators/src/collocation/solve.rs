@@ -152,7 +152,8 @@ impl<'a, Y: Metriplectic> Iteration<'a, Y> {
         let mut iteration =
             Self { equation, budget, linear, full: None, evaluations: 1, corrections: 0 };
         if budget.derivatives == Derivatives::OfAllStages {
-            iteration.full = Full::of(&equation, &guess, &at);
+            let correction = iteration.blended(&guess, &at);
+            iteration.full = Full::of(&equation, &guess, &at, &correction);
             iteration.evaluations += iteration.full.as_ref().map_or(0, |full| full.evaluations);
         }
         let here = iteration.corrected(guess, at).ok_or(undefined)?;
@@ -173,13 +174,20 @@ impl<'a, Y: Metriplectic> Iteration<'a, Y> {
         size.is_finite().then_some(Iterate { k, at, delta, round_off, size, excess })
     }
 
+    /// The correction with one Jacobian.
+    fn blended(&self, k: &Unknowns<Y>, at: &Evaluated<Y>) -> Unknowns<Y> {
+        let round_off = self.linear.round_off(at, k);
+        self.linear.correction(&at.residual, &round_off).0
+    }
+
     /// Forms the derivatives anew.
     fn renew(&mut self, here: Iterate<Y>) -> Option<Iterate<Y>> {
         let Iterate { k, at, .. } = here;
         self.linear = Linear::of(&self.equation, &k)?;
         self.equation.rounding = self.linear.rounding();
         if self.full.is_some() {
-            self.full = Full::of(&self.equation, &k, &at);
+            let correction = self.blended(&k, &at);
+            self.full = Full::of(&self.equation, &k, &at, &correction);
             self.evaluations += self.full.as_ref()?.evaluations;
         }
         self.corrected(k, at)

@@ -1,6 +1,6 @@
 //! One step: guess, solve, end; then the last digits.
 
-use metriplectic_dynamics::Metriplectic;
+use metriplectic_dynamics::{Metriplectic, system::Point};
 use metriplectic_fields::{Dimension, Space as _};
 use metriplectic_manifolds::Manifold;
 
@@ -10,7 +10,7 @@ use super::memory::{LastStep, StageMemory};
 use super::solve::Solved;
 use super::tableau::Tableau;
 use crate::method::{Effort, Evidence, Flow as _, Laws, StageLaws, StepStart, Taken};
-use crate::midpoint::{Dim, Start};
+use crate::midpoint::{Dim, Numbers, Start};
 use crate::round_off::bound::{ROUNDED, breaks_first_law, sizes_on_a_step};
 use crate::round_off::compensation::Displaced;
 use crate::round_off::drift;
@@ -37,6 +37,9 @@ pub(super) fn start_of<'a, Y: Metriplectic>(
 /// The change of the energy at a stage, relative to the size of its terms, that no motion makes.
 const FAR: f64 = 1.0;
 
+/// The ratio `R²/(½ (1 − R²))` of a deviation above which it is not damped.
+const DAMPED: f64 = 1.0;
+
 /// Tries a step whole.
 pub(super) fn try_step<Y: Metriplectic>(
     tableau: &'static Tableau,
@@ -60,10 +63,13 @@ pub(super) fn try_step<Y: Metriplectic>(
         .iter()
         .all(|k| (0..Dim::<Y>::LEN).all(|c| (h * k[c]).abs() <= 2.0 * round_off[c]));
     let rise = if tableau.one_sided { at.growth + at.surplus } else { at.growth };
+    // What is left of a deviation by the ratio R produces R² hλ of what the step has produced, or more.
+    let damped = DAMPED * linear.friction.max(1.0) * (at.growth.abs() + at.surplus)
+        + ROUNDED * at.sizes.entropy;
     let evidence = Evidence {
         entropy_slope: at.entropy_slope,
         dissipates: rise.abs() > NOTHING * values.entropy.abs(),
-        friction: if at.damps { 0.0 } else { linear.friction },
+        friction: if at.left <= damped { 0.0 } else { linear.friction },
         rests,
         stages: Some(StageLaws::new(at.error * ROUNDED, at.surplus)),
         ..Evidence::default()
@@ -92,13 +98,18 @@ pub(super) fn try_step<Y: Metriplectic>(
     memory.last = Some(LastStep { k, filter: *linear.filter() });
     let step = Displaced { x, d: &u, end: &end };
     let compensated = memory.compensation.add::<Y::Manifold>(Y::Manifold::lost_digits, &step);
-    let (x_end, values_end) = match compensated {
+    let (mut x_end, mut values_end) = match compensated {
         Some(moved) => {
             let values = system.laws(&moved);
             (moved, values)
         }
         None => (end, at.values),
     };
+    if let Some(moved) = corrected(&equation, at.error, &x_end, &values_end) {
+        values_end = system.laws(&moved);
+        x_end = moved;
+        memory.compensation.clear();
+    }
     let change = values_end.energy - values.energy;
     if !values_end.entropy.is_finite() {
         return Err(failed(Cause::Edge, effort));
@@ -108,4 +119,28 @@ pub(super) fn try_step<Y: Metriplectic>(
         return Err(failed(Cause::Energy { change, size }, effort));
     }
     Ok(Taken { x: x_end, values: values_end, evidence, effort })
+}
+
+/// The end with the last digits of the laws, where friction is so stiff that the stages have lost them: moved onto the
+/// energy and the further invariants, and onto the entropy if that has fallen. `None` if nothing is lost, or no state
+/// near by has these laws.
+fn corrected<Y: Metriplectic>(
+    equation: &StageEquation<'_, Y>,
+    error: f64,
+    end: &Point<Y>,
+    values: &Laws<Numbers<Y>>,
+) -> Option<Point<Y>> {
+    let StageEquation { system, values: before, drift, .. } = equation;
+    let falls = before.entropy - values.entropy > ROUNDED * before.entropy.abs();
+    let falls = falls && equation.is_exact() && equation.h > 0.0;
+    if error <= 1.0 && !falls {
+        return None;
+    }
+    let laws = Laws {
+        energy: before.energy - drift.energy,
+        entropy: before.entropy,
+        invariants: Dim::<Y>::array(|a| before.invariants[a] - drift.invariants[a]),
+    };
+    let on_all = if falls { system.onto(end, &laws, Some(before.entropy)) } else { None };
+    on_all.or_else(|| system.onto(end, &laws, None))
 }

@@ -297,14 +297,14 @@ mod tests {
                 (sum - f64::from(k).recip()).abs()
             };
             let order = tableau.order.cast_signed();
-            assert!((1..=order).all(|k| quadrature(k) < 2e-16), "{tableau:?}");
-            assert!(quadrature(order + 1) > 1e-5, "{tableau:?}");
+            assert!((1..=order).all(|k| quadrature(k) < 4e-16), "{tableau:?}");
+            assert!(quadrature(order + 1) > 1e-6, "{tableau:?}");
             for k in 1..=i32::try_from(s).unwrap() {
                 for i in 0..s {
                     let row: f64 =
                         (0..s).map(|j| tableau.matrix[i][j] * tableau.nodes[j].powi(k - 1)).sum();
                     let off = row - tableau.nodes[i].powi(k) / f64::from(k);
-                    assert!(off.abs() < 2e-16, "{s} stages, row {i}, degree {k}: {off:e}");
+                    assert!(off.abs() < 4e-16, "{s} stages, row {i}, degree {k}: {off:e}");
                 }
             }
         }

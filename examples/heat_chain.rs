@@ -61,7 +61,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let spread = (4.0 * CONDUCTIVITY * t / CAPACITY).sqrt();
     let diffused =
         |i: usize| 1.0 + 0.5 * (HOT - 1.0) * erfc((i as f64 + 0.5 - middle as f64) / spread);
-    let width = (4.0 * spread) as usize + 1;
+    let width = SITES / 40;
     let apart = |i: usize| (temperature(i) - diffused(i)).abs();
     let error = (middle - width..middle + width).map(apart).fold(0.0, f64::max);
     let wide = SITES / 4;
@@ -77,7 +77,7 @@ fn main() -> Result<(), Box<dyn Error>> {
                 .line("closed form", profile(wide, &sound))
                 .line("chain", profile(wide, &|i| end.point[i].y)),
         );
-    let entries = [0, wide, middle].map(|i| temperature(i)).to_vec();
+    let entries = [0, wide, middle].map(temperature).to_vec();
     let report = example.report_of(certificate, t, entries);
     report
         .with("temperature_error", error)

@@ -11,7 +11,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use chain::{chain, waves};
 use metriplectic::integrators::{Flow, Vector};
 use metriplectic::prelude::*;
-use models::{conduction, helix, toda};
+use models::{conduction, embedded_atoms, helix, toda};
 
 /// The velocity of the chain of `models/chain.rs`, with derivatives by hand.
 fn velocity_by_hand(bonds: &[[usize; 2]], x: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
@@ -137,22 +137,32 @@ fn slope(points: &[[f64; 2]]) -> f64 {
 }
 
 #[test]
-fn a_damped_helix_turns_and_warms_as_in_closed_form() {
+fn a_damped_helix_turns_and_warms_as_in_closed_form_in_every_unit() {
     let n = 40;
-    let lattice = helix::lattice(n);
-    let start = lattice.points(|i| helix::at(n, i, 0.0));
-    let run = DormandPrince8.run(&lattice, start, Span::until(6.0).tolerance(1e-13).at_most(2));
-    let run = run.unwrap();
-    println!("{}", run.certificate());
-    assert!(run.certificate().keeps_energy() && run.certificate().keeps_entropy());
-    assert!(run.certificate().max_manifold_defect < 1e-15);
-    let off = |(i, x): (usize, &helix::Spin)| {
-        let exact = helix::at(n, i, 6.0);
-        (x.0 - exact.0).amax().max((x.1 - exact.1).amax())
-    };
-    let off = run.last().point.iter().enumerate().map(off).fold(0.0, f64::max);
-    println!("{off:.1e}");
-    assert!(off < 2e-12, "{off:.1e}");
+    // In units of its own; and in joules and joules per kelvin, with an exchange of k_B · 1 K.
+    let boltzmann = 1.380_649e-23;
+    let runs = [[1.0, 1.0], [boltzmann, boltzmann]].map(|[joule, boltzmann]| {
+        let lattice = helix::lattice(n, [joule, boltzmann]);
+        let at = |i: usize, t: f64| {
+            let (n, s) = helix::at(n, i, t * joule);
+            (n, s * boltzmann)
+        };
+        let end = 6.0 / joule;
+        let span = Span::until(end).tolerance(1e-13).at_most(2);
+        let run = DormandPrince8.run(&lattice, lattice.points(|i| at(i, 0.0)), span).unwrap();
+        println!("{}", run.certificate());
+        assert!(run.certificate().keeps_energy() && run.certificate().keeps_entropy());
+        assert!(run.certificate().max_manifold_defect < 1e-15);
+        let off = |(i, x): (usize, &helix::Spin)| {
+            let exact = at(i, end);
+            (x.0 - exact.0).amax().max((x.1 - exact.1).amax() / boltzmann)
+        };
+        let off = run.last().point.iter().enumerate().map(off).fold(0.0, f64::max);
+        (off, run.certificate().steps)
+    });
+    println!("{runs:?}");
+    assert!(runs.iter().all(|(off, _)| *off < 1e-12), "{runs:?}");
+    assert_eq!(runs[0].1, runs[1].1, "the steps have no unit");
 }
 
 #[test]
@@ -183,7 +193,7 @@ fn heat_spreads_as_the_discrete_kernel_says_in_every_unit() {
 #[test]
 fn the_error_is_proportional_to_the_tolerance() {
     let n = 40;
-    let lattice = helix::lattice(n);
+    let lattice = helix::lattice(n, [1.0, 1.0]);
     let start = lattice.points(|i| helix::at(n, i, 0.0));
     let error = |eight: bool, tolerance: f64| {
         let span = Span::until(20.0).tolerance(tolerance).at_most(2);
@@ -224,7 +234,7 @@ fn a_pulse_leaves_the_sites_alone_that_it_has_not_reached() {
 #[test]
 fn runs_have_outputs_events_rest_and_checkpoints() {
     let n = 40;
-    let lattice = helix::lattice(n);
+    let lattice = helix::lattice(n, [1.0, 1.0]);
     let start = lattice.points(|i| helix::at(n, i, 0.0));
     let height = |x: &Points<_>| -> f64 {
         let x: &[helix::Spin] = x;
@@ -293,4 +303,47 @@ fn stiff_conduction_takes_stages_in_proportion_to_the_root_of_its_stiffness() {
     }
     // An explicit step is stable up to 3.3 / (4κ/c): 2400 steps to t = 2, seven velocities each.
     assert!(runs[1].0 < 7e-6 && runs[1].1 < 700, "{runs:?}");
+}
+
+#[test]
+fn embedded_atoms_have_both_laws_and_the_order_of_the_method() {
+    // Bonds across chunks, so that sums of neighbours cross them too.
+    let n = 2080;
+    let lattice = embedded_atoms::lattice(n);
+    let start = lattice.points(waves);
+    let end = |steps: usize| {
+        let span = Span::steps(2.0 / steps as f64, steps).every(steps);
+        let run = DormandPrince5.run(&lattice, start.clone(), span).unwrap();
+        let certificate = run.certificate();
+        // Each site has terms of about 2 and −1.6.
+        let bound = 4.0 * f64::EPSILON * 3.6 * n as f64;
+        assert!(certificate.max_energy_error <= bound, "{certificate}");
+        assert!(certificate.keeps_entropy() && certificate.keeps_invariants());
+        run.last().point.clone()
+    };
+    let span = Span::until(2.0).tolerance(1e-13).at_most(2);
+    let exact = DormandPrince8.run(&lattice, start.clone(), span).unwrap().last().point.clone();
+    let steps = [40, 57, 80, 113];
+    let errors = steps.map(|steps| distance(&end(steps), &exact));
+    let points = steps.iter().zip(errors).map(|(&n, e)| [(n as f64).ln(), e.ln()]);
+    let order = -slope(&points.collect::<Vec<_>>());
+    println!("order {order:.2}: {errors:?}");
+    assert!(order > 4.7 && order < 5.5, "{errors:?}");
+}
+
+#[test]
+#[ignore = "slow study: 10⁵ steps of 1000 sites"]
+fn both_laws_hold_over_many_steps() {
+    let lattice = chain(Graph::ring(1000));
+    let start = lattice.points(waves);
+    let energy = lattice.laws(&start).energy;
+    let steps = 100_000;
+    let run = DormandPrince5.run(&lattice, start, Span::steps(0.05, steps).every(steps)).unwrap();
+    let certificate = run.certificate();
+    println!("{certificate}\n{certificate:?}");
+    assert!(certificate.max_energy_error <= 4.0 * f64::EPSILON * energy);
+    // Σ|p| is at most the square root of 2NH.
+    let momenta = (2000.0 * energy).sqrt();
+    assert!(certificate.invariants[0].max_error <= 4.0 * f64::EPSILON * momenta);
+    assert_eq!(certificate.entropy_falls, 0);
 }

@@ -51,11 +51,18 @@ pub(crate) mod helix {
     const CAPACITY: f64 = 2.0;
     const FRICTION: f64 = 0.1;
 
-    pub(crate) fn lattice(n: usize) -> Lattice<impl Model<Manifold = SpinSpace>> {
+    /// With energies in units of `joule`, entropies in units of `boltzmann`, and times in units of one over the energy.
+    pub(crate) fn lattice(
+        n: usize,
+        [joule, boltzmann]: [f64; 2],
+    ) -> Lattice<impl Model<Manifold = SpinSpace>> {
         Lattice::on(Graph::ring(n), Product(Sphere::<2>::round(), Euclidean::<1>))
             .bracket((AreaForm, Zero))
-            .energy(|(n, s): &Dual| (s.x / CAPACITY).exp() * CAPACITY - n.z * n.z * ANISOTROPY)
-            .bond_energy(|(x, y): &(Dual, Dual)| x.0.dot(&y.0) * -EXCHANGE)
+            .energy(move |(n, s): &Dual| {
+                let heat = (s.x / (CAPACITY * boltzmann)).exp() * CAPACITY;
+                (heat - n.z * n.z * ANISOTROPY) * joule
+            })
+            .bond_energy(move |(x, y): &(Dual, Dual)| x.0.dot(&y.0) * (-EXCHANGE * joule))
             .entropy(|(_, s): &Dual| s.x)
             .site_onsager(|site| {
                 let w = site.w;
@@ -120,5 +127,29 @@ pub(crate) mod conduction {
         let k = waves * std::f64::consts::TAU / n as f64;
         let decay = (-2.0 * kappa * (1.0 - k.cos()) * t / c).exp();
         vector![c * theta * (1.0 + 0.4 * (k * i as f64).cos() * decay)]
+    }
+}
+
+/// Embedded atoms (Daw, Baskes 1984) in a ring with heat: the energy of a site is `−√ρ` of the density `ρ = Σ e^{−2r}`
+/// of its neighbours, beside the parts of the chain.
+pub(crate) mod embedded_atoms {
+    use super::*;
+    use crate::chain::{CANONICAL, Pair, bond, onsager, site};
+
+    pub(crate) fn lattice(n: usize) -> Lattice<impl Model<Manifold = Euclidean<3>>> {
+        Lattice::on(Graph::ring(n), Euclidean::<3>)
+            .bracket(Poisson::constant(CANONICAL).expect("a skew matrix"))
+            .energy(site)
+            .gather(
+                |(x, y): &Pair| ((x.x - y.x) * 2.0).exp(),
+                // The bond of an atom is weaker where it is hot.
+                |x, density| -density.sqrt() * (-x.z * 0.02).exp(),
+            )
+            .bond_energy(bond)
+            .entropy(|x: &Vector3<Real>| x.z)
+            .bond_onsager(onsager)
+            .conserved(|x: &Vector3<Real>| x.y)
+            .build()
+            .expect("the parts make a lattice")
     }
 }

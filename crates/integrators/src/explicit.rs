@@ -42,6 +42,7 @@
 
 mod chebyshev;
 mod dense;
+mod estimates;
 mod flow;
 mod memory;
 mod metriplectic;
@@ -194,7 +195,7 @@ macro_rules! method {
                 memory: &MemoryOf<F>,
                 norm: impl Fn(&F::Vector) -> f64,
             ) -> Option<f64> {
-                step::error(Self::TABLEAU, flow, step, memory, norm)
+                estimates::error(Self::TABLEAU, flow, step, memory, norm)
             }
 
             fn between(

@@ -8,7 +8,8 @@ use metriplectic_fields::{Real, ScalarField, Vector};
 use metriplectic_manifolds::{Canonical, Manifold, Product, Riemannian, Times};
 
 use crate::error::LatticeError;
-use crate::fields::{Absent, ConservedSums, LocalData, LocalField, Uniform, WithData};
+use crate::fields::{Absent, ConservedSums, InOrder, LocalData, LocalField, Uniform, WithData};
+use crate::gather::{Gathered, SiteEnergy};
 use crate::graph::Graph;
 use crate::lattice::Lattice;
 use crate::layout::Layout;
@@ -240,6 +241,47 @@ where
         })
     }
 
+    /// Appends an energy `g(x_i, ρ_i)` of each site that depends on a sum over its bonds, `ρ_i = Σ φ`: a density. `φ` is
+    /// a function of the first and the second site of a bond, and counts for both. Set the
+    /// [`energy`](Self::energy) of the sites before it.
+    ///
+    /// An embedded atom (Daw, Baskes 1984) has `g = −√ρ`:
+    ///
+    /// ```
+    /// use metriplectic_dynamics::Symplectic;
+    /// use metriplectic_fields::Real;
+    /// use metriplectic_lattices::{Graph, Lattice, LatticeError};
+    /// use metriplectic_manifolds::Euclidean;
+    /// use nalgebra::{Vector2, vector};
+    /// use num_dual::DualNum;
+    ///
+    /// let atoms = Lattice::on(Graph::ring(100), Euclidean::<2>)
+    ///     .bracket(Symplectic)
+    ///     .energy(|x: &Vector2<Real>| x.y * x.y * 0.5)
+    ///     .gather(
+    ///         |(x, y): &(Vector2<Real>, Vector2<Real>)| ((x.x - y.x) * 2.0).exp(),
+    ///         |_, density| -density.sqrt(),
+    ///     )
+    ///     .build()?;
+    /// atoms.verify(&atoms.points(|i| vector![0.1 * (i as f64).sin(), 0.0]))?;
+    /// # Ok::<(), LatticeError>(())
+    /// ```
+    pub fn gather<P, G>(
+        self,
+        phi: P,
+        embed: G,
+    ) -> LatticeBuilder<M, B, Fields<Gathered<H, P, G>, V, S>, Friction<KB, KS>, L, Data<D, E>>
+    where
+        P: ScalarField<Product<M, M>> + Sync,
+        G: Fn(&M::Point<Real>, Real) -> Real + Sync,
+    {
+        self.with_fields(|Fields { energy, bond_energy, entropy }| Fields {
+            energy: Gathered { energy, phi, embed },
+            bond_energy,
+            entropy,
+        })
+    }
+
     /// Sets the entropy `s(x_i)` of a site: a closure `|x| -> Real` or any other [`ScalarField`]. The bracket must
     /// annihilate its differential.
     pub fn entropy<T: ScalarField<M> + Sync>(
@@ -318,17 +360,13 @@ where
     /// # Errors
     ///
     /// [`LatticeError`] if the parts do not make a lattice.
-    #[allow(
-        clippy::type_complexity,
-        reason = "the type of a lattice lists its parts, and a name for it would hide them"
-    )]
     pub fn build(
         self,
     ) -> Result<Lattice<Parts<M, B, Fields<H, V, S>, Friction<KB, KS>, L, Data<D, E>>>, LatticeError>
     where
         Canonical: Riemannian<M>,
         B: Bracket<M, Canonical> + Sync,
-        H: LocalField<M, D::Item>,
+        H: SiteEnergy<M, D::Item>,
         V: LocalField<Product<M, M>, E::Item>,
         S: LocalField<M, D::Item>,
         KB: BondFriction<M, E::Item>,
@@ -365,21 +403,5 @@ where
             parts.data.bonds.arrange(order);
         }
         Ok(Lattice::new(parts, layout))
-    }
-}
-
-/// Data that can be brought into the order in which bonds are evaluated.
-pub trait InOrder: LocalData {
-    /// Puts the item with the number `order[k]` at the place `k`.
-    fn arrange(&mut self, order: &[u32]);
-}
-
-impl InOrder for () {
-    fn arrange(&mut self, _: &[u32]) {}
-}
-
-impl<T: Sync + Clone> InOrder for Vec<T> {
-    fn arrange(&mut self, order: &[u32]) {
-        *self = order.iter().map(|&number| self[number as usize].clone()).collect();
     }
 }

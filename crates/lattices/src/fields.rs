@@ -151,3 +151,19 @@ impl<T: Sync> LocalData for Vec<T> {
         &self[index]
     }
 }
+
+/// Data that can be brought into the order in which bonds are evaluated.
+pub trait InOrder: LocalData {
+    /// Puts the item with the number `order[k]` at the place `k`.
+    fn arrange(&mut self, order: &[u32]);
+}
+
+impl InOrder for () {
+    fn arrange(&mut self, _: &[u32]) {}
+}
+
+impl<T: Sync + Clone> InOrder for Vec<T> {
+    fn arrange(&mut self, order: &[u32]) {
+        *self = order.iter().map(|&number| self[number as usize].clone()).collect();
+    }
+}

@@ -19,13 +19,12 @@ use crate::vector::{SiteVector, larger};
 pub struct LatticeJets<V> {
     pub(crate) all: Differentials,
     pub(crate) totals: Totals<V>,
-    pub(crate) sums: Vec<Total>,
 }
 
 impl<P: Model> Lattice<P> {
     pub(crate) fn jets(&self, x: &Points<P::Manifold>) -> LatticeJets<VectorOf<P>> {
         let (all, totals) = self.differentials::<true>(x);
-        LatticeJets { all, totals, sums: self.sums(x) }
+        LatticeJets { all, totals }
     }
 
     /// The same numbers at all sites.
@@ -37,15 +36,15 @@ impl<P: Model> Lattice<P> {
 
 impl<V> LatticeJets<V> {
     pub(crate) fn is_finite(&self) -> bool {
-        let Totals { energy, entropy, .. } = &self.totals;
-        let all = [energy, entropy].into_iter().chain(&self.sums);
+        let Totals { energy, entropy, sums, .. } = &self.totals;
+        let all = [energy, entropy].into_iter().chain(sums);
         all.into_iter().all(|total| total.sum.value().is_finite())
     }
 
     pub(crate) fn laws(&self) -> Laws<Vec<f64>> {
         let [energy, entropy] =
             [&self.totals.energy, &self.totals.entropy].map(|total| total.sum.value());
-        Laws { energy, entropy, invariants: values(&self.sums) }
+        Laws { energy, entropy, invariants: values(&self.totals.sums) }
     }
 }
 
@@ -59,8 +58,7 @@ impl<P: Model> Flow for Lattice<P> {
     type Vector = SiteVector;
 
     fn laws(&self, x: &Points<P::Manifold>) -> Laws<Vec<f64>> {
-        let [energy, entropy] = self.totals(x).map(|total| total.sum.value());
-        Laws { energy, entropy, invariants: values(&self.sums(x)) }
+        self.jets(x).laws()
     }
 
     fn term_sizes(&self, x: &Points<P::Manifold>) -> Laws<Vec<f64>> {
@@ -81,7 +79,7 @@ impl<P: Model> Flow for Lattice<P> {
         Laws {
             energy: jets.totals.energy.size + slopes(0),
             entropy: jets.totals.entropy.size + slopes(1),
-            invariants: (0..P::SUMS).map(|k| jets.sums[k].size + slopes(2 + k)).collect(),
+            invariants: (0..P::SUMS).map(|k| jets.totals.sums[k].size + slopes(2 + k)).collect(),
         }
     }
 

@@ -97,7 +97,8 @@ impl Normals {
                 normal.round_off += share.abs() * before.round_off;
                 normal.shares.push(share);
             }
-            normal.dependent = !(normal.square > INDEPENDENT * INDEPENDENT * product(a));
+            let independent = normal.square > INDEPENDENT * INDEPENDENT * product(a);
+            normal.dependent = !independent;
             if normal.dependent {
                 normal.square = 0.0;
             }

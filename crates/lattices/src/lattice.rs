@@ -4,6 +4,7 @@ use std::fmt;
 
 use metriplectic_fields::{Column, Dimension, Space, Vector};
 use metriplectic_manifolds::Manifold;
+use nalgebra::SVector;
 
 use crate::double::Double;
 use crate::layout::Layout;
@@ -26,6 +27,8 @@ pub struct Lattice<P> {
     differentials: Pool<f64>,
     /// Arrays with a vector for each slot of the layout.
     slots: Pool<f64>,
+    /// The same with a number.
+    sums: [Pool<f64>; 2],
 }
 
 // By hand, because closures have no `Debug`.
@@ -91,17 +94,21 @@ impl Total {
 pub(crate) struct Totals<V> {
     pub(crate) energy: Total,
     pub(crate) entropy: Total,
+    /// Those of the conserved sums.
+    pub(crate) sums: Vec<Total>,
     pub(crate) sizes: V,
 }
 
 impl<V: Column<f64>> Totals<V> {
-    fn new() -> Self {
-        Self { energy: Total::default(), entropy: Total::default(), sizes: V::zero() }
+    fn new(sums: usize) -> Self {
+        let [energy, entropy] = [Total::default(); 2];
+        Self { energy, entropy, sums: vec![Total::default(); sums], sizes: V::zero() }
     }
 
     fn merge(mut self, other: &Self) -> Self {
         self.energy.merge(&other.energy);
         self.entropy.merge(&other.entropy);
+        self.sums.iter_mut().zip(&other.sums).for_each(|(sum, part)| sum.merge(part));
         self.sizes = larger(&self.sizes, &other.sizes);
         self
     }
@@ -114,8 +121,9 @@ fn larger<V: Column<f64>>(a: &V, b: &V) -> V {
 
 impl<P: Model> Lattice<P> {
     pub(crate) fn new(parts: P, layout: Layout) -> Self {
-        let [vectors, differentials, slots] = std::array::from_fn(|_| Pool::default());
-        Self { parts, layout, vectors, differentials, slots }
+        let [vectors, differentials, slots, at_sites, in_slots] =
+            std::array::from_fn(|_| Pool::default());
+        Self { parts, layout, vectors, differentials, slots, sums: [at_sites, in_slots] }
     }
 
     /// Gives up the arrays that were used before a run and are used no more.
@@ -146,6 +154,33 @@ impl<P: Model> Lattice<P> {
         self.slots.numbers(count * dimension::<P>())
     }
 
+    /// For each site the sum `ρ_i` over its bonds, and `λ_i = ∂g/∂ρ`; empty where nothing is gathered.
+    fn gathered(&self, x: &[PointOf<P>]) -> Buffer<f64> {
+        let [at_sites, in_slots] = &self.sums;
+        if !P::GATHERS {
+            return at_sites.adopt(Vec::new());
+        }
+        let mut sums = at_sites.numbers(2 * self.sites());
+        let bonds = self.layout.bonds();
+        self.layout.scatter(&mut sums, &mut in_slots.numbers(self.layout.slots), |mut part| {
+            for site in part.sites.clone() {
+                part.set(site, 0, &SVector::<f64, 2>::zero());
+            }
+            for bond in part.bonds.clone() {
+                let ends = bonds[bond];
+                let pair = ends.map(|site| x[site as usize].clone()).into();
+                let phi = SVector::<f64, 1>::from_index(|_| self.parts.weight(&pair).value);
+                part.add(ends, &[phi, phi]);
+            }
+        });
+        parallel::fill(&mut sums, 2, |sites, sums| {
+            for (site, sum) in sites.zip(sums.chunks_exact_mut(2)) {
+                sum[1] = self.parts.embedded(&x[site], sum[0]).1;
+            }
+        });
+        sums
+    }
+
     /// The differentials `w = dh + Σ ∂h₂` and `ds` at each site, and the totals if `TOTALS`.
     pub(crate) fn differentials<const TOTALS: bool>(
         &self,
@@ -154,15 +189,28 @@ impl<P: Model> Lattice<P> {
         let n = dimension::<P>();
         let mut all = self.differentials.numbers(self.sites() * width::<P>());
         let bonds = self.layout.bonds();
-        let totals = self.layout.scatter(&mut all, &mut self.slots(P::BOND_ENERGY), |mut part| {
-            let mut totals = Totals::new();
+        let gathered = self.gathered(x);
+        let sums = &*gathered;
+        let mut slots = self.slots(P::BOND_ENERGY || P::GATHERS);
+        let totals = self.layout.scatter(&mut all, &mut slots, |mut part| {
+            let mut totals = Totals::new(if TOTALS { P::SUMS } else { 0 });
             for site in part.sites.clone() {
                 let point = &x[site];
-                let energy = self.parts.energy(site, point);
+                let mut energy = self.parts.energy(site, point);
+                if P::GATHERS {
+                    let (embedded, _) = self.parts.embedded(point, sums[2 * site]);
+                    energy.df += embedded.df;
+                    if TOTALS {
+                        totals.energy.add(embedded.value);
+                    }
+                }
                 part.set(site, 0, &energy.df);
                 if TOTALS {
                     totals.energy.add(energy.value);
                     totals.sizes = larger(&totals.sizes, &P::Manifold::scales(point));
+                    for (k, sum) in totals.sums.iter_mut().enumerate() {
+                        sum.add(self.parts.sum(k, site, point).value);
+                    }
                 }
                 if P::ENTROPY {
                     let entropy = self.parts.entropy(site, point);
@@ -172,11 +220,15 @@ impl<P: Model> Lattice<P> {
                     }
                 }
             }
-            if P::BOND_ENERGY {
+            if P::BOND_ENERGY || P::GATHERS {
                 for bond in part.bonds.clone() {
                     let ends = bonds[bond];
                     let pair = ends.map(|site| x[site as usize].clone()).into();
-                    let jet = self.parts.bond_energy(bond, &pair);
+                    let mut jet = self.parts.bond_energy(bond, &pair);
+                    if P::GATHERS {
+                        let [i, j] = ends.map(|site| sums[2 * site as usize + 1]);
+                        jet.df += self.parts.weight(&pair).df * (i + j);
+                    }
                     let first = VectorOf::<P>::from_index(|k| jet.df[k]);
                     let second = VectorOf::<P>::from_index(|k| jet.df[n + k]);
                     part.add(ends, &[first, second]);
@@ -187,7 +239,7 @@ impl<P: Model> Lattice<P> {
             }
             totals
         });
-        (all, totals.iter().fold(Totals::new(), Totals::merge))
+        (all, totals.iter().fold(Totals::new(P::SUMS), Totals::merge))
     }
 
     /// The velocity `v = Π w + Σ K s` at each site and the total production `Σ ρ (b·s)²`; `None` if a term is not a
@@ -236,27 +288,6 @@ impl<P: Model> Lattice<P> {
         let production = production.value();
         let is_finite = !f64::is_nan(probe) && production.is_finite();
         is_finite.then(|| (self.vector(v), production))
-    }
-
-    /// The totals of the conserved sums.
-    pub(crate) fn sums(&self, x: &[PointOf<P>]) -> Vec<Total> {
-        let mut totals = vec![Total::default(); P::SUMS];
-        if P::SUMS == 0 {
-            return totals;
-        }
-        let partial = parallel::map(self.sites(), |sites| {
-            let mut totals = vec![Total::default(); P::SUMS];
-            for site in sites {
-                for (k, total) in totals.iter_mut().enumerate() {
-                    total.add(self.parts.sum(k, site, &x[site]).value);
-                }
-            }
-            totals
-        });
-        for part in partial {
-            totals.iter_mut().zip(&part).for_each(|(total, part)| total.merge(part));
-        }
-        totals
     }
 
     /// The totals of energy and entropy alone.

@@ -5,6 +5,7 @@ use metriplectic_fields::{ChartPoint, Column, Jet1, Vector};
 use metriplectic_manifolds::{Canonical, Manifold, MetricAt, Product, Riemannian, Times};
 
 use crate::fields::{ConservedSums, LocalData, LocalField};
+use crate::gather::SiteEnergy;
 use crate::onsager::{BondFriction, BondState, Onsager, SiteFriction, SiteState};
 
 /// The functions and tensors of a lattice, site by site and bond by bond; [`Parts`] is the one implementation.
@@ -18,6 +19,8 @@ pub trait Model: Sync {
     const ENTROPY: bool;
     /// Whether bonds have an energy.
     const BOND_ENERGY: bool;
+    /// Whether the energy of a site depends on a sum over its bonds.
+    const GATHERS: bool;
     /// Whether bonds have friction.
     const BOND_FRICTION: bool;
 
@@ -29,6 +32,12 @@ pub trait Model: Sync {
 
     /// The energy of a bond.
     fn bond_energy(&self, bond: usize, x: &PairOf<Self>) -> Jet1<PairManifold<Self>>;
+
+    /// What a bond adds to the sums of its two sites.
+    fn weight(&self, x: &PairOf<Self>) -> Jet1<PairManifold<Self>>;
+
+    /// The energy of a site that depends on its sum, and its derivative along the sum.
+    fn embedded(&self, x: &PointOf<Self>, sum: f64) -> (Jet1<Self::Manifold>, f64);
 
     /// The entropy of a site.
     fn entropy(&self, site: usize, x: &PointOf<Self>) -> Jet1<Self::Manifold>;
@@ -118,7 +127,7 @@ where
     M: Manifold + Times<M>,
     Canonical: Riemannian<M>,
     B: Bracket<M, Canonical> + Sync,
-    H: LocalField<M, D::Item>,
+    H: SiteEnergy<M, D::Item>,
     V: LocalField<Product<M, M>, E::Item>,
     S: LocalField<M, D::Item>,
     KB: BondFriction<M, E::Item>,
@@ -132,6 +141,7 @@ where
     const SUMS: usize = L::COUNT;
     const ENTROPY: bool = S::PRESENT;
     const BOND_ENERGY: bool = V::PRESENT;
+    const GATHERS: bool = H::GATHERS;
     const BOND_FRICTION: bool = KB::PRESENT;
 
     fn manifold(&self) -> &M {
@@ -146,6 +156,16 @@ where
     #[inline]
     fn bond_energy(&self, bond: usize, x: &PairOf<Self>) -> Jet1<Product<M, M>> {
         self.fields.bond_energy.jet(x, self.data.bonds.of(bond))
+    }
+
+    #[inline]
+    fn weight(&self, x: &PairOf<Self>) -> Jet1<Product<M, M>> {
+        self.fields.energy.weight(x)
+    }
+
+    #[inline]
+    fn embedded(&self, x: &M::Point<f64>, sum: f64) -> (Jet1<M>, f64) {
+        self.fields.energy.embedded(x, sum)
     }
 
     #[inline]

@@ -3,7 +3,7 @@
 //! A correction has the direction
 //!
 //! ```math
-//! u_i = \omega_i \sum_a c_a\, s^2\, dF_a(x_i), \qquad \omega_i = |e_i|^2 / \max_j |e_j|^2,
+//! u_i = \omega_i \sum_a c_a\, s^2\, dF_a(x_i), \qquad \omega_i = |e_i|^2,
 //! ```
 //!
 //! with the sizes `s` of the entries, which cancel the units, and an estimate `e` of the local error of the step in
@@ -47,7 +47,7 @@ pub(crate) struct Projection<'a, P: Model> {
 #[derive(Clone, Copy)]
 struct Weights<'a, V> {
     error: Option<Reader<'a>>,
-    /// `s / max|e|` for each entry.
+    /// The reciprocal of the size of each entry.
     units: V,
 }
 
@@ -74,12 +74,18 @@ impl<P: Model> Projection<'_, P> {
         let mut moved = 0.0;
         let mut best: Option<(f64, Projected<Lattice<P>>)> = None;
         let mut before = f64::INFINITY;
+        let mut known: Option<(Gram, Weights<'_, VectorOf<P>>)> = None;
         for corrections in 0..=CORRECTIONS {
             let jets = self.lattice.jets(&y);
             if !jets.is_finite() {
                 return Err(ProjectionError::Outside);
             }
-            let (normals, weights) = self.normals(&y, &jets)?;
+            // A correction is small, and leaves the Gram matrix as it was.
+            let (gram, weights) = match known.take() {
+                Some(known) if corrections == 1 => known,
+                _ => self.products(&y, &jets)?,
+            };
+            let normals = Normals::new(&gram, &self.laws(&jets), P::ENTROPY);
             let excess = normals.excess(with_entropy)?;
             let off = if with_entropy { normals.off() / OFF } else { 0.0 };
             let enough = if corrections == 0 { SMALL } else { ENOUGH };
@@ -106,6 +112,7 @@ impl<P: Model> Projection<'_, P> {
                 best = Some((worst, self.projected(&normals, y, jets)));
             }
             y = next.points.ok_or(ProjectionError::Outside)?;
+            known = Some((gram, weights));
         }
         self.stagnated(best)
     }
@@ -135,41 +142,27 @@ impl<P: Model> Projection<'_, P> {
         Projected { x, gradients, entropy, entropy_round_off }
     }
 
-    /// The laws at a state, made independent of each other, and the weights with which they are.
-    fn normals(
+    /// The products of the differentials of the laws, and the weights of the sites in them.
+    fn products(
         &self,
         y: &State<P>,
         jets: &Jets<P>,
-    ) -> Result<(Normals, Weights<'_, VectorOf<P>>), ProjectionError> {
-        if let Some(weights) = self.weights(jets) {
-            let normals = Normals::new(&self.gram(y, jets, &weights), &self.laws(jets), P::ENTROPY);
-            if !normals.leaves_out(self.target.with_entropy) {
-                return Ok((normals, weights));
+    ) -> Result<(Gram, Weights<'_, VectorOf<P>>), ProjectionError> {
+        if let Some(error) = self.target.error {
+            // A common factor of the weights cancels.
+            let sizes = &jets.totals.sizes;
+            let reciprocal = |k: usize| if sizes[k] > 0.0 { sizes[k].recip() } else { 0.0 };
+            let units = VectorOf::<P>::from_index(reciprocal);
+            let weights = Weights { error: Some(error.reader()), units };
+            let gram = self.gram(y, jets, &weights);
+            let normals = Normals::new(&gram, &self.laws(jets), P::ENTROPY);
+            if gram.is_finite() && !normals.leaves_out(self.target.with_entropy) {
+                return Ok((gram, weights));
             }
         }
         let weights = Weights { error: None, units: VectorOf::<P>::zero() };
         let gram = self.gram(y, jets, &weights);
-        if !gram.is_finite() {
-            return Err(ProjectionError::Outside);
-        }
-        Ok((Normals::new(&gram, &self.laws(jets), P::ENTROPY), weights))
-    }
-
-    /// The weights of the sites by the error; `None` if there is none.
-    fn weights(&self, jets: &Jets<P>) -> Option<Weights<'_, VectorOf<P>>> {
-        let error = self.target.error?.reader();
-        let sizes = &jets.totals.sizes;
-        let reciprocal = |k: usize| if sizes[k] > 0.0 { sizes[k].recip() } else { 0.0 };
-        let units = VectorOf::<P>::from_index(reciprocal);
-        let weights = Weights { error: Some(error), units };
-        let largest = parallel::map(self.lattice.sites(), |sites| {
-            sites.map(|site| weights.at(site)).fold(0.0, larger)
-        });
-        let largest = largest.into_iter().fold(0.0, larger);
-        let unit = largest.sqrt().recip();
-        let units = VectorOf::<P>::from_index(|k| units[k] * unit);
-        (largest > 0.0 && unit.is_finite() && unit > 0.0)
-            .then_some(Weights { error: Some(error), units })
+        if gram.is_finite() { Ok((gram, weights)) } else { Err(ProjectionError::Outside) }
     }
 
     /// The target, the value and the sizes of each law.
@@ -179,7 +172,7 @@ impl<P: Model> Projection<'_, P> {
             residual: total.sum.below(target),
             size: target.abs() + total.size,
         };
-        let sums = jets.sums.iter().zip(&target.invariants);
+        let sums = jets.totals.sums.iter().zip(&target.invariants);
         std::iter::once(law(target.energy, &jets.totals.energy))
             .chain(sums.map(|(sum, &target)| law(target, sum)))
             .chain(P::ENTROPY.then(|| law(target.entropy, &jets.totals.entropy)))

@@ -2,7 +2,7 @@
 
 use metriplectic_fields::Column;
 
-/// The generator SplitMix64 (Steele, Lea, Flood 2014).
+/// The generator `SplitMix64` (Steele, Lea, Flood 2014).
 pub(crate) struct Random(u64);
 
 impl Random {

@@ -29,12 +29,15 @@ const QUOTIENT: f64 = 1e-4;
 fn samples(count: usize) -> impl Iterator<Item = usize> {
     let most = SAMPLES.min(count);
     // Strides of the golden ratio meet no period of a regular lattice.
-    let golden = |k: usize| (k as f64 * 0.618_033_988_749_894_9).fract();
+    let golden = move |k: usize| {
+        let turn = (k as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+        usize::try_from((u128::from(turn) * count as u128) >> 64).unwrap_or(0)
+    };
     (0..most).map(move |k| match k {
         _ if most == count => k,
         0 => 0,
         1 => count - 1,
-        _ => std::cmp::min((golden(k) * count as f64) as usize, count - 1),
+        _ => golden(k),
     })
 }
 

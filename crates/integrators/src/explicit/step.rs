@@ -3,15 +3,15 @@
 use metriplectic_dynamics::SecondLaw;
 
 use super::chebyshev;
+use super::estimates::is_at_the_edge;
 use super::flow::{Projected, ProjectionError, StageFlow, Target};
 use super::memory::{
     ExplicitMemory, Here, LastStep, MemoryOf, Produced, STAGES, combined, produced,
 };
 use super::tableau::Tableau;
 use crate::method::{
-    Effort, Element, EntropyStep, Evidence, Laws, Refusal, StepEnds, StepStart, Taken, Vector,
+    Effort, Element, EntropyStep, Evidence, Laws, Refusal, StepStart, Taken, Vector,
 };
-use crate::run::scales::relative;
 use crate::step_error::StepError;
 
 /// Falls of the entropy in a row after which a state that hardly moves is held.
@@ -78,15 +78,18 @@ pub(super) fn with_halves<F: StageFlow>(
     h: f64,
     memory: &mut MemoryOf<F>,
 ) -> Result<Taken<F>, StepError> {
-    if let Ok(whole) = try_step(tableau, flow, start, h, memory) {
-        return Ok(whole);
-    }
+    let first = match try_step(tableau, flow, start, h, memory) {
+        Ok(whole) => return Ok(whole),
+        Err(refused) => refused,
+    };
     let kept = memory.clone();
     halves(tableau, flow, start, h, memory, HALVES).map_err(|refused| {
         // What the parts that were taken have left belongs to no state of the run.
         *memory = kept;
         let tried = Effort { splits: HALVES as usize, ..Effort::default() };
         let time = start.time;
+        // A site that leaves in the whole step says more than a small part that finds no end.
+        let refused = if let Refused::Outside(Some(_)) = first { first } else { refused };
         match refused {
             Refused::Outside(Some(site)) => StepError::SiteOutOfDomain { time, h, site, tried },
             Refused::Outside(None) => StepError::OutOfDomain { time, h, tried },
@@ -291,53 +294,6 @@ fn hardly_moves<F: StageFlow>(flow: &F, start: &StepStart<'_, F>, q: &F::Vector)
         let allowed = start.allowed.as_ref().map_or(0.0, |allowed| allowed.get(i));
         q.get(i).abs() <= (HARDLY * sizes.get(i)).max(HARDLY_ALLOWED * allowed)
     })
-}
-
-/// Whether the rates between the last stage and the end differ by as much as at the edge of the region of
-/// stability: `h |k_e − k_s| / |q_e − q_s|` of Hairer, Wanner (Solving ODEs II, §IV.2), relative to the sizes of
-/// the entries.
-fn is_at_the_edge<F: StageFlow>(
-    tableau: &'static Tableau,
-    flow: &F,
-    x: &Element<F>,
-    h: f64,
-    last: &LastStep<F::Vector>,
-    rates: &F::Vector,
-) -> bool {
-    let sizes = flow.sizes(x);
-    let one = sizes.map(|_| 1.0);
-    let before = [&last.before, &last.stages[tableau.stages.len()].0];
-    // One array at a time, because a large system has no room for more.
-    let norm = |end: &F::Vector, before: &F::Vector, factor: f64| {
-        let ratios =
-            Vector::zip([end, before, &sizes, &last.end], |[end, before, size, reached]| {
-                let change = factor * (end - before);
-                if change == 0.0 { 0.0 } else { change / size.max(reached.abs()) }
-            });
-        relative(&ratios, &one)
-    };
-    let distance = norm(&last.end, before[0], 1.0);
-    distance > 64.0 * f64::EPSILON && norm(rates, before[1], h) > tableau.stability * distance
-}
-
-/// The error of a step in units of the one allowed. A step that was taken in parts has the estimate of the flow.
-pub(super) fn error<F: StageFlow>(
-    tableau: &'static Tableau,
-    flow: &F,
-    step: &StepEnds<'_, F>,
-    memory: &MemoryOf<F>,
-    norm: impl Fn(&F::Vector) -> f64,
-) -> Option<f64> {
-    let h = step.h;
-    let Some(last) = memory.last.as_ref() else {
-        return Some(norm(&flow.local_error(step.x, step.end, h)?));
-    };
-    if tableau.stages.is_empty() {
-        return Some(norm(&chebyshev::error(last, h)));
-    }
-    let [fifth, third] = tableau.errors.map(|row| norm(&combined(h, row, &last.stages)));
-    // Hairer's e₅²/√(e₅² + e₃²/100) is of the order of the method; a method with one error has that.
-    Some(if third > 0.0 { fifth * (fifth / fifth.hypot(0.1 * third)) } else { fifth })
 }
 
 /// Where a step ends.

@@ -1,0 +1,55 @@
+//! What the stages of a step tell of its error and of its stability.
+
+use super::chebyshev;
+use super::flow::StageFlow;
+use super::memory::{LastStep, MemoryOf, combined};
+use super::tableau::Tableau;
+use crate::method::{Element, StepEnds, Vector};
+use crate::run::scales::relative;
+
+/// Whether the rates between the last stage and the end differ by as much as at the edge of the region of
+/// stability: `h |k_e − k_s| / |q_e − q_s|` of Hairer, Wanner (Solving ODEs II, §IV.2), relative to the sizes of
+/// the entries.
+pub(super) fn is_at_the_edge<F: StageFlow>(
+    tableau: &'static Tableau,
+    flow: &F,
+    x: &Element<F>,
+    h: f64,
+    last: &LastStep<F::Vector>,
+    rates: &F::Vector,
+) -> bool {
+    let sizes = flow.sizes(x);
+    let one = sizes.map(|_| 1.0);
+    let before = [&last.before, &last.stages[tableau.stages.len()].0];
+    // One array at a time, because a large system has no room for more.
+    let norm = |end: &F::Vector, before: &F::Vector, factor: f64| {
+        let ratios =
+            Vector::zip([end, before, &sizes, &last.end], |[end, before, size, reached]| {
+                let change = factor * (end - before);
+                if change == 0.0 { 0.0 } else { change / size.max(reached.abs()) }
+            });
+        relative(&ratios, &one)
+    };
+    let distance = norm(&last.end, before[0], 1.0);
+    distance > 64.0 * f64::EPSILON && norm(rates, before[1], h) > tableau.stability * distance
+}
+
+/// The error of a step in units of the one allowed. A step that was taken in parts has the estimate of the flow.
+pub(super) fn error<F: StageFlow>(
+    tableau: &'static Tableau,
+    flow: &F,
+    step: &StepEnds<'_, F>,
+    memory: &MemoryOf<F>,
+    norm: impl Fn(&F::Vector) -> f64,
+) -> Option<f64> {
+    let h = step.h;
+    let Some(last) = memory.last.as_ref() else {
+        return Some(norm(&flow.local_error(step.x, step.end, h)?));
+    };
+    if tableau.stages.is_empty() {
+        return Some(norm(&chebyshev::error(last, h)));
+    }
+    let [fifth, third] = tableau.errors.map(|row| norm(&combined(h, row, &last.stages)));
+    // Hairer's e₅²/√(e₅² + e₃²/100) is of the order of the method; a method with one error has that.
+    Some(if third > 0.0 { fifth * (fifth / fifth.hypot(0.1 * third)) } else { fifth })
+}

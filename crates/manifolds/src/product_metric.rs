@@ -32,6 +32,10 @@ pub type InnerHalves<A, B, G, D> = (
     <<G as Split<A, B>>::Right as Riemannian<B>>::At<D>,
 );
 
+/// A product metric at a point, on each factor.
+pub type MetricHalves<'a, A, B, G, D> =
+    (MetricAt<'a, A, <G as Split<A, B>>::Left, D>, MetricAt<'a, B, <G as Split<A, B>>::Right, D>);
+
 impl<'a, A: Times<B>, B: Space, G: Split<A, B>, D: Scalar> MetricAt<'a, Product<A, B>, G, D> {
     /// Returns the metric of each factor at its part of the point.
     ///
@@ -43,7 +47,7 @@ impl<'a, A: Times<B>, B: Space, G: Split<A, B>, D: Scalar> MetricAt<'a, Product<
         &self,
         x: &'b ChartPoint<A, D>,
         y: &'b ChartPoint<B, D>,
-    ) -> Result<(MetricAt<'b, A, G::Left, D>, MetricAt<'b, B, G::Right, D>), MetricError>
+    ) -> Result<MetricHalves<'b, A, B, G, D>, MetricError>
     where
         'a: 'b,
     {

@@ -7,7 +7,6 @@ use std::cell::Cell;
 use std::time::Instant;
 
 use metriplectic::dynamics::system::Point;
-use metriplectic::dynamics::Verify;
 use metriplectic::prelude::*;
 
 use crate::{Gas, INERTIA, RelaxingBody, SpinningTop, WEIGHTS};

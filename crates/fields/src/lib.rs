@@ -14,7 +14,7 @@
 //! | [`stack`] | room on the stack for large matrices |
 //! | [`laws`] | the laws of a field, and the function that checks them |
 //!
-//! # Two doors
+//! # Two ways to write a field
 //!
 //! A field is evaluated at several scalars: `f64` for its value, dual numbers for its derivatives.
 //! Rust closures cannot be generic, so there are two ways in:

@@ -420,7 +420,7 @@ fn help_says_what_an_example_is_and_its_defaults() {
 fn the_convergence_study_prints_an_array_of_orders() {
     let report = json(&example("convergence", &["--json"]));
     let rows = report.as_array().expect("an array");
-    assert_eq!(rows.len(), 41);
+    assert_eq!(rows.len(), 47);
     for row in rows {
         let mut keys: Vec<_> = row.as_object().expect("an object").keys().collect();
         keys.sort();

@@ -17,6 +17,7 @@ pub type Slopes<M> = Option<<<M as Space>::Dim as Dimension>::Array<Matrix<M>>>;
 /// use metriplectic_fields::{ChartPoint, Real};
 /// use metriplectic_manifolds::{Euclidean, InnerProduct, Metric, MetricAt, MetricError};
 /// use nalgebra::{Matrix2, Vector2, vector};
+/// use num_dual::DualNum;
 /// let half_plane =
 ///     Metric::field(|q: &Vector2<Real>| Matrix2::from_diagonal_element((q.y * q.y).recip()));
 /// let x = ChartPoint::centre(&vector![0.0, 2.0]);

@@ -41,6 +41,5 @@ pub(crate) fn rows() -> Vec<Row> {
         row::<12>(),
         row::<16>(),
         row::<32>(),
-        row::<64>(),
     ]
 }

@@ -8,40 +8,17 @@ use metriplectic::integrators::{StageMemory, StepStart, laws};
 use metriplectic::manifolds::Riemannian;
 use metriplectic::prelude::*;
 
-#[path = "models/chart_midpoint.rs"]
-mod chart_midpoint;
 mod models;
 #[path = "models/stages.rs"]
 mod stages;
 
-use chart_midpoint::ChartMidpoint;
-use models::{Globe, gas, relaxing_body, top};
+use models::{Globe, distance, gas, relaxing_body, slope, top};
 use stages::*;
 
 const GAS: Vector4<f64> = Vector4::new(1.0, 2.0, 2.0, 2.0);
 
 /// The error of steps below which round-off may count.
 const ROUND_OFF: f64 = 2e-13;
-
-fn distance<M: Manifold>(a: &M::Point<f64>, b: &M::Point<f64>) -> f64 {
-    let both = M::entries(a).into_iter().zip(M::entries(b));
-    both.map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
-}
-
-/// The slope of the errors that are above round-off, by least squares.
-fn slope(steps: &[f64], errors: &[f64]) -> f64 {
-    let points: Vec<(f64, f64)> = steps
-        .iter()
-        .zip(errors)
-        .filter(|(_, error)| **error > ROUND_OFF)
-        .map(|(h, error)| (h.ln(), error.ln()))
-        .collect();
-    assert!(points.len() >= 3, "{errors:?} are round-off");
-    let n = points.len() as f64;
-    let (x, y) = points.iter().fold((0.0, 0.0), |(x, y), p| (x + p.0 / n, y + p.1 / n));
-    let both: f64 = points.iter().map(|p| (p.0 - x) * (p.1 - y)).sum();
-    both / points.iter().map(|p| (p.0 - x).powi(2)).sum::<f64>()
-}
 
 /// A run on which both laws and the further invariants are kept to round-off.
 fn kept<Y: Metriplectic>(
@@ -80,7 +57,8 @@ fn orders<Y: Metriplectic>(
             assert_eq!(run.certificate().effort.splits, 0, "{name}, {method:?}");
             distance::<Y::Manifold>(&run.last().point, &exact)
         });
-        let (fitted, order) = (slope(&steps, &errors), f64::from(Method::<Y>::order(&method)));
+        let (fitted, order) =
+            (slope(&steps, &errors, ROUND_OFF), f64::from(Method::<Y>::order(&method)));
         println!("{name}, {method:?}: {fitted:.2} from {errors:?}, {per_step:.1} residuals");
         assert!(fitted >= order - 0.3, "{name}, {method:?}: {fitted:.2} from {errors:?}");
     }

@@ -11,27 +11,7 @@ use metriplectic_studies::problems::flow;
 
 mod models;
 
-use models::{Globe, gas, top};
-
-/// The slope of the errors that are above round-off, by least squares.
-fn slope(steps: &[f64], errors: &[f64], floor: f64) -> f64 {
-    let points: Vec<(f64, f64)> = steps
-        .iter()
-        .zip(errors)
-        .filter(|(_, error)| **error > floor)
-        .map(|(h, error)| (h.ln(), error.ln()))
-        .collect();
-    assert!(points.len() >= 3, "{errors:?} are round-off");
-    let n = points.len() as f64;
-    let (x, y) = points.iter().fold((0.0, 0.0), |(x, y), p| (x + p.0 / n, y + p.1 / n));
-    let both: f64 = points.iter().map(|p| (p.0 - x) * (p.1 - y)).sum();
-    both / points.iter().map(|p| (p.0 - x).powi(2)).sum::<f64>()
-}
-
-fn distance<M: Manifold>(a: &M::Point<f64>, b: &M::Point<f64>) -> f64 {
-    let both = M::entries(a).into_iter().zip(M::entries(b));
-    both.map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
-}
+use models::{Globe, distance, gas, slope, top};
 
 /// What a run keeps, and its end.
 fn end<Y: Metriplectic, M: Method<Y>>(

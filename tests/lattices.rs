@@ -11,6 +11,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use chain::{chain, waves};
 use metriplectic::integrators::{Flow, Vector};
 use metriplectic::prelude::*;
+use metriplectic_studies::Order;
 use models::{conduction, embedded_atoms, helix, toda};
 
 /// The velocity of the chain of `models/chain.rs`, with derivatives by hand.
@@ -102,6 +103,12 @@ fn the_bits_do_not_depend_on_the_number_of_threads() {
     assert!(ends.iter().all(|end| *end == ends[0]));
 }
 
+/// The fitted order of runs of so many steps over the same time.
+fn order(steps: &[usize], errors: &[f64]) -> f64 {
+    let sizes: Vec<f64> = steps.iter().map(|&n| (n as f64).recip()).collect();
+    Order::fit(&sizes, errors).expect("errors above round-off").slope
+}
+
 #[test]
 fn a_soliton_moves_at_the_order_of_the_method() {
     let lattice = toda::lattice(64);
@@ -121,19 +128,10 @@ fn a_soliton_moves_at_the_order_of_the_method() {
     };
     for (eight, least, steps) in [(false, 4.8, [40, 57, 80, 113]), (true, 7.65, [20, 25, 32, 40])] {
         let errors = steps.map(|steps| error(eight, steps));
-        let points = steps.iter().zip(errors).map(|(&n, e)| [(n as f64).ln(), e.ln()]);
-        let slope = -slope(&points.collect::<Vec<_>>());
+        let slope = order(&steps, &errors);
         println!("order {slope:.2}: {errors:?}");
         assert!(slope > least && slope < least + 1.5, "{slope}: {errors:?}");
     }
-}
-
-/// The slope of the line of least squares.
-fn slope(points: &[[f64; 2]]) -> f64 {
-    let mean = |k: usize| points.iter().map(|p| p[k]).sum::<f64>() / points.len() as f64;
-    let [x, y] = [mean(0), mean(1)];
-    let product = points.iter().map(|p| (p[0] - x) * (p[1] - y)).sum::<f64>();
-    product / points.iter().map(|p| (p[0] - x).powi(2)).sum::<f64>()
 }
 
 #[test]
@@ -325,8 +323,7 @@ fn embedded_atoms_have_both_laws_and_the_order_of_the_method() {
     let exact = DormandPrince8.run(&lattice, start.clone(), span).unwrap().last().point.clone();
     let steps = [40, 57, 80, 113];
     let errors = steps.map(|steps| distance(&end(steps), &exact));
-    let points = steps.iter().zip(errors).map(|(&n, e)| [(n as f64).ln(), e.ln()]);
-    let order = -slope(&points.collect::<Vec<_>>());
+    let order = order(&steps, &errors);
     println!("order {order:.2}: {errors:?}");
     assert!(order > 4.7 && order < 5.5, "{errors:?}");
 }

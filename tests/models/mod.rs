@@ -247,3 +247,24 @@ pub(crate) fn cusp() -> impl Metriplectic<Manifold = Euclidean<3>, Metric = Cano
 
 /// Where it starts.
 pub(crate) const BEFORE_THE_CUSP: Vector3<f64> = Vector3::new(0.25, 0.125, 0.0);
+
+/// The slope of the errors that are above round-off, by least squares.
+pub(crate) fn slope(steps: &[f64], errors: &[f64], round_off: f64) -> f64 {
+    let points: Vec<(f64, f64)> = steps
+        .iter()
+        .zip(errors)
+        .filter(|(_, error)| **error > round_off)
+        .map(|(h, error)| (h.ln(), error.ln()))
+        .collect();
+    assert!(points.len() >= 3, "{errors:?} are round-off");
+    let n = points.len() as f64;
+    let (x, y) = points.iter().fold((0.0, 0.0), |(x, y), p| (x + p.0 / n, y + p.1 / n));
+    let both: f64 = points.iter().map(|p| (p.0 - x) * (p.1 - y)).sum();
+    both / points.iter().map(|p| (p.0 - x).powi(2)).sum::<f64>()
+}
+
+/// The distance of two points in the space around, by their entries.
+pub(crate) fn distance<M: Manifold>(a: &M::Point<f64>, b: &M::Point<f64>) -> f64 {
+    let both = M::entries(a).into_iter().zip(M::entries(b));
+    both.map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
+}

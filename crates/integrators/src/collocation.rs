@@ -72,7 +72,7 @@ pub use memory::StageMemory;
 use crate::method::{Control, Flow, Method, Promises, Refusal, StepEnds, StepStart, Taken};
 use crate::midpoint::Dim;
 use crate::step_error::StepError;
-use fallbacks::Fallbacks;
+use crate::step_failure::Fallbacks;
 use tableau::{GAUSS, RADAU, Tableau};
 
 /// A point of a system.
@@ -197,13 +197,12 @@ macro_rules! method {
                 memory: &mut StageMemory<Dim<Y>>,
             ) -> Result<Taken<Y>, Refusal> {
                 let start = step::start_of(Self::tableau(), start, h);
-                step::try_step(Self::tableau(), system, &start, memory, Fallbacks::Direct).map_err(
-                    |failure| Refusal {
+                step::try_step(Self::tableau(), system, &start, memory, Fallbacks::FirstTries)
+                    .map_err(|failure| Refusal {
                         effort: failure.effort,
-                        error: failure.first_law(start.time, h),
+                        error: failure.cause.first_law(start.time, h),
                         second_law: false,
-                    },
-                )
+                    })
             }
 
             fn error(

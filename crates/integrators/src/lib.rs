@@ -37,6 +37,7 @@ pub mod newton;
 pub mod round_off;
 pub mod run;
 pub mod step_error;
+mod step_failure;
 
 pub use attitude::{Attitude, AttitudeError};
 pub use collocation::{Gauss, Radau, StageMemory};

@@ -232,6 +232,8 @@ pub trait Method<F: Flow>: Sized {
 
     /// One step of size `h`, at any price.
     ///
+    /// A run calls it within [`Flow::with_room`]; so does a caller that steps a large system by itself.
+    ///
     /// # Errors
     ///
     /// [`StepError`] if it cannot be taken.

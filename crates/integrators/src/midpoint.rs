@@ -55,7 +55,8 @@ use crate::round_off::compensation::Displaced;
 use crate::round_off::drift::{self, DriftCorrection};
 use crate::round_off::level;
 use crate::step_error::StepError;
-use fallbacks::{Cause, Fallbacks, StepFailure};
+use crate::step_failure::{Cause, Fallbacks};
+use fallbacks::StepFailure;
 
 /// The dimension of the manifold of a system.
 pub(crate) type Dim<Y> = <<Y as Metriplectic>::Manifold as Space>::Dim;
@@ -169,9 +170,9 @@ where
         memory: &mut MemoryOf<Y>,
     ) -> Result<Taken<Y>, Refusal> {
         let start = Start::of(start, h);
-        self.try_step(system, &start, memory, Fallbacks::NewtonOnly).map_err(|failure| Refusal {
+        self.try_step(system, &start, memory, Fallbacks::FirstTries).map_err(|failure| Refusal {
             effort: failure.effort,
-            error: failure.first_law(start.time, h),
+            error: failure.cause.first_law(start.time, h),
             second_law: false,
         })
     }

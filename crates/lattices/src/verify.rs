@@ -144,7 +144,8 @@ impl<P: Model> Lattice<P> {
         self.layout.bonds()[bond].map(|site| x[site as usize].clone()).into()
     }
 
-    /// A state near a state, moved along the velocity and at random; the state itself if there is none.
+    /// Moves a state by a little along its velocity and at random. Returns the state without a change if it has no
+    /// neighbour with finite values.
     fn near(&self, x: &Points<P::Manifold>) -> Points<P::Manifold> {
         let sizes = self.sizes(x);
         let Some((v, _)) = self.motion(x) else { return x.clone() };

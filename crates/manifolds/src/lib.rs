@@ -80,7 +80,7 @@ pub use lie_algebra::{AlgebraError, LieAlgebra};
 pub use lie_dual::LieDual;
 pub use manifold::{Manifold, PointError};
 pub use metric::{GeodesicEnd, Riemannian};
-pub use metric_at::{MetricAt, MetricJet, Slopes};
+pub use metric_at::{MetricAt, MetricJet, MetricSlopes, Slopes};
 pub use metric_error::MetricError;
 pub use product::{Product, Times};
 pub use product_metric::Split;

@@ -7,8 +7,11 @@ use metriplectic_fields::{ChartPoint, Dimension, Matrix, Scalar, Space};
 
 use crate::{MetricError, Riemannian};
 
-/// The derivatives `∂g/∂qᵏ` of a metric along the chart; `None` for a metric that is constant by construction.
-pub type Slopes<M> = Option<<<M as Space>::Dim as Dimension>::Array<Matrix<M>>>;
+/// The derivatives `∂g/∂qᵏ` of a metric along the chart.
+pub type MetricSlopes<M> = <<M as Space>::Dim as Dimension>::Array<Matrix<M>>;
+
+/// The same; `None` for a metric that is constant by construction.
+pub type Slopes<M> = Option<MetricSlopes<M>>;
 
 /// A metric at one point of a chart. What is asked for is evaluated once, and kept for all that need it there:
 /// the inner product, the bracket, the dissipation and the volume form.

@@ -7,12 +7,13 @@ use super::PointOf;
 use super::chart::in_chart_at;
 use super::covectors::combined;
 use super::equation::StageEquation;
-use super::fallbacks::{self, Fallbacks};
+use super::fallbacks;
 use super::memory::{LastStep, StageMemory};
 use super::tableau::Tableau;
 use crate::method::{Components, Effort, Flow as _, Promises, StepEnds};
 use crate::midpoint::Dim;
 use crate::run::dense::{self, cubic, limited};
+use crate::step_failure::Fallbacks;
 
 /// The state at the fraction `θ` of a step: a step of size `θh`, guessed by the polynomial of the whole one, and moved
 /// onto the laws of the run with an entropy that does not fall from one fraction to a later one.
@@ -53,7 +54,8 @@ fn part<Y: Metriplectic>(
         combined(tableau.stages, &tableau.velocity(theta * tableau.nodes[i]), &last.k)
     });
     let mut effort = Effort::default();
-    let solved = fallbacks::solve(&equation, Some(guess), Fallbacks::Direct, &mut effort).ok()?;
+    let solved =
+        fallbacks::solve(&equation, Some(guess), Fallbacks::FirstTries, &mut effort).ok()?;
     Some(solved.at.end)
 }
 

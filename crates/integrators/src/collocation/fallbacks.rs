@@ -13,15 +13,7 @@ use super::tableau::{STAGES, Tableau};
 use crate::method::{Effort, Laws, Taken};
 use crate::midpoint::{Dim, Start, dependent_invariant};
 use crate::step_error::StepError;
-
-/// How hard to try.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Fallbacks {
-    /// Everything, because only halving the step comes after it.
-    All,
-    /// The guess and rest, because a smaller step is tried next.
-    Direct,
-}
+use crate::step_failure::{Cause, Fallbacks};
 
 /// A step that was not taken.
 #[derive(Clone, Copy, Debug)]
@@ -30,29 +22,6 @@ pub(super) struct StepFailure {
     pub(super) cause: Cause,
     /// What was done.
     pub(super) effort: Effort,
-}
-
-/// Why a step was not taken.
-#[derive(Clone, Copy, Debug)]
-pub(super) enum Cause {
-    /// The domain of the model is in the way.
-    Edge,
-    /// The equation is solved, but its end has another energy.
-    Energy { change: f64, size: f64 },
-    /// The iteration does not converge.
-    Unsolved,
-}
-
-impl StepFailure {
-    /// The error that names the first law, if the step was refused because its end has another energy.
-    pub(super) const fn first_law(self, time: f64, h: f64) -> Option<StepError> {
-        match self.cause {
-            Cause::Energy { change, size } => {
-                Some(StepError::FirstLawBroken { time, h, change, size })
-            }
-            Cause::Edge | Cause::Unsolved => None,
-        }
-    }
 }
 
 /// Corrections from the guess.
@@ -215,7 +184,7 @@ impl<Y: Metriplectic> Halves<'_, Y> {
         memory: &mut StageMemory<Dim<Y>>,
         depth: usize,
     ) -> Result<Taken<Y>, Failed<Y>> {
-        match try_step(self.tableau, self.system, start, memory, Fallbacks::Direct) {
+        match try_step(self.tableau, self.system, start, memory, Fallbacks::FirstTries) {
             Ok(taken) => {
                 self.effort += taken.effort;
                 Ok(taken)
@@ -240,7 +209,7 @@ impl<Y: Metriplectic> Halves<'_, Y> {
     ) -> StepError {
         let &Start { time, h, values, .. } = start;
         let tried = self.effort;
-        if let Some(error) = failure.first_law(time, h) {
+        if let Some(error) = failure.cause.first_law(time, h) {
             return error;
         }
         let suggested = (0..self.splits).fold(h, |part, _| 0.5 * part);

@@ -5,7 +5,7 @@ use metriplectic_fields::{Dimension, Space as _};
 use metriplectic_manifolds::Manifold;
 
 use super::equation::StageEquation;
-use super::fallbacks::{self, Cause, Fallbacks, StepFailure};
+use super::fallbacks::{self, StepFailure};
 use super::memory::{LastStep, StageMemory};
 use super::solve::Solved;
 use super::tableau::Tableau;
@@ -14,6 +14,7 @@ use crate::midpoint::{Dim, Numbers, Start};
 use crate::round_off::bound::{ROUNDED, breaks_first_law, sizes_on_a_step};
 use crate::round_off::compensation::Displaced;
 use crate::round_off::drift;
+use crate::step_failure::{Cause, Fallbacks};
 
 /// The growth of the entropy, relative to its value, below which a step of friction is round-off.
 const NOTHING: f64 = 1e-6 * f64::EPSILON;

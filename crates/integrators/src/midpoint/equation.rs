@@ -9,11 +9,11 @@ use metriplectic_dynamics::velocity::{
 };
 use metriplectic_dynamics::{Metriplectic, SecondLaw, system::Point};
 use metriplectic_fields::{
-    ChartPoint, Column, Dimension, Matrix, Scalar, ScalarField, Space, Square, Vector, differential,
+    ChartPoint, Column, Scalar, ScalarField, Space, Square, Vector, differential,
 };
 use metriplectic_manifolds::{
-    InnerProduct, Manifold, MetricAt, MetricError, Nodes, Retraction, Riemannian, StepPath,
-    StepPathJet,
+    InnerProduct, Manifold, MetricAt, MetricError, MetricSlopes, Nodes, Retraction, Riemannian,
+    StepPath, StepPathJet,
 };
 
 use super::{Dim, Numbers};
@@ -440,16 +440,13 @@ where
     }
 }
 
-/// The derivatives of a metric that is not constant, along the chart.
-type Slopes<M> = <<M as Space>::Dim as Dimension>::Array<Matrix<M>>;
-
 /// The same with the derivatives along the unknown of the step, and what the round-off of the equation is
 /// made of.
 struct Jets<'a, 'b, Y: Metriplectic, R, W, G> {
     along: &'a Along<'a, 'b, Y, R, W, G>,
     path: &'a StepPathJet<Y::Manifold>,
     metric: &'a MetricAt<'a, Y::Manifold, Y::Metric>,
-    slopes: Option<&'a Slopes<Y::Manifold>>,
+    slopes: Option<&'a MetricSlopes<Y::Manifold>>,
     /// The round-off of `w_H`.
     noise: Vector<Y::Manifold>,
     velocity: Option<VelocityJet<Dim<Y>>>,
@@ -460,7 +457,7 @@ impl<'a, 'b, Y: Metriplectic, R, W, G> Jets<'a, 'b, Y, R, W, G> {
         along: &'a Along<'a, 'b, Y, R, W, G>,
         path: &'a StepPathJet<Y::Manifold>,
         metric: &'a MetricAt<'a, Y::Manifold, Y::Metric>,
-        slopes: Option<&'a Slopes<Y::Manifold>>,
+        slopes: Option<&'a MetricSlopes<Y::Manifold>>,
     ) -> Self {
         Self { along, path, metric, slopes, noise: Column::zero(), velocity: None }
     }

@@ -12,15 +12,7 @@ use crate::discrete_gradient::DiscreteGradient;
 use crate::method::{Effort, Flow as _, Laws, Taken};
 use crate::newton::{Equation, Inverse, Iterate, Newton, Root};
 use crate::step_error::StepError;
-
-/// How hard to try.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Fallbacks {
-    /// Everything, because only halving the step comes after it.
-    All,
-    /// Newton's method alone, because a smaller step is tried next.
-    NewtonOnly,
-}
+use crate::step_failure::{Cause, Fallbacks};
 
 /// A step that was not taken.
 #[derive(Clone, Copy, Debug)]
@@ -31,29 +23,6 @@ pub(super) struct StepFailure {
     pub(super) cause: Cause,
     /// What was done.
     pub(super) effort: Effort,
-}
-
-impl StepFailure {
-    /// The error that names the first law, if the step was refused because its end has another energy.
-    pub(super) const fn first_law(self, time: f64, h: f64) -> Option<StepError> {
-        match self.cause {
-            Cause::Energy { change, size } => {
-                Some(StepError::FirstLawBroken { time, h, change, size })
-            }
-            Cause::Edge | Cause::Unsolved => None,
-        }
-    }
-}
-
-/// Why a step was not taken.
-#[derive(Clone, Copy, Debug)]
-pub(super) enum Cause {
-    /// The domain of the model is in the way.
-    Edge,
-    /// The equation is solved, but its end has another energy.
-    Energy { change: f64, size: f64 },
-    /// Newton's method does not converge.
-    Unsolved,
 }
 
 /// The parts of a step that was not solved whole.
@@ -107,7 +76,7 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
     {
         let Start { time, h, .. } = *start;
         let StepFailure { residual, cause, .. } = failure;
-        if let Some(error) = failure.first_law(time, h) {
+        if let Some(error) = failure.cause.first_law(time, h) {
             return error;
         }
         let suggested = smallest_part(h, self.splits);
@@ -167,7 +136,7 @@ where
         let energy = start.accumulated_error.energy + (laws.energy - start.values.energy);
         let accumulated_error = Laws { energy, ..start.accumulated_error };
         let part = Start { x, h, values: laws, accumulated_error, ..*start };
-        match self.scheme.try_step(self.system, &part, memory, Fallbacks::NewtonOnly) {
+        match self.scheme.try_step(self.system, &part, memory, Fallbacks::FirstTries) {
             Ok(taken) => {
                 self.effort += taken.effort;
                 Ok(taken)

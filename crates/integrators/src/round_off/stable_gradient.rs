@@ -5,7 +5,7 @@ use std::borrow::Borrow;
 use metriplectic_fields::{
     Column, Dimension, Matrix, Real, ScalarField, Space, Square, Vector, along_slopes, power_of_two,
 };
-use metriplectic_manifolds::{InnerProduct, Manifold, Nodes, StepPathJet};
+use metriplectic_manifolds::{InnerProduct, Manifold, MetricSlopes, Nodes, StepPathJet};
 
 /// What a field does along one path: the data of a discrete gradient at `f64`.
 ///
@@ -149,7 +149,7 @@ impl<M: Manifold> StableGradient<M> {
     pub fn slope(
         &self,
         drift_correction: f64,
-        (g, slopes): (&impl InnerProduct<Vector<M>>, Option<&Slopes<M>>),
+        (g, slopes): (&impl InnerProduct<Vector<M>>, Option<&MetricSlopes<M>>),
         path: &StepPathJet<M>,
         dmean: &Matrix<M>,
         df_end: &Vector<M>,
@@ -192,9 +192,6 @@ fn along_short<V: Column<f64>>(defect: f64, g: &impl InnerProduct<V>, d: &V) -> 
     let square = flat.dot(d) / unit;
     if square > 0.0 { flat * (defect / unit / square) } else { V::zero() }
 }
-
-/// The derivatives of a metric along the chart.
-type Slopes<M> = <<M as Space>::Dim as Dimension>::Array<Matrix<M>>;
 
 /// The defect as an integral, with the estimate of its error.
 struct Integral {

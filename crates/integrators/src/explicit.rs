@@ -32,7 +32,9 @@
 //! | held | it would fall in any step, by round-off | as before; the state stays |
 //!
 //! At an equilibrium the entropy falls exactly where the step is beyond the region of stability, so the free
-//! steps find its edge.
+//! steps find its edge. Values of `S` show a deviation `δ` from an equilibrium only if `|δ| > √ε`. Below that, the
+//! integral `∫ ⟨dS − β dH − γ_a dL_a, dx⟩` over the step decides whether the entropy falls, so a run reaches the
+//! equilibrium to round-off.
 //!
 //! # What is promised
 //!
@@ -46,6 +48,7 @@ mod estimates;
 mod flow;
 mod memory;
 mod metriplectic;
+mod referred_rise;
 mod step;
 mod tableau;
 

@@ -42,6 +42,13 @@ pub trait StageFlow: Flow {
     /// The coordinates `ψ_x⁻¹(y)`.
     fn stage_coordinates(&self, x: &Element<Self>, y: &Element<Self>) -> Self::Vector;
 
+    /// Returns whether the entropy falls from a state to one near it, where the change of its values is round-off. A
+    /// flow that cannot say returns `false`.
+    fn falls_below_round_off(&self, x: &Element<Self>, y: &Element<Self>) -> bool {
+        let _ = (x, y);
+        false
+    }
+
     /// Whether [`project`](Self::project) uses an estimate of the local error; see [`Target::error`].
     fn weighs_errors(&self) -> bool {
         false

@@ -6,6 +6,7 @@ use metriplectic_fields::{ChartPoint, Column, Dimension, Jet1, ScalarField, Spac
 use metriplectic_manifolds::{InnerProduct, Manifold, Riemannian};
 
 use super::flow::{Projected, ProjectionError, StageFlow, Target};
+use super::referred_rise;
 use crate::method::{Components, Laws};
 use crate::midpoint::{Dim, Numbers};
 
@@ -120,6 +121,10 @@ impl<Y: Metriplectic> StageFlow for Y {
         Components(Y::Manifold::stage_coordinates(x, y))
     }
 
+    fn falls_below_round_off(&self, x: &Point<Y>, y: &Point<Y>) -> bool {
+        referred_rise::falls(self, x, y)
+    }
+
     #[inline]
     fn project(
         &self,
@@ -167,7 +172,7 @@ struct Normals<N: Dimension> {
 }
 
 /// The independent fraction of a differential below which it is a combination of others.
-const INDEPENDENT: f64 = 1e-10;
+pub(super) const INDEPENDENT: f64 = 1e-10;
 /// The residual of an entropy, in units of its round-off, from which on the round-off of the other laws, which
 /// moves it too, is corrected.
 const OFF: f64 = 0.8;

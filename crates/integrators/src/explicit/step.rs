@@ -381,11 +381,17 @@ impl<F: StageFlow> Onto<'_, F> {
         last.rise >= 0.0 && doubt <= 0.5 * last.rise
     }
 
-    /// Whether the entropy at the end is below the one at the start by more than its round-off.
+    /// Whether the entropy at the end is below the one at the start by more than its round-off. Near an equilibrium,
+    /// where every change is round-off, the flow says whether it falls.
     fn falls(&self, end: &Projected<F>) -> bool {
         let (flow, start) = (self.flow, self.start);
         let rise = flow.values(&end.gradients).entropy - start.values.entropy;
-        rise < 0.0 && rise < -FALL * flow.entropy_round_off([start.x, &end.x])
+        let round_off = flow.entropy_round_off([start.x, &end.x]);
+        if rise.abs() > round_off {
+            return rise < 0.0;
+        }
+        let dissipates = self.last.stages[0].1 != 0.0;
+        rise < -FALL * round_off || (dissipates && flow.falls_below_round_off(start.x, &end.x))
     }
 }
 

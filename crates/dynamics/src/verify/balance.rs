@@ -3,7 +3,7 @@
 //! The entries of a state may have different units, so the norm of a vector has no meaning. A sum
 //! `Σ_j A_ij w_j` is compared with `Σ_j |A_ij||w_j|`, row by row, in which every term has one unit.
 
-use metriplectic_fields::{Column, Dimension, Matrix, Space, Square, Vector};
+use super::table::{Table, pairs};
 
 /// The violation of a law that is taken for round-off, relative to the terms that cancel. Models contain
 /// transcendental functions, so it is far above `ε`. It is far below any mistake.
@@ -88,18 +88,17 @@ pub(crate) fn worse(old: f64, new: f64) -> f64 {
 }
 
 /// The largest relative size of a row of `A w`, in chart coordinates of the sizes `units`.
-pub(crate) fn product<M: Space>(a: &Matrix<M>, w: &Vector<M>, units: &Vector<M>) -> f64 {
-    let n = M::Dim::LEN;
-    let rates = Matrix::<M>::from_entries(|i, j| (a[(i, j)] * w[j] / units[i]).abs());
-    let largest = largest_in_blocks::<M>(a, &rates);
-    let row = |i| (0..n).map(|j| a[(i, j)] * w[j]).collect::<Balance>();
-    (0..n).map(|i| row(i).relative(units[i] * largest[i])).fold(0.0, worse)
+pub(crate) fn product(a: &Table, w: &[f64], units: &[f64]) -> f64 {
+    let rates = Table::from_entries(w.len(), |i, j| (a[(i, j)] * w[j] / units[i]).abs());
+    let largest = largest_in_blocks(a, &rates);
+    let row = |i| (0..w.len()).map(|j| a[(i, j)] * w[j]).collect::<Balance>();
+    (0..w.len()).map(|i| row(i).relative(units[i] * largest[i])).fold(0.0, worse)
 }
 
 /// For each index the largest size of an entry in its block: the rows and columns that entries of `a` which
 /// are not zero connect it with. Rounding comes only from these.
-fn largest_in_blocks<M: Space>(a: &Matrix<M>, sizes: &Matrix<M>) -> Vec<f64> {
-    let n = M::Dim::LEN;
+fn largest_in_blocks(a: &Table, sizes: &Table) -> Vec<f64> {
+    let n = a.len();
     let mut block: Vec<usize> = (0..n).collect();
     for (i, j) in pairs(n).filter(|&ij| a[ij] != 0.0) {
         let (kept, joined) = (block[i], block[j]);
@@ -113,13 +112,8 @@ fn largest_in_blocks<M: Space>(a: &Matrix<M>, sizes: &Matrix<M>) -> Vec<f64> {
 }
 
 /// The relative size of the number `⟨α, A β⟩`.
-pub(crate) fn form<M: Space>(
-    a: &Matrix<M>,
-    alpha: &Vector<M>,
-    beta: &Vector<M>,
-    units: &Vector<M>,
-) -> f64 {
-    let n = M::Dim::LEN;
+pub(crate) fn form(a: &Table, alpha: &[f64], beta: &[f64], units: &[f64]) -> f64 {
+    let n = a.len();
     let rate = pairs(n).map(|(i, j)| (a[(i, j)] * beta[j] / units[i]).abs()).fold(0.0, f64::max);
     let size = (0..n).map(|i| (alpha[i] * units[i]).abs()).fold(0.0, f64::max);
     let terms = pairs(n).map(|(i, j)| alpha[i] * a[(i, j)] * beta[j]);
@@ -127,40 +121,34 @@ pub(crate) fn form<M: Space>(
 }
 
 /// The relative size of the number `⟨α, v⟩`.
-pub(crate) fn pairing<M: Space>(alpha: &Vector<M>, v: &Vector<M>, units: &Vector<M>) -> f64 {
-    let n = M::Dim::LEN;
+pub(crate) fn pairing(alpha: &[f64], v: &[f64], units: &[f64]) -> f64 {
+    let n = v.len();
     let rate = (0..n).map(|i| (v[i] / units[i]).abs()).fold(0.0, f64::max);
     let size = (0..n).map(|i| (alpha[i] * units[i]).abs()).fold(0.0, f64::max);
     (0..n).map(|i| alpha[i] * v[i]).collect::<Balance>().relative(size * rate)
 }
 
 /// The sizes of the entries of a tensor on covectors in the given units.
-fn scaled<M: Space>(a: &Matrix<M>, units: &Vector<M>) -> Matrix<M> {
-    Matrix::<M>::from_entries(|i, j| (a[(i, j)] / units[i] / units[j]).abs())
+fn scaled(a: &Table, units: &[f64]) -> Table {
+    Table::from_entries(a.len(), |i, j| (a[(i, j)] / units[i] / units[j]).abs())
 }
 
 /// The largest entry of a tensor on covectors in the given units.
-pub(crate) fn largest<M: Space>(a: &Matrix<M>, units: &Vector<M>) -> f64 {
-    let sizes = scaled::<M>(a, units);
-    pairs(M::Dim::LEN).map(|ij| sizes[ij]).fold(0.0, worse)
+pub(crate) fn largest(a: &Table, units: &[f64]) -> f64 {
+    scaled(a, units).max_abs()
 }
 
 /// The largest relative difference of an entry of a tensor from the transposed one times the `sign`. Beside
 /// the two entries, `√(A_ii A_jj)` and the `rounding` of the largest entry are what they are relative to.
-pub(crate) fn asymmetry<M: Space>(
-    a: &Matrix<M>,
-    sign: f64,
-    units: &Vector<M>,
-    rounding: f64,
-) -> Violation {
-    let top = largest_in_blocks::<M>(a, &scaled::<M>(a, units));
+pub(crate) fn asymmetry(a: &Table, sign: f64, units: &[f64], rounding: f64) -> Violation {
+    let top = largest_in_blocks(a, &scaled(a, units));
     let root = |i: usize| if sign > 0.0 { a[(i, i)].abs().sqrt() } else { 0.0 };
     let violation = |(i, j): (usize, usize)| {
         let balance: Balance = [a[(i, j)], -sign * a[(j, i)]].into_iter().collect();
         let size = rounding * top[i] * units[i] * units[j];
         balance.beside(root(i) * root(j) + size)
     };
-    pairs(M::Dim::LEN).map(violation).fold(Violation::default(), Violation::or_worse)
+    pairs(a.len()).map(violation).fold(Violation::default(), Violation::or_worse)
 }
 
 /// Measures how far a symmetric tensor on covectors is from positive semidefinite: the most negative pivot of
@@ -168,18 +156,18 @@ pub(crate) fn asymmetry<M: Space>(
 ///
 /// The scaling `K_ij / √(K_ii K_jj)` removes all units. Rows that are round-off of others keep
 /// entries below the tolerance.
-pub(crate) fn indefiniteness<M: Space>(k: &Matrix<M>, units: &Vector<M>) -> f64 {
-    let (n, sizes) = (M::Dim::LEN, scaled::<M>(k, units));
-    let top = largest_in_blocks::<M>(k, &sizes);
+pub(crate) fn indefiniteness(k: &Table, units: &[f64]) -> f64 {
+    let n = k.len();
+    let top = largest_in_blocks(k, &scaled(k, units));
     if !top.iter().all(|top| top.is_finite()) {
         return f64::NAN;
     }
-    let hat = Matrix::<M>::from_entries(|i, j| {
+    let hat = Table::from_entries(n, |i, j| {
         let entry = 0.5 * (k[(i, j)] + k[(j, i)]);
         if entry == 0.0 { 0.0 } else { entry / units[i] / units[j] / top[i] }
     });
-    let diagonal = Vector::<M>::from_index(|i| hat[(i, i)].abs() + ROUNDING);
-    let mut a = Matrix::<M>::from_entries(|i, j| hat[(i, j)] / (diagonal[i] * diagonal[j]).sqrt());
+    let diagonal: Vec<f64> = (0..n).map(|i| hat[(i, i)].abs() + ROUNDING).collect();
+    let mut a = Table::from_entries(n, |i, j| hat[(i, j)] / (diagonal[i] * diagonal[j]).sqrt());
     let mut left: Vec<usize> = (0..n).collect();
     let mut negative = 0.0_f64;
     while let Some(&p) = left.iter().max_by(|&&i, &&j| a[(i, i)].total_cmp(&a[(j, j)])) {
@@ -198,9 +186,4 @@ pub(crate) fn indefiniteness<M: Space>(k: &Matrix<M>, units: &Vector<M>) -> f64 
         }
     }
     negative
-}
-
-/// All pairs of indices below `n`.
-pub(crate) fn pairs(n: usize) -> impl Iterator<Item = (usize, usize)> {
-    (0..n).flat_map(move |i| (0..n).map(move |j| (i, j)))
 }

@@ -9,6 +9,7 @@ use rand::{RngExt, SeedableRng};
 use super::balance::{self, Balance, ROUNDING, Violation, asymmetry, largest, worse};
 use super::findings::Findings;
 use super::place::{Place, unusable};
+use super::table::{Table, components};
 use crate::bracket::{Bracket, BracketArgs};
 use crate::metriplectic::{Metriplectic, Point, SecondLaw};
 use crate::model_error::ModelError;
@@ -44,11 +45,12 @@ pub(crate) fn bracket_defects<Y: Metriplectic + ?Sized>(
     let centre = ChartPoint::<Y::Manifold>::centre(x);
     let g = system.metric_at(&centre);
     let tensor = system.bracket().tensor(&system.bracket_args(&g, &entropy.df))?;
-    let at = At { system, x, entropy, units, rounding, tensor: &tensor };
+    let (table, sizes) = (Table::of(&tensor), components(units));
+    let at = At { system, x, entropy, units: &sizes, rounding, tensor: &tensor, table: &table };
     let large = <Y::Manifold as Space>::Dim::LEN > ALL_TRIPLES;
     let Jacobi { violation, is_finite } =
         if large { at.jacobi_of_covectors()? } else { at.jacobi_of_axes()? };
-    let skewness = asymmetry::<Y::Manifold>(&tensor, -1.0, units, rounding);
+    let skewness = asymmetry(&table, -1.0, &sizes, rounding);
     Ok(BracketDefects { tensor, skewness, jacobi: violation, is_finite })
 }
 
@@ -59,14 +61,40 @@ struct Jacobi {
     is_finite: bool,
 }
 
+impl Jacobi {
+    /// Judges the cyclic sums of all triples of axes from the tensor and its derivatives along each axis.
+    fn of_axes(tensor: &Table, slopes: &[Table], units: &[f64], rounding: f64) -> Self {
+        let n = tensor.len();
+        let top = largest(tensor, units);
+        let steepest = (0..n).map(|l| largest(&slopes[l], units) * units[l]);
+        let top = top * steepest.fold(top, worse);
+        let term =
+            |a: usize, b: usize, c: usize| (0..n).map(move |l| tensor[(a, l)] * slopes[l][(b, c)]);
+        // The cyclic sum of a skew tensor is totally skew, and that of a constant one is zero.
+        let mut violation = Violation::default();
+        let constant = slopes.iter().all(|slope| slope.max_abs() == 0.0);
+        for k in 0..if constant { 0 } else { n } {
+            for j in 0..k {
+                for i in 0..j {
+                    let terms = term(i, j, k).chain(term(j, k, i)).chain(term(k, i, j));
+                    let size = rounding * top * units[i] * units[j] * units[k];
+                    violation = violation.or_worse(terms.collect::<Balance>().beside(size));
+                }
+            }
+        }
+        Self { violation, is_finite: slopes.iter().all(|slope| slope.max_abs().is_finite()) }
+    }
+}
+
 /// Where the Jacobi identity is evaluated.
 struct At<'a, Y: Metriplectic + ?Sized> {
     system: &'a Y,
     x: &'a Point<Y>,
     entropy: &'a Jet2<Y::Manifold>,
-    units: &'a Vector<Y::Manifold>,
+    units: &'a [f64],
     rounding: f64,
     tensor: &'a Matrix<Y::Manifold>,
+    table: &'a Table,
 }
 
 impl<Y: Metriplectic + ?Sized> At<'_, Y> {
@@ -88,45 +116,24 @@ impl<Y: Metriplectic + ?Sized> At<'_, Y> {
 
     /// The sum `Σ_l Π^{il}∂_lΠ^{jk} + cyclic` for all triples of axes, term by term.
     fn jacobi_of_axes(&self) -> Result<Jacobi, MetricError> {
-        let &Self { system, units, rounding, tensor, .. } = self;
         let n = <Y::Manifold as Space>::Dim::LEN;
         let mut slopes = Vec::with_capacity(n);
         for l in 0..n {
             let along = Vector::<Y::Manifold>::basis(l);
-            let dual = self.moved(&along, |args| system.bracket().tensor(args))?;
-            slopes.push(Matrix::<Y::Manifold>::from_entries(|i, j| dual[(i, j)].eps));
+            let dual = self.moved(&along, |args| self.system.bracket().tensor(args))?;
+            slopes.push(Table::of(&Matrix::<Y::Manifold>::from_entries(|i, j| dual[(i, j)].eps)));
         }
-        let steepest = (0..n).map(|l| largest::<Y::Manifold>(&slopes[l], units) * units[l]);
-        let top = largest::<Y::Manifold>(tensor, units);
-        let top = top * steepest.fold(top, worse);
-        let term = |a: usize, b: usize, c: usize| {
-            let slopes = &slopes;
-            (0..n).map(move |l| tensor[(a, l)] * slopes[l][(b, c)])
-        };
-        // The cyclic sum of a skew tensor is totally skew, and that of a constant one is zero.
-        let mut violation = Violation::default();
-        let constant = slopes.iter().all(|slope| slope.max_abs() == 0.0);
-        for k in 0..if constant { 0 } else { n } {
-            for j in 0..k {
-                for i in 0..j {
-                    let terms = term(i, j, k).chain(term(j, k, i)).chain(term(k, i, j));
-                    let size = rounding * top * units[i] * units[j] * units[k];
-                    violation = violation.or_worse(terms.collect::<Balance>().beside(size));
-                }
-            }
-        }
-        let is_finite = slopes.iter().all(|slope| slope.max_abs().is_finite());
-        Ok(Jacobi { violation, is_finite })
+        Ok(Jacobi::of_axes(self.table, &slopes, self.units, self.rounding))
     }
 
     /// The same sum for random covectors, `⟨β, ∂_{Πα}Π γ⟩ + cyclic`, which is the sum of three derivatives.
     fn jacobi_of_covectors(&self) -> Result<Jacobi, MetricError> {
-        let &Self { system, units, rounding, tensor, .. } = self;
+        let &Self { system, units, rounding, tensor, table, .. } = self;
         let n = <Y::Manifold as Space>::Dim::LEN;
         let mut rng = ChaCha8Rng::seed_from_u64(SEED);
         let mut covector =
             || Vector::<Y::Manifold>::from_index(|i| rng.random_range(-1.0..1.0) / units[i]);
-        let top = largest::<Y::Manifold>(tensor, units);
+        let top = largest(table, units);
         let (mut violation, mut is_finite) = (Violation::default(), true);
         for _ in 0..TRIPLES {
             let w = [covector(), covector(), covector()];
@@ -162,17 +169,19 @@ pub(super) fn examine<Y: Metriplectic + ?Sized>(
         return Err(ModelError::DerivativeNotFinite { field: "bracket", point });
     }
     let size = defects.skewness.relative();
-    findings.note("Πᵀ = −Π", size, |point| ModelError::BracketNotSkew { point, size });
+    findings.note("Πᵀ = −Π", size, |point, size| ModelError::BracketNotSkew { point, size });
     let size = defects.jacobi.relative();
     if system.bracket().is_poisson() {
-        findings
-            .note("Jacobi identity", size, |point| ModelError::NoJacobiIdentity { point, size });
+        let error = |point, size| ModelError::NoJacobiIdentity { point, size };
+        findings.note("Jacobi identity", size, error);
     } else {
         findings.record("Jacobi identity", size, f64::INFINITY);
     }
     if system.second_law() == SecondLaw::Exact {
-        let size = balance::product::<Y::Manifold>(&defects.tensor, &entropy.df, units);
-        findings.note("Π dS = 0", size, |point| ModelError::EntropyNotCasimir { point, size });
+        let tensor = Table::of(&defects.tensor);
+        let size = balance::product(&tensor, &components(&entropy.df), &components(units));
+        findings
+            .note("Π dS = 0", size, |point, size| ModelError::EntropyNotCasimir { point, size });
     }
     Ok(())
 }

@@ -50,6 +50,9 @@ pub(super) const OF_CLOSURES: Rounding = Rounding { itself: 1e-9, others: 64.0 *
 /// The rounding of a tensor that solves with a metric, which multiplies it by the condition number.
 pub(super) const OF_SOLUTIONS: Rounding = Rounding { itself: 1e-6, others: 1e-9 };
 
+/// Appends the values of all entries at a distance along the direction; `None` if there are no values.
+pub(super) type Values<'a> = &'a dyn Fn(f64, &mut Vec<f64>) -> Option<()>;
+
 /// A derivative that is not that of the values.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Mismatch {
@@ -93,11 +96,10 @@ impl Quotient {
 }
 
 impl Derivatives {
-    /// Compares the derivatives with the values of the entries. `f(t, values)` appends the values at the
-    /// distance `t` along the direction; `None` if there are no values.
-    pub(super) fn compare(&self, f: impl Fn(f64, &mut Vec<f64>) -> Option<()>) -> Option<Mismatch> {
-        let at = |k| self.quotients(k, &f);
-        if self.agree_at_once(&f).is_some() {
+    /// Compares the derivatives with the values of the entries.
+    pub(super) fn compare(&self, f: Values<'_>) -> Option<Mismatch> {
+        let at = |k| self.quotients(k, f);
+        if self.agree_at_once(f).is_some() {
             return None;
         }
         let mut levels: Vec<_> = (COARSEST..=FINEST).filter_map(at).collect();
@@ -120,11 +122,7 @@ impl Derivatives {
     }
 
     /// The quotients of all entries at `δ_k`; `None` where a value is not finite.
-    fn quotients(
-        &self,
-        k: i32,
-        f: &impl Fn(f64, &mut Vec<f64>) -> Option<()>,
-    ) -> Option<Vec<Quotient>> {
+    fn quotients(&self, k: i32, f: Values<'_>) -> Option<Vec<Quotient>> {
         let (delta, n) = (self.scale * RATIO.powi(k), self.df.len());
         let mut values = Vec::with_capacity(2 * n);
         f(delta, &mut values)?;
@@ -133,7 +131,7 @@ impl Derivatives {
     }
 
     /// Returns `Some` if each derivative agrees with a quotient of a narrow bound, whatever the rounding is.
-    fn agree_at_once(&self, f: &impl Fn(f64, &mut Vec<f64>) -> Option<()>) -> Option<()> {
+    fn agree_at_once(&self, f: Values<'_>) -> Option<()> {
         let (deltas, n) = ([FIRST - 1, FIRST].map(|k| self.scale * RATIO.powi(k)), self.df.len());
         let mut values = Vec::with_capacity(4 * n);
         for delta in deltas {

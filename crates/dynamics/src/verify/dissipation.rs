@@ -5,6 +5,7 @@ use metriplectic_fields::{ChartPoint, Square, Vector};
 use super::balance::{self, ROUNDING};
 use super::findings::Findings;
 use super::place::{Place, unusable};
+use super::table::{Table, components};
 use crate::dissipation::Dissipation;
 use crate::metriplectic::Metriplectic;
 use crate::model_error::ModelError;
@@ -29,20 +30,21 @@ pub(super) fn examine<Y: Metriplectic + ?Sized>(
         return Err(ModelError::DerivativeNotFinite { field: "dissipation", point });
     }
     let tensor = k.tensor(&g, &energy.df).map_err(&metric)?;
-    let size = balance::asymmetry::<Y::Manifold>(&tensor, 1.0, units, ROUNDING).relative();
-    findings.note("Kᵀ = K", size, |point| ModelError::DissipationNotSymmetric { point, size });
-    let size = balance::indefiniteness::<Y::Manifold>(&tensor, units);
-    findings.note("K ⪰ 0", size, |point| ModelError::DissipationNotPositive { point, size });
-    let size = balance::product::<Y::Manifold>(&tensor, &energy.df, units);
-    findings.note("K dH = 0", size, |point| ModelError::EnergyNotKept { point, size });
+    let (tensor, units) = (Table::of(&tensor), components(units));
+    let size = balance::asymmetry(&tensor, 1.0, &units, ROUNDING).relative();
+    findings
+        .note("Kᵀ = K", size, |point, size| ModelError::DissipationNotSymmetric { point, size });
+    let size = balance::indefiniteness(&tensor, &units);
+    findings
+        .note("K ⪰ 0", size, |point, size| ModelError::DissipationNotPositive { point, size });
+    let size = balance::product(&tensor, &components(&energy.df), &units);
+    findings.note("K dH = 0", size, |point, size| ModelError::EnergyNotKept { point, size });
     if let Some(w) = w {
         let tensor = k.tensor(&g, w).map_err(&metric)?;
         if tensor.max_abs().is_finite() {
-            let size = balance::product::<Y::Manifold>(&tensor, w, units);
-            findings.note("K_w w = 0", size, |point| ModelError::CovectorNotAnnihilated {
-                point,
-                size,
-            });
+            let size = balance::product(&Table::of(&tensor), &components(w), &units);
+            let error = |point, size| ModelError::CovectorNotAnnihilated { point, size };
+            findings.note("K_w w = 0", size, error);
         }
     }
     Ok(())

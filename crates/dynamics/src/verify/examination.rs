@@ -49,7 +49,7 @@ impl<'a, Y: Metriplectic + ?Sized> Examination<'a, Y> {
     pub(super) fn at(
         &mut self,
         x: &Point<Y>,
-        axes: impl Iterator<Item = usize> + Clone,
+        axes: &[usize],
         report: &mut Report,
     ) -> Result<(), ModelError> {
         report.judged += 1;
@@ -61,7 +61,7 @@ impl<'a, Y: Metriplectic + ?Sized> Examination<'a, Y> {
         let place = Place { system, x, units: &self.sizes.units, energy, entropy };
         // A wrong derivative breaks other laws too, and is reported as their cause.
         let compared = fields::TensorSlopes::at(&place).and_then(|slopes| {
-            axes.clone().try_for_each(|axis| fields::compare(&place, &slopes, axis))
+            axes.iter().try_for_each(|&axis| fields::compare(&place, &slopes, axis))
         });
         let mut findings =
             Findings { point: Y::Manifold::entries(x), laws: &mut report.laws, first: None };

@@ -5,9 +5,9 @@ use metriplectic_fields::{
 };
 use metriplectic_manifolds::{Manifold, Riemannian, Slopes};
 
-use super::balance::pairs;
-use super::derivatives::{Derivatives, Mismatch, OF_CLOSURES, OF_SOLUTIONS};
+use super::derivatives::{Derivatives, Mismatch, OF_CLOSURES, OF_SOLUTIONS, Values};
 use super::place::{Place, unusable};
+use super::table::{Table, append, components};
 use crate::bracket::Bracket;
 use crate::dissipation::{Dissipation, DissipationJet};
 use crate::invariants::{Invariants, Kind, Visitor};
@@ -57,18 +57,17 @@ pub(super) fn compare<Y: Metriplectic + ?Sized>(
 /// law uses them, so a law that its values violate is named first.
 pub(super) fn compare_dissipation<Y: Metriplectic + ?Sized>(
     place: &Place<'_, Y>,
-    axes: impl Iterator<Item = usize>,
+    axes: &[usize],
 ) -> Result<(), ModelError> {
     let &Place { system, x, units, ref energy, .. } = place;
-    let mut axes = axes.peekable();
-    if system.dissipation().is_none() || axes.peek().is_none() {
+    if system.dissipation().is_none() || axes.is_empty() {
         return Ok(());
     }
     let (alpha, centre) = (generic::<Y::Manifold>(units), ChartPoint::centre(x));
     let g = system.metric_at(&centre);
     let jet = system.dissipation().linearise(&g, &energy.df, &alpha);
     let jet = jet.map_err(unusable::<Y::Manifold>(x))?;
-    axes.try_for_each(|axis| Along { place, axis }.dissipation(&jet, &alpha))
+    axes.iter().try_for_each(|&axis| Along { place, axis }.dissipation(&jet, &alpha))
 }
 
 /// One axis of the chart at a point.
@@ -88,12 +87,13 @@ impl<Y: Metriplectic + ?Sized> Along<'_, '_, Y> {
         &self,
         field: &'static str,
         derivatives: &Derivatives,
-        f: impl Fn(f64, &mut Vec<f64>) -> Option<()>,
+        values: Values<'_>,
     ) -> Result<(), ModelError> {
-        derivatives.compare(f).map_or(Ok(()), |Mismatch { derivative, quotient }| {
-            let (axis, point) = (self.axis, Y::Manifold::entries(self.place.x));
-            Err(ModelError::WrongDerivative { field, axis, point, derivative, quotient })
-        })
+        let Some(Mismatch { derivative, quotient }) = derivatives.compare(values) else {
+            return Ok(());
+        };
+        let (axis, point) = (self.axis, Y::Manifold::entries(self.place.x));
+        Err(ModelError::WrongDerivative { field, axis, point, derivative, quotient })
     }
 
     fn scalar(
@@ -103,15 +103,11 @@ impl<Y: Metriplectic + ?Sized> Along<'_, '_, Y> {
         df: &Vector<Y::Manifold>,
     ) -> Result<(), ModelError> {
         let (scale, df) = (self.place.units[self.axis], vec![df[self.axis]]);
-        let value = |t, values: &mut Vec<f64>| {
+        let derivatives = Derivatives { scale, df, units: vec![1.0], rounding: OF_CLOSURES };
+        self.compare(field, &derivatives, &|t, values| {
             values.push(f.at::<f64>(&self.at(t).point()));
             Some(())
-        };
-        self.compare(
-            field,
-            &Derivatives { scale, df, units: vec![1.0], rounding: OF_CLOSURES },
-            value,
-        )
+        })
     }
 
     fn invariants(&self) -> Result<(), ModelError> {
@@ -121,18 +117,17 @@ impl<Y: Metriplectic + ?Sized> Along<'_, '_, Y> {
     }
 
     fn metric(&self, slopes: &TensorSlopes<Y::Manifold>) -> Result<(), ModelError> {
-        let (metric, n) = (self.place.system.metric(), Dim::<Y>::LEN);
         let Some(slopes) = &slopes.metric else { return Ok(()) };
-        let value = |t, values: &mut Vec<f64>| {
-            let g: Matrix<Y::Manifold> = metric.matrix(&self.at(t));
-            values.extend(pairs(n).map(|ij| g[ij]));
-            Some(())
-        };
         let sizes = self.place.units;
-        let df = pairs(n).map(|ij| slopes[self.axis][ij]).collect();
-        let scale = sizes[self.axis];
-        let units = pairs(n).map(|(i, j)| (sizes[i] * sizes[j]).recip()).collect();
-        self.compare("metric", &Derivatives { scale, df, units, rounding: OF_CLOSURES }, value)
+        let (scale, df) = (sizes[self.axis], Table::of(&slopes[self.axis]).entries().to_vec());
+        let units = Table::from_entries(Dim::<Y>::LEN, |i, j| (sizes[i] * sizes[j]).recip());
+        let units = units.entries().to_vec();
+        let derivatives = Derivatives { scale, df, units, rounding: OF_CLOSURES };
+        self.compare("metric", &derivatives, &|t, values| {
+            let g: Matrix<Y::Manifold> = self.place.system.metric().matrix(&self.at(t));
+            values.extend_from_slice(Table::of(&g).entries());
+            Some(())
+        })
     }
 
     fn bracket(&self, slopes: &TensorSlopes<Y::Manifold>) -> Result<(), ModelError> {
@@ -140,14 +135,15 @@ impl<Y: Metriplectic + ?Sized> Along<'_, '_, Y> {
         let (bracket, alpha) = (system.bracket(), generic::<Y::Manifold>(units));
         let Some(slopes) = &slopes.bracket else { return Ok(()) };
         let slopes = slopes.column_at(self.axis);
-        let value = |t, values: &mut Vec<f64>| {
+        let (scale, df, units) = (units[self.axis], components(&slopes), components(units));
+        let derivatives = Derivatives { scale, df, units, rounding: OF_CLOSURES };
+        self.compare("bracket", &derivatives, &|t, values| {
             let at = self.at(t);
             let g = system.metric_at(&at);
             let column = bracket.apply(&system.bracket_args(&g, &entropy.df), &alpha).ok()?;
-            append(values, &column)
-        };
-        let (scale, df, units) = (units[self.axis], components(&slopes), components(units));
-        self.compare("bracket", &Derivatives { scale, df, units, rounding: OF_CLOSURES }, value)
+            append(values, &column);
+            Some(())
+        })
     }
 
     fn dissipation(
@@ -158,11 +154,11 @@ impl<Y: Metriplectic + ?Sized> Along<'_, '_, Y> {
         let &Place { system, units, ref energy, .. } = self.place;
         let (k, w, axis) = (system.dissipation(), energy.df, self.axis);
         let (scale, df) = (units[axis], components(&jet.along_z.column_at(axis)));
-        let value = |t, values: &mut Vec<f64>| {
-            append(values, &k.apply(&system.metric_at(&self.at(t)), &w, alpha).ok()?)
-        };
         let along_z = Derivatives { scale, df, units: components(units), rounding: OF_SOLUTIONS };
-        self.compare("dissipation", &along_z, value)?;
+        self.compare("dissipation", &along_z, &|t, values| {
+            append(values, &k.apply(&system.metric_at(&self.at(t)), &w, alpha).ok()?);
+            Some(())
+        })?;
 
         // If a component of dH is negligible, its size is that of the largest energy of all components.
         let largest = (0..Dim::<Y>::LEN).map(|i| (w[i] * units[i]).abs()).fold(0.0, f64::max);
@@ -173,12 +169,12 @@ impl<Y: Metriplectic + ?Sized> Along<'_, '_, Y> {
         }
         let (df, centre) = (components(&jet.along_w.column_at(axis)), self.at(0.0));
         let g = system.metric_at(&centre);
-        let value = |t, values: &mut Vec<f64>| {
-            let w = w + Vector::<Y::Manifold>::basis(axis) * t;
-            append(values, &k.apply(&g, &w, alpha).ok()?)
-        };
         let along_w = Derivatives { df, scale, ..along_z };
-        self.compare("dissipation, as a function of w,", &along_w, value)
+        self.compare("dissipation, as a function of w,", &along_w, &|t, values| {
+            let w = w + Vector::<Y::Manifold>::basis(axis) * t;
+            append(values, &k.apply(&g, &w, alpha).ok()?);
+            Some(())
+        })
     }
 }
 
@@ -199,14 +195,4 @@ impl<Y: Metriplectic + ?Sized> Visitor<Y::Manifold> for Compared<'_, '_, '_, Y> 
 /// A covector that involves every column of a tensor.
 fn generic<M: Space>(units: &Vector<M>) -> Vector<M> {
     Vector::<M>::from_index(|i| (1.0 + i as f64).sin() / units[i])
-}
-
-fn components<V: Column<f64>>(v: &V) -> Vec<f64> {
-    (0..V::LEN).map(|i| v[i]).collect()
-}
-
-/// Appends the components.
-fn append<V: Column<f64>>(values: &mut Vec<f64>, v: &V) -> Option<()> {
-    values.extend((0..V::LEN).map(|i| v[i]));
-    Some(())
 }

@@ -17,13 +17,13 @@ impl Findings<'_> {
         &mut self,
         law: &'static str,
         size: f64,
-        error: impl FnOnce(Vec<f64>) -> ModelError,
+        error: fn(Vec<f64>, f64) -> ModelError,
     ) {
         if !self.record(law, size, TOLERANCE) && self.first.is_none() {
             let point = self.point.clone();
             // All values of the model are finite here, so their products overflow.
             self.first = Some(if size.is_finite() {
-                error(point)
+                error(point, size)
             } else {
                 ModelError::Overflow { law, point }
             });

@@ -5,6 +5,7 @@ use metriplectic_fields::{ChartPoint, Column, Dimension, Square, Vector};
 use super::balance::{self, worse};
 use super::findings::Findings;
 use super::place::{Place, unusable};
+use super::table::components;
 use crate::bracket::Bracket;
 use crate::metriplectic::{Dim, Metriplectic, SecondLaw};
 use crate::model_error::ModelError;
@@ -31,11 +32,15 @@ pub(super) fn examine<Y: Metriplectic + ?Sized>(
         let point = findings.point.clone();
         return Err(ModelError::DerivativeNotFinite { field: "force", point });
     }
+    let sizes = components(units);
+    let pairing = |alpha: &Vector<Y::Manifold>, v: &Vector<Y::Manifold>| {
+        balance::pairing(&components(alpha), &components(v), &sizes)
+    };
     for w in [Some(&energy.df), w].into_iter().flatten() {
         let force = system.bracket().force(&args, w).map_err(&metric)?;
-        let size = balance::pairing::<Y::Manifold>(w, &force, units);
-        findings
-            .note("⟨dH, force⟩ = 0", size, |point| ModelError::ForceDoesWork { point, size });
+        let size = pairing(w, &force);
+        let error = |point, size| ModelError::ForceDoesWork { point, size };
+        findings.note("⟨dH, force⟩ = 0", size, error);
     }
     if system.second_law() == SecondLaw::Exact {
         let here = [energy.df, entropy.df];
@@ -44,8 +49,8 @@ pub(super) fn examine<Y: Metriplectic + ?Sized>(
             let force =
                 system.bracket().force(&system.bracket_args(&g, &s), &w).map_err(&metric)?;
             let falls = s.dot(&force) < 0.0;
-            let size = if falls { balance::pairing::<Y::Manifold>(&s, &force, units) } else { 0.0 };
-            let error = |point| ModelError::ForceDestroysEntropy { point, size };
+            let size = if falls { pairing(&s, &force) } else { 0.0 };
+            let error = |point, size| ModelError::ForceDestroysEntropy { point, size };
             findings.note("⟨dS, force⟩ ≥ 0", worse(0.0, size), error);
         }
     }

@@ -4,10 +4,11 @@ use metriplectic_fields::{
     ChartPoint, Column, Dimension, Matrix, Real, ScalarField, Space, Square, Vector,
 };
 
-use super::balance::{self, Balance, TOLERANCE, pairs, worse};
+use super::balance::{self, Balance, TOLERANCE, worse};
 use super::findings::Findings;
 use super::place::{Place, jet, unusable};
 use super::sampling;
+use super::table::{Table, components, pairs};
 use crate::bracket::Bracket;
 use crate::dissipation::Dissipation;
 use crate::invariants::{Action, Invariants, Kind, Visitor};
@@ -60,32 +61,33 @@ impl<Y: Metriplectic + ?Sized> Invariance<'_, '_, '_, Y> {
         let g = system.metric_at(&centre);
         let args = system.bracket_args(&g, &entropy.df);
         let tensor = system.bracket().tensor(&args).map_err(unusable::<Y::Manifold>(x))?;
+        let (tensor, sizes, entries) = (Table::of(&tensor), components(units), components(&dl));
         match kind {
             Kind::Casimir => {
-                let size = balance::product::<Y::Manifold>(&tensor, &dl, units);
-                findings.note("Π dC = 0", size, |point| ModelError::NotCasimir { point, size });
+                let size = balance::product(&tensor, &entries, &sizes);
+                findings
+                    .note("Π dC = 0", size, |point, size| ModelError::NotCasimir { point, size });
             }
             Kind::Momentum => {
-                let size = balance::form::<Y::Manifold>(&tensor, &dl, &energy.df, units);
-                findings.note("⟨dJ, Π dH⟩ = 0", size, |point| ModelError::NotMomentum {
-                    point,
-                    size,
-                });
+                let size = balance::form(&tensor, &entries, &components(&energy.df), &sizes);
+                let error = |point, size| ModelError::NotMomentum { point, size };
+                findings.note("⟨dJ, Π dH⟩ = 0", size, error);
             }
         }
         if system.bracket().is_forced() {
             let force = system.bracket().linearise_force(&args, &energy.df);
             let force = force.map_err(unusable::<Y::Manifold>(x))?;
-            let size = balance::pairing::<Y::Manifold>(&dl, &force.value, units);
-            let error = |point| ModelError::ForceChangesInvariant { point, size };
+            let size = balance::pairing(&entries, &components(&force.value), &sizes);
+            let error = |point, size| ModelError::ForceChangesInvariant { point, size };
             findings.note("⟨dL, force⟩ = 0", size, error);
         }
         let k = system.dissipation();
         if !k.is_none() && !k.adapts() {
             let tensor = k.tensor(&g, &energy.df);
             let tensor = tensor.map_err(unusable::<Y::Manifold>(x))?;
-            let size = balance::product::<Y::Manifold>(&tensor, &dl, units);
-            findings.note("K dL = 0", size, |point| ModelError::InvariantNotKept { point, size });
+            let size = balance::product(&Table::of(&tensor), &entries, &sizes);
+            let error = |point, size| ModelError::InvariantNotKept { point, size };
+            findings.note("K dL = 0", size, error);
         }
         Ok(())
     }
@@ -109,7 +111,8 @@ impl<Y: Metriplectic + ?Sized> Invariance<'_, '_, '_, Y> {
         let size = sampling::terms(energy, units) + sampling::terms(&there, units);
         let size = change.sum().abs() / (size + ROUNDED * change.terms());
         let size = if change.sum() == 0.0 { 0.0 } else { size };
-        findings.note("H∘Φ = H", size, |point| ModelError::EnergyNotSymmetric { point, size });
+        let error = |point, size| ModelError::EnergyNotSymmetric { point, size };
+        findings.note("H∘Φ = H", size, error);
 
         // T Π(x) Tᵀ = Π(Φ(x)) with the derivative T of the map.
         let tangent = jacobian_of::<Y>(&y, &|q| moved(far, q));
@@ -119,29 +122,47 @@ impl<Y: Metriplectic + ?Sized> Invariance<'_, '_, '_, Y> {
             let tensor = system.bracket().tensor(&system.bracket_args(&g, ds));
             tensor.map_err(unusable::<Y::Manifold>(x))
         };
-        let (here, there) = (tensor(x, &entropy.df)?, tensor(&y, &system.entropy().jet1(&y).df)?);
-        let top = balance::largest::<Y::Manifold>(&here, units)
-            .max(balance::largest::<Y::Manifold>(&there, units));
-        let violation = |(i, j): (usize, usize)| {
-            let pushed = pairs(n).map(|(k, l)| tangent[(i, k)] * here[(k, l)] * tangent[(j, l)]);
-            let balance: Balance = pushed.chain([-there[(i, j)]]).collect();
-            balance.relative(top * units[i] * units[j])
-        };
-        let size = pairs(n).map(violation).fold(0.0, worse);
-        findings.note("Φ is Poisson", size, |point| ModelError::ActionNotPoisson { point, size });
+        let here = Table::of(&tensor(x, &entropy.df)?);
+        let there = Table::of(&tensor(&y, &system.entropy().jet1(&y).df)?);
+        let sizes = components(units);
+        let size = push_forward(&Table::of(&tangent), &here, &there, &sizes);
+        let error = |point, size| ModelError::ActionNotPoisson { point, size };
+        findings.note("Φ is Poisson", size, error);
 
         let Some(dj) = &self.dj else { return Ok(()) };
-        let largest = pairs(n).map(|(i, j)| (here[(i, j)] * dj[j] / units[i]).abs());
-        let largest = largest.fold(0.0, f64::max);
-        let violation = |i: usize| {
-            let terms = (0..n).map(|j| here[(i, j)] * dj[j]);
-            let balance: Balance = terms.chain([-generator[i]]).collect();
-            balance.relative(units[i] * largest).max((at_rest[i].re / units[i]).abs())
-        };
-        let size = (0..n).map(violation).fold(0.0, worse);
-        findings.note("Π dJ = Φ'", size, |point| ModelError::ActionNotOfMomentum { point, size });
+        let (generator, at_rest) =
+            (components(&generator), (0..n).map(|i| at_rest[i].re).collect::<Vec<_>>());
+        let moved = at_rest.iter().zip(&sizes).map(|(q, unit)| (q / unit).abs());
+        let size = moved.fold(flow_of(&here, &components(dj), &generator, &sizes), worse);
+        let error = |point, size| ModelError::ActionNotOfMomentum { point, size };
+        findings.note("Π dJ = Φ'", size, error);
         Ok(())
     }
+}
+
+/// The largest relative difference of `T Π(x) Tᵀ`, pushed from `here`, and the tensor `there`.
+fn push_forward(tangent: &Table, here: &Table, there: &Table, units: &[f64]) -> f64 {
+    let n = units.len();
+    let top = balance::largest(here, units).max(balance::largest(there, units));
+    let violation = |(i, j): (usize, usize)| {
+        let pushed = pairs(n).map(|(k, l)| tangent[(i, k)] * here[(k, l)] * tangent[(j, l)]);
+        let balance: Balance = pushed.chain([-there[(i, j)]]).collect();
+        balance.relative(top * units[i] * units[j])
+    };
+    pairs(n).map(violation).fold(0.0, worse)
+}
+
+/// The largest relative difference of a row of `Π dJ` and the generator of an action.
+fn flow_of(tensor: &Table, dj: &[f64], generator: &[f64], units: &[f64]) -> f64 {
+    let n = units.len();
+    let largest = pairs(n).map(|(i, j)| (tensor[(i, j)] * dj[j] / units[i]).abs());
+    let largest = largest.fold(0.0, f64::max);
+    let violation = |i: usize| {
+        let terms = (0..n).map(|j| tensor[(i, j)] * dj[j]);
+        let balance: Balance = terms.chain([-generator[i]]).collect();
+        balance.relative(units[i] * largest)
+    };
+    (0..n).map(violation).fold(0.0, worse)
 }
 
 /// How far along its action a symmetry is tested, relative to the sizes of the coordinates.

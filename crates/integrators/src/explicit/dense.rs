@@ -41,14 +41,22 @@ pub(super) fn between<F: StageFlow>(
         .iter()
         .map(|row| (combined(1.0, row, &last.stages), produced(row, &last.stages)));
     let rows: Vec<(F::Vector, f64)> = rows.collect();
+    let mut higher = vec![0.0; rows.len()];
+    let [(before, production_before), (after, production_after)] = ends;
     let q = last.end.with(|i| {
-        let slopes = ends.map(|(rates, _)| h * rates.get(i));
-        polynomial(last.end.get(i), slopes, rows.iter().map(|(row, _)| h * row.get(i)), theta)
+        let slopes = [h * before.get(i), h * after.get(i)];
+        for (number, (row, _)) in higher.iter_mut().zip(&rows) {
+            *number = h * row.get(i);
+        }
+        polynomial(last.end.get(i), slopes, &higher, theta)
     });
     let target = promises.entropy.then(|| {
-        let slopes = ends.map(|(_, production)| h * production);
-        let higher = rows.iter().map(|(_, row)| h * row);
-        entropy(step.values.map(|laws| laws.entropy), slopes, higher, theta)
+        let slopes = [h * production_before, h * production_after];
+        for (number, (_, row)) in higher.iter_mut().zip(&rows) {
+            *number = h * row;
+        }
+        let [start, end] = step.values;
+        entropy([start.entropy, end.entropy], slopes, &higher, theta)
     });
     let on_line = || flow.stage(step.x, &line).unwrap_or_else(|| step.x.clone());
     let y = flow.stage(step.x, &q).unwrap_or_else(on_line);
@@ -74,15 +82,10 @@ fn more_stages<F: StageFlow>(
 }
 
 /// The dense output of one entry, from 0 to `end`, with the slopes at both ends.
-fn polynomial(
-    end: f64,
-    slopes: [f64; 2],
-    higher: impl DoubleEndedIterator<Item = f64> + ExactSizeIterator,
-    theta: f64,
-) -> f64 {
+fn polynomial(end: f64, slopes: [f64; 2], higher: &[f64], theta: f64) -> f64 {
     let rest = 1.0 - theta;
     // (1 − θ) (c₁ + θ (c₂ + (1 − θ) (c₃ + …))).
-    let nested = higher.enumerate().rev().fold(0.0, |sum, (k, c)| {
+    let nested = higher.iter().enumerate().rev().fold(0.0, |sum, (k, c)| {
         let factor = if k % 2 == 0 { rest } else { theta };
         factor * (c + sum)
     });
@@ -91,17 +94,12 @@ fn polynomial(
 
 /// The entropy at the fraction `θ`, between that of the start and that of the end, and never falling. A rise
 /// that is not positive is round-off: the entropy is then the one at the start.
-fn entropy(
-    [start, end]: [f64; 2],
-    slopes: [f64; 2],
-    higher: impl DoubleEndedIterator<Item = f64> + ExactSizeIterator + Clone,
-    theta: f64,
-) -> f64 {
+fn entropy([start, end]: [f64; 2], slopes: [f64; 2], higher: &[f64], theta: f64) -> f64 {
     let rise = end - start;
     if rise <= 0.0 {
         return start;
     }
-    let at = |theta: f64| polynomial(rise, slopes, higher.clone(), theta);
+    let at = |theta: f64| polynomial(rise, slopes, higher, theta);
     let nodes = (0..=NODES).map(|k| at(f64::from(k) / f64::from(NODES)));
     let is_monotone = nodes.clone().zip(nodes.skip(1)).all(|(a, b)| a < b);
     let risen = if is_monotone {
@@ -124,7 +122,7 @@ mod tests {
     fn the_first_rows_of_the_polynomial_are_the_cubic_of_hermite() {
         // f = t² (1 − t)² vanishes at both ends with its slope, and is the first higher row.
         for theta in [0.1, 0.4, 0.9_f64] {
-            let value = polynomial(0.0, [0.0; 2], [1.0].into_iter(), theta);
+            let value = polynomial(0.0, [0.0; 2], &[1.0], theta);
             assert!((value - theta.powi(2) * (1.0 - theta).powi(2)).abs() < 1e-16);
         }
     }
@@ -133,9 +131,7 @@ mod tests {
     fn an_entropy_between_two_states_never_falls() {
         let falling = [0.5, -3.0, 2.0, -1.0];
         for rise in [1.0, 1e-9, 0.0, -1e-16] {
-            let at = |k: u32| {
-                entropy([2.0, 2.0 + rise], [0.0, 9.0], falling.into_iter(), f64::from(k) / 40.0)
-            };
+            let at = |k: u32| entropy([2.0, 2.0 + rise], [0.0, 9.0], &falling, f64::from(k) / 40.0);
             assert!((0..40).all(|k| at(k) <= at(k + 1)), "{rise}");
             assert!(at(40) <= 2.0 + rise.max(0.0));
         }

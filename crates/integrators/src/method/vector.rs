@@ -41,7 +41,13 @@ pub trait Vector: Clone + Debug {
     #[inline]
     fn zip<const K: usize>(vectors: [&Self; K], f: impl Fn([f64; K]) -> f64 + Sync) -> Self {
         const { assert!(K > 0, "a function of no vectors has no length") };
-        vectors[0].with(|i| f(vectors.map(|v| v.get(i))))
+        vectors[0].with(|i| {
+            let mut numbers = [0.0; K];
+            for (number, v) in numbers.iter_mut().zip(vectors) {
+                *number = v.get(i);
+            }
+            f(numbers)
+        })
     }
 
     /// `h Σ_j w_j v_j` over `count > 0` vectors of one length, given with their weights by their index.

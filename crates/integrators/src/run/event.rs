@@ -199,14 +199,22 @@ impl<M: StateSpace> Events<M> {
         for (index, watched) in self.0.iter_mut().enumerate() {
             watched.look(index, inside, ends, output, &mut found)?;
         }
-        found.sort_by(|(a, _), (b, _)| a.total_cmp(b));
-        let mut events: Vec<Event<M>> = found.into_iter().map(|(_, event)| event).collect();
+        let order = in_order(&found.iter().map(|(time, _)| *time).collect::<Vec<_>>());
+        let mut found: Vec<_> = found.into_iter().map(|(_, event)| Some(event)).collect();
+        let mut events: Vec<Event<M>> = order.iter().filter_map(|&i| found[i].take()).collect();
         let stop = events.iter().position(|event| self.0[event.index].request.stops);
         if let Some(stop) = stop {
             events.truncate(stop + 1);
         }
         Some((events, stop.is_some()))
     }
+}
+
+/// The indices of times in their order. A sort of the events themselves is compiled for each space.
+fn in_order(times: &[f64]) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..times.len()).collect();
+    order.sort_by(|&i, &j| times[i].total_cmp(&times[j]));
+    order
 }
 
 impl<M: StateSpace> Watched<M> {

@@ -56,9 +56,9 @@ examples:
 study:
     cargo test --release --workspace -- --ignored
 
-# compare the bits of many runs with tests/golden, or write it with `--bless`: for this machine and compiler
+# compare the bits of many runs with benches/golden, or write it with `--bless`: for this machine and compiler
 golden *flags:
-    {{ if flags == "--bless" { "BLESS=1" } else { "" } }} cargo test --release --all-features --test golden -- --ignored --nocapture
+    {{ if flags == "--bless" { "BLESS=1" } else { "" } }} cargo bench --all-features --bench golden
 
 # random input without sense for ten minutes: a third of the seconds for each of six searches, two at a time
 fuzz seconds="600":

@@ -14,23 +14,27 @@ fn main() -> Result<(), Box<dyn Error>> {
     let about = "Orders of convergence, measured: retraction × manifold × metric × problem.";
     let example = Example::study(about);
 
-    let (mut studies, mut worst, mut progress) = (Vec::new(), 0.0_f64, Progress::over(3));
+    let (mut studies, mut expected) = (Vec::new(), Vec::new());
+    let (mut worst, mut progress) = (0.0_f64, Progress::over(3));
     for part in [Orders::canonical, Orders::closures, Orders::products] {
         let orders = part();
         if !orders.failures.is_empty() {
             return Err(orders.failures.join("\n").into());
         }
         studies.extend(orders.studies);
+        expected.extend(orders.expected);
         worst = worst.max(orders.energy_error);
         progress.step();
     }
     drop(progress);
 
-    let rows = studies.iter().map(|s| {
+    let rows = studies.iter().zip(&expected).map(|(s, expected)| {
         json!({
             "problem": s.problem, "manifold": s.manifold, "metric": s.metric,
             "scheme": s.scheme, "steps": s.steps, "errors": s.errors,
             "order": s.order.slope, "order_interval": s.order.interval,
+            "expected_order": expected, "agrees": s.order.agrees(*expected, 0.05),
+            "worst_energy_error": worst,
         })
     });
     let figure = |place: &str| {

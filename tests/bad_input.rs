@@ -8,7 +8,7 @@ use metriplectic::dynamics::{BuildError, PoissonError};
 use metriplectic::integrators::{RunError, SpanError, StepError};
 use metriplectic::manifolds::{AlgebraError, MetricError, PointError};
 use metriplectic::prelude::*;
-use models::{TUMBLING, UNSTABLE, free_body, half_square, kinetic, relaxing_body};
+use models::{TUMBLING, UNSTABLE, boxed, free_body, half_square, kinetic, relaxing_body};
 
 const INERTIA: Vector3<f64> = Vector3::new(10.0, 5.0, 1.0);
 /// Function pointers and boxes, so that one compiled system serves all choices of the fields.
@@ -137,9 +137,9 @@ fn a_dissipation_that_changes_an_invariant_is_refused() {
         Matrix3::from_diagonal_element(w.norm_squared()) - w * w.transpose()
     };
     let system = System::on(Euclidean::<3>)
-        .energy(|x: &Vector3<Real>| x.x)
-        .entropy(|x: &Vector3<Real>| x.y)
-        .casimir(|x: &Vector3<Real>| x.z)
+        .energy(boxed(|x: &Vector3<Real>| x.x))
+        .entropy(boxed(|x: &Vector3<Real>| x.y))
+        .casimir(boxed(|x: &Vector3<Real>| x.z))
         .dissipation(FieldDissipation(friction))
         .build()
         .unwrap();
@@ -220,8 +220,8 @@ fn a_run_that_fails_on_its_way_keeps_what_it_has() {
 /// logarithm at t = 1.
 fn doomed() -> impl Metriplectic<Manifold = Euclidean<2>, Metric = Canonical> {
     System::on(Euclidean::<2>)
-        .energy(|x: &Vector2<Real>| x.x.ln() + x.y)
-        .entropy(|x: &Vector2<Real>| -x.x)
+        .energy(boxed(|x: &Vector2<Real>| x.x.ln() + x.y))
+        .entropy(boxed(|x: &Vector2<Real>| -x.x))
         .build()
         .expect("the doomed system is a system")
 }
@@ -251,7 +251,7 @@ fn no_step_ends_on_the_edge_of_a_logarithm() {
     // q' = 1 for H = p + ln(1 − q): the flow reaches q = 1 at t = 1, in the middle of a step.
     let system = System::on(Euclidean::<2>)
         .bracket(Symplectic)
-        .energy(|x: &Vector2<Real>| x.y + (-x.x + 1.0).ln())
+        .energy(boxed(|x: &Vector2<Real>| x.y + (-x.x + 1.0).ln()))
         .build()
         .unwrap();
     for h in [0.15, 0.3, 0.7] {
@@ -352,7 +352,8 @@ fn bad_structure_constants_are_refused() {
 
 #[test]
 fn a_system_in_which_nothing_moves_is_not_built() {
-    let error = System::on(Euclidean::<2>).energy(|x: &Vector2<Real>| x.x).build().unwrap_err();
+    let error =
+        System::on(Euclidean::<2>).energy(boxed(|x: &Vector2<Real>| x.x)).build().unwrap_err();
     assert_eq!(error, BuildError::NothingMoves);
     let error = System::on(LieDual::so3())
         .energy(body_energy as Field3)
@@ -366,8 +367,8 @@ fn a_system_in_which_nothing_moves_is_not_built() {
 fn a_model_is_judged_only_inside_its_domain() {
     // The start is closer to the edge of the logarithm than the samples reach, a tenth of an entry.
     let system = System::on(Euclidean::<2>)
-        .energy(|x: &Vector2<Real>| x.x + x.y)
-        .entropy(|x: &Vector2<Real>| (x.x - 1.0).ln() + x.y.ln())
+        .energy(boxed(|x: &Vector2<Real>| x.x + x.y))
+        .entropy(boxed(|x: &Vector2<Real>| (x.x - 1.0).ln() + x.y.ln()))
         .build()
         .unwrap();
     let start = vector![1.01, 2.0];
@@ -383,7 +384,7 @@ fn a_model_is_judged_only_inside_its_domain() {
     let plane = System::on(chart)
         .metric(Metric::field(metric))
         .bracket(AreaForm)
-        .energy(|q: &Vector2<Real>| q.x.powi(2) + q.y.powi(2))
+        .energy(boxed(|q: &Vector2<Real>| q.x.powi(2) + q.y.powi(2)))
         .build()
         .unwrap();
     let report = plane.report(&vector![1.05, 1.0]);
@@ -400,7 +401,7 @@ fn a_model_is_judged_only_inside_its_domain() {
 fn a_point_off_its_manifold_says_how_far() {
     let system = System::on(Sphere::<2>::round())
         .bracket(AreaForm)
-        .energy(|x: &Vector3<Real>| x.x)
+        .energy(boxed(|x: &Vector3<Real>| x.x))
         .build()
         .unwrap();
     let error = WeylMidpoint.run(&system, vector![1.0, 0.1, 0.0], TEN_STEPS).unwrap_err();
@@ -489,8 +490,8 @@ fn errors_are_sentences_with_the_numbers() {
 fn a_step_out_of_an_open_chart_is_an_error_with_the_trajectory_so_far() {
     // x' = −1 towards the edge x = 0 of the chart, where the fields themselves go on.
     let system = System::on(Chart::<2>::new(|q| q.x > 0.0))
-        .energy(|q: &Vector2<Real>| q.y)
-        .entropy(|q: &Vector2<Real>| -q.x)
+        .energy(boxed(|q: &Vector2<Real>| q.y))
+        .entropy(boxed(|q: &Vector2<Real>| -q.x))
         .build()
         .unwrap();
     let error = WeylMidpoint.run(&system, vector![1.0, 0.5], Span::steps(0.1, 100)).unwrap_err();

@@ -12,7 +12,7 @@ use metriplectic::manifolds::{laws, rotations};
 use metriplectic::nalgebra::Const;
 use metriplectic::prelude::*;
 use metriplectic_studies::Order;
-use models::{Globe, top};
+use models::{Globe, boxed, top};
 
 /// The evaluations of a metric so far. The number is atomic, because a system is `Sync`.
 #[derive(Default)]
@@ -73,8 +73,8 @@ fn a_step_evaluates_the_metric_at_most_four_times() {
     let system = System::on(Rotations)
         .metric(Metric::field(inertia))
         .bracket(Nambu::default())
-        .energy(|r: &Matrix3<Real>| r.m11 + r.m22 * 2.0 + r.m33 * 3.0 + r.m12 * r.m23 * 0.5)
-        .entropy(|r: &Matrix3<Real>| r.m13 - r.m21 * 0.5 + (r.m31 + r.m32).powi(2) * 0.25)
+        .energy(boxed(|r: &Matrix3<Real>| r.m11 + r.m22 * 2.0 + r.m33 * 3.0 + r.m12 * r.m23 * 0.5))
+        .entropy(boxed(|r: &Matrix3<Real>| r.m13 - r.m21 * 0.5 + (r.m31 + r.m32).powi(2) * 0.25))
         .build()
         .expect("a frame is a system");
     count.check("SO(3)", &system, &rotations::exp(&vector![0.3, -0.2, 0.5]), 0.005, 4.5);
@@ -85,8 +85,8 @@ fn a_step_evaluates_the_metric_at_most_four_times() {
     });
     let system = System::on(LieDual::so3())
         .metric(Metric::field(skewed))
-        .energy(|p: &Vector3<Real>| p.x * p.x * 0.05 + p.y * p.y * 0.1 + p.z * p.z * 0.5)
-        .entropy(|p: &Vector3<Real>| p.norm_squared() * 0.5)
+        .energy(boxed(|p: &Vector3<Real>| p.x * p.x * 0.05 + p.y * p.y * 0.1 + p.z * p.z * 0.5))
+        .entropy(boxed(|p: &Vector3<Real>| p.norm_squared() * 0.5))
         .build()
         .expect("the body is a system");
     count.check("R³", &system, &vector![-0.6, -0.84, 0.15], 0.1, 4.5);
@@ -99,8 +99,8 @@ fn a_step_evaluates_the_metric_at_most_four_times() {
     });
     let system = System::on(Product(Sphere::<2>::round(), Euclidean::<1>))
         .metric(Metric::field(coupled))
-        .energy(|(m, s): &(Vector3<Real>, Vector1<Real>)| top(m) + s.x.exp())
-        .entropy(|(_, s): &(Vector3<Real>, Vector1<Real>)| s.x)
+        .energy(boxed(|(m, s): &(Vector3<Real>, Vector1<Real>)| top(m) + s.x.exp()))
+        .entropy(boxed(|(_, s): &(Vector3<Real>, Vector1<Real>)| s.x))
         .build()
         .expect("the spin is a system");
     count.check("S² × R", &system, &(vector![0.6, 0.0, 0.8], vector![0.1]), 0.02, 4.5);

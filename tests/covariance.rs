@@ -8,7 +8,7 @@ use metriplectic::fields::{ChartPoint, Matrix};
 use metriplectic::manifolds::{GeodesicEnd, MetricError, Riemannian, StepPathJet};
 use metriplectic::prelude::*;
 use metriplectic_studies::{Either, Order};
-use models::top;
+use models::{boxed, top};
 
 /// Either of both geodesic retractions: each system compiles its run once.
 type Geodesic = Either<WeylMidpoint, Exponential>;
@@ -44,8 +44,8 @@ fn a_step_on_the_sphere_is_the_same_in_colatitude_and_longitude() {
     let chart = System::on(Euclidean::<2>)
         .metric(Metric::field(round))
         .bracket(AreaForm)
-        .energy(|q: &Vector2<Real>| top(&on_sphere(q)))
-        .entropy(|q: &Vector2<Real>| hill(&on_sphere(q)))
+        .energy(boxed(|q: &Vector2<Real>| top(&on_sphere(q))))
+        .entropy(boxed(|q: &Vector2<Real>| hill(&on_sphere(q))))
         .second_law(SecondLaw::Published)
         .build()
         .unwrap();
@@ -95,8 +95,8 @@ fn a_run_with_numerical_geodesics_has_order_two_and_keeps_the_energy() {
     let system = System::on(Euclidean::<3>)
         .metric(Metric::field(bent))
         .bracket(Nambu::default())
-        .energy(|q: &Vector3<Real>| energy(&unbend(q)))
-        .entropy(|q: &Vector3<Real>| entropy(&unbend(q)))
+        .energy(boxed(|q: &Vector3<Real>| energy(&unbend(q))))
+        .entropy(boxed(|q: &Vector3<Real>| entropy(&unbend(q))))
         .build()
         .unwrap();
     let start = vector![0.3, -0.4, 0.5];
@@ -205,8 +205,8 @@ fn in_stereographic_coordinates(
         .bracket(
             Nambu::default().times(move |q: &Vector3<Real>| (q.dot(q) * 0.25 + 1.0).powi(power)),
         )
-        .energy(|q: &Vector3<Real>| wavy(&stereographic(q)))
-        .entropy(|q: &Vector3<Real>| tilted(&stereographic(q)))
+        .energy(boxed(|q: &Vector3<Real>| wavy(&stereographic(q))))
+        .entropy(boxed(|q: &Vector3<Real>| tilted(&stereographic(q))))
         .build()
         .expect("a system")
 }
@@ -307,8 +307,8 @@ fn a_nambu_step_on_rotations_is_the_same_in_rotation_vectors() {
             theta.transpose() * j.cast::<Real>() * theta
         }))
         .bracket(Nambu::default())
-        .energy(move |q: &Vector3<Real>| energy(&exp(q)))
-        .entropy(move |q: &Vector3<Real>| entropy(&exp(q)))
+        .energy(boxed(move |q: &Vector3<Real>| energy(&exp(q))))
+        .entropy(boxed(move |q: &Vector3<Real>| entropy(&exp(q))))
         .build()
         .unwrap();
     same_in_the_chart(&embedded, &chart, vector![0.3, -0.5, 0.4], exp);
@@ -325,8 +325,8 @@ fn a_nambu_step_is_the_same_in_bent_coordinates_with_both_retractions() {
     let chart = System::on(Euclidean::<3>)
         .metric(Metric::field(bent))
         .bracket(Nambu::default())
-        .energy(|q: &Vector3<Real>| energy(&unbend(q)))
-        .entropy(|q: &Vector3<Real>| entropy(&unbend(q)))
+        .energy(boxed(|q: &Vector3<Real>| energy(&unbend(q))))
+        .entropy(boxed(|q: &Vector3<Real>| entropy(&unbend(q))))
         .build()
         .unwrap();
     same_in_the_chart(&flat, &chart, vector![0.3, -0.7, 0.8], unbend);

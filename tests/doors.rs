@@ -5,7 +5,7 @@ use std::marker::PhantomData;
 use std::ops::Mul;
 use std::thread;
 
-use metriplectic::integrators::RunError;
+use metriplectic::fields::ChartPoint;
 use metriplectic::prelude::*;
 
 const START: Vector3<f64> = Vector3::new(0.4, -1.0, 0.3);
@@ -22,13 +22,12 @@ type BoxedMatrix = Box<dyn Fn(&Vector3<Real>) -> Matrix3<Real>>;
 type SharedMatrix = Box<dyn Fn(&Vector3<Real>) -> Matrix3<Real> + Send + Sync>;
 type MatrixPointer = fn(&Vector3<Real>) -> Matrix3<Real>;
 
-/// Where a few steps lead.
-fn end<Y>(system: &Y) -> Result<Vector3<f64>, RunError<LieDual<3>>>
+/// Where the velocity leads in a few steps of Euler's method, which compile in a tenth of the time of a run.
+fn end<Y>(system: &Y) -> Result<Vector3<f64>, Error>
 where
     Y: Metriplectic<Manifold = LieDual<3>>,
-    WeylMidpoint: Retraction<LieDual<3>, Y::Metric>,
 {
-    Ok(WeylMidpoint.run(system, START, Span::steps(0.1, 10))?.last().point)
+    (0..10).try_fold(START, |x, _| Ok(x + system.velocity(&ChartPoint::centre(&x))? * 0.1))
 }
 
 /// Where the free rigid body leads with this energy and this entropy.
@@ -36,7 +35,7 @@ fn end_with(
     energy: impl ScalarField<LieDual<3>>,
     entropy: impl ScalarField<LieDual<3>>,
 ) -> Result<Vector3<f64>, Error> {
-    Ok(end(&System::on(LieDual::so3()).energy(energy).entropy(entropy).build()?)?)
+    end(&System::on(LieDual::so3()).energy(energy).entropy(entropy).build()?)
 }
 
 /// Where the free rigid body leads with this metric and this Poisson tensor.
@@ -50,7 +49,7 @@ fn end_with_matrices(
         .energy(kinetic)
         .entropy(casimir)
         .build()?;
-    Ok(end(&system)?)
+    end(&system)
 }
 
 fn kinetic(p: &Vector3<Real>) -> Real {
@@ -155,8 +154,10 @@ fn every_kind_of_closure_is_a_scalar_field() -> Result<(), Error> {
 fn a_system_of_shareable_boxes_runs_on_another_thread() -> Result<(), Error> {
     let (energy, entropy): (Shared, Shared) = (Box::new(kinetic_of(INERTIA)), Box::new(casimir));
     let body = System::on(LieDual::so3()).energy(energy).entropy(entropy).build()?;
-    let elsewhere = thread::scope(|scope| scope.spawn(|| end(&body)).join().unwrap())?;
-    assert_eq!(elsewhere, end_with(kinetic, casimir)?);
+    let run =
+        || WeylMidpoint.run(&body, START, Span::steps(0.1, 10)).expect("it runs").last().point;
+    let elsewhere = thread::scope(|scope| scope.spawn(run).join().unwrap());
+    assert_eq!(elsewhere, run());
     Ok(())
 }
 

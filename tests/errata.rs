@@ -9,7 +9,7 @@ use metriplectic::integrators::DiscreteGradient;
 use metriplectic::manifolds::{MetricAt, Riemannian, StepPath, Tangent, rotations};
 use metriplectic::prelude::*;
 use metriplectic_studies::Order;
-use models::{TUMBLING, UNSTABLE, free_body, half_square, kinetic, relaxing_body, top};
+use models::{TUMBLING, UNSTABLE, boxed, free_body, half_square, kinetic, relaxing_body, top};
 use std::f64::consts::{FRAC_PI_2, SQRT_2};
 
 const EPS: f64 = f64::EPSILON;
@@ -113,8 +113,8 @@ fn the_remark_has_another_scale_than_the_equation_before_it() {
     // library on R³, where nothing moves but by friction, and L = p₁ + p₂³ is kept, too.
     let system = System::on(Euclidean::<3>)
         .energy(kinetic(INERTIA))
-        .entropy(|p: &Vector3<Real>| p.norm_squared() * 0.5 + p.x * 0.3)
-        .casimir(|p: &Vector3<Real>| p.x + p.y.powi(3))
+        .entropy(boxed(|p: &Vector3<Real>| p.norm_squared() * 0.5 + p.x * 0.3))
+        .casimir(boxed(|p: &Vector3<Real>| p.x + p.y.powi(3)))
         .build()
         .expect("a system");
     let dl = vector![1.0, 3.0 * P.y * P.y, 0.0];
@@ -152,7 +152,7 @@ fn a_momentum_is_kept_if_its_differential_is_annihilated() {
         System::on(Euclidean::<5>)
             .bracket(of_the_plane())
             .energy(in_the_plane)
-            .entropy(|x: &Vector5<Real>| x[4])
+            .entropy(boxed(|x: &Vector5<Real>| x[4]))
     };
     let run = WeylMidpoint.run(&builder().build().unwrap(), start, span).unwrap();
     assert!(run.certificate().keeps_energy());
@@ -172,7 +172,7 @@ fn body_in_space()
 -> impl Metriplectic<Manifold = Product<Rotations, Euclidean<3>>, Metric = Canonical> {
     System::on(Product(Rotations, Euclidean::<3>))
         .bracket(Symplectic)
-        .energy(|(_, p): &(Matrix3<Real>, Vector3<Real>)| kinetic(INERTIA)(p))
+        .energy(boxed(|(_, p): &(Matrix3<Real>, Vector3<Real>)| kinetic(INERTIA)(p)))
         .build()
         .expect("a Hamiltonian system")
 }
@@ -229,8 +229,8 @@ fn before_reduction_the_entropy_is_no_casimir_and_a_function_of_the_momentum() {
     assert!((P.cross(&P)).norm() <= EPS);
     let upstairs = System::on(Product(Rotations, Euclidean::<3>))
         .bracket(Symplectic)
-        .energy(|(_, p): &(Matrix3<Real>, Vector3<Real>)| kinetic(INERTIA)(p))
-        .entropy(|(_, p): &(Matrix3<Real>, Vector3<Real>)| half_square(p))
+        .energy(boxed(|(_, p): &(Matrix3<Real>, Vector3<Real>)| kinetic(INERTIA)(p)))
+        .entropy(boxed(|(_, p): &(Matrix3<Real>, Vector3<Real>)| half_square(p)))
         .build();
     let refused = upstairs.expect("a system").verify(&(r, P), 0.1);
     assert!(matches!(refused, Err(ModelError::EntropyNotCasimir { .. })), "{refused:?}");
@@ -238,8 +238,8 @@ fn before_reduction_the_entropy_is_no_casimir_and_a_function_of_the_momentum() {
     type State = ((Matrix3<Real>, Vector3<Real>), Vector1<Real>);
     let with_a_bath = System::on(Product(Product(Rotations, Euclidean::<3>), Euclidean::<1>))
         .bracket((Symplectic, Zero))
-        .energy(|((_, p), s): &State| kinetic(INERTIA)(p) + s.x.exp())
-        .entropy(|(_, s): &State| s.x)
+        .energy(boxed(|((_, p), s): &State| kinetic(INERTIA)(p) + s.x.exp()))
+        .entropy(boxed(|(_, s): &State| s.x))
         .build()
         .expect("a system");
     let start = ((r, P), Vector1::new(0.1));
@@ -315,8 +315,8 @@ fn containers(
     });
     System::on(Euclidean::<4>)
         .bracket(Poisson::field(wall))
-        .energy(|x: &Vector4<Real>| x.y * x.y * 0.5 + x.z + x.w)
-        .entropy(|x: &Vector4<Real>| x.x.ln() + (-x.x + 2.0).ln() + (x.z * x.w).ln() * 1.5)
+        .energy(boxed(|x: &Vector4<Real>| x.y * x.y * 0.5 + x.z + x.w))
+        .entropy(boxed(|x: &Vector4<Real>| x.x.ln() + (-x.x + 2.0).ln() + (x.z * x.w).ln() * 1.5))
         .dissipation(conduction)
         .second_law(law)
         .build()

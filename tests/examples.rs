@@ -424,15 +424,18 @@ fn the_convergence_study_prints_an_array_of_orders() {
     for row in rows {
         let mut keys: Vec<_> = row.as_object().expect("an object").keys().collect();
         keys.sort();
-        let expected = "errors manifold metric order order_interval problem scheme steps";
+        let expected = "agrees errors expected_order manifold metric order order_interval problem scheme steps \
+                        worst_energy_error";
         assert!(keys.into_iter().eq(expected.split(' ')), "{row}");
         assert!(
             row.as_object().expect("an object").values().all(|value| !value.is_null()),
             "{row}"
         );
+        // The order is within 0.05 of theory, with its whole interval, and the energy is conserved on the way.
         let expected = if row["scheme"] == "exponential" { 1.0 } else { 2.0 };
-        let order = row["order"].as_f64().expect("a number");
-        assert!((order - expected).abs() < 0.05, "{row}");
+        assert!(row["agrees"] == true && figure(row, "expected_order") == expected, "{row}");
+        assert!((figure(row, "order") - expected).abs() <= 0.05, "{row}");
+        assert!(figure(row, "worst_energy_error") <= 50.0 * f64::EPSILON, "{row}");
     }
 }
 

@@ -11,7 +11,7 @@ use metriplectic_studies::problems::flow;
 
 mod models;
 
-use models::{Globe, distance, gas, slope, top};
+use models::{Globe, boxed, distance, gas, slope, top};
 
 /// What a run keeps, and its end.
 fn end<Y: Metriplectic, M: Method<Y>>(
@@ -70,8 +70,8 @@ fn on_spheres_and_products_with_them() {
     type Warm = (Vector3<Real>, Vector1<Real>);
     let warm = System::on(Product(Sphere::<2>::round(), Euclidean::<1>))
         .bracket((AreaForm, Zero))
-        .energy(|(x, s): &Warm| x.z + x.x * x.x * 0.3 + s.x.exp() * 0.2)
-        .entropy(|(_, s): &Warm| s.x)
+        .energy(boxed(|(x, s): &Warm| x.z + x.x * x.x * 0.3 + s.x.exp() * 0.2))
+        .entropy(boxed(|(_, s): &Warm| s.x))
         .build()
         .unwrap();
     orders("S² × R", &warm, &(vector![0.6, 0.0, 0.8], Vector1::new(0.0)), 6.0, [64, 16]);
@@ -87,8 +87,8 @@ fn on_gas_containers() {
 fn on_rotations() {
     let group = System::on(Rotations::bi_invariant())
         .bracket(Nambu::default())
-        .energy(|r: &Matrix3<Real>| r.m11 + r.m22 * 2.0 + r.m33 * 3.0 + r.m12 * r.m23 * 0.5)
-        .entropy(|r: &Matrix3<Real>| r.m13 - r.m21 * 0.5 + (r.m31 + r.m32).powi(2) * 0.25)
+        .energy(boxed(|r: &Matrix3<Real>| r.m11 + r.m22 * 2.0 + r.m33 * 3.0 + r.m12 * r.m23 * 0.5))
+        .entropy(boxed(|r: &Matrix3<Real>| r.m13 - r.m21 * 0.5 + (r.m31 + r.m32).powi(2) * 0.25))
         .build()
         .unwrap();
     let start = Rotations::bi_invariant().from_quaternion([0.8, 0.3, -0.4, 0.33]).unwrap();
@@ -105,8 +105,10 @@ fn on_a_chart_with_a_metric_of_its_own() {
     let system = System::on(Chart::<3>::new(|x| x.norm() < 4.0))
         .metric(Metric::field(metric))
         .bracket(Nambu::default())
-        .energy(|x: &Vector3<Real>| x.x * x.x * 0.5 + x.y * x.y + x.z * x.z * 1.5 + x.x * x.y * 0.3)
-        .entropy(|x: &Vector3<Real>| x.norm_squared() * 0.5 + x.z * 0.2)
+        .energy(boxed(|x: &Vector3<Real>| {
+            x.x * x.x * 0.5 + x.y * x.y + x.z * x.z * 1.5 + x.x * x.y * 0.3
+        }))
+        .entropy(boxed(|x: &Vector3<Real>| x.norm_squared() * 0.5 + x.z * 0.2))
         .build()
         .unwrap();
     orders("chart", &system, &vector![0.5, -0.6, 0.4], 2.0, [32, 8]);
@@ -117,7 +119,7 @@ fn with_a_listed_momentum() {
     let system = System::on(Euclidean::<10>)
         .bracket(Poisson::constant(models::pendulum_bracket()).unwrap())
         .energy(models::pendulum_energy)
-        .entropy(|x: &models::State10| x[8] + x[9])
+        .entropy(boxed(|x: &models::State10| x[8] + x[9]))
         .dissipation(FieldDissipation(models::heat_exchange))
         .momentum(models::angular_momentum)
         .build()
@@ -130,7 +132,7 @@ fn on_a_manifold_of_a_user() {
     let globe = System::on(Globe)
         .metric(Metric::field(|_: &Vector3<Real>| Matrix3::identity()))
         .bracket(AreaForm)
-        .energy(|x: &Vector3<Real>| x.z + x.x * x.x * 0.3 + x.y * x.x * 0.2)
+        .energy(boxed(|x: &Vector3<Real>| x.z + x.x * x.x * 0.3 + x.y * x.x * 0.2))
         .build()
         .unwrap();
     orders("globe", &globe, &Globe::point(vector![0.6, 0.0, 0.8]), 12.0, [64, 16]);
@@ -296,7 +298,7 @@ fn steps_of_one_size_come_to_rest() {
 fn no_digit_of_a_slow_motion_is_lost() {
     let free = System::on(Euclidean::<2>)
         .bracket(Symplectic)
-        .energy(|x: &Vector2<Real>| x.y * x.y * 0.5)
+        .energy(boxed(|x: &Vector2<Real>| x.y * x.y * 0.5))
         .build()
         .unwrap();
     let run = DormandPrince8.run(&free, vector![1e17, 1.0], Span::steps(1.0, 1000)).unwrap();
@@ -331,8 +333,8 @@ fn invariants_that_depend_on_others_are_left_out() {
     // A plane oscillator on a circle: dJ = ±dH/ω, at every point of the way.
     let circle = System::on(Euclidean::<4>)
         .bracket(Symplectic)
-        .energy(|x: &Vector4<Real>| x.norm_squared() * 0.5)
-        .momentum(|x: &Vector4<Real>| x.x * x.w - x.y * x.z)
+        .energy(boxed(|x: &Vector4<Real>| x.norm_squared() * 0.5))
+        .momentum(boxed(|x: &Vector4<Real>| x.x * x.w - x.y * x.z))
         .build()
         .unwrap();
     let start = vector![1.0, 0.0, 0.0, 1.0];
@@ -360,7 +362,7 @@ fn an_edge_is_an_error_or_is_not_crossed() {
     let half_plane = Chart::<2>::new(|x| x.x > 0.0);
     let falling = System::on(half_plane)
         .bracket(Poisson::constant(Matrix2::new(0.0, 1.0, -1.0, 0.0)).unwrap())
-        .energy(|x: &Vector2<Real>| x.y * x.y * 0.5 + x.x)
+        .energy(boxed(|x: &Vector2<Real>| x.y * x.y * 0.5 + x.x))
         .build()
         .unwrap();
     let start = vector![1.0, 0.0];
@@ -382,7 +384,7 @@ fn an_edge_is_an_error_or_is_not_crossed() {
 fn a_failed_step_is_not_in_the_checkpoint() {
     let falling = System::on(Chart::<2>::new(|x| x.x > 0.0))
         .bracket(Poisson::constant(Matrix2::new(0.0, 1.0, -1.0, 0.0)).unwrap())
-        .energy(|x: &Vector2<Real>| x.y * x.y * 0.5 + x.x)
+        .energy(boxed(|x: &Vector2<Real>| x.y * x.y * 0.5 + x.x))
         .build()
         .unwrap();
     let mut steps =
@@ -398,8 +400,8 @@ fn a_failed_step_is_not_in_the_checkpoint() {
 #[test]
 fn an_invariant_without_a_value_ends_the_run() {
     let body = System::on(LieDual::so3())
-        .energy(|p: &Vector3<Real>| p.x * p.x * 0.5 + p.y * p.y + p.z * p.z * 1.5)
-        .casimir(|p: &Vector3<Real>| p.norm_squared() + (p.x + 0.2).sqrt() * 0.0)
+        .energy(boxed(|p: &Vector3<Real>| p.x * p.x * 0.5 + p.y * p.y + p.z * p.z * 1.5))
+        .casimir(boxed(|p: &Vector3<Real>| p.norm_squared() + (p.x + 0.2).sqrt() * 0.0))
         .build()
         .unwrap();
     let start = vector![0.4, 0.2, 0.9];
@@ -414,8 +416,8 @@ fn an_invariant_without_a_value_ends_the_run() {
 #[test]
 fn spheres_of_other_dimensions_and_products_of_three() {
     let sphere = System::on(Sphere::<5>::round())
-        .energy(|x: &Vector6<Real>| x.x * x.x * 0.5 + x.y * x.z - x.w * 0.3)
-        .entropy(|x: &Vector6<Real>| x[4] + x[5] * x[0] * 0.4)
+        .energy(boxed(|x: &Vector6<Real>| x.x * x.x * 0.5 + x.y * x.z - x.w * 0.3))
+        .entropy(boxed(|x: &Vector6<Real>| x[4] + x[5] * x[0] * 0.4))
         .build()
         .unwrap();
     let start = Vector6::repeat(6_f64.sqrt().recip());
@@ -426,8 +428,8 @@ fn spheres_of_other_dimensions_and_products_of_three() {
     let space = Product(Product(Sphere::<2>::round(), Rotations::bi_invariant()), Euclidean::<1>);
     let three = System::on(space)
         .bracket(((AreaForm, Zero), Zero))
-        .energy(|((x, r), e): &Three| x.z + x.x * r.m11 * 0.3 + e.x.exp())
-        .entropy(|((_, r), e): &Three| e.x + r.m13 * 0.2)
+        .energy(boxed(|((x, r), e): &Three| x.z + x.x * r.m11 * 0.3 + e.x.exp()))
+        .entropy(boxed(|((_, r), e): &Three| e.x + r.m13 * 0.2))
         .build()
         .unwrap();
     let start = ((vector![0.6, 0.0, 0.8], Matrix3::identity()), Vector1::new(0.0));
@@ -441,8 +443,8 @@ fn what_is_not_promised_is_said() {
         .bracket(
             Poisson::constant(Matrix3::new(0.0, 1.0, 0.0, -1.0, 0.0, 0.0, 0.0, 0.0, 0.0)).unwrap(),
         )
-        .energy(|x: &Vector3<Real>| x.norm_squared() * 0.5 + x.z)
-        .entropy(|x: &Vector3<Real>| x.z + x.x * 0.1)
+        .energy(boxed(|x: &Vector3<Real>| x.norm_squared() * 0.5 + x.z))
+        .entropy(boxed(|x: &Vector3<Real>| x.z + x.x * 0.1))
         .second_law(SecondLaw::Published)
         .build()
         .unwrap();

@@ -5,6 +5,8 @@
 //! of each in 60 digits from a step of size 0 to the one that is asked for. A start is solvable if
 //! that branch gets there.
 
+mod models;
+
 use std::fmt;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::{Duration, Instant};
@@ -12,6 +14,7 @@ use std::time::{Duration, Instant};
 use metriplectic::dynamics::system::Point;
 use metriplectic::integrators::Effort;
 use metriplectic::prelude::*;
+use models::boxed;
 use serde_json::Value;
 
 /// A start with its label.
@@ -63,25 +66,27 @@ impl Case {
                 self.outcome(
                     System::on(LieDual::so3())
                         .metric(metric.expect("a metric"))
-                        .energy(move |p: &Vector3<Real>| {
+                        .energy(boxed(move |p: &Vector3<Real>| {
                             p.component_mul(p).component_div(&inertia.cast()).sum() * 0.5
-                        })
-                        .entropy(|p: &Vector3<Real>| p.norm_squared() * 0.5)
+                        }))
+                        .entropy(boxed(|p: &Vector3<Real>| p.norm_squared() * 0.5))
                         .build(),
                     self.x(),
                 )
             }
             "climbing body" => self.outcome(
                 System::on(LieDual::so3())
-                    .energy(|p: &Vector3<Real>| p.x.powi(2) * 0.5 + p.y.powi(2) * 0.25 + p.z.exp())
-                    .entropy(|p: &Vector3<Real>| p.norm_squared().powi(2))
+                    .energy(boxed(|p: &Vector3<Real>| {
+                        p.x.powi(2) * 0.5 + p.y.powi(2) * 0.25 + p.z.exp()
+                    }))
+                    .entropy(boxed(|p: &Vector3<Real>| p.norm_squared().powi(2)))
                     .build(),
                 self.x(),
             ),
             "doomed logarithm" => self.outcome(
                 System::on(Euclidean::<2>)
-                    .energy(|x: &Vector2<Real>| x.x.ln() + x.y)
-                    .entropy(|x: &Vector2<Real>| -x.x)
+                    .energy(boxed(|x: &Vector2<Real>| x.x.ln() + x.y))
+                    .entropy(boxed(|x: &Vector2<Real>| -x.x))
                     .build(),
                 self.x(),
             ),
@@ -90,12 +95,12 @@ impl Case {
                 let kind = self.number("kind");
                 self.outcome(
                     System::on(Euclidean::<2>)
-                        .energy(|e: &Vector2<Real>| e.x + e.y * 2.0 + e.x * e.y * 0.1)
-                        .entropy(move |e: &Vector2<Real>| match kind {
+                        .energy(boxed(|e: &Vector2<Real>| e.x + e.y * 2.0 + e.x * e.y * 0.1))
+                        .entropy(boxed(move |e: &Vector2<Real>| match kind {
                             0.0 => e.x.ln() + e.y.ln() * 3.0,
                             1.0 => e.x.sqrt() * 2.0 + e.y.sqrt() * 6.0,
                             _ => (e.x.powf(0.3) + e.y.powf(0.3) * 3.0) / 0.3,
-                        })
+                        }))
                         .build(),
                     self.x(),
                 )
@@ -104,12 +109,12 @@ impl Case {
             "rotation" => self.outcome(
                 System::on(Rotations::bi_invariant())
                     .bracket(Nambu::default())
-                    .energy(|r: &Matrix3<Real>| {
+                    .energy(boxed(|r: &Matrix3<Real>| {
                         r.m11 + r.m22 * 2.0 + r.m33 * 3.0 + r.m12 * r.m23 * 0.5
-                    })
-                    .entropy(|r: &Matrix3<Real>| {
+                    }))
+                    .entropy(boxed(|r: &Matrix3<Real>| {
                         r.m13 - r.m21 * 0.5 + (r.m31 + r.m32).powi(2) * 0.25
-                    })
+                    }))
                     .build(),
                 Matrix3::from_row_slice(&self.numbers("x")),
             ),
@@ -122,10 +127,12 @@ impl Case {
                 self.outcome(
                     System::on(Euclidean::<2>)
                         .metric(metric)
-                        .energy(|x: &Vector2<Real>| {
+                        .energy(boxed(|x: &Vector2<Real>| {
                             x.x.powi(2) * 0.5 + x.y.powi(2) + x.x * x.y * 0.3
-                        })
-                        .entropy(|x: &Vector2<Real>| x.x - x.y * 0.5 + x.x * x.y.powi(2) * 0.25)
+                        }))
+                        .entropy(boxed(|x: &Vector2<Real>| {
+                            x.x - x.y * 0.5 + x.x * x.y.powi(2) * 0.25
+                        }))
                         .build(),
                     self.x(),
                 )
@@ -135,8 +142,10 @@ impl Case {
                 self.outcome(
                     System::on(Euclidean::<3>)
                         .bracket(Poisson::constant(-Vector3::z().cross_matrix()).expect("skew"))
-                        .energy(|x: &Vector3<Real>| (x.x.powi(2) + x.y.powi(2)) * 0.5 + x.z.exp())
-                        .entropy(|x: &Vector3<Real>| x.z)
+                        .energy(boxed(|x: &Vector3<Real>| {
+                            (x.x.powi(2) + x.y.powi(2)) * 0.5 + x.z.exp()
+                        }))
+                        .entropy(boxed(|x: &Vector3<Real>| x.z))
                         .dissipation(FieldDissipation(
                             move |_: &Vector3<Real>, w: &Vector3<Real>| {
                                 let b = Vector3::new(0.0.into(), w.z, -w.y);
@@ -162,8 +171,10 @@ impl Case {
                 (pi[(3, 1)], pi[(1, 3)]) = (right, -right);
                 pi
             }))
-            .energy(|x: &Vector4<Real>| x.y.powi(2) * 0.5 + x.z + x.w)
-            .entropy(|x: &Vector4<Real>| x.x.ln() + (-x.x + 2.0).ln() + (x.z.ln() + x.w.ln()) * 1.5)
+            .energy(boxed(|x: &Vector4<Real>| x.y.powi(2) * 0.5 + x.z + x.w))
+            .entropy(boxed(|x: &Vector4<Real>| {
+                x.x.ln() + (-x.x + 2.0).ln() + (x.z.ln() + x.w.ln()) * 1.5
+            }))
             .dissipation(FieldDissipation(move |_: &Vector4<Real>, w: &Vector4<Real>| {
                 let b = Vector4::new(0.0.into(), 0.0.into(), w.w, -w.z);
                 b * b.transpose() * Real::from(alpha)
@@ -195,11 +206,11 @@ impl Case {
         let system = System::on(Euclidean::<3>)
             .metric(Metric::constant(g).expect("a metric"))
             .bracket(Nambu::default())
-            .energy(|x: &Vector3<Real>| {
+            .energy(boxed(|x: &Vector3<Real>| {
                 let wells = x.iter().map(|a| a.powi(2) * 0.5 + a.powi(4) * 0.25).sum::<Real>();
                 wells + x.x * x.y / 3.0
-            })
-            .entropy(|x: &Vector3<Real>| x.z + x.x.powi(2) * 0.5 - x.y.exp() * 0.25)
+            }))
+            .entropy(boxed(|x: &Vector3<Real>| x.z + x.x.powi(2) * 0.5 - x.y.exp() * 0.25))
             .build();
         self.outcome(system, self.x())
     }
@@ -409,14 +420,14 @@ const fn label(solvable: bool) -> &'static str {
 fn a_blow_up_on_the_dual_of_se3_ends_in_the_error_of_the_step_it_cannot_take() {
     // C₁ = |Γ|², C₂ = M·Γ. H has no lower bound along Γ, so that exp(C₁C₂) climbs without bound.
     let system = System::on(LieDual::se3())
-        .energy(|x: &SVector<Real, 6>| {
+        .energy(boxed(|x: &SVector<Real, 6>| {
             let m = x.fixed_rows::<3>(0);
             m.x.powi(2) * 0.5 + m.y.powi(2) * 0.25 + m.z.powi(2) * 0.2 + x[5] + x[3] * x[4] * 0.3
-        })
-        .entropy(|x: &SVector<Real, 6>| {
+        }))
+        .entropy(boxed(|x: &SVector<Real, 6>| {
             let (m, gamma) = (x.fixed_rows::<3>(0), x.fixed_rows::<3>(3));
             (gamma.norm_squared() * m.dot(&gamma)).exp()
-        })
+        }))
         .build()
         .unwrap();
     let start = SVector::from([0.4, -0.3, 0.5, 0.6, 0.2, 0.5]);

@@ -7,8 +7,8 @@ use metriplectic::prelude::*;
 use metriplectic_studies::Order;
 use metriplectic_studies::problems::flow;
 use models::{
-    HEAVY, PENDULUM, State6, State10, alignment, angular_momentum, gamma_squared, heat_exchange,
-    heavy, kinetic, pair, pendulum_bracket, pendulum_energy,
+    HEAVY, PENDULUM, State6, State10, alignment, angular_momentum, boxed, gamma_squared,
+    heat_exchange, heavy, kinetic, pair, pendulum_bracket, pendulum_energy,
 };
 
 /// Orders on four step sizes, with certificates that must keep everything.
@@ -98,7 +98,7 @@ fn the_angular_momentum_of_a_pendulum_is_kept_at_second_order() {
     let system = System::on(Euclidean::<10>)
         .bracket(Poisson::constant(pendulum_bracket()).unwrap())
         .energy(pendulum_energy)
-        .entropy(|x: &State10| x[8] + x[9])
+        .entropy(boxed(|x: &State10| x[8] + x[9]))
         .dissipation(FieldDissipation(heat_exchange))
         .symmetry(turned, angular_momentum)
         .build()
@@ -182,35 +182,36 @@ fn mistakes_in_the_list_are_refused_with_numbers() {
         };
     }
     // Not a Casimir; it says what else it may be.
-    let error = refused!(top().casimir(|x: &State6| x[0] + x[3]));
+    let error = refused!(top().casimir(boxed(|x: &State6| x[0] + x[3])));
     assert!(matches!(error, ModelError::NotCasimir { size, .. } if size > 0.1));
     assert!(error.to_string().contains(".momentum(..)"));
     // Not conserved.
-    let error = refused!(top().momentum(|x: &State6| x[2]));
+    let error = refused!(top().momentum(boxed(|x: &State6| x[2])));
     assert!(matches!(error, ModelError::NotMomentum { size, .. } if size > 1e-3));
     // A function of the entropy, and of the energy.
-    let error = refused!(top().casimir(|x: &State6| alignment(x).powi(2)));
+    let error = refused!(top().casimir(boxed(|x: &State6| alignment(x).powi(2))));
     assert!(
         matches!(error, ModelError::DependentInvariant { index: 0, fraction } if fraction < 1e-8)
     );
-    let error = refused!(top().casimir(gamma_squared).momentum(|x: &State6| heavy(x) * 2.0));
+    let error = refused!(top().casimir(gamma_squared).momentum(boxed(|x: &State6| heavy(x) * 2.0)));
     assert!(
         matches!(error, ModelError::DependentInvariant { index: 1, fraction } if fraction < 1e-8)
     );
     // A dissipation of one's own that changes it.
     let friction = CasimirDissipation::new(LieDual::se3().algebra(), SMatrix::identity()).unwrap();
-    let error = refused!(top().dissipation(friction).momentum(|x: &State6| heavy(x) + x[0]));
+    let error = refused!(top().dissipation(friction).momentum(boxed(|x: &State6| heavy(x) + x[0])));
     assert!(matches!(error, ModelError::NotMomentum { .. }), "{error}");
     // A derivative that is not a number.
-    let error =
-        refused!(top().casimir(|x: &State6| gamma_squared(x) + (x[0] - HEAVY[0]).powi(2).sqrt()));
+    let error = refused!(
+        top().casimir(boxed(|x: &State6| gamma_squared(x) + (x[0] - HEAVY[0]).powi(2).sqrt()))
+    );
     assert!(matches!(error, ModelError::DerivativeNotFinite { field: "invariant", .. }), "{error}");
     // Nothing is left to move.
     let crowd = System::on(Euclidean::<2>)
         .bracket(Poisson::constant(Matrix2::new(0.0, 1.0, -1.0, 0.0)).unwrap())
-        .energy(|x: &Vector2<Real>| x.norm_squared())
-        .momentum(|x: &Vector2<Real>| x.x)
-        .momentum(|x: &Vector2<Real>| x.y)
+        .energy(boxed(|x: &Vector2<Real>| x.norm_squared()))
+        .momentum(boxed(|x: &Vector2<Real>| x.x))
+        .momentum(boxed(|x: &Vector2<Real>| x.y))
         .build();
     assert!(matches!(crowd, Err(BuildError::TooManyInvariants { count: 2, dimension: 2 })));
 }
@@ -221,7 +222,7 @@ fn an_action_that_is_no_symmetry_is_refused() {
         let system = System::on(Euclidean::<10>)
             .bracket(Poisson::constant(pendulum_bracket()).unwrap())
             .energy(energy)
-            .entropy(|x: &State10| x[8] + x[9])
+            .entropy(boxed(|x: &State10| x[8] + x[9]))
             .dissipation(FieldDissipation(heat_exchange))
             .symmetry(action, angular_momentum)
             .build()
@@ -255,8 +256,10 @@ fn on_the_four_sphere() -> impl Metriplectic<Manifold = Sphere<4>, Metric = Cano
     let tilt = |x: &Vector5<Real>| x[4] + x[0] * x[1] * 0.3;
     System::on(Sphere::<4>)
         .bracket(Nambu::default().and(tilt))
-        .energy(|x: &Vector5<Real>| x[0].powi(2) + x[1].powi(2) * 2.0 + x[2] * x[3] + x[4].powi(3))
-        .entropy(|x: &Vector5<Real>| x[0] + x[2].powi(2) - x[3] * x[1])
+        .energy(boxed(|x: &Vector5<Real>| {
+            x[0].powi(2) + x[1].powi(2) * 2.0 + x[2] * x[3] + x[4].powi(3)
+        }))
+        .entropy(boxed(|x: &Vector5<Real>| x[0] + x[2].powi(2) - x[3] * x[1]))
         .casimir(tilt)
         .build()
         .expect("it is a system")

@@ -6,14 +6,15 @@ use metriplectic::dynamics::ModelError;
 use metriplectic::integrators::{Schedule, SpanError, StepError, Until};
 use metriplectic::manifolds::Constant;
 use metriplectic::prelude::*;
+use models::boxed;
 
 /// A pendulum of energy `H = p²/2 + 1 − cos q`, in a unit of length and momentum.
 fn pendulum(unit: f64) -> impl Metriplectic<Manifold = Euclidean<2>, Metric = Canonical> {
     System::on(Euclidean::<2>)
         .bracket(Symplectic)
-        .energy(move |x: &Vector2<Real>| {
+        .energy(boxed(move |x: &Vector2<Real>| {
             x.y.powi(2) * 0.5 + (-(x.x / unit).cos() + 1.0) * unit.powi(2)
-        })
+        }))
         .build()
         .expect("the parts make a system")
 }
@@ -41,11 +42,11 @@ fn molecule() -> impl Metriplectic<Manifold = Euclidean<3>, Metric = Canonical> 
             Poisson::constant(Matrix3::new(0.0, 1.0, 0.0, -1.0, 0.0, 0.0, 0.0, 0.0, 0.0))
                 .expect("it is skew"),
         )
-        .energy(|x: &Vector3<Real>| {
+        .energy(boxed(|x: &Vector3<Real>| {
             let stretch = -((-(x.x - LENGTH) * STIFFNESS).exp()) + 1.0;
             x.y.powi(2) / (2.0 * MASS) + stretch.powi(2) * DEPTH + x.z * 300.0
-        })
-        .entropy(|x: &Vector3<Real>| x.z)
+        }))
+        .entropy(boxed(|x: &Vector3<Real>| x.z))
         .dissipation(FieldDissipation(|_: &Vector3<Real>, w: &Vector3<Real>| {
             let b = Vector3::new(Real::from(0.0), w.z, -w.y);
             b * b.transpose() * (w.z.recip() * FRICTION)
@@ -91,7 +92,7 @@ fn a_molecule_in_si_units_keeps_its_laws_at_the_default_tolerance() {
 fn a_collision_ends_in_an_error_however_small_the_least_step() {
     let fall = System::on(Euclidean::<2>)
         .bracket(Symplectic)
-        .energy(|x: &Vector2<Real>| x.y.powi(2) * 0.5 - x.x.recip())
+        .energy(boxed(|x: &Vector2<Real>| x.y.powi(2) * 0.5 - x.x.recip()))
         .build()
         .unwrap();
     let end = |span: Until| {
@@ -119,9 +120,9 @@ fn a_collision_ends_in_an_error_however_small_the_least_step() {
 fn a_field_of_tiny_slope_moves() {
     let tiny = |size: f64| {
         System::on(LieDual::so3())
-            .energy(move |p: &Vector3<Real>| {
+            .energy(boxed(move |p: &Vector3<Real>| {
                 (p.x.powi(2) * 0.5 + p.y.powi(2) + p.z.powi(2) * 1.5) * size
-            })
+            }))
             .build()
             .unwrap()
     };
@@ -146,7 +147,7 @@ fn a_field_of_tiny_slope_moves() {
 fn a_uniform_motion_far_away_is_no_rest() {
     let free = System::on(Euclidean::<2>)
         .bracket(Symplectic)
-        .energy(|x: &Vector2<Real>| x.y.powi(2) * 0.5)
+        .energy(boxed(|x: &Vector2<Real>| x.y.powi(2) * 0.5))
         .build()
         .unwrap();
     let span = Span::steps(1.0, 1000).until_rest(1e-9);
@@ -177,11 +178,11 @@ fn damped(
             Poisson::constant(Matrix3::new(0.0, skew, 0.0, -skew, 0.0, 0.0, 0.0, 0.0, 0.0))
                 .expect("it is skew"),
         )
-        .energy(move |x: &Vector3<Real>| {
+        .energy(boxed(move |x: &Vector3<Real>| {
             let (q, p) = (x.x / q, x.y / p);
             (p * p * 0.5 + q * q * 0.5 + q.powi(4) * 0.25 + x.z / s) * energy
-        })
-        .entropy(move |x: &Vector3<Real>| x.z)
+        }))
+        .entropy(boxed(move |x: &Vector3<Real>| x.z))
         .dissipation(FieldDissipation(move |_: &Vector3<Real>, w: &Vector3<Real>| {
             // b = (0, w_s, −w_p), each with the unit of its entry.
             let b = Vector3::new(Real::from(0.0), w.z * (s * p / energy), -w.y * (s * p / energy));
@@ -248,10 +249,10 @@ fn the_size_of_an_entry_can_be_said() {
     let radius = 1e3;
     let system = System::on(Euclidean::<2>)
         .bracket(Symplectic)
-        .energy(move |x: &Vector2<Real>| {
+        .energy(boxed(move |x: &Vector2<Real>| {
             let height = x.x - radius;
             x.y.powi(2) * 0.5 + height.powi(2) * 0.5 + height.powi(4) * 0.25
-        })
+        }))
         .build()
         .unwrap();
     let start = vector![radius + 1.0, 0.0];
@@ -295,7 +296,7 @@ fn an_entry_that_stays_at_zero_but_for_noise_stops_nothing() {
     let matrix = Matrix4::from_fn(|i, j| f64::from(j == i + 2) - f64::from(i == j + 2));
     let system = System::on(Euclidean::<4>)
         .bracket(Poisson::constant(matrix).unwrap())
-        .energy(|x: &Vector4<Real>| {
+        .energy(boxed(|x: &Vector4<Real>| {
             // The second position is the centre: forces of 10³ on it cancel.
             let (a, b) = (x.y + x.x, x.y - x.x);
             (x.z.powi(2) + x.w.powi(2)) * 0.5
@@ -303,7 +304,7 @@ fn an_entry_that_stays_at_zero_but_for_noise_stops_nothing() {
                 + (a * 3.0 + b * 3.0).sin()
                 - (a * 3.0).sin()
                 - (b * 3.0).sin()
-        })
+        }))
         .build()
         .unwrap();
     let start = vector![0.7, 0.0, 0.3, 0.0];
@@ -346,7 +347,7 @@ fn a_run_starts_when_it_is_told() {
     // A step that fails says when.
     let fall = System::on(Euclidean::<2>)
         .bracket(Symplectic)
-        .energy(|x: &Vector2<Real>| x.y.powi(2) * 0.5 - x.x.recip())
+        .energy(boxed(|x: &Vector2<Real>| x.y.powi(2) * 0.5 - x.x.recip()))
         .build()
         .unwrap();
     let span = Span::until(102.0).starting_at(100.0).tolerance(1e-3);
@@ -392,7 +393,7 @@ fn an_underflow_is_called_one() {
     // ½(q² + p²) is 10⁻³²⁰, which has three digits left.
     let oscillator = System::on(Euclidean::<2>)
         .bracket(Symplectic)
-        .energy(|x: &Vector2<Real>| x.norm_squared() * 0.5)
+        .energy(boxed(|x: &Vector2<Real>| x.norm_squared() * 0.5))
         .build()
         .unwrap();
     for size in [1e-160, 1e-150] {

@@ -268,3 +268,10 @@ pub(crate) fn distance<M: Manifold>(a: &M::Point<f64>, b: &M::Point<f64>) -> f64
     let both = M::entries(a).into_iter().zip(M::entries(b));
     both.map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
 }
+
+/// A function in a box: systems of one shape with boxed functions have one type, and are compiled once.
+pub(crate) fn boxed<P: 'static, T>(
+    f: impl Fn(&P) -> T + Send + Sync + 'static,
+) -> Box<dyn Fn(&P) -> T + Send + Sync> {
+    Box::new(f)
+}

@@ -36,21 +36,18 @@ struct PathEnergy<'a, M: Space, F> {
     x: &'a M::Point<f64>,
     end: Vector<M>,
     space: PhantomData<M>,
-    evaluations: Cell<u32>,
+}
+
+/// A smooth function of a column of numbers.
+trait Objective {
+    /// Its value; infinite outside the domain.
+    fn value(&self, path: &[f64]) -> f64;
+
+    /// Its gradient.
+    fn gradient(&self, path: &[f64]) -> Vec<f64>;
 }
 
 impl<M: Space, F: MatrixField<M>> PathEnergy<'_, M, F> {
-    /// Counts an evaluation, and fails at the limit. Without it, a line search through a metric that is not
-    /// smooth may not end.
-    fn spend(&self) -> Result<(), argmin::core::Error> {
-        self.evaluations.set(self.evaluations.get() + 1);
-        if self.evaluations.get() <= EVALUATIONS {
-            Ok(())
-        } else {
-            Err(argmin::core::Error::msg("the path is not found in the evaluations allowed"))
-        }
-    }
-
     /// The corner `k`, where the first and the last corner are the ends.
     fn corner(&self, path: &[f64], k: usize) -> Vector<M> {
         match k {
@@ -67,32 +64,22 @@ impl<M: Space, F: MatrixField<M>> PathEnergy<'_, M, F> {
     }
 }
 
-impl<M: Space, F: MatrixField<M>> CostFunction for PathEnergy<'_, M, F> {
-    type Param = Vec<f64>;
-    type Output = f64;
-
-    fn cost(&self, path: &Vec<f64>) -> Result<f64, argmin::core::Error> {
-        self.spend()?;
+impl<M: Space, F: MatrixField<M>> Objective for PathEnergy<'_, M, F> {
+    fn value(&self, path: &[f64]) -> f64 {
         let mut energy = 0.0;
         for k in 0..PIECES {
             let (step, g) = self.piece(path, k);
             let square = step.dot(&(g.value * step));
             // Beyond the edge of a chart the metric is not positive, or not a number.
             if !(square >= 0.0 && square.is_finite()) {
-                return Ok(f64::INFINITY);
+                return f64::INFINITY;
             }
             energy += 0.5 * PIECES as f64 * square;
         }
-        Ok(energy)
+        energy
     }
-}
 
-impl<M: Space, F: MatrixField<M>> Gradient for PathEnergy<'_, M, F> {
-    type Param = Vec<f64>;
-    type Gradient = Vec<f64>;
-
-    fn gradient(&self, path: &Vec<f64>) -> Result<Vec<f64>, argmin::core::Error> {
-        self.spend()?;
+    fn gradient(&self, path: &[f64]) -> Vec<f64> {
         let n = M::Dim::LEN;
         let mut gradient = vec![0.0; path.len()];
         for k in 0..PIECES {
@@ -109,8 +96,56 @@ impl<M: Space, F: MatrixField<M>> Gradient for PathEnergy<'_, M, F> {
                 }
             }
         }
-        Ok(gradient)
+        gradient
     }
+}
+
+/// An objective for argmin, with its evaluations counted. It has one type, so L-BFGS is compiled once.
+struct Counted<'a> {
+    objective: &'a dyn Objective,
+    evaluations: Cell<u32>,
+}
+
+impl Counted<'_> {
+    /// Counts an evaluation, and fails at the limit. Without it, a line search through a metric that is not
+    /// smooth may not end.
+    fn spend(&self) -> Result<(), argmin::core::Error> {
+        self.evaluations.set(self.evaluations.get() + 1);
+        if self.evaluations.get() <= EVALUATIONS {
+            Ok(())
+        } else {
+            Err(argmin::core::Error::msg("the path is not found in the evaluations allowed"))
+        }
+    }
+}
+
+impl CostFunction for Counted<'_> {
+    type Param = Vec<f64>;
+    type Output = f64;
+
+    fn cost(&self, path: &Vec<f64>) -> Result<f64, argmin::core::Error> {
+        self.spend().map(|()| self.objective.value(path))
+    }
+}
+
+impl Gradient for Counted<'_> {
+    type Param = Vec<f64>;
+    type Gradient = Vec<f64>;
+
+    fn gradient(&self, path: &Vec<f64>) -> Result<Vec<f64>, argmin::core::Error> {
+        self.spend().map(|()| self.objective.gradient(path))
+    }
+}
+
+/// Minimises an objective by L-BFGS.
+fn minimised(objective: &dyn Objective, start: Vec<f64>) -> Option<Vec<f64>> {
+    let counted = Counted { objective, evaluations: Cell::new(0) };
+    let solver = LBFGS::new(MoreThuenteLineSearch::new(), MEMORY);
+    let result = Executor::new(counted, solver)
+        .configure(|state| state.param(start).max_iters(ITERATIONS))
+        .run()
+        .ok()?;
+    result.state().get_best_param().cloned()
 }
 
 /// The initial velocity of a geodesic from `x` to the point with coordinates `end`, if a short path
@@ -124,14 +159,7 @@ pub(crate) fn aim<M: Manifold>(
     let straight = (0..(PIECES - 1) * n)
         .map(|entry| end[entry % n] * (entry / n + 1) as f64 / PIECES as f64)
         .collect();
-    let evaluations = Cell::new(0);
-    let energy = PathEnergy { field, x, end: *end, space: PhantomData, evaluations };
-    let solver = LBFGS::new(MoreThuenteLineSearch::new(), MEMORY);
-    let result = Executor::new(energy, solver)
-        .configure(|state| state.param(straight).max_iters(ITERATIONS))
-        .run()
-        .ok()?;
-    let path = result.state().get_best_param()?;
+    let path = minimised(&PathEnergy { field, x, end: *end, space: PhantomData }, straight)?;
     let corner = |k: usize| match k {
         0 => x.clone(),
         PIECES => M::chart(x, end),

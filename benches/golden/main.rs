@@ -40,10 +40,10 @@ impl Study for Record {
     }
 }
 
-/// Compares a record with the one in `tests/golden`, or writes it.
+/// Compares a record with the one in `benches/golden`, or writes it.
 fn compare(name: &str, record: &BTreeMap<String, String>) {
     let text: String = record.iter().map(|(name, bits)| format!("{name}: {bits}\n")).collect();
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden").join(name);
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("benches/golden").join(name);
     if std::env::var_os("BLESS").is_some() {
         std::fs::write(&path, &text).expect("the record is written");
     }
@@ -55,31 +55,30 @@ fn compare(name: &str, record: &BTreeMap<String, String>) {
     assert!(changed.is_empty(), "{} rows have changed:\n{}", changed.len(), changed.join("\n"));
 }
 
-#[test]
-#[ignore = "the record is of one machine"]
-fn every_problem_has_the_bits_of_the_record() {
+fn main() {
     let mut record = Record(BTreeMap::new());
     problems::each(&mut record);
     compare("problems.txt", &record.0);
+    compare("examples.txt", &examples());
 }
 
 /// The final state of every example, with all digits.
-#[test]
-#[ignore = "the record is of one machine"]
-fn every_example_has_the_bits_of_the_record() {
+fn examples() -> BTreeMap<String, String> {
     let mut record = BTreeMap::new();
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples");
-    for file in std::fs::read_dir(folder).unwrap() {
-        let name = file.unwrap().path().file_stem().unwrap().to_str().unwrap().to_owned();
+    for file in std::fs::read_dir(folder).expect("the folder of the examples") {
+        let path = file.expect("an example").path();
+        let name = path.file_stem().expect("a name").to_string_lossy().into_owned();
         let output = Command::new(env!("CARGO"))
             .args(["run", "--quiet", "--release", "--all-features", "--example", &name])
             .args(["--", "--json"])
             .output()
-            .unwrap();
-        let report: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+            .expect("cargo runs");
+        let report: serde_json::Value = serde_json::from_slice(&output.stdout)
+            .unwrap_or_else(|error| panic!("{name}: {error}"));
         if !report["final_state"].is_null() {
             record.insert(format!("example {name}"), report["final_state"].to_string());
         }
     }
-    compare("examples.txt", &record);
+    record
 }

@@ -90,12 +90,7 @@ impl<D: Scalar, const N: usize> Column<D> for SVector<D, N> {
 
     #[inline]
     fn from_index(mut f: impl FnMut(usize) -> D) -> Self {
-        // A plain loop compiles faster than `from_fn`, and to the same instructions.
-        let mut column = Self::repeat(D::zero());
-        for i in 0..N {
-            column[i] = f(i);
-        }
-        column
+        Self::from_fn(|i, _| f(i))
     }
 
     #[inline]

@@ -235,14 +235,8 @@ impl<D: Scalar, const N: usize> Square<D> for SMatrix<D, N, N> {
     type Column = SVector<D, N>;
 
     #[inline]
-    fn from_entries(mut f: impl FnMut(usize, usize) -> D) -> Self {
-        let mut matrix = Self::repeat(D::zero());
-        for j in 0..N {
-            for i in 0..N {
-                matrix[(i, j)] = f(i, j);
-            }
-        }
-        matrix
+    fn from_entries(f: impl FnMut(usize, usize) -> D) -> Self {
+        Self::from_fn(f)
     }
 
     type Factors = LU<D, Const<N>>;

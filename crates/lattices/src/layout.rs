@@ -111,19 +111,18 @@ impl Layout {
         let stride = out.len() / self.sites;
         let width = slots.len().checked_div(self.slots).unwrap_or(0);
         let mut rest = &mut *slots;
-        let mut pieces = Vec::with_capacity(self.chunks.len());
-        for ((k, chunk), out) in self.chunks.iter().enumerate().zip(out.chunks_mut(CHUNK * stride))
-        {
+        let chunks = self.chunks.iter().enumerate().zip(out.chunks_mut(CHUNK * stride));
+        let pieces = chunks.map(|((k, chunk), out)| {
             let own = chunk.slots.len() * width;
             let (own, after) = std::mem::take(&mut rest).split_at_mut(own);
             rest = after;
             let (bonds, sites) = (chunk.bonds.clone(), parallel::sites(k, self.sites));
-            pieces.push(Part { sites, bonds, out, stride, slots: own, width, next: 0 });
-        }
+            Part { sites, bonds, out, stride, slots: own, width, next: 0 }
+        });
         let results = parallel::each(pieces, work);
         if width > 0 {
             let slots = &*slots;
-            let pieces: Vec<_> = self.chunks.iter().zip(out.chunks_mut(CHUNK * stride)).collect();
+            let pieces = self.chunks.iter().zip(out.chunks_mut(CHUNK * stride));
             parallel::each(pieces, |(chunk, out)| {
                 for &Arrival { site, slot } in &self.arrivals[chunk.arrivals.clone()] {
                     let from = slot as usize * width;

@@ -13,7 +13,10 @@ use rayon::prelude::*;
 pub(crate) const CHUNK: usize = 1024;
 
 /// The results of `f` for each piece of work, in order.
-pub(crate) fn each<W: Send, R: Send>(work: Vec<W>, f: impl Fn(W) -> R + Sync) -> Vec<R> {
+pub(crate) fn each<W: Send, R: Send>(
+    work: impl ExactSizeIterator<Item = W>,
+    f: impl Fn(W) -> R + Sync,
+) -> Vec<R> {
     // Plain loops: what iterators make of them would be compiled for every loop of every lattice.
     let mut pieces = Vec::with_capacity(work.len());
     for work in work {
@@ -64,19 +67,11 @@ pub(crate) fn fill<T: Send, R: Send>(
     f: impl Fn(Range<usize>, &mut [T]) -> R + Sync,
 ) -> Vec<R> {
     let count = out.len() / per_site;
-    let mut work = Vec::with_capacity(count.div_ceil(CHUNK));
-    for (chunk, out) in out.chunks_mut(CHUNK * per_site).enumerate() {
-        work.push((sites(chunk, count), out));
-    }
-    each(work, |(sites, out)| f(sites, out))
+    let work = out.chunks_mut(CHUNK * per_site).enumerate();
+    each(work, |(chunk, out)| f(sites(chunk, count), out))
 }
 
 /// The results of `f` for each chunk of `count` sites.
 pub(crate) fn map<R: Send>(count: usize, f: impl Fn(Range<usize>) -> R + Sync) -> Vec<R> {
-    let chunks = count.div_ceil(CHUNK);
-    let mut work = Vec::with_capacity(chunks);
-    for chunk in 0..chunks {
-        work.push(sites(chunk, count));
-    }
-    each(work, f)
+    each(0..count.div_ceil(CHUNK), |chunk| f(sites(chunk, count)))
 }

@@ -105,13 +105,23 @@ pub(crate) mod conduction {
         [c, kappa]: [f64; 2],
         count: Arc<AtomicUsize>,
     ) -> Lattice<impl Model<Manifold = Euclidean<1>>> {
-        Lattice::on(Graph::ring(n), Euclidean::<1>)
+        of_bonds(c, vec![kappa; n], count)
+    }
+
+    /// The same with a conductivity for each bond, which starts at the site of this number.
+    pub(crate) fn of_bonds(
+        c: f64,
+        kappa: Vec<f64>,
+        count: Arc<AtomicUsize>,
+    ) -> Lattice<impl Model<Manifold = Euclidean<1>>> {
+        Lattice::on(Graph::ring(kappa.len()), Euclidean::<1>)
+            .bond_data(kappa)
             .energy(|e: &Vector1<Real>| e.x)
             .entropy(move |e: &Vector1<Real>| e.x.ln() * c)
             .bond_onsager(move |bond| {
                 count.fetch_add(1, Ordering::Relaxed);
                 let [x, y] = bond.x.map(|e| e.x / c);
-                [Onsager { rate: kappa * x * y, b: [vector![1.0], vector![-1.0]] }]
+                [Onsager { rate: bond.data * x * y, b: [vector![1.0], vector![-1.0]] }]
             })
             .build()
             .expect("the parts make a lattice")

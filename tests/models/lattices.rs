@@ -163,3 +163,85 @@ pub(crate) mod embedded_atoms {
             .expect("the parts make a lattice")
     }
 }
+
+/// Masses on springs with internal energies, `x = (q, p, u)`, whose entropy depends on their neighbours:
+/// `S = Σ ln u_i + Σ a ln(u_i) ρ_i`, `ρ_i = Σ_j √(u_i u_j)`. Friction and conduction take the temperatures `1/s` of this
+/// entropy.
+pub(crate) mod warm_neighbours {
+    use super::*;
+    use crate::chain::{CANONICAL, Pair};
+
+    const COUPLING: f64 = 0.05;
+
+    /// With energies in units of `joule`, entropies in units of `boltzmann`, and lengths and times in units of one.
+    pub(crate) fn lattice(
+        n: usize,
+        [joule, boltzmann]: [f64; 2],
+    ) -> Lattice<impl Model<Manifold = Euclidean<3>>> {
+        Lattice::on(Graph::ring(n), Euclidean::<3>)
+            .bracket(Poisson::constant(CANONICAL).expect("a skew matrix"))
+            .energy(move |x: &Vector3<Real>| x.y * x.y * (0.5 / joule) + x.z)
+            .bond_energy(move |(x, y): &Pair| {
+                let r = y.x - x.x;
+                r * r * (r * r * 0.5 + 0.5) * joule
+            })
+            .entropy(move |x: &Vector3<Real>| (x.z / joule).ln() * boltzmann)
+            .gather_entropy(
+                move |(x, y): &Pair| (x.z * y.z).sqrt() / joule,
+                move |x, density| (x.z / joule).ln() * density * (COUPLING * boltzmann),
+            )
+            .bond_onsager(move |bond| {
+                let slip = 0.5 * (bond.w[1].y - bond.w[0].y);
+                let [s, t] = bond.s.map(|s| s.z);
+                [
+                    Onsager {
+                        rate: 0.2 * joule / (s + t),
+                        b: [vector![0.0, -1.0, -slip], vector![0.0, 1.0, -slip]],
+                    },
+                    Onsager {
+                        rate: 0.1 * boltzmann / (s * t),
+                        b: [vector![0.0, 0.0, 1.0], vector![0.0, 0.0, -1.0]],
+                    },
+                ]
+            })
+            .conserved(|x: &Vector3<Real>| x.y)
+            .build()
+            .expect("the parts make a lattice")
+    }
+
+    pub(crate) fn at(i: usize, joule: f64) -> Vector3<f64> {
+        let x = crate::chain::waves(i);
+        vector![x.x, x.y * joule, (1.0 + x.z) * joule]
+    }
+
+    /// The velocity in units of one, with derivatives by hand.
+    pub(crate) fn velocity(x: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
+        let n = x.len();
+        let ends = || (0..n).map(|i| [i, (i + 1) % n]);
+        let phi = |[i, j]: [usize; 2]| (x[i].z * x[j].z).sqrt();
+        let mut density = vec![0.0; n];
+        for [i, j] in ends() {
+            density[i] += phi([i, j]);
+            density[j] += phi([i, j]);
+        }
+        let mut s: Vec<_> =
+            x.iter().zip(&density).map(|(x, rho)| (1.0 + COUPLING * rho) / x.z).collect();
+        for [i, j] in ends() {
+            // ∂φ/∂u_i = φ/2u_i, with λ_i + λ_j in front.
+            let both = COUPLING * (x[i].z * x[j].z).ln() * 0.5 * phi([i, j]);
+            s[i] += both / x[i].z;
+            s[j] += both / x[j].z;
+        }
+        let mut v: Vec<_> = x.iter().map(|x| vector![x.y, 0.0, 0.0]).collect();
+        for [i, j] in ends() {
+            let r = x[j].x - x[i].x;
+            let force = r + 2.0 * r * r * r;
+            // Friction −0.2 slip, whose heat is shared, and conduction by the difference of 1/T.
+            let slip = 0.5 * (x[j].y - x[i].y);
+            let (heat, flux) = (0.2 * slip * slip, 0.1 * (s[i] - s[j]) / (s[i] * s[j]));
+            v[i] += vector![0.0, force + 0.2 * slip, heat + flux];
+            v[j] += vector![0.0, -force - 0.2 * slip, heat - flux];
+        }
+        v
+    }
+}

@@ -189,6 +189,12 @@ fn refused_gather(
 fn an_entropy_that_gathers_what_the_bracket_moves_is_refused_with_its_site() {
     let warmth: fn(&(Vector3<Real>, Vector3<Real>)) -> Real = |(x, y)| x.z + y.z;
     assert_eq!(refused_gather(warmth, |x, sum| (x.z * sum).ln()), None);
+    // Values that are no numbers, with the bond and the site: all internal energies are 2.
+    let not_finite = |place| Some(LatticeError::NotFinite { what: "entropy", place });
+    let bond = Place::Bond { bond: 0, sites: [0, 1] };
+    assert_eq!(refused_gather(|(x, _)| (x.z - 2.0).ln(), |_, sum| sum), not_finite(bond));
+    let site = Place::Site(0);
+    assert_eq!(refused_gather(warmth, |_, sum| (-sum + 8.0).ln()), not_finite(site));
     // A density of positions.
     let error = refused_gather(|(x, y)| (x.x - y.x).powi(2), |x, sum| x.z.ln() * sum).unwrap();
     let LatticeError::Broken { law: "Π dS = 0", place: Place::Site(0), size, remedy } = error

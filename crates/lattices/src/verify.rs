@@ -115,6 +115,8 @@ impl<P: Model> Lattice<P> {
                 .into_iter()
                 .collect::<Result<(), _>>()?;
         }
+        self.verify_gathered("energy", &self.parts.gathers().energy, x)?;
+        self.verify_gathered("entropy", &self.parts.gathers().entropy, x)?;
         let (all, _) = self.differentials::<false>(x);
         if self.motion_along(x, &all).is_some() {
             return Ok(());

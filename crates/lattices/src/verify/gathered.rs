@@ -1,12 +1,44 @@
-//! The derivatives of what energy and entropy gather over bonds.
+//! The values and derivatives of what energy and entropy gather over bonds.
 
 use metriplectic_fields::{Column, Space, Vector};
 
 use super::{STEP, Slope, Trial, quotient, samples};
 use crate::error::{LatticeError, Place};
-use crate::gather::Gather;
-use crate::lattice::dimension;
+use crate::gather::{Embedded, Gather};
+use crate::lattice::{Lattice, dimension};
 use crate::model::{Model, PairManifold, VectorOf};
+use crate::parallel;
+use crate::points::Points;
+
+impl<P: Model> Lattice<P> {
+    /// Looks for values and derivatives of `φ` and `g` that are no numbers.
+    pub(super) fn verify_gathered<G: Gather<P::Manifold>>(
+        &self,
+        what: &'static str,
+        gather: &G,
+        x: &Points<P::Manifold>,
+    ) -> Result<(), LatticeError> {
+        if !G::PRESENT {
+            return Ok(());
+        }
+        let not_finite = |place| Err(LatticeError::NotFinite { what, place });
+        let on = |bond: usize| {
+            let is_finite = gather.weight(&self.pair(x, bond)).is_finite();
+            if is_finite { Ok(()) } else { not_finite(self.place_of(bond)) }
+        };
+        let bonds = self.layout.bonds().len();
+        parallel::map(bonds, |mut bonds| bonds.try_for_each(on))
+            .into_iter()
+            .collect::<Result<(), _>>()?;
+        let sums = self.gathered(gather, x);
+        let at = |site: usize| {
+            let Embedded { jet, along_rho } = gather.embedded(&x[site], sums[2 * site]);
+            let is_finite = jet.is_finite() && along_rho.is_finite();
+            if is_finite { Ok(()) } else { not_finite(Place::Site(site)) }
+        };
+        parallel::map(self.sites(), |mut sites| sites.try_for_each(at)).into_iter().collect()
+    }
+}
 
 impl<P: Model> Trial<'_, P> {
     /// Compares the derivatives of `φ` at sampled bonds, and those of `g` at sampled sites, with differences of values.

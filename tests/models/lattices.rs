@@ -245,3 +245,83 @@ pub(crate) mod warm_neighbours {
         v
     }
 }
+
+/// A gas in mass coordinates on a ring of cells with friction and conduction: the equations of Navier, Stokes and Fourier in
+/// one dimension, as in the example `viscous_shock`.
+pub(crate) mod gas {
+    use metriplectic::nalgebra::Complex;
+
+    use super::*;
+    use crate::chain::{CANONICAL, Pair};
+
+    const GAMMA: f64 = 1.4;
+    const HEAT: f64 = 1.0 / (GAMMA - 1.0);
+    const VISCOSITY: f64 = 0.8;
+    const CONDUCTION: f64 = 1.5;
+
+    /// With lengths in units of `metre`, energies in units of `joule`, entropies in units of `boltzmann`, and times in
+    /// units of one.
+    pub(crate) fn lattice(
+        n: usize,
+        [metre, joule, boltzmann]: [f64; 3],
+    ) -> Lattice<impl Model<Manifold = Euclidean<3>>> {
+        Lattice::on(Graph::ring(n), Euclidean::<3>)
+            .bracket(Poisson::constant(CANONICAL).expect("a skew matrix"))
+            .energy(move |x: &Vector3<Real>| x.y * x.y * (0.5 * metre * metre / joule))
+            .bond_energy(move |(x, y): &Pair| {
+                let volume = (y.x - x.x) / metre + 1.0;
+                volume.powf(1.0 - GAMMA) * (x.z / (HEAT * boltzmann)).exp() * (HEAT * joule)
+            })
+            .entropy(|x: &Vector3<Real>| x.z)
+            .bond_onsager(move |bond| {
+                let ([x, y], [u, v]) = (bond.x, bond.w);
+                let volume = (y.x - x.x) / metre + 1.0;
+                [
+                    Onsager {
+                        rate: VISCOSITY * joule / (metre * metre) * u.z / volume,
+                        b: [vector![0.0, -1.0, (u.y - v.y) / u.z], vector![0.0, 1.0, 0.0]],
+                    },
+                    Onsager {
+                        rate: CONDUCTION * boltzmann / (volume * u.z * v.z),
+                        b: [vector![0.0, 0.0, v.z], vector![0.0, 0.0, -u.z]],
+                    },
+                ]
+            })
+            .conserved(|x: &Vector3<Real>| x.y)
+            .build()
+            .expect("the parts make a lattice")
+    }
+
+    /// The wave number of so many waves, `K = 2(1 − cos k)`, and the rate `g = κK(γ − 1)` of conduction.
+    fn wave(n: usize, waves: f64) -> [f64; 3] {
+        let k = waves * std::f64::consts::TAU / n as f64;
+        let square = 2.0 * (1.0 - k.cos());
+        [k, square, CONDUCTION * square * (GAMMA - 1.0)]
+    }
+
+    /// The eigenvalue of sound of the linearised lattice. With the amplitudes `V` of a volume and `s` of an entropy,
+    ///
+    /// ```text
+    /// V'' = K (−γV + (γ − 1)s) − μK V',   s' = −g (s − V),   so  λ² + μKλ + γK = K(γ − 1) g/(λ + g) .
+    /// ```
+    pub(crate) fn eigenvalue(n: usize, waves: f64) -> Complex<f64> {
+        let [_, square, g] = wave(n, waves);
+        let mut lambda = Complex::new(0.0, (GAMMA * square).sqrt());
+        for _ in 0..50 {
+            let heat = square * (GAMMA - 1.0) * g / (lambda + g);
+            let off = lambda * lambda + lambda * (VISCOSITY * square) + GAMMA * square - heat;
+            let slope = lambda * 2.0 + VISCOSITY * square + heat / (lambda + g);
+            lambda -= off / slope;
+        }
+        lambda
+    }
+
+    /// `(q, p, s)` of a cell at the time `t`, in a wave of sound of this amplitude.
+    pub(crate) fn at([n, i]: [usize; 2], waves: f64, amplitude: f64, t: f64) -> Vector3<f64> {
+        let ([k, _, g], lambda) = (wave(n, waves), eigenvalue(n, waves));
+        let turn = Complex::new(0.0, k * i as f64).exp() * (lambda * t).exp() * amplitude;
+        // V = (e^{ik} − 1) q and s = gV/(λ + g).
+        let q = turn / (Complex::new(0.0, k).exp() - 1.0);
+        vector![q.re, (q * lambda).re, (turn * g / (lambda + g)).re]
+    }
+}

@@ -172,13 +172,13 @@ fn refused_gather(
 ) -> Option<LatticeError> {
     let canonical = matrix![0.0, 1.0, 0.0; -1.0, 0.0, 0.0; 0.0, 0.0, 0.0];
     let lattice = Lattice::on(Graph::ring(3000), Euclidean::<3>)
-        .bracket(Poisson::constant(canonical).unwrap())
+        .bracket(Poisson::constant(canonical).expect("a skew matrix"))
         .energy(|x: &Vector3<Real>| (x.x * x.x + x.y * x.y) * 0.5 + x.z)
         .entropy(|x: &Vector3<Real>| x.z.ln())
         .gather_entropy(phi, embed)
         .site_onsager(|site| [Onsager { rate: 0.1, b: vector![0.0, 1.0, -site.w.y] }])
         .build()
-        .unwrap();
+        .expect("the parts make a lattice");
     let start = lattice.points(|i| vector![(i as f64).sin(), (i as f64).cos(), 2.0]);
     let error = lattice.verify(&start).err();
     println!("{error:?}");

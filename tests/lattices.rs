@@ -2,6 +2,10 @@
 
 #[path = "models/chain.rs"]
 mod chain;
+#[path = "lattices/gathered.rs"]
+mod gathered;
+#[path = "lattices/limiting_sites.rs"]
+mod limiting_sites;
 #[path = "models/lattices.rs"]
 mod models;
 
@@ -301,143 +305,6 @@ fn stiff_conduction_takes_stages_in_proportion_to_the_root_of_its_stiffness() {
     }
     // An explicit step is stable up to 3.3 / (4κ/c): 2400 steps to t = 2, seven velocities each.
     assert!(runs[1].0 < 7e-6 && runs[1].1 < 700, "{runs:?}");
-}
-
-#[test]
-fn the_certificate_names_the_stiff_bond_in_every_unit() {
-    // One bond conducts a hundred times better; in units of its own, and copper in cells of 1 mm and 1 cm².
-    let copper = [385.0 * 8960.0 * 1e-7, 401.0 * 1e-1, 300.0];
-    let (n, stiff) = (3000, 1234);
-    for parameters @ [c, kappa, _] in [[1.0, 1.0, 1.0], copper] {
-        let of = |i| if i == stiff { 100.0 * kappa } else { kappa };
-        let lattice = conduction::of_bonds(c, (0..n).map(of).collect(), Arc::default());
-        let start = lattice.points(|i| conduction::at([n, i], 2.0, parameters, 0.0));
-        let span = || Span::until(1.5 * c / kappa).tolerance(1e-4).at_most(2);
-        let ends = [stiff, stiff + 1];
-        let explicit = DormandPrince8.run(&lattice, start.clone(), span()).unwrap();
-        let certificate = explicit.certificate();
-        println!("{certificate}");
-        assert!(certificate.is_limited_by_stability());
-        let site = certificate.limiting_sites.stiffness.expect("a stiff site");
-        assert!(ends.contains(&site), "{site}");
-        assert!(
-            certificate.to_string().contains(&format!("at site {site}, and not the tolerance"))
-        );
-
-        let whole = RungeKuttaChebyshev.run(&lattice, start.clone(), span()).unwrap();
-        let site = whole.certificate().limiting_sites.stiffness.expect("a stiff site");
-        println!("{}", whole.certificate());
-        assert!(ends.contains(&site), "{site}");
-        assert!(whole.certificate().to_string().contains(&format!("is stiffest at site {site}")));
-        // The direction in which the motion is stiff is part of a checkpoint, and so are the sites.
-        let mut steps = RungeKuttaChebyshev.steps(&lattice, start, span()).unwrap();
-        for _ in 0..7 {
-            steps.advance().unwrap();
-        }
-        let text = serde_json::to_string(&steps.checkpoint()).unwrap();
-        let checkpoint: Checkpoint = serde_json::from_str(&text).unwrap();
-        let resumed = RungeKuttaChebyshev.resume(&lattice, &checkpoint).unwrap().run().unwrap();
-        assert_eq!(resumed.certificate(), whole.certificate());
-        // A site that the lattice does not have is refused, and a file without sites is an older one.
-        let known = serde_json::to_string(&whole.certificate().limiting_sites).unwrap();
-        let with = |sites: &str| {
-            assert!(text.contains(&known), "{known}");
-            serde_json::from_str::<Checkpoint>(&text.replace(&known, sites)).unwrap()
-        };
-        let elsewhere = with(r#"{"error":null,"stiffness":3000}"#);
-        let error = RungeKuttaChebyshev.resume(&lattice, &elsewhere).unwrap_err();
-        assert!(matches!(error, ResumeError::Damaged { value: 3000.0, .. }), "{error}");
-        let older = text.replace(&format!(",\"limiting_sites\":{known}"), "");
-        let older: Checkpoint = serde_json::from_str(&older).unwrap();
-        RungeKuttaChebyshev.resume(&lattice, &older).expect("a checkpoint without sites");
-    }
-}
-
-#[test]
-fn the_certificate_names_the_site_of_a_pulse() {
-    let (n, pushed) = (4000, 1717);
-    let lattice = chain(Graph::ring(n));
-    let start = lattice.points(|i| vector![0.0, if i == pushed { 0.5 } else { 0.0 }, 0.0]);
-    let span = Span::until(3.0).tolerance(1e-8).at_most(2);
-    let run = DormandPrince5.run(&lattice, start, span).unwrap();
-    let (certificate, text) = (run.certificate(), run.certificate().to_string());
-    println!("{text}");
-    // Sound moves by one site in a unit of time.
-    let site = certificate.limiting_sites.error.expect("a site");
-    assert!(site.abs_diff(pushed) <= 4, "{site}");
-    assert!(text.contains(&format!("the largest error is at site {site}\n")), "{text}");
-    assert!(!certificate.is_limited_by_stability() && !text.contains("stiffest"), "{text}");
-}
-
-#[test]
-fn embedded_atoms_have_both_laws_and_the_order_of_the_method() {
-    // Bonds across chunks, so that sums of neighbours cross them too.
-    let n = 2080;
-    let lattice = embedded_atoms::lattice(n);
-    let start = lattice.points(waves);
-    let end = |steps: usize| {
-        let span = Span::steps(2.0 / steps as f64, steps).every(steps);
-        let run = DormandPrince5.run(&lattice, start.clone(), span).unwrap();
-        let certificate = run.certificate();
-        // Each site has terms of about 2 and −1.6.
-        let bound = 4.0 * f64::EPSILON * 3.6 * n as f64;
-        assert!(certificate.max_energy_error <= bound, "{certificate}");
-        assert!(certificate.keeps_entropy() && certificate.keeps_invariants());
-        run.last().point.clone()
-    };
-    let span = Span::until(2.0).tolerance(1e-13).at_most(2);
-    let exact = DormandPrince8.run(&lattice, start.clone(), span).unwrap().last().point.clone();
-    let steps = [40, 57, 80, 113];
-    let errors = steps.map(|steps| distance(&end(steps), &exact));
-    let order = order(&steps, &errors);
-    println!("order {order:.2}: {errors:?}");
-    assert!(order > 4.7 && order < 5.5, "{errors:?}");
-}
-
-#[test]
-fn an_entropy_of_neighbours_has_both_laws_and_the_order_of_the_method_in_every_unit() {
-    // Bonds across chunks; in units of one, and of an electron volt and the constant of Boltzmann.
-    let n = 2080;
-    let runs = [[1.0, 1.0], [1.602_176_634e-19, 1.380_649e-23]].map(|[joule, boltzmann]| {
-        let lattice = warm_neighbours::lattice(n, [joule, boltzmann]);
-        let start = lattice.points(|i| warm_neighbours::at(i, joule));
-        let in_units = |x: &Vector3<f64>| vector![x.x, x.y / joule, x.z / joule];
-        // The motion is the sum of terms by hand.
-        let v = lattice.rates(&start, &lattice.sizes(&start).zero()).unwrap();
-        let x: Vec<_> = start.iter().map(in_units).collect();
-        let off = warm_neighbours::velocity(&x).into_iter().enumerate().map(|(i, by_hand)| {
-            let v = in_units(&vector![v.get(3 * i), v.get(3 * i + 1), v.get(3 * i + 2)]);
-            (v - by_hand).amax()
-        });
-        let off = off.fold(0.0, f64::max);
-        assert!(off < 64.0 * f64::EPSILON, "{off:.1e}");
-        let end = |steps: usize| {
-            let span = Span::steps(2.0 / steps as f64, steps).every(steps);
-            let run = DormandPrince5.run(&lattice, start.clone(), span).unwrap();
-            let certificate = run.certificate();
-            // All terms of this energy are positive.
-            let bound = 4.0 * f64::EPSILON * certificate.initial_energy;
-            assert!(certificate.max_energy_error <= bound, "{certificate}");
-            assert!(certificate.keeps_entropy() && certificate.keeps_invariants());
-            assert!(certificate.projected_steps.targeted == steps, "{certificate}");
-            assert!(certificate.entropy_gained > boltzmann);
-            run.last().point.clone()
-        };
-        let span = Span::until(2.0).tolerance(1e-13).at_most(2);
-        let exact = DormandPrince8.run(&lattice, start.clone(), span).unwrap().last().point.clone();
-        let steps = [40, 57, 80, 113];
-        let errors = steps.map(|steps| {
-            let off = |(x, y): (&Vector3<f64>, &Vector3<f64>)| in_units(&(x - y)).amax();
-            end(steps).iter().zip(exact.iter()).map(off).fold(0.0, f64::max)
-        });
-        let order = order(&steps, &errors);
-        println!("order {order:.2}: {errors:?}");
-        assert!(order > 4.7 && order < 5.5, "{errors:?}");
-        errors[0]
-    });
-    // Up to some roundings of entries of about one.
-    let off = (runs[0] - runs[1]).abs();
-    assert!(off < 64.0 * f64::EPSILON, "the error has no unit: {runs:?}");
 }
 
 #[test]

@@ -164,3 +164,57 @@ fn a_site_that_leaves_its_domain_is_named() {
     println!("{cause}");
     assert!(matches!(cause, StepError::SiteOutOfDomain { site: 1234, .. }), "{cause}");
 }
+
+/// What is said of masses `(q, p, u)` on springs whose entropy gathers this.
+fn refused_gather(
+    phi: fn(&(Vector3<Real>, Vector3<Real>)) -> Real,
+    embed: fn(&Vector3<Real>, Real) -> Real,
+) -> Option<LatticeError> {
+    let canonical = matrix![0.0, 1.0, 0.0; -1.0, 0.0, 0.0; 0.0, 0.0, 0.0];
+    let lattice = Lattice::on(Graph::ring(3000), Euclidean::<3>)
+        .bracket(Poisson::constant(canonical).expect("a skew matrix"))
+        .energy(|x: &Vector3<Real>| (x.x * x.x + x.y * x.y) * 0.5 + x.z)
+        .entropy(|x: &Vector3<Real>| x.z.ln())
+        .gather_entropy(phi, embed)
+        .site_onsager(|site| [Onsager { rate: 0.1, b: vector![0.0, 1.0, -site.w.y] }])
+        .build()
+        .expect("the parts make a lattice");
+    let start = lattice.points(|i| vector![(i as f64).sin(), (i as f64).cos(), 2.0]);
+    let error = lattice.verify(&start).err();
+    println!("{error:?}");
+    error
+}
+
+#[test]
+fn an_entropy_that_gathers_what_the_bracket_moves_is_refused_with_its_site() {
+    let warmth: fn(&(Vector3<Real>, Vector3<Real>)) -> Real = |(x, y)| x.z + y.z;
+    assert_eq!(refused_gather(warmth, |x, sum| (x.z * sum).ln()), None);
+    // Values that are no numbers, with the bond and the site: all internal energies are 2.
+    let not_finite = |place| Some(LatticeError::NotFinite { what: "entropy", place });
+    let bond = Place::Bond { bond: 0, sites: [0, 1] };
+    assert_eq!(refused_gather(|(x, _)| (x.z - 2.0).ln(), |_, sum| sum), not_finite(bond));
+    let site = Place::Site(0);
+    assert_eq!(refused_gather(warmth, |_, sum| (-sum + 8.0).ln()), not_finite(site));
+    // A density of positions.
+    let error = refused_gather(|(x, y)| (x.x - y.x).powi(2), |x, sum| x.z.ln() * sum).unwrap();
+    let LatticeError::Broken { law: "Π dS = 0", place: Place::Site(0), size, remedy } = error
+    else {
+        panic!("another error: {error}")
+    };
+    assert!(size > 1e-3 && remedy.contains("gather such a density in the energy"), "{remedy}");
+    // Positions in `g`.
+    let error = refused_gather(warmth, |x, sum| x.x * sum * 1e-3).unwrap();
+    assert!(matches!(error, LatticeError::Broken { law: "Π dS = 0", .. }), "{error}");
+    // Derivatives that closures lose, with the bond and the site.
+    let error = refused_gather(|(x, y)| x.z + Real::from(y.z.re), |_, sum| sum.ln()).unwrap();
+    assert!(
+        matches!(error, LatticeError::WrongDerivative { place: Place::Bond { .. }, .. }),
+        "{error}"
+    );
+    let error = refused_gather(warmth, |x, sum| x.z.ln() * Real::from(sum.re)).unwrap();
+    let place = Place::Site(0);
+    assert!(
+        matches!(error, LatticeError::WrongDerivative { place: at, .. } if at == place),
+        "{error}"
+    );
+}

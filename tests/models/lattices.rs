@@ -105,13 +105,23 @@ pub(crate) mod conduction {
         [c, kappa]: [f64; 2],
         count: Arc<AtomicUsize>,
     ) -> Lattice<impl Model<Manifold = Euclidean<1>>> {
-        Lattice::on(Graph::ring(n), Euclidean::<1>)
+        of_bonds(c, vec![kappa; n], count)
+    }
+
+    /// The same with a conductivity for each bond, which starts at the site of this number.
+    pub(crate) fn of_bonds(
+        c: f64,
+        kappa: Vec<f64>,
+        count: Arc<AtomicUsize>,
+    ) -> Lattice<impl Model<Manifold = Euclidean<1>>> {
+        Lattice::on(Graph::ring(kappa.len()), Euclidean::<1>)
+            .bond_data(kappa)
             .energy(|e: &Vector1<Real>| e.x)
             .entropy(move |e: &Vector1<Real>| e.x.ln() * c)
             .bond_onsager(move |bond| {
                 count.fetch_add(1, Ordering::Relaxed);
                 let [x, y] = bond.x.map(|e| e.x / c);
-                [Onsager { rate: kappa * x * y, b: [vector![1.0], vector![-1.0]] }]
+                [Onsager { rate: bond.data * x * y, b: [vector![1.0], vector![-1.0]] }]
             })
             .build()
             .expect("the parts make a lattice")
@@ -151,5 +161,167 @@ pub(crate) mod embedded_atoms {
             .conserved(|x: &Vector3<Real>| x.y)
             .build()
             .expect("the parts make a lattice")
+    }
+}
+
+/// Masses on springs with internal energies, `x = (q, p, u)`, whose entropy depends on their neighbours:
+/// `S = Σ ln u_i + Σ a ln(u_i) ρ_i`, `ρ_i = Σ_j √(u_i u_j)`. Friction and conduction take the temperatures `1/s` of this
+/// entropy.
+pub(crate) mod warm_neighbours {
+    use super::*;
+    use crate::chain::{CANONICAL, Pair};
+
+    const COUPLING: f64 = 0.05;
+
+    /// With energies in units of `joule`, entropies in units of `boltzmann`, and lengths and times in units of one.
+    pub(crate) fn lattice(
+        n: usize,
+        [joule, boltzmann]: [f64; 2],
+    ) -> Lattice<impl Model<Manifold = Euclidean<3>>> {
+        Lattice::on(Graph::ring(n), Euclidean::<3>)
+            .bracket(Poisson::constant(CANONICAL).expect("a skew matrix"))
+            .energy(move |x: &Vector3<Real>| x.y * x.y * (0.5 / joule) + x.z)
+            .bond_energy(move |(x, y): &Pair| {
+                let r = y.x - x.x;
+                r * r * (r * r * 0.5 + 0.5) * joule
+            })
+            .entropy(move |x: &Vector3<Real>| (x.z / joule).ln() * boltzmann)
+            .gather_entropy(
+                move |(x, y): &Pair| (x.z * y.z).sqrt() / joule,
+                move |x, density| (x.z / joule).ln() * density * (COUPLING * boltzmann),
+            )
+            .bond_onsager(move |bond| {
+                let slip = 0.5 * (bond.w[1].y - bond.w[0].y);
+                let [s, t] = bond.s.map(|s| s.z);
+                [
+                    Onsager {
+                        rate: 0.2 * joule / (s + t),
+                        b: [vector![0.0, -1.0, -slip], vector![0.0, 1.0, -slip]],
+                    },
+                    Onsager {
+                        rate: 0.1 * boltzmann / (s * t),
+                        b: [vector![0.0, 0.0, 1.0], vector![0.0, 0.0, -1.0]],
+                    },
+                ]
+            })
+            .conserved(|x: &Vector3<Real>| x.y)
+            .build()
+            .expect("the parts make a lattice")
+    }
+
+    pub(crate) fn at(i: usize, joule: f64) -> Vector3<f64> {
+        let x = crate::chain::waves(i);
+        vector![x.x, x.y * joule, (1.0 + x.z) * joule]
+    }
+
+    /// The velocity in units of one, with derivatives by hand.
+    pub(crate) fn velocity(x: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
+        let n = x.len();
+        let ends = || (0..n).map(|i| [i, (i + 1) % n]);
+        let phi = |[i, j]: [usize; 2]| (x[i].z * x[j].z).sqrt();
+        let mut density = vec![0.0; n];
+        for [i, j] in ends() {
+            density[i] += phi([i, j]);
+            density[j] += phi([i, j]);
+        }
+        let mut s: Vec<_> =
+            x.iter().zip(&density).map(|(x, rho)| (1.0 + COUPLING * rho) / x.z).collect();
+        for [i, j] in ends() {
+            // ∂φ/∂u_i = φ/2u_i, with λ_i + λ_j in front.
+            let both = COUPLING * (x[i].z * x[j].z).ln() * 0.5 * phi([i, j]);
+            s[i] += both / x[i].z;
+            s[j] += both / x[j].z;
+        }
+        let mut v: Vec<_> = x.iter().map(|x| vector![x.y, 0.0, 0.0]).collect();
+        for [i, j] in ends() {
+            let r = x[j].x - x[i].x;
+            let force = r + 2.0 * r * r * r;
+            // Friction −0.2 slip, whose heat is shared, and conduction by the difference of 1/T.
+            let slip = 0.5 * (x[j].y - x[i].y);
+            let (heat, flux) = (0.2 * slip * slip, 0.1 * (s[i] - s[j]) / (s[i] * s[j]));
+            v[i] += vector![0.0, force + 0.2 * slip, heat + flux];
+            v[j] += vector![0.0, -force - 0.2 * slip, heat - flux];
+        }
+        v
+    }
+}
+
+/// A gas in mass coordinates on a ring of cells with friction and conduction: the equations of Navier, Stokes and Fourier in
+/// one dimension, as in the example `viscous_shock`.
+pub(crate) mod gas {
+    use metriplectic::nalgebra::Complex;
+
+    use super::*;
+    use crate::chain::{CANONICAL, Pair};
+
+    const GAMMA: f64 = 1.4;
+    const HEAT: f64 = 1.0 / (GAMMA - 1.0);
+    const VISCOSITY: f64 = 0.8;
+    const CONDUCTION: f64 = 1.5;
+
+    /// With lengths in units of `metre`, energies in units of `joule`, entropies in units of `boltzmann`, and times in
+    /// units of one.
+    pub(crate) fn lattice(
+        n: usize,
+        [metre, joule, boltzmann]: [f64; 3],
+    ) -> Lattice<impl Model<Manifold = Euclidean<3>>> {
+        Lattice::on(Graph::ring(n), Euclidean::<3>)
+            .bracket(Poisson::constant(CANONICAL).expect("a skew matrix"))
+            .energy(move |x: &Vector3<Real>| x.y * x.y * (0.5 * metre * metre / joule))
+            .bond_energy(move |(x, y): &Pair| {
+                let volume = (y.x - x.x) / metre + 1.0;
+                volume.powf(1.0 - GAMMA) * (x.z / (HEAT * boltzmann)).exp() * (HEAT * joule)
+            })
+            .entropy(|x: &Vector3<Real>| x.z)
+            .bond_onsager(move |bond| {
+                let ([x, y], [u, v]) = (bond.x, bond.w);
+                let volume = (y.x - x.x) / metre + 1.0;
+                [
+                    Onsager {
+                        rate: VISCOSITY * joule / (metre * metre) * u.z / volume,
+                        b: [vector![0.0, -1.0, (u.y - v.y) / u.z], vector![0.0, 1.0, 0.0]],
+                    },
+                    Onsager {
+                        rate: CONDUCTION * boltzmann / (volume * u.z * v.z),
+                        b: [vector![0.0, 0.0, v.z], vector![0.0, 0.0, -u.z]],
+                    },
+                ]
+            })
+            .conserved(|x: &Vector3<Real>| x.y)
+            .build()
+            .expect("the parts make a lattice")
+    }
+
+    /// The wave number of so many waves, `K = 2(1 − cos k)`, and the rate `g = κK(γ − 1)` of conduction.
+    fn wave(n: usize, waves: f64) -> [f64; 3] {
+        let k = waves * std::f64::consts::TAU / n as f64;
+        let square = 2.0 * (1.0 - k.cos());
+        [k, square, CONDUCTION * square * (GAMMA - 1.0)]
+    }
+
+    /// The eigenvalue of sound of the linearised lattice. With the amplitudes `V` of a volume and `s` of an entropy,
+    ///
+    /// ```text
+    /// V'' = K (−γV + (γ − 1)s) − μK V',   s' = −g (s − V),   so  λ² + μKλ + γK = K(γ − 1) g/(λ + g) .
+    /// ```
+    pub(crate) fn eigenvalue(n: usize, waves: f64) -> Complex<f64> {
+        let [_, square, g] = wave(n, waves);
+        let mut lambda = Complex::new(0.0, (GAMMA * square).sqrt());
+        for _ in 0..50 {
+            let heat = square * (GAMMA - 1.0) * g / (lambda + g);
+            let off = lambda * lambda + lambda * (VISCOSITY * square) + GAMMA * square - heat;
+            let slope = lambda * 2.0 + VISCOSITY * square + heat / (lambda + g);
+            lambda -= off / slope;
+        }
+        lambda
+    }
+
+    /// `(q, p, s)` of a cell at the time `t`, in a wave of sound of this amplitude.
+    pub(crate) fn at([n, i]: [usize; 2], waves: f64, amplitude: f64, t: f64) -> Vector3<f64> {
+        let ([k, _, g], lambda) = (wave(n, waves), eigenvalue(n, waves));
+        let turn = Complex::new(0.0, k * i as f64).exp() * (lambda * t).exp() * amplitude;
+        // V = (e^{ik} − 1) q and s = gV/(λ + g).
+        let q = turn / (Complex::new(0.0, k).exp() - 1.0);
+        vector![q.re, (q * lambda).re, (turn * g / (lambda + g)).re]
     }
 }

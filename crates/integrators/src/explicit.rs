@@ -59,7 +59,9 @@ pub use memory::ExplicitMemory;
 use memory::MemoryOf;
 pub use metriplectic::LawJets;
 
-use crate::method::{Control, Element, Method, Promises, Refusal, StepEnds, StepStart, Taken};
+use crate::method::{
+    Control, Element, LimitingSites, Method, Promises, Refusal, StepEnds, StepStart, Taken,
+};
 use crate::step_error::StepError;
 use chebyshev::CHEBYSHEV;
 use tableau::{EIGHT, FIVE, Tableau};
@@ -199,6 +201,16 @@ macro_rules! method {
                 norm: impl Fn(&F::Vector) -> f64,
             ) -> Option<f64> {
                 estimates::error(Self::TABLEAU, flow, step, memory, norm)
+            }
+
+            fn limiting_sites(
+                &self,
+                flow: &F,
+                step: &StepEnds<'_, F>,
+                memory: &MemoryOf<F>,
+                allowed: &F::Vector,
+            ) -> LimitingSites {
+                estimates::limiting_sites(Self::TABLEAU, flow, step, memory, allowed)
             }
 
             fn between(

@@ -18,7 +18,7 @@ use metriplectic_dynamics::invariants::Kind;
 use metriplectic_dynamics::{ModelError, SecondLaw};
 use metriplectic_manifolds::{Manifold, PointError};
 
-pub use evidence::{Effort, EntropyStep, Evidence, Promises, StageLaws};
+pub use evidence::{Effort, EntropyStep, Evidence, LimitingSites, Promises, StageLaws};
 pub use vector::{Components, Vector};
 
 use crate::error::{FlowError, RunError};
@@ -280,6 +280,22 @@ pub trait Method<F: Flow>: Sized {
     ) -> Option<f64> {
         let _ = memory;
         Some(norm(&flow.local_error(step.x, step.end, step.h)?))
+    }
+
+    /// The sites at which a step has the largest error, in units of the one allowed, and at which the motion is
+    /// stiffest. A run asks for them on a few steps, and only for vectors with [`sites`](Vector::sites).
+    ///
+    /// The default has the site of the error that the [`Flow`] estimates.
+    fn limiting_sites(
+        &self,
+        flow: &F,
+        step: &StepEnds<'_, F>,
+        memory: &Self::Memory,
+        allowed: &F::Vector,
+    ) -> LimitingSites {
+        let _ = memory;
+        let error = flow.local_error(step.x, step.end, step.h);
+        LimitingSites::new(error.and_then(|error| error.largest_site(allowed)), None)
     }
 
     /// The state at the fraction `θ` of a step that was taken, from the memory after it; `None` if the flow

@@ -1,5 +1,7 @@
 //! The builder of a [`Lattice`].
 
+mod fields;
+
 use std::fmt;
 
 use metriplectic_dynamics::Bracket;
@@ -9,7 +11,7 @@ use metriplectic_manifolds::{Canonical, Manifold, Product, Riemannian, Times};
 
 use crate::error::LatticeError;
 use crate::fields::{Absent, ConservedSums, InOrder, LocalData, LocalField, Uniform, WithData};
-use crate::gather::{Gathered, SiteEnergy};
+use crate::gather::{Gather, Gathers};
 use crate::graph::Graph;
 use crate::lattice::Lattice;
 use crate::layout::Layout;
@@ -41,7 +43,7 @@ impl<M: fmt::Debug, B, F, K, L, D> fmt::Debug for LatticeBuilder<M, B, F, K, L, 
 type Empty<M> = LatticeBuilder<
     M,
     <M as NaturalBracket>::Bracket,
-    Fields<Absent, Absent, Absent>,
+    Fields<Absent, Absent, Absent, Gathers<Absent, Absent>>,
     Friction<Frictionless, Frictionless>,
     (),
     Data<(), ()>,
@@ -165,8 +167,8 @@ impl<M, B, F, K, L, D> LatticeBuilder<M, B, F, K, L, D> {
     clippy::type_complexity,
     reason = "the type of a builder lists the parts of the lattice, and a name for it would hide them"
 )]
-impl<M, B, H, V, S, KB, KS, L, D, E>
-    LatticeBuilder<M, B, Fields<H, V, S>, Friction<KB, KS>, L, Data<D, E>>
+impl<M, B, H, V, S, G, KB, KS, L, D, E>
+    LatticeBuilder<M, B, Fields<H, V, S, G>, Friction<KB, KS>, L, Data<D, E>>
 where
     M: Manifold + Times<M>,
     D: LocalData,
@@ -177,7 +179,7 @@ where
     pub fn site_data<T: Sync>(
         self,
         data: Vec<T>,
-    ) -> LatticeBuilder<M, B, Fields<H, V, S>, Friction<KB, KS>, L, Data<Vec<T>, E>> {
+    ) -> LatticeBuilder<M, B, Fields<H, V, S, G>, Friction<KB, KS>, L, Data<Vec<T>, E>> {
         self.with_data(|Data { bonds, .. }| Data { sites: data, bonds })
     }
 
@@ -185,132 +187,8 @@ where
     pub fn bond_data<T: Sync>(
         self,
         data: Vec<T>,
-    ) -> LatticeBuilder<M, B, Fields<H, V, S>, Friction<KB, KS>, L, Data<D, Vec<T>>> {
+    ) -> LatticeBuilder<M, B, Fields<H, V, S, G>, Friction<KB, KS>, L, Data<D, Vec<T>>> {
         self.with_data(|Data { sites, .. }| Data { sites, bonds: data })
-    }
-
-    /// Sets the energy `h(x_i)` of a site: a closure `|x| -> Real` or any other [`ScalarField`].
-    pub fn energy<T: ScalarField<M> + Sync>(
-        self,
-        energy: T,
-    ) -> LatticeBuilder<M, B, Fields<Uniform<T>, V, S>, Friction<KB, KS>, L, Data<D, E>> {
-        self.with_fields(|Fields { bond_energy, entropy, .. }| Fields {
-            energy: Uniform(energy),
-            bond_energy,
-            entropy,
-        })
-    }
-
-    /// Sets the energy of a site from its point and its data.
-    pub fn energy_with<T: Fn(&M::Point<Real>, &D::Item) -> Real + Sync>(
-        self,
-        energy: T,
-    ) -> LatticeBuilder<M, B, Fields<WithData<T>, V, S>, Friction<KB, KS>, L, Data<D, E>> {
-        self.with_fields(|Fields { bond_energy, entropy, .. }| Fields {
-            energy: WithData(energy),
-            bond_energy,
-            entropy,
-        })
-    }
-
-    /// Sets the energy `h₂(x_i, x_j)` of a bond, given its first and its second site as a pair: a closure
-    /// `|(x, y)| -> Real` or any other [`ScalarField`] on the product.
-    pub fn bond_energy<T: ScalarField<Product<M, M>> + Sync>(
-        self,
-        energy: T,
-    ) -> LatticeBuilder<M, B, Fields<H, Uniform<T>, S>, Friction<KB, KS>, L, Data<D, E>> {
-        self.with_fields(|Fields { energy: site, entropy, .. }| Fields {
-            energy: site,
-            bond_energy: Uniform(energy),
-            entropy,
-        })
-    }
-
-    /// Sets the energy of a bond from its points and its data.
-    pub fn bond_energy_with<T>(
-        self,
-        energy: T,
-    ) -> LatticeBuilder<M, B, Fields<H, WithData<T>, S>, Friction<KB, KS>, L, Data<D, E>>
-    where
-        T: Fn(&(M::Point<Real>, M::Point<Real>), &E::Item) -> Real + Sync,
-    {
-        self.with_fields(|Fields { energy: site, entropy, .. }| Fields {
-            energy: site,
-            bond_energy: WithData(energy),
-            entropy,
-        })
-    }
-
-    /// Appends an energy `g(x_i, ρ_i)` of each site that depends on a sum over its bonds, `ρ_i = Σ φ`: a density. `φ` is
-    /// a function of the first and the second site of a bond, and counts for both. Set the
-    /// [`energy`](Self::energy) of the sites before it.
-    ///
-    /// An embedded atom (Daw, Baskes 1984) has `g = −√ρ`:
-    ///
-    /// ```
-    /// use metriplectic_dynamics::Symplectic;
-    /// use metriplectic_fields::Real;
-    /// use metriplectic_lattices::{Graph, Lattice, LatticeError};
-    /// use metriplectic_manifolds::Euclidean;
-    /// use nalgebra::{Vector2, vector};
-    /// use num_dual::DualNum;
-    ///
-    /// let atoms = Lattice::on(Graph::ring(100), Euclidean::<2>)
-    ///     .bracket(Symplectic)
-    ///     .energy(|x: &Vector2<Real>| x.y * x.y * 0.5)
-    ///     .gather(
-    ///         |(x, y): &(Vector2<Real>, Vector2<Real>)| ((x.x - y.x) * 2.0).exp(),
-    ///         |_, density| -density.sqrt(),
-    ///     )
-    ///     .build()?;
-    /// atoms.verify(&atoms.points(|i| vector![0.1 * (i as f64).sin(), 0.0]))?;
-    /// # Ok::<(), LatticeError>(())
-    /// ```
-    pub fn gather<P, G>(
-        self,
-        phi: P,
-        embed: G,
-    ) -> LatticeBuilder<M, B, Fields<Gathered<H, P, G>, V, S>, Friction<KB, KS>, L, Data<D, E>>
-    where
-        P: ScalarField<Product<M, M>> + Sync,
-        G: Fn(&M::Point<Real>, Real) -> Real + Sync,
-    {
-        self.with_fields(|Fields { energy, bond_energy, entropy }| Fields {
-            energy: Gathered { energy, phi, embed },
-            bond_energy,
-            entropy,
-        })
-    }
-
-    /// Sets the entropy `s(x_i)` of a site: a closure `|x| -> Real` or any other [`ScalarField`]. The bracket must
-    /// annihilate its differential.
-    pub fn entropy<T: ScalarField<M> + Sync>(
-        self,
-        entropy: T,
-    ) -> LatticeBuilder<M, B, Fields<H, V, Uniform<T>>, Friction<KB, KS>, L, Data<D, E>> {
-        self.with_fields(|Fields { energy, bond_energy, .. }| Fields {
-            energy,
-            bond_energy,
-            entropy: Uniform(entropy),
-        })
-    }
-
-    /// Sets the entropy of a site from its point and its data.
-    pub fn entropy_with<T: Fn(&M::Point<Real>, &D::Item) -> Real + Sync>(
-        self,
-        entropy: T,
-    ) -> LatticeBuilder<M, B, Fields<H, V, WithData<T>>, Friction<KB, KS>, L, Data<D, E>> {
-        self.with_fields(|Fields { energy, bond_energy, .. }| Fields {
-            energy,
-            bond_energy,
-            entropy: WithData(entropy),
-        })
-    }
-
-    /// Says that bonds have an entropy. [`build`](Self::build) refuses it, and says what to do instead: `Π dS = 0`
-    /// holds site by site only for a sum over sites.
-    pub fn bond_entropy<T: ScalarField<Product<M, M>>>(self, _entropy: T) -> Self {
-        Self { has_bond_entropy: true, ..self }
     }
 
     /// Sets the friction in a bond: `R` terms `ρ b bᵀ` from the points at its sites and the differentials of the
@@ -318,7 +196,7 @@ where
     pub fn bond_onsager<T, const R: usize>(
         self,
         terms: T,
-    ) -> LatticeBuilder<M, B, Fields<H, V, S>, Friction<Terms<T, R>, KS>, L, Data<D, E>>
+    ) -> LatticeBuilder<M, B, Fields<H, V, S, G>, Friction<Terms<T, R>, KS>, L, Data<D, E>>
     where
         T: Fn(&BondState<'_, M, E::Item>) -> [Onsager<[Vector<M>; 2]>; R] + Sync,
     {
@@ -330,7 +208,7 @@ where
     pub fn site_onsager<T, const R: usize>(
         self,
         terms: T,
-    ) -> LatticeBuilder<M, B, Fields<H, V, S>, Friction<KB, Terms<T, R>>, L, Data<D, E>>
+    ) -> LatticeBuilder<M, B, Fields<H, V, S, G>, Friction<KB, Terms<T, R>>, L, Data<D, E>>
     where
         T: Fn(&SiteState<'_, M, D::Item>) -> [Onsager<Vector<M>>; R] + Sync,
     {
@@ -342,7 +220,8 @@ where
     pub fn conserved<T: ScalarField<M> + Sync>(
         self,
         sum: T,
-    ) -> LatticeBuilder<M, B, Fields<H, V, S>, Friction<KB, KS>, (L, Uniform<T>), Data<D, E>> {
+    ) -> LatticeBuilder<M, B, Fields<H, V, S, G>, Friction<KB, KS>, (L, Uniform<T>), Data<D, E>>
+    {
         self.with_sum(Uniform(sum))
     }
 
@@ -350,10 +229,23 @@ where
     pub fn conserved_with<T: Fn(&M::Point<Real>, &D::Item) -> Real + Sync>(
         self,
         sum: T,
-    ) -> LatticeBuilder<M, B, Fields<H, V, S>, Friction<KB, KS>, (L, WithData<T>), Data<D, E>> {
+    ) -> LatticeBuilder<M, B, Fields<H, V, S, G>, Friction<KB, KS>, (L, WithData<T>), Data<D, E>>
+    {
         self.with_sum(WithData(sum))
     }
+}
 
+#[allow(
+    clippy::type_complexity,
+    reason = "the type of a builder lists the parts of the lattice, and a name for it would hide them"
+)]
+impl<M, B, H, V, S, GE, GS, KB, KS, L, D, E>
+    LatticeBuilder<M, B, Fields<H, V, S, Gathers<GE, GS>>, Friction<KB, KS>, L, Data<D, E>>
+where
+    M: Manifold + Times<M>,
+    D: LocalData,
+    E: LocalData,
+{
     /// Checks the graph and the structure, and finishes the lattice in `O(N)`. Every run checks the laws that need
     /// points, by [`Lattice::verify`].
     ///
@@ -362,13 +254,18 @@ where
     /// [`LatticeError`] if the parts do not make a lattice.
     pub fn build(
         self,
-    ) -> Result<Lattice<Parts<M, B, Fields<H, V, S>, Friction<KB, KS>, L, Data<D, E>>>, LatticeError>
+    ) -> Result<
+        Lattice<Parts<M, B, Fields<H, V, S, Gathers<GE, GS>>, Friction<KB, KS>, L, Data<D, E>>>,
+        LatticeError,
+    >
     where
         Canonical: Riemannian<M>,
         B: Bracket<M, Canonical> + Sync,
-        H: SiteEnergy<M, D::Item>,
+        H: LocalField<M, D::Item>,
         V: LocalField<Product<M, M>, E::Item>,
         S: LocalField<M, D::Item>,
+        GE: Gather<M>,
+        GS: Gather<M>,
         KB: BondFriction<M, E::Item>,
         KS: SiteFriction<M, D::Item>,
         L: ConservedSums<M, D::Item>,
@@ -389,7 +286,7 @@ where
             return Err(LatticeError::EntropyOnBonds);
         }
         let has_friction = KB::PRESENT || KS::PRESENT;
-        if has_friction != S::PRESENT {
+        if has_friction != (S::PRESENT || GS::PRESENT) {
             return Err(LatticeError::EntropyWithoutFriction);
         }
         if !has_friction && Bracket::<M, Canonical>::is_zero(&parts.bracket) {

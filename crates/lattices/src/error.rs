@@ -54,7 +54,8 @@ pub enum LatticeError {
     /// An entropy on bonds.
     #[error(
         "an entropy on bonds is refused: Π dS = 0 holds site by site only for a sum over sites; take the entropy, or \
-         the internal energy, of each site as one of its variables, and give the bonds an energy"
+         the internal energy, of each site as one of its variables, and give the bonds an energy; where the bracket \
+         leaves the variables of the entropy alone, give it by `.gather_entropy(..)`"
     )]
     EntropyOnBonds,
     /// Neither a bracket nor friction.

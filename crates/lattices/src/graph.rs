@@ -21,6 +21,48 @@ pub struct Graph {
     refused: Option<LatticeError>,
 }
 
+/// The sites are the nodes by their indices, and the bonds are the edges in their order, from the source to the target of
+/// each. Weights are not read: hand them to [`bond_data`](crate::LatticeBuilder::bond_data), which has the same order.
+/// An edge from a node to itself is refused when the lattice is built.
+///
+/// ```
+/// use metriplectic_lattices::{Graph, Lattice, LatticeError};
+/// use metriplectic_dynamics::Symplectic;
+/// use metriplectic_fields::Real;
+/// use metriplectic_manifolds::Euclidean;
+/// use nalgebra::Vector2;
+/// use petgraph::graph::UnGraph;
+///
+/// // Masses in kg at the nodes, and springs in N/m on the edges, of a triangle with a tail.
+/// let mut body = UnGraph::<f64, f64>::default();
+/// let [a, b, c, d] = [1.0, 2.0, 1.0, 4.0].map(|mass| body.add_node(mass));
+/// body.extend_with_edges([(a, b, 3.0), (b, c, 3.0), (c, a, 5.0), (c, d, 1.0)]);
+///
+/// let graph = Graph::from(&body);
+/// assert_eq!(graph.sites(), 4);
+/// assert_eq!(graph.bonds(), [[0, 1], [1, 2], [2, 0], [2, 3]]);
+///
+/// let springs = Lattice::on(graph, Euclidean::<2>)
+///     .bracket(Symplectic)
+///     .site_data(body.node_weights().copied().collect())
+///     .bond_data(body.edge_weights().copied().collect())
+///     .energy_with(|x: &Vector2<Real>, mass| x.y * x.y / (2.0 * mass))
+///     .bond_energy_with(|(x, y): &(Vector2<Real>, Vector2<Real>), k| (y.x - x.x) * (y.x - x.x) * (0.5 * k))
+///     .build()?;
+/// springs.verify(&springs.points(|i| Vector2::new(i as f64, 0.0)))?;
+/// # Ok::<(), LatticeError>(())
+/// ```
+#[cfg(feature = "petgraph")]
+impl<N, E, Ty: petgraph::EdgeType, Ix: petgraph::graph::IndexType>
+    From<&petgraph::Graph<N, E, Ty, Ix>> for Graph
+{
+    fn from(graph: &petgraph::Graph<N, E, Ty, Ix>) -> Self {
+        let ends =
+            |edge: &petgraph::graph::Edge<E, Ix>| [edge.source().index(), edge.target().index()];
+        Self::from_bonds(graph.node_count(), graph.raw_edges().iter().map(ends))
+    }
+}
+
 /// What is beyond the last site of a regular lattice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Boundary {

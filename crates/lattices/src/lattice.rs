@@ -1,10 +1,11 @@
 //! A lattice, and its loops over sites and bonds.
 
+mod differentials;
+
 use std::fmt;
 
 use metriplectic_fields::{Column, Dimension, Space, Vector};
 use metriplectic_manifolds::Manifold;
-use nalgebra::SVector;
 
 use crate::double::Double;
 use crate::layout::Layout;
@@ -13,6 +14,7 @@ use crate::parallel;
 use crate::points::Points;
 use crate::pool::{Buffer, Pool};
 use crate::vector::{Reader, SiteVector};
+use differentials::Given;
 
 /// Points of a manifold at the sites of a graph, with energies of sites and bonds, an entropy of sites, and friction
 /// at both; built by [`Lattice::on`].
@@ -27,7 +29,9 @@ pub struct Lattice<P> {
     differentials: Pool<f64>,
     /// Arrays with a vector for each slot of the layout.
     slots: Pool<f64>,
-    /// The same with a number.
+    /// The same with the vectors of both laws.
+    both_slots: Pool<f64>,
+    /// Arrays with two numbers for each site, and with a number for each slot.
     sums: [Pool<f64>; 2],
 }
 
@@ -121,14 +125,15 @@ fn larger<V: Column<f64>>(a: &V, b: &V) -> V {
 
 impl<P: Model> Lattice<P> {
     pub(crate) fn new(parts: P, layout: Layout) -> Self {
-        let [vectors, differentials, slots, at_sites, in_slots] =
+        let [vectors, differentials, slots, both_slots, at_sites, in_slots] =
             std::array::from_fn(|_| Pool::default());
-        Self { parts, layout, vectors, differentials, slots, sums: [at_sites, in_slots] }
+        let sums = [at_sites, in_slots];
+        Self { parts, layout, vectors, differentials, slots, both_slots, sums }
     }
 
     /// Gives up the arrays that were used before a run and are used no more.
     pub(crate) fn clear(&self) {
-        for pool in [&self.vectors, &self.differentials, &self.slots] {
+        for pool in [&self.vectors, &self.differentials, &self.slots, &self.both_slots] {
             pool.clear();
         }
     }
@@ -148,112 +153,19 @@ impl<P: Model> Lattice<P> {
         SiteVector::each(self.sites(), dimension::<P>(), numbers)
     }
 
-    /// A place for what bonds give to other chunks; none if they give nothing.
-    fn slots(&self, bonds_give: bool) -> Buffer<f64> {
-        let count = if bonds_give { self.layout.slots } else { 0 };
-        self.slots.numbers(count * dimension::<P>())
-    }
-
-    /// For each site the sum `ρ_i` over its bonds, and `λ_i = ∂g/∂ρ`; empty where nothing is gathered.
-    fn gathered(&self, x: &[PointOf<P>]) -> Buffer<f64> {
-        let [at_sites, in_slots] = &self.sums;
-        if !P::GATHERS {
-            return at_sites.adopt(Vec::new());
-        }
-        let mut sums = at_sites.numbers(2 * self.sites());
-        let bonds = self.layout.bonds();
-        self.layout.scatter(&mut sums, &mut in_slots.numbers(self.layout.slots), |mut part| {
-            for site in part.sites.clone() {
-                part.set(site, 0, &SVector::<f64, 2>::zero());
-            }
-            for bond in part.bonds.clone() {
-                let ends = bonds[bond];
-                let pair = ends.map(|site| x[site as usize].clone()).into();
-                let phi = SVector::<f64, 1>::from_index(|_| self.parts.weight(&pair).value);
-                part.add(ends, &[phi, phi]);
-            }
-        });
-        parallel::fill(&mut sums, 2, |sites, sums| {
-            for (site, sum) in sites.zip(sums.chunks_exact_mut(2)) {
-                sum[1] = self.parts.embedded(&x[site], sum[0]).1;
-            }
-        });
-        sums
-    }
-
-    /// The differentials `w = dh + Σ ∂h₂` and `ds` at each site, and the totals if `TOTALS`.
-    pub(crate) fn differentials<const TOTALS: bool>(
-        &self,
-        x: &[PointOf<P>],
-    ) -> (Differentials, Totals<VectorOf<P>>) {
-        let n = dimension::<P>();
-        let mut all = self.differentials.numbers(self.sites() * width::<P>());
-        let bonds = self.layout.bonds();
-        let gathered = self.gathered(x);
-        let sums = &*gathered;
-        let mut slots = self.slots(P::BOND_ENERGY || P::GATHERS);
-        let totals = self.layout.scatter(&mut all, &mut slots, |mut part| {
-            let mut totals = Totals::new(if TOTALS { P::SUMS } else { 0 });
-            for site in part.sites.clone() {
-                let point = &x[site];
-                let mut energy = self.parts.energy(site, point);
-                if P::GATHERS {
-                    let (embedded, _) = self.parts.embedded(point, sums[2 * site]);
-                    energy.df += embedded.df;
-                    if TOTALS {
-                        totals.energy.add(embedded.value);
-                    }
-                }
-                part.set(site, 0, &energy.df);
-                if TOTALS {
-                    totals.energy.add(energy.value);
-                    totals.sizes = larger(&totals.sizes, &P::Manifold::scales(point));
-                    for (k, sum) in totals.sums.iter_mut().enumerate() {
-                        sum.add(self.parts.sum(k, site, point).value);
-                    }
-                }
-                if P::ENTROPY {
-                    let entropy = self.parts.entropy(site, point);
-                    part.set(site, n, &entropy.df);
-                    if TOTALS {
-                        totals.entropy.add(entropy.value);
-                    }
-                }
-            }
-            if P::BOND_ENERGY || P::GATHERS {
-                for bond in part.bonds.clone() {
-                    let ends = bonds[bond];
-                    let pair = ends.map(|site| x[site as usize].clone()).into();
-                    let mut jet = self.parts.bond_energy(bond, &pair);
-                    if P::GATHERS {
-                        let [i, j] = ends.map(|site| sums[2 * site as usize + 1]);
-                        jet.df += self.parts.weight(&pair).df * (i + j);
-                    }
-                    let first = VectorOf::<P>::from_index(|k| jet.df[k]);
-                    let second = VectorOf::<P>::from_index(|k| jet.df[n + k]);
-                    part.add(ends, &[first, second]);
-                    if TOTALS {
-                        totals.energy.add(jet.value);
-                    }
-                }
-            }
-            totals
-        });
-        (all, totals.iter().fold(Totals::new(P::SUMS), Totals::merge))
-    }
-
     /// The velocity `v = Π w + Σ K s` at each site and the total production `Σ ρ (b·s)²`; `None` if a term is not a
     /// number.
     pub(crate) fn motion_along(&self, x: &[PointOf<P>], all: &[f64]) -> Option<(SiteVector, f64)> {
         let mut v = self.vectors.numbers(self.sites() * dimension::<P>());
         let bonds = self.layout.bonds();
-        let partial = self.layout.scatter(&mut v, &mut self.slots(P::BOND_FRICTION), |mut part| {
+        let given = if P::BOND_FRICTION { Given::Vector } else { Given::Nothing };
+        let partial = self.layout.scatter(&mut v, &mut self.slots(given), |mut part| {
             // The second sum is not a number if a term is not finite.
             let (mut production, mut probe) = (0.0, 0.0);
             for site in part.sites.clone() {
                 let [w, s] = differentials_at::<P>(all, site);
                 let mut v = self.parts.reversible(&x[site], &w, &s);
-                self.parts.site_friction(site, &x[site], &w, |term| {
+                self.parts.site_friction(site, &x[site], [&w, &s], |term| {
                     let force = term.b.dot(&s);
                     v += term.b * (term.rate * force);
                     production += term.rate * force * force;
@@ -267,15 +179,20 @@ impl<P: Model> Lattice<P> {
                     let [i, j] = ends.map(|site| site as usize);
                     let [[wi, si], [wj, sj]] = [i, j].map(|site| differentials_at::<P>(all, site));
                     let mut v = [VectorOf::<P>::zero(); 2];
-                    self.parts.bond_friction(bond, [&x[i], &x[j]], [&wi, &wj], |term| {
-                        let [bi, bj] = term.b;
-                        let force = bi.dot(&si) + bj.dot(&sj);
-                        v[0] += bi * (term.rate * force);
-                        v[1] += bj * (term.rate * force);
-                        production += term.rate * force * force;
-                    });
+                    self.parts.bond_friction(
+                        bond,
+                        [&x[i], &x[j]],
+                        [[&wi, &si], [&wj, &sj]],
+                        |term| {
+                            let [bi, bj] = term.b;
+                            let force = bi.dot(&si) + bj.dot(&sj);
+                            v[0] += bi * (term.rate * force);
+                            v[1] += bj * (term.rate * force);
+                            production += term.rate * force * force;
+                        },
+                    );
                     probe += probed(&v[0]) + probed(&v[1]);
-                    part.add(ends, &v);
+                    part.add(ends, &[v]);
                 }
             }
             [production, probe]

@@ -171,26 +171,35 @@ impl Part<'_> {
         }
     }
 
-    /// Adds what a bond gives to its sites.
+    /// Adds the vectors that a bond gives to its two sites: one after the other for each law.
     #[inline]
-    pub(crate) fn add<V: Column<f64>>(&mut self, [from, to]: [u32; 2], [first, second]: &[V; 2]) {
-        self.add_here(from as usize - self.sites.start, first);
+    pub(crate) fn add<V: Column<f64>, const LAWS: usize>(
+        &mut self,
+        [from, to]: [u32; 2],
+        laws: &[[V; 2]; LAWS],
+    ) {
+        let here = from as usize - self.sites.start;
         let place = (to as usize).wrapping_sub(self.sites.start);
-        if place < self.sites.len() {
-            self.add_here(place, second);
-        } else {
-            let start = self.next * self.width;
-            let slot = &mut self.slots[start..start + V::LEN];
-            for k in 0..V::LEN {
-                slot[k] = second[k];
+        let start = self.next * self.width;
+        let inside = place < self.sites.len();
+        self.next += usize::from(!inside);
+        for (law, [first, second]) in laws.iter().enumerate() {
+            let offset = law * V::LEN;
+            self.add_here(here, offset, first);
+            if inside {
+                self.add_here(place, offset, second);
+            } else {
+                let slot = &mut self.slots[start + offset..start + offset + V::LEN];
+                for k in 0..V::LEN {
+                    slot[k] = second[k];
+                }
             }
-            self.next += 1;
         }
     }
 
     #[inline]
-    fn add_here<V: Column<f64>>(&mut self, place: usize, v: &V) {
-        let start = place * self.stride;
+    fn add_here<V: Column<f64>>(&mut self, place: usize, offset: usize, v: &V) {
+        let start = place * self.stride + offset;
         let out = &mut self.out[start..start + V::LEN];
         for k in 0..V::LEN {
             out[k] += v[k];

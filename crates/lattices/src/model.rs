@@ -5,13 +5,17 @@ use metriplectic_fields::{ChartPoint, Column, Jet1, Vector};
 use metriplectic_manifolds::{Canonical, Manifold, MetricAt, Product, Riemannian, Times};
 
 use crate::fields::{ConservedSums, LocalData, LocalField};
-use crate::gather::SiteEnergy;
+use crate::gather::{Gather, Gathers};
 use crate::onsager::{BondFriction, BondState, Onsager, SiteFriction, SiteState};
 
 /// The functions and tensors of a lattice, site by site and bond by bond; [`Parts`] is the one implementation.
 pub trait Model: Sync {
     /// The manifold of a site.
     type Manifold: Manifold + Times<Self::Manifold>;
+    /// What the energy gathers over bonds.
+    type EnergyGather: Gather<Self::Manifold>;
+    /// What the entropy gathers over bonds.
+    type EntropyGather: Gather<Self::Manifold>;
 
     /// How many conserved sums there are.
     const SUMS: usize;
@@ -19,8 +23,6 @@ pub trait Model: Sync {
     const ENTROPY: bool;
     /// Whether bonds have an energy.
     const BOND_ENERGY: bool;
-    /// Whether the energy of a site depends on a sum over its bonds.
-    const GATHERS: bool;
     /// Whether bonds have friction.
     const BOND_FRICTION: bool;
 
@@ -33,16 +35,13 @@ pub trait Model: Sync {
     /// The energy of a bond.
     fn bond_energy(&self, bond: usize, x: &PairOf<Self>) -> Jet1<PairManifold<Self>>;
 
-    /// What a bond adds to the sums of its two sites.
-    fn weight(&self, x: &PairOf<Self>) -> Jet1<PairManifold<Self>>;
-
-    /// The energy of a site that depends on its sum, and its derivative along the sum.
-    fn embedded(&self, x: &PointOf<Self>, sum: f64) -> (Jet1<Self::Manifold>, f64);
+    /// What energy and entropy gather over bonds.
+    fn gathers(&self) -> &Gathers<Self::EnergyGather, Self::EntropyGather>;
 
     /// The entropy of a site.
     fn entropy(&self, site: usize, x: &PointOf<Self>) -> Jet1<Self::Manifold>;
 
-    /// The values of the same three functions.
+    /// The values of the energy and the entropy of a site.
     fn values(&self, site: usize, x: &PointOf<Self>) -> [f64; 2];
 
     /// The value of the energy of a bond.
@@ -59,21 +58,21 @@ pub trait Model: Sync {
         s: &VectorOf<Self>,
     ) -> VectorOf<Self>;
 
-    /// The terms of the friction at a site.
+    /// The terms of the friction at a site with these differentials of energy and entropy.
     fn site_friction(
         &self,
         site: usize,
         x: &PointOf<Self>,
-        w: &VectorOf<Self>,
+        differentials: [&VectorOf<Self>; 2],
         visit: impl FnMut(Onsager<VectorOf<Self>>),
     );
 
-    /// The terms of the friction in a bond.
+    /// The terms of the friction in a bond with these differentials of energy and entropy at each site.
     fn bond_friction(
         &self,
         bond: usize,
         x: [&PointOf<Self>; 2],
-        w: [&VectorOf<Self>; 2],
+        differentials: [[&VectorOf<Self>; 2]; 2],
         visit: impl FnMut(Onsager<[VectorOf<Self>; 2]>),
     );
 }
@@ -99,12 +98,13 @@ pub struct Parts<M, B, F, K, L, D> {
     pub(crate) data: D,
 }
 
-/// The energy of a site, the energy of a bond, and the entropy of a site.
+/// The energy of a site, the energy of a bond, the entropy of a site, and what both laws gather over bonds.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Fields<H, V, S> {
+pub struct Fields<H, V, S, G> {
     pub(crate) energy: H,
     pub(crate) bond_energy: V,
     pub(crate) entropy: S,
+    pub(crate) gathers: G,
 }
 
 /// The friction in bonds and at sites.
@@ -121,15 +121,17 @@ pub struct Data<D, E> {
     pub(crate) bonds: E,
 }
 
-impl<M, B, H, V, S, KB, KS, L, D, E> Model
-    for Parts<M, B, Fields<H, V, S>, Friction<KB, KS>, L, Data<D, E>>
+impl<M, B, H, V, S, GE, GS, KB, KS, L, D, E> Model
+    for Parts<M, B, Fields<H, V, S, Gathers<GE, GS>>, Friction<KB, KS>, L, Data<D, E>>
 where
     M: Manifold + Times<M>,
     Canonical: Riemannian<M>,
     B: Bracket<M, Canonical> + Sync,
-    H: SiteEnergy<M, D::Item>,
+    H: LocalField<M, D::Item>,
     V: LocalField<Product<M, M>, E::Item>,
     S: LocalField<M, D::Item>,
+    GE: Gather<M>,
+    GS: Gather<M>,
     KB: BondFriction<M, E::Item>,
     KS: SiteFriction<M, D::Item>,
     L: ConservedSums<M, D::Item>,
@@ -137,11 +139,12 @@ where
     E: LocalData,
 {
     type Manifold = M;
+    type EnergyGather = GE;
+    type EntropyGather = GS;
 
     const SUMS: usize = L::COUNT;
-    const ENTROPY: bool = S::PRESENT;
+    const ENTROPY: bool = S::PRESENT || GS::PRESENT;
     const BOND_ENERGY: bool = V::PRESENT;
-    const GATHERS: bool = H::GATHERS;
     const BOND_FRICTION: bool = KB::PRESENT;
 
     fn manifold(&self) -> &M {
@@ -159,13 +162,8 @@ where
     }
 
     #[inline]
-    fn weight(&self, x: &PairOf<Self>) -> Jet1<Product<M, M>> {
-        self.fields.energy.weight(x)
-    }
-
-    #[inline]
-    fn embedded(&self, x: &M::Point<f64>, sum: f64) -> (Jet1<M>, f64) {
-        self.fields.energy.embedded(x, sum)
+    fn gathers(&self) -> &Gathers<GE, GS> {
+        &self.fields.gathers
     }
 
     #[inline]
@@ -201,11 +199,11 @@ where
         &self,
         site: usize,
         x: &M::Point<f64>,
-        w: &Vector<M>,
+        [w, s]: [&Vector<M>; 2],
         visit: impl FnMut(Onsager<Vector<M>>),
     ) {
         let data = self.data.sites.of(site);
-        self.friction.sites.each(&SiteState { x, w, data }, visit);
+        self.friction.sites.each(&SiteState { x, w, s, data }, visit);
     }
 
     #[inline]
@@ -213,10 +211,11 @@ where
         &self,
         bond: usize,
         x: [&M::Point<f64>; 2],
-        w: [&Vector<M>; 2],
+        [first, second]: [[&Vector<M>; 2]; 2],
         visit: impl FnMut(Onsager<[Vector<M>; 2]>),
     ) {
         let data = self.data.bonds.of(bond);
-        self.friction.bonds.each(&BondState { x, w, data }, visit);
+        let [w, s] = [0, 1].map(|law| [first[law], second[law]]);
+        self.friction.bonds.each(&BondState { x, w, s, data }, visit);
     }
 }

@@ -28,6 +28,8 @@ pub struct SiteState<'a, M: Space, D = ()> {
     pub x: &'a M::Point<f64>,
     /// The differential of the total energy there, in the frame of the chart at `x`.
     pub w: &'a Vector<M>,
+    /// The differential of the total entropy there: reciprocal temperatures, if internal energies are variables.
+    pub s: &'a Vector<M>,
     /// The data of the site.
     pub data: &'a D,
 }
@@ -38,19 +40,29 @@ pub struct BondState<'a, M: Space, E = ()> {
     pub x: [&'a M::Point<f64>; 2],
     /// The differentials of the total energy there, in the frames of the charts at these points.
     pub w: [&'a Vector<M>; 2],
+    /// The differentials of the total entropy there.
+    pub s: [&'a Vector<M>; 2],
     /// The data of the bond.
     pub data: &'a E,
 }
 
 impl<M: Space, D> fmt::Debug for SiteState<'_, M, D> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("SiteState").field("x", self.x).field("w", self.w).finish_non_exhaustive()
+        f.debug_struct("SiteState")
+            .field("x", self.x)
+            .field("w", self.w)
+            .field("s", self.s)
+            .finish_non_exhaustive()
     }
 }
 
 impl<M: Space, E> fmt::Debug for BondState<'_, M, E> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("BondState").field("x", &self.x).field("w", &self.w).finish_non_exhaustive()
+        f.debug_struct("BondState")
+            .field("x", &self.x)
+            .field("w", &self.w)
+            .field("s", &self.s)
+            .finish_non_exhaustive()
     }
 }
 

@@ -111,7 +111,7 @@ impl<P: Model> Lattice<P> {
                 }
             }
             let [[wi, si], [wj, sj]] = [i, j].map(|site| differentials_at::<P>(&all, site));
-            self.parts.bond_friction(bond, [&x[i], &x[j]], [&wi, &wj], |term| {
+            self.parts.bond_friction(bond, [&x[i], &x[j]], [[&wi, &si], [&wj, &sj]], |term| {
                 let [bi, bj] = term.b.map(|b| b.abs());
                 let force = term.rate * (bi.dot(&si.abs()) + bj.dot(&sj.abs()));
                 for k in 0..n {

@@ -79,18 +79,19 @@ impl SiteVector {
         }
     }
 
-    /// The largest value of `f` over the sites, from the numbers of two vectors there.
-    fn largest<'a>(&'a self, other: &'a Self, f: impl Fn(&[f64], &[f64]) -> f64 + Sync) -> f64 {
-        let [here, there] = [self, other].map(Self::reader);
-        let stride = self.stride;
-        let at = |reader: Reader<'a>, site: usize| {
-            let start = site * reader.stride;
-            &reader.numbers[start..start + stride]
-        };
-        let of = |sites: std::ops::Range<usize>| {
-            sites.map(|site| f(at(here, site), at(there, site))).fold(0.0, larger)
-        };
-        parallel::map(self.sites, of).into_iter().fold(0.0, larger)
+    /// The root mean square of the ratios `v_i/s_i` at each site.
+    fn ratios<'a>(&'a self, sizes: &'a Self) -> impl Fn(usize) -> f64 + Sync + 'a {
+        let (count, mean) = (self.stride, (self.stride as f64).recip());
+        let [v, sizes] = [self, sizes].map(Self::reader);
+        move |site| {
+            let [v, sizes] = [v, sizes].map(|reader| {
+                let start = site * reader.stride;
+                &reader.numbers[start..start + count]
+            });
+            let ratio = |(v, s): (&f64, &f64)| if *v == 0.0 { 0.0 } else { (v / s).abs() };
+            let sum = v.iter().zip(sizes).map(ratio).fold(0.0, |sum, r| sum + r * r);
+            (sum * mean).sqrt()
+        }
     }
 }
 
@@ -195,11 +196,28 @@ impl Vector for SiteVector {
     /// The largest site, and the root mean square over the directions of a site. A mean over the sites would allow
     /// a pulse an error that grows with the length of the lattice around it.
     fn relative_to(&self, sizes: &Self) -> f64 {
-        let mean = (self.stride as f64).recip();
-        self.largest(sizes, |v, sizes| {
-            let ratio = |(v, s): (&f64, &f64)| if *v == 0.0 { 0.0 } else { (v / s).abs() };
-            let sum = v.iter().zip(sizes).map(ratio).fold(0.0, |sum, r| sum + r * r);
-            (sum * mean).sqrt()
-        })
+        let ratio = self.ratios(sizes);
+        let of = |range: std::ops::Range<usize>| range.map(&ratio).fold(0.0, larger);
+        parallel::map(self.sites, of).into_iter().fold(0.0, larger)
     }
+
+    fn sites(&self) -> Option<usize> {
+        Some(self.sites)
+    }
+
+    fn largest_site(&self, sizes: &Self) -> Option<usize> {
+        let ahead = |best: Ranked, next: Ranked| if next.ratio > best.ratio { next } else { best };
+        let none = Ranked { ratio: 0.0, site: None };
+        let ratio = self.ratios(sizes);
+        let ranked = |site| Ranked { ratio: ratio(site), site: Some(site) };
+        let of = |range: std::ops::Range<usize>| range.map(ranked).fold(none, ahead);
+        parallel::map(self.sites, of).into_iter().fold(none, ahead).site
+    }
+}
+
+/// A site, and the norm of the ratios there.
+#[derive(Clone, Copy)]
+struct Ranked {
+    ratio: f64,
+    site: Option<usize>,
 }

@@ -4,11 +4,14 @@
 //! true neighbours, at a state near the start: moved along the velocity and at random, so that no force and no
 //! velocity vanishes by the symmetry of the start.
 
+mod gathered;
+
 use metriplectic_fields::{Column, Space, Vector};
 use metriplectic_integrators::{Flow as _, StageFlow as _, Vector as _};
 use metriplectic_manifolds::Manifold;
 
 use crate::error::{LatticeError, Place};
+use crate::gather::Gather as _;
 use crate::lattice::{Lattice, differentials_at, dimension};
 use crate::model::{Model, PairManifold, PointOf, VectorOf};
 use crate::parallel;
@@ -112,6 +115,8 @@ impl<P: Model> Lattice<P> {
                 .into_iter()
                 .collect::<Result<(), _>>()?;
         }
+        self.verify_gathered("energy", &self.parts.gathers().energy, x)?;
+        self.verify_gathered("entropy", &self.parts.gathers().entropy, x)?;
         let (all, _) = self.differentials::<false>(x);
         if self.motion_along(x, &all).is_some() {
             return Ok(());
@@ -121,16 +126,16 @@ impl<P: Model> Lattice<P> {
             let [w, s] = differentials_at::<P>(&all, site);
             let mut sum = self.parts.reversible(&x[site], &w, &s);
             let add = |term: crate::Onsager<VectorOf<P>>| sum += term.b * term.rate;
-            self.parts.site_friction(site, &x[site], &w, add);
+            self.parts.site_friction(site, &x[site], [&w, &s], add);
             if !sum.is_finite() {
                 return not_finite("velocity", Place::Site(site));
             }
         }
         for bond in 0..self.layout.bonds().len() {
             let [i, j] = self.layout.bonds()[bond].map(|site| site as usize);
-            let [wi, wj] = [i, j].map(|site| differentials_at::<P>(&all, site)[0]);
+            let [[wi, si], [wj, sj]] = [i, j].map(|site| differentials_at::<P>(&all, site));
             let mut sum = VectorOf::<P>::zero();
-            self.parts.bond_friction(bond, [&x[i], &x[j]], [&wi, &wj], |term| {
+            self.parts.bond_friction(bond, [&x[i], &x[j]], [[&wi, &si], [&wj, &sj]], |term| {
                 sum += (term.b[0] + term.b[1]) * term.rate;
             });
             if !sum.is_finite() {
@@ -193,6 +198,8 @@ impl<P: Model> Trial<'_, P> {
                 self.bond_derivative(bond, &totals.sizes)?;
             }
         }
+        self.gathered_derivatives("energy", &lattice.parts.gathers().energy, &totals.sizes)?;
+        self.gathered_derivatives("entropy", &lattice.parts.gathers().entropy, &totals.sizes)?;
         self.total_derivatives(&all, &totals.sizes)?;
         self.conserved(&all)
     }
@@ -211,11 +218,15 @@ impl<P: Model> Trial<'_, P> {
             let v = parts.reversible(x, &alpha, s);
             cancels("Π = −Πᵀ", [alpha.dot(&v), alpha.abs().dot(&v.abs())], "")?;
         }
-        let v = parts.reversible(x, w, s);
-        let remedy = "; the entropy of a site must be a Casimir of its bracket";
-        cancels("Π dS = 0", [s.dot(&v), s.abs().dot(&v.abs())], remedy)?;
+        // Along the velocity, and along what Π makes of any other differential.
+        let alpha = VectorOf::<P>::from_index(|k| w[k] * (1.0 + self.random.next()));
+        let remedy = if P::EntropyGather::PRESENT { GATHERED_CASIMIR } else { CASIMIR };
+        for covector in [w, &alpha] {
+            let v = parts.reversible(x, covector, s);
+            cancels("Π dS = 0", [s.dot(&v), s.abs().dot(&v.abs())], remedy)?;
+        }
         let mut result = Ok(());
-        parts.site_friction(site, x, w, |term| {
+        parts.site_friction(site, x, [w, s], |term| {
             let rest = [term.b.dot(w), term.b.abs().dot(&w.abs())];
             let checked =
                 rate(term.rate, place).and_then(|()| cancels("b·dH = 0", rest, ANNIHILATES));
@@ -229,9 +240,9 @@ impl<P: Model> Trial<'_, P> {
         let Self { lattice, y, .. } = *self;
         let place = lattice.place_of(bond);
         let [i, j] = lattice.layout.bonds()[bond].map(|site| site as usize);
-        let [wi, wj] = [i, j].map(|site| differentials_at::<P>(all, site)[0]);
+        let [[wi, si], [wj, sj]] = [i, j].map(|site| differentials_at::<P>(all, site));
         let mut result = Ok(());
-        lattice.parts.bond_friction(bond, [&y[i], &y[j]], [&wi, &wj], |term| {
+        lattice.parts.bond_friction(bond, [&y[i], &y[j]], [[&wi, &si], [&wj, &sj]], |term| {
             let [bi, bj] = term.b;
             let rest = (bi.dot(&wi) + bj.dot(&wj)).abs();
             let terms = bi.abs().dot(&wi.abs()) + bj.abs().dot(&wj.abs());
@@ -332,6 +343,9 @@ impl<P: Model> Trial<'_, P> {
     }
 }
 
+const CASIMIR: &str = "; the entropy of a site must be a Casimir of its bracket";
+const GATHERED_CASIMIR: &str = "; the entropy of a site and what it gathers must not depend on what the bracket moves; \
+     gather such a density in the energy, by `.gather(..)`, and take the entropy of each site as a variable";
 const ANNIHILATES: &str =
     "; build each b from the differentials of the energy that the closure is given";
 

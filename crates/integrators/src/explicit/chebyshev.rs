@@ -53,6 +53,21 @@ pub(super) struct Spectrum<V> {
     pub(super) read: Vec<f64>,
 }
 
+impl<V: Vector> Spectrum<V> {
+    /// The direction that was read, as a vector of the length of `like`.
+    fn as_read(&self, like: &V) -> V {
+        like.with(|i| <[f64]>::get(&self.read, i).copied().unwrap_or(0.0))
+    }
+
+    /// The site with the largest part of the direction.
+    pub(super) fn stiffest_site(&self, sizes: &V) -> Option<usize> {
+        match &self.direction {
+            Some(direction) => direction.largest_site(sizes),
+            None => self.as_read(sizes).largest_site(sizes),
+        }
+    }
+}
+
 /// The stages of a step of size `h`.
 pub(super) fn stages<F: StageFlow>(
     flow: &F,
@@ -172,7 +187,7 @@ fn spectrum<F: StageFlow>(
             return Some(Spectrum { age: known.age + 1, ..known });
         }
         Some(Spectrum { direction: Some(direction), .. }) => direction,
-        Some(known) => velocity.with(|i| <[f64]>::get(&known.read, i).copied().unwrap_or(0.0)),
+        Some(known) => known.as_read(velocity),
         None => irregular(&flow.sizes(x)),
     };
     let sizes = flow.sizes(x);

@@ -1,10 +1,10 @@
 //! What the stages of a step tell of its error and of its stability.
 
-use super::chebyshev;
+use super::chebyshev::{self, Spectrum};
 use super::flow::StageFlow;
 use super::memory::{LastStep, MemoryOf, combined};
 use super::tableau::Tableau;
-use crate::method::{Element, StepEnds, Vector};
+use crate::method::{Element, LimitingSites, StepEnds, Vector};
 use crate::run::scales::relative;
 
 /// Whether the rates between the last stage and the end differ by as much as at the edge of the region of
@@ -52,4 +52,36 @@ pub(super) fn error<F: StageFlow>(
     let [fifth, third] = tableau.errors.map(|row| norm(&combined(h, row, &last.stages)));
     // Hairer's e₅²/√(e₅² + e₃²/100) is of the order of the method; a method with one error has that.
     Some(if third > 0.0 { fifth * (fifth / fifth.hypot(0.1 * third)) } else { fifth })
+}
+
+/// The sites with the largest embedded error and the stiffest motion. The stiff direction is the one of the power
+/// method for the spectral radius; without it, and at the edge of the region of stability, it is the change of the
+/// rates between the last stage and the end of the step.
+pub(super) fn limiting_sites<F: StageFlow>(
+    tableau: &'static Tableau,
+    flow: &F,
+    step: &StepEnds<'_, F>,
+    memory: &MemoryOf<F>,
+    allowed: &F::Vector,
+) -> LimitingSites {
+    let (x, h) = (step.x, step.h);
+    let largest = |v: Option<F::Vector>| v.and_then(|v| v.largest_site(allowed));
+    let Some(last) = memory.last.as_ref() else {
+        return LimitingSites::new(largest(flow.local_error(x, step.end, h)), None);
+    };
+    if tableau.stages.is_empty() {
+        let stiffest = |found: &Spectrum<_>| found.stiffest_site(&flow.sizes(x));
+        let stiffness = memory.spectrum.as_ref().and_then(stiffest);
+        return LimitingSites::new(largest(Some(chebyshev::error(last, h))), stiffness);
+    }
+    let error = largest(Some(combined(h, tableau.errors[0], &last.stages)));
+    let count = tableau.stages.len();
+    let [before, rates] = [count, count + 1].map(|stage| &last.stages[stage].0);
+    let stiffness = if is_at_the_edge(tableau, flow, x, h, last, rates) {
+        let change = Vector::zip([rates, before], |[rates, before]| rates - before);
+        change.largest_site(&flow.sizes(x))
+    } else {
+        None
+    };
+    LimitingSites::new(error, stiffness)
 }

@@ -114,6 +114,24 @@ impl Evidence {
     }
 }
 
+/// The sites of a large system that set the size of the steps.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
+pub struct LimitingSites {
+    /// The site with the largest local error, relative to the error that is allowed.
+    pub error: Option<usize>,
+    /// The site with the largest part of the direction in which the motion is stiffest.
+    pub stiffness: Option<usize>,
+}
+
+impl LimitingSites {
+    /// These sites, of the error and of the stiffness.
+    pub const fn new(error: Option<usize>, stiffness: Option<usize>) -> Self {
+        Self { error, stiffness }
+    }
+}
+
 /// What the solver of a method did, in a step or in a run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]

@@ -91,6 +91,19 @@ pub trait Vector: Clone + Debug {
         }
     }
 
+    /// The number of sites, if these are the numbers of a system of sites, one site after the other.
+    #[inline]
+    fn sites(&self) -> Option<usize> {
+        None
+    }
+
+    /// The site with the largest norm of the ratios `v_i/s_i` to the sizes `s_i`, and the first of several; `None`
+    /// without [`sites`](Self::sites), or if all ratios are zero.
+    fn largest_site(&self, sizes: &Self) -> Option<usize> {
+        let _ = sizes;
+        None
+    }
+
     /// The numbers in a list.
     fn to_list(&self) -> Vec<f64> {
         (0..self.len()).map(|i| self.get(i)).collect()

@@ -6,7 +6,7 @@ use metriplectic_dynamics::SecondLaw;
 use metriplectic_dynamics::invariants::Kind;
 
 use crate::digits::{Digits, counted};
-use crate::method::{Effort, Element, EntropyStep, Evidence, Flow, Laws, Promises};
+use crate::method::{Effort, Element, EntropyStep, Evidence, Flow, Laws, LimitingSites, Promises};
 use crate::round_off::bound::of_a_law;
 
 /// The balance of a run: what became of the two laws, of the manifold, and what it cost.
@@ -64,6 +64,11 @@ pub struct Certificate {
     /// those whose number is a power of two. `None` where there is no estimate. Where friction is stiff it is
     /// too large by a factor of about `h|K'|`.
     pub local_error: Option<f64>,
+    /// The sites of a large system that set the size of the steps: the site with the largest of these local errors,
+    /// relative to the error that is allowed, and the site where the motion was stiffest when this was last found.
+    /// [`RungeKuttaChebyshev`](crate::RungeKuttaChebyshev) looks for it, and the other explicit methods if stability
+    /// bounds a step. Both are `None` in a system without sites.
+    pub limiting_sites: LimitingSites,
     /// What the method promises.
     pub promises: Promises,
     /// What the model promises about its entropy; serialized as the name of the variant.
@@ -191,6 +196,7 @@ impl Certificate {
             effort: Effort::default(),
             worst_iterations: 0,
             local_error: None,
+            limiting_sites: LimitingSites::default(),
             promises,
             second_law: flow.entropy_law(),
             friction: 0.0,
@@ -244,13 +250,19 @@ impl Certificate {
         self.worst_iterations = self.worst_iterations.max(effort.iterations);
     }
 
-    /// Notes an estimate of the local error, relative to the state.
-    pub(crate) const fn note_local_error(&mut self, error: f64) {
+    /// Notes an estimate of the local error, relative to the state, and the sites that set the step.
+    pub(crate) const fn note_local_error(&mut self, error: f64, sites: LimitingSites) {
         let before = match self.local_error {
             Some(before) => before,
             None => 0.0,
         };
         self.local_error = Some(before.max(error));
+        if error > before {
+            self.limiting_sites.error = sites.error;
+        }
+        if sites.stiffness.is_some() {
+            self.limiting_sites.stiffness = sites.stiffness;
+        }
     }
 
     /// `max |H(x_k) − H(x₀)| / |H(x₀)|`; the absolute error if `H(x₀) = 0`.
@@ -332,11 +344,17 @@ impl fmt::Display for Certificate {
         }
         writeln!(f, "manifold:    defect ≤ {:.1e}", self.max_manifold_defect)?;
         if self.smallest_step < self.largest_step || self.rejected > 0 {
-            writeln!(
+            write!(
                 f,
                 "step sizes:  {:.1e} to {:.1e}, {} rejected",
                 self.smallest_step, self.largest_step, self.rejected
             )?;
+            if let Some(site) = self.limiting_sites.error
+                && !self.is_limited_by_stability()
+            {
+                write!(f, "; the largest error is at site {site}")?;
+            }
+            writeln!(f)?;
         }
         // Where friction is stiff the estimate is far too large, and the line above says so.
         if !self.is_stiff()
@@ -401,11 +419,16 @@ impl Certificate {
         }
         if self.is_limited_by_stability() {
             let steps = counted(self.steps, "step", "steps");
+            let LimitingSites { stiffness, .. } = self.limiting_sites;
+            let site = stiffness.map_or_else(String::new, |site| format!(" at site {site}"));
             writeln!(
                 f,
-                "stability:   it sets the size of {stability} of {steps}, and not the tolerance; an implicit method, \
-                 such as `Radau`, takes larger ones, and so does `RungeKuttaChebyshev` if friction sets it"
+                "stability:   it sets the size of {stability} of {steps}{site}, and not the tolerance; an implicit \
+                 method, such as `Radau`, takes larger ones, and so does `RungeKuttaChebyshev` if friction sets it"
             )?;
+        } else if let (0, Some(site)) = (stability, self.limiting_sites.stiffness) {
+            // Few steps at the edge are no stiffness; a method without an edge has looked for it.
+            writeln!(f, "stiffness:   the motion is stiffest at site {site}")?;
         }
         Ok(())
     }
@@ -462,6 +485,7 @@ mod tests {
         effort: Effort { iterations: 9, continued: 0, globalised: 0, splits: 1 },
         worst_iterations: 2,
         local_error: None,
+        limiting_sites: LimitingSites::new(None, None),
         promises: Promises::all_laws(true),
         second_law: SecondLaw::Exact,
         friction: 0.0,

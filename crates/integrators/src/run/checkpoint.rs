@@ -93,7 +93,7 @@ mod validation;
 
 use metriplectic_manifolds::PointError;
 
-use crate::method::{Control, Effort, Flow, Memory, Method, StateSpace, Vector};
+use crate::method::{Control, Effort, Flow, LimitingSites, Memory, Method, StateSpace, Vector};
 use crate::run::certificate::{Certificate, ProjectedSteps, StageBalance};
 use crate::run::controller::{Cap, Controller, Entries, StepSize};
 use crate::run::output::StepBefore;
@@ -167,6 +167,8 @@ struct Balance {
     effort: Effort,
     worst_iterations: usize,
     local_error: Option<Exact>,
+    #[cfg_attr(feature = "serde", serde(default))]
+    limiting_sites: LimitingSites,
 }
 
 #[derive(Clone, Debug, PartialEq)]
@@ -607,6 +609,7 @@ impl Balance {
             effort: c.effort,
             worst_iterations: c.worst_iterations,
             local_error: c.local_error.map(Exact),
+            limiting_sites: c.limiting_sites,
         }
     }
 
@@ -638,6 +641,7 @@ impl Balance {
         c.effort = self.effort;
         c.worst_iterations = self.worst_iterations;
         c.local_error = self.local_error.map(|error| error.0);
+        c.limiting_sites = self.limiting_sites;
         Ok(())
     }
 }

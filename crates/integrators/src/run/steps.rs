@@ -4,8 +4,8 @@ use std::fmt;
 
 use crate::error::RunError;
 use crate::method::{
-    Effort, Element, EntropyStep, Flow, Laws, Memory as _, Method, Promises, Refusal, StepEnds,
-    StepStart, Taken, Vector as _,
+    Effort, Element, EntropyStep, Flow, Laws, LimitingSites, Memory as _, Method, Promises,
+    Refusal, StepEnds, StepStart, Taken, Vector as _,
 };
 use crate::round_off::bound::{ROUNDED, breaks_first_law};
 use crate::run::certificate::Certificate;
@@ -224,7 +224,9 @@ impl<'a, F: Flow, M: Method<F>> Steps<'a, F, M> {
         }
         let ends = [(&self.state.point, &self.values), (&x, &values)];
         self.certificate.enter(self.flow, ends, h, (evidence, effort));
-        if step.is_power_of_two() {
+        let first_at_the_edge =
+            evidence.stability && self.certificate.limiting_sites.stiffness.is_none();
+        if step.is_power_of_two() || (first_at_the_edge && self.has_sites()) {
             self.sample((&x, &values), h);
         }
         (self.before.h, self.before.entropy) = (h, self.entropy);
@@ -254,7 +256,13 @@ impl<'a, F: Flow, M: Method<F>> Steps<'a, F, M> {
         Ok(())
     }
 
-    /// Notes the local error of a step, on the few whose number is a power of two.
+    /// Whether the certificate may name a site.
+    fn has_sites(&self) -> bool {
+        self.progress.scales.sizes.sites().is_some()
+    }
+
+    /// Notes the local error of a step, and where it is largest, on the few whose number is a power of two and on the
+    /// first one at the edge of stability.
     #[cold]
     fn sample(&mut self, (end, values): (&Element<F>, &Laws<F::Numbers>), h: f64) {
         let (flow, x) = (self.flow, &self.state.point);
@@ -270,9 +278,17 @@ impl<'a, F: Flow, M: Method<F>> Steps<'a, F, M> {
         };
         let reference = self.reference(self.entropy);
         let step = StepEnds { x, end, h, values: [&self.values, values], reference: &reference };
-        if let Some(error) = self.method.error(flow, &step, &self.memory, norm) {
-            self.certificate.note_local_error(error);
-        }
+        let Some(error) = self.method.error(flow, &step, &self.memory, norm) else { return };
+        let sites = if self.has_sites() {
+            let allowed = match &self.progress.step_size {
+                StepSize::Adaptive(controller) => controller.allowed(&self.progress.scales, h),
+                StepSize::Fixed(_) => sizes.clone(),
+            };
+            self.method.limiting_sites(flow, &step, &self.memory, &allowed)
+        } else {
+            LimitingSites::default()
+        };
+        self.certificate.note_local_error(error, sites);
     }
 
     /// Tries steps until the controller accepts one. Not part of the loop over steps of one size, which

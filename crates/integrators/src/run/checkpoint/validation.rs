@@ -1,7 +1,7 @@
 //! Whether the numbers of a checkpoint agree: with the system at its point, and with each other.
 
 use super::{Checkpoint, Exact, ResumeError, SavedEnding};
-use crate::method::{Element, Flow, Memory, Promises, Vector};
+use crate::method::{Element, Flow, LimitingSites, Memory, Promises, Vector};
 use crate::run::controller::StepSize;
 use crate::run::span::{check_end, check_steps};
 use crate::run::steps::Progress;
@@ -101,6 +101,11 @@ pub(super) fn of_the_balance<F: Flow>(
         if (here.0 - initial.0).abs() > error.0 {
             return damaged("initial value of a further invariant", initial.0);
         }
+    }
+    let sites = flow.sizes(x).sites().unwrap_or(0);
+    let LimitingSites { error, stiffness } = b.limiting_sites;
+    if let Some(site) = [error, stiffness].into_iter().flatten().find(|&site| site >= sites) {
+        return damaged("site that sets the steps", site as f64);
     }
     size("smallest step", b.smallest_step)?;
     size("largest step", b.largest_step)?;

@@ -1,0 +1,184 @@
+//! The differentials of energy and entropy, and their totals.
+
+use metriplectic_fields::{Column, Jet1, Vector};
+use metriplectic_manifolds::{Manifold, Product, Times};
+use nalgebra::SVector;
+
+use super::{Differentials, Lattice, Totals, dimension, larger, width};
+use crate::gather::Gather;
+use crate::model::{Model, PairManifold, PointOf, VectorOf};
+use crate::parallel;
+use crate::pool::Buffer;
+
+/// What a bond gives to each of its sites.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Given {
+    Nothing,
+    /// A vector.
+    Vector,
+    /// A differential of the energy and one of the entropy.
+    BothLaws,
+}
+
+impl Given {
+    /// What it gives to the differentials of the laws.
+    const fn by_functions<P: Model>() -> Self {
+        if P::EntropyGather::PRESENT {
+            Self::BothLaws
+        } else if P::BOND_ENERGY || P::EnergyGather::PRESENT {
+            Self::Vector
+        } else {
+            Self::Nothing
+        }
+    }
+}
+
+/// Adds the differential of `g(x, ρ)` along `x` at a site, and returns the value.
+#[inline]
+fn embed<M: Manifold + Times<M>, G: Gather<M>>(
+    gather: &G,
+    x: &M::Point<f64>,
+    sums: &[f64],
+    site: usize,
+    df: &mut Vector<M>,
+) -> f64 {
+    if !G::PRESENT {
+        return 0.0;
+    }
+    let Jet1 { value, df: more } = gather.embedded(x, sums[2 * site]).jet;
+    *df += more;
+    value
+}
+
+/// Adds the differential `(λ_i + λ_j) ∂φ` of what a bond gives to the sums of its sites.
+#[inline]
+fn spread<M: Manifold + Times<M>, G: Gather<M>>(
+    gather: &G,
+    pair: &(M::Point<f64>, M::Point<f64>),
+    sums: &[f64],
+    ends: [u32; 2],
+    df: &mut Vector<Product<M, M>>,
+) {
+    if G::PRESENT {
+        let [i, j] = ends.map(|site| sums[2 * site as usize + 1]);
+        *df += gather.weight(pair).df * (i + j);
+    }
+}
+
+/// The parts of a differential on a bond that belong to its two sites.
+#[inline]
+fn halves<P: Model>(df: &Vector<PairManifold<P>>) -> [VectorOf<P>; 2] {
+    let n = dimension::<P>();
+    [0, n].map(|start| VectorOf::<P>::from_index(|k| df[start + k]))
+}
+
+impl<P: Model> Lattice<P> {
+    /// A place for what bonds give to other chunks.
+    pub(super) fn slots(&self, given: Given) -> Buffer<f64> {
+        let (pool, laws) = match given {
+            Given::Nothing => return self.slots.adopt(Vec::new()),
+            Given::Vector => (&self.slots, 1),
+            Given::BothLaws => (&self.both_slots, 2),
+        };
+        pool.numbers(laws * self.layout.slots * dimension::<P>())
+    }
+
+    /// For each site the sum `ρ_i` over its bonds, and `λ_i = ∂g/∂ρ`; empty where nothing is gathered.
+    pub(crate) fn gathered<G: Gather<P::Manifold>>(
+        &self,
+        gather: &G,
+        x: &[PointOf<P>],
+    ) -> Buffer<f64> {
+        let [at_sites, in_slots] = &self.sums;
+        if !G::PRESENT {
+            return at_sites.adopt(Vec::new());
+        }
+        let mut sums = at_sites.numbers(2 * self.sites());
+        let bonds = self.layout.bonds();
+        self.layout.scatter(&mut sums, &mut in_slots.numbers(self.layout.slots), |mut part| {
+            for site in part.sites.clone() {
+                part.set(site, 0, &SVector::<f64, 2>::zero());
+            }
+            for bond in part.bonds.clone() {
+                let ends = bonds[bond];
+                let pair = ends.map(|site| x[site as usize].clone()).into();
+                let phi = SVector::<f64, 1>::from_index(|_| gather.weight(&pair).value);
+                part.add(ends, &[[phi, phi]]);
+            }
+        });
+        parallel::fill(&mut sums, 2, |sites, sums| {
+            for (site, sum) in sites.zip(sums.chunks_exact_mut(2)) {
+                sum[1] = gather.embedded(&x[site], sum[0]).along_rho;
+            }
+        });
+        sums
+    }
+
+    /// The differentials `w = dh + Σ ∂h₂` and `ds` at each site, with what they gather, and the totals if `TOTALS`.
+    pub(crate) fn differentials<const TOTALS: bool>(
+        &self,
+        x: &[PointOf<P>],
+    ) -> (Differentials, Totals<VectorOf<P>>) {
+        let n = dimension::<P>();
+        let mut all = self.differentials.numbers(self.sites() * width::<P>());
+        let bonds = self.layout.bonds();
+        let gathers = self.parts.gathers();
+        let energy_sums = self.gathered(&gathers.energy, x);
+        let entropy_sums = self.gathered(&gathers.entropy, x);
+        let [energy_sums, entropy_sums] = [&*energy_sums, &*entropy_sums];
+        let given = Given::by_functions::<P>();
+        let totals = self.layout.scatter(&mut all, &mut self.slots(given), |mut part| {
+            let mut totals = Totals::new(if TOTALS { P::SUMS } else { 0 });
+            for site in part.sites.clone() {
+                let point = &x[site];
+                let mut energy = self.parts.energy(site, point);
+                let gathered = embed(&gathers.energy, point, energy_sums, site, &mut energy.df);
+                part.set(site, 0, &energy.df);
+                if TOTALS {
+                    if P::EnergyGather::PRESENT {
+                        totals.energy.add(gathered);
+                    }
+                    totals.energy.add(energy.value);
+                    totals.sizes = larger(&totals.sizes, &P::Manifold::scales(point));
+                    for (k, sum) in totals.sums.iter_mut().enumerate() {
+                        sum.add(self.parts.sum(k, site, point).value);
+                    }
+                }
+                if P::ENTROPY {
+                    let mut entropy = self.parts.entropy(site, point);
+                    let gathered =
+                        embed(&gathers.entropy, point, entropy_sums, site, &mut entropy.df);
+                    part.set(site, n, &entropy.df);
+                    if TOTALS {
+                        if P::EntropyGather::PRESENT {
+                            totals.entropy.add(gathered);
+                        }
+                        totals.entropy.add(entropy.value);
+                    }
+                }
+            }
+            if given == Given::Nothing {
+                return totals;
+            }
+            for bond in part.bonds.clone() {
+                let ends = bonds[bond];
+                let pair = ends.map(|site| x[site as usize].clone()).into();
+                let mut jet = self.parts.bond_energy(bond, &pair);
+                spread(&gathers.energy, &pair, energy_sums, ends, &mut jet.df);
+                let energy = halves::<P>(&jet.df);
+                if P::EntropyGather::PRESENT {
+                    let mut ds = Vector::<PairManifold<P>>::zero();
+                    spread(&gathers.entropy, &pair, entropy_sums, ends, &mut ds);
+                    part.add(ends, &[energy, halves::<P>(&ds)]);
+                } else {
+                    part.add(ends, &[energy]);
+                }
+                if TOTALS {
+                    totals.energy.add(jet.value);
+                }
+            }
+            totals
+        });
+        (all, totals.iter().fold(Totals::new(P::SUMS), Totals::merge))
+    }
+}

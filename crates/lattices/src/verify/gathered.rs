@@ -1,0 +1,79 @@
+//! The values and derivatives of what energy and entropy gather over bonds.
+
+use metriplectic_fields::{Column, Space, Vector};
+
+use super::{STEP, Slope, Trial, quotient, samples};
+use crate::error::{LatticeError, Place};
+use crate::gather::{Embedded, Gather};
+use crate::lattice::{Lattice, dimension};
+use crate::model::{Model, PairManifold, VectorOf};
+use crate::parallel;
+use crate::points::Points;
+
+impl<P: Model> Lattice<P> {
+    /// Looks for values and derivatives of `φ` and `g` that are no numbers.
+    pub(super) fn verify_gathered<G: Gather<P::Manifold>>(
+        &self,
+        what: &'static str,
+        gather: &G,
+        x: &Points<P::Manifold>,
+    ) -> Result<(), LatticeError> {
+        if !G::PRESENT {
+            return Ok(());
+        }
+        let not_finite = |place| Err(LatticeError::NotFinite { what, place });
+        let on = |bond: usize| {
+            let is_finite = gather.weight(&self.pair(x, bond)).is_finite();
+            if is_finite { Ok(()) } else { not_finite(self.place_of(bond)) }
+        };
+        let bonds = self.layout.bonds().len();
+        parallel::map(bonds, |mut bonds| bonds.try_for_each(on))
+            .into_iter()
+            .collect::<Result<(), _>>()?;
+        let sums = self.gathered(gather, x);
+        let at = |site: usize| {
+            let Embedded { jet, along_rho } = gather.embedded(&x[site], sums[2 * site]);
+            let is_finite = jet.is_finite() && along_rho.is_finite();
+            if is_finite { Ok(()) } else { not_finite(Place::Site(site)) }
+        };
+        parallel::map(self.sites(), |mut sites| sites.try_for_each(at)).into_iter().collect()
+    }
+}
+
+impl<P: Model> Trial<'_, P> {
+    /// Compares the derivatives of `φ` at sampled bonds, and those of `g` at sampled sites, with differences of values.
+    pub(super) fn gathered_derivatives<G: Gather<P::Manifold>>(
+        &mut self,
+        what: &'static str,
+        gather: &G,
+        sizes: &VectorOf<P>,
+    ) -> Result<(), LatticeError> {
+        if !G::PRESENT {
+            return Ok(());
+        }
+        let (lattice, n) = (self.lattice, dimension::<P>());
+        let sums = lattice.gathered(gather, self.y);
+        for bond in samples(lattice.layout.bonds().len()) {
+            let x = lattice.pair(self.y, bond);
+            let both = Vector::<PairManifold<P>>::from_index(|k| sizes[k % n]);
+            let u = self.random.vector(&both);
+            let moved = |t: f64| PairManifold::<P>::chart(&x, &(u * t));
+            let ends = [STEP, -STEP].map(|t| gather.weight(&moved(t)).value);
+            let phi = gather.weight(&x);
+            let slope = Slope::of(&phi.df, &u);
+            quotient(what, lattice.place_of(bond), phi.value, slope, ends)?;
+        }
+        for site in samples(lattice.sites()) {
+            let (x, rho, place) = (&self.y[site], sums[2 * site], Place::Site(site));
+            let u = self.random.vector(sizes);
+            let moved = |t: f64| P::Manifold::chart(x, &(u * t));
+            let ends = [STEP, -STEP].map(|t| gather.embedded(&moved(t), rho).jet.value);
+            let g = gather.embedded(x, rho);
+            quotient(what, place, g.jet.value, Slope::of(&g.jet.df, &u), ends)?;
+            let sum = g.along_rho * rho;
+            let ends = [STEP, -STEP].map(|t| gather.embedded(x, rho * (1.0 + t)).jet.value);
+            quotient(what, place, g.jet.value, Slope { sum, terms: sum.abs() }, ends)?;
+        }
+        Ok(())
+    }
+}

@@ -106,7 +106,12 @@ pub(super) fn try_step<Y: Metriplectic>(
         }
         None => (end, at.values),
     };
-    if let Some(moved) = corrected(&equation, at.error, &x_end, &values_end) {
+    let mut error = at.error;
+    if tableau.one_sided {
+        // What was not taken back, as long as that is round-off.
+        error = error.max(equation.error(&values_end, &at.sizes));
+    }
+    if let Some(moved) = corrected(&equation, error, &x_end, &values_end) {
         values_end = system.laws(&moved);
         x_end = moved;
         memory.compensation.clear();

@@ -222,8 +222,10 @@ macro_rules! method {
                 memory: &mut StageMemory<Dim<Y>>,
                 theta: f64,
             ) -> Option<PointOf<Y>> {
+                let (tableau, splits) = (Self::tableau(), self.splits);
                 let promises = Method::<Y>::promises(self, system);
-                dense::between(Self::tableau(), system, step, promises, memory, theta)
+                let inside = dense::Inside { tableau, splits, promises };
+                dense::between(inside, system, step, memory, theta)
             }
         }
     };

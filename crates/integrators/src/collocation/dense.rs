@@ -156,3 +156,26 @@ pub(super) fn error<Y: Metriplectic>(
     };
     Some(defect(0.0, x)?.max(defect(1.0, end)?))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::rational;
+
+    #[test]
+    fn the_entropy_inside_a_step_is_monotone_and_has_its_slopes() {
+        let (rise, tiny) = (0.3, 1e-6);
+        for slopes in [[0.3, 0.3], [2.0, 0.0], [0.0, 5.0], [1e12, 1e-3]] {
+            let at = |theta| rational(rise, slopes, theta);
+            assert!(at(0.0).abs() <= 0.0 && (at(1.0) - rise).abs() <= 1e-16);
+            let values: Vec<f64> = (0..=1000).map(|k| at(f64::from(k) * 1e-3)).collect();
+            assert!(values.is_sorted(), "{slopes:?}");
+            if slopes[0] < 1e3 {
+                let ends = [at(tiny) / tiny, (rise - at(1.0 - tiny)) / tiny];
+                let off = [ends[0] - slopes[0], ends[1] - slopes[1]];
+                assert!(off.iter().all(|off| off.abs() <= 1e-3), "{slopes:?}: {ends:?}");
+            }
+        }
+        // A fast transient is over at once.
+        assert!(rise - rational(rise, [1e12, 0.0], 0.1) <= 1e-11);
+    }
+}

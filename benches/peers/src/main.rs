@@ -22,7 +22,9 @@ const SHOWN_STEPS: [(u32, u32); 3] = [(5, 1), (20, 1), (80, 1)];
 const OURS: &str = "metriplectic";
 const EIGHT: &str = "DormandPrince8";
 const FIVE: &str = "DormandPrince5";
-/// Exponents of the tolerances of the explicit methods.
+/// The methods with stages, which have a table of their own.
+const GAUSS: [&str; 3] = ["Gauss::<2>", "Gauss::<3>", "Gauss::<4>"];
+/// Exponents of the tolerances of our adaptive methods.
 const OUR_TOLERANCES: [i32; 10] = [3, 4, 5, 6, 7, 8, 9, 10, 11, 12];
 /// A run is repeated until it has taken so many seconds, at most five times; the least time counts.
 const PATIENCE: f64 = 0.5;
@@ -154,13 +156,17 @@ fn compare<P: Ours<N>, const N: usize>(problem: &P, time: u32, entries: &mut Vec
         let shown = SHOWN_STEPS.contains(&(n, d));
         entries.push(Entry { method: OURS, setting: format!("h = {h}"), shown, outcome });
     }
-    let explicit: [(&'static str, fn(f64, f64) -> How); 2] =
-        [(EIGHT, How::Eight), (FIVE, How::Five)];
-    for (method, how) in explicit {
+    let adaptive: [(&'static str, fn(f64, f64) -> How); 5] = [
+        (EIGHT, How::Eight),
+        (FIVE, How::Five),
+        (GAUSS[0], How::Gauss2),
+        (GAUSS[1], How::Gauss3),
+        (GAUSS[2], How::Gauss4),
+    ];
+    for (method, how) in adaptive {
         for k in OUR_TOLERANCES {
             let tolerance = 10.0_f64.powi(-k);
-            let outcome =
-                certified(problem, &exact, fastest(|| problem.run(how(end, tolerance))));
+            let outcome = certified(problem, &exact, fastest(|| problem.run(how(end, tolerance))));
             let (setting, shown) = (format!("{tolerance:.0e}"), SHOWN_TOLERANCES.contains(&k));
             entries.push(Entry { method, setting, shown, outcome });
         }
@@ -235,11 +241,11 @@ impl Comparison {
         table
     }
 
-    /// The methods, each once.
+    /// The methods but those with stages, each once.
     fn methods(&self) -> Vec<&'static str> {
         let mut methods: Vec<&str> = Vec::new();
         for entry in &self.entries {
-            if !methods.contains(&entry.method) {
+            if !methods.contains(&entry.method) && !GAUSS.contains(&entry.method) {
                 methods.push(entry.method);
             }
         }
@@ -255,6 +261,12 @@ impl Comparison {
     fn fastest(&self, method: &str, error: f64) -> Option<f64> {
         let near = self.outcomes(method).filter(|o| o.error <= error);
         near.map(|o| o.seconds).reduce(f64::min)
+    }
+
+    /// The least evaluations with which a method came as near to the exact solution.
+    fn least(&self, method: &str, error: f64) -> Option<u64> {
+        let near = self.outcomes(method).filter(|o| o.error <= error);
+        near.map(|o| o.evaluations).min()
     }
 
     fn panel(&self, title: String, value: impl Fn(&Outcome) -> f64) -> Panel {
@@ -295,6 +307,28 @@ fn summary(all: &[Comparison]) -> Table<10> {
     table
 }
 
+/// The least evaluations and milliseconds of the methods with stages to an error at the end, beside the explicit one.
+fn with_stages(all: &[Comparison]) -> Table<7> {
+    let [two, three, four] = GAUSS;
+    let mut table = Table::new(["problem", "T", "error below", EIGHT, two, three, four]);
+    for comparison in all {
+        for error in [1e-4, 1e-8, 1e-11] {
+            let cell = |method| {
+                let least = comparison.least(method, error).zip(comparison.fastest(method, error));
+                least.map_or("–".into(), |(evaluations, s)| {
+                    format!("{evaluations}, {:.2}", 1e3 * s)
+                })
+            };
+            let head =
+                [comparison.problem.clone(), comparison.time.to_string(), format!("{error:.0e}")];
+            let [problem, time, error] = head;
+            let [a, b, c, d] = [EIGHT, two, three, four].map(cell);
+            table.row([problem, time, error, a, b, c, d]);
+        }
+    }
+    table
+}
+
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = env::args().skip(1).collect();
     let every = arguments.iter().any(|argument| argument == "--all");
@@ -307,6 +341,10 @@ fn main() -> Result<(), Box<dyn Error>> {
         all.push(Comparison::of(&Gas { alpha: 0.5 }, time));
     }
     println!("The least milliseconds to an error at T:\n\n{}", summary(&all).markdown());
+    println!(
+        "\nWith stages: evaluations and milliseconds to an error at T:\n\n{}",
+        with_stages(&all).markdown()
+    );
     for comparison in &all {
         println!("\n### {}, T = {}\n", comparison.problem, comparison.time);
         println!("{}", comparison.table(every).markdown());

@@ -39,6 +39,12 @@ pub enum How {
     Five(f64, f64),
     /// The method of order 8.
     Eight(f64, f64),
+    /// The reversible methods with two, three and four stages.
+    Gauss2(f64, f64),
+    /// Of order 6.
+    Gauss3(f64, f64),
+    /// Of order 8.
+    Gauss4(f64, f64),
 }
 
 /// A problem that runs from closures.
@@ -71,6 +77,15 @@ where
         }
         How::Five(time, tolerance) => DormandPrince5.run(system, start, span((time, tolerance))),
         How::Eight(time, tolerance) => DormandPrince8.run(system, start, span((time, tolerance))),
+        How::Gauss2(time, tolerance) => {
+            Gauss::<2>::default().run(system, start, span((time, tolerance)))
+        }
+        How::Gauss3(time, tolerance) => {
+            Gauss::<3>::default().run(system, start, span((time, tolerance)))
+        }
+        How::Gauss4(time, tolerance) => {
+            Gauss::<4>::default().run(system, start, span((time, tolerance)))
+        }
     };
     let run = run.map_err(|error| error.to_string())?;
     let seconds = clock.elapsed().as_secs_f64();

@@ -38,7 +38,8 @@
 //! 2. The same from rest.
 //! 3. Newton's method with the derivatives of all stages, for friction that is stiff and not linear.
 //! 4. Continuation in the step size, by steps that double and are quartered.
-//! 5. Halves, [`splits`](Gauss::splits) times at most.
+//! 5. In parts: halves of a Gauss step, [`splits`](Gauss::splits) times at most; parts of a Radau step that grow from
+//!    the time in which friction acts, since the step damps what is faster than itself.
 //!
 //! It stops where the correction *and* the errors of the laws are round-off. A root whose stages have quite another
 //! energy, or which is beyond the chart, is refused. Adaptive steps are tried by 1 to 3, and then by a smaller step.
@@ -61,6 +62,7 @@ mod full;
 mod heat;
 mod linear;
 mod memory;
+mod parts;
 mod solve;
 mod step;
 mod tableau;
@@ -136,18 +138,16 @@ pub struct Gauss<const S: usize> {
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Radau<const S: usize> {
-    /// How often a step that is not solved is split in halves; both laws hold for each half.
+    /// A step that is not solved is taken in parts, the first of which is at least `2^{-splits}` of it; each may be twice
+    /// as long as the one before, and both laws hold for each.
     pub splits: usize,
 }
 
-/// How often a step is split in halves, unless another number is asked for.
-const SPLITS: usize = 10;
-
 macro_rules! method {
-    ($name:ident, $tableaux:expr, $first:literal, $last:literal) => {
+    ($name:ident, $tableaux:expr, $first:literal, $last:literal, $splits:literal) => {
         impl<const S: usize> Default for $name<S> {
             fn default() -> Self {
-                Self { splits: SPLITS }
+                Self { splits: $splits }
             }
         }
 
@@ -186,7 +186,7 @@ macro_rules! method {
                 memory: &mut StageMemory<Dim<Y>>,
             ) -> Result<Taken<Y>, StepError> {
                 let start = step::start_of(Self::tableau(), start, h);
-                fallbacks::with_halves(Self::tableau(), self.splits, system, &start, memory)
+                parts::take(Self::tableau(), self.splits, system, &start, memory)
             }
 
             fn attempt(
@@ -222,15 +222,18 @@ macro_rules! method {
                 memory: &mut StageMemory<Dim<Y>>,
                 theta: f64,
             ) -> Option<PointOf<Y>> {
+                let (tableau, splits) = (Self::tableau(), self.splits);
                 let promises = Method::<Y>::promises(self, system);
-                dense::between(Self::tableau(), system, step, promises, memory, theta)
+                let inside = dense::Inside { tableau, splits, promises };
+                dense::between(inside, system, step, memory, theta)
             }
         }
     };
 }
 
-method!(Gauss, GAUSS, 1, 4);
-method!(Radau, RADAU, 2, 4);
+method!(Gauss, GAUSS, 1, 4, 10);
+// Down to the inverse of round-off: the time in which the fastest friction acts.
+method!(Radau, RADAU, 2, 4, 60);
 
 /// The defect of the polynomial of a step is `O(h^{s+1})`, and its end is of order `p`: held to `τ^{(s+1)/p}`, the
 /// error of a run is proportional to the tolerance `τ`.

@@ -9,22 +9,33 @@ use super::covectors::combined;
 use super::equation::StageEquation;
 use super::fallbacks;
 use super::memory::{LastStep, StageMemory};
+use super::parts;
 use super::tableau::Tableau;
 use crate::method::{Components, Effort, Flow as _, Promises, StepEnds};
-use crate::midpoint::Dim;
+use crate::midpoint::{Dim, Start};
+use crate::round_off::drift;
 use crate::run::dense::{self, cubic, limited};
 use crate::step_failure::Fallbacks;
+
+/// How states inside a step are found.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Inside {
+    pub(super) tableau: &'static Tableau,
+    /// How often a part of the step may be divided.
+    pub(super) splits: usize,
+    pub(super) promises: Promises,
+}
 
 /// The state at the fraction `θ` of a step: a step of size `θh`, guessed by the polynomial of the whole one, and moved
 /// onto the laws of the run with an entropy that does not fall from one fraction to a later one.
 pub(super) fn between<Y: Metriplectic>(
-    tableau: &'static Tableau,
+    inside: Inside,
     system: &Y,
     step: &StepEnds<'_, Y>,
-    promises: Promises,
     memory: &StageMemory<Dim<Y>>,
     theta: f64,
 ) -> Option<PointOf<Y>> {
+    let Inside { tableau, promises, .. } = inside;
     if theta <= 0.0 || step.x == step.end {
         return Some(step.x.clone());
     }
@@ -32,11 +43,14 @@ pub(super) fn between<Y: Metriplectic>(
         return Some(step.end.clone());
     }
     let part = memory.last.and_then(|last| part(tableau, system, step, &last, theta));
-    // A step that was taken in parts has no polynomial.
-    let Some(y) = part else { return dense::between(system, step, promises, theta) };
+    // A step that was taken in parts has no polynomial, and the cubic through stiff ends is no motion.
+    let in_parts = || if tableau.one_sided { in_parts(inside, system, step, theta) } else { None };
+    let Some(y) = part.or_else(in_parts) else {
+        return dense::between(system, step, promises, theta);
+    };
     let q = Y::Manifold::coordinates(step.x, step.end);
     let line = || Y::Manifold::chart(step.x, &(q * theta));
-    let entropy = promises.entropy.then(|| entropy(system, step, theta));
+    let entropy = promises.entropy.then(|| entropy(tableau, system, step, theta));
     Some(dense::onto_laws(system, step, promises, (theta, entropy), (y, line)))
 }
 
@@ -59,19 +73,56 @@ fn part<Y: Metriplectic>(
     Some(solved.at.end)
 }
 
-/// The entropy at the fraction `θ` of a step: the cubic with the production as its slope, limited so that it is
-/// monotone (Fritsch, Carlson 1980).
-fn entropy<Y: Metriplectic>(system: &Y, step: &StepEnds<'_, Y>, theta: f64) -> f64 {
+/// The end of a step of size `θh`, in parts where it is not solved whole.
+fn in_parts<Y: Metriplectic>(
+    inside: Inside,
+    system: &Y,
+    step: &StepEnds<'_, Y>,
+    theta: f64,
+) -> Option<PointOf<Y>> {
+    let Inside { tableau, splits, .. } = inside;
+    let (h, accumulated_error) = (theta * step.h, drift::nothing::<Y>());
+    let start = Start { x: step.x, time: 0.0, h, values: *step.values[0], accumulated_error };
+    let taken = parts::take(tableau, splits, system, &start, &mut StageMemory::default());
+    taken.ok().map(|taken| taken.x)
+}
+
+/// The entropy at the fraction `θ` of a step, with the production as its slope at both ends: the cubic, limited so that
+/// it is monotone (Fritsch, Carlson 1980), and for a method that damps the rational function, which follows the rise
+/// of a fast transient.
+fn entropy<Y: Metriplectic>(
+    tableau: &Tableau,
+    system: &Y,
+    step: &StepEnds<'_, Y>,
+    theta: f64,
+) -> f64 {
     let [start, end] = step.values.map(|laws| laws.entropy);
     let rise = end - start;
     if rise <= 0.0 {
         return start;
     }
     let slopes = match (system.production(step.x), system.production(step.end)) {
-        (Some(a), Some(b)) => limited(rise, [step.h * a, step.h * b]),
+        (Some(a), Some(b)) => [step.h * a, step.h * b],
         _ => [rise, rise],
     };
-    (start + cubic(rise, slopes, theta)).min(end)
+    let risen = if tableau.one_sided && slopes.iter().all(|slope| slope.is_finite()) {
+        rational(rise, slopes, theta)
+    } else {
+        cubic(rise, limited(rise, slopes), theta)
+    };
+    (start + risen).min(end)
+}
+
+/// The rational quadratic function from 0 to `rise` with these slopes, which is monotone if they are not negative
+/// (Gregory, Delbourgo 1982, IMA J. Numer. Anal. 2, 123-130):
+///
+/// ```math
+/// \frac{\Delta \theta^2 + d_0\, \theta(1 - \theta)}{\Delta + (d_0 + d_1 - 2\Delta)\, \theta(1 - \theta)}\, \Delta .
+/// ```
+fn rational(rise: f64, slopes: [f64; 2], theta: f64) -> f64 {
+    let [start, end] = slopes.map(|slope| (slope / rise).max(0.0));
+    let both = theta * (1.0 - theta);
+    rise * (theta * theta + start * both) / (1.0 + (start + end - 2.0) * both)
 }
 
 /// The error of a step, by a norm: the larger one of
@@ -104,4 +155,27 @@ pub(super) fn error<Y: Metriplectic>(
         Some(norm(&Components(*filter * chart.to_start(x, &middle))))
     };
     Some(defect(0.0, x)?.max(defect(1.0, end)?))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::rational;
+
+    #[test]
+    fn the_entropy_inside_a_step_is_monotone_and_has_its_slopes() {
+        let (rise, tiny) = (0.3, 1e-6);
+        for slopes in [[0.3, 0.3], [2.0, 0.0], [0.0, 5.0], [1e12, 1e-3]] {
+            let at = |theta| rational(rise, slopes, theta);
+            assert!(at(0.0).abs() <= 0.0 && (at(1.0) - rise).abs() <= 1e-16);
+            let values: Vec<f64> = (0..=1000).map(|k| at(f64::from(k) * 1e-3)).collect();
+            assert!(values.is_sorted(), "{slopes:?}");
+            if slopes[0] < 1e3 {
+                let ends = [at(tiny) / tiny, (rise - at(1.0 - tiny)) / tiny];
+                let off = [ends[0] - slopes[0], ends[1] - slopes[1]];
+                assert!(off.iter().all(|off| off.abs() <= 1e-3), "{slopes:?}: {ends:?}");
+            }
+        }
+        // A fast transient is over at once.
+        assert!(rise - rational(rise, [1e12, 0.0], 0.1) <= 1e-11);
+    }
 }

@@ -20,7 +20,7 @@ use super::covectors::{
     AlongStages, Correction, LawStart, OfInvariants, StageCovectors, StagePoints, Stages,
     StepPolynomial, all_finite, combined,
 };
-use super::heat;
+use super::heat::{self, HeatStart};
 use super::tableau::{STAGES, Tableau};
 use crate::method::Laws;
 use crate::midpoint::{Dim, Numbers};
@@ -50,8 +50,8 @@ pub(super) struct StageEquation<'a, Y: Metriplectic> {
     pub(super) drift: DriftCorrection<Y>,
     /// Whether the laws are integrated along short steps.
     pub(super) integrals: bool,
-    /// The differential of the energy at `x`, if what is lost of the energy becomes heat.
-    pub(super) heats: Option<Vector<Y::Manifold>>,
+    /// The start, if what is lost of the energy becomes heat.
+    pub(super) heats: Option<HeatStart<Vector<Y::Manifold>>>,
     /// The round-off of the terms of a velocity; zero where it is not known.
     pub(super) rounding: Vector<Y::Manifold>,
 }
@@ -125,7 +125,7 @@ impl<'a, Y: Metriplectic> StageEquation<'a, Y> {
         let mut heats = None;
         if tableau.one_sided && system.second_law() == SecondLaw::Exact {
             let w = differentials(system, &ChartPoint::<Y::Manifold>::centre(x));
-            heats = heat::is_directed(system, x, &w).then_some(w.energy);
+            heats = heat::start(system, x, &w);
         }
         Self { tableau, system, x, h, values, drift, integrals: true, heats, rounding }
     }

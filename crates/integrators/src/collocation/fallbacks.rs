@@ -5,14 +5,10 @@ use metriplectic_dynamics::Metriplectic;
 use metriplectic_fields::{Column, Vector};
 
 use super::equation::{StageEquation, Unknowns};
-use super::linear::Linear;
-use super::memory::StageMemory;
 use super::solve::{Budget, Derivatives, Solved, Unsolved};
-use super::step::try_step;
-use super::tableau::{STAGES, Tableau};
-use crate::method::{Effort, Laws, Taken};
-use crate::midpoint::{Dim, Start, dependent_invariant};
-use crate::step_error::StepError;
+use super::tableau::STAGES;
+use crate::method::Effort;
+use crate::round_off::drift;
 use crate::step_failure::{Cause, Fallbacks};
 
 /// A step that was not taken.
@@ -47,7 +43,7 @@ pub(super) fn solve<Y: Metriplectic>(
     effort: &mut Effort,
 ) -> Result<Solved<Y>, StepFailure> {
     let mut best = Unsolved { residual: f64::INFINITY, edge: false, evaluations: 0 };
-    let mut attempt = |guess: Unknowns<Y>, budget, effort: &mut Effort| {
+    let mut attempt = |equation: &StageEquation<'_, Y>, guess, budget, effort: &mut Effort| {
         let solved = equation.solve(guess, budget);
         effort.iterations += match &solved {
             Ok(solved) => solved.evaluations,
@@ -60,20 +56,23 @@ pub(super) fn solve<Y: Metriplectic>(
         })
     };
     if let Some(guess) = guess
-        && let Ok(solved) = attempt(guess, WHOLE, effort)
+        && let Ok(solved) = attempt(equation, guess, WHOLE, effort)
     {
         return Ok(solved);
     }
+    // Where friction is stiff, to take back a rounding of the energy may ask for more than the motion gives.
+    let drift = if equation.tableau.one_sided { drift::nothing::<Y>() } else { equation.drift };
+    let equation = &StageEquation { drift, ..*equation };
     let rest = [Vector::<Y::Manifold>::zero(); STAGES];
-    if let Ok(solved) = attempt(rest, FROM_REST, effort) {
+    if let Ok(solved) = attempt(equation, rest, FROM_REST, effort) {
         return Ok(solved);
     }
-    if let Ok(solved) = attempt(guess.unwrap_or(rest), FULL, effort) {
+    if let Ok(solved) = attempt(equation, guess.unwrap_or(rest), FULL, effort) {
         return Ok(solved);
     }
     if fallbacks == Fallbacks::All
         && let Some(near) = continue_in_step_size(equation, effort)
-        && let Ok(solved) = attempt(near, FULL, effort)
+        && let Ok(solved) = attempt(equation, near, FULL, effort)
     {
         return Ok(solved);
     }
@@ -110,127 +109,4 @@ fn continue_in_step_size<Y: Metriplectic>(
         }
     }
     None
-}
-
-/// The step, whole or in parts.
-pub(super) fn with_halves<Y: Metriplectic>(
-    tableau: &'static Tableau,
-    splits: usize,
-    system: &Y,
-    start: &Start<'_, Y>,
-    memory: &mut StageMemory<Dim<Y>>,
-) -> Result<Taken<Y>, StepError> {
-    let failure = match try_step(tableau, system, start, memory, Fallbacks::All) {
-        Ok(taken) => return Ok(taken),
-        Err(failure) => failure,
-    };
-    let kept = *memory;
-    *memory = StageMemory::default();
-    let mut halves = Halves { tableau, splits, system, effort: failure.effort };
-    let parts =
-        if splits == 0 { Err((failure, start.x.clone())) } else { halves.of(start, memory, 1) };
-    let effort = halves.effort;
-    match parts {
-        Ok(taken) => {
-            memory.last = None;
-            Ok(Taken { effort, ..taken })
-        }
-        Err((failure, x)) => {
-            *memory = kept;
-            Err(halves.error(start, failure, &x))
-        }
-    }
-}
-
-/// The parts of a step that was not solved whole.
-struct Halves<'a, Y: Metriplectic> {
-    tableau: &'static Tableau,
-    splits: usize,
-    system: &'a Y,
-    /// What all of the parts took.
-    effort: Effort,
-}
-
-/// A part that failed, and where it starts.
-type Failed<Y> = (StepFailure, metriplectic_dynamics::system::Point<Y>);
-
-impl<Y: Metriplectic> Halves<'_, Y> {
-    /// The two halves of a step that was not solved whole.
-    fn of(
-        &mut self,
-        start: &Start<'_, Y>,
-        memory: &mut StageMemory<Dim<Y>>,
-        depth: usize,
-    ) -> Result<Taken<Y>, Failed<Y>> {
-        self.effort.splits += 1;
-        let h = 0.5 * start.h;
-        let first = self.part(&Start { h, ..*start }, memory, depth)?;
-        let laws = first.values;
-        let change = |after: f64, before: f64| after - before;
-        let accumulated_error = Laws {
-            energy: start.accumulated_error.energy + change(laws.energy, start.values.energy),
-            ..start.accumulated_error
-        };
-        let next = Start { x: &first.x, h, values: laws, accumulated_error, ..*start };
-        let second = self.part(&next, memory, depth)?;
-        let evidence = first.evidence.and(second.evidence);
-        Ok(Taken { evidence, ..second })
-    }
-
-    /// One half.
-    fn part(
-        &mut self,
-        start: &Start<'_, Y>,
-        memory: &mut StageMemory<Dim<Y>>,
-        depth: usize,
-    ) -> Result<Taken<Y>, Failed<Y>> {
-        match try_step(self.tableau, self.system, start, memory, Fallbacks::FirstTries) {
-            Ok(taken) => {
-                self.effort += taken.effort;
-                Ok(taken)
-            }
-            Err(failure) => {
-                self.effort += failure.effort;
-                if depth >= self.splits {
-                    return Err((failure, start.x.clone()));
-                }
-                self.of(start, memory, depth + 1)
-            }
-        }
-    }
-
-    /// What a user is told of a step that was not solved, by what became of its smallest part.
-    #[cold]
-    fn error(
-        &self,
-        start: &Start<'_, Y>,
-        failure: StepFailure,
-        x: &super::PointOf<Y>,
-    ) -> StepError {
-        let &Start { time, h, values, .. } = start;
-        let tried = self.effort;
-        if let Some(error) = failure.cause.first_law(time, h) {
-            return error;
-        }
-        let suggested = (0..self.splits).fold(h, |part, _| 0.5 * part);
-        let part = StageEquation::new(self.tableau, self.system, start.x, values, suggested);
-        let rest = [Vector::<Y::Manifold>::zero(); STAGES];
-        let residual = part.evaluate(&rest).map_or(f64::INFINITY, |at| {
-            at.residual.iter().map(Column::magnitude).fold(0.0, f64::max)
-        });
-        if let Some(linear) = Linear::of(&part, &rest)
-            && linear.friction > f64::max(1.0, linear.rotation)
-        {
-            let stiffness = linear.friction * (h / suggested);
-            return StepError::StiffFriction { time, h, stiffness, residual, tried };
-        }
-        match (failure.cause, dependent_invariant(self.system, x)) {
-            (Cause::Edge, _) => StepError::OutOfDomain { time, h, tried },
-            (_, Some((index, fraction))) => {
-                let change = start.accumulated_error.invariants[index].abs();
-                StepError::DependentInvariants { time, index, change, fraction }
-            }
-            _ => StepError::NotConverged { time, h, residual, tried, suggested },
-        }
-    }
 }

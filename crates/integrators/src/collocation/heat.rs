@@ -65,13 +65,23 @@ fn direction<Y: Metriplectic>(
     is_directed.then(|| sharp * warmed.recip())
 }
 
-/// Whether heat has a direction at a point.
-pub(super) fn is_directed<Y: Metriplectic>(
+/// Where a step that heats starts.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct HeatStart<V> {
+    /// The differential of the energy.
+    energy: V,
+    /// The inverse temperature `⟨dS, u⟩ = |n|²/⟨dH, ♯n⟩`.
+    coldness: f64,
+}
+
+/// The start of a step at a point; `None` where heat has no direction there.
+pub(super) fn start<Y: Metriplectic>(
     system: &Y,
     x: &Point<Y>,
     w: &Covectors<Dim<Y>, Vector<Y::Manifold>>,
-) -> bool {
-    direction(system, x, w).is_some()
+) -> Option<HeatStart<Vector<Y::Manifold>>> {
+    let u = direction(system, x, w)?;
+    Some(HeatStart { energy: w.energy, coldness: w.entropy.dot(&u) })
 }
 
 /// A step that heats.
@@ -82,11 +92,11 @@ pub(super) struct Step<'a, Y: Metriplectic> {
     pub(super) chart: &'a StepChart<Y::Manifold>,
     pub(super) h: f64,
     pub(super) x: &'a Point<Y>,
-    /// The differential of the energy at `x`.
-    pub(super) start: &'a Vector<Y::Manifold>,
+    pub(super) start: &'a HeatStart<Vector<Y::Manifold>>,
 }
 
-/// Corrects the covectors of energy and entropy with heat; `None` where heat has no direction.
+/// Corrects the covectors of energy and entropy with heat; `None` where heat has no direction, or a stage has a
+/// temperature of the other sign.
 pub(super) fn add<Y: Metriplectic>(
     step: &Step<'_, Y>,
     stages: &StagePoints<Y::Manifold>,
@@ -104,7 +114,12 @@ pub(super) fn add<Y: Metriplectic>(
     let mut velocity = [Vector::<Y::Manifold>::zero(); STAGES];
     let (mut gain, mut along) = (w.entropy.left, 0.0);
     for i in 0..tableau.stages {
-        velocity[i] = direction(system, &stages.x[i], &at_stage::<Y>(w, i))? * rho;
+        let u = direction(system, &stages.x[i], &at_stage::<Y>(w, i))?;
+        // Beyond an infinite temperature no motion leads: such a root belongs to another branch of the entropy.
+        if (w.entropy.w[i].dot(&u) > 0.0) != (step.start.coldness > 0.0) {
+            return None;
+        }
+        velocity[i] = u * rho;
         let weight = h * tableau.weights[i];
         gain += weight * w.entropy.w[i].dot(&velocity[i]);
         along += weight * stages.flat(i).dot(&velocity[i]);
@@ -146,7 +161,7 @@ fn transient<Y: Metriplectic>(
         for (part, v) in parts.iter_mut().zip(varied) {
             let here = in_chart_at::<Y::Manifold>(&stages.x[i], &chart.z, &stages.q[i], &v);
             let before = in_chart_at::<Y::Manifold>(x, &chart.z, &back, &v);
-            let paired = w.energy.w[i].dot(&here) - start.dot(&before);
+            let paired = w.energy.w[i].dot(&here) - start.energy.dot(&before);
             *part += tableau.weights[i] * paired.abs();
         }
     }

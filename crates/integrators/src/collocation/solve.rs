@@ -66,6 +66,9 @@ const HALVINGS: usize = 8;
 /// The fraction of the round-off that a last correction without an evaluation has to promise.
 const SURE: f64 = 0.03;
 
+/// The error of the laws at an end, in units of their round-off, above which a better end is looked for.
+const HALF: f64 = 0.5;
+
 /// An evaluation with its correction.
 struct Iterate<Y: Metriplectic> {
     k: Unknowns<Y>,
@@ -118,7 +121,7 @@ impl<Y: Metriplectic> StageEquation<'_, Y> {
         let values = self.system.laws(&chart.end);
         let error = self.error(&values, &here.at.sizes);
         // Not so if it is not a number.
-        let conserved = error <= 1.0;
+        let conserved = error <= HALF;
         if !conserved || !values.entropy.is_finite() {
             return None;
         }
@@ -202,7 +205,8 @@ impl<'a, Y: Metriplectic> Iteration<'a, Y> {
         let (mut contraction, mut is_fresh) = (f64::INFINITY, true);
         loop {
             if here.total() <= self.budget.tolerance {
-                return Ok(self.solved(here));
+                let better = if here.at.error > HALF { self.better(&here) } else { None };
+                return Ok(self.solved(better.unwrap_or(here)));
             }
             if contraction * here.total() <= SURE
                 && let Some(End { k, chart, values, error }) = self.equation.last(&here)
@@ -235,6 +239,14 @@ impl<'a, Y: Metriplectic> Iteration<'a, Y> {
                 (contraction, is_fresh) = (f64::INFINITY, true);
             }
         }
+    }
+
+    /// One more correction of a solved step whose end has other laws; `None` if they are not nearer then.
+    fn better(&mut self, here: &Iterate<Y>) -> Option<Iterate<Y>> {
+        self.evaluations += 1;
+        let k = moved(here, 1.0);
+        let at = self.equation.evaluate(&k).filter(|at| at.error < here.at.error)?;
+        self.corrected(k, at)
     }
 
     /// The longest of the corrections `Δ, Δ/2, Δ/4, …` after which the next one is shorter.

@@ -38,6 +38,10 @@ pub(super) fn start_of<'a, Y: Metriplectic>(
 /// The change of the energy at a stage, relative to the size of its terms, that no motion makes.
 const FAR: f64 = 1.0;
 
+/// The error of the laws of a method that damps, in units of their round-off, above which the end is moved onto them.
+/// Near an equilibrium the entropy falls with the energy.
+const DAMPED_LAW: f64 = 0.125;
+
 /// The ratio `R²/(½ (1 − R²))` of a deviation above which it is not damped.
 const DAMPED: f64 = 1.0;
 
@@ -64,9 +68,10 @@ pub(super) fn try_step<Y: Metriplectic>(
         .iter()
         .all(|k| (0..Dim::<Y>::LEN).all(|c| (h * k[c]).abs() <= 2.0 * round_off[c]));
     let rise = if tableau.one_sided { at.growth + at.surplus } else { at.growth };
-    // What is left of a deviation by the ratio R produces R² hλ of what the step has produced, or more.
-    let damped = DAMPED * linear.friction.max(1.0) * (at.growth.abs() + at.surplus)
-        + ROUNDED * at.sizes.entropy;
+    // What is left of a deviation by the ratio R produces R² hλ of what the step has produced, or more. A deviation
+    // that the entropy does not show is round-off.
+    let produced = at.growth.abs() + at.surplus + ROUNDED * at.sizes.entropy;
+    let damped = DAMPED * linear.friction.max(1.0) * produced;
     let evidence = Evidence {
         entropy_slope: at.entropy_slope,
         dissipates: rise.abs() > NOTHING * values.entropy.abs(),
@@ -83,6 +88,7 @@ pub(super) fn try_step<Y: Metriplectic>(
         }
     }
     if rests {
+        memory.last = Some(LastStep { k, filter: *linear.filter() });
         return Ok(Taken { x: x.clone(), values, evidence, effort });
     }
     // A root beyond the chart belongs to another way between the ends.
@@ -106,7 +112,9 @@ pub(super) fn try_step<Y: Metriplectic>(
         }
         None => (end, at.values),
     };
-    if let Some(moved) = corrected(&equation, at.error, &x_end, &values_end) {
+    // What was not taken back counts, as long as that is round-off.
+    let error = if tableau.one_sided { equation.error(&values_end, &at.sizes) } else { at.error };
+    if let Some(moved) = corrected(&equation, error, &x_end, &values_end) {
         values_end = system.laws(&moved);
         x_end = moved;
         memory.compensation.clear();
@@ -122,8 +130,8 @@ pub(super) fn try_step<Y: Metriplectic>(
     Ok(Taken { x: x_end, values: values_end, evidence, effort })
 }
 
-/// The end with the last digits of the laws, where friction is so stiff that the stages have lost them: moved onto the
-/// energy and the further invariants, and onto the entropy if that has fallen. `None` if nothing is lost, or no state
+/// The end with the last digits of the laws, where the stages have lost them, as they do if friction is stiff: moved onto
+/// the energy and the further invariants with its entropy, or that of the start if the entropy has fallen. `None` if nothing is lost, or no state
 /// near by has these laws.
 fn corrected<Y: Metriplectic>(
     equation: &StageEquation<'_, Y>,
@@ -134,7 +142,8 @@ fn corrected<Y: Metriplectic>(
     let StageEquation { system, values: before, drift, .. } = equation;
     let falls = before.entropy - values.entropy > ROUNDED * before.entropy.abs();
     let falls = falls && equation.is_exact() && equation.h > 0.0;
-    if error <= 1.0 && !falls {
+    let most = if equation.tableau.one_sided { DAMPED_LAW } else { 1.0 };
+    if error <= most && !falls {
         return None;
     }
     let laws = Laws {
@@ -142,6 +151,8 @@ fn corrected<Y: Metriplectic>(
         entropy: before.entropy,
         invariants: Dim::<Y>::array(|a| before.invariants[a] - drift.invariants[a]),
     };
-    let on_all = if falls { system.onto(end, &laws, Some(before.entropy)) } else { None };
+    let entropy = if falls { before.entropy } else { values.entropy };
+    let on_all = equation.is_exact().then(|| system.onto(end, &laws, Some(entropy))).flatten();
+    // Near an equilibrium the other laws determine the entropy.
     on_all.or_else(|| system.onto(end, &laws, None))
 }

@@ -1,0 +1,246 @@
+//! A step that is not solved whole, in parts. Both laws hold for each part, and so for the step.
+//!
+//! A Gauss step is split in halves, and these again. A Radau step damps whatever is faster than itself, so only its
+//! start has to be divided: a transient of the rate `λ` is over after a few parts of the size `1/λ`, and then each part
+//! may be as long as all before it. There are about `log₂ hλ` of them.
+
+use metriplectic_dynamics::Metriplectic;
+use metriplectic_fields::{Column, Vector};
+
+use super::PointOf;
+use super::equation::StageEquation;
+use super::fallbacks::StepFailure;
+use super::linear::Linear;
+use super::memory::StageMemory;
+use super::step::try_step;
+use super::tableau::{STAGES, Tableau};
+use crate::method::{Effort, Evidence, Laws, Taken};
+use crate::midpoint::{Dim, Start, dependent_invariant};
+use crate::step_error::StepError;
+use crate::step_failure::{Cause, Fallbacks};
+
+/// The rate `|K'|` times the size of the first part, where friction is stiff.
+const FIRST: f64 = 4.0;
+/// The ratio of a part to the one before it, and to one that was not solved.
+const RATIOS: [f64; 2] = [2.0, 0.25];
+/// Parts of a Radau step that are tried.
+const TRIALS: usize = 400;
+
+/// The step, whole or in parts.
+pub(super) fn take<Y: Metriplectic>(
+    tableau: &'static Tableau,
+    splits: usize,
+    system: &Y,
+    start: &Start<'_, Y>,
+    memory: &mut StageMemory<Dim<Y>>,
+) -> Result<Taken<Y>, StepError> {
+    let failure = match try_step(tableau, system, start, memory, Fallbacks::All) {
+        Ok(taken) => return Ok(taken),
+        Err(failure) => failure,
+    };
+    let kept = *memory;
+    *memory = StageMemory::default();
+    let mut parts = Parts { tableau, splits, system, effort: failure.effort };
+    let taken = if splits == 0 {
+        Err(Failed { failure, x: start.x.clone(), h: start.h })
+    } else if tableau.one_sided {
+        parts.graded(start, memory)
+    } else {
+        parts.halves(start, memory, 1)
+    };
+    match taken {
+        Ok(taken) => {
+            memory.last = None;
+            Ok(Taken { effort: parts.effort, ..taken })
+        }
+        Err(failed) => {
+            *memory = kept;
+            Err(parts.error(start, &failed))
+        }
+    }
+}
+
+/// The parts of a step that was not solved whole.
+struct Parts<'a, Y: Metriplectic> {
+    tableau: &'static Tableau,
+    splits: usize,
+    system: &'a Y,
+    /// What all of the parts took.
+    effort: Effort,
+}
+
+/// A part that was not taken.
+struct Failed<Y: Metriplectic> {
+    failure: StepFailure,
+    /// Where it starts.
+    x: PointOf<Y>,
+    /// Its size.
+    h: f64,
+}
+
+/// The start of a part of this size, after another one.
+fn after<'a, Y: Metriplectic>(start: &Start<'a, Y>, before: &'a Taken<Y>, h: f64) -> Start<'a, Y> {
+    let laws = before.values;
+    let energy = start.accumulated_error.energy + (laws.energy - start.values.energy);
+    let accumulated_error = Laws { energy, ..start.accumulated_error };
+    Start { x: &before.x, h, values: laws, accumulated_error, ..*start }
+}
+
+/// What two parts of a step that damps tell: what the first one has not damped the second one may damp.
+fn together<Y: Metriplectic>(first: &Taken<Y>, second: &Taken<Y>) -> Evidence {
+    let friction = second.evidence.friction;
+    Evidence { friction, ..first.evidence.and(second.evidence) }
+}
+
+impl<Y: Metriplectic> Parts<'_, Y> {
+    /// The two halves of a step that was not solved whole.
+    fn halves(
+        &mut self,
+        start: &Start<'_, Y>,
+        memory: &mut StageMemory<Dim<Y>>,
+        depth: usize,
+    ) -> Result<Taken<Y>, Failed<Y>> {
+        self.effort.splits += 1;
+        let h = 0.5 * start.h;
+        let first = self.half(&Start { h, ..*start }, memory, depth)?;
+        let second = self.half(&after(start, &first, h), memory, depth)?;
+        let evidence = first.evidence.and(second.evidence);
+        Ok(Taken { evidence, ..second })
+    }
+
+    /// One half.
+    fn half(
+        &mut self,
+        start: &Start<'_, Y>,
+        memory: &mut StageMemory<Dim<Y>>,
+        depth: usize,
+    ) -> Result<Taken<Y>, Failed<Y>> {
+        match self.part(start, memory, Fallbacks::FirstTries) {
+            Err(failed) if depth >= self.splits => Err(failed),
+            Err(_) => self.halves(start, memory, depth + 1),
+            taken => taken,
+        }
+    }
+
+    /// The parts of a step that damps, each twice as long as the one before it.
+    fn graded(
+        &mut self,
+        start: &Start<'_, Y>,
+        memory: &mut StageMemory<Dim<Y>>,
+    ) -> Result<Taken<Y>, Failed<Y>> {
+        let least = smallest(1.0, self.splits);
+        let (mut done, mut fraction) = (0.0, self.first_part(start).max(least));
+        // What has to be done before the rest is tried again.
+        let mut enough = 0.0;
+        let mut reached: Option<Taken<Y>> = None;
+        for _ in 0..TRIALS {
+            let rest = 1.0 - done;
+            let is_last = fraction >= rest;
+            let size = start.h * if is_last { rest } else { fraction };
+            self.effort.splits += usize::from(!is_last);
+            let part = match &reached {
+                Some(before) => {
+                    self.part(&after(start, before, size), memory, Fallbacks::FirstTries)
+                }
+                None => self.part(&Start { h: size, ..*start }, memory, Fallbacks::FirstTries),
+            };
+            match part {
+                Ok(next) => {
+                    let evidence =
+                        reached.as_ref().map_or(next.evidence, |before| together(before, &next));
+                    let next = Taken { evidence, ..next };
+                    if is_last {
+                        return Ok(next);
+                    }
+                    (done, fraction) = (done + fraction, fraction * RATIOS[0]);
+                    reached = Some(next);
+                }
+                Err(failed) => {
+                    if done > enough
+                        && let Some(before) = &reached
+                    {
+                        enough = 2.0 * done;
+                        let rest = after(start, before, start.h * rest);
+                        if let Ok(next) = self.part(&rest, memory, Fallbacks::All) {
+                            return Ok(Taken { evidence: together(before, &next), ..next });
+                        }
+                    }
+                    fraction = fraction.min(rest) * RATIOS[1];
+                    if fraction < least {
+                        return Err(failed);
+                    }
+                }
+            }
+        }
+        let (x, h) = (reached.map_or_else(|| start.x.clone(), |part| part.x), start.h * fraction);
+        let failure = StepFailure { cause: Cause::Unsolved, effort: self.effort };
+        Err(Failed { failure, x, h })
+    }
+
+    /// The fraction of a step that the first part is: the time in which friction acts, as a power of two.
+    fn first_part(&self, start: &Start<'_, Y>) -> f64 {
+        let &Start { x, h, values, .. } = start;
+        let equation = StageEquation::new(self.tableau, self.system, x, values, h);
+        let rest = [Vector::<Y::Manifold>::zero(); STAGES];
+        let friction = Linear::of(&equation, &rest).map_or(0.0, |linear| linear.friction);
+        let mut fraction = 0.5;
+        while fraction * friction > FIRST && fraction > f64::MIN_POSITIVE {
+            fraction *= 0.5;
+        }
+        fraction
+    }
+
+    /// One part.
+    fn part(
+        &mut self,
+        start: &Start<'_, Y>,
+        memory: &mut StageMemory<Dim<Y>>,
+        fallbacks: Fallbacks,
+    ) -> Result<Taken<Y>, Failed<Y>> {
+        match try_step(self.tableau, self.system, start, memory, fallbacks) {
+            Ok(taken) => {
+                self.effort += taken.effort;
+                Ok(taken)
+            }
+            Err(failure) => {
+                self.effort += failure.effort;
+                Err(Failed { failure, x: start.x.clone(), h: start.h })
+            }
+        }
+    }
+
+    /// What a user is told of a step that was not solved, by what became of its smallest part.
+    #[cold]
+    fn error(&self, start: &Start<'_, Y>, failed: &Failed<Y>) -> StepError {
+        let &Start { time, h, values, .. } = start;
+        let tried = self.effort;
+        if let Some(error) = failed.failure.cause.first_law(time, h) {
+            return error;
+        }
+        let suggested = smallest(h, self.splits);
+        let part = StageEquation::new(self.tableau, self.system, start.x, values, suggested);
+        let rest = [Vector::<Y::Manifold>::zero(); STAGES];
+        let residual = part.evaluate(&rest).map_or(f64::INFINITY, |at| {
+            at.residual.iter().map(Column::magnitude).fold(0.0, f64::max)
+        });
+        if let Some(linear) = Linear::of(&StageEquation { h: failed.h, ..part }, &rest)
+            && linear.friction > f64::max(1.0, linear.rotation)
+        {
+            let stiffness = linear.friction * (h / failed.h);
+            return StepError::StiffFriction { time, h, stiffness, residual, tried };
+        }
+        match (failed.failure.cause, dependent_invariant(self.system, &failed.x)) {
+            (Cause::Edge, _) => StepError::OutOfDomain { time, h, tried },
+            (_, Some((index, fraction))) => {
+                let change = start.accumulated_error.invariants[index].abs();
+                StepError::DependentInvariants { time, index, change, fraction }
+            }
+            _ => StepError::NotConverged { time, h, residual, tried, suggested },
+        }
+    }
+}
+
+/// The size of the smallest part of a step that was split so many times.
+fn smallest(h: f64, splits: usize) -> f64 {
+    (0..splits).fold(h, |part, _| 0.5 * part)
+}

@@ -93,6 +93,10 @@ instructions *flags:
 peers *options:
     cd benches/peers && cargo run --release --bin peers -- {{ justfile_directory() }}/docs/gallery/peers.svg {{ options }}
 
+# draw work against precision on six problems, for the book, and print its table
+precision:
+    cd benches/peers && cargo run --release --bin peers -- {{ justfile_directory() }}/book/src/precision.svg --precision
+
 # check every combination of features
 features: (need "cargo hack --version" "cargo install cargo-hack --locked")
     cargo hack check --workspace --feature-powerset

@@ -4,6 +4,7 @@
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 pub mod exact;
+pub mod more;
 pub mod ours;
 pub mod rivals;
 

@@ -6,7 +6,9 @@
 use std::{env, error::Error, time::Instant};
 
 use metriplectic_peers::{
-    Gas, Problem, RelaxingBody, SpinningTop, exact, norm,
+    Gas, Problem, RelaxingBody, SpinningTop, exact,
+    more::{HeavyTop, WarmOscillator},
+    norm,
     ours::{How, Ours, Ran},
     rivals::{self, Path, Solver},
 };
@@ -54,6 +56,7 @@ struct Entry {
 /// All runs of a problem over a time.
 struct Comparison {
     problem: String,
+    dimension: usize,
     time: u32,
     entries: Vec<Entry>,
 }
@@ -194,7 +197,8 @@ impl Comparison {
         eprintln!("{}, T = {time}", problem.name());
         let mut entries = Vec::new();
         compare(problem, time, &mut entries);
-        Self { problem: problem.name(), time, entries }
+        let dimension = N - usize::from(problem.on_sphere());
+        Self { problem: problem.name(), dimension, time, entries }
     }
 
     fn table(&self, all: bool) -> Table<10> {
@@ -241,15 +245,28 @@ impl Comparison {
         table
     }
 
-    /// The methods but those with stages, each once.
-    fn methods(&self) -> Vec<&'static str> {
+    /// The methods, each once.
+    fn every_method(&self) -> Vec<&'static str> {
         let mut methods: Vec<&str> = Vec::new();
         for entry in &self.entries {
-            if !methods.contains(&entry.method) && !GAUSS.contains(&entry.method) {
+            if !methods.contains(&entry.method) {
                 methods.push(entry.method);
             }
         }
         methods
+    }
+
+    /// The methods but those with stages, each once.
+    fn methods(&self) -> Vec<&'static str> {
+        let every = self.every_method().into_iter();
+        every.filter(|method| !GAUSS.contains(method)).collect()
+    }
+
+    /// The evaluations of a run in units of a velocity: our differentials take a call for each pair of entries.
+    fn velocities(&self, method: &str, outcome: &Outcome) -> f64 {
+        let is_ours = [OURS, EIGHT, FIVE].contains(&method) || GAUSS.contains(&method);
+        let calls = if is_ours { self.dimension.div_ceil(2) } else { 1 };
+        outcome.evaluations as f64 / calls as f64
     }
 
     fn outcomes(&self, method: &str) -> impl Iterator<Item = &Outcome> {
@@ -329,10 +346,70 @@ fn with_stages(all: &[Comparison]) -> Table<7> {
     table
 }
 
+/// The methods in the figure of work against precision, and what they are called there.
+const DRAWN: [(&str, &str); 7] = [
+    (OURS, "WeylMidpoint"),
+    (EIGHT, EIGHT),
+    (FIVE, FIVE),
+    (GAUSS[0], GAUSS[0]),
+    (GAUSS[2], GAUSS[2]),
+    ("the same, projected", "DOP853, projected onto H"),
+    ("ode_solvers", "DOP853"),
+];
+
+/// Draws the error at `T = 100` over the evaluations, of every method on six problems.
+fn precision(path: &str) -> Result<(), Box<dyn Error>> {
+    let time = TIMES[0];
+    let all = [
+        Comparison::of(&RelaxingBody, time),
+        Comparison::of(&SpinningTop, time),
+        Comparison::of(&HeavyTop, time),
+        Comparison::of(&Gas { alpha: 1e-3 }, time),
+        Comparison::of(&Gas { alpha: 0.5 }, time),
+        Comparison::of(&WarmOscillator, time),
+    ];
+    let mut figure = Panels::new("Work and precision at T = 100").columns(3);
+    for comparison in &all {
+        let mut panel = Panel::new(comparison.problem.clone(), "log₁₀ of the evaluations");
+        panel = panel.logarithmic(1e-16);
+        for (method, label) in DRAWN {
+            let mut points: Vec<(f64, f64)> = comparison
+                .outcomes(method)
+                .map(|o| (comparison.velocities(method, o).log10(), o.error))
+                .filter(|(_, error)| error.is_finite())
+                .collect();
+            points.sort_by(|a, b| a.0.total_cmp(&b.0));
+            panel = panel.line(label, points);
+        }
+        figure = figure.panel(panel);
+    }
+    figure.save(path)?;
+    eprintln!("figure: {path}");
+    let mut header = vec!["problem", "error below"];
+    header.extend(all[0].every_method());
+    let mut table = Table::<12>::new(std::array::from_fn(|i| header[i].to_owned()));
+    for comparison in &all {
+        for error in [1e-2, 1e-4, 1e-8] {
+            let mut row = vec![comparison.problem.clone(), format!("{error:.0e}")];
+            row.extend(comparison.every_method().into_iter().map(|method| {
+                let near = comparison.outcomes(method).filter(|o| o.error <= error);
+                let least = near.map(|o| comparison.velocities(method, o)).reduce(f64::min);
+                least.map_or("–".into(), |least| format!("{least:.0}"))
+            }));
+            table.row(std::array::from_fn(|i| row[i].clone()));
+        }
+    }
+    println!("Evaluations of the velocity to an error at T = {time}:\n\n{}", table.markdown());
+    Ok(())
+}
+
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = env::args().skip(1).collect();
     let every = arguments.iter().any(|argument| argument == "--all");
     let path = arguments.iter().find(|argument| !argument.starts_with("--"));
+    if arguments.iter().any(|argument| argument == "--precision") {
+        return precision(path.ok_or("where does the figure go?")?);
+    }
     let mut all = Vec::new();
     for time in TIMES {
         all.push(Comparison::of(&RelaxingBody, time));

@@ -57,7 +57,7 @@ pub trait Ours<const N: usize>: crate::Problem<N> {
     fn run(&self, how: How) -> Result<Ran<N>, String>;
 }
 
-fn ran<Y: Metriplectic, const N: usize>(
+pub(crate) fn ran<Y: Metriplectic, const N: usize>(
     system: &Y,
     start: Point<Y>,
     how: How,

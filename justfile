@@ -69,6 +69,7 @@ mutants shard="0/256": (need "cargo mutants --version" "cargo install cargo-muta
     cargo mutants --package metriplectic-integrators --package metriplectic-dynamics \
         --shard {{ shard }} --sharding round-robin --all-features --output target --timeout 300 \
         --test-package metriplectic --exclude-re 'impl (fmt::)?(Debug|Display)' \
+        --cargo-arg=--package=metriplectic \
         --cargo-arg=--test=mutations --cargo-arg=--test=conservation \
         --cargo-arg=--test=explicit --cargo-arg=--test=collocation
 

@@ -13,8 +13,8 @@ use std::error::Error;
 
 use metriplectic::integrators::Flow;
 use metriplectic::prelude::*;
+use metriplectic_peers::rivals;
 use metriplectic_studies::Table;
-use ode_solvers::dop_shared::OutputType;
 use ode_solvers_nalgebra::DVector;
 
 use model::{chain, waves};
@@ -110,111 +110,90 @@ fn processor_seconds() -> Result<f64, Box<dyn Error>> {
     Ok(nanoseconds * 1e-9)
 }
 
-/// This library's method.
-fn ours<L, M>(
-    name: &'static str,
-    method: M,
-    lattice: &L,
-    start: &Points<Euclidean<3>>,
-    exact: &[f64],
-    exponent: i32,
-) -> Result<Outcome, Box<dyn Error>>
-where
-    L: Flow<Space = metriplectic::lattices::Sites<Euclidean<3>>>,
-    M: Method<L> + Copy,
-{
-    let mut best: Option<Outcome> = None;
-    for _ in 0..REPEATS {
-        let span = Span::until(END).tolerance(tolerance(exponent));
-        let mut steps = method.steps(lattice, start.clone(), span)?;
-        // The model is verified before.
-        let clock = processor_seconds()?;
-        while steps.ending().is_none() {
-            steps.advance()?;
-        }
-        let seconds = processor_seconds()? - clock;
-        let certificate = steps.certificate();
-        let next = Outcome {
-            method: name,
-            exponent,
-            steps: certificate.steps,
-            seconds,
-            error: distance(flat(&steps.state().point), exact),
-            energy_error: certificate.max_relative_energy_error(),
-            least: certificate.min_entropy_increment,
-            falls: certificate.entropy_falls,
-        };
-        best = best.filter(|best| best.seconds <= seconds).or(Some(next));
-    }
-    best.ok_or_else(|| "no run".into())
+/// A chain, where it starts, and where it ends.
+struct Case<'a, L> {
+    lattice: &'a L,
+    start: &'a Points<Euclidean<3>>,
+    exact: &'a [f64],
 }
 
-/// DOP853 of `ode_solvers`, whose laws are looked at after the clock has stopped.
-fn dop853<L>(
-    lattice: &L,
-    start: &Points<Euclidean<3>>,
-    exact: &[f64],
-    exponent: i32,
-) -> Result<Outcome, Box<dyn Error>>
-where
-    L: Flow<Space = metriplectic::lattices::Sites<Euclidean<3>>>,
-{
-    let scratch = RefCell::new(vec![[0.0; 3]; SITES]);
-    let mut best: Option<(f64, Vec<DVector<f64>>)> = None;
-    for _ in 0..REPEATS {
-        let from = DVector::from_iterator(3 * SITES, flat(start));
-        let tolerance = tolerance(exponent);
-        let mut solver = ode_solvers::Dop853::from_param(
-            ByHand(&scratch),
-            0.0,
-            END,
-            0.0,
-            from,
-            tolerance,
-            tolerance,
-            0.9,
-            0.0,
-            0.333,
-            6.0,
-            END,
-            0.0,
-            u32::MAX,
-            1000,
-            OutputType::Sparse,
-        );
-        let clock = processor_seconds()?;
-        solver.integrate()?;
-        let seconds = processor_seconds()? - clock;
-        if best.as_ref().is_none_or(|(least, _)| seconds < *least) {
-            best = Some((seconds, solver.y_out().clone()));
+impl<L: Flow<Space = metriplectic::lattices::Sites<Euclidean<3>>>> Case<'_, L> {
+    /// A method of this library, at the tolerance `10^{-exponent}`.
+    fn ours<M: Method<L> + Copy>(
+        &self,
+        name: &'static str,
+        method: M,
+        exponent: i32,
+    ) -> Result<Outcome, Box<dyn Error>> {
+        let Self { lattice, start, exact } = *self;
+        let mut best: Option<Outcome> = None;
+        for _ in 0..REPEATS {
+            let span = Span::until(END).tolerance(tolerance(exponent));
+            let mut steps = method.steps(lattice, start.clone(), span)?;
+            // The model is verified before.
+            let clock = processor_seconds()?;
+            while steps.ending().is_none() {
+                steps.advance()?;
+            }
+            let seconds = processor_seconds()? - clock;
+            let certificate = steps.certificate();
+            let next = Outcome {
+                method: name,
+                exponent,
+                steps: certificate.steps,
+                seconds,
+                error: distance(flat(&steps.state().point), exact),
+                energy_error: certificate.max_relative_energy_error(),
+                least: certificate.min_entropy_increment,
+                falls: certificate.entropy_falls,
+            };
+            best = best.filter(|best| best.seconds <= seconds).or(Some(next));
         }
+        best.ok_or_else(|| "no run".into())
     }
-    let (seconds, path) = best.ok_or("no run")?;
-    let laws: Vec<_> = path
-        .iter()
-        .map(|x| {
-            let sites = x.as_slice().chunks_exact(3).map(|x| vector![x[0], x[1], x[2]]);
-            let point = Points::from(sites.collect::<Vec<_>>());
-            let metriplectic::integrators::Laws { energy, entropy, .. } = lattice.laws(&point);
-            At { energy, entropy, size: lattice.term_sizes(&point).entropy }
+
+    /// DOP853 of `ode_solvers`, whose laws are looked at after the clock has stopped.
+    fn dop853(&self, exponent: i32) -> Result<Outcome, Box<dyn Error>> {
+        let Self { lattice, start, exact } = *self;
+        let scratch = RefCell::new(vec![[0.0; 3]; SITES]);
+        let mut best: Option<(f64, Vec<DVector<f64>>)> = None;
+        for _ in 0..REPEATS {
+            let from = DVector::from_iterator(3 * SITES, flat(start));
+            let mut solver = rivals::dop853(ByHand(&scratch), from, END, tolerance(exponent));
+            let clock = processor_seconds()?;
+            solver.integrate()?;
+            let seconds = processor_seconds()? - clock;
+            if best.as_ref().is_none_or(|(least, _)| seconds < *least) {
+                best = Some((seconds, solver.y_out().clone()));
+            }
+        }
+        let (seconds, path) = best.ok_or("no run")?;
+        let laws: Vec<_> = path
+            .iter()
+            .map(|x| {
+                let sites = x.as_slice().chunks_exact(3).map(|x| vector![x[0], x[1], x[2]]);
+                let point = Points::from(sites.collect::<Vec<_>>());
+                let metriplectic::integrators::Laws { energy, entropy, .. } = lattice.laws(&point);
+                At { energy, entropy, size: lattice.term_sizes(&point).entropy }
+            })
+            .collect();
+        let energy = laws[0].energy;
+        let off = |at: &At| ((at.energy - energy) / energy).abs();
+        let rises = || {
+            laws.windows(2)
+                .map(|pair| Rise { by: pair[1].entropy - pair[0].entropy, size: pair[1].size })
+        };
+        Ok(Outcome {
+            method: METHODS[2],
+            exponent,
+            steps: path.len() - 1,
+            seconds,
+            error: distance(path[path.len() - 1].iter().copied(), exact),
+            energy_error: laws.iter().map(off).fold(0.0, f64::max),
+            least: rises().map(|rise| rise.by).fold(f64::INFINITY, f64::min),
+            falls: rises().filter(|rise| rise.by < -4.0 * f64::EPSILON * rise.size).count(),
         })
-        .collect();
-    let energy = laws[0].energy;
-    let off = |at: &At| ((at.energy - energy) / energy).abs();
-    let rises = || {
-        laws.windows(2)
-            .map(|pair| Rise { by: pair[1].entropy - pair[0].entropy, size: pair[1].size })
-    };
-    Ok(Outcome {
-        method: METHODS[2],
-        exponent,
-        steps: path.len() - 1,
-        seconds,
-        error: distance(path[path.len() - 1].iter().copied(), exact),
-        energy_error: laws.iter().map(off).fold(0.0, f64::max),
-        least: rises().map(|rise| rise.by).fold(f64::INFINITY, f64::min),
-        falls: rises().filter(|rise| rise.by < -4.0 * f64::EPSILON * rise.size).count(),
-    })
+    }
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -228,12 +207,13 @@ fn main() -> Result<(), Box<dyn Error>> {
     let exact = reference(3e-15)?;
     let off = distance(reference(3e-14)?.into_iter(), &exact);
     println!("the exact solution is known to {off:.0e}, H₀ = {}", lattice.laws(&start).energy);
+    let case = Case { lattice: &lattice, start: &start, exact: &exact };
     let mut outcomes = Vec::new();
     for exponent in TOLERANCES {
         let [five, eight, _] = METHODS;
-        outcomes.push(ours(five, DormandPrince5, &lattice, &start, &exact, exponent)?);
-        outcomes.push(ours(eight, DormandPrince8, &lattice, &start, &exact, exponent)?);
-        outcomes.push(dop853(&lattice, &start, &exact, exponent)?);
+        outcomes.push(case.ours(five, DormandPrince5, exponent)?);
+        outcomes.push(case.ours(eight, DormandPrince8, exponent)?);
+        outcomes.push(case.dop853(exponent)?);
     }
     let mut table = Table::new([
         "method",

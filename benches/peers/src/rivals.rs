@@ -9,7 +9,8 @@ use differential_equations::{
     status::Status,
 };
 use diffsol::{NalgebraMat, OdeBuilder, OdeSolverMethod, OdeSolverStopReason};
-use ode_solvers_nalgebra::SVector;
+use ode_solvers_nalgebra::allocator::Allocator;
+use ode_solvers_nalgebra::{DefaultAllocator, Dim, OVector, SVector};
 
 use crate::Problem;
 
@@ -47,17 +48,19 @@ impl<P: Problem<N>, const N: usize> ODE<f64, [f64; N]> for Counted<'_, P> {
     }
 }
 
-/// DOP853 of the crate `ode_solvers`; both tolerances alike, no dense output.
-pub fn ode_solvers<P: Problem<N>, const N: usize>(
-    problem: &P,
+/// DOP853 of the crate `ode_solvers` from `start` at time 0; both tolerances alike, no dense output.
+pub fn dop853<D: Dim, F>(
+    system: F,
+    start: OVector<f64, D>,
     time: f64,
     tolerance: f64,
-) -> Path<N> {
-    let count = Cell::new(0);
-    let start = SVector::from(problem.start());
-    let system = Counted { problem, count: &count };
+) -> ode_solvers::Dop853<f64, OVector<f64, D>, F>
+where
+    F: ode_solvers::System<f64, OVector<f64, D>>,
+    DefaultAllocator: Allocator<D>,
+{
     // Safety factor, β, the bounds of the step's change, and the stiffness test are the defaults.
-    let mut solver = ode_solvers::Dop853::from_param(
+    ode_solvers::Dop853::from_param(
         system,
         0.0,
         time,
@@ -74,7 +77,18 @@ pub fn ode_solvers<P: Problem<N>, const N: usize>(
         u32::MAX,
         1000,
         ode_solvers::dop_shared::OutputType::Sparse,
-    );
+    )
+}
+
+/// The same for a problem, with its path.
+pub fn ode_solvers<P: Problem<N>, const N: usize>(
+    problem: &P,
+    time: f64,
+    tolerance: f64,
+) -> Path<N> {
+    let count = Cell::new(0);
+    let system = Counted { problem, count: &count };
+    let mut solver = dop853(system, SVector::from(problem.start()), time, tolerance);
     solver.integrate().map_err(|error| error.to_string())?;
     Ok((solver.y_out().iter().map(|x| x.data.0[0]).collect(), count.get()))
 }

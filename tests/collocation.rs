@@ -12,7 +12,7 @@ mod models;
 #[path = "models/stages.rs"]
 mod stages;
 
-use models::{Globe, distance, gas, relaxing_body, slope, top};
+use models::{Globe, distance, gas, half_square, relaxing_body, slope, top};
 use stages::*;
 
 const GAS: Vector4<f64> = Vector4::new(1.0, 2.0, 2.0, 2.0);
@@ -62,6 +62,10 @@ fn orders<Y: Metriplectic>(
         println!("{name}, {method:?}: {fitted:.2} from {errors:?}, {per_step:.1} residuals");
         assert!(fitted >= order - 0.3, "{name}, {method:?}: {fitted:.2} from {errors:?}");
     }
+}
+
+fn order_of<Y: Metriplectic>(_: &Y, method: Stages) -> u32 {
+    Method::<Y>::order(&method)
 }
 
 fn spin() -> impl Metriplectic<Manifold = Sphere<2>, Metric = Canonical> {
@@ -126,6 +130,57 @@ fn orders_on_spheres_and_products_with_them() {
     );
     orders("S² × R", &warm_spin(1.0), &WARM, 6.0, ([64, 48, 40, 30], [48, 48, 28]));
     orders("SO(3)", &rotations(), &turned(), 0.4, ([32, 32, 16, 16], [32, 16, 16]));
+}
+
+/// The sign of `⟨dH, dS⟩` is that of the temperature, and it changes as this spin turns.
+#[test]
+fn orders_through_infinite_temperatures() {
+    let spin = System::on(LieDual::so3())
+        .energy(|p: &Vector3<Real>| p.z + p.x * p.x * 0.5)
+        .entropy(half_square)
+        .dissipation(MetricDissipation::scaled(|_: &Vector3<Real>| Real::from(0.05)))
+        .build()
+        .expect("it is a system");
+    let x0 = vector![0.3, 0.2, -0.05];
+    let run = kept("spin", Radau3, &spin, &x0, Span::until(6.0).tolerance(1e-6));
+    let inverse_temperatures = run.iter().map(|state| state.point.z + state.point.x.powi(2));
+    let changes = inverse_temperatures.map(f64::signum).collect::<Vec<_>>();
+    assert!(changes.windows(2).filter(|pair| pair[0] != pair[1]).count() >= 2, "{changes:?}");
+    // Where a step goes from one side far to the other, it is taken in parts, which are no less accurate.
+    let fine = Span::until(6.0).tolerance(1e-14).at_most(2);
+    let exact = DormandPrince8.run(&spin, x0, fine).expect("it runs").last().point;
+    for (method, coarsest) in RADAU.into_iter().zip([64, 72, 32]) {
+        let counts = [4, 5, 6, 8, 10].map(|k| k * coarsest / 4);
+        let errors = counts.map(|n| {
+            let run = kept("spin", method, &spin, &x0, Span::steps(6.0 / n as f64, n));
+            (run.last().point - exact).norm()
+        });
+        let fitted = slope(&counts.map(|n| 6.0 / n as f64), &errors, ROUND_OFF);
+        println!("spin, {method:?}: {fitted:.2} from {errors:?}");
+        let order = f64::from(order_of(&spin, method));
+        assert!(fitted >= order - 0.3, "{method:?}: {fitted:.2} from {errors:?}");
+    }
+}
+
+/// A pendulum beside a bath that it does not heat.
+#[test]
+fn orders_without_friction_where_the_entropy_is_constant() {
+    let pendulum = System::on(Euclidean::<3>)
+        .bracket(
+            Poisson::constant(Matrix3::new(0., 1., 0., -1., 0., 0., 0., 0., 0.)).expect("skew"),
+        )
+        .energy(|x: &Vector3<Real>| x.y * x.y * 0.5 - x.x.cos() + x.z.exp())
+        .entropy(|x: &Vector3<Real>| x.z)
+        .dissipation(MetricDissipation::scaled(|_: &Vector3<Real>| Real::from(0.0)))
+        .build()
+        .expect("it is a system");
+    let x0 = vector![2.0, 0.25, 0.125];
+    orders("pendulum", &pendulum, &x0, 4.0, ([48, 32, 20, 16], [32, 20, 16]));
+    for method in RADAU {
+        let run = kept("pendulum", method, &pendulum, &x0, Span::until(4.0).tolerance(1e-5));
+        let off = run.iter().map(|state| (state.entropy - 0.125).abs()).fold(0.0, f64::max);
+        assert!(off <= f64::EPSILON, "{method:?}: {off:e}");
+    }
 }
 
 #[test]

@@ -5,6 +5,11 @@ use metriplectic::integrators::{RunError, Schedule, StepError};
 use metriplectic::manifolds::Constant;
 use metriplectic::prelude::*;
 
+#[path = "models/stages.rs"]
+mod stages;
+
+use stages::{Gauss2, Radau3};
+
 /// A problem on Rⁿ that can be written in any units, one for each entry.
 struct Problem<const N: usize> {
     name: &'static str,
@@ -84,6 +89,8 @@ impl<const N: usize> Problem<N> {
                 laws::scaling(&Scheme::new(WeylMidpoint), &run, &twin, &factors, tolerance),
                 laws::scaling(&DormandPrince8, &run, &twin, &factors, tolerance),
                 laws::scaling(&DormandPrince5, &run, &twin, &factors, tolerance),
+                laws::scaling(&Gauss2, &run, &twin, &factors, tolerance),
+                laws::scaling(&Radau3, &run, &twin, &factors, tolerance),
             ];
             for law in laws {
                 law.unwrap_or_else(|law| panic!("{}: {law}", self.name));
@@ -616,6 +623,8 @@ fn curved<Y: Metriplectic>(
         let laws = [
             laws::scaling(&Scheme::new(WeylMidpoint), &run, &twin, &factors, 0.0),
             laws::scaling(&DormandPrince8, &run, &twin, &factors, 0.0),
+            laws::scaling(&Gauss2, &run, &twin, &factors, 0.0),
+            laws::scaling(&Radau3, &run, &twin, &factors, 0.0),
         ];
         for law in laws {
             law.unwrap_or_else(|law| panic!("{name}, {units:?}: {law}"));

@@ -86,6 +86,8 @@ pub(super) struct Evaluated<Y: Metriplectic> {
     pub(super) sizes: Laws<Numbers<Y>>,
     /// The round-off of the covectors of the energy.
     pub(super) noise: Vector<Y::Manifold>,
+    /// The round-off of the displacement by heat; an entry that heat alone moves has no other.
+    pub(super) heat_rounding: Vector<Y::Manifold>,
     /// The least `|w_S|` of a stage; infinite if the entropy is not corrected.
     pub(super) entropy_slope: f64,
     /// What friction adds to the entropy.
@@ -166,15 +168,22 @@ impl<'a, Y: Metriplectic> StageEquation<'a, Y> {
         let stages = StagePoints::of(system.metric(), &polynomial, inside)?;
         let mut w = self.covectors(&stages, &polynomial);
         let (mut heat, mut surplus, mut left) = (None, 0.0, f64::INFINITY);
+        let mut heat_rounding = Vector::<Y::Manifold>::zero();
         if let Some(start) = &self.heats {
+            let friction = |i: usize| {
+                let at = ChartPoint::<Y::Manifold>::centre(&stages.x[i]);
+                irreversible(system, &system.metric_at(&at), &at_stage::<Y>(&w, i)).ok()
+            };
             let last = tableau.stages - 1;
-            let (at, plain) = (&stages.x[last], at_stage::<Y>(&w, last));
-            let at = ChartPoint::centre(at);
-            let friction = irreversible(system, &system.metric_at(&at), &plain).ok()?;
-            left = h.abs() * plain.entropy.dot(&friction);
-            let step = heat::Step { system, tableau, chart: &chart, h, x, start };
+            let at_last = friction(last)?;
+            left = h.abs() * w.entropy.w[last].dot(&at_last);
+            let vanishes = |v: Vector<Y::Manifold>| v.magnitude() == 0.0;
+            let is_reversible =
+                vanishes(at_last) && (0..last).all(|i| friction(i).is_some_and(vanishes));
+            let step = heat::Step { system, tableau, chart: &chart, h, x, start, is_reversible };
             let added = heat::add(&step, &stages, &mut w)?;
             (heat, surplus) = (Some(added.velocity), added.gain.max(0.0));
+            heat_rounding = added.rounding;
         }
         let mut residual = [Vector::<Y::Manifold>::zero(); STAGES];
         let mut work = Work::<Dim<Y>>::default();
@@ -229,6 +238,7 @@ impl<'a, Y: Metriplectic> StageEquation<'a, Y> {
             error,
             sizes,
             noise: w.energy.noise,
+            heat_rounding,
             entropy_slope: if self.is_exact() { entropy_slope } else { f64::INFINITY },
             growth: production,
             surplus,

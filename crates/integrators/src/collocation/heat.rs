@@ -21,6 +21,9 @@
 //! Near an equilibrium `dS = β dH`, and with `τ = 1` the number `N = δ_S − β δ_H` is the gain of `S − βH`, which has a
 //! maximum there: it is not negative, and nothing is corrected.
 //!
+//! At an infinite temperature `⟨dH, ♯n⟩` changes its sign and `u` has no direction: near it `τ` is reduced to zero. Where
+//! friction vanishes at every stage nothing is damped, and the entropy is corrected in both directions.
+//!
 //! `u` is a choice: where an unresolved transient loses energy, the laws do not say which variable warms.
 
 use metriplectic_dynamics::orthogonal::Orthogonal;
@@ -42,17 +45,30 @@ pub(super) struct Heat<V> {
     pub(super) velocity: Stages<V>,
     /// The number `N`, the gain of the entropy beside the production of friction.
     pub(super) gain: f64,
+    /// The displacement by the heat that is the round-off of the energy, the largest over the stages.
+    pub(super) rounding: V,
 }
 
-/// The fraction of its terms that is left of `⟨dH, ♯n⟩` where heat has a direction.
-const DIRECTED: f64 = 1e-3;
+/// Where heat is to go at a point: along the part of `dS` that is orthogonal to the invariants.
+struct Direction<V> {
+    /// The vector `♯n`.
+    sharp: V,
+    /// The change `⟨dH, ♯n⟩` of the energy along it in units of its terms, between −1 and 1; its sign is that of the
+    /// temperature.
+    alignment: f64,
+}
 
-/// The vector `♯n` at a point; `None` where it does not change the energy.
+/// The alignment up to which there is no heat: at an infinite temperature the entropy does not change the energy.
+const FAINT: f64 = 0.01;
+/// The alignment from which on all that friction has lost becomes heat.
+const CLEAR: f64 = 0.1;
+
+/// The direction of heat at a point; `None` where there is no metric.
 fn direction<Y: Metriplectic>(
     system: &Y,
     x: &Point<Y>,
     w: &Covectors<Dim<Y>, Vector<Y::Manifold>>,
-) -> Option<Vector<Y::Manifold>> {
+) -> Option<Direction<Vector<Y::Manifold>>> {
     let g = system.metric().at(&ChartPoint::<Y::Manifold>::centre(x)).ok()?;
     let mut normals = Orthogonal::<Dim<Y>>::default();
     for (_, l) in w.invariants.as_ref().iter().flatten() {
@@ -61,8 +77,8 @@ fn direction<Y: Metriplectic>(
     let sharp = g.sharp(&normals.project_covector(0, &w.entropy));
     let warmed = w.energy.dot(&sharp);
     let terms = Y::Manifold::pairing_size(&w.energy, &sharp);
-    let is_directed = warmed.abs() >= DIRECTED * terms && terms > 0.0 && warmed.is_finite();
-    is_directed.then(|| sharp * warmed.recip())
+    let alignment = if terms > 0.0 { warmed / terms } else { 0.0 };
+    alignment.is_finite().then_some(Direction { sharp, alignment })
 }
 
 /// Where a step that heats starts.
@@ -70,8 +86,19 @@ fn direction<Y: Metriplectic>(
 pub(super) struct HeatStart<V> {
     /// The differential of the energy.
     energy: V,
-    /// The inverse temperature `⟨dS, u⟩ = |n|²/⟨dH, ♯n⟩`.
-    coldness: f64,
+    /// The alignment of the direction of heat.
+    alignment: f64,
+}
+
+impl<V> HeatStart<V> {
+    /// The fraction of the heat that goes in a direction of a stage; `None` beyond a temperature of zero, where no
+    /// motion leads: such a root belongs to another branch of the entropy. At an infinite temperature the direction
+    /// turns, and there is no heat.
+    fn fraction(&self, alignment: f64) -> Option<f64> {
+        let along = alignment * self.alignment.signum();
+        let fraction = (along - FAINT) / (CLEAR - FAINT);
+        (along > -CLEAR).then(|| fraction.clamp(0.0, 1.0))
+    }
 }
 
 /// The start of a step at a point; `None` where heat has no direction there.
@@ -80,8 +107,9 @@ pub(super) fn start<Y: Metriplectic>(
     x: &Point<Y>,
     w: &Covectors<Dim<Y>, Vector<Y::Manifold>>,
 ) -> Option<HeatStart<Vector<Y::Manifold>>> {
-    let u = direction(system, x, w)?;
-    Some(HeatStart { energy: w.energy, coldness: w.entropy.dot(&u) })
+    let Direction { alignment, .. } = direction(system, x, w)?;
+    let start = HeatStart { energy: w.energy, alignment };
+    (alignment.abs() > FAINT).then_some(start)
 }
 
 /// A step that heats.
@@ -93,44 +121,55 @@ pub(super) struct Step<'a, Y: Metriplectic> {
     pub(super) h: f64,
     pub(super) x: &'a Point<Y>,
     pub(super) start: &'a HeatStart<Vector<Y::Manifold>>,
+    /// Whether friction vanishes at every stage: then nothing is damped, and both laws are corrected.
+    pub(super) is_reversible: bool,
 }
 
-/// Corrects the covectors of energy and entropy with heat; `None` where heat has no direction, or a stage has a
-/// temperature of the other sign.
+/// Corrects the covectors of energy and entropy with heat; `None` where a stage is beyond a temperature of zero.
 pub(super) fn add<Y: Metriplectic>(
     step: &Step<'_, Y>,
     stages: &StagePoints<Y::Manifold>,
     w: &mut StageCovectorsOf<Y>,
 ) -> Option<Heat<Vector<Y::Manifold>>> {
     let &Step { system, tableau, h, .. } = step;
-    let transient = transient(step, stages, w)?;
+    let zero = Vector::<Y::Manifold>::zero();
+    let (mut sharp, mut directed) = ([zero; STAGES], 1.0_f64);
+    for i in 0..tableau.stages {
+        let at = direction(system, &stages.x[i], &at_stage::<Y>(w, i))?;
+        directed = directed.min(step.start.fraction(at.alignment)?);
+        sharp[i] = at.sharp;
+    }
+    let lost = if step.is_reversible { 0.0 } else { directed * transient(step, stages, w)? };
     let (delta, square) = (w.energy.left, stages.square());
     if square != 0.0 {
         for i in 0..tableau.stages {
-            w.energy.w[i] += stages.flat(i) * ((1.0 - transient) * delta / square);
+            w.energy.w[i] += stages.flat(i) * ((1.0 - lost) * delta / square);
         }
     }
-    let rho = -transient * delta / h;
-    let mut velocity = [Vector::<Y::Manifold>::zero(); STAGES];
+    let rho = -lost * delta / h;
+    let [mut velocity, mut rounding] = [[zero; STAGES], [zero; STAGES]];
     let (mut gain, mut along) = (w.entropy.left, 0.0);
-    for i in 0..tableau.stages {
-        let u = direction(system, &stages.x[i], &at_stage::<Y>(w, i))?;
-        // Beyond an infinite temperature no motion leads: such a root belongs to another branch of the entropy.
-        if (w.entropy.w[i].dot(&u) > 0.0) != (step.start.coldness > 0.0) {
-            return None;
+    if directed > 0.0 {
+        for i in 0..tableau.stages {
+            let u = sharp[i] * w.energy.w[i].dot(&sharp[i]).recip();
+            velocity[i] = u * rho;
+            rounding[i] = u.abs() * (f64::EPSILON * w.energy.size);
+            let weight = h * tableau.weights[i];
+            gain += weight * w.entropy.w[i].dot(&velocity[i]);
+            along += weight * stages.flat(i).dot(&velocity[i]);
         }
-        velocity[i] = u * rho;
-        let weight = h * tableau.weights[i];
-        gain += weight * w.entropy.w[i].dot(&velocity[i]);
-        along += weight * stages.flat(i).dot(&velocity[i]);
     }
     let square = square - along;
-    if gain < 0.0 && square != 0.0 {
+    if (gain < 0.0 || step.is_reversible) && square != 0.0 {
         for i in 0..tableau.stages {
             w.entropy.w[i] += stages.flat(i) * (gain / square);
         }
     }
-    Some(Heat { velocity, gain })
+    let gain = if step.is_reversible { 0.0 } else { gain };
+    let rounding = Vector::<Y::Manifold>::from_index(|c| {
+        rounding.iter().fold(0.0, |largest, rounding| f64::max(largest, rounding[c]))
+    });
+    Some(Heat { velocity, gain, rounding })
 }
 
 /// The fraction `τ` of what is lost that becomes heat: what the energy loses is a quadratic form of the variations of

@@ -125,7 +125,8 @@ impl<N: Dimension> Linear<N> {
         for k in &k[..self.tableau.stages] {
             largest = N::Vector::<f64>::from_index(|c| largest[c].max((self.h * k[c]).abs()));
         }
-        let first = self.terms + self.sensitivity.abs() * at.noise + self.moved;
+        let heat = self.inverse.abs() * at.heat_rounding;
+        let first = self.terms + self.sensitivity.abs() * at.noise + self.moved + heat;
         (first + largest * f64::EPSILON) * MARGIN
     }
 

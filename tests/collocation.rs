@@ -425,3 +425,23 @@ fn adaptive_runs_have_what_every_run_has() {
     assert_eq!(resumed.last(), whole.last());
     assert_eq!(resumed.certificate(), whole.certificate());
 }
+
+/// The same motion in a chart of the sphere and in the space around it.
+#[test]
+fn a_tolerance_asks_for_as_many_steps_on_a_sphere_as_around_it() {
+    let around = System::on(LieDual::so3())
+        .energy(top)
+        .casimir(half_square)
+        .build()
+        .expect("the square of the momentum is a Casimir");
+    let x0 = Vector3::repeat(3_f64.sqrt().recip());
+    for method in [Gauss2, Gauss3] {
+        let span = Span::until(40.0).tolerance(1e-6);
+        let [on, off] = [
+            kept("S²", method, &spin(), &x0, span).certificate().steps,
+            kept("so(3)*", method, &around, &x0, span).certificate().steps,
+        ];
+        println!("{method:?}: {on} steps on the sphere, {off} around it");
+        assert!((0.7..1.4).contains(&(on as f64 / off as f64)), "{method:?}: {on}, {off}");
+    }
+}

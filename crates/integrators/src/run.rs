@@ -13,4 +13,5 @@ pub mod scales;
 pub mod span;
 pub mod steps;
 pub mod trajectory;
+pub mod until;
 pub mod watch;

@@ -11,7 +11,6 @@ use kuva::render::render::render_multiple;
 use crate::{
     axis::{Axis, layout},
     order::Order,
-    panels::range,
     plot::{self, GREY, INK, NUMBER, PlotError, color},
 };
 
@@ -125,8 +124,8 @@ impl LogLog {
             plot::check(&series.label, points, "logarithmic axes", fits)?;
         }
         let points = || self.series.iter().flat_map(|series| &series.points);
-        let x = Axis::logarithmic(range(points().map(|p| p.0)));
-        let y = Axis::logarithmic(range(points().map(|p| p.1)));
+        let x = Axis::logarithmic(points().map(|p| p.0).collect());
+        let y = Axis::logarithmic(points().map(|p| p.1).collect());
         let mut plots = Vec::new();
         let mut layout = layout(&x, &y)
             .with_x_label(&self.horizontal)
@@ -134,14 +133,14 @@ impl LogLog {
             .with_legend_position(LegendPosition::OutsideRightTop)
             .with_legend_box(false);
         for &p in &self.guides {
-            let [start, corner, end] = self.guide_points((&x, &y), p);
+            let [start, corner, end] = self.guide_points(&x, &y, p);
             let line = LinePlot::new().with_data([start, corner, end, start]).with_color(GREY);
             plots.push(Plot::Line(line.with_stroke_width(1.0)));
             let beside = (end.0 * x.fraction(0.025), (corner.1 * end.1).sqrt());
             let label = TextAnnotation::new(p.to_string(), beside.0, beside.1);
             layout = layout.with_annotation(label.with_color(INK).with_font_size(NUMBER));
         }
-        self.series.iter().for_each(|series| series.plots((&x, &y), &mut plots));
+        self.series.iter().for_each(|series| series.plots(&x, &y, &mut plots));
         for problem in self.series.chunk_by(|_, next| next.look.rank > 0) {
             let entries = problem.iter().map(Series::legend).collect();
             layout = layout.with_legend_group(&problem[0].label, entries);
@@ -172,7 +171,7 @@ impl LogLog {
 
     /// A triangle of slope `p` to the lower right of the middle of the series it fits best, in readings of
     /// the axes.
-    fn guide_points(&self, (x, y): (&Axis, &Axis), p: f64) -> [(f64, f64); 3] {
+    fn guide_points(&self, x: &Axis, y: &Axis, p: f64) -> [(f64, f64); 3] {
         let misfit = |series: &&Series| (series.slope() - p).abs();
         let nearest = self.series.iter().min_by(|a, b| misfit(a).total_cmp(&misfit(b)));
         let (low, high) = nearest.map_or_else(Default::default, Series::middle);
@@ -214,7 +213,7 @@ impl Series {
     }
 
     /// Its line, its markers, and the hollow markers of round-off, for `kuva`.
-    fn plots(&self, (x, y): (&Axis, &Axis), plots: &mut Vec<Plot>) {
+    fn plots(&self, x: &Axis, y: &Axis, plots: &mut Vec<Plot>) {
         let at = |(a, b): &(f64, f64)| (x.reading(*a), y.reading(*b));
         let (color, style) = (color(self.look.line), self.look.style());
         let line = LinePlot::new().with_data(self.points.iter().map(at)).with_color(color);

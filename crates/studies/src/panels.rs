@@ -10,7 +10,7 @@ use kuva::render::{
 };
 
 use crate::{
-    axis::{Axis, layout},
+    axis::{Axis, Range, layout},
     globe::Globe,
     header::Header,
     plot::{self, At, INK, NAME, PlotError, color, fitting},
@@ -152,8 +152,9 @@ impl Panel {
     fn axes(&self) -> (Axis, Axis) {
         let points = || self.lines.iter().flat_map(|(_, points)| points);
         let levels = self.levels.iter().map(|(_, y)| *y);
-        let x = range(points().map(|(x, _)| *x));
-        let y = range(points().map(|(_, y)| *y).chain(levels).map(|y| self.shown(y)));
+        let x: Range = points().map(|(x, _)| *x).collect();
+        let heights = points().map(|(_, y)| *y).chain(levels);
+        let y: Range = heights.map(|y| self.shown(y)).collect();
         let vertical = match self.floor {
             Some(_) => Axis::logarithmic(y),
             None => Axis::linear(y, 0.06, 5),
@@ -343,11 +344,6 @@ impl Panels {
         };
         self.columns.unwrap_or(usual).min(self.panels.len())
     }
-}
-
-/// The least and the greatest of some numbers.
-pub(crate) fn range(values: impl Iterator<Item = f64>) -> (f64, f64) {
-    values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)))
 }
 
 /// The lowest and the highest point of each of so many stretches, in their order, and the two ends: a

@@ -379,19 +379,23 @@ fn geodesic<Y: Metriplectic>(study: &mut impl Study, problem: &Problem<Y>) {
     study.visit(problem, "exponential", Geodesic::Second(Exponential), 1.0);
 }
 
+/// A retraction under its name in a study.
+#[derive(Clone, Copy)]
+struct Named<R> {
+    scheme: &'static str,
+    retraction: R,
+}
+
 /// Both geodesic retractions, and further ones of order 2, as one type.
-fn with<Y: Metriplectic, R>(
-    study: &mut impl Study,
-    problem: &Problem<Y>,
-    further: &[(&'static str, R)],
-) where
+fn with<Y: Metriplectic, R>(study: &mut impl Study, problem: &Problem<Y>, further: &[Named<R>])
+where
     R: Retraction<Y::Manifold, Y::Metric> + Copy,
 {
     type Any<R> = Either<Either<WeylMidpoint, Exponential>, R>;
     let first = |retraction| Any::<R>::First(retraction);
     study.visit(problem, "Weyl midpoint", first(Either::First(WeylMidpoint)), 2.0);
     study.visit(problem, "exponential", first(Either::Second(Exponential)), 1.0);
-    for &(scheme, retraction) in further {
+    for &Named { scheme, retraction } in further {
         study.visit(problem, scheme, Any::Second(retraction), 2.0);
     }
 }
@@ -407,12 +411,13 @@ fn all<Y: Metriplectic, R>(
     R: Retraction<Y::Manifold, Y::Metric> + Copy,
 {
     type Cheap<R> = Either<ChartMidpoint, R>;
-    let further =
-        [(CHART_MIDPOINT, Cheap::First(ChartMidpoint)), (scheme, Cheap::Second(retraction))];
-    with(study, problem, &further);
+    let chart = Named { scheme: BY_THE_CHART.scheme, retraction: Cheap::First(ChartMidpoint) };
+    let own = Named { scheme, retraction: Cheap::Second(retraction) };
+    with(study, problem, &[chart, own]);
 }
 
-const CHART_MIDPOINT: &str = "chart midpoint";
+const BY_THE_CHART: Named<ChartMidpoint> =
+    Named { scheme: "chart midpoint", retraction: ChartMidpoint };
 
 /// Canonical metrics.
 fn canonical(study: &mut impl Study) {
@@ -420,7 +425,7 @@ fn canonical(study: &mut impl Study) {
     macro_rules! visit {
         ($labels:expr, $start:expr, $strides:expr, $system:expr, $scheme:literal by $retraction:expr) => {
             visit!(@ $labels, $start, $strides, $system, |study, problem| {
-                with(study, problem, &[($scheme, $retraction)])
+                with(study, problem, &[Named { scheme: $scheme, retraction: $retraction }])
             })
         };
         ($labels:expr, $start:expr, $strides:expr, $system:expr) => {
@@ -556,7 +561,7 @@ fn closures(study: &mut impl Study) {
     let (name, manifold, metric) = ("area form", "2-chart", "non-diagonal");
     let start = vector![0.6, 0.4];
     let problem = Problem { name, manifold, metric, system, start, time: 2.0, strides };
-    with(study, &problem, &[(CHART_MIDPOINT, ChartMidpoint)]);
+    with(study, &problem, &[BY_THE_CHART]);
 
     let leaning = |q: &Vector3<Real>| {
         let wave = Vector3::new(q.y.sin(), q.z.cos(), q.x * 0.5);
@@ -574,7 +579,7 @@ fn closures(study: &mut impl Study) {
     let (name, manifold, metric) = ("Nambu", "3-chart", "non-diagonal");
     let start = vector![0.5, -0.4, 0.3];
     let problem = Problem { name, manifold, metric, system, start, time: 2.0, strides };
-    with(study, &problem, &[(CHART_MIDPOINT, ChartMidpoint)]);
+    with(study, &problem, &[BY_THE_CHART]);
 }
 
 /// Products.
@@ -636,5 +641,5 @@ fn products(study: &mut impl Study) {
     let strides = vec![(away, 4.0), (away, 2.0)];
     let (name, metric) = ("relaxation", "full closure");
     let problem = Problem { name, manifold, metric, system, start, time: 1.0, strides };
-    with(study, &problem, &[(CHART_MIDPOINT, ChartMidpoint)]);
+    with(study, &problem, &[BY_THE_CHART]);
 }

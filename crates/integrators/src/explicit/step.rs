@@ -5,9 +5,7 @@ use metriplectic_dynamics::SecondLaw;
 use super::chebyshev;
 use super::estimates::is_at_the_edge;
 use super::flow::{Projected, ProjectionError, StageFlow, Target};
-use super::memory::{
-    ExplicitMemory, Here, LastStep, MemoryOf, Produced, STAGES, combined, produced,
-};
+use super::memory::{ExplicitMemory, Here, LastStep, MemoryOf, Produced, combined, produced};
 use super::tableau::Tableau;
 use crate::method::{
     Effort, Element, EntropyStep, Evidence, Laws, Refusal, StepStart, Taken, Vector,
@@ -153,8 +151,8 @@ fn try_step<F: StageFlow>(
         memory.last = Some(last);
     } else {
         // The state has stayed where it was.
-        let [(velocity, production), ..] = last.stages;
-        memory.here = Some(Here { velocity, production });
+        let [here, ..] = last.stages;
+        memory.here = Some(here);
     }
     taken
 }
@@ -170,7 +168,7 @@ fn finished<F: StageFlow>(
     memory: &mut MemoryOf<F>,
 ) -> Result<Taken<F>, Refused> {
     let x = start.x;
-    let dissipates = last.stages[0].1 != 0.0;
+    let dissipates = last.stages[0].production != 0.0;
     if let Some(lost) = &memory.lost {
         last.end = Vector::zip([&last.end, lost], |[end, lost]| end + lost);
     } else if !memory.read.is_empty() {
@@ -203,10 +201,10 @@ fn finished<F: StageFlow>(
         .ok_or_else(|| Refused::outside(flow, x, &last.end))?;
     last.end = flow.stage_coordinates(x, &end.x);
     let rates = flow.stage_rates(x, (&last.end, &end.x), &next.velocity);
-    let rests = end.x == *x && is_zero(&last.stages[0].0);
+    let rests = end.x == *x && is_zero(&last.stages[0].velocity);
     let stability =
         tableau.stability.is_finite() && is_at_the_edge(tableau, flow, x, h, last, &rates);
-    last.stages[last.known] = (rates, next.production);
+    last.stages[last.known] = Here { velocity: rates, production: next.production };
     last.known += 1;
 
     let entropy_step = (flow.entropy_law() == SecondLaw::Exact).then_some(how);
@@ -255,8 +253,8 @@ fn stages<F: StageFlow>(
     here: Here<F::Vector>,
 ) -> Result<LastStep<F::Vector>, Refused> {
     let zero = here.velocity.zero();
-    let mut stages: [(F::Vector, f64); STAGES] = std::array::from_fn(|_| (zero.clone(), 0.0));
-    stages[0] = (here.velocity, here.production);
+    let mut stages = Here::at_rest(&zero);
+    stages[0] = here;
     let mut before = zero;
     for (i, row) in tableau.stages.iter().enumerate() {
         before = combined(h, row, &stages);
@@ -266,7 +264,7 @@ fn stages<F: StageFlow>(
     let end = combined(h, tableau.end, &stages);
     let rise = h * produced(tableau.end, &stages);
     for &stage in tableau.passed {
-        stages[stage].0 = stages[0].0.zero();
+        stages[stage].velocity = stages[0].velocity.zero();
     }
     Ok(LastStep { stages, known: tableau.stages.len() + 1, before, end, rise })
 }
@@ -277,10 +275,10 @@ pub(super) fn stage<F: StageFlow>(
     flow: &F,
     x: &Element<F>,
     q: &F::Vector,
-) -> Option<(F::Vector, f64)> {
+) -> Option<Here<F::Vector>> {
     let y = flow.stage(x, q)?;
     let (v, production) = flow.motion(&y)?;
-    Some((flow.stage_rates(x, (q, &y), &v), production))
+    Some(Here { velocity: flow.stage_rates(x, (q, &y), &v), production })
 }
 
 fn is_zero(v: &impl Vector) -> bool {
@@ -326,7 +324,8 @@ impl<F: StageFlow> Onto<'_, F> {
             }
         };
         let embedded = self.embedded_error();
-        let error = flow.weighs_errors().then(|| embedded.as_ref().unwrap_or(&last.stages[0].0));
+        let error =
+            flow.weighs_errors().then(|| embedded.as_ref().unwrap_or(&last.stages[0].velocity));
         let onto = |y, entropy, with_entropy| {
             let laws = Laws { entropy, ..start.reference.clone() };
             let limit = Some(&limit);
@@ -390,7 +389,7 @@ impl<F: StageFlow> Onto<'_, F> {
         if rise.abs() > round_off {
             return rise < 0.0;
         }
-        let dissipates = self.last.stages[0].1 != 0.0;
+        let dissipates = self.last.stages[0].production != 0.0;
         rise < -FALL * round_off || (dissipates && flow.falls_below_round_off(start.x, &end.x))
     }
 }

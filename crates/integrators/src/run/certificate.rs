@@ -6,7 +6,9 @@ use metriplectic_dynamics::SecondLaw;
 use metriplectic_dynamics::invariants::Kind;
 
 use crate::digits::{Digits, counted};
-use crate::method::{Effort, Element, EntropyStep, Evidence, Flow, Laws, LimitingSites, Promises};
+use crate::method::{
+    Effort, Element, EntropyStep, Evidence, Flow, Laws, LimitingSites, Promises, Taken,
+};
 use crate::round_off::bound::of_a_law;
 
 /// The balance of a run: what became of the two laws, of the manifold, and what it cost.
@@ -163,6 +165,12 @@ fn by_name<S: serde::Serializer>(name: &impl fmt::Debug, to: S) -> Result<S::Ok,
     to.collect_str(&format_args!("{name:?}"))
 }
 
+/// A step that was taken, and its size.
+pub(crate) struct StepOf<'a, F: Flow> {
+    pub(crate) taken: &'a Taken<F>,
+    pub(crate) h: f64,
+}
+
 impl Certificate {
     /// That of a run that starts at `x0`.
     pub(crate) fn start<F: Flow>(flow: &F, x0: &Element<F>, promises: Promises) -> Self {
@@ -204,15 +212,16 @@ impl Certificate {
         }
     }
 
-    /// Enters a step of size `h` between two states with these laws.
+    /// Enters a step from a state with these laws.
     #[inline]
     pub(crate) fn enter<F: Flow>(
         &mut self,
         flow: &F,
-        [(x, before), (next, after)]: [(&Element<F>, &Laws<F::Numbers>); 2],
-        h: f64,
-        (evidence, effort): (Evidence, Effort),
+        x: &Element<F>,
+        before: &Laws<F::Numbers>,
+        step: StepOf<'_, F>,
     ) {
+        let StepOf { taken: Taken { x: next, values: after, evidence, effort }, h } = step;
         self.smallest_step = if self.steps == 0 { h } else { self.smallest_step.min(h) };
         self.largest_step = self.largest_step.max(h);
         let error = (after.energy - self.initial_energy).abs();
@@ -240,13 +249,13 @@ impl Certificate {
         self.friction = self.friction.max(evidence.friction);
         self.max_manifold_defect = self.max_manifold_defect.max(flow.defect(next));
         self.steps += 1;
-        self.projected_steps.enter(&evidence);
+        self.projected_steps.enter(evidence);
         if let Some(laws) = evidence.stages {
             let balance = self.stages.get_or_insert_default();
             balance.defect = balance.defect.max(laws.defect);
             balance.surplus += laws.surplus;
         }
-        self.effort += effort;
+        self.effort += *effort;
         self.worst_iterations = self.worst_iterations.max(effort.iterations);
     }
 

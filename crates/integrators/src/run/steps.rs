@@ -8,7 +8,7 @@ use crate::method::{
     Refusal, StepEnds, StepStart, Taken, Vector as _,
 };
 use crate::round_off::bound::{ROUNDED, breaks_first_law};
-use crate::run::certificate::Certificate;
+use crate::run::certificate::{Certificate, StepOf};
 use crate::run::controller::{Controller, Rule, StepSize};
 use crate::run::output::{StepBefore, Watching};
 use crate::run::scales::{Scales, larger, relative};
@@ -244,26 +244,26 @@ impl<'a, F: Flow, M: Method<F>> Steps<'a, F, M> {
             }
             StepSize::Adaptive(controller) => self.controlled(controller.clone())?,
         };
-        let Taken { x, values, evidence, effort } = taken;
-        if !is_finite(&values) {
+        if !is_finite(&taken.values) {
             let time = self.state.time;
-            return Err(StepError::OutOfDomain { time, h, tried: effort });
+            return Err(StepError::OutOfDomain { time, h, tried: taken.effort });
         }
-        let change = values.energy - self.certificate.initial_energy;
-        let sizes = || self.flow.energy_sizes([&self.state.point, &x]);
+        let change = taken.values.energy - self.certificate.initial_energy;
+        let sizes = || self.flow.energy_sizes([&self.state.point, &taken.x]);
         if self.promises.energy
-            && let Some(size) = breaks_first_law(change, values.energy, sizes)
+            && let Some(size) = breaks_first_law(change, taken.values.energy, sizes)
         {
             let time = self.state.time;
             return Err(StepError::FirstLawBroken { time, h, change, size });
         }
-        let ends = [(&self.state.point, &self.values), (&x, &values)];
-        self.certificate.enter(self.flow, ends, h, (evidence, effort));
+        let entered = StepOf { taken: &taken, h };
+        self.certificate.enter(self.flow, &self.state.point, &self.values, entered);
         let first_at_the_edge =
-            evidence.stability && self.certificate.limiting_sites.stiffness.is_none();
+            taken.evidence.stability && self.certificate.limiting_sites.stiffness.is_none();
         if step.is_power_of_two() || (first_at_the_edge && self.has_sites()) {
-            self.sample((&x, &values), h);
+            self.sample(&taken, h);
         }
+        let Taken { x, values, evidence, .. } = taken;
         (self.before.h, self.before.entropy) = (h, self.entropy);
         if evidence.dissipates {
             self.entropy = values.entropy;
@@ -299,7 +299,7 @@ impl<'a, F: Flow, M: Method<F>> Steps<'a, F, M> {
     /// Notes the local error of a step, and where it is largest, on the few whose number is a power of two and on the
     /// first one at the edge of stability.
     #[cold]
-    fn sample(&mut self, (end, values): (&Element<F>, &Laws<F::Numbers>), h: f64) {
+    fn sample(&mut self, Taken { x: end, values, .. }: &Taken<F>, h: f64) {
         let (flow, x) = (self.flow, &self.state.point);
         // The sizes that a step brings about count too, and the largest ones so far: an entry that has decayed to
         // round-off has no error relative to itself.

@@ -7,6 +7,7 @@ pub mod dense;
 pub mod event;
 pub mod observables;
 mod output;
+mod progress;
 mod record;
 mod root;
 pub mod scales;

@@ -88,6 +88,7 @@
 //! another way or contract `a*b + c`; and another processor has another library. There the laws hold all the
 //! same, to the same round-off, but the digits of two long runs need not agree.
 
+mod error;
 pub(crate) mod exact;
 #[cfg(feature = "serde")]
 mod file;
@@ -98,16 +99,16 @@ mod validation;
 
 use std::convert::Infallible;
 
-use metriplectic_manifolds::PointError;
-
 use crate::method::{Flow, Memory, Method, StateSpace, Vector};
 use crate::run::certificate::Certificate;
 use crate::run::controller::{Rule, StepSize};
 use crate::run::output::StepBefore;
+use crate::run::progress::Progress;
 use crate::run::span::{SpanError, check_end, check_steps};
-use crate::run::steps::{Progress, Steps};
+use crate::run::steps::Steps;
 use crate::run::trajectory::{Ending, State};
 
+pub use error::ResumeError;
 pub(crate) use exact::Exact;
 pub use saved::Saved;
 
@@ -142,79 +143,6 @@ struct SavedRun {
     #[cfg_attr(feature = "serde", serde(with = "exact"))]
     balance: Certificate,
     progress: Progress<Vec<Exact>>,
-}
-
-/// A checkpoint that cannot be resumed.
-#[derive(Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum ResumeError {
-    /// It was written by another version of this library.
-    #[error(
-        "the checkpoint has format {found}, and {expected} is what is read here; resume it with the version that wrote it"
-    )]
-    Version {
-        /// The format of the checkpoint.
-        found: u32,
-        /// The format of this version.
-        expected: u32,
-    },
-    /// Its point is not one of the manifold.
-    #[error("the point of the checkpoint: {0}")]
-    Point(#[from] PointError),
-    /// A list in it has another length than the system says.
-    #[error(
-        "the checkpoint has {found} {what}, the system {expected}; resume it with the system that it is of"
-    )]
-    Length {
-        /// What the list holds.
-        what: &'static str,
-        /// Its length.
-        found: usize,
-        /// The length that it should have.
-        expected: usize,
-    },
-    /// A field has another value than the checkpoint says.
-    #[error(
-        "the {field} is {found} at the point of the checkpoint, which says {stored}; resume it with the system that it is of"
-    )]
-    AnotherSystem {
-        /// Which field.
-        field: &'static str,
-        /// Its value in the checkpoint.
-        stored: f64,
-        /// Its value in the system.
-        found: f64,
-    },
-    /// The end that it is to be given cannot be that of the run.
-    #[error(transparent)]
-    Span(#[from] SpanError),
-    /// It is of a run in steps of one size, and is to be given a time at which it ends.
-    #[error(
-        "the run takes steps of one size; say how many with `with_steps` instead of `with_end`"
-    )]
-    FixedSteps,
-    /// It is of a run whose steps follow a tolerance, and is to be given a number of steps.
-    #[error(
-        "the steps of the run follow a tolerance; say when it ends with `with_end` instead of `with_steps`"
-    )]
-    AdaptiveSteps,
-    /// A number in it is impossible: by itself, beside the others, or for the system.
-    #[error(
-        "the {what} of the checkpoint is {value}, which no run has that agrees with its other numbers; the \
-         file is damaged: write another one"
-    )]
-    Damaged {
-        /// Which number.
-        what: &'static str,
-        /// Its value.
-        value: f64,
-    },
-}
-
-impl std::fmt::Debug for ResumeError {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        std::fmt::Display::fmt(self, f)
-    }
 }
 
 impl Checkpoint {

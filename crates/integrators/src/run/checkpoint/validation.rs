@@ -4,8 +4,8 @@ use super::{Exact, ResumeError, SavedRun};
 use crate::method::{Element, Flow, LimitingSites, Memory, Promises, Vector};
 use crate::run::certificate::StageBalance;
 use crate::run::controller::{Controller, Pace, StepSize};
+use crate::run::progress::Progress;
 use crate::run::span::{check_end, check_step_size, check_steps};
-use crate::run::steps::Progress;
 use crate::run::trajectory::Ending;
 
 /// Units of round-off by which the values of one field differ between two mathematical libraries: some

@@ -2,11 +2,11 @@
 
 use std::sync::Arc;
 
-use kuva::render::layout::{Layout, TickFormat};
-use kuva::render::render_utils::compute_tick_step;
+use kuva::render::layout::{ComputedLayout, Layout, TickFormat};
+use kuva::render::render_utils::{compute_tick_step, generate_ticks_log};
 use kuva::render::theme::Theme;
 
-use crate::plot::{GREY, INK, NAME, NUMBER};
+use crate::plot::{At, GREY, INK, NAME, NUMBER};
 
 /// The least and the greatest of some numbers.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -81,6 +81,15 @@ impl Axis {
         }
     }
 
+    /// The numbers along a logarithmic axis as they are written.
+    fn written(&self) -> Vec<String> {
+        let format = self.format();
+        generate_ticks_log(self.low, self.high)
+            .into_iter()
+            .map(|tick| format.format(tick))
+            .collect()
+    }
+
     /// How the numbers along the axis are written.
     fn format(&self) -> TickFormat {
         let (decades, shift) = (decade(self.high) - decade(self.low), self.exponent);
@@ -135,7 +144,43 @@ pub(crate) fn layout(x: &Axis, y: &Axis) -> Layout {
         .with_y_tick_format(y.format());
     (layout.log_x, layout.log_y) = (x.step.is_none(), y.step.is_none());
     (layout.x_tick_step, layout.y_tick_step) = (x.step, y.step);
+    // `kuva` leaves room for numbers as it writes them on a logarithmic axis, and these may be wider.
+    if layout.log_y {
+        let room = |layout: &Layout| ComputedLayout::from_layout(layout).y_tick_label_px;
+        let left = room(&layout);
+        layout.y_categories = Some(y.written());
+        layout.y_label_offset.0 = left - room(&layout);
+        layout.y_categories = None;
+    }
     layout
+}
+
+/// The size of a frame, and the room around it.
+pub(crate) struct Room {
+    pub(crate) frame: At,
+    pub(crate) left: f64,
+    pub(crate) right: f64,
+    pub(crate) top: f64,
+    pub(crate) below: f64,
+}
+
+impl Room {
+    /// Width and height of all.
+    pub(crate) fn size(&self) -> At {
+        (self.left + self.frame.0 + self.right, self.top + self.frame.1 + self.below)
+    }
+
+    /// Axes with this frame.
+    pub(crate) fn around(&self, layout: Layout) -> Layout {
+        let (width, height) = self.size();
+        let layout = layout.with_force_margins(self.left, self.right);
+        layout.with_force_margins_y(self.top, self.below).with_width(width).with_height(height)
+    }
+}
+
+/// The room to the left of a frame: for the numbers along its axis, and their name.
+pub(crate) fn room_left(layout: &Layout) -> f64 {
+    ComputedLayout::from_layout(layout).margin_left - layout.y_label_offset.0
 }
 
 /// The exponent of the largest power of ten that is not above a number.

@@ -9,7 +9,7 @@ use kuva::render::layout::ComputedLayout;
 use kuva::render::render::render_multiple;
 
 use crate::{
-    axis::{Axis, layout},
+    axis::{Axis, Room, layout, room_left},
     order::Order,
     plot::{self, GREY, INK, NUMBER, PlotError, color},
 };
@@ -146,17 +146,13 @@ impl LogLog {
             layout = layout.with_legend_group(&problem[0].label, entries);
         }
         let computed = ComputedLayout::from_layout(&layout);
-        // Numbers such as 2×10⁴ are wider than the room that is computed for them.
-        let (left, right) = (computed.margin_left.ceil() + 12.0, computed.margin_right.ceil());
+        let (left, right) = (room_left(&layout).ceil(), computed.margin_right.ceil());
         let rows: usize = self.series.iter().map(|series| 2 - series.look.rank.min(1)).sum();
-        let height = (FRAME.1 + BELOW).max(ROW * rows as f64 + 24.0);
-        let size = (left + FRAME.0 + right, TOP + height);
-        (layout.width, layout.height) = (Some(size.0), Some(size.1));
-        layout.x_label_offset = (0.0, FRAME.1 + BELOW - height);
-        let layout =
-            layout.with_force_margins(left, right).with_force_margins_y(TOP, height - FRAME.1);
-        let mut sheet = plot::sheet(size, &self.title, left + 0.5 * FRAME.0);
-        plot::place(&mut sheet, (0.0, 0.0), render_multiple(plots, layout).elements);
+        let below = BELOW.max(ROW * rows as f64 + 24.0 - FRAME.1);
+        let room = Room { frame: FRAME, left, right, top: TOP, below };
+        layout.x_label_offset = (0.0, BELOW - below);
+        let mut sheet = plot::sheet(room.size(), &self.title, left + 0.5 * FRAME.0);
+        plot::place(&mut sheet, (0.0, 0.0), render_multiple(plots, room.around(layout)).elements);
         Ok(plot::svg(&sheet))
     }
 
@@ -288,6 +284,20 @@ mod tests {
         assert_eq!(figure().svg().unwrap(), figure().svg().unwrap());
         let bare = LogLog::new("t", "h", "error").series("s", with_plateau()).svg().unwrap();
         assert!(figure().svg().unwrap().len() > bare.len());
+    }
+
+    #[test]
+    fn the_name_of_the_vertical_axis_is_beside_its_numbers() {
+        let points = [(2.0, 1530.0), (4.0, 8915.0), (32.0, 394_593.0)];
+        let svg = LogLog::new("t", "n", "name").series("s", points).svg().unwrap();
+        let x = |text: &str| -> f64 {
+            let line = svg.lines().find(|line| line.contains(&format!(">{text}<"))).unwrap();
+            let x = line.split('"').nth(1).unwrap();
+            x.parse().unwrap()
+        };
+        let left_of_the_number = x("2×10⁴") - plot::length("2×10⁴", NUMBER);
+        // The name is written upwards from its base line.
+        assert!(0.5 * f64::from(plot::NAME) < x("name") && x("name") < left_of_the_number, "{svg}");
     }
 
     #[test]

@@ -8,14 +8,10 @@ use kuva::render::{
 };
 
 use crate::{
-    axis::{Axis, Range, layout},
+    axis::{Axis, Range, Room, layout},
     header::Header,
     plot::{self, At, INK, NAME, PlotError, color, fitting},
 };
-
-/// Room to the right of a panel, and for the numbers and the name below it.
-pub(crate) const RIGHT: f64 = 16.0;
-pub(crate) const BELOW: f64 = 42.0;
 
 /// A pair of axes with lines on it.
 #[derive(Clone, Debug)]
@@ -190,22 +186,12 @@ impl Panel {
 
     /// The parts, with the upper left corner at the origin.
     pub(crate) fn parts(&self, letter: char, room: &Room, stretches: usize) -> Vec<Primitive> {
-        let &Room { frame, left, top } = room;
-        let mut layout =
-            self.layout(frame).with_force_margins(left, RIGHT).with_force_margins_y(top, BELOW);
-        (layout.width, layout.height) = (Some(left + frame.0 + RIGHT), Some(top + frame.1 + BELOW));
-        let header = self.header(left + frame.0);
+        let layout = room.around(self.layout(room.frame));
+        let header = self.header(room.left + room.frame.0);
         let mut parts = render_multiple(self.plots(stretches), layout).elements;
-        parts.extend(header.parts(letter, (4.0, top - header.height)));
+        parts.extend(header.parts(letter, (4.0, room.top - header.height)));
         parts
     }
-}
-
-/// The size of a frame, with the room to the left of it and above it.
-pub(crate) struct Room {
-    pub(crate) frame: At,
-    pub(crate) left: f64,
-    pub(crate) top: f64,
 }
 
 /// The lowest and the highest point of each of so many stretches, in their order, and the two ends: a

@@ -2,11 +2,10 @@
 
 use std::path::PathBuf;
 
-use kuva::render::layout::ComputedLayout;
-
 use crate::{
+    axis::{Room, room_left},
     globe::Globe,
-    panel::{BELOW, Panel, RIGHT, Room},
+    panel::Panel,
     plot::{self, At, PlotError},
 };
 
@@ -15,6 +14,9 @@ const STRETCHES: usize = 700;
 /// Stretches of all lines of a figure: what keeps its file below some 300 kB.
 const ALL_STRETCHES: usize = 12_000;
 
+/// Room to the right of a panel, and for the numbers and the name below it.
+const RIGHT: f64 = 16.0;
+const BELOW: f64 = 42.0;
 /// Room around the sheet, and for the title.
 const EDGE: f64 = 8.0;
 const HEAD: f64 = 36.0;
@@ -89,7 +91,7 @@ impl Panels {
             _ => (260.0, 180.0),
         };
         let room = self.room(frame);
-        let cell = (room.left + frame.0 + RIGHT, room.top + frame.1 + BELOW);
+        let cell = room.size();
         let rows = self.panels.len().div_ceil(columns.max(1));
         let grid = (cell.0 * columns as f64, cell.1 * rows as f64);
 
@@ -131,10 +133,10 @@ impl Panels {
     /// The room of each panel: the same for all, so that their frames line up.
     fn room(&self, frame: At) -> Room {
         let layouts = self.panels.iter().map(|panel| panel.layout(frame));
-        let margins = layouts.map(|layout| ComputedLayout::from_layout(&layout).margin_left);
-        let left = margins.fold(0.0, f64::max).ceil();
+        let left = layouts.map(|layout| room_left(&layout)).fold(0.0, f64::max).ceil();
         let headers = self.panels.iter().map(|panel| panel.header(left + frame.0).height);
-        Room { frame, left, top: headers.fold(0.0, f64::max) }
+        let top = headers.fold(0.0, f64::max);
+        Room { frame, left, right: RIGHT, top, below: BELOW }
     }
 
     fn columns_or_usual(&self) -> usize {
@@ -150,6 +152,8 @@ impl Panels {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use kuva::render::layout::ComputedLayout;
+
     use crate::panel::thinned;
 
     fn wave(count: u32) -> Vec<(f64, f64)> {

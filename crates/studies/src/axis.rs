@@ -8,21 +8,6 @@ use kuva::render::theme::Theme;
 
 use crate::plot::{At, GREY, INK, NAME, NUMBER};
 
-/// The least and the greatest of some numbers.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Range {
-    pub(crate) low: f64,
-    pub(crate) high: f64,
-}
-
-impl FromIterator<f64> for Range {
-    fn from_iter<I: IntoIterator<Item = f64>>(numbers: I) -> Self {
-        let none = Self { low: f64::INFINITY, high: f64::NEG_INFINITY };
-        let wider = |Self { low, high }, x: f64| Self { low: low.min(x), high: high.max(x) };
-        numbers.into_iter().fold(none, wider)
-    }
-}
-
 /// An axis over `[low, high]` of a number in units of `10^exponent`.
 #[derive(Clone, Debug)]
 pub(crate) struct Axis {
@@ -34,9 +19,14 @@ pub(crate) struct Axis {
 }
 
 impl Axis {
-    /// A linear axis over `[low, high]` and a fraction of `padding` on either side, with about so many
+    /// A linear axis over these numbers and a fraction of `padding` on either side, with about so many
     /// ticks. It begins at 0 where that is near.
-    pub(crate) fn linear(Range { low, high }: Range, padding: f64, ticks: usize) -> Self {
+    pub(crate) fn linear(
+        numbers: impl IntoIterator<Item = f64>,
+        padding: f64,
+        ticks: usize,
+    ) -> Self {
+        let [low, high] = ends(numbers);
         let low = if low > 0.0 && low < 0.1 * high { 0.0 } else { low };
         let size = low.abs().max(high.abs());
         // A single value gets a tenth of itself on either side.
@@ -51,10 +41,11 @@ impl Axis {
         Self { low, high, exponent, step: Some(step) }
     }
 
-    /// A logarithmic axis over `[low, high]`, both positive, and a little more on either side.
+    /// A logarithmic axis over these positive numbers, and a little more on either side.
     ///
     /// The least number is about 1 on it: `kuva` draws nothing below 1e-10 on logarithmic axes.
-    pub(crate) fn logarithmic(Range { low, high }: Range) -> Self {
+    pub(crate) fn logarithmic(numbers: impl IntoIterator<Item = f64>) -> Self {
+        let [low, high] = ends(numbers);
         let (exponent, margin) = (decade(low), 1.12 * (high / low).powf(0.03));
         let unit = 10_f64.powi(exponent);
         Self { low: low / margin / unit, high: high * margin / unit, exponent, step: None }
@@ -149,7 +140,7 @@ pub(crate) fn layout(x: &Axis, y: &Axis) -> Layout {
         let room = |layout: &Layout| ComputedLayout::from_layout(layout).y_tick_label_px;
         let left = room(&layout);
         layout.y_categories = Some(y.written());
-        layout.y_label_offset.0 = left - room(&layout);
+        layout.y_label_offset.0 = (left - room(&layout)).min(0.0);
         layout.y_categories = None;
     }
     layout
@@ -183,6 +174,12 @@ pub(crate) fn room_left(layout: &Layout) -> f64 {
     ComputedLayout::from_layout(layout).margin_left - layout.y_label_offset.0
 }
 
+/// The least and the greatest of some numbers.
+fn ends(numbers: impl IntoIterator<Item = f64>) -> [f64; 2] {
+    let none = [f64::INFINITY, f64::NEG_INFINITY];
+    numbers.into_iter().fold(none, |[low, high], x| [low.min(x), high.max(x)])
+}
+
 /// The exponent of the largest power of ten that is not above a number.
 fn decade(x: f64) -> i32 {
     format!("{x:e}").rsplit('e').next().and_then(|exponent| exponent.parse().ok()).unwrap_or(0)
@@ -200,21 +197,13 @@ fn power(exponent: i32) -> String {
 mod tests {
     use super::*;
 
-    fn linear(ends: [f64; 2], padding: f64, ticks: usize) -> Axis {
-        Axis::linear(ends.into_iter().collect(), padding, ticks)
-    }
-
-    fn logarithmic(ends: [f64; 2]) -> Axis {
-        Axis::logarithmic(ends.into_iter().collect())
-    }
-
     fn written(axis: &Axis, tick: f64) -> String {
         axis.format().format(tick)
     }
 
     #[test]
     fn round_off_is_written_in_its_own_units() {
-        let axis = linear([-2.2e-16, 4.4e-16], 0.05, 5);
+        let axis = Axis::linear([-2.2e-16, 4.4e-16], 0.05, 5);
         assert_eq!(axis.label("|ΔH|", ""), "|ΔH| (10⁻¹⁶)");
         assert_eq!(axis.label("|ΔH|", "J"), "|ΔH| (10⁻¹⁶ J)");
         assert!((axis.reading(2.2e-16) - 2.2).abs() < 1e-12);
@@ -222,32 +211,32 @@ mod tests {
 
     #[test]
     fn ordinary_numbers_are_written_as_they_are() {
-        let axis = linear([0.0, 1.0], 0.0, 5);
+        let axis = Axis::linear([0.0, 1.0], 0.0, 5);
         assert_eq!([0.0, 0.2, -0.4].map(|x| written(&axis, x)), ["0", "0.2", "−0.4"]);
         assert_eq!((axis.label("t", ""), axis.label("t", "s")), ("t".into(), "t (s)".into()));
-        assert_eq!(written(&linear([0.0, 2e4], 0.0, 4), 5e3), "5000");
-        assert_eq!(written(&linear([0.0, 1.0], 0.0, 4), 0.5), "0.50");
+        assert_eq!(written(&Axis::linear([0.0, 2e4], 0.0, 4), 5e3), "5000");
+        assert_eq!(written(&Axis::linear([0.0, 1.0], 0.0, 4), 0.5), "0.50");
     }
 
     #[test]
     fn an_axis_begins_at_zero_where_that_is_near() {
-        let low = |low| linear([low, 30.0], 0.0, 4).low;
+        let low = |low| Axis::linear([low, 30.0], 0.0, 4).low;
         assert_eq!((low(0.1), low(10.0)), (0.0, 10.0));
         for value in [0.0, 3.0, -1e-300] {
-            let axis = linear([value, value], 0.05, 5);
+            let axis = Axis::linear([value, value], 0.05, 5);
             assert!(axis.low < axis.reading(value) && axis.reading(value) < axis.high);
         }
     }
 
     #[test]
     fn decades_are_powers_of_ten() {
-        let axis = logarithmic([1e-15, 0.5]);
+        let axis = Axis::logarithmic([1e-15, 0.5]);
         let labels = (0..=15).map(|n| written(&axis, 10_f64.powi(n)));
         let labels: Vec<String> = labels.filter(|label| !label.is_empty()).collect();
         assert_eq!(labels, ["10⁻¹⁵", "10⁻¹²", "10⁻⁹", "10⁻⁶", "10⁻³", "10⁰"]);
-        let narrow = logarithmic([0.03, 0.04]);
+        let narrow = Axis::logarithmic([0.03, 0.04]);
         assert_eq!([2.0, 5.0].map(|x| written(&narrow, x)), ["2×10⁻²", "5×10⁻²"]);
-        let counts = logarithmic([2.0, 12.0]);
+        let counts = Axis::logarithmic([2.0, 12.0]);
         assert_eq!([2.0, 10.0].map(|x| written(&counts, x)), ["2", "10"]);
     }
 }

@@ -124,8 +124,8 @@ impl LogLog {
             plot::check(&series.label, points, "logarithmic axes", fits)?;
         }
         let points = || self.series.iter().flat_map(|series| &series.points);
-        let x = Axis::logarithmic(points().map(|p| p.0).collect());
-        let y = Axis::logarithmic(points().map(|p| p.1).collect());
+        let x = Axis::logarithmic(points().map(|p| p.0));
+        let y = Axis::logarithmic(points().map(|p| p.1));
         let mut plots = Vec::new();
         let mut layout = layout(&x, &y)
             .with_x_label(&self.horizontal)

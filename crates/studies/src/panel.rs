@@ -8,7 +8,7 @@ use kuva::render::{
 };
 
 use crate::{
-    axis::{Axis, Range, Room, layout},
+    axis::{Axis, Room, layout},
     header::Header,
     plot::{self, At, INK, NAME, PlotError, color, fitting},
 };
@@ -115,9 +115,9 @@ impl Panel {
     fn axes(&self) -> (Axis, Axis) {
         let points = || self.lines.iter().flat_map(|(_, points)| points);
         let levels = self.levels.iter().map(|(_, y)| *y);
-        let x: Range = points().map(|(x, _)| *x).collect();
+        let x = points().map(|(x, _)| *x);
         let heights = points().map(|(_, y)| *y).chain(levels);
-        let y: Range = heights.map(|y| self.shown(y)).collect();
+        let y = heights.map(|y| self.shown(y));
         let vertical = match self.floor {
             Some(_) => Axis::logarithmic(y),
             None => Axis::linear(y, 0.06, 5),

@@ -187,7 +187,7 @@ fn a_damaged_checkpoint_is_refused() {
     let error = with(&|tree| tree["run"]["time"] = "-1.0".into());
     assert!(matches!(error, Some(ResumeError::Damaged { what: "time", .. })));
     let error = with(&|tree| {
-        tree["run"]["progress"]["step_size"]["Adaptive"]["pace"]["next"] = "0.0".into()
+        tree["run"]["progress"]["step_size"]["Adaptive"]["pace"]["next"] = "0.0".into();
     });
     assert!(matches!(error, Some(ResumeError::Damaged { what: "next step", .. })));
     let error = with(&|tree| tree["run"]["progress"]["every"] = 0.into());

@@ -30,6 +30,8 @@ fn through_a_file(checkpoint: &Checkpoint) -> Checkpoint {
         let text = serde_json::to_string(checkpoint).expect("it is written");
         let read = serde_json::from_str(&text).expect("it is read");
         assert_eq!(&read, checkpoint);
+        // Down to the sign of a zero.
+        assert_eq!(serde_json::to_string(&read).expect("it is written"), text);
         // Reading it as a tree, as a program that adds a field of its own does, costs no digit.
         let tree: serde_json::Value = serde_json::from_str(&text).expect("it is read");
         assert_eq!(&serde_json::from_value::<Checkpoint>(tree).expect("it is read"), checkpoint);
@@ -179,23 +181,32 @@ fn a_damaged_checkpoint_is_refused() {
     };
     assert_eq!(with(&|_| ()), None);
     let error = with(&|tree| tree["version"] = 7.into());
-    assert_eq!(error, Some(ResumeError::Version { found: 7, expected: 5 }));
-    let error = with(&|tree| tree["point"][1] = "NaN".into());
+    assert_eq!(error, Some(ResumeError::Version { found: 7, expected: 6 }));
+    let error = with(&|tree| tree["run"]["point"][1] = "NaN".into());
     assert!(matches!(error, Some(ResumeError::Point(PointError::NotFinite { index: 1, .. }))));
-    let error = with(&|tree| tree["time"] = "-1.0".into());
+    let error = with(&|tree| tree["run"]["time"] = "-1.0".into());
     assert!(matches!(error, Some(ResumeError::Damaged { what: "time", .. })));
-    let error = with(&|tree| tree["step_size"]["Adaptive"]["next"] = "0.0".into());
+    let error = with(&|tree| {
+        tree["run"]["progress"]["step_size"]["Adaptive"]["pace"]["next"] = "0.0".into();
+    });
     assert!(matches!(error, Some(ResumeError::Damaged { what: "next step", .. })));
-    let error = with(&|tree| tree["every"] = 0.into());
+    let error = with(&|tree| tree["run"]["progress"]["every"] = 0.into());
     assert!(matches!(error, Some(ResumeError::Damaged { .. })));
-    let error = with(&|tree| tree["memory"]["compensation"] = serde_json::json!(["0.0"]));
+    let error = with(&|tree| tree["run"]["memory"]["compensation"] = serde_json::json!(["0.0"]));
     assert!(matches!(error, Some(ResumeError::Length { found: 1, expected: 3, .. })));
     // What is no number, and what is no field, is not even read.
     let mut unread = tree.clone();
-    unread["energy"] = "one".into();
+    unread["run"]["energy"] = "one".into();
     assert!(serde_json::from_value::<Checkpoint>(unread).is_err());
+    for path in
+        ["", "/run", "/run/balance", "/run/progress", "/run/progress/step_size/Adaptive/pace"]
+    {
+        let mut unread = tree.clone();
+        unread.pointer_mut(path).expect(path)["enegry"] = "1.0".into();
+        assert!(serde_json::from_value::<Checkpoint>(unread).is_err(), "{path}");
+    }
     let mut unread = tree.clone();
-    unread["enegry"] = "1.0".into();
+    unread["run"] = serde_json::Value::Null;
     assert!(serde_json::from_value::<Checkpoint>(unread).is_err());
 }
 
@@ -217,28 +228,28 @@ fn every_number_of_a_checkpoint_is_compared_with_the_others() {
         let checkpoint = serde_json::from_value::<Checkpoint>(tree).expect(path);
         WeylMidpoint.resume(&body, &checkpoint).err()
     };
-    assert_eq!(with(&fixed, "/every", 1.into()), None);
-    assert_eq!(with(&adaptive, "/every", 1.into()), None);
+    assert_eq!(with(&fixed, "/run/progress/every", 1.into()), None);
+    assert_eq!(with(&adaptive, "/run/progress/every", 1.into()), None);
     for (path, value, what) in [
-        ("/balance/initial_energy", "NaN", "initial energy"),
-        ("/balance/initial_energy", "0.4", "initial energy"),
-        ("/balance/max_energy_error", "-1.0", "largest error of the energy"),
-        ("/balance/initial_entropy", "inf", "initial entropy"),
-        ("/balance/initial_entropy", "0.4", "growth of the entropy"),
-        ("/balance/entropy_gained", "1e9", "growth of the entropy"),
-        ("/balance/min_entropy_increment", "NaN", "smallest growth of the entropy"),
-        ("/balance/min_entropy_slope", "NaN", "least slope of the entropy"),
-        ("/balance/max_manifold_defect", "NaN", "largest defect"),
-        ("/balance/smallest_step", "1e9", "smallest step"),
-        ("/kept_entropy", "1e9", "kept entropy"),
-        ("/kept_entropy", "NaN", "kept entropy"),
-        ("/start", "NaN", "start"),
-        ("/start", "7.0", "time"),
-        ("/time", "1e9", "time"),
-        ("/largest_velocity/0", "NaN", "largest velocities"),
-        ("/largest_velocity/0", "-1.0", "largest velocity of an entry"),
-        ("/memory/compensation/0", "1e-3", "lost digits of an entry"),
-        ("/sizes/1", "-1.0", "size of an entry"),
+        ("/run/balance/initial_energy", "NaN", "initial energy"),
+        ("/run/balance/initial_energy", "0.4", "initial energy"),
+        ("/run/balance/max_energy_error", "-1.0", "largest error of the energy"),
+        ("/run/balance/initial_entropy", "inf", "initial entropy"),
+        ("/run/balance/initial_entropy", "0.4", "growth of the entropy"),
+        ("/run/balance/entropy_gained", "1e9", "growth of the entropy"),
+        ("/run/balance/min_entropy_increment", "NaN", "smallest growth of the entropy"),
+        ("/run/balance/min_entropy_slope", "NaN", "least slope of the entropy"),
+        ("/run/balance/max_manifold_defect", "NaN", "largest defect"),
+        ("/run/balance/smallest_step", "1e9", "smallest step"),
+        ("/run/kept_entropy", "1e9", "kept entropy"),
+        ("/run/kept_entropy", "NaN", "kept entropy"),
+        ("/run/progress/start", "NaN", "start"),
+        ("/run/progress/start", "7.0", "time"),
+        ("/run/time", "1e9", "time"),
+        ("/run/progress/largest_velocity/0", "NaN", "largest velocities"),
+        ("/run/progress/largest_velocity/0", "-1.0", "largest velocity of an entry"),
+        ("/run/memory/compensation/0", "1e-3", "lost digits of an entry"),
+        ("/run/progress/scales/sizes/1", "-1.0", "size of an entry"),
     ] {
         for tree in [&fixed, &adaptive] {
             match with(tree, path, value.into()) {
@@ -248,17 +259,17 @@ fn every_number_of_a_checkpoint_is_compared_with_the_others() {
         }
     }
     for (tree, path, value, what) in [
-        (&fixed, "/step", 19.into(), "number of steps in the balance"),
-        (&fixed, "/count", 19.into(), "number of steps to take"),
-        (&fixed, "/step_size/Fixed/h", "0.2".into(), "time"),
-        (&fixed, "/ending", "Span".into(), "number of steps"),
-        (&adaptive, "/ending", "Span".into(), "time"),
-        (&adaptive, "/step_size/Adaptive/end", "1e-3".into(), "time"),
-        (&adaptive, "/step_size/Adaptive/end", "NaN".into(), "end"),
-        (&adaptive, "/step_size/Adaptive/tolerance", "NaN".into(), "tolerance"),
-        (&adaptive, "/sizes/1", "0.5".into(), "size of an entry"),
-        (&adaptive, "/rest", "2.0".into(), "tolerance of rest"),
-        (&adaptive, "/most", 1.into(), "number of states to record"),
+        (&fixed, "/run/step", 19.into(), "number of steps in the balance"),
+        (&fixed, "/run/progress/count", 19.into(), "number of steps to take"),
+        (&fixed, "/run/progress/step_size/Fixed", "0.2".into(), "time"),
+        (&fixed, "/run/progress/ending", "Span".into(), "number of steps"),
+        (&adaptive, "/run/progress/ending", "Span".into(), "time"),
+        (&adaptive, "/run/progress/step_size/Adaptive/pace/end", "1e-3".into(), "time"),
+        (&adaptive, "/run/progress/step_size/Adaptive/pace/end", "NaN".into(), "end"),
+        (&adaptive, "/run/progress/step_size/Adaptive/pace/tolerance", "NaN".into(), "tolerance"),
+        (&adaptive, "/run/progress/scales/sizes/1", "0.5".into(), "size of an entry"),
+        (&adaptive, "/run/progress/rest", "2.0".into(), "tolerance of rest"),
+        (&adaptive, "/run/progress/most", 1.into(), "number of states to record"),
     ] as [(_, _, serde_json::Value, _); 11]
     {
         match with(tree, path, value.clone()) {
@@ -270,8 +281,26 @@ fn every_number_of_a_checkpoint_is_compared_with_the_others() {
     let mut steps = WeylMidpoint.steps(&body, UNSTABLE, Span::steps(0.1, 5)).unwrap();
     while steps.next().is_some() {}
     let tree = serde_json::to_value(steps.checkpoint()).unwrap();
-    let error = with(&tree, "/ending", serde_json::Value::Null);
+    let error = with(&tree, "/run/progress/ending", serde_json::Value::Null);
     assert!(matches!(error, Some(ResumeError::Damaged { what: "number of steps", .. })));
+}
+
+#[test]
+fn a_file_of_another_version_is_known_by_its_version_alone() {
+    let body = relaxing_body();
+    for (version, text) in [
+        (5, r#"{"version":5,"step":0,"start":"0.0","point":["0.0","0.5","0.5"],"balance":{}}"#),
+        (7, r#"{"step":{"taken":0},"version":7}"#),
+        (4, r#"{"version":4}"#),
+    ] {
+        let error = ResumeError::Version { found: version, expected: 6 };
+        let older: Checkpoint = serde_json::from_str(text).expect("it is read");
+        assert_eq!(WeylMidpoint.resume(&body, &older).err(), Some(error.clone()));
+        assert_eq!(older.clone().with_steps(10), Err(error.clone()));
+        assert_eq!(older.clone().with_end(10.0), Err(error));
+        assert!(older.time().is_nan() && older.point().next().is_none());
+    }
+    assert!(serde_json::from_str::<Checkpoint>(r#"{"step":0}"#).is_err());
 }
 
 /// An oscillator with the energy `(a p² + q²)/2` times a unit, and friction `b` into its entropy.

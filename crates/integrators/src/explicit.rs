@@ -46,6 +46,7 @@ mod chebyshev;
 mod dense;
 mod estimates;
 mod flow;
+mod landing;
 mod memory;
 mod metriplectic;
 mod referred_rise;

@@ -2,11 +2,11 @@
 
 use std::sync::Arc;
 
-use kuva::render::layout::{Layout, TickFormat};
-use kuva::render::render_utils::compute_tick_step;
+use kuva::render::layout::{ComputedLayout, Layout, TickFormat};
+use kuva::render::render_utils::{compute_tick_step, generate_ticks_log};
 use kuva::render::theme::Theme;
 
-use crate::plot::{GREY, INK, NAME, NUMBER};
+use crate::plot::{At, GREY, INK, NAME, NUMBER};
 
 /// An axis over `[low, high]` of a number in units of `10^exponent`.
 #[derive(Clone, Debug)]
@@ -19,9 +19,14 @@ pub(crate) struct Axis {
 }
 
 impl Axis {
-    /// A linear axis over `[low, high]` and a fraction of `padding` on either side, with about so many
+    /// A linear axis over these numbers and a fraction of `padding` on either side, with about so many
     /// ticks. It begins at 0 where that is near.
-    pub(crate) fn linear((low, high): (f64, f64), padding: f64, ticks: usize) -> Self {
+    pub(crate) fn linear(
+        numbers: impl IntoIterator<Item = f64>,
+        padding: f64,
+        ticks: usize,
+    ) -> Self {
+        let [low, high] = ends(numbers);
         let low = if low > 0.0 && low < 0.1 * high { 0.0 } else { low };
         let size = low.abs().max(high.abs());
         // A single value gets a tenth of itself on either side.
@@ -36,10 +41,11 @@ impl Axis {
         Self { low, high, exponent, step: Some(step) }
     }
 
-    /// A logarithmic axis over `[low, high]`, both positive, and a little more on either side.
+    /// A logarithmic axis over these positive numbers, and a little more on either side.
     ///
     /// The least number is about 1 on it: `kuva` draws nothing below 1e-10 on logarithmic axes.
-    pub(crate) fn logarithmic((low, high): (f64, f64)) -> Self {
+    pub(crate) fn logarithmic(numbers: impl IntoIterator<Item = f64>) -> Self {
+        let [low, high] = ends(numbers);
         let (exponent, margin) = (decade(low), 1.12 * (high / low).powf(0.03));
         let unit = 10_f64.powi(exponent);
         Self { low: low / margin / unit, high: high * margin / unit, exponent, step: None }
@@ -64,6 +70,15 @@ impl Axis {
             "" => quantity.into(),
             unit => format!("{quantity} ({unit})"),
         }
+    }
+
+    /// The numbers along a logarithmic axis as they are written.
+    fn written(&self) -> Vec<String> {
+        let format = self.format();
+        generate_ticks_log(self.low, self.high)
+            .into_iter()
+            .map(|tick| format.format(tick))
+            .collect()
     }
 
     /// How the numbers along the axis are written.
@@ -120,7 +135,49 @@ pub(crate) fn layout(x: &Axis, y: &Axis) -> Layout {
         .with_y_tick_format(y.format());
     (layout.log_x, layout.log_y) = (x.step.is_none(), y.step.is_none());
     (layout.x_tick_step, layout.y_tick_step) = (x.step, y.step);
+    // `kuva` leaves room for numbers as it writes them on a logarithmic axis, and these may be wider.
+    if layout.log_y {
+        let room = |layout: &Layout| ComputedLayout::from_layout(layout).y_tick_label_px;
+        let left = room(&layout);
+        layout.y_categories = Some(y.written());
+        layout.y_label_offset.0 = (left - room(&layout)).min(0.0);
+        layout.y_categories = None;
+    }
     layout
+}
+
+/// The size of a frame, and the room around it.
+pub(crate) struct Room {
+    pub(crate) frame: At,
+    pub(crate) left: f64,
+    pub(crate) right: f64,
+    pub(crate) top: f64,
+    pub(crate) below: f64,
+}
+
+impl Room {
+    /// Width and height of all.
+    pub(crate) fn size(&self) -> At {
+        (self.left + self.frame.0 + self.right, self.top + self.frame.1 + self.below)
+    }
+
+    /// Axes with this frame.
+    pub(crate) fn around(&self, layout: Layout) -> Layout {
+        let (width, height) = self.size();
+        let layout = layout.with_force_margins(self.left, self.right);
+        layout.with_force_margins_y(self.top, self.below).with_width(width).with_height(height)
+    }
+}
+
+/// The room to the left of a frame: for the numbers along its axis, and their name.
+pub(crate) fn room_left(layout: &Layout) -> f64 {
+    ComputedLayout::from_layout(layout).margin_left - layout.y_label_offset.0
+}
+
+/// The least and the greatest of some numbers.
+fn ends(numbers: impl IntoIterator<Item = f64>) -> [f64; 2] {
+    let none = [f64::INFINITY, f64::NEG_INFINITY];
+    numbers.into_iter().fold(none, |[low, high], x| [low.min(x), high.max(x)])
 }
 
 /// The exponent of the largest power of ten that is not above a number.
@@ -146,7 +203,7 @@ mod tests {
 
     #[test]
     fn round_off_is_written_in_its_own_units() {
-        let axis = Axis::linear((-2.2e-16, 4.4e-16), 0.05, 5);
+        let axis = Axis::linear([-2.2e-16, 4.4e-16], 0.05, 5);
         assert_eq!(axis.label("|ΔH|", ""), "|ΔH| (10⁻¹⁶)");
         assert_eq!(axis.label("|ΔH|", "J"), "|ΔH| (10⁻¹⁶ J)");
         assert!((axis.reading(2.2e-16) - 2.2).abs() < 1e-12);
@@ -154,32 +211,32 @@ mod tests {
 
     #[test]
     fn ordinary_numbers_are_written_as_they_are() {
-        let axis = Axis::linear((0.0, 1.0), 0.0, 5);
+        let axis = Axis::linear([0.0, 1.0], 0.0, 5);
         assert_eq!([0.0, 0.2, -0.4].map(|x| written(&axis, x)), ["0", "0.2", "−0.4"]);
         assert_eq!((axis.label("t", ""), axis.label("t", "s")), ("t".into(), "t (s)".into()));
-        assert_eq!(written(&Axis::linear((0.0, 2e4), 0.0, 4), 5e3), "5000");
-        assert_eq!(written(&Axis::linear((0.0, 1.0), 0.0, 4), 0.5), "0.50");
+        assert_eq!(written(&Axis::linear([0.0, 2e4], 0.0, 4), 5e3), "5000");
+        assert_eq!(written(&Axis::linear([0.0, 1.0], 0.0, 4), 0.5), "0.50");
     }
 
     #[test]
     fn an_axis_begins_at_zero_where_that_is_near() {
-        let low = |low| Axis::linear((low, 30.0), 0.0, 4).low;
+        let low = |low| Axis::linear([low, 30.0], 0.0, 4).low;
         assert_eq!((low(0.1), low(10.0)), (0.0, 10.0));
         for value in [0.0, 3.0, -1e-300] {
-            let axis = Axis::linear((value, value), 0.05, 5);
+            let axis = Axis::linear([value, value], 0.05, 5);
             assert!(axis.low < axis.reading(value) && axis.reading(value) < axis.high);
         }
     }
 
     #[test]
     fn decades_are_powers_of_ten() {
-        let axis = Axis::logarithmic((1e-15, 0.5));
+        let axis = Axis::logarithmic([1e-15, 0.5]);
         let labels = (0..=15).map(|n| written(&axis, 10_f64.powi(n)));
         let labels: Vec<String> = labels.filter(|label| !label.is_empty()).collect();
         assert_eq!(labels, ["10⁻¹⁵", "10⁻¹²", "10⁻⁹", "10⁻⁶", "10⁻³", "10⁰"]);
-        let narrow = Axis::logarithmic((0.03, 0.04));
+        let narrow = Axis::logarithmic([0.03, 0.04]);
         assert_eq!([2.0, 5.0].map(|x| written(&narrow, x)), ["2×10⁻²", "5×10⁻²"]);
-        let counts = Axis::logarithmic((2.0, 12.0));
+        let counts = Axis::logarithmic([2.0, 12.0]);
         assert_eq!([2.0, 10.0].map(|x| written(&counts, x)), ["2", "10"]);
     }
 }

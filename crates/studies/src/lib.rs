@@ -62,6 +62,7 @@ mod axis;
 mod globe;
 mod header;
 mod log_log;
+mod panel;
 mod panels;
 mod student;
 

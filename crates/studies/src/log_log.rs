@@ -9,9 +9,8 @@ use kuva::render::layout::ComputedLayout;
 use kuva::render::render::render_multiple;
 
 use crate::{
-    axis::{Axis, layout},
+    axis::{Axis, Room, layout, room_left},
     order::Order,
-    panels::range,
     plot::{self, GREY, INK, NUMBER, PlotError, color},
 };
 
@@ -125,8 +124,8 @@ impl LogLog {
             plot::check(&series.label, points, "logarithmic axes", fits)?;
         }
         let points = || self.series.iter().flat_map(|series| &series.points);
-        let x = Axis::logarithmic(range(points().map(|p| p.0)));
-        let y = Axis::logarithmic(range(points().map(|p| p.1)));
+        let x = Axis::logarithmic(points().map(|p| p.0));
+        let y = Axis::logarithmic(points().map(|p| p.1));
         let mut plots = Vec::new();
         let mut layout = layout(&x, &y)
             .with_x_label(&self.horizontal)
@@ -134,30 +133,26 @@ impl LogLog {
             .with_legend_position(LegendPosition::OutsideRightTop)
             .with_legend_box(false);
         for &p in &self.guides {
-            let [start, corner, end] = self.guide_points((&x, &y), p);
+            let [start, corner, end] = self.guide_points(&x, &y, p);
             let line = LinePlot::new().with_data([start, corner, end, start]).with_color(GREY);
             plots.push(Plot::Line(line.with_stroke_width(1.0)));
             let beside = (end.0 * x.fraction(0.025), (corner.1 * end.1).sqrt());
             let label = TextAnnotation::new(p.to_string(), beside.0, beside.1);
             layout = layout.with_annotation(label.with_color(INK).with_font_size(NUMBER));
         }
-        self.series.iter().for_each(|series| series.plots((&x, &y), &mut plots));
+        self.series.iter().for_each(|series| series.plots(&x, &y, &mut plots));
         for problem in self.series.chunk_by(|_, next| next.look.rank > 0) {
             let entries = problem.iter().map(Series::legend).collect();
             layout = layout.with_legend_group(&problem[0].label, entries);
         }
         let computed = ComputedLayout::from_layout(&layout);
-        // Numbers such as 2×10⁴ are wider than the room that is computed for them.
-        let (left, right) = (computed.margin_left.ceil() + 12.0, computed.margin_right.ceil());
+        let (left, right) = (room_left(&layout).ceil(), computed.margin_right.ceil());
         let rows: usize = self.series.iter().map(|series| 2 - series.look.rank.min(1)).sum();
-        let height = (FRAME.1 + BELOW).max(ROW * rows as f64 + 24.0);
-        let size = (left + FRAME.0 + right, TOP + height);
-        (layout.width, layout.height) = (Some(size.0), Some(size.1));
-        layout.x_label_offset = (0.0, FRAME.1 + BELOW - height);
-        let layout =
-            layout.with_force_margins(left, right).with_force_margins_y(TOP, height - FRAME.1);
-        let mut sheet = plot::sheet(size, &self.title, left + 0.5 * FRAME.0);
-        plot::place(&mut sheet, (0.0, 0.0), render_multiple(plots, layout).elements);
+        let below = BELOW.max(ROW * rows as f64 + 24.0 - FRAME.1);
+        let room = Room { frame: FRAME, left, right, top: TOP, below };
+        layout.x_label_offset = (0.0, BELOW - below);
+        let mut sheet = plot::sheet(room.size(), &self.title, left + 0.5 * FRAME.0);
+        plot::place(&mut sheet, (0.0, 0.0), render_multiple(plots, room.around(layout)).elements);
         Ok(plot::svg(&sheet))
     }
 
@@ -172,7 +167,7 @@ impl LogLog {
 
     /// A triangle of slope `p` to the lower right of the middle of the series it fits best, in readings of
     /// the axes.
-    fn guide_points(&self, (x, y): (&Axis, &Axis), p: f64) -> [(f64, f64); 3] {
+    fn guide_points(&self, x: &Axis, y: &Axis, p: f64) -> [(f64, f64); 3] {
         let misfit = |series: &&Series| (series.slope() - p).abs();
         let nearest = self.series.iter().min_by(|a, b| misfit(a).total_cmp(&misfit(b)));
         let (low, high) = nearest.map_or_else(Default::default, Series::middle);
@@ -214,7 +209,7 @@ impl Series {
     }
 
     /// Its line, its markers, and the hollow markers of round-off, for `kuva`.
-    fn plots(&self, (x, y): (&Axis, &Axis), plots: &mut Vec<Plot>) {
+    fn plots(&self, x: &Axis, y: &Axis, plots: &mut Vec<Plot>) {
         let at = |(a, b): &(f64, f64)| (x.reading(*a), y.reading(*b));
         let (color, style) = (color(self.look.line), self.look.style());
         let line = LinePlot::new().with_data(self.points.iter().map(at)).with_color(color);
@@ -289,6 +284,20 @@ mod tests {
         assert_eq!(figure().svg().unwrap(), figure().svg().unwrap());
         let bare = LogLog::new("t", "h", "error").series("s", with_plateau()).svg().unwrap();
         assert!(figure().svg().unwrap().len() > bare.len());
+    }
+
+    #[test]
+    fn the_name_of_the_vertical_axis_is_beside_its_numbers() {
+        let points = [(2.0, 1530.0), (4.0, 8915.0), (32.0, 394_593.0)];
+        let svg = LogLog::new("t", "n", "name").series("s", points).svg().unwrap();
+        let x = |text: &str| -> f64 {
+            let line = svg.lines().find(|line| line.contains(&format!(">{text}<"))).unwrap();
+            let x = line.split('"').nth(1).unwrap();
+            x.parse().unwrap()
+        };
+        let left_of_the_number = x("2×10⁴") - plot::length("2×10⁴", NUMBER);
+        // The name is written upwards from its base line.
+        assert!(0.5 * f64::from(plot::NAME) < x("name") && x("name") < left_of_the_number, "{svg}");
     }
 
     #[test]

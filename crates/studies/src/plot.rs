@@ -9,11 +9,7 @@ use std::{fs, io, path::PathBuf};
 use kuva::backend::svg::SvgBackend;
 use kuva::render::render::{PathData, Primitive, Scene, TextAnchor};
 
-pub use crate::{
-    globe::Globe,
-    log_log::LogLog,
-    panels::{Panel, Panels},
-};
+pub use crate::{globe::Globe, log_log::LogLog, panel::Panel, panels::Panels};
 
 /// Why a figure could not be drawn.
 #[derive(Debug, thiserror::Error)]

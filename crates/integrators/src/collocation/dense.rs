@@ -51,7 +51,8 @@ pub(super) fn between<Y: Metriplectic>(
     let q = Y::Manifold::coordinates(step.x, step.end);
     let line = || Y::Manifold::chart(step.x, &(q * theta));
     let entropy = promises.entropy.then(|| entropy(tableau, system, step, theta));
-    Some(dense::onto_laws(system, step, promises, (theta, entropy), (y, line)))
+    let target = dense::Target::new(step, promises, theta, entropy);
+    Some(target.reached_from(system, &y, line))
 }
 
 /// The end of a step of size `θh`.

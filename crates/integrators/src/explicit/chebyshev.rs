@@ -13,7 +13,7 @@
 //! differences of rates (§3 of the same), and again after some steps, from the direction that was found last.
 
 use super::flow::StageFlow;
-use super::memory::{Here, LastStep, MemoryOf, STAGES};
+use super::memory::{Here, LastStep, MemoryOf};
 use super::step::{Refused, stage};
 use super::tableau::Tableau;
 use crate::method::{Element, Vector};
@@ -89,7 +89,8 @@ pub(super) fn stages<F: StageFlow>(
     let [mut produced_before, mut produced] = [0.0, first * h * production];
     for _ in 2..=count {
         let Recursion { mu, nu, rate, start_rate } = c.next();
-        let (k, sigma) = stage(flow, x, &q).ok_or_else(|| Refused::outside(flow, x, &q))?;
+        let Here { velocity: k, production: sigma } =
+            stage(flow, x, &q).ok_or_else(|| Refused::outside(flow, x, &q))?;
         let next = Vector::zip([&q, &before, &k, &start], |[q, before, k, start]| {
             mu * q + nu * before + h * (rate * k + start_rate * start)
         });
@@ -99,15 +100,17 @@ pub(super) fn stages<F: StageFlow>(
         produced_before = std::mem::replace(&mut produced, next);
     }
     let zero = start.zero();
-    let mut stages: [(F::Vector, f64); STAGES] = std::array::from_fn(|_| (zero.clone(), 0.0));
-    stages[0] = (start, production);
+    let mut stages = Here::at_rest(&zero);
+    stages[0] = Here { velocity: start, production };
     Ok(LastStep { stages, known: 1, before: zero, end: q, rise: produced })
 }
 
 /// The estimate `0.8 (q₀ − q) + 0.4 h (k₀ + k)` of the local error (eq. 2.9).
 pub(super) fn error<V: Vector>(last: &LastStep<V>, h: f64) -> V {
-    let [(start, _), (end, _), ..] = &last.stages;
-    V::zip([&last.end, start, end], |[q, start, end]| 0.4 * h * (start + end) - 0.8 * q)
+    let [start, end, ..] = &last.stages;
+    V::zip([&last.end, &start.velocity, &end.velocity], |[q, start, end]| {
+        0.4 * h * (start + end) - 0.8 * q
+    })
 }
 
 /// The least number of stages with `hρ ≤ β`.
@@ -200,7 +203,7 @@ fn spectrum<F: StageFlow>(
         }
         let factor = small / length;
         let q = direction.map(|d| factor * d);
-        let (k, _) = stage(flow, x, &q)?;
+        let k = stage(flow, x, &q)?.velocity;
         direction = Vector::zip([&k, velocity], |[k, velocity]| k - velocity);
         let found = direction.relative_to(&sizes) / small;
         let converged = (found - radius).abs() <= CHANGE * found;

@@ -42,16 +42,15 @@ pub(super) fn between<F: StageFlow>(
         .map(|row| (combined(1.0, row, &last.stages), produced(row, &last.stages)));
     let rows: Vec<(F::Vector, f64)> = rows.collect();
     let mut higher = vec![0.0; rows.len()];
-    let [(before, production_before), (after, production_after)] = ends;
     let q = last.end.with(|i| {
-        let slopes = [h * before.get(i), h * after.get(i)];
+        let slopes = ends.map(|end| h * end.velocity.get(i));
         for (number, (row, _)) in higher.iter_mut().zip(&rows) {
             *number = h * row.get(i);
         }
         polynomial(last.end.get(i), slopes, &higher, theta)
     });
     let target = promises.entropy.then(|| {
-        let slopes = [h * production_before, h * production_after];
+        let slopes = ends.map(|end| h * end.production);
         for (number, (_, row)) in higher.iter_mut().zip(&rows) {
             *number = h * row;
         }
@@ -60,7 +59,8 @@ pub(super) fn between<F: StageFlow>(
     });
     let on_line = || flow.stage(step.x, &line).unwrap_or_else(|| step.x.clone());
     let y = flow.stage(step.x, &q).unwrap_or_else(on_line);
-    Some(dense::onto_laws(flow, step, promises, (theta, target), (y, on_line)))
+    let target = dense::Target::new(step, promises, theta, target);
+    Some(target.reached_from(flow, &y, on_line))
 }
 
 /// Takes the stages that only the dense output needs, once.

@@ -20,7 +20,7 @@ pub(super) fn is_at_the_edge<F: StageFlow>(
 ) -> bool {
     let sizes = flow.sizes(x);
     let one = sizes.map(|_| 1.0);
-    let before = [&last.before, &last.stages[tableau.stages.len()].0];
+    let before = [&last.before, &last.stages[tableau.stages.len()].velocity];
     // One array at a time, because a large system has no room for more.
     let norm = |end: &F::Vector, before: &F::Vector, factor: f64| {
         let ratios =
@@ -76,7 +76,7 @@ pub(super) fn limiting_sites<F: StageFlow>(
     }
     let error = largest(Some(combined(h, tableau.errors[0], &last.stages)));
     let count = tableau.stages.len();
-    let [before, rates] = [count, count + 1].map(|stage| &last.stages[stage].0);
+    let [before, rates] = [count, count + 1].map(|stage| &last.stages[stage].velocity);
     let stiffness = if is_at_the_edge(tableau, flow, x, h, last, rates) {
         let change = Vector::zip([rates, before], |[rates, before]| rates - before);
         change.largest_site(&flow.sizes(x))

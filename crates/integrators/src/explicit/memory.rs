@@ -57,18 +57,25 @@ impl Produced {
     }
 }
 
-/// What is known at a state.
+/// The motion at a state, or that of a stage in the chart at the start of its step.
 #[derive(Clone, Debug)]
 pub(super) struct Here<V> {
     pub(super) velocity: V,
     pub(super) production: f64,
 }
 
+impl<V: Vector> Here<V> {
+    /// As many at rest as there may be stages; `zero` is the velocity.
+    pub(super) fn at_rest(zero: &V) -> [Self; STAGES] {
+        std::array::from_fn(|_| Self { velocity: zero.clone(), production: 0.0 })
+    }
+}
+
 /// A step, for its error and its dense output.
 #[derive(Clone, Debug)]
 pub(super) struct LastStep<V> {
     /// The rates of the stages in the chart at its start, and their entropy production.
-    pub(super) stages: [(V, f64); STAGES],
+    pub(super) stages: [Here<V>; STAGES],
     /// The stages that are known.
     pub(super) known: usize,
     /// The coordinates of the last stage before the end.
@@ -151,18 +158,18 @@ impl<V: Vector> Memory for ExplicitMemory<V> {
 
 /// `h Σ_j w_j k_j` over the rates of the stages.
 #[inline]
-pub(super) fn combined<V: Vector>(h: f64, row: Row, stages: &[(V, f64); STAGES]) -> V {
+pub(super) fn combined<V: Vector>(h: f64, row: Row, stages: &[Here<V>; STAGES]) -> V {
     if row.is_empty() {
-        return stages[0].0.zero();
+        return stages[0].velocity.zero();
     }
     V::combination(h, row.len(), |j| {
         let (stage, w) = row[j];
-        (w, &stages[stage].0)
+        (w, &stages[stage].velocity)
     })
 }
 
 /// `Σ_j w_j σ_j` over the entropy production of the stages.
 #[inline]
-pub(super) fn produced<V>(row: Row, stages: &[(V, f64); STAGES]) -> f64 {
-    row.iter().fold(0.0, |sum, &(j, w)| sum + w * stages[j].1)
+pub(super) fn produced<V>(row: Row, stages: &[Here<V>; STAGES]) -> f64 {
+    row.iter().fold(0.0, |sum, &(j, w)| sum + w * stages[j].production)
 }

@@ -4,14 +4,11 @@ use metriplectic_dynamics::SecondLaw;
 
 use super::chebyshev;
 use super::estimates::is_at_the_edge;
-use super::flow::{Projected, ProjectionError, StageFlow, Target};
-use super::memory::{
-    ExplicitMemory, Here, LastStep, MemoryOf, Produced, STAGES, combined, produced,
-};
+use super::flow::StageFlow;
+use super::landing::{Landed, Onto};
+use super::memory::{ExplicitMemory, Here, LastStep, MemoryOf, Produced, combined, produced};
 use super::tableau::Tableau;
-use crate::method::{
-    Effort, Element, EntropyStep, Evidence, Laws, Refusal, StepStart, Taken, Vector,
-};
+use crate::method::{Effort, Element, EntropyStep, Evidence, Refusal, StepStart, Taken, Vector};
 use crate::step_error::StepError;
 
 /// Falls of the entropy in a row after which a state that hardly moves is held.
@@ -20,16 +17,8 @@ const FALLS: u32 = 5;
 const HARDLY: f64 = 1e-6;
 /// The same relative to the error that is allowed.
 const HARDLY_ALLOWED: f64 = 1e-3;
-/// The fraction of the round-off of an increment by which the entropy may fall: less than what the certificate
-/// counts as a fall.
-const FALL: f64 = 0.875;
-/// The same relative to the sizes of the entries: some units of round-off.
-const NEAR: f64 = 64.0 * f64::EPSILON;
 /// How often a step of a fixed size is halved.
 const HALVES: u32 = 12;
-/// The length of a projection in units of the error that is allowed.
-const FAR: f64 = 10.0;
-
 /// Why a step is not taken.
 pub(super) enum Refused {
     /// A stage is beyond the edge of the chart or the domain, or has no value; at a site, if the flow says which.
@@ -153,8 +142,8 @@ fn try_step<F: StageFlow>(
         memory.last = Some(last);
     } else {
         // The state has stayed where it was.
-        let [(velocity, production), ..] = last.stages;
-        memory.here = Some(Here { velocity, production });
+        let [here, ..] = last.stages;
+        memory.here = Some(here);
     }
     taken
 }
@@ -170,7 +159,7 @@ fn finished<F: StageFlow>(
     memory: &mut MemoryOf<F>,
 ) -> Result<Taken<F>, Refused> {
     let x = start.x;
-    let dissipates = last.stages[0].1 != 0.0;
+    let dissipates = last.stages[0].production != 0.0;
     if let Some(lost) = &memory.lost {
         last.end = Vector::zip([&last.end, lost], |[end, lost]| end + lost);
     } else if !memory.read.is_empty() {
@@ -203,10 +192,10 @@ fn finished<F: StageFlow>(
         .ok_or_else(|| Refused::outside(flow, x, &last.end))?;
     last.end = flow.stage_coordinates(x, &end.x);
     let rates = flow.stage_rates(x, (&last.end, &end.x), &next.velocity);
-    let rests = end.x == *x && is_zero(&last.stages[0].0);
+    let rests = end.x == *x && is_zero(&last.stages[0].velocity);
     let stability =
         tableau.stability.is_finite() && is_at_the_edge(tableau, flow, x, h, last, &rates);
-    last.stages[last.known] = (rates, next.production);
+    last.stages[last.known] = Here { velocity: rates, production: next.production };
     last.known += 1;
 
     let entropy_step = (flow.entropy_law() == SecondLaw::Exact).then_some(how);
@@ -255,8 +244,8 @@ fn stages<F: StageFlow>(
     here: Here<F::Vector>,
 ) -> Result<LastStep<F::Vector>, Refused> {
     let zero = here.velocity.zero();
-    let mut stages: [(F::Vector, f64); STAGES] = std::array::from_fn(|_| (zero.clone(), 0.0));
-    stages[0] = (here.velocity, here.production);
+    let mut stages = Here::at_rest(&zero);
+    stages[0] = here;
     let mut before = zero;
     for (i, row) in tableau.stages.iter().enumerate() {
         before = combined(h, row, &stages);
@@ -266,7 +255,7 @@ fn stages<F: StageFlow>(
     let end = combined(h, tableau.end, &stages);
     let rise = h * produced(tableau.end, &stages);
     for &stage in tableau.passed {
-        stages[stage].0 = stages[0].0.zero();
+        stages[stage].velocity = stages[0].velocity.zero();
     }
     Ok(LastStep { stages, known: tableau.stages.len() + 1, before, end, rise })
 }
@@ -277,10 +266,10 @@ pub(super) fn stage<F: StageFlow>(
     flow: &F,
     x: &Element<F>,
     q: &F::Vector,
-) -> Option<(F::Vector, f64)> {
+) -> Option<Here<F::Vector>> {
     let y = flow.stage(x, q)?;
     let (v, production) = flow.motion(&y)?;
-    Some((flow.stage_rates(x, (q, &y), &v), production))
+    Some(Here { velocity: flow.stage_rates(x, (q, &y), &v), production })
 }
 
 fn is_zero(v: &impl Vector) -> bool {
@@ -294,110 +283,4 @@ fn hardly_moves<F: StageFlow>(flow: &F, start: &StepStart<'_, F>, q: &F::Vector)
         let allowed = start.allowed.as_ref().map_or(0.0, |allowed| allowed.get(i));
         q.get(i).abs() <= (HARDLY * sizes.get(i)).max(HARDLY_ALLOWED * allowed)
     })
-}
-
-/// Where a step ends.
-struct Landed<F: StageFlow> {
-    end: Projected<F>,
-    produced: Produced,
-    how: EntropyStep,
-}
-
-/// The projection of the end of a step onto the laws, and the decision whether it is taken.
-struct Onto<'a, F: StageFlow> {
-    tableau: &'static Tableau,
-    flow: &'a F,
-    start: &'a StepStart<'a, F>,
-    h: f64,
-    last: &'a LastStep<F::Vector>,
-    produced: Produced,
-}
-
-impl<F: StageFlow> Onto<'_, F> {
-    #[inline]
-    fn decide(&self, y: Element<F>) -> Result<Landed<F>, Refused> {
-        let Self { flow, start, last, produced, .. } = *self;
-        let limit = match &start.allowed {
-            Some(allowed) => allowed.map(|error| FAR * error),
-            // Round-off is never too far.
-            None => {
-                let sizes = flow.sizes(start.x);
-                Vector::zip([&last.end, &sizes], |[end, size]| (0.5 * end.abs()).max(NEAR * size))
-            }
-        };
-        let embedded = self.embedded_error();
-        let error = flow.weighs_errors().then(|| embedded.as_ref().unwrap_or(&last.stages[0].0));
-        let onto = |y, entropy, with_entropy| {
-            let laws = Laws { entropy, ..start.reference.clone() };
-            let limit = Some(&limit);
-            flow.project(y, &Target { laws: &laws, with_entropy, limit, error })
-        };
-        if flow.entropy_law() != SecondLaw::Exact {
-            let end = onto(y, start.reference.entropy, false).map_err(refused)?;
-            return Ok(Landed { end, produced, how: EntropyStep::Free });
-        }
-        let mut y = Some(y);
-        if self.is_trusted()
-            && let Some(y) = y.take()
-        {
-            let target = produced.plus(last.rise);
-            if let Ok(end) = onto(y, target.sum, true)
-                && !self.falls(&end)
-            {
-                let largest = produced.largest.max(end.entropy);
-                let produced = Produced { largest, ..target };
-                return Ok(Landed { end, produced, how: EntropyStep::Targeted });
-            }
-        }
-        let again = || flow.stage(start.x, &last.end).ok_or(Refused::Outside(None));
-        let y = y.map_or_else(again, Ok)?;
-        let end = onto(y, produced.sum, false).map_err(refused)?;
-        let least = produced.largest - 2.0 * end.entropy_round_off;
-        if end.entropy < least || self.falls(&end) {
-            return Err(Refused::Falls);
-        }
-        let largest = produced.largest.max(end.entropy);
-        let produced = Produced { largest, ..Produced::from(end.entropy) };
-        Ok(Landed { end, produced, how: EntropyStep::Free })
-    }
-
-    /// The embedded error, if the flow weighs errors and it does not need the end of the step. Otherwise the
-    /// velocity at the start takes its place.
-    fn embedded_error(&self) -> Option<F::Vector> {
-        let Self { tableau, flow, h, last, .. } = *self;
-        let [row, _] = tableau.errors;
-        let known = !row.is_empty() && row.iter().all(|&(stage, _)| stage < last.known);
-        (flow.weighs_errors() && known).then(|| combined(h, row, &last.stages))
-    }
-
-    /// Whether the entropy that was produced may be aimed at.
-    fn is_trusted(&self) -> bool {
-        let Self { tableau, h, last, .. } = *self;
-        let doubt = if tableau.order == 8 {
-            (h * produced(tableau.errors[0], &last.stages)).abs()
-        } else {
-            0.0
-        };
-        last.rise >= 0.0 && doubt <= 0.5 * last.rise
-    }
-
-    /// Whether the entropy at the end is below the one at the start by more than its round-off. Near an equilibrium,
-    /// where every change is round-off, the flow says whether it falls.
-    fn falls(&self, end: &Projected<F>) -> bool {
-        let (flow, start) = (self.flow, self.start);
-        let rise = flow.values(&end.gradients).entropy - start.values.entropy;
-        let round_off = flow.entropy_round_off([start.x, &end.x]);
-        if rise.abs() > round_off {
-            return rise < 0.0;
-        }
-        let dissipates = self.last.stages[0].1 != 0.0;
-        rise < -FALL * round_off || (dissipates && flow.falls_below_round_off(start.x, &end.x))
-    }
-}
-
-fn refused(error: ProjectionError) -> Refused {
-    match error {
-        ProjectionError::Outside => Refused::Outside(None),
-        ProjectionError::NoEntropy | ProjectionError::Far => Refused::Far,
-    }
 }

@@ -1,12 +1,16 @@
 //! What a run did to its laws.
 
+mod text;
+
+#[cfg(feature = "serde")]
 use std::fmt;
 
 use metriplectic_dynamics::SecondLaw;
 use metriplectic_dynamics::invariants::Kind;
 
-use crate::digits::{Digits, counted};
-use crate::method::{Effort, Element, EntropyStep, Evidence, Flow, Laws, LimitingSites, Promises};
+use crate::method::{
+    Effort, Element, EntropyStep, Evidence, Flow, Laws, LimitingSites, Promises, Taken,
+};
 use crate::round_off::bound::of_a_law;
 
 /// The balance of a run: what became of the two laws, of the manifold, and what it cost.
@@ -155,12 +159,15 @@ impl InvariantBalance {
 /// deviation that decays at this rate, with the opposite sign.
 const STIFF: f64 = 10.0;
 
-/// The local error, relative to the sizes of the entries, from which on a motion is not resolved.
-const UNRESOLVED: f64 = 0.1;
-
 #[cfg(feature = "serde")]
 fn by_name<S: serde::Serializer>(name: &impl fmt::Debug, to: S) -> Result<S::Ok, S::Error> {
     to.collect_str(&format_args!("{name:?}"))
+}
+
+/// A step that was taken, and its size.
+pub(crate) struct StepOf<'a, F: Flow> {
+    pub(crate) taken: &'a Taken<F>,
+    pub(crate) h: f64,
 }
 
 impl Certificate {
@@ -204,15 +211,16 @@ impl Certificate {
         }
     }
 
-    /// Enters a step of size `h` between two states with these laws.
+    /// Enters a step from a state with these laws.
     #[inline]
     pub(crate) fn enter<F: Flow>(
         &mut self,
         flow: &F,
-        [(x, before), (next, after)]: [(&Element<F>, &Laws<F::Numbers>); 2],
-        h: f64,
-        (evidence, effort): (Evidence, Effort),
+        x: &Element<F>,
+        before: &Laws<F::Numbers>,
+        step: StepOf<'_, F>,
     ) {
+        let StepOf { taken: Taken { x: next, values: after, evidence, effort }, h } = step;
         self.smallest_step = if self.steps == 0 { h } else { self.smallest_step.min(h) };
         self.largest_step = self.largest_step.max(h);
         let error = (after.energy - self.initial_energy).abs();
@@ -240,13 +248,13 @@ impl Certificate {
         self.friction = self.friction.max(evidence.friction);
         self.max_manifold_defect = self.max_manifold_defect.max(flow.defect(next));
         self.steps += 1;
-        self.projected_steps.enter(&evidence);
+        self.projected_steps.enter(evidence);
         if let Some(laws) = evidence.stages {
             let balance = self.stages.get_or_insert_default();
             balance.defect = balance.defect.max(laws.defect);
             balance.surplus += laws.surplus;
         }
-        self.effort += effort;
+        self.effort += *effort;
         self.worst_iterations = self.worst_iterations.max(effort.iterations);
     }
 
@@ -295,109 +303,6 @@ impl Certificate {
     }
 }
 
-impl fmt::Display for Certificate {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let steps = counted(self.steps, "step", "steps");
-        let (error, relative) = (self.max_energy_error, self.relative_to());
-        if !self.promises.energy {
-            writeln!(
-                f,
-                "first law:   not promised; |H − H₀| ≤ {error:.1e}{relative}, over {steps}"
-            )?;
-        } else if self.keeps_energy() {
-            writeln!(f, "first law:   |H − H₀| ≤ {error:.1e}{relative}, over {steps}")?;
-        } else {
-            let allowed = of_a_law(self.energy_scale);
-            writeln!(
-                f,
-                "first law:   BROKEN: |H − H₀| = {error:.1e}{relative}, round-off is {allowed:.1e}, over {steps}"
-            )?;
-        }
-        match self.second_law {
-            SecondLaw::NoEntropy => writeln!(f, "second law:  no entropy"),
-            _ if !self.promises.entropy => {
-                writeln!(f, "second law: not promised; {}", self.entropy_line())
-            }
-            _ => writeln!(f, "second law:  {}", self.entropy_line()),
-        }?;
-        if self.projected {
-            writeln!(f, "friction:    projected so that K dH = 0, not quite the tensor given")?;
-        }
-        if self.is_stiff() {
-            writeln!(f, "friction not damped: h|K'| = {:.1e}; `Radau` damps it", self.friction)?;
-        }
-        for (index, kept) in self.invariants.iter().enumerate() {
-            let InvariantBalance { kind, initial, max_error, .. } = kept;
-            writeln!(
-                f,
-                "{:<13}{}|L − L₀| ≤ {max_error:.1e}, L₀ = {}",
-                format!("{kind} {}:", index + 1),
-                if !self.promises.invariants {
-                    "not promised; "
-                } else if kept.is_kept() {
-                    ""
-                } else {
-                    "BROKEN: "
-                },
-                Digits(*initial)
-            )?;
-        }
-        writeln!(f, "manifold:    defect ≤ {:.1e}", self.max_manifold_defect)?;
-        if self.smallest_step < self.largest_step || self.rejected > 0 {
-            write!(
-                f,
-                "step sizes:  {:.1e} to {:.1e}, {} rejected",
-                self.smallest_step, self.largest_step, self.rejected
-            )?;
-            if let Some(site) = self.limiting_sites.error
-                && !self.is_limited_by_stability()
-            {
-                write!(f, "; the largest error is at site {site}")?;
-            }
-            writeln!(f)?;
-        }
-        // Where friction is stiff the estimate is far too large, and the line above says so.
-        if !self.is_stiff()
-            && let Some(error) = self.local_error.filter(|error| *error > UNRESOLVED)
-        {
-            writeln!(
-                f,
-                "accuracy:    the motion is not resolved: local errors up to {error:.1e} of the state in a step"
-            )?;
-        }
-        if let Some(StageBalance { defect, surplus }) = self.stages {
-            write!(f, "stages:      laws off by {defect:.1e} of their terms in the worst step")?;
-            if surplus > 0.0 {
-                write!(f, ", damping added {surplus:.1e} to S")?;
-            }
-            writeln!(f)?;
-        }
-        self.projections(f)?;
-        if self.effort == Effort::default() {
-            return write!(f, "solver:      explicit steps, none split");
-        }
-        if self.effort.iterations == 0 {
-            let splits = counted(self.effort.splits, "split", "splits");
-            return write!(f, "solver:      explicit steps, {splits}");
-        }
-        write!(
-            f,
-            "solver:      {} ({} in the worst step), {}",
-            counted(self.effort.iterations, "Newton iteration", "Newton iterations"),
-            self.worst_iterations,
-            counted(self.effort.splits, "retry", "retries")
-        )?;
-        if self.effort.continued > 0 {
-            let steps = counted(self.effort.continued, "continuation", "continuations");
-            write!(f, ", {steps} in the step size")?;
-        }
-        if self.effort.globalised > 0 {
-            write!(f, ", {} of the globaliser", counted(self.effort.globalised, "call", "calls"))?;
-        }
-        Ok(())
-    }
-}
-
 /// The fraction of steps at the edge of stability from which on stability sets the steps of a run.
 const AT_THE_EDGE: f64 = 0.5;
 
@@ -406,116 +311,7 @@ impl Certificate {
     pub const fn is_limited_by_stability(&self) -> bool {
         self.projected_steps.stability as f64 > AT_THE_EDGE * self.steps as f64
     }
-
-    /// How the steps of an explicit method found the entropy, and what has set their size.
-    fn projections(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let ProjectedSteps { targeted, free, held, stability } = self.projected_steps;
-        if self.projected_steps.all() > 0 {
-            let falls = counted(self.falls_avoided, "fall", "falls");
-            writeln!(
-                f,
-                "entropy:     {targeted} steps targeted, {free} free, {held} held; {falls} avoided by a smaller step"
-            )?;
-        }
-        if self.is_limited_by_stability() {
-            let steps = counted(self.steps, "step", "steps");
-            let LimitingSites { stiffness, .. } = self.limiting_sites;
-            let site = stiffness.map_or_else(String::new, |site| format!(" at site {site}"));
-            writeln!(
-                f,
-                "stability:   it sets the size of {stability} of {steps}{site}, and not the tolerance; an implicit \
-                 method, such as `Radau`, takes larger ones, and so does `RungeKuttaChebyshev` if friction sets it"
-            )?;
-        } else if let (0, Some(site)) = (stability, self.limiting_sites.stiffness) {
-            // Few steps at the edge are no stiffness; a method without an edge has looked for it.
-            writeln!(f, "stiffness:   the motion is stiffest at site {site}")?;
-        }
-        Ok(())
-    }
-
-    /// The energy at the start, and the error relative to it where it is not zero.
-    fn relative_to(&self) -> String {
-        let start = self.initial_energy;
-        if start.abs() > 0.0 {
-            format!(", {:.1e} of H₀ = {}", self.max_relative_energy_error(), Digits(start))
-        } else {
-            " from H₀ = 0".to_owned()
-        }
-    }
-
-    fn entropy_line(&self) -> String {
-        let falls = match self.entropy_falls {
-            0 => "it never fell".to_owned(),
-            n => format!("it fell on {}", counted(n, "step", "steps")),
-        };
-        let slope = if self.min_entropy_slope.is_finite() {
-            format!(", |w_S| ≥ {:.1e}", self.min_entropy_slope)
-        } else {
-            String::new()
-        };
-        format!(
-            "ΔS ≥ {:.1e} on every step, {falls}; S rose by {:.6e}{slope}",
-            self.min_entropy_increment, self.entropy_gained
-        )
-    }
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    const ONE_FALL: Certificate = Certificate {
-        initial_energy: 0.5,
-        max_energy_error: 1e-16,
-        energy_scale: 0.5,
-        initial_entropy: 1.0,
-        min_entropy_increment: -2e-9,
-        entropy_gained: 0.25,
-        entropy_falls: 1,
-        min_entropy_slope: 0.7,
-        invariants: Vec::new(),
-        max_manifold_defect: 0.0,
-        steps: 7,
-        smallest_step: 0.1,
-        largest_step: 0.1,
-        rejected: 0,
-        falls_avoided: 0,
-        projected_steps: ProjectedSteps { targeted: 0, free: 0, held: 0, stability: 0 },
-        stages: None,
-        effort: Effort { iterations: 9, continued: 0, globalised: 0, splits: 1 },
-        worst_iterations: 2,
-        local_error: None,
-        limiting_sites: LimitingSites::new(None, None),
-        promises: Promises::all_laws(true),
-        second_law: SecondLaw::Exact,
-        friction: 0.0,
-        projected: false,
-    };
-
-    #[test]
-    fn one_is_no_plural() {
-        let text = ONE_FALL.to_string();
-        for part in ["over 7 steps", "fell on 1 step;", "9 Newton iterations", "1 retry"] {
-            assert!(text.contains(part), "\"{part}\" is missing in: {text}");
-        }
-        assert!(!text.contains("step sizes"), "{text}");
-        let adaptive = Certificate { smallest_step: 1e-3, rejected: 2, ..ONE_FALL }.to_string();
-        assert!(adaptive.contains("step sizes:  1.0e-3 to 1.0e-1, 2 rejected"), "{adaptive}");
-        let coarse = Certificate { local_error: Some(0.5), ..ONE_FALL };
-        assert!(
-            coarse.to_string().contains("the motion is not resolved: local errors up to 5.0e-1")
-        );
-        let stiff = Certificate { friction: 1e6, ..coarse };
-        assert!(!stiff.to_string().contains("not resolved"), "{stiff}");
-        let text = Certificate {
-            entropy_falls: 2,
-            steps: 1,
-            effort: Effort { iterations: 1, ..ONE_FALL.effort },
-            ..ONE_FALL
-        }
-        .to_string();
-        for part in ["over 1 step\n", "fell on 2 steps;", "1 Newton iteration ("] {
-            assert!(text.contains(part), "\"{part}\" is missing in: {text}");
-        }
-    }
-}
+mod tests;

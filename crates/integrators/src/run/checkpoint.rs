@@ -88,31 +88,48 @@
 //! another way or contract `a*b + c`; and another processor has another library. There the laws hold all the
 //! same, to the same round-off, but the digits of two long runs need not agree.
 
+mod error;
+pub(crate) mod exact;
+#[cfg(feature = "serde")]
+mod file;
+#[cfg(feature = "serde")]
+mod forms;
 mod saved;
 mod validation;
 
-use metriplectic_manifolds::PointError;
+use std::convert::Infallible;
 
-use crate::method::{Control, Effort, Flow, LimitingSites, Memory, Method, StateSpace, Vector};
-use crate::run::certificate::{Certificate, ProjectedSteps, StageBalance};
-use crate::run::controller::{Cap, Controller, Entries, StepSize};
+use crate::method::{Flow, Memory, Method, StateSpace, Vector};
+use crate::run::certificate::Certificate;
+use crate::run::controller::{Rule, StepSize};
 use crate::run::output::StepBefore;
-use crate::run::scales::Scales;
-use crate::run::span::{SpanError, check_end, check_step_size, check_steps};
-use crate::run::steps::{Progress, Steps};
+use crate::run::progress::Progress;
+use crate::run::span::{SpanError, check_end, check_steps};
+use crate::run::steps::Steps;
 use crate::run::trajectory::{Ending, State};
 
-pub(crate) use saved::Exact;
+pub use error::ResumeError;
+pub(crate) use exact::Exact;
 pub use saved::Saved;
 
 /// Where a run was put down; made by [`Steps::checkpoint`], taken up by [`Method::resume`].
 #[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Checkpoint {
     version: u32,
+    /// The run; `None` in a file of another version.
+    run: Option<Box<SavedRun>>,
+}
+
+/// The version of the format that is written and read.
+const VERSION: u32 = 6;
+
+/// A run between two steps, but for its system and its method.
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
+struct SavedRun {
     step: usize,
-    start: Exact,
     time: Exact,
     point: Vec<Exact>,
     /// The velocity there; empty where it cannot be evaluated.
@@ -123,188 +140,32 @@ pub struct Checkpoint {
     kept_entropy: Exact,
     invariants: Vec<Exact>,
     memory: Saved,
-    balance: Balance,
-    step_size: SavedStepSize,
-    count: Option<usize>,
-    every: usize,
-    most: Option<usize>,
-    /// The sizes of the entries so far, and those of the terms of their velocities.
-    sizes: Vec<Exact>,
-    terms: Vec<Exact>,
-    rest: Option<Exact>,
-    /// The largest velocity of each entry.
-    largest_velocity: Vec<Exact>,
-    ending: Option<SavedEnding>,
-}
-
-/// The version of the format that is written and read.
-const VERSION: u32 = 5;
-
-/// The figures of a certificate that the system does not know.
-#[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-struct Balance {
-    initial_energy: Exact,
-    max_energy_error: Exact,
-    energy_scale: Exact,
-    initial_entropy: Exact,
-    min_entropy_increment: Exact,
-    entropy_gained: Exact,
-    entropy_falls: usize,
-    min_entropy_slope: Exact,
-    /// Initial value, largest error and scale of each further invariant.
-    invariants: Vec<(Exact, Exact, Exact)>,
-    friction: Exact,
-    max_manifold_defect: Exact,
-    steps: usize,
-    smallest_step: Exact,
-    largest_step: Exact,
-    rejected: usize,
-    falls_avoided: usize,
-    projected_steps: ProjectedSteps,
-    /// Largest defect and surplus of steps with stages.
-    stages: Option<(Exact, Exact)>,
-    effort: Effort,
-    worst_iterations: usize,
-    local_error: Option<Exact>,
-    #[cfg_attr(feature = "serde", serde(default))]
-    limiting_sites: LimitingSites,
-}
-
-#[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-enum SavedStepSize {
-    Fixed {
-        h: Exact,
-    },
-    Adaptive {
-        end: Exact,
-        tolerance: Exact,
-        entries: SavedEntries,
-        least: Option<Exact>,
-        largest: Option<Exact>,
-        next: Exact,
-        taken: Option<Exact>,
-        error: Option<Exact>,
-        rejected: bool,
-        cap: Option<SavedCap>,
-    },
-}
-
-/// What the second law says of the size of a step.
-#[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-struct SavedCap {
-    size: Exact,
-    before: Exact,
-    steps: u32,
-}
-
-/// What is known of the errors of the entries.
-#[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-enum SavedEntries {
-    Automatic,
-    Scale(Vec<Exact>),
-    Absolute(Vec<Exact>),
-}
-
-#[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-enum SavedEnding {
-    Span,
-    Rest { speed: Exact, largest: Exact },
-    Event { index: usize },
-    Stopped,
-}
-
-/// A checkpoint that cannot be resumed.
-#[derive(Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum ResumeError {
-    /// It was written by another version of this library.
-    #[error(
-        "the checkpoint has format {found}, and {expected} is what is read here; resume it with the version that wrote it"
-    )]
-    Version {
-        /// The format of the checkpoint.
-        found: u32,
-        /// The format of this version.
-        expected: u32,
-    },
-    /// Its point is not one of the manifold.
-    #[error("the point of the checkpoint: {0}")]
-    Point(#[from] PointError),
-    /// A list in it has another length than the system says.
-    #[error(
-        "the checkpoint has {found} {what}, the system {expected}; resume it with the system that it is of"
-    )]
-    Length {
-        /// What the list holds.
-        what: &'static str,
-        /// Its length.
-        found: usize,
-        /// The length that it should have.
-        expected: usize,
-    },
-    /// A field has another value than the checkpoint says.
-    #[error(
-        "the {field} is {found} at the point of the checkpoint, which says {stored}; resume it with the system that it is of"
-    )]
-    AnotherSystem {
-        /// Which field.
-        field: &'static str,
-        /// Its value in the checkpoint.
-        stored: f64,
-        /// Its value in the system.
-        found: f64,
-    },
-    /// The end that it is to be given cannot be that of the run.
-    #[error(transparent)]
-    Span(#[from] SpanError),
-    /// It is of a run in steps of one size, and is to be given a time at which it ends.
-    #[error(
-        "the run takes steps of one size; say how many with `with_steps` instead of `with_end`"
-    )]
-    FixedSteps,
-    /// It is of a run whose steps follow a tolerance, and is to be given a number of steps.
-    #[error(
-        "the steps of the run follow a tolerance; say when it ends with `with_end` instead of `with_steps`"
-    )]
-    AdaptiveSteps,
-    /// A number in it is impossible: by itself, beside the others, or for the system.
-    #[error(
-        "the {what} of the checkpoint is {value}, which no run has that agrees with its other numbers; the \
-         file is damaged: write another one"
-    )]
-    Damaged {
-        /// Which number.
-        what: &'static str,
-        /// Its value.
-        value: f64,
-    },
-}
-
-impl std::fmt::Debug for ResumeError {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        std::fmt::Display::fmt(self, f)
-    }
+    #[cfg_attr(feature = "serde", serde(with = "exact"))]
+    balance: Certificate,
+    progress: Progress<Vec<Exact>>,
 }
 
 impl Checkpoint {
-    /// The number of steps taken.
-    pub const fn step(&self) -> usize {
-        self.step
+    /// The run that was put down.
+    fn run(&self) -> Result<&SavedRun, ResumeError> {
+        let Self { version: found, run } = self;
+        let other = ResumeError::Version { found: *found, expected: VERSION };
+        run.as_deref().filter(|_| *found == VERSION).ok_or(other)
     }
 
-    /// The time reached.
-    pub const fn time(&self) -> f64 {
-        self.time.0
+    /// The number of steps taken; 0 in a file of another version.
+    pub fn step(&self) -> usize {
+        self.run().map_or(0, |run| run.step)
     }
 
-    /// The entries of the point reached.
+    /// The time reached; not a number in a file of another version.
+    pub fn time(&self) -> f64 {
+        self.run().map_or(f64::NAN, |run| run.time.0)
+    }
+
+    /// The entries of the point reached; none in a file of another version.
     pub fn point(&self) -> impl Iterator<Item = f64> {
-        self.point.iter().map(|x| x.0)
+        self.run().into_iter().flat_map(SavedRun::point)
     }
 
     /// The same run in so many steps of one size, those taken so far among them: a run that has reached
@@ -313,18 +174,18 @@ impl Checkpoint {
     /// # Errors
     ///
     /// [`ResumeError::AdaptiveSteps`] if its steps follow a tolerance; [`ResumeError::Span`] if it has taken
-    /// as many already, or the end would be too late for a number.
-    pub fn with_steps(mut self, count: usize) -> Result<Self, ResumeError> {
-        let SavedStepSize::Fixed { h } = self.step_size else {
+    /// as many already, or the end would be too late for a number; [`ResumeError::Version`].
+    pub fn with_steps(self, count: usize) -> Result<Self, ResumeError> {
+        let mut run = self.run()?.clone();
+        let StepSize::Fixed(h) = run.progress.step_size else {
             return Err(ResumeError::AdaptiveSteps);
         };
-        if count <= self.step {
+        if count <= run.step {
             return Err(SpanError::NoSteps.into());
         }
-        check_steps(self.start.0, h.0, count)?;
-        self.count = Some(count);
-        self.go_on();
-        Ok(self)
+        check_steps(run.progress.start, h, count)?;
+        run.progress.count = Some(count);
+        Ok(run.go_on())
     }
 
     /// The same run to another time, in steps that follow its tolerance: a run that has reached its end
@@ -333,21 +194,34 @@ impl Checkpoint {
     /// # Errors
     ///
     /// [`ResumeError::FixedSteps`] if its steps are of one size; [`ResumeError::Span`] if the end is not
-    /// after the time reached.
-    pub fn with_end(mut self, end: f64) -> Result<Self, ResumeError> {
-        let SavedStepSize::Adaptive { end: old, .. } = &mut self.step_size else {
+    /// after the time reached; [`ResumeError::Version`].
+    pub fn with_end(self, end: f64) -> Result<Self, ResumeError> {
+        let mut run = self.run()?.clone();
+        let StepSize::Adaptive(controller) = &mut run.progress.step_size else {
             return Err(ResumeError::FixedSteps);
         };
-        check_end(self.time.0, end)?;
-        *old = Exact(end);
-        self.go_on();
-        Ok(self)
+        check_end(run.time.0, end)?;
+        controller.pace.end = end;
+        Ok(run.go_on())
+    }
+}
+
+impl From<SavedRun> for Checkpoint {
+    fn from(run: SavedRun) -> Self {
+        Self { version: VERSION, run: Some(Box::new(run)) }
+    }
+}
+
+impl SavedRun {
+    fn point(&self) -> impl Iterator<Item = f64> {
+        self.point.iter().map(|x| x.0)
     }
 
-    fn go_on(&mut self) {
-        if matches!(self.ending, Some(SavedEnding::Span | SavedEnding::Event { .. })) {
-            self.ending = None;
+    fn go_on(mut self) -> Checkpoint {
+        if matches!(self.progress.ending, Some(Ending::Span | Ending::Event { .. })) {
+            self.progress.ending = None;
         }
+        self.into()
     }
 }
 
@@ -380,15 +254,13 @@ impl<'a, F: Flow, M: Method<F>> Steps<'a, F, M> {
     /// All that the next steps depend on, but for the system and the method.
     pub fn checkpoint(&self) -> Checkpoint {
         let State { step, time, point, energy, entropy } = &self.state;
-        let Progress { step_size, scales, largest_velocity, .. } = &self.progress;
         let velocity = self.flow.rates(point, &self.flow.sizes(point).map(|_| 0.0));
         let known = self.certificate.invariants.len();
         let mut memory = Saved::default();
         self.memory.save(&mut memory);
-        Checkpoint {
-            version: VERSION,
+        let Ok(progress) = self.progress.convert(|_, v| Ok::<_, Infallible>(column(v)));
+        let run = SavedRun {
             step: *step,
-            start: Exact(self.progress.start),
             time: Exact(*time),
             point: exact(F::Space::numbers(point)),
             velocity: velocity.map_or_else(Vec::new, |v| column(&v)),
@@ -397,34 +269,31 @@ impl<'a, F: Flow, M: Method<F>> Steps<'a, F, M> {
             kept_entropy: Exact(self.entropy),
             invariants: exact(self.values.invariants.as_ref()[..known].iter().copied()),
             memory,
-            balance: Balance::of(&self.certificate),
-            step_size: SavedStepSize::of(step_size),
-            count: self.progress.count,
-            every: self.progress.every,
-            most: self.progress.most,
-            sizes: column(&scales.sizes),
-            terms: column(&scales.terms),
-            rest: self.progress.rest.map(Exact),
-            largest_velocity: column(largest_velocity),
-            ending: self.progress.ending.map(SavedEnding::of),
-        }
+            balance: self.certificate.clone(),
+            progress,
+        };
+        run.into()
     }
 
     /// A run that was put down.
-    pub(crate) fn resume(method: M, flow: &'a F, c: &Checkpoint) -> Result<Self, ResumeError> {
-        if c.version != VERSION {
-            return Err(ResumeError::Version { found: c.version, expected: VERSION });
-        }
+    pub(crate) fn resume(
+        method: M,
+        flow: &'a F,
+        checkpoint: &Checkpoint,
+    ) -> Result<Self, ResumeError> {
+        let c = checkpoint.run()?;
         let entries: Vec<f64> = c.point().collect();
         let point = flow.element(&entries)?;
-        let mut certificate = Certificate::start(flow, &point, method.promises(flow));
-        c.balance.restore(&mut certificate)?;
-        let progress = progress(c, &flow.sizes(&point), (method.order(), method.control()))?;
+        let certificate =
+            c.balance.resumed(Certificate::start(flow, &point, method.promises(flow)))?;
+        validation::of_the_step_size(&c.progress)?;
+        let like = flow.sizes(&point);
+        let progress = c.progress.convert(|what, list| vector(what, list, &like))?;
         let memory = M::Memory::restore(&c.memory)?;
         expect_length("further invariants", c.invariants.len(), certificate.invariants.len())?;
         validation::of_the_system(flow, &point, c)?;
         validation::of_the_balance(flow, &point, c, certificate.promises)?;
-        validation::of_the_schedule(c, &progress)?;
+        validation::of_the_schedule(c)?;
         validation::of_the_entries(flow, &point, &progress, &memory)?;
         let mut values = flow.laws(&point);
         (values.energy, values.entropy) = (c.energy.0, c.entropy.0);
@@ -437,6 +306,7 @@ impl<'a, F: Flow, M: Method<F>> Steps<'a, F, M> {
         let before = StepBefore { state: state.clone(), values: values.clone(), entropy: kept, h };
         Ok(Self {
             promises: certificate.promises,
+            rule: Rule::of(&method, progress.start),
             before,
             watching: None,
             method,
@@ -452,196 +322,16 @@ impl<'a, F: Flow, M: Method<F>> Steps<'a, F, M> {
     }
 }
 
-fn progress<V: Vector>(
-    c: &Checkpoint,
-    like: &V,
-    (order, control): (u32, Control),
-) -> Result<Progress<V>, ResumeError> {
-    let damaged = |what, value| Err(ResumeError::Damaged { what, value });
-    if c.every == 0 {
-        return damaged("interval of its records", 0.0);
-    }
-    let positive = |what, h: Exact| match check_step_size(h.0) {
-        Ok(()) => Ok(h.0),
-        Err(_) => Err(ResumeError::Damaged { what, value: h.0 }),
-    };
-    let step_size = match &c.step_size {
-        SavedStepSize::Fixed { h } => StepSize::Fixed(positive("step size", *h)?),
-        SavedStepSize::Adaptive {
-            end,
-            tolerance,
-            entries,
-            least,
-            largest,
-            next,
-            taken,
-            error,
-            rejected,
-            cap,
-        } => StepSize::Adaptive(Controller {
-            order,
-            control,
-            start: c.start.0,
-            end: end.0,
-            tolerance: positive("tolerance", *tolerance)?,
-            entries: entries.restore(like)?,
-            least: least.map(|h| positive("least step", h)).transpose()?,
-            largest: largest.map(|h| positive("largest step", h)).transpose()?,
-            next: positive("next step", *next)?,
-            taken: taken.map(|h| positive("last step", h)).transpose()?,
-            error: error.map(|e| positive("last error", e)).transpose()?,
-            rejected: *rejected,
-            cap: match cap {
-                Some(SavedCap { size, before, steps }) => Some(Cap {
-                    size: positive("bound of the step size", *size)?,
-                    before: before.0,
-                    steps: *steps,
-                }),
-                None => None,
-            },
-        }),
-    };
-    Ok(Progress {
-        step_size,
-        start: c.start.0,
-        count: c.count,
-        every: c.every,
-        most: c.most,
-        scales: Scales {
-            sizes: vector("sizes of the entries", &c.sizes, like)?,
-            terms: vector("sizes of the terms", &c.terms, like)?,
-        },
-        rest: c.rest.map(|x| positive("tolerance of rest", x)).transpose()?,
-        largest_velocity: vector("largest velocities", &c.largest_velocity, like)?,
-        ending: c.ending.as_ref().map(SavedEnding::ending),
-    })
-}
-
-impl SavedStepSize {
-    fn of<V: Vector>(step_size: &StepSize<V>) -> Self {
-        match step_size {
-            StepSize::Fixed(h) => Self::Fixed { h: Exact(*h) },
-            StepSize::Adaptive(c) => Self::Adaptive {
-                end: Exact(c.end),
-                tolerance: Exact(c.tolerance),
-                entries: SavedEntries::of(&c.entries),
-                least: c.least.map(Exact),
-                largest: c.largest.map(Exact),
-                next: Exact(c.next),
-                taken: c.taken.map(Exact),
-                error: c.error.map(Exact),
-                rejected: c.rejected,
-                cap: c.cap.map(|Cap { size, before, steps }| SavedCap {
-                    size: Exact(size),
-                    before: Exact(before),
-                    steps,
-                }),
-            },
+impl Certificate {
+    /// These figures, in a run that starts anew with the certificate `fresh`: what the system and the method say
+    /// of themselves is theirs.
+    fn resumed(&self, fresh: Self) -> Result<Self, ResumeError> {
+        expect_length("further invariants", self.invariants.len(), fresh.invariants.len())?;
+        let Self { promises, second_law, projected, .. } = fresh;
+        let mut certificate = Self { promises, second_law, projected, ..self.clone() };
+        for (balance, fresh) in certificate.invariants.iter_mut().zip(fresh.invariants) {
+            balance.kind = fresh.kind;
         }
-    }
-}
-
-impl SavedEntries {
-    fn of<V: Vector>(entries: &Entries<V>) -> Self {
-        match entries {
-            Entries::Automatic => Self::Automatic,
-            Entries::Scale(sizes) => Self::Scale(column(sizes)),
-            Entries::Absolute(errors) => Self::Absolute(column(errors)),
-        }
-    }
-
-    fn restore<V: Vector>(&self, like: &V) -> Result<Entries<V>, ResumeError> {
-        Ok(match self {
-            Self::Automatic => Entries::Automatic,
-            Self::Scale(list) => Entries::Scale(vector("sizes of entries", list, like)?),
-            Self::Absolute(list) => Entries::Absolute(vector("errors of entries", list, like)?),
-        })
-    }
-}
-
-impl SavedEnding {
-    const fn of(ending: Ending) -> Self {
-        match ending {
-            Ending::Span => Self::Span,
-            Ending::Rest { speed, largest } => {
-                Self::Rest { speed: Exact(speed), largest: Exact(largest) }
-            }
-            Ending::Event { index } => Self::Event { index },
-            Ending::Stopped => Self::Stopped,
-        }
-    }
-
-    const fn ending(&self) -> Ending {
-        match self {
-            Self::Span => Ending::Span,
-            Self::Rest { speed, largest } => Ending::Rest { speed: speed.0, largest: largest.0 },
-            Self::Event { index } => Ending::Event { index: *index },
-            Self::Stopped => Ending::Stopped,
-        }
-    }
-}
-
-impl Balance {
-    fn of(c: &Certificate) -> Self {
-        Self {
-            initial_energy: Exact(c.initial_energy),
-            max_energy_error: Exact(c.max_energy_error),
-            energy_scale: Exact(c.energy_scale),
-            friction: Exact(c.friction),
-            initial_entropy: Exact(c.initial_entropy),
-            min_entropy_increment: Exact(c.min_entropy_increment),
-            entropy_gained: Exact(c.entropy_gained),
-            entropy_falls: c.entropy_falls,
-            min_entropy_slope: Exact(c.min_entropy_slope),
-            invariants: c
-                .invariants
-                .iter()
-                .map(|k| (Exact(k.initial), Exact(k.max_error), Exact(k.scale)))
-                .collect(),
-            max_manifold_defect: Exact(c.max_manifold_defect),
-            steps: c.steps,
-            smallest_step: Exact(c.smallest_step),
-            largest_step: Exact(c.largest_step),
-            rejected: c.rejected,
-            falls_avoided: c.falls_avoided,
-            projected_steps: c.projected_steps,
-            stages: c.stages.map(|s| (Exact(s.defect), Exact(s.surplus))),
-            effort: c.effort,
-            worst_iterations: c.worst_iterations,
-            local_error: c.local_error.map(Exact),
-            limiting_sites: c.limiting_sites,
-        }
-    }
-
-    /// Enters these figures into the certificate of the system.
-    fn restore(&self, c: &mut Certificate) -> Result<(), ResumeError> {
-        expect_length("further invariants", self.invariants.len(), c.invariants.len())?;
-        for (balance, (initial, error, scale)) in c.invariants.iter_mut().zip(&self.invariants) {
-            (balance.initial, balance.max_error, balance.scale) = (initial.0, error.0, scale.0);
-        }
-        c.initial_energy = self.initial_energy.0;
-        c.max_energy_error = self.max_energy_error.0;
-        c.energy_scale = self.energy_scale.0;
-        c.friction = self.friction.0;
-        c.initial_entropy = self.initial_entropy.0;
-        c.min_entropy_increment = self.min_entropy_increment.0;
-        c.entropy_gained = self.entropy_gained.0;
-        c.entropy_falls = self.entropy_falls;
-        c.min_entropy_slope = self.min_entropy_slope.0;
-        c.max_manifold_defect = self.max_manifold_defect.0;
-        c.steps = self.steps;
-        c.smallest_step = self.smallest_step.0;
-        c.largest_step = self.largest_step.0;
-        c.rejected = self.rejected;
-        c.falls_avoided = self.falls_avoided;
-        c.projected_steps = self.projected_steps;
-        c.stages = self
-            .stages
-            .map(|(defect, surplus)| StageBalance { defect: defect.0, surplus: surplus.0 });
-        c.effort = self.effort;
-        c.worst_iterations = self.worst_iterations;
-        c.local_error = self.local_error.map(|error| error.0);
-        c.limiting_sites = self.limiting_sites;
-        Ok(())
+        Ok(certificate)
     }
 }

@@ -111,35 +111,55 @@ pub(crate) fn between<F: Flow>(
     let target = has_entropy.then(|| entropy(flow, step, theta));
     let y = flow.moved(step.x, &curve.at(theta));
     let line = || flow.moved(step.x, &curve.end.map(|q| theta * q));
-    Some(onto_laws(flow, step, promises, (theta, target), (y, line)))
+    let target = Target::new(step, promises, theta, target);
+    Some(target.reached_from(flow, &y, line))
 }
 
-/// The state at the fraction `θ` that is near `y` and has the laws of the run with this entropy. If `y` is too far
-/// from them, the state on the straight line is moved onto them, and at last it is the nearer end, where the laws
-/// hold.
-pub(crate) fn onto_laws<F: Flow>(
-    flow: &F,
-    step: &StepEnds<'_, F>,
-    promises: Promises,
-    (theta, entropy): (f64, Option<f64>),
-    (y, line): (Element<F>, impl FnOnce() -> Element<F>),
-) -> Element<F> {
-    let laws = targets(step, promises, theta);
-    let [least, most] = step.values.map(|laws| laws.entropy);
-    let onto = |y: &Element<F>| {
-        let on_all = flow.onto(y, &laws, entropy);
+/// What is asked of the state at the fraction `θ` of a step: the laws of the run, and an entropy.
+pub(crate) struct Target<'a, F: Flow> {
+    step: &'a StepEnds<'a, F>,
+    laws: Laws<F::Numbers>,
+    entropy: Option<f64>,
+    theta: f64,
+}
+
+impl<'a, F: Flow> Target<'a, F> {
+    pub(crate) fn new(
+        step: &'a StepEnds<'a, F>,
+        promises: Promises,
+        theta: f64,
+        entropy: Option<f64>,
+    ) -> Self {
+        Self { step, laws: targets(step, promises, theta), entropy, theta }
+    }
+
+    /// The state near `y` with these laws. If `y` is too far from them, the state on the straight line is moved onto
+    /// them, and at last it is the nearer end, where the laws hold.
+    pub(crate) fn reached_from(
+        &self,
+        flow: &F,
+        y: &Element<F>,
+        line: impl FnOnce() -> Element<F>,
+    ) -> Element<F> {
+        let &Self { step, theta, .. } = self;
+        let near = || if theta < 0.5 { step.x.clone() } else { step.end.clone() };
+        self.near(flow, y).or_else(|| self.near(flow, &line())).unwrap_or_else(near)
+    }
+
+    fn near(&self, flow: &F, y: &Element<F>) -> Option<Element<F>> {
+        let &Self { step, ref laws, entropy, .. } = self;
+        let on_all = flow.onto(y, laws, entropy);
         if on_all.is_some() || entropy.is_none() {
             return on_all;
         }
         // Near an equilibrium the other laws determine the entropy.
+        let [least, most] = step.values.map(|laws| laws.entropy);
         let round_off = flow.entropy_round_off([step.x, step.end]);
-        flow.onto(y, &laws, None).filter(|y| {
+        flow.onto(y, laws, None).filter(|y| {
             let entropy = flow.laws(y).entropy;
             entropy >= least - round_off && entropy <= most + round_off
         })
-    };
-    let near = || if theta < 0.5 { step.x.clone() } else { step.end.clone() };
-    onto(&y).or_else(|| onto(&line())).unwrap_or_else(near)
+    }
 }
 
 #[cfg(test)]

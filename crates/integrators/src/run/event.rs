@@ -146,6 +146,19 @@ const WIDTH: f64 = 2.0 * f64::EPSILON;
 /// A state on the output, at a fraction of a step; `None` if it is not known.
 pub(crate) type Output<'a, M> = dyn FnMut(f64) -> Option<State<M>> + 'a;
 
+/// A point of the cubic at a fraction of a step.
+struct Inside<M: StateSpace> {
+    theta: f64,
+    point: M::Element,
+}
+
+/// A change of sign at a fraction of a step.
+struct Change<M: StateSpace> {
+    theta: f64,
+    rises: bool,
+    state: State<M>,
+}
+
 /// A point of a step at which the function of an event is known.
 struct Node<M: StateSpace> {
     sample: Sample,
@@ -182,8 +195,9 @@ impl<M: StateSpace> Events<M> {
         output: &mut Output<'_, M>,
     ) -> Option<(Vec<Event<M>>, bool)> {
         let curve = if step.x == step.end { None } else { Hermite::through(flow, step) };
-        let inside: Vec<(f64, M::Element)> = curve.map_or_else(Vec::new, |curve| {
-            INSIDE.iter().map(|&theta| (theta, flow.moved(step.x, &curve.at(theta)))).collect()
+        let inside: Vec<Inside<M>> = curve.map_or_else(Vec::new, |curve| {
+            let point = |theta| flow.moved(step.x, &curve.at(theta));
+            INSIDE.iter().map(|&theta| Inside { theta, point: point(theta) }).collect()
         });
         self.on_points(&inside, ends, output)
     }
@@ -191,16 +205,19 @@ impl<M: StateSpace> Events<M> {
     /// The same, from the points on the cubic.
     fn on_points(
         &mut self,
-        inside: &[(f64, M::Element)],
+        inside: &[Inside<M>],
         ends: [&State<M>; 2],
         output: &mut Output<'_, M>,
     ) -> Option<(Vec<Event<M>>, bool)> {
-        let mut found = Vec::new();
+        let (mut thetas, mut found) = (Vec::new(), Vec::new());
         for (index, watched) in self.0.iter_mut().enumerate() {
-            watched.look(index, inside, ends, output, &mut found)?;
+            for Change { theta, rises, state } in watched.look(inside, ends, output)? {
+                let name = Arc::clone(&watched.request.name);
+                thetas.push(theta);
+                found.push(Some(Event { name, index, rises, state }));
+            }
         }
-        let order = in_order(&found.iter().map(|(time, _)| *time).collect::<Vec<_>>());
-        let mut found: Vec<_> = found.into_iter().map(|(_, event)| Some(event)).collect();
+        let order = in_order(&thetas);
         let mut events: Vec<Event<M>> = order.iter().filter_map(|&i| found[i].take()).collect();
         let stop = events.iter().position(|event| self.0[event.index].request.stops);
         if let Some(stop) = stop {
@@ -227,15 +244,13 @@ impl<M: StateSpace> Watched<M> {
         self.request.rising && a < 0.0 && b >= 0.0 || self.request.falling && a > 0.0 && b <= 0.0
     }
 
-    /// Finds the changes of sign in a step.
+    /// The changes of sign in a step; `None` as in [`Events::of_step`].
     fn look(
         &mut self,
-        index: usize,
-        inside: &[(f64, M::Element)],
+        inside: &[Inside<M>],
         [start, end]: [&State<M>; 2],
         output: &mut Output<'_, M>,
-        found: &mut Vec<(f64, Event<M>)>,
-    ) -> Option<()> {
+    ) -> Option<Vec<Change<M>>> {
         let (before, after) = (self.value, self.at(end));
         self.value = after;
         let node = |at, value, state: Option<&State<M>>| Node {
@@ -243,7 +258,7 @@ impl<M: StateSpace> Watched<M> {
             state: state.cloned(),
         };
         let mut nodes = vec![node(0.0, before, Some(start))];
-        for (theta, point) in inside {
+        for Inside { theta, point } in inside {
             let time = start.time + theta * (end.time - start.time);
             nodes.push(node(*theta, (self.function.0)(time, point), None));
         }
@@ -265,12 +280,13 @@ impl<M: StateSpace> Watched<M> {
             }
             nodes.retain(|node| !node.sample.value.is_nan());
         }
+        let mut changes = Vec::new();
         for pair in nodes.windows(2) {
             let [a, b] = [pair[0].sample, pair[1].sample];
             if self.changes(a.value, b.value) {
                 let rises = a.value < 0.0;
                 let mut last = pair[1].state.clone();
-                let at = narrow([a, b], WIDTH, |theta| {
+                let theta = narrow([a, b], WIDTH, |theta| {
                     let state = output(theta)?;
                     let value = self.at(&state);
                     if (rises && value >= 0.0) || (!rises && value <= 0.0) {
@@ -278,10 +294,9 @@ impl<M: StateSpace> Watched<M> {
                     }
                     Some(value)
                 })?;
-                let name = Arc::clone(&self.request.name);
-                found.push((at, Event { name, index, rises, state: last? }));
+                changes.push(Change { theta, rises, state: last? });
             }
         }
-        Some(())
+        Some(changes)
     }
 }

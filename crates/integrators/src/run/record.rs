@@ -3,8 +3,9 @@
 use crate::error::RunError;
 use crate::method::{Flow, Method};
 use crate::run::controller::StepSize;
+use crate::run::progress::Progress;
 use crate::run::span::{ROOM, SpanError};
-use crate::run::steps::{Progress, Steps};
+use crate::run::steps::Steps;
 use crate::run::trajectory::{Ending, State, Trajectory, thin_out};
 use crate::step_error::StepError;
 

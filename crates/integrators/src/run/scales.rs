@@ -15,6 +15,7 @@ use crate::method::{Element, Flow, Vector};
 
 /// The sizes of the entries so far, and those of the terms of their velocities.
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Scales<V> {
     /// The sizes of the entries.
     pub sizes: V,

@@ -1,6 +1,6 @@
 //! How far a run goes, in which steps, and what of it is recorded.
 
-use crate::run::controller::Adaptive;
+use crate::run::until::Adaptive;
 use crate::run::watch::Requests;
 
 /// The time span of a run: the step size, the number of steps, and every how many a state is kept.

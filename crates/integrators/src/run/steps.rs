@@ -8,9 +8,10 @@ use crate::method::{
     Refusal, StepEnds, StepStart, Taken, Vector as _,
 };
 use crate::round_off::bound::{ROUNDED, breaks_first_law};
-use crate::run::certificate::Certificate;
-use crate::run::controller::{Controller, StepSize};
+use crate::run::certificate::{Certificate, StepOf};
+use crate::run::controller::{Controller, Rule, StepSize};
 use crate::run::output::{StepBefore, Watching};
+use crate::run::progress::Progress;
 use crate::run::scales::{Scales, larger, relative};
 use crate::run::span::{Schedule, Size};
 use crate::run::trajectory::{Ending, State};
@@ -24,6 +25,7 @@ use crate::step_error::StepError;
 pub struct Steps<'a, F: Flow, M: Method<F>> {
     pub(super) method: M,
     pub(super) flow: &'a F,
+    pub(super) rule: Rule,
     pub(super) progress: Progress<F::Vector>,
     pub(super) state: State<F::Space>,
     /// The laws at the state.
@@ -37,42 +39,6 @@ pub struct Steps<'a, F: Flow, M: Method<F>> {
     /// The step before the state, for what lies between them.
     pub(super) before: StepBefore<F>,
     pub(super) watching: Option<Box<Watching<F::Space>>>,
-}
-
-/// Where a run is on its schedule.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Progress<V> {
-    pub(crate) step_size: StepSize<V>,
-    /// The time at which the run started.
-    pub(crate) start: f64,
-    pub(crate) count: Option<usize>,
-    pub(crate) every: usize,
-    /// The most states to record.
-    pub(crate) most: Option<usize>,
-    /// The sizes of the entries so far, where errors or rest are judged by them.
-    pub(crate) scales: Scales<V>,
-    /// The tolerance of rest.
-    pub(crate) rest: Option<f64>,
-    /// The largest velocity of each entry so far, where rest is looked for.
-    pub(crate) largest_velocity: V,
-    pub(crate) ending: Option<Ending>,
-}
-
-impl<V> Progress<V> {
-    /// Whether errors or rest are judged by the sizes of the entries.
-    pub(crate) const fn judges_sizes(&self) -> bool {
-        self.rest.is_some() || matches!(self.step_size, StepSize::Adaptive(_))
-    }
-
-    /// When the run ends; infinite if it does not.
-    pub(crate) fn end(&self) -> f64 {
-        match &self.step_size {
-            StepSize::Fixed(h) => {
-                self.count.map_or(f64::INFINITY, |count| self.start + count as f64 * h)
-            }
-            StepSize::Adaptive(controller) => controller.end,
-        }
-    }
 }
 
 impl<F: Flow, M: Method<F>> fmt::Debug for Steps<'_, F, M> {
@@ -108,11 +74,11 @@ impl<'a, F: Flow, M: Method<F>> Steps<'a, F, M> {
         let certificate = Certificate::start(flow, &x0, promises);
         let scales = Scales::at(flow, &x0, schedule.span());
         let Schedule { size, start, count, every, most, rest, watch } = schedule;
+        let rule = Rule::of(&method, start);
         let step_size = match size {
             Size::Fixed(h) => StepSize::Fixed(h),
             Size::Tolerance(adaptive) => {
-                let rule = (method.order(), method.control());
-                StepSize::Adaptive(adaptive.controller(flow, (&x0, start), &scales, rule)?)
+                StepSize::Adaptive(adaptive.controller(&rule, flow, &x0, &scales)?)
             }
         };
         let largest_velocity = scales.sizes.zero();
@@ -135,6 +101,7 @@ impl<'a, F: Flow, M: Method<F>> Steps<'a, F, M> {
         let mut steps = Self {
             method,
             flow,
+            rule,
             progress,
             state,
             before,
@@ -209,26 +176,26 @@ impl<'a, F: Flow, M: Method<F>> Steps<'a, F, M> {
             }
             StepSize::Adaptive(controller) => self.controlled(controller.clone())?,
         };
-        let Taken { x, values, evidence, effort } = taken;
-        if !is_finite(&values) {
+        if !is_finite(&taken.values) {
             let time = self.state.time;
-            return Err(StepError::OutOfDomain { time, h, tried: effort });
+            return Err(StepError::OutOfDomain { time, h, tried: taken.effort });
         }
-        let change = values.energy - self.certificate.initial_energy;
-        let sizes = || self.flow.energy_sizes([&self.state.point, &x]);
+        let change = taken.values.energy - self.certificate.initial_energy;
+        let sizes = || self.flow.energy_sizes([&self.state.point, &taken.x]);
         if self.promises.energy
-            && let Some(size) = breaks_first_law(change, values.energy, sizes)
+            && let Some(size) = breaks_first_law(change, taken.values.energy, sizes)
         {
             let time = self.state.time;
             return Err(StepError::FirstLawBroken { time, h, change, size });
         }
-        let ends = [(&self.state.point, &self.values), (&x, &values)];
-        self.certificate.enter(self.flow, ends, h, (evidence, effort));
+        let entered = StepOf { taken: &taken, h };
+        self.certificate.enter(self.flow, &self.state.point, &self.values, entered);
         let first_at_the_edge =
-            evidence.stability && self.certificate.limiting_sites.stiffness.is_none();
+            taken.evidence.stability && self.certificate.limiting_sites.stiffness.is_none();
         if step.is_power_of_two() || (first_at_the_edge && self.has_sites()) {
-            self.sample((&x, &values), h);
+            self.sample(&taken, h);
         }
+        let Taken { x, values, evidence, .. } = taken;
         (self.before.h, self.before.entropy) = (h, self.entropy);
         if evidence.dissipates {
             self.entropy = values.entropy;
@@ -240,7 +207,7 @@ impl<'a, F: Flow, M: Method<F>> Steps<'a, F, M> {
         self.check_invariants(&self.before.state)?;
         let over = match &self.progress.step_size {
             StepSize::Fixed(_) => self.progress.count.is_some_and(|count| step >= count),
-            StepSize::Adaptive(Controller { end, .. }) => self.state.time >= *end,
+            StepSize::Adaptive(controller) => self.state.time >= controller.pace.end,
         };
         if over {
             self.progress.ending = Some(Ending::Span);
@@ -264,7 +231,7 @@ impl<'a, F: Flow, M: Method<F>> Steps<'a, F, M> {
     /// Notes the local error of a step, and where it is largest, on the few whose number is a power of two and on the
     /// first one at the edge of stability.
     #[cold]
-    fn sample(&mut self, (end, values): (&Element<F>, &Laws<F::Numbers>), h: f64) {
+    fn sample(&mut self, Taken { x: end, values, .. }: &Taken<F>, h: f64) {
         let (flow, x) = (self.flow, &self.state.point);
         // The sizes that a step brings about count too, and the largest ones so far: an entry that has decayed to
         // round-off has no error relative to itself.
@@ -281,7 +248,9 @@ impl<'a, F: Flow, M: Method<F>> Steps<'a, F, M> {
         let Some(error) = self.method.error(flow, &step, &self.memory, norm) else { return };
         let sites = if self.has_sites() {
             let allowed = match &self.progress.step_size {
-                StepSize::Adaptive(controller) => controller.allowed(&self.progress.scales, h),
+                StepSize::Adaptive(controller) => {
+                    controller.allowed(&self.rule, &self.progress.scales, h)
+                }
                 StepSize::Fixed(_) => sizes.clone(),
             };
             self.method.limiting_sites(flow, &step, &self.memory, &allowed)
@@ -298,29 +267,30 @@ impl<'a, F: Flow, M: Method<F>> Steps<'a, F, M> {
         &mut self,
         mut controller: Controller<F::Vector>,
     ) -> Result<Advance<F>, StepError> {
-        let (flow, time, mut effort) = (self.flow, self.state.time, Effort::default());
+        let (flow, rule, time) = (self.flow, self.rule, self.state.time);
+        let mut effort = Effort::default();
         let (mut tries, mut broken) = (0, None);
         loop {
             tries += 1;
             if tries == TRIES {
                 // An entry that begins to move only now has no size yet.
-                let here = Scales::at(flow, &self.state.point, Some(controller.end - time));
+                let here = Scales::at(flow, &self.state.point, Some(controller.pace.end - time));
                 self.progress.scales = self.progress.scales.and(&here);
             }
-            let (h, last) = controller.attempt(time);
-            if controller.next < controller.least() && !last {
-                let (h, least) = (controller.next, controller.least());
+            let (h, last) = controller.pace.attempt(time);
+            if controller.pace.next < controller.pace.least(&rule) && !last {
+                let (h, least) = (controller.pace.next, controller.pace.least(&rule));
                 let too_small = StepError::TooSmall { time, h, least };
                 let cause = broken.or_else(|| self.dependent(&self.state));
                 return Err(cause.unwrap_or(too_small));
             }
             if time + h <= time {
-                let standstill = StepError::Standstill { time, h: controller.next };
+                let standstill = StepError::Standstill { time, h: controller.pace.next };
                 return Err(broken.unwrap_or(standstill));
             }
-            let ratio = controller.taken.map_or(1.0, |taken| h / taken);
+            let ratio = controller.pace.taken.map_or(1.0, |taken| h / taken);
             let mut memory = self.memory.rescaled(ratio);
-            let allowed = controller.allowed(&self.progress.scales, h);
+            let allowed = controller.allowed(&rule, &self.progress.scales, h);
             let start = self.from(Some(allowed));
             let end = self.method.attempt(flow, &start, h, &mut memory);
             let mut falls = false;
@@ -338,7 +308,7 @@ impl<'a, F: Flow, M: Method<F>> Steps<'a, F, M> {
             };
             let error = end.as_ref().and_then(|taken| {
                 let scales = self.progress.scales.or(&flow.sizes(&taken.x));
-                let allowed = controller.allowed(&scales, h);
+                let allowed = controller.allowed(&rule, &scales, h);
                 let values = [&self.values, &taken.values];
                 let (x, reference) = (&self.state.point, &start.reference);
                 let step = StepEnds { x, end: &taken.x, h, values, reference };
@@ -347,27 +317,27 @@ impl<'a, F: Flow, M: Method<F>> Steps<'a, F, M> {
             });
             match (end, error) {
                 (Some(taken), _) if taken.evidence.entropy_step == Some(EntropyStep::Held) => {
-                    controller.accept_held(h);
+                    controller.pace.accept_held(&rule, h);
                     self.memory = memory;
-                    let time = if last { controller.end } else { time + h };
+                    let time = if last { controller.pace.end } else { time + h };
                     self.progress.step_size = StepSize::Adaptive(controller);
                     return Ok(Advance { taken: Taken { effort, ..taken }, h, time });
                 }
                 (None, _) if falls => {
-                    controller.reject_fall(h);
+                    controller.pace.reject_fall(h);
                     self.memory.refused(memory);
                     self.certificate.rejected += 1;
                     self.certificate.falls_avoided += 1;
                 }
                 (Some(taken), Some(error)) if error <= 1.0 => {
-                    controller.accept(h, error);
+                    controller.pace.accept(&rule, h, error);
                     self.memory = memory;
-                    let time = if last { controller.end } else { time + h };
+                    let time = if last { controller.pace.end } else { time + h };
                     self.progress.step_size = StepSize::Adaptive(controller);
                     return Ok(Advance { taken: Taken { effort, ..taken }, h, time });
                 }
                 (_, error) => {
-                    controller.reject(h, error);
+                    controller.pace.reject(&rule, h, error);
                     self.certificate.rejected += 1;
                 }
             }

@@ -1,10 +1,12 @@
 //! Whether the numbers of a checkpoint agree: with the system at its point, and with each other.
 
-use super::{Checkpoint, Exact, ResumeError, SavedEnding};
+use super::{Exact, ResumeError, SavedRun};
 use crate::method::{Element, Flow, LimitingSites, Memory, Promises, Vector};
-use crate::run::controller::StepSize;
-use crate::run::span::{check_end, check_steps};
-use crate::run::steps::Progress;
+use crate::run::certificate::StageBalance;
+use crate::run::controller::{Controller, Pace, StepSize};
+use crate::run::progress::Progress;
+use crate::run::span::{check_end, check_step_size, check_steps};
+use crate::run::trajectory::Ending;
 
 /// Units of round-off by which the values of one field differ between two mathematical libraries: some
 /// units for each function in it, and far less than any change of a model.
@@ -14,22 +16,24 @@ const fn damaged(what: &'static str, value: f64) -> Result<(), ResumeError> {
     Err(ResumeError::Damaged { what, value })
 }
 
-fn finite(what: &'static str, numbers: &[Exact]) -> Result<(), ResumeError> {
-    match numbers.iter().find(|number| !number.0.is_finite()) {
-        Some(number) => damaged(what, number.0),
-        None => Ok(()),
-    }
+const fn finite(what: &'static str, number: f64) -> Result<(), ResumeError> {
+    if number.is_finite() { Ok(()) } else { damaged(what, number) }
+}
+
+/// A finite number above zero.
+fn positive(what: &'static str, number: f64) -> Result<(), ResumeError> {
+    check_step_size(number).map_err(|_| ResumeError::Damaged { what, value: number })
 }
 
 /// A finite number that is not negative.
-fn size(what: &'static str, number: Exact) -> Result<(), ResumeError> {
-    if number.0 >= 0.0 && number.0.is_finite() { Ok(()) } else { damaged(what, number.0) }
+const fn size(what: &'static str, number: f64) -> Result<(), ResumeError> {
+    if number >= 0.0 && number.is_finite() { Ok(()) } else { damaged(what, number) }
 }
 
 /// Accepts a stored value that is the one of the system, but for round-off of its terms.
 fn same(field: &'static str, stored: Exact, found: f64, terms: f64) -> Result<(), ResumeError> {
-    finite(field, &[stored])?;
     let stored = stored.0;
+    finite(field, stored)?;
     if (stored - found).abs() <= LIBRARIES * terms {
         Ok(())
     } else {
@@ -41,7 +45,7 @@ fn same(field: &'static str, stored: Exact, found: f64, terms: f64) -> Result<()
 pub(super) fn of_the_system<F: Flow>(
     flow: &F,
     x: &Element<F>,
-    c: &Checkpoint,
+    c: &SavedRun,
 ) -> Result<(), ResumeError> {
     let (laws, sizes) = (flow.laws(x), flow.term_sizes(x));
     same("energy", c.energy, laws.energy, sizes.energy)?;
@@ -65,41 +69,41 @@ pub(super) fn of_the_system<F: Flow>(
 pub(super) fn of_the_balance<F: Flow>(
     flow: &F,
     x: &Element<F>,
-    c: &Checkpoint,
+    c: &SavedRun,
     promises: Promises,
 ) -> Result<(), ResumeError> {
     let b = &c.balance;
-    finite("initial energy", &[b.initial_energy])?;
-    finite("initial entropy", &[b.initial_entropy])?;
-    finite("smallest growth of the entropy", &[b.min_entropy_increment])?;
-    finite("kept entropy", &[c.kept_entropy])?;
+    finite("initial energy", b.initial_energy)?;
+    finite("initial entropy", b.initial_entropy)?;
+    finite("smallest growth of the entropy", b.min_entropy_increment)?;
+    finite("kept entropy", c.kept_entropy.0)?;
     size("largest error of the energy", b.max_energy_error)?;
     size("largest defect", b.max_manifold_defect)?;
-    if b.min_entropy_slope.0.is_nan() {
-        return damaged("least slope of the entropy", b.min_entropy_slope.0);
+    if b.min_entropy_slope.is_nan() {
+        return damaged("least slope of the entropy", b.min_entropy_slope);
     }
     if b.steps != c.step {
         return damaged("number of steps in the balance", b.steps as f64);
     }
     // A balance holds the errors of the very numbers that are stored beside it.
-    if (c.energy.0 - b.initial_energy.0).abs() > b.max_energy_error.0 {
-        return damaged("initial energy", b.initial_energy.0);
+    if (c.energy.0 - b.initial_energy).abs() > b.max_energy_error {
+        return damaged("initial energy", b.initial_energy);
     }
-    if c.step > 0 && Exact(c.entropy.0 - b.initial_entropy.0) != b.entropy_gained {
-        return damaged("growth of the entropy", b.entropy_gained.0);
+    if c.step > 0 && Exact(c.entropy.0 - b.initial_entropy) != Exact(b.entropy_gained) {
+        return damaged("growth of the entropy", b.entropy_gained);
     }
     size("size of the terms of the energy", b.energy_scale)?;
     size("rate of the friction", b.friction)?;
-    if let Some((defect, surplus)) = b.stages {
+    if let Some(StageBalance { defect, surplus }) = b.stages {
         size("defect of the stages", defect)?;
         size("surplus of the entropy", surplus)?;
     }
-    for (here, (initial, error, scale)) in c.invariants.iter().zip(&b.invariants) {
-        finite("initial value of a further invariant", &[*initial])?;
-        size("size of the terms of a further invariant", *scale)?;
-        size("largest error of a further invariant", *error)?;
-        if (here.0 - initial.0).abs() > error.0 {
-            return damaged("initial value of a further invariant", initial.0);
+    for (here, balance) in c.invariants.iter().zip(&b.invariants) {
+        finite("initial value of a further invariant", balance.initial)?;
+        size("size of the terms of a further invariant", balance.scale)?;
+        size("largest error of a further invariant", balance.max_error)?;
+        if (here.0 - balance.initial).abs() > balance.max_error {
+            return damaged("initial value of a further invariant", balance.initial);
         }
     }
     let sites = flow.sizes(x).sites().unwrap_or(0);
@@ -109,8 +113,8 @@ pub(super) fn of_the_balance<F: Flow>(
     }
     size("smallest step", b.smallest_step)?;
     size("largest step", b.largest_step)?;
-    if b.smallest_step.0 > b.largest_step.0 {
-        return damaged("smallest step", b.smallest_step.0);
+    if b.smallest_step > b.largest_step {
+        return damaged("smallest step", b.smallest_step);
     }
     // What the steps without friction have changed of the entropy is round-off, at worst a sum of it.
     let terms = flow.term_sizes(x).entropy;
@@ -121,16 +125,39 @@ pub(super) fn of_the_balance<F: Flow>(
     Ok(())
 }
 
+/// The numbers of the step size, each by itself.
+pub(super) fn of_the_step_size<V>(progress: &Progress<V>) -> Result<(), ResumeError> {
+    if progress.every == 0 {
+        return damaged("interval of its records", 0.0);
+    }
+    match &progress.step_size {
+        StepSize::Fixed(h) => positive("step size", *h)?,
+        StepSize::Adaptive(Controller { pace, .. }) => {
+            let &Pace { tolerance, least, largest, next, taken, error, cap, .. } = pace;
+            positive("tolerance", tolerance)?;
+            positive("next step", next)?;
+            for (what, number) in [
+                ("least step", least),
+                ("largest step", largest),
+                ("last step", taken),
+                ("last error", error),
+                ("bound of the step size", cap.map(|cap| cap.size)),
+            ] {
+                number.map_or(Ok(()), |number| positive(what, number))?;
+            }
+        }
+    }
+    progress.rest.map_or(Ok(()), |tolerance| positive("tolerance of rest", tolerance))
+}
+
 /// The time beside the steps, and the end that has been reached or not.
-pub(super) fn of_the_schedule<V>(
-    c: &Checkpoint,
-    progress: &Progress<V>,
-) -> Result<(), ResumeError> {
-    let (start, time, ended) = (c.start.0, c.time.0, c.ending == Some(SavedEnding::Span));
+pub(super) fn of_the_schedule(c: &SavedRun) -> Result<(), ResumeError> {
+    let progress = &c.progress;
+    let (start, time, ended) = (progress.start, c.time.0, progress.ending == Some(Ending::Span));
     // An event that stops a run may lie in its last step.
-    let stopped = matches!(c.ending, Some(SavedEnding::Event { .. }));
-    finite("start", &[c.start])?;
-    if c.most.is_some_and(|most| most < 2) {
+    let stopped = matches!(progress.ending, Some(Ending::Event { .. }));
+    finite("start", start)?;
+    if progress.most.is_some_and(|most| most < 2) {
         return damaged("number of states to record", 0.0);
     }
     if progress.rest.is_some_and(|tolerance| tolerance >= 1.0) {
@@ -141,7 +168,7 @@ pub(super) fn of_the_schedule<V>(
             if Exact(start + c.step as f64 * h) != c.time {
                 return damaged("time", time);
             }
-            if let Some(count) = c.count {
+            if let Some(count) = progress.count {
                 if check_steps(start, h, count).is_err() || c.step > count {
                     return damaged("number of steps to take", count as f64);
                 }
@@ -150,14 +177,15 @@ pub(super) fn of_the_schedule<V>(
                 }
             }
         }
-        StepSize::Adaptive(controller) => {
-            let end = controller.end;
+        StepSize::Adaptive(Controller { pace, .. }) => {
+            let end = pace.end;
             if check_end(start, end).is_err() {
                 return damaged("end", end);
             }
-            let taken = controller.taken.unwrap_or(0.0);
+            let taken = pace.taken.unwrap_or(0.0);
             // The first steps end after the start, and no step ends after the end.
-            let begun = if c.step == 0 { c.time == c.start } else { time > start && taken > 0.0 };
+            let begun =
+                if c.step == 0 { c.time == Exact(start) } else { time > start && taken > 0.0 };
             if !(begun && time <= end) || !stopped && ended != (time >= end) {
                 return damaged("time", time);
             }
@@ -181,12 +209,12 @@ pub(super) fn of_the_entries<F: Flow>(
     let of = |list: &[f64], i: usize| list.get(i).copied().unwrap_or(0.0);
     for i in 0..here.len() {
         let (here, known) = (here.get(i), progress.scales.sizes.get(i));
-        size("size of an entry", Exact(known))?;
+        size("size of an entry", known)?;
         if progress.judges_sizes() && known < here {
             return damaged("size of an entry", known);
         }
-        size("size of the terms of an entry", Exact(progress.scales.terms.get(i)))?;
-        size("largest velocity of an entry", Exact(progress.largest_velocity.get(i)))?;
+        size("size of the terms of an entry", progress.scales.terms.get(i))?;
+        size("largest velocity of an entry", progress.largest_velocity.get(i))?;
         // Both ends of the last step were rounded.
         let (moved, lost) = (of(&moved, i).abs(), of(&lost, i));
         if lost.abs() > LIBRARIES * (here + moved) {

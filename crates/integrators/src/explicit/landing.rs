@@ -1,0 +1,124 @@
+//! Where an explicit step ends: the projection of its end onto the laws, and whether it is taken.
+
+use metriplectic_dynamics::SecondLaw;
+
+use super::flow::{Projected, ProjectionError, StageFlow, Target};
+use super::memory::{LastStep, Produced, combined, produced};
+use super::step::Refused;
+use super::tableau::Tableau;
+use crate::method::{Element, EntropyStep, Laws, StepStart, Vector};
+
+/// The fraction of the round-off of an increment by which the entropy may fall: less than what the certificate
+/// counts as a fall.
+const FALL: f64 = 0.875;
+/// The length of a projection, relative to the sizes of the entries, that is round-off: some units of it.
+const NEAR: f64 = 64.0 * f64::EPSILON;
+/// The length of a projection in units of the error that is allowed.
+const FAR: f64 = 10.0;
+
+/// Where a step ends.
+pub(super) struct Landed<F: StageFlow> {
+    pub(super) end: Projected<F>,
+    pub(super) produced: Produced,
+    pub(super) how: EntropyStep,
+}
+
+/// The projection of the end of a step onto the laws, and the decision whether it is taken.
+pub(super) struct Onto<'a, F: StageFlow> {
+    pub(super) tableau: &'static Tableau,
+    pub(super) flow: &'a F,
+    pub(super) start: &'a StepStart<'a, F>,
+    pub(super) h: f64,
+    pub(super) last: &'a LastStep<F::Vector>,
+    pub(super) produced: Produced,
+}
+
+impl<F: StageFlow> Onto<'_, F> {
+    #[inline]
+    pub(super) fn decide(&self, y: Element<F>) -> Result<Landed<F>, Refused> {
+        let Self { flow, start, last, produced, .. } = *self;
+        let limit = match &start.allowed {
+            Some(allowed) => allowed.map(|error| FAR * error),
+            // Round-off is never too far.
+            None => {
+                let sizes = flow.sizes(start.x);
+                Vector::zip([&last.end, &sizes], |[end, size]| (0.5 * end.abs()).max(NEAR * size))
+            }
+        };
+        let embedded = self.embedded_error();
+        let error =
+            flow.weighs_errors().then(|| embedded.as_ref().unwrap_or(&last.stages[0].velocity));
+        let onto = |y, entropy, with_entropy| {
+            let laws = Laws { entropy, ..start.reference.clone() };
+            let limit = Some(&limit);
+            flow.project(y, &Target { laws: &laws, with_entropy, limit, error })
+        };
+        if flow.entropy_law() != SecondLaw::Exact {
+            let end = onto(y, start.reference.entropy, false).map_err(refused)?;
+            return Ok(Landed { end, produced, how: EntropyStep::Free });
+        }
+        let mut y = Some(y);
+        if self.is_trusted()
+            && let Some(y) = y.take()
+        {
+            let target = produced.plus(last.rise);
+            if let Ok(end) = onto(y, target.sum, true)
+                && !self.falls(&end)
+            {
+                let largest = produced.largest.max(end.entropy);
+                let produced = Produced { largest, ..target };
+                return Ok(Landed { end, produced, how: EntropyStep::Targeted });
+            }
+        }
+        let again = || flow.stage(start.x, &last.end).ok_or(Refused::Outside(None));
+        let y = y.map_or_else(again, Ok)?;
+        let end = onto(y, produced.sum, false).map_err(refused)?;
+        let least = produced.largest - 2.0 * end.entropy_round_off;
+        if end.entropy < least || self.falls(&end) {
+            return Err(Refused::Falls);
+        }
+        let largest = produced.largest.max(end.entropy);
+        let produced = Produced { largest, ..Produced::from(end.entropy) };
+        Ok(Landed { end, produced, how: EntropyStep::Free })
+    }
+
+    /// The embedded error, if the flow weighs errors and it does not need the end of the step. Otherwise the
+    /// velocity at the start takes its place.
+    fn embedded_error(&self) -> Option<F::Vector> {
+        let Self { tableau, flow, h, last, .. } = *self;
+        let [row, _] = tableau.errors;
+        let known = !row.is_empty() && row.iter().all(|&(stage, _)| stage < last.known);
+        (flow.weighs_errors() && known).then(|| combined(h, row, &last.stages))
+    }
+
+    /// Whether the entropy that was produced may be aimed at.
+    fn is_trusted(&self) -> bool {
+        let Self { tableau, h, last, .. } = *self;
+        let doubt = if tableau.order == 8 {
+            (h * produced(tableau.errors[0], &last.stages)).abs()
+        } else {
+            0.0
+        };
+        last.rise >= 0.0 && doubt <= 0.5 * last.rise
+    }
+
+    /// Whether the entropy at the end is below the one at the start by more than its round-off. Near an equilibrium,
+    /// where every change is round-off, the flow says whether it falls.
+    fn falls(&self, end: &Projected<F>) -> bool {
+        let (flow, start) = (self.flow, self.start);
+        let rise = flow.values(&end.gradients).entropy - start.values.entropy;
+        let round_off = flow.entropy_round_off([start.x, &end.x]);
+        if rise.abs() > round_off {
+            return rise < 0.0;
+        }
+        let dissipates = self.last.stages[0].production != 0.0;
+        rise < -FALL * round_off || (dissipates && flow.falls_below_round_off(start.x, &end.x))
+    }
+}
+
+fn refused(error: ProjectionError) -> Refused {
+    match error {
+        ProjectionError::Outside => Refused::Outside(None),
+        ProjectionError::NoEntropy | ProjectionError::Far => Refused::Far,
+    }
+}

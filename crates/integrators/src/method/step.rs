@@ -1,0 +1,67 @@
+//! What goes into a step of a method, and what comes out of it.
+
+use super::{Effort, Element, Evidence, Flow, Laws};
+use crate::step_error::StepError;
+
+/// Where a step starts.
+#[derive(Debug)]
+pub struct StepStart<'a, F: Flow + ?Sized> {
+    /// The state.
+    pub x: &'a Element<F>,
+    /// The time.
+    pub time: f64,
+    /// The laws there.
+    pub values: Laws<F::Numbers>,
+    /// What they were at the start of the run; for the entropy, after the last step that dissipated. A method
+    /// may aim at these values, so that round-off does not add up.
+    pub reference: Laws<F::Numbers>,
+    /// The error that each entry is allowed in this step, if the steps follow a tolerance.
+    pub allowed: Option<F::Vector>,
+}
+
+impl<'a, F: Flow> StepStart<'a, F> {
+    /// The first step of a run from `x`.
+    pub fn first(flow: &F, x: &'a Element<F>) -> Self {
+        let values = flow.laws(x);
+        Self { x, time: 0.0, reference: values.clone(), values, allowed: None }
+    }
+}
+
+/// The two ends of a step that was taken.
+#[derive(Debug)]
+pub struct StepEnds<'a, F: Flow + ?Sized> {
+    /// The state at its start.
+    pub x: &'a Element<F>,
+    /// The state at its end.
+    pub end: &'a Element<F>,
+    /// Its size.
+    pub h: f64,
+    /// The laws at both.
+    pub values: [&'a Laws<F::Numbers>; 2],
+    /// What the laws were at the start of the run, as in [`StepStart::reference`].
+    pub reference: &'a Laws<F::Numbers>,
+}
+
+/// A step that was taken.
+#[derive(Clone, Debug)]
+pub struct Taken<F: Flow + ?Sized> {
+    /// The state at its end.
+    pub x: Element<F>,
+    /// The laws there.
+    pub values: Laws<F::Numbers>,
+    /// What the step tells of the motion.
+    pub evidence: Evidence,
+    /// What it cost.
+    pub effort: Effort,
+}
+
+/// A step that was not taken, where a smaller one may be.
+#[derive(Clone, Debug)]
+pub struct Refusal {
+    /// What was done.
+    pub effort: Effort,
+    /// The error that a run ends with if no smaller step is taken either, where there is a particular one.
+    pub error: Option<StepError>,
+    /// Whether the entropy would have fallen. Steps then stay smaller for a while.
+    pub second_law: bool,
+}

@@ -1,0 +1,54 @@
+use super::*;
+
+const ONE_FALL: Certificate = Certificate {
+    initial_energy: 0.5,
+    max_energy_error: 1e-16,
+    energy_scale: 0.5,
+    initial_entropy: 1.0,
+    min_entropy_increment: -2e-9,
+    entropy_gained: 0.25,
+    entropy_falls: 1,
+    min_entropy_slope: 0.7,
+    invariants: Vec::new(),
+    max_manifold_defect: 0.0,
+    steps: 7,
+    smallest_step: 0.1,
+    largest_step: 0.1,
+    rejected: 0,
+    falls_avoided: 0,
+    projected_steps: ProjectedSteps { targeted: 0, free: 0, held: 0, stability: 0 },
+    stages: None,
+    effort: Effort { iterations: 9, continued: 0, globalised: 0, splits: 1 },
+    worst_iterations: 2,
+    local_error: None,
+    limiting_sites: LimitingSites::new(None, None),
+    promises: Promises::all_laws(true),
+    second_law: SecondLaw::Exact,
+    friction: 0.0,
+    projected: false,
+};
+
+#[test]
+fn one_is_no_plural() {
+    let text = ONE_FALL.to_string();
+    for part in ["over 7 steps", "fell on 1 step;", "9 Newton iterations", "1 retry"] {
+        assert!(text.contains(part), "\"{part}\" is missing in: {text}");
+    }
+    assert!(!text.contains("step sizes"), "{text}");
+    let adaptive = Certificate { smallest_step: 1e-3, rejected: 2, ..ONE_FALL }.to_string();
+    assert!(adaptive.contains("step sizes:  1.0e-3 to 1.0e-1, 2 rejected"), "{adaptive}");
+    let coarse = Certificate { local_error: Some(0.5), ..ONE_FALL };
+    assert!(coarse.to_string().contains("the motion is not resolved: local errors up to 5.0e-1"));
+    let stiff = Certificate { friction: 1e6, ..coarse };
+    assert!(!stiff.to_string().contains("not resolved"), "{stiff}");
+    let text = Certificate {
+        entropy_falls: 2,
+        steps: 1,
+        effort: Effort { iterations: 1, ..ONE_FALL.effort },
+        ..ONE_FALL
+    }
+    .to_string();
+    for part in ["over 1 step\n", "fell on 2 steps;", "1 Newton iteration ("] {
+        assert!(text.contains(part), "\"{part}\" is missing in: {text}");
+    }
+}

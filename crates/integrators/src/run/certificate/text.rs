@@ -1,0 +1,170 @@
+//! What a certificate says to a reader, line by line.
+
+use std::fmt;
+
+use metriplectic_dynamics::SecondLaw;
+
+use super::{Certificate, InvariantBalance, ProjectedSteps, StageBalance};
+use crate::digits::{Digits, counted};
+use crate::method::{Effort, LimitingSites};
+use crate::round_off::bound::of_a_law;
+
+/// The local error, relative to the sizes of the entries, from which on a motion is not resolved.
+const UNRESOLVED: f64 = 0.1;
+
+impl fmt::Display for Certificate {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let steps = counted(self.steps, "step", "steps");
+        let (error, relative) = (self.max_energy_error, self.relative_to());
+        if !self.promises.energy {
+            writeln!(
+                f,
+                "first law:   not promised; |H − H₀| ≤ {error:.1e}{relative}, over {steps}"
+            )?;
+        } else if self.keeps_energy() {
+            writeln!(f, "first law:   |H − H₀| ≤ {error:.1e}{relative}, over {steps}")?;
+        } else {
+            let allowed = of_a_law(self.energy_scale);
+            writeln!(
+                f,
+                "first law:   BROKEN: |H − H₀| = {error:.1e}{relative}, round-off is {allowed:.1e}, over {steps}"
+            )?;
+        }
+        match self.second_law {
+            SecondLaw::NoEntropy => writeln!(f, "second law:  no entropy"),
+            _ if !self.promises.entropy => {
+                writeln!(f, "second law: not promised; {}", self.entropy_line())
+            }
+            _ => writeln!(f, "second law:  {}", self.entropy_line()),
+        }?;
+        if self.projected {
+            writeln!(f, "friction:    projected so that K dH = 0, not quite the tensor given")?;
+        }
+        if self.is_stiff() {
+            writeln!(f, "friction not damped: h|K'| = {:.1e}; `Radau` damps it", self.friction)?;
+        }
+        for (index, kept) in self.invariants.iter().enumerate() {
+            let InvariantBalance { kind, initial, max_error, .. } = kept;
+            writeln!(
+                f,
+                "{:<13}{}|L − L₀| ≤ {max_error:.1e}, L₀ = {}",
+                format!("{kind} {}:", index + 1),
+                if !self.promises.invariants {
+                    "not promised; "
+                } else if kept.is_kept() {
+                    ""
+                } else {
+                    "BROKEN: "
+                },
+                Digits(*initial)
+            )?;
+        }
+        writeln!(f, "manifold:    defect ≤ {:.1e}", self.max_manifold_defect)?;
+        if self.smallest_step < self.largest_step || self.rejected > 0 {
+            write!(
+                f,
+                "step sizes:  {:.1e} to {:.1e}, {} rejected",
+                self.smallest_step, self.largest_step, self.rejected
+            )?;
+            if let Some(site) = self.limiting_sites.error
+                && !self.is_limited_by_stability()
+            {
+                write!(f, "; the largest error is at site {site}")?;
+            }
+            writeln!(f)?;
+        }
+        // Where friction is stiff the estimate is far too large, and the line above says so.
+        if !self.is_stiff()
+            && let Some(error) = self.local_error.filter(|error| *error > UNRESOLVED)
+        {
+            writeln!(
+                f,
+                "accuracy:    the motion is not resolved: local errors up to {error:.1e} of the state in a step"
+            )?;
+        }
+        if let Some(StageBalance { defect, surplus }) = self.stages {
+            write!(f, "stages:      laws off by {defect:.1e} of their terms in the worst step")?;
+            if surplus > 0.0 {
+                write!(f, ", damping added {surplus:.1e} to S")?;
+            }
+            writeln!(f)?;
+        }
+        self.projections(f)?;
+        if self.effort == Effort::default() {
+            return write!(f, "solver:      explicit steps, none split");
+        }
+        if self.effort.iterations == 0 {
+            let splits = counted(self.effort.splits, "split", "splits");
+            return write!(f, "solver:      explicit steps, {splits}");
+        }
+        write!(
+            f,
+            "solver:      {} ({} in the worst step), {}",
+            counted(self.effort.iterations, "Newton iteration", "Newton iterations"),
+            self.worst_iterations,
+            counted(self.effort.splits, "retry", "retries")
+        )?;
+        if self.effort.continued > 0 {
+            let steps = counted(self.effort.continued, "continuation", "continuations");
+            write!(f, ", {steps} in the step size")?;
+        }
+        if self.effort.globalised > 0 {
+            write!(f, ", {} of the globaliser", counted(self.effort.globalised, "call", "calls"))?;
+        }
+        Ok(())
+    }
+}
+
+impl Certificate {
+    /// How the steps of an explicit method found the entropy, and what has set their size.
+    fn projections(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let ProjectedSteps { targeted, free, held, stability } = self.projected_steps;
+        if self.projected_steps.all() > 0 {
+            let falls = counted(self.falls_avoided, "fall", "falls");
+            writeln!(
+                f,
+                "entropy:     {targeted} steps targeted, {free} free, {held} held; {falls} avoided by a smaller step"
+            )?;
+        }
+        if self.is_limited_by_stability() {
+            let steps = counted(self.steps, "step", "steps");
+            let LimitingSites { stiffness, .. } = self.limiting_sites;
+            let site = stiffness.map_or_else(String::new, |site| format!(" at site {site}"));
+            writeln!(
+                f,
+                "stability:   it sets the size of {stability} of {steps}{site}, and not the tolerance; an implicit \
+                 method, such as `Radau`, takes larger ones, and so does `RungeKuttaChebyshev` if friction sets it"
+            )?;
+        } else if let (0, Some(site)) = (stability, self.limiting_sites.stiffness) {
+            // Few steps at the edge are no stiffness; a method without an edge has looked for it.
+            writeln!(f, "stiffness:   the motion is stiffest at site {site}")?;
+        }
+        Ok(())
+    }
+
+    /// The energy at the start, and the error relative to it where it is not zero.
+    fn relative_to(&self) -> String {
+        let start = self.initial_energy;
+        if start.abs() > 0.0 {
+            format!(", {:.1e} of H₀ = {}", self.max_relative_energy_error(), Digits(start))
+        } else {
+            " from H₀ = 0".to_owned()
+        }
+    }
+
+    fn entropy_line(&self) -> String {
+        let falls = match self.entropy_falls {
+            0 => "it never fell".to_owned(),
+            n => format!("it fell on {}", counted(n, "step", "steps")),
+        };
+        let slope = if self.min_entropy_slope.is_finite() {
+            format!(", |w_S| ≥ {:.1e}", self.min_entropy_slope)
+        } else {
+            String::new()
+        };
+        format!(
+            "ΔS ≥ {:.1e} on every step, {falls}; S rose by {:.6e}{slope}",
+            self.min_entropy_increment, self.entropy_gained
+        )
+    }
+}

@@ -1,0 +1,78 @@
+//! Why a run cannot be taken up.
+
+use metriplectic_manifolds::PointError;
+
+use crate::run::span::SpanError;
+
+/// A checkpoint that cannot be resumed.
+#[derive(Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ResumeError {
+    /// It was written by another version of this library.
+    #[error(
+        "the checkpoint has format {found}, and {expected} is what is read here; resume it with the version that wrote it"
+    )]
+    Version {
+        /// The format of the checkpoint.
+        found: u32,
+        /// The format of this version.
+        expected: u32,
+    },
+    /// Its point is not one of the manifold.
+    #[error("the point of the checkpoint: {0}")]
+    Point(#[from] PointError),
+    /// A list in it has another length than the system says.
+    #[error(
+        "the checkpoint has {found} {what}, the system {expected}; resume it with the system that it is of"
+    )]
+    Length {
+        /// What the list holds.
+        what: &'static str,
+        /// Its length.
+        found: usize,
+        /// The length that it should have.
+        expected: usize,
+    },
+    /// A field has another value than the checkpoint says.
+    #[error(
+        "the {field} is {found} at the point of the checkpoint, which says {stored}; resume it with the system that it is of"
+    )]
+    AnotherSystem {
+        /// Which field.
+        field: &'static str,
+        /// Its value in the checkpoint.
+        stored: f64,
+        /// Its value in the system.
+        found: f64,
+    },
+    /// The end that it is to be given cannot be that of the run.
+    #[error(transparent)]
+    Span(#[from] SpanError),
+    /// It is of a run in steps of one size, and is to be given a time at which it ends.
+    #[error(
+        "the run takes steps of one size; say how many with `with_steps` instead of `with_end`"
+    )]
+    FixedSteps,
+    /// It is of a run whose steps follow a tolerance, and is to be given a number of steps.
+    #[error(
+        "the steps of the run follow a tolerance; say when it ends with `with_end` instead of `with_steps`"
+    )]
+    AdaptiveSteps,
+    /// A number in it is impossible: by itself, beside the others, or for the system.
+    #[error(
+        "the {what} of the checkpoint is {value}, which no run has that agrees with its other numbers; the \
+         file is damaged: write another one"
+    )]
+    Damaged {
+        /// Which number.
+        what: &'static str,
+        /// Its value.
+        value: f64,
+    },
+}
+
+impl std::fmt::Debug for ResumeError {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        std::fmt::Display::fmt(self, f)
+    }
+}

@@ -1,0 +1,133 @@
+//! The saved forms of types that are also written for readers. There they have plain numbers, and a type has one
+//! form in serde: so each has a second one here, by which the compiler reads and writes the type itself.
+
+use metriplectic_dynamics::SecondLaw;
+use metriplectic_dynamics::invariants::Kind;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+use super::exact::{self, ExactForm};
+use crate::method::{Effort, LimitingSites, Promises};
+use crate::run::certificate::{Certificate, InvariantBalance, ProjectedSteps, StageBalance};
+use crate::run::trajectory::Ending;
+
+#[derive(Serialize, Deserialize)]
+#[serde(remote = "Certificate", deny_unknown_fields)]
+struct CertificateForm {
+    #[serde(with = "exact")]
+    initial_energy: f64,
+    #[serde(with = "exact")]
+    max_energy_error: f64,
+    #[serde(with = "exact")]
+    energy_scale: f64,
+    #[serde(with = "exact")]
+    initial_entropy: f64,
+    #[serde(with = "exact")]
+    min_entropy_increment: f64,
+    #[serde(with = "exact")]
+    entropy_gained: f64,
+    entropy_falls: usize,
+    #[serde(with = "exact")]
+    min_entropy_slope: f64,
+    #[serde(with = "exact")]
+    invariants: Vec<InvariantBalance>,
+    #[serde(with = "exact")]
+    max_manifold_defect: f64,
+    steps: usize,
+    #[serde(with = "exact")]
+    smallest_step: f64,
+    #[serde(with = "exact")]
+    largest_step: f64,
+    rejected: usize,
+    falls_avoided: usize,
+    projected_steps: ProjectedSteps,
+    #[serde(with = "exact")]
+    stages: Option<StageBalance>,
+    effort: Effort,
+    worst_iterations: usize,
+    #[serde(with = "exact")]
+    local_error: Option<f64>,
+    #[serde(default)]
+    limiting_sites: LimitingSites,
+    promises: Promises,
+    #[serde(with = "SecondLawForm")]
+    second_law: SecondLaw,
+    #[serde(with = "exact")]
+    friction: f64,
+    projected: bool,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(remote = "InvariantBalance")]
+struct InvariantBalanceForm {
+    #[serde(with = "KindForm")]
+    kind: Kind,
+    #[serde(with = "exact")]
+    initial: f64,
+    #[serde(with = "exact")]
+    max_error: f64,
+    #[serde(with = "exact")]
+    scale: f64,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(remote = "StageBalance")]
+struct StageBalanceForm {
+    #[serde(with = "exact")]
+    defect: f64,
+    #[serde(with = "exact")]
+    surplus: f64,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(remote = "Ending")]
+enum EndingForm {
+    Span,
+    Rest {
+        #[serde(with = "exact")]
+        speed: f64,
+        #[serde(with = "exact")]
+        largest: f64,
+    },
+    Event {
+        index: usize,
+    },
+    Stopped,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(remote = "SecondLaw")]
+#[non_exhaustive]
+enum SecondLawForm {
+    NoEntropy,
+    Exact,
+    Published,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(remote = "Kind")]
+#[non_exhaustive]
+enum KindForm {
+    Casimir,
+    Momentum,
+}
+
+macro_rules! exact_form {
+    ($($form:ident of $type:ty),*) => {$(
+        impl ExactForm for $type {
+            fn write<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+                $form::serialize(self, serializer)
+            }
+
+            fn read<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+                $form::deserialize(deserializer)
+            }
+        }
+    )*};
+}
+
+exact_form! {
+    CertificateForm of Certificate,
+    InvariantBalanceForm of InvariantBalance,
+    StageBalanceForm of StageBalance,
+    EndingForm of Ending
+}

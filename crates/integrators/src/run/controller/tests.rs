@@ -1,0 +1,77 @@
+use super::*;
+use crate::{Run, Span};
+use metriplectic_dynamics::{AreaForm, Metriplectic, Nambu, System, system::Point};
+use metriplectic_fields::{Column as _, Real, Space as _};
+use metriplectic_manifolds::{Exponential, Retraction, Rotations, Sphere, WeylMidpoint};
+use nalgebra::{Matrix3, Vector3};
+use num_dual::DualNum;
+
+/// How far the estimate is off the local error, relative to it; that is found by 200 steps.
+fn off<Y, R>(retraction: R, system: &Y, x: &Point<Y>, h: f64) -> f64
+where
+    Y: Metriplectic,
+    R: Run + Retraction<Y::Manifold, Y::Metric>,
+    WeylMidpoint: Retraction<Y::Manifold, Y::Metric>,
+{
+    let end = retraction.run(system, x.clone(), Span::steps(h, 1)).unwrap().last().point.clone();
+    let fine = WeylMidpoint.run(system, x.clone(), Span::steps(h / 200.0, 200)).unwrap();
+    let at = |y| Y::Manifold::coordinates(x, y);
+    let exact = at(&end) - at(&fine.last().point);
+    let estimate = system.local_error(x, &end, h).unwrap().0;
+    (estimate - exact).magnitude() / exact.magnitude()
+}
+
+#[test]
+fn the_estimate_tends_to_the_local_error() {
+    let top = System::on(Sphere::<2>::round())
+        .bracket(AreaForm)
+        .energy(|x: &Vector3<Real>| x.x.powi(2) * 0.5 + x.y.powi(3) * 0.4 + x.z * x.x)
+        .build()
+        .unwrap();
+    let start = Vector3::new(0.48, 0.6, 0.64);
+    let group = System::on(Rotations::bi_invariant())
+        .bracket(Nambu::default())
+        .energy(|r: &Matrix3<Real>| r.m11 + r.m22 * 2.0 + r.m33 * 3.0 + r.m12 * r.m23 * 0.5)
+        .entropy(|r: &Matrix3<Real>| r.m13 - r.m21 * 0.5 + (r.m31 + r.m32).powi(2) * 0.25)
+        .build()
+        .unwrap();
+    let turned = Rotations::bi_invariant().from_quaternion([0.8, 0.3, -0.4, 0.33]).unwrap();
+    let steps = [0.1, 0.05, 0.025];
+    for (name, off) in [
+        ("S²", steps.map(|h| off(WeylMidpoint, &top, &start, h))),
+        ("S², based at the start", steps.map(|h| off(Exponential, &top, &start, h))),
+        ("SO(3)", steps.map(|h| off(WeylMidpoint, &group, &turned, 0.03 * h))),
+    ] {
+        println!("{name}: {off:.4?}");
+        // Of order one: the estimate is the local error, and no multiple of it.
+        assert!(off[2] < 0.05, "{name}: {off:?}");
+        assert!(off[2] < 0.6 * off[1] && off[1] < 0.6 * off[0], "{name}: {off:?}");
+    }
+}
+
+#[test]
+fn the_controller_stays_within_its_bounds() {
+    let rule = Rule { order: 2, control: Control::of_order(2), start: 0.0 };
+    let mut pace = Pace {
+        end: 10.0,
+        tolerance: 1e-4,
+        least: Some(1e-6),
+        largest: Some(2.0),
+        next: 1.0,
+        ..Pace::default()
+    };
+    pace.accept(&rule, 1.0, 0.0);
+    assert!((pace.next - 2.0).abs() < 1e-15);
+    pace.reject(&rule, 1.0, Some(1e9));
+    assert!((pace.next - 0.2).abs() < 1e-15);
+    pace.accept(&rule, 0.2, 0.0);
+    // Not larger right after a rejection.
+    assert!((pace.next - 0.2).abs() < 1e-15);
+    pace.reject(&rule, 0.2, None);
+    assert!((pace.next - 0.05).abs() < 1e-15);
+    // The last steps: one, if it is nearly as long; two of one size, if it would be cut.
+    pace.next = 1.0;
+    assert_eq!(pace.attempt(9.0), (1.0, true));
+    assert_eq!(pace.attempt(8.5), (0.75, false));
+    assert_eq!(pace.attempt(2.0), (1.0, false));
+}

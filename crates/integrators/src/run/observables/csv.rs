@@ -1,0 +1,94 @@
+//! Tables of comma-separated values.
+
+use std::fmt;
+use std::io::{self, Write};
+
+use super::{BUFFER, Observables, TableError};
+use crate::method::StateSpace;
+use crate::run::trajectory::State;
+
+/// A table of comma-separated values; made by [`Observables::csv`].
+#[derive(Debug)]
+pub struct Csv<'a, M: StateSpace, W: Write> {
+    pub(super) of: &'a Observables<'a, M>,
+    /// `None` once the table is finished.
+    pub(super) to: Option<W>,
+    /// What has not been written; it begins in the middle of a line if writing has failed there.
+    pub(super) lines: String,
+    /// The rows that were given to it.
+    pub(super) rows: usize,
+}
+
+impl<M: StateSpace, W: Write> Csv<'_, M, W> {
+    /// One row more.
+    ///
+    /// # Errors
+    ///
+    /// Those of writing.
+    pub fn write(&mut self, state: &State<M>) -> io::Result<()> {
+        for (index, x) in self.of.row(state).enumerate() {
+            let comma = if index == 0 { "" } else { "," };
+            fmt::Write::write_fmt(&mut self.lines, format_args!("{comma}{x:?}"))
+                .map_err(io::Error::other)?;
+        }
+        self.lines.push('\n');
+        self.rows += 1;
+        if self.lines.len() < BUFFER { Ok(()) } else { self.flush() }
+    }
+
+    /// Writes the rows that are still in memory.
+    ///
+    /// # Errors
+    ///
+    /// Those of writing.
+    pub fn flush(&mut self) -> io::Result<()> {
+        let Some(to) = &mut self.to else { return Ok(()) };
+        // No byte is written twice, and none is left out.
+        let (written, result) = write(to, self.lines.as_bytes());
+        self.lines.drain(..written);
+        result.and_then(|()| to.flush()).map_err(|source| {
+            let left = self.lines.bytes().filter(|&byte| byte == b'\n').count();
+            TableError::Write { rows: self.rows.saturating_sub(left), source }.into()
+        })
+    }
+
+    /// Writes the rows that are still in memory, and gives back what was written to.
+    ///
+    /// # Errors
+    ///
+    /// Those of writing.
+    pub fn finish(mut self) -> io::Result<W> {
+        self.flush()?;
+        self.to.take().ok_or_else(|| io::Error::other("the table was finished before"))
+    }
+}
+
+impl<M: StateSpace, W: Write> Drop for Csv<'_, M, W> {
+    /// Writes what is still in memory; an error is lost, so prefer [`finish`](Self::finish).
+    fn drop(&mut self) {
+        let _ = self.flush();
+    }
+}
+
+/// Writes as much as there is room for, and says how many bytes that are: `write_all` does not.
+fn write(to: &mut impl Write, bytes: &[u8]) -> (usize, io::Result<()>) {
+    let mut written = 0;
+    while written < bytes.len() {
+        match to.write(&bytes[written..]) {
+            Ok(0) => return (written, Err(io::ErrorKind::WriteZero.into())),
+            Ok(more) => written += more,
+            Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+            Err(error) => return (written, Err(error)),
+        }
+    }
+    (written, Ok(()))
+}
+
+/// A name as RFC 4180 wants it.
+pub(super) fn quoted(name: &str) -> String {
+    if name.contains([',', '"', '\n', '\r']) {
+        format!("\"{}\"", name.replace('"', "\"\""))
+    } else {
+        name.into()
+    }
+}

@@ -1,0 +1,74 @@
+//! Where a run is on its schedule: what its next step depends on beside the state and the memory of the method.
+
+use crate::run::controller::StepSize;
+use crate::run::scales::Scales;
+use crate::run::trajectory::Ending;
+
+#[cfg(feature = "serde")]
+use crate::run::checkpoint::exact;
+
+/// Where a run is on its schedule.
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
+pub(crate) struct Progress<V> {
+    pub(crate) step_size: StepSize<V>,
+    /// The time at which the run started.
+    #[cfg_attr(feature = "serde", serde(with = "exact"))]
+    pub(crate) start: f64,
+    pub(crate) count: Option<usize>,
+    pub(crate) every: usize,
+    /// The most states to record.
+    pub(crate) most: Option<usize>,
+    /// The sizes of the entries so far, where errors or rest are judged by them.
+    pub(crate) scales: Scales<V>,
+    /// The tolerance of rest.
+    #[cfg_attr(feature = "serde", serde(with = "exact"))]
+    pub(crate) rest: Option<f64>,
+    /// The largest velocity of each entry so far, where rest is looked for.
+    pub(crate) largest_velocity: V,
+    #[cfg_attr(feature = "serde", serde(with = "exact"))]
+    pub(crate) ending: Option<Ending>,
+}
+
+impl<V> Progress<V> {
+    /// Whether errors or rest are judged by the sizes of the entries.
+    pub(crate) const fn judges_sizes(&self) -> bool {
+        self.rest.is_some() || matches!(self.step_size, StepSize::Adaptive(_))
+    }
+
+    /// The same, with the numbers of the entries in another form; they are told apart by what they are.
+    pub(crate) fn convert<W, E>(
+        &self,
+        convert: impl Fn(&'static str, &V) -> Result<W, E>,
+    ) -> Result<Progress<W>, E> {
+        let Self { start, count, every, most, rest, ending, .. } = *self;
+        let step_size = self.step_size.convert(&convert)?;
+        let scales = Scales {
+            sizes: convert("sizes of the entries", &self.scales.sizes)?,
+            terms: convert("sizes of the terms", &self.scales.terms)?,
+        };
+        let largest_velocity = convert("largest velocities", &self.largest_velocity)?;
+        Ok(Progress {
+            step_size,
+            start,
+            count,
+            every,
+            most,
+            scales,
+            rest,
+            largest_velocity,
+            ending,
+        })
+    }
+
+    /// When the run ends; infinite if it does not.
+    pub(crate) fn end(&self) -> f64 {
+        match &self.step_size {
+            StepSize::Fixed(h) => {
+                self.count.map_or(f64::INFINITY, |count| self.start + count as f64 * h)
+            }
+            StepSize::Adaptive(controller) => controller.pace.end,
+        }
+    }
+}

@@ -34,8 +34,16 @@ impl<N: Dimension> MidpointMemory<N> {
 }
 
 /// The names of the displacements in a checkpoint.
-const NAMES: [&str; DIFFERENCES] =
-    ["displacement", "first difference", "second difference", "third difference"];
+const NAMES: [&str; DIFFERENCES] = [
+    "displacement",
+    "first difference",
+    "second difference",
+    "third difference",
+    "fourth difference",
+    "fifth difference",
+    "sixth difference",
+    "seventh difference",
+];
 
 impl<N: Dimension> Memory for MidpointMemory<N> {
     fn rescaled(&self, ratio: f64) -> Self {

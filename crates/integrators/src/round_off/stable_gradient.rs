@@ -85,7 +85,7 @@ fn safer<M: Space>(
 impl<M: Manifold> StableGradient<M> {
     /// Evaluates `f` along a path with the mean covector `mean`. `start` is `F(x)`, `end` is `F(x')`,
     /// `base` the slope `⟨dF(z), d⟩` at the base point, and `nodes` those of the path.
-    #[inline]
+    #[inline(always)]
     pub fn new<N: Borrow<Nodes<M>>>(
         f: &impl ScalarField<M>,
         mean: &Vector<M>,

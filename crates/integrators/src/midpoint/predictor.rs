@@ -48,8 +48,9 @@ impl<N: Dimension> Predictor<N> {
         if self.known < 2 {
             return None;
         }
+        let (last, differences) = self.differences[..self.known].split_first()?;
         let (mut best, mut smallest) = (1, f64::INFINITY);
-        for (k, difference) in self.differences[..self.known].iter().enumerate().skip(1) {
+        for (difference, k) in differences.iter().zip(1..) {
             let size = difference.dot(difference);
             if k >= LOW && (best + 1 < k || size > FALLS * smallest) {
                 break;
@@ -62,11 +63,7 @@ impl<N: Dimension> Predictor<N> {
         if best + 1 == self.known || best + 1 >= LOW {
             best += 1;
         }
-        let mut sum = self.differences[0];
-        for difference in &self.differences[1..best] {
-            sum += *difference;
-        }
-        Some(sum)
+        Some(differences.iter().take(best - 1).fold(*last, |sum, difference| sum + *difference))
     }
 
     /// Notes the displacement `d` of the step from `x` to `end`.

@@ -64,6 +64,9 @@ pub(crate) fn short(change: f64, size: f64) -> f64 {
     if change.abs() >= 4.0 * SHORT * size && size > 0.0 {
         return 0.0;
     }
+    if change.abs() <= SHORT * size {
+        return 1.0;
+    }
     let fraction = change.abs() / (SHORT * size).max(f64::MIN_POSITIVE);
     let t = ((fraction - 1.0) / 3.0).clamp(0.0, 1.0);
     1.0 - t * t * (3.0 - 2.0 * t)

@@ -209,8 +209,14 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
         }
         let end = self.retraction.end(system.metric(), start.x, &root.u);
         let end = end.map_err(|_| failed(Cause::Edge, effort))?;
-        let level::Polished { u, end, moved, evaluated } =
-            level::polish(&equation, &root, end, &mut effort);
+        // Where the laws hold at the point with the digits that earlier steps have lost, the step goes there.
+        let shifted = memory.compensation.shifted::<Y::Manifold>(&end);
+        let held = shifted.and_then(|shifted| level::held(&equation, &shifted));
+        let level::Polished { u, end, moved, evaluated } = if held.is_some() {
+            level::Polished { u: root.u, end, moved: false, evaluated: held }
+        } else {
+            level::polish(&equation, &root, end, &mut effort)
+        };
         // Outside an open chart the defect is infinite: there is no state to go on from.
         if system.manifold().defect(&end).is_infinite() {
             return Err(failed(Cause::Edge, effort));
@@ -225,7 +231,7 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
             let step = Displaced { x: start.x, d: &u, end: &end };
             memory.compensation.add::<Y::Manifold>(lost, &step)
         };
-        let evaluated = if compensated.is_some() { None } else { evaluated };
+        let evaluated = if compensated.is_some() { held } else { evaluated };
         let x = compensated.unwrap_or(end);
         // The last digits of the end, which no residual has seen, may be beyond the edge.
         let values = match evaluated {

@@ -106,7 +106,7 @@ impl<N: Dimension> Inverse<N> {
     /// Whether as many corrections of the next guess as a Jacobian is worth are expected to be enough, the last
     /// one unchecked.
     fn serves(&self) -> bool {
-        contracted(self.first, self.contraction, corrections::<N>()) <= SURE
+        reaches(self.first, self.contraction, corrections::<N>(), SURE)
     }
 
     /// The correction of a residual.
@@ -123,29 +123,43 @@ impl<N: Dimension> Inverse<N> {
 
     /// Broyden's update: the least change of the inverse after which the step `s` has the change `y`
     /// of the residual, `s = J⁻¹y`, with `predicted = J⁻¹y` before it (Broyden 1965, in the form of
-    /// Sherman and Morrison).
+    /// Sherman and Morrison). The `correction` of a residual becomes that of the new inverse.
     #[inline]
-    fn learn(&mut self, s: &N::Vector<f64>, predicted: &N::Vector<f64>) {
+    fn learn(
+        &mut self,
+        s: &N::Vector<f64>,
+        predicted: &N::Vector<f64>,
+        correction: &mut N::Vector<f64>,
+    ) {
         let along = s.dot(predicted);
         // Beyond a factor of four the step says little about the slope, and nothing where its square
         // underflows.
         if along > 0.25 * s.dot(s) && along > 1e-280 {
             let row = self.matrix.transpose_times(s);
-            self.matrix += N::Matrix::<f64>::outer(&((*s - *predicted) * along.recip()), &row);
+            let turned = (*s - *predicted) * along.recip();
+            self.matrix += N::Matrix::<f64>::outer(&turned, &row);
+            *correction += turned * s.dot(correction);
         }
     }
 }
 
 /// The corrections by a kept Jacobian that cost less than a new one. In dimension `n` the derivatives of the
-/// residual cost about as much as `n` residuals, and their factorisation grows with `n³`.
+/// residual cost about as much as `n` residuals.
 const fn corrections<N: Dimension>() -> usize {
-    if N::LEN > 6 { N::LEN / 2 } else { 3 }
+    if N::LEN > 3 { N::LEN } else { 3 }
 }
 
-/// What a number of corrections with this contraction leave of a residual.
+/// Whether a number of corrections with this contraction reduce a residual to a limit.
 #[inline]
-fn contracted(residual: f64, contraction: f64, corrections: usize) -> f64 {
-    (0..corrections).fold(residual, |left, _| left * contraction)
+fn reaches(residual: f64, contraction: f64, corrections: usize, limit: f64) -> bool {
+    let mut left = residual;
+    for _ in 0..corrections {
+        if left <= limit {
+            return true;
+        }
+        left *= contraction;
+    }
+    left <= limit
 }
 
 /// A measure of corrections: the root mean square of their components in units of round-off.
@@ -364,7 +378,7 @@ impl Newton {
             };
             let (before, size_before, step) = (best.residual, size, correction);
             (residual, evidence) = (next.at.residual, next.at.evidence);
-            (best.best, best.residual) = (next.u, residual.magnitude());
+            (best.best, best.residual) = (next.u, next.size);
             correction = inverse.times(&residual);
             size = measure.of(&correction);
             (contraction, expected) = (best.residual / before, size / size_before);
@@ -390,13 +404,15 @@ impl Newton {
             if before > NOISE * residual_bound {
                 let taken = step * -next.length;
                 let predicted = correction - step;
-                inverse.learn(&taken, &predicted);
-                correction = inverse.times(&residual);
+                inverse.learn(&taken, &predicted, &mut correction);
             }
             // Another equation's Jacobian gets its corrections, the last one unchecked.
             let remaining = corrections::<M::Dim>().saturating_sub(taken + 1).max(1);
-            let left = contracted(best.residual, contraction, remaining);
-            if !own && best.residual > residual_bound && left > SURE * residual_bound {
+            let limit = SURE * residual_bound;
+            if !own
+                && best.residual > residual_bound
+                && !reaches(best.residual, contraction, remaining, limit)
+            {
                 return Progress::Slow;
             }
         }
@@ -416,11 +432,12 @@ impl Newton {
         let mut length = 1.0;
         for halving in 0..=self.halvings {
             let u = best.best - *correction * length;
-            if let Some(at) = equation.evaluate(&u)
-                && (at.residual.magnitude() < best.residual * (1.0 - 1e-4 * length)
-                    || halving == 0 && contracts(&at.residual))
-            {
-                return Some(Descent { u, at, length });
+            if let Some(at) = equation.evaluate(&u) {
+                let size = at.residual.magnitude();
+                let falls = size < best.residual * (1.0 - 1e-4 * length);
+                if falls || halving == 0 && contracts(&at.residual) {
+                    return Some(Descent { u, at, size, length });
+                }
             }
             length *= 0.5;
         }
@@ -432,6 +449,8 @@ impl Newton {
 struct Descent<M: Space, E> {
     u: Vector<M>,
     at: Evaluated<M, E>,
+    /// The norm of the residual.
+    size: f64,
     length: f64,
 }
 

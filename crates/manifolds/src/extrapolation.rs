@@ -18,21 +18,21 @@ pub(crate) const TOLERANCE: f64 = 1e-13;
 /// Substeps of the midpoint rule, before extrapolation.
 const SUBSTEPS: [u32; 8] = [2, 4, 6, 8, 10, 12, 14, 16];
 
-/// The start of a step, with the rate there, which is the same in every row.
-struct Start<'a, Y> {
-    state: &'a Y,
-    slope: &'a Y,
+/// The start of a step, with the rate there, which is the same in every row and for every size.
+pub(crate) struct Start<Y> {
+    pub(crate) state: Y,
+    pub(crate) slope: Y,
 }
 
 /// One row of the extrapolation: the midpoint rule with `n` substeps over `h`, smoothed by Gragg.
 fn midpoint_rule<Y: State>(
     rate: &impl Fn(&Y) -> Option<Y>,
-    Start { state: start, slope }: &Start<'_, Y>,
+    Start { state: start, slope }: &Start<Y>,
     h: f64,
     n: u32,
 ) -> Option<Y> {
     let step = h / f64::from(n);
-    let mut before = **start;
+    let mut before = *start;
     let mut here = start.plus(slope, step);
     for _ in 1..n {
         let next = before.plus(&rate(&here)?, 2.0 * step);
@@ -58,8 +58,11 @@ const EASY: usize = SUBSTEPS.len() - 3;
 const HOPELESS: f64 = 1e-9;
 
 /// One step of size `h`; `None` if it does not converge or leaves the domain of `rate`.
-pub(crate) fn step<Y: State>(rate: &impl Fn(&Y) -> Option<Y>, start: &Y, h: f64) -> Option<End<Y>> {
-    let start = &Start { state: start, slope: &rate(start)? };
+pub(crate) fn step<Y: State>(
+    rate: &impl Fn(&Y) -> Option<Y>,
+    start: &Start<Y>,
+    h: f64,
+) -> Option<End<Y>> {
     let mut table: [Option<Y>; SUBSTEPS.len()] = [None; SUBSTEPS.len()];
     for (row, &n) in SUBSTEPS.iter().enumerate() {
         // Aitken and Neville: the table of the row above is overwritten from the left.
@@ -107,7 +110,8 @@ mod tests {
 
     #[test]
     fn a_turn_by_one_radian_is_exact_to_round_off() {
-        let end = step(&|y: &[f64; 2]| Some([-y[1], y[0]]), &[1.0, 0.0], 1.0).unwrap();
+        let start = Start { state: [1.0, 0.0], slope: [0.0, 1.0] };
+        let end = step(&|y: &[f64; 2]| Some([-y[1], y[0]]), &start, 1.0).unwrap();
         let (sine, cosine) = 1_f64.sin_cos();
         assert!(end.state.distance(&[cosine, sine]) < 1e-14);
     }
@@ -115,7 +119,8 @@ mod tests {
     #[test]
     fn a_singularity_on_the_way_is_no_step() {
         // x' = x² blows up at t = 1.
-        let end = step(&|y: &[f64; 2]| Some([y[0] * y[0], 0.0]), &[1.0, 0.0], 1.5);
+        let start = Start { state: [1.0, 0.0], slope: [1.0, 0.0] };
+        let end = step(&|y: &[f64; 2]| Some([y[0] * y[0], 0.0]), &start, 1.5);
         assert!(end.is_none());
     }
 }

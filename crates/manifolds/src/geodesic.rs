@@ -19,13 +19,14 @@
 //! around the point that it has reached.
 
 use metriplectic_fields::{
-    ChartPoint, Column, Dimension, Matrix, MatrixField, Scalar, Space, Square, Vector,
+    ChartPoint, Column, Dimension, Matrix, MatrixField, MatrixJet, Scalar, Space, Square, Vector,
+    along_slopes,
 };
 use num_dual::Dual;
 
-use crate::chart_metric::{dg_v, metric, metric_jet};
+use crate::chart_metric::{metric, metric_jet};
 pub(crate) use crate::extrapolation::TOLERANCE as ACCURACY;
-use crate::extrapolation::{self, State};
+use crate::extrapolation::{self, Start, State};
 use crate::metric::GeodesicEnd;
 use crate::{Manifold, MetricError};
 
@@ -89,8 +90,12 @@ fn rate<M: Space>(
 ) -> Option<Phase<M, f64>> {
     let g = metric_jet(field, x, &at.q);
     let v = g.value.solve(&at.p)?;
-    let force = Vector::<M>::from_index(|k| 0.5 * v.dot(&(g.slopes[k] * v)));
-    Some(Phase { q: v, p: force, size: at.size })
+    Some(Phase { q: v, p: force(&g, &v), size: at.size })
+}
+
+/// The rate `½ vᵀ (∂_k g) v` of the momentum.
+fn force<M: Space>(g: &MatrixJet<M>, v: &Vector<M>) -> Vector<M> {
+    Vector::<M>::from_index(|k| 0.5 * v.dot(&(g.slopes[k] * *v)))
 }
 
 /// The rate at any scalar by its definition, with one more dual number.
@@ -154,8 +159,16 @@ pub(crate) fn ended<M: Space, T>(
     })
 }
 
+/// Where a geodesic starts in the chart at a point.
+pub(crate) struct Departure<'a, M: Space, Y> {
+    pub(crate) point: &'a M::Point<f64>,
+    pub(crate) state: Y,
+    /// The rate there, if it is known.
+    pub(crate) slope: Option<Y>,
+}
+
 /// Follows a geodesic for a unit of time: `rate` in the chart at a point, `position` of a state, and
-/// `recentre` to the chart at the state itself. The last state is recentred too.
+/// `recentre` to the chart at the state itself. Returns the last state in the chart at the point.
 ///
 /// # Errors
 ///
@@ -164,20 +177,23 @@ pub(crate) fn ended<M: Space, T>(
 /// neither and the pieces are used up, or too short.
 pub(crate) fn travel<M: Space, Y: State>(
     field: &impl MatrixField<M>,
-    x: &M::Point<f64>,
-    start: Y,
+    start: Departure<'_, M, Y>,
     rate: impl Fn(&M::Point<f64>, &Y) -> Option<Y>,
     position: impl Fn(&Y) -> Vector<M>,
     recentre: impl Fn(&M::Point<f64>, &Y) -> Option<(M::Point<f64>, Y)>,
 ) -> Result<(M::Point<f64>, Y), MetricError> {
-    let (mut base, mut here) = (x.clone(), start);
+    let Departure { point, state: mut here, mut slope } = start;
+    let mut base = point.clone();
     let (mut time, mut h) = (0.0, 1.0_f64);
     for pieces in 1..=PIECES {
         h = h.min(1.0 - time);
-        let next = extrapolation::step(&|y: &Y| rate(&base, y), &here, h);
+        slope = slope.or_else(|| rate(&base, &here));
+        let next = slope.and_then(|slope| {
+            extrapolation::step(&|y: &Y| rate(&base, y), &Start { state: here, slope }, h)
+        });
         match next.filter(|next| M::is_near(&position(&next.state))) {
             Some(next) => {
-                here = next.state;
+                (here, slope) = (next.state, None);
                 // A sum of halves and quarters is exact.
                 time += h;
                 if next.easy {
@@ -189,23 +205,22 @@ pub(crate) fn travel<M: Space, Y: State>(
                 continue;
             }
             None => {
-                let velocity = rate(&base, &here).map(|rate| position(&rate));
+                let velocity = slope.map(|rate| position(&rate));
                 let at = ChartPoint { q: position(&here), base };
                 let obstacle =
                     obstacle(field, time, &at, &(velocity.unwrap_or(Vector::<M>::zero()) * h));
                 return Err(obstacle.unwrap_or(MetricError::Uneven { time, pieces }));
             }
         }
-        let finished = time >= 1.0;
-        if finished || !M::is_near(&(position(&here) * 2.0)) {
+        if time >= 1.0 {
+            return Ok((base, here));
+        }
+        if !M::is_near(&(position(&here) * 2.0)) {
             (base, here) = recentre(&base, &here).ok_or_else(|| {
                 let at = ChartPoint { base: base.clone(), q: position(&here) };
                 obstacle(field, time, &at, &Vector::<M>::zero())
                     .unwrap_or(MetricError::Edge { time })
             })?;
-        }
-        if finished {
-            return Ok((base, here));
         }
     }
     Err(MetricError::Uneven { time, pieces: PIECES })
@@ -222,20 +237,93 @@ pub(crate) fn follow<M: Manifold, D: Scalar>(
     x: &ChartPoint<M, D>,
     v: &Vector<M, D>,
 ) -> Result<GeodesicEnd<M, D>, MetricError> {
-    let recentre = |base: &M::Point<f64>, y: &Phase<M, D>| {
+    let end = |base: &M::Point<f64>, y: &Phase<M, D>| {
         let g = metric(field, &ChartPoint { base: base.clone(), q: y.q });
-        let (at, v) = centred::<M, D>(base, &y.q, &g.solve(&y.p)?);
+        Some(centred::<M, D>(base, &y.q, &g.solve(&y.p)?))
+    };
+    let recentre = |base: &M::Point<f64>, y: &Phase<M, D>| {
+        let (at, v) = end(base, y)?;
         let p = metric(field, &at) * v;
         Some((at.base, Phase { q: at.q, p, size: y.size }))
     };
     let size = size_at::<M>(&x.base);
-    let start = Phase::<M, D> { q: x.q, p: metric(field, x) * *v, size };
+    let state = Phase::<M, D> { q: x.q, p: metric(field, x) * *v, size };
     let rate = |base: &M::Point<f64>, y: &Phase<M, D>| rate_at_scalar(field, base, y);
-    let (base, end) = travel::<M, _>(field, &x.base, start, rate, |y| y.q.real(), recentre)?;
-    let end_point = ChartPoint { base, q: end.q };
-    let v = metric(field, &end_point).solve(&end.p);
-    let v = ended(field, &end_point.base, v)?;
-    Ok((end_point, v))
+    let start = Departure { point: &x.base, state, slope: None };
+    let (base, y) = travel(field, start, rate, |y| y.q.real(), recentre)?;
+    ended(field, &base, end(&base, &y))
+}
+
+/// Where a geodesic from a real point ends, in the last of its charts.
+pub(crate) struct Arrival<M: Space> {
+    /// The centre of this chart.
+    base: M::Point<f64>,
+    end: Phase<M, f64>,
+    /// The metric where it starts, and the velocity there.
+    start: MatrixJet<M>,
+    velocity: Vector<M>,
+}
+
+impl<M: Manifold> Arrival<M> {
+    /// Follows the geodesic from `x` with velocity `v` for a unit of time.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`travel`].
+    pub(crate) fn of(
+        field: &impl MatrixField<M>,
+        x: &M::Point<f64>,
+        v: &Vector<M>,
+    ) -> Result<Self, MetricError> {
+        let recentre = |base: &M::Point<f64>, y: &Phase<M, f64>| {
+            let (end, v) = centred_real(field, base, y)?;
+            let p = metric(field, &ChartPoint::<M>::centre(&end)) * v;
+            Some((end, Phase { q: Vector::<M>::zero(), p, size: y.size }))
+        };
+        let (q, size) = (Vector::<M>::zero(), size_at::<M>(x));
+        let g = metric_jet(field, x, &q);
+        let state = Phase::<M, f64> { q, p: g.value * *v, size };
+        let slope = Phase { q: *v, p: force(&g, v), size };
+        // A metric without an inverse has no geodesics, whatever the velocity is.
+        let slope = g.value.factor().is_some().then_some(slope);
+        let start = Departure { point: x, state, slope };
+        let rate = |base: &M::Point<f64>, y: &Phase<M, f64>| rate(field, base, y);
+        let (base, end) = travel(field, start, rate, |y| y.q, recentre)?;
+        Ok(Self { base, end, start: g, velocity: *v })
+    }
+
+    /// The acceleration at the start; `None` where the metric has no inverse.
+    pub(crate) fn acceleration_at_start(&self) -> Option<Vector<M>> {
+        bend(&self.start, &self.velocity)
+    }
+
+    /// The end, without an evaluation of the metric.
+    pub(crate) fn point(&self) -> M::Point<f64> {
+        M::chart(&self.base, &self.end.q)
+    }
+
+    /// The end with the velocity in the frame of the chart there.
+    ///
+    /// # Errors
+    ///
+    /// The error of a metric without an inverse there.
+    pub(crate) fn with_velocity(
+        &self,
+        field: &impl MatrixField<M>,
+    ) -> Result<(M::Point<f64>, Vector<M>), MetricError> {
+        ended(field, &self.base, centred_real(field, &self.base, &self.end))
+    }
+}
+
+/// The point and the velocity of a phase point in the chart at `x`, in the chart at the point itself.
+fn centred_real<M: Space>(
+    field: &impl MatrixField<M>,
+    x: &M::Point<f64>,
+    y: &Phase<M, f64>,
+) -> Option<(M::Point<f64>, Vector<M>)> {
+    let g = metric(field, &ChartPoint::<M> { base: x.clone(), q: y.q });
+    let (at, v) = centred::<M, f64>(x, &y.q, &g.solve(&y.p)?);
+    Some((at.base, v))
 }
 
 /// Follows a geodesic from a real point. Returns the end, and the velocity in the frame of the chart there.
@@ -248,29 +336,21 @@ pub(crate) fn follow_real<M: Manifold>(
     x: &M::Point<f64>,
     v: &Vector<M>,
 ) -> Result<(M::Point<f64>, Vector<M>), MetricError> {
-    let value = |at: &ChartPoint<M>| metric(field, at);
-    let recentre = |base: &M::Point<f64>, y: &Phase<M, f64>| {
-        let g = value(&ChartPoint { base: base.clone(), q: y.q });
-        let (at, v) = centred::<M, f64>(base, &y.q, &g.solve(&y.p)?);
-        let p = value(&at) * v;
-        Some((at.base, Phase { q: Vector::<M>::zero(), p, size: y.size }))
-    };
-    let (q, p) = (Vector::<M>::zero(), value(&ChartPoint::centre(x)) * *v);
-    let start = Phase::<M, f64> { q, p, size: size_at::<M>(x) };
-    let (end, y) =
-        travel::<M, _>(field, x, start, |base, y| rate(field, base, y), |y| y.q, recentre)?;
-    let v = value(&ChartPoint::centre(&end)).solve(&y.p);
-    let v = ended(field, &end, v)?;
-    Ok((end, v))
+    Arrival::of(field, x, v)?.with_velocity(field)
 }
 
 /// Computes the acceleration `−Γ(v, v)` of the geodesic through a real point, with the Christoffel symbols of
-/// the metric: `g a = ½∇(vᵀ g v) − (∂_v g) v`.
+/// the metric.
 pub(crate) fn acceleration<M: Space>(
     field: &impl MatrixField<M>,
     x: &M::Point<f64>,
     v: &Vector<M>,
 ) -> Option<Vector<M>> {
-    let (g, dg_v) = dg_v(field, x, &Vector::<M>::zero(), v);
-    g.solve(&(dg_v.transpose_times(v) * 0.5 - dg_v * *v))
+    bend(&metric_jet(field, x, &Vector::<M>::zero()), v)
+}
+
+/// The same from the metric there: `g a = ½∇(vᵀ g v) − (∂_v g) v`.
+fn bend<M: Space>(g: &MatrixJet<M>, v: &Vector<M>) -> Option<Vector<M>> {
+    let dg_v = along_slopes::<M>(&g.slopes, v);
+    g.value.solve(&(dg_v.transpose_times(v) * 0.5 - dg_v * *v))
 }

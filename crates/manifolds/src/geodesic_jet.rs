@@ -1,11 +1,13 @@
 //! Geodesics with their derivatives along the initial velocity.
 
-use metriplectic_fields::{Column, Dimension, Factors, Matrix, MatrixField, Space, Square, Vector};
+use metriplectic_fields::{
+    Column, Dimension, Factors, Matrix, MatrixField, Space, Square, Vector, along_slopes,
+};
 use num_dual::Dual64;
 
-use crate::chart_metric::{dg_v, part, seeded};
+use crate::chart_metric::{dg_v, metric_jet, part, seeded};
 use crate::extrapolation::State;
-use crate::geodesic::{Phase, centred, ended, relative, size_at, travel};
+use crate::geodesic::{Departure, Phase, centred, ended, relative, size_at, travel};
 use crate::{Manifold, MetricError};
 
 /// A point of the phase space with its derivatives along the initial velocity.
@@ -93,25 +95,70 @@ pub(crate) struct GeodesicJet<M: Space> {
     pub(crate) dvelocity: Matrix<M>,
 }
 
+/// Where a geodesic with derivatives ends, in the last of its charts.
+pub(crate) struct ArrivalJet<M: Space> {
+    /// The centre of this chart.
+    base: M::Point<f64>,
+    end: Bundle<M>,
+}
+
+impl<M: Manifold> ArrivalJet<M> {
+    /// Follows the geodesic for a unit of time.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`travel`].
+    pub(crate) fn of(
+        field: &impl MatrixField<M>,
+        start: &GeodesicJet<M>,
+    ) -> Result<Self, MetricError> {
+        let recentre = |base: &M::Point<f64>, y: &Bundle<M>| {
+            let jet = into_velocities(field, base, y)?;
+            let centred = recentred(base, &y.at.q, &jet);
+            let bundle = into_momenta(field, &centred, y.at.size);
+            Some((centred.point, bundle))
+        };
+        let state = into_momenta(field, start, size_at::<M>(&start.point));
+        let rate = |base: &M::Point<f64>, y: &Bundle<M>| rate_of_bundle(field, base, y);
+        let departure = Departure { point: &start.point, state, slope: None };
+        let (base, end) = travel(field, departure, rate, |y| y.at.q, recentre)?;
+        Ok(Self { base, end })
+    }
+
+    /// The end with its velocity, in the frame of the chart there.
+    ///
+    /// # Errors
+    ///
+    /// The error of a metric without an inverse there.
+    pub(crate) fn jet(&self, field: &impl MatrixField<M>) -> Result<GeodesicJet<M>, MetricError> {
+        let jet = into_velocities(field, &self.base, &self.end);
+        let jet = jet.map(|jet| recentred(&self.base, &self.end.at.q, &jet));
+        ended(field, &self.base, jet)
+    }
+
+    /// The derivative of the end in the chart there, without an evaluation of the metric.
+    pub(crate) fn derivative(&self) -> Matrix<M> {
+        let Bundle { at, dq, .. } = &self.end;
+        let point = M::chart(&self.base, &at.q);
+        Matrix::<M>::from_columns(|k| {
+            let moved = Vector::<M, Dual64>::from_index(|i| Dual64::new(at.q[i], dq[(i, k)]));
+            let end = M::coordinates(&point, &M::chart(&self.base, &moved));
+            Vector::<M>::from_index(|i| end[i].eps)
+        })
+    }
+}
+
 /// Follows a geodesic with its derivatives for a unit of time.
 ///
 /// # Errors
 ///
-/// Those of [`follow`].
+/// Those of [`travel`].
+#[cfg(feature = "argmin")]
 pub(crate) fn follow<M: Manifold>(
     field: &impl MatrixField<M>,
     start: &GeodesicJet<M>,
 ) -> Result<GeodesicJet<M>, MetricError> {
-    let recentre = |base: &M::Point<f64>, y: &Bundle<M>| {
-        let jet = into_velocities(field, base, y)?;
-        let centred = recentred(base, &y.at.q, &jet);
-        let bundle = into_momenta(field, &centred, y.at.size);
-        Some((centred.point, bundle))
-    };
-    let bundle = into_momenta(field, start, size_at::<M>(&start.point));
-    let rate = |base: &M::Point<f64>, y: &Bundle<M>| rate_of_bundle(field, base, y);
-    let (base, end) = travel::<M, _>(field, &start.point, bundle, rate, |y| y.at.q, recentre)?;
-    ended(field, &base, into_velocities(field, &base, &end))
+    ArrivalJet::of(field, start)?.jet(field)
 }
 
 /// `p = g v` and `δp = g δv + (∂_δq g) v`, at the centre of a chart.
@@ -134,10 +181,10 @@ fn into_velocities<M: Space>(
     x: &M::Point<f64>,
     y: &Bundle<M>,
 ) -> Option<GeodesicJet<M>> {
-    let (g, _) = dg_v(field, x, &y.at.q, &Vector::<M>::zero());
-    let factors = g.factor()?;
+    let g = metric_jet(field, x, &y.at.q);
+    let factors = g.value.factor()?;
     let velocity = factors.solve(&y.at.p)?;
-    let (_, dg_v) = dg_v(field, x, &y.at.q, &velocity);
+    let dg_v = along_slopes::<M>(&g.slopes, &velocity);
     let lag = y.dp - dg_v * y.dq;
     let mut dvelocity = Matrix::<M>::zeros();
     for k in 0..M::Dim::LEN {

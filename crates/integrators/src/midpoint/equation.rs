@@ -12,8 +12,8 @@ use metriplectic_fields::{
     ChartPoint, Column, Scalar, ScalarField, Space, Square, Vector, differential,
 };
 use metriplectic_manifolds::{
-    InnerProduct, Manifold, MetricAt, MetricError, MetricSlopes, Nodes, Retraction, Riemannian,
-    StepPath, StepPathJet,
+    GeodesicEnds, InnerProduct, Manifold, MetricAt, MetricError, MetricSlopes, Nodes, Retraction,
+    Riemannian, StepPath, StepPathJet, WeylPath,
 };
 
 use super::{Dim, Numbers};
@@ -284,9 +284,10 @@ where
     #[inline]
     fn evaluate(&self, u: &Vector<Y::Manifold>) -> Option<Evaluated<Y::Manifold, Dissipated>> {
         let metric = self.system.metric();
-        let path = self.retraction.real_step_path(metric, self.x, u).ok()?;
+        let WeylPath { path, ends } = self.retraction.path_with_ends(metric, self.x, u).ok()?;
         let g = self.system.metric_at(&path.z);
-        let along = Along::new(self, u, g.inner().ok()?, Segment::new(&path.d, &path.end));
+        let segment = Segment::new(&path.d, &path.end);
+        let along = Along { ends, ..Along::new(self, u, g.inner().ok()?, segment) };
         let mut values = Values { along: &along, path: &path, g: &g };
         let Terms { w, residual, production } = equation(self.system, self.h, &mut values).ok()?;
         let evidence = self.dissipated(&w.entropy, production);
@@ -348,6 +349,8 @@ struct Along<'a, 'b, Y: Metriplectic, R, W, G> {
     u: &'a Vector<Y::Manifold>,
     g: &'a G,
     segment: Segment<'a, Y::Manifold>,
+    /// The motion at the ends of a geodesic, where it is known.
+    ends: Option<GeodesicEnds<Y::Manifold>>,
     nodes: OnceCell<Nodes<Y::Manifold>>,
 }
 
@@ -364,7 +367,7 @@ where
         g: &'a G,
         segment: Segment<'a, Y::Manifold>,
     ) -> Self {
-        Self { step, u, g, segment, nodes: OnceCell::new() }
+        Self { step, u, g, segment, ends: None, nodes: OnceCell::new() }
     }
 
     /// The data of the discrete gradient of `f` on the path with the base `z` and the end `x'`, from its
@@ -379,9 +382,13 @@ where
     ) -> StableGradient<Y::Manifold> {
         let base = || self.step.gradient.slope_at_base(f, z, self.segment.d, mean);
         let nodes = || {
-            let Residual { system, retraction, x, .. } = self.step;
+            let (Residual { retraction, x, .. }, metric) = (self.step, self.step.system.metric());
+            let nodes = match &self.ends {
+                Some(ends) => ends.nodes(metric, x, self.u, end),
+                None => retraction.along(metric, x, self.u),
+            };
             // The same path has been followed to its end, so the alternative is not reached.
-            retraction.along(system.metric(), x, self.u).unwrap_or_else(|_| Nodes {
+            nodes.unwrap_or_else(|_| Nodes {
                 ends: [*x, end].map(Y::Manifold::constant),
                 middle: None,
             })

@@ -157,7 +157,7 @@ pub(super) fn solve<Y, R, W>(
     newton: &Newton,
     equation: &Residual<'_, Y, R, W>,
     guess: &Vector<Y::Manifold>,
-    kept: &mut Option<KeptJacobian<Dim<Y>>>,
+    kept: &mut KeptJacobian<Dim<Y>>,
     fallbacks: Fallbacks,
 ) -> Result<(Root<Y::Manifold, Dissipated>, Effort), StepFailure>
 where
@@ -165,21 +165,31 @@ where
     R: Retraction<Y::Manifold, Y::Metric>,
     W: DiscreteGradient,
 {
-    let known = kept.take().filter(|known| known.serves(equation.step_size(), guess));
-    let mut inverse = known.map(|known| known.inverse);
-    let root = newton.solve_near(equation, guess, &mut inverse);
+    let h = equation.step_size();
+    kept.prepare(h, guess);
+    let known = kept.inverse.is_some();
+    let root = newton.solve_near(equation, guess, &mut kept.inverse);
     let mut effort = Effort { iterations: iterations(&root), ..Effort::default() };
     let root = match root {
         Ok(root) => root,
         Err(failure) => {
-            let mut rescue = Rescue { newton, equation, inverse: &mut inverse, effort };
+            let mut rescue = Rescue { newton, equation, inverse: &mut kept.inverse, effort };
             let rescued = rescue.solve(failure, fallbacks);
             effort = rescue.effort;
-            rescued.map_err(|failure| StepFailure { effort, ..failure })?
+            match rescued {
+                Ok(root) => root,
+                Err(failure) => {
+                    kept.inverse = None;
+                    return Err(StepFailure { effort, ..failure });
+                }
+            }
         }
     };
-    *kept =
-        inverse.map(|inverse| KeptJacobian::after(known, inverse, equation.step_size(), &root.u));
+    if let Some(inverse) = &kept.inverse
+        && (!known || inverse.age == 0)
+    {
+        kept.note(h, &root.u);
+    }
     Ok((root, effort))
 }
 

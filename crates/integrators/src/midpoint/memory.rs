@@ -15,27 +15,35 @@ use crate::run::checkpoint::{ResumeError, Saved};
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MidpointMemory<N: Dimension> {
     pub(super) predictor: Predictor<N>,
-    pub(super) jacobian: Option<KeptJacobian<N>>,
+    pub(super) jacobian: KeptJacobian<N>,
     pub(super) compensation: Compensation<N>,
 }
 
 impl<N: Dimension> Default for MidpointMemory<N> {
     fn default() -> Self {
         let (predictor, compensation) = (Predictor::default(), Compensation::NONE);
-        Self { predictor, jacobian: None, compensation }
+        Self { predictor, jacobian: KeptJacobian::default(), compensation }
     }
 }
 
 impl<N: Dimension> MidpointMemory<N> {
     /// The rate `h|K'|` of the friction where the kept Jacobian was formed.
     pub(super) fn friction(&self) -> f64 {
-        self.jacobian.map_or(0.0, |kept| kept.inverse.friction)
+        self.jacobian.inverse.as_ref().map_or(0.0, |inverse| inverse.friction)
     }
 }
 
 /// The names of the displacements in a checkpoint.
-const NAMES: [&str; DIFFERENCES] =
-    ["displacement", "first difference", "second difference", "third difference"];
+const NAMES: [&str; DIFFERENCES] = [
+    "displacement",
+    "first difference",
+    "second difference",
+    "third difference",
+    "fourth difference",
+    "fifth difference",
+    "sixth difference",
+    "seventh difference",
+];
 
 impl<N: Dimension> Memory for MidpointMemory<N> {
     fn rescaled(&self, ratio: f64) -> Self {
@@ -49,7 +57,7 @@ impl<N: Dimension> Memory for MidpointMemory<N> {
         for (name, difference) in NAMES.iter().zip(differences).take(*known) {
             saved.put(name, column(difference));
         }
-        if let Some(KeptJacobian { inverse, h, length }) = &self.jacobian {
+        if let KeptJacobian { inverse: Some(inverse), h, length } = &self.jacobian {
             let Inverse { matrix, round_off, residual_bound, contraction, first, friction, age } =
                 inverse;
             saved.put("inverse", (0..n * n).map(|k| matrix[(k / n, k % n)]));
@@ -93,7 +101,7 @@ impl<N: Dimension> Memory for MidpointMemory<N> {
             let matrix = N::Matrix::<f64>::from_entries(|i, j| matrix[i * n + j]);
             let inverse =
                 Inverse { matrix, round_off, residual_bound, contraction, first, friction, age };
-            memory.jacobian = Some(KeptJacobian { inverse, h, length });
+            memory.jacobian = KeptJacobian { inverse: Some(inverse), h, length };
         }
         memory.compensation = Compensation(column("compensation")?);
         Ok(memory)

@@ -15,7 +15,12 @@ pub(crate) struct Predictor<N: Dimension> {
 }
 
 /// Displacements that are remembered.
-pub(crate) const DIFFERENCES: usize = 4;
+pub(crate) const DIFFERENCES: usize = 8;
+/// The order from which on a difference has to fall well below the one before to count.
+const LOW: usize = 4;
+/// The fraction of the squared difference before it that its own square may be: `1/4²`. Round-off grows by a factor
+/// of two from one order to the next.
+const FALLS: f64 = 0.0625;
 
 impl<N: Dimension> Default for Predictor<N> {
     fn default() -> Self {
@@ -36,28 +41,29 @@ impl<N: Dimension> Predictor<N> {
     }
 
     /// The next displacement `Σ_{j<k} ∇ʲd`, on the polynomial through the last `k` of them; `k` is the
-    /// one that would have been best for the last step, where it was wrong by `∇ᵏd`.
+    /// one that would have been best for the last step, where it was wrong by `∇ᵏd`. A higher difference than the
+    /// third counts only if it falls well below the one before, which round-off does not.
     #[inline]
     fn extrapolate(&self) -> Option<N::Vector<f64>> {
         if self.known < 2 {
             return None;
         }
+        let (last, differences) = self.differences[..self.known].split_first()?;
         let (mut best, mut smallest) = (1, f64::INFINITY);
-        for (k, difference) in self.differences[..self.known].iter().enumerate().skip(1) {
+        for (difference, k) in differences.iter().zip(1..) {
             let size = difference.dot(difference);
+            if k >= LOW && (best + 1 < k || size > FALLS * smallest) {
+                break;
+            }
             if size < smallest {
                 (best, smallest) = (k, size);
             }
         }
         // Where the last difference is the smallest, it is the next one that counts.
-        if best + 1 == self.known {
-            best = self.known;
+        if best + 1 == self.known || best + 1 >= LOW {
+            best += 1;
         }
-        let mut sum = self.differences[0];
-        for difference in &self.differences[1..best] {
-            sum += *difference;
-        }
-        Some(sum)
+        Some(differences.iter().take(best - 1).fold(*last, |sum, difference| sum + *difference))
     }
 
     /// Notes the displacement `d` of the step from `x` to `end`.

@@ -27,6 +27,16 @@ impl<N: Dimension> Compensation<N> {
         self.0 = None;
     }
 
+    /// The end of a step, moved by what earlier steps have lost; `None` if it does not move.
+    #[inline]
+    pub(crate) fn shifted<M: Manifold<Dim = N>>(
+        &self,
+        end: &M::Point<f64>,
+    ) -> Option<M::Point<f64>> {
+        let before = self.0.filter(|before| (0..N::LEN).any(|i| before[i].abs() > 0.0))?;
+        Some(M::chart(end, &before))
+    }
+
     /// The end of the `step`, moved by what earlier steps have lost; `None` if it does not move.
     #[inline]
     pub(crate) fn add<M: Manifold<Dim = N>>(

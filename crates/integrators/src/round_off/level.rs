@@ -37,6 +37,46 @@ pub(crate) struct Polished<Y: Metriplectic> {
     pub(crate) evaluated: Option<[f64; 2]>,
 }
 
+/// Energy and entropy at a point where the laws hold to round-off, so that nothing is to be corrected.
+#[inline]
+pub(crate) fn held<Y: Metriplectic, R, W>(
+    equation: &Residual<'_, Y, R, W>,
+    x: &Point<Y>,
+) -> Option<[f64; 2]>
+where
+    R: Retraction<Y::Manifold, Y::Metric>,
+    W: DiscreteGradient,
+{
+    let laws = [equation.system.energy_at(x), equation.system.entropy_at(x)];
+    let Defects { balanced, falls, .. } = Defects::of(equation, laws);
+    (balanced && !(falls && equation.is_exact())).then_some(laws)
+}
+
+/// What is wrong with the laws at the end of a step.
+struct Defects {
+    /// The error `e` of the energy.
+    e: f64,
+    /// Whether it is round-off.
+    balanced: bool,
+    /// Whether the entropy falls by more than its round-off.
+    falls: bool,
+}
+
+impl Defects {
+    #[inline]
+    fn of<Y: Metriplectic, R, W>(
+        Residual { values, drift, .. }: &Residual<'_, Y, R, W>,
+        [energy, entropy]: [f64; 2],
+    ) -> Self {
+        let e = energy - values.energy + drift.energy;
+        Self {
+            e,
+            balanced: e.abs() <= ROUNDED * values.energy.abs(),
+            falls: entropy - values.entropy < -ROUNDED * values.entropy.abs(),
+        }
+    }
+}
+
 /// Corrects a root with the end `x'` at which the energy is not conserved to round-off, or the entropy falls.
 #[inline]
 pub(crate) fn polish<Y, R, W>(
@@ -66,19 +106,15 @@ fn corrected<Y, R, W>(
     equation: &Residual<'_, Y, R, W>,
     root: &Root<Y::Manifold, Dissipated>,
     end: &Point<Y>,
-    [energy, entropy]: [f64; 2],
+    laws: [f64; 2],
 ) -> Option<Polished<Y>>
 where
     Y: Metriplectic,
     R: Retraction<Y::Manifold, Y::Metric>,
     W: DiscreteGradient,
 {
-    let Residual { values, drift, .. } = equation;
-    let e = energy - values.energy + drift.energy;
-    let growth = entropy - values.entropy;
-    let balanced = e.abs() <= ROUNDED * values.energy.abs();
+    let Defects { e, balanced, falls } = Defects::of(equation, laws);
     let corrected = if balanced { None } else { Level { equation }.energy(root, end, e) };
-    let falls = growth < -ROUNDED * values.entropy.abs();
     if corrected.is_none() && falls && equation.is_exact() {
         return Level { equation }.entropy(root, end, e);
     }

@@ -64,6 +64,9 @@ pub(crate) fn short(change: f64, size: f64) -> f64 {
     if change.abs() >= 4.0 * SHORT * size && size > 0.0 {
         return 0.0;
     }
+    if change.abs() <= SHORT * size {
+        return 1.0;
+    }
     let fraction = change.abs() / (SHORT * size).max(f64::MIN_POSITIVE);
     let t = ((fraction - 1.0) / 3.0).clamp(0.0, 1.0);
     1.0 - t * t * (3.0 - 2.0 * t)
@@ -85,7 +88,7 @@ fn safer<M: Space>(
 impl<M: Manifold> StableGradient<M> {
     /// Evaluates `f` along a path with the mean covector `mean`. `start` is `F(x)`, `end` is `F(x')`,
     /// `base` the slope `⟨dF(z), d⟩` at the base point, and `nodes` those of the path.
-    #[inline]
+    #[inline(always)]
     pub fn new<N: Borrow<Nodes<M>>>(
         f: &impl ScalarField<M>,
         mean: &Vector<M>,

@@ -1,4 +1,5 @@
 //! The methods with stages as one type, so that a test compiles its runs once.
+#![allow(dead_code, reason = "each test file uses some of the methods")]
 
 use metriplectic::fields::Space;
 use metriplectic::integrators::{

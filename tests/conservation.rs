@@ -195,7 +195,8 @@ where
 {
     let mut steps = Scheme::new(retraction).steps(system, x0, h).expect("the model keeps its laws");
     let x = steps.advance().expect("the step is solved").point;
-    let residual = Residual::new(system, (&retraction, &Gonzalez), &x, -h);
+    let scheme = Scheme::new(retraction);
+    let residual = Residual::new(system, &scheme, &x, -h);
     residual.at::<f64>(&(x0 - x)).expect("the residual is defined").norm()
 }
 

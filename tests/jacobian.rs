@@ -112,7 +112,8 @@ where
     Y: Metriplectic,
     W: DiscreteGradient,
 {
-    let residual = Residual::new(system, (&retraction, &gradient), x, 0.1);
+    let scheme = Scheme::new(retraction).gradient(gradient);
+    let residual = Residual::new(system, &scheme, x, 0.1);
     let Some(assembled) = residual.linearise(u) else {
         return Err(TestCaseError::fail("the residual is defined"));
     };

@@ -315,7 +315,8 @@ fn a_jacobian_is_not_kept_for_steps_of_another_length() {
 #[test]
 fn the_jacobian_of_a_step_has_its_digits_on_the_shortest_arcs() {
     let system = relaxing();
-    let equation = Residual::new(&system, (&WeylMidpoint, &Gonzalez), &START, 1.0);
+    let scheme = Scheme::new(WeylMidpoint);
+    let equation = Residual::new(&system, &scheme, &START, 1.0);
     let jacobian = |length: f64| {
         let u: Vector<LieDual<3>> = vector![0.48, 0.6, -0.64] * length;
         equation.linearise(&u).unwrap().jacobian

@@ -193,8 +193,7 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
     {
         let guess = memory.predictor.guess(system, start);
         let target = drift::target(system, start, &guess);
-        let parts = (&self.retraction, &self.gradient);
-        let equation = Residual::towards(system, parts, (start.x, start.values), start.h, target);
+        let equation = Residual::of_start(system, self, start, target);
         let (root, mut effort) =
             fallbacks::solve(&self.newton, &equation, &guess, &mut memory.jacobian, fallbacks)?;
         let evidence = evidence(&root, memory.friction());

@@ -1,10 +1,14 @@
 //! Newton's method, down to the round-off of each component.
 
 mod equation;
+mod inverse;
 
-use metriplectic_fields::{Column, Dimension, Space, Square, Vector};
+use metriplectic_fields::{Column, Dimension, Space, Vector};
 
 pub use equation::{Equation, Evaluated, Iterate, Linearised, Root, Rounding, Stiffness};
+pub(crate) use inverse::Inverse;
+
+use inverse::{corrections, reaches};
 
 /// Newton's method, damped, down to round-off.
 ///
@@ -50,118 +54,6 @@ impl Default for Newton {
     }
 }
 
-/// The inverse of a Jacobian, kept up to date by Broyden's rank-one corrections, and what it makes of
-/// the round-off of the equation.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Inverse<N: Dimension> {
-    pub(crate) matrix: N::Matrix<f64>,
-    /// The round-off `|J⁻¹| r + |J⁻¹G| η + |1 − J⁻¹| ξ` of the solution, where the Jacobian was formed.
-    pub(crate) round_off: N::Vector<f64>,
-    /// The norm of the round-off of the residual, where the Jacobian was formed.
-    pub(crate) residual_bound: f64,
-    /// The fraction of a residual that the first correction by a kept inverse has left of late.
-    pub(crate) contraction: f64,
-    /// The residual of the guess in the last step, in units of its round-off.
-    pub(crate) first: f64,
-    /// The rate of the friction where the Jacobian was formed.
-    pub(crate) friction: f64,
-    /// Equations that it has solved since the one whose Jacobian it is.
-    pub(crate) age: u32,
-}
-
-impl<N: Dimension> Inverse<N> {
-    fn of<M: Space<Dim = N>, E>(
-        Linearised { jacobian, rounding, stiffness, .. }: &Linearised<M, E>,
-        residual_bound: f64,
-    ) -> Option<Self> {
-        let Rounding { terms, sensitivity, covector, argument } = rounding;
-        let matrix = jacobian.inverse()?;
-        // In mixed units only the diagonal of J⁻¹J has none, and tells whether the inverse has digits.
-        let digits = |i| {
-            let product: f64 = (0..N::LEN).map(|j| matrix[(i, j)] * jacobian[(j, i)]).sum();
-            (product - 1.0).abs() < INVERTED
-        };
-        if !(0..N::LEN).all(digits) {
-            return None;
-        }
-        // J⁻¹(J − 1) = 1 − J⁻¹.
-        let moved = (N::Matrix::<f64>::one() - matrix).abs();
-        // A point and its compensation have twice the digits: smaller displacements move nothing.
-        let round_off = matrix.abs() * *terms
-            + (matrix * *sensitivity).abs() * *covector
-            + moved * *argument
-            + *argument * f64::EPSILON;
-        let Stiffness { friction, .. } = *stiffness;
-        Some(Self {
-            matrix,
-            round_off,
-            residual_bound,
-            contraction: 0.0,
-            first: 0.0,
-            friction,
-            age: 0,
-        })
-    }
-
-    /// Whether as many corrections of the next guess as a Jacobian is worth are expected to be enough, the last
-    /// one unchecked.
-    fn serves(&self) -> bool {
-        reaches(self.first, self.contraction, corrections::<N>(), SURE)
-    }
-
-    /// The correction of a residual.
-    #[inline]
-    fn times(&self, residual: &N::Vector<f64>) -> N::Vector<f64> {
-        self.matrix * *residual
-    }
-
-    /// The round-off of each component of a solution near `u`.
-    #[inline]
-    fn round_off(&self, u: &N::Vector<f64>) -> N::Vector<f64> {
-        (self.round_off + u.abs() * f64::EPSILON) * MARGIN
-    }
-
-    /// Broyden's update: the least change of the inverse after which the step `s` has the change `y`
-    /// of the residual, `s = J⁻¹y`, with `predicted = J⁻¹y` before it (Broyden 1965, in the form of
-    /// Sherman and Morrison). The `correction` of a residual becomes that of the new inverse.
-    #[inline]
-    fn learn(
-        &mut self,
-        s: &N::Vector<f64>,
-        predicted: &N::Vector<f64>,
-        correction: &mut N::Vector<f64>,
-    ) {
-        let along = s.dot(predicted);
-        // Beyond a factor of four the step says little about the slope, and nothing where its square
-        // underflows.
-        if along > 0.25 * s.dot(s) && along > 1e-280 {
-            let row = self.matrix.transpose_times(s);
-            let turned = (*s - *predicted) * along.recip();
-            self.matrix += N::Matrix::<f64>::outer(&turned, &row);
-            *correction += turned * s.dot(correction);
-        }
-    }
-}
-
-/// The corrections by a kept Jacobian that cost less than a new one. In dimension `n` the derivatives of the
-/// residual cost about as much as `n` residuals.
-const fn corrections<N: Dimension>() -> usize {
-    if N::LEN > 3 { N::LEN } else { 3 }
-}
-
-/// Whether a number of corrections with this contraction reduce a residual to a limit.
-#[inline]
-fn reaches(residual: f64, contraction: f64, corrections: usize, limit: f64) -> bool {
-    let mut left = residual;
-    for _ in 0..corrections {
-        if left <= limit {
-            return true;
-        }
-        left *= contraction;
-    }
-    left <= limit
-}
-
 /// A measure of corrections: the root mean square of their components in units of round-off.
 struct Measure<N: Dimension> {
     /// The reciprocals of the round-off of each component.
@@ -191,16 +83,11 @@ impl<N: Dimension> Measure<N> {
     }
 }
 
-/// The factor between the bound of round-off to first order and what is taken for round-off.
-const MARGIN: f64 = 3.0;
 /// The norm of a residual that is taken for round-off, in units of the norm of its bounds.
 pub(crate) const NORM: f64 = 3.0;
 /// The multiple of its round-off that the last correction may leave of a component, where the norm of the
 /// residual has fallen to a hundredth of its own.
 const HIDDEN: f64 = 1.0;
-/// The error of `J⁻¹J` at which an inverse has no digits: the Jacobian is singular to round-off, as with
-/// friction that is 10¹⁶ times faster than the motion along no axis.
-const INVERTED: f64 = 0.01;
 /// The multiple of round-off below which the change of a residual says nothing of the Jacobian.
 const NOISE: f64 = 1e3;
 /// The fraction of the round-off that the last correction has to promise.
@@ -263,7 +150,8 @@ impl Newton {
                     self.correct(equation, &here, inverse, &mut best)
                 {
                     inverse.age += 1;
-                    return Ok(best.solved(solution, inverse.residual_bound / NORM));
+                    let (round_off, evidence) = solution;
+                    return Ok(best.solved(round_off, evidence, inverse.residual_bound / NORM));
                 }
                 history = Some((inverse.contraction, Some(inverse.first)));
             } else {
@@ -306,7 +194,8 @@ impl Newton {
                 Progress::Solved(solution) => {
                     inverse.contraction = 0.0;
                     *known = Some(inverse);
-                    return Ok(best.solved(solution, residual_bound));
+                    let (round_off, evidence) = solution;
+                    return Ok(best.solved(round_off, evidence, residual_bound));
                 }
                 Progress::Slow if best.iterations < self.iterations => {}
                 Progress::Slow | Progress::Stuck => break,
@@ -455,100 +344,4 @@ struct Descent<M: Space, E> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use metriplectic_fields::Matrix;
-    use metriplectic_manifolds::Euclidean;
-    use nalgebra::{Matrix1, Matrix2, Vector1, Vector2, vector};
-
-    /// Round-off of the terms alone.
-    fn rounding<M: Space>(terms: Vector<M>) -> Rounding<M> {
-        let zero = Vector::<M>::zero();
-        Rounding { terms, sensitivity: Matrix::<M>::zeros(), covector: zero, argument: zero }
-    }
-
-    /// `x² + y² = 4`, `xy = 1`.
-    struct CircleAndHyperbola;
-
-    impl Equation<Euclidean<2>> for CircleAndHyperbola {
-        type Evidence = ();
-
-        fn evaluate(&self, u: &Vector2<f64>) -> Option<Evaluated<Euclidean<2>, ()>> {
-            self.linearise(u).map(|at| Evaluated { residual: at.residual, evidence: () })
-        }
-
-        fn linearise(&self, u: &Vector2<f64>) -> Option<Linearised<Euclidean<2>, ()>> {
-            Some(Linearised {
-                residual: vector![u.norm_squared() - 4.0, u.x * u.y - 1.0],
-                jacobian: Matrix2::new(2.0 * u.x, 2.0 * u.y, u.y, u.x),
-                rounding: rounding(Vector2::repeat(8.0 * f64::EPSILON)),
-                stiffness: Stiffness::default(),
-                evidence: (),
-            })
-        }
-    }
-
-    #[test]
-    fn convergence_is_quadratic_with_a_jacobian_for_each_correction() {
-        let fresh = Newton { reuse: 0.0, ..Newton::default() };
-        let root = fresh.solve(&CircleAndHyperbola, &vector![2.0, 0.4]).unwrap();
-        // x² = 2 + √3 in closed form.
-        assert!((root.u.x - (2.0 + 3.0_f64.sqrt()).sqrt()).abs() < 1e-15);
-        assert!(root.iterations <= 5, "{} iterations", root.iterations);
-    }
-
-    /// `ln u = 1`, defined for `u > 0` only.
-    struct Logarithm;
-
-    impl Equation<Euclidean<1>> for Logarithm {
-        type Evidence = ();
-
-        fn evaluate(&self, u: &Vector1<f64>) -> Option<Evaluated<Euclidean<1>, ()>> {
-            self.linearise(u).map(|at| Evaluated { residual: at.residual, evidence: () })
-        }
-
-        fn linearise(&self, u: &Vector1<f64>) -> Option<Linearised<Euclidean<1>, ()>> {
-            let residual = vector![u.x.ln() - 1.0];
-            let jacobian = Matrix1::new(u.x.recip());
-            let rounding = rounding(Vector1::new(4.0 * f64::EPSILON));
-            let (stiffness, evidence) = (Stiffness::default(), ());
-            (u.x > 0.0).then_some(Linearised { residual, jacobian, rounding, stiffness, evidence })
-        }
-    }
-
-    #[test]
-    fn damping_backs_off_from_the_edge_of_the_domain() {
-        // The undamped correction from u = 20 lands at 20 − 20 (ln 20 − 1) = −19.9.
-        let root = Newton::default().solve(&Logarithm, &vector![20.0]).unwrap();
-        assert!((root.u.x - 1.0_f64.exp()).abs() < 1e-14);
-    }
-
-    /// `u² + 1 = 0` has no real root.
-    struct NoRealRoot;
-
-    impl Equation<Euclidean<1>> for NoRealRoot {
-        type Evidence = ();
-
-        fn evaluate(&self, u: &Vector1<f64>) -> Option<Evaluated<Euclidean<1>, ()>> {
-            self.linearise(u).map(|at| Evaluated { residual: at.residual, evidence: () })
-        }
-
-        fn linearise(&self, u: &Vector1<f64>) -> Option<Linearised<Euclidean<1>, ()>> {
-            Some(Linearised {
-                residual: vector![u.x * u.x + 1.0],
-                jacobian: Matrix1::new(2.0 * u.x),
-                rounding: rounding(Vector1::new(f64::EPSILON)),
-                stiffness: Stiffness::default(),
-                evidence: (),
-            })
-        }
-    }
-
-    #[test]
-    fn a_missing_root_is_an_error_with_the_best_point() {
-        let failure = Newton::default().solve(&NoRealRoot, &vector![3.0]).unwrap_err();
-        assert!(failure.residual >= 1.0 && failure.residual < 10.0);
-        let undefined = Newton::default().solve(&Logarithm, &vector![-1.0]).unwrap_err();
-        assert!(undefined.residual.is_infinite());
-    }
-}
+mod tests;

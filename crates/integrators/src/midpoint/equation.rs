@@ -1,28 +1,24 @@
 //! The implicit equation of one step.
 
-use std::cell::OnceCell;
+mod providers;
+
 use std::fmt::Debug;
 
 use metriplectic_dynamics::orthogonal::WithJacobian;
-use metriplectic_dynamics::velocity::{
-    Covectors, Gradient, VelocityJet, irreversible, reversible, velocity_jet,
-};
+use metriplectic_dynamics::velocity::{Covectors, Gradient};
 use metriplectic_dynamics::{Metriplectic, SecondLaw, system::Point};
-use metriplectic_fields::{
-    ChartPoint, Column, Scalar, ScalarField, Space, Square, Vector, differential,
-};
-use metriplectic_manifolds::{
-    GeodesicEnds, InnerProduct, Manifold, MetricAt, MetricError, MetricSlopes, Nodes, Retraction,
-    Riemannian, StepPath, StepPathJet, WeylPath,
-};
+use metriplectic_fields::{ChartPoint, Column, Scalar, ScalarField, Space, Square, Vector};
+use metriplectic_manifolds::{Manifold, MetricError, Retraction, WeylPath};
 
-use super::{Dim, Numbers};
+use providers::{Along, Defined, Jets, Values};
+
+use super::{Dim, Numbers, Scheme, Start};
 use crate::discrete_gradient::DiscreteGradient;
 use crate::method::{Flow as _, Laws};
 use crate::newton::{Equation, Evaluated, Linearised, Rounding, Stiffness};
 use crate::round_off::bound::ROUNDED;
 use crate::round_off::drift::{self, DriftCorrection};
-use crate::round_off::stable_gradient::{Segment, StableGradient};
+use crate::round_off::stable_gradient::Segment;
 
 /// The equation of one step (Bloch, Farré Puiggalí, Martín de Diego 2024, §4.4), as a function of
 /// the initial displacement `u ∈ T_xM` of the path:
@@ -160,27 +156,30 @@ where
     W: DiscreteGradient,
 {
     /// The equation of a step of size `h` from `x`.
-    pub fn new(system: &'a Y, parts: (&'a R, &'a W), x: &'a Point<Y>, h: f64) -> Self {
-        Self::towards(system, parts, (x, system.laws(x)), h, drift::nothing::<Y>())
+    pub fn new(system: &'a Y, scheme: &'a Scheme<R, W>, x: &'a Point<Y>, h: f64) -> Self {
+        let Scheme { retraction, gradient, .. } = scheme;
+        let (values, drift) = (system.laws(x), drift::nothing::<Y>());
+        Self { system, retraction, gradient, x, h, values, drift }
     }
 
-    /// The same for a point with known laws, and errors of earlier steps to take back.
+    /// The same from a start with known laws, and errors of earlier steps to take back.
     #[inline]
-    pub(crate) fn towards(
+    pub(crate) fn of_start(
         system: &'a Y,
-        (retraction, gradient): (&'a R, &'a W),
-        (x, values): (&'a Point<Y>, Laws<Numbers<Y>>),
-        h: f64,
+        scheme: &'a Scheme<R, W>,
+        start: &Start<'a, Y>,
         drift: DriftCorrection<Y>,
     ) -> Self {
+        let Scheme { retraction, gradient, .. } = scheme;
+        let &Start { x, h, values, .. } = start;
         Self { system, retraction, gradient, x, h, values, drift }
     }
 
     /// The equation of a step of a fraction of the size, which takes nothing back.
     pub(crate) fn of_fraction(&self, fraction: f64) -> Self {
-        let parts = (self.retraction, self.gradient);
-        let start = (self.x, self.values);
-        Self::towards(self.system, parts, start, self.h * fraction, drift::nothing::<Y>())
+        let &Self { system, retraction, gradient, x, h, values, .. } = self;
+        let drift = drift::nothing::<Y>();
+        Self { system, retraction, gradient, x, h: h * fraction, values, drift }
     }
 
     /// The size of the step.
@@ -297,225 +296,5 @@ where
     #[inline]
     fn linearise(&self, u: &Vector<Y::Manifold>) -> Option<Linearised<Y::Manifold, Dissipated>> {
         self.jet(u).map(|jet| jet.at)
-    }
-}
-
-/// Discrete gradients along one path by their definition.
-struct Defined<'a, 'b, Y: Metriplectic, R, W, D: Scalar> {
-    step: &'a Residual<'b, Y, R, W>,
-    inner: &'a <Y::Metric as Riemannian<Y::Manifold>>::At<D>,
-    g: &'a MetricAt<'a, Y::Manifold, Y::Metric, D>,
-    path: &'a StepPath<Y::Manifold, D>,
-}
-
-impl<Y, R, W, D> Provider for Defined<'_, '_, Y, R, W, D>
-where
-    Y: Metriplectic,
-    R: Retraction<Y::Manifold, Y::Metric>,
-    W: DiscreteGradient,
-    D: Scalar,
-{
-    type System = Y;
-    type Components = Vector<Y::Manifold, D>;
-
-    fn discrete(&mut self, _: Law, f: &impl ScalarField<Y::Manifold>) -> Vector<Y::Manifold, D> {
-        let Residual { gradient, x, .. } = self.step;
-        gradient.covector(f, self.inner, (x, f.at(x)), self.path)
-    }
-
-    fn differential(&self, f: &impl ScalarField<Y::Manifold>) -> Vector<Y::Manifold, D> {
-        differential(f, &self.path.z)
-    }
-
-    fn displacement_less(&self, h: f64, v: Vector<Y::Manifold, D>) -> Vector<Y::Manifold, D> {
-        self.path.d - v * D::from(h)
-    }
-
-    fn velocity(
-        &mut self,
-        system: &Y,
-        w: &CovectorsOf<Self>,
-    ) -> Result<(Vector<Y::Manifold, D>, f64), MetricError> {
-        let friction = irreversible(system, self.g, w)?;
-        let production = w.entropy.dot(&friction).re();
-        Ok((reversible(system, self.g, w)? + friction, production))
-    }
-}
-
-/// One path at real points, along which fields get discrete gradients that are safe against
-/// round-off.
-struct Along<'a, 'b, Y: Metriplectic, R, W, G> {
-    step: &'a Residual<'b, Y, R, W>,
-    u: &'a Vector<Y::Manifold>,
-    g: &'a G,
-    segment: Segment<'a, Y::Manifold>,
-    /// The motion at the ends of a geodesic, where it is known.
-    ends: Option<GeodesicEnds<Y::Manifold>>,
-    nodes: OnceCell<Nodes<Y::Manifold>>,
-}
-
-impl<'a, 'b, Y, R, W, G> Along<'a, 'b, Y, R, W, G>
-where
-    Y: Metriplectic,
-    R: Retraction<Y::Manifold, Y::Metric>,
-    W: DiscreteGradient,
-    G: InnerProduct<Vector<Y::Manifold>>,
-{
-    const fn new(
-        step: &'a Residual<'b, Y, R, W>,
-        u: &'a Vector<Y::Manifold>,
-        g: &'a G,
-        segment: Segment<'a, Y::Manifold>,
-    ) -> Self {
-        Self { step, u, g, segment, ends: None, nodes: OnceCell::new() }
-    }
-
-    /// The data of the discrete gradient of `f` on the path with the base `z` and the end `x'`, from its
-    /// values at `x` and `x'`.
-    #[inline]
-    fn stable_gradient(
-        &self,
-        f: &impl ScalarField<Y::Manifold>,
-        mean: &Vector<Y::Manifold>,
-        [z, end]: [&Point<Y>; 2],
-        values: [f64; 2],
-    ) -> StableGradient<Y::Manifold> {
-        let base = || self.step.gradient.slope_at_base(f, z, self.segment.d, mean);
-        let nodes = || {
-            let (Residual { retraction, x, .. }, metric) = (self.step, self.step.system.metric());
-            let nodes = match &self.ends {
-                Some(ends) => ends.nodes(metric, x, self.u, end),
-                None => retraction.along(metric, x, self.u),
-            };
-            // The same path has been followed to its end, so the alternative is not reached.
-            nodes.unwrap_or_else(|_| Nodes {
-                ends: [*x, end].map(Y::Manifold::constant),
-                middle: None,
-            })
-        };
-        let nodes = || self.nodes.get_or_init(nodes);
-        StableGradient::new(f, mean, &self.segment, values, base, nodes)
-    }
-}
-
-/// Discrete gradients at real points, with `⟨w, d⟩ = F(x') − F(x) + φe`.
-struct Values<'a, 'b, Y: Metriplectic, R, W, G> {
-    along: &'a Along<'a, 'b, Y, R, W, G>,
-    path: &'a StepPath<Y::Manifold>,
-    g: &'a MetricAt<'a, Y::Manifold, Y::Metric>,
-}
-
-impl<Y, R, W, G> Provider for Values<'_, '_, Y, R, W, G>
-where
-    Y: Metriplectic,
-    R: Retraction<Y::Manifold, Y::Metric>,
-    W: DiscreteGradient,
-    G: InnerProduct<Vector<Y::Manifold>>,
-{
-    type System = Y;
-    type Components = Vector<Y::Manifold>;
-
-    #[inline]
-    fn discrete(&mut self, law: Law, f: &impl ScalarField<Y::Manifold>) -> Vector<Y::Manifold> {
-        let (Along { step, g, .. }, path) = (self.along, self.path);
-        let (start, drift) = step.start_of(law);
-        let mean = step.gradient.real_mean(f, step.x, path);
-        let values = [start, f.at(&path.end)];
-        let w = self.along.stable_gradient(f, &mean, [&path.z.base, &path.end], values);
-        w.covector(drift, *g, &path.d)
-    }
-
-    #[inline]
-    fn differential(&self, f: &impl ScalarField<Y::Manifold>) -> Vector<Y::Manifold> {
-        f.jet1(&self.path.z.base).df
-    }
-
-    #[inline]
-    fn displacement_less(&self, h: f64, v: Vector<Y::Manifold>) -> Vector<Y::Manifold> {
-        self.path.d - v * h
-    }
-
-    #[inline]
-    fn velocity(
-        &mut self,
-        system: &Y,
-        w: &CovectorsOf<Self>,
-    ) -> Result<(Vector<Y::Manifold>, f64), MetricError> {
-        let friction = irreversible(system, self.g, w)?;
-        let production = w.entropy.dot(&friction);
-        Ok((reversible(system, self.g, w)? + friction, production))
-    }
-}
-
-/// The same with the derivatives along the unknown of the step, and what the round-off of the equation is
-/// made of.
-struct Jets<'a, 'b, Y: Metriplectic, R, W, G> {
-    along: &'a Along<'a, 'b, Y, R, W, G>,
-    path: &'a StepPathJet<Y::Manifold>,
-    metric: &'a MetricAt<'a, Y::Manifold, Y::Metric>,
-    slopes: Option<&'a MetricSlopes<Y::Manifold>>,
-    /// The round-off of `w_H`.
-    noise: Vector<Y::Manifold>,
-    velocity: Option<VelocityJet<Dim<Y>>>,
-}
-
-impl<'a, 'b, Y: Metriplectic, R, W, G> Jets<'a, 'b, Y, R, W, G> {
-    fn new(
-        along: &'a Along<'a, 'b, Y, R, W, G>,
-        path: &'a StepPathJet<Y::Manifold>,
-        metric: &'a MetricAt<'a, Y::Manifold, Y::Metric>,
-        slopes: Option<&'a MetricSlopes<Y::Manifold>>,
-    ) -> Self {
-        Self { along, path, metric, slopes, noise: Column::zero(), velocity: None }
-    }
-}
-
-impl<Y, R, W, G> Provider for Jets<'_, '_, Y, R, W, G>
-where
-    Y: Metriplectic,
-    R: Retraction<Y::Manifold, Y::Metric>,
-    W: DiscreteGradient,
-    G: InnerProduct<Vector<Y::Manifold>>,
-{
-    type System = Y;
-    type Components = WithJacobian<Dim<Y>>;
-
-    #[inline]
-    fn discrete(&mut self, law: Law, f: &impl ScalarField<Y::Manifold>) -> WithJacobian<Dim<Y>> {
-        let (Along { step, g, .. }, path) = (self.along, self.path);
-        let (start, drift) = step.start_of(law);
-        let (mean, dmean) = step.gradient.mean_jet(f, step.x, path);
-        let end = f.jet1(&path.end);
-        let ends = [&path.z, &path.end];
-        let w = self.along.stable_gradient(f, &mean, ends, [start, end.value]);
-        let value = w.covector(drift, *g, &path.d);
-        let slope = w.slope(drift, (*g, self.slopes), path, &dmean, &end.df);
-        if law == Law::Energy {
-            // Near the edge of a domain dH is far steeper at x' than at z, and the rounding of d counts
-            // there.
-            self.noise = w.noise(*g, &path.d) + end.df.abs() * f64::EPSILON;
-        }
-        WithJacobian { value, slope }
-    }
-
-    fn differential(&self, f: &impl ScalarField<Y::Manifold>) -> WithJacobian<Dim<Y>> {
-        let jet = f.jet2(&self.path.z);
-        WithJacobian { value: jet.df, slope: jet.hf * self.path.dz }
-    }
-
-    #[inline]
-    fn displacement_less(&self, h: f64, v: WithJacobian<Dim<Y>>) -> WithJacobian<Dim<Y>> {
-        WithJacobian { value: self.path.d - v.value * h, slope: self.path.dd - v.slope * h }
-    }
-
-    #[inline]
-    fn velocity(
-        &mut self,
-        system: &Y,
-        w: &CovectorsOf<Self>,
-    ) -> Result<(WithJacobian<Dim<Y>>, f64), MetricError> {
-        let jet = velocity_jet(system, self.metric, &self.path.dz, w)?;
-        self.velocity = Some(jet);
-        Ok((jet.velocity, jet.production))
     }
 }

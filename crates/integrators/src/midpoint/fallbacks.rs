@@ -56,7 +56,7 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
         let effort = halves.effort;
         match parts {
             Ok(taken) => Ok(Taken { effort, ..taken }),
-            Err((smallest, x)) => Err(self.error(system, start, (smallest, &x), effort)),
+            Err((smallest, x)) => Err(self.error(system, start, smallest, &x, effort)),
         }
     }
 
@@ -67,7 +67,8 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
         &self,
         system: &Y,
         start: &Start<'_, Y>,
-        (failure, x): (StepFailure, &Point<Y>),
+        failure: StepFailure,
+        x: &Point<Y>,
         tried: Effort,
     ) -> StepError
     where
@@ -80,8 +81,7 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
             return error;
         }
         let suggested = smallest_part(h, self.splits);
-        let equation =
-            Residual::new(system, (&self.retraction, &self.gradient), start.x, suggested);
+        let equation = Residual::new(system, self, start.x, suggested);
         let here = equation.linearise(&Vector::<Y::Manifold>::zero());
         let rates = here.map(|at| at.stiffness).unwrap_or_default();
         // Where friction is slow against the smallest part, or slower than the reversible motion, something

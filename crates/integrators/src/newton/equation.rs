@@ -120,7 +120,8 @@ impl<M: Space> Iterate<M> {
     /// The best point as the root, with its round-off.
     pub(super) fn solved<E>(
         self,
-        (round_off, evidence): (Vector<M>, E),
+        round_off: Vector<M>,
+        evidence: E,
         residual_bound: f64,
     ) -> Root<M, E> {
         let Self { best: u, residual, iterations } = self;

@@ -77,7 +77,8 @@ pub(crate) fn short(change: f64, size: f64) -> f64 {
 fn safer<M: Space>(
     f: &impl ScalarField<M>,
     Nodes { ends: [x, y], middle }: &Nodes<M>,
-    (base, slope): (impl FnOnce() -> f64, f64),
+    base: impl FnOnce() -> f64,
+    slope: f64,
     rounding: f64,
 ) -> (f64, f64) {
     let middle = middle.as_ref().map_or_else(base, |z| f.at_real(z).eps1);
@@ -109,7 +110,7 @@ impl<M: Manifold> StableGradient<M> {
         let fraction = short(change, size);
         let (mut defect, mut noise) = (difference, rounding);
         if fraction > 0.0 {
-            let (better, weight) = safer(f, nodes().borrow(), (base, slope), rounding);
+            let (better, weight) = safer(f, nodes().borrow(), base, slope, rounding);
             defect += fraction * weight * (better - difference);
             noise *= 1.0 - fraction * weight;
         }

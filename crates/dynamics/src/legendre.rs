@@ -271,6 +271,15 @@ mod tests {
         weighted * 0.5 + weighted * weighted * 0.25 + xi.x * xi.y * 0.3 + xi.z * 0.2
     }
 
+    #[test]
+    fn a_dual_number_carries_the_velocity() {
+        let (legendre, mu, v) =
+            (Legendre::of(quartic), vector![0.4, -0.7, 0.2], vector![1.0, -2.0, 0.5]);
+        let jet: Jet1<LieDual<3>> = legendre.jet1(&mu);
+        let h: Dual64 = legendre.at(&mu.zip_map(&v, Dual64::new));
+        assert!((h.re - jet.value).abs() < 1e-15 && (h.eps - jet.df.dot(&v)).abs() < 1e-15);
+    }
+
     proptest! {
         #[test]
         fn the_energy_of_a_lagrangian_is_a_field(mu in columns(), v in columns()) {

@@ -35,7 +35,7 @@
 //! |---|---|---|
 //! | `♯_K(α) = K(α, ·)`, `grad^K S = ♯_K(dS)` | [`Dissipation::apply`](crate::dynamics::Dissipation::apply) | `tests/laws.rs::each_law_of_a_dissipation_can_break` |
 //! | `(f, g) = K(df, dg) = K^{ij} f_i g_j`, symmetric, `⪰ 0` | [`Dissipation::tensor`](crate::dynamics::Dissipation::tensor), [`laws::dissipation`](crate::dynamics::laws::dissipation) | `tests/laws.rs::the_metric_dissipation_keeps_the_laws` |
-//! | `G*(df, dg) = G(grad f, grad g)` | [`InnerProduct`](crate::manifolds::InnerProduct), [`Riemannian`](crate::manifolds::Riemannian) | `crates/manifolds/src/laws.rs::flat_spaces_keep_the_laws`, `tests/metrics.rs::metrics_that_vary_keep_the_laws_on_rotations_and_products` |
+//! | `G*(df, dg) = G(grad f, grad g)` | [`InnerProduct`](crate::manifolds::InnerProduct), [`Riemannian`](crate::manifolds::Riemannian) | `crates/manifolds/src/laws/tests.rs::flat_spaces_keep_the_laws`, `tests/metrics.rs::metrics_that_vary_keep_the_laws_on_rotations_and_products` |
 //! | (semid) `K(α, β) = G*(dH,dH) G*(α,β) − G*(dH,α) G*(dH,β)`, both lines | [`MetricDissipation`](crate::dynamics::MetricDissipation) | `tests/equations.rs::the_form_of_the_metric_is_the_printed_one_on_each_line` |
 //! | `K^{ij} = C_H g^{ij} − (g⁻¹dH)^i (g⁻¹dH)^j` | the same | `tests/equations.rs::the_form_of_the_metric_is_the_printed_one_on_each_line` |
 //! | remark: `K(α, β) = G*(Qα, Qβ)` off all `dL_a` † | [`SystemBuilder::casimir`](crate::dynamics::SystemBuilder::casimir), [`momentum`](crate::dynamics::SystemBuilder::momentum), with the scale `G*(dH, dH)` | `tests/errata.rs::the_remark_has_another_scale_than_the_equation_before_it`, `tests/errata.rs::a_momentum_is_kept_if_its_differential_is_annihilated` |
@@ -132,7 +132,7 @@
 //! | the diagram `π_P ∘ ∇̄H = τ_P ∘ R_h⁻¹` | covectors of a step are at the base `z` of its [`StepPath`](crate::manifolds::StepPath) | `crates/manifolds/src/laws.rs::metrics_that_vary_keep_the_laws` |
 //! | (discGrad-m) `h⟨w, v⟩ = ΔH` †, `w → dH` | [`laws::discrete_gradient`](crate::integrators::laws::discrete_gradient) | `crates/integrators/src/laws.rs::the_discrete_gradient_keeps_its_laws`, `tests/errata.rs::a_discrete_gradient_on_a_manifold_counts_the_step` |
 //! | (gonzalez-m) `w = dH(z) + (ΔH/h − dH(z)v) ♭v/G(v,v)` † | [`Gonzalez`](crate::integrators::Gonzalez) | `tests/errata.rs::a_discrete_gradient_on_a_manifold_counts_the_step`, `tests/covariance.rs::a_step_on_the_sphere_is_the_same_in_colatitude_and_longitude` |
-//! | `♭(u)(v) = G(u, v)` | [`InnerProduct::flat`](crate::manifolds::InnerProduct::flat) | `crates/manifolds/src/laws.rs::flat_spaces_keep_the_laws` |
+//! | `♭(u)(v) = G(u, v)` | [`InnerProduct::flat`](crate::manifolds::InnerProduct::flat) | `crates/manifolds/src/laws/tests.rs::flat_spaces_keep_the_laws` |
 //! | `R_h⁻¹(x_k, x_{k+1}) = Π(z) w + K_d(z) dS(z)` † | [`Scheme`](crate::integrators::Scheme), [`Residual`](crate::integrators::Residual), [`Run`](crate::integrators::Run) | `tests/reference.rs::one_step_of_pure_relaxation_on_the_sphere_is_the_published_one`, `tests/reference.rs::one_step_on_the_rotation_group_is_the_published_one`, `tests/errata.rs::the_dissipation_acts_on_the_differential_and_not_on_the_gradient` |
 //!
 //! # Beyond the paper

@@ -14,7 +14,7 @@ use inverse::{corrections, reaches};
 ///
 /// The inverse of a Jacobian is kept as long as it serves, from one step to the next: each correction
 /// then costs only a residual, from which the inverse learns (Broyden 1965). That of an earlier step is
-/// used where three corrections, or `n` in a dimension above 3, are expected to be enough, by the contraction
+/// used where three corrections, or `n/2` in a dimension above 6, are expected to be enough, by the contraction
 /// that it has shown of late;
 /// otherwise a new one is formed, at the guess or where the first correction has led.
 ///

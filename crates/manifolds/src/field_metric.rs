@@ -3,14 +3,13 @@
 use std::fmt;
 
 use metriplectic_fields::{
-    ChartPoint, Column, Matrix, MatrixField, MatrixJet, Real, Scalar, Space, Square, Vector,
+    ChartPoint, Column, Matrix, MatrixField, MatrixJet, Real, Scalar, Square, Vector,
 };
 
 use crate::chart_metric;
 use crate::geodesic::{self, Arrival};
 use crate::geodesic_jet::{ArrivalJet, GeodesicJet};
 use crate::metric::{Factored, GeodesicEnd, MetricError};
-use crate::step_path::{GeodesicEnds, WeylPath};
 use crate::{Manifold, MetricJet, Riemannian, Slopes, StepPath, StepPathJet, shooting};
 
 /// A metric given as a matrix field; see [`Metric::field`](crate::Metric::field).
@@ -56,21 +55,10 @@ impl<M: Manifold, F: MatrixField<M>> Riemannian<M> for FieldMetric<F> {
     }
 
     fn weyl_path(&self, x: &M::Point<f64>, d: &Vector<M>) -> Result<StepPath<M>, MetricError> {
-        let Halves { z, displacement, second, .. } = halves(&self.field, x, d)?;
-        Ok(StepPath { z: ChartPoint::centre(&z), d: displacement, end: second.point() })
-    }
-
-    fn weyl_path_with_ends(
-        &self,
-        x: &M::Point<f64>,
-        d: &Vector<M>,
-    ) -> Result<WeylPath<M>, MetricError> {
-        let Halves { z, displacement, first, second } = halves(&self.field, x, d)?;
-        let (_, velocity) = second.with_velocity(&self.field).map_err(on_second_half)?;
-        let bend = first.acceleration_at_start().map(|half| half * 4.0);
-        let ends = bend.map(|bend| GeodesicEnds { bend, velocity: velocity * 2.0 });
-        let path = StepPath { z: ChartPoint::centre(&z), d: displacement, end: second.point() };
-        Ok(WeylPath { path, ends })
+        let first = Arrival::of(&self.field, x, &(*d * 0.5)).map_err(on_first_half)?;
+        let (z, velocity) = first.with_velocity(&self.field).map_err(on_first_half)?;
+        let second = Arrival::of(&self.field, &z, &velocity).map_err(on_second_half)?;
+        Ok(StepPath { z: ChartPoint::centre(&z), d: velocity * 2.0, end: second.point() })
     }
 
     fn along(
@@ -142,27 +130,6 @@ impl<M: Manifold, F: MatrixField<M>> Riemannian<M> for FieldMetric<F> {
         let MatrixJet { value, slopes } = self.field.covariant_jet(x);
         Ok(MetricJet { at: Factored::new(value)?, slopes: Some(slopes) })
     }
-}
-
-/// The two halves of a path.
-struct Halves<M: Space> {
-    z: M::Point<f64>,
-    /// The displacement at `z`.
-    displacement: Vector<M>,
-    first: Arrival<M>,
-    second: Arrival<M>,
-}
-
-/// Follows both halves of the path that leaves `x` with the displacement `d`.
-fn halves<M: Manifold>(
-    field: &impl MatrixField<M>,
-    x: &M::Point<f64>,
-    d: &Vector<M>,
-) -> Result<Halves<M>, MetricError> {
-    let first = Arrival::of(field, x, &(*d * 0.5)).map_err(on_first_half)?;
-    let (z, velocity) = first.with_velocity(field).map_err(on_first_half)?;
-    let second = Arrival::of(field, &z, &velocity).map_err(on_second_half)?;
-    Ok(Halves { z, displacement: velocity * 2.0, first, second })
 }
 
 fn on_first_half(error: MetricError) -> MetricError {

@@ -259,9 +259,6 @@ pub(crate) struct Arrival<M: Space> {
     /// The centre of this chart.
     base: M::Point<f64>,
     end: Phase<M, f64>,
-    /// The metric where it starts, and the velocity there.
-    start: MatrixJet<M>,
-    velocity: Vector<M>,
 }
 
 impl<M: Manifold> Arrival<M> {
@@ -289,12 +286,7 @@ impl<M: Manifold> Arrival<M> {
         let start = Departure { point: x, state, slope };
         let rate = |base: &M::Point<f64>, y: &Phase<M, f64>| rate(field, base, y);
         let (base, end) = travel(field, start, rate, |y| y.q, recentre)?;
-        Ok(Self { base, end, start: g, velocity: *v })
-    }
-
-    /// The acceleration at the start; `None` where the metric has no inverse.
-    pub(crate) fn acceleration_at_start(&self) -> Option<Vector<M>> {
-        bend(&self.start, &self.velocity)
+        Ok(Self { base, end })
     }
 
     /// The end, without an evaluation of the metric.

@@ -89,7 +89,7 @@ pub use ready_made::Metric;
 pub use retraction::{Nodes, PointPair, Retraction, Tangent};
 pub use rotations::Rotations;
 pub use sphere::Sphere;
-pub use step_path::{GeodesicEnds, StepPath, StepPathJet, WeylPath};
+pub use step_path::{StepPath, StepPathJet};
 pub use weyl_midpoint::WeylMidpoint;
 
 /// The random numbers of [`Manifold::random`], for manifolds of your own.

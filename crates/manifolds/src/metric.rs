@@ -10,7 +10,7 @@ use metriplectic_fields::{
 
 use crate::metric_at::{MetricJet, Slopes};
 use crate::metric_error::finite;
-use crate::step_path::{StepPath, StepPathJet, WeylPath};
+use crate::step_path::{StepPath, StepPathJet};
 
 pub use crate::inner_product::{Canonical, Factored, InnerProduct};
 pub use crate::metric_error::MetricError;
@@ -94,20 +94,6 @@ pub trait Riemannian<M: Space> {
     fn weyl_path(&self, x: &M::Point<f64>, d: &Vector<M>) -> Result<StepPath<M>, MetricError> {
         let StepPathJet { z, d, end, .. } = self.weyl_jet(x, d)?;
         Ok(StepPath { z: ChartPoint::centre(&z), d, end })
-    }
-
-    /// Follows the same path, with the motion at its ends if geodesics are integrated.
-    ///
-    /// # Errors
-    ///
-    /// Those of [`exp`](Self::exp).
-    #[inline]
-    fn weyl_path_with_ends(
-        &self,
-        x: &M::Point<f64>,
-        d: &Vector<M>,
-    ) -> Result<WeylPath<M>, MetricError> {
-        self.weyl_path(x, d).map(WeylPath::from)
     }
 
     /// Follows the same path, with the derivatives along `d`.

@@ -5,7 +5,7 @@ use metriplectic_fields::{Column, Real, Scalar, Space, Vector};
 
 use crate::{Manifold, MetricError, Riemannian};
 
-pub use crate::step_path::{GeodesicEnds, StepPath, StepPathJet, WeylPath};
+pub use crate::step_path::{StepPath, StepPathJet};
 
 /// A discrete derivative `R_h: TM → M × M` (Bloch, Farré Puiggalí, Martín de Diego 2024, §4.4):
 /// a base point `z` and a vector `v ∈ T_zM` stand for a pair `(x, x')`.
@@ -41,22 +41,6 @@ pub trait Retraction<M: Manifold, G: Riemannian<M>> {
         u: &Vector<M>,
     ) -> Result<StepPath<M>, MetricError> {
         self.step_path(metric, x, u)
-    }
-
-    /// Follows the same path at `f64`, with the motion at its ends if [`along`](Self::along) would integrate a
-    /// geodesic for it. By default there is none.
-    ///
-    /// # Errors
-    ///
-    /// Those of [`step_path`](Self::step_path).
-    #[inline]
-    fn path_with_ends(
-        &self,
-        metric: &G,
-        x: &M::Point<f64>,
-        u: &Vector<M>,
-    ) -> Result<WeylPath<M>, MetricError> {
-        self.real_step_path(metric, x, u).map(WeylPath::from)
     }
 
     /// Computes the end of the path of `u`. By default it is the end of a geodesic.

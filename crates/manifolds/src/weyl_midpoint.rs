@@ -4,8 +4,7 @@ use metriplectic_fields::{ChartPoint, Scalar, Vector};
 
 use crate::retraction::half;
 use crate::{
-    Manifold, MetricError, Nodes, PointPair, Retraction, Riemannian, StepPath, StepPathJet,
-    Tangent, WeylPath,
+    Manifold, MetricError, Nodes, PointPair, Retraction, Riemannian, StepPath, StepPathJet, Tangent,
 };
 
 /// Weyl's midpoint retraction (Bloch, Farré Puiggalí, Martín de Diego 2024, eq. "weyl"):
@@ -40,16 +39,6 @@ impl<M: Manifold, G: Riemannian<M>> Retraction<M, G> for WeylMidpoint {
         u: &Vector<M>,
     ) -> Result<StepPath<M>, MetricError> {
         metric.weyl_path(x, u)
-    }
-
-    #[inline]
-    fn path_with_ends(
-        &self,
-        metric: &G,
-        x: &M::Point<f64>,
-        u: &Vector<M>,
-    ) -> Result<WeylPath<M>, MetricError> {
-        metric.weyl_path_with_ends(x, u)
     }
 
     #[inline]

@@ -8,7 +8,7 @@ use metriplectic_dynamics::orthogonal::WithJacobian;
 use metriplectic_dynamics::velocity::{Covectors, Gradient};
 use metriplectic_dynamics::{Metriplectic, SecondLaw, system::Point};
 use metriplectic_fields::{ChartPoint, Column, Scalar, ScalarField, Space, Square, Vector};
-use metriplectic_manifolds::{Manifold, MetricError, Retraction, WeylPath};
+use metriplectic_manifolds::{Manifold, MetricError, Retraction};
 
 use providers::{Along, Defined, Jets, Values};
 
@@ -283,10 +283,10 @@ where
     #[inline]
     fn evaluate(&self, u: &Vector<Y::Manifold>) -> Option<Evaluated<Y::Manifold, Dissipated>> {
         let metric = self.system.metric();
-        let WeylPath { path, ends } = self.retraction.path_with_ends(metric, self.x, u).ok()?;
+        let path = self.retraction.real_step_path(metric, self.x, u).ok()?;
         let g = self.system.metric_at(&path.z);
         let segment = Segment::new(&path.d, &path.end);
-        let along = Along { ends, ..Along::new(self, u, g.inner().ok()?, segment) };
+        let along = Along::new(self, u, g.inner().ok()?, segment);
         let mut values = Values { along: &along, path: &path, g: &g };
         let Terms { w, residual, production } = equation(self.system, self.h, &mut values).ok()?;
         let evidence = self.dissipated(&w.entropy, production);

@@ -105,7 +105,7 @@ impl<N: Dimension> Inverse<N> {
 /// The corrections by a kept Jacobian that cost less than a new one. In dimension `n` the derivatives of the
 /// residual cost about as much as `n` residuals.
 pub(super) const fn corrections<N: Dimension>() -> usize {
-    if N::LEN > 3 { N::LEN } else { 3 }
+    if N::LEN > 6 { N::LEN / 2 } else { 3 }
 }
 
 /// Whether a number of corrections with this contraction reduce a residual to a limit.

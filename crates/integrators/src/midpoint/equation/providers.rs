@@ -9,8 +9,8 @@ use metriplectic_dynamics::system::Point;
 use metriplectic_dynamics::velocity::{VelocityJet, irreversible, reversible, velocity_jet};
 use metriplectic_fields::{Column, Scalar, ScalarField, Space as _, Vector, differential};
 use metriplectic_manifolds::{
-    GeodesicEnds, InnerProduct, MetricAt, MetricError, MetricSlopes, Nodes, Retraction, Riemannian,
-    StepPath, StepPathJet,
+    InnerProduct, MetricAt, MetricError, MetricSlopes, Nodes, Retraction, Riemannian, StepPath,
+    StepPathJet,
 };
 
 use super::{CovectorsOf, Law, Provider, Residual};
@@ -67,8 +67,6 @@ pub(super) struct Along<'a, 'b, Y: Metriplectic, R, W, G> {
     pub(super) u: &'a Vector<Y::Manifold>,
     pub(super) g: &'a G,
     pub(super) segment: Segment<'a, Y::Manifold>,
-    /// The motion at the ends of a geodesic, where it is known.
-    pub(super) ends: Option<GeodesicEnds<Y::Manifold>>,
     pub(super) nodes: OnceCell<Nodes<Y::Manifold>>,
 }
 
@@ -85,7 +83,7 @@ where
         g: &'a G,
         segment: Segment<'a, Y::Manifold>,
     ) -> Self {
-        Self { step, u, g, segment, ends: None, nodes: OnceCell::new() }
+        Self { step, u, g, segment, nodes: OnceCell::new() }
     }
 
     /// The data of the discrete gradient of `f` on the path with the base `z` and the end `x'`, from its
@@ -101,10 +99,7 @@ where
         let base = || self.step.gradient.slope_at_base(f, z, self.segment.d, mean);
         let nodes = || {
             let (Residual { retraction, x, .. }, metric) = (self.step, self.step.system.metric());
-            let nodes = match &self.ends {
-                Some(ends) => ends.nodes(metric, x, self.u, end),
-                None => retraction.along(metric, x, self.u),
-            };
+            let nodes = retraction.along(metric, x, self.u);
             // The same path has been followed to its end, so the alternative is not reached.
             nodes.unwrap_or_else(|_| Nodes {
                 ends: [*x, end].map(Y::Manifold::constant),

@@ -124,12 +124,12 @@
 //!
 //! | equation | in the library | checked by |
 //! |---|---|---|
-//! | `R_h: TP → P × P`, `R_h⁻¹`, `z = τ_P(R_h⁻¹(x, x')) ∈ P` † | [`Retraction`](crate::manifolds::Retraction), [`Tangent`](crate::manifolds::Tangent) | `crates/manifolds/src/laws.rs::metrics_that_vary_keep_the_laws`, `tests/errata.rs::the_base_of_a_pair_is_a_point_and_not_a_vector` |
+//! | `R_h: TP → P × P`, `R_h⁻¹`, `z = τ_P(R_h⁻¹(x, x')) ∈ P` † | [`Retraction`](crate::manifolds::Retraction), [`Tangent`](crate::manifolds::Tangent) | `crates/manifolds/src/laws/tests.rs::metrics_that_vary_keep_the_laws`, `tests/errata.rs::the_base_of_a_pair_is_a_point_and_not_a_vector` |
 //! | `exp_h(v) = (x, exp_x(hv))` | [`Exponential`](crate::manifolds::Exponential) | `tests/equations.rs::both_retractions_are_the_printed_pairs` |
 //! | `exp_x(v) = γ_v(1)`, geodesics of `G` | [`Riemannian::exp`](crate::manifolds::Riemannian::exp), [`Riemannian::log`](crate::manifolds::Riemannian::log) | `tests/metrics.rs::geodesics_of_a_left_invariant_metric_are_euler_s_rigid_body`, `crates/manifolds/src/field_metric.rs::geodesics_of_the_half_plane_are_its_semicircles` |
 //! | (weyl) `(exp_z(−hv/2), exp_z(hv/2))` | [`WeylMidpoint`](crate::manifolds::WeylMidpoint) | `tests/equations.rs::both_retractions_are_the_printed_pairs`, `tests/reference.rs::the_spinning_top_has_the_published_errors` |
 //! | second order † | [`WeylMidpoint`](crate::manifolds::WeylMidpoint) 2, [`Exponential`](crate::manifolds::Exponential) 1 | `tests/errata.rs::the_exponential_at_the_start_is_of_first_order`, `tests/examples.rs::the_convergence_study_prints_an_array_of_orders` |
-//! | the diagram `π_P ∘ ∇̄H = τ_P ∘ R_h⁻¹` | covectors of a step are at the base `z` of its [`StepPath`](crate::manifolds::StepPath) | `crates/manifolds/src/laws.rs::metrics_that_vary_keep_the_laws` |
+//! | the diagram `π_P ∘ ∇̄H = τ_P ∘ R_h⁻¹` | covectors of a step are at the base `z` of its [`StepPath`](crate::manifolds::StepPath) | `crates/manifolds/src/laws/tests.rs::metrics_that_vary_keep_the_laws` |
 //! | (discGrad-m) `h⟨w, v⟩ = ΔH` †, `w → dH` | [`laws::discrete_gradient`](crate::integrators::laws::discrete_gradient) | `crates/integrators/src/laws.rs::the_discrete_gradient_keeps_its_laws`, `tests/errata.rs::a_discrete_gradient_on_a_manifold_counts_the_step` |
 //! | (gonzalez-m) `w = dH(z) + (ΔH/h − dH(z)v) ♭v/G(v,v)` † | [`Gonzalez`](crate::integrators::Gonzalez) | `tests/errata.rs::a_discrete_gradient_on_a_manifold_counts_the_step`, `tests/covariance.rs::a_step_on_the_sphere_is_the_same_in_colatitude_and_longitude` |
 //! | `♭(u)(v) = G(u, v)` | [`InnerProduct::flat`](crate::manifolds::InnerProduct::flat) | `crates/manifolds/src/laws/tests.rs::flat_spaces_keep_the_laws` |

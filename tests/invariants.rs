@@ -237,7 +237,7 @@ fn the_rate_of_an_action_is_checked_in_every_unit() {
     for size in [1e-9, 1.0, 1e11] {
         let run = |rate| WeylMidpoint.run(&system(rate), start * size, Span::steps(0.1, 1));
         assert!(run(1.0).is_ok(), "{size:e}");
-        let error = run(1.001).unwrap_err();
+        let error = run(1.000_001).unwrap_err();
         assert!(
             matches!(error, RunError::Model(ModelError::ActionNotOfMomentum { .. })),
             "{error}"

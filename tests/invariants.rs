@@ -216,27 +216,30 @@ fn mistakes_in_the_list_are_refused_with_numbers() {
     assert!(matches!(crowd, Err(BuildError::TooManyInvariants { count: 2, dimension: 2 })));
 }
 
-/// A rotation that is a thousandth too fast for its angular momentum, of an oscillator of this size.
+/// A rotation that is a millionth too fast for its angular momentum, in units of the points and of the bracket.
 #[test]
 fn the_rate_of_an_action_is_checked_in_every_unit() {
-    let system = |rate: f64| {
+    let system = |rate: f64, strength: f64| {
         let turned = move |t: Real, x: &Vector4<Real>| {
             let (sin, cos) = (t * rate).sin_cos();
             let turn = |a: Real, b: Real| [a * cos - b * sin, a * sin + b * cos];
             let ([x0, x1], [x2, x3]) = (turn(x.x, x.y), turn(x.z, x.w));
             Vector4::new(x0, x1, x2, x3)
         };
+        let paired = |i: usize, j: usize| f64::from(j == i + 2) - f64::from(i == j + 2);
         System::on(Euclidean::<4>)
-            .bracket(Symplectic)
-            .energy(|x: &Vector4<Real>| x.norm_squared() * 0.5)
-            .symmetry(turned, |x: &Vector4<Real>| x.x * x.w - x.y * x.z)
+            .bracket(Poisson::constant(Matrix4::from_fn(paired) * strength).unwrap())
+            .energy(move |x: &Vector4<Real>| x.norm_squared() * (0.5 / strength))
+            .symmetry(turned, move |x: &Vector4<Real>| (x.x * x.w - x.y * x.z) / strength)
             .build()
             .expect("the parts make a system")
     };
     let start = vector![0.4, -0.3, 0.2, 0.5];
-    for size in [1e-9, 1.0, 1e11] {
+    let units = [1e-9, 1.0, 1e11];
+    for (size, strength) in units.iter().flat_map(|&size| units.map(|unit| (size, unit))) {
+        let system = |rate| system(rate, strength);
         let run = |rate| WeylMidpoint.run(&system(rate), start * size, Span::steps(0.1, 1));
-        assert!(run(1.0).is_ok(), "{size:e}");
+        assert!(run(1.0).is_ok(), "{size:e}, {strength:e}");
         let error = run(1.000_001).unwrap_err();
         assert!(
             matches!(error, RunError::Model(ModelError::ActionNotOfMomentum { .. })),

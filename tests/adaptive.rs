@@ -195,6 +195,35 @@ fn the_end_is_the_time_that_was_asked_for() {
     }
 }
 
+/// At these starts the frequency vanishes, and the time that is asked for is the only one known.
+#[test]
+fn the_states_do_not_depend_on_the_end() {
+    type Force = fn(f64) -> f64;
+    type Potential = fn(Real) -> Real;
+    let problems: [(&str, Potential, Force, Vector2<f64>); 2] = [
+        ("pendulum", |q| -q.cos(), |q| -q.sin(), vector![std::f64::consts::FRAC_PI_2, 0.0]),
+        ("quartic", |q| q.powi(4) * 0.25, |q| -q.powi(3), vector![0.0, 1.0]),
+    ];
+    for (name, potential, force, start) in problems {
+        let system = System::on(Euclidean::<2>)
+            .bracket(Symplectic)
+            .energy(move |x: &Vector2<Real>| x.y.powi(2) * 0.5 + potential(x.x))
+            .build()
+            .unwrap();
+        let exact = flow(|x| vector![x.y, force(x.x)], &start, (20.0, 1e-3));
+        for end in [21.0, 1e3, 1e5] {
+            let span = Span::until(end)
+                .tolerance(1e-8)
+                .at_most(2)
+                .event_in_time("time", |t: f64, _: &Vector2<f64>| t - 20.0)
+                .stop();
+            let run = DormandPrince5.run(&system, start, span).unwrap();
+            let error = (run.last().point - exact).norm();
+            assert!(error < 1e-6, "{name}, until {end}: {error:e}");
+        }
+    }
+}
+
 #[test]
 fn the_steps_asked_for_are_respected() {
     let body = free_body();

@@ -10,7 +10,8 @@
 //! `δ` is a quarter of the shortest time of the motion, of the span of the run, `1/|f'_ii|` and
 //! `1/√|f'_ij f'_ji|`, which no unit of an entry changes. An entry that begins to move with a higher power of time
 //! gets the displacement of a step of size `δ` of the classical method of order 4. `δ` is cut until `r` grows no faster than a power
-//! of `δ`, so that a steep wall on the way does not count.
+//! of `δ`, so that a steep wall on the way does not count, and until the motion is nowhere on that step much faster than
+//! at its start: a pendulum at a right angle has no frequency yet.
 //!
 //! The terms of a velocity have the sizes `t_i = Σ_j (|Π_ij||∂_jH| + |K_ij||∂_jS| + |f'_ij||x_j|)`.
 
@@ -28,7 +29,15 @@ pub(super) fn velocity_and_terms<Y: Metriplectic>(
     x: &Point<Y>,
 ) -> Option<[Vector<Y::Manifold>; 2]> {
     let v = velocity(system, x, Vector::<Y::Manifold>::zero())?;
-    Some([v, terms(system, x, &slopes(system, x), &Y::Manifold::scales(x))?])
+    Some([
+        v,
+        terms(
+            system,
+            x,
+            &slopes_at(system, x, Vector::<Y::Manifold>::zero()),
+            &Y::Manifold::scales(x),
+        )?,
+    ])
 }
 
 /// The sizes that the entries reach soon; `None` if the equation of motion cannot be evaluated at `x`.
@@ -39,7 +48,7 @@ pub(super) fn reach<Y: Metriplectic>(
 ) -> Option<Scales<Components<Vector<Y::Manifold>>>> {
     let (origin, sizes) = (Vector::<Y::Manifold>::zero(), Y::Manifold::scales(x));
     let v = velocity(system, x, origin)?;
-    let slopes = slopes(system, x);
+    let slopes = slopes_at(system, x, origin);
     let (a, terms) = (slopes * v, terms(system, x, &slopes, &sizes)?);
     let nonlinear = |delta: f64| Some(velocity(system, x, v * delta)? - v - a * delta);
     let is_smooth = |delta: f64, whole: &Vector<Y::Manifold>, half: &Vector<Y::Manifold>| {
@@ -49,9 +58,16 @@ pub(super) fn reach<Y: Metriplectic>(
         })
     };
     let (mut delta, mut r) = (0.25 * shortest_time(&slopes, span), origin);
+    let is_short = |delta: f64| {
+        [0.5 * delta, delta].into_iter().all(|h| {
+            let reached = classical_step(system, x, v, h);
+            reached.is_some_and(|d| delta <= 0.5 * shortest_time(&slopes_at(system, x, d), span))
+        })
+    };
     for _ in 0..CUTS {
         if let (Some(whole), Some(half)) = (nonlinear(delta), nonlinear(0.5 * delta))
             && is_smooth(delta, &whole, &half)
+            && is_short(delta)
         {
             r = whole;
             break;
@@ -90,7 +106,7 @@ const STEEPEST: f64 = 20.0;
 /// The fraction of the terms of a velocity below which it may be noise: 2⁻¹⁶, far above round-off.
 const NOISE: f64 = 1.0 / 65_536.0;
 
-/// The shortest time of the motion, and at most `span`.
+/// The shortest time of the motion, and at most `span`; zero where a derivative is not a number.
 fn shortest_time<V: Column<f64>>(slopes: &impl Square<f64, Column = V>, span: f64) -> f64 {
     let mut time = span;
     for i in 0..V::LEN {
@@ -100,6 +116,9 @@ fn shortest_time<V: Column<f64>>(slopes: &impl Square<f64, Column = V>, span: f6
             // The product of two numbers that are not zero may be too small or too large for a number.
             let rate =
                 if product.is_normal() { product.sqrt() } else { there.sqrt() * back.sqrt() };
+            if rate.is_nan() {
+                return 0.0;
+            }
             if rate > 0.0 {
                 time = time.min(rate.recip());
             }
@@ -129,11 +148,15 @@ fn terms<Y: Metriplectic>(
     }))
 }
 
-/// The derivatives `f'` of the velocity along the chart at `x`; not numbers where there are none.
-fn slopes<Y: Metriplectic>(system: &Y, x: &Point<Y>) -> Matrix<Y::Manifold> {
+/// The derivatives `f'` of the velocity at `φ_x(q)`, along the chart at `x`; not numbers where there are none.
+fn slopes_at<Y: Metriplectic>(
+    system: &Y,
+    x: &Point<Y>,
+    q: Vector<Y::Manifold>,
+) -> Matrix<Y::Manifold> {
     jacobian::<Y::Manifold, f64>(
         |&q| velocity(system, x, q).unwrap_or_else(|| Column::from_index(|_| f64::NAN.into())),
-        &Vector::<Y::Manifold>::zero(),
+        &q,
     )
 }
 

@@ -350,3 +350,59 @@ fn units_change_nothing() {
         scaling(&method, &large, &small, &units, 1e-14).unwrap();
     }
 }
+
+/// A constant in the energy takes digits from its values, and none from the temperatures.
+#[test]
+fn a_constant_in_the_energy_moves_no_heat() {
+    for constant in [0.0, 1e6, 1e10] {
+        let system = System::on(Euclidean::<2>)
+            .energy(move |t: &Vector2<Real>| t.x + t.y * 2.0 + constant)
+            .entropy(|t: &Vector2<Real>| t.x.ln() + t.y.ln() * 2.0)
+            .dissipation(FieldDissipation(|t: &Vector2<Real>, w: &Vector2<Real>| {
+                let b = vector![w.y, -w.x];
+                b * b.transpose() * (t.x * t.y / 6.0)
+            }))
+            .build()
+            .unwrap();
+        for h in [1e-3, 1e-7] {
+            let steps = 20_000;
+            let exact = 300.0 + 40.0 * (1.0 - (-h * f64::from(steps)).exp());
+            let run = damped(
+                "two temperatures",
+                Radau2,
+                &system,
+                &vector![300.0, 360.0],
+                Span::steps(h, steps as usize),
+            );
+            let error = (run.last().point.x - exact).abs();
+            assert!(error < 1e-11, "constant {constant:e}, h = {h:e}: {error:e}");
+        }
+    }
+}
+
+/// A gas below a piston with friction: the energy that an unresolved transient loses warms the gas and leaves the
+/// piston where the motion has it, in every unit of its height. The velocity decays like `exp(−γt)`, so the height
+/// changes by `v₀/γ` and then slowly with the pressure.
+#[test]
+fn heat_moves_no_length() {
+    for unit in [1e-3, 1.0, 1e3] {
+        for friction in [1e4, 1e6] {
+            let system = System::on(Euclidean::<3>)
+                .bracket(
+                    Nambu::default().times(move |x: &Vector3<Real>| x.z * (-1.0 / (1.5 * unit))),
+                )
+                .energy(move |x: &Vector3<Real>| x.x * unit + x.y.powi(2) * 0.5 + x.z)
+                .entropy(|x: &Vector3<Real>| x.x.ln() + x.z.ln() * 1.5)
+                .dissipation(FieldDissipation(move |x: &Vector3<Real>, w: &Vector3<Real>| {
+                    let b = Vector3::new(Real::from(0.0), w.z, -w.y);
+                    b * b.transpose() * (x.z * friction / 1.5)
+                }))
+                .build()
+                .unwrap();
+            let start = vector![1.0 / unit, 0.1, 1.5];
+            let run = damped("piston", Radau3, &system, &start, Span::steps(1.0, 1));
+            let moved = (run.last().point.x * unit - 1.0).abs();
+            assert!(moved < 0.3 / friction, "{unit:e}, {friction:e}: {moved:e}");
+        }
+    }
+}

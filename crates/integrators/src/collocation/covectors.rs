@@ -60,6 +60,8 @@ pub(super) struct StageCovectors<V> {
     pub(super) noise: V,
     /// The number `δ` with what is taken back of errors; zero if it is corrected.
     pub(super) left: f64,
+    /// The round-off of `δ`.
+    pub(super) left_round_off: f64,
 }
 
 /// The start of a law: its value, and what is taken back of its error.
@@ -201,7 +203,8 @@ impl<M: Manifold> AlongStages<'_, M> {
             change += tableau.weights[i] * h.abs() * M::pairing_size(&w[i], &stages.v[i]);
             size += tableau.weights[i] * w[i].abs().dot(scales);
         }
-        let none = StageCovectors { w, end, size, excursion, noise: zero, left: 0.0 };
+        let none =
+            StageCovectors { w, end, size, excursion, noise: zero, left: 0.0, left_round_off: 0.0 };
         if correction == Correction::None {
             return none;
         }
@@ -224,9 +227,11 @@ impl<M: Manifold> AlongStages<'_, M> {
         }
         delta += start.drift;
         let squares = stages.square * stages.unit;
+        let left_round_off = noise + f64::EPSILON * change;
+        let later = StageCovectors { left: delta, left_round_off, ..none };
         let is_later = correction == Correction::Later;
         if squares == 0.0 {
-            return StageCovectors { left: if is_later { delta } else { 0.0 }, ..none };
+            return if is_later { later } else { none };
         }
         let blur = (noise / squares).abs();
         let mut noise = zero;
@@ -237,7 +242,7 @@ impl<M: Manifold> AlongStages<'_, M> {
             });
         }
         if is_later {
-            return StageCovectors { noise, left: delta, ..none };
+            return StageCovectors { noise, ..later };
         }
         for i in 0..s {
             w[i] += stages.flat[i] * (delta / squares);

@@ -51,7 +51,7 @@ pub(super) struct StageEquation<'a, Y: Metriplectic> {
     /// Whether the laws are integrated along short steps.
     pub(super) integrals: bool,
     /// The start, if what is lost of the energy becomes heat.
-    pub(super) heats: Option<HeatStart<Vector<Y::Manifold>>>,
+    pub(super) heats: Option<HeatStart<Dim<Y>>>,
     /// The round-off of the terms of a velocity; zero where it is not known.
     pub(super) rounding: Vector<Y::Manifold>,
 }

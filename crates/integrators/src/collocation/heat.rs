@@ -9,8 +9,8 @@
 //! u_i = \frac{♯n_i}{\langle w_{H,i}, ♯n_i\rangle}, \qquad h\rho = -\tau\,\delta_H ,
 //! ```
 //!
-//! with `n_i` the part of `dS` that is orthogonal to the covectors of the further invariants, and
-//! `w_H = dH + (1 − τ) δ_H ♭v/D`. Then `ΔH = 0` and
+//! with `n_i` the part of `dS` that is orthogonal to the covectors of the further invariants and to the entries that
+//! friction does not move, and `w_H = dH + (1 − τ) δ_H ♭v/D`. Then `ΔH = 0` and
 //!
 //! ```math
 //! \Delta S = h \sum_i b_i \tilde K_i(w_{S,i}, w_{S,i}) + \max(N, 0), \qquad
@@ -24,12 +24,14 @@
 //! At an infinite temperature `⟨dH, ♯n⟩` changes its sign and `u` has no direction: near it `τ` is reduced to zero. Where
 //! friction vanishes at every stage nothing is damped, and the entropy is corrected in both directions.
 //!
-//! `u` is a choice: where an unresolved transient loses energy, the laws do not say which variable warms.
+//! `u` is a choice: where an unresolved transient loses energy, the laws do not say which variable warms. Heat moves no
+//! entry whose row of `K` is zero at the start, such as a length on which the entropy depends. Where several entries may
+//! take it, the metric shares it.
 
 use metriplectic_dynamics::orthogonal::Orthogonal;
 use metriplectic_dynamics::velocity::{self, Covectors};
-use metriplectic_dynamics::{Metriplectic, system::Point};
-use metriplectic_fields::{ChartPoint, Column, Vector};
+use metriplectic_dynamics::{Dissipation as _, Metriplectic, system::Point};
+use metriplectic_fields::{ChartPoint, Column, Dimension, Vector};
 use metriplectic_manifolds::{InnerProduct, Manifold, Riemannian};
 
 use super::chart::{StepChart, in_chart_at};
@@ -45,7 +47,7 @@ pub(super) struct Heat<V> {
     pub(super) velocity: Stages<V>,
     /// The number `N`, the gain of the entropy beside the production of friction.
     pub(super) gain: f64,
-    /// The displacement by the heat that is the round-off of the energy, the largest over the stages.
+    /// The round-off of the displacement by heat, the largest over the stages.
     pub(super) rounding: V,
 }
 
@@ -63,14 +65,35 @@ const FAINT: f64 = 0.01;
 /// The alignment from which on all that friction has lost becomes heat.
 const CLEAR: f64 = 0.1;
 
+/// The entries that are not warmed.
+type Still<Y> = <Dim<Y> as Dimension>::Array<bool>;
+
+/// The entries that friction does not move at a point; none where nothing would be left that the entropy depends on.
+fn still<Y: Metriplectic>(
+    system: &Y,
+    x: &Point<Y>,
+    w: &Covectors<Dim<Y>, Vector<Y::Manifold>>,
+) -> Option<Still<Y>> {
+    let centre = ChartPoint::<Y::Manifold>::centre(x);
+    let g = system.metric_at(&centre);
+    let k = system.dissipation().tensor(&g, &w.energy).ok()?;
+    let still = Dim::<Y>::array(|i| (0..Dim::<Y>::LEN).all(|j| k[(i, j)] == 0.0));
+    let is_warmed = direction(system, x, w, &still)?.alignment.abs() > FAINT;
+    Some(if is_warmed { still } else { Dim::<Y>::array(|_| false) })
+}
+
 /// The direction of heat at a point; `None` where there is no metric.
 fn direction<Y: Metriplectic>(
     system: &Y,
     x: &Point<Y>,
     w: &Covectors<Dim<Y>, Vector<Y::Manifold>>,
+    still: &Still<Y>,
 ) -> Option<Direction<Vector<Y::Manifold>>> {
     let g = system.metric().at(&ChartPoint::<Y::Manifold>::centre(x)).ok()?;
     let mut normals = Orthogonal::<Dim<Y>>::default();
+    for (i, _) in still.as_ref().iter().enumerate().filter(|(_, still)| **still) {
+        normals.push(&g, &Column::from_index(|j| if j == i { 1.0 } else { 0.0 }));
+    }
     for (_, l) in w.invariants.as_ref().iter().flatten() {
         normals.push(&g, l);
     }
@@ -83,14 +106,16 @@ fn direction<Y: Metriplectic>(
 
 /// Where a step that heats starts.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct HeatStart<V> {
+pub(super) struct HeatStart<N: Dimension> {
     /// The differential of the energy.
-    energy: V,
+    energy: N::Vector<f64>,
     /// The alignment of the direction of heat.
     alignment: f64,
+    /// The entries that are not warmed.
+    still: N::Array<bool>,
 }
 
-impl<V> HeatStart<V> {
+impl<N: Dimension> HeatStart<N> {
     /// The fraction of the heat that goes in a direction of a stage; `None` beyond a temperature of zero, where no
     /// motion leads: such a root belongs to another branch of the entropy. At an infinite temperature the direction
     /// turns, and there is no heat.
@@ -106,9 +131,10 @@ pub(super) fn start<Y: Metriplectic>(
     system: &Y,
     x: &Point<Y>,
     w: &Covectors<Dim<Y>, Vector<Y::Manifold>>,
-) -> Option<HeatStart<Vector<Y::Manifold>>> {
-    let Direction { alignment, .. } = direction(system, x, w)?;
-    let start = HeatStart { energy: w.energy, alignment };
+) -> Option<HeatStart<Dim<Y>>> {
+    let still = still(system, x, w)?;
+    let Direction { alignment, .. } = direction(system, x, w, &still)?;
+    let start = HeatStart { energy: w.energy, alignment, still };
     (alignment.abs() > FAINT).then_some(start)
 }
 
@@ -120,7 +146,7 @@ pub(super) struct Step<'a, Y: Metriplectic> {
     pub(super) chart: &'a StepChart<Y::Manifold>,
     pub(super) h: f64,
     pub(super) x: &'a Point<Y>,
-    pub(super) start: &'a HeatStart<Vector<Y::Manifold>>,
+    pub(super) start: &'a HeatStart<Dim<Y>>,
     /// Whether friction vanishes at every stage: then nothing is damped, and both laws are corrected.
     pub(super) is_reversible: bool,
 }
@@ -135,7 +161,7 @@ pub(super) fn add<Y: Metriplectic>(
     let zero = Vector::<Y::Manifold>::zero();
     let (mut sharp, mut directed) = ([zero; STAGES], 1.0_f64);
     for i in 0..tableau.stages {
-        let at = direction(system, &stages.x[i], &at_stage::<Y>(w, i))?;
+        let at = direction(system, &stages.x[i], &at_stage::<Y>(w, i), &step.start.still)?;
         directed = directed.min(step.start.fraction(at.alignment)?);
         sharp[i] = at.sharp;
     }
@@ -153,7 +179,7 @@ pub(super) fn add<Y: Metriplectic>(
         for i in 0..tableau.stages {
             let u = sharp[i] * w.energy.w[i].dot(&sharp[i]).recip();
             velocity[i] = u * rho;
-            rounding[i] = u.abs() * (f64::EPSILON * w.energy.size);
+            rounding[i] = u.abs() * (lost * w.energy.left_round_off);
             let weight = h * tableau.weights[i];
             gain += weight * w.entropy.w[i].dot(&velocity[i]);
             along += weight * stages.flat(i).dot(&velocity[i]);

@@ -380,6 +380,29 @@ fn a_run_that_has_reached_its_end_goes_on() {
     assert!(matches!(adaptive().with_end(f64::NAN), Err(ResumeError::Span(SpanError::End { .. }))));
 }
 
+/// At a velocity of zero friction produces no entropy, and the entropy rises in the step that begins there.
+#[test]
+fn a_run_from_rest_with_friction_goes_on() {
+    let canonical = Matrix3::new(0.0, 1.0, 0.0, -1.0, 0.0, 0.0, 0.0, 0.0, 0.0);
+    let system = System::on(Euclidean::<3>)
+        .bracket(Poisson::constant(canonical).unwrap())
+        .energy(|x: &Vector3<Real>| (x.x * x.x + x.y * x.y) * 0.5 + x.z)
+        .entropy(|x: &Vector3<Real>| x.z)
+        .dissipation(FieldDissipation(|_: &Vector3<Real>, w: &Vector3<Real>| {
+            let b = Vector3::new(Real::from(0.0), w.z, -w.y);
+            b * b.transpose() * w.z.recip()
+        }))
+        .build()
+        .unwrap();
+    let start = vector![1.0, 0.0, 1.0];
+    let run = DormandPrince5.run(&system, start, Span::steps(0.1, 1)).unwrap();
+    assert!(run.last().entropy > 1.0);
+    let later = through_a_file(run.checkpoint()).with_steps(2).unwrap();
+    let resumed = DormandPrince5.resume(&system, &later).unwrap().run().unwrap();
+    let whole = DormandPrince5.run(&system, start, Span::steps(0.1, 2)).unwrap();
+    assert_eq!(bits(resumed.last()), bits(whole.last()));
+}
+
 #[test]
 fn a_run_that_failed_goes_on_with_another_scheme() {
     let body = relaxing_body();

@@ -159,7 +159,8 @@ fn finished<F: StageFlow>(
     memory: &mut MemoryOf<F>,
 ) -> Result<Taken<F>, Refused> {
     let x = start.x;
-    let dissipates = last.stages[0].production != 0.0;
+    // Friction may vanish at the start alone, as for a body at rest.
+    let dissipates = last.stages[0].production != 0.0 || last.rise != 0.0;
     if let Some(lost) = &memory.lost {
         last.end = Vector::zip([&last.end, lost], |[end, lost]| end + lost);
     } else if !memory.read.is_empty() {

@@ -197,6 +197,31 @@ fn stiff_friction_keeps_the_laws_of_its_outputs() {
     keeps_the_laws("stiff, order 5", (&bodies, &vector![1.0, 3.0]), DormandPrince5, span, 0.025);
 }
 
+/// Energy `1 + 3` in two bodies that exchange heat a thousand times faster than a step, which is taken in parts.
+#[test]
+fn the_states_inside_a_step_in_parts_are_those_of_the_motion() {
+    let system = System::on(Euclidean::<2>)
+        .energy(|e: &Vector2<Real>| e.x + e.y)
+        .entropy(|e: &Vector2<Real>| e.x.ln() + e.y.ln())
+        .dissipation(FieldDissipation(|_: &Vector2<Real>, w: &Vector2<Real>| {
+            let b = vector![w.y, -w.x];
+            b * b.transpose() * Real::from(1e3)
+        }))
+        .build()
+        .unwrap();
+    let span = Span::steps(0.5, 1).output_every(0.0625).event("warm", |e: &Vector2<f64>| e.x - 1.9);
+    let run = DormandPrince5.run(&system, vector![1.0, 3.0], span).unwrap();
+    assert!(run.certificate().effort.splits > 0);
+    for state in run.iter().skip(1) {
+        assert!((state.point.x - 2.0).abs() < 1e-10, "{state:?}");
+    }
+    // With e = 2 − d the motion is d' = −2000 d/(4 − d²).
+    let exact = ((0.1_f64.ln() * -4.0) - 0.5 * (1.0 - 0.01)) / 2000.0;
+    let [event] = run.events() else { panic!("{:?}", run.events()) };
+    let error = (event.state.time - exact).abs();
+    assert!(error < 0.5 * exact, "{} instead of {exact}", event.state.time);
+}
+
 #[test]
 fn the_iterator_the_trajectory_and_a_step_have_the_same_outputs() {
     let body = free_body();

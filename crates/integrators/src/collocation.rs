@@ -222,10 +222,8 @@ macro_rules! method {
                 memory: &mut StageMemory<Dim<Y>>,
                 theta: f64,
             ) -> Option<PointOf<Y>> {
-                let (tableau, splits) = (Self::tableau(), self.splits);
                 let promises = Method::<Y>::promises(self, system);
-                let inside = dense::Inside { tableau, splits, promises };
-                dense::between(inside, system, step, memory, theta)
+                dense::between(Self::tableau(), promises, system, step, memory, theta)
             }
         }
     };

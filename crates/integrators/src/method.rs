@@ -112,8 +112,9 @@ pub trait Method<F: Flow>: Sized {
         LimitingSites::new(error.and_then(|error| error.largest_site(allowed)), None)
     }
 
-    /// The state at the fraction `θ` of a step that was taken, from the memory after it; `None` if the flow
-    /// does not say what [lies between](Flow::displacement) two states.
+    /// The state at the fraction `θ` of a step that was taken, from the memory after it; `None` if the method does
+    /// not know it, or if the flow does not say what [lies between](Flow::displacement) two states. Where only the
+    /// method does not know it, and inside a step in [parts](Effort::splits), a run takes a step of size `θh`.
     ///
     /// The default is the cubic of Hermite in the chart at the start, of order 3, moved
     /// [onto](Flow::onto) the laws: the energy and the further invariants that the run began with, and an

@@ -9,45 +9,29 @@ use super::covectors::combined;
 use super::equation::StageEquation;
 use super::fallbacks;
 use super::memory::{LastStep, StageMemory};
-use super::parts;
 use super::tableau::Tableau;
 use crate::method::{Components, Effort, Flow as _, Promises, StepEnds};
-use crate::midpoint::{Dim, Start};
-use crate::round_off::drift;
+use crate::midpoint::Dim;
 use crate::run::dense::{self, cubic, limited};
 use crate::step_failure::Fallbacks;
-
-/// How states inside a step are found.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Inside {
-    pub(super) tableau: &'static Tableau,
-    /// How often a part of the step may be divided.
-    pub(super) splits: usize,
-    pub(super) promises: Promises,
-}
 
 /// The state at the fraction `θ` of a step: a step of size `θh`, guessed by the polynomial of the whole one, and moved
 /// onto the laws of the run with an entropy that does not fall from one fraction to a later one.
 pub(super) fn between<Y: Metriplectic>(
-    inside: Inside,
+    tableau: &'static Tableau,
+    promises: Promises,
     system: &Y,
     step: &StepEnds<'_, Y>,
     memory: &StageMemory<Dim<Y>>,
     theta: f64,
 ) -> Option<PointOf<Y>> {
-    let Inside { tableau, promises, .. } = inside;
     if theta <= 0.0 || step.x == step.end {
         return Some(step.x.clone());
     }
     if theta >= 1.0 {
         return Some(step.end.clone());
     }
-    let part = memory.last.and_then(|last| part(tableau, system, step, &last, theta));
-    // A step that was taken in parts has no polynomial, and the cubic through stiff ends is no motion.
-    let in_parts = || if tableau.one_sided { in_parts(inside, system, step, theta) } else { None };
-    let Some(y) = part.or_else(in_parts) else {
-        return dense::between(system, step, promises, theta);
-    };
+    let y = part(tableau, system, step, &memory.last?, theta)?;
     let q = Y::Manifold::coordinates(step.x, step.end);
     let line = || Y::Manifold::chart(step.x, &(q * theta));
     let entropy = promises.entropy.then(|| entropy(tableau, system, step, theta));
@@ -72,20 +56,6 @@ fn part<Y: Metriplectic>(
     let solved =
         fallbacks::solve(&equation, Some(guess), Fallbacks::FirstTries, &mut effort).ok()?;
     Some(solved.at.end)
-}
-
-/// The end of a step of size `θh`, in parts where it is not solved whole.
-fn in_parts<Y: Metriplectic>(
-    inside: Inside,
-    system: &Y,
-    step: &StepEnds<'_, Y>,
-    theta: f64,
-) -> Option<PointOf<Y>> {
-    let Inside { tableau, splits, .. } = inside;
-    let (h, accumulated_error) = (theta * step.h, drift::nothing::<Y>());
-    let start = Start { x: step.x, time: 0.0, h, values: *step.values[0], accumulated_error };
-    let taken = parts::take(tableau, splits, system, &start, &mut StageMemory::default());
-    taken.ok().map(|taken| taken.x)
 }
 
 /// The entropy at the fraction `θ` of a step, with the production as its slope at both ends: the cubic, limited so that

@@ -302,8 +302,9 @@ impl<'a, F: Flow, M: Method<F>> Steps<'a, F, M> {
         }
         let (energy, entropy, time) = (c.energy.0, c.entropy.0, c.time.0);
         let state = State { step: c.step, time, point, energy, entropy };
-        let (kept, h) = (c.kept_entropy.0, 0.0);
-        let before = StepBefore { state: state.clone(), values: values.clone(), entropy: kept, h };
+        let (kept, h, in_parts) = (c.kept_entropy.0, 0.0, false);
+        let before =
+            StepBefore { state: state.clone(), values: values.clone(), entropy: kept, h, in_parts };
         Ok(Self {
             promises: certificate.promises,
             rule: Rule::of(&method, progress.start),

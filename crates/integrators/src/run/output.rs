@@ -4,8 +4,8 @@ use std::collections::VecDeque;
 
 use metriplectic_dynamics::SecondLaw;
 
-use crate::method::{Element, Flow, Laws, Method, StateSpace, StepEnds};
-use crate::run::dense::between;
+use crate::method::{Element, Flow, Laws, Method, StateSpace, StepEnds, StepStart};
+use crate::run::dense::{Target, between};
 use crate::run::event::{Event, Events};
 use crate::run::span::{Schedule, SpanError};
 use crate::run::steps::Steps;
@@ -23,6 +23,8 @@ pub(super) struct StepBefore<F: Flow> {
     pub(super) entropy: f64,
     /// The size of the step; 0 before the first one.
     pub(super) h: f64,
+    /// Whether the step was taken in parts.
+    pub(super) in_parts: bool,
 }
 
 /// What a run looks at between its steps.
@@ -217,13 +219,29 @@ impl<F: Flow, M: Method<F>> Steps<'_, F, M> {
             let out = (before.state.entropy - inside.entropy).max(inside.entropy - state.entropy);
             inside.energy.is_finite() && (!has_entropy || out <= 0.0 || out <= round_off())
         };
-        // A method may not know what lies in this step, as after its halves, or find no entropy between those
-        // of the ends. The output of any method then serves it.
-        method
-            .between(flow, &step, memory, theta)
+        let promises = method.promises(flow);
+        // A step of that size, where the method does not know what lies in this one, as after a step in parts.
+        let smaller_step = |method: &mut M| {
+            flow.displacement(x, end)?;
+            let (values, reference) = (before.values.clone(), reference.clone());
+            let start = StepStart { x, time: times[0], values, reference, allowed: None };
+            let taken = method.step(*flow, &start, theta * h, &mut M::Memory::default()).ok()?;
+            let inside = at(taken.x);
+            if is_between(&inside) {
+                return Some(inside);
+            }
+            let entropy =
+                inside.entropy.clamp(before.state.entropy, state.entropy.max(before.state.entropy));
+            let target = Target::new(&step, promises, theta, Some(entropy));
+            Some(at(target.reached_from(*flow, &inside.point, || end.clone())))
+        };
+        let known = if before.in_parts { None } else { method.between(flow, &step, memory, theta) };
+        // The output of any method serves one that finds no entropy between those of the ends.
+        known
             .map(at)
             .filter(is_between)
-            .or_else(|| between(*flow, &step, method.promises(flow), theta).map(at))
+            .or_else(|| smaller_step(method).filter(is_between))
+            .or_else(|| between(*flow, &step, promises, theta).map(at))
     }
 
     /// Looks at the step that was just taken.

@@ -97,7 +97,9 @@ impl<'a, F: Flow, M: Method<F>> Steps<'a, F, M> {
         let (energy, entropy) = (values.energy, values.entropy);
         let state = State { step: 0, time: start, point: x0, energy, entropy };
         let watching = Watching::new(watch, [start, progress.end()], &state)?;
-        let before = StepBefore { state: state.clone(), values: values.clone(), entropy, h: 0.0 };
+        let (h, in_parts) = (0.0, false);
+        let before =
+            StepBefore { state: state.clone(), values: values.clone(), entropy, h, in_parts };
         let mut steps = Self {
             method,
             flow,
@@ -195,8 +197,9 @@ impl<'a, F: Flow, M: Method<F>> Steps<'a, F, M> {
         if step.is_power_of_two() || (first_at_the_edge && self.has_sites()) {
             self.sample(&taken, h);
         }
-        let Taken { x, values, evidence, .. } = taken;
+        let Taken { x, values, evidence, effort } = taken;
         (self.before.h, self.before.entropy) = (h, self.entropy);
+        self.before.in_parts = effort.splits > 0;
         if evidence.dissipates {
             self.entropy = values.entropy;
         }

@@ -133,7 +133,7 @@ impl<const N: usize> Until<N> {
         Self { least: Some(h), ..self }
     }
 
-    /// The largest step to take.
+    /// The largest step to take. The last one may be a hundredth longer, instead of a sliver after it.
     #[must_use]
     pub const fn largest_step(self, h: f64) -> Self {
         Self { largest: Some(h), ..self }

@@ -171,7 +171,8 @@ impl Watched {
     }
 
     /// Ends the run at the event, with [`Ending::Event`](crate::Ending::Event): the last state of the trajectory is
-    /// the state there.
+    /// the state there. The [checkpoint](crate::Checkpoint) of such a run is the end of the step in which the event
+    /// lies: a run that is resumed from it has no outputs and events between the two.
     ///
     /// ```
     /// # use metriplectic_dynamics::System;

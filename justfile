@@ -64,7 +64,7 @@ golden *flags:
 fuzz seconds="600":
     FUZZ_SECONDS=$(({{ seconds }} / 3)) cargo test --release --all-features --test fuzz -- --nocapture --test-threads 2
 
-# change the integrators and the dynamics in small ways, some thirty of 7900 in an hour, and list what no test notices
+# change the integrators and the dynamics in small ways, some thirty of 7900 in an hour, and list what four tests miss
 mutants shard="0/256": (need "cargo mutants --version" "cargo install cargo-mutants --locked")
     cargo mutants --package metriplectic-integrators --package metriplectic-dynamics \
         --shard {{ shard }} --sharding round-robin --all-features --output target --timeout 300 \

@@ -176,8 +176,6 @@ pub(super) struct AlongStages<'a, M: Space> {
     pub(super) polynomial: &'a StepPolynomial<'a, M>,
     /// The sizes of the entries at the end.
     pub(super) scales: Vector<M>,
-    /// Whether short steps are integrated.
-    pub(super) integrals: bool,
 }
 
 impl<M: Manifold> AlongStages<'_, M> {
@@ -189,7 +187,7 @@ impl<M: Manifold> AlongStages<'_, M> {
         start: LawStart,
         correction: Correction,
     ) -> StageCovectors<Vector<M>> {
-        let (Self { stages, polynomial, scales, integrals }, zero) = (self, Vector::<M>::zero());
+        let (Self { stages, polynomial, scales }, zero) = (self, Vector::<M>::zero());
         let StepPolynomial { tableau, chart, h, .. } = polynomial;
         let (s, end) = (tableau.stages, f.at(&chart.end));
         let mut w = [zero; STAGES];
@@ -212,7 +210,7 @@ impl<M: Manifold> AlongStages<'_, M> {
         let mut delta = (end - start.value) - slope;
         let mut noise = rounding;
         let fraction = short(change, size);
-        if fraction > 0.0 && *integrals {
+        if fraction > 0.0 {
             let integral = self.integral(f) - slope;
             // Without terms there is no error.
             let error = if change > 0.0 {

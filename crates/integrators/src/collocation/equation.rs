@@ -48,8 +48,6 @@ pub(super) struct StageEquation<'a, Y: Metriplectic> {
     pub(super) values: Laws<Numbers<Y>>,
     /// What is taken back of the errors of earlier steps.
     pub(super) drift: DriftCorrection<Y>,
-    /// Whether the laws are integrated along short steps.
-    pub(super) integrals: bool,
     /// The start, if what is lost of the energy becomes heat.
     pub(super) heats: Option<HeatStart<Dim<Y>>>,
     /// The round-off of the terms of a velocity; zero where it is not known.
@@ -129,7 +127,7 @@ impl<'a, Y: Metriplectic> StageEquation<'a, Y> {
             let w = differentials(system, &ChartPoint::<Y::Manifold>::centre(x));
             heats = heat::start(system, x, &w);
         }
-        Self { tableau, system, x, h, values, drift, integrals: true, heats, rounding }
+        Self { tableau, system, x, h, values, drift, heats, rounding }
     }
 
     /// The displacement `u = h Σ b_j k̃_j`.
@@ -289,9 +287,9 @@ impl<'a, Y: Metriplectic> StageEquation<'a, Y> {
         stages: &StagePoints<Y::Manifold>,
         polynomial: &StepPolynomial<'_, Y::Manifold>,
     ) -> Covectors<Dim<Y>, StageCovectors<Vector<Y::Manifold>>> {
-        let &Self { system, values, drift, integrals, .. } = self;
+        let &Self { system, values, drift, .. } = self;
         let scales = Y::Manifold::scales(&polynomial.chart.end);
-        let along = AlongStages { stages, polynomial, scales, integrals };
+        let along = AlongStages { stages, polynomial, scales };
         let [of_energy, of_entropy] = match (self.is_exact(), self.heats.is_some()) {
             (false, _) => [Correction::Here, Correction::None],
             (true, false) => [Correction::Here; 2],

@@ -105,13 +105,19 @@ struct End<Y: Metriplectic> {
 impl<Y: Metriplectic> StageEquation<'_, Y> {
     /// The velocities near a guess, at which the laws hold.
     pub(super) fn solve(&self, guess: Unknowns<Y>, budget: Budget) -> Result<Solved<Y>, Unsolved> {
-        let solved = Iteration::start(self, guess, budget)?;
-        if solved.at.error <= STALLED_LAW || !self.integrals || budget.tolerance > 1.0 {
-            return Ok(solved);
+        let undefined = Unsolved { residual: f64::INFINITY, edge: true, evaluations: 1 };
+        let linear = Linear::of(self, &guess).ok_or(undefined)?;
+        let equation = StageEquation { rounding: linear.rounding(), ..*self };
+        let at = equation.evaluate(&guess).ok_or(undefined)?;
+        let mut iteration =
+            Iteration { equation, budget, linear, full: None, evaluations: 1, corrections: 0 };
+        if budget.derivatives == Derivatives::OfAllStages {
+            let correction = iteration.blended(&guess, &at);
+            iteration.full = Full::of(&equation, &guess, &at, &correction);
+            iteration.evaluations += iteration.full.as_ref().map_or(0, |full| full.evaluations);
         }
-        // An integral along the step is off by more than its estimate.
-        let again = Iteration::start(&Self { integrals: false, ..*self }, solved.k, budget)?;
-        Ok(Solved { evaluations: solved.evaluations + again.evaluations, ..again })
+        let here = iteration.corrected(guess, at).ok_or(undefined)?;
+        iteration.run(here)
     }
 
     /// The end after the last correction, with the laws evaluated there; `None` if they are off.
@@ -141,28 +147,7 @@ struct Iteration<'a, Y: Metriplectic> {
     corrections: usize,
 }
 
-impl<'a, Y: Metriplectic> Iteration<'a, Y> {
-    /// Iterates from a guess.
-    fn start(
-        equation: &StageEquation<'a, Y>,
-        guess: Unknowns<Y>,
-        budget: Budget,
-    ) -> Result<Solved<Y>, Unsolved> {
-        let undefined = Unsolved { residual: f64::INFINITY, edge: true, evaluations: 1 };
-        let linear = Linear::of(equation, &guess).ok_or(undefined)?;
-        let equation = StageEquation { rounding: linear.rounding(), ..*equation };
-        let at = equation.evaluate(&guess).ok_or(undefined)?;
-        let mut iteration =
-            Self { equation, budget, linear, full: None, evaluations: 1, corrections: 0 };
-        if budget.derivatives == Derivatives::OfAllStages {
-            let correction = iteration.blended(&guess, &at);
-            iteration.full = Full::of(&equation, &guess, &at, &correction);
-            iteration.evaluations += iteration.full.as_ref().map_or(0, |full| full.evaluations);
-        }
-        let here = iteration.corrected(guess, at).ok_or(undefined)?;
-        iteration.run(here)
-    }
-
+impl<Y: Metriplectic> Iteration<'_, Y> {
     /// An evaluation with its correction.
     fn corrected(&self, k: Unknowns<Y>, at: Evaluated<Y>) -> Option<Iterate<Y>> {
         let round_off = self.linear.round_off(&at, &k);

@@ -4,9 +4,10 @@
 //! References are ends of the explicit method of order 8 at a tolerance of 10⁻¹⁴.
 
 use metriplectic::dynamics::system::Point;
-use metriplectic::integrators::{StageMemory, StepStart, laws};
+use metriplectic::integrators::{Components, StageMemory, StepEnds, StepStart, laws};
 use metriplectic::manifolds::Riemannian;
 use metriplectic::prelude::*;
+use metriplectic_studies::Order;
 
 mod models;
 #[path = "models/stages.rs"]
@@ -443,5 +444,25 @@ fn a_tolerance_asks_for_as_many_steps_on_a_sphere_as_around_it() {
         ];
         println!("{method:?}: {on} steps on the sphere, {off} around it");
         assert!((0.7..1.4).contains(&(on as f64 / off as f64)), "{method:?}: {on}, {off}");
+    }
+}
+
+/// The defect of the polynomial of `s` stages at an end is `O(h^s)` in a chart that is curved too.
+#[test]
+fn the_estimated_error_has_its_order_on_a_sphere() {
+    let (system, x) = (spin(), vector![0.48, 0.36, -0.8]);
+    for (method, stages) in [(Gauss2, 2), (Gauss3, 3), (Gauss4, 4), (Radau3, 3), (Radau4, 4)] {
+        let sizes = [0.1, 0.07, 0.05, 0.035];
+        let errors = sizes.map(|h| {
+            let (start, mut memory) = (StepStart::first(&system, &x), StageMemory::default());
+            let taken = method.step(&system, &start, h, &mut memory).expect("it is taken");
+            let values = [&start.values, &taken.values];
+            let step = StepEnds { x: &x, end: &taken.x, h, values, reference: &start.values };
+            let norm = |v: &Components<Vector2<f64>>| v.0.norm();
+            Method::<_>::error(&method, &system, &step, &memory, norm).expect("it has an estimate")
+        });
+        let order = Order::fit(&sizes, &errors).expect("four errors");
+        println!("{method:?}: {order} from {errors:?}");
+        assert!(order.agrees(f64::from(stages + 1), 0.3), "{method:?}: {order} from {errors:?}");
     }
 }

@@ -1,12 +1,4 @@
-//! The power of ten in which the numbers of an axis are drawn, and what is written along it.
-
-use std::sync::Arc;
-
-use kuva::render::layout::{ComputedLayout, Layout, TickFormat};
-use kuva::render::render_utils::{compute_tick_step, generate_ticks_log};
-use kuva::render::theme::Theme;
-
-use crate::plot::{At, GREY, INK, NAME, NUMBER};
+//! The range of an axis, the power of ten in which its numbers are drawn, and what is written along it.
 
 /// An axis over `[low, high]` of a number in units of `10^exponent`.
 #[derive(Clone, Debug)]
@@ -21,11 +13,7 @@ pub(crate) struct Axis {
 impl Axis {
     /// A linear axis over these numbers and a fraction of `padding` on either side, with about so many
     /// ticks. It begins at 0 where that is near.
-    pub(crate) fn linear(
-        numbers: impl IntoIterator<Item = f64>,
-        padding: f64,
-        ticks: usize,
-    ) -> Self {
+    pub(crate) fn linear(numbers: impl IntoIterator<Item = f64>, padding: f64, ticks: u8) -> Self {
         let [low, high] = ends(numbers);
         let low = if low > 0.0 && low < 0.1 * high { 0.0 } else { low };
         let size = low.abs().max(high.abs());
@@ -34,7 +22,7 @@ impl Axis {
         let margin = if high > low { padding * (high - low) } else { alone };
         let exponent = Some(decade(size)).filter(|d| !(-2..5).contains(d)).unwrap_or(0);
         let [low, high] = [low - margin, high + margin].map(|x| x / 10_f64.powi(exponent));
-        let step = compute_tick_step(low, high, ticks);
+        let step = round_step((high - low) / f64::from(ticks));
         // A last tick that is nearly reached belongs to the axis.
         let last = (high / step).ceil() * step;
         let high = if last - high < 0.01 * (high - low) { last } else { high };
@@ -42,23 +30,63 @@ impl Axis {
     }
 
     /// A logarithmic axis over these positive numbers, and a little more on either side.
-    ///
-    /// The least number is about 1 on it: `kuva` draws nothing below 1e-10 on logarithmic axes.
     pub(crate) fn logarithmic(numbers: impl IntoIterator<Item = f64>) -> Self {
         let [low, high] = ends(numbers);
-        let (exponent, margin) = (decade(low), 1.12 * (high / low).powf(0.03));
-        let unit = 10_f64.powi(exponent);
-        Self { low: low / margin / unit, high: high * margin / unit, exponent, step: None }
+        let margin = 1.12 * (high / low).powf(0.03);
+        Self { low: low / margin, high: high * margin, exponent: 0, step: None }
+    }
+
+    /// Two linear axes in one unit, of which the shorter one is extended until a number has the same length on both
+    /// sides of a frame.
+    pub(crate) fn equal(axes: [Self; 2], frame: (f64, f64)) -> [Self; 2] {
+        let exponent = axes[0].exponent.max(axes[1].exponent);
+        let unit = |axis: &Self| 10_f64.powi(axis.exponent - exponent);
+        let length = |axis: &Self| (axis.high - axis.low) * unit(axis);
+        let sides = [frame.0, frame.1];
+        let scale = (length(&axes[0]) / sides[0]).max(length(&axes[1]) / sides[1]);
+        let step = round_step(scale * sides[0].min(sides[1]) / 4.0);
+        std::array::from_fn(|k| {
+            let (axis, unit) = (&axes[k], unit(&axes[k]));
+            let (middle, half) = (0.5 * unit * (axis.low + axis.high), 0.5 * scale * sides[k]);
+            Self { low: middle - half, high: middle + half, exponent, step: Some(step) }
+        })
+    }
+
+    /// The place of a value: 0 at the lower end, 1 at the upper one.
+    pub(crate) fn place(&self, value: f64) -> f64 {
+        let x = self.reading(value);
+        match self.step {
+            Some(_) => (x - self.low) / (self.high - self.low),
+            None => (x / self.low).ln() / (self.high / self.low).ln(),
+        }
     }
 
     /// The number that is drawn for a value.
-    pub(crate) fn reading(&self, value: f64) -> f64 {
+    fn reading(&self, value: f64) -> f64 {
         value / 10_f64.powi(self.exponent)
     }
 
-    /// The factor between two numbers that are so far from each other on a logarithmic axis.
-    pub(crate) fn fraction(&self, part: f64) -> f64 {
-        (self.high / self.low).powf(part)
+    /// The ticks: the values, and the numbers that are written beside them.
+    pub(crate) fn ticks(&self) -> Vec<(f64, String)> {
+        let unit = 10_f64.powi(self.exponent);
+        let written = |tick: f64| (tick * unit, self.written(tick));
+        let Some(step) = self.step else {
+            return self
+                .decades()
+                .filter(|x| (self.low..=self.high).contains(x))
+                .map(written)
+                .collect();
+        };
+        let first = (self.low / step - 1e-9).ceil();
+        let ticks = (0_u8..64).map(|k| (first + f64::from(k)) * step);
+        ticks.take_while(|tick| *tick <= self.high + 1e-9 * step).map(written).collect()
+    }
+
+    /// The powers of ten from below to above a logarithmic axis, and, if these are few, twice and five times them.
+    fn decades(&self) -> impl Iterator<Item = f64> {
+        let (first, last) = (decade(self.low), decade(self.high));
+        let digits: &[f64] = if last - first < 3 { &[1.0, 2.0, 5.0] } else { &[1.0] };
+        (first..=last).flat_map(move |n| digits.iter().map(move |digit| digit * 10_f64.powi(n)))
     }
 
     /// The quantity with its power of ten and its unit: `H − H₀ (10⁻¹⁶ J)`.
@@ -72,106 +100,42 @@ impl Axis {
         }
     }
 
-    /// The numbers along a logarithmic axis as they are written.
-    fn written(&self) -> Vec<String> {
-        let format = self.format();
-        generate_ticks_log(self.low, self.high)
-            .into_iter()
-            .map(|tick| format.format(tick))
-            .collect()
-    }
-
-    /// How the numbers along the axis are written.
-    fn format(&self) -> TickFormat {
-        let (decades, shift) = (decade(self.high) - decade(self.low), self.exponent);
+    /// The number beside a tick.
+    fn written(&self, tick: f64) -> String {
         let Some(step) = self.step else {
-            return TickFormat::Custom(Arc::new(move |tick| {
-                let exponent = decade(tick * (1.0 + 1e-9));
-                let (digit, total) = ((tick / 10_f64.powi(exponent)).round(), exponent + shift);
-                match (digit > 1.5, decades < 3) {
-                    (_, true) if (0..4).contains(&total) => {
-                        (digit * 10_f64.powi(total)).to_string()
-                    }
-                    (true, true) => format!("{digit}×{}", power(total)),
-                    (false, _) if total % (1 + (decades - 1) / 7) == 0 => power(total),
-                    _ => String::new(),
+            let decades = decade(self.high) - decade(self.low);
+            let exponent = decade(tick * (1.0 + 1e-9));
+            let digit = (tick / 10_f64.powi(exponent)).round();
+            return match (digit > 1.5, decades < 3) {
+                (_, true) if (0..4).contains(&exponent) => {
+                    (digit * 10_f64.powi(exponent)).to_string()
                 }
-            }));
+                (true, true) => format!("{digit}×{}", power(exponent)),
+                (false, _) if exponent % (1 + (decades - 1) / 7) == 0 => power(exponent),
+                _ => String::new(),
+            };
         };
+        if tick.abs() < 1e-9 * step {
+            return "0".into();
+        }
         // A step is 1, 2, 2.5 or 5 times a power of ten.
         let digits = (0..9).find(|&n| (step * 10_f64.powi(n)).fract() < 1e-6).unwrap_or(9);
         let digits = usize::try_from(digits).unwrap_or(0);
-        TickFormat::Custom(Arc::new(move |tick| match tick.abs() < 1e-9 * step {
-            true => "0".into(),
-            false => format!("{tick:.digits$}").replace('-', "−"),
-        }))
+        format!("{tick:.digits$}").replace('-', "−")
     }
 }
 
-/// A pair of axes in the style of all figures.
-pub(crate) fn layout(x: &Axis, y: &Axis) -> Layout {
-    let theme = Theme {
-        axis_color: GREY.into(),
-        grid_color: "#E5E5E5".into(),
-        tick_color: GREY.into(),
-        text_color: INK.into(),
-        ..Theme::light()
+/// The distance between ticks, 1, 2, 2.5 or 5 times a power of ten, that is nearest to this one.
+fn round_step(wanted: f64) -> f64 {
+    let unit = 10_f64.powf(wanted.log10().floor());
+    let digit = match wanted / unit {
+        x if x < 1.5 => 1.0,
+        x if x < 2.25 => 2.0,
+        x if x < 3.5 => 2.5,
+        x if x < 7.5 => 5.0,
+        _ => 10.0,
     };
-    let mut layout = Layout::new((x.low, x.high), (y.low, y.high))
-        .with_theme(theme)
-        .with_box_axes()
-        .with_label_size(NAME)
-        .with_tick_size(NUMBER)
-        .with_body_size(NUMBER)
-        .with_axis_line_width(0.8)
-        .with_grid_line_width(0.8)
-        .with_tick_width(0.8)
-        .with_tick_length(4.0)
-        .with_x_axis_min(x.low)
-        .with_x_axis_max(x.high)
-        .with_y_axis_min(y.low)
-        .with_y_axis_max(y.high)
-        .with_x_tick_format(x.format())
-        .with_y_tick_format(y.format());
-    (layout.log_x, layout.log_y) = (x.step.is_none(), y.step.is_none());
-    (layout.x_tick_step, layout.y_tick_step) = (x.step, y.step);
-    // `kuva` leaves room for numbers as it writes them on a logarithmic axis, and these may be wider.
-    if layout.log_y {
-        let room = |layout: &Layout| ComputedLayout::from_layout(layout).y_tick_label_px;
-        let left = room(&layout);
-        layout.y_categories = Some(y.written());
-        layout.y_label_offset.0 = (left - room(&layout)).min(0.0);
-        layout.y_categories = None;
-    }
-    layout
-}
-
-/// The size of a frame, and the room around it.
-pub(crate) struct Room {
-    pub(crate) frame: At,
-    pub(crate) left: f64,
-    pub(crate) right: f64,
-    pub(crate) top: f64,
-    pub(crate) below: f64,
-}
-
-impl Room {
-    /// Width and height of all.
-    pub(crate) fn size(&self) -> At {
-        (self.left + self.frame.0 + self.right, self.top + self.frame.1 + self.below)
-    }
-
-    /// Axes with this frame.
-    pub(crate) fn around(&self, layout: Layout) -> Layout {
-        let (width, height) = self.size();
-        let layout = layout.with_force_margins(self.left, self.right);
-        layout.with_force_margins_y(self.top, self.below).with_width(width).with_height(height)
-    }
-}
-
-/// The room to the left of a frame: for the numbers along its axis, and their name.
-pub(crate) fn room_left(layout: &Layout) -> f64 {
-    ComputedLayout::from_layout(layout).margin_left - layout.y_label_offset.0
+    digit * unit
 }
 
 /// The least and the greatest of some numbers.
@@ -198,7 +162,7 @@ mod tests {
     use super::*;
 
     fn written(axis: &Axis, tick: f64) -> String {
-        axis.format().format(tick)
+        axis.written(tick)
     }
 
     #[test]
@@ -230,13 +194,34 @@ mod tests {
 
     #[test]
     fn decades_are_powers_of_ten() {
-        let axis = Axis::logarithmic([1e-15, 0.5]);
-        let labels = (0..=15).map(|n| written(&axis, 10_f64.powi(n)));
-        let labels: Vec<String> = labels.filter(|label| !label.is_empty()).collect();
-        assert_eq!(labels, ["10⁻¹⁵", "10⁻¹²", "10⁻⁹", "10⁻⁶", "10⁻³", "10⁰"]);
-        let narrow = Axis::logarithmic([0.03, 0.04]);
-        assert_eq!([2.0, 5.0].map(|x| written(&narrow, x)), ["2×10⁻²", "5×10⁻²"]);
-        let counts = Axis::logarithmic([2.0, 12.0]);
-        assert_eq!([2.0, 10.0].map(|x| written(&counts, x)), ["2", "10"]);
+        let written = |numbers: [f64; 2]| {
+            let ticks = Axis::logarithmic(numbers).ticks().into_iter();
+            ticks.map(|(_, number)| number).filter(|number| !number.is_empty()).collect::<Vec<_>>()
+        };
+        assert_eq!(written([1e-15, 0.5]), ["10⁻¹⁵", "10⁻¹²", "10⁻⁹", "10⁻⁶", "10⁻³", "10⁰"]);
+        assert_eq!(written([0.01, 0.06]), ["10⁻²", "2×10⁻²", "5×10⁻²"]);
+        assert_eq!(written([2.0, 12.0]), ["2", "5", "10"]);
+    }
+
+    #[test]
+    fn ticks_are_round_numbers_within_the_axis() {
+        let axis = Axis::linear([-0.3, 1.0], 0.0, 5);
+        let ticks = axis.ticks();
+        let numbers: Vec<&str> = ticks.iter().map(|(_, number)| number.as_str()).collect();
+        assert_eq!(numbers, ["−0.25", "0", "0.25", "0.50", "0.75", "1.00"]);
+        assert!(ticks.iter().all(|(value, _)| (0.0..=1.0 + 1e-9).contains(&axis.place(*value))));
+        assert!((axis.place(-0.3)).abs() < 1e-12 && (axis.place(1.0) - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_unit_has_the_same_length_on_equal_axes() {
+        for factor in [1.0, 1e-9, 1e12] {
+            let axes =
+                [[0.0, 2.0], [5e-3, 6e-3]].map(|x| Axis::linear(x.map(|x| factor * x), 0.0, 5));
+            let [x, y] = Axis::equal(axes, (300.0, 200.0));
+            let length = |axis: &Axis, side: f64| side * (axis.place(factor) - axis.place(0.0));
+            assert!((length(&x, 300.0) - 150.0).abs() < 1e-9, "{factor}");
+            assert!((length(&y, 200.0) - 150.0).abs() < 1e-9, "{factor}");
+        }
     }
 }

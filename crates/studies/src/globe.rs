@@ -2,12 +2,12 @@
 
 use std::f64::consts::{FRAC_PI_6, TAU};
 
-use kuva::render::render::{Primitive, TextAnchor};
 use nalgebra::Vector3;
+use svg::node::element::{Element, Group};
 
 use crate::{
     header::{Entry, Header},
-    plot::{self, At, GREY, INK, NAME, PlotError, color, line, text},
+    plot::{self, Anchor, At, GREY, INK, NAME, PlotError, circle, color, line, text},
 };
 
 /// How far from 1 the norm of a point may be: what an integrator that leaves the sphere makes of it
@@ -117,7 +117,7 @@ impl Globe {
     }
 
     /// The parts of a globe of this size, with its upper left corner at the origin.
-    pub(crate) fn parts(&self, letter: char, (width, height): At) -> Vec<Primitive> {
+    pub(crate) fn parts(&self, letter: char, (width, height): At) -> Vec<Element> {
         let centre = (0.5 * width, height - 0.5 * width);
         let radius = 0.5 * width - MARGIN;
         let view = View::from(self.viewer, centre, radius);
@@ -133,13 +133,10 @@ impl Globe {
         };
         let mut parts = vec![circle(centre, radius, SURFACE, GREY, 0.9)];
         // What lies behind is pale.
-        let attributes = Some(r#"opacity="0.35""#.into());
-        parts.push(Primitive::GroupStart { transform: None, title: None, extra_attrs: attributes });
-        for (x, color) in levels().chain(curves()) {
-            parts.extend(view.lines(x, false, color, 0.9));
-        }
-        parts.extend(ends(false));
-        parts.push(Primitive::GroupEnd);
+        let behind =
+            levels().chain(curves()).flat_map(|(x, color)| view.lines(x, false, color, 0.9));
+        let pale = Group::new().set("opacity", 0.35);
+        parts.push(behind.chain(ends(false)).fold(pale, Group::add).into());
         for x in &graticule() {
             parts.extend(view.lines(x, true, GRATICULE, 0.6));
         }
@@ -222,14 +219,13 @@ impl View {
     }
 
     /// The parts of a curve on one side, as lines.
-    fn lines(&self, points: &[Vector], front: bool, color: &str, width: f64) -> Vec<Primitive> {
-        let place = |path: &Vec<Vector>| path.iter().map(|x| self.at(x)).collect();
-        let paths = self.paths(points, front);
-        paths.iter().map(|path| line(place(path), color, width, None)).collect()
+    fn lines(&self, points: &[Vector], front: bool, color: &str, width: f64) -> Vec<Element> {
+        let line = |path: &Vec<Vector>| line(path.iter().map(|x| self.at(x)), color, width, None);
+        self.paths(points, front).iter().map(line).collect()
     }
 
     /// The ends of the coordinate axes that stick out of the sphere.
-    fn axes(&self) -> Vec<Primitive> {
+    fn axes(&self) -> Vec<Element> {
         let mut parts = Vec::new();
         let tip = 1.0 + AXIS[0] / self.radius;
         for (axis, name) in [(Vector::x(), "x₁"), (Vector::y(), "x₂"), (Vector::z(), "x₃")] {
@@ -237,20 +233,14 @@ impl View {
             // Behind the sphere an axis begins where the disc does not cover it.
             let start = if self.front(&axis) { 1.0 } else { across.recip() };
             if start < tip {
-                let ends = vec![self.at(&(axis * start)), self.at(&(axis * tip))];
+                let ends = [self.at(&(axis * start)), self.at(&(axis * tip))];
                 let beside = tip + AXIS[1] / (self.radius * across.max(1e-3));
                 parts.push(line(ends, INK, 1.0, None));
-                parts.push(text(name, self.at(&(axis * beside)), NAME, TextAnchor::Middle));
+                parts.push(text(name, self.at(&(axis * beside)), NAME, Anchor::Middle).into());
             }
         }
         parts
     }
-}
-
-/// A disc with its outline.
-fn circle((cx, cy): At, r: f64, inside: &str, outline: &str, width: f64) -> Primitive {
-    let (fill, stroke, stroke_width) = (inside.into(), Some(outline.into()), Some(width));
-    Primitive::Circle { cx, cy, r, fill, fill_opacity: None, stroke, stroke_width }
 }
 
 /// Meridians and parallels, 30° apart.

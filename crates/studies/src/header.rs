@@ -1,8 +1,8 @@
 //! What stands above a picture: its letter, its title and its legend.
 
-use kuva::render::render::{Primitive, TextAnchor};
+use svg::node::element::Element;
 
-use crate::plot::{At, NAME, NUMBER, length, line, text};
+use crate::plot::{Anchor, At, NAME, NUMBER, length, line, text};
 
 /// Height of a row; room for the letter, for the line before a label, and between two entries.
 const ROW: f64 = 18.0;
@@ -39,19 +39,18 @@ impl<'a> Header<'a> {
     }
 
     /// The parts, with the upper left corner at a place.
-    pub(crate) fn parts(&self, letter: char, (left, top): At) -> Vec<Primitive> {
+    pub(crate) fn parts(&self, letter: char, (left, top): At) -> Vec<Element> {
         let first = top + 0.5 * ROW;
-        let mut letter = text(&letter.to_string(), (left, first), NAME + 2, TextAnchor::Start);
-        if let Primitive::Text { bold, .. } = &mut letter {
-            *bold = true;
+        let letter = text(&letter.to_string(), (left, first), NAME + 2, Anchor::Start);
+        let mut parts = vec![letter.set("font-weight", "bold").into()];
+        if !self.title.is_empty() {
+            parts.push(text(self.title, (left + LETTER, first), NAME, Anchor::Start).into());
         }
-        let title = text(self.title, (left + LETTER, first), NAME, TextAnchor::Start);
-        let mut parts = vec![letter, title];
         for &((label, color, dashed), (x, y)) in &self.entries {
             let (x, y) = (left + x, top + y);
             let (width, dashes) = if dashed { (1.0, Some("5 4")) } else { (2.0, None) };
-            parts.push(line(vec![(x, y), (x + 18.0, y)], color, width, dashes));
-            parts.push(text(label, (x + SAMPLE, y), NUMBER, TextAnchor::Start));
+            parts.push(line([(x, y), (x + 18.0, y)], color, width, dashes));
+            parts.push(text(label, (x + SAMPLE, y), NUMBER, Anchor::Start).into());
         }
         parts
     }

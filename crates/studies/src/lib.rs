@@ -59,9 +59,11 @@ pub mod report;
 pub mod table;
 
 mod axis;
+mod frame;
 mod globe;
 mod header;
 mod log_log;
+mod marker;
 mod panel;
 mod panels;
 mod student;

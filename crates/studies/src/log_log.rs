@@ -2,24 +2,26 @@
 
 use std::path::PathBuf;
 
-use kuva::plot::{LineStyle, scatter::MarkerShape};
-use kuva::prelude::{LegendEntry, LegendPosition, LegendShape, LinePlot, Plot, ScatterPlot};
-use kuva::render::annotations::TextAnnotation;
-use kuva::render::layout::ComputedLayout;
-use kuva::render::render::render_multiple;
+use svg::node::element::Element;
 
-use crate::{
-    axis::{Axis, Room, layout, room_left},
-    order::Order,
-    plot::{self, GREY, INK, NUMBER, PlotError, color},
-};
+use crate::axis::Axis;
+use crate::frame::{Frame, Room};
+use crate::marker::marker;
+use crate::order::Order;
+use crate::plot::{self, Anchor, At, GREY, NUMBER, PlotError, color, length, line, text};
 
 /// Width and height of the frame, and the room for the title above it and the name below it.
 const FRAME: (f64, f64) = (440.0, 360.0);
 const TOP: f64 = 40.0;
 const BELOW: f64 = 46.0;
-/// Height of a row of the legend.
-const ROW: f64 = 18.0;
+/// Height of a row of the legend, and room around it, before its labels, and between two problems.
+const ROW: f64 = 17.0;
+const AROUND: f64 = 15.0;
+const SAMPLE: f64 = 20.0;
+const GAP: f64 = 4.0;
+/// The size of a marker, and the width of a line.
+const MARKER: f64 = 3.6;
+const STROKE: f64 = 1.2;
 
 /// A figure of errors over step sizes, with the fitted [`Order`] of each series in the legend.
 ///
@@ -126,34 +128,43 @@ impl LogLog {
         let points = || self.series.iter().flat_map(|series| &series.points);
         let x = Axis::logarithmic(points().map(|p| p.0));
         let y = Axis::logarithmic(points().map(|p| p.1));
-        let mut plots = Vec::new();
-        let mut layout = layout(&x, &y)
-            .with_x_label(&self.horizontal)
-            .with_y_label(&self.vertical)
-            .with_legend_position(LegendPosition::OutsideRightTop)
-            .with_legend_box(false);
-        for &p in &self.guides {
-            let [start, corner, end] = self.guide_points(&x, &y, p);
-            let line = LinePlot::new().with_data([start, corner, end, start]).with_color(GREY);
-            plots.push(Plot::Line(line.with_stroke_width(1.0)));
-            let beside = (end.0 * x.fraction(0.025), (corner.1 * end.1).sqrt());
-            let label = TextAnnotation::new(p.to_string(), beside.0, beside.1);
-            layout = layout.with_annotation(label.with_color(INK).with_font_size(NUMBER));
-        }
-        self.series.iter().for_each(|series| series.plots(&x, &y, &mut plots));
-        for problem in self.series.chunk_by(|_, next| next.look.rank > 0) {
-            let entries = problem.iter().map(Series::legend).collect();
-            layout = layout.with_legend_group(&problem[0].label, entries);
-        }
-        let computed = ComputedLayout::from_layout(&layout);
-        let (left, right) = (room_left(&layout).ceil(), computed.margin_right.ceil());
-        let rows: usize = self.series.iter().map(|series| 2 - series.look.rank.min(1)).sum();
-        let below = BELOW.max(ROW * rows as f64 + 24.0 - FRAME.1);
+        let (legend, width, height) = self.legend((AROUND, TOP));
+        let left = Room::left_of(&y);
+        let below = BELOW.max(TOP + height + 8.0 - FRAME.1 - TOP);
+        let right = (width + AROUND).ceil();
         let room = Room { frame: FRAME, left, right, top: TOP, below };
-        layout.x_label_offset = (0.0, BELOW - below);
-        let mut sheet = plot::sheet(room.size(), &self.title, left + 0.5 * FRAME.0);
-        plot::place(&mut sheet, (0.0, 0.0), render_multiple(plots, room.around(layout)).elements);
-        Ok(plot::svg(&sheet))
+        let frame = Frame { room: &room, x, y };
+        let mut parts = frame.parts([&self.horizontal, &self.vertical]);
+        for &p in &self.guides {
+            let corners = self.guide_points(&frame, p);
+            parts.push(line([0, 1, 2, 0].map(|k| corners[k]), GREY, 1.0, None));
+            let beside = (corners[2].0 + 0.025 * FRAME.0, 0.5 * (corners[1].1 + corners[2].1));
+            parts.push(text(&p.to_string(), beside, NUMBER, Anchor::Middle).into());
+        }
+        parts.extend(self.series.iter().flat_map(|series| series.parts(&frame)));
+        let sheet = plot::sheet(room.size(), &self.title, left + 0.5 * FRAME.0);
+        let sheet = sheet.add(plot::placed((0.0, 0.0), parts));
+        Ok(sheet.add(plot::placed((left + FRAME.0, 0.0), legend)).to_string())
+    }
+
+    /// The legend with its upper left corner at a place, its width and its height.
+    fn legend(&self, (left, top): At) -> (Vec<Element>, f64, f64) {
+        let (mut parts, mut width, mut y) = (Vec::new(), 0.0_f64, top + 0.5 * ROW);
+        for problem in self.series.chunk_by(|_, next| next.look.rank > 0) {
+            let name = text(&problem[0].label, (left, y), NUMBER, Anchor::Start);
+            parts.push(name.set("font-weight", "bold").into());
+            // Bold letters are wider by a tenth.
+            width = width.max(1.1 * length(&problem[0].label, NUMBER));
+            for series in problem {
+                y += ROW;
+                let label = series.caption();
+                parts.push(series.sample((left + 0.4 * SAMPLE, y)));
+                parts.push(text(&label, (left + SAMPLE, y), NUMBER, Anchor::Start).into());
+                width = width.max(SAMPLE + length(&label, NUMBER));
+            }
+            y += ROW + GAP;
+        }
+        (parts, left + width, y - top - 0.5 * ROW)
     }
 
     /// Writes the figure to a file.
@@ -165,32 +176,27 @@ impl LogLog {
         plot::save(path.into(), &self.svg()?)
     }
 
-    /// A triangle of slope `p` to the lower right of the middle of the series it fits best, in readings of
-    /// the axes.
-    fn guide_points(&self, x: &Axis, y: &Axis, p: f64) -> [(f64, f64); 3] {
+    /// The corners of a triangle of slope `p`, to the lower right of the middle of the series that it fits best.
+    fn guide_points(&self, frame: &Frame<'_>, p: f64) -> [At; 3] {
         let misfit = |series: &&Series| (series.slope() - p).abs();
         let nearest = self.series.iter().min_by(|a, b| misfit(a).total_cmp(&misfit(b)));
         let (low, high) = nearest.map_or_else(Default::default, Series::middle);
-        let (right, down) = (x.fraction(0.025), y.fraction(-0.025));
-        let at = |(a, b)| (x.reading(a) * right, y.reading(b) * down);
+        let at = |point| {
+            let (x, y) = frame.at(point);
+            (x + 0.025 * FRAME.0, y + 0.025 * FRAME.1)
+        };
         let (start, end) = (at((low.0, high.1 * (low.0 / high.0).powf(p))), at(high));
         [start, (end.0, start.1), end]
     }
 }
 
 impl Look {
-    fn style(self) -> LineStyle {
+    fn dashes(self) -> Option<&'static str> {
         match self.rank {
-            0 => LineStyle::Solid,
-            1 => LineStyle::Custom("5 4".into()),
-            _ => LineStyle::Custom("0.5 4".into()),
+            0 => None,
+            1 => Some("5 4"),
+            _ => Some("0.5 4"),
         }
-    }
-
-    /// Shapes that differ, for those who cannot go by colour.
-    fn marker(self) -> MarkerShape {
-        use MarkerShape::{Circle, Diamond, Pentagon, Square, Triangle, TriangleDown};
-        [Circle, Square, Triangle, Diamond, Pentagon, TriangleDown][self.line % 6]
     }
 }
 
@@ -208,37 +214,33 @@ impl Series {
         self.order.as_ref().map_or(0.0, |order| order.slope)
     }
 
-    /// Its line, its markers, and the hollow markers of round-off, for `kuva`.
-    fn plots(&self, x: &Axis, y: &Axis, plots: &mut Vec<Plot>) {
-        let at = |(a, b): &(f64, f64)| (x.reading(*a), y.reading(*b));
-        let (color, style) = (color(self.look.line), self.look.style());
-        let line = LinePlot::new().with_data(self.points.iter().map(at)).with_color(color);
-        plots.push(Plot::Line(line.with_stroke_width(1.2).with_line_style(style)));
-        for round_off in [false, true] {
-            let given = self.given.iter().enumerate();
-            let chosen = given.filter(|(index, _)| self.is_round_off(*index) == round_off);
-            let markers = ScatterPlot::new()
-                .with_data(chosen.map(|(_, point)| at(point)))
-                .with_color(color)
-                .with_size(3.6)
-                .with_marker(self.look.marker())
-                .with_marker_stroke_width(1.2);
-            let opacity = if round_off { 0.0 } else { 1.0 };
-            plots.push(Plot::Scatter(markers.with_marker_opacity(opacity)));
-        }
+    /// Its line, its markers, and the hollow markers of round-off.
+    fn parts(&self, frame: &Frame<'_>) -> Vec<Element> {
+        let color = color(self.look.line);
+        let path = self.points.iter().map(|point| frame.at(*point));
+        let mut parts = vec![line(path, color, STROKE, self.look.dashes())];
+        parts.extend(self.given.iter().enumerate().map(|(index, point)| {
+            let filled = !self.is_round_off(index);
+            marker(self.look.line, frame.at(*point), MARKER, color, filled)
+        }));
+        parts
     }
 
-    /// The slope; for a rival with its name and its line.
-    fn legend(&self) -> LegendEntry {
+    /// The slope; for a rival after its name.
+    fn caption(&self) -> String {
         let order = self.order.as_ref();
         let slope =
             order.map_or_else(|| "no slope fitted".into(), |order| format!("slope {order}"));
-        let (color, dasharray) = (color(self.look.line).into(), self.look.style().dasharray());
-        let (label, shape) = match self.look.rank {
-            0 => (slope, LegendShape::Marker(self.look.marker())),
-            _ => (format!("{}, {slope}", self.label), LegendShape::Line),
-        };
-        LegendEntry { label, color, shape, dasharray }
+        if self.look.rank == 0 { slope } else { format!("{}, {slope}", self.label) }
+    }
+
+    /// A marker, or for a rival its line, around a place.
+    fn sample(&self, (x, y): At) -> Element {
+        let color = color(self.look.line);
+        match self.look.rank {
+            0 => marker(self.look.line, (x, y), MARKER, color, true),
+            _ => line([(x - 7.0, y), (x + 7.0, y)], color, STROKE, self.look.dashes()),
+        }
     }
 
     fn is_round_off(&self, index: usize) -> bool {
@@ -270,11 +272,15 @@ mod tests {
         assert!(svg.contains("slope 4.00 [4.00, 4.00]"));
         let order =
             Series::of("s".into(), &with_plateau(), Look { line: 0, rank: 0 }).order.unwrap();
-        let markers = |opacity: &str| {
+        let markers = |fill: &str| {
             let circles = svg.lines().filter(|line| line.contains("<circle"));
-            circles.filter(|line| line.contains(&format!("fill-opacity=\"{opacity}\""))).count()
+            circles.filter(|line| line.contains(&format!("fill=\"{fill}\""))).count()
         };
-        assert_eq!((markers("0"), markers("1")), (order.plateau.len(), order.used.len()));
+        // One more stands in the legend.
+        assert_eq!(
+            (markers("none"), markers(color(0))),
+            (order.plateau.len(), order.used.len() + 1)
+        );
         assert!(order.plateau.len() >= 4);
     }
 
@@ -292,8 +298,8 @@ mod tests {
         let svg = LogLog::new("t", "n", "name").series("s", points).svg().unwrap();
         let x = |text: &str| -> f64 {
             let line = svg.lines().find(|line| line.contains(&format!(">{text}<"))).unwrap();
-            let x = line.split('"').nth(1).unwrap();
-            x.parse().unwrap()
+            let x = &line[line.find(" x=\"").unwrap() + 4..];
+            x[..x.find('"').unwrap()].parse().unwrap()
         };
         let left_of_the_number = x("2×10⁴") - plot::length("2×10⁴", NUMBER);
         // The name is written upwards from its base line.

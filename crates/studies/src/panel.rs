@@ -1,17 +1,11 @@
 //! A pair of axes with lines on it.
 
-use kuva::plot::annotations::ReferenceLine;
-use kuva::prelude::{LinePlot, Plot, ScatterPlot};
-use kuva::render::{
-    layout::Layout,
-    render::{Primitive, render_multiple},
-};
+use svg::node::element::Element;
 
-use crate::{
-    axis::{Axis, Room, layout},
-    header::Header,
-    plot::{self, At, INK, NAME, PlotError, color, fitting},
-};
+use crate::axis::Axis;
+use crate::frame::{Frame, Room};
+use crate::header::Header;
+use crate::plot::{self, At, INK, PlotError, circle, color, line};
 
 /// A pair of axes with lines on it.
 #[derive(Clone, Debug)]
@@ -112,7 +106,8 @@ impl Panel {
         plot::check(&self.vertical, first.chain(levels), place, fits)
     }
 
-    fn axes(&self) -> (Axis, Axis) {
+    /// The axes of a frame of this size.
+    pub(crate) fn axes(&self, frame: At) -> [Axis; 2] {
         let points = || self.lines.iter().flat_map(|(_, points)| points);
         let levels = self.levels.iter().map(|(_, y)| *y);
         let x = points().map(|(x, _)| *x);
@@ -122,7 +117,8 @@ impl Panel {
             Some(_) => Axis::logarithmic(y),
             None => Axis::linear(y, 0.06, 5),
         };
-        (Axis::linear(x, if self.equal { 0.03 } else { 0.0 }, 5), vertical)
+        let axes = [Axis::linear(x, if self.equal { 0.03 } else { 0.0 }, 5), vertical];
+        if self.equal { Axis::equal(axes, frame) } else { axes }
     }
 
     pub(crate) fn header(&self, width: f64) -> Header<'_> {
@@ -146,49 +142,23 @@ impl Panel {
         labels
     }
 
-    /// The axes, their names and the levels, for `kuva`.
-    pub(crate) fn layout(&self, frame: At) -> Layout {
-        let (x, y) = self.axes();
-        let vertical = y.label(&self.vertical, &self.unit);
-        let mut layout = layout(&x, &y)
-            .with_x_label(x.label(&self.horizontal, ""))
-            .with_label_size(fitting(&vertical, NAME, frame.1 + 24.0))
-            .with_y_label(vertical);
-        for (_, level) in &self.levels {
-            let line = ReferenceLine::horizontal(y.reading(self.shown(*level)));
-            layout = layout.with_reference_line(line.with_color(INK).with_dasharray("5 4"));
-        }
-        layout.equal_aspect = self.equal;
-        if self.equal {
-            // The axis that `kuva` makes longer has room for the ticks of the other one, and few more.
-            let step = layout.x_tick_step.into_iter().chain(layout.y_tick_step).fold(0.0, f64::max);
-            (layout.x_tick_step, layout.y_tick_step) = (Some(2.0 * step), Some(2.0 * step));
-        }
-        layout
-    }
-
-    /// The lines, for `kuva`; a single point is a disc.
-    fn plots(&self, stretches: usize) -> Vec<Plot> {
-        let ((x, y), labels) = (self.axes(), self.labels());
-        let plot = |(label, points): &(String, Vec<At>)| {
+    /// The parts, with the upper left corner at the origin; a line of one point is a disc.
+    pub(crate) fn parts(&self, letter: char, room: &Room, stretches: usize) -> Vec<Element> {
+        let [x, y] = self.axes(room.frame);
+        let names = [x.label(&self.horizontal, ""), y.label(&self.vertical, &self.unit)];
+        let frame = Frame { room, x, y };
+        let mut parts = frame.parts([&names[0], &names[1]]);
+        parts.extend(self.levels.iter().map(|(_, y)| frame.level(self.shown(*y), INK)));
+        let labels = self.labels();
+        for (label, points) in &self.lines {
             let colour = color(labels.iter().position(|other| other == label).unwrap_or(0));
-            let shown = thinned(points, stretches);
-            let shown = shown.map(|(a, b)| (x.reading(a), y.reading(self.shown(b))));
-            if points.len() == 1 {
-                Plot::Scatter(ScatterPlot::new().with_data(shown).with_color(colour).with_size(4.0))
-            } else {
-                let line = LinePlot::new().with_data(shown).with_color(colour);
-                Plot::Line(line.with_stroke_width(1.4))
-            }
-        };
-        self.lines.iter().map(plot).collect()
-    }
-
-    /// The parts, with the upper left corner at the origin.
-    pub(crate) fn parts(&self, letter: char, room: &Room, stretches: usize) -> Vec<Primitive> {
-        let layout = room.around(self.layout(room.frame));
+            let mut places = thinned(points, stretches).map(|(a, b)| frame.at((a, self.shown(b))));
+            parts.push(match (places.next(), points.len()) {
+                (Some(place), 1) => circle(place, 4.0, colour, colour, 0.0),
+                (first, _) => line(first.into_iter().chain(places), colour, 1.4, None),
+            });
+        }
         let header = self.header(room.left + room.frame.0);
-        let mut parts = render_multiple(self.plots(stretches), layout).elements;
         parts.extend(header.parts(letter, (4.0, room.top - header.height)));
         parts
     }

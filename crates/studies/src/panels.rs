@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use crate::{
-    axis::{Room, room_left},
+    frame::Room,
     globe::Globe,
     panel::Panel,
     plot::{self, At, PlotError},
@@ -103,11 +103,8 @@ impl Panels {
         let (mut letters, mut x) = ('a'..='z', EDGE);
         for (globe, size) in self.globes.iter().zip(&globes) {
             let letter = letters.next().unwrap_or(' ');
-            plot::place(
-                &mut sheet,
-                (x, HEAD + 0.5 * (height - size.1)),
-                globe.parts(letter, *size),
-            );
+            let at = (x, HEAD + 0.5 * (height - size.1));
+            sheet = sheet.add(plot::placed(at, globe.parts(letter, *size)));
             x += size.0;
         }
         let lines: usize = self.panels.iter().map(|panel| panel.lines.len()).sum();
@@ -116,9 +113,9 @@ impl Panels {
             let parts = panel.parts(letters.next().unwrap_or(' '), &room, stretches);
             let (column, row) = ((index % columns) as f64, (index / columns) as f64);
             let y = HEAD + 0.5 * (height - grid.1) + row * cell.1;
-            plot::place(&mut sheet, (start + column * cell.0, y), parts);
+            sheet = sheet.add(plot::placed((start + column * cell.0, y), parts));
         }
-        Ok(plot::svg(&sheet))
+        Ok(sheet.to_string())
     }
 
     /// Writes the figure to a file.
@@ -132,8 +129,8 @@ impl Panels {
 
     /// The room of each panel: the same for all, so that their frames line up.
     fn room(&self, frame: At) -> Room {
-        let layouts = self.panels.iter().map(|panel| panel.layout(frame));
-        let left = layouts.map(|layout| room_left(&layout)).fold(0.0, f64::max).ceil();
+        let left = self.panels.iter().map(|panel| Room::left_of(&panel.axes(frame)[1]));
+        let left = left.fold(0.0, f64::max);
         let headers = self.panels.iter().map(|panel| panel.header(left + frame.0).height);
         let top = headers.fold(0.0, f64::max);
         Room { frame, left, right: RIGHT, top, below: BELOW }
@@ -152,8 +149,6 @@ impl Panels {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use kuva::render::layout::ComputedLayout;
-
     use crate::panel::thinned;
 
     fn wave(count: u32) -> Vec<(f64, f64)> {
@@ -179,12 +174,9 @@ mod tests {
             .map(|k| f64::from(k).to_radians())
             .map(|t| (3.0 + t.cos(), 5.0 + t.sin()))
             .collect();
-        let mut layout = Panel::new("y", "x").line("", circle).equal().layout((340.0, 210.0));
-        (layout.width, layout.height) = (Some(340.0), Some(210.0));
-        let layout = layout.with_force_margins(0.0, 0.0).with_force_margins_y(0.0, 0.0);
-        let axes = ComputedLayout::from_layout(&layout);
-        let (width, height) =
-            (axes.map_x(4.0) - axes.map_x(2.0), axes.map_y(4.0) - axes.map_y(6.0));
+        let [x, y] = Panel::new("y", "x").line("", circle).equal().axes((340.0, 210.0));
+        let width = 340.0 * (x.place(4.0) - x.place(2.0));
+        let height = 210.0 * (y.place(6.0) - y.place(4.0));
         assert!((width - height).abs() < 1e-9 && (150.0..210.0).contains(&height));
     }
 

@@ -1,13 +1,12 @@
 //! Figures as SVG: the same bytes for the same numbers.
 //!
 //! [`Panels`] draws lines over time and, beside them, curves on a sphere ([`Globe`]). [`LogLog`] draws
-//! convergence. Axes, grids, ticks, lines and markers are those of the crate `kuva`. The colours are those
-//! of Okabe and Ito (2008), which the colour-blind tell apart.
+//! convergence. The colours are those of Okabe and Ito (2008), which the colour-blind tell apart. The crate `svg`
+//! writes the elements.
 
 use std::{fs, io, path::PathBuf};
 
-use kuva::backend::svg::SvgBackend;
-use kuva::render::render::{PathData, Primitive, Scene, TextAnchor};
+use svg::node::element::{self, Element, Group, Rectangle};
 
 pub use crate::{globe::Globe, log_log::LogLog, panel::Panel, panels::Panels};
 
@@ -91,71 +90,92 @@ pub(crate) fn fitting(text: &str, size: u32, most: f64) -> u32 {
     (7..=size).rev().find(|&size| length(text, size) <= most).unwrap_or(7)
 }
 
+/// The end of a text, or its middle, that stands at its place.
+#[derive(Clone, Copy)]
+pub(crate) enum Anchor {
+    Start,
+    Middle,
+    End,
+}
+
 /// A line of text around a place, half of its height above it.
-pub(crate) fn text(content: &str, (x, y): At, size: u32, anchor: TextAnchor) -> Primitive {
-    let (content, y) = (content.to_owned(), y + 0.35 * f64::from(size));
-    Primitive::Text { x, y, content, size, anchor, rotate: None, bold: false, color: None }
+pub(crate) fn text(content: &str, at: At, size: u32, anchor: Anchor) -> element::Text {
+    baseline(content, (at.0, at.1 + 0.35 * f64::from(size)), size, anchor)
 }
 
-/// A line through places, perhaps dashed.
-pub(crate) fn line(points: Vec<At>, color: &str, width: f64, dashes: Option<&str>) -> Primitive {
-    Primitive::PolyLine {
-        points,
-        stroke: color.into(),
-        stroke_width: width,
-        stroke_dasharray: dashes.map(str::to_owned),
-    }
+/// A line of text that is written upwards, with its baseline at `x` and its middle at `y`.
+pub(crate) fn upwards(content: &str, (x, y): At, size: u32) -> element::Text {
+    let turn = format!("rotate(-90,{},{})", pixels(x), pixels(y));
+    baseline(content, (x, y), size, Anchor::Middle).set("transform", turn)
 }
 
-/// An empty sheet of this size with a title over `middle`.
-pub(crate) fn sheet((width, height): At, title: &str, middle: f64) -> Scene {
-    let mut sheet = Scene::new(width, height);
-    (sheet.background_color, sheet.text_color) = (Some("white".into()), Some(INK.into()));
-    sheet.font_family = Some("DejaVu Sans, Verdana, Liberation Sans, Arial, sans-serif".into());
-    let size = fitting(title, TITLE, 2.0 * middle - 16.0);
-    sheet.add(text(title, (middle, 20.0), size, TextAnchor::Middle));
-    sheet
-}
-
-/// Puts a picture on the sheet with its upper left corner at a place.
-pub(crate) fn place(sheet: &mut Scene, (x, y): At, picture: impl IntoIterator<Item = Primitive>) {
-    sheet.add(Primitive::GroupStart {
-        transform: Some(format!("translate({x:.1},{y:.1})")),
-        title: None,
-        extra_attrs: Some(r#"stroke-linejoin="round" stroke-linecap="round""#.into()),
-    });
-    // Clips have numbers that count all figures of a process, and every line is inside its frame.
-    let drawn = |part: &Primitive| match part {
-        Primitive::ClipStart { .. } | Primitive::ClipEnd => false,
-        Primitive::Text { content, .. } => !content.is_empty(),
-        _ => true,
+fn baseline(content: &str, (x, y): At, size: u32, anchor: Anchor) -> element::Text {
+    let anchor = match anchor {
+        Anchor::Start => "start",
+        Anchor::Middle => "middle",
+        Anchor::End => "end",
     };
-    picture.into_iter().filter(drawn).for_each(|part| sheet.add(compact(part)));
-    sheet.add(Primitive::GroupEnd);
+    let text = element::Text::new(content).set("x", pixels(x)).set("y", pixels(y));
+    text.set("font-size", size).set("text-anchor", anchor)
 }
 
-/// A line without the points that cannot be told from their neighbours, in hundredths of a pixel. The
-/// backend writes up to 17 digits.
-fn compact(part: Primitive) -> Primitive {
-    let Primitive::PolyLine { points, stroke, stroke_width, stroke_dasharray } = part else {
-        return part;
-    };
+/// A line through places, perhaps dashed, without the points that cannot be told from their neighbours.
+pub(crate) fn line(
+    points: impl IntoIterator<Item = At>,
+    color: &str,
+    width: f64,
+    dashes: Option<&str>,
+) -> Element {
+    let mut points = points.into_iter().peekable();
     let mut kept: Vec<At> = Vec::new();
-    for (k, &(x, y)) in points.iter().enumerate() {
+    while let Some((x, y)) = points.next() {
         let far = |&(a, b): &At| (x - a).hypot(y - b) >= GRAIN;
-        if k + 1 == points.len() || kept.last().is_none_or(far) {
+        if points.peek().is_none() || kept.last().is_none_or(far) {
             kept.push((x, y));
         }
     }
-    let path = kept.iter().map(|(x, y)| format!("{x:.2} {y:.2}")).collect::<Vec<_>>().join("L");
-    let d = format!("M{path}");
-    let (fill, opacity) = (None, None);
-    Primitive::Path(Box::new(PathData { d, fill, stroke, stroke_width, opacity, stroke_dasharray }))
+    let line = path(&kept, false).set("stroke", color).set("stroke-width", width);
+    let line = line.set("fill", "none");
+    if let Some(dashes) = dashes { line.set("stroke-dasharray", dashes) } else { line }.into()
 }
 
-/// The sheet as SVG, an element in each line.
-pub(crate) fn svg(sheet: &Scene) -> String {
-    SvgBackend::new().with_pretty(true).render_scene(sheet)
+/// A path through places, in hundredths of a pixel.
+pub(crate) fn path(points: &[At], closed: bool) -> element::Path {
+    let path: Vec<String> = points.iter().map(|(x, y)| format!("{x:.2} {y:.2}")).collect();
+    element::Path::new().set("d", format!("M{}{}", path.join("L"), if closed { "Z" } else { "" }))
+}
+
+/// A disc with its outline.
+pub(crate) fn circle((x, y): At, r: f64, inside: &str, outline: &str, width: f64) -> Element {
+    let circle = element::Circle::new().set("cx", pixels(x)).set("cy", pixels(y)).set("r", r);
+    circle.set("fill", inside).set("stroke", outline).set("stroke-width", width).into()
+}
+
+/// A length in hundredths of a pixel.
+fn pixels(x: f64) -> String {
+    let rounded = format!("{x:.2}");
+    rounded.trim_end_matches('0').trim_end_matches('.').to_owned()
+}
+
+/// An empty sheet of this size with a title over `middle`.
+pub(crate) fn sheet((width, height): At, title: &str, middle: f64) -> svg::Document {
+    let size = fitting(title, TITLE, 2.0 * middle - 16.0);
+    svg::Document::new()
+        .set("width", width)
+        .set("height", height)
+        .set("font-family", "DejaVu Sans, Verdana, Liberation Sans, Arial, sans-serif")
+        .set("fill", INK)
+        .add(Rectangle::new().set("width", "100%").set("height", "100%").set("fill", "white"))
+        .add(text(title, (middle, 20.0), size, Anchor::Middle))
+}
+
+/// A picture with its upper left corner at a place.
+pub(crate) fn placed((x, y): At, picture: impl IntoIterator<Item = Element>) -> Group {
+    let group = Group::new()
+        .set("transform", format!("translate({x:.1},{y:.1})"))
+        .set("stroke-linejoin", "round")
+        .set("stroke-linecap", "round");
+    picture.into_iter().fold(group, Group::add)
 }
 
 /// The file of a figure.

@@ -23,7 +23,7 @@ test:
 
 # what verification refuses, and that it accepts the models of the tests that build many, and of the examples
 verification: examples
-    cargo test --all-features --test verification --test problems --test laws --test second_law --test hard_corpus --test random_systems --test dissipations --test invariants --test equations --test errata --test euler_poincare --test metrics --test bad_input --test fuzz
+    cargo test --package metriplectic-tests --test verification --test problems --test laws --test second_law --test hard_corpus --test random_systems --test dissipations --test invariants --test equations --test errata --test euler_poincare --test metrics --test bad_input --test fuzz
 
 # build the documentation with rendered formulas, warnings are errors
 doc:
@@ -49,7 +49,7 @@ examples:
     for file in examples/*.rs; do
         example=$(basename "$file" .rs)
         echo "example $example"
-        cargo run --quiet --release --all-features --example "$example" -- --json > /dev/null
+        cargo run --quiet --release --example "$example" -- --json > /dev/null
     done
 
 # the slow studies, which `test` leaves out
@@ -58,24 +58,24 @@ study:
 
 # compare the bits of many runs with benches/golden, or write it with `--bless`: for this machine and compiler
 golden *flags:
-    {{ if flags == "--bless" { "BLESS=1" } else { "" } }} cargo bench --all-features --bench golden
+    {{ if flags == "--bless" { "BLESS=1" } else { "" } }} cargo bench --package metriplectic-benches --bench golden
 
 # random input without sense for ten minutes: a third of the seconds for each of six searches, two at a time
 fuzz seconds="600":
-    FUZZ_SECONDS=$(({{ seconds }} / 3)) cargo test --release --all-features --test fuzz -- --nocapture --test-threads 2
+    FUZZ_SECONDS=$(({{ seconds }} / 3)) cargo test --release --package metriplectic-tests --test fuzz -- --nocapture --test-threads 2
 
 # change the integrators and the dynamics in small ways, some thirty of 7900 in an hour, and list what four tests miss
 mutants shard="0/256": (need "cargo mutants --version" "cargo install cargo-mutants --locked")
     cargo mutants --package metriplectic-integrators --package metriplectic-dynamics \
         --shard {{ shard }} --sharding round-robin --all-features --output target --timeout 300 \
-        --test-package metriplectic --exclude-re 'impl (fmt::)?(Debug|Display)' \
-        --cargo-arg=--package=metriplectic \
+        --test-package metriplectic-tests --exclude-re 'impl (fmt::)?(Debug|Display)' \
+        --cargo-arg=--package=metriplectic-tests \
         --cargo-arg=--test=mutations --cargo-arg=--test=conservation \
         --cargo-arg=--test=explicit --cargo-arg=--test=collocation
 
 # time steps, and print the table of orders
 bench:
-    cargo bench
+    cargo bench --package metriplectic-benches
 
 # count the instructions of a step in each row with callgrind, against benches/step/snapshot.txt (±3 %)
 instructions *flags:
@@ -87,7 +87,7 @@ instructions *flags:
     elif ! command -v valgrind > /dev/null; then
         echo "valgrind is not installed: skipped"
     else
-        cargo bench --bench step -- --instructions {{ flags }}
+        cargo bench --package metriplectic-benches --bench step -- --instructions {{ flags }}
     fi
 
 # compare with other solvers, tables and docs/gallery/peers.svg: a package of its own, see docs/peers.md

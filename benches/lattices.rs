@@ -1,7 +1,7 @@
 //! The cost of a step of a lattice, as ratios in one run: over the number of sites, beside derivatives by hand, beside a
 //! step without the laws, and on two threads.
 //!
-//! `cargo bench --bench lattices` prints a table; `-- N ORDER STEPS` runs one case, for a profiler.
+//! `cargo bench -p metriplectic-benches --bench lattices` prints a table; `-- N ORDER STEPS` runs one case, for a profiler.
 
 #[path = "../tests/models/chain.rs"]
 mod chain;

@@ -94,9 +94,6 @@ pub mod prelude {
     pub use num_dual::DualNum;
 }
 
-#[cfg(doctest)]
-mod book;
-
 /// The programs of the README, compiled and run.
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]

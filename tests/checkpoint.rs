@@ -26,19 +26,15 @@ where
 
 /// A checkpoint that went through a file.
 fn through_a_file(checkpoint: &Checkpoint) -> Checkpoint {
-    if cfg!(feature = "serde") {
-        let text = serde_json::to_string(checkpoint).expect("it is written");
-        let read = serde_json::from_str(&text).expect("it is read");
-        assert_eq!(&read, checkpoint);
-        // Down to the sign of a zero.
-        assert_eq!(serde_json::to_string(&read).expect("it is written"), text);
-        // Reading it as a tree, as a program that adds a field of its own does, costs no digit.
-        let tree: serde_json::Value = serde_json::from_str(&text).expect("it is read");
-        assert_eq!(&serde_json::from_value::<Checkpoint>(tree).expect("it is read"), checkpoint);
-        read
-    } else {
-        checkpoint.clone()
-    }
+    let text = serde_json::to_string(checkpoint).expect("it is written");
+    let read = serde_json::from_str(&text).expect("it is read");
+    assert_eq!(&read, checkpoint);
+    // Down to the sign of a zero.
+    assert_eq!(serde_json::to_string(&read).expect("it is written"), text);
+    // Reading it as a tree, as a program that adds a field of its own does, costs no digit.
+    let tree: serde_json::Value = serde_json::from_str(&text).expect("it is read");
+    assert_eq!(&serde_json::from_value::<Checkpoint>(tree).expect("it is read"), checkpoint);
+    read
 }
 
 /// Puts a run down at several places and takes it up again.

@@ -255,18 +255,18 @@ fn a_number_stands_on_the_right_of_a_dual_number() {
 }
 
 /// The messages are part of the interface: the first lines say what to write instead.
-/// `TRYBUILD=overwrite cargo test --test doors` renews the snapshots.
+/// `TRYBUILD=overwrite cargo test -p metriplectic-tests --test doors` renews the snapshots.
 #[test]
 fn the_compiler_explains_what_is_not_a_field() {
     let cases = trybuild::TestCases::new();
-    cases.pass("tests/doors/a_closure_is_a_field.rs");
-    cases.pass("tests/doors/a_type_of_your_own_has_every_order.rs");
-    cases.compile_fail("tests/doors/bracket_*.rs");
-    cases.compile_fail("tests/doors/closure_*.rs");
-    cases.compile_fail("tests/doors/dissipation_*.rs");
-    cases.compile_fail("tests/doors/energy_*.rs");
-    cases.compile_fail("tests/doors/force_*.rs");
-    cases.compile_fail("tests/doors/matrix_*.rs");
+    cases.pass("doors/a_closure_is_a_field.rs");
+    cases.pass("doors/a_type_of_your_own_has_every_order.rs");
+    cases.compile_fail("doors/bracket_*.rs");
+    cases.compile_fail("doors/closure_*.rs");
+    cases.compile_fail("doors/dissipation_*.rs");
+    cases.compile_fail("doors/energy_*.rs");
+    cases.compile_fail("doors/force_*.rs");
+    cases.compile_fail("doors/matrix_*.rs");
 }
 
 /// The first line of a message without the paths of its types.
@@ -289,7 +289,7 @@ fn short(message: &str) -> String {
 fn every_message_is_a_heading_of_the_book() {
     let page = include_str!("../book/src/compiler_messages.md");
     let headings: Vec<&str> = page.lines().filter_map(|line| line.strip_prefix("## ")).collect();
-    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/doors");
+    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/doors");
     let mut messages = 0;
     for entry in std::fs::read_dir(folder).expect("the folder of the messages") {
         let path = entry.expect("a file").path();

@@ -28,7 +28,15 @@ fn program(name: &str) -> PathBuf {
         return beside;
     }
     let mut build = Command::new(env!("CARGO"));
-    build.args(["build", "--quiet", "--example", name, "--target-dir"]);
+    build.args([
+        "build",
+        "--quiet",
+        "--package",
+        "metriplectic",
+        "--example",
+        name,
+        "--target-dir",
+    ]);
     build.arg(folder.parent().expect("a profile is in the build folder"));
     build.args(["--release", "--all-features"]);
     assert!(build.status().expect("cargo starts").success(), "{name} is not built");
@@ -42,7 +50,7 @@ fn modified(path: &Path) -> Option<SystemTime> {
 /// When a source was changed last.
 fn newest_source() -> SystemTime {
     static NEWEST: LazyLock<SystemTime> = LazyLock::new(|| {
-        let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+        let root = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/.."));
         let mut folders = ["src", "crates", "examples"].map(|name| root.join(name)).to_vec();
         let mut newest = modified(&root.join("Cargo.toml")).expect("a manifest");
         while let Some(folder) = folders.pop() {
@@ -114,7 +122,7 @@ fn the_relaxing_rigid_body_draws_its_figure_and_writes_its_table() {
 
 #[test]
 fn every_example_of_a_run_reports_the_same_keys() {
-    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/examples");
+    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../examples");
     let files = std::fs::read_dir(folder).expect("the examples are there");
     let names = files.map(|file| file.expect("a file").path());
     let names = names.map(|path| path.file_stem().map(|name| name.to_string_lossy().into_owned()));

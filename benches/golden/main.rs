@@ -43,7 +43,7 @@ impl Study for Record {
 /// Compares a record with the one in `benches/golden`, or writes it.
 fn compare(name: &str, record: &BTreeMap<String, String>) {
     let text: String = record.iter().map(|(name, bits)| format!("{name}: {bits}\n")).collect();
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("benches/golden").join(name);
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("golden").join(name);
     if std::env::var_os("BLESS").is_some() {
         std::fs::write(&path, &text).expect("the record is written");
     }
@@ -65,12 +65,21 @@ fn main() {
 /// The final state of every example, with all digits.
 fn examples() -> BTreeMap<String, String> {
     let mut record = BTreeMap::new();
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples");
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../examples");
     for file in std::fs::read_dir(folder).expect("the folder of the examples") {
         let path = file.expect("an example").path();
         let name = path.file_stem().expect("a name").to_string_lossy().into_owned();
         let output = Command::new(env!("CARGO"))
-            .args(["run", "--quiet", "--release", "--all-features", "--example", &name])
+            .args([
+                "run",
+                "--quiet",
+                "--release",
+                "--all-features",
+                "--package",
+                "metriplectic",
+                "--example",
+                &name,
+            ])
             .args(["--", "--json"])
             .output()
             .expect("cargo runs");

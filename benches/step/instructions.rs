@@ -42,7 +42,7 @@ pub(crate) fn compare(rows: &[Row], bless: bool) {
         println!("valgrind is not installed: the instructions are not counted");
         return;
     }
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("benches/step/snapshot.txt");
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("step/snapshot.txt");
     let known: BTreeMap<String, f64> = std::fs::read_to_string(&path)
         .unwrap_or_default()
         .lines()

@@ -5,8 +5,8 @@
 //! analytic Jacobian in every step and the guess of a parabola; the library differentiates closures,
 //! and keeps its Jacobian and a guess of higher order.
 //!
-//! - `cargo bench --bench step` times every row;
-//! - `cargo bench --bench step -- --instructions` counts the instructions of a step in each row with
+//! - `cargo bench -p metriplectic-benches --bench step` times every row;
+//! - `cargo bench -p metriplectic-benches --bench step -- --instructions` counts the instructions of a step in each row with
 //!   callgrind, and compares them with `snapshot.txt`; `--bless` writes that file.
 //!
 //! `closure_metric` is the step from closures once more, with the canonical metric given by a closure

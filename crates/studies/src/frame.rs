@@ -10,8 +10,11 @@ const WIDTH: f64 = 0.8;
 /// The length of a tick, and the room between it and its number.
 const TICK: f64 = 4.0;
 const GAP: f64 = 3.0;
-/// The distance of the baseline of the vertical name from the edge, and of the horizontal name from the frame.
+/// The distance of the baseline of the vertical name from the edge.
 const NAME_LEFT: f64 = 15.0;
+/// The room between the vertical name and the numbers. Some fonts are wider than the estimate.
+const NAME_RIGHT: f64 = 14.0;
+/// The distance of the horizontal name from the frame.
 const NAME_BELOW: f64 = 32.0;
 
 /// The size of a frame, and the room around it.
@@ -32,7 +35,7 @@ impl Room {
     /// The room to the left of a frame: for the numbers along its axis, and their name.
     pub(crate) fn left_of(y: &Axis) -> f64 {
         let widest = y.ticks().iter().map(|(_, number)| length(number, NUMBER)).fold(0.0, f64::max);
-        (NAME_LEFT + 8.0 + widest + GAP + TICK).ceil()
+        (NAME_LEFT + NAME_RIGHT + widest + GAP + TICK).ceil()
     }
 }
 

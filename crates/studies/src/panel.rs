@@ -148,7 +148,6 @@ impl Panel {
         let names = [x.label(&self.horizontal, ""), y.label(&self.vertical, &self.unit)];
         let frame = Frame { room, x, y };
         let mut parts = frame.parts([&names[0], &names[1]]);
-        parts.extend(self.levels.iter().map(|(_, y)| frame.level(self.shown(*y), INK)));
         let labels = self.labels();
         for (label, points) in &self.lines {
             let colour = color(labels.iter().position(|other| other == label).unwrap_or(0));
@@ -158,6 +157,7 @@ impl Panel {
                 (first, _) => line(first.into_iter().chain(places), colour, 1.4, None),
             });
         }
+        parts.extend(self.levels.iter().map(|(_, y)| frame.level(self.shown(*y), INK)));
         let header = self.header(room.left + room.frame.0);
         parts.extend(header.parts(letter, (4.0, room.top - header.height)));
         parts

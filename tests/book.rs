@@ -1,5 +1,6 @@
 //! The programs of the book, compiled and run. The chapters are in `book/src`; `just book` builds
 //! their pages.
+#![cfg(doctest)]
 
 #[doc = include_str!("../book/src/introduction.md")]
 struct Introduction;

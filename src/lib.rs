@@ -70,7 +70,7 @@ pub mod prelude {
         ModelError, Nambu, Poisson, ProjectedDissipation, Scaled, SecondLaw, Symplectic, System,
         VectorField, Verify, Zero,
     };
-    pub use metriplectic_fields::{MatrixField, Real, Scalar, ScalarField};
+    pub use metriplectic_fields::{ErasedField, MatrixField, Real, Scalar, ScalarField};
     pub use metriplectic_integrators::{
         Attitude, AttitudeError, Certificate, Checkpoint, DormandPrince5, DormandPrince8, Ending,
         Error, Event, Gauss, Gonzalez, ItohAbe, MeanValue, Method, Newton, Observables, Radau,

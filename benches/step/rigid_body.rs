@@ -126,6 +126,7 @@ pub(crate) fn rows() -> Vec<Row> {
     let rows = vec![
         Row::new("step/rigid_body/closure", body().build().expect(WELL), start, h)
             .counted(&calls, counting, start, h),
+        Row::new("step/rigid_body/erased", body().build().expect(WELL).erased(), start, h),
         Row::new("step/rigid_body/typed", typed.build().expect(WELL), start, h),
         Row::new("step/rigid_body/analytic", analytic.build().expect(WELL), start, h),
         Row::by_hand("step/rigid_body/hand_coded", HandCoded::new(&INERTIA), start, h),

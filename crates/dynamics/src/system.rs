@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use metriplectic_fields::{Dimension, Scalar, ScalarField, Space};
+use metriplectic_fields::{Dimension, ErasedField, Scalar, ScalarField, Space};
 use metriplectic_manifolds::{Manifold, Riemannian};
 
 use crate::bracket::Bracket;
@@ -98,6 +98,48 @@ where
             return Err(BuildError::TooManyInvariants { count: L::COUNT, dimension: M::Dim::LEN });
         }
         Ok(Self { tensors, fields, second_law })
+    }
+}
+
+impl<M: Space, G, B, K, H, S, L> System<M, G, B, K, H, S, L> {
+    /// Moves energy and entropy behind pointers, so that systems with other closures have the same type.
+    ///
+    /// A `Vec` then holds several models, and a struct names the type of its system. Closures keep the bits of a run. Each of
+    /// their evaluations is a call through a pointer; [`ErasedField`] has the price. Metric, bracket, dissipation and
+    /// further invariants keep their types.
+    ///
+    /// ```
+    /// use metriplectic_dynamics::{BuildError, System, VectorField};
+    /// use metriplectic_fields::{ChartPoint, Real};
+    /// use metriplectic_manifolds::LieDual;
+    /// use nalgebra::{Vector3, vector};
+    ///
+    /// let round = System::on(LieDual::so3())
+    ///     .energy(|p: &Vector3<Real>| p.norm_squared() * 0.5)
+    ///     .entropy(|p: &Vector3<Real>| p.norm_squared())
+    ///     .build()?;
+    /// let long = System::on(LieDual::so3())
+    ///     .energy(|p: &Vector3<Real>| p.x * p.x * 0.5 + p.y * p.y + p.z * p.z)
+    ///     .entropy(|p: &Vector3<Real>| p.norm_squared() * 0.5)
+    ///     .build()?;
+    /// let bodies = vec![round.erased(), long.erased()];
+    /// let x = ChartPoint::<LieDual<3>>::centre(&vector![1.0, 2.0, 3.0]);
+    /// let speeds: Vec<f64> = bodies.iter().map(|body| body.velocity(&x).unwrap().norm()).collect();
+    /// assert!(speeds[0] < 1e-15 && speeds[1] > 1.0);
+    /// # Ok::<(), BuildError>(())
+    /// ```
+    pub fn erased(self) -> System<M, G, B, K, ErasedField<M>, ErasedField<M>, L>
+    where
+        H: ScalarField<M> + Send + Sync + 'static,
+        S: ScalarField<M> + Send + Sync + 'static,
+    {
+        let Fields { energy, entropy, invariants } = self.fields;
+        let [energy, entropy] = [ErasedField::new(energy), ErasedField::new(entropy)];
+        System {
+            tensors: self.tensors,
+            fields: Fields { energy, entropy, invariants },
+            second_law: self.second_law,
+        }
     }
 }
 

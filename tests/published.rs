@@ -1,0 +1,238 @@
+//! Problems that papers publish with parameters and figures, to the digits of independent references.
+//!
+//! The references were computed by SciPy's DOP853, and by its Radau or LSODA; the digits given are those on which two
+//! methods agree.
+
+#[path = "models/stages.rs"]
+mod stages;
+
+use metriplectic::prelude::*;
+use metriplectic_studies::{Order, scientific};
+use stages::{GAUSS, RADAU};
+
+type Point<Y> = <<Y as Metriplectic>::Manifold as metriplectic::fields::Space>::Point<f64>;
+
+/// The states at these times, by a method of order 8.
+fn by_order_8<Y: Metriplectic, const N: usize>(
+    system: &Y,
+    start: &Point<Y>,
+    times: [f64; N],
+) -> [State<Y::Manifold>; N] {
+    let span = Span::until(times[N - 1]).tolerance(1e-13).output_at(times);
+    let run = DormandPrince8.run(system, start.clone(), span).expect("the run is taken");
+    let certificate = run.certificate();
+    assert!(certificate.keeps_energy() && certificate.keeps_entropy(), "{certificate}");
+    times.map(|t| {
+        let found = run.iter().find(|state| state.time.to_bits() == t.to_bits());
+        found.expect("there is an output").clone()
+    })
+}
+
+/// The order of the midpoint rule, fitted to its errors over `time`.
+fn order<Y: Metriplectic>(
+    system: &Y,
+    start: &Point<Y>,
+    time: f64,
+    steps: [usize; 4],
+    error: impl Fn(&Point<Y>) -> f64,
+) -> Order
+where
+    WeylMidpoint: Retraction<Y::Manifold, Y::Metric>,
+{
+    let sizes = steps.map(|n| time / n as f64);
+    let errors = steps.map(|n| {
+        let run = WeylMidpoint.run(system, start.clone(), Span::steps(time / n as f64, n));
+        error(&run.expect("the run is taken").last().point)
+    });
+    let order = Order::fit(&sizes, &errors).expect("the errors follow a power law");
+    println!("order {order} from {:?}", errors.map(scientific));
+    order
+}
+
+/// Gruber, Gunzburger, Ju and Wang (2021), arXiv:2110.03442: `(q, p, S₁, S₂)` with
+/// `H = p²/2 + (e^{S₁}/q)^{2/3} + (e^{S₂}/(2 − q))^{2/3}` and heat conduction `g = 8`.
+fn entropy_containers() -> impl Metriplectic<Manifold = Euclidean<4>, Metric = Canonical> {
+    let conduction = |_: &Vector4<Real>, w: &Vector4<Real>| {
+        // K = g b bᵀ/(T₁T₂)², b = (T₂, −T₁) on the entropies.
+        let b = Vector4::new(0.0.into(), 0.0.into(), w.w, -w.z);
+        b * b.transpose() * ((w.z * w.w).powi(-2) * 8.0)
+    };
+    let canonical =
+        matrix![0.0, 1.0, 0.0, 0.0; -1.0, 0.0, 0.0, 0.0; 0.0, 0.0, 0.0, 0.0; 0.0, 0.0, 0.0, 0.0];
+    System::on(Euclidean::<4>)
+        .bracket(Poisson::constant(canonical).expect("it is skew"))
+        .dissipation(FieldDissipation(conduction))
+        .energy(|x: &Vector4<Real>| {
+            let gas = |s: Real, volume: Real| ((s - volume.ln()) * (2.0 / 3.0)).exp();
+            x.y.powi(2) * 0.5 + gas(x.z, x.x) + gas(x.w, -x.x + 2.0)
+        })
+        .entropy(|x: &Vector4<Real>| x.z + x.w)
+        .build()
+        .expect("the containers are a system")
+}
+
+#[test]
+fn gas_containers_of_the_learning_literature() {
+    let (gas, start) = (entropy_containers(), vector![0.9, -0.4, 2.4, 2.0]);
+    assert!((gas.energy_at(&start) - 8.953_560_999_182_892).abs() < 1e-14);
+    let [early, late] = by_order_8(&gas, &start, [8.0, 32.0]);
+    let reference = [0.98124602254157, -0.08052345768301, 2.25535400537030, 2.23944457420009];
+    let early_error = (early.point - Vector4::from(reference)).amax();
+    let late_error = (late.point.xy() - vector![1.00007965014505, -0.00038766112526]).amax();
+    println!("order 8: {early_error:.1e} at t = 8, {late_error:.1e} at t = 32");
+    // The references have 14 decimals, and the tolerance is 1e-13.
+    assert!(early_error < 1e-11 && late_error < 1e-11, "{early_error:.1e} {late_error:.1e}");
+    assert!((late.entropy - 4.496712416726).abs() < 1e-11, "{}", late.entropy);
+    let fitted =
+        order(&gas, &start, 8.0, [400, 800, 1600, 3200], |x| (x - Vector4::from(reference)).amax());
+    assert!(fitted.agrees(2.0, 0.05), "{fitted}");
+}
+
+/// The Kovalevskaya top in (l, n), with its start.
+fn kovalevskaya() -> (impl Metriplectic<Manifold = LieDual<6>, Metric = Canonical>, Vector6<f64>) {
+    let top = System::on(LieDual::se3())
+        .energy(|x: &Vector6<Real>| (x[0] * x[0] + x[1] * x[1]) * 0.5 + x[2] * x[2] + x[3])
+        .casimir(|x: &Vector6<Real>| x[0] * x[3] + x[1] * x[4] + x[2] * x[5])
+        .casimir(|x: &Vector6<Real>| x[3] * x[3] + x[4] * x[4] + x[5] * x[5])
+        .momentum(|x: &Vector6<Real>| {
+            (x[0] * x[0] - x[1] * x[1] - x[3] * 2.0).powi(2) + (x[0] * x[1] - x[4]).powi(2) * 4.0
+        })
+        .build()
+        .expect("the top is a system");
+    (top, vector![2.0, 0.0, 0.2, 0.8, 0.6, 0.0])
+}
+
+/// Andrews and Farrell (2024), arXiv:2407.11904, §5.
+#[test]
+fn the_kovalevskaya_top_is_where_it_should_be() {
+    let (top, start) = kovalevskaya();
+    // (l, n) with the decimals that are sure.
+    let references = [
+        (
+            10.0,
+            [
+                1.479146708389,
+                -0.8791794875529,
+                0.7369728212838,
+                0.8164552825534,
+                0.03677054332477,
+                0.5762366690295,
+            ],
+            1e-10,
+        ),
+        (
+            100.0,
+            [
+                -0.004684270190564,
+                -1.943255179397,
+                1.291684080313,
+                -0.716579080654,
+                -0.644744933118,
+                0.2661172530812,
+            ],
+            1e-8,
+        ),
+        (300.0, [2.01227, -0.61786, 0.24925, 0.56236, -0.81483, -0.14071], 2e-5),
+    ];
+    let states = by_order_8(&top, &start, references.map(|(t, ..)| t));
+    for (state, (t, reference, sure)) in states.iter().zip(references) {
+        let error = (state.point - Vector6::from(reference)).amax();
+        println!("order 8 at t = {t}: {error:.1e}");
+        assert!(error < sure, "t = {t}: {error:.1e}");
+    }
+    let fitted = order(&top, &start, 10.0, [400, 800, 1600, 3200], |x| {
+        (x - Vector6::from(references[0].1)).amax()
+    });
+    assert!(fitted.agrees(2.0, 0.05), "{fitted}");
+}
+
+#[test]
+fn every_method_keeps_the_four_invariants_of_the_kovalevskaya_top() {
+    fn kept<M: Method<Y>, Y: Metriplectic>(name: &str, method: M, (top, start): (&Y, Point<Y>)) {
+        let run = method.run(top, start, Span::steps(0.1, 3000).at_most(2)).expect("3000 steps");
+        let certificate = run.certificate();
+        let worst = certificate.invariants.iter().map(|law| law.max_error);
+        let worst = worst.fold(certificate.max_energy_error, f64::max);
+        println!("{name}: {worst:.1e}");
+        assert_eq!(certificate.invariants.len(), 3, "{name}");
+        assert!(worst <= 1e-13, "{name}: {worst:.1e}");
+    }
+    let (top, start) = kovalevskaya();
+    kept("WeylMidpoint", Scheme::new(WeylMidpoint), (&top, start));
+    for method in GAUSS.into_iter().chain(RADAU) {
+        kept(&format!("{method:?}"), method, (&top, start));
+    }
+    kept("DormandPrince5", DormandPrince5, (&top, start));
+    kept("DormandPrince8", DormandPrince8, (&top, start));
+    kept("RungeKuttaChebyshev", RungeKuttaChebyshev, (&top, start));
+}
+
+/// Andrews and Farrell (2024): Kepler's problem, in `H`, the angular momentum and the Runge-Lenz vector. One component
+/// of this vector is a function of the others, so it is conserved without being listed.
+#[test]
+fn kepler_keeps_its_ellipse() {
+    let runge_lenz = |x: &Vector4<Real>| {
+        let (r, l) = (x.xy().norm_squared().sqrt(), x.x * x.w - x.y * x.z);
+        vector![x.w * l - x.x / r, -x.z * l - x.y / r]
+    };
+    let kepler = System::on(Euclidean::<4>)
+        .bracket(Symplectic)
+        .energy(|x: &Vector4<Real>| {
+            (x.z.powi(2) + x.w.powi(2)) * 0.5 - x.xy().norm_squared().sqrt().recip()
+        })
+        .momentum(|x: &Vector4<Real>| x.x * x.w - x.y * x.z)
+        .momentum(move |x: &Vector4<Real>| runge_lenz(x).y)
+        .build()
+        .expect("Kepler's problem is a system");
+    let start = vector![0.4, 0.0, 0.0, 2.0];
+    let reference =
+        [-0.1041832044341881, -0.694741715567954, 1.2361777626870742, 0.5646232510858523];
+    let [end] = by_order_8(&kepler, &start, [100.0]);
+    let error = (end.point - Vector4::from(reference)).amax();
+    println!("order 8: {error:.1e}");
+    assert!(error < 1e-9, "{error:.1e}");
+    // Their h = 0.1: the phase is off, the ellipse is not.
+    let run = WeylMidpoint.run(&kepler, start, Span::steps(0.1, 1000)).expect("1000 steps");
+    let vector = |x: &Vector4<f64>| runge_lenz(&x.cast()).map(|c| c.re);
+    let turned = run.iter().map(|state| (vector(&state.point) - vector(&start)).norm());
+    let turned = turned.fold(0.0, f64::max);
+    println!("h = 0.1: the Runge-Lenz vector is off by {turned:.1e}\n{}", run.certificate());
+    assert!(run.certificate().keeps_energy() && turned < 1e-12, "{turned:.1e}");
+}
+
+/// Gruber, Gunzburger, Ju and Wang (2021): 250 masses and one entropy, of which each site has a share.
+#[test]
+fn the_thermoelastic_rod() {
+    const MASSES: usize = 250;
+    let canonical = matrix![0.0, 1.0, 0.0; -1.0, 0.0, 0.0; 0.0, 0.0, 0.0];
+    let rod = Lattice::on(Graph::from_bonds(MASSES, []), Euclidean::<3>)
+        .bracket(Poisson::constant(canonical).expect("it is skew"))
+        .energy(|x: &Vector3<Real>| x.y.powi(2) * 0.5 + x.x.cos() + x.z)
+        .entropy(|x: &Vector3<Real>| x.z)
+        .site_onsager(|site| [Onsager { rate: 0.1, b: vector![0.0, -1.0, site.w.y] }])
+        .build()
+        .expect("the rod is a lattice");
+    let start = rod.points(|i| {
+        let x = i as f64 / (MASSES - 1) as f64;
+        vector![(0.65 * x).exp(), (1.0 - 0.1 * x * x).recip(), 1.9 / MASSES as f64]
+    });
+    let references = [
+        (8.0, [1.73114905294, 3.10385392000, 0.574655423218, 1.07008071085, 221.52983998683]),
+        (48.0, [3.09510856972, 3.28859007363, 0.191064493102, 0.00792347682, 421.5128086722]),
+    ];
+    let span = Span::until(48.0).tolerance(1e-12).output_at(references.map(|(t, _)| t));
+    let run = DormandPrince8.run(&rod, start, span).expect("the run is taken");
+    println!("{}", run.certificate());
+    assert!((run.states()[0].energy - 175.199_275_838_788).abs() < 1e-11);
+    assert!(run.certificate().keeps_energy() && run.certificate().keeps_entropy());
+    for (t, reference) in references {
+        let state = run.iter().find(|state| state.time.to_bits() == t.to_bits());
+        let state = state.expect("there is an output");
+        let (first, last) = (&state.point[0], &state.point[MASSES - 1]);
+        let values = [first.x, last.x, first.y, last.y, state.entropy];
+        for (value, reference) in values.into_iter().zip(reference) {
+            // The references have 10 to 12 significant digits, S has 10 decimals.
+            assert!((value - reference).abs() < 2e-10, "t = {t}: {value} {reference}");
+        }
+    }
+}

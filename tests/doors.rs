@@ -254,6 +254,29 @@ fn a_number_stands_on_the_right_of_a_dual_number() {
     assert_eq!(Real::from(3.0) * 0.5, Real::from(1.5));
 }
 
+#[test]
+fn erased_closures_have_one_type_and_the_bits_of_the_closures() {
+    let round = System::on(LieDual::so3())
+        .energy(|p: &Vector3<Real>| p.norm_squared() * 0.5)
+        .build()
+        .unwrap();
+    let long = System::on(LieDual::so3())
+        .energy(|p: &Vector3<Real>| p.x * p.x * 0.25 + p.y * p.y * 0.5 + p.z * p.z)
+        .build()
+        .unwrap();
+    let erased = vec![round.clone().erased(), long.clone().erased()];
+    let span = || Span::steps(0.1, 20);
+    let last = |run: metriplectic::integrators::Trajectory<LieDual<3>>| run.last().point;
+    let ends = [
+        last(WeylMidpoint.run(&round, START, span()).unwrap()),
+        last(WeylMidpoint.run(&long, START, span()).unwrap()),
+    ];
+    for (body, end) in erased.iter().zip(ends) {
+        let same = last(WeylMidpoint.run(body, START, span()).unwrap());
+        assert_eq!(same.map(f64::to_bits), end.map(f64::to_bits));
+    }
+}
+
 /// The messages are part of the interface: the first lines say what to write instead.
 /// `TRYBUILD=overwrite cargo test -p metriplectic-tests --test doors` renews the snapshots.
 #[test]

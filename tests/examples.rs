@@ -251,6 +251,51 @@ fn the_heavy_top_rises_until_it_sleeps() {
 }
 
 #[test]
+fn the_kovalevskaya_top_keeps_four_invariants_and_a_midpoint_rule_three() {
+    let output = example("kovalevskaya_top", &[]);
+    let text = String::from_utf8(output.stdout).expect("text");
+    // "K     off by 2.8e-14; by the plain midpoint rule 3.6e-1"
+    let errors = |name: &str| -> [f64; 2] {
+        let line = text.lines().find(|line| line.starts_with(name) && line.contains("off by"));
+        let line = line.unwrap_or_else(|| panic!("no line of {name} in {text}"));
+        let number = |part: &str| part.rsplit(' ').next().and_then(|n| n.parse().ok());
+        let parts = line.split_once(';').expect("two methods");
+        [parts.0, parts.1].map(|part| number(part).expect("a number"))
+    };
+    for name in ["H", "n·l", "|n|²", "K"] {
+        let [ours, plain] = errors(name);
+        assert!(ours <= 1e-13, "{text}");
+        // Published by Andrews and Farrell (2024): the midpoint rule loses K by 0.36, and keeps the others.
+        assert!(if name == "K" { (0.3..0.4).contains(&plain) } else { plain < 1e-13 }, "{text}");
+    }
+}
+
+#[test]
+fn the_thermoelastic_rod_meets_its_references() {
+    let report = json(&example("thermoelastic_rod", &["--json"]));
+    let ([energy, entropy, _], _) = certified(&report);
+    let errors: Vec<f64> = serde_json::from_value(report["errors"].clone()).expect("numbers");
+    assert!(energy <= 5e-15 && entropy > 0.0, "{report}");
+    // The references at t = 48 have ten digits, of an entry that has nearly come to rest.
+    assert!(errors.len() == 2 && errors[0] < 1e-10 && errors[1] < 5e-9, "{report}");
+}
+
+#[test]
+fn the_training_data_keep_both_laws_and_are_one_array() {
+    let arguments = ["--json", "--steps", "20"];
+    let report = json(&example("learning_data", &arguments));
+    let number = |key: &str| report[key].as_f64().expect("a number");
+    assert!(number("energy_error") < 5e-14 && number("momentum_error") < 5e-14, "{report}");
+    assert_eq!(report["entropy_falls"], 0, "{report}");
+    let folder = format!("{}/gallery", gallery("learning_data", &arguments));
+    let bytes =
+        std::fs::read(format!("{folder}/learning_data.npy")).expect("the example writes it");
+    // 50 runs of 21 states with ten numbers.
+    assert_eq!(bytes.len(), 128 + 50 * 21 * 10 * 8);
+    assert!(String::from_utf8_lossy(&bytes[..128]).contains("(1050, 10)"), "the shape");
+}
+
+#[test]
 fn the_forced_rigid_body_relaxes_as_by_the_metric_and_more_slowly_about_one_axis() {
     let report = json(&example("forced_rigid_body", &["--json"]));
     let ([energy, _, _], state) = certified(&report);

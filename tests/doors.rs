@@ -266,7 +266,7 @@ fn erased_closures_have_one_type_and_the_bits_of_the_closures() {
         .unwrap();
     let erased = vec![round.clone().erased(), long.clone().erased()];
     let span = || Span::steps(0.1, 20);
-    let last = |run: metriplectic::integrators::Trajectory<LieDual<3>>| run.last().point;
+    let last = |run: Trajectory<LieDual<3>>| run.last().point;
     let ends = [
         last(WeylMidpoint.run(&round, START, span()).unwrap()),
         last(WeylMidpoint.run(&long, START, span()).unwrap()),

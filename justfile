@@ -56,6 +56,13 @@ examples:
 study:
     cargo test --release --workspace -- --ignored
 
+# write docs/verification.md: what the tests measure of each guarantee
+report:
+    rm -rf target/report
+    METRIPLECTIC_REPORT={{ justfile_directory() / "target/report" }} cargo test --release --package metriplectic-tests --test published --test conservation --test second_law --test order --test invariants --test hard_corpus --test explicit --test collocation
+    METRIPLECTIC_REPORT={{ justfile_directory() / "target/report" }} cargo test --release --package metriplectic-tests --test long_runs -- --ignored
+    cargo run --quiet --release --package metriplectic-studies --bin report -- target/report docs/verification.md
+
 # compare the bits of many runs with benches/golden, or write it with `--bless`: for this machine and compiler
 golden *flags:
     {{ if flags == "--bless" { "BLESS=1" } else { "" } }} cargo bench --package metriplectic-benches --bench golden

@@ -5,7 +5,7 @@ mod models;
 use metriplectic::integrators::Residual;
 use metriplectic::manifolds::Tangent;
 use metriplectic::prelude::*;
-use metriplectic_studies::{Drift, Growth};
+use metriplectic_studies::{Claim, Drift, Growth, Guarantee, scientific};
 use models::{TUMBLING, UNSTABLE, free_body, half_square, kinetic, relaxing_body, top};
 
 const MILLION: usize = 1_000_000;
@@ -35,6 +35,12 @@ where
     (drift, run.certificate().clone())
 }
 
+/// The claim that such a run keeps the energy.
+fn energy_claim(problem: &str) -> Claim {
+    let claim = Claim::new(Guarantee::Energy, problem, "WeylMidpoint");
+    claim.against("H by hand, relative, 10⁶ steps of 0.1")
+}
+
 /// No drift: the worst of the last tenth is at most three times that of the first.
 fn is_flat(drift: &Drift) -> bool {
     drift.last_tenth_worst() <= 3.0 * drift.first_tenth_worst()
@@ -57,6 +63,10 @@ fn a_million_steps_of_the_relaxing_body_keep_the_energy() {
             entropy = next;
         });
     println!("{drift}\n{certificate}");
+    energy_claim("relaxing rigid body, so(3)*").record(scientific(drift.worst()), "5e-15");
+    let claim = Claim::new(Guarantee::Entropy, "relaxing rigid body, so(3)*", "WeylMidpoint");
+    let claim = claim.against("S by hand, 10⁶ steps of 0.1");
+    claim.record(format!("{falls} falls"), "0 falls");
     assert_eq!((falls, certificate.entropy_falls), (0, 0));
     assert!(drift.worst() <= 5e-15, "{drift}");
     assert!(is_flat(&drift), "{drift}");
@@ -68,6 +78,7 @@ fn a_million_steps_of_a_body_that_never_rests_keep_the_energy() {
     let inertia = vector![1.0, 2.0, 3.0];
     let (drift, certificate) = energy_drift(&free_body(), TUMBLING, by_hand(inertia), |_| ());
     println!("{drift}\n{certificate}");
+    energy_claim("free rigid body, so(3)*").record(scientific(drift.worst()), "5e-15");
     assert!(drift.worst() <= 5e-15, "{drift}");
     assert!(is_flat(&drift), "{drift}");
     assert_eq!(drift.growth(), Some(Growth::Flat), "{drift}");
@@ -152,6 +163,9 @@ fn steps_far_too_large_keep_the_energy() {
         worst = worst.max(certificate.max_energy_error);
     }
     println!("|H − H₀| ≤ {worst:.1e}");
+    Claim::new(Guarantee::Energy, "rigid bodies, steps of 0.1 to 1000", "WeylMidpoint")
+        .against("H at the start")
+        .record(scientific(worst), "16 ε");
     // Like H, its gradient and p are of size one.
     assert!(worst <= 16.0 * f64::EPSILON, "{worst:.1e}");
 }

@@ -4,8 +4,8 @@ mod models;
 
 use metriplectic::dynamics::BuildError;
 use metriplectic::prelude::*;
-use metriplectic_studies::Order;
 use metriplectic_studies::problems::flow;
+use metriplectic_studies::{Claim, Guarantee, Order, scientific};
 use models::{
     HEAVY, PENDULUM, State6, State10, alignment, angular_momentum, boxed, gamma_squared,
     heat_exchange, heavy, kinetic, pair, pendulum_bracket, pendulum_energy,
@@ -56,6 +56,14 @@ fn a_further_casimir_of_the_heavy_top_is_kept_at_second_order() {
     assert!(order(&system, &start, 2.0, 20).agrees(2.0, 0.05));
     let run = WeylMidpoint.run(&system, start, Span::steps(0.05, 20_000).at_most(2)).unwrap();
     println!("{}", run.certificate());
+    let off = run.certificate().invariants[0].max_error;
+    Claim::new(
+        Guarantee::Invariants,
+        "|Γ|² of the heavy top with friction, se(3)*",
+        "WeylMidpoint",
+    )
+    .against("its value at the start, 20 000 steps")
+    .record(scientific(off), "round-off of its terms");
     assert!(run.certificate().keeps_invariants() && run.certificate().keeps_entropy());
     assert!(run.certificate().entropy_gained > 0.1 && run.certificate().keeps_energy());
     // Without it friction changes |Γ|².
@@ -118,6 +126,13 @@ fn the_angular_momentum_of_a_pendulum_is_kept_at_second_order() {
     let certificate = run.certificate();
     println!("{certificate}");
     assert!(certificate.max_relative_energy_error() <= 5e-14 / 4.4, "{certificate}");
+    Claim::new(
+        Guarantee::Invariants,
+        "angular momentum of the thermoelastic pendulum",
+        "WeylMidpoint",
+    )
+    .against("its value at the start, T = 40")
+    .record(scientific(certificate.invariants[0].max_error), "5e-14");
     assert!(certificate.invariants[0].max_error <= 5e-14 && certificate.keeps_entropy());
     assert!((certificate.initial_energy - 4.435_059_592_089_027).abs() < 1e-14);
     // S(40) from the data of the model, off by the error of second order.

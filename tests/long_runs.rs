@@ -9,7 +9,7 @@ use std::time::Instant;
 
 use metriplectic::dynamics::system::Point;
 use metriplectic::prelude::*;
-use metriplectic_studies::{Drift, Growth, Table, scientific};
+use metriplectic_studies::{Claim, Drift, Growth, Guarantee, Table, scientific};
 use models::{TUMBLING, UNSTABLE, free_body, relaxing_body, top};
 
 /// What is watched over a run.
@@ -162,6 +162,21 @@ fn keeps_its_laws(run: &LongRun) {
 #[ignore = "a study of some minutes, run by `just study`"]
 fn ten_million_steps() {
     let all = runs(10_000_000);
+    for run in &all {
+        let [first, last] = [run.energy.first_tenth_worst(), run.energy.last_tenth_worst()];
+        let growth = run.energy.growth().map_or_else(|| "?".into(), |growth| growth.to_string());
+        Claim::new(Guarantee::LongRuns, format!("{}, h = {}", run.name, run.h), "WeylMidpoint")
+            .against("H at the start, relative: worst of the first and of the last tenth")
+            .record(
+                format!(
+                    "{} → {}, {growth}; {} falls of S",
+                    scientific(first),
+                    scientific(last),
+                    run.certificate.entropy_falls
+                ),
+                "5e-15, last ≤ 3 × first, no fall",
+            );
+    }
     all.iter().for_each(keeps_its_laws);
     let [body, top, nambu, _, _, gas, rest] = &all;
     for run in [body, top, nambu, gas, rest] {

@@ -11,6 +11,7 @@
 //! | [`either`] | with which retraction and gradient? | [`Either`] and [`AnyGradient`], chosen at run time |
 //! | [`published`] | and by the scheme as published? | [`Compared`], [`problems::SecondLaws`] |
 //! | [`drift`] | does the error grow with time? | [`Drift`]: flat, a random walk or a linear drift, in constant memory |
+//! | [`claim`] | which test holds a guarantee, by which figure? | [`Claim`], and the report of all |
 //! | [`table`] | what does the study say, in rows? | [`Table`]: plain text and Markdown |
 //! | [`plot`] | what does it look like? | [`Panels`] of lines, with a [`Globe`] beside them, and [`LogLog`]: SVG, the same bytes every time |
 //! | [`example`] | what surrounds the model of an example? | [`Example`]: options, progress and the run; [`Record`]: its states |
@@ -45,6 +46,7 @@
 //! # Ok::<(), metriplectic_studies::OrderError>(())
 //! ```
 
+pub mod claim;
 pub mod convergence;
 pub mod drift;
 pub mod either;
@@ -68,6 +70,7 @@ mod panel;
 mod panels;
 mod student;
 
+pub use claim::{Claim, Guarantee};
 pub use convergence::Convergence;
 pub use drift::{Drift, Growth, Slope};
 pub use either::{AnyGradient, Either};

@@ -301,7 +301,7 @@ mod tests {
             let x = &line[line.find(" x=\"").unwrap() + 4..];
             x[..x.find('"').unwrap()].parse().unwrap()
         };
-        let left_of_the_number = x("2×10⁴") - plot::length("2×10⁴", NUMBER);
+        let left_of_the_number = x("2×10⁴") - length("2×10⁴", NUMBER);
         // The name is written upwards from its base line.
         assert!(0.5 * f64::from(plot::NAME) < x("name") && x("name") < left_of_the_number, "{svg}");
     }

@@ -120,7 +120,8 @@ pub trait Method<F: Flow>: Sized {
 
     /// The state at the fraction `θ` of a step that was taken, from the memory after it; `None` if the method does
     /// not know it, or if the flow does not say what [lies between](Flow::displacement) two states. Where only the
-    /// method does not know it, and inside a step in [parts](Effort::splits), a run takes a step of size `θh`.
+    /// method does not know it, inside a step that is longer than a chart, and inside a step in
+    /// [parts](Effort::splits), a run takes a step of size `θh`.
     ///
     /// The default is the cubic of Hermite in the chart at the start, of order 3, moved
     /// [onto](Flow::onto) the laws: the energy and the further invariants that the run began with, and an

@@ -19,7 +19,7 @@ use crate::step_error::StepError;
 
 /// The iterator over the states of a run after its start, in constant memory; ended by an error, or
 /// where its schedule ends. With a step size alone it is endless. It yields the state after each step, or those at
-/// the [times asked for](crate::Watch::output_at) and the last one.
+/// the [times asked for](crate::Watch::output_at) and the last one. An endless iterator over such times ends with them.
 ///
 /// Made by [`Method::steps`] or [`Run::steps`](crate::Run::steps).
 pub struct Steps<'a, F: Flow, M: Method<F>> {
@@ -68,13 +68,14 @@ impl<'a, F: Flow, M: Method<F>> Steps<'a, F, M> {
         schedule: Schedule,
     ) -> Result<Self, RunError<F::Space>> {
         schedule.check()?;
+        let rule = Rule::of(&method, schedule.start);
+        schedule.check_tolerance(&rule)?;
         flow.check(&x0)?;
         flow.examine(&x0)?;
         let promises = method.promises(flow);
         let certificate = Certificate::start(flow, &x0, promises);
         let scales = Scales::at(flow, &x0, schedule.span());
         let Schedule { size, start, count, every, most, rest, watch } = schedule;
-        let rule = Rule::of(&method, start);
         let step_size = match size {
             Size::Fixed(h) => StepSize::Fixed(h),
             Size::Tolerance(adaptive) => {
@@ -96,7 +97,7 @@ impl<'a, F: Flow, M: Method<F>> Steps<'a, F, M> {
         let values = flow.laws(&x0);
         let (energy, entropy) = (values.energy, values.entropy);
         let state = State { step: 0, time: start, point: x0, energy, entropy };
-        let watching = Watching::new(watch, [start, progress.end()], &state)?;
+        let watching = Watching::new(watch, &progress, &state)?;
         let (h, in_parts) = (0.0, false);
         let before =
             StepBefore { state: state.clone(), values: values.clone(), entropy, h, in_parts };

@@ -119,7 +119,8 @@ impl Certificate {
     /// How the steps of an explicit method found the entropy, and what has set their size.
     fn projections(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let ProjectedSteps { targeted, free, held, stability } = self.projected_steps;
-        if self.projected_steps.all() > 0 {
+        // A step that hits the entropy of its production is the rule, and needs no line.
+        if free + held + self.falls_avoided > 0 {
             let falls = counted(self.falls_avoided, "fall", "falls");
             writeln!(
                 f,

@@ -412,12 +412,13 @@ fn a_run_from_rest_with_friction_goes_on() {
 }
 
 #[test]
-fn a_run_that_failed_goes_on_with_another_scheme() {
+fn a_run_that_failed_goes_on_with_other_options() {
     let body = relaxing_body();
     let span = Span::until(10.0).tolerance(1e-9).least_step(1e-2);
     let error = WeylMidpoint.run(&body, UNSTABLE, span).unwrap_err();
     let stopped = error.trajectory().expect("it had started");
-    let resumed = WeylMidpoint.resume(&body, stopped.checkpoint()).unwrap();
+    let other = Scheme { splits: 2, ..Scheme::new(WeylMidpoint) };
+    let resumed = other.resume(&body, stopped.checkpoint()).unwrap();
     assert_eq!(resumed.state(), stopped.last());
 }
 

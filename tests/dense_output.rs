@@ -222,22 +222,61 @@ fn the_states_inside_a_step_in_parts_are_those_of_the_motion() {
     assert!(error < 0.5 * exact, "{} instead of {exact}", event.state.time);
 }
 
+/// The attitude and the angular momentum of a body.
+type Turning = Product<Rotations, Euclidean<3>>;
+
+/// A free body with its attitude.
+fn turning(inertia: Vector3<f64>) -> impl Metriplectic<Manifold = Turning> {
+    System::on(Product(Rotations::bi_invariant(), Euclidean::<3>))
+        .bracket(Symplectic)
+        .energy(move |(_, p): &(Matrix3<Real>, Vector3<Real>)| models::kinetic(inertia)(p))
+        .build()
+        .expect("the parts make a system")
+}
+
+/// A body with the spin 8 about its third axis turns by more than a right angle in a step of 0.25.
+#[test]
+fn a_certificate_speaks_of_the_accuracy_of_a_run_that_is_off() {
+    let body = turning(vector![2.0, 2.0, 1.0]);
+    let start = (Matrix3::identity(), vector![0.5, 0.0, 8.0]);
+    let exact = DormandPrince8.run(&body, start, Span::until(10.0).tolerance(1e-12)).unwrap();
+    let mut silent = 0;
+    for (h, count) in [(2.0, 5), (0.25, 40), (0.1, 100), (0.01, 1000)] {
+        let mut check = |name: &str, run: Result<Trajectory<Turning>, RunError<Turning>>| {
+            let run = run.unwrap_or_else(|error| panic!("{name}: {error}"));
+            let off = (run.last().point.0 - exact.last().point.0).norm();
+            let (c, longest) = (run.certificate(), 8.0 * h > 0.5 * std::f64::consts::PI);
+            let line =
+                c.to_string().lines().find(|line| line.starts_with("accuracy:")).map(str::to_owned);
+            println!("{name}, h = {h}: off by {off:.1e}, {:?}: {line:?}", c.local_error);
+            assert!(line.is_some() || off < 1e-2, "{name}, h = {h}: off by {off:e}\n{c}");
+            silent += usize::from(line.is_none());
+            if longest && c.effort.splits > 0 {
+                assert_eq!(c.local_error, Some(f64::INFINITY), "{name}, h = {h}");
+            }
+        };
+        let span = || Span::steps(h, count).every(count);
+        check("midpoint", WeylMidpoint.run(&body, start, span()));
+        check("order 5", DormandPrince5.run(&body, start, span()));
+        check("order 8", DormandPrince8.run(&body, start, span()));
+        check("Gauss", Gauss::<4>::default().run(&body, start, span()));
+        check("Radau", Radau::<4>::default().run(&body, start, span()));
+    }
+    // The steps of 0.01 are fine with all of them.
+    assert!(silent >= 5, "{silent}");
+}
+
 /// A body that turns by 1.8 in a step, beyond its chart.
 #[test]
 fn the_states_inside_a_step_that_is_longer_than_a_chart_are_those_of_the_motion() {
-    type Space = Product<Rotations, Euclidean<3>>;
-    let body = System::on(Product(Rotations::bi_invariant(), Euclidean::<3>))
-        .bracket(Symplectic)
-        .energy(|(_, p): &(Matrix3<Real>, Vector3<Real>)| p.norm_squared() * 0.5)
-        .build()
-        .unwrap();
+    let body = turning(vector![1.0, 1.0, 1.0]);
     let start = (Matrix3::identity(), vector![0.0, 0.0, 1.0]);
     // sin φ = 0.98 twice in the step, and at neither of its ends.
     let (h, angle) = (1.8, 0.98_f64.asin());
     let span = Span::steps(h, 1)
         .output_every(0.45)
         .event("height", |(r, _): &(Matrix3<f64>, Vector3<f64>)| r.m21 - 0.98);
-    let check = |name: &str, bound: f64, run: Result<Trajectory<Space>, RunError<Space>>| {
+    let check = |name: &str, bound: f64, run: Result<Trajectory<Turning>, RunError<Turning>>| {
         let run = run.unwrap_or_else(|error| panic!("{name}: {error}"));
         let angles = run.iter().map(|State { time, point: (r, _), .. }| {
             (r.m11 - time.cos()).abs().max((r.m21 - time.sin()).abs())

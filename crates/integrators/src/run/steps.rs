@@ -10,6 +10,7 @@ use crate::method::{
 use crate::round_off::bound::{ROUNDED, breaks_first_law};
 use crate::run::certificate::{Certificate, StepOf};
 use crate::run::controller::{Controller, Rule, StepSize};
+use crate::run::dense::says_between;
 use crate::run::output::{StepBefore, Watching};
 use crate::run::progress::Progress;
 use crate::run::scales::{Scales, larger, relative};
@@ -249,7 +250,12 @@ impl<'a, F: Flow, M: Method<F>> Steps<'a, F, M> {
         };
         let reference = self.reference(self.entropy);
         let step = StepEnds { x, end, h, values: [&self.values, values], reference: &reference };
-        let Some(error) = self.method.error(flow, &step, &self.memory, norm) else { return };
+        let Some(error) = self.method.error(flow, &step, &self.memory, norm) else {
+            if says_between(flow, x) && flow.displacement(x, end).is_none() {
+                self.certificate.note_local_error(f64::INFINITY, LimitingSites::default());
+            }
+            return;
+        };
         let sites = if self.has_sites() {
             let allowed = match &self.progress.step_size {
                 StepSize::Adaptive(controller) => {

@@ -210,8 +210,8 @@ fn a_full_disk_behind_a_buffer_does_not_have_the_rows_of_the_buffer() {
     let rows: Vec<_> = (0..201).map(|step| state(step, 0.1 * step as f64)).collect();
     rows.iter().for_each(|row| csv.write(row).unwrap());
     let lines = csv.finish().unwrap();
-    for (room, capacity) in [4, 1000, 1001, 2000, 3000].into_iter().zip([1 << 16, 100, 4096, 8, 1])
-    {
+    let rooms = [4, lines.len() / 3, lines.len() / 3 + 1, lines.len() / 2, lines.len() - 1];
+    for (room, capacity) in rooms.into_iter().zip([1 << 16, 100, 4096, 8, 1]) {
         let buffer = io::BufWriter::with_capacity(capacity, Disk { room, ..Disk::default() });
         let mut table = watch.csv(buffer).unwrap();
         let mut most = 0;

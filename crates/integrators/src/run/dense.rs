@@ -40,7 +40,7 @@ impl<V: Vector> Hermite<V> {
     }
 }
 
-/// Whether a flow says what lies between two states, where they are near each other.
+/// Returns whether a flow says what lies between two states that are near each other.
 pub(crate) fn says_between<F: Flow>(flow: &F, x: &Element<F>) -> bool {
     flow.displacement(x, x).is_some()
 }

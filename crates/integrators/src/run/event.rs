@@ -185,7 +185,7 @@ impl<M: StateSpace> Events<M> {
         self.0.is_empty()
     }
 
-    /// Whether one of them ends the run.
+    /// Returns whether one of them ends the run.
     pub(crate) fn may_stop(&self) -> bool {
         self.0.iter().any(|watched| watched.request.stops)
     }

@@ -38,7 +38,7 @@ pub(super) struct Watching<M: StateSpace> {
 }
 
 impl<M: StateSpace> Watching<M> {
-    /// What is asked for in a run that is at this state; nothing if nothing is.
+    /// Takes up the requests of a run that is at this state; `None` if there are none.
     pub(super) fn new<V>(
         requests: Requests,
         progress: &Progress<V>,
@@ -61,7 +61,7 @@ impl<M: StateSpace> Watching<M> {
         !self.outputs.is_empty() || !self.queue.is_empty()
     }
 
-    /// Whether nothing more will be found, however long the run goes on.
+    /// Returns whether no output is left, and no event ends the run.
     pub(super) fn is_over(&self) -> bool {
         self.queue.is_empty()
             && !self.outputs.is_empty()

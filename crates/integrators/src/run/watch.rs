@@ -219,7 +219,7 @@ impl Requests {
         self.times.is_some() || self.interval.is_some()
     }
 
-    /// Whether a run from `start` to `end` has these outputs, and sees them apart up to `seen`.
+    /// Accepts outputs of a run from `start` to `end` that have different times up to `seen`.
     pub(crate) fn check(&self, [start, end]: [f64; 2], seen: f64) -> Result<(), SpanError> {
         let last = end + rounding(start, end);
         let outside = |time: &&f64| !(**time >= start && **time <= last && time.is_finite());
@@ -287,7 +287,7 @@ impl Outputs {
         self.times.is_none() && self.interval.is_none()
     }
 
-    /// Whether no output is to come, however long the run goes on.
+    /// Returns whether no output is left, however long the run goes on.
     pub(crate) fn are_over(&self) -> bool {
         self.index == self.listed().len() && self.interval.is_none()
     }

@@ -14,7 +14,7 @@ const UNRESOLVED: f64 = 0.1;
 /// The local error from which on a hundred steps may be off by what a picture shows: about 27 steps of the midpoint rule
 /// in a turn.
 const COARSE: f64 = 1e-3;
-/// The same inside a step with stages, whose end is more accurate.
+/// This bound inside a step with stages, whose end is more accurate.
 const COARSE_INSIDE: f64 = 1e-2;
 
 impl fmt::Display for Certificate {
@@ -113,7 +113,7 @@ impl fmt::Display for Certificate {
 }
 
 impl Certificate {
-    /// Whether the steps are short enough for the motion.
+    /// Says how coarse the steps are for the motion.
     fn accuracy(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let has_stages = self.stages.is_some();
         match self.local_error {

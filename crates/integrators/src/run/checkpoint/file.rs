@@ -95,7 +95,11 @@ impl<'de> Visitor<'de> for File {
                 list.next_element()?.ok_or_else(|| missing(1))?,
                 list.next_element()?.ok_or_else(|| missing(2))?,
             ),
-            found => Ok(of_another_version(found)),
+            found => {
+                // A format that says where each field ends wants to have seen all of them; another one cannot skip.
+                while matches!(list.next_element::<IgnoredAny>(), Ok(Some(_))) {}
+                Ok(of_another_version(found))
+            }
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Whether a checkpoint belongs to the method and to the system that are to resume it.
+//! Checks that a checkpoint belongs to the method and to the system that are to resume it.
 
 use super::{Exact, ResumeError, SavedRun};
 use crate::method::{Element, Flow, Vector as _};

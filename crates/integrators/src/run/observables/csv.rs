@@ -17,7 +17,7 @@ pub struct Csv<'a, M: StateSpace, W: Write> {
     pub(super) lines: String,
     /// The rows that were given to it.
     pub(super) rows: usize,
-    /// Those of them that are in the file: what it was written to has been flushed since.
+    /// The rows that are in the file: it has been flushed since.
     pub(super) confirmed: usize,
 }
 

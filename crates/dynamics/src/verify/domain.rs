@@ -52,7 +52,7 @@ pub(super) fn has_digits<M: Manifold>(
     let underflows = if size > 0.0 {
         size * f64::EPSILON < f64::MIN_POSITIVE
     } else {
-        (0..M::Dim::LEN).any(is_lost)
+        size <= 0.0 && (0..M::Dim::LEN).any(is_lost)
     };
     if underflows {
         return Err(ModelError::Underflow { field, size, point: M::entries(x0) });

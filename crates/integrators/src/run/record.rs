@@ -60,8 +60,7 @@ impl<F: Flow, M: Method<F>> Steps<'_, F, M> {
 
     /// Returns whether a run without an end has found all that is yielded in place of its steps.
     fn waits_for_nothing(&self) -> bool {
-        let is_over = |watching: &Box<Watching<F::Space>>| watching.is_over();
-        self.watching.as_ref().is_some_and(is_over)
+        self.watching.as_deref().is_some_and(Watching::is_over)
             && self.progress.end().is_infinite()
             && self.progress.rest.is_none()
     }

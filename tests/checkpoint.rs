@@ -252,7 +252,7 @@ fn a_damaged_checkpoint_is_refused() {
         ["", "/run", "/run/balance", "/run/progress", "/run/progress/step_size/Adaptive/pace"]
     {
         let unread = changed(&checkpoint, |tree| {
-            tree.pointer_mut(path).expect(path)["enegry"] = "1.0".into()
+            tree.pointer_mut(path).expect(path)["enegry"] = "1.0".into();
         });
         assert!(unread.is_err(), "{path}");
     }
@@ -275,7 +275,7 @@ fn a_checkpoint_of_another_method_is_refused_and_one_with_other_options_is_not()
         other => panic!("{name}: {other:?}"),
     };
     refused(Exponential.resume(&body, &checkpoint).err(), "Scheme<Exponential, Gonzalez>");
-    let other = Scheme::new(WeylMidpoint).gradient(MeanValue::default());
+    let other = Scheme::new(WeylMidpoint).gradient(MeanValue);
     refused(other.resume(&body, &checkpoint).err(), "Scheme<WeylMidpoint, MeanValue>");
     refused(DormandPrince8.resume(&body, &checkpoint).err(), "DormandPrince8");
     refused(DormandPrince5.resume(&body, &checkpoint).err(), "DormandPrince5");

@@ -6,8 +6,9 @@
 //!
 //! The Poisson tensor `Π` generates the reversible flow of the energy `H`. The positive semidefinite tensor `K`,
 //! built from a Riemannian metric, produces the entropy `S` and conserves `H`. You write `H`, `S` and, if it is not the
-//! canonical one, the metric. Dual numbers differentiate them. Every step conserves `H` to round-off, and `S` never
-//! decreases.
+//! canonical one, the metric. Dual numbers differentiate them. Every step conserves `H` to round-off, and `S` does not
+//! decrease by more than round-off. It may decrease if it is no Casimir of the bracket, for which you ask by
+//! [`SecondLaw::Published`](dynamics::SecondLaw::Published).
 //!
 //! ```
 //! use metriplectic::prelude::*;
@@ -28,7 +29,18 @@
 //! }
 //! ```
 //!
-//! The guides go on from here:
+//! Each method conserves both laws:
+//!
+//! | method | order | take it for |
+//! |---|---|---|
+//! | [`DormandPrince8`](integrators::DormandPrince8), [`DormandPrince5`](integrators::DormandPrince5) | 8, 5 | smooth motions, with steps that follow a tolerance |
+//! | [`WeylMidpoint`](manifolds::WeylMidpoint) and the other [schemes](integrators::Scheme) of the paper | 2 | long runs in steps of one size |
+//! | [`Gauss`](integrators::Gauss) of 1 to 4 stages | 2 to 8 | the same with a smaller error; reversible in time |
+//! | [`Radau`](integrators::Radau) of 2 to 4 stages | 3 to 7 | friction that is much faster than a step |
+//! | [`RungeKuttaChebyshev`](integrators::RungeKuttaChebyshev) | 2 | stiff friction or conduction in many variables |
+//!
+//! The book in the folder `book/` of the repository (`mdbook serve book` shows it) is the introduction. It explains
+//! the methods, units, tolerances and each line of the certificate. The guides go on from here:
 //!
 //! - [choose](guide::choosing) bracket, dissipation and scheme;
 //! - write [your own metric](guide::your_own_metric), or [your own manifold](guide::your_own_manifold) in sixty lines;

@@ -2,7 +2,7 @@
 
 mod models;
 
-use metriplectic::integrators::{Laws, Schedule, SpanError, StepError, StepStart};
+use metriplectic::integrators::{Flow, Laws, Schedule, SpanError, StepError, StepStart};
 use metriplectic::prelude::*;
 use metriplectic_studies::Order;
 use models::{TUMBLING, UNSTABLE, free_body, half_square, relaxing_body, top};
@@ -275,6 +275,45 @@ fn a_motion_that_ends_is_an_error_with_what_there_is() {
     }
 }
 
+/// Asks for tolerances in and out of the bounds of a method.
+fn has_bounds<F: Flow<Space = LieDual<3>>>(
+    body: &F,
+    method: impl Method<F> + Copy,
+    [least, largest]: [f64; 2],
+) {
+    let run = |tolerance| {
+        let span = Span::until(1.0).tolerance(tolerance);
+        method.steps(body, TUMBLING, span).map(|steps| steps.ending())
+    };
+    let below = [0.0, -0.0, -1e-6, f64::NEG_INFINITY, 0.9 * least, 1e-300];
+    for asked in below.into_iter().chain([f64::NAN, f64::INFINITY, 1.1, 1e300]) {
+        let error = run(asked).expect_err("it is out of bounds");
+        let RunError::Span(SpanError::Tolerance { tolerance, least: a, largest: b }) = error else {
+            panic!("{error}");
+        };
+        assert_eq!(tolerance.to_bits(), asked.to_bits());
+        assert_eq!([a, b].map(f64::to_bits), [least, largest].map(f64::to_bits), "{error}");
+        assert!(error.to_string().contains(&format!("from {least:.0e} to {largest}")), "{error}");
+    }
+    assert!(run(least).is_ok() && run(largest).is_ok());
+}
+
+#[test]
+fn a_tolerance_has_the_bounds_of_its_method() {
+    let body = free_body();
+    // The table of `Until::tolerance`.
+    has_bounds(&body, Scheme::new(WeylMidpoint), [1e-10, 1.0]);
+    has_bounds(&body, Scheme::new(Exponential), [1e-10, 1.0]);
+    has_bounds(&body, RungeKuttaChebyshev, [1e-10, 1.0]);
+    has_bounds(&body, DormandPrince5, [1e-15, 1.0]);
+    has_bounds(&body, DormandPrince8, [1e-15, 1.0]);
+    has_bounds(&body, Gauss::<1>::default(), [1e-15, 1.0]);
+    has_bounds(&body, Gauss::<2>::default(), [1e-15, 1.0]);
+    has_bounds(&body, Gauss::<4>::default(), [1e-15, 1.0]);
+    has_bounds(&body, Radau::<2>::default(), [1e-15, 1.0]);
+    has_bounds(&body, Radau::<4>::default(), [1e-15, 1.0]);
+}
+
 #[test]
 fn bad_courses_are_refused() {
     let body = free_body();
@@ -282,10 +321,6 @@ fn bad_courses_are_refused() {
         Err(RunError::Span(error)) => error,
         other => panic!("another answer: {:?}", other.err()),
     };
-    for tolerance in [0.0, -1e-6, f64::NAN, f64::INFINITY, 1e-12] {
-        let error = refused(Span::until(1.0).tolerance(tolerance));
-        assert!(matches!(error, SpanError::Tolerance { .. }), "{error}");
-    }
     for end in [0.0, -1.0, f64::NAN, f64::INFINITY] {
         assert!(matches!(refused(Span::until(end)), SpanError::End { .. }));
     }

@@ -1,7 +1,10 @@
 //! A run that is put down and taken up again, and a run that is taken twice: the same bits.
 
+#[path = "models/digits.rs"]
+mod digits;
 mod models;
 
+use digits::refuses_changed_digits;
 use metriplectic::integrators::{Checkpoint, ResumeError, Schedule, SpanError, Steps};
 use metriplectic::manifolds::PointError;
 use metriplectic::prelude::*;
@@ -33,7 +36,10 @@ fn through_a_file(checkpoint: &Checkpoint) -> Checkpoint {
     assert_eq!(serde_json::to_string(&read).expect("it is written"), text);
     // Reading it as a tree, as a program that adds a field of its own does, costs no digit.
     let tree: serde_json::Value = serde_json::from_str(&text).expect("it is read");
-    assert_eq!(&serde_json::from_value::<Checkpoint>(tree).expect("it is read"), checkpoint);
+    assert_eq!(&serde_json::from_value::<Checkpoint>(tree.clone()).expect("it is read"), checkpoint);
+    // And so does a format that writes fields in their order, without names.
+    let list = serde_json::json!([tree["version"], tree["checksum"], tree["run"]]);
+    assert_eq!(&serde_json::from_value::<Checkpoint>(list).expect("it is read"), checkpoint);
     read
 }
 
@@ -163,140 +169,148 @@ fn a_checkpoint_of_another_system_is_refused() {
     assert!(matches!(error, ResumeError::Length { found: 0, expected: 1, .. }), "{error}");
 }
 
+/// A file of a run, with a change.
+fn changed(
+    checkpoint: &Checkpoint,
+    change: impl FnOnce(&mut serde_json::Value),
+) -> serde_json::Result<Checkpoint> {
+    let mut tree = serde_json::to_value(checkpoint)?;
+    change(&mut tree);
+    serde_json::from_value(tree)
+}
+
+#[test]
+fn every_changed_digit_of_a_checkpoint_is_refused() {
+    let body = relaxing_body();
+    let fixed = Schedule::from(Span::steps(0.1, 50).until_rest(1e-9));
+    let adaptive = Schedule::from(Span::until(10.0).tolerance(1e-4).scale([1.0, 0.0, 0.0]));
+    for course in [&fixed, &adaptive] {
+        macro_rules! refuse {
+            ($($method:expr),*) => {$(
+                refuses_changed_digits($method, &body, UNSTABLE, course.clone());
+            )*};
+        }
+        refuse!(Scheme::new(WeylMidpoint), Gauss::<3>::default(), Radau::<2>::default());
+        refuse!(DormandPrince5, DormandPrince8, RungeKuttaChebyshev);
+    }
+    refuses_changed_digits(
+        Scheme::new(WeylMidpoint),
+        &spring(),
+        vector![1.0, 0.2, -0.3, 0.6],
+        fixed,
+    );
+}
+
 #[test]
 fn a_damaged_checkpoint_is_refused() {
     let body = relaxing_body();
     let mut steps = WeylMidpoint.steps(&body, UNSTABLE, Span::until(1.0)).unwrap();
     steps.advance().unwrap();
-    let tree = serde_json::to_value(steps.checkpoint()).unwrap();
-    let with = |change: &dyn Fn(&mut serde_json::Value)| {
-        let mut tree = tree.clone();
-        change(&mut tree);
-        let checkpoint = serde_json::from_value::<Checkpoint>(tree).ok()?;
-        WeylMidpoint.resume(&body, &checkpoint).err()
+    let checkpoint = steps.checkpoint();
+    let resumed = |checkpoint: &Checkpoint| WeylMidpoint.resume(&body, checkpoint).err();
+    let with = |path: &str, value: serde_json::Value| {
+        changed(&checkpoint, |tree| *tree.pointer_mut(path).expect(path) = value)
     };
-    assert_eq!(with(&|_| ()), None);
-    let error = with(&|tree| tree["version"] = 7.into());
-    assert_eq!(error, Some(ResumeError::Version { found: 7, expected: 6 }));
-    let error = with(&|tree| tree["run"]["point"][1] = "NaN".into());
-    assert!(matches!(error, Some(ResumeError::Point(PointError::NotFinite { index: 1, .. }))));
-    let error = with(&|tree| tree["run"]["time"] = "-1.0".into());
-    assert!(matches!(error, Some(ResumeError::Damaged { what: "time", .. })));
-    let error = with(&|tree| {
-        tree["run"]["progress"]["step_size"]["Adaptive"]["pace"]["next"] = "0.0".into();
+    let same = with("/run/progress/every", 1.into()).unwrap();
+    assert!(same == checkpoint && resumed(&same).is_none());
+    for (path, value) in [
+        ("/run/point/1", "NaN".into()),
+        ("/run/point/1", "-0.99999".into()),
+        ("/run/time", "-1.0".into()),
+        ("/run/progress/every", 0.into()),
+        ("/run/progress/step_size/Adaptive/pace/next", "0.0".into()),
+        ("/run/progress/ending", "Span".into()),
+        ("/run/memory/compensation", serde_json::json!(["0.0"])),
+        ("/run/memory", serde_json::json!({})),
+        ("/run/method", "DormandPrince8".into()),
+    ] {
+        let altered = with(path, value).expect(path);
+        let error = resumed(&altered).expect(path);
+        assert!(matches!(error, ResumeError::Altered { .. }), "{path}: {error}");
+        assert_eq!(altered.clone().with_end(2.0), Err(error.clone()));
+        assert!(altered.time().is_nan() && altered.method().is_empty());
+        // It is not written again under a checksum that fits.
+        assert!(serde_json::to_string(&altered).unwrap_err().to_string() == error.to_string());
+    }
+    // Two numbers that have changed places.
+    let swapped = changed(&checkpoint, |tree| {
+        let point = tree["run"]["point"].as_array_mut().unwrap();
+        point.swap(0, 1);
     });
-    assert!(matches!(error, Some(ResumeError::Damaged { what: "next step", .. })));
-    let error = with(&|tree| tree["run"]["progress"]["every"] = 0.into());
-    assert!(matches!(error, Some(ResumeError::Damaged { .. })));
-    let error = with(&|tree| tree["run"]["memory"]["compensation"] = serde_json::json!(["0.0"]));
-    assert!(matches!(error, Some(ResumeError::Length { found: 1, expected: 3, .. })));
+    assert!(matches!(resumed(&swapped.unwrap()), Some(ResumeError::Altered { .. })));
     // What is no number, and what is no field, is not even read.
-    let mut unread = tree.clone();
-    unread["run"]["energy"] = "one".into();
-    assert!(serde_json::from_value::<Checkpoint>(unread).is_err());
+    assert!(with("/run/energy", "one".into()).is_err() && with("/checksum", "sum".into()).is_err());
+    assert!(with("/run", serde_json::Value::Null).is_err());
     for path in
         ["", "/run", "/run/balance", "/run/progress", "/run/progress/step_size/Adaptive/pace"]
     {
-        let mut unread = tree.clone();
-        unread.pointer_mut(path).expect(path)["enegry"] = "1.0".into();
-        assert!(serde_json::from_value::<Checkpoint>(unread).is_err(), "{path}");
+        let unread = changed(&checkpoint, |tree| {
+            tree.pointer_mut(path).expect(path)["enegry"] = "1.0".into();
+        });
+        assert!(unread.is_err(), "{path}");
     }
-    let mut unread = tree.clone();
-    unread["run"] = serde_json::Value::Null;
-    assert!(serde_json::from_value::<Checkpoint>(unread).is_err());
 }
 
 #[test]
-fn every_number_of_a_checkpoint_is_compared_with_the_others() {
+fn a_checkpoint_of_another_method_is_refused_and_one_with_other_options_is_not() {
     let body = relaxing_body();
-    let tree = |course: Schedule| {
-        let mut steps = WeylMidpoint.steps(&body, UNSTABLE, course).unwrap();
-        for _ in 0..20 {
-            steps.advance().unwrap();
+    let mut steps = WeylMidpoint.steps(&body, UNSTABLE, 0.1).unwrap();
+    steps.advance().unwrap();
+    let checkpoint = through_a_file(&steps.checkpoint());
+    assert_eq!(checkpoint.method(), "Scheme<WeylMidpoint, Gonzalez>");
+    let patient = Newton { iterations: 60, ..Newton::default() };
+    let options = Scheme { splits: 3, ..Scheme::new(WeylMidpoint).newton(patient) };
+    assert!(options.resume(&body, &checkpoint).is_ok());
+    let refused = |error: Option<ResumeError>, name: &str| match error {
+        Some(ResumeError::AnotherMethod { stored, found }) => {
+            assert!(stored == checkpoint.method() && found == name, "{stored}, {found}");
         }
-        serde_json::to_value(steps.checkpoint()).unwrap()
+        other => panic!("{name}: {other:?}"),
     };
-    let fixed = tree(Span::steps(0.1, 50).into());
-    let adaptive = tree(Span::until(10.0).tolerance(1e-4).until_rest(1e-9).into());
-    let with = |tree: &serde_json::Value, path: &str, value: serde_json::Value| {
-        let mut tree = tree.clone();
-        *tree.pointer_mut(path).expect(path) = value;
-        let checkpoint = serde_json::from_value::<Checkpoint>(tree).expect(path);
-        WeylMidpoint.resume(&body, &checkpoint).err()
-    };
-    assert_eq!(with(&fixed, "/run/progress/every", 1.into()), None);
-    assert_eq!(with(&adaptive, "/run/progress/every", 1.into()), None);
-    for (path, value, what) in [
-        ("/run/balance/initial_energy", "NaN", "initial energy"),
-        ("/run/balance/initial_energy", "0.4", "initial energy"),
-        ("/run/balance/max_energy_error", "-1.0", "largest error of the energy"),
-        ("/run/balance/initial_entropy", "inf", "initial entropy"),
-        ("/run/balance/initial_entropy", "0.4", "growth of the entropy"),
-        ("/run/balance/entropy_gained", "1e9", "growth of the entropy"),
-        ("/run/balance/min_entropy_increment", "NaN", "smallest growth of the entropy"),
-        ("/run/balance/min_entropy_slope", "NaN", "least slope of the entropy"),
-        ("/run/balance/max_manifold_defect", "NaN", "largest defect"),
-        ("/run/balance/smallest_step", "1e9", "smallest step"),
-        ("/run/kept_entropy", "1e9", "kept entropy"),
-        ("/run/kept_entropy", "NaN", "kept entropy"),
-        ("/run/progress/start", "NaN", "start"),
-        ("/run/progress/start", "7.0", "time"),
-        ("/run/time", "1e9", "time"),
-        ("/run/progress/largest_velocity/0", "NaN", "largest velocities"),
-        ("/run/progress/largest_velocity/0", "-1.0", "largest velocity of an entry"),
-        ("/run/memory/compensation/0", "1e-3", "lost digits of an entry"),
-        ("/run/progress/scales/sizes/1", "-1.0", "size of an entry"),
-    ] {
-        for tree in [&fixed, &adaptive] {
-            match with(tree, path, value.into()) {
-                Some(ResumeError::Damaged { what: found, .. }) => assert_eq!(found, what, "{path}"),
-                other => panic!("{path} {value}: {other:?}"),
-            }
-        }
-    }
-    for (tree, path, value, what) in [
-        (&fixed, "/run/step", 19.into(), "number of steps in the balance"),
-        (&fixed, "/run/progress/count", 19.into(), "number of steps to take"),
-        (&fixed, "/run/progress/step_size/Fixed", "0.2".into(), "time"),
-        (&fixed, "/run/progress/ending", "Span".into(), "number of steps"),
-        (&adaptive, "/run/progress/ending", "Span".into(), "time"),
-        (&adaptive, "/run/progress/step_size/Adaptive/pace/end", "1e-3".into(), "time"),
-        (&adaptive, "/run/progress/step_size/Adaptive/pace/end", "NaN".into(), "end"),
-        (&adaptive, "/run/progress/step_size/Adaptive/pace/tolerance", "NaN".into(), "tolerance"),
-        (&adaptive, "/run/progress/scales/sizes/1", "0.5".into(), "size of an entry"),
-        (&adaptive, "/run/progress/rest", "2.0".into(), "tolerance of rest"),
-        (&adaptive, "/run/progress/most", 1.into(), "number of states to record"),
-    ] as [(_, _, serde_json::Value, _); 11]
-    {
-        match with(tree, path, value.clone()) {
-            Some(ResumeError::Damaged { what: found, .. }) => assert_eq!(found, what, "{path}"),
-            other => panic!("{path} {value}: {other:?}"),
-        }
-    }
-    // A file that is not damaged, of a run that has ended, is not taken for one that has not.
-    let mut steps = WeylMidpoint.steps(&body, UNSTABLE, Span::steps(0.1, 5)).unwrap();
-    while steps.next().is_some() {}
-    let tree = serde_json::to_value(steps.checkpoint()).unwrap();
-    let error = with(&tree, "/run/progress/ending", serde_json::Value::Null);
-    assert!(matches!(error, Some(ResumeError::Damaged { what: "number of steps", .. })));
+    refused(Exponential.resume(&body, &checkpoint).err(), "Scheme<Exponential, Gonzalez>");
+    let other = Scheme::new(WeylMidpoint).gradient(MeanValue);
+    refused(other.resume(&body, &checkpoint).err(), "Scheme<WeylMidpoint, MeanValue>");
+    refused(DormandPrince8.resume(&body, &checkpoint).err(), "DormandPrince8");
+    refused(DormandPrince5.resume(&body, &checkpoint).err(), "DormandPrince5");
+    refused(RungeKuttaChebyshev.resume(&body, &checkpoint).err(), "RungeKuttaChebyshev");
+    refused(Gauss::<2>::default().resume(&body, &checkpoint).err(), "Gauss::<2>");
+    refused(Radau::<3>::default().resume(&body, &checkpoint).err(), "Radau::<3>");
+    let gauss = Gauss::<2>::default().run(&body, UNSTABLE, Span::steps(0.1, 2)).unwrap();
+    let later = gauss.checkpoint().clone().with_steps(4).unwrap();
+    assert!(Gauss::<2> { splits: 3 }.resume(&body, &later).is_ok());
+    let error = Gauss::<3>::default().resume(&body, &later).unwrap_err();
+    assert!(matches!(error, ResumeError::AnotherMethod { .. }), "{error}");
 }
 
 #[test]
 fn a_file_of_another_version_is_known_by_its_version_alone() {
     let body = relaxing_body();
+    let run = WeylMidpoint.run(&body, UNSTABLE, Span::steps(0.1, 3)).unwrap();
+    // The sixth version had neither a checksum nor the name of the method.
+    let mut sixth = serde_json::to_value(run.checkpoint()).unwrap();
+    sixth["version"] = 6.into();
+    sixth.as_object_mut().unwrap().remove("checksum").unwrap();
+    sixth["run"].as_object_mut().unwrap().remove("method").unwrap();
+    // In the order of its fields, and with the run before the version.
+    let first = format!(r#"{{"version":6,"run":{}}}"#, sixth["run"]);
     for (version, text) in [
         (5, r#"{"version":5,"step":0,"start":"0.0","point":["0.0","0.5","0.5"],"balance":{}}"#),
-        (7, r#"{"step":{"taken":0},"version":7}"#),
+        (6, &first),
+        (6, &sixth.to_string()),
+        (8, r#"{"step":{"taken":0},"version":8}"#),
         (4, r#"{"version":4}"#),
+        (6, &format!("[6,{}]", sixth["run"])),
     ] {
-        let error = ResumeError::Version { found: version, expected: 6 };
+        let error = ResumeError::Version { found: version, expected: 7 };
         let older: Checkpoint = serde_json::from_str(text).expect("it is read");
         assert_eq!(WeylMidpoint.resume(&body, &older).err(), Some(error.clone()));
         assert_eq!(older.clone().with_steps(10), Err(error.clone()));
         assert_eq!(older.clone().with_end(10.0), Err(error));
         assert!(older.time().is_nan() && older.point().next().is_none());
     }
-    assert!(serde_json::from_str::<Checkpoint>(r#"{"step":0}"#).is_err());
+    for text in [r#"{"step":0}"#, r#"{"version":7}"#, "[]", "[7]", r#"[7,"0"]"#, "7"] {
+        assert!(serde_json::from_str::<Checkpoint>(text).is_err(), "{text}");
+    }
 }
 
 /// An oscillator with the energy `(a p² + q²)/2` times a unit, and friction `b` into its entropy.
@@ -400,12 +414,13 @@ fn a_run_from_rest_with_friction_goes_on() {
 }
 
 #[test]
-fn a_run_that_failed_goes_on_with_another_scheme() {
+fn a_run_that_failed_goes_on_with_other_options() {
     let body = relaxing_body();
     let span = Span::until(10.0).tolerance(1e-9).least_step(1e-2);
     let error = WeylMidpoint.run(&body, UNSTABLE, span).unwrap_err();
     let stopped = error.trajectory().expect("it had started");
-    let resumed = WeylMidpoint.resume(&body, stopped.checkpoint()).unwrap();
+    let other = Scheme { splits: 2, ..Scheme::new(WeylMidpoint) };
+    let resumed = other.resume(&body, stopped.checkpoint()).unwrap();
     assert_eq!(resumed.state(), stopped.last());
 }
 

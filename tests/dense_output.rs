@@ -222,6 +222,80 @@ fn the_states_inside_a_step_in_parts_are_those_of_the_motion() {
     assert!(error < 0.5 * exact, "{} instead of {exact}", event.state.time);
 }
 
+/// The attitude and the angular momentum of a body.
+type Turning = Product<Rotations, Euclidean<3>>;
+
+/// A free body with its attitude.
+fn turning(inertia: Vector3<f64>) -> impl Metriplectic<Manifold = Turning> {
+    System::on(Product(Rotations::bi_invariant(), Euclidean::<3>))
+        .bracket(Symplectic)
+        .energy(move |(_, p): &(Matrix3<Real>, Vector3<Real>)| models::kinetic(inertia)(p))
+        .build()
+        .expect("the parts make a system")
+}
+
+/// A body with the spin 8 about its third axis turns by more than a right angle in a step of 0.25.
+#[test]
+fn a_certificate_speaks_of_the_accuracy_of_a_run_that_is_off() {
+    let body = turning(vector![2.0, 2.0, 1.0]);
+    let start = (Matrix3::identity(), vector![0.5, 0.0, 8.0]);
+    let exact = DormandPrince8.run(&body, start, Span::until(10.0).tolerance(1e-12)).unwrap();
+    let mut silent = 0;
+    for (h, count) in [(2.0, 5), (0.25, 40), (0.1, 100), (0.01, 1000)] {
+        let mut check = |name: &str, run: Result<Trajectory<Turning>, RunError<Turning>>| {
+            let run = run.unwrap_or_else(|error| panic!("{name}: {error}"));
+            let off = (run.last().point.0 - exact.last().point.0).norm();
+            let (c, longest) = (run.certificate(), 8.0 * h > 0.5 * std::f64::consts::PI);
+            let line =
+                c.to_string().lines().find(|line| line.starts_with("accuracy:")).map(str::to_owned);
+            println!("{name}, h = {h}: off by {off:.1e}, {:?}: {line:?}", c.local_error);
+            assert!(line.is_some() || off < 1e-2, "{name}, h = {h}: off by {off:e}\n{c}");
+            silent += usize::from(line.is_none());
+            if longest && c.effort.splits > 0 {
+                assert_eq!(c.local_error, Some(f64::INFINITY), "{name}, h = {h}");
+            }
+        };
+        let span = || Span::steps(h, count).every(count);
+        check("midpoint", WeylMidpoint.run(&body, start, span()));
+        check("order 5", DormandPrince5.run(&body, start, span()));
+        check("order 8", DormandPrince8.run(&body, start, span()));
+        check("Gauss", Gauss::<4>::default().run(&body, start, span()));
+        check("Radau", Radau::<4>::default().run(&body, start, span()));
+    }
+    // The steps of 0.01 are fine with all of them.
+    assert!(silent >= 5, "{silent}");
+}
+
+/// A body that turns by 1.8 in a step, beyond its chart.
+#[test]
+fn the_states_inside_a_step_that_is_longer_than_a_chart_are_those_of_the_motion() {
+    let body = turning(vector![1.0, 1.0, 1.0]);
+    let start = (Matrix3::identity(), vector![0.0, 0.0, 1.0]);
+    // sin φ = 0.98 twice in the step, and at neither of its ends.
+    let (h, angle) = (1.8, 0.98_f64.asin());
+    let span = Span::steps(h, 1)
+        .output_every(0.45)
+        .event("height", |(r, _): &(Matrix3<f64>, Vector3<f64>)| r.m21 - 0.98);
+    let check = |name: &str, bound: f64, run: Result<Trajectory<Turning>, RunError<Turning>>| {
+        let run = run.unwrap_or_else(|error| panic!("{name}: {error}"));
+        let angles = run.iter().map(|State { time, point: (r, _), .. }| {
+            (r.m11 - time.cos()).abs().max((r.m21 - time.sin()).abs())
+        });
+        let times = run.events().iter().zip([angle, std::f64::consts::PI - angle]);
+        let times = times.map(|(event, exact)| (event.state.time - exact).abs());
+        let (off, late) = (angles.fold(0.0, f64::max), times.fold(0.0, f64::max));
+        println!("{name}: angles off by {off:.1e}, events by {late:.1e}");
+        assert_eq!((run.states().len(), run.events().len()), (5, 2), "{name}");
+        // At the events sin φ is flat: cos φ = 0.2.
+        assert!(off < bound && late < 5.0 * bound, "{name}: {off:e}, {late:e}");
+    };
+    check("midpoint", 1e-12, WeylMidpoint.run(&body, start, span.clone()));
+    check("order 5", 1e-2, DormandPrince5.run(&body, start, span.clone()));
+    check("order 8", 1e-2, DormandPrince8.run(&body, start, span.clone()));
+    check("Gauss", 1e-2, Gauss::<4>::default().run(&body, start, span.clone()));
+    check("Radau", 1e-2, Radau::<4>::default().run(&body, start, span));
+}
+
 #[test]
 fn the_iterator_the_trajectory_and_a_step_have_the_same_outputs() {
     let body = free_body();
@@ -301,8 +375,47 @@ fn times_that_are_not_of_the_run_are_errors() {
         let error = refused(span.output_every(interval));
         assert!(matches!(error, SpanError::OutputInterval { .. }), "{error}");
     }
+    // Intervals that change no time of the run: the outputs would have no end, or equal times.
+    let late = Span::until(1e10 + 1e-3).starting_at(1e10);
+    let early = Span::until(1e-3).starting_at(-1e10);
+    for (schedule, time) in [
+        (span.output_every(1e-18), 3.0_f64 * 0.1),
+        (Span::until(1.0).output_every(1e-18), 1.0),
+        (late.output_every(1e-7), 1e10 + 1e-3),
+        (early.output_every(1e-7), -1e10),
+    ] {
+        let error = refused(schedule);
+        let SpanError::OutputStandstill { time: found, .. } = error else { panic!("{error}") };
+        assert_eq!(found.to_bits(), time.to_bits());
+    }
+    let endless = WeylMidpoint.steps(&body, TUMBLING, 0.1.output_every(1e-18)).map(|_| ());
+    let Err(RunError::Span(error)) = endless else { panic!("{endless:?}") };
+    assert!(matches!(error, SpanError::OutputStandstill { .. }), "{error}");
+    // No interval is too short in itself, and outputs that differ have different times.
+    let short = Span::steps(1e-30, 3).output_every(2e-31);
+    assert_eq!(WeylMidpoint.run(&body, TUMBLING, short).unwrap().states().len(), 16);
+    let run = WeylMidpoint.run(&body, TUMBLING, late.output_every(1e-5)).unwrap();
+    assert!(run.states().len() > 90 && run.states().is_sorted_by(|a, b| a.time < b.time));
+    assert_eq!(refused(span.every(2).output_at([])), SpanError::TwoRecords);
     assert_eq!(refused(span.every(2).output_every(0.1)), SpanError::TwoRecords);
     assert_eq!(refused(until.at_most(9).output_at([0.7])), SpanError::TwoRecords);
+}
+
+#[test]
+fn a_run_with_outputs_at_no_time_has_its_start_and_its_end() {
+    let body = free_body();
+    for schedule in [Span::steps(0.1, 10).output_at([]), Span::until(1.0).output_at([])] {
+        let run = WeylMidpoint.run(&body, TUMBLING, schedule.clone()).unwrap();
+        let times: Vec<f64> = run.iter().map(|state| state.time).collect();
+        assert_eq!(times, [0.0, 1.0]);
+        let steps = WeylMidpoint.steps(&body, TUMBLING, schedule).unwrap();
+        assert_eq!(steps.map(|state| state.unwrap().time).collect::<Vec<_>>(), [1.0]);
+    }
+    // An iterator without an end yields what was asked for, and then nothing.
+    for times in [vec![], vec![0.05, 0.3]] {
+        let steps = WeylMidpoint.steps(&body, TUMBLING, 0.1.output_at(times.clone())).unwrap();
+        assert_eq!(steps.map(|state| state.unwrap().time).collect::<Vec<_>>(), times);
+    }
 }
 
 /// The explicit midpoint rule, which keeps no law.

@@ -290,6 +290,7 @@ fn the_compiler_explains_what_is_not_a_field() {
     cases.compile_fail("doors/energy_*.rs");
     cases.compile_fail("doors/force_*.rs");
     cases.compile_fail("doors/matrix_*.rs");
+    cases.compile_fail("doors/product_*.rs");
 }
 
 /// The first line of a message without the paths of its types.

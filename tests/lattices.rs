@@ -2,6 +2,8 @@
 
 #[path = "models/chain.rs"]
 mod chain;
+#[path = "models/digits.rs"]
+mod digits;
 #[path = "lattices/gathered.rs"]
 mod gathered;
 #[path = "lattices/limiting_sites.rs"]
@@ -13,6 +15,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use chain::{chain, waves};
+use digits::refuses_changed_digits;
 use metriplectic::integrators::{Flow, Vector};
 use metriplectic::prelude::*;
 use metriplectic_studies::Order;

@@ -396,13 +396,21 @@ fn an_underflow_is_called_one() {
         .energy(boxed(|x: &Vector2<Real>| x.norm_squared() * 0.5))
         .build()
         .unwrap();
-    for size in [1e-160, 1e-150] {
-        let start = vector![1.0, 0.5] * size;
-        let error = WeylMidpoint.run(&oscillator, start, Span::steps(0.1, 10)).unwrap_err();
-        let RunError::Model(ModelError::Underflow { field: "energy", .. }) = &error else {
-            panic!("another error: {error}");
-        };
-        assert!(error.to_string().contains("smaller units"), "{error}");
+    // At 10⁻²⁰⁰ it is zero, and so are the products ∂ᵢH xᵢ, at rest as in motion.
+    for size in [1e-300, 1e-200, 1e-165, 1e-160, 1e-150] {
+        for start in [vector![1.0, 0.5] * size, vector![size, 0.0], vector![0.0, -size]] {
+            let span = Span::until(1.0).until_rest(1e-9);
+            let refuses = |error: RunError<Euclidean<2>>| {
+                let RunError::Model(ModelError::Underflow { field: "energy", .. }) = &error else {
+                    panic!("another error: {error}");
+                };
+                assert!(error.to_string().contains("smaller units"), "{error}");
+            };
+            refuses(WeylMidpoint.run(&oscillator, start, span).unwrap_err());
+            refuses(WeylMidpoint.run(&oscillator, start, Span::steps(0.1, 10)).unwrap_err());
+            refuses(DormandPrince8.run(&oscillator, start, span).unwrap_err());
+            refuses(Gauss::<2>::default().run(&oscillator, start, span).unwrap_err());
+        }
     }
     // All digits are there at 10⁻¹⁴⁰, and none is needed at the equilibrium.
     for size in [1e-140, 0.0] {

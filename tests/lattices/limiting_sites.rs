@@ -37,19 +37,17 @@ fn the_certificate_names_the_stiff_bond_in_every_unit() {
         let checkpoint: Checkpoint = serde_json::from_str(&text).unwrap();
         let resumed = RungeKuttaChebyshev.resume(&lattice, &checkpoint).unwrap().run().unwrap();
         assert_eq!(resumed.certificate(), whole.certificate());
-        // A site that the lattice does not have is refused, and a file without sites is an older one.
-        let known = serde_json::to_string(&whole.certificate().limiting_sites).unwrap();
-        let with = |sites: &str| {
-            assert!(text.contains(&known), "{known}");
-            serde_json::from_str::<Checkpoint>(&text.replace(&known, sites)).unwrap()
-        };
-        let elsewhere = with(r#"{"error":null,"stiffness":3000}"#);
-        let error = RungeKuttaChebyshev.resume(&lattice, &elsewhere).unwrap_err();
-        assert!(matches!(error, ResumeError::Damaged { value: 3000.0, .. }), "{error}");
-        let older = text.replace(&format!(",\"limiting_sites\":{known}"), "");
-        let older: Checkpoint = serde_json::from_str(&older).unwrap();
-        RungeKuttaChebyshev.resume(&lattice, &older).expect("a checkpoint without sites");
     }
+}
+
+#[test]
+fn every_changed_digit_of_a_checkpoint_of_a_lattice_is_refused() {
+    let lattice = conduction::of_bonds(1.0, vec![1.0; 4], Arc::default());
+    let start = lattice.points(|i| conduction::at([4, i], 1.0, [1.0; 3], 0.0));
+    let span = || Span::until(1.5).tolerance(1e-4);
+    refuses_changed_digits(RungeKuttaChebyshev, &lattice, start.clone(), span());
+    refuses_changed_digits(DormandPrince8, &lattice, start.clone(), span());
+    refuses_changed_digits(DormandPrince5, &lattice, start, Span::steps(0.01, 10));
 }
 
 #[test]

@@ -166,6 +166,10 @@ macro_rules! method {
         impl<Y: Metriplectic, const S: usize> Method<Y> for $name<S> {
             type Memory = StageMemory<Dim<Y>>;
 
+            fn name(&self) -> String {
+                format!("{}::<{S}>", stringify!($name))
+            }
+
             fn order(&self) -> u32 {
                 Self::tableau().order
             }

@@ -161,6 +161,10 @@ macro_rules! method {
         impl<F: StageFlow> Method<F> for $name {
             type Memory = MemoryOf<F>;
 
+            fn name(&self) -> String {
+                stringify!($name).to_owned()
+            }
+
             fn order(&self) -> u32 {
                 Self::TABLEAU.order
             }

@@ -38,6 +38,12 @@ pub trait Method<F: Flow>: Sized {
     /// What it keeps from one step to the next, [`saved`](Memory) by a checkpoint.
     type Memory: Memory;
 
+    /// The name in a checkpoint, with the stages or the tableau and without options. A run is resumed by a method of
+    /// its name. The default is the name of the type without paths.
+    fn name(&self) -> String {
+        name_of::<Self>()
+    }
+
     /// The order of convergence: it sets the exponents of adaptive step sizes.
     fn order(&self) -> u32;
 
@@ -114,7 +120,8 @@ pub trait Method<F: Flow>: Sized {
 
     /// The state at the fraction `θ` of a step that was taken, from the memory after it; `None` if the method does
     /// not know it, or if the flow does not say what [lies between](Flow::displacement) two states. Where only the
-    /// method does not know it, and inside a step in [parts](Effort::splits), a run takes a step of size `θh`.
+    /// method does not know it, inside a step that is longer than a chart, and inside a step in
+    /// [parts](Effort::splits), a run takes a step of size `θh`.
     ///
     /// The default is the cubic of Hermite in the chart at the start, of order 3, moved
     /// [onto](Flow::onto) the laws: the energy and the further invariants that the run began with, and an
@@ -166,7 +173,8 @@ pub trait Method<F: Flow>: Sized {
     ///
     /// # Errors
     ///
-    /// [`ResumeError`] if the checkpoint does not belong to the system, or is damaged.
+    /// [`ResumeError`] if the checkpoint does not belong to the system or to the method, or if its file has
+    /// changed.
     fn resume<'a>(
         self,
         flow: &'a F,
@@ -174,6 +182,16 @@ pub trait Method<F: Flow>: Sized {
     ) -> Result<Steps<'a, F, Self>, ResumeError> {
         flow.with_room(|| Steps::resume(self, flow, checkpoint))
     }
+}
+
+/// The name of a type without the paths of its modules.
+pub(crate) fn name_of<T>() -> String {
+    let within = |c: char| c.is_alphanumeric() || c == '_' || c == ':';
+    let mut name = String::new();
+    for part in std::any::type_name::<T>().split_inclusive(|c| !within(c)) {
+        name.push_str(part.rsplit("::").next().unwrap_or(part));
+    }
+    name
 }
 
 /// What a method keeps from one step to the next.
@@ -196,12 +214,6 @@ pub trait Memory: Clone + Debug + Default {
     ///
     /// [`ResumeError`] if a number is missing or impossible.
     fn restore(saved: &Saved) -> Result<Self, ResumeError>;
-
-    /// The displacement of the last step, and the digits that rounding has lost of the position: a checkpoint
-    /// compares them with the state. Empty where there are none.
-    fn moved_and_lost(&self) -> [Vec<f64>; 2] {
-        [Vec::new(), Vec::new()]
-    }
 }
 
 /// The memory of a method that has none.

@@ -48,7 +48,9 @@ pub use memory::MidpointMemory;
 pub use run::Run;
 
 use crate::discrete_gradient::{DiscreteGradient, Gonzalez};
-use crate::method::{Evidence, Flow as _, Laws, Method, Promises, Refusal, StepStart, Taken};
+use crate::method::{
+    Evidence, Flow as _, Laws, Method, Promises, Refusal, StepStart, Taken, name_of,
+};
 use crate::newton::{Newton, Root};
 use crate::round_off::bound::{BROKEN, breaks_first_law, sizes_on_a_step};
 use crate::round_off::compensation::Displaced;
@@ -143,6 +145,10 @@ where
     W: DiscreteGradient,
 {
     type Memory = MemoryOf<Y>;
+
+    fn name(&self) -> String {
+        format!("Scheme<{}, {}>", name_of::<R>(), name_of::<W>())
+    }
 
     fn order(&self) -> u32 {
         2

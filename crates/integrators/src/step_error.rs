@@ -173,11 +173,12 @@ pub enum StepError {
         /// What was done.
         tried: Effort,
     },
-    /// A state inside a step was asked for, and the flow gives no displacement between the ends of the step, or
-    /// none as large as this one.
+    /// A state inside a step was asked for, and the flow gives no displacement between two states, or no smaller step
+    /// was found.
     #[error(
-        "the step of size {h:.3e} from t = {} was taken, and the flow does not say what lies inside it, where an \
-         output or an event was asked for; take a smaller step, or implement `Flow::displacement`",
+        "the step of size {h:.3e} from t = {} was taken, and no state was found inside it, where an output or an \
+         event was asked for; take a smaller step (a `Flow` of your own finds states inside a step by its \
+         `Flow::displacement`)",
         digits(.time)
     )]
     NothingBetween {

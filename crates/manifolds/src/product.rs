@@ -28,7 +28,8 @@ use crate::{Manifold, PointError, StepPath, StepPathJet};
 
 /// The product `A × B`: a state with two parts, such as a direction with an internal energy
 /// (`S² × R`) or an attitude with an angular momentum (`SO(3) × R³`). A factor may be a product again.
-/// See the [module](mod@crate::product).
+/// All factors together have at most 127 variables; one `Euclidean<N>` may have 256. See the
+/// [module](mod@crate::product).
 ///
 /// ```
 /// use metriplectic_fields::Real;
@@ -43,7 +44,13 @@ use crate::{Manifold, PointError, StepPath, StepPathJet};
 pub struct Product<A, B>(pub A, pub B);
 
 /// Spaces whose dimensions can be added: the left and the right factor of a product. It is implemented for
-/// all such spaces.
+/// all such spaces. Stable Rust does not add the numbers of two types, so nalgebra has a table of their sums, which ends
+/// at 127.
+#[diagnostic::on_unimplemented(
+    message = "a product has at most 127 variables, and its velocities have at most 127 entries",
+    label = "the factors `{Self}` and `{B}` have more together, or are no spaces",
+    note = "one `Euclidean<N>` may have 256 variables, and a `Lattice` has any number"
+)]
 pub trait Times<B: Space>: Space {
     /// The dimension of the product.
     type SumDim: Dimension;
@@ -51,6 +58,7 @@ pub trait Times<B: Space>: Space {
     type SumVelocity: Dimension;
 }
 
+#[diagnostic::do_not_recommend]
 impl<A: Space, B: Space> Times<B> for A
 where
     A::Dim: Plus<B::Dim>,

@@ -1,6 +1,6 @@
 //! The domain of a model: the points at which its parts have values.
 
-use metriplectic_fields::{ChartPoint, Column, ScalarField, Square};
+use metriplectic_fields::{ChartPoint, Column, Dimension as _, ScalarField, Square};
 use metriplectic_manifolds::{Manifold, Riemannian};
 
 use crate::bracket::Bracket;
@@ -37,15 +37,24 @@ pub(super) fn value_not_finite<Y: Metriplectic + ?Sized>(
     Some(ModelError::ValueNotFinite { field, value, point: Y::Manifold::entries(x) })
 }
 
-/// Checks that the terms of a field at the start are zero, or that their last digits do not underflow.
+/// Checks that the terms of a field at the start are zero, or that their last digits do not underflow. A term is
+/// zero if one of its factors is.
 pub(super) fn has_digits<M: Manifold>(
     f: &impl ScalarField<M>,
     field: &'static str,
     x0: &M::Point<f64>,
 ) -> Result<(), ModelError> {
     let jet = f.jet1(x0);
-    let size = jet.value.abs() + jet.df.abs().dot(&M::scales(x0));
-    if size > 0.0 && size * f64::EPSILON < f64::MIN_POSITIVE {
+    let scales = M::scales(x0);
+    let size = jet.value.abs() + jet.df.abs().dot(&scales);
+    // A product may be zero by underflow alone: ½q² and its term q·q at q = 10⁻²⁰⁰.
+    let is_lost = |i| jet.df[i] != 0.0 && scales[i] > 0.0;
+    let underflows = if size > 0.0 {
+        size * f64::EPSILON < f64::MIN_POSITIVE
+    } else {
+        size <= 0.0 && (0..M::Dim::LEN).any(is_lost)
+    };
+    if underflows {
         return Err(ModelError::Underflow { field, size, point: M::entries(x0) });
     }
     Ok(())

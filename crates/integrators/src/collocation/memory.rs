@@ -130,13 +130,4 @@ impl<N: Dimension> Memory for StageMemory<N> {
         let compensation = Compensation(column("compensation")?);
         Ok(Self { velocities, compensation, last: None })
     }
-
-    fn moved_and_lost(&self) -> [Vec<f64>; 2] {
-        let column = |v: &N::Vector<f64>| (0..N::LEN).map(|i| v[i]).collect();
-        let moved = self.velocities.map_or_else(Vec::new, |Continued { k, stages, h }| {
-            let longest = |i| k[..stages].iter().map(|k| (h * k[i]).abs()).fold(0.0, f64::max);
-            (0..N::LEN).map(longest).collect()
-        });
-        [moved, self.compensation.0.as_ref().map_or_else(Vec::new, column)]
-    }
 }

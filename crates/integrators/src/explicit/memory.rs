@@ -149,11 +149,6 @@ impl<V: Vector> Memory for ExplicitMemory<V> {
         }
         Ok(memory)
     }
-
-    fn moved_and_lost(&self) -> [Vec<f64>; 2] {
-        let lost = self.lost.as_ref().map_or_else(|| self.read.clone(), Vector::to_list);
-        [Vec::new(), lost]
-    }
 }
 
 /// `h Σ_j w_j k_j` over the rates of the stages.

@@ -106,11 +106,4 @@ impl<N: Dimension> Memory for MidpointMemory<N> {
         memory.compensation = Compensation(column("compensation")?);
         Ok(memory)
     }
-
-    fn moved_and_lost(&self) -> [Vec<f64>; 2] {
-        let column = |v: &N::Vector<f64>| (0..N::LEN).map(|i| v[i]).collect();
-        let Predictor { differences, known } = &self.predictor;
-        let moved = if *known > 0 { column(&differences[0]) } else { Vec::new() };
-        [moved, self.compensation.0.as_ref().map_or_else(Vec::new, column)]
-    }
 }

@@ -65,8 +65,10 @@ pub struct Certificate {
     /// Linear systems solved in the worst step.
     pub worst_iterations: usize,
     /// The largest local error of a step, relative to the sizes of the entries, as estimated on a few steps:
-    /// those whose number is a power of two. `None` where there is no estimate. Where friction is stiff it is
-    /// too large by a factor of about `h|K'|`.
+    /// those whose number is a power of two. `None` where there is no estimate, and infinite (in JSON, null) where a
+    /// step is longer than a chart, so that nothing is known of its error. Where friction is stiff it is
+    /// too large by a factor of about `h|K'|`. With [`stages`](Self::stages) it is the error of the polynomial
+    /// inside a step, which is larger than the one at its end.
     pub local_error: Option<f64>,
     /// The sites of a large system that set the size of the steps: the site with the largest of these local errors,
     /// relative to the error that is allowed, and the site where the motion was stiffest when this was last found.

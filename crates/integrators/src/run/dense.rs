@@ -40,6 +40,11 @@ impl<V: Vector> Hermite<V> {
     }
 }
 
+/// Returns whether a flow says what lies between two states that are near each other.
+pub(crate) fn says_between<F: Flow>(flow: &F, x: &Element<F>) -> bool {
+    flow.displacement(x, x).is_some()
+}
+
 /// The cubic from 0 to `rise` with these slopes.
 pub(crate) fn cubic(rise: f64, [start, end]: [f64; 2], theta: f64) -> f64 {
     let rest = 1.0 - theta;

@@ -11,7 +11,7 @@ use std::sync::Arc;
 
 use crate::digits::Digits;
 use crate::method::{Flow, StateSpace, StepEnds};
-use crate::run::dense::Hermite;
+use crate::run::dense::{Hermite, says_between};
 use crate::run::root::{Sample, narrow};
 use crate::run::span::SpanError;
 use crate::run::trajectory::State;
@@ -185,6 +185,11 @@ impl<M: StateSpace> Events<M> {
         self.0.is_empty()
     }
 
+    /// Returns whether one of them ends the run.
+    pub(crate) fn may_stop(&self) -> bool {
+        self.0.iter().any(|watched| watched.request.stops)
+    }
+
     /// The events of a step in the order of their times, up to the first that stops the run, and whether one
     /// does. `None` if a state inside the step is not known and is needed.
     pub(crate) fn of_step<F: Flow<Space = M>>(
@@ -195,10 +200,16 @@ impl<M: StateSpace> Events<M> {
         output: &mut Output<'_, M>,
     ) -> Option<(Vec<Event<M>>, bool)> {
         let curve = if step.x == step.end { None } else { Hermite::through(flow, step) };
-        let inside: Vec<Inside<M>> = curve.map_or_else(Vec::new, |curve| {
-            let point = |theta| flow.moved(step.x, &curve.at(theta));
-            INSIDE.iter().map(|&theta| Inside { theta, point: point(theta) }).collect()
-        });
+        let moves = step.x != step.end && (curve.is_some() || says_between(flow, step.x));
+        let mut inside = Vec::with_capacity(INSIDE.len());
+        for &theta in INSIDE.iter().filter(|_| moves) {
+            let point = match &curve {
+                Some(curve) => flow.moved(step.x, &curve.at(theta)),
+                // The step is longer than a chart.
+                None => output(theta)?.point,
+            };
+            inside.push(Inside { theta, point });
+        }
         self.on_points(&inside, ends, output)
     }
 

@@ -42,7 +42,8 @@
 //! memory is written when the table is finished or dropped: a run that is interrupted leaves a file
 //! that can be read. The first column is always the time.
 //!
-//! If the disk is full, the error says how many rows are in the file as a whole ([`TableError`]). What
+//! If the disk is full, the error says how many rows are in the file as a whole ([`TableError`]). Behind a buffer,
+//! such as a `BufWriter`, there may be more of them. What
 //! could not be written stays in memory, and the next call goes on where this one ended: once there is room,
 //! the file is the one that it would have been. Until then an array has the rows that its header counts, and
 //! a table of comma-separated values may end in a cut line, which has no line break.
@@ -71,9 +72,11 @@ pub enum TableError {
         name: String,
     },
     /// Writing has failed; what was not written is kept for the next call.
-    #[error("{source}; {rows} rows are in the file as a whole, and the others are kept in memory")]
+    #[error(
+        "{source}; at least {rows} rows are in the file as a whole, and the others are kept in memory"
+    )]
     Write {
-        /// The rows that are in the file as a whole.
+        /// The rows that are in the file as a whole, by the last flush without an error.
         rows: usize,
         /// What has failed.
         source: io::Error,
@@ -151,7 +154,8 @@ impl<'a, M: StateSpace> Observables<'a, M> {
     pub fn csv<W: Write>(&self, to: W) -> io::Result<Csv<'_, M, W>> {
         self.check_names()?;
         let names: Vec<_> = self.names().map(quoted).collect();
-        let mut table = Csv { of: self, to: Some(to), lines: names.join(","), rows: 0 };
+        let mut table =
+            Csv { of: self, to: Some(to), lines: names.join(","), rows: 0, confirmed: 0 };
         table.lines.push('\n');
         table.flush()?;
         Ok(table)

@@ -5,8 +5,9 @@ use std::collections::VecDeque;
 use metriplectic_dynamics::SecondLaw;
 
 use crate::method::{Element, Flow, Laws, Method, StateSpace, StepEnds, StepStart};
-use crate::run::dense::{Target, between};
+use crate::run::dense::{Target, between, says_between};
 use crate::run::event::{Event, Events};
+use crate::run::progress::Progress;
 use crate::run::span::{Schedule, SpanError};
 use crate::run::steps::Steps;
 use crate::run::trajectory::{Ending, State};
@@ -37,13 +38,14 @@ pub(super) struct Watching<M: StateSpace> {
 }
 
 impl<M: StateSpace> Watching<M> {
-    /// What is asked for in a run from `start` to `end` that is at this state; nothing if nothing is.
-    pub(super) fn new(
+    /// Takes up the requests of a run that is at this state; `None` if there are none.
+    pub(super) fn new<V>(
         requests: Requests,
-        [start, end]: [f64; 2],
+        progress: &Progress<V>,
         state: &State<M>,
     ) -> Result<Option<Box<Self>>, SpanError> {
-        requests.check(start, end)?;
+        let start = progress.start;
+        requests.check([start, progress.end()], progress.next_end(state.time))?;
         let Requests { times, interval, events } = requests;
         let outputs = Outputs::after(state.time, start, times, interval);
         let events = Events::new(events, state)?;
@@ -57,6 +59,14 @@ impl<M: StateSpace> Watching<M> {
     /// Whether the states of the queue are recorded in place of the one at the end of the step.
     pub(super) fn replaces_steps(&self) -> bool {
         !self.outputs.is_empty() || !self.queue.is_empty()
+    }
+
+    /// Returns whether no output is left, and no event ends the run.
+    pub(super) fn is_over(&self) -> bool {
+        self.queue.is_empty()
+            && !self.outputs.is_empty()
+            && self.outputs.are_over()
+            && !self.events.may_stop()
     }
 
     pub(super) const fn queue(&mut self) -> &mut VecDeque<State<M>> {
@@ -179,8 +189,7 @@ impl<F: Flow, M: Method<F>> Steps<'_, F, M> {
     ///
     /// [`SpanError`] if a time is outside of the run, or an event is one of other points.
     pub fn watching(mut self, schedule: impl Into<Schedule>) -> Result<Self, SpanError> {
-        let span = [self.progress.start, self.progress.end()];
-        self.watching = Watching::new(schedule.into().watch, span, &self.state)?;
+        self.watching = Watching::new(schedule.into().watch, &self.progress, &self.state)?;
         Ok(self)
     }
 
@@ -220,9 +229,12 @@ impl<F: Flow, M: Method<F>> Steps<'_, F, M> {
             inside.energy.is_finite() && (!has_entropy || out <= 0.0 || out <= round_off())
         };
         let promises = method.promises(flow);
-        // A step of that size, where the method does not know what lies in this one, as after a step in parts.
+        // A step of that size, where the method does not know what lies in this one: after a step in parts, and after
+        // one that is longer than a chart.
         let smaller_step = |method: &mut M| {
-            flow.displacement(x, end)?;
+            if !says_between(*flow, x) {
+                return None;
+            }
             let (values, reference) = (before.values.clone(), reference.clone());
             let start = StepStart { x, time: times[0], values, reference, allowed: None };
             let taken = method.step(*flow, &start, theta * h, &mut M::Memory::default()).ok()?;

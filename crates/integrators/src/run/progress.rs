@@ -62,6 +62,14 @@ impl<V> Progress<V> {
         })
     }
 
+    /// When the run ends; in a run without an end, when the next step from `time` does.
+    pub(crate) fn next_end(&self, time: f64) -> f64 {
+        match &self.step_size {
+            StepSize::Fixed(h) if self.count.is_none() => time + h,
+            _ => self.end(),
+        }
+    }
+
     /// When the run ends; infinite if it does not.
     pub(crate) fn end(&self) -> f64 {
         match &self.step_size {

@@ -3,6 +3,7 @@
 use crate::error::RunError;
 use crate::method::{Flow, Method};
 use crate::run::controller::StepSize;
+use crate::run::output::Watching;
 use crate::run::progress::Progress;
 use crate::run::span::{ROOM, SpanError};
 use crate::run::steps::Steps;
@@ -57,6 +58,13 @@ impl<F: Flow, M: Method<F>> Steps<'_, F, M> {
         }
     }
 
+    /// Returns whether a run without an end has found all that is yielded in place of its steps.
+    fn waits_for_nothing(&self) -> bool {
+        self.watching.as_deref().is_some_and(Watching::is_over)
+            && self.progress.end().is_infinite()
+            && self.progress.rest.is_none()
+    }
+
     /// Records the states that were asked for in the last step, if they replace the one at its end.
     fn watched(&mut self, states: &mut Vec<State<F::Space>>, failed: bool) -> bool {
         let Some(watching) = self.watching.as_mut().filter(|watching| watching.replaces_steps())
@@ -81,7 +89,7 @@ impl<F: Flow, M: Method<F>> Iterator for Steps<'_, F, M> {
             {
                 return Some(Ok(state));
             }
-            if self.progress.ending.is_some() {
+            if self.progress.ending.is_some() || self.waits_for_nothing() {
                 return None;
             }
             let advanced = self.advance().cloned();

@@ -1,5 +1,6 @@
 //! How far a run goes, in which steps, and what of it is recorded.
 
+use crate::run::controller::Rule;
 use crate::run::until::Adaptive;
 use crate::run::watch::Requests;
 
@@ -146,6 +147,14 @@ impl Schedule {
         }
     }
 
+    /// Accepts a tolerance that a method with this rule can hold.
+    pub(crate) fn check_tolerance(&self, rule: &Rule) -> Result<(), SpanError> {
+        match &self.size {
+            Size::Fixed(_) => Ok(()),
+            Size::Tolerance(adaptive) => adaptive.check_tolerance(rule),
+        }
+    }
+
     pub(crate) fn check(&self) -> Result<(), SpanError> {
         match &self.size {
             Size::Fixed(h) => {
@@ -254,13 +263,17 @@ pub enum SpanError {
         /// The number.
         value: f64,
     },
-    /// The tolerance is zero, negative, NaN, or finer than round-off.
-    #[error("the tolerance is {tolerance}; it must be a finite number of at least {least:.0e}")]
+    /// The tolerance is not a number, below the round-off of a step, or above the size of the entries.
+    #[error(
+        "the tolerance is {tolerance:e}; with this method it must be from {least:.0e} to {largest}"
+    )]
     Tolerance {
         /// The tolerance asked for.
         tolerance: f64,
-        /// The least one.
+        /// The least one of the method.
         least: f64,
+        /// The largest one.
+        largest: f64,
     },
     /// The least step size is larger than the largest one.
     #[error("the least step size {least} is above the largest one, {largest}; swap them?")]
@@ -307,6 +320,17 @@ pub enum SpanError {
     /// The interval between outputs is zero, negative, infinite or NaN.
     #[error("the interval between outputs is {interval}; it must be a positive finite number")]
     OutputInterval {
+        /// The interval.
+        interval: f64,
+    },
+    /// Outputs follow each other so closely that they have one time.
+    #[error(
+        "at t = {time:.6e} outputs that are {interval:.1e} apart have one time; let the run start at t = 0, or \
+         ask for a longer interval"
+    )]
+    OutputStandstill {
+        /// The time, the largest one of the run; without an end that of its first step.
+        time: f64,
         /// The interval.
         interval: f64,
     },

@@ -10,6 +10,7 @@ use crate::method::{
 use crate::round_off::bound::{ROUNDED, breaks_first_law};
 use crate::run::certificate::{Certificate, StepOf};
 use crate::run::controller::{Controller, Rule, StepSize};
+use crate::run::dense::says_between;
 use crate::run::output::{StepBefore, Watching};
 use crate::run::progress::Progress;
 use crate::run::scales::{Scales, larger, relative};
@@ -19,7 +20,7 @@ use crate::step_error::StepError;
 
 /// The iterator over the states of a run after its start, in constant memory; ended by an error, or
 /// where its schedule ends. With a step size alone it is endless. It yields the state after each step, or those at
-/// the [times asked for](crate::Watch::output_at) and the last one.
+/// the [times asked for](crate::Watch::output_at) and the last one. An endless iterator over such times ends with them.
 ///
 /// Made by [`Method::steps`] or [`Run::steps`](crate::Run::steps).
 pub struct Steps<'a, F: Flow, M: Method<F>> {
@@ -68,13 +69,14 @@ impl<'a, F: Flow, M: Method<F>> Steps<'a, F, M> {
         schedule: Schedule,
     ) -> Result<Self, RunError<F::Space>> {
         schedule.check()?;
+        let rule = Rule::of(&method, schedule.start);
+        schedule.check_tolerance(&rule)?;
         flow.check(&x0)?;
         flow.examine(&x0)?;
         let promises = method.promises(flow);
         let certificate = Certificate::start(flow, &x0, promises);
         let scales = Scales::at(flow, &x0, schedule.span());
         let Schedule { size, start, count, every, most, rest, watch } = schedule;
-        let rule = Rule::of(&method, start);
         let step_size = match size {
             Size::Fixed(h) => StepSize::Fixed(h),
             Size::Tolerance(adaptive) => {
@@ -96,7 +98,7 @@ impl<'a, F: Flow, M: Method<F>> Steps<'a, F, M> {
         let values = flow.laws(&x0);
         let (energy, entropy) = (values.energy, values.entropy);
         let state = State { step: 0, time: start, point: x0, energy, entropy };
-        let watching = Watching::new(watch, [start, progress.end()], &state)?;
+        let watching = Watching::new(watch, &progress, &state)?;
         let (h, in_parts) = (0.0, false);
         let before =
             StepBefore { state: state.clone(), values: values.clone(), entropy, h, in_parts };
@@ -248,7 +250,12 @@ impl<'a, F: Flow, M: Method<F>> Steps<'a, F, M> {
         };
         let reference = self.reference(self.entropy);
         let step = StepEnds { x, end, h, values: [&self.values, values], reference: &reference };
-        let Some(error) = self.method.error(flow, &step, &self.memory, norm) else { return };
+        let Some(error) = self.method.error(flow, &step, &self.memory, norm) else {
+            if says_between(flow, x) && flow.displacement(x, end).is_none() {
+                self.certificate.note_local_error(f64::INFINITY, LimitingSites::default());
+            }
+            return;
+        };
         let sites = if self.has_sites() {
             let allowed = match &self.progress.step_size {
                 StepSize::Adaptive(controller) => {

@@ -171,7 +171,7 @@ impl<M: StateSpace> Trajectory<M> {
     }
 
     /// Where the run was put down: at its end, or before the step that failed. From here it goes on,
-    /// with a later end ([`Checkpoint::with_steps`], [`Checkpoint::with_end`]) or another scheme.
+    /// with a later end ([`Checkpoint::with_steps`], [`Checkpoint::with_end`]) or other options of its method.
     pub const fn checkpoint(&self) -> &Checkpoint {
         &self.checkpoint
     }

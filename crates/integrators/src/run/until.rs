@@ -47,9 +47,11 @@ pub(crate) enum Entries<V> {
 
 /// The tolerance without another one.
 const TOLERANCE: f64 = 1e-6;
-/// The least error `τ^p` of a step, with the power of its [`Control`]: some units of round-off. So the least
-/// tolerance is 10⁻¹⁰ for order 2, and this for a method that holds errors to the tolerance itself.
-const LEAST_LOCAL: f64 = 1e-15;
+/// The least error `τ^p` of a step, with the power of its [`Control`](crate::method::Control), and the least error `τ`
+/// of a run: some units of round-off. So the least tolerance is 10⁻¹⁰ for `p = 3/2`, and this one for `p ≤ 1`.
+const LEAST: f64 = 1e-15;
+/// The largest tolerance: an error of the size of the entry.
+const LARGEST: f64 = 1.0;
 
 impl Span {
     /// From `t = 0` to `t = end`, in steps that follow a [tolerance](Until::tolerance) of 10⁻⁶ or
@@ -108,8 +110,12 @@ impl Until {
 
 impl<const N: usize> Until<N> {
     /// About the error, relative to the sizes of the entries, that the run collects while its state
-    /// moves by its own size; the error at the end is proportional to it. At least 10⁻¹⁰ for
-    /// methods of order 2, and 10⁻¹⁵ for the explicit methods.
+    /// moves by its own size; the error at the end is proportional to it.
+    ///
+    /// | method | least | largest |
+    /// |---|---|---|
+    /// | [`Scheme`](crate::Scheme), such as `WeylMidpoint`, and [`RungeKuttaChebyshev`](crate::RungeKuttaChebyshev) | 10⁻¹⁰ | 1 |
+    /// | [`DormandPrince5`](crate::DormandPrince5), [`DormandPrince8`](crate::DormandPrince8), [`Gauss`](crate::Gauss), [`Radau`](crate::Radau) | 10⁻¹⁵ | 1 |
     #[must_use]
     pub const fn tolerance(self, tolerance: f64) -> Self {
         Self { tolerance, ..self }
@@ -219,11 +225,7 @@ impl Adaptive {
     }
 
     pub(crate) fn check(&self, start: f64) -> Result<(), SpanError> {
-        let Self { end, tolerance, .. } = *self;
-        check_end(start, end)?;
-        if !(tolerance > 0.0 && tolerance.is_finite()) {
-            return Err(SpanError::Tolerance { tolerance, least: LEAST_LOCAL });
-        }
+        check_end(start, self.end)?;
         for h in [self.first, self.least, self.largest].into_iter().flatten() {
             check_step_size(h)?;
         }
@@ -233,6 +235,17 @@ impl Adaptive {
             return Err(SpanError::StepSizes { least, largest });
         }
         Ok(())
+    }
+
+    /// Accepts a tolerance that a method with this rule can hold.
+    pub(crate) fn check_tolerance(&self, rule: &Rule) -> Result<(), SpanError> {
+        let (tolerance, least, largest) = (self.tolerance, rule.tolerance_of(LEAST), LARGEST);
+        let least = least.max(LEAST);
+        if tolerance >= least && tolerance <= largest {
+            Ok(())
+        } else {
+            Err(SpanError::Tolerance { tolerance, least, largest })
+        }
     }
 
     /// The numbers for the entries of a point with `expected` directions.
@@ -258,10 +271,6 @@ impl Adaptive {
         scales: &Scales<F::Vector>,
     ) -> Result<Controller<F::Vector>, SpanError> {
         let Self { end, tolerance, least, largest, .. } = *self;
-        let least_tolerance = rule.tolerance_of(LEAST_LOCAL);
-        if tolerance < least_tolerance {
-            return Err(SpanError::Tolerance { tolerance, least: least_tolerance });
-        }
         let pace = Pace { end, tolerance, least, largest, ..Pace::default() };
         let mut controller = Controller { pace, entries: self.entries(&scales.sizes)? };
         let first = self.first.unwrap_or_else(|| controller.first_step(rule, flow, x, scales));

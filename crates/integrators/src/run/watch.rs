@@ -13,7 +13,7 @@ use crate::run::span::{Schedule, SpanError};
 pub trait Watch: Into<Schedule> {
     /// Records the states at these times, in place of those after each step. The trajectory holds the start, the
     /// states at these times, and the last state. The iterator over [`Steps`](crate::Steps) yields the same states
-    /// after the start.
+    /// after the start. Without any time these are the start and the last state.
     ///
     /// ```
     /// # use metriplectic_dynamics::System;
@@ -35,14 +35,15 @@ pub trait Watch: Into<Schedule> {
     #[must_use]
     fn output_at(self, times: impl IntoIterator<Item = f64>) -> Schedule {
         let mut schedule = self.into();
-        let list = &mut schedule.watch.times;
+        let list = schedule.watch.times.get_or_insert_default();
         list.extend(times);
         list.sort_by(f64::total_cmp);
         list.dedup();
         schedule
     }
 
-    /// Records the states at the times `t₀ + k Δt`, like [`output_at`](Self::output_at).
+    /// Records the states at the times `t₀ + k Δt`, like [`output_at`](Self::output_at). An interval that changes no
+    /// time of the run is [refused](crate::SpanError::OutputStandstill).
     ///
     /// ```
     /// # use metriplectic_dynamics::System;
@@ -206,8 +207,8 @@ impl From<Watched> for Schedule {
 /// What a schedule asks a run to look at.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Requests {
-    /// Times of outputs, in their order.
-    pub(crate) times: Vec<f64>,
+    /// Times of outputs, in their order, if a list was given.
+    pub(crate) times: Option<Vec<f64>>,
     /// The interval of outputs from the start on.
     pub(crate) interval: Option<f64>,
     pub(crate) events: Vec<Request>,
@@ -215,19 +216,23 @@ pub(crate) struct Requests {
 
 impl Requests {
     pub(crate) const fn has_outputs(&self) -> bool {
-        !self.times.is_empty() || self.interval.is_some()
+        self.times.is_some() || self.interval.is_some()
     }
 
-    /// Whether a run from `start` to `end` has these outputs.
-    pub(crate) fn check(&self, start: f64, end: f64) -> Result<(), SpanError> {
+    /// Accepts outputs of a run from `start` to `end` that have different times up to `seen`.
+    pub(crate) fn check(&self, [start, end]: [f64; 2], seen: f64) -> Result<(), SpanError> {
         let last = end + rounding(start, end);
         let outside = |time: &&f64| !(**time >= start && **time <= last && time.is_finite());
-        if let Some(&time) = self.times.iter().find(outside) {
+        if let Some(&time) = self.times.iter().flatten().find(outside) {
             return Err(SpanError::Output { time, start, end });
         }
         match self.interval {
             Some(interval) if !(interval > 0.0 && interval.is_finite()) => {
                 Err(SpanError::OutputInterval { interval })
+            }
+            Some(interval) if interval <= rounding(start, seen) => {
+                let time = if seen.abs() > start.abs() { seen } else { start };
+                Err(SpanError::OutputStandstill { time, interval })
             }
             _ => Ok(()),
         }
@@ -243,7 +248,7 @@ pub(crate) fn rounding(start: f64, time: f64) -> f64 {
 #[derive(Clone, Debug)]
 pub(crate) struct Outputs {
     start: f64,
-    times: Vec<f64>,
+    times: Option<Vec<f64>>,
     interval: Option<f64>,
     /// How many of the times are over, and how many intervals.
     index: usize,
@@ -252,10 +257,15 @@ pub(crate) struct Outputs {
 
 impl Outputs {
     /// Those after `time` in a run that began at `start`.
-    pub(crate) fn after(time: f64, start: f64, times: Vec<f64>, interval: Option<f64>) -> Self {
+    pub(crate) fn after(
+        time: f64,
+        start: f64,
+        times: Option<Vec<f64>>,
+        interval: Option<f64>,
+    ) -> Self {
         let mut outputs = Self { start, times, interval, index: 0, count: 0 };
         let done = time + rounding(start, time);
-        outputs.index = outputs.times.partition_point(|t| *t <= done);
+        outputs.index = outputs.listed().partition_point(|t| *t <= done);
         if let Some(interval) = interval {
             // The quotient may be off by its rounding.
             let quotient = ((done - start) / interval).floor().max(1.0) - 1.0;
@@ -274,7 +284,16 @@ impl Outputs {
     }
 
     pub(crate) const fn is_empty(&self) -> bool {
-        self.times.is_empty() && self.interval.is_none()
+        self.times.is_none() && self.interval.is_none()
+    }
+
+    /// Returns whether no output is left, however long the run goes on.
+    pub(crate) fn are_over(&self) -> bool {
+        self.index == self.listed().len() && self.interval.is_none()
+    }
+
+    fn listed(&self) -> &[f64] {
+        self.times.as_deref().unwrap_or_default()
     }
 
     /// The next multiple of the interval.
@@ -285,7 +304,7 @@ impl Outputs {
     /// The next output up to `time`, or so near to it that it is the same time.
     pub(crate) fn next(&mut self, time: f64) -> Option<f64> {
         let last = time + rounding(self.start, time);
-        let listed = self.times.get(self.index).copied().filter(|t| *t <= last);
+        let listed = self.listed().get(self.index).copied().filter(|t| *t <= last);
         let counted = self.in_interval().filter(|t| *t <= last);
         let next = match (listed, counted) {
             (Some(a), Some(b)) => a.min(b),
@@ -307,7 +326,8 @@ mod tests {
             let times = vec![start + 0.25, start + 0.3, start + 1.0, start + 2.75];
             let (step, interval) = (0.07, 0.1);
             let time = |n: u32| start + f64::from(n) * step;
-            let ahead = |n: u32| Outputs::after(time(n), start, times.clone(), Some(interval));
+            let ahead =
+                |n: u32| Outputs::after(time(n), start, Some(times.clone()), Some(interval));
             let mut whole = ahead(0);
             let mut all = Vec::new();
             for n in 1..=50 {

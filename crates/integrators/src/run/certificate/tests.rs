@@ -39,8 +39,18 @@ fn one_is_no_plural() {
     assert!(adaptive.contains("step sizes:  1.0e-3 to 1.0e-1, 2 rejected"), "{adaptive}");
     let coarse = Certificate { local_error: Some(0.5), ..ONE_FALL };
     assert!(coarse.to_string().contains("the motion is not resolved: local errors up to 5.0e-1"));
-    let stiff = Certificate { friction: 1e6, ..coarse };
+    let stiff = Certificate { friction: 1e6, ..coarse.clone() };
     assert!(!stiff.to_string().contains("not resolved"), "{stiff}");
+    let some = Certificate { local_error: Some(0.02), ..coarse.clone() }.to_string();
+    assert!(
+        some.contains("accuracy:    local errors up to 2.0e-2 of the state in a step, and"),
+        "{some}"
+    );
+    let fine = Certificate { local_error: Some(9e-4), ..coarse.clone() }.to_string();
+    assert!(!fine.contains("accuracy"), "{fine}");
+    let unknown =
+        Certificate { local_error: Some(f64::INFINITY), friction: 1e6, ..coarse }.to_string();
+    assert!(unknown.contains("accuracy:    not known: a step is longer than a chart"), "{unknown}");
     let text = Certificate {
         entropy_falls: 2,
         steps: 1,
@@ -50,5 +60,19 @@ fn one_is_no_plural() {
     .to_string();
     for part in ["over 1 step\n", "fell on 2 steps;", "1 Newton iteration ("] {
         assert!(text.contains(part), "\"{part}\" is missing in: {text}");
+    }
+}
+
+#[test]
+fn the_line_of_the_entropy_is_about_steps_that_were_not_targeted() {
+    let with = |projected_steps, falls_avoided| {
+        Certificate { projected_steps, falls_avoided, ..ONE_FALL }.to_string()
+    };
+    let all = ProjectedSteps { targeted: 7, ..ProjectedSteps::default() };
+    assert!(!with(all, 0).contains("entropy:  "), "{}", with(all, 0));
+    let free = ProjectedSteps { targeted: 6, free: 1, ..all };
+    let held = ProjectedSteps { targeted: 6, held: 1, ..all };
+    for text in [with(free, 0), with(held, 0), with(all, 2)] {
+        assert!(text.contains("entropy:     "), "{text}");
     }
 }

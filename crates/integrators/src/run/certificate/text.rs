@@ -11,6 +11,11 @@ use crate::round_off::bound::of_a_law;
 
 /// The local error, relative to the sizes of the entries, from which on a motion is not resolved.
 const UNRESOLVED: f64 = 0.1;
+/// The local error from which on a hundred steps may be off by what a picture shows: about 27 steps of the midpoint rule
+/// in a turn.
+const COARSE: f64 = 1e-3;
+/// This bound inside a step with stages, whose end is more accurate.
+const COARSE_INSIDE: f64 = 1e-2;
 
 impl fmt::Display for Certificate {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -73,15 +78,7 @@ impl fmt::Display for Certificate {
             }
             writeln!(f)?;
         }
-        // Where friction is stiff the estimate is far too large, and the line above says so.
-        if !self.is_stiff()
-            && let Some(error) = self.local_error.filter(|error| *error > UNRESOLVED)
-        {
-            writeln!(
-                f,
-                "accuracy:    the motion is not resolved: local errors up to {error:.1e} of the state in a step"
-            )?;
-        }
+        self.accuracy(f)?;
         if let Some(StageBalance { defect, surplus }) = self.stages {
             write!(f, "stages:      laws off by {defect:.1e} of their terms in the worst step")?;
             if surplus > 0.0 {
@@ -116,10 +113,35 @@ impl fmt::Display for Certificate {
 }
 
 impl Certificate {
+    /// Says how coarse the steps are for the motion.
+    fn accuracy(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let has_stages = self.stages.is_some();
+        match self.local_error {
+            Some(f64::INFINITY) => {
+                writeln!(f, "accuracy:    not known: a step is longer than a chart of the space")
+            }
+            // Where friction is stiff the estimate is far too large, and the line above says so.
+            Some(error) if error > UNRESOLVED && !self.is_stiff() => writeln!(
+                f,
+                "accuracy:    the motion is not resolved: local errors up to {error:.1e} of the state in a step"
+            ),
+            Some(error) if error > COARSE_INSIDE && !self.is_stiff() && has_stages => writeln!(
+                f,
+                "accuracy:    inside a step errors up to {error:.1e} of the state, smaller ones at its end"
+            ),
+            Some(error) if error > COARSE && !self.is_stiff() && !has_stages => writeln!(
+                f,
+                "accuracy:    local errors up to {error:.1e} of the state in a step, and they add up"
+            ),
+            _ => Ok(()),
+        }
+    }
+
     /// How the steps of an explicit method found the entropy, and what has set their size.
     fn projections(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let ProjectedSteps { targeted, free, held, stability } = self.projected_steps;
-        if self.projected_steps.all() > 0 {
+        // A step that hits the entropy of its production is the rule, and needs no line.
+        if free + held + self.falls_avoided > 0 {
             let falls = counted(self.falls_avoided, "fall", "falls");
             writeln!(
                 f,

@@ -58,11 +58,30 @@ pub enum ResumeError {
         "the steps of the run follow a tolerance; say when it ends with `with_end` instead of `with_steps`"
     )]
     AdaptiveSteps,
-    /// A number in it is impossible: by itself, beside the others, or for the system.
+    /// It is of a run by another method.
     #[error(
-        "the {what} of the checkpoint is {value}, which no run has that agrees with its other numbers; the \
-         file is damaged: write another one"
+        "the checkpoint is of a run by `{stored}`, and `{found}` was to resume it; resume it with the method that \
+         it is of, or start a run by the other one at its point"
     )]
+    AnotherMethod {
+        /// The [name](crate::Method::name) of the method in the checkpoint.
+        stored: String,
+        /// The name of the method that was to resume it.
+        found: String,
+    },
+    /// A number of its file has changed since it was written.
+    #[error(
+        "the numbers of the checkpoint have the checksum {found:016x}, and its file says {stored:016x}; the file \
+         was changed or damaged: take another copy of it"
+    )]
+    Altered {
+        /// The checksum in the file.
+        stored: u64,
+        /// The checksum of the numbers in the file.
+        found: u64,
+    },
+    /// A number that a method has saved is impossible.
+    #[error("the {what} of the checkpoint is {value}, which no run has; write another one")]
     Damaged {
         /// Which number.
         what: &'static str,

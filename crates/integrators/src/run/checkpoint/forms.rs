@@ -46,7 +46,6 @@ struct CertificateForm {
     worst_iterations: usize,
     #[serde(with = "exact")]
     local_error: Option<f64>,
-    #[serde(default)]
     limiting_sites: LimitingSites,
     promises: Promises,
     #[serde(with = "SecondLawForm")]

@@ -17,6 +17,8 @@ pub struct Csv<'a, M: StateSpace, W: Write> {
     pub(super) lines: String,
     /// The rows that were given to it.
     pub(super) rows: usize,
+    /// The rows that are in the file: it has been flushed since.
+    pub(super) confirmed: usize,
 }
 
 impl<M: StateSpace, W: Write> Csv<'_, M, W> {
@@ -46,10 +48,15 @@ impl<M: StateSpace, W: Write> Csv<'_, M, W> {
         // No byte is written twice, and none is left out.
         let (written, result) = write(to, self.lines.as_bytes());
         self.lines.drain(..written);
-        result.and_then(|()| to.flush()).map_err(|source| {
+        // A buffer takes bytes that its disk then refuses.
+        let flushed = to.flush();
+        if flushed.is_ok() {
             let left = self.lines.bytes().filter(|&byte| byte == b'\n').count();
-            TableError::Write { rows: self.rows.saturating_sub(left), source }.into()
-        })
+            self.confirmed = self.rows.saturating_sub(left);
+        }
+        result
+            .and(flushed)
+            .map_err(|source| TableError::Write { rows: self.confirmed, source }.into())
     }
 
     /// Writes the rows that are still in memory, and gives back what was written to.

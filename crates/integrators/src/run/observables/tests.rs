@@ -202,6 +202,38 @@ fn a_full_disk_leaves_rows_that_can_be_read_and_room_to_go_on() {
     }
 }
 
+/// A buffer takes rows for which its disk has no room.
+#[test]
+fn a_full_disk_behind_a_buffer_does_not_have_the_rows_of_the_buffer() {
+    let watch = Observables::<Line>::new().of("x", |x: &Vector1<f64>| x.x);
+    let mut csv = watch.csv(Vec::new()).unwrap();
+    let rows: Vec<_> = (0..201).map(|step| state(step, 0.1 * step as f64)).collect();
+    rows.iter().for_each(|row| csv.write(row).unwrap());
+    let lines = csv.finish().unwrap();
+    let rooms = [4, lines.len() / 3, lines.len() / 3 + 1, lines.len() / 2, lines.len() - 1];
+    for (room, capacity) in rooms.into_iter().zip([1 << 16, 100, 4096, 8, 1]) {
+        let buffer = io::BufWriter::with_capacity(capacity, Disk { room, ..Disk::default() });
+        let mut table = watch.csv(buffer).unwrap();
+        let mut most = 0;
+        for (index, row) in rows.iter().enumerate() {
+            table.write(row).unwrap();
+            if index % 50 == 49
+                && let Err(error) = table.flush()
+            {
+                most = most.max(rows_of(&error));
+            }
+        }
+        let claimed = rows_of(&table.flush().unwrap_err());
+        let there = table.to.as_ref().unwrap().get_ref().file.get_ref();
+        let whole = there.iter().filter(|&&byte| byte == b'\n').count() - 1;
+        assert!(most <= claimed && claimed <= whole, "{claimed} of {whole} rows");
+        assert!(whole < 50 || claimed >= 50, "{claimed} of {whole} rows");
+        table.to.as_mut().unwrap().get_mut().room = usize::MAX;
+        let buffer = table.finish().unwrap();
+        assert!(*buffer.get_ref().file.get_ref() == lines, "{room}");
+    }
+}
+
 #[test]
 fn two_columns_of_one_name_are_refused() {
     let twice = Observables::<Line>::new().of("x", |x| x.x).of_state("x", |s| s.entropy);

@@ -44,6 +44,7 @@
 //! friction bounds their steps; the certificate says when it does.
 
 mod chebyshev;
+mod creep;
 mod dense;
 mod estimates;
 mod flow;

@@ -129,6 +129,22 @@ pub enum StepError {
         /// The entropy `h Σ b_i ⟨dS, K dS⟩_i` that friction produces in the step.
         rise: f64,
     },
+    /// The energy changes along the velocity in proportion to time, which its derivative excludes, and explicit steps
+    /// creep.
+    #[error(
+        "the energy changes at the rate {rate:.1e} along the velocity at t = {}, although `⟨dH, v⟩ = 0`, so steps of size \
+         {h:.1e} make no way: the derivative of H is not that of its values there; check it around this state, and that \
+         no closure takes the value out of a `Real`",
+        digits(.time)
+    )]
+    WrongDerivative {
+        /// The time at which the step starts.
+        time: f64,
+        /// The size of the step.
+        h: f64,
+        /// The rate at which the energy changes.
+        rate: f64,
+    },
     /// The controller asks for a step below the least one.
     #[error(
         "the step from t = {} would have to be {h:.1e} long to keep the tolerance, below the least \

@@ -19,7 +19,7 @@ const HARDLY: f64 = 1e-6;
 const HARDLY_ALLOWED: f64 = 1e-3;
 
 /// The sizes of the entries at the start of a step: at least the error that is allowed.
-fn sizes<F: StageFlow>(flow: &F, start: &StepStart<'_, F>) -> F::Vector {
+pub(super) fn sizes<F: StageFlow>(flow: &F, start: &StepStart<'_, F>) -> F::Vector {
     let sizes = flow.sizes(start.x);
     match &start.allowed {
         Some(allowed) => Vector::zip([&sizes, allowed], |[size, allowed]| size.max(allowed)),

@@ -3,6 +3,7 @@
 use metriplectic_dynamics::SecondLaw;
 
 use super::chebyshev;
+use super::creep;
 use super::estimates::is_at_the_edge;
 use super::flow::StageFlow;
 use super::landing::{Landed, Onto};
@@ -195,6 +196,13 @@ fn finished<F: StageFlow>(
         Err(Refused::Outside(_)) => return Err(Refused::outside(flow, x, &last.end)),
         Err(refused) => return Err(refused),
     };
+    let taken = memory.taken.wrapping_add(1);
+    if taken.is_multiple_of(creep::PATIENCE)
+        && let Some(rate) = creep::energy_rate(flow, start, &last.stages[0].velocity, &last.end)
+    {
+        let time = start.time;
+        return Err(Refused::Never(StepError::WrongDerivative { time, h, rate }));
+    }
     let values = flow.values(&end.gradients);
     let next = here_at(flow, &end.x, Some(end.gradients))
         .ok_or_else(|| Refused::outside(flow, x, &last.end))?;
@@ -211,6 +219,7 @@ fn finished<F: StageFlow>(
     *memory = ExplicitMemory {
         entropy: Some(produced),
         falls: 0,
+        taken,
         lost: Some(lost),
         read: Vec::new(),
         here: Some(next),

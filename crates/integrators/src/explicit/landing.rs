@@ -92,9 +92,10 @@ impl<F: StageFlow> Onto<'_, F> {
         // Round-off is never too far.
         let most = |[end, size]: [f64; 2]| (0.5 * end.abs()).max(NEAR * size);
         let limit = Vector::zip([&last.end, &sizes], most);
-        // An entry that crosses zero has the size of its displacement.
-        let units = Vector::zip([&last.end, &sizes], |[end, size]| size.max(end.abs()));
-        Bounds { limit, units: Some(units) }
+        // An entry that crosses zero has the size of its displacement. A flow that weighs errors has its own units.
+        let size = |[end, size]: [f64; 2]| size.max(end.abs());
+        let units = (!flow.weighs_errors()).then(|| Vector::zip([&last.end, &sizes], size));
+        Bounds { limit, units }
     }
 
     /// The embedded error, if the flow weighs errors and it does not need the end of the step. Otherwise the

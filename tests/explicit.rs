@@ -319,7 +319,7 @@ fn wrong_beyond(wrong: Wrong) -> impl Metriplectic<Manifold = Euclidean<3>, Metr
         .entropy(|x: &Vector3<Real>| x.z)
         .dissipation(FieldDissipation(move |x: &Vector3<Real>, w: &Vector3<Real>| {
             let rate = match wrong {
-                Wrong::FrictionThatTurns => (-x.x + 1.5) * 0.5,
+                Wrong::FrictionThatTurns => (-x.x + 1.5) * 0.05,
                 Wrong::NegativeFriction if x.x > Real::from(1.5) => Real::from(-0.1),
                 _ => Real::from(0.1),
             };
@@ -351,7 +351,7 @@ fn a_state_that_moves_is_not_held_where_the_entropy_falls() {
                     _ => matches!(cause, StepError::EntropyFalls { rise, .. } if rise < 0.0),
                 };
                 assert!(named && c.projected_steps.held == 0, "{cause}\n{c}");
-                assert!((1.49..1.6).contains(&x.x) && x.y > 1.0, "{x}");
+                assert!((1.49..2.0).contains(&x.x), "{x}");
                 assert!(c.rejected < 500, "{c}");
             }
             let cause = match method.run(system, x0, Span::steps(0.01, 1000)) {

@@ -99,16 +99,16 @@ pub(super) fn stages<F: StageFlow>(
             mu * produced + nu * produced_before + h * (rate * sigma + start_rate * production);
         produced_before = std::mem::replace(&mut produced, next);
     }
-    let mut stages = Here::at_rest(&start.zero());
+    let zero = start.zero();
+    let mut stages = Here::at_rest(&zero);
     stages[0] = Here { velocity: start, production };
-    Ok(LastStep { stages, known: 1, before: q.clone(), end: q, rise: produced })
+    Ok(LastStep { stages, known: 1, before: zero, end: q, rise: produced })
 }
 
-/// The estimate `0.8 (q₀ − q) + 0.4 h (k₀ + k)` of the local error (eq. 2.9), with the end `q` before it is moved onto
-/// the laws. Where the values of a law have few digits, no smaller step would make their round-off smaller.
+/// The estimate `0.8 (q₀ − q) + 0.4 h (k₀ + k)` of the local error (eq. 2.9).
 pub(super) fn error<V: Vector>(last: &LastStep<V>, h: f64) -> V {
     let [start, end, ..] = &last.stages;
-    V::zip([&last.before, &start.velocity, &end.velocity], |[q, start, end]| {
+    V::zip([&last.end, &start.velocity, &end.velocity], |[q, start, end]| {
         0.4 * h * (start + end) - 0.8 * q
     })
 }

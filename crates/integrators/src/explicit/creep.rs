@@ -33,7 +33,7 @@ pub(super) fn energy_rate<F: StageFlow>(
     let is_short =
         (0..displacement.len()).all(|i| displacement.get(i).abs() <= CREEPING * sizes.get(i));
     let speed = velocity.relative_to(&sizes);
-    if !is_short || !(speed > 0.0 && speed.is_finite()) {
+    if !(is_short && speed > 0.0 && speed.is_finite()) {
         return None;
     }
     let clear = CLEAR * ROUNDED * flow.term_sizes(start.x).energy;

@@ -80,8 +80,7 @@ pub(super) struct LastStep<V> {
     pub(super) stages: [Here<V>; STAGES],
     /// The stages that are known.
     pub(super) known: usize,
-    /// The coordinates of the last stage before the end. A method whose last stage is the end has the end there, before
-    /// it was moved onto the laws.
+    /// The coordinates of the last stage before the end.
     pub(super) before: V,
     /// The coordinates of its end.
     pub(super) end: V,

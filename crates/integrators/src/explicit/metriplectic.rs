@@ -225,6 +225,9 @@ impl<Y: Metriplectic> Projection<'_, Y> {
                 // No correction improves it.
                 return self.stagnated(before, better);
             }
+            if target.with_entropy && normals.is_blurred() {
+                return Err(ProjectionError::NoEntropy);
+            }
             let correction = normals.correction(target.with_entropy, is_off);
             moved += correction.magnitude();
             let limit = target.limit.map(|limit| in_units(&limit.0, &units).magnitude());
@@ -350,7 +353,14 @@ impl<N: Dimension> Normals<N> {
         }
     }
 
-    /// The correction, in the orthonormal frame. A residual below half its round-off is left, unless the last digits
+    /// Whether the round-off of the entropy is as long as a unit: a state moved onto an entropy has an error then which
+    /// no smaller step makes smaller.
+    fn is_blurred(&self) -> bool {
+        let length = |entropy: &Normal<_>| entropy.round_off / entropy.square.sqrt();
+        self.entropy.iter().any(|entropy| !entropy.dependent && length(entropy) > 1.0)
+    }
+
+    /// The correction, in units of the entries. A residual below half its round-off is left, unless the last digits
     /// are asked for.
     fn correction(&self, with_entropy: bool, last_digits: bool) -> N::Vector<f64> {
         let entropy = self.entropy.iter().filter(|entropy| with_entropy && !entropy.dependent);

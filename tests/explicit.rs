@@ -319,6 +319,7 @@ fn wrong_beyond(wrong: Wrong) -> impl Metriplectic<Manifold = Euclidean<3>, Metr
         .entropy(|x: &Vector3<Real>| x.z)
         .dissipation(FieldDissipation(move |x: &Vector3<Real>, w: &Vector3<Real>| {
             let rate = match wrong {
+                Wrong::FrictionThatTurns if x.x > Real::from(1.5) => (-x.x + 1.5) * 2.0,
                 Wrong::FrictionThatTurns => (-x.x + 1.5) * 0.05,
                 Wrong::NegativeFriction if x.x > Real::from(1.5) => Real::from(-0.1),
                 _ => Real::from(0.1),
@@ -358,11 +359,13 @@ fn a_state_that_moves_is_not_held_where_the_entropy_falls() {
                 Err(RunError::Step { cause, .. }) => cause,
                 other => panic!("{other:?}"),
             };
-            let named = match wrong {
-                Wrong::LostDerivative => matches!(cause, StepError::NotProjected { .. }),
-                _ => matches!(cause, StepError::EntropyFalls { .. }),
-            };
-            assert!(named, "{method:?}, {wrong:?}: {cause}");
+            // No state near by has the energy, or the one that has it has less entropy.
+            let far = matches!(cause, StepError::NotProjected { .. });
+            let falls = matches!(cause, StepError::EntropyFalls { .. });
+            assert!(
+                falls || (far && wrong == Wrong::LostDerivative),
+                "{method:?}, {wrong:?}: {cause}"
+            );
         }
     }
     for wrong in [Wrong::NegativeFriction, Wrong::FrictionThatTurns, Wrong::LostDerivative] {

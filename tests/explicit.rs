@@ -6,6 +6,7 @@
 
 use metriplectic::dynamics::SecondLaw;
 use metriplectic::dynamics::system::Point;
+use metriplectic::integrators::{RunError, StepError};
 use metriplectic::prelude::*;
 use metriplectic_studies::problems::flow;
 
@@ -291,6 +292,88 @@ fn steps_of_one_size_come_to_rest() {
     assert!(!c.to_string().contains("not resolved"), "{c}");
     let (c, end) = certified(&gas(0.5), &GAS, Span::steps(0.05, 40_000).at_most(2));
     assert!((end.x - 1.0).abs() < 1e-9 && end.y.abs() < 1e-9, "{end} {c}");
+}
+
+/// What is wrong with a damped oscillator beyond `q = 1.5`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Wrong {
+    /// `K` jumps to a negative value.
+    NegativeFriction,
+    /// `K` turns negative.
+    FrictionThatTurns,
+    /// The potential has its value and no derivative.
+    LostDerivative,
+}
+
+/// `H = ½p² + ½q² + e^s`, `S = s`, with a mistake that the verification of a start below `q = 1.5` does not see.
+fn wrong_beyond(wrong: Wrong) -> impl Metriplectic<Manifold = Euclidean<3>, Metric = Canonical> {
+    let pi = Matrix3::new(0.0, 1.0, 0.0, -1.0, 0.0, 0.0, 0.0, 0.0, 0.0);
+    System::on(Euclidean::<3>)
+        .bracket(Poisson::constant(pi).expect("it is skew"))
+        .energy(move |x: &Vector3<Real>| {
+            let spring = x.x * x.x * 0.5;
+            let lost = wrong == Wrong::LostDerivative && x.x > Real::from(1.5);
+            let spring = if lost { Real::from(spring.re) } else { spring };
+            x.y * x.y * 0.5 + spring + x.z.exp()
+        })
+        .entropy(|x: &Vector3<Real>| x.z)
+        .dissipation(FieldDissipation(move |x: &Vector3<Real>, w: &Vector3<Real>| {
+            let rate = match wrong {
+                Wrong::FrictionThatTurns if x.x > Real::from(1.5) => (-x.x + 1.5) * 2.0,
+                Wrong::FrictionThatTurns => (-x.x + 1.5) * 0.05,
+                Wrong::NegativeFriction if x.x > Real::from(1.5) => Real::from(-0.1),
+                _ => Real::from(0.1),
+            };
+            let b = Vector3::new(Real::from(0.0), w.z, -w.y);
+            b * b.transpose() * (rate / w.z)
+        }))
+        .build()
+        .expect("it is a system")
+}
+
+/// A step short enough hardly moves any state, and is no reason to hold it.
+#[test]
+fn a_state_that_moves_is_not_held_where_the_entropy_falls() {
+    fn ends_where_it_is_wrong<M, Y>(method: M, wrong: Wrong, system: &Y)
+    where
+        M: Method<Y> + Copy + std::fmt::Debug,
+        Y: Metriplectic<Manifold = Euclidean<3>>,
+    {
+        // From a motion, and from rest.
+        for x0 in [vector![1.0, 2.0, 0.0], vector![-2.2, 0.0, 0.0]] {
+            for tolerance in [1e-4, 1e-6] {
+                let span = Span::until(10.0).tolerance(tolerance);
+                let mut steps = method.steps(system, x0, span).expect("its start is verified");
+                let cause = steps.by_ref().find_map(Result::err).expect("the run ends in an error");
+                let (c, x) = (steps.certificate(), steps.state().point);
+                println!("{method:?}, {wrong:?}, {tolerance:e}: {cause}\n{c}");
+                let named = match wrong {
+                    Wrong::LostDerivative => matches!(cause, StepError::WrongDerivative { .. }),
+                    _ => matches!(cause, StepError::EntropyFalls { rise, .. } if rise < 0.0),
+                };
+                assert!(named && c.projected_steps.held == 0, "{cause}\n{c}");
+                assert!((1.49..2.0).contains(&x.x), "{x}");
+                assert!(c.rejected < 500, "{c}");
+            }
+            let cause = match method.run(system, x0, Span::steps(0.01, 1000)) {
+                Err(RunError::Step { cause, .. }) => cause,
+                other => panic!("{other:?}"),
+            };
+            // No state near by has the energy, or the one that has it has less entropy.
+            let far = matches!(cause, StepError::NotProjected { .. });
+            let falls = matches!(cause, StepError::EntropyFalls { .. });
+            assert!(
+                falls || (far && wrong == Wrong::LostDerivative),
+                "{method:?}, {wrong:?}: {cause}"
+            );
+        }
+    }
+    for wrong in [Wrong::NegativeFriction, Wrong::FrictionThatTurns, Wrong::LostDerivative] {
+        let system = wrong_beyond(wrong);
+        ends_where_it_is_wrong(DormandPrince8, wrong, &system);
+        ends_where_it_is_wrong(DormandPrince5, wrong, &system);
+        ends_where_it_is_wrong(RungeKuttaChebyshev, wrong, &system);
+    }
 }
 
 /// A motion whose steps are far below the last digit of its position.

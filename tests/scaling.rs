@@ -89,6 +89,7 @@ impl<const N: usize> Problem<N> {
                 laws::scaling(&Scheme::new(WeylMidpoint), &run, &twin, &factors, tolerance),
                 laws::scaling(&DormandPrince8, &run, &twin, &factors, tolerance),
                 laws::scaling(&DormandPrince5, &run, &twin, &factors, tolerance),
+                laws::scaling(&RungeKuttaChebyshev, &run, &twin, &factors, tolerance),
                 laws::scaling(&Gauss2, &run, &twin, &factors, tolerance),
                 laws::scaling(&Radau3, &run, &twin, &factors, tolerance),
             ];
@@ -517,6 +518,188 @@ fn explicit_methods_have_the_errors_of_the_dimensionless_twin_in_si_units() {
     }
 }
 
+/// A magnet on a spring in a bath, `x = (m, (q, p, s))` on `S² × R³`, in units of length, energy and temperature:
+///
+/// `H = E (−m_z − 0.3 m_x² + ½ (p/P)² + ½ (q/L)² + 0.2 m_x q/L) + C T e^{s/C}`, `S = s`, with `P = 1/L` and `C = 10 E/T`.
+/// Friction turns `m` towards its field and slows `p`. A time has the unit `1/E`, because `m' = m × dH`.
+struct Magnet {
+    length: f64,
+    energy: f64,
+    temperature: f64,
+    friction: f64,
+}
+
+type MagnetSpace = Product<Sphere<2>, Euclidean<3>>;
+type MagnetState = (Vector3<Real>, Vector3<Real>);
+
+impl Magnet {
+    const ONE: Self = Self { length: 1.0, energy: 1.0, temperature: 1.0, friction: 1e-3 };
+    /// A Bohr magneton in a field of one tesla at room temperature.
+    const SI: Self = Self { length: 1e-9, energy: 9.27e-24, temperature: 300.0, friction: 1e-3 };
+
+    fn system(&self) -> impl Metriplectic<Manifold = MagnetSpace, Metric = Canonical> + use<> {
+        let Self { length, energy, temperature, friction } = *self;
+        let capacity = 10.0 * energy / temperature;
+        let pi = Matrix3::new(0.0, 1.0, 0.0, -1.0, 0.0, 0.0, 0.0, 0.0, 0.0);
+        System::on(Product(Sphere::<2>::round(), Euclidean::<3>))
+            .bracket((AreaForm, Poisson::constant(pi).expect("it is skew")))
+            .energy(move |(m, x): &MagnetState| {
+                let [q, p] = [x.x / length, x.y * length];
+                let motion = (p * p + q * q) * 0.5 + m.x * q * 0.2;
+                let bath = (x.z / capacity).exp() * (capacity * temperature);
+                (motion - m.z - m.x * m.x * 0.3) * energy + bath
+            })
+            .entropy(|(_, x): &MagnetState| x.z)
+            .dissipation(FieldDissipation(move |(m, _): &MagnetState, w: &SVector<Real, 6>| {
+                // Of `b` in each direction of `m` across itself, and of `p`.
+                let mut k = SMatrix::<Real, 6, 6>::zeros();
+                let [rate, slow] = [friction, friction / (length * length)].map(Real::from);
+                let field = Vector3::new(w[0], w[1], w[2]);
+                let across = Matrix3::identity() - m * m.transpose();
+                for axis in 0..3 {
+                    let mut b = SVector::<Real, 6>::zeros();
+                    let a: Vector3<Real> = across.column(axis).into();
+                    b.fixed_rows_mut::<3>(0).copy_from(&(a * w[5]));
+                    b[5] = -a.dot(&field);
+                    k += onsager(b, w[5].recip() * rate);
+                }
+                let mut b = SVector::<Real, 6>::zeros();
+                (b[4], b[5]) = (w[5], -w[4]);
+                k + onsager(b, w[5].recip() * slow)
+            }))
+            .build()
+            .expect("the parts make a system")
+    }
+
+    fn start(&self, moves: bool) -> (Vector3<f64>, Vector3<f64>) {
+        let p = if moves { 0.5 / self.length } else { 0.0 };
+        let unit = self.energy / self.temperature;
+        (vector![0.6, 0.0, -0.8], vector![0.7 * self.length, p, 0.5 * unit])
+    }
+
+    /// The entries of a state in these units.
+    fn own(&self, (m, x): &(Vector3<f64>, Vector3<f64>)) -> [f64; 6] {
+        let unit = self.energy / self.temperature;
+        [m.x, m.y, m.z, x.x / self.length, x.y * self.length, x.z / unit]
+    }
+}
+
+/// The same run in units of one and in SI units: as many steps of each kind, and the same states.
+fn targets_alike<Y, M>(method: M, [one, si]: [&Y; 2])
+where
+    Y: Metriplectic<Manifold = MagnetSpace>,
+    M: Method<Y> + Copy + std::fmt::Debug,
+{
+    for (moves, tolerance) in [(true, 1e-4), (false, 1e-4), (true, 1e-6), (false, 1e-6)] {
+        let courses: [&dyn Fn(f64) -> Schedule; 2] =
+            [&|unit| Span::until(20.0 * unit).tolerance(tolerance).into(), &|unit| {
+                Span::steps(0.05 * unit, 400).into()
+            }];
+        for course in courses {
+            let [a, b] = [(one, &Magnet::ONE), (si, &Magnet::SI)].map(|(system, units)| {
+                let schedule = course(units.energy.recip());
+                let run = method.run(system, units.start(moves), schedule).expect("it runs");
+                let certificate = run.certificate();
+                assert!(certificate.keeps_energy() && certificate.keeps_entropy(), "{certificate}");
+                let kinds = certificate.projected_steps;
+                let counts = [certificate.steps, kinds.targeted, kinds.free, kinds.held];
+                (counts, units.own(&run.last().point))
+            });
+            println!("{method:?}, {tolerance:e}, {moves}: {:?}", a.0);
+            assert_eq!(a.0, b.0, "{method:?}, {tolerance:e}, {moves}");
+            // All but the first steps of a magnet with friction aim at the entropy that it produces.
+            assert!(a.0[1] > a.0[0] * 9 / 10, "{:?}", a.0);
+            let off = a.1.iter().zip(b.1).fold(0.0_f64, |most, (a, b)| most.max((a - b).abs()));
+            assert!(off < 1e-9, "{method:?}, {tolerance:e}, {moves}: {off:e}");
+        }
+    }
+}
+
+/// Energy, entropy, lengths and momenta of a magnet differ by tens of orders in SI units, and its metric adds their
+/// squares.
+#[test]
+fn explicit_methods_aim_at_the_entropy_alike_in_any_units() {
+    let systems = [&Magnet::ONE.system(), &Magnet::SI.system()];
+    targets_alike(DormandPrince8, systems);
+    targets_alike(DormandPrince5, systems);
+    targets_alike(RungeKuttaChebyshev, systems);
+}
+
+/// Bodies of energies `e_i` in a row that exchange heat, `S = Σ c_i ln e_i`, with constants added to `H` and `S`.
+fn heated(
+    [energy, entropy]: [f64; 2],
+) -> impl Metriplectic<Manifold = Euclidean<4>, Metric = Canonical> {
+    System::on(Euclidean::<4>)
+        .bracket(Zero)
+        .energy(move |e: &Vector4<Real>| e.x + e.y + e.z + e.w + energy)
+        .entropy(move |e: &Vector4<Real>| e.x.ln() + e.y.ln() * 2.0 + e.z.ln() + e.w.ln() + entropy)
+        .dissipation(FieldDissipation(|_: &Vector4<Real>, w: &Vector4<Real>| {
+            let b = |i: usize| {
+                let mut b = Vector4::zeros();
+                (b[i], b[i + 1]) = (w[i + 1], -w[i]);
+                b
+            };
+            onsager(b(0), real(10.0)) + onsager(b(1), real(1.0)) + onsager(b(2), real(5.0))
+        }))
+        .build()
+        .expect("the parts make a system")
+}
+
+/// A damped pendulum with its bath, with constants added to `H` and `S`.
+fn swinging(
+    [energy, entropy]: [f64; 2],
+) -> impl Metriplectic<Manifold = Euclidean<3>, Metric = Canonical> {
+    let pi = Matrix3::new(0.0, 1.0, 0.0, -1.0, 0.0, 0.0, 0.0, 0.0, 0.0);
+    System::on(Euclidean::<3>)
+        .bracket(Poisson::constant(pi).expect("it is skew"))
+        .energy(move |x: &Vector3<Real>| x.y * x.y * 0.5 - x.x.cos() + x.z.exp() + energy)
+        .entropy(move |x: &Vector3<Real>| x.z + entropy)
+        .dissipation(FieldDissipation(|_: &Vector3<Real>, w: &Vector3<Real>| {
+            onsager(Vector3::new(real(0.0), w.z, -w.y), w.z.recip() * 0.4)
+        }))
+        .build()
+        .expect("the parts make a system")
+}
+
+/// Constants of 10⁶ times the range of `H` and `S` leave their values ten digits. They change no motion, so they may
+/// cost no more steps and move the end by no more than its tolerance.
+fn ignores_constants<Y: Metriplectic<Metric = Canonical>, M: Method<Y> + Clone>(
+    name: &str,
+    method: &M,
+    shifted: impl Fn([f64; 2]) -> Y,
+    x0: &metriplectic::dynamics::system::Point<Y>,
+) {
+    let span = Span::until(40.0).tolerance(1e-4);
+    let run = |constants| {
+        let run = method.clone().run(&shifted(constants), x0.clone(), span).expect("it runs");
+        let certificate = run.certificate();
+        assert!(certificate.keeps_energy() && certificate.keeps_entropy(), "{certificate}");
+        (certificate.steps + certificate.rejected, Y::Manifold::entries(&run.last().point))
+    };
+    let (steps, end) = run([0.0, 0.0]);
+    for constants in [[0.0, 1e6], [1e6, 0.0], [-1e6, 1e6]] {
+        let (more, other) = run(constants);
+        let off = end.iter().zip(&other).fold(0.0_f64, |most, (a, b)| most.max((a - b).abs()));
+        println!("{name}, {constants:?}: {more} steps for {steps}, off by {off:.1e}");
+        assert!(more * 2 <= steps * 3 && off < 1e-3, "{name}, {constants:?}: {more}, {off:e}");
+    }
+}
+
+#[test]
+fn constants_in_the_energy_and_the_entropy_cost_no_steps() {
+    let heat = vector![1.0, 3.0, 0.5, 2.0];
+    let swings = [vector![1.5, 0.5, 0.0], vector![1.5, 0.0, 0.0]];
+    macro_rules! ignored {
+        ($($method:expr),+) => {$(
+            ignores_constants(stringify!($method), &$method, heated, &heat);
+            for start in &swings {
+                ignores_constants(stringify!($method), &$method, swinging, start);
+            }
+        )+};
+    }
+    ignored!(DormandPrince8, DormandPrince5, RungeKuttaChebyshev);
+}
+
 /// A Morse molecule `x = (r, p)`: `H = p²/2μ + D (1 − e^{−a(r − r₀)})²`.
 fn molecule(
     [mass, depth, width, length]: [f64; 4],
@@ -623,6 +806,8 @@ fn curved<Y: Metriplectic>(
         let laws = [
             laws::scaling(&Scheme::new(WeylMidpoint), &run, &twin, &factors, 0.0),
             laws::scaling(&DormandPrince8, &run, &twin, &factors, 0.0),
+            laws::scaling(&DormandPrince5, &run, &twin, &factors, 0.0),
+            laws::scaling(&RungeKuttaChebyshev, &run, &twin, &factors, 0.0),
             laws::scaling(&Gauss2, &run, &twin, &factors, 0.0),
             laws::scaling(&Radau3, &run, &twin, &factors, 0.0),
         ];

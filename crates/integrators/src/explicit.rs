@@ -18,7 +18,8 @@
 //! # The laws
 //!
 //! The end of the step is moved onto `{H = H₀, L_a = L_a⁰, S = S*}` by Newton's method along the differentials,
-//! made orthogonal to each other in the user's metric. The targets are those of the start of the run, so
+//! made orthogonal to each other in units of the errors that are allowed, or of the sizes of the entries in steps
+//! of one size. So neither the units of measurement nor the metric decide which laws are independent. The targets are those of the start of the run, so
 //! nothing drifts. A projection keeps the order (Hairer, Lubich, Wanner 2006, §IV.4).
 //!
 //! Near an equilibrium `dS = β dH + γ_a dL_a`, and a round-off of the energy moves `S` by more than its own. So
@@ -29,7 +30,7 @@
 //! | targeted | `S*` is trusted and reached | `S*` |
 //! | free | else, on `{H₀, L_a⁰}` alone | what it is, if it does not fall |
 //! | rejected | it would fall | `h ← 0.7 h`, and no larger steps for a while |
-//! | held | it would fall in any step, by round-off | as before; the state stays |
+//! | held | it would fall in any step, by round-off, and the state is at rest in its own motion | as before; the state stays |
 //!
 //! At an equilibrium the entropy falls exactly where the step is beyond the region of stability, so the free
 //! steps find its edge. Values of `S` show a deviation `δ` from an equilibrium only if `|δ| > √ε`. Below that, the
@@ -43,6 +44,7 @@
 //! friction bounds their steps; the certificate says when it does.
 
 mod chebyshev;
+mod creep;
 mod dense;
 mod estimates;
 mod flow;
@@ -50,6 +52,7 @@ mod landing;
 mod memory;
 mod metriplectic;
 mod referred_rise;
+mod rest;
 mod step;
 mod tableau;
 

@@ -98,12 +98,11 @@ pub enum StepError {
         /// The fraction of its differential that is independent.
         fraction: f64,
     },
-    /// No state near the end of an explicit step has the energy and the further invariants of the run, or the
-    /// entropy would fall there.
+    /// No state near the end of an explicit step has the energy and the further invariants of the run.
     #[error(
         "the step of size {h:.3e} from t = {} was not taken: no state near its end has the energy and the \
-         invariants of the run, or the entropy would fall there, however small its part ({tried}); take smaller \
-         steps, or let them follow a tolerance with `Span::until`",
+         invariants of the run, however small its part ({tried}); take smaller steps, or let them follow a \
+         tolerance with `Span::until`",
         digits(.time)
     )]
     NotProjected {
@@ -113,6 +112,38 @@ pub enum StepError {
         h: f64,
         /// What was done.
         tried: Effort,
+    },
+    /// The entropy would fall in an explicit step and in each smaller one, while the state moves.
+    #[error(
+        "the entropy would fall in the step of size {h:.3e} from t = {}, and in smaller ones, while the state is not \
+         at rest: friction produces {rise:.1e} in this step; check that K is positive semidefinite around this \
+         state, and that H and S have their derivatives there; if friction is stiff, take smaller steps, or let them \
+         follow a tolerance with `Span::until`",
+        digits(.time)
+    )]
+    EntropyFalls {
+        /// The time at which the step starts.
+        time: f64,
+        /// The size of the step.
+        h: f64,
+        /// The entropy `h Σ b_i ⟨dS, K dS⟩_i` that friction produces in the step.
+        rise: f64,
+    },
+    /// The energy changes along the velocity in proportion to time, which its derivative excludes, and explicit steps
+    /// creep.
+    #[error(
+        "the energy changes at the rate {rate:.1e} along the velocity at t = {}, although `⟨dH, v⟩ = 0`, so steps of size \
+         {h:.1e} make no way: the derivative of H is not that of its values there; check it around this state, and that \
+         no closure takes the value out of a `Real`",
+        digits(.time)
+    )]
+    WrongDerivative {
+        /// The time at which the step starts.
+        time: f64,
+        /// The size of the step.
+        h: f64,
+        /// The rate at which the energy changes.
+        rate: f64,
     },
     /// The controller asks for a step below the least one.
     #[error(

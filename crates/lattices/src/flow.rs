@@ -124,7 +124,8 @@ impl<P: Model> Flow for Lattice<P> {
         let laws = Laws { entropy: entropy.unwrap_or(laws.entropy), ..laws.clone() };
         let (error, _) = self.motion(y)?;
         let with_entropy = entropy.is_some();
-        let target = Target { laws: &laws, with_entropy, limit: None, error: Some(&error) };
+        let error = Some(&error);
+        let target = Target { laws: &laws, with_entropy, limit: None, units: None, error };
         self.project(y.clone(), &target).ok().map(|end| end.x)
     }
 

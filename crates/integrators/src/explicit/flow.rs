@@ -75,6 +75,10 @@ pub struct Target<'a, F: Flow + ?Sized> {
     pub with_entropy: bool,
     /// A displacement, longer than which none is allowed.
     pub limit: Option<&'a F::Vector>,
+    /// The unit of each entry, in which displacements and the independence of the laws are measured: the error that is
+    /// allowed, or the size in this step. Without it, the size at the state. A flow that
+    /// [weighs errors](StageFlow::weighs_errors) may have units of its own.
+    pub units: Option<&'a F::Vector>,
     /// An estimate of the local error of the step, if the flow [weighs errors](StageFlow::weighs_errors): a state
     /// may be moved in proportion to it, so that nothing moves which the step has not moved.
     pub error: Option<&'a F::Vector>,

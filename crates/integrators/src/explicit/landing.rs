@@ -23,6 +23,12 @@ pub(super) struct Landed<F: StageFlow> {
     pub(super) how: EntropyStep,
 }
 
+/// How far a state may be moved onto its laws.
+struct Bounds<V> {
+    limit: V,
+    units: Option<V>,
+}
+
 /// The projection of the end of a step onto the laws, and the decision whether it is taken.
 pub(super) struct Onto<'a, F: StageFlow> {
     pub(super) tableau: &'static Tableau,
@@ -37,21 +43,15 @@ impl<F: StageFlow> Onto<'_, F> {
     #[inline]
     pub(super) fn decide(&self, y: Element<F>) -> Result<Landed<F>, Refused> {
         let Self { flow, start, last, produced, .. } = *self;
-        let limit = match &start.allowed {
-            Some(allowed) => allowed.map(|error| FAR * error),
-            // Round-off is never too far.
-            None => {
-                let sizes = flow.sizes(start.x);
-                Vector::zip([&last.end, &sizes], |[end, size]| (0.5 * end.abs()).max(NEAR * size))
-            }
-        };
+        let Bounds { limit, units } = self.bounds();
+        let units = units.as_ref().or(start.allowed.as_ref());
         let embedded = self.embedded_error();
         let error =
             flow.weighs_errors().then(|| embedded.as_ref().unwrap_or(&last.stages[0].velocity));
         let onto = |y, entropy, with_entropy| {
             let laws = Laws { entropy, ..start.reference.clone() };
             let limit = Some(&limit);
-            flow.project(y, &Target { laws: &laws, with_entropy, limit, error })
+            flow.project(y, &Target { laws: &laws, with_entropy, limit, units, error })
         };
         if flow.entropy_law() != SecondLaw::Exact {
             let end = onto(y, start.reference.entropy, false).map_err(refused)?;
@@ -75,11 +75,27 @@ impl<F: StageFlow> Onto<'_, F> {
         let end = onto(y, produced.sum, false).map_err(refused)?;
         let least = produced.largest - 2.0 * end.entropy_round_off;
         if end.entropy < least || self.falls(&end) {
-            return Err(Refused::Falls);
+            return Err(Refused::Falls(last.rise));
         }
         let largest = produced.largest.max(end.entropy);
         let produced = Produced { largest, ..Produced::from(end.entropy) };
         Ok(Landed { end, produced, how: EntropyStep::Free })
+    }
+
+    /// The longest displacement, and the units of the entries unless they are the errors that are allowed.
+    fn bounds(&self) -> Bounds<F::Vector> {
+        let Self { flow, start, last, .. } = *self;
+        if let Some(allowed) = &start.allowed {
+            return Bounds { limit: allowed.map(|error| FAR * error), units: None };
+        }
+        let sizes = flow.sizes(start.x);
+        // Round-off is never too far.
+        let most = |[end, size]: [f64; 2]| (0.5 * end.abs()).max(NEAR * size);
+        let limit = Vector::zip([&last.end, &sizes], most);
+        // An entry that crosses zero has the size of its displacement. A flow that weighs errors has its own units.
+        let size = |[end, size]: [f64; 2]| size.max(end.abs());
+        let units = (!flow.weighs_errors()).then(|| Vector::zip([&last.end, &sizes], size));
+        Bounds { limit, units }
     }
 
     /// The embedded error, if the flow weighs errors and it does not need the end of the step. Otherwise the

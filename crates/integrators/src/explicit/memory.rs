@@ -16,6 +16,8 @@ pub struct ExplicitMemory<V> {
     pub(super) entropy: Option<Produced>,
     /// How often in a row the entropy would have fallen.
     pub(super) falls: u32,
+    /// Steps taken; no number of a step depends on it.
+    pub(super) taken: u32,
     /// The digits that rounding has lost of the position, as displacements (Kahan 1965).
     pub(super) lost: Option<V>,
     /// The same as it was read from a checkpoint.
@@ -91,6 +93,7 @@ impl<V> Default for ExplicitMemory<V> {
         Self {
             entropy: None,
             falls: 0,
+            taken: 0,
             lost: None,
             read: Vec::new(),
             here: None,
@@ -102,10 +105,19 @@ impl<V> Default for ExplicitMemory<V> {
 
 impl<V: Vector> Memory for ExplicitMemory<V> {
     fn rescaled(&self, _: f64) -> Self {
-        let Self { entropy, falls, lost, read, here, spectrum, .. } = self;
+        let Self { entropy, falls, taken, lost, read, here, spectrum, .. } = self;
         let spectrum = spectrum.clone();
         let (lost, read, here) = (lost.clone(), read.clone(), here.clone());
-        Self { entropy: *entropy, falls: *falls, lost, read, here, last: None, spectrum }
+        Self {
+            entropy: *entropy,
+            falls: *falls,
+            taken: *taken,
+            lost,
+            read,
+            here,
+            last: None,
+            spectrum,
+        }
     }
 
     fn refused(&mut self, tried: Self) {

@@ -2,8 +2,10 @@
 
 use metriplectic_dynamics::velocity::{Covectors, Gradient, irreversible};
 use metriplectic_dynamics::{Bracket, Metriplectic, SecondLaw, system::Point};
-use metriplectic_fields::{ChartPoint, Column, Dimension, Jet1, ScalarField, Space, Vector};
-use metriplectic_manifolds::{InnerProduct, Manifold, Riemannian};
+use metriplectic_fields::{
+    ChartPoint, Column, Dimension, Jet1, ScalarField, Space, Vector, power_of_two,
+};
+use metriplectic_manifolds::Manifold;
 
 use super::flow::{Projected, ProjectionError, StageFlow, Target};
 use super::referred_rise;
@@ -139,14 +141,17 @@ impl<Y: Metriplectic> StageFlow for Y {
 /// combination of their residuals.
 #[derive(Clone, Copy, Debug)]
 struct Normal<V> {
-    /// The components of its differential in an orthonormal frame.
+    /// The components `s_i ∂_iF/f` of its differential, with the units `s` of the entries. The factor `f` is a power of
+    /// two near their length, so that no square underflows.
     hat: V,
     /// The square of its length.
     square: f64,
-    /// The target less the value.
+    /// The target less the value, over `f`.
     residual: f64,
     /// The round-off of the residual.
     round_off: f64,
+    /// The factor `f`.
+    factor: f64,
     /// Whether its differential depends on those before it.
     dependent: bool,
 }
@@ -183,6 +188,11 @@ const STAGNATED: f64 = 2.0;
 /// The same where no entropy is asked for.
 const CONSERVED: f64 = 64.0;
 
+/// A projection along the differentials `s² dF`, where `s_i` is the unit of entry `i`: the shortest correction in these
+/// units.
+///
+/// A metric of the user adds squares of entries that have different units of measurement, so it says nothing of how
+/// independent two laws are.
 struct Projection<'a, Y: Metriplectic> {
     system: &'a Y,
     target: &'a Target<'a, Y>,
@@ -198,9 +208,9 @@ impl<Y: Metriplectic> Projection<'_, Y> {
             if !gradients.is_finite() || !system.manifold().is_inside(&y) {
                 return Err(ProjectionError::Outside);
             }
-            let at = ChartPoint::<Y::Manifold>::centre(&y);
-            let Ok(g) = system.metric().at(&at) else { return Err(ProjectionError::Outside) };
-            let normals = self.normals(&y, &gradients, &g);
+            let scales = Y::Manifold::scales(&y);
+            let units = target.units.map_or(scales, |units| units.0);
+            let normals = self.normals(&gradients, &scales, &units);
             let excess = normals.excess(target.with_entropy)?;
             let here = normals.projected(y.clone(), gradients, target);
             // Two ends whose entropies are each off by less cannot differ by a fall.
@@ -215,14 +225,16 @@ impl<Y: Metriplectic> Projection<'_, Y> {
                 // No correction improves it.
                 return self.stagnated(before, better);
             }
+            if target.with_entropy && normals.is_blurred() {
+                return Err(ProjectionError::NoEntropy);
+            }
             let correction = normals.correction(target.with_entropy, is_off);
             moved += correction.magnitude();
-            let limit = target.limit.map(|limit| g.orthonormal(&g.flat(&limit.0)).magnitude());
+            let limit = target.limit.map(|limit| in_units(&limit.0, &units).magnitude());
             if !moved.is_finite() || limit.is_some_and(|limit| moved > limit) {
                 return Err(ProjectionError::Far);
             }
-            let u = g.from_orthonormal(&correction);
-            let scales = Y::Manifold::scales(&y);
+            let u = Vector::<Y::Manifold>::from_index(|i| units[i] * correction[i]);
             let unseen = (0..Dim::<Y>::LEN).all(|i| u[i].abs() <= f64::EPSILON * scales[i]);
             if unseen && excess <= CONSERVED {
                 return Ok(here);
@@ -248,20 +260,23 @@ impl<Y: Metriplectic> Projection<'_, Y> {
 
     fn normals(
         &self,
-        y: &Point<Y>,
         LawJets { values, w }: &LawJets<Dim<Y>>,
-        g: &<Y::Metric as Riemannian<Y::Manifold>>::At<f64>,
+        scales: &Vector<Y::Manifold>,
+        units: &Vector<Y::Manifold>,
     ) -> Normals<Dim<Y>> {
         let laws = self.target.laws;
-        let scales = Y::Manifold::scales(y);
         let normal = |w: &Vector<Y::Manifold>, target: f64, value: f64| {
-            let hat = g.orthonormal(w);
-            let terms = 2.0 * target.abs() + w.abs().dot(&scales);
+            let whole = Vector::<Y::Manifold>::from_index(|i| units[i] * w[i]);
+            let length = whole.magnitude();
+            let factor = if length > 0.0 { power_of_two(length) } else { 1.0 };
+            let hat = whole * factor.recip();
+            let terms = 2.0 * target.abs() + w.abs().dot(scales);
             Normal {
                 hat,
                 square: hat.dot(&hat),
-                residual: target - value,
-                round_off: f64::EPSILON * terms,
+                residual: (target - value) / factor,
+                round_off: f64::EPSILON * terms / factor,
+                factor,
                 dependent: false,
             }
         };
@@ -284,6 +299,11 @@ impl<Y: Metriplectic> Projection<'_, Y> {
         }
         normals
     }
+}
+
+/// The components `v_i/s_i`; those of an entry without a unit vanish.
+fn in_units<V: Column<f64>>(v: &V, units: &V) -> V {
+    V::from_index(|i| if v[i] == 0.0 { 0.0 } else { v[i] / units[i] })
 }
 
 impl<N: Dimension> Normals<N> {
@@ -333,7 +353,14 @@ impl<N: Dimension> Normals<N> {
         }
     }
 
-    /// The correction, in the orthonormal frame. A residual below half its round-off is left, unless the last digits
+    /// Whether the round-off of the entropy is as long as a unit: a state moved onto an entropy has an error then which
+    /// no smaller step makes smaller.
+    fn is_blurred(&self) -> bool {
+        let length = |entropy: &Normal<_>| entropy.round_off / entropy.square.sqrt();
+        self.entropy.iter().any(|entropy| !entropy.dependent && length(entropy) > 1.0)
+    }
+
+    /// The correction, in units of the entries. A residual below half its round-off is left, unless the last digits
     /// are asked for.
     fn correction(&self, with_entropy: bool, last_digits: bool) -> N::Vector<f64> {
         let entropy = self.entropy.iter().filter(|entropy| with_entropy && !entropy.dependent);
@@ -352,8 +379,9 @@ impl<N: Dimension> Normals<N> {
         gradients: LawJets<N>,
         target: &Target<'_, Y>,
     ) -> Projected<Y> {
-        let (residual, entropy_round_off) =
-            self.entropy.map_or((0.0, 0.0), |entropy| (entropy.residual, entropy.round_off));
+        let (residual, entropy_round_off) = self.entropy.map_or((0.0, 0.0), |entropy| {
+            (entropy.residual * entropy.factor, entropy.round_off * entropy.factor)
+        });
         let entropy = target.laws.entropy - residual;
         Projected { x, gradients, entropy, entropy_round_off }
     }

@@ -14,7 +14,7 @@
 use metriplectic_dynamics::velocity::differentials;
 use metriplectic_dynamics::{Metriplectic, system::Point};
 use metriplectic_fields::{ChartPoint, Column, Dimension, Space, Vector};
-use metriplectic_manifolds::{InnerProduct, Manifold, Riemannian};
+use metriplectic_manifolds::Manifold;
 
 use super::metriplectic::INDEPENDENT;
 use crate::midpoint::Dim;
@@ -28,7 +28,7 @@ struct Along<V> {
     w: [V; 3],
     /// The absolute terms of the differential in the middle.
     terms: V,
-    /// The components of the differential in the middle in an orthonormal frame.
+    /// The components `s_i ∂_iF` of the differential in the middle, with the sizes `s` of the entries.
     hat: V,
     square: f64,
 }
@@ -50,9 +50,9 @@ pub(super) fn falls<Y: Metriplectic>(system: &Y, x: &Point<Y>, y: &Point<Y>) -> 
     let d = Y::Manifold::coordinates::<f64>(x, y);
     let at = |t| differentials(system, &ChartPoint::<Y::Manifold> { base: x.clone(), q: d * t });
     let (start, middle, end) = (at(0.0), at(0.5), at(1.0));
-    let Ok(g) = system.metric().at(&ChartPoint::<Y::Manifold>::centre(x)) else { return false };
+    let scales = Y::Manifold::scales(x);
     let law = |w: [Vector<Y::Manifold>; 3]| {
-        let hat = g.orthonormal(&w[1]);
+        let hat = Vector::<Y::Manifold>::from_index(|i| scales[i].max(d[i].abs()) * w[1][i]);
         Along { w, terms: w[1].abs(), hat, square: hat.dot(&hat) }
     };
     let energy = law([start.energy, middle.energy, end.energy]);
@@ -77,7 +77,6 @@ pub(super) fn falls<Y: Metriplectic>(system: &Y, x: &Point<Y>, y: &Point<Y>) -> 
     let entropy = independent(law([start.entropy, middle.entropy, end.entropy]), &listed);
     let [before, between, after] = entropy.w.map(|w| w.dot(&d));
     let (simpson, trapezoid) = ((before + 4.0 * between + after) / 6.0, 0.5 * (before + after));
-    let scales = Y::Manifold::scales(x);
     let rounding = entropy.terms.dot(&d.abs()) + entropy.w[1].abs().dot(&scales);
     simpson + (simpson - trapezoid).abs() + ROUNDING * f64::EPSILON * rounding < 0.0
 }

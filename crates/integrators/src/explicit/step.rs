@@ -3,20 +3,18 @@
 use metriplectic_dynamics::SecondLaw;
 
 use super::chebyshev;
+use super::creep;
 use super::estimates::is_at_the_edge;
 use super::flow::StageFlow;
 use super::landing::{Landed, Onto};
 use super::memory::{ExplicitMemory, Here, LastStep, MemoryOf, Produced, combined, produced};
+use super::rest::{self, is_hardly};
 use super::tableau::Tableau;
 use crate::method::{Effort, Element, EntropyStep, Evidence, Refusal, StepStart, Taken, Vector};
 use crate::step_error::StepError;
 
 /// Falls of the entropy in a row after which a state that hardly moves is held.
 const FALLS: u32 = 5;
-/// A displacement, relative to the size of its entry, that hardly moves a state.
-const HARDLY: f64 = 1e-6;
-/// The same relative to the error that is allowed.
-const HARDLY_ALLOWED: f64 = 1e-3;
 /// How often a step of a fixed size is halved.
 const HALVES: u32 = 12;
 /// Why a step is not taken.
@@ -25,8 +23,10 @@ pub(super) enum Refused {
     Outside(Option<usize>),
     /// No state near by has the laws of the run.
     Far,
-    /// The entropy would fall.
-    Falls,
+    /// The entropy would fall, where friction produces this much in the step.
+    Falls(f64),
+    /// No smaller step can be taken either.
+    Never(StepError),
 }
 
 impl Refused {
@@ -35,9 +35,10 @@ impl Refused {
         let tried = Effort::default();
         let error = match self {
             Self::Outside(Some(site)) => Some(StepError::SiteOutOfDomain { time, h, site, tried }),
+            Self::Never(error) => Some(error),
             _ => None,
         };
-        Refusal { effort: tried, error, second_law: matches!(self, Self::Falls) }
+        Refusal { effort: tried, error, second_law: matches!(self, Self::Falls(_)) }
     }
 
     /// A displacement leads out of the domain.
@@ -69,6 +70,7 @@ pub(super) fn with_halves<F: StageFlow>(
 ) -> Result<Taken<F>, StepError> {
     let first = match try_step(tableau, flow, start, h, memory) {
         Ok(whole) => return Ok(whole),
+        Err(Refused::Never(error)) => return Err(error),
         Err(refused) => refused,
     };
     let kept = memory.clone();
@@ -82,7 +84,9 @@ pub(super) fn with_halves<F: StageFlow>(
         match refused {
             Refused::Outside(Some(site)) => StepError::SiteOutOfDomain { time, h, site, tried },
             Refused::Outside(None) => StepError::OutOfDomain { time, h, tried },
-            Refused::Far | Refused::Falls => StepError::NotProjected { time, h, tried },
+            Refused::Far => StepError::NotProjected { time, h, tried },
+            Refused::Falls(rise) => StepError::EntropyFalls { time, h, rise },
+            Refused::Never(error) => error,
         }
     })
 }
@@ -96,7 +100,7 @@ fn halves<F: StageFlow>(
     left: u32,
 ) -> Result<Taken<F>, Refused> {
     match try_step(tableau, flow, start, h, memory) {
-        Err(_) if left > 0 => {}
+        Err(Refused::Outside(_) | Refused::Far | Refused::Falls(_)) if left > 0 => {}
         taken => return taken,
     }
     let first = halves(tableau, flow, start, 0.5 * h, memory, left - 1)?;
@@ -177,17 +181,28 @@ fn finished<F: StageFlow>(
     let projection = Onto { tableau, flow, start, h, last: &*last, produced };
     let Landed { end, produced, how } = match projection.decide(y) {
         Ok(landed) => landed,
-        Err(Refused::Falls) => {
+        Err(Refused::Falls(rise)) => {
             memory.falls += 1;
-            if memory.falls > FALLS && hardly_moves(flow, start, &last.end) {
+            if memory.falls > FALLS && is_hardly(flow, start, &last.end) {
                 memory.falls = 0;
+                if !rest::is_reached(flow, start, &last.stages[0].velocity) {
+                    let time = start.time;
+                    return Err(Refused::Never(StepError::EntropyFalls { time, h, rise }));
+                }
                 return Ok(held(start));
             }
-            return Err(Refused::Falls);
+            return Err(Refused::Falls(rise));
         }
         Err(Refused::Outside(_)) => return Err(Refused::outside(flow, x, &last.end)),
         Err(refused) => return Err(refused),
     };
+    let taken = memory.taken.wrapping_add(1);
+    if taken.is_multiple_of(creep::PATIENCE)
+        && let Some(rate) = creep::energy_rate(flow, start, &last.stages[0].velocity, &last.end)
+    {
+        let time = start.time;
+        return Err(Refused::Never(StepError::WrongDerivative { time, h, rate }));
+    }
     let values = flow.values(&end.gradients);
     let next = here_at(flow, &end.x, Some(end.gradients))
         .ok_or_else(|| Refused::outside(flow, x, &last.end))?;
@@ -204,6 +219,7 @@ fn finished<F: StageFlow>(
     *memory = ExplicitMemory {
         entropy: Some(produced),
         falls: 0,
+        taken,
         lost: Some(lost),
         read: Vec::new(),
         here: Some(next),
@@ -275,13 +291,4 @@ pub(super) fn stage<F: StageFlow>(
 
 fn is_zero(v: &impl Vector) -> bool {
     (0..v.len()).all(|i| v.get(i) == 0.0)
-}
-
-/// Whether a displacement is too small to matter.
-fn hardly_moves<F: StageFlow>(flow: &F, start: &StepStart<'_, F>, q: &F::Vector) -> bool {
-    let sizes = flow.sizes(start.x);
-    (0..q.len()).all(|i| {
-        let allowed = start.allowed.as_ref().map_or(0.0, |allowed| allowed.get(i));
-        q.get(i).abs() <= (HARDLY * sizes.get(i)).max(HARDLY_ALLOWED * allowed)
-    })
 }

@@ -73,7 +73,7 @@ impl<Y: Metriplectic> Flow for Y {
     ) -> Option<Point<Y>> {
         let laws = Laws { entropy: entropy.unwrap_or(laws.entropy), ..*laws };
         let with_entropy = entropy.is_some();
-        let target = Target { laws: &laws, with_entropy, limit: None, error: None };
+        let target = Target { laws: &laws, with_entropy, limit: None, units: None, error: None };
         self.project(y.clone(), &target).ok().map(|end| end.x)
     }
 

@@ -311,6 +311,14 @@ impl<'a, F: Flow, M: Method<F>> Steps<'a, F, M> {
                 }
                 Err(Refusal { effort: wasted, error, second_law }) => {
                     effort += wasted;
+                    // An entropy that falls in a step that hardly moves the state falls in a smaller one too.
+                    if let Some(
+                        never
+                        @ (StepError::EntropyFalls { .. } | StepError::WrongDerivative { .. }),
+                    ) = error
+                    {
+                        return Err(never);
+                    }
                     broken = error.or(broken);
                     falls = second_law;
                     None

@@ -1,0 +1,70 @@
+//! Whether a state is at rest in its own motion.
+//!
+//! With the rates `k` at the displacement `d` along the velocity `v`, the motion changes its velocity at the rate
+//!
+//! ```math
+//! \rho = \min_{\pm} \frac{|k(\pm d) - v|}{|d|} ,
+//! ```
+//!
+//! and would come to rest, or turn back, after a displacement of about `v/ρ`. A state is at rest if this is hardly
+//! anything in each entry. A short step alone shows nothing: any state hardly moves in it.
+
+use super::flow::StageFlow;
+use super::step::stage;
+use crate::method::{StepStart, Vector};
+
+/// A displacement, relative to the size of its entry, that hardly moves a state.
+const HARDLY: f64 = 1e-6;
+/// The same relative to the error that is allowed.
+const HARDLY_ALLOWED: f64 = 1e-3;
+
+/// The sizes of the entries at the start of a step: at least the error that is allowed.
+pub(super) fn sizes<F: StageFlow>(flow: &F, start: &StepStart<'_, F>) -> F::Vector {
+    let sizes = flow.sizes(start.x);
+    match &start.allowed {
+        Some(allowed) => Vector::zip([&sizes, allowed], |[size, allowed]| size.max(allowed)),
+        None => sizes,
+    }
+}
+
+/// The displacements that hardly move a state.
+fn hardly<F: StageFlow>(flow: &F, start: &StepStart<'_, F>) -> F::Vector {
+    let sizes = flow.sizes(start.x);
+    match &start.allowed {
+        Some(allowed) => Vector::zip([&sizes, allowed], |[size, allowed]| {
+            (HARDLY * size).max(HARDLY_ALLOWED * allowed)
+        }),
+        None => sizes.map(|size| HARDLY * size),
+    }
+}
+
+/// Whether a displacement hardly moves a state.
+pub(super) fn is_hardly<F: StageFlow>(flow: &F, start: &StepStart<'_, F>, d: &F::Vector) -> bool {
+    let hardly = hardly(flow, start);
+    (0..d.len()).all(|i| d.get(i).abs() <= hardly.get(i))
+}
+
+/// Whether the state at the start of a step, with this velocity, is at rest in its own motion.
+#[cold]
+pub(super) fn is_reached<F: StageFlow>(
+    flow: &F,
+    start: &StepStart<'_, F>,
+    velocity: &F::Vector,
+) -> bool {
+    let (sizes, hardly) = (sizes(flow, start), hardly(flow, start));
+    // An entry without a size that moves is not at rest.
+    let speed = velocity.relative_to(&sizes);
+    if speed == 0.0 {
+        return true;
+    }
+    let time = f64::EPSILON.sqrt() / speed;
+    // On one of both sides of a jump the rates change as they do without it.
+    let rate = [time, -time].into_iter().try_fold(f64::INFINITY, |least, time| {
+        let there = stage(flow, start.x, &velocity.map(|v| time * v))?.velocity;
+        let change = Vector::zip([&there, velocity], |[there, v]| there - v);
+        Some(least.min(change.relative_to(&sizes) / f64::EPSILON.sqrt()))
+    });
+    rate.is_some_and(|rate| {
+        (0..velocity.len()).all(|i| velocity.get(i).abs() <= rate * hardly.get(i))
+    })
+}

@@ -73,6 +73,10 @@ pub struct Certificate {
     /// [`RungeKuttaChebyshev`](crate::RungeKuttaChebyshev) looks for it, and the other explicit methods if stability
     /// bounds a step. Both are `None` in a system without sites.
     pub limiting_sites: LimitingSites,
+    /// The states at which the laws of the model were checked, the start and the end among them. Those at which a step
+    /// was held or failed are checked too, and not counted. 0 for a flow that does not
+    /// [check](crate::Flow::recheck) them.
+    pub checked_states: usize,
     /// What the method promises.
     pub promises: Promises,
     /// What the model promises about its entropy; serialized as the name of the variant.
@@ -204,6 +208,7 @@ impl Certificate {
             worst_iterations: 0,
             local_error: None,
             limiting_sites: LimitingSites::default(),
+            checked_states: usize::from(flow.rechecks()),
             promises,
             second_law: flow.entropy_law(),
             friction: 0.0,

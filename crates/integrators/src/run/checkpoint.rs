@@ -104,6 +104,7 @@ use crate::run::certificate::Certificate;
 use crate::run::controller::{Rule, StepSize};
 use crate::run::output::StepBefore;
 use crate::run::progress::Progress;
+use crate::run::recheck::checked_states;
 use crate::run::span::{SpanError, check_end, check_steps};
 use crate::run::steps::Steps;
 use crate::run::trajectory::{Ending, State};
@@ -284,8 +285,11 @@ impl<'a, F: Flow, M: Method<F>> Steps<'a, F, M> {
         let c = checkpoint.run()?;
         let entries: Vec<f64> = c.point().collect();
         let point = flow.element(&entries)?;
-        let certificate =
+        let mut certificate =
             c.balance.resumed(Certificate::start(flow, &point, method.promises(flow)))?;
+        if flow.rechecks() && c.progress.ending.is_none() {
+            certificate.checked_states = checked_states(c.step);
+        }
         validation::of_the_step_size(&c.progress)?;
         let like = flow.sizes(&point);
         let progress = c.progress.convert(|what, list| vector(what, list, &like))?;

@@ -48,6 +48,8 @@ struct CertificateForm {
     local_error: Option<f64>,
     #[serde(default)]
     limiting_sites: LimitingSites,
+    #[serde(default)]
+    checked_states: usize,
     promises: Promises,
     #[serde(with = "SecondLawForm")]
     second_law: SecondLaw,

@@ -20,7 +20,7 @@ pub trait Verify<M: Manifold> {
     fn report(&self, x0: &M::Point<f64>) -> Report;
 
     /// Verifies the model around `x0`, and returns the system with this certificate. A run of it, from any
-    /// start, checks the laws at that start alone. Use it for a study of many runs.
+    /// start, checks the laws at that start without samples around it. Use it for a study of many runs.
     ///
     /// # Errors
     ///
@@ -81,7 +81,8 @@ pub trait Verify<M: Manifold> {
 ///
 /// Verification costs as much as some tens of steps, once a run. In a study of many short runs of one
 /// model, it dominates the cost and repeats the same work. A run of a verified system checks the laws at its
-/// start alone: the start lies on the manifold, values and derivatives are finite, and every law holds.
+/// start without samples around it: the start lies on the manifold, values and derivatives are finite, and every law
+/// holds. On its way it [checks](Verify::check_state) its states like any run.
 ///
 /// ```
 /// use metriplectic_dynamics::{System, Verify};

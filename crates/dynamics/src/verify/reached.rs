@@ -9,7 +9,9 @@
 //! coordinates. A law must also be broken at each of a few states at a distance of `10⁻⁶ ℓ`: at this
 //! distance from an equilibrium the differentials have ten digits, and a model is wrong in a region.
 
-use metriplectic_fields::{ChartPoint, Column, Dimension, Matrix, ScalarField, Space, Square, Vector};
+use metriplectic_fields::{
+    ChartPoint, Column, Dimension, Matrix, ScalarField, Space, Square, Vector,
+};
 use metriplectic_manifolds::{Manifold, Riemannian};
 use rand::SeedableRng;
 use rand::rngs::ChaCha8Rng;
@@ -141,7 +143,11 @@ impl<Y: Metriplectic + ?Sized> Reached<'_, Y> {
     ) -> Result<Covector<Y::Manifold>, ModelError> {
         let jet = f.jet1(self.x);
         if !jet.value.is_finite() {
-            return Err(ModelError::ValueNotFinite { field, value: jet.value, point: self.point() });
+            return Err(ModelError::ValueNotFinite {
+                field,
+                value: jet.value,
+                point: self.point(),
+            });
         }
         if !jet.df.is_finite() {
             return Err(ModelError::DerivativeNotFinite { field, point: self.point() });
@@ -173,7 +179,11 @@ impl<Y: Metriplectic + ?Sized> Reached<'_, Y> {
 
     fn law(&self, size: f64, error: fn(Vec<f64>, f64) -> ModelError) -> Result<(), ModelError> {
         // A sum that is not a number has terms that overflow, and says nothing.
-        if size > sums::TOLERANCE && size.is_finite() { Err(error(self.point(), size)) } else { Ok(()) }
+        if size > sums::TOLERANCE && size.is_finite() {
+            Err(error(self.point(), size))
+        } else {
+            Ok(())
+        }
     }
 
     /// Judges every law.
@@ -228,8 +238,7 @@ impl<Y: Metriplectic + ?Sized> Reached<'_, Y> {
         if Y::Invariants::COUNT == 0 {
             return Ok(());
         }
-        let mut each =
-            Each { at: self, units, energy, pi, force, friction, outcome: Ok(()) };
+        let mut each = Each { at: self, units, energy, pi, force, friction, outcome: Ok(()) };
         system.invariants().each(&mut each);
         each.outcome
     }
@@ -266,8 +275,9 @@ impl<Y: Metriplectic + ?Sized> Each<'_, '_, Y> {
             }),
             Kind::Momentum => {
                 let h = [&energy.value, &energy.rounding];
-                at.law(sums::form(pi, [l, h], units), |point, size| {
-                    ModelError::NotMomentum { point, size }
+                at.law(sums::form(pi, [l, h], units), |point, size| ModelError::NotMomentum {
+                    point,
+                    size,
                 })
             }
         }?;
@@ -275,8 +285,9 @@ impl<Y: Metriplectic + ?Sized> Each<'_, '_, Y> {
             ModelError::ForceChangesInvariant { point, size }
         })?;
         friction.as_ref().map_or(Ok(()), |k| {
-            at.law(sums::product(k, l, units), |point, size| {
-                ModelError::InvariantNotKept { point, size }
+            at.law(sums::product(k, l, units), |point, size| ModelError::InvariantNotKept {
+                point,
+                size,
             })
         })
     }

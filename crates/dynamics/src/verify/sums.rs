@@ -69,7 +69,8 @@ pub(super) fn form<A: Square<f64>>(
     for i in 0..n {
         for j in 0..n {
             let entry = a[(i, j)];
-            let rounding = (alpha[i] * entry * of_beta[j]).abs() + (of_alpha[i] * entry * beta[j]).abs();
+            let rounding =
+                (alpha[i] * entry * of_beta[j]).abs() + (of_alpha[i] * entry * beta[j]).abs();
             sum.add(alpha[i] * entry * beta[j], rounding);
             rate = rate.max((entry * beta[j] / units[i]).abs());
         }
@@ -79,11 +80,7 @@ pub(super) fn form<A: Square<f64>>(
 }
 
 /// Computes the relative size of `⟨α, v⟩`, with its sign.
-pub(super) fn pairing<V: Column<f64>>(
-    [alpha, rounding]: Rounded<'_, V>,
-    v: &V,
-    units: &V,
-) -> f64 {
+pub(super) fn pairing<V: Column<f64>>([alpha, rounding]: Rounded<'_, V>, v: &V, units: &V) -> f64 {
     let mut sum = Sum::default();
     (0..V::LEN).for_each(|i| sum.add(alpha[i] * v[i], rounding[i] * v[i]));
     let rate = (0..V::LEN).map(|i| (v[i] / units[i]).abs()).fold(0.0, f64::max);

@@ -107,7 +107,7 @@ impl<Y: Metriplectic> Flow for Y {
     }
 
     #[inline]
-    fn rechecks(&self) -> bool {
+    fn rechecks(&self, _: Recheck) -> bool {
         true
     }
 

@@ -287,8 +287,8 @@ impl<'a, F: Flow, M: Method<F>> Steps<'a, F, M> {
         let point = flow.element(&entries)?;
         let mut certificate =
             c.balance.resumed(Certificate::start(flow, &point, method.promises(flow)))?;
-        if flow.rechecks() && c.progress.ending.is_none() {
-            certificate.checked_states = checked_states(c.step);
+        if c.progress.ending.is_none() {
+            certificate.checked_states = checked_states(flow, c.step);
         }
         validation::of_the_step_size(&c.progress)?;
         let like = flow.sizes(&point);

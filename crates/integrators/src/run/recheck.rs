@@ -23,9 +23,17 @@ fn is_due(step: usize) -> bool {
     if step < EVERY { FIRST.contains(&step) } else { step.is_multiple_of(EVERY) }
 }
 
-/// The states at which a model has been checked after so many steps, the start among them.
-pub(crate) fn checked_states(steps: usize) -> usize {
-    1 + FIRST.iter().filter(|first| **first <= steps).count() + steps / EVERY
+/// The steps up to this one after which the model is checked.
+fn due_steps(steps: usize) -> usize {
+    FIRST.iter().filter(|first| **first <= steps).count() + steps / EVERY
+}
+
+/// The states at which the model of a flow has been checked after so many steps, the start among them.
+pub(crate) fn checked_states<F: Flow>(flow: &F, steps: usize) -> usize {
+    if !flow.rechecks(Recheck::End) {
+        return 0;
+    }
+    1 + if flow.rechecks(Recheck::OnTheWay) { due_steps(steps) } else { 0 }
 }
 
 impl<F: Flow, M: Method<F>> Steps<'_, F, M> {
@@ -36,21 +44,26 @@ impl<F: Flow, M: Method<F>> Steps<'_, F, M> {
     /// [`StepError::Model`] or [`StepError::Flow`].
     #[inline]
     pub(super) fn recheck(&mut self, held: bool) -> Result<(), StepError> {
-        if !self.flow.rechecks() {
-            return Ok(());
-        }
         let over = self.progress.ending.is_some();
         let stays = held && self.certificate.projected_steps.held.is_power_of_two();
-        if over || stays || is_due(self.state.step) { self.verify_state(over, stays) } else { Ok(()) }
+        if over || stays || is_due(self.state.step) {
+            self.verify_state(over, stays)
+        } else {
+            Ok(())
+        }
     }
 
     #[cold]
     #[inline(never)]
     fn verify_state(&mut self, over: bool, stays: bool) -> Result<(), StepError> {
         let occasion = if over || stays { Recheck::End } else { Recheck::OnTheWay };
+        if !self.flow.rechecks(occasion) {
+            return Ok(());
+        }
         let step = self.state.step;
-        let only_the_end = usize::from(over && !is_due(step));
-        self.certificate.checked_states = checked_states(step) + only_the_end;
+        let counted = is_due(step) && self.flow.rechecks(Recheck::OnTheWay);
+        self.certificate.checked_states =
+            checked_states(self.flow, step) + usize::from(over && !counted);
         let verdict = self.verdict(occasion);
         if verdict.is_err() {
             self.progress.ending = None;
@@ -71,11 +84,12 @@ impl<F: Flow, M: Method<F>> Steps<'_, F, M> {
     #[inline(never)]
     pub(super) fn explained(&self, error: StepError) -> StepError {
         match error.size() {
-            Some(h) if self.flow.rechecks() => {
-                let h = h.max(self.before.h);
-                self.verdict(Recheck::Failure { h }).err().unwrap_or(error)
+            Some(h) => {
+                let occasion = Recheck::Failure { h: h.max(self.before.h) };
+                let asked = self.flow.rechecks(occasion);
+                asked.then(|| self.verdict(occasion).err()).flatten().unwrap_or(error)
             }
-            _ => error,
+            None => error,
         }
     }
 }
@@ -89,9 +103,9 @@ mod tests {
         let mut checked = 1;
         for step in 0..1000 {
             checked += usize::from(step > 0 && is_due(step));
-            assert_eq!(checked_states(step), checked, "step {step}");
+            assert_eq!(1 + due_steps(step), checked, "step {step}");
         }
         // One per cent of the steps, beside the first ones.
-        assert_eq!(checked_states(100_000), 1 + 9 + 1123);
+        assert_eq!(due_steps(100_000), 9 + 1123);
     }
 }

@@ -201,7 +201,8 @@ fn a_quartic_casimir_of_so5_becomes_dependent_without_an_error() {
 /// equality where an eigenvalue is zero, and at least 1/4.
 #[test]
 fn a_casimir_of_so5_stays_where_the_entropy_depends_on_it() {
-    let start = SVector::from([0.3, -0.2, 0.9, 0.1, 0.8, 0.4, -0.5, 0.2, 0.6, -0.1]) * 0.7;
+    let start: SVector<f64, 10> =
+        SVector::from([0.3, -0.2, 0.9, 0.1, 0.8, 0.4, -0.5, 0.2, 0.6, -0.1]) * 0.7;
     let square = start.norm_squared();
     let cases: [(&str, Field10, f64); 2] = [
         ("S = tr X⁴", quartic, 2.0 * square * square),

@@ -2,26 +2,33 @@
 //!
 //! Where the differential of a Casimir depends on that of the entropy, its projection fades out of `Π̃`, because a
 //! discrete gradient does not resolve the direction of the rest. A step then changes the Casimir by up to `10⁻⁴h²`, and
-//! the entropy may rise above the largest value that the Casimir allows. So the end is moved onto the laws of
-//! the run, by less than a hundredth of the step: with the entropy of the end; with any entropy that has not fallen; or
-//! with that of the start, because the start has these laws.
+//! the entropy may rise above the largest value that the Casimir allows. So the end is moved onto the energy and the
+//! further invariants of the run by Newton's method along their differentials, and along that of the entropy as
+//! long as it is below that of the start. The start has these laws, so there is such a state. Near the largest
+//! entropy that the invariants allow, its differential is a combination of theirs, and each correction leaves a quarter
+//! of the fall.
 
+use metriplectic_dynamics::orthogonal::Orthogonal;
+use metriplectic_dynamics::velocity::differentials;
 use metriplectic_dynamics::{Invariants, Metriplectic, system::Point};
-use metriplectic_fields::{Column, Space as _, Vector};
-use metriplectic_manifolds::Manifold;
+use metriplectic_fields::{ChartPoint, Column, Space as _, Vector};
+use metriplectic_manifolds::{InnerProduct, Manifold, Riemannian};
 
-use super::{Numbers, Start};
+use super::{Dim, Numbers, Start};
 use crate::method::{Flow as _, Laws};
 use crate::round_off::bound::{ROUNDED, of_a_law};
 
 /// The largest distance by which an end is moved, relative to the step.
 const NEAR: f64 = 1e-2;
 
+/// The most corrections: a fall of the entropy by `10⁻⁴` is round-off after 20.
+const CORRECTIONS: usize = 32;
+
 /// A state and the laws there.
 type Restored<Y> = (Point<Y>, Laws<Numbers<Y>>);
 
-/// The end of a step with the further invariants of the run; `None` if they are kept to round-off, or no state nearby has
-/// them.
+/// The end of a step with the further invariants of the run; `None` if they are kept to round-off, or no state nearby
+/// has them.
 #[inline]
 pub(super) fn restored<Y: Metriplectic>(
     system: &Y,
@@ -35,50 +42,113 @@ pub(super) fn restored<Y: Metriplectic>(
         let error = values.invariants[k] - value + start.accumulated_error.invariants[k];
         error.abs() > of_a_law(value.abs())
     };
-    if (0..Y::Invariants::COUNT).any(off) { moved(system, start, end, values, exact) } else { None }
-}
-
-#[cold]
-#[inline(never)]
-fn moved<Y: Metriplectic>(
-    system: &Y,
-    start: &Start<'_, Y>,
-    end: &Point<Y>,
-    values: &Laws<Numbers<Y>>,
-    exact: bool,
-) -> Option<Restored<Y>> {
-    let sizes = system.term_sizes(end);
-    let mut laws = *values;
-    laws.energy = start.values.energy - start.accumulated_error.energy;
-    let mut worst = 0.0_f64;
-    for k in 0..Y::Invariants::COUNT {
-        laws.invariants[k] = start.values.invariants[k] - start.accumulated_error.invariants[k];
-        let error = (values.invariants[k] - laws.invariants[k]).abs();
-        worst = worst.max(error / of_a_law(sizes.invariants[k]));
-    }
-    if worst <= 1.0 {
+    if !(0..Y::Invariants::COUNT).any(off) {
         return None;
     }
-    let d = Y::Manifold::coordinates(start.x, end);
-    let units = Y::Manifold::scales(start.x) + d.abs();
-    let length = |q: &Vector<Y::Manifold>| {
-        (0..Vector::<Y::Manifold>::LEN).map(|i| (q[i] / units[i]).abs()).fold(0.0, f64::max)
-    };
-    let holds = |y: &Point<Y>, there: &Laws<Numbers<Y>>| {
-        let kept = |k: usize| {
-            (there.invariants[k] - laws.invariants[k]).abs() <= of_a_law(sizes.invariants[k])
+    let floor = exact.then_some(start.values.entropy);
+    Wanted::at(system, start, end, floor).of(end, *values)
+}
+
+/// The laws that the end of a step should have.
+struct Wanted<'a, Y: Metriplectic> {
+    system: &'a Y,
+    laws: Laws<Numbers<Y>>,
+    /// The entropy that the end has at least.
+    floor: Option<f64>,
+    /// The round-off of the laws.
+    round_off: Laws<Numbers<Y>>,
+    /// The size of each coordinate, and of the step in these units.
+    units: Vector<Y::Manifold>,
+    length: f64,
+}
+
+impl<'a, Y: Metriplectic> Wanted<'a, Y> {
+    #[cold]
+    fn at(system: &'a Y, start: &Start<'_, Y>, end: &Point<Y>, floor: Option<f64>) -> Self {
+        let (mut laws, mut round_off) = (start.values, system.term_sizes(end));
+        laws.energy -= start.accumulated_error.energy;
+        round_off.energy = of_a_law(round_off.energy);
+        // Half of the round-off of an increment.
+        round_off.entropy *= 0.5 * ROUNDED;
+        for k in 0..Y::Invariants::COUNT {
+            laws.invariants[k] -= start.accumulated_error.invariants[k];
+            round_off.invariants[k] = of_a_law(round_off.invariants[k]);
+        }
+        let d = Y::Manifold::coordinates(start.x, end);
+        let units = Y::Manifold::scales(start.x) + d.abs();
+        let length = relative::<Y>(&d, &units);
+        Self { system, laws, floor, round_off, units, length }
+    }
+
+    /// The state near the end of a step that has the laws.
+    #[cold]
+    #[inline(never)]
+    fn of(&self, end: &Point<Y>, mut there: Laws<Numbers<Y>>) -> Option<Restored<Y>> {
+        if self.has_invariants(&there, 1.0) {
+            return None;
+        }
+        let mut y = end.clone();
+        for _ in 0..CORRECTIONS {
+            y = Y::Manifold::chart(&y, &self.correction(&y, &there)?);
+            there = self.system.laws(&y);
+            let moved = relative::<Y>(&Y::Manifold::coordinates(end, &y), &self.units);
+            // NaN is not near.
+            if !(moved <= NEAR * self.length) {
+                return None;
+            }
+            let balanced = (there.energy - self.laws.energy).abs() <= self.round_off.energy;
+            if balanced
+                && self.has_invariants(&there, 0.25)
+                && self.fall(there.entropy) <= self.round_off.entropy
+            {
+                return Some((y, there));
+            }
+        }
+        None
+    }
+
+    /// Whether the further invariants are off by at most this fraction of their round-off.
+    fn has_invariants(&self, there: &Laws<Numbers<Y>>, fraction: f64) -> bool {
+        let (wanted, round_off) = (&self.laws.invariants, &self.round_off.invariants);
+        (0..Y::Invariants::COUNT)
+            .all(|k| (there.invariants[k] - wanted[k]).abs() <= fraction * round_off[k])
+    }
+
+    /// By how much the entropy is below the least one.
+    fn fall(&self, entropy: f64) -> f64 {
+        self.floor.map_or(0.0, |floor| (floor - entropy).max(0.0))
+    }
+
+    /// The shortest displacement that has the missing parts of the laws, one law after the other.
+    fn correction(&self, y: &Point<Y>, there: &Laws<Numbers<Y>>) -> Option<Vector<Y::Manifold>> {
+        let at = ChartPoint::<Y::Manifold>::centre(y);
+        let (w, g) = (differentials(self.system, &at), self.system.metric().at(&at).ok()?);
+        let mut normals = Orthogonal::<Dim<Y>>::default();
+        let mut d = Vector::<Y::Manifold>::zero();
+        let mut add = |dl: &Vector<Y::Manifold>, missing: f64| {
+            let sharp = g.sharp(&normals.project_covector(0, dl));
+            let known = normals.len();
+            normals.push(&g, dl);
+            if normals.len() > known {
+                d += sharp * ((missing - dl.dot(&d)) / dl.dot(&sharp));
+            }
         };
-        let fall = start.values.entropy - there.entropy;
-        length(&Y::Manifold::coordinates(end, y)) <= NEAR * length(&d)
-            && (there.energy - laws.energy).abs() <= of_a_law(sizes.energy)
-            && (0..Y::Invariants::COUNT).all(kept)
-            && (!exact || fall <= ROUNDED * start.values.entropy.abs())
-    };
-    let entropies = [Some(values.entropy), None, Some(start.values.entropy)];
-    let asked = if exact { 0..3 } else { 1..2 };
-    entropies[asked].iter().find_map(|entropy| {
-        let y = system.onto(end, &laws, *entropy)?;
-        let there = system.laws(&y);
-        holds(&y, &there).then_some((y, there))
+        add(&w.energy, self.laws.energy - there.energy);
+        for (k, (_, dl)) in w.invariants.as_ref().iter().flatten().enumerate() {
+            add(dl, self.laws.invariants[k] - there.invariants[k]);
+        }
+        let fall = self.fall(there.entropy);
+        if fall > 0.0 {
+            add(&w.entropy, fall);
+        }
+        Some(d)
+    }
+}
+
+/// The size of a displacement in these units.
+fn relative<Y: Metriplectic>(d: &Vector<Y::Manifold>, units: &Vector<Y::Manifold>) -> f64 {
+    (0..Vector::<Y::Manifold>::LEN).fold(0.0, |most, i| {
+        let size = (d[i] / units[i]).abs();
+        if size > most || size.is_nan() { size } else { most }
     })
 }

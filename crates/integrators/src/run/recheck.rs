@@ -18,6 +18,10 @@ const FIRST: [usize; 9] = [1, 2, 3, 5, 8, 13, 21, 34, 55];
 /// The model is checked after each multiple of so many steps: a check costs as much as a step.
 const EVERY: usize = 89;
 
+/// The size of a step, relative to the largest one of the run, below which the derivatives are compared with the values
+/// too: where a derivative is lost, the energy and its differential contradict each other, and steps become tiny.
+const CREEPS: f64 = 1e-2;
+
 /// Whether the model is checked after this step.
 fn is_due(step: usize) -> bool {
     if step < EVERY { FIRST.contains(&step) } else { step.is_multiple_of(EVERY) }
@@ -56,7 +60,9 @@ impl<F: Flow, M: Method<F>> Steps<'_, F, M> {
     #[cold]
     #[inline(never)]
     fn verify_state(&mut self, over: bool, stays: bool) -> Result<(), StepError> {
-        let occasion = if over || stays { Recheck::End } else { Recheck::OnTheWay };
+        let creeps = self.before.h < CREEPS * self.certificate.largest_step;
+        let all = over || stays || creeps;
+        let occasion = if all { Recheck::End } else { Recheck::OnTheWay };
         if !self.flow.rechecks(occasion) {
             return Ok(());
         }

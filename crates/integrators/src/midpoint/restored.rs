@@ -24,6 +24,13 @@ const NEAR: f64 = 1e-2;
 /// The most corrections: a fall of the entropy by `10⁻⁴` is round-off after 20.
 const CORRECTIONS: usize = 32;
 
+/// The fraction of the round-off of a law that an invariant may be off by before an end is moved.
+const KEPT: f64 = 0.5;
+
+/// The fraction of this by which the invariants may differ from the wanted ones. The entropy depends on them, and has
+/// to hold to its own round-off.
+const EXACT: f64 = 0.03;
+
 /// A state and the laws there.
 type Restored<Y> = (Point<Y>, Laws<Numbers<Y>>);
 
@@ -40,7 +47,7 @@ pub(super) fn restored<Y: Metriplectic>(
     let off = |k: usize| {
         let value = start.values.invariants[k];
         let error = values.invariants[k] - value + start.accumulated_error.invariants[k];
-        error.abs() > of_a_law(value.abs())
+        error.abs() > KEPT * of_a_law(value.abs())
     };
     if !(0..Y::Invariants::COUNT).any(off) {
         return None;
@@ -53,6 +60,8 @@ pub(super) fn restored<Y: Metriplectic>(
 struct Wanted<'a, Y: Metriplectic> {
     system: &'a Y,
     laws: Laws<Numbers<Y>>,
+    /// The further invariants of the run.
+    reference: Numbers<Y>,
     /// The entropy that the end has at least.
     floor: Option<f64>,
     /// The round-off of the laws.
@@ -70,21 +79,26 @@ impl<'a, Y: Metriplectic> Wanted<'a, Y> {
         round_off.energy = of_a_law(round_off.energy);
         // Half of the round-off of an increment.
         round_off.entropy *= 0.5 * ROUNDED;
+        let mut reference = laws.invariants;
         for k in 0..Y::Invariants::COUNT {
-            laws.invariants[k] -= start.accumulated_error.invariants[k];
-            round_off.invariants[k] = of_a_law(round_off.invariants[k]);
+            let (error, allowed) =
+                (start.accumulated_error.invariants[k], KEPT * of_a_law(round_off.invariants[k]));
+            round_off.invariants[k] = allowed;
+            reference[k] -= error;
+            // The entropy of the start may need the round-off of the invariants there.
+            laws.invariants[k] = reference[k] + error.clamp(-allowed, allowed);
         }
         let d = Y::Manifold::coordinates(start.x, end);
         let units = Y::Manifold::scales(start.x) + d.abs();
         let length = relative::<Y>(&d, &units);
-        Self { system, laws, floor, round_off, units, length }
+        Self { system, laws, reference, floor, round_off, units, length }
     }
 
     /// The state near the end of a step that has the laws.
     #[cold]
     #[inline(never)]
     fn of(&self, end: &Point<Y>, mut there: Laws<Numbers<Y>>) -> Option<Restored<Y>> {
-        if self.has_invariants(&there, 1.0) {
+        if self.has_invariants(&there, &self.reference, 1.0) {
             return None;
         }
         let mut y = end.clone();
@@ -98,7 +112,7 @@ impl<'a, Y: Metriplectic> Wanted<'a, Y> {
             }
             let balanced = (there.energy - self.laws.energy).abs() <= self.round_off.energy;
             if balanced
-                && self.has_invariants(&there, 0.25)
+                && self.has_invariants(&there, &self.laws.invariants, EXACT)
                 && self.fall(there.entropy) <= self.round_off.entropy
             {
                 return Some((y, there));
@@ -107,11 +121,13 @@ impl<'a, Y: Metriplectic> Wanted<'a, Y> {
         None
     }
 
-    /// Whether the further invariants are off by at most this fraction of their round-off.
-    fn has_invariants(&self, there: &Laws<Numbers<Y>>, fraction: f64) -> bool {
-        let (wanted, round_off) = (&self.laws.invariants, &self.round_off.invariants);
-        (0..Y::Invariants::COUNT)
-            .all(|k| (there.invariants[k] - wanted[k]).abs() <= fraction * round_off[k])
+    /// Whether the further invariants differ from the `wanted` ones by at most this fraction of their round-off.
+    fn has_invariants(&self, there: &Laws<Numbers<Y>>, wanted: &Numbers<Y>, fraction: f64) -> bool {
+        let near = |k: usize| {
+            let allowed = fraction * self.round_off.invariants[k];
+            (there.invariants[k] - wanted[k]).abs() <= allowed
+        };
+        (0..Y::Invariants::COUNT).all(near)
     }
 
     /// By how much the entropy is below the least one.

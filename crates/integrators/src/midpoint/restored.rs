@@ -106,8 +106,7 @@ impl<'a, Y: Metriplectic> Wanted<'a, Y> {
             y = Y::Manifold::chart(&y, &self.correction(&y, &there)?);
             there = self.system.laws(&y);
             let moved = relative::<Y>(&Y::Manifold::coordinates(end, &y), &self.units);
-            // NaN is not near.
-            if !(moved <= NEAR * self.length) {
+            if moved > NEAR * self.length || moved.is_nan() {
                 return None;
             }
             let balanced = (there.energy - self.laws.energy).abs() <= self.round_off.energy;

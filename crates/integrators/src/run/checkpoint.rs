@@ -39,7 +39,7 @@
 //!
 //! The system and the scheme are not in it, since closures cannot be written down: resume with the same
 //! ones. Nor are outputs at given times and events: say them again ([`Steps::watching`]). Another system is noticed if its energy, its entropy, a further invariant or its velocity has
-//! another value at the point, by more than the round-off of its terms. The model is not verified again. All
+//! another value at the point, by more than the round-off of its terms. The model is not verified around the point; it is checked on the way like that of any run. All
 //! numbers of a checkpoint are compared with each other, and with what the system says at the point.
 //!
 //! # Going on

@@ -311,6 +311,51 @@ fn resumes<Y: Metriplectic<Manifold = LieDual<3>, Metric = Canonical>>(system: &
     }
 }
 
+/// The times of the events of two functions that are NaN at the end of a step, for one step and for three.
+fn across_nan<M: Method<Y>, Y: Metriplectic<Manifold = Euclidean<2>>>(
+    method: M,
+    system: &Y,
+) -> Vec<f64> {
+    let nan_from = |from: f64, to: f64| {
+        move |t: f64, _: &Plane| {
+            if t > from && t < to { f64::NAN } else { t - 0.5 }
+        }
+    };
+    let span = Span::steps(0.1, 20)
+        .event_in_time("one end", nan_from(0.499, 0.501))
+        .event_in_time("three ends", nan_from(0.35, 0.65))
+        // It has risen before the NaN, and does not rise again after it.
+        .event_in_time(
+            "before",
+            |t: f64, _: &Plane| {
+                if t > 0.58 && t < 0.62 { f64::NAN } else { t - 0.55 }
+            },
+        );
+    let run = method.run(system, START, span).expect("it runs");
+    run.events().iter().map(|event| event.state.time).collect()
+}
+
+#[test]
+fn an_event_across_a_nan_at_the_end_of_a_step_is_found_by_every_method() {
+    let system = oscillator();
+    let all = [
+        ("midpoint", across_nan(Scheme::new(WeylMidpoint), &system)),
+        ("Gauss", across_nan(Gauss::<2>::default(), &system)),
+        ("Radau", across_nan(Radau::<3>::default(), &system)),
+        ("order 5", across_nan(DormandPrince5, &system)),
+        ("order 8", across_nan(DormandPrince8, &system)),
+        ("Chebyshev", across_nan(RungeKuttaChebyshev, &system)),
+    ];
+    for (name, times) in all {
+        println!("{name}: {times:?}");
+        // The first time after the points that are left out, to the width of a bracket in a step of 0.1.
+        let expected = [0.501, 0.55, 0.65];
+        assert_eq!(times.len(), expected.len(), "{name}: {times:?}");
+        let near = |(time, exact): (&f64, &f64)| (time - exact).abs() < 1e-14;
+        assert!(times.iter().zip(&expected).all(near), "{name}: {times:?}");
+    }
+}
+
 #[test]
 fn a_resumed_run_has_the_same_events() {
     resumes(&free_body(), 5);

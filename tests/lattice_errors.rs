@@ -218,3 +218,46 @@ fn an_entropy_that_gathers_what_the_bracket_moves_is_refused_with_its_site() {
         "{error}"
     );
 }
+
+/// One bond of 64 whose friction is wrong once its sites are warm: production stays positive, so no step shows it.
+#[test]
+fn a_bond_that_breaks_a_law_away_from_the_start_ends_the_run_of_every_method() {
+    let broken = |wrong: fn(Term) -> Term| {
+        let lattice = Lattice::on(Graph::ring(64), Euclidean::<2>)
+            .energy(energy)
+            .entropy(entropy)
+            .bond_data((0..64).map(|bond| bond == 17).collect::<Vec<bool>>())
+            .bond_onsager(move |bond: &BondState<'_, Euclidean<2>, bool>| {
+                let right = friction(bond.w[0], bond.w[1]);
+                if *bond.data && bond.x[0].y > 1.02 { right.map(wrong) } else { right }
+            })
+            .conserved(|x: &Vector2<Real>| x.x)
+            .build()
+            .expect("the parts make a lattice");
+        let start = lattice.points(warm);
+        assert!(lattice.verify(&start).is_ok());
+        let span = Span::until(5.0);
+        [
+            DormandPrince5.run(&lattice, start.clone(), span),
+            DormandPrince8.run(&lattice, start.clone(), span),
+            RungeKuttaChebyshev.run(&lattice, start, span),
+        ]
+        .map(|run| match run {
+            Err(RunError::Step { cause: StepError::Flow { time, law }, trajectory }) => {
+                assert!(time > 0.0 && trajectory.last().time <= time);
+                own(&law)
+            }
+            other => panic!("not refused: {other:?}"),
+        })
+    };
+    for error in broken(|term| Onsager { rate: -0.01, ..term }) {
+        let found =
+            matches!(error, LatticeError::NegativeRate { place: Place::Bond { bond: 17, .. }, .. });
+        assert!(found, "{error}");
+    }
+    for error in broken(|term| Onsager { b: [term.b[0], term.b[1] * (1.0 + 1e-7)], ..term }) {
+        let found =
+            matches!(error, LatticeError::Broken { place: Place::Bond { bond: 17, .. }, .. });
+        assert!(found, "{error}");
+    }
+}

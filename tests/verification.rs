@@ -1,11 +1,13 @@
 //! What verification finds, at every scale, and what it leaves alone.
 
 mod models;
+#[path = "models/stages.rs"]
+mod stages;
 
 use std::cell::Cell;
 
 use metriplectic::dynamics::Report;
-use metriplectic::integrators::RunError;
+use metriplectic::integrators::{RunError, Schedule};
 use metriplectic::prelude::*;
 use models::{half_square, kinetic};
 
@@ -621,4 +623,242 @@ fn a_verified_system_runs_as_the_system_does_and_judges_its_start() {
     assert!(matches!(error, RunError::Model(ModelError::EntropyNotCasimir { .. })), "{error}");
     // A model that is not sound has no certificate.
     assert!(bent.verified(&vector![2.1, 1.0, 1.0]).is_err());
+}
+
+type State = Vector3<Real>;
+/// Function pointers, so that one compiled system serves all models.
+type Field = fn(&State) -> Real;
+type Friction = fn(&State, &State) -> Matrix3<Real>;
+
+/// Friction `γ b bᵀ/w_s` with `b = (0, w_s, −w_p)`.
+fn drag(gamma: Real, w: &State) -> Matrix3<Real> {
+    let b = Vector3::new(Real::from(0.0), w.z, -w.y);
+    b * b.transpose() * (gamma / w.z)
+}
+
+fn damped(_: &State, w: &State) -> Matrix3<Real> {
+    drag(Real::from(0.05), w)
+}
+
+/// The part of `q` beyond 3/2, to the power of four.
+fn beyond(q: Real) -> Real {
+    if q.re > 1.5 { (q - 1.5).powi(4) } else { Real::from(0.0) }
+}
+
+/// `H = (q² + p²)/2 + e^s` with friction.
+fn oscillator_with(
+    energy: Field,
+    entropy: Field,
+    friction: Friction,
+) -> impl Metriplectic<Manifold = Euclidean<3>, Metric = Canonical> {
+    System::on(Euclidean::<3>)
+        .bracket(Poisson::constant(matrix![0.0, 1.0, 0.0; -1.0, 0.0, 0.0; 0.0, 0.0, 0.0]).unwrap())
+        .energy(energy)
+        .entropy(entropy)
+        .dissipation(FieldDissipation(friction))
+        .build()
+        .expect("an oscillator is a system")
+}
+
+fn warm(x: &State) -> Real {
+    (x.x * x.x + x.y * x.y) * 0.5 + x.z.exp()
+}
+
+const THROUGH: Vector3<f64> = Vector3::new(1.0, 2.0, 0.0);
+const AT_REST: Vector3<f64> = Vector3::new(1.2, 0.0, 0.0);
+
+/// The law that ends a run, with its time, and the trajectory up to there; `None` for a run that ends well.
+fn broken_law<Y, M>(
+    system: &Y,
+    method: M,
+    start: Vector3<f64>,
+    span: Schedule,
+) -> Option<(f64, ModelError)>
+where
+    Y: Metriplectic<Manifold = Euclidean<3>>,
+    M: Method<Y>,
+{
+    match method.run(system, start, span) {
+        Ok(run) => {
+            let checked = run.certificate().checked_states;
+            assert!(checked > 2 && run.certificate().to_string().contains("were checked at"));
+            None
+        }
+        Err(RunError::Step { cause: StepError::Model { time, law }, trajectory }) => {
+            let last = trajectory.last();
+            assert!(last.time <= time && !trajectory.ending().is_rest(), "{law}");
+            assert_eq!(trajectory.ending(), Ending::Stopped, "{law}");
+            Some((time, *law))
+        }
+        Err(error) => panic!("{error}"),
+    }
+}
+
+/// The laws that end runs of every method, in steps of one size and of a tolerance; from rest without those of Gauss.
+fn laws_of_all<Y>(system: &Y, start: Vector3<f64>) -> Vec<Option<(f64, ModelError)>>
+where
+    Y: Metriplectic<Manifold = Euclidean<3>, Metric = Canonical>,
+{
+    let mut found = Vec::new();
+    let spans: [Schedule; 2] =
+        [Span::steps(0.05, 200).into(), Span::until(10.0).tolerance(1e-6).into()];
+    for span in spans {
+        found.push(broken_law(system, Scheme::new(WeylMidpoint), start, span.clone()));
+        let gauss = stages::GAUSS.into_iter().filter(|_| start != AT_REST);
+        for method in gauss.chain(stages::RADAU) {
+            found.push(broken_law(system, method, start, span.clone()));
+        }
+        found.push(broken_law(system, DormandPrince5, start, span.clone()));
+        found.push(broken_law(system, DormandPrince8, start, span.clone()));
+        found.push(broken_law(system, RungeKuttaChebyshev, start, span));
+    }
+    found
+}
+
+#[test]
+fn a_law_that_breaks_away_from_the_start_ends_the_run_of_every_method() {
+    type Is = fn(&ModelError) -> bool;
+    let models: [(&str, Field, Field, Friction, Is); 4] = [
+        (
+            "S",
+            warm,
+            |x| x.z + beyond(x.x),
+            damped,
+            |law| matches!(law, ModelError::EntropyNotCasimir { .. }),
+        ),
+        (
+            "K dH",
+            warm,
+            |x| x.z,
+            |x, w| {
+                let mut k = drag(Real::from(0.05), w);
+                k[(2, 2)] += beyond(x.x);
+                k
+            },
+            |law| matches!(law, ModelError::EnergyNotKept { .. }),
+        ),
+        (
+            "K < 0",
+            warm,
+            |x| x.z,
+            |x, w| {
+                let growth = if x.x.re < -0.5 { (x.x + 0.5).powi(2) } else { Real::from(0.0) };
+                drag(Real::from(0.05) - growth, w)
+            },
+            |law| matches!(law, ModelError::DissipationNotPositive { .. }),
+        ),
+        (
+            "dH",
+            |x| warm(x) + Real::from(beyond(x.x).re),
+            |x| x.z,
+            damped,
+            |law| matches!(law, ModelError::WrongDerivative { .. }),
+        ),
+    ];
+    for (name, energy, entropy, friction, is) in models {
+        let system = oscillator_with(energy, entropy, friction);
+        for start in [THROUGH, AT_REST] {
+            if start == AT_REST && name != "K < 0" {
+                // It does not come to where the law is broken.
+                continue;
+            }
+            let all = laws_of_all(&system, start);
+            for (index, found) in all.into_iter().enumerate() {
+                // A lost derivative shows at the end of a run, or where a step fails.
+                let Some((time, law)) = found else {
+                    assert_eq!(name, "dH", "run {index} from {start:?}");
+                    continue;
+                };
+                println!("{name}, run {index}: {law} at {time}");
+                assert!(is(&law), "{name}, run {index}: {law}");
+                assert!(time > 0.0 && time < 10.0, "{name}, run {index}: {time}");
+            }
+        }
+    }
+    // The model that keeps its laws everywhere.
+    let sound = oscillator_with(warm, |x| x.z, damped);
+    for start in [THROUGH, AT_REST] {
+        assert!(laws_of_all(&sound, start).iter().all(Option::is_none));
+    }
+}
+
+#[test]
+fn a_lost_derivative_is_found_at_the_end_of_a_run() {
+    let system = oscillator_with(|x| warm(x) + Real::from(beyond(x.x).re), |x| x.z, damped);
+    // It ends at q = 1.9, in steps of one size.
+    for (index, found) in [
+        broken_law(&system, Scheme::new(WeylMidpoint), THROUGH, Span::steps(0.05, 12).into()),
+        broken_law(&system, stages::Gauss2, THROUGH, Span::steps(0.05, 12).into()),
+        broken_law(&system, stages::Radau3, THROUGH, Span::steps(0.05, 12).into()),
+        broken_law(&system, DormandPrince5, THROUGH, Span::steps(0.05, 12).into()),
+        broken_law(&system, DormandPrince8, THROUGH, Span::steps(0.05, 12).into()),
+        broken_law(&system, RungeKuttaChebyshev, THROUGH, Span::steps(0.05, 12).into()),
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        let (_, law) = found.unwrap_or_else(|| panic!("run {index} ends well"));
+        assert!(matches!(law, ModelError::WrongDerivative { field: "energy", .. }), "{law}");
+    }
+}
+
+#[test]
+fn steps_resumed_runs_and_runs_with_outputs_check_their_model() {
+    let system = oscillator_with(warm, |x| x.z + beyond(x.x), damped);
+    let method = Scheme::new(WeylMidpoint);
+    // One step at a time, without an end.
+    let mut steps = method.steps(&system, THROUGH, 0.05).unwrap();
+    let error = steps.by_ref().find_map(Result::err).expect("a law is broken");
+    assert!(matches!(error, StepError::Model { .. }), "{error}");
+    assert!(steps.state().point.x > 1.5 && steps.next().is_none());
+    // Put down before the law breaks.
+    let first = method.run(&system, THROUGH, Span::steps(0.05, 4)).unwrap();
+    assert_eq!(first.certificate().checked_states, 5);
+    let later = first.checkpoint().clone().with_steps(200).unwrap();
+    let error = method.resume(&system, &later).unwrap().run().unwrap_err();
+    assert!(error.to_string().contains("Casimir"), "{error}");
+    // The state at which the run stopped is the last one, also among outputs.
+    for span in [
+        Schedule::from(Span::steps(0.05, 200).output_every(0.5)),
+        Span::until(10.0).event("turn", |x: &Vector3<f64>| x.y).into(),
+        Span::until(10.0).until_rest(1e-6).into(),
+    ] {
+        let error = method.run(&system, THROUGH, span).unwrap_err();
+        let trajectory = error.trajectory().expect("it had started");
+        assert!(trajectory.last().point.x > 1.5, "{error}");
+        assert!(error.to_string().contains("Casimir"), "{error}");
+    }
+}
+
+#[test]
+fn a_model_that_keeps_its_laws_is_not_refused_at_an_equilibrium_or_at_the_edge_of_a_branch() {
+    // dS = 4 (|p|² − 1) p cancels to round-off at |p| = 1, and S is a Casimir all the same.
+    let body = System::on(LieDual::so3())
+        .energy(kinetic(vector![1.0, 2.0, 3.0]))
+        .entropy(|p: &Vector3<Real>| p.norm_squared().powi(2) - p.norm_squared() * 2.0)
+        .build()
+        .unwrap();
+    for unit in [vector![0.6, 0.8, 0.0], vector![1.0, 1.0, 1.0] / 3.0_f64.sqrt()] {
+        for size in [1.0, 1.0 + 1e-15, 1.0 - 3e-16, 1.0 + 1e-9] {
+            let x = unit * size;
+            assert!(body.check_state(&x).is_ok(), "{:?}", body.check_state(&x));
+        }
+    }
+    // A rate that falls to zero, and to −10⁻¹⁷ by round-off; and a negative one.
+    let rate = oscillator_with(warm, |x| x.z, |x, w| drag(x.x, w));
+    assert!(rate.check_state(&vector![-1e-17, 2.0, 0.1]).is_ok());
+    assert!(rate.check_state(&vector![0.0, 2.0, 0.1]).is_ok());
+    assert!(rate.check_state(&vector![-1e-3, 2.0, 0.1]).is_err());
+    // At rest, at tiny and at large states.
+    let sound = oscillator_with(warm, |x| x.z, damped);
+    for size in [0.0, 1e-300, 1e-170, 1e-30, 1e-9, 1.0, 1e9, 1e30] {
+        for x in [vector![size, 0.0, 0.0], vector![0.0, size, 0.1], vector![size, -size, 0.3]] {
+            assert!(sound.check_state(&x).is_ok(), "{:?}", sound.check_state(&x));
+            assert!(sound.check_derivatives(&x).is_ok(), "{:?}", sound.check_derivatives(&x));
+        }
+    }
+    // A kink of the energy, where no derivative agrees with the quotients.
+    let kink =
+        oscillator_with(|x| warm(x) + if x.x.re < 0.0 { -x.x } else { x.x }, |x| x.z, damped);
+    assert!(kink.check_derivatives(&vector![0.0, 1.0, 0.0]).is_ok());
 }

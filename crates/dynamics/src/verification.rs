@@ -20,7 +20,7 @@ pub trait Verify<M: Manifold> {
     fn report(&self, x0: &M::Point<f64>) -> Report;
 
     /// Verifies the model around `x0`, and returns the system with this certificate. A run of it, from any
-    /// start, checks the laws at that start alone. Use it for a study of many runs.
+    /// start, checks the laws at that start without samples around it. Use it for a study of many runs.
     ///
     /// # Errors
     ///
@@ -34,13 +34,55 @@ pub trait Verify<M: Manifold> {
     ///
     /// Those of [`verify`](Self::verify).
     fn check_start(&self, x0: &M::Point<f64>) -> Result<(), ModelError>;
+
+    /// Checks the laws at one state that a run has reached: finite differentials, a metric that can be used, a skew
+    /// `Π` with `Π dS = 0`, a symmetric `K ⪰ 0` with `K dH = 0`, and the laws of a force and of the further
+    /// invariants. A law is broken if it is off by `10⁻⁸` of its terms there and at states nearby. The Jacobi identity
+    /// and the actions of symmetries are checked at the start alone.
+    ///
+    /// ```
+    /// use metriplectic_dynamics::{ModelError, Poisson, System, Verify};
+    /// use metriplectic_fields::Real;
+    /// use metriplectic_manifolds::Euclidean;
+    /// use nalgebra::{Vector3, vector};
+    /// let bent = System::on(Euclidean::<3>)
+    ///     .bracket(Poisson::constant(Vector3::z().cross_matrix()).unwrap())
+    ///     .energy(|x: &Vector3<Real>| x.norm_squared())
+    ///     .entropy(|x: &Vector3<Real>| if x.x.re > 2.0 { x.z + (x.x - 2.0).powi(3) } else { x.z })
+    ///     .build()
+    ///     .unwrap();
+    /// assert!(bent.verify(&vector![1.0, 1.0, 1.0], 0.1).is_ok());
+    /// let law = bent.check_state(&vector![2.5, 1.0, 1.0]);
+    /// assert!(matches!(law, Err(ModelError::EntropyNotCasimir { .. })));
+    /// ```
+    ///
+    /// # Errors
+    ///
+    /// [`ModelError`] that names the law, the state and the size of the violation.
+    fn check_state(&self, x: &M::Point<f64>) -> Result<(), ModelError>;
+
+    /// Compares the derivatives of energy, entropy and further invariants with their values at one state.
+    ///
+    /// # Errors
+    ///
+    /// [`ModelError::WrongDerivative`].
+    fn check_derivatives(&self, x: &M::Point<f64>) -> Result<(), ModelError>;
+
+    /// Looks for a broken law where a step fails: at `x`, at 16 states around it, each coordinate within a tenth of its
+    /// size, and at the states `ahead`. States without values are left out.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`check_state`](Self::check_state) and [`check_derivatives`](Self::check_derivatives).
+    fn check_around(&self, x: &M::Point<f64>, ahead: &[M::Point<f64>]) -> Result<(), ModelError>;
 }
 
 /// A system whose model was verified once; made by [`Verify::verified`].
 ///
 /// Verification costs as much as some tens of steps, once a run. In a study of many short runs of one
 /// model, it dominates the cost and repeats the same work. A run of a verified system checks the laws at its
-/// start alone: the start lies on the manifold, values and derivatives are finite, and every law holds.
+/// start without samples around it: the start lies on the manifold, values and derivatives are finite, and every law
+/// holds. On its way it [checks](Verify::check_state) its states like any run.
 ///
 /// ```
 /// use metriplectic_dynamics::{System, Verify};

@@ -6,6 +6,8 @@
 //! A model has a domain (a logarithm, a square root), and is judged inside it. If a *value* is not finite at a
 //! sample, the sample is drawn again, nearer to the start. If a value is finite and a derivative is not, the
 //! model is refused, as with `x.norm()` at zero.
+//!
+//! A run asks for the laws again at states on its way (module `reached`).
 
 pub(crate) mod balance;
 pub(crate) mod bracket;
@@ -19,7 +21,9 @@ mod force;
 mod invariants;
 mod metric;
 mod place;
+mod reached;
 pub(crate) mod sampling;
+mod sums;
 mod table;
 
 use metriplectic_fields::stack::with_room;
@@ -64,6 +68,18 @@ impl<Y: Metriplectic + ?Sized> Verify<Y::Manifold> for Y {
 
     fn check_start(&self, x0: &Point<Y>) -> Result<(), ModelError> {
         if self.is_verified() { at_one_point(self, x0) } else { self.verify(x0, RADIUS) }
+    }
+
+    fn check_state(&self, x: &Point<Y>) -> Result<(), ModelError> {
+        with_room::<Dim<Y>, _>(|| reached::examine(self, x))
+    }
+
+    fn check_derivatives(&self, x: &Point<Y>) -> Result<(), ModelError> {
+        with_room::<Dim<Y>, _>(|| reached::compare(self, x))
+    }
+
+    fn check_around(&self, x: &Point<Y>, ahead: &[Point<Y>]) -> Result<(), ModelError> {
+        with_room::<Dim<Y>, _>(|| reached::around(self, x, ahead))
     }
 }
 

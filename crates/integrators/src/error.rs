@@ -61,6 +61,13 @@ impl<M: StateSpace> RunError<M> {
 #[error("{0}")]
 pub struct FlowError(#[source] Arc<dyn std::error::Error + Send + Sync>);
 
+/// The same error, not one that says the same.
+impl PartialEq for FlowError {
+    fn eq(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.0, &other.0)
+    }
+}
+
 impl FlowError {
     /// Wraps the error of a flow.
     pub fn new(error: impl std::error::Error + Send + Sync + 'static) -> Self {

@@ -46,7 +46,7 @@ pub use error::{Error, FlowError, RunError};
 pub use explicit::{DormandPrince5, DormandPrince8, RungeKuttaChebyshev, StageFlow};
 pub use method::{
     Components, Control, Effort, Element, EntropyStep, Evidence, Flow, Laws, LimitingSites, Memory,
-    Method, Promises, Refusal, StageLaws, StateSpace, StepEnds, StepStart, Taken, Vector,
+    Method, Promises, Recheck, Refusal, StageLaws, StateSpace, StepEnds, StepStart, Taken, Vector,
 };
 pub use midpoint::{Residual, Run, Scheme};
 pub use newton::{Equation, Iterate, Linearised, Newton, Root, Rounding};

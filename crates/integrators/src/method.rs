@@ -18,7 +18,7 @@ use std::fmt::Debug;
 
 pub use control::Control;
 pub use evidence::{Effort, EntropyStep, Evidence, LimitingSites, Promises, StageLaws};
-pub use flow::{Element, Flow, Laws, StateSpace};
+pub use flow::{Element, Flow, Laws, Recheck, StateSpace};
 pub use step::{Refusal, StepEnds, StepStart, Taken};
 pub use vector::{Components, Vector};
 

@@ -35,6 +35,7 @@ mod globaliser;
 mod jacobian;
 mod memory;
 mod predictor;
+mod restored;
 mod run;
 
 use metriplectic_dynamics::velocity::projected_fractions;
@@ -244,6 +245,14 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
                 Laws { energy, entropy, ..start.values }
             }
             _ => system.laws(&x),
+        };
+        let (x, values) = match restored::restored(system, start, &x, &values, equation.is_exact())
+        {
+            Some(restored) => {
+                memory.compensation.clear();
+                restored
+            }
+            None => (x, values),
         };
         let change = values.energy - start.values.energy;
         if !values.entropy.is_finite() {

@@ -8,6 +8,7 @@ pub mod event;
 pub mod observables;
 mod output;
 mod progress;
+mod recheck;
 mod record;
 mod root;
 pub mod scales;

@@ -2,7 +2,10 @@
 
 use std::fmt;
 
+use metriplectic_dynamics::ModelError;
+
 use crate::digits::{counted, digits};
+use crate::error::FlowError;
 use crate::method::Effort;
 
 impl fmt::Display for Effort {
@@ -20,9 +23,28 @@ impl fmt::Display for Effort {
 }
 
 /// A step that could not be taken, after its halves had been tried too.
-#[derive(Clone, Copy, PartialEq, thiserror::Error)]
+#[derive(Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum StepError {
+    /// The model was verified at the start of the run, and breaks a law at a state that the run has reached, or near a
+    /// state from which a step failed.
+    #[error("the model keeps its laws around the start of the run, but not around the state at t = {}: {law}", digits(.time))]
+    Model {
+        /// The time of the state.
+        time: f64,
+        /// The law, with the state at which it is broken.
+        #[source]
+        law: Box<ModelError>,
+    },
+    /// The flow has found a fault of its own at a state that the run has reached.
+    #[error("the system was verified at the start of the run, but at t = {}: {law}", digits(.time))]
+    Flow {
+        /// The time of the state.
+        time: f64,
+        /// The flow's own error.
+        #[source]
+        law: FlowError,
+    },
     /// The implicit equation was not solved.
     #[error(
         "the step of size {h:.3e} from t = {} was not solved: residual {residual:.1e} after \
@@ -218,6 +240,26 @@ pub enum StepError {
         /// The size of the step.
         h: f64,
     },
+}
+
+impl StepError {
+    /// The size of the step that failed; `None` if the error says already what is wrong with the system.
+    pub(crate) const fn size(&self) -> Option<f64> {
+        match self {
+            Self::NotConverged { h, .. }
+            | Self::StiffFriction { h, .. }
+            | Self::FirstLawBroken { h, .. }
+            | Self::NotProjected { h, .. }
+            | Self::TooSmall { h, .. }
+            | Self::Standstill { h, .. }
+            | Self::OutOfDomain { h, .. }
+            | Self::SiteOutOfDomain { h, .. } => Some(h.abs()),
+            Self::Model { .. }
+            | Self::Flow { .. }
+            | Self::DependentInvariants { .. }
+            | Self::NothingBetween { .. } => None,
+        }
+    }
 }
 
 impl fmt::Debug for StepError {

@@ -4,7 +4,7 @@ use metriplectic_dynamics::SecondLaw;
 use metriplectic_dynamics::invariants::Kind;
 use metriplectic_fields::{Column, Space};
 use metriplectic_integrators::explicit::{Projected, ProjectionError, Target};
-use metriplectic_integrators::{Flow, FlowError, Laws, Scales, StageFlow};
+use metriplectic_integrators::{Flow, FlowError, Laws, Recheck, Scales, StageFlow};
 use metriplectic_manifolds::{Manifold, PointError};
 
 use crate::lattice::{Differentials, Lattice, Total, Totals, differentials_at, dimension};
@@ -158,6 +158,16 @@ impl<P: Model> Flow for Lattice<P> {
         let verified = self.verify(x0).map_err(FlowError::new);
         self.clear();
         verified
+    }
+
+    fn rechecks(&self, occasion: Recheck) -> bool {
+        occasion != Recheck::OnTheWay
+    }
+
+    fn reexamine(&self, x: &Points<P::Manifold>, _occasion: Recheck) -> Result<(), FlowError> {
+        let checked = self.recheck_all(x).map_err(FlowError::new);
+        self.clear();
+        checked
     }
 
     fn site_outside(&self, x: &Points<P::Manifold>, d: &SiteVector) -> Option<usize> {

@@ -49,6 +49,7 @@ pub mod profiles;
 mod projection;
 mod random;
 mod reach;
+mod recheck;
 pub mod vector;
 mod verify;
 

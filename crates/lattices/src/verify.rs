@@ -68,7 +68,7 @@ impl<P: Model> Lattice<P> {
         Trial { lattice: self, y: &y, random: Random::new(1), mean: [0.0; 2] }.all()
     }
 
-    fn place_of(&self, bond: usize) -> Place {
+    pub(crate) fn place_of(&self, bond: usize) -> Place {
         let sites = self.layout.bonds()[bond].map(|site| site as usize);
         Place::Bond { bond: self.layout.number(bond), sites }
     }

@@ -45,12 +45,21 @@ pub(super) fn compare<Y: Metriplectic + ?Sized>(
     slopes: &TensorSlopes<Y::Manifold>,
     axis: usize,
 ) -> Result<(), ModelError> {
+    compare_scalars(place, axis)?;
+    let along = Along { place, axis };
+    along.metric(slopes)?;
+    along.bracket(slopes)
+}
+
+/// Compares the derivatives of energy, entropy and further invariants along one axis of the chart.
+pub(super) fn compare_scalars<Y: Metriplectic + ?Sized>(
+    place: &Place<'_, Y>,
+    axis: usize,
+) -> Result<(), ModelError> {
     let along = Along { place, axis };
     along.scalar("energy", place.system.energy(), &place.energy.df)?;
     along.scalar("entropy", place.system.entropy(), &place.entropy.df)?;
-    along.invariants()?;
-    along.metric(slopes)?;
-    along.bracket(slopes)
+    along.invariants()
 }
 
 /// Compares the derivatives of the dissipation along the `axes`, also along the covector that it annihilates. No

@@ -43,6 +43,21 @@ pub struct Laws<L> {
     pub invariants: L,
 }
 
+/// The occasion on which a run asks for the laws of its model again.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Recheck {
+    /// A state on the way, after a step. The check allocates nothing.
+    OnTheWay,
+    /// The end of the run, or a state that a step has left where it is.
+    End,
+    /// A state from which a step of this size fails, before the run ends in the error of the step.
+    Failure {
+        /// The size of the step.
+        h: f64,
+    },
+}
+
 /// What a run needs of a system: its laws, its sizes, and its equation of motion.
 ///
 /// Implement it for a system that is no [`Metriplectic`](metriplectic_dynamics::Metriplectic) one, such as one
@@ -143,6 +158,33 @@ pub trait Flow {
     /// The flow's own error.
     fn examine(&self, x0: &Element<Self>) -> Result<(), FlowError> {
         let _ = x0;
+        Ok(())
+    }
+
+    /// Whether [`recheck`](Self::recheck) or [`reexamine`](Self::reexamine) checks anything on an occasion. A run does
+    /// not ask for them otherwise.
+    fn rechecks(&self, occasion: Recheck) -> bool {
+        let _ = occasion;
+        false
+    }
+
+    /// Verifies the model at a state that the run has reached. A law that is broken there ends the run.
+    ///
+    /// # Errors
+    ///
+    /// The first law of the model that is broken.
+    fn recheck(&self, x: &Element<Self>, occasion: Recheck) -> Result<(), ModelError> {
+        let _ = (x, occasion);
+        Ok(())
+    }
+
+    /// Verifies what only the flow knows of at a state that the run has reached.
+    ///
+    /// # Errors
+    ///
+    /// The flow's own error.
+    fn reexamine(&self, x: &Element<Self>, occasion: Recheck) -> Result<(), FlowError> {
+        let _ = (x, occasion);
         Ok(())
     }
 

@@ -8,7 +8,7 @@ use metriplectic_dynamics::{
 use metriplectic_fields::{ChartPoint, Column, Dimension, ScalarField, Space, stack};
 use metriplectic_manifolds::{Manifold, PointError};
 
-use super::{Components, Flow, Laws, reach};
+use super::{Components, Flow, Laws, Recheck, reach};
 use crate::explicit::{StageFlow as _, Target};
 use crate::midpoint::{Dim, Numbers, dependent_invariant};
 use crate::round_off::bound::{SizesAt, of_an_increment, size_of_terms, sizes_on_a_step};
@@ -107,6 +107,19 @@ impl<Y: Metriplectic> Flow for Y {
     }
 
     #[inline]
+    fn rechecks(&self, _: Recheck) -> bool {
+        true
+    }
+
+    fn recheck(&self, x: &Point<Y>, occasion: Recheck) -> Result<(), ModelError> {
+        match occasion {
+            Recheck::OnTheWay => self.check_state(x),
+            Recheck::End => self.check_state(x).and_then(|()| self.check_derivatives(x)),
+            Recheck::Failure { h } => self.check_around(x, &ahead(self, x, h)),
+        }
+    }
+
+    #[inline]
     fn defect(&self, x: &Point<Y>) -> f64 {
         self.manifold().defect(x)
     }
@@ -144,6 +157,17 @@ impl<Y: Metriplectic> Flow for Y {
         Some(Components(q - (start + middle * 4.0 + there) * (h / 6.0)))
     }
 }
+
+/// States along the velocity at `x`, on the way of a step of size `h`.
+#[cold]
+fn ahead<Y: Metriplectic>(system: &Y, x: &Point<Y>, h: f64) -> Vec<Point<Y>> {
+    let velocity = reach::velocity(system, x, Column::zero()).filter(Column::is_finite);
+    let steps = velocity.into_iter().flat_map(|v| AHEAD.map(|theta| v * (theta * h)));
+    steps.filter(Y::Manifold::is_near).map(|q| Y::Manifold::chart(x, &q)).collect()
+}
+
+/// The fractions of a step that fails at which its model is looked at.
+const AHEAD: [f64; 4] = [0.125, 0.25, 0.5, 1.0];
 
 /// The further invariants of a system at a point.
 fn values<Y: Metriplectic>(system: &Y, x: &Point<Y>) -> Numbers<Y> {

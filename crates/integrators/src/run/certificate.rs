@@ -12,6 +12,7 @@ use crate::method::{
     Effort, Element, EntropyStep, Evidence, Flow, Laws, LimitingSites, Promises, Taken,
 };
 use crate::round_off::bound::of_a_law;
+use crate::run::recheck::checked_states;
 
 /// The balance of a run: what became of the two laws, of the manifold, and what it cost.
 ///
@@ -75,6 +76,10 @@ pub struct Certificate {
     /// [`RungeKuttaChebyshev`](crate::RungeKuttaChebyshev) looks for it, and the other explicit methods if stability
     /// bounds a step. Both are `None` in a system without sites.
     pub limiting_sites: LimitingSites,
+    /// The states at which the laws of the model were checked, the start and the end among them. Those at which a step
+    /// was held or failed are checked too, and not counted. 0 for a flow that does not
+    /// [check](crate::Flow::rechecks) them; a lattice checks them at the start and at the end.
+    pub checked_states: usize,
     /// What the method promises.
     pub promises: Promises,
     /// What the model promises about its entropy; serialized as the name of the variant.
@@ -206,6 +211,7 @@ impl Certificate {
             worst_iterations: 0,
             local_error: None,
             limiting_sites: LimitingSites::default(),
+            checked_states: checked_states(flow, 0),
             promises,
             second_law: flow.entropy_law(),
             friction: 0.0,

@@ -40,7 +40,7 @@
 //! The system is not in it, since closures cannot be written down: resume with the same one. Nor are outputs at
 //! given times and events: say them again ([`Steps::watching`]). Another system is noticed if its energy, its
 //! entropy, a further invariant or its velocity has another value at the point, by more than the round-off of its
-//! terms. The model is not verified again.
+//! terms. The model is not verified around the point; it is checked on the way like that of any run.
 //!
 //! The [name](Method::name) of the method is in it, and another method is refused. The options of the method are
 //! not in it: a run that failed may go on with more corrections or more splits.
@@ -112,6 +112,7 @@ use crate::run::certificate::Certificate;
 use crate::run::controller::{Rule, StepSize};
 use crate::run::output::StepBefore;
 use crate::run::progress::Progress;
+use crate::run::recheck::checked_states;
 use crate::run::span::{SpanError, check_end, check_steps};
 use crate::run::steps::Steps;
 use crate::run::trajectory::{Ending, State};
@@ -296,8 +297,11 @@ impl<'a, F: Flow, M: Method<F>> Steps<'a, F, M> {
         validation::of_the_method(&c.method, method.name())?;
         let entries: Vec<f64> = c.point().collect();
         let point = flow.element(&entries)?;
-        let certificate =
+        let mut certificate =
             c.balance.resumed(Certificate::start(flow, &point, method.promises(flow)))?;
+        if c.progress.ending.is_none() {
+            certificate.checked_states = checked_states(flow, c.step);
+        }
         let like = flow.sizes(&point);
         let progress = c.progress.convert(|what, list| vector(what, list, &like))?;
         let memory = M::Memory::restore(&c.memory)?;

@@ -130,7 +130,8 @@ impl PartialEq for Request {
 struct Watched<M: StateSpace> {
     request: Request,
     function: Arc<Function<M::Element>>,
-    /// The value of the function at the state of the run.
+    /// The last value of the function that is a number: the one at the state of the run, or before it if it is NaN
+    /// there.
     value: f64,
 }
 
@@ -263,7 +264,6 @@ impl<M: StateSpace> Watched<M> {
         output: &mut Output<'_, M>,
     ) -> Option<Vec<Change<M>>> {
         let (before, after) = (self.value, self.at(end));
-        self.value = after;
         let node = |at, value, state: Option<&State<M>>| Node {
             sample: Sample { at, value },
             state: state.cloned(),
@@ -291,6 +291,8 @@ impl<M: StateSpace> Watched<M> {
             }
             nodes.retain(|node| !node.sample.value.is_nan());
         }
+        // A change across a step that ends at a NaN is found in the next one.
+        self.value = nodes.last().map_or(f64::NAN, |node| node.sample.value);
         let mut changes = Vec::new();
         for pair in nodes.windows(2) {
             let [a, b] = [pair[0].sample, pair[1].sample];

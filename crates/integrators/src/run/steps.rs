@@ -163,7 +163,7 @@ impl<'a, F: Flow, M: Method<F>> Steps<'a, F, M> {
     pub fn advance(&mut self) -> Result<&State<F::Space>, StepError> {
         if self.progress.ending.is_none() {
             let flow = self.flow;
-            flow.with_room(|| self.take_step())?;
+            flow.with_room(|| self.take_step().map_err(|error| self.explained(error)))?;
         }
         Ok(&self.state)
     }
@@ -225,7 +225,7 @@ impl<'a, F: Flow, M: Method<F>> Steps<'a, F, M> {
         if self.watching.is_some() {
             self.look()?;
         }
-        Ok(())
+        self.recheck(evidence.entropy_step == Some(EntropyStep::Held))
     }
 
     /// Whether the certificate may name a site.

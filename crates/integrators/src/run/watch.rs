@@ -75,7 +75,8 @@ pub trait Watch: Into<Schedule> {
     /// Both directions count unless you go on with [`rising`](Watched::rising) or [`falling`](Watched::falling),
     /// and the run goes on after it unless you say [`stop`](Watched::stop). Inside a step the function is looked at
     /// four times, so that two changes of sign in one step are found unless they lie closer than a fifth of it. A
-    /// function that is zero at the start has no event there. A point where it is NaN is left out.
+    /// function that is zero at the start has no event there. A point where it is NaN is left out, inside a step and at
+    /// its end: a change of sign across such points is an event at the first time after them.
     ///
     /// ```
     /// # use metriplectic_dynamics::System;

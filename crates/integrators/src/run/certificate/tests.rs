@@ -22,6 +22,7 @@ const ONE_FALL: Certificate = Certificate {
     worst_iterations: 2,
     local_error: None,
     limiting_sites: LimitingSites::new(None, None),
+    checked_states: 5,
     promises: Promises::all_laws(true),
     second_law: SecondLaw::Exact,
     friction: 0.0,
@@ -31,7 +32,9 @@ const ONE_FALL: Certificate = Certificate {
 #[test]
 fn one_is_no_plural() {
     let text = ONE_FALL.to_string();
-    for part in ["over 7 steps", "fell on 1 step;", "9 Newton iterations", "1 retry"] {
+    for part in
+        ["over 7 steps", "fell on 1 step;", "9 Newton iterations", "1 retry", "checked at 5 states"]
+    {
         assert!(text.contains(part), "\"{part}\" is missing in: {text}");
     }
     assert!(!text.contains("step sizes"), "{text}");

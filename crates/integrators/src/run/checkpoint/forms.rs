@@ -47,6 +47,8 @@ struct CertificateForm {
     #[serde(with = "exact")]
     local_error: Option<f64>,
     limiting_sites: LimitingSites,
+    #[serde(default)]
+    checked_states: usize,
     promises: Promises,
     #[serde(with = "SecondLawForm")]
     second_law: SecondLaw,

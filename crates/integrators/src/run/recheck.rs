@@ -1,0 +1,117 @@
+//! The laws of the model at states on the way of a run.
+//!
+//! A model that was verified around the start may break its laws elsewhere. Then a method conserves the energy of a
+//! motion that no longer exists. So a run [asks](Flow::recheck) for the laws again: after the steps whose number is
+//! 1, 2, 3, 5, 8, … 55 or a multiple of 89, after the first, second, fourth, … step that leaves the state where it is,
+//! at its end, and at a state from which a step fails.
+//!
+//! The numbers depend on nothing but the step, so a run that is resumed checks the same states. 89 has no factor in
+//! common with the steps of a period that users choose, so the states lie at all phases of an oscillation.
+
+use crate::method::{Flow, Method, Recheck};
+use crate::run::steps::Steps;
+use crate::step_error::StepError;
+
+/// The first steps after which the model is checked.
+const FIRST: [usize; 9] = [1, 2, 3, 5, 8, 13, 21, 34, 55];
+
+/// The model is checked after each multiple of so many steps: a check costs as much as a step.
+const EVERY: usize = 89;
+
+/// The size of a step, relative to the largest one of the run, below which the derivatives are compared with the values
+/// too: where a derivative is lost, the energy and its differential contradict each other, and steps become tiny.
+const CREEPS: f64 = 1e-2;
+
+/// Whether the model is checked after this step.
+fn is_due(step: usize) -> bool {
+    if step < EVERY { FIRST.contains(&step) } else { step.is_multiple_of(EVERY) }
+}
+
+/// The steps up to this one after which the model is checked.
+fn due_steps(steps: usize) -> usize {
+    FIRST.iter().filter(|first| **first <= steps).count() + steps / EVERY
+}
+
+/// The states at which the model of a flow has been checked after so many steps, the start among them.
+pub(crate) fn checked_states<F: Flow>(flow: &F, steps: usize) -> usize {
+    if !flow.rechecks(Recheck::End) {
+        return 0;
+    }
+    1 + if flow.rechecks(Recheck::OnTheWay) { due_steps(steps) } else { 0 }
+}
+
+impl<F: Flow, M: Method<F>> Steps<'_, F, M> {
+    /// Checks the model after a step, where it is due.
+    ///
+    /// # Errors
+    ///
+    /// [`StepError::Model`] or [`StepError::Flow`].
+    #[inline]
+    pub(super) fn recheck(&mut self, held: bool) -> Result<(), StepError> {
+        let over = self.progress.ending.is_some();
+        let stays = held && self.certificate.projected_steps.held.is_power_of_two();
+        if over || stays || is_due(self.state.step) {
+            self.verify_state(over, stays)
+        } else {
+            Ok(())
+        }
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn verify_state(&mut self, over: bool, stays: bool) -> Result<(), StepError> {
+        let creeps = self.before.h < CREEPS * self.certificate.largest_step;
+        let all = over || stays || creeps;
+        let occasion = if all { Recheck::End } else { Recheck::OnTheWay };
+        if !self.flow.rechecks(occasion) {
+            return Ok(());
+        }
+        let step = self.state.step;
+        let counted = is_due(step) && self.flow.rechecks(Recheck::OnTheWay);
+        self.certificate.checked_states =
+            checked_states(self.flow, step) + usize::from(over && !counted);
+        let verdict = self.verdict(occasion);
+        if verdict.is_err() {
+            self.progress.ending = None;
+        }
+        verdict
+    }
+
+    /// The verdict on the model at the state of the run.
+    fn verdict(&self, occasion: Recheck) -> Result<(), StepError> {
+        let (x, time) = (&self.state.point, self.state.time);
+        let broken = |law| StepError::Model { time, law: Box::new(law) };
+        self.flow.recheck(x, occasion).map_err(broken)?;
+        self.flow.reexamine(x, occasion).map_err(|law| StepError::Flow { time, law })
+    }
+
+    /// Explains why a step failed: by a law that the model breaks around the state, if there is one.
+    #[cold]
+    #[inline(never)]
+    pub(super) fn explained(&self, error: StepError) -> StepError {
+        match error.size() {
+            Some(h) => {
+                let occasion = Recheck::Failure { h: h.max(self.before.h) };
+                let asked = self.flow.rechecks(occasion);
+                asked.then(|| self.verdict(occasion).err()).flatten().unwrap_or(error)
+            }
+            None => error,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_states_that_are_checked_are_counted() {
+        let mut checked = 1;
+        for step in 0..1000 {
+            checked += usize::from(step > 0 && is_due(step));
+            assert_eq!(1 + due_steps(step), checked, "step {step}");
+        }
+        // One per cent of the steps, beside the first ones.
+        assert_eq!(due_steps(100_000), 9 + 1123);
+    }
+}

@@ -250,6 +250,8 @@ impl StepError {
             | Self::StiffFriction { h, .. }
             | Self::FirstLawBroken { h, .. }
             | Self::NotProjected { h, .. }
+            | Self::EntropyFalls { h, .. }
+            | Self::WrongDerivative { h, .. }
             | Self::TooSmall { h, .. }
             | Self::Standstill { h, .. }
             | Self::OutOfDomain { h, .. }

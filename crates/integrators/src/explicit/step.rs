@@ -33,12 +33,13 @@ impl Refused {
     /// What becomes of a step of size `h` from `time`.
     fn into_refusal(self, time: f64, h: f64) -> Refusal {
         let tried = Effort::default();
+        let second_law = matches!(self, Self::Falls(_));
         let error = match self {
             Self::Outside(Some(site)) => Some(StepError::SiteOutOfDomain { time, h, site, tried }),
             Self::Never(error) => Some(error),
             _ => None,
         };
-        Refusal { effort: tried, error, second_law: matches!(self, Self::Falls(_)) }
+        Refusal { effort: tried, error, second_law }
     }
 
     /// A displacement leads out of the domain.

@@ -652,7 +652,10 @@ fn oscillator_with(
     friction: Friction,
 ) -> impl Metriplectic<Manifold = Euclidean<3>, Metric = Canonical> {
     System::on(Euclidean::<3>)
-        .bracket(Poisson::constant(matrix![0.0, 1.0, 0.0; -1.0, 0.0, 0.0; 0.0, 0.0, 0.0]).unwrap())
+        .bracket(
+            Poisson::constant(matrix![0.0, 1.0, 0.0; -1.0, 0.0, 0.0; 0.0, 0.0, 0.0])
+                .expect("it is skew"),
+        )
         .energy(energy)
         .entropy(entropy)
         .dissipation(FieldDissipation(friction))
@@ -819,7 +822,7 @@ fn steps_resumed_runs_and_runs_with_outputs_check_their_model() {
     assert!(error.to_string().contains("Casimir"), "{error}");
     // The state at which the run stopped is the last one, also among outputs.
     for span in [
-        Schedule::from(Span::steps(0.05, 200).output_every(0.5)),
+        Span::steps(0.05, 200).output_every(0.5),
         Span::until(10.0).event("turn", |x: &Vector3<f64>| x.y).into(),
         Span::until(10.0).until_rest(1e-6).into(),
     ] {

@@ -136,7 +136,7 @@ impl<N: Dimension> Linear<N> {
     }
 
     /// What a residual leaves of the laws, in units of round-off. That of the production of entropy is the one of its
-    /// terms, which may be large where friction is stiff.
+    /// terms, which may be large where friction is stiff, and of the heat, which has the digits of the energy.
     pub(super) fn excess<Y>(&self, at: &Evaluated<Y>) -> f64
     where
         Y: Metriplectic<Manifold: Space<Dim = N>>,
@@ -145,7 +145,8 @@ impl<N: Dimension> Linear<N> {
         if work == 0.0 {
             return at.excess;
         }
-        at.excess.max(work.abs() / (ROUNDED * size + at.entropy_covector.dot(&self.rounded)))
+        let rounded = self.rounded + at.heat_rounding;
+        at.excess.max(work.abs() / (ROUNDED * size + at.entropy_covector.dot(&rounded)))
     }
 
     /// The root mean square of displacements by these velocities, in units of their round-off; infinite if it is not

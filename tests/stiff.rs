@@ -129,7 +129,9 @@ fn stiff_friction_is_damped_or_named() {
                     // The rate of the cold body, κ/(T₁² (1 + T₁)).
                     let rate = h * KAPPA / (START[0].powi(2) * (1.0 + START[0]));
                     assert!((0.5 * rate..4.0 * rate).contains(&stiffness), "{cause}");
-                    assert!(cause.to_string().contains("because the friction is stiff: h|K'| = "));
+                    let text = cause.to_string();
+                    assert!(text.contains("because the friction is stiff: h|K'| = "), "{text}");
+                    assert!(text.contains("take `Radau`, which damps it in steps of this size"));
                 }
             }
         }

@@ -227,7 +227,8 @@ impl<Y: Metriplectic> Parts<'_, Y> {
             && linear.friction > f64::max(1.0, linear.rotation)
         {
             let stiffness = linear.friction * (h / failed.h);
-            return StepError::StiffFriction { time, h, stiffness, residual, tried };
+            let damps = self.tableau.one_sided;
+            return StepError::StiffFriction { time, h, stiffness, residual, tried, damps };
         }
         match (failed.failure.cause, dependent_invariant(self.system, &failed.x)) {
             (Cause::Edge, _) => StepError::OutOfDomain { time, h, tried },

@@ -288,8 +288,17 @@ impl Certificate {
     }
 
     /// Whether friction is so stiff at these step sizes that the method does not damp it.
+    ///
+    /// Friction that the method has damped does not count. [`is_resolved`](Self::is_resolved) says whether a step was
+    /// longer than its transient.
     pub const fn is_stiff(&self) -> bool {
         self.friction > STIFF
+    }
+
+    /// Whether no step is known to be too long for the motion: the local errors that were estimated are below a tenth of
+    /// the state, and friction is [damped](Self::is_stiff).
+    pub fn is_resolved(&self) -> bool {
+        !self.is_stiff() && self.local_error.is_none_or(|error| error <= UNRESOLVED)
     }
 
     /// Whether the entropy fell on no step by more than its round-off.
@@ -302,6 +311,9 @@ impl Certificate {
         self.invariants.iter().all(InvariantBalance::is_kept)
     }
 }
+
+/// The local error, relative to the sizes of the entries, from which on a motion is not resolved.
+const UNRESOLVED: f64 = 0.1;
 
 /// The fraction of steps at the edge of stability from which on stability sets the steps of a run.
 const AT_THE_EDGE: f64 = 0.5;

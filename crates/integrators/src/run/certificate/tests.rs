@@ -39,7 +39,13 @@ fn one_is_no_plural() {
     assert!(adaptive.contains("step sizes:  1.0e-3 to 1.0e-1, 2 rejected"), "{adaptive}");
     let coarse = Certificate { local_error: Some(0.5), ..ONE_FALL };
     assert!(coarse.to_string().contains("the motion is not resolved: local errors up to 5.0e-1"));
+    assert!(!coarse.is_resolved() && ONE_FALL.is_resolved());
+    assert!(!coarse.to_string().contains("may be in a wrong one"));
+    let stages = Some(StageBalance { surplus: 1e-3, ..StageBalance::default() });
+    let damped = Certificate { stages, ..coarse.clone() };
+    assert!(damped.to_string().contains("may be in a wrong one: let steps follow a tolerance"));
     let stiff = Certificate { friction: 1e6, ..coarse };
+    assert!(stiff.is_stiff() && !stiff.is_resolved());
     assert!(!stiff.to_string().contains("not resolved"), "{stiff}");
     let text = Certificate {
         entropy_falls: 2,

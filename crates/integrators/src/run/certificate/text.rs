@@ -9,9 +9,6 @@ use crate::digits::{Digits, counted};
 use crate::method::{Effort, LimitingSites};
 use crate::round_off::bound::of_a_law;
 
-/// The local error, relative to the sizes of the entries, from which on a motion is not resolved.
-const UNRESOLVED: f64 = 0.1;
-
 impl fmt::Display for Certificate {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let steps = counted(self.steps, "step", "steps");
@@ -75,12 +72,21 @@ impl fmt::Display for Certificate {
         }
         // Where friction is stiff the estimate is far too large, and the line above says so.
         if !self.is_stiff()
-            && let Some(error) = self.local_error.filter(|error| *error > UNRESOLVED)
+            && !self.is_resolved()
+            && let Some(error) = self.local_error
         {
-            writeln!(
+            write!(
                 f,
                 "accuracy:    the motion is not resolved: local errors up to {error:.1e} of the state in a step"
             )?;
+            if self.stages.is_some_and(|StageBalance { surplus, .. }| surplus > 0.0) {
+                write!(
+                    f,
+                    "; where several entries may be warmed, the heat of a transient that was damped may be in a wrong \
+                     one: let steps follow a tolerance"
+                )?;
+            }
+            writeln!(f)?;
         }
         if let Some(StageBalance { defect, surplus }) = self.stages {
             write!(f, "stages:      laws off by {defect:.1e} of their terms in the worst step")?;

@@ -469,33 +469,34 @@ fn heat_of_a_transient_that_no_step_resolves_is_named() {
         .expect("six bodies are a system");
     let entropies = State6::from_fn(|i, _| CAPACITIES[i] * WARM[i].ln());
     let energies = State6::from_fn(|i, _| CAPACITIES[i] * WARM[i]);
-    let courses: [(Schedule, f64); 4] = [
-        (Span::steps(1e-2, 20).into(), 0.2),
-        (Span::steps(0.1, 20).into(), 2.0),
-        (Span::steps(1.0, 20).into(), 20.0),
-        (Span::until(2.0).tolerance(1e-6).into(), 2.0),
+    // The course, its end, and the largest error in kelvins of the entropies and of the energies as variables.
+    let courses: [(Schedule, f64, [f64; 2]); 4] = [
+        (Span::steps(1e-2, 20).into(), 0.2, [0.5, 1e-7]),
+        (Span::steps(0.1, 20).into(), 2.0, [3.0, 1e-9]),
+        (Span::steps(1.0, 20).into(), 20.0, [4.0, 2e-6]),
+        (Span::until(2.0).tolerance(1e-6).into(), 2.0, [2e-5, 2e-8]),
     ];
-    for (schedule, t) in courses {
+    for (index, (schedule, t, bounds)) in courses.into_iter().enumerate() {
         let exact = conducted_until(t);
         for method in RADAU {
-            let run = method.run(&by_entropies, entropies, schedule.clone()).expect("it is solved");
-            let c = run.certificate();
-            let ends = State6::from_fn(|i, _| (run.last().point[i] / CAPACITIES[i]).exp());
-            let run = method.run(&by_energies, energies, schedule.clone()).expect("it is solved");
-            let linear = run.certificate();
-            let twin = State6::from_fn(|i, _| run.last().point[i] / CAPACITIES[i]);
-            println!(
-                "{schedule:?} {method:?}: off by {:.1e} K, {:.1e} K; stiff {}, {}; resolved {}, {}; local {:?} {:?} {}",
-                (ends - exact).amax(),
-                (twin - exact).amax(),
-                c.is_stiff(),
-                linear.is_stiff(),
-                c.is_resolved(),
-                linear.is_resolved(),
-                c.local_error,
-                linear.local_error,
-                c.effort.splits
-            );
+            let start = [entropies, energies];
+            let runs = [
+                damped("entropies", method, &by_entropies, &start[0], schedule.clone()),
+                damped("energies", method, &by_energies, &start[1], schedule.clone()),
+            ];
+            let ends = [
+                runs[0].last().point.zip_map(&CAPACITIES.into(), |s, c| (s / c).exp()),
+                runs[1].last().point.zip_map(&CAPACITIES.into(), |e, c| e / c),
+            ];
+            let off = ends.map(|end| (end - exact).amax());
+            println!("{method:?}, course {index}: {off:?} K");
+            let c = runs[0].certificate();
+            assert!(off[0] < bounds[0] && off[1] < bounds[1], "{method:?}, {index}: {off:?}");
+            // A known deficiency: heat of a transient that no step resolves is shared by the metric.
+            let is_adaptive = index == 3;
+            assert_eq!(off[0] < 0.1, is_adaptive, "{method:?}, {index}: {off:?}");
+            assert_eq!(c.is_resolved(), is_adaptive, "{method:?}, {index}: {c}");
+            assert_eq!(c.to_string().contains("not resolved"), !is_adaptive, "{c}");
         }
     }
 }

@@ -41,9 +41,7 @@ pub(super) fn take<Y: Metriplectic>(
     let kept = *memory;
     *memory = StageMemory::default();
     let mut parts = Parts { tableau, splits, system, effort: failure.effort };
-    let taken = if splits == 0 {
-        Err(Failed { failure, x: start.x.clone(), h: start.h })
-    } else if tableau.one_sided {
+    let taken = if tableau.one_sided {
         parts.graded(start, memory)
     } else {
         parts.halves(start, memory, 1)

@@ -4,7 +4,7 @@ use std::fmt;
 
 use metriplectic_dynamics::SecondLaw;
 
-use super::{Certificate, InvariantBalance, ProjectedSteps, StageBalance};
+use super::{Certificate, InvariantBalance, ProjectedSteps, StageBalance, UNRESOLVED};
 use crate::digits::{Digits, counted};
 use crate::method::{Effort, LimitingSites};
 use crate::round_off::bound::of_a_law;
@@ -72,26 +72,25 @@ impl fmt::Display for Certificate {
         }
         // Where friction is stiff the estimate is far too large, and the line above says so.
         if !self.is_stiff()
-            && !self.is_resolved()
-            && let Some(error) = self.local_error
+            && let Some(error) = self.local_error.filter(|error| *error > UNRESOLVED)
         {
-            write!(
+            writeln!(
                 f,
                 "accuracy:    the motion is not resolved: local errors up to {error:.1e} of the state in a step"
             )?;
-            if self.stages.is_some_and(|StageBalance { surplus, .. }| surplus > 0.0) {
-                write!(
-                    f,
-                    "; where several entries may be warmed, the heat of a transient that was damped may be in a wrong \
-                     one: let steps follow a tolerance"
-                )?;
-            }
-            writeln!(f)?;
         }
         if let Some(StageBalance { defect, surplus }) = self.stages {
             write!(f, "stages:      laws off by {defect:.1e} of their terms in the worst step")?;
             if surplus > 0.0 {
                 write!(f, ", damping added {surplus:.1e} to S")?;
+            }
+            if self.skips_a_transient() {
+                write!(
+                    f,
+                    ", {:.1e} of its gain: a transient is not resolved, and its heat may have warmed a wrong entry; let \
+                     steps follow a tolerance",
+                    surplus / self.entropy_gained.abs()
+                )?;
             }
             writeln!(f)?;
         }

@@ -50,7 +50,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         let run = method?;
         Ok(Record { states: run.iter().cloned().collect(), certificate: run.certificate().clone() })
     };
-    let radau = run(Radau::<3>::default().run(&bead, START, span))?;
+    let radau = run(Radau::<3>.run(&bead, START, span))?;
     let midpoint = run(WeylMidpoint.run(&bead, START, span))?;
 
     let exact = |t: f64| (START.x + START.y / FRICTION) * (-TRAP / FRICTION * t).exp();

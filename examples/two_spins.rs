@@ -34,8 +34,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         let states = run.iter().cloned().collect();
         Ok(Record::<Spins> { states, certificate: run.certificate().clone() })
     };
-    let gauss = record(Gauss::<2>::default().run(&spins, start, span))?;
-    let radau = record(Radau::<2>::default().run(&spins, start, span))?;
+    let gauss = record(Gauss::<2>.run(&spins, start, span))?;
+    let radau = record(Radau::<2>.run(&spins, start, span))?;
     let explicit = record(DormandPrince5.run(&spins, start, span))?;
 
     let momentum = |s: &State<Spins>| s.point.0.z + s.point.1.z;

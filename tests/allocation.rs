@@ -44,8 +44,8 @@ fn main() {
         .build()
         .expect("it is a system");
     assert_eq!(blocks(&body, vector![0.5, -0.3, 0.1]), 0);
-    assert_eq!(blocks_of(Gauss::<4>::default(), &body, vector![0.5, -0.3, 0.1]), 0);
-    assert_eq!(blocks_of(Radau::<3>::default(), &body, vector![0.5, -0.3, 0.1]), 0);
+    assert_eq!(blocks_of(Gauss::<4>, &body, vector![0.5, -0.3, 0.1]), 0);
+    assert_eq!(blocks_of(Radau::<3>, &body, vector![0.5, -0.3, 0.1]), 0);
 
     let top = System::on(LieDual::se3())
         .energy(|x: &Vector6<Real>| {

@@ -5,7 +5,7 @@
 //! `S = s(T₁) + s(T₂)` with `s = ln T + T`, so that `s' = e'/T`, and `K = κ b bᵀ` with `b = (1/w₁, −1/w₂)`:
 //! `e₁' = κ (1/T₁ − 1/T₂)`.
 
-use metriplectic::integrators::{Schedule, StepError};
+use metriplectic::integrators::{Effort, Schedule, StepError};
 use metriplectic::prelude::*;
 
 /// A cold and a hot body.
@@ -129,11 +129,25 @@ fn stiff_friction_is_damped_or_named() {
                     // The rate of the cold body, κ/(T₁² (1 + T₁)).
                     let rate = h * KAPPA / (START[0].powi(2) * (1.0 + START[0]));
                     assert!((0.5 * rate..4.0 * rate).contains(&stiffness), "{cause}");
-                    assert!(cause.to_string().contains("because the friction is stiff: h|K'| = "));
+                    let text = cause.to_string();
+                    assert!(text.contains("because the friction is stiff: h|K'| = "), "{text}");
+                    assert!(text.contains("take `Radau`, which damps it in steps of this size"));
                 }
             }
         }
     }
+}
+
+#[test]
+fn a_method_that_damps_is_not_told_to_take_itself() {
+    let error = |damps| {
+        let (time, h, stiffness, residual, tried) = (0.0, 1.0, 1e6, 1.0, Effort::default());
+        StepError::StiffFriction { time, h, stiffness, residual, tried, damps }.to_string()
+    };
+    assert!(
+        error(false).contains("; take `Radau`, which damps it in steps of this size, or steps")
+    );
+    assert!(error(true).contains("; take steps below 1.0e-5") && !error(true).contains("Radau"));
 }
 
 #[test]

@@ -2,6 +2,7 @@
 //! names the cause in an error, or says in its certificate that friction is not damped.
 
 use metriplectic::dynamics::system::Point;
+use metriplectic::integrators::Schedule;
 use metriplectic::prelude::*;
 
 mod models;
@@ -21,7 +22,7 @@ fn damped<Y: Metriplectic>(
     method: Stages,
     system: &Y,
     x0: &Point<Y>,
-    span: impl Into<metriplectic::integrators::Schedule>,
+    span: impl Into<Schedule>,
 ) -> Trajectory<Y::Manifold> {
     let run = method.run(system, x0.clone(), span).expect(name);
     let c = run.certificate();
@@ -403,6 +404,99 @@ fn heat_moves_no_length() {
             let run = damped("piston", Radau3, &system, &start, Span::steps(1.0, 1));
             let moved = (run.last().point.x * unit - 1.0).abs();
             assert!(moved < 0.3 / friction, "{unit:e}, {friction:e}: {moved:e}");
+        }
+    }
+}
+
+type State6 = SVector<f64, 6>;
+type Real6 = SVector<Real, 6>;
+
+/// Heat capacities, temperatures at the start and conductances of a row of six bodies.
+const CAPACITIES: [f64; 6] = [1.0, 2.0, 1.5, 3.0, 0.7, 2.2];
+const WARM: [f64; 6] = [300.0, 340.0, 280.0, 390.0, 310.0, 260.0];
+const CONDUCTANCES: [f64; 5] = [1e5, 1e-5, 1e2, 1e-2, 1e-5];
+
+/// `K = Σ r_i b_i b_iᵀ` with the rate `r_i` of each bond.
+fn conducted(w: &Real6, rate: impl Fn(usize) -> Real) -> SMatrix<Real, 6, 6> {
+    let mut k = SMatrix::<Real, 6, 6>::zeros();
+    for i in 0..5 {
+        let mut b = Real6::zeros();
+        (b[i], b[i + 1]) = (w[i + 1], -w[i]);
+        k += b * b.transpose() * rate(i);
+    }
+    k
+}
+
+/// The exact temperatures: `C_i T_i' = Σ κ_ij (T_j − T_i)` is linear.
+fn conducted_until(t: f64) -> State6 {
+    let root = State6::from_fn(|i, _| CAPACITIES[i].sqrt());
+    let mut rates = SMatrix::<f64, 6, 6>::zeros();
+    for (i, kappa) in CONDUCTANCES.into_iter().enumerate() {
+        let mut b = State6::zeros();
+        (b[i], b[i + 1]) = (root[i].recip(), -root[i + 1].recip());
+        rates += b * b.transpose() * kappa;
+    }
+    let modes = rates.symmetric_eigen();
+    let start: State6 = modes.eigenvectors.transpose() * root.component_mul(&State6::from(WARM));
+    let end: State6 = start.zip_map(&modes.eigenvalues, |u, rate| u * (-rate * t).exp());
+    let end: State6 = modes.eigenvectors * end;
+    end.component_div(&root)
+}
+
+#[test]
+fn heat_of_a_transient_that_no_step_resolves_is_named() {
+    let by_entropies = System::on(Euclidean::<6>)
+        .energy(|s: &Real6| {
+            (0..6).map(|i| (s[i] / CAPACITIES[i]).exp() * CAPACITIES[i]).sum::<Real>()
+        })
+        .entropy(|s: &Real6| s.sum())
+        .dissipation(FieldDissipation(|_: &Real6, w: &Real6| {
+            conducted(w, |i| (w[i] * w[i + 1]).recip() * CONDUCTANCES[i])
+        }))
+        .build()
+        .expect("six bodies are a system");
+    let by_energies = System::on(Euclidean::<6>)
+        .energy(|e: &Real6| e.sum())
+        .entropy(|e: &Real6| {
+            (0..6).map(|i| (e[i] / CAPACITIES[i]).ln() * CAPACITIES[i]).sum::<Real>()
+        })
+        .dissipation(FieldDissipation(|e: &Real6, w: &Real6| {
+            conducted(w, |i| {
+                e[i] * e[i + 1] * (CONDUCTANCES[i] / (CAPACITIES[i] * CAPACITIES[i + 1]))
+            })
+        }))
+        .build()
+        .expect("six bodies are a system");
+    let entropies = State6::from_fn(|i, _| CAPACITIES[i] * WARM[i].ln());
+    let energies = State6::from_fn(|i, _| CAPACITIES[i] * WARM[i]);
+    // The course, its end, and the largest error in kelvins of the entropies and of the energies as variables.
+    let courses: [(Schedule, f64, [f64; 2]); 4] = [
+        (Span::steps(1e-2, 20).into(), 0.2, [0.5, 1e-7]),
+        (Span::steps(0.1, 20).into(), 2.0, [3.0, 1e-9]),
+        (Span::steps(1.0, 20).into(), 20.0, [4.0, 2e-6]),
+        (Span::until(2.0).tolerance(1e-6).into(), 2.0, [2e-5, 2e-8]),
+    ];
+    for (index, (schedule, t, bounds)) in courses.into_iter().enumerate() {
+        let exact = conducted_until(t);
+        for method in RADAU {
+            let start = [entropies, energies];
+            let runs = [
+                damped("entropies", method, &by_entropies, &start[0], schedule.clone()),
+                damped("energies", method, &by_energies, &start[1], schedule.clone()),
+            ];
+            let ends = [
+                runs[0].last().point.zip_map(&CAPACITIES.into(), |s, c| (s / c).exp()),
+                runs[1].last().point.zip_map(&CAPACITIES.into(), |e, c| e / c),
+            ];
+            let off = ends.map(|end| (end - exact).amax());
+            println!("{method:?}, course {index}: {off:?} K");
+            let c = runs[0].certificate();
+            assert!(off[0] < bounds[0] && off[1] < bounds[1], "{method:?}, {index}: {off:?}");
+            // A known deficiency: heat of a transient that no step resolves is shared by the metric.
+            let is_adaptive = index == 3;
+            assert_eq!(off[0] < 0.1, is_adaptive, "{method:?}, {index}: {off:?}");
+            assert_eq!(c.is_resolved(), is_adaptive, "{method:?}, {index}: {c}");
+            assert_eq!(c.to_string().contains("not resolved"), !is_adaptive, "{c}");
         }
     }
 }

@@ -28,31 +28,31 @@ macro_rules! each {
     ($self:expr, $method:ident => $call:expr) => {
         match $self {
             Gauss1 => {
-                let $method = Gauss::<1>::default();
+                let $method = Gauss::<1>;
                 $call
             }
             Gauss2 => {
-                let $method = Gauss::<2>::default();
+                let $method = Gauss::<2>;
                 $call
             }
             Gauss3 => {
-                let $method = Gauss::<3>::default();
+                let $method = Gauss::<3>;
                 $call
             }
             Gauss4 => {
-                let $method = Gauss::<4>::default();
+                let $method = Gauss::<4>;
                 $call
             }
             Radau2 => {
-                let $method = Radau::<2>::default();
+                let $method = Radau::<2>;
                 $call
             }
             Radau3 => {
-                let $method = Radau::<3>::default();
+                let $method = Radau::<3>;
                 $call
             }
             Radau4 => {
-                let $method = Radau::<4>::default();
+                let $method = Radau::<4>;
                 $call
             }
         }

@@ -38,8 +38,8 @@
 //! 2. The same from rest.
 //! 3. Newton's method with the derivatives of all stages, for friction that is stiff and not linear.
 //! 4. Continuation in the step size, by steps that double and are quartered.
-//! 5. In parts: halves of a Gauss step, [`splits`](Gauss::splits) times at most; parts of a Radau step that grow from
-//!    the time in which friction acts, since the step damps what is faster than itself.
+//! 5. In parts: halves of a Gauss step, ten times at most; parts of a Radau step that grow from the time in which
+//!    friction acts, since the step damps what is faster than itself.
 //!
 //! It stops where the correction *and* the errors of the laws are round-off. A root whose stages have quite another
 //! energy, or which is beyond the chart, is refused. Adaptive steps are tried by 1 to 3, and then by a smaller step.
@@ -93,17 +93,14 @@ type PointOf<Y> = Point<Y>;
 ///     .energy(|p: &Vector3<Real>| p.x * p.x * 0.5 + p.y * p.y + p.z * p.z * 1.5)
 ///     .entropy(|p: &Vector3<Real>| p.norm_squared() * 0.5)
 ///     .build()?;
-/// let run = Gauss::<3>::default().run(&body, Vector3::new(0.4, 0.5, 0.3), Span::steps(0.5, 100))?;
+/// let run = Gauss::<3>.run(&body, Vector3::new(0.4, 0.5, 0.3), Span::steps(0.5, 100))?;
 /// let certificate = run.certificate();
 /// assert!(certificate.keeps_energy() && certificate.keeps_entropy());
 /// # Ok(())
 /// # }
 /// ```
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Gauss<const S: usize> {
-    /// How often a step that is not solved is split in halves; both laws hold for each half.
-    pub splits: usize,
-}
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Gauss<const S: usize>;
 
 /// The Radau IIA method of `S = 2 … 4` stages and order `2S − 1`, for friction that is much faster than a step: it damps
 /// it, conserves the energy, and the entropy never falls.
@@ -130,28 +127,21 @@ pub struct Gauss<const S: usize> {
 ///     }))
 ///     .build()?;
 /// # use num_dual::DualNum;
-/// let run = Radau::<3>::default().run(&bodies, Vector2::new(300.0, 360.0), Span::steps(1.0, 10))?;
+/// let run = Radau::<3>.run(&bodies, Vector2::new(300.0, 360.0), Span::steps(1.0, 10))?;
 /// assert!((run.last().point.x - 340.0).abs() < 1e-6);
 /// assert!(run.certificate().keeps_energy() && run.certificate().keeps_entropy());
 /// # Ok(())
 /// # }
 /// ```
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Radau<const S: usize> {
-    /// A step that is not solved is taken in parts, the first of which is at least `2^{-splits}` of it; each may be twice
-    /// as long as the one before, and both laws hold for each.
-    pub splits: usize,
-}
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Radau<const S: usize>;
 
 macro_rules! method {
     ($name:ident, $tableaux:expr, $first:literal, $last:literal, $splits:literal) => {
-        impl<const S: usize> Default for $name<S> {
-            fn default() -> Self {
-                Self { splits: $splits }
-            }
-        }
-
         impl<const S: usize> $name<S> {
+            /// The first part of a step that is not solved is at least `2^{-SPLITS}` of it.
+            const SPLITS: usize = $splits;
+
             const IS_A_METHOD: () = assert!(
                 S >= $first && S <= $last,
                 concat!(stringify!($name), " has ", $first, " to ", $last, " stages")
@@ -190,7 +180,7 @@ macro_rules! method {
                 memory: &mut StageMemory<Dim<Y>>,
             ) -> Result<Taken<Y>, StepError> {
                 let start = step::start_of(Self::tableau(), start, h);
-                parts::take(Self::tableau(), self.splits, system, &start, memory)
+                parts::take(Self::tableau(), Self::SPLITS, system, &start, memory)
             }
 
             fn attempt(

@@ -66,9 +66,10 @@ pub enum StepError {
     /// The equation was not solved, and friction is stiff at this step size.
     #[error(
         "the step of size {h:.3e} from t = {} was not solved, because the friction is stiff: \
-         h|K'| = {stiffness:.1e} (residual {residual:.1e} after {tried}); take steps below {:.1e} while the fast \
+         h|K'| = {stiffness:.1e} (residual {residual:.1e} after {tried}); take {}steps below {:.1e} while the fast \
          variables relax, as `Span::until` does, or eliminate these",
         digits(.time),
+        if *.damps { "" } else { "`Radau`, which damps it in steps of this size, or " },
         .h * 10.0 / .stiffness
     )]
     StiffFriction {
@@ -82,6 +83,8 @@ pub enum StepError {
         residual: f64,
         /// What was done to solve it.
         tried: Effort,
+        /// Whether the method damps friction that is faster than a step, as [`Radau`](crate::Radau) does.
+        damps: bool,
     },
     /// The energy is not conserved: it differs by more than a millionth of the size of its terms from what it
     /// was. The size is `|H| + Σ_i |∂_iH| (|x_i| + |d_i|)` with the displacement `d` of the step, at the end of

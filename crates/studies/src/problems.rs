@@ -11,7 +11,7 @@ use metriplectic_dynamics::{Metriplectic, system::Point};
 use metriplectic_fields::{ChartPoint, Column as _, Space as _, Vector};
 use metriplectic_manifolds::{Manifold, Retraction};
 
-pub use list::each;
+pub use list::{each, each_with};
 pub use measured::{Comparison, LargeSteps, Orders, SecondLaws, Strides};
 
 /// A system with a start, and names for tables.
@@ -27,11 +27,22 @@ pub struct Problem<Y: Metriplectic> {
     pub system: Y,
     /// Its start.
     pub start: Point<Y>,
+    /// A start at rest: without momenta where it has any, otherwise without a velocity.
+    pub rest: Point<Y>,
     /// The time over which errors are measured.
     pub time: f64,
     /// Where a step may be long, and its size: points, by their coordinates in the chart at the start,
     /// and for each retraction one at least from which a step spans two radians.
     pub strides: Vec<(Vector<Y::Manifold>, f64)>,
+}
+
+/// Constants that are added to the energy and the entropy of a problem.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Constants {
+    /// That of the energy.
+    pub energy: f64,
+    /// That of the entropy.
+    pub entropy: f64,
 }
 
 impl<Y: Metriplectic> Problem<Y> {

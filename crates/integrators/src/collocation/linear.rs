@@ -136,7 +136,8 @@ impl<N: Dimension> Linear<N> {
     }
 
     /// What a residual leaves of the laws, in units of round-off. That of the production of entropy is the one of its
-    /// terms, which may be large where friction is stiff.
+    /// terms, which may be large where friction is stiff, of the heat, and of the covectors of the energy: the last two
+    /// have the digits of the energy, and an entropy near zero has more.
     pub(super) fn excess<Y>(&self, at: &Evaluated<Y>) -> f64
     where
         Y: Metriplectic<Manifold: Space<Dim = N>>,
@@ -145,7 +146,15 @@ impl<N: Dimension> Linear<N> {
         if work == 0.0 {
             return at.excess;
         }
-        at.excess.max(work.abs() / (ROUNDED * size + at.entropy_covector.dot(&self.rounded)))
+        let in_units = |rounded: N::Vector<f64>| {
+            work.abs() / (ROUNDED * size + at.entropy_covector.dot(&rounded))
+        };
+        let of_terms = in_units(self.rounded);
+        if of_terms <= 1.0 {
+            return at.excess.max(of_terms);
+        }
+        let by_covectors = self.sensitivity.abs() * at.noise + at.heat_rounding;
+        at.excess.max(in_units(self.rounded + by_covectors))
     }
 
     /// The root mean square of displacements by these velocities, in units of their round-off; infinite if it is not

@@ -41,9 +41,7 @@ pub(super) fn take<Y: Metriplectic>(
     let kept = *memory;
     *memory = StageMemory::default();
     let mut parts = Parts { tableau, splits, system, effort: failure.effort };
-    let taken = if splits == 0 {
-        Err(Failed { failure, x: start.x.clone(), h: start.h })
-    } else if tableau.one_sided {
+    let taken = if tableau.one_sided {
         parts.graded(start, memory)
     } else {
         parts.halves(start, memory, 1)
@@ -227,7 +225,8 @@ impl<Y: Metriplectic> Parts<'_, Y> {
             && linear.friction > f64::max(1.0, linear.rotation)
         {
             let stiffness = linear.friction * (h / failed.h);
-            return StepError::StiffFriction { time, h, stiffness, residual, tried };
+            let damps = self.tableau.one_sided;
+            return StepError::StiffFriction { time, h, stiffness, residual, tried, damps };
         }
         match (failed.failure.cause, dependent_invariant(self.system, &failed.x)) {
             (Cause::Edge, _) => StepError::OutOfDomain { time, h, tried },

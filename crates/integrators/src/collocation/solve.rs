@@ -1,7 +1,7 @@
 //! The iteration for the velocities of the stages.
 
 use metriplectic_dynamics::Metriplectic;
-use metriplectic_fields::Vector;
+use metriplectic_fields::{Dimension as _, Vector};
 
 use super::chart::StepChart;
 use super::equation::{Evaluated, StageEquation, Unknowns};
@@ -69,6 +69,12 @@ const SURE: f64 = 0.03;
 /// The error of the laws at an end, in units of their round-off, above which a better end is looked for.
 const HALF: f64 = 0.5;
 
+/// The ratio of a round-off to that after a correction below which it was not known before.
+const UNKNOWN: f64 = 0.25;
+
+/// The fraction of the squares of known corrections that the next one may be.
+const KNOWN: f64 = 0.25;
+
 /// An evaluation with its correction.
 struct Iterate<Y: Metriplectic> {
     k: Unknowns<Y>,
@@ -91,6 +97,23 @@ impl<Y: Metriplectic> Iterate<Y> {
     fn is_nearer(&self, other: &Self, fraction: f64) -> bool {
         self.size < fraction * other.size
             || other.size <= STALL && self.total() < fraction * other.total()
+    }
+}
+
+impl<Y: Metriplectic> Iterate<Y> {
+    /// The sums of the squares of the corrections before and here, in units of the round-off here, without the entries
+    /// that begin to move: their correction grows, and their round-off was not known before.
+    fn known_since(&self, before: &Self) -> [f64; 2] {
+        let mut sums = [0.0; 2];
+        for c in 0..Dim::<Y>::LEN {
+            let unit = self.round_off[c].max(f64::MIN_POSITIVE);
+            let [was, is] = [before, self]
+                .map(|at| at.delta.iter().map(|v| (v[c] / unit).powi(2)).sum::<f64>());
+            if is <= was || before.round_off[c] >= UNKNOWN * unit {
+                sums = [sums[0] + was, sums[1] + is];
+            }
+        }
+        sums
     }
 }
 
@@ -168,9 +191,13 @@ impl<Y: Metriplectic> Iteration<'_, Y> {
         self.linear.correction(&at.residual, &round_off).0
     }
 
-    /// Forms the derivatives anew.
+    /// The same point with derivatives that are formed anew.
     fn renew(&mut self, here: Iterate<Y>) -> Option<Iterate<Y>> {
-        let Iterate { k, at, .. } = here;
+        self.renewed(here.k, here.at)
+    }
+
+    /// An evaluation with its correction by the derivatives there.
+    fn renewed(&mut self, k: Unknowns<Y>, at: Evaluated<Y>) -> Option<Iterate<Y>> {
         self.linear = Linear::of(&self.equation, &k)?;
         self.equation.rounding = self.linear.rounding();
         if self.full.is_some() {
@@ -208,6 +235,10 @@ impl<Y: Metriplectic> Iteration<'_, Y> {
                 if here.size <= STALL && here.excess <= STALLED_LAW {
                     return Ok(self.solved(here));
                 }
+                if is_fresh && let Some(next) = self.begin(&here) {
+                    (here, contraction) = (next, f64::INFINITY);
+                    continue;
+                }
                 if is_fresh {
                     let edge = self.equation.evaluate(&moved(&here, 1.0)).is_none();
                     return Err(Unsolved { edge, evaluations: self.evaluations, ..failed });
@@ -224,6 +255,20 @@ impl<Y: Metriplectic> Iteration<'_, Y> {
                 (contraction, is_fresh) = (f64::INFINITY, true);
             }
         }
+    }
+
+    /// The whole correction, where an entry begins to move with it and the others are nearer.
+    ///
+    /// An entry that moves at a higher order than the others, as heat does in a system that is released from rest, has no
+    /// round-off before they have moved. In units of that, no correction of it is short.
+    fn begin(&mut self, here: &Iterate<Y>) -> Option<Iterate<Y>> {
+        self.corrections += 1;
+        self.evaluations += 1;
+        let k = moved(here, 1.0);
+        let at = self.equation.evaluate(&k)?;
+        let next = self.renewed(k, at)?;
+        let [before, after] = next.known_since(here);
+        (after < KNOWN * before).then_some(next)
     }
 
     /// One more correction of a solved step whose end has other laws; `None` if they are not nearer then.

@@ -88,7 +88,7 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
         // else is in the way.
         if rates.friction > f64::max(1.0, rates.rotation) {
             let stiffness = rates.friction * (h / suggested);
-            return StepError::StiffFriction { time, h, stiffness, residual, tried };
+            return StepError::StiffFriction { time, h, stiffness, residual, tried, damps: false };
         }
         match (cause, dependent_invariant(system, x)) {
             (Cause::Edge, _) => StepError::OutOfDomain { time, h, tried },

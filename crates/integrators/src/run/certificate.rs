@@ -296,8 +296,26 @@ impl Certificate {
     }
 
     /// Whether friction is so stiff at these step sizes that the method does not damp it.
+    ///
+    /// Friction that the method has damped does not count. [`is_resolved`](Self::is_resolved) says whether a step was
+    /// longer than its transient.
     pub const fn is_stiff(&self) -> bool {
         self.friction > STIFF
+    }
+
+    /// Whether no step is known to be too long for the motion: the local errors that were estimated are below a tenth of
+    /// the state, friction is [damped](Self::is_stiff), and damping has added at most a hundredth of what the entropy
+    /// gained.
+    pub fn is_resolved(&self) -> bool {
+        let is_followed = self.local_error.is_none_or(|error| error <= UNRESOLVED);
+        is_followed && !self.is_stiff() && !self.skips_a_transient()
+    }
+
+    /// Whether damping has added more than a hundredth of what the entropy gained, beyond round-off.
+    fn skips_a_transient(&self) -> bool {
+        let of_friction = ADDED * self.entropy_gained.abs();
+        let least = of_friction.max(of_a_law(self.initial_entropy.abs()));
+        self.stages.is_some_and(|StageBalance { surplus, .. }| surplus > least)
     }
 
     /// Whether the entropy fell on no step by more than its round-off.
@@ -310,6 +328,12 @@ impl Certificate {
         self.invariants.iter().all(InvariantBalance::is_kept)
     }
 }
+
+/// The local error, relative to the sizes of the entries, from which on a motion is not resolved.
+const UNRESOLVED: f64 = 0.1;
+
+/// The fraction of the gain of the entropy that damping may add where a motion is resolved.
+const ADDED: f64 = 0.01;
 
 /// The fraction of steps at the edge of stability from which on stability sets the steps of a run.
 const AT_THE_EDGE: f64 = 0.5;

@@ -10,10 +10,10 @@ use metriplectic_manifolds::{
     Canonical, Cayley, ChartMidpoint, Euclidean, Exponential, HalfLine, LieDual, Metric, Product,
     Projection, Retraction, Rotations, Sphere, WeylMidpoint, rotations,
 };
-use nalgebra::{Matrix2, Matrix3, SVector, Vector1, Vector2, Vector3, Vector6, vector};
+use nalgebra::{Matrix2, Matrix3, SVector, Vector1, Vector2, Vector3, Vector4, Vector6, vector};
 use num_dual::DualNum;
 
-use super::{Problem, Study};
+use super::{Constants, Problem, Study};
 use crate::Either;
 
 /// The spinning top's energy on S² (Celledoni, Eidnes, Owren, Ringholm 2019, example 1).
@@ -71,6 +71,11 @@ fn off_axis<const A: usize>() -> SVector<f64, A> {
     SVector::<f64, A>::from_fn(|i, _| 1.0 + 0.3 * i as f64).normalize()
 }
 
+/// A point at which `Σ a_i x_i² + b_i x_i³` has no slope along the sphere.
+fn last_axis<const A: usize>() -> SVector<f64, A> {
+    SVector::<f64, A>::from_fn(|i, _| if i + 1 == A { 1.0 } else { 0.0 })
+}
+
 fn attitude() -> Matrix3<f64> {
     rotations::exp(&vector![0.3, -0.2, 0.5])
 }
@@ -79,9 +84,14 @@ const CANONICAL: &str = "canonical";
 
 /// Visits every problem.
 pub fn each(study: &mut impl Study) {
-    canonical(study);
-    closures(study);
-    products(study);
+    each_with(study, Constants::default());
+}
+
+/// Visits every problem, with these constants in its energy and entropy: they change no motion.
+pub fn each_with(study: &mut impl Study, constants: Constants) {
+    canonical(study, constants);
+    closures(study, constants);
+    products(study, constants);
 }
 
 /// Both geodesic retractions, as one type: the code of a study is made once for each problem.
@@ -132,38 +142,41 @@ const BY_THE_CHART: Named<ChartMidpoint> =
     Named { scheme: "chart midpoint", retraction: ChartMidpoint };
 
 /// Canonical metrics.
-pub(super) fn canonical(study: &mut impl Study) {
+pub(super) fn canonical(study: &mut impl Study, constants: Constants) {
+    let Constants { energy: h, entropy: s } = constants;
     let problem = |name, manifold, time| (name, manifold, CANONICAL, time);
     macro_rules! visit {
-        ($labels:expr, $start:expr, $strides:expr, $system:expr, $scheme:literal by $retraction:expr) => {
-            visit!(@ $labels, $start, $strides, $system, |study, problem| {
+        ($labels:expr, $start:expr, $rest:expr, $strides:expr, $system:expr, $scheme:literal by $retraction:expr) => {
+            visit!(@ $labels, $start, $rest, $strides, $system, |study, problem| {
                 with(study, problem, &[Named { scheme: $scheme, retraction: $retraction }])
             })
         };
-        ($labels:expr, $start:expr, $strides:expr, $system:expr) => {
-            visit!(@ $labels, $start, $strides, $system, geodesic)
+        ($labels:expr, $start:expr, $rest:expr, $strides:expr, $system:expr) => {
+            visit!(@ $labels, $start, $rest, $strides, $system, geodesic)
         };
-        (@ $labels:expr, $start:expr, $strides:expr, $system:expr, $all:expr) => {{
+        (@ $labels:expr, $start:expr, $rest:expr, $strides:expr, $system:expr, $all:expr) => {{
             let (name, manifold, metric, time) = $labels;
             let system = $system.build().expect("a problem is a system");
-            let strides = $strides.to_vec();
-            let problem = Problem { name, manifold, metric, system, start: $start, time, strides };
+            let (start, rest, strides) = ($start, $rest, $strides.to_vec());
+            let problem = Problem { name, manifold, metric, system, start, rest, time, strides };
             $all(study, &problem);
         }};
     }
     visit!(
         problem("rigid body", "so(3)*", 10.0),
         vector![0.1, -1.0, 0.2],
+        Vector3::zeros(),
         [(vector![1.0, -0.3, -0.8], 2.0)],
         System::on(LieDual::so3())
-            .energy(body_energy)
-            .entropy(|p: &Vector3<Real>| p.norm_squared() * 0.5)
+            .energy(move |p: &Vector3<Real>| body_energy(p) + h)
+            .entropy(move |p: &Vector3<Real>| p.norm_squared() * 0.5 + s)
     );
-    let sphere = || System::on(Sphere::<2>::round()).energy(top);
+    let sphere = || System::on(Sphere::<2>::round()).energy(move |x: &Vector3<Real>| top(x) + h);
     let diagonal = Vector3::from_element(3.0_f64.sqrt().recip());
     visit!(
         problem("spinning top", "S²", 5.0),
         diagonal,
+        Vector3::z(),
         [(vector![0.6, -1.2], 4.0)],
         sphere().bracket(AreaForm),
         "projection" by Projection
@@ -171,51 +184,62 @@ pub(super) fn canonical(study: &mut impl Study) {
     visit!(
         problem("relaxation", "S²", 3.0),
         diagonal,
+        Vector3::z(),
         [(vector![-0.4, 1.1], 4.0)],
-        System::on(Sphere::<2>::round()).energy(hill).entropy(tilt),
+        System::on(Sphere::<2>::round())
+            .energy(move |x: &Vector3<Real>| hill(x) + h)
+            .entropy(move |x: &Vector3<Real>| tilt(x) + s),
         "projection" by Projection
     );
     visit!(
         problem("no Casimir", "S²", 3.0),
         diagonal,
+        Vector3::z(),
         [(vector![0.3, 1.0], 8.0)],
-        sphere().bracket(AreaForm).entropy(hill).second_law(SecondLaw::Published),
+        sphere()
+            .bracket(AreaForm)
+            .entropy(move |x: &Vector3<Real>| hill(x) + s)
+            .second_law(SecondLaw::Published),
         "projection" by Projection
     );
     visit!(
         problem("Nambu", "S³", 2.0),
         off_axis::<4>(),
+        last_axis::<4>(),
         [(vector![-1.1, -1.0, 0.1], 8.0)],
         System::on(Sphere::<3>::round())
             .bracket(Nambu::default())
-            .energy(bumpy::<4>)
-            .entropy(slope::<4>),
+            .energy(move |x: &Vector4<Real>| bumpy(x) + h)
+            .entropy(move |x: &Vector4<Real>| slope(x) + s),
         "projection" by Projection
     );
     visit!(
         problem("Nambu", "S⁵", 2.0),
         off_axis::<6>(),
+        last_axis::<6>(),
         [ (vector![0.4, 0.0, -1.2, 0.6, 0.2], 4.0), (vector![-0.1, -0.2, -0.7, 1.8, 0.2], 8.0)],
         System::on(Sphere::<5>::round())
             .bracket(Nambu::default().and(first_twist).and(second_twist))
-            .energy(bumpy::<6>)
-            .entropy(slope::<6>),
+            .energy(move |x: &Vector6<Real>| bumpy(x) + h)
+            .entropy(move |x: &Vector6<Real>| slope(x) + s),
         "projection" by Projection
     );
     visit!(
         problem("Nambu", "SO(3)", 1.0),
         attitude(),
+        Matrix3::identity(),
         [(vector![1.1, -1.2, 1.1], 2.0)],
         System::on(Rotations::bi_invariant())
             .bracket(Nambu::default())
-            .energy(rotation_energy)
-            .entropy(rotation_entropy),
+            .energy(move |r: &Matrix3<Real>| rotation_energy(r) + h)
+            .entropy(move |r: &Matrix3<Real>| rotation_entropy(r) + s),
         "Cayley" by Cayley
     );
 }
 
 /// Metrics from closures, with numerical geodesics.
-pub(super) fn closures(study: &mut impl Study) {
+pub(super) fn closures(study: &mut impl Study, constants: Constants) {
+    let Constants { energy: h, entropy: s } = constants;
     let ambient = |x: &Vector3<Real>| {
         let mut g = Matrix3::from_diagonal(&vector![1.0, 1.5, 2.0]).cast::<Real>();
         g[(0, 1)] = x.z * 0.2;
@@ -224,14 +248,15 @@ pub(super) fn closures(study: &mut impl Study) {
     };
     let system = System::on(Sphere::<2>::round())
         .metric(Metric::field(ambient))
-        .energy(top)
-        .entropy(hill)
+        .energy(move |x: &Vector3<Real>| top(x) + h)
+        .entropy(move |x: &Vector3<Real>| hill(x) + s)
         .build()
         .expect("a problem is a system");
     let start = Vector3::from_element(3.0_f64.sqrt().recip());
     let strides = vec![(vector![0.7, -1.5], 32.0)];
     let (name, manifold, metric) = ("relaxation", "S²", "ambient closure");
-    let problem = Problem { name, manifold, metric, system, start, time: 2.0, strides };
+    let problem =
+        Problem { name, manifold, metric, system, start, time: 2.0, rest: Vector3::z(), strides };
     all(study, &problem, "projection", Projection);
 
     // One closure for both, and so one type.
@@ -249,13 +274,13 @@ pub(super) fn closures(study: &mut impl Study) {
             .metric(Metric::field(body))
             .bracket(Nambu::default())
             .dissipation(Scaled(0.1, MetricDissipation))
-            .energy(rotation_energy)
-            .entropy(rotation_entropy)
+            .energy(move |r: &Matrix3<Real>| rotation_energy(r) + h)
+            .entropy(move |r: &Matrix3<Real>| rotation_entropy(r) + s)
             .build()
             .expect("a problem is a system");
         let (name, manifold, strides) = ("Nambu", "SO(3)", strides.to_vec());
-        let problem =
-            Problem { name, manifold, metric, system, start: attitude(), time: 1.0, strides };
+        let (start, rest, time) = (attitude(), Matrix3::identity(), 1.0);
+        let problem = Problem { name, manifold, metric, system, start, rest, time, strides };
         all(study, &problem, "Cayley", Cayley);
     }
 
@@ -266,13 +291,13 @@ pub(super) fn closures(study: &mut impl Study) {
     let system = System::on(Euclidean::<2>)
         .metric(Metric::field(leaning))
         .bracket(AreaForm)
-        .energy(|q: &Vector2<Real>| q.x.powi(2) * 0.5 + q.y.powi(2) + q.x.powi(3) * 0.1)
+        .energy(move |q: &Vector2<Real>| q.x.powi(2) * 0.5 + q.y.powi(2) + q.x.powi(3) * 0.1 + h)
         .build()
         .expect("a problem is a system");
     let strides = vec![(vector![0.0, 0.55], 2.0)];
     let (name, manifold, metric) = ("area form", "2-chart", "non-diagonal");
-    let start = vector![0.6, 0.4];
-    let problem = Problem { name, manifold, metric, system, start, time: 2.0, strides };
+    let (start, rest, time) = (vector![0.6, 0.4], Vector2::zeros(), 2.0);
+    let problem = Problem { name, manifold, metric, system, start, rest, time, strides };
     with(study, &problem, &[BY_THE_CHART]);
 
     let leaning = |q: &Vector3<Real>| {
@@ -283,51 +308,56 @@ pub(super) fn closures(study: &mut impl Study) {
         .metric(Metric::field(leaning))
         .bracket(Nambu::default())
         .dissipation(Scaled(0.1, MetricDissipation))
-        .energy(bumpy::<3>)
-        .entropy(|q: &Vector3<Real>| q.norm_squared() * 0.5 + q.z.powi(3) * 0.1)
+        .energy(move |q: &Vector3<Real>| bumpy(q) + h)
+        .entropy(move |q: &Vector3<Real>| q.norm_squared() * 0.5 + q.z.powi(3) * 0.1 + s)
         .build()
         .expect("a problem is a system");
     let strides = vec![(vector![-1.1, 0.8, 0.9], 2.0)];
     let (name, manifold, metric) = ("Nambu", "3-chart", "non-diagonal");
-    let start = vector![0.5, -0.4, 0.3];
-    let problem = Problem { name, manifold, metric, system, start, time: 2.0, strides };
+    let (start, rest, time) = (vector![0.5, -0.4, 0.3], Vector3::zeros(), 2.0);
+    let problem = Problem { name, manifold, metric, system, start, rest, time, strides };
     with(study, &problem, &[BY_THE_CHART]);
 }
 
 /// Products.
-pub(super) fn products(study: &mut impl Study) {
+pub(super) fn products(study: &mut impl Study, constants: Constants) {
+    let Constants { energy: h, entropy: s } = constants;
     // H = h(n) + e(s) with the entropy itself as the second factor: a spin in a bath.
     let system = System::on(Product(Sphere::<2>::round(), Euclidean::<1>))
         .bracket((AreaForm, Zero))
-        .energy(|(n, s): &(Vector3<Real>, Vector1<Real>)| top(n) + s.x.exp())
-        .entropy(|(_, s): &(Vector3<Real>, Vector1<Real>)| s.x)
+        .energy(move |(n, s): &(Vector3<Real>, Vector1<Real>)| top(n) + s.x.exp() + h)
+        .entropy(move |(_, bath): &(Vector3<Real>, Vector1<Real>)| bath.x + s)
         .build()
         .expect("a problem is a system");
     let start = (Vector3::from_element(3.0_f64.sqrt().recip()), Vector1::new(0.1));
     let strides = vec![(vector![1.3, 0.2, 1.5], 2.0)];
     let (name, manifold, metric) = ("spin in a bath", "S² × R", CANONICAL);
-    geodesic(study, &Problem { name, manifold, metric, system, start, time: 2.0, strides });
+    let (rest, time) = ((Vector3::z(), Vector1::new(0.1)), 2.0);
+    geodesic(study, &Problem { name, manifold, metric, system, start, rest, time, strides });
 
     let system = System::on(Product(Sphere::<2>::round(), HalfLine))
         .metric((Canonical, Canonical))
         .bracket((AreaForm, Zero))
-        .energy(|(n, e): &(Vector3<Real>, Vector1<Real>)| top(n) + e.x)
-        .entropy(|(_, e): &(Vector3<Real>, Vector1<Real>)| e.x.ln())
+        .energy(move |(n, e): &(Vector3<Real>, Vector1<Real>)| top(n) + e.x + h)
+        .entropy(move |(_, e): &(Vector3<Real>, Vector1<Real>)| e.x.ln() + s)
         .build()
         .expect("a problem is a system");
     let start = (Vector3::new(FRAC_1_SQRT_2, 0.5, 0.5), Vector1::new(0.8));
     let strides = vec![(vector![-0.2, 0.1, -0.6], 8.0)];
     let (name, manifold) = ("spin in a bath", "S² × R₊");
-    geodesic(study, &Problem { name, manifold, metric, system, start, time: 2.0, strides });
+    let rest = (Vector3::z(), Vector1::new(0.8));
+    geodesic(study, &Problem { name, manifold, metric, system, start, rest, time, strides });
 
-    let energy = |(r, p): &(Matrix3<Real>, Vector3<Real>)| {
+    let energy = move |(r, p): &(Matrix3<Real>, Vector3<Real>)| {
         p.x.powi(2) * 0.5
             + p.y.powi(2) * 0.25
             + p.z.powi(2) * (1.0 / 6.0)
             + r.m33 * 0.7
             + r.m31 * 0.2
+            + h
     };
     let start = (attitude(), vector![0.4, -0.6, 0.8]);
+    let rest = (attitude(), Vector3::zeros());
     let system = System::on(Product(Rotations, Euclidean::<3>))
         .bracket(Symplectic)
         .energy(energy)
@@ -335,7 +365,7 @@ pub(super) fn products(study: &mut impl Study) {
         .expect("a problem is a system");
     let strides = vec![(vector![-0.9, 0.8, 1.0, 0.6, 1.4, 0.9], 1.0)];
     let (name, manifold) = ("heavy body", "SO(3) × R³");
-    geodesic(study, &Problem { name, manifold, metric, system, start, time: 2.0, strides });
+    geodesic(study, &Problem { name, manifold, metric, system, start, rest, time, strides });
 
     let full = |(r, _): &(Matrix3<Real>, Vector3<Real>)| {
         let mut g = nalgebra::Matrix6::<Real>::identity();
@@ -346,12 +376,12 @@ pub(super) fn products(study: &mut impl Study) {
     let system = System::on(Product(Rotations, Euclidean::<3>))
         .metric(Metric::field(full))
         .energy(energy)
-        .entropy(|(r, p): &(Matrix3<Real>, Vector3<Real>)| r.m12 - p.norm_squared() * 0.3)
+        .entropy(move |(r, p): &(Matrix3<Real>, Vector3<Real>)| r.m12 - p.norm_squared() * 0.3 + s)
         .build()
         .expect("a problem is a system");
     let away = vector![0.2, -0.3, 1.5, -1.3, -0.9, 0.3];
     let strides = vec![(away, 4.0), (away, 2.0)];
     let (name, metric) = ("relaxation", "full closure");
-    let problem = Problem { name, manifold, metric, system, start, time: 1.0, strides };
+    let problem = Problem { name, manifold, metric, system, start, rest, time: 1.0, strides };
     with(study, &problem, &[BY_THE_CHART]);
 }

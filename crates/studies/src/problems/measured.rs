@@ -6,7 +6,7 @@ use metriplectic_integrators::{Certificate, Method as _, Run, Scheme, Span};
 use metriplectic_manifolds::{Retraction, Riemannian as _, WeylMidpoint};
 
 use super::list::{canonical, closures, products};
-use super::{Problem, Study, each, flow, relative};
+use super::{Constants, Problem, Study, each, flow, relative};
 use crate::{Compared, Convergence};
 
 /// The orders of every scheme on the problems that are visited, and how well the energy was kept.
@@ -53,7 +53,7 @@ impl Orders {
     #[inline]
     pub fn canonical() -> Self {
         let mut orders = Self::new(40);
-        canonical(&mut orders);
+        canonical(&mut orders, Constants::default());
         orders
     }
 
@@ -61,7 +61,7 @@ impl Orders {
     #[inline]
     pub fn closures() -> Self {
         let mut orders = Self::new(15);
-        closures(&mut orders);
+        closures(&mut orders, Constants::default());
         orders
     }
 
@@ -69,7 +69,7 @@ impl Orders {
     #[inline]
     pub fn products() -> Self {
         let mut orders = Self::new(15);
-        products(&mut orders);
+        products(&mut orders, Constants::default());
         orders
     }
 }

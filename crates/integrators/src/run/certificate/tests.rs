@@ -42,7 +42,17 @@ fn one_is_no_plural() {
     assert!(adaptive.contains("step sizes:  1.0e-3 to 1.0e-1, 2 rejected"), "{adaptive}");
     let coarse = Certificate { local_error: Some(0.5), ..ONE_FALL };
     assert!(coarse.to_string().contains("the motion is not resolved: local errors up to 5.0e-1"));
+    assert!(!coarse.is_resolved() && ONE_FALL.is_resolved());
+    let with = |surplus| {
+        let stages = Some(StageBalance { surplus, ..StageBalance::default() });
+        Certificate { stages, ..ONE_FALL }
+    };
+    let [resolved, skipped] = [with(2e-3), with(5e-3)];
+    assert!(resolved.is_resolved() && !skipped.is_resolved());
+    assert!(!resolved.to_string().contains("its heat"), "{resolved}");
+    assert!(skipped.to_string().contains("2.0e-2 of its gain: a transient is not resolved"));
     let stiff = Certificate { friction: 1e6, ..coarse.clone() };
+    assert!(stiff.is_stiff() && !stiff.is_resolved());
     assert!(!stiff.to_string().contains("not resolved"), "{stiff}");
     let some = Certificate { local_error: Some(0.02), ..coarse.clone() }.to_string();
     assert!(

@@ -4,13 +4,11 @@ use std::fmt;
 
 use metriplectic_dynamics::SecondLaw;
 
-use super::{Certificate, InvariantBalance, ProjectedSteps, StageBalance};
+use super::{Certificate, InvariantBalance, ProjectedSteps, StageBalance, UNRESOLVED};
 use crate::digits::{Digits, counted};
 use crate::method::{Effort, LimitingSites};
 use crate::round_off::bound::of_a_law;
 
-/// The local error, relative to the sizes of the entries, from which on a motion is not resolved.
-const UNRESOLVED: f64 = 0.1;
 /// The local error from which on a hundred steps may be off by what a picture shows: about 27 steps of the midpoint rule
 /// in a turn.
 const COARSE: f64 = 1e-3;
@@ -87,6 +85,14 @@ impl fmt::Display for Certificate {
             write!(f, "stages:      laws off by {defect:.1e} of their terms in the worst step")?;
             if surplus > 0.0 {
                 write!(f, ", damping added {surplus:.1e} to S")?;
+            }
+            if self.skips_a_transient() {
+                write!(
+                    f,
+                    ", {:.1e} of its gain: a transient is not resolved, and its heat may have warmed a wrong entry; let \
+                     steps follow a tolerance",
+                    surplus / self.entropy_gained.abs()
+                )?;
             }
             writeln!(f)?;
         }

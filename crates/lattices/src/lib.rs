@@ -53,7 +53,7 @@ pub mod vector;
 mod verify;
 
 pub use builder::LatticeBuilder;
-pub use error::{LatticeError, Place};
+pub use error::{LatticeError, Place, Tried};
 pub use graph::{Boundary, Graph};
 pub use lattice::Lattice;
 pub use model::Model;

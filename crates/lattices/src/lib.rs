@@ -48,7 +48,7 @@ mod pool;
 pub mod profiles;
 mod projection;
 mod random;
-mod reach;
+mod terms;
 pub mod vector;
 mod verify;
 

@@ -7,7 +7,9 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use super::exact::{self, ExactForm};
 use crate::method::{Effort, LimitingSites, Promises};
-use crate::run::certificate::{Certificate, InvariantBalance, ProjectedSteps, StageBalance};
+use crate::run::certificate::{
+    Certificate, InvariantBalance, MisjudgedSize, ProjectedSteps, StageBalance,
+};
 use crate::run::trajectory::Ending;
 
 #[derive(Serialize, Deserialize)]
@@ -46,6 +48,8 @@ struct CertificateForm {
     worst_iterations: usize,
     #[serde(with = "exact")]
     local_error: Option<f64>,
+    #[serde(with = "exact", default)]
+    misjudged_size: Option<MisjudgedSize>,
     #[serde(default)]
     limiting_sites: LimitingSites,
     promises: Promises,
@@ -76,6 +80,16 @@ struct StageBalanceForm {
     defect: f64,
     #[serde(with = "exact")]
     surplus: f64,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(remote = "MisjudgedSize")]
+struct MisjudgedSizeForm {
+    direction: usize,
+    #[serde(with = "exact")]
+    judged: f64,
+    #[serde(with = "exact")]
+    reached: f64,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -129,5 +143,6 @@ exact_form! {
     CertificateForm of Certificate,
     InvariantBalanceForm of InvariantBalance,
     StageBalanceForm of StageBalance,
+    MisjudgedSizeForm of MisjudgedSize,
     EndingForm of Ending
 }

@@ -5,6 +5,7 @@ use crate::method::{Element, Flow, LimitingSites, Memory, Promises, Vector};
 use crate::run::certificate::StageBalance;
 use crate::run::controller::{Controller, Pace, StepSize};
 use crate::run::progress::Progress;
+use crate::run::scales::Judged;
 use crate::run::span::{check_end, check_step_size, check_steps};
 use crate::run::trajectory::Ending;
 
@@ -212,6 +213,13 @@ pub(super) fn of_the_entries<F: Flow>(
         size("size of an entry", known)?;
         if progress.judges_sizes() && known < here {
             return damaged("size of an entry", known);
+        }
+        if let Some(Judged { first, reached }) = &progress.judged {
+            size("size of an entry at the start", first.get(i))?;
+            let reached = reached.get(i);
+            if !(here..=known).contains(&reached) {
+                return damaged("largest size of an entry", reached);
+            }
         }
         size("size of the terms of an entry", progress.scales.terms.get(i))?;
         size("largest velocity of an entry", progress.largest_velocity.get(i))?;

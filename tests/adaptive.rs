@@ -307,11 +307,11 @@ fn a_tolerance_has_the_bounds_of_its_method() {
     has_bounds(&body, RungeKuttaChebyshev, [1e-10, 1.0]);
     has_bounds(&body, DormandPrince5, [1e-15, 1.0]);
     has_bounds(&body, DormandPrince8, [1e-15, 1.0]);
-    has_bounds(&body, Gauss::<1>::default(), [1e-15, 1.0]);
-    has_bounds(&body, Gauss::<2>::default(), [1e-15, 1.0]);
-    has_bounds(&body, Gauss::<4>::default(), [1e-15, 1.0]);
-    has_bounds(&body, Radau::<2>::default(), [1e-15, 1.0]);
-    has_bounds(&body, Radau::<4>::default(), [1e-15, 1.0]);
+    has_bounds(&body, Gauss::<1>, [1e-15, 1.0]);
+    has_bounds(&body, Gauss::<2>, [1e-15, 1.0]);
+    has_bounds(&body, Gauss::<4>, [1e-15, 1.0]);
+    has_bounds(&body, Radau::<2>, [1e-15, 1.0]);
+    has_bounds(&body, Radau::<4>, [1e-15, 1.0]);
 }
 
 #[test]

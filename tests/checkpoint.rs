@@ -36,7 +36,10 @@ fn through_a_file(checkpoint: &Checkpoint) -> Checkpoint {
     assert_eq!(serde_json::to_string(&read).expect("it is written"), text);
     // Reading it as a tree, as a program that adds a field of its own does, costs no digit.
     let tree: serde_json::Value = serde_json::from_str(&text).expect("it is read");
-    assert_eq!(&serde_json::from_value::<Checkpoint>(tree.clone()).expect("it is read"), checkpoint);
+    assert_eq!(
+        &serde_json::from_value::<Checkpoint>(tree.clone()).expect("it is read"),
+        checkpoint
+    );
     // And so does a format that writes fields in their order, without names.
     let list = serde_json::json!([tree["version"], tree["checksum"], tree["run"]]);
     assert_eq!(&serde_json::from_value::<Checkpoint>(list).expect("it is read"), checkpoint);
@@ -190,7 +193,7 @@ fn every_changed_digit_of_a_checkpoint_is_refused() {
                 refuses_changed_digits($method, &body, UNSTABLE, course.clone());
             )*};
         }
-        refuse!(Scheme::new(WeylMidpoint), Gauss::<3>::default(), Radau::<2>::default());
+        refuse!(Scheme::new(WeylMidpoint), Gauss::<3>, Radau::<2>);
         refuse!(DormandPrince5, DormandPrince8, RungeKuttaChebyshev);
     }
     refuses_changed_digits(
@@ -273,12 +276,12 @@ fn a_checkpoint_of_another_method_is_refused_and_one_with_other_options_is_not()
     refused(DormandPrince8.resume(&body, &checkpoint).err(), "DormandPrince8");
     refused(DormandPrince5.resume(&body, &checkpoint).err(), "DormandPrince5");
     refused(RungeKuttaChebyshev.resume(&body, &checkpoint).err(), "RungeKuttaChebyshev");
-    refused(Gauss::<2>::default().resume(&body, &checkpoint).err(), "Gauss::<2>");
-    refused(Radau::<3>::default().resume(&body, &checkpoint).err(), "Radau::<3>");
-    let gauss = Gauss::<2>::default().run(&body, UNSTABLE, Span::steps(0.1, 2)).unwrap();
+    refused(Gauss::<2>.resume(&body, &checkpoint).err(), "Gauss::<2>");
+    refused(Radau::<3>.resume(&body, &checkpoint).err(), "Radau::<3>");
+    let gauss = Gauss::<2>.run(&body, UNSTABLE, Span::steps(0.1, 2)).unwrap();
     let later = gauss.checkpoint().clone().with_steps(4).unwrap();
-    assert!(Gauss::<2> { splits: 3 }.resume(&body, &later).is_ok());
-    let error = Gauss::<3>::default().resume(&body, &later).unwrap_err();
+    assert!(Gauss::<2>.resume(&body, &later).is_ok());
+    let error = Gauss::<3>.resume(&body, &later).unwrap_err();
     assert!(matches!(error, ResumeError::AnotherMethod { .. }), "{error}");
 }
 

@@ -264,7 +264,7 @@ fn erased_closures_have_one_type_and_the_bits_of_the_closures() {
         .energy(|p: &Vector3<Real>| p.x * p.x * 0.25 + p.y * p.y * 0.5 + p.z * p.z)
         .build()
         .unwrap();
-    let erased = vec![round.clone().erased(), long.clone().erased()];
+    let erased = [round.clone().erased(), long.clone().erased()];
     let span = || Span::steps(0.1, 20);
     let last = |run: Trajectory<LieDual<3>>| run.last().point;
     let ends = [

@@ -340,8 +340,8 @@ fn an_event_across_a_nan_at_the_end_of_a_step_is_found_by_every_method() {
     let system = oscillator();
     let all = [
         ("midpoint", across_nan(Scheme::new(WeylMidpoint), &system)),
-        ("Gauss", across_nan(Gauss::<2>::default(), &system)),
-        ("Radau", across_nan(Radau::<3>::default(), &system)),
+        ("Gauss", across_nan(Gauss::<2>, &system)),
+        ("Radau", across_nan(Radau::<3>, &system)),
         ("order 5", across_nan(DormandPrince5, &system)),
         ("order 8", across_nan(DormandPrince8, &system)),
         ("Chebyshev", across_nan(RungeKuttaChebyshev, &system)),

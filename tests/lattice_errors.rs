@@ -1,7 +1,7 @@
 //! Lattices that are refused, with the site or the bond.
 
 use metriplectic::integrators::FlowError;
-use metriplectic::lattices::Place;
+use metriplectic::lattices::{Place, Tried};
 use metriplectic::prelude::*;
 
 type Pair = (Vector2<Real>, Vector2<Real>);
@@ -66,6 +66,14 @@ fn a_graph_that_does_not_fit_is_refused() {
     assert_eq!(of(Graph::ring(1)), LatticeError::BondToItself { bond: 0, site: 0 });
     let large = Graph::cubic([1 << 40, 1 << 40, 1], Boundary::Open);
     assert!(matches!(of(large), LatticeError::TooManySites { .. }));
+    // The sites can be numbered, and the bonds would take 98 GB.
+    for boundary in [Boundary::Open, Boundary::Periodic] {
+        let error = Graph::cubic([1600; 3], boundary).checked().unwrap_err();
+        println!("{error}");
+        assert!(
+            matches!(error, LatticeError::TooManyBonds { bonds, .. } if bonds > 12_000_000_000)
+        );
+    }
 }
 
 #[test]
@@ -114,6 +122,112 @@ fn friction_that_breaks_a_law_is_refused_with_its_bond() {
         matches!(error, LatticeError::NotConserved { index: 0, size } if size > 1e-4),
         "{error}"
     );
+}
+
+#[test]
+fn friction_is_tried_in_every_bond_and_at_every_site() {
+    let n = 5000;
+    let graph = || Graph::from_bonds(n, (0..n).map(|i| [i, (i + 1) % n]));
+    let one_of = |number: usize| (0..n).map(|i| i == number).collect::<Vec<_>>();
+    for odd in [1234, 4321] {
+        let on_bonds = |wrong: fn(Term) -> Term| {
+            let lattice = Lattice::on(graph(), Euclidean::<2>)
+                .bond_data(one_of(odd))
+                .energy(energy)
+                .entropy(entropy)
+                .bond_onsager(move |bond| {
+                    let term = |t| if *bond.data { wrong(t) } else { t };
+                    friction(bond.w[0], bond.w[1]).map(term)
+                })
+                .build()
+                .unwrap();
+            let error = lattice.verify(&lattice.points(warm)).unwrap_err();
+            println!("{error}");
+            error
+        };
+        let (place, tried) = (Place::Bond { bond: odd, sites: [odd, odd + 1] }, Tried::Start);
+        assert_eq!(
+            on_bonds(|t| Onsager { rate: -0.1, ..t }),
+            LatticeError::NegativeRate { place, tried, rate: -0.1 }
+        );
+        let error = on_bonds(|t| Onsager { b: [t.b[0], t.b[1] * 1.001], ..t });
+        assert!(matches!(error, LatticeError::Broken { place: at, .. } if at == place), "{error}");
+        let at_sites = |wrong: fn(&mut Onsager<Vector2<f64>>)| {
+            let lattice = Lattice::on(graph(), Euclidean::<2>)
+                .site_data(one_of(odd))
+                .energy_with(|x: &Vector2<Real>, _: &bool| energy(x))
+                .entropy_with(|x: &Vector2<Real>, _: &bool| entropy(x))
+                .site_onsager(move |site| {
+                    let mut term = Onsager { rate: 0.1, b: vector![1.0, -site.w.x] };
+                    if *site.data {
+                        wrong(&mut term);
+                    }
+                    [term]
+                })
+                .build()
+                .unwrap();
+            let error = lattice.verify(&lattice.points(warm)).unwrap_err();
+            println!("{error}");
+            error
+        };
+        let place = Place::Site(odd);
+        let negative = LatticeError::NegativeRate { place, tried, rate: -1e-30 };
+        assert_eq!(at_sites(|term| term.rate = -1e-30), negative);
+        let error = at_sites(|term| term.b.x *= 1.001);
+        assert!(matches!(error, LatticeError::Broken { place: at, .. } if at == place), "{error}");
+    }
+}
+
+/// Bodies with the capacities `c` in J/K and energies in J as variables, which exchange heat.
+fn bodies(
+    capacities: Vec<f64>,
+    conductance: f64,
+) -> Result<Lattice<impl metriplectic::lattices::Model<Manifold = Euclidean<1>>>, LatticeError> {
+    let n = capacities.len();
+    let bonds = (0..n).map(|i| [i, (i + 1) % n]).chain((0..n).map(|i| [i, (7 * i + 11) % n]));
+    let bonds: Vec<_> = bonds.filter(|[i, j]| i != j).collect();
+    let data = bonds.iter().map(|bond| bond.map(|site| capacities[site])).collect();
+    let graph = Graph::from_bonds(n, bonds).checked()?;
+    Lattice::on(graph, Euclidean::<1>)
+        .site_data(capacities)
+        .bond_data(data)
+        .energy_with(|e: &Vector1<Real>, _: &f64| e.x)
+        .entropy_with(|e: &Vector1<Real>, c: &f64| (e.x / *c).ln() * *c)
+        .bond_onsager(move |bond| {
+            let ([x, y], [c, d]) = (bond.x, bond.data);
+            let rate = conductance * (x.x / c) * (y.x / d);
+            [Onsager { rate, b: [vector![1.0], vector![-1.0]] }]
+        })
+        .build()
+}
+
+#[test]
+fn a_small_body_beside_large_ones_is_verified_at_energies_of_its_own() {
+    // From 0.1 to 1000 J/K, at 250 to 350 K.
+    let capacity = |i: usize| 0.1 * 1e4_f64.powf((i * 23 % 60) as f64 / 59.0);
+    let capacities: Vec<f64> = (0..60).map(capacity).collect();
+    let lattice = bodies(capacities.clone(), 0.5).unwrap();
+    let kelvin = |i: usize| 300.0 + 50.0 * (i as f64).sin();
+    let start = lattice.points(|i| vector![capacities[i] * kelvin(i)]);
+    assert_eq!(lattice.verify(&start), Ok(()));
+    let run = RungeKuttaChebyshev.run(&lattice, start.clone(), Span::until(10.0).at_most(2));
+    let run = run.unwrap();
+    assert!(run.certificate().keeps_energy() && run.certificate().keeps_entropy());
+    // A rate that is negative beside the start says so.
+    let lattice = Lattice::on(Graph::chain(60), Euclidean::<1>)
+        .energy(|e: &Vector1<Real>| e.x)
+        .entropy(|e: &Vector1<Real>| e.x.ln())
+        .bond_onsager(|bond| {
+            let rate = if (bond.x[0].x - 300.0).abs() < 1e-9 { 1.0 } else { -1.0 };
+            [Onsager { rate, b: [vector![1.0], vector![-1.0]] }]
+        })
+        .build()
+        .unwrap();
+    let error = lattice.verify(&lattice.points(|_| vector![300.0])).unwrap_err();
+    println!("{error}");
+    let tried = Tried::Near { fraction: 1e-2 };
+    let place = Place::Bond { bond: 0, sites: [0, 1] };
+    assert_eq!(error, LatticeError::NegativeRate { place, tried, rate: -1.0 });
 }
 
 #[test]
@@ -197,7 +311,7 @@ fn an_entropy_that_gathers_what_the_bracket_moves_is_refused_with_its_site() {
     assert_eq!(refused_gather(warmth, |_, sum| (-sum + 8.0).ln()), not_finite(site));
     // A density of positions.
     let error = refused_gather(|(x, y)| (x.x - y.x).powi(2), |x, sum| x.z.ln() * sum).unwrap();
-    let LatticeError::Broken { law: "Π dS = 0", place: Place::Site(0), size, remedy } = error
+    let LatticeError::Broken { law: "Π dS = 0", place: Place::Site(0), size, remedy, .. } = error
     else {
         panic!("another error: {error}")
     };

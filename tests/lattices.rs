@@ -1,5 +1,7 @@
 //! Lattices: both laws, orders, closed forms, and the same bits on every number of threads.
 
+#[path = "lattices/at_rest.rs"]
+mod at_rest;
 #[path = "models/chain.rs"]
 mod chain;
 #[path = "models/digits.rs"]

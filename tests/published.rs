@@ -1,6 +1,6 @@
 //! Problems that papers publish with parameters and figures, to the digits of independent references.
 //!
-//! References without a source were computed by SciPy's DOP853, and by its Radau or LSODA; the digits given are those on
+//! References without a source were computed by `SciPy`'s DOP853, and by its Radau or LSODA; the digits given are those on
 //! which two methods agree.
 
 #[path = "models/stages.rs"]

@@ -290,6 +290,49 @@ fn the_size_of_an_entry_can_be_said() {
     }
 }
 
+/// The size that was misjudged in a run by each method.
+fn misjudged(
+    system: &impl Metriplectic<Manifold = Euclidean<2>>,
+    start: Vector2<f64>,
+    schedule: &Schedule,
+) -> [Option<[f64; 3]>; 5] {
+    let of = |certificate: &Certificate| {
+        println!("{certificate}");
+        certificate.misjudged_size.map(|size| [size.direction as f64, size.judged, size.reached])
+    };
+    macro_rules! of {
+        ($method:expr) => {
+            of($method.run(system, start, schedule.clone()).expect("it runs").certificate())
+        };
+    }
+    [of!(WeylMidpoint), of!(Gauss::<2>), of!(Radau::<2>), of!(DormandPrince5), of!(DormandPrince8)]
+}
+
+#[test]
+fn the_certificate_says_which_size_was_misjudged() {
+    let oscillator = System::on(Euclidean::<2>)
+        .bracket(Symplectic)
+        .energy(|x: &Vector2<Real>| x.norm_squared() * 0.5)
+        .build()
+        .unwrap();
+    let start = vector![1e-9, 0.0];
+    let span = Span::until(13.0).tolerance(1e-4);
+    assert_eq!(misjudged(&oscillator, start, &span.into()), [None; 5]);
+    // A size of the user that is not reached.
+    let unreached = [Some([0.0, 1.0, 1e-9]); 5];
+    assert_eq!(misjudged(&oscillator, start, &span.scale([1.0, 0.0]).into()), unreached);
+    // Unstable, with p from 0 to 10⁻⁹ sinh 13 = 2.2e-4.
+    let saddle = System::on(Euclidean::<2>)
+        .bracket(Symplectic)
+        .energy(|x: &Vector2<Real>| (x.y.powi(2) - x.x.powi(2)) * 0.5)
+        .build()
+        .unwrap();
+    for grown in misjudged(&saddle, start, &span.into()) {
+        let [direction, judged, reached] = grown.expect("a size that has grown");
+        assert!(direction > 0.5 && judged < 1e-9 && reached > 1e-4, "{grown:?}");
+    }
+}
+
 #[test]
 fn an_entry_that_stays_at_zero_but_for_noise_stops_nothing() {
     // Two equal weights on springs: the sum of their momenta is zero, but for rounding.
@@ -409,7 +452,7 @@ fn an_underflow_is_called_one() {
             refuses(WeylMidpoint.run(&oscillator, start, span).unwrap_err());
             refuses(WeylMidpoint.run(&oscillator, start, Span::steps(0.1, 10)).unwrap_err());
             refuses(DormandPrince8.run(&oscillator, start, span).unwrap_err());
-            refuses(Gauss::<2>::default().run(&oscillator, start, span).unwrap_err());
+            refuses(Gauss::<2>.run(&oscillator, start, span).unwrap_err());
         }
     }
     // All digits are there at 10⁻¹⁴⁰, and none is needed at the equilibrium.

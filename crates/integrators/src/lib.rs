@@ -51,7 +51,9 @@ pub use method::{
 pub use midpoint::{Residual, Run, Scheme};
 pub use newton::{Equation, Iterate, Linearised, Newton, Root, Rounding};
 pub use round_off::stable_gradient::StableGradient;
-pub use run::certificate::{Certificate, InvariantBalance, ProjectedSteps, StageBalance};
+pub use run::certificate::{
+    Certificate, InvariantBalance, MisjudgedSize, ProjectedSteps, StageBalance,
+};
 pub use run::checkpoint::{Checkpoint, ResumeError, Saved};
 pub use run::event::Event;
 pub use run::observables::{Csv, Npy, Observables, TableError};

@@ -9,6 +9,7 @@
 mod control;
 mod evidence;
 mod flow;
+mod initial_scales;
 mod metriplectic;
 mod reach;
 mod step;

@@ -20,6 +20,20 @@ pub enum LatticeError {
         /// The most.
         most: usize,
     },
+    /// More bonds than can be numbered.
+    #[error("the graph has {bonds} bonds, and at most {most} can be numbered; give it fewer sites")]
+    TooManyBonds {
+        /// How many there are.
+        bonds: usize,
+        /// The most.
+        most: usize,
+    },
+    /// A list of bonds for which there is no memory.
+    #[error("there is no memory for the {bonds} bonds of the graph; give it fewer sites")]
+    NoMemory {
+        /// How many bonds there are.
+        bonds: usize,
+    },
     /// A bond to a site that is not there.
     #[error("bond {bond} ends at site {site}, and the graph has {sites} sites, numbered from 0")]
     BondToNowhere {
@@ -98,22 +112,28 @@ pub enum LatticeError {
         place: Place,
     },
     /// A law that is broken at a site or a bond.
-    #[error("{law} is broken at {place}: the rest is {size:.1e} of the terms{remedy}")]
+    #[error("{law} is broken at {place}, {tried}: the rest is {size:.1e} of the terms{remedy}")]
     Broken {
         /// The law.
         law: &'static str,
         /// Where.
         place: Place,
+        /// At which state.
+        tried: Tried,
         /// What is left, relative to the terms that should cancel.
         size: f64,
         /// What to do.
         remedy: &'static str,
     },
     /// A negative rate of friction.
-    #[error("the friction at {place} has the negative rate {rate:.3e}, and would destroy entropy")]
+    #[error(
+        "the friction at {place}, {tried}, has the negative rate {rate:.3e}, and would destroy entropy"
+    )]
     NegativeRate {
         /// Where.
         place: Place,
+        /// At which state.
+        tried: Tried,
         /// The rate.
         rate: f64,
     },
@@ -146,6 +166,36 @@ pub enum LatticeError {
 impl fmt::Debug for LatticeError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         fmt::Display::fmt(self, f)
+    }
+}
+
+/// The state at which a law was tried.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Tried {
+    /// The start of the run.
+    Start,
+    /// A state that the run has reached.
+    Reached,
+    /// A state whose entries differ from the start at random, and along the velocity.
+    Near {
+        /// By this fraction of each entry, or of the largest one of its kind where it is zero.
+        fraction: f64,
+    },
+}
+
+impl fmt::Display for Tried {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Start => f.write_str("at the start"),
+            Self::Reached => f.write_str("at a state of the run"),
+            Self::Near { fraction } => {
+                write!(
+                    f,
+                    "at a state whose entries differ from the start by {fraction:.0e} of their sizes"
+                )
+            }
+        }
     }
 }
 

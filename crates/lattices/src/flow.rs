@@ -4,7 +4,7 @@ use metriplectic_dynamics::SecondLaw;
 use metriplectic_dynamics::invariants::Kind;
 use metriplectic_fields::{Column, Space};
 use metriplectic_integrators::explicit::{Projected, ProjectionError, Target};
-use metriplectic_integrators::{Flow, FlowError, Laws, Recheck, Scales, StageFlow};
+use metriplectic_integrators::{Flow, FlowError, Laws, Recheck, StageFlow};
 use metriplectic_manifolds::{Manifold, PointError};
 
 use crate::lattice::{Differentials, Lattice, Total, Totals, differentials_at, dimension};
@@ -186,10 +186,13 @@ impl<P: Model> Flow for Lattice<P> {
         parallel::map(self.sites(), of).into_iter().fold(0.0, larger)
     }
 
-    fn reach(&self, x: &Points<P::Manifold>, span: f64) -> Option<Scales<SiteVector>> {
-        let sizes = self.sizes_soon(x, span);
-        self.clear();
-        sizes
+    fn velocity_terms(
+        &self,
+        x: &Points<P::Manifold>,
+        v: &SiteVector,
+        sizes: &SiteVector,
+    ) -> Option<SiteVector> {
+        self.terms(x, v, sizes)
     }
 
     fn local_error(

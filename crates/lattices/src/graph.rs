@@ -72,6 +72,9 @@ pub enum Boundary {
     Periodic,
 }
 
+/// The most sites, and the most bonds, that can be numbered.
+const MOST: usize = u32::MAX as usize;
+
 impl Graph {
     /// A row of sites, each bonded to the next.
     #[must_use]
@@ -98,7 +101,7 @@ impl Graph {
     }
 
     /// A graph of `sites` sites with these bonds, from the first to the second site of each pair. A bond that does
-    /// not fit is refused when the lattice is built.
+    /// not fit is refused when the lattice is built, or by [`checked`](Self::checked).
     #[must_use]
     pub fn from_bonds(sites: usize, bonds: impl IntoIterator<Item = [usize; 2]>) -> Self {
         let mut graph = Self::without_bonds(sites);
@@ -123,8 +126,28 @@ impl Graph {
         &self.bonds
     }
 
-    /// Returns the graph if it can carry a lattice.
-    pub(crate) fn checked(self) -> Result<Self, LatticeError> {
+    /// Returns the graph if it can carry a lattice. A lattice checks its graph when it is built; check a graph that is
+    /// read from a file before.
+    ///
+    /// ```
+    /// use metriplectic_lattices::{Graph, LatticeError};
+    ///
+    /// fn read(sites: usize, bonds: &[[usize; 2]]) -> Result<Graph, LatticeError> {
+    ///     Graph::from_bonds(sites, bonds.iter().copied()).checked()
+    /// }
+    /// # fn main() -> Result<(), LatticeError> {
+    /// let triangle = read(3, &[[0, 1], [1, 2], [2, 0]])?;
+    /// assert_eq!(triangle.bonds().len(), 3);
+    /// let error = read(3, &[[0, 1], [1, 3]]).unwrap_err();
+    /// assert_eq!(error, LatticeError::BondToNowhere { bond: 1, site: 3, sites: 3 });
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
+    /// # Errors
+    ///
+    /// [`LatticeError`] if it has no sites, or more sites or bonds than can be numbered, or a bond that does not fit.
+    pub fn checked(self) -> Result<Self, LatticeError> {
         if self.sites == 0 {
             return Err(LatticeError::NoSites);
         }
@@ -135,14 +158,22 @@ impl Graph {
     }
 
     fn without_bonds(sites: usize) -> Self {
-        let most = u32::MAX as usize;
-        let refused = (sites > most).then_some(LatticeError::TooManySites { sites, most });
+        let refused = (sites > MOST).then_some(LatticeError::TooManySites { sites, most: MOST });
         Self { sites, bonds: Vec::new(), refused }
     }
 
     fn grid<const D: usize>(sizes: [usize; D], boundary: Boundary) -> Self {
         let sites = sizes.iter().try_fold(1_usize, |sites, &size| sites.checked_mul(size));
         let mut graph = Self::without_bonds(sites.unwrap_or(usize::MAX));
+        // Along a side of `size` sites there are `size − 1` bonds, and one more if it is closed.
+        let along = |size: usize| match boundary {
+            Boundary::Open => graph.sites - graph.sites / size,
+            Boundary::Periodic => graph.sites,
+        };
+        if graph.refused.is_none() && graph.sites > 0 {
+            let bonds = sizes.map(along).iter().sum();
+            graph.reserve(bonds);
+        }
         if graph.refused.is_some() {
             return graph;
         }
@@ -161,8 +192,22 @@ impl Graph {
         graph
     }
 
+    /// Makes room for so many bonds, or refuses the graph.
+    fn reserve(&mut self, bonds: usize) {
+        if bonds > MOST {
+            self.refused = Some(LatticeError::TooManyBonds { bonds, most: MOST });
+        } else if self.bonds.try_reserve_exact(bonds).is_err() {
+            self.refused = Some(LatticeError::NoMemory { bonds });
+        }
+    }
+
     fn bond(&mut self, from: usize, to: usize) {
         let (bond, sites) = (self.bonds.len(), self.sites);
+        if bond == MOST {
+            let bonds = bond.saturating_add(1);
+            self.refused.get_or_insert(LatticeError::TooManyBonds { bonds, most: MOST });
+            return;
+        }
         let number = |site: usize| u32::try_from(site).ok().filter(|_| site < sites);
         match (number(from), number(to)) {
             (Some(site), Some(_)) if from == to => {

@@ -48,13 +48,13 @@ mod pool;
 pub mod profiles;
 mod projection;
 mod random;
-mod reach;
 mod recheck;
+mod terms;
 pub mod vector;
 mod verify;
 
 pub use builder::LatticeBuilder;
-pub use error::{LatticeError, Place};
+pub use error::{LatticeError, Place, Tried};
 pub use graph::{Boundary, Graph};
 pub use lattice::Lattice;
 pub use model::Model;

@@ -22,18 +22,21 @@ const HEADER: u16 = 128;
 #[derive(Debug)]
 pub struct Profiles<W> {
     file: W,
+    /// Where the array begins in the file.
+    start: u64,
     columns: usize,
     rows: u64,
 }
 
 impl<W: Write + Seek> Profiles<W> {
-    /// Begins an array with so many columns.
+    /// Begins an array with so many columns at the current position of the file.
     ///
     /// # Errors
     ///
     /// Those of the file.
-    pub fn npy(file: W, columns: usize) -> io::Result<Self> {
-        let mut profiles = Self { file, columns, rows: 0 };
+    pub fn npy(mut file: W, columns: usize) -> io::Result<Self> {
+        let start = file.stream_position()?;
+        let mut profiles = Self { file, start, columns, rows: 0 };
         profiles.header()?;
         Ok(profiles)
     }
@@ -45,12 +48,15 @@ impl<W: Write + Seek> Profiles<W> {
     /// [`io::ErrorKind::InvalidInput`] if the row has another length, and those of the file; the row is then not
     /// counted.
     pub fn row(&mut self, numbers: impl IntoIterator<Item = f64>) -> io::Result<()> {
-        let bytes: Vec<u8> = numbers.into_iter().flat_map(f64::to_le_bytes).collect();
-        if bytes.len() != 8 * self.columns {
-            let message = format!("{} numbers for {} columns", bytes.len() / 8, self.columns);
+        // One number more than fits tells a row that is too long.
+        let numbers: Vec<f64> = numbers.into_iter().take(self.columns.saturating_add(1)).collect();
+        if numbers.len() != self.columns {
+            let found = if numbers.len() > self.columns { "more" } else { "fewer" };
+            let message = format!("{found} numbers than the {} columns", self.columns);
             return Err(io::Error::new(io::ErrorKind::InvalidInput, message));
         }
-        let start = u64::from(HEADER) + self.rows * bytes.len() as u64;
+        let bytes: Vec<u8> = numbers.into_iter().flat_map(f64::to_le_bytes).collect();
+        let start = self.start + u64::from(HEADER) + self.rows * bytes.len() as u64;
         self.file.seek(SeekFrom::Start(start))?;
         self.file.write_all(&bytes)?;
         self.rows += 1;
@@ -70,7 +76,37 @@ impl<W: Write + Seek> Profiles<W> {
         let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
         bytes.extend((HEADER - 10).to_le_bytes());
         bytes.extend(format!("{text:width$}\n", width = rest - 1).into_bytes());
-        self.file.seek(SeekFrom::Start(0))?;
+        self.file.seek(SeekFrom::Start(self.start))?;
         self.file.write_all(&bytes)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::io::Cursor;
+
+    #[test]
+    fn an_array_begins_where_its_file_stands() {
+        let mut file = Cursor::new(b"a title".to_vec());
+        file.set_position(7);
+        let mut profiles = Profiles::npy(file, 2).unwrap();
+        profiles.row([1.0, 2.0]).unwrap();
+        profiles.row([3.0, 4.0]).unwrap();
+        let bytes = profiles.into_inner().into_inner();
+        assert!(bytes.starts_with(b"a title\x93NUMPY") && bytes.len() == 7 + 128 + 4 * 8);
+        assert_eq!(bytes[7 + 128..7 + 136], 1.0_f64.to_le_bytes());
+    }
+
+    #[test]
+    fn a_row_of_another_length_is_refused() {
+        for (columns, numbers) in [(3, 2), (3, 4), (usize::MAX, 2), (usize::MAX / 8 + 1, 0)] {
+            let mut profiles = Profiles::npy(Cursor::new(Vec::new()), columns).unwrap();
+            let error = profiles.row(vec![1.0; numbers]).unwrap_err();
+            assert_eq!(error.kind(), io::ErrorKind::InvalidInput, "{error}");
+        }
+        // A row without an end.
+        let mut profiles = Profiles::npy(Cursor::new(Vec::new()), 3).unwrap();
+        assert!(profiles.row(std::iter::repeat(1.0)).is_err());
     }
 }

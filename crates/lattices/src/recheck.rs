@@ -6,7 +6,7 @@
 use metriplectic_fields::Column;
 
 use crate::Onsager;
-use crate::error::{LatticeError, Place};
+use crate::error::{LatticeError, Place, Tried};
 use crate::lattice::{Lattice, differentials_at};
 use crate::model::{Model, VectorOf};
 use crate::points::Points;
@@ -48,7 +48,7 @@ impl<P: Model> Lattice<P> {
         self.each_term(x, &all, |Term { place, rate, along_energy, force }| {
             broken("b·dH = 0", place, along_energy)?;
             if rate < 0.0 && -rate * force * force > DESTROYED * production {
-                return Err(LatticeError::NegativeRate { place, rate });
+                return Err(LatticeError::NegativeRate { place, tried: Tried::Reached, rate });
             }
             Ok(())
         })
@@ -99,7 +99,7 @@ impl<P: Model> Lattice<P> {
 fn broken(law: &'static str, place: Place, [rest, terms]: [f64; 2]) -> Result<(), LatticeError> {
     if rest.abs() > CANCELS * terms + f64::MIN_POSITIVE {
         let size = rest.abs() / terms;
-        return Err(LatticeError::Broken { law, place, size, remedy: "" });
+        return Err(LatticeError::Broken { law, place, tried: Tried::Reached, size, remedy: "" });
     }
     Ok(())
 }

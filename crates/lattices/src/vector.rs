@@ -213,6 +213,42 @@ impl Vector for SiteVector {
         let of = |range: std::ops::Range<usize>| range.map(ranked).fold(none, ahead);
         parallel::map(self.sites, of).into_iter().fold(none, ahead).site
     }
+
+    fn to_short_list(&self) -> Vec<f64> {
+        match &self.numbers {
+            Numbers::Same(numbers) => numbers.clone(),
+            Numbers::Each(_) => self.to_list(),
+        }
+    }
+
+    fn kinds(&self) -> usize {
+        self.stride
+    }
+
+    fn by_kind(&self) -> Self {
+        let Some(numbers) = self.slice() else { return self.map(f64::abs) };
+        let largest = |mut most: Vec<f64>, numbers: &[f64]| {
+            for (most, number) in most.iter_mut().zip(numbers) {
+                *most = larger(*most, number.abs());
+            }
+            most
+        };
+        let zeros = || vec![0.0; self.stride];
+        let of = |sites: std::ops::Range<usize>| {
+            let numbers = &numbers[sites.start * self.stride..sites.end * self.stride];
+            numbers.chunks_exact(self.stride).fold(zeros(), largest)
+        };
+        let parts = parallel::map(self.sites, of).into_iter();
+        let numbers = parts.fold(zeros(), |most, part| largest(most, &part));
+        Self::same(self.sites, numbers, &self.pool)
+    }
+
+    fn with_list(&self, list: &[f64]) -> Option<Self> {
+        if list.len() == self.stride {
+            return Some(Self::same(self.sites, list.to_vec(), &self.pool));
+        }
+        (list.len() == self.len()).then(|| self.with(|i| list[i]))
+    }
 }
 
 /// A site, and the norm of the ratios there.

@@ -1,16 +1,17 @@
 //! The laws of a lattice, verified at a start in `O(N)`.
 //!
-//! All points and values are looked at once. The laws of the closures are tried at up to 64 sites and bonds, with their
-//! true neighbours, at a state near the start: moved along the velocity and at random, so that no force and no
-//! velocity vanishes by the symmetry of the start.
+//! All points and values are looked at once, and the friction of all sites and bonds. The other laws of the closures are
+//! tried at up to 64 sites and bonds, with their true neighbours, at a state near the start: moved along the velocity and
+//! at random, so that no force and no velocity vanishes by the symmetry of the start. The friction is tried there too.
 
+mod friction;
 mod gathered;
 
 use metriplectic_fields::{Column, Space, Vector};
 use metriplectic_integrators::{Flow as _, StageFlow as _, Vector as _};
 use metriplectic_manifolds::Manifold;
 
-use crate::error::{LatticeError, Place};
+use crate::error::{LatticeError, Place, Tried};
 use crate::gather::Gather as _;
 use crate::lattice::{Lattice, differentials_at, dimension};
 use crate::model::{Model, PairManifold, PointOf, VectorOf};
@@ -64,8 +65,15 @@ impl<P: Model> Lattice<P> {
             return Err(LatticeError::Start { place: Place::Site(site), cause });
         }
         self.verify_values(x)?;
-        let y = self.near(x);
-        Trial { lattice: self, y: &y, random: Random::new(1), mean: [0.0; 2] }.all()
+        self.verify_friction(x, Tried::Start)?;
+        {
+            // Small entries beside large ones keep their signs here, as rates of friction may need.
+            let (y, tried) = self.near(x, &self.own_sizes(x));
+            self.verify_friction(&y, tried)?;
+        }
+        let (y, tried) = self.near(x, &self.sizes(x));
+        let (sizes, random) = (self.sizes(&y), Random::new(1));
+        Trial { lattice: self, y: &y, sizes: &sizes, tried, random, mean: [0.0; 2] }.all()
     }
 
     pub(crate) fn place_of(&self, bond: usize) -> Place {
@@ -149,27 +157,41 @@ impl<P: Model> Lattice<P> {
         self.layout.bonds()[bond].map(|site| x[site as usize].clone()).into()
     }
 
-    /// Moves a state by a little along its velocity and at random. Returns the state without a change if it has no
-    /// neighbour with finite values.
-    fn near(&self, x: &Points<P::Manifold>) -> Points<P::Manifold> {
-        let sizes = self.sizes(x);
-        let Some((v, _)) = self.motion(x) else { return x.clone() };
-        let sized = crate::SiteVector::zip([&v, &sizes], |[v, s]| if s > 0.0 { v } else { 0.0 });
-        let speed = sized.relative_to(&sizes);
+    /// The size of each entry at its own site, or the largest one on the lattice where it is zero.
+    fn own_sizes(&self, x: &Points<P::Manifold>) -> crate::SiteVector {
+        let largest = self.largest_sizes(x);
+        self.vector_of(|site| {
+            let own = P::Manifold::scales(&x[site]);
+            VectorOf::<P>::from_index(|k| if own[k] > 0.0 { own[k] } else { largest[k] })
+        })
+    }
+
+    /// Moves a state by a little along its velocity and at random, each entry by a fraction of its size. Returns the
+    /// state without a change if it has no neighbour with finite values.
+    fn near(
+        &self,
+        x: &Points<P::Manifold>,
+        sizes: &crate::SiteVector,
+    ) -> (Points<P::Manifold>, Tried) {
+        let unmoved = || (x.clone(), Tried::Start);
+        let Some((v, _)) = self.motion(x) else { return unmoved() };
+        let sized = crate::SiteVector::zip([&v, sizes], |[v, s]| if s > 0.0 { v } else { 0.0 });
+        let speed = sized.relative_to(sizes);
+        drop(sized);
         let time = if speed > 0.0 { speed.recip() } else { 0.0 };
         let mut random = Random::new(0);
         let noise = v.with(|_| random.next());
-        for moved in [MOVED, 1e-2 * MOVED, 1e-4 * MOVED] {
-            let d = crate::SiteVector::zip([&v, &noise, &sizes], |[v, noise, size]| {
-                moved * (time * v + noise * size)
+        for fraction in [MOVED, 1e-2 * MOVED, 1e-4 * MOVED] {
+            let d = crate::SiteVector::zip([&v, &noise, sizes], |[v, noise, size]| {
+                fraction * (time * v + noise * size)
             });
             if let Some(y) = self.stage(x, &d)
                 && self.motion(&y).is_some()
             {
-                return y;
+                return (y, Tried::Near { fraction });
             }
         }
-        x.clone()
+        unmoved()
     }
 }
 
@@ -177,6 +199,9 @@ impl<P: Model> Lattice<P> {
 struct Trial<'a, P: Model> {
     lattice: &'a Lattice<P>,
     y: &'a Points<P::Manifold>,
+    /// The sizes of the entries along which derivatives are tried.
+    sizes: &'a crate::SiteVector,
+    tried: Tried,
     random: Random,
     /// The sizes `|h|` and `|s|` of a site in the mean.
     mean: [f64; 2],
@@ -190,29 +215,38 @@ impl<P: Model> Trial<'_, P> {
         self.mean = [totals.energy.size / count, totals.entropy.size / count];
         for site in samples(lattice.sites()) {
             self.site(site, &differentials_at::<P>(&all, site))?;
-            self.derivatives(site, &totals.sizes)?;
         }
-        for bond in samples(lattice.layout.bonds().len()) {
-            self.bond(bond, &all)?;
-            if P::BOND_ENERGY {
-                self.bond_derivative(bond, &totals.sizes)?;
-            }
-        }
-        self.gathered_derivatives("energy", &lattice.parts.gathers().energy, &totals.sizes)?;
-        self.gathered_derivatives("entropy", &lattice.parts.gathers().entropy, &totals.sizes)?;
-        self.total_derivatives(&all, &totals.sizes)?;
+        self.all_derivatives(&all).or_else(|error| {
+            // The difference of a small entry is not small if it is a fraction of the largest one.
+            let own = lattice.own_sizes(y);
+            let random = Random::new(3);
+            Trial { sizes: &own, random, ..*self }.all_derivatives(&all).map_err(|_| error)
+        })?;
         self.conserved(&all)
     }
 
-    /// The bracket and the friction of a site.
+    /// The derivatives of the functions of sites and bonds, and of the totals.
+    fn all_derivatives(&mut self, all: &[f64]) -> Result<(), LatticeError> {
+        let lattice = self.lattice;
+        for site in samples(lattice.sites()) {
+            self.derivatives(site)?;
+        }
+        if P::BOND_ENERGY {
+            for bond in samples(lattice.layout.bonds().len()) {
+                self.bond_derivative(bond)?;
+            }
+        }
+        self.gathered_derivatives("energy", &lattice.parts.gathers().energy)?;
+        self.gathered_derivatives("entropy", &lattice.parts.gathers().entropy)?;
+        self.total_derivatives(all)
+    }
+
+    /// The bracket of a site.
     fn site(&mut self, site: usize, [w, s]: &[VectorOf<P>; 2]) -> Result<(), LatticeError> {
         let (parts, x, place) = (&self.lattice.parts, &self.y[site], Place::Site(site));
-        let cancels = |law, [rest, terms]: [f64; 2], remedy| {
-            if rest.abs() <= CANCELS * terms {
-                return Ok(());
-            }
-            Err(LatticeError::Broken { law, place, size: rest.abs() / terms, remedy })
-        };
+        let tried = self.tried;
+        let cancels =
+            |law, rest_and_terms, remedy| cancels(law, (place, tried), rest_and_terms, remedy);
         for _ in 0..2 {
             let alpha = VectorOf::<P>::from_index(|k| w[k] * (1.0 + self.random.next()));
             let v = parts.reversible(x, &alpha, s);
@@ -225,43 +259,13 @@ impl<P: Model> Trial<'_, P> {
             let v = parts.reversible(x, covector, s);
             cancels("Π dS = 0", [s.dot(&v), s.abs().dot(&v.abs())], remedy)?;
         }
-        let mut result = Ok(());
-        parts.site_friction(site, x, [w, s], |term| {
-            let rest = [term.b.dot(w), term.b.abs().dot(&w.abs())];
-            let checked =
-                rate(term.rate, place).and_then(|()| cancels("b·dH = 0", rest, ANNIHILATES));
-            result = result.clone().and(checked);
-        });
-        result
-    }
-
-    /// The friction of a bond.
-    fn bond(&self, bond: usize, all: &[f64]) -> Result<(), LatticeError> {
-        let Self { lattice, y, .. } = *self;
-        let place = lattice.place_of(bond);
-        let [i, j] = lattice.layout.bonds()[bond].map(|site| site as usize);
-        let [[wi, si], [wj, sj]] = [i, j].map(|site| differentials_at::<P>(all, site));
-        let mut result = Ok(());
-        lattice.parts.bond_friction(bond, [&y[i], &y[j]], [[&wi, &si], [&wj, &sj]], |term| {
-            let [bi, bj] = term.b;
-            let rest = (bi.dot(&wi) + bj.dot(&wj)).abs();
-            let terms = bi.abs().dot(&wi.abs()) + bj.abs().dot(&wj.abs());
-            let broken = (rest > CANCELS * terms).then(|| LatticeError::Broken {
-                law: "b·(dH_i, dH_j) = 0",
-                place,
-                size: rest / terms,
-                remedy: ANNIHILATES,
-            });
-            let checked = rate(term.rate, place).and(broken.map_or(Ok(()), Err));
-            result = result.clone().and(checked);
-        });
-        result
+        Ok(())
     }
 
     /// The derivatives of the functions of a site.
-    fn derivatives(&mut self, site: usize, sizes: &VectorOf<P>) -> Result<(), LatticeError> {
+    fn derivatives(&mut self, site: usize) -> Result<(), LatticeError> {
         let (parts, x) = (&self.lattice.parts, &self.y[site]);
-        let u = self.random.vector(sizes);
+        let u = self.random.vector(&self.sizes.reader().at::<VectorOf<P>>(site));
         let moved = |t: f64| P::Manifold::chart(x, &(u * t));
         let ends = [moved(STEP), moved(-STEP)];
         let place = Place::Site(site);
@@ -287,12 +291,17 @@ impl<P: Model> Trial<'_, P> {
         Ok(())
     }
 
-    fn bond_derivative(&mut self, bond: usize, sizes: &VectorOf<P>) -> Result<(), LatticeError> {
+    /// A random direction of the sites of a bond.
+    fn random_along(&mut self, bond: usize) -> Vector<PairManifold<P>> {
+        let (n, ends) = (dimension::<P>(), self.lattice.layout.bonds()[bond]);
+        let sizes = ends.map(|site| self.sizes.reader().at::<VectorOf<P>>(site as usize));
+        self.random.vector(&Column::from_index(|k| sizes[k / n][k % n]))
+    }
+
+    fn bond_derivative(&mut self, bond: usize) -> Result<(), LatticeError> {
         let lattice = self.lattice;
         let x = lattice.pair(self.y, bond);
-        let n = dimension::<P>();
-        let both = Vector::<PairManifold<P>>::from_index(|k| sizes[k % n]);
-        let u = self.random.vector(&both);
+        let u = self.random_along(bond);
         let ends = [STEP, -STEP]
             .map(|t| lattice.parts.bond_value(bond, &PairManifold::<P>::chart(&x, &(u * t))));
         let jet = lattice.parts.bond_energy(bond, &x);
@@ -301,10 +310,11 @@ impl<P: Model> Trial<'_, P> {
     }
 
     /// The derivative of the totals along one random direction.
-    fn total_derivatives(&mut self, all: &[f64], sizes: &VectorOf<P>) -> Result<(), LatticeError> {
+    fn total_derivatives(&mut self, all: &[f64]) -> Result<(), LatticeError> {
         let Self { lattice, y, .. } = *self;
-        let random = &mut self.random;
-        let u: Vec<VectorOf<P>> = (0..lattice.sites()).map(|_| random.vector(sizes)).collect();
+        let (random, sizes) = (&mut self.random, self.sizes.reader());
+        let along = |site| random.vector(&sizes.at::<VectorOf<P>>(site));
+        let u: Vec<VectorOf<P>> = (0..lattice.sites()).map(along).collect();
         let moved = |t: f64| {
             let d = lattice.vector_of(|site| u[site] * t);
             lattice.moved(y, &d)
@@ -346,11 +356,18 @@ impl<P: Model> Trial<'_, P> {
 const CASIMIR: &str = "; the entropy of a site must be a Casimir of its bracket";
 const GATHERED_CASIMIR: &str = "; the entropy of a site and what it gathers must not depend on what the bracket moves; \
      gather such a density in the energy, by `.gather(..)`, and take the entropy of each site as a variable";
-const ANNIHILATES: &str =
-    "; build each b from the differentials of the energy that the closure is given";
 
-fn rate(rate: f64, place: Place) -> Result<(), LatticeError> {
-    if rate < 0.0 { Err(LatticeError::NegativeRate { place, rate }) } else { Ok(()) }
+/// Compares what is left of terms with their sizes. Products of numbers below 10⁻¹⁵⁴ have lost their digits, and are zero.
+fn cancels(
+    law: &'static str,
+    (place, tried): (Place, Tried),
+    [rest, terms]: [f64; 2],
+    remedy: &'static str,
+) -> Result<(), LatticeError> {
+    if rest.abs() <= CANCELS * terms || terms < f64::MIN_POSITIVE / f64::EPSILON {
+        return Ok(());
+    }
+    Err(LatticeError::Broken { law, place, tried, size: rest.abs() / terms, remedy })
 }
 
 /// A derivative along a direction, and the sizes of its terms.

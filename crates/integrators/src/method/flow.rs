@@ -8,6 +8,7 @@ use metriplectic_dynamics::{ModelError, SecondLaw};
 use metriplectic_manifolds::{Manifold, PointError};
 
 use super::Vector;
+use super::initial_scales::initial_scales;
 use crate::error::FlowError;
 use crate::run::scales::Scales;
 
@@ -219,10 +220,22 @@ pub trait Flow {
         None
     }
 
-    /// The sizes that the entries reach soon in a run that lasts `span`.
+    /// The sizes that the entries reach soon in a run that lasts `span`. The default is two steps of the classical
+    /// method of order 4, of a size that resolves the motion.
     fn reach(&self, x: &Element<Self>, span: f64) -> Option<Scales<Self::Vector>> {
-        let _ = (x, span);
-        None
+        initial_scales(self, x, span)
+    }
+
+    /// The sizes of the terms that the velocity `v` at a state is summed of, with entries of these sizes. Velocities
+    /// below their round-off are noise. The default knows of none.
+    fn velocity_terms(
+        &self,
+        x: &Element<Self>,
+        v: &Self::Vector,
+        sizes: &Self::Vector,
+    ) -> Option<Self::Vector> {
+        let _ = (x, sizes);
+        Some(v.zero())
     }
 
     /// The velocity at a state and the sizes of what it is summed of.

@@ -20,7 +20,7 @@ use metriplectic_dynamics::{Bracket, Dissipation, Metriplectic, system::Point};
 use metriplectic_fields::{ChartPoint, Column, Matrix, Scalar, Square, Vector, jacobian};
 use metriplectic_manifolds::Manifold;
 
-use crate::method::Components;
+use crate::method::{Components, initial_scales};
 use crate::run::scales::Scales;
 
 /// The velocity at `x`, and the sizes of what it is summed of; `None` if it cannot be evaluated there.
@@ -91,10 +91,8 @@ fn classical_step<Y: Metriplectic>(
     v: Vector<Y::Manifold>,
     h: f64,
 ) -> Option<Vector<Y::Manifold>> {
-    let second = velocity(system, x, v * (0.5 * h))?;
-    let third = velocity(system, x, second * (0.5 * h))?;
-    let last = velocity(system, x, third * h)?;
-    Some((v + (second + third) * 2.0 + last) * (h / 6.0))
+    let (origin, v) = (Components(Vector::<Y::Manifold>::zero()), Components(v));
+    initial_scales::classical_step(system, x, [&origin, &v], h).map(|end| end.0)
 }
 
 /// The fraction of a displacement below which the first powers of time say nothing of it.

@@ -108,6 +108,32 @@ pub trait Vector: Clone + Debug {
     fn to_list(&self) -> Vec<f64> {
         (0..self.len()).map(|i| self.get(i)).collect()
     }
+
+    /// The numbers in a list for [`with_list`](Self::with_list): one for each kind if entries of a kind are equal by
+    /// construction.
+    fn to_short_list(&self) -> Vec<f64> {
+        self.to_list()
+    }
+
+    /// How many kinds of entries there are: one for each entry, or one for each entry of a site if the sites are
+    /// alike. Entry `i` is of the kind `i % kinds`.
+    fn kinds(&self) -> usize {
+        self.len()
+    }
+
+    /// The largest absolute value of each kind of entry, for all entries of this kind.
+    #[must_use]
+    fn by_kind(&self) -> Self {
+        self.map(f64::abs)
+    }
+
+    /// As many numbers, given by a list with one for each entry, or one for each [kind](Self::kinds); `None` if the
+    /// list has another length.
+    #[must_use]
+    fn with_list(&self, list: &[f64]) -> Option<Self> {
+        let kinds = list.len();
+        (kinds == self.len() || kinds == self.kinds()).then(|| self.with(|i| list[i % kinds]))
+    }
 }
 
 impl Vector for Vec<f64> {

@@ -71,6 +71,10 @@ pub struct Certificate {
     /// too large by a factor of about `h|K'|`. With [`stages`](Self::stages) it is the error of the polynomial
     /// inside a step, which is larger than the one at its end.
     pub local_error: Option<f64>,
+    /// The entry whose size, which its errors are relative to, differs most from the largest one that it has reached,
+    /// by more than a factor of 100. It is looked for in steps that follow a tolerance, where
+    /// their number is a power of two and at the end of the run.
+    pub misjudged_size: Option<MisjudgedSize>,
     /// The sites of a large system that set the size of the steps: the site with the largest of these local errors,
     /// relative to the error that is allowed, and the site where the motion was stiffest when this was last found.
     /// [`RungeKuttaChebyshev`](crate::RungeKuttaChebyshev) looks for it, and the other explicit methods if stability
@@ -137,6 +141,20 @@ pub struct StageBalance {
     /// What the entropy has gained beside the production of friction: what
     /// [`Radau`](crate::Radau) adds where it damps.
     pub surplus: f64,
+}
+
+/// An entry of a state whose errors were relative to a size that is not its own.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[non_exhaustive]
+pub struct MisjudgedSize {
+    /// The direction of the chart, or of that of a site of a lattice.
+    pub direction: usize,
+    /// The size that errors were relative to: the one estimated at the start of the run if the entry has grown beyond
+    /// it, and the one at its end if the entry has not reached it.
+    pub judged: f64,
+    /// The largest size of the entry in the run.
+    pub reached: f64,
 }
 
 /// What became of a further invariant.
@@ -210,6 +228,7 @@ impl Certificate {
             effort: Effort::default(),
             worst_iterations: 0,
             local_error: None,
+            misjudged_size: None,
             limiting_sites: LimitingSites::default(),
             checked_states: checked_states(flow, 0),
             promises,

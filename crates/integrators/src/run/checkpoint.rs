@@ -249,8 +249,9 @@ fn column(v: &impl Vector) -> Vec<Exact> {
 
 /// The numbers of a list, as many as there are in `like`.
 fn vector<V: Vector>(what: &'static str, list: &[Exact], like: &V) -> Result<V, ResumeError> {
-    expect_length(what, list.len(), like.len())?;
-    Ok(like.with(|i| list[i].0))
+    let numbers: Vec<f64> = list.iter().map(|number| number.0).collect();
+    let (found, expected) = (list.len(), like.len());
+    like.with_list(&numbers).ok_or(ResumeError::Length { what, found, expected })
 }
 
 const fn expect_length(
@@ -269,7 +270,8 @@ impl<'a, F: Flow, M: Method<F>> Steps<'a, F, M> {
         let known = self.certificate.invariants.len();
         let mut memory = Saved::default();
         self.memory.save(&mut memory);
-        let Ok(progress) = self.progress.convert(|_, v| Ok::<_, Infallible>(column(v)));
+        let Ok(progress) =
+            self.progress.convert(|_, v| Ok::<_, Infallible>(exact(v.to_short_list())));
         let run = SavedRun {
             method: self.method.name(),
             step: *step,

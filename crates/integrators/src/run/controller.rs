@@ -307,6 +307,16 @@ impl<V: Vector> Controller<V> {
         }
     }
 
+    /// The sizes that errors are relative to: those of the run, or the ones that are known beforehand.
+    pub(crate) fn judged_by(&self, sizes: &V) -> V {
+        match &self.entries {
+            Entries::Scale(known) => {
+                V::zip([sizes, known], |[size, known]| if known > 0.0 { known } else { size })
+            }
+            Entries::Automatic | Entries::Absolute(_) => sizes.clone(),
+        }
+    }
+
     /// The first step, after Hairer, Nørsett, Wanner (Solving ODEs I, §II.4): a short step of Euler's
     /// method gives the rate `ω = |f'f|/|f|` of the motion, and `h^{p+1}ω^p|f|` is to be a hundredth of the
     /// error allowed, all in units of it.

@@ -1,7 +1,7 @@
 //! Where a run is on its schedule: what its next step depends on beside the state and the memory of the method.
 
 use crate::run::controller::StepSize;
-use crate::run::scales::Scales;
+use crate::run::scales::{Judged, Scales};
 use crate::run::trajectory::Ending;
 
 #[cfg(feature = "serde")]
@@ -22,6 +22,9 @@ pub(crate) struct Progress<V> {
     pub(crate) most: Option<usize>,
     /// The sizes of the entries so far, where errors or rest are judged by them.
     pub(crate) scales: Scales<V>,
+    /// What the sizes were at the start, and what the state has reached, where errors are judged by them.
+    #[cfg_attr(feature = "serde", serde(default = "Option::default"))]
+    pub(crate) judged: Option<Judged<V>>,
     /// The tolerance of rest.
     #[cfg_attr(feature = "serde", serde(with = "exact"))]
     pub(crate) rest: Option<f64>,
@@ -48,6 +51,11 @@ impl<V> Progress<V> {
             sizes: convert("sizes of the entries", &self.scales.sizes)?,
             terms: convert("sizes of the terms", &self.scales.terms)?,
         };
+        let judged = self.judged.as_ref().map(|Judged { first, reached }| {
+            let [first, reached] = [first, reached].map(|v| convert("sizes at the start", v));
+            Ok(Judged { first: first?, reached: reached? })
+        });
+        let judged = judged.transpose()?;
         let largest_velocity = convert("largest velocities", &self.largest_velocity)?;
         Ok(Progress {
             step_size,
@@ -56,6 +64,7 @@ impl<V> Progress<V> {
             every,
             most,
             scales,
+            judged,
             rest,
             largest_velocity,
             ending,

@@ -243,13 +243,13 @@ pub enum SpanError {
     },
     /// The list of `scale` or `absolute` has another length than the point has directions.
     #[error(
-        "{found} numbers were given for the entries, and the chart has {expected} directions; give one for \
-         each"
+        "{found} numbers were given for the entries, and the chart has {expected} directions (in a lattice, that \
+         of a site); give one for each"
     )]
     Entries {
         /// How many there are.
         found: usize,
-        /// How many directions the chart has.
+        /// How many directions the chart has, or that of a site of a lattice.
         expected: usize,
     },
     /// A number in the list of `scale` or `absolute` is negative, infinite or NaN.

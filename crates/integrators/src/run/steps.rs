@@ -13,7 +13,7 @@ use crate::run::controller::{Controller, Rule, StepSize};
 use crate::run::dense::says_between;
 use crate::run::output::{StepBefore, Watching};
 use crate::run::progress::Progress;
-use crate::run::scales::{Scales, larger, relative};
+use crate::run::scales::{Judged, Scales, larger, relative};
 use crate::run::span::{Schedule, Size};
 use crate::run::trajectory::{Ending, State};
 use crate::step_error::StepError;
@@ -84,6 +84,12 @@ impl<'a, F: Flow, M: Method<F>> Steps<'a, F, M> {
             }
         };
         let largest_velocity = scales.sizes.zero();
+        let judged = match &step_size {
+            StepSize::Fixed(_) => None,
+            StepSize::Adaptive(controller) => {
+                Some(Judged::new(&controller.judged_by(&scales.sizes), flow.sizes(&x0)))
+            }
+        };
         let progress = Progress {
             step_size,
             start,
@@ -91,6 +97,7 @@ impl<'a, F: Flow, M: Method<F>> Steps<'a, F, M> {
             every,
             most,
             scales,
+            judged,
             rest,
             largest_velocity,
             ending: None,
@@ -220,8 +227,14 @@ impl<'a, F: Flow, M: Method<F>> Steps<'a, F, M> {
         if self.progress.judges_sizes() {
             let here = self.flow.sizes(&self.state.point);
             self.progress.scales = self.progress.scales.or(&here);
+            if let Some(judged) = &mut self.progress.judged {
+                judged.reached = larger(&judged.reached, &here);
+            }
         }
         self.rest(!evidence.rests);
+        if step.is_power_of_two() || self.progress.ending.is_some() {
+            self.judge_sizes();
+        }
         if self.watching.is_some() {
             self.look()?;
         }
@@ -268,6 +281,18 @@ impl<'a, F: Flow, M: Method<F>> Steps<'a, F, M> {
             LimitingSites::default()
         };
         self.certificate.note_local_error(error, sites);
+    }
+
+    /// Compares the sizes that errors are relative to with those that the state has reached.
+    #[cold]
+    fn judge_sizes(&mut self) {
+        let Progress { step_size, judged, scales, start, ending, .. } = &self.progress;
+        if let (StepSize::Adaptive(controller), Some(judged)) = (step_size, judged) {
+            let relative_to = controller.judged_by(&scales.sizes);
+            let noise = scales.rounding(self.state.time - start);
+            let has_ended = ending.is_some();
+            self.certificate.misjudged_size = judged.worst(&relative_to, &noise, has_ended);
+        }
     }
 
     /// Tries steps until the controller accepts one. Not part of the loop over steps of one size, which

@@ -90,13 +90,15 @@ impl Until {
     ///
     /// Say the size of an entry that starts at zero and moves late, or of one whose changes matter and are
     /// far smaller than the entry: heights of metres beside an earth's radius.
+    ///
+    /// The sites of a lattice are alike: one number for each direction of one site is enough.
     #[must_use]
     pub const fn scale<const N: usize>(self, sizes: [f64; N]) -> Until<N> {
         self.with(Entries::Scale(sizes))
     }
 
     /// The error of each entry that is allowed in a step, in addition to `τ^{3/2}` of its size: one for
-    /// each direction of the chart, in the units of the entries.
+    /// each direction of the chart, or of one site of a lattice, in the units of the entries.
     #[must_use]
     pub const fn absolute<const N: usize>(self, errors: [f64; N]) -> Until<N> {
         self.with(Entries::Absolute(errors))
@@ -251,14 +253,12 @@ impl Adaptive {
     /// The numbers for the entries of a point with `expected` directions.
     fn entries<V: Vector>(&self, like: &V) -> Result<Entries<V>, SpanError> {
         self.entries.convert(|_, list| {
-            if list.len() != like.len() {
-                return Err(SpanError::Entries { found: list.len(), expected: like.len() });
-            }
             let bad = list.iter().position(|x| !(*x >= 0.0 && x.is_finite()));
-            match bad {
-                Some(index) => Err(SpanError::Entry { index, value: list[index] }),
-                None => Ok(like.with(|i| list[i])),
+            if let Some(index) = bad {
+                return Err(SpanError::Entry { index, value: list[index] });
             }
+            let other = SpanError::Entries { found: list.len(), expected: like.kinds() };
+            like.with_list(list).ok_or(other)
         })
     }
 

@@ -1,11 +1,11 @@
 //! The values and derivatives of what energy and entropy gather over bonds.
 
-use metriplectic_fields::{Column, Space, Vector};
+use metriplectic_fields::Space;
 
 use super::{STEP, Slope, Trial, quotient, samples};
 use crate::error::{LatticeError, Place};
 use crate::gather::{Embedded, Gather};
-use crate::lattice::{Lattice, dimension};
+use crate::lattice::Lattice;
 use crate::model::{Model, PairManifold, VectorOf};
 use crate::parallel;
 use crate::points::Points;
@@ -46,17 +46,15 @@ impl<P: Model> Trial<'_, P> {
         &mut self,
         what: &'static str,
         gather: &G,
-        sizes: &VectorOf<P>,
     ) -> Result<(), LatticeError> {
         if !G::PRESENT {
             return Ok(());
         }
-        let (lattice, n) = (self.lattice, dimension::<P>());
+        let lattice = self.lattice;
         let sums = lattice.gathered(gather, self.y);
         for bond in samples(lattice.layout.bonds().len()) {
             let x = lattice.pair(self.y, bond);
-            let both = Vector::<PairManifold<P>>::from_index(|k| sizes[k % n]);
-            let u = self.random.vector(&both);
+            let u = self.random_along(bond);
             let moved = |t: f64| PairManifold::<P>::chart(&x, &(u * t));
             let ends = [STEP, -STEP].map(|t| gather.weight(&moved(t)).value);
             let phi = gather.weight(&x);
@@ -65,7 +63,7 @@ impl<P: Model> Trial<'_, P> {
         }
         for site in samples(lattice.sites()) {
             let (x, rho, place) = (&self.y[site], sums[2 * site], Place::Site(site));
-            let u = self.random.vector(sizes);
+            let u = self.random.vector(&self.sizes.reader().at::<VectorOf<P>>(site));
             let moved = |t: f64| P::Manifold::chart(x, &(u * t));
             let ends = [STEP, -STEP].map(|t| gather.embedded(&moved(t), rho).jet.value);
             let g = gather.embedded(x, rho);

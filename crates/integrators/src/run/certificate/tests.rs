@@ -21,6 +21,7 @@ const ONE_FALL: Certificate = Certificate {
     effort: Effort { iterations: 9, continued: 0, globalised: 0, splits: 1 },
     worst_iterations: 2,
     local_error: None,
+    misjudged_size: None,
     limiting_sites: LimitingSites::new(None, None),
     checked_states: 5,
     promises: Promises::all_laws(true),
@@ -42,6 +43,11 @@ fn one_is_no_plural() {
     assert!(adaptive.contains("step sizes:  1.0e-3 to 1.0e-1, 2 rejected"), "{adaptive}");
     let coarse = Certificate { local_error: Some(0.5), ..ONE_FALL };
     assert!(coarse.to_string().contains("the motion is not resolved: local errors up to 5.0e-1"));
+    let size = |judged, reached| Some(MisjudgedSize { direction: 2, judged, reached });
+    let grown = Certificate { misjudged_size: size(1e-3, 4.0), ..ONE_FALL }.to_string();
+    assert!(grown.contains("direction 2 was estimated to have the size 1.0e-3"), "{grown}");
+    let unreached = Certificate { misjudged_size: size(5e3, 4.0), ..ONE_FALL }.to_string();
+    assert!(unreached.contains("it has not exceeded 4.0e0; say its size"), "{unreached}");
     assert!(!coarse.is_resolved() && ONE_FALL.is_resolved());
     let with = |surplus| {
         let stages = Some(StageBalance { surplus, ..StageBalance::default() });

@@ -4,7 +4,9 @@ use std::fmt;
 
 use metriplectic_dynamics::SecondLaw;
 
-use super::{Certificate, InvariantBalance, ProjectedSteps, StageBalance, UNRESOLVED};
+use super::{
+    Certificate, InvariantBalance, MisjudgedSize, ProjectedSteps, StageBalance, UNRESOLVED,
+};
 use crate::digits::{Digits, counted};
 use crate::method::{Effort, LimitingSites};
 use crate::round_off::bound::of_a_law;
@@ -81,6 +83,21 @@ impl fmt::Display for Certificate {
             writeln!(f)?;
         }
         self.accuracy(f)?;
+        if let Some(MisjudgedSize { direction, judged, reached }) = self.misjudged_size {
+            write!(f, "sizes:       ")?;
+            if reached > judged {
+                writeln!(
+                    f,
+                    "direction {direction} was estimated to have the size {judged:.1e} soon, and has grown to {reached:.1e}"
+                )?;
+            } else {
+                writeln!(
+                    f,
+                    "errors in direction {direction} are relative to the size {judged:.1e}, and it has not exceeded \
+                     {reached:.1e}; say its size by `.scale`"
+                )?;
+            }
+        }
         if let Some(StageBalance { defect, surplus }) = self.stages {
             write!(f, "stages:      laws off by {defect:.1e} of their terms in the worst step")?;
             if surplus > 0.0 {

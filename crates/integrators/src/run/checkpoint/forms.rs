@@ -7,7 +7,9 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use super::exact::{self, ExactForm};
 use crate::method::{Effort, LimitingSites, Promises};
-use crate::run::certificate::{Certificate, InvariantBalance, ProjectedSteps, StageBalance};
+use crate::run::certificate::{
+    Certificate, InvariantBalance, MisjudgedSize, ProjectedSteps, StageBalance,
+};
 use crate::run::trajectory::Ending;
 
 #[derive(Serialize, Deserialize)]
@@ -46,6 +48,8 @@ struct CertificateForm {
     worst_iterations: usize,
     #[serde(with = "exact")]
     local_error: Option<f64>,
+    #[serde(with = "exact")]
+    misjudged_size: Option<MisjudgedSize>,
     limiting_sites: LimitingSites,
     #[serde(default)]
     checked_states: usize,
@@ -77,6 +81,16 @@ struct StageBalanceForm {
     defect: f64,
     #[serde(with = "exact")]
     surplus: f64,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(remote = "MisjudgedSize")]
+struct MisjudgedSizeForm {
+    direction: usize,
+    #[serde(with = "exact")]
+    judged: f64,
+    #[serde(with = "exact")]
+    reached: f64,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -130,5 +144,6 @@ exact_form! {
     CertificateForm of Certificate,
     InvariantBalanceForm of InvariantBalance,
     StageBalanceForm of StageBalance,
+    MisjudgedSizeForm of MisjudgedSize,
     EndingForm of Ending
 }

@@ -17,7 +17,7 @@ use metriplectic_studies::{Example, Panel, Panels, Table};
 
 const MASSES: usize = 250;
 const FRICTION: f64 = 0.1;
-/// `(q₁, q₂₅₀, p₁, p₂₅₀, S)` at `t = 8` and `t = 48`, by SciPy's DOP853 and LSODA, which agree to these digits.
+/// `(q₁, q₂₅₀, p₁, p₂₅₀, S)` at `t = 8` and `t = 48`, by `SciPy`'s DOP853 and LSODA, which agree to these digits.
 const REFERENCES: [(f64, [f64; 5]); 2] = [
     (8.0, [1.73114905294, 3.10385392, 0.574655423218, 1.07008071085, 221.52983998683]),
     (48.0, [3.09510856972, 3.28859007363, 0.191064493102, 0.00792347682, 421.5128086722]),
@@ -53,7 +53,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut table = Table::new(["t", "largest relative error", "of S"]);
     let mut errors = Vec::new();
     for (time, reference) in REFERENCES {
-        let Some(state) = states.iter().find(|state| state.time == time) else { continue };
+        let Some(state) = states.iter().find(|state| (state.time - time).abs() < 1e-9) else {
+            continue;
+        };
         let (first, last) = (&state.point[0], &state.point[MASSES - 1]);
         let values = [first.x, last.x, first.y, last.y, state.entropy];
         let error = |k: usize| (values[k] / reference[k] - 1.0).abs();
@@ -65,7 +67,9 @@ fn main() -> Result<(), Box<dyn Error>> {
         ]);
     }
     let colour = [0.0, 2.0, 8.0, 48.0];
-    let shape = colour.into_iter().filter_map(|t| states.iter().find(|state| state.time == t));
+    let shape = colour
+        .into_iter()
+        .filter_map(|t| states.iter().find(|state| (state.time - t).abs() < 1e-9));
     let shape = shape.fold(Panel::new("position q", "place along the rod"), |panel, state| {
         let line: Vec<_> = state.point.iter().enumerate().map(|(i, x)| (place(i), x.x)).collect();
         panel.line(format!("t = {}", state.time), line)

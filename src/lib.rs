@@ -29,12 +29,12 @@
 //! }
 //! ```
 //!
-//! Each method conserves both laws:
+//! Each method keeps both laws:
 //!
 //! | method | order | take it for |
 //! |---|---|---|
 //! | [`DormandPrince8`](integrators::DormandPrince8), [`DormandPrince5`](integrators::DormandPrince5) | 8, 5 | smooth motions, with steps that follow a tolerance |
-//! | [`WeylMidpoint`](manifolds::WeylMidpoint) and the other [schemes](integrators::Scheme) of the paper | 2 | long runs in steps of one size |
+//! | [`WeylMidpoint`](manifolds::WeylMidpoint) and the other [schemes](integrators::Scheme) of the paper | 2; `Exponential` 1 | long runs in steps of one size |
 //! | [`Gauss`](integrators::Gauss) of 1 to 4 stages | 2 to 8 | the same with a smaller error; reversible in time |
 //! | [`Radau`](integrators::Radau) of 2 to 4 stages | 3 to 7 | friction that is much faster than a step |
 //! | [`RungeKuttaChebyshev`](integrators::RungeKuttaChebyshev) | 2 | stiff friction or conduction in many variables |

@@ -294,6 +294,30 @@ fn steps_of_one_size_come_to_rest() {
     assert!((end.x - 1.0).abs() < 1e-9 && end.y.abs() < 1e-9, "{end} {c}");
 }
 
+/// A body that turns steadily about a principal axis that is no axis of its frame: `dH` is parallel to `p` to round-off, so
+/// the velocity is round-off and has any direction.
+#[test]
+fn a_steady_rotation_about_a_skew_axis_is_an_equilibrium() {
+    let a = matrix![2.0, 0.3, 0.5; 0.3, 1.5, 0.2; 0.5, 0.2, 1.0];
+    let body = System::on(LieDual::so3())
+        .energy(move |p: &Vector3<Real>| p.dot(&(a.cast::<Real>() * p)) * 0.5)
+        .entropy(|p: &Vector3<Real>| p.norm_squared() * 0.5)
+        .build()
+        .expect("the body is a system");
+    fn rests<Y: Metriplectic<Manifold = LieDual<3>>>(body: &Y, method: impl Method<Y> + Copy) {
+        let start = vector![0.8464152172256919, 0.38374909725133777, 0.36921255450968626];
+        for span in
+            [Schedule::from(Span::steps(0.1, 300)), Span::until(300.0).tolerance(1e-6).into()]
+        {
+            let run = method.run(body, start, span).expect("it stays");
+            assert!((run.last().point - start).norm() < 1e-13, "{}", run.last().point);
+        }
+    }
+    rests(&body, DormandPrince5);
+    rests(&body, DormandPrince8);
+    rests(&body, RungeKuttaChebyshev);
+}
+
 /// What is wrong with a damped oscillator beyond `q = 1.5`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Wrong {

@@ -61,7 +61,7 @@ impl<M: StateSpace> RunError<M> {
 #[error("{0}")]
 pub struct FlowError(#[source] Arc<dyn std::error::Error + Send + Sync>);
 
-/// The same error, not one that says the same.
+/// Compares by identity: two errors with the same text differ.
 impl PartialEq for FlowError {
     fn eq(&self, other: &Self) -> bool {
         Arc::ptr_eq(&self.0, &other.0)

@@ -18,8 +18,8 @@
 //! # The laws
 //!
 //! The end of the step is moved onto `{H = H₀, L_a = L_a⁰, S = S*}` by Newton's method along the differentials,
-//! made orthogonal to each other in units of the errors that are allowed, or of the sizes of the entries in steps
-//! of one size. So neither the units of measurement nor the metric decide which laws are independent. The targets are those of the start of the run, so
+//! made orthogonal in units of the allowed errors, or of the sizes of the entries in steps of one size. So neither units
+//! of measurement nor the metric decide which laws are independent. The targets are those of the start of the run, so
 //! nothing drifts. A projection keeps the order (Hairer, Lubich, Wanner 2006, §IV.4).
 //!
 //! Near an equilibrium `dS = β dH + γ_a dL_a`, and a round-off of the energy moves `S` by more than its own. So

@@ -83,7 +83,7 @@ pub enum StepError {
         residual: f64,
         /// What was done to solve it.
         tried: Effort,
-        /// Whether the method damps friction that is faster than a step, as [`Radau`](crate::Radau) does.
+        /// True if the method damps friction that is faster than a step, as [`Radau`](crate::Radau) does.
         damps: bool,
     },
     /// The energy is not conserved: it differs by more than a millionth of the size of its terms from what it
@@ -158,7 +158,7 @@ pub enum StepError {
     /// creep.
     #[error(
         "the energy changes at the rate {rate:.1e} along the velocity at t = {}, although `⟨dH, v⟩ = 0`, so steps of size \
-         {h:.1e} make no way: the derivative of H is not that of its values there; check it around this state, and that \
+         {h:.1e} hardly advance: the derivative of H is not that of its values there; check it around this state, and that \
          no closure takes the value out of a `Real`",
         digits(.time)
     )]

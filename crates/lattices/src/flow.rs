@@ -192,7 +192,10 @@ impl<P: Model> Flow for Lattice<P> {
         v: &SiteVector,
         sizes: &SiteVector,
     ) -> Option<SiteVector> {
-        self.terms(x, v, sizes)
+        let terms = self.terms(x, v, sizes);
+        // The arrays of the search for these sizes would stay for the whole run.
+        self.clear();
+        terms
     }
 
     fn local_error(

@@ -1,4 +1,4 @@
-//! What a test has measured of a guarantee, for the report of verification.
+//! Measured figures of guarantees, for the report of verification.
 //!
 //! A test that measures a figure records it beside its assertion. `just report` runs these tests with the variable
 //! `METRIPLECTIC_REPORT`, which names a folder, and writes `docs/verification.md` from what they leave there.

@@ -96,7 +96,7 @@ pub(super) fn around<Y: Metriplectic + ?Sized>(
     })
 }
 
-/// Whether the model is `broken` at each of a few states near `x`.
+/// Returns whether the model is `broken` at each of a few states near `x`.
 fn all_around<Y: Metriplectic + ?Sized>(
     system: &Y,
     x: &Point<Y>,
@@ -164,7 +164,7 @@ impl<Y: Metriplectic + ?Sized> Reached<'_, Y> {
         Ok([energy, self.differential("entropy", self.system.entropy())?])
     }
 
-    /// Whether the differentials are finite, where nothing else can be judged.
+    /// Returns whether the differentials are finite, where nothing else can be judged.
     fn values(&self) -> Result<(), ModelError> {
         self.differentials().map(|_| ())
     }

@@ -109,7 +109,8 @@ impl<Y: Metriplectic> Iterate<Y> {
             let unit = self.round_off[c].max(f64::MIN_POSITIVE);
             let [was, is] = [before, self]
                 .map(|at| at.delta.iter().map(|v| (v[c] / unit).powi(2)).sum::<f64>());
-            if is <= was || before.round_off[c] >= UNKNOWN * unit {
+            let begins = before.round_off[c] < UNKNOWN * self.round_off[c] && is > was;
+            if !begins {
                 sums = [sums[0] + was, sums[1] + is];
             }
         }

@@ -37,6 +37,8 @@ pub(super) fn energy_rate<F: StageFlow>(
         return None;
     }
     let clear = CLEAR * ROUNDED * flow.term_sizes(start.x).energy;
+    // At an equilibrium the velocity is round-off and has any direction: the step itself has to change the energy.
+    let whole = displacement.relative_to(&sizes) / LENGTH;
     let rates = [LENGTH / speed, -LENGTH / speed].map(|time| {
         let mut changes = [0.0; FRACTIONS.len()];
         for (change, fraction) in changes.iter_mut().zip(FRACTIONS) {
@@ -45,7 +47,10 @@ pub(super) fn energy_rate<F: StageFlow>(
         }
         let [first, second, third] = changes;
         let is_linear = |larger: f64, smaller: f64| (8.0..32.0).contains(&(larger / smaller));
-        let linear = is_linear(first, second) && is_linear(second, third) && third > clear;
+        let linear = is_linear(first, second)
+            && is_linear(second, third)
+            && third > clear
+            && first * whole > clear;
         linear.then(|| first / time.abs())
     });
     let [forward, backward] = rates;

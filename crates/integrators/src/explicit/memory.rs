@@ -1,6 +1,7 @@
 //! What an explicit method keeps from one step to the next.
 
 use super::chebyshev::Spectrum;
+use super::creep;
 use super::tableau::Row;
 use crate::method::{Flow, Memory, Vector};
 use crate::run::checkpoint::{ResumeError, Saved};
@@ -16,7 +17,7 @@ pub struct ExplicitMemory<V> {
     pub(super) entropy: Option<Produced>,
     /// How often in a row the entropy would have fallen.
     pub(super) falls: u32,
-    /// Steps taken; no number of a step depends on it.
+    /// Steps taken, which say when the energy is [looked at](super::creep); no number of a step depends on it.
     pub(super) taken: u32,
     /// The digits that rounding has lost of the position, as displacements (Kahan 1965).
     pub(super) lost: Option<V>,
@@ -131,6 +132,7 @@ impl<V: Vector> Memory for ExplicitMemory<V> {
         if let Some(Produced { sum, lost, largest }) = self.entropy {
             saved.put("entropy produced", [sum, lost, largest, f64::from(self.falls)]);
         }
+        saved.put("steps taken", [f64::from(self.taken % creep::PATIENCE)]);
         if let Some(lost) = &self.lost {
             saved.put("compensation", lost.to_list());
         } else if !self.read.is_empty() {
@@ -146,6 +148,10 @@ impl<V: Vector> Memory for ExplicitMemory<V> {
     fn restore(saved: &Saved) -> Result<Self, ResumeError> {
         let read = saved.list("compensation")?.unwrap_or_default();
         let mut memory = Self { read, ..Self::default() };
+        if let Some(numbers) = saved.get("steps taken", 1)? {
+            let taken = (0..creep::PATIENCE).find(|&taken| f64::from(taken) >= numbers[0]);
+            memory.taken = taken.unwrap_or(0);
+        }
         if let Some(numbers) = saved.get("entropy produced", 4)? {
             let [sum, lost, largest] = [0, 1, 2].map(|k| numbers[k]);
             memory.entropy = Some(Produced { sum, lost, largest });

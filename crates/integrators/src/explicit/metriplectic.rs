@@ -353,7 +353,7 @@ impl<N: Dimension> Normals<N> {
         }
     }
 
-    /// Whether the round-off of the entropy is as long as a unit: a state moved onto an entropy has an error then which
+    /// Returns whether the round-off of the entropy is as long as a unit: a state moved onto an entropy has an error then which
     /// no smaller step makes smaller.
     fn is_blurred(&self) -> bool {
         let length = |entropy: &Normal<_>| entropy.round_off / entropy.square.sqrt();

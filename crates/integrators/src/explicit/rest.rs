@@ -1,4 +1,4 @@
-//! Whether a state is at rest in its own motion.
+//! States at rest in their own motion.
 //!
 //! With the rates `k` at the displacement `d` along the velocity `v`, the motion changes its velocity at the rate
 //!
@@ -15,7 +15,7 @@ use crate::method::{StepStart, Vector};
 
 /// A displacement, relative to the size of its entry, that hardly moves a state.
 const HARDLY: f64 = 1e-6;
-/// The same relative to the error that is allowed.
+/// A displacement, relative to the error that is allowed, that hardly moves a state.
 const HARDLY_ALLOWED: f64 = 1e-3;
 
 /// The sizes of the entries at the start of a step: at least the error that is allowed.
@@ -29,22 +29,22 @@ pub(super) fn sizes<F: StageFlow>(flow: &F, start: &StepStart<'_, F>) -> F::Vect
 
 /// The displacements that hardly move a state.
 fn hardly<F: StageFlow>(flow: &F, start: &StepStart<'_, F>) -> F::Vector {
-    let sizes = flow.sizes(start.x);
+    let hardly = flow.sizes(start.x).map(|size| HARDLY * size);
     match &start.allowed {
-        Some(allowed) => Vector::zip([&sizes, allowed], |[size, allowed]| {
-            (HARDLY * size).max(HARDLY_ALLOWED * allowed)
+        Some(allowed) => Vector::zip([&hardly, allowed], |[hardly, allowed]| {
+            hardly.max(HARDLY_ALLOWED * allowed)
         }),
-        None => sizes.map(|size| HARDLY * size),
+        None => hardly,
     }
 }
 
-/// Whether a displacement hardly moves a state.
+/// Returns whether a displacement hardly moves a state.
 pub(super) fn is_hardly<F: StageFlow>(flow: &F, start: &StepStart<'_, F>, d: &F::Vector) -> bool {
     let hardly = hardly(flow, start);
     (0..d.len()).all(|i| d.get(i).abs() <= hardly.get(i))
 }
 
-/// Whether the state at the start of a step, with this velocity, is at rest in its own motion.
+/// Returns whether the state at the start of a step, with this velocity, is at rest in its own motion.
 #[cold]
 pub(super) fn is_reached<F: StageFlow>(
     flow: &F,

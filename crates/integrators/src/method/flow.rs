@@ -162,7 +162,7 @@ pub trait Flow {
         Ok(())
     }
 
-    /// Whether [`recheck`](Self::recheck) or [`reexamine`](Self::reexamine) checks anything on an occasion. A run does
+    /// Returns whether [`recheck`](Self::recheck) or [`reexamine`](Self::reexamine) checks anything on an occasion. A run does
     /// not ask for them otherwise.
     fn rechecks(&self, occasion: Recheck) -> bool {
         let _ = occasion;

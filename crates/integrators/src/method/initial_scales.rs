@@ -113,7 +113,7 @@ impl<F: Flow + ?Sized> Start<'_, F> {
         Some([classical_step(flow, x, [&origin, v], h)?, halves])
     }
 
-    /// Whether one step and two halves agree in each kind of entry that does not move late.
+    /// Returns whether one step and two halves agree in each kind of entry that does not move late.
     fn is_resolved(&self, [whole, halves]: [&F::Vector; 2], late: Option<&F::Vector>) -> bool {
         let difference = F::Vector::zip([whole, halves], |[whole, halves]| whole - halves);
         let (difference, reached, sizes) = (difference.by_kind(), halves.by_kind(), self.sizes);

@@ -120,7 +120,7 @@ impl<'a, Y: Metriplectic> Wanted<'a, Y> {
         None
     }
 
-    /// Whether the further invariants differ from the `wanted` ones by at most this fraction of their round-off.
+    /// Returns whether the further invariants differ from the `wanted` ones by at most this fraction of their round-off.
     fn has_invariants(&self, there: &Laws<Numbers<Y>>, wanted: &Numbers<Y>, fraction: f64) -> bool {
         let near = |k: usize| {
             let allowed = fraction * self.round_off.invariants[k];

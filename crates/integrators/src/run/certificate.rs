@@ -322,7 +322,7 @@ impl Certificate {
         self.friction > STIFF
     }
 
-    /// Whether no step is known to be too long for the motion: the local errors that were estimated are below a tenth of
+    /// Returns whether no step is known to be too long for the motion: the local errors that were estimated are below a tenth of
     /// the state, friction is [damped](Self::is_stiff), and damping has added at most a hundredth of what the entropy
     /// gained.
     pub fn is_resolved(&self) -> bool {
@@ -330,7 +330,7 @@ impl Certificate {
         is_followed && !self.is_stiff() && !self.skips_a_transient()
     }
 
-    /// Whether damping has added more than a hundredth of what the entropy gained, beyond round-off.
+    /// Returns whether damping has added more than a hundredth of what the entropy gained, beyond round-off.
     fn skips_a_transient(&self) -> bool {
         let of_friction = ADDED * self.entropy_gained.abs();
         let least = of_friction.max(of_a_law(self.initial_entropy.abs()));

@@ -22,8 +22,7 @@ pub(crate) struct Progress<V> {
     pub(crate) most: Option<usize>,
     /// The sizes of the entries so far, where errors or rest are judged by them.
     pub(crate) scales: Scales<V>,
-    /// What the sizes were at the start, and what the state has reached, where errors are judged by them.
-    #[cfg_attr(feature = "serde", serde(default = "Option::default"))]
+    /// The sizes at the start and those reached, where errors are judged by them.
     pub(crate) judged: Option<Judged<V>>,
     /// The tolerance of rest.
     #[cfg_attr(feature = "serde", serde(with = "exact"))]

@@ -1,9 +1,9 @@
 //! The laws of the model at states on the way of a run.
 //!
 //! A model that was verified around the start may break its laws elsewhere. Then a method conserves the energy of a
-//! motion that no longer exists. So a run [asks](Flow::recheck) for the laws again: after the steps whose number is
-//! 1, 2, 3, 5, 8, … 55 or a multiple of 89, after the first, second, fourth, … step that leaves the state where it is,
-//! at its end, and at a state from which a step fails.
+//! motion that no longer exists. So a run [asks](Flow::recheck) for the laws again: after steps 1, 2, 3, 5, 8, … 55 and
+//! each multiple of 89. It asks at its end and at a state from which a step fails, too. It also asks after the first,
+//! second, fourth, … step that leaves the state where it is.
 //!
 //! The numbers depend on nothing but the step, so a run that is resumed checks the same states. 89 has no factor in
 //! common with the steps of a period that users choose, so the states lie at all phases of an oscillation.
@@ -22,7 +22,7 @@ const EVERY: usize = 89;
 /// too: where a derivative is lost, the energy and its differential contradict each other, and steps become tiny.
 const CREEPS: f64 = 1e-2;
 
-/// Whether the model is checked after this step.
+/// Returns whether the model is checked after this step.
 fn is_due(step: usize) -> bool {
     if step < EVERY { FIRST.contains(&step) } else { step.is_multiple_of(EVERY) }
 }

@@ -54,9 +54,9 @@ impl<V: Vector> Judged<V> {
         has_ended: bool,
     ) -> Option<MisjudgedSize> {
         let (mut worst, mut largest) = (None, MISJUDGED);
+        let by_kind = [&self.first, relative_to, &self.reached, noise].map(V::by_kind);
         for direction in 0..relative_to.kinds() {
-            let [first, last, reached, noise] =
-                [&self.first, relative_to, &self.reached, noise].map(|v| v.get(direction));
+            let [first, last, reached, noise] = by_kind.each_ref().map(|v| v.get(direction));
             let outgrown = (first > noise).then(|| (first, reached / first));
             let not_reached = (has_ended && last > noise).then(|| (last, last / reached));
             for (judged, factor) in [outgrown, not_reached].into_iter().flatten() {

@@ -170,7 +170,8 @@ impl<M: StateSpace> Trajectory<M> {
         self.ending
     }
 
-    /// Where the run was put down: at its end, or before the step that failed. From here it goes on,
+    /// The place where the run was put down: its end, the state before the step that failed, or the state at which the
+    /// model broke a law. From here it goes on,
     /// with a later end ([`Checkpoint::with_steps`], [`Checkpoint::with_end`]) or other options of its method.
     pub const fn checkpoint(&self) -> &Checkpoint {
         &self.checkpoint

@@ -47,7 +47,7 @@ fn one_is_no_plural() {
     let grown = Certificate { misjudged_size: size(1e-3, 4.0), ..ONE_FALL }.to_string();
     assert!(grown.contains("direction 2 was estimated to have the size 1.0e-3"), "{grown}");
     let unreached = Certificate { misjudged_size: size(5e3, 4.0), ..ONE_FALL }.to_string();
-    assert!(unreached.contains("it has not exceeded 4.0e0; say its size"), "{unreached}");
+    assert!(unreached.contains("it has not exceeded 4.0e0; give it a smaller one"), "{unreached}");
     assert!(!coarse.is_resolved() && ONE_FALL.is_resolved());
     let with = |surplus| {
         let stages = Some(StageBalance { surplus, ..StageBalance::default() });

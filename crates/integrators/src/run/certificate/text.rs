@@ -94,7 +94,7 @@ impl fmt::Display for Certificate {
                 writeln!(
                     f,
                     "errors in direction {direction} are relative to the size {judged:.1e}, and it has not exceeded \
-                     {reached:.1e}; say its size by `.scale`"
+                     {reached:.1e}; give it a smaller one by `.scale`"
                 )?;
             }
         }

@@ -51,7 +51,6 @@ struct CertificateForm {
     #[serde(with = "exact")]
     misjudged_size: Option<MisjudgedSize>,
     limiting_sites: LimitingSites,
-    #[serde(default)]
     checked_states: usize,
     promises: Promises,
     #[serde(with = "SecondLawForm")]

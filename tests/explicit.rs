@@ -6,7 +6,7 @@
 
 use metriplectic::dynamics::SecondLaw;
 use metriplectic::dynamics::system::Point;
-use metriplectic::integrators::{RunError, StepError};
+use metriplectic::integrators::{RunError, Schedule, StepError};
 use metriplectic::prelude::*;
 use metriplectic_studies::problems::flow;
 

@@ -229,10 +229,13 @@ fn a_force_under_which_the_entropy_falls_is_refused_unless_the_second_law_is_not
     let published = body().force(vortex).second_law(SecondLaw::Published).build().unwrap();
     published.verify(&START, 0.1).unwrap();
 
-    // Samples near the start are no proof: away from them the certificate counts the falls.
+    // Samples near the start are no proof: the run checks the states on its way.
     let run =
         WeylMidpoint.run(&body().force(vortex).build().unwrap(), START, Span::steps(0.05, 400));
-    assert!(!run.unwrap().certificate().keeps_entropy());
+    let Err(RunError::Step { cause: StepError::Model { law, time }, .. }) = run else {
+        panic!("not refused")
+    };
+    assert!(matches!(*law, ModelError::ForceDestroysEntropy { .. }) && time > 1.0, "{law}");
 
     let report = body().force(saturated).build().unwrap().report(&START).to_string();
     assert!(report.contains("⟨dS, force⟩ ≥ 0") && report.contains("⟨dH, force⟩ = 0"), "{report}");

@@ -19,7 +19,7 @@ fn end<Y: Metriplectic, M: Method<Y>>(
     method: M,
     system: &Y,
     x0: &Point<Y>,
-    span: impl Into<metriplectic::integrators::Schedule>,
+    span: impl Into<Schedule>,
 ) -> Point<Y> {
     let run = method.run(system, x0.clone(), span).expect("it runs");
     let certificate = run.certificate();
@@ -231,7 +231,7 @@ fn nothing_drifts_in_a_million_steps() {
 fn certified<Y: Metriplectic>(
     system: &Y,
     x0: &Point<Y>,
-    span: impl Into<metriplectic::integrators::Schedule>,
+    span: impl Into<Schedule>,
 ) -> (Certificate, Point<Y>) {
     let run = DormandPrince8.run(system, x0.clone(), span).expect("it runs");
     let c = run.certificate();

@@ -48,7 +48,7 @@ pub trait Verify<M: Manifold> {
     /// let bent = System::on(Euclidean::<3>)
     ///     .bracket(Poisson::constant(Vector3::z().cross_matrix()).unwrap())
     ///     .energy(|x: &Vector3<Real>| x.norm_squared())
-    ///     .entropy(|x: &Vector3<Real>| if x.x.re > 2.0 { x.z + (x.x - 2.0).powi(3) } else { x.z })
+    ///     .entropy(|x: &Vector3<Real>| if x.x.re > 2.0 { x.z + x.x * (x.x - 2.0) } else { x.z })
     ///     .build()
     ///     .unwrap();
     /// assert!(bent.verify(&vector![1.0, 1.0, 1.0], 0.1).is_ok());

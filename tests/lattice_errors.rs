@@ -333,6 +333,31 @@ fn an_entropy_that_gathers_what_the_bracket_moves_is_refused_with_its_site() {
     );
 }
 
+/// Bodies that turn steadily about a principal axis: `Π dH` and the friction `b = w × s` are all round-off there, at the
+/// start and at the end of the run. The friction produces nothing elsewhere either, so every fall of the entropy is
+/// an error of the steps.
+#[test]
+fn an_equilibrium_of_skew_bodies_breaks_no_law_and_stops_no_run() {
+    let a = matrix![2.0, 0.3, 0.5; 0.3, 1.5, 0.2; 0.5, 0.2, 1.0];
+    let damped = Lattice::on(Graph::ring(8), LieDual::so3())
+        .energy(move |p: &Vector3<Real>| p.dot(&(a.cast::<Real>() * p)) * 0.5)
+        .entropy(|p: &Vector3<Real>| p.norm_squared() * 0.5)
+        .site_onsager(|site| [Onsager { rate: 0.1, b: site.w.cross(site.s) }])
+        .build()
+        .expect("the parts make a lattice");
+    let axis = vector![0.8464152172256919, 0.38374909725133777, 0.36921255450968626];
+    let near = axis + vector![1e-9, 0.0, 0.0];
+    let starts = [(axis, 1e-9), (near, 1e-9), (near, 1e-6), (vector![0.3, -0.8, 0.4], 1e-6)];
+    for (start, tolerance) in starts {
+        let span = Span::until(200.0).tolerance(tolerance).at_most(2);
+        let run = DormandPrince8.run(&damped, damped.points(|_| start), span);
+        let run = run.unwrap_or_else(|error| panic!("{start:?}, {tolerance}: {error}"));
+        // A period is 20, and 66 steps of order 8 in a period are many.
+        let steps = run.certificate().steps;
+        assert!(steps < 2000, "{start:?}, {tolerance}: {steps} steps");
+    }
+}
+
 /// One bond of 64 whose friction is wrong once its sites are warm: production stays positive, so no step shows it.
 #[test]
 fn a_bond_that_breaks_a_law_away_from_the_start_ends_the_run_of_every_method() {

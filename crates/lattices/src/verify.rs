@@ -65,6 +65,14 @@ impl<P: Model> Lattice<P> {
             return Err(LatticeError::Start { place: Place::Site(site), cause });
         }
         self.verify_values(x)?;
+        self.verify_friction_around(x)?;
+        let (y, tried) = self.near(x, &self.sizes(x));
+        let (sizes, random) = (self.sizes(&y), Random::new(1));
+        Trial { lattice: self, y: &y, sizes: &sizes, tried, random, mean: [0.0; 2] }.all()
+    }
+
+    /// Verifies the friction of all sites and bonds at a start, and at a state near it.
+    fn verify_friction_around(&self, x: &Points<P::Manifold>) -> Result<(), LatticeError> {
         let at_start = self.verify_friction(x, Tried::Start);
         // Small entries beside large ones keep their signs here, as rates of friction may need.
         let (y, tried) = self.near(x, &self.own_sizes(x));
@@ -74,10 +82,7 @@ impl<P: Model> Lattice<P> {
             Err(LatticeError::Broken { .. }) if nearby.is_ok() => {}
             verdict => verdict?,
         }
-        nearby?;
-        let (y, tried) = self.near(x, &self.sizes(x));
-        let (sizes, random) = (self.sizes(&y), Random::new(1));
-        Trial { lattice: self, y: &y, sizes: &sizes, tried, random, mean: [0.0; 2] }.all()
+        nearby
     }
 
     pub(crate) fn place_of(&self, bond: usize) -> Place {

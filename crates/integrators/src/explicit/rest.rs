@@ -17,6 +17,8 @@ use crate::method::{StepStart, Vector};
 const HARDLY: f64 = 1e-6;
 /// A displacement, relative to the error that is allowed, that hardly moves a state.
 const HARDLY_ALLOWED: f64 = 1e-3;
+/// The size of a step, relative to the time `1/ρ` of the motion, that is short.
+const SHORT: f64 = 1e-2;
 
 /// The sizes of the entries at the start of a step: at least the error that is allowed.
 pub(super) fn sizes<F: StageFlow>(flow: &F, start: &StepStart<'_, F>) -> F::Vector {
@@ -44,6 +46,18 @@ pub(super) fn is_hardly<F: StageFlow>(flow: &F, start: &StepStart<'_, F>, d: &F:
     (0..d.len()).all(|i| d.get(i).abs() <= hardly.get(i))
 }
 
+/// The rate `ρ` at which the motion changes this velocity at the start of a step; `None` outside of the domain.
+fn own_rate<F: StageFlow>(flow: &F, start: &StepStart<'_, F>, velocity: &F::Vector) -> Option<f64> {
+    let sizes = sizes(flow, start);
+    let time = f64::EPSILON.sqrt() / velocity.relative_to(&sizes);
+    // On one of both sides of a jump the rates change as they do without it.
+    [time, -time].into_iter().try_fold(f64::INFINITY, |least, time| {
+        let there = stage(flow, start.x, &velocity.map(|v| time * v))?.velocity;
+        let change = Vector::zip([&there, velocity], |[there, v]| there - v);
+        Some(least.min(change.relative_to(&sizes) / f64::EPSILON.sqrt()))
+    })
+}
+
 /// Returns whether the state at the start of a step, with this velocity, is at rest in its own motion.
 #[cold]
 pub(super) fn is_reached<F: StageFlow>(
@@ -51,20 +65,25 @@ pub(super) fn is_reached<F: StageFlow>(
     start: &StepStart<'_, F>,
     velocity: &F::Vector,
 ) -> bool {
-    let (sizes, hardly) = (sizes(flow, start), hardly(flow, start));
     // An entry without a size that moves is not at rest.
-    let speed = velocity.relative_to(&sizes);
-    if speed == 0.0 {
+    if velocity.relative_to(&sizes(flow, start)) == 0.0 {
         return true;
     }
-    let time = f64::EPSILON.sqrt() / speed;
-    // On one of both sides of a jump the rates change as they do without it.
-    let rate = [time, -time].into_iter().try_fold(f64::INFINITY, |least, time| {
-        let there = stage(flow, start.x, &velocity.map(|v| time * v))?.velocity;
-        let change = Vector::zip([&there, velocity], |[there, v]| there - v);
-        Some(least.min(change.relative_to(&sizes) / f64::EPSILON.sqrt()))
-    });
-    rate.is_some_and(|rate| {
+    let hardly = hardly(flow, start);
+    own_rate(flow, start, velocity).is_some_and(|rate| {
         (0..velocity.len()).all(|i| velocity.get(i).abs() <= rate * hardly.get(i))
     })
+}
+
+/// Returns whether a step of size `h` is short in the motion near a state at rest. At a distance `δ` from it, the
+/// entropy changes by `δ²` times the error `(ρh)^{p+1}` of the step, which is below round-off. So a fall of the
+/// entropy is round-off too, whatever production is left.
+#[cold]
+pub(super) fn is_short<F: StageFlow>(
+    flow: &F,
+    start: &StepStart<'_, F>,
+    velocity: &F::Vector,
+    h: f64,
+) -> bool {
+    own_rate(flow, start, velocity).is_some_and(|rate| rate * h.abs() <= SHORT)
 }

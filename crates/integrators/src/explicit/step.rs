@@ -184,9 +184,16 @@ fn finished<F: StageFlow>(
         Ok(landed) => landed,
         Err(Refused::Falls(rise)) => {
             memory.falls += 1;
-            if memory.falls > FALLS && is_hardly(flow, start, &last.end) {
+            let velocity = &last.stages[0].velocity;
+            let often = memory.falls > FALLS;
+            let by_round_off = || {
+                often
+                    || (rest::is_short(flow, start, velocity, h)
+                        && rest::is_reached(flow, start, velocity))
+            };
+            if is_hardly(flow, start, &last.end) && by_round_off() {
                 memory.falls = 0;
-                if !rest::is_reached(flow, start, &last.stages[0].velocity) {
+                if often && !rest::is_reached(flow, start, velocity) {
                     let time = start.time;
                     return Err(Refused::Never(StepError::EntropyFalls { time, h, rise }));
                 }

@@ -1,0 +1,139 @@
+//! The terms of the friction, place by place: `ρ ≥ 0` and `⟨b, dH⟩ = 0` at each site and on each bond.
+
+use metriplectic_fields::Column;
+
+use crate::Onsager;
+use crate::error::{LatticeError, Place, Tried};
+use crate::lattice::{Lattice, differentials_at};
+use crate::model::{Model, VectorOf};
+use crate::parallel;
+use crate::points::Points;
+use crate::verify::cancels;
+
+const ANNIHILATES: &str =
+    "; build each b from the differentials of the energy that the closure is given";
+
+/// A term `ρ b bᵀ` at one place.
+pub(crate) struct Term {
+    place: Place,
+    /// `ρ`.
+    rate: f64,
+    /// `⟨b, dH⟩` and the sizes of its terms.
+    along_energy: [f64; 2],
+    /// `⟨b, dS⟩`.
+    force: f64,
+}
+
+impl Term {
+    /// The entropy `ρ⟨b, dS⟩²` that it produces in a unit of time.
+    pub(crate) fn production(&self) -> f64 {
+        self.rate * self.force * self.force
+    }
+
+    /// # Errors
+    ///
+    /// [`LatticeError::NegativeRate`].
+    pub(crate) fn negative_rate(&self, tried: Tried) -> Result<(), LatticeError> {
+        let &Self { place, rate, .. } = self;
+        if rate < 0.0 { Err(LatticeError::NegativeRate { place, tried, rate }) } else { Ok(()) }
+    }
+
+    /// # Errors
+    ///
+    /// [`LatticeError::Broken`] if it changes the energy.
+    pub(crate) fn keeps_energy(&self, tried: Tried) -> Result<(), LatticeError> {
+        let law = match self.place {
+            Place::Bond { .. } => "b·(dH_i, dH_j) = 0",
+            Place::Site(_) | Place::Total => "b·dH = 0",
+        };
+        cancels(law, (self.place, tried), self.along_energy, ANNIHILATES)
+    }
+}
+
+impl<P: Model> Lattice<P> {
+    /// Checks every term of the friction, and returns the first error in the order of the places.
+    ///
+    /// # Errors
+    ///
+    /// The first one of `check`.
+    pub(crate) fn each_term(
+        &self,
+        x: &Points<P::Manifold>,
+        all: &[f64],
+        check: impl Fn(&Term) -> Result<(), LatticeError> + Sync,
+    ) -> Result<(), LatticeError> {
+        let first = self.terms_of_chunks(x, all, |first: &mut Option<LatticeError>, term| {
+            if first.is_none() {
+                *first = check(&term).err();
+            }
+        });
+        first.into_iter().flatten().next().map_or(Ok(()), Err)
+    }
+
+    /// The sum of a value over the terms of the friction.
+    pub(crate) fn sum_over_terms(
+        &self,
+        x: &Points<P::Manifold>,
+        all: &[f64],
+        value: impl Fn(&Term) -> f64 + Sync,
+    ) -> f64 {
+        self.terms_of_chunks(x, all, |sum: &mut f64, term| *sum += value(&term)).iter().sum()
+    }
+
+    /// The results of visits to the terms of each chunk of sites and of bonds.
+    fn terms_of_chunks<R: Default + Send>(
+        &self,
+        x: &Points<P::Manifold>,
+        all: &[f64],
+        visit: impl Fn(&mut R, Term) + Sync,
+    ) -> Vec<R> {
+        let mut results = parallel::map(self.sites(), |sites| {
+            let mut result = R::default();
+            sites.for_each(|site| self.site_terms(site, x, all, |term| visit(&mut result, term)));
+            result
+        });
+        if P::BOND_FRICTION {
+            results.extend(parallel::map(self.layout.bonds().len(), |bonds| {
+                let mut result = R::default();
+                bonds.for_each(|bond| {
+                    self.bond_terms(bond, x, all, |term| visit(&mut result, term));
+                });
+                result
+            }));
+        }
+        results
+    }
+
+    fn site_terms(
+        &self,
+        site: usize,
+        x: &Points<P::Manifold>,
+        all: &[f64],
+        mut visit: impl FnMut(Term),
+    ) {
+        let [w, s] = differentials_at::<P>(all, site);
+        self.parts.site_friction(site, &x[site], [&w, &s], |Onsager { rate, b }| {
+            let along_energy = [b.dot(&w), b.abs().dot(&w.abs())];
+            visit(Term { place: Place::Site(site), rate, along_energy, force: b.dot(&s) });
+        });
+    }
+
+    fn bond_terms(
+        &self,
+        bond: usize,
+        x: &Points<P::Manifold>,
+        all: &[f64],
+        mut visit: impl FnMut(Term),
+    ) {
+        let [i, j] = self.layout.bonds()[bond].map(|site| site as usize);
+        let [[wi, si], [wj, sj]] = [i, j].map(|site| differentials_at::<P>(all, site));
+        let place = self.place_of(bond);
+        let dot = |[bi, bj]: &[VectorOf<P>; 2], [i, j]: [&VectorOf<P>; 2]| bi.dot(i) + bj.dot(j);
+        let state = [[&wi, &si], [&wj, &sj]];
+        self.parts.bond_friction(bond, [&x[i], &x[j]], state, |Onsager { rate, b }| {
+            let terms = dot(&b.map(|b| b.abs()), [&wi.abs(), &wj.abs()]);
+            let along_energy = [dot(&b, [&wi, &wj]), terms];
+            visit(Term { place, rate, along_energy, force: dot(&b, [&si, &sj]) });
+        });
+    }
+}

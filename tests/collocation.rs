@@ -37,7 +37,11 @@ fn kept<Y: Metriplectic>(
     run
 }
 
-/// The orders of all methods, with so many steps at the coarsest: for Gauss 1 to 4, and for Radau 2 to 4.
+/// A fraction of a run that lies inside a step, however many steps it has.
+const INSIDE: f64 = 0.437;
+
+/// The orders of all methods at the end and inside a step, with so many steps at the coarsest: for Gauss 1 to 4, and for
+/// Radau 2 to 4.
 fn orders<Y: Metriplectic>(
     name: &str,
     system: &Y,
@@ -45,23 +49,38 @@ fn orders<Y: Metriplectic>(
     time: f64,
     (of_gauss, of_radau): ([usize; 4], [usize; 3]),
 ) {
-    let fine = Span::until(time).tolerance(1e-14).at_most(2);
-    let exact = DormandPrince8.run(system, x0.clone(), fine).expect(name).last().point.clone();
+    let times = [INSIDE * time, time];
+    let exact = times.map(|time| {
+        let fine = Span::until(time).tolerance(1e-14).at_most(2);
+        DormandPrince8.run(system, x0.clone(), fine).expect(name).last().point.clone()
+    });
     let methods = GAUSS.into_iter().zip(of_gauss).chain(RADAU.into_iter().zip(of_radau));
     for (method, coarsest) in methods {
         let counts = [4, 5, 6, 8, 10].map(|k| k * coarsest / 4);
         let steps = counts.map(|n| time / n as f64);
         let mut per_step = 0.0;
         let errors = counts.map(|n| {
-            let run = kept(name, method, system, x0, Span::steps(time / n as f64, n));
+            let span = Span::steps(time / n as f64, n).output_at(times);
+            let run = kept(name, method, system, x0, span);
             per_step = run.certificate().effort.iterations as f64 / n as f64;
             assert_eq!(run.certificate().effort.splits, 0, "{name}, {method:?}");
-            distance::<Y::Manifold>(&run.last().point, &exact)
+            let [.., inside, end] = run.states() else { panic!("{name}: two outputs") };
+            assert!(inside.time > 0.0 && end.time > inside.time, "{name}");
+            [(inside, &exact[0]), (end, &exact[1])]
+                .map(|(state, exact)| distance::<Y::Manifold>(&state.point, exact))
         });
-        let (fitted, order) =
-            (slope(&steps, &errors, ROUND_OFF), f64::from(Method::<Y>::order(&method)));
-        println!("{name}, {method:?}: {fitted:.2} from {errors:?}, {per_step:.1} residuals");
-        assert!(fitted >= order - 0.3, "{name}, {method:?}: {fitted:.2} from {errors:?}");
+        let order = f64::from(Method::<Y>::order(&method));
+        for (place, which) in ["inside", "at the end"].into_iter().zip([0, 1]) {
+            let errors = errors.map(|both| both[which]);
+            let fitted = slope(&steps, &errors, ROUND_OFF);
+            println!(
+                "{name}, {method:?}, {place}: {fitted:.2}, {errors:?}, {per_step:.1} residuals"
+            );
+            assert!(
+                fitted >= order - 0.3,
+                "{name}, {method:?}, {place}: {fitted:.2} from {errors:?}"
+            );
+        }
     }
 }
 

@@ -34,7 +34,10 @@ pub(super) fn between<Y: Metriplectic>(
     let y = part(tableau, system, step, &memory.last?, theta)?;
     let q = Y::Manifold::coordinates(step.x, step.end);
     let line = || Y::Manifold::chart(step.x, &(q * theta));
-    let entropy = promises.entropy.then(|| entropy(tableau, system, step, theta));
+    let entropy = promises.entropy.then(|| {
+        let reached = system.laws(&y).entropy;
+        entropy(tableau, system, step, theta, reached)
+    });
     let target = dense::Target::new(step, promises, theta, entropy);
     Some(target.reached_from(system, &y, line))
 }
@@ -58,14 +61,19 @@ fn part<Y: Metriplectic>(
     Some(solved.at.end)
 }
 
-/// The entropy at the fraction `θ` of a step, with the production as its slope at both ends: the cubic, limited so that
-/// it is monotone (Fritsch, Carlson 1980), and for a method that damps the rational function, which follows the rise
-/// of a fast transient.
+/// The entropy at the fraction `θ` of a step: the one that the part of the step has `reached`, of the order of the
+/// method, as far as it lies within a band around a monotone function of low order.
+///
+/// That function has the production as its slope at both ends. It is the cubic, limited so that it is monotone (Fritsch,
+/// Carlson 1980), and for a method that damps the rational function, which follows the rise of a fast transient. Half of
+/// its least slope `m` bounds the slope of the band `± ½m θ(1 − θ)`. So the entropy rises along each edge of the band, and
+/// inside of it where it differs from the function by a smooth remainder.
 fn entropy<Y: Metriplectic>(
     tableau: &Tableau,
     system: &Y,
     step: &StepEnds<'_, Y>,
     theta: f64,
+    reached: f64,
 ) -> f64 {
     let [start, end] = step.values.map(|laws| laws.entropy);
     let rise = end - start;
@@ -76,12 +84,39 @@ fn entropy<Y: Metriplectic>(
         (Some(a), Some(b)) => [step.h * a, step.h * b],
         _ => [rise, rise],
     };
-    let risen = if tableau.one_sided && slopes.iter().all(|slope| slope.is_finite()) {
-        rational(rise, slopes, theta)
+    let (risen, least) = if tableau.one_sided && slopes.iter().all(|slope| slope.is_finite()) {
+        (rational(rise, slopes, theta), least_slope_of_rational(rise, slopes))
     } else {
-        cubic(rise, limited(rise, slopes), theta)
+        let slopes = limited(rise, slopes);
+        (cubic(rise, slopes, theta), least_slope_of_cubic(rise, slopes))
     };
-    (start + risen).min(end)
+    let band = 0.5 * least * theta * (1.0 - theta);
+    let risen = risen + (reached - start - risen).clamp(-band, band);
+    (start + risen).clamp(start, end)
+}
+
+/// The least slope on `[0, 1]` of the cubic from 0 to `rise` with limited slopes at both ends; never negative.
+fn least_slope_of_cubic(rise: f64, [start, end]: [f64; 2]) -> f64 {
+    // The slope is aθ² + bθ + c.
+    let (a, b) = (3.0 * (start + end - 2.0 * rise), 2.0 * (3.0 * rise - 2.0 * start - end));
+    let lowest = -b / (2.0 * a);
+    let inside = if a > 0.0 && (0.0..=1.0).contains(&lowest) {
+        0.5_f64.mul_add(b * lowest, start)
+    } else {
+        f64::INFINITY
+    };
+    start.min(end).min(inside).max(0.0)
+}
+
+/// A lower bound for the slope of [`rational`] on `[0, 1]`,
+///
+/// ```math
+/// \frac{\min(d_0, d_1, \Delta)\, \Delta^2}{\max(\Delta, (2\Delta + d_0 + d_1)/4)^2} .
+/// ```
+fn least_slope_of_rational(rise: f64, slopes: [f64; 2]) -> f64 {
+    let [start, end] = slopes.map(|slope| (slope / rise).max(0.0));
+    let most = (0.25 * (2.0 + start + end)).max(1.0);
+    rise * start.min(end).min(1.0) / (most * most)
 }
 
 /// The rational quadratic function from 0 to `rise` with these slopes, which is monotone if they are not negative
@@ -130,7 +165,7 @@ pub(super) fn error<Y: Metriplectic>(
 
 #[cfg(test)]
 mod tests {
-    use super::rational;
+    use super::{cubic, least_slope_of_cubic, least_slope_of_rational, limited, rational};
 
     #[test]
     fn the_entropy_inside_a_step_is_monotone_and_has_its_slopes() {
@@ -148,5 +183,31 @@ mod tests {
         }
         // A fast transient is over at once.
         assert!(rise - rational(rise, [1e12, 0.0], 0.1) <= 1e-11);
+    }
+
+    #[test]
+    fn the_least_slope_is_none_that_a_difference_falls_below() {
+        for [start, end] in
+            [[1.0, 1.0], [0.2, 1.7], [2.9, 0.1], [0.0, 0.5], [1.2, 2.7], [50.0, 3.0]]
+        {
+            let (rise, step) = (0.3, 1e-3);
+            let slopes = [start * rise, end * rise];
+            let cubic_slopes = limited(rise, slopes);
+            let [mut cubics, mut rationals] = [f64::INFINITY; 2];
+            for k in 0..1000 {
+                let [a, b] = [k, k + 1].map(|k| f64::from(k) * step);
+                let difference = |f: &dyn Fn(f64) -> f64| (f(b) - f(a)) / step;
+                cubics = cubics.min(difference(&|theta| cubic(rise, cubic_slopes, theta)));
+                rationals = rationals.min(difference(&|theta| rational(rise, slopes, theta)));
+            }
+            // The cubic's is attained, up to the change of the slope within a difference.
+            let least = least_slope_of_cubic(rise, cubic_slopes);
+            assert!(
+                least <= cubics + 1e-12 && cubics <= least + 20.0 * step * rise,
+                "{start}, {end}"
+            );
+            let least = least_slope_of_rational(rise, slopes);
+            assert!(least <= rationals + 1e-12, "{start}, {end}: {least} {rationals}");
+        }
     }
 }

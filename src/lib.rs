@@ -87,7 +87,7 @@ pub mod prelude {
         Attitude, AttitudeError, Certificate, Checkpoint, DormandPrince5, DormandPrince8, Ending,
         Error, Event, Gauss, Gonzalez, ItohAbe, MeanValue, Method, Newton, Observables, Radau,
         ResumeError, Run, RunError, RungeKuttaChebyshev, Scheme, Span, SpanError, State, StepError,
-        Steps, SymmetricItohAbe, Trajectory, Until, Watch,
+        Stepper, Steps, SymmetricItohAbe, Trajectory, Until, Watch,
     };
     pub use metriplectic_lattices::{
         BondState, Boundary, Graph, Lattice, LatticeError, Onsager, Points, Profiles, SiteState,

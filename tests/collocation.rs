@@ -59,14 +59,14 @@ fn orders<Y: Metriplectic>(
             distance::<Y::Manifold>(&run.last().point, &exact)
         });
         let (fitted, order) =
-            (slope(&steps, &errors, ROUND_OFF), f64::from(Method::<Y>::order(&method)));
+            (slope(&steps, &errors, ROUND_OFF), f64::from(Stepper::<Y>::order(&method)));
         println!("{name}, {method:?}: {fitted:.2} from {errors:?}, {per_step:.1} residuals");
         assert!(fitted >= order - 0.3, "{name}, {method:?}: {fitted:.2} from {errors:?}");
     }
 }
 
 fn order_of<Y: Metriplectic>(_: &Y, method: Stages) -> u32 {
-    Method::<Y>::order(&method)
+    Stepper::<Y>::order(&method)
 }
 
 fn spin() -> impl Metriplectic<Manifold = Sphere<2>, Metric = Canonical> {
@@ -459,7 +459,7 @@ fn the_estimated_error_has_its_order_on_a_sphere() {
             let values = [&start.values, &taken.values];
             let step = StepEnds { x: &x, end: &taken.x, h, values, reference: &start.values };
             let norm = |v: &Components<Vector2<f64>>| v.0.norm();
-            Method::<_>::error(&method, &system, &step, &memory, norm).expect("it has an estimate")
+            Stepper::<_>::error(&method, &system, &step, &memory, norm).expect("it has an estimate")
         });
         let order = Order::fit(&sizes, &errors).expect("four errors");
         println!("{method:?}: {order} from {errors:?}");

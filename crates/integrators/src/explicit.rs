@@ -50,9 +50,10 @@ mod estimates;
 mod flow;
 mod landing;
 mod memory;
-mod metriplectic;
-mod referred_rise;
+mod refused;
 mod rest;
+mod spectrum;
+mod stage;
 mod step;
 mod tableau;
 
@@ -61,12 +62,11 @@ use metriplectic_dynamics::SecondLaw;
 pub use flow::{Projected, ProjectionError, StageFlow, Target};
 pub use memory::ExplicitMemory;
 use memory::MemoryOf;
-pub use metriplectic::LawJets;
 
-use crate::method::{
-    Control, Element, LimitingSites, Method, Promises, Refusal, StepEnds, StepStart, Taken,
+use crate::step::{
+    Control, Element, LimitingSites, Promises, Refusal, StepEnds, StepError, StepStart, Stepper,
+    Taken,
 };
-use crate::step_error::StepError;
 use chebyshev::CHEBYSHEV;
 use tableau::{EIGHT, FIVE, Tableau};
 
@@ -161,7 +161,7 @@ macro_rules! method {
             const TABLEAU: &'static Tableau = &$tableau;
         }
 
-        impl<F: StageFlow> Method<F> for $name {
+        impl<F: StageFlow> Stepper<F> for $name {
             type Memory = MemoryOf<F>;
 
             fn name(&self) -> String {

@@ -7,11 +7,13 @@ use metriplectic_fields::{
 use metriplectic_manifolds::{Manifold, Retraction, Riemannian, StepPath};
 
 use crate::discrete_gradient::{DiscreteGradient, along as along_path};
-use crate::method::{Element, Flow, Method, StateSpace as _, StepStart};
-use crate::midpoint::{Dim, MidpointMemory, Scheme};
+use crate::midpoint::{MidpointMemory, Scheme};
 use crate::round_off::bound::{of_a_law, of_an_increment, size_of_terms};
-use crate::run::span::{Schedule, Span};
-use crate::run::trajectory::State;
+use crate::run::method::Method;
+use crate::run::schedule::Schedule;
+use crate::run::span::Span;
+use crate::run::state::State;
+use crate::step::{Dim, Element, Flow, StateSpace as _, StepStart, Stepper};
 
 /// Checks a discrete gradient of `f` on the path of `u` from `x`:
 ///
@@ -130,8 +132,8 @@ where
     Ok(())
 }
 
-/// Checks a method from `x` in steps of size `h`: 1. its [order](Method::order) is the slope of its error, from
-/// runs of 32 steps and of twice and four times as many; 2. what it [promises](Method::promises) holds on these
+/// Checks a method from `x` in steps of size `h`: 1. its [order](Stepper::order) is the slope of its error, from
+/// runs of 32 steps and of twice and four times as many; 2. what it [promises](Stepper::promises) holds on these
 /// steps; 3. a run that is resumed from a checkpoint is the same run, bit for bit.
 ///
 /// # Errors

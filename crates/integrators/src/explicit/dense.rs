@@ -7,11 +7,11 @@
 //! is then moved onto the laws.
 
 use super::flow::StageFlow;
-use super::memory::{LastStep, MemoryOf, combined, produced};
-use super::step::stage;
+use super::memory::{LastStep, MemoryOf};
+use super::stage::{combined, produced, stage};
 use super::tableau::Tableau;
-use crate::method::{Element, Promises, StepEnds, Vector};
-use crate::run::dense;
+use crate::step::dense;
+use crate::step::{Element, Promises, StepEnds, Vector};
 
 /// The state at the fraction `θ` of a step.
 pub(super) fn between<F: StageFlow>(

@@ -1,11 +1,13 @@
 //! What the stages of a step tell of its error and of its stability.
 
-use super::chebyshev::{self, Spectrum};
+use super::chebyshev;
 use super::flow::StageFlow;
-use super::memory::{LastStep, MemoryOf, combined};
+use super::memory::{LastStep, MemoryOf};
+use super::spectrum::Spectrum;
+use super::stage::combined;
 use super::tableau::Tableau;
-use crate::method::{Element, LimitingSites, StepEnds, Vector};
-use crate::run::scales::relative;
+use crate::step::scales::relative;
+use crate::step::{Element, LimitingSites, StepEnds, Vector};
 
 /// Whether the rates between the last stage and the end differ by as much as at the edge of the region of
 /// stability: `h |k_e − k_s| / |q_e − q_s|` of Hairer, Wanner (Solving ODEs II, §IV.2), relative to the sizes of

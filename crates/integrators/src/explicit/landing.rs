@@ -3,10 +3,11 @@
 use metriplectic_dynamics::SecondLaw;
 
 use super::flow::{Projected, ProjectionError, StageFlow, Target};
-use super::memory::{LastStep, Produced, combined, produced};
-use super::step::Refused;
+use super::memory::{LastStep, Produced};
+use super::refused::Refused;
+use super::stage::{combined, produced};
 use super::tableau::Tableau;
-use crate::method::{Element, EntropyStep, Laws, StepStart, Vector};
+use crate::step::{Element, EntropyStep, Laws, StepStart, Vector};
 
 /// The fraction of the round-off of an increment by which the entropy may fall: less than what the certificate
 /// counts as a fall.

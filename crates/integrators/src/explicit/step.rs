@@ -7,47 +7,19 @@ use super::creep;
 use super::estimates::is_at_the_edge;
 use super::flow::StageFlow;
 use super::landing::{Landed, Onto};
-use super::memory::{ExplicitMemory, Here, LastStep, MemoryOf, Produced, combined, produced};
+use super::memory::{ExplicitMemory, LastStep, MemoryOf, Produced};
+use super::refused::Refused;
 use super::rest::{self, is_hardly};
+use super::stage::{Here, combined, produced, stage};
 use super::tableau::Tableau;
-use crate::method::{Effort, Element, EntropyStep, Evidence, Refusal, StepStart, Taken, Vector};
-use crate::step_error::StepError;
+use crate::step::{
+    Effort, Element, EntropyStep, Evidence, Refusal, StepError, StepStart, Taken, Vector,
+};
 
 /// Falls of the entropy in a row after which a state that hardly moves is held.
 const FALLS: u32 = 5;
 /// How often a step of a fixed size is halved.
 const HALVES: u32 = 12;
-/// Why a step is not taken.
-pub(super) enum Refused {
-    /// A stage is beyond the edge of the chart or the domain, or has no value; at a site, if the flow says which.
-    Outside(Option<usize>),
-    /// No state near by has the laws of the run.
-    Far,
-    /// The entropy would fall, where friction produces this much in the step.
-    Falls(f64),
-    /// No smaller step can be taken either.
-    Never(StepError),
-}
-
-impl Refused {
-    /// What becomes of a step of size `h` from `time`.
-    fn into_refusal(self, time: f64, h: f64) -> Refusal {
-        let tried = Effort::default();
-        let second_law = matches!(self, Self::Falls(_));
-        let error = match self {
-            Self::Outside(Some(site)) => Some(StepError::SiteOutOfDomain { time, h, site, tried }),
-            Self::Never(error) => Some(error),
-            _ => None,
-        };
-        Refusal { effort: tried, error, second_law }
-    }
-
-    /// A displacement leads out of the domain.
-    #[cold]
-    pub(super) fn outside<F: StageFlow>(flow: &F, x: &Element<F>, d: &F::Vector) -> Self {
-        Self::Outside(flow.site_outside(x, d))
-    }
-}
 
 /// Tries a step.
 #[inline]
@@ -276,18 +248,6 @@ fn stages<F: StageFlow>(
         stages[stage].velocity = stages[0].velocity.zero();
     }
     Ok(LastStep { stages, known: tableau.stages.len() + 1, before, end, rise })
-}
-
-/// The rates and the entropy production of a stage at the coordinates `q`.
-#[inline]
-pub(super) fn stage<F: StageFlow>(
-    flow: &F,
-    x: &Element<F>,
-    q: &F::Vector,
-) -> Option<Here<F::Vector>> {
-    let y = flow.stage(x, q)?;
-    let (v, production) = flow.motion(&y)?;
-    Some(Here { velocity: flow.stage_rates(x, (q, &y), &v), production })
 }
 
 fn is_zero(v: &impl Vector) -> bool {

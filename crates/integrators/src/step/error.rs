@@ -4,9 +4,8 @@ use std::fmt;
 
 use metriplectic_dynamics::ModelError;
 
-use crate::digits::{counted, digits};
-use crate::error::FlowError;
-use crate::method::Effort;
+use super::digits::{counted, digits};
+use crate::step::{Effort, FlowError};
 
 impl fmt::Display for Effort {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

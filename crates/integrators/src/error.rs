@@ -11,7 +11,7 @@ use metriplectic_manifolds::{AlgebraError, MetricError, PointError};
 use crate::attitude::AttitudeError;
 use crate::run::checkpoint::ResumeError;
 use crate::run::span_error::SpanError;
-use crate::step::{StateSpace, StepError};
+use crate::step::{MethodError, StateSpace, StepError};
 
 pub use crate::run::error::RunError;
 pub use crate::step::FlowError;
@@ -48,6 +48,9 @@ pub enum Error {
     /// A flow that has found a fault of its own.
     #[error(transparent)]
     Flow(#[from] FlowError),
+    /// A method that has found a fault of its own.
+    #[error(transparent)]
+    Method(#[from] MethodError),
     /// A span that cannot be run.
     #[error(transparent)]
     Span(#[from] SpanError),
@@ -70,6 +73,7 @@ impl<M: StateSpace> From<RunError<M>> for Error {
         match error {
             RunError::Model(error) => Self::Model(error),
             RunError::Flow(error) => Self::Flow(error),
+            RunError::Method(error) => Self::Method(error),
             RunError::Span(error) => Self::Span(error),
             error @ RunError::Step { .. } => Self::Run(Box::new(error)),
         }

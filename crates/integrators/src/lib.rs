@@ -46,7 +46,10 @@ pub use collocation::{Gauss, Radau, StageMemory};
 pub use default_scheme::Run;
 pub use discrete_gradient::{DiscreteGradient, Gonzalez, ItohAbe, MeanValue, SymmetricItohAbe};
 pub use error::{Error, FlowError, RunError};
-pub use explicit::{DormandPrince5, DormandPrince8, RungeKuttaChebyshev, StageFlow};
+pub use explicit::{
+    DormandPrince5, DormandPrince8, ExplicitRungeKutta, Row, RungeKuttaChebyshev, StageFlow,
+    Tableau, TableauError,
+};
 pub use midpoint::{Residual, Scheme};
 pub use newton::{Equation, Iterate, Linearised, Newton, Root, Rounding};
 pub use round_off::stable_gradient::StableGradient;
@@ -64,6 +67,6 @@ pub use run::watch::{Watch, Watched};
 pub use run::{Ending, Method, Schedule, SpanError, State};
 pub use step::{
     Components, Control, Effort, Element, EntropyStep, Evidence, Flow, Laws, LimitingSites, Memory,
-    Promises, Recheck, Refusal, RestoreError, Saved, Scales, StageLaws, StateSpace, StepEnds,
-    StepError, StepStart, Stepper, Taken, Vector,
+    MethodError, Promises, Recheck, Refusal, RestoreError, Saved, Scales, StageLaws, StateSpace,
+    StepEnds, StepError, StepStart, Stepper, Taken, Vector,
 };

@@ -23,7 +23,7 @@ const ROOMS: [(&str, &[&str]); 13] = [
     ("default_scheme", &["midpoint", "run"]),
     ("attitude", &["round_off", "run"]),
     ("error", &["step", "run", "attitude"]),
-    ("laws", &["step", "round_off", "discrete_gradient", "midpoint", "run"]),
+    ("laws", &["step", "round_off", "discrete_gradient", "midpoint", "explicit", "run"]),
 ];
 
 /// The files that name each other, all of them pairs: a default and what it is computed from, an equation and its

@@ -18,19 +18,12 @@ use super::refused::Refused;
 use super::spectrum::spectrum;
 use super::stage::{Here, stage};
 use super::tableau::Tableau;
-use crate::step::{Element, Vector};
+use crate::step::{Control, Element, Vector};
 
-/// What is needed of a tableau after the stages.
-pub(super) const CHEBYSHEV: Tableau = Tableau {
-    order: 2,
-    stages: &[],
-    end: &[],
-    errors: [&[], &[]],
-    more_stages: &[],
-    dense: &[],
-    passed: &[],
-    stability: f64::INFINITY,
-};
+/// What is needed of a tableau after the stages, with the PI controller of order 2, by which the error at the end is
+/// proportional to the tolerance.
+pub(super) const CHEBYSHEV: Tableau =
+    Tableau::chebyshev("RungeKuttaChebyshev", Control::of_order(2));
 
 /// The damping `ε`.
 const DAMPING: f64 = 2.0 / 13.0;

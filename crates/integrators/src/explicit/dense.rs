@@ -35,7 +35,7 @@ pub(super) fn between<F: StageFlow>(
     // A step that was taken in parts has no stages.
     let Some(last) = known else { return dense::between(flow, step, promises, theta) };
     let (h, line) = (step.h, last.end.map(|q| theta * q));
-    let ends = [&last.stages[0], &last.stages[tableau.stages.len() + 1]];
+    let ends = [&last.stages[0], &last.stages[tableau.rows().len() + 1]];
     let rows = tableau
         .dense
         .iter()
@@ -71,7 +71,7 @@ fn more_stages<F: StageFlow>(
     last: &mut LastStep<F::Vector>,
 ) -> Option<()> {
     for row in tableau.more_stages {
-        if last.known == tableau.stages.len() + 2 + tableau.more_stages.len() {
+        if last.known == tableau.rows().len() + 2 + tableau.more_stages.len() {
             break;
         }
         let q = combined(step.h, row, &last.stages);

@@ -103,19 +103,15 @@ impl<F: StageFlow> Onto<'_, F> {
     /// velocity at the start takes its place.
     fn embedded_error(&self) -> Option<F::Vector> {
         let Self { tableau, flow, h, last, .. } = *self;
-        let [row, _] = tableau.errors;
-        let known = !row.is_empty() && row.iter().all(|&(stage, _)| stage < last.known);
-        (flow.weighs_errors() && known).then(|| combined(h, row, &last.stages))
+        let row = tableau.early_error().filter(|_| flow.weighs_errors())?;
+        Some(combined(h, row, &last.stages))
     }
 
     /// Whether the entropy that was produced may be aimed at.
     fn is_trusted(&self) -> bool {
         let Self { tableau, h, last, .. } = *self;
-        let doubt = if tableau.order == 8 {
-            (h * produced(tableau.errors[0], &last.stages)).abs()
-        } else {
-            0.0
-        };
+        let doubt = |row| (h * produced(row, &last.stages)).abs();
+        let doubt = tableau.early_error().map_or(0.0, doubt);
         last.rise >= 0.0 && doubt <= 0.5 * last.rise
     }
 

@@ -2,7 +2,8 @@
 
 use super::creep;
 use super::spectrum::Spectrum;
-use super::stage::{Here, STAGES};
+use super::stage::Here;
+use super::tableau::STAGES;
 use crate::step::{Flow, Memory, RestoreError, Saved, Vector};
 
 /// What [`DormandPrince8`](crate::DormandPrince8) and [`DormandPrince5`](crate::DormandPrince5) keep from one step

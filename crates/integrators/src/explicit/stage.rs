@@ -1,11 +1,8 @@
 //! The stages of an explicit step.
 
 use super::flow::StageFlow;
-use super::tableau::Row;
+use super::tableau::{Row, STAGES};
 use crate::step::{Element, Vector};
-
-/// The most stages of a step: those of order 8, its end, and three for its dense output.
-pub(super) const STAGES: usize = 16;
 
 /// The motion at a state, or that of a stage in the chart at the start of its step.
 #[derive(Clone, Debug)]

@@ -11,9 +11,10 @@ use super::memory::{ExplicitMemory, LastStep, MemoryOf, Produced};
 use super::refused::Refused;
 use super::rest::{self, is_hardly};
 use super::stage::{Here, combined, produced, stage};
-use super::tableau::Tableau;
+use super::tableau::{Stages, Tableau};
 use crate::step::{
-    Effort, Element, EntropyStep, Evidence, Refusal, StepError, StepStart, Taken, Vector,
+    Effort, Element, EntropyStep, Evidence, MethodError, Refusal, StepError, StepStart, Taken,
+    Vector,
 };
 
 /// Falls of the entropy in a row after which a state that hardly moves is held.
@@ -103,16 +104,21 @@ fn try_step<F: StageFlow>(
     memory: &mut MemoryOf<F>,
 ) -> Result<Taken<F>, Refused> {
     let x = start.x;
+    if let Some(fault) = tableau.fault {
+        return Err(Refused::Never(StepError::Method {
+            time: start.time,
+            error: MethodError::new(fault),
+        }));
+    }
     // The stages of the step before it serve nobody any more.
     memory.last = None;
     let here = match memory.here.take() {
         Some(here) => here,
         None => here_at(flow, x, None).ok_or(Refused::Outside(None))?,
     };
-    let mut last = if tableau.stages.is_empty() {
-        chebyshev::stages(flow, x, h, here, memory)?
-    } else {
-        stages(tableau, flow, x, h, here)?
+    let mut last = match tableau.stages {
+        Stages::Chebyshev => chebyshev::stages(flow, x, h, here, memory)?,
+        Stages::Rows(_) => stages(tableau, flow, x, h, here)?,
     };
     let taken = finished(tableau, flow, start, h, &mut last, memory);
     if memory.here.is_some() {
@@ -237,17 +243,17 @@ fn stages<F: StageFlow>(
     let mut stages = Here::at_rest(&zero);
     stages[0] = here;
     let mut before = zero;
-    for (i, row) in tableau.stages.iter().enumerate() {
+    for (i, row) in tableau.rows().iter().enumerate() {
         before = combined(h, row, &stages);
         stages[i + 1] =
             stage(flow, x, &before).ok_or_else(|| Refused::outside(flow, x, &before))?;
     }
     let end = combined(h, tableau.end, &stages);
     let rise = h * produced(tableau.end, &stages);
-    for &stage in tableau.passed {
+    for stage in tableau.passed() {
         stages[stage].velocity = stages[0].velocity.zero();
     }
-    Ok(LastStep { stages, known: tableau.stages.len() + 1, before, end, rise })
+    Ok(LastStep { stages, known: tableau.rows().len() + 1, before, end, rise })
 }
 
 fn is_zero(v: &impl Vector) -> bool {

@@ -6,7 +6,7 @@ use metriplectic_dynamics::ModelError;
 
 use crate::run::span_error::SpanError;
 use crate::run::trajectory::Trajectory;
-use crate::step::{FlowError, StateSpace, StepError};
+use crate::step::{FlowError, MethodError, StateSpace, StepError};
 
 /// A run that did not finish.
 #[derive(Clone, thiserror::Error)]
@@ -18,6 +18,9 @@ pub enum RunError<M: StateSpace> {
     /// The flow has found a fault of its own.
     #[error(transparent)]
     Flow(#[from] FlowError),
+    /// The method has found a fault of its own.
+    #[error(transparent)]
+    Method(#[from] MethodError),
     /// The span cannot be run.
     #[error(transparent)]
     Span(#[from] SpanError),
@@ -36,7 +39,7 @@ impl<M: StateSpace> RunError<M> {
     pub fn trajectory(&self) -> Option<&Trajectory<M>> {
         match self {
             Self::Step { trajectory, .. } => Some(trajectory),
-            Self::Model(_) | Self::Flow(_) | Self::Span(_) => None,
+            Self::Model(_) | Self::Flow(_) | Self::Method(_) | Self::Span(_) => None,
         }
     }
 }

@@ -70,6 +70,7 @@ impl<'a, F: Flow, M: Stepper<F>> Steps<'a, F, M> {
         schedule: Schedule,
     ) -> Result<Self, RunError<F::Space>> {
         schedule.check()?;
+        method.check(!schedule.is_fixed())?;
         let rule = Rule::of(&method, schedule.start);
         schedule.check_tolerance(&rule)?;
         flow.check(&x0)?;

@@ -1,8 +1,8 @@
 //! What a run knows of a method.
 
 use super::{
-    Control, Effort, Element, Flow, LimitingSites, Memory, Promises, Refusal, StepEnds, StepError,
-    StepStart, Taken, Vector as _, dense,
+    Control, Effort, Element, Flow, LimitingSites, Memory, MethodError, Promises, Refusal,
+    StepEnds, StepError, StepStart, Taken, Vector as _, dense,
 };
 
 /// A one-step method.
@@ -25,6 +25,16 @@ pub trait Stepper<F: Flow>: Sized {
 
     /// What holds exactly on every step.
     fn promises(&self, flow: &F) -> Promises;
+
+    /// Refuses options with which no run can start, of steps that follow a tolerance or have one size.
+    ///
+    /// # Errors
+    ///
+    /// The method's own error.
+    fn check(&self, follows_tolerance: bool) -> Result<(), MethodError> {
+        let _ = follows_tolerance;
+        Ok(())
+    }
 
     /// One step of size `h`, at any price.
     ///

@@ -3,7 +3,7 @@
 use metriplectic_manifolds::PointError;
 
 use crate::run::span_error::SpanError;
-use crate::step::RestoreError;
+use crate::step::{MethodError, RestoreError};
 
 /// A checkpoint that cannot be resumed.
 #[derive(Clone, PartialEq, thiserror::Error)]
@@ -70,6 +70,9 @@ pub enum ResumeError {
         /// The name of the method that was to resume it.
         found: String,
     },
+    /// The method has found a fault of its own.
+    #[error(transparent)]
+    Method(#[from] MethodError),
     /// A number of its file has changed since it was written.
     #[error(
         "the numbers of the checkpoint have the checksum {found:016x}, and its file says {stored:016x}; the file \

@@ -7,7 +7,7 @@ use super::saved::SavedRun;
 use super::{Checkpoint, validation};
 use crate::run::certificate::Certificate;
 use crate::run::checked::checked_states;
-use crate::run::controller::Rule;
+use crate::run::controller::{Rule, StepSize};
 use crate::run::state::State;
 use crate::run::steps::Steps;
 use crate::run::watching::StepBefore;
@@ -64,6 +64,7 @@ impl<'a, F: Flow, M: Stepper<F>> Steps<'a, F, M> {
     ) -> Result<Self, ResumeError> {
         let c = checkpoint.run()?;
         validation::of_the_method(&c.method, method.name())?;
+        method.check(matches!(c.progress.step_size, StepSize::Adaptive(_)))?;
         let entries: Vec<f64> = c.point().collect();
         let point = flow.element(&entries)?;
         let mut certificate =

@@ -103,15 +103,14 @@ impl<F: StageFlow> Onto<'_, F> {
     /// velocity at the start takes its place.
     fn embedded_error(&self) -> Option<F::Vector> {
         let Self { tableau, flow, h, last, .. } = *self;
-        let row = tableau.early_error().filter(|_| flow.weighs_errors())?;
-        Some(combined(h, row, &last.stages))
+        let row = tableau.early_error;
+        (flow.weighs_errors() && !row.is_empty()).then(|| combined(h, row, &last.stages))
     }
 
     /// Whether the entropy that was produced may be aimed at.
     fn is_trusted(&self) -> bool {
         let Self { tableau, h, last, .. } = *self;
-        let doubt = |row| (h * produced(row, &last.stages)).abs();
-        let doubt = tableau.early_error().map_or(0.0, doubt);
+        let doubt = (h * produced(tableau.early_error, &last.stages)).abs();
         last.rise >= 0.0 && doubt <= 0.5 * last.rise
     }
 

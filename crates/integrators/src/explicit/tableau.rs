@@ -42,6 +42,8 @@ pub struct Tableau {
     pub(super) end: Row,
     /// The weights of the error, of which the first is the one of higher order.
     pub(super) errors: [Row; 2],
+    /// The first of them if it is known before the end of the step is, and none otherwise.
+    pub(super) early_error: Row,
     /// The orders of both.
     pub(super) error_orders: [u32; 2],
     /// Further stages for the dense output; the stage at the end of the step comes before them.
@@ -139,6 +141,7 @@ impl Tableau {
             stages: Stages::Rows(stages),
             end,
             errors: [&[], &[]],
+            early_error: &[],
             error_orders: [0, 0],
             more_stages: &[],
             dense: &[],
@@ -245,17 +248,14 @@ impl Tableau {
         }
     }
 
-    /// The weights of the error that is known before the end of the step is, if there is one.
-    pub(super) fn early_error(&self) -> Option<Row> {
-        let [row, _] = self.errors;
-        let end = self.rows().len() + 1;
-        (!row.is_empty() && row.iter().all(|&(stage, _)| stage < end)).then_some(row)
-    }
-
     /// The stages that only other stages before the end need.
     pub(super) fn passed(&self) -> impl Iterator<Item = usize> {
-        let passed = self.passed;
-        (0..STAGES).filter(move |stage| passed >> stage & 1 == 1)
+        let mut left = self.passed;
+        std::iter::from_fn(move || {
+            let stage = left.trailing_zeros();
+            left &= left.wrapping_sub(1);
+            (stage < u32::BITS).then_some(stage as usize)
+        })
     }
 
     /// The tableau with the control for the order of its error.
@@ -311,7 +311,9 @@ impl Tableau {
             }
             stage += 1;
         }
-        Self { fault, passed, ..self }
+        let [error, _] = self.errors;
+        let early_error: Row = if names(error, end) { &[] } else { error };
+        Self { fault, passed, early_error, ..self }
     }
 
     /// The first row of a part that names a stage which is not known: of `known` stages, and of one more for each row if

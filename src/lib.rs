@@ -34,6 +34,7 @@
 //! | method | order | take it for |
 //! |---|---|---|
 //! | [`DormandPrince8`](integrators::DormandPrince8), [`DormandPrince5`](integrators::DormandPrince5) | 8, 5 | smooth motions, with steps that follow a tolerance |
+//! | [`ExplicitRungeKutta`](integrators::ExplicitRungeKutta) | of its tableau | coefficients of your own |
 //! | [`WeylMidpoint`](manifolds::WeylMidpoint) and the other [schemes](integrators::Scheme) of the paper | 2; `Exponential` 1 | long runs in steps of one size |
 //! | [`Gauss`](integrators::Gauss) of 1 to 4 stages | 2 to 8 | the same with a smaller error; reversible in time |
 //! | [`Radau`](integrators::Radau) of 2 to 4 stages | 3 to 7 | friction that is much faster than a step |
@@ -85,9 +86,10 @@ pub mod prelude {
     pub use metriplectic_fields::{ErasedField, MatrixField, Real, Scalar, ScalarField};
     pub use metriplectic_integrators::{
         Attitude, AttitudeError, Certificate, Checkpoint, DormandPrince5, DormandPrince8, Ending,
-        Error, Event, Gauss, Gonzalez, ItohAbe, MeanValue, Method, Newton, Observables, Radau,
-        ResumeError, Run, RunError, RungeKuttaChebyshev, Scheme, Span, SpanError, State, StepError,
-        Steps, SymmetricItohAbe, Trajectory, Until, Watch,
+        Error, Event, ExplicitRungeKutta, Gauss, Gonzalez, ItohAbe, MeanValue, Method, Newton,
+        Observables, Radau, ResumeError, Run, RunError, RungeKuttaChebyshev, Scheme, Span,
+        SpanError, State, StepError, Stepper, Steps, SymmetricItohAbe, Tableau, Trajectory, Until,
+        Watch,
     };
     pub use metriplectic_lattices::{
         BondState, Boundary, Graph, Lattice, LatticeError, Onsager, Points, Profiles, SiteState,

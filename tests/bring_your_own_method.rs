@@ -11,7 +11,7 @@ use metriplectic::prelude::*;
 #[derive(Clone, Copy, Debug)]
 struct ExplicitMidpoint;
 
-impl<F: Flow> Method<F> for ExplicitMidpoint {
+impl<F: Flow> Stepper<F> for ExplicitMidpoint {
     type Memory = ();
 
     fn order(&self) -> u32 {
@@ -74,7 +74,7 @@ fn a_method_of_forty_lines_keeps_the_laws_of_a_method() {
 #[derive(Clone, Copy, Debug)]
 struct Boastful;
 
-impl<F: Flow> Method<F> for Boastful {
+impl<F: Flow> Stepper<F> for Boastful {
     type Memory = ();
 
     fn order(&self) -> u32 {

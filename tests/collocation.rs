@@ -69,7 +69,7 @@ fn orders<Y: Metriplectic>(
             [(inside, &exact[0]), (end, &exact[1])]
                 .map(|(state, exact)| distance::<Y::Manifold>(&state.point, exact))
         });
-        let order = f64::from(Method::<Y>::order(&method));
+        let order = f64::from(Stepper::<Y>::order(&method));
         for (place, which) in ["inside", "at the end"].into_iter().zip([0, 1]) {
             let errors = errors.map(|both| both[which]);
             let fitted = slope(&steps, &errors, ROUND_OFF);
@@ -85,7 +85,7 @@ fn orders<Y: Metriplectic>(
 }
 
 fn order_of<Y: Metriplectic>(_: &Y, method: Stages) -> u32 {
-    Method::<Y>::order(&method)
+    Stepper::<Y>::order(&method)
 }
 
 fn spin() -> impl Metriplectic<Manifold = Sphere<2>, Metric = Canonical> {
@@ -478,7 +478,7 @@ fn the_estimated_error_has_its_order_on_a_sphere() {
             let values = [&start.values, &taken.values];
             let step = StepEnds { x: &x, end: &taken.x, h, values, reference: &start.values };
             let norm = |v: &Components<Vector2<f64>>| v.0.norm();
-            Method::<_>::error(&method, &system, &step, &memory, norm).expect("it has an estimate")
+            Stepper::<_>::error(&method, &system, &step, &memory, norm).expect("it has an estimate")
         });
         let order = Order::fit(&sizes, &errors).expect("four errors");
         println!("{method:?}: {order} from {errors:?}");

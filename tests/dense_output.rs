@@ -422,7 +422,7 @@ fn a_run_with_outputs_at_no_time_has_its_start_and_its_end() {
 #[derive(Clone, Copy, Debug)]
 struct ExplicitMidpoint;
 
-impl<F: Flow> Method<F> for ExplicitMidpoint {
+impl<F: Flow> Stepper<F> for ExplicitMidpoint {
     type Memory = ();
 
     fn order(&self) -> u32 {

@@ -29,7 +29,7 @@ const START: Plane = Plane::new(1.0, 0.0);
 #[derive(Clone, Debug)]
 struct Counted<'a, M>(M, &'a AtomicUsize);
 
-impl<F: Flow, M: Method<F>> Method<F> for Counted<'_, M> {
+impl<F: Flow, M: Method<F>> Stepper<F> for Counted<'_, M> {
     type Memory = M::Memory;
 
     fn order(&self) -> u32 {

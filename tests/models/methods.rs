@@ -3,8 +3,8 @@
 
 use metriplectic::fields::Space;
 use metriplectic::integrators::{
-    Control, Flow, Memory, Promises, Refusal, ResumeError, Saved, StageMemory, StepEnds, StepStart,
-    Taken,
+    Control, Flow, Memory, Promises, Refusal, RestoreError, Saved, StageMemory, StepEnds,
+    StepStart, Taken,
 };
 use metriplectic::prelude::*;
 
@@ -28,7 +28,7 @@ impl Any {
 }
 
 type OfStages<Y> = StageMemory<<<Y as Metriplectic>::Manifold as Space>::Dim>;
-type OfExplicit<Y> = <DormandPrince8 as Method<Y>>::Memory;
+type OfExplicit<Y> = <DormandPrince8 as Stepper<Y>>::Memory;
 
 /// The memories of both families.
 #[derive(Clone, Debug, Default)]
@@ -52,7 +52,7 @@ impl<I: Memory, E: Memory> Memory for Both<I, E> {
         self.explicit.save(saved);
     }
 
-    fn restore(saved: &Saved) -> Result<Self, ResumeError> {
+    fn restore(saved: &Saved) -> Result<Self, RestoreError> {
         Ok(Self { implicit: I::restore(saved)?, explicit: E::restore(saved)? })
     }
 }
@@ -89,15 +89,15 @@ const fn explicit<I, E>(both: &mut Both<I, E>) -> &mut E {
     &mut both.explicit
 }
 
-impl<Y: Metriplectic> Method<Y> for Any {
+impl<Y: Metriplectic> Stepper<Y> for Any {
     type Memory = Both<OfStages<Y>, OfExplicit<Y>>;
 
     fn order(&self) -> u32 {
-        each!(self, &mut Self::Memory::default(), |method, _memory| Method::<Y>::order(method))
+        each!(self, &mut Self::Memory::default(), |method, _memory| Stepper::<Y>::order(method))
     }
 
     fn control(&self) -> Control {
-        each!(self, &mut Self::Memory::default(), |method, _memory| Method::<Y>::control(method))
+        each!(self, &mut Self::Memory::default(), |method, _memory| Stepper::<Y>::control(method))
     }
 
     fn promises(&self, system: &Y) -> Promises {

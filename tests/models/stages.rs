@@ -61,15 +61,15 @@ macro_rules! each {
 
 type MemoryOf<Y> = StageMemory<<<Y as Metriplectic>::Manifold as Space>::Dim>;
 
-impl<Y: Metriplectic> Method<Y> for Stages {
+impl<Y: Metriplectic> Stepper<Y> for Stages {
     type Memory = MemoryOf<Y>;
 
     fn order(&self) -> u32 {
-        each!(self, method => Method::<Y>::order(&method))
+        each!(self, method => Stepper::<Y>::order(&method))
     }
 
     fn control(&self) -> Control {
-        each!(self, method => Method::<Y>::control(&method))
+        each!(self, method => Stepper::<Y>::control(&method))
     }
 
     fn promises(&self, system: &Y) -> Promises {

@@ -41,7 +41,8 @@ use metriplectic_manifolds::{
 use nalgebra::{Matrix3, Vector3};
 
 use crate::round_off::stable_gradient::{Segment, StableGradient};
-use crate::run::trajectory::{State, Trajectory};
+use crate::run::state::State;
+use crate::run::trajectory::Trajectory;
 
 /// The attitude `R(t)` of a body, a rotation from its frame to space, along a run on so(3)*; see the
 /// [module](mod@crate::attitude).

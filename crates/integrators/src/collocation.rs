@@ -71,14 +71,11 @@ use metriplectic_dynamics::{Metriplectic, SecondLaw, system::Point};
 
 pub use memory::StageMemory;
 
-use crate::method::{Control, Flow, Method, Promises, Refusal, StepEnds, StepStart, Taken};
-use crate::midpoint::Dim;
-use crate::step_error::StepError;
-use crate::step_failure::Fallbacks;
+use crate::step::failure::Fallbacks;
+use crate::step::{
+    Control, Dim, Flow, Promises, Refusal, StepEnds, StepError, StepStart, Stepper, Taken,
+};
 use tableau::{GAUSS, RADAU, Tableau};
-
-/// A point of a system.
-type PointOf<Y> = Point<Y>;
 
 /// The Gauss method of `S = 1 … 4` stages and order `2S`: reversible, with both laws exact.
 ///
@@ -153,7 +150,7 @@ macro_rules! method {
             }
         }
 
-        impl<Y: Metriplectic, const S: usize> Method<Y> for $name<S> {
+        impl<Y: Metriplectic, const S: usize> Stepper<Y> for $name<S> {
             type Memory = StageMemory<Dim<Y>>;
 
             fn name(&self) -> String {
@@ -215,8 +212,8 @@ macro_rules! method {
                 step: &StepEnds<'_, Y>,
                 memory: &mut StageMemory<Dim<Y>>,
                 theta: f64,
-            ) -> Option<PointOf<Y>> {
-                let promises = Method::<Y>::promises(self, system);
+            ) -> Option<Point<Y>> {
+                let promises = Stepper::<Y>::promises(self, system);
                 dense::between(Self::tableau(), promises, system, step, memory, theta)
             }
         }

@@ -4,81 +4,17 @@
 //! the sentence of their `Display` form.
 
 use std::fmt;
-use std::sync::Arc;
 
 use metriplectic_dynamics::{BuildError, FormError, LegendreError, ModelError, PoissonError};
 use metriplectic_manifolds::{AlgebraError, MetricError, PointError};
 
 use crate::attitude::AttitudeError;
-use crate::method::StateSpace;
 use crate::run::checkpoint::ResumeError;
-use crate::run::span::SpanError;
-use crate::run::trajectory::Trajectory;
-use crate::step_error::StepError;
+use crate::run::span_error::SpanError;
+use crate::step::{MethodError, StateSpace, StepError};
 
-/// A run that did not finish.
-#[derive(Clone, thiserror::Error)]
-#[non_exhaustive]
-pub enum RunError<M: StateSpace> {
-    /// The model breaks one of its laws.
-    #[error(transparent)]
-    Model(#[from] ModelError),
-    /// The flow has found a fault of its own.
-    #[error(transparent)]
-    Flow(#[from] FlowError),
-    /// The span cannot be run.
-    #[error(transparent)]
-    Span(#[from] SpanError),
-    /// A step failed; what was computed until then is kept.
-    #[error("{cause} ({} steps were taken and are kept in this error)", trajectory.certificate().steps)]
-    Step {
-        /// The step that failed.
-        cause: StepError,
-        /// The trajectory so far.
-        trajectory: Box<Trajectory<M>>,
-    },
-}
-
-impl<M: StateSpace> RunError<M> {
-    /// The trajectory up to the step that failed, if the run had started.
-    pub fn trajectory(&self) -> Option<&Trajectory<M>> {
-        match self {
-            Self::Step { trajectory, .. } => Some(trajectory),
-            Self::Model(_) | Self::Flow(_) | Self::Span(_) => None,
-        }
-    }
-}
-
-/// A fault that a [`Flow`](crate::Flow) which is no metriplectic system has found at the start of a run. It is the
-/// flow's own error, which can be downcast from it.
-///
-/// ```
-/// use metriplectic_integrators::FlowError;
-/// let error = FlowError::new("7a".parse::<i32>().unwrap_err());
-/// assert!(error.downcast_ref::<std::num::ParseIntError>().is_some());
-/// ```
-#[derive(Clone, thiserror::Error)]
-#[error("{0}")]
-pub struct FlowError(#[source] Arc<dyn std::error::Error + Send + Sync>);
-
-/// Compares by identity: two errors with the same text differ.
-impl PartialEq for FlowError {
-    fn eq(&self, other: &Self) -> bool {
-        Arc::ptr_eq(&self.0, &other.0)
-    }
-}
-
-impl FlowError {
-    /// Wraps the error of a flow.
-    pub fn new(error: impl std::error::Error + Send + Sync + 'static) -> Self {
-        Self(Arc::new(error))
-    }
-
-    /// The flow's own error, if it is of this type.
-    pub fn downcast_ref<E: std::error::Error + 'static>(&self) -> Option<&E> {
-        self.0.downcast_ref()
-    }
-}
+pub use crate::run::error::RunError;
+pub use crate::step::FlowError;
 
 /// Everything that can go wrong between three closures and a trajectory, for programs that pass all
 /// of it on with `?`.
@@ -112,6 +48,9 @@ pub enum Error {
     /// A flow that has found a fault of its own.
     #[error(transparent)]
     Flow(#[from] FlowError),
+    /// A method that has found a fault of its own.
+    #[error(transparent)]
+    Method(#[from] MethodError),
     /// A span that cannot be run.
     #[error(transparent)]
     Span(#[from] SpanError),
@@ -134,21 +73,10 @@ impl<M: StateSpace> From<RunError<M>> for Error {
         match error {
             RunError::Model(error) => Self::Model(error),
             RunError::Flow(error) => Self::Flow(error),
+            RunError::Method(error) => Self::Method(error),
             RunError::Span(error) => Self::Span(error),
             error @ RunError::Step { .. } => Self::Run(Box::new(error)),
         }
-    }
-}
-
-impl<M: StateSpace> fmt::Debug for RunError<M> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        fmt::Display::fmt(self, f)
-    }
-}
-
-impl fmt::Debug for FlowError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        fmt::Display::fmt(self, f)
     }
 }
 

@@ -44,15 +44,18 @@
 //! friction bounds their steps; the certificate says when it does.
 
 mod chebyshev;
+pub(crate) mod conditions;
 mod creep;
 mod dense;
+mod dormand_prince;
 mod estimates;
 mod flow;
 mod landing;
 mod memory;
-mod metriplectic;
-mod referred_rise;
+mod refused;
 mod rest;
+mod spectrum;
+mod stage;
 mod step;
 mod tableau;
 
@@ -61,14 +64,15 @@ use metriplectic_dynamics::SecondLaw;
 pub use flow::{Projected, ProjectionError, StageFlow, Target};
 pub use memory::ExplicitMemory;
 use memory::MemoryOf;
-pub use metriplectic::LawJets;
 
-use crate::method::{
-    Control, Element, LimitingSites, Method, Promises, Refusal, StepEnds, StepStart, Taken,
+use crate::step::{
+    Control, Element, LimitingSites, MethodError, Promises, Refusal, StepEnds, StepError,
+    StepStart, Stepper, Taken,
 };
-use crate::step_error::StepError;
 use chebyshev::CHEBYSHEV;
-use tableau::{EIGHT, FIVE, Tableau};
+use dormand_prince::{EIGHT, FIVE};
+
+pub use tableau::{Row, Tableau, TableauError};
 
 /// The method of Dormand and Prince of order 8, with both laws exact: for high accuracy, and for smooth motions at
 /// any accuracy.
@@ -155,25 +159,94 @@ pub struct DormandPrince5;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct RungeKuttaChebyshev;
 
-macro_rules! method {
-    ($name:ident, $tableau:expr, $control:expr) => {
-        impl $name {
-            const TABLEAU: &'static Tableau = &$tableau;
-        }
+/// An explicit Runge-Kutta method with coefficients of your own, with both laws exact.
+///
+/// ```
+/// use metriplectic_dynamics::System;
+/// use metriplectic_fields::Real;
+/// use metriplectic_integrators::{ExplicitRungeKutta, Method, Span, Tableau};
+/// use metriplectic_manifolds::LieDual;
+/// use nalgebra::Vector3;
+/// # fn main() -> Result<(), metriplectic_integrators::Error> {
+/// // Kutta's method of order 3 (1901).
+/// const KUTTA: Tableau = Tableau::new(
+///     "Kutta3",
+///     3,
+///     &[&[(0, 0.5)], &[(0, -1.0), (1, 2.0)]],
+///     &[(0, 1.0 / 6.0), (1, 2.0 / 3.0), (2, 1.0 / 6.0)],
+/// );
+/// let body = System::on(LieDual::so3())
+///     .energy(|p: &Vector3<Real>| p.x * p.x * 0.5 + p.y * p.y + p.z * p.z * 1.5)
+///     .entropy(|p: &Vector3<Real>| p.norm_squared() * 0.5)
+///     .build()?;
+/// let kutta = ExplicitRungeKutta::new(&KUTTA);
+/// let run = kutta.run(&body, Vector3::new(0.4, 0.5, 0.3), Span::until(50.0).tolerance(1e-4))?;
+/// assert!(run.certificate().keeps_energy() && run.certificate().keeps_entropy());
+/// # Ok(())
+/// # }
+/// ```
+#[derive(Clone, Copy, Debug)]
+pub struct ExplicitRungeKutta {
+    tableau: &'static Tableau,
+}
 
-        impl<F: StageFlow> Method<F> for $name {
+impl ExplicitRungeKutta {
+    /// The method of a tableau. A run refuses a tableau whose rows name stages that are not known, or whose weights miss
+    /// their order, with the [`TableauError`] in [`RunError::Method`](crate::RunError::Method).
+    pub const fn new(tableau: &'static Tableau) -> Self {
+        Self { tableau }
+    }
+
+    /// Its coefficients.
+    pub const fn tableau(&self) -> &'static Tableau {
+        self.tableau
+    }
+}
+
+impl DormandPrince8 {
+    /// The coefficients.
+    pub const TABLEAU: &'static Tableau = &EIGHT;
+
+    const fn tableau(self) -> &'static Tableau {
+        Self::TABLEAU
+    }
+}
+
+impl DormandPrince5 {
+    /// The coefficients.
+    pub const TABLEAU: &'static Tableau = &FIVE;
+
+    const fn tableau(self) -> &'static Tableau {
+        Self::TABLEAU
+    }
+}
+
+impl RungeKuttaChebyshev {
+    const fn tableau(self) -> &'static Tableau {
+        &CHEBYSHEV
+    }
+}
+
+macro_rules! method {
+    ($name:ident, $check:expr) => {
+        impl<F: StageFlow> Stepper<F> for $name {
             type Memory = MemoryOf<F>;
 
             fn name(&self) -> String {
-                stringify!($name).to_owned()
+                self.tableau().name.to_owned()
             }
 
             fn order(&self) -> u32 {
-                Self::TABLEAU.order
+                self.tableau().order
             }
 
             fn control(&self) -> Control {
-                $control
+                self.tableau().control
+            }
+
+            fn check(&self, follows_tolerance: bool) -> Result<(), MethodError> {
+                let check: fn(&$name, bool) -> Result<(), TableauError> = $check;
+                check(self, follows_tolerance).map_err(MethodError::new)
             }
 
             fn promises(&self, flow: &F) -> Promises {
@@ -187,7 +260,7 @@ macro_rules! method {
                 h: f64,
                 memory: &mut MemoryOf<F>,
             ) -> Result<Taken<F>, StepError> {
-                step::with_halves(Self::TABLEAU, flow, start, h, memory)
+                step::with_halves(self.tableau(), flow, start, h, memory)
             }
 
             #[inline]
@@ -198,7 +271,7 @@ macro_rules! method {
                 h: f64,
                 memory: &mut MemoryOf<F>,
             ) -> Result<Taken<F>, Refusal> {
-                step::attempt(Self::TABLEAU, flow, start, h, memory)
+                step::attempt(self.tableau(), flow, start, h, memory)
             }
 
             fn error(
@@ -208,7 +281,7 @@ macro_rules! method {
                 memory: &MemoryOf<F>,
                 norm: impl Fn(&F::Vector) -> f64,
             ) -> Option<f64> {
-                estimates::error(Self::TABLEAU, flow, step, memory, norm)
+                estimates::error(self.tableau(), flow, step, memory, norm)
             }
 
             fn limiting_sites(
@@ -218,7 +291,7 @@ macro_rules! method {
                 memory: &MemoryOf<F>,
                 allowed: &F::Vector,
             ) -> LimitingSites {
-                estimates::limiting_sites(Self::TABLEAU, flow, step, memory, allowed)
+                estimates::limiting_sites(self.tableau(), flow, step, memory, allowed)
             }
 
             fn between(
@@ -229,37 +302,13 @@ macro_rules! method {
                 theta: f64,
             ) -> Option<Element<F>> {
                 let promises = self.promises(flow);
-                dense::between(Self::TABLEAU, flow, step, promises, memory, theta)
+                dense::between(self.tableau(), flow, step, promises, memory, theta)
             }
         }
     };
 }
 
-method!(
-    DormandPrince8,
-    EIGHT,
-    Control {
-        power: 1.0,
-        alpha: 1.0 / 8.0,
-        beta: 0.0,
-        rejected: 1.0 / 8.0,
-        ratios: [1.0 / 3.0, 6.0]
-    }
-);
-method!(
-    DormandPrince5,
-    FIVE,
-    Control { power: 1.0, alpha: 0.17, beta: 0.04, rejected: 0.2, ratios: [0.2, 10.0] }
-);
-// The PI controller of order 2, by which the error at the end is proportional to the tolerance.
-method!(
-    RungeKuttaChebyshev,
-    CHEBYSHEV,
-    Control {
-        power: 1.5,
-        alpha: 0.7 / 3.0,
-        beta: 0.4 / 3.0,
-        rejected: 1.0 / 3.0,
-        ratios: [0.2, 5.0]
-    }
-);
+method!(DormandPrince8, |_, _| Ok(()));
+method!(DormandPrince5, |_, _| Ok(()));
+method!(RungeKuttaChebyshev, |_, _| Ok(()));
+method!(ExplicitRungeKutta, |method, follows_tolerance| method.tableau.check(follows_tolerance));

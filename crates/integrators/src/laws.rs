@@ -7,11 +7,15 @@ use metriplectic_fields::{
 use metriplectic_manifolds::{Manifold, Retraction, Riemannian, StepPath};
 
 use crate::discrete_gradient::{DiscreteGradient, along as along_path};
-use crate::method::{Element, Flow, Method, StateSpace as _, StepStart};
-use crate::midpoint::{Dim, MidpointMemory, Scheme};
+use crate::explicit::Tableau;
+use crate::explicit::conditions::Conditions;
+use crate::midpoint::{MidpointMemory, Scheme};
 use crate::round_off::bound::{of_a_law, of_an_increment, size_of_terms};
-use crate::run::span::{Schedule, Span};
-use crate::run::trajectory::State;
+use crate::run::method::Method;
+use crate::run::schedule::Schedule;
+use crate::run::span::Span;
+use crate::run::state::State;
+use crate::step::{Dim, Element, Flow, StateSpace as _, StepStart, Stepper};
 
 /// Checks a discrete gradient of `f` on the path of `u` from `x`:
 ///
@@ -130,8 +134,8 @@ where
     Ok(())
 }
 
-/// Checks a method from `x` in steps of size `h`: 1. its [order](Method::order) is the slope of its error, from
-/// runs of 32 steps and of twice and four times as many; 2. what it [promises](Method::promises) holds on these
+/// Checks a method from `x` in steps of size `h`: 1. its [order](Stepper::order) is the slope of its error, from
+/// runs of 32 steps and of twice and four times as many; 2. what it [promises](Stepper::promises) holds on these
 /// steps; 3. a run that is resumed from a checkpoint is the same run, bit for bit.
 ///
 /// # Errors
@@ -178,6 +182,36 @@ pub fn method<F: Flow, M: Method<F> + Clone>(
         |x: &Element<F>| F::Space::numbers(x).into_iter().map(f64::to_bits).collect::<Vec<_>>();
     let differs = bits(&whole.last().point) != bits(&resumed.last().point);
     BrokenLaw::unless("a resumed run is the same run", f64::from(u8::from(differs)), 0.0)
+}
+
+/// Checks the coefficients of an explicit Runge-Kutta method by the conditions of order, one for each rooted tree:
+///
+/// 1. the weights of the end have the [order](Tableau::order) of the method;
+/// 2. an error vanishes up to its order, and not in the next one;
+/// 3. a dense output has the order of the method less one.
+///
+/// # Errors
+///
+/// The first law that is broken. Its size is the largest residual of a condition, relative to its terms.
+pub fn tableau(tableau: &Tableau) -> Result<(), BrokenLaw> {
+    let faults = usize::from(tableau.has_a_fault());
+    BrokenLaw::unless("a row names stages that are known", faults as f64, 0.0)?;
+    let orders = tableau.orders_of_errors();
+    let most = orders.iter().map(|order| order + 1).fold(tableau.order(), u32::max);
+    let conditions = Conditions::of(tableau, most);
+    let round_off = 64.0 * f64::EPSILON;
+    BrokenLaw::unless("the end has the order of the method", conditions.of_end(), round_off)?;
+    for which in 0..orders.len() {
+        let [off, own] = conditions.of_error(which);
+        BrokenLaw::unless("an error vanishes up to its order", off, round_off)?;
+        let missing = if own > 1e3 * round_off { 0.0 } else { 1.0 };
+        BrokenLaw::unless("an error does not vanish in the next order", missing, 0.0)?;
+    }
+    if tableau.has_dense_output() {
+        let off = conditions.inside(tableau.order() - 1);
+        BrokenLaw::unless("the dense output has the order of the method less one", off, round_off)?;
+    }
+    Ok(())
 }
 
 /// The same system in other units: the numbers of its entries, times, energies and entropies are

@@ -1,19 +1,22 @@
 //! How a metriplectic system moves in discrete time, with the first law kept to round-off.
 //!
-//! | module | what it holds | knows |
+//! Each module is a room: a file in it uses files of its own room and of rooms above it in this table.
+//!
+//! | room | what it holds | knows |
 //! |---|---|---|
-//! | [`step_error`] | [`StepError`]: what can go wrong in a step | |
-//! | [`run`] | [`Span`], [`Until`], [`Watch`], [`Steps`], [`Trajectory`], [`Event`], [`Certificate`], [`Checkpoint`], [`Observables`]: what a user does with a run of any method | [`method`] |
-//! | [`method`] | [`Flow`] and [`Method`]: what a run knows of a system and of a method | |
-//! | [`newton`] | [`Newton`]: the solver of every implicit step | |
-//! | [`discrete_gradient`] | [`DiscreteGradient`]: [`Gonzalez`], [`MeanValue`], [`ItohAbe`], [`SymmetricItohAbe`] | |
-//! | [`round_off`] | covectors, laws and positions that are safe against round-off | |
-//! | [`midpoint`] | [`Scheme`]: the method of the paper, its equation and its fallbacks | [`newton`], [`discrete_gradient`], [`round_off`] |
-//! | [`explicit`] | [`DormandPrince8`], [`DormandPrince5`], [`RungeKuttaChebyshev`]: explicit methods, and then back onto the laws | [`method`] |
-//! | [`collocation`] | [`Gauss`], [`Radau`]: methods with stages, of order `2s` and `2s − 1` | [`method`], [`round_off`] |
-//! | [`attitude`] | [`Attitude`]: where a body points along a run of its angular momentum | [`run`] |
-//! | [`laws`] | what a step and a method promise, and the functions that check it | |
-//! | [`error`](mod@error) | [`Error`], [`RunError`], [`FlowError`] | |
+//! | [`step`] | [`Flow`] and [`Stepper`]: what a run knows of a system and of a method; [`StepError`] | |
+//! | [`round_off`] | covectors, laws and positions that are safe against round-off | [`step`] |
+//! | [`discrete_gradient`] | [`DiscreteGradient`]: [`Gonzalez`], [`MeanValue`], [`ItohAbe`], [`SymmetricItohAbe`] | [`round_off`] |
+//! | [`newton`] | [`Newton`]: the solver of an implicit midpoint step | |
+//! | [`midpoint`] | [`Scheme`]: the method of the paper, its equation and its fallbacks | [`step`], [`round_off`], [`discrete_gradient`], [`newton`] |
+//! | [`collocation`] | [`Gauss`], [`Radau`]: methods with stages, of order `2s` and `2s − 1` | [`step`], [`round_off`] |
+//! | [`explicit`] | [`DormandPrince8`], [`DormandPrince5`], [`RungeKuttaChebyshev`]: explicit methods, and then back onto the laws | [`step`], [`round_off`] |
+//! | [`run`] | [`Method`], [`Span`], [`Until`], [`Watch`], [`Steps`], [`Trajectory`], [`Event`], [`Certificate`], [`Checkpoint`], [`Observables`]: what a user does with a run of any method | [`step`], [`round_off`] |
+//! | [`system`] | every metriplectic system is a flow | [`step`], [`round_off`], [`explicit`] |
+//! | [`Run`] | runs with the default scheme of a retraction | [`midpoint`], [`run`] |
+//! | [`attitude`] | [`Attitude`]: where a body points along a run of its angular momentum | [`run`], [`round_off`] |
+//! | [`laws`] | what a step and a method promise, and the functions that check it | all of them |
+//! | [`error`](mod@error) | [`Error`]: everything that can go wrong | [`step`], [`run`], [`attitude`] |
 //!
 //! # What a later version may add
 //!
@@ -26,41 +29,44 @@
 
 pub mod attitude;
 pub mod collocation;
-mod digits;
+mod default_scheme;
 pub mod discrete_gradient;
 pub mod error;
 pub mod explicit;
 pub mod laws;
-pub mod method;
 pub mod midpoint;
 pub mod newton;
 pub mod round_off;
 pub mod run;
-pub mod step_error;
-mod step_failure;
+pub mod step;
+pub mod system;
 
 pub use attitude::{Attitude, AttitudeError};
 pub use collocation::{Gauss, Radau, StageMemory};
+pub use default_scheme::Run;
 pub use discrete_gradient::{DiscreteGradient, Gonzalez, ItohAbe, MeanValue, SymmetricItohAbe};
 pub use error::{Error, FlowError, RunError};
-pub use explicit::{DormandPrince5, DormandPrince8, RungeKuttaChebyshev, StageFlow};
-pub use method::{
-    Components, Control, Effort, Element, EntropyStep, Evidence, Flow, Laws, LimitingSites, Memory,
-    Method, Promises, Recheck, Refusal, StageLaws, StateSpace, StepEnds, StepStart, Taken, Vector,
+pub use explicit::{
+    DormandPrince5, DormandPrince8, ExplicitRungeKutta, Row, RungeKuttaChebyshev, StageFlow,
+    Tableau, TableauError,
 };
-pub use midpoint::{Residual, Run, Scheme};
+pub use midpoint::{Residual, Scheme};
 pub use newton::{Equation, Iterate, Linearised, Newton, Root, Rounding};
 pub use round_off::stable_gradient::StableGradient;
 pub use run::certificate::{
     Certificate, InvariantBalance, MisjudgedSize, ProjectedSteps, StageBalance,
 };
-pub use run::checkpoint::{Checkpoint, ResumeError, Saved};
+pub use run::checkpoint::{Checkpoint, ResumeError};
 pub use run::event::Event;
 pub use run::observables::{Csv, Npy, Observables, TableError};
-pub use run::scales::Scales;
-pub use run::span::{Schedule, Span, SpanError};
+pub use run::span::Span;
 pub use run::steps::Steps;
-pub use run::trajectory::{Ending, State, Trajectory};
+pub use run::trajectory::Trajectory;
 pub use run::until::Until;
 pub use run::watch::{Watch, Watched};
-pub use step_error::StepError;
+pub use run::{Ending, Method, Schedule, SpanError, State};
+pub use step::{
+    Components, Control, Effort, Element, EntropyStep, Evidence, Flow, Laws, LimitingSites, Memory,
+    MethodError, Promises, Recheck, Refusal, RestoreError, Saved, Scales, StageLaws, StateSpace,
+    StepEnds, StepError, StepStart, Stepper, Taken, Vector,
+};

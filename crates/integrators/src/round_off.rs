@@ -4,12 +4,10 @@
 //! |---|---|---|
 //! | [`stable_gradient`] | the covectors of a step | an integral beside a difference of nearly equal values |
 //! | `drift` | the laws over millions of steps | a number that is added to `ΔF` |
-//! | `level` | the last digits of the laws in a step | a correction of the root, or of its end |
 //! | `compensation` | steps shorter than the last digit of the position | a compensated sum |
 //! | `bound` | all of these | the sizes to which round-off is relative |
 
 pub(crate) mod bound;
 pub(crate) mod compensation;
 pub(crate) mod drift;
-pub(crate) mod level;
 pub mod stable_gradient;

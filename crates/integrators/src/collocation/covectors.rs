@@ -17,13 +17,15 @@
 //! it is estimated by `|δ| (|δ|/c)^{2/s}`. Where `δ` changes its sign this is too small; the solver compares the laws
 //! at the end, and takes the difference alone if they are off.
 
-use metriplectic_dynamics::velocity::Gradient;
+use metriplectic_dynamics::Metriplectic;
+use metriplectic_dynamics::velocity::{Covectors, Gradient};
 use metriplectic_fields::{Column, Dimension, Real, ScalarField, Space, Vector, power_of_two};
 use metriplectic_manifolds::{InnerProduct, Manifold, Riemannian};
 
 use super::chart::StepChart;
 use super::tableau::{STAGES, Tableau};
 use crate::round_off::stable_gradient::short;
+use crate::step::Dim;
 
 /// A vector for each stage.
 pub(super) type Stages<V> = [V; STAGES];
@@ -62,6 +64,22 @@ pub(super) struct StageCovectors<V> {
     pub(super) left: f64,
     /// The round-off of `δ`.
     pub(super) left_round_off: f64,
+}
+
+/// The covectors of all laws at the stages.
+pub(super) type StageCovectorsOf<Y> =
+    Covectors<Dim<Y>, StageCovectors<Vector<<Y as Metriplectic>::Manifold>>>;
+
+/// The covectors at one stage.
+pub(super) fn at_stage<Y: Metriplectic>(
+    w: &StageCovectorsOf<Y>,
+    i: usize,
+) -> Covectors<Dim<Y>, Vector<Y::Manifold>> {
+    Covectors {
+        energy: w.energy.w[i],
+        entropy: w.entropy.w[i],
+        invariants: Dim::<Y>::array(|a| w.invariants[a].map(|(kind, l)| (kind, l.w[i]))),
+    }
 }
 
 /// The start of a law: its value, and what is taken back of its error.

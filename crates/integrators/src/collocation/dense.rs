@@ -1,19 +1,17 @@
 //! States inside a step with stages, and the error of a step.
 
-use metriplectic_dynamics::Metriplectic;
+use metriplectic_dynamics::{Metriplectic, system::Point};
 use metriplectic_fields::{Column, Space as _, Vector};
 
-use super::PointOf;
 use super::chart::in_chart_at;
 use super::covectors::combined;
 use super::equation::StageEquation;
 use super::fallbacks;
 use super::memory::{LastStep, StageMemory};
 use super::tableau::Tableau;
-use crate::method::{Components, Effort, Flow as _, Promises, StepEnds};
-use crate::midpoint::Dim;
-use crate::run::dense::{self, cubic, limited};
-use crate::step_failure::Fallbacks;
+use crate::step::dense::{self, cubic, limited};
+use crate::step::failure::Fallbacks;
+use crate::step::{Components, Dim, Effort, Flow as _, Promises, StepEnds};
 
 /// The state at the fraction `θ` of a step: a step of size `θh`, guessed by the polynomial of the whole one, and moved
 /// onto the laws of the run with an entropy that does not fall from one fraction to a later one.
@@ -24,7 +22,7 @@ pub(super) fn between<Y: Metriplectic>(
     step: &StepEnds<'_, Y>,
     memory: &StageMemory<Dim<Y>>,
     theta: f64,
-) -> Option<PointOf<Y>> {
+) -> Option<Point<Y>> {
     if theta <= 0.0 || step.x == step.end {
         return Some(step.x.clone());
     }
@@ -49,7 +47,7 @@ fn part<Y: Metriplectic>(
     step: &StepEnds<'_, Y>,
     last: &LastStep<Dim<Y>>,
     theta: f64,
-) -> Option<PointOf<Y>> {
+) -> Option<Point<Y>> {
     let (x, h, values) = (step.x, theta * step.h, *step.values[0]);
     let equation = StageEquation::new(tableau, system, x, values, h);
     let guess = std::array::from_fn(|i| {
@@ -152,7 +150,7 @@ pub(super) fn error<Y: Metriplectic>(
     let chart = equation.chart(k)?;
     let polynomial = equation.polynomial(&chart, k);
     let zero = Vector::<Y::Manifold>::zero();
-    let defect = |tau: f64, at: &PointOf<Y>| {
+    let defect = |tau: f64, at: &Point<Y>| {
         let q = chart.d * (tau - 0.5);
         let slope = polynomial.combined(&tableau.velocity(tau));
         let there = in_chart_at::<Y::Manifold>(at, &chart.z, &q, &slope);

@@ -18,24 +18,19 @@ use metriplectic_manifolds::Manifold;
 use super::chart::{StepChart, in_chart_at};
 use super::covectors::{
     AlongStages, Correction, LawStart, OfInvariants, StageCovectors, StagePoints, Stages,
-    StepPolynomial, all_finite, combined,
+    StepPolynomial, all_finite, at_stage, combined,
 };
 use super::heat::{self, HeatStart};
 use super::tableau::{STAGES, Tableau};
-use crate::method::Laws;
-use crate::midpoint::{Dim, Numbers};
 use crate::round_off::bound::ROUNDED;
-use crate::round_off::drift::{self, DriftCorrection};
+use crate::round_off::drift;
+use crate::step::{Dim, DriftCorrection, Laws, Numbers};
 
 /// The velocities of the stages, in the frame at the start of the step.
 pub(super) type Unknowns<Y> = Stages<Vector<<Y as Metriplectic>::Manifold>>;
 
 /// Units of round-off up to which a velocity that changes the energy is one that has lost digits.
 const ROUNDINGS: f64 = 16.0;
-
-/// The covectors of all laws at the stages.
-pub(super) type StageCovectorsOf<Y> =
-    Covectors<Dim<Y>, StageCovectors<Vector<<Y as Metriplectic>::Manifold>>>;
 
 /// The equation of a step.
 #[derive(Debug)]
@@ -304,18 +299,6 @@ impl<'a, Y: Metriplectic> StageEquation<'a, Y> {
         let start = |a: usize| LawStart { value: values.invariants[a], drift: drift.invariants[a] };
         let mut invariants = OfInvariants { along: &along, start, seen: 0 };
         Covectors::new(laws, system.invariants(), &mut invariants)
-    }
-}
-
-/// The covectors at one stage.
-pub(super) fn at_stage<Y: Metriplectic>(
-    w: &StageCovectorsOf<Y>,
-    i: usize,
-) -> Covectors<Dim<Y>, Vector<Y::Manifold>> {
-    Covectors {
-        energy: w.energy.w[i],
-        entropy: w.entropy.w[i],
-        invariants: Dim::<Y>::array(|a| w.invariants[a].map(|(kind, l)| (kind, l.w[i]))),
     }
 }
 

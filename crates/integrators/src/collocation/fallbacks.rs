@@ -7,9 +7,9 @@ use metriplectic_fields::{Column, Vector};
 use super::equation::{StageEquation, Unknowns};
 use super::solve::{Budget, Derivatives, Solved, Unsolved};
 use super::tableau::STAGES;
-use crate::method::Effort;
 use crate::round_off::drift;
-use crate::step_failure::{Cause, Fallbacks};
+use crate::step::Effort;
+use crate::step::failure::{Cause, Fallbacks};
 
 /// A step that was not taken.
 #[derive(Clone, Copy, Debug)]

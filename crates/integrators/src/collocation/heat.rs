@@ -35,10 +35,9 @@ use metriplectic_fields::{ChartPoint, Column, Dimension, Vector};
 use metriplectic_manifolds::{InnerProduct, Manifold, Riemannian};
 
 use super::chart::{StepChart, in_chart_at};
-use super::covectors::{StagePoints, Stages};
-use super::equation::{StageCovectorsOf, at_stage};
+use super::covectors::{StageCovectorsOf, StagePoints, Stages, at_stage};
 use super::tableau::{STAGES, Tableau};
-use crate::midpoint::Dim;
+use crate::step::Dim;
 
 /// What is added to the stages.
 #[derive(Clone, Copy, Debug)]

@@ -21,8 +21,8 @@ use metriplectic_manifolds::Manifold;
 use super::covectors::{Stages, combined};
 use super::equation::{Evaluated, Left, StageEquation, Unknowns};
 use super::tableau::{STAGES, Tableau};
-use crate::midpoint::Dim;
 use crate::round_off::bound::ROUNDED;
+use crate::step::Dim;
 
 /// The linear part of the equation of a step.
 #[derive(Clone, Copy, Debug)]

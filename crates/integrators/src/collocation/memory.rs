@@ -6,9 +6,8 @@ use metriplectic_manifolds::Manifold;
 use super::chart::StepChart;
 use super::covectors::{Stages, combined};
 use super::tableau::{STAGES, Tableau};
-use crate::method::Memory;
 use crate::round_off::compensation::Compensation;
-use crate::run::checkpoint::{ResumeError, Saved};
+use crate::step::{Memory, RestoreError, Saved};
 
 /// What [`Gauss`](crate::Gauss) and [`Radau`](crate::Radau) keep from one step to the next: the velocities of the
 /// stages, whose polynomial is continued, and the digits that rounding has lost of the position.
@@ -107,8 +106,8 @@ impl<N: Dimension> Memory for StageMemory<N> {
         }
     }
 
-    fn restore(saved: &Saved) -> Result<Self, ResumeError> {
-        let column = |name| -> Result<Option<N::Vector<f64>>, ResumeError> {
+    fn restore(saved: &Saved) -> Result<Self, RestoreError> {
+        let column = |name| -> Result<Option<N::Vector<f64>>, RestoreError> {
             let list = saved.get(name, N::LEN)?;
             Ok(list.map(|list| N::Vector::<f64>::from_index(|i| list[i])))
         };
@@ -123,7 +122,7 @@ impl<N: Dimension> Memory for StageMemory<N> {
             Some(h) if stages > 0 && h != 0.0 => Some(Continued { k, stages, h }),
             Some(value) => {
                 let what = "size of the step of the stages";
-                return Err(ResumeError::Damaged { what, value });
+                return Err(RestoreError::Damaged { what, value });
             }
             None => None,
         };

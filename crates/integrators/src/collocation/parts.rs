@@ -4,20 +4,17 @@
 //! start has to be divided: a transient of the rate `λ` is over after a few parts of the size `1/λ`, and then each part
 //! may be as long as all before it. There are about `log₂ hλ` of them.
 
-use metriplectic_dynamics::Metriplectic;
+use metriplectic_dynamics::{Metriplectic, system::Point};
 use metriplectic_fields::{Column, Vector};
 
-use super::PointOf;
 use super::equation::StageEquation;
 use super::fallbacks::StepFailure;
 use super::linear::Linear;
 use super::memory::StageMemory;
 use super::step::try_step;
 use super::tableau::{STAGES, Tableau};
-use crate::method::{Effort, Evidence, Laws, Taken};
-use crate::midpoint::{Dim, Start, dependent_invariant};
-use crate::step_error::StepError;
-use crate::step_failure::{Cause, Fallbacks};
+use crate::step::failure::{Cause, Fallbacks};
+use crate::step::{Dim, Effort, Evidence, Flow as _, Laws, Start, StepError, Taken};
 
 /// The rate `|K'|` times the size of the first part, where friction is stiff.
 const FIRST: f64 = 4.0;
@@ -71,7 +68,7 @@ struct Parts<'a, Y: Metriplectic> {
 struct Failed<Y: Metriplectic> {
     failure: StepFailure,
     /// Where it starts.
-    x: PointOf<Y>,
+    x: Point<Y>,
     /// Its size.
     h: f64,
 }
@@ -228,7 +225,7 @@ impl<Y: Metriplectic> Parts<'_, Y> {
             let damps = self.tableau.one_sided;
             return StepError::StiffFriction { time, h, stiffness, residual, tried, damps };
         }
-        match (failed.failure.cause, dependent_invariant(self.system, &failed.x)) {
+        match (failed.failure.cause, self.system.dependent_invariant(&failed.x)) {
             (Cause::Edge, _) => StepError::OutOfDomain { time, h, tried },
             (_, Some((index, fraction))) => {
                 let change = start.accumulated_error.invariants[index].abs();

@@ -7,8 +7,7 @@ use super::chart::StepChart;
 use super::equation::{Evaluated, StageEquation, Unknowns};
 use super::full::Full;
 use super::linear::Linear;
-use crate::method::{Flow as _, Laws};
-use crate::midpoint::{Dim, Numbers};
+use crate::step::{Dim, Flow as _, Laws, Numbers};
 
 /// A solved step.
 pub(super) struct Solved<Y: Metriplectic> {

@@ -9,12 +9,13 @@ use super::fallbacks::{self, StepFailure};
 use super::memory::{LastStep, StageMemory};
 use super::solve::Solved;
 use super::tableau::Tableau;
-use crate::method::{Effort, Evidence, Flow as _, Laws, StageLaws, StepStart, Taken};
-use crate::midpoint::{Dim, Numbers, Start};
 use crate::round_off::bound::{ROUNDED, breaks_first_law, sizes_on_a_step};
 use crate::round_off::compensation::Displaced;
 use crate::round_off::drift;
-use crate::step_failure::{Cause, Fallbacks};
+use crate::step::failure::{Cause, Fallbacks};
+use crate::step::{
+    Dim, Effort, Evidence, Flow as _, Laws, Numbers, StageLaws, Start, StepStart, Taken,
+};
 
 /// The growth of the entropy, relative to its value, below which a step of friction is round-off.
 const NOTHING: f64 = 1e-6 * f64::EPSILON;

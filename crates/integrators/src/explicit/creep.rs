@@ -6,8 +6,8 @@
 
 use super::flow::StageFlow;
 use super::rest::sizes;
-use crate::method::{StepStart, Vector};
 use crate::round_off::bound::ROUNDED;
+use crate::step::{StepStart, Vector};
 
 /// Steps between two looks at the energy.
 pub(super) const PATIENCE: u32 = 64;

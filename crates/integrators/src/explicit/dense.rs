@@ -7,11 +7,11 @@
 //! is then moved onto the laws.
 
 use super::flow::StageFlow;
-use super::memory::{LastStep, MemoryOf, combined, produced};
-use super::step::stage;
+use super::memory::{LastStep, MemoryOf};
+use super::stage::{combined, produced, stage};
 use super::tableau::Tableau;
-use crate::method::{Element, Promises, StepEnds, Vector};
-use crate::run::dense;
+use crate::step::dense;
+use crate::step::{Element, Promises, StepEnds, Vector};
 
 /// The state at the fraction `θ` of a step.
 pub(super) fn between<F: StageFlow>(
@@ -35,7 +35,7 @@ pub(super) fn between<F: StageFlow>(
     // A step that was taken in parts has no stages.
     let Some(last) = known else { return dense::between(flow, step, promises, theta) };
     let (h, line) = (step.h, last.end.map(|q| theta * q));
-    let ends = [&last.stages[0], &last.stages[tableau.stages.len() + 1]];
+    let ends = [&last.stages[0], &last.stages[tableau.rows().len() + 1]];
     let rows = tableau
         .dense
         .iter()
@@ -71,7 +71,7 @@ fn more_stages<F: StageFlow>(
     last: &mut LastStep<F::Vector>,
 ) -> Option<()> {
     for row in tableau.more_stages {
-        if last.known == tableau.stages.len() + 2 + tableau.more_stages.len() {
+        if last.known == tableau.rows().len() + 2 + tableau.more_stages.len() {
             break;
         }
         let q = combined(step.h, row, &last.stages);

@@ -1,11 +1,13 @@
 //! What the stages of a step tell of its error and of its stability.
 
-use super::chebyshev::{self, Spectrum};
+use super::chebyshev;
 use super::flow::StageFlow;
-use super::memory::{LastStep, MemoryOf, combined};
-use super::tableau::Tableau;
-use crate::method::{Element, LimitingSites, StepEnds, Vector};
-use crate::run::scales::relative;
+use super::memory::{LastStep, MemoryOf};
+use super::spectrum::Spectrum;
+use super::stage::combined;
+use super::tableau::{ESTIMATED, Stages, Tableau};
+use crate::step::scales::relative;
+use crate::step::{Element, LimitingSites, StepEnds, Vector};
 
 /// Whether the rates between the last stage and the end differ by as much as at the edge of the region of
 /// stability: `h |k_e − k_s| / |q_e − q_s|` of Hairer, Wanner (Solving ODEs II, §IV.2), relative to the sizes of
@@ -20,7 +22,7 @@ pub(super) fn is_at_the_edge<F: StageFlow>(
 ) -> bool {
     let sizes = flow.sizes(x);
     let one = sizes.map(|_| 1.0);
-    let before = [&last.before, &last.stages[tableau.stages.len()].velocity];
+    let before = [&last.before, &last.stages[tableau.rows().len()].velocity];
     // One array at a time, because a large system has no room for more.
     let norm = |end: &F::Vector, before: &F::Vector, factor: f64| {
         let ratios =
@@ -46,8 +48,14 @@ pub(super) fn error<F: StageFlow>(
     let Some(last) = memory.last.as_ref() else {
         return Some(norm(&flow.local_error(step.x, step.end, h)?));
     };
-    if tableau.stages.is_empty() {
-        return Some(norm(&chebyshev::error(last, h)));
+    match (tableau.stages, tableau.errors) {
+        (Stages::Chebyshev, _) => return Some(norm(&chebyshev::error(last, h))),
+        // The estimate of the flow has an error of order 5.
+        (Stages::Rows(_), [[], _]) if tableau.order <= ESTIMATED => {
+            return Some(norm(&flow.local_error(step.x, step.end, h)?));
+        }
+        (Stages::Rows(_), [[], _]) => return None,
+        (Stages::Rows(_), _) => {}
     }
     let [fifth, third] = tableau.errors.map(|row| norm(&combined(h, row, &last.stages)));
     // Hairer's e₅²/√(e₅² + e₃²/100) is of the order of the method; a method with one error has that.
@@ -69,13 +77,16 @@ pub(super) fn limiting_sites<F: StageFlow>(
     let Some(last) = memory.last.as_ref() else {
         return LimitingSites::new(largest(flow.local_error(x, step.end, h)), None);
     };
-    if tableau.stages.is_empty() {
+    if let Stages::Chebyshev = tableau.stages {
         let stiffest = |found: &Spectrum<_>| found.stiffest_site(&flow.sizes(x));
         let stiffness = memory.spectrum.as_ref().and_then(stiffest);
         return LimitingSites::new(largest(Some(chebyshev::error(last, h))), stiffness);
     }
-    let error = largest(Some(combined(h, tableau.errors[0], &last.stages)));
-    let count = tableau.stages.len();
+    let error = match tableau.errors {
+        [[], _] => flow.local_error(x, step.end, h),
+        [row, _] => Some(combined(h, row, &last.stages)),
+    };
+    let (error, count) = (largest(error), tableau.rows().len());
     let [before, rates] = [count, count + 1].map(|stage| &last.stages[stage].velocity);
     let stiffness = if is_at_the_edge(tableau, flow, x, h, last, rates) {
         let change = Vector::zip([rates, before], |[rates, before]| rates - before);

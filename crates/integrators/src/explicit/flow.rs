@@ -1,6 +1,6 @@
 //! What an explicit method needs of a system.
 
-use crate::method::{Element, Flow, Laws};
+use crate::step::{Element, Flow, Laws};
 
 /// A flow on which explicit methods run: it says the rates of a stage, and moves a state onto its laws. Every
 /// [`Metriplectic`](metriplectic_dynamics::Metriplectic) system is one.

@@ -3,10 +3,11 @@
 use metriplectic_dynamics::SecondLaw;
 
 use super::flow::{Projected, ProjectionError, StageFlow, Target};
-use super::memory::{LastStep, Produced, combined, produced};
-use super::step::Refused;
+use super::memory::{LastStep, Produced};
+use super::refused::Refused;
+use super::stage::{combined, produced};
 use super::tableau::Tableau;
-use crate::method::{Element, EntropyStep, Laws, StepStart, Vector};
+use crate::step::{Element, EntropyStep, Laws, StepStart, Vector};
 
 /// The fraction of the round-off of an increment by which the entropy may fall: less than what the certificate
 /// counts as a fall.
@@ -102,19 +103,14 @@ impl<F: StageFlow> Onto<'_, F> {
     /// velocity at the start takes its place.
     fn embedded_error(&self) -> Option<F::Vector> {
         let Self { tableau, flow, h, last, .. } = *self;
-        let [row, _] = tableau.errors;
-        let known = !row.is_empty() && row.iter().all(|&(stage, _)| stage < last.known);
-        (flow.weighs_errors() && known).then(|| combined(h, row, &last.stages))
+        let row = tableau.early_error;
+        (flow.weighs_errors() && !row.is_empty()).then(|| combined(h, row, &last.stages))
     }
 
     /// Whether the entropy that was produced may be aimed at.
     fn is_trusted(&self) -> bool {
         let Self { tableau, h, last, .. } = *self;
-        let doubt = if tableau.order == 8 {
-            (h * produced(tableau.errors[0], &last.stages)).abs()
-        } else {
-            0.0
-        };
+        let doubt = (h * produced(tableau.early_error, &last.stages)).abs();
         last.rise >= 0.0 && doubt <= 0.5 * last.rise
     }
 

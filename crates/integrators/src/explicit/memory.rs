@@ -1,13 +1,10 @@
 //! What an explicit method keeps from one step to the next.
 
-use super::chebyshev::Spectrum;
 use super::creep;
-use super::tableau::Row;
-use crate::method::{Flow, Memory, Vector};
-use crate::run::checkpoint::{ResumeError, Saved};
-
-/// The most stages of a step: those of order 8, its end, and three for its dense output.
-pub(super) const STAGES: usize = 16;
+use super::spectrum::Spectrum;
+use super::stage::Here;
+use super::tableau::STAGES;
+use crate::step::{Flow, Memory, RestoreError, Saved, Vector};
 
 /// What [`DormandPrince8`](crate::DormandPrince8) and [`DormandPrince5`](crate::DormandPrince5) keep from one step
 /// to the next: the sum of the entropy that was produced, and what is known at the state reached.
@@ -57,20 +54,6 @@ impl Produced {
         let rise = rise + self.lost;
         let sum = self.sum + rise;
         Self { sum, lost: rise - (sum - self.sum), ..self }
-    }
-}
-
-/// The motion at a state, or that of a stage in the chart at the start of its step.
-#[derive(Clone, Debug)]
-pub(super) struct Here<V> {
-    pub(super) velocity: V,
-    pub(super) production: f64,
-}
-
-impl<V: Vector> Here<V> {
-    /// As many at rest as there may be stages; `zero` is the velocity.
-    pub(super) fn at_rest(zero: &V) -> [Self; STAGES] {
-        std::array::from_fn(|_| Self { velocity: zero.clone(), production: 0.0 })
     }
 }
 
@@ -145,7 +128,7 @@ impl<V: Vector> Memory for ExplicitMemory<V> {
         }
     }
 
-    fn restore(saved: &Saved) -> Result<Self, ResumeError> {
+    fn restore(saved: &Saved) -> Result<Self, RestoreError> {
         let read = saved.list("compensation")?.unwrap_or_default();
         let mut memory = Self { read, ..Self::default() };
         if let Some(numbers) = saved.get("steps taken", 1)? {
@@ -167,22 +150,4 @@ impl<V: Vector> Memory for ExplicitMemory<V> {
         }
         Ok(memory)
     }
-}
-
-/// `h Σ_j w_j k_j` over the rates of the stages.
-#[inline]
-pub(super) fn combined<V: Vector>(h: f64, row: Row, stages: &[Here<V>; STAGES]) -> V {
-    if row.is_empty() {
-        return stages[0].velocity.zero();
-    }
-    V::combination(h, row.len(), |j| {
-        let (stage, w) = row[j];
-        (w, &stages[stage].velocity)
-    })
-}
-
-/// `Σ_j w_j σ_j` over the entropy production of the stages.
-#[inline]
-pub(super) fn produced<V>(row: Row, stages: &[Here<V>; STAGES]) -> f64 {
-    row.iter().fold(0.0, |sum, &(j, w)| sum + w * stages[j].production)
 }

@@ -10,8 +10,8 @@
 //! anything in each entry. A short step alone shows nothing: any state hardly moves in it.
 
 use super::flow::StageFlow;
-use super::step::stage;
-use crate::method::{StepStart, Vector};
+use super::stage::stage;
+use crate::step::{StepStart, Vector};
 
 /// A displacement, relative to the size of its entry, that hardly moves a state.
 const HARDLY: f64 = 1e-6;

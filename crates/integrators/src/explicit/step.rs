@@ -7,47 +7,20 @@ use super::creep;
 use super::estimates::is_at_the_edge;
 use super::flow::StageFlow;
 use super::landing::{Landed, Onto};
-use super::memory::{ExplicitMemory, Here, LastStep, MemoryOf, Produced, combined, produced};
+use super::memory::{ExplicitMemory, LastStep, MemoryOf, Produced};
+use super::refused::Refused;
 use super::rest::{self, is_hardly};
-use super::tableau::Tableau;
-use crate::method::{Effort, Element, EntropyStep, Evidence, Refusal, StepStart, Taken, Vector};
-use crate::step_error::StepError;
+use super::stage::{Here, combined, produced, stage};
+use super::tableau::{Stages, Tableau};
+use crate::step::{
+    Effort, Element, EntropyStep, Evidence, MethodError, Refusal, StepError, StepStart, Taken,
+    Vector,
+};
 
 /// Falls of the entropy in a row after which a state that hardly moves is held.
 const FALLS: u32 = 5;
 /// How often a step of a fixed size is halved.
 const HALVES: u32 = 12;
-/// Why a step is not taken.
-pub(super) enum Refused {
-    /// A stage is beyond the edge of the chart or the domain, or has no value; at a site, if the flow says which.
-    Outside(Option<usize>),
-    /// No state near by has the laws of the run.
-    Far,
-    /// The entropy would fall, where friction produces this much in the step.
-    Falls(f64),
-    /// No smaller step can be taken either.
-    Never(StepError),
-}
-
-impl Refused {
-    /// What becomes of a step of size `h` from `time`.
-    fn into_refusal(self, time: f64, h: f64) -> Refusal {
-        let tried = Effort::default();
-        let second_law = matches!(self, Self::Falls(_));
-        let error = match self {
-            Self::Outside(Some(site)) => Some(StepError::SiteOutOfDomain { time, h, site, tried }),
-            Self::Never(error) => Some(error),
-            _ => None,
-        };
-        Refusal { effort: tried, error, second_law }
-    }
-
-    /// A displacement leads out of the domain.
-    #[cold]
-    pub(super) fn outside<F: StageFlow>(flow: &F, x: &Element<F>, d: &F::Vector) -> Self {
-        Self::Outside(flow.site_outside(x, d))
-    }
-}
 
 /// Tries a step.
 #[inline]
@@ -131,16 +104,21 @@ fn try_step<F: StageFlow>(
     memory: &mut MemoryOf<F>,
 ) -> Result<Taken<F>, Refused> {
     let x = start.x;
+    if let Some(fault) = tableau.fault {
+        return Err(Refused::Never(StepError::Method {
+            time: start.time,
+            error: MethodError::new(fault),
+        }));
+    }
     // The stages of the step before it serve nobody any more.
     memory.last = None;
     let here = match memory.here.take() {
         Some(here) => here,
         None => here_at(flow, x, None).ok_or(Refused::Outside(None))?,
     };
-    let mut last = if tableau.stages.is_empty() {
-        chebyshev::stages(flow, x, h, here, memory)?
-    } else {
-        stages(tableau, flow, x, h, here)?
+    let mut last = match tableau.stages {
+        Stages::Chebyshev => chebyshev::stages(flow, x, h, here, memory)?,
+        Stages::Rows(_) => stages(tableau, flow, x, h, here)?,
     };
     let taken = finished(tableau, flow, start, h, &mut last, memory);
     if memory.here.is_some() {
@@ -272,29 +250,17 @@ fn stages<F: StageFlow>(
     let mut stages = Here::at_rest(&zero);
     stages[0] = here;
     let mut before = zero;
-    for (i, row) in tableau.stages.iter().enumerate() {
+    for (i, row) in tableau.rows().iter().enumerate() {
         before = combined(h, row, &stages);
         stages[i + 1] =
             stage(flow, x, &before).ok_or_else(|| Refused::outside(flow, x, &before))?;
     }
     let end = combined(h, tableau.end, &stages);
     let rise = h * produced(tableau.end, &stages);
-    for &stage in tableau.passed {
+    for stage in tableau.passed() {
         stages[stage].velocity = stages[0].velocity.zero();
     }
-    Ok(LastStep { stages, known: tableau.stages.len() + 1, before, end, rise })
-}
-
-/// The rates and the entropy production of a stage at the coordinates `q`.
-#[inline]
-pub(super) fn stage<F: StageFlow>(
-    flow: &F,
-    x: &Element<F>,
-    q: &F::Vector,
-) -> Option<Here<F::Vector>> {
-    let y = flow.stage(x, q)?;
-    let (v, production) = flow.motion(&y)?;
-    Some(Here { velocity: flow.stage_rates(x, (q, &y), &v), production })
+    Ok(LastStep { stages, known: tableau.rows().len() + 1, before, end, rise })
 }
 
 fn is_zero(v: &impl Vector) -> bool {

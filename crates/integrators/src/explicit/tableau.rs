@@ -1,336 +1,422 @@
-//! The coefficients of the methods of Dormand and Prince.
-//!
-//! Rows are lists of (stage, weight), without the zeros. Order 5 with its error of order 4: Dormand, Prince
-//! (1980). Order 8 with its errors of order 5 and 3, and its dense output of order 7: Prince, Dormand (1981), and
-//! Hairer, Nørsett, Wanner (Solving ODEs I, §II.5 and §II.6), from the authors' program DOP853. The weights are
-//! rounded to the nearest number.
+//! The coefficients of an explicit Runge-Kutta method.
 
-/// Weights of stages.
-pub(super) type Row = &'static [(usize, f64)];
+use crate::step::Control;
 
-/// An explicit Runge-Kutta method with an embedded error and a dense output.
-#[derive(Debug)]
-pub(super) struct Tableau {
-    /// The order.
+/// The most stages of a step: those of order 8, its end, and three for its dense output.
+pub(super) const STAGES: usize = 16;
+
+/// The weights of stages, as a list of (stage, weight) without the zeros.
+pub type Row = &'static [(usize, f64)];
+
+/// The coefficients of an explicit Runge-Kutta method, for [`ExplicitRungeKutta`](crate::ExplicitRungeKutta).
+///
+/// With the rates `k_0` at the start `q = 0` of a step of size `h`, row `i` makes stage `i + 1`, and the end follows:
+///
+/// ```math
+/// k_{i+1} = f\Bigl( h \sum_j a_{ij} k_j \Bigr), \qquad q_1 = h \sum_j b_j k_j .
+/// ```
+///
+/// A step of `n` rows has the stages `0 … n`, and stage `n + 1` is the rates at its end, after the end was moved onto the
+/// laws. So leave out a last row that repeats the weights of the end.
+///
+/// Write it down as a constant. [`laws::tableau`](crate::laws::tableau) checks its order, and so does a run before its
+/// first step.
+///
+/// ```
+/// use metriplectic_integrators::{Tableau, laws};
+/// /// Kutta's method of order 3 (1901).
+/// const KUTTA: Tableau = Tableau::new(
+///     "Kutta3",
+///     3,
+///     &[&[(0, 0.5)], &[(0, -1.0), (1, 2.0)]],
+///     &[(0, 1.0 / 6.0), (1, 2.0 / 3.0), (2, 1.0 / 6.0)],
+/// );
+/// assert!(laws::tableau(&KUTTA).is_ok());
+/// ```
+#[derive(Clone, Copy, Debug)]
+pub struct Tableau {
+    pub(super) name: &'static str,
     pub(super) order: u32,
-    /// The stages before the end of the step; row `i` makes stage `i + 1`, and stage 0 is at the start.
-    pub(super) stages: &'static [Row],
+    pub(super) stages: Stages,
     /// The end of the step.
     pub(super) end: Row,
     /// The weights of the error, of which the first is the one of higher order.
     pub(super) errors: [Row; 2],
+    /// The first of them if it is known before the end of the step is, and none otherwise.
+    pub(super) early_error: Row,
+    /// The orders of both.
+    pub(super) error_orders: [u32; 2],
     /// Further stages for the dense output; the stage at the end of the step comes before them.
     pub(super) more_stages: &'static [Row],
     /// The rows of the dense output beyond those of a cubic.
     pub(super) dense: &'static [Row],
-    /// Stages that only other stages before the end need.
-    pub(super) passed: &'static [usize],
+    pub(super) control: Control,
+    /// Whether the control was given.
+    has_control: bool,
     /// `h|λ|` at the edge of the region of stability, on the negative axis.
     pub(super) stability: f64,
+    /// The stages that only other stages before the end need, one bit for each.
+    passed: u32,
+    pub(super) fault: Option<TableauError>,
 }
 
-/// Order 8.
-pub(super) const EIGHT: Tableau = Tableau {
-    order: 8,
-    stages: &[
-        &[(0, 0.05260015195876773)],
-        &[(0, 0.0197250569845379), (1, 0.0591751709536137)],
-        &[(0, 0.02958758547680685), (2, 0.08876275643042054)],
-        &[(0, 0.2413651341592667), (2, -0.8845494793282861), (3, 0.924834003261792)],
-        &[(0, 0.037037037037037035), (3, 0.17082860872947386), (4, 0.12546768756682242)],
-        &[(0, 0.037109375), (3, 0.17025221101954405), (4, 0.06021653898045596), (5, -0.017578125)],
-        &[
-            (0, 0.03709200011850479),
-            (3, 0.17038392571223998),
-            (4, 0.10726203044637328),
-            (5, -0.015319437748624402),
-            (6, 0.008273789163814023),
-        ],
-        &[
-            (0, 0.6241109587160757),
-            (3, -3.3608926294469414),
-            (4, -0.868219346841726),
-            (5, 27.59209969944671),
-            (6, 20.154067550477894),
-            (7, -43.48988418106996),
-        ],
-        &[
-            (0, 0.47766253643826434),
-            (3, -2.4881146199716677),
-            (4, -0.590290826836843),
-            (5, 21.230051448181193),
-            (6, 15.279233632882423),
-            (7, -33.28821096898486),
-            (8, -0.020331201708508627),
-        ],
-        &[
-            (0, -0.9371424300859873),
-            (3, 5.186372428844064),
-            (4, 1.0914373489967295),
-            (5, -8.149787010746927),
-            (6, -18.52006565999696),
-            (7, 22.739487099350505),
-            (8, 2.4936055526796523),
-            (9, -3.0467644718982196),
-        ],
-        &[
-            (0, 2.273310147516538),
-            (3, -10.53449546673725),
-            (4, -2.0008720582248625),
-            (5, -17.9589318631188),
-            (6, 27.94888452941996),
-            (7, -2.8589982771350235),
-            (8, -8.87285693353063),
-            (9, 12.360567175794303),
-            (10, 0.6433927460157636),
-        ],
-    ],
-    end: &[
-        (0, 0.054293734116568765),
-        (5, 4.450312892752409),
-        (6, 1.8915178993145003),
-        (7, -5.801203960010585),
-        (8, 0.3111643669578199),
-        (9, -0.1521609496625161),
-        (10, 0.20136540080403034),
-        (11, 0.04471061572777259),
-    ],
-    errors: [
-        &[
-            (0, 0.01312004499419488),
-            (5, -1.2251564463762044),
-            (6, -0.4957589496572502),
-            (7, 1.6643771824549864),
-            (8, -0.35032884874997366),
-            (9, 0.3341791187130175),
-            (10, 0.08192320648511571),
-            (11, -0.022355307863886294),
-        ],
-        &[
-            (0, -0.18980075407240762),
-            (5, 4.450312892752409),
-            (6, 1.8915178993145003),
-            (7, -5.801203960010585),
-            (8, -0.42268232132379197),
-            (9, -0.1521609496625161),
-            (10, 0.20136540080403034),
-            (11, 0.022651792198360825),
-        ],
-    ],
-    more_stages: &[
-        &[
-            (0, 0.056167502283047954),
-            (6, 0.25350021021662483),
-            (7, -0.2462390374708025),
-            (8, -0.12419142326381637),
-            (9, 0.15329179827876568),
-            (10, 0.00820105229563469),
-            (11, 0.007567897660545699),
-            (12, -0.008298),
-        ],
-        &[
-            (0, 0.03183464816350214),
-            (5, 0.028300909672366776),
-            (6, 0.053541988307438566),
-            (7, -0.05492374857139099),
-            (10, -0.00010834732869724932),
-            (11, 0.0003825710908356584),
-            (12, -0.00034046500868740456),
-            (13, 0.1413124436746325),
-        ],
-        &[
-            (0, -0.42889630158379194),
-            (5, -4.697621415361164),
-            (6, 7.683421196062599),
-            (7, 4.06898981839711),
-            (8, 0.3567271874552811),
-            (12, -0.0013990241651590145),
-            (13, 2.9475147891527724),
-            (14, -9.15095847217987),
-        ],
-    ],
-    dense: &[
-        &[
-            (0, -8.428938276109013),
-            (5, 0.5667149535193777),
-            (6, -3.0689499459498917),
-            (7, 2.38466765651207),
-            (8, 2.117034582445028),
-            (9, -0.871391583777973),
-            (10, 2.2404374302607883),
-            (11, 0.6315787787694688),
-            (12, -0.08899033645133331),
-            (13, 18.148505520854727),
-            (14, -9.194632392478356),
-            (15, -4.436036387594894),
-        ],
-        &[
-            (0, 10.427508642579134),
-            (5, 242.28349177525817),
-            (6, 165.20045171727028),
-            (7, -374.5467547226902),
-            (8, -22.113666853125306),
-            (9, 7.733432668472264),
-            (10, -30.674084731089398),
-            (11, -9.332130526430229),
-            (12, 15.697238121770845),
-            (13, -31.139403219565178),
-            (14, -9.35292435884448),
-            (15, 35.81684148639408),
-        ],
-        &[
-            (0, 19.985053242002433),
-            (5, -387.0373087493518),
-            (6, -189.17813819516758),
-            (7, 527.8081592054236),
-            (8, -11.57390253995963),
-            (9, 6.8812326946963),
-            (10, -1.0006050966910838),
-            (11, 0.7777137798053443),
-            (12, -2.778205752353508),
-            (13, -60.19669523126412),
-            (14, 84.32040550667716),
-            (15, 11.99229113618279),
-        ],
-        &[
-            (0, -25.69393346270375),
-            (5, -154.18974869023643),
-            (6, -231.5293791760455),
-            (7, 357.6391179106141),
-            (8, 93.40532418362432),
-            (9, -37.45832313645163),
-            (10, 104.0996495089623),
-            (11, 29.8402934266605),
-            (12, -43.53345659001114),
-            (13, 96.32455395918828),
-            (14, -39.17726167561544),
-            (15, -149.72683625798564),
-        ],
-    ],
-    passed: &[1, 2, 3, 4],
-    stability: 6.1,
-};
+/// The stages before the end of a step.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Stages {
+    /// Row `i` makes stage `i + 1`, and stage 0 is at the start.
+    Rows(&'static [Row]),
+    /// As many as the size of the step asks for, by a recursion.
+    Chebyshev,
+}
 
-/// Order 5.
-pub(super) const FIVE: Tableau = Tableau {
-    order: 5,
-    stages: &[
-        &[(0, 1.0 / 5.0)],
-        &[(0, 3.0 / 40.0), (1, 9.0 / 40.0)],
-        &[(0, 44.0 / 45.0), (1, -56.0 / 15.0), (2, 32.0 / 9.0)],
-        &[
-            (0, 19372.0 / 6561.0),
-            (1, -25360.0 / 2187.0),
-            (2, 64448.0 / 6561.0),
-            (3, -212.0 / 729.0),
-        ],
-        &[
-            (0, 9017.0 / 3168.0),
-            (1, -355.0 / 33.0),
-            (2, 46732.0 / 5247.0),
-            (3, 49.0 / 176.0),
-            (4, -5103.0 / 18656.0),
-        ],
-    ],
-    end: &[
-        (0, 35.0 / 384.0),
-        (2, 500.0 / 1113.0),
-        (3, 125.0 / 192.0),
-        (4, -2187.0 / 6784.0),
-        (5, 11.0 / 84.0),
-    ],
-    errors: [
-        &[
-            (0, 71.0 / 57600.0),
-            (2, -71.0 / 16695.0),
-            (3, 71.0 / 1920.0),
-            (4, -17253.0 / 339200.0),
-            (5, 22.0 / 525.0),
-            (6, -1.0 / 40.0),
-        ],
-        &[],
-    ],
-    more_stages: &[],
-    dense: &[&[
-        (0, -12715105075.0 / 11282082432.0),
-        (2, 87487479700.0 / 32700410799.0),
-        (3, -10690763975.0 / 1880347072.0),
-        (4, 701980252875.0 / 199316789632.0),
-        (5, -1453857185.0 / 822651844.0),
-        (6, 69997945.0 / 29380423.0),
-    ]],
-    passed: &[1],
-    stability: 3.25,
-};
+/// A tableau with which no run starts.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum TableauError {
+    /// There are too many stages.
+    #[error(
+        "the tableau `{name}` has {found} stages, with the start, the end and those of its dense output; a step has \
+         room for {most}"
+    )]
+    Stages {
+        /// The name of the tableau.
+        name: &'static str,
+        /// How many there are.
+        found: usize,
+        /// The most that there may be.
+        most: usize,
+    },
+    /// A row names a stage that is not known where the row is used.
+    #[error(
+        "row {row} of {part} of the tableau `{name}` names stage {stage}; {known} stages are known there"
+    )]
+    Unknown {
+        /// The name of the tableau.
+        name: &'static str,
+        /// The part of the tableau.
+        part: &'static str,
+        /// Which row of this part, counted from 0.
+        row: usize,
+        /// The stage that it names.
+        stage: usize,
+        /// How many are known, counted from stage 0.
+        known: usize,
+    },
+    /// The weights do not have the order of the method.
+    #[error(
+        "the tableau `{name}` misses a condition of order {order} by {off:.1e}, relative to its terms; \
+         look for a wrong weight with `laws::tableau`"
+    )]
+    Order {
+        /// The name of the tableau.
+        name: &'static str,
+        /// The order that it was given.
+        order: u32,
+        /// The largest residual of a condition, relative to its terms.
+        off: f64,
+    },
+    /// The steps are to follow a tolerance, and nothing estimates their error.
+    #[error(
+        "the steps follow a tolerance, and the tableau `{name}` of order {order} has no row for their error; give it one \
+         by `Tableau::error`, or take steps of one size"
+    )]
+    NoError {
+        /// The name of the tableau.
+        name: &'static str,
+        /// Its order.
+        order: u32,
+    },
+}
 
-#[cfg(test)]
-mod tests {
-    use super::*;
+/// The highest order of a tableau without an error of its own for which the estimate of the flow serves: its error is
+/// `O(h⁵)`.
+pub(super) const ESTIMATED: u32 = 3;
 
-    /// `Σ w_j`.
-    fn sum(row: Row) -> f64 {
-        row.iter().map(|(_, w)| w).sum()
+impl Tableau {
+    /// A method of this order: its name in checkpoints, its rows of stages and the weights of its end.
+    pub const fn new(name: &'static str, order: u32, stages: &'static [Row], end: Row) -> Self {
+        let tableau = Self {
+            name,
+            order,
+            stages: Stages::Rows(stages),
+            end,
+            errors: [&[], &[]],
+            early_error: &[],
+            error_orders: [0, 0],
+            more_stages: &[],
+            dense: &[],
+            control: Control::of_order(order),
+            has_control: false,
+            stability: f64::INFINITY,
+            passed: 0,
+            fault: None,
+        };
+        let tableau = tableau.checked();
+        if tableau.fault.is_some() {
+            return tableau;
+        }
+        Self { stability: edge_of_stability(stages, end), ..tableau }
     }
 
-    /// The times of the stages, the sums of their rows.
-    fn times(tableau: &Tableau) -> Vec<f64> {
-        let mut c = vec![0.0];
-        c.extend(tableau.stages.iter().map(|row| sum(row)));
-        c.push(sum(tableau.end));
-        c.extend(tableau.more_stages.iter().map(|row| sum(row)));
-        c
+    /// The weights of the error: those of the end less those of an embedded method of this order. They may name stage
+    /// `n + 1`. Without a control of its own, steps follow the PI controller for this order.
+    ///
+    /// If they do not name stage `n + 1`, the entropy of a step is aimed at only if its own error is at most half of its
+    /// rise.
+    #[must_use]
+    pub const fn error(self, row: Row, order: u32) -> Self {
+        Self { errors: [row, self.errors[1]], error_orders: [order, self.error_orders[1]], ..self }
+            .controlled()
+            .checked()
     }
 
-    /// Order 8 leaves out what would be the number 12 of Hairer's rows; here the end of a step is stage 12.
-    #[test]
-    fn quadratures_have_the_order_of_their_method() {
-        for (tableau, error_orders) in [(&EIGHT, [5, 3]), (&FIVE, [4, 0])] {
-            let c = times(tableau);
-            let moment =
-                |row: Row, k: i32| -> f64 { row.iter().map(|&(j, w)| w * c[j].powi(k)).sum() };
-            for k in 0..tableau.order.cast_signed() {
-                let error = moment(tableau.end, k) - 1.0 / f64::from(k + 1);
-                assert!(error.abs() < 1e-14, "order {}: moment {k}: {error:e}", tableau.order);
+    /// The weights of a second error, of a lower order. With the errors `e` and `e₂` a step has the error
+    /// `e²/√(e² + e₂²/100)` (Hairer, Nørsett, Wanner, Solving ODEs I, §II.10). Without a first error it does nothing.
+    #[must_use]
+    pub const fn second_error(self, row: Row, order: u32) -> Self {
+        Self { errors: [self.errors[0], row], error_orders: [self.error_orders[0], order], ..self }
+            .controlled()
+            .checked()
+    }
+
+    /// The dense output. It adds these terms to the cubic of Hermite `C` through both ends, with one row `c_i` for each,
+    ///
+    /// ```math
+    /// q(\theta) = C(\theta) + \theta^2 (1 - \theta)^2 h
+    ///     \bigl( C_1 + \theta C_2 + \theta (1 - \theta) C_3 + \theta^2 (1 - \theta) C_4 + \dots \bigr), \qquad
+    /// C_i = \sum_j c_{ij} k_j .
+    /// ```
+    ///
+    /// The rows of `more_stages` make the stages `n + 2`, `n + 3`, …, and are evaluated only where a state inside a step
+    /// is asked for. Without a dense output it is the cubic, of order 3.
+    #[must_use]
+    pub const fn dense(self, more_stages: &'static [Row], rows: &'static [Row]) -> Self {
+        Self { more_stages, dense: rows, ..self }.checked()
+    }
+
+    /// How steps follow a tolerance.
+    #[must_use]
+    pub const fn control(self, control: Control) -> Self {
+        Self { control, has_control: true, ..self }
+    }
+
+    /// The largest `z` for which the method is stable on `[−z, 0]`, by which a certificate says that stability sets the
+    /// steps. Without it, the `z` is the one of the stability function if the last stage is at the end of the step, and
+    /// nothing is said otherwise.
+    #[must_use]
+    pub const fn stable_to(self, z: f64) -> Self {
+        Self { stability: z, ..self }
+    }
+
+    /// The name in checkpoints.
+    pub const fn name(&self) -> &'static str {
+        self.name
+    }
+
+    /// The order of convergence.
+    pub const fn order(&self) -> u32 {
+        self.order
+    }
+
+    /// Whether a row names a stage that is not known, or there are too many.
+    pub(crate) const fn has_a_fault(&self) -> bool {
+        self.fault.is_some()
+    }
+
+    /// The orders of the errors.
+    pub(crate) fn orders_of_errors(&self) -> &[u32] {
+        let count = self.errors.iter().take_while(|row| !row.is_empty()).count();
+        &self.error_orders[..count]
+    }
+
+    /// Whether states inside a step have more than a cubic.
+    pub(crate) const fn has_dense_output(&self) -> bool {
+        !self.dense.is_empty()
+    }
+
+    /// What is needed of a tableau after the stages of Chebyshev.
+    pub(super) const fn chebyshev(name: &'static str, control: Control) -> Self {
+        let tableau = Self::new(name, 2, &[], &[]);
+        Self { stages: Stages::Chebyshev, stability: f64::INFINITY, control, ..tableau }
+    }
+
+    /// The rows of the stages.
+    pub(super) const fn rows(&self) -> &'static [Row] {
+        match self.stages {
+            Stages::Rows(rows) => rows,
+            Stages::Chebyshev => &[],
+        }
+    }
+
+    /// The stages that only other stages before the end need.
+    pub(super) fn passed(&self) -> impl Iterator<Item = usize> {
+        let mut left = self.passed;
+        std::iter::from_fn(move || {
+            let stage = left.trailing_zeros();
+            left &= left.wrapping_sub(1);
+            (stage < u32::BITS).then_some(stage as usize)
+        })
+    }
+
+    /// The tableau with the control for the order of its error.
+    const fn controlled(self) -> Self {
+        if self.has_control || self.errors[0].is_empty() {
+            return self;
+        }
+        let [first, second] = self.error_orders;
+        // The order of e²/e₂.
+        let order = if self.errors[1].is_empty() {
+            first
+        } else {
+            (2 * first + 1).saturating_sub(second + 1)
+        };
+        Self { control: Control { power: 1.0, ..Control::of_order(order) }, ..self }
+    }
+
+    /// The tableau with its first fault, and with the stages that are passed.
+    const fn checked(self) -> Self {
+        let (rows, name) = (self.rows(), self.name);
+        let end = rows.len() + 1;
+        let found = end + 1 + self.more_stages.len();
+        let mut fault = None;
+        if found > STAGES {
+            fault = Some(TableauError::Stages { name, found, most: STAGES });
+        }
+        if fault.is_none() {
+            fault = self.unknown("the stages", rows, 1, true);
+        }
+        if fault.is_none() {
+            fault = self.unknown("the end", &[self.end], end, false);
+        }
+        if fault.is_none() {
+            fault = self.unknown("the errors", &self.errors, end + 1, false);
+        }
+        if fault.is_none() {
+            fault = self.unknown("the further stages", self.more_stages, end + 1, true);
+        }
+        if fault.is_none() {
+            fault = self.unknown("the dense output", self.dense, found, false);
+        }
+        let mut passed = 0;
+        let mut stage = 1;
+        while stage < end && fault.is_none() {
+            let [first, second] = self.errors;
+            let is_named = names(self.end, stage)
+                || names(first, stage)
+                || names(second, stage)
+                || one_names(self.more_stages, stage)
+                || one_names(self.dense, stage);
+            if !is_named {
+                passed |= 1 << stage;
             }
-            for (row, order) in tableau.errors.iter().zip(error_orders) {
-                for k in 0..order {
-                    assert!(moment(row, k).abs() < 1e-14, "order {}: {k}", tableau.order);
+            stage += 1;
+        }
+        let [error, _] = self.errors;
+        let early_error: Row = if names(error, end) { &[] } else { error };
+        Self { fault, passed, early_error, ..self }
+    }
+
+    /// The first row of a part that names a stage which is not known: of `known` stages, and of one more for each row if
+    /// the rows make stages.
+    const fn unknown(
+        &self,
+        part: &'static str,
+        rows: &[Row],
+        known: usize,
+        makes: bool,
+    ) -> Option<TableauError> {
+        let mut row = 0;
+        while row < rows.len() {
+            let known = if makes { known + row } else { known };
+            let mut at = 0;
+            while at < rows[row].len() {
+                let (stage, _) = rows[row][at];
+                if stage >= known {
+                    return Some(TableauError::Unknown {
+                        name: self.name,
+                        part,
+                        row,
+                        stage,
+                        known,
+                    });
                 }
-                assert!(
-                    order == 0 || moment(row, order).abs() > 1e-6,
-                    "an error has its own order"
-                );
+                at += 1;
             }
+            row += 1;
         }
+        None
     }
+}
 
-    #[test]
-    fn no_later_row_has_a_stage_that_was_passed() {
-        for tableau in [&EIGHT, &FIVE] {
-            let rows = tableau.errors.iter().chain(tableau.more_stages).chain(tableau.dense);
-            let mut stages = rows.copied().flatten().chain(tableau.end).map(|(j, _)| j);
-            assert!(stages.all(|j| !tableau.passed.contains(j)));
+/// Whether a row names a stage.
+const fn names(row: Row, stage: usize) -> bool {
+    let mut at = 0;
+    while at < row.len() {
+        if row[at].0 == stage {
+            return true;
         }
+        at += 1;
     }
+    false
+}
 
-    /// Conditions of trees of height 2: `Σ_ij b_i c_i^k a_ij c_j^l = 1/((l + 1)(k + l + 2))`.
-    #[test]
-    fn trees_with_a_branch_have_the_order_of_their_method() {
-        for tableau in [&EIGHT, &FIVE] {
-            let c = times(tableau);
-            let p = tableau.order.cast_signed();
-            for (k, l) in (0..p).flat_map(|k| (0..p).map(move |l| (k, l))) {
-                if k + l + 2 > p {
-                    continue;
-                }
-                let inner = |i: usize| -> f64 {
-                    let row: Row = if i == 0 { &[] } else { tableau.stages[i - 1] };
-                    row.iter().map(|&(j, a)| a * c[j].powi(l)).sum()
-                };
-                let sum: f64 = tableau.end.iter().map(|&(i, b)| b * c[i].powi(k) * inner(i)).sum();
-                let error = sum - 1.0 / f64::from((l + 1) * (k + l + 2));
-                assert!(error.abs() < 2e-14, "order {p}, k = {k}, l = {l}: {error:e}");
-            }
+/// Whether one of several rows names a stage.
+const fn one_names(rows: &[Row], stage: usize) -> bool {
+    let mut row = 0;
+    while row < rows.len() {
+        if names(rows[row], stage) {
+            return true;
+        }
+        row += 1;
+    }
+    false
+}
+
+/// `Σ_j w_j k_j`.
+const fn weighed(row: Row, k: &[f64; STAGES]) -> f64 {
+    let (mut sum, mut at) = (0.0, 0);
+    while at < row.len() {
+        let (stage, w) = row[at];
+        sum += w * k[stage];
+        at += 1;
+    }
+    sum
+}
+
+/// The stability function `R(−z)`: the end of a step with `hλ = −z` from 1.
+const fn stability_function(rows: &[Row], end: Row, z: f64) -> f64 {
+    let mut k = [1.0; STAGES];
+    let mut row = 0;
+    while row < rows.len() {
+        k[row + 1] = 1.0 - z * weighed(rows[row], &k);
+        row += 1;
+    }
+    1.0 - z * weighed(end, &k)
+}
+
+/// The first `z` with `|R(−z)| > 1`; infinite if the last stage is not at the end of the step, because the rates of both
+/// are compared.
+const fn edge_of_stability(rows: &[Row], end: Row) -> f64 {
+    if rows.is_empty() || (weighed(rows[rows.len() - 1], &[1.0; STAGES]) - 1.0).abs() > 1e-10 {
+        return f64::INFINITY;
+    }
+    let (mut stable, mut unstable) = (0.0, 0.25);
+    while stability_function(rows, end, unstable).abs() <= 1.0 {
+        stable = unstable;
+        unstable += 0.25;
+        if unstable > 64.0 {
+            return f64::INFINITY;
         }
     }
+    let mut halvings = 0;
+    while halvings < 40 {
+        let middle = 0.5 * (stable + unstable);
+        if stability_function(rows, end, middle).abs() <= 1.0 {
+            stable = middle;
+        } else {
+            unstable = middle;
+        }
+        halvings += 1;
+    }
+    stable
 }

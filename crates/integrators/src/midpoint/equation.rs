@@ -12,13 +12,13 @@ use metriplectic_manifolds::{Manifold, MetricError, Retraction};
 
 use providers::{Along, Defined, Jets, Values};
 
-use super::{Dim, Numbers, Scheme, Start};
+use super::scheme::Scheme;
 use crate::discrete_gradient::DiscreteGradient;
-use crate::method::{Flow as _, Laws};
 use crate::newton::{Equation, Evaluated, Linearised, Rounding, Stiffness};
 use crate::round_off::bound::ROUNDED;
-use crate::round_off::drift::{self, DriftCorrection};
+use crate::round_off::drift;
 use crate::round_off::stable_gradient::Segment;
+use crate::step::{Dim, DriftCorrection, Flow as _, Laws, Numbers, Start};
 
 /// The equation of one step (Bloch, Farré Puiggalí, Martín de Diego 2024, §4.4), as a function of
 /// the initial displacement `u ∈ T_xM` of the path:

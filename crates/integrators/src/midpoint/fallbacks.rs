@@ -7,12 +7,12 @@ use metriplectic_manifolds::{Manifold, Retraction};
 
 use super::equation::{Dissipated, Residual};
 use super::jacobian::KeptJacobian;
-use super::{Dim, MemoryOf, Scheme, Start, dependent_invariant};
+use super::memory::MemoryOf;
+use super::scheme::Scheme;
 use crate::discrete_gradient::DiscreteGradient;
-use crate::method::{Effort, Flow as _, Laws, Taken};
 use crate::newton::{Equation, Inverse, Iterate, Newton, Root};
-use crate::step_error::StepError;
-use crate::step_failure::{Cause, Fallbacks};
+use crate::step::failure::{Cause, Fallbacks};
+use crate::step::{Dim, Effort, Flow as _, Laws, Start, StepError, Taken};
 
 /// A step that was not taken.
 #[derive(Clone, Copy, Debug)]
@@ -90,7 +90,7 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
             let stiffness = rates.friction * (h / suggested);
             return StepError::StiffFriction { time, h, stiffness, residual, tried, damps: false };
         }
-        match (cause, dependent_invariant(system, x)) {
+        match (cause, system.dependent_invariant(x)) {
             (Cause::Edge, _) => StepError::OutOfDomain { time, h, tried },
             (_, Some((index, fraction))) => {
                 let change = start.accumulated_error.invariants[index].abs();

@@ -4,10 +4,9 @@ use metriplectic_fields::{Column, Dimension, Square};
 
 use super::jacobian::KeptJacobian;
 use super::predictor::{DIFFERENCES, Predictor};
-use crate::method::Memory;
 use crate::newton::Inverse;
 use crate::round_off::compensation::Compensation;
-use crate::run::checkpoint::{ResumeError, Saved};
+use crate::step::{Dim, Memory, RestoreError, Saved};
 
 /// What a [`Scheme`](crate::Scheme) keeps from one step to the next: the displacements, from which the next one is
 /// extrapolated; the inverse of a Jacobian, which is used as long as it contracts; and what rounding has
@@ -18,6 +17,9 @@ pub struct MidpointMemory<N: Dimension> {
     pub(super) jacobian: KeptJacobian<N>,
     pub(super) compensation: Compensation<N>,
 }
+
+/// The memory of a scheme for a system.
+pub(super) type MemoryOf<Y> = MidpointMemory<Dim<Y>>;
 
 impl<N: Dimension> Default for MidpointMemory<N> {
     fn default() -> Self {
@@ -71,9 +73,9 @@ impl<N: Dimension> Memory for MidpointMemory<N> {
         }
     }
 
-    fn restore(saved: &Saved) -> Result<Self, ResumeError> {
+    fn restore(saved: &Saved) -> Result<Self, RestoreError> {
         let n = N::LEN;
-        let column = |name| -> Result<Option<N::Vector<f64>>, ResumeError> {
+        let column = |name| -> Result<Option<N::Vector<f64>>, RestoreError> {
             let list = saved.get(name, n)?;
             Ok(list.map(|list| N::Vector::<f64>::from_index(|i| list[i])))
         };
@@ -90,7 +92,7 @@ impl<N: Dimension> Memory for MidpointMemory<N> {
             let [residual_bound, contraction, first, friction, age, h, length] =
                 [0, 1, 2, 3, 4, 5, 6].map(|k| numbers[k]);
             if !(0.0..=f64::from(u32::MAX)).contains(&age) {
-                return Err(ResumeError::Damaged { what: "age of the inverse", value: age });
+                return Err(RestoreError::Damaged { what: "age of the inverse", value: age });
             }
             #[allow(
                 clippy::cast_possible_truncation,

@@ -4,7 +4,7 @@ use metriplectic_dynamics::Metriplectic;
 use metriplectic_fields::{ChartPoint, Column, Dimension, Vector};
 use metriplectic_manifolds::Manifold;
 
-use super::Start;
+use crate::step::Start;
 
 /// The displacements of the steps before, from which the next one is extrapolated.
 #[derive(Clone, Copy, Debug, PartialEq)]

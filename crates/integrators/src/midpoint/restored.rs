@@ -14,9 +14,8 @@ use metriplectic_dynamics::{Invariants, Metriplectic, system::Point};
 use metriplectic_fields::{ChartPoint, Column, Space as _, Vector};
 use metriplectic_manifolds::{InnerProduct, Manifold, Riemannian};
 
-use super::{Dim, Numbers, Start};
-use crate::method::{Flow as _, Laws};
 use crate::round_off::bound::{ROUNDED, of_a_law};
+use crate::step::{Dim, Flow as _, Laws, Numbers, Start};
 
 /// The largest distance by which an end is moved, relative to the step.
 const NEAR: f64 = 1e-2;

@@ -5,12 +5,8 @@ use metriplectic_dynamics::{Bracket, Dissipation, Invariants, Metriplectic};
 use metriplectic_fields::{ChartPoint, Column, Dimension, Matrix, Square, Vector};
 use metriplectic_manifolds::InnerProduct;
 
-use crate::method::Laws;
-use crate::midpoint::{Dim, Numbers, Start};
 use crate::round_off::bound::ROUNDED;
-
-/// What a step takes back of the errors of earlier steps: the numbers `φe` in `⟨w, d⟩ = F(x') − F(x) + φe`.
-pub(crate) type DriftCorrection<Y> = Laws<Numbers<Y>>;
+use crate::step::{Dim, DriftCorrection, Laws, Start};
 
 /// Nothing is taken back, as in the definition of the scheme.
 pub(crate) fn nothing<Y: Metriplectic>() -> DriftCorrection<Y> {

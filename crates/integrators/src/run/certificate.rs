@@ -8,11 +8,11 @@ use std::fmt;
 use metriplectic_dynamics::SecondLaw;
 use metriplectic_dynamics::invariants::Kind;
 
-use crate::method::{
+use crate::round_off::bound::of_a_law;
+use crate::run::checked::checked_states;
+use crate::step::{
     Effort, Element, EntropyStep, Evidence, Flow, Laws, LimitingSites, Promises, Taken,
 };
-use crate::round_off::bound::of_a_law;
-use crate::run::recheck::checked_states;
 
 /// The balance of a run: what became of the two laws, of the manifold, and what it cost.
 ///

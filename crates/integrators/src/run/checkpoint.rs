@@ -38,11 +38,11 @@
 //! ```
 //!
 //! The system is not in it, since closures cannot be written down: resume with the same one. Nor are outputs at
-//! given times and events: say them again ([`Steps::watching`]). Another system is noticed if its energy, its
+//! given times and events: say them again ([`Steps::watching`](crate::Steps::watching)). Another system is noticed if its energy, its
 //! entropy, a further invariant or its velocity has another value at the point, by more than the round-off of its
 //! terms. The model is not verified around the point; it is checked on the way like that of any run.
 //!
-//! The [name](Method::name) of the method is in it, and another method is refused. The options of the method are
+//! The [name](crate::Stepper::name) of the method is in it, and another method is refused. The options of the method are
 //! not in it: a run that failed may go on with more corrections or more splits.
 //!
 //! A file has a checksum over the bits of all of its numbers. A file with another number is refused
@@ -97,31 +97,22 @@
 #[cfg(feature = "serde")]
 mod checksum;
 mod error;
-pub(crate) mod exact;
 #[cfg(feature = "serde")]
 mod file;
 #[cfg(feature = "serde")]
 mod forms;
+mod resume;
 mod saved;
 mod validation;
 
-use std::convert::Infallible;
-
-use crate::method::{Flow, Memory, Method, StateSpace, Vector};
-use crate::run::certificate::Certificate;
-use crate::run::controller::{Rule, StepSize};
-use crate::run::output::StepBefore;
-use crate::run::progress::Progress;
-use crate::run::recheck::checked_states;
-use crate::run::span::{SpanError, check_end, check_steps};
-use crate::run::steps::Steps;
-use crate::run::trajectory::{Ending, State};
-
 pub use error::ResumeError;
-pub(crate) use exact::Exact;
-pub use saved::Saved;
+use saved::SavedRun;
 
-/// Where a run was put down; made by [`Steps::checkpoint`], taken up by [`Method::resume`].
+use crate::run::controller::StepSize;
+use crate::run::ending::Ending;
+use crate::run::span_error::{SpanError, check_end, check_steps};
+
+/// Where a run was put down; made by [`Steps::checkpoint`](crate::Steps::checkpoint), taken up by [`Method::resume`](crate::Method::resume).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Checkpoint(
     /// The run, or why the file that it was read from cannot be resumed.
@@ -131,29 +122,6 @@ pub struct Checkpoint(
 /// The version of the format that is written and read. Each change of a field is a new version.
 #[cfg(feature = "serde")]
 const VERSION: u32 = 7;
-
-/// A run between two steps, but for its system and the options of its method.
-#[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
-struct SavedRun {
-    /// The name of the method.
-    method: String,
-    step: usize,
-    time: Exact,
-    point: Vec<Exact>,
-    /// The velocity there; empty where it cannot be evaluated.
-    velocity: Vec<Exact>,
-    energy: Exact,
-    entropy: Exact,
-    /// The entropy after the last step that dissipated.
-    kept_entropy: Exact,
-    invariants: Vec<Exact>,
-    memory: Saved,
-    #[cfg_attr(feature = "serde", serde(with = "exact"))]
-    balance: Certificate,
-    progress: Progress<Vec<Exact>>,
-}
 
 impl Checkpoint {
     /// The run that was put down.
@@ -227,126 +195,10 @@ impl From<SavedRun> for Checkpoint {
 }
 
 impl SavedRun {
-    fn point(&self) -> impl Iterator<Item = f64> {
-        self.point.iter().map(|x| x.0)
-    }
-
     fn go_on(mut self) -> Checkpoint {
         if matches!(self.progress.ending, Some(Ending::Span | Ending::Event { .. })) {
             self.progress.ending = None;
         }
         self.into()
-    }
-}
-
-fn exact(numbers: impl IntoIterator<Item = f64>) -> Vec<Exact> {
-    numbers.into_iter().map(Exact).collect()
-}
-
-fn column(v: &impl Vector) -> Vec<Exact> {
-    exact(v.to_list())
-}
-
-/// The numbers of a list, as many as there are in `like`.
-fn vector<V: Vector>(what: &'static str, list: &[Exact], like: &V) -> Result<V, ResumeError> {
-    let numbers: Vec<f64> = list.iter().map(|number| number.0).collect();
-    let (found, expected) = (list.len(), like.len());
-    like.with_list(&numbers).ok_or(ResumeError::Length { what, found, expected })
-}
-
-const fn expect_length(
-    what: &'static str,
-    found: usize,
-    expected: usize,
-) -> Result<(), ResumeError> {
-    if found == expected { Ok(()) } else { Err(ResumeError::Length { what, found, expected }) }
-}
-
-impl<'a, F: Flow, M: Method<F>> Steps<'a, F, M> {
-    /// All that the next steps depend on, but for the system and the options of the method.
-    pub fn checkpoint(&self) -> Checkpoint {
-        let State { step, time, point, energy, entropy } = &self.state;
-        let velocity = self.flow.rates(point, &self.flow.sizes(point).map(|_| 0.0));
-        let known = self.certificate.invariants.len();
-        let mut memory = Saved::default();
-        self.memory.save(&mut memory);
-        let Ok(progress) =
-            self.progress.convert(|_, v| Ok::<_, Infallible>(exact(v.to_short_list())));
-        let run = SavedRun {
-            method: self.method.name(),
-            step: *step,
-            time: Exact(*time),
-            point: exact(F::Space::numbers(point)),
-            velocity: velocity.map_or_else(Vec::new, |v| column(&v)),
-            energy: Exact(*energy),
-            entropy: Exact(*entropy),
-            kept_entropy: Exact(self.entropy),
-            invariants: exact(self.values.invariants.as_ref()[..known].iter().copied()),
-            memory,
-            balance: self.certificate.clone(),
-            progress,
-        };
-        run.into()
-    }
-
-    /// A run that was put down.
-    pub(crate) fn resume(
-        method: M,
-        flow: &'a F,
-        checkpoint: &Checkpoint,
-    ) -> Result<Self, ResumeError> {
-        let c = checkpoint.run()?;
-        validation::of_the_method(&c.method, method.name())?;
-        let entries: Vec<f64> = c.point().collect();
-        let point = flow.element(&entries)?;
-        let mut certificate =
-            c.balance.resumed(Certificate::start(flow, &point, method.promises(flow)))?;
-        if c.progress.ending.is_none() {
-            certificate.checked_states = checked_states(flow, c.step);
-        }
-        let like = flow.sizes(&point);
-        let progress = c.progress.convert(|what, list| vector(what, list, &like))?;
-        let memory = M::Memory::restore(&c.memory)?;
-        expect_length("further invariants", c.invariants.len(), certificate.invariants.len())?;
-        validation::of_the_system(flow, &point, c)?;
-        let mut values = flow.laws(&point);
-        (values.energy, values.entropy) = (c.energy.0, c.entropy.0);
-        for (k, stored) in c.invariants.iter().enumerate() {
-            values.invariants[k] = stored.0;
-        }
-        let (energy, entropy, time) = (c.energy.0, c.entropy.0, c.time.0);
-        let state = State { step: c.step, time, point, energy, entropy };
-        let (kept, h, in_parts) = (c.kept_entropy.0, 0.0, false);
-        let before =
-            StepBefore { state: state.clone(), values: values.clone(), entropy: kept, h, in_parts };
-        Ok(Self {
-            promises: certificate.promises,
-            rule: Rule::of(&method, progress.start),
-            before,
-            watching: None,
-            method,
-            flow,
-            progress,
-            state,
-            values,
-            entropy: kept,
-            memory,
-            certificate,
-            failed: false,
-        })
-    }
-}
-
-impl Certificate {
-    /// These figures, in a run that starts anew with the certificate `fresh`: what the system and the method say
-    /// of themselves is theirs.
-    fn resumed(&self, fresh: Self) -> Result<Self, ResumeError> {
-        expect_length("further invariants", self.invariants.len(), fresh.invariants.len())?;
-        let Self { promises, second_law, projected, .. } = fresh;
-        let mut certificate = Self { promises, second_law, projected, ..self.clone() };
-        for (balance, fresh) in certificate.invariants.iter_mut().zip(fresh.invariants) {
-            balance.kind = fresh.kind;
-        }
-        Ok(certificate)
     }
 }

@@ -61,12 +61,11 @@
 //! asked for, to the last bit. The first step is that of Hairer, Nørsett, Wanner (Solving ODEs I, §II.4),
 //! with the sizes of the entries in place of their absolute numbers.
 
-use crate::method::{Control, Element, Flow, Method, Vector};
-use crate::run::scales::{Scales, relative};
-use crate::run::until::Entries;
+use crate::step::scales::relative;
+use crate::step::{Control, Element, Flow, Scales, Stepper, Vector};
 
 #[cfg(feature = "serde")]
-use crate::run::checkpoint::exact;
+use crate::step::exact;
 
 /// How large the steps of a run are.
 #[derive(Clone, Debug, PartialEq)]
@@ -102,6 +101,32 @@ pub(crate) struct Controller<V> {
     pub(crate) entries: Entries<V>,
 }
 
+/// What is known of the errors of the entries, one number for each direction of the chart.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub(crate) enum Entries<V> {
+    /// Nothing: errors are relative to the sizes that the entries have.
+    Automatic,
+    /// The sizes of some entries; zero for an automatic one.
+    Scale(V),
+    /// Errors that are allowed in addition.
+    Absolute(V),
+}
+
+impl<V> Entries<V> {
+    /// The same, with the numbers in another form.
+    pub(crate) fn convert<W, E>(
+        &self,
+        convert: impl FnOnce(&'static str, &V) -> Result<W, E>,
+    ) -> Result<Entries<W>, E> {
+        Ok(match self {
+            Self::Automatic => Entries::Automatic,
+            Self::Scale(sizes) => Entries::Scale(convert("sizes of entries", sizes)?),
+            Self::Absolute(errors) => Entries::Absolute(convert("errors of entries", errors)?),
+        })
+    }
+}
+
 /// What the method of a run and its start say of the size of its steps.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Rule {
@@ -114,7 +139,7 @@ pub(crate) struct Rule {
 
 impl Rule {
     /// The rule of this method, in a run from this time.
-    pub(crate) fn of<F: Flow, M: Method<F>>(method: &M, start: f64) -> Self {
+    pub(crate) fn of<F: Flow, M: Stepper<F>>(method: &M, start: f64) -> Self {
         Self { order: method.order(), control: method.control(), start }
     }
 

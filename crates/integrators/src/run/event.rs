@@ -1,7 +1,7 @@
 //! Where a function of the state changes its sign.
 //!
 //! The function is known at both ends of a step. Inside it is looked at on the cubic of Hermite
-//! ([`dense`](crate::run::dense)), at a few points and without their projection onto the laws, which is what makes
+//! ([`dense`](crate::step::dense)), at a few points and without their projection onto the laws, which is what makes
 //! an output expensive. Where that shows a change of sign, the states of the output decide: first at the points
 //! around the change, then in a bracket that is narrowed to the last digits of the time.
 
@@ -9,12 +9,12 @@ use std::any::{Any, type_name};
 use std::fmt;
 use std::sync::Arc;
 
-use crate::digits::Digits;
-use crate::method::{Flow, StateSpace, StepEnds};
-use crate::run::dense::{Hermite, says_between};
 use crate::run::root::{Sample, narrow};
-use crate::run::span::SpanError;
-use crate::run::trajectory::State;
+use crate::run::span_error::SpanError;
+use crate::run::state::State;
+use crate::step::dense::{Hermite, says_between};
+use crate::step::digits::Digits;
+use crate::step::{Flow, StateSpace, StepEnds};
 
 /// A change of sign of a function of the state, found in a run; asked for by [`Watch::event`](crate::Watch::event).
 ///

@@ -54,8 +54,8 @@ mod npy;
 use std::fmt;
 use std::io::{self, Seek, Write};
 
-use crate::method::{Flow, StateSpace};
-use crate::run::trajectory::State;
+use crate::run::state::State;
+use crate::step::{Flow, StateSpace};
 
 pub use csv::Csv;
 use csv::quoted;

@@ -1,81 +1,20 @@
 //! States between steps: at the times that were asked for, at events, and at any time of the last step.
 
-use std::collections::VecDeque;
-
 use metriplectic_dynamics::SecondLaw;
 
-use crate::method::{Element, Flow, Laws, Method, StateSpace, StepEnds, StepStart};
-use crate::run::dense::{Target, between, says_between};
-use crate::run::event::{Event, Events};
-use crate::run::progress::Progress;
-use crate::run::span::{Schedule, SpanError};
+use crate::run::ending::Ending;
+use crate::run::event::Event;
+use crate::run::requests::rounding;
+use crate::run::schedule::Schedule;
+use crate::run::span_error::SpanError;
+use crate::run::state::State;
 use crate::run::steps::Steps;
-use crate::run::trajectory::{Ending, State};
-use crate::run::watch::{Outputs, Requests, rounding};
-use crate::step_error::StepError;
+use crate::run::watching::Watching;
+use crate::step::dense::{Target, between, says_between};
+use crate::step::{Element, Flow, Laws, StepEnds, StepError, StepStart, Stepper};
 
-/// The start of the last step.
-#[derive(Clone, Debug)]
-pub(super) struct StepBefore<F: Flow> {
-    pub(super) state: State<F::Space>,
-    /// The laws there.
-    pub(super) values: Laws<F::Numbers>,
-    /// The entropy after the last step before it that dissipated.
-    pub(super) entropy: f64,
-    /// The size of the step; 0 before the first one.
-    pub(super) h: f64,
-    /// Whether the step was taken in parts.
-    pub(super) in_parts: bool,
-}
-
-/// What a run looks at between its steps.
-pub(super) struct Watching<M: StateSpace> {
-    outputs: Outputs,
-    events: Events<M>,
-    /// The states to record of the last step, if they replace the one at its end.
-    queue: VecDeque<State<M>>,
-    found: Vec<Event<M>>,
-}
-
-impl<M: StateSpace> Watching<M> {
-    /// Takes up the requests of a run that is at this state; `None` if there are none.
-    pub(super) fn new<V>(
-        requests: Requests,
-        progress: &Progress<V>,
-        state: &State<M>,
-    ) -> Result<Option<Box<Self>>, SpanError> {
-        let start = progress.start;
-        requests.check([start, progress.end()], progress.next_end(state.time))?;
-        let Requests { times, interval, events } = requests;
-        let outputs = Outputs::after(state.time, start, times, interval);
-        let events = Events::new(events, state)?;
-        if outputs.is_empty() && events.is_empty() {
-            return Ok(None);
-        }
-        let (queue, found) = (VecDeque::new(), Vec::new());
-        Ok(Some(Box::new(Self { outputs, events, queue, found })))
-    }
-
-    /// Whether the states of the queue are recorded in place of the one at the end of the step.
-    pub(super) fn replaces_steps(&self) -> bool {
-        !self.outputs.is_empty() || !self.queue.is_empty()
-    }
-
-    /// Returns whether no output is left, and no event ends the run.
-    pub(super) fn is_over(&self) -> bool {
-        self.queue.is_empty()
-            && !self.outputs.is_empty()
-            && self.outputs.are_over()
-            && !self.events.may_stop()
-    }
-
-    pub(super) const fn queue(&mut self) -> &mut VecDeque<State<M>> {
-        &mut self.queue
-    }
-}
-
-impl<F: Flow, M: Method<F>> Steps<'_, F, M> {
-    /// The state at a time in the last step, on the [dense output](Method::between) of the method; `None` at other
+impl<F: Flow, M: Stepper<F>> Steps<'_, F, M> {
+    /// The state at a time in the last step, on the [dense output](Stepper::between) of the method; `None` at other
     /// times, or if the flow does not say what lies between two states.
     ///
     /// ```

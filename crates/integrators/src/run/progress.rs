@@ -1,11 +1,12 @@
 //! Where a run is on its schedule: what its next step depends on beside the state and the memory of the method.
 
 use crate::run::controller::StepSize;
-use crate::run::scales::{Judged, Scales};
-use crate::run::trajectory::Ending;
+use crate::run::ending::Ending;
+use crate::run::judged::Judged;
+use crate::step::Scales;
 
 #[cfg(feature = "serde")]
-use crate::run::checkpoint::exact;
+use crate::step::exact;
 
 /// Where a run is on its schedule.
 #[derive(Clone, Debug, PartialEq)]

@@ -1,16 +1,20 @@
 //! The states of a run in a row: one after the other, or all in a trajectory.
 
-use crate::error::RunError;
-use crate::method::{Flow, Method};
 use crate::run::controller::StepSize;
-use crate::run::output::Watching;
+use crate::run::ending::Ending;
+use crate::run::error::RunError;
 use crate::run::progress::Progress;
-use crate::run::span::{ROOM, SpanError};
+use crate::run::span_error::SpanError;
+use crate::run::state::State;
 use crate::run::steps::Steps;
-use crate::run::trajectory::{Ending, State, Trajectory, thin_out};
-use crate::step_error::StepError;
+use crate::run::trajectory::{Trajectory, thin_out};
+use crate::run::watching::Watching;
+use crate::step::{Flow, StepError, Stepper};
 
-impl<F: Flow, M: Method<F>> Steps<'_, F, M> {
+/// The most states that a run makes room for beforehand: it may end long before its span.
+const ROOM: usize = 1 << 12;
+
+impl<F: Flow, M: Stepper<F>> Steps<'_, F, M> {
     /// Takes all steps that are left, and records the states from here on.
     ///
     /// # Errors
@@ -79,7 +83,7 @@ impl<F: Flow, M: Method<F>> Steps<'_, F, M> {
     }
 }
 
-impl<F: Flow, M: Method<F>> Iterator for Steps<'_, F, M> {
+impl<F: Flow, M: Stepper<F>> Iterator for Steps<'_, F, M> {
     type Item = Result<State<F::Space>, StepError>;
 
     fn next(&mut self) -> Option<Self::Item> {

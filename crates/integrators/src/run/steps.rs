@@ -2,28 +2,29 @@
 
 use std::fmt;
 
-use crate::error::RunError;
-use crate::method::{
-    Effort, Element, EntropyStep, Flow, Laws, LimitingSites, Memory as _, Method, Promises,
-    Refusal, StepEnds, StepStart, Taken, Vector as _,
-};
 use crate::round_off::bound::{ROUNDED, breaks_first_law};
-use crate::run::certificate::{Certificate, StepOf};
+use crate::run::certificate::{Certificate, InvariantBalance, StepOf};
 use crate::run::controller::{Controller, Rule, StepSize};
-use crate::run::dense::says_between;
-use crate::run::output::{StepBefore, Watching};
+use crate::run::ending::Ending;
+use crate::run::error::RunError;
+use crate::run::judged::Judged;
 use crate::run::progress::Progress;
-use crate::run::scales::{Judged, Scales, larger, relative};
-use crate::run::span::{Schedule, Size};
-use crate::run::trajectory::{Ending, State};
-use crate::step_error::StepError;
+use crate::run::schedule::{Schedule, Size};
+use crate::run::state::State;
+use crate::run::watching::{StepBefore, Watching};
+use crate::step::dense::says_between;
+use crate::step::scales::{larger, relative};
+use crate::step::{
+    Effort, Element, EntropyStep, Flow, Laws, LimitingSites, Memory as _, Promises, Refusal,
+    Scales, StepEnds, StepError, StepStart, Stepper, Taken, Vector as _,
+};
 
 /// The iterator over the states of a run after its start, in constant memory; ended by an error, or
 /// where its schedule ends. With a step size alone it is endless. It yields the state after each step, or those at
 /// the [times asked for](crate::Watch::output_at) and the last one. An endless iterator over such times ends with them.
 ///
-/// Made by [`Method::steps`] or [`Run::steps`](crate::Run::steps).
-pub struct Steps<'a, F: Flow, M: Method<F>> {
+/// Made by [`Method::steps`](crate::Method::steps) or [`Run::steps`](crate::Run::steps).
+pub struct Steps<'a, F: Flow, M: Stepper<F>> {
     pub(super) method: M,
     pub(super) flow: &'a F,
     pub(super) rule: Rule,
@@ -42,7 +43,7 @@ pub struct Steps<'a, F: Flow, M: Method<F>> {
     pub(super) watching: Option<Box<Watching<F::Space>>>,
 }
 
-impl<F: Flow, M: Method<F>> fmt::Debug for Steps<'_, F, M> {
+impl<F: Flow, M: Stepper<F>> fmt::Debug for Steps<'_, F, M> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { state, certificate, memory, .. } = self;
         f.debug_struct("Steps")
@@ -60,7 +61,7 @@ struct Advance<F: Flow> {
     time: f64,
 }
 
-impl<'a, F: Flow, M: Method<F>> Steps<'a, F, M> {
+impl<'a, F: Flow, M: Stepper<F>> Steps<'a, F, M> {
     /// Verifies the model, and starts.
     pub(crate) fn start(
         method: M,
@@ -69,6 +70,7 @@ impl<'a, F: Flow, M: Method<F>> Steps<'a, F, M> {
         schedule: Schedule,
     ) -> Result<Self, RunError<F::Space>> {
         schedule.check()?;
+        method.check(!schedule.is_fixed())?;
         let rule = Rule::of(&method, schedule.start);
         schedule.check_tolerance(&rule)?;
         flow.check(&x0)?;
@@ -417,8 +419,7 @@ impl<'a, F: Flow, M: Method<F>> Steps<'a, F, M> {
     /// [`StepError::DependentInvariants`] if one is no longer conserved because its differential depends
     /// on those of the others.
     fn check_invariants(&self, before: &State<F::Space>) -> Result<(), StepError> {
-        let broken =
-            |balance: &crate::InvariantBalance| balance.max_error > NOT_CONSERVED * balance.scale;
+        let broken = |balance: &InvariantBalance| balance.max_error > NOT_CONSERVED * balance.scale;
         if self.promises.invariants && self.certificate.invariants.iter().any(broken) {
             self.dependent(before).map_or(Ok(()), Err)
         } else {

@@ -2,11 +2,11 @@
 
 use std::convert::Infallible;
 
-use crate::method::{Element, Flow, Vector};
-use crate::run::controller::{Controller, Pace, Rule};
-use crate::run::scales::Scales;
-use crate::run::span::{Schedule, Size, Span, SpanError, check_end, check_step_size};
-use crate::run::watch::Requests;
+use crate::run::adaptive::Adaptive;
+use crate::run::controller::Entries;
+use crate::run::requests::Requests;
+use crate::run::schedule::{Schedule, Size};
+use crate::run::span::Span;
 
 /// A run to a time, in steps that follow a tolerance; made by [`Span::until`].
 ///
@@ -33,25 +33,8 @@ pub struct Until<const N: usize = 0> {
     entries: Entries<[f64; N]>,
 }
 
-/// What is known of the errors of the entries, one number for each direction of the chart.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub(crate) enum Entries<V> {
-    /// Nothing: errors are relative to the sizes that the entries have.
-    Automatic,
-    /// The sizes of some entries; zero for an automatic one.
-    Scale(V),
-    /// Errors that are allowed in addition.
-    Absolute(V),
-}
-
 /// The tolerance without another one.
 const TOLERANCE: f64 = 1e-6;
-/// The least error `τ^p` of a step, with the power of its [`Control`](crate::method::Control), and the least error `τ`
-/// of a run: some units of round-off. So the least tolerance is 10⁻¹⁰ for `p = 3/2`, and this one for `p ≤ 1`.
-const LEAST: f64 = 1e-15;
-/// The largest tolerance: an error of the size of the entry.
-const LARGEST: f64 = 1.0;
 
 impl Span {
     /// From `t = 0` to `t = end`, in steps that follow a [tolerance](Until::tolerance) of 10⁻⁶ or
@@ -186,20 +169,6 @@ impl<const N: usize> Until<N> {
     }
 }
 
-impl<V> Entries<V> {
-    /// The same, with the numbers in another form.
-    pub(crate) fn convert<W, E>(
-        &self,
-        convert: impl FnOnce(&'static str, &V) -> Result<W, E>,
-    ) -> Result<Entries<W>, E> {
-        Ok(match self {
-            Self::Automatic => Entries::Automatic,
-            Self::Scale(sizes) => Entries::Scale(convert("sizes of entries", sizes)?),
-            Self::Absolute(errors) => Entries::Absolute(convert("errors of entries", errors)?),
-        })
-    }
-}
-
 impl<const N: usize> From<Until<N>> for Schedule {
     fn from(until: Until<N>) -> Self {
         let Until { start, end, tolerance, first, least, largest, every, most, rest, entries } =
@@ -207,74 +176,5 @@ impl<const N: usize> From<Until<N>> for Schedule {
         let Ok(entries) = entries.convert(|_, numbers| Ok::<_, Infallible>((*numbers).into()));
         let size = Size::Tolerance(Adaptive { end, tolerance, first, least, largest, entries });
         Self { size, start, count: None, every, most, rest, watch: Requests::default() }
-    }
-}
-
-/// What a course says of steps that follow a tolerance.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Adaptive {
-    end: f64,
-    tolerance: f64,
-    first: Option<f64>,
-    least: Option<f64>,
-    largest: Option<f64>,
-    entries: Entries<Box<[f64]>>,
-}
-
-impl Adaptive {
-    pub(crate) const fn end(&self) -> f64 {
-        self.end
-    }
-
-    pub(crate) fn check(&self, start: f64) -> Result<(), SpanError> {
-        check_end(start, self.end)?;
-        for h in [self.first, self.least, self.largest].into_iter().flatten() {
-            check_step_size(h)?;
-        }
-        if let (Some(least), Some(largest)) = (self.least, self.largest)
-            && least > largest
-        {
-            return Err(SpanError::StepSizes { least, largest });
-        }
-        Ok(())
-    }
-
-    /// Accepts a tolerance that a method with this rule can hold.
-    pub(crate) fn check_tolerance(&self, rule: &Rule) -> Result<(), SpanError> {
-        let (tolerance, least, largest) = (self.tolerance, rule.tolerance_of(LEAST), LARGEST);
-        let least = least.max(LEAST);
-        if tolerance >= least && tolerance <= largest {
-            Ok(())
-        } else {
-            Err(SpanError::Tolerance { tolerance, least, largest })
-        }
-    }
-
-    /// The numbers for the entries of a point with `expected` directions.
-    fn entries<V: Vector>(&self, like: &V) -> Result<Entries<V>, SpanError> {
-        self.entries.convert(|_, list| {
-            let bad = list.iter().position(|x| !(*x >= 0.0 && x.is_finite()));
-            if let Some(index) = bad {
-                return Err(SpanError::Entry { index, value: list[index] });
-            }
-            let other = SpanError::Entries { found: list.len(), expected: like.kinds() };
-            like.with_list(list).ok_or(other)
-        })
-    }
-
-    /// The controller of a run from `x` under this rule, with entries of these sizes.
-    pub(crate) fn controller<F: Flow>(
-        &self,
-        rule: &Rule,
-        flow: &F,
-        x: &Element<F>,
-        scales: &Scales<F::Vector>,
-    ) -> Result<Controller<F::Vector>, SpanError> {
-        let Self { end, tolerance, least, largest, .. } = *self;
-        let pace = Pace { end, tolerance, least, largest, ..Pace::default() };
-        let mut controller = Controller { pace, entries: self.entries(&scales.sizes)? };
-        let first = self.first.unwrap_or_else(|| controller.first_step(rule, flow, x, scales));
-        controller.pace.next = controller.pace.within(rule, first);
-        Ok(controller)
     }
 }

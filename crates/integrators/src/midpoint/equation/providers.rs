@@ -15,8 +15,8 @@ use metriplectic_manifolds::{
 
 use super::{CovectorsOf, Law, Provider, Residual};
 use crate::discrete_gradient::DiscreteGradient;
-use crate::midpoint::Dim;
 use crate::round_off::stable_gradient::{Segment, StableGradient};
+use crate::step::Dim;
 
 /// Discrete gradients along one path by their definition.
 pub(super) struct Defined<'a, 'b, Y: Metriplectic, R, W, D: Scalar> {

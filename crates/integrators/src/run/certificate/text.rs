@@ -7,9 +7,9 @@ use metriplectic_dynamics::SecondLaw;
 use super::{
     Certificate, InvariantBalance, MisjudgedSize, ProjectedSteps, StageBalance, UNRESOLVED,
 };
-use crate::digits::{Digits, counted};
-use crate::method::{Effort, LimitingSites};
 use crate::round_off::bound::of_a_law;
+use crate::step::digits::{Digits, counted};
+use crate::step::{Effort, LimitingSites};
 
 /// The local error from which on a hundred steps may be off by what a picture shows: about 27 steps of the midpoint rule
 /// in a turn.

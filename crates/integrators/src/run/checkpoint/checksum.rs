@@ -3,7 +3,7 @@
 use serde::de::value::Error;
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de, ser};
 
-use super::SavedRun;
+use super::saved::SavedRun;
 
 /// A sum over words `w`: `c ← rot((c ⊕ w) m)` with an odd `m`. Each step is one to one in `c` and in `w`, so another
 /// value of one word is always another sum.

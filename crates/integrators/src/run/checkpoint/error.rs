@@ -2,7 +2,8 @@
 
 use metriplectic_manifolds::PointError;
 
-use crate::run::span::SpanError;
+use crate::run::span_error::SpanError;
+use crate::step::{MethodError, RestoreError};
 
 /// A checkpoint that cannot be resumed.
 #[derive(Clone, PartialEq, thiserror::Error)]
@@ -64,11 +65,14 @@ pub enum ResumeError {
          it is of, or start a run by the other one at its point"
     )]
     AnotherMethod {
-        /// The [name](crate::Method::name) of the method in the checkpoint.
+        /// The [name](crate::Stepper::name) of the method in the checkpoint.
         stored: String,
         /// The name of the method that was to resume it.
         found: String,
     },
+    /// The method has found a fault of its own.
+    #[error(transparent)]
+    Method(#[from] MethodError),
     /// A number of its file has changed since it was written.
     #[error(
         "the numbers of the checkpoint have the checksum {found:016x}, and its file says {stored:016x}; the file \
@@ -94,4 +98,24 @@ impl std::fmt::Debug for ResumeError {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         std::fmt::Display::fmt(self, f)
     }
+}
+
+impl From<RestoreError> for ResumeError {
+    fn from(error: RestoreError) -> Self {
+        match error {
+            RestoreError::Length { what, found, expected } => {
+                Self::Length { what, found, expected }
+            }
+            RestoreError::Damaged { what, value } => Self::Damaged { what, value },
+        }
+    }
+}
+
+/// Accepts a list of the length that the system says.
+pub(super) const fn expect_length(
+    what: &'static str,
+    found: usize,
+    expected: usize,
+) -> Result<(), ResumeError> {
+    if found == expected { Ok(()) } else { Err(ResumeError::Length { what, found, expected }) }
 }

@@ -7,7 +7,8 @@ use serde::de::{Deserialize, Deserializer, Error, IgnoredAny, MapAccess, SeqAcce
 use serde::ser::{Error as _, Serialize, SerializeStruct as _, Serializer};
 
 use super::checksum::Checksum;
-use super::{Checkpoint, ResumeError, SavedRun, VERSION};
+use super::saved::SavedRun;
+use super::{Checkpoint, ResumeError, VERSION};
 
 impl Serialize for Checkpoint {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {

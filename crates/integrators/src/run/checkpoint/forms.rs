@@ -5,12 +5,12 @@ use metriplectic_dynamics::SecondLaw;
 use metriplectic_dynamics::invariants::Kind;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-use super::exact::{self, ExactForm};
-use crate::method::{Effort, LimitingSites, Promises};
 use crate::run::certificate::{
     Certificate, InvariantBalance, MisjudgedSize, ProjectedSteps, StageBalance,
 };
-use crate::run::trajectory::Ending;
+use crate::run::ending::Ending;
+use crate::step::exact::{self, ExactForm};
+use crate::step::{Effort, LimitingSites, Promises};
 
 #[derive(Serialize, Deserialize)]
 #[serde(remote = "Certificate", deny_unknown_fields)]

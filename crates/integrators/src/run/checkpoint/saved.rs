@@ -1,43 +1,38 @@
-//! What a method saves.
+//! A run between two steps, as it is saved.
 
-use std::collections::BTreeMap;
+use crate::run::certificate::Certificate;
+use crate::run::progress::Progress;
+use crate::step::Saved;
+use crate::step::exact::Exact;
 
-use super::{Exact, ResumeError};
+#[cfg(feature = "serde")]
+use crate::step::exact;
 
-/// The numbers that a method keeps from one step to the next, in named lists.
-#[derive(Clone, Debug, Default, PartialEq)]
+/// A run between two steps, but for its system and the options of its method.
+#[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Saved(BTreeMap<String, Vec<Exact>>);
+#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
+pub(super) struct SavedRun {
+    /// The name of the method.
+    pub(super) method: String,
+    pub(super) step: usize,
+    pub(super) time: Exact,
+    pub(super) point: Vec<Exact>,
+    /// The velocity there; empty where it cannot be evaluated.
+    pub(super) velocity: Vec<Exact>,
+    pub(super) energy: Exact,
+    pub(super) entropy: Exact,
+    /// The entropy after the last step that dissipated.
+    pub(super) kept_entropy: Exact,
+    pub(super) invariants: Vec<Exact>,
+    pub(super) memory: Saved,
+    #[cfg_attr(feature = "serde", serde(with = "exact"))]
+    pub(super) balance: Certificate,
+    pub(super) progress: Progress<Vec<Exact>>,
+}
 
-impl Saved {
-    /// Puts a list under a name.
-    pub fn put(&mut self, name: &str, numbers: impl IntoIterator<Item = f64>) {
-        self.0.insert(name.to_owned(), numbers.into_iter().map(Exact).collect());
-    }
-
-    /// The list under a name; `None` if it was not put.
-    ///
-    /// # Errors
-    ///
-    /// [`ResumeError`] if it has another length, or a number that is not finite.
-    pub fn get(&self, name: &'static str, length: usize) -> Result<Option<Vec<f64>>, ResumeError> {
-        let list = self.list(name)?;
-        if let Some(list) = &list {
-            super::expect_length(name, list.len(), length)?;
-        }
-        Ok(list)
-    }
-
-    /// The list under a name, of any length; `None` if it was not put.
-    ///
-    /// # Errors
-    ///
-    /// [`ResumeError`] if it has a number that is not finite.
-    pub fn list(&self, name: &'static str) -> Result<Option<Vec<f64>>, ResumeError> {
-        let Some(list) = self.0.get(name) else { return Ok(None) };
-        match list.iter().find(|number| !number.0.is_finite()) {
-            Some(number) => Err(ResumeError::Damaged { what: name, value: number.0 }),
-            None => Ok(Some(list.iter().map(|number| number.0).collect())),
-        }
+impl SavedRun {
+    pub(super) fn point(&self) -> impl Iterator<Item = f64> {
+        self.point.iter().map(|x| x.0)
     }
 }

@@ -1,7 +1,9 @@
 //! Checks that a checkpoint belongs to the method and to the system that are to resume it.
 
-use super::{Exact, ResumeError, SavedRun};
-use crate::method::{Element, Flow, Vector as _};
+use super::error::{ResumeError, expect_length};
+use super::saved::SavedRun;
+use crate::step::exact::Exact;
+use crate::step::{Element, Flow, Vector as _};
 
 /// Units of round-off by which the values of one field differ between two mathematical libraries: some
 /// units for each function in it, and far less than any change of a model.
@@ -42,7 +44,7 @@ pub(super) fn of_the_system<F: Flow>(
     if let Some([velocity, terms]) = flow.rates_and_terms(x)
         && !c.velocity.is_empty()
     {
-        super::expect_length("entries of the velocity", c.velocity.len(), velocity.len())?;
+        expect_length("entries of the velocity", c.velocity.len(), velocity.len())?;
         for (i, stored) in c.velocity.iter().enumerate() {
             same("velocity", *stored, velocity.get(i), terms.get(i))?;
         }

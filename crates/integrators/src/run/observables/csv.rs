@@ -4,8 +4,8 @@ use std::fmt;
 use std::io::{self, Write};
 
 use super::{BUFFER, Observables, TableError};
-use crate::method::StateSpace;
-use crate::run::trajectory::State;
+use crate::run::state::State;
+use crate::step::StateSpace;
 
 /// A table of comma-separated values; made by [`Observables::csv`].
 #[derive(Debug)]

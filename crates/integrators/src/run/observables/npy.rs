@@ -3,8 +3,8 @@
 use std::io::{self, Seek, SeekFrom, Write};
 
 use super::{BUFFER, Observables, TableError};
-use crate::method::StateSpace;
-use crate::run::trajectory::State;
+use crate::run::state::State;
+use crate::step::StateSpace;
 
 /// An array of `numpy`; made by [`Observables::npy`].
 #[derive(Debug)]

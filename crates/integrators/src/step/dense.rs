@@ -14,7 +14,7 @@
 
 use metriplectic_dynamics::SecondLaw;
 
-use crate::method::{Element, Flow, Laws, Promises, StepEnds, Vector};
+use super::{Element, Flow, Laws, Promises, StepEnds, Vector};
 
 /// The cubic of Hermite in the chart at the start of a step.
 #[derive(Clone, Debug)]

@@ -12,8 +12,8 @@
 //! step that is longer than a period differs from two halves. Entries of one kind, such as the positions of all sites
 //! of a lattice, share the largest size.
 
+use super::scales::{Scales, larger};
 use super::{Element, Flow, Vector};
-use crate::run::scales::{Scales, larger};
 
 /// The fraction of the span and of the times `s_i/|v_i|` with which the search for `h` begins.
 const FIRST: f64 = 0.25;
@@ -27,6 +27,20 @@ const RESOLVED: f64 = 0.125;
 const NOTHING: f64 = 1e-9;
 /// The displacement along the velocity, relative to the first `h`, at which late entries are told apart.
 const AHEAD: f64 = 1e-6;
+
+impl<V: Vector> Scales<V> {
+    /// The sizes at `x`, where a run starts that lasts `span`, or where entries begin to move. Without a span
+    /// nothing is known.
+    pub(crate) fn at<F: Flow<Vector = V>>(flow: &F, x: &Element<F>, span: Option<f64>) -> Self {
+        let sizes = flow.sizes(x);
+        let zero = sizes.zero();
+        let Some(span) = span else { return Self { sizes: zero.clone(), terms: zero } };
+        match flow.reach(x, span) {
+            Some(reached) => reached.or(&sizes),
+            None => Self { sizes, terms: zero },
+        }
+    }
+}
 
 /// The sizes that the entries reach soon in a run that lasts `span`; `None` if the flow has no rates at `x`, or
 /// nowhere near it.
@@ -46,7 +60,7 @@ pub(super) fn initial_scales<F: Flow + ?Sized>(
 
 /// The displacement from `x` of a step of the classical Runge-Kutta method that begins at the displacement `d`, with
 /// the velocity `v` there; `None` if it leaves the domain.
-pub(super) fn classical_step<F: Flow + ?Sized>(
+pub(crate) fn classical_step<F: Flow + ?Sized>(
     flow: &F,
     x: &Element<F>,
     [d, v]: [&F::Vector; 2],
@@ -136,7 +150,7 @@ impl<F: Flow + ?Sized> Start<'_, F> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::method::{Laws, StateSpace};
+    use crate::step::{Laws, StateSpace};
     use metriplectic_manifolds::PointError;
 
     /// The numbers of a state, of any length.

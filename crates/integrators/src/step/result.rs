@@ -1,7 +1,6 @@
 //! What goes into a step of a method, and what comes out of it.
 
-use super::{Effort, Element, Evidence, Flow, Laws};
-use crate::step_error::StepError;
+use super::{Effort, Element, Evidence, Flow, Laws, StepError};
 
 /// Where a step starts.
 #[derive(Debug)]

@@ -5,11 +5,11 @@ use metriplectic_manifolds::{
     Cayley, ChartMidpoint, Exponential, Projection, Retraction, WeylMidpoint,
 };
 
-use super::Scheme;
-use crate::error::RunError;
-use crate::method::Method as _;
+use crate::midpoint::Scheme;
 use crate::run::checkpoint::{Checkpoint, ResumeError};
-use crate::run::span::Schedule;
+use crate::run::error::RunError;
+use crate::run::method::Method as _;
+use crate::run::schedule::Schedule;
 use crate::run::steps::Steps;
 use crate::run::trajectory::Trajectory;
 

@@ -4,9 +4,8 @@ use std::fmt;
 
 use metriplectic_dynamics::ModelError;
 
-use crate::digits::{counted, digits};
-use crate::error::FlowError;
-use crate::method::Effort;
+use super::digits::{counted, digits};
+use super::{Effort, FlowError, MethodError};
 
 impl fmt::Display for Effort {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -35,6 +34,15 @@ pub enum StepError {
         /// The law, with the state at which it is broken.
         #[source]
         law: Box<ModelError>,
+    },
+    /// The method has found a fault of its own.
+    #[error("the method cannot take a step from t = {}: {error}", digits(.time))]
+    Method {
+        /// The time at which the step starts.
+        time: f64,
+        /// The fault.
+        #[source]
+        error: MethodError,
     },
     /// The flow has found a fault of its own at a state that the run has reached.
     #[error("the system was verified at the start of the run, but at t = {}: {law}", digits(.time))]
@@ -261,6 +269,7 @@ impl StepError {
             | Self::SiteOutOfDomain { h, .. } => Some(h.abs()),
             Self::Model { .. }
             | Self::Flow { .. }
+            | Self::Method { .. }
             | Self::DependentInvariants { .. }
             | Self::NothingBetween { .. } => None,
         }

@@ -7,10 +7,9 @@ use metriplectic_fields::{
 };
 use metriplectic_manifolds::Manifold;
 
-use super::flow::{Projected, ProjectionError, StageFlow, Target};
-use super::referred_rise;
-use crate::method::{Components, Laws};
-use crate::midpoint::{Dim, Numbers};
+use super::referred_rise::{self, INDEPENDENT};
+use crate::explicit::{Projected, ProjectionError, StageFlow, Target};
+use crate::step::{Components, Dim, Laws, Numbers};
 
 type Tangent<Y> = Components<Vector<<Y as Metriplectic>::Manifold>>;
 
@@ -176,8 +175,6 @@ struct Normals<N: Dimension> {
     off: f64,
 }
 
-/// The independent fraction of a differential below which it is a combination of others.
-pub(super) const INDEPENDENT: f64 = 1e-10;
 /// The residual of an entropy, in units of its round-off, from which on the round-off of the other laws, which
 /// moves it too, is corrected.
 const OFF: f64 = 0.8;

@@ -1,18 +1,24 @@
-//! A metriplectic system as a flow.
+//! Every metriplectic system is a flow, and one on which explicit methods run.
+
+mod reach;
+mod referred_rise;
+mod stages;
 
 use metriplectic_dynamics::invariants::{Kind, Visitor};
-use metriplectic_dynamics::velocity::{Covectors, Gradient, differentials, irreversible};
+use metriplectic_dynamics::velocity::{
+    Covectors, Gradient, differentials, irreversible, projected_fractions,
+};
 use metriplectic_dynamics::{
     Dissipation, Invariants, Metriplectic, ModelError, SecondLaw, system::Point,
 };
 use metriplectic_fields::{ChartPoint, Column, Dimension, ScalarField, Space, stack};
 use metriplectic_manifolds::{Manifold, PointError};
 
-use super::{Components, Flow, Laws, Recheck, reach};
+pub use stages::LawJets;
+
 use crate::explicit::{StageFlow as _, Target};
-use crate::midpoint::{Dim, Numbers, dependent_invariant};
 use crate::round_off::bound::{SizesAt, of_an_increment, size_of_terms, sizes_on_a_step};
-use crate::run::scales::Scales;
+use crate::step::{Components, Dim, Flow, Laws, Numbers, Recheck, Scales};
 
 type Tangent<Y> = Components<metriplectic_fields::Vector<<Y as Metriplectic>::Manifold>>;
 
@@ -195,3 +201,14 @@ fn of_each<Y: Metriplectic>(
     let numbers = Covectors::new([0.0; 2], system.invariants(), number);
     Dim::<Y>::array(|k| numbers.invariants[k].map_or(0.0, |(_, value)| value))
 }
+
+/// The further invariant that has the least independent fraction at `x`, and this fraction, if it is small
+/// enough to be the cause of a failure.
+fn dependent_invariant<Y: Metriplectic>(system: &Y, x: &Point<Y>) -> Option<(usize, f64)> {
+    let fractions = projected_fractions(system, &ChartPoint::centre(x)).ok()?;
+    let least = fractions.into_iter().enumerate().min_by(|a, b| a.1.total_cmp(&b.1));
+    least.filter(|(_, fraction)| *fraction < DEPENDENT)
+}
+
+/// The independent fraction of a further invariant's differential that explains a failure.
+const DEPENDENT: f64 = 1e-3;

@@ -24,10 +24,11 @@ impl Control {
     /// The PI controller of Gustafsson (1991) for a method of order `p`, with local errors `∝ τ^{(p+1)/p}`: the
     /// error at the end of a run is proportional to the tolerance.
     #[must_use]
-    pub fn of_order(p: u32) -> Self {
-        let local = f64::from(p + 1);
+    pub const fn of_order(p: u32) -> Self {
+        #[allow(clippy::cast_lossless, reason = "`f64::from` is not constant")]
+        let (order, local) = (p as f64, (p + 1) as f64);
         Self {
-            power: local / f64::from(p),
+            power: local / order,
             alpha: 0.7 / local,
             beta: 0.4 / local,
             rejected: 1.0 / local,

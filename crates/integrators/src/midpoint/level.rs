@@ -21,11 +21,11 @@ use metriplectic_dynamics::{Metriplectic, system::Point};
 use metriplectic_fields::{ChartPoint, Column, Dimension, Space, Square, Vector};
 use metriplectic_manifolds::{InnerProduct, Manifold, Retraction};
 
+use super::equation::{Dissipated, Jet, Residual};
 use crate::discrete_gradient::DiscreteGradient;
-use crate::method::Effort;
-use crate::midpoint::{Dim, Dissipated, Jet, Residual};
 use crate::newton::Root;
 use crate::round_off::bound::{ROUNDED, of_an_increment, size_of_terms};
+use crate::step::{Dim, Effort};
 
 /// A root and its end, with the last digits of the laws.
 pub(crate) struct Polished<Y: Metriplectic> {

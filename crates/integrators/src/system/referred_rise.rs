@@ -16,9 +16,10 @@ use metriplectic_dynamics::{Metriplectic, system::Point};
 use metriplectic_fields::{ChartPoint, Column, Dimension, Space, Vector};
 use metriplectic_manifolds::Manifold;
 
-use super::metriplectic::INDEPENDENT;
-use crate::midpoint::Dim;
+use crate::step::Dim;
 
+/// The independent fraction of a differential below which it is a combination of others.
+pub(super) const INDEPENDENT: f64 = 1e-10;
 /// The rounding of a differential, and of a product with it, in units of `ε` of its terms.
 const ROUNDING: f64 = 8.0;
 

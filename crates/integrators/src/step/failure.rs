@@ -1,6 +1,6 @@
 //! How hard an implicit step is tried, and why it was not taken.
 
-use crate::step_error::StepError;
+use super::StepError;
 
 /// How hard to try.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -7,10 +7,8 @@ use metriplectic_dynamics::invariants::Kind;
 use metriplectic_dynamics::{ModelError, SecondLaw};
 use metriplectic_manifolds::{Manifold, PointError};
 
-use super::Vector;
 use super::initial_scales::initial_scales;
-use crate::error::FlowError;
-use crate::run::scales::Scales;
+use super::{FlowError, Scales, Vector};
 
 /// Where the states of a run live. Every [`Manifold`] is a state space.
 pub trait StateSpace: Clone + Debug + PartialEq + Send + Sync + 'static {

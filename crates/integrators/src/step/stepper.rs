@@ -1,41 +1,16 @@
-//! What a run knows of a system and of a method.
-//!
-//! A run needs little of a system: its laws, and how large things are. This is a [`Flow`]; every
-//! [`Metriplectic`](metriplectic_dynamics::Metriplectic) system is one. It knows of a method that it takes
-//! steps, what these promise, and what has to be saved between two of them: a [`Method`]. Everything that a
-//! user does with a run, from [`Span`](crate::Span) to [`Checkpoint`], works with any flow
-//! and any method.
+//! What a run knows of a method.
 
-mod control;
-mod evidence;
-mod flow;
-mod initial_scales;
-mod metriplectic;
-mod reach;
-mod step;
-mod vector;
-
-use std::fmt::Debug;
-
-pub use control::Control;
-pub use evidence::{Effort, EntropyStep, Evidence, LimitingSites, Promises, StageLaws};
-pub use flow::{Element, Flow, Laws, Recheck, StateSpace};
-pub use step::{Refusal, StepEnds, StepStart, Taken};
-pub use vector::{Components, Vector};
-
-use crate::error::RunError;
-use crate::run::checkpoint::{Checkpoint, ResumeError, Saved};
-use crate::run::span::Schedule;
-use crate::run::steps::Steps;
-use crate::run::trajectory::Trajectory;
-use crate::step_error::StepError;
+use super::{
+    Control, Effort, Element, Flow, LimitingSites, Memory, MethodError, Promises, Refusal,
+    StepEnds, StepError, StepStart, Taken, Vector as _, dense,
+};
 
 /// A one-step method.
 ///
 /// Laws ([`laws::method`](crate::laws::method)): 1. [`order`](Self::order) is the slope of the error;
 /// 2. what [`promises`](Self::promises) says holds on every step; 3. a step from a saved memory is the same
 /// step, bit for bit.
-pub trait Method<F: Flow>: Sized {
+pub trait Stepper<F: Flow>: Sized {
     /// What it keeps from one step to the next, [`saved`](Memory) by a checkpoint.
     type Memory: Memory;
 
@@ -50,6 +25,16 @@ pub trait Method<F: Flow>: Sized {
 
     /// What holds exactly on every step.
     fn promises(&self, flow: &F) -> Promises;
+
+    /// Refuses options with which no run can start, of steps that follow a tolerance or have one size.
+    ///
+    /// # Errors
+    ///
+    /// The method's own error.
+    fn check(&self, follows_tolerance: bool) -> Result<(), MethodError> {
+        let _ = follows_tolerance;
+        Ok(())
+    }
 
     /// One step of size `h`, at any price.
     ///
@@ -104,7 +89,7 @@ pub trait Method<F: Flow>: Sized {
     }
 
     /// The sites at which a step has the largest error, in units of the one allowed, and at which the motion is
-    /// stiffest. A run asks for them on a few steps, and only for vectors with [`sites`](Vector::sites).
+    /// stiffest. A run asks for them on a few steps, and only for vectors with [`sites`](super::Vector::sites).
     ///
     /// The default has the site of the error that the [`Flow`] estimates.
     fn limiting_sites(
@@ -135,53 +120,7 @@ pub trait Method<F: Flow>: Sized {
         theta: f64,
     ) -> Option<Element<F>> {
         let _ = memory;
-        crate::run::dense::between(flow, step, self.promises(flow), theta)
-    }
-
-    /// Verifies the model and starts a run: endless in steps of size `h`, or over a [`Span`](crate::Span) or
-    /// [`Until`](crate::Until).
-    ///
-    /// # Errors
-    ///
-    /// [`RunError`] if the model breaks a law or the schedule cannot be run.
-    fn steps(
-        self,
-        flow: &F,
-        x0: Element<F>,
-        schedule: impl Into<Schedule>,
-    ) -> Result<Steps<'_, F, Self>, RunError<F::Space>> {
-        let schedule = schedule.into();
-        flow.with_room(|| Steps::start(self, flow, x0, schedule))
-    }
-
-    /// Verifies the model, runs it over a [`Span`](crate::Span) or [`Until`](crate::Until), and records the states.
-    ///
-    /// # Errors
-    ///
-    /// [`RunError`]; if a step failed, the trajectory so far is in it.
-    fn run(
-        self,
-        flow: &F,
-        x0: Element<F>,
-        schedule: impl Into<Schedule>,
-    ) -> Result<Trajectory<F::Space>, RunError<F::Space>> {
-        let schedule = schedule.into();
-        flow.with_room(|| self.steps(flow, x0, schedule)?.run())
-    }
-
-    /// Takes up a run where it was put down. With the system and the method of that run the steps
-    /// are those that it would have taken, bit for bit.
-    ///
-    /// # Errors
-    ///
-    /// [`ResumeError`] if the checkpoint does not belong to the system or to the method, or if its file has
-    /// changed.
-    fn resume<'a>(
-        self,
-        flow: &'a F,
-        checkpoint: &Checkpoint,
-    ) -> Result<Steps<'a, F, Self>, ResumeError> {
-        flow.with_room(|| Steps::resume(self, flow, checkpoint))
+        dense::between(flow, step, self.promises(flow), theta)
     }
 }
 
@@ -193,37 +132,4 @@ pub(crate) fn name_of<T>() -> String {
         name.push_str(part.rsplit("::").next().unwrap_or(part));
     }
     name
-}
-
-/// What a method keeps from one step to the next.
-pub trait Memory: Clone + Debug + Default {
-    /// The memory for steps of `ratio` times the size.
-    #[must_use]
-    fn rescaled(&self, ratio: f64) -> Self;
-
-    /// Notes what a try that was refused has left in its own copy of this memory.
-    fn refused(&mut self, tried: Self) {
-        let _ = tried;
-    }
-
-    /// Puts all of its numbers into a checkpoint.
-    fn save(&self, saved: &mut Saved);
-
-    /// Reads them from a checkpoint.
-    ///
-    /// # Errors
-    ///
-    /// [`ResumeError`] if a number is missing or impossible.
-    fn restore(saved: &Saved) -> Result<Self, ResumeError>;
-}
-
-/// The memory of a method that has none.
-impl Memory for () {
-    fn rescaled(&self, _: f64) -> Self {}
-
-    fn save(&self, _: &mut Saved) {}
-
-    fn restore(_: &Saved) -> Result<Self, ResumeError> {
-        Ok(())
-    }
 }

@@ -20,8 +20,7 @@ use metriplectic_dynamics::{Bracket, Dissipation, Metriplectic, system::Point};
 use metriplectic_fields::{ChartPoint, Column, Matrix, Scalar, Square, Vector, jacobian};
 use metriplectic_manifolds::Manifold;
 
-use crate::method::{Components, initial_scales};
-use crate::run::scales::Scales;
+use crate::step::{Components, Scales, classical_step as classical_step_of};
 
 /// The velocity at `x`, and the sizes of what it is summed of; `None` if it cannot be evaluated there.
 pub(super) fn velocity_and_terms<Y: Metriplectic>(
@@ -92,7 +91,7 @@ fn classical_step<Y: Metriplectic>(
     h: f64,
 ) -> Option<Vector<Y::Manifold>> {
     let (origin, v) = (Components(Vector::<Y::Manifold>::zero()), Components(v));
-    initial_scales::classical_step(system, x, [&origin, &v], h).map(|end| end.0)
+    classical_step_of(system, x, [&origin, &v], h).map(|end| end.0)
 }
 
 /// The fraction of a displacement below which the first powers of time say nothing of it.

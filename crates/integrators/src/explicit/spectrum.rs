@@ -1,0 +1,90 @@
+//! The spectral radius of the equation of motion, by the power method (Sommeijer, Shampine, Verwer 1997, §3).
+
+use super::flow::StageFlow;
+use super::stage::stage;
+use crate::step::{Element, Vector};
+
+/// Steps after which the spectral radius is found anew.
+const PATIENCE: u32 = 25;
+/// The most iterations of the power method, the change at which it ends, and what the estimate may miss.
+const ITERATIONS: u32 = 50;
+const CHANGE: f64 = 0.01;
+const SAFETY: f64 = 1.2;
+
+/// The spectral radius of the equation of motion, and a direction in which it is attained.
+#[derive(Clone, Debug)]
+pub(super) struct Spectrum<V> {
+    pub(super) radius: f64,
+    /// Steps since it was found.
+    pub(super) age: u32,
+    /// `None` after it was read from a checkpoint.
+    pub(super) direction: Option<V>,
+    /// The direction as it was read.
+    pub(super) read: Vec<f64>,
+}
+
+impl<V: Vector> Spectrum<V> {
+    /// The direction that was read, as a vector of the length of `like`.
+    fn as_read(&self, like: &V) -> V {
+        like.with(|i| <[f64]>::get(&self.read, i).copied().unwrap_or(0.0))
+    }
+
+    /// The site with the largest part of the direction.
+    pub(super) fn stiffest_site(&self, sizes: &V) -> Option<usize> {
+        match &self.direction {
+            Some(direction) => direction.largest_site(sizes),
+            None => self.as_read(sizes).largest_site(sizes),
+        }
+    }
+}
+
+/// The spectral radius at a state with this velocity; `None` if it cannot be found.
+pub(super) fn spectrum<F: StageFlow>(
+    flow: &F,
+    x: &Element<F>,
+    velocity: &F::Vector,
+    known: Option<Spectrum<F::Vector>>,
+) -> Option<Spectrum<F::Vector>> {
+    let mut direction = match known {
+        Some(known) if known.age < PATIENCE => {
+            return Some(Spectrum { age: known.age + 1, ..known });
+        }
+        Some(Spectrum { direction: Some(direction), .. }) => direction,
+        Some(known) => known.as_read(velocity),
+        None => irregular(&flow.sizes(x)),
+    };
+    let sizes = flow.sizes(x);
+    let small = f64::EPSILON.sqrt();
+    let mut radius = 0.0;
+    for _ in 0..ITERATIONS {
+        let length = direction.relative_to(&sizes);
+        if !(length > 0.0 && length.is_finite()) {
+            break;
+        }
+        let factor = small / length;
+        let q = direction.map(|d| factor * d);
+        let k = stage(flow, x, &q)?.velocity;
+        direction = Vector::zip([&k, velocity], |[k, velocity]| k - velocity);
+        let found = direction.relative_to(&sizes) / small;
+        let converged = (found - radius).abs() <= CHANGE * found;
+        radius = found;
+        if converged {
+            break;
+        }
+    }
+    let radius = SAFETY * radius;
+    radius.is_finite().then_some(Spectrum {
+        radius,
+        age: 0,
+        direction: Some(direction),
+        read: Vec::new(),
+    })
+}
+
+/// A direction with a part along each other one: entries of both signs, without a pattern (Weyl 1916).
+fn irregular<V: Vector>(sizes: &V) -> V {
+    sizes.with(|i| {
+        let turn = (i as f64 * 0.618_033_988_749_894_9).fract();
+        sizes.get(i) * (2.0 * (turn * turn * 1e4).fract() - 1.0)
+    })
+}

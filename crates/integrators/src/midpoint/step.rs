@@ -1,0 +1,184 @@
+//! One implicit step: guess, solve, retract, and the last digits.
+
+use metriplectic_dynamics::{Invariants, Metriplectic, SecondLaw};
+use metriplectic_fields::{Column, Dimension, ScalarField, Vector};
+use metriplectic_manifolds::{Manifold, Retraction};
+
+use super::equation::{Dissipated, Residual};
+use super::fallbacks::{self, StepFailure};
+use super::memory::MemoryOf;
+use super::scheme::Scheme;
+use super::{level, restored};
+use crate::discrete_gradient::DiscreteGradient;
+use crate::newton::Root;
+use crate::round_off::bound::{BROKEN, breaks_first_law, sizes_on_a_step};
+use crate::round_off::compensation::Displaced;
+use crate::round_off::drift;
+use crate::step::failure::{Cause, Fallbacks};
+use crate::step::{
+    Dim, Evidence, Flow as _, Laws, Promises, Refusal, Start, StepError, StepStart, Stepper, Taken,
+    name_of,
+};
+
+impl<Y, R, W> Stepper<Y> for Scheme<R, W>
+where
+    Y: Metriplectic,
+    R: Retraction<Y::Manifold, Y::Metric>,
+    W: DiscreteGradient,
+{
+    type Memory = MemoryOf<Y>;
+
+    fn name(&self) -> String {
+        format!("Scheme<{}, {}>", name_of::<R>(), name_of::<W>())
+    }
+
+    fn order(&self) -> u32 {
+        2
+    }
+
+    fn promises(&self, system: &Y) -> Promises {
+        Promises::all_laws(system.second_law() == SecondLaw::Exact)
+    }
+
+    fn step(
+        &self,
+        system: &Y,
+        start: &StepStart<'_, Y>,
+        h: f64,
+        memory: &mut MemoryOf<Y>,
+    ) -> Result<Taken<Y>, StepError> {
+        self.with_halves(system, &Start::of(start, h), memory)
+    }
+
+    fn attempt(
+        &self,
+        system: &Y,
+        start: &StepStart<'_, Y>,
+        h: f64,
+        memory: &mut MemoryOf<Y>,
+    ) -> Result<Taken<Y>, Refusal> {
+        let start = Start::of(start, h);
+        self.try_step(system, &start, memory, Fallbacks::FirstTries).map_err(|failure| Refusal {
+            effort: failure.effort,
+            error: failure.cause.first_law(start.time, h),
+            second_law: false,
+        })
+    }
+}
+
+impl<R, W: DiscreteGradient> Scheme<R, W> {
+    /// Guess, solve, retract; then the last digits.
+    pub(super) fn try_step<Y>(
+        &self,
+        system: &Y,
+        start: &Start<'_, Y>,
+        memory: &mut MemoryOf<Y>,
+        fallbacks: Fallbacks,
+    ) -> Result<Taken<Y>, StepFailure>
+    where
+        Y: Metriplectic,
+        R: Retraction<Y::Manifold, Y::Metric>,
+    {
+        let guess = memory.predictor.guess(system, start);
+        let target = drift::target(system, start, &guess);
+        let equation = Residual::of_start(system, self, start, target);
+        let (root, mut effort) =
+            fallbacks::solve(&self.newton, &equation, &guess, &mut memory.jacobian, fallbacks)?;
+        let evidence = evidence(&root, memory.friction());
+        let failed = |cause, effort| StepFailure { residual: root.residual, cause, effort };
+        if !has_digits(system, start, &root, evidence.friction) {
+            return Err(failed(Cause::Unsolved, effort));
+        }
+        if evidence.rests {
+            // What the solver found is its own round-off, and following it would make a random walk of
+            // the energy.
+            return Ok(Taken { x: start.x.clone(), values: start.values, evidence, effort });
+        }
+        let end = self.retraction.end(system.metric(), start.x, &root.u);
+        let end = end.map_err(|_| failed(Cause::Edge, effort))?;
+        // Where the laws hold at the point with the digits that earlier steps have lost, the step goes there.
+        let shifted = memory.compensation.shifted::<Y::Manifold>(&end);
+        let held = shifted.and_then(|shifted| level::held(&equation, &shifted));
+        let level::Polished { u, end, moved, evaluated } = if held.is_some() {
+            level::Polished { u: root.u, end, moved: false, evaluated: held }
+        } else {
+            level::polish(&equation, &root, end, &mut effort)
+        };
+        // Outside an open chart the defect is infinite: there is no state to go on from.
+        if system.manifold().defect(&end).is_infinite() {
+            return Err(failed(Cause::Edge, effort));
+        }
+        memory.predictor.note::<Y::Manifold>(start.x, &u, &end);
+        let compensated = if moved {
+            memory.compensation.clear();
+            None
+        } else {
+            let lost =
+                |x: &_, d: &_, end: &_| self.retraction.lost_digits(system.metric(), x, d, end);
+            let step = Displaced { x: start.x, d: &u, end: &end };
+            memory.compensation.add::<Y::Manifold>(lost, &step)
+        };
+        let evaluated = if compensated.is_some() { held } else { evaluated };
+        let x = compensated.unwrap_or(end);
+        // The last digits of the end, which no residual has seen, may be beyond the edge.
+        let values = match evaluated {
+            Some([energy, entropy]) if Y::Invariants::COUNT == 0 => {
+                Laws { energy, entropy, ..start.values }
+            }
+            _ => system.laws(&x),
+        };
+        let (x, values) = match restored::restored(system, start, &x, &values, equation.is_exact())
+        {
+            Some(restored) => {
+                memory.compensation.clear();
+                restored
+            }
+            None => (x, values),
+        };
+        let change = values.energy - start.values.energy;
+        if !values.entropy.is_finite() {
+            return Err(failed(Cause::Edge, effort));
+        }
+        let sizes = || sizes_on_a_step(system, [start.x, &x]);
+        if let Some(size) = breaks_first_law(change, values.energy, sizes) {
+            return Err(failed(Cause::Energy { change, size }, effort));
+        }
+        Ok(Taken { x, values, evidence, effort })
+    }
+}
+
+/// What a solution tells of the motion.
+fn evidence<M: Manifold>(root: &Root<M, Dissipated>, friction: f64) -> Evidence {
+    let rests = (0..Vector::<M>::LEN).all(|i| root.u[i].abs() <= 2.0 * root.round_off[i]);
+    let Dissipated { slope_squared, dissipates } = root.evidence;
+    Evidence {
+        entropy_slope: slope_squared.sqrt(),
+        dissipates,
+        friction,
+        rests,
+        ..Evidence::default()
+    }
+}
+
+/// The rate `h|K'|` of friction from which on the round-off of a solution may be large.
+const VERY_STIFF: f64 = 1e8;
+
+/// Whether the round-off of a solution is small: if friction is so stiff that the slow motion has no digits
+/// beside it, the round-off of the displacement is as large as the displacement, and a state would seem to
+/// rest. It is measured by the energy that goes with it, which has one unit for all components.
+fn has_digits<Y: Metriplectic>(
+    system: &Y,
+    start: &Start<'_, Y>,
+    Root { u, round_off, .. }: &Root<Y::Manifold, Dissipated>,
+    friction: f64,
+) -> bool {
+    if friction <= VERY_STIFF {
+        return true;
+    }
+    let scales = Y::Manifold::scales(start.x);
+    if (0..Dim::<Y>::LEN).all(|i| round_off[i] <= 1e-2 * BROKEN * (scales[i] + u[i].abs())) {
+        return true;
+    }
+    let dh = system.energy().jet1(start.x).df.abs();
+    dh.dot(round_off) <= BROKEN * (start.values.energy.abs() + dh.dot(&scales))
+}

@@ -1,0 +1,120 @@
+//! How a run is put down and taken up.
+
+use std::convert::Infallible;
+
+use super::error::{ResumeError, expect_length};
+use super::saved::SavedRun;
+use super::{Checkpoint, validation};
+use crate::run::certificate::Certificate;
+use crate::run::checked::checked_states;
+use crate::run::controller::{Rule, StepSize};
+use crate::run::state::State;
+use crate::run::steps::Steps;
+use crate::run::watching::StepBefore;
+use crate::step::exact::Exact;
+use crate::step::{Flow, Memory as _, Saved, StateSpace as _, Stepper, Vector};
+
+fn exact(numbers: impl IntoIterator<Item = f64>) -> Vec<Exact> {
+    numbers.into_iter().map(Exact).collect()
+}
+
+fn column(v: &impl Vector) -> Vec<Exact> {
+    exact(v.to_list())
+}
+
+/// The numbers of a list, as many as there are in `like`.
+fn vector<V: Vector>(what: &'static str, list: &[Exact], like: &V) -> Result<V, ResumeError> {
+    let numbers: Vec<f64> = list.iter().map(|number| number.0).collect();
+    let (found, expected) = (list.len(), like.len());
+    like.with_list(&numbers).ok_or(ResumeError::Length { what, found, expected })
+}
+
+impl<'a, F: Flow, M: Stepper<F>> Steps<'a, F, M> {
+    /// All that the next steps depend on, but for the system and the options of the method.
+    pub fn checkpoint(&self) -> Checkpoint {
+        let State { step, time, point, energy, entropy } = &self.state;
+        let velocity = self.flow.rates(point, &self.flow.sizes(point).map(|_| 0.0));
+        let known = self.certificate.invariants.len();
+        let mut memory = Saved::default();
+        self.memory.save(&mut memory);
+        let Ok(progress) =
+            self.progress.convert(|_, v| Ok::<_, Infallible>(exact(v.to_short_list())));
+        let run = SavedRun {
+            method: self.method.name(),
+            step: *step,
+            time: Exact(*time),
+            point: exact(F::Space::numbers(point)),
+            velocity: velocity.map_or_else(Vec::new, |v| column(&v)),
+            energy: Exact(*energy),
+            entropy: Exact(*entropy),
+            kept_entropy: Exact(self.entropy),
+            invariants: exact(self.values.invariants.as_ref()[..known].iter().copied()),
+            memory,
+            balance: self.certificate.clone(),
+            progress,
+        };
+        run.into()
+    }
+
+    /// A run that was put down.
+    pub(crate) fn resume(
+        method: M,
+        flow: &'a F,
+        checkpoint: &Checkpoint,
+    ) -> Result<Self, ResumeError> {
+        let c = checkpoint.run()?;
+        validation::of_the_method(&c.method, method.name())?;
+        method.check(matches!(c.progress.step_size, StepSize::Adaptive(_)))?;
+        let entries: Vec<f64> = c.point().collect();
+        let point = flow.element(&entries)?;
+        let mut certificate =
+            c.balance.resumed(Certificate::start(flow, &point, method.promises(flow)))?;
+        if c.progress.ending.is_none() {
+            certificate.checked_states = checked_states(flow, c.step);
+        }
+        let like = flow.sizes(&point);
+        let progress = c.progress.convert(|what, list| vector(what, list, &like))?;
+        let memory = M::Memory::restore(&c.memory)?;
+        expect_length("further invariants", c.invariants.len(), certificate.invariants.len())?;
+        validation::of_the_system(flow, &point, c)?;
+        let mut values = flow.laws(&point);
+        (values.energy, values.entropy) = (c.energy.0, c.entropy.0);
+        for (k, stored) in c.invariants.iter().enumerate() {
+            values.invariants[k] = stored.0;
+        }
+        let (energy, entropy, time) = (c.energy.0, c.entropy.0, c.time.0);
+        let state = State { step: c.step, time, point, energy, entropy };
+        let (kept, h, in_parts) = (c.kept_entropy.0, 0.0, false);
+        let before =
+            StepBefore { state: state.clone(), values: values.clone(), entropy: kept, h, in_parts };
+        Ok(Self {
+            promises: certificate.promises,
+            rule: Rule::of(&method, progress.start),
+            before,
+            watching: None,
+            method,
+            flow,
+            progress,
+            state,
+            values,
+            entropy: kept,
+            memory,
+            certificate,
+            failed: false,
+        })
+    }
+}
+
+impl Certificate {
+    /// These figures, in a run that starts anew with the certificate `fresh`: what the system and the method say
+    /// of themselves is theirs.
+    fn resumed(&self, fresh: Self) -> Result<Self, ResumeError> {
+        expect_length("further invariants", self.invariants.len(), fresh.invariants.len())?;
+        let Self { promises, second_law, projected, .. } = fresh;
+        let mut certificate = Self { promises, second_law, projected, ..self.clone() };
+        for (balance, fresh) in certificate.invariants.iter_mut().zip(fresh.invariants) {
+            balance.kind = fresh.kind;
+        }
+        Ok(certificate)
+    }
+}

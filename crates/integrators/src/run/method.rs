@@ -1,0 +1,59 @@
+//! Runs by any method.
+
+use crate::run::checkpoint::{Checkpoint, ResumeError};
+use crate::run::error::RunError;
+use crate::run::schedule::Schedule;
+use crate::run::steps::Steps;
+use crate::run::trajectory::Trajectory;
+use crate::step::{Element, Flow, Stepper};
+
+/// What a user does with a one-step method. Every [`Stepper`] is one.
+pub trait Method<F: Flow>: Stepper<F> {
+    /// Verifies the model and starts a run: endless in steps of size `h`, or over a [`Span`](crate::Span) or
+    /// [`Until`](crate::Until).
+    ///
+    /// # Errors
+    ///
+    /// [`RunError`] if the model breaks a law or the schedule cannot be run.
+    fn steps(
+        self,
+        flow: &F,
+        x0: Element<F>,
+        schedule: impl Into<Schedule>,
+    ) -> Result<Steps<'_, F, Self>, RunError<F::Space>> {
+        let schedule = schedule.into();
+        flow.with_room(|| Steps::start(self, flow, x0, schedule))
+    }
+
+    /// Verifies the model, runs it over a [`Span`](crate::Span) or [`Until`](crate::Until), and records the states.
+    ///
+    /// # Errors
+    ///
+    /// [`RunError`]; if a step failed, the trajectory so far is in it.
+    fn run(
+        self,
+        flow: &F,
+        x0: Element<F>,
+        schedule: impl Into<Schedule>,
+    ) -> Result<Trajectory<F::Space>, RunError<F::Space>> {
+        let schedule = schedule.into();
+        flow.with_room(|| self.steps(flow, x0, schedule)?.run())
+    }
+
+    /// Takes up a run where it was put down. With the system and the method of that run the steps
+    /// are those that it would have taken, bit for bit.
+    ///
+    /// # Errors
+    ///
+    /// [`ResumeError`] if the checkpoint does not belong to the system or to the method, or if its file has
+    /// changed.
+    fn resume<'a>(
+        self,
+        flow: &'a F,
+        checkpoint: &Checkpoint,
+    ) -> Result<Steps<'a, F, Self>, ResumeError> {
+        flow.with_room(|| Steps::resume(self, flow, checkpoint))
+    }
+}
+
+impl<F: Flow, M: Stepper<F>> Method<F> for M {}

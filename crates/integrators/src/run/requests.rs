@@ -1,0 +1,145 @@
+//! What a schedule asks a run to look at, and the outputs that are still to come.
+
+use crate::run::event::Request;
+use crate::run::span_error::SpanError;
+
+/// What a schedule asks a run to look at.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Requests {
+    /// Times of outputs, in their order, if a list was given.
+    pub(crate) times: Option<Vec<f64>>,
+    /// The interval of outputs from the start on.
+    pub(crate) interval: Option<f64>,
+    pub(crate) events: Vec<Request>,
+}
+
+impl Requests {
+    pub(crate) const fn has_outputs(&self) -> bool {
+        self.times.is_some() || self.interval.is_some()
+    }
+
+    /// Accepts outputs of a run from `start` to `end` that have different times up to `seen`.
+    pub(crate) fn check(&self, [start, end]: [f64; 2], seen: f64) -> Result<(), SpanError> {
+        let last = end + rounding(start, end);
+        let outside = |time: &&f64| !(**time >= start && **time <= last && time.is_finite());
+        if let Some(&time) = self.times.iter().flatten().find(outside) {
+            return Err(SpanError::Output { time, start, end });
+        }
+        match self.interval {
+            Some(interval) if !(interval > 0.0 && interval.is_finite()) => {
+                Err(SpanError::OutputInterval { interval })
+            }
+            Some(interval) if interval <= rounding(start, seen) => {
+                let time = if seen.abs() > start.abs() { seen } else { start };
+                Err(SpanError::OutputStandstill { time, interval })
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+/// By how much a time of a run that began at `start` may differ from another expression of the same time.
+pub(crate) fn rounding(start: f64, time: f64) -> f64 {
+    2.0 * f64::EPSILON * start.abs().max(time.abs())
+}
+
+/// The outputs of a run that are still to come.
+#[derive(Clone, Debug)]
+pub(crate) struct Outputs {
+    start: f64,
+    times: Option<Vec<f64>>,
+    interval: Option<f64>,
+    /// How many of the times are over, and how many intervals.
+    index: usize,
+    count: usize,
+}
+
+impl Outputs {
+    /// Those after `time` in a run that began at `start`.
+    pub(crate) fn after(
+        time: f64,
+        start: f64,
+        times: Option<Vec<f64>>,
+        interval: Option<f64>,
+    ) -> Self {
+        let mut outputs = Self { start, times, interval, index: 0, count: 0 };
+        let done = time + rounding(start, time);
+        outputs.index = outputs.listed().partition_point(|t| *t <= done);
+        if let Some(interval) = interval {
+            // The quotient may be off by its rounding.
+            let quotient = ((done - start) / interval).floor().max(1.0) - 1.0;
+            #[allow(
+                clippy::cast_possible_truncation,
+                clippy::cast_sign_loss,
+                reason = "it is a whole number that is not negative, and saturates"
+            )]
+            let before = quotient as usize;
+            outputs.count = before;
+            while outputs.in_interval().is_some_and(|t| t <= done) {
+                outputs.count += 1;
+            }
+        }
+        outputs
+    }
+
+    pub(crate) const fn is_empty(&self) -> bool {
+        self.times.is_none() && self.interval.is_none()
+    }
+
+    /// Returns whether no output is left, however long the run goes on.
+    pub(crate) fn are_over(&self) -> bool {
+        self.index == self.listed().len() && self.interval.is_none()
+    }
+
+    fn listed(&self) -> &[f64] {
+        self.times.as_deref().unwrap_or_default()
+    }
+
+    /// The next multiple of the interval.
+    fn in_interval(&self) -> Option<f64> {
+        Some(self.start + (self.count + 1) as f64 * self.interval?)
+    }
+
+    /// The next output up to `time`, or so near to it that it is the same time.
+    pub(crate) fn next(&mut self, time: f64) -> Option<f64> {
+        let last = time + rounding(self.start, time);
+        let listed = self.listed().get(self.index).copied().filter(|t| *t <= last);
+        let counted = self.in_interval().filter(|t| *t <= last);
+        let next = match (listed, counted) {
+            (Some(a), Some(b)) => a.min(b),
+            (a, b) => a.or(b)?,
+        };
+        self.index += usize::from(listed.is_some_and(|t| t <= next));
+        self.count += usize::from(counted.is_some_and(|t| t <= next));
+        Some(next)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn outputs_are_taken_up_where_they_were_left() {
+        for start in [0.0, -3.0, 1e6] {
+            let times = vec![start + 0.25, start + 0.3, start + 1.0, start + 2.75];
+            let (step, interval) = (0.07, 0.1);
+            let time = |n: u32| start + f64::from(n) * step;
+            let ahead =
+                |n: u32| Outputs::after(time(n), start, Some(times.clone()), Some(interval));
+            let mut whole = ahead(0);
+            let mut all = Vec::new();
+            for n in 1..=50 {
+                let mut resumed = ahead(n - 1);
+                while let Some(t) = whole.next(time(n)) {
+                    assert_eq!(resumed.next(time(n)), Some(t));
+                    all.push(t);
+                }
+                assert_eq!(resumed.next(time(n)), None);
+            }
+            assert!(all.is_sorted_by(|a, b| a < b), "{all:?}");
+            // 35 multiples up to 3.5, and 0.25 and 2.75, which are none of them.
+            assert!((37..=39).contains(&all.len()), "{} from {start}", all.len());
+        }
+    }
+}

@@ -1,0 +1,98 @@
+//! How a run goes.
+
+use crate::run::adaptive::Adaptive;
+use crate::run::controller::Rule;
+use crate::run::requests::Requests;
+use crate::run::span_error::{SpanError, check_step_size, check_steps};
+
+/// How a run goes: what [`Method::steps`](crate::Method::steps) and [`Method::run`](crate::Method::run)
+/// make of what they are given.
+///
+/// | given | steps | until |
+/// |---|---|---|
+/// | a number `h` | of size `h` | you stop |
+/// | [`Span::steps`](crate::Span::steps)`(h, count)` | of size `h` | `count` of them |
+/// | [`Span::until`](crate::Span::until)`(end)` | that follow a tolerance | `t = end` |
+///
+/// Each of them may ask for states at given times and for events: see [`Watch`](crate::Watch).
+#[derive(Clone, Debug, PartialEq)]
+pub struct Schedule {
+    pub(crate) size: Size,
+    /// The time at which the run starts.
+    pub(crate) start: f64,
+    pub(crate) count: Option<usize>,
+    pub(crate) every: usize,
+    /// The most states to record.
+    pub(crate) most: Option<usize>,
+    pub(crate) rest: Option<f64>,
+    /// The outputs and the events.
+    pub(crate) watch: Requests,
+}
+
+/// How large the steps of a course are.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Size {
+    Fixed(f64),
+    Tolerance(Adaptive),
+}
+
+impl From<f64> for Schedule {
+    fn from(h: f64) -> Self {
+        let (start, every, most, rest) = (0.0, 1, None, None);
+        let watch = Requests::default();
+        Self { size: Size::Fixed(h), start, count: None, every, most, rest, watch }
+    }
+}
+
+impl Schedule {
+    /// Whether all steps have one size.
+    pub(crate) const fn is_fixed(&self) -> bool {
+        matches!(self.size, Size::Fixed(_))
+    }
+
+    /// How long the run may last, if the sizes of the entries matter to it: to its errors, or to its rest.
+    pub(crate) fn span(&self) -> Option<f64> {
+        match &self.size {
+            Size::Tolerance(adaptive) => Some(adaptive.end() - self.start),
+            Size::Fixed(h) if self.rest.is_some() => {
+                Some(self.count.map_or(*h, |count| count as f64 * h))
+            }
+            Size::Fixed(_) => None,
+        }
+    }
+
+    /// Accepts a tolerance that a method with this rule can hold.
+    pub(crate) fn check_tolerance(&self, rule: &Rule) -> Result<(), SpanError> {
+        match &self.size {
+            Size::Fixed(_) => Ok(()),
+            Size::Tolerance(adaptive) => adaptive.check_tolerance(rule),
+        }
+    }
+
+    pub(crate) fn check(&self) -> Result<(), SpanError> {
+        match &self.size {
+            Size::Fixed(h) => {
+                check_step_size(*h)?;
+                if let Some(count) = self.count.filter(|count| *count > 0) {
+                    check_steps(self.start, *h, count)?;
+                }
+            }
+            Size::Tolerance(adaptive) => adaptive.check(self.start)?,
+        }
+        if self.count == Some(0) {
+            return Err(SpanError::NoSteps);
+        }
+        if self.every == 0 {
+            return Err(SpanError::RecordsNothing);
+        }
+        if self.watch.has_outputs() && (self.every != 1 || self.most.is_some()) {
+            return Err(SpanError::TwoRecords);
+        }
+        match self.rest {
+            Some(tolerance) if !(tolerance > 0.0 && tolerance < 1.0) => {
+                Err(SpanError::Rest { tolerance })
+            }
+            _ => Ok(()),
+        }
+    }
+}

@@ -1,0 +1,167 @@
+//! Spans that cannot be run.
+
+/// A span that cannot be run.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum SpanError {
+    /// The step size is zero, negative, infinite or NaN.
+    #[error(
+        "the step size is {h}; it must be a positive finite number (entropy grows only forward in time)"
+    )]
+    StepSize {
+        /// The step size.
+        h: f64,
+    },
+    /// The end is not after the start, or one of them is infinite or NaN; with steps of one size the end
+    /// may be too large for a number.
+    #[error(
+        "the run would start at t = {start} and end at t = {end}; its end must be a later, finite time"
+    )]
+    End {
+        /// The time at which it starts.
+        start: f64,
+        /// The time asked for.
+        end: f64,
+    },
+    /// The steps are shorter than the last digit of the time.
+    #[error(
+        "at t = {time:.6e} a step of size {h:.1e} does not change the time; let the run start at t = 0, or \
+         take larger steps"
+    )]
+    Standstill {
+        /// The time, the largest one of the run.
+        time: f64,
+        /// The step size.
+        h: f64,
+    },
+    /// The list of `scale` or `absolute` has another length than the point has directions.
+    #[error(
+        "{found} numbers were given for the entries, and the chart has {expected} directions (in a lattice, that \
+         of a site); give one for each"
+    )]
+    Entries {
+        /// How many there are.
+        found: usize,
+        /// How many directions the chart has, or that of a site of a lattice.
+        expected: usize,
+    },
+    /// A number in the list of `scale` or `absolute` is negative, infinite or NaN.
+    #[error(
+        "the number for direction {index} is {value}; it must be finite and positive, or zero for the \
+         automatic one"
+    )]
+    Entry {
+        /// Which direction.
+        index: usize,
+        /// The number.
+        value: f64,
+    },
+    /// The tolerance is not a number, below the round-off of a step, or above the size of the entries.
+    #[error(
+        "the tolerance is {tolerance:e}; with this method it must be from {least:.0e} to {largest}"
+    )]
+    Tolerance {
+        /// The tolerance asked for.
+        tolerance: f64,
+        /// The least one of the method.
+        least: f64,
+        /// The largest one.
+        largest: f64,
+    },
+    /// The least step size is larger than the largest one.
+    #[error("the least step size {least} is above the largest one, {largest}; swap them?")]
+    StepSizes {
+        /// The least step size.
+        least: f64,
+        /// The largest step size.
+        largest: f64,
+    },
+    /// The tolerance of rest is not between 0 and 1.
+    #[error(
+        "the tolerance of rest is {tolerance}; it is compared with the speed relative to the \
+         largest one, so it must be between 0 and 1"
+    )]
+    Rest {
+        /// The tolerance asked for.
+        tolerance: f64,
+    },
+    /// Zero steps.
+    #[error("the span has no steps; ask for at least one")]
+    NoSteps,
+    /// A step size alone, where a run has to end.
+    #[error("steps of one size have no end; say how many with `Span::steps`")]
+    Endless,
+    /// `every(0)`.
+    #[error("`every(0)` records nothing; use `every(1)` to record each step")]
+    RecordsNothing,
+    /// Outputs are asked for, and `every` or `at_most` too.
+    #[error(
+        "outputs at given times are recorded in place of steps; leave out `every` and `at_most`, or the \
+         outputs"
+    )]
+    TwoRecords,
+    /// A time of an output is not one of the run.
+    #[error("an output was asked for at t = {time}; the run goes from t = {start} to t = {end}")]
+    Output {
+        /// The time asked for.
+        time: f64,
+        /// The time at which the run starts.
+        start: f64,
+        /// The time at which it ends.
+        end: f64,
+    },
+    /// The interval between outputs is zero, negative, infinite or NaN.
+    #[error("the interval between outputs is {interval}; it must be a positive finite number")]
+    OutputInterval {
+        /// The interval.
+        interval: f64,
+    },
+    /// Outputs follow each other so closely that they have one time.
+    #[error(
+        "at t = {time:.6e} outputs that are {interval:.1e} apart have one time; let the run start at t = 0, or \
+         ask for a longer interval"
+    )]
+    OutputStandstill {
+        /// The time, the largest one of the run; without an end that of its first step.
+        time: f64,
+        /// The interval.
+        interval: f64,
+    },
+    /// The function of an event has points of another type than the run.
+    #[error(
+        "event {index} is a function of {found}, and the points of the run are {expected}; say this type in \
+         the closure"
+    )]
+    EventPoint {
+        /// Which event, in the order in which they were asked for, counted from 0.
+        index: usize,
+        /// The type of its points.
+        found: &'static str,
+        /// The type of the points of the run.
+        expected: &'static str,
+    },
+}
+
+/// Accepts a positive, finite step size.
+pub(crate) fn check_step_size(h: f64) -> Result<(), SpanError> {
+    if h > 0.0 && h.is_finite() { Ok(()) } else { Err(SpanError::StepSize { h }) }
+}
+
+/// Accepts a finite time after `start`.
+pub(crate) fn check_end(start: f64, end: f64) -> Result<(), SpanError> {
+    if start.is_finite() && end > start && end.is_finite() {
+        Ok(())
+    } else {
+        Err(SpanError::End { start, end })
+    }
+}
+
+/// Accepts steps of one size that end at a finite time, and of which the first is seen in the time. Times are
+/// products of the count, so later ones are no shorter than their last digit by more than a rounding.
+pub(crate) fn check_steps(start: f64, h: f64, count: usize) -> Result<(), SpanError> {
+    let end = start + count as f64 * h;
+    if start.is_finite() && start + h <= start {
+        return Err(SpanError::Standstill { time: start, h });
+    }
+    check_end(start, end)
+}

@@ -1,0 +1,43 @@
+//! What a run knows of a system and of a method.
+//!
+//! A run needs little of a system: its laws, and how large things are. This is a [`Flow`]; every
+//! [`Metriplectic`](metriplectic_dynamics::Metriplectic) system is one. It knows of a method that it takes
+//! steps, what these promise, and what has to be saved between two of them: a [`Stepper`]. Everything that a
+//! user does with a run, from [`Span`](crate::Span) to [`Checkpoint`](crate::Checkpoint), works with any flow
+//! and any method, by the trait [`Method`](crate::Method) that every stepper has.
+//!
+//! Nothing in this module knows of a method or of a run.
+
+mod control;
+pub mod dense;
+pub(crate) mod digits;
+mod error;
+mod evidence;
+pub(crate) mod exact;
+pub(crate) mod failure;
+mod flow;
+mod flow_error;
+mod initial_scales;
+mod memory;
+mod method_error;
+mod result;
+pub mod scales;
+mod start;
+mod stepper;
+mod vector;
+
+pub use control::Control;
+pub use error::StepError;
+pub use evidence::{Effort, EntropyStep, Evidence, LimitingSites, Promises, StageLaws};
+pub use flow::{Element, Flow, Laws, Recheck, StateSpace};
+pub use flow_error::FlowError;
+pub(crate) use initial_scales::classical_step;
+pub use memory::{Memory, RestoreError, Saved};
+pub use method_error::MethodError;
+pub use result::{Refusal, StepEnds, StepStart, Taken};
+pub use scales::Scales;
+pub use start::Numbers;
+pub(crate) use start::{Dim, DriftCorrection, Start};
+pub use stepper::Stepper;
+pub(crate) use stepper::name_of;
+pub use vector::{Components, Vector};

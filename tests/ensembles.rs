@@ -107,12 +107,12 @@ fn the_bytes_of_a_table_depend_on_neither_threads_nor_shards() {
     assert_eq!(entry.end(), run.last().point.as_slice());
     let by_hand: Vec<(f64, f64)> = run.iter().map(|state| (state.time, state.point.x)).collect();
     assert_eq!(entry.series("p₁").expect("observed").collect::<Vec<_>>(), by_hand);
-    assert_eq!(entry.get("energy_error"), {
+    assert_eq!(entry.get("run.energy_error"), {
         let certificate = run.certificate();
         Some(certificate.max_energy_error / certificate.energy_scale)
     });
-    assert_eq!(entry.get("entropy_increment"), Some(run.certificate().min_entropy_increment));
-    assert_eq!(entry.get("kept"), Some(1.0));
+    assert_eq!(entry.get("run.entropy_increment"), Some(run.certificate().min_entropy_increment));
+    assert_eq!(entry.get("run.kept"), Some(1.0));
 }
 
 #[test]
@@ -165,7 +165,7 @@ fn a_row_that_fails_or_panics_is_a_row_with_a_sentence() {
     };
     let broken = runs(plan("failures"), closure).only(0).expect("a row");
     let row = broken.row(0).expect("a row");
-    println!("{:?}, {:?}", row.error(), row.get("t"));
+    println!("{:?}, {:?}", row.error(), row.get("run.t"));
 }
 
 // The children: this program again, with a task in its environment.
@@ -498,7 +498,14 @@ fn a_sweep_in_other_units_has_the_same_steps_and_scaled_bits() {
     let scaled = |row: TableRow<'_>| {
         let [l, e] = ["length", "energy"].map(|name| row.get(name).expect("a unit"));
         let [q, p, s] = *row.end() else { panic!("three entries") };
-        let figures = ["steps", "rejected", "t", "energy_error", "local_error", "stiff"];
+        let figures = [
+            "run.steps",
+            "run.rejected",
+            "run.t",
+            "run.energy_error",
+            "run.local_error",
+            "run.stiff",
+        ];
         let figures = figures.map(|name| row.get(name).expect("a figure").to_bits());
         ([q / l, p * l / e, s / e].map(f64::to_bits), figures)
     };
@@ -523,11 +530,11 @@ fn a_stiff_row_ends_and_says_so() {
             .build()?;
         Ok(WeylMidpoint.run(&system, vector![1.0, 0.5, 0.0], Span::steps(0.2, 50).at_most(2))?)
     };
-    let sweep = Sweep::new("stiff").grid("friction", [0.1, 1.0, 1e7]);
+    let sweep = Sweep::new("run.stiff").grid("friction", [0.1, 1.0, 1e7]);
     let table = sweep.run(closure).quiet().execute().expect("all rows");
-    assert_eq!(column(&table, "stiff"), [0.0, 0.0, 1.0], "{table}");
-    assert_eq!(column(&table, "resolved")[2], 0.0);
-    assert!(column(&table, "energy_error").iter().all(|error| *error <= 50.0 * f64::EPSILON));
+    assert_eq!(column(&table, "run.stiff"), [0.0, 0.0, 1.0], "{table}");
+    assert_eq!(column(&table, "run.resolved")[2], 0.0);
+    assert!(column(&table, "run.energy_error").iter().all(|error| *error <= 50.0 * f64::EPSILON));
     assert!(table.to_string().contains("friction is not damped in 1 rows: 2"), "{table}");
 }
 
@@ -613,7 +620,7 @@ fn a_plan_without_sense_is_refused() {
         (Sweep::new("s").grid("friction", []), "`friction` has no values"),
         (Sweep::new("s").samples(0), "no values"),
         (Sweep::new("s").grid("a", [1.0]).grid("a", [2.0]), "two columns"),
-        (Sweep::new("s").grid("steps", [1.0]), "two columns"),
+        (Sweep::new("s").grid("run.steps", [1.0]), "two columns"),
         (Sweep::new("s").grid("p₁", [1.0]), "two columns"),
         (Sweep::new("s").samples(usize::MAX).samples(2), "more rows"),
         (Sweep::new("s").latin_hypercube(3, [("a", 1.0..0.0)]), "from 1 to 0"),

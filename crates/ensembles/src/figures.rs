@@ -5,19 +5,19 @@ use metriplectic_integrators::{Certificate, Error, RunError, StateSpace, StepErr
 
 /// The names of the columns, in the order of [`figures`].
 pub(crate) const FIGURES: [&str; 13] = [
-    "t",
-    "steps",
-    "rejected",
-    "energy_error",
-    "entropy_increment",
-    "entropy_gained",
-    "entropy_slope",
-    "manifold_defect",
-    "friction",
-    "stiff",
-    "local_error",
-    "resolved",
-    "kept",
+    "run.t",
+    "run.steps",
+    "run.rejected",
+    "run.energy_error",
+    "run.entropy_increment",
+    "run.entropy_gained",
+    "run.entropy_slope",
+    "run.manifold_defect",
+    "run.friction",
+    "run.stiff",
+    "run.local_error",
+    "run.resolved",
+    "run.kept",
 ];
 
 /// The numbers of a row in the order of [`FIGURES`].
@@ -28,7 +28,7 @@ const OTHERS: [&str; 4] = ["row", "outcome", "error", "failed"];
 
 /// Whether a name is one of the columns that each table has.
 pub(crate) fn reserved(name: &str) -> bool {
-    FIGURES.contains(&name) || OTHERS.contains(&name) || name.starts_with("end.")
+    OTHERS.contains(&name) || ["run.", "end."].iter().any(|prefix| name.starts_with(prefix))
 }
 
 /// The numbers of a certificate, with the time that was reached.

@@ -25,15 +25,15 @@ pub use time::Series;
 /// | `row` | the number |
 /// | the parameters | by their names |
 /// | `outcome` | `span`, `rest`, `event` or `stopped` for how it ended; the kind of the error if it failed |
-/// | `t` | the time reached |
-/// | `steps`, `rejected` | steps taken, and given up |
-/// | `energy_error` | `max abs(H − H₀)`, relative to the size of the terms of `H` |
-/// | `entropy_increment`, `entropy_gained` | the least `ΔS` of a step, and that of the run |
-/// | `entropy_slope` | the least size of the discrete gradient of the entropy; infinite without one |
-/// | `manifold_defect` | the largest defect of the manifold |
-/// | `friction`, `stiff` | the largest rate `h abs(K')`; 1 if a step does not damp it |
-/// | `local_error`, `resolved` | the largest error of a step; 1 if no step is known to be too long |
-/// | `kept` | 1 if all laws that the method promises were kept to round-off |
+/// | `run.t` | the time reached |
+/// | `run.steps`, `run.rejected` | steps taken, and given up |
+/// | `run.energy_error` | `max abs(H − H₀)`, relative to the size of the terms of `H` |
+/// | `run.entropy_increment`, `run.entropy_gained` | the least `ΔS` of a step, and that of the run |
+/// | `run.entropy_slope` | the least size of the discrete gradient of the entropy; infinite without one |
+/// | `run.manifold_defect` | the largest defect of the manifold |
+/// | `run.friction`, `run.stiff` | the largest rate `h abs(K')`; 1 if a step does not damp it |
+/// | `run.local_error`, `run.resolved` | the largest error of a step; 1 if no step is known to be too long |
+/// | `run.kept` | 1 if all laws that the method promises were kept to round-off |
 /// | `end.0`, `end.1`, … | the entries of the last state |
 /// | what was measured and observed | by their names; the last value of what was observed |
 /// | `error` | the sentence of the error |

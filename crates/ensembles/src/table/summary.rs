@@ -30,12 +30,12 @@ impl fmt::Display for Table {
             let numbers = self.rows().filter_map(|row| Some((row.number(), row.get(column)?)));
             numbers.filter(|(_, x)| !x.is_nan()).max_by(|a, b| a.1.total_cmp(&b.1))
         };
-        if let Some((row, error)) = worst("energy_error") {
+        if let Some((row, error)) = worst("run.energy_error") {
             write!(f, "\nfirst law:   |H − H₀| ≤ {error:.1e} of the terms of H (row {row})")?;
         }
-        self.flagged(f, "kept", 0.0, "a law is broken in")?;
-        self.flagged(f, "stiff", 1.0, "friction is not damped in")?;
-        self.flagged(f, "resolved", 0.0, "the motion is not resolved in")?;
+        self.flagged(f, "run.kept", 0.0, "a law is broken in")?;
+        self.flagged(f, "run.stiff", 1.0, "friction is not damped in")?;
+        self.flagged(f, "run.resolved", 0.0, "the motion is not resolved in")?;
         let missing = self.missing();
         if rows > 1 && !missing.is_empty() {
             write!(f, "\nmissing:     {} rows: {}", missing.len(), listed(&missing))?;

@@ -15,6 +15,7 @@ use crate::figures::FIGURES;
 use crate::journal::{Header, merged};
 use crate::runs::of_shard;
 
+#[cfg(feature = "serde")]
 pub(crate) use files::replaced;
 pub use time::Series;
 

@@ -3,7 +3,8 @@
 //! A model that was verified around the start may break its laws elsewhere. Then a method conserves the energy of a
 //! motion that no longer exists. So a run [asks](Flow::recheck) for the laws again: after steps 1, 2, 3, 5, 8, … 55 and
 //! each multiple of 89. It asks at its end and at a state from which a step fails, too. It also asks after the first,
-//! second, fourth, … step that leaves the state where it is.
+//! second, fourth, … step that leaves the state where it is. A run of a system that was
+//! [verified before](Flow::is_verified) leaves out the first steps up to 55, so that many short runs are cheap.
 //!
 //! The numbers depend on nothing but the step, so a run that is resumed checks the same states. 89 has no factor in
 //! common with the steps of a period that users choose, so the states lie at all phases of an oscillation.
@@ -23,13 +24,14 @@ const EVERY: usize = 89;
 const CREEPS: f64 = 1e-2;
 
 /// Returns whether the model is checked after this step.
-fn is_due(step: usize) -> bool {
-    if step < EVERY { FIRST.contains(&step) } else { step.is_multiple_of(EVERY) }
+fn is_due(step: usize, verified: bool) -> bool {
+    if step < EVERY { !verified && FIRST.contains(&step) } else { step.is_multiple_of(EVERY) }
 }
 
 /// The steps up to this one after which the model is checked.
-fn due_steps(steps: usize) -> usize {
-    FIRST.iter().filter(|first| **first <= steps).count() + steps / EVERY
+fn due_steps(steps: usize, verified: bool) -> usize {
+    let first = FIRST.iter().filter(|first| !verified && **first <= steps).count();
+    first + steps / EVERY
 }
 
 /// The states at which the model of a flow has been checked after so many steps, the start among them.
@@ -37,7 +39,8 @@ pub(crate) fn checked_states<F: Flow>(flow: &F, steps: usize) -> usize {
     if !flow.rechecks(Recheck::End) {
         return 0;
     }
-    1 + if flow.rechecks(Recheck::OnTheWay) { due_steps(steps) } else { 0 }
+    let on_the_way = flow.rechecks(Recheck::OnTheWay);
+    1 + if on_the_way { due_steps(steps, flow.is_verified()) } else { 0 }
 }
 
 impl<F: Flow, M: Method<F>> Steps<'_, F, M> {
@@ -50,7 +53,7 @@ impl<F: Flow, M: Method<F>> Steps<'_, F, M> {
     pub(super) fn recheck(&mut self, held: bool) -> Result<(), StepError> {
         let over = self.progress.ending.is_some();
         let stays = held && self.certificate.projected_steps.held.is_power_of_two();
-        if over || stays || is_due(self.state.step) {
+        if over || stays || is_due(self.state.step, self.flow.is_verified()) {
             self.verify_state(over, stays)
         } else {
             Ok(())
@@ -67,7 +70,8 @@ impl<F: Flow, M: Method<F>> Steps<'_, F, M> {
             return Ok(());
         }
         let step = self.state.step;
-        let counted = is_due(step) && self.flow.rechecks(Recheck::OnTheWay);
+        let due = is_due(step, self.flow.is_verified());
+        let counted = due && self.flow.rechecks(Recheck::OnTheWay);
         self.certificate.checked_states =
             checked_states(self.flow, step) + usize::from(over && !counted);
         let verdict = self.verdict(occasion);
@@ -106,12 +110,14 @@ mod tests {
 
     #[test]
     fn the_states_that_are_checked_are_counted() {
-        let mut checked = 1;
-        for step in 0..1000 {
-            checked += usize::from(step > 0 && is_due(step));
-            assert_eq!(1 + due_steps(step), checked, "step {step}");
+        for verified in [false, true] {
+            let mut checked = 1;
+            for step in 0..1000 {
+                checked += usize::from(step > 0 && is_due(step, verified));
+                assert_eq!(1 + due_steps(step, verified), checked, "step {step}");
+            }
         }
         // One per cent of the steps, beside the first ones.
-        assert_eq!(due_steps(100_000), 9 + 1123);
+        assert_eq!([false, true].map(|verified| due_steps(100_000, verified)), [9 + 1123, 1123]);
     }
 }

@@ -154,18 +154,32 @@ fn a_row_that_fails_or_panics_is_a_row_with_a_sentence() {
     }
     let text = table.to_string();
     assert!(text.contains("400 rows, 12 failed (panic: 1, start: 11)"), "{text}");
-    // A step that fails has the steps before it in its row.
-    let closure: Closure = |row| {
+}
+
+#[test]
+fn a_row_whose_step_fails_has_the_steps_before() {
+    // A mass falls into the centre of its force after a time of √(π/2) q₀.
+    let closure = |row: &Row| {
         let system = System::on(Euclidean::<3>)
             .bracket(Poisson::constant(matrix![0.0, 1.0, 0.0; -1.0, 0.0, 0.0; 0.0, 0.0, 0.0])?)
-            .energy(|x: &Vector3<Real>| x.x + x.y.powi(2) * 0.5 - (x.x + 1.0).ln())
+            .energy(|x: &Vector3<Real>| x.y.powi(2) * 0.5 + x.x.ln())
             .build()?;
-        let _ = WeylMidpoint.run(&system, vector![1e-3, -3.0, 0.0], Span::steps(0.05, 200))?;
-        relaxing(row)
+        let start = vector![row["q"], 0.0, 0.0];
+        Ok(WeylMidpoint.run(&system, start, Span::steps(0.01, 500).at_most(2))?)
     };
-    let broken = runs(plan("failures"), closure).only(0).expect("a row");
-    let row = broken.row(0).expect("a row");
-    println!("{:?}, {:?}", row.error(), row.get("run.t"));
+    let table = Sweep::new("fall").grid("q", [1.0, 2.0]).run(closure).quiet().execute();
+    let table = table.expect("two rows");
+    assert_eq!(table.failed(), 2);
+    for row in table.rows() {
+        let fall = std::f64::consts::FRAC_PI_2.sqrt() * row.parameters()[0];
+        let (kind, sentence) = row.error().expect("a failure");
+        println!("{kind}: {sentence}");
+        assert!(kind != "run" && sentence.contains("steps were taken"), "{kind}: {sentence}");
+        let time = row.get("run.t").expect("a time");
+        assert!((time - fall).abs() < 0.2 && time > 0.5, "{time} of {fall}");
+        assert_eq!(row.get("run.steps"), Some((time / 0.01).round()));
+        assert_eq!(row.end(), [0.0; 0]);
+    }
 }
 
 // The children: this program again, with a task in its environment.

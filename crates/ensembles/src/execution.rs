@@ -86,10 +86,10 @@ where
                     return Err(Stop);
                 }
                 let row = prepared(runs, runs.plan.known_row(number, &names), &header);
-                let entry = outcome(runs, row).ok_or(Stop)?;
+                let entry = outcome(runs, &row).ok_or(Stop)?;
                 let line = if has_journal { encode(&entry) } else { Vec::new() };
                 sink.lock().unwrap_or_else(PoisonError::into_inner).take(entry, &line)?;
-                finished(runs, number);
+                finished(&row);
                 Ok(())
             })
             .is_err();
@@ -128,7 +128,7 @@ fn prepared<M: StateSpace, F>(runs: &Runs<'_, M, F>, mut row: Row, header: &Head
     row.long = runs
         .journal
         .as_deref()
-        .map(|path| crate::long::LongRow::new(path, row.number(), header.plan, runs.checkpoints));
+        .map(|path| crate::long::LongRow::new(path, header.plan, runs.checkpoints));
     row
 }
 
@@ -138,17 +138,15 @@ fn prepared<M: StateSpace, F>(_: &Runs<'_, M, F>, row: Row, _: &Header) -> Row {
 }
 
 /// Removes the checkpoint of a row that is in the journal.
-fn finished<M: StateSpace, F>(runs: &Runs<'_, M, F>, row: usize) {
+fn finished(row: &Row) {
     #[cfg(feature = "serde")]
-    if let Some(path) = &runs.journal {
-        crate::long::remove(path, row);
-    }
+    row.remove_checkpoint();
     #[cfg(not(feature = "serde"))]
-    let _ = (runs, row);
+    let _ = row;
 }
 
 /// What becomes of a row; `None` if it was put down for another time.
-pub(crate) fn outcome<M, T, F>(runs: &Runs<'_, M, F>, row: Row) -> Option<Entry>
+pub(crate) fn outcome<M, T, F>(runs: &Runs<'_, M, F>, row: &Row) -> Option<Entry>
 where
     M: StateSpace,
     T: Recorded<Space = M>,
@@ -157,7 +155,7 @@ where
     let (number, begun) = (row.number(), Instant::now());
     // A panic leaves nothing behind that another row sees: rows share nothing but what their closure captures.
     let outcome = catch_unwind(AssertUnwindSafe(|| {
-        (runs.run)(&row).map(|run| observed(runs, &run.recorded()))
+        (runs.run)(row).map(|run| observed(runs, &run.recorded()))
     }));
     let outcome = match outcome {
         Ok(Ok(done)) => Outcome::Done(done),
@@ -173,7 +171,7 @@ where
             Outcome::Failed(Failed { kind, message, figures: None })
         }
     };
-    let (parameters, seconds) = (row.into_values(), begun.elapsed().as_secs_f64());
+    let (parameters, seconds) = (row.values().into(), begun.elapsed().as_secs_f64());
     Some(Entry { number, parameters, outcome, seconds })
 }
 

@@ -7,6 +7,7 @@
 use std::fs;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use metriplectic_integrators::{
@@ -21,12 +22,20 @@ use crate::row::Row;
 use crate::table::replaced;
 
 /// Where a row keeps its checkpoint.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub(crate) struct LongRow {
-    path: PathBuf,
-    row: usize,
+    journal: PathBuf,
     plan: u64,
     interval: Duration,
+    /// Whether the row is a long one.
+    used: AtomicBool,
+}
+
+/// The file of a long row.
+struct Place<'a> {
+    path: PathBuf,
+    row: usize,
+    of: &'a LongRow,
 }
 
 /// A row that was put down because of a signal. It is no failure.
@@ -60,10 +69,18 @@ struct Saved {
 struct SavedState(usize, [u64; 3], Vec<u64>);
 
 impl LongRow {
-    pub(crate) fn new(journal: &Path, row: usize, plan: u64, interval: Duration) -> Self {
-        Self { path: file_of(journal, row), row, plan, interval }
+    pub(crate) fn new(journal: &Path, plan: u64, interval: Duration) -> Self {
+        Self { journal: journal.to_owned(), plan, interval, used: AtomicBool::new(false) }
     }
 
+    /// The file of a row: `relax.row-17.checkpoint` beside `relax.journal`.
+    fn place(&self, row: usize) -> Place<'_> {
+        let path = self.journal.with_extension(format!("row-{row}.checkpoint"));
+        Place { path, row, of: self }
+    }
+}
+
+impl Place<'_> {
     fn failed(&self, problem: impl ToString) -> Error {
         let (path, problem) = (self.path.clone(), problem.to_string());
         FlowError::new(CheckpointError { path, problem }).into()
@@ -85,7 +102,7 @@ impl LongRow {
             return Err(changed());
         }
         let saved: Saved = serde_json::from_str(json).map_err(|error| self.failed(error))?;
-        if (saved.plan, saved.row) != (self.plan, self.row) {
+        if (saved.plan, saved.row) != (self.of.plan, self.row) {
             return Err(
                 self.failed("it belongs to another sweep; remove it, and the row begins anew")
             );
@@ -94,23 +111,20 @@ impl LongRow {
     }
 }
 
-/// The file of a row beside the journal.
-fn file_of(journal: &Path, row: usize) -> PathBuf {
-    journal.with_extension(format!("row-{row}.checkpoint"))
-}
-
-/// Removes the checkpoint of a row that is in the journal.
-pub(crate) fn remove(journal: &Path, row: usize) {
-    // Most rows have none.
-    let _ = fs::remove_file(file_of(journal, row));
-}
-
 /// Whether a row was put down rather than ended.
 pub(crate) fn is_put_down(error: &Error) -> bool {
     matches!(error, Error::Flow(error) if error.downcast_ref::<PutDown>().is_some())
 }
 
 impl Row {
+    /// Removes the checkpoint of a row that is in the journal.
+    pub(crate) fn remove_checkpoint(&self) {
+        if let Some(long) = self.long.as_ref().filter(|long| long.used.load(Ordering::Relaxed)) {
+            // A short row of this kind has none.
+            let _ = fs::remove_file(long.place(self.number()).path);
+        }
+    }
+
     /// Runs a row that lasts for hours. Each minute, or as often as
     /// [`Runs::checkpoint_every`](crate::Runs::checkpoint_every) says, it writes a checkpoint beside the journal. A sweep
     /// that is started again goes on from there, with the same bits. Ctrl-C puts such a row down.
@@ -129,7 +143,11 @@ impl Row {
         schedule: impl Into<Schedule>,
     ) -> Result<Record<F::Space>, Error> {
         let schedule = schedule.into();
-        let saved = self.long.as_ref().map_or(Ok(None), LongRow::read)?;
+        let long = self.long.as_ref().map(|long| {
+            long.used.store(true, Ordering::Relaxed);
+            long.place(self.number())
+        });
+        let saved = long.as_ref().map_or(Ok(None), Place::read)?;
         let (mut steps, mut record) = match saved {
             None => {
                 let steps = method.steps(flow, start, schedule)?;
@@ -148,10 +166,10 @@ impl Row {
             failure = steps.advance().err();
             record.states.extend(steps.outputs().cloned());
             record.events.extend(steps.take_events().iter().map(Crossing::of));
-            let Some(long) = &self.long else { continue };
+            let Some(long) = &long else { continue };
             let asked = interrupt::asked();
             let glance = steps.state().step.is_multiple_of(GLANCE);
-            if asked || glance && written.elapsed() >= long.interval {
+            if asked || glance && written.elapsed() >= long.of.interval {
                 if steps.ending().is_none() && failure.is_none() {
                     long.write(&saved_of(long, &steps, &record))?;
                     if asked {
@@ -183,7 +201,7 @@ fn begun<F: Flow, M: Method<F>>(steps: &Steps<'_, F, M>) -> Record<F::Space> {
 }
 
 fn saved_of<F: Flow, M: Method<F>>(
-    long: &LongRow,
+    long: &Place<'_>,
     steps: &Steps<'_, F, M>,
     record: &Record<F::Space>,
 ) -> Saved {
@@ -192,7 +210,7 @@ fn saved_of<F: Flow, M: Method<F>>(
         .iter()
         .map(|event| (event.name.clone(), event.index, event.rises, SavedState::of(&event.state)));
     Saved {
-        plan: long.plan,
+        plan: long.of.plan,
         row: long.row,
         checkpoint: steps.checkpoint(),
         states: record.states.iter().map(SavedState::of).collect(),

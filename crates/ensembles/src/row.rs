@@ -56,10 +56,6 @@ impl Row {
     pub fn draw(&self) -> Draw {
         Draw::of(self.seed, OF_THE_ROW, self.number)
     }
-
-    pub(crate) fn into_values(self) -> Box<[f64]> {
-        self.values
-    }
 }
 
 /// The parameter of this name; [`Row::get`] does not panic.

@@ -180,7 +180,7 @@ where
         let header = self.header()?;
         let _ = self.plan.row(row)?;
         let names: Arc<[String]> = header.parameters.clone().into();
-        let entry = crate::execution::outcome(self, self.plan.known_row(row, &names));
+        let entry = crate::execution::outcome(self, &self.plan.known_row(row, &names));
         Ok(Table::new(header, entry.into_iter().collect(), 0))
     }
 }

@@ -182,7 +182,7 @@ impl Table {
     }
 }
 
-impl TableRow<'_> {
+impl<'a> TableRow<'a> {
     /// The number of the row.
     #[must_use]
     pub const fn number(&self) -> usize {
@@ -191,19 +191,19 @@ impl TableRow<'_> {
 
     /// The parameters in the order of the plan.
     #[must_use]
-    pub fn parameters(&self) -> &[f64] {
+    pub fn parameters(&self) -> &'a [f64] {
         &self.entry.parameters
     }
 
     /// The kind of the error in a word and its sentence, if the row failed.
     #[must_use]
-    pub fn error(&self) -> Option<(&str, &str)> {
+    pub fn error(&self) -> Option<(&'a str, &'a str)> {
         self.entry.failed().map(|failed| (failed.kind.as_str(), failed.message.as_str()))
     }
 
     /// The entries of the last state; none in a row that failed.
     #[must_use]
-    pub fn end(&self) -> &[f64] {
+    pub fn end(&self) -> &'a [f64] {
         self.entry.done().map_or(&[], |done| &done.end)
     }
 
@@ -214,7 +214,7 @@ impl TableRow<'_> {
     }
 
     /// What was observed, with the times of the states; `None` if the row failed or there is no such name.
-    pub fn series(&self, name: &str) -> Option<impl Iterator<Item = (f64, f64)>> {
+    pub fn series(&self, name: &str) -> Option<impl Iterator<Item = (f64, f64)> + use<'a>> {
         let column = self.header.observables.iter().position(|other| other == name)?;
         let done = self.entry.done()?;
         let n = done.times.len();

@@ -63,10 +63,10 @@ impl Table {
     }
 }
 
-impl TableRow<'_> {
+impl<'a> TableRow<'a> {
     /// How the run ended, `span`, `rest`, `event` or `stopped`, or the kind of the error.
     #[must_use]
-    pub fn outcome(&self) -> &str {
+    pub fn outcome(&self) -> &'a str {
         match (self.entry.done(), self.entry.failed()) {
             (Some(done), _) => done.ending,
             (_, Some(failed)) => &failed.kind,

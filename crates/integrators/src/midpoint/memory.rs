@@ -53,7 +53,7 @@ impl<N: Dimension> Memory for MidpointMemory<N> {
     fn save(&self, saved: &mut Saved) {
         let n = N::LEN;
         let column = |v: &N::Vector<f64>| {
-            let v = v.clone();
+            let v = *v;
             (0..n).map(move |i| v[i])
         };
         let Predictor { differences, known } = &self.predictor;

@@ -64,7 +64,7 @@ impl<F: Flow, M: Method<F>> Steps<'_, F, M> {
     #[inline(never)]
     fn verify_state(&mut self, over: bool, stays: bool) -> Result<(), StepError> {
         let creeps = self.before.h < CREEPS * self.certificate.largest_step;
-        let all = over || stays || creeps;
+        let all = stays || creeps || (over && !self.flow.is_verified());
         let occasion = if all { Recheck::End } else { Recheck::OnTheWay };
         if !self.flow.rechecks(occasion) {
             return Ok(());

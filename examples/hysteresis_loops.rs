@@ -7,8 +7,8 @@
 //! H = −½ (n·a)² − η(τ) n₃ + C e^{s/C} + ε,   n' = n × ∇H − λ w_tan,   S = s .
 //! ```
 //!
-//! The spin jumps where its minimum of the energy ends, at `η = (cos^⅔ θ + sin^⅔ θ)^{−3/2}` if this is beyond
-//! `45°`'s half, else later; a slow field makes it a little late. A powder keeps the magnetisation ½ without a field.
+//! The spin jumps where its minimum of the energy ends, at `η = −(cos^⅔ θ + sin^⅔ θ)^{−3/2}`; the field is not infinitely
+//! slow, so it jumps a little later. Without a field a powder keeps half of its magnetisation.
 
 use std::error::Error;
 
@@ -16,9 +16,9 @@ use metriplectic::prelude::*;
 use metriplectic_studies::{Example, Panel, Panels};
 
 const FIELD: f64 = 1.5;
-const PERIOD: f64 = 600.0;
+const PERIOD: f64 = 1000.0;
 const CAPACITY: f64 = 50.0;
-const FRICTION: f64 = 0.5;
+const FRICTION: f64 = 1.0;
 const OUTPUTS: f64 = 400.0;
 
 /// The spin, and `(s, τ, ε)`.
@@ -42,15 +42,16 @@ fn particle(row: &Row) -> Result<Trajectory<Space>, metriplectic::integrators::E
             along * along * -0.5 - field * n.z + (x.x / CAPACITY).exp() * CAPACITY + x.z
         })
         .entropy(|(_, x): &Point<Real>| x.x)
-        .dissipation(FieldDissipation(|_: &Point<Real>, w: &SVector<Real, 5>| {
+        .dissipation(FieldDissipation(|_: &Point<Real>, w: &Vector6<Real>| {
             let channel = |k: usize| {
-                let b = SVector::<Real, 5>::ith(k, w[2]) - SVector::<Real, 5>::ith(2, w[k]);
-                b * b.transpose() * (w[2].recip() * FRICTION)
+                let b = Vector6::<Real>::ith(k, w[3]) - Vector6::<Real>::ith(3, w[k]);
+                b * b.transpose() * (w[3].recip() * FRICTION)
             };
-            channel(0) + channel(1)
+            channel(0) + channel(1) + channel(2)
         }))
         .build()?;
-    let start = (Vector3::new(0.1, 0.1, 1.0).normalize(), Vector3::zeros());
+    // Near the field and the axis, but in no plane with them.
+    let start = (vector![axis.x, 0.01, axis.z + 2.0].normalize(), Vector3::zeros());
     let span = Span::until(1.25 * PERIOD).tolerance(1e-6).output_every(PERIOD / OUTPUTS);
     let span = span.event("jump", move |(n, _): &Point<f64>| n.dot(&axis)).falling();
     Ok(DormandPrince5.run(&system, start, span)?)
@@ -104,7 +105,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         .panel(
             Panel::new("field η of the jump", "angle θ (degrees)")
                 .line("infinitely slow", curve)
-                .line("in 600 units of time", found),
+                .line(format!("once in {PERIOD}"), found),
         )
         .panel(
             Panel::new("temperature", "t")

@@ -56,6 +56,57 @@ examples:
 study:
     cargo test --release --workspace -- --ignored
 
+# run the shards of the example `sweep` by mpirun, GNU parallel and the variables of schedulers, and compare the bytes
+cluster:
+    #!/usr/bin/env bash
+    set -euo pipefail
+    target=$(realpath -m "${CARGO_TARGET_DIR:-target}")
+    CARGO_TARGET_DIR=$target cargo build --quiet --release --example sweep
+    sweep=$target/release/examples/sweep
+    work=$(mktemp -d)
+    trap 'rm -rf "$work"' EXIT
+    # Each way has a folder for its journals, and the gallery of its table in there.
+    in_folder() { mkdir -p "$work/$1"; cd "$work/$1"; export CARGO_TARGET_DIR=$work/$1; }
+    compare() { (
+        in_folder "$1"
+        "$sweep" --merge --json > /dev/null
+        cmp gallery/sweep.csv "$work/alone/gallery/sweep.csv"
+        echo "$1: the same bytes from $(ls -- *.journal | wc -l) journals"
+    ) }
+    (in_folder alone; "$sweep" --json > /dev/null)
+    if command -v mpirun > /dev/null; then
+        flags=()
+        if mpirun --version | grep -q 'Open MPI'; then
+            flags+=(--oversubscribe)
+            if [[ $(id -u) == 0 ]]; then flags+=(--allow-run-as-root); fi
+        fi
+        (in_folder mpirun; RAYON_NUM_THREADS=1 mpirun "${flags[@]}" -n 3 "$sweep" > /dev/null)
+        compare mpirun
+    else
+        echo 'mpirun is missing (openmpi-bin in Debian): not tried'
+    fi
+    if command -v parallel > /dev/null; then
+        (in_folder parallel; seq 0 3 | RAYON_NUM_THREADS=1 parallel -j 2 "$sweep" --shard {}/4 > /dev/null)
+        compare parallel
+    else
+        echo 'GNU parallel is missing (parallel in Debian): not tried'
+    fi
+    # The schedulers themselves are not needed to see that their variables are read.
+    for task in 1 4 7; do
+        (
+            in_folder slurm
+            export SLURM_ARRAY_TASK_ID=$task SLURM_ARRAY_TASK_MIN=1 SLURM_ARRAY_TASK_MAX=7
+            SLURM_ARRAY_TASK_STEP=3 SLURM_ARRAY_TASK_COUNT=3 "$sweep" > /dev/null
+        )
+        (
+            in_folder gridengine
+            export SGE_TASK_ID=$task SGE_TASK_FIRST=1 SGE_TASK_LAST=7
+            SGE_TASK_STEPSIZE=3 "$sweep" > /dev/null
+        )
+        (in_folder pbs; PBS_ARRAY_INDEX=$((task / 3)) "$sweep" --shards 3 > /dev/null)
+    done
+    compare slurm; compare gridengine; compare pbs
+
 # write docs/verification.md: what the tests measure of each guarantee; it takes ten minutes after `just test`
 report:
     rm -rf target/report

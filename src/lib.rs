@@ -64,11 +64,14 @@
 //! | [`Lattice`](lattices::Lattice) | many sites, from closures of a site and of a bond | [`lattices`] |
 //! | [`Method`](integrators::Method) | a one-step method, such as [`Scheme`](integrators::Scheme) | [`integrators`] |
 //! | [`Scheme`](integrators::Scheme) | one step: guess, solve, retract | [`integrators`] |
+//! | [`Sweep`](ensembles::Sweep) | many runs, in one table | [`ensembles`] |
 //! | [`Trajectory`](integrators::Trajectory) | the steps of a run, with their [`Certificate`](integrators::Certificate) | [`integrators`] |
 
 pub mod guide;
 
 pub use metriplectic_dynamics as dynamics;
+#[cfg(feature = "ensembles")]
+pub use metriplectic_ensembles as ensembles;
 pub use metriplectic_fields as fields;
 pub use metriplectic_integrators as integrators;
 pub use metriplectic_lattices as lattices;
@@ -83,6 +86,8 @@ pub mod prelude {
         ModelError, Nambu, Poisson, ProjectedDissipation, Scaled, SecondLaw, Symplectic, System,
         VectorField, Verify, Zero,
     };
+    #[cfg(feature = "ensembles")]
+    pub use metriplectic_ensembles::{Row, Shard, Sweep, Table, geomspace, linspace};
     pub use metriplectic_fields::{ErasedField, MatrixField, Real, Scalar, ScalarField};
     pub use metriplectic_integrators::{
         Attitude, AttitudeError, Certificate, Checkpoint, DormandPrince5, DormandPrince8, Ending,

@@ -47,6 +47,18 @@ fn main() {
     assert_eq!(blocks_of(Gauss::<4>, &body, vector![0.5, -0.3, 0.1]), 0);
     assert_eq!(blocks_of(Radau::<3>, &body, vector![0.5, -0.3, 0.1]), 0);
 
+    // A run allocates its record and nothing else: as much for 2000 steps as for 20.
+    let verified = body.verified(&vector![0.5, -0.3, 0.1]).expect("a model");
+    let of_run = |steps: usize| {
+        let before = dhat::HeapStats::get().total_blocks;
+        let span = Span::steps(0.05, steps).at_most(2);
+        drop(WeylMidpoint.run(&verified, vector![0.5, -0.3, 0.1], span).expect("a run"));
+        dhat::HeapStats::get().total_blocks - before
+    };
+    let [short, long] = [20, 2000].map(of_run);
+    println!("{short} blocks in a run of 20 steps, {long} in one of 2000");
+    assert_eq!(short, long);
+
     let top = System::on(LieDual::se3())
         .energy(|x: &Vector6<Real>| {
             let weights = [1.0, 0.5, 0.25, 0.2, 0.15, 0.1];

@@ -127,8 +127,9 @@ fn every_example_of_a_run_reports_the_same_keys() {
     let names = files.map(|file| file.expect("a file").path());
     let names = names.map(|path| path.file_stem().map(|name| name.to_string_lossy().into_owned()));
     let mut seen = 0;
-    // The study of convergence is of many runs.
-    for name in names.flatten().filter(|name| name != "convergence") {
+    // The study of convergence and the sweep are of many runs.
+    let many = ["convergence", "sweep", "hysteresis_loops"];
+    for name in names.flatten().filter(|name| !many.contains(&name.as_str())) {
         let report = json(&example(&name, &["--json", "--steps", "20"]));
         let (_, state) = certified(&report);
         assert!(report["steps"] == 20 && !state.is_empty(), "{name}: {report}");
@@ -699,4 +700,29 @@ fn two_spins_keep_an_angular_momentum_that_is_not_listed() {
     let (short, long) = (run("1000"), run("5000"));
     assert!(long[0] < 1e-5 && long[0] < 1.1 * short[0], "{long:?}");
     assert!(long[1] > 4.0 * short[1] && long[2] > 4.0 * short[2], "{short:?}, {long:?}");
+}
+
+#[test]
+fn the_shards_of_the_sweep_make_the_table_of_one_process() {
+    let folder = PathBuf::from(gallery("sweep", &["shards"]));
+    let _ = std::fs::remove_dir_all(&folder);
+    std::fs::create_dir_all(&folder).expect("a folder");
+    let in_folder = |arguments: &[&str]| {
+        let output = command("sweep", arguments).current_dir(&folder).output();
+        let report = json(&output.expect("the example starts"));
+        (report, gallery("sweep", arguments) + "/gallery/sweep.csv")
+    };
+    let (whole, table) = in_folder(&["--json"]);
+    assert_eq!([&whole["rows"], &whole["failed"], &whole["missing"]], [1000, 0, 0], "{whole}");
+    assert!(figure(&whole, "worst_energy_error") <= 50.0 * f64::EPSILON, "{whole}");
+    // Half of the bodies fall to either side, by stripes.
+    assert!((0.4..0.6).contains(&(figure(&whole, "backwards") / 1000.0)), "{whole}");
+    for shard in ["0/2", "1/2"] {
+        let (part, _) = in_folder(&["--json", "--shard", shard]);
+        assert_eq!([&part["rows"], &part["missing"]], [500, 500], "{part}");
+    }
+    let (merged, shards) = in_folder(&["--json", "--merge"]);
+    assert_eq!(merged, whole);
+    let read = |path: &str| std::fs::read(path).expect("the example writes it");
+    assert!(read(&table) == read(&shards));
 }

@@ -100,7 +100,7 @@ fn the_bits_do_not_depend_on_the_number_of_threads() {
     // Bonds within chunks and across them, in three directions.
     let lattice = chain(Graph::cubic([20, 20, 10], Boundary::Periodic));
     let start = lattice.points(waves);
-    let ends = [1, 2, 3, 7].map(|threads| {
+    let ends = [1, 2, 3, 4, 5, 6, 7].map(|threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| {
             let span = Span::until(0.6).tolerance(1e-6).at_most(2);

@@ -608,7 +608,13 @@ fn a_verified_system_runs_as_the_system_does_and_judges_its_start() {
     let span = Span::steps(0.1, 50);
     let start = vector![0.3, 0.5, 0.2];
     let run = WeylMidpoint.run(&body, start, span).unwrap();
-    assert_eq!(WeylMidpoint.run(&verified, start, span).unwrap(), run);
+    let cheap = WeylMidpoint.run(&verified, start, span).unwrap();
+    assert_eq!(cheap.states(), run.states());
+    // The start and the end; the certificate says that the model was verified before.
+    assert_eq!((cheap.certificate().checked_states, run.certificate().checked_states), (2, 10));
+    assert!(cheap.certificate().verified_before && !run.certificate().verified_before);
+    let text = cheap.certificate().to_string();
+    assert!(text.contains("verified before the run; its laws were checked at 2 states"), "{text}");
     let error = WeylMidpoint.run(&verified, vector![0.1, f64::NAN, 0.0], span).unwrap_err();
     assert!(error.to_string().contains("entry 1"), "{error}");
     // A law that breaks elsewhere than around the point of verification, and at the start of the run.

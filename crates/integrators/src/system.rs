@@ -113,6 +113,11 @@ impl<Y: Metriplectic> Flow for Y {
     }
 
     #[inline]
+    fn is_verified(&self) -> bool {
+        Metriplectic::is_verified(self)
+    }
+
+    #[inline]
     fn rechecks(&self, _: Recheck) -> bool {
         true
     }

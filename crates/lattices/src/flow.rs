@@ -75,7 +75,11 @@ impl<P: Model> Flow for Lattice<P> {
             }
             sums
         });
-        let slopes = |k: usize| partial.iter().fold(0.0, |sum, part| sum + part[k]);
+        let slopes = parallel::tree(partial, |mut sums, more| {
+            sums.iter_mut().zip(more).for_each(|(sum, part)| *sum += part);
+            sums
+        });
+        let slopes = |k: usize| slopes.as_ref().map_or(0.0, |sums| sums[k]);
         Laws {
             energy: jets.totals.energy.size + slopes(0),
             entropy: jets.totals.entropy.size + slopes(1),

@@ -197,11 +197,16 @@ impl<P: Model> Lattice<P> {
             }
             [production, probe]
         });
-        let (mut production, mut probe) = (Double::default(), 0.0);
-        for [part, probed] in partial {
+        let partial = partial.into_iter().map(|[part, probe]| {
+            let mut production = Double::default();
             production.add(part);
-            probe += probed;
-        }
+            (production, probe)
+        });
+        let (production, probe) = parallel::tree(partial.collect(), |mut a: (Double, f64), b| {
+            a.0.merge(b.0);
+            (a.0, a.1 + b.1)
+        })
+        .unwrap_or_default();
         let production = production.value();
         let is_finite = !f64::is_nan(probe) && production.is_finite();
         is_finite.then(|| (self.vector(v), production))

@@ -1,7 +1,8 @@
 //! Loops over chunks of sites, on all threads.
 //!
-//! The chunks have a fixed length, and their results come in their order. So the bits of a sum do not depend on
-//! the number of threads.
+//! The chunks have a fixed length, and their results come in their order. [`tree`] merges them two by two, by the numbers
+//! of the chunks alone. So the bits of a sum do not depend on the number of threads, or on which process has summed a
+//! whole subtree.
 
 use std::ops::Range;
 use std::sync::Mutex;
@@ -55,6 +56,24 @@ fn on_all_threads(count: usize, f: &(dyn Fn(usize) + Sync)) {
     (0..count).for_each(f);
 }
 
+/// The results of all chunks in one, by a fixed binary tree: on each level the results `2k` and `2k + 1` are merged. A node
+/// of level `l` is the sum of the chunks from `k 2ˡ` to `(k + 1) 2ˡ`. `None` without chunks.
+pub(crate) fn tree<R>(parts: Vec<R>, merge: impl Fn(R, R) -> R) -> Option<R> {
+    let mut level = parts;
+    while level.len() > 1 {
+        let mut next = Vec::with_capacity(level.len().div_ceil(2));
+        let mut parts = level.into_iter();
+        while let Some(left) = parts.next() {
+            next.push(match parts.next() {
+                Some(right) => merge(left, right),
+                None => left,
+            });
+        }
+        level = next;
+    }
+    level.pop()
+}
+
 /// The sites of a chunk.
 pub(crate) fn sites(chunk: usize, count: usize) -> Range<usize> {
     chunk * CHUNK..count.min((chunk + 1) * CHUNK)
@@ -74,4 +93,28 @@ pub(crate) fn fill<T: Send, R: Send>(
 /// The results of `f` for each chunk of `count` sites.
 pub(crate) fn map<R: Send>(count: usize, f: impl Fn(Range<usize>) -> R + Sync) -> Vec<R> {
     each(0..count.div_ceil(CHUNK), |chunk| f(sites(chunk, count)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sum(parts: &[f64]) -> f64 {
+        tree(parts.to_vec(), |a, b| a + b).unwrap_or(0.0)
+    }
+
+    #[test]
+    fn processes_that_own_whole_subtrees_have_the_bits_of_one_process() {
+        let parts: Vec<f64> = (0..100).map(|k| 1.0 / (3.0 + f64::from(k))).collect();
+        let whole = sum(&parts);
+        for length in [1, 2, 4, 8, 16, 32, 64, 128] {
+            let owned: Vec<f64> = parts.chunks(length).map(sum).collect();
+            assert_eq!(sum(&owned).to_bits(), whole.to_bits(), "{length} chunks each");
+        }
+        // Blocks that are no subtrees have other bits, and so has a sum in a row.
+        let others = parts.chunks(7).map(sum).collect::<Vec<_>>();
+        assert_ne!(sum(&others).to_bits(), whole.to_bits());
+        assert_ne!(parts.iter().sum::<f64>().to_bits(), whole.to_bits());
+        assert!(tree(Vec::<f64>::new(), |a, b| a + b).is_none());
+    }
 }

@@ -218,7 +218,7 @@ impl<P: Model> Projection<'_, P> {
             }
             gram
         });
-        parts.iter().fold(Gram::new(laws), Gram::plus)
+        parallel::tree(parts, |a, b| a.plus(&b)).unwrap_or_else(|| Gram::new(laws))
     }
 
     /// The length of a vector in units of the sizes of the entries: that of the largest site.

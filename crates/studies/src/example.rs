@@ -46,6 +46,8 @@ pub struct Example {
     pub steps: usize,
     /// The size of a step.
     pub step_size: f64,
+    /// Whether a sweep merges the journals of its shards, rather than running rows.
+    pub merge: bool,
     folder: Option<std::path::PathBuf>,
 }
 
@@ -88,6 +90,13 @@ impl Example {
         Self::read(command(about, None), 0, 0.0)
     }
 
+    /// Reads the command line of a sweep: `--json`, `--merge`, and the shard, which
+    /// `Shard::from_environment` reads by itself.
+    #[must_use]
+    pub fn sweep(about: &'static str) -> Self {
+        Self::read(sweep_command(about), 0, 0.0)
+    }
+
     fn read(command: Command, steps: usize, step_size: f64) -> Self {
         Self::parsed(command, env::args_os(), steps, step_size).unwrap_or_else(|error| error.exit())
     }
@@ -106,6 +115,7 @@ impl Example {
             json: given.get_flag("json"),
             steps: asked("steps").unwrap_or(steps),
             step_size: size.unwrap_or(step_size),
+            merge: given.try_get_one::<bool>("merge").ok().flatten().copied().unwrap_or(false),
             folder: None,
         })
     }
@@ -243,6 +253,32 @@ fn command(about: &'static str, run: Option<[String; 2]>) -> Command {
         )
 }
 
+/// The options of a sweep.
+fn sweep_command(about: &'static str) -> Command {
+    let merge = Arg::new("merge").long("merge").action(ArgAction::SetTrue);
+    let shard = Arg::new("shard").long("shard").value_name("i/n");
+    let shards = Arg::new("shards").long("shards").value_name("n");
+    command(about, None)
+        .arg(shard.help("Run the rows of one of n shards, counted from 0, into a journal"))
+        .arg(shards.help("The number of shards, where the scheduler does not say it (PBS)"))
+        .arg(merge.help("Put the journals of all shards together, and draw"))
+        .after_help(SHARDS)
+}
+
+/// How a sweep is run on many machines.
+const SHARDS: &str = "\
+Shards share the rows of a sweep. Each one writes a journal into the current folder, and goes on from it when
+it is started again. All of these run four shards of the program:
+
+  mpirun -n 4 ./sweep                            OpenMPI or MPICH say the rank and the size
+  sbatch --array=0-3 job.sh                      SLURM says the task of the array; job.sh runs ./sweep
+  qsub -t 1-4 job.sh                             Grid Engine
+  qsub -J 0-3 job.sh                             PBS; job.sh runs ./sweep --shards 4
+  seq 0 3 | parallel ./sweep --shard {}/4        GNU parallel, on one machine or many
+  ./sweep --shard 0/4                            any other way, in four places
+
+Then ./sweep --merge reads the journals, names rows that are missing, and draws the table of all rows.";
+
 fn positive(text: &str) -> Result<f64, String> {
     let value: f64 = text.parse().map_err(|_| format!("`{text}` is not a number"))?;
     let valid = value.is_finite() && value > 0.0;
@@ -267,6 +303,13 @@ mod tests {
         assert_eq!((none.json, none.steps, none.step_size), (false, 3, 0.1));
         let study = Example::parsed(command("A study.", None), ["example", "--json"], 0, 0.0);
         assert!(study.unwrap().json);
+        let sweep = |line: &[&str]| {
+            let line = ["example"].iter().chain(line).copied();
+            Example::parsed(sweep_command("A sweep."), line, 0, 0.0)
+        };
+        assert!(sweep(&["--merge", "--json"]).unwrap().merge);
+        assert!(!sweep(&["--shard", "3/16"]).unwrap().merge);
+        assert!(sweep(&["--help"]).unwrap_err().to_string().contains("--array=0-3"));
         assert!(Example::parsed(command("", None), ["example", "--steps", "3"], 0, 0.0).is_err());
     }
 

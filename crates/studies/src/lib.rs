@@ -13,7 +13,7 @@
 //! | [`drift`] | does the error grow with time? | [`Drift`]: flat, a random walk or a linear drift, in constant memory |
 //! | [`claim`] | which test holds a guarantee, by which figure? | [`Claim`], and the report of all |
 //! | [`table`] | what does the study say, in rows? | [`Table`]: plain text and Markdown |
-//! | [`plot`] | what does it look like? | [`Panels`] of lines, with a [`Globe`] beside them, and [`LogLog`]: SVG, the same bytes every time |
+//! | [`plot`] | what does it look like? | [`Panels`] of lines and [`Map`]s, with a [`Globe`] beside them, and [`LogLog`]: SVG, the same bytes every time |
 //! | [`example`] | what surrounds the model of an example? | [`Example`]: options, progress and the run; [`Record`]: its states |
 //! | [`report`] | what does an example write? | [`Report`]: files, and text or one JSON object |
 //! | [`gallery`] | where do pictures and words go? | [`Gallery`], [`Progress`], [`print()`], [`write_csv`] |
@@ -65,6 +65,7 @@ mod frame;
 mod globe;
 mod header;
 mod log_log;
+mod map;
 mod marker;
 mod panel;
 mod panels;
@@ -77,6 +78,7 @@ pub use either::{AnyGradient, Either};
 pub use example::{Example, Record};
 pub use gallery::{Gallery, GalleryError, Progress, print, write_csv};
 pub use interrupt::interrupted;
+pub use map::Map;
 pub use order::{Order, OrderError};
 pub use plot::{Globe, LogLog, Panel, Panels, PlotError};
 pub use published::Compared;

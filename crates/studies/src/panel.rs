@@ -5,15 +5,17 @@ use svg::node::element::Element;
 use crate::axis::Axis;
 use crate::frame::{Frame, Room};
 use crate::header::Header;
+use crate::map::Map;
 use crate::plot::{self, At, INK, PlotError, circle, color, line};
 
-/// A pair of axes with lines on it.
+/// A pair of axes with lines on it, or a map.
 #[derive(Clone, Debug)]
 pub struct Panel {
     title: String,
     horizontal: String,
     vertical: String,
     unit: String,
+    map: Option<Map>,
     pub(crate) lines: Vec<(String, Vec<(f64, f64)>)>,
     levels: Vec<(String, f64)>,
     /// The lower end of a logarithmic axis.
@@ -31,6 +33,7 @@ impl Panel {
             horizontal: horizontal.into(),
             vertical: quantity.into(),
             unit: String::new(),
+            map: None,
             lines: Vec::new(),
             levels: Vec::new(),
             floor: None,
@@ -58,6 +61,12 @@ impl Panel {
     pub fn line(mut self, label: impl Into<String>, points: impl AsRef<[(f64, f64)]>) -> Self {
         self.lines.push((label.into(), points.as_ref().to_vec()));
         self
+    }
+
+    /// Puts a map on the axes, under the lines.
+    #[must_use]
+    pub fn map(self, map: Map) -> Self {
+        Self { map: Some(map), ..self }
     }
 
     /// Adds a dashed line at height `y`.
@@ -103,19 +112,21 @@ impl Panel {
         }
         let levels = self.levels.iter().map(|(_, y)| [0.0, *y]);
         let first = self.lines.iter().map(|(_, points)| [0.0, points[0].1]).take(1);
-        plot::check(&self.vertical, first.chain(levels), place, fits)
+        let map = self.map.iter().flat_map(Map::corners).map(|(x, y)| [x, y]);
+        plot::check(&self.vertical, first.chain(levels).chain(map), place, fits)
     }
 
     /// The axes of a frame of this size.
     pub(crate) fn axes(&self, frame: At) -> [Axis; 2] {
-        let points = || self.lines.iter().flat_map(|(_, points)| points);
+        let lines = || self.lines.iter().flat_map(|(_, points)| points).copied();
+        let points = || lines().chain(self.map.iter().flat_map(Map::corners));
         let levels = self.levels.iter().map(|(_, y)| *y);
-        let x = points().map(|(x, _)| *x);
-        let heights = points().map(|(_, y)| *y).chain(levels);
+        let x = points().map(|(x, _)| x);
+        let heights = points().map(|(_, y)| y).chain(levels);
         let y = heights.map(|y| self.shown(y));
         let vertical = match self.floor {
             Some(_) => Axis::logarithmic(y),
-            None => Axis::linear(y, 0.06, 5),
+            None => Axis::linear(y, if self.map.is_some() { 0.0 } else { 0.06 }, 5),
         };
         let axes = [Axis::linear(x, if self.equal { 0.03 } else { 0.0 }, 5), vertical];
         if self.equal { Axis::equal(axes, frame) } else { axes }
@@ -128,7 +139,8 @@ impl Panel {
         let lines = lines.map(|(k, label)| (label, color(k), false));
         let levels = self.levels.iter().filter(|(label, _)| !label.is_empty());
         let levels = levels.map(|(label, _)| (label.as_str(), INK, true));
-        Header::of(&self.title, lines.chain(levels).collect(), width)
+        let map = self.map.iter().flat_map(Map::legend).map(|(label, color)| (label, color, false));
+        Header::of(&self.title, map.chain(lines).chain(levels).collect(), width)
     }
 
     /// The labels of the lines, each once.
@@ -148,6 +160,7 @@ impl Panel {
         let names = [x.label(&self.horizontal, ""), y.label(&self.vertical, &self.unit)];
         let frame = Frame { room, x, y };
         let mut parts = frame.parts([&names[0], &names[1]]);
+        parts.extend(self.map.iter().flat_map(|map| map.parts(&frame)));
         let labels = self.labels();
         for (label, points) in &self.lines {
             let colour = color(labels.iter().position(|other| other == label).unwrap_or(0));

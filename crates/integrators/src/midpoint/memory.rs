@@ -54,7 +54,10 @@ impl<N: Dimension> Memory for MidpointMemory<N> {
 
     fn save(&self, saved: &mut Saved) {
         let n = N::LEN;
-        let column = |v: &N::Vector<f64>| (0..n).map(|i| v[i]).collect::<Vec<f64>>();
+        let column = |v: &N::Vector<f64>| {
+            let v = *v;
+            (0..n).map(move |i| v[i])
+        };
         let Predictor { differences, known } = &self.predictor;
         for (name, difference) in NAMES.iter().zip(differences).take(*known) {
             saved.put(name, column(difference));

@@ -84,6 +84,9 @@ pub struct Certificate {
     /// was held or failed are checked too, and not counted. 0 for a flow that does not
     /// [check](crate::Flow::rechecks) them; a lattice checks them at the start and at the end.
     pub checked_states: usize,
+    /// Whether the model was verified before the run, by [`Verify::verified`](metriplectic_dynamics::Verify::verified), and
+    /// not around its start.
+    pub verified_before: bool,
     /// What the method promises.
     pub promises: Promises,
     /// What the model promises about its entropy; serialized as the name of the variant.
@@ -231,6 +234,7 @@ impl Certificate {
             misjudged_size: None,
             limiting_sites: LimitingSites::default(),
             checked_states: checked_states(flow, 0),
+            verified_before: flow.is_verified(),
             promises,
             second_law: flow.entropy_law(),
             friction: 0.0,

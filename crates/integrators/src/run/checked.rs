@@ -9,13 +9,14 @@ const FIRST: [usize; 9] = [1, 2, 3, 5, 8, 13, 21, 34, 55];
 const EVERY: usize = 89;
 
 /// Returns whether the model is checked after this step.
-pub(super) fn is_due(step: usize) -> bool {
-    if step < EVERY { FIRST.contains(&step) } else { step.is_multiple_of(EVERY) }
+pub(super) fn is_due(step: usize, verified: bool) -> bool {
+    if step < EVERY { !verified && FIRST.contains(&step) } else { step.is_multiple_of(EVERY) }
 }
 
 /// The steps up to this one after which the model is checked.
-fn due_steps(steps: usize) -> usize {
-    FIRST.iter().filter(|first| **first <= steps).count() + steps / EVERY
+fn due_steps(steps: usize, verified: bool) -> usize {
+    let first = FIRST.iter().filter(|first| !verified && **first <= steps).count();
+    first + steps / EVERY
 }
 
 /// The states at which the model of a flow has been checked after so many steps, the start among them.
@@ -23,7 +24,8 @@ pub(crate) fn checked_states<F: Flow>(flow: &F, steps: usize) -> usize {
     if !flow.rechecks(Recheck::End) {
         return 0;
     }
-    1 + if flow.rechecks(Recheck::OnTheWay) { due_steps(steps) } else { 0 }
+    let on_the_way = flow.rechecks(Recheck::OnTheWay);
+    1 + if on_the_way { due_steps(steps, flow.is_verified()) } else { 0 }
 }
 
 #[cfg(test)]
@@ -32,12 +34,14 @@ mod tests {
 
     #[test]
     fn the_states_that_are_checked_are_counted() {
-        let mut checked = 1;
-        for step in 0..1000 {
-            checked += usize::from(step > 0 && is_due(step));
-            assert_eq!(1 + due_steps(step), checked, "step {step}");
+        for verified in [false, true] {
+            let mut checked = 1;
+            for step in 0..1000 {
+                checked += usize::from(step > 0 && is_due(step, verified));
+                assert_eq!(1 + due_steps(step, verified), checked, "step {step}");
+            }
         }
         // One per cent of the steps, beside the first ones.
-        assert_eq!(due_steps(100_000), 9 + 1123);
+        assert_eq!([false, true].map(|verified| due_steps(100_000, verified)), [9 + 1123, 1123]);
     }
 }

@@ -57,9 +57,8 @@ use std::io::{self, Seek, Write};
 use crate::run::state::State;
 use crate::step::{Flow, StateSpace};
 
-pub use csv::Csv;
-use csv::quoted;
-pub use npy::Npy;
+pub use csv::{Csv, quoted};
+pub use npy::{Npy, npy_header};
 
 /// A table that cannot be written; the source of an [`io::Error`] of this module.
 #[derive(Debug, thiserror::Error)]

@@ -150,6 +150,12 @@ pub trait Flow {
         Ok(())
     }
 
+    /// Returns whether the model was verified before the run. A run then checks the model at its start, after each
+    /// multiple of 89 steps and at its end, and the certificate says so.
+    fn is_verified(&self) -> bool {
+        false
+    }
+
     /// Verifies what only the flow knows of at the start of a run: its sites, its data.
     ///
     /// # Errors

@@ -126,10 +126,16 @@ pub trait Stepper<F: Flow>: Sized {
 
 /// The name of a type without the paths of its modules.
 pub(crate) fn name_of<T>() -> String {
-    let within = |c: char| c.is_alphanumeric() || c == '_' || c == ':';
-    let mut name = String::new();
-    for part in std::any::type_name::<T>().split_inclusive(|c| !within(c)) {
-        name.push_str(part.rsplit("::").next().unwrap_or(part));
+    let full = std::any::type_name::<T>();
+    let (mut name, mut start) = (String::with_capacity(full.len()), 0);
+    for (at, byte) in full.bytes().enumerate() {
+        if byte == b':' {
+            start = at + 1;
+        } else if byte.is_ascii() && !byte.is_ascii_alphanumeric() && byte != b'_' {
+            name.push_str(&full[start..=at]);
+            start = at + 1;
+        }
     }
+    name.push_str(&full[start..]);
     name
 }

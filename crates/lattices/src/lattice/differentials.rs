@@ -179,6 +179,7 @@ impl<P: Model> Lattice<P> {
             }
             totals
         });
-        (all, totals.iter().fold(Totals::new(P::SUMS), Totals::merge))
+        let totals = if TOTALS { parallel::tree(totals, |a, b| a.merge(&b)) } else { None };
+        (all, totals.unwrap_or_else(|| Totals::new(P::SUMS)))
     }
 }

@@ -24,6 +24,7 @@ const ONE_FALL: Certificate = Certificate {
     misjudged_size: None,
     limiting_sites: LimitingSites::new(None, None),
     checked_states: 5,
+    verified_before: false,
     promises: Promises::all_laws(true),
     second_law: SecondLaw::Exact,
     friction: 0.0,

@@ -67,7 +67,8 @@ impl fmt::Display for Certificate {
         writeln!(f, "manifold:    defect ≤ {:.1e}", self.max_manifold_defect)?;
         if self.checked_states > 0 {
             let states = counted(self.checked_states, "state", "states");
-            writeln!(f, "model:       its laws were checked at {states}")?;
+            let before = if self.verified_before { "verified before the run; " } else { "" };
+            writeln!(f, "model:       {before}its laws were checked at {states}")?;
         }
         if self.smallest_step < self.largest_step || self.rejected > 0 {
             write!(

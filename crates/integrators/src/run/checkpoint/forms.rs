@@ -52,6 +52,8 @@ struct CertificateForm {
     misjudged_size: Option<MisjudgedSize>,
     limiting_sites: LimitingSites,
     checked_states: usize,
+    #[serde(default)]
+    verified_before: bool,
     promises: Promises,
     #[serde(with = "SecondLawForm")]
     second_law: SecondLaw,

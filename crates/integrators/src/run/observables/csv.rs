@@ -91,8 +91,9 @@ fn write(to: &mut impl Write, bytes: &[u8]) -> (usize, io::Result<()>) {
     (written, Ok(()))
 }
 
-/// A name as RFC 4180 wants it.
-pub(super) fn quoted(name: &str) -> String {
+/// A cell of text as RFC 4180 wants it: within quotes if it has a comma, a quote or a line break.
+#[must_use]
+pub fn quoted(name: &str) -> String {
     if name.contains([',', '"', '\n', '\r']) {
         format!("\"{}\"", name.replace('"', "\"\""))
     } else {

@@ -39,7 +39,7 @@ impl<M: StateSpace, W: Write + Seek> Npy<'_, M, W> {
         let (origin, rows, row) = (self.origin, self.rows, 8 * self.of.list.len());
         let Some(to) = &mut self.to else { return Ok(()) };
         let all = rows + self.bytes.len() / row;
-        let header = header(self.of.names(), all);
+        let header = npy_header(self.of.names(), all);
         // The rows first, over what an earlier call has written in part, then the header that counts them.
         let mut append = || {
             if all > rows {
@@ -77,9 +77,10 @@ impl<M: StateSpace, W: Write + Seek> Drop for Npy<'_, M, W> {
     }
 }
 
-/// The header of an array with so many rows: as long for any number of rows, and a multiple of 64
-/// bytes.
-fn header<'a>(names: impl Iterator<Item = &'a str>, rows: usize) -> Vec<u8> {
+/// The header of an array of `numpy` with named `<f8` columns and so many rows, before the bytes of its numbers: as long
+/// for any number of rows, and a multiple of 64 bytes.
+#[must_use]
+pub fn npy_header<'a>(names: impl Iterator<Item = &'a str>, rows: usize) -> Vec<u8> {
     let columns: Vec<_> = names.map(|name| format!("('{}', '<f8')", escaped(name))).collect();
     let columns = columns.join(", ");
     let dictionary =

@@ -1,0 +1,76 @@
+//! What became of a row.
+
+use metriplectic_integrators::Ending;
+
+use crate::figures::Figures;
+
+/// A row with what became of it.
+#[derive(Clone, Debug)]
+pub(crate) struct Entry {
+    pub(crate) number: usize,
+    pub(crate) parameters: Box<[f64]>,
+    pub(crate) outcome: Outcome,
+    /// The wall time, which is no part of the compared numbers.
+    pub(crate) seconds: f64,
+}
+
+/// What became of a row.
+#[derive(Clone, Debug)]
+pub(crate) enum Outcome {
+    Done(Done),
+    Failed(Failed),
+}
+
+/// A row whose run has ended.
+#[derive(Clone, Debug)]
+pub(crate) struct Done {
+    /// The name of how it ended.
+    pub(crate) ending: &'static str,
+    pub(crate) figures: Figures,
+    /// The entries of the last state.
+    pub(crate) end: Box<[f64]>,
+    /// Numbers of the whole run.
+    pub(crate) measures: Box<[f64]>,
+    /// The times of the recorded states, if anything was observed there.
+    pub(crate) times: Box<[f64]>,
+    /// What was observed at these times, one observable after the other.
+    pub(crate) series: Box<[f64]>,
+}
+
+/// A row that failed.
+#[derive(Clone, Debug)]
+pub(crate) struct Failed {
+    pub(crate) kind: String,
+    pub(crate) message: String,
+    /// The numbers of the steps before it failed.
+    pub(crate) figures: Option<Figures>,
+}
+
+/// The names of how a run ended.
+pub(crate) const ENDINGS: [&str; 4] = ["span", "rest", "event", "stopped"];
+
+/// The name of how a run ended.
+pub(crate) const fn ending(ending: Ending) -> &'static str {
+    match ending {
+        Ending::Span => ENDINGS[0],
+        Ending::Rest { .. } => ENDINGS[1],
+        Ending::Event { .. } => ENDINGS[2],
+        _ => ENDINGS[3],
+    }
+}
+
+impl Entry {
+    pub(crate) const fn done(&self) -> Option<&Done> {
+        match &self.outcome {
+            Outcome::Done(done) => Some(done),
+            Outcome::Failed(_) => None,
+        }
+    }
+
+    pub(crate) const fn failed(&self) -> Option<&Failed> {
+        match &self.outcome {
+            Outcome::Failed(failed) => Some(failed),
+            Outcome::Done(_) => None,
+        }
+    }
+}

@@ -1,0 +1,124 @@
+//! Files of tables: text, and arrays of `numpy`.
+
+use std::fs::{self, File};
+use std::io::{self, BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+use metriplectic_integrators::run::observables::{npy_header, quoted};
+
+use super::Table;
+use super::time::Series;
+
+impl Table {
+    /// Writes comma-separated values (RFC 4180). A number read back is the number written, to the last bit; a cell
+    /// that a row does not have is empty. `pandas.read_csv` and `polars.read_csv` read the file.
+    ///
+    /// The file is replaced as a whole, so one that exists is not lost where writing fails.
+    ///
+    /// # Errors
+    ///
+    /// Those of writing.
+    pub fn csv(&self, path: impl AsRef<Path>) -> io::Result<()> {
+        replaced(path.as_ref(), |file| self.write_csv(file))
+    }
+
+    /// Writes the same text to anything that takes it.
+    ///
+    /// # Errors
+    ///
+    /// Those of writing.
+    pub fn write_csv(&self, mut to: impl Write) -> io::Result<()> {
+        let names = self.names();
+        let heads = names.iter().map(|name| if name == "failed" { "outcome" } else { name });
+        let heads: Vec<String> = heads.map(quoted).collect();
+        writeln!(to, "{},error", heads.join(","))?;
+        for row in self.rows() {
+            for name in &names {
+                match (name.as_str(), row.get(name)) {
+                    ("row", _) => write!(to, "{}", row.number())?,
+                    ("failed", _) => write!(to, ",{}", row.outcome())?,
+                    (_, Some(x)) => write!(to, ",{x:?}")?,
+                    (_, None) => write!(to, ",")?,
+                }
+            }
+            let message = row.error().map_or_else(String::new, |(_, message)| quoted(message));
+            writeln!(to, ",{message}")?;
+        }
+        to.flush()
+    }
+
+    /// Writes an array of `numpy` with one named column for each number; NaN where a row does not have it.
+    /// `numpy.load(path)["friction"]` is a column.
+    ///
+    /// # Errors
+    ///
+    /// Those of writing.
+    pub fn npy(&self, path: impl AsRef<Path>) -> io::Result<()> {
+        let names = self.names();
+        let rows = self.rows().map(|row| {
+            let number = |name: &String| row.get(name).unwrap_or(f64::NAN);
+            names.iter().map(number).collect::<Vec<_>>()
+        });
+        write_npy(path.as_ref(), &names, rows)
+    }
+}
+
+impl Series {
+    /// Writes comma-separated values, one time a line.
+    ///
+    /// # Errors
+    ///
+    /// Those of writing.
+    pub fn csv(&self, path: impl AsRef<Path>) -> io::Result<()> {
+        replaced(path.as_ref(), |file| {
+            let names: Vec<String> = self.names().iter().map(|name| quoted(name)).collect();
+            writeln!(file, "{}", names.join(","))?;
+            for row in self.rows() {
+                let numbers: Vec<String> = row.iter().map(|x| format!("{x:?}")).collect();
+                writeln!(file, "{}", numbers.join(","))?;
+            }
+            Ok(())
+        })
+    }
+
+    /// Writes an array of `numpy` with the named columns.
+    ///
+    /// # Errors
+    ///
+    /// Those of writing.
+    pub fn npy(&self, path: impl AsRef<Path>) -> io::Result<()> {
+        write_npy(path.as_ref(), self.names(), self.rows().iter().cloned())
+    }
+}
+
+fn write_npy(
+    path: &Path,
+    names: &[String],
+    rows: impl ExactSizeIterator<Item = Vec<f64>>,
+) -> io::Result<()> {
+    replaced(path, |file| {
+        file.write_all(&npy_header(names.iter().map(String::as_str), rows.len()))?;
+        rows.flatten().try_for_each(|x| file.write_all(&x.to_le_bytes()))
+    })
+}
+
+/// Writes a file beside the one of this path, and then puts it in its place.
+pub(crate) fn replaced(
+    path: &Path,
+    write: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>,
+) -> io::Result<()> {
+    let mut name = path.file_name().unwrap_or_default().to_owned();
+    name.push(format!(".{}.part", std::process::id()));
+    let part: PathBuf = path.with_file_name(name);
+    let written = File::create(&part).and_then(|file| {
+        let mut file = BufWriter::new(file);
+        write(&mut file)?;
+        file.flush()?;
+        file.get_ref().sync_data()
+    });
+    let placed = written.and_then(|()| fs::rename(&part, path));
+    if placed.is_err() {
+        let _ = fs::remove_file(&part);
+    }
+    placed
+}

@@ -1,0 +1,744 @@
+//! Sweeps: the laws of their tables, under threads, shards, kills, full disks and bad rows.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+use metriplectic::ensembles::{
+    JournalError, PlanError, Runs, ShardError, SweepError, TableError, TableRow,
+};
+use metriplectic::integrators::Scheme;
+use metriplectic::prelude::*;
+
+/// A folder for the files of a test.
+fn folder(name: &str) -> PathBuf {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("ensembles").join(name);
+    let _ = fs::remove_dir_all(&folder);
+    fs::create_dir_all(&folder).expect("a folder");
+    folder
+}
+
+/// A body with a friction, from a spin, in steps of a size.
+fn relaxing(row: &Row) -> Result<Trajectory<LieDual<3>>, Error> {
+    relaxing_in(row, 40, 0.1)
+}
+
+fn relaxing_in(row: &Row, steps: usize, h: f64) -> Result<Trajectory<LieDual<3>>, Error> {
+    let friction = row["friction"];
+    let inertia = vector![10.0, 5.0, 1.0];
+    let body = System::on(LieDual::so3())
+        .energy(move |p: &Vector3<Real>| {
+            p.component_mul(p).component_div(&inertia.cast()).sum() * 0.5
+        })
+        .entropy(move |p: &Vector3<Real>| p.norm_squared() * (0.5 * friction))
+        .build()?;
+    let start = vector![row["spin"], -1.0, 0.3];
+    Ok(WeylMidpoint.run(&body, start, Span::steps(h, steps).every(steps / 4))?)
+}
+
+/// A plan of 20 × 20 rows.
+fn plan(name: &str) -> Sweep {
+    Sweep::new(name)
+        .grid("friction", linspace(0.05, 1.0, 20))
+        .samples(20)
+        .random("spin", |draw| draw.uniform(-1.0..1.0))
+}
+
+type Closure = fn(&Row) -> Result<Trajectory<LieDual<3>>, Error>;
+
+fn runs(plan: Sweep, closure: Closure) -> Runs<'static, LieDual<3>, Closure> {
+    plan.run(closure).observe("p₁", |p| p.x).measure("|p|", |run| run.last().point.norm()).quiet()
+}
+
+fn csv(table: &Table) -> String {
+    let mut text = Vec::new();
+    table.write_csv(&mut text).expect("memory takes it");
+    String::from_utf8(text).expect("text")
+}
+
+fn column(table: &Table, name: &str) -> Vec<f64> {
+    table.column(name).expect("the column")
+}
+
+/// Everything that is compared: the table, and what was observed in time.
+fn bytes(table: &Table) -> String {
+    let series = |row: TableRow<'_>| {
+        row.series("p₁")
+            .map_or(Vec::new(), Iterator::collect)
+            .into_iter()
+            .map(|(t, x): (f64, f64)| format!("{:x}{:x}", t.to_bits(), x.to_bits()))
+            .collect::<String>()
+    };
+    csv(table) + &table.rows().map(series).collect::<Vec<_>>().join("\n")
+}
+
+#[test]
+fn the_bytes_of_a_table_depend_on_neither_threads_nor_shards() {
+    let folder = folder("threads");
+    let alone = runs(plan("threads"), relaxing).threads(1).execute().expect("all rows");
+    assert_eq!((alone.len(), alone.failed(), alone.missing().len()), (400, 0, 0));
+    for threads in [2, 7] {
+        let table = runs(plan("threads"), relaxing).threads(threads).execute().expect("all rows");
+        assert!(bytes(&table) == bytes(&alone), "{threads} threads");
+    }
+    let journal = folder.join("sweep.journal");
+    for index in 0..3 {
+        let shard = Shard::new(index, 3).expect("a shard");
+        let part = runs(plan("threads"), relaxing).journal(&journal).shard(shard);
+        let part = part.execute().expect("the rows of a shard");
+        assert_eq!(part.len(), 400_usize.div_ceil(3) - usize::from(index > 0));
+        assert!(part.rows().all(|row| row.number() % 3 == index));
+        if index < 2 {
+            let merged = Table::merge(Table::journals(&journal).expect("files")).expect("a table");
+            let missing = merged.missing();
+            assert!(missing.iter().all(|row| row % 3 > index) && missing.len() > 132);
+            assert_eq!(merged.complete().unwrap_err(), TableError::Missing { rows: missing });
+        }
+    }
+    let names = Table::journals(&journal).expect("files");
+    assert!(names.iter().all(|name| name.extension().is_some_and(|e| e == "journal")));
+    let merged = Table::merge(names).expect("a table").complete().expect("all rows");
+    assert!(bytes(&merged) == bytes(&alone));
+    // The numbers are those of runs by hand.
+    let row = plan("threads").row(217).expect("a row");
+    let run = relaxing(&row).expect("a run");
+    let entry = alone.row(217).expect("a row");
+    assert_eq!(entry.end(), run.last().point.as_slice());
+    let by_hand: Vec<(f64, f64)> = run.iter().map(|state| (state.time, state.point.x)).collect();
+    assert_eq!(entry.series("p₁").expect("observed").collect::<Vec<_>>(), by_hand);
+    assert_eq!(entry.get("run.energy_error"), {
+        let certificate = run.certificate();
+        Some(certificate.max_energy_error / certificate.energy_scale)
+    });
+    assert_eq!(entry.get("run.entropy_increment"), Some(run.certificate().min_entropy_increment));
+    assert_eq!(entry.get("run.kept"), Some(1.0));
+}
+
+#[test]
+fn a_row_alone_has_the_bits_of_the_table() {
+    let all = runs(plan("alone"), relaxing).execute().expect("all rows");
+    let alone = runs(plan("alone"), relaxing).only(17).expect("a row");
+    assert_eq!(alone.len(), 1);
+    let line = |table: &Table| csv(table).lines().find(|l| l.starts_with("17,")).map(str::to_owned);
+    assert!(line(&alone).is_some() && line(&alone) == line(&all));
+    let none = runs(plan("alone"), relaxing).only(400).unwrap_err();
+    assert!(matches!(none, PlanError::NoSuchRow { row: 400, rows: 400 }), "{none}");
+}
+
+/// Eleven starts that are not a number, and a closure that panics in a row.
+fn some_fail(row: &Row) -> Result<Trajectory<LieDual<3>>, Error> {
+    assert!(row.number() != 200, "row 200 is bad");
+    if row.number() % 37 == 5 {
+        let plan = Sweep::new("nan").grid("friction", [0.1]).grid("spin", [f64::NAN]);
+        return relaxing(&plan.row(0).expect("a row"));
+    }
+    relaxing(row)
+}
+
+#[test]
+fn a_row_that_fails_or_panics_is_a_row_with_a_sentence() {
+    let whole = runs(plan("failures"), relaxing).execute().expect("all rows");
+    let table = runs(plan("failures"), some_fail).execute().expect("all rows");
+    assert_eq!((table.len(), table.failed(), table.missing().len()), (400, 12, 0));
+    for (row, right) in table.rows().zip(whole.rows()) {
+        match row.number() {
+            200 => assert_eq!(row.error(), Some(("panic", "panicked: row 200 is bad"))),
+            n if n % 37 == 5 => {
+                let (kind, sentence) = row.error().expect("a failure");
+                assert_eq!(kind, "start");
+                assert!(sentence.contains("entry 0 of the point is NaN"), "{sentence}");
+            }
+            _ => assert_eq!(row.end(), right.end()),
+        }
+    }
+    let text = table.to_string();
+    assert!(text.contains("400 rows, 12 failed (panic: 1, start: 11)"), "{text}");
+}
+
+#[test]
+fn a_row_whose_step_fails_has_the_steps_before() {
+    // A mass falls into the centre of its force after a time of √(π/2) q₀.
+    let closure = |row: &Row| {
+        let system = System::on(Euclidean::<3>)
+            .bracket(Poisson::constant(matrix![0.0, 1.0, 0.0; -1.0, 0.0, 0.0; 0.0, 0.0, 0.0])?)
+            .energy(|x: &Vector3<Real>| x.y.powi(2) * 0.5 + x.x.ln())
+            .build()?;
+        let start = vector![row["q"], 0.0, 0.0];
+        Ok(WeylMidpoint.run(&system, start, Span::steps(0.01, 500).at_most(2))?)
+    };
+    let table = Sweep::new("fall").grid("q", [1.0, 2.0]).run(closure).quiet().execute();
+    let table = table.expect("two rows");
+    assert_eq!(table.failed(), 2);
+    for row in table.rows() {
+        let fall = std::f64::consts::FRAC_PI_2.sqrt() * row.parameters()[0];
+        let (kind, sentence) = row.error().expect("a failure");
+        println!("{kind}: {sentence}");
+        assert!(kind != "run" && sentence.contains("steps were taken"), "{kind}: {sentence}");
+        let time = row.get("run.t").expect("a time");
+        assert!((time - fall).abs() < 0.2 && time > 0.5, "{time} of {fall}");
+        assert_eq!(row.get("run.steps"), Some((time / 0.01).round()));
+        assert_eq!(row.end(), [0.0; 0]);
+    }
+}
+
+// The children: this program again, with a task in its environment.
+
+const TASK: &str = "METRIPLECTIC_TEST_TASK";
+const FILE: &str = "METRIPLECTIC_TEST_FILE";
+
+/// A child that does a task with a file.
+fn child(task: &str, file: &Path) -> Command {
+    let mut child = Command::new(std::env::current_exe().expect("a test has a path"));
+    child.args(["--exact", "a_task_of_a_child", "--nocapture"]).env(TASK, task).env(FILE, file);
+    child.stdout(Stdio::piped()).stderr(Stdio::piped());
+    child
+}
+
+/// A row of two milliseconds.
+fn slowly(row: &Row) -> Result<Trajectory<LieDual<3>>, Error> {
+    std::thread::sleep(Duration::from_millis(2));
+    relaxing(row)
+}
+
+/// A row of many steps with outputs and an event.
+fn long_row(
+    row: &Row,
+    pause: Duration,
+) -> Result<metriplectic::ensembles::Record<LieDual<3>>, Error> {
+    let body = System::on(LieDual::so3())
+        .energy(move |p: &Vector3<Real>| {
+            std::thread::sleep(pause);
+            p.x.powi(2) * 0.05 + p.y.powi(2) * 0.1 + p.z.powi(2) * 0.5
+        })
+        .build()?;
+    let span = Span::steps(0.05, 20_000).output_every(1.3).event("node", |p: &Vector3<f64>| p.x);
+    row.run_long(Scheme::new(WeylMidpoint), &body, vector![row["spin"], -1.0, 0.3], span)
+}
+
+fn long_rows(journal: Option<&Path>) -> Result<Table, SweepError> {
+    let plan = Sweep::new("long").grid("spin", [0.1, 0.2]);
+    let pause = Duration::ZERO;
+    let runs = plan
+        .run(move |row| long_row(row, pause))
+        .observe("p₁", |p| p.x)
+        .measure("nodes", |run| run.events().len() as f64)
+        .measure("last node", |run| run.events().last().map_or(f64::NAN, |e| e.state.time))
+        .checkpoint_every(Duration::from_millis(1))
+        .quiet();
+    match journal {
+        Some(journal) => runs.journal(journal).execute(),
+        None => runs.execute(),
+    }
+}
+
+#[test]
+fn a_task_of_a_child() {
+    let Ok(task) = std::env::var(TASK) else { return };
+    let file = PathBuf::from(std::env::var_os(FILE).expect("a file"));
+    let outcome = match task.as_str() {
+        "slow" => runs(plan("kill"), slowly).journal(&file).threads(2).execute(),
+        "long" => long_rows(Some(&file)),
+        "full" => runs(plan("full"), relaxing).journal(&file).execute(),
+        "export" => {
+            let table = runs(plan("full"), relaxing).execute().expect("all rows");
+            let error = table.csv(&file).unwrap_err();
+            println!("export failed: {error}");
+            return;
+        }
+        other => panic!("no task {other}"),
+    };
+    match outcome {
+        Ok(table) => println!("finished {}", table.len()),
+        Err(SweepError::Interrupted { table, journal }) => {
+            println!("interrupted after {} {journal}", table.len());
+        }
+        Err(error) => println!("error: {error}; rows {}", error.table().map_or(0, Table::len)),
+    }
+}
+
+/// Waits until a journal has so many lines.
+fn wait_for(child: &mut Child, journal: &Path, lines: usize) {
+    let begun = Instant::now();
+    loop {
+        let found = fs::read(journal).unwrap_or_default();
+        if found.iter().filter(|&&byte| byte == b'\n').count() >= lines {
+            return;
+        }
+        assert!(child.try_wait().expect("a child").is_none(), "the child has ended");
+        assert!(begun.elapsed() < Duration::from_secs(60), "the child does nothing");
+        std::thread::sleep(Duration::from_millis(1));
+    }
+}
+
+fn signal(child: &Child, name: &str) {
+    let status = Command::new("kill").args([name, &child.id().to_string()]).status();
+    assert!(status.expect("kill starts").success());
+}
+
+#[test]
+#[cfg(unix)]
+fn a_killed_sweep_goes_on_and_has_the_same_bytes() {
+    let journal = folder("killed").join("sweep.journal");
+    let whole = runs(plan("kill"), relaxing).execute().expect("all rows");
+    let mut killed = child("slow", &journal).spawn().expect("it starts");
+    wait_for(&mut killed, &journal, 68);
+    // Another process may not write to it meanwhile.
+    let busy = runs(plan("kill"), relaxing).journal(&journal).execute().unwrap_err();
+    assert!(matches!(busy, SweepError::Journal(JournalError::InUse { .. })), "{busy}");
+    signal(&killed, "-KILL");
+    killed.wait().expect("it ends");
+    // The last line is torn.
+    let left = fs::read(&journal).expect("a journal");
+    fs::write(&journal, &left[..left.len() - 7]).expect("written");
+    let known = Table::merge([&journal]).expect("a table");
+    assert!((60..400).contains(&known.len()) && known.damaged_lines() == 1, "{}", known.len());
+    let resumed = runs(plan("kill"), relaxing).journal(&journal).execute().expect("all rows");
+    assert!(bytes(&resumed) == bytes(&whole));
+    let again = runs(plan("kill"), |_| panic!("no row is left")).journal(&journal).execute();
+    assert!(bytes(&again.expect("all rows")) == bytes(&whole));
+    let lines = fs::read_to_string(&journal).expect("text").lines().count();
+    assert_eq!(lines, 1 + 400 + 1, "the header, the rows, and the torn line");
+}
+
+#[test]
+#[cfg(unix)]
+fn a_signal_ends_a_sweep_after_the_rows_in_hand() {
+    for (name, stop) in [("interrupt", "-INT"), ("terminate", "-TERM")] {
+        let journal = folder(name).join("sweep.journal");
+        let mut asked = child("slow", &journal).spawn().expect("it starts");
+        wait_for(&mut asked, &journal, 30);
+        signal(&asked, stop);
+        let output = asked.wait_with_output().expect("it ends");
+        let text = String::from_utf8_lossy(&output.stdout).into_owned();
+        assert!(output.status.success(), "{text}");
+        let known = Table::merge([&journal]).expect("a table");
+        assert_eq!(known.damaged_lines(), 0);
+        assert!(text.contains(&format!("interrupted after {} true", known.len())), "{text}");
+        let resumed = runs(plan("kill"), relaxing).journal(&journal).execute().expect("all rows");
+        assert_eq!(resumed.len(), 400);
+    }
+}
+
+#[test]
+#[cfg(unix)]
+fn a_long_row_goes_on_from_its_checkpoint_with_the_same_bits() {
+    let folder = folder("long");
+    let journal = folder.join("sweep.journal");
+    let whole = long_rows(None).expect("all rows");
+    assert!(column(&whole, "nodes").iter().all(|n| *n > 20.0));
+    let is_there = || (0..2).any(|n| folder.join(format!("sweep.row-{n}.checkpoint")).is_file());
+    let mut stopped = 0;
+    for round in 0..200 {
+        let mut run = child("long", &journal).spawn().expect("it starts");
+        let begun = Instant::now();
+        // It is put down by either signal once it has a checkpoint.
+        let pause = Duration::from_millis(10);
+        while run.try_wait().expect("a child").is_none() {
+            if begun.elapsed() > pause && is_there() {
+                signal(&run, if round % 2 == 0 { "-KILL" } else { "-INT" });
+                stopped += 1;
+                break;
+            }
+        }
+        let output = run.wait_with_output().expect("it ends");
+        let text = String::from_utf8_lossy(&output.stdout).into_owned();
+        if text.contains("finished 2") {
+            break;
+        }
+        if stopped > 6 {
+            break;
+        }
+    }
+    let resumed = long_rows(Some(&journal)).expect("all rows");
+    assert!(stopped > 0, "the child was too fast");
+    assert!(csv(&resumed) == csv(&whole), "{}\n{}", csv(&resumed), csv(&whole));
+    assert!(bytes(&resumed) == bytes(&whole));
+    assert!(!is_there(), "the checkpoints of rows in the journal are removed");
+}
+
+#[test]
+#[cfg(unix)]
+fn a_full_disk_is_an_error_that_keeps_the_rows() {
+    let folder = folder("full");
+    let limited = |task: &str, file: &Path| {
+        let child = child(task, file);
+        let program = child.get_program().to_string_lossy().into_owned();
+        let mut shell = Command::new("sh");
+        // A file may have 32 blocks of 512 bytes, and a longer one is an error and no signal.
+        let script = format!(
+            "trap '' XFSZ; ulimit -f 32; exec '{program}' --exact a_task_of_a_child --nocapture"
+        );
+        shell.args(["-c", &script]).env(TASK, task).env(FILE, file);
+        let output = shell.output().expect("sh starts");
+        String::from_utf8_lossy(&output.stdout).into_owned()
+    };
+    let journal = folder.join("sweep.journal");
+    let text = limited("full", &journal);
+    let known = Table::merge([&journal]).expect("a table");
+    println!("{text} {} rows", known.len());
+    assert!(text.contains("error: the journal") && text.contains("rows are kept"), "{text}");
+    assert!(known.len() > 5 && known.len() < 400 && known.damaged_lines() <= 1);
+    // With room it goes on.
+    let whole = runs(plan("full"), relaxing).execute().expect("all rows");
+    let resumed = runs(plan("full"), relaxing).journal(&journal).execute().expect("all rows");
+    assert!(bytes(&resumed) == bytes(&whole));
+    // A table that cannot be written leaves the one that was there.
+    let file = folder.join("table.csv");
+    fs::write(&file, "precious").expect("written");
+    let text = limited("export", &file);
+    assert!(text.contains("export failed"), "{text}");
+    assert_eq!(fs::read_to_string(&file).expect("text"), "precious");
+    assert_eq!(fs::read_dir(&folder).expect("a folder").count(), 2);
+}
+
+#[test]
+fn a_journal_of_another_sweep_is_refused_and_left_as_it_is() {
+    let journal = folder("another").join("sweep.journal");
+    let small = |values: [f64; 2]| Sweep::new("small").grid("friction", values).grid("spin", [0.1]);
+    let first = runs(small([0.1, 0.2]), relaxing).journal(&journal).execute().expect("rows");
+    assert_eq!(first.len(), 2);
+    let before = fs::read(&journal).expect("a journal");
+    let refused = |error: SweepError| match error {
+        SweepError::Journal(JournalError::AnotherSweep { found, expected, .. }) => {
+            assert_ne!(found, expected);
+        }
+        other => panic!("{other}"),
+    };
+    let with = |plan: Sweep| runs(plan, relaxing).journal(&journal).execute().unwrap_err();
+    refused(with(small([0.1, 0.3])));
+    refused(with(small([0.1, 0.2]).seed(7)));
+    refused(with(small([0.1, 0.2]).tag("model 2")));
+    refused(with(small([0.1, 0.2]).random("x", |draw| draw.uniform(0.0..1.0))));
+    let other = runs(small([0.1, 0.2]), relaxing).observe("p₂", |p| p.y).journal(&journal);
+    refused(other.execute().unwrap_err());
+    // A random column that draws other numbers.
+    let drawn = |end: f64| {
+        Sweep::new("drawn")
+            .samples(3)
+            .random("spin", move |draw| draw.uniform(0.0..end))
+            .grid("friction", [0.1])
+    };
+    let random = journal.with_file_name("random.journal");
+    runs(drawn(1.0), relaxing).journal(&random).execute().expect("rows");
+    refused(runs(drawn(2.0), relaxing).journal(&random).execute().unwrap_err());
+    assert_eq!(fs::read(&journal).expect("a journal"), before);
+    let mixed = Table::merge([&journal, &random]).unwrap_err();
+    assert!(matches!(mixed, JournalError::AnotherSweep { .. }), "{mixed}");
+    // Files that are no journals.
+    let text = journal.with_file_name("notes.txt");
+    fs::write(&text, "my notes\n").expect("written");
+    let error = runs(small([0.1, 0.2]), relaxing).journal(&text).execute().unwrap_err();
+    assert!(matches!(error, SweepError::Journal(JournalError::NotAJournal { .. })), "{error}");
+    assert_eq!(fs::read_to_string(&text).expect("text"), "my notes\n");
+    let error = runs(small([0.1, 0.2]), relaxing).journal("/dev/full").execute();
+    assert!(matches!(error, Err(SweepError::Journal(JournalError::NotAFile { .. }))));
+    assert!(matches!(Table::merge::<&Path>([]), Err(JournalError::None)));
+}
+
+#[test]
+fn a_shortened_journal_loses_the_rows_of_its_bytes_and_no_other() {
+    let folder = folder("shortened");
+    let journal = folder.join("sweep.journal");
+    let small = || Sweep::new("small").grid("friction", [0.1, 0.2, 0.3]).grid("spin", [0.1, 0.4]);
+    let whole = runs(small(), relaxing).threads(1).journal(&journal).execute().expect("rows");
+    let full = fs::read(&journal).expect("a journal");
+    let part = folder.join("part.journal");
+    for end in (0..full.len()).rev().step_by(3) {
+        fs::write(&part, &full[..end]).expect("written");
+        let ends = full[..end].iter().filter(|&&byte| byte == b'\n').count();
+        match Table::merge([&part]) {
+            Ok(table) => assert_eq!(table.len(), ends - 1, "{end} bytes"),
+            Err(JournalError::NotAJournal { .. }) => assert_eq!(ends, 0),
+            Err(other) => panic!("{other}"),
+        }
+        if end % 17 == 0 {
+            let resumed = runs(small(), relaxing).journal(&part).execute().expect("rows");
+            assert!(bytes(&resumed) == bytes(&whole), "{end} bytes");
+        }
+    }
+}
+
+#[test]
+fn two_journals_that_contradict_each_other_are_named_with_the_row() {
+    let folder = folder("contradiction");
+    let [one, two] = ["one.journal", "two.journal"].map(|name| folder.join(name));
+    let small = || Sweep::new("small").grid("friction", [0.1, 0.2, 0.3]).grid("spin", [0.1]);
+    runs(small(), relaxing).journal(&one).execute().expect("rows");
+    let closure: Closure =
+        |row| relaxing_in(row, 40, if row.number() == 1 { 0.1_f64.next_up() } else { 0.1 });
+    runs(small(), closure).journal(&two).execute().expect("rows");
+    match Table::merge([&one, &two]) {
+        Err(JournalError::Contradiction { row: 1, first, second }) => {
+            assert_eq!((first, second), (one.clone(), two));
+        }
+        other => panic!("{other:?}"),
+    }
+    // The same rows twice agree, whatever time they took.
+    let copy = folder.join("copy.journal");
+    runs(small(), relaxing).journal(&copy).execute().expect("rows");
+    assert_eq!(Table::merge([&one, &copy]).expect("a table").len(), 3);
+}
+
+#[test]
+fn a_sweep_in_other_units_has_the_same_steps_and_scaled_bits() {
+    // A molecule in units of length and energy that are powers of two: 2⁻³³ m, 2⁻⁶⁰ J and beyond.
+    let closure = |row: &Row| {
+        let (l, e) = (row["length"], row["energy"]);
+        // A mass of one in units of energy · time² / length².
+        let system = System::on(Euclidean::<3>)
+            .bracket(Poisson::constant(matrix![0.0, 1.0, 0.0; -1.0, 0.0, 0.0; 0.0, 0.0, 0.0])?)
+            .energy(move |x: &Vector3<Real>| {
+                let (q, p) = (x.x / l, x.y * l / e);
+                (q * q + p * p) * (0.5 * e) + x.z
+            })
+            .entropy(|x: &Vector3<Real>| x.z)
+            .dissipation(FieldDissipation(move |_: &Vector3<Real>, w: &Vector3<Real>| {
+                let b = Vector3::new(Real::from(0.0), w.z, -w.y);
+                b * b.transpose() * (w.z.recip() * (0.2 * e / (l * l)))
+            }))
+            .build()?;
+        let start = vector![l, row["kick"] * e / l, 0.0];
+        Ok(DormandPrince5.run(&system, start, Span::until(5.0).tolerance(1e-6).at_most(2))?)
+    };
+    let sweep = Sweep::new("units")
+        .listed(
+            ["length", "energy"],
+            [[1.0, 1.0], [2_f64.powi(-33), 2_f64.powi(-60)], [1024.0, 2_f64.powi(80)]],
+        )
+        .grid("kick", [0.1, 0.7, -0.4]);
+    let table = sweep.run(closure).quiet().execute().expect("all rows");
+    assert_eq!(table.failed(), 0, "{table}");
+    let scaled = |row: TableRow<'_>| {
+        let [l, e] = ["length", "energy"].map(|name| row.get(name).expect("a unit"));
+        let [q, p, s] = *row.end() else { panic!("three entries") };
+        let figures = [
+            "run.steps",
+            "run.rejected",
+            "run.t",
+            "run.energy_error",
+            "run.local_error",
+            "run.stiff",
+        ];
+        let figures = figures.map(|name| row.get(name).expect("a figure").to_bits());
+        ([q / l, p * l / e, s / e].map(f64::to_bits), figures)
+    };
+    let rows: Vec<_> = table.rows().map(scaled).collect();
+    assert_eq!(rows[..3], rows[3..6]);
+    assert_eq!(rows[..3], rows[6..]);
+    assert_ne!(rows[0], rows[1]);
+}
+
+#[test]
+fn a_stiff_row_ends_and_says_so() {
+    let closure = |row: &Row| {
+        let friction = row["friction"];
+        let system = System::on(Euclidean::<3>)
+            .bracket(Poisson::constant(matrix![0.0, 1.0, 0.0; -1.0, 0.0, 0.0; 0.0, 0.0, 0.0])?)
+            .energy(|x: &Vector3<Real>| (x.x.powi(2) + x.y.powi(2)) * 0.5 + x.z)
+            .entropy(|x: &Vector3<Real>| x.z)
+            .dissipation(FieldDissipation(move |_: &Vector3<Real>, w: &Vector3<Real>| {
+                let b = Vector3::new(Real::from(0.0), w.z, -w.y);
+                b * b.transpose() * (w.z.recip() * friction)
+            }))
+            .build()?;
+        Ok(WeylMidpoint.run(&system, vector![1.0, 0.5, 0.0], Span::steps(0.2, 50).at_most(2))?)
+    };
+    let sweep = Sweep::new("run.stiff").grid("friction", [0.1, 1.0, 1e7]);
+    let table = sweep.run(closure).quiet().execute().expect("all rows");
+    assert_eq!(column(&table, "run.stiff"), [0.0, 0.0, 1.0], "{table}");
+    assert_eq!(column(&table, "run.resolved")[2], 0.0);
+    assert!(column(&table, "run.energy_error").iter().all(|error| *error <= 50.0 * f64::EPSILON));
+    assert!(table.to_string().contains("friction is not damped in 1 rows: 2"), "{table}");
+}
+
+#[test]
+fn means_and_quantiles_in_time_are_those_of_the_rows() {
+    let table = runs(plan("time"), some_fail).execute().expect("all rows");
+    let all: Vec<Vec<(f64, f64)>> =
+        table.rows().filter_map(|row| Some(row.series("p₁")?.collect())).collect();
+    assert_eq!(all.len(), 388);
+    let quantiles = table.quantiles("p₁", [0.0, 0.05, 0.5, 1.0]).expect("in time");
+    assert_eq!(quantiles.names(), ["t", "q0.0", "q0.05", "q0.5", "q1.0"]);
+    let means = table.mean("p₁").expect("in time");
+    assert_eq!((means.rows().len(), quantiles.rows().len()), (5, 5));
+    for (k, (row, mean)) in quantiles.rows().iter().zip(means.rows()).enumerate() {
+        let mut values: Vec<f64> = all.iter().map(|series| series[k].1).collect();
+        values.sort_by(f64::total_cmp);
+        let n = values.len() as f64;
+        // 0.05 · 387 = 19.35 and 0.5 · 387 = 193.5.
+        let expected = [
+            all[0][k].0,
+            values[0],
+            0.65 * values[19] + 0.35 * values[20],
+            0.5 * (values[193] + values[194]),
+            values[387],
+        ];
+        assert!(row.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-13), "{row:?}");
+        let average = values.iter().sum::<f64>() / n;
+        let variance = values.iter().map(|x| (x - average).powi(2)).sum::<f64>() / (n - 1.0);
+        assert!((mean[1] - average).abs() < 1e-14 && mean[0] == row[0]);
+        assert!((mean[2] / (variance / n).sqrt() - 1.0).abs() < 1e-12, "{mean:?}");
+    }
+    assert!(matches!(table.mean("friction"), Err(TableError::NotInTime { .. })));
+    assert!(matches!(table.mean("p₉"), Err(TableError::NoColumn { .. })));
+    assert!(matches!(table.quantiles("p₁", [1.5]), Err(TableError::Probability { .. })));
+    let closure: Closure = |row| relaxing_in(row, 40 + 4 * (row.number() % 2), 0.1);
+    let uneven = runs(plan("time"), closure).execute().expect("all rows");
+    let error = uneven.mean("p₁").unwrap_err();
+    assert_eq!(error, TableError::Times { first: 0, second: 1 });
+}
+
+#[test]
+fn a_table_is_read_back_from_its_files() {
+    let folder = folder("files");
+    let table = runs(plan("files"), some_fail).execute().expect("all rows");
+    let [text, array, rows] = ["t.csv", "t.npy", "rows.csv"].map(|name| folder.join(name));
+    table.csv(&text).expect("written");
+    table.npy(&array).expect("written");
+    let text = fs::read_to_string(&text).expect("text");
+    let heads: Vec<&str> = text.lines().next().expect("names").split(',').collect();
+    assert_eq!(heads[..4], ["row", "friction", "spin", "outcome"]);
+    assert_eq!(heads[heads.len() - 3..], ["|p|", "p₁", "error"]);
+    let numbers: Vec<u64> = text
+        .lines()
+        .skip(1)
+        .map(|line| {
+            line.split(',').nth(2).expect("a spin").parse::<f64>().expect("a number").to_bits()
+        })
+        .collect();
+    assert!(numbers.into_iter().eq(column(&table, "spin").into_iter().map(f64::to_bits)));
+    // An array has its rows after a header that is a multiple of 64 bytes.
+    let bytes = fs::read(&array).expect("bytes");
+    let names = table.names();
+    let header = bytes.len() - 400 * names.len() * 8;
+    assert!(header.is_multiple_of(64) && bytes.starts_with(b"\x93NUMPY"));
+    let first = bytes[header + 16..header + 24].try_into().expect("eight bytes");
+    assert_eq!(f64::from_le_bytes(first).to_bits(), column(&table, "spin")[0].to_bits());
+    // The rows of a file are those of the plan.
+    fs::write(&rows, "friction, \"spin\"\r\n0.1,-0.5\r\n\r\n1e-1,0.25\r\n").expect("written");
+    let listed = Sweep::new("listed").rows_of(&rows).expect("rows");
+    assert_eq!((listed.rows().expect("rows"), listed.row(1).expect("a row")["spin"]), (2, 0.25));
+    for (bad, line) in [("a,b\n1\n", 2), ("a\n1\nx\n", 3), ("a,,b\n", 1), ("", 1)] {
+        fs::write(&rows, bad).expect("written");
+        let error = Sweep::new("bad").rows_of(&rows).unwrap_err();
+        assert!(matches!(&error, PlanError::Cell { line: l, .. } if *l == line), "{error}");
+    }
+}
+
+#[test]
+fn a_plan_without_sense_is_refused() {
+    let error = |plan: Sweep| runs(plan, relaxing).execute().unwrap_err().to_string();
+    for (plan, says) in [
+        (Sweep::new(""), "no name"),
+        (Sweep::new("s").grid("friction", []), "`friction` has no values"),
+        (Sweep::new("s").samples(0), "no values"),
+        (Sweep::new("s").grid("a", [1.0]).grid("a", [2.0]), "two columns"),
+        (Sweep::new("s").grid("run.steps", [1.0]), "two columns"),
+        (Sweep::new("s").grid("p₁", [1.0]), "two columns"),
+        (Sweep::new("s").samples(usize::MAX).samples(2), "more rows"),
+        (Sweep::new("s").latin_hypercube(3, [("a", 1.0..0.0)]), "from 1 to 0"),
+    ] {
+        let found = error(plan);
+        assert!(found.contains(says), "{found}");
+    }
+}
+
+#[test]
+fn a_latin_hypercube_has_one_sample_in_each_stratum() {
+    let plan = Sweep::new("cube")
+        .grid("cell", [0.0, 1.0])
+        .latin_hypercube(50, [("a", 0.0..50.0), ("b", -25.0..25.0)]);
+    let mut columns: Vec<Vec<f64>> = Vec::new();
+    for cell in 0..2 {
+        for name in ["a", "b"] {
+            let values = (0..50).map(|k| plan.row(50 * cell + k).expect("a row")[name]);
+            columns.push(values.map(|x| if name == "b" { x + 25.0 } else { x }).collect());
+        }
+    }
+    for values in &columns {
+        let mut strata: Vec<f64> = values.iter().map(|x| x.floor()).collect();
+        strata.sort_by(f64::total_cmp);
+        assert!(strata.into_iter().eq((0..50).map(f64::from)));
+    }
+    // No two of them are in the same order.
+    let order =
+        |values: &Vec<f64>| values.iter().map(|x| x.floor()).map(f64::to_bits).collect::<Vec<_>>();
+    for (i, one) in columns.iter().enumerate() {
+        assert!(columns[..i].iter().all(|other| order(other) != order(one)));
+    }
+}
+
+#[test]
+fn each_launcher_says_which_shard_a_process_is() {
+    let of = |line: &[&str], variables: &[(&str, &str)]| {
+        let line: Vec<String> = line.iter().map(|word| (*word).to_owned()).collect();
+        let variable = |name: &str| {
+            variables.iter().find(|(other, _)| *other == name).map(|(_, value)| (*value).to_owned())
+        };
+        Shard::of(&line, &variable)
+    };
+    let shard = |index, count| Shard::new(index, count);
+    assert_eq!(of(&["sweep"], &[]), Ok(Shard::WHOLE));
+    assert_eq!(of(&["sweep", "--shard", "3/16"], &[("PMI_RANK", "1")]), shard(3, 16));
+    assert_eq!(of(&["sweep", "--shard=15/16", "--json"], &[]), shard(15, 16));
+    let slurm = [
+        ("SLURM_ARRAY_TASK_ID", "7"),
+        ("SLURM_ARRAY_TASK_MIN", "1"),
+        ("SLURM_ARRAY_TASK_MAX", "16"),
+        ("SLURM_ARRAY_TASK_COUNT", "16"),
+    ];
+    assert_eq!(of(&[], &slurm), shard(6, 16));
+    let steps = [
+        ("SLURM_ARRAY_TASK_ID", "14"),
+        ("SLURM_ARRAY_TASK_MIN", "10"),
+        ("SLURM_ARRAY_TASK_MAX", "17"),
+        ("SLURM_ARRAY_TASK_STEP", "2"),
+        ("SLURM_ARRAY_TASK_COUNT", "4"),
+    ];
+    assert_eq!(of(&[], &steps), shard(2, 4));
+    // Some tasks of an array alone: their places are not known.
+    let gaps = [
+        ("SLURM_ARRAY_TASK_ID", "3"),
+        ("SLURM_ARRAY_TASK_MIN", "3"),
+        ("SLURM_ARRAY_TASK_MAX", "7"),
+        ("SLURM_ARRAY_TASK_COUNT", "2"),
+    ];
+    assert!(matches!(
+        of(&[], &gaps),
+        Err(ShardError::Gaps { count: 2, first: 3, last: 7, step: 1 })
+    ));
+    // A batch script is rank 0 of all its tasks, but it is the only process.
+    assert_eq!(of(&[], &[("SLURM_PROCID", "0"), ("SLURM_NTASKS", "16")]), Ok(Shard::WHOLE));
+    assert_eq!(of(&[], &[("SLURM_PROCID", "5"), ("SLURM_STEP_NUM_TASKS", "16")]), shard(5, 16));
+    let open = [("OMPI_COMM_WORLD_RANK", "2"), ("OMPI_COMM_WORLD_SIZE", "4"), ("PMI_RANK", "0")];
+    assert_eq!(of(&[], &open), shard(2, 4));
+    assert_eq!(of(&[], &[("PMI_RANK", "3"), ("PMI_SIZE", "8")]), shard(3, 8));
+    assert!(matches!(of(&[], &[("PMI_RANK", "3")]), Err(ShardError::Missing { .. })));
+    // An array of parallel programs.
+    let both: Vec<_> = slurm.iter().chain(&open).copied().collect();
+    assert_eq!(of(&[], &both), shard(6 * 4 + 2, 64));
+    for name in ["PBS_ARRAY_INDEX", "PBS_ARRAYID"] {
+        assert_eq!(of(&["sweep", "--shards", "16"], &[(name, "9")]), shard(9, 16));
+        assert!(matches!(of(&[], &[(name, "9")]), Err(ShardError::NoCount { .. })));
+        let last = of(&["--shards=16"], &[(name, "16")]);
+        assert_eq!(last, Err(ShardError::Range { index: 16, count: 16 }));
+    }
+    let engine = [
+        ("SGE_TASK_ID", "5"),
+        ("SGE_TASK_FIRST", "1"),
+        ("SGE_TASK_LAST", "16"),
+        ("SGE_TASK_STEPSIZE", "4"),
+    ];
+    assert_eq!(of(&[], &engine), shard(1, 4));
+    let alone = [("SGE_TASK_ID", "undefined"), ("SGE_TASK_FIRST", "undefined")];
+    assert_eq!(of(&[], &alone), Ok(Shard::WHOLE));
+    for text in ["3", "a/4", "4/4", "", "3/"] {
+        assert!(of(&["--shard", text], &[]).is_err(), "{text}");
+    }
+    assert!(of(&["--shard"], &[]).is_err());
+    assert!(matches!(
+        of(&[], &[("PMI_RANK", "x"), ("PMI_SIZE", "8")]),
+        Err(ShardError::Text { .. })
+    ));
+}

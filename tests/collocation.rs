@@ -7,7 +7,7 @@ use metriplectic::dynamics::system::Point;
 use metriplectic::integrators::{Components, StageMemory, StepEnds, StepStart, laws};
 use metriplectic::manifolds::Riemannian;
 use metriplectic::prelude::*;
-use metriplectic_studies::Order;
+use metriplectic_studies::{Claim, Guarantee, Order, scientific};
 
 mod models;
 #[path = "models/stages.rs"]
@@ -61,6 +61,13 @@ fn orders<Y: Metriplectic>(
         let (fitted, order) =
             (slope(&steps, &errors, ROUND_OFF), f64::from(Method::<Y>::order(&method)));
         println!("{name}, {method:?}: {fitted:.2} from {errors:?}, {per_step:.1} residuals");
+        let above = steps.iter().zip(&errors).filter(|(_, error)| **error > ROUND_OFF);
+        let (fine, small): (Vec<f64>, Vec<f64>) = above.unzip();
+        let shown = Order::fit(&fine, &small)
+            .map_or_else(|_| format!("{fitted:.2}"), |order| order.to_string());
+        Claim::new(Guarantee::Order, name, format!("{method:?}"))
+            .against("DormandPrince8, tolerance 1e-14")
+            .record(shown, format!("≥ {:.1}", order - 0.3));
         assert!(fitted >= order - 0.3, "{name}, {method:?}: {fitted:.2} from {errors:?}");
     }
 }
@@ -282,6 +289,14 @@ fn gauss_steps_lead_back() {
             way_back(method, &warm_spin(0.1), &WARM, 0.1),
         ];
         println!("{method:?}: {back:?}");
+        let worst = back.into_iter().fold(0.0, f64::max);
+        Claim::new(
+            Guarantee::Symmetry,
+            "a step of h and one of −h: S², SO(3), S² × R, gas",
+            format!("{method:?}"),
+        )
+        .against("the start")
+        .record(scientific(worst), "1e-14");
         assert!(back.iter().all(|off| *off <= 1e-14), "{method:?}: {back:?}");
     }
     // Radau's nodes are not symmetric.
@@ -294,6 +309,13 @@ fn weak_friction_keeps_both_laws() {
         let kappa = 10_f64.powi(-exponent);
         let run = kept("S² × R", Gauss3, &warm_spin(kappa), &WARM, Span::steps(0.2, 2000));
         let gained = run.certificate().entropy_gained;
+        Claim::new(
+            Guarantee::Entropy,
+            format!("spin with friction κ = 1e-{exponent}, S² × R"),
+            "Gauss3",
+        )
+        .against("S of 2000 steps of 0.2")
+        .record(format!("{} falls", run.certificate().entropy_falls), "0 falls");
         assert!(gained > 0.0, "κ = {kappa:e}: {gained:e}");
     }
     let run = kept("S² × R", Gauss3, &warm_spin(0.0), &WARM, Span::steps(0.2, 2000));
@@ -313,6 +335,13 @@ fn drift(steps: usize) -> [f64; 2] {
 #[test]
 fn nothing_drifts_in_many_steps() {
     let [energy, entropy] = drift(50_000);
+    let claim = |guarantee| {
+        Claim::new(guarantee, "spin without friction, S² × R, 50 000 steps of 0.2", "Gauss2")
+    };
+    claim(Guarantee::Energy)
+        .against("H at the start, relative to its terms")
+        .record(scientific(energy), "2e-15");
+    claim(Guarantee::Entropy).against("S at the start").record(scientific(entropy), "2e-15");
     assert!(energy <= 2e-15 && entropy <= 2e-15, "{energy:e}, {entropy:e}");
 }
 
@@ -401,6 +430,14 @@ fn adaptive_runs_have_what_every_run_has() {
             (run.last().point - exact.last().point).norm()
         });
         println!("{method:?}: {errors:?}");
+        let ratios = errors.windows(2).map(|pair| format!("{:.0}", pair[0] / pair[1]));
+        Claim::new(
+            Guarantee::Tolerance,
+            "gas containers: errors over two decades",
+            format!("{method:?}"),
+        )
+        .against("DormandPrince8, tolerance 1e-14")
+        .record(ratios.collect::<Vec<_>>().join(", "), "12 to 600 for 100");
         // Two decades of the tolerance are two decades of the error, but for a factor.
         for pair in errors.windows(2) {
             assert!((12.0..600.0).contains(&(pair[0] / pair[1])), "{method:?}: {errors:?}");

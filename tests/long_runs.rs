@@ -1,7 +1,7 @@
 //! Runs of ten million steps: whether the errors stay where they are.
 //!
-//! `cargo test --release -p metriplectic-tests --test long_runs -- --ignored --nocapture` prints the table of
-//! `docs/long_runs.md`. The same runs with a hundred thousand steps are among the usual tests.
+//! `cargo test --release -p metriplectic-tests --test long_runs -- --ignored --nocapture` prints a table of
+//! them; `docs/verification.md` has its figures. The same runs with a hundred thousand steps are among the usual tests.
 
 mod models;
 

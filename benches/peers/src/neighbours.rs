@@ -13,10 +13,9 @@ use metriplectic_peers::{
 };
 use metriplectic_studies::{Table, scientific};
 
-const TIMES: [u32; 2] = [100, 10_000];
-const TOLERANCES: [f64; 3] = [1e-4, 1e-7, 1e-10];
+const TOLERANCES: [f64; 2] = [1e-4, 1e-10];
 /// Steps of one size in a unit of time.
-const STEPS: [u32; 2] = [5, 40];
+const STEPS: [u32; 1] = [40];
 
 /// A row of the table.
 struct Row {
@@ -143,11 +142,10 @@ fn main() {
         "falls of S",
         "steps without factors",
     ]);
-    for time in TIMES {
-        rows(&RelaxingBody, time, &mut table);
-        rows(&Gas { alpha: 1e-3 }, time, &mut table);
-        rows(&Gas { alpha: 0.5 }, time, &mut table);
-        rows(&WarmOscillator, time, &mut table);
-    }
+    rows(&RelaxingBody, 100, &mut table);
+    rows(&WarmOscillator, 100, &mut table);
+    rows(&Gas { alpha: 1e-3 }, 100, &mut table);
+    rows(&Gas { alpha: 1e-3 }, 10_000, &mut table);
+    rows(&Gas { alpha: 0.5 }, 10_000, &mut table);
     println!("{}", table.markdown());
 }

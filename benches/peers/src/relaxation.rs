@@ -72,7 +72,7 @@ pub fn run<P: TwoLaws<N>, const N: usize>(
     tolerance: f64,
     relaxed: Relaxed,
 ) -> Path<N> {
-    let (mut x, mut t, mut h) = (problem.start(), 0.0, 1e-3);
+    let (mut x, mut t, mut h) = (problem.start(), 0.0, 1e-3_f64);
     let energy = problem.energy(&x);
     let mut path = Path { states: vec![x], evaluations: 1, plain: 0 };
     let mut first = problem.velocity(&x);

@@ -107,6 +107,10 @@ instructions *flags:
 peers *options:
     cd benches/peers && cargo run --release --bin peers -- {{ justfile_directory() }}/docs/gallery/peers.svg {{ options }}
 
+# compare with the methods of the literature that keep laws, a table of docs/peers.md
+neighbours:
+    cd benches/peers && cargo run --release --no-default-features --bin neighbours
+
 # draw work against precision on six problems, for the book, and print its table
 precision:
     cd benches/peers && cargo run --release --bin peers -- {{ justfile_directory() }}/book/src/precision.svg --precision

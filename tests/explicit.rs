@@ -71,20 +71,26 @@ fn orders<Y: Metriplectic>(name: &str, system: &Y, x0: &Point<Y>, time: f64, coa
 
 #[test]
 fn on_lie_algebra_duals() {
-    orders("so(3)*", &models::relaxing_body(), &vector![0.3, -0.9, 0.2], 30.0, [64, 24]);
+    orders(
+        "relaxing body, so(3)*",
+        &models::relaxing_body(),
+        &vector![0.3, -0.9, 0.2],
+        30.0,
+        [64, 24],
+    );
     let body = System::on(LieDual::se3())
         .energy(models::heavy)
         .entropy(models::alignment)
         .casimir(models::gamma_squared)
         .build()
         .unwrap();
-    orders("se(3)*", &body, &SVector::from(models::HEAVY), 4.0, [32, 24]);
+    orders("heavy top with friction, se(3)*", &body, &SVector::from(models::HEAVY), 4.0, [32, 24]);
 }
 
 #[test]
 fn on_spheres_and_products_with_them() {
     let spin = System::on(Sphere::<2>::round()).bracket(AreaForm).energy(top).build().unwrap();
-    orders("S²", &spin, &Vector3::repeat(3_f64.sqrt().recip()), 20.0, [64, 24]);
+    orders("spinning top, S²", &spin, &Vector3::repeat(3_f64.sqrt().recip()), 20.0, [64, 24]);
     type Warm = (Vector3<Real>, Vector1<Real>);
     let warm = System::on(Product(Sphere::<2>::round(), Euclidean::<1>))
         .bracket((AreaForm, Zero))
@@ -92,13 +98,19 @@ fn on_spheres_and_products_with_them() {
         .entropy(boxed(|(_, s): &Warm| s.x))
         .build()
         .unwrap();
-    orders("S² × R", &warm, &(vector![0.6, 0.0, 0.8], Vector1::new(0.0)), 6.0, [64, 16]);
+    orders(
+        "spin that warms a bath, S² × R",
+        &warm,
+        &(vector![0.6, 0.0, 0.8], Vector1::new(0.0)),
+        6.0,
+        [64, 16],
+    );
 }
 
 #[test]
 fn on_gas_containers() {
-    orders("gas, α = 0.5", &gas(0.5), &vector![1.0, 2.0, 2.0, 2.0], 2.0, [128, 48]);
-    orders("gas, α = 0.001", &gas(1e-3), &vector![1.0, 2.0, 2.0, 2.0], 2.0, [128, 48]);
+    orders("gas containers, α = 0.5", &gas(0.5), &vector![1.0, 2.0, 2.0, 2.0], 2.0, [128, 48]);
+    orders("gas containers, α = 0.001", &gas(1e-3), &vector![1.0, 2.0, 2.0, 2.0], 2.0, [128, 48]);
 }
 
 #[test]
@@ -110,7 +122,7 @@ fn on_rotations() {
         .build()
         .unwrap();
     let start = Rotations::bi_invariant().from_quaternion([0.8, 0.3, -0.4, 0.33]).unwrap();
-    orders("SO(3)", &group, &start, 0.4, [32, 20]);
+    orders("Nambu bracket, SO(3)", &group, &start, 0.4, [32, 20]);
 }
 
 #[test]
@@ -129,7 +141,13 @@ fn on_a_chart_with_a_metric_of_its_own() {
         .entropy(boxed(|x: &Vector3<Real>| x.norm_squared() * 0.5 + x.z * 0.2))
         .build()
         .unwrap();
-    orders("chart", &system, &vector![0.5, -0.6, 0.4], 2.0, [32, 8]);
+    orders(
+        "Nambu bracket, chart with a metric of its own",
+        &system,
+        &vector![0.5, -0.6, 0.4],
+        2.0,
+        [32, 8],
+    );
 }
 
 #[test]
@@ -142,7 +160,13 @@ fn with_a_listed_momentum() {
         .momentum(models::angular_momentum)
         .build()
         .unwrap();
-    orders("double pendulum", &system, &SVector::from(models::PENDULUM), 2.0, [64, 16]);
+    orders(
+        "thermoelastic double pendulum",
+        &system,
+        &SVector::from(models::PENDULUM),
+        2.0,
+        [64, 16],
+    );
 }
 
 #[test]
@@ -153,7 +177,13 @@ fn on_a_manifold_of_a_user() {
         .energy(boxed(|x: &Vector3<Real>| x.z + x.x * x.x * 0.3 + x.y * x.x * 0.2))
         .build()
         .unwrap();
-    orders("globe", &globe, &Globe::point(vector![0.6, 0.0, 0.8]), 12.0, [64, 16]);
+    orders(
+        "spin on a globe of a user",
+        &globe,
+        &Globe::point(vector![0.6, 0.0, 0.8]),
+        12.0,
+        [64, 16],
+    );
 }
 
 /// Runs with tolerances, by both methods; the steps and the distance from `exact` of each one of order 8.
@@ -193,9 +223,10 @@ fn at_tolerances<Y: Metriplectic>(
     claim(Guarantee::Energy)
         .against("H at the start, relative")
         .record(scientific(energy), "3e-15");
-    claim(Guarantee::Entropy)
-        .against("S of every step")
-        .record(format!("{falls} falls"), "0 falls");
+    if system.second_law() != SecondLaw::NoEntropy {
+        let falls = format!("{falls} falls");
+        claim(Guarantee::Entropy).against("S of every step").record(falls, "0 falls");
+    }
     ends
 }
 
@@ -205,7 +236,7 @@ const ALL: [i32; 4] = [3, 6, 9, 12];
 fn the_laws_hold_at_every_tolerance() {
     let (body, spin) = (models::relaxing_body(), spin());
     for time in [100.0, 1e4] {
-        let ends = at_tolerances("body", &body, &models::UNSTABLE, time, &ALL);
+        let ends = at_tolerances("relaxing body", &body, &models::UNSTABLE, time, &ALL);
         if time > 1e3 {
             // The energy is that of a rotation about the first axis.
             let energy = body.energy_at(&models::UNSTABLE);
@@ -217,9 +248,9 @@ fn the_laws_hold_at_every_tolerance() {
             assert!(ends[0].0 <= 800, "{} steps", ends[0].0);
         }
         at_tolerances("spinning top", &spin, &Vector3::repeat(3_f64.sqrt().recip()), time, &ALL);
-        at_tolerances("gas, α = 0.5", &gas(0.5), &GAS, time, &ALL);
+        at_tolerances("gas containers, α = 0.5", &gas(0.5), &GAS, time, &ALL);
         let tolerances: &[i32] = if time > 1e3 { &[4, 8] } else { &ALL };
-        at_tolerances("gas, α = 0.001", &gas(1e-3), &GAS, time, tolerances);
+        at_tolerances("gas containers, α = 0.001", &gas(1e-3), &GAS, time, tolerances);
     }
 }
 

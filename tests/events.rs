@@ -270,6 +270,11 @@ fn a_function_of_other_points_is_an_error() {
     let span = Span::steps(0.1, 9).event("a", |x: &Plane| x.x).event("b", |x: &Vector3<f64>| x.x);
     let error = WeylMidpoint.run(&oscillator(), START, span).unwrap_err();
     assert!(matches!(error, RunError::Span(SpanError::EventPoint { index: 1, .. })), "{error}");
+    let text = error.to_string();
+    assert!(
+        text.contains("a function of Vector3<f64>") && text.contains("are Vector2<f64>;"),
+        "{text}"
+    );
     println!("{error}");
 }
 

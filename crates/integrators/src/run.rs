@@ -15,5 +15,6 @@ pub mod scales;
 pub mod span;
 pub mod steps;
 pub mod trajectory;
+mod type_names;
 pub mod until;
 pub mod watch;

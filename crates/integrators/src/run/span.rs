@@ -1,6 +1,7 @@
 //! How far a run goes, in which steps, and what of it is recorded.
 
 use crate::run::controller::Rule;
+use crate::run::type_names::short;
 use crate::run::until::Adaptive;
 use crate::run::watch::Requests;
 
@@ -336,8 +337,9 @@ pub enum SpanError {
     },
     /// The function of an event has points of another type than the run.
     #[error(
-        "event {index} is a function of {found}, and the points of the run are {expected}; say this type in \
-         the closure"
+        "event {index} is a function of {}, and the points of the run are {}; say this type in the closure",
+        short(found),
+        short(expected)
     )]
     EventPoint {
         /// Which event, in the order in which they were asked for, counted from 0.

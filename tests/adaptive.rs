@@ -4,7 +4,7 @@ mod models;
 
 use metriplectic::integrators::{Flow, Laws, Schedule, SpanError, StepError, StepStart};
 use metriplectic::prelude::*;
-use metriplectic_studies::Order;
+use metriplectic_studies::{Claim, Guarantee, Order, scientific};
 use models::{TUMBLING, UNSTABLE, free_body, half_square, relaxing_body, top};
 
 /// One step of the classical Runge-Kutta method, which shares nothing with the scheme.
@@ -56,6 +56,12 @@ fn the_error_is_proportional_to_the_tolerance() {
     });
     let order = Order::fit(&tolerances, &errors).expect("six errors");
     println!("relaxing body: {errors:?}, slope {order}");
+    let claim = |problem: &str, order: &Order| {
+        Claim::new(Guarantee::Tolerance, format!("{problem}: error ~ toleranceᵖ"), "WeylMidpoint")
+            .against("a Runge-Kutta flow with gradients by hand")
+            .record(format!("p = {order}"), "1 ± 0.1");
+    };
+    claim("relaxing rigid body, so(3)*", &order);
     assert!(order.agrees(1.0, 0.1), "{order}");
 
     let system = System::on(Sphere::<2>::round()).bracket(AreaForm).energy(top).build().unwrap();
@@ -67,6 +73,7 @@ fn the_error_is_proportional_to_the_tolerance() {
     });
     let order = Order::fit(&tolerances, &errors).expect("six errors");
     println!("top: {errors:?}, slope {order}");
+    claim("spinning top, S²", &order);
     assert!(order.agrees(1.0, 0.1), "{order}");
     // The tolerance is about the error that is collected in a turn; here it is some turns.
     assert!(errors[3] < 20.0 * tolerances[3], "{errors:?}");
@@ -106,6 +113,10 @@ fn the_laws_hold_in_steps_of_a_controller() {
         let certificate = run.certificate();
         println!("{tolerance:.0e}:\n{certificate}");
         assert!(certificate.keeps_energy() && certificate.keeps_entropy(), "{certificate}");
+        let problem = format!("relaxing rigid body, T = 300, tolerance {tolerance:.0e}: H");
+        Claim::new(Guarantee::Tolerance, problem, "WeylMidpoint")
+            .against("H at the start")
+            .record(scientific(certificate.max_energy_error), "16 ε");
         assert!(certificate.max_energy_error <= 16.0 * f64::EPSILON, "{certificate}");
         // The motion is slow, quick and slow again.
         assert!(certificate.largest_step > 5.0 * certificate.smallest_step, "{certificate}");
@@ -169,7 +180,11 @@ fn a_stiff_start_of_a_slow_motion_takes_few_steps() {
     }
     println!("adaptive {steps} steps, error {error:.1e}; fixed {fixed:?}");
     let coarser = fixed.iter().filter(|fixed| fixed.1 > error).map(|fixed| fixed.0).max();
-    assert!(coarser.expect("one of them") > 200 * steps, "{steps} {error:.1e} {fixed:?}");
+    let coarser = coarser.expect("one of them");
+    Claim::new(Guarantee::Tolerance, "stiff start of a slow exchange of heat", "WeylMidpoint")
+        .against("steps of one size with no less error")
+        .record(format!("{steps} steps for {coarser}"), "200 times fewer");
+    assert!(coarser > 200 * steps, "{steps} {error:.1e} {fixed:?}");
 }
 
 #[test]

@@ -8,6 +8,7 @@ use digits::refuses_changed_digits;
 use metriplectic::integrators::{Checkpoint, ResumeError, Schedule, SpanError, Steps};
 use metriplectic::manifolds::PointError;
 use metriplectic::prelude::*;
+use metriplectic_studies::{Claim, Guarantee};
 use models::{TUMBLING, UNSTABLE, free_body, half_square, relaxing_body, spring, top};
 
 type Start<Y> = <<Y as Metriplectic>::Manifold as metriplectic::fields::Space>::Point<f64>;
@@ -74,6 +75,14 @@ fn resumes<Y: Metriplectic>(
         // Down to what the next step would be guessed from.
         assert_eq!(resumed.checkpoint(), whole.checkpoint(), "{name} at {put_down}");
     }
+    let steps = expected.len();
+    Claim::new(
+        Guarantee::Reproducibility,
+        format!("{name}, {steps} steps, resumed at 7 places"),
+        "WeylMidpoint",
+    )
+    .against("the whole run")
+    .record("the same bits", "the same bits");
 }
 
 /// With steps of one size, and with those of a controller.
@@ -445,4 +454,11 @@ fn the_same_inputs_give_the_same_bits() {
     for thread in threads {
         assert!(thread.join().expect("it runs") == once, "in another thread");
     }
+    Claim::new(
+        Guarantee::Reproducibility,
+        "body and spin, twice and in two threads",
+        "WeylMidpoint",
+    )
+    .against("the first run")
+    .record("the same bits", "the same bits");
 }

@@ -7,7 +7,7 @@ use metriplectic::dynamics::system::Point;
 use metriplectic::integrators::{Components, StageMemory, StepEnds, StepStart, laws};
 use metriplectic::manifolds::Riemannian;
 use metriplectic::prelude::*;
-use metriplectic_studies::Order;
+use metriplectic_studies::{Claim, Guarantee, Order, scientific};
 
 mod models;
 #[path = "models/stages.rs"]
@@ -70,12 +70,19 @@ fn orders<Y: Metriplectic>(
                 .map(|(state, exact)| distance::<Y::Manifold>(&state.point, exact))
         });
         let order = f64::from(Stepper::<Y>::order(&method));
-        for (place, which) in ["inside", "at the end"].into_iter().zip([0, 1]) {
+        for (which, place) in ["inside", "at the end"].into_iter().enumerate() {
             let errors = errors.map(|both| both[which]);
             let fitted = slope(&steps, &errors, ROUND_OFF);
             println!(
                 "{name}, {method:?}, {place}: {fitted:.2}, {errors:?}, {per_step:.1} residuals"
             );
+            let above = steps.iter().zip(&errors).filter(|(_, error)| **error > ROUND_OFF);
+            let (fine, small): (Vec<f64>, Vec<f64>) = above.unzip();
+            let shown = Order::fit(&fine, &small)
+                .map_or_else(|_| format!("{fitted:.2}"), |order| order.to_string());
+            Claim::new(Guarantee::Order, format!("{name}, {place}"), format!("{method:?}"))
+                .against("DormandPrince8, tolerance 1e-14")
+                .record(shown, format!("≥ {:.1}", order - 0.3));
             assert!(
                 fitted >= order - 0.3,
                 "{name}, {method:?}, {place}: {fitted:.2} from {errors:?}"
@@ -124,7 +131,7 @@ fn turned() -> Matrix3<f64> {
 #[test]
 fn orders_on_lie_algebra_duals() {
     orders(
-        "so(3)*",
+        "relaxing body, so(3)*",
         &relaxing_body(),
         &vector![0.3, -0.9, 0.2],
         30.0,
@@ -136,20 +143,32 @@ fn orders_on_lie_algebra_duals() {
         .casimir(models::gamma_squared)
         .build()
         .expect("it is a system");
-    orders("se(3)*", &body, &SVector::from(models::HEAVY), 4.0, ([32, 32, 16, 12], [32, 16, 12]));
+    orders(
+        "heavy top with friction, se(3)*",
+        &body,
+        &SVector::from(models::HEAVY),
+        4.0,
+        ([32, 32, 16, 12], [32, 16, 12]),
+    );
 }
 
 #[test]
 fn orders_on_spheres_and_products_with_them() {
     orders(
-        "S²",
+        "spinning top, S²",
         &spin(),
         &Vector3::repeat(3_f64.sqrt().recip()),
         20.0,
         ([64, 64, 36, 36], [64, 36, 36]),
     );
-    orders("S² × R", &warm_spin(1.0), &WARM, 6.0, ([64, 48, 40, 30], [48, 48, 28]));
-    orders("SO(3)", &rotations(), &turned(), 0.4, ([32, 32, 16, 16], [32, 16, 16]));
+    orders(
+        "spin that warms a bath, S² × R",
+        &warm_spin(1.0),
+        &WARM,
+        6.0,
+        ([64, 48, 40, 30], [48, 48, 28]),
+    );
+    orders("Nambu bracket, SO(3)", &rotations(), &turned(), 0.4, ([32, 32, 16, 16], [32, 16, 16]));
 }
 
 /// The sign of `⟨dH, dS⟩` is that of the temperature, and it changes as this spin turns.
@@ -195,7 +214,7 @@ fn orders_without_friction_where_the_entropy_is_constant() {
         .build()
         .expect("it is a system");
     let x0 = vector![2.0, 0.25, 0.125];
-    orders("pendulum", &pendulum, &x0, 4.0, ([48, 32, 20, 16], [32, 20, 16]));
+    orders("pendulum beside a bath", &pendulum, &x0, 4.0, ([48, 32, 20, 16], [32, 20, 16]));
     for method in RADAU {
         let run = kept("pendulum", method, &pendulum, &x0, Span::until(4.0).tolerance(1e-5));
         let off = run.iter().map(|state| (state.entropy - 0.125).abs()).fold(0.0, f64::max);
@@ -205,7 +224,7 @@ fn orders_without_friction_where_the_entropy_is_constant() {
 
 #[test]
 fn orders_on_gas_containers_and_with_a_listed_momentum() {
-    orders("gas", &gas(0.5), &GAS, 2.0, ([64, 48, 24, 20], [48, 24, 36]));
+    orders("gas containers, α = 0.5", &gas(0.5), &GAS, 2.0, ([64, 48, 24, 20], [48, 24, 36]));
     let pendulum = System::on(Euclidean::<10>)
         .bracket(Poisson::constant(models::pendulum_bracket()).expect("it is skew"))
         .energy(models::pendulum_energy)
@@ -215,7 +234,7 @@ fn orders_on_gas_containers_and_with_a_listed_momentum() {
         .build()
         .expect("it is a system");
     orders(
-        "double pendulum",
+        "thermoelastic double pendulum",
         &pendulum,
         &SVector::from(models::PENDULUM),
         2.0,
@@ -243,7 +262,13 @@ const BENT: Vector3<f64> = Vector3::new(0.5, -0.6, 0.4);
 
 #[test]
 fn orders_with_a_metric_of_its_own_and_on_a_manifold_of_a_user() {
-    orders("chart", &bent(), &BENT, 4.0, ([48, 32, 16, 12], [32, 16, 16]));
+    orders(
+        "Nambu bracket, chart with a metric of its own",
+        &bent(),
+        &BENT,
+        4.0,
+        ([48, 32, 16, 12], [32, 16, 16]),
+    );
     let globe = System::on(Globe)
         .metric(Metric::field(|_: &Vector3<Real>| Matrix3::identity()))
         .bracket(AreaForm)
@@ -251,7 +276,7 @@ fn orders_with_a_metric_of_its_own_and_on_a_manifold_of_a_user() {
         .build()
         .expect("it is a system");
     let start = Globe::point(vector![0.6, 0.0, 0.8]);
-    orders("globe", &globe, &start, 12.0, ([64, 40, 24, 16], [40, 24, 16]));
+    orders("spin on a globe of a user", &globe, &start, 12.0, ([64, 40, 24, 16], [40, 24, 16]));
 }
 
 /// How far the method of one stage is from a midpoint scheme after 100 steps.
@@ -301,6 +326,14 @@ fn gauss_steps_lead_back() {
             way_back(method, &warm_spin(0.1), &WARM, 0.1),
         ];
         println!("{method:?}: {back:?}");
+        let worst = back.into_iter().fold(0.0, f64::max);
+        Claim::new(
+            Guarantee::Symmetry,
+            "a step of h and one of −h: S², SO(3), S² × R, gas",
+            format!("{method:?}"),
+        )
+        .against("the start")
+        .record(scientific(worst), "1e-14");
         assert!(back.iter().all(|off| *off <= 1e-14), "{method:?}: {back:?}");
     }
     // Radau's nodes are not symmetric.
@@ -313,6 +346,13 @@ fn weak_friction_keeps_both_laws() {
         let kappa = 10_f64.powi(-exponent);
         let run = kept("S² × R", Gauss3, &warm_spin(kappa), &WARM, Span::steps(0.2, 2000));
         let gained = run.certificate().entropy_gained;
+        Claim::new(
+            Guarantee::Entropy,
+            format!("spin with friction κ = 1e-{exponent}, S² × R"),
+            "Gauss3",
+        )
+        .against("S of 2000 steps of 0.2")
+        .record(format!("{} falls", run.certificate().entropy_falls), "0 falls");
         assert!(gained > 0.0, "κ = {kappa:e}: {gained:e}");
     }
     let run = kept("S² × R", Gauss3, &warm_spin(0.0), &WARM, Span::steps(0.2, 2000));
@@ -332,6 +372,13 @@ fn drift(steps: usize) -> [f64; 2] {
 #[test]
 fn nothing_drifts_in_many_steps() {
     let [energy, entropy] = drift(50_000);
+    let claim = |guarantee| {
+        Claim::new(guarantee, "spin without friction, S² × R, 50 000 steps of 0.2", "Gauss2")
+    };
+    claim(Guarantee::Energy)
+        .against("H at the start, relative to its terms")
+        .record(scientific(energy), "2e-15");
+    claim(Guarantee::Entropy).against("S at the start").record(scientific(entropy), "2e-15");
     assert!(energy <= 2e-15 && entropy <= 2e-15, "{energy:e}, {entropy:e}");
 }
 
@@ -420,6 +467,14 @@ fn adaptive_runs_have_what_every_run_has() {
             (run.last().point - exact.last().point).norm()
         });
         println!("{method:?}: {errors:?}");
+        let ratios = errors.windows(2).map(|pair| format!("{:.0}", pair[0] / pair[1]));
+        Claim::new(
+            Guarantee::Tolerance,
+            "gas containers: errors over two decades",
+            format!("{method:?}"),
+        )
+        .against("DormandPrince8, tolerance 1e-14")
+        .record(ratios.collect::<Vec<_>>().join(", "), "12 to 600 for 100");
         // Two decades of the tolerance are two decades of the error, but for a factor.
         for pair in errors.windows(2) {
             assert!((12.0..600.0).contains(&(pair[0] / pair[1])), "{method:?}: {errors:?}");

@@ -7,7 +7,7 @@ mod models;
 use metriplectic::fields::{ChartPoint, Matrix};
 use metriplectic::manifolds::{GeodesicEnd, MetricError, Riemannian, StepPathJet};
 use metriplectic::prelude::*;
-use metriplectic_studies::{Either, Order};
+use metriplectic_studies::{Claim, Either, Guarantee, Order, scientific};
 use models::{boxed, top};
 
 /// Either of both geodesic retractions: each system compiles its run once.
@@ -50,16 +50,20 @@ fn a_step_on_the_sphere_is_the_same_in_colatitude_and_longitude() {
         .build()
         .unwrap();
     let span = Span::steps(0.2, 1);
+    let mut off = Vec::new();
     let there = Scheme::new(WEYL).run(&embedded, on_sphere(&start), span).unwrap().last().point;
     let here = Scheme::new(WEYL).run(&chart, start, span).unwrap().last().point;
     assert!((on_sphere(&here) - there).amax() < 1e-11, "{:e}", (on_sphere(&here) - there).amax());
+    off.push((on_sphere(&here) - there).amax());
     // The step is long enough for the test to mean something.
     assert!((there - on_sphere(&start)).norm() > 0.05);
 
     let there =
         Scheme::new(EXPONENTIAL).run(&embedded, on_sphere(&start), span).unwrap().last().point;
     let here = Scheme::new(EXPONENTIAL).run(&chart, start, span).unwrap().last().point;
-    assert!((on_sphere(&here) - there).amax() < 1e-11, "{:e}", (on_sphere(&here) - there).amax());
+    off.push((on_sphere(&here) - there).amax());
+    chart_claim("S², in colatitude and longitude").record(listed(&off), "1e-11");
+    assert!(off[1] < 1e-11, "{off:?}");
 }
 
 /// A point of R³ from bent coordinates, at any scalar: `(u, v, w) ↦ (u, v + u²/2, w + uv/2)`.
@@ -117,6 +121,9 @@ fn a_run_with_numerical_geodesics_has_order_two_and_keeps_the_energy() {
         (unbend(&run.last().point) - exact).norm()
     });
     let order = Order::fit(&sizes, &errors).unwrap();
+    Claim::new(Guarantee::Order, "R³ with a flat metric in bent coordinates", "WeylMidpoint")
+        .against("a Runge-Kutta flow in flat coordinates")
+        .record(&order, "2 ± 0.05");
     assert!(order.agrees(2.0, 0.05), "{order} from {errors:?}");
 }
 
@@ -162,6 +169,7 @@ where
 
 /// One step of both geodesic retractions is the same in the chart.
 fn same_in_the_chart<Y, Z, const N: usize>(
+    name: &str,
     embedded: &Y,
     chart: &Z,
     start: SVector<f64, N>,
@@ -171,7 +179,17 @@ fn same_in_the_chart<Y, Z, const N: usize>(
     Z: Metriplectic<Manifold = Euclidean<N>>,
 {
     let off = discrepancies(embedded, chart, start, point);
+    chart_claim(name).record(listed(&off), "1e-11");
     assert!(off.iter().all(|&off| off < 1e-11), "{off:?}");
+}
+
+#[track_caller]
+fn chart_claim(problem: &str) -> Claim {
+    Claim::new(Guarantee::Charts, problem, "WeylMidpoint, Exponential").against("the other chart")
+}
+
+fn listed(figures: &[f64]) -> String {
+    figures.iter().map(|figure| scientific(*figure)).collect::<Vec<_>>().join(", ")
 }
 
 /// Stereographic coordinates of S³ from the pole `−e₀`: `x = (1 − |q|²/4, q)/(1 + |q|²/4)`, in which
@@ -274,7 +292,7 @@ fn a_nambu_step_on_the_three_sphere_is_the_same_in_stereographic_coordinates() {
     let start = vector![0.5, -0.4, 0.6];
     let round = || Metric::field(conformal);
     let chart = in_stereographic_coordinates(round(), 0);
-    same_in_the_chart(&embedded, &chart, start, stereographic);
+    same_in_the_chart("S³, in stereographic coordinates", &embedded, &chart, start, stereographic);
 
     // With the factor that cancels 1/√det g, and with straight lines for geodesics, it is not.
     let dense = in_stereographic_coordinates(round(), -3);
@@ -284,6 +302,8 @@ fn a_nambu_step_on_the_three_sphere_is_the_same_in_stereographic_coordinates() {
         discrepancies(&embedded, &straight, start, stereographic),
     ];
     println!("without √det g, and with straight lines: {off:?}");
+    chart_claim("S³ without √det g in the chart").record(listed(&off[0]), "> 1e-6");
+    chart_claim("S³ with straight lines for geodesics").record(listed(&off[1]), "> 1e-6");
     assert!(off.iter().flatten().all(|&off| off > 1e-6), "{off:?}");
 }
 
@@ -311,7 +331,13 @@ fn a_nambu_step_on_rotations_is_the_same_in_rotation_vectors() {
         .entropy(boxed(move |q: &Vector3<Real>| entropy(&exp(q))))
         .build()
         .unwrap();
-    same_in_the_chart(&embedded, &chart, vector![0.3, -0.5, 0.4], exp);
+    same_in_the_chart(
+        "SO(3), in rotation vectors",
+        &embedded,
+        &chart,
+        vector![0.3, -0.5, 0.4],
+        exp,
+    );
 }
 
 #[test]
@@ -329,5 +355,5 @@ fn a_nambu_step_is_the_same_in_bent_coordinates_with_both_retractions() {
         .entropy(boxed(|q: &Vector3<Real>| entropy(&unbend(q))))
         .build()
         .unwrap();
-    same_in_the_chart(&flat, &chart, vector![0.3, -0.7, 0.8], unbend);
+    same_in_the_chart("R³, in bent coordinates", &flat, &chart, vector![0.3, -0.7, 0.8], unbend);
 }

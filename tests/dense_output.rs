@@ -8,6 +8,7 @@ use metriplectic::integrators::{
     StepStart, Taken, Vector,
 };
 use metriplectic::prelude::*;
+use metriplectic_studies::{Claim, Guarantee, scientific};
 use models::{TUMBLING, UNSTABLE, free_body, relaxing_body};
 
 /// The bits of a state.
@@ -95,6 +96,14 @@ fn keeps_the_laws<Y: Metriplectic, M: Method<Y> + Clone>(
         run.states().len(),
         run.certificate().steps
     );
+    let method = match name.rsplit_once(", order ") {
+        Some((_, "8")) => "DormandPrince8",
+        Some((_, "5")) => "DormandPrince5",
+        _ => "WeylMidpoint",
+    };
+    Claim::new(Guarantee::Outputs, format!("{name}, {} outputs: H", run.states().len()), method)
+        .against("H at the start, relative; the run without outputs has the same bits")
+        .record(scientific(energy), "5e-15");
     assert!(energy <= 5e-15, "{name}: {energy:.1e}");
     assert!(invariants <= 1e-14, "{name}: {invariants:.1e}");
     assert!(fall <= 1.0, "{name}: S falls by {fall} of its round-off");

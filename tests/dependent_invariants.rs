@@ -6,6 +6,7 @@ mod models;
 use metriplectic::fields::Space;
 use metriplectic::integrators::{Schedule, StepError};
 use metriplectic::prelude::*;
+use metriplectic_studies::{Claim, Guarantee, scientific};
 use models::{BEFORE_THE_CUSP, cusp};
 
 type State6 = SVector<Real, 6>;
@@ -34,6 +35,10 @@ fn certified<Y: Metriplectic>(
     let certificate = steps.certificate();
     let change = certificate.invariants[0].max_error;
     println!("{name}: {certificate}");
+    let (falls, steps) = (certificate.entropy_falls, certificate.steps);
+    Claim::new(Guarantee::DependentCasimirs, format!("{name}, {steps} steps"), "WeylMidpoint")
+        .against("C at the start; S of every step")
+        .record(format!("{}; {falls} falls", scientific(change)), format!("{bound:.1e}; 0 falls"));
     assert!(certificate.keeps_energy() && certificate.keeps_entropy(), "{name}: {certificate}");
     assert!(change <= bound, "{name}: C changed by {change:.1e} > {bound:.1e}");
     assert_eq!(certificate.effort.splits, 0, "{name}: {certificate}");
@@ -219,6 +224,11 @@ fn a_casimir_of_so5_stays_where_the_entropy_depends_on_it() {
             let run = WeylMidpoint.run(&system, start, Span::steps(h, count)).unwrap();
             let (certificate, end) = (run.certificate(), run.last().entropy);
             println!("{name}, h = {h}: S − S_max = {:.1e}\n{certificate}", end - largest);
+            let (change, falls) = (certificate.invariants[0].max_error, certificate.entropy_falls);
+            let problem = format!("so(5)*, {name}, {count} steps of {h}");
+            Claim::new(Guarantee::DependentCasimirs, problem, "WeylMidpoint")
+                .against("C at the start; S of every step")
+                .record(format!("{}; {falls} falls", scientific(change)), "round-off; 0 falls");
             assert!(certificate.keeps_energy() && certificate.keeps_entropy(), "{certificate}");
             assert!(certificate.keeps_invariants(), "{name}, h = {h}: {certificate}");
             // 50 ε of the terms of tr X⁴, which are five times as large as it.

@@ -10,6 +10,7 @@ use metriplectic::integrators::{
     StepStart, Taken, Watched,
 };
 use metriplectic::prelude::*;
+use metriplectic_studies::{Claim, Guarantee, scientific};
 use models::{free_body, relaxing_body};
 
 type Plane = Vector2<f64>;
@@ -104,6 +105,9 @@ fn times<M: Method<Y> + Clone, Y: Metriplectic<Manifold = Euclidean<2>>>(
     println!(
         "{name}: {found} events, |g| ≤ {worst:.1e}, |H − H₀| ≤ {energy:.1e} H₀, {evaluations:.1} evaluations an event"
     );
+    Claim::new(Guarantee::Outputs, format!("oscillator, {found} events g = 0: |g| and H"), name)
+        .against("H at the start, relative")
+        .record(format!("{}, {}", scientific(worst), scientific(energy)), "1e-14, 5e-15");
     assert!(worst <= 1e-14 && energy <= 5e-15 && evaluations <= 10.0, "{name}");
     for event in run.events() {
         // The state has the later sign.
@@ -266,6 +270,11 @@ fn a_function_of_other_points_is_an_error() {
     let span = Span::steps(0.1, 9).event("a", |x: &Plane| x.x).event("b", |x: &Vector3<f64>| x.x);
     let error = WeylMidpoint.run(&oscillator(), START, span).unwrap_err();
     assert!(matches!(error, RunError::Span(SpanError::EventPoint { index: 1, .. })), "{error}");
+    let text = error.to_string();
+    assert!(
+        text.contains("a function of Vector3<f64>") && text.contains("are Vector2<f64>;"),
+        "{text}"
+    );
     println!("{error}");
 }
 

@@ -5,6 +5,8 @@ use std::process::{Command, Output};
 use std::sync::LazyLock;
 use std::time::SystemTime;
 
+use metriplectic_studies::{Claim, Guarantee, scientific};
+
 /// Runs an example. Each call draws into a folder of its own, so that the gallery keeps the pictures of a
 /// reader.
 fn example(name: &str, arguments: &[&str]) -> Output {
@@ -286,6 +288,19 @@ fn the_training_data_keep_both_laws_and_are_one_array() {
     let arguments = ["--json", "--steps", "20"];
     let report = json(&example("learning_data", &arguments));
     let number = |key: &str| report[key].as_f64().expect("a number");
+    let claim = |guarantee, law: &str| {
+        let problem = format!("training set of 50 double pendulums, 20 steps of 0.3: {law}");
+        Claim::new(guarantee, problem, "DormandPrince8, tolerance 1e-9")
+    };
+    claim(Guarantee::Energy, "H")
+        .against("H at the start, relative; 1.55e-4 in the published set, arXiv:2004.04653")
+        .record(scientific(number("energy_error")), "5e-14");
+    claim(Guarantee::Invariants, "L")
+        .against("L at the start, relative; 5e-14 in the published set, arXiv:2004.04653")
+        .record(scientific(number("momentum_error")), "5e-14");
+    claim(Guarantee::Entropy, "S")
+        .against("S of every step; no fall in the published set")
+        .record(format!("{} runs with a fall", report["entropy_falls"]), "0 runs with a fall");
     assert!(number("energy_error") < 5e-14 && number("momentum_error") < 5e-14, "{report}");
     assert_eq!(report["entropy_falls"], 0, "{report}");
     let folder = format!("{}/gallery", gallery("learning_data", &arguments));
@@ -487,6 +502,18 @@ fn the_convergence_study_prints_an_array_of_orders() {
         );
         // The order is within 0.05 of theory, with its whole interval, and the energy is conserved on the way.
         let expected = if row["scheme"] == "exponential" { 1.0 } else { 2.0 };
+        let text = |key: &str| row[key].as_str().expect("a text");
+        let [low, high] = [0, 1].map(|k| row["order_interval"][k].as_f64().expect("a number"));
+        let place = match text("metric") {
+            "canonical" => text("manifold").to_owned(),
+            metric => format!("{}, {metric} metric", text("manifold")),
+        };
+        Claim::new(Guarantee::Order, format!("{}, {place}", text("problem")), text("scheme"))
+            .against("a Runge-Kutta flow of order 4 of the same velocity")
+            .record(
+                format!("{:.2} [{low:.2}, {high:.2}]", figure(row, "order")),
+                format!("{expected} ± 0.05"),
+            );
         assert!(row["agrees"] == true && row["expected_order"] == expected, "{row}");
         assert!((figure(row, "order") - expected).abs() <= 0.05, "{row}");
         assert!(figure(row, "worst_energy_error") <= 50.0 * f64::EPSILON, "{row}");

@@ -9,6 +9,7 @@ use metriplectic::dynamics::system::Point;
 use metriplectic::integrators::{RunError, Schedule, StepError};
 use metriplectic::prelude::*;
 use metriplectic_studies::problems::flow;
+use metriplectic_studies::{Claim, Guarantee, Order, scientific};
 
 mod models;
 
@@ -30,6 +31,13 @@ fn end<Y: Metriplectic, M: Method<Y>>(
     run.last().point.clone()
 }
 
+/// A slope with its interval, where there are points enough.
+fn with_interval(slope: f64, steps: &[f64], errors: &[f64], round_off: f64) -> String {
+    let above = steps.iter().zip(errors).filter(|(_, error)| **error > round_off);
+    let (steps, errors): (Vec<f64>, Vec<f64>) = above.unzip();
+    Order::fit(&steps, &errors).map_or_else(|_| format!("{slope:.2}"), |order| order.to_string())
+}
+
 /// The orders of both methods, from so many steps on: of order 5, and of order 8.
 fn orders<Y: Metriplectic>(name: &str, system: &Y, x0: &Point<Y>, time: f64, coarsest: [usize; 2]) {
     let fine = Span::until(time).tolerance(1e-14);
@@ -49,25 +57,40 @@ fn orders<Y: Metriplectic>(name: &str, system: &Y, x0: &Point<Y>, time: f64, coa
     let floor = 10.0 * apart.max(1e-15);
     let slopes = [slope(&steps[0], &of_five, floor), slope(&steps[1], &of_eight, floor)];
     println!("{name}: {slopes:.2?}; {of_five:?} {of_eight:?}, {apart:.1e}, {classical:.1e}");
+    let methods = [
+        ("DormandPrince5", "DormandPrince8", "≥ 4.7", steps[0], of_five),
+        ("DormandPrince8", "DormandPrince5", "≥ 7.5", steps[1], of_eight),
+    ];
+    for ((method, other, bound, steps, errors), slope) in methods.into_iter().zip(slopes) {
+        Claim::new(Guarantee::Order, name, method)
+            .against(format!("{other}, tolerance 1e-14; a Runge-Kutta flow to 1e-8"))
+            .record(with_interval(slope, &steps, &errors, floor), bound);
+    }
     assert!(slopes[0] >= 4.7 && slopes[1] >= 7.5, "{name}: {slopes:.2?}");
 }
 
 #[test]
 fn on_lie_algebra_duals() {
-    orders("so(3)*", &models::relaxing_body(), &vector![0.3, -0.9, 0.2], 30.0, [64, 24]);
+    orders(
+        "relaxing body, so(3)*",
+        &models::relaxing_body(),
+        &vector![0.3, -0.9, 0.2],
+        30.0,
+        [64, 24],
+    );
     let body = System::on(LieDual::se3())
         .energy(models::heavy)
         .entropy(models::alignment)
         .casimir(models::gamma_squared)
         .build()
         .unwrap();
-    orders("se(3)*", &body, &SVector::from(models::HEAVY), 4.0, [32, 24]);
+    orders("heavy top with friction, se(3)*", &body, &SVector::from(models::HEAVY), 4.0, [32, 24]);
 }
 
 #[test]
 fn on_spheres_and_products_with_them() {
     let spin = System::on(Sphere::<2>::round()).bracket(AreaForm).energy(top).build().unwrap();
-    orders("S²", &spin, &Vector3::repeat(3_f64.sqrt().recip()), 20.0, [64, 24]);
+    orders("spinning top, S²", &spin, &Vector3::repeat(3_f64.sqrt().recip()), 20.0, [64, 24]);
     type Warm = (Vector3<Real>, Vector1<Real>);
     let warm = System::on(Product(Sphere::<2>::round(), Euclidean::<1>))
         .bracket((AreaForm, Zero))
@@ -75,13 +98,19 @@ fn on_spheres_and_products_with_them() {
         .entropy(boxed(|(_, s): &Warm| s.x))
         .build()
         .unwrap();
-    orders("S² × R", &warm, &(vector![0.6, 0.0, 0.8], Vector1::new(0.0)), 6.0, [64, 16]);
+    orders(
+        "spin that warms a bath, S² × R",
+        &warm,
+        &(vector![0.6, 0.0, 0.8], Vector1::new(0.0)),
+        6.0,
+        [64, 16],
+    );
 }
 
 #[test]
 fn on_gas_containers() {
-    orders("gas, α = 0.5", &gas(0.5), &vector![1.0, 2.0, 2.0, 2.0], 2.0, [128, 48]);
-    orders("gas, α = 0.001", &gas(1e-3), &vector![1.0, 2.0, 2.0, 2.0], 2.0, [128, 48]);
+    orders("gas containers, α = 0.5", &gas(0.5), &vector![1.0, 2.0, 2.0, 2.0], 2.0, [128, 48]);
+    orders("gas containers, α = 0.001", &gas(1e-3), &vector![1.0, 2.0, 2.0, 2.0], 2.0, [128, 48]);
 }
 
 #[test]
@@ -93,7 +122,7 @@ fn on_rotations() {
         .build()
         .unwrap();
     let start = Rotations::bi_invariant().from_quaternion([0.8, 0.3, -0.4, 0.33]).unwrap();
-    orders("SO(3)", &group, &start, 0.4, [32, 20]);
+    orders("Nambu bracket, SO(3)", &group, &start, 0.4, [32, 20]);
 }
 
 #[test]
@@ -112,7 +141,13 @@ fn on_a_chart_with_a_metric_of_its_own() {
         .entropy(boxed(|x: &Vector3<Real>| x.norm_squared() * 0.5 + x.z * 0.2))
         .build()
         .unwrap();
-    orders("chart", &system, &vector![0.5, -0.6, 0.4], 2.0, [32, 8]);
+    orders(
+        "Nambu bracket, chart with a metric of its own",
+        &system,
+        &vector![0.5, -0.6, 0.4],
+        2.0,
+        [32, 8],
+    );
 }
 
 #[test]
@@ -125,7 +160,13 @@ fn with_a_listed_momentum() {
         .momentum(models::angular_momentum)
         .build()
         .unwrap();
-    orders("double pendulum", &system, &SVector::from(models::PENDULUM), 2.0, [64, 16]);
+    orders(
+        "thermoelastic double pendulum",
+        &system,
+        &SVector::from(models::PENDULUM),
+        2.0,
+        [64, 16],
+    );
 }
 
 #[test]
@@ -136,7 +177,13 @@ fn on_a_manifold_of_a_user() {
         .energy(boxed(|x: &Vector3<Real>| x.z + x.x * x.x * 0.3 + x.y * x.x * 0.2))
         .build()
         .unwrap();
-    orders("globe", &globe, &Globe::point(vector![0.6, 0.0, 0.8]), 12.0, [64, 16]);
+    orders(
+        "spin on a globe of a user",
+        &globe,
+        &Globe::point(vector![0.6, 0.0, 0.8]),
+        12.0,
+        [64, 16],
+    );
 }
 
 /// Runs with tolerances, by both methods; the steps and the distance from `exact` of each one of order 8.
@@ -147,7 +194,8 @@ fn at_tolerances<Y: Metriplectic>(
     time: f64,
     tolerances: &[i32],
 ) -> Vec<(usize, Point<Y>)> {
-    let run = |k: i32| {
+    let (mut energy, mut falls) = (0.0_f64, 0);
+    let mut run = |k: i32| {
         let span = Span::until(time).tolerance(10_f64.powi(-k)).at_most(2);
         let five = DormandPrince5.run(system, x0.clone(), span).expect("it runs");
         let eight = DormandPrince8.run(system, x0.clone(), span).expect("it runs");
@@ -160,6 +208,8 @@ fn at_tolerances<Y: Metriplectic>(
                 c.max_relative_energy_error(),
                 c.projected_steps
             );
+            energy = energy.max(c.max_relative_energy_error());
+            falls += c.entropy_falls;
             assert!(c.max_relative_energy_error() <= 3e-15, "{name}, 1e-{k}: {c}");
             assert_eq!(c.entropy_falls, 0, "{name}, 1e-{k}: {c}");
             assert!(c.max_manifold_defect <= 1e-15 && c.keeps_invariants(), "{name}: {c}");
@@ -167,7 +217,17 @@ fn at_tolerances<Y: Metriplectic>(
         }
         (eight.certificate().steps, eight.last().point.clone())
     };
-    tolerances.iter().map(|&k| run(k)).collect()
+    let ends = tolerances.iter().map(|&k| run(k)).collect();
+    let course = format!("{name}, T = {time}, tolerances 1e-{tolerances:?}");
+    let claim = |guarantee| Claim::new(guarantee, course.clone(), "DormandPrince5, DormandPrince8");
+    claim(Guarantee::Energy)
+        .against("H at the start, relative")
+        .record(scientific(energy), "3e-15");
+    if system.second_law() != SecondLaw::NoEntropy {
+        let falls = format!("{falls} falls");
+        claim(Guarantee::Entropy).against("S of every step").record(falls, "0 falls");
+    }
+    ends
 }
 
 const ALL: [i32; 4] = [3, 6, 9, 12];
@@ -176,7 +236,7 @@ const ALL: [i32; 4] = [3, 6, 9, 12];
 fn the_laws_hold_at_every_tolerance() {
     let (body, spin) = (models::relaxing_body(), spin());
     for time in [100.0, 1e4] {
-        let ends = at_tolerances("body", &body, &models::UNSTABLE, time, &ALL);
+        let ends = at_tolerances("relaxing body", &body, &models::UNSTABLE, time, &ALL);
         if time > 1e3 {
             // The energy is that of a rotation about the first axis.
             let energy = body.energy_at(&models::UNSTABLE);
@@ -188,9 +248,9 @@ fn the_laws_hold_at_every_tolerance() {
             assert!(ends[0].0 <= 800, "{} steps", ends[0].0);
         }
         at_tolerances("spinning top", &spin, &Vector3::repeat(3_f64.sqrt().recip()), time, &ALL);
-        at_tolerances("gas, α = 0.5", &gas(0.5), &GAS, time, &ALL);
+        at_tolerances("gas containers, α = 0.5", &gas(0.5), &GAS, time, &ALL);
         let tolerances: &[i32] = if time > 1e3 { &[4, 8] } else { &ALL };
-        at_tolerances("gas, α = 0.001", &gas(1e-3), &GAS, time, tolerances);
+        at_tolerances("gas containers, α = 0.001", &gas(1e-3), &GAS, time, tolerances);
     }
 }
 
@@ -211,8 +271,11 @@ fn a_tenth_of_the_tolerance_is_about_a_tenth_of_the_error() {
     let five = of(&|span| end(DormandPrince5, &gas(0.5), &GAS, span));
     let eight = of(&|span| end(DormandPrince8, &gas(0.5), &GAS, span));
     println!("{five:?} {eight:?}");
-    for errors in [five, eight] {
+    for (name, errors) in [("DormandPrince5", five), ("DormandPrince8", eight)] {
         let powers = slope(&tolerances.map(|k| 10_f64.powi(-k)), &errors, 1e-13);
+        Claim::new(Guarantee::Tolerance, "gas containers, α = 0.5: error ~ toleranceᵖ", name)
+            .against("DormandPrince5, tolerance 1e-14")
+            .record(format!("p = {powers:.2}"), "0.75 to 1.35");
         assert!((0.75..1.35).contains(&powers), "{powers}: {errors:?}");
     }
 }
@@ -223,6 +286,13 @@ fn nothing_drifts_in_a_million_steps() {
     let run = DormandPrince8.run(&gas(0.0), GAS, Span::steps(0.02, 1_000_000).at_most(2)).unwrap();
     let c = run.certificate();
     println!("{c}");
+    let claim = |guarantee| {
+        Claim::new(guarantee, "gas containers without a leak, 10⁶ steps of 0.02", "DormandPrince8")
+    };
+    let energy = scientific(c.max_relative_energy_error());
+    claim(Guarantee::Energy).against("H at the start, relative").record(energy, "3e-15");
+    let gained = scientific(c.entropy_gained.abs());
+    claim(Guarantee::Entropy).against("S at the start").record(gained, "1e-14");
     assert!(c.max_relative_energy_error() <= 3e-15 && c.entropy_falls == 0, "{c}");
     assert!(c.entropy_gained.abs() <= 1e-14, "{c}");
 }

@@ -15,6 +15,7 @@ use metriplectic::fields::{ChartPoint, Form, Space};
 use metriplectic::integrators::{Newton, RunError, Scheme};
 use metriplectic::manifolds::{MetricAt, MetricError, Riemannian, rotations};
 use metriplectic::prelude::*;
+use metriplectic_studies::{Claim, Guarantee};
 use proptest::prelude::*;
 use proptest::test_runner::{Config, RngSeed, TestCaseResult, TestRunner};
 
@@ -169,6 +170,10 @@ fn search<S: Strategy>(
         }
     }
     println!("{name}: {tried} inputs, {:?}", tally.0.borrow());
+    if seconds.is_none() {
+        Claim::new(Guarantee::RandomInput, format!("{name}, {tried} inputs"), "WeylMidpoint")
+            .record("0 panics, 0 states without a number", "0");
+    }
 }
 
 /// Verifies a model and steps it; whatever comes back is finite, or an error with a message.

@@ -4,6 +4,7 @@ use metriplectic::integrators::laws::{self, UnitRun, Units};
 use metriplectic::integrators::{RunError, Schedule, StepError};
 use metriplectic::manifolds::Constant;
 use metriplectic::prelude::*;
+use metriplectic_studies::{Claim, Guarantee, scientific};
 
 #[path = "models/stages.rs"]
 mod stages;
@@ -112,6 +113,16 @@ impl<const N: usize> Problem<N> {
             let units = Factors { entries, time: 4 * sign, energy: -6, entropy: 9 };
             self.obeys_the_law(units, [1e-12, 1e-9]);
         }
+        let claim = |units: &str| {
+            let problem = format!("{}, in {units}", self.name);
+            Claim::new(Guarantee::Units, problem, "six methods, fixed and adaptive steps")
+        };
+        claim("one unit for all entries, 4 choices")
+            .against("the run in other units, by powers of two")
+            .record("the same bits", "the same bits");
+        claim("a unit for each entry, 2 choices")
+            .against("the run in other units, by powers of two")
+            .record("within the bound", "1e-12, adaptive 1e-9");
     }
 }
 
@@ -738,6 +749,13 @@ fn a_molecule_in_si_units_vibrates_like_its_dimensionless_twin() {
         let error = |x: Vector2<f64>| (x - exact.last().point).amax();
         let errors = [error(a.last().point), error(b.last().point.component_div(&scale))];
         println!("{errors:.2?}\n{}\n{}", a.certificate(), b.certificate());
+        Claim::new(
+            Guarantee::Units,
+            "vibrating molecule in SI units, T = 100 in its unit of time",
+            "WeylMidpoint",
+        )
+        .against("its dimensionless twin, whose error is the bound's half")
+        .record(scientific(errors[1]), scientific(2.0 * errors[0]));
         assert!(errors[1] <= 2.0 * errors[0] && errors[0] > 0.0);
         assert!(b.certificate().keeps_energy(), "{}", b.certificate());
         assert!(b.certificate().max_relative_energy_error() < 2e-14);
@@ -821,6 +839,13 @@ fn curved<Y: Metriplectic>(
             law.unwrap_or_else(|law| panic!("{name}, {units:?}: {law}"));
         }
     }
+    Claim::new(
+        Guarantee::Units,
+        format!("{name}, in {units:?}"),
+        "six methods, fixed and adaptive steps",
+    )
+    .against("the run with times, energies and entropies in these powers of two")
+    .record("the same bits", "the same bits");
 }
 
 #[test]

@@ -4,6 +4,7 @@
 use metriplectic::dynamics::system::Point;
 use metriplectic::integrators::Schedule;
 use metriplectic::prelude::*;
+use metriplectic_studies::{Claim, Guarantee, scientific};
 
 mod models;
 #[path = "models/stages.rs"]
@@ -62,6 +63,12 @@ fn gas_containers_with_a_wall_that_leaks_fast() {
             (run.last().point - exact).norm()
         });
         println!("α = {alpha:e}: {errors:?}");
+        for ((error, bound), n) in errors.iter().zip(bounds).zip([40, 80, 160, 320]) {
+            let problem = format!("gas containers, α = {alpha:e}, T = 2, {n} steps");
+            Claim::new(Guarantee::StiffFriction, problem, "Radau3")
+                .against("Radau4, tolerance 1e-11")
+                .record(scientific(*error), scientific(bound));
+        }
         assert!(errors.iter().zip(bounds).all(|(error, bound)| *error <= bound), "{errors:?}");
         // The temperatures of a Gauss method stay apart.
         let run = Gauss3.run(&system, start, Span::steps(0.05, 40)).unwrap();
@@ -124,6 +131,14 @@ fn one_step_damps_a_stiff_component() {
     };
     let (radau, gauss) = (RADAU.map(left), GAUSS.map(left));
     println!("{radau:?}, {gauss:?}");
+    let methods = GAUSS.iter().zip(gauss).chain(RADAU.iter().zip(radau));
+    for (index, (method, left)) in methods.enumerate() {
+        let bound = if index < GAUSS.len() { "0.9 to 1: not damped" } else { "0.01" };
+        let problem = "a deviation after one step of h|K'| = 1000";
+        Claim::new(Guarantee::StiffFriction, problem, format!("{method:?}"))
+            .against("the deviation before the step")
+            .record(format!("{left:.4}"), bound);
+    }
     assert!(radau.iter().all(|left| *left <= 0.01), "{radau:?}");
     // With an exact balance of the entropy nothing is damped.
     assert!(gauss.iter().all(|left| (0.9..1.0).contains(left)), "{gauss:?}");

@@ -3,9 +3,12 @@
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
+pub mod averaged;
 pub mod exact;
 pub mod more;
 pub mod ours;
+pub mod relaxation;
+#[cfg(feature = "solvers")]
 pub mod rivals;
 
 /// A number that a right-hand side is evaluated with: `f64`, or twice as long for the reference.

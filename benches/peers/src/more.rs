@@ -72,7 +72,7 @@ impl Ours<6> for HeavyTop {
 #[derive(Clone, Copy, Debug)]
 pub struct WarmOscillator;
 
-const FRICTION: f64 = 0.05;
+pub(crate) const FRICTION: f64 = 0.05;
 
 impl Problem<3> for WarmOscillator {
     fn name(&self) -> String {

@@ -77,15 +77,9 @@ where
         }
         How::Five(time, tolerance) => DormandPrince5.run(system, start, span((time, tolerance))),
         How::Eight(time, tolerance) => DormandPrince8.run(system, start, span((time, tolerance))),
-        How::Gauss2(time, tolerance) => {
-            Gauss::<2>.run(system, start, span((time, tolerance)))
-        }
-        How::Gauss3(time, tolerance) => {
-            Gauss::<3>.run(system, start, span((time, tolerance)))
-        }
-        How::Gauss4(time, tolerance) => {
-            Gauss::<4>.run(system, start, span((time, tolerance)))
-        }
+        How::Gauss2(time, tolerance) => Gauss::<2>.run(system, start, span((time, tolerance))),
+        How::Gauss3(time, tolerance) => Gauss::<3>.run(system, start, span((time, tolerance))),
+        How::Gauss4(time, tolerance) => Gauss::<4>.run(system, start, span((time, tolerance))),
     };
     let run = run.map_err(|error| error.to_string())?;
     let seconds = clock.elapsed().as_secs_f64();

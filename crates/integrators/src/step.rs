@@ -24,6 +24,7 @@ mod result;
 pub mod scales;
 mod start;
 mod stepper;
+pub(crate) mod type_names;
 mod vector;
 
 pub use control::Control;
@@ -39,5 +40,5 @@ pub use scales::Scales;
 pub use start::Numbers;
 pub(crate) use start::{Dim, DriftCorrection, Start};
 pub use stepper::Stepper;
-pub(crate) use stepper::name_of;
+pub(crate) use type_names::name_of;
 pub use vector::{Components, Vector};

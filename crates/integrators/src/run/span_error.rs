@@ -1,5 +1,7 @@
 //! Spans that cannot be run.
 
+use crate::step::type_names::short;
+
 /// A span that cannot be run.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -129,8 +131,9 @@ pub enum SpanError {
     },
     /// The function of an event has points of another type than the run.
     #[error(
-        "event {index} is a function of {found}, and the points of the run are {expected}; say this type in \
-         the closure"
+        "event {index} is a function of {}, and the points of the run are {}; say this type in the closure",
+        short(found),
+        short(expected)
     )]
     EventPoint {
         /// Which event, in the order in which they were asked for, counted from 0.

@@ -2,7 +2,7 @@
 
 use super::{
     Control, Effort, Element, Flow, LimitingSites, Memory, MethodError, Promises, Refusal,
-    StepEnds, StepError, StepStart, Taken, Vector as _, dense,
+    StepEnds, StepError, StepStart, Taken, Vector as _, dense, name_of,
 };
 
 /// A one-step method.
@@ -122,20 +122,4 @@ pub trait Stepper<F: Flow>: Sized {
         let _ = memory;
         dense::between(flow, step, self.promises(flow), theta)
     }
-}
-
-/// The name of a type without the paths of its modules.
-pub(crate) fn name_of<T>() -> String {
-    let full = std::any::type_name::<T>();
-    let (mut name, mut start) = (String::with_capacity(full.len()), 0);
-    for (at, byte) in full.bytes().enumerate() {
-        if byte == b':' {
-            start = at + 1;
-        } else if byte.is_ascii() && !byte.is_ascii_alphanumeric() && byte != b'_' {
-            name.push_str(&full[start..=at]);
-            start = at + 1;
-        }
-    }
-    name.push_str(&full[start..]);
-    name
 }

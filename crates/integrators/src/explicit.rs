@@ -58,6 +58,7 @@ mod spectrum;
 mod stage;
 mod step;
 mod tableau;
+mod trial;
 
 use metriplectic_dynamics::SecondLaw;
 
@@ -71,6 +72,7 @@ use crate::step::{
 };
 use chebyshev::CHEBYSHEV;
 use dormand_prince::{EIGHT, FIVE};
+use trial::{Done, Trial};
 
 pub use tableau::{Row, Tableau, TableauError};
 
@@ -260,7 +262,7 @@ macro_rules! method {
                 h: f64,
                 memory: &mut MemoryOf<F>,
             ) -> Result<Taken<F>, StepError> {
-                step::with_halves(self.tableau(), flow, start, h, memory)
+                step::with_halves(&Trial { tableau: self.tableau(), flow, start, h }, memory)
             }
 
             #[inline]
@@ -271,7 +273,7 @@ macro_rules! method {
                 h: f64,
                 memory: &mut MemoryOf<F>,
             ) -> Result<Taken<F>, Refusal> {
-                step::attempt(self.tableau(), flow, start, h, memory)
+                step::attempt(&Trial { tableau: self.tableau(), flow, start, h }, memory)
             }
 
             fn error(
@@ -281,7 +283,7 @@ macro_rules! method {
                 memory: &MemoryOf<F>,
                 norm: impl Fn(&F::Vector) -> f64,
             ) -> Option<f64> {
-                estimates::error(self.tableau(), flow, step, memory, norm)
+                estimates::error(&Done { tableau: self.tableau(), flow, ends: step }, memory, norm)
             }
 
             fn limiting_sites(
@@ -291,7 +293,11 @@ macro_rules! method {
                 memory: &MemoryOf<F>,
                 allowed: &F::Vector,
             ) -> LimitingSites {
-                estimates::limiting_sites(self.tableau(), flow, step, memory, allowed)
+                estimates::limiting_sites(
+                    &Done { tableau: self.tableau(), flow, ends: step },
+                    memory,
+                    allowed,
+                )
             }
 
             fn between(
@@ -302,7 +308,12 @@ macro_rules! method {
                 theta: f64,
             ) -> Option<Element<F>> {
                 let promises = self.promises(flow);
-                dense::between(self.tableau(), flow, step, promises, memory, theta)
+                dense::between(
+                    &Done { tableau: self.tableau(), flow, ends: step },
+                    promises,
+                    memory,
+                    theta,
+                )
             }
         }
     };

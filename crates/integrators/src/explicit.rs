@@ -1,8 +1,8 @@
-//! Explicit Runge-Kutta methods of order 5 and 8, and then back onto the laws.
+//! Explicit Runge-Kutta methods, and then back onto the laws.
 //!
-//! The stages of [`DormandPrince8`] and [`DormandPrince5`] are taken in a cheap chart `ψ_x` of the space
-//! ([`Space::stage`](metriplectic_fields::Space::stage)). Any chart keeps the order (Munthe-Kaas 1998; Hairer,
-//! Lubich, Wanner 2006, §IV.5).
+//! The stages of [`DormandPrince8`], [`DormandPrince5`] and of a [`Tableau`] of your own are taken in a cheap chart `ψ_x`
+//! of the space ([`Space::stage`](metriplectic_fields::Space::stage)). Any chart keeps the order (Munthe-Kaas 1998;
+//! Hairer, Lubich, Wanner 2006, §IV.5).
 //!
 //! # The entropy
 //!
@@ -12,8 +12,8 @@
 //! S^* = \bar S + h \sum_i b_i \sigma_i
 //! ```
 //!
-//! is of the same order as the state. It is *trusted* if it does not fall, and, for order 8, if its embedded error
-//! is at most half of its rise.
+//! is of the same order as the state. It is *trusted* if it does not fall, and if its embedded error is at most
+//! half of its rise. The error of order 5 needs the rates at the end of the step, and is not known yet.
 //!
 //! # The laws
 //!

@@ -1,8 +1,8 @@
-//! Explicit Runge-Kutta methods of order 5 and 8, and then back onto the laws.
+//! Explicit Runge-Kutta methods, and then back onto the laws.
 //!
-//! The stages of [`DormandPrince8`] and [`DormandPrince5`] are taken in a cheap chart `ψ_x` of the space
-//! ([`Space::stage`](metriplectic_fields::Space::stage)). Any chart keeps the order (Munthe-Kaas 1998; Hairer,
-//! Lubich, Wanner 2006, §IV.5).
+//! The stages of [`DormandPrince8`], [`DormandPrince5`] and of a [`Tableau`] of your own are taken in a cheap chart `ψ_x`
+//! of the space ([`Space::stage`](metriplectic_fields::Space::stage)). Any chart keeps the order (Munthe-Kaas 1998;
+//! Hairer, Lubich, Wanner 2006, §IV.5).
 //!
 //! # The entropy
 //!
@@ -12,8 +12,8 @@
 //! S^* = \bar S + h \sum_i b_i \sigma_i
 //! ```
 //!
-//! is of the same order as the state. It is *trusted* if it does not fall, and, for order 8, if its embedded error
-//! is at most half of its rise.
+//! is of the same order as the state. It is *trusted* if it does not fall, and if its embedded error is at most
+//! half of its rise. The error of order 5 needs the rates at the end of the step, and is not known yet.
 //!
 //! # The laws
 //!
@@ -58,6 +58,7 @@ mod spectrum;
 mod stage;
 mod step;
 mod tableau;
+mod trial;
 
 use metriplectic_dynamics::SecondLaw;
 
@@ -71,6 +72,7 @@ use crate::step::{
 };
 use chebyshev::CHEBYSHEV;
 use dormand_prince::{EIGHT, FIVE};
+use trial::{Done, Trial};
 
 pub use tableau::{Row, Tableau, TableauError};
 
@@ -260,7 +262,7 @@ macro_rules! method {
                 h: f64,
                 memory: &mut MemoryOf<F>,
             ) -> Result<Taken<F>, StepError> {
-                step::with_halves(self.tableau(), flow, start, h, memory)
+                step::with_halves(&Trial { tableau: self.tableau(), flow, start, h }, memory)
             }
 
             #[inline]
@@ -271,7 +273,7 @@ macro_rules! method {
                 h: f64,
                 memory: &mut MemoryOf<F>,
             ) -> Result<Taken<F>, Refusal> {
-                step::attempt(self.tableau(), flow, start, h, memory)
+                step::attempt(&Trial { tableau: self.tableau(), flow, start, h }, memory)
             }
 
             fn error(
@@ -281,7 +283,7 @@ macro_rules! method {
                 memory: &MemoryOf<F>,
                 norm: impl Fn(&F::Vector) -> f64,
             ) -> Option<f64> {
-                estimates::error(self.tableau(), flow, step, memory, norm)
+                estimates::error(&Done { tableau: self.tableau(), flow, ends: step }, memory, norm)
             }
 
             fn limiting_sites(
@@ -291,7 +293,11 @@ macro_rules! method {
                 memory: &MemoryOf<F>,
                 allowed: &F::Vector,
             ) -> LimitingSites {
-                estimates::limiting_sites(self.tableau(), flow, step, memory, allowed)
+                estimates::limiting_sites(
+                    &Done { tableau: self.tableau(), flow, ends: step },
+                    memory,
+                    allowed,
+                )
             }
 
             fn between(
@@ -302,7 +308,12 @@ macro_rules! method {
                 theta: f64,
             ) -> Option<Element<F>> {
                 let promises = self.promises(flow);
-                dense::between(self.tableau(), flow, step, promises, memory, theta)
+                dense::between(
+                    &Done { tableau: self.tableau(), flow, ends: step },
+                    promises,
+                    memory,
+                    theta,
+                )
             }
         }
     };

@@ -18,7 +18,8 @@ use super::refused::Refused;
 use super::spectrum::spectrum;
 use super::stage::{Here, stage};
 use super::tableau::Tableau;
-use crate::step::{Control, Element, Vector};
+use super::trial::Trial;
+use crate::step::{Control, StepStart, Vector};
 
 /// What is needed of a tableau after the stages, with the PI controller of order 2, by which the error at the end is
 /// proportional to the tolerance.
@@ -29,11 +30,10 @@ pub(super) const CHEBYSHEV: Tableau =
 const DAMPING: f64 = 2.0 / 13.0;
 /// The most stages of a step; a step that needs more is too long.
 const MOST: u32 = 4000;
+
 /// The stages of a step of size `h`.
 pub(super) fn stages<F: StageFlow>(
-    flow: &F,
-    x: &Element<F>,
-    h: f64,
+    &Trial { flow, start: &StepStart { x, .. }, h, .. }: &Trial<'_, F>,
     here: Here<F::Vector>,
     memory: &mut MemoryOf<F>,
 ) -> Result<LastStep<F::Vector>, Refused> {

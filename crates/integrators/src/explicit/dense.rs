@@ -9,19 +9,18 @@
 use super::flow::StageFlow;
 use super::memory::{LastStep, MemoryOf};
 use super::stage::{combined, produced, stage};
-use super::tableau::Tableau;
+use super::trial::Done;
 use crate::step::dense;
-use crate::step::{Element, Promises, StepEnds, Vector};
+use crate::step::{Element, Promises, Vector};
 
 /// The state at the fraction `θ` of a step.
 pub(super) fn between<F: StageFlow>(
-    tableau: &'static Tableau,
-    flow: &F,
-    step: &StepEnds<'_, F>,
+    done: &Done<'_, F>,
     promises: Promises,
     memory: &mut MemoryOf<F>,
     theta: f64,
 ) -> Option<Element<F>> {
+    let &Done { tableau, flow, ends: step } = done;
     if theta <= 0.0 || step.x == step.end {
         return Some(step.x.clone());
     }
@@ -29,7 +28,7 @@ pub(super) fn between<F: StageFlow>(
         return Some(step.end.clone());
     }
     let known = memory.last.as_mut().and_then(|last| {
-        more_stages(tableau, flow, step, last)?;
+        more_stages(done, last)?;
         Some(&*last)
     });
     // A step that was taken in parts has no stages.
@@ -65,9 +64,7 @@ pub(super) fn between<F: StageFlow>(
 
 /// Takes the stages that only the dense output needs, once.
 fn more_stages<F: StageFlow>(
-    tableau: &'static Tableau,
-    flow: &F,
-    step: &StepEnds<'_, F>,
+    &Done { tableau, flow, ends: step }: &Done<'_, F>,
     last: &mut LastStep<F::Vector>,
 ) -> Option<()> {
     for row in tableau.more_stages {

@@ -6,27 +6,25 @@ use super::memory::{LastStep, MemoryOf};
 use super::spectrum::Spectrum;
 use super::stage::combined;
 use super::tableau::{ESTIMATED, Stages, Tableau};
+use super::trial::Done;
 use crate::step::scales::relative;
-use crate::step::{Element, LimitingSites, StepEnds, Vector};
+use crate::step::{LimitingSites, Vector};
 
 /// Whether the rates between the last stage and the end differ by as much as at the edge of the region of
-/// stability: `h |k_e − k_s| / |q_e − q_s|` of Hairer, Wanner (Solving ODEs II, §IV.2), relative to the sizes of
-/// the entries.
-pub(super) fn is_at_the_edge<F: StageFlow>(
-    tableau: &'static Tableau,
-    flow: &F,
-    x: &Element<F>,
-    h: f64,
-    last: &LastStep<F::Vector>,
-    rates: &F::Vector,
+/// stability: `h |k_e − k_s| / |q_e − q_s|` of Hairer, Wanner (Solving ODEs II, §IV.2), relative to these sizes
+/// of the entries.
+pub(super) fn is_at_the_edge<V: Vector>(
+    (tableau, h): (&Tableau, f64),
+    sizes: &V,
+    last: &LastStep<V>,
+    rates: &V,
 ) -> bool {
-    let sizes = flow.sizes(x);
     let one = sizes.map(|_| 1.0);
     let before = [&last.before, &last.stages[tableau.rows().len()].velocity];
     // One array at a time, because a large system has no room for more.
-    let norm = |end: &F::Vector, before: &F::Vector, factor: f64| {
+    let norm = |end: &V, before: &V, factor: f64| {
         let ratios =
-            Vector::zip([end, before, &sizes, &last.end], |[end, before, size, reached]| {
+            Vector::zip([end, before, sizes, &last.end], |[end, before, size, reached]| {
                 let change = factor * (end - before);
                 if change == 0.0 { 0.0 } else { change / size.max(reached.abs()) }
             });
@@ -38,9 +36,7 @@ pub(super) fn is_at_the_edge<F: StageFlow>(
 
 /// The error of a step in units of the one allowed. A step that was taken in parts has the estimate of the flow.
 pub(super) fn error<F: StageFlow>(
-    tableau: &'static Tableau,
-    flow: &F,
-    step: &StepEnds<'_, F>,
+    &Done { tableau, flow, ends: step }: &Done<'_, F>,
     memory: &MemoryOf<F>,
     norm: impl Fn(&F::Vector) -> f64,
 ) -> Option<f64> {
@@ -66,9 +62,7 @@ pub(super) fn error<F: StageFlow>(
 /// method for the spectral radius; without it, and at the edge of the region of stability, it is the change of the
 /// rates between the last stage and the end of the step.
 pub(super) fn limiting_sites<F: StageFlow>(
-    tableau: &'static Tableau,
-    flow: &F,
-    step: &StepEnds<'_, F>,
+    &Done { tableau, flow, ends: step }: &Done<'_, F>,
     memory: &MemoryOf<F>,
     allowed: &F::Vector,
 ) -> LimitingSites {
@@ -88,7 +82,7 @@ pub(super) fn limiting_sites<F: StageFlow>(
     };
     let (error, count) = (largest(error), tableau.rows().len());
     let [before, rates] = [count, count + 1].map(|stage| &last.stages[stage].velocity);
-    let stiffness = if is_at_the_edge(tableau, flow, x, h, last, rates) {
+    let stiffness = if is_at_the_edge((tableau, h), &flow.sizes(x), last, rates) {
         let change = Vector::zip([rates, before], |[rates, before]| rates - before);
         change.largest_site(&flow.sizes(x))
     } else {

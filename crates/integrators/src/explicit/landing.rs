@@ -6,8 +6,8 @@ use super::flow::{Projected, ProjectionError, StageFlow, Target};
 use super::memory::{LastStep, Produced};
 use super::refused::Refused;
 use super::stage::{combined, produced};
-use super::tableau::Tableau;
-use crate::step::{Element, EntropyStep, Laws, StepStart, Vector};
+use super::trial::Trial;
+use crate::step::{Element, EntropyStep, Laws, Vector};
 
 /// The fraction of the round-off of an increment by which the entropy may fall: less than what the certificate
 /// counts as a fall.
@@ -32,10 +32,7 @@ struct Bounds<V> {
 
 /// The projection of the end of a step onto the laws, and the decision whether it is taken.
 pub(super) struct Onto<'a, F: StageFlow> {
-    pub(super) tableau: &'static Tableau,
-    pub(super) flow: &'a F,
-    pub(super) start: &'a StepStart<'a, F>,
-    pub(super) h: f64,
+    pub(super) trial: &'a Trial<'a, F>,
     pub(super) last: &'a LastStep<F::Vector>,
     pub(super) produced: Produced,
 }
@@ -43,7 +40,7 @@ pub(super) struct Onto<'a, F: StageFlow> {
 impl<F: StageFlow> Onto<'_, F> {
     #[inline]
     pub(super) fn decide(&self, y: Element<F>) -> Result<Landed<F>, Refused> {
-        let Self { flow, start, last, produced, .. } = *self;
+        let Self { trial: &Trial { flow, start, .. }, last, produced } = *self;
         let Bounds { limit, units } = self.bounds();
         let units = units.as_ref().or(start.allowed.as_ref());
         let embedded = self.embedded_error();
@@ -85,7 +82,7 @@ impl<F: StageFlow> Onto<'_, F> {
 
     /// The longest displacement, and the units of the entries unless they are the errors that are allowed.
     fn bounds(&self) -> Bounds<F::Vector> {
-        let Self { flow, start, last, .. } = *self;
+        let Self { trial: &Trial { flow, start, .. }, last, .. } = *self;
         if let Some(allowed) = &start.allowed {
             return Bounds { limit: allowed.map(|error| FAR * error), units: None };
         }
@@ -102,14 +99,14 @@ impl<F: StageFlow> Onto<'_, F> {
     /// The embedded error, if the flow weighs errors and it does not need the end of the step. Otherwise the
     /// velocity at the start takes its place.
     fn embedded_error(&self) -> Option<F::Vector> {
-        let Self { tableau, flow, h, last, .. } = *self;
+        let Self { trial: &Trial { tableau, flow, h, .. }, last, .. } = *self;
         let row = tableau.early_error;
         (flow.weighs_errors() && !row.is_empty()).then(|| combined(h, row, &last.stages))
     }
 
     /// Whether the entropy that was produced may be aimed at.
     fn is_trusted(&self) -> bool {
-        let Self { tableau, h, last, .. } = *self;
+        let Self { trial: &Trial { tableau, h, .. }, last, .. } = *self;
         let doubt = (h * produced(tableau.early_error, &last.stages)).abs();
         last.rise >= 0.0 && doubt <= 0.5 * last.rise
     }
@@ -117,7 +114,7 @@ impl<F: StageFlow> Onto<'_, F> {
     /// Whether the entropy at the end is below the one at the start by more than its round-off. Near an equilibrium,
     /// where every change is round-off, the flow says whether it falls.
     fn falls(&self, end: &Projected<F>) -> bool {
-        let (flow, start) = (self.flow, self.start);
+        let &Trial { flow, start, .. } = self.trial;
         let rise = flow.values(&end.gradients).entropy - start.values.entropy;
         let round_off = flow.entropy_round_off([start.x, &end.x]);
         if rise.abs() > round_off {

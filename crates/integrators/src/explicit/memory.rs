@@ -6,7 +6,7 @@ use super::stage::Here;
 use super::tableau::STAGES;
 use crate::step::{Flow, Memory, RestoreError, Saved, Vector};
 
-/// What [`DormandPrince8`](crate::DormandPrince8) and [`DormandPrince5`](crate::DormandPrince5) keep from one step
+/// What [`DormandPrince8`](crate::DormandPrince8) and the other explicit methods keep from one step
 /// to the next: the sum of the entropy that was produced, and what is known at the state reached.
 #[derive(Clone, Debug)]
 pub struct ExplicitMemory<V> {

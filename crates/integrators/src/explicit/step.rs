@@ -11,7 +11,8 @@ use super::memory::{ExplicitMemory, LastStep, MemoryOf, Produced};
 use super::refused::Refused;
 use super::rest::{self, is_hardly};
 use super::stage::{Here, combined, produced, stage};
-use super::tableau::{Stages, Tableau};
+use super::tableau::Stages;
+use super::trial::Trial;
 use crate::step::{
     Effort, Element, EntropyStep, Evidence, MethodError, Refusal, StepError, StepStart, Taken,
     Vector,
@@ -25,34 +26,28 @@ const HALVES: u32 = 12;
 /// Tries a step.
 #[inline]
 pub(super) fn attempt<F: StageFlow>(
-    tableau: &'static Tableau,
-    flow: &F,
-    start: &StepStart<'_, F>,
-    h: f64,
+    trial: &Trial<'_, F>,
     memory: &mut MemoryOf<F>,
 ) -> Result<Taken<F>, Refusal> {
-    try_step(tableau, flow, start, h, memory).map_err(|refused| refused.into_refusal(start.time, h))
+    try_step(trial, memory).map_err(|refused| refused.into_refusal(trial.start.time, trial.h))
 }
 
 /// Takes a step of a fixed size, in halves where it is refused.
 pub(super) fn with_halves<F: StageFlow>(
-    tableau: &'static Tableau,
-    flow: &F,
-    start: &StepStart<'_, F>,
-    h: f64,
+    trial: &Trial<'_, F>,
     memory: &mut MemoryOf<F>,
 ) -> Result<Taken<F>, StepError> {
-    let first = match try_step(tableau, flow, start, h, memory) {
+    let first = match try_step(trial, memory) {
         Ok(whole) => return Ok(whole),
         Err(Refused::Never(error)) => return Err(error),
         Err(refused) => refused,
     };
     let kept = memory.clone();
-    halves(tableau, flow, start, h, memory, HALVES).map_err(|refused| {
+    halves(trial, memory, HALVES).map_err(|refused| {
         // What the parts that were taken have left belongs to no state of the run.
         *memory = kept;
         let tried = Effort { splits: HALVES as usize, ..Effort::default() };
-        let time = start.time;
+        let (time, h) = (trial.start.time, trial.h);
         // A site that leaves in the whole step says more than a small part that finds no end.
         let refused = if let Refused::Outside(Some(_)) = first { first } else { refused };
         match refused {
@@ -66,26 +61,25 @@ pub(super) fn with_halves<F: StageFlow>(
 }
 
 fn halves<F: StageFlow>(
-    tableau: &'static Tableau,
-    flow: &F,
-    start: &StepStart<'_, F>,
-    h: f64,
+    trial: &Trial<'_, F>,
     memory: &mut MemoryOf<F>,
     left: u32,
 ) -> Result<Taken<F>, Refused> {
-    match try_step(tableau, flow, start, h, memory) {
+    match try_step(trial, memory) {
         Err(Refused::Outside(_) | Refused::Far | Refused::Falls(_)) if left > 0 => {}
         taken => return taken,
     }
-    let first = halves(tableau, flow, start, 0.5 * h, memory, left - 1)?;
+    let (start, h) = (trial.start, 0.5 * trial.h);
+    let first = halves(&Trial { h, ..*trial }, memory, left - 1)?;
     let middle = StepStart {
         x: &first.x,
-        time: start.time + 0.5 * h,
+        time: start.time + h,
         values: first.values.clone(),
         reference: start.reference.clone(),
         allowed: start.allowed.clone(),
     };
-    let mut second = halves(tableau, flow, &middle, 0.5 * h, memory, left - 1)?;
+    let second = Trial { tableau: trial.tableau, flow: trial.flow, start: &middle, h };
+    let mut second = halves(&second, memory, left - 1)?;
     second.effort += first.effort;
     second.effort.splits += 1;
     second.evidence = first.evidence.and(second.evidence);
@@ -97,13 +91,10 @@ fn halves<F: StageFlow>(
 /// Stages, end, projection, decision.
 #[inline]
 fn try_step<F: StageFlow>(
-    tableau: &'static Tableau,
-    flow: &F,
-    start: &StepStart<'_, F>,
-    h: f64,
+    trial: &Trial<'_, F>,
     memory: &mut MemoryOf<F>,
 ) -> Result<Taken<F>, Refused> {
-    let x = start.x;
+    let &Trial { tableau, flow, start, .. } = trial;
     if let Some(fault) = tableau.fault {
         return Err(Refused::Never(StepError::Method {
             time: start.time,
@@ -114,13 +105,13 @@ fn try_step<F: StageFlow>(
     memory.last = None;
     let here = match memory.here.take() {
         Some(here) => here,
-        None => here_at(flow, x, None).ok_or(Refused::Outside(None))?,
+        None => here_at(flow, start.x, None).ok_or(Refused::Outside(None))?,
     };
     let mut last = match tableau.stages {
-        Stages::Chebyshev => chebyshev::stages(flow, x, h, here, memory)?,
-        Stages::Rows(_) => stages(tableau, flow, x, h, here)?,
+        Stages::Chebyshev => chebyshev::stages(trial, here, memory)?,
+        Stages::Rows(_) => stages(trial, here)?,
     };
-    let taken = finished(tableau, flow, start, h, &mut last, memory);
+    let taken = finished(trial, &mut last, memory);
     if memory.here.is_some() {
         memory.last = Some(last);
     } else {
@@ -134,13 +125,11 @@ fn try_step<F: StageFlow>(
 /// The end of a step from its stages: projection, decision.
 #[inline]
 fn finished<F: StageFlow>(
-    tableau: &'static Tableau,
-    flow: &F,
-    start: &StepStart<'_, F>,
-    h: f64,
+    trial: &Trial<'_, F>,
     last: &mut LastStep<F::Vector>,
     memory: &mut MemoryOf<F>,
 ) -> Result<Taken<F>, Refused> {
+    let &Trial { tableau, flow, start, h } = trial;
     let x = start.x;
     // Friction may vanish at the start alone, as for a body at rest.
     let dissipates = last.stages[0].production != 0.0 || last.rise != 0.0;
@@ -157,7 +146,7 @@ fn finished<F: StageFlow>(
     };
 
     let produced = memory.entropy.unwrap_or_else(|| Produced::from(start.values.entropy));
-    let projection = Onto { tableau, flow, start, h, last: &*last, produced };
+    let projection = Onto { trial, last: &*last, produced };
     let Landed { end, produced, how } = match projection.decide(y) {
         Ok(landed) => landed,
         Err(Refused::Falls(rise)) => {
@@ -196,7 +185,7 @@ fn finished<F: StageFlow>(
     let rates = flow.stage_rates(x, (&last.end, &end.x), &next.velocity);
     let rests = end.x == *x && is_zero(&last.stages[0].velocity);
     let stability =
-        tableau.stability.is_finite() && is_at_the_edge(tableau, flow, x, h, last, &rates);
+        tableau.stability.is_finite() && is_at_the_edge((tableau, h), &flow.sizes(x), last, &rates);
     last.stages[last.known] = Here { velocity: rates, production: next.production };
     last.known += 1;
 
@@ -240,12 +229,10 @@ fn here_at<F: StageFlow>(
 /// The stages of a step, and the coordinates of its end.
 #[inline]
 fn stages<F: StageFlow>(
-    tableau: &'static Tableau,
-    flow: &F,
-    x: &Element<F>,
-    h: f64,
+    &Trial { tableau, flow, start, h }: &Trial<'_, F>,
     here: Here<F::Vector>,
 ) -> Result<LastStep<F::Vector>, Refused> {
+    let x = start.x;
     let zero = here.velocity.zero();
     let mut stages = Here::at_rest(&zero);
     stages[0] = here;

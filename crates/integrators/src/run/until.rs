@@ -100,7 +100,7 @@ impl<const N: usize> Until<N> {
     /// | method | least | largest |
     /// |---|---|---|
     /// | [`Scheme`](crate::Scheme), such as `WeylMidpoint`, and [`RungeKuttaChebyshev`](crate::RungeKuttaChebyshev) | 10⁻¹⁰ | 1 |
-    /// | [`DormandPrince5`](crate::DormandPrince5), [`DormandPrince8`](crate::DormandPrince8), [`Gauss`](crate::Gauss), [`Radau`](crate::Radau) | 10⁻¹⁵ | 1 |
+    /// | [`DormandPrince5`](crate::DormandPrince5), [`DormandPrince8`](crate::DormandPrince8), [`ExplicitRungeKutta`](crate::ExplicitRungeKutta) with an error of its own, [`Gauss`](crate::Gauss), [`Radau`](crate::Radau) | 10⁻¹⁵ | 1 |
     #[must_use]
     pub const fn tolerance(self, tolerance: f64) -> Self {
         Self { tolerance, ..self }

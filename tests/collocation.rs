@@ -131,7 +131,7 @@ fn turned() -> Matrix3<f64> {
 #[test]
 fn orders_on_lie_algebra_duals() {
     orders(
-        "relaxing body, so(3)*",
+        "so(3)*",
         &relaxing_body(),
         &vector![0.3, -0.9, 0.2],
         30.0,
@@ -143,32 +143,20 @@ fn orders_on_lie_algebra_duals() {
         .casimir(models::gamma_squared)
         .build()
         .expect("it is a system");
-    orders(
-        "heavy top with friction, se(3)*",
-        &body,
-        &SVector::from(models::HEAVY),
-        4.0,
-        ([32, 32, 16, 12], [32, 16, 12]),
-    );
+    orders("se(3)*", &body, &SVector::from(models::HEAVY), 4.0, ([32, 32, 16, 12], [32, 16, 12]));
 }
 
 #[test]
 fn orders_on_spheres_and_products_with_them() {
     orders(
-        "spinning top, S²",
+        "S²",
         &spin(),
         &Vector3::repeat(3_f64.sqrt().recip()),
         20.0,
         ([64, 64, 36, 36], [64, 36, 36]),
     );
-    orders(
-        "spin that warms a bath, S² × R",
-        &warm_spin(1.0),
-        &WARM,
-        6.0,
-        ([64, 48, 40, 30], [48, 48, 28]),
-    );
-    orders("Nambu bracket, SO(3)", &rotations(), &turned(), 0.4, ([32, 32, 16, 16], [32, 16, 16]));
+    orders("S² × R", &warm_spin(1.0), &WARM, 6.0, ([64, 48, 40, 30], [48, 48, 28]));
+    orders("SO(3)", &rotations(), &turned(), 0.4, ([32, 32, 16, 16], [32, 16, 16]));
 }
 
 /// The sign of `⟨dH, dS⟩` is that of the temperature, and it changes as this spin turns.
@@ -214,7 +202,7 @@ fn orders_without_friction_where_the_entropy_is_constant() {
         .build()
         .expect("it is a system");
     let x0 = vector![2.0, 0.25, 0.125];
-    orders("pendulum beside a bath", &pendulum, &x0, 4.0, ([48, 32, 20, 16], [32, 20, 16]));
+    orders("pendulum", &pendulum, &x0, 4.0, ([48, 32, 20, 16], [32, 20, 16]));
     for method in RADAU {
         let run = kept("pendulum", method, &pendulum, &x0, Span::until(4.0).tolerance(1e-5));
         let off = run.iter().map(|state| (state.entropy - 0.125).abs()).fold(0.0, f64::max);
@@ -224,7 +212,7 @@ fn orders_without_friction_where_the_entropy_is_constant() {
 
 #[test]
 fn orders_on_gas_containers_and_with_a_listed_momentum() {
-    orders("gas containers, α = 0.5", &gas(0.5), &GAS, 2.0, ([64, 48, 24, 20], [48, 24, 36]));
+    orders("gas", &gas(0.5), &GAS, 2.0, ([64, 48, 24, 20], [48, 24, 36]));
     let pendulum = System::on(Euclidean::<10>)
         .bracket(Poisson::constant(models::pendulum_bracket()).expect("it is skew"))
         .energy(models::pendulum_energy)
@@ -234,7 +222,7 @@ fn orders_on_gas_containers_and_with_a_listed_momentum() {
         .build()
         .expect("it is a system");
     orders(
-        "thermoelastic double pendulum",
+        "double pendulum",
         &pendulum,
         &SVector::from(models::PENDULUM),
         2.0,
@@ -262,13 +250,7 @@ const BENT: Vector3<f64> = Vector3::new(0.5, -0.6, 0.4);
 
 #[test]
 fn orders_with_a_metric_of_its_own_and_on_a_manifold_of_a_user() {
-    orders(
-        "Nambu bracket, chart with a metric of its own",
-        &bent(),
-        &BENT,
-        4.0,
-        ([48, 32, 16, 12], [32, 16, 16]),
-    );
+    orders("chart", &bent(), &BENT, 4.0, ([48, 32, 16, 12], [32, 16, 16]));
     let globe = System::on(Globe)
         .metric(Metric::field(|_: &Vector3<Real>| Matrix3::identity()))
         .bracket(AreaForm)
@@ -276,7 +258,7 @@ fn orders_with_a_metric_of_its_own_and_on_a_manifold_of_a_user() {
         .build()
         .expect("it is a system");
     let start = Globe::point(vector![0.6, 0.0, 0.8]);
-    orders("spin on a globe of a user", &globe, &start, 12.0, ([64, 40, 24, 16], [40, 24, 16]));
+    orders("globe", &globe, &start, 12.0, ([64, 40, 24, 16], [40, 24, 16]));
 }
 
 /// How far the method of one stage is from a midpoint scheme after 100 steps.

@@ -171,14 +171,6 @@ pub enum SweepError {
         /// Whether there is a journal from which it goes on.
         journal: bool,
     },
-    /// The threads could not be started.
-    #[error("cannot start {threads} threads: {source}")]
-    Threads {
-        /// How many were asked for.
-        threads: usize,
-        /// What the system says.
-        source: rayon::ThreadPoolBuildError,
-    },
 }
 
 impl SweepError {
@@ -187,7 +179,7 @@ impl SweepError {
     pub fn table(&self) -> Option<&Table> {
         match self {
             Self::Write { table, .. } | Self::Interrupted { table, .. } => Some(table),
-            Self::Plan(_) | Self::Journal(_) | Self::Threads { .. } => None,
+            Self::Plan(_) | Self::Journal(_) => None,
         }
     }
 }

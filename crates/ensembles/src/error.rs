@@ -164,7 +164,7 @@ pub enum SweepError {
         table: Box<Table>,
     },
     /// Ctrl-C or the signal of a scheduler has ended the sweep, after the rows in hand.
-    #[error("the sweep was interrupted after {} rows{}", table.len(), if *journal { "; run it again, and it goes on" } else { "" })]
+    #[error("the sweep was interrupted after {} rows{}", table.len(), advice(*journal))]
     Interrupted {
         /// The rows so far.
         table: Box<Table>,
@@ -182,6 +182,11 @@ impl SweepError {
             Self::Plan(_) | Self::Journal(_) => None,
         }
     }
+}
+
+/// What to do after an interruption.
+const fn advice(journal: bool) -> &'static str {
+    if journal { "; run it again, and it goes on" } else { "" }
 }
 
 /// Prints the sentence, which is what a `main` that returns the error shows.

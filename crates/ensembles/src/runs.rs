@@ -88,8 +88,8 @@ impl<'a, M: StateSpace, F> Runs<'a, M, F> {
         Self { shard, ..self }
     }
 
-    /// Runs rows on so many threads, rather than on as many as `RAYON_NUM_THREADS` says or the machine has. The table has
-    /// the same bits.
+    /// Runs rows on so many threads, rather than on as many as `RAYON_NUM_THREADS` says or the machine has. The table
+    /// has the same bits.
     #[must_use]
     pub fn threads(self, threads: usize) -> Self {
         Self { threads: Some(threads.max(1)), ..self }

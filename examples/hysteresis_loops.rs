@@ -7,8 +7,8 @@
 //! H = −½ (n·a)² − η(τ) n₃ + C e^{s/C} + ε,   n' = n × ∇H − λ w_tan,   S = s .
 //! ```
 //!
-//! The spin jumps where its minimum of the energy ends, at `η = −(cos^⅔ θ + sin^⅔ θ)^{−3/2}`; the field is not infinitely
-//! slow, so it jumps a little later. Without a field a powder keeps half of its magnetisation.
+//! The spin jumps where its minimum of the energy ends, at `η = −(cos^⅔ θ + sin^⅔ θ)^{−3/2}`; the field is not
+//! infinitely slow, so it jumps a little later. Without a field a powder keeps half of its magnetisation.
 
 use std::error::Error;
 

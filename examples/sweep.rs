@@ -1,9 +1,10 @@
 //! A thousand bodies fall over: when a body that spins about its long axis turns over, and to which side.
 //!
-//! `p' = p × ω + γ (|ω|² p − ⟨ω, p⟩ ω)`, with `H = ½ Σ p_i²/I_i`, `ω_i = p_i/I_i` and `S = ½γ|p|²`. The rotation about the axis of
-//! least inertia is stable without friction alone: Explorer 1 did so in 1958, and fell over within a day. The body
-//! ends in a rotation about the axis of largest inertia, forwards or backwards. Which of both it is depends on
-//! friction and on the start in stripes, because it depends on the phase in which the motion crosses the separatrix.
+//! `p' = p × ω + γ (|ω|² p − ⟨ω, p⟩ ω)`, with `H = ½ Σ p_i²/I_i`, `ω_i = p_i/I_i` and `S = ½γ|p|²`. The rotation
+//! about the axis of least inertia is stable without friction alone: Explorer 1 did so in 1958, and fell over within
+//! a day. The body ends in a rotation about the axis of largest inertia, forwards or backwards. Which of both it is
+//! depends on friction and on the start in stripes, because it depends on the phase in which the motion crosses the
+//! separatrix.
 //!
 //! The rows run on all threads. As shards of several processes they write journals; `--help` says how.
 

@@ -1,4 +1,4 @@
-//! Sweeps: the laws of their tables, under threads, shards, kills, full disks and bad rows.
+//! Sweeps: the laws of their tables, under threads, shards, killed processes, full disks and bad rows.
 
 use std::fs;
 use std::path::{Path, PathBuf};

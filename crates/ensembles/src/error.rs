@@ -164,20 +164,12 @@ pub enum SweepError {
         table: Box<Table>,
     },
     /// Ctrl-C or the signal of a scheduler has ended the sweep, after the rows in hand.
-    #[error("the sweep was interrupted after {} rows{}", table.len(), if *journal { "; run it again, and it goes on" } else { "" })]
+    #[error("the sweep was interrupted after {} rows{}", table.len(), advice(*journal))]
     Interrupted {
         /// The rows so far.
         table: Box<Table>,
         /// Whether there is a journal from which it goes on.
         journal: bool,
-    },
-    /// The threads could not be started.
-    #[error("cannot start {threads} threads: {source}")]
-    Threads {
-        /// How many were asked for.
-        threads: usize,
-        /// What the system says.
-        source: rayon::ThreadPoolBuildError,
     },
 }
 
@@ -187,9 +179,14 @@ impl SweepError {
     pub fn table(&self) -> Option<&Table> {
         match self {
             Self::Write { table, .. } | Self::Interrupted { table, .. } => Some(table),
-            Self::Plan(_) | Self::Journal(_) | Self::Threads { .. } => None,
+            Self::Plan(_) | Self::Journal(_) => None,
         }
     }
+}
+
+/// What to do after an interruption.
+const fn advice(journal: bool) -> &'static str {
+    if journal { "; run it again, and it goes on" } else { "" }
 }
 
 /// Prints the sentence, which is what a `main` that returns the error shows.

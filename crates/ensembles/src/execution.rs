@@ -3,11 +3,12 @@
 use std::any::Any;
 use std::collections::HashSet;
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
+use std::thread;
 use std::time::Instant;
 
 use metriplectic_integrators::{Error, StateSpace};
-use rayon::prelude::*;
 
 use crate::bar::Bar;
 use crate::entry::{Done, Entry, Failed, Outcome, ending};
@@ -36,9 +37,6 @@ struct Sink {
     failure: Option<JournalError>,
     bar: Bar,
 }
-
-/// Why no further row is begun.
-struct Stop;
 
 impl<'r, 'a, M, T, F> Execution<'r, 'a, M, F>
 where
@@ -79,20 +77,29 @@ where
         let has_journal = journal.is_some();
         let sink = Mutex::new(Sink { journal, rows: known, failure: None, bar });
         let names: Arc<[String]> = header.parameters.clone().into();
-        let stopped = todo
-            .into_par_iter()
-            .try_for_each(|number| {
-                if interrupt::asked() {
-                    return Err(Stop);
-                }
+        let (next, stopped) = (AtomicUsize::new(0), AtomicBool::new(false));
+        let work = || {
+            while !stopped.load(Ordering::Relaxed)
+                && let Some(&number) = todo.get(next.fetch_add(1, Ordering::Relaxed))
+            {
                 let row = prepared(runs, runs.plan.known_row(number, &names), &header);
-                let entry = outcome(runs, &row).ok_or(Stop)?;
-                let line = if has_journal { encode(&entry) } else { Vec::new() };
-                sink.lock().unwrap_or_else(PoisonError::into_inner).take(entry, &line)?;
-                finished(&row);
-                Ok(())
-            })
-            .is_err();
+                let taken = !interrupt::asked()
+                    && outcome(runs, &row).is_some_and(|entry| {
+                        let line = if has_journal { encode(&entry) } else { Vec::new() };
+                        sink.lock().unwrap_or_else(PoisonError::into_inner).take(entry, &line)
+                    });
+                if taken { finished(&row) } else { stopped.store(true, Ordering::Relaxed) }
+            }
+        };
+        // Threads of its own: one of rayon's would begin another row while it waits for the loops of a lattice.
+        thread::scope(|scope| {
+            for _ in 1..runs.thread_count().min(todo.len()) {
+                // Without the thread the others run its rows.
+                let _ = thread::Builder::new().spawn_scoped(scope, work);
+            }
+            work();
+        });
+        let stopped = stopped.into_inner();
         let Sink { journal, rows, failure, bar } =
             sink.into_inner().unwrap_or_else(PoisonError::into_inner);
         bar.finish();
@@ -109,8 +116,8 @@ where
 }
 
 impl Sink {
-    /// Takes a row that is done. After a failed write nothing more is written.
-    fn take(&mut self, entry: Entry, line: &[u8]) -> Result<(), Stop> {
+    /// Takes a row that is done, and returns whether it is kept. After a failed write nothing more is written.
+    fn take(&mut self, entry: Entry, line: &[u8]) -> bool {
         self.bar.add(entry.failed().is_some());
         self.rows.push(entry);
         if self.failure.is_none()
@@ -118,7 +125,7 @@ impl Sink {
         {
             self.failure = journal.append(line).err();
         }
-        if self.failure.is_some() { Err(Stop) } else { Ok(()) }
+        self.failure.is_none()
     }
 }
 

@@ -1,9 +1,9 @@
 //! The file in which each row is kept as soon as it is done.
 //!
-//! A journal is text. Its first line names the format, the version, the hash of the plan and the columns; each line after
-//! it is a row. A line ends in its check sum, so a torn line is no row, and a sweep that is started again runs this row
-//! anew. Rows stand in the order in which they finished. Numbers are the hexadecimal digits of their bits, without
-//! the zeros at the end.
+//! A journal is text. Its first line names the format, the version, the hash of the plan and the columns; each line
+//! after it is a row. A line ends in its check sum, so a torn line is no row, and a sweep that is started again runs
+//! this row anew. Rows stand in the order in which they finished. Numbers are the hexadecimal digits of their bits,
+//! without the zeros at the end.
 
 mod header;
 mod line;

@@ -1,7 +1,7 @@
 //! Sweeps and ensembles: a thousand runs are one table.
 //!
-//! A [`Sweep`] lists rows of parameters. A closure builds the system of a row and returns its trajectory. The rows run on
-//! all threads, and each one goes to a journal as soon as it is done. The [`Table`] has for each row its
+//! A [`Sweep`] lists rows of parameters. A closure builds the system of a row and returns its trajectory. The rows
+//! run on all threads, and each one goes to a journal as soon as it is done. The [`Table`] has for each row its
 //! parameters, its last state, the figures of its certificate, and what was observed, or the error.
 //!
 //! ```
@@ -23,7 +23,7 @@
 //!     .run(|row| {
 //!         let (friction, spin) = (row["friction"], row["spin"]);
 //!         let body = System::on(LieDual::so3())
-//!             .energy(|p: &Vector3<Real>| p.x.powi(2) * 0.05 + p.y.powi(2) * 0.1 + p.z.powi(2) * 0.5)
+//!             .energy(|p: &Vector3<Real>| p.x * p.x * 0.05 + p.y * p.y * 0.1 + p.z * p.z * 0.5)
 //!             .entropy(move |p: &Vector3<Real>| p.norm_squared() * (0.5 * friction))
 //!             .build()?;
 //!         Ok(WeylMidpoint.run(&body, vector![spin, -1.0, 0.3], Span::steps(0.1, 100).every(10))?)
@@ -42,8 +42,8 @@
 //!
 //! # Laws
 //!
-//! 1. The bytes of a table do not depend on threads, shards, machines with the same program and mathematical library, or
-//!    how often the sweep was put down.
+//! 1. The bytes of a table do not depend on threads, shards, machines with the same program and mathematical library,
+//! or how often the sweep was put down.
 //! 2. Each row of the plan is in the table once, done or failed, or it is [missing](Table::missing).
 //! 3. A row [alone](Runs::only) has the bits of the same row in the table.
 //! 4. A failed write ends the sweep with an error that has the rows so far.

@@ -1,8 +1,8 @@
 //! Rows that last for hours: they write checkpoints, and go on from them.
 //!
-//! Row 17 of `relax.journal` has the file `relax.row-17.checkpoint`. It holds the checkpoint of the run and the states and
-//! events recorded so far, with a check sum in its last line. It is replaced as a whole, and removed once the row is in
-//! the journal.
+//! Row 17 of `relax.journal` has the file `relax.row-17.checkpoint`. It holds the checkpoint of the run and the
+//! states and events recorded so far, with a check sum in its last line. It is replaced as a whole, and removed once
+//! the row is in the journal.
 
 use std::fs;
 use std::io::Write as _;
@@ -126,8 +126,8 @@ impl Row {
     }
 
     /// Runs a row that lasts for hours. Each minute, or as often as
-    /// [`Runs::checkpoint_every`](crate::Runs::checkpoint_every) says, it writes a checkpoint beside the journal. A sweep
-    /// that is started again goes on from there, with the same bits. Ctrl-C puts such a row down.
+    /// [`Runs::checkpoint_every`](crate::Runs::checkpoint_every) says, it writes a checkpoint beside the journal. A
+    /// sweep that is started again goes on from there, with the same bits. Ctrl-C puts such a row down.
     ///
     /// The record has the start, the [outputs](metriplectic_integrators::Watch) and the events that the schedule asks
     /// for, and the last state; not each step. Without a journal there is no checkpoint.

@@ -88,7 +88,8 @@ impl<'a, M: StateSpace, F> Runs<'a, M, F> {
         Self { shard, ..self }
     }
 
-    /// Runs rows on so many threads, rather than on those of rayon's global pool. The table has the same bits.
+    /// Runs rows on so many threads, rather than on as many as `RAYON_NUM_THREADS` says or the machine has. The table
+    /// has the same bits.
     #[must_use]
     pub fn threads(self, threads: usize) -> Self {
         Self { threads: Some(threads.max(1)), ..self }
@@ -111,6 +112,13 @@ impl<'a, M: StateSpace, F> Runs<'a, M, F> {
     #[must_use]
     pub fn checkpoint_every(self, interval: std::time::Duration) -> Self {
         Self { checkpoints: interval, ..self }
+    }
+
+    /// The number of threads.
+    pub(crate) fn thread_count(&self) -> usize {
+        let asked = || std::env::var("RAYON_NUM_THREADS").ok()?.trim().parse().ok();
+        let there = || std::thread::available_parallelism().map_or(1, usize::from);
+        self.threads.or_else(asked).filter(|threads| *threads > 0).unwrap_or_else(there)
     }
 
     /// The file of a shard.
@@ -160,15 +168,7 @@ where
     ///
     /// [`SweepError`]; the rows so far are in [`SweepError::table`].
     pub fn execute(&self) -> Result<Table, SweepError> {
-        let execution = Execution::new(self, self.header()?)?;
-        match self.threads {
-            None => execution.all(),
-            Some(threads) => {
-                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-                let pool = pool.map_err(|source| SweepError::Threads { threads, source })?;
-                pool.install(|| execution.all())
-            }
-        }
+        Execution::new(self, self.header()?)?.all()
     }
 
     /// Runs one row, without the journal. It has the bits of the same row in the table of all.

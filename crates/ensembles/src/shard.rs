@@ -57,7 +57,8 @@ pub enum ShardError {
     },
     /// The scheduler says which task this is, but not how many there are.
     #[error(
-        "{variable} says which task this is and not of how many; add `--shards N` to the command, and number the tasks from 0"
+        "{variable} says which task this is and not of how many; add `--shards N` to the command, and \
+         number the tasks from 0"
     )]
     NoCount {
         /// The variable.
@@ -73,7 +74,8 @@ pub enum ShardError {
     },
     /// The tasks of the array are not at equal distances, so their order is not known.
     #[error(
-        "the array has {count} tasks from {first} to {last} in steps of {step}, which leaves gaps; say the shard by `--shard i/n`"
+        "the array has {count} tasks from {first} to {last} in steps of {step}, which leaves gaps; say the \
+         shard by `--shard i/n`"
     )]
     Gaps {
         /// The number of tasks.

@@ -1,8 +1,8 @@
 //! Loops over chunks of sites, on all threads.
 //!
-//! The chunks have a fixed length, and their results come in their order. [`tree`] merges them two by two, by the numbers
-//! of the chunks alone. So the bits of a sum do not depend on the number of threads, or on which process has summed a
-//! whole subtree.
+//! The chunks have a fixed length, and their results come in their order. [`tree`] merges them two by two, by the
+//! numbers of the chunks alone. So the bits of a sum do not depend on the number of threads, or on which process has
+//! summed a whole subtree.
 
 use std::ops::Range;
 use std::sync::Mutex;
@@ -56,8 +56,8 @@ fn on_all_threads(count: usize, f: &(dyn Fn(usize) + Sync)) {
     (0..count).for_each(f);
 }
 
-/// The results of all chunks in one, by a fixed binary tree: on each level the results `2k` and `2k + 1` are merged. A node
-/// of level `l` is the sum of the chunks from `k 2ˡ` to `(k + 1) 2ˡ`. `None` without chunks.
+/// The results of all chunks in one, by a fixed binary tree: on each level the results `2k` and `2k + 1` are merged.
+/// A node of level `l` is the sum of the chunks from `k 2ˡ` to `(k + 1) 2ˡ`. `None` without chunks.
 pub(crate) fn tree<R>(parts: Vec<R>, merge: impl Fn(R, R) -> R) -> Option<R> {
     let mut level = parts;
     while level.len() > 1 {

@@ -9,8 +9,8 @@ use crate::plot::At;
 const COLORS: [&str; 7] =
     ["#440154", "#443983", "#31688E", "#21918C", "#35B779", "#90D743", "#FDE725"];
 
-/// A number in each cell of a grid, drawn in bands of colour between bounds. A number that is not finite leaves its cell
-/// blank.
+/// A number in each cell of a grid, drawn in bands of colour between bounds. A number that is not finite leaves its
+/// cell blank.
 ///
 /// ```
 /// use metriplectic_studies::{Map, Panel, Panels};

@@ -102,7 +102,7 @@ impl Broken {
         let off = clock.map_or(f64::INFINITY, |event| (event.state.time - at).abs());
         self.expect(off <= 4.0 * f64::EPSILON * at, || format!("the clock is off by {off:e}"));
         let state = clock.map(|event| Recorded::from(&event.state));
-        let output = outputs.iter().find(|output| output.time == at);
+        let output = outputs.iter().find(|output| output.time.to_bits() == at.to_bits());
         let apart = state.zip(output).map_or(f64::INFINITY, |(state, output)| {
             let scale = output.entries.iter().fold(0.0_f64, |a, b| a.max(b.abs()));
             state.distance(output) / scale.max(f64::MIN_POSITIVE)

@@ -236,12 +236,20 @@ fn a_wrong_tableau_is_refused_by_its_laws_and_before_a_run() {
         matches!(refused(&WEIGHT, steps()), TableauError::Order { order: 3, off, .. } if off < 1e-5)
     );
     assert!(matches!(refused(&ORDER, steps()), TableauError::Order { order: 4, .. }));
+    // The bound is a residual of 1e-8, and these have 2e-8 and half of 1e-8.
+    const ROWS: &[Row] = &[&[(0, 0.5)], &[(0, -1.0), (1, 2.0)]];
+    const FAR: Tableau =
+        Tableau::new("far", 3, ROWS, &[(0, 1.0 / 6.0 + 4e-8), (1, 2.0 / 3.0), (2, 1.0 / 6.0)]);
+    const NEAR: Tableau =
+        Tableau::new("near", 3, ROWS, &[(0, 1.0 / 6.0 + 1e-8), (1, 2.0 / 3.0), (2, 1.0 / 6.0)]);
+    assert!(matches!(refused(&FAR, steps()), TableauError::Order { order: 3, .. }));
+    assert!(NEAR.check(true).is_ok() && laws::tableau(&NEAR).is_err());
     // A stage that is known only later, and more stages than fit.
     const LATER: Tableau =
         Tableau::new("later", 3, &[&[(1, 0.5)], &[(0, -1.0), (1, 2.0)]], KUTTA_END);
     const NONE: Row = &[];
-    const ROWS: &[Row] = &[NONE; 15];
-    const LONG: Tableau = Tableau::new("long", 1, ROWS, &[(0, 1.0)]);
+    const EMPTY: &[Row] = &[NONE; 15];
+    const LONG: Tableau = Tableau::new("long", 1, EMPTY, &[(0, 1.0)]);
     assert_eq!(
         refused(&LATER, steps()),
         TableauError::Unknown { name: "later", part: "the stages", row: 0, stage: 1, known: 1 }

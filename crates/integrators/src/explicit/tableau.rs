@@ -129,7 +129,7 @@ pub enum TableauError {
 }
 
 /// The highest order of a tableau without an error of its own for which the estimate of the flow serves: its error is
-/// `O(h⁵)`.
+/// `O(h⁵)` (`tests/tableau.rs::steps_follow_a_tolerance_only_where_their_error_is_known`).
 pub(super) const ESTIMATED: u32 = 3;
 
 impl Tableau {
@@ -419,4 +419,45 @@ const fn edge_of_stability(rows: &[Row], end: Row) -> f64 {
         halvings += 1;
     }
     stable
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::dormand_prince::{EIGHT, FIVE};
+    use super::*;
+
+    #[test]
+    fn the_edge_of_stability_is_where_the_stability_function_leaves_one() {
+        // R(−z) = 1 − z + z²/2 − z³/6 is −1 at 2.5127.
+        let kutta: &[Row] = &[&[(0, 0.5)], &[(0, -1.0), (1, 2.0)]];
+        let end: Row = &[(0, 1.0 / 6.0), (1, 2.0 / 3.0), (2, 1.0 / 6.0)];
+        assert!((Tableau::new("Kutta3", 3, kutta, end).stability - 2.512_745).abs() < 1e-6);
+        // Hairer, Wanner (Solving ODEs II, §IV.2) draw the regions of both.
+        let edges = [&FIVE, &EIGHT].map(|tableau| edge_of_stability(tableau.rows(), tableau.end));
+        println!("{edges:?}");
+        assert!((edges[0] - 3.307).abs() < 1e-2 && (edges[1] - 6.393).abs() < 1e-2, "{edges:?}");
+        // The last stage of Bogacki and Shampine is not at the end of the step.
+        let rows: &[Row] = &[&[(0, 0.5)], &[(1, 0.75)]];
+        let end: Row = &[(0, 2.0 / 9.0), (1, 1.0 / 3.0), (2, 4.0 / 9.0)];
+        assert!(Tableau::new("BogackiShampine3", 3, rows, end).stability.is_infinite());
+    }
+
+    #[test]
+    fn the_parts_that_follow_from_the_rows_are_those_of_dormand_and_prince() {
+        assert_eq!(EIGHT.passed().collect::<Vec<_>>(), [1, 2, 3, 4]);
+        assert_eq!(FIVE.passed().collect::<Vec<_>>(), [1]);
+        // The error of order 5 needs the rates at the end.
+        assert!(EIGHT.early_error == EIGHT.errors[0] && FIVE.early_error.is_empty());
+    }
+
+    #[test]
+    fn a_pair_follows_a_tolerance_by_the_order_of_its_error() {
+        let plain = Tableau::new("plain", 3, &[], &[]);
+        assert_eq!(plain.control, Control::of_order(3));
+        let pair = plain.error(&[(0, 1.0)], 2);
+        assert_eq!(pair.control, Control { power: 1.0, ..Control::of_order(2) });
+        // e²/e₂ of the orders 5 and 3 is O(h⁸), as the control of order 8 says.
+        let two = plain.error(&[(0, 1.0)], 5).second_error(&[(0, 1.0)], 3);
+        assert!((two.control.rejected - EIGHT.control.rejected).abs() < 1e-15);
+    }
 }

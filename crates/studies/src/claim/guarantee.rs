@@ -123,6 +123,7 @@ impl Guarantee {
                     "It is 5 and 8 with",
                     "have the orders 2 to 8",
                     "Sixteen problems are fitted",
+                    "Formulas by hand check this velocity",
                     "Closed forms, and flows of gradients by hand",
                     "The orders 5 and 8 are fitted on",
                 ],
@@ -149,12 +150,20 @@ impl Guarantee {
             }
             Self::Tolerance => (
                 "Adaptive steps follow a tolerance",
-                &["has the same laws in each step", "A stiff start of a slow motion"],
+                &[
+                    "has the same laws in each step",
+                    "A stiff start of a slow motion",
+                    "Steps of one size would be",
+                ],
                 &["adaptive_relaxation"],
             ),
             Self::Outputs => (
                 "Outputs and events keep the laws",
-                &["| outputs and events with the laws |", "States between the steps keep the laws"],
+                &[
+                    "| outputs and events with the laws |",
+                    "The tests of the explicit methods are in",
+                    "States between the steps keep the laws",
+                ],
                 &["plane_crossings"],
             ),
             Self::HardSteps => (

@@ -43,7 +43,7 @@
 //! # Laws
 //!
 //! 1. The bytes of a table do not depend on threads, shards, machines with the same program and mathematical library,
-//! or how often the sweep was put down.
+//!    or how often the sweep was put down.
 //! 2. Each row of the plan is in the table once, done or failed, or it is [missing](Table::missing).
 //! 3. A row [alone](Runs::only) has the bits of the same row in the table.
 //! 4. A failed write ends the sweep with an error that has the rows so far.

@@ -547,7 +547,7 @@ fn a_stiff_row_ends_and_says_so() {
     let sweep = Sweep::new("run.stiff").grid("friction", [0.1, 1.0, 1e7]);
     let table = sweep.run(closure).quiet().execute().expect("all rows");
     assert_eq!(column(&table, "run.stiff"), [0.0, 0.0, 1.0], "{table}");
-    assert_eq!(column(&table, "run.resolved")[2], 0.0);
+    assert!(column(&table, "run.resolved")[2].abs() < 0.5);
     assert!(column(&table, "run.energy_error").iter().all(|error| *error <= 50.0 * f64::EPSILON));
     assert!(table.to_string().contains("friction is not damped in 1 rows: 2"), "{table}");
 }
@@ -577,7 +577,7 @@ fn means_and_quantiles_in_time_are_those_of_the_rows() {
         assert!(row.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-13), "{row:?}");
         let average = values.iter().sum::<f64>() / n;
         let variance = values.iter().map(|x| (x - average).powi(2)).sum::<f64>() / (n - 1.0);
-        assert!((mean[1] - average).abs() < 1e-14 && mean[0] == row[0]);
+        assert!((mean[1] - average).abs() < 1e-14 && mean[0].to_bits() == row[0].to_bits());
         assert!((mean[2] / (variance / n).sqrt() - 1.0).abs() < 1e-12, "{mean:?}");
     }
     assert!(matches!(table.mean("friction"), Err(TableError::NotInTime { .. })));

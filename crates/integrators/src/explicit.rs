@@ -58,6 +58,7 @@ mod spectrum;
 mod stage;
 mod step;
 mod tableau;
+mod tableau_error;
 mod trial;
 
 use metriplectic_dynamics::SecondLaw;
@@ -74,7 +75,8 @@ use chebyshev::CHEBYSHEV;
 use dormand_prince::{EIGHT, FIVE};
 use trial::{Done, Trial};
 
-pub use tableau::{Row, Tableau, TableauError};
+pub use tableau::{Row, Tableau};
+pub use tableau_error::TableauError;
 
 /// The method of Dormand and Prince of order 8, with both laws exact: for high accuracy, and for smooth motions at
 /// any accuracy.

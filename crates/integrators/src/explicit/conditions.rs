@@ -11,7 +11,8 @@
 //! A method has the order `p` if `Σ b_i Φ_i(t) = 1/γ(t)` for all trees with at most `p` nodes; inside a step, at the
 //! fraction `θ`, the right side is `θ^{|t|}/γ(t)`.
 
-use super::tableau::{ESTIMATED, Row, STAGES, Tableau, TableauError};
+use super::tableau::{ESTIMATED, Row, STAGES, Tableau};
+use super::tableau_error::TableauError;
 
 /// The highest order whose conditions are looked at: no tableau that fits has a higher one.
 const HIGHEST: u32 = 10;

@@ -1,5 +1,6 @@
 //! The coefficients of an explicit Runge-Kutta method.
 
+use super::tableau_error::TableauError;
 use crate::step::Control;
 
 /// The most stages of a step: those of order 8, its end, and three for its dense output.
@@ -67,65 +68,6 @@ pub(super) enum Stages {
     Rows(&'static [Row]),
     /// As many as the size of the step asks for, by a recursion.
     Chebyshev,
-}
-
-/// A tableau with which no run starts.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum TableauError {
-    /// There are too many stages.
-    #[error(
-        "the tableau `{name}` has {found} stages, with the start, the end and those of its dense output; a step has \
-         room for {most}"
-    )]
-    Stages {
-        /// The name of the tableau.
-        name: &'static str,
-        /// How many there are.
-        found: usize,
-        /// The most that there may be.
-        most: usize,
-    },
-    /// A row names a stage that is not known where the row is used.
-    #[error(
-        "row {row} of {part} of the tableau `{name}` names stage {stage}; {known} stages are known there"
-    )]
-    Unknown {
-        /// The name of the tableau.
-        name: &'static str,
-        /// The part of the tableau.
-        part: &'static str,
-        /// Which row of this part, counted from 0.
-        row: usize,
-        /// The stage that it names.
-        stage: usize,
-        /// How many are known, counted from stage 0.
-        known: usize,
-    },
-    /// The weights do not have the order of the method.
-    #[error(
-        "the tableau `{name}` misses a condition of order {order} by {off:.1e}, relative to its terms; \
-         look for a wrong weight with `laws::tableau`"
-    )]
-    Order {
-        /// The name of the tableau.
-        name: &'static str,
-        /// The order that it was given.
-        order: u32,
-        /// The largest residual of a condition, relative to its terms.
-        off: f64,
-    },
-    /// The steps are to follow a tolerance, and nothing estimates their error.
-    #[error(
-        "the steps follow a tolerance, and the tableau `{name}` of order {order} has no row for their error; give it one \
-         by `Tableau::error`, or take steps of one size"
-    )]
-    NoError {
-        /// The name of the tableau.
-        name: &'static str,
-        /// Its order.
-        order: u32,
-    },
 }
 
 /// The highest order of a tableau without an error of its own for which the estimate of the flow serves: its error is

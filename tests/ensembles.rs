@@ -9,6 +9,7 @@ use metriplectic::ensembles::{
     JournalError, PlanError, Runs, ShardError, SweepError, TableError, TableRow,
 };
 use metriplectic::integrators::Scheme;
+use metriplectic::manifolds::metric::Canonical;
 use metriplectic::prelude::*;
 
 /// A folder for the files of a test.
@@ -25,16 +26,40 @@ fn relaxing(row: &Row) -> Result<Trajectory<LieDual<3>>, Error> {
 }
 
 fn relaxing_in(row: &Row, steps: usize, h: f64) -> Result<Trajectory<LieDual<3>>, Error> {
-    let friction = row["friction"];
-    let inertia = vector![10.0, 5.0, 1.0];
-    let body = System::on(LieDual::so3())
-        .energy(move |p: &Vector3<Real>| {
-            p.component_mul(p).component_div(&inertia.cast()).sum() * 0.5
-        })
-        .entropy(move |p: &Vector3<Real>| p.norm_squared() * (0.5 * friction))
-        .build()?;
+    let body = body(row["friction"])?;
     let start = vector![row["spin"], -1.0, 0.3];
     Ok(WeylMidpoint.run(&body, start, Span::steps(h, steps).every(steps / 4))?)
+}
+
+/// One type of body and one of oscillators, because each is compiled with its method.
+fn body(
+    friction: f64,
+) -> Result<impl Metriplectic<Manifold = LieDual<3>, Metric = Canonical>, Error> {
+    Ok(System::on(LieDual::so3())
+        .energy(|p: &Vector3<Real>| p.x.powi(2) * 0.05 + p.y.powi(2) * 0.1 + p.z.powi(2) * 0.5)
+        .entropy(move |p: &Vector3<Real>| p.norm_squared() * (0.5 * friction))
+        .build()?)
+}
+
+/// An oscillator in units of length and energy, or a mass that is attracted by the logarithm of its distance.
+fn oscillator(
+    [l, e]: [f64; 2],
+    friction: f64,
+    attracted: bool,
+) -> Result<impl Metriplectic<Manifold = Euclidean<3>, Metric = Canonical>, Error> {
+    Ok(System::on(Euclidean::<3>)
+        .bracket(Poisson::constant(matrix![0.0, 1.0, 0.0; -1.0, 0.0, 0.0; 0.0, 0.0, 0.0])?)
+        .energy(move |x: &Vector3<Real>| {
+            let (q, p) = (x.x / l, x.y * l / e);
+            let potential = if attracted { q.ln() * 2.0 } else { q * q };
+            (potential + p * p) * (0.5 * e) + x.z
+        })
+        .entropy(|x: &Vector3<Real>| x.z)
+        .dissipation(FieldDissipation(move |_: &Vector3<Real>, w: &Vector3<Real>| {
+            let b = Vector3::new(Real::from(0.0), w.z, -w.y);
+            b * b.transpose() * (w.z.recip() * (friction * e / (l * l)))
+        }))
+        .build()?)
 }
 
 /// A plan of 20 × 20 rows.
@@ -160,10 +185,7 @@ fn a_row_that_fails_or_panics_is_a_row_with_a_sentence() {
 fn a_row_whose_step_fails_has_the_steps_before() {
     // A mass falls into the centre of its force after a time of √(π/2) q₀.
     let closure = |row: &Row| {
-        let system = System::on(Euclidean::<3>)
-            .bracket(Poisson::constant(matrix![0.0, 1.0, 0.0; -1.0, 0.0, 0.0; 0.0, 0.0, 0.0])?)
-            .energy(|x: &Vector3<Real>| x.y.powi(2) * 0.5 + x.x.ln())
-            .build()?;
+        let system = oscillator([1.0; 2], 0.0, true)?;
         let start = vector![row["q"], 0.0, 0.0];
         Ok(WeylMidpoint.run(&system, start, Span::steps(0.01, 500).at_most(2))?)
     };
@@ -202,25 +224,17 @@ fn slowly(row: &Row) -> Result<Trajectory<LieDual<3>>, Error> {
 }
 
 /// A row of many steps with outputs and an event.
-fn long_row(
-    row: &Row,
-    pause: Duration,
-) -> Result<metriplectic::ensembles::Record<LieDual<3>>, Error> {
-    let body = System::on(LieDual::so3())
-        .energy(move |p: &Vector3<Real>| {
-            std::thread::sleep(pause);
-            p.x.powi(2) * 0.05 + p.y.powi(2) * 0.1 + p.z.powi(2) * 0.5
-        })
-        .build()?;
-    let span = Span::steps(0.05, 20_000).output_every(1.3).event("node", |p: &Vector3<f64>| p.x);
-    row.run_long(Scheme::new(WeylMidpoint), &body, vector![row["spin"], -1.0, 0.3], span)
+fn long_row(row: &Row) -> Result<metriplectic::ensembles::Record<LieDual<3>>, Error> {
+    let span = Span::steps(0.05, 20_000).output_every(1.3).event("node", |p: &Vector3<f64>| p.y);
+    // So little friction that the body turns over and over.
+    let start = vector![row["spin"], -1.0, 0.3];
+    row.run_long(Scheme::new(WeylMidpoint), &body(1e-9)?, start, span)
 }
 
 fn long_rows(journal: Option<&Path>) -> Result<Table, SweepError> {
     let plan = Sweep::new("long").grid("spin", [0.1, 0.2]);
-    let pause = Duration::ZERO;
     let runs = plan
-        .run(move |row| long_row(row, pause))
+        .run(long_row)
         .observe("p₁", |p| p.x)
         .measure("nodes", |run| run.events().len() as f64)
         .measure("last node", |run| run.events().last().map_or(f64::NAN, |e| e.state.time))
@@ -485,19 +499,7 @@ fn a_sweep_in_other_units_has_the_same_steps_and_scaled_bits() {
     // A molecule in units of length and energy that are powers of two: 2⁻³³ m, 2⁻⁶⁰ J and beyond.
     let closure = |row: &Row| {
         let (l, e) = (row["length"], row["energy"]);
-        // A mass of one in units of energy · time² / length².
-        let system = System::on(Euclidean::<3>)
-            .bracket(Poisson::constant(matrix![0.0, 1.0, 0.0; -1.0, 0.0, 0.0; 0.0, 0.0, 0.0])?)
-            .energy(move |x: &Vector3<Real>| {
-                let (q, p) = (x.x / l, x.y * l / e);
-                (q * q + p * p) * (0.5 * e) + x.z
-            })
-            .entropy(|x: &Vector3<Real>| x.z)
-            .dissipation(FieldDissipation(move |_: &Vector3<Real>, w: &Vector3<Real>| {
-                let b = Vector3::new(Real::from(0.0), w.z, -w.y);
-                b * b.transpose() * (w.z.recip() * (0.2 * e / (l * l)))
-            }))
-            .build()?;
+        let system = oscillator([l, e], 0.2, false)?;
         let start = vector![l, row["kick"] * e / l, 0.0];
         Ok(DormandPrince5.run(&system, start, Span::until(5.0).tolerance(1e-6).at_most(2))?)
     };
@@ -532,16 +534,7 @@ fn a_sweep_in_other_units_has_the_same_steps_and_scaled_bits() {
 #[test]
 fn a_stiff_row_ends_and_says_so() {
     let closure = |row: &Row| {
-        let friction = row["friction"];
-        let system = System::on(Euclidean::<3>)
-            .bracket(Poisson::constant(matrix![0.0, 1.0, 0.0; -1.0, 0.0, 0.0; 0.0, 0.0, 0.0])?)
-            .energy(|x: &Vector3<Real>| (x.x.powi(2) + x.y.powi(2)) * 0.5 + x.z)
-            .entropy(|x: &Vector3<Real>| x.z)
-            .dissipation(FieldDissipation(move |_: &Vector3<Real>, w: &Vector3<Real>| {
-                let b = Vector3::new(Real::from(0.0), w.z, -w.y);
-                b * b.transpose() * (w.z.recip() * friction)
-            }))
-            .build()?;
+        let system = oscillator([1.0; 2], row["friction"], false)?;
         Ok(WeylMidpoint.run(&system, vector![1.0, 0.5, 0.0], Span::steps(0.2, 50).at_most(2))?)
     };
     let sweep = Sweep::new("run.stiff").grid("friction", [0.1, 1.0, 1e7]);

@@ -71,7 +71,7 @@
 //! canonical metrics `ChartMidpoint` takes the same steps.
 //!
 //! With a metric from a closure `WeylMidpoint` integrates true geodesics, 100 to 200 evaluations of the closure in a
-//! step, and `ChartMidpoint` takes 2.2 to 3.4 (`cargo test -p metriplectic-tests --test chart_midpoint -- --nocapture`). Both laws are exact
+//! step, and `ChartMidpoint` takes 2.2 to 3.4 (`cargo test -p metriplectic-quick-tests --test chart_midpoint -- --nocapture`). Both laws are exact
 //! with both, and the errors are of one size. Take `WeylMidpoint` for the scheme of the paper, if a step must not
 //! depend on the coordinates (with `ChartMidpoint` it does, by `O(h³)`), or if an edge of the domain is infinitely
 //! far in the metric.

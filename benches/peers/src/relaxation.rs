@@ -122,6 +122,11 @@ pub fn run<P: TwoLaws<N>, const N: usize>(
 /// How far a factor may be from that of the method.
 const FARTHEST: f64 = 0.5;
 
+/// Whether both are numbers near those of the method.
+fn is_near([first, second]: [f64; 2]) -> bool {
+    (first - 1.0).abs() < FARTHEST && second.abs() < FARTHEST
+}
+
 /// `γ` with `H(x + γd) = H₀`, near 1, by Newton's method.
 fn energy_factor<P: TwoLaws<N>, const N: usize>(
     problem: &P,
@@ -137,7 +142,7 @@ fn energy_factor<P: TwoLaws<N>, const N: usize>(
             return Some(factors);
         }
         factors[0] -= off / dot(&problem.gradient(&end), &d[0]);
-        if !((factors[0] - 1.0).abs() < FARTHEST) {
+        if !is_near(factors) {
             return None;
         }
     }
@@ -170,7 +175,7 @@ fn both_factors<P: TwoLaws<N>, const N: usize>(
         let determinant = a * e - b * c;
         factors[0] -= (off[0] * e - off[1] * b) / determinant;
         factors[1] -= (off[1] * a - off[0] * c) / determinant;
-        if !((factors[0] - 1.0).abs() < FARTHEST && factors[1].abs() < FARTHEST) {
+        if !is_near(factors) {
             return None;
         }
     }

@@ -84,7 +84,8 @@ impl Study for EveryMethod {
     }
 }
 
-/// The promises of every method on every problem that are not kept.
+/// The promises of every method with stages and every explicit one on every problem that are not kept. Those of the
+/// scheme with a retraction are tested promise by promise, in files of their own.
 #[derive(Default)]
 struct Table {
     cells: usize,
@@ -99,18 +100,18 @@ impl Table {
 }
 
 impl Study for Table {
-    fn visit<Y, R>(&mut self, problem: &Problem<Y>, scheme: &'static str, retraction: R, _: f64)
+    fn visit<Y, R>(&mut self, problem: &Problem<Y>, scheme: &'static str, _: R, _: f64)
     where
         Y: Metriplectic,
         R: Retraction<Y::Manifold, Y::Metric> + Copy,
     {
+        if scheme != "exponential" {
+            return;
+        }
         let Problem { name, manifold, metric, start, rest, .. } = problem;
         for (from, x) in [("start", start), ("rest", rest)] {
             let label = format!("{name} on {manifold} ({metric}) from {from}");
-            let broken = promises(problem, x, Scheme::new(retraction));
-            self.enter(format!("{label}, {scheme}"), broken);
-            let methods = if scheme == "exponential" { Any::all() } else { Vec::new() };
-            for method in methods {
+            for method in Any::all() {
                 self.enter(format!("{label}, {method:?}"), promises(problem, x, method));
             }
         }
@@ -122,8 +123,8 @@ fn every_method_keeps_its_promises_on_every_problem() {
     let mut table = Table::default();
     each(&mut table);
     assert!(table.broken.is_empty(), "{}", table.broken.join("\n"));
-    // From two starts: 47 schemes, and ten methods on each of sixteen problems.
-    assert_eq!(table.cells, 2 * (47 + 160));
+    // From two starts, ten methods on each of sixteen problems.
+    assert_eq!(table.cells, 2 * 10 * 16);
 }
 
 #[test]

@@ -32,3 +32,8 @@ fn the_energy_is_kept_where_a_step_spans_two_radians() {
     // nine of them.
     assert_eq!(study.rows.len(), 47);
 }
+
+#[test]
+fn the_velocity_of_each_problem_is_the_one_by_hand() {
+    by_hand::compare();
+}

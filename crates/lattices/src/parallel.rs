@@ -59,19 +59,19 @@ fn on_all_threads(count: usize, f: &(dyn Fn(usize) + Sync)) {
 /// The results of all chunks in one, by a fixed binary tree: on each level the results `2k` and `2k + 1` are merged.
 /// A node of level `l` is the sum of the chunks from `k 2ˡ` to `(k + 1) 2ˡ`. `None` without chunks.
 pub(crate) fn tree<R>(parts: Vec<R>, merge: impl Fn(R, R) -> R) -> Option<R> {
-    let mut level = parts;
-    while level.len() > 1 {
-        let mut next = Vec::with_capacity(level.len().div_ceil(2));
-        let mut parts = level.into_iter();
-        while let Some(left) = parts.next() {
-            next.push(match parts.next() {
-                Some(right) => merge(left, right),
-                None => left,
-            });
+    // The nodes whose right neighbour of the same level is still to come: at most one of each level.
+    let levels = parts.len().checked_ilog2()? as usize + 1;
+    let mut nodes: Vec<(u32, R)> = Vec::with_capacity(levels);
+    for part in parts {
+        let mut node = (0, part);
+        while let Some((level, left)) = nodes.pop_if(|(level, _)| *level == node.0) {
+            node = (level + 1, merge(left, node.1));
         }
-        level = next;
+        nodes.push(node);
     }
-    level.pop()
+    let mut nodes = nodes.into_iter().rev();
+    let (_, last) = nodes.next()?;
+    Some(nodes.fold(last, |right, (_, left)| merge(left, right)))
 }
 
 /// The sites of a chunk.

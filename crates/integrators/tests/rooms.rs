@@ -27,12 +27,11 @@ const ROOMS: [(&str, &[&str]); 13] = [
 ];
 
 /// The files that name each other, all of them pairs: a default and what it is computed from, an equation and its
-/// covectors, a solver and what it keeps, a table and the form of its file.
-const PAIRS: [[&str; 2]; 4] = [
+/// covectors, a solver and what it keeps.
+const PAIRS: [[&str; 2]; 3] = [
     ["step::flow", "step::initial_scales"],
     ["midpoint::equation", "midpoint::equation::providers"],
     ["newton", "newton::inverse"],
-    ["run::observables", "run::observables::csv"],
 ];
 
 /// The files by their modules, without comments, texts and tests.

@@ -22,7 +22,7 @@
 //! | [`graph`] | [`Graph`]: which sites are bonded |
 //! | [`builder`] | [`LatticeBuilder`]: the parts of a lattice, one by one |
 //! | [`fields`] | functions of a site and of a bond, with their data |
-//! | [`gather`] | energies that depend on a sum over the neighbours of a site |
+//! | `gather` | energies that depend on a sum over the neighbours of a site |
 //! | [`onsager`] | friction at sites and in bonds: [`Onsager`], [`SiteState`], [`BondState`] |
 //! | [`lattice`] | [`Lattice`], and its loops |
 //! | [`points`] | [`Points`]: the states of a lattice |

@@ -146,9 +146,11 @@ fn friction_is_tried_in_every_bond_and_at_every_site() {
             error
         };
         let (place, tried) = (Place::Bond { bond: odd, sites: [odd, odd + 1] }, Tried::Start);
+        let [left, right] = [odd, odd + 1].map(warm);
+        let entries = vec![left.x, left.y, right.x, right.y];
         assert_eq!(
             on_bonds(|t| Onsager { rate: -0.1, ..t }),
-            LatticeError::NegativeRate { place, tried, rate: -0.1 }
+            LatticeError::NegativeRate { place, tried, entries, rate: -0.1 }
         );
         let error = on_bonds(|t| Onsager { b: [t.b[0], t.b[1] * 1.001], ..t });
         assert!(matches!(error, LatticeError::Broken { place: at, .. } if at == place), "{error}");
@@ -171,7 +173,8 @@ fn friction_is_tried_in_every_bond_and_at_every_site() {
             error
         };
         let place = Place::Site(odd);
-        let negative = LatticeError::NegativeRate { place, tried, rate: -1e-30 };
+        let entries = vec![left.x, left.y];
+        let negative = LatticeError::NegativeRate { place, tried, entries, rate: -1e-30 };
         assert_eq!(at_sites(|term| term.rate = -1e-30), negative);
         let error = at_sites(|term| term.b.x *= 1.001);
         assert!(matches!(error, LatticeError::Broken { place: at, .. } if at == place), "{error}");
@@ -227,7 +230,12 @@ fn a_small_body_beside_large_ones_is_verified_at_energies_of_its_own() {
     println!("{error}");
     let tried = Tried::Near { fraction: 1e-2 };
     let place = Place::Bond { bond: 0, sites: [0, 1] };
-    assert_eq!(error, LatticeError::NegativeRate { place, tried, rate: -1.0 });
+    let found = matches!(
+        &error,
+        LatticeError::NegativeRate { place: at, tried: how, entries, rate: -1.0 }
+            if *at == place && *how == tried && entries.len() == 2 && entries[0] != 300.0
+    );
+    assert!(found, "{error}");
 }
 
 #[test]
@@ -398,5 +406,87 @@ fn a_bond_that_breaks_a_law_away_from_the_start_ends_the_run_of_every_method() {
         let found =
             matches!(error, LatticeError::Broken { place: Place::Bond { bond: 17, .. }, .. });
         assert!(found, "{error}");
+    }
+}
+
+/// One bond of 64 whose friction is wrong for a while: it is right at the start and at the end.
+#[test]
+fn a_bond_that_breaks_a_law_in_the_middle_of_a_run_ends_it_there() {
+    let with = |window: [f64; 2], wrong: fn(Term) -> Term| {
+        Lattice::on(Graph::ring(64), Euclidean::<2>)
+            .energy(energy)
+            .entropy(entropy)
+            .bond_data((0..64).map(|bond| bond == 17).collect::<Vec<bool>>())
+            .bond_onsager(move |bond: &BondState<'_, Euclidean<2>, bool>| {
+                let right = friction(bond.w[0], bond.w[1]);
+                let [after, before] = window;
+                let odd = *bond.data && bond.x[0].y > after && bond.x[0].y < before;
+                if odd { right.map(wrong) } else { right }
+            })
+            .conserved(|x: &Vector2<Real>| x.x)
+            .build()
+            .expect("the parts make a lattice")
+    };
+    let sound = with([0.0; 2], |term| term);
+    let span = Span::steps(0.01, 400);
+    let run = DormandPrince5.run(&sound, sound.points(warm), span).expect("a sound lattice");
+    let warmth = |step: usize| run.states()[step].point[17].y;
+    let window = [warmth(60), warmth(150)];
+    assert!(window[0] > 1.0 && window[1] > window[0] && warmth(400) > window[1], "{window:?}");
+    for wrong in [(|term| Onsager { rate: -0.001, ..term }) as fn(Term) -> Term, |term| Onsager {
+        b: [term.b[0], term.b[1] * (1.0 + 1e-7)],
+        ..term
+    }] {
+        let lattice = with(window, wrong);
+        let start = lattice.points(warm);
+        for run in [
+            DormandPrince5.run(&lattice, start.clone(), span),
+            DormandPrince8.run(&lattice, start.clone(), span),
+            RungeKuttaChebyshev.run(&lattice, start.clone(), span),
+        ] {
+            let Err(RunError::Step { cause: StepError::Flow { time, law }, .. }) = run else {
+                panic!("not refused: {run:?}");
+            };
+            let place = match own(&law) {
+                LatticeError::NegativeRate { place, tried, entries, .. }
+                | LatticeError::Broken { place, tried, entries, .. } => {
+                    assert_eq!((tried, entries.len()), (Tried::Reached, 4));
+                    assert!(entries[1] > window[0] && entries[1] < window[1], "{entries:?}");
+                    place
+                }
+                other => panic!("{other}"),
+            };
+            assert_eq!(place, Place::Bond { bond: 17, sites: [17, 18] });
+            assert!((time - 0.89).abs() < 1e-9, "{time}");
+        }
+    }
+}
+
+/// Derivatives are compared at other sites at each state: one of 200 that loses its derivative is found on the way.
+#[test]
+fn a_site_that_loses_a_derivative_on_the_way_ends_the_run_there() {
+    for odd in [0, 71, 199] {
+        let lattice = Lattice::on(Graph::ring(200), Euclidean::<2>)
+            .site_data((0..200).map(|site| site == odd).collect::<Vec<bool>>())
+            .energy_with(|x: &Vector2<Real>, odd: &bool| {
+                let warm = if *odd && x.y.re > 1.03 { (x.y.re - 1.03) * 0.01 } else { 0.0 };
+                energy(x) + Real::from(warm)
+            })
+            .entropy_with(|x: &Vector2<Real>, _: &bool| entropy(x))
+            .bond_onsager(|bond| friction(bond.w[0], bond.w[1]))
+            .conserved(|x: &Vector2<Real>| x.x)
+            .build()
+            .expect("the parts make a lattice");
+        let span = Span::steps(0.001, 6000).at_most(2);
+        let run = DormandPrince5.run(&lattice, lattice.points(warm), span);
+        let Err(RunError::Step { cause: StepError::Flow { time, law }, .. }) = run else {
+            panic!("not refused: {run:?}");
+        };
+        let found = matches!(
+            own(&law),
+            LatticeError::WrongDerivative { what: "energy", place: Place::Site(site), .. }
+                if site == odd
+        );
+        assert!(found && time < 5.5, "{law} at {time}");
     }
 }

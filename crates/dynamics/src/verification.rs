@@ -68,6 +68,15 @@ pub trait Verify<M: Manifold> {
     /// [`ModelError::WrongDerivative`].
     fn check_derivatives(&self, x: &M::Point<f64>) -> Result<(), ModelError>;
 
+    /// Compares the derivatives of energy, entropy and further invariants with their values along two directions: a
+    /// generic one, and one axis, which `turn` chooses. It costs five evaluations of each field and allocates nothing. If
+    /// they contradict each other, it is [`check_derivatives`](Self::check_derivatives) that judges.
+    ///
+    /// # Errors
+    ///
+    /// [`ModelError::WrongDerivative`].
+    fn look_at_derivatives(&self, x: &M::Point<f64>, turn: usize) -> Result<(), ModelError>;
+
     /// Looks for a broken law where a step fails: at `x`, at 16 states around it, each coordinate within a tenth of its
     /// size, and at the states `ahead`. States without values are left out.
     ///
@@ -82,8 +91,9 @@ pub trait Verify<M: Manifold> {
 /// Verification costs as much as some tens of steps, once a run. In a study of many short runs of one
 /// model, it dominates the cost and repeats the same work. A run of a verified system checks the laws at its
 /// start without samples around it: the start lies on the manifold, values and derivatives are finite, and the laws
-/// of a [state](Verify::check_state) hold. It checks them again at its end and after each multiple of 89 steps, and the
-/// certificate says that the model was verified before.
+/// of a [state](Verify::check_state) hold. It checks them again at its end and after each multiple of 89 steps, with
+/// the [derivatives](Verify::look_at_derivatives) along two directions, and the certificate says that the model was
+/// verified before.
 ///
 /// ```
 /// use metriplectic_dynamics::{System, Verify};

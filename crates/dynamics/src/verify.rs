@@ -78,6 +78,10 @@ impl<Y: Metriplectic + ?Sized> Verify<Y::Manifold> for Y {
         with_room::<Dim<Y>, _>(|| reached::compare(self, x))
     }
 
+    fn look_at_derivatives(&self, x: &Point<Y>, turn: usize) -> Result<(), ModelError> {
+        with_room::<Dim<Y>, _>(|| reached::look(self, x, turn))
+    }
+
     fn check_around(&self, x: &Point<Y>, ahead: &[Point<Y>]) -> Result<(), ModelError> {
         with_room::<Dim<Y>, _>(|| reached::around(self, x, ahead))
     }

@@ -124,7 +124,9 @@ impl<Y: Metriplectic> Flow for Y {
 
     fn recheck(&self, x: &Point<Y>, occasion: Recheck) -> Result<(), ModelError> {
         match occasion {
-            Recheck::OnTheWay => self.check_state(x),
+            Recheck::OnTheWay { step } => {
+                self.check_state(x).and_then(|()| self.look_at_derivatives(x, step))
+            }
             Recheck::End => self.check_state(x).and_then(|()| self.check_derivatives(x)),
             Recheck::Failure { h } => self.check_around(x, &ahead(self, x, h)),
         }

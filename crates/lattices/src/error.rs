@@ -112,7 +112,10 @@ pub enum LatticeError {
         place: Place,
     },
     /// A law that is broken at a site or a bond.
-    #[error("{law} is broken at {place}, {tried}: the rest is {size:.1e} of the terms{remedy}")]
+    #[error(
+        "{law} is broken at {place}, {tried}{}: the rest is {size:.1e} of the terms{remedy}",
+        Entries(entries)
+    )]
     Broken {
         /// The law.
         law: &'static str,
@@ -120,6 +123,8 @@ pub enum LatticeError {
         place: Place,
         /// At which state.
         tried: Tried,
+        /// The entries of the state at the site, or at both sites of the bond.
+        entries: Vec<f64>,
         /// What is left, relative to the terms that should cancel.
         size: f64,
         /// What to do.
@@ -127,13 +132,16 @@ pub enum LatticeError {
     },
     /// A negative rate of friction.
     #[error(
-        "the friction at {place}, {tried}, has the negative rate {rate:.3e}, and would destroy entropy"
+        "the friction at {place}, {tried}{}, has the negative rate {rate:.3e}, and would destroy entropy",
+        Entries(entries)
     )]
     NegativeRate {
         /// Where.
         place: Place,
         /// At which state.
         tried: Tried,
+        /// The entries of the state at the site, or at both sites of the bond.
+        entries: Vec<f64>,
         /// The rate.
         rate: f64,
     },
@@ -166,6 +174,15 @@ pub enum LatticeError {
 impl fmt::Debug for LatticeError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         fmt::Display::fmt(self, f)
+    }
+}
+
+/// The entries of a state, if they are known.
+struct Entries<'a>(&'a [f64]);
+
+impl fmt::Display for Entries<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.0.is_empty() { Ok(()) } else { write!(f, " with the entries {:?}", self.0) }
     }
 }
 

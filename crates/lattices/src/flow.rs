@@ -164,11 +164,14 @@ impl<P: Model> Flow for Lattice<P> {
         verified
     }
 
-    fn rechecks(&self, occasion: Recheck) -> bool {
-        occasion != Recheck::OnTheWay
+    fn rechecks(&self, _: Recheck) -> bool {
+        true
     }
 
-    fn reexamine(&self, x: &Points<P::Manifold>, _occasion: Recheck) -> Result<(), FlowError> {
+    fn reexamine(&self, x: &Points<P::Manifold>, occasion: Recheck) -> Result<(), FlowError> {
+        if let Recheck::OnTheWay { step } = occasion {
+            return self.recheck_on_the_way(x, step).map_err(FlowError::new);
+        }
         let checked = self.recheck_all(x).map_err(FlowError::new);
         self.clear();
         checked

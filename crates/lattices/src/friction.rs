@@ -35,7 +35,11 @@ impl Term {
     /// [`LatticeError::NegativeRate`].
     pub(crate) fn negative_rate(&self, tried: Tried) -> Result<(), LatticeError> {
         let &Self { place, rate, .. } = self;
-        if rate < 0.0 { Err(LatticeError::NegativeRate { place, tried, rate }) } else { Ok(()) }
+        if rate < 0.0 {
+            Err(LatticeError::NegativeRate { place, tried, rate, entries: Vec::new() })
+        } else {
+            Ok(())
+        }
     }
 
     /// # Errors
@@ -70,18 +74,8 @@ impl<P: Model> Lattice<P> {
         first.into_iter().flatten().next().map_or(Ok(()), Err)
     }
 
-    /// The sum of a value over the terms of the friction.
-    pub(crate) fn sum_over_terms(
-        &self,
-        x: &Points<P::Manifold>,
-        all: &[f64],
-        value: impl Fn(&Term) -> f64 + Sync,
-    ) -> f64 {
-        self.terms_of_chunks(x, all, |sum: &mut f64, term| *sum += value(&term)).iter().sum()
-    }
-
     /// The results of visits to the terms of each chunk of sites and of bonds.
-    fn terms_of_chunks<R: Default + Send>(
+    pub(crate) fn terms_of_chunks<R: Default + Send>(
         &self,
         x: &Points<P::Manifold>,
         all: &[f64],

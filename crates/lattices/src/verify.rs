@@ -29,19 +29,20 @@ const STEP: f64 = 1e-5;
 const QUOTIENT: f64 = 1e-4;
 
 /// Up to [`SAMPLES`] numbers below `count`, with the first and the last one.
-fn samples(count: usize) -> impl Iterator<Item = usize> {
+pub(crate) fn samples(count: usize) -> impl Iterator<Item = usize> + Clone {
     let most = SAMPLES.min(count);
-    // Strides of the golden ratio meet no period of a regular lattice.
-    let golden = move |k: usize| {
-        let turn = (k as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15);
-        usize::try_from((u128::from(turn) * count as u128) >> 64).unwrap_or(0)
-    };
     (0..most).map(move |k| match k {
         _ if most == count => k,
         0 => 0,
         1 => count - 1,
-        _ => golden(k),
+        _ => golden(k, count),
     })
+}
+
+/// A number below `count`. Strides of the golden ratio meet no period of a regular lattice.
+pub(crate) fn golden(k: usize, count: usize) -> usize {
+    let turn = (k as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+    usize::try_from((u128::from(turn) * count as u128) >> 64).unwrap_or(0)
 }
 
 impl<P: Model> Lattice<P> {
@@ -66,8 +67,9 @@ impl<P: Model> Lattice<P> {
         self.verify_values(x)?;
         self.verify_friction_around(x)?;
         let (y, tried) = self.near(x, &self.sizes(x));
-        let (sizes, random) = (self.sizes(&y), Random::new(1));
-        Trial { lattice: self, y: &y, sizes: &sizes, tried, random, mean: [0.0; 2] }.all()
+        let (sizes, random) = (Sizes::Same(self.largest_sizes(&y)), Random::new(1));
+        let trial = Trial { lattice: self, y: &y, sizes, tried, random, mean: [0.0; 2] }.all();
+        trial.map_err(|law| self.located(law, &y))
     }
 
     /// Verifies the friction of all sites and bonds at a start, and at a state near it.
@@ -87,10 +89,32 @@ impl<P: Model> Lattice<P> {
     /// Verifies the terms of the friction at a state, in `O(N)`.
     fn verify_friction(&self, x: &Points<P::Manifold>, tried: Tried) -> Result<(), LatticeError> {
         let (all, _) = self.differentials::<false>(x);
-        self.each_term(x, &all, |term| {
+        let verdict = self.each_term(x, &all, |term| {
             term.negative_rate(tried)?;
             term.keeps_energy(tried)
-        })
+        });
+        verdict.map_err(|law| self.located(law, x))
+    }
+
+    /// An error with the entries of the state at its place.
+    #[cold]
+    pub(crate) fn located(&self, law: LatticeError, x: &Points<P::Manifold>) -> LatticeError {
+        let entries = |place: Place| match place {
+            Place::Site(site) => P::Manifold::entries(&x[site]),
+            Place::Bond { sites, .. } => {
+                sites.iter().flat_map(|&site| P::Manifold::entries(&x[site])).collect()
+            }
+            Place::Total => Vec::new(),
+        };
+        match law {
+            LatticeError::Broken { law, place, tried, size, remedy, .. } => {
+                LatticeError::Broken { law, place, tried, size, remedy, entries: entries(place) }
+            }
+            LatticeError::NegativeRate { place, tried, rate, .. } => {
+                LatticeError::NegativeRate { place, tried, rate, entries: entries(place) }
+            }
+            other => other,
+        }
     }
 
     pub(crate) fn place_of(&self, bond: usize) -> Place {
@@ -212,16 +236,25 @@ impl<P: Model> Lattice<P> {
     }
 }
 
+/// The sizes of entries over which differences are taken.
+#[derive(Clone, Copy)]
+pub(crate) enum Sizes<V> {
+    /// The same at all sites.
+    Same(V),
+    /// The size of each entry at its own site, or the given one where it is zero.
+    Own(V),
+}
+
 /// A state at which laws are tried.
-struct Trial<'a, P: Model> {
-    lattice: &'a Lattice<P>,
-    y: &'a Points<P::Manifold>,
+pub(crate) struct Trial<'a, P: Model> {
+    pub(crate) lattice: &'a Lattice<P>,
+    pub(crate) y: &'a Points<P::Manifold>,
     /// The sizes of the entries along which derivatives are tried.
-    sizes: &'a crate::SiteVector,
-    tried: Tried,
-    random: Random,
+    pub(crate) sizes: Sizes<VectorOf<P>>,
+    pub(crate) tried: Tried,
+    pub(crate) random: Random,
     /// The sizes `|h|` and `|s|` of a site in the mean.
-    mean: [f64; 2],
+    pub(crate) mean: [f64; 2],
 }
 
 impl<P: Model> Trial<'_, P> {
@@ -235,27 +268,48 @@ impl<P: Model> Trial<'_, P> {
         }
         self.all_derivatives(&all).or_else(|error| {
             // The difference of a small entry is not small if it is a fraction of the largest one.
-            let own = lattice.own_sizes(y);
+            let sizes = Sizes::Own(lattice.largest_sizes(y));
             let random = Random::new(3);
-            Trial { sizes: &own, random, ..*self }.all_derivatives(&all).map_err(|_| error)
+            Trial { sizes, random, ..*self }.all_derivatives(&all).map_err(|_| error)
         })?;
         self.conserved(&all)
     }
 
     /// The derivatives of the functions of sites and bonds, and of the totals.
     fn all_derivatives(&mut self, all: &[f64]) -> Result<(), LatticeError> {
+        let [sites, bonds] = [self.lattice.sites(), self.lattice.layout.bonds().len()];
+        self.derivatives_of((samples(sites), samples(bonds)))?;
+        self.total_derivatives(all)
+    }
+
+    /// The derivatives of the functions of these sites and bonds.
+    pub(crate) fn derivatives_of(
+        &mut self,
+        (sites, bonds): (impl Iterator<Item = usize> + Clone, impl Iterator<Item = usize> + Clone),
+    ) -> Result<(), LatticeError> {
         let lattice = self.lattice;
-        for site in samples(lattice.sites()) {
+        for site in sites.clone() {
             self.derivatives(site)?;
         }
         if P::BOND_ENERGY {
-            for bond in samples(lattice.layout.bonds().len()) {
+            for bond in bonds.clone() {
                 self.bond_derivative(bond)?;
             }
         }
-        self.gathered_derivatives("energy", &lattice.parts.gathers().energy)?;
-        self.gathered_derivatives("entropy", &lattice.parts.gathers().entropy)?;
-        self.total_derivatives(all)
+        let gathers = lattice.parts.gathers();
+        self.gathered_derivatives("energy", &gathers.energy, (sites.clone(), bonds.clone()))?;
+        self.gathered_derivatives("entropy", &gathers.entropy, (sites, bonds))
+    }
+
+    /// The sizes of the entries at a site.
+    fn sizes_at(&self, site: usize) -> VectorOf<P> {
+        match &self.sizes {
+            Sizes::Same(sizes) => *sizes,
+            Sizes::Own(largest) => {
+                let own = P::Manifold::scales(&self.y[site]);
+                VectorOf::<P>::from_index(|k| if own[k] > 0.0 { own[k] } else { largest[k] })
+            }
+        }
     }
 
     /// The bracket of a site.
@@ -282,7 +336,7 @@ impl<P: Model> Trial<'_, P> {
     /// The derivatives of the functions of a site.
     fn derivatives(&mut self, site: usize) -> Result<(), LatticeError> {
         let (parts, x) = (&self.lattice.parts, &self.y[site]);
-        let u = self.random.vector(&self.sizes.reader().at::<VectorOf<P>>(site));
+        let u = self.along(site);
         let moved = |t: f64| P::Manifold::chart(x, &(u * t));
         let ends = [moved(STEP), moved(-STEP)];
         let place = Place::Site(site);
@@ -308,10 +362,16 @@ impl<P: Model> Trial<'_, P> {
         Ok(())
     }
 
+    /// A random direction at a site.
+    fn along(&mut self, site: usize) -> VectorOf<P> {
+        let sizes = self.sizes_at(site);
+        self.random.vector(&sizes)
+    }
+
     /// A random direction of the sites of a bond.
     fn random_along(&mut self, bond: usize) -> Vector<PairManifold<P>> {
         let (n, ends) = (dimension::<P>(), self.lattice.layout.bonds()[bond]);
-        let sizes = ends.map(|site| self.sizes.reader().at::<VectorOf<P>>(site as usize));
+        let sizes = ends.map(|site| self.sizes_at(site as usize));
         self.random.vector(&Column::from_index(|k| sizes[k / n][k % n]))
     }
 
@@ -329,9 +389,7 @@ impl<P: Model> Trial<'_, P> {
     /// The derivative of the totals along one random direction.
     fn total_derivatives(&mut self, all: &[f64]) -> Result<(), LatticeError> {
         let Self { lattice, y, .. } = *self;
-        let (random, sizes) = (&mut self.random, self.sizes.reader());
-        let along = |site| random.vector(&sizes.at::<VectorOf<P>>(site));
-        let u: Vec<VectorOf<P>> = (0..lattice.sites()).map(along).collect();
+        let u: Vec<VectorOf<P>> = (0..lattice.sites()).map(|site| self.along(site)).collect();
         let moved = |t: f64| {
             let d = lattice.vector_of(|site| u[site] * t);
             lattice.moved(y, &d)
@@ -391,7 +449,8 @@ pub(crate) fn cancels(
     if rest.abs() <= bound * terms || terms < f64::MIN_POSITIVE / f64::EPSILON {
         return Ok(());
     }
-    Err(LatticeError::Broken { law, place, tried, size: rest.abs() / terms, remedy })
+    let (size, entries) = (rest.abs() / terms, Vec::new());
+    Err(LatticeError::Broken { law, place, tried, size, entries, remedy })
 }
 
 /// A derivative along a direction, and the sizes of its terms.

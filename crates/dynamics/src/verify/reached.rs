@@ -8,6 +8,10 @@
 //! broken is judged again. The round-off of a differential `F_i` is then `ε Σ_j |F_ij| ℓ_j` in units `ℓ` of the
 //! coordinates. A law must also be broken at each of a few states at a distance of `10⁻⁶ ℓ`: at this
 //! distance from an equilibrium the differentials have ten digits, and a model is wrong in a region.
+//!
+//! Derivatives are compared with values along two directions: a generic one that moves every entry, and one axis,
+//! another one at each state. Where a difference of values is far from the differential, all axes are judged as at the
+//! start.
 
 use metriplectic_fields::{
     ChartPoint, Column, Dimension, Matrix, ScalarField, Space, Square, Vector,
@@ -74,6 +78,69 @@ pub(super) fn compare<Y: Metriplectic + ?Sized>(
     };
     let Err(found) = judge(x) else { return Ok(()) };
     if all_around(system, x, &sizes, |y| judge(y).is_err()) { Err(found) } else { Ok(()) }
+}
+
+/// The displacements, relative to the sizes of the entries, over which a first look takes differences.
+const ACROSS: [f64; 2] = [1e-4, 1e-7];
+
+/// The part of a difference, relative to its terms, that is worth a closer look.
+const CONTRADICTS: f64 = 1e-4;
+
+/// The round-off of a difference of values, relative to them.
+const ROUNDED: f64 = 64.0 * f64::EPSILON;
+
+/// Compares the derivatives of the scalar fields with their values along two directions, and along each axis if they
+/// contradict each other. `turn` chooses the directions.
+pub(super) fn look<Y: Metriplectic + ?Sized>(
+    system: &Y,
+    x: &Point<Y>,
+    turn: usize,
+) -> Result<(), ModelError> {
+    let scales = Y::Manifold::scales(x);
+    // The fractional parts of the multiples of the golden ratio, between ½ and 1, with either sign.
+    let generic = Vector::<Y::Manifold>::from_index(|i| {
+        let turns = ((turn * Dim::<Y>::LEN + i) as f64 * GOLDEN).fract() - 0.5;
+        scales[i] * (turns + 0.5_f64.copysign(turns))
+    });
+    let axis = turn % Dim::<Y>::LEN;
+    let along = Vector::<Y::Manifold>::basis(axis) * scales[axis];
+    let mut look = Look { x, directions: [&generic, &along], contradicts: false };
+    look.visit(Kind::Casimir, system.energy());
+    look.visit(Kind::Casimir, system.entropy());
+    if Y::Invariants::COUNT > 0 {
+        system.invariants().each(&mut look);
+    }
+    if look.contradicts { compare(system, x) } else { Ok(()) }
+}
+
+/// The golden ratio without its whole part.
+const GOLDEN: f64 = 0.618_033_988_749_894_9;
+
+/// A first look at the derivatives of fields along directions.
+struct Look<'a, M: Manifold> {
+    x: &'a M::Point<f64>,
+    directions: [&'a Vector<M>; 2],
+    contradicts: bool,
+}
+
+impl<M: Manifold> Visitor<M> for Look<'_, M> {
+    fn visit(&mut self, _: Kind, f: &impl ScalarField<M>) {
+        if self.contradicts {
+            return;
+        }
+        let df = f.jet1(self.x).df;
+        let contradicts = |d: &Vector<M>, size: f64| {
+            let [ahead, behind] = [size, -size].map(|t| f.at::<f64>(&M::chart(self.x, &(*d * t))));
+            let (slope, terms) = (df.dot(d) * size, df.abs().dot(&d.abs()) * size);
+            let rest = (0.5 * (ahead - behind) - slope).abs();
+            // A difference that is not a number says nothing.
+            rest > CONTRADICTS * terms + ROUNDED * (ahead.abs() + behind.abs()) && rest.is_finite()
+        };
+        self.contradicts = self
+            .directions
+            .into_iter()
+            .any(|d| ACROSS.into_iter().all(|size| contradicts(d, size)));
+    }
 }
 
 /// Looks for a broken law at a state from which a step fails, at samples around it, and at the states `ahead`.

@@ -24,7 +24,7 @@ pub(crate) fn checked_states<F: Flow>(flow: &F, steps: usize) -> usize {
     if !flow.rechecks(Recheck::End) {
         return 0;
     }
-    let on_the_way = flow.rechecks(Recheck::OnTheWay);
+    let on_the_way = flow.rechecks(Recheck::OnTheWay { step: steps });
     1 + if on_the_way { due_steps(steps, flow.is_verified()) } else { 0 }
 }
 

@@ -46,8 +46,11 @@ pub struct Laws<L> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Recheck {
-    /// A state on the way, after a step. The check allocates nothing.
-    OnTheWay,
+    /// A state on the way, after a step. The check allocates nothing if no law is broken.
+    OnTheWay {
+        /// The steps so far. A flow with many parts may check other ones after each of them.
+        step: usize,
+    },
     /// The end of the run, or a state that a step has left where it is.
     End,
     /// A state from which a step of this size fails, before the run ends in the error of the step.

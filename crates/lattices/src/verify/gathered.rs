@@ -2,11 +2,11 @@
 
 use metriplectic_fields::Space;
 
-use super::{STEP, Slope, Trial, quotient, samples};
+use super::{STEP, Slope, Trial, quotient};
 use crate::error::{LatticeError, Place};
 use crate::gather::{Embedded, Gather};
 use crate::lattice::Lattice;
-use crate::model::{Model, PairManifold, VectorOf};
+use crate::model::{Model, PairManifold};
 use crate::parallel;
 use crate::points::Points;
 
@@ -41,18 +41,19 @@ impl<P: Model> Lattice<P> {
 }
 
 impl<P: Model> Trial<'_, P> {
-    /// Compares the derivatives of `φ` at sampled bonds, and those of `g` at sampled sites, with differences of values.
+    /// Compares the derivatives of `φ` at these bonds, and those of `g` at these sites, with differences of values.
     pub(super) fn gathered_derivatives<G: Gather<P::Manifold>>(
         &mut self,
         what: &'static str,
         gather: &G,
+        (sites, bonds): (impl Iterator<Item = usize>, impl Iterator<Item = usize>),
     ) -> Result<(), LatticeError> {
         if !G::PRESENT {
             return Ok(());
         }
         let lattice = self.lattice;
         let sums = lattice.gathered(gather, self.y);
-        for bond in samples(lattice.layout.bonds().len()) {
+        for bond in bonds {
             let x = lattice.pair(self.y, bond);
             let u = self.random_along(bond);
             let moved = |t: f64| PairManifold::<P>::chart(&x, &(u * t));
@@ -61,9 +62,9 @@ impl<P: Model> Trial<'_, P> {
             let slope = Slope::of(&phi.df, &u);
             quotient(what, lattice.place_of(bond), phi.value, slope, ends)?;
         }
-        for site in samples(lattice.sites()) {
+        for site in sites {
             let (x, rho, place) = (&self.y[site], sums[2 * site], Place::Site(site));
-            let u = self.random.vector(&self.sizes.reader().at::<VectorOf<P>>(site));
+            let u = self.along(site);
             let moved = |t: f64| P::Manifold::chart(x, &(u * t));
             let ends = [STEP, -STEP].map(|t| gather.embedded(&moved(t), rho).jet.value);
             let g = gather.embedded(x, rho);

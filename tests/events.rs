@@ -320,6 +320,33 @@ fn resumes<Y: Metriplectic<Manifold = LieDual<3>, Metric = Canonical>>(system: &
     }
 }
 
+#[test]
+fn an_event_across_a_nan_where_a_run_was_put_down_is_found() {
+    let system = oscillator();
+    let gap = |t: f64, _: &Plane| if t > 0.35 && t < 0.65 { f64::NAN } else { t - 0.5 };
+    let falls = |t: f64, _: &Plane| if t > 0.35 && t < 0.65 { f64::NAN } else { 0.5 - t };
+    let span = Span::steps(0.1, 20).event_in_time("gap", gap).event_in_time("falls", falls);
+    let whole = DormandPrince5.run(&system, START, span.clone()).expect("it runs");
+    assert_eq!(whole.events().len(), 2);
+    for put_down in 1..10 {
+        let mut steps = DormandPrince5.steps(&system, START, span.clone()).expect("it runs");
+        let mut seen = Vec::new();
+        for _ in 0..put_down {
+            steps.advance().expect("it runs");
+            seen.extend(steps.take_events());
+        }
+        // Through a file, and put down once more before the events are said again.
+        let text = serde_json::to_string(&steps.checkpoint()).expect("it is written");
+        let read: Checkpoint = serde_json::from_str(&text).expect("it is read");
+        let again = DormandPrince5.resume(&system, &read).expect("it is resumed").checkpoint();
+        assert_eq!(again, read);
+        let resumed = DormandPrince5.resume(&system, &again).expect("it is resumed");
+        let resumed = resumed.watching(span.clone()).expect("it watches").run().expect("it runs");
+        seen.extend(resumed.events().iter().cloned());
+        assert_eq!(seen, whole.events(), "after {put_down} steps");
+    }
+}
+
 /// The times of the events of two functions that are NaN at the end of a step, for one step and for three.
 fn across_nan<M: Method<Y>, Y: Metriplectic<Manifold = Euclidean<2>>>(
     method: M,

@@ -1,5 +1,6 @@
 //! The coefficients of an explicit Runge-Kutta method.
 
+use super::dormand_prince::{EIGHT, FIVE};
 use super::tableau_error::TableauError;
 use crate::step::Control;
 
@@ -153,6 +154,34 @@ impl Tableau {
     /// The name in checkpoints.
     pub const fn name(&self) -> &'static str {
         self.name
+    }
+
+    /// The name and a digest of the coefficients: two tableaus of one name are two methods. Those of this library have
+    /// their names alone.
+    pub(super) fn name_with_digest(&'static self) -> String {
+        let digest = self.digest();
+        let ours = [&EIGHT, &FIVE].into_iter().any(|tableau| tableau.digest() == digest);
+        if ours { self.name.to_owned() } else { format!("{} {digest:016x}", self.name) }
+    }
+
+    /// A digest of the order and of all rows. How steps follow a tolerance is an option and is not in it.
+    fn digest(&self) -> u64 {
+        let mut digest = u64::from(self.order);
+        let mut put = |word: u64| {
+            digest = (digest ^ word).wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(29);
+        };
+        let [end, errors] = [std::slice::from_ref(&self.end), &self.errors];
+        for part in [self.rows(), end, errors, self.more_stages, self.dense] {
+            put(part.len() as u64);
+            for row in part {
+                put(row.len() as u64);
+                for &(stage, weight) in *row {
+                    put(stage as u64);
+                    put(weight.to_bits());
+                }
+            }
+        }
+        digest
     }
 
     /// The order of convergence.

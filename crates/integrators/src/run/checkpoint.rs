@@ -38,12 +38,15 @@
 //! ```
 //!
 //! The system is not in it, since closures cannot be written down: resume with the same one. Nor are outputs at
-//! given times and events: say them again ([`Steps::watching`](crate::Steps::watching)). Another system is noticed if its energy, its
+//! given times and events: say them again ([`Steps::watching`](crate::Steps::watching)). If the function of an event is
+//! not a number there, its last number is in the checkpoint, so that a change of sign across the gap is found. Another system is noticed if its energy, its
 //! entropy, a further invariant or its velocity has another value at the point, by more than the round-off of its
 //! terms. The model is not verified around the point; it is checked on the way like that of any run.
 //!
-//! The [name](crate::Stepper::name) of the method is in it, and another method is refused. The options of the method are
-//! not in it: a run that failed may go on with more corrections or more splits.
+//! The [name](crate::Stepper::name) of the method is in it, and another method is refused. To the name of a
+//! [`Tableau`](crate::Tableau) of your own a digest of its coefficients is added, so that two tableaus of one name are two
+//! methods. The options of the method are not in it: they decide how hard a step is tried and not which equation it solves,
+//! so a run that failed may go on with more corrections or more splits.
 //!
 //! A file has a checksum over the bits of all of its numbers. A file with another number is refused
 //! ([`ResumeError::Altered`]), and one with other digits of the same number is not.
@@ -121,7 +124,7 @@ pub struct Checkpoint(
 
 /// The version of the format that is written and read. Each change of a field is a new version.
 #[cfg(feature = "serde")]
-const VERSION: u32 = 7;
+const VERSION: u32 = 8;
 
 impl Checkpoint {
     /// The run that was put down.

@@ -14,6 +14,7 @@ use crate::run::span_error::SpanError;
 use crate::run::state::State;
 use crate::step::dense::{Hermite, says_between};
 use crate::step::digits::Digits;
+use crate::step::exact::Exact;
 use crate::step::{Flow, StateSpace, StepEnds};
 
 /// A change of sign of a function of the state, found in a run; asked for by [`Watch::event`](crate::Watch::event).
@@ -135,6 +136,17 @@ struct Watched<M: StateSpace> {
     value: f64,
 }
 
+/// The last number of the function of an event that has no value where a run is put down.
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
+pub(crate) struct LastNumber {
+    /// Which one of the events that were asked for.
+    index: usize,
+    name: String,
+    value: Exact,
+}
+
 /// The events of a run.
 pub(crate) struct Events<M: StateSpace>(Vec<Watched<M>>);
 
@@ -168,18 +180,39 @@ struct Node<M: StateSpace> {
 }
 
 impl<M: StateSpace> Events<M> {
-    /// Those that were asked for, at the start of a run.
-    pub(crate) fn new(requests: Vec<Request>, state: &State<M>) -> Result<Self, SpanError> {
+    /// Those that were asked for, at the start of a run, or where it was put down with these last numbers.
+    pub(crate) fn new(
+        requests: Vec<Request>,
+        state: &State<M>,
+        last: &[LastNumber],
+    ) -> Result<Self, SpanError> {
         let watched = |(index, request): (usize, Request)| {
             let Ok(function) = Arc::clone(&request.function).downcast::<Function<M::Element>>()
             else {
                 let expected = type_name::<M::Element>();
                 return Err(SpanError::EventPoint { index, found: request.point, expected });
             };
-            let value = (function.0)(state.time, &state.point);
+            let here = (function.0)(state.time, &state.point);
+            let before = || {
+                let same = |last: &&LastNumber| last.index == index && *last.name == *request.name;
+                last.iter().find(same).map_or(here, |last| last.value.0)
+            };
+            let value = if here.is_nan() { before() } else { here };
             Ok(Watched { request, function, value })
         };
         requests.into_iter().enumerate().map(watched).collect::<Result<_, _>>().map(Self)
+    }
+
+    /// The last numbers of the functions that have no value at the state of the run.
+    pub(crate) fn last_numbers(&self, state: &State<M>) -> Vec<LastNumber> {
+        let mut numbers = Vec::new();
+        for (index, watched) in self.0.iter().enumerate() {
+            if !watched.value.is_nan() && watched.at(state).is_nan() {
+                let (name, value) = (watched.request.name.to_string(), Exact(watched.value));
+                numbers.push(LastNumber { index, name, value });
+            }
+        }
+        numbers
     }
 
     pub(crate) const fn is_empty(&self) -> bool {

@@ -128,7 +128,10 @@ impl<F: Flow, M: Stepper<F>> Steps<'_, F, M> {
     ///
     /// [`SpanError`] if a time is outside of the run, or an event is one of other points.
     pub fn watching(mut self, schedule: impl Into<Schedule>) -> Result<Self, SpanError> {
-        self.watching = Watching::new(schedule.into().watch, &self.progress, &self.state)?;
+        self.watching = {
+            let last = if self.before.h == 0.0 { self.last_numbers.as_slice() } else { &[] };
+            Watching::new(schedule.into().watch, &self.progress, &self.state, last)?
+        };
         Ok(self)
     }
 

@@ -7,6 +7,7 @@ use crate::run::certificate::{Certificate, InvariantBalance, StepOf};
 use crate::run::controller::{Controller, Rule, StepSize};
 use crate::run::ending::Ending;
 use crate::run::error::RunError;
+use crate::run::event::LastNumber;
 use crate::run::judged::Judged;
 use crate::run::progress::Progress;
 use crate::run::schedule::{Schedule, Size};
@@ -41,6 +42,8 @@ pub struct Steps<'a, F: Flow, M: Stepper<F>> {
     /// The step before the state, for what lies between them.
     pub(super) before: StepBefore<F>,
     pub(super) watching: Option<Box<Watching<F::Space>>>,
+    /// Those of the functions of events that had no value where the run was put down, until its first step.
+    pub(super) last_numbers: Vec<LastNumber>,
 }
 
 impl<F: Flow, M: Stepper<F>> fmt::Debug for Steps<'_, F, M> {
@@ -107,7 +110,7 @@ impl<'a, F: Flow, M: Stepper<F>> Steps<'a, F, M> {
         let values = flow.laws(&x0);
         let (energy, entropy) = (values.energy, values.entropy);
         let state = State { step: 0, time: start, point: x0, energy, entropy };
-        let watching = Watching::new(watch, &progress, &state)?;
+        let watching = Watching::new(watch, &progress, &state, &[])?;
         let (h, in_parts) = (0.0, false);
         let before =
             StepBefore { state: state.clone(), values: values.clone(), entropy, h, in_parts };
@@ -119,6 +122,7 @@ impl<'a, F: Flow, M: Stepper<F>> Steps<'a, F, M> {
             state,
             before,
             watching,
+            last_numbers: Vec::new(),
             values,
             entropy,
             memory: M::Memory::default(),

@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use crate::run::event::{Event, Events};
+use crate::run::event::{Event, Events, LastNumber};
 use crate::run::progress::Progress;
 use crate::run::requests::{Outputs, Requests};
 use crate::run::span_error::SpanError;
@@ -38,12 +38,13 @@ impl<M: StateSpace> Watching<M> {
         requests: Requests,
         progress: &Progress<V>,
         state: &State<M>,
+        last: &[LastNumber],
     ) -> Result<Option<Box<Self>>, SpanError> {
         let start = progress.start;
         requests.check([start, progress.end()], progress.next_end(state.time))?;
         let Requests { times, interval, events } = requests;
         let outputs = Outputs::after(state.time, start, times, interval);
-        let events = Events::new(events, state)?;
+        let events = Events::new(events, state, last)?;
         if outputs.is_empty() && events.is_empty() {
             return Ok(None);
         }

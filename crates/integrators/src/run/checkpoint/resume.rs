@@ -39,6 +39,11 @@ impl<'a, F: Flow, M: Stepper<F>> Steps<'a, F, M> {
         self.memory.save(&mut memory);
         let Ok(progress) =
             self.progress.convert(|_, v| Ok::<_, Infallible>(exact(v.to_short_list())));
+        let events = match &self.watching {
+            Some(watching) => watching.events.last_numbers(&self.state),
+            None if self.before.h == 0.0 => self.last_numbers.clone(),
+            None => Vec::new(),
+        };
         let run = SavedRun {
             method: self.method.name(),
             step: *step,
@@ -50,6 +55,7 @@ impl<'a, F: Flow, M: Stepper<F>> Steps<'a, F, M> {
             kept_entropy: Exact(self.entropy),
             invariants: exact(self.values.invariants.as_ref()[..known].iter().copied()),
             memory,
+            events,
             balance: self.certificate.clone(),
             progress,
         };
@@ -63,8 +69,8 @@ impl<'a, F: Flow, M: Stepper<F>> Steps<'a, F, M> {
         checkpoint: &Checkpoint,
     ) -> Result<Self, ResumeError> {
         let c = checkpoint.run()?;
-        validation::of_the_method(&c.method, method.name())?;
         method.check(matches!(c.progress.step_size, StepSize::Adaptive(_)))?;
+        validation::of_the_method(&c.method, method.name())?;
         let entries: Vec<f64> = c.point().collect();
         let point = flow.element(&entries)?;
         let mut certificate =
@@ -92,6 +98,7 @@ impl<'a, F: Flow, M: Stepper<F>> Steps<'a, F, M> {
             rule: Rule::of(&method, progress.start),
             before,
             watching: None,
+            last_numbers: c.events.clone(),
             method,
             flow,
             progress,

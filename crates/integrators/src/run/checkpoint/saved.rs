@@ -1,6 +1,7 @@
 //! A run between two steps, as it is saved.
 
 use crate::run::certificate::Certificate;
+use crate::run::event::LastNumber;
 use crate::run::progress::Progress;
 use crate::step::Saved;
 use crate::step::exact::Exact;
@@ -26,6 +27,7 @@ pub(super) struct SavedRun {
     pub(super) kept_entropy: Exact,
     pub(super) invariants: Vec<Exact>,
     pub(super) memory: Saved,
+    pub(super) events: Vec<LastNumber>,
     #[cfg_attr(feature = "serde", serde(with = "exact"))]
     pub(super) balance: Certificate,
     pub(super) progress: Progress<Vec<Exact>>,

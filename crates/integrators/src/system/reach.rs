@@ -51,9 +51,18 @@ pub(super) fn reach<Y: Metriplectic>(
     let (a, terms) = (slopes * v, terms(system, x, &slopes, &sizes)?);
     let nonlinear = |delta: f64| Some(velocity(system, x, v * delta)? - v - a * delta);
     let is_smooth = |delta: f64, whole: &Vector<Y::Manifold>, half: &Vector<Y::Manifold>| {
+        let quarter = std::cell::OnceCell::new();
         (0..Vector::<Y::Manifold>::LEN).all(|i| {
             let linear = 1e-6 * (v[i].abs() + delta * a[i].abs());
-            whole[i].abs() <= STEEPEST * half[i].abs() + linear + NOISE * terms[i]
+            let is_flat = whole[i].abs() <= STEEPEST * half[i].abs() + linear + NOISE * terms[i];
+            let is_power = || {
+                let quarter = quarter.get_or_init(|| nonlinear(0.25 * delta));
+                quarter.as_ref().is_some_and(|quarter| {
+                    let [first, second] = [whole[i] / half[i], half[i] / quarter[i]];
+                    (first / second - 1.0).abs() <= SAME
+                })
+            };
+            is_flat || is_power()
         })
     };
     let (mut delta, mut r) = (0.25 * shortest_time(&slopes, span), origin);
@@ -100,6 +109,8 @@ const LATE: f64 = 1e-6;
 const CUTS: usize = 30;
 /// A nonlinear part that grows faster than `δ⁴` is that of a wall: `2⁴`, and a quarter more.
 const STEEPEST: f64 = 20.0;
+/// But for a power of `δ`, which grows by the same factor at half the time, to this fraction of it.
+const SAME: f64 = 0.1;
 /// The fraction of the terms of a velocity below which it may be noise: 2⁻¹⁶, far above round-off.
 const NOISE: f64 = 1.0 / 65_536.0;
 

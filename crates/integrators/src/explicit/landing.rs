@@ -5,6 +5,7 @@ use metriplectic_dynamics::SecondLaw;
 use super::flow::{Projected, ProjectionError, StageFlow, Target};
 use super::memory::{LastStep, Produced};
 use super::refused::Refused;
+use super::rest;
 use super::stage::{combined, produced};
 use super::trial::Trial;
 use crate::step::{Element, EntropyStep, Laws, Vector};
@@ -14,6 +15,8 @@ use crate::step::{Element, EntropyStep, Laws, Vector};
 const FALL: f64 = 0.875;
 /// The length of a projection, relative to the sizes of the entries, that is round-off: some units of it.
 const NEAR: f64 = 64.0 * f64::EPSILON;
+/// The entropy that is produced in a step, in units of the round-off of the entropy, by friction that is idle.
+const IDLE: f64 = 0.25;
 /// The length of a projection in units of the error that is allowed.
 const FAR: f64 = 10.0;
 
@@ -73,6 +76,12 @@ impl<F: StageFlow> Onto<'_, F> {
         let end = onto(y, produced.sum, false).map_err(refused)?;
         let least = produced.largest - 2.0 * end.entropy_round_off;
         if end.entropy < least || self.falls(&end) {
+            if self.is_idle()
+                && let Ok(end) = onto(again()?, produced.sum, true)
+                && !self.falls(&end)
+            {
+                return Ok(Landed { end, produced, how: EntropyStep::Targeted });
+            }
             return Err(Refused::Falls(last.rise));
         }
         let largest = produced.largest.max(end.entropy);
@@ -109,6 +118,16 @@ impl<F: StageFlow> Onto<'_, F> {
         let Self { trial: &Trial { tableau, h, .. }, last, .. } = *self;
         let doubt = (h * produced(tableau.early_error, &last.stages)).abs();
         last.rise >= 0.0 && doubt <= 0.5 * last.rise
+    }
+
+    /// Whether friction produces nothing but round-off while the state moves: the entropy is aimed at as without friction.
+    #[cold]
+    fn is_idle(&self) -> bool {
+        let Self { trial: &Trial { tableau, flow, start, h }, last, .. } = *self;
+        let doubt = (h * produced(tableau.early_error, &last.stages)).abs();
+        let round_off = flow.entropy_round_off([start.x, start.x]);
+        last.rise.abs() + doubt <= IDLE * round_off
+            && !rest::is_reached(flow, start, &last.stages[0].velocity)
     }
 
     /// Whether the entropy at the end is below the one at the start by more than its round-off. Near an equilibrium,

@@ -20,6 +20,9 @@ use crate::step::{
 
 /// Falls of the entropy in a row after which a state that hardly moves is held.
 const FALLS: u32 = 5;
+/// Falls in a row after which a model is wrong, even if its friction produces entropy. A step beyond the edge of stability
+/// falls too, and a smaller one does not: the first steps of a stiff model may be 10³ times too long.
+const MANY_FALLS: u32 = 24;
 /// How often a step of a fixed size is halved.
 const HALVES: u32 = 12;
 
@@ -159,12 +162,15 @@ fn finished<F: StageFlow>(
                         && rest::is_reached(flow, start, velocity))
             };
             if is_hardly(flow, start, &last.end) && by_round_off() {
-                memory.falls = 0;
-                if often && !rest::is_reached(flow, start, velocity) {
+                if !often || rest::is_reached(flow, start, velocity) {
+                    memory.falls = 0;
+                    return Ok(held(start));
+                }
+                let round_off = flow.entropy_round_off([x, x]);
+                if rise < -round_off || memory.falls > MANY_FALLS {
                     let time = start.time;
                     return Err(Refused::Never(StepError::EntropyFalls { time, h, rise }));
                 }
-                return Ok(held(start));
             }
             return Err(Refused::Falls(rise));
         }

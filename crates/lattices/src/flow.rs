@@ -75,7 +75,7 @@ impl<P: Model> Flow for Lattice<P> {
             }
             sums
         });
-        let slopes = parallel::tree(partial, |mut sums, more| {
+        let slopes = self.layout.sum(partial, |mut sums: Vec<f64>, more| {
             sums.iter_mut().zip(more).for_each(|(sum, part)| *sum += part);
             sums
         });

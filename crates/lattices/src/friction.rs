@@ -77,7 +77,8 @@ impl<P: Model> Lattice<P> {
         all: &[f64],
         value: impl Fn(&Term) -> f64 + Sync,
     ) -> f64 {
-        self.terms_of_chunks(x, all, |sum: &mut f64, term| *sum += value(&term)).iter().sum()
+        let chunks = self.terms_of_chunks(x, all, |sum: &mut f64, term| *sum += value(&term));
+        parallel::tree(chunks, |a, b| a + b).unwrap_or(0.0)
     }
 
     /// The results of visits to the terms of each chunk of sites and of bonds.

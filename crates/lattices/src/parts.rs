@@ -125,6 +125,8 @@ fn bits<P: Model<Manifold = Euclidean<3>>>(lattice: &Lattice<P>) -> [Vec<u64>; 2
     let x = Points::from(own.chain(ghosts).collect::<Vec<_>>());
     let (v, production) = lattice.motion(&x).expect("numbers");
     let (laws, sizes) = (lattice.laws(&x), lattice.term_sizes(&x));
+    let round_off = lattice.entropy_round_off([&x, &x]);
+    assert_eq!(round_off.to_bits(), (4.0 * f64::EPSILON * sizes.entropy).to_bits());
     let totals = [laws, sizes].into_iter().flat_map(|laws| {
         [laws.energy, laws.entropy].into_iter().chain(laws.invariants).collect::<Vec<_>>()
     });

@@ -190,7 +190,7 @@ impl Guarantee {
             }
             Self::Sweeps => (
                 "The table of a sweep does not depend on how it was run",
-                &["The table of a sweep has the same bytes"],
+                &["has the same bytes for any number of threads and shards"],
                 &["sweep"],
             ),
             Self::Allocation => ("A step allocates nothing", &["makes no heap allocation"], &[]),

@@ -329,6 +329,7 @@ fn the_training_data_keep_both_laws_and_are_one_array() {
         .record(format!("{} runs with a fall", report["entropy_falls"]), "0 runs with a fall");
     assert!(number("energy_error") < 5e-14 && number("momentum_error") < 5e-14, "{report}");
     assert_eq!(report["entropy_falls"], 0, "{report}");
+    assert_eq!([&report["rows"], &report["failed"]], [50, 0]);
     let folder = format!("{}/gallery", gallery("learning_data", &arguments));
     let bytes =
         std::fs::read(format!("{folder}/learning_data.npy")).expect("the example writes it");

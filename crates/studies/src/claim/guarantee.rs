@@ -190,7 +190,10 @@ impl Guarantee {
             }
             Self::Sweeps => (
                 "The table of a sweep does not depend on how it was run",
-                &["has the same bytes for any number of threads and shards"],
+                &[
+                    "has the same bytes for any number of threads and shards",
+                    "Memory grows by the rows of the table alone",
+                ],
                 &["sweep"],
             ),
             Self::Allocation => ("A step allocates nothing", &["makes no heap allocation"], &[]),

@@ -413,7 +413,8 @@ fn the_memory_of_a_sweep_grows_by_the_rows_of_its_table_alone() {
     let row = (many - few) / 3000.0;
     println!("{few} bytes, and {row:.0} for each further row");
     let process = "the largest resident memory of the process, for 3500 rows and for 500";
-    claim("rows of 400 recorded states", process, format!("{row:.0} bytes a row"), "1000");
+    // The number itself is not the same in each run.
+    claim("rows of 400 recorded states", process, "< 1000 bytes a row", "1000");
     // A trajectory of 400 states has more than thirty thousand bytes.
     assert!(row < 1000.0, "{row} bytes a row");
 }

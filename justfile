@@ -114,11 +114,18 @@ report:
     rm -rf target/report
     export METRIPLECTIC_REPORT={{ justfile_directory() / "target/report" }}
     tests=$(grep -l 'Claim::new' tests/*.rs | xargs -n 1 basename --suffix .rs)
-    run() { PROPTEST_RNG_SEED=2401 cargo test --package metriplectic-tests --all-features "$@"; }
+    run() { PROPTEST_RNG_SEED=2401 cargo test --package metriplectic-tests --package metriplectic-quick-tests --all-features "$@"; }
     run $(sed '/^examples$/d; s/^/--test /' <<< "$tests")
+    cargo build --quiet --profile test --all-features --example convergence --example learning_data
     run --test examples -- orders training_data
     run --test long_runs -- --ignored
     cargo run --quiet --profile test --package metriplectic-studies --bin report -- target/report .
+    # The figures that it links; the programs are those of the tests.
+    for figure in $(grep -o 'gallery/[a-z_]*\.svg' docs/verification.md | xargs -n 1 basename --suffix .svg | sort -u); do
+        cargo build --quiet --profile test --all-features --example "$figure"
+        CARGO_TARGET_DIR=target/report "${CARGO_TARGET_DIR:-target}/debug/examples/$figure" --json > /dev/null
+        mv "target/report/gallery/$figure.svg" docs/gallery
+    done
 
 # compare the bits of many runs with benches/golden, or write it with `--bless`: for this machine and compiler
 golden *flags:

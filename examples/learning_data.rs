@@ -13,9 +13,8 @@
 
 use std::{error::Error, fs::File};
 
-use metriplectic::manifolds::rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 use metriplectic::prelude::*;
-use metriplectic_studies::{Example, Gallery, Panel, Panels, Progress};
+use metriplectic_studies::{Example, Gallery, Panel, Panels};
 
 type Point<D> = (SVector<D, 8>, Vector2<D>); // ((q₁, q₂, p₁, p₂), (s₁, s₂))
 
@@ -65,37 +64,50 @@ fn main() -> Result<(), Box<dyn Error>> {
 
     let about = "A training set of 50 runs of the thermoelastic double pendulum, as one NPY file.";
     let example = Example::new(about, STEPS, 0.3);
-    let [mut energies, mut momenta, mut entropies] = [const { Vec::new() }; 3];
-    let mut random = ChaCha8Rng::seed_from_u64(2004);
-    let folder = Gallery::open()?;
-    let mut rows = Profiles::npy(File::create(folder.path("learning_data.npy"))?, 10)?;
-    let mut progress = Progress::over(RUNS);
-    let mut last = None;
-    for _ in 0..RUNS {
-        let around = [4.5, 4.5, 2.0, 4.5, -0.5, 1.5, 1.4, -0.2];
-        let q = SVector::from_fn(|i, _| around[i] + random.random_range(-0.1..0.1));
-        let span = Span::until(example.step_size * example.steps as f64).tolerance(1e-9);
-        let outputs = span.output_every(example.step_size);
-        let run = DormandPrince8.run(&pendulum, (q, Vector2::zeros()), outputs)?;
-        let first = &run.states()[0];
-        let series = |f: &dyn Fn(&State<_>) -> f64| -> Vec<_> {
-            run.iter().map(|state| (state.time, f(state))).collect()
-        };
-        energies.push(series(&|s| s.energy / first.energy - 1.0));
-        let momentum = angular_momentum(&first.point);
-        momenta.push(series(&|s| angular_momentum(&s.point) / momentum - 1.0));
-        entropies.push(series(&|s| s.entropy - first.entropy));
-        for state in run.iter() {
-            rows.row(state.point.0.iter().chain(&state.point.1).copied())?;
-        }
-        last = Some(run);
-        progress.step();
+    let span = Span::until(example.step_size * example.steps as f64).tolerance(1e-9);
+    let span = span.output_every(example.step_size);
+    let around = [4.5, 4.5, 2.0, 4.5, -0.5, 1.5, 1.4, -0.2];
+    // The start of a run is drawn from the seed and the number of its row alone.
+    let mut runs = Sweep::new("learning_data")
+        .seed(2004)
+        .samples(RUNS)
+        .run(|row| {
+            let mut draw = row.draw();
+            let start = SVector::from_fn(|i, _| around[i] + draw.uniform(-0.1..0.1));
+            Ok(DormandPrince8.run(&pendulum, (start, Vector2::zeros()), span)?)
+        })
+        .observe("H", |x| energy(&(x.0.cast(), x.1.cast())).re)
+        .observe("L", angular_momentum)
+        .observe("S", |(_, s)| s.x + s.y);
+    for i in 0..10 {
+        let entry = move |(x, s): &Point<f64>| if i < 8 { x[i] } else { s[i - 8] };
+        runs = runs.observe(format!("x{i}"), entry);
     }
-    drop(progress);
+    let table = runs.execute()?;
+
+    let lines = |name: &str| -> Vec<Vec<(f64, f64)>> {
+        table.rows().filter_map(|row| Some(row.series(name)?.collect())).collect()
+    };
+    let relative = |name: &str| -> Vec<Vec<(f64, f64)>> {
+        let error = |line: Vec<(f64, f64)>| {
+            let first = line[0].1;
+            line.into_iter().map(|(t, value)| (t, value / first - 1.0)).collect()
+        };
+        lines(name).into_iter().map(error).collect()
+    };
+    let folder = Gallery::open()?;
+    let mut states = Profiles::npy(File::create(folder.path("learning_data.npy"))?, 10)?;
+    let entries: Vec<_> = (0..10).map(|i| lines(&format!("x{i}"))).collect();
+    for (run, line) in entries[0].iter().enumerate() {
+        for step in 0..line.len() {
+            states.row(entries.iter().map(|entry| entry[run][step].1))?;
+        }
+    }
 
     let worst = |lines: &[Vec<(f64, f64)>]| {
         lines.iter().flatten().fold(0.0_f64, |worst, (_, error)| worst.max(error.abs()))
     };
+    let [energies, momenta, entropies] = [relative("H"), relative("L"), lines("S")];
     let rise = |line: &Vec<(f64, f64)>| line.windows(2).all(|pair| pair[1].1 >= pair[0].1);
     let falls = entropies.iter().filter(|line| !rise(line)).count();
     let [energy, momentum] = [worst(&energies), worst(&momenta)];
@@ -105,17 +117,19 @@ fn main() -> Result<(), Box<dyn Error>> {
     let figure = Panels::new(format!("A training set of {RUNS} runs with both laws exact"))
         .panel(panel("relative error of H", &energies))
         .panel(panel("relative error of L", &momenta))
-        .panel(panel("entropy S − S₀", &entropies));
-    let run = last.ok_or("there are no runs")?;
-    let state = run.last();
-    let report =
-        example.report_of(run.certificate(), state.time, state.point.0.as_slice().to_vec());
-    report
+        .panel(panel("entropy S", &entropies));
+    let last = table.row(RUNS - 1).ok_or("there are no runs")?.end().to_vec();
+    example
+        .report_of_many()
+        .text(&table)
         .text("                  published set     this set")
         .text(format_args!("energy constant to   1.55e-4     {energy:.1e}"))
         .text(format_args!("momentum             5e-14       {momentum:.1e}"))
         .text(format_args!("runs where S falls   0           {falls}"))
+        .with("rows", table.len())
+        .with("failed", table.failed())
         .with("steps", example.steps)
+        .with("final_state", last)
         .with("energy_error", energy)
         .with("momentum_error", momentum)
         .with("entropy_falls", falls)

@@ -297,9 +297,9 @@ fn one_stage_is_the_scheme_of_the_paper() {
 }
 
 /// The distance from the start after steps of `h` and of `−h`.
-fn way_back<Y: Metriplectic>(method: Stages, system: &Y, x: &Point<Y>, h: f64) -> f64 {
+fn way_back<Y: Metriplectic>(method: impl Stepper<Y>, system: &Y, x: &Point<Y>, h: f64) -> f64 {
     let step = |x: &Point<Y>, h| {
-        let (start, mut memory) = (StepStart::first(system, x), StageMemory::default());
+        let (start, mut memory) = (StepStart::first(system, x), Default::default());
         method.step(system, &start, h, &mut memory).expect("it is taken").x
     };
     distance::<Y::Manifold>(x, &step(&step(x, h), -h))
@@ -327,6 +327,24 @@ fn gauss_steps_lead_back() {
     }
     // Radau's nodes are not symmetric.
     assert!(way_back(Radau2, &gas(0.5), &GAS, 0.05) > 1e-8);
+}
+
+#[test]
+fn midpoint_steps_lead_back() {
+    let weyl = || Scheme::new(WeylMidpoint);
+    let back = [
+        way_back(weyl(), &spin(), &Vector3::repeat(3_f64.sqrt().recip()), 0.2),
+        way_back(weyl(), &rotations(), &turned(), 0.02),
+        way_back(weyl(), &gas(0.5), &GAS, 0.05),
+        way_back(weyl(), &warm_spin(0.1), &WARM, 0.1),
+    ];
+    println!("WeylMidpoint: {back:?}");
+    let worst = back.into_iter().fold(0.0, f64::max);
+    let problem = "a step of h and one of −h: S², SO(3), S² × R, gas";
+    Claim::new(Guarantee::Symmetry, problem, "WeylMidpoint")
+        .against("the start")
+        .record(scientific(worst), "1e-14");
+    assert!(worst <= 1e-14, "{back:?}");
 }
 
 #[test]

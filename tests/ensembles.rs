@@ -11,6 +11,14 @@ use metriplectic::ensembles::{
 use metriplectic::integrators::Scheme;
 use metriplectic::manifolds::metric::Canonical;
 use metriplectic::prelude::*;
+use metriplectic_studies::{Claim, Guarantee};
+
+/// Records what a test of sweeps has measured.
+#[track_caller]
+fn claim(problem: &str, against: &str, figure: impl std::fmt::Display, bound: &str) {
+    let claim = Claim::new(Guarantee::Sweeps, problem, "WeylMidpoint");
+    claim.against(against).record(figure, bound);
+}
 
 /// A folder for the files of a test.
 fn folder(name: &str) -> PathBuf {
@@ -125,6 +133,8 @@ fn the_bytes_of_a_table_depend_on_neither_threads_nor_shards() {
     assert!(names.iter().all(|name| name.extension().is_some_and(|e| e == "journal")));
     let merged = Table::merge(names).expect("a table").complete().expect("all rows");
     assert!(bytes(&merged) == bytes(&alone));
+    let threads = "the table of 1 thread, for 2 and 7 threads and for 3 shards that are merged";
+    claim("400 relaxing bodies", threads, "the same bytes", "the same bytes");
     // The numbers are those of runs by hand.
     let row = plan("threads").row(217).expect("a row");
     let run = relaxing(&row).expect("a run");
@@ -208,6 +218,7 @@ fn a_row_whose_step_fails_has_the_steps_before() {
 
 const TASK: &str = "METRIPLECTIC_TEST_TASK";
 const FILE: &str = "METRIPLECTIC_TEST_FILE";
+const ROWS: &str = "METRIPLECTIC_TEST_ROWS";
 
 /// A child that does a task with a file.
 fn child(task: &str, file: &Path) -> Command {
@@ -260,6 +271,17 @@ fn a_task_of_a_child() {
             println!("export failed: {error}");
             return;
         }
+        "merge" => loop {
+            let table = Table::merge(Table::journals(&file).expect("files")).expect("a table");
+            table.csv(file.with_file_name("table.csv")).expect("a file");
+        },
+        "memory" => {
+            let rows = std::env::var(ROWS).expect("a number").parse().expect("a number");
+            many_rows(rows, &file);
+            let status = fs::read_to_string("/proc/self/status").expect("a status");
+            let line = status.lines().find(|line| line.starts_with("VmHWM:")).expect("a line");
+            return println!("{line}");
+        }
         other => panic!("no task {other}"),
     };
     match outcome {
@@ -269,6 +291,20 @@ fn a_task_of_a_child() {
         }
         Err(error) => println!("error: {error}; rows {}", error.table().map_or(0, Table::len)),
     }
+}
+
+/// Rows of 400 recorded states, of which the table has the last.
+fn many_rows(rows: usize, journal: &Path) {
+    let body = body(0.4).expect("a body");
+    let body = body.verified(&vector![0.4, -1.0, 0.3]).expect("a model");
+    let plan = Sweep::new("many").samples(rows).random("spin", |draw| draw.uniform(-1.0..1.0));
+    let closure = |row: &Row| {
+        let start = vector![row["spin"], -1.0, 0.3];
+        Ok(WeylMidpoint.run(&body, start, Span::steps(0.01, 400))?)
+    };
+    let runs = plan.run(closure).measure("p₁", |run| run.last().point.x).quiet();
+    let table = runs.journal(journal).threads(2).execute().expect("all rows");
+    assert_eq!((table.len(), table.failed()), (rows, 0));
 }
 
 /// Waits until a journal has so many lines.
@@ -309,10 +345,78 @@ fn a_killed_sweep_goes_on_and_has_the_same_bytes() {
     assert!((60..400).contains(&known.len()) && known.damaged_lines() == 1, "{}", known.len());
     let resumed = runs(plan("kill"), relaxing).journal(&journal).execute().expect("all rows");
     assert!(bytes(&resumed) == bytes(&whole));
+    let killed = "the table without a kill, after `kill -9` and a torn line";
+    claim("400 relaxing bodies", killed, "the same bytes", "the same bytes");
     let again = runs(plan("kill"), |_| panic!("no row is left")).journal(&journal).execute();
     assert!(bytes(&again.expect("all rows")) == bytes(&whole));
     let lines = fs::read_to_string(&journal).expect("text").lines().count();
     assert_eq!(lines, 1 + 400 + 1, "the header, the rows, and the torn line");
+}
+
+#[test]
+#[cfg(unix)]
+fn a_merge_that_is_killed_leaves_a_whole_table_or_none() {
+    let folder = folder("merged");
+    let (journal, file) = (folder.join("sweep.journal"), folder.join("table.csv"));
+    for index in 0..3 {
+        let shard = Shard::new(index, 3).expect("a shard");
+        let runs = runs(plan("merged"), relaxing).journal(&journal).shard(shard);
+        runs.execute().expect("the rows of a shard");
+    }
+    let merged = || Table::merge(Table::journals(&journal).expect("files")).expect("a table");
+    let whole = csv(&merged());
+    let parts = || {
+        let names =
+            fs::read_dir(&folder).expect("a folder").map(|entry| entry.expect("one").path());
+        names.filter(|path| path.extension().is_some_and(|e| e == "part")).collect::<Vec<_>>()
+    };
+    for round in 0..20 {
+        let mut killed = child("merge", &journal).spawn().expect("it starts");
+        let begun = Instant::now();
+        while parts().is_empty() {
+            assert!(begun.elapsed() < Duration::from_secs(60), "the child writes nothing");
+        }
+        std::thread::sleep(Duration::from_micros(100 * (round % 4)));
+        signal(&killed, "-KILL");
+        killed.wait().expect("it ends");
+        assert!(!file.exists() || fs::read_to_string(&file).expect("text") == whole);
+        if !parts().is_empty() {
+            break;
+        }
+    }
+    // A part that a kill has left is no journal, and a process of its number writes over it.
+    let left = parts().len();
+    let own = folder.join(format!("table.csv.{}.part", std::process::id()));
+    fs::write(&own, whole.repeat(2)).expect("written");
+    fs::write(folder.join("sweep.1.journal.77.part"), "torn").expect("written");
+    assert!(left > 0, "no kill has left a part");
+    assert_eq!(csv(&merged()), whole);
+    merged().csv(&file).expect("a file");
+    assert_eq!(fs::read_to_string(&file).expect("text"), whole);
+    assert!(!own.exists() && parts().len() == left + 1);
+    assert_eq!(csv(&merged().complete().expect("all rows")), whole);
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+fn the_memory_of_a_sweep_grows_by_the_rows_of_its_table_alone() {
+    let folder = folder("memory");
+    let [few, many] = [500, 3500].map(|rows: usize| {
+        let mut child = child("memory", &folder.join(format!("{rows}.journal")));
+        let output = child.env(ROWS, rows.to_string()).output().expect("it starts");
+        let text = String::from_utf8_lossy(&output.stdout).into_owned();
+        let line = text.lines().find(|line| line.contains("VmHWM:"));
+        let line = line.unwrap_or_else(|| panic!("{text}{:?}", output.stderr));
+        let number = line.split_whitespace().rev().nth(1).and_then(|n| n.parse::<f64>().ok());
+        number.expect("kilobytes") * 1024.0
+    });
+    let row = (many - few) / 3000.0;
+    println!("{few} bytes, and {row:.0} for each further row");
+    let process = "the largest resident memory of the process, for 3500 rows and for 500";
+    // The number itself is not the same in each run.
+    claim("rows of 400 recorded states", process, "< 1000 bytes a row", "1000");
+    // A trajectory of 400 states has more than thirty thousand bytes.
+    assert!(row < 1000.0, "{row} bytes a row");
 }
 
 #[test]

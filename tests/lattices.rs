@@ -118,7 +118,7 @@ fn the_bits_do_not_depend_on_the_number_of_threads() {
     });
     assert!(ends.iter().all(|end| *end == ends[0]));
     Claim::new(Guarantee::Reproducibility, "chain on a cubic grid of 4000 sites", "DormandPrince5")
-        .against("1, 2, 3 and 7 threads")
+        .against("1 to 7 threads")
         .record("the same bits", "the same bits");
 }
 

@@ -16,6 +16,7 @@ use crate::graph::Graph;
 use crate::lattice::Lattice;
 use crate::layout::Layout;
 use crate::model::{Data, Fields, Friction, Parts};
+use crate::neighbours::{Alone, Neighbours};
 use crate::onsager::{
     BondFriction, BondState, Frictionless, Onsager, SiteFriction, SiteState, Terms,
 };
@@ -271,6 +272,31 @@ where
         L: ConservedSums<M, D::Item>,
         E: InOrder,
     {
+        self.part(0, Box::new(Alone))
+    }
+
+    /// Finishes the part with this number of a lattice that is cut into as many parts as there are neighbours.
+    pub(crate) fn part(
+        self,
+        number: usize,
+        neighbours: Box<dyn Neighbours>,
+    ) -> Result<
+        Lattice<Parts<M, B, Fields<H, V, S, Gathers<GE, GS>>, Friction<KB, KS>, L, Data<D, E>>>,
+        LatticeError,
+    >
+    where
+        Canonical: Riemannian<M>,
+        B: Bracket<M, Canonical> + Sync,
+        H: LocalField<M, D::Item>,
+        V: LocalField<Product<M, M>, E::Item>,
+        S: LocalField<M, D::Item>,
+        GE: Gather<M>,
+        GS: Gather<M>,
+        KB: BondFriction<M, E::Item>,
+        KS: SiteFriction<M, D::Item>,
+        L: ConservedSums<M, D::Item>,
+        E: InOrder,
+    {
         let Self { graph, mut parts, has_bond_entropy } = self;
         let graph = graph.checked()?;
         let counts = [
@@ -295,10 +321,12 @@ where
         if Bracket::<M, Canonical>::is_forced(&parts.bracket) {
             return Err(LatticeError::ForcedBracket);
         }
-        let layout = Layout::new(&graph);
-        if let Some(order) = layout.order() {
-            parts.data.bonds.arrange(order);
+        let layout = Layout::part(&graph, number, neighbours)?;
+        match layout.order() {
+            Some(order) => parts.data.bonds.arrange(order),
+            None => parts.data.bonds.keep(layout.bonds_of_graph()),
         }
+        parts.data.sites.keep(layout.sites_of_graph());
         Ok(Lattice::new(parts, layout))
     }
 }

@@ -30,6 +30,16 @@ impl Double {
         self.lo += other.lo;
     }
 
+    /// The two numbers whose sum it is.
+    pub(crate) const fn parts(self) -> [f64; 2] {
+        [self.hi, self.lo]
+    }
+
+    /// The sum of two such numbers.
+    pub(crate) const fn of_parts([hi, lo]: [f64; 2]) -> Self {
+        Self { hi, lo }
+    }
+
     /// The number nearest to the sum.
     #[inline]
     pub(crate) fn value(self) -> f64 {

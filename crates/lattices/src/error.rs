@@ -28,6 +28,16 @@ pub enum LatticeError {
         /// The most.
         most: usize,
     },
+    /// More parts than chunks of sites.
+    #[error(
+        "{parts} parts of a lattice need as many chunks of 1024 sites, and the graph has {chunks}; cut it into fewer"
+    )]
+    TooManyParts {
+        /// How many parts there should be.
+        parts: usize,
+        /// How many chunks there are.
+        chunks: usize,
+    },
     /// A list of bonds for which there is no memory.
     #[error("there is no memory for the {bonds} bonds of the graph; give it fewer sites")]
     NoMemory {

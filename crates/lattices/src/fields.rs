@@ -1,5 +1,7 @@
 //! Functions of a site and of a bond.
 
+use std::ops::Range;
+
 use metriplectic_fields::{Column, Jet1, Real, ScalarField, Space, Vector};
 
 /// A smooth function of a point of `M` and of data `D`: the energy or the entropy of a site, or the energy of a bond
@@ -124,6 +126,9 @@ pub trait LocalData: Sync {
 
     /// Those of one of them.
     fn of(&self, index: usize) -> &Self::Item;
+
+    /// Gives up all but those with these indices.
+    fn keep(&mut self, range: Range<usize>);
 }
 
 impl LocalData for () {
@@ -137,6 +142,8 @@ impl LocalData for () {
     fn of(&self, _: usize) -> &() {
         &()
     }
+
+    fn keep(&mut self, _: Range<usize>) {}
 }
 
 impl<T: Sync> LocalData for Vec<T> {
@@ -149,6 +156,11 @@ impl<T: Sync> LocalData for Vec<T> {
     #[inline]
     fn of(&self, index: usize) -> &T {
         &self[index]
+    }
+
+    fn keep(&mut self, range: Range<usize>) {
+        self.truncate(range.end);
+        self.drain(..range.start);
     }
 }
 

@@ -7,6 +7,7 @@ use metriplectic_integrators::explicit::{Projected, ProjectionError, Target};
 use metriplectic_integrators::{Flow, FlowError, Laws, Recheck, StageFlow};
 use metriplectic_manifolds::{Manifold, PointError};
 
+use crate::gather::Gather;
 use crate::lattice::{Differentials, Lattice, Total, Totals, differentials_at, dimension};
 use crate::model::{Model, VectorOf};
 use crate::parallel;
@@ -25,6 +26,28 @@ impl<P: Model> Lattice<P> {
     pub(crate) fn jets(&self, x: &Points<P::Manifold>) -> LatticeJets<VectorOf<P>> {
         let (all, totals) = self.differentials::<true>(x);
         LatticeJets { all, totals }
+    }
+
+    /// The size of the terms of the entropy: the one of [`Flow::term_sizes`], in one loop over the sites where it gathers
+    /// nothing.
+    fn entropy_size(&self, x: &Points<P::Manifold>) -> f64 {
+        if P::EntropyGather::PRESENT {
+            return self.term_sizes(x).entropy;
+        }
+        if !P::ENTROPY {
+            return 0.0;
+        }
+        let parts = parallel::map(self.sites(), |sites| {
+            let mut sums = vec![0.0; 2];
+            for site in sites {
+                let entropy = self.parts.entropy(site, &x[site]);
+                sums[0] += entropy.value.abs();
+                sums[1] += entropy.df.abs().dot(&P::Manifold::scales(&x[site]));
+            }
+            sums
+        });
+        let sizes = self.layout.sum(parts, |a, b| vec![a[0] + b[0], a[1] + b[1]]);
+        sizes.map_or(0.0, |sizes| sizes[0] + sizes[1])
     }
 
     /// The same numbers at all sites.
@@ -75,7 +98,7 @@ impl<P: Model> Flow for Lattice<P> {
             }
             sums
         });
-        let slopes = parallel::tree(partial, |mut sums, more| {
+        let slopes = self.layout.sum(partial, |mut sums: Vec<f64>, more| {
             sums.iter_mut().zip(more).for_each(|(sum, part)| *sum += part);
             sums
         });
@@ -85,6 +108,12 @@ impl<P: Model> Flow for Lattice<P> {
             entropy: jets.totals.entropy.size + slopes(1),
             invariants: (0..P::SUMS).map(|k| jets.totals.sums[k].size + slopes(2 + k)).collect(),
         }
+    }
+
+    /// That of the terms of the entropy, without those of the other laws.
+    fn entropy_round_off(&self, ends: [&Points<P::Manifold>; 2]) -> f64 {
+        let sizes = ends.map(|x| self.entropy_size(x));
+        4.0 * f64::EPSILON * sizes[0].max(sizes[1])
     }
 
     fn rates(&self, x: &Points<P::Manifold>, d: &SiteVector) -> Option<SiteVector> {

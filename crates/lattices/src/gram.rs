@@ -2,6 +2,8 @@
 
 use metriplectic_integrators::explicit::ProjectionError;
 
+use crate::neighbours::Shared;
+
 /// The independent fraction of a differential below which it is a combination of others. Products of differentials
 /// have lost half of the digits.
 const INDEPENDENT: f64 = 3e-7;
@@ -28,6 +30,17 @@ impl Gram {
 
     pub(crate) fn is_finite(&self) -> bool {
         self.products.iter().chain(&self.slopes).all(|number| number.is_finite())
+    }
+}
+
+impl Shared for Gram {
+    fn list(&self) -> Vec<f64> {
+        [&self.products[..], &self.slopes].concat()
+    }
+
+    fn of_list(&self, list: &[f64]) -> Self {
+        let (products, slopes) = list.split_at(self.products.len());
+        Self { laws: self.laws, products: products.to_vec(), slopes: slopes.to_vec() }
     }
 }
 

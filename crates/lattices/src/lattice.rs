@@ -10,6 +10,7 @@ use metriplectic_manifolds::Manifold;
 use crate::double::Double;
 use crate::layout::Layout;
 use crate::model::{Model, PointOf, VectorOf};
+use crate::neighbours::Shared;
 use crate::parallel;
 use crate::points::Points;
 use crate::pool::{Buffer, Pool};
@@ -118,6 +119,39 @@ impl<V: Column<f64>> Totals<V> {
     }
 }
 
+impl Shared for (Double, f64) {
+    fn list(&self) -> Vec<f64> {
+        self.0.parts().into_iter().chain([self.1]).collect()
+    }
+
+    fn of_list(&self, list: &[f64]) -> Self {
+        (Double::of_parts([list[0], list[1]]), list[2])
+    }
+}
+
+impl<V: Column<f64>> Shared for Totals<V> {
+    fn list(&self) -> Vec<f64> {
+        let totals = [self.energy, self.entropy].into_iter().chain(self.sums.iter().copied());
+        let numbers = totals.flat_map(|Total { sum, size }| {
+            let [hi, lo] = sum.parts();
+            [hi, lo, size]
+        });
+        numbers.chain((0..V::LEN).map(|k| self.sizes[k])).collect()
+    }
+
+    fn of_list(&self, list: &[f64]) -> Self {
+        let total =
+            |k: usize| Total { sum: Double::of_parts([list[k], list[k + 1]]), size: list[k + 2] };
+        let sizes = list.len() - V::LEN;
+        Self {
+            energy: total(0),
+            entropy: total(3),
+            sums: (0..self.sums.len()).map(|k| total(6 + 3 * k)).collect(),
+            sizes: V::from_index(|k| list[sizes + k]),
+        }
+    }
+}
+
 /// The larger one of two sizes, entry by entry.
 fn larger<V: Column<f64>>(a: &V, b: &V) -> V {
     V::from_index(|k| a[k].max(b[k]))
@@ -202,11 +236,11 @@ impl<P: Model> Lattice<P> {
             production.add(part);
             (production, probe)
         });
-        let (production, probe) = parallel::tree(partial.collect(), |mut a: (Double, f64), b| {
+        let sum = self.layout.sum(partial.collect(), |mut a: (Double, f64), b| {
             a.0.merge(b.0);
             (a.0, a.1 + b.1)
-        })
-        .unwrap_or_default();
+        });
+        let (production, probe) = sum.unwrap_or_default();
         let production = production.value();
         let is_finite = !f64::is_nan(probe) && production.is_finite();
         is_finite.then(|| (self.vector(v), production))

@@ -42,8 +42,11 @@ pub mod graph;
 pub mod lattice;
 mod layout;
 pub mod model;
+mod neighbours;
 pub mod onsager;
 mod parallel;
+#[cfg(test)]
+mod parts;
 pub mod points;
 mod pool;
 pub mod profiles;

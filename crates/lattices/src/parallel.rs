@@ -2,13 +2,15 @@
 //!
 //! The chunks have a fixed length, and their results come in their order. [`tree`] merges them two by two, by the
 //! numbers of the chunks alone. So the bits of a sum do not depend on the number of threads, or on which process has
-//! summed a whole subtree.
+//! summed which chunks.
 
 use std::ops::Range;
 use std::sync::Mutex;
 
 #[cfg(feature = "rayon")]
 use rayon::prelude::*;
+
+use crate::neighbours::Node;
 
 /// Sites in a chunk: some ten microseconds of work, and about what fits into a cache.
 pub(crate) const CHUNK: usize = 1024;
@@ -57,21 +59,42 @@ fn on_all_threads(count: usize, f: &(dyn Fn(usize) + Sync)) {
 }
 
 /// The results of all chunks in one, by a fixed binary tree: on each level the results `2k` and `2k + 1` are merged.
-/// A node of level `l` is the sum of the chunks from `k 2ˡ` to `(k + 1) 2ˡ`. `None` without chunks.
+/// `None` without chunks.
 pub(crate) fn tree<R>(parts: Vec<R>, merge: impl Fn(R, R) -> R) -> Option<R> {
-    // The nodes whose right neighbour of the same level is still to come: at most one of each level.
-    let levels = parts.len().checked_ilog2()? as usize + 1;
-    let mut nodes: Vec<(u32, R)> = Vec::with_capacity(levels);
-    for part in parts {
-        let mut node = (0, part);
-        while let Some((level, left)) = nodes.pop_if(|(level, _)| *level == node.0) {
-            node = (level + 1, merge(left, node.1));
+    top(nodes(leaves(0, parts), &merge), &merge)
+}
+
+/// The results of the chunks from `first` on.
+pub(crate) fn leaves<R>(first: usize, parts: Vec<R>) -> impl ExactSizeIterator<Item = Node<R>> {
+    parts.into_iter().enumerate().map(move |(k, sum)| Node { level: 0, index: first + k, sum })
+}
+
+/// The largest nodes of the tree that a row of nodes has.
+pub(crate) fn nodes<R>(
+    row: impl ExactSizeIterator<Item = Node<R>>,
+    merge: impl Fn(R, R) -> R,
+) -> Vec<Node<R>> {
+    // Before the first node without a left neighbour levels rise, and behind it they fall.
+    let levels = row.len().checked_ilog2().unwrap_or(0) as usize + 1;
+    let mut nodes: Vec<Node<R>> = Vec::with_capacity(2 * levels);
+    for mut node in row {
+        let is_left = |left: &mut Node<R>, node: &Node<R>| {
+            left.level == node.level && left.index % 2 == 0 && left.index + 1 == node.index
+        };
+        while let Some(left) = nodes.pop_if(|left| is_left(left, &node)) {
+            let (level, index) = (node.level + 1, left.index / 2);
+            node = Node { level, index, sum: merge(left.sum, node.sum) };
         }
         nodes.push(node);
     }
+    nodes
+}
+
+/// The whole sum, from the largest nodes of all chunks.
+pub(crate) fn top<R>(nodes: Vec<Node<R>>, merge: impl Fn(R, R) -> R) -> Option<R> {
     let mut nodes = nodes.into_iter().rev();
-    let (_, last) = nodes.next()?;
-    Some(nodes.fold(last, |right, (_, left)| merge(left, right)))
+    let last = nodes.next()?.sum;
+    Some(nodes.fold(last, |right, left| merge(left.sum, right)))
 }
 
 /// The sites of a chunk.
@@ -104,14 +127,25 @@ mod tests {
     }
 
     #[test]
-    fn processes_that_own_whole_subtrees_have_the_bits_of_one_process() {
+    fn processes_that_own_any_rows_of_chunks_have_the_bits_of_one_process() {
         let parts: Vec<f64> = (0..100).map(|k| 1.0 / (3.0 + f64::from(k))).collect();
-        let whole = sum(&parts);
+        let (whole, plus) = (sum(&parts), |a, b| a + b);
         for length in [1, 2, 4, 8, 16, 32, 64, 128] {
+            // Where they own whole subtrees, one number is enough.
             let owned: Vec<f64> = parts.chunks(length).map(sum).collect();
             assert_eq!(sum(&owned).to_bits(), whole.to_bits(), "{length} chunks each");
         }
-        // Blocks that are no subtrees have other bits, and so has a sum in a row.
+        for length in [1, 3, 7, 33, 34, 99, 100] {
+            let owned = parts.chunks(length).enumerate().flat_map(|(k, parts)| {
+                let row = nodes(leaves(k * length, parts.to_vec()), plus);
+                assert!(row.len() <= 2 * (length.ilog2() as usize + 1), "{} nodes", row.len());
+                row
+            });
+            let owned: Vec<_> = owned.collect();
+            let total = top(nodes(owned.into_iter(), plus), plus).expect("there are chunks");
+            assert_eq!(total.to_bits(), whole.to_bits(), "{length} chunks each");
+        }
+        // Sums of blocks that are no subtrees have other bits, and so has a sum in a row.
         let others = parts.chunks(7).map(sum).collect::<Vec<_>>();
         assert_ne!(sum(&others).to_bits(), whole.to_bits());
         assert_ne!(parts.iter().sum::<f64>().to_bits(), whole.to_bits());

@@ -218,7 +218,8 @@ impl<P: Model> Projection<'_, P> {
             }
             gram
         });
-        parallel::tree(parts, |a, b| a.plus(&b)).unwrap_or_else(|| Gram::new(laws))
+        let gram = self.lattice.layout.sum(parts, |a, b| a.plus(&b));
+        gram.unwrap_or_else(|| Gram::new(laws))
     }
 
     /// The length of a vector in units of the sizes of the entries: that of the largest site.

@@ -201,6 +201,18 @@ impl Vector for SiteVector {
         parallel::map(self.sites, of).into_iter().fold(0.0, larger)
     }
 
+    fn norm_of<const K: usize>(vectors: [&Self; K], f: impl Fn([f64; K]) -> f64 + Sync) -> f64 {
+        let (readers, stride) = (vectors.map(Self::reader), vectors[0].stride);
+        let mean = (stride as f64).recip();
+        let at = |site: usize| {
+            let number = |k| f(readers.map(|reader| reader.numbers[site * reader.stride + k]));
+            let sum = (0..stride).map(number).fold(0.0, |sum, r| sum + r * r);
+            (sum * mean).sqrt()
+        };
+        let of = |sites: std::ops::Range<usize>| sites.map(at).fold(0.0, larger);
+        parallel::map(vectors[0].sites, of).into_iter().fold(0.0, larger)
+    }
+
     fn sites(&self) -> Option<usize> {
         Some(self.sites)
     }
@@ -256,4 +268,26 @@ impl Vector for SiteVector {
 struct Ranked {
     ratio: f64,
     site: Option<usize>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::Random;
+
+    #[test]
+    fn a_norm_without_an_array_has_the_bits_of_one_with_it() {
+        let (sites, stride, mut random) = (3000, 3, Random::new(5));
+        let pool = Pool::default();
+        let v = SiteVector::same(sites, vec![0.0; stride], &pool).with(|_| random.next());
+        let w = v.with(|i| if i % 7 == 0 { v.get(i) } else { random.next() });
+        let sizes = SiteVector::same(sites, vec![0.5, 2.0, 1e-3], &pool);
+        let ratio = |[v, w, size]: [f64; 3]| (v - w) / size;
+        let numbers = SiteVector::zip([&v, &w, &sizes], ratio);
+        let norm = numbers.relative_to(&numbers.map(|_| 1.0));
+        assert!(norm > 0.0);
+        assert_eq!(SiteVector::norm_of([&v, &w, &sizes], ratio).to_bits(), norm.to_bits());
+        let lost = SiteVector::norm_of([&v, &w], |[v, w]| if v == w { f64::NAN } else { v });
+        assert!(lost.is_nan());
+    }
 }

@@ -7,7 +7,6 @@ use super::spectrum::Spectrum;
 use super::stage::combined;
 use super::tableau::{ESTIMATED, Stages, Tableau};
 use super::trial::Done;
-use crate::step::scales::relative;
 use crate::step::{LimitingSites, Vector};
 
 /// Whether the rates between the last stage and the end differ by as much as at the edge of the region of
@@ -19,16 +18,12 @@ pub(super) fn is_at_the_edge<V: Vector>(
     last: &LastStep<V>,
     rates: &V,
 ) -> bool {
-    let one = sizes.map(|_| 1.0);
     let before = [&last.before, &last.stages[tableau.rows().len()].velocity];
-    // One array at a time, because a large system has no room for more.
     let norm = |end: &V, before: &V, factor: f64| {
-        let ratios =
-            Vector::zip([end, before, sizes, &last.end], |[end, before, size, reached]| {
-                let change = factor * (end - before);
-                if change == 0.0 { 0.0 } else { change / size.max(reached.abs()) }
-            });
-        relative(&ratios, &one)
+        V::norm_of([end, before, sizes, &last.end], |[end, before, size, reached]| {
+            let change = factor * (end - before);
+            if change == 0.0 { 0.0 } else { change / size.max(reached.abs()) }
+        })
     };
     let distance = norm(&last.end, before[0], 1.0);
     distance > 64.0 * f64::EPSILON && norm(rates, before[1], h) > tableau.stability * distance

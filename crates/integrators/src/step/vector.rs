@@ -66,6 +66,14 @@ pub trait Vector: Clone + Debug {
         sum.map(|q| h * q)
     }
 
+    /// The norm of numbers without a unit, a function of what several vectors have at the same place, as
+    /// [`relative_to`](Self::relative_to) has it of ratios. A large vector needs no array for them.
+    #[must_use]
+    fn norm_of<const K: usize>(vectors: [&Self; K], f: impl Fn([f64; K]) -> f64 + Sync) -> f64 {
+        let numbers = Self::zip(vectors, f);
+        numbers.relative_to(&numbers.map(|_| 1.0))
+    }
+
     /// The norm of the ratios `v_i/s_i` to the sizes `s_i`, where `0/0 = 0`; NaN if a ratio is.
     ///
     /// The default is the Euclidean norm, which bounds each ratio and which no rotation of the frame of a curved

@@ -93,9 +93,10 @@ impl<P: Model> Lattice<P> {
         if !G::PRESENT {
             return at_sites.adopt(Vec::new());
         }
-        let mut sums = at_sites.numbers(2 * self.sites());
+        let mut all = at_sites.numbers(2 * self.layout.reach());
+        let sums = &mut all[..2 * self.sites()];
         let bonds = self.layout.bonds();
-        self.layout.scatter(&mut sums, &mut in_slots.numbers(self.layout.slots), |mut part| {
+        self.layout.scatter(sums, &mut in_slots.numbers(self.layout.slots), |mut part| {
             for site in part.sites.clone() {
                 part.set(site, 0, &SVector::<f64, 2>::zero());
             }
@@ -106,28 +107,31 @@ impl<P: Model> Lattice<P> {
                 part.add(ends, &[[phi, phi]]);
             }
         });
-        parallel::fill(&mut sums, 2, |sites, sums| {
+        parallel::fill(sums, 2, |sites, sums| {
             for (site, sum) in sites.zip(sums.chunks_exact_mut(2)) {
                 sum[1] = gather.embedded(&x[site], sum[0]).along_rho;
             }
         });
-        sums
+        self.layout.fill_ghosts(&mut all);
+        all
     }
 
-    /// The differentials `w = dh + Σ ∂h₂` and `ds` at each site, with what they gather, and the totals if `TOTALS`.
+    /// The differentials `w = dh + Σ ∂h₂` and `ds` at each site, with what they gather, and the totals if `TOTALS`. The
+    /// points of ghosts stand behind the own ones, and so do their differentials, as far as bonds ask for them.
     pub(crate) fn differentials<const TOTALS: bool>(
         &self,
         x: &[PointOf<P>],
     ) -> (Differentials, Totals<VectorOf<P>>) {
         let n = dimension::<P>();
-        let mut all = self.differentials.numbers(self.sites() * width::<P>());
+        let mut all = self.differentials.numbers(self.layout.reach() * width::<P>());
+        let own = &mut all[..self.sites() * width::<P>()];
         let bonds = self.layout.bonds();
         let gathers = self.parts.gathers();
         let energy_sums = self.gathered(&gathers.energy, x);
         let entropy_sums = self.gathered(&gathers.entropy, x);
         let [energy_sums, entropy_sums] = [&*energy_sums, &*entropy_sums];
         let given = Given::by_functions::<P>();
-        let totals = self.layout.scatter(&mut all, &mut self.slots(given), |mut part| {
+        let totals = self.layout.scatter(own, &mut self.slots(given), |mut part| {
             let mut totals = Totals::new(if TOTALS { P::SUMS } else { 0 });
             for site in part.sites.clone() {
                 let point = &x[site];
@@ -179,7 +183,10 @@ impl<P: Model> Lattice<P> {
             }
             totals
         });
-        let totals = if TOTALS { parallel::tree(totals, |a, b| a.merge(&b)) } else { None };
+        if P::BOND_FRICTION {
+            self.layout.fill_ghosts(&mut all);
+        }
+        let totals = if TOTALS { self.layout.sum(totals, |a, b| a.merge(&b)) } else { None };
         (all, totals.unwrap_or_else(|| Totals::new(P::SUMS)))
     }
 }

@@ -37,6 +37,8 @@ pub enum Guarantee {
     ManySites,
     /// The same bits.
     Reproducibility,
+    /// Many runs in one table.
+    Sweeps,
     /// Heap allocations.
     Allocation,
     /// Friction faster than a step.
@@ -55,7 +57,7 @@ pub(super) struct Facts {
 
 impl Guarantee {
     /// All of them.
-    pub(super) const ALL: [Self; 18] = [
+    pub(super) const ALL: [Self; 19] = [
         Self::Energy,
         Self::Entropy,
         Self::Invariants,
@@ -72,6 +74,7 @@ impl Guarantee {
         Self::RandomInput,
         Self::ManySites,
         Self::Reproducibility,
+        Self::Sweeps,
         Self::Allocation,
         Self::StiffFriction,
     ];
@@ -132,7 +135,7 @@ impl Guarantee {
             Self::Accuracy => (
                 "Published problems are met to the digits of independent solutions",
                 &["Problems that papers publish are met"],
-                &["thermoelastic_rod", "learning_data"],
+                &["entropy_containers", "kepler", "thermoelastic_rod", "learning_data"],
             ),
             Self::Symmetry => ("Symmetric steps lead back", &["| symmetric in time |"], &[]),
             Self::Units => (
@@ -185,6 +188,14 @@ impl Guarantee {
             Self::Reproducibility => {
                 ("The same inputs have the same bits", &["A run has the same bits each time"], &[])
             }
+            Self::Sweeps => (
+                "The table of a sweep does not depend on how it was run",
+                &[
+                    "has the same bytes for any number of threads and shards",
+                    "Memory grows by the rows of the table alone",
+                ],
+                &["sweep"],
+            ),
             Self::Allocation => ("A step allocates nothing", &["makes no heap allocation"], &[]),
             Self::StiffFriction => (
                 "Friction faster than a step is damped by `Radau` and named with the others",

@@ -83,6 +83,32 @@ mod tests {
     const PAGE: &str = "# A page\n\n| a | b |\n|---|---|\n| one | two |\n\n**Title.** Here\n\n\\\\[\nx^2,\n\\\\]\n\n\
         without drift. A second\none ends.\n\n- An item of 1.5 lines.\n- Another.\n";
 
+    /// The chapters of the table of contents are those of the introduction, in its order, and their programs are tests.
+    #[test]
+    fn the_introduction_lists_the_chapters_of_the_book() {
+        let root = concat!(env!("CARGO_MANIFEST_DIR"), "/../..");
+        let read = |path: &str| std::fs::read_to_string(format!("{root}/{path}")).expect(path);
+        let [summary, introduction] =
+            ["SUMMARY", "introduction"].map(|name| read(&format!("book/src/{name}.md")));
+        // `- [Title](file.md)` and `| [Title](file.md) | … |`.
+        let chapters = |page: &str, first: &str| -> Vec<String> {
+            let lines = page.lines().filter_map(|line| line.strip_prefix(first));
+            lines.filter_map(|line| Some(line.split_once(')')?.0.to_owned())).collect()
+        };
+        let listed = chapters(&summary, "- [");
+        assert!(listed.len() > 15, "{listed:?}");
+        assert_eq!(chapters(&introduction, "| ["), listed);
+        let programs = read("tests/book.rs");
+        for chapter in &listed {
+            let file = chapter.split('(').nth(1).expect("a link");
+            let has_programs = read(&format!("book/src/{file}")).contains("```rust\n");
+            assert!(
+                !has_programs || programs.contains(&format!("/{file}")),
+                "{file} is not tested"
+            );
+        }
+    }
+
     #[test]
     fn a_page_is_its_sentences_and_the_rows_of_its_tables() {
         let expected = [

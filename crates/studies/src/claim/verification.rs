@@ -244,6 +244,42 @@ mod tests {
         assert!(matches!(holds(&all[1..3]), Err(VerificationError::NoSentence { .. })));
     }
 
+    /// A file with claims is a target of a package that `just report` tests: it passes each one by its name.
+    #[test]
+    fn the_recipe_of_the_report_runs_every_file_with_claims() {
+        let read = |path: &str| fs::read_to_string(root().join(path)).expect(path);
+        let recipes = read("justfile");
+        let recipe = recipes.split("\nreport:").nth(1).expect("a recipe `report`");
+        let recipe = recipe.split("\n\n").next().expect("its lines");
+        assert!(recipe.contains("grep -l 'Claim::new' tests/*.rs"), "{recipe}");
+        let mut targets = String::new();
+        for (package, manifest, path) in [
+            ("metriplectic-tests", "tests/Cargo.toml", "path = \""),
+            ("metriplectic-quick-tests", "tests/quick/Cargo.toml", "path = \"../"),
+        ] {
+            if recipe.contains(&format!("--package {package} ")) {
+                targets += &read(manifest).replace(path, "target ");
+            }
+        }
+        let (mut folders, mut files) = (vec![root().join("tests")], 0);
+        while let Some(folder) = folders.pop() {
+            for entry in fs::read_dir(folder).expect("a folder of tests") {
+                let path = entry.expect("an entry").path();
+                if path.is_dir() {
+                    folders.push(path);
+                } else if path.extension().is_some_and(|kind| kind == "rs")
+                    && fs::read_to_string(&path).expect("a test").contains("Claim::new")
+                {
+                    let file = path.strip_prefix(root().join("tests")).expect("it is inside");
+                    let target = format!("target {}\"", file.display());
+                    assert!(targets.contains(&target), "no package of the recipe has {target}");
+                    files += 1;
+                }
+            }
+        }
+        assert!(files > 15, "{files} files with claims");
+    }
+
     /// The report of the repository is not older than the names of the tests.
     #[test]
     fn the_report_names_tests_that_exist() {

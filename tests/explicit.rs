@@ -6,7 +6,7 @@
 
 use metriplectic::dynamics::SecondLaw;
 use metriplectic::dynamics::system::Point;
-use metriplectic::integrators::{RunError, Schedule, StepError};
+use metriplectic::integrators::{Laws, RunError, Schedule, StepError, StepStart};
 use metriplectic::prelude::*;
 use metriplectic_studies::problems::flow;
 use metriplectic_studies::{Claim, Guarantee, Order, scientific};
@@ -645,4 +645,36 @@ fn what_is_not_promised_is_said() {
         DormandPrince8.run(&published, vector![0.5, 0.2, 0.1], Span::until(5.0).tolerance(1e-8));
     let certificate = run.unwrap().certificate().to_string();
     assert!(certificate.contains("second law: not promised"), "{certificate}");
+}
+
+/// The reference of the entropy follows a half that dissipates, as it follows a step in a run.
+#[test]
+fn a_step_in_two_halves_is_two_steps_of_half_the_size() {
+    let exchange = |_: &Vector2<Real>, w: &Vector2<Real>| {
+        let b = vector![w.y, -w.x];
+        b * b.transpose() * Real::from(1e3)
+    };
+    let bodies = System::on(Euclidean::<2>)
+        .energy(|e: &Vector2<Real>| e.x + e.y)
+        .entropy(|e: &Vector2<Real>| e.x.ln() + e.y.ln())
+        .dissipation(FieldDissipation(exchange))
+        .build()
+        .unwrap();
+    let x = vector![1.0, 3.0];
+    let start = StepStart::first(&bodies, &x);
+    let mut compared = 0;
+    for h in (0..100).map(|k| 1e-5 * 1.1_f64.powi(k)) {
+        let whole = DormandPrince5.step(&bodies, &start, h, &mut Default::default());
+        let Some(whole) = whole.ok().filter(|whole| whole.effort.splits == 1) else { continue };
+        let mut memory = Default::default();
+        let first = DormandPrince5.step(&bodies, &start, 0.5 * h, &mut memory).unwrap();
+        assert!(first.evidence.dissipates && first.effort.splits == 0);
+        let reference = Laws { entropy: first.values.entropy, ..start.reference };
+        let (x, values, time) = (&first.x, first.values, 0.5 * h);
+        let middle = StepStart { x, time, values, reference, allowed: None };
+        let second = DormandPrince5.step(&bodies, &middle, 0.5 * h, &mut memory).unwrap();
+        assert_eq!((whole.x, whole.values), (second.x, second.values), "h = {h:e}");
+        compared += 1;
+    }
+    assert!(compared > 0, "no step was taken in two halves");
 }

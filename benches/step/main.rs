@@ -17,14 +17,16 @@ use std::hint::black_box;
 
 use criterion::Criterion;
 use metriplectic::dynamics::system::Point;
-use metriplectic::integrators::DiscreteGradient;
-use metriplectic::integrators::{Flow as _, StepStart};
+use metriplectic::integrators::{DiscreteGradient, Element, Flow, StateSpace, StepStart};
 use metriplectic::prelude::*;
 
+#[path = "../../tests/models/chain.rs"]
+mod chain;
 mod chart_midpoint;
 mod dimension;
 mod hand_generic;
 mod instructions;
+mod lattice;
 mod rigid_body;
 mod so3_nambu;
 mod spinning_top;
@@ -88,18 +90,29 @@ impl Row {
     where
         R: Retraction<Y::Manifold, Y::Metric> + 'static,
     {
+        Self::by(name, scheme, system, start, h)
+    }
+
+    /// Steps of a flow by any method.
+    fn by<F: Flow + 'static, M: Stepper<F> + 'static>(
+        name: impl Into<String>,
+        method: M,
+        flow: F,
+        start: Element<F>,
+        h: f64,
+    ) -> Self {
         let run = move |steps| {
             let (mut memory, mut x, mut iterations) =
                 (Default::default(), black_box(start.clone()), 0);
-            let mut values = system.laws(&x);
+            let mut values = flow.laws(&x);
             for _ in 0..steps {
-                let start =
-                    StepStart { x: &x, time: 0.0, values, reference: values, allowed: None };
-                let Ok(taken) = scheme.step(&system, &start, h, &mut memory) else { break };
+                let reference = values.clone();
+                let start = StepStart { x: &x, time: 0.0, values, reference, allowed: None };
+                let taken = method.step(&flow, &start, h, &mut memory).expect("a step is taken");
                 iterations += taken.effort.iterations;
                 (x, values) = (taken.x, taken.values);
             }
-            Outcome { end: Y::Manifold::entries(&x), iterations }
+            Outcome { end: F::Space::numbers(&x), iterations }
         };
         Self { name: name.into(), run: Box::new(run), calls: None }
     }
@@ -143,6 +156,7 @@ fn rows() -> Vec<Row> {
         so3_nambu::rows(),
         chart_midpoint::rows(),
         dimension::rows(),
+        lattice::rows(),
     ];
     all.into_iter().flatten().collect()
 }

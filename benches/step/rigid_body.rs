@@ -108,6 +108,7 @@ pub(crate) fn rows() -> Vec<Row> {
             })
             .entropy(|p: &Vector3<Real>| p.norm_squared() * 0.5)
     };
+    let of_body = || body().build().expect(WELL);
     let calls = Rc::new(Cell::new(0));
     let count = Rc::clone(&calls);
     let counting = System::on(LieDual::so3())
@@ -121,12 +122,12 @@ pub(crate) fn rows() -> Vec<Row> {
     let analytic = System::on(LieDual::so3()).energy(Analytic(INERTIA)).entropy(AnalyticEntropy);
     let typed = System::on(LieDual::so3()).energy(Energy(INERTIA)).entropy(Entropy);
     let published = body().second_law(SecondLaw::Published).build().expect(WELL);
-    let [mean, itoh_abe] = [(); 2].map(|()| body().build().expect(WELL));
+    let [mean, itoh_abe] = [(); 2].map(|()| of_body());
     let scheme = Scheme::new(WeylMidpoint);
     let rows = vec![
-        Row::new("step/rigid_body/closure", body().build().expect(WELL), start, h)
+        Row::new("step/rigid_body/closure", of_body(), start, h)
             .counted(&calls, counting, start, h),
-        Row::new("step/rigid_body/erased", body().build().expect(WELL).erased(), start, h),
+        Row::new("step/rigid_body/erased", of_body().erased(), start, h),
         Row::new("step/rigid_body/typed", typed.build().expect(WELL), start, h),
         Row::new("step/rigid_body/analytic", analytic.build().expect(WELL), start, h),
         Row::by_hand("step/rigid_body/hand_coded", HandCoded::new(&INERTIA), start, h),
@@ -148,7 +149,13 @@ pub(crate) fn rows() -> Vec<Row> {
     ];
     // For quadratic fields on a flat space all of these are the midpoint rule.
     check(&rows, 1e-12);
-    rows
+    let stages = [
+        Row::by("step/rigid_body/order_5", DormandPrince5, of_body(), start, h),
+        Row::by("step/rigid_body/order_8", DormandPrince8, of_body(), start, h),
+        Row::by("step/rigid_body/gauss_2", Gauss::<2>, of_body(), start, h),
+        Row::by("step/rigid_body/radau_2", Radau::<2>, of_body(), start, h),
+    ];
+    rows.into_iter().chain(stages).collect()
 }
 
 /// By hand: analytic gradients and Jacobian, the same chord-Newton iteration.

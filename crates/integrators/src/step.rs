@@ -1,4 +1,4 @@
-//! What a run knows of a system and of a method.
+//! The interfaces between runs, systems and methods.
 //!
 //! A run needs little of a system: its laws, and how large things are. This is a [`Flow`]; every
 //! [`Metriplectic`](metriplectic_dynamics::Metriplectic) system is one. It knows of a method that it takes
@@ -6,7 +6,7 @@
 //! user does with a run, from [`Span`](crate::Span) to [`Checkpoint`](crate::Checkpoint), works with any flow
 //! and any method, by the trait [`Method`](crate::Method) that every stepper has.
 //!
-//! Nothing in this module knows of a method or of a run.
+//! This module knows of no method and of no run.
 
 mod control;
 pub mod dense;
@@ -16,10 +16,9 @@ mod evidence;
 pub(crate) mod exact;
 pub(crate) mod failure;
 mod flow;
-mod flow_error;
 mod initial_scales;
 mod memory;
-mod method_error;
+mod own_error;
 mod result;
 pub mod scales;
 mod start;
@@ -31,10 +30,9 @@ pub use control::Control;
 pub use error::StepError;
 pub use evidence::{Effort, EntropyStep, Evidence, LimitingSites, Promises, StageLaws};
 pub use flow::{Element, Flow, Laws, Recheck, StateSpace};
-pub use flow_error::FlowError;
 pub(crate) use initial_scales::classical_step;
 pub use memory::{Memory, RestoreError, Saved};
-pub use method_error::MethodError;
+pub use own_error::{FlowError, MethodError};
 pub use result::{Refusal, StepEnds, StepStart, Taken};
 pub use scales::Scales;
 pub use start::Numbers;

@@ -37,6 +37,27 @@ impl<M: Space, D> LocalField<M, D> for Absent {
     }
 }
 
+/// The sum of two functions.
+impl<M, D, F, G> LocalField<M, D> for (F, G)
+where
+    M: Space,
+    F: LocalField<M, D>,
+    G: LocalField<M, D>,
+{
+    const PRESENT: bool = F::PRESENT || G::PRESENT;
+
+    #[inline]
+    fn value(&self, x: &M::Point<f64>, data: &D) -> f64 {
+        self.0.value(x, data) + self.1.value(x, data)
+    }
+
+    #[inline]
+    fn jet(&self, x: &M::Point<f64>, data: &D) -> Jet1<M> {
+        let [f, g] = [self.0.jet(x, data), self.1.jet(x, data)];
+        Jet1 { value: f.value + g.value, df: f.df + g.df }
+    }
+}
+
 /// A [`ScalarField`], the same at every site or bond.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Uniform<F>(pub(crate) F);

@@ -57,9 +57,8 @@ use metriplectic_fields::{ChartPoint, Column, Scalar, Space};
 use nalgebra::{Const, SMatrix, SVector};
 use rand::{Rng, RngExt};
 
-use crate::euclidean::{components_are_velocities, sum_of_terms};
-use crate::flat::straight_lines;
-use crate::{Flat, Manifold, PointError};
+use crate::euclidean::{columns, translations};
+use crate::{Manifold, PointError};
 
 /// An open part of Rⁿ, in coordinates and with a metric that you choose. See the [module](mod@crate::chart).
 ///
@@ -97,46 +96,11 @@ impl<const N: usize> PartialEq for Chart<N> {
     }
 }
 
-impl<const N: usize> Space for Chart<N> {
-    type Dim = Const<N>;
-    type Velocity = Const<N>;
-    type Point<D: Scalar> = SVector<D, N>;
-
-    #[inline]
-    fn constant<D: Scalar>(x: &SVector<f64, N>) -> SVector<D, N> {
-        Column::embed(x)
-    }
-
-    #[inline]
-    fn real<D: Scalar>(x: &SVector<D, N>) -> SVector<f64, N> {
-        Column::real(x)
-    }
-
-    #[inline]
-    fn chart<D: Scalar>(x: &SVector<f64, N>, q: &SVector<D, N>) -> SVector<D, N> {
-        Column::from_index(|i| q[i] + x[i])
-    }
-
-    #[inline]
-    fn coordinates<D: Scalar>(x: &SVector<f64, N>, y: &SVector<D, N>) -> SVector<D, N> {
-        Column::from_index(|i| y[i] - x[i])
-    }
-
-    /// The chart is a translation.
-    #[inline]
-    fn stage_rates(
-        _: &SVector<f64, N>,
-        _: (&SVector<f64, N>, &SVector<f64, N>),
-        v: &SVector<f64, N>,
-    ) -> SVector<f64, N> {
-        *v
-    }
-
-    components_are_velocities!(N);
-}
+translations!(Chart);
 
 impl<const N: usize> Manifold for Chart<N> {
-    straight_lines!();
+    // The nearest point of the domain is not known, so `project` leaves a point where it is.
+    columns!();
 
     /// Returns 0 inside the domain and infinity outside, where the distance is not known.
     fn defect(&self, x: &SVector<f64, N>) -> f64 {
@@ -150,34 +114,6 @@ impl<const N: usize> Manifold for Chart<N> {
     #[inline]
     fn is_inside(&self, x: &SVector<f64, N>) -> bool {
         (self.domain)(x)
-    }
-
-    fn entries(x: &SVector<f64, N>) -> Vec<f64> {
-        x.iter().copied().collect()
-    }
-
-    fn assemble(next: &mut impl FnMut() -> f64) -> SVector<f64, N> {
-        Column::from_index(|_| next())
-    }
-
-    #[inline]
-    fn magnitude(x: &SVector<f64, N>) -> f64 {
-        Column::magnitude(x)
-    }
-
-    #[inline]
-    fn scales(x: &SVector<f64, N>) -> SVector<f64, N> {
-        x.abs()
-    }
-
-    #[inline]
-    fn pairing_size(w: &SVector<f64, N>, v: &SVector<f64, N>) -> f64 {
-        sum_of_terms(w, v)
-    }
-
-    /// Returns the point itself, because the nearest point of the domain is not known.
-    fn project(&self, x: &SVector<f64, N>) -> SVector<f64, N> {
-        *x
     }
 
     /// Draws a point of the domain by rejection, with entries in `−1 … 1`. If a thousand points are all outside,
@@ -202,8 +138,6 @@ impl<const N: usize> Manifold for Chart<N> {
         if (self.domain)(x) { Ok(()) } else { Err(PointError::OutsideChart) }
     }
 }
-
-impl<const N: usize> Flat for Chart<N> {}
 
 #[cfg(test)]
 mod tests {

@@ -164,7 +164,7 @@ pub(crate) fn line<M: Manifold>(x: &M::Point<f64>, u: &Vector<M>) -> StepPath<M>
     StepPath { z: ChartPoint::centre(&base), d, end: M::chart(x, u) }
 }
 
-/// The same with the derivatives along `u`: `ε₁` moves along the line, and `ε₂` changes `u`.
+/// Computes the line with the derivatives along `u`: `ε₁` moves along the line, and `ε₂` changes `u`.
 pub(crate) fn line_jet<M: Manifold>(x: &M::Point<f64>, u: &Vector<M>) -> StepPathJet<M> {
     let StepPath { z, d, end } = M::line(x, u);
     let zero = Matrix::<M>::zeros();

@@ -60,8 +60,8 @@ pub(crate) fn sum_of_terms<V: Column<f64>>(w: &V, v: &V) -> f64 {
     (0..V::LEN).fold(0.0, |sum, i| sum + (w[i] * v[i]).abs())
 }
 
-/// The charts of a vector space, and its membership: every finite column of numbers is a point.
-macro_rules! vector_space {
+/// The charts of a part of a vector space.
+macro_rules! translations {
     ($space:ident) => {
         impl<const N: usize> Space for $space<N> {
             type Dim = Const<N>;
@@ -101,46 +101,63 @@ macro_rules! vector_space {
             $crate::euclidean::components_are_velocities!(N);
         }
 
+        impl<const N: usize> $crate::Flat for $space<N> {}
+    };
+}
+pub(crate) use translations;
+
+/// The entries of points that are columns of numbers, their sizes, and straight lines between them.
+macro_rules! columns {
+    () => {
+        $crate::flat::straight_lines!();
+
+        fn entries(x: &SVector<f64, N>) -> Vec<f64> {
+            x.iter().copied().collect()
+        }
+
+        fn assemble(next: &mut impl FnMut() -> f64) -> SVector<f64, N> {
+            Column::from_index(|_| next())
+        }
+
+        #[inline]
+        fn magnitude(x: &SVector<f64, N>) -> f64 {
+            Column::magnitude(x)
+        }
+
+        #[inline]
+        fn scales(x: &SVector<f64, N>) -> SVector<f64, N> {
+            x.abs()
+        }
+
+        #[inline]
+        fn pairing_size(w: &SVector<f64, N>, v: &SVector<f64, N>) -> f64 {
+            $crate::euclidean::sum_of_terms(w, v)
+        }
+
+        /// Returns the point itself.
+        fn project(&self, x: &SVector<f64, N>) -> SVector<f64, N> {
+            *x
+        }
+    };
+}
+pub(crate) use columns;
+
+/// The charts of a vector space, and its membership: every finite column of numbers is a point.
+macro_rules! vector_space {
+    ($space:ident) => {
+        $crate::euclidean::translations!($space);
+
         impl<const N: usize> Manifold for $space<N> {
-            $crate::flat::straight_lines!();
+            $crate::euclidean::columns!();
 
             fn defect(&self, x: &SVector<f64, N>) -> f64 {
                 if x.is_finite() { 0.0 } else { f64::NAN }
-            }
-
-            fn entries(x: &SVector<f64, N>) -> Vec<f64> {
-                x.iter().copied().collect()
-            }
-
-            fn assemble(next: &mut impl FnMut() -> f64) -> SVector<f64, N> {
-                Column::from_index(|_| next())
-            }
-
-            #[inline]
-            fn magnitude(x: &SVector<f64, N>) -> f64 {
-                Column::magnitude(x)
-            }
-
-            #[inline]
-            fn scales(x: &SVector<f64, N>) -> SVector<f64, N> {
-                x.abs()
-            }
-
-            #[inline]
-            fn pairing_size(w: &SVector<f64, N>, v: &SVector<f64, N>) -> f64 {
-                $crate::euclidean::sum_of_terms(w, v)
-            }
-
-            fn project(&self, x: &SVector<f64, N>) -> SVector<f64, N> {
-                *x
             }
 
             fn random(&self, rng: &mut impl Rng) -> SVector<f64, N> {
                 Column::from_index(|_| rng.random_range(-1.0..1.0))
             }
         }
-
-        impl<const N: usize> $crate::Flat for $space<N> {}
     };
 }
 pub(crate) use vector_space;

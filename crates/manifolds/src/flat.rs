@@ -122,7 +122,7 @@ impl<M: Flat + Space<Dim = Const<N>>, const N: usize> Riemannian<M> for Constant
     straight_geodesics!();
 }
 
-/// What rounding loses of a translation by `v`.
+/// Computes the digits that rounding loses of a translation by `v`.
 #[inline]
 pub(crate) fn lost_digits<M: Space>(
     x: &M::Point<f64>,

@@ -231,7 +231,7 @@ pub(crate) fn travel<M: Space, Y: State>(
 ///
 /// # Errors
 ///
-/// Those of [`travel`].
+/// The errors of [`travel`].
 pub(crate) fn follow<M: Manifold, D: Scalar>(
     field: &impl MatrixField<M>,
     x: &ChartPoint<M, D>,
@@ -266,7 +266,7 @@ impl<M: Manifold> Arrival<M> {
     ///
     /// # Errors
     ///
-    /// Those of [`travel`].
+    /// The errors of [`travel`].
     pub(crate) fn of(
         field: &impl MatrixField<M>,
         x: &M::Point<f64>,
@@ -322,7 +322,7 @@ fn centred_real<M: Space>(
 ///
 /// # Errors
 ///
-/// Those of [`follow`].
+/// The errors of [`follow`].
 pub(crate) fn follow_real<M: Manifold>(
     field: &impl MatrixField<M>,
     x: &M::Point<f64>,
@@ -341,7 +341,7 @@ pub(crate) fn acceleration<M: Space>(
     bend(&metric_jet(field, x, &Vector::<M>::zero()), v)
 }
 
-/// The same from the metric there: `g a = ½∇(vᵀ g v) − (∂_v g) v`.
+/// Computes the acceleration from the metric at a point: `g a = ½∇(vᵀ g v) − (∂_v g) v`.
 fn bend<M: Space>(g: &MatrixJet<M>, v: &Vector<M>) -> Option<Vector<M>> {
     let dg_v = along_slopes::<M>(&g.slopes, v);
     g.value.solve(&(dg_v.transpose_times(v) * 0.5 - dg_v * *v))

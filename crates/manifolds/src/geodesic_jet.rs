@@ -107,7 +107,7 @@ impl<M: Manifold> ArrivalJet<M> {
     ///
     /// # Errors
     ///
-    /// Those of [`travel`].
+    /// The errors of [`travel`].
     pub(crate) fn of(
         field: &impl MatrixField<M>,
         start: &GeodesicJet<M>,
@@ -152,7 +152,7 @@ impl<M: Manifold> ArrivalJet<M> {
 ///
 /// # Errors
 ///
-/// Those of [`travel`].
+/// The errors of [`travel`].
 #[cfg(feature = "argmin")]
 pub(crate) fn follow<M: Manifold>(
     field: &impl MatrixField<M>,

@@ -1,6 +1,6 @@
 //! The laws of manifolds, metrics and retractions, and the functions that check them.
 //!
-//! The same line checks a manifold, metric or retraction that you write and those of this crate.
+//! One line checks a manifold, metric or retraction, of your own or of this crate.
 
 use approx::AbsDiffEq;
 use metriplectic_fields::{

@@ -76,7 +76,7 @@ impl<const N: usize> LieDual<N> {
     ///
     /// # Errors
     ///
-    /// Those of [`LieAlgebra::new`].
+    /// The errors of [`LieAlgebra::new`].
     pub fn new(constants: &[[[f64; N]; N]; N]) -> Result<Self, AlgebraError> {
         LieAlgebra::new(constants).map(Self::of)
     }

@@ -59,7 +59,7 @@ pub trait Riemannian<M: Space> {
     ///
     /// # Errors
     ///
-    /// Those of [`exp`](Self::exp).
+    /// The errors of [`exp`](Self::exp).
     fn end(&self, x: &M::Point<f64>, v: &Vector<M>) -> Result<M::Point<f64>, MetricError> {
         Ok(self.exp(&ChartPoint::centre(x), v)?.0.point())
     }
@@ -69,7 +69,7 @@ pub trait Riemannian<M: Space> {
     ///
     /// # Errors
     ///
-    /// Those of [`exp`](Self::exp).
+    /// The errors of [`exp`](Self::exp).
     fn along(
         &self,
         x: &M::Point<f64>,
@@ -89,7 +89,7 @@ pub trait Riemannian<M: Space> {
     ///
     /// # Errors
     ///
-    /// Those of [`exp`](Self::exp).
+    /// The errors of [`exp`](Self::exp).
     #[inline]
     fn weyl_path(&self, x: &M::Point<f64>, d: &Vector<M>) -> Result<StepPath<M>, MetricError> {
         let StepPathJet { z, d, end, .. } = self.weyl_jet(x, d)?;
@@ -100,7 +100,7 @@ pub trait Riemannian<M: Space> {
     ///
     /// # Errors
     ///
-    /// Those of [`exp`](Self::exp).
+    /// The errors of [`exp`](Self::exp).
     fn weyl_jet(&self, x: &M::Point<f64>, d: &Vector<M>) -> Result<StepPathJet<M>, MetricError>;
 
     /// Computes the length `√G(v, v)` of a tangent vector at a real point.
@@ -118,7 +118,7 @@ pub trait Riemannian<M: Space> {
     ///
     /// # Errors
     ///
-    /// Those of [`log`](Self::log).
+    /// The errors of [`log`](Self::log).
     fn distance(&self, x: &M::Point<f64>, y: &M::Point<f64>) -> Result<f64, MetricError> {
         self.norm(x, &self.log(x, y)?)
     }
@@ -177,7 +177,7 @@ pub trait Riemannian<M: Space> {
     ///
     /// # Errors
     ///
-    /// Those of [`at`](Self::at).
+    /// The errors of [`at`](Self::at).
     #[inline]
     fn jet(&self, x: &M::Point<f64>) -> Result<MetricJet<M, Self>, MetricError>
     where

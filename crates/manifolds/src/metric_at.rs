@@ -10,7 +10,7 @@ use crate::{MetricError, Riemannian};
 /// The derivatives `∂g/∂qᵏ` of a metric along the chart.
 pub type MetricSlopes<M> = <<M as Space>::Dim as Dimension>::Array<Matrix<M>>;
 
-/// The same; `None` for a metric that is constant by construction.
+/// The derivatives of a metric; `None` if it is constant by construction.
 pub type Slopes<M> = Option<MetricSlopes<M>>;
 
 /// A metric at one point of a chart. What is asked for is evaluated once, and kept for all that need it there:
@@ -75,7 +75,7 @@ impl<'a, M: Space, G: Riemannian<M>, D: Scalar> MetricAt<'a, M, G, D> {
     ///
     /// # Errors
     ///
-    /// Those of [`inner`](Self::inner), and [`MetricError::NotFinite`] beyond the range of numbers.
+    /// The errors of [`inner`](Self::inner), and [`MetricError::NotFinite`] beyond the range of numbers.
     #[inline]
     pub fn volume_density(&self) -> Result<D, MetricError> {
         G::volume_density(self.inner()?)
@@ -87,7 +87,7 @@ impl<M: Space, G: Riemannian<M>> MetricAt<'_, M, G> {
     ///
     /// # Errors
     ///
-    /// Those of [`inner`](Self::inner).
+    /// The errors of [`inner`](Self::inner).
     #[inline]
     pub fn slopes(&self) -> Result<&Slopes<M>, MetricError> {
         if let Some(slopes) = self.slopes.get() {

@@ -18,13 +18,13 @@ pub enum MetricError {
         /// Its value.
         value: f64,
     },
-    /// What is computed of a metric and of points is NaN, because they are, or beyond the range of
+    /// A quantity of a metric and of points is NaN, because they are, or beyond the range of
     /// numbers.
     #[error(
         "{quantity} is {value}, which is not a finite number; take finite points, closer together"
     )]
     NotFinite {
-        /// What is not finite.
+        /// The quantity that is not finite.
         quantity: &'static str,
         /// Its value.
         value: f64,

@@ -171,7 +171,7 @@ pub(crate) fn aim<M: Manifold>(
     newton::solve(&shooting, Pieces { corners, velocities }, LIMITS).ok()
 }
 
-/// What Newton's method may take for a path.
+/// The limits of Newton's method for a path.
 const LIMITS: Limits = Limits { iterations: 12, halvings: 0 };
 
 /// The last correction of a path, relative to a piece, that single shooting can take over from.

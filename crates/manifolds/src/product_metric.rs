@@ -41,7 +41,7 @@ impl<'a, A: Times<B>, B: Space, G: Split<A, B>, D: Scalar> MetricAt<'a, Product<
     ///
     /// # Errors
     ///
-    /// Those of [`inner`](MetricAt::inner).
+    /// The errors of [`inner`](MetricAt::inner).
     #[inline]
     pub fn halves<'b>(
         &self,

@@ -32,7 +32,7 @@ pub trait Retraction<M: Manifold, G: Riemannian<M>> {
     ///
     /// # Errors
     ///
-    /// Those of [`step_path`](Self::step_path).
+    /// The errors of [`step_path`](Self::step_path).
     #[inline]
     fn real_step_path(
         &self,
@@ -47,7 +47,7 @@ pub trait Retraction<M: Manifold, G: Riemannian<M>> {
     ///
     /// # Errors
     ///
-    /// Those of [`step_path`](Self::step_path).
+    /// The errors of [`step_path`](Self::step_path).
     #[inline]
     fn end(
         &self,
@@ -62,7 +62,7 @@ pub trait Retraction<M: Manifold, G: Riemannian<M>> {
     ///
     /// # Errors
     ///
-    /// Those of [`step_path`](Self::step_path).
+    /// The errors of [`step_path`](Self::step_path).
     #[inline]
     fn along(&self, metric: &G, x: &M::Point<f64>, u: &Vector<M>) -> Result<Nodes<M>, MetricError> {
         Nodes::of(|t| metric.along(x, u, t))
@@ -90,7 +90,7 @@ pub trait Retraction<M: Manifold, G: Riemannian<M>> {
     ///
     /// # Errors
     ///
-    /// Those of [`step_path`](Self::step_path).
+    /// The errors of [`step_path`](Self::step_path).
     fn step_path_jet(
         &self,
         metric: &G,
@@ -137,7 +137,7 @@ impl<M: Space> Nodes<M> {
     ///
     /// # Errors
     ///
-    /// Those of the curve.
+    /// The errors of the curve.
     #[inline]
     pub fn of(
         at: impl Fn(f64) -> Result<M::Point<Real>, MetricError>,

@@ -12,7 +12,7 @@ use crate::{Manifold, Riemannian, StepPathJet};
 
 /// Geodesics that a logarithm may follow.
 const SHOTS: u32 = 500;
-/// What Newton's method may take for one end. At first no correction is halved, because there are better
+/// The limits of Newton's method for one end. At first no correction is halved, because there are better
 /// aims to try.
 const EAGER: Limits = Limits { iterations: 16, halvings: 0 };
 const PATIENT: Limits = Limits { iterations: 16, halvings: 6 };

@@ -2,11 +2,11 @@
 
 use std::{env, error::Error};
 
-use clap::{Arg, ArgAction, Command, builder::RangedU64ValueParser};
 use metriplectic_dynamics::{Metriplectic, system::Point};
 use metriplectic_integrators::{Certificate, Method, Scheme, Span, State};
 use metriplectic_manifolds::{Manifold, WeylMidpoint};
 
+use crate::options::{Answer, Options};
 use crate::{Panel, Progress, Report};
 
 /// States that a figure and a data file hold, at most.
@@ -70,7 +70,7 @@ impl Example {
             format!("Number of steps [default: {steps}]"),
             format!("Size of a step [default: {step_size:?}]"),
         ];
-        Self::read(command(about, Some(help)), steps, step_size)
+        Self::read(&Options::of_a_run(about, help), steps, step_size)
     }
 
     /// Reads the command line of an example whose steps follow the motion, up to a largest one, until it
@@ -81,41 +81,39 @@ impl Example {
             "Number of steps, at most [default: until the end]".to_owned(),
             format!("Size of the largest step [default: {largest:?}]"),
         ];
-        Self::read(command(about, Some(help)), usize::MAX, largest)
+        Self::read(&Options::of_a_run(about, help), usize::MAX, largest)
     }
 
     /// Reads the command line of a study of many runs, which has the option `--json` alone.
     #[must_use]
     pub fn study(about: &'static str) -> Self {
-        Self::read(command(about, None), 0, 0.0)
+        Self::read(&Options::new(about), 0, 0.0)
     }
 
     /// Reads the command line of a sweep: `--json`, `--merge`, and the shard, which
     /// `Shard::from_environment` reads by itself.
     #[must_use]
     pub fn sweep(about: &'static str) -> Self {
-        Self::read(sweep_command(about), 0, 0.0)
+        Self::read(&Options::of_a_sweep(about), 0, 0.0)
     }
 
-    fn read(command: Command, steps: usize, step_size: f64) -> Self {
-        Self::parsed(command, env::args_os(), steps, step_size).unwrap_or_else(|error| error.exit())
+    fn read(options: &Options, steps: usize, step_size: f64) -> Self {
+        let line = env::args().skip(1);
+        Self::parsed(options, line, steps, step_size).unwrap_or_else(|answer| answer.exit())
     }
 
-    fn parsed<T: Into<std::ffi::OsString> + Clone>(
-        command: Command,
-        line: impl IntoIterator<Item = T>,
+    fn parsed(
+        options: &Options,
+        line: impl IntoIterator<Item = String>,
         steps: usize,
         step_size: f64,
-    ) -> Result<Self, clap::Error> {
-        let given = command.try_get_matches_from(line)?;
-        // A study has neither option.
-        let asked = |name| given.try_get_one(name).ok().flatten().copied();
-        let size = given.try_get_one("step-size").ok().flatten().copied();
+    ) -> Result<Self, Answer> {
+        let given = options.parse(line)?;
         Ok(Self {
-            json: given.get_flag("json"),
-            steps: asked("steps").unwrap_or(steps),
-            step_size: size.unwrap_or(step_size),
-            merge: given.try_get_one::<bool>("merge").ok().flatten().copied().unwrap_or(false),
+            json: given.contains_key("json"),
+            steps: given.get("steps").map_or(Ok(steps), |text| count(text))?,
+            step_size: given.get("step-size").map_or(Ok(step_size), |text| size(text))?,
+            merge: given.contains_key("merge"),
             folder: None,
         })
     }
@@ -233,66 +231,27 @@ pub(crate) fn name() -> String {
     path.file_stem().map_or_else(|| "example".into(), |name| name.to_string_lossy().into_owned())
 }
 
-/// The options, with the help of those of a run.
-fn command(about: &'static str, run: Option<[String; 2]>) -> Command {
-    let json = Arg::new("json").long("json").action(ArgAction::SetTrue);
-    let options = Command::new("example")
-        .about(about)
-        .arg(json.help("Print one JSON value, in the place of text"));
-    let Some([steps, size]) = run else { return options };
-    let count = RangedU64ValueParser::<usize>::new().range(1..);
-    options
-        .arg(Arg::new("steps").long("steps").value_name("N").value_parser(count).help(steps))
-        .arg(
-            Arg::new("step-size")
-                .long("step-size")
-                .value_name("h")
-                .value_parser(positive)
-                .allow_negative_numbers(true)
-                .help(size),
-        )
+fn count(text: &str) -> Result<usize, Answer> {
+    let count = text.parse().ok().filter(|&count| count > 0);
+    count.ok_or_else(|| Answer::Mistake(format!("`{text}` is not a number of steps")))
 }
 
-/// The options of a sweep.
-fn sweep_command(about: &'static str) -> Command {
-    let merge = Arg::new("merge").long("merge").action(ArgAction::SetTrue);
-    let shard = Arg::new("shard").long("shard").value_name("i/n");
-    let shards = Arg::new("shards").long("shards").value_name("n");
-    command(about, None)
-        .arg(shard.help("Run the rows of one of n shards, counted from 0, into a journal"))
-        .arg(shards.help("The number of shards, where the scheduler does not say it (PBS)"))
-        .arg(merge.help("Put the journals of all shards together, and draw"))
-        .after_help(SHARDS)
-}
-
-/// How a sweep is run on many machines.
-const SHARDS: &str = "\
-Shards share the rows of a sweep. Each one writes a journal into the current folder, and goes on from it when
-it is started again. All of these run four shards of the program:
-
-  mpirun -n 4 ./sweep                            OpenMPI or MPICH say the rank and the size
-  sbatch --array=0-3 job.sh                      SLURM says the task of the array; job.sh runs ./sweep
-  qsub -t 1-4 job.sh                             Grid Engine
-  qsub -J 0-3 job.sh                             PBS; job.sh runs ./sweep --shards 4
-  seq 0 3 | parallel ./sweep --shard {}/4        GNU parallel, on one machine or many
-  ./sweep --shard 0/4                            any other way, in four places
-
-Then ./sweep --merge reads the journals, names rows that are missing, and draws the table of all rows.";
-
-fn positive(text: &str) -> Result<f64, String> {
-    let value: f64 = text.parse().map_err(|_| format!("`{text}` is not a number"))?;
-    let valid = value.is_finite() && value > 0.0;
-    if valid { Ok(value) } else { Err(format!("a step size is positive and finite, not {value}")) }
+fn size(text: &str) -> Result<f64, Answer> {
+    let size = text.parse().ok().filter(|size: &f64| size.is_finite() && *size > 0.0);
+    size.ok_or_else(|| Answer::Mistake(format!("a step size is positive and finite, not `{text}`")))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn parsed(line: &[&str]) -> Result<Example, clap::Error> {
+    fn of(options: &Options, line: &[&str]) -> Result<Example, Answer> {
+        Example::parsed(options, line.iter().map(|&word| word.to_owned()), 3, 0.1)
+    }
+
+    fn parsed(line: &[&str]) -> Result<Example, Answer> {
         let help = ["Number of steps [default: 3]", "Size of a step [default: 0.1]"];
-        let line = ["example"].iter().chain(line).copied();
-        Example::parsed(command("A test.", Some(help.map(str::to_owned))), line, 3, 0.1)
+        of(&Options::of_a_run("A test.", help.map(str::to_owned)), line)
     }
 
     #[test]
@@ -301,30 +260,40 @@ mod tests {
         assert_eq!((asked.json, asked.steps, asked.step_size), (true, 12, 0.5));
         let none = parsed(&[]).unwrap();
         assert_eq!((none.json, none.steps, none.step_size), (false, 3, 0.1));
-        let study = Example::parsed(command("A study.", None), ["example", "--json"], 0, 0.0);
-        assert!(study.unwrap().json);
-        let sweep = |line: &[&str]| {
-            let line = ["example"].iter().chain(line).copied();
-            Example::parsed(sweep_command("A sweep."), line, 0, 0.0)
-        };
+        assert!(of(&Options::new("A study."), &["--json"]).unwrap().json);
+        let sweep = |line: &[&str]| of(&Options::of_a_sweep("A sweep."), line);
         assert!(sweep(&["--merge", "--json"]).unwrap().merge);
         assert!(!sweep(&["--shard", "3/16"]).unwrap().merge);
-        assert!(sweep(&["--help"]).unwrap_err().to_string().contains("--array=0-3"));
-        assert!(Example::parsed(command("", None), ["example", "--steps", "3"], 0, 0.0).is_err());
+        assert!(sweep(&["--help"]).unwrap_err().text().contains("--array=0-3"));
     }
 
     #[test]
     fn help_says_what_the_example_is_and_its_defaults() {
-        let help = parsed(&["--help"]).unwrap_err().to_string();
-        for part in ["A test.", "[default: 3]", "[default: 0.1]", "--json"] {
-            assert!(help.contains(part), "{help}");
+        for flag in ["--help", "-h"] {
+            let help = parsed(&[flag]).unwrap_err();
+            for part in ["A test.", "[default: 3]", "[default: 0.1]", "--json"] {
+                assert!(help.text().contains(part), "{help:?}");
+            }
         }
     }
 
     #[test]
-    fn impossible_steps_are_refused() {
-        for line in ["--steps=0", "--step-size=0", "--step-size=-1", "--step-size=NaN"] {
-            assert!(parsed(&[line]).is_err(), "{line}");
+    fn mistakes_are_refused() {
+        for line in [
+            "--steps=0",
+            "--steps=x",
+            "--steps",
+            "--step-size=0",
+            "--step-size=-1",
+            "--step-size=NaN",
+            "--json=1",
+            "--merge",
+            "--stepsize=1",
+            "12",
+        ] {
+            let answer = parsed(&[line]);
+            assert!(matches!(answer, Err(Answer::Mistake(_))), "{line}: {answer:?}");
         }
+        assert!(of(&Options::new(""), &["--steps", "3"]).is_err());
     }
 }

@@ -67,6 +67,7 @@ mod header;
 mod log_log;
 mod map;
 mod marker;
+mod options;
 mod panel;
 mod panels;
 mod student;

@@ -1,4 +1,4 @@
-//! What is done where the iteration does not solve a step from its guess; in the order of the
+//! The fallbacks where the iteration does not solve a step from its guess, in the order of the
 //! [module](super).
 
 use metriplectic_dynamics::Metriplectic;
@@ -9,14 +9,14 @@ use super::solve::{Budget, Derivatives, Solved, Unsolved};
 use super::tableau::STAGES;
 use crate::round_off::drift;
 use crate::step::Effort;
-use crate::step::failure::{Cause, Fallbacks};
+use crate::step::failure::{self, Cause, Fallbacks};
 
 /// A step that was not taken.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct StepFailure {
     /// Why it was not taken.
     pub(super) cause: Cause,
-    /// What was done.
+    /// The effort of the tries.
     pub(super) effort: Effort,
 }
 
@@ -25,15 +25,10 @@ const WHOLE: Budget =
     Budget { corrections: 30, tolerance: 1.0, derivatives: Derivatives::InTheMiddle };
 /// Corrections from rest.
 const FROM_REST: Budget = Budget { corrections: 20, ..WHOLE };
-/// The same with the derivatives of all stages.
+/// Corrections with the derivatives of all stages.
 const FULL: Budget = Budget { derivatives: Derivatives::OfAllStages, ..WHOLE };
-/// Those of a step on the way to a larger one, which need not be solved to round-off.
+/// Corrections of a step on the way to a larger one, which need not be solved to round-off.
 const ON_THE_WAY: Budget = Budget { corrections: 8, tolerance: 1e6, ..FULL };
-/// Steps of growing sizes that may be tried to get to the size that is asked for.
-const INCREMENTS: usize = 200;
-/// The fraction of what has been reached below which an increment of the size means that the branch of solutions
-/// ends there.
-const LEAST: f64 = 1e-4;
 
 /// Solves the equation of a step from a guess, from rest, or by continuation in its size.
 pub(super) fn solve<Y: Metriplectic>(
@@ -87,26 +82,15 @@ fn continue_in_step_size<Y: Metriplectic>(
     effort: &mut Effort,
 ) -> Option<Unknowns<Y>> {
     effort.continued += 1;
-    let mut k = [Vector::<Y::Manifold>::zero(); STAGES];
-    let (mut fraction, mut increment) = (0.0, 0.125);
-    for _ in 0..INCREMENTS {
-        let next = f64::min(fraction + increment, 1.0);
+    let rest = [Vector::<Y::Manifold>::zero(); STAGES];
+    failure::continue_in_step_size(rest, |(k, fraction), next| {
         // The same displacements: once a step is long for friction they hardly change with its size.
         let guess = if fraction > 0.0 { k.map(|k| k * (fraction / next)) } else { k };
-        let part = equation.of_fraction(next);
-        let solved = part.solve(guess, ON_THE_WAY);
+        let solved = equation.of_fraction(next).solve(guess, ON_THE_WAY);
         effort.iterations += match &solved {
             Ok(solved) => solved.evaluations,
             Err(unsolved) => unsolved.evaluations,
         };
-        match solved {
-            Ok(solved) if next >= 1.0 => return Some(solved.k),
-            Ok(solved) => (k, fraction, increment) = (solved.k, next, 2.0 * increment),
-            Err(_) => increment *= 0.25,
-        }
-        if increment <= LEAST * fraction {
-            return None;
-        }
-    }
-    None
+        Some(solved.ok()?.k)
+    })
 }

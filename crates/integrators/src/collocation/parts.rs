@@ -13,7 +13,7 @@ use super::linear::Linear;
 use super::memory::StageMemory;
 use super::step::try_step;
 use super::tableau::{STAGES, Tableau};
-use crate::step::failure::{Cause, Fallbacks};
+use crate::step::failure::{Cause, Fallbacks, smallest_part};
 use crate::step::{Dim, Effort, Evidence, Flow as _, Laws, Start, StepError, Taken};
 
 /// The rate `|K'|` times the size of the first part, where friction is stiff.
@@ -60,7 +60,7 @@ struct Parts<'a, Y: Metriplectic> {
     tableau: &'static Tableau,
     splits: usize,
     system: &'a Y,
-    /// What all of the parts took.
+    /// The effort of all parts.
     effort: Effort,
 }
 
@@ -81,7 +81,7 @@ fn after<'a, Y: Metriplectic>(start: &Start<'a, Y>, before: &'a Taken<Y>, h: f64
     Start { x: &before.x, h, values: laws, accumulated_error, ..*start }
 }
 
-/// What two parts of a step that damps tell: what the first one has not damped the second one may damp.
+/// Adds the evidence of two parts of a step that damps: friction that the first one has not damped the second one may damp.
 fn together<Y: Metriplectic>(first: &Taken<Y>, second: &Taken<Y>) -> Evidence {
     let friction = second.evidence.friction;
     Evidence { friction, ..first.evidence.and(second.evidence) }
@@ -123,7 +123,7 @@ impl<Y: Metriplectic> Parts<'_, Y> {
         start: &Start<'_, Y>,
         memory: &mut StageMemory<Dim<Y>>,
     ) -> Result<Taken<Y>, Failed<Y>> {
-        let least = smallest(1.0, self.splits);
+        let least = smallest_part(1.0, self.splits);
         let (mut done, mut fraction) = (0.0, self.first_part(start).max(least));
         // What has to be done before the rest is tried again.
         let mut enough = 0.0;
@@ -204,7 +204,7 @@ impl<Y: Metriplectic> Parts<'_, Y> {
         }
     }
 
-    /// What a user is told of a step that was not solved, by what became of its smallest part.
+    /// Explains a step that was not solved by the failure of its smallest part.
     #[cold]
     fn error(&self, start: &Start<'_, Y>, failed: &Failed<Y>) -> StepError {
         let &Start { time, h, values, .. } = start;
@@ -212,7 +212,7 @@ impl<Y: Metriplectic> Parts<'_, Y> {
         if let Some(error) = failed.failure.cause.first_law(time, h) {
             return error;
         }
-        let suggested = smallest(h, self.splits);
+        let suggested = smallest_part(h, self.splits);
         let part = StageEquation::new(self.tableau, self.system, start.x, values, suggested);
         let rest = [Vector::<Y::Manifold>::zero(); STAGES];
         let residual = part.evaluate(&rest).map_or(f64::INFINITY, |at| {
@@ -234,9 +234,4 @@ impl<Y: Metriplectic> Parts<'_, Y> {
             _ => StepError::NotConverged { time, h, residual, tried, suggested },
         }
     }
-}
-
-/// The size of the smallest part of a step that was split so many times.
-fn smallest(h: f64, splits: usize) -> f64 {
-    (0..splits).fold(h, |part, _| 0.5 * part)
 }

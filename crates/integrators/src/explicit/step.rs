@@ -74,13 +74,12 @@ fn halves<F: StageFlow>(
     }
     let (start, h) = (trial.start, 0.5 * trial.h);
     let first = halves(&Trial { h, ..*trial }, memory, left - 1)?;
-    let middle = StepStart {
-        x: &first.x,
-        time: start.time + h,
-        values: first.values.clone(),
-        reference: start.reference.clone(),
-        allowed: start.allowed.clone(),
-    };
+    let mut reference = start.reference.clone();
+    if first.evidence.dissipates {
+        reference.entropy = first.values.entropy;
+    }
+    let (x, values, time) = (&first.x, first.values.clone(), start.time + h);
+    let middle = StepStart { x, time, values, reference, allowed: start.allowed.clone() };
     let second = Trial { tableau: trial.tableau, flow: trial.flow, start: &middle, h };
     let mut second = halves(&second, memory, left - 1)?;
     second.effort += first.effort;
@@ -217,7 +216,7 @@ fn held<F: StageFlow>(start: &StepStart<'_, F>) -> Taken<F> {
     Taken { x, values, evidence, effort: Effort::default() }
 }
 
-/// What is known at a state.
+/// Evaluates the velocity and the production at a state.
 #[inline]
 fn here_at<F: StageFlow>(
     flow: &F,

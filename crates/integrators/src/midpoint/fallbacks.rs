@@ -1,4 +1,4 @@
-//! What is done where Newton's method does not solve the equation of a step; in the order of the
+//! The fallbacks where Newton's method does not solve the equation of a step, in the order of the
 //! [module](super).
 
 use metriplectic_dynamics::{Metriplectic, system::Point};
@@ -11,7 +11,7 @@ use super::memory::MemoryOf;
 use super::scheme::Scheme;
 use crate::discrete_gradient::DiscreteGradient;
 use crate::newton::{Equation, Inverse, Iterate, Newton, Root};
-use crate::step::failure::{Cause, Fallbacks};
+use crate::step::failure::{Cause, Fallbacks, continue_in_step_size, smallest_part};
 use crate::step::{Dim, Effort, Flow as _, Laws, Start, StepError, Taken};
 
 /// A step that was not taken.
@@ -21,7 +21,7 @@ pub(super) struct StepFailure {
     pub(super) residual: f64,
     /// Why it was not taken.
     pub(super) cause: Cause,
-    /// What was done.
+    /// The effort of the tries.
     pub(super) effort: Effort,
 }
 
@@ -29,7 +29,7 @@ pub(super) struct StepFailure {
 struct Halves<'a, Y: Metriplectic, R, W> {
     scheme: &'a Scheme<R, W>,
     system: &'a Y,
-    /// What all of the parts took.
+    /// The effort of all parts.
     effort: Effort,
 }
 
@@ -60,7 +60,7 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
         }
     }
 
-    /// What a user is told of a step that was not solved, by what became of its smallest part, which
+    /// Explains a step that was not solved by the failure of its smallest part, which
     /// starts at `x`.
     #[cold]
     fn error<Y>(
@@ -193,7 +193,7 @@ where
     Ok((root, effort))
 }
 
-/// What comes after Newton's method from the guess.
+/// The tries after Newton's method from the guess.
 struct Rescue<'a, 'b, Y: Metriplectic, R, W> {
     newton: &'a Newton,
     equation: &'a Residual<'b, Y, R, W>,
@@ -265,39 +265,27 @@ where
         self.effort.continued += 1;
         // The points on the way need not be solved to round-off.
         let newton = Newton { tolerance: 1e3, iterations: DIRECT, halvings: 2, ..*self.newton };
-        let (mut u, mut fraction, mut increment) = (Vector::<Y::Manifold>::zero(), 0.0, 0.125);
-        for _ in 0..STAGES {
-            let next = f64::min(fraction + increment, 1.0);
+        continue_in_step_size(Vector::<Y::Manifold>::zero(), |(u, fraction), next| {
             let equation = self.equation.of_fraction(next);
             self.effort.iterations += 1;
-            let near = equation.linearise(&u).and_then(|at| {
-                let step = at.jacobian.solve(&at.residual)?;
-                // The branch begins as a straight line: the implicit displacement is the explicit one.
-                let bends = (step - at.residual).magnitude() > NEARBY * step.magnitude();
-                if fraction <= 0.0 && bends {
-                    return None;
-                }
-                let predicted = u - step;
-                let solved = newton.solve_near(&equation, &predicted, &mut None);
-                self.effort.iterations += iterations(&solved);
-                let root = solved.ok()?.u;
-                let error = (root - predicted).magnitude();
-                (error <= NEARBY * (root - u).magnitude()).then_some(root)
-            });
-            match near {
-                Some(root) if next >= 1.0 => return Some(root),
-                Some(root) => (u, fraction, increment) = (root, next, 2.0 * increment),
-                None => increment *= 0.25,
-            }
-            if increment <= LEAST * fraction {
+            let at = equation.linearise(&u)?;
+            let step = at.jacobian.solve(&at.residual)?;
+            // The branch begins as a straight line: the implicit displacement is the explicit one.
+            let bends = (step - at.residual).magnitude() > NEARBY * step.magnitude();
+            if fraction <= 0.0 && bends {
                 return None;
             }
-        }
-        None
+            let predicted = u - step;
+            let solved = newton.solve_near(&equation, &predicted, &mut None);
+            self.effort.iterations += iterations(&solved);
+            let root = solved.ok()?.u;
+            let error = (root - predicted).magnitude();
+            (error <= NEARBY * (root - u).magnitude()).then_some(root)
+        })
     }
 }
 
-/// What Newton's method has cost.
+/// The linear systems that Newton's method has solved.
 fn iterations<M: Space, E>(solved: &Result<Root<M, E>, Iterate<M>>) -> usize {
     solved.as_ref().map_or_else(|best| best.iterations, |root| root.iterations)
 }
@@ -307,11 +295,6 @@ const NEARBY: f64 = 0.1;
 /// Linear systems after which a way from rest is no longer direct, and its end no longer likely to be
 /// the solution that belongs to the start.
 const DIRECT: usize = 8;
-/// Steps of growing sizes that may be tried to get to the size that is asked for.
-const STAGES: usize = 200;
-/// The fraction of what has been reached below which an increment of the size means that the branch of
-/// solutions ends there.
-const LEAST: f64 = 1e-4;
 
 /// Whether it is the edge of the domain that stops Newton's method at `u`: its correction leads out,
 /// cut to the length of the step, because a far longer one, from a Jacobian that is nearly singular,
@@ -321,9 +304,4 @@ fn at_edge<M: Manifold>(equation: &impl Equation<M>, u: &Vector<M>) -> bool {
     let Some(step) = at.jacobian.solve(&at.residual) else { return false };
     let fraction = (u.magnitude() + at.residual.magnitude()) / step.magnitude();
     equation.evaluate(&(*u - step * fraction.min(1.0))).is_none()
-}
-
-/// The size of the smallest part of a step that was split `splits` times.
-fn smallest_part(h: f64, splits: usize) -> f64 {
-    (0..splits).fold(h, |part, _| 0.5 * part)
 }

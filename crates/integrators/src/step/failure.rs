@@ -33,3 +33,34 @@ impl Cause {
         }
     }
 }
+
+/// Increments of the step size that may be tried to get to the size that is asked for.
+const INCREMENTS: usize = 200;
+/// The fraction of the size reached below which an increment means that the branch of solutions ends there.
+const LEAST: f64 = 1e-4;
+
+/// Follows the solutions that begin at rest to the whole step, by fractions of its size: an increment doubles after
+/// a solution and is quartered after a failure. `solve` is given a solution with its fraction, and the next fraction.
+pub(crate) fn continue_in_step_size<T: Copy>(
+    rest: T,
+    mut solve: impl FnMut((T, f64), f64) -> Option<T>,
+) -> Option<T> {
+    let (mut reached, mut increment) = ((rest, 0.0), 0.125);
+    for _ in 0..INCREMENTS {
+        let next = f64::min(reached.1 + increment, 1.0);
+        match solve(reached, next) {
+            Some(found) if next >= 1.0 => return Some(found),
+            Some(found) => (reached, increment) = ((found, next), 2.0 * increment),
+            None => increment *= 0.25,
+        }
+        if increment <= LEAST * reached.1 {
+            return None;
+        }
+    }
+    None
+}
+
+/// The size of the smallest part of a step that was split `splits` times.
+pub(crate) fn smallest_part(h: f64, splits: usize) -> f64 {
+    (0..splits).fold(h, |part, _| 0.5 * part)
+}

@@ -45,6 +45,67 @@ where
         })
     }
 
+    /// Adds an energy of a site to the one that it has.
+    ///
+    /// ```
+    /// use metriplectic_dynamics::Symplectic;
+    /// use metriplectic_fields::Real;
+    /// use metriplectic_integrators::Flow;
+    /// use metriplectic_lattices::{Graph, Lattice, LatticeError};
+    /// use metriplectic_manifolds::Euclidean;
+    /// use nalgebra::{Vector2, vector};
+    ///
+    /// let pinned = Lattice::on(Graph::chain(2), Euclidean::<2>)
+    ///     .site_data(vec![1.0, 4.0])
+    ///     .bracket(Symplectic)
+    ///     .energy(|x: &Vector2<Real>| x.y * x.y * 0.5)
+    ///     .and_energy_with(|x: &Vector2<Real>, stiffness: &f64| x.x * x.x * (0.5 * stiffness))
+    ///     .build()?;
+    /// let start = pinned.points(|_| vector![1.0, 2.0]);
+    /// assert_eq!(pinned.laws(&start).energy, 2.0 + 2.0 + 0.5 + 2.0);
+    /// # Ok::<(), LatticeError>(())
+    /// ```
+    pub fn and_energy<T: ScalarField<M> + Sync>(
+        self,
+        more: T,
+    ) -> LatticeBuilder<M, B, Fields<(H, Uniform<T>), V, S, G>, Friction<KB, KS>, L, Data<D, E>>
+    {
+        self.with_fields(|Fields { energy, bond_energy, entropy, gathers }| Fields {
+            energy: (energy, Uniform(more)),
+            bond_energy,
+            entropy,
+            gathers,
+        })
+    }
+
+    /// Adds an energy of a site, from its point and its data, to the one that it has.
+    pub fn and_energy_with<T: Fn(&M::Point<Real>, &D::Item) -> Real + Sync>(
+        self,
+        more: T,
+    ) -> LatticeBuilder<M, B, Fields<(H, WithData<T>), V, S, G>, Friction<KB, KS>, L, Data<D, E>>
+    {
+        self.with_fields(|Fields { energy, bond_energy, entropy, gathers }| Fields {
+            energy: (energy, WithData(more)),
+            bond_energy,
+            entropy,
+            gathers,
+        })
+    }
+
+    /// Adds an energy of a bond to the one that it has.
+    pub fn and_bond_energy<T: ScalarField<Product<M, M>> + Sync>(
+        self,
+        more: T,
+    ) -> LatticeBuilder<M, B, Fields<H, (V, Uniform<T>), S, G>, Friction<KB, KS>, L, Data<D, E>>
+    {
+        self.with_fields(|Fields { energy, bond_energy, entropy, gathers }| Fields {
+            energy,
+            bond_energy: (bond_energy, Uniform(more)),
+            entropy,
+            gathers,
+        })
+    }
+
     /// Sets the energy `h₂(x_i, x_j)` of a bond, given its first and its second site as a pair: a closure
     /// `|(x, y)| -> Real` or any other [`ScalarField`] on the product.
     pub fn bond_energy<T: ScalarField<Product<M, M>> + Sync>(

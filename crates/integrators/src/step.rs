@@ -18,6 +18,7 @@ pub(crate) mod failure;
 mod flow;
 mod flow_error;
 mod initial_scales;
+mod ledger;
 mod memory;
 mod method_error;
 mod result;
@@ -33,6 +34,7 @@ pub use evidence::{Effort, EntropyStep, Evidence, LimitingSites, Promises, Stage
 pub use flow::{Element, Flow, Laws, Recheck, StateSpace};
 pub use flow_error::FlowError;
 pub(crate) use initial_scales::classical_step;
+pub use ledger::LedgerSummary;
 pub use memory::{Memory, RestoreError, Saved};
 pub use method_error::MethodError;
 pub use result::{Refusal, StepEnds, StepStart, Taken};

@@ -66,12 +66,21 @@ impl<T, R> fmt::Debug for Bath<T, R> {
 pub trait Temperature {
     /// The temperature at the time `t`.
     fn at(&self, t: f64) -> f64;
+
+    /// Returns whether it is zero at all times.
+    fn is_zero(&self) -> bool {
+        false
+    }
 }
 
 impl Temperature for f64 {
     #[inline]
     fn at(&self, _: f64) -> f64 {
         *self
+    }
+
+    fn is_zero(&self) -> bool {
+        *self == 0.0
     }
 }
 

@@ -77,6 +77,9 @@ pub trait Exchange<M: Manifold, G: Riemannian<M>> {
 
     /// Appends the names of the parts.
     fn names(&self, names: &mut Names);
+
+    /// Returns whether a bath has the temperature zero. It takes energy and no entropy, so no entropy is promised.
+    fn has_cold_bath(&self) -> bool;
 }
 
 impl<M: Manifold, G: Riemannian<M>> Exchange<M, G> for () {
@@ -90,6 +93,11 @@ impl<M: Manifold, G: Riemannian<M>> Exchange<M, G> for () {
     }
 
     fn names(&self, _: &mut Names) {}
+
+    #[inline]
+    fn has_cold_bath(&self) -> bool {
+        false
+    }
 }
 
 impl<M, G, L, F> Exchange<M, G> for (L, Port<F>)
@@ -124,6 +132,10 @@ where
     fn names(&self, names: &mut Names) {
         self.0.names(names);
         names.push((Arc::clone(&self.1.name), false));
+    }
+
+    fn has_cold_bath(&self) -> bool {
+        self.0.has_cold_bath()
     }
 }
 
@@ -171,6 +183,10 @@ where
     fn names(&self, names: &mut Names) {
         self.0.names(names);
         names.push((Arc::clone(&self.1.name), true));
+    }
+
+    fn has_cold_bath(&self) -> bool {
+        self.1.part.temperature.is_zero() || self.0.has_cold_bath()
     }
 }
 

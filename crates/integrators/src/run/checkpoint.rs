@@ -121,7 +121,7 @@ pub struct Checkpoint(
 
 /// The version of the format that is written and read. Each change of a field is a new version.
 #[cfg(feature = "serde")]
-const VERSION: u32 = 7;
+const VERSION: u32 = 8;
 
 impl Checkpoint {
     /// The run that was put down.

@@ -37,6 +37,7 @@ mod flow;
 mod halves;
 mod midpoint;
 mod projection;
+mod stages;
 mod state;
 mod system;
 mod vector;

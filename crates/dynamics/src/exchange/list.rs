@@ -78,6 +78,9 @@ pub trait Exchange<M: Manifold, G: Riemannian<M>> {
     /// Appends the names of the parts.
     fn names(&self, names: &mut Names);
 
+    /// Appends the temperatures of the baths at a time.
+    fn temperatures(&self, t: f64, list: &mut Vec<f64>);
+
     /// Returns whether a bath has the temperature zero. It takes energy and no entropy, so no entropy is promised.
     fn has_cold_bath(&self) -> bool;
 }
@@ -93,6 +96,8 @@ impl<M: Manifold, G: Riemannian<M>> Exchange<M, G> for () {
     }
 
     fn names(&self, _: &mut Names) {}
+
+    fn temperatures(&self, _: f64, _: &mut Vec<f64>) {}
 
     #[inline]
     fn has_cold_bath(&self) -> bool {
@@ -132,6 +137,10 @@ where
     fn names(&self, names: &mut Names) {
         self.0.names(names);
         names.push((Arc::clone(&self.1.name), false));
+    }
+
+    fn temperatures(&self, t: f64, list: &mut Vec<f64>) {
+        self.0.temperatures(t, list);
     }
 
     fn has_cold_bath(&self) -> bool {
@@ -183,6 +192,11 @@ where
     fn names(&self, names: &mut Names) {
         self.0.names(names);
         names.push((Arc::clone(&self.1.name), true));
+    }
+
+    fn temperatures(&self, t: f64, list: &mut Vec<f64>) {
+        self.0.temperatures(t, list);
+        list.push(self.1.part.temperature.at(t));
     }
 
     fn has_cold_bath(&self) -> bool {

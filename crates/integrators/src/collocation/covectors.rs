@@ -100,6 +100,8 @@ pub(super) enum Correction {
     Later,
     /// So that the law has no error.
     Here,
+    /// So that the law has no error, if it would be more than it should; what it is less is left.
+    Raised,
 }
 
 /// The polynomial of a step, in the chart at its middle.
@@ -304,7 +306,7 @@ impl<M: Manifold> AlongStages<'_, M> {
         let later = StageCovectors { left: delta, left_round_off, ..none };
         let is_later = correction == Correction::Later;
         if squares == 0.0 {
-            return if is_later { later } else { none };
+            return if is_later || correction == Correction::Raised { later } else { none };
         }
         let blur = (noise / squares).abs();
         let mut noise = zero;
@@ -314,7 +316,7 @@ impl<M: Manifold> AlongStages<'_, M> {
                 here.max(noise[c])
             });
         }
-        if is_later {
+        if is_later || (correction == Correction::Raised && delta < 0.0) {
             return StageCovectors { noise, ..later };
         }
         for i in 0..s {

@@ -229,7 +229,11 @@ impl<'a, Y: Metriplectic> StageEquation<'a, Y> {
             size: w.entropy.size,
         };
         let values = Laws {
-            energy: if self.in_time.is_some() { w.energy.end - exchanged } else { w.energy.end },
+            energy: if self.in_time.is_some() {
+                w.energy.end - exchanged - w.energy.left.min(0.0)
+            } else {
+                w.energy.end
+            },
             entropy: w.entropy.end,
             invariants: Dim::<Y>::array(|a| w.invariants[a].map_or(0.0, |(_, l)| l.end)),
         };
@@ -318,6 +322,11 @@ impl<'a, Y: Metriplectic> StageEquation<'a, Y> {
         let energy = LawStart { value: values.energy, drift: drift.energy };
         let entropy = LawStart { value: values.entropy, drift: drift.entropy };
         let of_energy = match self.in_time {
+            // What a method that damps loses of the energy is heat of the bath.
+            Some(in_time) if self.tableau.one_sided => {
+                let (tableau, x, z) = (self.tableau, self.x, &polynomial.chart.z);
+                along.of_law(&Timed { in_time, tableau, x, z }, energy, Correction::Raised)
+            }
             Some(in_time) => {
                 let (tableau, x, z) = (self.tableau, self.x, &polynomial.chart.z);
                 along.of_law(&Timed { in_time, tableau, x, z }, energy, of_energy)

@@ -19,7 +19,7 @@ pub(crate) struct Tableau {
     /// The order of convergence.
     pub(crate) order: u32,
     /// Whether the entropy is corrected on one side only.
-    pub(super) one_sided: bool,
+    pub(crate) one_sided: bool,
     /// The nodes `c_i`.
     pub(crate) nodes: Numbers,
     /// The weights `b_j`.

@@ -82,6 +82,8 @@ pub(crate) struct StageSolution<Y: Metriplectic> {
     pub(crate) z: Point<Y>,
     /// The nodes and the weights of the stages, and the stages with the covectors of energy and entropy.
     pub(crate) stages: Vec<Stage<Y>>,
+    /// What the energy has lost beside work and heat of the stages, in a method that damps: not positive.
+    pub(crate) lost: f64,
     pub(crate) evidence: Evidence,
     pub(crate) effort: Effort,
 }
@@ -204,12 +206,13 @@ impl<Y: Metriplectic> TimedStep<'_, Y> {
         let evidence = Evidence {
             entropy_slope: at.entropy_slope,
             dissipates: at.growth != 0.0,
-            friction: linear.friction,
+            friction: if tableau.one_sided { 0.0 } else { linear.friction },
             stages: Some(StageLaws::new(at.error * crate::round_off::bound::ROUNDED, at.surplus)),
             ..Evidence::default()
         };
         let (end, stages, effort) = (at.end.clone(), stages.collect(), *effort);
-        Ok((solved, StageSolution { end, z, stages, evidence, effort }))
+        let lost = if tableau.one_sided { w.energy.left.min(0.0) } else { 0.0 };
+        Ok((solved, StageSolution { end, z, stages, lost, evidence, effort }))
     }
 }
 

@@ -1,4 +1,4 @@
-//! Gauss methods for open systems.
+//! Gauss and Radau methods for open systems.
 //!
 //! ```math
 //! W_t = H(t', z) - H(t, z) + h \sum_i b_i \bigl( \partial_t H(t_i, X_i) - \partial_t H(t_i, z) \bigr), \qquad
@@ -8,6 +8,10 @@
 //! with `z` the middle of the step. `δ_H` is the error of a rule for an integral that vanishes with the velocity, so the
 //! corrected covectors have the order of the method up to rest. Ports and baths are evaluated at the stages, and `W_a`
 //! and `Q_b` are the sums `h Σ b_i ⟨w_{H,i}, …⟩`.
+//!
+//! `Radau` corrects the energy where `δ_H > 0` alone. What it loses where it damps, `−δ_H`, is heat of the bath: the balance
+//! stays exact, and the entropy of the bath rises by `−δ_H/T`. Which of several baths it would be is not known, so a system
+//! has one.
 
 use metriplectic_dynamics::exchange::{Entries as _, Exchange};
 use metriplectic_dynamics::{Metriplectic, SecondLaw, VectorField, system::Point};
@@ -20,14 +24,14 @@ use super::system::{OpenSystem, StateOf};
 use super::vector::OpenVector;
 use super::view::Frozen;
 use crate::collocation::{
-    EnergyInTime, Gauss, InTime, MOST, StageMemory, StageSolution, Tableau, TimedStep, control,
-    dense,
+    EnergyInTime, Gauss, InTime, MOST, Radau, StageMemory, StageSolution, Tableau, TimedStep,
+    control, dense,
 };
 use crate::step::dense::Target;
 use crate::step::failure::{Cause, Fallbacks};
 use crate::step::{
-    Control, Dim, Flow, Laws, Promises, Refusal, Start, StepEnds, StepError, StepStart, Stepper,
-    Taken,
+    Control, Dim, Effort, Flow, Laws, MethodError, Promises, Refusal, Start, StepEnds, StepError,
+    StepStart, Stepper, Taken,
 };
 
 /// The energy of an open system along a step.
@@ -134,7 +138,7 @@ where
         h: f64,
     ) -> Option<StateOf<Y, X>> {
         let Self { system, along, .. } = self;
-        let StageSolution { end, z, stages, .. } = solution;
+        let StageSolution { end, z, stages, lost, .. } = solution;
         let mut parameter = system.frozen_work(along.times, z);
         let mut entries = X::Entries::from_index(|_| 0.0);
         for stage in stages {
@@ -145,6 +149,15 @@ where
             let rates =
                 system.exchanged(t, &stage.x, [&stage.energy, &stage.entropy]).ok()?.entries;
             entries = X::Entries::from_index(|i| entries.get(i) + weight * rates.get(i));
+        }
+        if *lost < 0.0 {
+            // What a step has damped is heat of the bath.
+            let (heat, temperature) = system.only_bath(along.time(1.0))?;
+            let entropy = if temperature > 0.0 { -lost / temperature } else { 0.0 };
+            entries = X::Entries::from_index(|i| {
+                let added = [*lost, entropy];
+                entries.get(i) + i.checked_sub(heat).and_then(|k| added.get(k)).unwrap_or(&0.0)
+            });
         }
         let ledger = from.ledger.with(&Booked { parameter, entries });
         Some(OpenState { x: end.clone(), time: along.times[1], ledger })
@@ -217,88 +230,135 @@ where
     Some(Target::new(step, promises, theta, entropy).reached_from(system, &y, line))
 }
 
-impl<Y, C, X, const S: usize> Stepper<OpenSystem<Y, C, X>> for Gauss<S>
+/// Halvings of a step.
+const HALVES: usize = 10;
+
+/// Why `Radau` does not take a system.
+#[derive(Clone, Copy, Debug, thiserror::Error)]
+#[error(
+    "`Radau` damps an open system without an entropy of its own and with one bath, to which it gives what it damps; take \
+     `Gauss`, or an explicit method"
+)]
+struct NotDamped;
+
+/// Accepts a system that a method which damps can take: what it damps is heat of its only bath.
+fn damps<Y, C, X>(
+    tableau: &'static Tableau,
+    system: &OpenSystem<Y, C, X>,
+    time: f64,
+) -> Result<(), StepError>
 where
     Y: Metriplectic,
     C: Clock<Y::Manifold, Y::Energy>,
     X: Exchange<Y::Manifold, Y::Metric>,
 {
-    type Memory = StageMemory<Dim<Y>>;
-
-    fn name(&self) -> String {
-        format!("Gauss::<{S}>")
+    let isothermal = system.closed().second_law() == SecondLaw::NoEntropy && X::BATHS == 1;
+    if !tableau.one_sided || isothermal {
+        return Ok(());
     }
-
-    fn order(&self) -> u32 {
-        Self::tableau().order
-    }
-
-    fn control(&self) -> Control {
-        control(Self::tableau())
-    }
-
-    fn promises(&self, system: &OpenSystem<Y, C, X>) -> Promises {
-        Promises::all_laws(system.entropy_law() == SecondLaw::Exact)
-    }
-
-    fn step(
-        &self,
-        system: &OpenSystem<Y, C, X>,
-        start: &StepStart<'_, OpenSystem<Y, C, X>>,
-        h: f64,
-        memory: &mut Self::Memory,
-    ) -> Result<Taken<OpenSystem<Y, C, X>>, StepError> {
-        let mut whole = true;
-        let taken = halves::take(start, h, Self::SPLITS, &mut |start, h, fallbacks| {
-            if !std::mem::replace(&mut whole, false) {
-                *memory = StageMemory::default();
-            }
-            open_step(Self::tableau(), system, start, h, memory, fallbacks)
-        });
-        taken
-    }
-
-    fn attempt(
-        &self,
-        system: &OpenSystem<Y, C, X>,
-        start: &StepStart<'_, OpenSystem<Y, C, X>>,
-        h: f64,
-        memory: &mut Self::Memory,
-    ) -> Result<Taken<OpenSystem<Y, C, X>>, Refusal> {
-        open_step(Self::tableau(), system, start, h, memory, Fallbacks::FirstTries)
-            .map_err(|failure| failure.into_refusal(start.time, h))
-    }
-
-    fn error(
-        &self,
-        system: &OpenSystem<Y, C, X>,
-        step: &StepEnds<'_, OpenSystem<Y, C, X>>,
-        memory: &Self::Memory,
-        norm: impl Fn(&<OpenSystem<Y, C, X> as Flow>::Vector) -> f64,
-    ) -> Option<f64> {
-        let (time, h) = (step.x.time, step.h);
-        let whole = Step::new(Self::tableau(), system, [time, time + h]);
-        let (values, reference) = (*step.values[0], *step.values[0]);
-        let start = StepStart { x: step.x, time, values, reference, allowed: None };
-        let velocity = |t: f64, x: &Point<Y>| {
-            let zero = Vector::<Y::Manifold>::zero();
-            VectorField::velocity(&system.frozen(t), &ChartPoint { base: x.clone(), q: zero }).ok()
-        };
-        let velocities = [velocity(time, &step.x.x)?, velocity(time + h, &step.end.x)?];
-        let start = whole.start(&start, h);
-        let defects = whole.timed().defects(&start, memory, &step.end.x, velocities)?;
-        let [first, second] = defects.map(OpenVector::of);
-        Some(norm(&first).max(norm(&second)))
-    }
-
-    fn between(
-        &self,
-        system: &OpenSystem<Y, C, X>,
-        step: &StepEnds<'_, OpenSystem<Y, C, X>>,
-        memory: &mut Self::Memory,
-        theta: f64,
-    ) -> Option<StateOf<Y, X>> {
-        let promises = Stepper::<OpenSystem<Y, C, X>>::promises(self, system);
-        between(Self::tableau(), promises, system, step, memory, theta)
-    }
+    Err(StepError::Method { time, error: MethodError::new(NotDamped) })
 }
+
+macro_rules! open_stages {
+    ($name:ident) => {
+        impl<Y, C, X, const S: usize> Stepper<OpenSystem<Y, C, X>> for $name<S>
+        where
+            Y: Metriplectic,
+            C: Clock<Y::Manifold, Y::Energy>,
+            X: Exchange<Y::Manifold, Y::Metric>,
+        {
+            type Memory = StageMemory<Dim<Y>>;
+
+            fn name(&self) -> String {
+                format!("{}::<{S}>", stringify!($name))
+            }
+
+            fn order(&self) -> u32 {
+                Self::tableau().order
+            }
+
+            fn control(&self) -> Control {
+                control(Self::tableau())
+            }
+
+            fn promises(&self, system: &OpenSystem<Y, C, X>) -> Promises {
+                Promises::all_laws(system.entropy_law() == SecondLaw::Exact)
+            }
+
+            fn step(
+                &self,
+                system: &OpenSystem<Y, C, X>,
+                start: &StepStart<'_, OpenSystem<Y, C, X>>,
+                h: f64,
+                memory: &mut Self::Memory,
+            ) -> Result<Taken<OpenSystem<Y, C, X>>, StepError> {
+                damps(Self::tableau(), system, start.time)?;
+                let mut whole = true;
+                halves::take(start, h, Self::SPLITS.min(HALVES), &mut |start, h, fallbacks| {
+                    if !std::mem::replace(&mut whole, false) {
+                        *memory = StageMemory::default();
+                    }
+                    open_step(Self::tableau(), system, start, h, memory, fallbacks)
+                })
+            }
+
+            fn attempt(
+                &self,
+                system: &OpenSystem<Y, C, X>,
+                start: &StepStart<'_, OpenSystem<Y, C, X>>,
+                h: f64,
+                memory: &mut Self::Memory,
+            ) -> Result<Taken<OpenSystem<Y, C, X>>, Refusal> {
+                if let Err(error) = damps(Self::tableau(), system, start.time) {
+                    return Err(Refusal {
+                        effort: Effort::default(),
+                        error: Some(error),
+                        second_law: false,
+                    });
+                }
+                open_step(Self::tableau(), system, start, h, memory, Fallbacks::FirstTries)
+                    .map_err(|failure| failure.into_refusal(start.time, h))
+            }
+
+            fn error(
+                &self,
+                system: &OpenSystem<Y, C, X>,
+                step: &StepEnds<'_, OpenSystem<Y, C, X>>,
+                memory: &Self::Memory,
+                norm: impl Fn(&<OpenSystem<Y, C, X> as Flow>::Vector) -> f64,
+            ) -> Option<f64> {
+                let (time, h) = (step.x.time, step.h);
+                let whole = Step::new(Self::tableau(), system, [time, time + h]);
+                let (values, reference) = (*step.values[0], *step.values[0]);
+                let start = StepStart { x: step.x, time, values, reference, allowed: None };
+                let velocity = |t: f64, x: &Point<Y>| {
+                    let zero = Vector::<Y::Manifold>::zero();
+                    VectorField::velocity(
+                        &system.frozen(t),
+                        &ChartPoint { base: x.clone(), q: zero },
+                    )
+                    .ok()
+                };
+                let velocities = [velocity(time, &step.x.x)?, velocity(time + h, &step.end.x)?];
+                let start = whole.start(&start, h);
+                let defects = whole.timed().defects(&start, memory, &step.end.x, velocities)?;
+                let [first, second] = defects.map(OpenVector::of);
+                Some(norm(&first).max(norm(&second)))
+            }
+
+            fn between(
+                &self,
+                system: &OpenSystem<Y, C, X>,
+                step: &StepEnds<'_, OpenSystem<Y, C, X>>,
+                memory: &mut Self::Memory,
+                theta: f64,
+            ) -> Option<StateOf<Y, X>> {
+                let promises = Stepper::<OpenSystem<Y, C, X>>::promises(self, system);
+                between(Self::tableau(), promises, system, step, memory, theta)
+            }
+        }
+    };
+}
+
+open_stages!(Gauss);
+open_stages!(Radau);

@@ -53,6 +53,11 @@ impl Columns {
         Self(columns.collect())
     }
 
+    /// The index of the first heat.
+    pub(super) fn first_heat(&self) -> Option<usize> {
+        self.0.iter().position(|column| column.1 == Kind::Heat)
+    }
+
     fn index(&self, name: &str, kind: Kind) -> Option<usize> {
         self.0.iter().position(|column| *column.0 == *name && column.1 == kind)
     }

@@ -23,6 +23,9 @@ struct Methods;
 #[doc = include_str!("../book/src/lattices.md")]
 struct Lattices;
 
+#[doc = include_str!("../book/src/open_systems.md")]
+struct OpenSystems;
+
 #[doc = include_str!("../book/src/sweeps.md")]
 struct Sweeps;
 

@@ -9,7 +9,7 @@ use crate::bracket::{Bracket, NaturalBracket};
 use crate::dissipation::{Choice, Dissipation, Given, NoDissipation};
 use crate::invariants::{Casimir, Invariants, Momentum, Symmetry};
 use crate::metriplectic::SecondLaw;
-use crate::system::{BuildError, Fields, NoEntropy, System, Tensors};
+use crate::system::{BuildError, Context, Fields, NoEntropy, System, Tensors};
 
 /// Stands for the energy that a builder has not been given yet.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -17,6 +17,32 @@ pub struct NoEnergy;
 
 /// The system that a builder makes, with the dissipation that its choice `K` has come to.
 pub type Built<M, G, B, K, H, S, L> = System<M, G, B, <K as Choice>::Dissipation, H, S, L>;
+
+/// The surroundings of a system in the making: none, `()`, or what makes an open system of it when it is built.
+pub trait Surroundings {
+    /// What is built of the system `Y`.
+    type Built<Y>;
+
+    /// Puts the surroundings around a system.
+    fn around<Y>(self, system: Y) -> Self::Built<Y>;
+
+    /// Returns whether they may move the system and change its entropy, without a bracket and a dissipation.
+    fn is_open(&self) -> bool {
+        true
+    }
+}
+
+impl Surroundings for () {
+    type Built<Y> = Y;
+
+    fn around<Y>(self, system: Y) -> Y {
+        system
+    }
+
+    fn is_open(&self) -> bool {
+        false
+    }
+}
 
 impl System<(), (), (), (), (), ()> {
     /// Starts a system on a manifold, with the manifold's canonical metric and its natural bracket
@@ -44,6 +70,7 @@ impl System<(), (), (), (), (), ()> {
             fields: Fields { energy: NoEnergy, entropy: NoEntropy, invariants: () },
             has_entropy: false,
             second_law: SecondLaw::NoEntropy,
+            surroundings: (),
         }
     }
 }
@@ -51,15 +78,16 @@ impl System<(), (), (), (), (), ()> {
 /// A system in the making: each method replaces one part.
 #[derive(Clone)]
 #[must_use = "a builder does nothing until `build` is called"]
-pub struct SystemBuilder<M, G, B, K, H, S, L = ()> {
+pub struct SystemBuilder<M, G, B, K, H, S, L = (), P = ()> {
     tensors: Tensors<M, G, B, K>,
     fields: Fields<H, S, L>,
     has_entropy: bool,
     second_law: SecondLaw,
+    surroundings: P,
 }
 
 // By hand, because closures have no `Debug`.
-impl<M: fmt::Debug, G, B, K, H, S, L> fmt::Debug for SystemBuilder<M, G, B, K, H, S, L> {
+impl<M: fmt::Debug, G, B, K, H, S, L, P> fmt::Debug for SystemBuilder<M, G, B, K, H, S, L, P> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("SystemBuilder")
             .field("manifold", &self.tensors.manifold)
@@ -68,30 +96,30 @@ impl<M: fmt::Debug, G, B, K, H, S, L> fmt::Debug for SystemBuilder<M, G, B, K, H
     }
 }
 
-impl<M, G, B, K, H, S, L> SystemBuilder<M, G, B, K, H, S, L> {
+impl<M, G, B, K, H, S, L, P> SystemBuilder<M, G, B, K, H, S, L, P> {
     /// Replaces tensors.
-    fn with_tensors<P, C, D>(
+    fn with_tensors<E, C, D>(
         self,
-        replace: impl FnOnce(Tensors<M, G, B, K>) -> Tensors<M, P, C, D>,
-    ) -> SystemBuilder<M, P, C, D, H, S, L> {
-        let Self { tensors, fields, has_entropy, second_law } = self;
-        SystemBuilder { tensors: replace(tensors), fields, has_entropy, second_law }
+        replace: impl FnOnce(Tensors<M, G, B, K>) -> Tensors<M, E, C, D>,
+    ) -> SystemBuilder<M, E, C, D, H, S, L, P> {
+        let Self { tensors, fields, has_entropy, second_law, surroundings } = self;
+        SystemBuilder { tensors: replace(tensors), fields, has_entropy, second_law, surroundings }
     }
 
     /// Replaces scalar fields.
     fn with_fields<E, F, I>(
         self,
         replace: impl FnOnce(Fields<H, S, L>) -> Fields<E, F, I>,
-    ) -> SystemBuilder<M, G, B, K, E, F, I> {
-        let Self { tensors, fields, has_entropy, second_law } = self;
-        SystemBuilder { tensors, fields: replace(fields), has_entropy, second_law }
+    ) -> SystemBuilder<M, G, B, K, E, F, I, P> {
+        let Self { tensors, fields, has_entropy, second_law, surroundings } = self;
+        SystemBuilder { tensors, fields: replace(fields), has_entropy, second_law, surroundings }
     }
 
     /// Replaces the choice of the dissipation.
     pub(crate) fn choose<F>(
         self,
         choose: impl FnOnce(K) -> F,
-    ) -> SystemBuilder<M, G, B, F, H, S, L> {
+    ) -> SystemBuilder<M, G, B, F, H, S, L, P> {
         self.with_tensors(|Tensors { manifold, metric, bracket, dissipation }| Tensors {
             manifold,
             metric,
@@ -100,8 +128,18 @@ impl<M, G, B, K, H, S, L> SystemBuilder<M, G, B, K, H, S, L> {
         })
     }
 
+    /// Replaces the surroundings, which make an open system of it.
+    pub fn surrounded<Q>(
+        self,
+        replace: impl FnOnce(P) -> Q,
+    ) -> SystemBuilder<M, G, B, K, H, S, L, Q> {
+        let Self { tensors, fields, has_entropy, second_law, surroundings } = self;
+        let surroundings = replace(surroundings);
+        SystemBuilder { tensors, fields, has_entropy, second_law, surroundings }
+    }
+
     /// Appends an invariant to the list.
-    fn with_invariant<T>(self, last: T) -> SystemBuilder<M, G, B, K, H, S, (L, T)> {
+    fn with_invariant<T>(self, last: T) -> SystemBuilder<M, G, B, K, H, S, (L, T), P> {
         self.with_fields(|Fields { energy, entropy, invariants }| Fields {
             energy,
             entropy,
@@ -110,9 +148,9 @@ impl<M, G, B, K, H, S, L> SystemBuilder<M, G, B, K, H, S, L> {
     }
 }
 
-impl<M: Manifold, G, B, K, H, S, L> SystemBuilder<M, G, B, K, H, S, L> {
+impl<M: Manifold, G, B, K, H, S, L, P> SystemBuilder<M, G, B, K, H, S, L, P> {
     /// Sets the energy `H`: a closure `|x| -> Real` or any other [`ScalarField`].
-    pub fn energy<F: ScalarField<M>>(self, energy: F) -> SystemBuilder<M, G, B, K, F, S, L> {
+    pub fn energy<F: ScalarField<M>>(self, energy: F) -> SystemBuilder<M, G, B, K, F, S, L, P> {
         self.with_fields(|Fields { entropy, invariants, .. }| Fields {
             energy,
             entropy,
@@ -127,7 +165,7 @@ impl<M: Manifold, G, B, K, H, S, L> SystemBuilder<M, G, B, K, H, S, L> {
     pub fn entropy<F: ScalarField<M>>(
         self,
         entropy: F,
-    ) -> SystemBuilder<M, G, B, K::WithEntropy, H, F, L>
+    ) -> SystemBuilder<M, G, B, K::WithEntropy, H, F, L, P>
     where
         K: Choice,
     {
@@ -146,13 +184,13 @@ impl<M: Manifold, G, B, K, H, S, L> SystemBuilder<M, G, B, K, H, S, L> {
 
     /// Sets the dissipation that produces the entropy, in place of that of the metric: any
     /// [`Dissipation`], such as those of the table in [`dissipation`](crate::dissipation).
-    pub fn dissipation<F>(self, dissipation: F) -> SystemBuilder<M, G, B, Given<F>, H, S, L> {
+    pub fn dissipation<F>(self, dissipation: F) -> SystemBuilder<M, G, B, Given<F>, H, S, L, P> {
         self.choose(|_| Given(dissipation))
     }
 
     /// Sets the Riemannian metric: [`Metric::constant`](metriplectic_manifolds::Metric::constant) or
     /// [`Metric::field`](metriplectic_manifolds::Metric::field).
-    pub fn metric<F: Riemannian<M>>(self, metric: F) -> SystemBuilder<M, F, B, K, H, S, L> {
+    pub fn metric<F: Riemannian<M>>(self, metric: F) -> SystemBuilder<M, F, B, K, H, S, L, P> {
         self.with_tensors(|Tensors { manifold, bracket, dissipation, .. }| Tensors {
             manifold,
             metric,
@@ -166,7 +204,7 @@ impl<M: Manifold, G, B, K, H, S, L> SystemBuilder<M, G, B, K, H, S, L> {
     /// [`Symplectic`](crate::Symplectic), [`AreaForm`](type@crate::AreaForm) or [`Nambu`](crate::Nambu);
     /// on a product a pair of them, one for each factor. A skew tensor that is not Poisson is
     /// [`AlmostPoisson::field`](crate::AlmostPoisson::field).
-    pub fn bracket<F>(self, bracket: F) -> SystemBuilder<M, G, F, K, H, S, L> {
+    pub fn bracket<F>(self, bracket: F) -> SystemBuilder<M, G, F, K, H, S, L, P> {
         self.with_tensors(|Tensors { manifold, metric, dissipation, .. }| Tensors {
             manifold,
             metric,
@@ -183,7 +221,7 @@ impl<M: Manifold, G, B, K, H, S, L> SystemBuilder<M, G, B, K, H, S, L> {
     pub fn casimir<F: ScalarField<M>>(
         self,
         casimir: F,
-    ) -> SystemBuilder<M, G, B, K, H, S, (L, Casimir<F>)> {
+    ) -> SystemBuilder<M, G, B, K, H, S, (L, Casimir<F>), P> {
         self.with_invariant(Casimir(casimir))
     }
 
@@ -195,7 +233,7 @@ impl<M: Manifold, G, B, K, H, S, L> SystemBuilder<M, G, B, K, H, S, L> {
     pub fn momentum<F: ScalarField<M>>(
         self,
         momentum: F,
-    ) -> SystemBuilder<M, G, B, K, H, S, (L, Momentum<F>)> {
+    ) -> SystemBuilder<M, G, B, K, H, S, (L, Momentum<F>), P> {
         self.with_invariant(Momentum(momentum))
     }
 
@@ -211,7 +249,7 @@ impl<M: Manifold, G, B, K, H, S, L> SystemBuilder<M, G, B, K, H, S, L> {
         self,
         action: A,
         momentum: F,
-    ) -> SystemBuilder<M, G, B, K, H, S, (L, Symmetry<A, F>)>
+    ) -> SystemBuilder<M, G, B, K, H, S, (L, Symmetry<A, F>), P>
     where
         A: Fn(Real, &M::Point<Real>) -> M::Point<Real>,
         F: ScalarField<M>,
@@ -236,8 +274,9 @@ impl<M: Manifold, G, B, K, H, S, L> SystemBuilder<M, G, B, K, H, S, L> {
         clippy::type_complexity,
         reason = "the type of a builder lists the parts of the system, and a name for it would hide them"
     )]
-    pub fn build(self) -> Result<Built<M, G, B, K, H, S, L>, BuildError>
+    pub fn build(self) -> Result<P::Built<Built<M, G, B, K, H, S, L>>, BuildError>
     where
+        P: Surroundings,
         G: Riemannian<M>,
         B: Bracket<M, G>,
         K: Choice<Dissipation: Dissipation<M, G>>,
@@ -245,7 +284,10 @@ impl<M: Manifold, G, B, K, H, S, L> SystemBuilder<M, G, B, K, H, S, L> {
         S: ScalarField<M>,
         L: Invariants<M>,
     {
-        let SystemBuilder { tensors, fields, has_entropy, second_law } = self.choose(K::chosen);
-        System::new(tensors, fields, second_law, has_entropy)
+        let SystemBuilder { tensors, fields, has_entropy, second_law, surroundings } =
+            self.choose(K::chosen);
+        let is_open = surroundings.is_open();
+        let system = System::new(tensors, fields, second_law, Context { has_entropy, is_open })?;
+        Ok(surroundings.around(system))
     }
 }

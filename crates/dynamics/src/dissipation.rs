@@ -25,6 +25,7 @@ pub use casimir::{CasimirDissipation, FormError};
 pub use choice::{Choice, Given};
 pub use cometric::CometricDissipation;
 pub use field::FieldDissipation;
+pub(crate) use field::along_velocities;
 pub use kulkarni_nomizu::KulkarniNomizu;
 pub use metric::MetricDissipation;
 pub use none::NoDissipation;

@@ -58,7 +58,9 @@ use crate::dissipation::Choice;
 
 pub use crate::legendre::{Legendre, LegendreError};
 
-impl<G, K: Choice, H, S, I, const N: usize> SystemBuilder<LieDual<N>, G, LiePoisson, K, H, S, I> {
+impl<G, K: Choice, H, S, I, P, const N: usize>
+    SystemBuilder<LieDual<N>, G, LiePoisson, K, H, S, I, P>
+{
     /// Sets the force `𝓕: g → g*` of the equations `μ' = ad*_ξ(μ + 𝓕(ξ))`, `ξ = dH`: a closure
     /// `|ξ| -> SVector<Real, N>` or any other [`Force`]. Every force conserves `H`.
     ///
@@ -73,18 +75,18 @@ impl<G, K: Choice, H, S, I, const N: usize> SystemBuilder<LieDual<N>, G, LiePois
     pub fn force<F: Force<N>>(
         self,
         force: F,
-    ) -> SystemBuilder<LieDual<N>, G, ForcedLiePoisson<F>, K::WithForce, H, S, I> {
+    ) -> SystemBuilder<LieDual<N>, G, ForcedLiePoisson<F>, K::WithForce, H, S, I, P> {
         self.bracket(ForcedLiePoisson(force)).choose(K::with_force)
     }
 }
 
-impl<G, B, K, H, S, I, const N: usize> SystemBuilder<LieDual<N>, G, B, K, H, S, I> {
+impl<G, B, K, H, S, I, P, const N: usize> SystemBuilder<LieDual<N>, G, B, K, H, S, I, P> {
     /// Sets the energy `h(μ) = ⟨μ, ξ⟩ − l(ξ)` of a reduced Lagrangian `l` by [`Legendre::of`]. `l` is a closure
     /// `|ξ| -> Real` on the Lie algebra, or any other [`ScalarField`] on it.
     pub fn lagrangian<L: ScalarField<Euclidean<N>>>(
         self,
         l: L,
-    ) -> SystemBuilder<LieDual<N>, G, B, K, Legendre<L, N>, S, I> {
+    ) -> SystemBuilder<LieDual<N>, G, B, K, Legendre<L, N>, S, I, P> {
         self.energy(Legendre::of(l))
     }
 }

@@ -11,6 +11,7 @@
 //! |---|---|
 //! | [`bracket`] | [`Bracket`]: `Π`; [`LiePoisson`], [`AreaForm`](type@AreaForm), [`Nambu`], [`Symplectic`], [`Poisson::constant`], [`Poisson::field`], [`AlmostPoisson::field`], [`Zero`]; with a [`Force`], [`ForcedLiePoisson`] |
 //! | [`dissipation`] | [`Dissipation`]: `K`, given the covector it must annihilate; [`MetricDissipation`], [`CometricDissipation`], [`KulkarniNomizu`], [`CasimirDissipation`], [`FieldDissipation`], [`ProjectedDissipation`], [`Scaled`] |
+//! | [`exchange`] | [`Port`], [`Bath`]: work and heat from outside |
 //! | [`invariants`] | further Casimirs and momenta `L_a`, and symmetries |
 //! | [`orthogonal`] | projections off covectors, by which a tensor is made to annihilate them |
 //! | [`model_error`] | [`ModelError`]: the law that a model violates, with the numbers |
@@ -30,6 +31,7 @@ pub mod bracket;
 pub mod builder;
 pub mod dissipation;
 pub mod euler_poincare;
+pub mod exchange;
 pub mod invariants;
 pub mod laws;
 pub mod legendre;
@@ -49,11 +51,12 @@ pub use bracket::{
     Force, ForcedLiePoisson, LiePoisson, Nambu, NaturalBracket, OfEntropy, Poisson, PoissonError,
     Symplectic, Zero,
 };
-pub use builder::{NoEnergy, SystemBuilder};
+pub use builder::{NoEnergy, Surroundings, SystemBuilder};
 pub use dissipation::{
     CasimirDissipation, CometricDissipation, Dissipation, DissipationJet, FieldDissipation,
     FormError, KulkarniNomizu, MetricDissipation, NoDissipation, ProjectedDissipation, Scaled,
 };
+pub use exchange::{Bath, Contact, Port};
 pub use invariants::Invariants;
 pub use legendre::{Legendre, LegendreError};
 pub use metriplectic::{Metriplectic, Point, SecondLaw};

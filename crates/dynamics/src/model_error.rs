@@ -1,6 +1,7 @@
 //! The laws that a model violates, with the numbers.
 
 use std::fmt;
+use std::sync::Arc;
 
 use metriplectic_manifolds::{MetricError, PointError};
 
@@ -267,6 +268,90 @@ pub enum ModelError {
         point: Vec<f64>,
         /// The relative size of the violation.
         size: f64,
+    },
+    /// A port carries entropy, `⟨dS, F⟩ ≠ 0`.
+    #[error(
+        "the port `{port}` carries entropy at t = {time}, {point:?}: ⟨dS, F⟩ is {size:.1e} of its terms; what carries entropy \
+         is a bath, or take the entropy as a variable that the port does not move"
+    )]
+    WorkCarriesEntropy {
+        /// The name of the port.
+        port: Arc<str>,
+        /// The time.
+        time: f64,
+        /// The entries of the point.
+        point: Vec<f64>,
+        /// The relative size of the violation.
+        size: f64,
+    },
+    /// The friction of a bath is negative.
+    #[error(
+        "the friction of the bath `{bath}` has the rate {rate} at t = {time}; a rate must not be negative"
+    )]
+    FrictionNotPositive {
+        /// The name of the bath.
+        bath: Arc<str>,
+        /// The least rate.
+        rate: f64,
+        /// The time.
+        time: f64,
+    },
+    /// The temperature of a bath is negative or no number.
+    #[error(
+        "the bath `{bath}` has the temperature {temperature} at t = {time}; it must be a positive number, or zero for a \
+         friction that takes energy alone"
+    )]
+    BathNotPositive {
+        /// The name of the bath.
+        bath: Arc<str>,
+        /// The temperature.
+        temperature: f64,
+        /// The time.
+        time: f64,
+    },
+    /// A port or a bath changes a further invariant.
+    #[error(
+        "`{part}` changes invariant {index} at t = {time}, {point:?}: ⟨dL, velocity⟩ is {size:.1e} of its terms; leave the \
+         invariant out of the list"
+    )]
+    PortBreaksInvariant {
+        /// The name of the port or the bath.
+        part: Arc<str>,
+        /// Which invariant, in the order of the list, counted from 0.
+        index: usize,
+        /// The time.
+        time: f64,
+        /// The entries of the point.
+        point: Vec<f64>,
+        /// The relative size of the violation.
+        size: f64,
+    },
+    /// The velocity of a port or a bath is not a number.
+    #[error(
+        "the velocity of `{part}` is not finite at t = {time}, {point:?}; start where it is defined"
+    )]
+    ExchangeNotFinite {
+        /// The name of the port or the bath.
+        part: Arc<str>,
+        /// The time.
+        time: f64,
+        /// The entries of the point.
+        point: Vec<f64>,
+    },
+    /// The derivative of the energy along time is not that of its values.
+    #[error(
+        "the energy has the derivative {derivative:.6e} along time at t = {time}, {point:?}, but its values change at the rate \
+         {quotient:.6e}: the closure loses the derivative of `t`, as `t.re` does; compute with `t` as a `Real`"
+    )]
+    LostTimeDerivative {
+        /// The time.
+        time: f64,
+        /// The entries of the point.
+        point: Vec<f64>,
+        /// The derivative by dual numbers.
+        derivative: f64,
+        /// The difference quotient of the values.
+        quotient: f64,
     },
     /// `K_w w ≠ 0` for a discrete gradient `w` of the energy.
     #[error(

@@ -43,6 +43,14 @@ pub(crate) struct Fields<H, S, L> {
     pub(crate) invariants: L,
 }
 
+/// What a builder knows beside the parts.
+#[derive(Clone, Copy)]
+pub(crate) struct Context {
+    pub(crate) has_entropy: bool,
+    /// Whether something outside may move the system and change its entropy.
+    pub(crate) is_open: bool,
+}
+
 /// A metriplectic system on the manifold `M` with metric `G`, bracket `B`, dissipation `K`, energy
 /// `H`, entropy `S` and further invariants `L`; built by [`System::on`].
 #[derive(Clone)]
@@ -76,7 +84,7 @@ where
         tensors: Tensors<M, G, B, K>,
         fields: Fields<H, S, L>,
         second_law: SecondLaw,
-        has_entropy: bool,
+        Context { has_entropy, is_open }: Context,
     ) -> Result<Self, BuildError> {
         const {
             assert!(
@@ -86,10 +94,10 @@ where
             );
         }
         let dissipates = !tensors.dissipation.is_none();
-        if !dissipates && tensors.bracket.is_zero() {
+        if !dissipates && !is_open && tensors.bracket.is_zero() {
             return Err(BuildError::NothingMoves);
         }
-        let changes = dissipates || tensors.bracket.is_forced();
+        let changes = dissipates || is_open || tensors.bracket.is_forced();
         let promises = second_law != SecondLaw::NoEntropy;
         if promises != (has_entropy && changes) || dissipates && !has_entropy {
             return Err(BuildError::SecondLawWithoutEntropy);

@@ -55,7 +55,7 @@
 
 mod chart;
 mod covectors;
-mod dense;
+pub(crate) mod dense;
 mod equation;
 mod fallbacks;
 mod full;
@@ -66,16 +66,19 @@ mod parts;
 mod solve;
 mod step;
 mod tableau;
+mod timed;
 
 use metriplectic_dynamics::{Metriplectic, SecondLaw, system::Point};
 
 pub use memory::StageMemory;
+pub(crate) use tableau::Tableau;
+pub(crate) use timed::{EnergyInTime, InTime, MOST, StageSolution, TimedStep};
 
 use crate::step::failure::Fallbacks;
 use crate::step::{
     Control, Dim, Flow, Promises, Refusal, StepEnds, StepError, StepStart, Stepper, Taken,
 };
-use tableau::{GAUSS, RADAU, Tableau};
+use tableau::{GAUSS, RADAU};
 
 /// The Gauss method of `S = 1 … 4` stages and order `2S`: reversible, with both laws exact.
 ///
@@ -137,14 +140,14 @@ macro_rules! method {
     ($name:ident, $tableaux:expr, $first:literal, $last:literal, $splits:literal) => {
         impl<const S: usize> $name<S> {
             /// The first part of a step that is not solved is at least `2^{-SPLITS}` of it.
-            const SPLITS: usize = $splits;
+            pub(crate) const SPLITS: usize = $splits;
 
             const IS_A_METHOD: () = assert!(
                 S >= $first && S <= $last,
                 concat!(stringify!($name), " has ", $first, " to ", $last, " stages")
             );
 
-            fn tableau() -> &'static Tableau {
+            pub(crate) fn tableau() -> &'static Tableau {
                 let () = Self::IS_A_METHOD;
                 &$tableaux[S - $first]
             }
@@ -226,7 +229,7 @@ method!(Radau, RADAU, 2, 4, 60);
 
 /// The defect of the polynomial of a step is `O(h^{s+1})`, and its end is of order `p`: held to `τ^{(s+1)/p}`, the
 /// error of a run is proportional to the tolerance `τ`.
-fn control(tableau: &Tableau) -> Control {
+pub(crate) fn control(tableau: &Tableau) -> Control {
     let local = tableau.stages as f64 + 1.0;
     Control {
         power: local / f64::from(tableau.order),

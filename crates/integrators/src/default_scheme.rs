@@ -1,9 +1,6 @@
 //! Runs with the default scheme.
 
-use metriplectic_dynamics::{Metriplectic, system::Point};
-use metriplectic_manifolds::{
-    Cayley, ChartMidpoint, Exponential, Projection, Retraction, WeylMidpoint,
-};
+use metriplectic_manifolds::{Cayley, ChartMidpoint, Exponential, Projection, WeylMidpoint};
 
 use crate::midpoint::Scheme;
 use crate::run::checkpoint::{Checkpoint, ResumeError};
@@ -12,6 +9,7 @@ use crate::run::method::Method as _;
 use crate::run::schedule::Schedule;
 use crate::run::steps::Steps;
 use crate::run::trajectory::Trajectory;
+use crate::step::{Element, Flow, Stepper};
 
 /// Runs a system with the default scheme of a retraction:
 /// `WeylMidpoint.run(&system, x0, Span::steps(0.1, 1000))`.
@@ -23,15 +21,14 @@ pub trait Run: Sized {
     /// # Errors
     ///
     /// Those of [`Method::run`](crate::Method::run).
-    fn run<Y>(
+    fn run<F: Flow>(
         self,
-        system: &Y,
-        x0: Point<Y>,
+        system: &F,
+        x0: Element<F>,
         schedule: impl Into<Schedule>,
-    ) -> Result<Trajectory<Y::Manifold>, RunError<Y::Manifold>>
+    ) -> Result<Trajectory<F::Space>, RunError<F::Space>>
     where
-        Y: Metriplectic,
-        Self: Retraction<Y::Manifold, Y::Metric>,
+        Scheme<Self>: Stepper<F>,
     {
         Scheme::new(self).run(system, x0, schedule)
     }
@@ -41,15 +38,14 @@ pub trait Run: Sized {
     /// # Errors
     ///
     /// Those of [`Method::steps`](crate::Method::steps).
-    fn steps<Y>(
+    fn steps<F: Flow>(
         self,
-        system: &Y,
-        x0: Point<Y>,
+        system: &F,
+        x0: Element<F>,
         schedule: impl Into<Schedule>,
-    ) -> Result<Steps<'_, Y, Scheme<Self>>, RunError<Y::Manifold>>
+    ) -> Result<Steps<'_, F, Scheme<Self>>, RunError<F::Space>>
     where
-        Y: Metriplectic,
-        Self: Retraction<Y::Manifold, Y::Metric>,
+        Scheme<Self>: Stepper<F>,
     {
         Scheme::new(self).steps(system, x0, schedule)
     }
@@ -59,14 +55,13 @@ pub trait Run: Sized {
     /// # Errors
     ///
     /// Those of [`Method::resume`](crate::Method::resume).
-    fn resume<'a, Y>(
+    fn resume<'a, F: Flow>(
         self,
-        system: &'a Y,
+        system: &'a F,
         checkpoint: &Checkpoint,
-    ) -> Result<Steps<'a, Y, Scheme<Self>>, ResumeError>
+    ) -> Result<Steps<'a, F, Scheme<Self>>, ResumeError>
     where
-        Y: Metriplectic,
-        Self: Retraction<Y::Manifold, Y::Metric>,
+        Scheme<Self>: Stepper<F>,
     {
         Scheme::new(self).resume(system, checkpoint)
     }

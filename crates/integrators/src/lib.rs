@@ -36,6 +36,7 @@ pub mod explicit;
 pub mod laws;
 pub mod midpoint;
 pub mod newton;
+pub mod open;
 pub mod round_off;
 pub mod run;
 pub mod step;
@@ -52,6 +53,7 @@ pub use explicit::{
 };
 pub use midpoint::{Residual, Scheme};
 pub use newton::{Equation, Iterate, Linearised, Newton, Root, Rounding};
+pub use open::{OpenBuilder, OpenSpace, OpenState, OpenSystem};
 pub use round_off::stable_gradient::StableGradient;
 pub use run::certificate::{
     Certificate, InvariantBalance, MisjudgedSize, ProjectedSteps, StageBalance,
@@ -66,7 +68,7 @@ pub use run::until::Until;
 pub use run::watch::{Watch, Watched};
 pub use run::{Ending, Method, Schedule, SpanError, State};
 pub use step::{
-    Components, Control, Effort, Element, EntropyStep, Evidence, Flow, Laws, LimitingSites, Memory,
-    MethodError, Promises, Recheck, Refusal, RestoreError, Saved, Scales, StageLaws, StateSpace,
-    StepEnds, StepError, StepStart, Stepper, Taken, Vector,
+    Components, Control, Effort, Element, EntropyStep, Evidence, Flow, Laws, LedgerSummary,
+    LimitingSites, Memory, MethodError, Promises, Recheck, Refusal, RestoreError, Saved, Scales,
+    StageLaws, StateSpace, StepEnds, StepError, StepStart, Stepper, Taken, Vector,
 };

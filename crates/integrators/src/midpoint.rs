@@ -38,10 +38,12 @@ mod memory;
 mod predictor;
 mod restored;
 mod scheme;
+mod solution;
 mod step;
 
 pub use equation::{Dissipated, Residual};
 pub use memory::MidpointMemory;
 pub use scheme::Scheme;
+pub(crate) use solution::Solution;
 
 pub use crate::step::Numbers;

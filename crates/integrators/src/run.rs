@@ -5,6 +5,7 @@ pub mod certificate;
 mod checked;
 pub mod checkpoint;
 pub mod controller;
+mod corners;
 mod ending;
 pub(crate) mod error;
 pub mod event;

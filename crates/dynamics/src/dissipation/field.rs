@@ -148,7 +148,7 @@ impl<F> FieldDissipation<F> {
 /// Where `θ` is the identity, as on every vector space, this is `w` itself. The LU decomposition of the
 /// identity in dual numbers would take longer than all the rest of the velocity.
 #[inline]
-fn along_velocities<M: Manifold, D: Scalar>(
+pub(crate) fn along_velocities<M: Manifold, D: Scalar>(
     x: &ChartPoint<M, D>,
     w: &Vector<M, D>,
     is_zero: impl Fn(&D) -> bool,

@@ -19,7 +19,9 @@
 
 use metriplectic_dynamics::Metriplectic;
 use metriplectic_dynamics::velocity::{Covectors, Gradient};
-use metriplectic_fields::{Column, Dimension, Real, ScalarField, Space, Vector, power_of_two};
+use metriplectic_fields::{
+    Column, Dimension, Jet1, Real, ScalarField, Space, Vector, power_of_two,
+};
 use metriplectic_manifolds::{InnerProduct, Manifold, Riemannian};
 
 use super::chart::StepChart;
@@ -98,6 +100,8 @@ pub(super) enum Correction {
     Later,
     /// So that the law has no error.
     Here,
+    /// So that the law has no error, if it would be more than it should; what it is less is left.
+    Raised,
 }
 
 /// The polynomial of a step, in the chart at its middle.
@@ -188,6 +192,46 @@ impl<M: Manifold> StagePoints<M> {
     }
 }
 
+/// A law along a step: a field, or one that depends on time.
+pub(super) trait Law<M: Space> {
+    /// The value at the end, for its value at the start.
+    fn end(&self, start: f64, end: &M::Point<f64>) -> f64;
+
+    /// The value and the differential at a stage.
+    fn jet1(&self, stage: usize, x: &M::Point<f64>) -> Jet1<M>;
+
+    /// What time alone changes of it at a stage, if it depends on time.
+    fn rate(&self, stage: usize, x: &M::Point<f64>) -> Option<f64>;
+
+    /// Its derivative along the polynomial of the step at a fraction of it, where the point is `x`.
+    fn slope(&self, node: f64, x: &M::Point<Real>) -> f64;
+}
+
+/// A field.
+struct Constant<'a, F>(&'a F);
+
+impl<M: Space, F: ScalarField<M>> Law<M> for Constant<'_, F> {
+    #[inline]
+    fn end(&self, _: f64, end: &M::Point<f64>) -> f64 {
+        self.0.at(end)
+    }
+
+    #[inline]
+    fn jet1(&self, _: usize, x: &M::Point<f64>) -> Jet1<M> {
+        self.0.jet1(x)
+    }
+
+    #[inline]
+    fn rate(&self, _: usize, _: &M::Point<f64>) -> Option<f64> {
+        None
+    }
+
+    #[inline]
+    fn slope(&self, _: f64, x: &M::Point<Real>) -> f64 {
+        self.0.at_real(x).eps1
+    }
+}
+
 /// Computes the covectors of one field after the other.
 pub(super) struct AlongStages<'a, M: Space> {
     pub(super) stages: &'a StagePoints<M>,
@@ -205,19 +249,34 @@ impl<M: Manifold> AlongStages<'_, M> {
         start: LawStart,
         correction: Correction,
     ) -> StageCovectors<Vector<M>> {
+        self.of_law(&Constant(f), start, correction)
+    }
+
+    /// The covectors of a law.
+    #[inline]
+    pub(super) fn of_law(
+        &self,
+        f: &impl Law<M>,
+        start: LawStart,
+        correction: Correction,
+    ) -> StageCovectors<Vector<M>> {
         let (Self { stages, polynomial, scales }, zero) = (self, Vector::<M>::zero());
         let StepPolynomial { tableau, chart, h, .. } = polynomial;
-        let (s, end) = (tableau.stages, f.at(&chart.end));
+        let (s, end) = (tableau.stages, f.end(start.value, &chart.end));
         let mut w = [zero; STAGES];
         let (mut slope, mut change, mut excursion) = (0.0, 0.0, 0.0_f64);
         let mut size = start.value.abs() + end.abs();
         for i in 0..s {
-            let jet = f.jet1(&stages.x[i]);
+            let jet = f.jet1(i, &stages.x[i]);
             excursion = excursion.max((jet.value - start.value).abs());
             w[i] = jet.df;
             slope += tableau.weights[i] * h * w[i].dot(&stages.v[i]);
             change += tableau.weights[i] * h.abs() * M::pairing_size(&w[i], &stages.v[i]);
             size += tableau.weights[i] * w[i].abs().dot(scales);
+            if let Some(rate) = f.rate(i, &stages.x[i]) {
+                slope += tableau.weights[i] * h * rate;
+                change += tableau.weights[i] * (h * rate).abs();
+            }
         }
         let none =
             StageCovectors { w, end, size, excursion, noise: zero, left: 0.0, left_round_off: 0.0 };
@@ -247,7 +306,7 @@ impl<M: Manifold> AlongStages<'_, M> {
         let later = StageCovectors { left: delta, left_round_off, ..none };
         let is_later = correction == Correction::Later;
         if squares == 0.0 {
-            return if is_later { later } else { none };
+            return if is_later || correction == Correction::Raised { later } else { none };
         }
         let blur = (noise / squares).abs();
         let mut noise = zero;
@@ -257,7 +316,7 @@ impl<M: Manifold> AlongStages<'_, M> {
                 here.max(noise[c])
             });
         }
-        if is_later {
+        if is_later || (correction == Correction::Raised && delta < 0.0) {
             return StageCovectors { noise, ..later };
         }
         for i in 0..s {
@@ -268,13 +327,13 @@ impl<M: Manifold> AlongStages<'_, M> {
 
     /// The change of a field along the polynomial of the step, as an integral.
     #[inline]
-    fn integral(&self, f: &impl ScalarField<M>) -> f64 {
+    fn integral(&self, f: &impl Law<M>) -> f64 {
         let StepPolynomial { tableau, chart, .. } = self.polynomial;
         tableau.points().iter().fold(0.0, |sum, point| {
             let q = self.polynomial.combined(&point.position);
             let v = self.polynomial.combined(&point.velocity);
             let moved = Vector::<M, Real>::from_index(|i| Real::new(q[i], v[i], 0.0, 0.0));
-            sum + point.weight * f.at_real(&M::chart(&chart.z, &moved)).eps1
+            sum + point.weight * f.slope(point.node, &M::chart(&chart.z, &moved))
         })
     }
 }

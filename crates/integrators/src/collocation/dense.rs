@@ -11,7 +11,7 @@ use super::memory::{LastStep, StageMemory};
 use super::tableau::Tableau;
 use crate::step::dense::{self, cubic, limited};
 use crate::step::failure::Fallbacks;
-use crate::step::{Components, Dim, Effort, Flow as _, Promises, StepEnds};
+use crate::step::{Components, Dim, Effort, Flow, Promises, StepEnds};
 
 /// The state at the fraction `θ` of a step: a step of size `θh`, guessed by the polynomial of the whole one, and moved
 /// onto the laws of the run with an entropy that does not fall from one fraction to a later one.
@@ -66,10 +66,10 @@ fn part<Y: Metriplectic>(
 /// Carlson 1980), and for a method that damps the rational function, which follows the rise of a fast transient. Half of
 /// its least slope `m` bounds the slope of the band `± ½m θ(1 − θ)`. So the entropy rises along each edge of the band, and
 /// inside of it where it differs from the function by a smooth remainder.
-fn entropy<Y: Metriplectic>(
+pub(crate) fn entropy<F: Flow>(
     tableau: &Tableau,
-    system: &Y,
-    step: &StepEnds<'_, Y>,
+    system: &F,
+    step: &StepEnds<'_, F>,
     theta: f64,
     reached: f64,
 ) -> f64 {
@@ -129,14 +129,7 @@ fn rational(rise: f64, slopes: [f64; 2], theta: f64) -> f64 {
     rise * (theta * theta + start * both) / (1.0 + (start + end - 2.0) * both)
 }
 
-/// The error of a step, by a norm: the larger one of
-///
-/// ```math
-/// h M^{-1} (u'(0) - f(x)), \qquad h M^{-1} (u'(1) - f(x')) ,
-/// ```
-///
-/// the defects of its polynomial at both ends. `M = I − γhJ` leaves of a stiff component what it may contribute
-/// to the end (Hairer, Wanner, Solving ODEs II, §IV.8).
+/// The error of a step, by a norm: the larger one of its [defects].
 pub(super) fn error<Y: Metriplectic>(
     tableau: &'static Tableau,
     system: &Y,
@@ -145,20 +138,42 @@ pub(super) fn error<Y: Metriplectic>(
     norm: impl Fn(&Components<Vector<Y::Manifold>>) -> f64,
 ) -> Option<f64> {
     let &StepEnds { x, end, h, values, .. } = step;
-    let LastStep { k, filter } = memory.last.as_ref()?;
     let equation = StageEquation::new(tableau, system, x, *values[0], h);
+    let velocity = |at: &Point<Y>| Some(system.rates(at, &Components(Column::zero()))?.0);
+    let velocities = [velocity(x)?, velocity(end)?];
+    let [first, second] = defects(&equation, memory, end, velocities)?;
+    Some(norm(&Components(first)).max(norm(&Components(second))))
+}
+
+/// The numbers
+///
+/// ```math
+/// h M^{-1} (u'(0) - f(x)), \qquad h M^{-1} (u'(1) - f(x')) ,
+/// ```
+///
+/// the defects of the polynomial of a step at both ends, where the motion has these velocities. `M = I − γhJ` leaves of a
+/// stiff component what it may contribute to the end (Hairer, Wanner, Solving ODEs II, §IV.8).
+pub(super) fn defects<Y: Metriplectic>(
+    equation: &StageEquation<'_, Y>,
+    memory: &StageMemory<Dim<Y>>,
+    end: &Point<Y>,
+    velocities: [Vector<Y::Manifold>; 2],
+) -> Option<[Vector<Y::Manifold>; 2]> {
+    let &StageEquation { tableau, x, h, .. } = equation;
+    let LastStep { k, filter } = memory.last.as_ref()?;
     let chart = equation.chart(k)?;
     let polynomial = equation.polynomial(&chart, k);
     let zero = Vector::<Y::Manifold>::zero();
-    let defect = |tau: f64, at: &Point<Y>| {
+    let defect = |tau: f64, at: &Point<Y>, velocity: Vector<Y::Manifold>| {
         let q = chart.d * (tau - 0.5);
         let slope = polynomial.combined(&tableau.velocity(tau));
         let there = in_chart_at::<Y::Manifold>(at, &chart.z, &q, &slope);
-        let off = there - system.rates(at, &Components(zero))?.0 * h;
+        let off = there - velocity * h;
         let middle = in_chart_at::<Y::Manifold>(&chart.z, at, &zero, &off);
-        Some(norm(&Components(*filter * chart.to_start(x, &middle))))
+        *filter * chart.to_start(x, &middle)
     };
-    Some(defect(0.0, x)?.max(defect(1.0, end)?))
+    let [first, second] = velocities;
+    Some([defect(0.0, x, first), defect(1.0, end, second)])
 }
 
 #[cfg(test)]

@@ -17,17 +17,22 @@ use metriplectic_manifolds::Manifold;
 
 use super::chart::{StepChart, in_chart_at};
 use super::covectors::{
-    AlongStages, Correction, LawStart, OfInvariants, StageCovectors, StagePoints, Stages,
-    StepPolynomial, all_finite, at_stage, combined,
+    AlongStages, Correction, LawStart, OfInvariants, StageCovectors, StageCovectorsOf, StagePoints,
+    Stages, StepPolynomial, all_finite, at_stage, combined,
 };
 use super::heat::{self, HeatStart};
 use super::tableau::{STAGES, Tableau};
+use super::timed::{InTime, Timed};
 use crate::round_off::bound::ROUNDED;
 use crate::round_off::drift;
 use crate::step::{Dim, DriftCorrection, Laws, Numbers};
 
 /// The velocities of the stages, in the frame at the start of the step.
 pub(super) type Unknowns<Y> = Stages<Vector<<Y as Metriplectic>::Manifold>>;
+
+/// The stages of a step, their covectors, and the middle of its chart.
+pub(super) type StagesOf<Y> =
+    (StagePoints<<Y as Metriplectic>::Manifold>, StageCovectorsOf<Y>, Point<Y>);
 
 /// Units of round-off up to which a velocity that changes the energy is one that has lost digits.
 const ROUNDINGS: f64 = 16.0;
@@ -47,6 +52,8 @@ pub(super) struct StageEquation<'a, Y: Metriplectic> {
     pub(super) heats: Option<HeatStart<Dim<Y>>>,
     /// The round-off of the terms of a velocity; zero where it is not known.
     pub(super) rounding: Vector<Y::Manifold>,
+    /// The system at the times of the stages, if it depends on time. Then `system` is that in the middle of the step.
+    pub(super) in_time: Option<InTime<'a, Y>>,
 }
 
 impl<Y: Metriplectic> Clone for StageEquation<'_, Y> {
@@ -122,7 +129,7 @@ impl<'a, Y: Metriplectic> StageEquation<'a, Y> {
             let w = differentials(system, &ChartPoint::<Y::Manifold>::centre(x));
             heats = heat::start(system, x, &w);
         }
-        Self { tableau, system, x, h, values, drift, heats, rounding }
+        Self { tableau, system, x, h, values, drift, heats, rounding, in_time: None }
     }
 
     /// The displacement `u = h Σ b_j k̃_j`.
@@ -160,6 +167,8 @@ impl<'a, Y: Metriplectic> StageEquation<'a, Y> {
         let inside = |x: &Point<Y>| system.manifold().is_inside(x);
         let stages = StagePoints::of(system.metric(), &polynomial, inside)?;
         let mut w = self.covectors(&stages, &polynomial);
+        // The work and the heat of an open system.
+        let mut exchanged = 0.0;
         let (mut heat, mut surplus, mut left) = (None, 0.0, f64::INFINITY);
         let mut heat_rounding = Vector::<Y::Manifold>::zero();
         if let Some(start) = &self.heats {
@@ -185,14 +194,20 @@ impl<'a, Y: Metriplectic> StageEquation<'a, Y> {
         for i in 0..tableau.stages {
             let at = ChartPoint::<Y::Manifold>::centre(&stages.x[i]);
             let here = at_stage::<Y>(&w, i);
+            let weight = h * tableau.weights[i];
+            let system = self.in_time.map_or(system, |in_time| &in_time.systems[i]);
             let g = system.metric_at(&at);
             let friction = irreversible(system, &g, &here).ok()?;
             let velocity = reversible(system, &g, &here).ok()? + friction;
-            let mut off = self.conserving(velocity, &here.energy) - stages.v[i];
+            let mut off = if self.in_time.is_some() {
+                exchanged += weight * here.energy.dot(&velocity);
+                velocity
+            } else {
+                self.conserving(velocity, &here.energy)
+            } - stages.v[i];
             if let Some(heat) = &heat {
                 off += heat[i];
             }
-            let weight = h * tableau.weights[i];
             work.add(weight, &here, &off);
             let sizes = here.entropy.abs();
             entropy_covector =
@@ -214,7 +229,11 @@ impl<'a, Y: Metriplectic> StageEquation<'a, Y> {
             size: w.entropy.size,
         };
         let values = Laws {
-            energy: w.energy.end,
+            energy: if self.in_time.is_some() {
+                w.energy.end - exchanged - w.energy.left.min(0.0)
+            } else {
+                w.energy.end
+            },
             entropy: w.entropy.end,
             invariants: Dim::<Y>::array(|a| w.invariants[a].map_or(0.0, |(_, l)| l.end)),
         };
@@ -238,6 +257,16 @@ impl<'a, Y: Metriplectic> StageEquation<'a, Y> {
             left,
             excursion: w.energy.excursion,
         })
+    }
+
+    /// The stages at these velocities with their covectors, and the middle of the chart.
+    pub(super) fn stages(&self, k: &Unknowns<Y>) -> Option<StagesOf<Y>> {
+        let chart = self.chart(k)?;
+        let polynomial = self.polynomial(&chart, k);
+        let inside = |x: &Point<Y>| self.system.manifold().is_inside(x);
+        let stages = StagePoints::of(self.system.metric(), &polynomial, inside)?;
+        let w = self.covectors(&stages, &polynomial);
+        Some((stages, w, chart.z))
     }
 
     /// The errors of the energy and the further invariants at the end, in units of round-off.
@@ -292,10 +321,19 @@ impl<'a, Y: Metriplectic> StageEquation<'a, Y> {
         };
         let energy = LawStart { value: values.energy, drift: drift.energy };
         let entropy = LawStart { value: values.entropy, drift: drift.entropy };
-        let laws = [
-            along.of(system.energy(), energy, of_energy),
-            along.of(system.entropy(), entropy, of_entropy),
-        ];
+        let of_energy = match self.in_time {
+            // What a method that damps loses of the energy is heat of the bath.
+            Some(in_time) if self.tableau.one_sided => {
+                let (tableau, x, z) = (self.tableau, self.x, &polynomial.chart.z);
+                along.of_law(&Timed { in_time, tableau, x, z }, energy, Correction::Raised)
+            }
+            Some(in_time) => {
+                let (tableau, x, z) = (self.tableau, self.x, &polynomial.chart.z);
+                along.of_law(&Timed { in_time, tableau, x, z }, energy, of_energy)
+            }
+            None => along.of(system.energy(), energy, of_energy),
+        };
+        let laws = [of_energy, along.of(system.entropy(), entropy, of_entropy)];
         let start = |a: usize| LawStart { value: values.invariants[a], drift: drift.invariants[a] };
         let mut invariants = OfInvariants { along: &along, start, seen: 0 };
         Covectors::new(laws, system.invariants(), &mut invariants)

@@ -4,24 +4,24 @@
 //! Lubich, Wanner 2006, §II.1).
 
 /// The most stages of a method.
-pub(super) const STAGES: usize = 4;
+pub(crate) const STAGES: usize = 4;
 /// The most nodes of the rule that integrates along a step, two more than there are stages.
 const POINTS: usize = STAGES + 2;
 
 /// A number for each stage; those beyond the last one are zero.
-pub(super) type Numbers = [f64; STAGES];
+pub(crate) type Numbers = [f64; STAGES];
 
 /// The coefficients of a collocation method.
 #[derive(Debug)]
-pub(super) struct Tableau {
+pub(crate) struct Tableau {
     /// How many stages there are.
     pub(super) stages: usize,
     /// The order of convergence.
-    pub(super) order: u32,
+    pub(crate) order: u32,
     /// Whether the entropy is corrected on one side only.
-    pub(super) one_sided: bool,
+    pub(crate) one_sided: bool,
     /// The nodes `c_i`.
-    pub(super) nodes: Numbers,
+    pub(crate) nodes: Numbers,
     /// The weights `b_j`.
     pub(super) weights: Numbers,
     /// The matrix `a_ij`.
@@ -37,6 +37,8 @@ pub(super) struct Tableau {
 /// A node of the Gauss rule along a step.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Point {
+    /// The fraction of the step.
+    pub(super) node: f64,
     /// Its weight.
     pub(super) weight: f64,
     /// The coefficients `∫₀^τ ℓ_j − b_j/2` of the position from the middle of the step.
@@ -105,7 +107,7 @@ const SIX: Rule<6> = Rule {
 };
 
 /// Gauss methods of 1 to 4 stages.
-pub(super) static GAUSS: [Tableau; 4] = [
+pub(crate) static GAUSS: [Tableau; 4] = [
     Tableau::new([0.5], &THREE, 0.5, 2),
     Tableau::new(
         [0.211_324_865_405_187_13, 0.788_675_134_594_812_9],
@@ -118,7 +120,7 @@ pub(super) static GAUSS: [Tableau; 4] = [
 ];
 
 /// Radau IIA methods of 2 to 4 stages.
-pub(super) static RADAU: [Tableau; 3] = [
+pub(crate) static RADAU: [Tableau; 3] = [
     Tableau::new([1.0 / 3.0, 1.0], &FOUR, 0.408_248_290_463_863, 3),
     Tableau::new(
         [0.155_051_025_721_682_2, 0.644_948_974_278_317_8, 1.0],
@@ -150,8 +152,12 @@ impl Tableau {
             matrix: [[0.0; STAGES]; STAGES],
             inverse: [[0.0; STAGES]; STAGES],
             gamma,
-            points: [Point { weight: 0.0, position: [0.0; STAGES], velocity: [0.0; STAGES] };
-                POINTS],
+            points: [Point {
+                node: 0.0,
+                weight: 0.0,
+                position: [0.0; STAGES],
+                velocity: [0.0; STAGES],
+            }; POINTS],
         };
         let mut i = 0;
         while i < S {
@@ -181,8 +187,8 @@ impl Tableau {
                 position[j] = self.integral(j, rule.nodes[i]) - 0.5 * self.weights[j];
                 j += 1;
             }
-            self.points[i] =
-                Point { weight: rule.weights[i], position, velocity: self.velocity(rule.nodes[i]) };
+            let (node, weight) = (rule.nodes[i], rule.weights[i]);
+            self.points[i] = Point { node, weight, position, velocity: self.velocity(node) };
             i += 1;
         }
         self

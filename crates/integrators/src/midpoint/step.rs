@@ -148,7 +148,7 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
 }
 
 /// What a solution tells of the motion.
-fn evidence<M: Manifold>(root: &Root<M, Dissipated>, friction: f64) -> Evidence {
+pub(super) fn evidence<M: Manifold>(root: &Root<M, Dissipated>, friction: f64) -> Evidence {
     let rests = (0..Vector::<M>::LEN).all(|i| root.u[i].abs() <= 2.0 * root.round_off[i]);
     let Dissipated { slope_squared, dissipates } = root.evidence;
     Evidence {
@@ -166,7 +166,7 @@ const VERY_STIFF: f64 = 1e8;
 /// Whether the round-off of a solution is small: if friction is so stiff that the slow motion has no digits
 /// beside it, the round-off of the displacement is as large as the displacement, and a state would seem to
 /// rest. It is measured by the energy that goes with it, which has one unit for all components.
-fn has_digits<Y: Metriplectic>(
+pub(super) fn has_digits<Y: Metriplectic>(
     system: &Y,
     start: &Start<'_, Y>,
     Root { u, round_off, .. }: &Root<Y::Manifold, Dissipated>,

@@ -11,7 +11,8 @@ use metriplectic_dynamics::invariants::Kind;
 use crate::round_off::bound::of_a_law;
 use crate::run::checked::checked_states;
 use crate::step::{
-    Effort, Element, EntropyStep, Evidence, Flow, Laws, LimitingSites, Promises, Taken,
+    Effort, Element, EntropyStep, Evidence, Flow, Laws, LedgerSummary, LimitingSites, Promises,
+    Taken,
 };
 
 /// The balance of a run: what became of the two laws, of the manifold, and what it cost.
@@ -96,6 +97,10 @@ pub struct Certificate {
     /// state, from the Jacobians that were formed; 0 without dissipation, and in steps that damp it. The midpoint
     /// rule damps no deviation that decays much faster than a step: it is multiplied by almost −1.
     pub friction: f64,
+    /// What has flowed into an open system; `None` for a closed one. The energy of an open system is `H − W − Q`, and
+    /// its entropy that of the system and its baths.
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
+    pub exchange: Option<LedgerSummary>,
     /// Whether the dissipation was projected so that it keeps the energy, and is not quite the tensor
     /// that was written down ([`ProjectedDissipation`](metriplectic_dynamics::ProjectedDissipation)).
     pub projected: bool,
@@ -238,6 +243,7 @@ impl Certificate {
             promises,
             second_law: flow.entropy_law(),
             friction: 0.0,
+            exchange: flow.ledger(x0),
             projected: flow.is_projected(),
         }
     }
@@ -279,6 +285,9 @@ impl Certificate {
         self.friction = self.friction.max(evidence.friction);
         self.max_manifold_defect = self.max_manifold_defect.max(flow.defect(next));
         self.steps += 1;
+        if self.exchange.is_some() {
+            self.exchange = flow.ledger(next);
+        }
         self.projected_steps.enter(evidence);
         if let Some(laws) = evidence.stages {
             let balance = self.stages.get_or_insert_default();

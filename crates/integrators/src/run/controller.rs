@@ -245,10 +245,10 @@ impl Pace {
         h.clamp(least, self.largest.unwrap_or(self.end - rule.start).max(least))
     }
 
-    /// The size of the step to try from time `t`, so that `t + h` has no round-off, and whether it
+    /// The size of the step to try from time `t` on the way to `end`, so that `t + h` has no round-off, and whether it
     /// is the last one.
-    pub(crate) fn attempt(&self, t: f64) -> (f64, bool) {
-        let (h, left) = (self.next, self.end - t);
+    pub(crate) fn attempt(&self, t: f64, end: f64) -> (f64, bool) {
+        let (h, left) = (self.next, end - t);
         if left <= 1.01 * h {
             (left, true)
         } else if left < 2.0 * h {

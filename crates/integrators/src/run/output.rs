@@ -2,6 +2,7 @@
 
 use metriplectic_dynamics::SecondLaw;
 
+use crate::run::corners::{self, Fixed};
 use crate::run::ending::Ending;
 use crate::run::event::Event;
 use crate::run::requests::rounding;
@@ -156,7 +157,8 @@ impl<F: Flow, M: Stepper<F>> Steps<'_, F, M> {
             return Some(self.state.clone());
         }
         let (has_entropy, reference) = (self.has_entropy(), self.reference(self.before.entropy));
-        let Self { method, flow, before, state, values, memory, .. } = self;
+        let Self { method, flow, before, state, values, memory, progress, .. } = self;
+        let corners = &progress.corners;
         let (x, end, h) = (&before.state.point, &state.point, before.h);
         let step = StepEnds { x, end, h, values: [&before.values, values], reference: &reference };
         let times = [before.state.time, state.time];
@@ -179,7 +181,9 @@ impl<F: Flow, M: Stepper<F>> Steps<'_, F, M> {
             }
             let (values, reference) = (before.values.clone(), reference.clone());
             let start = StepStart { x, time: times[0], values, reference, allowed: None };
-            let taken = method.step(*flow, &start, theta * h, &mut M::Memory::default()).ok()?;
+            let size = Fixed { h: theta * h, end: times[0] + theta * (times[1] - times[0]) };
+            let memory = &mut M::Memory::default();
+            let taken = corners::step((&*method, *flow), &start, size, corners, memory).ok()?;
             let inside = at(taken.x);
             if is_between(&inside) {
                 return Some(inside);

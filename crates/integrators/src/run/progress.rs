@@ -1,6 +1,7 @@
 //! Where a run is on its schedule: what its next step depends on beside the state and the memory of the method.
 
 use crate::run::controller::StepSize;
+use crate::run::corners::Corners;
 use crate::run::ending::Ending;
 use crate::run::judged::Judged;
 use crate::step::Scales;
@@ -25,6 +26,8 @@ pub(crate) struct Progress<V> {
     pub(crate) scales: Scales<V>,
     /// The sizes at the start and those reached, where errors are judged by them.
     pub(crate) judged: Option<Judged<V>>,
+    /// The times across which no step goes.
+    pub(crate) corners: Corners,
     /// The tolerance of rest.
     #[cfg_attr(feature = "serde", serde(with = "exact"))]
     pub(crate) rest: Option<f64>,
@@ -65,6 +68,7 @@ impl<V> Progress<V> {
             most,
             scales,
             judged,
+            corners: self.corners.clone(),
             rest,
             largest_velocity,
             ending,

@@ -2,6 +2,7 @@
 
 use crate::run::adaptive::Adaptive;
 use crate::run::controller::Rule;
+use crate::run::corners::Corners;
 use crate::run::requests::Requests;
 use crate::run::span_error::{SpanError, check_step_size, check_steps};
 
@@ -27,6 +28,8 @@ pub struct Schedule {
     pub(crate) rest: Option<f64>,
     /// The outputs and the events.
     pub(crate) watch: Requests,
+    /// The times across which no step goes.
+    pub(crate) corners: Corners,
 }
 
 /// How large the steps of a course are.
@@ -39,8 +42,8 @@ pub(crate) enum Size {
 impl From<f64> for Schedule {
     fn from(h: f64) -> Self {
         let (start, every, most, rest) = (0.0, 1, None, None);
-        let watch = Requests::default();
-        Self { size: Size::Fixed(h), start, count: None, every, most, rest, watch }
+        let (watch, corners) = (Requests::default(), Corners::default());
+        Self { size: Size::Fixed(h), start, count: None, every, most, rest, watch, corners }
     }
 }
 
@@ -58,6 +61,14 @@ impl Schedule {
                 Some(self.count.map_or(*h, |count| count as f64 * h))
             }
             Size::Fixed(_) => None,
+        }
+    }
+
+    /// When the run ends; infinite if it does not.
+    fn end(&self) -> f64 {
+        match &self.size {
+            Size::Fixed(h) => self.count.map_or(f64::INFINITY, |n| self.start + n as f64 * h),
+            Size::Tolerance(adaptive) => adaptive.end(),
         }
     }
 
@@ -88,6 +99,7 @@ impl Schedule {
         if self.watch.has_outputs() && (self.every != 1 || self.most.is_some()) {
             return Err(SpanError::TwoRecords);
         }
+        self.corners.check(self.end())?;
         match self.rest {
             Some(tolerance) if !(tolerance > 0.0 && tolerance < 1.0) => {
                 Err(SpanError::Rest { tolerance })

@@ -1,5 +1,6 @@
 //! How far a run goes in steps of one size, and what of it is recorded.
 
+use crate::run::corners::Corners;
 use crate::run::requests::Requests;
 use crate::run::schedule::{Schedule, Size};
 
@@ -83,7 +84,8 @@ impl Span {
 impl From<Span> for Schedule {
     fn from(Span { start, step, count, every, rest }: Span) -> Self {
         let (size, watch) = (Size::Fixed(step), Requests::default());
-        Self { size, start, count: Some(count), every, most: None, rest, watch }
+        let (count, corners) = (Some(count), Corners::default());
+        Self { size, start, count, every, most: None, rest, watch, corners }
     }
 }
 

@@ -129,6 +129,25 @@ pub enum SpanError {
         /// The interval.
         interval: f64,
     },
+    /// A corner is not a finite time.
+    #[error("a corner was named at t = {time}; it must be a finite time")]
+    Corner {
+        /// The time.
+        time: f64,
+    },
+    /// The interval of samples is not positive and finite, or is not seen in the time.
+    #[error(
+        "the interval between samples is {interval}; it must be a positive finite number that the time of the run sees"
+    )]
+    Sampling {
+        /// The interval.
+        interval: f64,
+    },
+    /// A run of an open system is to end at rest.
+    #[error(
+        "an open system has no rest: what drives it may begin at any time; leave `until_rest` out, or stop at an event"
+    )]
+    NoRestInTime,
     /// The function of an event has points of another type than the run.
     #[error(
         "event {index} is a function of {}, and the points of the run are {}; say this type in the closure",

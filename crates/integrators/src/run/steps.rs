@@ -5,12 +5,14 @@ use std::fmt;
 use crate::round_off::bound::{ROUNDED, breaks_first_law};
 use crate::run::certificate::{Certificate, InvariantBalance, StepOf};
 use crate::run::controller::{Controller, Rule, StepSize};
+use crate::run::corners;
 use crate::run::ending::Ending;
 use crate::run::error::RunError;
 use crate::run::event::LastNumber;
 use crate::run::judged::Judged;
 use crate::run::progress::Progress;
 use crate::run::schedule::{Schedule, Size};
+use crate::run::span_error::SpanError;
 use crate::run::state::State;
 use crate::run::watching::{StepBefore, Watching};
 use crate::step::dense::says_between;
@@ -76,12 +78,17 @@ impl<'a, F: Flow, M: Stepper<F>> Steps<'a, F, M> {
         method.check(!schedule.is_fixed())?;
         let rule = Rule::of(&method, schedule.start);
         schedule.check_tolerance(&rule)?;
+        if schedule.rest.is_some() && flow.depends_on_time() {
+            return Err(SpanError::NoRestInTime.into());
+        }
+        let x0 = flow.begin(x0, schedule.start);
         flow.check(&x0)?;
         flow.examine(&x0)?;
         let promises = method.promises(flow);
         let certificate = Certificate::start(flow, &x0, promises);
         let scales = Scales::at(flow, &x0, schedule.span());
-        let Schedule { size, start, count, every, most, rest, watch } = schedule;
+        let Schedule { size, start, count, every, most, rest, watch, mut corners } = schedule;
+        corners.start = start;
         let step_size = match size {
             Size::Fixed(h) => StepSize::Fixed(h),
             Size::Tolerance(adaptive) => {
@@ -103,6 +110,7 @@ impl<'a, F: Flow, M: Stepper<F>> Steps<'a, F, M> {
             most,
             scales,
             judged,
+            corners,
             rest,
             largest_velocity,
             ending: None,
@@ -184,15 +192,22 @@ impl<'a, F: Flow, M: Stepper<F>> Steps<'a, F, M> {
     /// Takes one step of a run that has not ended.
     fn take_step(&mut self) -> Result<(), StepError> {
         let step = self.state.step + 1;
-        let Advance { taken, h, time } = match &self.progress.step_size {
+        let Advance { mut taken, h, time } = match &self.progress.step_size {
             &StepSize::Fixed(h) => {
                 let mut memory = std::mem::take(&mut self.memory);
-                let taken = self.method.step(self.flow, &self.from(None), h, &mut memory);
+                let time = self.progress.start + step as f64 * h;
+                let (system, size) = ((&self.method, self.flow), corners::Fixed { h, end: time });
+                let corners = &self.progress.corners;
+                let taken = corners::step(system, &self.from(None), size, corners, &mut memory);
                 self.memory = memory;
-                Advance { taken: taken?, h, time: self.progress.start + step as f64 * h }
+                Advance { taken: taken?, h, time }
             }
             StepSize::Adaptive(controller) => self.controlled(controller.clone())?,
         };
+        if let Some(clocked) = self.flow.clocked(&taken.x, time) {
+            taken.values = self.flow.laws(&clocked);
+            taken.x = clocked;
+        }
         if !is_finite(&taken.values) {
             let time = self.state.time;
             return Err(StepError::OutOfDomain { time, h, tried: taken.effort });
@@ -205,6 +220,7 @@ impl<'a, F: Flow, M: Stepper<F>> Steps<'a, F, M> {
             let time = self.state.time;
             return Err(StepError::FirstLawBroken { time, h, change, size });
         }
+        self.check_step(&taken, h)?;
         let entered = StepOf { taken: &taken, h };
         self.certificate.enter(self.flow, &self.state.point, &self.values, entered);
         let first_at_the_edge =
@@ -245,6 +261,19 @@ impl<'a, F: Flow, M: Stepper<F>> Steps<'a, F, M> {
             self.look()?;
         }
         self.recheck(evidence.entropy_step == Some(EntropyStep::Held))
+    }
+
+    /// Looks at what must hold on every step. Steps of one size between corners have been looked at one by one.
+    #[inline]
+    fn check_step(&self, taken: &Taken<F>, h: f64) -> Result<(), StepError> {
+        let fixed = matches!(self.progress.step_size, StepSize::Fixed(_));
+        if !self.flow.depends_on_time() || (fixed && !self.progress.corners.is_empty()) {
+            return Ok(());
+        }
+        let reference = self.reference(self.entropy);
+        let (x, values) = (&self.state.point, [&self.values, &taken.values]);
+        let step = StepEnds { x, end: &taken.x, h, values, reference: &reference };
+        self.flow.inspect(&step, fixed)
     }
 
     /// Whether the certificate may name a site.
@@ -311,6 +340,15 @@ impl<'a, F: Flow, M: Stepper<F>> Steps<'a, F, M> {
         let (flow, rule, time) = (self.flow, self.rule, self.state.time);
         let mut effort = Effort::default();
         let (mut tries, mut broken) = (0, None);
+        let corner =
+            self.progress.corners.after(time).filter(|corner| *corner < controller.pace.end);
+        let stop =
+            corner.map_or(controller.pace.end, |corner| self.progress.corners.before(corner));
+        // The time that is recorded for a step that goes on to there.
+        let target = corner.unwrap_or(controller.pace.end);
+        if self.progress.corners.has(time) {
+            self.memory = M::Memory::default();
+        }
         loop {
             tries += 1;
             if tries == TRIES {
@@ -318,7 +356,7 @@ impl<'a, F: Flow, M: Stepper<F>> Steps<'a, F, M> {
                 let here = Scales::at(flow, &self.state.point, Some(controller.pace.end - time));
                 self.progress.scales = self.progress.scales.and(&here);
             }
-            let (h, last) = controller.pace.attempt(time);
+            let (h, last) = controller.pace.attempt(time, stop);
             if controller.pace.next < controller.pace.least(&rule) && !last {
                 let (h, least) = (controller.pace.next, controller.pace.least(&rule));
                 let too_small = StepError::TooSmall { time, h, least };
@@ -368,7 +406,7 @@ impl<'a, F: Flow, M: Stepper<F>> Steps<'a, F, M> {
                 (Some(taken), _) if taken.evidence.entropy_step == Some(EntropyStep::Held) => {
                     controller.pace.accept_held(&rule, h);
                     self.memory = memory;
-                    let time = if last { controller.pace.end } else { time + h };
+                    let time = if last { target } else { time + h };
                     self.progress.step_size = StepSize::Adaptive(controller);
                     return Ok(Advance { taken: Taken { effort, ..taken }, h, time });
                 }
@@ -381,7 +419,7 @@ impl<'a, F: Flow, M: Stepper<F>> Steps<'a, F, M> {
                 (Some(taken), Some(error)) if error <= 1.0 => {
                     controller.pace.accept(&rule, h, error);
                     self.memory = memory;
-                    let time = if last { controller.pace.end } else { time + h };
+                    let time = if last { target } else { time + h };
                     self.progress.step_size = StepSize::Adaptive(controller);
                     return Ok(Advance { taken: Taken { effort, ..taken }, h, time });
                 }

@@ -4,6 +4,7 @@ use std::convert::Infallible;
 
 use crate::run::adaptive::Adaptive;
 use crate::run::controller::Entries;
+use crate::run::corners::Corners;
 use crate::run::requests::Requests;
 use crate::run::schedule::{Schedule, Size};
 use crate::run::span::Span;
@@ -175,6 +176,7 @@ impl<const N: usize> From<Until<N>> for Schedule {
             until;
         let Ok(entries) = entries.convert(|_, numbers| Ok::<_, Infallible>((*numbers).into()));
         let size = Size::Tolerance(Adaptive { end, tolerance, first, least, largest, entries });
-        Self { size, start, count: None, every, most, rest, watch: Requests::default() }
+        let (watch, corners) = (Requests::default(), Corners::default());
+        Self { size, start, count: None, every, most, rest, watch, corners }
     }
 }

@@ -69,6 +69,51 @@ pub trait Watch: Into<Schedule> {
         schedule
     }
 
+    /// Names times at which the law of motion of an open system jumps or has a kink. No step goes across them: each ends at
+    /// a corner on the old law, and the next one begins there with the new law. What the energy changes by at the corner
+    /// is work of the time at a frozen state. Corners outside of the run are left out.
+    ///
+    /// ```
+    /// use metriplectic_dynamics::{Symplectic, System};
+    /// use metriplectic_fields::Real;
+    /// use metriplectic_integrators::{DormandPrince8, Method, OpenBuilder, Span, Watch};
+    /// use metriplectic_manifolds::Euclidean;
+    /// use nalgebra::{Vector2, vector};
+    /// # fn main() -> Result<(), metriplectic_integrators::Error> {
+    /// // A spring that becomes four times as stiff at t = 0.5.
+    /// let spring = System::on(Euclidean::<2>)
+    ///     .bracket(Symplectic)
+    ///     .energy_in_time(|t: Real, x: &Vector2<Real>| {
+    ///         let stiffness = if t.re < 0.5 { 1.0 } else { 4.0 };
+    ///         (x.y * x.y + x.x * x.x * stiffness) * 0.5
+    ///     })
+    ///     .build()?;
+    /// let span = Span::until(1.0).tolerance(1e-10).corners([0.5]);
+    /// let run = DormandPrince8.run(&spring, spring.start(vector![1.0, 0.0]), span)?;
+    /// let [q, p] = [0.5_f64.cos(), -0.5_f64.sin()];
+    /// assert!((run.last().point.x.x - (q * 1.0_f64.cos() + p * 0.5 * 1.0_f64.sin())).abs() < 1e-9);
+    /// assert!((run.last().point.ledger.parameter_work() - 1.5 * q * q).abs() < 1e-9);
+    /// # Ok(())
+    /// # }
+    /// ```
+    #[must_use]
+    fn corners(self, times: impl IntoIterator<Item = f64>) -> Schedule {
+        let mut schedule = self.into();
+        let list = &mut schedule.corners.times;
+        list.extend(times);
+        list.sort_by(f64::total_cmp);
+        list.dedup();
+        schedule
+    }
+
+    /// Makes [corners](Self::corners) of the times `t₀ + k Δt`: for a control that is constant between its samples.
+    #[must_use]
+    fn sampled(self, interval: f64) -> Schedule {
+        let mut schedule = self.into();
+        schedule.corners.interval = Some(interval);
+        schedule
+    }
+
     /// Finds where a function of the point changes its sign, to the last digits of the time, and records the
     /// [events](crate::Trajectory::events) by their name. Say the type of the point in the closure.
     ///

@@ -162,6 +162,23 @@ pub enum StepError {
         /// The entropy `h Σ b_i ⟨dS, K dS⟩_i` that friction produces in the step.
         rise: f64,
     },
+    /// The energy jumps inside a step of a fixed size, or changes faster than the step.
+    #[error(
+        "the energy changes by {frozen:.3e} along the step of size {h:.3e} from t = {} at a frozen state, and its rate adds \
+         up to {quadrature:.3e}: the protocol jumps inside the step, or is faster than it; name the times of its jumps by \
+         `.corners([..])`, take smaller steps, or let them follow a tolerance",
+        digits(.time)
+    )]
+    ProtocolJumps {
+        /// The time at which the step starts.
+        time: f64,
+        /// The size of the step.
+        h: f64,
+        /// The change `H(t', x) − H(t, x)` at a frozen state.
+        frozen: f64,
+        /// The integral of `∂_tH` there, by the Gauss rule of three points.
+        quadrature: f64,
+    },
     /// The energy changes along the velocity in proportion to time, which its derivative excludes, and explicit steps
     /// creep.
     #[error(
@@ -263,6 +280,7 @@ impl StepError {
             | Self::NotProjected { h, .. }
             | Self::EntropyFalls { h, .. }
             | Self::WrongDerivative { h, .. }
+            | Self::ProtocolJumps { h, .. }
             | Self::TooSmall { h, .. }
             | Self::Standstill { h, .. }
             | Self::OutOfDomain { h, .. }

@@ -8,7 +8,7 @@ use metriplectic_dynamics::{ModelError, SecondLaw};
 use metriplectic_manifolds::{Manifold, PointError};
 
 use super::initial_scales::initial_scales;
-use super::{FlowError, Scales, Vector};
+use super::{FlowError, LedgerSummary, Scales, StepEnds, StepError, Vector};
 
 /// Where the states of a run live. Every [`Manifold`] is a state space.
 pub trait StateSpace: Clone + Debug + PartialEq + Send + Sync + 'static {
@@ -119,6 +119,43 @@ pub trait Flow {
     /// as it is.
     fn with_room<T>(&self, f: impl FnOnce() -> T) -> T {
         f()
+    }
+
+    /// The state in which a run starts at a time. The default is the one that is given.
+    fn begin(&self, x: Element<Self>, time: f64) -> Element<Self> {
+        let _ = time;
+        x
+    }
+
+    /// The state at another reading of the clock, where states carry one; `None` if they do not, or show this time. A run
+    /// asks for it at the end of each step, with the time that it records, and across each
+    /// [corner](crate::Watch::corners).
+    #[inline]
+    fn clocked(&self, x: &Element<Self>, time: f64) -> Option<Element<Self>> {
+        let _ = (x, time);
+        None
+    }
+
+    /// Returns whether the flow depends on time. Then no state is at rest.
+    fn depends_on_time(&self) -> bool {
+        false
+    }
+
+    /// What has flowed into the system up to a state, for the certificate of an open one.
+    fn ledger(&self, x: &Element<Self>) -> Option<LedgerSummary> {
+        let _ = x;
+        None
+    }
+
+    /// Looks at each step that was taken, for what must hold on every one. Steps are `of_one_size`, or follow a tolerance.
+    ///
+    /// # Errors
+    ///
+    /// [`StepError`] that ends the run.
+    #[inline]
+    fn inspect(&self, step: &StepEnds<'_, Self>, of_one_size: bool) -> Result<(), StepError> {
+        let _ = (step, of_one_size);
+        Ok(())
     }
 
     /// The state with these entries.

@@ -58,6 +58,16 @@ impl<N: Dimension> LawJets<N> {
         Self { values, w }
     }
 
+    /// The values of the laws.
+    pub(crate) const fn values(&self) -> Laws<N::Array<f64>> {
+        self.values
+    }
+
+    /// The differentials of the laws.
+    pub(crate) const fn covectors(&self) -> &Covectors<N, N::Vector<f64>> {
+        &self.w
+    }
+
     fn is_finite(&self) -> bool {
         let Self { values, w } = self;
         let mut listed = w.invariants.as_ref().iter().flatten().zip(values.invariants.as_ref());

@@ -9,7 +9,7 @@ use super::{
 };
 use crate::round_off::bound::of_a_law;
 use crate::step::digits::{Digits, counted};
-use crate::step::{Effort, LimitingSites};
+use crate::step::{Effort, LedgerSummary, LimitingSites};
 
 /// The local error from which on a hundred steps may be off by what a picture shows: about 27 steps of the midpoint rule
 /// in a turn.
@@ -21,20 +21,19 @@ impl fmt::Display for Certificate {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let steps = counted(self.steps, "step", "steps");
         let (error, relative) = (self.max_energy_error, self.relative_to());
+        let law = if self.exchange.is_some() { "|ΔH − W − Q|" } else { "|H − H₀|" };
         if !self.promises.energy {
-            writeln!(
-                f,
-                "first law:   not promised; |H − H₀| ≤ {error:.1e}{relative}, over {steps}"
-            )?;
+            writeln!(f, "first law:   not promised; {law} ≤ {error:.1e}{relative}, over {steps}")?;
         } else if self.keeps_energy() {
-            writeln!(f, "first law:   |H − H₀| ≤ {error:.1e}{relative}, over {steps}")?;
+            writeln!(f, "first law:   {law} ≤ {error:.1e}{relative}, over {steps}")?;
         } else {
             let allowed = of_a_law(self.energy_scale);
             writeln!(
                 f,
-                "first law:   BROKEN: |H − H₀| = {error:.1e}{relative}, round-off is {allowed:.1e}, over {steps}"
+                "first law:   BROKEN: {law} = {error:.1e}{relative}, round-off is {allowed:.1e}, over {steps}"
             )?;
         }
+        self.exchanged(f)?;
         match self.second_law {
             SecondLaw::NoEntropy => writeln!(f, "second law:  no entropy"),
             _ if !self.promises.entropy => {
@@ -141,6 +140,26 @@ impl fmt::Display for Certificate {
 }
 
 impl Certificate {
+    /// Lists the work and the heat of an open system.
+    fn exchanged(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Some(LedgerSummary { parameter, work, heat, .. }) = &self.exchange else {
+            return Ok(());
+        };
+        let mut entries: Vec<String> =
+            parameter.iter().map(|work| format!("parameter {work:.1e}")).collect();
+        let named = |list: &[(std::sync::Arc<str>, f64)]| -> Vec<String> {
+            list.iter().map(|(name, number)| format!("{name} {number:.1e}")).collect()
+        };
+        entries.extend(named(work));
+        if !entries.is_empty() {
+            writeln!(f, "work:        {}", entries.join(", "))?;
+        }
+        if !heat.is_empty() {
+            writeln!(f, "heat:        {}", named(heat).join(", "))?;
+        }
+        Ok(())
+    }
+
     /// Says how coarse the steps are for the motion.
     fn accuracy(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let has_stages = self.stages.is_some();
@@ -212,9 +231,15 @@ impl Certificate {
         } else {
             String::new()
         };
-        format!(
-            "ΔS ≥ {:.1e} on every step, {falls}; S rose by {:.6e}{slope}",
-            self.min_entropy_increment, self.entropy_gained
-        )
+        match &self.exchange {
+            Some(LedgerSummary { heat, system_entropy, .. }) if !heat.is_empty() => format!(
+                "Δ(S + S of the baths) ≥ {:.1e} on every step, {falls}; rose by {:.6e}, S is {system_entropy:.6e}{slope}",
+                self.min_entropy_increment, self.entropy_gained
+            ),
+            _ => format!(
+                "ΔS ≥ {:.1e} on every step, {falls}; S rose by {:.6e}{slope}",
+                self.min_entropy_increment, self.entropy_gained
+            ),
+        }
     }
 }

@@ -10,7 +10,7 @@ use crate::run::certificate::{
 };
 use crate::run::ending::Ending;
 use crate::step::exact::{self, ExactForm};
-use crate::step::{Effort, LimitingSites, Promises};
+use crate::step::{Effort, LedgerSummary, LimitingSites, Promises};
 
 #[derive(Serialize, Deserialize)]
 #[serde(remote = "Certificate", deny_unknown_fields)]
@@ -59,6 +59,9 @@ struct CertificateForm {
     second_law: SecondLaw,
     #[serde(with = "exact")]
     friction: f64,
+    // It is that of the point.
+    #[serde(skip)]
+    exchange: Option<LedgerSummary>,
     projected: bool,
 }
 

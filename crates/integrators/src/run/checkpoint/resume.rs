@@ -117,8 +117,8 @@ impl Certificate {
     /// of themselves is theirs.
     fn resumed(&self, fresh: Self) -> Result<Self, ResumeError> {
         expect_length("further invariants", self.invariants.len(), fresh.invariants.len())?;
-        let Self { promises, second_law, projected, .. } = fresh;
-        let mut certificate = Self { promises, second_law, projected, ..self.clone() };
+        let Self { promises, second_law, projected, exchange, .. } = fresh;
+        let mut certificate = Self { promises, second_law, projected, exchange, ..self.clone() };
         for (balance, fresh) in certificate.invariants.iter_mut().zip(fresh.invariants) {
             balance.kind = fresh.kind;
         }

@@ -71,7 +71,7 @@ fn the_controller_stays_within_its_bounds() {
     assert!((pace.next - 0.05).abs() < 1e-15);
     // The last steps: one, if it is nearly as long; two of one size, if it would be cut.
     pace.next = 1.0;
-    assert_eq!(pace.attempt(9.0), (1.0, true));
-    assert_eq!(pace.attempt(8.5), (0.75, false));
-    assert_eq!(pace.attempt(2.0), (1.0, false));
+    assert_eq!(pace.attempt(9.0, 10.0), (1.0, true));
+    assert_eq!(pace.attempt(8.5, 10.0), (0.75, false));
+    assert_eq!(pace.attempt(2.0, 10.0), (1.0, false));
 }

@@ -1,0 +1,220 @@
+//! Systems that depend on time along a step, and the solution of their stages.
+
+use std::fmt::Debug;
+
+use metriplectic_dynamics::{Metriplectic, system::Point};
+use metriplectic_fields::{Jet1, Real, ScalarField, Space, Vector};
+use metriplectic_manifolds::Manifold;
+
+use super::covectors::{Law, at_stage, combined};
+use super::dense;
+use super::equation::{StageEquation, Unknowns};
+use super::fallbacks::{self, StepFailure};
+use super::memory::{LastStep, StageMemory};
+use super::solve::Solved;
+use super::tableau::{STAGES, Tableau};
+use crate::round_off::compensation::Displaced;
+use crate::round_off::drift;
+use crate::step::failure::{Cause, Fallbacks};
+use crate::step::{Dim, Effort, Evidence, StageLaws, Start};
+
+/// The energy `H(t, x)` of a system along a step from `t` to `t'`.
+pub(crate) trait EnergyInTime<M: Space>: Debug {
+    /// The change `[H(t', x') − H(t', z)] − [H(t, x) − H(t, z)]`.
+    fn change(&self, x: &M::Point<f64>, end: &M::Point<f64>, z: &M::Point<f64>) -> f64;
+
+    /// The rate `∂_tH` at a fraction of the step.
+    fn rate(&self, node: f64, x: &M::Point<f64>) -> f64;
+
+    /// The derivative of `H` along the fraction of the step, with the point that moves.
+    fn slope(&self, node: f64, x: &M::Point<Real>) -> f64;
+}
+
+/// A system at the times of the stages.
+#[derive(Debug)]
+pub(crate) struct InTime<'a, Y: Metriplectic> {
+    pub(crate) systems: &'a [Y; STAGES],
+    pub(crate) energy: &'a dyn EnergyInTime<Y::Manifold>,
+}
+
+impl<Y: Metriplectic> Clone for InTime<'_, Y> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<Y: Metriplectic> Copy for InTime<'_, Y> {}
+
+/// The energy of a system in time, less that of a frozen state `z`, as a law along a step.
+#[derive(Debug)]
+pub(super) struct Timed<'a, Y: Metriplectic> {
+    pub(super) in_time: InTime<'a, Y>,
+    pub(super) tableau: &'static Tableau,
+    pub(super) x: &'a Point<Y>,
+    pub(super) z: &'a Point<Y>,
+}
+
+impl<Y: Metriplectic> Law<Y::Manifold> for Timed<'_, Y> {
+    fn end(&self, start: f64, end: &Point<Y>) -> f64 {
+        start + self.in_time.energy.change(self.x, end, self.z)
+    }
+
+    fn jet1(&self, stage: usize, x: &Point<Y>) -> Jet1<Y::Manifold> {
+        self.in_time.systems[stage].energy().jet1(x)
+    }
+
+    fn rate(&self, stage: usize, x: &Point<Y>) -> Option<f64> {
+        let (node, energy) = (self.tableau.nodes[stage], self.in_time.energy);
+        Some(energy.rate(node, x) - energy.rate(node, self.z))
+    }
+
+    fn slope(&self, node: f64, x: &<Y::Manifold as Space>::Point<Real>) -> f64 {
+        let energy = self.in_time.energy;
+        energy.slope(node, x) - energy.slope(node, &Y::Manifold::constant(self.z))
+    }
+}
+
+/// A step of a system in time that was solved.
+pub(crate) struct StageSolution<Y: Metriplectic> {
+    /// The end of the step, with the digits that earlier steps have lost.
+    pub(crate) end: Point<Y>,
+    /// The middle of its chart.
+    pub(crate) z: Point<Y>,
+    /// The nodes and the weights of the stages, and the stages with the covectors of energy and entropy.
+    pub(crate) stages: Vec<Stage<Y>>,
+    /// What the energy has lost beside work and heat of the stages, in a method that damps: not positive.
+    pub(crate) lost: f64,
+    pub(crate) evidence: Evidence,
+    pub(crate) effort: Effort,
+}
+
+/// A stage of a step.
+pub(crate) struct Stage<Y: Metriplectic> {
+    pub(crate) node: f64,
+    pub(crate) weight: f64,
+    pub(crate) x: Point<Y>,
+    pub(crate) energy: Vector<Y::Manifold>,
+    pub(crate) entropy: Vector<Y::Manifold>,
+}
+
+/// A step of a system in time.
+#[derive(Debug)]
+pub(crate) struct TimedStep<'a, Y: Metriplectic> {
+    pub(crate) tableau: &'static Tableau,
+    /// The system in the middle of the step.
+    pub(crate) middle: &'a Y,
+    pub(crate) in_time: InTime<'a, Y>,
+}
+
+impl<Y: Metriplectic> TimedStep<'_, Y> {
+    fn equation<'b>(&'b self, start: &Start<'b, Y>) -> StageEquation<'b, Y> {
+        let &Start { x, h, values, .. } = start;
+        let equation = StageEquation::new(self.tableau, self.middle, x, values, h);
+        StageEquation { in_time: Some(self.in_time), ..equation }
+    }
+
+    /// Solves a step, and adds the digits that earlier steps have lost of the position. What it leaves of the laws is for the
+    /// next one to take back.
+    pub(crate) fn solve(
+        &self,
+        start: &Start<'_, Y>,
+        memory: &mut StageMemory<Dim<Y>>,
+        fallbacks: Fallbacks,
+    ) -> Result<StageSolution<Y>, (Cause, Effort)> {
+        memory.last = None;
+        let (x, h) = (start.x, start.h);
+        let guess = memory.guess(self.tableau, h);
+        let mut equation = self.equation(start);
+        if let Some(guess) = &guess {
+            let d = equation.displacement(guess);
+            equation.drift = drift::target(self.middle, start, &d);
+        }
+        let mut effort = Effort::default();
+        let solved = self.solved(&equation, guess, fallbacks, &mut effort);
+        let (solved, mut solution) = solved.map_err(|failure| (failure.cause, failure.effort))?;
+        let k = solved.k;
+        let edge = || (Cause::Edge, effort);
+        let u = equation.displacement(&k);
+        let chart = equation.chart(&k).ok_or_else(edge)?;
+        memory.note::<Y::Manifold>(self.tableau, x, h, &k, &chart, &solution.end);
+        memory.last = Some(LastStep { k, filter: *solved.linear.filter() });
+        let step = Displaced { x, d: &u, end: &solution.end };
+        if let Some(moved) = memory.compensation.add::<Y::Manifold>(Y::Manifold::lost_digits, &step)
+        {
+            solution.end = moved;
+        }
+        Ok(solution)
+    }
+
+    /// Solves a step of a part of the size, from the polynomial of the whole one, at the fraction `θ`.
+    pub(crate) fn part(
+        &self,
+        start: &Start<'_, Y>,
+        memory: &StageMemory<Dim<Y>>,
+        theta: f64,
+    ) -> Option<StageSolution<Y>> {
+        let last = memory.last?;
+        let guess = std::array::from_fn(|i| {
+            let nodes = &self.tableau.nodes;
+            combined(self.tableau.stages, &self.tableau.velocity(theta * nodes[i]), &last.k)
+        });
+        let equation = self.equation(start);
+        let mut effort = Effort::default();
+        let solved = self.solved(&equation, Some(guess), Fallbacks::FirstTries, &mut effort);
+        solved.ok().map(|(_, solution)| solution)
+    }
+
+    /// The defects of the polynomial of a step at both ends, where the motion has these velocities.
+    pub(crate) fn defects(
+        &self,
+        start: &Start<'_, Y>,
+        memory: &StageMemory<Dim<Y>>,
+        end: &Point<Y>,
+        velocities: [Vector<Y::Manifold>; 2],
+    ) -> Option<[Vector<Y::Manifold>; 2]> {
+        dense::defects(&self.equation(start), memory, end, velocities)
+    }
+
+    fn solved(
+        &self,
+        equation: &StageEquation<'_, Y>,
+        guess: Option<Unknowns<Y>>,
+        fallbacks: Fallbacks,
+        effort: &mut Effort,
+    ) -> Result<(Solved<Y>, StageSolution<Y>), StepFailure> {
+        let tableau = self.tableau;
+        let solved = fallbacks::solve(equation, guess, fallbacks, effort)?;
+        let failed = |cause| StepFailure { cause, effort: *effort };
+        let Solved { k, at, linear, .. } = &solved;
+        if !Y::Manifold::is_near(&(at.d * 0.5)) {
+            return Err(failed(Cause::Unsolved));
+        }
+        if self.middle.manifold().defect(&at.end).is_infinite() {
+            return Err(failed(Cause::Edge));
+        }
+        let (points, w, z) = equation.stages(k).ok_or_else(|| failed(Cause::Edge))?;
+        let stages = (0..tableau.stages).map(|i| {
+            let here = at_stage::<Y>(&w, i);
+            Stage {
+                node: tableau.nodes[i],
+                weight: tableau.weights[i],
+                x: points.x[i].clone(),
+                energy: here.energy,
+                entropy: here.entropy,
+            }
+        });
+        let evidence = Evidence {
+            entropy_slope: at.entropy_slope,
+            dissipates: at.growth != 0.0,
+            friction: if tableau.one_sided { 0.0 } else { linear.friction },
+            stages: Some(StageLaws::new(at.error * crate::round_off::bound::ROUNDED, at.surplus)),
+            ..Evidence::default()
+        };
+        let (end, stages, effort) = (at.end.clone(), stages.collect(), *effort);
+        let lost = if tableau.one_sided { w.energy.left.min(0.0) } else { 0.0 };
+        Ok((solved, StageSolution { end, z, stages, lost, evidence, effort }))
+    }
+}
+
+/// The most stages, for the systems of a step.
+pub(crate) const MOST: usize = STAGES;

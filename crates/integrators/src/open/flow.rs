@@ -1,0 +1,301 @@
+//! An open system as a flow.
+
+use metriplectic_dynamics::exchange::{Entries as _, Exchange};
+use metriplectic_dynamics::velocity::{Covectors, differentials, irreversible};
+use metriplectic_dynamics::{
+    Dissipation as _, Metriplectic, ModelError, SecondLaw, VectorField, Verify as _,
+    invariants::Kind, system::Point,
+};
+use metriplectic_fields::{ChartPoint, Column as _, Space as _, Vector};
+use metriplectic_manifolds::{Manifold, PointError};
+
+use super::clock::Clock;
+use super::state::{Booked, Ledger, OpenSpace, OpenState};
+use super::system::{EntriesOf, OpenSystem, StateOf};
+use super::vector::OpenVector;
+use super::verify;
+use crate::explicit::{StageFlow as _, Target};
+use crate::round_off::bound::{of_an_increment, size_of_terms, sizes_on_a_step};
+use crate::step::{
+    Components, Dim, Flow, Laws, LedgerSummary, Numbers, Recheck, StepEnds, StepError,
+};
+
+/// A direction of an open system.
+pub(super) type Direction<Y, X> =
+    OpenVector<Vector<<Y as Metriplectic>::Manifold>, EntriesOf<Y, X>>;
+
+/// The covectors of all laws of a system at a point.
+pub(super) type CovectorsOf<Y> = Covectors<Dim<Y>, Vector<<Y as Metriplectic>::Manifold>>;
+
+impl<Y, C, X> Flow for OpenSystem<Y, C, X>
+where
+    Y: Metriplectic,
+    C: Clock<Y::Manifold, Y::Energy>,
+    X: Exchange<Y::Manifold, Y::Metric>,
+{
+    type Space = OpenSpace<Y::Manifold, X::Entries>;
+    type Numbers = Numbers<Y>;
+    type Vector = Direction<Y, X>;
+
+    fn with_room<T>(&self, f: impl FnOnce() -> T) -> T {
+        self.closed().with_room(f)
+    }
+
+    fn laws(&self, x: &StateOf<Y, X>) -> Laws<Numbers<Y>> {
+        let laws = self.closed().laws(&x.x);
+        self.balanced(x, Laws { energy: self.energy(x.time, &x.x), ..laws })
+    }
+
+    fn term_sizes(&self, x: &StateOf<Y, X>) -> Laws<Numbers<Y>> {
+        let sizes = self.closed().term_sizes(&x.x);
+        let view = self.frozen(x.time);
+        let energy = size_of_terms::<Y::Manifold>(view.energy(), &x.x) + x.ledger.net().abs();
+        Laws { energy, entropy: sizes.entropy + x.ledger.entropy_of_baths().abs(), ..sizes }
+    }
+
+    fn rates(&self, x: &StateOf<Y, X>, d: &Direction<Y, X>) -> Option<Direction<Y, X>> {
+        let t = x.time + d.clock;
+        let at = ChartPoint { base: x.x.clone(), q: d.v };
+        let v = VectorField::velocity(&self.frozen(t), &at).ok()?;
+        let y = Y::Manifold::chart(&x.x, &d.v);
+        let parameter = if C::RUNS { self.power(t, &y) - self.power(t, &x.x) } else { 0.0 };
+        let entries = self.entry_rates(t, &y, &self.covectors(t, &y))?;
+        Some(OpenVector { v, clock: 1.0, booked: Booked { parameter, entries } })
+    }
+
+    fn sizes(&self, x: &StateOf<Y, X>) -> Direction<Y, X> {
+        OpenVector::of(Y::Manifold::scales(&x.x))
+    }
+
+    fn moved(&self, x: &StateOf<Y, X>, d: &Direction<Y, X>) -> StateOf<Y, X> {
+        self.advanced(x, d, Y::Manifold::chart(&x.x, &d.v))
+    }
+
+    fn displacement(&self, x: &StateOf<Y, X>, y: &StateOf<Y, X>) -> Option<Direction<Y, X>> {
+        let q = Y::Manifold::coordinates(&x.x, &y.x);
+        (q.is_finite() && Y::Manifold::is_near(&q)).then(|| self.direction(x, y, q))
+    }
+
+    fn production(&self, x: &StateOf<Y, X>) -> Option<f64> {
+        let w = self.covectors(x.time, &x.x);
+        let exchanged = self.exchanged(x.time, &x.x, [&w.energy, &w.entropy]).ok()?.production;
+        let production = self.internal_production(x.time, &x.x, &w)? + exchanged;
+        production.is_finite().then_some(production)
+    }
+
+    fn onto(
+        &self,
+        y: &StateOf<Y, X>,
+        laws: &Laws<Numbers<Y>>,
+        entropy: Option<f64>,
+    ) -> Option<StateOf<Y, X>> {
+        let laws = Laws { entropy: entropy.unwrap_or(laws.entropy), ..*laws };
+        let with_entropy = entropy.is_some();
+        let target = Target { laws: &laws, with_entropy, limit: None, units: None, error: None };
+        self.project(y.clone(), &target).ok().map(|end| end.x)
+    }
+
+    fn element(&self, entries: &[f64]) -> Result<StateOf<Y, X>, PointError> {
+        let beside = 1 + Ledger::<X::Entries>::NUMBERS;
+        let Some(length) = entries.len().checked_sub(beside) else {
+            return Err(PointError::Length { found: entries.len(), expected: beside });
+        };
+        let (point, rest) = entries.split_at(length);
+        let x = self.closed().manifold().from_entries(point)?;
+        Ok(OpenState { x, time: rest[0], ledger: Ledger::read(self.columns(), &rest[1..]) })
+    }
+
+    fn begin(&self, x: StateOf<Y, X>, time: f64) -> StateOf<Y, X> {
+        OpenState { time, ..self.start(x.x) }
+    }
+
+    fn clocked(&self, x: &StateOf<Y, X>, time: f64) -> Option<StateOf<Y, X>> {
+        if x.time.to_bits() == time.to_bits() {
+            return None;
+        }
+        let work =
+            Booked { parameter: self.frozen_work([x.time, time], &x.x), ..Booked::nothing() };
+        Some(OpenState { x: x.x.clone(), time, ledger: x.ledger.with(&work) })
+    }
+
+    fn depends_on_time(&self) -> bool {
+        true
+    }
+
+    fn ledger(&self, x: &StateOf<Y, X>) -> Option<LedgerSummary> {
+        let [work, heat] = x.ledger.summary();
+        let parameter = C::RUNS.then(|| x.ledger.parameter_work());
+        let system_entropy = self.entropy_at(x);
+        Some(LedgerSummary { parameter, work, heat, system_entropy })
+    }
+
+    fn inspect(&self, step: &StepEnds<'_, Self>, of_one_size: bool) -> Result<(), StepError> {
+        if of_one_size {
+            verify::protocol(self, step)?;
+        }
+        verify::exchange(self, step.end)
+            .map_err(|law| StepError::Model { time: step.end.time, law: Box::new(law) })
+    }
+
+    fn entropy_law(&self) -> SecondLaw {
+        match self.closed().second_law() {
+            _ if self.exchange().has_cold_bath() => SecondLaw::Published,
+            SecondLaw::NoEntropy if X::BATHS > 0 => SecondLaw::Exact,
+            law => law,
+        }
+    }
+
+    fn kinds(&self) -> Vec<Kind> {
+        self.closed().kinds()
+    }
+
+    fn is_projected(&self) -> bool {
+        self.closed().dissipation().is_projected()
+    }
+
+    fn check(&self, x0: &StateOf<Y, X>) -> Result<(), ModelError> {
+        self.without_exchange(x0.time).check_start(&x0.x)?;
+        verify::clock(self, x0)?;
+        verify::exchange(self, x0)
+    }
+
+    fn is_verified(&self) -> bool {
+        self.closed().is_verified()
+    }
+
+    fn rechecks(&self, _: Recheck) -> bool {
+        true
+    }
+
+    fn recheck(&self, x: &StateOf<Y, X>, occasion: Recheck) -> Result<(), ModelError> {
+        let model = self.without_exchange(x.time);
+        match occasion {
+            Recheck::OnTheWay => model.check_state(&x.x),
+            Recheck::End => {
+                model.check_state(&x.x)?;
+                model.check_derivatives(&x.x)?;
+                verify::clock(self, x)
+            }
+            Recheck::Failure { .. } => {
+                verify::exchange(self, x)?;
+                model.check_around(&x.x, &[])
+            }
+        }
+    }
+
+    fn defect(&self, x: &StateOf<Y, X>) -> f64 {
+        self.closed().manifold().defect(&x.x)
+    }
+
+    fn energy_sizes(&self, [x, end]: [&StateOf<Y, X>; 2]) -> [f64; 2] {
+        let sizes = sizes_on_a_step(&self.between([x.time, end.time]), [&x.x, &end.x]);
+        let work = self.frozen_work([x.time, end.time], &x.x).abs();
+        sizes.map(|size| size + work)
+    }
+
+    fn entropy_round_off(&self, ends: [&StateOf<Y, X>; 2]) -> f64 {
+        let of_baths = ends.map(|x| x.ledger.entropy_of_baths().abs());
+        let of_system = of_an_increment(&self.frozen(ends[0].time), ends.map(|x| &x.x));
+        of_system + 4.0 * f64::EPSILON * of_baths[0].max(of_baths[1])
+    }
+
+    fn dependent_invariant(&self, x: &StateOf<Y, X>) -> Option<(usize, f64)> {
+        self.without_exchange(x.time).dependent_invariant(&x.x)
+    }
+
+    #[inline(never)]
+    fn local_error(
+        &self,
+        x: &StateOf<Y, X>,
+        end: &StateOf<Y, X>,
+        h: f64,
+    ) -> Option<Direction<Y, X>> {
+        let q = Y::Manifold::coordinates(&x.x, &end.x);
+        if !Y::Manifold::is_near(&q) {
+            return None;
+        }
+        let f = |t: f64, q| {
+            VectorField::velocity(&self.frozen(t), &ChartPoint { base: x.x.clone(), q }).ok()
+        };
+        let (start, there) = (f(x.time, Vector::<Y::Manifold>::zero())?, f(end.time, q)?);
+        let middle = f(x.time + 0.5 * h, q * 0.5 - (there - start) * (h / 8.0))?;
+        Some(OpenVector::of(q - (start + middle * 4.0 + there) * (h / 6.0)))
+    }
+}
+
+impl<Y, C, X> OpenSystem<Y, C, X>
+where
+    Y: Metriplectic,
+    C: Clock<Y::Manifold, Y::Energy>,
+    X: Exchange<Y::Manifold, Y::Metric>,
+{
+    /// The laws of the open system, from those of the system at this state: `H − W − Q`, and `S + Σ S_b`.
+    pub(super) fn balanced(&self, x: &StateOf<Y, X>, laws: Laws<Numbers<Y>>) -> Laws<Numbers<Y>> {
+        let [net, rest] = x.ledger.net_parts();
+        let entropy = laws.entropy + x.ledger.entropy_of_baths();
+        Laws { energy: (laws.energy - net) - rest, entropy, ..laws }
+    }
+
+    /// The differentials of all laws at a point.
+    pub(super) fn covectors(&self, t: f64, x: &Point<Y>) -> CovectorsOf<Y> {
+        differentials(&self.without_exchange(t), &ChartPoint::<Y::Manifold>::centre(x))
+    }
+
+    /// The entropy `⟨dS, K dS⟩` that the system produces by itself.
+    pub(super) fn internal_production(
+        &self,
+        t: f64,
+        x: &Point<Y>,
+        w: &CovectorsOf<Y>,
+    ) -> Option<f64> {
+        let model = self.without_exchange(t);
+        if model.dissipation().is_none() {
+            return Some(0.0);
+        }
+        let centre = ChartPoint::<Y::Manifold>::centre(x);
+        Some(w.entropy.dot(&irreversible(&model, &model.metric_at(&centre), w).ok()?))
+    }
+
+    /// The rates of the entries of the ledger.
+    pub(super) fn entry_rates(
+        &self,
+        t: f64,
+        x: &Point<Y>,
+        w: &CovectorsOf<Y>,
+    ) -> Option<X::Entries> {
+        if X::PORTS + X::BATHS == 0 {
+            return Some(X::Entries::from_index(|_| 0.0));
+        }
+        Some(self.exchanged(t, x, [&w.energy, &w.entropy]).ok()?.entries)
+    }
+
+    /// The state at a point that the displacement `d` leads to.
+    pub(super) fn advanced(
+        &self,
+        x: &StateOf<Y, X>,
+        d: &Direction<Y, X>,
+        point: Point<Y>,
+    ) -> StateOf<Y, X> {
+        let time = x.time + d.clock;
+        let parameter = d.booked.parameter + self.frozen_work([x.time, time], &x.x);
+        let ledger = x.ledger.with(&Booked { parameter, ..d.booked });
+        OpenState { x: point, time, ledger }
+    }
+
+    /// The displacement from a state to another one, with these components.
+    pub(super) fn direction(
+        &self,
+        x: &StateOf<Y, X>,
+        y: &StateOf<Y, X>,
+        v: Vector<Y::Manifold>,
+    ) -> Direction<Y, X> {
+        let mut booked = y.ledger.since(&x.ledger);
+        booked.parameter -= self.frozen_work([x.time, y.time], &x.x);
+        OpenVector { v, clock: y.time - x.time, booked }
+    }
+
+    /// The components of a direction, as those of the closed system.
+    pub(super) fn components(d: &Direction<Y, X>) -> Components<Vector<Y::Manifold>> {
+        Components(d.v)
+    }
+}

@@ -1,0 +1,133 @@
+//! An open system for explicit methods: stages with clock and ledger, and the projection of the point alone.
+
+use metriplectic_dynamics::exchange::Exchange;
+use metriplectic_dynamics::{Metriplectic, SecondLaw};
+use metriplectic_fields::{Dimension, Space as _};
+
+use super::clock::Clock;
+use super::flow::Direction;
+use super::state::{Booked, OpenState};
+use super::system::{OpenSystem, StateOf};
+use super::vector::OpenVector;
+use crate::explicit::{Projected, ProjectionError, StageFlow, Target};
+use crate::step::{Dim, Laws, Numbers};
+use crate::system::LawJets;
+
+/// The laws of an open system at a state, with the differentials of the system's own.
+#[derive(Clone, Debug)]
+pub struct OpenGradients<N: Dimension> {
+    jets: LawJets<N>,
+    values: Laws<N::Array<f64>>,
+}
+
+impl<Y, C, X> StageFlow for OpenSystem<Y, C, X>
+where
+    Y: Metriplectic,
+    C: Clock<Y::Manifold, Y::Energy>,
+    X: Exchange<Y::Manifold, Y::Metric>,
+{
+    type Gradients = OpenGradients<Dim<Y>>;
+
+    fn gradients(&self, x: &StateOf<Y, X>) -> Option<OpenGradients<Dim<Y>>> {
+        let view = self.frozen(x.time);
+        let jets = view.gradients(&x.x)?;
+        Some(self.gradients_at(x, jets))
+    }
+
+    fn values(&self, gradients: &OpenGradients<Dim<Y>>) -> Laws<Numbers<Y>> {
+        gradients.values
+    }
+
+    fn velocity(
+        &self,
+        x: &StateOf<Y, X>,
+        OpenGradients { jets, .. }: &OpenGradients<Dim<Y>>,
+    ) -> Option<(Direction<Y, X>, f64)> {
+        let t = x.time;
+        let w = jets.covectors();
+        let (v, _) = self.frozen(t).velocity(&x.x, jets)?;
+        let mut production = self.internal_production(t, &x.x, w)?;
+        let mut booked = Booked::nothing();
+        if X::PORTS + X::BATHS > 0 {
+            let exchanged = self.exchanged(t, &x.x, [&w.energy, &w.entropy]).ok()?;
+            production += exchanged.production;
+            booked.entries = exchanged.entries;
+        }
+        let velocity = OpenVector { v: v.0, clock: 1.0, booked };
+        production.is_finite().then_some((velocity, production))
+    }
+
+    fn stage(&self, x: &StateOf<Y, X>, q: &Direction<Y, X>) -> Option<StateOf<Y, X>> {
+        let view = self.frozen(x.time);
+        let point = view.stage(&x.x, &Self::components(q))?;
+        Some(self.advanced(x, q, point))
+    }
+
+    fn stage_rates(
+        &self,
+        x: &StateOf<Y, X>,
+        (q, y): (&Direction<Y, X>, &StateOf<Y, X>),
+        v: &Direction<Y, X>,
+    ) -> Direction<Y, X> {
+        let rates = Y::Manifold::stage_rates(&x.x, (&q.v, &y.x), &v.v);
+        let mut booked = v.booked;
+        if C::RUNS {
+            booked.parameter = self.power(y.time, &y.x) - self.power(y.time, &x.x);
+        }
+        OpenVector { v: rates, clock: v.clock, booked }
+    }
+
+    fn stage_coordinates(&self, x: &StateOf<Y, X>, y: &StateOf<Y, X>) -> Direction<Y, X> {
+        self.direction(x, y, Y::Manifold::stage_coordinates(&x.x, &y.x))
+    }
+
+    /// Moves the point alone. The energy of the system is to be the target and what has flowed in, its entropy the target
+    /// less what the baths have gained.
+    fn project(
+        &self,
+        y: StateOf<Y, X>,
+        target: &Target<'_, Self>,
+    ) -> Result<Projected<Self>, ProjectionError> {
+        let OpenState { x, time, ledger } = y;
+        let [net, rest] = ledger.net_parts();
+        let of_baths = ledger.entropy_of_baths();
+        let laws = Laws {
+            energy: (target.laws.energy + net) + rest,
+            entropy: target.laws.entropy - of_baths,
+            ..*target.laws
+        };
+        let has_entropy = self.closed().second_law() == SecondLaw::Exact;
+        let [limit, units, error] = [target.limit, target.units, target.error]
+            .map(|direction| direction.map(Self::components));
+        let inner = Target {
+            laws: &laws,
+            with_entropy: target.with_entropy && has_entropy,
+            limit: limit.as_ref(),
+            units: units.as_ref(),
+            error: error.as_ref(),
+        };
+        let view = self.frozen(time);
+        let Projected { x, gradients, entropy, entropy_round_off } = view.project(x, &inner)?;
+        // Without an entropy of its own, the system leaves that of the baths as it is.
+        let entropy = if has_entropy { entropy } else { 0.0 };
+        let x = OpenState { x, time, ledger };
+        Ok(Projected {
+            gradients: self.gradients_at(&x, gradients),
+            x,
+            entropy: entropy + of_baths,
+            entropy_round_off: entropy_round_off + 2.0 * f64::EPSILON * of_baths.abs(),
+        })
+    }
+}
+
+impl<Y, C, X> OpenSystem<Y, C, X>
+where
+    Y: Metriplectic,
+    C: Clock<Y::Manifold, Y::Energy>,
+    X: Exchange<Y::Manifold, Y::Metric>,
+{
+    /// The gradients of the open system, from those of the system at this state.
+    fn gradients_at(&self, x: &StateOf<Y, X>, jets: LawJets<Dim<Y>>) -> OpenGradients<Dim<Y>> {
+        OpenGradients { values: self.balanced(x, jets.values()), jets }
+    }
+}

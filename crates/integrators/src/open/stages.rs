@@ -1,0 +1,364 @@
+//! Gauss and Radau methods for open systems.
+//!
+//! ```math
+//! W_t = H(t', z) - H(t, z) + h \sum_i b_i \bigl( \partial_t H(t_i, X_i) - \partial_t H(t_i, z) \bigr), \qquad
+//! \delta_H = H(t', x') - H(t, x) - W_t - h \sum_i b_i \langle dH(t_i, X_i), v_i \rangle
+//! ```
+//!
+//! with `z` the middle of the step. `δ_H` is the error of a rule for an integral that vanishes with the velocity, so the
+//! corrected covectors have the order of the method up to rest. Ports and baths are evaluated at the stages, and `W_a`
+//! and `Q_b` are the sums `h Σ b_i ⟨w_{H,i}, …⟩`.
+//!
+//! `Radau` corrects the energy where `δ_H > 0` alone. What it loses where it damps, `−δ_H`, is heat of the bath: the balance
+//! stays exact, and the entropy of the bath rises by `−δ_H/T`. Which of several baths it would be is not known, so a system
+//! has one.
+
+use metriplectic_dynamics::exchange::{Entries as _, Exchange};
+use metriplectic_dynamics::{Metriplectic, SecondLaw, VectorField, system::Point};
+use metriplectic_fields::{ChartPoint, Column as _, Dimension as _, Real, Space, Vector};
+
+use super::clock::Clock;
+use super::halves::{self, Failure};
+use super::state::{Booked, OpenState};
+use super::system::{OpenSystem, StateOf};
+use super::vector::OpenVector;
+use super::view::Frozen;
+use crate::collocation::{
+    EnergyInTime, Gauss, InTime, MOST, Radau, StageMemory, StageSolution, Tableau, TimedStep,
+    control, dense,
+};
+use crate::step::dense::Target;
+use crate::step::failure::{Cause, Fallbacks};
+use crate::step::{
+    Control, Dim, Effort, Flow, Laws, MethodError, Promises, Refusal, Start, StepEnds, StepError,
+    StepStart, Stepper, Taken,
+};
+
+/// The energy of an open system along a step.
+struct AlongStep<'a, Y, C, X> {
+    system: &'a OpenSystem<Y, C, X>,
+    times: [f64; 2],
+}
+
+impl<Y, C, X> std::fmt::Debug for AlongStep<'_, Y, C, X> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("AlongStep").field("times", &self.times).finish_non_exhaustive()
+    }
+}
+
+impl<Y, C, X> AlongStep<'_, Y, C, X> {
+    fn size(&self) -> f64 {
+        self.times[1] - self.times[0]
+    }
+
+    fn time(&self, node: f64) -> f64 {
+        // The end exactly, at which a protocol may jump.
+        if node >= 1.0 { self.times[1] } else { self.times[0] + node * self.size() }
+    }
+}
+
+impl<Y, C, X> EnergyInTime<Y::Manifold> for AlongStep<'_, Y, C, X>
+where
+    Y: Metriplectic,
+    C: Clock<Y::Manifold, Y::Energy>,
+    X: Exchange<Y::Manifold, Y::Metric>,
+{
+    fn change(&self, x: &Point<Y>, end: &Point<Y>, z: &Point<Y>) -> f64 {
+        let [t, later] = self.times;
+        let energy = |t, x| self.system.energy(t, x);
+        if C::RUNS {
+            (energy(later, end) - energy(later, z)) - (energy(t, x) - energy(t, z))
+        } else {
+            energy(t, end) - energy(t, x)
+        }
+    }
+
+    fn rate(&self, node: f64, x: &Point<Y>) -> f64 {
+        self.system.power(self.time(node), x)
+    }
+
+    fn slope(&self, node: f64, x: &<Y::Manifold as Space>::Point<Real>) -> f64 {
+        let t = Real::new(self.time(node), self.size(), 0.0, 0.0);
+        C::in_time(self.system.closed().energy(), t, x).eps1
+    }
+}
+
+/// A step of an open system.
+struct Step<'a, Y: Metriplectic, C, X> {
+    tableau: &'static Tableau,
+    system: &'a OpenSystem<Y, C, X>,
+    along: AlongStep<'a, Y, C, X>,
+    systems: [Frozen<'a, Y, C, X>; MOST],
+    middle: Frozen<'a, Y, C, X>,
+}
+
+impl<'a, Y, C, X> Step<'a, Y, C, X>
+where
+    Y: Metriplectic,
+    C: Clock<Y::Manifold, Y::Energy>,
+    X: Exchange<Y::Manifold, Y::Metric>,
+{
+    fn new(tableau: &'static Tableau, system: &'a OpenSystem<Y, C, X>, times: [f64; 2]) -> Self {
+        let along = AlongStep { system, times };
+        let systems = std::array::from_fn(|i| system.frozen(along.time(tableau.nodes[i])));
+        Self { tableau, system, middle: system.frozen(along.time(0.5)), along, systems }
+    }
+
+    fn timed(&self) -> TimedStep<'_, Frozen<'a, Y, C, X>> {
+        let in_time = InTime { systems: &self.systems, energy: &self.along };
+        TimedStep { tableau: self.tableau, middle: &self.middle, in_time }
+    }
+
+    /// The start of the step as that of a system which does not depend on time.
+    fn start<'b>(
+        &self,
+        start: &StepStart<'b, OpenSystem<Y, C, X>>,
+        h: f64,
+    ) -> Start<'b, Frozen<'a, Y, C, X>> {
+        let OpenState { x, time, .. } = start.x;
+        let invariants = start.values.invariants;
+        let values = Laws {
+            energy: self.system.energy(*time, x),
+            entropy: self.system.closed().entropy_at(x),
+            invariants,
+        };
+        let accumulated_error = Laws {
+            energy: start.values.energy - start.reference.energy,
+            entropy: start.values.entropy - start.reference.entropy,
+            invariants: Dim::<Y>::array(|k| invariants[k] - start.reference.invariants[k]),
+        };
+        Start { x, time: *time, h, values, accumulated_error }
+    }
+
+    /// Books a step that was solved.
+    fn booked(
+        &self,
+        from: &StateOf<Y, X>,
+        solution: &StageSolution<Frozen<'a, Y, C, X>>,
+        h: f64,
+    ) -> Option<StateOf<Y, X>> {
+        let Self { system, along, .. } = self;
+        let StageSolution { end, z, stages, lost, .. } = solution;
+        let mut parameter = system.frozen_work(along.times, z);
+        let mut entries = X::Entries::from_index(|_| 0.0);
+        for stage in stages {
+            let (t, weight) = (along.time(stage.node), h * stage.weight);
+            if C::RUNS {
+                parameter += weight * (system.power(t, &stage.x) - system.power(t, z));
+            }
+            let rates =
+                system.exchanged(t, &stage.x, [&stage.energy, &stage.entropy]).ok()?.entries;
+            entries = X::Entries::from_index(|i| entries.get(i) + weight * rates.get(i));
+        }
+        if *lost < 0.0 {
+            // What a step has damped is heat of the bath.
+            let (heat, temperature) = system.only_bath(along.time(1.0))?;
+            let entropy = if temperature > 0.0 { -lost / temperature } else { 0.0 };
+            entries = X::Entries::from_index(|i| {
+                let added = [*lost, entropy];
+                entries.get(i) + i.checked_sub(heat).and_then(|k| added.get(k)).unwrap_or(&0.0)
+            });
+        }
+        let ledger = from.ledger.with(&Booked { parameter, entries });
+        Some(OpenState { x: end.clone(), time: along.times[1], ledger })
+    }
+}
+
+/// Solves a step, and books it.
+fn open_step<Y, C, X>(
+    tableau: &'static Tableau,
+    system: &OpenSystem<Y, C, X>,
+    start: &StepStart<'_, OpenSystem<Y, C, X>>,
+    h: f64,
+    memory: &mut StageMemory<Dim<Y>>,
+    fallbacks: Fallbacks,
+) -> Result<Taken<OpenSystem<Y, C, X>>, Failure>
+where
+    Y: Metriplectic,
+    C: Clock<Y::Manifold, Y::Energy>,
+    X: Exchange<Y::Manifold, Y::Metric>,
+{
+    let time = start.x.time;
+    let step = Step::new(tableau, system, [time, time + h]);
+    let solution = step.timed().solve(&step.start(start, h), memory, fallbacks);
+    let residual = f64::INFINITY;
+    let solution = solution.map_err(|(cause, effort)| Failure { cause, residual, effort })?;
+    let effort = solution.effort;
+    let edge = || Failure { cause: Cause::Edge, residual, effort };
+    let x = step.booked(start.x, &solution, h).ok_or_else(edge)?;
+    let values = system.laws(&x);
+    if !(values.energy.is_finite() && values.entropy.is_finite()) {
+        return Err(edge());
+    }
+    let mut evidence = solution.evidence;
+    evidence.dissipates |= X::BATHS > 0;
+    Ok(Taken { x, values, evidence, effort })
+}
+
+/// The state at the fraction `θ` of a step: a step of size `θh`, guessed by the polynomial of the whole one, and moved onto
+/// the balance of the run with an entropy that does not fall from one fraction to a later one.
+fn between<Y, C, X>(
+    tableau: &'static Tableau,
+    promises: Promises,
+    system: &OpenSystem<Y, C, X>,
+    step: &StepEnds<'_, OpenSystem<Y, C, X>>,
+    memory: &StageMemory<Dim<Y>>,
+    theta: f64,
+) -> Option<StateOf<Y, X>>
+where
+    Y: Metriplectic,
+    C: Clock<Y::Manifold, Y::Energy>,
+    X: Exchange<Y::Manifold, Y::Metric>,
+{
+    if theta <= 0.0 {
+        return Some(step.x.clone());
+    }
+    if theta >= 1.0 {
+        return Some(step.end.clone());
+    }
+    let (time, h) = (step.x.time, theta * step.h);
+    let part = Step::new(tableau, system, [time, time + h]);
+    let (values, reference) = (*step.values[0], *step.values[0]);
+    let start = StepStart { x: step.x, time, values, reference, allowed: None };
+    let solution = part.timed().part(&part.start(&start, h), memory, theta)?;
+    let y = part.booked(step.x, &solution, h)?;
+    let entropy = promises.entropy.then(|| {
+        let reached = system.laws(&y).entropy;
+        dense::entropy(tableau, system, step, theta, reached)
+    });
+    let line = || y.clone();
+    Some(Target::new(step, promises, theta, entropy).reached_from(system, &y, line))
+}
+
+/// Halvings of a step.
+const HALVES: usize = 10;
+
+/// Why `Radau` does not take a system.
+#[derive(Clone, Copy, Debug, thiserror::Error)]
+#[error(
+    "`Radau` damps an open system without an entropy of its own and with one bath, to which it gives what it damps; take \
+     `Gauss`, or an explicit method"
+)]
+struct NotDamped;
+
+/// Accepts a system that a method which damps can take: what it damps is heat of its only bath.
+fn damps<Y, C, X>(
+    tableau: &'static Tableau,
+    system: &OpenSystem<Y, C, X>,
+    time: f64,
+) -> Result<(), StepError>
+where
+    Y: Metriplectic,
+    C: Clock<Y::Manifold, Y::Energy>,
+    X: Exchange<Y::Manifold, Y::Metric>,
+{
+    let isothermal = system.closed().second_law() == SecondLaw::NoEntropy && X::BATHS == 1;
+    if !tableau.one_sided || isothermal {
+        return Ok(());
+    }
+    Err(StepError::Method { time, error: MethodError::new(NotDamped) })
+}
+
+macro_rules! open_stages {
+    ($name:ident) => {
+        impl<Y, C, X, const S: usize> Stepper<OpenSystem<Y, C, X>> for $name<S>
+        where
+            Y: Metriplectic,
+            C: Clock<Y::Manifold, Y::Energy>,
+            X: Exchange<Y::Manifold, Y::Metric>,
+        {
+            type Memory = StageMemory<Dim<Y>>;
+
+            fn name(&self) -> String {
+                format!("{}::<{S}>", stringify!($name))
+            }
+
+            fn order(&self) -> u32 {
+                Self::tableau().order
+            }
+
+            fn control(&self) -> Control {
+                control(Self::tableau())
+            }
+
+            fn promises(&self, system: &OpenSystem<Y, C, X>) -> Promises {
+                Promises::all_laws(system.entropy_law() == SecondLaw::Exact)
+            }
+
+            fn step(
+                &self,
+                system: &OpenSystem<Y, C, X>,
+                start: &StepStart<'_, OpenSystem<Y, C, X>>,
+                h: f64,
+                memory: &mut Self::Memory,
+            ) -> Result<Taken<OpenSystem<Y, C, X>>, StepError> {
+                damps(Self::tableau(), system, start.time)?;
+                let mut whole = true;
+                halves::take(start, h, Self::SPLITS.min(HALVES), &mut |start, h, fallbacks| {
+                    if !std::mem::replace(&mut whole, false) {
+                        *memory = StageMemory::default();
+                    }
+                    open_step(Self::tableau(), system, start, h, memory, fallbacks)
+                })
+            }
+
+            fn attempt(
+                &self,
+                system: &OpenSystem<Y, C, X>,
+                start: &StepStart<'_, OpenSystem<Y, C, X>>,
+                h: f64,
+                memory: &mut Self::Memory,
+            ) -> Result<Taken<OpenSystem<Y, C, X>>, Refusal> {
+                if let Err(error) = damps(Self::tableau(), system, start.time) {
+                    return Err(Refusal {
+                        effort: Effort::default(),
+                        error: Some(error),
+                        second_law: false,
+                    });
+                }
+                open_step(Self::tableau(), system, start, h, memory, Fallbacks::FirstTries)
+                    .map_err(|failure| failure.into_refusal(start.time, h))
+            }
+
+            fn error(
+                &self,
+                system: &OpenSystem<Y, C, X>,
+                step: &StepEnds<'_, OpenSystem<Y, C, X>>,
+                memory: &Self::Memory,
+                norm: impl Fn(&<OpenSystem<Y, C, X> as Flow>::Vector) -> f64,
+            ) -> Option<f64> {
+                let (time, h) = (step.x.time, step.h);
+                let whole = Step::new(Self::tableau(), system, [time, time + h]);
+                let (values, reference) = (*step.values[0], *step.values[0]);
+                let start = StepStart { x: step.x, time, values, reference, allowed: None };
+                let velocity = |t: f64, x: &Point<Y>| {
+                    let zero = Vector::<Y::Manifold>::zero();
+                    VectorField::velocity(
+                        &system.frozen(t),
+                        &ChartPoint { base: x.clone(), q: zero },
+                    )
+                    .ok()
+                };
+                let velocities = [velocity(time, &step.x.x)?, velocity(time + h, &step.end.x)?];
+                let start = whole.start(&start, h);
+                let defects = whole.timed().defects(&start, memory, &step.end.x, velocities)?;
+                let [first, second] = defects.map(OpenVector::of);
+                Some(norm(&first).max(norm(&second)))
+            }
+
+            fn between(
+                &self,
+                system: &OpenSystem<Y, C, X>,
+                step: &StepEnds<'_, OpenSystem<Y, C, X>>,
+                memory: &mut Self::Memory,
+                theta: f64,
+            ) -> Option<StateOf<Y, X>> {
+                let promises = Stepper::<OpenSystem<Y, C, X>>::promises(self, system);
+                between(Self::tableau(), promises, system, step, memory, theta)
+            }
+        }
+    };
+}
+
+open_stages!(Gauss);
+open_stages!(Radau);

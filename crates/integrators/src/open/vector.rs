@@ -1,0 +1,66 @@
+//! Directions of an open system: those of its space, with the clock and what is booked beside them.
+
+use metriplectic_dynamics::exchange::Entries;
+use metriplectic_fields::Column;
+
+use super::state::Booked;
+use crate::step::Vector;
+
+/// A displacement or a rate of an open system: the components on its space, which alone count in norms, the time that
+/// passes, and what is booked.
+///
+/// The numbers beyond [`len`](Vector::len) are those of the clock and of the ledger. A combination of rates by a
+/// Runge-Kutta method integrates them with the state.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct OpenVector<V, E> {
+    /// The components.
+    pub v: V,
+    /// The time.
+    pub clock: f64,
+    /// What is booked.
+    pub booked: Booked<E>,
+}
+
+impl<V: Column<f64>, E: Entries> OpenVector<V, E> {
+    /// The components alone.
+    pub(super) fn of(v: V) -> Self {
+        Self { v, clock: 0.0, booked: Booked::nothing() }
+    }
+
+    /// How many numbers there are, with those of the clock and the ledger.
+    const ALL: usize = V::LEN + 2 + E::LEN;
+}
+
+impl<V: Column<f64>, E: Entries> Vector for OpenVector<V, E> {
+    #[inline]
+    fn len(&self) -> usize {
+        V::LEN
+    }
+
+    #[inline]
+    fn get(&self, i: usize) -> f64 {
+        match i.checked_sub(V::LEN) {
+            None => self.v[i],
+            Some(0) => self.clock,
+            Some(1) => self.booked.parameter,
+            Some(i) => self.booked.entries.get(i - 2),
+        }
+    }
+
+    #[inline]
+    fn with(&self, mut number: impl FnMut(usize) -> f64) -> Self {
+        let v = V::from_index(&mut number);
+        let (clock, parameter) = (number(V::LEN), number(V::LEN + 1));
+        let entries = E::from_index(|i| number(V::LEN + 2 + i));
+        Self { v, clock, booked: Booked { parameter, entries } }
+    }
+
+    fn to_list(&self) -> Vec<f64> {
+        (0..Self::ALL).map(|i| self.get(i)).collect()
+    }
+
+    fn with_list(&self, list: &[f64]) -> Option<Self> {
+        let known = [V::LEN, Self::ALL].contains(&list.len());
+        known.then(|| self.with(|i| list.get(i).copied().unwrap_or(0.0)))
+    }
+}

@@ -1,0 +1,205 @@
+//! The laws of the surroundings of a system.
+
+use metriplectic_dynamics::exchange::{Exchange, ExchangeArgs, Part, PartKind, Visitor};
+use metriplectic_dynamics::{Metriplectic, ModelError};
+use metriplectic_fields::{ChartPoint, Column as _, Real, Vector};
+use metriplectic_manifolds::{Manifold, MetricAt};
+
+use super::clock::Clock;
+use super::flow::CovectorsOf;
+use super::system::{OpenSystem, StateOf};
+use crate::step::{Flow as _, StepEnds, StepError};
+
+/// The slope of a law along a velocity, relative to its terms, that is no round-off.
+const BROKEN: f64 = 1e-8;
+
+/// Checks at a state that ports carry no entropy and keep the further invariants, that no temperature is negative, and that no
+/// friction has a negative rate.
+pub(super) fn exchange<Y, C, X>(
+    system: &OpenSystem<Y, C, X>,
+    state: &StateOf<Y, X>,
+) -> Result<(), ModelError>
+where
+    Y: Metriplectic,
+    C: Clock<Y::Manifold, Y::Energy>,
+    X: Exchange<Y::Manifold, Y::Metric>,
+{
+    if X::PORTS + X::BATHS == 0 {
+        return Ok(());
+    }
+    let point = || Y::Manifold::entries(&state.x);
+    let w = system.covectors(state.time, &state.x);
+    let centre = ChartPoint::<Y::Manifold, Real>::centre(&state.x);
+    let g = MetricAt::new(system.closed().metric(), &centre);
+    let [energy, entropy] = [&w.energy, &w.entropy].map(Vector::<Y::Manifold, Real>::embed);
+    let at = ExchangeArgs { t: state.time, g: &g, w: &energy, s: &entropy };
+    let mut judge = Judge::<Y, _> { w: &w, time: state.time, point: &point, verdict: Ok(()) };
+    let looked_at = system.exchange().each(&at, &mut judge);
+    looked_at.map_err(|source| ModelError::Metric { source, point: point() })?;
+    judge.verdict
+}
+
+struct Judge<'a, Y: Metriplectic, P> {
+    w: &'a CovectorsOf<Y>,
+    time: f64,
+    point: &'a P,
+    verdict: Result<(), ModelError>,
+}
+
+impl<Y: Metriplectic, P: Fn() -> Vec<f64>> Judge<'_, Y, P> {
+    fn of_part(
+        &self,
+        part: Part<'_>,
+        velocity: &Vector<Y::Manifold>,
+        given: &Vector<Y::Manifold>,
+    ) -> Result<(), ModelError> {
+        let (name, time) = (|| part.name.clone(), self.time);
+        let point = || (self.point)();
+        if let PartKind::Bath { temperature, least_rate } = part.kind {
+            if !(temperature >= 0.0 && temperature.is_finite()) {
+                return Err(ModelError::BathNotPositive { bath: name(), temperature, time });
+            }
+            if least_rate < 0.0 || least_rate.is_nan() {
+                return Err(ModelError::FrictionNotPositive {
+                    bath: name(),
+                    rate: least_rate,
+                    time,
+                });
+            }
+        }
+        if !(velocity.is_finite() && given.is_finite()) {
+            return Err(ModelError::ExchangeNotFinite { part: name(), time, point: point() });
+        }
+        // 0/0 = 0: a law that nothing changes is kept.
+        let slope = |law: &Vector<Y::Manifold>, v: &Vector<Y::Manifold>| {
+            let (slope, terms) = (law.dot(v).abs(), Y::Manifold::pairing_size(law, v));
+            if slope == 0.0 { 0.0 } else { slope / terms }
+        };
+        let carried = slope(&self.w.entropy, given);
+        if part.kind == PartKind::Port && carried > BROKEN {
+            let (port, size) = (name(), carried);
+            return Err(ModelError::WorkCarriesEntropy { port, time, point: point(), size });
+        }
+        for (index, (_, law)) in self.w.invariants.as_ref().iter().flatten().enumerate() {
+            let size = slope(law, given);
+            if size > BROKEN {
+                let part = name();
+                return Err(ModelError::PortBreaksInvariant {
+                    part,
+                    index,
+                    time,
+                    point: point(),
+                    size,
+                });
+            }
+        }
+        Ok(())
+    }
+}
+
+impl<Y: Metriplectic, P: Fn() -> Vec<f64>> Visitor<Y::Manifold> for Judge<'_, Y, P> {
+    fn visit(
+        &mut self,
+        part: Part<'_>,
+        velocity: &Vector<Y::Manifold, Real>,
+        given: &Vector<Y::Manifold, Real>,
+    ) {
+        if self.verdict.is_ok() {
+            self.verdict = self.of_part(part, &velocity.real(), &given.real());
+        }
+    }
+}
+
+/// Differences in a row whose quotients show a derivative.
+const AGREEING: usize = 4;
+/// The relative difference of quotients that agree.
+const SAME: f64 = 1e-4;
+/// The change of the energy in units of its round-off that shows a quotient.
+const CLEAR: f64 = 1e6;
+
+/// Compares the derivative of the energy along time with its values. Nothing is known of the times of a model, so the
+/// differences are taken over intervals of all powers of two; where quotients in a row agree, they are the derivative.
+pub(super) fn clock<Y, C, X>(
+    system: &OpenSystem<Y, C, X>,
+    state: &StateOf<Y, X>,
+) -> Result<(), ModelError>
+where
+    Y: Metriplectic,
+    C: Clock<Y::Manifold, Y::Energy>,
+    X: Exchange<Y::Manifold, Y::Metric>,
+{
+    if !C::RUNS {
+        return Ok(());
+    }
+    let (t, x) = (state.time, &state.x);
+    let derivative = system.power(t, x);
+    let point = || Y::Manifold::entries(x);
+    if !derivative.is_finite() {
+        return Err(ModelError::DerivativeNotFinite { field: "energy along time", point: point() });
+    }
+    let mut agreeing = 0;
+    let mut before = f64::NAN;
+    for exponent in -200..200 {
+        let delta = 2_f64.powi(exponent);
+        let [early, late] = [t - delta, t + delta];
+        let values = [system.energy(early, x), system.energy(late, x)];
+        let change = values[1] - values[0];
+        let quotient = change / (late - early);
+        let clear = change.abs() > CLEAR * f64::EPSILON * (values[0].abs() + values[1].abs());
+        let agrees = clear && (quotient - before).abs() <= SAME * quotient.abs();
+        agreeing = if agrees { agreeing + 1 } else { 0 };
+        before = if clear { quotient } else { f64::NAN };
+        if agreeing == AGREEING {
+            if (derivative - quotient).abs() > 1e2 * SAME * quotient.abs() {
+                let time = t;
+                return Err(ModelError::LostTimeDerivative {
+                    time,
+                    point: point(),
+                    derivative,
+                    quotient,
+                });
+            }
+            return Ok(());
+        }
+    }
+    Ok(())
+}
+
+/// The difference of the frozen work of a step and its quadrature, relative to the energies at both ends, that no smooth
+/// protocol makes in a step that resolves it.
+const JUMP: f64 = 1e-3;
+/// The nodes and weights of the Gauss rule of three points on `[−1, 1]`.
+const GAUSS: [(f64, f64); 3] = [
+    (-0.774_596_669_241_483_4, 5.0 / 18.0),
+    (0.0, 4.0 / 9.0),
+    (0.774_596_669_241_483_4, 5.0 / 18.0),
+];
+
+/// Looks for a jump of the energy in time inside a step of a fixed size. Steps that follow a tolerance become small there.
+pub(super) fn protocol<Y, C, X>(
+    system: &OpenSystem<Y, C, X>,
+    step: &StepEnds<'_, OpenSystem<Y, C, X>>,
+) -> Result<(), StepError>
+where
+    Y: Metriplectic,
+    C: Clock<Y::Manifold, Y::Energy>,
+    X: Exchange<Y::Manifold, Y::Metric>,
+{
+    if !C::RUNS {
+        return Ok(());
+    }
+    let [t, end] = [step.x.time, step.end.time];
+    let x = &step.end.x;
+    let energies = [t, end].map(|t| system.energy(t, x));
+    let frozen = energies[1] - energies[0];
+    let half = 0.5 * (end - t);
+    let quadrature: f64 = GAUSS
+        .iter()
+        .map(|(node, weight)| 2.0 * half * weight * system.power(t + half * (1.0 + node), x))
+        .sum();
+    let terms = system.energy_sizes([step.x, step.end])[0] + frozen.abs();
+    if (frozen - quadrature).abs() > JUMP * terms {
+        return Err(StepError::ProtocolJumps { time: t, h: end - t, frozen, quadrature });
+    }
+    Ok(())
+}

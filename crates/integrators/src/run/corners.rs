@@ -1,0 +1,177 @@
+//! Times at which the law of motion of a system changes, so that no step may lie across them.
+//!
+//! A protocol that jumps, or has a kink, breaks the order of a method that steps across. A step ends a few roundings before
+//! a corner, on the old law. There the [clock](crate::Flow::clocked) of the state is set to the corner: what the energy
+//! changes by is work at a frozen state. The next step begins with the new law, and with no memory of the old one.
+
+use crate::run::requests::rounding;
+use crate::run::span_error::SpanError;
+use crate::step::{Flow, StepEnds, StepError, StepStart, Stepper, Taken};
+
+#[cfg(feature = "serde")]
+use crate::step::exact;
+
+/// The corners of a run.
+#[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
+pub(crate) struct Corners {
+    /// Times in their order.
+    #[cfg_attr(feature = "serde", serde(with = "exact"))]
+    pub(crate) times: Vec<f64>,
+    /// The interval of corners from the start of the run on.
+    #[cfg_attr(feature = "serde", serde(with = "exact"))]
+    pub(crate) interval: Option<f64>,
+    /// The start of the run.
+    #[cfg_attr(feature = "serde", serde(with = "exact"))]
+    pub(crate) start: f64,
+}
+
+/// How far before a corner a step ends, in roundings of the time.
+const BEFORE: f64 = 4.0;
+
+impl Corners {
+    pub(crate) fn is_empty(&self) -> bool {
+        self.times.is_empty() && self.interval.is_none()
+    }
+
+    /// Accepts finite times, and an interval that the time sees.
+    pub(crate) fn check(&self, end: f64) -> Result<(), SpanError> {
+        if let Some(&time) = self.times.iter().find(|time| !time.is_finite()) {
+            return Err(SpanError::Corner { time });
+        }
+        let least = BEFORE * self.rounding(if end.is_finite() { end } else { self.start });
+        match self.interval {
+            Some(interval) if !(interval > least && interval.is_finite()) => {
+                Err(SpanError::Sampling { interval })
+            }
+            _ => Ok(()),
+        }
+    }
+
+    fn rounding(&self, time: f64) -> f64 {
+        rounding(self.start, time)
+    }
+
+    /// The first corner after a time, but for its rounding.
+    pub(crate) fn after(&self, time: f64) -> Option<f64> {
+        let done = time + BEFORE * self.rounding(time);
+        let index = self.times.partition_point(|corner| *corner <= done);
+        let listed = self.times.get(index).copied();
+        let counted = self.interval.map(|interval| {
+            let mut count = ((done - self.start) / interval).floor().max(0.0);
+            // The quotient may be off by its rounding.
+            while self.start + count * interval <= done {
+                count += 1.0;
+            }
+            self.start + count * interval
+        });
+        match (listed, counted) {
+            (Some(a), Some(b)) => Some(a.min(b)),
+            (a, b) => a.or(b),
+        }
+    }
+
+    /// Returns whether a time is a corner.
+    pub(crate) fn has(&self, time: f64) -> bool {
+        !self.is_empty()
+            && self
+                .after(time - 2.0 * BEFORE * self.rounding(time))
+                .is_some_and(|corner| corner <= time)
+    }
+
+    /// The time at which a step ends that goes on to a corner.
+    pub(crate) fn before(&self, corner: f64) -> f64 {
+        corner - BEFORE * self.rounding(corner)
+    }
+}
+
+/// A step of one size, and the time at which it ends.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Fixed {
+    pub(crate) h: f64,
+    pub(crate) end: f64,
+}
+
+/// A step of one size in a run with these corners, in parts between them.
+pub(crate) fn step<F: Flow, M: Stepper<F>>(
+    (method, flow): (&M, &F),
+    start: &StepStart<'_, F>,
+    Fixed { h, end }: Fixed,
+    corners: &Corners,
+    memory: &mut M::Memory,
+) -> Result<Taken<F>, StepError> {
+    if corners.is_empty() {
+        return method.step(flow, start, h, memory);
+    }
+    let (mut time, mut reference) = (start.time, start.reference.clone());
+    let (mut x, mut values) = (start.x.clone(), start.values.clone());
+    let mut before: Option<Taken<F>> = None;
+    loop {
+        let limit = end + corners.rounding(end);
+        let corner = corners.after(time).filter(|corner| *corner <= limit);
+        let size = match corner {
+            None if before.is_none() => h,
+            None => end - time,
+            Some(corner) => corners.before(corner) - time,
+        };
+        if corners.has(time) {
+            *memory = M::Memory::default();
+        }
+        let (reference_here, allowed) = (reference.clone(), start.allowed.clone());
+        let from =
+            StepStart { x: &x, time, values: values.clone(), reference: reference_here, allowed };
+        let mut taken = method.step(flow, &from, size, memory)?;
+        flow.inspect(
+            &StepEnds {
+                x: &x,
+                end: &taken.x,
+                h: size,
+                values: [&values, &taken.values],
+                reference: &reference,
+            },
+            true,
+        )?;
+        // A corner at the end of the step may be another expression of the same time.
+        let reached = corner.map_or(end, |corner| {
+            if corner >= end - (limit - end) { end.max(corner) } else { corner }
+        });
+        if let Some(clocked) = flow.clocked(&taken.x, reached) {
+            taken.values = flow.laws(&clocked);
+            taken.x = clocked;
+        }
+        if taken.evidence.dissipates {
+            reference.entropy = taken.values.entropy;
+        }
+        if let Some(before) = &before {
+            taken.evidence = before.evidence.and(taken.evidence);
+            taken.effort += before.effort;
+            taken.effort.splits += 1;
+        }
+        if reached >= end {
+            return Ok(taken);
+        }
+        (x, values, time) = (taken.x.clone(), taken.values.clone(), reached);
+        before = Some(taken);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_corner_comes_once() {
+        let corners = Corners { times: vec![0.3, 0.5, 2.0], interval: Some(0.25), start: 0.0 };
+        let mut found = Vec::new();
+        let mut time = 0.0;
+        while let Some(corner) = corners.after(time).filter(|corner| *corner <= 1.0) {
+            assert!(corners.has(corner) && !corners.has(corners.before(corner)));
+            assert!(corners.before(corner) > time);
+            found.push(corner);
+            time = corner;
+        }
+        assert_eq!(found, [0.25, 0.3, 0.5, 0.75, 1.0]);
+        assert!(!Corners::default().has(0.5) && Corners::default().after(0.0).is_none());
+    }
+}

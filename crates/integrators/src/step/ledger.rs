@@ -1,0 +1,38 @@
+//! What has flowed into an open system, for its certificate.
+
+use std::sync::Arc;
+
+/// What has flowed into an open system since the start of a run.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct LedgerSummary {
+    /// The work of the time in the energy; `None` if the energy does not depend on it.
+    pub parameter: Option<f64>,
+    /// The work of each port.
+    pub work: Vec<(Arc<str>, f64)>,
+    /// The heat of each bath.
+    pub heat: Vec<(Arc<str>, f64)>,
+    /// The entropy of the system alone.
+    pub system_entropy: f64,
+}
+
+/// Each list as a map from names to numbers.
+#[cfg(feature = "serde")]
+impl serde::Serialize for LedgerSummary {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        use serde::ser::SerializeStruct as _;
+
+        struct Map<'a>(&'a [(Arc<str>, f64)]);
+        impl serde::Serialize for Map<'_> {
+            fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+                serializer.collect_map(self.0.iter().map(|(name, number)| (&**name, number)))
+            }
+        }
+        let mut summary = serializer.serialize_struct("LedgerSummary", 4)?;
+        summary.serialize_field("parameter", &self.parameter)?;
+        summary.serialize_field("work", &Map(&self.work))?;
+        summary.serialize_field("heat", &Map(&self.heat))?;
+        summary.serialize_field("system_entropy", &self.system_entropy)?;
+        summary.end()
+    }
+}

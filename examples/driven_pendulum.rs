@@ -1,0 +1,66 @@
+//! A pendulum in air is driven by a motor: a strange attractor, and where the energy goes.
+//!
+//! `H = ½p² − cos q`, a port with the torque `A sin Ωt`, and air at a temperature as the friction `γ` of the momentum. Once
+//! a period of the motor the state is a point of Poincaré's section. The motor's work and the air's heat grow without
+//! bound, and their difference with the energy stays at round-off.
+
+use std::error::Error;
+
+use metriplectic::prelude::*;
+use metriplectic_studies::{Example, Panel, Panels};
+
+const TORQUE: f64 = 1.5;
+const FREQUENCY: f64 = 2.0 / 3.0;
+const FRICTION: f64 = 0.5;
+const PERIOD: f64 = std::f64::consts::TAU / FREQUENCY;
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let pendulum = System::on(Euclidean::<2>)
+        .bracket(Symplectic)
+        .energy(|x: &Vector2<Real>| x.y * x.y * 0.5 - x.x.cos())
+        .work("motor", |t: Real, _: &Vector2<Real>| {
+            vector![0.0.into(), (t * FREQUENCY).sin() * TORQUE]
+        })
+        .bath(
+            "air",
+            Bath::at(1.0).friction(|_: Real, _: &Vector2<Real>, _: &Vector2<Real>| {
+                [Contact { rate: FRICTION.into(), along: Vector2::y() }]
+            }),
+        )
+        .build()?;
+
+    let about =
+        "A pendulum in air is driven by a motor: a strange attractor, and where the energy goes.";
+    let example = Example::new(about, 1200, PERIOD);
+    let end = example.steps as f64 * example.step_size;
+    let span = Span::until(end).tolerance(1e-7).output_every(example.step_size);
+    let run = DormandPrince8.run(&pendulum, pendulum.start(vector![0.2, 0.0]), span)?;
+
+    let turn = std::f64::consts::TAU;
+    let angle = |q: f64| q - turn * ((q + 0.5 * turn) / turn).floor();
+    // The first periods lead to the attractor. A cross for each point: a short line.
+    let section = run.iter().skip(20).map(|s| (angle(s.point.x.x), s.point.x.y));
+    let mut sections = Panel::new("p", "q").title("once a period of the motor");
+    let marks: Vec<(f64, f64)> =
+        section.flat_map(|(q, p)| [(q, p), (q + 0.02, p + 0.02), (f64::NAN, f64::NAN)]).collect();
+    sections = sections.line("attractor", marks);
+    let series = |value: &dyn Fn(&OpenState<Vector2<f64>, _>) -> f64| -> Vec<(f64, f64)> {
+        run.iter().map(|s| (s.time, value(&s.point))).collect()
+    };
+    let ledger = Panel::new("energy", "t")
+        .line("work of the motor", series(&|s| s.ledger.work("motor").unwrap_or(0.0)))
+        .line("heat into the air", series(&|s| -s.ledger.heat("air").unwrap_or(0.0)));
+    let balance: Vec<(f64, f64)> =
+        run.iter().map(|s| (s.time, s.energy - run.certificate().initial_energy)).collect();
+    let figure = Panels::new("A driven pendulum in air")
+        .columns(2)
+        .panel(sections)
+        .panel(ledger)
+        .panel(Panel::new("ΔH − W − Q", "t").line("balance", balance).level(0.0));
+    let last = run.last();
+    example
+        .report_of(run.certificate(), last.time, vec![last.point.x.x, last.point.x.y])
+        .with("work", last.point.ledger.work("motor").unwrap_or(0.0))
+        .figure(figure)
+        .print()
+}

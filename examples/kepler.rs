@@ -17,6 +17,7 @@ use metriplectic_studies::{Example, Panel, Panels};
 
 type Orbit = Vector4<Real>;
 type Law = fn(&Orbit) -> Real;
+type Line<'a> = &'a dyn Fn(f64, &Vector4<f64>) -> (f64, f64);
 
 fn radius(x: &Orbit) -> Real {
     (x.x * x.x + x.y * x.y).sqrt()
@@ -51,7 +52,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         ("plain midpoint rule", midpoint_rule(start, example.step_size, example.steps)),
         ("WeylMidpoint", ours),
     ];
-    let lines = |panel: Panel, line: &dyn Fn(f64, &Vector4<f64>) -> (f64, f64)| {
+    let lines = |panel: Panel, line: Line<'_>| {
         runs.iter().fold(panel, |panel, (name, states)| {
             panel.line(*name, states.iter().map(|(t, x)| line(*t, x)).collect::<Vec<_>>())
         })

@@ -65,7 +65,6 @@ fn main() -> Result<(), Box<dyn Error>> {
     let about = "A training set of 50 runs of the thermoelastic double pendulum, as one NPY file.";
     let example = Example::new(about, STEPS, 0.3);
     let span = Span::until(example.step_size * example.steps as f64).tolerance(1e-9);
-    let span = span.output_every(example.step_size);
     let around = [4.5, 4.5, 2.0, 4.5, -0.5, 1.5, 1.4, -0.2];
     // The start of a run is drawn from the seed and the number of its row alone.
     let mut runs = Sweep::new("learning_data")
@@ -74,7 +73,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         .run(|row| {
             let mut draw = row.draw();
             let start = SVector::from_fn(|i, _| around[i] + draw.uniform(-0.1..0.1));
-            Ok(DormandPrince8.run(&pendulum, (start, Vector2::zeros()), span)?)
+            let outputs = span.output_every(example.step_size);
+            Ok(DormandPrince8.run(&pendulum, (start, Vector2::zeros()), outputs)?)
         })
         .observe("H", |x| energy(&(x.0.cast(), x.1.cast())).re)
         .observe("L", angular_momentum)

@@ -222,11 +222,11 @@ fn every_method_keeps_the_four_invariants_of_the_kovalevskaya_top() {
     }
     let (top, start) = kovalevskaya();
     let weyl = Scheme::new(WeylMidpoint);
-    kept("WeylMidpoint", weyl.clone(), (&top, start));
+    kept("WeylMidpoint", weyl, (&top, start));
     kept("ChartMidpoint", Scheme::new(ChartMidpoint), (&top, start));
     kept("Exponential", Scheme::new(Exponential), (&top, start));
-    kept("WeylMidpoint, MeanValue", weyl.clone().gradient(MeanValue), (&top, start));
-    kept("WeylMidpoint, ItohAbe", weyl.clone().gradient(ItohAbe), (&top, start));
+    kept("WeylMidpoint, MeanValue", weyl.gradient(MeanValue), (&top, start));
+    kept("WeylMidpoint, ItohAbe", weyl.gradient(ItohAbe), (&top, start));
     kept("WeylMidpoint, SymmetricItohAbe", weyl.gradient(SymmetricItohAbe), (&top, start));
     for method in GAUSS.into_iter().chain(RADAU) {
         kept(&format!("{method:?}"), method, (&top, start));

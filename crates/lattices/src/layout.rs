@@ -60,6 +60,12 @@ const fn chunk_of(site: u32) -> usize {
     site as usize / CHUNK
 }
 
+/// The number of a site or of a bond: a graph has no more of them than there are.
+#[expect(clippy::cast_possible_truncation, reason = "a graph with more sites or bonds is refused")]
+const fn number(index: usize) -> u32 {
+    index as u32
+}
+
 impl Layout {
     /// Sorts the bonds of a graph into chunks, in `O(N)`: those of the part with this number, of as
     /// many parts as there are neighbours.
@@ -145,13 +151,13 @@ impl Layout {
             chunk.arrivals = next[k]..next[k + 1];
         }
         self.arrivals = vec![Arrival { site: 0, slot: 0 }; next[own.len()]];
-        let (mut here, mut elsewhere) = (0, slots as u32);
+        let (mut here, mut elsewhere) = (0, number(slots));
         for (name, bond) in (0..).zip(all()) {
             let [from, to] = chunks(bond).map(|chunk| own.contains(&chunk));
             let place = if from { &mut here } else { &mut elsewhere };
             if to {
                 let next = &mut next[chunks(bond)[1] - own.start];
-                let site = bond[1] - self.first[0] as u32;
+                let site = bond[1] - number(self.first[0]);
                 self.arrivals[*next] = Arrival { site, slot: *place };
                 *next += 1;
             }
@@ -180,15 +186,15 @@ impl Layout {
             ends.dedup();
         }
         let [border, ghosts] = ends;
-        let first = self.first[0] as u32;
+        let first = number(self.first[0]);
         let here = border.into_iter().map(|name| Edge { place: name - first, name });
-        let there = (self.sites as u32..).zip(ghosts).map(|(place, name)| Edge { place, name });
+        let there = (number(self.sites)..).zip(ghosts).map(|(place, name)| Edge { place, name });
         self.ghosts = Edges { sent: here.collect(), received: there.collect() };
     }
 
     /// The number here of a site of the graph that is its own or a ghost.
     fn local(&self, site: u32) -> u32 {
-        let own = site.wrapping_sub(self.first[0] as u32);
+        let own = site.wrapping_sub(number(self.first[0]));
         let ghosts = &self.ghosts.received;
         match ghosts.binary_search_by_key(&site, |ghost| ghost.name) {
             Ok(ghost) => ghosts[ghost].place,

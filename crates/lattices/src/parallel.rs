@@ -79,7 +79,7 @@ pub(crate) fn nodes<R>(
     let mut nodes: Vec<Node<R>> = Vec::with_capacity(2 * levels);
     for mut node in row {
         let is_left = |left: &mut Node<R>, node: &Node<R>| {
-            left.level == node.level && left.index % 2 == 0 && left.index + 1 == node.index
+            left.level == node.level && left.index.is_multiple_of(2) && left.index + 1 == node.index
         };
         while let Some(left) = nodes.pop_if(|left| is_left(left, &node)) {
             let (level, index) = (node.level + 1, left.index / 2);

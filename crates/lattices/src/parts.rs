@@ -14,7 +14,6 @@ use num_dual::DualNum;
 use crate::neighbours::{Alone, Edge, Edges, Neighbours, Node};
 use crate::onsager::BondState;
 use crate::parallel::CHUNK;
-use crate::random::Random;
 use crate::{Graph, Lattice, LatticeError, Model, Onsager, Points};
 
 /// Where the parts put what they tell each other.
@@ -136,8 +135,13 @@ fn bits<P: Model<Manifold = Euclidean<3>>>(lattice: &Lattice<P>) -> [Vec<u64>; 2
 
 /// Bonds from site to site in no order, many of them between parts that are no neighbours in a row.
 fn tangle(sites: usize) -> Graph {
-    let mut random = Random::new(3);
-    let mut site = || ((random.next() + 1.0) * 0.5 * sites as f64) as usize % sites;
+    // The generator of Knuth's MMIX.
+    let mut state = 3_u64;
+    let mut site = || {
+        state =
+            state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        usize::try_from(state >> 33).unwrap_or(0) % sites
+    };
     let bonds = (0..3 * sites).map(|_| [site(), site()]).filter(|[from, to]| from != to);
     Graph::from_bonds(sites, bonds.collect::<Vec<_>>())
 }

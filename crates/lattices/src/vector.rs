@@ -287,7 +287,7 @@ mod tests {
         let norm = numbers.relative_to(&numbers.map(|_| 1.0));
         assert!(norm > 0.0);
         assert_eq!(SiteVector::norm_of([&v, &w, &sizes], ratio).to_bits(), norm.to_bits());
-        let lost = SiteVector::norm_of([&v, &w], |[v, w]| if v == w { f64::NAN } else { v });
+        let lost = SiteVector::norm_of([&v, &w], |[v, w]| if v - w == 0.0 { f64::NAN } else { v });
         assert!(lost.is_nan());
     }
 }

@@ -175,8 +175,19 @@ msrv: (need ("rustup run " + msrv + " cargo --version") ("rustup toolchain insta
     cargo +{{ msrv }} check --workspace --all-features
 
 # check spelling and vocabulary: `_typos.toml` has the words to avoid and what to write instead
-words: (need "typos --version" "cargo install typos-cli --locked")
+words: docstrings (need "typos --version" "cargo install typos-cli --locked")
     typos
+
+# find docstrings that begin with a clause instead of a verb or a noun
+docstrings:
+    #!/usr/bin/env bash
+    set -euo pipefail
+    # Three files that still have some are left out.
+    if grep -rnE '^\s*//[/!] (What|Those|That|The same|Nothing)\b' crates/{fields,manifolds,dynamics,integrators}/src \
+        --exclude=equation.rs --exclude=step.rs --exclude=steps.rs; then
+        echo 'begin these docstrings with a verb in the third person or with a noun' >&2
+        exit 1
+    fi
 
 # check licenses, advisories and duplicate dependencies
 deny: (need "cargo deny --version" "cargo install cargo-deny --locked")

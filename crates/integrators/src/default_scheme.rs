@@ -22,7 +22,7 @@ pub trait Run: Sized {
     ///
     /// # Errors
     ///
-    /// Those of [`Method::run`](crate::Method::run).
+    /// The errors of [`Method::run`](crate::Method::run).
     fn run<Y>(
         self,
         system: &Y,
@@ -40,7 +40,7 @@ pub trait Run: Sized {
     ///
     /// # Errors
     ///
-    /// Those of [`Method::steps`](crate::Method::steps).
+    /// The errors of [`Method::steps`](crate::Method::steps).
     fn steps<Y>(
         self,
         system: &Y,
@@ -58,7 +58,7 @@ pub trait Run: Sized {
     ///
     /// # Errors
     ///
-    /// Those of [`Method::resume`](crate::Method::resume).
+    /// The errors of [`Method::resume`](crate::Method::resume).
     fn resume<'a, Y>(
         self,
         system: &'a Y,

@@ -23,7 +23,7 @@ test:
 
 # what verification refuses, and that it accepts the models of the tests that build many, and of the examples
 verification: examples
-    cargo test --package metriplectic-tests --package metriplectic-quick-tests --test verification --test problems --test laws --test second_law --test hard_corpus --test random_systems --test dissipations --test invariants --test equations --test errata --test euler_poincare --test metrics --test bad_input --test fuzz
+    cargo test --package metriplectic-tests --package metriplectic-quick-tests --test verification --test problems --test laws --test second_law --test hard_corpus --test random_systems --test dissipations --test invariants --test equations --test errata --test euler_poincare --test metrics --test bad_input --test refusals --test fuzz
 
 # build the documentation with rendered formulas, warnings are errors
 doc:

@@ -23,7 +23,7 @@ test:
 
 # what verification refuses, and that it accepts the models of the tests that build many, and of the examples
 verification: examples
-    cargo test --package metriplectic-tests --package metriplectic-quick-tests --test verification --test problems --test laws --test second_law --test hard_corpus --test random_systems --test dissipations --test invariants --test equations --test errata --test euler_poincare --test metrics --test bad_input --test fuzz
+    cargo test --package metriplectic-tests --package metriplectic-quick-tests --test verification --test problems --test laws --test second_law --test hard_corpus --test random_systems --test dissipations --test invariants --test equations --test errata --test euler_poincare --test metrics --test bad_input --test refusals --test fuzz
 
 # build the documentation with rendered formulas, warnings are errors
 doc:
@@ -182,8 +182,19 @@ msrv: (need ("rustup run " + msrv + " cargo --version") ("rustup toolchain insta
     cargo +{{ msrv }} check --workspace --all-features
 
 # check spelling and vocabulary: `_typos.toml` has the words to avoid and what to write instead
-words: (need "typos --version" "cargo install typos-cli --locked")
+words: docstrings (need "typos --version" "cargo install typos-cli --locked")
     typos
+
+# find docstrings that begin with a clause instead of a verb or a noun
+docstrings:
+    #!/usr/bin/env bash
+    set -euo pipefail
+    # Three files that still have some are left out.
+    if grep -rnE '^\s*//[/!] (What|Those|That|The same|Nothing)\b' crates/{fields,manifolds,dynamics,integrators}/src \
+        --exclude=equation.rs --exclude=step.rs --exclude=steps.rs; then
+        echo 'begin these docstrings with a verb in the third person or with a noun' >&2
+        exit 1
+    fi
 
 # check licenses, advisories and duplicate dependencies
 deny: (need "cargo deny --version" "cargo install cargo-deny --locked")

@@ -267,27 +267,6 @@ fn a_body_at_its_greatest_entropy_stays_there_to_round_off() {
 }
 
 #[test]
-fn a_sparse_record_has_the_states_of_the_full_one() {
-    let full = WeylMidpoint.run(&relaxing_body(), UNSTABLE, Span::steps(0.1, 103)).unwrap();
-    let sparse =
-        WeylMidpoint.run(&relaxing_body(), UNSTABLE, Span::steps(0.1, 103).every(10)).unwrap();
-    let steps: Vec<usize> = sparse.iter().map(|state| state.step).collect();
-    assert_eq!(steps, [0, 10, 20, 30, 40, 50, 60, 70, 80, 90, 100, 103]);
-    assert!(sparse.iter().all(|state| *state == full.states()[state.step]));
-    assert_eq!(sparse.certificate(), full.certificate());
-}
-
-#[test]
-fn the_iterator_takes_the_steps_of_the_run() {
-    let body = relaxing_body();
-    let run = WeylMidpoint.run(&body, UNSTABLE, Span::steps(0.1, 50)).unwrap();
-    let steps = WeylMidpoint.steps(&body, UNSTABLE, 0.1).unwrap();
-    for (state, step) in run.states()[1..].iter().zip(steps) {
-        assert_eq!(*state, step.unwrap());
-    }
-}
-
-#[test]
 fn trajectories_are_compared_by_approx() {
     let body = relaxing_body();
     let run = |h: f64| WeylMidpoint.run(&body, UNSTABLE, Span::steps(h, 20)).unwrap();

@@ -338,34 +338,6 @@ fn the_iterator_the_trajectory_and_a_step_have_the_same_outputs() {
 }
 
 #[test]
-fn a_resumed_run_has_the_same_outputs() {
-    let body = relaxing_body();
-    let schedules: [Schedule; 2] = [
-        Span::steps(0.1, 60).output_every(0.03).output_at([0.1, 0.25, 4.0]),
-        Span::until(6.0).tolerance(1e-4).output_every(0.03).output_at([0.1, 0.25, 4.0]),
-    ];
-    for schedule in schedules {
-        let whole: Vec<_> = WeylMidpoint
-            .steps(&body, UNSTABLE, schedule.clone())
-            .unwrap()
-            .map(|state| bits(&state.unwrap()))
-            .collect();
-        for put_down in [0, 1, 7, 20] {
-            let mut steps = WeylMidpoint.steps(&body, UNSTABLE, schedule.clone()).unwrap();
-            let mut seen = Vec::new();
-            for _ in 0..put_down {
-                steps.advance().unwrap();
-                seen.extend(steps.outputs().map(bits));
-            }
-            let resumed = WeylMidpoint.resume(&body, &steps.checkpoint()).unwrap();
-            let resumed = resumed.watching(schedule.clone()).unwrap();
-            seen.extend(resumed.map(|state| bits(&state.unwrap())));
-            assert!(seen == whole, "{} and {} outputs", seen.len(), whole.len());
-        }
-    }
-}
-
-#[test]
 fn times_that_are_not_of_the_run_are_errors() {
     let body = free_body();
     let refused = |schedule: Schedule| match WeylMidpoint.run(&body, TUMBLING, schedule) {

@@ -1,7 +1,5 @@
 //! Events: their times against closed forms, their states on the laws, their cost, and what becomes of a run.
 
-mod models;
-
 use std::f64::consts::PI;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
@@ -11,7 +9,6 @@ use metriplectic::integrators::{
 };
 use metriplectic::prelude::*;
 use metriplectic_studies::{Claim, Guarantee, scientific};
-use models::{free_body, relaxing_body};
 
 type Plane = Vector2<f64>;
 
@@ -278,48 +275,6 @@ fn a_function_of_other_points_is_an_error() {
     println!("{error}");
 }
 
-/// Puts a run down at several places and takes it up again.
-fn resumes<Y: Metriplectic<Manifold = LieDual<3>, Metric = Canonical>>(system: &Y, most: usize) {
-    const START: Vector3<f64> = Vector3::new(0.4, 0.5, 0.3);
-    let schedules: [Schedule; 2] =
-        [Span::steps(0.1, 400).into(), Span::until(40.0).tolerance(1e-4).into()];
-    for plain in schedules {
-        let schedule = plain.clone().event("node", |p: &Vector3<f64>| p.y);
-        let schedule = schedule.event("node of another", |p: &Vector3<f64>| p.z - p.x);
-        let schedule = schedule.event_in_time("rate", |t, p: &Vector3<f64>| p.x - 0.01 * t);
-        let run = WeylMidpoint.run(system, START, schedule.clone()).expect("it runs");
-        let bits = |event: &Event<LieDual<3>>| {
-            let State { time, point, energy, entropy, .. } = &event.state;
-            let numbers = [*time, point.x, point.y, point.z, *energy, *entropy].map(f64::to_bits);
-            (event.index, event.rises, numbers)
-        };
-        let whole: Vec<_> = run.events().iter().map(bits).collect();
-        println!("{} events in {} steps", whole.len(), run.certificate().steps);
-        assert!(whole.len() >= most, "{} events", whole.len());
-        for put_down in [0, 1, 30, 100, 300] {
-            let mut steps = WeylMidpoint.steps(system, START, schedule.clone()).expect("it runs");
-            let mut seen = Vec::new();
-            for _ in 0..put_down {
-                steps.advance().expect("it runs");
-                seen.extend(steps.take_events().iter().map(bits));
-            }
-            let resumed = WeylMidpoint.resume(system, &steps.checkpoint()).expect("it runs");
-            let resumed =
-                resumed.watching(schedule.clone()).expect("it runs").run().expect("it runs");
-            seen.extend(resumed.events().iter().map(bits));
-            assert!(seen == whole, "{} events", seen.len());
-        }
-        // The states keep the laws, S grows from event to event, and no step is another one.
-        let start = run.states()[0].energy;
-        let energy = run.events().iter().map(|event| (event.state.energy - start).abs() / start);
-        assert!(energy.fold(0.0, f64::max) <= 5e-15);
-        let entropies = run.events().iter().map(|event| event.state.entropy);
-        assert!(entropies.is_sorted_by(|a, b| *b >= a - 6.0 * f64::EPSILON));
-        let plain = WeylMidpoint.run(system, START, plain).expect("it runs");
-        assert!(run.states() == plain.states() && run.certificate() == plain.certificate());
-    }
-}
-
 #[test]
 fn an_event_across_a_nan_where_a_run_was_put_down_is_found() {
     let system = oscillator();
@@ -390,10 +345,4 @@ fn an_event_across_a_nan_at_the_end_of_a_step_is_found_by_every_method() {
         let near = |(time, exact): (&f64, &f64)| (time - exact).abs() < 1e-14;
         assert!(times.iter().zip(&expected).all(near), "{name}: {times:?}");
     }
-}
-
-#[test]
-fn a_resumed_run_has_the_same_events() {
-    resumes(&free_body(), 5);
-    resumes(&relaxing_body(), 2);
 }

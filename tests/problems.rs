@@ -7,10 +7,17 @@ use metriplectic_studies::problems::{LargeSteps, Strides};
 
 #[path = "problems/by_hand.rs"]
 mod by_hand;
+#[path = "models/chain.rs"]
+mod chain;
 #[path = "problems/every_method.rs"]
 mod every_method;
+#[path = "models/lattices.rs"]
+#[allow(dead_code, reason = "one of the lattices is in the table")]
+mod lattices;
 #[path = "models/methods.rs"]
 mod methods;
+#[path = "problems/on_lattices.rs"]
+mod on_lattices;
 #[path = "problems/promises.rs"]
 mod promises;
 #[path = "problems/released.rs"]

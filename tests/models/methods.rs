@@ -1,147 +1,208 @@
-//! The methods with stages and the explicit ones as one type, so that a test compiles its runs once.
+//! Every method as one type, so that a test compiles its runs once.
 #![allow(dead_code, reason = "each test file uses some of the methods")]
 
+use std::fmt;
+
 use metriplectic::fields::Space;
+use metriplectic::integrators::explicit::ExplicitMemory;
+use metriplectic::integrators::midpoint::MidpointMemory;
 use metriplectic::integrators::{
-    Control, Flow, Memory, Promises, Refusal, RestoreError, Saved, StageMemory, StepEnds,
-    StepStart, Taken,
+    Control, Element, Flow, LimitingSites, Memory, MethodError, Promises, Refusal, RestoreError,
+    Saved, StageFlow, StageMemory, StepEnds, StepStart, Taken,
 };
 use metriplectic::prelude::*;
 
-use crate::stages::{GAUSS, RADAU, Stages};
+use crate::stages::{GAUSS, RADAU, Stages, forward_steps};
 
-/// A method that takes every system.
+/// Kutta's method of order 3 (1901), which has neither an error nor a dense output of its own.
+const KUTTA: ExplicitRungeKutta = ExplicitRungeKutta::new(&THREE);
+const THREE: Tableau = Tableau::new(
+    "Kutta3",
+    3,
+    &[&[(0, 0.5)], &[(0, -1.0), (1, 2.0)]],
+    &[(0, 1.0 / 6.0), (1, 2.0 / 3.0), (2, 1.0 / 6.0)],
+);
+
+/// A method that takes every flow with stages: systems and lattices.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Any {
-    Implicit(Stages),
-    Explicit5,
-    Explicit8,
+pub(crate) enum Explicit {
+    Kutta3,
+    Order5,
+    Order8,
     Chebyshev,
 }
 
-impl Any {
+impl Explicit {
     /// All of them.
-    pub(crate) fn all() -> Vec<Self> {
+    pub(crate) const ALL: [Self; 4] = [Self::Kutta3, Self::Order5, Self::Order8, Self::Chebyshev];
+}
+
+/// A method that takes every system; the scheme with one of its retractions.
+#[derive(Clone, Copy, PartialEq)]
+pub(crate) enum Any<R = WeylMidpoint> {
+    Scheme(R),
+    Implicit(Stages),
+    Explicit(Explicit),
+}
+
+impl<R> Any<R> {
+    /// All of them.
+    pub(crate) fn all(retraction: R) -> Vec<Self> {
         let implicit = GAUSS.into_iter().chain(RADAU).map(Self::Implicit);
-        implicit.chain([Self::Explicit5, Self::Explicit8, Self::Chebyshev]).collect()
+        let explicit = Explicit::ALL.map(Self::Explicit);
+        [Self::Scheme(retraction)].into_iter().chain(implicit).chain(explicit).collect()
     }
 }
 
-type OfStages<Y> = StageMemory<<<Y as Metriplectic>::Manifold as Space>::Dim>;
-type OfExplicit<Y> = <DormandPrince8 as Stepper<Y>>::Memory;
-
-/// The memories of both families.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct Both<I, E> {
-    implicit: I,
-    explicit: E,
-}
-
-impl<I: Memory, E: Memory> Memory for Both<I, E> {
-    fn rescaled(&self, ratio: f64) -> Self {
-        Self { implicit: self.implicit.rescaled(ratio), explicit: self.explicit.rescaled(ratio) }
-    }
-
-    fn refused(&mut self, tried: Self) {
-        self.implicit.refused(tried.implicit);
-        self.explicit.refused(tried.explicit);
-    }
-
-    fn save(&self, saved: &mut Saved) {
-        self.implicit.save(saved);
-        self.explicit.save(saved);
-    }
-
-    fn restore(saved: &Saved) -> Result<Self, RestoreError> {
-        Ok(Self { implicit: I::restore(saved)?, explicit: E::restore(saved)? })
+// By hand, because a retraction need not have `Debug`.
+impl<R> fmt::Debug for Any<R> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Scheme(_) => f.write_str("Scheme"),
+            Self::Implicit(method) => method.fmt(f),
+            Self::Explicit(method) => method.fmt(f),
+        }
     }
 }
 
-/// A call of the method that it is, with the memory of its family.
-macro_rules! each {
+macro_rules! each_explicit {
     ($self:expr, $both:expr, |$method:ident, $memory:ident| $call:expr) => {
-        match $self {
-            Any::Implicit($method) => {
-                let $memory = implicit($both);
+        match ($self, $both) {
+            (Explicit::Kutta3, $memory) => {
+                let $method = &KUTTA;
                 $call
             }
-            Any::Explicit5 => {
-                let ($method, $memory) = (&DormandPrince5, explicit($both));
+            (Explicit::Order5, $memory) => {
+                let $method = &DormandPrince5;
                 $call
             }
-            Any::Explicit8 => {
-                let ($method, $memory) = (&DormandPrince8, explicit($both));
+            (Explicit::Order8, $memory) => {
+                let $method = &DormandPrince8;
                 $call
             }
-            Any::Chebyshev => {
-                let ($method, $memory) = (&RungeKuttaChebyshev, explicit($both));
+            (Explicit::Chebyshev, $memory) => {
+                let $method = &RungeKuttaChebyshev;
                 $call
             }
         }
     };
 }
 
-const fn implicit<I, E>(both: &mut Both<I, E>) -> &mut I {
-    &mut both.implicit
+impl<F: StageFlow> Stepper<F> for Explicit {
+    type Memory = ExplicitMemory<F::Vector>;
+
+    forward_steps!(F, each_explicit);
 }
 
-const fn explicit<I, E>(both: &mut Both<I, E>) -> &mut E {
-    &mut both.explicit
+/// The memory of the family that has taken a step.
+#[derive(Clone, Debug, Default)]
+pub(crate) enum OneOf<M, I, E> {
+    #[default]
+    New,
+    Scheme(M),
+    Implicit(I),
+    Explicit(E),
 }
 
-impl<Y: Metriplectic> Stepper<Y> for Any {
-    type Memory = Both<OfStages<Y>, OfExplicit<Y>>;
+/// Gives the memory of a family, which is new at the start of a run.
+macro_rules! memory_of {
+    ($name:ident, $family:ident, $t:ident) => {
+        fn $name(&mut self) -> &mut $t {
+            if !matches!(self, Self::$family(_)) {
+                *self = Self::$family($t::default());
+            }
+            match self {
+                Self::$family(memory) => memory,
+                _ => unreachable!("it is of this family"),
+            }
+        }
+    };
+}
 
-    fn order(&self) -> u32 {
-        each!(self, &mut Self::Memory::default(), |method, _memory| Stepper::<Y>::order(method))
+impl<M: Memory, I: Memory, E: Memory> OneOf<M, I, E> {
+    memory_of!(scheme, Scheme, M);
+    memory_of!(implicit, Implicit, I);
+    memory_of!(explicit, Explicit, E);
+}
+
+/// The name of the family in a checkpoint.
+const FAMILY: &str = "family";
+
+impl<M: Memory, I: Memory, E: Memory> Memory for OneOf<M, I, E> {
+    fn rescaled(&self, ratio: f64) -> Self {
+        match self {
+            Self::New => Self::New,
+            Self::Scheme(memory) => Self::Scheme(memory.rescaled(ratio)),
+            Self::Implicit(memory) => Self::Implicit(memory.rescaled(ratio)),
+            Self::Explicit(memory) => Self::Explicit(memory.rescaled(ratio)),
+        }
     }
 
-    fn control(&self) -> Control {
-        each!(self, &mut Self::Memory::default(), |method, _memory| Stepper::<Y>::control(method))
+    fn refused(&mut self, tried: Self) {
+        match tried {
+            Self::New => {}
+            Self::Scheme(tried) => self.scheme().refused(tried),
+            Self::Implicit(tried) => self.implicit().refused(tried),
+            Self::Explicit(tried) => self.explicit().refused(tried),
+        }
     }
 
-    fn promises(&self, system: &Y) -> Promises {
-        each!(self, &mut Self::Memory::default(), |method, _memory| method.promises(system))
+    fn save(&self, saved: &mut Saved) {
+        match self {
+            Self::New => {}
+            Self::Scheme(memory) => {
+                saved.put(FAMILY, [1.0]);
+                memory.save(saved);
+            }
+            Self::Implicit(memory) => {
+                saved.put(FAMILY, [2.0]);
+                memory.save(saved);
+            }
+            Self::Explicit(memory) => {
+                saved.put(FAMILY, [3.0]);
+                memory.save(saved);
+            }
+        }
     }
 
-    fn step(
-        &self,
-        system: &Y,
-        start: &StepStart<'_, Y>,
-        h: f64,
-        memory: &mut Self::Memory,
-    ) -> Result<Taken<Y>, StepError> {
-        each!(self, memory, |method, memory| method.step(system, start, h, memory))
+    fn restore(saved: &Saved) -> Result<Self, RestoreError> {
+        let family = saved.get(FAMILY, 1)?.map_or(0.0, |family| family[0]);
+        Ok(if family > 2.5 {
+            Self::Explicit(E::restore(saved)?)
+        } else if family > 1.5 {
+            Self::Implicit(I::restore(saved)?)
+        } else if family > 0.5 {
+            Self::Scheme(M::restore(saved)?)
+        } else {
+            Self::New
+        })
     }
+}
 
-    fn attempt(
-        &self,
-        system: &Y,
-        start: &StepStart<'_, Y>,
-        h: f64,
-        memory: &mut Self::Memory,
-    ) -> Result<Taken<Y>, Refusal> {
-        each!(self, memory, |method, memory| method.attempt(system, start, h, memory))
-    }
+macro_rules! each {
+    ($self:expr, $both:expr, |$method:ident, $memory:ident| $call:expr) => {
+        match $self {
+            Any::Scheme(retraction) => {
+                let ($method, $memory) = (&Scheme::new(*retraction), $both.scheme());
+                $call
+            }
+            Any::Implicit($method) => {
+                let $memory = $both.implicit();
+                $call
+            }
+            Any::Explicit($method) => {
+                let $memory = $both.explicit();
+                $call
+            }
+        }
+    };
+}
 
-    fn error(
-        &self,
-        system: &Y,
-        step: &StepEnds<'_, Y>,
-        memory: &Self::Memory,
-        norm: impl Fn(&<Y as Flow>::Vector) -> f64,
-    ) -> Option<f64> {
-        let mut memory = memory.clone();
-        each!(self, &mut memory, |method, memory| method.error(system, step, memory, norm))
-    }
+type Dim<Y> = <<Y as Metriplectic>::Manifold as Space>::Dim;
 
-    fn between(
-        &self,
-        system: &Y,
-        step: &StepEnds<'_, Y>,
-        memory: &mut Self::Memory,
-        theta: f64,
-    ) -> Option<<Y::Manifold as Space>::Point<f64>> {
-        each!(self, memory, |method, memory| method.between(system, step, memory, theta))
-    }
+impl<Y: Metriplectic, R: Retraction<Y::Manifold, Y::Metric> + Copy> Stepper<Y> for Any<R> {
+    type Memory =
+        OneOf<MidpointMemory<Dim<Y>>, StageMemory<Dim<Y>>, <DormandPrince8 as Stepper<Y>>::Memory>;
+
+    forward_steps!(Y, each);
 }

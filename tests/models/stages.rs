@@ -3,7 +3,8 @@
 
 use metriplectic::fields::Space;
 use metriplectic::integrators::{
-    Control, Flow, Promises, Refusal, StageMemory, StepEnds, StepStart, Taken,
+    Control, Element, Flow, LimitingSites, MethodError, Promises, Refusal, StageMemory, StepEnds,
+    StepStart, Taken,
 };
 use metriplectic::prelude::*;
 
@@ -24,95 +25,132 @@ pub(crate) use Stages::*;
 pub(crate) const GAUSS: [Stages; 4] = [Gauss1, Gauss2, Gauss3, Gauss4];
 pub(crate) const RADAU: [Stages; 3] = [Radau2, Radau3, Radau4];
 
+/// The methods of a [`Stepper`] that is one of many, by a macro that calls the one that it is with its memory.
+macro_rules! forward_steps {
+    ($flow:ident, $each:ident) => {
+        fn name(&self) -> String {
+            $each!(self, &mut Self::Memory::default(), |method, _memory| {
+                Stepper::<$flow>::name(method)
+            })
+        }
+
+        fn order(&self) -> u32 {
+            $each!(self, &mut Self::Memory::default(), |method, _memory| {
+                Stepper::<$flow>::order(method)
+            })
+        }
+
+        fn control(&self) -> Control {
+            $each!(self, &mut Self::Memory::default(), |method, _memory| {
+                Stepper::<$flow>::control(method)
+            })
+        }
+
+        fn check(&self, follows_tolerance: bool) -> Result<(), MethodError> {
+            $each!(self, &mut Self::Memory::default(), |method, _memory| {
+                Stepper::<$flow>::check(method, follows_tolerance)
+            })
+        }
+
+        fn promises(&self, flow: &$flow) -> Promises {
+            $each!(self, &mut Self::Memory::default(), |method, _memory| method.promises(flow))
+        }
+
+        fn step(
+            &self,
+            flow: &$flow,
+            start: &StepStart<'_, $flow>,
+            h: f64,
+            memory: &mut Self::Memory,
+        ) -> Result<Taken<$flow>, StepError> {
+            $each!(self, memory, |method, memory| method.step(flow, start, h, memory))
+        }
+
+        fn attempt(
+            &self,
+            flow: &$flow,
+            start: &StepStart<'_, $flow>,
+            h: f64,
+            memory: &mut Self::Memory,
+        ) -> Result<Taken<$flow>, Refusal> {
+            $each!(self, memory, |method, memory| method.attempt(flow, start, h, memory))
+        }
+
+        fn error(
+            &self,
+            flow: &$flow,
+            step: &StepEnds<'_, $flow>,
+            memory: &Self::Memory,
+            norm: impl Fn(&<$flow as Flow>::Vector) -> f64,
+        ) -> Option<f64> {
+            let mut memory = memory.clone();
+            $each!(self, &mut memory, |method, memory| method.error(flow, step, memory, norm))
+        }
+
+        fn limiting_sites(
+            &self,
+            flow: &$flow,
+            step: &StepEnds<'_, $flow>,
+            memory: &Self::Memory,
+            allowed: &<$flow as Flow>::Vector,
+        ) -> LimitingSites {
+            let mut memory = memory.clone();
+            $each!(self, &mut memory, |method, memory| {
+                method.limiting_sites(flow, step, memory, allowed)
+            })
+        }
+
+        fn between(
+            &self,
+            flow: &$flow,
+            step: &StepEnds<'_, $flow>,
+            memory: &mut Self::Memory,
+            theta: f64,
+        ) -> Option<Element<$flow>> {
+            $each!(self, memory, |method, memory| method.between(flow, step, memory, theta))
+        }
+    };
+}
+#[allow(unused_imports, reason = "the methods of all families use it, in some tests")]
+pub(crate) use forward_steps;
+
 macro_rules! each {
-    ($self:expr, $method:ident => $call:expr) => {
-        match $self {
-            Gauss1 => {
-                let $method = Gauss::<1>;
+    ($self:expr, $both:expr, |$method:ident, $memory:ident| $call:expr) => {
+        match ($self, $both) {
+            (Gauss1, $memory) => {
+                let $method = &Gauss::<1>;
                 $call
             }
-            Gauss2 => {
-                let $method = Gauss::<2>;
+            (Gauss2, $memory) => {
+                let $method = &Gauss::<2>;
                 $call
             }
-            Gauss3 => {
-                let $method = Gauss::<3>;
+            (Gauss3, $memory) => {
+                let $method = &Gauss::<3>;
                 $call
             }
-            Gauss4 => {
-                let $method = Gauss::<4>;
+            (Gauss4, $memory) => {
+                let $method = &Gauss::<4>;
                 $call
             }
-            Radau2 => {
-                let $method = Radau::<2>;
+            (Radau2, $memory) => {
+                let $method = &Radau::<2>;
                 $call
             }
-            Radau3 => {
-                let $method = Radau::<3>;
+            (Radau3, $memory) => {
+                let $method = &Radau::<3>;
                 $call
             }
-            Radau4 => {
-                let $method = Radau::<4>;
+            (Radau4, $memory) => {
+                let $method = &Radau::<4>;
                 $call
             }
         }
     };
 }
 
-type MemoryOf<Y> = StageMemory<<<Y as Metriplectic>::Manifold as Space>::Dim>;
-
 impl<Y: Metriplectic> Stepper<Y> for Stages {
-    type Memory = MemoryOf<Y>;
+    type Memory = StageMemory<<<Y as Metriplectic>::Manifold as Space>::Dim>;
 
-    fn order(&self) -> u32 {
-        each!(self, method => Stepper::<Y>::order(&method))
-    }
-
-    fn control(&self) -> Control {
-        each!(self, method => Stepper::<Y>::control(&method))
-    }
-
-    fn promises(&self, system: &Y) -> Promises {
-        each!(self, method => method.promises(system))
-    }
-
-    fn step(
-        &self,
-        system: &Y,
-        start: &StepStart<'_, Y>,
-        h: f64,
-        memory: &mut MemoryOf<Y>,
-    ) -> Result<Taken<Y>, StepError> {
-        each!(self, method => method.step(system, start, h, memory))
-    }
-
-    fn attempt(
-        &self,
-        system: &Y,
-        start: &StepStart<'_, Y>,
-        h: f64,
-        memory: &mut MemoryOf<Y>,
-    ) -> Result<Taken<Y>, Refusal> {
-        each!(self, method => method.attempt(system, start, h, memory))
-    }
-
-    fn error(
-        &self,
-        system: &Y,
-        step: &StepEnds<'_, Y>,
-        memory: &MemoryOf<Y>,
-        norm: impl Fn(&<Y as Flow>::Vector) -> f64,
-    ) -> Option<f64> {
-        each!(self, method => method.error(system, step, memory, norm))
-    }
-
-    fn between(
-        &self,
-        system: &Y,
-        step: &StepEnds<'_, Y>,
-        memory: &mut MemoryOf<Y>,
-        theta: f64,
-    ) -> Option<<Y::Manifold as Space>::Point<f64>> {
-        each!(self, method => method.between(system, step, memory, theta))
-    }
+    forward_steps!(Y, each);
 }

@@ -3,16 +3,17 @@
 //! | promise | what is compared |
 //! |---|---|
 //! | drift | both laws and the invariants after a hundred steps |
-//! | outputs | their times, their laws, and their error with the error of the steps |
+//! | record | a sparse record, the iterator and the trajectory; the end with the time that was asked for |
+//! | outputs | their times, their laws, and their error with the error of the steps; the steps with and without them |
 //! | events | their times, and their states with the outputs at these times |
-//! | checkpoints | the bits of a run that was put down, and of the one that was not |
-//! | refusals | the sentence of each input that no method takes |
+//! | checkpoints | the states, outputs, events and the certificate of a run that was put down, and of the one that was not |
+//! | another method | a checkpoint is refused by every other method |
+//! | refusals | the sentence of each span that no method takes |
 
-use metriplectic::dynamics::system::Point;
-use metriplectic::integrators::{Checkpoint, Event, RunError, Schedule};
-use metriplectic::manifolds::Manifold;
+use metriplectic::integrators::{
+    Checkpoint, Element, Event, Flow, ResumeError, RunError, Schedule, StageFlow, StateSpace, Steps,
+};
 use metriplectic::prelude::*;
-use metriplectic_studies::problems::Problem;
 
 /// The relative tolerance of the runs with steps that follow the motion.
 const TOLERANCE: f64 = 1e-5;
@@ -29,10 +30,10 @@ struct Recorded {
     entries: Vec<f64>,
 }
 
-impl<M: Manifold> From<&State<M>> for Recorded {
+impl<M: StateSpace> From<&State<M>> for Recorded {
     fn from(state: &State<M>) -> Self {
         let &State { time, energy, entropy, ref point, .. } = state;
-        Self { time, energy, entropy, entries: M::entries(point) }
+        Self { time, energy, entropy, entries: M::numbers(point) }
     }
 }
 
@@ -49,7 +50,7 @@ impl Recorded {
     }
 }
 
-fn recorded<'a, M: Manifold + 'a>(states: impl IntoIterator<Item = &'a State<M>>) -> Vec<Recorded> {
+fn recorded<'a, M: StateSpace>(states: impl IntoIterator<Item = &'a State<M>>) -> Vec<Recorded> {
     states.into_iter().map(Recorded::from).collect()
 }
 
@@ -97,7 +98,7 @@ impl Broken {
     }
 
     /// Events at given times are there, with the states of the outputs at these times.
-    fn events<M: Manifold>(&mut self, events: &[Event<M>], outputs: &[Recorded], at: f64) {
+    fn events<M: StateSpace>(&mut self, events: &[Event<M>], outputs: &[Recorded], at: f64) {
         let clock = events.iter().find(|event| &*event.name == "clock");
         let off = clock.map_or(f64::INFINITY, |event| (event.state.time - at).abs());
         self.expect(off <= 4.0 * f64::EPSILON * at, || format!("the clock is off by {off:e}"));
@@ -133,19 +134,19 @@ struct Schedules {
 }
 
 impl Schedules {
-    fn of<Y: Metriplectic>(time: f64, ends: [&Point<Y>; 2]) -> Self
+    fn of<F: Flow>(time: f64, ends: [&Element<F>; 2]) -> Self
     where
-        Point<Y>: 'static,
+        Element<F>: 'static,
     {
         let (h, end) = (time / 40.0, 0.2 * time);
         let half = 0.5 * end;
-        let [from, to] = ends.map(|x| Y::Manifold::entries(x)[0]);
+        let [from, to] = ends.map(|x| F::Space::numbers(x)[0]);
         let level = level(from, to);
         let adaptive = Span::until(end)
             .tolerance(TOLERANCE)
             .output_at([0.0, 0.3 * end, half, end])
-            .event_in_time("clock", move |t, _: &Point<Y>| t - half)
-            .event("level", move |x: &Point<Y>| Y::Manifold::entries(x)[0] - level);
+            .event_in_time("clock", move |t, _: &Element<F>| t - half)
+            .event("level", move |x: &Element<F>| F::Space::numbers(x)[0] - level);
         Self {
             drift: Span::steps(h, 100).at_most(2).into(),
             inside: Span::steps(h, STEPS).output_every(h / PARTS as f64),
@@ -155,38 +156,87 @@ impl Schedules {
     }
 }
 
-/// The promises that a method does not keep on a problem, from a start.
-pub(crate) fn promises<Y, M>(problem: &Problem<Y>, start: &Point<Y>, method: M) -> Vec<String>
+/// What an iterator yields from where it is, and what it has noted at its end.
+#[derive(Debug, PartialEq)]
+struct Course {
+    outputs: Vec<Vec<u64>>,
+    events: Vec<(String, Vec<u64>)>,
+    certificate: Certificate,
+}
+
+impl Course {
+    /// Takes some steps, puts the run down if there is something to resume it with, and goes on to the end.
+    fn of<'a, F: Flow, M: Method<F>>(
+        mut steps: Steps<'a, F, M>,
+        put_down: usize,
+        resume: impl FnOnce(&Checkpoint) -> Option<Steps<'a, F, M>>,
+    ) -> Self {
+        let event =
+            |event: &Event<F::Space>| (event.to_string(), Recorded::from(&event.state).bits());
+        let (mut outputs, mut events) = (Vec::new(), Vec::new());
+        for _ in 0..put_down {
+            if steps.ending().is_some() {
+                break;
+            }
+            steps.advance().expect("a step is taken");
+            outputs.extend(steps.outputs().map(|state| Recorded::from(state).bits()));
+            events.extend(steps.take_events().iter().map(event));
+        }
+        let mut steps = resume(&steps.checkpoint()).unwrap_or(steps);
+        for state in steps.by_ref() {
+            outputs.push(Recorded::from(&state.expect("a step is taken")).bits());
+        }
+        events.extend(steps.take_events().iter().map(event));
+        Self { outputs, events, certificate: steps.certificate().clone() }
+    }
+}
+
+/// A checkpoint that went through a file.
+fn through_a_file(checkpoint: &Checkpoint) -> Checkpoint {
+    let text = serde_json::to_string(checkpoint).expect("it is written");
+    serde_json::from_str(&text).expect("it is read")
+}
+
+/// A flow with a start and a time in which it moves.
+#[derive(Debug)]
+pub(crate) struct Case<'a, F: Flow> {
+    pub(crate) flow: &'a F,
+    pub(crate) start: &'a Element<F>,
+    pub(crate) time: f64,
+}
+
+/// The promises that the first of some methods does not keep.
+pub(crate) fn promises<F, M>(case: &Case<'_, F>, methods: &[M]) -> Vec<String>
 where
-    Y: Metriplectic,
-    M: Method<Y> + Clone,
-    Point<Y>: 'static,
+    F: StageFlow,
+    M: Method<F> + Clone,
+    Element<F>: 'static,
 {
-    let Problem { system, time, .. } = problem;
     let mut broken = Broken::default();
-    if let Err(error) = observe(&mut broken, system, *time, start, method) {
+    if let Err(error) = observe(&mut broken, case, methods) {
         broken.0.push(error.to_string());
     }
     broken.0
 }
 
-fn observe<Y, M>(
+fn observe<F, M>(
     broken: &mut Broken,
-    system: &Y,
-    time: f64,
-    start: &Point<Y>,
-    method: M,
-) -> Result<(), RunError<Y::Manifold>>
+    &Case { flow, start, time }: &Case<'_, F>,
+    methods: &[M],
+) -> Result<(), RunError<F::Space>>
 where
-    Y: Metriplectic,
-    M: Method<Y> + Clone,
-    Point<Y>: 'static,
+    F: StageFlow,
+    M: Method<F> + Clone,
+    Element<F>: 'static,
 {
-    let run = |schedule: &Schedule| method.clone().run(system, start.clone(), schedule.clone());
-    let has_second_law = system.second_law() == SecondLaw::Exact;
-    let short: Schedule = Span::until(0.2 * time).tolerance(TOLERANCE).into();
-    let end = run(&short)?.last().point.clone();
-    let schedules = Schedules::of::<Y>(time, [start, &end]);
+    let method = || methods[0].clone();
+    let run = |schedule: &Schedule| method().run(flow, start.clone(), schedule.clone());
+    let has_second_law = flow.entropy_law() == SecondLaw::Exact;
+    let end_time = 0.2 * time;
+    let short: Schedule = Span::until(end_time).tolerance(TOLERANCE).into();
+    let plain = run(&short)?;
+    let end = plain.last().point.clone();
+    let schedules = Schedules::of::<F>(time, [start, &end]);
 
     let drift = run(&schedules.drift)?;
     let certificate = drift.certificate();
@@ -195,39 +245,96 @@ where
         format!("a hundred steps: {certificate}")
     });
 
-    let inside = recorded(&run(&schedules.inside)?);
+    let fixed = Span::steps(time / 40.0, STEPS);
+    let full = run(&fixed.into())?;
+    let sparse = recorded(&run(&fixed.every(4).into())?);
+    let states = recorded(&full);
+    let chosen = [0, 4, STEPS].map(|step| states[step].clone());
+    broken.expect(sparse == chosen, || "a sparse record has other states".to_owned());
+    broken.expect(plain.last().time.to_bits() == end_time.to_bits(), || {
+        format!("the end is at {}, not at {end_time}", plain.last().time)
+    });
+
+    let inside = run(&schedules.inside)?;
+    broken.expect(inside.certificate() == full.certificate(), || "outputs change steps".to_owned());
+    let inside = recorded(&inside);
     let fine = Span::until(time / 40.0 * STEPS as f64).tolerance(1e-12);
     let fine = fine.output_every(time / 40.0 / PARTS as f64);
-    let exact = recorded(&DormandPrince8.run(system, start.clone(), fine)?);
+    let exact = recorded(&DormandPrince8.run(flow, start.clone(), fine)?);
     let scale = certificate_scale(&inside);
     broken.laws(&inside, has_second_law, scale);
     broken.accurate(&inside, &exact, scale);
 
     let adaptive = run(&schedules.adaptive)?;
+    broken.expect(adaptive.certificate() == plain.certificate(), || {
+        "outputs and events change steps".to_owned()
+    });
     let outputs = recorded(&adaptive);
     broken.laws(&outputs, has_second_law, scale);
     broken.events(adaptive.events(), &outputs, schedules.half);
 
-    for schedule in [&Schedule::from(Span::steps(time / 40.0, STEPS)), &short] {
-        let whole = run(schedule)?;
-        let mut steps = method.clone().steps(system, start.clone(), schedule.clone())?;
-        for _ in 0..2 {
-            steps.advance().map_err(|error| panic!("{error}")).ok();
+    for schedule in [&schedules.inside, &schedules.adaptive] {
+        let steps = || method().steps(flow, start.clone(), schedule.clone());
+        let whole = Course::of(steps()?, 0, |_| None);
+        let yielded: Vec<_> = recorded(&run(schedule)?)[1..].iter().map(Recorded::bits).collect();
+        broken.expect(whole.outputs == yielded, || "the iterator yields other states".to_owned());
+        for put_down in [0, 1, 2] {
+            let resumed = Course::of(steps()?, put_down, |checkpoint| {
+                let resumed = method().resume(flow, &through_a_file(checkpoint));
+                let resumed = resumed.expect("it is the same system");
+                Some(resumed.watching(schedule.clone()).expect("it is the same schedule"))
+            });
+            broken.expect(resumed == whole, || {
+                format!("resumed after {put_down} steps, a run is another one")
+            });
         }
-        let text = serde_json::to_string(&steps.checkpoint()).expect("it is written");
-        let read: Checkpoint = serde_json::from_str(&text).expect("it is read");
-        let resumed = method.clone().resume(system, &read).expect("it is the same system").run()?;
-        let bits = [&whole, &resumed].map(|run| Recorded::from(run.last()).bits());
-        let same = bits[0] == bits[1] && whole.certificate() == resumed.certificate();
-        broken.expect(same, || "a resumed run is another one".to_owned());
+    }
+    for other in &methods[1..] {
+        let names = [plain.checkpoint().method().to_owned(), other.name()];
+        match other.clone().resume(flow, plain.checkpoint()).err() {
+            Some(ResumeError::AnotherMethod { stored, found }) if [&*stored, &*found] == names => {}
+            answer => broken.0.push(format!("its checkpoint, for {}: {answer:?}", names[1])),
+        }
     }
 
-    for (h, reason) in [(0.0, "zero"), (f64::NAN, "NaN"), (f64::INFINITY, "inf")] {
-        let refused = run(&Span::steps(h, 1).into());
-        let sentence = refused.err().map(|error| error.to_string()).unwrap_or_default();
-        broken.expect(sentence.contains("step size"), || format!("h = {reason}: {sentence:?}"));
+    for (schedule, part) in impossible(time) {
+        let refused = method().steps(flow, start.clone(), schedule).err();
+        let sentence = refused.map(|error| error.to_string()).unwrap_or_default();
+        broken.expect(sentence.contains(part), || format!("not {part:?}: {sentence:?}"));
     }
     Ok(())
+}
+
+/// Spans that no method takes, and a part of the sentence in which they are refused.
+fn impossible(time: f64) -> Vec<(Schedule, &'static str)> {
+    let mut refused: Vec<(Schedule, &'static str)> = Vec::new();
+    let until = Span::until(time);
+    for h in [0.0, -0.1, f64::NAN, f64::INFINITY] {
+        refused.push((Span::steps(h, 1).into(), "step size"));
+        refused.push((h.into(), "step size"));
+        refused.push((Span::until(h).into(), "end"));
+        refused.push((until.output_every(h), "interval"));
+    }
+    for h in [0.0, -0.1, f64::NAN] {
+        let steps = [until.first_step(h), until.least_step(h), until.largest_step(h)];
+        refused.extend(steps.map(|span| (span.into(), "step size")));
+    }
+    for tolerance in [0.0, -1e-6, f64::NAN, 1.1, 1e-300] {
+        refused.push((until.tolerance(tolerance).into(), "tolerance"));
+    }
+    for tolerance in [0.0, 1.0, f64::NAN] {
+        refused.push((until.until_rest(tolerance).into(), "rest"));
+    }
+    refused.extend([
+        (Span::steps(0.1, 0).into(), "no steps"),
+        (Span::steps(0.1, 3).every(0).into(), "record"),
+        (until.every(0).into(), "record"),
+        (until.least_step(0.2 * time).largest_step(0.1 * time).into(), "largest"),
+        (until.output_at([2.0 * time]), "output"),
+        (until.output_at([f64::NAN]), "output"),
+        (until.every(2).output_every(0.1 * time), "in place of steps"),
+    ]);
+    refused
 }
 
 /// The size of the energies, and at least the unit of the problems.

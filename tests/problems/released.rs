@@ -116,18 +116,16 @@ fn every_method_damps_a_motion_that_is_released_from_rest() {
             for (course, schedule) in courses.iter().enumerate() {
                 let label = format!("{}, γ = {gamma:e}, p = {p:e}, {course}", damped.name);
                 let mut study = EveryMethod::default();
-                for method in Any::all() {
+                for method in Any::all(WeylMidpoint) {
                     let run = method.run(&system, start, schedule.clone());
                     study.note(format!("{label}, {method:?}"), &system, run);
                 }
-                let run = WeylMidpoint.run(&system, start, schedule.clone());
-                study.note(format!("{label}, midpoint"), &system, run);
                 assert!(study.failures.is_empty(), "{}", study.failures.join("\n"));
                 if course != 1 {
                     continue;
                 }
-                let eight = &study.outcomes[8];
-                assert!(eight.label.ends_with("Explicit8"), "{}", eight.label);
+                let eight = |at: &&Outcome| at.label.ends_with(", Order8");
+                let eight = study.outcomes.iter().find(eight).expect("a method of order 8");
                 let [x, p, heat] = std::array::from_fn(|i| eight.entries[i]);
                 for at in &study.outcomes {
                     let off = apart(at, [x, p, heat]);

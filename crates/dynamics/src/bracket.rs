@@ -63,7 +63,7 @@ pub trait Bracket<M: Manifold, G: Riemannian<M>> {
     ///
     /// # Errors
     ///
-    /// Those of [`apply`](Self::apply).
+    /// The errors of [`apply`](Self::apply).
     fn linearise(
         &self,
         at: &BracketArgs<'_, M, G>,
@@ -76,7 +76,7 @@ pub trait Bracket<M: Manifold, G: Riemannian<M>> {
     ///
     /// # Errors
     ///
-    /// Those of [`apply`](Self::apply).
+    /// The errors of [`apply`](Self::apply).
     fn tensor<D: Scalar>(
         &self,
         at: &BracketArgs<'_, M, G, D>,
@@ -108,7 +108,7 @@ pub trait Bracket<M: Manifold, G: Riemannian<M>> {
     ///
     /// # Errors
     ///
-    /// Those of [`apply`](Self::apply).
+    /// The errors of [`apply`](Self::apply).
     fn force<D: Scalar>(
         &self,
         _at: &BracketArgs<'_, M, G, D>,
@@ -122,7 +122,7 @@ pub trait Bracket<M: Manifold, G: Riemannian<M>> {
     ///
     /// # Errors
     ///
-    /// Those of [`apply`](Self::apply).
+    /// The errors of [`apply`](Self::apply).
     fn linearise_force(
         &self,
         at: &BracketArgs<'_, M, G>,
@@ -236,7 +236,7 @@ pub trait NaturalBracket: Manifold {
 pub enum Poisson {}
 
 impl Poisson {
-    /// The same skew matrix everywhere, as in canonical coordinates.
+    /// A skew matrix that is constant, as in canonical coordinates.
     ///
     /// ```
     /// use metriplectic_dynamics::Poisson;

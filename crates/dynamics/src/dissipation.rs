@@ -66,7 +66,7 @@ pub trait Dissipation<M: Manifold, G: Riemannian<M>> {
     ///
     /// # Errors
     ///
-    /// Those of [`apply`](Self::apply).
+    /// The errors of [`apply`](Self::apply).
     fn linearise(
         &self,
         g: &MetricAt<'_, M, G>,
@@ -80,7 +80,7 @@ pub trait Dissipation<M: Manifold, G: Riemannian<M>> {
     ///
     /// # Errors
     ///
-    /// Those of [`apply`](Self::apply).
+    /// The errors of [`apply`](Self::apply).
     fn tensor(&self, g: &MetricAt<'_, M, G>, w: &Vector<M>) -> Result<Matrix<M>, MetricError> {
         let mut tensor = Matrix::<M>::zeros();
         for j in 0..M::Dim::LEN {

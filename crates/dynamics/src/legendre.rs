@@ -33,7 +33,7 @@ impl<L, const N: usize> fmt::Debug for Legendre<L, N> {
     }
 }
 
-/// What Newton's method may take. A correction is tried at 40 lengths.
+/// The limits of Newton's method. A correction is tried at 40 lengths.
 const LIMITS: Limits = Limits { iterations: 100, halvings: 39 };
 
 /// A Hessian is degenerate if its reciprocal condition number is below this. No digit of a solution would be

@@ -125,7 +125,7 @@ pub type Point<Y> = <<Y as Metriplectic>::Manifold as Space>::Point<f64>;
 /// The dimension of the manifold of the system `Y`.
 pub(crate) type Dim<Y> = <<Y as Metriplectic>::Manifold as Space>::Dim;
 
-/// What a system promises about its entropy.
+/// The promise of a system about its entropy.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum SecondLaw {

@@ -126,7 +126,7 @@ pub enum ModelError {
     /// The metric cannot be used.
     #[error("at {point:?}: {source}")]
     Metric {
-        /// What is wrong with it.
+        /// The error of the metric.
         source: MetricError,
         /// The entries of the point.
         point: Vec<f64>,

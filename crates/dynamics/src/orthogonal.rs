@@ -255,7 +255,7 @@ impl<N: Dimension> OrthogonalJet<N> {
         self.terms(first, v, mu, |normal| (&normal.n, &normal.sharp))
     }
 
-    /// The same for a covector.
+    /// Projects a covector.
     #[must_use]
     pub fn terms_of_covector(
         &self,

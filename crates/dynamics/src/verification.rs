@@ -24,7 +24,7 @@ pub trait Verify<M: Manifold> {
     ///
     /// # Errors
     ///
-    /// Those of [`verify`](Self::verify).
+    /// The errors of [`verify`](Self::verify).
     fn verified(&self, x0: &M::Point<f64>) -> Result<Verified<'_, Self>, ModelError>;
 
     /// Checks what a run requires before its first step: everything that [`verify`](Self::verify) does, or
@@ -32,7 +32,7 @@ pub trait Verify<M: Manifold> {
     ///
     /// # Errors
     ///
-    /// Those of [`verify`](Self::verify).
+    /// The errors of [`verify`](Self::verify).
     fn check_start(&self, x0: &M::Point<f64>) -> Result<(), ModelError>;
 
     /// Checks the laws at one state that a run has reached: finite differentials, a metric that can be used, a skew
@@ -82,7 +82,7 @@ pub trait Verify<M: Manifold> {
     ///
     /// # Errors
     ///
-    /// Those of [`check_state`](Self::check_state) and [`check_derivatives`](Self::check_derivatives).
+    /// The errors of [`check_state`](Self::check_state) and [`check_derivatives`](Self::check_derivatives).
     fn check_around(&self, x: &M::Point<f64>, ahead: &[M::Point<f64>]) -> Result<(), ModelError>;
 }
 

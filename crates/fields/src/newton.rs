@@ -75,7 +75,7 @@ pub struct Limits {
 ///
 /// # Errors
 ///
-/// Those of the problem.
+/// The errors of the problem.
 pub fn solve<P: Problem>(
     problem: &P,
     start: P::Iterate,

@@ -102,7 +102,7 @@ impl<'a, Y: Metriplectic<Manifold = LieDual<3>>> Attitude<'a, Y> {
     ///
     /// # Errors
     ///
-    /// Those of [`start`](Self::start) and [`advance`](Self::advance).
+    /// The errors of [`start`](Self::start) and [`advance`](Self::advance).
     pub fn along(
         system: &'a Y,
         run: &Trajectory<LieDual<3>>,

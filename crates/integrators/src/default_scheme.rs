@@ -20,7 +20,7 @@ pub trait Run: Sized {
     ///
     /// # Errors
     ///
-    /// Those of [`Method::run`](crate::Method::run).
+    /// The errors of [`Method::run`](crate::Method::run).
     fn run<F: Flow>(
         self,
         system: &F,
@@ -37,7 +37,7 @@ pub trait Run: Sized {
     ///
     /// # Errors
     ///
-    /// Those of [`Method::steps`](crate::Method::steps).
+    /// The errors of [`Method::steps`](crate::Method::steps).
     fn steps<F: Flow>(
         self,
         system: &F,
@@ -54,7 +54,7 @@ pub trait Run: Sized {
     ///
     /// # Errors
     ///
-    /// Those of [`Method::resume`](crate::Method::resume).
+    /// The errors of [`Method::resume`](crate::Method::resume).
     fn resume<'a, F: Flow>(
         self,
         system: &'a F,

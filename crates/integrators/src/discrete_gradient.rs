@@ -52,7 +52,7 @@ pub trait DiscreteGradient: Copy + Debug + Send + Sync {
         path: &StepPath<M, D>,
     ) -> Vector<M, D>;
 
-    /// The same at real points.
+    /// Computes the mean covector at real points.
     #[inline]
     fn real_mean<M: Manifold>(
         &self,
@@ -63,7 +63,7 @@ pub trait DiscreteGradient: Copy + Debug + Send + Sync {
         self.mean(f, x, path)
     }
 
-    /// The same at real points, with its derivatives along the unknown of the path, in a chart that
+    /// Computes the mean covector at real points, with its derivatives along the unknown of the path, in a chart that
     /// stays where it is.
     #[inline]
     fn mean_jet<M: Manifold>(

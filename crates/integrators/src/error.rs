@@ -1,4 +1,4 @@
-//! What can go wrong in a run.
+//! Errors of runs.
 //!
 //! A `main` that returns an error prints its `Debug` form. For the errors of this module that is
 //! the sentence of their `Display` form.

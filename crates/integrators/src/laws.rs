@@ -1,4 +1,4 @@
-//! What discrete gradients and steps promise, and the functions that check it.
+//! The laws of discrete gradients and steps, and the functions that check them.
 
 use metriplectic_dynamics::{Metriplectic, SecondLaw, system::Point};
 use metriplectic_fields::{
@@ -214,7 +214,7 @@ pub fn tableau(tableau: &Tableau) -> Result<(), BrokenLaw> {
     Ok(())
 }
 
-/// The same system in other units: the numbers of its entries, times, energies and entropies are
+/// A system in other units: the numbers of its entries, times, energies and entropies are
 /// those of the original one times these factors.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Units {

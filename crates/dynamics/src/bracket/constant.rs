@@ -6,7 +6,7 @@ use nalgebra::{Const, SMatrix, SVector};
 
 use super::{Bracket, BracketArgs, BracketJet, PoissonError};
 
-/// The same skew matrix everywhere on a flat space; see [`Poisson::constant`](super::Poisson::constant).
+/// A constant skew matrix on a flat space; see [`Poisson::constant`](super::Poisson::constant).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ConstantPoisson<const N: usize> {
     tensor: SMatrix<f64, N, N>,

@@ -39,7 +39,7 @@ pub trait Force<const N: usize> {
     /// The components of `𝓕(ξ)` at any scalar.
     fn at<D: Scalar>(&self, xi: &SVector<D, N>) -> SVector<D, N>;
 
-    /// The same at the scalar of closures, at which a closure needs no lift.
+    /// Evaluates the force at the scalar of closures, at which a closure needs no lift.
     #[inline]
     fn at_real(&self, xi: &SVector<Real, N>) -> SVector<Real, N> {
         self.at(xi)

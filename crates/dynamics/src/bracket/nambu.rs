@@ -127,7 +127,7 @@ pub trait Casimirs<M: Space, const N: usize> {
     /// Their covectors at `x`, from that of the entropy.
     fn covectors<D: Scalar>(&self, x: &ChartPoint<M, D>, s: &Vector<M, D>, rows: &mut Rows<M, D>);
 
-    /// The same at a real point, with the derivatives of those that are differentials there.
+    /// Computes the covectors at a real point, with the derivatives of those that are differentials there.
     fn jets(
         &self,
         x: &M::Point<f64>,

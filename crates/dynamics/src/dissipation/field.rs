@@ -131,7 +131,7 @@ impl<F> FieldDissipation<F> {
         M::contravariant(x, &(self.0)(&x.point(), &along_velocities(x, w, still)?))
     }
 
-    /// The same at `f64`, where the frame has no derivatives to carry.
+    /// Evaluates the closure at `f64`, where the frame has no derivatives to carry.
     fn real_tensor<M: Manifold>(&self, x: &ChartPoint<M>, w: &Vector<M>) -> Option<Matrix<M>>
     where
         F: Fn(&M::Point<Real>, &Velocity<M, Real>) -> Form<M, Real>,

@@ -26,7 +26,7 @@ pub struct VelocityJet<N: Dimension> {
     /// The rate of the friction, `√|tr A²|` with `A` the derivative of `K̃ w_S` along the unknown. It is the
     /// root of the sum of the squared eigenvalues, the same number in all units.
     pub friction: f64,
-    /// The same for the derivative of `Π̃ w_H`.
+    /// The terms of the derivative of `Π̃ w_H`.
     pub rotation: f64,
 }
 

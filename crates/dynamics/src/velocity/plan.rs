@@ -17,7 +17,7 @@ use crate::metriplectic::{Dim, Metriplectic, SecondLaw};
 /// less than `μ|dC||v|` per unit of time.
 pub(super) const CASIMIR: f64 = 1e-4;
 
-/// The same for a momentum. Near a relative equilibrium it is a function of the other fields to first order,
+/// The bound for a momentum. Near a relative equilibrium it is a function of the other fields to first order,
 /// so a step that conserves these changes it by no more than the order of `h³σ`.
 pub(super) const MOMENTUM: f64 = 1e-6;
 

@@ -54,7 +54,7 @@ pub(crate) fn bracket_defects<Y: Metriplectic + ?Sized>(
     Ok(BracketDefects { tensor, skewness, jacobi: violation, is_finite })
 }
 
-/// What the Jacobi identity says at a point.
+/// The Jacobi identity at a point.
 struct Jacobi {
     violation: Violation,
     /// Whether the derivatives of the tensor are finite.
@@ -126,7 +126,7 @@ impl<Y: Metriplectic + ?Sized> At<'_, Y> {
         Ok(Jacobi::of_axes(self.table, &slopes, self.units, self.rounding))
     }
 
-    /// The same sum for random covectors, `⟨β, ∂_{Πα}Π γ⟩ + cyclic`, which is the sum of three derivatives.
+    /// The sum for random covectors, `⟨β, ∂_{Πα}Π γ⟩ + cyclic`, which is the sum of three derivatives.
     fn jacobi_of_covectors(&self) -> Result<Jacobi, MetricError> {
         let &Self { system, units, rounding, tensor, table, .. } = self;
         let n = <Y::Manifold as Space>::Dim::LEN;

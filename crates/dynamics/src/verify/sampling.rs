@@ -18,7 +18,7 @@ const NEGLIGIBLE: f64 = 1e-6;
 pub(crate) struct CoordinateScales<M: Space> {
     /// The sizes that round-off and difference quotients are relative to. They are positive.
     pub(crate) units: Vector<M>,
-    /// The same sizes, but the size of the entry itself wherever it is not zero, however small.
+    /// The sizes of the entries themselves wherever they are not zero, however small.
     own: Vector<M>,
 }
 

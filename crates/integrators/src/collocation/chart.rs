@@ -34,7 +34,7 @@ pub(super) struct StepChart<M: Space> {
     pub(super) d: Vector<M>,
     /// The end `x'`.
     pub(super) end: M::Point<f64>,
-    /// What the displacement is more than that of the velocities at `x`; zero in normal coordinates.
+    /// The displacement less the one of the velocities at `x`; zero in normal coordinates.
     pub(super) shift: Vector<M>,
     /// Half of the displacement at `x`.
     half: Vector<M>,

@@ -62,7 +62,7 @@ fn part<Y: Metriplectic>(
 /// The entropy at the fraction `θ` of a step: the one that the part of the step has `reached`, of the order of the
 /// method, as far as it lies within a band around a monotone function of low order.
 ///
-/// That function has the production as its slope at both ends. It is the cubic, limited so that it is monotone (Fritsch,
+/// The function of the entropy has the production as its slope at both ends. It is the cubic, limited so that it is monotone (Fritsch,
 /// Carlson 1980), and for a method that damps the rational function, which follows the rise of a fast transient. Half of
 /// its least slope `m` bounds the slope of the band `± ½m θ(1 − θ)`. So the entropy rises along each edge of the band, and
 /// inside of it where it differs from the function by a smooth remainder.

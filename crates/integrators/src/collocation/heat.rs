@@ -39,7 +39,7 @@ use super::covectors::{StageCovectorsOf, StagePoints, Stages, at_stage};
 use super::tableau::{STAGES, Tableau};
 use crate::step::Dim;
 
-/// What is added to the stages.
+/// The heat that is added to the stages.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Heat<V> {
     /// The velocities `ρ u_i`.

@@ -35,7 +35,7 @@ pub(super) struct Linear<N: Dimension> {
     inverse: N::Matrix<f64>,
     /// The round-off of the terms of a displacement.
     rounded: N::Vector<f64>,
-    /// What the solution makes of it.
+    /// The solution with the terms as the right side.
     terms: N::Vector<f64>,
     /// The derivative of a displacement along the covector of the energy, and `M⁻¹` times it.
     sensitivity: N::Matrix<f64>,
@@ -135,7 +135,7 @@ impl<N: Dimension> Linear<N> {
         self.rounded * self.h.abs().recip()
     }
 
-    /// What a residual leaves of the laws, in units of round-off. That of the production of entropy is the one of its
+    /// The errors of the laws that a residual leaves, in units of round-off. The unit for the production of entropy is that of its
     /// terms, which may be large where friction is stiff, of the heat, and of the covectors of the energy: the last two
     /// have the digits of the energy, and an entropy near zero has more.
     pub(super) fn excess<Y>(&self, at: &Evaluated<Y>) -> f64

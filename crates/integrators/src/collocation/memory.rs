@@ -1,4 +1,4 @@
-//! What a method with stages keeps from one step to the next.
+//! The memory of methods with stages.
 
 use metriplectic_fields::{Column, Dimension, Vector};
 use metriplectic_manifolds::Manifold;
@@ -9,7 +9,7 @@ use super::tableau::{STAGES, Tableau};
 use crate::round_off::compensation::Compensation;
 use crate::step::{Memory, RestoreError, Saved};
 
-/// What [`Gauss`](crate::Gauss) and [`Radau`](crate::Radau) keep from one step to the next: the velocities of the
+/// The memory of [`Gauss`](crate::Gauss) and [`Radau`](crate::Radau) from one step to the next: the velocities of the
 /// stages, whose polynomial is continued, and the digits that rounding has lost of the position.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StageMemory<N: Dimension> {

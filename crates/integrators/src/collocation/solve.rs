@@ -48,9 +48,9 @@ pub(super) struct Budget {
 /// The derivatives that a correction is computed with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Derivatives {
-    /// Those of the equation of motion in the middle of the step.
+    /// Derivatives of the equation of motion in the middle of the step.
     InTheMiddle,
-    /// Those of the equation of the step along all of its unknowns.
+    /// Derivatives of the equation of the step along all of its unknowns.
     OfAllStages,
 }
 
@@ -82,12 +82,12 @@ struct Iterate<Y: Metriplectic> {
     round_off: Vector<Y::Manifold>,
     /// The size of the correction, in units of round-off.
     size: f64,
-    /// What is left of the laws, in units of round-off.
+    /// The error of the laws, in units of round-off.
     excess: f64,
 }
 
 impl<Y: Metriplectic> Iterate<Y> {
-    /// What is left, in units of the round-off of the solution and of the laws.
+    /// The remaining error, in units of the round-off of the solution and of the laws.
     fn total(&self) -> f64 {
         self.size.max(self.excess)
     }
@@ -195,7 +195,7 @@ impl<Y: Metriplectic> Iteration<'_, Y> {
         self.linear.correction(&at.residual, &round_off).0
     }
 
-    /// The same point with derivatives that are formed anew.
+    /// Forms the derivatives anew at the point.
     fn renew(&mut self, here: Iterate<Y>) -> Option<Iterate<Y>> {
         self.renewed(here.k, here.at)
     }

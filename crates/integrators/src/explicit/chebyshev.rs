@@ -21,7 +21,7 @@ use super::tableau::Tableau;
 use super::trial::Trial;
 use crate::step::{Control, StepStart, Vector};
 
-/// What is needed of a tableau after the stages, with the PI controller of order 2, by which the error at the end is
+/// The tableau without rows, with the PI controller of order 2, by which the error at the end is
 /// proportional to the tolerance.
 pub(super) const CHEBYSHEV: Tableau =
     Tableau::chebyshev("RungeKuttaChebyshev", Control::of_order(2));

@@ -1,4 +1,4 @@
-//! What the stages of a step tell of its error and of its stability.
+//! Estimates of the error and of the stability of a step, from its stages.
 
 use super::chebyshev;
 use super::flow::StageFlow;

@@ -1,4 +1,4 @@
-//! What an explicit method needs of a system.
+//! The interface between explicit methods and systems.
 
 use crate::step::{Element, Flow, Laws};
 

@@ -1,4 +1,4 @@
-//! What an explicit method keeps from one step to the next.
+//! The memory of explicit methods.
 
 use super::creep;
 use super::spectrum::Spectrum;
@@ -6,7 +6,7 @@ use super::stage::Here;
 use super::tableau::STAGES;
 use crate::step::{Flow, Memory, RestoreError, Saved, Vector};
 
-/// What [`DormandPrince8`](crate::DormandPrince8) and the other explicit methods keep from one step
+/// The memory of [`DormandPrince8`](crate::DormandPrince8) and the other explicit methods from one step
 /// to the next: the sum of the entropy that was produced, and what is known at the state reached.
 #[derive(Clone, Debug)]
 pub struct ExplicitMemory<V> {
@@ -18,7 +18,7 @@ pub struct ExplicitMemory<V> {
     pub(super) taken: u32,
     /// The digits that rounding has lost of the position, as displacements (Kahan 1965).
     pub(super) lost: Option<V>,
-    /// The same as it was read from a checkpoint.
+    /// The lost digits as they were read from a checkpoint.
     pub(super) read: Vec<f64>,
     /// The velocity at the state reached, a function of this state alone.
     pub(super) here: Option<Here<V>>,
@@ -36,7 +36,7 @@ pub(super) type MemoryOf<F> = ExplicitMemory<<F as Flow>::Vector>;
 pub(super) struct Produced {
     /// The sum.
     pub(super) sum: f64,
-    /// What rounding has lost of it.
+    /// The digits of the sum that rounding has lost.
     pub(super) lost: f64,
     /// The largest entropy of a state so far.
     pub(super) largest: f64,
@@ -110,7 +110,7 @@ impl<V: Vector> Memory for ExplicitMemory<V> {
         self.here = self.here.take().or(tried.here);
     }
 
-    /// What is known at the state is evaluated anew, with the same bits.
+    /// Leaves out the velocity at the state, which is evaluated anew with the same bits.
     fn save(&self, saved: &mut Saved) {
         if let Some(Produced { sum, lost, largest }) = self.entropy {
             saved.put("entropy produced", [sum, lost, largest, f64::from(self.falls)]);

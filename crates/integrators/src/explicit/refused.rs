@@ -16,7 +16,7 @@ pub(super) enum Refused {
 }
 
 impl Refused {
-    /// What becomes of a step of size `h` from `time`.
+    /// Converts to the refusal of a step of size `h` from `time`.
     pub(super) fn into_refusal(self, time: f64, h: f64) -> Refusal {
         let tried = Effort::default();
         let second_law = matches!(self, Self::Falls(_));

@@ -205,7 +205,7 @@ impl Tableau {
         !self.dense.is_empty()
     }
 
-    /// What is needed of a tableau after the stages of Chebyshev.
+    /// Makes the tableau of Chebyshev's method, whose stages are computed in each step.
     pub(super) const fn chebyshev(name: &'static str, control: Control) -> Self {
         let tableau = Self::new(name, 2, &[], &[]);
         Self { stages: Stages::Chebyshev, stability: f64::INFINITY, control, ..tableau }

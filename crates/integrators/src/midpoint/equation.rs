@@ -41,11 +41,11 @@ pub struct Residual<'a, Y: Metriplectic, R, W> {
     h: f64,
     /// The laws at `x`.
     pub(crate) values: Laws<Numbers<Y>>,
-    /// What is taken back of the errors of earlier steps.
+    /// The correction of the errors of earlier steps.
     pub(crate) drift: DriftCorrection<Y>,
 }
 
-/// What an evaluation tells of the entropy.
+/// The entropy in an evaluation of the equation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Dissipated {
     /// `|w_S|²`; infinite if the entropy has no discrete gradient.
@@ -72,7 +72,7 @@ enum Law {
     Invariant(usize),
 }
 
-/// What makes covectors and velocities along the path of a step: by definition at any scalar, safely at real
+/// A provider of covectors and velocities along the path of a step: by definition at any scalar, safely at real
 /// points, or there with the derivatives along the unknown of the step.
 trait Provider {
     type System: Metriplectic;
@@ -162,7 +162,7 @@ where
         Self { system, retraction, gradient, x, h, values, drift }
     }
 
-    /// The same from a start with known laws, and errors of earlier steps to take back.
+    /// Makes the equation of a start with known laws, and with errors of earlier steps to correct.
     #[inline]
     pub(crate) fn of_start(
         system: &'a Y,

@@ -52,7 +52,7 @@ where
     (balanced && !(falls && equation.is_exact())).then_some(laws)
 }
 
-/// What is wrong with the laws at the end of a step.
+/// Errors of the laws at the end of a step.
 struct Defects {
     /// The error `e` of the energy.
     e: f64,

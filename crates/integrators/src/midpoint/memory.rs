@@ -1,4 +1,4 @@
-//! What a scheme keeps from one step to the next.
+//! The memory of a scheme.
 
 use metriplectic_fields::{Column, Dimension, Square};
 
@@ -8,7 +8,7 @@ use crate::newton::Inverse;
 use crate::round_off::compensation::Compensation;
 use crate::step::{Dim, Memory, RestoreError, Saved};
 
-/// What a [`Scheme`](crate::Scheme) keeps from one step to the next: the displacements, from which the next one is
+/// The memory of a [`Scheme`](crate::Scheme) from one step to the next: the displacements, from which the next one is
 /// extrapolated; the inverse of a Jacobian, which is used as long as it contracts; and what rounding has
 /// lost of the position.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -84,7 +84,7 @@ impl<N: Dimension> Predictor<N> {
         self.known = DIFFERENCES.min(self.known + 1);
     }
 
-    /// The same displacements for steps of another size: with the parabola `D(s)` through the last
+    /// Rescales the displacements to steps of another size: with the parabola `D(s)` through the last
     /// three, where `s` counts the steps from the middle of the last one, those of a step `ρ` times
     /// as long are `ρ D(½ − ρ/2)`, `ρ D(½ − 3ρ/2)` and `ρ D(½ − 5ρ/2)`, each with `ρ(ρ² − 1)D''/24`
     /// for the shorter mean: exact where the state is a cubic of the time.

@@ -6,7 +6,7 @@ use metriplectic_fields::{Matrix, Space, Square, Vector};
 
 /// An equation `F(u) = 0` for a tangent vector `u`.
 pub trait Equation<M: Space> {
-    /// What an evaluation tells beside the residual.
+    /// Data of an evaluation beside the residual.
     type Evidence: Copy + Debug;
 
     /// `F(u)`, or `None` where it is not defined: outside the domain of a field, or beyond the reach
@@ -27,7 +27,7 @@ pub trait Equation<M: Space> {
 pub struct Evaluated<M: Space, E> {
     /// `F(u)`.
     pub residual: Vector<M>,
-    /// What else the evaluation tells.
+    /// Data of the evaluation beside the residual.
     pub evidence: E,
 }
 
@@ -42,7 +42,7 @@ pub struct Linearised<M: Space, E> {
     pub rounding: Rounding<M>,
     /// The rates of what the equation discretises.
     pub stiffness: Stiffness,
-    /// What else the evaluation tells.
+    /// Data of the evaluation beside the residual.
     pub evidence: E,
 }
 
@@ -101,7 +101,7 @@ pub struct Root<M: Space, E> {
     pub residual_bound: f64,
     /// Linear systems solved.
     pub iterations: usize,
-    /// What the last evaluation told.
+    /// Data of the last evaluation beside the residual.
     pub evidence: E,
 }
 

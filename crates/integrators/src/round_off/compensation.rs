@@ -1,4 +1,4 @@
-//! What rounding loses of a position.
+//! Compensation of the digits that rounding loses of a position.
 
 use metriplectic_fields::{Dimension, Vector};
 use metriplectic_manifolds::Manifold;
@@ -19,7 +19,7 @@ pub(crate) struct Displaced<'a, M: Manifold> {
 }
 
 impl<N: Dimension> Compensation<N> {
-    /// Nothing is lost.
+    /// The compensation without lost digits.
     pub(crate) const NONE: Self = Self(None);
 
     /// The end was moved for another reason, and what has been lost is no longer known.

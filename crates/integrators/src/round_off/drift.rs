@@ -1,4 +1,4 @@
-//! What earlier steps have left of the laws, and a step takes back.
+//! Correction of the round-off that earlier steps have accumulated in H, S and the invariants.
 
 use metriplectic_dynamics::velocity::differentials;
 use metriplectic_dynamics::{Bracket, Dissipation, Invariants, Metriplectic};
@@ -8,14 +8,14 @@ use metriplectic_manifolds::InnerProduct;
 use crate::round_off::bound::ROUNDED;
 use crate::step::{Dim, DriftCorrection, Laws, Start};
 
-/// Nothing is taken back, as in the definition of the scheme.
+/// Makes the correction that is zero, as in the definition of the scheme.
 pub(crate) fn nothing<Y: Metriplectic>() -> DriftCorrection<Y> {
     Laws { energy: 0.0, entropy: 0.0, invariants: Dim::<Y>::array(|_| 0.0) }
 }
 
 /// The fractions `φe` of the accumulated errors `e` that the step takes back.
 ///
-/// What the solver leaves in each step would make the energy a random walk over millions of them, so
+/// The errors of the solver would make the energy a random walk over millions of steps, so
 /// a step aims at `H(x₀)` instead of `H(x)`, once they differ by more than a few units of round-off.
 /// Asking for `⟨w, d⟩ = F(x') − F(x) + φe` changes the covector by `φe ♭d/G(d, d)`, and with it the
 /// displacement by some `δ`, which must stay small against `d`. Both are compared by the change of `F` that goes

@@ -7,7 +7,7 @@ use metriplectic_fields::{
 };
 use metriplectic_manifolds::{InnerProduct, Manifold, MetricSlopes, Nodes, StepPathJet};
 
-/// What a field does along one path: the data of a discrete gradient at `f64`.
+/// A field along one path: the data of a discrete gradient at `f64`.
 ///
 /// The defect `δ = F(x') − F(x) − ⟨w̄, d⟩` of a mean covector `w̄` is of third order, so the difference of the two values
 /// loses it in round-off as the step gets short: its error `ε|F|` enters the covector as `ε|F|/|d|`.
@@ -36,7 +36,7 @@ pub struct StableGradient<M: Space> {
     noise: f64,
 }
 
-/// What the stable gradients of all fields along one path share.
+/// The path that the stable gradients of all fields share.
 #[derive(Debug)]
 pub struct Segment<'a, M: Space> {
     /// The displacement `d` at the base point.
@@ -46,7 +46,7 @@ pub struct Segment<'a, M: Space> {
 }
 
 impl<'a, M: Manifold> Segment<'a, M> {
-    /// That of a path with the displacement `d` and the end `x'`.
+    /// Makes the segment of a path with the displacement `d` and the end `x'`.
     #[inline]
     pub fn new(d: &'a Vector<M>, end: &M::Point<f64>) -> Self {
         Self { d, scales: M::scales(end) }

@@ -1,4 +1,4 @@
-//! What a schedule says of steps that follow a tolerance.
+//! Options of steps that follow a tolerance.
 
 use crate::run::controller::{Controller, Entries, Pace, Rule};
 use crate::run::span_error::{SpanError, check_end, check_step_size};
@@ -10,7 +10,7 @@ const LEAST: f64 = 1e-15;
 /// The largest tolerance: an error of the size of the entry.
 const LARGEST: f64 = 1.0;
 
-/// What a course says of steps that follow a tolerance.
+/// Options of steps that follow a tolerance.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Adaptive {
     pub(super) end: f64,

@@ -1,4 +1,4 @@
-//! What a run did to its laws.
+//! The balance of the laws of a run.
 
 mod text;
 
@@ -42,7 +42,7 @@ pub struct Certificate {
     /// `min |w_S|`, the size of the discrete gradient of the entropy in the exact scheme, which has
     /// order 2 as long as this is large against `h²`; infinite (in JSON, null) without such a one.
     pub min_entropy_slope: f64,
-    /// What became of the further invariants, in their order.
+    /// The balances of the further invariants, in their order.
     pub invariants: Vec<InvariantBalance>,
     /// `max` of the manifold's defect.
     pub max_manifold_defect: f64,
@@ -55,13 +55,13 @@ pub struct Certificate {
     /// Steps that were tried and given up, because their error was above the tolerance or because
     /// they were not solved.
     pub rejected: usize,
-    /// Those of them on which the entropy would have fallen.
+    /// Rejected steps on which the entropy would have fallen.
     pub falls_avoided: usize,
     /// Steps of a method that projects onto the laws, by how the entropy was found.
     pub projected_steps: ProjectedSteps,
-    /// What became of the laws in steps with stages; `None` for another method.
+    /// The balance of the laws in steps with stages; `None` for another method.
     pub stages: Option<StageBalance>,
-    /// What the solver did, in all steps.
+    /// The effort of the solver, in all steps.
     #[cfg_attr(feature = "serde", serde(flatten))]
     pub effort: Effort,
     /// Linear systems solved in the worst step.
@@ -88,9 +88,9 @@ pub struct Certificate {
     /// Whether the model was verified before the run, by [`Verify::verified`](metriplectic_dynamics::Verify::verified), and
     /// not around its start.
     pub verified_before: bool,
-    /// What the method promises.
+    /// The promises of the method.
     pub promises: Promises,
-    /// What the model promises about its entropy; serialized as the name of the variant.
+    /// The promise of the model about its entropy; serialized as the name of the variant.
     #[cfg_attr(feature = "serde", serde(serialize_with = "by_name"))]
     pub second_law: SecondLaw,
     /// The largest rate `h|K'|` of the friction in a step, with `K'` the derivative of `K dS` along the
@@ -139,14 +139,14 @@ impl ProjectedSteps {
     }
 }
 
-/// What became of the laws in steps of a method with stages.
+/// The balance of the laws in steps of a method with stages.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
 pub struct StageBalance {
     /// The largest error of the energy and the further invariants in one step, relative to the sizes of their terms.
     pub defect: f64,
-    /// What the entropy has gained beside the production of friction: what
+    /// The entropy gained beside the production of friction: what
     /// [`Radau`](crate::Radau) adds where it damps.
     pub surplus: f64,
 }
@@ -165,7 +165,7 @@ pub struct MisjudgedSize {
     pub reached: f64,
 }
 
-/// What became of a further invariant.
+/// The balance of a further invariant.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
@@ -204,7 +204,7 @@ pub(crate) struct StepOf<'a, F: Flow> {
 }
 
 impl Certificate {
-    /// That of a run that starts at `x0`.
+    /// Makes the certificate of a run that starts at `x0`.
     pub(crate) fn start<F: Flow>(flow: &F, x0: &Element<F>, promises: Promises) -> Self {
         let (laws, sizes) = (flow.laws(x0), flow.term_sizes(x0));
         let kinds = flow.kinds().into_iter().enumerate();

@@ -152,7 +152,7 @@ impl Checkpoint {
         self.run().into_iter().flat_map(SavedRun::point)
     }
 
-    /// The same run in so many steps of one size, those taken so far among them: a run that has reached
+    /// Changes the number of steps of one size, those taken so far among them: a run that has reached
     /// its end goes on. One that has come to rest stays there.
     ///
     /// # Errors
@@ -173,7 +173,7 @@ impl Checkpoint {
         Ok(run.go_on())
     }
 
-    /// The same run to another time, in steps that follow its tolerance: a run that has reached its end
+    /// Changes the end of a run in steps that follow its tolerance: a run that has reached its end
     /// goes on. One that has come to rest stays there.
     ///
     /// # Errors

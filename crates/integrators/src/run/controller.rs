@@ -78,7 +78,7 @@ pub(crate) enum StepSize<V> {
 }
 
 impl<V> StepSize<V> {
-    /// The same, with the numbers of the entries in another form.
+    /// Converts the numbers of the entries to another form.
     pub(crate) fn convert<W, E>(
         &self,
         convert: impl FnOnce(&'static str, &V) -> Result<W, E>,
@@ -101,11 +101,11 @@ pub(crate) struct Controller<V> {
     pub(crate) entries: Entries<V>,
 }
 
-/// What is known of the errors of the entries, one number for each direction of the chart.
+/// Sizes that the errors of the entries are relative to, one number for each direction of the chart.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) enum Entries<V> {
-    /// Nothing: errors are relative to the sizes that the entries have.
+    /// Relative to the sizes that the entries have.
     Automatic,
     /// The sizes of some entries; zero for an automatic one.
     Scale(V),
@@ -114,7 +114,7 @@ pub(crate) enum Entries<V> {
 }
 
 impl<V> Entries<V> {
-    /// The same, with the numbers in another form.
+    /// Converts the numbers to another form.
     pub(crate) fn convert<W, E>(
         &self,
         convert: impl FnOnce(&'static str, &V) -> Result<W, E>,
@@ -127,7 +127,7 @@ impl<V> Entries<V> {
     }
 }
 
-/// What the method of a run and its start say of the size of its steps.
+/// Rules of the method and of the start of a run for the size of its steps.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Rule {
     /// The order of the method.
@@ -184,7 +184,7 @@ pub(crate) struct Pace {
     pub(crate) error: Option<f64>,
     /// Whether the last try was rejected.
     pub(crate) rejected: bool,
-    /// What the second law says of the size.
+    /// The bound of the size by the second law.
     pub(crate) cap: Option<Cap>,
 }
 

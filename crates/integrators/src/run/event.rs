@@ -74,7 +74,7 @@ impl<M: StateSpace> fmt::Display for Event<M> {
 /// A function of the time and of a point.
 type OfPoint<P> = dyn Fn(f64, &P) -> f64 + Send + Sync;
 
-/// The same as a type that can be recovered from `dyn Any`.
+/// A function of points as a type that can be recovered from `dyn Any`.
 struct Function<P>(Box<OfPoint<P>>);
 
 /// An event that was asked for.
@@ -117,7 +117,7 @@ impl fmt::Debug for Request {
     }
 }
 
-/// The same function, with the same options.
+/// Compares the functions by identity, and their options.
 impl PartialEq for Request {
     fn eq(&self, other: &Self) -> bool {
         let options = |r: &Self| (r.rising, r.falling, r.stops);
@@ -180,7 +180,7 @@ struct Node<M: StateSpace> {
 }
 
 impl<M: StateSpace> Events<M> {
-    /// Those that were asked for, at the start of a run, or where it was put down with these last numbers.
+    /// Watches the events that were asked for, from the start of a run, or where it was put down with these last numbers.
     pub(crate) fn new(
         requests: Vec<Request>,
         state: &State<M>,
@@ -247,7 +247,7 @@ impl<M: StateSpace> Events<M> {
         self.on_points(&inside, ends, output)
     }
 
-    /// The same, from the points on the cubic.
+    /// Looks for events at the points on the cubic.
     fn on_points(
         &mut self,
         inside: &[Inside<M>],

@@ -7,7 +7,7 @@ use crate::run::steps::Steps;
 use crate::run::trajectory::Trajectory;
 use crate::step::{Element, Flow, Stepper};
 
-/// What a user does with a one-step method. Every [`Stepper`] is one.
+/// Runs of a one-step method. Every [`Stepper`] is one.
 pub trait Method<F: Flow>: Stepper<F> {
     /// Verifies the model and starts a run: endless in steps of size `h`, or over a [`Span`](crate::Span) or
     /// [`Until`](crate::Until).

@@ -77,7 +77,7 @@ pub enum TableError {
     Write {
         /// The rows that are in the file as a whole, by the last flush without an error.
         rows: usize,
-        /// What has failed.
+        /// The error of writing.
         source: io::Error,
     },
 }

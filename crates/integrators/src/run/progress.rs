@@ -43,7 +43,7 @@ impl<V> Progress<V> {
         self.rest.is_some() || matches!(self.step_size, StepSize::Adaptive(_))
     }
 
-    /// The same, with the numbers of the entries in another form; they are told apart by what they are.
+    /// Converts the numbers of the entries to another form; they are told apart by their names.
     pub(crate) fn convert<W, E>(
         &self,
         convert: impl Fn(&'static str, &V) -> Result<W, E>,

@@ -1,9 +1,9 @@
-//! What a schedule asks a run to look at, and the outputs that are still to come.
+//! Requests for outputs and events, and the outputs that are still to come.
 
 use crate::run::event::Request;
 use crate::run::span_error::SpanError;
 
-/// What a schedule asks a run to look at.
+/// Requests of a schedule for outputs and events.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Requests {
     /// Times of outputs, in their order, if a list was given.
@@ -55,7 +55,7 @@ pub(crate) struct Outputs {
 }
 
 impl Outputs {
-    /// Those after `time` in a run that began at `start`.
+    /// Keeps the outputs after `time` in a run that began at `start`.
     pub(crate) fn after(
         time: f64,
         start: f64,

@@ -1,4 +1,4 @@
-//! What a user says of a run in steps that follow a tolerance.
+//! Runs in steps that follow a tolerance.
 
 use std::convert::Infallible;
 

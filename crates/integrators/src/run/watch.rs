@@ -1,4 +1,4 @@
-//! What a run is asked to look at between its steps: states at given times, and events.
+//! States at given times between the steps of a run, and events.
 
 use crate::run::event::Request;
 use crate::run::schedule::Schedule;
@@ -150,7 +150,7 @@ pub trait Watch: Into<Schedule> {
         self.event_in_time(name, move |_, x: &P| function(x))
     }
 
-    /// The same for a function of the time and the point.
+    /// Asks for the sign changes of a function of the time and the point.
     ///
     /// ```
     /// # use metriplectic_dynamics::System;

@@ -1,4 +1,4 @@
-//! What a run looks at between its steps.
+//! Outputs and events between the steps of a run.
 
 use std::collections::VecDeque;
 
@@ -23,7 +23,7 @@ pub(super) struct StepBefore<F: Flow> {
     pub(super) in_parts: bool,
 }
 
-/// What a run looks at between its steps.
+/// Outputs and events between the steps of a run.
 pub(super) struct Watching<M: StateSpace> {
     pub(super) outputs: Outputs,
     pub(super) events: Events<M>,

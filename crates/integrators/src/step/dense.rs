@@ -76,7 +76,7 @@ fn entropy<F: Flow>(flow: &F, step: &StepEnds<'_, F>, theta: f64) -> f64 {
     (start + cubic(rise, slopes, theta)).min(end)
 }
 
-/// What the laws are at the fraction `θ` of a step: a law that is promised has the value of the run, as far as
+/// Computes the laws at the fraction `θ` of a step: a law that is promised has the value of the run, as far as
 /// both ends have it; another one goes from its value at the start to that at the end.
 fn targets<F: Flow>(step: &StepEnds<'_, F>, promises: Promises, theta: f64) -> Laws<F::Numbers> {
     let target = |promised, reference: f64, [start, end]: [f64; 2]| {
@@ -120,7 +120,7 @@ pub(crate) fn between<F: Flow>(
     Some(target.reached_from(flow, &y, line))
 }
 
-/// What is asked of the state at the fraction `θ` of a step: the laws of the run, and an entropy.
+/// The target of the state at the fraction `θ` of a step: the laws of the run, and an entropy.
 pub(crate) struct Target<'a, F: Flow> {
     step: &'a StepEnds<'a, F>,
     laws: Laws<F::Numbers>,

@@ -1,4 +1,4 @@
-//! What can go wrong in a step.
+//! Errors of steps.
 
 use std::fmt;
 
@@ -66,7 +66,7 @@ pub enum StepError {
         h: f64,
         /// The residual that was left in the smallest step tried.
         residual: f64,
-        /// What was done to solve it.
+        /// The effort of the solver.
         tried: Effort,
         /// A step size to try next.
         suggested: f64,
@@ -89,7 +89,7 @@ pub enum StepError {
         stiffness: f64,
         /// The residual that was left in the smallest step tried.
         residual: f64,
-        /// What was done to solve it.
+        /// The effort of the solver.
         tried: Effort,
         /// True if the method damps friction that is faster than a step, as [`Radau`](crate::Radau) does.
         damps: bool,
@@ -143,7 +143,7 @@ pub enum StepError {
         time: f64,
         /// The size of the step that was asked for.
         h: f64,
-        /// What was done.
+        /// The effort of the solver.
         tried: Effort,
     },
     /// The entropy would fall in an explicit step and in each smaller one, while the state moves.
@@ -235,7 +235,7 @@ pub enum StepError {
         time: f64,
         /// The size of the step that was asked for.
         h: f64,
-        /// What was done to solve it.
+        /// The effort of the solver.
         tried: Effort,
     },
     /// A part of a large system leaves its domain.
@@ -251,7 +251,7 @@ pub enum StepError {
         h: f64,
         /// The first site that leaves.
         site: usize,
-        /// What was done.
+        /// The effort of the solver.
         tried: Effort,
     },
     /// A state inside a step was asked for, and the flow gives no displacement between two states, or no smaller step

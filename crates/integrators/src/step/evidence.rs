@@ -1,6 +1,6 @@
-//! What a step promises, what it tells of the motion, and what it cost.
+//! Promises of a method, and the evidence and the effort of a step.
 
-/// What holds exactly on every step of a method.
+/// The laws that hold exactly on every step of a method.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
@@ -20,13 +20,13 @@ impl Promises {
         Self { energy: true, entropy, invariants: true }
     }
 
-    /// Nothing: the laws hold to the order of the method.
+    /// Promises no law: the laws hold to the order of the method.
     pub const fn nothing() -> Self {
         Self { energy: false, entropy: false, invariants: false }
     }
 }
 
-/// What a step tells of the motion.
+/// Evidence of a step about the motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Evidence {
@@ -43,28 +43,28 @@ pub struct Evidence {
     pub entropy_step: Option<EntropyStep>,
     /// Whether the size of the step is near the edge of the region of stability of an explicit method.
     pub stability: bool,
-    /// What a method with stages tells of its laws.
+    /// The laws in the stages of a method that has them.
     pub stages: Option<StageLaws>,
 }
 
-/// What a step with stages tells of its laws.
+/// The laws in a step with stages.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct StageLaws {
     /// The largest error of the energy and the further invariants in the step, relative to the sizes of their terms,
     /// before the last digits of the end.
     pub defect: f64,
-    /// What the entropy gains beside the production of friction: zero, but for a method that damps.
+    /// The entropy gained beside the production of friction: zero, but for a method that damps.
     pub surplus: f64,
 }
 
 impl StageLaws {
-    /// Those of a step.
+    /// Makes the laws of a step.
     pub(crate) const fn new(defect: f64, surplus: f64) -> Self {
         Self { defect, surplus }
     }
 
-    /// Those of two parts.
+    /// Adds the laws of two parts.
     fn and(self, next: Self) -> Self {
         Self { defect: self.defect.max(next.defect), surplus: self.surplus + next.surplus }
     }
@@ -132,7 +132,7 @@ impl LimitingSites {
     }
 }
 
-/// What the solver of a method did, in a step or in a run.
+/// The effort of the solver of a method, in a step or in a run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]

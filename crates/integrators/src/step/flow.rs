@@ -1,4 +1,4 @@
-//! What a run knows of a system.
+//! The interface between runs and systems.
 
 use std::fmt::Debug;
 use std::ops::IndexMut;
@@ -60,7 +60,7 @@ pub enum Recheck {
     },
 }
 
-/// What a run needs of a system: its laws, its sizes, and its equation of motion.
+/// A system as a run sees it: its laws, its sizes, and its equation of motion.
 ///
 /// Implement it for a system that is no [`Metriplectic`](metriplectic_dynamics::Metriplectic) one, such as one
 /// of a size that is known only at run time. The methods with a body serve adaptive steps, further invariants
@@ -165,7 +165,7 @@ pub trait Flow {
     /// [`PointError`] if they are no state.
     fn element(&self, entries: &[f64]) -> Result<Element<Self>, PointError>;
 
-    /// What the model says of its entropy.
+    /// The promise of the model about its entropy.
     fn entropy_law(&self) -> SecondLaw {
         SecondLaw::NoEntropy
     }

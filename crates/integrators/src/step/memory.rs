@@ -1,11 +1,11 @@
-//! What a method keeps from one step to the next, and saves in a checkpoint.
+//! The memory of a method, which a checkpoint saves.
 
 use std::collections::BTreeMap;
 use std::fmt::Debug;
 
 use super::exact::Exact;
 
-/// What a method keeps from one step to the next.
+/// The memory of a method from one step to the next.
 pub trait Memory: Clone + Debug + Default {
     /// The memory for steps of `ratio` times the size.
     #[must_use]
@@ -86,7 +86,7 @@ pub enum RestoreError {
     /// A list has another length.
     #[error("the checkpoint has {found} {what}, the method {expected}")]
     Length {
-        /// What the list holds.
+        /// The name of the list.
         what: &'static str,
         /// Its length.
         found: usize,

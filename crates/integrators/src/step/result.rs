@@ -1,4 +1,4 @@
-//! What goes into a step of a method, and what comes out of it.
+//! The input and the result of a step.
 
 use super::{Effort, Element, Evidence, Flow, Laws, StepError};
 
@@ -11,7 +11,7 @@ pub struct StepStart<'a, F: Flow + ?Sized> {
     pub time: f64,
     /// The laws there.
     pub values: Laws<F::Numbers>,
-    /// What they were at the start of the run; for the entropy, after the last step that dissipated. A method
+    /// The laws at the start of the run; for the entropy, after the last step that dissipated. A method
     /// may aim at these values, so that round-off does not add up.
     pub reference: Laws<F::Numbers>,
     /// The error that each entry is allowed in this step, if the steps follow a tolerance.
@@ -37,7 +37,7 @@ pub struct StepEnds<'a, F: Flow + ?Sized> {
     pub h: f64,
     /// The laws at both.
     pub values: [&'a Laws<F::Numbers>; 2],
-    /// What the laws were at the start of the run, as in [`StepStart::reference`].
+    /// The laws at the start of the run, as in [`StepStart::reference`].
     pub reference: &'a Laws<F::Numbers>,
 }
 
@@ -48,16 +48,16 @@ pub struct Taken<F: Flow + ?Sized> {
     pub x: Element<F>,
     /// The laws there.
     pub values: Laws<F::Numbers>,
-    /// What the step tells of the motion.
+    /// Evidence about the motion.
     pub evidence: Evidence,
-    /// What it cost.
+    /// The effort of the solver.
     pub effort: Effort,
 }
 
 /// A step that was not taken, where a smaller one may be.
 #[derive(Clone, Debug)]
 pub struct Refusal {
-    /// What was done.
+    /// The effort of the solver.
     pub effort: Effort,
     /// The error that a run ends with if no smaller step is taken either, where there is a particular one.
     pub error: Option<StepError>,

@@ -34,7 +34,7 @@ impl<V: Vector> Scales<V> {
         Self { terms: larger(&self.terms, &other.terms), ..self.or(&other.sizes) }
     }
 
-    /// What rounding may make of a displacement in the time `h`.
+    /// The rounding of a displacement in the time `h`.
     pub(crate) fn rounding(&self, h: f64) -> V {
         self.terms.map(|terms| terms * (16.0 * f64::EPSILON * h))
     }

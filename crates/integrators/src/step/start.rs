@@ -11,7 +11,7 @@ pub(crate) type Dim<Y> = <<Y as Metriplectic>::Manifold as Space>::Dim;
 /// A number for each further invariant of a system.
 pub type Numbers<Y> = <<<Y as Metriplectic>::Manifold as Space>::Dim as Dimension>::Array<f64>;
 
-/// What a step takes back of the errors of earlier steps: the numbers `φe` in `⟨w, d⟩ = F(x') − F(x) + φe`.
+/// Corrections of the errors of earlier steps: the numbers `φe` in `⟨w, d⟩ = F(x') − F(x) + φe`.
 pub(crate) type DriftCorrection<Y> = Laws<Numbers<Y>>;
 
 /// Where an implicit step starts.

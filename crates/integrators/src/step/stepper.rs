@@ -1,4 +1,4 @@
-//! What a run knows of a method.
+//! The interface between runs and methods.
 
 use super::{
     Control, Effort, Element, Flow, LimitingSites, Memory, MethodError, Promises, Refusal,
@@ -11,7 +11,7 @@ use super::{
 /// 2. what [`promises`](Self::promises) says holds on every step; 3. a step from a saved memory is the same
 /// step, bit for bit.
 pub trait Stepper<F: Flow>: Sized {
-    /// What it keeps from one step to the next, [`saved`](Memory) by a checkpoint.
+    /// The memory from one step to the next, [`saved`](Memory) by a checkpoint.
     type Memory: Memory;
 
     /// The name in a checkpoint, with the stages or the tableau and without options. A run is resumed by a method of
@@ -23,7 +23,7 @@ pub trait Stepper<F: Flow>: Sized {
     /// The order of convergence: it sets the exponents of adaptive step sizes.
     fn order(&self) -> u32;
 
-    /// What holds exactly on every step.
+    /// The laws that hold exactly on every step.
     fn promises(&self, flow: &F) -> Promises;
 
     /// Refuses options with which no run can start, of steps that follow a tolerance or have one size.
@@ -36,7 +36,7 @@ pub trait Stepper<F: Flow>: Sized {
         Ok(())
     }
 
-    /// One step of size `h`, at any price.
+    /// Takes a step of size `h`, in parts if needed.
     ///
     /// A run calls it within [`Flow::with_room`]; so does a caller that steps a large system by itself.
     ///
@@ -51,11 +51,11 @@ pub trait Stepper<F: Flow>: Sized {
         memory: &mut Self::Memory,
     ) -> Result<Taken<F>, StepError>;
 
-    /// One step of size `h` where a smaller one may be tried instead: an error costs little.
+    /// Tries a step of size `h` once. The caller may try a smaller one.
     ///
     /// # Errors
     ///
-    /// What became of the step.
+    /// The refusal of the step.
     fn attempt(
         &self,
         flow: &F,

@@ -192,7 +192,7 @@ const OFF: f64 = 0.8;
 const CORRECTIONS: usize = 8;
 /// Residuals, in units of round-off, with which a state is accepted that no correction improves.
 const STAGNATED: f64 = 2.0;
-/// The same where no entropy is asked for.
+/// The limit where no entropy is asked for.
 const CONSERVED: f64 = 64.0;
 
 /// A projection along the differentials `s² dF`, where `s_i` is the unit of entry `i`: the shortest correction in these
@@ -255,7 +255,7 @@ impl<Y: Metriplectic> Projection<'_, Y> {
         }
     }
 
-    /// What becomes of the best state, if no correction improves it.
+    /// Decides on the best state, if no correction improves it.
     fn stagnated(&self, excess: f64, best: Projected<Y>) -> Result<Projected<Y>, ProjectionError> {
         match self.target.with_entropy {
             _ if excess <= STAGNATED => Ok(best),

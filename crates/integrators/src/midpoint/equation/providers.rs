@@ -160,7 +160,7 @@ where
     }
 }
 
-/// The same with the derivatives along the unknown of the step, and what the round-off of the equation is
+/// Stable covectors with the derivatives along the unknown of the step, and the terms that the round-off of the equation is
 /// made of.
 pub(super) struct Jets<'a, 'b, Y: Metriplectic, R, W, G> {
     pub(super) along: &'a Along<'a, 'b, Y, R, W, G>,

@@ -1,4 +1,4 @@
-//! What a certificate says to a reader, line by line.
+//! The text of a certificate, line by line.
 
 use std::fmt;
 

@@ -27,7 +27,7 @@ pub enum ResumeError {
         "the checkpoint has {found} {what}, the system {expected}; resume it with the system that it is of"
     )]
     Length {
-        /// What the list holds.
+        /// The name of the list.
         what: &'static str,
         /// Its length.
         found: usize,

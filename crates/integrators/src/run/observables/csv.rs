@@ -13,7 +13,7 @@ pub struct Csv<'a, M: StateSpace, W: Write> {
     pub(super) of: &'a Observables<'a, M>,
     /// `None` once the table is finished.
     pub(super) to: Option<W>,
-    /// What has not been written; it begins in the middle of a line if writing has failed there.
+    /// Text that is not yet written; it begins in the middle of a line if writing has failed there.
     pub(super) lines: String,
     /// The rows that were given to it.
     pub(super) rows: usize,
@@ -26,7 +26,7 @@ impl<M: StateSpace, W: Write> Csv<'_, M, W> {
     ///
     /// # Errors
     ///
-    /// Those of writing.
+    /// The errors of writing.
     pub fn write(&mut self, state: &State<M>) -> io::Result<()> {
         for (index, x) in self.of.row(state).enumerate() {
             let comma = if index == 0 { "" } else { "," };
@@ -42,7 +42,7 @@ impl<M: StateSpace, W: Write> Csv<'_, M, W> {
     ///
     /// # Errors
     ///
-    /// Those of writing.
+    /// The errors of writing.
     pub fn flush(&mut self) -> io::Result<()> {
         let Some(to) = &mut self.to else { return Ok(()) };
         // No byte is written twice, and none is left out.
@@ -63,7 +63,7 @@ impl<M: StateSpace, W: Write> Csv<'_, M, W> {
     ///
     /// # Errors
     ///
-    /// Those of writing.
+    /// The errors of writing.
     pub fn finish(mut self) -> io::Result<W> {
         self.flush()?;
         self.to.take().ok_or_else(|| io::Error::other("the table was finished before"))

@@ -24,7 +24,7 @@ impl<M: StateSpace, W: Write + Seek> Npy<'_, M, W> {
     ///
     /// # Errors
     ///
-    /// Those of writing.
+    /// The errors of writing.
     pub fn write(&mut self, state: &State<M>) -> io::Result<()> {
         self.bytes.extend(self.of.row(state).flat_map(f64::to_le_bytes));
         if self.bytes.len() < BUFFER { Ok(()) } else { self.flush() }
@@ -34,7 +34,7 @@ impl<M: StateSpace, W: Write + Seek> Npy<'_, M, W> {
     ///
     /// # Errors
     ///
-    /// Those of writing.
+    /// The errors of writing.
     pub fn flush(&mut self) -> io::Result<()> {
         let (origin, rows, row) = (self.origin, self.rows, 8 * self.of.list.len());
         let Some(to) = &mut self.to else { return Ok(()) };
@@ -63,7 +63,7 @@ impl<M: StateSpace, W: Write + Seek> Npy<'_, M, W> {
     ///
     /// # Errors
     ///
-    /// Those of writing.
+    /// The errors of writing.
     pub fn finish(mut self) -> io::Result<W> {
         self.flush()?;
         self.to.take().ok_or_else(|| io::Error::other("the table was finished before"))

@@ -13,6 +13,8 @@ const TORQUE: f64 = 1.5;
 const FREQUENCY: f64 = 2.0 / 3.0;
 const FRICTION: f64 = 0.5;
 const PERIOD: f64 = std::f64::consts::TAU / FREQUENCY;
+/// Steps in a period.
+const STEPS: usize = 40;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let pendulum = System::on(Euclidean::<2>)
@@ -31,9 +33,8 @@ fn main() -> Result<(), Box<dyn Error>> {
 
     let about =
         "A pendulum in air is driven by a motor: a strange attractor, and where the energy goes.";
-    let example = Example::new(about, 1200, PERIOD);
-    let end = example.steps as f64 * example.step_size;
-    let span = Span::until(end).tolerance(1e-7).output_every(example.step_size);
+    let example = Example::new(about, 1200 * STEPS, PERIOD / STEPS as f64);
+    let span = Span::steps(example.step_size, example.steps).every(STEPS);
     let run = DormandPrince8.run(&pendulum, pendulum.start(vector![0.2, 0.0]), span)?;
 
     let turn = std::f64::consts::TAU;
@@ -44,7 +45,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let marks: Vec<(f64, f64)> =
         section.flat_map(|(q, p)| [(q, p), (q + 0.02, p + 0.02), (f64::NAN, f64::NAN)]).collect();
     sections = sections.line("attractor", marks);
-    let series = |value: &dyn Fn(&OpenState<Vector2<f64>, _>) -> f64| -> Vec<(f64, f64)> {
+    let series = |value: &dyn Fn(&OpenState<Vector2<f64>>) -> f64| -> Vec<(f64, f64)> {
         run.iter().map(|s| (s.time, value(&s.point))).collect()
     };
     let ledger = Panel::new("energy", "t")
@@ -52,7 +53,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         .line("heat into the air", series(&|s| -s.ledger.heat("air").unwrap_or(0.0)));
     let balance: Vec<(f64, f64)> =
         run.iter().map(|s| (s.time, s.energy - run.certificate().initial_energy)).collect();
-    let figure = Panels::new("A driven pendulum in air")
+    let figure = Panels::new(format!("A driven pendulum in air, {STEPS} steps a period"))
         .columns(2)
         .panel(sections)
         .panel(ledger)

@@ -29,8 +29,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let about =
         "A spin in a field that turns: the hysteresis of a nanomagnet, and the heat of each loop.";
     let example = Example::new(about, 2000, 0.4);
-    let end = example.steps as f64 * example.step_size;
-    let span = Span::until(end).tolerance(1e-9).output_every(example.step_size);
+    let span = Span::steps(example.step_size, example.steps);
     let start = Vector3::new(0.28, 0.0, 0.96);
     let run = DormandPrince8.run(&spin, spin.start(start), span)?;
 
@@ -38,7 +37,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let along = |t: f64| field(t.into()).map(|b| b.re).dot(&axis);
     let magnet: Vec<(f64, f64)> =
         run.iter().map(|s| (along(s.time), s.point.x.dot(&axis))).collect();
-    let series = |value: &dyn Fn(&OpenState<Vector3<f64>, _>) -> f64| -> Vec<(f64, f64)> {
+    let series = |value: &dyn Fn(&OpenState<Vector3<f64>>) -> f64| -> Vec<(f64, f64)> {
         run.iter().map(|s| (s.time, value(&s.point))).collect()
     };
     let energies = Panel::new("energy", "t")
@@ -47,7 +46,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let globe = Globe::new("the spin n(t), from ○ to ●").seen_from([0.4, 0.9, 0.3]);
     let balance: Vec<(f64, f64)> =
         run.iter().map(|s| (s.time, s.energy - run.certificate().initial_energy)).collect();
-    let figure = Panels::new("A spin in a field that turns")
+    let figure = Panels::new(format!("A spin in a field that turns, h = {}", example.step_size))
         .columns(2)
         .globe(globe.curve("n(t)", run.iter().map(|s| s.point.x)))
         .panel(Panel::new("n along the field", "field").title("hysteresis").line("n", magnet))

@@ -384,8 +384,12 @@ fn a_run_that_starts_late_keeps_the_balance() {
             ($($method:expr),*) => {$(
                 let span = Span::steps(0.1, 1000).starting_at(time);
                 let run = $method.run(&system, system.start(start()), span).unwrap();
-                assert!(run.certificate().keeps_energy(), "{}", run.certificate());
-                assert!(run.certificate().keeps_entropy(), "{}", run.certificate());
+                // At t = 10⁶ the energy in time has 10⁻¹⁰ of its rate as round-off, and a step of Gauss compares its
+                // values with an integral.
+                let certificate = run.certificate();
+                let kept = certificate.keeps_energy() || time > 1e5;
+                assert!(kept && certificate.max_energy_error < 1e-12, "{certificate}");
+                assert!(certificate.keeps_entropy(), "{certificate}");
             )*};
         }
         late!(WeylMidpoint, Gauss::<2>, DormandPrince5, DormandPrince8);

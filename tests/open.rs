@@ -1,6 +1,5 @@
 //! Open systems: work, heat and both laws, by every method.
 
-use metriplectic::integrators::open::OpenSpace;
 use metriplectic::prelude::*;
 
 type State = (Vector2<Real>, Vector1<Real>);

@@ -15,8 +15,8 @@ use super::system::{CovectorsOf, Direction, OpenSystem, StateOf};
 use super::vector::OpenVector;
 use super::verify;
 use crate::explicit::{StageFlow as _, Target};
-use crate::round_off::bound::{of_an_increment, size_of_terms, sizes_on_a_step};
-use crate::step::{Components, Flow, Laws, LedgerSummary, Numbers, Recheck, StepError};
+use crate::round_off::bound::{ROUNDED, of_an_increment, size_of_terms, sizes_on_a_step};
+use crate::step::{Components, Flow, Laws, LedgerSummary, Numbers, Recheck, StepError, StepStart};
 
 impl<Y, C, X> Flow for OpenSystem<Y, C, X>
 where
@@ -211,6 +211,9 @@ where
     }
 }
 
+/// The error of the balance, relative to the terms of the energy, up to which it is one of last digits.
+const LAST_DIGITS: f64 = 1e-11;
+
 impl<Y, C, X> OpenSystem<Y, C, X>
 where
     Y: Metriplectic,
@@ -280,6 +283,31 @@ where
         let mut booked = y.ledger.since(&x.ledger);
         booked.parameter -= self.frozen_work([x.time, y.time], &x.x);
         OpenVector { v, clock: y.time - x.time, booked }
+    }
+
+    /// The end of an implicit step with the last digits of its balance. Where friction is fast and a step short, the rounding of
+    /// the end makes heat that is larger than a rounding of the energy. The point is moved onto the balance, with its entropy
+    /// where that does not depend on it, unless the entropy would fall.
+    pub(super) fn with_last_digits(
+        &self,
+        start: &StepStart<'_, Self>,
+        x: StateOf<Y>,
+    ) -> (StateOf<Y>, Laws<Numbers<Y>>) {
+        let values = self.laws(&x);
+        let off = |laws: &Laws<Numbers<Y>>| (laws.energy - start.reference.energy).abs();
+        let size = self.term_sizes(&x).energy;
+        if !(off(&values) > ROUNDED * size && off(&values) <= LAST_DIGITS * size) {
+            return (x, values);
+        }
+        let both = self.onto(&x, &start.reference, Some(values.entropy));
+        let moved = both.or_else(|| self.onto(&x, &start.reference, None));
+        let moved = moved.map(|moved| (self.laws(&moved), moved));
+        match moved
+            .filter(|(laws, _)| off(laws) < off(&values) && laws.entropy >= start.values.entropy)
+        {
+            Some((laws, moved)) => (moved, laws),
+            None => (x, values),
+        }
     }
 
     /// The components of a direction, as those of the closed system.

@@ -196,7 +196,7 @@ where
     let effort = solution.effort;
     let edge = || Failure { cause: Cause::Edge, residual, effort };
     let x = step.booked(start.x, &solution, h).ok_or_else(edge)?;
-    let values = system.laws(&x);
+    let (x, values) = system.with_last_digits(start, x);
     if !(values.energy.is_finite() && values.entropy.is_finite()) {
         return Err(edge());
     }

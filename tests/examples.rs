@@ -783,7 +783,7 @@ fn the_loops_of_a_spin_have_the_work_of_the_field_as_heat() {
     assert!(energy <= 5e-15 && manifold <= 1e-15, "{report}");
     // Two loops end where they began, but for what the spin still holds.
     let (work, heat) = (figure(&report, "work"), figure(&report, "heat"));
-    assert!(work > 1.0 && (work + heat).abs() < 0.05 * work, "{report}");
+    assert!(work > 0.3 && (work + heat).abs() < 0.01 * work, "{report}");
 }
 
 #[test]

@@ -4,15 +4,20 @@
 //! a period of the motor the state is a point of Poincaré's section. The motor's work and the air's heat grow without
 //! bound, and their difference with the energy stays at round-off.
 
+use std::collections::BTreeMap;
 use std::error::Error;
 
 use metriplectic::prelude::*;
-use metriplectic_studies::{Example, Panel, Panels};
+use metriplectic_studies::{Example, Map, Panel, Panels};
 
 const TORQUE: f64 = 1.5;
 const FREQUENCY: f64 = 2.0 / 3.0;
 const FRICTION: f64 = 0.5;
 const PERIOD: f64 = std::f64::consts::TAU / FREQUENCY;
+/// The size of a cell in the picture of the section.
+const CELL: f64 = 0.06;
+/// Steps in a period.
+const STEPS: usize = 40;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let pendulum = System::on(Euclidean::<2>)
@@ -31,20 +36,25 @@ fn main() -> Result<(), Box<dyn Error>> {
 
     let about =
         "A pendulum in air is driven by a motor: a strange attractor, and where the energy goes.";
-    let example = Example::new(about, 1200, PERIOD);
-    let end = example.steps as f64 * example.step_size;
-    let span = Span::until(end).tolerance(1e-7).output_every(example.step_size);
+    let example = Example::new(about, 3000 * STEPS, PERIOD / STEPS as f64);
+    let span = Span::steps(example.step_size, example.steps).every(STEPS);
     let run = DormandPrince8.run(&pendulum, pendulum.start(vector![0.2, 0.0]), span)?;
 
+    // How often the section visits each cell of a grid; the first periods lead to the attractor.
     let turn = std::f64::consts::TAU;
-    let angle = |q: f64| q - turn * ((q + 0.5 * turn) / turn).floor();
-    // The first periods lead to the attractor. A cross for each point: a short line.
-    let section = run.iter().skip(20).map(|s| (angle(s.point.x.x), s.point.x.y));
-    let mut sections = Panel::new("p", "q").title("once a period of the motor");
-    let marks: Vec<(f64, f64)> =
-        section.flat_map(|(q, p)| [(q, p), (q + 0.02, p + 0.02), (f64::NAN, f64::NAN)]).collect();
-    sections = sections.line("attractor", marks);
-    let series = |value: &dyn Fn(&OpenState<Vector2<f64>, _>) -> f64| -> Vec<(f64, f64)> {
+    let cell = |x: f64, size: f64| (x / size).floor() as i64;
+    let mut visits: BTreeMap<(i64, i64), u32> = BTreeMap::new();
+    for state in run.iter().skip(20) {
+        let [q, p] = state.point.x.into();
+        let angle = q - turn * ((q + 0.5 * turn) / turn).floor();
+        *visits.entry((cell(angle, CELL), cell(p, CELL))).or_default() += 1;
+    }
+    let centre = |k: i64| (k as f64 + 0.5) * CELL;
+    let cells = visits.iter().map(|((q, p), n)| [centre(*q), centre(*p), f64::from(*n)]);
+    let sections = Panel::new("p", "q")
+        .title("once a period of the motor, visits")
+        .map(Map::new(cells, [2.0, 4.0]));
+    let series = |value: &dyn Fn(&OpenState<Vector2<f64>>) -> f64| -> Vec<(f64, f64)> {
         run.iter().map(|s| (s.time, value(&s.point))).collect()
     };
     let ledger = Panel::new("energy", "t")
@@ -52,7 +62,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         .line("heat into the air", series(&|s| -s.ledger.heat("air").unwrap_or(0.0)));
     let balance: Vec<(f64, f64)> =
         run.iter().map(|s| (s.time, s.energy - run.certificate().initial_energy)).collect();
-    let figure = Panels::new("A driven pendulum in air")
+    let figure = Panels::new(format!("A driven pendulum in air, {STEPS} steps a period"))
         .columns(2)
         .panel(sections)
         .panel(ledger)

@@ -37,8 +37,8 @@ fn main() -> Result<(), Box<dyn Error>> {
 
     let nano = 1e9;
     let series = |value: &dyn Fn(f64, f64, f64) -> f64| -> Vec<(f64, f64)> {
-        let heat = |s: &State<_>| s.point.ledger.heat("resistor").unwrap_or(0.0);
-        run.iter().map(|s| (1e3 * s.time, value(s.time, s.point.x.x, heat(s)))).collect()
+        let heat = |s: &OpenState<Vector1<f64>>| s.ledger.heat("resistor").unwrap_or(0.0);
+        run.iter().map(|s| (1e3 * s.time, value(s.time, s.point.x.x, heat(&s.point)))).collect()
     };
     let half = 0.5 * CAPACITANCE * VOLTAGE * VOLTAGE;
     let stored = |q: f64| 0.5 * q * q / CAPACITANCE;

@@ -92,8 +92,8 @@ pub mod prelude {
     pub use metriplectic_integrators::{
         Attitude, AttitudeError, Certificate, Checkpoint, DormandPrince5, DormandPrince8, Ending,
         Error, Event, ExplicitRungeKutta, Gauss, Gonzalez, ItohAbe, MeanValue, Method, Newton,
-        Observables, OpenBuilder, OpenState, OpenSystem, Radau, ResumeError, Run, RunError,
-        RungeKuttaChebyshev, Scheme, Span, SpanError, State, StepError, Stepper, Steps,
+        Observables, OpenBuilder, OpenSpace, OpenState, OpenSystem, Radau, ResumeError, Run,
+        RunError, RungeKuttaChebyshev, Scheme, Span, SpanError, State, StepError, Stepper, Steps,
         SymmetricItohAbe, Tableau, Trajectory, Until, Watch,
     };
     pub use metriplectic_lattices::{

@@ -130,7 +130,7 @@ fn every_example_of_a_run_reports_the_same_keys() {
     let names = names.map(|path| path.file_stem().map(|name| name.to_string_lossy().into_owned()));
     let mut seen = 0;
     // The study of convergence and the sweep are of many runs.
-    let many = ["convergence", "sweep", "hysteresis_loops"];
+    let many = ["convergence", "sweep", "hysteresis_loops", "carnot_engine"];
     for name in names.flatten().filter(|name| !many.contains(&name.as_str())) {
         let report = json(&example(&name, &["--json", "--steps", "20"]));
         let (_, state) = certified(&report);
@@ -779,4 +779,45 @@ fn the_shards_of_the_sweep_make_the_table_of_one_process() {
     assert_eq!(merged, whole);
     let read = |path: &str| std::fs::read(path).expect("the example writes it");
     assert!(read(&table) == read(&shards));
+}
+
+#[test]
+fn a_capacitor_turns_half_of_its_energy_into_heat_each_time() {
+    let report = json(&example("rc_circuit", &["--json"]));
+    assert_eq!(report["entropy_falls"], 0);
+    let (heat, whole) = (figure(&report, "heat_of_both"), figure(&report, "c_v_squared"));
+    assert!((heat / whole - 1.0).abs() < 1e-7, "{report}");
+}
+
+#[test]
+fn the_engine_obeys_the_identity_of_its_efficiency_at_each_speed() {
+    let report = json(&example("carnot_engine", &["--json"]));
+    let list = |key: &str| -> Vec<f64> {
+        serde_json::from_value(report[key].clone()).expect("a list of numbers")
+    };
+    let (efficiencies, off) = (list("efficiencies"), list("errors_of_the_identity"));
+    assert!(
+        efficiencies.is_sorted() && efficiencies[3] > 0.49 && efficiencies[3] < 0.5,
+        "{report}"
+    );
+    assert!(off.len() == 4 && off.iter().all(|off| off.abs() < 1e-12), "{report}");
+}
+
+#[test]
+fn the_loops_of_a_spin_have_the_work_of_the_field_as_heat() {
+    let report = json(&example("spin_in_a_rotating_field", &["--json"]));
+    let ([energy, _, manifold], _) = certified(&report);
+    assert!(energy <= 5e-15 && manifold <= 1e-15, "{report}");
+    // Two loops end where they began, but for what the spin still holds.
+    let (work, heat) = (figure(&report, "work"), figure(&report, "heat"));
+    assert!(work > 0.3 && (work + heat).abs() < 0.01 * work, "{report}");
+}
+
+#[test]
+fn the_wheels_stop_the_satellite_and_keep_its_momentum() {
+    let report = json(&example("reaction_wheels", &["--json"]));
+    let ([energy, _, _], state) = certified(&report);
+    assert!(energy <= 2e-14, "{report}");
+    let momentum = state[..3].iter().map(|l| l * l).sum::<f64>();
+    assert!((momentum - 1.42).abs() < 1e-13 && figure(&report, "speed") < 0.05, "{report}");
 }

@@ -218,6 +218,10 @@ impl<M: Manifold, G, B, K, H, S, L, P> SystemBuilder<M, G, B, K, H, S, L, P> {
     ///
     /// The dissipation of the metric is projected off its differential; another dissipation must satisfy
     /// `K dC = 0` by itself.
+    #[allow(
+        clippy::type_complexity,
+        reason = "the type of a builder lists the parts of the system, and a name for it would hide them"
+    )]
     pub fn casimir<F: ScalarField<M>>(
         self,
         casimir: F,
@@ -230,6 +234,10 @@ impl<M: Manifold, G, B, K, H, S, L, P> SystemBuilder<M, G, B, K, H, S, L, P> {
     ///
     /// The dissipation of the metric is projected off its differential; another dissipation must satisfy
     /// `K dJ = 0` by itself.
+    #[allow(
+        clippy::type_complexity,
+        reason = "the type of a builder lists the parts of the system, and a name for it would hide them"
+    )]
     pub fn momentum<F: ScalarField<M>>(
         self,
         momentum: F,

@@ -60,6 +60,7 @@ mod equation;
 mod fallbacks;
 mod full;
 mod heat;
+mod in_time;
 mod linear;
 mod memory;
 mod parts;
@@ -70,9 +71,10 @@ mod timed;
 
 use metriplectic_dynamics::{Metriplectic, SecondLaw, system::Point};
 
+pub(crate) use in_time::{EnergyInTime, InTime};
 pub use memory::StageMemory;
 pub(crate) use tableau::Tableau;
-pub(crate) use timed::{EnergyInTime, InTime, MOST, StageSolution, TimedStep};
+pub(crate) use timed::{MOST, StageSolution, TimedStep};
 
 use crate::step::failure::Fallbacks;
 use crate::step::{

@@ -13,7 +13,8 @@
 //! | [`explicit`] | [`DormandPrince8`], [`DormandPrince5`], [`RungeKuttaChebyshev`]: explicit methods, and then back onto the laws | [`step`], [`round_off`] |
 //! | [`run`] | [`Method`], [`Span`], [`Until`], [`Watch`], [`Steps`], [`Trajectory`], [`Event`], [`Certificate`], [`Checkpoint`], [`Observables`]: what a user does with a run of any method | [`step`], [`round_off`] |
 //! | [`system`] | every metriplectic system is a flow | [`step`], [`round_off`], [`explicit`] |
-//! | [`Run`] | runs with the default scheme of a retraction | [`midpoint`], [`run`] |
+//! | [`open`](mod@open) | [`OpenSystem`]: a clock in the energy, ports, baths and a ledger, for every method | [`step`], [`round_off`], [`discrete_gradient`], [`midpoint`], [`collocation`], [`explicit`], [`system`] |
+//! | [`Run`] | runs with the default scheme of a retraction | [`step`], [`midpoint`], [`run`] |
 //! | [`attitude`] | [`Attitude`]: where a body points along a run of its angular momentum | [`run`], [`round_off`] |
 //! | [`laws`] | what a step and a method promise, and the functions that check it | all of them |
 //! | [`error`](mod@error) | [`Error`]: everything that can go wrong | [`step`], [`run`], [`attitude`] |

@@ -10,7 +10,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// The rooms, each with the rooms that its files name. A room names only rooms above it.
-const ROOMS: [(&str, &[&str]); 13] = [
+const ROOMS: [(&str, &[&str]); 14] = [
     ("step", &[]),
     ("round_off", &["step"]),
     ("discrete_gradient", &["round_off"]),
@@ -20,7 +20,19 @@ const ROOMS: [(&str, &[&str]); 13] = [
     ("explicit", &["step", "round_off"]),
     ("run", &["step", "round_off"]),
     ("system", &["step", "round_off", "explicit"]),
-    ("default_scheme", &["midpoint", "run"]),
+    (
+        "open",
+        &[
+            "step",
+            "round_off",
+            "discrete_gradient",
+            "midpoint",
+            "collocation",
+            "explicit",
+            "system",
+        ],
+    ),
+    ("default_scheme", &["step", "midpoint", "run"]),
     ("attitude", &["round_off", "run"]),
     ("error", &["step", "run", "attitude"]),
     ("laws", &["step", "round_off", "discrete_gradient", "midpoint", "explicit", "run"]),

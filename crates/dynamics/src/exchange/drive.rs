@@ -91,7 +91,7 @@ pub fn rates<M: Manifold, G: Riemannian<M>, X: Exchange<M, G>>(
     }
     let centre = ChartPoint::<M, Real>::centre(x);
     let g = MetricAt::new(metric, &centre);
-    let [real_w, real_s] = [w, s].map(|v| Vector::<M, Real>::embed(v));
+    let [real_w, real_s] = [w, s].map(Vector::<M, Real>::embed);
     let mut collected = Collected::<M> {
         sum: Vector::<M>::zero(),
         w: *w,

@@ -54,7 +54,7 @@ pub(super) struct StagePoints<M: Space> {
 pub(super) struct StageCovectors<V> {
     /// The covectors `w_i`.
     pub(super) w: Stages<V>,
-    /// The value `F(x')`.
+    /// The value `F(x')`, less what time alone has changed of it at the stages.
     pub(super) end: f64,
     /// The size of the terms of `F`, to which its round-off is relative.
     pub(super) size: f64,
@@ -197,10 +197,13 @@ pub(super) trait Law<M: Space> {
     /// The value at the end, for its value at the start.
     fn end(&self, start: f64, end: &M::Point<f64>) -> f64;
 
+    /// The size of what the value at the end is summed of, beside both values.
+    fn size(&self, end: &M::Point<f64>) -> f64;
+
     /// The value and the differential at a stage.
     fn jet1(&self, stage: usize, x: &M::Point<f64>) -> Jet1<M>;
 
-    /// What time alone changes of it at a stage, if it depends on time.
+    /// What time alone would change of it in the whole step at its rate at a stage, if it depends on time.
     fn rate(&self, stage: usize, x: &M::Point<f64>) -> Option<f64>;
 
     /// Its derivative along the polynomial of the step at a fraction of it, where the point is `x`.
@@ -214,6 +217,11 @@ impl<M: Space, F: ScalarField<M>> Law<M> for Constant<'_, F> {
     #[inline]
     fn end(&self, _: f64, end: &M::Point<f64>) -> f64 {
         self.0.at(end)
+    }
+
+    #[inline]
+    fn size(&self, _: &M::Point<f64>) -> f64 {
+        0.0
     }
 
     #[inline]
@@ -265,7 +273,8 @@ impl<M: Manifold> AlongStages<'_, M> {
         let (s, end) = (tableau.stages, f.end(start.value, &chart.end));
         let mut w = [zero; STAGES];
         let (mut slope, mut change, mut excursion) = (0.0, 0.0, 0.0_f64);
-        let mut size = start.value.abs() + end.abs();
+        let mut by_time = 0.0;
+        let mut size = start.value.abs() + end.abs() + f.size(&chart.end);
         for i in 0..s {
             let jet = f.jet1(i, &stages.x[i]);
             excursion = excursion.max((jet.value - start.value).abs());
@@ -274,12 +283,20 @@ impl<M: Manifold> AlongStages<'_, M> {
             change += tableau.weights[i] * h.abs() * M::pairing_size(&w[i], &stages.v[i]);
             size += tableau.weights[i] * w[i].abs().dot(scales);
             if let Some(rate) = f.rate(i, &stages.x[i]) {
-                slope += tableau.weights[i] * h * rate;
-                change += tableau.weights[i] * (h * rate).abs();
+                slope += tableau.weights[i] * rate;
+                by_time += tableau.weights[i] * rate;
+                change += tableau.weights[i] * rate.abs();
             }
         }
-        let none =
-            StageCovectors { w, end, size, excursion, noise: zero, left: 0.0, left_round_off: 0.0 };
+        let none = StageCovectors {
+            w,
+            end: end - by_time,
+            size,
+            excursion,
+            noise: zero,
+            left: 0.0,
+            left_round_off: 0.0,
+        };
         if correction == Correction::None {
             return none;
         }

@@ -21,8 +21,8 @@ use super::covectors::{
     Stages, StepPolynomial, all_finite, at_stage, combined,
 };
 use super::heat::{self, HeatStart};
+use super::in_time::{InTime, Timed};
 use super::tableau::{STAGES, Tableau};
-use super::timed::{InTime, Timed};
 use crate::round_off::bound::ROUNDED;
 use crate::round_off::drift;
 use crate::step::{Dim, DriftCorrection, Laws, Numbers};

@@ -1,15 +1,14 @@
-//! Systems that depend on time along a step, and the solution of their stages.
+//! Steps of systems that depend on time.
 
-use std::fmt::Debug;
-
-use metriplectic_dynamics::{Metriplectic, system::Point};
-use metriplectic_fields::{Jet1, Real, ScalarField, Space, Vector};
+use metriplectic_dynamics::{Metriplectic, VectorField, system::Point};
+use metriplectic_fields::{ChartPoint, Column as _, Space as _, Vector};
 use metriplectic_manifolds::Manifold;
 
-use super::covectors::{Law, at_stage, combined};
+use super::covectors::{all_finite, at_stage, combined};
 use super::dense;
 use super::equation::{StageEquation, Unknowns};
 use super::fallbacks::{self, StepFailure};
+use super::in_time::InTime;
 use super::memory::{LastStep, StageMemory};
 use super::solve::Solved;
 use super::tableau::{STAGES, Tableau};
@@ -17,62 +16,6 @@ use crate::round_off::compensation::Displaced;
 use crate::round_off::drift;
 use crate::step::failure::{Cause, Fallbacks};
 use crate::step::{Dim, Effort, Evidence, StageLaws, Start};
-
-/// The energy `H(t, x)` of a system along a step from `t` to `t'`.
-pub(crate) trait EnergyInTime<M: Space>: Debug {
-    /// The change `[H(t', x') − H(t', z)] − [H(t, x) − H(t, z)]`.
-    fn change(&self, x: &M::Point<f64>, end: &M::Point<f64>, z: &M::Point<f64>) -> f64;
-
-    /// The rate `∂_tH` at a fraction of the step.
-    fn rate(&self, node: f64, x: &M::Point<f64>) -> f64;
-
-    /// The derivative of `H` along the fraction of the step, with the point that moves.
-    fn slope(&self, node: f64, x: &M::Point<Real>) -> f64;
-}
-
-/// A system at the times of the stages.
-#[derive(Debug)]
-pub(crate) struct InTime<'a, Y: Metriplectic> {
-    pub(crate) systems: &'a [Y; STAGES],
-    pub(crate) energy: &'a dyn EnergyInTime<Y::Manifold>,
-}
-
-impl<Y: Metriplectic> Clone for InTime<'_, Y> {
-    fn clone(&self) -> Self {
-        *self
-    }
-}
-
-impl<Y: Metriplectic> Copy for InTime<'_, Y> {}
-
-/// The energy of a system in time, less that of a frozen state `z`, as a law along a step.
-#[derive(Debug)]
-pub(super) struct Timed<'a, Y: Metriplectic> {
-    pub(super) in_time: InTime<'a, Y>,
-    pub(super) tableau: &'static Tableau,
-    pub(super) x: &'a Point<Y>,
-    pub(super) z: &'a Point<Y>,
-}
-
-impl<Y: Metriplectic> Law<Y::Manifold> for Timed<'_, Y> {
-    fn end(&self, start: f64, end: &Point<Y>) -> f64 {
-        start + self.in_time.energy.change(self.x, end, self.z)
-    }
-
-    fn jet1(&self, stage: usize, x: &Point<Y>) -> Jet1<Y::Manifold> {
-        self.in_time.systems[stage].energy().jet1(x)
-    }
-
-    fn rate(&self, stage: usize, x: &Point<Y>) -> Option<f64> {
-        let (node, energy) = (self.tableau.nodes[stage], self.in_time.energy);
-        Some(energy.rate(node, x) - energy.rate(node, self.z))
-    }
-
-    fn slope(&self, node: f64, x: &<Y::Manifold as Space>::Point<Real>) -> f64 {
-        let energy = self.in_time.energy;
-        energy.slope(node, x) - energy.slope(node, &Y::Manifold::constant(self.z))
-    }
-}
 
 /// A step of a system in time that was solved.
 pub(crate) struct StageSolution<Y: Metriplectic> {
@@ -123,7 +66,8 @@ impl<Y: Metriplectic> TimedStep<'_, Y> {
     ) -> Result<StageSolution<Y>, (Cause, Effort)> {
         memory.last = None;
         let (x, h) = (start.x, start.h);
-        let guess = memory.guess(self.tableau, h);
+        // From rest a drive may move entries that have no size yet.
+        let guess = memory.guess(self.tableau, h).or_else(|| self.explicit_guess(x, h));
         let mut equation = self.equation(start);
         if let Some(guess) = &guess {
             let d = equation.displacement(guess);
@@ -144,6 +88,21 @@ impl<Y: Metriplectic> TimedStep<'_, Y> {
             solution.end = moved;
         }
         Ok(solution)
+    }
+
+    /// The velocities of the stages by two passes of a fixed-point iteration from rest.
+    fn explicit_guess(&self, x: &Point<Y>, h: f64) -> Option<Unknowns<Y>> {
+        let Tableau { stages, matrix, .. } = self.tableau;
+        let mut k = [Vector::<Y::Manifold>::zero(); STAGES];
+        for _ in 0..PASSES {
+            let before = k;
+            for i in 0..*stages {
+                let q = combined(*stages, &matrix[i], &before) * h;
+                let at = ChartPoint { base: x.clone(), q };
+                k[i] = VectorField::velocity(&self.in_time.systems[i], &at).ok()?;
+            }
+        }
+        all_finite::<Dim<Y>>(&k).then_some(k)
     }
 
     /// Solves a step of a part of the size, from the polynomial of the whole one, at the fraction `θ`.
@@ -215,6 +174,9 @@ impl<Y: Metriplectic> TimedStep<'_, Y> {
         Ok((solved, StageSolution { end, z, stages, lost, evidence, effort }))
     }
 }
+
+/// Passes of the iteration that guesses the first step.
+const PASSES: usize = 2;
 
 /// The most stages, for the systems of a step.
 pub(crate) const MOST: usize = STAGES;

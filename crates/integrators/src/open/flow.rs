@@ -1,7 +1,7 @@
 //! An open system as a flow.
 
 use metriplectic_dynamics::exchange::{Entries as _, Exchange};
-use metriplectic_dynamics::velocity::{Covectors, differentials, irreversible};
+use metriplectic_dynamics::velocity::{differentials, irreversible};
 use metriplectic_dynamics::{
     Dissipation as _, Metriplectic, ModelError, SecondLaw, VectorField, Verify as _,
     invariants::Kind, system::Point,
@@ -11,21 +11,12 @@ use metriplectic_manifolds::{Manifold, PointError};
 
 use super::clock::Clock;
 use super::state::{Booked, Ledger, OpenSpace, OpenState};
-use super::system::{EntriesOf, OpenSystem, StateOf};
+use super::system::{CovectorsOf, Direction, OpenSystem, StateOf};
 use super::vector::OpenVector;
 use super::verify;
 use crate::explicit::{StageFlow as _, Target};
-use crate::round_off::bound::{of_an_increment, size_of_terms, sizes_on_a_step};
-use crate::step::{
-    Components, Dim, Flow, Laws, LedgerSummary, Numbers, Recheck, StepEnds, StepError,
-};
-
-/// A direction of an open system.
-pub(super) type Direction<Y, X> =
-    OpenVector<Vector<<Y as Metriplectic>::Manifold>, EntriesOf<Y, X>>;
-
-/// The covectors of all laws of a system at a point.
-pub(super) type CovectorsOf<Y> = Covectors<Dim<Y>, Vector<<Y as Metriplectic>::Manifold>>;
+use crate::round_off::bound::{ROUNDED, of_an_increment, size_of_terms, sizes_on_a_step};
+use crate::step::{Components, Flow, Laws, LedgerSummary, Numbers, Recheck, StepError, StepStart};
 
 impl<Y, C, X> Flow for OpenSystem<Y, C, X>
 where
@@ -33,7 +24,7 @@ where
     C: Clock<Y::Manifold, Y::Energy>,
     X: Exchange<Y::Manifold, Y::Metric>,
 {
-    type Space = OpenSpace<Y::Manifold, X::Entries>;
+    type Space = OpenSpace<Y::Manifold>;
     type Numbers = Numbers<Y>;
     type Vector = Direction<Y, X>;
 
@@ -41,19 +32,19 @@ where
         self.closed().with_room(f)
     }
 
-    fn laws(&self, x: &StateOf<Y, X>) -> Laws<Numbers<Y>> {
+    fn laws(&self, x: &StateOf<Y>) -> Laws<Numbers<Y>> {
         let laws = self.closed().laws(&x.x);
         self.balanced(x, Laws { energy: self.energy(x.time, &x.x), ..laws })
     }
 
-    fn term_sizes(&self, x: &StateOf<Y, X>) -> Laws<Numbers<Y>> {
+    fn term_sizes(&self, x: &StateOf<Y>) -> Laws<Numbers<Y>> {
         let sizes = self.closed().term_sizes(&x.x);
         let view = self.frozen(x.time);
         let energy = size_of_terms::<Y::Manifold>(view.energy(), &x.x) + x.ledger.net().abs();
         Laws { energy, entropy: sizes.entropy + x.ledger.entropy_of_baths().abs(), ..sizes }
     }
 
-    fn rates(&self, x: &StateOf<Y, X>, d: &Direction<Y, X>) -> Option<Direction<Y, X>> {
+    fn rates(&self, x: &StateOf<Y>, d: &Direction<Y, X>) -> Option<Direction<Y, X>> {
         let t = x.time + d.clock;
         let at = ChartPoint { base: x.x.clone(), q: d.v };
         let v = VectorField::velocity(&self.frozen(t), &at).ok()?;
@@ -63,20 +54,20 @@ where
         Some(OpenVector { v, clock: 1.0, booked: Booked { parameter, entries } })
     }
 
-    fn sizes(&self, x: &StateOf<Y, X>) -> Direction<Y, X> {
+    fn sizes(&self, x: &StateOf<Y>) -> Direction<Y, X> {
         OpenVector::of(Y::Manifold::scales(&x.x))
     }
 
-    fn moved(&self, x: &StateOf<Y, X>, d: &Direction<Y, X>) -> StateOf<Y, X> {
+    fn moved(&self, x: &StateOf<Y>, d: &Direction<Y, X>) -> StateOf<Y> {
         self.advanced(x, d, Y::Manifold::chart(&x.x, &d.v))
     }
 
-    fn displacement(&self, x: &StateOf<Y, X>, y: &StateOf<Y, X>) -> Option<Direction<Y, X>> {
+    fn displacement(&self, x: &StateOf<Y>, y: &StateOf<Y>) -> Option<Direction<Y, X>> {
         let q = Y::Manifold::coordinates(&x.x, &y.x);
         (q.is_finite() && Y::Manifold::is_near(&q)).then(|| self.direction(x, y, q))
     }
 
-    fn production(&self, x: &StateOf<Y, X>) -> Option<f64> {
+    fn production(&self, x: &StateOf<Y>) -> Option<f64> {
         let w = self.covectors(x.time, &x.x);
         let exchanged = self.exchanged(x.time, &x.x, [&w.energy, &w.entropy]).ok()?.production;
         let production = self.internal_production(x.time, &x.x, &w)? + exchanged;
@@ -85,18 +76,18 @@ where
 
     fn onto(
         &self,
-        y: &StateOf<Y, X>,
+        y: &StateOf<Y>,
         laws: &Laws<Numbers<Y>>,
         entropy: Option<f64>,
-    ) -> Option<StateOf<Y, X>> {
+    ) -> Option<StateOf<Y>> {
         let laws = Laws { entropy: entropy.unwrap_or(laws.entropy), ..*laws };
         let with_entropy = entropy.is_some();
         let target = Target { laws: &laws, with_entropy, limit: None, units: None, error: None };
         self.project(y.clone(), &target).ok().map(|end| end.x)
     }
 
-    fn element(&self, entries: &[f64]) -> Result<StateOf<Y, X>, PointError> {
-        let beside = 1 + Ledger::<X::Entries>::NUMBERS;
+    fn element(&self, entries: &[f64]) -> Result<StateOf<Y>, PointError> {
+        let beside = 1 + Ledger::length(self.columns());
         let Some(length) = entries.len().checked_sub(beside) else {
             return Err(PointError::Length { found: entries.len(), expected: beside });
         };
@@ -105,16 +96,18 @@ where
         Ok(OpenState { x, time: rest[0], ledger: Ledger::read(self.columns(), &rest[1..]) })
     }
 
-    fn begin(&self, x: StateOf<Y, X>, time: f64) -> StateOf<Y, X> {
+    fn begin(&self, x: StateOf<Y>, time: f64) -> StateOf<Y> {
         OpenState { time, ..self.start(x.x) }
     }
 
-    fn clocked(&self, x: &StateOf<Y, X>, time: f64) -> Option<StateOf<Y, X>> {
+    fn clocked(&self, x: &StateOf<Y>, time: f64) -> Option<StateOf<Y>> {
         if x.time.to_bits() == time.to_bits() {
             return None;
         }
-        let work =
-            Booked { parameter: self.frozen_work([x.time, time], &x.x), ..Booked::nothing() };
+        let work = Booked {
+            parameter: self.frozen_work([x.time, time], &x.x),
+            ..Booked::<X::Entries>::nothing()
+        };
         Some(OpenState { x: x.x.clone(), time, ledger: x.ledger.with(&work) })
     }
 
@@ -122,19 +115,19 @@ where
         true
     }
 
-    fn ledger(&self, x: &StateOf<Y, X>) -> Option<LedgerSummary> {
+    fn ledger(&self, x: &StateOf<Y>) -> Option<LedgerSummary> {
         let [work, heat] = x.ledger.summary();
         let parameter = C::RUNS.then(|| x.ledger.parameter_work());
         let system_entropy = self.entropy_at(x);
         Some(LedgerSummary { parameter, work, heat, system_entropy })
     }
 
-    fn inspect(&self, step: &StepEnds<'_, Self>, of_one_size: bool) -> Result<(), StepError> {
+    fn inspect(&self, ends: [&StateOf<Y>; 2], of_one_size: bool) -> Result<(), StepError> {
         if of_one_size {
-            verify::protocol(self, step)?;
+            verify::protocol(self, ends)?;
         }
-        verify::exchange(self, step.end)
-            .map_err(|law| StepError::Model { time: step.end.time, law: Box::new(law) })
+        verify::exchange(self, ends[1])
+            .map_err(|law| StepError::Model { time: ends[1].time, law: Box::new(law) })
     }
 
     fn entropy_law(&self) -> SecondLaw {
@@ -153,7 +146,7 @@ where
         self.closed().dissipation().is_projected()
     }
 
-    fn check(&self, x0: &StateOf<Y, X>) -> Result<(), ModelError> {
+    fn check(&self, x0: &StateOf<Y>) -> Result<(), ModelError> {
         self.without_exchange(x0.time).check_start(&x0.x)?;
         verify::clock(self, x0)?;
         verify::exchange(self, x0)
@@ -167,7 +160,7 @@ where
         true
     }
 
-    fn recheck(&self, x: &StateOf<Y, X>, occasion: Recheck) -> Result<(), ModelError> {
+    fn recheck(&self, x: &StateOf<Y>, occasion: Recheck) -> Result<(), ModelError> {
         let model = self.without_exchange(x.time);
         match occasion {
             Recheck::OnTheWay => model.check_state(&x.x),
@@ -183,33 +176,28 @@ where
         }
     }
 
-    fn defect(&self, x: &StateOf<Y, X>) -> f64 {
+    fn defect(&self, x: &StateOf<Y>) -> f64 {
         self.closed().manifold().defect(&x.x)
     }
 
-    fn energy_sizes(&self, [x, end]: [&StateOf<Y, X>; 2]) -> [f64; 2] {
+    fn energy_sizes(&self, [x, end]: [&StateOf<Y>; 2]) -> [f64; 2] {
         let sizes = sizes_on_a_step(&self.between([x.time, end.time]), [&x.x, &end.x]);
         let work = self.frozen_work([x.time, end.time], &x.x).abs();
         sizes.map(|size| size + work)
     }
 
-    fn entropy_round_off(&self, ends: [&StateOf<Y, X>; 2]) -> f64 {
+    fn entropy_round_off(&self, ends: [&StateOf<Y>; 2]) -> f64 {
         let of_baths = ends.map(|x| x.ledger.entropy_of_baths().abs());
         let of_system = of_an_increment(&self.frozen(ends[0].time), ends.map(|x| &x.x));
         of_system + 4.0 * f64::EPSILON * of_baths[0].max(of_baths[1])
     }
 
-    fn dependent_invariant(&self, x: &StateOf<Y, X>) -> Option<(usize, f64)> {
+    fn dependent_invariant(&self, x: &StateOf<Y>) -> Option<(usize, f64)> {
         self.without_exchange(x.time).dependent_invariant(&x.x)
     }
 
     #[inline(never)]
-    fn local_error(
-        &self,
-        x: &StateOf<Y, X>,
-        end: &StateOf<Y, X>,
-        h: f64,
-    ) -> Option<Direction<Y, X>> {
+    fn local_error(&self, x: &StateOf<Y>, end: &StateOf<Y>, h: f64) -> Option<Direction<Y, X>> {
         let q = Y::Manifold::coordinates(&x.x, &end.x);
         if !Y::Manifold::is_near(&q) {
             return None;
@@ -223,6 +211,9 @@ where
     }
 }
 
+/// The error of the balance, relative to the terms of the energy, up to which it is one of last digits.
+const LAST_DIGITS: f64 = 1e-11;
+
 impl<Y, C, X> OpenSystem<Y, C, X>
 where
     Y: Metriplectic,
@@ -230,7 +221,7 @@ where
     X: Exchange<Y::Manifold, Y::Metric>,
 {
     /// The laws of the open system, from those of the system at this state: `H − W − Q`, and `S + Σ S_b`.
-    pub(super) fn balanced(&self, x: &StateOf<Y, X>, laws: Laws<Numbers<Y>>) -> Laws<Numbers<Y>> {
+    pub(super) fn balanced(&self, x: &StateOf<Y>, laws: Laws<Numbers<Y>>) -> Laws<Numbers<Y>> {
         let [net, rest] = x.ledger.net_parts();
         let entropy = laws.entropy + x.ledger.entropy_of_baths();
         Laws { energy: (laws.energy - net) - rest, entropy, ..laws }
@@ -272,10 +263,10 @@ where
     /// The state at a point that the displacement `d` leads to.
     pub(super) fn advanced(
         &self,
-        x: &StateOf<Y, X>,
+        x: &StateOf<Y>,
         d: &Direction<Y, X>,
         point: Point<Y>,
-    ) -> StateOf<Y, X> {
+    ) -> StateOf<Y> {
         let time = x.time + d.clock;
         let parameter = d.booked.parameter + self.frozen_work([x.time, time], &x.x);
         let ledger = x.ledger.with(&Booked { parameter, ..d.booked });
@@ -285,13 +276,38 @@ where
     /// The displacement from a state to another one, with these components.
     pub(super) fn direction(
         &self,
-        x: &StateOf<Y, X>,
-        y: &StateOf<Y, X>,
+        x: &StateOf<Y>,
+        y: &StateOf<Y>,
         v: Vector<Y::Manifold>,
     ) -> Direction<Y, X> {
         let mut booked = y.ledger.since(&x.ledger);
         booked.parameter -= self.frozen_work([x.time, y.time], &x.x);
         OpenVector { v, clock: y.time - x.time, booked }
+    }
+
+    /// The end of an implicit step with the last digits of its balance. Where friction is fast and a step short, the rounding of
+    /// the end makes heat that is larger than a rounding of the energy. The point is moved onto the balance, with its entropy
+    /// where that does not depend on it, unless the entropy would fall.
+    pub(super) fn with_last_digits(
+        &self,
+        start: &StepStart<'_, Self>,
+        x: StateOf<Y>,
+    ) -> (StateOf<Y>, Laws<Numbers<Y>>) {
+        let values = self.laws(&x);
+        let off = |laws: &Laws<Numbers<Y>>| (laws.energy - start.reference.energy).abs();
+        let size = self.term_sizes(&x).energy;
+        if !(off(&values) > ROUNDED * size && off(&values) <= LAST_DIGITS * size) {
+            return (x, values);
+        }
+        let both = self.onto(&x, &start.reference, Some(values.entropy));
+        let moved = both.or_else(|| self.onto(&x, &start.reference, None));
+        let moved = moved.map(|moved| (self.laws(&moved), moved));
+        match moved
+            .filter(|(laws, _)| off(laws) < off(&values) && laws.entropy >= start.values.entropy)
+        {
+            Some((laws, moved)) => (moved, laws),
+            None => (x, values),
+        }
     }
 
     /// The components of a direction, as those of the closed system.

@@ -114,7 +114,7 @@ where
         entries: X::Entries::from_index(|i| h * rates.entries.get(i)),
     };
     let x = OpenState { x: end, time: times[1], ledger: ledger.with(&booked) };
-    let values = system.laws(&x);
+    let (x, values) = system.with_last_digits(start, x);
     if !(values.energy.is_finite() && values.entropy.is_finite()) {
         return Err(edge());
     }

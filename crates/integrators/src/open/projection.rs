@@ -5,9 +5,8 @@ use metriplectic_dynamics::{Metriplectic, SecondLaw};
 use metriplectic_fields::{Dimension, Space as _};
 
 use super::clock::Clock;
-use super::flow::Direction;
 use super::state::{Booked, OpenState};
-use super::system::{OpenSystem, StateOf};
+use super::system::{Direction, OpenSystem, StateOf};
 use super::vector::OpenVector;
 use crate::explicit::{Projected, ProjectionError, StageFlow, Target};
 use crate::step::{Dim, Laws, Numbers};
@@ -28,7 +27,7 @@ where
 {
     type Gradients = OpenGradients<Dim<Y>>;
 
-    fn gradients(&self, x: &StateOf<Y, X>) -> Option<OpenGradients<Dim<Y>>> {
+    fn gradients(&self, x: &StateOf<Y>) -> Option<OpenGradients<Dim<Y>>> {
         let view = self.frozen(x.time);
         let jets = view.gradients(&x.x)?;
         Some(self.gradients_at(x, jets))
@@ -40,7 +39,7 @@ where
 
     fn velocity(
         &self,
-        x: &StateOf<Y, X>,
+        x: &StateOf<Y>,
         OpenGradients { jets, .. }: &OpenGradients<Dim<Y>>,
     ) -> Option<(Direction<Y, X>, f64)> {
         let t = x.time;
@@ -57,7 +56,7 @@ where
         production.is_finite().then_some((velocity, production))
     }
 
-    fn stage(&self, x: &StateOf<Y, X>, q: &Direction<Y, X>) -> Option<StateOf<Y, X>> {
+    fn stage(&self, x: &StateOf<Y>, q: &Direction<Y, X>) -> Option<StateOf<Y>> {
         let view = self.frozen(x.time);
         let point = view.stage(&x.x, &Self::components(q))?;
         Some(self.advanced(x, q, point))
@@ -65,8 +64,8 @@ where
 
     fn stage_rates(
         &self,
-        x: &StateOf<Y, X>,
-        (q, y): (&Direction<Y, X>, &StateOf<Y, X>),
+        x: &StateOf<Y>,
+        (q, y): (&Direction<Y, X>, &StateOf<Y>),
         v: &Direction<Y, X>,
     ) -> Direction<Y, X> {
         let rates = Y::Manifold::stage_rates(&x.x, (&q.v, &y.x), &v.v);
@@ -77,7 +76,7 @@ where
         OpenVector { v: rates, clock: v.clock, booked }
     }
 
-    fn stage_coordinates(&self, x: &StateOf<Y, X>, y: &StateOf<Y, X>) -> Direction<Y, X> {
+    fn stage_coordinates(&self, x: &StateOf<Y>, y: &StateOf<Y>) -> Direction<Y, X> {
         self.direction(x, y, Y::Manifold::stage_coordinates(&x.x, &y.x))
     }
 
@@ -85,7 +84,7 @@ where
     /// less what the baths have gained.
     fn project(
         &self,
-        y: StateOf<Y, X>,
+        y: StateOf<Y>,
         target: &Target<'_, Self>,
     ) -> Result<Projected<Self>, ProjectionError> {
         let OpenState { x, time, ledger } = y;
@@ -127,7 +126,7 @@ where
     X: Exchange<Y::Manifold, Y::Metric>,
 {
     /// The gradients of the open system, from those of the system at this state.
-    fn gradients_at(&self, x: &StateOf<Y, X>, jets: LawJets<Dim<Y>>) -> OpenGradients<Dim<Y>> {
+    fn gradients_at(&self, x: &StateOf<Y>, jets: LawJets<Dim<Y>>) -> OpenGradients<Dim<Y>> {
         OpenGradients { values: self.balanced(x, jets.values()), jets }
     }
 }

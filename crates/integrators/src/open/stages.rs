@@ -73,8 +73,17 @@ where
         }
     }
 
+    fn size(&self, x: &Point<Y>, end: &Point<Y>, z: &Point<Y>) -> f64 {
+        if !C::RUNS {
+            return 0.0;
+        }
+        let [t, later] = self.times;
+        let sizes = [(later, end), (later, z), (t, x), (t, z)];
+        sizes.into_iter().map(|(t, x)| self.system.energy(t, x).abs()).sum()
+    }
+
     fn rate(&self, node: f64, x: &Point<Y>) -> f64 {
-        self.system.power(self.time(node), x)
+        self.size() * self.system.power(self.time(node), x)
     }
 
     fn slope(&self, node: f64, x: &<Y::Manifold as Space>::Point<Real>) -> f64 {
@@ -133,10 +142,10 @@ where
     /// Books a step that was solved.
     fn booked(
         &self,
-        from: &StateOf<Y, X>,
+        from: &StateOf<Y>,
         solution: &StageSolution<Frozen<'a, Y, C, X>>,
         h: f64,
-    ) -> Option<StateOf<Y, X>> {
+    ) -> Option<StateOf<Y>> {
         let Self { system, along, .. } = self;
         let StageSolution { end, z, stages, lost, .. } = solution;
         let mut parameter = system.frozen_work(along.times, z);
@@ -144,7 +153,8 @@ where
         for stage in stages {
             let (t, weight) = (along.time(stage.node), h * stage.weight);
             if C::RUNS {
-                parameter += weight * (system.power(t, &stage.x) - system.power(t, z));
+                let power = system.power(t, &stage.x) - system.power(t, z);
+                parameter += stage.weight * along.size() * power;
             }
             let rates =
                 system.exchanged(t, &stage.x, [&stage.energy, &stage.entropy]).ok()?.entries;
@@ -186,7 +196,7 @@ where
     let effort = solution.effort;
     let edge = || Failure { cause: Cause::Edge, residual, effort };
     let x = step.booked(start.x, &solution, h).ok_or_else(edge)?;
-    let values = system.laws(&x);
+    let (x, values) = system.with_last_digits(start, x);
     if !(values.energy.is_finite() && values.entropy.is_finite()) {
         return Err(edge());
     }
@@ -204,7 +214,7 @@ fn between<Y, C, X>(
     step: &StepEnds<'_, OpenSystem<Y, C, X>>,
     memory: &StageMemory<Dim<Y>>,
     theta: f64,
-) -> Option<StateOf<Y, X>>
+) -> Option<StateOf<Y>>
 where
     Y: Metriplectic,
     C: Clock<Y::Manifold, Y::Energy>,
@@ -352,7 +362,7 @@ macro_rules! open_stages {
                 step: &StepEnds<'_, OpenSystem<Y, C, X>>,
                 memory: &mut Self::Memory,
                 theta: f64,
-            ) -> Option<StateOf<Y, X>> {
+            ) -> Option<StateOf<Y>> {
                 let promises = Stepper::<OpenSystem<Y, C, X>>::promises(self, system);
                 between(Self::tableau(), promises, system, step, memory, theta)
             }

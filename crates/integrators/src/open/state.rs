@@ -18,15 +18,14 @@ pub struct Booked<E> {
 }
 
 impl<E: Entries> Booked<E> {
+    /// The numbers by their index, the parameter first.
+    fn get(&self, index: usize) -> f64 {
+        index.checked_sub(1).map_or(self.parameter, |index| self.entries.get(index))
+    }
+
     /// Nothing.
     pub(super) fn nothing() -> Self {
         Self { parameter: 0.0, entries: E::from_index(|_| 0.0) }
-    }
-
-    /// A function of the numbers that two have at the same place.
-    pub(super) fn zip(&self, other: &Self, f: impl Fn(f64, f64) -> f64) -> Self {
-        let entries = E::from_index(|i| f(self.entries.get(i), other.entries.get(i)));
-        Self { parameter: f(self.parameter, other.parameter), entries }
     }
 }
 
@@ -69,10 +68,11 @@ impl Columns {
 /// Each sum is compensated. All work and heat goes into one more sum, [`net`](Self::net), by which the balance of
 /// the energy is kept: the entries grow with what flows through a system, and their round-off with them.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Ledger<E> {
-    sum: Booked<E>,
-    lost: Booked<E>,
+pub struct Ledger {
+    /// The sum of all work and heat, and what rounding has lost of it.
     net: [f64; 2],
+    /// The same of the parameter, and of each column.
+    sums: Box<[[f64; 2]]>,
     columns: Arc<Columns>,
 }
 
@@ -86,39 +86,36 @@ fn plus([high, low]: [f64; 2], x: f64) -> [f64; 2] {
     [whole, low - (whole - sum)]
 }
 
-impl<E: Entries> Ledger<E> {
+impl Ledger {
     /// The ledger of a system with these columns, before anything is booked.
     pub(super) fn empty(columns: &Arc<Columns>) -> Self {
-        let nothing = Booked::nothing();
-        Self { sum: nothing, lost: nothing, net: [0.0; 2], columns: Arc::clone(columns) }
+        let sums = vec![[0.0; 2]; columns.0.len() + 1].into();
+        Self { net: [0.0; 2], sums, columns: Arc::clone(columns) }
     }
 
     /// The ledger with one more step.
     #[must_use]
-    pub(super) fn with(&self, step: &Booked<E>) -> Self {
-        let add = |sum: f64, lost: f64, x: f64| plus([sum, lost], x);
-        let parameter = add(self.sum.parameter, self.lost.parameter, step.parameter);
-        let entry =
-            |i: usize| add(self.sum.entries.get(i), self.lost.entries.get(i), step.entries.get(i));
-        let mut net = plus(self.net, step.parameter);
+    pub(super) fn with<E: Entries>(&self, step: &Booked<E>) -> Self {
+        let mut ledger = self.clone();
+        for (index, sum) in ledger.sums.iter_mut().enumerate() {
+            *sum = plus(*sum, step.get(index));
+        }
+        ledger.net = plus(ledger.net, step.parameter);
         for (i, (_, kind)) in self.columns.0.iter().enumerate() {
             if *kind != Kind::Entropy {
-                net = plus(net, step.entries.get(i));
+                ledger.net = plus(ledger.net, step.entries.get(i));
             }
         }
-        Self {
-            sum: Booked { parameter: parameter[0], entries: E::from_index(|i| entry(i)[0]) },
-            lost: Booked { parameter: parameter[1], entries: E::from_index(|i| entry(i)[1]) },
-            net,
-            columns: Arc::clone(&self.columns),
-        }
+        ledger
     }
 
     /// What was booked between another ledger and this one.
-    pub(super) fn since(&self, other: &Self) -> Booked<E> {
-        let sum = self.sum.zip(&other.sum, |a, b| a - b);
-        let lost = self.lost.zip(&other.lost, |a, b| a - b);
-        sum.zip(&lost, |a, b| a + b)
+    pub(super) fn since<E: Entries>(&self, other: &Self) -> Booked<E> {
+        let change = |index: usize| {
+            let [[a, low_a], [b, low_b]] = [self.sums[index], other.sums[index]];
+            (a - b) + (low_a - low_b)
+        };
+        Booked { parameter: change(0), entries: E::from_index(|i| change(i + 1)) }
     }
 
     /// The sum of all work and heat, and its last digits.
@@ -127,8 +124,8 @@ impl<E: Entries> Ledger<E> {
     }
 
     /// The work `W_t` of the time in the energy, into the system.
-    pub const fn parameter_work(&self) -> f64 {
-        self.sum.parameter
+    pub fn parameter_work(&self) -> f64 {
+        self.sums[0][0]
     }
 
     /// The work of a port, into the system; `None` if no port has this name.
@@ -147,7 +144,7 @@ impl<E: Entries> Ledger<E> {
     }
 
     fn entry(&self, name: &str, kind: Kind) -> Option<f64> {
-        Some(self.sum.entries.get(self.columns.index(name, kind)?))
+        Some(self.sums[self.columns.index(name, kind)? + 1][0])
     }
 
     /// The sum of all work and heat.
@@ -157,86 +154,75 @@ impl<E: Entries> Ledger<E> {
 
     /// The entropy that all baths have gained.
     pub fn entropy_of_baths(&self) -> f64 {
-        let entropies =
-            self.columns.0.iter().enumerate().filter(|(_, column)| column.1 == Kind::Entropy);
-        let sum = entropies.fold([0.0; 2], |sum, (i, _)| {
-            plus(plus(sum, self.sum.entries.get(i)), self.lost.entries.get(i))
-        });
-        sum[0]
+        let entropies = self.of_kind(Kind::Entropy);
+        entropies.fold([0.0; 2], |sum, (_, [high, low])| plus(plus(sum, high), low))[0]
     }
 
-    /// The work of each port and the heat of each bath, by their names, in the order of the system; the work of the
-    /// parameter has no name.
-    pub fn entries(&self) -> impl Iterator<Item = (&str, f64)> {
-        let columns =
-            self.columns.0.iter().enumerate().filter(|(_, column)| column.1 != Kind::Entropy);
-        columns.map(|(i, (name, _))| (&**name, self.sum.entries.get(i)))
+    /// The names and sums of a kind.
+    fn of_kind(&self, kind: Kind) -> impl Iterator<Item = (&Arc<str>, [f64; 2])> {
+        let columns = self.columns.0.iter().zip(&self.sums[1..]);
+        columns.filter(move |(column, _)| column.1 == kind).map(|((name, _), sum)| (name, *sum))
     }
 
     /// The names and entries of work and of heat.
     pub(super) fn summary(&self) -> [Vec<(Arc<str>, f64)>; 2] {
-        [Kind::Work, Kind::Heat].map(|wanted| {
-            let columns =
-                self.columns.0.iter().enumerate().filter(|(_, column)| column.1 == wanted);
-            columns.map(|(i, (name, _))| (Arc::clone(name), self.sum.entries.get(i))).collect()
+        [Kind::Work, Kind::Heat].map(|kind| {
+            self.of_kind(kind).map(|(name, [sum, _])| (Arc::clone(name), sum)).collect()
         })
     }
 
     /// All numbers, in the order in which [`read`](Self::read) reads them.
     fn numbers(&self) -> Vec<f64> {
-        let mut numbers = self.net.to_vec();
-        for booked in [&self.sum, &self.lost] {
-            numbers.push(booked.parameter);
-            numbers.extend((0..E::LEN).map(|i| booked.entries.get(i)));
-        }
-        numbers
+        self.net.into_iter().chain(self.sums.iter().flatten().copied()).collect()
     }
 
-    /// How many numbers there are.
-    pub(super) const NUMBERS: usize = 4 + 2 * E::LEN;
+    /// How many numbers a ledger with these columns has.
+    pub(super) fn length(columns: &Columns) -> usize {
+        4 + 2 * columns.0.len()
+    }
 
     /// The ledger with these numbers.
     pub(super) fn read(columns: &Arc<Columns>, numbers: &[f64]) -> Self {
-        let mut next = numbers.iter().copied();
-        let mut next = || next.next().unwrap_or(0.0);
-        let net = [next(), next()];
-        let mut booked = || Booked { parameter: next(), entries: E::fill(&mut next) };
-        Self { net, sum: booked(), lost: booked(), columns: Arc::clone(columns) }
+        let mut pairs = numbers.chunks_exact(2).map(|pair| [pair[0], pair[1]]);
+        let mut next = || pairs.next().unwrap_or([0.0; 2]);
+        let net = next();
+        let sums = (0..=columns.0.len()).map(|_| next()).collect();
+        Self { net, sums, columns: Arc::clone(columns) }
     }
 }
 
 /// A state of an open system.
 #[derive(Clone, Debug, PartialEq)]
-pub struct OpenState<P, E> {
+pub struct OpenState<P> {
     /// The point.
     pub x: P,
     /// The time.
     pub time: f64,
     /// What has flowed into the system since the start of the run.
-    pub ledger: Ledger<E>,
+    pub ledger: Ledger,
 }
 
 /// The states of an open system: points of `M` with the time and a ledger.
 #[derive(Debug)]
-pub struct OpenSpace<M, E>(PhantomData<fn() -> (M, E)>);
+pub struct OpenSpace<M>(PhantomData<fn() -> M>);
 
-impl<M, E> Clone for OpenSpace<M, E> {
+impl<M> Clone for OpenSpace<M> {
     fn clone(&self) -> Self {
         Self(PhantomData)
     }
 }
 
-impl<M, E> PartialEq for OpenSpace<M, E> {
+impl<M> PartialEq for OpenSpace<M> {
     fn eq(&self, _: &Self) -> bool {
         true
     }
 }
 
-impl<M: Manifold, E: Entries> StateSpace for OpenSpace<M, E> {
-    type Element = OpenState<M::Point<f64>, E>;
+impl<M: Manifold> StateSpace for OpenSpace<M> {
+    type Element = OpenState<M::Point<f64>>;
 
-    /// The entries of the point, the time, the net sum with its last digits, and the entries of the ledger with
-    /// theirs.
+    /// The entries of the point, the time, and each sum of the ledger with its last digits: all work and heat, the work
+    /// of the parameter, and the columns of the ports and baths in their order.
     fn numbers(x: &Self::Element) -> Vec<f64> {
         let mut numbers = M::entries(&x.x);
         numbers.push(x.time);

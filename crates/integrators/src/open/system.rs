@@ -5,13 +5,16 @@ use std::marker::PhantomData;
 use std::sync::Arc;
 
 use metriplectic_dynamics::exchange::{Exchange, Names, Rates, rates};
+use metriplectic_dynamics::velocity::Covectors;
 use metriplectic_dynamics::{Metriplectic, system::Point};
 use metriplectic_fields::{Real, Space, Vector};
 use metriplectic_manifolds::MetricError;
 
 use super::clock::Clock;
 use super::state::{Columns, Ledger, OpenState};
+use super::vector::OpenVector;
 use super::view::{Closed, Frozen};
+use crate::step::Dim;
 
 /// A system `Y` with a clock `C` in its energy, and with the ports and baths `X`; built by
 /// [`System::on`](metriplectic_dynamics::System::on) with the methods of [`OpenBuilder`](crate::OpenBuilder).
@@ -50,8 +53,15 @@ impl<Y, C, X> OpenSystem<Y, C, X> {
 pub(super) type EntriesOf<Y, X> =
     <X as Exchange<<Y as Metriplectic>::Manifold, <Y as Metriplectic>::Metric>>::Entries;
 
+/// A direction of an open system.
+pub(super) type Direction<Y, X> =
+    OpenVector<Vector<<Y as Metriplectic>::Manifold>, EntriesOf<Y, X>>;
+
+/// The covectors of all laws of a system at a point.
+pub(super) type CovectorsOf<Y> = Covectors<Dim<Y>, Vector<<Y as Metriplectic>::Manifold>>;
+
 /// A state of an open system.
-pub(super) type StateOf<Y, X> = OpenState<Point<Y>, EntriesOf<Y, X>>;
+pub(super) type StateOf<Y> = OpenState<Point<Y>>;
 
 impl<Y, C, X> OpenSystem<Y, C, X>
 where
@@ -60,18 +70,18 @@ where
     X: Exchange<Y::Manifold, Y::Metric>,
 {
     /// Returns the state in which a run starts at a point: its time is that of the run, and nothing is booked yet.
-    pub fn start(&self, x: Point<Y>) -> OpenState<Point<Y>, X::Entries> {
+    pub fn start(&self, x: Point<Y>) -> OpenState<Point<Y>> {
         OpenState { x, time: 0.0, ledger: Ledger::empty(&self.columns) }
     }
 
     /// Evaluates the energy `H(t, x)` at a state. The energy of a [state of a run](crate::State) is the balance
     /// `H − W − Q` instead, which stays what it was at the start.
-    pub fn energy_at(&self, state: &OpenState<Point<Y>, X::Entries>) -> f64 {
+    pub fn energy_at(&self, state: &OpenState<Point<Y>>) -> f64 {
         self.energy(state.time, &state.x)
     }
 
     /// Evaluates the entropy `S(x)` of the system at a state, without that of the baths.
-    pub fn entropy_at(&self, state: &OpenState<Point<Y>, X::Entries>) -> f64 {
+    pub fn entropy_at(&self, state: &OpenState<Point<Y>>) -> f64 {
         self.closed.entropy_at(&state.x)
     }
 

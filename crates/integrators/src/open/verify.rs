@@ -6,9 +6,8 @@ use metriplectic_fields::{ChartPoint, Column as _, Real, Vector};
 use metriplectic_manifolds::{Manifold, MetricAt};
 
 use super::clock::Clock;
-use super::flow::CovectorsOf;
-use super::system::{OpenSystem, StateOf};
-use crate::step::{Flow as _, StepEnds, StepError};
+use super::system::{CovectorsOf, OpenSystem, StateOf};
+use crate::step::{Flow as _, StepError};
 
 /// The slope of a law along a velocity, relative to its terms, that is no round-off.
 const BROKEN: f64 = 1e-8;
@@ -17,7 +16,7 @@ const BROKEN: f64 = 1e-8;
 /// friction has a negative rate.
 pub(super) fn exchange<Y, C, X>(
     system: &OpenSystem<Y, C, X>,
-    state: &StateOf<Y, X>,
+    state: &StateOf<Y>,
 ) -> Result<(), ModelError>
 where
     Y: Metriplectic,
@@ -121,7 +120,7 @@ const CLEAR: f64 = 1e6;
 /// differences are taken over intervals of all powers of two; where quotients in a row agree, they are the derivative.
 pub(super) fn clock<Y, C, X>(
     system: &OpenSystem<Y, C, X>,
-    state: &StateOf<Y, X>,
+    state: &StateOf<Y>,
 ) -> Result<(), ModelError>
 where
     Y: Metriplectic,
@@ -141,10 +140,11 @@ where
     let mut before = f64::NAN;
     for exponent in -200..200 {
         let delta = 2_f64.powi(exponent);
-        let [early, late] = [t - delta, t + delta];
-        let values = [system.energy(early, x), system.energy(late, x)];
+        // Forward, because the law of motion may have changed at this time.
+        let later = t + delta;
+        let values = [system.energy(t, x), system.energy(later, x)];
         let change = values[1] - values[0];
-        let quotient = change / (late - early);
+        let quotient = change / (later - t);
         let clear = change.abs() > CLEAR * f64::EPSILON * (values[0].abs() + values[1].abs());
         let agrees = clear && (quotient - before).abs() <= SAME * quotient.abs();
         agreeing = if agrees { agreeing + 1 } else { 0 };
@@ -178,7 +178,7 @@ const GAUSS: [(f64, f64); 3] = [
 /// Looks for a jump of the energy in time inside a step of a fixed size. Steps that follow a tolerance become small there.
 pub(super) fn protocol<Y, C, X>(
     system: &OpenSystem<Y, C, X>,
-    step: &StepEnds<'_, OpenSystem<Y, C, X>>,
+    [x, end]: [&StateOf<Y>; 2],
 ) -> Result<(), StepError>
 where
     Y: Metriplectic,
@@ -188,16 +188,16 @@ where
     if !C::RUNS {
         return Ok(());
     }
-    let [t, end] = [step.x.time, step.end.time];
-    let x = &step.end.x;
-    let energies = [t, end].map(|t| system.energy(t, x));
+    let (ends, point) = ([x, end], &end.x);
+    let [t, end] = [x.time, end.time];
+    let energies = [t, end].map(|t| system.energy(t, point));
     let frozen = energies[1] - energies[0];
     let half = 0.5 * (end - t);
     let quadrature: f64 = GAUSS
         .iter()
-        .map(|(node, weight)| 2.0 * half * weight * system.power(t + half * (1.0 + node), x))
+        .map(|(node, weight)| 2.0 * half * weight * system.power(t + half * (1.0 + node), point))
         .sum();
-    let terms = system.energy_sizes([step.x, step.end])[0] + frozen.abs();
+    let terms = system.energy_sizes(ends)[0] + frozen.abs();
     if (frozen - quadrature).abs() > JUMP * terms {
         return Err(StepError::ProtocolJumps { time: t, h: end - t, frozen, quadrature });
     }

@@ -6,7 +6,7 @@
 
 use crate::run::requests::rounding;
 use crate::run::span_error::SpanError;
-use crate::step::{Flow, StepEnds, StepError, StepStart, Stepper, Taken};
+use crate::step::{Flow, StepError, StepStart, Stepper, Taken};
 
 #[cfg(feature = "serde")]
 use crate::step::exact;
@@ -81,9 +81,38 @@ impl Corners {
     }
 
     /// The time at which a step ends that goes on to a corner.
-    pub(crate) fn before(&self, corner: f64) -> f64 {
+    fn before(&self, corner: f64) -> f64 {
         corner - BEFORE * self.rounding(corner)
     }
+
+    /// How far a step may go from a time on the way to an end.
+    #[inline]
+    pub(crate) fn stop(&self, time: f64, end: f64) -> Stop {
+        if self.is_empty() {
+            return Stop { stop: end, recorded: end, is_corner: false };
+        }
+        let rounding = self.rounding(end);
+        match self.after(time).filter(|corner| *corner <= end + rounding) {
+            None => Stop { stop: end, recorded: end, is_corner: false },
+            Some(corner) => {
+                // A corner at the end may be another expression of the same time.
+                let is_end = corner >= end - rounding;
+                let recorded = if is_end { end } else { corner };
+                Stop { stop: self.before(corner), recorded, is_corner: true }
+            }
+        }
+    }
+}
+
+/// How far a step may go.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Stop {
+    /// The time at which it ends.
+    pub(crate) stop: f64,
+    /// The time that is recorded then: the corner, or the end.
+    pub(crate) recorded: f64,
+    /// Whether it ends before a corner.
+    pub(crate) is_corner: bool,
 }
 
 /// A step of one size, and the time at which it ends.
@@ -108,13 +137,8 @@ pub(crate) fn step<F: Flow, M: Stepper<F>>(
     let (mut x, mut values) = (start.x.clone(), start.values.clone());
     let mut before: Option<Taken<F>> = None;
     loop {
-        let limit = end + corners.rounding(end);
-        let corner = corners.after(time).filter(|corner| *corner <= limit);
-        let size = match corner {
-            None if before.is_none() => h,
-            None => end - time,
-            Some(corner) => corners.before(corner) - time,
-        };
+        let Stop { stop, recorded, is_corner } = corners.stop(time, end);
+        let size = if before.is_none() && !is_corner { h } else { stop - time };
         if corners.has(time) {
             *memory = M::Memory::default();
         }
@@ -122,21 +146,8 @@ pub(crate) fn step<F: Flow, M: Stepper<F>>(
         let from =
             StepStart { x: &x, time, values: values.clone(), reference: reference_here, allowed };
         let mut taken = method.step(flow, &from, size, memory)?;
-        flow.inspect(
-            &StepEnds {
-                x: &x,
-                end: &taken.x,
-                h: size,
-                values: [&values, &taken.values],
-                reference: &reference,
-            },
-            true,
-        )?;
-        // A corner at the end of the step may be another expression of the same time.
-        let reached = corner.map_or(end, |corner| {
-            if corner >= end - (limit - end) { end.max(corner) } else { corner }
-        });
-        if let Some(clocked) = flow.clocked(&taken.x, reached) {
+        flow.inspect([&x, &taken.x], true)?;
+        if let Some(clocked) = flow.clocked(&taken.x, recorded) {
             taken.values = flow.laws(&clocked);
             taken.x = clocked;
         }
@@ -148,10 +159,10 @@ pub(crate) fn step<F: Flow, M: Stepper<F>>(
             taken.effort += before.effort;
             taken.effort.splits += 1;
         }
-        if reached >= end {
+        if recorded >= end {
             return Ok(taken);
         }
-        (x, values, time) = (taken.x.clone(), taken.values.clone(), reached);
+        (x, values, time) = (taken.x.clone(), taken.values.clone(), recorded);
         before = Some(taken);
     }
 }

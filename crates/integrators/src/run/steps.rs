@@ -5,7 +5,7 @@ use std::fmt;
 use crate::round_off::bound::{ROUNDED, breaks_first_law};
 use crate::run::certificate::{Certificate, InvariantBalance, StepOf};
 use crate::run::controller::{Controller, Rule, StepSize};
-use crate::run::corners;
+use crate::run::corners::{self, Stop};
 use crate::run::ending::Ending;
 use crate::run::error::RunError;
 use crate::run::event::LastNumber;
@@ -220,7 +220,7 @@ impl<'a, F: Flow, M: Stepper<F>> Steps<'a, F, M> {
             let time = self.state.time;
             return Err(StepError::FirstLawBroken { time, h, change, size });
         }
-        self.check_step(&taken, h)?;
+        self.check_step(&taken)?;
         let entered = StepOf { taken: &taken, h };
         self.certificate.enter(self.flow, &self.state.point, &self.values, entered);
         let first_at_the_edge =
@@ -265,15 +265,12 @@ impl<'a, F: Flow, M: Stepper<F>> Steps<'a, F, M> {
 
     /// Looks at what must hold on every step. Steps of one size between corners have been looked at one by one.
     #[inline]
-    fn check_step(&self, taken: &Taken<F>, h: f64) -> Result<(), StepError> {
+    fn check_step(&self, taken: &Taken<F>) -> Result<(), StepError> {
         let fixed = matches!(self.progress.step_size, StepSize::Fixed(_));
         if !self.flow.depends_on_time() || (fixed && !self.progress.corners.is_empty()) {
             return Ok(());
         }
-        let reference = self.reference(self.entropy);
-        let (x, values) = (&self.state.point, [&self.values, &taken.values]);
-        let step = StepEnds { x, end: &taken.x, h, values, reference: &reference };
-        self.flow.inspect(&step, fixed)
+        self.flow.inspect([&self.state.point, &taken.x], fixed)
     }
 
     /// Whether the certificate may name a site.
@@ -340,12 +337,8 @@ impl<'a, F: Flow, M: Stepper<F>> Steps<'a, F, M> {
         let (flow, rule, time) = (self.flow, self.rule, self.state.time);
         let mut effort = Effort::default();
         let (mut tries, mut broken) = (0, None);
-        let corner =
-            self.progress.corners.after(time).filter(|corner| *corner < controller.pace.end);
-        let stop =
-            corner.map_or(controller.pace.end, |corner| self.progress.corners.before(corner));
-        // The time that is recorded for a step that goes on to there.
-        let target = corner.unwrap_or(controller.pace.end);
+        let Stop { stop, recorded: target, .. } =
+            self.progress.corners.stop(time, controller.pace.end);
         if self.progress.corners.has(time) {
             self.memory = M::Memory::default();
         }

@@ -8,7 +8,7 @@ use metriplectic_dynamics::{ModelError, SecondLaw};
 use metriplectic_manifolds::{Manifold, PointError};
 
 use super::initial_scales::initial_scales;
-use super::{FlowError, LedgerSummary, Scales, StepEnds, StepError, Vector};
+use super::{FlowError, LedgerSummary, Scales, StepError, Vector};
 
 /// Where the states of a run live. Every [`Manifold`] is a state space.
 pub trait StateSpace: Clone + Debug + PartialEq + Send + Sync + 'static {
@@ -147,14 +147,15 @@ pub trait Flow {
         None
     }
 
-    /// Looks at each step that was taken, for what must hold on every one. Steps are `of_one_size`, or follow a tolerance.
+    /// Looks at the ends of each step that was taken, for what must hold on every one. Steps are `of_one_size`, or follow a
+    /// tolerance.
     ///
     /// # Errors
     ///
     /// [`StepError`] that ends the run.
     #[inline]
-    fn inspect(&self, step: &StepEnds<'_, Self>, of_one_size: bool) -> Result<(), StepError> {
-        let _ = (step, of_one_size);
+    fn inspect(&self, ends: [&Element<Self>; 2], of_one_size: bool) -> Result<(), StepError> {
+        let _ = (ends, of_one_size);
         Ok(())
     }
 

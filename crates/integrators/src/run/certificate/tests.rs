@@ -28,6 +28,7 @@ const ONE_FALL: Certificate = Certificate {
     promises: Promises::all_laws(true),
     second_law: SecondLaw::Exact,
     friction: 0.0,
+    exchange: None,
     projected: false,
 };
 

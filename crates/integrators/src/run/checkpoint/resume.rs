@@ -19,7 +19,7 @@ fn exact(numbers: impl IntoIterator<Item = f64>) -> Vec<Exact> {
 }
 
 fn column(v: &impl Vector) -> Vec<Exact> {
-    exact(v.to_list())
+    exact((0..v.len()).map(|i| v.get(i)))
 }
 
 /// The numbers of a list, as many as there are in `like`.

@@ -163,7 +163,10 @@ where
     fn recheck(&self, x: &StateOf<Y>, occasion: Recheck) -> Result<(), ModelError> {
         let model = self.without_exchange(x.time);
         match occasion {
-            Recheck::OnTheWay => model.check_state(&x.x),
+            Recheck::OnTheWay { step } => {
+                model.check_state(&x.x)?;
+                model.look_at_derivatives(&x.x, step)
+            }
             Recheck::End => {
                 model.check_state(&x.x)?;
                 model.check_derivatives(&x.x)?;

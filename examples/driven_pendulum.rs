@@ -42,15 +42,15 @@ fn main() -> Result<(), Box<dyn Error>> {
 
     // How often the section visits each cell of a grid; the first periods lead to the attractor.
     let turn = std::f64::consts::TAU;
-    let cell = |x: f64, size: f64| (x / size).floor() as i64;
-    let mut visits: BTreeMap<(i64, i64), u32> = BTreeMap::new();
+    let cell = |x: f64| (x / CELL).floor().to_bits();
+    let mut visits: BTreeMap<[u64; 2], u32> = BTreeMap::new();
     for state in run.iter().skip(20) {
         let [q, p] = state.point.x.into();
         let angle = q - turn * ((q + 0.5 * turn) / turn).floor();
-        *visits.entry((cell(angle, CELL), cell(p, CELL))).or_default() += 1;
+        *visits.entry([cell(angle), cell(p)]).or_default() += 1;
     }
-    let centre = |k: i64| (k as f64 + 0.5) * CELL;
-    let cells = visits.iter().map(|((q, p), n)| [centre(*q), centre(*p), f64::from(*n)]);
+    let centre = |k: u64| (f64::from_bits(k) + 0.5) * CELL;
+    let cells = visits.iter().map(|([q, p], n)| [centre(*q), centre(*p), f64::from(*n)]);
     let sections = Panel::new("p", "q")
         .title("once a period of the motor, visits")
         .map(Map::new(cells, [2.0, 4.0]));

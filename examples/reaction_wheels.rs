@@ -12,6 +12,7 @@ use metriplectic::prelude::*;
 use metriplectic_studies::{Example, Panel, Panels};
 
 type Point = (Vector3<Real>, Vector3<Real>);
+type Momenta = (Vector3<f64>, Vector3<f64>);
 
 const INERTIA: Vector3<f64> = Vector3::new(3.0, 2.0, 1.5);
 const WHEEL: f64 = 0.05;
@@ -53,8 +54,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     let span = Span::steps(example.step_size, example.steps);
     let run = Gauss::<2>.run(&satellite, satellite.start(start), span)?;
 
-    let body = |x: &(Vector3<f64>, Vector3<f64>)| (x.0 - x.1).component_div(&INERTIA);
-    let series = |value: &dyn Fn(&(Vector3<f64>, Vector3<f64>)) -> f64| -> Vec<(f64, f64)> {
+    let body = |x: &Momenta| (x.0 - x.1).component_div(&INERTIA);
+    let series = |value: &dyn Fn(&Momenta) -> f64| -> Vec<(f64, f64)> {
         run.iter().map(|s| (s.time, value(&s.point.x))).collect()
     };
     let mut rates = Panel::new("ω", "t").title("the body comes to rest");

@@ -237,6 +237,64 @@ fn a_casimir_of_so5_stays_where_the_entropy_depends_on_it() {
     }
 }
 
+/// The other methods keep the energy and the Casimir there, or end in an error of the step: none goes on without them. The
+/// entropy falls by its round-off at most, which the certificate counts.
+#[test]
+fn other_methods_keep_a_casimir_of_so5_or_end_in_an_error() {
+    fn kept<Y: Metriplectic<Manifold = LieDual<10>>>(
+        name: &str,
+        method: impl Method<Y> + Copy + std::fmt::Debug,
+        system: &Y,
+        start: SVector<f64, 10>,
+        largest: f64,
+    ) {
+        let spans: [Schedule; 2] =
+            [Span::steps(0.1, 1000).into(), Span::until(100.0).tolerance(1e-6).into()];
+        for (index, span) in spans.into_iter().enumerate() {
+            let (trajectory, cause) = match method.run(system, start, span) {
+                Ok(run) => (run, None),
+                Err(RunError::Step { cause, trajectory }) => (*trajectory, Some(cause)),
+                Err(error) => panic!("{name}, {method:?}: {error}"),
+            };
+            let (c, end) = (trajectory.certificate(), trajectory.last());
+            let ended = cause.map_or_else(|| "kept".into(), |cause| cause.to_string());
+            println!(
+                "{name}, {method:?}, {index}: {} steps to t = {:.1}, {} falls of {:.1e}, \
+                 S − S_max = {:.1e}, C by {:.1e}: {ended}",
+                c.steps,
+                end.time,
+                c.entropy_falls,
+                c.min_entropy_increment,
+                end.entropy - largest,
+                c.invariants[0].max_error
+            );
+            assert!(c.keeps_energy() && c.keeps_invariants(), "{name}, {method:?}: {c}");
+            let round_off = 250.0 * f64::EPSILON * largest.abs();
+            assert!(end.entropy - largest <= round_off, "{name}, {method:?}: {}", end.entropy);
+            assert!(c.min_entropy_increment >= -round_off, "{name}, {method:?}: {c}");
+        }
+    }
+    let start: SVector<f64, 10> =
+        SVector::from([0.3, -0.2, 0.9, 0.1, 0.8, 0.4, -0.5, 0.2, 0.6, -0.1]) * 0.7;
+    let square = start.norm_squared();
+    let cases: [(&str, Field10, f64); 2] = [
+        ("S = tr X⁴", quartic, 2.0 * square * square),
+        ("S = −tr X⁴", |x| -quartic(x), -square * square),
+    ];
+    for (name, entropy, largest) in cases {
+        let system = System::on(so5())
+            .energy(energy10 as Field10)
+            .entropy(entropy)
+            .casimir(square10 as Field10)
+            .build()
+            .unwrap();
+        kept(name, Gauss::<2>, &system, start, largest);
+        kept(name, Radau::<3>, &system, start, largest);
+        kept(name, DormandPrince5, &system, start, largest);
+        kept(name, DormandPrince8, &system, start, largest);
+    }
+}
+
 #[test]
 fn a_run_that_dependence_ends_says_so() {
     let system = cusp();

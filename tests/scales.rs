@@ -295,7 +295,7 @@ fn misjudged(
     system: &impl Metriplectic<Manifold = Euclidean<2>>,
     start: Vector2<f64>,
     schedule: &Schedule,
-) -> [Option<[f64; 3]>; 5] {
+) -> [Option<[f64; 3]>; 6] {
     let of = |certificate: &Certificate| {
         println!("{certificate}");
         certificate.misjudged_size.map(|size| [size.direction as f64, size.judged, size.reached])
@@ -305,7 +305,14 @@ fn misjudged(
             of($method.run(system, start, schedule.clone()).expect("it runs").certificate())
         };
     }
-    [of!(WeylMidpoint), of!(Gauss::<2>), of!(Radau::<2>), of!(DormandPrince5), of!(DormandPrince8)]
+    [
+        of!(WeylMidpoint),
+        of!(Gauss::<2>),
+        of!(Radau::<2>),
+        of!(DormandPrince5),
+        of!(DormandPrince8),
+        of!(RungeKuttaChebyshev),
+    ]
 }
 
 #[test]
@@ -317,9 +324,9 @@ fn the_certificate_says_which_size_was_misjudged() {
         .unwrap();
     let start = vector![1e-9, 0.0];
     let span = Span::until(13.0).tolerance(1e-4);
-    assert_eq!(misjudged(&oscillator, start, &span.into()), [None; 5]);
+    assert_eq!(misjudged(&oscillator, start, &span.into()), [None; 6]);
     // A size of the user that is not reached.
-    let unreached = [Some([0.0, 1.0, 1e-9]); 5];
+    let unreached = [Some([0.0, 1.0, 1e-9]); 6];
     assert_eq!(misjudged(&oscillator, start, &span.scale([1.0, 0.0]).into()), unreached);
     // Unstable, with p from 0 to 10⁻⁹ sinh 13 = 2.2e-4.
     let saddle = System::on(Euclidean::<2>)

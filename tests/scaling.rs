@@ -636,6 +636,54 @@ fn explicit_methods_aim_at_the_entropy_alike_in_any_units() {
     targets_alike(RungeKuttaChebyshev, systems);
 }
 
+/// Weak friction heats a magnet by what its motion loses, to the tolerance, in every unit.
+#[test]
+fn a_magnet_with_weak_friction_follows_its_tolerance_in_any_units() {
+    fn run<Y, M>(method: M, system: &Y, units: &Magnet, tolerance: f64) -> ([f64; 6], usize)
+    where
+        Y: Metriplectic<Manifold = MagnetSpace>,
+        M: Method<Y>,
+    {
+        let span = Span::until(20.0 / units.energy).tolerance(tolerance).at_most(2);
+        let run = method.run(system, units.start(true), span).expect("it runs");
+        let c = run.certificate();
+        assert!(c.keeps_energy() && c.keeps_entropy(), "{c}");
+        (units.own(&run.last().point), c.projected_steps.free)
+    }
+    for friction in [1e-4, 1e-6] {
+        let [one, si] = [Magnet::ONE, Magnet::SI].map(|units| Magnet { friction, ..units });
+        let (in_one, in_si) = (one.system(), si.system());
+        // Each of the two is a reference for the other.
+        let (five, _) = run(DormandPrince5, &in_one, &one, 1e-13);
+        let (eight, _) = run(DormandPrince8, &in_one, &one, 1e-13);
+        for (exact, other) in five.iter().zip(eight) {
+            assert!((exact - other).abs() < 1e-10, "{five:?} {eight:?}");
+        }
+        let mut off = |name: &str,
+                       (end, free): ([f64; 6], usize),
+                       exact: [f64; 6],
+                       most: [f64; 2]| {
+            let moved = (0..5).map(|i| (end[i] - exact[i]).abs()).fold(0.0, f64::max);
+            let heated = ((end[5] - exact[5]) / (exact[5] - 0.5)).abs();
+            println!(
+                "α = {friction:e}, {name}: off by {moved:.1e}, the heat by {heated:.1e}, {free} free"
+            );
+            assert!(moved < most[0] && heated < most[1], "{name}: {moved:e}, {heated:e}");
+        };
+        for tolerance in [1e-6, 1e-9] {
+            // The error collects over ten turns.
+            let most = [1e2 * tolerance, 1e3 * tolerance];
+            for (name, system, units) in [("one", &in_one, &one), ("SI", &in_si, &si)] {
+                let name = format!("{name}, {tolerance:e}");
+                let end = run(DormandPrince8, system, units, tolerance);
+                off(&format!("order 8, {name}"), end, five, most);
+                let end = run(DormandPrince5, system, units, tolerance);
+                off(&format!("order 5, {name}"), end, eight, most);
+            }
+        }
+    }
+}
+
 /// Bodies of energies `e_i` in a row that exchange heat, `S = Σ c_i ln e_i`, with constants added to `H` and `S`.
 fn heated(
     [energy, entropy]: [f64; 2],
@@ -695,7 +743,9 @@ fn ignores_constants<Y: Metriplectic<Metric = Canonical>, M: Method<Y> + Clone>(
         println!(
             "{name}, {tolerance:e}, {constants:?}: {more} steps for {steps}, off by {off:.1e}"
         );
-        assert!(more * 2 <= steps * 3 && off < 1e-3, "{name}, {constants:?}: {more}, {off:e}");
+        // Values beside the constants have ten digits.
+        let allowed = 20.0 * tolerance + 1e-8;
+        assert!(more * 2 <= steps * 3 && off < allowed, "{name}, {constants:?}: {more}, {off:e}");
     }
 }
 
@@ -704,8 +754,8 @@ fn constants_in_the_energy_and_the_entropy_cost_no_steps() {
     let heat = vector![1.0, 3.0, 0.5, 2.0];
     let swings = [vector![1.5, 0.5, 0.0], vector![1.5, 0.0, 0.0]];
     macro_rules! ignored {
-        ($($method:expr),+) => {$(
-            for tolerance in [1e-4, 1e-6] {
+        ($($method:expr, $tolerances:expr);+) => {$(
+            for tolerance in $tolerances {
                 let name = stringify!($method);
                 ignores_constants(name, &$method, heated, &heat, tolerance);
                 for start in &swings {
@@ -714,7 +764,11 @@ fn constants_in_the_energy_and_the_entropy_cost_no_steps() {
             }
         )+};
     }
-    ignored!(DormandPrince8, DormandPrince5, RungeKuttaChebyshev);
+    ignored!(
+        DormandPrince8, [1e-4, 1e-6, 1e-8, 1e-10];
+        DormandPrince5, [1e-4, 1e-6, 1e-8, 1e-10];
+        RungeKuttaChebyshev, [1e-4, 1e-6]
+    );
 }
 
 /// A Morse molecule `x = (r, p)`: `H = p²/2μ + D (1 − e^{−a(r − r₀)})²`.

@@ -36,6 +36,26 @@ fn faded<D: Scalar>(square: D, size: D, mu: f64) -> D {
     square + square * (size / square * (mu * mu)).powi(2)
 }
 
+/// The inner product in which sizes `s` are units: `G(u, v) = Σ u_i v_i / s_i²`. The shortest way to a level of
+/// a function is then the one that changes each component by a like fraction of its size, and whether covectors are
+/// independent depends on no unit.
+#[derive(Clone, Copy, Debug)]
+pub struct InUnits<V>(pub V);
+
+impl<V: Column<f64>> InnerProduct<V> for InUnits<V> {
+    fn flat(&self, v: &V) -> V {
+        V::from_index(|i| v[i] / self.0[i] / self.0[i])
+    }
+
+    fn orthonormal(&self, alpha: &V) -> V {
+        V::from_index(|i| alpha[i] * self.0[i])
+    }
+
+    fn from_orthonormal(&self, a: &V) -> V {
+        V::from_index(|i| a[i] * self.0[i])
+    }
+}
+
 /// Covectors made orthogonal to each other.
 #[derive(Clone, Copy, Debug)]
 pub struct Orthogonal<N: Dimension, D: Scalar = f64> {

@@ -114,7 +114,7 @@ fn examine<Y: Metriplectic + ?Sized>(
     has_digits(system.entropy(), "entropy", x0)?;
     let mut independent = vec![0.0_f64; Y::Invariants::COUNT];
     let mut widen = |x: &Point<Y>| {
-        let fractions = independence(system, &ChartPoint::centre(x)).unwrap_or_default();
+        let fractions = independence(system, &ChartPoint::centre(x));
         independent
             .iter_mut()
             .zip(fractions)

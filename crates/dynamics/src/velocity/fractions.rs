@@ -1,25 +1,22 @@
 //! The independence of the further invariants from the other fields.
+//!
+//! Fractions are measured in units of the sizes of the coordinates. The metric of a product of unlike factors adds squares
+//! of different units, and a differential that is independent in one unit would be round-off in another.
 
-use metriplectic_manifolds::{MetricError, Riemannian};
+use metriplectic_fields::Vector;
 
 use super::covectors::{Place, differentials};
 use super::plan::ProjectionPlan;
 use crate::bracket::Bracket;
 use crate::invariants::Kind;
 use crate::metriplectic::{Dim, Metriplectic, SecondLaw};
-use crate::orthogonal::Orthogonal;
+use crate::orthogonal::{InUnits, Orthogonal};
+use crate::verify::sampling::CoordinateScales;
 
 /// Computes for each further invariant the smallest fraction of its differential at `x` that is independent of
 /// the differentials of the other fields in its projections.
-///
-/// # Errors
-///
-/// [`MetricError`] if the metric cannot be used at `x`.
-pub fn independence<Y: Metriplectic + ?Sized>(
-    system: &Y,
-    x: &Place<Y, f64>,
-) -> Result<Vec<f64>, MetricError> {
-    let (w, g) = (differentials(system, x), system.metric().at(x)?);
+pub fn independence<Y: Metriplectic + ?Sized>(system: &Y, x: &Place<Y, f64>) -> Vec<f64> {
+    let (w, g) = (differentials(system, x), units_at(system, x));
     let (mut casimirs, mut all) =
         (Orthogonal::<Dim<Y>>::default(), Orthogonal::<Dim<Y>>::default());
     if system.second_law() == SecondLaw::Exact && !system.bracket().is_zero() {
@@ -30,7 +27,7 @@ pub fn independence<Y: Metriplectic + ?Sized>(
     }
     all.push(&g, &w.energy);
     let listed = w.invariants.as_ref().iter().flatten();
-    Ok(listed
+    listed
         .map(|(kind, l)| {
             let among_all = all.push(&g, l);
             match kind {
@@ -38,7 +35,7 @@ pub fn independence<Y: Metriplectic + ?Sized>(
                 Kind::Momentum => among_all,
             }
         })
-        .collect())
+        .collect()
 }
 
 /// Computes for each further invariant the smallest independent fraction of its differential at `x` in a
@@ -48,15 +45,8 @@ pub fn independence<Y: Metriplectic + ?Sized>(
 ///
 /// [`independence`] also includes fractions beside the entropy *and* the energy. These vanish at every
 /// equilibrium without an effect on a step.
-///
-/// # Errors
-///
-/// [`MetricError`] if the metric cannot be used at `x`.
-pub fn projected_fractions<Y: Metriplectic + ?Sized>(
-    system: &Y,
-    x: &Place<Y, f64>,
-) -> Result<Vec<f64>, MetricError> {
-    let (w, g) = (differentials(system, x), system.metric().at(x)?);
+pub fn projected_fractions<Y: Metriplectic + ?Sized>(system: &Y, x: &Place<Y, f64>) -> Vec<f64> {
+    let (w, g) = (differentials(system, x), units_at(system, x));
     let mut bracket = Orthogonal::<Dim<Y>>::default();
     if ProjectionPlan::of(system, &w).entropy {
         bracket.push(&g, &w.entropy);
@@ -69,7 +59,7 @@ pub fn projected_fractions<Y: Metriplectic + ?Sized>(
     let mut friction = Orthogonal::<Dim<Y>>::default();
     friction.push(&g, &w.energy);
     let listed = w.invariants.as_ref().iter().flatten();
-    Ok(listed
+    listed
         .map(|(kind, l)| {
             let in_bracket = match kind {
                 Kind::Casimir => casimirs.next(),
@@ -78,5 +68,13 @@ pub fn projected_fractions<Y: Metriplectic + ?Sized>(
             let in_friction = friction.push(&g, l);
             in_bracket.map_or(in_friction, |fraction| fraction.min(in_friction))
         })
-        .collect())
+        .collect()
+}
+
+/// The sizes of the coordinates at `x` as units.
+fn units_at<Y: Metriplectic + ?Sized>(
+    system: &Y,
+    x: &Place<Y, f64>,
+) -> InUnits<Vector<Y::Manifold>> {
+    InUnits(CoordinateScales::at(system, &x.point()).units)
 }

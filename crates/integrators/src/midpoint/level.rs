@@ -15,7 +15,7 @@
 //! right energy, and a numerical geodesic has an error of its own: there the end itself is moved, within
 //! the accuracy of geodesics.
 
-use metriplectic_dynamics::orthogonal::Orthogonal;
+use metriplectic_dynamics::orthogonal::{InUnits, Orthogonal};
 use metriplectic_dynamics::velocity::differentials;
 use metriplectic_dynamics::{Metriplectic, system::Point};
 use metriplectic_fields::{ChartPoint, Column, Dimension, Space, Square, Vector};
@@ -125,25 +125,6 @@ where
 #[inline]
 fn imbalance<Y: Metriplectic, R, W>(equation: &Residual<'_, Y, R, W>, end: &Point<Y>) -> f64 {
     equation.system.energy_at(end) - equation.values.energy + equation.drift.energy
-}
-
-/// The inner product in which `sizes` are units: `G(u, v) = Σ u_i v_i / s_i²`. The shortest way to a level of
-/// a function is then the one that changes each component by a like fraction of its size.
-#[derive(Clone, Copy)]
-struct InUnits<V>(V);
-
-impl<V: Column<f64>> InnerProduct<V> for InUnits<V> {
-    fn flat(&self, v: &V) -> V {
-        V::from_index(|i| v[i] / self.0[i] / self.0[i])
-    }
-
-    fn orthonormal(&self, alpha: &V) -> V {
-        V::from_index(|i| alpha[i] * self.0[i])
-    }
-
-    fn from_orthonormal(&self, a: &V) -> V {
-        V::from_index(|i| a[i] * self.0[i])
-    }
 }
 
 /// The level of the energy that the end of a step belongs to.

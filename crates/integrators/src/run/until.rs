@@ -102,6 +102,8 @@ impl<const N: usize> Until<N> {
     /// |---|---|---|
     /// | [`Scheme`](crate::Scheme), such as `WeylMidpoint`, and [`RungeKuttaChebyshev`](crate::RungeKuttaChebyshev) | 10⁻¹⁰ | 1 |
     /// | [`DormandPrince5`](crate::DormandPrince5), [`DormandPrince8`](crate::DormandPrince8), [`ExplicitRungeKutta`](crate::ExplicitRungeKutta) with an error of its own, [`Gauss`](crate::Gauss), [`Radau`](crate::Radau) | 10⁻¹⁵ | 1 |
+    ///
+    /// One below `8ε = 1.8·10⁻¹⁵` is taken for `8ε`: a step has round-off of this size.
     #[must_use]
     pub const fn tolerance(self, tolerance: f64) -> Self {
         Self { tolerance, ..self }

@@ -1,5 +1,10 @@
 //! The sizes that the entries of a flow reach soon, from its rates alone.
 //!
+//! A [`System`](metriplectic_dynamics::System) knows the derivatives of its velocity too, and has a routine of its own,
+//! `system/reach.rs`. It sees the times of a motion that has not begun, such as the one of a stiff direction in which nothing
+//! is displaced yet. Here only a step shows them. A lattice cannot form `f'`, which has `N²` entries. Both share the
+//! classical step.
+//!
 //! An entry that starts at zero has no size yet. It gets its displacement in two steps of size `h/2` of the classical
 //! method of order 4. `h` is at most a quarter of the span of the run and of each time `s_i/|v_i|` in which an entry
 //! moves by its own size. It is decreased until one step of size `h` gives these displacements too, and so for `h/2`,

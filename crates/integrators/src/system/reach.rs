@@ -1,5 +1,9 @@
 //! How far the entries of a state move soon.
 //!
+//! Flows without derivatives have `step/initial_scales.rs`, from rates alone. This routine is not replaced by it: `1/|f'_ii|`
+//! and `1/√|f'_ij f'_ji|` are times of the motion also in directions in which nothing is displaced yet, and the terms `t_i`
+//! need `f'` anyway. The two share the classical step.
+//!
 //! An entry that starts at zero has no size yet. It gets the one that it reaches soon: with `v = f(x)`,
 //! `a = f'(x) v` and the nonlinear part `r = f(δv) − v − δa`,
 //!

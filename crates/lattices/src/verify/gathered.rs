@@ -2,7 +2,7 @@
 
 use metriplectic_fields::Space;
 
-use super::{STEP, Slope, Trial, quotient};
+use super::{Slope, Trial, quotient};
 use crate::error::{LatticeError, Place};
 use crate::gather::{Embedded, Gather};
 use crate::lattice::Lattice;
@@ -57,21 +57,21 @@ impl<P: Model> Trial<'_, P> {
             let x = lattice.pair(self.y, bond);
             let u = self.random_along(bond);
             let moved = |t: f64| PairManifold::<P>::chart(&x, &(u * t));
-            let ends = [STEP, -STEP].map(|t| gather.weight(&moved(t)).value);
             let phi = gather.weight(&x);
-            let slope = Slope::of(&phi.df, &u);
-            quotient(what, lattice.place_of(bond), phi.value, slope, ends)?;
+            let (slope, at) = (Slope::of(&phi.df, &u), (lattice.place_of(bond), self.tried));
+            quotient(what, at, phi.value, slope, |t| gather.weight(&moved(t)).value)?;
         }
         for site in sites {
-            let (x, rho, place) = (&self.y[site], sums[2 * site], Place::Site(site));
+            let (x, rho) = (&self.y[site], sums[2 * site]);
+            let at = (Place::Site(site), self.tried);
             let u = self.along(site);
             let moved = |t: f64| P::Manifold::chart(x, &(u * t));
-            let ends = [STEP, -STEP].map(|t| gather.embedded(&moved(t), rho).jet.value);
             let g = gather.embedded(x, rho);
-            quotient(what, place, g.jet.value, Slope::of(&g.jet.df, &u), ends)?;
+            let value = |t| gather.embedded(&moved(t), rho).jet.value;
+            quotient(what, at, g.jet.value, Slope::of(&g.jet.df, &u), value)?;
             let sum = g.along_rho * rho;
-            let ends = [STEP, -STEP].map(|t| gather.embedded(x, rho * (1.0 + t)).jet.value);
-            quotient(what, place, g.jet.value, Slope { sum, terms: sum.abs() }, ends)?;
+            let value = |t: f64| gather.embedded(x, rho * (1.0 + t)).jet.value;
+            quotient(what, at, g.jet.value, Slope { sum, terms: sum.abs() }, value)?;
         }
         Ok(())
     }

@@ -659,10 +659,7 @@ fn a_magnet_with_weak_friction_follows_its_tolerance_in_any_units() {
         for (exact, other) in five.iter().zip(eight) {
             assert!((exact - other).abs() < 1e-10, "{five:?} {eight:?}");
         }
-        let off = |name: &str,
-                       (end, free): ([f64; 6], usize),
-                       exact: [f64; 6],
-                       most: [f64; 2]| {
+        let off = |name: &str, (end, free): ([f64; 6], usize), exact: [f64; 6], most: [f64; 2]| {
             let moved = (0..5).map(|i| (end[i] - exact[i]).abs()).fold(0.0, f64::max);
             let heated = ((end[5] - exact[5]) / (exact[5] - 0.5)).abs();
             println!(

@@ -303,7 +303,7 @@ fn a_file_of_another_version_is_known_by_its_version_alone() {
         (4, r#"{"version":4}"#),
         (6, &format!("[6,{}]", sixth["run"])),
     ] {
-        let error = ResumeError::Version { found: version, expected: 7 };
+        let error = ResumeError::Version { found: version, expected: 8 };
         let older: Checkpoint = serde_json::from_str(text).expect("it is read");
         assert_eq!(WeylMidpoint.resume(&body, &older).err(), Some(error.clone()));
         assert_eq!(older.clone().with_steps(10), Err(error.clone()));

@@ -6,7 +6,7 @@ use metriplectic::manifolds::Manifold;
 use metriplectic::prelude::*;
 use metriplectic_studies::problems::{Constants, Problem, Study, each, each_with};
 
-use crate::methods::Any;
+use crate::methods::{Any, Explicit};
 use crate::promises::{Case, promises};
 
 /// The end of a run, and what was kept on it.
@@ -20,7 +20,6 @@ pub(crate) struct Outcome {
 /// Every method on every problem, from its start and from rest.
 #[derive(Default)]
 pub(crate) struct EveryMethod {
-    implicit_only: bool,
     pub(crate) outcomes: Vec<Outcome>,
     pub(crate) failures: Vec<String>,
 }
@@ -74,10 +73,8 @@ impl Study for EveryMethod {
                 self.note(format!("{label}, {scheme}"), system, run);
                 let methods = Any::all(retraction).into_iter().skip(1);
                 for method in methods.filter(|_| scheme == "exponential") {
-                    if !self.implicit_only || matches!(method, Any::Implicit(_)) {
-                        let run = method.run(system, x.clone(), schedule.clone());
-                        self.note(format!("{label}, {method:?}"), system, run);
-                    }
+                    let run = method.run(system, x.clone(), schedule.clone());
+                    self.note(format!("{label}, {method:?}"), system, run);
                 }
             }
         }
@@ -138,19 +135,36 @@ fn every_method_takes_every_problem_from_its_start_and_from_rest() {
     // From two starts, by two courses: 47 schemes, and eleven methods on each of sixteen problems.
     assert_eq!(plain.outcomes.len(), 4 * (47 + 176));
 
-    // Constants of a million times the terms of both laws change no run by an implicit method.
-    let mut shifted = EveryMethod { implicit_only: true, ..EveryMethod::default() };
+    // Constants of a million times the terms of both laws change no run by an implicit method. An explicit one sees
+    // the entropy of a step with ten digits, so another step may be targeted.
+    let mut shifted = EveryMethod::default();
     each_with(&mut shifted, Constants { energy: SHIFT, entropy: SHIFT });
     assert!(shifted.failures.is_empty(), "{}", shifted.failures.join("\n"));
-    assert_eq!(shifted.outcomes.len(), 4 * (47 + 112));
+    assert_eq!(shifted.outcomes.len(), plain.outcomes.len());
+    let mut farthest = [0.0_f64; 2];
     for at in &shifted.outcomes {
         let twin = plain.outcomes.iter().find(|plain| plain.label == at.label).expect("a twin");
         let pairs = at.entries.iter().zip(&twin.entries);
         let off = pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        let is_explicit =
+            Explicit::ALL.iter().any(|method| at.label.ends_with(&format!(", {method:?}")));
+        let which = usize::from(is_explicit);
+        if off > farthest[which] {
+            println!("{}: off by {off:.1e}", at.label);
+        }
+        farthest[which] = farthest[which].max(off);
+        let [steps, others] = [at, twin].map(|at| at.certificate.steps + at.certificate.rejected);
+        if is_explicit {
+            // Measured: 5.6e-9.
+            assert!(off <= 1e-7, "{}: off by {off:e}", at.label);
+            assert!(2 * steps <= 3 * others + 4, "{}: {steps} steps for {others}", at.label);
+            continue;
+        }
         // The last digit of a law, in each of eight steps; measured: 4.3e-10.
         assert!(off <= 8.0 * SHIFT * f64::EPSILON, "{}: off by {off:e}", at.label);
         assert_eq!(at.certificate.steps, twin.certificate.steps, "{}", at.label);
     }
+    println!("off by {:.1e}, {:.1e} by explicit methods", farthest[0], farthest[1]);
 }
 
 /// A constant in an energy and an entropy whose terms are of size 1.

@@ -4,7 +4,8 @@ use metriplectic::integrators::Schedule;
 use metriplectic::prelude::*;
 
 use crate::every_method::{EveryMethod, Outcome};
-use crate::methods::Any;
+use crate::methods::{Any, Explicit};
+use crate::stages::{Gauss1, Radau2, Radau3, Radau4};
 
 /// A damped oscillator or a fall with drag, as `(q, p, s)`.
 struct Damped {
@@ -140,4 +141,42 @@ fn every_method_damps_a_motion_that_is_released_from_rest() {
         }
     }
     println!("off by {farthest:.1e}, the heat by {hottest:.1e} of what was produced");
+}
+
+/// At the least tolerances, with friction and without: the motion without friction has a closed form for springs.
+#[test]
+fn methods_of_gauss_start_from_rest_down_to_the_least_tolerance() {
+    for damped in &DAMPED {
+        for gamma in [0.0, 1e-3, 1.0] {
+            let (system, start) = (damped.system(gamma), vector![1.0, 0.0, damped.heat]);
+            let mut study = EveryMethod::default();
+            for tolerance in [1e-6, 1e-10, 1e-14] {
+                for method in Any::all(WeylMidpoint) {
+                    // The others would take a tenth of a million steps, or end at 1e-10.
+                    let low = matches!(
+                        method,
+                        Any::Scheme(_)
+                            | Any::Implicit(Gauss1 | Radau2 | Radau3 | Radau4)
+                            | Any::Explicit(Explicit::Kutta3 | Explicit::Chebyshev)
+                    );
+                    if tolerance < 1e-6 && low {
+                        continue;
+                    }
+                    let run = method.run(&system, start, Span::until(0.5).tolerance(tolerance));
+                    let label = format!("{}, γ = {gamma}, {tolerance:e}, {method:?}", damped.name);
+                    study.note(label, &system, run);
+                }
+            }
+            assert!(study.failures.is_empty(), "{}", study.failures.join("\n"));
+            let best = study.outcomes.last().expect("it ran");
+            let [x, p, _]: [f64; 3] = std::array::from_fn(|i| best.entries[i]);
+            for at in study.outcomes.iter().filter(|at| at.label.contains("1e-14")) {
+                let off = apart(at, [x, p, 0.0]);
+                assert!(off < 1e-12, "{}: off by {off:e}", at.label);
+            }
+            if gamma == 0.0 && damped.name.starts_with("e^s") {
+                assert!((x - 0.5_f64.cos()).abs() < 1e-12 && (p + 0.5_f64.sin()).abs() < 1e-12);
+            }
+        }
+    }
 }

@@ -309,7 +309,7 @@ fn a_file_of_another_version_is_known_by_its_version_alone() {
         (5, r#"{"version":5,"step":0,"start":"0.0","point":["0.0","0.5","0.5"],"balance":{}}"#),
         (6, &first),
         (6, &sixth.to_string()),
-        (8, r#"{"step":{"taken":0},"version":8}"#),
+        (9, r#"{"step":{"taken":0},"version":9}"#),
         (4, r#"{"version":4}"#),
         (6, &format!("[6,{}]", sixth["run"])),
     ] {
@@ -320,7 +320,7 @@ fn a_file_of_another_version_is_known_by_its_version_alone() {
         assert_eq!(older.clone().with_end(10.0), Err(error));
         assert!(older.time().is_nan() && older.point().next().is_none());
     }
-    for text in [r#"{"step":0}"#, r#"{"version":7}"#, "[]", "[7]", r#"[7,"0"]"#, "7"] {
+    for text in [r#"{"step":0}"#, r#"{"version":8}"#, "[]", "[7]", r#"[7,"0"]"#, "7"] {
         assert!(serde_json::from_str::<Checkpoint>(text).is_err(), "{text}");
     }
 }

@@ -24,7 +24,7 @@ const LOOKED_AT: usize = 8;
 /// What the terms of the friction of a chunk show.
 #[derive(Default)]
 struct Seen {
-    broken: Option<LatticeError>,
+    broken: Option<Box<LatticeError>>,
     production: f64,
     negative: bool,
 }
@@ -87,21 +87,27 @@ impl<P: Model> Lattice<P> {
             let rest_and_terms = [s.dot(&v), s.abs().dot(&v.abs())];
             cancels("Π dS = 0", (Place::Site(site), tried), rest_and_terms, "")
         };
-        if P::ENTROPY {
-            let sites = parallel::map(self.sites(), |mut sites| sites.try_for_each(casimir));
-            sites.into_iter().collect::<Result<(), _>>().map_err(|law| self.located(law, x))?;
+        // Without an entropy there is no friction either.
+        if !P::ENTROPY {
+            return Ok(mean);
+        }
+        let sites = parallel::map(self.sites(), |mut sites| {
+            sites.try_for_each(casimir).err().map(Box::new)
+        });
+        if let Some(law) = sites.into_iter().flatten().next() {
+            return Err(self.located(*law, x));
         }
         let (mut production, mut negative) = (0.0, false);
         let look = |seen: &mut Seen, term: Term| {
             if seen.broken.is_none() {
-                seen.broken = term.keeps_energy(tried).err();
+                seen.broken = term.keeps_energy(tried).err().map(Box::new);
             }
             seen.production += term.production().abs();
             seen.negative |= term.production() < 0.0;
         };
         for seen in self.terms_of_chunks(x, &all, look) {
             if let Some(law) = seen.broken {
-                return Err(self.located(law, x));
+                return Err(self.located(*law, x));
             }
             production += seen.production;
             negative |= seen.negative;

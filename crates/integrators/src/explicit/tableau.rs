@@ -1,6 +1,5 @@
 //! The coefficients of an explicit Runge-Kutta method.
 
-use super::dormand_prince::{EIGHT, FIVE};
 use super::tableau_error::TableauError;
 use crate::step::Control;
 
@@ -156,16 +155,8 @@ impl Tableau {
         self.name
     }
 
-    /// The name and a digest of the coefficients: two tableaus of one name are two methods. Those of this library have
-    /// their names alone.
-    pub(super) fn name_with_digest(&'static self) -> String {
-        let digest = self.digest();
-        let ours = [&EIGHT, &FIVE].into_iter().any(|tableau| tableau.digest() == digest);
-        if ours { self.name.to_owned() } else { format!("{} {digest:016x}", self.name) }
-    }
-
     /// A digest of the order and of all rows. How steps follow a tolerance is an option and is not in it.
-    fn digest(&self) -> u64 {
+    pub(super) fn digest(&self) -> u64 {
         let mut digest = u64::from(self.order);
         let mut put = |word: u64| {
             digest = (digest ^ word).wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(29);

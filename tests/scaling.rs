@@ -948,3 +948,56 @@ fn curved_spaces_obey_the_scaling_law_in_times_energies_and_entropies() {
         curved("S³", systems, &vector![0.5, 0.5, 0.5, 0.5], 0.1, [-2 * e - s, e, s]);
     }
 }
+
+/// A spin about an oscillator in a bath, in units of angular momentum, length and energy, at 300 K per unit of temperature:
+/// both the Casimir of the spin and its momentum about the third axis are listed.
+#[test]
+fn listed_invariants_of_unlike_factors_are_independent_in_any_units() {
+    type State = (Vector3<Real>, Vector3<Real>);
+    let ends = [[1.0; 4], [1e-34, 1e-9, 1e-23, 300.0]].map(|[spin, length, energy, kelvin]| {
+        let capacity = 10.0 * energy / kelvin;
+        let pi = Matrix3::new(0.0, 1.0, 0.0, -1.0, 0.0, 0.0, 0.0, 0.0, 0.0);
+        let system = System::on(Product(LieDual::so3(), Euclidean::<3>))
+            .bracket((LiePoisson, Poisson::constant(pi).expect("it is skew")))
+            .energy(move |(l, x): &State| {
+                let l = *l * Real::from(1.0 / spin);
+                let [q, p] = [x.x / length, x.y * (length / spin)];
+                let body = (l.x * l.x + l.y * l.y) * 0.5 + l.z * l.z * (q * 0.1 + 0.2);
+                let bath = (x.z / capacity).exp() * (capacity * kelvin);
+                (body + (p * p + q * q) * 0.5) * energy + bath
+            })
+            .entropy(|(_, x): &State| x.z)
+            .dissipation(FieldDissipation(move |_: &State, w: &SVector<Real, 6>| {
+                let b = SVector::<Real, 6>::from([
+                    0.0.into(),
+                    0.0.into(),
+                    0.0.into(),
+                    0.0.into(),
+                    w[5],
+                    -w[4],
+                ]);
+                b * b.transpose() * (w[5].recip() * (0.1 * spin / (length * length)))
+            }))
+            .casimir(move |(l, _): &State| l.norm_squared() * (0.5 / spin / spin))
+            .momentum(|(l, _): &State| l.z)
+            .build()
+            .expect("the parts make a system");
+        let start = (
+            Vector3::new(0.6, 0.3, 0.8) * spin,
+            Vector3::new(0.7 * length, 0.3 * spin / length, 0.5 * energy / kelvin),
+        );
+        let span = Span::steps(0.05 * spin / energy, 400);
+        let run = DormandPrince8.run(&system, start, span).expect("its invariants are independent");
+        let c = run.certificate();
+        assert!(c.keeps_energy() && c.keeps_entropy() && c.keeps_invariants(), "{c}");
+        let (l, x) = run.last().point;
+        let [q, p, s] = [x.x / length, x.y * length / spin, x.z * kelvin / energy];
+        ([l.x / spin, l.y / spin, l.z / spin, q, p, s], c.projected_steps)
+    });
+    let [(one, steps), (si, steps_in_si)] = ends;
+    let off = one.iter().zip(si).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    println!("off by {off:.1e}");
+    assert_eq!(steps, steps_in_si);
+    // The rounding of 400 steps; measured: 1.3e-15.
+    assert!(off < 400.0 * f64::EPSILON, "off by {off:e}");
+}

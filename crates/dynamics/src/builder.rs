@@ -20,7 +20,7 @@ pub type Built<M, G, B, K, H, S, L> = System<M, G, B, <K as Choice>::Dissipation
 
 /// The surroundings of a system in the making: none, `()`, or what makes an open system of it when it is built.
 pub trait Surroundings {
-    /// What is built of the system `Y`.
+    /// The type that is built from the system `Y`.
     type Built<Y>;
 
     /// Puts the surroundings around a system.

@@ -1,4 +1,4 @@
-//! What a system exchanges with its surroundings: work through ports, and heat with baths.
+//! The exchange of a system with its surroundings: work through ports, and heat with baths.
 //!
 //! ```math
 //! x' = \Pi\, dH + K\, dS + \sum_a F_a(t, x) + \sum_b R_b(t, x) \bigl( T_b\, dS - dH \bigr)

@@ -126,7 +126,7 @@ pub trait Friction<M: Manifold, G: Riemannian<M>> {
     ///
     /// # Errors
     ///
-    /// Those of [`apply`](Self::apply).
+    /// The errors of [`apply`](Self::apply).
     fn least_rate(&self, at: &ExchangeArgs<'_, M, G>) -> Result<f64, MetricError>;
 }
 

@@ -41,7 +41,7 @@ impl<M: Manifold> Visitor<M> for Sum<M> {
     }
 }
 
-/// What an exchange does at one place, per unit of time.
+/// The rates of an exchange at one place, per unit of time.
 #[derive(Clone, Copy, Debug)]
 pub struct Rates<M: Manifold, E> {
     /// The sum of all velocities, in the frame there.

@@ -27,11 +27,11 @@ pub struct ExchangeArgs<'a, M: Manifold, G: Riemannian<M>> {
 pub struct Part<'a> {
     /// Its name.
     pub name: &'a Arc<str>,
-    /// What it exchanges.
+    /// The kind of its exchange.
     pub kind: PartKind,
 }
 
-/// What a part exchanges.
+/// The kind of the exchange of a part.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum PartKind {
     /// Work.
@@ -55,7 +55,7 @@ pub trait Visitor<M: Manifold> {
 /// The names of the parts of a list in their order, with whether each is a bath.
 pub type Names = Vec<(Arc<str>, bool)>;
 
-/// What a system exchanges with its surroundings: `()`, or a shorter list and a named [`Port`] or [`Bath`].
+/// The exchange of a system with its surroundings: `()`, or a shorter list and a named [`Port`] or [`Bath`].
 pub trait Exchange<M: Manifold, G: Riemannian<M>> {
     /// The numbers of a ledger: one for each port, its work; two for each bath, its heat and its entropy.
     type Entries: Entries;

@@ -114,7 +114,7 @@ impl Guarantee {
             ),
             Self::DependentCasimirs => (
                 "Both laws hold where the entropy becomes a function of a listed Casimir",
-                &["The midpoint rule keeps both there"],
+                &["The midpoint rule keeps both there", "All of this is in"],
                 &[],
             ),
             Self::Order => (

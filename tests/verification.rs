@@ -952,3 +952,47 @@ fn a_model_that_keeps_its_laws_is_not_refused_at_an_equilibrium_or_at_the_edge_o
         oscillator_with(|x| warm(x) + if x.x.re < 0.0 { -x.x } else { x.x }, |x| x.z, damped);
     assert!(kink.check_derivatives(&vector![0.0, 1.0, 0.0]).is_ok());
 }
+
+/// Friction `b bᵀ` with `b = dH × p + c p` loses its digits beside an equilibrium, where `dH × p` cancels.
+#[test]
+fn friction_that_hardly_acts_is_sound_beside_an_equilibrium_and_everywhere() {
+    let body = |a: Vector3<f64>, wrong: f64| {
+        System::on(LieDual::so3())
+            .energy(kinetic(a))
+            .entropy(|p: &Vector3<Real>| p.norm_squared() * 0.5)
+            .dissipation(FieldDissipation(move |p: &Vector3<Real>, w: &Vector3<Real>| {
+                let b = w.cross(p) + p * Real::from(wrong);
+                b * b.transpose()
+            }))
+            .build()
+            .unwrap()
+    };
+    let (inertia, axis) = (vector![1.0, 2.0, 3.0], Vector3::y());
+    for unit in [1.0, 1e-20, 1e20] {
+        for off in [1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12, 1e-15, 0.0] {
+            let x = (axis + vector![0.8, 0.3, -0.6] * off) * unit;
+            accepted(&body(inertia, 0.0).report(&x));
+            refused(&body(inertia, 1e-3 * unit).report(&x), &["dissipation"]);
+        }
+        // Every state of a sphere is at rest.
+        accepted(&body(vector![2.0, 2.0, 2.0], 0.0).report(&(vector![0.6, -0.3, 0.7] * unit)));
+    }
+    let (beside, still) = (axis + vector![0.8, 0.3, -0.6] * 1e-8, vector![0.6, -0.3, 0.7]);
+    for (a, x) in [(inertia, beside), (vector![2.0, 2.0, 2.0], still)] {
+        let system = body(a, 0.0);
+        keeps_both_laws(Scheme::new(WeylMidpoint), &system, x);
+        keeps_both_laws(Gauss::<2>, &system, x);
+        keeps_both_laws(Radau::<2>, &system, x);
+        keeps_both_laws(DormandPrince5, &system, x);
+        keeps_both_laws(DormandPrince8, &system, x);
+    }
+}
+
+fn keeps_both_laws<Y>(method: impl Method<Y>, system: &Y, x: Vector3<f64>)
+where
+    Y: Metriplectic<Manifold = LieDual<3>>,
+{
+    let run = method.run(system, x, Span::steps(0.1, 100)).expect("it is a sound model");
+    let c = run.certificate();
+    assert!(c.keeps_energy() && c.keeps_entropy(), "{c}");
+}

@@ -89,10 +89,26 @@ pub(crate) fn worse(old: f64, new: f64) -> f64 {
 
 /// The largest relative size of a row of `A w`, in chart coordinates of the sizes `units`.
 pub(crate) fn product(a: &Table, w: &[f64], units: &[f64]) -> f64 {
-    let rates = Table::from_entries(w.len(), |i, j| (a[(i, j)] * w[j] / units[i]).abs());
+    product_rounded(a, None, w, units)
+}
+
+/// The largest relative size of a row of `A w`, where the entries of `A` have the given `rounding`.
+pub(super) fn product_rounded(
+    a: &Table,
+    rounding: Option<&Table>,
+    w: &[f64],
+    units: &[f64],
+) -> f64 {
+    let n = w.len();
+    let rates = Table::from_entries(n, |i, j| (a[(i, j)] * w[j] / units[i]).abs());
     let largest = largest_in_blocks(a, &rates);
-    let row = |i| (0..w.len()).map(|j| a[(i, j)] * w[j]).collect::<Balance>();
-    (0..w.len()).map(|i| row(i).relative(units[i] * largest[i])).fold(0.0, worse)
+    let row = |i| (0..n).map(|j| a[(i, j)] * w[j]).collect::<Balance>();
+    let rounded = |i| {
+        let terms = |rounding: &Table| (0..n).map(|j| rounding[(i, j)] * w[j].abs()).sum::<f64>();
+        rounding.map_or(0.0, terms) / TOLERANCE
+    };
+    let size = |i: usize| ROUNDING * units[i] * largest[i] + rounded(i);
+    (0..n).map(|i| row(i).beside(size(i)).relative()).fold(0.0, worse)
 }
 
 /// For each index the largest size of an entry in its block: the rows and columns that entries of `a` which

@@ -6,6 +6,7 @@ use metriplectic_fields::{
 use metriplectic_manifolds::{Manifold, Riemannian, Slopes};
 
 use super::derivatives::{Derivatives, Mismatch, OF_CLOSURES, OF_SOLUTIONS, Values};
+use super::dissipation::is_round_off;
 use super::place::{Place, unusable};
 use super::table::{Table, append, components};
 use crate::bracket::Bracket;
@@ -76,7 +77,9 @@ pub(super) fn compare_dissipation<Y: Metriplectic + ?Sized>(
     let g = system.metric_at(&centre);
     let jet = system.dissipation().linearise(&g, &energy.df, &alpha);
     let jet = jet.map_err(unusable::<Y::Manifold>(x))?;
-    axes.iter().try_for_each(|&axis| Along { place, axis }.dissipation(&jet, &alpha))
+    let compared =
+        axes.iter().try_for_each(|&axis| Along { place, axis }.dissipation(&jet, &alpha));
+    compared.or_else(|error| if is_round_off(place) { Ok(()) } else { Err(error) })
 }
 
 /// One axis of the chart at a point.

@@ -5,6 +5,7 @@ use metriplectic_fields::{
 };
 
 use super::balance::{self, Balance, TOLERANCE, worse};
+use super::dissipation;
 use super::findings::Findings;
 use super::place::{Place, jet, unusable};
 use super::sampling;
@@ -85,7 +86,7 @@ impl<Y: Metriplectic + ?Sized> Invariance<'_, '_, '_, Y> {
         if !k.is_none() && !k.adapts() {
             let tensor = k.tensor(&g, &energy.df);
             let tensor = tensor.map_err(unusable::<Y::Manifold>(x))?;
-            let size = balance::product(&Table::of(&tensor), &entries, &sizes);
+            let size = dissipation::annihilated(self.place, &Table::of(&tensor), &dl);
             let error = |point, size| ModelError::InvariantNotKept { point, size };
             findings.note("K dL = 0", size, error);
         }

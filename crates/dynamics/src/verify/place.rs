@@ -16,6 +16,20 @@ pub(super) struct Place<'a, Y: Metriplectic + ?Sized> {
     pub(super) entropy: Jet2<Y::Manifold>,
 }
 
+impl<'a, Y: Metriplectic + ?Sized> Place<'a, Y> {
+    /// The point and the sizes of its coordinates.
+    pub(super) const fn at(&self) -> At<'a, Y> {
+        At { system: self.system, x: self.x, units: self.units }
+    }
+}
+
+/// A point and the sizes of its coordinates.
+pub(super) struct At<'a, Y: Metriplectic + ?Sized> {
+    pub(super) system: &'a Y,
+    pub(super) x: &'a Point<Y>,
+    pub(super) units: &'a Vector<Y::Manifold>,
+}
+
 /// Converts the error of a metric that cannot be used at `x`.
 pub(super) fn unusable<M: Manifold>(x: &M::Point<f64>) -> impl Fn(MetricError) -> ModelError + '_ {
     |source| ModelError::Metric { source, point: M::entries(x) }

@@ -22,9 +22,10 @@ use rand::rngs::ChaCha8Rng;
 
 use super::domain::value_not_finite;
 use super::fields::compare_scalars;
-use super::place::{Place, unusable};
+use super::place::{At, Place, unusable};
 use super::sampling::CoordinateScales;
-use super::{RADIUS, SAMPLES, sums};
+use super::table::Table;
+use super::{RADIUS, SAMPLES, dissipation, sums};
 use crate::bracket::Bracket;
 use crate::dissipation::Dissipation;
 use crate::invariants::{Invariants, Kind, Visitor};
@@ -253,6 +254,23 @@ impl<Y: Metriplectic + ?Sized> Reached<'_, Y> {
         }
     }
 
+    /// The largest relative size of a row of `K α`, beside the round-off of `K` where it counts.
+    fn annihilated(
+        &self,
+        k: &Matrix<Y::Manifold>,
+        alpha: &Covector<Y::Manifold>,
+        units: &Vector<Y::Manifold>,
+    ) -> f64 {
+        let size = sums::product(k, [&alpha.value, &alpha.rounding], units);
+        match self.precise {
+            Some(units) if size > sums::TOLERANCE => {
+                let at = At { system: self.system, x: self.x, units };
+                dissipation::beside_round_off(at, &Table::of(k), &alpha.value).min(size)
+            }
+            _ => size,
+        }
+    }
+
     /// Judges every law.
     fn judge(&self) -> Result<(), ModelError> {
         let &Self { system, x, .. } = self;
@@ -298,7 +316,7 @@ impl<Y: Metriplectic + ?Sized> Reached<'_, Y> {
             self.law(sums::indefiniteness(&k, &units), |point, size| {
                 ModelError::DissipationNotPositive { point, size }
             })?;
-            let size = sums::product(&k, [&energy.value, &energy.rounding], &units);
+            let size = self.annihilated(&k, &energy, &units);
             self.law(size, |point, size| ModelError::EnergyNotKept { point, size })?;
             friction = (!dissipation.adapts()).then_some(k);
         }
@@ -352,7 +370,7 @@ impl<Y: Metriplectic + ?Sized> Each<'_, '_, Y> {
             ModelError::ForceChangesInvariant { point, size }
         })?;
         friction.as_ref().map_or(Ok(()), |k| {
-            at.law(sums::product(k, l, units), |point, size| ModelError::InvariantNotKept {
+            at.law(at.annihilated(k, &dl, units), |point, size| ModelError::InvariantNotKept {
                 point,
                 size,
             })

@@ -503,3 +503,35 @@ fn a_site_that_loses_a_derivative_on_the_way_ends_the_run_there() {
         assert!(found && time < 5.5, "{law} at {time}");
     }
 }
+
+/// The function of a gathered density is compared with its values on the way, too.
+#[test]
+fn a_gathered_density_that_loses_a_derivative_on_the_way_ends_the_run() {
+    let with = |lost: f64| {
+        Lattice::on(Graph::ring(64), Euclidean::<2>)
+            .bracket(Symplectic)
+            .energy(|x: &Vector2<Real>| x.norm_squared() * 0.5)
+            .gather(
+                |(x, y): &(Vector2<Real>, Vector2<Real>)| (x.x - y.x).powi(2),
+                move |_: &Vector2<Real>, density| {
+                    let beyond = if density.re > 0.3 { density.re - 0.3 } else { 0.0 };
+                    density.powi(2) * 0.1 + Real::from(beyond * lost)
+                },
+            )
+            .build()
+            .expect("the parts make a lattice")
+    };
+    let start = |i: usize| vector![0.0, 0.8 * (i as f64).sin()];
+    let span = Span::steps(0.01, 150);
+    let sound = with(0.0);
+    assert!(DormandPrince5.run(&sound, sound.points(start), span).is_ok());
+    let wrong = with(0.1);
+    assert!(wrong.verify(&wrong.points(start)).is_ok(), "the start does not show it");
+    let Err(RunError::Step { cause: StepError::Flow { law, .. }, .. }) =
+        DormandPrince5.run(&wrong, wrong.points(start), span)
+    else {
+        panic!("not refused");
+    };
+    let found = own(&law);
+    assert!(matches!(found, LatticeError::WrongDerivative { what: "energy", .. }), "{found}");
+}

@@ -61,15 +61,17 @@ pub use run::certificate::{
 };
 pub use run::checkpoint::{Checkpoint, ResumeError};
 pub use run::event::Event;
+pub use run::jump::{Jump, JumpBalance};
 pub use run::observables::{Csv, Npy, Observables, TableError};
 pub use run::span::Span;
 pub use run::steps::Steps;
 pub use run::trajectory::Trajectory;
 pub use run::until::Until;
-pub use run::watch::{Watch, Watched};
+pub use run::watch::{Jumping, Watch, Watched};
 pub use run::{Ending, Method, Schedule, SpanError, State};
 pub use step::{
-    Components, Control, Effort, Element, EntropyStep, Evidence, Flow, Laws, LedgerSummary,
-    LimitingSites, Memory, MethodError, Promises, Recheck, Refusal, RestoreError, Saved, Scales,
-    StageLaws, StateSpace, StepEnds, StepError, StepStart, Stepper, Taken, Vector,
+    Components, Control, Effort, Element, EntropyStep, EventExchange, Evidence, Flow, JumpError,
+    Laws, LedgerSummary, LimitingSites, Memory, MethodError, Promises, Recheck, Refusal,
+    RestoreError, Saved, Scales, StageLaws, StateSpace, StepEnds, StepError, StepStart, Stepper,
+    Taken, Vector,
 };

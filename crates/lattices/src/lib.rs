@@ -24,6 +24,7 @@
 //! | [`fields`] | functions of a site and of a bond, with their data |
 //! | `gather` | energies that depend on a sum over the neighbours of a site |
 //! | [`onsager`] | friction at sites and in bonds: [`Onsager`], [`SiteState`], [`BondState`] |
+//! | [`open`] | [`OpenLattice`]: ports and baths at sites |
 //! | [`lattice`] | [`Lattice`], and its loops |
 //! | [`points`] | [`Points`]: the states of a lattice |
 //! | [`profiles`] | [`Profiles`]: rows of numbers along the lattice, in a file |
@@ -44,6 +45,7 @@ mod layout;
 pub mod model;
 mod neighbours;
 pub mod onsager;
+pub mod open;
 mod parallel;
 #[cfg(test)]
 mod parts;
@@ -63,6 +65,7 @@ pub use graph::{Boundary, Graph};
 pub use lattice::Lattice;
 pub use model::Model;
 pub use onsager::{BondState, Onsager, SiteState};
+pub use open::{OpenLattice, OpenSites};
 pub use points::{Points, Sites};
 pub use profiles::Profiles;
 pub use vector::SiteVector;

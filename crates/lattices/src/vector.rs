@@ -59,6 +59,16 @@ impl SiteVector {
         Self { sites, stride, numbers: Numbers::Each(numbers), pool }
     }
 
+    /// Adds a vector at one site of numbers that each site has for itself.
+    pub(crate) fn add_at<V: Column<f64>>(&mut self, site: usize, more: &V) {
+        if let Numbers::Each(numbers) = &mut self.numbers {
+            let start = site * self.stride;
+            for (k, number) in numbers[start..start + V::LEN].iter_mut().enumerate() {
+                *number += more[k];
+            }
+        }
+    }
+
     pub(crate) fn reader(&self) -> Reader<'_> {
         match &self.numbers {
             Numbers::Same(numbers) => Reader { numbers, stride: 0 },

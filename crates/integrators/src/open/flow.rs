@@ -13,10 +13,11 @@ use super::clock::Clock;
 use super::state::{Booked, Ledger, OpenSpace, OpenState};
 use super::system::{CovectorsOf, Direction, OpenSystem, StateOf};
 use super::vector::OpenVector;
-use super::verify;
 use crate::explicit::{StageFlow as _, Target};
 use crate::round_off::bound::{ROUNDED, of_an_increment, size_of_terms, sizes_on_a_step};
-use crate::step::{Components, Flow, Laws, LedgerSummary, Numbers, Recheck, StepError, StepStart};
+use crate::step::{
+    Components, EventExchange, Flow, Laws, LedgerSummary, Numbers, Recheck, StepError, StepStart,
+};
 
 impl<Y, C, X> Flow for OpenSystem<Y, C, X>
 where
@@ -111,22 +112,28 @@ where
         Some(OpenState { x: x.x.clone(), time, ledger: x.ledger.with(&work) })
     }
 
+    fn jumped(&self, x: &StateOf<Y>, y: StateOf<Y>) -> StateOf<Y> {
+        x.at(y.x)
+    }
+
+    fn with_event(&self, x: &StateOf<Y>, event: &EventExchange) -> Option<StateOf<Y>> {
+        Some(OpenState { ledger: x.ledger.with_event(event), ..x.clone() })
+    }
+
     fn depends_on_time(&self) -> bool {
         true
     }
 
     fn ledger(&self, x: &StateOf<Y>) -> Option<LedgerSummary> {
-        let [work, heat] = x.ledger.summary();
         let parameter = C::RUNS.then(|| x.ledger.parameter_work());
-        let system_entropy = self.entropy_at(x);
-        Some(LedgerSummary { parameter, work, heat, system_entropy })
+        Some(x.ledger.summarised(parameter, self.entropy_at(x)))
     }
 
     fn inspect(&self, ends: [&StateOf<Y>; 2], of_one_size: bool) -> Result<(), StepError> {
         if of_one_size {
-            verify::protocol(self, ends)?;
+            self.check_protocol(ends)?;
         }
-        verify::exchange(self, ends[1])
+        self.check_exchange(ends[1])
             .map_err(|law| StepError::Model { time: ends[1].time, law: Box::new(law) })
     }
 
@@ -148,8 +155,8 @@ where
 
     fn check(&self, x0: &StateOf<Y>) -> Result<(), ModelError> {
         self.without_exchange(x0.time).check_start(&x0.x)?;
-        verify::clock(self, x0)?;
-        verify::exchange(self, x0)
+        self.check_clock(x0)?;
+        self.check_exchange(x0)
     }
 
     fn is_verified(&self) -> bool {
@@ -170,10 +177,10 @@ where
             Recheck::End => {
                 model.check_state(&x.x)?;
                 model.check_derivatives(&x.x)?;
-                verify::clock(self, x)
+                self.check_clock(x)
             }
             Recheck::Failure { .. } => {
-                verify::exchange(self, x)?;
+                self.check_exchange(x)?;
                 model.check_around(&x.x, &[])
             }
         }

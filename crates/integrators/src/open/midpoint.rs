@@ -10,13 +10,13 @@
 
 use metriplectic_dynamics::exchange::{Entries as _, Exchange};
 use metriplectic_dynamics::{Metriplectic, SecondLaw};
-use metriplectic_fields::Dimension as _;
 use metriplectic_manifolds::Retraction;
 
 use super::clock::Clock;
 use super::halves::{self, Failure};
 use super::state::{Booked, OpenState};
 use super::system::OpenSystem;
+use super::view::Frozen;
 use crate::discrete_gradient::DiscreteGradient;
 use crate::midpoint::{MidpointMemory, Scheme, Solution};
 use crate::step::failure::{Cause, Fallbacks};
@@ -96,11 +96,8 @@ where
     let invariants = start.values.invariants;
     let values =
         Laws { energy: view.energy_at(x), entropy: system.closed().entropy_at(x), invariants };
-    let accumulated_error = Laws {
-        energy: start.values.energy - start.reference.energy,
-        entropy: start.values.entropy - start.reference.entropy,
-        invariants: Dim::<Y>::array(|k| invariants[k] - start.reference.invariants[k]),
-    };
+    let accumulated_error =
+        Start::<Frozen<'_, Y, C, X>>::accumulated([&start.values, &start.reference]);
     let inner = Start { x, time: *time, h, values, accumulated_error };
     let solved = scheme.solution(&view, &inner, memory, fallbacks);
     let Solution { end, z, energy, entropy, mut evidence, effort } =

@@ -10,12 +10,12 @@
 //! and `Q_b` are the sums `h Σ b_i ⟨w_{H,i}, …⟩`.
 //!
 //! `Radau` corrects the energy where `δ_H > 0` alone. What it loses where it damps, `−δ_H`, is heat of the bath: the balance
-//! stays exact, and the entropy of the bath rises by `−δ_H/T`. Which of several baths it would be is not known, so a system
-//! has one.
+//! stays exact, and the entropy of the bath rises by `−δ_H/T`. Several baths share it in proportion to the heat
+//! `h Σ b_i R_b(dH, dH)` that their friction takes in the step.
 
 use metriplectic_dynamics::exchange::{Entries as _, Exchange};
 use metriplectic_dynamics::{Metriplectic, SecondLaw, VectorField, system::Point};
-use metriplectic_fields::{ChartPoint, Column as _, Dimension as _, Real, Space, Vector};
+use metriplectic_fields::{ChartPoint, Column as _, Real, Space, Vector};
 
 use super::clock::Clock;
 use super::halves::{self, Failure};
@@ -131,11 +131,8 @@ where
             entropy: self.system.closed().entropy_at(x),
             invariants,
         };
-        let accumulated_error = Laws {
-            energy: start.values.energy - start.reference.energy,
-            entropy: start.values.entropy - start.reference.entropy,
-            invariants: Dim::<Y>::array(|k| invariants[k] - start.reference.invariants[k]),
-        };
+        let accumulated_error =
+            Start::<Frozen<'_, Y, C, X>>::accumulated([&start.values, &start.reference]);
         Start { x, time: *time, h, values, accumulated_error }
     }
 
@@ -161,13 +158,19 @@ where
             entries = X::Entries::from_index(|i| entries.get(i) + weight * rates.get(i));
         }
         if *lost < 0.0 {
-            // What a step has damped is heat of the bath.
-            let (heat, temperature) = system.only_bath(along.time(1.0))?;
-            let entropy = if temperature > 0.0 { -lost / temperature } else { 0.0 };
-            entries = X::Entries::from_index(|i| {
-                let added = [*lost, entropy];
-                entries.get(i) + i.checked_sub(heat).and_then(|k| added.get(k)).unwrap_or(&0.0)
-            });
+            // What a step has damped is heat of the baths, in proportion to what their friction takes; without friction, in
+            // equal parts.
+            let baths = system.baths(along.time(1.0));
+            let heats: f64 = baths.iter().map(|(heat, _)| entries.get(*heat)).sum();
+            let share =
+                |heat: f64| if heats < 0.0 { heat / heats } else { 1.0 / baths.len() as f64 };
+            let mut numbers: Vec<f64> = (0..X::Entries::LEN).map(|i| entries.get(i)).collect();
+            for (heat, temperature) in &baths {
+                let more = lost * share(entries.get(*heat));
+                numbers[*heat] += more;
+                numbers[heat + 1] -= if *temperature > 0.0 { more / temperature } else { 0.0 };
+            }
+            entries = X::Entries::from_index(|i| numbers[i]);
         }
         let ledger = from.ledger.with(&Booked { parameter, entries });
         Some(OpenState { x: end.clone(), time: along.times[1], ledger })
@@ -246,12 +249,12 @@ const HALVES: usize = 10;
 /// Why `Radau` does not take a system.
 #[derive(Clone, Copy, Debug, thiserror::Error)]
 #[error(
-    "`Radau` damps an open system without an entropy of its own and with one bath, to which it gives what it damps; take \
+    "`Radau` damps an open system without an entropy of its own and with a bath, to which it gives what it damps; take \
      `Gauss`, or an explicit method"
 )]
 struct NotDamped;
 
-/// Accepts a system that a method which damps can take: what it damps is heat of its only bath.
+/// Accepts a system that a method which damps can take: what it damps is heat of its baths.
 fn damps<Y, C, X>(
     tableau: &'static Tableau,
     system: &OpenSystem<Y, C, X>,
@@ -262,7 +265,7 @@ where
     C: Clock<Y::Manifold, Y::Energy>,
     X: Exchange<Y::Manifold, Y::Metric>,
 {
-    let isothermal = system.closed().second_law() == SecondLaw::NoEntropy && X::BATHS == 1;
+    let isothermal = system.closed().second_law() == SecondLaw::NoEntropy && X::BATHS > 0;
     if !tableau.one_sided || isothermal {
         return Ok(());
     }

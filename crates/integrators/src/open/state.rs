@@ -6,7 +6,8 @@ use std::sync::Arc;
 use metriplectic_dynamics::exchange::{Entries, Names};
 use metriplectic_manifolds::Manifold;
 
-use crate::step::StateSpace;
+use crate::round_off::sum::plus;
+use crate::step::{EventExchange, LedgerSummary, StateSpace};
 
 /// What is booked in a step: the work of the parameter, and the entries of ports and baths.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -52,9 +53,10 @@ impl Columns {
         Self(columns.collect())
     }
 
-    /// The index of the first heat.
-    pub(super) fn first_heat(&self) -> Option<usize> {
-        self.0.iter().position(|column| column.1 == Kind::Heat)
+    /// The indices of the heats; that of the entropy of a bath follows its heat.
+    pub(super) fn heats(&self) -> impl Iterator<Item = usize> {
+        let columns = self.0.iter().enumerate();
+        columns.filter(|(_, column)| column.1 == Kind::Heat).map(|(index, _)| index)
     }
 
     fn index(&self, name: &str, kind: Kind) -> Option<usize> {
@@ -73,53 +75,84 @@ pub struct Ledger {
     net: [f64; 2],
     /// The same of the parameter, and of each column.
     sums: Box<[[f64; 2]]>,
+    /// The same of the work and the heat of events, and of the entropy that their surroundings have gained.
+    events: [[f64; 2]; 3],
     columns: Arc<Columns>,
-}
-
-/// The sum of a number of two parts and another one, without a rounding of the sum of all three.
-fn plus([high, low]: [f64; 2], x: f64) -> [f64; 2] {
-    let sum = high + x;
-    let part = sum - high;
-    let error = (high - (sum - part)) + (x - part);
-    let low = low + error;
-    let whole = sum + low;
-    [whole, low - (whole - sum)]
 }
 
 impl Ledger {
     /// The ledger of a system with these columns, before anything is booked.
     pub(super) fn empty(columns: &Arc<Columns>) -> Self {
         let sums = vec![[0.0; 2]; columns.0.len() + 1].into();
-        Self { net: [0.0; 2], sums, columns: Arc::clone(columns) }
+        Self { net: [0.0; 2], sums, events: [[0.0; 2]; 3], columns: Arc::clone(columns) }
+    }
+
+    /// The ledger of a flow of your own, before anything is booked: of ports and of baths, each with its name and whether it is a
+    /// bath.
+    pub fn of(parts: impl IntoIterator<Item = (Arc<str>, bool)>) -> Self {
+        let names: Names = parts.into_iter().collect();
+        Self::empty(&Arc::new(Columns::new(&names)))
+    }
+
+    /// The ledger with one more step, with the work of each port, and the heat and the entropy of each bath in their order.
+    #[must_use]
+    pub fn with_entries(&self, entries: &[f64]) -> Self {
+        self.plus(|index| if index == 0 { 0.0 } else { entries[index - 1] })
+    }
+
+    /// The entries booked between another ledger and this one.
+    pub fn entries_since(&self, other: &Self) -> Vec<f64> {
+        (1..self.sums.len()).map(|index| self.change(other, index)).collect()
+    }
+
+    /// The ledger with one more event.
+    #[must_use]
+    pub fn with_event(&self, event: &EventExchange) -> Self {
+        let mut ledger = self.clone();
+        let EventExchange { work, heat, entropy } = *event;
+        for (sum, number) in ledger.events.iter_mut().zip([work, heat, entropy]) {
+            *sum = plus(*sum, number);
+        }
+        ledger.net = plus(plus(ledger.net, work), heat);
+        ledger
     }
 
     /// The ledger with one more step.
     #[must_use]
     pub(super) fn with<E: Entries>(&self, step: &Booked<E>) -> Self {
+        self.plus(|index| step.get(index))
+    }
+
+    /// The ledger with numbers by their index, the work of the parameter first.
+    #[inline]
+    fn plus(&self, number: impl Fn(usize) -> f64) -> Self {
         let mut ledger = self.clone();
         for (index, sum) in ledger.sums.iter_mut().enumerate() {
-            *sum = plus(*sum, step.get(index));
+            *sum = plus(*sum, number(index));
         }
-        ledger.net = plus(ledger.net, step.parameter);
+        ledger.net = plus(ledger.net, number(0));
         for (i, (_, kind)) in self.columns.0.iter().enumerate() {
             if *kind != Kind::Entropy {
-                ledger.net = plus(ledger.net, step.entries.get(i));
+                ledger.net = plus(ledger.net, number(i + 1));
             }
         }
         ledger
     }
 
+    /// The change of a number between another ledger and this one.
+    fn change(&self, other: &Self, index: usize) -> f64 {
+        let [[a, low_a], [b, low_b]] = [self.sums[index], other.sums[index]];
+        (a - b) + (low_a - low_b)
+    }
+
     /// What was booked between another ledger and this one.
     pub(super) fn since<E: Entries>(&self, other: &Self) -> Booked<E> {
-        let change = |index: usize| {
-            let [[a, low_a], [b, low_b]] = [self.sums[index], other.sums[index]];
-            (a - b) + (low_a - low_b)
-        };
+        let change = |index| self.change(other, index);
         Booked { parameter: change(0), entries: E::from_index(|i| change(i + 1)) }
     }
 
     /// The sum of all work and heat, and its last digits.
-    pub(super) const fn net_parts(&self) -> [f64; 2] {
+    pub const fn net_parts(&self) -> [f64; 2] {
         self.net
     }
 
@@ -147,15 +180,25 @@ impl Ledger {
         Some(self.sums[self.columns.index(name, kind)? + 1][0])
     }
 
+    /// The work of the [events that change the state](crate::Watched::jump), into the system.
+    pub const fn event_work(&self) -> f64 {
+        self.events[0][0]
+    }
+
+    /// The heat of these events, into the system.
+    pub const fn event_heat(&self) -> f64 {
+        self.events[1][0]
+    }
+
     /// The sum of all work and heat.
     pub const fn net(&self) -> f64 {
         self.net[0]
     }
 
-    /// The entropy that all baths have gained.
+    /// The entropy that all baths have gained, those of events among them.
     pub fn entropy_of_baths(&self) -> f64 {
         let entropies = self.of_kind(Kind::Entropy);
-        entropies.fold([0.0; 2], |sum, (_, [high, low])| plus(plus(sum, high), low))[0]
+        entropies.fold(self.events[2], |sum, (_, [high, low])| plus(plus(sum, high), low))[0]
     }
 
     /// The names and sums of a kind.
@@ -165,20 +208,33 @@ impl Ledger {
     }
 
     /// The names and entries of work and of heat.
-    pub(super) fn summary(&self) -> [Vec<(Arc<str>, f64)>; 2] {
+    fn summary(&self) -> [Vec<(Arc<str>, f64)>; 2] {
         [Kind::Work, Kind::Heat].map(|kind| {
             self.of_kind(kind).map(|(name, [sum, _])| (Arc::clone(name), sum)).collect()
         })
     }
 
-    /// All numbers, in the order in which [`read`](Self::read) reads them.
-    fn numbers(&self) -> Vec<f64> {
-        self.net.into_iter().chain(self.sums.iter().flatten().copied()).collect()
+    /// The names and entries of work and of heat, for a certificate.
+    pub fn summarised(&self, parameter: Option<f64>, system_entropy: f64) -> LedgerSummary {
+        let [work, heat] = self.summary();
+        LedgerSummary { parameter, work, heat, system_entropy }
+    }
+
+    /// The ledger of the same parts with these [`numbers`](Self::numbers).
+    #[must_use]
+    pub fn with_numbers(&self, numbers: &[f64]) -> Self {
+        Self::read(&self.columns, numbers)
+    }
+
+    /// All numbers: each sum with its last digits, for a checkpoint.
+    pub fn numbers(&self) -> Vec<f64> {
+        let sums = self.sums.iter().chain(&self.events).flatten();
+        self.net.iter().chain(sums).copied().collect()
     }
 
     /// How many numbers a ledger with these columns has.
     pub(super) fn length(columns: &Columns) -> usize {
-        4 + 2 * columns.0.len()
+        10 + 2 * columns.0.len()
     }
 
     /// The ledger with these numbers.
@@ -187,7 +243,8 @@ impl Ledger {
         let mut next = || pairs.next().unwrap_or([0.0; 2]);
         let net = next();
         let sums = (0..=columns.0.len()).map(|_| next()).collect();
-        Self { net, sums, columns: Arc::clone(columns) }
+        let events = [(); 3].map(|()| next());
+        Self { net, sums, events, columns: Arc::clone(columns) }
     }
 }
 
@@ -200,6 +257,15 @@ pub struct OpenState<P> {
     pub time: f64,
     /// What has flowed into the system since the start of the run.
     pub ledger: Ledger,
+}
+
+impl<P> OpenState<P> {
+    /// The state with another point, at the same time and with the same ledger: for an
+    /// [event that changes the state](crate::Watched::jump).
+    #[must_use]
+    pub fn at(&self, x: P) -> Self {
+        Self { x, time: self.time, ledger: self.ledger.clone() }
+    }
 }
 
 /// The states of an open system: points of `M` with the time and a ledger.
@@ -222,29 +288,11 @@ impl<M: Manifold> StateSpace for OpenSpace<M> {
     type Element = OpenState<M::Point<f64>>;
 
     /// The entries of the point, the time, and each sum of the ledger with its last digits: all work and heat, the work
-    /// of the parameter, and the columns of the ports and baths in their order.
+    /// of the parameter, the columns of the ports and baths in their order, and the work, the heat and the entropy of events.
     fn numbers(x: &Self::Element) -> Vec<f64> {
         let mut numbers = M::entries(&x.x);
         numbers.push(x.time);
         numbers.extend(x.ledger.numbers());
         numbers
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn sums_keep_the_digits_that_flow_through() {
-        // 10⁵ in and out again, a million times, with a millionth of 1 left each time.
-        let mut sum = [1.0, 0.0];
-        for _ in 0..1_000_000 {
-            for x in [1e5, 1e-6, -1e5] {
-                sum = plus(sum, x);
-            }
-        }
-        let exact = (0..1_000_000).fold([1.0, 0.0], |sum, _| plus(sum, 1e-6))[0];
-        assert!((sum[0] - exact).abs() <= f64::EPSILON * exact, "{sum:?}");
     }
 }

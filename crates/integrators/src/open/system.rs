@@ -123,14 +123,11 @@ where
         Closed::new(&self.closed, t)
     }
 
-    /// The index of the heat of the only bath in the ledger, and its temperature; `None` if there are none or several.
-    pub(super) fn only_bath(&self, t: f64) -> Option<(usize, f64)> {
+    /// The index of the heat of each bath among the entries, and its temperature.
+    pub(super) fn baths(&self, t: f64) -> Vec<(usize, f64)> {
         let mut temperatures = Vec::new();
         self.exchange.temperatures(t, &mut temperatures);
-        match temperatures[..] {
-            [temperature] => Some((self.columns.first_heat()?, temperature)),
-            _ => None,
-        }
+        self.columns.heats().zip(temperatures).collect()
     }
 
     /// What ports and baths do at a point, with the covectors of energy and entropy there.

@@ -12,32 +12,6 @@ use crate::step::{Flow as _, StepError};
 /// The slope of a law along a velocity, relative to its terms, that is no round-off.
 const BROKEN: f64 = 1e-8;
 
-/// Checks at a state that ports carry no entropy and keep the further invariants, that no temperature is negative, and that no
-/// friction has a negative rate.
-pub(super) fn exchange<Y, C, X>(
-    system: &OpenSystem<Y, C, X>,
-    state: &StateOf<Y>,
-) -> Result<(), ModelError>
-where
-    Y: Metriplectic,
-    C: Clock<Y::Manifold, Y::Energy>,
-    X: Exchange<Y::Manifold, Y::Metric>,
-{
-    if X::PORTS + X::BATHS == 0 {
-        return Ok(());
-    }
-    let point = || Y::Manifold::entries(&state.x);
-    let w = system.covectors(state.time, &state.x);
-    let centre = ChartPoint::<Y::Manifold, Real>::centre(&state.x);
-    let g = MetricAt::new(system.closed().metric(), &centre);
-    let [energy, entropy] = [&w.energy, &w.entropy].map(Vector::<Y::Manifold, Real>::embed);
-    let at = ExchangeArgs { t: state.time, g: &g, w: &energy, s: &entropy };
-    let mut judge = Judge::<Y, _> { w: &w, time: state.time, point: &point, verdict: Ok(()) };
-    let looked_at = system.exchange().each(&at, &mut judge);
-    looked_at.map_err(|source| ModelError::Metric { source, point: point() })?;
-    judge.verdict
-}
-
 struct Judge<'a, Y: Metriplectic, P> {
     w: &'a CovectorsOf<Y>,
     time: f64,
@@ -116,55 +90,6 @@ const SAME: f64 = 1e-4;
 /// The change of the energy in units of its round-off that shows a quotient.
 const CLEAR: f64 = 1e6;
 
-/// Compares the derivative of the energy along time with its values. Nothing is known of the times of a model, so the
-/// differences are taken over intervals of all powers of two; where quotients in a row agree, they are the derivative.
-pub(super) fn clock<Y, C, X>(
-    system: &OpenSystem<Y, C, X>,
-    state: &StateOf<Y>,
-) -> Result<(), ModelError>
-where
-    Y: Metriplectic,
-    C: Clock<Y::Manifold, Y::Energy>,
-    X: Exchange<Y::Manifold, Y::Metric>,
-{
-    if !C::RUNS {
-        return Ok(());
-    }
-    let (t, x) = (state.time, &state.x);
-    let derivative = system.power(t, x);
-    let point = || Y::Manifold::entries(x);
-    if !derivative.is_finite() {
-        return Err(ModelError::DerivativeNotFinite { field: "energy along time", point: point() });
-    }
-    let mut agreeing = 0;
-    let mut before = f64::NAN;
-    for exponent in -200..200 {
-        let delta = 2_f64.powi(exponent);
-        // Forward, because the law of motion may have changed at this time.
-        let later = t + delta;
-        let values = [system.energy(t, x), system.energy(later, x)];
-        let change = values[1] - values[0];
-        let quotient = change / (later - t);
-        let clear = change.abs() > CLEAR * f64::EPSILON * (values[0].abs() + values[1].abs());
-        let agrees = clear && (quotient - before).abs() <= SAME * quotient.abs();
-        agreeing = if agrees { agreeing + 1 } else { 0 };
-        before = if clear { quotient } else { f64::NAN };
-        if agreeing == AGREEING {
-            if (derivative - quotient).abs() > 1e2 * SAME * quotient.abs() {
-                let time = t;
-                return Err(ModelError::LostTimeDerivative {
-                    time,
-                    point: point(),
-                    derivative,
-                    quotient,
-                });
-            }
-            return Ok(());
-        }
-    }
-    Ok(())
-}
-
 /// The difference of the frozen work of a step and its quadrature, relative to the energies at both ends, that no smooth
 /// protocol makes in a step that resolves it.
 const JUMP: f64 = 1e-3;
@@ -175,31 +100,92 @@ const GAUSS: [(f64, f64); 3] = [
     (0.774_596_669_241_483_4, 5.0 / 18.0),
 ];
 
-/// Looks for a jump of the energy in time inside a step of a fixed size. Steps that follow a tolerance become small there.
-pub(super) fn protocol<Y, C, X>(
-    system: &OpenSystem<Y, C, X>,
-    [x, end]: [&StateOf<Y>; 2],
-) -> Result<(), StepError>
+impl<Y, C, X> OpenSystem<Y, C, X>
 where
     Y: Metriplectic,
     C: Clock<Y::Manifold, Y::Energy>,
     X: Exchange<Y::Manifold, Y::Metric>,
 {
-    if !C::RUNS {
-        return Ok(());
+    /// Checks at a state that ports carry no entropy and keep the further invariants, that no temperature is negative, and that no
+    /// friction has a negative rate.
+    pub(super) fn check_exchange(&self, state: &StateOf<Y>) -> Result<(), ModelError> {
+        if X::PORTS + X::BATHS == 0 {
+            return Ok(());
+        }
+        let point = || Y::Manifold::entries(&state.x);
+        let w = self.covectors(state.time, &state.x);
+        let centre = ChartPoint::<Y::Manifold, Real>::centre(&state.x);
+        let g = MetricAt::new(self.closed().metric(), &centre);
+        let [energy, entropy] = [&w.energy, &w.entropy].map(Vector::<Y::Manifold, Real>::embed);
+        let at = ExchangeArgs { t: state.time, g: &g, w: &energy, s: &entropy };
+        let mut judge = Judge::<Y, _> { w: &w, time: state.time, point: &point, verdict: Ok(()) };
+        let looked_at = self.exchange().each(&at, &mut judge);
+        looked_at.map_err(|source| ModelError::Metric { source, point: point() })?;
+        judge.verdict
     }
-    let (ends, point) = ([x, end], &end.x);
-    let [t, end] = [x.time, end.time];
-    let energies = [t, end].map(|t| system.energy(t, point));
-    let frozen = energies[1] - energies[0];
-    let half = 0.5 * (end - t);
-    let quadrature: f64 = GAUSS
-        .iter()
-        .map(|(node, weight)| 2.0 * half * weight * system.power(t + half * (1.0 + node), point))
-        .sum();
-    let terms = system.energy_sizes(ends)[0] + frozen.abs();
-    if (frozen - quadrature).abs() > JUMP * terms {
-        return Err(StepError::ProtocolJumps { time: t, h: end - t, frozen, quadrature });
+
+    /// Compares the derivative of the energy along time with its values. Nothing is known of the times of a model, so the
+    /// differences are taken over intervals of all powers of two; where quotients in a row agree, they are the derivative.
+    pub(super) fn check_clock(&self, state: &StateOf<Y>) -> Result<(), ModelError> {
+        if !C::RUNS {
+            return Ok(());
+        }
+        let (t, x) = (state.time, &state.x);
+        let derivative = self.power(t, x);
+        let point = || Y::Manifold::entries(x);
+        if !derivative.is_finite() {
+            return Err(ModelError::DerivativeNotFinite {
+                field: "energy along time",
+                point: point(),
+            });
+        }
+        let mut agreeing = 0;
+        let mut before = f64::NAN;
+        for exponent in -200..200 {
+            let delta = 2_f64.powi(exponent);
+            // Forward, because the law of motion may have changed at this time.
+            let later = t + delta;
+            let values = [self.energy(t, x), self.energy(later, x)];
+            let change = values[1] - values[0];
+            let quotient = change / (later - t);
+            let clear = change.abs() > CLEAR * f64::EPSILON * (values[0].abs() + values[1].abs());
+            let agrees = clear && (quotient - before).abs() <= SAME * quotient.abs();
+            agreeing = if agrees { agreeing + 1 } else { 0 };
+            before = if clear { quotient } else { f64::NAN };
+            if agreeing == AGREEING {
+                if (derivative - quotient).abs() > 1e2 * SAME * quotient.abs() {
+                    let time = t;
+                    return Err(ModelError::LostTimeDerivative {
+                        time,
+                        point: point(),
+                        derivative,
+                        quotient,
+                    });
+                }
+                return Ok(());
+            }
+        }
+        Ok(())
     }
-    Ok(())
+
+    /// Looks for a jump of the energy in time inside a step of a fixed size. Steps that follow a tolerance become small there.
+    pub(super) fn check_protocol(&self, [x, end]: [&StateOf<Y>; 2]) -> Result<(), StepError> {
+        if !C::RUNS {
+            return Ok(());
+        }
+        let (ends, point) = ([x, end], &end.x);
+        let [t, end] = [x.time, end.time];
+        let energies = [t, end].map(|t| self.energy(t, point));
+        let frozen = energies[1] - energies[0];
+        let half = 0.5 * (end - t);
+        let quadrature: f64 = GAUSS
+            .iter()
+            .map(|(node, weight)| 2.0 * half * weight * self.power(t + half * (1.0 + node), point))
+            .sum();
+        let terms = self.energy_sizes(ends)[0] + frozen.abs();
+        if (frozen - quadrature).abs() > JUMP * terms {
+            return Err(StepError::ProtocolJumps { time: t, h: end - t, frozen, quadrature });
+        }
+        Ok(())
+    }
 }

@@ -10,9 +10,10 @@ use metriplectic_dynamics::invariants::Kind;
 
 use crate::round_off::bound::of_a_law;
 use crate::run::checked::checked_states;
+use crate::run::jump::{Exchanged, JumpBalance};
 use crate::step::{
-    Effort, Element, EntropyStep, Evidence, Flow, Laws, LedgerSummary, LimitingSites, Promises,
-    Taken,
+    Effort, Element, EntropyStep, EventExchange, Evidence, Flow, Laws, LedgerSummary,
+    LimitingSites, Promises, Taken,
 };
 
 /// The balance of a run: what became of the two laws, of the manifold, and what it cost.
@@ -101,6 +102,12 @@ pub struct Certificate {
     /// its entropy that of the system and its baths.
     #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
     pub exchange: Option<LedgerSummary>,
+    /// The balance of each event at which the state has [jumped](crate::Watched::jump).
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Vec::is_empty"))]
+    pub jumps: Vec<JumpBalance>,
+    /// What jumps have brought into a system whose states have no ledger.
+    #[cfg_attr(feature = "serde", serde(skip))]
+    pub(crate) exchanged_in_jumps: Exchanged,
     /// Whether the dissipation was projected so that it keeps the energy, and is not quite the tensor
     /// that was written down ([`ProjectedDissipation`](metriplectic_dynamics::ProjectedDissipation)).
     pub projected: bool,
@@ -203,6 +210,20 @@ pub(crate) struct StepOf<'a, F: Flow> {
     pub(crate) h: f64,
 }
 
+/// A jump of a run.
+pub(crate) struct JumpOf<'a, F: Flow> {
+    pub(crate) name: &'a str,
+    /// The state after it.
+    pub(crate) x: &'a Element<F>,
+    /// The laws at the start of the step that it has cut, before it and after it.
+    pub(crate) values: [&'a Laws<F::Numbers>; 3],
+    pub(crate) exchange: &'a EventExchange,
+    /// The rise of the entropy of the system and its surroundings.
+    pub(crate) rise: f64,
+    /// Whether the exchange is in the ledger of the state.
+    pub(crate) is_booked: bool,
+}
+
 impl Certificate {
     /// Makes the certificate of a run that starts at `x0`.
     pub(crate) fn start<F: Flow>(flow: &F, x0: &Element<F>, promises: Promises) -> Self {
@@ -244,6 +265,8 @@ impl Certificate {
             second_law: flow.entropy_law(),
             friction: 0.0,
             exchange: flow.ledger(x0),
+            jumps: Vec::new(),
+            exchanged_in_jumps: Exchanged::NOTHING,
             projected: flow.is_projected(),
         }
     }
@@ -260,7 +283,7 @@ impl Certificate {
         let StepOf { taken: Taken { x: next, values: after, evidence, effort }, h } = step;
         self.smallest_step = if self.steps == 0 { h } else { self.smallest_step.min(h) };
         self.largest_step = self.largest_step.max(h);
-        let error = (after.energy - self.initial_energy).abs();
+        let error = (after.energy - self.reference_energy()).abs();
         self.max_energy_error = self.max_energy_error.max(error);
         // The terms of the energy are evaluated where the error asks for them, and not in every step.
         if error > of_a_law(self.energy_scale) {
@@ -269,7 +292,7 @@ impl Certificate {
         let increment = after.entropy - before.entropy;
         self.min_entropy_increment =
             if self.steps == 0 { increment } else { self.min_entropy_increment.min(increment) };
-        self.entropy_gained = after.entropy - self.initial_entropy;
+        self.entropy_gained = self.gained(after.entropy);
         if increment < 0.0 && increment < -flow.entropy_round_off([x, next]) {
             self.entropy_falls += 1;
         }
@@ -296,6 +319,38 @@ impl Certificate {
         }
         self.effort += *effort;
         self.worst_iterations = self.worst_iterations.max(effort.iterations);
+    }
+
+    /// The energy that the run keeps: that of its start, and what jumps have brought in.
+    #[inline]
+    pub(crate) const fn reference_energy(&self) -> f64 {
+        self.exchanged_in_jumps.energy_after(self.initial_energy)
+    }
+
+    /// What the entropy and that of the surroundings of events have gained.
+    fn gained(&self, entropy: f64) -> f64 {
+        (entropy - self.initial_entropy) + self.exchanged_in_jumps.entropy[0]
+    }
+
+    /// Enters a jump at the end of a step that it has cut.
+    pub(crate) fn enter_jump<F: Flow>(&mut self, flow: &F, jump: &JumpOf<'_, F>) {
+        let JumpOf { name, x, values: [start, before, after], exchange, rise, is_booked } = *jump;
+        self.max_energy_error =
+            self.max_energy_error.max((before.energy - self.reference_energy()).abs());
+        self.min_entropy_increment = self.min_entropy_increment.min(before.entropy - start.entropy);
+        if !is_booked {
+            self.exchanged_in_jumps.enter(exchange);
+        }
+        self.entropy_gained = self.gained(after.entropy);
+        if self.exchange.is_some() {
+            self.exchange = flow.ledger(x);
+        }
+        let known = self.jumps.iter().position(|balance| balance.name == name);
+        let index = known.unwrap_or_else(|| {
+            self.jumps.push(JumpBalance::new(name.to_owned()));
+            self.jumps.len() - 1
+        });
+        self.jumps[index].enter(exchange, rise);
     }
 
     /// Notes an estimate of the local error, relative to the state, and the sites that set the step.

@@ -9,6 +9,8 @@ use std::any::{Any, type_name};
 use std::fmt;
 use std::sync::Arc;
 
+use crate::run::departure::{self, Departure, Seen, Sides};
+use crate::run::jump::{Jump, JumpOn, JumpRequest};
 use crate::run::root::{Sample, narrow};
 use crate::run::span_error::SpanError;
 use crate::run::state::State;
@@ -57,6 +59,9 @@ pub struct Event<M: StateSpace> {
     pub rises: bool,
     /// The state there. The function is zero or has its later sign.
     pub state: State<M>,
+    /// The change of the state, if one was [asked for](crate::Watched::jump).
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
+    pub jump: Option<Jump<M>>,
 }
 
 #[cfg(feature = "serde")]
@@ -84,6 +89,7 @@ pub(crate) struct Request {
     pub(crate) rising: bool,
     pub(crate) falling: bool,
     pub(crate) stops: bool,
+    pub(crate) jump: Option<JumpRequest>,
     /// The type of the points, and the [`Function`] of them.
     point: &'static str,
     function: Arc<dyn Any + Send + Sync>,
@@ -99,6 +105,7 @@ impl Request {
             rising: true,
             falling: true,
             stops: false,
+            jump: None,
             point: type_name::<P>(),
             function: Arc::new(Function::<P>(Box::new(function))),
         }
@@ -121,7 +128,12 @@ impl fmt::Debug for Request {
 impl PartialEq for Request {
     fn eq(&self, other: &Self) -> bool {
         let options = |r: &Self| (r.rising, r.falling, r.stops);
+        let jumps = match (&self.jump, &other.jump) {
+            (Some(a), Some(b)) => a.is(b),
+            (a, b) => a.is_none() && b.is_none(),
+        };
         self.name == other.name
+            && jumps
             && options(self) == options(other)
             && Arc::ptr_eq(&self.function, &other.function)
     }
@@ -134,6 +146,9 @@ struct Watched<M: StateSpace> {
     /// The last value of the function that is a number: the one at the state of the run, or before it if it is NaN
     /// there.
     value: f64,
+    jump: Option<JumpOn<M>>,
+    /// How the state leaves the event at which it has jumped, as long as the function is round-off there.
+    departure: Option<Departure>,
 }
 
 /// The last number of the function of an event that has no value where a run is put down.
@@ -145,6 +160,7 @@ pub(crate) struct LastNumber {
     index: usize,
     name: String,
     value: Exact,
+    departure: Option<Departure>,
 }
 
 /// The events of a run.
@@ -155,6 +171,25 @@ const INSIDE: [f64; 4] = [0.2, 0.4, 0.6, 0.8];
 
 /// The width of a bracket, as a fraction of the step, at which an event is found.
 const WIDTH: f64 = 2.0 * f64::EPSILON;
+
+/// The difference of two fractions of a step that are found as one time.
+const SAME_TIME: f64 = 8.0 * f64::EPSILON;
+
+/// The events of a step.
+pub(crate) struct Found<M: StateSpace> {
+    pub(crate) events: Vec<Event<M>>,
+    /// What the last of them does.
+    pub(crate) end: Option<Interruption>,
+}
+
+/// What an event does to the run.
+pub(crate) enum Interruption {
+    Stop,
+    /// The state jumps. Other events at the same time are found again after it, with their directions.
+    Jump {
+        with_it: Vec<(usize, bool)>,
+    },
+}
 
 /// A state on the output, at a fraction of a step; `None` if it is not known.
 pub(crate) type Output<'a, M> = dyn FnMut(f64) -> Option<State<M>> + 'a;
@@ -193,23 +228,29 @@ impl<M: StateSpace> Events<M> {
                 return Err(SpanError::EventPoint { index, found: request.point, expected });
             };
             let here = (function.0)(state.time, &state.point);
-            let before = || {
-                let same = |last: &&LastNumber| last.index == index && *last.name == *request.name;
-                last.iter().find(same).map_or(here, |last| last.value.0)
+            let same = |last: &&LastNumber| last.index == index && *last.name == *request.name;
+            let last = last.iter().find(same);
+            let value = last.map_or(here, |last| last.value.0);
+            let departure = last.and_then(|last| last.departure);
+            let jump = match request.jump.clone() {
+                Some(jump) => Some(jump.on(index)?),
+                None => None,
             };
-            let value = if here.is_nan() { before() } else { here };
-            Ok(Watched { request, function, value })
+            Ok(Watched { request, function, value, jump, departure })
         };
         requests.into_iter().enumerate().map(watched).collect::<Result<_, _>>().map(Self)
     }
 
-    /// The last numbers of the functions that have no value at the state of the run.
+    /// The last numbers of the functions that have no value at the state of the run, or another one after a jump.
     pub(crate) fn last_numbers(&self, state: &State<M>) -> Vec<LastNumber> {
         let mut numbers = Vec::new();
         for (index, watched) in self.0.iter().enumerate() {
-            if !watched.value.is_nan() && watched.at(state).is_nan() {
+            let here = watched.at(state);
+            let differs = !watched.value.is_nan() && watched.value.to_bits() != here.to_bits();
+            if differs || watched.departure.is_some() {
                 let (name, value) = (watched.request.name.to_string(), Exact(watched.value));
-                numbers.push(LastNumber { index, name, value });
+                let departure = watched.departure;
+                numbers.push(LastNumber { index, name, value, departure });
             }
         }
         numbers
@@ -224,15 +265,15 @@ impl<M: StateSpace> Events<M> {
         self.0.iter().any(|watched| watched.request.stops)
     }
 
-    /// The events of a step in the order of their times, up to the first that stops the run, and whether one
-    /// does. `None` if a state inside the step is not known and is needed.
+    /// The events of a step in the order of their times, up to the first that stops the run or changes the state. `None` if
+    /// a state inside the step is not known and is needed.
     pub(crate) fn of_step<F: Flow<Space = M>>(
         &mut self,
         flow: &F,
         step: &StepEnds<'_, F>,
         ends: [&State<M>; 2],
         output: &mut Output<'_, M>,
-    ) -> Option<(Vec<Event<M>>, bool)> {
+    ) -> Option<Found<M>> {
         let curve = if step.x == step.end { None } else { Hermite::through(flow, step) };
         let moves = step.x != step.end && (curve.is_some() || says_between(flow, step.x));
         let mut inside = Vec::with_capacity(INSIDE.len());
@@ -253,22 +294,69 @@ impl<M: StateSpace> Events<M> {
         inside: &[Inside<M>],
         ends: [&State<M>; 2],
         output: &mut Output<'_, M>,
-    ) -> Option<(Vec<Event<M>>, bool)> {
+    ) -> Option<Found<M>> {
         let (mut thetas, mut found) = (Vec::new(), Vec::new());
         for (index, watched) in self.0.iter_mut().enumerate() {
             for Change { theta, rises, state } in watched.look(inside, ends, output)? {
                 let name = Arc::clone(&watched.request.name);
                 thetas.push(theta);
-                found.push(Some(Event { name, index, rises, state }));
+                found.push(Some(Event { name, index, rises, state, jump: None }));
             }
         }
         let order = in_order(&thetas);
         let mut events: Vec<Event<M>> = order.iter().filter_map(|&i| found[i].take()).collect();
-        let stop = events.iter().position(|event| self.0[event.index].request.stops);
-        if let Some(stop) = stop {
-            events.truncate(stop + 1);
+        let end = events.iter().position(|event| self.0[event.index].interrupts());
+        let Some(end) = end else { return Some(Found { events, end: None }) };
+        if self.0[events[end].index].request.stops {
+            events.truncate(end + 1);
+            return Some(Found { events, end: Some(Interruption::Stop) });
         }
-        Some((events, stop.is_some()))
+        let at = thetas[order[end]];
+        let (later, same_time) = (end + 1.., |i: &usize| thetas[order[*i]] <= at + SAME_TIME);
+        let with_it = later.take_while(|i| *i < order.len()).take_while(same_time);
+        let with_it = with_it.map(|i| (events[i].index, events[i].rises)).collect();
+        events.truncate(end + 1);
+        Some(Found { events, end: Some(Interruption::Jump { with_it }) })
+    }
+
+    /// The jump at an event.
+    pub(crate) fn jump(&self, index: usize) -> Option<JumpOn<M>> {
+        self.0[index].jump.clone()
+    }
+
+    /// Goes on after a jump at an event between two states. `ahead` is the state a little later, along the velocity.
+    pub(crate) fn after_jump(
+        &mut self,
+        event: &Event<M>,
+        after: &State<M>,
+        with_it: &[(usize, bool)],
+        mut ahead: impl FnMut(f64) -> M::Element,
+        h: f64,
+    ) {
+        for (index, watched) in self.0.iter_mut().enumerate() {
+            let [before, here] = [&event.state, after].map(|state| watched.at(state));
+            watched.value = if here.is_nan() { before } else { here };
+            watched.departure = None;
+            if index == event.index {
+                let value =
+                    |later: f64, x: &M::Element| (watched.function.0)(after.time + later, x);
+                let sides = Sides { earlier: if event.rises { -1.0 } else { 1.0 }, before, here };
+                watched.departure =
+                    departure::find(sides, after.time, h, |later| value(later, &ahead(later)));
+            } else if let Some((_, rises)) = with_it.iter().find(|(other, _)| *other == index) {
+                // It is found again at once.
+                let earlier = if *rises { -1.0 } else { 1.0 };
+                if earlier * here <= 0.0 {
+                    watched.value = earlier * f64::MIN_POSITIVE;
+                }
+            }
+        }
+    }
+
+    /// An event to which the state returns at once, for ever.
+    pub(crate) fn piled_up(&self) -> Option<&Arc<str>> {
+        let stuck = |watched: &&Watched<M>| watched.departure.is_some_and(|leaves| leaves.fails);
+        self.0.iter().find(stuck).map(|watched| &watched.request.name)
     }
 }
 
@@ -280,6 +368,11 @@ fn in_order(times: &[f64]) -> Vec<usize> {
 }
 
 impl<M: StateSpace> Watched<M> {
+    /// Whether the run stops at the event, or the state jumps there.
+    const fn interrupts(&self) -> bool {
+        self.request.stops || self.jump.is_some()
+    }
+
     fn at(&self, state: &State<M>) -> f64 {
         (self.function.0)(state.time, &state.point)
     }
@@ -302,7 +395,21 @@ impl<M: StateSpace> Watched<M> {
             state: state.cloned(),
         };
         let mut nodes = vec![node(0.0, before, Some(start))];
-        for Inside { theta, point } in inside {
+        let mut first = 0.0;
+        if let Some(departure) = self.departure {
+            match departure.seen([start.time, end.time], |theta| Some(self.at(&output(theta)?)))? {
+                Seen::NotYet => return Some(Vec::new()),
+                Seen::At { theta, value } => {
+                    (nodes, first) = (vec![node(theta, value, None)], theta);
+                    self.departure = None;
+                }
+                Seen::Never => {
+                    self.departure = Some(departure.failed());
+                    return Some(Vec::new());
+                }
+            }
+        }
+        for Inside { theta, point } in inside.iter().filter(|inside| inside.theta > first) {
             let time = start.time + theta * (end.time - start.time);
             nodes.push(node(*theta, (self.function.0)(time, point), None));
         }

@@ -4,7 +4,7 @@ use metriplectic_dynamics::SecondLaw;
 
 use crate::run::corners::{self, Fixed};
 use crate::run::ending::Ending;
-use crate::run::event::Event;
+use crate::run::event::{Event, Found, Interruption};
 use crate::run::requests::rounding;
 use crate::run::schedule::Schedule;
 use crate::run::span_error::SpanError;
@@ -12,7 +12,7 @@ use crate::run::state::State;
 use crate::run::steps::Steps;
 use crate::run::watching::Watching;
 use crate::step::dense::{Target, between, says_between};
-use crate::step::{Element, Flow, Laws, StepEnds, StepError, StepStart, Stepper};
+use crate::step::{Element, Flow, JumpError, Laws, StepEnds, StepError, StepStart, Stepper};
 
 impl<F: Flow, M: Stepper<F>> Steps<'_, F, M> {
     /// The state at a time in the last step, on the [dense output](Stepper::between) of the method; `None` at other
@@ -208,14 +208,28 @@ impl<F: Flow, M: Stepper<F>> Steps<'_, F, M> {
         let Some(mut watching) = self.watching.take() else { return Ok(()) };
         watching.queue.clear();
         let found = self.find(&mut watching);
-        self.watching = Some(watching);
         let (time, h) = (self.before.state.time, self.before.h);
-        found.ok_or(StepError::NothingBetween { time, h })
+        let looked = match found {
+            None => Err(StepError::NothingBetween { time, h }),
+            Some(None) => Ok(()),
+            Some(Some(with_it)) => self.jump(&mut watching, &with_it),
+        };
+        let piled_up = watching.events.piled_up().cloned();
+        self.watching = Some(watching);
+        let looked = match piled_up {
+            Some(event) => Err(StepError::Jump { time, event, error: JumpError::PilesUp }),
+            None => looked,
+        };
+        if let Err(StepError::Jump { .. }) = looked {
+            self.take_back();
+        }
+        looked
     }
 
-    /// Finds the events in the last step, and then the outputs up to its end or to the event that stops the run.
-    fn find(&mut self, watching: &mut Watching<F::Space>) -> Option<()> {
-        let mut stopped_at = None;
+    /// Finds the events in the last step, and then the outputs up to its end or to the event that stops the run or changes the
+    /// state. Returns the events at the same time if the state is to jump.
+    fn find(&mut self, watching: &mut Watching<F::Space>) -> Option<Option<Vec<(usize, bool)>>> {
+        let (mut stopped_at, mut jumps) = (None, None);
         if !watching.events.is_empty() {
             let ends = [self.before.state.clone(), self.state.clone()];
             let (laws, reference) = (
@@ -225,15 +239,22 @@ impl<F: Flow, M: Stepper<F>> Steps<'_, F, M> {
             let (x, end, values) = (&ends[0].point, &ends[1].point, laws.each_ref());
             let step = StepEnds { x, end, h: self.before.h, values, reference: &reference };
             let flow = self.flow;
-            let (found, stops) =
+            let Found { events, end } =
                 watching
                     .events
                     .of_step(flow, &step, ends.each_ref(), &mut |theta| self.inside(theta))?;
-            if let Some(event) = found.last().filter(|_| stops) {
+            if let (Some(event), Some(end)) = (events.last(), end) {
                 stopped_at = Some(event.state.clone());
-                self.progress.ending = Some(Ending::Event { index: event.index });
+                let index = event.index;
+                self.progress.ending = match end {
+                    Interruption::Stop => Some(Ending::Event { index }),
+                    Interruption::Jump { with_it } => {
+                        jumps = Some(with_it);
+                        None
+                    }
+                };
             }
-            watching.found.extend(found);
+            watching.found.extend(events);
         }
         if !watching.outputs.is_empty() {
             let last = stopped_at.as_ref().map_or(self.state.time, |state| state.time);
@@ -253,7 +274,7 @@ impl<F: Flow, M: Stepper<F>> Steps<'_, F, M> {
                 watching.queue.push_back(last);
             }
         }
-        Some(())
+        Some(jumps)
     }
 
     /// The state at a time, after another one in the same step. Where the entropy has fallen in between by more

@@ -11,6 +11,7 @@
 //! common with the steps of a period that users choose, so the states lie at all phases of an oscillation.
 
 use crate::run::checked::{checked_states, is_due};
+use crate::run::controller::StepSize;
 use crate::run::steps::Steps;
 use crate::step::{Flow, Recheck, StepError, Stepper};
 
@@ -65,12 +66,27 @@ impl<F: Flow, M: Stepper<F>> Steps<'_, F, M> {
         self.flow.reexamine(x, occasion).map_err(|law| StepError::Flow { time, law })
     }
 
-    /// Explains why a step failed: by a law that the model breaks around the state, if there is one.
+    /// What must hold on every step, at the frozen state along a step of one size that was not taken.
+    fn jump_inside(&self, h: f64) -> Option<StepError> {
+        let is_fixed = matches!(self.progress.step_size, StepSize::Fixed(_));
+        if !is_fixed || !self.progress.corners.is_empty() {
+            return None;
+        }
+        let x = &self.state.point;
+        let end = self.flow.clocked(x, self.state.time + h)?;
+        self.flow.inspect([x, &end], true).err()
+    }
+
+    /// Explains why a step failed: by a protocol that jumps inside it, or by a law that the model breaks around the state, if there
+    /// is one.
     #[cold]
     #[inline(never)]
     pub(super) fn explained(&self, error: StepError) -> StepError {
         match error.size() {
             Some(h) => {
+                if let Some(jump) = self.jump_inside(h) {
+                    return jump;
+                }
                 let occasion = Recheck::Failure { h: h.max(self.before.h) };
                 let asked = self.flow.rechecks(occasion);
                 asked.then(|| self.verdict(occasion).err()).flatten().unwrap_or(error)

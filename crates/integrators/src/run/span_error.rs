@@ -148,6 +148,14 @@ pub enum SpanError {
         "an open system has no rest: what drives it may begin at any time; leave `until_rest` out, or stop at an event"
     )]
     NoRestInTime,
+    /// The surroundings of an event that gives heat have no positive temperature.
+    #[error("event {index} gives heat at a temperature of {temperature}; it has to be positive")]
+    JumpTemperature {
+        /// Which event, in the order in which they were asked for, counted from 0.
+        index: usize,
+        /// The temperature.
+        temperature: f64,
+    },
     /// The function of an event has points of another type than the run.
     #[error(
         "event {index} is a function of {}, and the points of the run are {}; say this type in the closure",

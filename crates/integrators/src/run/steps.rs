@@ -164,7 +164,7 @@ impl<'a, F: Flow, M: Stepper<F>> Steps<'a, F, M> {
         for (k, balance) in self.certificate.invariants.iter().enumerate() {
             invariants[k] = balance.initial;
         }
-        Laws { energy: self.certificate.initial_energy, entropy, invariants }
+        Laws { energy: self.certificate.reference_energy(), entropy, invariants }
     }
 
     /// Where the next step starts.
@@ -196,6 +196,7 @@ impl<'a, F: Flow, M: Stepper<F>> Steps<'a, F, M> {
             &StepSize::Fixed(h) => {
                 let mut memory = std::mem::take(&mut self.memory);
                 let time = self.progress.start + step as f64 * h;
+                let h = self.left_of_a_step(h, time);
                 let (system, size) = ((&self.method, self.flow), corners::Fixed { h, end: time });
                 let corners = &self.progress.corners;
                 let taken = corners::step(system, &self.from(None), size, corners, &mut memory);
@@ -212,7 +213,7 @@ impl<'a, F: Flow, M: Stepper<F>> Steps<'a, F, M> {
             let time = self.state.time;
             return Err(StepError::OutOfDomain { time, h, tried: taken.effort });
         }
-        let change = taken.values.energy - self.certificate.initial_energy;
+        let change = taken.values.energy - self.certificate.reference_energy();
         let sizes = || self.flow.energy_sizes([&self.state.point, &taken.x]);
         if self.promises.energy
             && let Some(size) = breaks_first_law(change, taken.values.energy, sizes)

@@ -1,6 +1,7 @@
 //! States at given times between the steps of a run, and events.
 
 use crate::run::event::Request;
+use crate::run::jump::JumpRequest;
 use crate::run::schedule::Schedule;
 
 /// Asks a run for states at given times and for events, whatever its steps are: the steps stay the same, to the
@@ -241,6 +242,99 @@ impl Watched {
     /// ```
     pub fn stop(self) -> Self {
         self.with(|request| request.stops = true)
+    }
+}
+
+impl Watched {
+    /// Changes the state at the event: `x'` from the time and the state at which it was found. The time of the event is the end
+    /// of a step, and the next one starts from `x'`.
+    ///
+    /// What the energy changes by is work of the event, and the certificate lists it
+    /// ([`Certificate::jumps`](crate::Certificate::jumps)). So the first law of the run is `ΔH = W`. It is heat if you
+    /// name a temperature with [`heat_at`](Jumping::heat_at). The states of an open system have both in their
+    /// ledger. A map that lowers the entropy of the system and its surroundings ends the run in
+    /// [`JumpError::LowersEntropy`](crate::JumpError::LowersEntropy), and so does one that changes a listed Casimir or
+    /// momentum.
+    ///
+    /// A ball falls, and an elastic wall turns its momentum round. No energy is exchanged, to the last bit:
+    ///
+    /// ```
+    /// use metriplectic_dynamics::{Symplectic, System};
+    /// use metriplectic_fields::Real;
+    /// use metriplectic_integrators::{DormandPrince8, Method, Span, Watch};
+    /// use metriplectic_manifolds::Euclidean;
+    /// use nalgebra::{Vector2, vector};
+    /// # fn main() -> Result<(), metriplectic_integrators::Error> {
+    /// let ball = System::on(Euclidean::<2>)
+    ///     .bracket(Symplectic)
+    ///     .energy(|x: &Vector2<Real>| x.y * x.y * 0.5 + x.x)
+    ///     .build()?;
+    /// let span = Span::until(10.0)
+    ///     .tolerance(1e-10)
+    ///     .event("wall", |x: &Vector2<f64>| x.x)
+    ///     .falling()
+    ///     .jump(|_, x: &Vector2<f64>| vector![x.x, -x.y]);
+    /// let run = DormandPrince8.run(&ball, vector![0.5, 0.0], span)?;
+    /// // It falls for one unit of time, and is back at the wall after two more.
+    /// let times: Vec<f64> = run.events().iter().map(|event| event.state.time).collect();
+    /// assert_eq!(times.len(), 5);
+    /// assert!(times.iter().zip([1.0, 3.0, 5.0, 7.0, 9.0]).all(|(t, exact)| (t - exact).abs() < 1e-8));
+    /// let certificate = run.certificate();
+    /// assert!(certificate.keeps_energy() && certificate.jumps[0].work == 0.0);
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
+    /// Make it [`falling`](Self::falling) or [`rising`](Self::rising) for a wall. The model has to go on behind it by up
+    /// to one step, because an event is looked for in a step that was taken. An output at the time of a jump is the state
+    /// before it. The jump of one event is no event of another one. An event that [stops](Self::stop) the run does not
+    /// change the state. In steps of one size the rest of the step is taken from `x'`, so that the steps end at the
+    /// same times.
+    pub fn jump<P: 'static>(self, map: impl Fn(f64, &P) -> P + Send + Sync + 'static) -> Jumping {
+        Jumping(self.with(|request| request.jump = Some(JumpRequest::new(map))))
+    }
+}
+
+/// A schedule with an event that changes the state; made by [`Watched::jump`].
+#[derive(Clone, Debug, PartialEq)]
+#[must_use]
+pub struct Jumping(Watched);
+
+impl Jumping {
+    fn with(self, change: impl FnOnce(&mut JumpRequest)) -> Self {
+        Self(self.0.with(|request| {
+            if let Some(jump) = &mut request.jump {
+                change(jump);
+            }
+        }))
+    }
+
+    /// Takes what the energy changes by for heat from surroundings of this temperature, in the unit of `H/S`: they gain
+    /// the entropy `−ΔH/T`. A wall that is hit without a bounce is warmed.
+    ///
+    /// ```
+    /// use metriplectic_integrators::{Span, Watch};
+    /// use nalgebra::{Vector2, vector};
+    /// let span = Span::until(20.0)
+    ///     .event("wall", |x: &Vector2<f64>| x.x)
+    ///     .falling()
+    ///     .jump(|_, x: &Vector2<f64>| vector![x.x, -0.9 * x.y])
+    ///     .heat_at(300.0);
+    /// ```
+    pub fn heat_at(self, temperature: f64) -> Self {
+        self.with(|jump| jump.temperature = Some(temperature))
+    }
+
+    /// Accepts a jump that lowers the entropy of the system and its surroundings: of a model without the part of the
+    /// surroundings that gains it. The certificate lists the least change.
+    pub fn may_lower_entropy(self) -> Self {
+        self.with(|jump| jump.lowers = true)
+    }
+}
+
+impl From<Jumping> for Schedule {
+    fn from(Jumping(watched): Jumping) -> Self {
+        watched.into()
     }
 }
 

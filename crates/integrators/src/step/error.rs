@@ -1,11 +1,12 @@
 //! Errors of steps.
 
 use std::fmt;
+use std::sync::Arc;
 
 use metriplectic_dynamics::ModelError;
 
 use super::digits::{counted, digits};
-use super::{Effort, FlowError, MethodError};
+use super::{Effort, FlowError, JumpError, MethodError};
 
 impl fmt::Display for Effort {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -195,6 +196,17 @@ pub enum StepError {
         /// The rate at which the energy changes.
         rate: f64,
     },
+    /// An event cannot change the state.
+    #[error("the event \"{event}\" at t = {} cannot change the state: {error}", digits(.time))]
+    Jump {
+        /// The time of the event.
+        time: f64,
+        /// Its name.
+        event: Arc<str>,
+        /// The reason.
+        #[source]
+        error: JumpError,
+    },
     /// The controller asks for a step below the least one.
     #[error(
         "the step from t = {} would have to be {h:.1e} long to keep the tolerance, below the least \
@@ -288,6 +300,7 @@ impl StepError {
             Self::Model { .. }
             | Self::Flow { .. }
             | Self::Method { .. }
+            | Self::Jump { .. }
             | Self::DependentInvariants { .. }
             | Self::NothingBetween { .. } => None,
         }

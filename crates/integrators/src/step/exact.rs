@@ -76,6 +76,16 @@ mod form {
         }
     }
 
+    impl ExactForm for [f64; 2] {
+        fn write<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+            self.map(Exact).serialize(serializer)
+        }
+
+        fn read<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+            Ok(<[Exact; 2]>::deserialize(deserializer)?.map(|number| number.0))
+        }
+    }
+
     impl ExactForm for f64 {
         fn write<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
             if serializer.is_human_readable() {

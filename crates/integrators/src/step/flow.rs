@@ -8,7 +8,7 @@ use metriplectic_dynamics::{ModelError, SecondLaw};
 use metriplectic_manifolds::{Manifold, PointError};
 
 use super::initial_scales::initial_scales;
-use super::{FlowError, LedgerSummary, Scales, StepError, Vector};
+use super::{EventExchange, FlowError, LedgerSummary, Scales, StepError, Vector};
 
 /// Where the states of a run live. Every [`Manifold`] is a state space.
 pub trait StateSpace: Clone + Debug + PartialEq + Send + Sync + 'static {
@@ -133,6 +133,20 @@ pub trait Flow {
     #[inline]
     fn clocked(&self, x: &Element<Self>, time: f64) -> Option<Element<Self>> {
         let _ = (x, time);
+        None
+    }
+
+    /// The state to which an event leads, from the one at which it was found and from what a closure made of that. What a
+    /// state carries beside its point, a clock or a ledger, stays. The default is the closure's state.
+    fn jumped(&self, x: &Element<Self>, y: Element<Self>) -> Element<Self> {
+        let _ = x;
+        y
+    }
+
+    /// The state with the exchange of an event in its ledger; `None` if states have no ledger. Then the run keeps the
+    /// balance.
+    fn with_event(&self, x: &Element<Self>, event: &EventExchange) -> Option<Element<Self>> {
+        let _ = (x, event);
         None
     }
 

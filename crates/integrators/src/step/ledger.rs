@@ -2,6 +2,19 @@
 
 use std::sync::Arc;
 
+/// The work and the heat of an event that changes the state, into the system, and the entropy that its surroundings gain.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[non_exhaustive]
+pub struct EventExchange {
+    /// The work.
+    pub work: f64,
+    /// The heat.
+    pub heat: f64,
+    /// The entropy that the surroundings gain, `−Q/T`.
+    pub entropy: f64,
+}
+
 /// What has flowed into an open system since the start of a run.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]

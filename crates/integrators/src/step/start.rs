@@ -35,11 +35,16 @@ impl<'a, Y: Metriplectic> Start<'a, Y> {
         &StepStart { x, time, values, reference, .. }: &StepStart<'a, Y>,
         h: f64,
     ) -> Self {
-        let accumulated_error = Laws {
+        let accumulated_error = Self::accumulated([&values, &reference]);
+        Self { x, time, h, values, accumulated_error }
+    }
+
+    /// What earlier steps have left of the laws, from those at the start of a step and of the run.
+    pub(crate) fn accumulated([values, reference]: [&Laws<Numbers<Y>>; 2]) -> DriftCorrection<Y> {
+        Laws {
             energy: values.energy - reference.energy,
             entropy: values.entropy - reference.entropy,
             invariants: Dim::<Y>::array(|k| values.invariants[k] - reference.invariants[k]),
-        };
-        Self { x, time, h, values, accumulated_error }
+        }
     }
 }

@@ -29,6 +29,8 @@ const ONE_FALL: Certificate = Certificate {
     second_law: SecondLaw::Exact,
     friction: 0.0,
     exchange: None,
+    jumps: Vec::new(),
+    exchanged_in_jumps: Exchanged::NOTHING,
     projected: false,
 };
 

@@ -8,6 +8,7 @@ use super::{
     Certificate, InvariantBalance, MisjudgedSize, ProjectedSteps, StageBalance, UNRESOLVED,
 };
 use crate::round_off::bound::of_a_law;
+use crate::run::jump::JumpBalance;
 use crate::step::digits::{Digits, counted};
 use crate::step::{Effort, LedgerSummary, LimitingSites};
 
@@ -21,7 +22,10 @@ impl fmt::Display for Certificate {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let steps = counted(self.steps, "step", "steps");
         let (error, relative) = (self.max_energy_error, self.relative_to());
-        let law = if self.exchange.is_some() { "|ΔH − W − Q|" } else { "|H − H₀|" };
+        let law = match (&self.exchange, self.jumps.is_empty()) {
+            (None, true) => "|H − H₀|",
+            _ => "|ΔH − W − Q|",
+        };
         if !self.promises.energy {
             writeln!(f, "first law:   not promised; {law} ≤ {error:.1e}{relative}, over {steps}")?;
         } else if self.keeps_energy() {
@@ -34,6 +38,7 @@ impl fmt::Display for Certificate {
             )?;
         }
         self.exchanged(f)?;
+        self.jumped(f)?;
         match self.second_law {
             SecondLaw::NoEntropy => writeln!(f, "second law:  no entropy"),
             _ if !self.promises.entropy => {
@@ -156,6 +161,21 @@ impl Certificate {
         }
         if !heat.is_empty() {
             writeln!(f, "heat:        {}", named(heat).join(", "))?;
+        }
+        Ok(())
+    }
+
+    /// Lists the events at which the state has jumped.
+    fn jumped(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for JumpBalance { name, count, work, heat, least_rise } in &self.jumps {
+            write!(f, "jumps:       {name} {}, work {work:.1e}", counted(*count, "time", "times"))?;
+            if *heat != 0.0 {
+                write!(f, ", heat {heat:.1e}")?;
+            }
+            if *least_rise != 0.0 {
+                write!(f, ", ΔS ≥ {least_rise:.1e}")?;
+            }
+            writeln!(f)?;
         }
         Ok(())
     }

@@ -9,6 +9,7 @@ use crate::run::certificate::{
     Certificate, InvariantBalance, MisjudgedSize, ProjectedSteps, StageBalance,
 };
 use crate::run::ending::Ending;
+use crate::run::jump::{Exchanged, JumpBalance};
 use crate::step::exact::{self, ExactForm};
 use crate::step::{Effort, LedgerSummary, LimitingSites, Promises};
 
@@ -62,6 +63,10 @@ struct CertificateForm {
     // It is that of the point.
     #[serde(skip)]
     exchange: Option<LedgerSummary>,
+    #[serde(with = "exact")]
+    jumps: Vec<JumpBalance>,
+    #[serde(with = "exact")]
+    exchanged_in_jumps: Exchanged,
     projected: bool,
 }
 
@@ -76,6 +81,28 @@ struct InvariantBalanceForm {
     max_error: f64,
     #[serde(with = "exact")]
     scale: f64,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(remote = "JumpBalance")]
+struct JumpBalanceForm {
+    name: String,
+    count: usize,
+    #[serde(with = "exact")]
+    work: f64,
+    #[serde(with = "exact")]
+    heat: f64,
+    #[serde(with = "exact")]
+    least_rise: f64,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(remote = "Exchanged")]
+struct ExchangedForm {
+    #[serde(with = "exact")]
+    energy: [f64; 2],
+    #[serde(with = "exact")]
+    entropy: [f64; 2],
 }
 
 #[derive(Serialize, Deserialize)]
@@ -147,6 +174,8 @@ macro_rules! exact_form {
 exact_form! {
     CertificateForm of Certificate,
     InvariantBalanceForm of InvariantBalance,
+    JumpBalanceForm of JumpBalance,
+    ExchangedForm of Exchanged,
     StageBalanceForm of StageBalance,
     MisjudgedSizeForm of MisjudgedSize,
     EndingForm of Ending

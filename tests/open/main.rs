@@ -1,7 +1,10 @@
 //! Open systems: work, heat and both laws, by every method.
 
+use metriplectic::dynamics::exchange::Exchange;
+use metriplectic::integrators::open::{AtTime, InTime};
 use metriplectic::prelude::*;
 
+type Space = Product<Euclidean<2>, Euclidean<1>>;
 type State = (Vector2<Real>, Vector1<Real>);
 
 /// The constants of the driven pendulum: heat capacity, temperature and frictions of the bath, friction inside, torque and
@@ -15,37 +18,45 @@ const STRING: [f64; 2] = [0.3, 0.9];
 
 /// A pendulum whose string is pulled, with a torque, a bearing of the energy `U` and the entropy `C ln U`, friction inside, and
 /// a bath on its momentum and on `U`. Nothing is quadratic.
-macro_rules! pendulum {
-    () => {
-        System::on(Product(Euclidean::<2>, Euclidean::<1>))
-            .bracket((Symplectic, Zero))
-            .energy_in_time(|t: Real, (x, u): &State| {
-                x.y * x.y * 0.5 - x.x.cos() * ((t * STRING[1]).cos() * STRING[0] + 1.0)
-                    + u.x
-                    + u.x * u.x * 0.05
-            })
-            .entropy(|(_, u): &State| u.x.ln() * CAPACITY)
-            .dissipation(FieldDissipation(|_: &State, w: &Vector3<Real>| {
-                let b = Vector3::new(0.0.into(), w.z, -w.y);
-                b * b.transpose() * (w.z.recip() * FRICTION)
-            }))
-            .work("torque", |t: Real, (x, _): &State| {
-                let torque = (t * TORQUE[1]).sin() * TORQUE[0] * (x.x.cos() * 0.2 + 1.0);
-                vector![0.0.into(), torque, 0.0.into()]
-            })
-            .bath(
-                "air",
-                Bath::at(TEMPERATURE).friction(|_: Real, (_, u): &State, _: &Vector3<Real>| {
-                    [
-                        Contact { rate: RATES[0].into(), along: Vector3::y() },
-                        Contact { rate: u.x * RATES[1], along: Vector3::z() },
-                    ]
-                }),
-            )
-            .build()
-            .unwrap()
-    };
+fn pendulum() -> OpenSystem<
+    impl Metriplectic<
+        Manifold = Space,
+        Metric = Canonical,
+        Energy = AtTime<impl Fn(Real, &State) -> Real>,
+    >,
+    InTime,
+    impl Exchange<Space, Canonical>,
+> {
+    System::on(Product(Euclidean::<2>, Euclidean::<1>))
+        .bracket((Symplectic, Zero))
+        .energy_in_time(|t: Real, (x, u): &State| {
+            x.y * x.y * 0.5 - x.x.cos() * ((t * STRING[1]).cos() * STRING[0] + 1.0)
+                + u.x
+                + u.x * u.x * 0.05
+        })
+        .entropy(|(_, u): &State| u.x.ln() * CAPACITY)
+        .dissipation(FieldDissipation(|_: &State, w: &Vector3<Real>| {
+            let b = Vector3::new(0.0.into(), w.z, -w.y);
+            b * b.transpose() * (w.z.recip() * FRICTION)
+        }))
+        .work("torque", |t: Real, (x, _): &State| {
+            let torque = (t * TORQUE[1]).sin() * TORQUE[0] * (x.x.cos() * 0.2 + 1.0);
+            vector![0.0.into(), torque, 0.0.into()]
+        })
+        .bath(
+            "air",
+            Bath::at(TEMPERATURE).friction(|_: Real, (_, u): &State, _: &Vector3<Real>| {
+                [
+                    Contact { rate: RATES[0].into(), along: Vector3::y() },
+                    Contact { rate: u.x * RATES[1], along: Vector3::z() },
+                ]
+            }),
+        )
+        .build()
+        .unwrap()
 }
+
+mod traps;
 
 fn start() -> (Vector2<f64>, Vector1<f64>) {
     (vector![1.0, 0.3], vector![1.5])
@@ -77,7 +88,7 @@ fn slope(points: &[(f64, f64)]) -> f64 {
 /// The errors of the state and of each entry of the ledger in runs of `counts` steps, and their orders.
 macro_rules! orders {
     ($method:expr, $counts:expr, $reference:expr) => {{
-        let system = pendulum!();
+        let system = pendulum();
         let mut errors: Vec<(f64, [f64; 5])> = Vec::new();
         for count in $counts {
             let h = 4.0 / f64::from(count);
@@ -102,7 +113,7 @@ macro_rules! orders {
 }
 
 fn reference() -> [f64; 7] {
-    let system = pendulum!();
+    let system = pendulum();
     let span = Span::until(4.0).tolerance(1e-13);
     let run = DormandPrince8.run(&system, system.start(start()), span).expect("it runs");
     println!("{}", run.certificate());
@@ -128,6 +139,9 @@ fn the_state_and_every_entry_of_the_ledger_have_the_order_of_the_method() {
     within("Gauss 1", orders!(Gauss::<1>, [80, 160, 320, 640], reference), 2.0);
     within("Gauss 2", orders!(Gauss::<2>, [20, 40, 80, 160], reference), 4.0);
     within("Gauss 3", orders!(Gauss::<3>, [10, 20, 40], reference), 6.0);
+    let chebyshev = orders!(RungeKuttaChebyshev, [80, 160, 320, 640], reference);
+    println!("Runge-Kutta-Chebyshev {chebyshev:?}");
+    within("Runge-Kutta-Chebyshev", chebyshev, 2.0);
     // The entries of explicit methods are within the error of the state.
     let five = orders!(DormandPrince5, [40, 80, 160], reference);
     let eight = orders!(DormandPrince8, [10, 20, 40], reference);
@@ -210,6 +224,40 @@ fn a_fast_bath_is_damped_and_its_heat_is_booked() {
     assert!(run.certificate().stages.unwrap().surplus > -1.0);
 }
 
+#[test]
+fn several_baths_share_what_is_damped() {
+    // A fast bath and a slow one on two momenta: each takes the energy of its own.
+    let slider = System::on(Euclidean::<2>)
+        .bracket(Zero)
+        .energy(|p: &Vector2<Real>| p.norm_squared() * 0.5)
+        .bath(
+            "fast",
+            Bath::at(2.0).friction(|_: Real, _: &Vector2<Real>, _: &Vector2<Real>| {
+                [Contact { rate: 1e3.into(), along: Vector2::x() }]
+            }),
+        )
+        .bath(
+            "slow",
+            Bath::at(0.5).friction(|_: Real, _: &Vector2<Real>, _: &Vector2<Real>| {
+                [Contact { rate: 1e-2.into(), along: Vector2::y() }]
+            }),
+        )
+        .build()
+        .unwrap();
+    let start = slider.start(vector![1.0, 1.0]);
+    let run = Radau::<2>.run(&slider, start, Span::steps(0.5, 10)).unwrap();
+    println!("{}", run.certificate());
+    assert!(run.certificate().keeps_energy() && run.certificate().keeps_entropy());
+    let OpenState { x, ledger, .. } = &run.last().point;
+    let slow = 0.5 * ((-0.1_f64).exp() - 1.0);
+    assert!(x.x.abs() < 1e-12 && (x.y - (-0.05_f64).exp()).abs() < 1e-3, "{x}");
+    let heats = ["fast", "slow"].map(|bath| ledger.heat(bath).unwrap());
+    assert!((heats[0] + 0.5).abs() < 1e-3 && (heats[1] - slow).abs() < 1e-3, "{heats:?}");
+    let entropies = ["fast", "slow"].map(|bath| ledger.bath_entropy(bath).unwrap());
+    assert!((entropies[0] + heats[0] / 2.0).abs() < 1e-14);
+    assert!((entropies[1] + heats[1] / 0.5).abs() < 1e-14);
+}
+
 /// `H = ½q² + ½p² + sin 3t`: the time changes the energy and moves nothing.
 macro_rules! beside_a_clock {
     () => {
@@ -271,7 +319,7 @@ fn work_of_the_time_moves_no_state_near_rest() {
 
 #[test]
 fn the_clock_is_no_coordinate() {
-    let system = pendulum!();
+    let system = pendulum();
     macro_rules! agree {
         ($($method:expr),*) => {$(
             let run = $method
@@ -352,7 +400,7 @@ fn a_sampled_control_has_corners_of_its_own() {
 #[test]
 fn what_flows_through_takes_no_digits_of_the_balance() {
     // A motor that works against friction for a long time: the entries grow, the balance does not.
-    let system = pendulum!();
+    let system = pendulum();
     macro_rules! long {
         ($method:expr, $h:expr) => {{
             let span = Span::steps($h, 20_000).every(1000);
@@ -362,6 +410,14 @@ fn what_flows_through_takes_no_digits_of_the_balance() {
             let ledger = &run.last().point.ledger;
             let throughput = ledger.heat("air").unwrap().abs();
             assert!(throughput > 10.0, "{throughput}");
+            // All in one sum, and each entry in its own.
+            let entries = [
+                ledger.parameter_work(),
+                ledger.work("torque").unwrap(),
+                ledger.heat("air").unwrap(),
+            ];
+            let apart = entries.iter().sum::<f64>() - ledger.net();
+            assert!(apart.abs() <= 2.0 * f64::EPSILON * throughput, "{apart:e}");
             assert!(run.certificate().max_energy_error < 2e-14);
         }};
     }
@@ -373,7 +429,7 @@ fn what_flows_through_takes_no_digits_of_the_balance() {
 
 #[test]
 fn a_run_that_starts_late_keeps_the_balance() {
-    let system = pendulum!();
+    let system = pendulum();
     for time in [2000.0, 1e6] {
         macro_rules! late {
             ($($method:expr),*) => {$(
@@ -456,7 +512,7 @@ fn a_bath_whose_temperature_changes_books_its_entropy_stage_by_stage() {
 
 #[test]
 fn outputs_events_and_checkpoints_have_the_ledger() {
-    let system = pendulum!();
+    let system = pendulum();
     let end = 8.0;
     macro_rules! whole {
         ($($method:expr, $bound:expr);*) => {$(

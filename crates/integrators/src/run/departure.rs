@@ -1,0 +1,100 @@
+//! How a state leaves the event at which it has jumped.
+//!
+//! An event is found where its function is zero or has its later sign, by round-off. A ball that bounces goes back to the
+//! side from which it came, so there the function has the wrong sign by round-off at the start of the next step. A
+//! switch goes on to the other side. The velocity after the jump tells one from the other.
+
+use crate::step::exact::Exact;
+
+/// The state goes back to the side from which it came.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
+pub(super) struct Departure {
+    /// The time from which on the function is no round-off.
+    time: Exact,
+    /// The sign of the function before the event.
+    earlier: Exact,
+    /// Whether it did not go back.
+    pub(super) fails: bool,
+}
+
+/// The function of an event before and after a jump.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Sides {
+    /// The sign before the event.
+    pub(super) earlier: f64,
+    /// The value at the event, before the jump and after it.
+    pub(super) before: f64,
+    pub(super) here: f64,
+}
+
+/// How much larger than after the jump the function is where it is no round-off.
+const CLEAR: f64 = 4.0;
+
+/// Looks for the time after a jump at which the function is no round-off, in steps of a factor of 2 up to a step of the run.
+/// `None` if the state does not go back.
+pub(super) fn find(
+    Sides { earlier, before, here }: Sides,
+    time: f64,
+    h: f64,
+    mut value: impl FnMut(f64) -> f64,
+) -> Option<Departure> {
+    let is_round_off = earlier * here <= 0.0 && here.abs() <= CLEAR * before.abs();
+    let mut later = CLEAR * f64::EPSILON * time.abs().max(h);
+    while is_round_off && later < h {
+        if earlier * value(later) > CLEAR * here.abs() {
+            return Some(Departure {
+                time: Exact(time + later),
+                earlier: Exact(earlier),
+                fails: false,
+            });
+        }
+        later *= 2.0;
+    }
+    None
+}
+
+/// Where in a step the function is first seen on the side to which the state goes back.
+pub(super) enum Seen {
+    /// The step ends before.
+    NotYet,
+    At {
+        theta: f64,
+        value: f64,
+    },
+    /// Nowhere: the state turns round within round-off.
+    Never,
+}
+
+/// The fraction of a step up to which the function is looked at.
+const EARLY: f64 = 0.2;
+
+impl Departure {
+    /// The state did not go back.
+    pub(super) const fn failed(self) -> Self {
+        Self { fails: true, ..self }
+    }
+
+    /// Looks at the function in a step; `None` if it has no value there.
+    pub(super) fn seen(
+        self,
+        [start, end]: [f64; 2],
+        mut value: impl FnMut(f64) -> Option<f64>,
+    ) -> Option<Seen> {
+        let mut theta = (self.time.0 - start) / (end - start);
+        if theta.is_nan() || theta >= 1.0 {
+            return Some(Seen::NotYet);
+        }
+        loop {
+            let value = value(theta)?;
+            if self.earlier.0 * value > 0.0 {
+                return Some(Seen::At { theta, value });
+            }
+            if theta >= EARLY {
+                return Some(Seen::Never);
+            }
+            theta = (2.0 * theta).min(EARLY);
+        }
+    }
+}

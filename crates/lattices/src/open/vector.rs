@@ -1,0 +1,113 @@
+//! Directions of an open lattice: those of its sites, with the clock and what is booked beside them.
+
+use metriplectic_integrators::Vector;
+
+use crate::vector::SiteVector;
+
+/// A displacement or a rate of an open lattice: the numbers of its sites, which alone count in norms, and those of the clock
+/// and of the ledger beyond [`len`](Vector::len). A combination of rates integrates all of them.
+#[derive(Clone, Debug)]
+pub struct OpenSiteVector {
+    pub(super) v: SiteVector,
+    /// The time, and what is booked.
+    pub(super) beside: Vec<f64>,
+}
+
+impl OpenSiteVector {
+    pub(super) const fn new(v: SiteVector, beside: Vec<f64>) -> Self {
+        Self { v, beside }
+    }
+}
+
+impl Vector for OpenSiteVector {
+    fn len(&self) -> usize {
+        self.v.len()
+    }
+
+    #[inline]
+    fn get(&self, i: usize) -> f64 {
+        match i.checked_sub(self.v.len()) {
+            None => self.v.get(i),
+            Some(i) => self.beside[i],
+        }
+    }
+
+    fn with(&self, mut number: impl FnMut(usize) -> f64) -> Self {
+        let length = self.v.len();
+        let v = self.v.with(&mut number);
+        Self { v, beside: (0..self.beside.len()).map(|i| number(length + i)).collect() }
+    }
+
+    fn zero(&self) -> Self {
+        Self { v: self.v.zero(), beside: vec![0.0; self.beside.len()] }
+    }
+
+    fn map(&self, f: impl Fn(f64) -> f64) -> Self {
+        Self { beside: self.beside.iter().map(|&x| f(x)).collect(), v: self.v.map(f) }
+    }
+
+    fn zip<const K: usize>(vectors: [&Self; K], f: impl Fn([f64; K]) -> f64 + Sync) -> Self {
+        let count = vectors[0].beside.len();
+        let beside = (0..count).map(|i| f(vectors.map(|v| v.beside[i]))).collect();
+        Self { v: SiteVector::zip(vectors.map(|v| &v.v), f), beside }
+    }
+
+    fn combination<'a>(h: f64, count: usize, term: impl Fn(usize) -> (f64, &'a Self)) -> Self
+    where
+        Self: 'a,
+    {
+        let beside = (0..term(0).1.beside.len()).map(|i| {
+            let of = |j: usize| term(j).0 * term(j).1.beside[i];
+            h * (1..count).fold(of(0), |sum, j| sum + of(j))
+        });
+        let beside = beside.collect();
+        let v = SiteVector::combination(h, count, |j| {
+            let (w, v) = term(j);
+            (w, &v.v)
+        });
+        Self { v, beside }
+    }
+
+    fn relative_to(&self, sizes: &Self) -> f64 {
+        self.v.relative_to(&sizes.v)
+    }
+
+    fn norm_of<const K: usize>(vectors: [&Self; K], f: impl Fn([f64; K]) -> f64 + Sync) -> f64 {
+        SiteVector::norm_of(vectors.map(|v| &v.v), f)
+    }
+
+    fn sites(&self) -> Option<usize> {
+        self.v.sites()
+    }
+
+    fn largest_site(&self, sizes: &Self) -> Option<usize> {
+        self.v.largest_site(&sizes.v)
+    }
+
+    fn to_list(&self) -> Vec<f64> {
+        let mut list = self.v.to_list();
+        list.extend(&self.beside);
+        list
+    }
+
+    fn to_short_list(&self) -> Vec<f64> {
+        self.v.to_short_list()
+    }
+
+    fn kinds(&self) -> usize {
+        self.v.kinds()
+    }
+
+    fn by_kind(&self) -> Self {
+        Self { v: self.v.by_kind(), beside: self.beside.clone() }
+    }
+
+    fn with_list(&self, list: &[f64]) -> Option<Self> {
+        let (length, count) = (self.v.len(), self.beside.len());
+        if list.len() == length + count && count > 0 {
+            let (v, beside) = list.split_at(length);
+            return Some(Self { v: self.v.with_list(v)?, beside: beside.to_vec() });
+        }
+        Some(Self { v: self.v.with_list(list)?, beside: vec![0.0; count] })
+    }
+}

@@ -18,6 +18,7 @@
 //! | [`normal`] | normal coordinates on a space of constant curvature |
 //! | [`metric_error`] | [`MetricError`]: errors of metrics and geodesics |
 //! | [`inner_product`] | [`InnerProduct`]: flat and sharp at one point; [`Canonical`] |
+//! | [`inert`](mod@inert) | [`Inert`]: a cometric that is zero, for parameters |
 //! | [`metric`] | [`Riemannian`]: norm, distance, geodesics |
 //! | [`metric_at`] | [`MetricAt`]: a metric at one point, evaluated once |
 //! | [`flat`] | metrics that are constant in a global chart, with straight geodesics: [`Metric::constant`] |
@@ -44,6 +45,7 @@ pub mod flat;
 mod geodesic;
 mod geodesic_jet;
 pub mod half_line;
+pub mod inert;
 pub mod inner_product;
 pub mod laws;
 pub mod lie_algebra;
@@ -75,6 +77,7 @@ pub use exponential::Exponential;
 pub use field_metric::FieldMetric;
 pub use flat::{Constant, Flat};
 pub use half_line::HalfLine;
+pub use inert::Inert;
 pub use inner_product::{Canonical, InnerProduct};
 pub use lie_algebra::{AlgebraError, LieAlgebra};
 pub use lie_dual::LieDual;

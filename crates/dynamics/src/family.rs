@@ -25,7 +25,7 @@ pub use on_first::{FieldAt, FieldOf, OnFirst};
 use std::fmt;
 use std::sync::Arc;
 
-use metriplectic_fields::{Real, Space};
+use metriplectic_fields::{Real, ScalarField, Space};
 use metriplectic_manifolds::{Euclidean, Manifold, Product, Riemannian, Times};
 use nalgebra::SVector;
 
@@ -137,5 +137,45 @@ where
             y.second_law(),
         );
         Frozen { narrow, wide: Arc::clone(&self.wide), theta, names: self.names }
+    }
+}
+
+/// A model with parameters, whose systems have tangents; what a fit asks for.
+pub trait Parametrised<const P: usize> {
+    /// The system at one `θ`.
+    type System: Differentiable;
+
+    /// Freezes the parameters, as [`Family::at`] does.
+    fn at_parameters(&self, theta: SVector<f64, P>) -> Self::System;
+}
+
+impl<M, G, B, K, H, S, L, const P: usize> Parametrised<P>
+    for Family<System<Product<M, Euclidean<P>>, G, B, K, H, S, L>, P>
+where
+    M: Manifold + Times<Euclidean<P>>,
+    System<Product<M, Euclidean<P>>, G, B, K, H, S, L>: Metriplectic<
+            Manifold = Product<M, Euclidean<P>>,
+            Metric = G,
+            Bracket = B,
+            Dissipation = K,
+            Energy = H,
+            Entropy = S,
+            Invariants = L,
+        >,
+    G: Freeze<P, Narrow: Riemannian<M>> + Riemannian<Product<M, Euclidean<P>>>,
+    B: Freeze<P, Narrow: Bracket<M, G::Narrow>>,
+    K: Freeze<P, Narrow: Dissipation<M, G::Narrow>>,
+    H: Freeze<P, Narrow: ScalarField<M>>,
+    S: Freeze<P, Narrow: ScalarField<M>>,
+    L: Freeze<P, Narrow: Invariants<M>>,
+{
+    type System = Frozen<
+        Narrow<M, G, B, K, H, S, L, P>,
+        System<Product<M, Euclidean<P>>, G, B, K, H, S, L>,
+        P,
+    >;
+
+    fn at_parameters(&self, theta: SVector<f64, P>) -> Self::System {
+        self.at(theta)
     }
 }

@@ -59,7 +59,7 @@ pub use dissipation::{
     FormError, KulkarniNomizu, MetricDissipation, NoDissipation, ProjectedDissipation, Scaled,
 };
 pub use exchange::{Bath, Contact, Port};
-pub use family::{Differentiable, Family, FamilyBuilder, Frozen};
+pub use family::{Differentiable, Family, FamilyBuilder, Frozen, Parametrised};
 pub use invariants::Invariants;
 pub use legendre::{Legendre, LegendreError};
 pub use metriplectic::{Metriplectic, Point, SecondLaw};

@@ -15,6 +15,7 @@
 //! | [`half_line`](mod@half_line) | [`HalfLine`]: R₊ |
 //! | [`chart`](mod@chart) | [`Chart`]: an open part of Rⁿ, in coordinates of your own |
 //! | [`product`](mod@product) | [`Product`]: `A × B` |
+//! | [`moving_base`](mod@moving_base) | [`MovingBase`]: stages around a base that moves, for tangents of explicit steps |
 //! | [`normal`] | normal coordinates on a space of constant curvature |
 //! | [`metric_error`] | [`MetricError`]: errors of metrics and geodesics |
 //! | [`inner_product`] | [`InnerProduct`]: flat and sharp at one point; [`Canonical`] |
@@ -54,6 +55,7 @@ pub mod manifold;
 pub mod metric;
 pub mod metric_at;
 pub mod metric_error;
+pub mod moving_base;
 pub mod normal;
 #[cfg(feature = "argmin")]
 mod path;
@@ -85,6 +87,7 @@ pub use manifold::{Manifold, PointError};
 pub use metric::{GeodesicEnd, Riemannian};
 pub use metric_at::{MetricAt, MetricJet, MetricSlopes, Slopes};
 pub use metric_error::MetricError;
+pub use moving_base::MovingBase;
 pub use product::{Product, Times};
 pub use product_metric::Split;
 pub use projection::Projection;

@@ -132,9 +132,9 @@ fn combinations_that_no_datum_sees_are_named() {
     let span = Span::steps(0.1, 60).output_every(0.5);
     let run = DormandPrince5.run(&family.at(truth), vector![1.0, 0.0], span.clone()).unwrap();
     let times: Vec<f64> = run.states()[1..].iter().map(|state| state.time).collect();
-    let rows: Vec<_> = run.states()[1..].iter().map(|state| vector![state.point.x + 1e-4]).collect();
+    let rows: Vec<_> = run.states()[1..].iter().map(|state| state.point.add_scalar(1e-4)).collect();
     let fit = Fit::of(&family)
-        .observe(|x: &Vector2<Real>| vector![x.x])
+        .observe(|x: &Vector2<Real>| *x)
         .data(&times, &rows)
         .start_at(vector![1.0, 0.0])
         .run(DormandPrince5, Span::steps(0.1, 60), vector![1.4, 2.2, 0.72])

@@ -121,6 +121,12 @@ fn parameters_are_columns() {
     let moved = weyl.run(&naive, (START, theta), span).unwrap().last().point.1 - theta;
     println!("a canonical factor moves by {:.2}", moved.amax());
     assert!(moved.amax() > 1.0);
+    let report = naive.report(&(START, theta));
+    assert_eq!(report.moved_by_friction, [3, 4, 5, 6]);
+    assert!(report.to_string().contains("belongs into a `Family`"));
+    let frozen = family.at(theta);
+    assert!(frozen.wide().report(&(START, theta)).moved_by_friction.is_empty());
+    assert!(frozen.report(&START).moved_by_friction.is_empty());
 }
 
 /// A molecule in SI units: powers of two change no bit, and others round-off alone.

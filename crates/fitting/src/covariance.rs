@@ -2,14 +2,14 @@
 
 use nalgebra::{DMatrix, DVector};
 
-/// The covariance `s² (JᵀJ)⁻¹` of the unknowns, and the combination that the data tell the least of.
+/// The covariance `s² (JᵀJ)⁻¹` of the unknowns, and the combinations that the data do not see.
 #[derive(Clone, Debug)]
 pub struct Covariance {
     /// The matrix; infinite along what the data do not see.
     pub matrix: DMatrix<f64>,
-    /// The direction of the smallest singular value, in units of the columns' lengths.
-    pub weakest: DVector<f64>,
-    /// This value relative to the largest one.
+    /// The directions that the data do not see, in units of the columns' lengths.
+    pub unseen: Vec<DVector<f64>>,
+    /// The smallest singular value of the columns in units of their lengths, relative to the largest.
     pub fraction: f64,
 }
 
@@ -31,8 +31,7 @@ impl Covariance {
         let r = unit.qr().r().svd(false, true);
         let values = r.singular_values.clone();
         let largest = values.max();
-        let weakest = values.imin();
-        let fraction = if largest > 0.0 { values[weakest] / largest } else { 0.0 };
+        let fraction = if largest > 0.0 { values.min() / largest } else { 0.0 };
         let v = r.v_t.map_or_else(|| DMatrix::identity(n, n), |v| v.transpose());
         let matrix = DMatrix::from_fn(n, n, |i, j| {
             let sum: f64 = (0..n)
@@ -43,7 +42,9 @@ impl Covariance {
                 .sum();
             variance * sum / (lengths[i] * lengths[j])
         });
-        Self { matrix, weakest: v.column(weakest).into_owned(), fraction }
+        let is_unseen = |k: &usize| !(values[*k] >= UNSEEN * largest);
+        let unseen = (0..n).filter(is_unseen).map(|k| v.column(k).into_owned()).collect();
+        Self { matrix, unseen, fraction }
     }
 
     /// Returns whether the data do not see a combination of the unknowns.

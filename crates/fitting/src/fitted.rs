@@ -131,15 +131,13 @@ impl Fitted {
         DMatrix::from_fn(n, n, |i, j| if i == j { 1.0 } else { self.covariance.correlation(i, j) })
     }
 
-    /// The names that the data cannot tell apart: those in the combination that no residual depends on.
+    /// The names that the data cannot tell apart: those in a combination that no residual depends on.
     pub fn not_told_apart(&self) -> Vec<&'static str> {
-        if !self.covariance.is_singular() {
-            return Vec::new();
-        }
-        let weakest = &self.covariance.weakest;
-        let largest = weakest.amax();
-        let named = self.estimates.iter().zip(weakest.iter());
-        named.filter(|(_, w)| w.abs() > 0.1 * largest).map(|(estimate, _)| estimate.name).collect()
+        let is_in = |k: usize| {
+            self.covariance.unseen.iter().any(|unseen| unseen[k].abs() > 0.1 * unseen.amax())
+        };
+        let named = self.estimates.iter().enumerate().filter(|(k, _)| is_in(*k));
+        named.map(|(_, estimate)| estimate.name).collect()
     }
 }
 

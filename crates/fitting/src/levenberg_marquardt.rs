@@ -10,7 +10,7 @@ use crate::least_squares::{LeastSquares, Squares};
 /// The method of Levenberg (1944) and Marquardt (1963), as a solver for argmin's
 /// [`Executor`](argmin::core::Executor): observers, checkpoints and limits are those of argmin.
 ///
-/// An iteration is one trial, and one evaluation of the problem: with `D` the largest lengths of the columns of `J` so far,
+/// An iteration is one trial, and one evaluation of the problem: with `D` the lengths of the columns of `J`,
 ///
 /// ```math
 /// \delta = \operatorname*{arg\,min}_\delta\, |J \delta + r|^2 + \lambda |D \delta|^2
@@ -50,11 +50,14 @@ pub struct LevenbergMarquardt {
     pub cosine: f64,
     /// The relative reduction of the sum of squares, predicted and actual, at which a minimum is reached.
     pub reduction: f64,
+    /// The length of a column of `J`, in units of the root mean square of the residuals, below which its unknown is left where it is: no
+    /// residual depends on it. The logarithm of a parameter that is zero ends here, and has no minimum.
+    pub negligible: f64,
 }
 
 impl Default for LevenbergMarquardt {
     fn default() -> Self {
-        Self { damping: 1e-3, cosine: 1e-8, reduction: 1e-12 }
+        Self { damping: 1e-3, cosine: 1e-8, reduction: 1e-12, negligible: 1e-2 }
     }
 }
 
@@ -65,6 +68,18 @@ type Iteration = IterState<Vec<f64>, (), DMatrix<f64>, (), DVector<f64>, f64>;
 const LARGEST: f64 = 1e16;
 
 impl LevenbergMarquardt {
+    /// The residuals and the columns of the unknowns that they depend on.
+    fn relevant(&self, whole: &Squares) -> Squares {
+        let mut at = whole.clone();
+        let least = self.negligible * (whole.sum() / whole.residuals.len() as f64).sqrt();
+        for mut column in at.jacobian.column_iter_mut() {
+            if column.norm() < least {
+                column.fill(0.0);
+            }
+        }
+        at
+    }
+
     /// The step with the damping `λ`, and the reduction of the sum of squares that it predicts.
     fn step(&self, at: &Squares, scales: &DVector<f64>, lambda: f64) -> Option<(DVector<f64>, f64)> {
         let (rows, n) = at.jacobian.shape();
@@ -85,9 +100,9 @@ impl LevenbergMarquardt {
 }
 
 /// The lengths of the columns; those of a column of zeros are 1.
-fn lengths(jacobian: &DMatrix<f64>, before: Option<&DVector<f64>>) -> DVector<f64> {
+fn lengths(jacobian: &DMatrix<f64>) -> DVector<f64> {
     DVector::from_fn(jacobian.ncols(), |j, _| {
-        let length = jacobian.column(j).norm().max(before.map_or(0.0, |before| before[j]));
+        let length = jacobian.column(j).norm();
         if length > 0.0 { length } else { 1.0 }
     })
 }
@@ -118,26 +133,26 @@ impl<O: LeastSquares> Solver<O, Iteration> for LevenbergMarquardt {
         let here = state.take_param().ok_or_else(missing)?;
         let (residuals, jacobian) =
             (state.take_residuals().ok_or_else(missing)?, state.take_jacobian().ok_or_else(missing)?);
-        let at = Squares { residuals, jacobian };
-        let sum = at.sum();
-        let keep = |state: Iteration, at: Squares, here: Vec<f64>| {
-            state.param(here).cost(sum).residuals(at.residuals).jacobian(at.jacobian)
+        let whole = Squares { residuals, jacobian };
+        let (at, sum) = (self.relevant(&whole), whole.sum());
+        let keep = |state: Iteration, whole: Squares, here: Vec<f64>| {
+            state.param(here).cost(sum).residuals(whole.residuals).jacobian(whole.jacobian)
         };
         let converged = TerminationReason::SolverConverged;
         if at.cosine() <= self.cosine || sum == 0.0 {
-            return Ok((keep(state, at, here).terminate_with(converged), None));
+            return Ok((keep(state, whole, here).terminate_with(converged), None));
         }
-        let scales = lengths(&at.jacobian, None);
+        let scales = lengths(&at.jacobian);
         let Some((delta, predicted)) = self.step(&at, &scales, self.damping) else {
             self.damping *= 10.0;
-            return Ok((keep(state, at, here), None));
+            return Ok((keep(state, whole, here), None));
         };
         let is_rounding = here
             .iter()
             .zip(delta.iter())
             .all(|(phi, delta)| delta.abs() <= 4.0 * f64::EPSILON * phi.abs());
         if predicted <= 0.1 * self.reduction * sum || is_rounding {
-            return Ok((keep(state, at, here).terminate_with(converged), None));
+            return Ok((keep(state, whole, here).terminate_with(converged), None));
         }
         let there: Vec<f64> = here.iter().zip(delta.iter()).map(|(phi, delta)| phi + delta).collect();
         let next = evaluate(problem, &there)?;
@@ -156,7 +171,7 @@ impl<O: LeastSquares> Solver<O, Iteration> for LevenbergMarquardt {
             }
             None => {
                 self.damping *= 10.0;
-                let state = keep(state, at, here);
+                let state = keep(state, whole, here);
                 let stuck = self.damping > LARGEST;
                 Ok((if stuck { state.terminate_with(converged) } else { state }, Some(kv)))
             }

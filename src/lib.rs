@@ -73,6 +73,8 @@ pub use metriplectic_dynamics as dynamics;
 #[cfg(feature = "ensembles")]
 pub use metriplectic_ensembles as ensembles;
 pub use metriplectic_fields as fields;
+#[cfg(feature = "fitting")]
+pub use metriplectic_fitting as fitting;
 pub use metriplectic_integrators as integrators;
 pub use metriplectic_lattices as lattices;
 pub use metriplectic_manifolds as manifolds;
@@ -82,25 +84,27 @@ pub use nalgebra;
 pub mod prelude {
     pub use metriplectic_dynamics::{
         AlmostPoisson, AreaForm, Bath, CasimirDissipation, CometricDissipation, Contact,
-        FieldDissipation, Force, ForcedLiePoisson, KulkarniNomizu, Legendre, LiePoisson,
+        Differentiable, Family, FieldDissipation, Force, ForcedLiePoisson, KulkarniNomizu, Legendre, LiePoisson,
         MetricDissipation, Metriplectic, ModelError, Nambu, Poisson, ProjectedDissipation, Scaled,
         SecondLaw, Symplectic, System, VectorField, Verify, Zero,
     };
     #[cfg(feature = "ensembles")]
     pub use metriplectic_ensembles::{Row, Shard, Sweep, Table, geomspace, linspace};
+    #[cfg(feature = "fitting")]
+    pub use metriplectic_fitting::{Fit, FitError, Fitted};
     pub use metriplectic_fields::{ErasedField, MatrixField, Real, Scalar, ScalarField};
     pub use metriplectic_integrators::{
         Attitude, AttitudeError, Certificate, Checkpoint, DormandPrince5, DormandPrince8, Ending,
         Error, Event, ExplicitRungeKutta, Gauss, Gonzalez, ItohAbe, MeanValue, Method, Newton,
         Observables, OpenBuilder, OpenSpace, OpenState, OpenSystem, Radau, ResumeError, Run,
         RunError, RungeKuttaChebyshev, Scheme, Span, SpanError, State, StepError, Stepper, Steps,
-        SymmetricItohAbe, Tableau, Trajectory, Until, Watch,
+        SymmetricItohAbe, Tableau, Tangents, Trajectory, Until, Watch,
     };
     pub use metriplectic_lattices::{
         BondState, Boundary, Graph, Lattice, LatticeError, Onsager, Points, Profiles, SiteState,
     };
     pub use metriplectic_manifolds::{
-        Canonical, Cayley, Chart, ChartMidpoint, Euclidean, Exponential, HalfLine, LieAlgebra,
+        Canonical, Cayley, Chart, ChartMidpoint, Euclidean, Exponential, HalfLine, Inert, LieAlgebra,
         LieDual, Manifold, Metric, Product, Projection, Retraction, Rotations, Sphere,
         WeylMidpoint,
     };

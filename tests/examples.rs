@@ -782,6 +782,17 @@ fn the_shards_of_the_sweep_make_the_table_of_one_process() {
 }
 
 #[test]
+fn a_fit_finds_the_inertias_of_a_body() {
+    let report = json(&example("fit_rigid_body", &["--json"]));
+    let off = |key: &str, truth: f64| {
+        (figure(&report, key) - truth) / figure(&report, &format!("{key}_error"))
+    };
+    assert!(off("I1", 3.0).abs() < 4.0 && off("friction", 0.08).abs() < 4.0, "{report}");
+    assert!((figure(&report, "noise") - 1e-3).abs() < 2e-4, "{report}");
+    assert!(figure(&report, "runs") <= 30.0 && figure(&report, "tangent_law") < 1e-12, "{report}");
+}
+
+#[test]
 fn a_capacitor_turns_half_of_its_energy_into_heat_each_time() {
     let report = json(&example("rc_circuit", &["--json"]));
     assert_eq!(report["entropy_falls"], 0);

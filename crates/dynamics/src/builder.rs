@@ -106,6 +106,16 @@ impl<M, G, B, K, H, S, L, P> SystemBuilder<M, G, B, K, H, S, L, P> {
         SystemBuilder { tensors: replace(tensors), fields, has_entropy, second_law, surroundings }
     }
 
+    /// Replaces the metric by one that is still to be checked, when the system is built.
+    pub(crate) fn any_metric<F>(self, metric: F) -> SystemBuilder<M, F, B, K, H, S, L, P> {
+        self.with_tensors(|Tensors { manifold, bracket, dissipation, .. }| Tensors {
+            manifold,
+            metric,
+            bracket,
+            dissipation,
+        })
+    }
+
     /// Replaces scalar fields.
     fn with_fields<E, F, I>(
         self,

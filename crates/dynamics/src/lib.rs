@@ -22,6 +22,7 @@
 //! | [`system`] | [`System`], which holds these parts |
 //! | [`builder`] | [`SystemBuilder`], which makes it |
 //! | [`legendre`] | [`Legendre`]: a reduced Lagrangian on a Lie algebra, as an energy on its dual |
+//! | [`family`] | [`Family`]: closures of the state and of parameters; [`Differentiable`] |
 //! | [`euler_poincare`] | `.lagrangian(..)` and `.force(..)` of the builder |
 //! | [`velocity`](mod@velocity) | `Π w_H + K w_S` for given covectors: differentials, or discrete gradients |
 //! | [`verify`] | the laws of a model, sampled |
@@ -32,6 +33,7 @@ pub mod builder;
 pub mod dissipation;
 pub mod euler_poincare;
 pub mod exchange;
+pub mod family;
 pub mod invariants;
 pub mod laws;
 pub mod legendre;
@@ -57,6 +59,7 @@ pub use dissipation::{
     FormError, KulkarniNomizu, MetricDissipation, NoDissipation, ProjectedDissipation, Scaled,
 };
 pub use exchange::{Bath, Contact, Port};
+pub use family::{Differentiable, Family, FamilyBuilder, Frozen, Parametrised};
 pub use invariants::Invariants;
 pub use legendre::{Legendre, LegendreError};
 pub use metriplectic::{Metriplectic, Point, SecondLaw};

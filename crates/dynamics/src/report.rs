@@ -36,6 +36,10 @@ pub struct Report {
     pub judged: usize,
     /// Points at which a value was not finite. Each was drawn again, nearer to the start.
     pub passed_over: usize,
+    /// Directions of the frame at the start that the dissipation of the metric moves and the bracket does not, if there are others
+    /// that it does. An internal energy is one. A parameter is not: it would not stay constant, and belongs into a
+    /// [`Family`](crate::Family).
+    pub moved_by_friction: Vec<usize>,
     /// The result of [`Verify::verify`](crate::Verify::verify).
     pub verdict: Result<(), ModelError>,
 }
@@ -43,7 +47,13 @@ pub struct Report {
 impl Report {
     /// The report of an examination that has not begun.
     pub(crate) const fn new() -> Self {
-        Self { laws: Vec::new(), judged: 0, passed_over: 0, verdict: Ok(()) }
+        Self {
+            laws: Vec::new(),
+            judged: 0,
+            passed_over: 0,
+            moved_by_friction: Vec::new(),
+            verdict: Ok(()),
+        }
     }
 }
 
@@ -58,6 +68,13 @@ impl fmt::Display for Report {
             } else {
                 writeln!(f, "  ------  {law:<22} {size:9.2e}  (not asked for)")?;
             }
+        }
+        if !self.moved_by_friction.is_empty() {
+            writeln!(
+                f,
+                "  note    directions {:?} are moved by friction alone; a parameter among them belongs into a `Family`",
+                self.moved_by_friction
+            )?;
         }
         match &self.verdict {
             Ok(()) => write!(f, "verdict: the model keeps its laws"),

@@ -151,6 +151,19 @@ impl<M: Space, G, B, K, H, S, L> System<M, G, B, K, H, S, L> {
     }
 }
 
+impl<M, G, B, K, H, S, L> System<M, G, B, K, H, S, L> {
+    /// Puts parts together that belong to a system which has been checked.
+    pub(crate) fn frozen(
+        manifold: M,
+        (metric, bracket, dissipation): (G, B, K),
+        (energy, entropy, invariants): (H, S, L),
+        second_law: SecondLaw,
+    ) -> Self {
+        let tensors = Tensors { manifold, metric, bracket, dissipation };
+        Self { tensors, fields: Fields { energy, entropy, invariants }, second_law }
+    }
+}
+
 impl<M, G, B, K, H, S, L> Metriplectic for System<M, G, B, K, H, S, L>
 where
     M: Manifold,

@@ -25,6 +25,7 @@ mod reached;
 pub(crate) mod sampling;
 mod sums;
 mod table;
+mod unbracketed;
 
 use metriplectic_fields::stack::with_room;
 use metriplectic_fields::{ChartPoint, Dimension};
@@ -112,6 +113,7 @@ fn examine<Y: Metriplectic + ?Sized>(
     value_not_finite(system, x0).map_or(Ok(()), Err)?;
     has_digits(system.energy(), "energy", x0)?;
     has_digits(system.entropy(), "entropy", x0)?;
+    report.moved_by_friction = unbracketed::directions(system, x0);
     let mut independent = vec![0.0_f64; Y::Invariants::COUNT];
     let mut widen = |x: &Point<Y>| {
         let fractions = independence(system, &ChartPoint::centre(x));

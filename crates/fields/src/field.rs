@@ -98,13 +98,30 @@ impl<M: Space> ScalarField<M> for f64 {
 }
 
 /// `f(x)` and `df(x)` in the coordinate frame of the chart at `x`.
-#[derive(Clone, Copy, Debug)]
+#[derive(Debug)]
 pub struct Jet1<M: Space> {
     /// The value.
     pub value: f64,
     /// The differential `∂f/∂qⁱ`.
     pub df: Vector<M>,
 }
+
+// By hand, because a derive would require `M: Copy`.
+impl<M: Space> Clone for Jet1<M> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<M: Space> Copy for Jet1<M> {}
+
+impl<M: Space> Clone for Jet2<M> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<M: Space> Copy for Jet2<M> {}
 
 impl<M: Space> Jet1<M> {
     /// Returns whether value and differential are finite.
@@ -114,7 +131,7 @@ impl<M: Space> Jet1<M> {
 }
 
 /// `f(x)`, `df(x)` and the Hessian in the coordinates of the chart at `x`.
-#[derive(Clone, Copy, Debug)]
+#[derive(Debug)]
 pub struct Jet2<M: Space> {
     /// The value.
     pub value: f64,

@@ -16,6 +16,7 @@
 //! | [`open`](mod@open) | [`OpenSystem`]: a clock in the energy, ports, baths and a ledger, for every method | [`step`], [`round_off`], [`discrete_gradient`], [`midpoint`], [`collocation`], [`explicit`], [`system`] |
 //! | [`Run`] | runs with the default scheme of a retraction | [`step`], [`midpoint`], [`run`] |
 //! | [`attitude`] | [`Attitude`]: where a body points along a run of its angular momentum | [`run`], [`round_off`] |
+//! | [`tangent`](mod@tangent) | [`Tangents`]: the derivative of a run along its start and parameters | [`step`], [`discrete_gradient`], [`newton`], [`midpoint`], [`explicit`], [`run`] |
 //! | [`laws`] | what a step and a method promise, and the functions that check it | all of them |
 //! | [`error`](mod@error) | [`Error`]: everything that can go wrong | [`step`], [`run`], [`attitude`] |
 //!
@@ -42,6 +43,7 @@ pub mod round_off;
 pub mod run;
 pub mod step;
 pub mod system;
+pub mod tangent;
 
 pub use attitude::{Attitude, AttitudeError};
 pub use collocation::{Gauss, Radau, StageMemory};
@@ -69,6 +71,10 @@ pub use run::trajectory::Trajectory;
 pub use run::until::Until;
 pub use run::watch::{Jumping, Watch, Watched};
 pub use run::{Ending, Method, Schedule, SpanError, State};
+pub use tangent::{
+    Linearised as LinearisedStep, SelfAdjoint, Sensitivity, TangentError, TangentEvent, TangentRun, TangentState,
+    TangentSteps, Tangents, Unlinearised,
+};
 pub use step::{
     Components, Control, Effort, Element, EntropyStep, EventExchange, Evidence, Flow, JumpError,
     Laws, LedgerSummary, LimitingSites, Memory, MethodError, Promises, Recheck, Refusal,

@@ -10,7 +10,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// The rooms, each with the rooms that its files name. A room names only rooms above it.
-const ROOMS: [(&str, &[&str]); 14] = [
+const ROOMS: [(&str, &[&str]); 15] = [
     ("step", &[]),
     ("round_off", &["step"]),
     ("discrete_gradient", &["round_off"]),
@@ -35,6 +35,7 @@ const ROOMS: [(&str, &[&str]); 14] = [
     ("default_scheme", &["step", "midpoint", "run"]),
     ("attitude", &["round_off", "run"]),
     ("error", &["step", "run", "attitude"]),
+    ("tangent", &["step", "discrete_gradient", "newton", "midpoint", "explicit", "run"]),
     ("laws", &["step", "round_off", "discrete_gradient", "midpoint", "explicit", "run"]),
 ];
 

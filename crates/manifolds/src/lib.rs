@@ -15,9 +15,11 @@
 //! | [`half_line`](mod@half_line) | [`HalfLine`]: R₊ |
 //! | [`chart`](mod@chart) | [`Chart`]: an open part of Rⁿ, in coordinates of your own |
 //! | [`product`](mod@product) | [`Product`]: `A × B` |
+//! | [`moving_base`](mod@moving_base) | [`MovingBase`]: stages around a base that moves, for tangents of explicit steps |
 //! | [`normal`] | normal coordinates on a space of constant curvature |
 //! | [`metric_error`] | [`MetricError`]: errors of metrics and geodesics |
 //! | [`inner_product`] | [`InnerProduct`]: flat and sharp at one point; [`Canonical`] |
+//! | [`inert`](mod@inert) | [`Inert`]: a cometric that is zero, for parameters |
 //! | [`metric`] | [`Riemannian`]: norm, distance, geodesics |
 //! | [`metric_at`] | [`MetricAt`]: a metric at one point, evaluated once |
 //! | [`flat`] | metrics that are constant in a global chart, with straight geodesics: [`Metric::constant`] |
@@ -44,6 +46,7 @@ pub mod flat;
 mod geodesic;
 mod geodesic_jet;
 pub mod half_line;
+pub mod inert;
 pub mod inner_product;
 pub mod laws;
 pub mod lie_algebra;
@@ -52,6 +55,7 @@ pub mod manifold;
 pub mod metric;
 pub mod metric_at;
 pub mod metric_error;
+pub mod moving_base;
 pub mod normal;
 #[cfg(feature = "argmin")]
 mod path;
@@ -75,6 +79,7 @@ pub use exponential::Exponential;
 pub use field_metric::FieldMetric;
 pub use flat::{Constant, Flat};
 pub use half_line::HalfLine;
+pub use inert::Inert;
 pub use inner_product::{Canonical, InnerProduct};
 pub use lie_algebra::{AlgebraError, LieAlgebra};
 pub use lie_dual::LieDual;
@@ -82,6 +87,7 @@ pub use manifold::{Manifold, PointError};
 pub use metric::{GeodesicEnd, Riemannian};
 pub use metric_at::{MetricAt, MetricJet, MetricSlopes, Slopes};
 pub use metric_error::MetricError;
+pub use moving_base::MovingBase;
 pub use product::{Product, Times};
 pub use product_metric::Split;
 pub use projection::Projection;

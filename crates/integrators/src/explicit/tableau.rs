@@ -203,11 +203,16 @@ impl Tableau {
     }
 
     /// The rows of the stages.
-    pub(super) const fn rows(&self) -> &'static [Row] {
+    pub(crate) const fn rows(&self) -> &'static [Row] {
         match self.stages {
             Stages::Rows(rows) => rows,
             Stages::Chebyshev => &[],
         }
+    }
+
+    /// The weights of the end.
+    pub(crate) const fn weights(&self) -> Row {
+        self.end
     }
 
     /// The stages that only other stages before the end need.

@@ -65,7 +65,7 @@ impl Schedule {
     }
 
     /// When the run ends; infinite if it does not.
-    fn end(&self) -> f64 {
+    pub(crate) fn end(&self) -> f64 {
         match &self.size {
             Size::Fixed(h) => self.count.map_or(f64::INFINITY, |n| self.start + n as f64 * h),
             Size::Tolerance(adaptive) => adaptive.end(),

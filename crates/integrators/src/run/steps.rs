@@ -119,9 +119,14 @@ impl<'a, F: Flow, M: Stepper<F>> Steps<'a, F, M> {
         let (energy, entropy) = (values.energy, values.entropy);
         let state = State { step: 0, time: start, point: x0, energy, entropy };
         let watching = Watching::new(watch, &progress, &state, &[])?;
-        let (h, in_parts) = (0.0, false);
-        let before =
-            StepBefore { state: state.clone(), values: values.clone(), entropy, h, in_parts };
+        let before = StepBefore {
+            state: state.clone(),
+            values: values.clone(),
+            entropy,
+            h: 0.0,
+            in_parts: false,
+            entropy_step: None,
+        };
         let mut steps = Self {
             method,
             flow,
@@ -232,6 +237,7 @@ impl<'a, F: Flow, M: Stepper<F>> Steps<'a, F, M> {
         let Taken { x, values, evidence, effort } = taken;
         (self.before.h, self.before.entropy) = (h, self.entropy);
         self.before.in_parts = effort.splits > 0;
+        self.before.entropy_step = evidence.entropy_step;
         if evidence.dissipates {
             self.entropy = values.entropy;
         }

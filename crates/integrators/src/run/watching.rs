@@ -7,7 +7,7 @@ use crate::run::progress::Progress;
 use crate::run::requests::{Outputs, Requests};
 use crate::run::span_error::SpanError;
 use crate::run::state::State;
-use crate::step::{Flow, Laws, StateSpace};
+use crate::step::{EntropyStep, Flow, Laws, StateSpace};
 
 /// The start of the last step.
 #[derive(Clone, Debug)]
@@ -21,6 +21,8 @@ pub(super) struct StepBefore<F: Flow> {
     pub(super) h: f64,
     /// Whether the step was taken in parts.
     pub(super) in_parts: bool,
+    /// How the entropy at its end was found, by a method that projects onto it.
+    pub(super) entropy_step: Option<EntropyStep>,
 }
 
 /// Outputs and events between the steps of a run.

@@ -90,9 +90,14 @@ impl<'a, F: Flow, M: Stepper<F>> Steps<'a, F, M> {
         }
         let (energy, entropy, time) = (c.energy.0, c.entropy.0, c.time.0);
         let state = State { step: c.step, time, point, energy, entropy };
-        let (kept, h, in_parts) = (c.kept_entropy.0, 0.0, false);
-        let before =
-            StepBefore { state: state.clone(), values: values.clone(), entropy: kept, h, in_parts };
+        let before = StepBefore {
+            state: state.clone(),
+            values: values.clone(),
+            entropy: c.kept_entropy.0,
+            h: 0.0,
+            in_parts: false,
+            entropy_step: None,
+        };
         Ok(Self {
             promises: certificate.promises,
             rule: Rule::of(&method, progress.start),
@@ -104,7 +109,7 @@ impl<'a, F: Flow, M: Stepper<F>> Steps<'a, F, M> {
             progress,
             state,
             values,
-            entropy: kept,
+            entropy: c.kept_entropy.0,
             memory,
             certificate,
             failed: false,

@@ -1,0 +1,206 @@
+//! The builder of a [`Family`].
+
+use std::fmt;
+use std::sync::Arc;
+
+use metriplectic_fields::{Dimension as _, Form, Real, ScalarField, Velocity};
+use metriplectic_manifolds::{
+    Canonical, Euclidean, Inert, Manifold, Product, Riemannian, Times,
+};
+use nalgebra::SVector;
+
+use super::{Family, FieldOf, OfPair, OnFirst};
+use crate::bracket::{Bracket, NaturalBracket, Zero};
+use crate::builder::{Built, NoEnergy, SystemBuilder};
+use crate::dissipation::{Choice, Dissipation, Given, NoDissipation};
+use crate::invariants::{Casimir, Invariants, Momentum};
+use crate::metriplectic::SecondLaw;
+use crate::system::{BuildError, NoEntropy, System};
+
+/// A family in the making: as a [`SystemBuilder`], with closures of two arguments, `|x, θ|`.
+#[must_use = "a builder does nothing until `build` is called"]
+pub struct FamilyBuilder<Y, const P: usize> {
+    wide: Y,
+    names: [&'static str; P],
+}
+
+impl<Y, const P: usize> fmt::Debug for FamilyBuilder<Y, P> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("FamilyBuilder").field("names", &self.names).finish_non_exhaustive()
+    }
+}
+
+/// The manifold of a family whose parameters have not been named yet.
+#[derive(Clone, Copy, Debug)]
+pub struct Unnamed<M>(M);
+
+/// A builder on `M × Rᴾ`.
+type Wide<M, G, B, K, H, S, L, const P: usize> =
+    SystemBuilder<Product<M, Euclidean<P>>, G, B, K, H, S, L>;
+
+impl Family<(), 0> {
+    /// Starts a family of systems on a manifold, with its canonical metric and its natural bracket.
+    pub const fn on<M: NaturalBracket>(manifold: M) -> Unnamed<M> {
+        Unnamed(manifold)
+    }
+}
+
+/// A family without energy and entropy.
+type Bare<M, const P: usize> = FamilyBuilder<
+    Wide<
+        M,
+        (Canonical, Inert),
+        (<M as NaturalBracket>::Bracket, Zero),
+        NoDissipation,
+        NoEnergy,
+        NoEntropy,
+        (),
+        P,
+    >,
+    P,
+>;
+
+impl<M: NaturalBracket> Unnamed<M> {
+    /// Names the parameters, which are as many.
+    pub fn parameters<const P: usize>(self, names: [&'static str; P]) -> Bare<M, P>
+    where
+        M: Times<Euclidean<P>>,
+    {
+        let bracket = (self.0.natural_bracket(), Zero);
+        let wide = System::on(Product(self.0, Euclidean::<P>));
+        FamilyBuilder { wide: wide.any_metric((Canonical, Inert)).bracket(bracket), names }
+    }
+}
+
+impl<M, G, B, K, H, S, L, const P: usize> FamilyBuilder<Wide<M, G, B, K, H, S, L, P>, P>
+where
+    M: Manifold + Times<Euclidean<P>>,
+{
+    fn with<T>(
+        self,
+        replace: impl FnOnce(Wide<M, G, B, K, H, S, L, P>) -> T,
+    ) -> FamilyBuilder<T, P> {
+        FamilyBuilder { wide: replace(self.wide), names: self.names }
+    }
+
+    /// Sets the energy `H(x, θ)`, a closure `|x, θ| -> Real`.
+    pub fn energy<F>(
+        self,
+        energy: F,
+    ) -> FamilyBuilder<Wide<M, G, B, K, OfPair<F>, S, L, P>, P>
+    where
+        F: Fn(&M::Point<Real>, &SVector<Real, P>) -> Real,
+    {
+        self.with(|wide| wide.energy(OfPair(Arc::new(energy))))
+    }
+
+    /// Sets the entropy `S(x, θ)`, a closure `|x, θ| -> Real`, as [`SystemBuilder::entropy`] does.
+    pub fn entropy<F>(
+        self,
+        entropy: F,
+    ) -> FamilyBuilder<Wide<M, G, B, K::WithEntropy, H, OfPair<F>, L, P>, P>
+    where
+        F: Fn(&M::Point<Real>, &SVector<Real, P>) -> Real,
+        K: Choice,
+    {
+        self.with(|wide| wide.entropy(OfPair(Arc::new(entropy))))
+    }
+
+    /// Sets the metric on `M`, which does not depend on the parameters.
+    pub fn metric<F: Riemannian<M>>(
+        self,
+        metric: F,
+    ) -> FamilyBuilder<Wide<M, (F, Inert), B, K, H, S, L, P>, P> {
+        self.with(|wide| wide.metric((metric, Inert)))
+    }
+
+    /// Sets the bracket on `M`, which does not depend on the parameters.
+    pub fn bracket<F>(
+        self,
+        bracket: F,
+    ) -> FamilyBuilder<Wide<M, G, (F, Zero), K, H, S, L, P>, P> {
+        self.with(|wide| wide.bracket((bracket, Zero)))
+    }
+
+    /// Sets a dissipation on `M` that does not depend on the parameters.
+    pub fn dissipation<F>(
+        self,
+        dissipation: F,
+    ) -> FamilyBuilder<Wide<M, G, B, Given<OnFirst<F>>, H, S, L, P>, P> {
+        self.with(|wide| wide.dissipation(OnFirst(dissipation)))
+    }
+
+    /// Sets the dissipation by a closure `|x, w, θ| -> K` that annihilates `w`, as
+    /// [`FieldDissipation`](crate::FieldDissipation) has it.
+    pub fn field_dissipation<F>(
+        self,
+        dissipation: F,
+    ) -> FamilyBuilder<Wide<M, G, B, Given<FieldOf<F>>, H, S, L, P>, P>
+    where
+        F: Fn(&M::Point<Real>, &Velocity<M, Real>, &SVector<Real, P>) -> Form<M, Real>,
+    {
+        self.with(|wide| wide.dissipation(FieldOf(Arc::new(dissipation))))
+    }
+
+    /// Appends a further Casimir `C(x, θ)`, as [`SystemBuilder::casimir`] does.
+    #[allow(
+        clippy::type_complexity,
+        reason = "the type of a builder lists the parts of the system, and a name for it would hide them"
+    )]
+    pub fn casimir<F>(
+        self,
+        casimir: F,
+    ) -> FamilyBuilder<Wide<M, G, B, K, H, S, (L, Casimir<OfPair<F>>), P>, P>
+    where
+        F: Fn(&M::Point<Real>, &SVector<Real, P>) -> Real,
+    {
+        self.with(|wide| wide.casimir(OfPair(Arc::new(casimir))))
+    }
+
+    /// Appends a momentum `J(x, θ)`, as [`SystemBuilder::momentum`] does.
+    #[allow(
+        clippy::type_complexity,
+        reason = "the type of a builder lists the parts of the system, and a name for it would hide them"
+    )]
+    pub fn momentum<F>(
+        self,
+        momentum: F,
+    ) -> FamilyBuilder<Wide<M, G, B, K, H, S, (L, Momentum<OfPair<F>>), P>, P>
+    where
+        F: Fn(&M::Point<Real>, &SVector<Real, P>) -> Real,
+    {
+        self.with(|wide| wide.momentum(OfPair(Arc::new(momentum))))
+    }
+
+    /// Chooses the scheme that treats the entropy.
+    pub fn second_law(self, second_law: SecondLaw) -> Self {
+        self.with(|wide| wide.second_law(second_law))
+    }
+
+    /// Checks the structure and finishes the family.
+    ///
+    /// # Errors
+    ///
+    /// [`BuildError`] if the parts do not make a system.
+    #[allow(
+        clippy::type_complexity,
+        reason = "the type of a builder lists the parts of the system, and a name for it would hide them"
+    )]
+    pub fn build(
+        self,
+    ) -> Result<Family<Built<Product<M, Euclidean<P>>, G, B, K, H, S, L>, P>, BuildError>
+    where
+        G: Riemannian<Product<M, Euclidean<P>>>,
+        B: Bracket<Product<M, Euclidean<P>>, G>,
+        K: Choice<Dissipation: Dissipation<Product<M, Euclidean<P>>, G>>,
+        H: ScalarField<Product<M, Euclidean<P>>>,
+        S: ScalarField<Product<M, Euclidean<P>>>,
+        L: Invariants<Product<M, Euclidean<P>>>,
+    {
+        let (count, dimension) = (L::COUNT, M::Dim::LEN);
+        if count > 0 && count >= dimension {
+            return Err(BuildError::TooManyInvariants { count, dimension });
+        }
+        Ok(Family::new(self.wide.build()?, self.names))
+    }
+}

@@ -1,0 +1,67 @@
+//! Parts of a family, frozen at one `θ`.
+
+use metriplectic_fields::Real;
+use metriplectic_manifolds::Inert;
+use nalgebra::SVector;
+
+use crate::bracket::Zero;
+use crate::dissipation::{MetricDissipation, NoDissipation};
+use crate::invariants::{Casimir, Momentum};
+use crate::system::NoEntropy;
+
+/// A part of a system on `M × Rᴾ` that is a part of one on `M` where the second factor is known.
+pub trait Freeze<const P: usize> {
+    /// The part of the system on `M`.
+    type Narrow;
+
+    /// Freezes the part at `θ`.
+    fn freeze(&self, theta: &SVector<Real, P>) -> Self::Narrow;
+}
+
+/// A metric that does not depend on the parameters.
+impl<G: Clone, const P: usize> Freeze<P> for (G, Inert) {
+    type Narrow = G;
+
+    fn freeze(&self, _: &SVector<Real, P>) -> G {
+        self.0.clone()
+    }
+}
+
+/// A bracket that does not depend on the parameters.
+impl<B: Clone, const P: usize> Freeze<P> for (B, Zero) {
+    type Narrow = B;
+
+    fn freeze(&self, _: &SVector<Real, P>) -> B {
+        self.0.clone()
+    }
+}
+
+/// Parts that know no manifold.
+macro_rules! the_same_anywhere {
+    ($($part:ty),+) => {$(
+        impl<const P: usize> Freeze<P> for $part {
+            type Narrow = Self;
+
+            fn freeze(&self, _: &SVector<Real, P>) -> Self {
+                *self
+            }
+        }
+    )+};
+}
+the_same_anywhere!(NoDissipation, MetricDissipation, NoEntropy, ());
+
+impl<L: Freeze<P>, F: Freeze<P>, const P: usize> Freeze<P> for (L, Casimir<F>) {
+    type Narrow = (L::Narrow, Casimir<F::Narrow>);
+
+    fn freeze(&self, theta: &SVector<Real, P>) -> Self::Narrow {
+        (self.0.freeze(theta), Casimir(self.1.0.freeze(theta)))
+    }
+}
+
+impl<L: Freeze<P>, F: Freeze<P>, const P: usize> Freeze<P> for (L, Momentum<F>) {
+    type Narrow = (L::Narrow, Momentum<F::Narrow>);
+
+    fn freeze(&self, theta: &SVector<Real, P>) -> Self::Narrow {
+        (self.0.freeze(theta), Momentum(self.1.0.freeze(theta)))
+    }
+}

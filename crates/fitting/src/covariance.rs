@@ -1,0 +1,64 @@
+//! What a Jacobian says of errors.
+
+use nalgebra::{DMatrix, DVector};
+
+/// The covariance `s² (JᵀJ)⁻¹` of the unknowns, and the combinations that the data do not see.
+#[derive(Clone, Debug)]
+pub struct Covariance {
+    /// The matrix; infinite along what the data do not see.
+    pub matrix: DMatrix<f64>,
+    /// The directions that the data do not see, in units of the columns' lengths.
+    pub unseen: Vec<DVector<f64>>,
+    /// The smallest singular value of the columns in units of their lengths, relative to the largest.
+    pub fraction: f64,
+}
+
+/// The fraction of the largest singular value below which the data do not see a combination: it is of the size of the errors of a
+/// Jacobian from runs of a usual tolerance.
+pub const UNSEEN: f64 = 1e-7;
+
+impl Covariance {
+    /// Computes the covariance from the singular values of the Jacobian with columns of length one, so that units do not matter.
+    /// `variance` is that of a residual.
+    pub fn of(jacobian: &DMatrix<f64>, variance: f64) -> Self {
+        let n = jacobian.ncols();
+        let lengths = DVector::from_fn(n, |j, _| {
+            let length = jacobian.column(j).norm();
+            if length > 0.0 { length } else { f64::MIN_POSITIVE }
+        });
+        let unit = DMatrix::from_fn(jacobian.nrows(), n, |i, j| jacobian[(i, j)] / lengths[j]);
+        // The squares of singular values, in JᵀJ, would lose half of the digits.
+        let r = unit.qr().r().svd(false, true);
+        let values = r.singular_values.clone();
+        let largest = values.max();
+        let fraction = if largest > 0.0 { values.min() / largest } else { 0.0 };
+        let v = r.v_t.map_or_else(|| DMatrix::identity(n, n), |v| v.transpose());
+        let matrix = DMatrix::from_fn(n, n, |i, j| {
+            let sum: f64 = (0..n)
+                .map(|k| {
+                    let term = v[(i, k)] * v[(j, k)];
+                    if term == 0.0 { 0.0 } else { term / (values[k] * values[k]) }
+                })
+                .sum();
+            variance * sum / (lengths[i] * lengths[j])
+        });
+        let is_unseen = |k: &usize| !(values[*k] >= UNSEEN * largest);
+        let unseen = (0..n).filter(is_unseen).map(|k| v.column(k).into_owned()).collect();
+        Self { matrix, unseen, fraction }
+    }
+
+    /// Returns whether the data do not see a combination of the unknowns.
+    pub fn is_singular(&self) -> bool {
+        self.fraction < UNSEEN
+    }
+
+    /// The standard error of an unknown.
+    pub fn standard_error(&self, i: usize) -> f64 {
+        self.matrix[(i, i)].sqrt()
+    }
+
+    /// The correlation of two unknowns.
+    pub fn correlation(&self, i: usize, j: usize) -> f64 {
+        self.matrix[(i, j)] / (self.standard_error(i) * self.standard_error(j))
+    }
+}

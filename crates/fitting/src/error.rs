@@ -1,0 +1,95 @@
+//! Why there is no fit.
+
+use std::fmt;
+
+/// Data, options or a model that cannot be fitted.
+#[derive(thiserror::Error)]
+#[non_exhaustive]
+pub enum FitError {
+    /// There is not one row of data for each time.
+    #[error("there are {rows} rows of data for {times} times; give one for each")]
+    Rows {
+        /// The rows.
+        rows: usize,
+        /// The times.
+        times: usize,
+    },
+    /// A number of the data is not finite.
+    #[error("the data have {value} in row {row}, column {column}; leave such rows out")]
+    NotFinite {
+        /// The row.
+        row: usize,
+        /// The column.
+        column: usize,
+        /// The number.
+        value: f64,
+    },
+    /// A time does not come after the one before it.
+    #[error("the times of the data must rise, and row {row} has t = {time}; sort the rows")]
+    Times {
+        /// The row.
+        row: usize,
+        /// Its time.
+        time: f64,
+    },
+    /// There are no more data than unknowns.
+    #[error("{data} numbers do not determine {unknowns} unknowns and their errors; give more data or fix parameters")]
+    TooFewData {
+        /// The numbers that were measured.
+        data: usize,
+        /// The unknowns.
+        unknowns: usize,
+    },
+    /// The noise is not a positive number.
+    #[error("the noise of column {column} is {sigma}; it must be a positive number, or left out")]
+    Noise {
+        /// The column of the data.
+        column: usize,
+        /// What was given.
+        sigma: f64,
+    },
+    /// There is no parameter of this name.
+    #[error("there is no parameter {name:?}; the family has {known:?}")]
+    UnknownParameter {
+        /// What was asked for.
+        name: String,
+        /// The names of the family.
+        known: Vec<&'static str>,
+    },
+    /// A parameter that is to stay positive has a guess that is not.
+    #[error("the guess of {name} is {value}, and it was said to be positive; guess a positive number")]
+    NotPositive {
+        /// The parameter.
+        name: &'static str,
+        /// The guess.
+        value: f64,
+    },
+    /// Nothing is free.
+    #[error("no parameter is free; name one, or leave `free` out to fit them all")]
+    NothingFree,
+    /// The model has no run, or no tangent, at the guess.
+    #[error("the model cannot be run at the guess: {0}")]
+    Guess(#[source] Box<dyn std::error::Error + Send + Sync>),
+    /// The model has no run near the best parameters that were found.
+    #[error("the solver has failed: {0}")]
+    Solver(String),
+    /// The minimum was not reached.
+    #[error(
+        "no minimum after {runs} runs: the residuals still fall, at χ² = {chi_squared:.6e}; start nearer, fix parameters, \
+         or allow more runs"
+    )]
+    NotConverged {
+        /// The runs that were made.
+        runs: usize,
+        /// The least sum of squares so far.
+        chi_squared: f64,
+        /// Where it is.
+        parameters: Vec<f64>,
+    },
+}
+
+impl fmt::Debug for FitError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        fmt::Display::fmt(self, f)
+    }
+}

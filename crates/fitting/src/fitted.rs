@@ -1,0 +1,174 @@
+//! The result of a fit.
+
+use std::fmt;
+
+use nalgebra::DMatrix;
+
+use crate::covariance::Covariance;
+use crate::least_squares::Squares;
+use crate::unknowns::Unknown;
+
+/// An estimate of a parameter.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Estimate {
+    /// Its name; that of a coordinate of the start is `start`.
+    pub name: &'static str,
+    /// Its value.
+    pub value: f64,
+    /// Its standard error, in the same unit.
+    pub standard_error: f64,
+    /// Whether its logarithm was fitted.
+    pub positive: bool,
+    /// Whether the data do not tell it from its bound, zero: its logarithm is uncertain by more than 1.
+    pub at_bound: bool,
+}
+
+impl Estimate {
+    /// The interval of `q` standard errors; `θ̂ exp(±q s/θ̂)` if the logarithm was fitted.
+    pub fn interval(&self, q: f64) -> [f64; 2] {
+        let Self { value, standard_error, positive, .. } = *self;
+        if positive {
+            [-q, q].map(|q| value * (q * standard_error / value).exp())
+        } else {
+            [-q, q].map(|q| value + q * standard_error)
+        }
+    }
+}
+
+/// A correlation from which on two estimates are named together.
+const CORRELATED: f64 = 0.95;
+
+/// The result of a fit. It prints each parameter with its standard error, and what the data cannot tell apart.
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub struct Fitted {
+    /// The estimates: free parameters, and then coordinates of a free start, in the chart at its guess.
+    pub estimates: Vec<Estimate>,
+    /// All parameters of the family, fixed ones too.
+    pub parameters: Vec<f64>,
+    /// The entries of the start.
+    pub start: Vec<f64>,
+    /// The sum of squares of residuals in units of the noise; of residuals themselves if it is not known.
+    pub chi_squared: f64,
+    /// The numbers that were measured less the unknowns.
+    pub degrees: usize,
+    /// The noise that the residuals show, `√(χ²/degrees)`: near 1 if it was given and the model is right.
+    pub noise: f64,
+    /// Whether the noise was given.
+    pub noise_is_known: bool,
+    /// The runs that were made.
+    pub runs: u64,
+    /// The covariance of the unknowns: parameters, or their logarithms.
+    pub covariance: Covariance,
+}
+
+/// What a result is made of.
+pub(crate) struct Parts<'a> {
+    pub(crate) unknowns: &'a [Unknown],
+    pub(crate) phi: &'a [f64],
+    pub(crate) squares: &'a Squares,
+    pub(crate) parameters: Vec<f64>,
+    pub(crate) start: Vec<f64>,
+    pub(crate) noise_is_known: bool,
+    pub(crate) runs: u64,
+}
+
+impl Fitted {
+    pub(crate) fn new(parts: Parts<'_>) -> Self {
+        let Parts { unknowns, phi, squares, parameters, start, noise_is_known, runs } = parts;
+        let chi_squared = squares.sum();
+        let degrees = squares.residuals.len() - phi.len();
+        let variance = chi_squared / degrees as f64;
+        let covariance =
+            Covariance::of(&squares.jacobian, if noise_is_known { 1.0 } else { variance });
+        let estimates = (phi.iter().enumerate())
+            .map(|(i, &phi)| {
+                let error = covariance.standard_error(i);
+                match unknowns.get(i) {
+                    Some(unknown) => {
+                        let value = unknown.parameter(phi);
+                        Estimate {
+                            name: unknown.name,
+                            value,
+                            standard_error: error * unknown.slope(value),
+                            positive: unknown.positive,
+                            at_bound: unknown.positive && !(error <= 1.0),
+                        }
+                    }
+                    None => Estimate {
+                        name: "start",
+                        value: phi,
+                        standard_error: error,
+                        positive: false,
+                        at_bound: false,
+                    },
+                }
+            })
+            .collect();
+        let noise = variance.sqrt();
+        Self {
+            estimates,
+            parameters,
+            start,
+            chi_squared,
+            degrees,
+            noise,
+            noise_is_known,
+            runs,
+            covariance,
+        }
+    }
+
+    /// The estimate of a parameter; `None` if it was not free.
+    pub fn estimate(&self, name: &str) -> Option<&Estimate> {
+        self.estimates.iter().find(|estimate| estimate.name == name)
+    }
+
+    /// The correlations of the unknowns.
+    pub fn correlations(&self) -> DMatrix<f64> {
+        let n = self.estimates.len();
+        DMatrix::from_fn(n, n, |i, j| if i == j { 1.0 } else { self.covariance.correlation(i, j) })
+    }
+
+    /// The names that the data cannot tell apart: those in a combination that no residual depends on.
+    pub fn not_told_apart(&self) -> Vec<&'static str> {
+        let is_in = |k: usize| {
+            self.covariance.unseen.iter().any(|unseen| unseen[k].abs() > 0.1 * unseen.amax())
+        };
+        let named = self.estimates.iter().enumerate().filter(|(k, _)| is_in(*k));
+        named.map(|(_, estimate)| estimate.name).collect()
+    }
+}
+
+impl fmt::Display for Fitted {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for Estimate { name, value, standard_error, at_bound, .. } in &self.estimates {
+            if *at_bound {
+                writeln!(f, "{name:>12} is at its bound: the data do not tell {value:.3e} from zero")?;
+            } else {
+                writeln!(f, "{name:>12} = {value:.9} ± {standard_error:.1e}")?;
+            }
+        }
+        let n = self.estimates.len();
+        for i in 0..n {
+            for j in i + 1..n {
+                let correlation = self.covariance.correlation(i, j);
+                if correlation.abs() > CORRELATED {
+                    let [a, b] = [i, j].map(|k| self.estimates[k].name);
+                    writeln!(f, "{a} and {b} are correlated by {correlation:.4}: their errors go together")?;
+                }
+            }
+        }
+        let together = self.not_told_apart();
+        if !together.is_empty() {
+            writeln!(f, "the data do not tell apart: {}; fix one of them", together.join(", "))?;
+        }
+        let Self { chi_squared, degrees, noise, runs, .. } = self;
+        if self.noise_is_known {
+            write!(f, "χ² = {chi_squared:.4e} for {degrees} degrees of freedom, {runs} runs")
+        } else {
+            write!(f, "noise {noise:.3e} by {degrees} degrees of freedom, {runs} runs")
+        }
+    }
+}

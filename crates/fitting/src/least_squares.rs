@@ -1,0 +1,45 @@
+//! Residuals and their Jacobian.
+
+use nalgebra::{DMatrix, DVector};
+
+/// The residuals at a point, and their Jacobian `∂r_i/∂φ_j`, from one evaluation.
+#[derive(Clone, Debug)]
+pub struct Squares {
+    /// The residuals `r`.
+    pub residuals: DVector<f64>,
+    /// Their Jacobian.
+    pub jacobian: DMatrix<f64>,
+}
+
+impl Squares {
+    /// The sum of squares `|r|²`.
+    pub fn sum(&self) -> f64 {
+        self.residuals.norm_squared()
+    }
+
+    /// The largest cosine between the residuals and a column of the Jacobian, which has no unit and vanishes at a minimum.
+    pub fn cosine(&self) -> f64 {
+        let length = self.residuals.norm();
+        let cosine = |column: nalgebra::DVectorView<'_, f64>| {
+            let size = column.norm() * length;
+            if size > 0.0 { column.dot(&self.residuals).abs() / size } else { 0.0 }
+        };
+        self.jacobian.column_iter().map(cosine).fold(0.0, f64::max)
+    }
+
+    pub(crate) fn is_finite(&self) -> bool {
+        self.residuals.iter().chain(self.jacobian.iter()).all(|x| x.is_finite())
+    }
+}
+
+/// A problem of least squares, `min_φ |r(φ)|²`.
+pub trait LeastSquares {
+    /// Evaluates the residuals with their Jacobian; `None` outside of the domain of the problem.
+    fn squares(&self, phi: &[f64]) -> Option<Squares>;
+}
+
+impl<T: LeastSquares> LeastSquares for &T {
+    fn squares(&self, phi: &[f64]) -> Option<Squares> {
+        (**self).squares(phi)
+    }
+}

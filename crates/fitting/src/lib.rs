@@ -1,0 +1,34 @@
+//! Fits of metriplectic systems to data.
+//!
+//! A [`Family`](metriplectic_dynamics::Family) has parameters `θ`; a fit finds those with which a run comes nearest to what was
+//! measured, with their standard errors. The derivatives are those of the discrete steps
+//! ([`Tangents`](metriplectic_integrators::Tangents)), so each run keeps its laws whatever `θ` is tried, and no difference quotient has
+//! a noise to be tuned.
+//!
+//! Each module uses only modules above it in this table.
+//!
+//! | module | what it holds |
+//! |---|---|
+//! | [`error`](mod@error) | [`FitError`]: why there is no fit |
+//! | [`least_squares`] | [`LeastSquares`]: residuals and their Jacobian, from one run |
+//! | [`levenberg_marquardt`] | [`LevenbergMarquardt`]: a solver for argmin's executor |
+//! | [`unknowns`] | which parameters are free, and which are fitted by their logarithm |
+//! | [`covariance`] | standard errors and correlations from a Jacobian |
+//! | [`fitted`] | [`Fitted`]: the result, which prints what the data say |
+//! | [`model`] | the residuals of a family of systems |
+//! | [`fit`](mod@fit) | [`Fit`]: what a user says of a fit |
+
+pub mod covariance;
+pub mod error;
+pub mod fit;
+pub mod fitted;
+pub mod least_squares;
+pub mod levenberg_marquardt;
+mod model;
+pub mod unknowns;
+
+pub use error::FitError;
+pub use fit::{Fit, FitBuilder};
+pub use fitted::{Estimate, Fitted};
+pub use least_squares::{LeastSquares, Squares};
+pub use levenberg_marquardt::LevenbergMarquardt;

@@ -1,0 +1,81 @@
+//! The unknowns of a fit: free parameters, some by their logarithm.
+
+use crate::error::FitError;
+
+/// A free parameter.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Unknown {
+    /// Which parameter of the family.
+    pub index: usize,
+    /// Its name.
+    pub name: &'static str,
+    /// Whether its logarithm is fitted, so that it stays positive.
+    pub positive: bool,
+}
+
+impl Unknown {
+    /// The unknown `φ`: the parameter, or its logarithm.
+    pub fn of(&self, theta: f64) -> f64 {
+        if self.positive { theta.ln() } else { theta }
+    }
+
+    /// The parameter of an unknown.
+    pub fn parameter(&self, phi: f64) -> f64 {
+        if self.positive { phi.exp() } else { phi }
+    }
+
+    /// The derivative `dθ/dφ`.
+    pub fn slope(&self, theta: f64) -> f64 {
+        if self.positive { theta } else { 1.0 }
+    }
+}
+
+/// Names of parameters: some, or all.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) enum Names {
+    /// None of them.
+    #[default]
+    None,
+    /// All of them.
+    All,
+    /// These.
+    Some(Vec<String>),
+}
+
+impl Names {
+    fn has(&self, name: &str) -> bool {
+        match self {
+            Self::None => false,
+            Self::All => true,
+            Self::Some(names) => names.iter().any(|other| other == name),
+        }
+    }
+
+    fn check(&self, known: &[&'static str]) -> Result<(), FitError> {
+        let Self::Some(names) = self else { return Ok(()) };
+        match names.iter().find(|name| !known.contains(&name.as_str())) {
+            Some(name) => Err(FitError::UnknownParameter { name: name.clone(), known: known.to_vec() }),
+            None => Ok(()),
+        }
+    }
+}
+
+/// The free parameters of a guess.
+pub(crate) fn unknowns(
+    known: &[&'static str],
+    guess: &[f64],
+    [free, positive]: [&Names; 2],
+) -> Result<Vec<Unknown>, FitError> {
+    free.check(known)?;
+    positive.check(known)?;
+    let mut unknowns = Vec::new();
+    for (index, &name) in known.iter().enumerate().filter(|(_, name)| free.has(name)) {
+        let positive = positive.has(name);
+        let value = guess[index];
+        if positive && !(value > 0.0 && value.is_finite()) {
+            return Err(FitError::NotPositive { name, value });
+        }
+        unknowns.push(Unknown { index, name, positive });
+    }
+    if unknowns.is_empty() { Err(FitError::NothingFree) } else { Ok(unknowns) }
+}

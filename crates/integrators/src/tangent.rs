@@ -1,0 +1,48 @@
+//! The derivative of a run: how each state depends on the start and on parameters.
+//!
+//! A run is a row of discrete maps `x_{k+1} = Φ_{h_k}(x_k, θ)`. Its tangent `T = ∂x/∂(x₀, θ)` is the derivative of these maps, not of
+//! the equation that they approximate:
+//!
+//! ```math
+//! T_{k+1} = \frac{\partial\Phi_{h_k}}{\partial x}\, T_k + \frac{\partial\Phi_{h_k}}{\partial\theta}, \qquad T_0 = (1, 0) .
+//! ```
+//!
+//! So it has no noise of its own, and the laws of the run hand theirs down: `H(x_k, θ) = H(x₀, θ)` on every step gives
+//! `dH(x_k) T_k = dH(x₀) T_0` to round-off at any step size, and so for the further invariants. Explicit methods say what entropy they
+//! have produced, and `dS(x_k) T_k` is its derivative. The [`Sensitivity`] of a run records the errors of these laws.
+//!
+//! The run is the plain run: no bit of it changes because a tangent is asked for. Steps that follow a tolerance are *frozen*: `h_k` is
+//! a number, and what the controller would have chosen for another start is left out. `T` is then smooth where a
+//! difference of two adaptive runs is not.
+//!
+//! | steps | how |
+//! |---|---|
+//! | [`Scheme`](crate::Scheme) with [`SelfAdjoint`] parts | two linearisations of its own equation, from either end |
+//! | [`DormandPrince5`](crate::DormandPrince5), [`DormandPrince8`](crate::DormandPrince8), [`ExplicitRungeKutta`](crate::ExplicitRungeKutta) | stages and projection at dual numbers |
+//!
+//! Components are those of the frames of the charts at both ends. [`TangentState::embedded`] has entries of velocities.
+
+mod certificate;
+mod columns;
+mod duals;
+mod error;
+mod event;
+mod explicit;
+mod frames;
+mod landing;
+mod linearised;
+mod pieces;
+mod record;
+mod schemes;
+mod state;
+mod steps;
+
+pub use certificate::Sensitivity;
+pub use columns::Columns;
+pub use error::{TangentError, Unlinearised};
+pub use event::TangentEvent;
+pub use linearised::{Linearised, Piece, Propagated};
+pub use record::{TangentRun, Tangents};
+pub use schemes::SelfAdjoint;
+pub use state::TangentState;
+pub use steps::TangentSteps;

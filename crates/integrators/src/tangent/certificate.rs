@@ -1,0 +1,93 @@
+//! What the tangent of a run kept.
+
+use std::fmt;
+
+use metriplectic_dynamics::Metriplectic;
+use metriplectic_dynamics::system::Point;
+use metriplectic_fields::{Dimension as _, Vector};
+
+use super::columns::{Columns, LawOfStart, jets, row};
+use super::error::Unlinearised;
+use crate::step::Dim;
+use crate::step::digits::counted;
+
+/// The laws of a tangent, each as its largest error relative to its terms `Σ_i |∂_iF T_ij|`, over all columns and steps.
+///
+/// Errors of `ε` times the condition of a step are round-off. They do not follow from the laws of the run, so they
+/// judge the tangent by itself.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[non_exhaustive]
+pub struct Sensitivity {
+    /// Steps with a derivative.
+    pub steps: usize,
+    /// The largest error of `dH(x_k) T_k = dH(x₀) T_0`.
+    pub energy: f64,
+    /// The largest error of `dL_a(x_k) T_k = dL_a(x₀) T_0`.
+    pub invariants: f64,
+    /// The largest error of `dS(x_k) T_k = δ(S₀ + Σ h Σ b_i σ_i)`, for explicit methods; `None` where the method does
+    /// not say what it has produced.
+    pub entropy: Option<f64>,
+    /// Whether the step sizes followed a tolerance, and are frozen.
+    pub frozen: bool,
+    /// Whether friction is not damped by the steps: `T` is then the derivative of the steps, and not that of the motion.
+    pub undamped: bool,
+}
+
+/// The error of a law from which on a derivative is wrong.
+const BROKEN: f64 = 1e-6;
+
+impl Sensitivity {
+    /// Enters a state.
+    pub(super) fn enter<Y: Metriplectic>(
+        &mut self,
+        system: &Y,
+        x: &Point<Y>,
+        columns: &Columns<Y>,
+    ) -> Result<(), Unlinearised> {
+        let jets = jets(system, x);
+        let off = |df: &Vector<Y::Manifold>, law: &LawOfStart<Vector<Y::Manifold>>| {
+            let [here, sizes] = row::<Y>(df, &columns.t);
+            (0..Dim::<Y>::LEN).fold(0.0, |worst: f64, j| {
+                let (off, size) = ((here[j] - law.row[j]).abs(), sizes[j] + law.row[j].abs());
+                let relative = if off == 0.0 { 0.0 } else { off / size };
+                // A number that is none must not be lost.
+                if relative > worst || relative.is_nan() { relative } else { worst }
+            })
+        };
+        let energy = off(&jets.energy.df, &columns.laws.energy);
+        let listed = jets.invariants.as_ref().iter().flatten().zip(&columns.laws.invariants);
+        let invariants = listed.fold(0.0, |worst: f64, ((_, jet), law)| worst.max(off(&jet.df, law)));
+        if !(energy.max(invariants) <= BROKEN) || energy.is_nan() {
+            return Err(Unlinearised::LawBroken { off: energy.max(invariants) });
+        }
+        self.steps += 1;
+        self.energy = self.energy.max(energy);
+        self.invariants = self.invariants.max(invariants);
+        if columns.laws.entropy_is_known {
+            let entropy = off(&jets.entropy.df, &columns.laws.entropy);
+            self.entropy = Some(self.entropy.unwrap_or(0.0).max(entropy));
+        }
+        Ok(())
+    }
+}
+
+impl fmt::Display for Sensitivity {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let steps = counted(self.steps, "step", "steps");
+        write!(f, "sensitivity: |dH T − dH₀| ≤ {:.1e} of its terms", self.energy)?;
+        if self.invariants > 0.0 {
+            write!(f, ", |dL T − dL₀| ≤ {:.1e}", self.invariants)?;
+        }
+        if let Some(entropy) = self.entropy {
+            write!(f, ", |dS T − δS| ≤ {entropy:.1e}")?;
+        }
+        write!(f, ", over {steps}{}", if self.frozen { ", frozen" } else { "" })?;
+        if self.undamped {
+            write!(
+                f,
+                "\n             it is the derivative of the steps, which do not damp the friction, and not that of the motion"
+            )?;
+        }
+        Ok(())
+    }
+}

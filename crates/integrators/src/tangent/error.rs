@@ -1,0 +1,72 @@
+//! Why a run has no tangent.
+
+use std::fmt;
+
+use crate::run::error::RunError;
+use crate::step::{StateSpace, StepError};
+
+/// Why a step has no derivative.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Unlinearised {
+    /// A path from one end of a step to the other was not found, or a Jacobian is singular or not a number.
+    #[error("the equation of the step has no regular derivative there; take smaller steps")]
+    Singular,
+    /// A field has no second derivative at a state of the run.
+    #[error(
+        "a second derivative of the model is not finite there, as that of a norm at zero; write `norm_squared()`, or \
+         start elsewhere"
+    )]
+    NotSmooth,
+    /// The step that was differentiated is not the one that was taken.
+    #[error("the step ends {off:.1e} of its size away from the one that was taken; take smaller steps")]
+    NotReproduced {
+        /// The largest difference of an entry, relative to its size.
+        off: f64,
+    },
+    /// The derivative breaks the first law of tangents.
+    #[error("dH(x') T' differs from dH(x₀) by {off:.1e} of its terms, so the derivative is wrong; take smaller steps")]
+    LawBroken {
+        /// The difference, relative to the terms.
+        off: f64,
+    },
+}
+
+/// A run whose tangent cannot be computed.
+#[derive(thiserror::Error)]
+#[non_exhaustive]
+pub enum TangentError<M: StateSpace> {
+    /// The run did not finish.
+    #[error(transparent)]
+    Run(#[from] RunError<M>),
+    /// A step of the run failed.
+    #[error(transparent)]
+    Step(#[from] StepError),
+    /// A step has no derivative.
+    #[error("no tangent of the step from t = {time}: {cause}")]
+    NotLinearised {
+        /// The time at which the step starts.
+        time: f64,
+        /// Why.
+        cause: Unlinearised,
+    },
+    /// An event is grazing: its function hardly changes along the motion, so that its time has no derivative.
+    #[error(
+        "the event {event} at t = {time} is grazing: its function changes along the motion by {slope:.1e} of what it \
+         could, so its time has no derivative; choose another function or another start"
+    )]
+    Grazing {
+        /// The name of the event.
+        event: String,
+        /// Its time.
+        time: f64,
+        /// `|dg·v|/(|dg||v|)`, with the entries in units of their sizes.
+        slope: f64,
+    },
+}
+
+impl<M: StateSpace> fmt::Debug for TangentError<M> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        fmt::Display::fmt(self, f)
+    }
+}

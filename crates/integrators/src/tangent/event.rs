@@ -1,0 +1,89 @@
+//! The tangent at an event.
+
+use std::fmt;
+
+use metriplectic_dynamics::Differentiable;
+use metriplectic_fields::{Column as _, Dimension as _, ScalarField, Vector};
+use metriplectic_manifolds::Manifold as _;
+use nalgebra::DVector;
+
+use super::error::TangentError;
+use super::state::TangentState;
+use crate::run::event::Event;
+use crate::step::Dim;
+
+/// An [event](crate::Watch::event) of a run with its derivatives.
+pub struct TangentEvent<D: Differentiable> {
+    /// The event.
+    pub event: Event<D::Manifold>,
+    /// The state there, with its derivatives at a fixed time.
+    pub state: TangentState<D>,
+    /// The velocity of the state along the size of the last step. It is that of the discrete map.
+    pub velocity: Vector<D::Manifold>,
+}
+
+impl<D: Differentiable> fmt::Debug for TangentEvent<D> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("TangentEvent")
+            .field("event", &self.event)
+            .field("state", &self.state)
+            .field("velocity", &self.velocity)
+            .finish()
+    }
+}
+
+/// The slope of a function along the motion, relative to what it could be, below which its event is grazing.
+const GRAZING: f64 = 1e-6;
+
+impl<D: Differentiable> TangentEvent<D> {
+    /// The derivative of the time of the event along start and parameters, by the function `g` of the event as a field:
+    ///
+    /// ```math
+    /// \delta t^* = -\frac{dg\, T}{dg\, v} .
+    /// ```
+    ///
+    /// # Errors
+    ///
+    /// [`TangentError::Grazing`] if `dg·v` is smaller than `10⁻⁶` of its terms.
+    pub fn time_along(
+        &self,
+        g: &impl ScalarField<D::Manifold>,
+    ) -> Result<DVector<f64>, TangentError<D::Manifold>> {
+        let df = g.jet1(&self.state.point).df;
+        let rate = df.dot(&self.velocity);
+        let (dg, speed) = self.lengths(&df);
+        let slope = rate.abs() / (dg * speed);
+        if !(slope > GRAZING) {
+            let (event, time) = (self.event.name.to_string(), self.state.time);
+            return Err(TangentError::Grazing { event, time, slope });
+        }
+        Ok(self.state.derivative_of(&df) * -rate.recip())
+    }
+
+    /// The derivative of the state at the event along start and parameters, `T + v δt*`, with a row for each direction of
+    /// the frame there.
+    ///
+    /// # Errors
+    ///
+    /// The errors of [`time_along`](Self::time_along).
+    pub fn state_along(
+        &self,
+        g: &impl ScalarField<D::Manifold>,
+    ) -> Result<nalgebra::DMatrix<f64>, TangentError<D::Manifold>> {
+        let time = self.time_along(g)?;
+        let velocity = DVector::from_fn(Dim::<D>::LEN, |i, _| self.velocity[i]);
+        Ok(self.state.matrix() + velocity * time.transpose())
+    }
+
+    /// The lengths of a differential and of the velocity, in units of the sizes of the entries or of what they reach in a unit of
+    /// the motion.
+    fn lengths(&self, df: &Vector<D::Manifold>) -> (f64, f64) {
+        let scales = D::Manifold::scales(&self.state.point);
+        let largest = (0..Dim::<D>::LEN).fold(0.0, |most: f64, i| most.max(scales[i]));
+        let unit = |i: usize| if scales[i] > 0.0 { scales[i].max(1e-3 * largest) } else { largest };
+        let n = Dim::<D>::LEN;
+        let dg = (0..n).fold(0.0, |sum, i| sum + (df[i] * unit(i)).powi(2)).sqrt();
+        let speed = (0..n).fold(0.0, |sum, i| sum + (self.velocity[i] / unit(i)).powi(2)).sqrt();
+        (dg, speed)
+    }
+}

@@ -1,0 +1,59 @@
+//! The interface between tangents and methods.
+
+use metriplectic_dynamics::{Metriplectic, system::Point};
+use metriplectic_fields::Vector;
+
+use super::columns::Columns;
+use super::error::Unlinearised;
+use crate::step::EntropyStep;
+
+/// A step that was taken, or a part of one.
+#[derive(Debug)]
+pub struct Piece<'a, Y: Metriplectic> {
+    /// The state at its start.
+    pub x: &'a Point<Y>,
+    /// The state at its end.
+    pub end: &'a Point<Y>,
+    /// Its size.
+    pub h: f64,
+    /// How many directions move: parameters, which stand behind them, do not.
+    pub moving: usize,
+    /// The error that each entry was allowed, if the steps follow a tolerance.
+    pub allowed: Option<Vector<Y::Manifold>>,
+    /// How the entropy at the end was found, by a method that projects onto it.
+    pub entropy_step: Option<EntropyStep>,
+}
+
+/// A step with its derivatives.
+#[derive(Clone, Debug)]
+pub struct Propagated<Y: Metriplectic> {
+    /// The tangent at the end of the step.
+    pub columns: Columns<Y>,
+    /// The derivative `∂x'/∂h` of the end along the size of the step.
+    pub along_h: Vector<Y::Manifold>,
+}
+
+/// A method whose steps can be differentiated.
+///
+/// Laws: 1. the tangent is the derivative of the step that was taken, of this size and on this branch; 2.
+/// `dF(x') T' = dF(x) T` for the energy and the further invariants; 3. a row of steps has the product of their
+/// derivatives.
+#[diagnostic::on_unimplemented(
+    message = "the steps of `{Self}` have no tangent on this system",
+    note = "a `Scheme` has one if its retraction and its discrete gradient are symmetric (`SelfAdjoint`): not `Exponential`, \
+            and not `ItohAbe`",
+    note = "`DormandPrince5`, `DormandPrince8` and `ExplicitRungeKutta` have one on every space of this library (`MovingBase`)"
+)]
+pub trait Linearised<Y: Metriplectic> {
+    /// Computes the tangent at the end of a step from that at its start.
+    ///
+    /// # Errors
+    ///
+    /// [`Unlinearised`] if the step has no derivative.
+    fn propagate(
+        &self,
+        system: &Y,
+        step: &Piece<'_, Y>,
+        columns: &Columns<Y>,
+    ) -> Result<Propagated<Y>, Unlinearised>;
+}

@@ -1,0 +1,180 @@
+//! Runs with tangents, and their record.
+
+use std::fmt;
+
+use metriplectic_dynamics::Differentiable;
+use metriplectic_dynamics::system::Point;
+
+use super::certificate::Sensitivity;
+use super::columns::Columns;
+use super::error::TangentError;
+use super::event::TangentEvent;
+use super::linearised::Linearised;
+use super::pieces::Wide;
+use super::state::TangentState;
+use super::steps::{Inside, TangentSteps};
+use crate::run::certificate::Certificate;
+use crate::run::ending::Ending;
+use crate::run::error::RunError;
+use crate::run::method::Method as _;
+use crate::run::requests::Outputs;
+use crate::run::schedule::Schedule;
+use crate::step::{Flow as _, Stepper};
+
+/// Runs with their derivatives, by every method whose steps are [`Linearised`].
+///
+/// ```
+/// use metriplectic_dynamics::Family;
+/// use metriplectic_fields::Real;
+/// use metriplectic_integrators::{DormandPrince8, Span, Tangents};
+/// use metriplectic_manifolds::LieDual;
+/// use nalgebra::{Vector3, Vector4, vector};
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let body = Family::on(LieDual::so3())
+///     .parameters(["I1", "I2", "I3", "friction"])
+///     .energy(|p: &Vector3<Real>, t: &Vector4<Real>| {
+///         (p.x * p.x / t.x + p.y * p.y / t.y + p.z * p.z / t.z) * 0.5
+///     })
+///     .entropy(|p: &Vector3<Real>, t: &Vector4<Real>| p.norm_squared() * t.w * 0.5)
+///     .build()?;
+/// let system = body.at(vector![3.0, 2.0, 1.0, 0.05]);
+/// let span = Span::until(20.0).tolerance(1e-8);
+/// let run = DormandPrince8.tangent(&system, vector![0.4, -1.0, 0.3], span)?;
+/// let friction = run.last().along("friction").unwrap();
+/// println!("dx/dγ = {friction:.4}\n{}", run.sensitivity());
+/// assert!(run.sensitivity().energy < 1e-12 && friction.norm() > 0.1);
+/// # Ok(())
+/// # }
+/// ```
+pub trait Tangents: Sized {
+    /// Verifies the model, and starts a run with its tangent.
+    ///
+    /// Events of the schedule are found, and [`advance`](TangentSteps::advance) passes over outputs.
+    ///
+    /// # Errors
+    ///
+    /// [`RunError`] if the model breaks a law or the schedule cannot be run.
+    fn tangent_steps<D>(
+        self,
+        system: &D,
+        x0: Point<D>,
+        schedule: impl Into<Schedule>,
+    ) -> Result<TangentSteps<'_, D, Self>, RunError<D::Manifold>>
+    where
+        D: Differentiable,
+        Self: Stepper<D> + Linearised<D::Wide>,
+    {
+        let mut schedule: Schedule = schedule.into();
+        let end = schedule.end();
+        schedule.watch.check([schedule.start, end], schedule.start)?;
+        let (times, interval) = (schedule.watch.times.take(), schedule.watch.interval.take());
+        let start = schedule.start;
+        let outputs = Outputs::after(start, start, times, interval);
+        let steps = self.steps(system, x0, schedule)?;
+        let columns = system
+            .with_room(|| Columns::start(system.wide(), &system.widened(&steps.state().point)));
+        Ok(TangentSteps { steps, columns, sensitivity: Sensitivity::default(), outputs, start })
+    }
+
+    /// Runs a system over a schedule, and records the states with their derivatives: after each step, or at the
+    /// [times asked for](crate::Watch::output_at). An output inside a step is a step of that fraction of the size.
+    ///
+    /// # Errors
+    ///
+    /// [`TangentError`].
+    fn tangent<D>(
+        self,
+        system: &D,
+        x0: Point<D>,
+        schedule: impl Into<Schedule>,
+    ) -> Result<TangentRun<D>, TangentError<D::Manifold>>
+    where
+        D: Differentiable,
+        Self: Stepper<D> + Linearised<D::Wide>,
+    {
+        let steps = self.tangent_steps(system, x0, schedule)?;
+        system.with_room(|| record(steps))
+    }
+}
+
+impl<M> Tangents for M {}
+
+/// Takes all steps that are left.
+fn record<D, M>(
+    mut steps: TangentSteps<'_, D, M>,
+) -> Result<TangentRun<D>, TangentError<D::Manifold>>
+where
+    D: Differentiable,
+    M: Stepper<D> + Linearised<Wide<D>>,
+{
+    let asked = !steps.outputs.is_empty();
+    let (mut states, mut events) = (vec![steps.state()], Vec::new());
+    if steps.steps.is_endless() {
+        return Err(RunError::from(crate::SpanError::Endless).into());
+    }
+    while steps.ending().is_none() {
+        let Inside { outputs, events: found } = steps.take_step()?;
+        let stop = steps.ending().is_some_and(Ending::is_event);
+        states.extend(outputs);
+        events.extend(found);
+        if let Some(event) = events.last().filter(|_| stop) {
+            states.push(event_state(event));
+        } else if !asked {
+            states.push(steps.state());
+        }
+    }
+    let (certificate, sensitivity) = (steps.steps.certificate().clone(), steps.sensitivity);
+    Ok(TangentRun { states, events, certificate, sensitivity })
+}
+
+fn event_state<D: Differentiable>(event: &TangentEvent<D>) -> TangentState<D> {
+    event.state.clone()
+}
+
+/// The record of a run with its tangent.
+pub struct TangentRun<D: Differentiable> {
+    states: Vec<TangentState<D>>,
+    events: Vec<TangentEvent<D>>,
+    certificate: Certificate,
+    sensitivity: Sensitivity,
+}
+
+impl<D: Differentiable> fmt::Debug for TangentRun<D> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("TangentRun")
+            .field("states", &self.states)
+            .field("sensitivity", &self.sensitivity)
+            .finish_non_exhaustive()
+    }
+}
+
+impl<D: Differentiable> TangentRun<D> {
+    /// The recorded states, the start first.
+    pub fn states(&self) -> &[TangentState<D>] {
+        &self.states
+    }
+
+    /// The last state.
+    ///
+    /// # Panics
+    ///
+    /// Never: the start is recorded.
+    pub fn last(&self) -> &TangentState<D> {
+        &self.states[self.states.len() - 1]
+    }
+
+    /// The events with their derivatives.
+    pub fn events(&self) -> &[TangentEvent<D>] {
+        &self.events
+    }
+
+    /// The balance of the run.
+    pub const fn certificate(&self) -> &Certificate {
+        &self.certificate
+    }
+
+    /// The laws of the tangent.
+    pub const fn sensitivity(&self) -> &Sensitivity {
+        &self.sensitivity
+    }
+}

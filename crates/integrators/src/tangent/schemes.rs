@@ -1,0 +1,166 @@
+//! The tangent of a self-adjoint implicit step, by two linearisations.
+//!
+//! The residual `R` of a step depends on the pair `(x, x')`. At fixed `x` the unknown `u` of the step from `x` varies `x'`:
+//! `∂R/∂u = A` and `∂x'/∂u = E`. At fixed `x'` the unknown `v` of the step of size `−h` from `x'` to `x` varies `x`. The scheme
+//! is self-adjoint, so the residual of this step is `−R` in the same frame at `z`: `∂R/∂v = −B` and `∂x/∂v = F`. Hence
+//!
+//! ```math
+//! J = -\Bigl(\frac{\partial R}{\partial x'}\Bigr)^{-1} \frac{\partial R}{\partial x} = E A^{-1} B F^{-1} .
+//! ```
+
+use metriplectic_dynamics::Metriplectic;
+use metriplectic_dynamics::system::Point;
+use metriplectic_fields::{
+    Column as _, Dimension as _, Matrix, Space as _, Square as _, Vector, power_of_two,
+};
+use metriplectic_manifolds::{
+    Cayley, ChartMidpoint, Manifold as _, Projection, Retraction, Riemannian as _, StepPathJet,
+    WeylMidpoint,
+};
+
+use super::columns::Columns;
+use super::error::Unlinearised;
+use super::frames::turned;
+use super::linearised::{Linearised, Piece, Propagated};
+use crate::discrete_gradient::{DiscreteGradient, Gonzalez, MeanValue, SymmetricItohAbe};
+use crate::midpoint::{Residual, Scheme};
+use crate::newton::Equation as _;
+use crate::step::Dim;
+
+/// A retraction or a discrete gradient that is the same seen from either end of a step:
+/// [law 4](crate::laws) of retractions, and `w(x, x') = w(x', x)`.
+///
+/// It is a promise: the tangent of a [`Scheme`] uses it.
+pub trait SelfAdjoint {}
+
+macro_rules! self_adjoint {
+    ($($part:ty),+) => { $(impl SelfAdjoint for $part {})+ };
+}
+self_adjoint!(WeylMidpoint, ChartMidpoint, Projection, Cayley);
+self_adjoint!(Gonzalez, MeanValue, SymmetricItohAbe);
+
+/// The linearisation of a step from one of its ends.
+struct Shot<Y: Metriplectic> {
+    path: StepPathJet<Y::Manifold>,
+    jacobian: Matrix<Y::Manifold>,
+}
+
+/// Corrections of the unknown of a path with a known end.
+const CORRECTIONS: usize = 8;
+
+/// The path of a retraction from `x` to `y`, by Newton's method on its end, which begins at the geodesic.
+fn path<Y, R>(
+    system: &Y,
+    retraction: &R,
+    [x, y]: [&Point<Y>; 2],
+) -> Option<(Vector<Y::Manifold>, StepPathJet<Y::Manifold>)>
+where
+    Y: Metriplectic,
+    R: Retraction<Y::Manifold, Y::Metric>,
+{
+    let metric = system.metric();
+    let mut u = metric.log(x, y).ok()?;
+    let mut before = f64::INFINITY;
+    for _ in 0..CORRECTIONS {
+        let path = retraction.step_path_jet(metric, x, &u).ok()?;
+        let off = Y::Manifold::coordinates(&path.end, y);
+        let size = off.magnitude();
+        // The last digits of the end are rounding.
+        if size == 0.0 || size >= 0.5 * before {
+            return Some((u, path));
+        }
+        before = size;
+        u += path.dend.solve(&off)?;
+    }
+    let path = retraction.step_path_jet(metric, x, &u).ok()?;
+    Some((u, path))
+}
+
+impl<R, W: DiscreteGradient> Scheme<R, W> {
+    /// Linearises the step of size `h` from `x` to `y` along its unknown.
+    fn shot<Y>(&self, system: &Y, [x, y]: [&Point<Y>; 2], h: f64) -> Option<Shot<Y>>
+    where
+        Y: Metriplectic,
+        R: Retraction<Y::Manifold, Y::Metric>,
+    {
+        let (u, path) = path(system, &self.retraction, [x, y])?;
+        let jacobian = Residual::new(system, self, x, h).linearise(&u)?.jacobian;
+        Some(Shot { path, jacobian })
+    }
+}
+
+impl<Y, R, W> Linearised<Y> for Scheme<R, W>
+where
+    Y: Metriplectic,
+    R: Retraction<Y::Manifold, Y::Metric> + SelfAdjoint,
+    W: DiscreteGradient + SelfAdjoint,
+{
+    fn propagate(
+        &self,
+        system: &Y,
+        &Piece { x, end, h, .. }: &Piece<'_, Y>,
+        columns: &Columns<Y>,
+    ) -> Result<Propagated<Y>, Unlinearised> {
+        let derivative = || {
+            let there = self.shot(system, [x, end], h)?;
+            let back = self.shot(system, [end, x], -h)?;
+            let units = units::<Y>(x, end, &there.path.d);
+            let e = turned::<Y::Manifold>(there.path.dend, &there.path.end, end);
+            let f = turned::<Y::Manifold>(back.path.dend, &back.path.end, x);
+            let b = turned::<Y::Manifold>(back.jacobian, &back.path.z, &there.path.z);
+            let a = scaled::<Y>(&there.jacobian, &units).factor()?;
+            let solve = |r: Vector<Y::Manifold>| {
+                let hat = metriplectic_fields::Factors::solve(&a, &each::<Y>(&r, |i| 1.0 / units[i]))?;
+                Some(e * each::<Y>(&hat, |i| units[i]))
+            };
+            let inverse = scaled::<Y>(&f, &units).inverse()?;
+            let inverse = Matrix::<Y::Manifold>::from_entries(|i, j| {
+                inverse[(i, j)] * units[i] / units[j]
+            });
+            let right = b * inverse;
+            let mut j = Matrix::<Y::Manifold>::zeros();
+            for k in 0..Dim::<Y>::LEN {
+                let column = solve(right.column_at(k))?;
+                for i in 0..Dim::<Y>::LEN {
+                    j[(i, k)] = column[i];
+                }
+            }
+            // R = d − h V vanishes, so ∂R/∂h = −V = −d/h.
+            Some((j, solve(there.path.d * h.recip())?))
+        };
+        let (j, along_h) = derivative().ok_or(Unlinearised::Singular)?;
+        Ok(Propagated { columns: columns.after(&j), along_h })
+    }
+}
+
+/// The unit of each entry, a power of two: in another one each number of a factorisation differs by a power of two, so that
+/// its pivots are the same.
+fn units<Y: Metriplectic>(
+    x: &Point<Y>,
+    y: &Point<Y>,
+    d: &Vector<Y::Manifold>,
+) -> Vector<Y::Manifold> {
+    let [a, b] = [x, y].map(Y::Manifold::scales);
+    let whole = Y::Manifold::magnitude(x);
+    Vector::<Y::Manifold>::from_index(|i| {
+        let size = a[i].max(b[i]).max(d[i].abs());
+        let size = if size > 0.0 { size } else { whole };
+        if size > 0.0 { power_of_two(size) } else { 1.0 }
+    })
+}
+
+/// The matrix `A_ij s_j/s_i` in the units `s`.
+fn scaled<Y: Metriplectic>(
+    a: &Matrix<Y::Manifold>,
+    units: &Vector<Y::Manifold>,
+) -> Matrix<Y::Manifold> {
+    Matrix::<Y::Manifold>::from_entries(|i, j| a[(i, j)] * units[j] / units[i])
+}
+
+/// The vector `v_i f(i)`.
+fn each<Y: Metriplectic>(
+    v: &Vector<Y::Manifold>,
+    f: impl Fn(usize) -> f64,
+) -> Vector<Y::Manifold> {
+    Vector::<Y::Manifold>::from_index(|i| v[i] * f(i))
+}

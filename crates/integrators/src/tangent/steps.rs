@@ -1,0 +1,211 @@
+//! A run with its tangent, step by step.
+
+use std::fmt;
+
+use metriplectic_dynamics::Differentiable;
+use metriplectic_fields::{Column as _, Dimension as _, Space as _, Vector};
+
+use super::certificate::Sensitivity;
+use super::columns::Columns;
+use super::error::{TangentError, Unlinearised};
+use super::event::TangentEvent;
+use super::frames::between;
+use super::linearised::{Linearised, Propagated};
+use super::pieces::{Ended, Wide, propagate};
+use super::state::TangentState;
+use crate::run::ending::Ending;
+use crate::run::event::Event;
+use crate::run::last_step::LastStep;
+use crate::run::requests::{Outputs, rounding};
+use crate::run::steps::Steps;
+use crate::step::{Dim, Flow as _, Stepper};
+
+/// A run with its tangent, step by step; made by [`Tangents::tangent_steps`](crate::Tangents::tangent_steps).
+///
+/// The steps are those of the run without it, bit for bit.
+pub struct TangentSteps<'a, D: Differentiable, M: Stepper<D>> {
+    pub(super) steps: Steps<'a, D, M>,
+    pub(super) columns: Columns<Wide<D>>,
+    pub(super) sensitivity: Sensitivity,
+    pub(super) outputs: Outputs,
+    pub(super) start: f64,
+}
+
+impl<D: Differentiable, M: Stepper<D>> fmt::Debug for TangentSteps<'_, D, M> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("TangentSteps")
+            .field("sensitivity", &self.sensitivity)
+            .finish_non_exhaustive()
+    }
+}
+
+/// States inside a step, and the events there.
+pub(super) struct Inside<D: Differentiable> {
+    pub(super) outputs: Vec<TangentState<D>>,
+    pub(super) events: Vec<TangentEvent<D>>,
+}
+
+impl<D, M> TangentSteps<'_, D, M>
+where
+    D: Differentiable,
+    M: Stepper<D> + Linearised<Wide<D>>,
+{
+    /// The state reached so far, with its derivatives.
+    pub fn state(&self) -> TangentState<D> {
+        let state = self.steps.state();
+        self.at(state.step, state.time, state.point.clone(), self.columns.clone())
+    }
+
+    /// The laws that the tangent has kept so far.
+    pub const fn sensitivity(&self) -> &Sensitivity {
+        &self.sensitivity
+    }
+
+    /// How the run ended; `None` as long as there are steps to take.
+    pub const fn ending(&self) -> Option<Ending> {
+        self.steps.ending()
+    }
+
+    /// The balance of the run itself.
+    pub const fn certificate(&self) -> &crate::Certificate {
+        self.steps.certificate()
+    }
+
+    fn at(
+        &self,
+        step: usize,
+        time: f64,
+        point: <D::Manifold as metriplectic_fields::Space>::Point<f64>,
+        columns: Columns<Wide<D>>,
+    ) -> TangentState<D> {
+        let names = self.steps.flow().parameters().to_vec();
+        TangentState { step, time, point, columns, names }
+    }
+
+    /// Takes one step. A run that has [ended](Self::ending) stays where it is.
+    ///
+    /// # Errors
+    ///
+    /// [`TangentError`]; the state is then the last one reached.
+    pub fn advance(&mut self) -> Result<(), TangentError<D::Manifold>> {
+        let flow = self.steps.flow();
+        flow.with_room(|| self.take_step().map(drop))
+    }
+
+    /// Takes one step, and returns what was asked for inside it.
+    pub(super) fn take_step(&mut self) -> Result<Inside<D>, TangentError<D::Manifold>> {
+        let scales = self.steps.scales();
+        let before = self.steps.state().clone();
+        self.steps.advance()?;
+        let mut inside = Inside { outputs: Vec::new(), events: Vec::new() };
+        if self.steps.state().step == before.step {
+            return Ok(inside);
+        }
+        let failed =
+            |cause| TangentError::NotLinearised { time: before.time, cause };
+        let found = self.steps.take_events();
+        let flow = self.steps.flow();
+        let last = self.steps.last_step(&scales);
+        let stop = match self.steps.ending() {
+            Some(Ending::Event { .. }) => found.last().map(|event| event.state.time),
+            _ => None,
+        };
+        let end = stop.unwrap_or_else(|| self.steps.state().time);
+        let mut outputs = self.outputs.clone();
+        while let Some(time) = outputs.next(end) {
+            let near = rounding(self.start, self.steps.state().time);
+            let is_end = (self.steps.state().time - time).abs() <= near;
+            if !is_end {
+                let (point, moved) =
+                    self.part(&last, (time - before.time) / (self.steps.state().time - before.time))
+                        .map_err(failed)?;
+                inside.outputs.push(self.at(before.step, time, point, moved.columns));
+            }
+        }
+        for event in found {
+            inside.events.push(self.event(&last, event, before.time).map_err(failed)?);
+        }
+        let state = self.steps.state();
+        let ended = Ended {
+            end: &state.point,
+            h: last.h,
+            in_parts: last.in_parts,
+            entropy_step: last.entropy_step,
+        };
+        let system = (flow, self.steps.method());
+        let next = propagate(system, &last.start, &ended, &self.columns).map_err(failed)?;
+        let wide = flow.widened(&state.point);
+        self.sensitivity.enter(flow.wide(), &wide, &next.columns).map_err(failed)?;
+        self.sensitivity.frozen = self.steps.is_adaptive();
+        self.sensitivity.undamped = self.steps.certificate().is_stiff();
+        let mut ends = self.outputs.clone();
+        let mut is_due = false;
+        while let Some(time) = ends.next(end) {
+            is_due = (state.time - time).abs() <= rounding(self.start, state.time);
+        }
+        self.outputs = ends;
+        self.columns = next.columns;
+        if is_due && stop.is_none() {
+            inside.outputs.push(self.state());
+        }
+        Ok(inside)
+    }
+
+    /// The state at a fraction of the last step, by a step of that size, with its derivatives.
+    #[allow(
+        clippy::type_complexity,
+        reason = "a point and its derivatives, which the caller takes apart at once"
+    )]
+    fn part(
+        &self,
+        last: &LastStep<'_, D>,
+        theta: f64,
+    ) -> Result<
+        (<D::Manifold as metriplectic_fields::Space>::Point<f64>, Propagated<Wide<D>>),
+        Unlinearised,
+    > {
+        let (flow, method) = (self.steps.flow(), self.steps.method());
+        let (h, mut memory) = (theta * last.h, M::Memory::default());
+        let taken = method
+            .step(flow, &last.start, h, &mut memory)
+            .map_err(|_| Unlinearised::Singular)?;
+        let ended = Ended {
+            end: &taken.x,
+            h,
+            in_parts: taken.effort.splits > 0,
+            entropy_step: taken.evidence.entropy_step,
+        };
+        let moved = propagate((flow, method), &last.start, &ended, &self.columns)?;
+        Ok((taken.x, moved))
+    }
+
+    /// An event of the last step with its derivatives, in the frame of its own state.
+    fn event(
+        &self,
+        last: &LastStep<'_, D>,
+        event: Event<D::Manifold>,
+        before: f64,
+    ) -> Result<TangentEvent<D>, Unlinearised> {
+        let n = Dim::<D>::LEN;
+        let theta = (event.state.time - before) / (self.steps.state().time - before);
+        let (reached, Propagated { mut columns, along_h }) = self.part(last, theta)?;
+        let mut velocity = Vector::<D::Manifold>::from_index(|i| along_h[i]);
+        // The state of the output is not that of the step of this size, and may have another frame.
+        if D::Manifold::coordinates(&event.state.point, &reached).is_finite()
+            && let Some(turn) = between::<D::Manifold>(&reached, &event.state.point)
+        {
+            velocity = turn * velocity;
+            let t = columns.t;
+            for j in 0..Dim::<Wide<D>>::LEN {
+                let column = turn * Vector::<D::Manifold>::from_index(|i| t[(i, j)]);
+                for i in 0..n {
+                    columns.t[(i, j)] = column[i];
+                }
+            }
+        }
+        let (step, time) = (event.state.step, event.state.time);
+        let state = self.at(step, time, event.state.point.clone(), columns);
+        Ok(TangentEvent { event, state, velocity })
+    }
+}
+

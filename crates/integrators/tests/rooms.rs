@@ -10,7 +10,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// The rooms, each with the rooms that its files name. A room names only rooms above it.
-const ROOMS: [(&str, &[&str]); 14] = [
+const ROOMS: [(&str, &[&str]); 15] = [
     ("step", &[]),
     ("round_off", &["step"]),
     ("discrete_gradient", &["round_off"]),
@@ -20,6 +20,7 @@ const ROOMS: [(&str, &[&str]); 14] = [
     ("explicit", &["step", "round_off"]),
     ("run", &["step", "round_off"]),
     ("system", &["step", "round_off", "explicit"]),
+    ("noise", &["step", "explicit"]),
     (
         "open",
         &[
@@ -30,6 +31,7 @@ const ROOMS: [(&str, &[&str]); 14] = [
             "collocation",
             "explicit",
             "system",
+            "noise",
         ],
     ),
     ("default_scheme", &["step", "midpoint", "run"]),

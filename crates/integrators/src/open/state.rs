@@ -54,7 +54,13 @@ impl Columns {
 
     /// The index of the first heat.
     pub(super) fn first_heat(&self) -> Option<usize> {
-        self.0.iter().position(|column| column.1 == Kind::Heat)
+        self.heat(0)
+    }
+
+    /// The index of the heat of a bath, in their order.
+    pub(super) fn heat(&self, bath: usize) -> Option<usize> {
+        let heats = self.0.iter().enumerate().filter(|(_, column)| column.1 == Kind::Heat);
+        heats.map(|(index, _)| index).nth(bath)
     }
 
     fn index(&self, name: &str, kind: Kind) -> Option<usize> {

@@ -11,8 +11,8 @@ use metriplectic_dynamics::invariants::Kind;
 use crate::round_off::bound::of_a_law;
 use crate::run::checked::checked_states;
 use crate::step::{
-    Effort, Element, EntropyStep, Evidence, Flow, Laws, LedgerSummary, LimitingSites, Promises,
-    Taken,
+    Effort, Element, EntropyStep, Evidence, Flow, Laws, LedgerSummary, LimitingSites, NoiseSummary,
+    Promises, Taken,
 };
 
 /// The balance of a run: what became of the two laws, of the manifold, and what it cost.
@@ -101,6 +101,9 @@ pub struct Certificate {
     /// its entropy that of the system and its baths.
     #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
     pub exchange: Option<LedgerSummary>,
+    /// The thermal noise of the run; `None` for one without.
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
+    pub noise: Option<NoiseSummary>,
     /// Whether the dissipation was projected so that it keeps the energy, and is not quite the tensor
     /// that was written down ([`ProjectedDissipation`](metriplectic_dynamics::ProjectedDissipation)).
     pub projected: bool,
@@ -244,6 +247,7 @@ impl Certificate {
             second_law: flow.entropy_law(),
             friction: 0.0,
             exchange: flow.ledger(x0),
+            noise: None,
             projected: flow.is_projected(),
         }
     }

@@ -210,7 +210,7 @@ impl<F: Flow, M: Stepper<F>> Steps<'_, F, M> {
         let found = self.find(&mut watching);
         self.watching = Some(watching);
         let (time, h) = (self.before.state.time, self.before.h);
-        found.ok_or(StepError::NothingBetween { time, h })
+        found.ok_or_else(|| self.method.nothing_between(time, h))
     }
 
     /// Finds the events in the last step, and then the outputs up to its end or to the event that stops the run.

@@ -10,7 +10,7 @@ use crate::run::certificate::{
 };
 use crate::run::ending::Ending;
 use crate::step::exact::{self, ExactForm};
-use crate::step::{Effort, LedgerSummary, LimitingSites, Promises};
+use crate::step::{Effort, LedgerSummary, LimitingSites, NoiseSummary, Promises};
 
 #[derive(Serialize, Deserialize)]
 #[serde(remote = "Certificate", deny_unknown_fields)]
@@ -62,6 +62,9 @@ struct CertificateForm {
     // It is that of the point.
     #[serde(skip)]
     exchange: Option<LedgerSummary>,
+    // It is that of the method.
+    #[serde(skip)]
+    noise: Option<NoiseSummary>,
     projected: bool,
 }
 

@@ -81,10 +81,10 @@ pub use nalgebra;
 /// Everything that a program usually needs.
 pub mod prelude {
     pub use metriplectic_dynamics::{
-        AlmostPoisson, AreaForm, Bath, CasimirDissipation, CometricDissipation, Contact,
+        AlmostPoisson, AreaForm, Bath, Boltzmann, CasimirDissipation, CometricDissipation, Contact,
         FieldDissipation, Force, ForcedLiePoisson, KulkarniNomizu, Legendre, LiePoisson,
-        MetricDissipation, Metriplectic, ModelError, Nambu, Poisson, ProjectedDissipation, Scaled,
-        SecondLaw, Symplectic, System, VectorField, Verify, Zero,
+        MetricDissipation, Metriplectic, ModelError, Nambu, OnsagerDissipation, Poisson,
+        ProjectedDissipation, Scaled, SecondLaw, Symplectic, System, VectorField, Verify, Zero,
     };
     #[cfg(feature = "ensembles")]
     pub use metriplectic_ensembles::{Row, Shard, Sweep, Table, geomspace, linspace};
@@ -92,9 +92,10 @@ pub mod prelude {
     pub use metriplectic_integrators::{
         Attitude, AttitudeError, Certificate, Checkpoint, DormandPrince5, DormandPrince8, Ending,
         Error, Event, ExplicitRungeKutta, Gauss, Gonzalez, ItohAbe, MeanValue, Method, Newton,
-        Observables, OpenBuilder, OpenSpace, OpenState, OpenSystem, Radau, ResumeError, Run,
-        RunError, RungeKuttaChebyshev, Scheme, Span, SpanError, State, StepError, Stepper, Steps,
-        SymmetricItohAbe, Tableau, Trajectory, Until, Watch,
+        NinomiyaVictoir, NoiseBuilder, NoiseError, Noisy, Observables, OpenBuilder, OpenSpace,
+        OpenState, OpenSystem, Radau, RandomFlow, ResumeError, Run, RunError, RungeKuttaChebyshev,
+        Scheme, Span, SpanError, State, StepError, Stepper, Steps, SymmetricItohAbe, Tableau,
+        Trajectory, Until, Watch,
     };
     pub use metriplectic_lattices::{
         BondState, Boundary, Graph, Lattice, LatticeError, Onsager, Points, Profiles, SiteState,

@@ -59,7 +59,7 @@ mod system;
 pub use builder::{Fluctuates, NoiseBuilder};
 pub(crate) use closed::examine_model;
 pub use error::NoiseError;
-pub use fluctuating::{Fluctuating, Landing, Noise};
+pub use fluctuating::{Drawn, Fluctuating, Landing, Noise};
 pub use ninomiya_victoir::NinomiyaVictoir;
 pub use numbers::{Counter, Numbers};
 pub use random_flow::RandomFlow;

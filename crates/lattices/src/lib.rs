@@ -43,6 +43,7 @@ pub mod lattice;
 mod layout;
 pub mod model;
 mod neighbours;
+mod noise;
 pub mod onsager;
 mod parallel;
 #[cfg(test)]

@@ -98,7 +98,7 @@ pub fn place<Y: Metriplectic + ?Sized>(system: &Y, x: &Point<Y>) -> Place<Y::Man
     }
 }
 
-/// Computes `Σ_r a_r √ρ_r b_r` over some of the terms, with the number `a_r` of each.
+/// Computes `Σ_r a_r √(κ ρ_r) b_r` over some of the terms, with the strength `κ` and the number `a_r` of each.
 ///
 /// # Errors
 ///
@@ -107,14 +107,14 @@ pub fn noise_vector<Y>(
     system: &Y,
     x: &Point<Y>,
     terms: Range<usize>,
-    numbers: &dyn Fn(usize) -> f64,
+    (strength, numbers): (f64, &dyn Fn(usize) -> f64),
 ) -> Result<VectorOf<Y>, MetricError>
 where
     Y: Metriplectic<Dissipation: NoiseTerms<Y::Manifold, Y::Metric>> + ?Sized,
 {
     let mut sum = VectorOf::<Y>::zero();
     each(system, &place(system, x), terms, &mut |r, NoiseTerm { rate, b }| {
-        sum += b.real::<VectorOf<Y>>() * (rate.re.sqrt() * numbers(r));
+        sum += b.real::<VectorOf<Y>>() * ((strength * rate.re).sqrt() * numbers(r));
     })?;
     Ok(sum)
 }

@@ -8,7 +8,7 @@ use metriplectic_fields::{Column as _, ScalarField};
 use metriplectic_manifolds::{Canonical, Riemannian};
 
 use super::error::NoiseError;
-use super::fluctuating::{Fluctuating, Landing, Noise};
+use super::fluctuating::{Drawn, Fluctuating, Landing, Noise};
 use crate::step::{Components, Flow};
 
 /// What may be off by round-off, of the sizes of the terms of a sum.
@@ -29,9 +29,10 @@ where
         &self,
         x: &Point<Y>,
         terms: Range<usize>,
-        numbers: &(dyn Fn(usize) -> f64 + Sync),
+        (strength, numbers): Drawn<'_>,
     ) -> Option<Self::Vector> {
-        noise_vector(self, x, terms, numbers).ok().filter(|v| v.is_finite()).map(Components)
+        let v = noise_vector(self, x, terms, (strength, numbers));
+        v.ok().filter(|v| v.is_finite()).map(Components)
     }
 
     fn drift(&self, x: &Point<Y>, _: usize, noise: &Noise<U>) -> Option<Self::Vector> {

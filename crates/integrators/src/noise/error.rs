@@ -48,6 +48,12 @@ pub enum NoiseError {
         "the noise of a bath does not keep the further invariants that are listed; leave them out of the list"
     )]
     InvariantsInABath,
+    /// A lattice has energies of bonds, or gathers over them.
+    #[error(
+        "the kinetic drift of a lattice is known where its energy and its entropy are sums over sites, and this one has \
+         energies of bonds, or gathers over them"
+    )]
+    BondsHaveEnergies,
     /// Steps follow a tolerance.
     #[error(
         "noise needs steps of one size, and these follow a tolerance: a step that is rejected and drawn again would change \
@@ -68,15 +74,12 @@ pub enum NoiseError {
         /// Its order.
         order: u32,
     },
-    /// The method adds entropy beside that of the friction.
+    /// The method damps, and adds entropy beside that of the friction.
     #[error(
-        "the method has added the entropy {surplus:.1e} beside that of the friction, to which no noise belongs, as `Radau` \
-         does; take `Gauss`, an explicit method or the midpoint scheme"
+        "the method damps, and adds entropy beside that of the friction, to which no noise belongs; take `Gauss`, an \
+         explicit method or the midpoint scheme in place of `Radau`"
     )]
-    Surplus {
-        /// The entropy.
-        surplus: f64,
-    },
+    NoiseWithRadau,
     /// Friction is faster than a step.
     #[error(
         "friction is not resolved: h|K'| = {rate:.1e} exceeds 1, and the law is off by its square; take steps below {below:.1e}"
@@ -87,9 +90,9 @@ pub enum NoiseError {
         /// A step size that resolves it.
         below: f64,
     },
-    /// An explicit method is at its edge of stability.
+    /// A step was beyond the edge of stability of an explicit method, and was taken in parts.
     #[error(
-        "the step is at the edge of stability of the explicit method, so friction is not resolved; take smaller steps"
+        "the step is beyond the edge of stability of the explicit method, so friction is not resolved; take smaller steps"
     )]
     StabilityUnresolved,
     /// A noise field leads out of its domain, even in small parts.

@@ -34,13 +34,13 @@ pub trait Fluctuating<U>: StageFlow {
     /// The terms of each group.
     fn groups(&self) -> Vec<Range<usize>>;
 
-    /// Computes `Σ_r a_r X_r` over terms of one group at a state, with the number `a_r` of each; `None` where it has no
-    /// value. In a bath the fields have the factor `√T`.
+    /// Computes `Σ_r a_r √(κ ρ_r) b_r` over terms of one group at a state, with the strength `κ` and the number `a_r` of each;
+    /// `None` where it has no value. In a bath the strength has the factor `T`.
     fn noise(
         &self,
         x: &Element<Self>,
         terms: Range<usize>,
-        numbers: &(dyn Fn(usize) -> f64 + Sync),
+        drawn: Drawn<'_>,
     ) -> Option<Self::Vector>;
 
     /// Computes the kinetic drift `Σ_r c_r b_r` of a group, without the factor `k_B`; `None` where it has no value. In a bath
@@ -61,6 +61,9 @@ pub trait Fluctuating<U>: StageFlow {
     /// The first condition that is not met.
     fn examine_noise(&self, x: &Element<Self>, noise: &Noise<U>) -> Result<(), NoiseError>;
 }
+
+/// The strength `κ = 2 k_B h` of the noise of a step, and the number of each term.
+pub type Drawn<'a> = (f64, &'a (dyn Fn(usize) -> f64 + Sync));
 
 /// The two ends of a flow of a group.
 #[derive(Debug)]

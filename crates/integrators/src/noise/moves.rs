@@ -84,13 +84,8 @@ impl<'a, F: Fluctuating<U>, U, R: Numbers> Moves<'a, F, U, R> {
             let below = self.h / rate;
             return Err(self.failed(NoiseError::FrictionUnresolved { rate, below }));
         }
-        if evidence.stability {
+        if evidence.stability && effort.splits > 0 {
             return Err(self.failed(NoiseError::StabilityUnresolved));
-        }
-        if let Some(surplus) = evidence.stages.map(|stages| stages.surplus)
-            && surplus > 0.0
-        {
-            return Err(self.failed(NoiseError::Surplus { surplus }));
         }
         let evidence = Evidence { friction: rate, rests: false, entropy_step: None, ..evidence };
         self.evidence = self.evidence.and(evidence);
@@ -132,13 +127,14 @@ impl<'a, F: Fluctuating<U>, U, R: Numbers> Moves<'a, F, U, R> {
         if numbers.iter().all(|xi| *xi == 0.0) {
             return Ok(());
         }
-        let s = (2.0 * self.system.noise().k_b * self.h).sqrt();
+        // One square root: it has no unit left over that would be rounded.
+        let strength = 2.0 * self.system.noise().k_b * self.h;
         let xi = |r: usize| numbers[r - terms.start];
-        let field = |x: &Element<F>| flow.noise(x, terms.clone(), &xi);
-        let end = self.followed(group, s, &field);
+        let field = |x: &Element<F>| flow.noise(x, terms.clone(), (strength, &xi));
+        let end = self.followed(group, 1.0, &field);
         self.x = end.ok_or_else(|| {
-            let reach = field(&self.x)
-                .map_or(f64::INFINITY, |v| v.map(|v| s * v).relative_to(&flow.sizes(&self.x)));
+            let reach =
+                field(&self.x).map_or(f64::INFINITY, |v| v.relative_to(&flow.sizes(&self.x)));
             let parts = 1 << HALVES;
             self.failed(NoiseError::Unresolved { term: terms.start, parts, reach })
         })?;

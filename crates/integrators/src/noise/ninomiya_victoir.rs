@@ -58,6 +58,7 @@ impl<F: Fluctuating<U>, U, M: Stepper<F>> Sampling<F, U> for NinomiyaVictoir<M> 
     fn check(&self) -> Result<(), NoiseError> {
         match self.0.order() {
             order @ 0..2 => Err(NoiseError::OrderTooLow { order }),
+            _ if self.0.damps() => Err(NoiseError::NoiseWithRadau),
             _ => Ok(()),
         }
     }

@@ -53,7 +53,7 @@ impl<F: Fluctuating<U>, U, M: Stepper<F>> Sampling<F, U> for RandomFlow<M> {
     }
 
     fn check(&self) -> Result<(), NoiseError> {
-        Ok(())
+        if self.0.damps() { Err(NoiseError::NoiseWithRadau) } else { Ok(()) }
     }
 
     fn sample<R: Numbers>(&self, moves: &mut Moves<'_, F, U, R>) -> Result<(), StepError> {

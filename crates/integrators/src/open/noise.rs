@@ -17,7 +17,7 @@ use super::clock::Clock;
 use super::state::{Booked, OpenState};
 use super::system::{OpenSystem, StateOf};
 use super::vector::OpenVector;
-use crate::noise::{Fluctuating, Landing, Noise, NoiseError, examine_model};
+use crate::noise::{Drawn, Fluctuating, Landing, Noise, NoiseError, examine_model};
 use crate::step::Flow;
 
 /// A vector of a system.
@@ -41,12 +41,12 @@ where
         self.exchange().each_term(&at, visit)
     }
 
-    /// Computes `Σ a_r √(T ρ_r) b_r` over some terms of the baths, which are numbered from `first` on.
+    /// Computes `Σ a_r √(κ T ρ_r) b_r` over some terms of the baths, which are numbered from `first` on.
     fn bath_noise(
         &self,
         x: &StateOf<Y>,
         terms: &Range<usize>,
-        numbers: &dyn Fn(usize) -> f64,
+        (strength, numbers): Drawn<'_>,
     ) -> Result<VectorOf<Y>, MetricError> {
         let model = self.without_exchange(x.time);
         let (mut sum, mut r) = (VectorOf::<Y>::zero(), self.closed().dissipation().count());
@@ -55,7 +55,7 @@ where
             &place(&model, &x.x),
             &mut |BathTerm { temperature, term, .. }| {
                 if terms.contains(&r) {
-                    let size = (temperature * term.rate.re).sqrt();
+                    let size = (strength * (temperature * term.rate.re)).sqrt();
                     sum += term.b.real::<VectorOf<Y>>() * (size * numbers(r));
                 }
                 r += 1;
@@ -118,13 +118,13 @@ where
         &self,
         x: &StateOf<Y>,
         terms: Range<usize>,
-        numbers: &(dyn Fn(usize) -> f64 + Sync),
+        (strength, numbers): Drawn<'_>,
     ) -> Option<Self::Vector> {
         let is_own = terms.start < self.closed().dissipation().count();
         let v = if is_own {
-            noise_vector(&self.without_exchange(x.time), &x.x, terms, numbers)
+            noise_vector(&self.without_exchange(x.time), &x.x, terms, (strength, numbers))
         } else {
-            self.bath_noise(x, &terms, numbers)
+            self.bath_noise(x, &terms, (strength, numbers))
         };
         v.ok().filter(|v| v.is_finite()).map(OpenVector::of)
     }

@@ -26,6 +26,11 @@ pub trait Stepper<F: Flow>: Sized {
     /// The laws that hold exactly on every step.
     fn promises(&self, flow: &F) -> Promises;
 
+    /// Whether the method damps what is faster than a step, and adds entropy beside that of the friction.
+    fn damps(&self) -> bool {
+        false
+    }
+
     /// What the method says of the noise of a run; `None` for one without random numbers.
     fn noise(&self, flow: &F) -> Option<NoiseSummary> {
         let _ = flow;

@@ -29,6 +29,7 @@ const ONE_FALL: Certificate = Certificate {
     second_law: SecondLaw::Exact,
     friction: 0.0,
     exchange: None,
+    noise: None,
     projected: false,
 };
 

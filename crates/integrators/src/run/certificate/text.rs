@@ -145,11 +145,7 @@ impl Certificate {
     fn fluctuation(&self, noise: &NoiseSummary, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let NoiseSummary { k_b, terms, weak_order, numbers } = noise;
         let terms = counted(*terms, "term", "terms");
-        writeln!(
-            f,
-            "noise:       k_B = {}, {terms}, {numbers}; weak order {weak_order}",
-            Digits(*k_b)
-        )?;
+        writeln!(f, "noise:       k_B = {k_b:?}, {terms}, {numbers}; weak order {weak_order}")?;
         let name = if self.exchange.is_some() { "S + S of the baths" } else { "S" };
         let fall = -self.min_entropy_increment.min(0.0) / k_b;
         writeln!(

@@ -26,6 +26,9 @@ struct Lattices;
 #[doc = include_str!("../book/src/open_systems.md")]
 struct OpenSystems;
 
+#[doc = include_str!("../book/src/noise.md")]
+struct Noise;
+
 #[doc = include_str!("../book/src/sweeps.md")]
 struct Sweeps;
 

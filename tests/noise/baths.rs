@@ -115,7 +115,7 @@ macro_rules! spin {
 #[test]
 fn the_equality_of_jarzynski_has_the_order_of_the_method() {
     let spin = spin!();
-    let shell = Shell::new(7, Vector3::from_element(1.0));
+    let shell = Shell::new(6, Vector3::from_element(1.0));
     let outcomes = outcomes(3);
     let time = 1.0;
     let off = [4, 8, 16].map(|count| {

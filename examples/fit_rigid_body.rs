@@ -63,9 +63,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     let fitted = |i: usize| -> Vec<(f64, f64)> {
         tangent.states().iter().map(|state| (state.time, state.point[i])).collect()
     };
-    let momentum = (0..3).fold(Panel::new("momentum", "t"), |panel, i| {
-        panel.line(format!("p{}", i + 1), fitted(i))
-    });
+    let momentum = (0..3)
+        .fold(Panel::new("momentum", "t"), |panel, i| panel.line(format!("p{}", i + 1), fitted(i)));
     let residuals = (0..3).fold(Panel::new("(data − fit) / 10⁻³", "t"), |panel, i| {
         let off: Vec<(f64, f64)> = (measured(i).iter().zip(&fitted(i)[1..]))
             .map(|((t, data), (_, fit))| (*t, (data - fit) / NOISE))
@@ -84,7 +83,8 @@ fn main() -> Result<(), Box<dyn Error>> {
             panel.line(name, along)
         },
     );
-    let estimate = |name: &str| fit.estimate(name).map_or([0.0; 2], |e| [e.value, e.standard_error]);
+    let estimate =
+        |name: &str| fit.estimate(name).map_or([0.0; 2], |e| [e.value, e.standard_error]);
     let ([a, sa], [b, sb]) = (estimate("I1"), estimate("I2"));
     let correlation = fit.correlations()[(0, 1)];
     // The ellipse by the Cholesky factor of the covariance.
@@ -93,10 +93,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             let (sine, cosine) = (TAU * f64::from(k) / 200.0).sin_cos();
             let radius = ELLIPSE.sqrt();
             let across = (1.0 - correlation * correlation).sqrt();
-            (
-                a + sa * radius * cosine,
-                b + sb * radius * (correlation * cosine + across * sine),
-            )
+            (a + sa * radius * cosine, b + sb * radius * (correlation * cosine + across * sine))
         })
         .collect();
     let cross = |x: f64, y: f64| vec![(x - 0.2 * sa, y), (x + 0.2 * sa, y)];

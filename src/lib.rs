@@ -83,29 +83,31 @@ pub use nalgebra;
 /// Everything that a program usually needs.
 pub mod prelude {
     pub use metriplectic_dynamics::{
-        AlmostPoisson, AreaForm, Bath, CasimirDissipation, CometricDissipation, Contact,
-        Differentiable, Family, FieldDissipation, Force, ForcedLiePoisson, KulkarniNomizu, Legendre, LiePoisson,
-        MetricDissipation, Metriplectic, ModelError, Nambu, Poisson, ProjectedDissipation, Scaled,
-        SecondLaw, Symplectic, System, VectorField, Verify, Zero,
+        AlmostPoisson, AreaForm, Bath, Boltzmann, CasimirDissipation, CometricDissipation, Contact,
+        Differentiable, Family, FieldDissipation, Force, ForcedLiePoisson, KulkarniNomizu,
+        Legendre, LiePoisson, MetricDissipation, Metriplectic, ModelError, Nambu,
+        OnsagerDissipation, Poisson, ProjectedDissipation, Scaled, SecondLaw, Symplectic, System,
+        VectorField, Verify, Zero,
     };
     #[cfg(feature = "ensembles")]
     pub use metriplectic_ensembles::{Row, Shard, Sweep, Table, geomspace, linspace};
+    pub use metriplectic_fields::{ErasedField, MatrixField, Real, Scalar, ScalarField};
     #[cfg(feature = "fitting")]
     pub use metriplectic_fitting::{Fit, FitError, Fitted};
-    pub use metriplectic_fields::{ErasedField, MatrixField, Real, Scalar, ScalarField};
     pub use metriplectic_integrators::{
         Attitude, AttitudeError, Certificate, Checkpoint, DormandPrince5, DormandPrince8, Ending,
         Error, Event, ExplicitRungeKutta, Gauss, Gonzalez, ItohAbe, MeanValue, Method, Newton,
-        Observables, OpenBuilder, OpenSpace, OpenState, OpenSystem, Radau, ResumeError, Run,
-        RunError, RungeKuttaChebyshev, Scheme, Span, SpanError, State, StepError, Stepper, Steps,
-        SymmetricItohAbe, Tableau, Tangents, Trajectory, Until, Watch,
+        NinomiyaVictoir, NoiseBuilder, NoiseError, Noisy, Observables, OpenBuilder, OpenSpace,
+        OpenState, OpenSystem, Radau, RandomFlow, ResumeError, Run, RunError, RungeKuttaChebyshev,
+        Scheme, Span, SpanError, State, StepError, Stepper, Steps, SymmetricItohAbe, Tableau,
+        Tangents, Trajectory, Until, Watch,
     };
     pub use metriplectic_lattices::{
         BondState, Boundary, Graph, Lattice, LatticeError, Onsager, Points, Profiles, SiteState,
     };
     pub use metriplectic_manifolds::{
-        Canonical, Cayley, Chart, ChartMidpoint, Euclidean, Exponential, HalfLine, Inert, LieAlgebra,
-        LieDual, Manifold, Metric, Product, Projection, Retraction, Rotations, Sphere,
+        Canonical, Cayley, Chart, ChartMidpoint, Euclidean, Exponential, HalfLine, Inert,
+        LieAlgebra, LieDual, Manifold, Metric, Product, Projection, Retraction, Rotations, Sphere,
         WeylMidpoint,
     };
     /// The linear algebra of this library; its macros, such as `vector!`, look for it under this name.

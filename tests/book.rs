@@ -28,6 +28,8 @@ struct OpenSystems;
 
 #[doc = include_str!("../book/src/sensitivities.md")]
 struct Sensitivities;
+#[doc = include_str!("../book/src/noise.md")]
+struct Noise;
 
 #[doc = include_str!("../book/src/sweeps.md")]
 struct Sweeps;

@@ -86,18 +86,15 @@ fn explicit_tangents_on_curved_spaces() {
 fn frozen_tangents_follow_the_tolerance() {
     let family = body!();
     let system = family.at(THETA);
-    let tangent = |span: Span| {
-        DormandPrince8.tangent(&system, START, span).unwrap().last().along_start()
-    };
+    let tangent =
+        |span: Span| DormandPrince8.tangent(&system, START, span).unwrap().last().along_start();
     let reference = tangent(Span::steps(0.05, 400));
     let mut points = Vec::new();
     for tolerance in [1e-3_f64, 1e-5, 1e-7, 1e-9, 1e-11] {
-        let run = DormandPrince8
-            .tangent(&system, START, Span::until(20.0).tolerance(tolerance))
-            .unwrap();
-        let plain = DormandPrince8
-            .run(&system, START, Span::until(20.0).tolerance(tolerance))
-            .unwrap();
+        let run =
+            DormandPrince8.tangent(&system, START, Span::until(20.0).tolerance(tolerance)).unwrap();
+        let plain =
+            DormandPrince8.run(&system, START, Span::until(20.0).tolerance(tolerance)).unwrap();
         assert!(plain.last().point == run.last().point);
         assert!(run.sensitivity().frozen);
         let error = off(&run.last().along_start(), &reference);
@@ -149,7 +146,11 @@ fn times_of_events_have_derivatives() {
     for k in 0..7 {
         let at = |d: f64| {
             let (mut x, mut t) = (START, THETA);
-            if k < 3 { x[k] += d } else { t[k - 3] += d }
+            if k < 3 {
+                x[k] += d
+            } else {
+                t[k - 3] += d
+            }
             times(x, t)
         };
         let e = 1e-4;
@@ -162,7 +163,8 @@ fn times_of_events_have_derivatives() {
     let state = event.state_along(&|p: &Vector3<Real>| p.x).unwrap();
     assert!(state.row(0).amax() < 1e-12 * state.amax());
     // The energy has no slope along the motion.
-    let grazing = event.time_along(&|p: &Vector3<Real>| (p.x * p.x / 3.0 + p.y * p.y / 2.0 + p.z * p.z) * 0.5);
+    let grazing = event
+        .time_along(&|p: &Vector3<Real>| (p.x * p.x / 3.0 + p.y * p.y / 2.0 + p.z * p.z) * 0.5);
     assert!(matches!(grazing, Err(TangentError::Grazing { .. })));
 }
 

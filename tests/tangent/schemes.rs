@@ -39,7 +39,8 @@ fn tangents_of_schemes_are_those_of_differences() {
     let itoh = weyl.gradient(SymmetricItohAbe);
     accept("Itoh and Abe", compared(&quartic, itoh, &START, &Span::steps(0.2, 20), 2e-3), bars);
 
-    let (round, n0, span) = (sphere!().build().unwrap(), vector![0.36, 0.48, 0.8], Span::steps(0.1, 20));
+    let (round, n0, span) =
+        (sphere!().build().unwrap(), vector![0.36, 0.48, 0.8], Span::steps(0.1, 20));
     accept("S², Weyl", compared(&round, weyl, &n0, &span, 2e-3), bars);
     accept("S², projection", compared(&round, Scheme::new(Projection), &n0, &span, 2e-3), bars);
     let metric = Metric::field(|n: &Vector3<Real>| {
@@ -135,7 +136,9 @@ fn units_scale_the_tangent() {
     let run = |i: f64, p: f64| {
         let inertia = vector![3.0, 2.0, 1.0] * i;
         let body = System::on(LieDual::so3())
-            .energy(move |x: &Vector3<Real>| x.component_mul(x).component_div(&inertia.cast()).sum() * 0.5)
+            .energy(move |x: &Vector3<Real>| {
+                x.component_mul(x).component_div(&inertia.cast()).sum() * 0.5
+            })
             .entropy(move |x: &Vector3<Real>| x.norm_squared() * (0.05 * i / p))
             .build()
             .unwrap();

@@ -7,6 +7,7 @@
 //! | [`KulkarniNomizu`] | `σ(w,w) μ(α,β) − σ(w,α) μ(w,β) − μ(w,α) σ(w,β) + μ(w,w) σ(α,β)` | two of them |
 //! | [`CasimirDissipation`] | `κ([w,α], [w,β])` | a semidefinite form `κ` on a Lie algebra |
 //! | [`FieldDissipation`] | `K(x, w)(α, β)` | a closure that annihilates `w` itself |
+//! | [`OnsagerDissipation`] | `Σ ρ_r ⟨α, b_r⟩ ⟨b_r, β⟩` | a closure that returns its terms |
 //! | [`ProjectedDissipation`] | `K(x)(Qᵀα, Qᵀβ)`, `Qᵀα = α − w G*(w,α)/G*(w,w)` | a closure of the point alone |
 //! | [`Scaled`] | `κ(x) K_w(α, β)` | any of these, and a number `κ(x) ≥ 0` |
 //! | [`NoDissipation`] | 0 | |
@@ -18,6 +19,7 @@ mod field;
 mod kulkarni_nomizu;
 mod metric;
 mod none;
+mod onsager;
 mod projected;
 mod scaled;
 
@@ -29,6 +31,7 @@ pub(crate) use field::along_velocities;
 pub use kulkarni_nomizu::KulkarniNomizu;
 pub use metric::MetricDissipation;
 pub use none::NoDissipation;
+pub use onsager::OnsagerDissipation;
 pub use projected::ProjectedDissipation;
 pub use scaled::Scaled;
 

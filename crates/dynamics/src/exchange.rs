@@ -23,11 +23,13 @@ mod drive;
 mod lift;
 mod list;
 mod port;
+mod terms;
 
 pub use bath::{Bath, Contact, Contacts, Friction, Isotropic, Temperature};
 pub use drive::{Driven, Rates, rates};
 pub use list::{Entries, Exchange, ExchangeArgs, Named, Names, Part, PartKind, Visitor, affinity};
 pub use port::Port;
+pub use terms::{BathTerm, ExchangeTerms, FrictionTerms};
 
 use metriplectic_fields::{
     ChartPoint, Column, Dimension, Factors, Matrix, Real, Square, Vector, Velocity,
@@ -35,13 +37,13 @@ use metriplectic_fields::{
 use metriplectic_manifolds::Manifold;
 
 /// Returns whether all parts of a number vanish.
-fn vanishes(a: &Real) -> bool {
+pub(crate) fn vanishes(a: &Real) -> bool {
     [a.re, a.eps1, a.eps2, a.eps1eps2].iter().all(|part| *part == 0.0)
 }
 
 /// The components, in the frame of the chart, of a velocity that is written by hand: those of its part along the
 /// manifold. `None` at the edge of the chart.
-fn components<M: Manifold>(
+pub(crate) fn components<M: Manifold>(
     x: &ChartPoint<M, Real>,
     velocity: &Velocity<M, Real>,
 ) -> Option<Vector<M, Real>> {

@@ -98,16 +98,15 @@ impl<M, G, B, K, H, S, L, const P: usize>
     Family<System<Product<M, Euclidean<P>>, G, B, K, H, S, L>, P>
 where
     M: Manifold + Times<Euclidean<P>>,
-    System<Product<M, Euclidean<P>>, G, B, K, H, S, L>:
-        Metriplectic<
-                Manifold = Product<M, Euclidean<P>>,
-                Metric = G,
-                Bracket = B,
-                Dissipation = K,
-                Energy = H,
-                Entropy = S,
-                Invariants = L,
-            >,
+    System<Product<M, Euclidean<P>>, G, B, K, H, S, L>: Metriplectic<
+            Manifold = Product<M, Euclidean<P>>,
+            Metric = G,
+            Bracket = B,
+            Dissipation = K,
+            Energy = H,
+            Entropy = S,
+            Invariants = L,
+        >,
     G: Freeze<P, Narrow: Riemannian<M>> + Riemannian<Product<M, Euclidean<P>>>,
     B: Freeze<P, Narrow: Bracket<M, G::Narrow>>,
     K: Freeze<P, Narrow: Dissipation<M, G::Narrow>>,
@@ -124,11 +123,8 @@ where
     pub fn at(
         &self,
         theta: SVector<f64, P>,
-    ) -> Frozen<
-        Narrow<M, G, B, K, H, S, L, P>,
-        System<Product<M, Euclidean<P>>, G, B, K, H, S, L>,
-        P,
-    > {
+    ) -> Frozen<Narrow<M, G, B, K, H, S, L, P>, System<Product<M, Euclidean<P>>, G, B, K, H, S, L>, P>
+    {
         let (y, t) = (&*self.wide, Euclidean::<P>::constant::<Real>(&theta));
         let narrow = System::frozen(
             y.manifold().0.clone(),

@@ -10,7 +10,7 @@
 //! | module | what it holds |
 //! |---|---|
 //! | [`bracket`] | [`Bracket`]: `Π`; [`LiePoisson`], [`AreaForm`](type@AreaForm), [`Nambu`], [`Symplectic`], [`Poisson::constant`], [`Poisson::field`], [`AlmostPoisson::field`], [`Zero`]; with a [`Force`], [`ForcedLiePoisson`] |
-//! | [`dissipation`] | [`Dissipation`]: `K`, given the covector it must annihilate; [`MetricDissipation`], [`CometricDissipation`], [`KulkarniNomizu`], [`CasimirDissipation`], [`FieldDissipation`], [`ProjectedDissipation`], [`Scaled`] |
+//! | [`dissipation`] | [`Dissipation`]: `K`, given the covector it must annihilate; [`MetricDissipation`], [`CometricDissipation`], [`KulkarniNomizu`], [`CasimirDissipation`], [`FieldDissipation`], [`OnsagerDissipation`], [`ProjectedDissipation`], [`Scaled`] |
 //! | [`exchange`] | [`Port`], [`Bath`]: work and heat from outside |
 //! | [`invariants`] | further Casimirs and momenta `L_a`, and symmetries |
 //! | [`orthogonal`] | projections off covectors, by which a tensor is made to annihilate them |
@@ -25,6 +25,7 @@
 //! | [`family`] | [`Family`]: closures of the state and of parameters; [`Differentiable`] |
 //! | [`euler_poincare`] | `.lagrangian(..)` and `.force(..)` of the builder |
 //! | [`velocity`](mod@velocity) | `Π w_H + K w_S` for given covectors: differentials, or discrete gradients |
+//! | [`noise`] | the terms of a dissipation as thermal noise, and the kinetic drift |
 //! | [`verify`] | the laws of a model, sampled |
 //! | [`laws`] | the laws of brackets and dissipations, and the functions that check them |
 
@@ -39,6 +40,7 @@ pub mod laws;
 pub mod legendre;
 pub mod metriplectic;
 pub mod model_error;
+pub mod noise;
 pub mod orthogonal;
 pub mod report;
 pub mod system;
@@ -56,7 +58,8 @@ pub use bracket::{
 pub use builder::{NoEnergy, Surroundings, SystemBuilder};
 pub use dissipation::{
     CasimirDissipation, CometricDissipation, Dissipation, DissipationJet, FieldDissipation,
-    FormError, KulkarniNomizu, MetricDissipation, NoDissipation, ProjectedDissipation, Scaled,
+    FormError, KulkarniNomizu, MetricDissipation, NoDissipation, OnsagerDissipation,
+    ProjectedDissipation, Scaled,
 };
 pub use exchange::{Bath, Contact, Port};
 pub use family::{Differentiable, Family, FamilyBuilder, Frozen, Parametrised};
@@ -64,6 +67,7 @@ pub use invariants::Invariants;
 pub use legendre::{Legendre, LegendreError};
 pub use metriplectic::{Metriplectic, Point, SecondLaw};
 pub use model_error::ModelError;
+pub use noise::{Boltzmann, NoiseTerms};
 pub use report::{LawResidual, Report};
 pub use system::{BuildError, NoEntropy, System};
 pub use vector_field::VectorField;

@@ -33,7 +33,9 @@ pub enum FitError {
         time: f64,
     },
     /// There are no more data than unknowns.
-    #[error("{data} numbers do not determine {unknowns} unknowns and their errors; give more data or fix parameters")]
+    #[error(
+        "{data} numbers do not determine {unknowns} unknowns and their errors; give more data or fix parameters"
+    )]
     TooFewData {
         /// The numbers that were measured.
         data: usize,
@@ -57,7 +59,9 @@ pub enum FitError {
         known: Vec<&'static str>,
     },
     /// A parameter that is to stay positive has a guess that is not.
-    #[error("the guess of {name} is {value}, and it was said to be positive; guess a positive number")]
+    #[error(
+        "the guess of {name} is {value}, and it was said to be positive; guess a positive number"
+    )]
     NotPositive {
         /// The parameter.
         name: &'static str,

@@ -111,7 +111,9 @@ pub struct FitBuilder<'a, Y: Parametrised<P>, F, const P: usize, const K: usize>
     solver: LevenbergMarquardt,
 }
 
-impl<Y: Parametrised<P>, F, const P: usize, const K: usize> fmt::Debug for FitBuilder<'_, Y, F, P, K> {
+impl<Y: Parametrised<P>, F, const P: usize, const K: usize> fmt::Debug
+    for FitBuilder<'_, Y, F, P, K>
+{
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("FitBuilder")
             .field("rows", &self.rows.len())
@@ -196,7 +198,9 @@ where
         self.check()?;
         let Self { family, observe, times, rows, noise, free, positive, start, .. } = self;
         let Some(start) = start else {
-            return Err(FitError::Solver("no start was given; say `start_at` or `free_start`".into()));
+            return Err(FitError::Solver(
+                "no start was given; say `start_at` or `free_start`".into(),
+            ));
         };
         let known = family.at_parameters(guess).parameters().to_vec();
         let unknowns = unknowns(&known, guess.as_slice(), [&free, &positive])?;

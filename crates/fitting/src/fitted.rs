@@ -145,7 +145,10 @@ impl fmt::Display for Fitted {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for Estimate { name, value, standard_error, at_bound, .. } in &self.estimates {
             if *at_bound {
-                writeln!(f, "{name:>12} is at its bound: the data do not tell {value:.3e} from zero")?;
+                writeln!(
+                    f,
+                    "{name:>12} is at its bound: the data do not tell {value:.3e} from zero"
+                )?;
             } else {
                 writeln!(f, "{name:>12} = {value:.9} ± {standard_error:.1e}")?;
             }
@@ -156,7 +159,10 @@ impl fmt::Display for Fitted {
                 let correlation = self.covariance.correlation(i, j);
                 if correlation.abs() > CORRELATED {
                     let [a, b] = [i, j].map(|k| self.estimates[k].name);
-                    writeln!(f, "{a} and {b} are correlated by {correlation:.4}: their errors go together")?;
+                    writeln!(
+                        f,
+                        "{a} and {b} are correlated by {correlation:.4}: their errors go together"
+                    )?;
                 }
             }
         }

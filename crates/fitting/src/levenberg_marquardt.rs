@@ -81,7 +81,12 @@ impl LevenbergMarquardt {
     }
 
     /// The step with the damping `λ`, and the reduction of the sum of squares that it predicts.
-    fn step(&self, at: &Squares, scales: &DVector<f64>, lambda: f64) -> Option<(DVector<f64>, f64)> {
+    fn step(
+        &self,
+        at: &Squares,
+        scales: &DVector<f64>,
+        lambda: f64,
+    ) -> Option<(DVector<f64>, f64)> {
         let (rows, n) = at.jacobian.shape();
         let root = lambda.sqrt();
         let damped = DMatrix::from_fn(rows + n, n, |i, j| match i.checked_sub(rows) {
@@ -131,8 +136,10 @@ impl<O: LeastSquares> Solver<O, Iteration> for LevenbergMarquardt {
     ) -> Result<(Iteration, Option<KV>), Error> {
         let missing = || Error::msg("the solver has lost its iterate");
         let here = state.take_param().ok_or_else(missing)?;
-        let (residuals, jacobian) =
-            (state.take_residuals().ok_or_else(missing)?, state.take_jacobian().ok_or_else(missing)?);
+        let (residuals, jacobian) = (
+            state.take_residuals().ok_or_else(missing)?,
+            state.take_jacobian().ok_or_else(missing)?,
+        );
         let whole = Squares { residuals, jacobian };
         let (at, sum) = (self.relevant(&whole), whole.sum());
         let keep = |state: Iteration, whole: Squares, here: Vec<f64>| {
@@ -154,7 +161,8 @@ impl<O: LeastSquares> Solver<O, Iteration> for LevenbergMarquardt {
         if predicted <= 0.1 * self.reduction * sum || is_rounding {
             return Ok((keep(state, whole, here).terminate_with(converged), None));
         }
-        let there: Vec<f64> = here.iter().zip(delta.iter()).map(|(phi, delta)| phi + delta).collect();
+        let there: Vec<f64> =
+            here.iter().zip(delta.iter()).map(|(phi, delta)| phi + delta).collect();
         let next = evaluate(problem, &there)?;
         let kv = argmin::kv!("damping" => self.damping;);
         match next.filter(|next| next.sum() < sum) {
@@ -163,9 +171,13 @@ impl<O: LeastSquares> Solver<O, Iteration> for LevenbergMarquardt {
                 let ratio = reduction / predicted;
                 // Nielsen's rule, which changes λ smoothly.
                 self.damping *= (1.0 - (2.0 * ratio - 1.0).powi(3)).clamp(0.1, 2.0);
-                let is_over = reduction <= self.reduction * sum && predicted <= self.reduction * sum;
-                let state =
-                    state.param(there).cost(after).residuals(next.residuals).jacobian(next.jacobian);
+                let is_over =
+                    reduction <= self.reduction * sum && predicted <= self.reduction * sum;
+                let state = state
+                    .param(there)
+                    .cost(after)
+                    .residuals(next.residuals)
+                    .jacobian(next.jacobian);
                 let state = if is_over { state.terminate_with(converged) } else { state };
                 Ok((state, Some(kv)))
             }

@@ -5,7 +5,7 @@ use std::cell::RefCell;
 use metriplectic_dynamics::{Differentiable, Metriplectic, Parametrised, Point};
 use metriplectic_fields::{Column as _, Dimension as _, Real, Space, Vector};
 use metriplectic_integrators::tangent::{Linearised, TangentState};
-use metriplectic_integrators::{Schedule, Stepper, Tangents as _, TangentError, Watch as _};
+use metriplectic_integrators::{Schedule, Stepper, TangentError, Tangents as _, Watch as _};
 use nalgebra::{DMatrix, DVector, SVector};
 use num_dual::Dual64;
 
@@ -72,8 +72,9 @@ where
     /// The coordinates of the start.
     fn moved(&self, phi: &[f64]) -> Option<Vector<ManifoldOf<Y, P>>> {
         let first = self.unknowns.len();
-        self.free_start
-            .then(|| Vector::<ManifoldOf<Y, P>>::from_index(|i| phi.get(first + i).copied().unwrap_or(0.0)))
+        self.free_start.then(|| {
+            Vector::<ManifoldOf<Y, P>>::from_index(|i| phi.get(first + i).copied().unwrap_or(0.0))
+        })
     }
 
     /// The matrix from the coordinates of the start to the frame at it.
@@ -144,7 +145,11 @@ where
                     let scale = unknown.slope(theta[unknown.index]) / sigma;
                     jacobian[(line, j)] = slope[(k, Self::N + unknown.index)] * scale;
                 }
-                for (j, along) in along_start.iter().flat_map(|a| a.row(k).iter().copied().collect::<Vec<_>>()).enumerate() {
+                for (j, along) in along_start
+                    .iter()
+                    .flat_map(|a| a.row(k).iter().copied().collect::<Vec<_>>())
+                    .enumerate()
+                {
                     jacobian[(line, first + j)] = along / sigma;
                 }
             }
@@ -160,8 +165,6 @@ where
     F: Fn(&PointOf<Y, Real, P>) -> SVector<Real, K>,
 {
     fn squares(&self, phi: &[f64]) -> Option<Squares> {
-        self.evaluate(phi)
-            .map_err(|failure| *self.failure.borrow_mut() = Some(failure))
-            .ok()
+        self.evaluate(phi).map_err(|failure| *self.failure.borrow_mut() = Some(failure)).ok()
     }
 }

@@ -54,7 +54,9 @@ impl Names {
     fn check(&self, known: &[&'static str]) -> Result<(), FitError> {
         let Self::Some(names) = self else { return Ok(()) };
         match names.iter().find(|name| !known.contains(&name.as_str())) {
-            Some(name) => Err(FitError::UnknownParameter { name: name.clone(), known: known.to_vec() }),
+            Some(name) => {
+                Err(FitError::UnknownParameter { name: name.clone(), known: known.to_vec() })
+            }
             None => Ok(()),
         }
     }

@@ -170,6 +170,10 @@ macro_rules! method {
                 control(Self::tableau())
             }
 
+            fn damps(&self) -> bool {
+                Self::tableau().one_sided
+            }
+
             fn promises(&self, system: &Y) -> Promises {
                 Promises::all_laws(system.second_law() == SecondLaw::Exact)
             }

@@ -43,6 +43,7 @@
 //! A model with [`SecondLaw::Published`] keeps `H` and `L_a`. The methods are not symmetric in time, and stiff
 //! friction bounds their steps; the certificate says when it does.
 
+mod along;
 mod chebyshev;
 pub(crate) mod conditions;
 mod creep;
@@ -63,6 +64,7 @@ mod trial;
 
 use metriplectic_dynamics::SecondLaw;
 
+pub(crate) use along::along;
 pub use flow::{Projected, ProjectionError, StageFlow, Target};
 pub use memory::ExplicitMemory;
 use memory::MemoryOf;

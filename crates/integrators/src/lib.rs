@@ -13,7 +13,8 @@
 //! | [`explicit`] | [`DormandPrince8`], [`DormandPrince5`], [`RungeKuttaChebyshev`]: explicit methods, and then back onto the laws | [`step`], [`round_off`] |
 //! | [`run`] | [`Method`], [`Span`], [`Until`], [`Watch`], [`Steps`], [`Trajectory`], [`Event`], [`Certificate`], [`Checkpoint`], [`Observables`]: what a user does with a run of any method | [`step`], [`round_off`] |
 //! | [`system`] | every metriplectic system is a flow | [`step`], [`round_off`], [`explicit`] |
-//! | [`open`](mod@open) | [`OpenSystem`]: a clock in the energy, ports, baths and a ledger, for every method | [`step`], [`round_off`], [`discrete_gradient`], [`midpoint`], [`collocation`], [`explicit`], [`system`] |
+//! | [`noise`](mod@noise) | [`Noisy`]: a system with thermal noise; [`NinomiyaVictoir`], [`RandomFlow`], which sample its law with any method | [`step`], [`explicit`] |
+//! | [`open`](mod@open) | [`OpenSystem`]: a clock in the energy, ports, baths and a ledger, for every method | [`step`], [`round_off`], [`discrete_gradient`], [`midpoint`], [`collocation`], [`explicit`], [`system`], [`noise`](mod@noise) |
 //! | [`Run`] | runs with the default scheme of a retraction | [`step`], [`midpoint`], [`run`] |
 //! | [`attitude`] | [`Attitude`]: where a body points along a run of its angular momentum | [`run`], [`round_off`] |
 //! | [`tangent`](mod@tangent) | [`Tangents`]: the derivative of a run along its start and parameters | [`step`], [`discrete_gradient`], [`newton`], [`midpoint`], [`explicit`], [`run`] |
@@ -38,6 +39,7 @@ pub mod explicit;
 pub mod laws;
 pub mod midpoint;
 pub mod newton;
+pub mod noise;
 pub mod open;
 pub mod round_off;
 pub mod run;
@@ -56,6 +58,9 @@ pub use explicit::{
 };
 pub use midpoint::{Residual, Scheme};
 pub use newton::{Equation, Iterate, Linearised, Newton, Root, Rounding};
+pub use noise::{
+    Counter, NinomiyaVictoir, NoiseBuilder, NoiseError, Noisy, RandomFlow, Sampler, Sampling,
+};
 pub use open::{OpenBuilder, OpenSpace, OpenState, OpenSystem};
 pub use round_off::stable_gradient::StableGradient;
 pub use run::certificate::{
@@ -71,13 +76,13 @@ pub use run::trajectory::Trajectory;
 pub use run::until::Until;
 pub use run::watch::{Jumping, Watch, Watched};
 pub use run::{Ending, Method, Schedule, SpanError, State};
-pub use tangent::{
-    Linearised as LinearisedStep, SelfAdjoint, Sensitivity, TangentError, TangentEvent, TangentRun, TangentState,
-    TangentSteps, Tangents, Unlinearised,
-};
 pub use step::{
     Components, Control, Effort, Element, EntropyStep, EventExchange, Evidence, Flow, JumpError,
-    Laws, LedgerSummary, LimitingSites, Memory, MethodError, Promises, Recheck, Refusal,
-    RestoreError, Saved, Scales, StageLaws, StateSpace, StepEnds, StepError, StepStart, Stepper,
-    Taken, Vector,
+    Laws, LedgerSummary, LimitingSites, Memory, MethodError, NoiseSummary, Promises, Recheck,
+    Refusal, RestoreError, Saved, Scales, StageLaws, StateSpace, StepEnds, StepError, StepStart,
+    Stepper, Taken, Vector,
+};
+pub use tangent::{
+    Linearised as LinearisedStep, SelfAdjoint, Sensitivity, TangentError, TangentEvent, TangentRun,
+    TangentState, TangentSteps, Tangents, Unlinearised,
 };

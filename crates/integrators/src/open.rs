@@ -36,6 +36,7 @@ mod clock;
 mod flow;
 mod halves;
 mod midpoint;
+mod noise;
 mod projection;
 mod stages;
 mod state;

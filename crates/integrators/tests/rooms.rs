@@ -20,6 +20,7 @@ const ROOMS: [(&str, &[&str]); 15] = [
     ("explicit", &["step", "round_off"]),
     ("run", &["step", "round_off"]),
     ("system", &["step", "round_off", "explicit"]),
+    ("noise", &["step", "explicit"]),
     (
         "open",
         &[
@@ -30,6 +31,7 @@ const ROOMS: [(&str, &[&str]); 15] = [
             "collocation",
             "explicit",
             "system",
+            "noise",
         ],
     ),
     ("default_scheme", &["step", "midpoint", "run"]),

@@ -15,7 +15,7 @@ use crate::parallel;
 use crate::points::Points;
 use crate::pool::{Buffer, Pool};
 use crate::vector::{Reader, SiteVector};
-use differentials::Given;
+pub(crate) use differentials::Given;
 
 /// Points of a manifold at the sites of a graph, with energies of sites and bonds, an entropy of sites, and friction
 /// at both; built by [`Lattice::on`].
@@ -300,7 +300,7 @@ impl<P: Model> Lattice<P> {
 
 /// Zero for finite numbers, and not a number otherwise.
 #[inline]
-fn probed<V: Column<f64>>(v: &V) -> f64 {
+pub(crate) fn probed<V: Column<f64>>(v: &V) -> f64 {
     let mut sum = 0.0;
     for k in 0..V::LEN {
         sum += v[k];

@@ -44,6 +44,7 @@ pub mod lattice;
 mod layout;
 pub mod model;
 mod neighbours;
+mod noise;
 pub mod onsager;
 pub mod open;
 mod parallel;

@@ -25,6 +25,8 @@ pub trait Model: Sync {
     const BOND_ENERGY: bool;
     /// Whether bonds have friction.
     const BOND_FRICTION: bool;
+    /// How many terms of friction a site has, and a bond.
+    const TERMS: [usize; 2];
 
     /// The manifold.
     fn manifold(&self) -> &Self::Manifold;
@@ -146,6 +148,7 @@ where
     const ENTROPY: bool = S::PRESENT || GS::PRESENT;
     const BOND_ENERGY: bool = V::PRESENT;
     const BOND_FRICTION: bool = KB::PRESENT;
+    const TERMS: [usize; 2] = [KS::TERMS, KB::TERMS];
 
     fn manifold(&self) -> &M {
         &self.manifold

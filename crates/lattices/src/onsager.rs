@@ -70,6 +70,8 @@ impl<M: Space, E> fmt::Debug for BondState<'_, M, E> {
 pub trait SiteFriction<M: Space, D>: Sync {
     /// Whether there is any.
     const PRESENT: bool = true;
+    /// How many terms a site has.
+    const TERMS: usize;
 
     /// Passes each term to the visitor.
     fn each(&self, at: &SiteState<'_, M, D>, visit: impl FnMut(Onsager<Vector<M>>));
@@ -79,6 +81,8 @@ pub trait SiteFriction<M: Space, D>: Sync {
 pub trait BondFriction<M: Space, E>: Sync {
     /// Whether there is any.
     const PRESENT: bool = true;
+    /// How many terms a bond has.
+    const TERMS: usize;
 
     /// Passes each term to the visitor.
     fn each(&self, at: &BondState<'_, M, E>, visit: impl FnMut(Onsager<[Vector<M>; 2]>));
@@ -90,12 +94,14 @@ pub struct Frictionless;
 
 impl<M: Space, D> SiteFriction<M, D> for Frictionless {
     const PRESENT: bool = false;
+    const TERMS: usize = 0;
 
     fn each(&self, _: &SiteState<'_, M, D>, _: impl FnMut(Onsager<Vector<M>>)) {}
 }
 
 impl<M: Space, E> BondFriction<M, E> for Frictionless {
     const PRESENT: bool = false;
+    const TERMS: usize = 0;
 
     fn each(&self, _: &BondState<'_, M, E>, _: impl FnMut(Onsager<[Vector<M>; 2]>)) {}
 }
@@ -109,6 +115,8 @@ where
     M: Space,
     F: Fn(&SiteState<'_, M, D>) -> [Onsager<Vector<M>>; R] + Sync,
 {
+    const TERMS: usize = R;
+
     #[inline]
     fn each(&self, at: &SiteState<'_, M, D>, visit: impl FnMut(Onsager<Vector<M>>)) {
         (self.0)(at).into_iter().for_each(visit);
@@ -120,6 +128,8 @@ where
     M: Space,
     F: Fn(&BondState<'_, M, E>) -> [Onsager<[Vector<M>; 2]>; R] + Sync,
 {
+    const TERMS: usize = R;
+
     #[inline]
     fn each(&self, at: &BondState<'_, M, E>, visit: impl FnMut(Onsager<[Vector<M>; 2]>)) {
         (self.0)(at).into_iter().for_each(visit);

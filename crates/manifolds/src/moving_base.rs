@@ -78,11 +78,7 @@ translated!(Chart);
 
 /// The chart is the logarithm of a ratio.
 impl MovingBase for HalfLine {
-    fn stage_from(
-        x: &Vector1<f64>,
-        delta: &Vector1<f64>,
-        q: &Vector1<Dual64>,
-    ) -> Vector1<Dual64> {
+    fn stage_from(x: &Vector1<f64>, delta: &Vector1<f64>, q: &Vector1<Dual64>) -> Vector1<Dual64> {
         Vector1::new((q.x + Dual64::new(0.0, delta.x)).exp() * x.x)
     }
 
@@ -94,11 +90,7 @@ impl MovingBase for HalfLine {
         Vector1::new(a.x / y.x)
     }
 
-    fn moved_from(
-        x: &Vector1<f64>,
-        delta: &Vector1<f64>,
-        a: &Vector1<Dual64>,
-    ) -> Vector1<Dual64> {
+    fn moved_from(x: &Vector1<f64>, delta: &Vector1<f64>, a: &Vector1<Dual64>) -> Vector1<Dual64> {
         let y = Dual64::new(x.x, x.x * delta.x);
         Vector1::new((a.x / y).exp() * y)
     }
@@ -162,11 +154,7 @@ fn turned(x: &Matrix3<f64>, delta: &Vector3<f64>) -> Matrix3<Dual64> {
 
 impl MovingBase for Rotations {
     /// Cayley's map.
-    fn stage_from(
-        x: &Matrix3<f64>,
-        delta: &Vector3<f64>,
-        q: &Vector3<Dual64>,
-    ) -> Matrix3<Dual64> {
+    fn stage_from(x: &Matrix3<f64>, delta: &Vector3<f64>, q: &Vector3<Dual64>) -> Matrix3<Dual64> {
         let scale = (q.dot(q) * 0.25 + 1.0).recip();
         turned(x, delta) * rodrigues(q, scale, scale * 0.5)
     }
@@ -181,11 +169,7 @@ impl MovingBase for Rotations {
         a + q.cross(a) * half + q * (q.dot(a) * 0.25)
     }
 
-    fn moved_from(
-        x: &Matrix3<f64>,
-        delta: &Vector3<f64>,
-        a: &Vector3<Dual64>,
-    ) -> Matrix3<Dual64> {
+    fn moved_from(x: &Matrix3<f64>, delta: &Vector3<f64>, a: &Vector3<Dual64>) -> Matrix3<Dual64> {
         turned(x, delta) * exp(a)
     }
 }

@@ -74,6 +74,26 @@ impl<const N: usize> CasimirDissipation<N> {
         Ok(Self { algebra: algebra.clone(), form })
     }
 
+    /// Returns the algebra.
+    pub(crate) const fn algebra(&self) -> &LieAlgebra<N> {
+        &self.algebra
+    }
+
+    /// Computes vectors `c_a`, as columns, with `κ = Σ c_a c_aᵀ`: the factor of Cholesky, whose columns vanish where its
+    /// pivots are round-off.
+    pub(crate) fn columns(&self) -> SMatrix<f64, N, N> {
+        let (mut rest, mut columns) = (self.form, SMatrix::<f64, N, N>::zeros());
+        for a in 0..N {
+            let pivot = rest[(a, a)];
+            if pivot > ROUND_OFF * self.form[(a, a)] {
+                let column = rest.column(a) / pivot.sqrt();
+                rest -= column * column.transpose();
+                columns.set_column(a, &column);
+            }
+        }
+        columns
+    }
+
     /// The force `F(ξ) = κ[ξ, dC]` in `g*`, for the differential `dC` of a Casimir:
     /// `⟨F(ξ), η⟩ = κ(η, [ξ, dC])`.
     #[inline]

@@ -136,6 +136,13 @@ pub struct Isotropic {
     rate: f64,
 }
 
+impl Isotropic {
+    /// The rate.
+    pub(super) const fn rate(&self) -> f64 {
+        self.rate
+    }
+}
+
 impl<M: Manifold, G: Riemannian<M>> Friction<M, G> for Isotropic {
     fn apply(
         &self,
@@ -161,7 +168,7 @@ impl<F> fmt::Debug for Contacts<F> {
 }
 
 impl<F> Contacts<F> {
-    fn at<M: Manifold, G: Riemannian<M>, const N: usize>(
+    pub(super) fn at<M: Manifold, G: Riemannian<M>, const N: usize>(
         &self,
         at: &ExchangeArgs<'_, M, G>,
     ) -> Result<[Contact<Velocity<M, Real>>; N], MetricError>

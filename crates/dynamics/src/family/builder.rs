@@ -4,9 +4,7 @@ use std::fmt;
 use std::sync::Arc;
 
 use metriplectic_fields::{Dimension as _, Form, Real, ScalarField, Velocity};
-use metriplectic_manifolds::{
-    Canonical, Euclidean, Inert, Manifold, Product, Riemannian, Times,
-};
+use metriplectic_manifolds::{Canonical, Euclidean, Inert, Manifold, Product, Riemannian, Times};
 use nalgebra::SVector;
 
 use super::{Family, FieldOf, OfPair, OnFirst};
@@ -84,10 +82,7 @@ where
     }
 
     /// Sets the energy `H(x, θ)`, a closure `|x, θ| -> Real`.
-    pub fn energy<F>(
-        self,
-        energy: F,
-    ) -> FamilyBuilder<Wide<M, G, B, K, OfPair<F>, S, L, P>, P>
+    pub fn energy<F>(self, energy: F) -> FamilyBuilder<Wide<M, G, B, K, OfPair<F>, S, L, P>, P>
     where
         F: Fn(&M::Point<Real>, &SVector<Real, P>) -> Real,
     {
@@ -115,10 +110,7 @@ where
     }
 
     /// Sets the bracket on `M`, which does not depend on the parameters.
-    pub fn bracket<F>(
-        self,
-        bracket: F,
-    ) -> FamilyBuilder<Wide<M, G, (F, Zero), K, H, S, L, P>, P> {
+    pub fn bracket<F>(self, bracket: F) -> FamilyBuilder<Wide<M, G, (F, Zero), K, H, S, L, P>, P> {
         self.with(|wide| wide.bracket((bracket, Zero)))
     }
 

@@ -41,8 +41,7 @@ where
     ) -> Result<Vector<Product<A, B>, D>, MetricError> {
         let (x, y) = Product::parts(g.x);
         let (left, _) = g.halves(&x, &y)?;
-        let ((w, _), (alpha, _)) =
-            (Product::<A, B>::split(w), Product::<A, B>::split(alpha));
+        let ((w, _), (alpha, _)) = (Product::<A, B>::split(w), Product::<A, B>::split(alpha));
         let k = self.0.apply(&left, &w, &alpha)?;
         Ok(Product::<A, B>::join(&k, &Vector::<B, D>::zero()))
     }
@@ -55,8 +54,7 @@ where
     ) -> Result<DissipationJet<Product<A, B>>, MetricError> {
         let (x, y) = Product::parts(g.x);
         let (left, _) = g.halves(&x, &y)?;
-        let ((w, _), (alpha, _)) =
-            (Product::<A, B>::split(w), Product::<A, B>::split(alpha));
+        let ((w, _), (alpha, _)) = (Product::<A, B>::split(w), Product::<A, B>::split(alpha));
         let jet = self.0.linearise(&left, &w, &alpha)?;
         let zero = Matrix::<B>::zeros();
         Ok(DissipationJet {
@@ -134,14 +132,12 @@ where
         w: &Vector<M, D>,
         alpha: &Vector<M, D>,
     ) -> Result<Vector<M, D>, MetricError> {
-        let closure =
-            |x: &M::Point<Real>, w: &Velocity<M, Real>| (self.field)(x, w, &self.theta);
+        let closure = |x: &M::Point<Real>, w: &Velocity<M, Real>| (self.field)(x, w, &self.theta);
         FieldDissipation(closure).apply(g, w, alpha)
     }
 
     fn tensor(&self, g: &MetricAt<'_, M, G>, w: &Vector<M>) -> Result<Matrix<M>, MetricError> {
-        let closure =
-            |x: &M::Point<Real>, w: &Velocity<M, Real>| (self.field)(x, w, &self.theta);
+        let closure = |x: &M::Point<Real>, w: &Velocity<M, Real>| (self.field)(x, w, &self.theta);
         FieldDissipation(closure).tensor(g, w)
     }
 
@@ -151,8 +147,7 @@ where
         w: &Vector<M>,
         alpha: &Vector<M>,
     ) -> Result<DissipationJet<M>, MetricError> {
-        let closure =
-            |x: &M::Point<Real>, w: &Velocity<M, Real>| (self.field)(x, w, &self.theta);
+        let closure = |x: &M::Point<Real>, w: &Velocity<M, Real>| (self.field)(x, w, &self.theta);
         FieldDissipation(closure).linearise(g, w, alpha)
     }
 }

@@ -294,6 +294,10 @@ macro_rules! open_stages {
                 control(Self::tableau())
             }
 
+            fn damps(&self) -> bool {
+                Self::tableau().one_sided
+            }
+
             fn promises(&self, system: &OpenSystem<Y, C, X>) -> Promises {
                 Promises::all_laws(system.entropy_law() == SecondLaw::Exact)
             }

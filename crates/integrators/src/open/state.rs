@@ -59,6 +59,12 @@ impl Columns {
         columns.filter(|(_, column)| column.1 == Kind::Heat).map(|(index, _)| index)
     }
 
+    /// The index of the heat of a bath, in their order.
+    pub(super) fn heat(&self, bath: usize) -> Option<usize> {
+        let heats = self.0.iter().enumerate().filter(|(_, column)| column.1 == Kind::Heat);
+        heats.map(|(index, _)| index).nth(bath)
+    }
+
     fn index(&self, name: &str, kind: Kind) -> Option<usize> {
         self.0.iter().position(|column| *column.0 == *name && column.1 == kind)
     }

@@ -13,7 +13,7 @@ use crate::run::checked::checked_states;
 use crate::run::jump::{Exchanged, JumpBalance};
 use crate::step::{
     Effort, Element, EntropyStep, EventExchange, Evidence, Flow, Laws, LedgerSummary,
-    LimitingSites, Promises, Taken,
+    LimitingSites, NoiseSummary, Promises, Taken,
 };
 
 /// The balance of a run: what became of the two laws, of the manifold, and what it cost.
@@ -108,6 +108,9 @@ pub struct Certificate {
     /// What jumps have brought into a system whose states have no ledger.
     #[cfg_attr(feature = "serde", serde(skip))]
     pub(crate) exchanged_in_jumps: Exchanged,
+    /// The thermal noise of the run; `None` for one without.
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
+    pub noise: Option<NoiseSummary>,
     /// Whether the dissipation was projected so that it keeps the energy, and is not quite the tensor
     /// that was written down ([`ProjectedDissipation`](metriplectic_dynamics::ProjectedDissipation)).
     pub projected: bool,
@@ -267,6 +270,7 @@ impl Certificate {
             exchange: flow.ledger(x0),
             jumps: Vec::new(),
             exchanged_in_jumps: Exchanged::NOTHING,
+            noise: None,
             projected: flow.is_projected(),
         }
     }

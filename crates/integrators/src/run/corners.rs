@@ -6,7 +6,7 @@
 
 use crate::run::requests::rounding;
 use crate::run::span_error::SpanError;
-use crate::step::{Flow, StepError, StepStart, Stepper, Taken};
+use crate::step::{Flow, Memory as _, StepError, StepStart, Stepper, Taken};
 
 #[cfg(feature = "serde")]
 use crate::step::exact;
@@ -140,7 +140,7 @@ pub(crate) fn step<F: Flow, M: Stepper<F>>(
         let Stop { stop, recorded, is_corner } = corners.stop(time, end);
         let size = if before.is_none() && !is_corner { h } else { stop - time };
         if corners.has(time) {
-            *memory = M::Memory::default();
+            *memory = memory.restarted();
         }
         let (reference_here, allowed) = (reference.clone(), start.allowed.clone());
         let from =

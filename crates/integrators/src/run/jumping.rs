@@ -86,6 +86,7 @@ impl<F: Flow, M: Stepper<F>> Steps<'_, F, M> {
             entropy,
             h: 0.0,
             in_parts: false,
+            entropy_step: None,
         };
         (self.state, self.values) = (after, values);
         let over = match &self.progress.step_size {

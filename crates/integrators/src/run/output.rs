@@ -210,7 +210,7 @@ impl<F: Flow, M: Stepper<F>> Steps<'_, F, M> {
         let found = self.find(&mut watching);
         let (time, h) = (self.before.state.time, self.before.h);
         let looked = match found {
-            None => Err(StepError::NothingBetween { time, h }),
+            None => Err(self.method.nothing_between(time, h)),
             Some(None) => Ok(()),
             Some(Some(with_it)) => self.jump(&mut watching, &with_it),
         };

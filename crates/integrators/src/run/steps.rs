@@ -85,7 +85,8 @@ impl<'a, F: Flow, M: Stepper<F>> Steps<'a, F, M> {
         flow.check(&x0)?;
         flow.examine(&x0)?;
         let promises = method.promises(flow);
-        let certificate = Certificate::start(flow, &x0, promises);
+        let certificate =
+            Certificate { noise: method.noise(flow), ..Certificate::start(flow, &x0, promises) };
         let scales = Scales::at(flow, &x0, schedule.span());
         let Schedule { size, start, count, every, most, rest, watch, mut corners } = schedule;
         corners.start = start;

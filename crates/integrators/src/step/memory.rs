@@ -11,6 +11,12 @@ pub trait Memory: Clone + Debug + Default {
     #[must_use]
     fn rescaled(&self, ratio: f64) -> Self;
 
+    /// The memory after a corner in time, across which nothing is extrapolated.
+    #[must_use]
+    fn restarted(&self) -> Self {
+        Self::default()
+    }
+
     /// Notes what a try that was refused has left in its own copy of this memory.
     fn refused(&mut self, tried: Self) {
         let _ = tried;

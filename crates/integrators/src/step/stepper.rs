@@ -1,8 +1,8 @@
 //! The interface between runs and methods.
 
 use super::{
-    Control, Effort, Element, Flow, LimitingSites, Memory, MethodError, Promises, Refusal,
-    StepEnds, StepError, StepStart, Taken, Vector as _, dense, name_of,
+    Control, Effort, Element, Flow, LimitingSites, Memory, MethodError, NoiseSummary, Promises,
+    Refusal, StepEnds, StepError, StepStart, Taken, Vector as _, dense, name_of,
 };
 
 /// A one-step method.
@@ -25,6 +25,22 @@ pub trait Stepper<F: Flow>: Sized {
 
     /// The laws that hold exactly on every step.
     fn promises(&self, flow: &F) -> Promises;
+
+    /// Whether the method damps what is faster than a step, and adds entropy beside that of the friction.
+    fn damps(&self) -> bool {
+        false
+    }
+
+    /// What the method says of the noise of a run; `None` for one without random numbers.
+    fn noise(&self, flow: &F) -> Option<NoiseSummary> {
+        let _ = flow;
+        None
+    }
+
+    /// The error of a run that asks for a state inside a step where there is none.
+    fn nothing_between(&self, time: f64, h: f64) -> StepError {
+        StepError::NothingBetween { time, h }
+    }
 
     /// Refuses options with which no run can start, of steps that follow a tolerance or have one size.
     ///

@@ -56,7 +56,8 @@ impl Sensitivity {
         };
         let energy = off(&jets.energy.df, &columns.laws.energy);
         let listed = jets.invariants.as_ref().iter().flatten().zip(&columns.laws.invariants);
-        let invariants = listed.fold(0.0, |worst: f64, ((_, jet), law)| worst.max(off(&jet.df, law)));
+        let invariants =
+            listed.fold(0.0, |worst: f64, ((_, jet), law)| worst.max(off(&jet.df, law)));
         if !(energy.max(invariants) <= BROKEN) || energy.is_nan() {
             return Err(Unlinearised::LawBroken { off: energy.max(invariants) });
         }

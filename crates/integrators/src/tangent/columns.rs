@@ -30,7 +30,12 @@ impl<Y: Metriplectic> Clone for Laws<Y> {
     fn clone(&self) -> Self {
         let Self { energy, invariants, entropy, entropy_is_known } = self;
         let (energy, entropy) = (*energy, *entropy);
-        Self { energy, invariants: invariants.clone(), entropy, entropy_is_known: *entropy_is_known }
+        Self {
+            energy,
+            invariants: invariants.clone(),
+            entropy,
+            entropy_is_known: *entropy_is_known,
+        }
     }
 }
 

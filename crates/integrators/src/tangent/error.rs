@@ -19,13 +19,17 @@ pub enum Unlinearised {
     )]
     NotSmooth,
     /// The step that was differentiated is not the one that was taken.
-    #[error("the step ends {off:.1e} of its size away from the one that was taken; take smaller steps")]
+    #[error(
+        "the step ends {off:.1e} of its size away from the one that was taken; take smaller steps"
+    )]
     NotReproduced {
         /// The largest difference of an entry, relative to its size.
         off: f64,
     },
     /// The derivative breaks the first law of tangents.
-    #[error("dH(x') T' differs from dH(x₀) by {off:.1e} of its terms, so the derivative is wrong; take smaller steps")]
+    #[error(
+        "dH(x') T' differs from dH(x₀) by {off:.1e} of its terms, so the derivative is wrong; take smaller steps"
+    )]
     LawBroken {
         /// The difference, relative to the terms.
         off: f64,

@@ -143,9 +143,8 @@ fn propagate<Y: Metriplectic<Manifold: MovingBase>>(
         let terms = tableau.weights().iter().map(|&(j, w)| stages[j].production[c] * w);
         terms.fold(Dual64::from(0.0), |sum, term| sum + term) * step.sizes[c]
     };
-    let points = (0..count)
-        .map(|c| Y::Manifold::stage_from(piece.x, &step.starts[c], &ends[c]))
-        .collect();
+    let points =
+        (0..count).map(|c| Y::Manifold::stage_from(piece.x, &step.starts[c], &ends[c])).collect();
     // The size of the step moves no target.
     let law = |law: &LawOfStart<Vector<Y::Manifold>>| -> Numbers {
         (0..count).map(|c| Dual64::new(law.value, if c < n { law.row[c] } else { 0.0 })).collect()

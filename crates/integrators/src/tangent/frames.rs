@@ -13,9 +13,8 @@ pub(super) fn between<M: Space>(from: &M::Point<f64>, to: &M::Point<f64>) -> Opt
         return None;
     }
     Some(Matrix::<M>::from_columns(|k| {
-        let e = Vector::<M, Dual64>::from_index(|i| {
-            Dual64::new(0.0, if i == k { 1.0 } else { 0.0 })
-        });
+        let e =
+            Vector::<M, Dual64>::from_index(|i| Dual64::new(0.0, if i == k { 1.0 } else { 0.0 }));
         let there = M::coordinates(to, &M::chart(from, &e));
         Vector::<M>::from_index(|i| there[i].eps)
     }))

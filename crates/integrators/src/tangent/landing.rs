@@ -50,8 +50,8 @@ impl<Y: Metriplectic<Manifold: MovingBase>> Landing<'_, Y> {
         let mut is_last = false;
         for _ in 0..CORRECTIONS {
             let Some(first) = points.first() else { break };
-            let fields = Fields::at(self.system, Y::Manifold::real(first))
-                .ok_or(Unlinearised::NotSmooth)?;
+            let fields =
+                Fields::at(self.system, Y::Manifold::real(first)).ok_or(Unlinearised::NotSmooth)?;
             let mut largest = 0.0_f64;
             let scales = Y::Manifold::scales(&fields.y);
             for (column, y) in points.iter_mut().enumerate() {

@@ -68,7 +68,9 @@ impl<D: Metriplectic, M: Stepper<D>> Again<'_, D, M> {
 }
 
 /// Components of the wide system: those of the first factor, and zeros.
-fn widened<D: Differentiable>(v: &Components<Vector<D::Manifold>>) -> Vector<<Wide<D> as Metriplectic>::Manifold> {
+fn widened<D: Differentiable>(
+    v: &Components<Vector<D::Manifold>>,
+) -> Vector<<Wide<D> as Metriplectic>::Manifold> {
     let n = Dim::<D>::LEN;
     Vector::<<Wide<D> as Metriplectic>::Manifold>::from_index(|i| if i < n { v.0[i] } else { 0.0 })
 }
@@ -99,13 +101,8 @@ where
         let reference = again.take(start, half, HALVES)?;
         let x = again.parts.last()?.end.clone();
         let values = crate::step::Flow::laws(system, &x);
-        let middle = StepStart {
-            x: &x,
-            time: start.time + half,
-            values,
-            reference,
-            allowed: start.allowed,
-        };
+        let middle =
+            StepStart { x: &x, time: start.time + half, values, reference, allowed: start.allowed };
         again.take(&middle, half, HALVES)
     })();
     parts.ok_or(Unlinearised::Singular)?;

@@ -110,13 +110,13 @@ where
             let b = turned::<Y::Manifold>(back.jacobian, &back.path.z, &there.path.z);
             let a = scaled::<Y>(&there.jacobian, &units).factor()?;
             let solve = |r: Vector<Y::Manifold>| {
-                let hat = metriplectic_fields::Factors::solve(&a, &each::<Y>(&r, |i| 1.0 / units[i]))?;
+                let hat =
+                    metriplectic_fields::Factors::solve(&a, &each::<Y>(&r, |i| 1.0 / units[i]))?;
                 Some(e * each::<Y>(&hat, |i| units[i]))
             };
             let inverse = scaled::<Y>(&f, &units).inverse()?;
-            let inverse = Matrix::<Y::Manifold>::from_entries(|i, j| {
-                inverse[(i, j)] * units[i] / units[j]
-            });
+            let inverse =
+                Matrix::<Y::Manifold>::from_entries(|i, j| inverse[(i, j)] * units[i] / units[j]);
             let right = b * inverse;
             let mut j = Matrix::<Y::Manifold>::zeros();
             for k in 0..Dim::<Y>::LEN {
@@ -158,9 +158,6 @@ fn scaled<Y: Metriplectic>(
 }
 
 /// The vector `v_i f(i)`.
-fn each<Y: Metriplectic>(
-    v: &Vector<Y::Manifold>,
-    f: impl Fn(usize) -> f64,
-) -> Vector<Y::Manifold> {
+fn each<Y: Metriplectic>(v: &Vector<Y::Manifold>, f: impl Fn(usize) -> f64) -> Vector<Y::Manifold> {
     Vector::<Y::Manifold>::from_index(|i| v[i] * f(i))
 }

@@ -87,6 +87,8 @@ impl<D: Differentiable> TangentState<D> {
     /// The derivative of a function `f` of the state along start and parameters, `df T`.
     pub fn derivative_of(&self, df: &Vector<D::Manifold>) -> DVector<f64> {
         let (n, all) = (Dim::<D>::LEN, Dim::<D::Wide>::LEN);
-        DVector::from_fn(all, |j, _| (0..n).fold(0.0, |sum, i| sum + df[i] * self.columns.t[(i, j)]))
+        DVector::from_fn(all, |j, _| {
+            (0..n).fold(0.0, |sum, i| sum + df[i] * self.columns.t[(i, j)])
+        })
     }
 }

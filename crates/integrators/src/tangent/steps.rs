@@ -101,8 +101,7 @@ where
         if self.steps.state().step == before.step {
             return Ok(inside);
         }
-        let failed =
-            |cause| TangentError::NotLinearised { time: before.time, cause };
+        let failed = |cause| TangentError::NotLinearised { time: before.time, cause };
         let found = self.steps.take_events();
         let flow = self.steps.flow();
         let last = self.steps.last_step(&scales);
@@ -116,9 +115,9 @@ where
             let near = rounding(self.start, self.steps.state().time);
             let is_end = (self.steps.state().time - time).abs() <= near;
             if !is_end {
-                let (point, moved) =
-                    self.part(&last, (time - before.time) / (self.steps.state().time - before.time))
-                        .map_err(failed)?;
+                let (point, moved) = self
+                    .part(&last, (time - before.time) / (self.steps.state().time - before.time))
+                    .map_err(failed)?;
                 inside.outputs.push(self.at(before.step, time, point, moved.columns));
             }
         }
@@ -166,9 +165,8 @@ where
     > {
         let (flow, method) = (self.steps.flow(), self.steps.method());
         let (h, mut memory) = (theta * last.h, M::Memory::default());
-        let taken = method
-            .step(flow, &last.start, h, &mut memory)
-            .map_err(|_| Unlinearised::Singular)?;
+        let taken =
+            method.step(flow, &last.start, h, &mut memory).map_err(|_| Unlinearised::Singular)?;
         let ended = Ended {
             end: &taken.x,
             h,
@@ -208,4 +206,3 @@ where
         Ok(TangentEvent { event, state, velocity })
     }
 }
-

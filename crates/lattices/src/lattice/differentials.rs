@@ -12,7 +12,7 @@ use crate::pool::Buffer;
 
 /// What a bond gives to each of its sites.
 #[derive(Clone, Copy, PartialEq, Eq)]
-pub(super) enum Given {
+pub(crate) enum Given {
     Nothing,
     /// A vector.
     Vector,
@@ -74,7 +74,7 @@ fn halves<P: Model>(df: &Vector<PairManifold<P>>) -> [VectorOf<P>; 2] {
 
 impl<P: Model> Lattice<P> {
     /// A place for what bonds give to other chunks.
-    pub(super) fn slots(&self, given: Given) -> Buffer<f64> {
+    pub(crate) fn slots(&self, given: Given) -> Buffer<f64> {
         let (pool, laws) = match given {
             Given::Nothing => return self.slots.adopt(Vec::new()),
             Given::Vector => (&self.slots, 1),

@@ -31,6 +31,7 @@ const ONE_FALL: Certificate = Certificate {
     exchange: None,
     jumps: Vec::new(),
     exchanged_in_jumps: Exchanged::NOTHING,
+    noise: None,
     projected: false,
 };
 

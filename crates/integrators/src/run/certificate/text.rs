@@ -10,7 +10,7 @@ use super::{
 use crate::round_off::bound::of_a_law;
 use crate::run::jump::JumpBalance;
 use crate::step::digits::{Digits, counted};
-use crate::step::{Effort, LedgerSummary, LimitingSites};
+use crate::step::{Effort, LedgerSummary, LimitingSites, NoiseSummary};
 
 /// The local error from which on a hundred steps may be off by what a picture shows: about 27 steps of the midpoint rule
 /// in a turn.
@@ -41,6 +41,7 @@ impl fmt::Display for Certificate {
         self.jumped(f)?;
         match self.second_law {
             SecondLaw::NoEntropy => writeln!(f, "second law:  no entropy"),
+            _ if let Some(noise) = &self.noise => self.fluctuation(noise, f),
             _ if !self.promises.entropy => {
                 writeln!(f, "second law: not promised; {}", self.entropy_line())
             }
@@ -145,6 +146,20 @@ impl fmt::Display for Certificate {
 }
 
 impl Certificate {
+    /// Says of the noise what it is, and that the second law holds in the mean.
+    fn fluctuation(&self, noise: &NoiseSummary, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let NoiseSummary { k_b, terms, weak_order, numbers } = noise;
+        let terms = counted(*terms, "term", "terms");
+        writeln!(f, "noise:       k_B = {k_b:?}, {terms}, {numbers}; weak order {weak_order}")?;
+        let name = if self.exchange.is_some() { "S + S of the baths" } else { "S" };
+        let fall = -self.min_entropy_increment.min(0.0) / k_b;
+        writeln!(
+            f,
+            "second law:  in the mean: {name} fluctuates; it fell on {} of {}, by at most {fall:.1} k_B",
+            self.entropy_falls, self.steps
+        )
+    }
+
     /// Lists the work and the heat of an open system.
     fn exchanged(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Some(LedgerSummary { parameter, work, heat, .. }) = &self.exchange else {

@@ -11,7 +11,7 @@ use crate::run::certificate::{
 use crate::run::ending::Ending;
 use crate::run::jump::{Exchanged, JumpBalance};
 use crate::step::exact::{self, ExactForm};
-use crate::step::{Effort, LedgerSummary, LimitingSites, Promises};
+use crate::step::{Effort, LedgerSummary, LimitingSites, NoiseSummary, Promises};
 
 #[derive(Serialize, Deserialize)]
 #[serde(remote = "Certificate", deny_unknown_fields)]
@@ -67,6 +67,9 @@ struct CertificateForm {
     jumps: Vec<JumpBalance>,
     #[serde(with = "exact")]
     exchanged_in_jumps: Exchanged,
+    // It is that of the method.
+    #[serde(skip)]
+    noise: Option<NoiseSummary>,
     projected: bool,
 }
 

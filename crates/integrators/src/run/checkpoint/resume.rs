@@ -73,8 +73,9 @@ impl<'a, F: Flow, M: Stepper<F>> Steps<'a, F, M> {
         validation::of_the_method(&c.method, method.name())?;
         let entries: Vec<f64> = c.point().collect();
         let point = flow.element(&entries)?;
+        let fresh = Certificate::start(flow, &point, method.promises(flow));
         let mut certificate =
-            c.balance.resumed(Certificate::start(flow, &point, method.promises(flow)))?;
+            c.balance.resumed(Certificate { noise: method.noise(flow), ..fresh })?;
         if c.progress.ending.is_none() {
             certificate.checked_states = checked_states(flow, c.step);
         }
@@ -122,8 +123,9 @@ impl Certificate {
     /// of themselves is theirs.
     fn resumed(&self, fresh: Self) -> Result<Self, ResumeError> {
         expect_length("further invariants", self.invariants.len(), fresh.invariants.len())?;
-        let Self { promises, second_law, projected, exchange, .. } = fresh;
-        let mut certificate = Self { promises, second_law, projected, exchange, ..self.clone() };
+        let Self { promises, second_law, projected, exchange, noise, .. } = fresh;
+        let mut certificate =
+            Self { promises, second_law, projected, exchange, noise, ..self.clone() };
         for (balance, fresh) in certificate.invariants.iter_mut().zip(fresh.invariants) {
             balance.kind = fresh.kind;
         }

@@ -1,0 +1,116 @@
+//! Faults of noise.
+
+/// Why a system has no noise of this kind, or a method cannot sample it. It is in
+/// [`RunError::Flow`](crate::RunError::Flow), [`RunError::Method`](crate::RunError::Method) or
+/// [`StepError::Method`](crate::StepError::Method), and can be downcast from it.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum NoiseError {
+    /// Boltzmann's constant is not a positive number.
+    #[error(
+        "Boltzmann's constant is {k_b}, and it must be positive; leave `.noise(..)` out for a system without noise"
+    )]
+    BoltzmannNotPositive {
+        /// The constant.
+        k_b: f64,
+    },
+    /// The reversible motion changes the volume `μ`, so `exp(S/k_B) μ` would not be its law.
+    #[error(
+        "div_μ(Π dH) = {divergence:.1e} at the start of the run, where its terms add up to {size:.1e}: the reversible \
+         motion changes the volume, and exp(S/k_B) would not be the law; give the measure that it keeps by \
+         `Boltzmann(k_B).measure(|x| ..)`, with ln μ relative to the volume of the canonical metric"
+    )]
+    NotUnimodular {
+        /// `div_μ(Π dH)`.
+        divergence: f64,
+        /// The sizes of its terms.
+        size: f64,
+    },
+    /// The terms of the dissipation do not add up to it.
+    #[error(
+        "the terms of the dissipation differ from it by {off:.1e}, of {size:.1e}, in units of the entries; its metric is \
+         not that of the space around, so write the friction as `OnsagerDissipation`"
+    )]
+    TermsDiffer {
+        /// The largest entry of `Σ ρ b bᵀ − K`.
+        off: f64,
+        /// The largest entry of `K`.
+        size: f64,
+    },
+    /// The entropy is no Casimir of the bracket.
+    #[error(
+        "noise needs an entropy that the bracket keeps, `Π dS = 0`, and this system has `SecondLaw::Published` or no \
+         entropy; exp(S/k_B) would not be its law"
+    )]
+    NoiseAndPublished,
+    /// A bath has noise, and further invariants are listed, which it would not keep.
+    #[error(
+        "the noise of a bath does not keep the further invariants that are listed; leave them out of the list"
+    )]
+    InvariantsInABath,
+    /// A lattice has energies of bonds, or gathers over them.
+    #[error(
+        "the kinetic drift of a lattice is known where its energy and its entropy are sums over sites, and this one has \
+         energies of bonds, or gathers over them"
+    )]
+    BondsHaveEnergies,
+    /// Steps follow a tolerance.
+    #[error(
+        "noise needs steps of one size, and these follow a tolerance: a step that is rejected and drawn again would change \
+         the law; take `Span::steps`"
+    )]
+    NeedsFixedSteps,
+    /// An output or an event is inside a step.
+    #[error(
+        "a step of noise has no state inside it, where an output or an event was asked for: what lies between is a path of \
+         its own; ask at the ends of steps"
+    )]
+    HasNoBetween,
+    /// The method that is wrapped has an order below 2.
+    #[error(
+        "`NinomiyaVictoir` of weak order 2 wraps a method of order {order}; take one of order 2 or more, or `RandomFlow`"
+    )]
+    OrderTooLow {
+        /// Its order.
+        order: u32,
+    },
+    /// The method damps, and adds entropy beside that of the friction.
+    #[error(
+        "the method damps, and adds entropy beside that of the friction, to which no noise belongs; take `Gauss`, an \
+         explicit method or the midpoint scheme in place of `Radau`"
+    )]
+    NoiseWithRadau,
+    /// Friction is faster than a step.
+    #[error(
+        "friction is not resolved: h|K'| = {rate:.1e} exceeds 1, and the law is off by its square; take steps below {below:.1e}"
+    )]
+    FrictionUnresolved {
+        /// `h|K'|`.
+        rate: f64,
+        /// A step size that resolves it.
+        below: f64,
+    },
+    /// A step was beyond the edge of stability of an explicit method, and was taken in parts.
+    #[error(
+        "the step is beyond the edge of stability of the explicit method, so friction is not resolved; take smaller steps"
+    )]
+    StabilityUnresolved,
+    /// A noise field leads out of its domain, even in small parts.
+    #[error(
+        "noise term {term} leads out of the domain, even in {parts} parts of a step: it is to move the state by \
+         {reach:.1e} of its size; take smaller steps, and let the friction vanish at the edge of the domain"
+    )]
+    Unresolved {
+        /// The first term of the flow.
+        term: usize,
+        /// How many parts were tried.
+        parts: u32,
+        /// `√(2 k_B h ρ) |b ξ|` in units of the entries.
+        reach: f64,
+    },
+    /// The kinetic drift leads out of its domain, or has no value.
+    #[error(
+        "the kinetic drift `k_B Σ c_r b_r` has no value, or leads out of the domain; take smaller steps"
+    )]
+    DriftUnresolved,
+}

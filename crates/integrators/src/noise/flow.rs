@@ -1,0 +1,156 @@
+//! A system with noise as a flow: its laws and its sizes are those of the system without.
+
+use metriplectic_dynamics::invariants::Kind;
+use metriplectic_dynamics::{ModelError, SecondLaw};
+use metriplectic_manifolds::PointError;
+
+use super::error::NoiseError;
+use super::fluctuating::Fluctuating;
+use super::system::Noisy;
+use crate::step::{Element, Flow, FlowError, Laws, LedgerSummary, Recheck, Scales, StepError};
+
+impl<F: Fluctuating<U>, U> Flow for Noisy<F, U> {
+    type Space = F::Space;
+    type Numbers = F::Numbers;
+    type Vector = F::Vector;
+
+    fn with_room<T>(&self, f: impl FnOnce() -> T) -> T {
+        self.flow().with_room(f)
+    }
+
+    fn laws(&self, x: &Element<F>) -> Laws<F::Numbers> {
+        self.flow().laws(x)
+    }
+
+    fn term_sizes(&self, x: &Element<F>) -> Laws<F::Numbers> {
+        self.flow().term_sizes(x)
+    }
+
+    fn rates(&self, x: &Element<F>, d: &F::Vector) -> Option<F::Vector> {
+        self.flow().rates(x, d)
+    }
+
+    fn sizes(&self, x: &Element<F>) -> F::Vector {
+        self.flow().sizes(x)
+    }
+
+    fn moved(&self, x: &Element<F>, d: &F::Vector) -> Element<F> {
+        self.flow().moved(x, d)
+    }
+
+    fn production(&self, x: &Element<F>) -> Option<f64> {
+        self.flow().production(x)
+    }
+
+    fn onto(
+        &self,
+        y: &Element<F>,
+        laws: &Laws<F::Numbers>,
+        entropy: Option<f64>,
+    ) -> Option<Element<F>> {
+        self.flow().onto(y, laws, entropy)
+    }
+
+    fn begin(&self, x: Element<F>, time: f64) -> Element<F> {
+        self.flow().begin(x, time)
+    }
+
+    fn clocked(&self, x: &Element<F>, time: f64) -> Option<Element<F>> {
+        self.flow().clocked(x, time)
+    }
+
+    /// Noise moves each state, so none is at rest.
+    fn depends_on_time(&self) -> bool {
+        true
+    }
+
+    fn ledger(&self, x: &Element<F>) -> Option<LedgerSummary> {
+        self.flow().ledger(x)
+    }
+
+    fn inspect(&self, ends: [&Element<F>; 2], of_one_size: bool) -> Result<(), StepError> {
+        self.flow().inspect(ends, of_one_size)
+    }
+
+    fn element(&self, entries: &[f64]) -> Result<Element<F>, PointError> {
+        self.flow().element(entries)
+    }
+
+    fn entropy_law(&self) -> SecondLaw {
+        self.flow().entropy_law()
+    }
+
+    fn kinds(&self) -> Vec<Kind> {
+        self.flow().kinds()
+    }
+
+    fn is_projected(&self) -> bool {
+        self.flow().is_projected()
+    }
+
+    fn check(&self, x0: &Element<F>) -> Result<(), ModelError> {
+        self.flow().check(x0)
+    }
+
+    fn is_verified(&self) -> bool {
+        self.flow().is_verified()
+    }
+
+    fn examine(&self, x0: &Element<F>) -> Result<(), FlowError> {
+        self.flow().examine(x0)?;
+        let k_b = self.noise().k_b;
+        if !(k_b > 0.0 && k_b.is_finite()) {
+            return Err(FlowError::new(NoiseError::BoltzmannNotPositive { k_b }));
+        }
+        self.flow().examine_noise(x0, self.noise()).map_err(FlowError::new)
+    }
+
+    fn rechecks(&self, occasion: Recheck) -> bool {
+        self.flow().rechecks(occasion)
+    }
+
+    fn recheck(&self, x: &Element<F>, occasion: Recheck) -> Result<(), ModelError> {
+        self.flow().recheck(x, occasion)
+    }
+
+    fn reexamine(&self, x: &Element<F>, occasion: Recheck) -> Result<(), FlowError> {
+        self.flow().reexamine(x, occasion)
+    }
+
+    fn site_outside(&self, x: &Element<F>, d: &F::Vector) -> Option<usize> {
+        self.flow().site_outside(x, d)
+    }
+
+    fn defect(&self, x: &Element<F>) -> f64 {
+        self.flow().defect(x)
+    }
+
+    fn energy_sizes(&self, ends: [&Element<F>; 2]) -> [f64; 2] {
+        self.flow().energy_sizes(ends)
+    }
+
+    fn entropy_round_off(&self, ends: [&Element<F>; 2]) -> f64 {
+        self.flow().entropy_round_off(ends)
+    }
+
+    fn dependent_invariant(&self, x: &Element<F>) -> Option<(usize, f64)> {
+        self.flow().dependent_invariant(x)
+    }
+
+    fn reach(&self, x: &Element<F>, span: f64) -> Option<Scales<F::Vector>> {
+        self.flow().reach(x, span)
+    }
+
+    fn velocity_terms(
+        &self,
+        x: &Element<F>,
+        v: &F::Vector,
+        sizes: &F::Vector,
+    ) -> Option<F::Vector> {
+        self.flow().velocity_terms(x, v, sizes)
+    }
+
+    fn rates_and_terms(&self, x: &Element<F>) -> Option<[F::Vector; 2]> {
+        self.flow().rates_and_terms(x)
+    }
+}

@@ -1,0 +1,172 @@
+//! The flows of which a step is composed.
+
+use std::ops::Range;
+
+use super::error::NoiseError;
+use super::fluctuating::{Fluctuating, Landing};
+use super::numbers::Numbers;
+use super::system::Noisy;
+use crate::explicit::along;
+use crate::step::{
+    Effort, Element, Evidence, Laws, MethodError, StepError, StepStart, Stepper, Taken, Vector as _,
+};
+
+/// How often a flow is halved.
+const HALVES: u32 = 12;
+/// The rate `h|K'|` above which friction is not resolved.
+const RESOLVED: f64 = 1.0;
+
+/// A step on its way.
+#[derive(Debug)]
+pub struct Moves<'a, F: Fluctuating<U>, U, R> {
+    system: &'a Noisy<F, U>,
+    numbers: &'a R,
+    step: u64,
+    time: f64,
+    h: f64,
+    reference: &'a Laws<F::Numbers>,
+    x: Element<F>,
+    evidence: Evidence,
+    effort: Effort,
+}
+
+impl<'a, F: Fluctuating<U>, U, R: Numbers> Moves<'a, F, U, R> {
+    pub(super) fn from(
+        system: &'a Noisy<F, U>,
+        start: &'a StepStart<'_, Noisy<F, U>>,
+        h: f64,
+        (numbers, step): (&'a R, u64),
+    ) -> Self {
+        Self {
+            system,
+            numbers,
+            step,
+            time: start.time,
+            h,
+            reference: &start.reference,
+            x: start.x.clone(),
+            evidence: Evidence { rests: false, ..Evidence::default() },
+            effort: Effort::default(),
+        }
+    }
+
+    /// The terms of each group.
+    pub(super) fn groups(&self) -> Vec<Range<usize>> {
+        self.system.flow().groups()
+    }
+
+    /// Whether the coin of this step says so.
+    pub(super) fn is_backward(&self) -> bool {
+        self.numbers.is_backward(self.step)
+    }
+
+    fn failed(&self, error: NoiseError) -> StepError {
+        StepError::Method { time: self.time, error: MethodError::new(error) }
+    }
+
+    /// `A` for a fraction of the step: the motion without noise, from this fraction on.
+    pub(super) fn deterministic<M: Stepper<F>>(
+        &mut self,
+        method: &M,
+        [from, fraction]: [f64; 2],
+    ) -> Result<(), StepError> {
+        let flow = self.system.flow();
+        let (h, time) = (fraction * self.h, self.time + from * self.h);
+        let values = flow.laws(&self.x);
+        let reference = Laws { entropy: values.entropy, ..self.reference.clone() };
+        let start = StepStart { x: &self.x, time, values, reference, allowed: None };
+        let Taken { x, evidence, effort, .. } =
+            method.step(flow, &start, h, &mut M::Memory::default())?;
+        self.x = x;
+        self.effort += effort;
+        let rate = evidence.friction / fraction;
+        if rate > RESOLVED {
+            let below = self.h / rate;
+            return Err(self.failed(NoiseError::FrictionUnresolved { rate, below }));
+        }
+        if evidence.stability && effort.splits > 0 {
+            return Err(self.failed(NoiseError::StabilityUnresolved));
+        }
+        let evidence = Evidence { friction: rate, rests: false, entropy_step: None, ..evidence };
+        self.evidence = self.evidence.and(evidence);
+        Ok(())
+    }
+
+    /// `D` for a fraction of the step, over all groups, or in the opposite order.
+    pub(super) fn drift(&mut self, fraction: f64, is_backward: bool) -> Result<(), StepError> {
+        let mut groups: Vec<usize> = (0..self.system.flow().groups().len()).collect();
+        if is_backward {
+            groups.reverse();
+        }
+        for group in groups {
+            if self.system.flow().has_drift(group, self.system.noise()) {
+                self.drift_of(group, fraction)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn drift_of(&mut self, group: usize, fraction: f64) -> Result<(), StepError> {
+        let (flow, noise) = (self.system.flow(), self.system.noise());
+        let drift = |x: &Element<F>| flow.drift(x, group, noise);
+        let none = || self.failed(NoiseError::DriftUnresolved);
+        let first = drift(&self.x).ok_or_else(none)?;
+        // From a state without drift the flow goes nowhere.
+        if (0..first.len()).all(|i| first.get(i) == 0.0) {
+            return Ok(());
+        }
+        let s = fraction * self.h * noise.k_b;
+        self.x = self.followed(group, s, &drift).ok_or_else(none)?;
+        Ok(())
+    }
+
+    /// The flow of one noise field, or of the sum of several of a group, for the times `√(2 k_B h) ξ_r`.
+    pub(super) fn noise(&mut self, group: usize, terms: Range<usize>) -> Result<(), StepError> {
+        let flow = self.system.flow();
+        let numbers: Vec<f64> = terms.clone().map(|r| self.numbers.number(self.step, r)).collect();
+        if numbers.iter().all(|xi| *xi == 0.0) {
+            return Ok(());
+        }
+        // One square root: it has no unit left over that would be rounded.
+        let strength = 2.0 * self.system.noise().k_b * self.h;
+        let xi = |r: usize| numbers[r - terms.start];
+        let field = |x: &Element<F>| flow.noise(x, terms.clone(), (strength, &xi));
+        let end = self.followed(group, 1.0, &field);
+        self.x = end.ok_or_else(|| {
+            let reach =
+                field(&self.x).map_or(f64::INFINITY, |v| v.relative_to(&flow.sizes(&self.x)));
+            let parts = 1 << HALVES;
+            self.failed(NoiseError::Unresolved { term: terms.start, parts, reach })
+        })?;
+        Ok(())
+    }
+
+    /// Follows a field, in halves where this leads out of a chart.
+    fn followed(
+        &self,
+        group: usize,
+        s: f64,
+        field: &impl Fn(&Element<F>) -> Option<F::Vector>,
+    ) -> Option<Element<F>> {
+        let once = |x: &Element<F>, s: f64| {
+            let to = along(self.system.flow(), x, s, field)?;
+            let landing = Landing { group, from: x, to, laws: self.reference };
+            self.system.flow().landed(landing)
+        };
+        halved(&once, &self.x, s, HALVES)
+    }
+
+    pub(super) fn taken(self) -> Taken<Noisy<F, U>> {
+        let values = self.system.flow().laws(&self.x);
+        Taken { x: self.x, values, evidence: self.evidence, effort: self.effort }
+    }
+}
+
+/// A flow for the time `s`, or twice for half of it.
+fn halved<X>(once: &impl Fn(&X, f64) -> Option<X>, x: &X, s: f64, left: u32) -> Option<X> {
+    once(x, s).or_else(|| {
+        let left = left.checked_sub(1)?;
+        let middle = halved(once, x, 0.5 * s, left)?;
+        halved(once, &middle, 0.5 * s, left)
+    })
+}

@@ -1,0 +1,191 @@
+//! Methods with random numbers.
+
+use super::error::NoiseError;
+use super::fluctuating::Fluctuating;
+use super::moves::Moves;
+use super::numbers::{Counter, Numbers};
+use super::system::Noisy;
+use crate::step::{
+    Effort, Element, Memory, MethodError, NoiseSummary, Promises, Refusal, RestoreError, Saved,
+    StepEnds, StepError, StepStart, Stepper, Taken,
+};
+
+/// A way to sample a system with noise: [`RandomFlow`](super::RandomFlow) and
+/// [`NinomiyaVictoir`](super::NinomiyaVictoir). Give it a seed to make a method of it.
+pub trait Sampling<F: Fluctuating<U>, U>: Sized {
+    /// The name in a checkpoint.
+    fn name(&self) -> String;
+
+    /// The weak order.
+    fn order(&self) -> u32;
+
+    /// Refuses a method that it cannot wrap.
+    ///
+    /// # Errors
+    ///
+    /// [`NoiseError::OrderTooLow`].
+    fn check(&self) -> Result<(), NoiseError>;
+
+    /// Takes a step.
+    ///
+    /// # Errors
+    ///
+    /// [`StepError`] if it cannot be taken.
+    fn sample<R: Numbers>(&self, moves: &mut Moves<'_, F, U, R>) -> Result<(), StepError>;
+}
+
+/// A way to sample, with its random numbers: a [`Method`](crate::Method) for systems with noise.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Sampler<S, R = Counter> {
+    sampling: S,
+    numbers: R,
+}
+
+impl<S, R> Sampler<S, R> {
+    /// A way to sample with numbers of your own.
+    pub const fn new(sampling: S, numbers: R) -> Self {
+        Self { sampling, numbers }
+    }
+}
+
+impl<S> Sampler<S> {
+    /// Takes another path: its numbers are independent of those of the others.
+    #[must_use]
+    pub fn path(self, path: u64) -> Self {
+        Self { numbers: self.numbers.path(path), ..self }
+    }
+
+    /// Takes numbers of [three points](Counter::three_point).
+    #[must_use]
+    pub fn three_point(self) -> Self {
+        Self { numbers: self.numbers.three_point(), ..self }
+    }
+}
+
+/// The memory of a method with random numbers: how many steps have been drawn. The numbers are a function of it.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct NoiseMemory {
+    drawn: u64,
+}
+
+/// The name of the number of steps in a checkpoint.
+const DRAWN: &str = "steps drawn";
+
+impl Memory for NoiseMemory {
+    fn rescaled(&self, _: f64) -> Self {
+        self.clone()
+    }
+
+    fn restarted(&self) -> Self {
+        self.clone()
+    }
+
+    fn save(&self, saved: &mut Saved) {
+        saved.put(DRAWN, [self.drawn as f64]);
+    }
+
+    fn restore(saved: &Saved) -> Result<Self, RestoreError> {
+        let drawn = saved.get(DRAWN, 1)?.map_or(0.0, |list| list[0]);
+        let is_count = drawn >= 0.0 && drawn.fract() == 0.0 && drawn <= MOST;
+        if !is_count {
+            return Err(RestoreError::Damaged { what: DRAWN, value: drawn });
+        }
+        #[allow(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "it is a whole number below 2⁵³"
+        )]
+        Ok(Self { drawn: drawn as u64 })
+    }
+}
+
+/// The largest number of steps that a number of a checkpoint counts.
+const MOST: f64 = 9_007_199_254_740_992.0;
+
+impl<F, U, S, R> Stepper<Noisy<F, U>> for Sampler<S, R>
+where
+    F: Fluctuating<U>,
+    S: Sampling<F, U>,
+    R: Numbers,
+{
+    type Memory = NoiseMemory;
+
+    fn name(&self) -> String {
+        format!("{}, {}", self.sampling.name(), self.numbers.name())
+    }
+
+    fn order(&self) -> u32 {
+        self.sampling.order()
+    }
+
+    fn promises(&self, _: &Noisy<F, U>) -> Promises {
+        Promises::all_laws(false)
+    }
+
+    fn noise(&self, system: &Noisy<F, U>) -> Option<NoiseSummary> {
+        let terms = system.flow().groups().last().map_or(0, |group| group.end);
+        let (k_b, weak_order) = (system.noise().k_b, self.sampling.order());
+        Some(NoiseSummary { k_b, terms, weak_order, numbers: self.numbers.name() })
+    }
+
+    fn check(&self, follows_tolerance: bool) -> Result<(), MethodError> {
+        if follows_tolerance {
+            return Err(MethodError::new(NoiseError::NeedsFixedSteps));
+        }
+        self.sampling.check().map_err(MethodError::new)
+    }
+
+    fn step(
+        &self,
+        system: &Noisy<F, U>,
+        start: &StepStart<'_, Noisy<F, U>>,
+        h: f64,
+        memory: &mut NoiseMemory,
+    ) -> Result<Taken<Noisy<F, U>>, StepError> {
+        let mut moves = Moves::from(system, start, h, (&self.numbers, memory.drawn));
+        self.sampling.sample(&mut moves)?;
+        memory.drawn += 1;
+        Ok(moves.taken())
+    }
+
+    fn attempt(
+        &self,
+        _: &Noisy<F, U>,
+        start: &StepStart<'_, Noisy<F, U>>,
+        _: f64,
+        _: &mut NoiseMemory,
+    ) -> Result<Taken<Noisy<F, U>>, Refusal> {
+        let error = MethodError::new(NoiseError::NeedsFixedSteps);
+        Err(Refusal {
+            effort: Effort::default(),
+            error: Some(StepError::Method { time: start.time, error }),
+            second_law: false,
+        })
+    }
+
+    /// None: the size of a step of noise is no error.
+    fn error(
+        &self,
+        _: &Noisy<F, U>,
+        _: &StepEnds<'_, Noisy<F, U>>,
+        _: &NoiseMemory,
+        _: impl Fn(&F::Vector) -> f64,
+    ) -> Option<f64> {
+        None
+    }
+
+    /// None: what lies between two states is a path of its own.
+    fn between(
+        &self,
+        _: &Noisy<F, U>,
+        _: &StepEnds<'_, Noisy<F, U>>,
+        _: &mut NoiseMemory,
+        _: f64,
+    ) -> Option<Element<F>> {
+        None
+    }
+
+    fn nothing_between(&self, time: f64, _: f64) -> StepError {
+        StepError::Method { time, error: MethodError::new(NoiseError::HasNoBetween) }
+    }
+}

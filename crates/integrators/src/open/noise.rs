@@ -1,0 +1,179 @@
+//! The noise of an open system: that of its own friction, and that of each bath.
+//!
+//! The first group of terms keeps the energy. A bath moves the state at a frozen time, and the energy changes by its heat,
+//! `Q = H(t, x') − H(t, x)`, so the balance holds on every path.
+
+use std::ops::Range;
+
+use metriplectic_dynamics::exchange::{BathTerm, Entries as _, ExchangeArgs, ExchangeTerms};
+use metriplectic_dynamics::noise::{
+    NoiseTerm, NoiseTerms, Place, kinetic_drift, noise_drift, noise_vector, place, seeded_place,
+};
+use metriplectic_dynamics::{Dissipation as _, Invariants, Metriplectic, SecondLaw};
+use metriplectic_fields::{Column as _, Real, ScalarField, Vector};
+use metriplectic_manifolds::{Canonical, MetricAt, MetricError, Riemannian};
+
+use super::clock::Clock;
+use super::state::{Booked, OpenState};
+use super::system::{OpenSystem, StateOf};
+use super::vector::OpenVector;
+use crate::noise::{Drawn, Fluctuating, Landing, Noise, NoiseError, examine_model};
+use crate::step::Flow;
+
+/// A vector of a system.
+type VectorOf<Y> = Vector<<Y as Metriplectic>::Manifold>;
+
+impl<Y, C, X> OpenSystem<Y, C, X>
+where
+    Y: Metriplectic<Dissipation: NoiseTerms<Y::Manifold, Y::Metric>>,
+    C: Clock<Y::Manifold, Y::Energy>,
+    X: ExchangeTerms<Y::Manifold, Y::Metric>,
+{
+    /// Passes the terms of all baths at a place to the visitor.
+    fn each_bath_term(
+        &self,
+        t: f64,
+        place: &Place<Y::Manifold>,
+        visit: &mut dyn FnMut(BathTerm<Vector<Y::Manifold, Real>>),
+    ) -> Result<(), MetricError> {
+        let g = MetricAt::new(self.closed().metric(), &place.x);
+        let at = ExchangeArgs { t, g: &g, w: &place.w, s: &place.s };
+        self.exchange().each_term(&at, visit)
+    }
+
+    /// Computes `Σ a_r √(κ T ρ_r) b_r` over some terms of the baths, which are numbered from `first` on.
+    fn bath_noise(
+        &self,
+        x: &StateOf<Y>,
+        terms: &Range<usize>,
+        (strength, numbers): Drawn<'_>,
+    ) -> Result<VectorOf<Y>, MetricError> {
+        let model = self.without_exchange(x.time);
+        let (mut sum, mut r) = (VectorOf::<Y>::zero(), self.closed().dissipation().count());
+        self.each_bath_term(
+            x.time,
+            &place(&model, &x.x),
+            &mut |BathTerm { temperature, term, .. }| {
+                if terms.contains(&r) {
+                    let size = (strength * (temperature * term.rate.re)).sqrt();
+                    sum += term.b.real::<VectorOf<Y>>() * (size * numbers(r));
+                }
+                r += 1;
+            },
+        )?;
+        Ok(sum)
+    }
+
+    /// Computes `T Σ c_r b_r` of a bath.
+    fn bath_drift<U: ScalarField<Y::Manifold>>(
+        &self,
+        x: &StateOf<Y>,
+        bath: usize,
+        measure: &U,
+    ) -> Result<VectorOf<Y>, MetricError>
+    where
+        Canonical: Riemannian<Y::Manifold>,
+    {
+        let model = self.without_exchange(x.time);
+        kinetic_drift(
+            &x.x,
+            measure,
+            |directions| seeded_place(&model, &x.x, directions),
+            |place, visit| {
+                let mut r = 0;
+                self.each_bath_term(x.time, place, &mut |of| {
+                    if of.bath == bath {
+                        // The rate of a bath is in the unit of 1/T.
+                        let NoiseTerm { rate, b } = of.term;
+                        visit(r, NoiseTerm { rate: rate * of.temperature, b });
+                        r += 1;
+                    }
+                })
+            },
+        )
+    }
+}
+
+impl<Y, C, X, U> Fluctuating<U> for OpenSystem<Y, C, X>
+where
+    Y: Metriplectic<Dissipation: NoiseTerms<Y::Manifold, Y::Metric>>,
+    C: Clock<Y::Manifold, Y::Energy>,
+    X: ExchangeTerms<Y::Manifold, Y::Metric>,
+    U: ScalarField<Y::Manifold>,
+    Canonical: Riemannian<Y::Manifold>,
+{
+    fn groups(&self) -> Vec<Range<usize>> {
+        let mut counts = vec![self.closed().dissipation().count()];
+        self.exchange().counts(&mut counts);
+        let mut first = 0;
+        let next = |count| {
+            let group = first..first + count;
+            first += count;
+            group
+        };
+        counts.into_iter().map(next).collect()
+    }
+
+    fn noise(
+        &self,
+        x: &StateOf<Y>,
+        terms: Range<usize>,
+        (strength, numbers): Drawn<'_>,
+    ) -> Option<Self::Vector> {
+        let is_own = terms.start < self.closed().dissipation().count();
+        let v = if is_own {
+            noise_vector(&self.without_exchange(x.time), &x.x, terms, (strength, numbers))
+        } else {
+            self.bath_noise(x, &terms, (strength, numbers))
+        };
+        v.ok().filter(|v| v.is_finite()).map(OpenVector::of)
+    }
+
+    fn drift(&self, x: &StateOf<Y>, group: usize, noise: &Noise<U>) -> Option<Self::Vector> {
+        let v = match group.checked_sub(1) {
+            None => noise_drift(&self.without_exchange(x.time), &x.x, &noise.measure),
+            Some(bath) => self.bath_drift(x, bath, &noise.measure),
+        };
+        v.ok().filter(|v| v.is_finite()).map(OpenVector::of)
+    }
+
+    fn has_drift(&self, group: usize, noise: &Noise<U>) -> bool {
+        let dissipation = self.closed().dissipation();
+        group > 0
+            || !(dissipation.is_none()
+                || dissipation.is_closed() && noise.is_uniform && Y::Invariants::COUNT == 0)
+    }
+
+    fn landed(&self, landing: Landing<'_, Self>) -> Option<StateOf<Y>> {
+        let Landing { group, from, to, laws } = landing;
+        let (time, ledger) = (from.time, &from.ledger);
+        let Some(bath) = group.checked_sub(1) else {
+            return self.onto(&OpenState { x: to.x, time, ledger: ledger.clone() }, laws, None);
+        };
+        let heat = self.energy(time, &to.x) - self.energy(time, &from.x);
+        if !heat.is_finite() {
+            return None;
+        }
+        let mut temperatures = Vec::new();
+        self.exchange().temperatures(time, &mut temperatures);
+        let temperature = *temperatures.get(bath)?;
+        let entropy = if temperature > 0.0 { -heat / temperature } else { 0.0 };
+        let column = self.columns().heat(bath)?;
+        let entries = X::Entries::from_index(|i| {
+            let booked = [heat, entropy];
+            i.checked_sub(column).and_then(|k| booked.get(k)).copied().unwrap_or(0.0)
+        });
+        let ledger = ledger.with(&Booked { parameter: 0.0, entries });
+        Some(OpenState { x: to.x, time, ledger })
+    }
+
+    fn examine_noise(&self, x: &StateOf<Y>, noise: &Noise<U>) -> Result<(), NoiseError> {
+        if self.closed().second_law() == SecondLaw::Published {
+            return Err(NoiseError::NoiseAndPublished);
+        }
+        if Y::Invariants::COUNT > 0 && X::BATHS > 0 {
+            return Err(NoiseError::InvariantsInABath);
+        }
+        examine_model(&self.without_exchange(x.time), &x.x, noise)
+    }
+}

@@ -1,0 +1,146 @@
+//! Baths: exact heat and work on each path, and Jarzynski's equality.
+
+use metriplectic::integrators::{Flow as _, StepStart, Stepper as _};
+use metriplectic::prelude::*;
+use nalgebra::{DMatrix, vector};
+use rayon::prelude::*;
+
+use crate::operator::{Basis as _, coefficients, order, outcomes};
+use crate::shell::Shell;
+
+const TEMPERATURE: f64 = 0.8;
+
+/// A particle in an anharmonic trap that is pulled along, in a bath.
+macro_rules! particle {
+    () => {
+        System::on(Euclidean::<2>)
+            .bracket(Symplectic)
+            .energy_in_time(|t: Real, x: &Vector2<Real>| {
+                let q = x.x - t;
+                x.y * x.y * 0.5 + q * q * 0.5 + q.powi(4) * 0.1
+            })
+            .bath(
+                "water",
+                Bath::at(TEMPERATURE).friction(|_: Real, _: &Vector2<Real>, _: &Vector2<Real>| {
+                    [Contact { rate: 0.7.into(), along: vector![0.0.into(), 1.0.into()] }]
+                }),
+            )
+            .noise(Boltzmann(1.0))
+            .build()
+            .unwrap()
+    };
+}
+
+#[test]
+fn heat_and_work_of_each_path_balance() {
+    let particle = particle!();
+    let start = particle.flow().start(vector![0.3, -0.2]);
+    for path in 0..20 {
+        let span = Span::steps(0.05, 400);
+        let method = NinomiyaVictoir(DormandPrince5).seed(4).path(path);
+        let run = method.run(&particle, start.clone(), span).unwrap();
+        let certificate = run.certificate();
+        assert!(
+            certificate.keeps_energy() && certificate.max_energy_error < 1e-14,
+            "{certificate}"
+        );
+        let state = &run.last().point;
+        let change = particle.flow().energy_at(state) - certificate.initial_energy;
+        let ledger = &state.ledger;
+        let (work, heat) = (ledger.parameter_work(), ledger.heat("water").unwrap());
+        assert!((change - work - heat).abs() < 1e-13 && heat.abs() > 0.1);
+        let entropy = ledger.bath_entropy("water").unwrap();
+        assert!((entropy + heat / TEMPERATURE).abs() < 1e-12);
+    }
+}
+
+/// Numbers of the canonical law of the trap at rest, by rejection.
+fn canonical(path: u64) -> Vector2<f64> {
+    use metriplectic::integrators::noise::{Counter, Numbers as _};
+    let counter = Counter::new(99).path(path);
+    let deviation = TEMPERATURE.sqrt();
+    let momentum = deviation * counter.number(0, 0);
+    for trial in 1.. {
+        let q = deviation * counter.number(trial, 0);
+        // A number that is uniform: the Gaussian one through its own distribution would need erf, so two angles.
+        let [a, b] = [1, 2].map(|k| counter.number(trial, k));
+        let uniform = (-0.5 * (a * a + b * b)).exp();
+        if uniform < (-0.1 * q.powi(4) / TEMPERATURE).exp() {
+            return vector![q, momentum];
+        }
+    }
+    unreachable!()
+}
+
+#[test]
+fn the_equality_of_jarzynski_holds_on_paths() {
+    // The trap is moved and not changed, so ΔF = 0.
+    let particle = particle!();
+    let paths = 4000;
+    let works: Vec<f64> = (0..paths)
+        .into_par_iter()
+        .map(|path| {
+            let start = particle.flow().start(canonical(path));
+            let method = NinomiyaVictoir(DormandPrince5).seed(6).path(path);
+            let run = method.run(&particle, start, Span::steps(0.1, 10)).unwrap();
+            run.last().point.ledger.parameter_work()
+        })
+        .collect();
+    let n = paths as f64;
+    let weights: Vec<f64> = works.iter().map(|w| (-w / TEMPERATURE).exp()).collect();
+    let mean = weights.iter().sum::<f64>() / n;
+    let deviation = (weights.iter().map(|w| (w - mean).powi(2)).sum::<f64>() / n).sqrt();
+    let error = deviation / n.sqrt();
+    assert!((mean - 1.0).abs() < 4.0 * error && error < 0.06, "{mean} ± {error}");
+    // The second law of the mean: some of the work is lost.
+    assert!(works.iter().sum::<f64>() / n > 0.1);
+}
+
+/// A spin with `H = −b(t)·n` in a bath at the temperature 1.
+macro_rules! spin {
+    () => {
+        System::on(Sphere::<2>::round())
+            .bracket(AreaForm)
+            .energy_in_time(|t: Real, n: &Vector3<Real>| {
+                let (angle, size) = (t * 0.9, t * 0.7 + 0.6);
+                -(n.x * angle.sin() + n.z * angle.cos()) * size
+            })
+            .bath("crystal", Bath::at(1.0).isotropic(0.6))
+            .noise(Boltzmann(1.0))
+            .build()
+            .unwrap()
+    };
+}
+
+#[test]
+fn the_equality_of_jarzynski_has_the_order_of_the_method() {
+    let spin = spin!();
+    let shell = Shell::new(6, Vector3::from_element(1.0));
+    let outcomes = outcomes(3);
+    let time = 1.0;
+    let off = [4, 8, 16].map(|count| {
+        let h = time / f64::from(count);
+        // The mean of exp(−W) over the steps that are left, backwards.
+        let mut left = coefficients(&shell, |_| 1.0);
+        for k in (0..count).rev() {
+            let mut values = DMatrix::<f64>::zeros(shell.nodes().len(), 1);
+            for (i, n) in shell.nodes().iter().enumerate() {
+                let from = spin.begin(spin.flow().start(*n), f64::from(k) * h);
+                let start = StepStart { time: f64::from(k) * h, ..StepStart::first(&spin, &from) };
+                for (q, outcome) in &outcomes {
+                    let method = NinomiyaVictoir(DormandPrince5).numbers(outcome.clone());
+                    let end = method.step(&spin, &start, h, &mut Default::default()).unwrap().x;
+                    let work = end.ledger.parameter_work();
+                    values[i] += q * (-work).exp() * shell.at(&end.x).dot(&left);
+                }
+            }
+            left = shell.projection() * values.column(0);
+        }
+        let weight = |n: &Vector3<f64>| (0.6 * n.z).exp();
+        let mean = shell.mean(weight, |n| shell.at(n).dot(&left));
+        // exp(−ΔF) is the ratio of sinh b/b at both ends.
+        let sum = |b: f64| b.sinh() / b;
+        (h, mean * sum(0.6) / sum(1.3) - 1.0)
+    });
+    assert!((order(&off[1..]) - 2.0).abs() < 0.15 && off[2].1.abs() < 1e-3, "{off:?}");
+}

@@ -1,0 +1,206 @@
+//! The rigid body with thermal noise on its energy ellipsoid.
+
+use metriplectic::prelude::*;
+use nalgebra::vector;
+
+use crate::operator::{Outcome, after, coefficients, mean, operator, order, outcomes, step};
+use crate::shell::Shell;
+
+pub(crate) const INERTIA: Vector3<f64> = vector![3.0, 2.0, 1.0];
+const ENERGY: f64 = 0.5;
+
+/// A rigid body with the entropy `½ |p|²` and half the friction of the metric.
+macro_rules! body {
+    ($k_b:expr) => {{
+        let so3 = LieDual::so3();
+        let friction = CasimirDissipation::new(so3.algebra(), Matrix3::identity() * 0.5).unwrap();
+        System::on(so3)
+            .energy(|p: &Vector3<Real>| {
+                p.component_mul(p).component_div(&INERTIA.cast()).sum() * 0.5
+            })
+            .entropy(|p: &Vector3<Real>| p.norm_squared() * 0.5)
+            .dissipation(friction)
+            .noise(Boltzmann($k_b))
+            .build()
+            .unwrap()
+    }};
+}
+
+pub(crate) use body;
+
+pub(crate) fn energy(p: &Vector3<f64>) -> f64 {
+    p.component_mul(p).component_div(&INERTIA).sum() * 0.5
+}
+
+fn entropy(p: &Vector3<f64>) -> f64 {
+    0.5 * p.norm_squared()
+}
+
+fn shell(degree: usize) -> Shell {
+    Shell::new(degree, (INERTIA * 2.0 * ENERGY).map(f64::sqrt))
+}
+
+/// What is measured of a family of steps.
+#[derive(Debug)]
+struct Measured {
+    /// The orders of the means of the entropy and of `p_z` after the time 1, from a point.
+    weak: [f64; 2],
+    /// The orders of the means of `S` and `p_x²` under the law.
+    law: [f64; 2],
+    /// The errors of these means in the smallest step.
+    last: [f64; 2],
+}
+
+/// The time of the weak errors.
+const TIME: f64 = 1.0;
+
+fn measure(
+    k_b: f64,
+    (counts, reference): ([u32; 3], [f64; 2]),
+    step: impl Fn(f64, &Vector3<f64>, &Outcome) -> Vector3<f64>,
+) -> Measured {
+    let shell = shell(DEGREE);
+    let outcomes = outcomes(3);
+    let functions: [fn(&Vector3<f64>) -> f64; 2] = [entropy, |p| p.x * p.x];
+    let weak_functions: [fn(&Vector3<f64>) -> f64; 2] = [entropy, |p| p.z];
+    let exact = functions.map(|f| shell.mean(|p| (entropy(p) / k_b).exp(), f));
+    let mut errors = [(); 4].map(|()| Vec::new());
+    for count in counts {
+        let h = TIME / f64::from(count);
+        let matrix = operator(&shell, &outcomes, |p, outcome| step(h, p, outcome));
+        for k in 0..2 {
+            let f = coefficients(&shell, weak_functions[k]);
+            errors[k].push((h, after(&shell, &matrix, count, &start(), &f) - reference[k]));
+            let f = coefficients(&shell, functions[k]);
+            errors[2 + k].push((h, mean(&shell, &matrix, &f) - exact[k]));
+        }
+    }
+    let last = [2, 3].map(|k| errors[k].last().unwrap().1.abs());
+    let [a, b, c, d] = errors.map(|errors| order(&errors));
+    Measured { weak: [a, b], law: [c, d], last }
+}
+
+const DEGREE: usize = 11;
+
+fn start() -> Vector3<f64> {
+    vector![0.6, 0.0, 0.8].component_mul(&(INERTIA * 2.0 * ENERGY).map(f64::sqrt))
+}
+
+/// The means at the time 1, extrapolated from two step sizes.
+fn reference(step: impl Fn(f64, &Vector3<f64>, &Outcome) -> Vector3<f64>) -> [f64; 2] {
+    let shell = shell(DEGREE);
+    let outcomes = outcomes(3);
+    let functions: [fn(&Vector3<f64>) -> f64; 2] = [entropy, |p| p.z];
+    let [coarse, fine] = [16, 32].map(|count| {
+        let h = TIME / f64::from(count);
+        let matrix = operator(&shell, &outcomes, |p, outcome| step(h, p, outcome));
+        functions.map(|f| after(&shell, &matrix, count, &start(), &coefficients(&shell, f)))
+    });
+    [0, 1].map(|k| fine[k] + (fine[k] - coarse[k]) / 3.0)
+}
+
+/// Orders within 0.1 of an integer.
+fn has_order(orders: [f64; 2], order: f64) -> bool {
+    orders.iter().all(|found| (found - order).abs() < 0.1)
+}
+
+#[test]
+fn orders_of_the_rigid_body() {
+    for k_b in [0.5, 0.8] {
+        let body = body!(k_b);
+        let explicit = |h: f64, p: &Vector3<f64>, outcome: &Outcome| {
+            step(&body, &NinomiyaVictoir(DormandPrince5).numbers(outcome.clone()), p, h)
+        };
+        let reference = reference(explicit);
+        let two = measure(k_b, ([4, 8, 16], reference), explicit);
+        assert!(has_order(two.weak, 2.0) && has_order(two.law, 2.0), "{k_b}: {two:?}");
+        let one = measure(k_b, ([16, 32, 64], reference), |h, p, outcome| {
+            step(&body, &RandomFlow(DormandPrince5).numbers(outcome.clone()), p, h)
+        });
+        assert!(has_order(one.weak, 1.0) && has_order(one.law, 1.0), "{k_b}: {one:?}");
+    }
+}
+
+#[test]
+fn gauss_and_the_midpoint_scheme_sample_with_order_two() {
+    let body = body!(0.5);
+    let by_gauss = |h: f64, p: &Vector3<f64>, outcome: &Outcome| {
+        step(&body, &NinomiyaVictoir(Gauss::<2>).numbers(outcome.clone()), p, h)
+    };
+    let reference = reference(by_gauss);
+    let two = measure(0.5, ([4, 8, 16], reference), by_gauss);
+    assert!(has_order(two.weak, 2.0) && has_order(two.law, 2.0), "{two:?}");
+    let two = measure(0.5, ([4, 8, 16], reference), |h, p, outcome| {
+        let scheme = Scheme::new(WeylMidpoint);
+        step(&body, &NinomiyaVictoir(scheme).numbers(outcome.clone()), p, h)
+    });
+    // Its law has hardly an error of S at this degree.
+    assert!(has_order(two.weak, 2.0) && (two.law[1] - 2.0).abs() < 0.1, "{two:?}");
+}
+
+/// Moves a state onto the energy shell along the ray.
+fn rescaled(p: Vector3<f64>) -> Vector3<f64> {
+    p * (ENERGY / energy(&p)).sqrt()
+}
+
+#[test]
+fn euler_and_rescaling_keeps_the_energy_and_samples_another_law_at_every_step_size() {
+    let k_b = 0.5;
+    let euler = |h: f64, p: &Vector3<f64>, outcome: &Outcome| {
+        let w = p.component_div(&INERTIA);
+        let noise = Vector3::from_column_slice(&outcome.xi).cross(&w) * (k_b * h).sqrt();
+        let friction = (p * w.norm_squared() - w * w.dot(p)) * 0.5;
+        let end = rescaled(p + (p.cross(&w) + friction) * h + noise);
+        assert!((energy(&end) - ENERGY).abs() < 4e-16);
+        end
+    };
+    let wrong = measure(k_b, ([16, 32, 64], [0.0; 2]), euler);
+    assert!(wrong.law[0] < 0.3 && wrong.last[0] > 5e-3, "{wrong:?}");
+}
+
+#[test]
+fn a_coin_that_never_turns_and_noise_fields_by_the_midpoint_rule_lose_an_order() {
+    let k_b = 0.5;
+    let body = body!(k_b);
+    let right = |h: f64, p: &Vector3<f64>, outcome: &Outcome| {
+        step(&body, &NinomiyaVictoir(DormandPrince5).numbers(outcome.clone()), p, h)
+    };
+    let reference = reference(right);
+    let unfair = measure(k_b, ([4, 8, 16], reference), |h, p, outcome| {
+        right(h, p, &Outcome { backward: false, ..outcome.clone() })
+    });
+    assert!(unfair.weak.iter().any(|order| *order < 1.5), "{unfair:?}");
+    let midpoint = measure(k_b, ([4, 8, 16], reference), |h, p, outcome| {
+        let half = |p: &Vector3<f64>| step(body.flow(), &DormandPrince5, p, 0.5 * h);
+        let mut p = half(p);
+        let axes = if outcome.backward { [2, 1, 0] } else { [0, 1, 2] };
+        for axis in axes {
+            let turn = Vector3::ith(axis, (k_b * h).sqrt() * outcome.xi[axis]);
+            let mut d = Vector3::zeros();
+            for _ in 0..100 {
+                d = turn.cross(&(p + d * 0.5).component_div(&INERTIA));
+            }
+            p += d;
+        }
+        half(&p)
+    });
+    assert!(midpoint.law[0] < 1.5, "{midpoint:?}");
+}
+
+#[test]
+fn the_fluctuation_theorem_of_a_closed_system() {
+    // ⟨exp(−ΔS/k_B)⟩ = 1 at all times, from a uniform start on the shell.
+    let (k_b, time) = (0.5, 1.0);
+    let body = body!(k_b);
+    let shell = shell(DEGREE);
+    let off = [4, 8, 16].map(|count| {
+        let h = time / f64::from(count);
+        let matrix = operator(&shell, &outcomes(3), |p, outcome| {
+            step(&body, &NinomiyaVictoir(DormandPrince5).numbers(outcome.clone()), p, h)
+        });
+        let f = coefficients(&shell, |p| (-entropy(p) / k_b).exp());
+        let end = |p: &Vector3<f64>| after(&shell, &matrix, count, p, &f);
+        (h, shell.mean(|_| 1.0, |p| (entropy(p) / k_b).exp() * end(p)) - 1.0)
+    });
+    assert!(off[2].1.abs() < 1e-4 && (order(&off) - 2.0).abs() < 0.15, "{off:?}");
+}

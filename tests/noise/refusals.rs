@@ -1,0 +1,127 @@
+//! What has no noise, and which methods cannot sample it: a typed error with a remedy.
+
+use metriplectic::integrators::{RunError, StateSpace};
+use metriplectic::prelude::*;
+use nalgebra::vector;
+
+use crate::body::{INERTIA, body};
+
+const START: Vector3<f64> = vector![0.9, 0.5, 0.3];
+
+/// The fault of the noise in an error of a run.
+fn fault<M: StateSpace, T>(run: Result<T, RunError<M>>) -> NoiseError {
+    match run.err().expect("the run is refused") {
+        RunError::Flow(error) => *error.downcast_ref().expect("it is a fault of noise"),
+        RunError::Method(error) => *error.downcast_ref().expect("it is a fault of noise"),
+        RunError::Step { cause: StepError::Method { error, .. }, .. } => {
+            *error.downcast_ref().expect("it is a fault of noise")
+        }
+        other => panic!("another error: {other}"),
+    }
+}
+
+#[test]
+fn constants_steps_and_outputs() {
+    let span = Span::steps(0.05, 10);
+    let method = NinomiyaVictoir(DormandPrince5).seed(1);
+    for k_b in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+        let error = fault(method.run(&body!(k_b), START, span));
+        assert!(matches!(error, NoiseError::BoltzmannNotPositive { .. }), "{error}");
+    }
+    let body = body!(0.3);
+    let until = Span::until(1.0).tolerance(1e-5);
+    assert_eq!(fault(method.run(&body, START, until)), NoiseError::NeedsFixedSteps);
+    let between = span.output_at([0.12]);
+    assert_eq!(fault(method.run(&body, START, between)), NoiseError::HasNoBetween);
+    let at_the_ends = span.output_every(0.1);
+    assert!(method.run(&body, START, at_the_ends).is_ok());
+}
+
+#[test]
+fn methods() {
+    const EULER: Tableau = Tableau::new("Euler", 1, &[], &[(0, 1.0)]);
+    let (body, span) = (body!(0.3), Span::steps(0.05, 10));
+    let euler = ExplicitRungeKutta::new(&EULER);
+    let error = fault(NinomiyaVictoir(euler).seed(1).run(&body, START, span));
+    assert_eq!(error, NoiseError::OrderTooLow { order: 1 });
+    assert!(RandomFlow(euler).seed(1).run(&body, START, span).is_ok());
+    let error = fault(NinomiyaVictoir(Radau::<2>).seed(1).run(&body, START, span));
+    assert_eq!(error, NoiseError::NoiseWithRadau);
+    let long = Span::steps(40.0, 10);
+    let error = fault(NinomiyaVictoir(Gauss::<2>).seed(1).run(&body, START, long));
+    assert!(matches!(error, NoiseError::FrictionUnresolved { rate, .. } if rate > 1.0), "{error}");
+}
+
+/// `{x, y} = y`, with a third variable that no bracket moves: the algebra of the affine group.
+macro_rules! affine {
+    ($noise:expr) => {
+        System::on(Euclidean::<3>)
+            .bracket(Poisson::field(|x: &Vector3<Real>| {
+                let mut pi = Matrix3::<Real>::zeros();
+                (pi[(0, 1)], pi[(1, 0)]) = (x.y, -x.y);
+                pi
+            }))
+            .energy(|x: &Vector3<Real>| (x.x * x.x + x.y * x.y) * 0.5 + x.z)
+            .entropy(|x: &Vector3<Real>| x.z)
+            .noise($noise)
+            .build()
+            .unwrap()
+    };
+}
+
+#[test]
+fn a_bracket_that_changes_the_volume() {
+    let (start, span) = (vector![0.7, 1.2, 0.3], Span::steps(0.01, 5));
+    let method = RandomFlow(DormandPrince5).seed(1);
+    let error = fault(method.run(&affine!(Boltzmann(0.1)), start, span));
+    // div(Π dH) = −H_x.
+    assert!(
+        matches!(error, NoiseError::NotUnimodular { divergence, .. } if (divergence + 0.7).abs() < 1e-12),
+        "{error}"
+    );
+    let with_measure = affine!(Boltzmann(0.1).measure(|x: &Vector3<Real>| -x.y.ln()));
+    assert!(method.run(&with_measure, start, span).is_ok());
+}
+
+#[test]
+fn systems() {
+    let span = Span::steps(0.01, 5);
+    let method = RandomFlow(DormandPrince5).seed(1);
+    let published = System::on(LieDual::so3())
+        .energy(|p: &Vector3<Real>| p.component_mul(p).component_div(&INERTIA.cast()).sum() * 0.5)
+        .entropy(|p: &Vector3<Real>| p.norm_squared() * 0.5)
+        .second_law(SecondLaw::Published)
+        .noise(Boltzmann(0.3))
+        .build()
+        .unwrap();
+    assert_eq!(fault(method.run(&published, START, span)), NoiseError::NoiseAndPublished);
+    // The canonical metric of a half-line is that of its logarithm, and not that of the axis around it.
+    let half = System::on(Product(Euclidean::<1>, HalfLine))
+        .energy(|x: &(Vector1<Real>, Vector1<Real>)| x.0.x + x.1.x)
+        .entropy(|x: &(Vector1<Real>, Vector1<Real>)| x.1.x.ln())
+        .noise(Boltzmann(0.3))
+        .build()
+        .unwrap();
+    let error = fault(method.run(&half, (Vector1::new(1.0), Vector1::new(2.0)), span));
+    assert!(matches!(error, NoiseError::TermsDiffer { .. }), "{error}");
+}
+
+#[test]
+fn a_noise_field_that_does_not_vanish_at_the_edge() {
+    // The rate stays 1 where a body has no energy left.
+    let bodies = System::on(Euclidean::<2>)
+        .energy(|u: &Vector2<Real>| u.x + u.y)
+        .entropy(|u: &Vector2<Real>| (u.x.ln() + u.y.ln()) * 0.01)
+        .dissipation(OnsagerDissipation(|_: &Vector2<Real>, w: &Vector2<Real>| {
+            [Contact { rate: 1.0.into(), along: vector![w.y, -w.x] }]
+        }))
+        .noise(Boltzmann(1.0))
+        .build()
+        .unwrap();
+    let error = fault(RandomFlow(DormandPrince5).seed(1).run(
+        &bodies,
+        vector![0.1, 1.0],
+        Span::steps(0.01, 100),
+    ));
+    assert!(matches!(error, NoiseError::Unresolved { reach, .. } if reach > 0.0), "{error}");
+}

@@ -21,7 +21,8 @@ use crate::discrete_gradient::DiscreteGradient;
 use crate::midpoint::{MidpointMemory, Scheme, Solution};
 use crate::step::failure::{Cause, Fallbacks};
 use crate::step::{
-    Dim, Flow as _, Laws, Promises, Refusal, Start, StepError, StepStart, Stepper, Taken, name_of,
+    CountOf, Dim, Flow as _, Laws, Promises, Refusal, Start, StepError, StepStart, Stepper, Taken,
+    name_of,
 };
 
 impl<Y, C, X, R, W> Stepper<OpenSystem<Y, C, X>> for Scheme<R, W>
@@ -99,7 +100,7 @@ where
     let accumulated_error = Laws {
         energy: start.values.energy - start.reference.energy,
         entropy: start.values.entropy - start.reference.entropy,
-        invariants: Dim::<Y>::array(|k| invariants[k] - start.reference.invariants[k]),
+        invariants: CountOf::<Y>::array(|k| invariants[k] - start.reference.invariants[k]),
     };
     let inner = Start { x, time: *time, h, values, accumulated_error };
     let solved = scheme.solution(&view, &inner, memory, fallbacks);

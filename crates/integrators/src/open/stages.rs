@@ -30,8 +30,8 @@ use crate::collocation::{
 use crate::step::dense::Target;
 use crate::step::failure::{Cause, Fallbacks};
 use crate::step::{
-    Control, Dim, Effort, Flow, Laws, MethodError, Promises, Refusal, Start, StepEnds, StepError,
-    StepStart, Stepper, Taken,
+    Control, CountOf, Dim, Effort, Flow, Laws, MethodError, Promises, Refusal, Start, StepEnds,
+    StepError, StepStart, Stepper, Taken,
 };
 
 /// The energy of an open system along a step.
@@ -134,7 +134,7 @@ where
         let accumulated_error = Laws {
             energy: start.values.energy - start.reference.energy,
             entropy: start.values.entropy - start.reference.entropy,
-            invariants: Dim::<Y>::array(|k| invariants[k] - start.reference.invariants[k]),
+            invariants: CountOf::<Y>::array(|k| invariants[k] - start.reference.invariants[k]),
         };
         Start { x, time: *time, h, values, accumulated_error }
     }

@@ -76,12 +76,13 @@ impl<N: Dimension, C: Dimension> LawJets<N, C> {
 
     fn is_finite(&self) -> bool {
         let Self { values, w } = self;
-        let mut listed = w.invariants.as_ref().iter().flatten().zip(values.invariants.as_ref());
-        values.energy.is_finite()
-            && values.entropy.is_finite()
-            && w.energy.is_finite()
-            && w.entropy.is_finite()
-            && listed.all(|((_, l), value)| l.is_finite() && value.is_finite())
+        let listed = w.invariants.as_ref().iter().flatten().zip(values.invariants.as_ref());
+        // Zero if all of it is finite, and NaN otherwise.
+        let of = |value: f64, w: &N::Vector<f64>| {
+            (0..N::LEN).fold(0.0 * value, |sum, i| sum + 0.0 * w[i])
+        };
+        let laws = of(values.energy, &w.energy) + of(values.entropy, &w.entropy);
+        listed.fold(laws, |sum, ((_, l), &value)| sum + of(value, l)) == 0.0
     }
 }
 

@@ -12,7 +12,8 @@
 
 use std::fmt;
 
-use metriplectic_fields::{Real, ScalarField, Space};
+use metriplectic_fields::{Dimension, Plus, Real, ScalarField, Space};
+use nalgebra::Const;
 
 /// The reason why a function is conserved.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -37,8 +38,11 @@ impl fmt::Display for Kind {
 /// [`SystemBuilder::casimir`](crate::SystemBuilder::casimir),
 /// [`momentum`](crate::SystemBuilder::momentum) and [`symmetry`](crate::SystemBuilder::symmetry).
 pub trait Invariants<M: Space> {
+    /// Their number, for lists with one value each.
+    type Count: Dimension;
+
     /// How many there are.
-    const COUNT: usize;
+    const COUNT: usize = Self::Count::LEN;
 
     /// Passes each invariant to the visitor, in the order of the list.
     fn each(&self, visitor: &mut impl Visitor<M>);
@@ -57,7 +61,7 @@ pub trait Visitor<M: Space> {
 pub type Action<'a, M> = dyn Fn(Real, &<M as Space>::Point<Real>) -> <M as Space>::Point<Real> + 'a;
 
 impl<M: Space> Invariants<M> for () {
-    const COUNT: usize = 0;
+    type Count = Const<0>;
 
     #[inline]
     fn each(&self, _: &mut impl Visitor<M>) {}
@@ -94,8 +98,13 @@ opaque!(Casimir<F>);
 opaque!(Momentum<F>);
 opaque!(Symmetry<A, F>);
 
-impl<M: Space, L: Invariants<M>, F: ScalarField<M>> Invariants<M> for (L, Casimir<F>) {
-    const COUNT: usize = L::COUNT + 1;
+impl<M, L, F> Invariants<M> for (L, Casimir<F>)
+where
+    M: Space,
+    L: Invariants<M, Count: Plus<Const<1>>>,
+    F: ScalarField<M>,
+{
+    type Count = <L::Count as Plus<Const<1>>>::Sum;
 
     #[inline]
     fn each(&self, visitor: &mut impl Visitor<M>) {
@@ -104,8 +113,13 @@ impl<M: Space, L: Invariants<M>, F: ScalarField<M>> Invariants<M> for (L, Casimi
     }
 }
 
-impl<M: Space, L: Invariants<M>, F: ScalarField<M>> Invariants<M> for (L, Momentum<F>) {
-    const COUNT: usize = L::COUNT + 1;
+impl<M, L, F> Invariants<M> for (L, Momentum<F>)
+where
+    M: Space,
+    L: Invariants<M, Count: Plus<Const<1>>>,
+    F: ScalarField<M>,
+{
+    type Count = <L::Count as Plus<Const<1>>>::Sum;
 
     #[inline]
     fn each(&self, visitor: &mut impl Visitor<M>) {
@@ -117,11 +131,11 @@ impl<M: Space, L: Invariants<M>, F: ScalarField<M>> Invariants<M> for (L, Moment
 impl<M, L, A, F> Invariants<M> for (L, Symmetry<A, F>)
 where
     M: Space,
-    L: Invariants<M>,
+    L: Invariants<M, Count: Plus<Const<1>>>,
     A: Fn(Real, &M::Point<Real>) -> M::Point<Real>,
     F: ScalarField<M>,
 {
-    const COUNT: usize = L::COUNT + 1;
+    type Count = <L::Count as Plus<Const<1>>>::Sum;
 
     #[inline]
     fn each(&self, visitor: &mut impl Visitor<M>) {

@@ -125,6 +125,10 @@ pub type Point<Y> = <<Y as Metriplectic>::Manifold as Space>::Point<f64>;
 /// The dimension of the manifold of the system `Y`.
 pub(crate) type Dim<Y> = <<Y as Metriplectic>::Manifold as Space>::Dim;
 
+/// The number of further invariants of the system `Y`, for lists with one value each.
+pub type CountOf<Y> =
+    <<Y as Metriplectic>::Invariants as Invariants<<Y as Metriplectic>::Manifold>>::Count;
+
 /// The promise of a system about its entropy.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]

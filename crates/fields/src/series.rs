@@ -33,6 +33,9 @@ const TINY: f64 = 1.0 / 32.0;
 /// ```
 #[inline]
 pub fn stumpff<D: Scalar>(s: D) -> [D; 4] {
+    if D::NDERIV == 0 && s.re() == 0.0 {
+        return [1.0, 1.0, 1.0 / 2.0, 1.0 / 6.0].map(D::from);
+    }
     // Each derivative removes a term from the end of a series.
     match s.re().abs() {
         size if size < TINY => power_series(s, 5 + D::NDERIV),

@@ -42,7 +42,7 @@ pub use own_error::{FlowError, MethodError};
 pub use result::{Refusal, StepEnds, StepStart, Taken};
 pub use scales::Scales;
 pub use start::Numbers;
-pub(crate) use start::{Dim, DriftCorrection, Start};
+pub(crate) use start::{CountOf, Dim, DriftCorrection, Start};
 pub use stepper::Stepper;
 pub(crate) use type_names::name_of;
 pub use vector::{Components, Vector};

@@ -14,11 +14,12 @@ use metriplectic_dynamics::{
 use metriplectic_fields::{ChartPoint, Column, Dimension, ScalarField, Space, stack};
 use metriplectic_manifolds::{Manifold, PointError};
 
+pub(crate) use stages::JetsOf;
 pub use stages::LawJets;
 
 use crate::explicit::{StageFlow as _, Target};
 use crate::round_off::bound::{SizesAt, of_an_increment, size_of_terms, sizes_on_a_step};
-use crate::step::{Components, Dim, Flow, Laws, Numbers, Recheck, Scales};
+use crate::step::{Components, CountOf, Dim, Flow, Laws, Numbers, Recheck, Scales};
 
 type Tangent<Y> = Components<metriplectic_fields::Vector<<Y as Metriplectic>::Manifold>>;
 
@@ -203,10 +204,10 @@ fn of_each<Y: Metriplectic>(
     number: &mut impl Gradient<Y::Manifold, Covector = f64>,
 ) -> Numbers<Y> {
     if Y::Invariants::COUNT == 0 {
-        return Dim::<Y>::array(|_| 0.0);
+        return CountOf::<Y>::array(|_| 0.0);
     }
     let numbers = Covectors::new([0.0; 2], system.invariants(), number);
-    Dim::<Y>::array(|k| numbers.invariants[k].map_or(0.0, |(_, value)| value))
+    CountOf::<Y>::array(|k| numbers.invariants[k].map_or(0.0, |(_, value)| value))
 }
 
 /// The further invariant that has the least independent fraction at `x`, and this fraction, if it is small

@@ -9,6 +9,8 @@ use nalgebra::{SMatrix, SVector};
 #[derive(Clone, Debug, PartialEq)]
 pub struct LieAlgebra<const N: usize> {
     nonzero: Vec<StructureConstant>,
+    /// The values of the constants, if they are those of so(3) at the [known places](ROTATIONS).
+    rotations: Option<[f64; 6]>,
 }
 
 /// The relative size below which matrices of a basis count as dependent, and commutators as in their span.
@@ -61,11 +63,11 @@ impl<const N: usize> LieAlgebra<N> {
                 }
             }
         }
-        let nonzero = triples(N)
+        let nonzero: Vec<_> = triples(N)
             .map(|(a, b, d)| StructureConstant { a, b, d, value: c(a, b, d) })
             .filter(|constant| constant.value != 0.0)
             .collect();
-        Ok(Self { nonzero })
+        Ok(Self::known(nonzero))
     }
 
     /// Makes the algebra spanned by matrices, with the commutator `[A, B] = AB − BA`.
@@ -102,8 +104,8 @@ impl<const N: usize> LieAlgebra<N> {
     }
 
     /// Makes the algebra of constants that are known to satisfy the laws.
-    pub(crate) const fn known(nonzero: Vec<StructureConstant>) -> Self {
-        Self { nonzero }
+    pub(crate) fn known(nonzero: Vec<StructureConstant>) -> Self {
+        Self { rotations: rotations(&nonzero), nonzero }
     }
 
     /// The nonzero structure constants.
@@ -123,12 +125,32 @@ impl<const N: usize> LieAlgebra<N> {
     /// Computes the coadjoint action `(ad*_ξ μ)_b = C_ab^d ξ^a μ_d`, that is `⟨ad*_ξ μ, η⟩ = ⟨μ, [ξ, η]⟩`.
     #[inline]
     pub fn coadjoint<D: Scalar>(&self, xi: &SVector<D, N>, mu: &SVector<D, N>) -> SVector<D, N> {
+        // A cross product: the compiler knows its indices, and there is no loop.
+        if N == 3
+            && let Some([p, m, q, n, r, o]) = self.rotations
+        {
+            return Column::from_index(|i| match i {
+                0 => xi[1] * mu[2] * m + xi[2] * mu[1] * r,
+                1 => xi[0] * mu[2] * p + xi[2] * mu[0] * n,
+                _ => xi[1] * mu[0] * q + xi[0] * mu[1] * o,
+            });
+        }
         let mut sum = <SVector<D, N> as Column<D>>::zero();
         for c in &self.nonzero {
             sum[c.b] += xi[c.a] * mu[c.d] * c.value;
         }
         sum
     }
+}
+
+/// The indices of the constants of so(3), in the order of [`LieDual::so3`](crate::LieDual::so3).
+const ROTATIONS: [(usize, usize, usize); 6] =
+    [(0, 1, 2), (1, 0, 2), (1, 2, 0), (2, 1, 0), (2, 0, 1), (0, 2, 1)];
+
+/// The values of constants that have the indices of so(3).
+fn rotations(nonzero: &[StructureConstant]) -> Option<[f64; 6]> {
+    let all: &[StructureConstant; 6] = nonzero.try_into().ok()?;
+    (all.map(|c| (c.a, c.b, c.d)) == ROTATIONS).then(|| all.map(|c| c.value))
 }
 
 /// All `(a, b, d)` with each index below `n`.

@@ -9,7 +9,7 @@ use num_dual::Dual64;
 
 use crate::bracket::epsilon;
 use crate::invariants::{Invariants, Kind, Visitor};
-use crate::metriplectic::{Dim, Metriplectic};
+use crate::metriplectic::{CountOf, Metriplectic};
 
 /// A point of a system in a chart, at a scalar.
 pub(super) type Place<Y, D> = ChartPoint<<Y as Metriplectic>::Manifold, D>;
@@ -26,27 +26,28 @@ pub trait Gradient<M: Space> {
     fn of(&mut self, f: &impl ScalarField<M>) -> Self::Covector;
 }
 
-/// One covector for each field of a system.
+/// One covector for each field of a system with `C` further invariants.
 #[derive(Clone, Copy, Debug)]
-pub struct Covectors<N: Dimension, V: Copy + Debug + Send + Sync> {
+pub struct Covectors<C: Dimension, V: Copy + Debug + Send + Sync> {
     /// The covector of the energy, `w_H`.
     pub energy: V,
     /// The covector of the entropy, `w_S`; zero without an entropy.
     pub entropy: V,
     /// The covectors of the further invariants, in their order.
-    pub invariants: N::Array<Option<(Kind, V)>>,
+    pub invariants: C::Array<Option<(Kind, V)>>,
 }
 
-impl<N: Dimension, V: Copy + Debug + Send + Sync> Covectors<N, V> {
+impl<C: Dimension, V: Copy + Debug + Send + Sync> Covectors<C, V> {
     /// Collects the covectors of energy and entropy, and those that `gradient` computes for the further
     /// `invariants`.
     #[inline]
-    pub fn new<M: Space<Dim = N>, W: Gradient<M, Covector = V>>(
+    pub fn new<M: Space, W: Gradient<M, Covector = V>>(
         [energy, entropy]: [V; 2],
-        invariants: &impl Invariants<M>,
+        invariants: &impl Invariants<M, Count = C>,
         gradient: &mut W,
     ) -> Self {
-        let mut collected = Collected { gradient, covectors: N::array(|_| None), len: 0 };
+        let mut collected =
+            Collected::<M, C, W> { gradient, covectors: C::array(|_| None), len: 0 };
         invariants.each(&mut collected);
         Self { energy, entropy, invariants: collected.covectors }
     }
@@ -66,13 +67,13 @@ impl<N: Dimension, V: Copy + Debug + Send + Sync> Covectors<N, V> {
 }
 
 /// The covectors of the invariants seen so far.
-struct Collected<'a, M: Space, W: Gradient<M>> {
+struct Collected<'a, M: Space, C: Dimension, W: Gradient<M>> {
     gradient: &'a mut W,
-    covectors: <M::Dim as Dimension>::Array<Option<(Kind, W::Covector)>>,
+    covectors: C::Array<Option<(Kind, W::Covector)>>,
     len: usize,
 }
 
-impl<M: Space, W: Gradient<M>> Visitor<M> for Collected<'_, M, W> {
+impl<M: Space, C: Dimension, W: Gradient<M>> Visitor<M> for Collected<'_, M, C, W> {
     #[inline]
     fn visit(&mut self, kind: Kind, f: &impl ScalarField<M>) {
         self.covectors[self.len] = Some((kind, self.gradient.of(f)));
@@ -134,7 +135,7 @@ impl<M: Space, D: Scalar> Gradient<M> for Differentials<'_, M, D> {
 pub fn differentials<Y: Metriplectic + ?Sized, D: Scalar>(
     system: &Y,
     x: &Place<Y, D>,
-) -> Covectors<Dim<Y>, Components<Y, D>> {
+) -> Covectors<CountOf<Y>, Components<Y, D>> {
     let mut d = Differentials::at(x);
     let laws = [d.of(system.energy()), d.of(system.entropy())];
     Covectors::new(laws, system.invariants(), &mut d)

@@ -8,7 +8,7 @@ use super::plan::{CASIMIR, MOMENTUM, ProjectionPlan};
 use crate::bracket::Bracket;
 use crate::dissipation::Dissipation;
 use crate::invariants::{Invariants, Kind};
-use crate::metriplectic::{Dim, Metriplectic, SecondLaw};
+use crate::metriplectic::{CountOf, Dim, Metriplectic, SecondLaw};
 use crate::orthogonal::Orthogonal;
 use crate::vector_field::VectorField;
 
@@ -35,7 +35,7 @@ impl<Y: Metriplectic + ?Sized> VectorField<Y::Manifold> for Y {
 pub fn reversible<Y: Metriplectic + ?Sized, D: Scalar>(
     system: &Y,
     g: &At<'_, Y, D>,
-    w: &Covectors<Dim<Y>, Components<Y, D>>,
+    w: &Covectors<CountOf<Y>, Components<Y, D>>,
 ) -> Result<Components<Y, D>, MetricError> {
     let annihilated = ProjectionPlan::of(system, w);
     let bracket = |alpha: &_| system.bracket().apply(&system.bracket_args(g, &w.entropy), alpha);
@@ -88,7 +88,7 @@ pub fn reversible<Y: Metriplectic + ?Sized, D: Scalar>(
 pub fn irreversible<Y: Metriplectic + ?Sized, D: Scalar>(
     system: &Y,
     g: &At<'_, Y, D>,
-    w: &Covectors<Dim<Y>, Components<Y, D>>,
+    w: &Covectors<CountOf<Y>, Components<Y, D>>,
 ) -> Result<Components<Y, D>, MetricError> {
     let friction = friction(system, g, w)?;
     if system.bracket().is_forced() { Ok(friction + force(system, g, w)?) } else { Ok(friction) }
@@ -98,7 +98,7 @@ pub fn irreversible<Y: Metriplectic + ?Sized, D: Scalar>(
 fn force<Y: Metriplectic + ?Sized, D: Scalar>(
     system: &Y,
     g: &At<'_, Y, D>,
-    w: &Covectors<Dim<Y>, Components<Y, D>>,
+    w: &Covectors<CountOf<Y>, Components<Y, D>>,
 ) -> Result<Components<Y, D>, MetricError> {
     let force = system.bracket().force(&system.bracket_args(g, &w.entropy), &w.energy)?;
     if Y::Invariants::COUNT == 0 {
@@ -118,7 +118,7 @@ fn force<Y: Metriplectic + ?Sized, D: Scalar>(
 fn friction<Y: Metriplectic + ?Sized, D: Scalar>(
     system: &Y,
     g: &At<'_, Y, D>,
-    w: &Covectors<Dim<Y>, Components<Y, D>>,
+    w: &Covectors<CountOf<Y>, Components<Y, D>>,
 ) -> Result<Components<Y, D>, MetricError> {
     let k = |alpha: &_| system.dissipation().apply(g, &w.energy, alpha);
     if Y::Invariants::COUNT == 0 {
@@ -132,7 +132,7 @@ fn friction<Y: Metriplectic + ?Sized, D: Scalar>(
 /// at the index.
 fn orthogonal_to_energy<Y: Metriplectic + ?Sized, D: Scalar>(
     g: &<Y::Metric as Riemannian<Y::Manifold>>::At<D>,
-    w: &Covectors<Dim<Y>, Components<Y, D>>,
+    w: &Covectors<CountOf<Y>, Components<Y, D>>,
 ) -> (Orthogonal<Dim<Y>, D>, usize) {
     let mut normals = Orthogonal::default();
     normals.push(g, &w.energy);

@@ -8,7 +8,7 @@ use super::plan::{CASIMIR, MOMENTUM, ProjectionPlan};
 use crate::bracket::Bracket;
 use crate::dissipation::Dissipation;
 use crate::invariants::{Invariants, Kind};
-use crate::metriplectic::{Dim, Metriplectic, SecondLaw};
+use crate::metriplectic::{CountOf, Dim, Metriplectic, SecondLaw};
 use crate::orthogonal::{OrthogonalJet, WithJacobian};
 
 /// The velocity at a real point with its derivatives along the unknown of a step.
@@ -41,7 +41,7 @@ pub fn velocity_jet<Y: Metriplectic + ?Sized>(
     system: &Y,
     metric: &MetricAt<'_, Y::Manifold, Y::Metric>,
     dz: &Matrix<Y::Manifold>,
-    w: &Covectors<Dim<Y>, WithJacobian<Dim<Y>>>,
+    w: &Covectors<CountOf<Y>, WithJacobian<Dim<Y>>>,
 ) -> Result<VelocityJet<Dim<Y>>, MetricError> {
     let slopes = if Y::Invariants::COUNT > 0 || ProjectionPlan::of(system, w).projected {
         metric.slopes()?.as_ref()
@@ -120,7 +120,7 @@ struct Linearisation<'a, Y: Metriplectic + ?Sized, F> {
     /// The derivative of `g v`, for a fixed `v`.
     dg_v: &'a F,
     /// The covectors of the fields.
-    w: &'a Covectors<Dim<Y>, WithJacobian<Dim<Y>>>,
+    w: &'a Covectors<CountOf<Y>, WithJacobian<Dim<Y>>>,
 }
 
 impl<Y, F> Linearisation<'_, Y, F>

@@ -5,7 +5,7 @@ use std::fmt::Debug;
 use super::covectors::Covectors;
 use crate::bracket::Bracket;
 use crate::invariants::{Invariants, Kind};
-use crate::metriplectic::{Dim, Metriplectic, SecondLaw};
+use crate::metriplectic::{CountOf, Metriplectic, SecondLaw};
 
 /// The independent fraction `σ = μ` of a Casimir's covector at which its projection in `Π̃` has half its weight,
 /// `1/(1 + (μ/σ)⁴)`.
@@ -33,7 +33,7 @@ pub(super) struct ProjectionPlan {
 
 impl ProjectionPlan {
     #[inline]
-    pub(super) fn of<Y, V>(system: &Y, w: &Covectors<Dim<Y>, V>) -> Self
+    pub(super) fn of<Y, V>(system: &Y, w: &Covectors<CountOf<Y>, V>) -> Self
     where
         Y: Metriplectic + ?Sized,
         V: Copy + Debug + Send + Sync,

@@ -27,7 +27,7 @@ use metriplectic_manifolds::{InnerProduct, Manifold, Riemannian};
 use super::chart::StepChart;
 use super::tableau::{STAGES, Tableau};
 use crate::round_off::stable_gradient::short;
-use crate::step::Dim;
+use crate::step::CountOf;
 
 /// A vector for each stage.
 pub(super) type Stages<V> = [V; STAGES];
@@ -70,17 +70,17 @@ pub(super) struct StageCovectors<V> {
 
 /// The covectors of all laws at the stages.
 pub(super) type StageCovectorsOf<Y> =
-    Covectors<Dim<Y>, StageCovectors<Vector<<Y as Metriplectic>::Manifold>>>;
+    Covectors<CountOf<Y>, StageCovectors<Vector<<Y as Metriplectic>::Manifold>>>;
 
 /// The covectors at one stage.
 pub(super) fn at_stage<Y: Metriplectic>(
     w: &StageCovectorsOf<Y>,
     i: usize,
-) -> Covectors<Dim<Y>, Vector<Y::Manifold>> {
+) -> Covectors<CountOf<Y>, Vector<Y::Manifold>> {
     Covectors {
         energy: w.energy.w[i],
         entropy: w.entropy.w[i],
-        invariants: Dim::<Y>::array(|a| w.invariants[a].map(|(kind, l)| (kind, l.w[i]))),
+        invariants: CountOf::<Y>::array(|a| w.invariants[a].map(|(kind, l)| (kind, l.w[i]))),
     }
 }
 

@@ -25,7 +25,7 @@ use super::in_time::{InTime, Timed};
 use super::tableau::{STAGES, Tableau};
 use crate::round_off::bound::ROUNDED;
 use crate::round_off::drift;
-use crate::step::{Dim, DriftCorrection, Laws, Numbers};
+use crate::step::{CountOf, Dim, DriftCorrection, Laws, Numbers};
 
 /// The velocities of the stages, in the frame at the start of the step.
 pub(super) type Unknowns<Y> = Stages<Vector<<Y as Metriplectic>::Manifold>>;
@@ -188,7 +188,7 @@ impl<'a, Y: Metriplectic> StageEquation<'a, Y> {
             heat_rounding = added.rounding;
         }
         let mut residual = [Vector::<Y::Manifold>::zero(); STAGES];
-        let mut work = Work::<Dim<Y>>::default();
+        let mut work = Work::<CountOf<Y>>::default();
         let (mut entropy_slope, mut production) = (f64::INFINITY, 0.0);
         let mut entropy_covector = Vector::<Y::Manifold>::zero();
         for i in 0..tableau.stages {
@@ -221,9 +221,9 @@ impl<'a, Y: Metriplectic> StageEquation<'a, Y> {
         let sizes = Laws {
             energy: w.energy.size,
             entropy: w.entropy.size,
-            invariants: Dim::<Y>::array(|a| w.invariants[a].map_or(0.0, |(_, l)| l.size)),
+            invariants: CountOf::<Y>::array(|a| w.invariants[a].map_or(0.0, |(_, l)| l.size)),
         };
-        let excess = relative::<Dim<Y>>(&work.laws, &sizes) / ROUNDED;
+        let excess = relative::<CountOf<Y>>(&work.laws, &sizes) / ROUNDED;
         let entropy = Left {
             work: if self.is_exact() { work.laws.entropy } else { 0.0 },
             size: w.entropy.size,
@@ -235,7 +235,7 @@ impl<'a, Y: Metriplectic> StageEquation<'a, Y> {
                 w.energy.end
             },
             entropy: w.entropy.end,
-            invariants: Dim::<Y>::array(|a| w.invariants[a].map_or(0.0, |(_, l)| l.end)),
+            invariants: CountOf::<Y>::array(|a| w.invariants[a].map_or(0.0, |(_, l)| l.end)),
         };
         let error = self.error(&values, &sizes);
         let usable = all_finite::<Dim<Y>>(&residual) && !excess.is_nan();
@@ -275,11 +275,11 @@ impl<'a, Y: Metriplectic> StageEquation<'a, Y> {
         let off = Laws {
             energy: after.energy - before.energy + drift.energy,
             entropy: 0.0,
-            invariants: Dim::<Y>::array(|a| {
+            invariants: CountOf::<Y>::array(|a| {
                 after.invariants[a] - before.invariants[a] + drift.invariants[a]
             }),
         };
-        relative::<Dim<Y>>(&off, sizes) / ROUNDED
+        relative::<CountOf<Y>>(&off, sizes) / ROUNDED
     }
 
     /// A velocity that the covector of the energy annihilates. Where friction is stiff the sum of its terms has lost
@@ -310,7 +310,7 @@ impl<'a, Y: Metriplectic> StageEquation<'a, Y> {
         &self,
         stages: &StagePoints<Y::Manifold>,
         polynomial: &StepPolynomial<'_, Y::Manifold>,
-    ) -> Covectors<Dim<Y>, StageCovectors<Vector<Y::Manifold>>> {
+    ) -> Covectors<CountOf<Y>, StageCovectors<Vector<Y::Manifold>>> {
         let &Self { system, values, drift, .. } = self;
         let scales = Y::Manifold::scales(&polynomial.chart.end);
         let along = AlongStages { stages, polynomial, scales };
@@ -341,19 +341,19 @@ impl<'a, Y: Metriplectic> StageEquation<'a, Y> {
 }
 
 /// What a residual changes of each law.
-struct Work<N: Dimension> {
-    laws: Laws<N::Array<f64>>,
+struct Work<C: Dimension> {
+    laws: Laws<C::Array<f64>>,
 }
 
-impl<N: Dimension> Default for Work<N> {
+impl<C: Dimension> Default for Work<C> {
     fn default() -> Self {
-        Self { laws: Laws { energy: 0.0, entropy: 0.0, invariants: N::array(|_| 0.0) } }
+        Self { laws: Laws { energy: 0.0, entropy: 0.0, invariants: C::array(|_| 0.0) } }
     }
 }
 
-impl<N: Dimension> Work<N> {
+impl<C: Dimension> Work<C> {
     #[inline]
-    fn add(&mut self, weight: f64, w: &Covectors<N, N::Vector<f64>>, off: &N::Vector<f64>) {
+    fn add<V: Column<f64>>(&mut self, weight: f64, w: &Covectors<C, V>, off: &V) {
         self.laws.energy += weight * w.energy.dot(off);
         self.laws.entropy += weight * w.entropy.dot(off);
         for (a, listed) in w.invariants.as_ref().iter().enumerate() {
@@ -365,7 +365,7 @@ impl<N: Dimension> Work<N> {
 
 /// The largest change of the energy and the further invariants, relative to the size of the terms of the law.
 #[inline]
-fn relative<N: Dimension>(off: &Laws<N::Array<f64>>, sizes: &Laws<N::Array<f64>>) -> f64 {
+fn relative<C: Dimension>(off: &Laws<C::Array<f64>>, sizes: &Laws<C::Array<f64>>) -> f64 {
     // 0/0 = 0: a law without terms has no round-off, and nothing changes it.
     let ratio = |off: f64, size: f64| if off == 0.0 { 0.0 } else { off.abs() / size };
     let listed = off.invariants.as_ref().iter().zip(sizes.invariants.as_ref());

@@ -37,7 +37,7 @@ use metriplectic_manifolds::{InnerProduct, Manifold, Riemannian};
 use super::chart::{StepChart, in_chart_at};
 use super::covectors::{StageCovectorsOf, StagePoints, Stages, at_stage};
 use super::tableau::{STAGES, Tableau};
-use crate::step::Dim;
+use crate::step::{CountOf, Dim};
 
 /// The heat that is added to the stages.
 #[derive(Clone, Copy, Debug)]
@@ -71,7 +71,7 @@ type Still<Y> = <Dim<Y> as Dimension>::Array<bool>;
 fn still<Y: Metriplectic>(
     system: &Y,
     x: &Point<Y>,
-    w: &Covectors<Dim<Y>, Vector<Y::Manifold>>,
+    w: &Covectors<CountOf<Y>, Vector<Y::Manifold>>,
 ) -> Option<Still<Y>> {
     let centre = ChartPoint::<Y::Manifold>::centre(x);
     let g = system.metric_at(&centre);
@@ -85,7 +85,7 @@ fn still<Y: Metriplectic>(
 fn direction<Y: Metriplectic>(
     system: &Y,
     x: &Point<Y>,
-    w: &Covectors<Dim<Y>, Vector<Y::Manifold>>,
+    w: &Covectors<CountOf<Y>, Vector<Y::Manifold>>,
     still: &Still<Y>,
 ) -> Option<Direction<Vector<Y::Manifold>>> {
     let g = system.metric().at(&ChartPoint::<Y::Manifold>::centre(x)).ok()?;
@@ -129,7 +129,7 @@ impl<N: Dimension> HeatStart<N> {
 pub(super) fn start<Y: Metriplectic>(
     system: &Y,
     x: &Point<Y>,
-    w: &Covectors<Dim<Y>, Vector<Y::Manifold>>,
+    w: &Covectors<CountOf<Y>, Vector<Y::Manifold>>,
 ) -> Option<HeatStart<Dim<Y>>> {
     let still = still(system, x, w)?;
     let Direction { alignment, .. } = direction(system, x, w, &still)?;

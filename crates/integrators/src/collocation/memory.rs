@@ -97,7 +97,7 @@ impl<N: Dimension> Memory for StageMemory<N> {
         let column = |v: &N::Vector<f64>| (0..N::LEN).map(|i| v[i]).collect::<Vec<f64>>();
         if let Some(Continued { k, stages, h }) = &self.velocities {
             for (name, k) in NAMES.iter().zip(k).take(*stages) {
-                saved.put(name, column(k));
+                saved.put(*name, column(k));
             }
             saved.put("size of the step of the stages", [*h]);
         }

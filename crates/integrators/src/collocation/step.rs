@@ -14,7 +14,7 @@ use crate::round_off::compensation::Displaced;
 use crate::round_off::drift;
 use crate::step::failure::{Cause, Fallbacks};
 use crate::step::{
-    Dim, Effort, Evidence, Flow as _, Laws, Numbers, StageLaws, Start, StepStart, Taken,
+    CountOf, Dim, Effort, Evidence, Flow as _, Laws, Numbers, StageLaws, Start, StepStart, Taken,
 };
 
 /// The growth of the entropy, relative to its value, below which a step of friction is round-off.
@@ -31,7 +31,7 @@ pub(super) fn start_of<'a, Y: Metriplectic>(
     let accumulated_error = Laws {
         energy: values.energy - reference.energy,
         entropy,
-        invariants: Dim::<Y>::array(|a| values.invariants[a] - reference.invariants[a]),
+        invariants: CountOf::<Y>::array(|a| values.invariants[a] - reference.invariants[a]),
     };
     Start { x, time, h, values, accumulated_error }
 }
@@ -150,7 +150,7 @@ fn corrected<Y: Metriplectic>(
     let laws = Laws {
         energy: before.energy - drift.energy,
         entropy: before.entropy,
-        invariants: Dim::<Y>::array(|a| before.invariants[a] - drift.invariants[a]),
+        invariants: CountOf::<Y>::array(|a| before.invariants[a] - drift.invariants[a]),
     };
     let entropy = if falls { before.entropy } else { values.entropy };
     let on_all = equation.is_exact().then(|| system.onto(end, &laws, Some(entropy))).flatten();

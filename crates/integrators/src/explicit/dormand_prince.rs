@@ -4,7 +4,7 @@
 //! output of order 7: Prince, Dormand (1981), and Hairer, Nørsett, Wanner (Solving ODEs I, §II.5 and §II.6), from the
 //! authors' program DOP853. The weights are rounded to the nearest number.
 
-use super::tableau::Tableau;
+use super::tableau::{Compiled, Tableau};
 use crate::step::Control;
 
 /// Order 8. It leaves out what would be the number 12 of Hairer's rows; here the end of a step is stage 12.
@@ -200,7 +200,8 @@ pub(super) const EIGHT: Tableau = Tableau::new(
     beta: 0.0,
     rejected: 1.0 / 8.0,
     ratios: [1.0 / 3.0, 6.0],
-});
+})
+.compiled(Compiled::Eight);
 
 /// Order 5.
 pub(super) const FIVE: Tableau = Tableau::new(
@@ -255,4 +256,5 @@ pub(super) const FIVE: Tableau = Tableau::new(
     ]],
 )
 .stable_to(3.25)
-.control(Control { power: 1.0, alpha: 0.17, beta: 0.04, rejected: 0.2, ratios: [0.2, 10.0] });
+.control(Control { power: 1.0, alpha: 0.17, beta: 0.04, rejected: 0.2, ratios: [0.2, 10.0] })
+.compiled(Compiled::Five);

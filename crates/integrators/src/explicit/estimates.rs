@@ -1,11 +1,12 @@
 //! Estimates of the error and of the stability of a step, from its stages.
 
 use super::chebyshev;
+use super::dormand_prince::{EIGHT, FIVE};
 use super::flow::StageFlow;
 use super::memory::{LastStep, MemoryOf};
 use super::spectrum::Spectrum;
 use super::stage::combined;
-use super::tableau::{ESTIMATED, Stages, Tableau};
+use super::tableau::{Compiled, ESTIMATED, Row, Stages, Tableau};
 use super::trial::Done;
 use crate::step::{LimitingSites, Vector};
 
@@ -48,7 +49,18 @@ pub(super) fn error<F: StageFlow>(
         (Stages::Rows(_), [[], _]) => return None,
         (Stages::Rows(_), _) => {}
     }
-    let [fifth, third] = tableau.errors.map(|row| norm(&combined(h, row, &last.stages)));
+    let of = |row: Row| norm(&combined(h, row, &last.stages));
+    let [fifth, third] = match tableau.compiled {
+        Some(Compiled::Eight) => {
+            const ROWS: [Row; 2] = EIGHT.errors;
+            [of(ROWS[0]), of(ROWS[1])]
+        }
+        Some(Compiled::Five) => {
+            const ROW: Row = FIVE.errors[0];
+            [of(ROW), 0.0]
+        }
+        None => tableau.errors.map(of),
+    };
     // Hairer's e₅²/√(e₅² + e₃²/100) is of the order of the method; a method with one error has that.
     Some(if third > 0.0 { fifth * (fifth / fifth.hypot(0.1 * third)) } else { fifth })
 }

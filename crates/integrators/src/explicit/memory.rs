@@ -23,7 +23,9 @@ pub struct ExplicitMemory<V> {
     /// The velocity at the state reached, a function of this state alone.
     pub(super) here: Option<Here<V>>,
     /// The step taken last.
-    pub(super) last: Option<LastStep<V>>,
+    pub(super) last: Option<Box<LastStep<V>>>,
+    /// A step before it, whose room the next one takes.
+    pub(super) room: Option<Box<LastStep<V>>>,
     /// The spectral radius of the equation of motion, if the method needs it.
     pub(super) spectrum: Option<Spectrum<V>>,
 }
@@ -72,6 +74,15 @@ pub(super) struct LastStep<V> {
     pub(super) rise: f64,
 }
 
+impl<V: Vector> LastStep<V> {
+    /// Room for a step; `like` has the length of a velocity.
+    pub(super) fn empty(like: &V) -> Self {
+        let zero = like.zero();
+        let stages = Here::at_rest(&zero);
+        Self { stages, known: 0, before: zero.clone(), end: zero, rise: 0.0 }
+    }
+}
+
 impl<V> Default for ExplicitMemory<V> {
     fn default() -> Self {
         Self {
@@ -82,8 +93,22 @@ impl<V> Default for ExplicitMemory<V> {
             read: Vec::new(),
             here: None,
             last: None,
+            room: None,
             spectrum: None,
         }
+    }
+}
+
+/// The room of a step, unless its vectors have arrays of their own, which then serve nobody.
+fn room_of<V: Vector>(last: Option<Box<LastStep<V>>>) -> Option<Box<LastStep<V>>> {
+    last.filter(|last| last.end.sites().is_none())
+}
+
+impl<V: Vector> ExplicitMemory<V> {
+    /// The room of the step taken last, or of the one before it.
+    pub(super) fn take_own_room(&mut self) -> Option<Box<LastStep<V>>> {
+        let last = room_of(self.last.take());
+        last.or_else(|| self.room.take())
     }
 }
 
@@ -100,14 +125,24 @@ impl<V: Vector> Memory for ExplicitMemory<V> {
             read,
             here,
             last: None,
+            room: None,
             spectrum,
         }
+    }
+
+    fn take_room(&mut self, from: &mut Self) {
+        self.room = from.room.take();
+    }
+
+    fn reuse(&mut self, mut given_up: Self) {
+        self.room = given_up.take_own_room();
     }
 
     fn refused(&mut self, tried: Self) {
         self.falls = tried.falls;
         // Known before the step was tried.
         self.here = self.here.take().or(tried.here);
+        self.room = tried.room.or_else(|| room_of(tried.last));
     }
 
     /// Leaves out the velocity at the state, which is evaluated anew with the same bits.

@@ -31,7 +31,7 @@ pub(super) fn stage<F: StageFlow>(
 }
 
 /// `h Σ_j w_j k_j` over the rates of the stages.
-#[inline]
+#[inline(always)]
 pub(super) fn combined<V: Vector>(h: f64, row: Row, stages: &[Here<V>; STAGES]) -> V {
     if row.is_empty() {
         return stages[0].velocity.zero();
@@ -43,7 +43,7 @@ pub(super) fn combined<V: Vector>(h: f64, row: Row, stages: &[Here<V>; STAGES]) 
 }
 
 /// `Σ_j w_j σ_j` over the entropy production of the stages.
-#[inline]
+#[inline(always)]
 pub(super) fn produced<V>(row: Row, stages: &[Here<V>; STAGES]) -> f64 {
     row.iter().fold(0.0, |sum, &(j, w)| sum + w * stages[j].production)
 }

@@ -4,14 +4,15 @@ use metriplectic_dynamics::SecondLaw;
 
 use super::chebyshev;
 use super::creep;
+use super::dormand_prince::{EIGHT, FIVE};
 use super::estimates::is_at_the_edge;
 use super::flow::StageFlow;
 use super::landing::{Landed, Onto};
-use super::memory::{ExplicitMemory, LastStep, MemoryOf, Produced};
+use super::memory::{LastStep, MemoryOf, Produced};
 use super::refused::Refused;
 use super::rest::{self, is_hardly};
 use super::stage::{Here, combined, produced, stage};
-use super::tableau::Stages;
+use super::tableau::{Compiled, Row, Stages};
 use super::trial::Trial;
 use crate::step::{
     Effort, Element, EntropyStep, Evidence, MethodError, Refusal, StepError, StepStart, Taken,
@@ -103,23 +104,24 @@ fn try_step<F: StageFlow>(
             error: MethodError::new(fault),
         }));
     }
-    // The stages of the step before it serve nobody any more.
-    memory.last = None;
+    // The stages of the step before it serve nobody any more, and leave their room.
+    let room = memory.take_own_room();
     let here = match memory.here.take() {
         Some(here) => here,
         None => here_at(flow, start.x, None).ok_or(Refused::Outside(None))?,
     };
-    let mut last = match tableau.stages {
-        Stages::Chebyshev => chebyshev::stages(trial, here, memory)?,
-        Stages::Rows(_) => stages(trial, here)?,
-    };
+    let mut last = room.unwrap_or_else(|| Box::new(LastStep::empty(&here.velocity)));
+    match tableau.stages {
+        Stages::Chebyshev => *last = chebyshev::stages(trial, here, memory)?,
+        Stages::Rows(rows) => stages(trial, rows, here, &mut last)?,
+    }
     let taken = finished(trial, &mut last, memory);
     if memory.here.is_some() {
         memory.last = Some(last);
     } else {
         // The state has stayed where it was.
-        let [here, ..] = last.stages;
-        memory.here = Some(here);
+        memory.here = Some(last.stages[0].clone());
+        memory.room = Some(last);
     }
     taken
 }
@@ -196,16 +198,12 @@ fn finished<F: StageFlow>(
 
     let entropy_step = (flow.entropy_law() == SecondLaw::Exact).then_some(how);
     let evidence = Evidence { dissipates, rests, entropy_step, stability, ..Evidence::default() };
-    *memory = ExplicitMemory {
-        entropy: Some(produced),
-        falls: 0,
-        taken,
-        lost: Some(lost),
-        read: Vec::new(),
-        here: Some(next),
-        last: None,
-        spectrum: memory.spectrum.take(),
-    };
+    memory.entropy = Some(produced);
+    memory.falls = 0;
+    memory.taken = taken;
+    memory.lost = Some(lost);
+    memory.read = Vec::new();
+    memory.here = Some(next);
     Ok(Taken { x: end.x, values, evidence, effort: Effort::default() })
 }
 
@@ -231,28 +229,59 @@ fn here_at<F: StageFlow>(
     Some(Here { velocity, production })
 }
 
-/// The stages of a step, and the coordinates of its end.
+/// The stages of a step, and the coordinates of its end, into the room for them.
 #[inline]
 fn stages<F: StageFlow>(
-    &Trial { tableau, flow, start, h }: &Trial<'_, F>,
+    trial: &Trial<'_, F>,
+    rows: &[Row],
     here: Here<F::Vector>,
-) -> Result<LastStep<F::Vector>, Refused> {
-    let x = start.x;
-    let zero = here.velocity.zero();
-    let mut stages = Here::at_rest(&zero);
-    stages[0] = here;
-    let mut before = zero;
-    for (i, row) in tableau.rows().iter().enumerate() {
-        before = combined(h, row, &stages);
-        stages[i + 1] =
-            stage(flow, x, &before).ok_or_else(|| Refused::outside(flow, x, &before))?;
+    last: &mut LastStep<F::Vector>,
+) -> Result<(), Refused> {
+    let &Trial { tableau, h, .. } = trial;
+    last.stages[0] = here;
+    last.known = rows.len() + 1;
+    /// With the rows as constants, whose sums the compiler writes out.
+    macro_rules! compiled {
+        ($tableau:ident: $($i:literal)*) => {{
+            $({
+                const ROW: Row = $tableau.rows()[$i];
+                add_stage(trial, ROW, $i, last)?;
+            })*
+            const END: Row = $tableau.end;
+            last.end = combined(h, END, &last.stages);
+            last.rise = h * produced(END, &last.stages);
+        }};
     }
-    let end = combined(h, tableau.end, &stages);
-    let rise = h * produced(tableau.end, &stages);
+    match tableau.compiled {
+        Some(Compiled::Eight) => compiled!(EIGHT: 0 1 2 3 4 5 6 7 8 9 10),
+        Some(Compiled::Five) => compiled!(FIVE: 0 1 2 3 4),
+        None => {
+            for (i, row) in rows.iter().enumerate() {
+                add_stage(trial, row, i, last)?;
+            }
+            last.end = combined(h, tableau.end, &last.stages);
+            last.rise = h * produced(tableau.end, &last.stages);
+        }
+    }
     for stage in tableau.passed() {
-        stages[stage].velocity = stages[0].velocity.zero();
+        last.stages[stage].velocity = last.stages[0].velocity.zero();
     }
-    Ok(LastStep { stages, known: tableau.rows().len() + 1, before, end, rise })
+    Ok(())
+}
+
+/// The stage that row `i` makes.
+#[inline(always)]
+fn add_stage<F: StageFlow>(
+    &Trial { flow, start, h, .. }: &Trial<'_, F>,
+    row: Row,
+    i: usize,
+    last: &mut LastStep<F::Vector>,
+) -> Result<(), Refused> {
+    let x = start.x;
+    last.before = combined(h, row, &last.stages);
+    let before = &last.before;
+    last.stages[i + 1] = stage(flow, x, before).ok_or_else(|| Refused::outside(flow, x, before))?;
+    Ok(())
 }
 
 fn is_zero(v: &impl Vector) -> bool {

@@ -58,7 +58,18 @@ pub struct Tableau {
     pub(super) stability: f64,
     /// The stages that only other stages before the end need, one bit for each.
     passed: u32,
+    /// Whether its rows are compiled as constants.
+    pub(super) compiled: Option<Compiled>,
     pub(super) fault: Option<TableauError>,
+}
+
+/// A tableau whose rows are compiled as constants.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Compiled {
+    /// [`DormandPrince5`](crate::DormandPrince5).
+    Five,
+    /// [`DormandPrince8`](crate::DormandPrince8).
+    Eight,
 }
 
 /// The stages before the end of a step.
@@ -91,6 +102,7 @@ impl Tableau {
             has_control: false,
             stability: f64::INFINITY,
             passed: 0,
+            compiled: None,
             fault: None,
         };
         let tableau = tableau.checked();
@@ -202,6 +214,11 @@ impl Tableau {
         Self { stages: Stages::Chebyshev, stability: f64::INFINITY, control, ..tableau }
     }
 
+    /// The tableau whose rows are compiled as constants. What changes a row takes it back.
+    pub(super) const fn compiled(self, which: Compiled) -> Self {
+        Self { compiled: Some(which), ..self }
+    }
+
     /// The rows of the stages.
     pub(crate) const fn rows(&self) -> &'static [Row] {
         match self.stages {
@@ -280,7 +297,8 @@ impl Tableau {
         }
         let [error, _] = self.errors;
         let early_error: Row = if names(error, end) { &[] } else { error };
-        Self { fault, passed, early_error, ..self }
+        // Its rows may be others now.
+        Self { fault, passed, early_error, compiled: None, ..self }
     }
 
     /// The first row of a part that names a stage which is not known: of `known` stages, and of one more for each row if

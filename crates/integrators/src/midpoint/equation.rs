@@ -18,7 +18,7 @@ use crate::newton::{Equation, Evaluated, Linearised, Rounding, Stiffness};
 use crate::round_off::bound::ROUNDED;
 use crate::round_off::drift;
 use crate::round_off::stable_gradient::Segment;
-use crate::step::{Dim, DriftCorrection, Flow as _, Laws, Numbers, Start};
+use crate::step::{CountOf, DriftCorrection, Flow as _, Laws, Numbers, Start};
 
 /// The equation of one step (Bloch, Farré Puiggalí, Martín de Diego 2024, §4.4), as a function of
 /// the initial displacement `u ∈ T_xM` of the path:
@@ -104,7 +104,7 @@ trait Provider {
 }
 
 /// The covectors of a provider.
-type CovectorsOf<P> = Covectors<Dim<<P as Provider>::System>, <P as Provider>::Components>;
+type CovectorsOf<P> = Covectors<CountOf<<P as Provider>::System>, <P as Provider>::Components>;
 
 /// The terms of the equation along one path.
 struct Terms<P: Provider> {

@@ -60,7 +60,7 @@ impl<N: Dimension> Memory for MidpointMemory<N> {
         };
         let Predictor { differences, known } = &self.predictor;
         for (name, difference) in NAMES.iter().zip(differences).take(*known) {
-            saved.put(name, column(difference));
+            saved.put(*name, column(difference));
         }
         if let KeptJacobian { inverse: Some(inverse), h, length } = &self.jacobian {
             let Inverse { matrix, round_off, residual_bound, contraction, first, friction, age } =

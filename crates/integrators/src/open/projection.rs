@@ -9,15 +9,18 @@ use super::state::{Booked, OpenState};
 use super::system::{Direction, OpenSystem, StateOf};
 use super::vector::OpenVector;
 use crate::explicit::{Projected, ProjectionError, StageFlow, Target};
-use crate::step::{Dim, Laws, Numbers};
-use crate::system::LawJets;
+use crate::step::{CountOf, Dim, Laws, Numbers};
+use crate::system::{JetsOf, LawJets};
 
 /// The laws of an open system at a state, with the differentials of the system's own.
 #[derive(Clone, Debug)]
-pub struct OpenGradients<N: Dimension> {
-    jets: LawJets<N>,
-    values: Laws<N::Array<f64>>,
+pub struct OpenGradients<N: Dimension, C: Dimension> {
+    jets: LawJets<N, C>,
+    values: Laws<C::Array<f64>>,
 }
+
+/// The laws of an open system with the differentials of the system `Y`.
+type OpenGradientsOf<Y> = OpenGradients<Dim<Y>, CountOf<Y>>;
 
 impl<Y, C, X> StageFlow for OpenSystem<Y, C, X>
 where
@@ -25,22 +28,22 @@ where
     C: Clock<Y::Manifold, Y::Energy>,
     X: Exchange<Y::Manifold, Y::Metric>,
 {
-    type Gradients = OpenGradients<Dim<Y>>;
+    type Gradients = OpenGradientsOf<Y>;
 
-    fn gradients(&self, x: &StateOf<Y>) -> Option<OpenGradients<Dim<Y>>> {
+    fn gradients(&self, x: &StateOf<Y>) -> Option<OpenGradientsOf<Y>> {
         let view = self.frozen(x.time);
         let jets = view.gradients(&x.x)?;
         Some(self.gradients_at(x, jets))
     }
 
-    fn values(&self, gradients: &OpenGradients<Dim<Y>>) -> Laws<Numbers<Y>> {
+    fn values(&self, gradients: &OpenGradientsOf<Y>) -> Laws<Numbers<Y>> {
         gradients.values
     }
 
     fn velocity(
         &self,
         x: &StateOf<Y>,
-        OpenGradients { jets, .. }: &OpenGradients<Dim<Y>>,
+        OpenGradients { jets, .. }: &OpenGradientsOf<Y>,
     ) -> Option<(Direction<Y, X>, f64)> {
         let t = x.time;
         let w = jets.covectors();
@@ -126,7 +129,7 @@ where
     X: Exchange<Y::Manifold, Y::Metric>,
 {
     /// The gradients of the open system, from those of the system at this state.
-    fn gradients_at(&self, x: &StateOf<Y>, jets: LawJets<Dim<Y>>) -> OpenGradients<Dim<Y>> {
+    fn gradients_at(&self, x: &StateOf<Y>, jets: JetsOf<Y>) -> OpenGradientsOf<Y> {
         OpenGradients { values: self.balanced(x, jets.values()), jets }
     }
 }

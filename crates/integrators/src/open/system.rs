@@ -14,7 +14,7 @@ use super::clock::Clock;
 use super::state::{Columns, Ledger, OpenState};
 use super::vector::OpenVector;
 use super::view::{Closed, Frozen};
-use crate::step::Dim;
+use crate::step::CountOf;
 
 /// A system `Y` with a clock `C` in its energy, and with the ports and baths `X`; built by
 /// [`System::on`](metriplectic_dynamics::System::on) with the methods of [`OpenBuilder`](crate::OpenBuilder).
@@ -58,7 +58,7 @@ pub(super) type Direction<Y, X> =
     OpenVector<Vector<<Y as Metriplectic>::Manifold>, EntriesOf<Y, X>>;
 
 /// The covectors of all laws of a system at a point.
-pub(super) type CovectorsOf<Y> = Covectors<Dim<Y>, Vector<<Y as Metriplectic>::Manifold>>;
+pub(super) type CovectorsOf<Y> = Covectors<CountOf<Y>, Vector<<Y as Metriplectic>::Manifold>>;
 
 /// A state of an open system.
 pub(super) type StateOf<Y> = OpenState<Point<Y>>;

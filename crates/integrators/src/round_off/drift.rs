@@ -6,11 +6,11 @@ use metriplectic_fields::{ChartPoint, Column, Dimension, Matrix, Square, Vector}
 use metriplectic_manifolds::InnerProduct;
 
 use crate::round_off::bound::ROUNDED;
-use crate::step::{Dim, DriftCorrection, Laws, Start};
+use crate::step::{CountOf, DriftCorrection, Laws, Start};
 
 /// Makes the correction that is zero, as in the definition of the scheme.
 pub(crate) fn nothing<Y: Metriplectic>() -> DriftCorrection<Y> {
-    Laws { energy: 0.0, entropy: 0.0, invariants: Dim::<Y>::array(|_| 0.0) }
+    Laws { energy: 0.0, entropy: 0.0, invariants: CountOf::<Y>::array(|_| 0.0) }
 }
 
 /// The fractions `φe` of the accumulated errors `e` that the step takes back.
@@ -69,7 +69,7 @@ pub(crate) fn target<Y: Metriplectic>(
         // An entropy that has risen by round-off comes back by less than a fall in each step.
         entropy: fraction(entropy, values.entropy.abs(), &w.entropy, of_entropy)
             .min(2.0 * f64::EPSILON * values.entropy.abs()),
-        invariants: Dim::<Y>::array(|k| {
+        invariants: CountOf::<Y>::array(|k| {
             let size = values.invariants[k].abs();
             w.invariants[k].map_or(0.0, |(_, dl)| fraction(invariants[k], size, &dl, 1e6))
         }),

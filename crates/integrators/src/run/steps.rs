@@ -370,6 +370,7 @@ impl<'a, F: Flow, M: Stepper<F>> Steps<'a, F, M> {
             }
             let ratio = controller.pace.taken.map_or(1.0, |taken| h / taken);
             let mut memory = self.memory.rescaled(ratio);
+            memory.take_room(&mut self.memory);
             let allowed = controller.allowed(&rule, &self.progress.scales, h);
             let start = self.from(Some(allowed));
             let end = self.method.attempt(flow, &start, h, &mut memory);
@@ -406,7 +407,8 @@ impl<'a, F: Flow, M: Stepper<F>> Steps<'a, F, M> {
             match (end, error) {
                 (Some(taken), _) if taken.evidence.entropy_step == Some(EntropyStep::Held) => {
                     controller.pace.accept_held(&rule, h);
-                    self.memory = memory;
+                    let before = std::mem::replace(&mut self.memory, memory);
+                    self.memory.reuse(before);
                     let time = if last { target } else { time + h };
                     self.progress.step_size = StepSize::Adaptive(controller);
                     return Ok(Advance { taken: Taken { effort, ..taken }, h, time });
@@ -419,13 +421,15 @@ impl<'a, F: Flow, M: Stepper<F>> Steps<'a, F, M> {
                 }
                 (Some(taken), Some(error)) if error <= 1.0 => {
                     controller.pace.accept(&rule, h, error);
-                    self.memory = memory;
+                    let before = std::mem::replace(&mut self.memory, memory);
+                    self.memory.reuse(before);
                     let time = if last { target } else { time + h };
                     self.progress.step_size = StepSize::Adaptive(controller);
                     return Ok(Advance { taken: Taken { effort, ..taken }, h, time });
                 }
                 (_, error) => {
                     controller.pace.reject(&rule, h, error);
+                    self.memory.reuse(memory);
                     self.certificate.rejected += 1;
                 }
             }

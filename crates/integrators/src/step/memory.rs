@@ -1,5 +1,6 @@
 //! The memory of a method, which a checkpoint saves.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::fmt::Debug;
 
@@ -15,6 +16,16 @@ pub trait Memory: Clone + Debug + Default {
     #[must_use]
     fn restarted(&self) -> Self {
         Self::default()
+    }
+
+    /// Takes over the room of another memory, which needs it no more. No number of a step depends on it.
+    fn take_room(&mut self, from: &mut Self) {
+        let _ = from;
+    }
+
+    /// Keeps the room of a memory that is given up. No number of a step depends on it.
+    fn reuse(&mut self, given_up: Self) {
+        let _ = given_up;
     }
 
     /// Notes what a try that was refused has left in its own copy of this memory.
@@ -44,15 +55,55 @@ impl Memory for () {
     }
 }
 
+/// Lists for which there is room at first.
+const LISTS: usize = 16;
+
 /// The numbers that a method keeps from one step to the next, in named lists.
 #[derive(Clone, Debug, Default, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Saved(BTreeMap<String, Vec<Exact>>);
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(from = "BTreeMap<String, Vec<Exact>>", into = "BTreeMap<String, Vec<Exact>>")
+)]
+pub struct Saved {
+    /// Sorted by their names. A short run ends with a checkpoint too, and this costs less than a tree.
+    lists: Vec<(Cow<'static, str>, Vec<Exact>)>,
+}
+
+impl From<BTreeMap<String, Vec<Exact>>> for Saved {
+    fn from(lists: BTreeMap<String, Vec<Exact>>) -> Self {
+        Self { lists: lists.into_iter().map(|(name, list)| (name.into(), list)).collect() }
+    }
+}
+
+impl From<Saved> for BTreeMap<String, Vec<Exact>> {
+    fn from(saved: Saved) -> Self {
+        saved.lists.into_iter().map(|(name, list)| (name.into_owned(), list)).collect()
+    }
+}
 
 impl Saved {
     /// Puts a list under a name.
-    pub fn put(&mut self, name: &str, numbers: impl IntoIterator<Item = f64>) {
-        self.0.insert(name.to_owned(), numbers.into_iter().map(Exact).collect());
+    pub fn put(
+        &mut self,
+        name: impl Into<Cow<'static, str>>,
+        numbers: impl IntoIterator<Item = f64>,
+    ) {
+        let (name, list) = (name.into(), numbers.into_iter().map(Exact).collect());
+        match self.place_of(&name) {
+            Ok(known) => self.lists[known].1 = list,
+            Err(place) => {
+                if self.lists.is_empty() {
+                    self.lists.reserve(LISTS);
+                }
+                self.lists.insert(place, (name, list));
+            }
+        }
+    }
+
+    /// The place of a name in the list, or the one where it would be.
+    fn place_of(&self, name: &str) -> Result<usize, usize> {
+        self.lists.binary_search_by(|(known, _)| known.as_ref().cmp(name))
     }
 
     /// The list under a name; `None` if it was not put.
@@ -77,7 +128,8 @@ impl Saved {
     ///
     /// [`RestoreError`] if it has a number that is not finite.
     pub fn list(&self, name: &'static str) -> Result<Option<Vec<f64>>, RestoreError> {
-        let Some(list) = self.0.get(name) else { return Ok(None) };
+        let Ok(place) = self.place_of(name) else { return Ok(None) };
+        let list = &self.lists[place].1;
         match list.iter().find(|number| !number.0.is_finite()) {
             Some(number) => Err(RestoreError::Damaged { what: name, value: number.0 }),
             None => Ok(Some(list.iter().map(|number| number.0).collect())),

@@ -8,8 +8,10 @@ use super::{Laws, StepStart};
 /// The dimension of the manifold of a system.
 pub(crate) type Dim<Y> = <<Y as Metriplectic>::Manifold as Space>::Dim;
 
+pub(crate) use metriplectic_dynamics::metriplectic::CountOf;
+
 /// A number for each further invariant of a system.
-pub type Numbers<Y> = <<<Y as Metriplectic>::Manifold as Space>::Dim as Dimension>::Array<f64>;
+pub type Numbers<Y> = <CountOf<Y> as Dimension>::Array<f64>;
 
 /// Corrections of the errors of earlier steps: the numbers `φe` in `⟨w, d⟩ = F(x') − F(x) + φe`.
 pub(crate) type DriftCorrection<Y> = Laws<Numbers<Y>>;
@@ -44,7 +46,7 @@ impl<'a, Y: Metriplectic> Start<'a, Y> {
         Laws {
             energy: values.energy - reference.energy,
             entropy: values.entropy - reference.entropy,
-            invariants: Dim::<Y>::array(|k| values.invariants[k] - reference.invariants[k]),
+            invariants: CountOf::<Y>::array(|k| values.invariants[k] - reference.invariants[k]),
         }
     }
 }

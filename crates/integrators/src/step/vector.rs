@@ -177,4 +177,54 @@ impl<V: Column<f64>> Vector for Components<V> {
     fn with(&self, number: impl FnMut(usize) -> f64) -> Self {
         Self(V::from_index(number))
     }
+
+    #[inline(always)]
+    fn combination<'a>(h: f64, count: usize, term: impl Fn(usize) -> (f64, &'a Self)) -> Self
+    where
+        Self: 'a,
+    {
+        let (w, first) = term(0);
+        let mut sum = first.0 * w;
+        for j in 1..count {
+            let (w, v) = term(j);
+            sum += v.0 * w;
+        }
+        Self(sum * h)
+    }
+
+    /// The same bits as the default, with each ratio taken once.
+    #[inline]
+    fn relative_to(&self, sizes: &Self) -> f64 {
+        let ratio = |i| if self.0[i] == 0.0 { 0.0 } else { (self.0[i] / sizes.0[i]).abs() };
+        norm(&V::from_index(ratio))
+    }
+
+    /// The same bits as the default, which divides by one.
+    #[inline]
+    fn norm_of<const K: usize>(vectors: [&Self; K], f: impl Fn([f64; K]) -> f64 + Sync) -> f64 {
+        norm(&V::from_index(|i| f(vectors.map(|v| v.0[i])).abs()))
+    }
+}
+
+/// The Euclidean norm of numbers that are not negative; NaN if one is.
+#[inline]
+fn norm<V: Column<f64>>(ratios: &V) -> f64 {
+    let (mut largest, mut check) = (0.0, 0.0);
+    for i in 0..V::LEN {
+        check += ratios[i];
+        largest = f64::max(largest, ratios[i]);
+    }
+    if check.is_nan() {
+        return f64::NAN;
+    }
+    if largest > 0.0 && largest.is_finite() {
+        let unit = largest.recip();
+        let mut sum = 0.0;
+        for i in 0..V::LEN {
+            sum += (ratios[i] * unit) * (ratios[i] * unit);
+        }
+        largest * sum.sqrt()
+    } else {
+        largest
+    }
 }

@@ -12,11 +12,11 @@
 //! shows deviations down to `ε`.
 
 use metriplectic_dynamics::velocity::differentials;
-use metriplectic_dynamics::{Metriplectic, system::Point};
+use metriplectic_dynamics::{Invariants as _, Metriplectic, system::Point};
 use metriplectic_fields::{ChartPoint, Column, Dimension, Space, Vector};
 use metriplectic_manifolds::Manifold;
 
-use crate::step::Dim;
+use crate::step::CountOf;
 
 /// The independent fraction of a differential below which it is a combination of others.
 pub(super) const INDEPENDENT: f64 = 1e-10;
@@ -57,17 +57,18 @@ pub(super) fn falls<Y: Metriplectic>(system: &Y, x: &Point<Y>, y: &Point<Y>) -> 
         Along { w, terms: w[1].abs(), hat, square: hat.dot(&hat) }
     };
     let energy = law([start.energy, middle.energy, end.energy]);
-    let mut listed = Dim::<Y>::array(|_| None);
-    let independent = |whole: Along<_>, listed: &<Dim<Y> as Dimension>::Array<Option<Along<_>>>| {
-        // The second pass removes the rounding error of the first.
-        let mut rest = whole;
-        for _ in 0..2 {
-            let before = std::iter::once(&energy).chain(listed.as_ref().iter().flatten());
-            rest = before.filter(|law| law.square > 0.0).fold(rest, Along::without);
-        }
-        rest
-    };
-    for k in 0..Dim::<Y>::LEN {
+    let mut listed = CountOf::<Y>::array(|_| None);
+    let independent =
+        |whole: Along<_>, listed: &<CountOf<Y> as Dimension>::Array<Option<Along<_>>>| {
+            // The second pass removes the rounding error of the first.
+            let mut rest = whole;
+            for _ in 0..2 {
+                let before = std::iter::once(&energy).chain(listed.as_ref().iter().flatten());
+                rest = before.filter(|law| law.square > 0.0).fold(rest, Along::without);
+            }
+            rest
+        };
+    for k in 0..Y::Invariants::COUNT {
         let all = [&start, &middle, &end].map(|w| w.invariants[k].map(|(_, l)| l));
         let [Some(before), Some(between), Some(after)] = all else { break };
         let whole = law([before, between, after]);

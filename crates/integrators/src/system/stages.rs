@@ -1,7 +1,7 @@
 //! A metriplectic system as a flow for explicit methods.
 
 use metriplectic_dynamics::velocity::{Covectors, Gradient, irreversible};
-use metriplectic_dynamics::{Bracket, Metriplectic, SecondLaw, system::Point};
+use metriplectic_dynamics::{Bracket, Invariants, Metriplectic, SecondLaw, system::Point};
 use metriplectic_fields::{
     ChartPoint, Column, Dimension, Jet1, ScalarField, Space, Vector, power_of_two,
 };
@@ -9,7 +9,7 @@ use metriplectic_manifolds::Manifold;
 
 use super::referred_rise::{self, INDEPENDENT};
 use crate::explicit::{Projected, ProjectionError, StageFlow, Target};
-use crate::step::{Components, Dim, Laws, Numbers};
+use crate::step::{Components, CountOf, Dim, Laws, Numbers};
 
 type Tangent<Y> = Components<Vector<<Y as Metriplectic>::Manifold>>;
 
@@ -35,15 +35,21 @@ impl<M: Space> Gradient<M> for Jets<'_, M> {
 
 /// The laws of a system at a point, with their differentials.
 #[derive(Clone, Copy, Debug)]
-pub struct LawJets<N: Dimension> {
-    values: Laws<N::Array<f64>>,
+pub struct LawJets<N: Dimension, C: Dimension> {
+    values: Laws<C::Array<f64>>,
     /// The differentials.
-    w: Covectors<N, N::Vector<f64>>,
+    w: Covectors<C, N::Vector<f64>>,
 }
 
-impl<N: Dimension> LawJets<N> {
+/// The laws of a system with their differentials.
+pub(crate) type JetsOf<Y> = LawJets<Dim<Y>, CountOf<Y>>;
+
+impl<N: Dimension, C: Dimension> LawJets<N, C> {
     #[inline]
-    fn at<Y: Metriplectic<Manifold: Space<Dim = N>>>(system: &Y, x: &Point<Y>) -> Self {
+    fn at<Y>(system: &Y, x: &Point<Y>) -> Self
+    where
+        Y: Metriplectic<Manifold: Space<Dim = N>, Invariants: Invariants<Y::Manifold, Count = C>>,
+    {
         let mut jets = Jets::<Y::Manifold>(x);
         let laws = [jets.of(system.energy()), jets.of(system.entropy())];
         let jets = Covectors::new(laws, system.invariants(), &mut jets);
@@ -51,54 +57,51 @@ impl<N: Dimension> LawJets<N> {
         let values = Laws {
             energy: jets.energy.value,
             entropy: jets.entropy.value,
-            invariants: N::array(|k| listed[k].map_or(0.0, |(_, l)| l.value)),
+            invariants: C::array(|k| listed[k].map_or(0.0, |(_, l)| l.value)),
         };
-        let invariants = N::array(|k| listed[k].map(|(kind, l)| (kind, l.df)));
+        let invariants = C::array(|k| listed[k].map(|(kind, l)| (kind, l.df)));
         let w = Covectors { energy: jets.energy.df, entropy: jets.entropy.df, invariants };
         Self { values, w }
     }
 
     /// The values of the laws.
-    pub(crate) const fn values(&self) -> Laws<N::Array<f64>> {
+    pub(crate) const fn values(&self) -> Laws<C::Array<f64>> {
         self.values
     }
 
     /// The differentials of the laws.
-    pub(crate) const fn covectors(&self) -> &Covectors<N, N::Vector<f64>> {
+    pub(crate) const fn covectors(&self) -> &Covectors<C, N::Vector<f64>> {
         &self.w
     }
 
     fn is_finite(&self) -> bool {
         let Self { values, w } = self;
-        let mut listed = w.invariants.as_ref().iter().flatten().zip(values.invariants.as_ref());
-        values.energy.is_finite()
-            && values.entropy.is_finite()
-            && w.energy.is_finite()
-            && w.entropy.is_finite()
-            && listed.all(|((_, l), value)| l.is_finite() && value.is_finite())
+        let listed = w.invariants.as_ref().iter().flatten().zip(values.invariants.as_ref());
+        // Zero if all of it is finite, and NaN otherwise.
+        let of = |value: f64, w: &N::Vector<f64>| {
+            (0..N::LEN).fold(0.0 * value, |sum, i| sum + 0.0 * w[i])
+        };
+        let laws = of(values.energy, &w.energy) + of(values.entropy, &w.entropy);
+        listed.fold(laws, |sum, ((_, l), &value)| sum + of(value, l)) == 0.0
     }
 }
 
 impl<Y: Metriplectic> StageFlow for Y {
-    type Gradients = LawJets<Dim<Y>>;
+    type Gradients = JetsOf<Y>;
 
     #[inline]
-    fn gradients(&self, x: &Point<Y>) -> Option<LawJets<Dim<Y>>> {
+    fn gradients(&self, x: &Point<Y>) -> Option<JetsOf<Y>> {
         let jets = LawJets::at(self, x);
         jets.is_finite().then_some(jets)
     }
 
     #[inline]
-    fn values(&self, gradients: &LawJets<Dim<Y>>) -> Laws<Numbers<Y>> {
+    fn values(&self, gradients: &JetsOf<Y>) -> Laws<Numbers<Y>> {
         gradients.values
     }
 
     #[inline]
-    fn velocity(
-        &self,
-        x: &Point<Y>,
-        LawJets { w, .. }: &LawJets<Dim<Y>>,
-    ) -> Option<(Tangent<Y>, f64)> {
+    fn velocity(&self, x: &Point<Y>, LawJets { w, .. }: &JetsOf<Y>) -> Option<(Tangent<Y>, f64)> {
         let x = ChartPoint::<Y::Manifold>::centre(x);
         let g = self.metric_at(&x);
         let reversible =
@@ -177,9 +180,9 @@ impl<V> Normal<V> {
 }
 
 /// The laws of a system at a point, made independent of each other.
-struct Normals<N: Dimension> {
+struct Normals<N: Dimension, C: Dimension> {
     energy: Normal<N::Vector<f64>>,
-    invariants: N::Array<Option<Normal<N::Vector<f64>>>>,
+    invariants: C::Array<Option<Normal<N::Vector<f64>>>>,
     entropy: Option<Normal<N::Vector<f64>>>,
     /// The residual of the entropy in units of its round-off, whatever it depends on.
     off: f64,
@@ -267,10 +270,10 @@ impl<Y: Metriplectic> Projection<'_, Y> {
 
     fn normals(
         &self,
-        LawJets { values, w }: &LawJets<Dim<Y>>,
+        LawJets { values, w }: &JetsOf<Y>,
         scales: &Vector<Y::Manifold>,
         units: &Vector<Y::Manifold>,
-    ) -> Normals<Dim<Y>> {
+    ) -> Normals<Dim<Y>, CountOf<Y>> {
         let laws = self.target.laws;
         let normal = |w: &Vector<Y::Manifold>, target: f64, value: f64| {
             let whole = Vector::<Y::Manifold>::from_index(|i| units[i] * w[i]);
@@ -288,9 +291,9 @@ impl<Y: Metriplectic> Projection<'_, Y> {
             }
         };
         let energy = normal(&w.energy, laws.energy, values.energy);
-        let mut normals = Normals::<Dim<Y>> {
+        let mut normals = Normals::<Dim<Y>, CountOf<Y>> {
             energy: Normal { dependent: energy.square == 0.0, ..energy },
-            invariants: Dim::<Y>::array(|_| None),
+            invariants: CountOf::<Y>::array(|_| None),
             entropy: None,
             off: 0.0,
         };
@@ -313,7 +316,7 @@ fn in_units<V: Column<f64>>(v: &V, units: &V) -> V {
     V::from_index(|i| if v[i] == 0.0 { 0.0 } else { v[i] / units[i] })
 }
 
-impl<N: Dimension> Normals<N> {
+impl<N: Dimension, C: Dimension> Normals<N, C> {
     fn enter(&mut self, k: usize, whole: Normal<N::Vector<f64>>) {
         let independent = self.independent(whole);
         self.invariants[k] = Some(independent);
@@ -380,12 +383,15 @@ impl<N: Dimension> Normals<N> {
             })
     }
 
-    fn projected<Y: Metriplectic<Manifold: Space<Dim = N>>>(
+    fn projected<Y>(
         &self,
         x: Point<Y>,
-        gradients: LawJets<N>,
+        gradients: JetsOf<Y>,
         target: &Target<'_, Y>,
-    ) -> Projected<Y> {
+    ) -> Projected<Y>
+    where
+        Y: Metriplectic<Manifold: Space<Dim = N>, Invariants: Invariants<Y::Manifold, Count = C>>,
+    {
         let (residual, entropy_round_off) = self.entropy.map_or((0.0, 0.0), |entropy| {
             (entropy.residual * entropy.factor, entropy.round_off * entropy.factor)
         });

@@ -6,7 +6,7 @@ use metriplectic_fields::{
     Column as _, Dimension as _, Jet1, Matrix, ScalarField, Space, Square as _, Vector,
 };
 
-use crate::step::Dim;
+use crate::step::{CountOf, Dim};
 
 /// A law at the start of a run, with its derivatives along the start and the parameters.
 #[derive(Clone, Copy, Debug)]
@@ -69,7 +69,7 @@ impl<M: Space> Gradient<M> for First<'_, M> {
 pub(crate) fn jets<Y: Metriplectic>(
     system: &Y,
     x: &Point<Y>,
-) -> Covectors<Dim<Y>, Jet1<Y::Manifold>> {
+) -> Covectors<CountOf<Y>, Jet1<Y::Manifold>> {
     let mut first = First::<Y::Manifold>(x);
     let laws = [first.of(system.energy()), first.of(system.entropy())];
     Covectors::new(laws, system.invariants(), &mut first)

@@ -7,7 +7,7 @@ use metriplectic_fields::{
 };
 use num_dual::Dual64;
 
-use crate::step::Dim;
+use crate::step::CountOf;
 
 /// Components with one derivative each.
 pub(super) type Dual<Y> = Vector<<Y as Metriplectic>::Manifold, Dual64>;
@@ -19,7 +19,7 @@ pub(super) type Numbers = Vec<Dual64>;
 #[derive(Debug)]
 pub(super) struct Fields<Y: Metriplectic> {
     pub(super) y: Point<Y>,
-    pub(super) jets: Covectors<Dim<Y>, Jet2<Y::Manifold>>,
+    pub(super) jets: Covectors<CountOf<Y>, Jet2<Y::Manifold>>,
 }
 
 /// The jets of all fields at a point.
@@ -57,12 +57,12 @@ impl<Y: Metriplectic> Fields<Y> {
     }
 
     /// The differentials along `δ`.
-    fn covectors(&self, delta: &Vector<Y::Manifold>) -> Covectors<Dim<Y>, Dual<Y>> {
+    fn covectors(&self, delta: &Vector<Y::Manifold>) -> Covectors<CountOf<Y>, Dual<Y>> {
         let listed = self.jets.invariants.as_ref();
         Covectors {
             energy: along::<Y>(&self.jets.energy, delta).1,
             entropy: along::<Y>(&self.jets.entropy, delta).1,
-            invariants: Dim::<Y>::array(|k| {
+            invariants: CountOf::<Y>::array(|k| {
                 listed[k].map(|(kind, jet)| (kind, along::<Y>(&jet, delta).1))
             }),
         }

@@ -175,7 +175,7 @@ fn energy10(x: &State10) -> Real {
 /// The eigenvalues `±iλ₁, ±iλ₂` of `X` become equal, or one of them zero.
 #[test]
 fn a_quartic_casimir_of_so5_becomes_dependent_without_an_error() {
-    let start = SVector::from([0.3, -0.2, 0.9, 0.1, 0.8, 0.4, -0.5, 0.2, 0.6, -0.1]) * 0.7;
+    let start = start10();
     let (u, v) = ([0.3, -0.2, 0.9, 0.1, 0.8], [0.4, -0.5, 0.2, 0.6, -0.1]);
     let plane = SVector::from(planes().map(|(i, j)| u[i] * v[j] - u[j] * v[i]));
     let cases: [(&str, Field10, Field10, SVector<f64, 10>); 5] = [
@@ -186,12 +186,7 @@ fn a_quartic_casimir_of_so5_becomes_dependent_without_an_error() {
         ("S = tr X⁴, λ₂ = 0", quartic, square10, plane),
     ];
     for (name, entropy, casimir, start) in cases {
-        let system = System::on(so5())
-            .energy(energy10 as Field10)
-            .entropy(entropy)
-            .casimir(casimir)
-            .build()
-            .unwrap();
+        let system = on_so5(entropy, casimir);
         for per_unit in [5_u16, 10, 20] {
             let h = f64::from(per_unit).recip();
             let span = Span::steps(h, 100 * usize::from(per_unit));
@@ -201,25 +196,40 @@ fn a_quartic_casimir_of_so5_becomes_dependent_without_an_error() {
     }
 }
 
+/// A start on so(5)*.
+fn start10() -> SVector<f64, 10> {
+    SVector::from([0.3, -0.2, 0.9, 0.1, 0.8, 0.4, -0.5, 0.2, 0.6, -0.1]) * 0.7
+}
+
+/// Entropies, and their largest values on the orbits of a sphere.
+fn largest_entropies(start: &SVector<f64, 10>) -> [(&'static str, Field10, f64); 2] {
+    let square = start.norm_squared();
+    [
+        ("S = tr X⁴", quartic, 2.0 * square * square),
+        ("S = −tr X⁴", |x| -quartic(x), -square * square),
+    ]
+}
+
+fn on_so5(
+    entropy: Field10,
+    casimir: Field10,
+) -> impl Metriplectic<Manifold = LieDual<10>, Metric = Canonical> {
+    System::on(so5())
+        .energy(energy10 as Field10)
+        .entropy(entropy)
+        .casimir(casimir)
+        .build()
+        .expect("it is a system")
+}
+
 /// `dS` becomes a multiple of `dC`, where the projection of the midpoint rule fades out. The Casimir stays at round-off,
 /// and the entropy below its largest value on the orbit, at which order 8 ends: `tr X⁴/|x|⁴` is at most 1/2, with
 /// equality where an eigenvalue is zero, and at least 1/4.
 #[test]
 fn a_casimir_of_so5_stays_where_the_entropy_depends_on_it() {
-    let start: SVector<f64, 10> =
-        SVector::from([0.3, -0.2, 0.9, 0.1, 0.8, 0.4, -0.5, 0.2, 0.6, -0.1]) * 0.7;
-    let square = start.norm_squared();
-    let cases: [(&str, Field10, f64); 2] = [
-        ("S = tr X⁴", quartic, 2.0 * square * square),
-        ("S = −tr X⁴", |x| -quartic(x), -square * square),
-    ];
-    for (name, entropy, largest) in cases {
-        let system = System::on(so5())
-            .energy(energy10 as Field10)
-            .entropy(entropy)
-            .casimir(square10 as Field10)
-            .build()
-            .unwrap();
+    let start = start10();
+    for (name, entropy, largest) in largest_entropies(&start) {
+        let system = on_so5(entropy, square10);
         for (h, count) in [(0.2, 500), (0.1, 3000), (0.05, 2000)] {
             let run = WeylMidpoint.run(&system, start, Span::steps(h, count)).unwrap();
             let (certificate, end) = (run.certificate(), run.last().entropy);
@@ -274,20 +284,9 @@ fn other_methods_keep_a_casimir_of_so5_or_end_in_an_error() {
             assert!(c.min_entropy_increment >= -round_off, "{name}, {method:?}: {c}");
         }
     }
-    let start: SVector<f64, 10> =
-        SVector::from([0.3, -0.2, 0.9, 0.1, 0.8, 0.4, -0.5, 0.2, 0.6, -0.1]) * 0.7;
-    let square = start.norm_squared();
-    let cases: [(&str, Field10, f64); 2] = [
-        ("S = tr X⁴", quartic, 2.0 * square * square),
-        ("S = −tr X⁴", |x| -quartic(x), -square * square),
-    ];
-    for (name, entropy, largest) in cases {
-        let system = System::on(so5())
-            .energy(energy10 as Field10)
-            .entropy(entropy)
-            .casimir(square10 as Field10)
-            .build()
-            .unwrap();
+    let start = start10();
+    for (name, entropy, largest) in largest_entropies(&start) {
+        let system = on_so5(entropy, square10);
         kept(name, Gauss::<2>, &system, start, largest);
         kept(name, Radau::<3>, &system, start, largest);
         kept(name, DormandPrince5, &system, start, largest);

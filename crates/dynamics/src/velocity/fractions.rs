@@ -8,7 +8,7 @@ use metriplectic_fields::Vector;
 use super::covectors::{Place, differentials};
 use super::plan::ProjectionPlan;
 use crate::bracket::Bracket;
-use crate::invariants::Kind;
+use crate::invariants::{Invariants, Kind};
 use crate::metriplectic::{Dim, Metriplectic, SecondLaw};
 use crate::orthogonal::{InUnits, Orthogonal};
 use crate::verify::sampling::CoordinateScales;
@@ -16,6 +16,9 @@ use crate::verify::sampling::CoordinateScales;
 /// Computes for each further invariant the smallest fraction of its differential at `x` that is independent of
 /// the differentials of the other fields in its projections.
 pub fn independence<Y: Metriplectic + ?Sized>(system: &Y, x: &Place<Y, f64>) -> Vec<f64> {
+    if Y::Invariants::COUNT == 0 {
+        return Vec::new();
+    }
     let (w, g) = (differentials(system, x), units_at(system, x));
     let (mut casimirs, mut all) =
         (Orthogonal::<Dim<Y>>::default(), Orthogonal::<Dim<Y>>::default());
@@ -46,6 +49,9 @@ pub fn independence<Y: Metriplectic + ?Sized>(system: &Y, x: &Place<Y, f64>) -> 
 /// [`independence`] also includes fractions beside the entropy *and* the energy. These vanish at every
 /// equilibrium without an effect on a step.
 pub fn projected_fractions<Y: Metriplectic + ?Sized>(system: &Y, x: &Place<Y, f64>) -> Vec<f64> {
+    if Y::Invariants::COUNT == 0 {
+        return Vec::new();
+    }
     let (w, g) = (differentials(system, x), units_at(system, x));
     let mut bracket = Orthogonal::<Dim<Y>>::default();
     if ProjectionPlan::of(system, &w).entropy {

@@ -827,8 +827,10 @@ fn the_loops_of_a_spin_have_the_work_of_the_field_as_heat() {
 #[test]
 fn the_wheels_stop_the_satellite_and_keep_its_momentum() {
     let report = json(&example("reaction_wheels", &["--json"]));
-    let ([energy, _, _], state) = certified(&report);
-    assert!(energy <= 2e-14, "{report}");
+    let (_, state) = certified(&report);
+    // Rounding is that of the energy that the motors have brought in.
+    let most = figure(&report, "initial_energy") + figure(&report, "work");
+    assert!(figure(&report, "max_energy_error") <= 4.0 * f64::EPSILON * most, "{report}");
     let momentum = state[..3].iter().map(|l| l * l).sum::<f64>();
     assert!((momentum - 1.42).abs() < 1e-13 && figure(&report, "speed") < 0.05, "{report}");
 }

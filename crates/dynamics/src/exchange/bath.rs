@@ -14,10 +14,10 @@ use crate::dissipation::along_velocities;
 /// ```
 /// use metriplectic_dynamics::exchange::{Bath, Contact};
 /// use metriplectic_fields::Real;
-/// use nalgebra::{Vector2, vector};
+/// use nalgebra::Vector2;
 /// // Air at 300 K that slows the second entry down, a momentum: R = γ on it.
 /// let air = Bath::at(300.0).friction(|_t: Real, _x: &Vector2<Real>, _w: &Vector2<Real>| {
-///     [Contact { rate: 0.08.into(), along: vector![0.0.into(), 1.0.into()] }]
+///     [Contact { rate: Real::from(0.08), along: Vector2::<Real>::y() }]
 /// });
 /// // A room whose temperature changes, and `R = rate · g⁻¹` with the metric of the system.
 /// let room = Bath::in_time(|t| 290.0 + 5.0 * (0.26 * t).sin()).isotropic(0.1);

@@ -59,6 +59,7 @@ fn main() {
     let [short, long] = [20, 2000].map(of_run);
     println!("{short} blocks in a run of 20 steps, {long} in one of 2000");
     assert_eq!(short, long);
+    assert!(short <= 30, "{short}");
 
     let top = System::on(LieDual::se3())
         .energy(|x: &Vector6<Real>| {

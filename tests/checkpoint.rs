@@ -299,7 +299,7 @@ fn a_file_of_another_version_is_known_by_its_version_alone() {
         (5, r#"{"version":5,"step":0,"start":"0.0","point":["0.0","0.5","0.5"],"balance":{}}"#),
         (6, &first),
         (6, &sixth.to_string()),
-        (9, r#"{"step":{"taken":0},"version":9}"#),
+        (10, r#"{"step":{"taken":0},"version":10}"#),
         (4, r#"{"version":4}"#),
         (6, &format!("[6,{}]", sixth["run"])),
     ] {

@@ -150,6 +150,25 @@ fn is_a_method<Y: Metriplectic>(
     }
 }
 
+/// The rows of order 5 and 8 without their dense output: they are read as those of any other tableau.
+const READ: [Tableau; 2] =
+    [DormandPrince5::TABLEAU.dense(&[], &[]), DormandPrince8::TABLEAU.dense(&[], &[])];
+
+#[test]
+fn rows_that_are_compiled_as_constants_give_the_bits_of_rows_that_are_read() {
+    let (body, start) = (models::relaxing_body(), models::UNSTABLE);
+    let span = || Span::until(40.0).tolerance(1e-7);
+    let compiled = [
+        DormandPrince5.run(&body, start, span()).expect("it runs"),
+        DormandPrince8.run(&body, start, span()).expect("it runs"),
+    ];
+    for (run, tableau) in compiled.iter().zip(&READ) {
+        let read = ExplicitRungeKutta::new(tableau).run(&body, start, span()).expect("it runs");
+        assert!(run.certificate().steps > 20);
+        assert_eq!(run.states(), read.states(), "{}", tableau.name());
+    }
+}
+
 #[test]
 fn two_tableaus_of_one_name_are_two_methods() {
     const STAGES: &[Row] = &[&[(0, 0.5)], &[(0, -1.0), (1, 2.0)]];

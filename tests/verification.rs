@@ -5,9 +5,10 @@ mod models;
 mod stages;
 
 use std::cell::Cell;
+use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
 use metriplectic::dynamics::Report;
-use metriplectic::integrators::{RunError, Schedule};
+use metriplectic::integrators::{Flow as _, Recheck, RunError, Schedule};
 use metriplectic::prelude::*;
 use models::{half_square, kinetic};
 
@@ -845,6 +846,9 @@ fn a_lost_derivative_is_found_in_runs_of_a_verified_system() {
     }
 }
 
+/// The steps from one check to the next; the test of the costs counts the states that are checked.
+const EVERY: usize = 149;
+
 /// A first look at derivatives costs a few evaluations, also of models whose differences are bad.
 #[test]
 fn checks_on_the_way_cost_a_hundredth_of_a_long_run() {
@@ -872,7 +876,7 @@ fn checks_on_the_way_cost_a_hundredth_of_a_long_run() {
             (calls.get() - before, checked)
         };
         let (short, few) = since(1000);
-        let (long, many) = since(9900);
+        let (long, many) = since(1000 + 100 * EVERY);
         let fraction = of_a_check * (many - few) as f64 / (long - short) as f64;
         println!("{name}: {of_a_check} calls at each of {} states, {fraction:.4}", many - few);
         assert_eq!(many - few, 100, "{name}");
@@ -887,9 +891,59 @@ fn checks_on_the_way_cost_a_hundredth_of_a_long_run() {
         let run = DormandPrince5.run(&body, start, span(count)).unwrap();
         run.certificate().checked_states
     });
+    cost("order 8", &|count| {
+        let run = DormandPrince8.run(&body, start, span(count)).unwrap();
+        run.certificate().checked_states
+    });
+    cost("Chebyshev", &|count| {
+        let run = RungeKuttaChebyshev.run(&body, start, span(count)).unwrap();
+        run.certificate().checked_states
+    });
+    cost("Gauss", &|count| {
+        let run = Gauss::<2>.run(&body, start, span(count)).unwrap();
+        run.certificate().checked_states
+    });
     for (name, fraction) in costs {
-        assert!(fraction < 0.015, "{name}: {fraction}");
+        assert!(fraction < 0.01, "{name}: {fraction}");
     }
+}
+
+#[test]
+fn checks_on_the_way_cost_a_hundredth_of_a_long_run_of_a_lattice() {
+    let calls = AtomicUsize::new(0);
+    let bond = |(x, y): &(Vector2<Real>, Vector2<Real>)| {
+        calls.fetch_add(1, Relaxed);
+        (y.x - x.x).powi(2) * 0.5
+    };
+    let lattice = Lattice::on(Graph::ring(64), Euclidean::<2>)
+        .bracket(Symplectic)
+        .energy(|x: &Vector2<Real>| x.y * x.y * 0.5)
+        .bond_energy(bond)
+        .build()
+        .unwrap();
+    let start = lattice.points(|site| vector![(site as f64).sin(), 0.0]);
+    let since = |f: &dyn Fn() -> usize| {
+        let before = calls.load(Relaxed);
+        let checked = f();
+        (calls.load(Relaxed) - before, checked)
+    };
+    let (all, _) = since(&|| {
+        for step in 0..64 {
+            lattice.reexamine(&start, Recheck::OnTheWay { step }).unwrap();
+        }
+        0
+    });
+    // No state is checked between these steps.
+    let run = |count| {
+        let run = DormandPrince5.run(&lattice, start.clone(), Span::steps(0.05, count)).unwrap();
+        run.certificate().checked_states
+    };
+    let [(short, few), (long, many)] = [60, 80].map(|count| since(&|| run(count)));
+    assert_eq!(few, many);
+    let (of_a_check, of_a_step) = (all as f64 / 64.0, (long - short) as f64 / 20.0);
+    let fraction = of_a_check / (EVERY as f64 * of_a_step);
+    println!("{of_a_check} calls of a check, {of_a_step} of a step, {fraction:.4}");
+    assert!(fraction > 0.0 && fraction < 0.01, "{fraction}");
 }
 
 #[test]

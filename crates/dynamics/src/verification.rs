@@ -91,7 +91,7 @@ pub trait Verify<M: Manifold> {
 /// Verification costs as much as some tens of steps, once a run. In a study of many short runs of one
 /// model, it dominates the cost and repeats the same work. A run of a verified system checks the laws at its
 /// start without samples around it: the start lies on the manifold, values and derivatives are finite, and the laws
-/// of a [state](Verify::check_state) hold. It checks them again at its end and after each multiple of 89 steps, with
+/// of a [state](Verify::check_state) hold. It checks them again at its end and after each multiple of 149 steps, with
 /// the [derivatives](Verify::look_at_derivatives) along two directions, and the certificate says that the model was
 /// verified before.
 ///

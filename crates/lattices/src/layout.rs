@@ -336,7 +336,7 @@ impl Part<'_> {
     }
 
     /// Adds the vectors that a bond gives to its two sites: one after the other for each law.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn add<V: Column<f64>, const LAWS: usize>(
         &mut self,
         [from, to]: [u32; 2],
@@ -361,7 +361,7 @@ impl Part<'_> {
         }
     }
 
-    #[inline]
+    #[inline(always)]
     fn add_here<V: Column<f64>>(&mut self, place: usize, offset: usize, v: &V) {
         let start = place * self.stride + offset;
         let out = &mut self.out[start..start + V::LEN];

@@ -1,7 +1,7 @@
 //! The laws of the closures at a state that a run has reached.
 //!
 //! `Π dS = 0`, `ρ ≥ 0` and `⟨b, dH⟩ = 0` are checked on every site and bond. It costs two evaluations of the velocity,
-//! at each 89th step of six or more evaluations. The derivatives of the closures are compared with their values at some
+//! at each 149th step of six or more evaluations. The derivatives of the closures are compared with their values at some
 //! sites and bonds, at other ones after each step.
 
 use metriplectic_fields::Column;

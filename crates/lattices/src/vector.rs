@@ -194,11 +194,19 @@ impl Vector for SiteVector {
             for (out, v) in out.iter_mut().zip(&v[start..end]) {
                 *out = last * (w * v);
             }
-            for (j, (w, v)) in terms.iter().enumerate().skip(1) {
-                let last = if j + 1 == count { h } else { 1.0 };
-                for (out, v) in out.iter_mut().zip(&v[start..end]) {
-                    *out = last * (*out + w * v);
-                }
+            let mut left = &terms[1..];
+            while let Some((some, rest)) = left.split_first_chunk::<3>() {
+                add(
+                    out,
+                    some.map(|(w, v)| (w, &v[start..end])),
+                    if rest.is_empty() { h } else { 1.0 },
+                );
+                left = rest;
+            }
+            match left {
+                [] => {}
+                [(w, v)] => add(out, [(*w, &v[start..end])], h),
+                [(a, v), (b, w), ..] => add(out, [(*a, &v[start..end]), (*b, &w[start..end])], h),
             }
         })
     }
@@ -270,6 +278,15 @@ impl Vector for SiteVector {
             return Some(Self::same(self.sites, list.to_vec(), &self.pool));
         }
         (list.len() == self.len()).then(|| self.with(|i| list[i]))
+    }
+}
+
+/// Adds a few terms `w_j v_j`, one after the other, and multiplies by a factor, in one pass.
+#[inline]
+fn add<const K: usize>(out: &mut [f64], terms: [(f64, &[f64]); K], factor: f64) {
+    let terms = terms.map(|(w, v)| (w, &v[..out.len()]));
+    for (i, out) in out.iter_mut().enumerate() {
+        *out = factor * terms.iter().fold(*out, |sum, (w, v)| sum + w * v[i]);
     }
 }
 

@@ -2,12 +2,12 @@
 //!
 //! A model that was verified around the start may break its laws elsewhere. Then a method conserves the energy of a
 //! motion that no longer exists. So a run [asks](Flow::recheck) for the laws again: after steps 1, 2, 3, 5, 8, … 55 and
-//! each multiple of 89. It asks at its end and at a state from which a step fails, too. It also asks after the first,
+//! each multiple of 149. It asks at its end and at a state from which a step fails, too. It also asks after the first,
 //! second, fourth, … step that leaves the state where it is. A run of a system that was
 //! [verified before](Flow::is_verified) leaves out the first steps up to 55, so that many short runs are cheap.
-//! A state on the way is checked at about a hundredth of the cost of the steps before it.
+//! A state on the way is checked at less than a hundredth of the cost of the steps before it.
 //!
-//! The numbers depend on nothing but the step, so a run that is resumed checks the same states. 89 has no factor in
+//! The numbers depend on nothing but the step, so a run that is resumed checks the same states. 149 has no factor in
 //! common with the steps of a period that users choose, so the states lie at all phases of an oscillation.
 
 use crate::run::checked::{checked_states, is_due};

@@ -206,7 +206,7 @@ pub trait Flow {
     }
 
     /// Returns whether the model was verified before the run. A run then checks the model at its start, after each
-    /// multiple of 89 steps and at its end, and the certificate says so.
+    /// multiple of 149 steps and at its end, and the certificate says so.
     fn is_verified(&self) -> bool {
         false
     }

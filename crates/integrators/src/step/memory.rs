@@ -59,15 +59,25 @@ impl Memory for () {
 const LISTS: usize = 16;
 
 /// The numbers that a method keeps from one step to the next, in named lists.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default)]
 #[cfg_attr(
     feature = "serde",
     derive(serde::Serialize, serde::Deserialize),
     serde(from = "BTreeMap<String, Vec<Exact>>", into = "BTreeMap<String, Vec<Exact>>")
 )]
 pub struct Saved {
-    /// Sorted by their names. A short run ends with a checkpoint too, and this costs less than a tree.
+    /// In the order in which they were put, which says nothing. A short run ends with a checkpoint too, and a few lists
+    /// cost less than a tree.
     lists: Vec<(Cow<'static, str>, Vec<Exact>)>,
+}
+
+impl PartialEq for Saved {
+    fn eq(&self, other: &Self) -> bool {
+        let is_there = |(name, list): &(Cow<'static, str>, Vec<Exact>)| {
+            other.place_of(name).is_some_and(|place| other.lists[place].1 == *list)
+        };
+        self.lists.len() == other.lists.len() && self.lists.iter().all(is_there)
+    }
 }
 
 impl From<BTreeMap<String, Vec<Exact>>> for Saved {
@@ -91,19 +101,19 @@ impl Saved {
     ) {
         let (name, list) = (name.into(), numbers.into_iter().map(Exact).collect());
         match self.place_of(&name) {
-            Ok(known) => self.lists[known].1 = list,
-            Err(place) => {
+            Some(known) => self.lists[known].1 = list,
+            None => {
                 if self.lists.is_empty() {
                     self.lists.reserve(LISTS);
                 }
-                self.lists.insert(place, (name, list));
+                self.lists.push((name, list));
             }
         }
     }
 
-    /// The place of a name in the list, or the one where it would be.
-    fn place_of(&self, name: &str) -> Result<usize, usize> {
-        self.lists.binary_search_by(|(known, _)| known.as_ref().cmp(name))
+    /// The place of a name in the list.
+    fn place_of(&self, name: &str) -> Option<usize> {
+        self.lists.iter().position(|(known, _)| known == name)
     }
 
     /// The list under a name; `None` if it was not put.
@@ -128,7 +138,7 @@ impl Saved {
     ///
     /// [`RestoreError`] if it has a number that is not finite.
     pub fn list(&self, name: &'static str) -> Result<Option<Vec<f64>>, RestoreError> {
-        let Ok(place) = self.place_of(name) else { return Ok(None) };
+        let Some(place) = self.place_of(name) else { return Ok(None) };
         let list = &self.lists[place].1;
         match list.iter().find(|number| !number.0.is_finite()) {
             Some(number) => Err(RestoreError::Damaged { what: name, value: number.0 }),

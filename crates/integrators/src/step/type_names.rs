@@ -27,9 +27,10 @@ pub(crate) fn name_of<T>() -> String {
 
 /// `a::b::C<d::E>` as `C<E>`.
 fn without_paths(full: &str) -> String {
-    // A type without parameters: its name is what follows the last path.
-    if !['<', '(', '[', '&', ' '].iter().any(|&part| full.contains(part)) {
-        return full.rsplit("::").next().unwrap_or(full).to_owned();
+    // A path alone, which the compiler looks through in blocks of bytes.
+    let in_path = |byte: u8| byte.is_ascii_alphanumeric() | (byte == b'_') | (byte == b':');
+    if full.bytes().fold(true, |path, byte| path & in_path(byte)) {
+        return full.rsplit(':').next().unwrap_or(full).to_owned();
     }
     let (mut name, mut start) = (String::with_capacity(full.len()), 0);
     for (at, byte) in full.bytes().enumerate() {

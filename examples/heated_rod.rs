@@ -21,7 +21,7 @@ const SITES: usize = 400;
 const OVEN: f64 = 2.0;
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let rod = Lattice::on(Graph::grid([SITES], Boundary::Open), Euclidean::<1>)
+    let rod = Lattice::on(Graph::chain(SITES), Euclidean::<1>)
         .energy(|u: &Vector1<Real>| u.x)
         .entropy(|u: &Vector1<Real>| u.x.ln())
         .bond_onsager(|bond| {
@@ -46,11 +46,12 @@ fn main() -> Result<(), Box<dyn Error>> {
     for part in [100, 10, 1] {
         let state = &run.states()[example.steps / part];
         let shown = 0..SITES / 2;
-        let curve = shown.clone().map(|i| (i as f64, state.point.x[i].x)).collect();
+        let curve: Vec<_> = shown.clone().map(|i| (i as f64, state.point.x[i].x)).collect();
         profiles = profiles.line(format!("t = {:.0}", state.time), curve);
         let exact = |i: usize| 1.0 + erfc((i as f64 + 0.5) / (4.0 * state.time).sqrt());
         if part == 1 {
-            profiles = profiles.line("erfc", shown.map(|i| (i as f64, exact(i))).collect());
+            profiles =
+                profiles.line("erfc", shown.map(|i| (i as f64, exact(i))).collect::<Vec<_>>());
         }
     }
     let series = |value: &dyn Fn(&State<_>) -> f64| -> Vec<(f64, f64)> {

@@ -9,7 +9,7 @@ type Mass = Euclidean<2>;
 
 /// Heat in a rod: the energy `u` and the entropy `ln u` of each site, and the flux `v − u` in a bond.
 fn rod(sites: usize) -> Lattice<impl Model<Manifold = Rod>> {
-    Lattice::on(Graph::grid([sites], Boundary::Open), Euclidean::<1>)
+    Lattice::on(Graph::chain(sites), Euclidean::<1>)
         .energy(|u: &Vector1<Real>| u.x)
         .entropy(|u: &Vector1<Real>| u.x.ln())
         .bond_onsager(|bond| {
@@ -116,7 +116,7 @@ fn one_site_is_the_system_that_it_is() {
 fn a_piston_sends_sound_into_a_chain_and_books_its_work() {
     // A piston that pushes the first mass; sites that the sound has not reached keep their bits.
     let n = 2000;
-    let chain = Lattice::on(Graph::grid([n], Boundary::Open), Euclidean::<2>)
+    let chain = Lattice::on(Graph::chain(n), Euclidean::<2>)
         .bracket(Symplectic)
         .energy(|x: &Vector2<Real>| x.y * x.y * 0.5)
         .bond_energy(|(x, y): &(Vector2<Real>, Vector2<Real>)| {

@@ -37,7 +37,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     let about = "A rod that is heated at one end, with the heat and the entropy of the oven.";
     let example = Example::new(about, 1000, 1.0);
     let start = rod.start(rod.lattice().points(|_| vector![1.0]));
-    let span = Span::steps(example.step_size, example.steps);
+    let end = example.steps as f64 * example.step_size;
+    let span = Span::until(end).tolerance(1e-5).output_every(example.step_size);
     let run = RungeKuttaChebyshev.run(&rod, start, span)?;
 
     let last = run.last();

@@ -4,6 +4,7 @@ use crate::round_off::bound::of_a_law;
 use crate::run::certificate::JumpOf;
 use crate::run::controller::StepSize;
 use crate::run::ending::Ending;
+use crate::run::event::Restart;
 use crate::run::jump::{Jump, JumpOn};
 use crate::run::state::State;
 use crate::run::steps::Steps;
@@ -26,7 +27,7 @@ struct Landing<F: Flow> {
 impl<F: Flow, M: Stepper<F>> Steps<'_, F, M> {
     /// The size of a step of one size up to `end`: what a jump has left of it.
     #[inline]
-    pub(super) fn left_of_a_step(&mut self, h: f64, end: f64) -> f64 {
+    pub(super) fn left_of_a_step(&self, h: f64, end: f64) -> f64 {
         let State { step, time, .. } = self.state;
         if time == self.progress.start + step as f64 * h { h } else { end - time }
     }
@@ -74,7 +75,8 @@ impl<F: Flow, M: Stepper<F>> Steps<'_, F, M> {
                 None => after.point.clone(),
             }
         };
-        watching.events.after_jump(&event, &after, with_it, ahead, h);
+        let restart = Restart { state: &after, ahead: &ahead, h };
+        watching.events.after_jump(&event, with_it, &restart);
         self.last_numbers = watching.events.last_numbers(&after);
         event.jump = Some(Jump { after: after.clone(), exchange });
         watching.found.push(event);

@@ -21,7 +21,7 @@ const SITES: usize = 400;
 const OVEN: f64 = 2.0;
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let rod = Lattice::on(Graph::grid([SITES], Boundary::Open), Euclidean::<1>)
+    let rod = Lattice::on(Graph::chain(SITES), Euclidean::<1>)
         .energy(|u: &Vector1<Real>| u.x)
         .entropy(|u: &Vector1<Real>| u.x.ln())
         .bond_onsager(|bond| {
@@ -37,7 +37,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     let about = "A rod that is heated at one end, with the heat and the entropy of the oven.";
     let example = Example::new(about, 1000, 1.0);
     let start = rod.start(rod.lattice().points(|_| vector![1.0]));
-    let span = Span::steps(example.step_size, example.steps);
+    let end = example.steps as f64 * example.step_size;
+    let span = Span::until(end).tolerance(1e-5).output_every(example.step_size);
     let run = RungeKuttaChebyshev.run(&rod, start, span)?;
 
     let last = run.last();
@@ -46,11 +47,12 @@ fn main() -> Result<(), Box<dyn Error>> {
     for part in [100, 10, 1] {
         let state = &run.states()[example.steps / part];
         let shown = 0..SITES / 2;
-        let curve = shown.clone().map(|i| (i as f64, state.point.x[i].x)).collect();
+        let curve: Vec<_> = shown.clone().map(|i| (i as f64, state.point.x[i].x)).collect();
         profiles = profiles.line(format!("t = {:.0}", state.time), curve);
         let exact = |i: usize| 1.0 + erfc((i as f64 + 0.5) / (4.0 * state.time).sqrt());
         if part == 1 {
-            profiles = profiles.line("erfc", shown.map(|i| (i as f64, exact(i))).collect());
+            profiles =
+                profiles.line("erfc", shown.map(|i| (i as f64, exact(i))).collect::<Vec<_>>());
         }
     }
     let series = |value: &dyn Fn(&State<_>) -> f64| -> Vec<(f64, f64)> {

@@ -103,7 +103,8 @@ pub mod prelude {
         Tangents, Trajectory, Until, Watch,
     };
     pub use metriplectic_lattices::{
-        BondState, Boundary, Graph, Lattice, LatticeError, Onsager, Points, Profiles, SiteState,
+        BondState, Boundary, Graph, Lattice, LatticeError, Onsager, OpenLattice, OpenSites, Points,
+        Profiles, SiteState,
     };
     pub use metriplectic_manifolds::{
         Canonical, Cayley, Chart, ChartMidpoint, Euclidean, Exponential, HalfLine, Inert,

@@ -801,6 +801,16 @@ fn a_capacitor_turns_half_of_its_energy_into_heat_each_time() {
 }
 
 #[test]
+fn the_oven_at_the_end_of_a_rod_gives_the_heat_of_the_closed_form() {
+    let report = json(&example("heated_rod", &["--json"]));
+    assert_eq!(report["entropy_falls"], 0);
+    let [heat, exact] = ["heat", "heat_by_the_closed_form"].map(|key| figure(&report, key));
+    // The first seconds are those of sites, and not of a continuous rod.
+    assert!((heat / exact - 1.0).abs() < 1e-2, "{report}");
+    assert!(figure(&report, "heat_less_gain").abs() < 1e-12, "{report}");
+}
+
+#[test]
 fn the_engine_obeys_the_identity_of_its_efficiency_at_each_speed() {
     let report = json(&example("carnot_engine", &["--json"]));
     let list = |key: &str| -> Vec<f64> {

@@ -1,4 +1,16 @@
-//! Traps of open systems: each test fails if its cure is removed.
+//! Traps of open systems. Each cure was removed once, and these tests failed:
+//!
+//! | what was changed | tests that failed |
+//! |---|---|
+//! | the clock is what steps add up, not the time that is recorded | `the_clock_is_no_coordinate`, `a_protocol_that_jumps_has_corners` |
+//! | work of the time is a quadrature, not frozen | `work_of_the_time_moves_no_state_near_rest`, `a_protocol_that_jumps_has_corners` and ten more |
+//! | work of a midpoint step is that at its start alone | `the_state_and_every_entry_of_the_ledger_have_the_order_of_the_method` and eight more |
+//! | a step that is held, or a corner, books no work | `the_time_works_on_a_state_that_no_force_moves`, `a_protocol_that_jumps_has_corners` |
+//! | a midpoint step at rest books nothing | `what_flows_through_a_state_at_rest_is_booked`, `the_time_works_on_a_state_that_no_force_moves` |
+//! | the balance is kept by the sums of the entries, not by one | `what_flows_through_takes_no_digits_of_the_balance` |
+//! | what `Radau` damps is not booked | `a_fast_bath_is_damped_and_its_heat_is_booked`, `curved_spaces_are_driven_as_flat_ones` |
+//! | the entropy of a bath is `−Q/T` in the middle of a step | `a_bath_whose_temperature_changes_books_its_entropy_stage_by_stage` |
+//! | jumps of a protocol are not looked for | `a_protocol_that_jumps_has_corners` |
 
 use metriplectic::prelude::*;
 

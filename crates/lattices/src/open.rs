@@ -37,12 +37,12 @@ pub use vector::OpenSiteVector;
 /// ```
 /// use metriplectic_fields::Real;
 /// use metriplectic_integrators::{DormandPrince5, Method, Span};
-/// use metriplectic_lattices::{Boundary, Graph, Lattice, Onsager, SiteState};
+/// use metriplectic_lattices::{Graph, Lattice, Onsager, SiteState};
 /// use metriplectic_manifolds::Euclidean;
 /// use nalgebra::{Vector1, vector};
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// // Heat in a rod of 20 sites with the energy u and the entropy ln u, whose first site touches a bath at T = 2.
-/// let rod = Lattice::on(Graph::grid([20], Boundary::Open), Euclidean::<1>)
+/// let rod = Lattice::on(Graph::chain(20), Euclidean::<1>)
 ///     .energy(|u: &Vector1<Real>| u.x)
 ///     .entropy(|u: &Vector1<Real>| u.x.ln())
 ///     .bond_onsager(|bond| {

@@ -5,14 +5,11 @@ use metriplectic_dynamics::system::Point;
 use metriplectic_fields::Vector;
 use metriplectic_manifolds::{Manifold as _, Retraction};
 
-use super::equation::Residual;
-use super::fallbacks;
 use super::memory::MemoryOf;
 use super::scheme::Scheme;
-use super::step::{evidence, has_digits};
+use super::step::Solved;
 use crate::discrete_gradient::DiscreteGradient;
 use crate::round_off::compensation::Displaced;
-use crate::round_off::drift;
 use crate::step::failure::{Cause, Fallbacks};
 use crate::step::{Effort, Evidence, Start};
 
@@ -46,18 +43,10 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
         Y: Metriplectic,
         R: Retraction<Y::Manifold, Y::Metric>,
     {
-        let guess = memory.predictor.guess(system, start);
-        let target = drift::target(system, start, &guess);
-        let equation = Residual::of_start(system, self, start, target);
-        let solved =
-            fallbacks::solve(&self.newton, &equation, &guess, &mut memory.jacobian, fallbacks);
-        let (root, effort) =
+        let solved = self.solved(system, start, memory, fallbacks);
+        let Solved { equation, root, effort, evidence } =
             solved.map_err(|failure| (failure.cause, failure.residual, failure.effort))?;
-        let evidence = evidence(&root, memory.friction());
         let failed = |cause| (cause, root.residual, effort);
-        if !has_digits(system, start, &root, evidence.friction) {
-            return Err(failed(Cause::Unsolved));
-        }
         let metric = system.metric();
         let path = self.retraction.real_step_path(metric, start.x, &root.u);
         let z = path.map_err(|_| failed(Cause::Edge))?.z.base;

@@ -16,8 +16,8 @@ use crate::round_off::compensation::Displaced;
 use crate::round_off::drift;
 use crate::step::failure::{Cause, Fallbacks};
 use crate::step::{
-    Dim, Evidence, Flow as _, Laws, Promises, Refusal, Start, StepError, StepStart, Stepper, Taken,
-    name_of,
+    Dim, Effort, Evidence, Flow as _, Laws, Promises, Refusal, Start, StepError, StepStart,
+    Stepper, Taken, name_of,
 };
 
 impl<Y, R, W> Stepper<Y> for Scheme<R, W>
@@ -66,7 +66,40 @@ where
     }
 }
 
+/// A solution of the equation of a step.
+pub(super) struct Solved<'a, Y: Metriplectic, R, W> {
+    pub(super) equation: Residual<'a, Y, R, W>,
+    pub(super) root: Root<Y::Manifold, Dissipated>,
+    pub(super) effort: Effort,
+    pub(super) evidence: Evidence,
+}
+
 impl<R, W: DiscreteGradient> Scheme<R, W> {
+    /// Guess and solve.
+    #[inline]
+    pub(super) fn solved<'a, Y>(
+        &'a self,
+        system: &'a Y,
+        start: &Start<'a, Y>,
+        memory: &mut MemoryOf<Y>,
+        fallbacks: Fallbacks,
+    ) -> Result<Solved<'a, Y, R, W>, StepFailure>
+    where
+        Y: Metriplectic,
+        R: Retraction<Y::Manifold, Y::Metric>,
+    {
+        let guess = memory.predictor.guess(system, start);
+        let target = drift::target(system, start, &guess);
+        let equation = Residual::of_start(system, self, start, target);
+        let (root, effort) =
+            fallbacks::solve(&self.newton, &equation, &guess, &mut memory.jacobian, fallbacks)?;
+        let evidence = evidence(&root, memory.friction());
+        if !has_digits(system, start, &root, evidence.friction) {
+            return Err(StepFailure { residual: root.residual, cause: Cause::Unsolved, effort });
+        }
+        Ok(Solved { equation, root, effort, evidence })
+    }
+
     /// Guess, solve, retract; then the last digits.
     pub(super) fn try_step<Y>(
         &self,
@@ -79,16 +112,9 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
         Y: Metriplectic,
         R: Retraction<Y::Manifold, Y::Metric>,
     {
-        let guess = memory.predictor.guess(system, start);
-        let target = drift::target(system, start, &guess);
-        let equation = Residual::of_start(system, self, start, target);
-        let (root, mut effort) =
-            fallbacks::solve(&self.newton, &equation, &guess, &mut memory.jacobian, fallbacks)?;
-        let evidence = evidence(&root, memory.friction());
+        let Solved { equation, root, mut effort, evidence } =
+            self.solved(system, start, memory, fallbacks)?;
         let failed = |cause, effort| StepFailure { residual: root.residual, cause, effort };
-        if !has_digits(system, start, &root, evidence.friction) {
-            return Err(failed(Cause::Unsolved, effort));
-        }
         if evidence.rests {
             // What the solver found is its own round-off, and following it would make a random walk of
             // the energy.
@@ -148,7 +174,7 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
 }
 
 /// What a solution tells of the motion.
-pub(super) fn evidence<M: Manifold>(root: &Root<M, Dissipated>, friction: f64) -> Evidence {
+fn evidence<M: Manifold>(root: &Root<M, Dissipated>, friction: f64) -> Evidence {
     let rests = (0..Vector::<M>::LEN).all(|i| root.u[i].abs() <= 2.0 * root.round_off[i]);
     let Dissipated { slope_squared, dissipates } = root.evidence;
     Evidence {
@@ -166,7 +192,7 @@ const VERY_STIFF: f64 = 1e8;
 /// Whether the round-off of a solution is small: if friction is so stiff that the slow motion has no digits
 /// beside it, the round-off of the displacement is as large as the displacement, and a state would seem to
 /// rest. It is measured by the energy that goes with it, which has one unit for all components.
-pub(super) fn has_digits<Y: Metriplectic>(
+fn has_digits<Y: Metriplectic>(
     system: &Y,
     start: &Start<'_, Y>,
     Root { u, round_off, .. }: &Root<Y::Manifold, Dissipated>,

@@ -10,8 +10,8 @@
 //! and `Q_b` are the sums `h Σ b_i ⟨w_{H,i}, …⟩`.
 //!
 //! `Radau` corrects the energy where `δ_H > 0` alone. What it loses where it damps, `−δ_H`, is heat of the bath: the balance
-//! stays exact, and the entropy of the bath rises by `−δ_H/T`. Several baths share it in proportion to the heat
-//! `h Σ b_i R_b(dH, dH)` that their friction takes in the step.
+//! stays exact, and the entropy of the bath rises by `−δ_H/T`. Which of several baths it would be is not known, so a system has
+//! one: in proportion to what friction takes at the stages, a slow bath would get most of the heat of a fast one.
 
 use metriplectic_dynamics::exchange::{Entries as _, Exchange};
 use metriplectic_dynamics::{Metriplectic, SecondLaw, VectorField, system::Point};
@@ -158,18 +158,13 @@ where
             entries = X::Entries::from_index(|i| entries.get(i) + weight * rates.get(i));
         }
         if *lost < 0.0 {
-            // What a step has damped is heat of the baths, in proportion to what their friction takes; without friction, in
-            // equal parts.
-            let baths = system.baths(along.time(1.0));
-            let heats: f64 = baths.iter().map(|(heat, _)| entries.get(*heat)).sum();
-            let share =
-                |heat: f64| if heats < 0.0 { heat / heats } else { 1.0 / baths.len() as f64 };
+            // What a step has damped is heat of the only bath.
+            let &[(heat, temperature)] = system.baths(along.time(1.0)).as_slice() else {
+                return None;
+            };
             let mut numbers: Vec<f64> = (0..X::Entries::LEN).map(|i| entries.get(i)).collect();
-            for (heat, temperature) in &baths {
-                let more = lost * share(entries.get(*heat));
-                numbers[*heat] += more;
-                numbers[heat + 1] -= if *temperature > 0.0 { more / temperature } else { 0.0 };
-            }
+            numbers[heat] += lost;
+            numbers[heat + 1] -= if temperature > 0.0 { lost / temperature } else { 0.0 };
             entries = X::Entries::from_index(|i| numbers[i]);
         }
         let ledger = from.ledger.with(&Booked { parameter, entries });
@@ -249,12 +244,12 @@ const HALVES: usize = 10;
 /// Why `Radau` does not take a system.
 #[derive(Clone, Copy, Debug, thiserror::Error)]
 #[error(
-    "`Radau` damps an open system without an entropy of its own and with a bath, to which it gives what it damps; take \
+    "`Radau` damps an open system without an entropy of its own and with one bath, to which it gives what it damps; take \
      `Gauss`, or an explicit method"
 )]
 struct NotDamped;
 
-/// Accepts a system that a method which damps can take: what it damps is heat of its baths.
+/// Accepts a system that a method which damps can take: what it damps is heat of its only bath.
 fn damps<Y, C, X>(
     tableau: &'static Tableau,
     system: &OpenSystem<Y, C, X>,
@@ -265,7 +260,7 @@ where
     C: Clock<Y::Manifold, Y::Energy>,
     X: Exchange<Y::Manifold, Y::Metric>,
 {
-    let isothermal = system.closed().second_law() == SecondLaw::NoEntropy && X::BATHS > 0;
+    let isothermal = system.closed().second_law() == SecondLaw::NoEntropy && X::BATHS == 1;
     if !tableau.one_sided || isothermal {
         return Ok(());
     }

@@ -175,6 +175,16 @@ const WIDTH: f64 = 2.0 * f64::EPSILON;
 /// The difference of two fractions of a step that are found as one time.
 const SAME_TIME: f64 = 8.0 * f64::EPSILON;
 
+/// Where a run goes on after a jump.
+pub(crate) struct Restart<'a, M: StateSpace> {
+    /// The state after the jump.
+    pub(crate) state: &'a State<M>,
+    /// The point a little later, along the velocity.
+    pub(crate) ahead: &'a dyn Fn(f64) -> M::Element,
+    /// The size of the last step.
+    pub(crate) h: f64,
+}
+
 /// The events of a step.
 pub(crate) struct Found<M: StateSpace> {
     pub(crate) events: Vec<Event<M>>,
@@ -324,15 +334,14 @@ impl<M: StateSpace> Events<M> {
         self.0[index].jump.clone()
     }
 
-    /// Goes on after a jump at an event between two states. `ahead` is the state a little later, along the velocity.
+    /// Goes on after a jump at an event.
     pub(crate) fn after_jump(
         &mut self,
         event: &Event<M>,
-        after: &State<M>,
         with_it: &[(usize, bool)],
-        mut ahead: impl FnMut(f64) -> M::Element,
-        h: f64,
+        from: &Restart<'_, M>,
     ) {
+        let &Restart { state: after, ahead, h } = from;
         for (index, watched) in self.0.iter_mut().enumerate() {
             let [before, here] = [&event.state, after].map(|state| watched.at(state));
             watched.value = if here.is_nan() { before } else { here };

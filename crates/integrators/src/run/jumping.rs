@@ -4,6 +4,7 @@ use crate::round_off::bound::of_a_law;
 use crate::run::certificate::JumpOf;
 use crate::run::controller::StepSize;
 use crate::run::ending::Ending;
+use crate::run::event::Restart;
 use crate::run::jump::{Jump, JumpOn};
 use crate::run::state::State;
 use crate::run::steps::Steps;
@@ -26,9 +27,10 @@ struct Landing<F: Flow> {
 impl<F: Flow, M: Stepper<F>> Steps<'_, F, M> {
     /// The size of a step of one size up to `end`: what a jump has left of it.
     #[inline]
-    pub(super) fn left_of_a_step(&mut self, h: f64, end: f64) -> f64 {
+    pub(super) fn left_of_a_step(&self, h: f64, end: f64) -> f64 {
         let State { step, time, .. } = self.state;
-        if time == self.progress.start + step as f64 * h { h } else { end - time }
+        let off = time - (self.progress.start + step as f64 * h);
+        if off.abs() > 0.0 { end - time } else { h }
     }
 
     /// Ends the last step at the event that was found last, and lets the state jump.
@@ -74,7 +76,8 @@ impl<F: Flow, M: Stepper<F>> Steps<'_, F, M> {
                 None => after.point.clone(),
             }
         };
-        watching.events.after_jump(&event, &after, with_it, ahead, h);
+        let restart = Restart { state: &after, ahead: &ahead, h };
+        watching.events.after_jump(&event, with_it, &restart);
         self.last_numbers = watching.events.last_numbers(&after);
         event.jump = Some(Jump { after: after.clone(), exchange });
         watching.found.push(event);
@@ -132,9 +135,8 @@ impl<F: Flow, M: Stepper<F>> Steps<'_, F, M> {
         for index in 0..self.certificate.invariants.len() {
             let of = |laws: &Laws<F::Numbers>| laws.invariants.as_ref()[index];
             let change = of(&values) - of(before);
-            if self.promises.invariants
-                && !(change.abs() <= of_a_law(of(&sizes[0]).max(of(&sizes[1]))))
-            {
+            let round_off = of_a_law(of(&sizes[0]).max(of(&sizes[1])));
+            if self.promises.invariants && (change.is_nan() || change.abs() > round_off) {
                 return Err(JumpError::BreaksInvariant { index, change });
             }
         }

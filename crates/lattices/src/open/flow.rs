@@ -34,6 +34,12 @@ impl<P: Model> Flow for OpenLattice<P> {
             + 4.0 * f64::EPSILON * of_baths[0].max(of_baths[1])
     }
 
+    /// The larger one of both ends: what flows in may find a state without energy.
+    fn energy_sizes(&self, ends: [&StateOf<P>; 2]) -> [f64; 2] {
+        let [start, end] = ends.map(|x| self.term_sizes(x).energy);
+        [start.max(end); 2]
+    }
+
     fn rates(&self, x: &StateOf<P>, d: &OpenSiteVector) -> Option<OpenSiteVector> {
         let y = self.stage(x, d)?;
         let (v, _) = self.motion(&y)?;

@@ -156,6 +156,19 @@ fn times_of_events_have_derivatives() {
     assert!(matches!(grazing, Err(TangentError::Grazing { .. })));
 }
 
+/// Jumps and corners are refused: the tangent would be another one beyond them.
+#[test]
+fn jumps_and_corners_are_refused() {
+    let family = body();
+    let system = family.at_parameters(THETA);
+    let bounce =
+        Span::steps(0.25, 40).event("x", |p: &Vector3<f64>| p.x).jump(|_, p: &Vector3<f64>| -p);
+    let jumps = DormandPrince8.tangent(&system, START, bounce);
+    assert!(matches!(jumps, Err(TangentError::Broken { what: "jumps" })));
+    let corners = DormandPrince8.tangent(&system, START, Span::steps(0.25, 40).corners([0.3]));
+    assert!(matches!(corners, Err(TangentError::Broken { what: "corners" })));
+}
+
 /// A run in two parts has the product of their tangents, and directions together are those one by one.
 #[test]
 fn tangents_of_runs_in_a_row_are_multiplied() {

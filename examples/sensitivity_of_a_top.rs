@@ -21,7 +21,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         .build()?;
     let about = "Neighbours of a top, and the tangent of the run in their middle.";
     let example = Example::new(about, 120, 0.1);
-    let start = vector![0.36, 0.48, 0.8];
+    let start = vector![0.6, 0.0, 0.8];
     let method = Scheme::new(WeylMidpoint);
     let middle = method.tangent(&top, start, example.span())?;
 

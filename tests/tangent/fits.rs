@@ -93,7 +93,8 @@ fn ellipsoids_hold_the_truth_as_often_as_they_say() {
     assert!((88..=99).contains(&inside), "{inside}");
 }
 
-/// A friction that is not there has no minimum in its logarithm.
+/// A friction that is not there has no minimum in its logarithm. Without friction the motion depends on differences of `1/I`
+/// alone, so one inertia is fixed.
 #[test]
 fn a_parameter_at_its_bound_is_said_to_be_there() {
     let (family, Data { times, truth, span }) = (body(), data(vector![3.0, 2.0, 1.0, 1e-9]));
@@ -103,8 +104,9 @@ fn a_parameter_at_its_bound_is_said_to_be_there() {
         .data(&times, &rows)
         .noise(NOISE)
         .positive_all()
+        .free(["I1", "I2", "friction"])
         .start_at(START)
-        .run(DormandPrince8, span, vector![3.1, 2.1, 1.05, 1e-3])
+        .run(DormandPrince8, span, vector![3.1, 2.1, 1.0, 1e-3])
         .unwrap();
     println!("{fit}");
     assert!(fit.estimate("friction").unwrap().at_bound && !fit.estimate("I1").unwrap().at_bound);

@@ -55,16 +55,29 @@ pub struct LevenbergMarquardt {
     pub negligible: f64,
     /// The longest step of each unknown; none if the list is shorter. A whole step is cut to them.
     pub limits: Vec<f64>,
+    /// The iterations in a row that have changed the sum of squares by less than `10⁻⁷` of it; 0 to begin with. Eight of them are
+    /// a minimum: the runs differ by more, where their steps go another way.
+    pub stalled: u32,
 }
 
 impl Default for LevenbergMarquardt {
     fn default() -> Self {
-        Self { damping: 1e-3, cosine: 1e-8, reduction: 1e-12, negligible: 1e-2, limits: Vec::new() }
+        Self {
+            damping: 1e-3,
+            cosine: 1e-8,
+            reduction: 1e-12,
+            negligible: 1e-2,
+            limits: Vec::new(),
+            stalled: 0,
+        }
     }
 }
 
 /// The state of an iteration.
 type Iteration = IterState<Vec<f64>, (), DMatrix<f64>, (), DVector<f64>, f64>;
+
+/// A relative change of the sum of squares that hardly counts, and how many of them in a row are a minimum.
+const SLOW: (f64, u32) = (1e-7, 8);
 
 /// A damping from which on a step is a rounding of the parameters.
 const LARGEST: f64 = 1e16;
@@ -171,14 +184,18 @@ impl<O: LeastSquares> Solver<O, Iteration> for LevenbergMarquardt {
             here.iter().zip(delta.iter()).map(|(phi, delta)| phi + delta).collect();
         let next = evaluate(problem, &there)?;
         let kv = argmin::kv!("damping" => self.damping;);
+        let (slow, patience) = SLOW;
+        let is_near = |next: &Squares| (next.sum() - sum).abs() <= slow * sum;
+        self.stalled = if next.as_ref().is_some_and(is_near) { self.stalled + 1 } else { 0 };
+        let has_stalled = self.stalled >= patience;
         match next.filter(|next| next.sum() < sum) {
             Some(next) => {
                 let (after, reduction) = (next.sum(), sum - next.sum());
                 let ratio = reduction / predicted;
                 // Nielsen's rule, which changes λ smoothly.
                 self.damping *= (1.0 - (2.0 * ratio - 1.0).powi(3)).clamp(0.1, 2.0);
-                let is_over =
-                    reduction <= self.reduction * sum && predicted <= self.reduction * sum;
+                let is_over = has_stalled
+                    || (reduction <= self.reduction * sum && predicted <= self.reduction * sum);
                 let state = state
                     .param(there)
                     .cost(after)
@@ -190,7 +207,7 @@ impl<O: LeastSquares> Solver<O, Iteration> for LevenbergMarquardt {
             None => {
                 self.damping *= 10.0;
                 let state = keep(state, whole, here);
-                let stuck = self.damping > LARGEST;
+                let stuck = has_stalled || self.damping > LARGEST;
                 Ok((if stuck { state.terminate_with(converged) } else { state }, Some(kv)))
             }
         }

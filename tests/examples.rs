@@ -793,6 +793,15 @@ fn a_fit_finds_the_inertias_of_a_body() {
 }
 
 #[test]
+fn neighbours_of_a_top_lie_on_the_ellipse_of_its_tangent() {
+    let report = json(&example("sensitivity_of_a_top", &["--json"]));
+    let (growth, off) = (figure(&report, "growth"), figure(&report, "distance_from_the_ellipse"));
+    // The square of the distance, which has grown.
+    assert!(growth > 3.0 && off < 0.02 * 0.02 * growth * growth, "{report}");
+    assert!(figure(&report, "tangent_law") < 1e-11, "{report}");
+}
+
+#[test]
 fn a_capacitor_turns_half_of_its_energy_into_heat_each_time() {
     let report = json(&example("rc_circuit", &["--json"]));
     assert_eq!(report["entropy_falls"], 0);

@@ -1,37 +1,25 @@
 //! Explicit steps with their projection, outputs and events.
 
+use metriplectic::dynamics::Parametrised as _;
 use metriplectic::integrators::{LinearisedStep, TangentError};
 use metriplectic::prelude::*;
 use nalgebra::{DMatrix, vector};
 
-use crate::{compared, differences, off};
+use crate::{body, compared, differences, off};
 
 const START: Vector3<f64> = Vector3::new(0.4, -1.0, 0.3);
 const THETA: Vector4<f64> = Vector4::new(3.0, 2.0, 1.0, 0.05);
 
-macro_rules! body {
-    () => {
-        Family::on(LieDual::so3())
-            .parameters(["I1", "I2", "I3", "friction"])
-            .energy(|p: &Vector3<Real>, t: &Vector4<Real>| {
-                (p.x * p.x / t.x + p.y * p.y / t.y + p.z * p.z / t.z) * 0.5
-            })
-            .entropy(|p: &Vector3<Real>, t: &Vector4<Real>| (p.norm_squared() * 0.5).exp() * t.w)
-            .build()
-            .unwrap()
-    };
-}
-
 #[test]
 fn explicit_tangents_are_those_of_differences() {
-    let family = body!();
-    let system = family.at(THETA);
+    let family = body();
+    let system = family.at_parameters(THETA);
     for (h, n, bars) in [(0.25, 80, [1e-9; 2]), (1.0, 20, [1e-10; 2])] {
         let span = Span::steps(h, n);
         let run = DormandPrince8.tangent(&system, START, span).unwrap();
         let [error, law] = compared(&system, DormandPrince8, &START, &span, 2e-3);
         let differences = differences::<Euclidean<4>, LieDual<3>>(&THETA, 2e-3, |t| {
-            DormandPrince8.run(&family.at(*t), START, span).unwrap().last().point
+            DormandPrince8.run(&family.at_parameters(*t), START, span).unwrap().last().point
         });
         let along = off(&run.last().along_parameters(), &differences);
         let entropy = run.sensitivity().entropy.unwrap();
@@ -84,8 +72,8 @@ fn explicit_tangents_on_curved_spaces() {
 /// Steps that follow a tolerance are frozen: the tangent converges with them.
 #[test]
 fn frozen_tangents_follow_the_tolerance() {
-    let family = body!();
-    let system = family.at(THETA);
+    let family = body();
+    let system = family.at_parameters(THETA);
     let tangent =
         |span: Span| DormandPrince8.tangent(&system, START, span).unwrap().last().along_start();
     let reference = tangent(Span::steps(0.05, 400));
@@ -112,8 +100,8 @@ fn frozen_tangents_follow_the_tolerance() {
 
 #[test]
 fn outputs_inside_steps_have_tangents() {
-    let family = body!();
-    let system = family.at(THETA);
+    let family = body();
+    let system = family.at_parameters(THETA);
     let span = Span::steps(0.5, 4).output_at([0.2, 1.0, 1.7]);
     let run = DormandPrince8.tangent(&system, START, span).unwrap();
     let times: Vec<f64> = run.states().iter().map(|state| state.time).collect();
@@ -132,13 +120,13 @@ fn outputs_inside_steps_have_tangents() {
 /// The time of an event, against differences of order 4 of the times of runs.
 #[test]
 fn times_of_events_have_derivatives() {
-    let family = body!();
+    let family = body();
     let times = |x: Vector3<f64>, t: Vector4<f64>| {
         let span = Span::until(20.0).tolerance(1e-11).event("x", |p: &Vector3<f64>| p.x);
-        DormandPrince8.run(&family.at(t), x, span).unwrap().events()[0].state.time
+        DormandPrince8.run(&family.at_parameters(t), x, span).unwrap().events()[0].state.time
     };
     let span = Span::until(20.0).tolerance(1e-11).event("x", |p: &Vector3<f64>| p.x).stop();
-    let run = DormandPrince8.tangent(&family.at(THETA), START, span).unwrap();
+    let run = DormandPrince8.tangent(&family.at_parameters(THETA), START, span).unwrap();
     let event = &run.events()[0];
     assert_eq!(run.last().time, event.state.time);
     let found = event.time_along(&|p: &Vector3<Real>| p.x).unwrap();
@@ -168,11 +156,24 @@ fn times_of_events_have_derivatives() {
     assert!(matches!(grazing, Err(TangentError::Grazing { .. })));
 }
 
+/// Jumps and corners are refused: the tangent would be another one beyond them.
+#[test]
+fn jumps_and_corners_are_refused() {
+    let family = body();
+    let system = family.at_parameters(THETA);
+    let bounce =
+        Span::steps(0.25, 40).event("x", |p: &Vector3<f64>| p.x).jump(|_, p: &Vector3<f64>| -p);
+    let jumps = DormandPrince8.tangent(&system, START, bounce);
+    assert!(matches!(jumps, Err(TangentError::Broken { what: "jumps" })));
+    let corners = DormandPrince8.tangent(&system, START, Span::steps(0.25, 40).corners([0.3]));
+    assert!(matches!(corners, Err(TangentError::Broken { what: "corners" })));
+}
+
 /// A run in two parts has the product of their tangents, and directions together are those one by one.
 #[test]
 fn tangents_of_runs_in_a_row_are_multiplied() {
-    let family = body!();
-    let system = family.at(THETA);
+    let family = body();
+    let system = family.at_parameters(THETA);
     let tangent = |x: Vector3<f64>, n: usize| {
         DormandPrince8.tangent(&system, x, Span::steps(0.25, n)).unwrap().last().clone()
     };

@@ -2,12 +2,31 @@
 
 mod explicit;
 mod fits;
+mod parts;
 mod schemes;
 
-use metriplectic::dynamics::Point;
+use metriplectic::dynamics::{Parametrised, Point};
 use metriplectic::fields::{Column as _, Dimension as _, Space, Vector};
 use metriplectic::prelude::*;
 use nalgebra::DMatrix;
+
+/// Bodies with three moments of inertia and a friction.
+pub(crate) fn body() -> impl Parametrised<
+    4,
+    System: Differentiable<
+        Manifold = LieDual<3>,
+        Wide: Metriplectic<Manifold = Product<LieDual<3>, Euclidean<4>>>,
+    >,
+> {
+    Family::on(LieDual::so3())
+        .parameters(["I1", "I2", "I3", "friction"])
+        .energy(|p: &Vector3<Real>, t: &Vector4<Real>| {
+            (p.x * p.x / t.x + p.y * p.y / t.y + p.z * p.z / t.z) * 0.5
+        })
+        .entropy(|p: &Vector3<Real>, t: &Vector4<Real>| (p.norm_squared() * 0.5).exp() * t.w)
+        .build()
+        .unwrap()
+}
 
 /// The dimension of a space.
 pub(crate) fn dim<M: Space>() -> usize {

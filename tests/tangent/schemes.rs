@@ -29,7 +29,8 @@ fn tangents_of_schemes_are_those_of_differences() {
         })
         .entropy(|p: &Vector3<Real>| (p.norm_squared() * 0.5).exp())
         .build()
-        .unwrap();
+        .unwrap()
+        .erased();
     // The law has the round-off of the two paths, which Newton's method leaves.
     let bars = [1e-9, 1e-11];
     let weyl = Scheme::new(WeylMidpoint);
@@ -40,7 +41,7 @@ fn tangents_of_schemes_are_those_of_differences() {
     accept("Itoh and Abe", compared(&quartic, itoh, &START, &Span::steps(0.2, 20), 2e-3), bars);
 
     let (round, n0, span) =
-        (sphere!().build().unwrap(), vector![0.36, 0.48, 0.8], Span::steps(0.1, 20));
+        (sphere!().build().unwrap().erased(), vector![0.36, 0.48, 0.8], Span::steps(0.1, 20));
     accept("S², Weyl", compared(&round, weyl, &n0, &span, 2e-3), bars);
     accept("S², projection", compared(&round, Scheme::new(Projection), &n0, &span, 2e-3), bars);
     let metric = Metric::field(|n: &Vector3<Real>| {
@@ -65,7 +66,7 @@ fn tangents_of_schemes_are_those_of_differences() {
 /// The frame of a sphere turns where its last entry changes its sign, in the middle of these steps or at their ends.
 #[test]
 fn frames_of_a_sphere_turn_at_its_equator() {
-    let round = sphere!().build().unwrap();
+    let round = sphere!().build().unwrap().erased();
     for z in [0.0, -0.0, 1e-17, -1e-9] {
         let n0 = vector![0.6, 0.8, z];
         let found = compared(&round, Scheme::new(WeylMidpoint), &n0, &Span::steps(0.1, 20), 2e-3);
@@ -108,7 +109,8 @@ fn parameters_are_columns() {
         .energy(move |p: &Vector3<Real>| h(p, &theta.cast()))
         .entropy(move |p: &Vector3<Real>| s(p, &theta.cast()))
         .build()
-        .unwrap();
+        .unwrap()
+        .erased();
     let plain = weyl.run(&captured, START, span).unwrap();
     assert!(plain.last().point == run.last().point);
 
@@ -141,7 +143,8 @@ fn units_scale_the_tangent() {
             })
             .entropy(move |x: &Vector3<Real>| x.norm_squared() * (0.05 * i / p))
             .build()
-            .unwrap();
+            .unwrap()
+            .erased();
         let span = Span::steps(0.1 * i / p, 50);
         Scheme::new(WeylMidpoint).tangent(&body, START * p, span).unwrap().last().along_start()
     };
@@ -159,7 +162,8 @@ fn the_order_is_that_of_the_method() {
         .energy(|p: &Vector3<Real>| p.x * p.x * 0.05 + p.y * p.y * 0.1 + p.z * p.z * 0.5)
         .entropy(|p: &Vector3<Real>| p.norm_squared() * 0.5)
         .build()
-        .unwrap();
+        .unwrap()
+        .erased();
     let at = |n: usize| {
         let span = Span::steps(4.0 / n as f64, n);
         Scheme::new(WeylMidpoint).tangent(&body, START, span).unwrap().last().along_start()
@@ -200,7 +204,8 @@ fn tangents_near_rest() {
         .energy(|p: &Vector3<Real>| p.x * p.x / 6.0 + p.y * p.y / 4.0 + p.z.powi(4) * 0.5)
         .entropy(|p: &Vector3<Real>| (p.norm_squared() * 0.5).exp())
         .build()
-        .unwrap();
+        .unwrap()
+        .erased();
     for beside in [0.0, 1e-14, 1e-10, 1e-6, 1e-3] {
         let x0 = vector![1.0, beside, beside];
         let found = compared(&body, Scheme::new(WeylMidpoint), &x0, &Span::steps(0.1, 20), 2e-3);

@@ -1,7 +1,7 @@
 //! Systems with parameters: closures of the state and of `θ`.
 //!
 //! A [`Family`] is a system on `M × Rᴾ` whose second factor carries the parameters with the cometric
-//! [`Inert`], so that nothing moves them. It has two faces:
+//! [`Inert`](metriplectic_manifolds::Inert), so that nothing moves them. It has two faces:
 //!
 //! - [`Family::at`] freezes `θ`. What it returns is a system on `M` like any other.
 //! - [`Differentiable::wide`] is the system on `M × Rᴾ`, whose derivatives along the second factor are those along the

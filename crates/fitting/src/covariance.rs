@@ -1,4 +1,4 @@
-//! What a Jacobian says of errors.
+//! Standard errors and correlations, from a Jacobian.
 
 use nalgebra::{DMatrix, DVector};
 

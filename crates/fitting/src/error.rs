@@ -47,13 +47,13 @@ pub enum FitError {
     Noise {
         /// The column of the data.
         column: usize,
-        /// What was given.
+        /// The noise that was given.
         sigma: f64,
     },
     /// There is no parameter of this name.
     #[error("there is no parameter {name:?}; the family has {known:?}")]
     UnknownParameter {
-        /// What was asked for.
+        /// The name that was asked for.
         name: String,
         /// The names of the family.
         known: Vec<&'static str>,
@@ -68,7 +68,7 @@ pub enum FitError {
         /// The guess.
         value: f64,
     },
-    /// Nothing is free.
+    /// No parameter is free.
     #[error("no parameter is free; name one, or leave `free` out to fit them all")]
     NothingFree,
     /// The model has no run, or no tangent, at the guess.

@@ -15,7 +15,10 @@ use crate::error::FitError;
 use crate::fitted::{Fitted, Parts};
 use crate::levenberg_marquardt::LevenbergMarquardt;
 use crate::model::{ManifoldOf, Measured, Model, PointOf};
-use crate::unknowns::{Names, unknowns};
+use crate::unknowns::{Names, Unknown, unknowns};
+
+/// The longest step of a logarithm.
+const STEEP: f64 = 3.0;
 
 /// A fit of the parameters of a family to data, by least squares.
 ///
@@ -226,7 +229,13 @@ where
             failure: RefCell::new(None),
         };
         model.evaluate(&phi).map_err(FitError::Guess)?;
-        let executor = Executor::new(&model, self.solver)
+        // A factor of e⁻³ in a step: the slope of a logarithm vanishes with its parameter.
+        let limit = |u: &Unknown| if u.positive { STEEP } else { f64::INFINITY };
+        let mut solver = self.solver;
+        if solver.limits.is_empty() {
+            solver.limits = unknowns.iter().map(limit).collect();
+        }
+        let executor = Executor::new(&model, solver)
             .configure(|state| state.param(phi).max_iters(self.iterations));
         let found = executor.run().map_err(|error| FitError::Solver(error.to_string()))?;
         let runs = 1 + found.problem.counts.get("squares").copied().unwrap_or(0);

@@ -63,7 +63,7 @@ pub struct Fitted {
     pub covariance: Covariance,
 }
 
-/// What a result is made of.
+/// The numbers that a result is made of.
 pub(crate) struct Parts<'a> {
     pub(crate) unknowns: &'a [Unknown],
     pub(crate) phi: &'a [f64],

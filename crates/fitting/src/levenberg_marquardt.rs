@@ -53,16 +53,31 @@ pub struct LevenbergMarquardt {
     /// The length of a column of `J`, in units of the root mean square of the residuals, below which its unknown is left where it is: no
     /// residual depends on it. The logarithm of a parameter that is zero ends here, and has no minimum.
     pub negligible: f64,
+    /// The longest step of each unknown; none if the list is shorter. A whole step is cut to them.
+    pub limits: Vec<f64>,
+    /// The iterations in a row that have changed the sum of squares by less than `10⁻⁷` of it; 0 to begin with. Eight of them are
+    /// a minimum: the runs differ by more, where their steps go another way.
+    pub stalled: u32,
 }
 
 impl Default for LevenbergMarquardt {
     fn default() -> Self {
-        Self { damping: 1e-3, cosine: 1e-8, reduction: 1e-12, negligible: 1e-2 }
+        Self {
+            damping: 1e-3,
+            cosine: 1e-8,
+            reduction: 1e-12,
+            negligible: 1e-2,
+            limits: Vec::new(),
+            stalled: 0,
+        }
     }
 }
 
 /// The state of an iteration.
 type Iteration = IterState<Vec<f64>, (), DMatrix<f64>, (), DVector<f64>, f64>;
+
+/// A relative change of the sum of squares that hardly counts, and how many of them in a row are a minimum.
+const SLOW: (f64, u32) = (1e-7, 8);
 
 /// A damping from which on a step is a rounding of the parameters.
 const LARGEST: f64 = 1e16;
@@ -98,7 +113,11 @@ impl LevenbergMarquardt {
             DVector::from_fn(rows + n, |i, _| if i < rows { -at.residuals[i] } else { 0.0 });
         let qr = damped.qr();
         let hat = qr.r().solve_upper_triangular(&(qr.q().transpose() * right))?;
-        let delta = hat.zip_map(scales, |hat, scale| hat / scale);
+        let whole = hat.zip_map(scales, |hat, scale| hat / scale);
+        let cut = whole.iter().zip(&self.limits).fold(1.0, |cut: f64, (step, limit)| {
+            if step.abs() > *limit { cut.min(limit / step.abs()) } else { cut }
+        });
+        let delta = whole * cut;
         let linear = &at.jacobian * &delta + &at.residuals;
         Some((delta, at.sum() - linear.norm_squared()))
     }
@@ -165,14 +184,18 @@ impl<O: LeastSquares> Solver<O, Iteration> for LevenbergMarquardt {
             here.iter().zip(delta.iter()).map(|(phi, delta)| phi + delta).collect();
         let next = evaluate(problem, &there)?;
         let kv = argmin::kv!("damping" => self.damping;);
+        let (slow, patience) = SLOW;
+        let is_near = |next: &Squares| (next.sum() - sum).abs() <= slow * sum;
+        self.stalled = if next.as_ref().is_some_and(is_near) { self.stalled + 1 } else { 0 };
+        let has_stalled = self.stalled >= patience;
         match next.filter(|next| next.sum() < sum) {
             Some(next) => {
                 let (after, reduction) = (next.sum(), sum - next.sum());
                 let ratio = reduction / predicted;
                 // Nielsen's rule, which changes λ smoothly.
                 self.damping *= (1.0 - (2.0 * ratio - 1.0).powi(3)).clamp(0.1, 2.0);
-                let is_over =
-                    reduction <= self.reduction * sum && predicted <= self.reduction * sum;
+                let is_over = has_stalled
+                    || (reduction <= self.reduction * sum && predicted <= self.reduction * sum);
                 let state = state
                     .param(there)
                     .cost(after)
@@ -184,7 +207,7 @@ impl<O: LeastSquares> Solver<O, Iteration> for LevenbergMarquardt {
             None => {
                 self.damping *= 10.0;
                 let state = keep(state, whole, here);
-                let stuck = self.damping > LARGEST;
+                let stuck = has_stalled || self.damping > LARGEST;
                 Ok((if stuck { state.terminate_with(converged) } else { state }, Some(kv)))
             }
         }
@@ -201,4 +224,42 @@ fn evaluate<O: LeastSquares>(
     phi: &[f64],
 ) -> Result<Option<Squares>, Error> {
     problem.problem("squares", |problem| Ok(problem.squares(phi).filter(Squares::is_finite)))
+}
+
+#[cfg(test)]
+mod tests {
+    use argmin::core::{Executor, TerminationReason};
+    use nalgebra::{DMatrix, DVector};
+
+    use super::*;
+
+    /// `a x + e^φ x²` fitted to `2x − 0.01 x²` with an error of 0.1: the best coefficient of `x²` is negative.
+    struct Bent;
+
+    impl LeastSquares for Bent {
+        fn squares(&self, u: &[f64]) -> Option<Squares> {
+            let (a, b) = (u[0], u[1].exp());
+            let x = |i: usize| 0.1 * (i + 1) as f64;
+            let noise = |i: usize| if i % 2 == 0 { 0.1 } else { -0.1 };
+            let residual =
+                |i, _| a * x(i) + b * x(i) * x(i) - 2.0 * x(i) + 0.01 * x(i) * x(i) + noise(i);
+            let slope = |i, j| if j == 0 { x(i) } else { b * x(i) * x(i) };
+            let (residuals, jacobian) =
+                (DVector::from_fn(20, residual), DMatrix::from_fn(20, 2, slope));
+            Some(Squares { residuals, jacobian })
+        }
+    }
+
+    #[test]
+    fn a_logarithm_without_a_minimum_is_left() {
+        let solver = LevenbergMarquardt { limits: vec![f64::INFINITY, 3.0], ..Default::default() };
+        let found = Executor::new(Bent, solver)
+            .configure(|state| state.param(vec![1.0, -1.0]).max_iters(100))
+            .run()
+            .unwrap();
+        let state = found.state();
+        println!("{:?} after {} iterations", state.get_best_param(), state.get_iter());
+        assert_eq!(state.get_termination_reason(), Some(&TerminationReason::SolverConverged));
+        assert!(state.get_best_param().unwrap()[1] < -4.0 && state.get_iter() < 20);
+    }
 }

@@ -15,7 +15,7 @@
 //! | [`unknowns`] | which parameters are free, and which are fitted by their logarithm |
 //! | [`covariance`] | standard errors and correlations from a Jacobian |
 //! | [`fitted`] | [`Fitted`]: the result, which prints what the data say |
-//! | [`model`] | the residuals of a family of systems |
+//! | `model` | the residuals of a family of systems |
 //! | [`fit`](mod@fit) | [`Fit`]: what a user says of a fit |
 
 pub mod covariance;

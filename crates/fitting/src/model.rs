@@ -19,7 +19,7 @@ pub(crate) type ManifoldOf<Y, const P: usize> =
 /// A point of it at a scalar.
 pub(crate) type PointOf<Y, D, const P: usize> = <ManifoldOf<Y, P> as Space>::Point<D>;
 
-/// What was measured, and when.
+/// The data, and their times.
 #[derive(Clone, Debug)]
 pub(crate) struct Measured<const K: usize> {
     pub(crate) times: Vec<f64>,
@@ -94,7 +94,7 @@ where
         Some(frame)
     }
 
-    /// What is observed at a state, and its derivatives along start and parameters.
+    /// Evaluates what is observed at a state, with its derivatives along start and parameters.
     fn observed(&self, state: &TangentState<Y::System>) -> (SVector<f64, K>, DMatrix<f64>) {
         let seeded = ManifoldOf::<Y, P>::seeds(&state.point);
         let mut value = SVector::<f64, K>::zeros();

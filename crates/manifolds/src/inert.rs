@@ -1,8 +1,6 @@
 //! A cometric that is zero: directions in which nothing moves.
 
-use std::ops::Sub;
-
-use metriplectic_fields::{ChartPoint, Matrix, Real, Scalar, Space, Square, Vector};
+use metriplectic_fields::{ChartPoint, Column, Matrix, Real, Scalar, Space, Square, Vector};
 use nalgebra::SVector;
 
 use crate::metric::GeodesicEnd;
@@ -28,20 +26,20 @@ use crate::{
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Inert;
 
-impl<V: Copy + Sub<Output = V>> InnerProduct<V> for Inert {
+impl<D: Scalar, const P: usize> InnerProduct<SVector<D, P>> for Inert {
     #[inline]
-    fn flat(&self, v: &V) -> V {
-        *v - *v
+    fn flat(&self, _: &SVector<D, P>) -> SVector<D, P> {
+        Column::zero()
     }
 
     #[inline]
-    fn orthonormal(&self, alpha: &V) -> V {
-        *alpha - *alpha
+    fn orthonormal(&self, _: &SVector<D, P>) -> SVector<D, P> {
+        Column::zero()
     }
 
     #[inline]
-    fn from_orthonormal(&self, a: &V) -> V {
-        *a - *a
+    fn from_orthonormal(&self, _: &SVector<D, P>) -> SVector<D, P> {
+        Column::zero()
     }
 }
 

@@ -82,6 +82,10 @@ where
     }
 
     /// Sets the energy `H(x, θ)`, a closure `|x, θ| -> Real`.
+    #[allow(
+        clippy::type_complexity,
+        reason = "the type of a builder lists the parts of the system, and a name for it would hide them"
+    )]
     pub fn energy<F>(self, energy: F) -> FamilyBuilder<Wide<M, G, B, K, OfPair<F>, S, L, P>, P>
     where
         F: Fn(&M::Point<Real>, &SVector<Real, P>) -> Real,
@@ -90,6 +94,10 @@ where
     }
 
     /// Sets the entropy `S(x, θ)`, a closure `|x, θ| -> Real`, as [`SystemBuilder::entropy`] does.
+    #[allow(
+        clippy::type_complexity,
+        reason = "the type of a builder lists the parts of the system, and a name for it would hide them"
+    )]
     pub fn entropy<F>(
         self,
         entropy: F,
@@ -102,6 +110,10 @@ where
     }
 
     /// Sets the metric on `M`, which does not depend on the parameters.
+    #[allow(
+        clippy::type_complexity,
+        reason = "the type of a builder lists the parts of the system, and a name for it would hide them"
+    )]
     pub fn metric<F: Riemannian<M>>(
         self,
         metric: F,
@@ -110,11 +122,19 @@ where
     }
 
     /// Sets the bracket on `M`, which does not depend on the parameters.
+    #[allow(
+        clippy::type_complexity,
+        reason = "the type of a builder lists the parts of the system, and a name for it would hide them"
+    )]
     pub fn bracket<F>(self, bracket: F) -> FamilyBuilder<Wide<M, G, (F, Zero), K, H, S, L, P>, P> {
         self.with(|wide| wide.bracket((bracket, Zero)))
     }
 
     /// Sets a dissipation on `M` that does not depend on the parameters.
+    #[allow(
+        clippy::type_complexity,
+        reason = "the type of a builder lists the parts of the system, and a name for it would hide them"
+    )]
     pub fn dissipation<F>(
         self,
         dissipation: F,
@@ -124,6 +144,10 @@ where
 
     /// Sets the dissipation by a closure `|x, w, θ| -> K` that annihilates `w`, as
     /// [`FieldDissipation`](crate::FieldDissipation) has it.
+    #[allow(
+        clippy::type_complexity,
+        reason = "the type of a builder lists the parts of the system, and a name for it would hide them"
+    )]
     pub fn field_dissipation<F>(
         self,
         dissipation: F,

@@ -1,4 +1,4 @@
-//! What the tangent of a run kept.
+//! The laws of the tangent of a run.
 
 use std::fmt;
 

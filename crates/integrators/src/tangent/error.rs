@@ -54,6 +54,15 @@ pub enum TangentError<M: StateSpace> {
         /// Why.
         cause: Unlinearised,
     },
+    /// The state jumps at an event, or steps end at corners.
+    #[error(
+        "the schedule has {what}, across which the tangent is not carried; run up to the first one and go on from there, \
+         with the derivative of the map in between"
+    )]
+    Broken {
+        /// The jumps or the corners.
+        what: &'static str,
+    },
     /// An event is grazing: its function hardly changes along the motion, so that its time has no derivative.
     #[error(
         "the event {event} at t = {time} is grazing: its function changes along the motion by {slope:.1e} of what it \

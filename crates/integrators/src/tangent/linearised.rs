@@ -38,6 +38,18 @@ pub struct Propagated<Y: Metriplectic> {
 /// Laws: 1. the tangent is the derivative of the step that was taken, of this size and on this branch; 2.
 /// `dF(x') T' = dF(x) T` for the energy and the further invariants; 3. a row of steps has the product of their
 /// derivatives.
+///
+/// A retraction that is not symmetric does not compile:
+///
+/// ```compile_fail
+/// # use metriplectic_dynamics::System;
+/// # use metriplectic_fields::Real;
+/// # use metriplectic_integrators::{Scheme, Span, Tangents};
+/// # use metriplectic_manifolds::{Exponential, LieDual};
+/// # use nalgebra::Vector3;
+/// let body = System::on(LieDual::so3()).energy(|p: &Vector3<Real>| p.x * p.x).build().unwrap();
+/// let run = Scheme::new(Exponential).tangent(&body, Vector3::x(), Span::steps(0.1, 1));
+/// ```
 #[diagnostic::on_unimplemented(
     message = "the steps of `{Self}` have no tangent on this system",
     note = "a `Scheme` has one if its retraction and its discrete gradient are symmetric (`SelfAdjoint`): not `Exponential`, \

@@ -53,20 +53,26 @@ pub trait Tangents: Sized {
     ///
     /// # Errors
     ///
-    /// [`RunError`] if the model breaks a law or the schedule cannot be run.
+    /// [`TangentError`] if the model breaks a law, the schedule cannot be run, or it has jumps or corners.
     fn tangent_steps<D>(
         self,
         system: &D,
         x0: Point<D>,
         schedule: impl Into<Schedule>,
-    ) -> Result<TangentSteps<'_, D, Self>, RunError<D::Manifold>>
+    ) -> Result<TangentSteps<'_, D, Self>, TangentError<D::Manifold>>
     where
         D: Differentiable,
         Self: Stepper<D> + Linearised<D::Wide>,
     {
         let mut schedule: Schedule = schedule.into();
         let end = schedule.end();
-        schedule.watch.check([schedule.start, end], schedule.start)?;
+        if schedule.watch.events.iter().any(|event| event.jump.is_some()) {
+            return Err(TangentError::Broken { what: "jumps" });
+        }
+        if !schedule.corners.is_empty() {
+            return Err(TangentError::Broken { what: "corners" });
+        }
+        schedule.watch.check([schedule.start, end], schedule.start).map_err(RunError::from)?;
         let (times, interval) = (schedule.watch.times.take(), schedule.watch.interval.take());
         let start = schedule.start;
         let outputs = Outputs::after(start, start, times, interval);

@@ -67,7 +67,7 @@ impl<D: Differentiable> TangentState<D> {
         DMatrix::from_fn(n, all, |i, j| self.columns.t[(i, j)])
     }
 
-    /// The same with the [velocities](Space::embed) of the space as rows: entries of a tangent vector of a sphere, a body
+    /// The matrix `∂x/∂(x₀, θ)` with the [velocities](Space::embed) of the space as rows: entries of a tangent vector of a sphere, a body
     /// angular velocity. Its columns are those of [`matrix`](Self::matrix).
     pub fn embedded(&self) -> DMatrix<f64> {
         let all = Dim::<D::Wide>::LEN;

@@ -43,7 +43,7 @@ impl Counter {
         Self { seed, path: 0, is_three_point: false }
     }
 
-    /// Those of another path.
+    /// Takes another path of the same seed.
     #[must_use]
     pub const fn path(self, path: u64) -> Self {
         Self { path, ..self }

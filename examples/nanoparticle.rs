@@ -64,8 +64,12 @@ fn main() -> Result<(), Box<dyn Error>> {
         .complete()?;
     let (x, means) = (table.column("x")?, table.column("mean")?);
     let of = |field: f64| -> (f64, f64) {
-        let here: Vec<f64> =
-            x.iter().zip(&means).filter(|(x, _)| **x == field).map(|(_, mean)| *mean).collect();
+        let here: Vec<f64> = x
+            .iter()
+            .zip(&means)
+            .filter(|(x, _)| (**x - field).abs() < 1e-9)
+            .map(|(_, mean)| *mean)
+            .collect();
         let count = here.len() as f64;
         let mean = here.iter().sum::<f64>() / count;
         let variance = here.iter().map(|m| (m - mean).powi(2)).sum::<f64>() / (count - 1.0);

@@ -93,7 +93,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let ratio: Vec<(f64, f64)> = there
         .iter()
         .zip(&back)
-        .filter(|((_, a), (_, b))| a.min(*b) > 0.02)
+        .filter(|((_, a), (_, b))| a.min(*b) > 0.05)
         .map(|((w, a), (_, b))| (*w, (a / b).ln()))
         .collect();
     let line: Vec<(f64, f64)> = ratio.iter().map(|(w, _)| (*w, w - free_energy)).collect();

@@ -65,13 +65,13 @@ fn main() -> Result<(), Box<dyn Error>> {
 
 /// The middles of the bins of `[−1, 1]`, with the density there.
 fn histogram(values: impl Iterator<Item = f64>) -> Vec<(f64, f64)> {
-    let (mut counts, mut all) = ([0.0; BINS], 0.0);
-    for value in values {
-        let bin = ((value + 1.0) * 0.5 * BINS as f64).clamp(0.0, BINS as f64 - 1.0);
-        counts[bin as usize] += 1.0;
-        all += 1.0;
-    }
-    (0..BINS).map(|k| (middle(k), counts[k] / all * BINS as f64 * 0.5)).collect()
+    let (values, half): (Vec<f64>, f64) = (values.collect(), 1.0 / BINS as f64);
+    let density = |k: usize| {
+        let bin = middle(k) - half..middle(k) + half;
+        let count = values.iter().filter(|value| bin.contains(value)).count();
+        count as f64 / (2.0 * half * values.len() as f64)
+    };
+    (0..BINS).map(|k| (middle(k), density(k))).collect()
 }
 
 fn middle(bin: usize) -> f64 {

@@ -130,7 +130,14 @@ fn every_example_of_a_run_reports_the_same_keys() {
     let names = names.map(|path| path.file_stem().map(|name| name.to_string_lossy().into_owned()));
     let mut seen = 0;
     // The study of convergence and the sweep are of many runs.
-    let many = ["convergence", "sweep", "hysteresis_loops", "carnot_engine"];
+    let many = [
+        "convergence",
+        "sweep",
+        "hysteresis_loops",
+        "carnot_engine",
+        "nanoparticle",
+        "pulled_particle",
+    ];
     for name in names.flatten().filter(|name| !many.contains(&name.as_str())) {
         let report = json(&example(&name, &["--json", "--steps", "20"]));
         let (_, state) = certified(&report);
@@ -852,4 +859,32 @@ fn the_wheels_stop_the_satellite_and_keep_its_momentum() {
     assert!(figure(&report, "max_energy_error") <= 4.0 * f64::EPSILON * most, "{report}");
     let momentum = state[..3].iter().map(|l| l * l).sum::<f64>();
     assert!((momentum - 1.42).abs() < 1e-13 && figure(&report, "speed") < 0.05, "{report}");
+}
+
+#[test]
+fn a_thermal_body_and_fluctuating_heat_have_the_means_of_their_laws() {
+    let body = json(&example("thermal_rigid_body", &["--json"]));
+    let (mean, exact) = (figure(&body, "mean_entropy"), figure(&body, "mean_entropy_of_the_law"));
+    assert!((mean / exact - 1.0).abs() < 0.02, "{body}");
+    assert!(figure(&body, "distance_of_the_histogram") < 0.15, "{body}");
+    let heat = json(&example("fluctuating_heat", &["--json"]));
+    let (variance, exact) = (figure(&heat, "variance"), figure(&heat, "variance_of_the_law"));
+    assert!((variance / exact - 1.0).abs() < 0.06, "{heat}");
+    assert!((figure(&heat, "mean") - figure(&heat, "mean_of_the_law")).abs() < 2e-3, "{heat}");
+    for report in [body, heat] {
+        assert!(figure(&report, "max_relative_energy_error") < 5e-15, "{report}");
+        assert!(figure(&report, "min_entropy_increment") < 0.0, "{report}");
+    }
+}
+
+#[test]
+fn a_nanoparticle_and_a_pulled_particle_obey_their_equalities() {
+    let spin = json(&example("nanoparticle", &["--json"]));
+    assert!(figure(&spin, "worst_in_standard_errors") < 4.0, "{spin}");
+    assert!(figure(&spin, "worst_balance_in_thermal_energies") < 1e-13, "{spin}");
+    let pulled = json(&example("pulled_particle", &["--json"]));
+    let (mean, error) = (figure(&pulled, "jarzynski"), figure(&pulled, "standard_error"));
+    assert!((mean - 1.0).abs() < 4.0 * error && error < 0.03, "{pulled}");
+    assert!(figure(&pulled, "mean_work") > figure(&pulled, "free_energy") + 0.2, "{pulled}");
+    assert!(figure(&pulled, "worst_balance") < 1e-13, "{pulled}");
 }

@@ -26,7 +26,7 @@ impl Curve {
         let nodes: Vec<_> = (0..n).map(|k| at(angle(k))).collect();
         let mut curve = Self { nodes, projection: DMatrix::zeros(n, n) };
         let values = DMatrix::from_fn(n, n, |i, k| curve.at(&curve.nodes[i])[k]);
-        curve.projection = values.try_inverse().unwrap();
+        curve.projection = values.try_inverse().expect("the functions are independent");
         curve
     }
 }
@@ -48,6 +48,9 @@ impl Basis<Vector3<f64>> for Curve {
         &self.projection
     }
 }
+
+/// A step of a size from a point.
+type Step<'a> = dyn Fn(f64, &Vector3<f64>, &Outcome) -> Vector3<f64> + 'a;
 
 fn entropy(x: &Vector3<f64>) -> f64 {
     0.4 * x.x + 0.3 * x.y * x.y + 0.2 * x.z
@@ -74,7 +77,7 @@ fn orders_with_a_further_casimir() {
         points.iter().map(|x| weight(x) * entropy(x)).sum::<f64>()
             / points.iter().map(weight).sum::<f64>()
     };
-    let errors = |sizes: [f64; 3], step: &dyn Fn(f64, &Vector3<f64>, &Outcome) -> Vector3<f64>| {
+    let errors = |sizes: [f64; 3], step: &Step<'_>| {
         sizes.map(|h| {
             let matrix = operator(&curve, &outcomes(3), |x, outcome| step(h, x, outcome));
             (h, mean(&curve, &matrix, &coefficients(&curve, entropy)) - exact)

@@ -32,7 +32,7 @@ impl Interval {
         let nodes: Vec<_> = (0..n).map(node).collect();
         let mut interval = Self { nodes, projection: DMatrix::zeros(n, n) };
         let values = DMatrix::from_fn(n, n, |i, k| interval.at(&interval.nodes[i])[k]);
-        interval.projection = values.try_inverse().unwrap();
+        interval.projection = values.try_inverse().expect("the functions are independent");
         interval
     }
 }

@@ -98,7 +98,7 @@ fn the_numbers_go_on_after_a_corner_in_time() {
         |schedule: metriplectic::integrators::Schedule| method.run(&body, START, schedule).unwrap();
     let plain = run(Span::steps(0.05, 4).into());
     // The corner ends a step, and the next one draws its own numbers.
-    let cut = run(Span::steps(0.05, 4).corners([0.1]).into());
+    let cut = run(Span::steps(0.05, 4).corners([0.1]));
     let moved = |k: usize, run: &Trajectory<LieDual<3>>| run.states()[k].point;
     assert!((moved(4, &plain) - moved(4, &cut)).norm() < 1e-12);
 }
@@ -116,12 +116,12 @@ fn exchanged([a, b, c]: [i32; 3]) -> Vec<[f64; 4]> {
         .dissipation(OnsagerDissipation(exchange))
         .noise(Boltzmann(0.1 * s))
         .build()
-        .unwrap();
+        .expect("a system");
     let start = vector![0.3, 0.7] * e;
     let run = NinomiyaVictoir(DormandPrince5)
         .seed(2)
         .run(&bodies, start, Span::steps(0.01 * t, 50))
-        .unwrap();
+        .expect("a run");
     run.iter()
         .map(|state| [state.point.x / e, state.point.y / e, state.time / t, state.entropy / s])
         .collect()
@@ -132,7 +132,7 @@ fn other_units_have_the_same_bits() {
     let plain = exchanged([0; 3]);
     assert_eq!(exchanged([-67, -31, 12]), plain);
     assert_eq!(exchanged([40, 7, -76]), plain);
-    assert!(plain[1] != plain[2]);
+    assert!((plain[1][0] - plain[2][0]).abs() > 1e-6);
 }
 
 #[test]

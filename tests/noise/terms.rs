@@ -14,9 +14,9 @@ where
 {
     let mut x = start.clone();
     for k in 0..5 {
-        let [off, size] = mismatch(system, &x).unwrap();
+        let [off, size] = mismatch(system, &x).expect("a place on the manifold");
         assert!(off <= 1e-13 * size, "{name}: the terms are off by {off} of {size}");
-        let drift = noise_drift(system, &x, &Uniform).unwrap();
+        let drift = noise_drift(system, &x, &Uniform).expect("a place on the manifold");
         let largest = metriplectic::fields::Column::magnitude(&drift);
         if system.dissipation().is_closed() {
             assert!(largest <= 1e-12 * size, "{name}: the drift is {largest}");

@@ -20,7 +20,7 @@ use crate::vector::SiteVector;
 
 /// The half width of a difference, in units of an entry: where its rounding is as large as its error, `ε^{1/3}`.
 const WIDTH: f64 = 6e-6;
-/// What differences of a divergence leave of its terms.
+/// The part of the terms of a divergence that its differences may leave.
 const DIFFERENCE: f64 = 1e-6;
 
 impl<P: Model<Manifold: Flat>> Lattice<P> {

@@ -45,21 +45,22 @@ impl<F> fmt::Debug for OnsagerDissipation<F> {
     }
 }
 
-/// The terms of a closure as a matrix on covectors dual to velocities.
-fn matrix<'a, M: Manifold, F, const R: usize>(
-    OnsagerDissipation(terms): &'a OnsagerDissipation<F>,
-) -> FieldDissipation<impl Fn(&M::Point<Real>, &Velocity<M, Real>) -> Form<M, Real> + 'a>
-where
-    F: Fn(&M::Point<Real>, &Velocity<M, Real>) -> [Contact<Velocity<M, Real>>; R],
-{
-    FieldDissipation(move |x: &M::Point<Real>, w: &Velocity<M, Real>| {
-        let terms = terms(x, w);
+impl<F> OnsagerDissipation<F> {
+    /// The sum of the terms, as a matrix on covectors dual to velocities.
+    fn sum<M: Manifold, const R: usize>(
+        &self,
+        x: &M::Point<Real>,
+        w: &Velocity<M, Real>,
+    ) -> Form<M, Real>
+    where
+        F: Fn(&M::Point<Real>, &Velocity<M, Real>) -> [Contact<Velocity<M, Real>>; R],
+    {
+        let terms = (self.0)(x, w);
         Form::<M, Real>::from_entries(|i, j| {
-            let entry =
-                |Contact { rate, along }: &Contact<Velocity<M, Real>>| along[i] * along[j] * *rate;
-            terms.iter().map(entry).fold(Real::from(0.0), |sum, entry| sum + entry)
+            let entries = terms.iter().map(|term| term.along[i] * term.along[j] * term.rate);
+            entries.fold(Real::from(0.0), |sum, entry| sum + entry)
         })
-    })
+    }
 }
 
 impl<M, G, F, const R: usize> Dissipation<M, G> for OnsagerDissipation<F>
@@ -74,7 +75,9 @@ where
         w: &Vector<M, D>,
         alpha: &Vector<M, D>,
     ) -> Result<Vector<M, D>, MetricError> {
-        matrix::<M, F, R>(self).apply(g, w, alpha)
+        let sum =
+            FieldDissipation(|x: &M::Point<Real>, w: &Velocity<M, Real>| self.sum::<M, R>(x, w));
+        sum.apply(g, w, alpha)
     }
 
     fn linearise(
@@ -83,10 +86,14 @@ where
         w: &Vector<M>,
         alpha: &Vector<M>,
     ) -> Result<DissipationJet<M>, MetricError> {
-        matrix::<M, F, R>(self).linearise(g, w, alpha)
+        let sum =
+            FieldDissipation(|x: &M::Point<Real>, w: &Velocity<M, Real>| self.sum::<M, R>(x, w));
+        sum.linearise(g, w, alpha)
     }
 
     fn tensor(&self, g: &MetricAt<'_, M, G>, w: &Vector<M>) -> Result<Matrix<M>, MetricError> {
-        Dissipation::<M, G>::tensor(&matrix::<M, F, R>(self), g, w)
+        let sum =
+            FieldDissipation(|x: &M::Point<Real>, w: &Velocity<M, Real>| self.sum::<M, R>(x, w));
+        Dissipation::<M, G>::tensor(&sum, g, w)
     }
 }

@@ -29,9 +29,18 @@ pub trait FrictionTerms<M: Manifold, G: Riemannian<M>>: Friction<M, G> {
         at: &ExchangeArgs<'_, M, G>,
         visit: &mut dyn FnMut(NoiseTerm<Vector<M, Real>>),
     ) -> Result<(), MetricError>;
+
+    /// Returns whether the kinetic drift `Σ_r c_r b_r` vanishes, with the measure 1.
+    fn is_closed(&self) -> bool {
+        false
+    }
 }
 
 impl<M: Manifold, G: NoiseFrame<M>> FrictionTerms<M, G> for Isotropic {
+    fn is_closed(&self) -> bool {
+        G::IS_CLOSED
+    }
+
     fn count(&self) -> usize {
         G::legs()
     }
@@ -87,6 +96,9 @@ pub trait ExchangeTerms<M: Manifold, G: Riemannian<M>>: Exchange<M, G> {
     /// Appends the number of terms of each bath.
     fn counts(&self, list: &mut Vec<usize>);
 
+    /// Returns whether the kinetic drift of a bath vanishes, with the measure 1.
+    fn is_closed(&self, bath: usize) -> bool;
+
     /// Passes the terms of all baths to the visitor, in the order of the list.
     ///
     /// # Errors
@@ -101,6 +113,10 @@ pub trait ExchangeTerms<M: Manifold, G: Riemannian<M>>: Exchange<M, G> {
 
 impl<M: Manifold, G: Riemannian<M>> ExchangeTerms<M, G> for () {
     fn counts(&self, _: &mut Vec<usize>) {}
+
+    fn is_closed(&self, _: usize) -> bool {
+        true
+    }
 
     fn each_term(
         &self,
@@ -120,6 +136,10 @@ where
 {
     fn counts(&self, list: &mut Vec<usize>) {
         self.0.counts(list);
+    }
+
+    fn is_closed(&self, bath: usize) -> bool {
+        self.0.is_closed(bath)
     }
 
     fn each_term(
@@ -142,6 +162,10 @@ where
     fn counts(&self, list: &mut Vec<usize>) {
         self.0.counts(list);
         list.push(self.1.part.friction.count());
+    }
+
+    fn is_closed(&self, bath: usize) -> bool {
+        if bath == L::BATHS { self.1.part.friction.is_closed() } else { self.0.is_closed(bath) }
     }
 
     fn each_term(

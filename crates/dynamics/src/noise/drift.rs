@@ -16,7 +16,7 @@ pub struct Place<M: Manifold> {
     pub w: Vector<M, Real>,
     /// The differential of the entropy.
     pub s: Vector<M, Real>,
-    /// Those of the further invariants.
+    /// The differentials of the further invariants.
     pub invariants: Vec<Vector<M, Real>>,
 }
 

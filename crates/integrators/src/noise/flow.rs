@@ -7,7 +7,9 @@ use metriplectic_manifolds::PointError;
 use super::error::NoiseError;
 use super::fluctuating::Fluctuating;
 use super::system::Noisy;
-use crate::step::{Element, Flow, FlowError, Laws, LedgerSummary, Recheck, Scales, StepError};
+use crate::step::{
+    Element, EventExchange, Flow, FlowError, Laws, LedgerSummary, Recheck, Scales, StepError,
+};
 
 impl<F: Fluctuating<U>, U> Flow for Noisy<F, U> {
     type Space = F::Space;
@@ -57,6 +59,14 @@ impl<F: Fluctuating<U>, U> Flow for Noisy<F, U> {
 
     fn clocked(&self, x: &Element<F>, time: f64) -> Option<Element<F>> {
         self.flow().clocked(x, time)
+    }
+
+    fn jumped(&self, x: &Element<F>, y: Element<F>) -> Element<F> {
+        self.flow().jumped(x, y)
+    }
+
+    fn with_event(&self, x: &Element<F>, event: &EventExchange) -> Option<Element<F>> {
+        self.flow().with_event(x, event)
     }
 
     /// Noise moves each state, so none is at rest.

@@ -32,7 +32,7 @@ pub struct Counter {
 const UNIT: f64 = 1.0 / (1_u64 << 52) as f64;
 /// The numbers of bits for the term in the counter of blocks.
 const TERM_BITS: u32 = 28;
-/// The words in a block of ChaCha.
+/// The words in a block of the generator.
 const WORDS: u128 = 16;
 /// The place of the coin, after all terms.
 const COIN: u64 = (1 << TERM_BITS) - 1;
@@ -43,7 +43,7 @@ impl Counter {
         Self { seed, path: 0, is_three_point: false }
     }
 
-    /// Those of another path.
+    /// Takes another path of the same seed.
     #[must_use]
     pub const fn path(self, path: u64) -> Self {
         Self { path, ..self }

@@ -139,9 +139,12 @@ where
 
     fn has_drift(&self, group: usize, noise: &Noise<U>) -> bool {
         let dissipation = self.closed().dissipation();
-        group > 0
-            || !(dissipation.is_none()
-                || dissipation.is_closed() && noise.is_uniform && Y::Invariants::COUNT == 0)
+        let is_closed = match group.checked_sub(1) {
+            None if dissipation.is_none() => return false,
+            None => dissipation.is_closed() && Y::Invariants::COUNT == 0,
+            Some(bath) => self.exchange().is_closed(bath),
+        };
+        !(is_closed && noise.is_uniform)
     }
 
     fn landed(&self, landing: Landing<'_, Self>) -> Option<StateOf<Y>> {

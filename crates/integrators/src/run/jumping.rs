@@ -10,7 +10,8 @@ use crate::run::state::State;
 use crate::run::steps::Steps;
 use crate::run::watching::{StepBefore, Watching};
 use crate::step::{
-    Element, EventExchange, Flow, JumpError, Laws, StateSpace as _, StepError, Stepper, Vector as _,
+    Element, EventExchange, Flow, JumpError, Laws, Memory as _, StateSpace as _, StepError,
+    Stepper, Vector as _,
 };
 
 /// Where a jump leads.
@@ -81,7 +82,7 @@ impl<F: Flow, M: Stepper<F>> Steps<'_, F, M> {
         self.last_numbers = watching.events.last_numbers(&after);
         event.jump = Some(Jump { after: after.clone(), exchange });
         watching.found.push(event);
-        self.memory = M::Memory::default();
+        self.memory = self.memory.restarted();
         self.entropy = entropy;
         self.before = StepBefore {
             state: after.clone(),
@@ -111,7 +112,7 @@ impl<F: Flow, M: Stepper<F>> Steps<'_, F, M> {
         self.state = self.before.state.clone();
         self.values = self.before.values.clone();
         self.entropy = self.before.entropy;
-        self.memory = M::Memory::default();
+        self.memory = self.memory.restarted();
         self.progress.ending = None;
     }
 

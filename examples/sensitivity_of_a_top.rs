@@ -2,8 +2,8 @@
 //!
 //! The direction `n` of a top precesses by `n' = n × ∂H/∂n` with `H = ½ n_x² + n_y² + ⅖ n_z³`. Neighbours on a circle of radius 0.02
 //! around its start are carried along. The tangent `T` of the one run in the middle maps the circle to an ellipse, in the frame there;
-//! the neighbours lie on it, up to the square of their distance. Area is kept (Liouville), so the ellipse grows as thin as it grows
-//! long: `|T|` grows like `t`, because neighbours on other level curves go round in other times.
+//! the neighbours lie on it, up to the square of their distance. The flow keeps area (Liouville), the midpoint rule to its order: the
+//! ellipse grows as thin as it grows long, because neighbours on other level curves go round in other times.
 
 use std::error::Error;
 use std::f64::consts::TAU;

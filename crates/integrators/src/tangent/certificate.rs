@@ -47,19 +47,17 @@ impl Sensitivity {
         let jets = jets(system, x);
         let off = |df: &Vector<Y::Manifold>, law: &LawOfStart<Vector<Y::Manifold>>| {
             let [here, sizes] = row::<Y>(df, &columns.t);
-            (0..Dim::<Y>::LEN).fold(0.0, |worst: f64, j| {
+            (0..Dim::<Y>::LEN).fold(0.0, |worst, j| {
                 let (off, size) = ((here[j] - law.row[j]).abs(), sizes[j] + law.row[j].abs());
-                let relative = if off == 0.0 { 0.0 } else { off / size };
-                // A number that is none must not be lost.
-                if relative > worst || relative.is_nan() { relative } else { worst }
+                worse(worst, if off == 0.0 { 0.0 } else { off / size })
             })
         };
         let energy = off(&jets.energy.df, &columns.laws.energy);
         let listed = jets.invariants.as_ref().iter().flatten().zip(&columns.laws.invariants);
-        let invariants =
-            listed.fold(0.0, |worst: f64, ((_, jet), law)| worst.max(off(&jet.df, law)));
-        if !(energy.max(invariants) <= BROKEN) || energy.is_nan() {
-            return Err(Unlinearised::LawBroken { off: energy.max(invariants) });
+        let invariants = listed.fold(0.0, |worst, ((_, jet), law)| worse(worst, off(&jet.df, law)));
+        let worst = worse(energy, invariants);
+        if worst > BROKEN || worst.is_nan() {
+            return Err(Unlinearised::LawBroken { off: worst });
         }
         self.steps += 1;
         self.energy = self.energy.max(energy);
@@ -70,6 +68,11 @@ impl Sensitivity {
         }
         Ok(())
     }
+}
+
+/// The larger of two numbers, where NaN is the largest.
+fn worse(old: f64, new: f64) -> f64 {
+    if new > old || new.is_nan() { new } else { old }
 }
 
 impl fmt::Display for Sensitivity {

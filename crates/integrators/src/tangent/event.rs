@@ -53,7 +53,7 @@ impl<D: Differentiable> TangentEvent<D> {
         let rate = df.dot(&self.velocity);
         let (dg, speed) = self.lengths(&df);
         let slope = rate.abs() / (dg * speed);
-        if !(slope > GRAZING) {
+        if slope.is_nan() || slope <= GRAZING {
             let (event, time) = (self.event.name.to_string(), self.state.time);
             return Err(TangentError::Grazing { event, time, slope });
         }

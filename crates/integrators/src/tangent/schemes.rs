@@ -45,15 +45,14 @@ struct Shot<Y: Metriplectic> {
     jacobian: Matrix<Y::Manifold>,
 }
 
+/// An unknown, and its path.
+type Path<Y> = (Vector<<Y as Metriplectic>::Manifold>, StepPathJet<<Y as Metriplectic>::Manifold>);
+
 /// Corrections of the unknown of a path with a known end.
 const CORRECTIONS: usize = 8;
 
 /// The path of a retraction from `x` to `y`, by Newton's method on its end, which begins at the geodesic.
-fn path<Y, R>(
-    system: &Y,
-    retraction: &R,
-    [x, y]: [&Point<Y>; 2],
-) -> Option<(Vector<Y::Manifold>, StepPathJet<Y::Manifold>)>
+fn path<Y, R>(system: &Y, retraction: &R, [x, y]: [&Point<Y>; 2]) -> Option<Path<Y>>
 where
     Y: Metriplectic,
     R: Retraction<Y::Manifold, Y::Metric>,

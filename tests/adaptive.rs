@@ -89,8 +89,7 @@ fn the_laws_hold_in_steps_of_random_sizes() {
     for step in 1..100_000 {
         let fraction = (f64::from(step) * 0.618_033_988_749_894_9).fract();
         let h = 1e-4 * 1e4_f64.powf(fraction);
-        let entropy = 0.5 * x.norm_squared();
-        let values = Laws { energy: energy(&x), entropy, invariants: [0.0; 3] };
+        let values = Flow::laws(&body, &x);
         let reference = Laws { energy: start, ..values };
         let from = StepStart { x: &x, time, values, reference, allowed: None };
         let taken = scheme.step(&body, &from, h, &mut memory).expect("the step is solved");

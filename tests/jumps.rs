@@ -13,7 +13,7 @@ fn oscillator() -> impl Metriplectic<Manifold = Euclidean<2>, Metric = Canonical
         .bracket(Symplectic)
         .energy(|x: &Vector2<Real>| x.norm_squared() * 0.5)
         .build()
-        .unwrap()
+        .expect("it is a system")
 }
 
 /// A wall at `q = −1/2` that gives back the fraction `e` of the momentum.
@@ -49,9 +49,10 @@ fn an_elastic_wall_keeps_the_energy_and_the_order_of_every_method() {
                 let span = wall(Span::steps(h, count as usize), 1.0);
                 let run = $method.run(&system, vector![1.0, 0.0], span).unwrap();
                 assert!(run.certificate().keeps_energy(), "{}", run.certificate());
-                assert!(run.states().len() == count as usize + 1 && run.last().time == end);
+                assert_eq!(run.states().len(), count as usize + 1);
+                assert_eq!(run.last().time.to_bits(), end.to_bits());
                 assert_eq!(run.certificate().jumps[0].count, 3);
-                assert_eq!(run.certificate().jumps[0].work, 0.0);
+                assert!(run.certificate().jumps[0].work.abs() == 0.0);
                 (h, (run.last().point - between_walls(end)).norm())
             }).collect();
             let order = slope(&points);
@@ -77,7 +78,7 @@ fn an_elastic_wall_keeps_the_energy_and_the_order_of_every_method() {
             // The time of an event is the end of a step, and the next one starts after the jump.
             for event in run.events() {
                 let Jump { after, .. } = event.jump.as_ref().unwrap();
-                assert_eq!(after.time, event.state.time);
+                assert_eq!(after.time.to_bits(), event.state.time.to_bits());
                 assert_eq!(after.point, vector![event.state.point.x, -event.state.point.y]);
                 assert!(run.iter().any(|state| state == after));
             }
@@ -109,7 +110,7 @@ macro_rules! ball {
 }
 
 fn ball() -> impl Metriplectic<Manifold = Product<Euclidean<2>, Euclidean<1>>, Metric = Canonical> {
-    ball!().build().unwrap()
+    ball!().build().expect("it is a system")
 }
 
 type Ball = (Vector2<f64>, Vector1<f64>);

@@ -17,7 +17,7 @@ fn rod(sites: usize) -> Lattice<impl Model<Manifold = Rod>> {
             [Onsager { rate: u.x * v.x, b: [vector![1.0], vector![-1.0]] }]
         })
         .build()
-        .unwrap()
+        .expect("it is a lattice")
 }
 
 /// A bath that gives the heat `2 (T − u)` to a site.

@@ -18,6 +18,10 @@ const STRING: [f64; 2] = [0.3, 0.9];
 
 /// A pendulum whose string is pulled, with a torque, a bearing of the energy `U` and the entropy `C ln U`, friction inside, and
 /// a bath on its momentum and on `U`. Nothing is quadratic.
+#[allow(
+    clippy::type_complexity,
+    reason = "a type with parts that have no names cannot be given one"
+)]
 fn pendulum() -> OpenSystem<
     impl Metriplectic<
         Manifold = Space,
@@ -53,7 +57,7 @@ fn pendulum() -> OpenSystem<
             }),
         )
         .build()
-        .unwrap()
+        .expect("it is a system")
 }
 
 mod traps;

@@ -128,16 +128,16 @@ fn times_of_events_have_derivatives() {
     let span = Span::until(20.0).tolerance(1e-11).event("x", |p: &Vector3<f64>| p.x).stop();
     let run = DormandPrince8.tangent(&family.at_parameters(THETA), START, span).unwrap();
     let event = &run.events()[0];
-    assert_eq!(run.last().time, event.state.time);
+    assert_eq!(run.last().time.to_bits(), event.state.time.to_bits());
     let found = event.time_along(&|p: &Vector3<Real>| p.x).unwrap();
     let mut worst = 0.0_f64;
     for k in 0..7 {
         let at = |d: f64| {
             let (mut x, mut t) = (START, THETA);
             if k < 3 {
-                x[k] += d
+                x[k] += d;
             } else {
-                t[k - 3] += d
+                t[k - 3] += d;
             }
             times(x, t)
         };

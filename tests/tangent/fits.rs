@@ -23,7 +23,7 @@ struct Data {
 fn data(theta: Vector4<f64>) -> Data {
     let times: Vec<f64> = (1..=80).map(|k| 0.25 * f64::from(k)).collect();
     let span = Span::steps(0.25, 80);
-    let run = DormandPrince8.run(&body().at_parameters(theta), START, span).unwrap();
+    let run = DormandPrince8.run(&body().at_parameters(theta), START, span).expect("it runs");
     Data { times, truth: run.states()[1..].iter().map(|state| state.point).collect(), span }
 }
 
@@ -39,7 +39,7 @@ fn noisy(truth: &[Vector3<f64>], rng: &mut ChaCha8Rng) -> Vec<Vector3<f64>> {
 /// `(φ̂ − φ)ᵀ C⁻¹ (φ̂ − φ)` in the logarithms of the parameters.
 fn distance(fit: &Fitted, theta: &Vector4<f64>) -> f64 {
     let off = DVector::from_fn(4, |k, _| (fit.parameters[k] / theta[k]).ln());
-    off.dot(&fit.covariance.matrix.clone().lu().solve(&off).unwrap())
+    off.dot(&fit.covariance.matrix.clone().lu().solve(&off).expect("a covariance"))
 }
 
 #[test]

@@ -54,10 +54,12 @@ fn along_parameters<Y, M, const P: usize>(
     M: Copy + Stepper<Y::System> + LinearisedStep<<Y::System as Differentiable>::Wide>,
     <Y::System as Metriplectic>::Manifold: Manifold,
 {
-    let run = method.tangent(&family.at_parameters(theta), x0.clone(), span).unwrap();
+    let run = method.tangent(&family.at_parameters(theta), x0.clone(), span);
+    let run = run.expect("it has a tangent");
     let found =
         differences::<Euclidean<P>, <Y::System as Metriplectic>::Manifold>(&theta, 1e-3, |t| {
-            method.run(&family.at_parameters(*t), x0.clone(), span).unwrap().last().point.clone()
+            let run = method.run(&family.at_parameters(*t), x0.clone(), span).expect("it runs");
+            run.last().point.clone()
         });
     let error = off(&run.last().along_parameters(), &found);
     println!("{name}: θ {error:.1e}; {}", run.sensitivity());

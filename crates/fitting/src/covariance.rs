@@ -42,7 +42,7 @@ impl Covariance {
                 .sum();
             variance * sum / (lengths[i] * lengths[j])
         });
-        let is_unseen = |k: &usize| !(values[*k] >= UNSEEN * largest);
+        let is_unseen = |k: &usize| values[*k].is_nan() || values[*k] < UNSEEN * largest;
         let unseen = (0..n).filter(is_unseen).map(|k| v.column(k).into_owned()).collect();
         Self { matrix, unseen, fraction }
     }

@@ -1,6 +1,7 @@
 //! Fits of the parameters of a family.
 
 use std::cell::RefCell;
+use std::cmp::Ordering;
 use std::fmt;
 
 use argmin::core::{Executor, State as _, TerminationReason};
@@ -266,7 +267,7 @@ where
             return Err(FitError::Rows { rows, times });
         }
         for (row, pair) in self.times.windows(2).enumerate() {
-            if !(pair[1] > pair[0]) {
+            if pair[1].partial_cmp(&pair[0]) != Some(Ordering::Greater) {
                 return Err(FitError::Times { row: row + 1, time: pair[1] });
             }
         }

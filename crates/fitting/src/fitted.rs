@@ -93,7 +93,7 @@ impl Fitted {
                             value,
                             standard_error: error * unknown.slope(value),
                             positive: unknown.positive,
-                            at_bound: unknown.positive && !(error <= 1.0),
+                            at_bound: unknown.positive && (error > 1.0 || error.is_nan()),
                         }
                     }
                     None => Estimate {

@@ -240,7 +240,7 @@ mod tests {
         fn squares(&self, u: &[f64]) -> Option<Squares> {
             let (a, b) = (u[0], u[1].exp());
             let x = |i: usize| 0.1 * (i + 1) as f64;
-            let noise = |i: usize| if i % 2 == 0 { 0.1 } else { -0.1 };
+            let noise = |i: usize| if i.is_multiple_of(2) { 0.1 } else { -0.1 };
             let residual =
                 |i, _| a * x(i) + b * x(i) * x(i) - 2.0 * x(i) + 0.01 * x(i) * x(i) + noise(i);
             let slope = |i, j| if j == 0 { x(i) } else { b * x(i) * x(i) };

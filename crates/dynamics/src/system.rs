@@ -43,7 +43,7 @@ pub(crate) struct Fields<H, S, L> {
     pub(crate) invariants: L,
 }
 
-/// What a builder knows beside the parts.
+/// The settings of a builder beside the parts.
 #[derive(Clone, Copy)]
 pub(crate) struct Context {
     pub(crate) has_entropy: bool,

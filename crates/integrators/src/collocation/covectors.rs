@@ -203,7 +203,7 @@ pub(super) trait Law<M: Space> {
     /// The value and the differential at a stage.
     fn jet1(&self, stage: usize, x: &M::Point<f64>) -> Jet1<M>;
 
-    /// What time alone would change of it in the whole step at its rate at a stage, if it depends on time.
+    /// Returns its change by time alone in the whole step at its rate at a stage, if it depends on time.
     fn rate(&self, stage: usize, x: &M::Point<f64>) -> Option<f64>;
 
     /// Its derivative along the polynomial of the step at a fraction of it, where the point is `x`.

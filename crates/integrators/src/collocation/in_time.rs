@@ -16,7 +16,7 @@ pub(crate) trait EnergyInTime<M: Space>: Debug {
     /// The size of the terms of this change.
     fn size(&self, x: &M::Point<f64>, end: &M::Point<f64>, z: &M::Point<f64>) -> f64;
 
-    /// What time would change in the whole step at the rate `∂_tH` that it has at a fraction of it. The length of the step is
+    /// Returns the change by time in the whole step at the rate `∂_tH` that it has at a fraction of it. The length of the step is
     /// the difference of the two times, which is not quite its nominal size.
     fn rate(&self, node: f64, x: &M::Point<f64>) -> f64;
 

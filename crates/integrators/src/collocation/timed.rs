@@ -25,7 +25,7 @@ pub(crate) struct StageSolution<Y: Metriplectic> {
     pub(crate) z: Point<Y>,
     /// The nodes and the weights of the stages, and the stages with the covectors of energy and entropy.
     pub(crate) stages: Vec<Stage<Y>>,
-    /// What the energy has lost beside work and heat of the stages, in a method that damps: not positive.
+    /// The loss of energy beside work and heat of the stages, in a method that damps: not positive.
     pub(crate) lost: f64,
     pub(crate) evidence: Evidence,
     pub(crate) effort: Effort,

@@ -12,7 +12,7 @@ pub(super) struct Failure {
 }
 
 impl Failure {
-    /// What a run is told of a step of adaptive size.
+    /// Makes the refusal of a step of adaptive size.
     pub(super) fn into_refusal(self, time: f64, h: f64) -> Refusal {
         let error = self.cause.first_law(time, h);
         Refusal { effort: self.effort, error, second_law: false }

@@ -9,7 +9,7 @@ use metriplectic_manifolds::Manifold;
 use crate::round_off::sum::plus;
 use crate::step::{EventExchange, LedgerSummary, StateSpace};
 
-/// What is booked in a step: the work of the parameter, and the entries of ports and baths.
+/// The entries of a step: the work of the parameter, and those of ports and baths.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Booked<E> {
     /// The work `W_t` that is done by the time in the energy.
@@ -24,13 +24,13 @@ impl<E: Entries> Booked<E> {
         index.checked_sub(1).map_or(self.parameter, |index| self.entries.get(index))
     }
 
-    /// Nothing.
+    /// A step in which nothing is booked.
     pub(super) fn nothing() -> Self {
         Self { parameter: 0.0, entries: E::from_index(|_| 0.0) }
     }
 }
 
-/// What an entry of a ledger is.
+/// The kind of an entry of a ledger.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Kind {
     Work,
@@ -43,7 +43,7 @@ enum Kind {
 pub(super) struct Columns(Vec<(Arc<str>, Kind)>);
 
 impl Columns {
-    /// Those of the parts with these names.
+    /// Makes the columns of the parts with these names.
     pub(super) fn new(names: &Names) -> Self {
         let kinds =
             |is_bath: bool| if is_bath { &[Kind::Heat, Kind::Entropy][..] } else { &[Kind::Work] };
@@ -70,7 +70,7 @@ impl Columns {
     }
 }
 
-/// What has flowed into a system since the start of a run: the work of the parameter, the work of each port, the heat of
+/// The exchange of a system with its surroundings since the start of a run: the work of the parameter, the work of each port, the heat of
 /// each bath, and the entropy that the baths have gained.
 ///
 /// Each sum is compensated. All work and heat goes into one more sum, [`net`](Self::net), by which the balance of
@@ -79,9 +79,9 @@ impl Columns {
 pub struct Ledger {
     /// The sum of all work and heat, and what rounding has lost of it.
     net: [f64; 2],
-    /// The same of the parameter, and of each column.
+    /// The work of the parameter, and the sum of each column.
     sums: Box<[[f64; 2]]>,
-    /// The same of the work and the heat of events, and of the entropy that their surroundings have gained.
+    /// The sums of the work and the heat of events, and of the entropy that their surroundings have gained.
     events: [[f64; 2]; 3],
     columns: Arc<Columns>,
 }
@@ -151,7 +151,7 @@ impl Ledger {
         (a - b) + (low_a - low_b)
     }
 
-    /// What was booked between another ledger and this one.
+    /// Returns the entries that were booked between another ledger and this one.
     pub(super) fn since<E: Entries>(&self, other: &Self) -> Booked<E> {
         let change = |index| self.change(other, index);
         Booked { parameter: change(0), entries: E::from_index(|i| change(i + 1)) }
@@ -261,7 +261,7 @@ pub struct OpenState<P> {
     pub x: P,
     /// The time.
     pub time: f64,
-    /// What has flowed into the system since the start of the run.
+    /// The exchange of the system since the start of the run.
     pub ledger: Ledger,
 }
 

@@ -130,7 +130,7 @@ where
         self.columns.heats().zip(temperatures).collect()
     }
 
-    /// What ports and baths do at a point, with the covectors of energy and entropy there.
+    /// Computes the motion by ports and baths at a point, with the covectors of energy and entropy there.
     pub(super) fn exchanged(
         &self,
         t: f64,

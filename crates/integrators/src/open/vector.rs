@@ -17,7 +17,7 @@ pub struct OpenVector<V, E> {
     pub v: V,
     /// The time.
     pub clock: f64,
-    /// What is booked.
+    /// The entries of the ledger.
     pub booked: Booked<E>,
 }
 

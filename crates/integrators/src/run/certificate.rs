@@ -98,14 +98,14 @@ pub struct Certificate {
     /// state, from the Jacobians that were formed; 0 without dissipation, and in steps that damp it. The midpoint
     /// rule damps no deviation that decays much faster than a step: it is multiplied by almost −1.
     pub friction: f64,
-    /// What has flowed into an open system; `None` for a closed one. The energy of an open system is `H − W − Q`, and
+    /// The exchange of an open system; `None` for a closed one. The energy of an open system is `H − W − Q`, and
     /// its entropy that of the system and its baths.
     #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
     pub exchange: Option<LedgerSummary>,
     /// The balance of each event at which the state has [jumped](crate::Watched::jump).
     #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Vec::is_empty"))]
     pub jumps: Vec<JumpBalance>,
-    /// What jumps have brought into a system whose states have no ledger.
+    /// The work and heat of jumps of a system whose states have no ledger.
     #[cfg_attr(feature = "serde", serde(skip))]
     pub(crate) exchanged_in_jumps: Exchanged,
     /// The thermal noise of the run; `None` for one without.
@@ -331,7 +331,7 @@ impl Certificate {
         self.exchanged_in_jumps.energy_after(self.initial_energy)
     }
 
-    /// What the entropy and that of the surroundings of events have gained.
+    /// The gain of the entropy and of that of the surroundings of events.
     fn gained(&self, entropy: f64) -> f64 {
         (entropy - self.initial_entropy) + self.exchanged_in_jumps.entropy[0]
     }

@@ -188,11 +188,11 @@ pub(crate) struct Restart<'a, M: StateSpace> {
 /// The events of a step.
 pub(crate) struct Found<M: StateSpace> {
     pub(crate) events: Vec<Event<M>>,
-    /// What the last of them does.
+    /// The action of the last of them.
     pub(crate) end: Option<Interruption>,
 }
 
-/// What an event does to the run.
+/// The effect of an event on the run.
 pub(crate) enum Interruption {
     Stop,
     /// The state jumps. Other events at the same time are found again after it, with their directions.

@@ -50,7 +50,7 @@ impl JumpBalance {
     }
 }
 
-/// What jumps have exchanged with a system whose states have no ledger, as sums of two numbers.
+/// The exchange by jumps of a system whose states have no ledger, as sums of two numbers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Exchanged {
     pub(crate) energy: [f64; 2],
@@ -139,7 +139,7 @@ impl<M: StateSpace> JumpOn<M> {
         (self.map.0)(state.time, &state.point)
     }
 
-    /// What a change of the energy is: heat if the surroundings have a temperature, and work if not.
+    /// Returns the exchange of a change of the energy: heat if the surroundings have a temperature, and work if not.
     pub(crate) fn exchange(&self, energy: f64) -> EventExchange {
         match self.temperature {
             Some(temperature) => {

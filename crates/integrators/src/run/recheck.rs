@@ -66,7 +66,7 @@ impl<F: Flow, M: Stepper<F>> Steps<'_, F, M> {
         self.flow.reexamine(x, occasion).map_err(|law| StepError::Flow { time, law })
     }
 
-    /// What must hold on every step, at the frozen state along a step of one size that was not taken.
+    /// Finds a jump of the protocol along a step of one size that was not taken, at the frozen state.
     fn jump_inside(&self, h: f64) -> Option<StepError> {
         let is_fixed = matches!(self.progress.step_size, StepSize::Fixed(_));
         if !is_fixed || !self.progress.corners.is_empty() {

@@ -249,7 +249,7 @@ impl Watched {
     /// Changes the state at the event: `x'` from the time and the state at which it was found. The time of the event is the end
     /// of a step, and the next one starts from `x'`.
     ///
-    /// What the energy changes by is work of the event, and the certificate lists it
+    /// The change of the energy is work of the event, and the certificate lists it
     /// ([`Certificate::jumps`](crate::Certificate::jumps)). So the first law of the run is `ΔH = W`. It is heat if you
     /// name a temperature with [`heat_at`](Jumping::heat_at). The states of an open system have both in their
     /// ledger. A map that lowers the entropy of the system and its surroundings ends the run in

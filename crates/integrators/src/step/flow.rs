@@ -155,7 +155,7 @@ pub trait Flow {
         false
     }
 
-    /// What has flowed into the system up to a state, for the certificate of an open one.
+    /// Returns the exchange of the system up to a state, for the certificate of an open one.
     fn ledger(&self, x: &Element<Self>) -> Option<LedgerSummary> {
         let _ = x;
         None

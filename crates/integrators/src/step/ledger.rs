@@ -1,4 +1,4 @@
-//! What has flowed into an open system, for its certificate.
+//! The exchange of an open system, for its certificate.
 
 use std::sync::Arc;
 
@@ -15,7 +15,7 @@ pub struct EventExchange {
     pub entropy: f64,
 }
 
-/// What has flowed into an open system since the start of a run.
+/// The exchange of an open system since the start of a run.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct LedgerSummary {

@@ -1,4 +1,4 @@
-//! What a certificate says of noise.
+//! The lines of a certificate on noise.
 
 /// The noise of a run.
 #[derive(Clone, Debug, PartialEq)]

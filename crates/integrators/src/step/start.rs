@@ -41,7 +41,7 @@ impl<'a, Y: Metriplectic> Start<'a, Y> {
         Self { x, time, h, values, accumulated_error }
     }
 
-    /// What earlier steps have left of the laws, from those at the start of a step and of the run.
+    /// Returns the round-off that earlier steps have left of the laws, from those at the start of a step and of the run.
     pub(crate) fn accumulated([values, reference]: [&Laws<Numbers<Y>>; 2]) -> DriftCorrection<Y> {
         Laws {
             energy: values.energy - reference.energy,

@@ -31,7 +31,7 @@ pub trait Stepper<F: Flow>: Sized {
         false
     }
 
-    /// What the method says of the noise of a run; `None` for one without random numbers.
+    /// Describes the noise of a run; `None` for one without random numbers.
     fn noise(&self, flow: &F) -> Option<NoiseSummary> {
         let _ = flow;
         None

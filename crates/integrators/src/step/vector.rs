@@ -192,14 +192,14 @@ impl<V: Column<f64>> Vector for Components<V> {
         Self(sum * h)
     }
 
-    /// The same bits as the default, with each ratio taken once.
+    /// Gives the bits of the default, and takes each ratio once.
     #[inline]
     fn relative_to(&self, sizes: &Self) -> f64 {
         let ratio = |i| if self.0[i] == 0.0 { 0.0 } else { (self.0[i] / sizes.0[i]).abs() };
         norm(&V::from_index(ratio))
     }
 
-    /// The same bits as the default, which divides by one.
+    /// Gives the bits of the default, which divides by one.
     #[inline]
     fn norm_of<const K: usize>(vectors: [&Self; K], f: impl Fn([f64; K]) -> f64 + Sync) -> f64 {
         norm(&V::from_index(|i| f(vectors.map(|v| v.0[i])).abs()))

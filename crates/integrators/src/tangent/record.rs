@@ -13,6 +13,7 @@ use super::linearised::Linearised;
 use super::pieces::Wide;
 use super::state::TangentState;
 use super::steps::{Inside, TangentSteps};
+use crate::run::SpanError;
 use crate::run::certificate::Certificate;
 use crate::run::ending::Ending;
 use crate::run::error::RunError;
@@ -116,7 +117,7 @@ where
     let asked = !steps.outputs.is_empty();
     let (mut states, mut events) = (vec![steps.state()], Vec::new());
     if steps.steps.is_endless() {
-        return Err(RunError::from(crate::SpanError::Endless).into());
+        return Err(RunError::from(SpanError::Endless).into());
     }
     while steps.ending().is_none() {
         let Inside { outputs, events: found } = steps.take_step()?;

@@ -13,6 +13,7 @@ use super::frames::between;
 use super::linearised::{Linearised, Propagated};
 use super::pieces::{Ended, Wide, propagate};
 use super::state::TangentState;
+use crate::run::certificate::Certificate;
 use crate::run::ending::Ending;
 use crate::run::event::Event;
 use crate::run::last_step::LastStep;
@@ -67,7 +68,7 @@ where
     }
 
     /// The balance of the run itself.
-    pub const fn certificate(&self) -> &crate::Certificate {
+    pub const fn certificate(&self) -> &Certificate {
         self.steps.certificate()
     }
 

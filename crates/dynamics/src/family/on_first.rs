@@ -120,6 +120,7 @@ impl<F, const P: usize> Freeze<P> for FieldOf<F> {
     }
 }
 
+#[diagnostic::do_not_recommend]
 impl<M, G, F, const P: usize> Dissipation<M, G> for FieldAt<F, P>
 where
     M: Manifold,
@@ -169,6 +170,7 @@ where
     })
 }
 
+#[diagnostic::do_not_recommend]
 impl<M, G, F, const P: usize> Dissipation<Product<M, Euclidean<P>>, G> for FieldOf<F>
 where
     M: Manifold + Times<Euclidean<P>>,

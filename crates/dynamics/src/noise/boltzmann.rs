@@ -87,6 +87,7 @@ impl<F> Fluctuation for Measured<F> {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Uniform;
 
+#[diagnostic::do_not_recommend]
 impl<M: Space> ScalarField<M> for Uniform {
     fn at<D: Scalar>(&self, _: &M::Point<D>) -> D {
         D::zero()

@@ -24,6 +24,7 @@ impl<C, H> Clone for EnergyAt<'_, C, H> {
 
 impl<C, H> Copy for EnergyAt<'_, C, H> {}
 
+#[diagnostic::do_not_recommend]
 impl<M: Space, C: Clock<M, H>, H> ScalarField<M> for EnergyAt<'_, C, H> {
     #[inline]
     fn at<D: Scalar>(&self, x: &M::Point<D>) -> D {

@@ -470,7 +470,7 @@ fn a_bond_that_breaks_a_law_in_the_middle_of_a_run_ends_it_there() {
                 other => panic!("{other}"),
             };
             assert_eq!(place, Place::Bond { bond: 17, sites: [17, 18] });
-            assert!((time - 0.89).abs() < 1e-9, "{time}");
+            assert!((time - 1.49).abs() < 1e-9, "{time}");
         }
     }
 }
@@ -490,7 +490,7 @@ fn a_site_that_loses_a_derivative_on_the_way_ends_the_run_there() {
             .conserved(|x: &Vector2<Real>| x.x)
             .build()
             .expect("the parts make a lattice");
-        let span = Span::steps(0.001, 6000).at_most(2);
+        let span = Span::steps(0.001, 10_000).at_most(2);
         let run = DormandPrince5.run(&lattice, lattice.points(warm), span);
         let Err(RunError::Step { cause: StepError::Flow { time, law }, .. }) = run else {
             panic!("not refused: {run:?}");
@@ -500,7 +500,7 @@ fn a_site_that_loses_a_derivative_on_the_way_ends_the_run_there() {
             LatticeError::WrongDerivative { what: "energy", place: Place::Site(site), .. }
                 if site == odd
         );
-        assert!(found && time < 5.5, "{law} at {time}");
+        assert!(found && time < 9.5, "{law} at {time}");
     }
 }
 

@@ -26,6 +26,7 @@ impl<K: Clone, const P: usize> Freeze<P> for OnFirst<K> {
     }
 }
 
+#[diagnostic::do_not_recommend]
 impl<A, B, G, K> Dissipation<Product<A, B>, G> for OnFirst<K>
 where
     A: Manifold + Times<B>,

@@ -157,14 +157,14 @@ const READ: [Tableau; 2] =
 #[test]
 fn rows_that_are_compiled_as_constants_give_the_bits_of_rows_that_are_read() {
     let (body, start) = (models::relaxing_body(), models::UNSTABLE);
-    let span = || Span::until(40.0).tolerance(1e-7);
+    let span = || Span::until(100.0).tolerance(1e-7);
     let compiled = [
         DormandPrince5.run(&body, start, span()).expect("it runs"),
         DormandPrince8.run(&body, start, span()).expect("it runs"),
     ];
     for (run, tableau) in compiled.iter().zip(&READ) {
         let read = ExplicitRungeKutta::new(tableau).run(&body, start, span()).expect("it runs");
-        assert!(run.certificate().steps > 20);
+        assert!(run.certificate().steps > 10, "{}", run.certificate());
         assert_eq!(run.states(), read.states(), "{}", tableau.name());
     }
 }

@@ -39,7 +39,7 @@ pub use vector::OpenSiteVector;
 /// use metriplectic_integrators::{DormandPrince5, Method, Span};
 /// use metriplectic_lattices::{Graph, Lattice, Onsager, SiteState};
 /// use metriplectic_manifolds::Euclidean;
-/// use nalgebra::{Vector1, vector};
+/// use nalgebra::{ComplexField, Vector1, vector};
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// // Heat in a rod of 20 sites with the energy u and the entropy ln u, whose first site touches a bath at T = 2.
 /// let rod = Lattice::on(Graph::chain(20), Euclidean::<1>)

@@ -1,4 +1,4 @@
-//! What a step that is tried costs, what a short run costs beside its steps, and what a journal costs beside its rows, in
+//! The cost of a step that is tried, of a short run beside its steps, and of a journal beside its rows, in
 //! instructions.
 //!
 //! `cargo bench -p metriplectic-benches --bench runs` counts with callgrind. A count is a difference of two executions,
@@ -158,7 +158,7 @@ fn sweep(journal: bool, rows: usize) {
     let _ = std::fs::remove_file(path);
 }
 
-/// What callgrind counts of this program with a task, and what the program prints.
+/// Returns the count by callgrind of this program with a task, and the output of the program.
 struct Counted {
     instructions: f64,
     printed: String,

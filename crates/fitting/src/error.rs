@@ -87,7 +87,7 @@ pub enum FitError {
         runs: usize,
         /// The least sum of squares so far.
         chi_squared: f64,
-        /// Where it is.
+        /// The parameters of this sum.
         parameters: Vec<f64>,
     },
 }

@@ -47,7 +47,7 @@ pub trait Fluctuation {
     /// The type of `ln μ`.
     type Measure;
 
-    /// Whether the density is 1.
+    /// True if the density is 1.
     const IS_UNIFORM: bool;
 
     /// Boltzmann's constant.

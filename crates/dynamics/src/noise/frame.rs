@@ -18,7 +18,7 @@ use crate::exchange::components;
     note = "it is for the canonical metric, and for `Metric::constant` and `Metric::field` on a vector space or a chart; write the friction as `OnsagerDissipation(|x, w| [Contact {{ rate, along }}])` otherwise"
 )]
 pub trait NoiseFrame<M: Manifold>: Riemannian<M> {
-    /// Whether `Σ_{ab} (div X_ab) X_ab = 0` for all `X_ab = E_a ⟨w, E_b⟩ − E_b ⟨w, E_a⟩` with `w = dH`.
+    /// True if `Σ_{ab} (div X_ab) X_ab = 0` for all `X_ab = E_a ⟨w, E_b⟩ − E_b ⟨w, E_a⟩` with `w = dH`.
     const IS_CLOSED: bool;
 
     /// The number of fields.

@@ -26,7 +26,7 @@ pub trait Gradient<M: Space> {
     fn of(&mut self, f: &impl ScalarField<M>) -> Self::Covector;
 }
 
-/// One covector for each field of a system with `C` further invariants.
+/// The covectors of the fields of a system with `C` further invariants.
 #[derive(Clone, Copy, Debug)]
 pub struct Covectors<C: Dimension, V: Copy + Debug + Send + Sync> {
     /// The covector of the energy, `w_H`.

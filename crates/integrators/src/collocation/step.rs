@@ -72,6 +72,7 @@ pub(super) fn try_step<Y: Metriplectic>(
     // What is left of a deviation by the ratio R produces R² hλ of what the step has produced, or more. A deviation
     // that the entropy does not show is round-off.
     let produced = at.growth.abs() + at.surplus + ROUNDED * at.sizes.entropy;
+    // hλ has no unit; where it is below 1, friction is resolved.
     let damped = DAMPED * linear.friction.max(1.0) * produced;
     let evidence = Evidence {
         entropy_slope: at.entropy_slope,

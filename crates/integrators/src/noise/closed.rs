@@ -11,7 +11,7 @@ use super::error::NoiseError;
 use super::fluctuating::{Drawn, Fluctuating, Landing, Noise};
 use crate::step::{Components, Flow};
 
-/// The part of the sizes of the terms of a sum that may be left over by round-off.
+/// The round-off of a sum, relative to the sizes of its terms.
 const ROUND_OFF: f64 = 1e-9;
 
 impl<Y, U> Fluctuating<U> for Y

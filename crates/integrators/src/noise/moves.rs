@@ -127,7 +127,7 @@ impl<'a, F: Fluctuating<U>, U, R: Numbers> Moves<'a, F, U, R> {
         if numbers.iter().all(|xi| *xi == 0.0) {
             return Ok(());
         }
-        // One square root: it has no unit left over that would be rounded.
+        // One square root, so that another unit by a power of two gives the same digits.
         let strength = 2.0 * self.system.noise().k_b * self.h;
         let xi = |r: usize| numbers[r - terms.start];
         let field = |x: &Element<F>| flow.noise(x, terms.clone(), (strength, &xi));

@@ -35,7 +35,7 @@ where
 
     fn laws(&self, x: &StateOf<Y>) -> Laws<Numbers<Y>> {
         let laws = self.closed().laws(&x.x);
-        self.balanced(x, Laws { energy: self.energy(x.time, &x.x), ..laws })
+        x.ledger.balanced(Laws { energy: self.energy(x.time, &x.x), ..laws })
     }
 
     fn term_sizes(&self, x: &StateOf<Y>) -> Laws<Numbers<Y>> {
@@ -230,13 +230,6 @@ where
     C: Clock<Y::Manifold, Y::Energy>,
     X: Exchange<Y::Manifold, Y::Metric>,
 {
-    /// The laws of the open system, from those of the system at this state: `H − W − Q`, and `S + Σ S_b`.
-    pub(super) fn balanced(&self, x: &StateOf<Y>, laws: Laws<Numbers<Y>>) -> Laws<Numbers<Y>> {
-        let [net, rest] = x.ledger.net_parts();
-        let entropy = laws.entropy + x.ledger.entropy_of_baths();
-        Laws { energy: (laws.energy - net) - rest, entropy, ..laws }
-    }
-
     /// The differentials of all laws at a point.
     pub(super) fn covectors(&self, t: f64, x: &Point<Y>) -> CovectorsOf<Y> {
         differentials(&self.without_exchange(t), &ChartPoint::<Y::Manifold>::centre(x))

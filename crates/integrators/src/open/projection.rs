@@ -91,13 +91,7 @@ where
         target: &Target<'_, Self>,
     ) -> Result<Projected<Self>, ProjectionError> {
         let OpenState { x, time, ledger } = y;
-        let [net, rest] = ledger.net_parts();
-        let of_baths = ledger.entropy_of_baths();
-        let laws = Laws {
-            energy: (target.laws.energy + net) + rest,
-            entropy: target.laws.entropy - of_baths,
-            ..*target.laws
-        };
+        let (laws, of_baths) = (ledger.targets(target.laws), ledger.entropy_of_baths());
         let has_entropy = self.closed().second_law() == SecondLaw::Exact;
         let [limit, units, error] = [target.limit, target.units, target.error]
             .map(|direction| direction.map(Self::components));
@@ -130,6 +124,6 @@ where
 {
     /// The gradients of the open system, from those of the system at this state.
     fn gradients_at(&self, x: &StateOf<Y>, jets: JetsOf<Y>) -> OpenGradientsOf<Y> {
-        OpenGradients { values: self.balanced(x, jets.values()), jets }
+        OpenGradients { values: x.ledger.balanced(jets.values()), jets }
     }
 }

@@ -7,7 +7,7 @@ use metriplectic_dynamics::exchange::{Entries, Names};
 use metriplectic_manifolds::Manifold;
 
 use crate::round_off::sum::plus;
-use crate::step::{EventExchange, LedgerSummary, StateSpace};
+use crate::step::{EventExchange, Laws, LedgerSummary, StateSpace};
 
 /// The entries of a step: the work of the parameter, and those of ports and baths.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -157,11 +157,6 @@ impl Ledger {
         Booked { parameter: change(0), entries: E::from_index(|i| change(i + 1)) }
     }
 
-    /// The sum of all work and heat, and its last digits.
-    pub const fn net_parts(&self) -> [f64; 2] {
-        self.net
-    }
-
     /// The work `W_t` of the time in the energy, into the system.
     pub fn parameter_work(&self) -> f64 {
         self.sums[0][0]
@@ -205,6 +200,26 @@ impl Ledger {
     pub fn entropy_of_baths(&self) -> f64 {
         let entropies = self.of_kind(Kind::Entropy);
         entropies.fold(self.events[2], |sum, (_, [high, low])| plus(plus(sum, high), low))[0]
+    }
+
+    /// Returns the laws `H − W − Q` and `S + Σ S_b`, from those of the closed system at this state.
+    #[must_use]
+    pub fn balanced<L>(&self, laws: Laws<L>) -> Laws<L> {
+        let [net, rest] = self.net;
+        let entropy = laws.entropy + self.entropy_of_baths();
+        Laws { energy: (laws.energy - net) - rest, entropy, ..laws }
+    }
+
+    /// Returns the laws that a state must have for the balance to be `laws`: the energy more by all that has flowed in, and
+    /// the entropy less by what the baths have gained.
+    #[must_use]
+    pub fn targets<L: Clone>(&self, laws: &Laws<L>) -> Laws<L> {
+        let [net, rest] = self.net;
+        Laws {
+            energy: (laws.energy + net) + rest,
+            entropy: laws.entropy - self.entropy_of_baths(),
+            invariants: laws.invariants.clone(),
+        }
     }
 
     /// The names and sums of a kind.

@@ -37,7 +37,7 @@ pub trait Stepper<F: Flow>: Sized {
         None
     }
 
-    /// The error of a run that asks for a state inside a step where there is none.
+    /// Returns the error of a request for a state inside a step where there is none.
     fn nothing_between(&self, time: f64, h: f64) -> StepError {
         StepError::NothingBetween { time, h }
     }

@@ -19,7 +19,7 @@ impl<P: Model> Flow for OpenLattice<P> {
     type Vector = OpenSiteVector;
 
     fn laws(&self, x: &StateOf<P>) -> Laws<Vec<f64>> {
-        self.balanced(x, self.lattice.laws(&x.x))
+        x.ledger.balanced(self.lattice.laws(&x.x))
     }
 
     fn term_sizes(&self, x: &StateOf<P>) -> Laws<Vec<f64>> {

@@ -19,15 +19,8 @@ pub struct OpenJets<V> {
 }
 
 impl<P: Model> OpenLattice<P> {
-    /// The laws `H − W − Q` and `S + ΣS_b`, from those of the lattice at this state.
-    pub(super) fn balanced(&self, x: &StateOf<P>, laws: Laws<Vec<f64>>) -> Laws<Vec<f64>> {
-        let [net, rest] = x.ledger.net_parts();
-        let entropy = laws.entropy + x.ledger.entropy_of_baths();
-        Laws { energy: (laws.energy - net) - rest, entropy, ..laws }
-    }
-
     fn jets_at(&self, x: &StateOf<P>, jets: LatticeJets<VectorOf<P>>) -> OpenJets<VectorOf<P>> {
-        OpenJets { values: self.balanced(x, jets.laws()), jets }
+        OpenJets { values: x.ledger.balanced(jets.laws()), jets }
     }
 
     /// The velocity of all sites, with the rates of the clock and the ledger, and the production.
@@ -124,13 +117,7 @@ impl<P: Model> StageFlow for OpenLattice<P> {
         target: &Target<'_, Self>,
     ) -> Result<Projected<Self>, ProjectionError> {
         let OpenState { x, time, ledger } = y;
-        let [net, rest] = ledger.net_parts();
-        let of_baths = ledger.entropy_of_baths();
-        let laws = Laws {
-            energy: (target.laws.energy + net) + rest,
-            entropy: target.laws.entropy - of_baths,
-            invariants: target.laws.invariants.clone(),
-        };
+        let (laws, of_baths) = (ledger.targets(target.laws), ledger.entropy_of_baths());
         let inner = Target {
             laws: &laws,
             with_entropy: target.with_entropy && P::ENTROPY,

@@ -4,7 +4,7 @@ use std::fmt::Debug;
 use std::ops::{Add, AddAssign, Index, IndexMut, Mul, Neg, RangeInclusive, Sub, SubAssign};
 
 use approx::RelativeEq;
-use nalgebra::SVector;
+use nalgebra::{ArrayStorage, SVector};
 
 use crate::scalar::Scalar;
 
@@ -91,7 +91,12 @@ impl<D: Scalar, const N: usize> Column<D> for SVector<D, N> {
 
     #[inline]
     fn from_index(mut f: impl FnMut(usize) -> D) -> Self {
-        Self::from_fn(|i, _| f(i))
+        // Of all ways to write this loop it is the cheapest to compile, and columns are made everywhere.
+        let mut entries = [D::zero(); N];
+        for (i, entry) in entries.iter_mut().enumerate() {
+            *entry = f(i);
+        }
+        Self::from_array_storage(ArrayStorage([entries]))
     }
 
     #[inline]

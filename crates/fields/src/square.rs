@@ -4,7 +4,7 @@ use std::fmt::Debug;
 use std::ops::{Add, AddAssign, Index, IndexMut, Mul, Neg, Sub, SubAssign};
 
 use approx::RelativeEq;
-use nalgebra::{Const, SMatrix, SVector};
+use nalgebra::{ArrayStorage, Const, SMatrix, SVector};
 use num_dual::linalg::LU;
 
 use crate::column::{Column, SQUARES, scaled_norm};
@@ -235,8 +235,14 @@ impl<D: Scalar, const N: usize> Square<D> for SMatrix<D, N, N> {
     type Column = SVector<D, N>;
 
     #[inline]
-    fn from_entries(f: impl FnMut(usize, usize) -> D) -> Self {
-        Self::from_fn(f)
+    fn from_entries(mut f: impl FnMut(usize, usize) -> D) -> Self {
+        let mut columns = [[D::zero(); N]; N];
+        for (j, column) in columns.iter_mut().enumerate() {
+            for (i, entry) in column.iter_mut().enumerate() {
+                *entry = f(i, j);
+            }
+        }
+        Self::from_array_storage(ArrayStorage(columns))
     }
 
     type Factors = LU<D, Const<N>>;

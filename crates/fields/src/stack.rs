@@ -17,7 +17,8 @@ const BYTES_PER_ENTRY: usize = 16384;
 /// Nested calls find it, so a run allocates it once.
 #[inline]
 pub fn with_room<N: Dimension, T>(f: impl FnOnce() -> T) -> T {
-    if N::LEN <= SMALL {
+    // A constant, so that small systems are compiled without what follows.
+    if const { N::LEN <= SMALL } {
         return f();
     }
     let needed = BYTES_PER_ENTRY * N::LEN * N::LEN;

@@ -252,7 +252,11 @@ impl<L: Entries, const N: usize> Entries for (L, [f64; N]) {
     #[inline]
     fn fill(next: &mut impl FnMut() -> f64) -> Self {
         let before = L::fill(next);
-        (before, std::array::from_fn(|_| next()))
+        let mut numbers = [0.0; N];
+        for number in &mut numbers {
+            *number = next();
+        }
+        (before, numbers)
     }
 
     #[inline]

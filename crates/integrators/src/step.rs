@@ -32,6 +32,7 @@ mod vector;
 pub use control::Control;
 pub use error::StepError;
 pub use evidence::{Effort, EntropyStep, Evidence, LimitingSites, Promises, StageLaws};
+pub(crate) use flow::AnyFlow;
 pub use flow::{Element, Flow, Laws, Recheck, StateSpace};
 pub(crate) use initial_scales::classical_step;
 pub use jump_error::JumpError;

@@ -63,7 +63,7 @@ impl Adaptive {
     }
 
     /// The controller of a run from `x` under this rule, with entries of these sizes.
-    pub(crate) fn controller<F: Flow>(
+    pub(crate) fn controller<F: Flow + ?Sized>(
         &self,
         rule: &Rule,
         flow: &F,

@@ -208,13 +208,13 @@ fn by_name<S: serde::Serializer>(name: &impl fmt::Debug, to: S) -> Result<S::Ok,
 }
 
 /// A step that was taken, and its size.
-pub(crate) struct StepOf<'a, F: Flow> {
+pub(crate) struct StepOf<'a, F: Flow + ?Sized> {
     pub(crate) taken: &'a Taken<F>,
     pub(crate) h: f64,
 }
 
 /// A jump of a run.
-pub(crate) struct JumpOf<'a, F: Flow> {
+pub(crate) struct JumpOf<'a, F: Flow + ?Sized> {
     pub(crate) name: &'a str,
     /// The state after it.
     pub(crate) x: &'a Element<F>,
@@ -229,7 +229,7 @@ pub(crate) struct JumpOf<'a, F: Flow> {
 
 impl Certificate {
     /// Makes the certificate of a run that starts at `x0`.
-    pub(crate) fn start<F: Flow>(flow: &F, x0: &Element<F>, promises: Promises) -> Self {
+    pub(crate) fn start<F: Flow + ?Sized>(flow: &F, x0: &Element<F>, promises: Promises) -> Self {
         let (laws, sizes) = (flow.laws(x0), flow.term_sizes(x0));
         let kinds = flow.kinds().into_iter().enumerate();
         Self {
@@ -277,7 +277,7 @@ impl Certificate {
 
     /// Enters a step from a state with these laws.
     #[inline]
-    pub(crate) fn enter<F: Flow>(
+    pub(crate) fn enter<F: Flow + ?Sized>(
         &mut self,
         flow: &F,
         x: &Element<F>,
@@ -337,7 +337,7 @@ impl Certificate {
     }
 
     /// Enters a jump at the end of a step that it has cut.
-    pub(crate) fn enter_jump<F: Flow>(&mut self, flow: &F, jump: &JumpOf<'_, F>) {
+    pub(crate) fn enter_jump<F: Flow + ?Sized>(&mut self, flow: &F, jump: &JumpOf<'_, F>) {
         let JumpOf { name, x, values: [start, before, after], exchange, rise, is_booked } = *jump;
         self.max_energy_error =
             self.max_energy_error.max((before.energy - self.reference_energy()).abs());

@@ -21,7 +21,7 @@ fn due_steps(steps: usize, verified: bool) -> usize {
 }
 
 /// The states at which the model of a flow has been checked after so many steps, the start among them.
-pub(crate) fn checked_states<F: Flow>(flow: &F, steps: usize) -> usize {
+pub(crate) fn checked_states<F: Flow + ?Sized>(flow: &F, steps: usize) -> usize {
     if !flow.rechecks(Recheck::End) {
         return 0;
     }

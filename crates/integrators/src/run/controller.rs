@@ -345,7 +345,7 @@ impl<V: Vector> Controller<V> {
     /// The first step, after Hairer, Nørsett, Wanner (Solving ODEs I, §II.4): a short step of Euler's
     /// method gives the rate `ω = |f'f|/|f|` of the motion, and `h^{p+1}ω^p|f|` is to be a hundredth of the
     /// error allowed, all in units of it.
-    pub(crate) fn first_step<F: Flow<Vector = V>>(
+    pub(crate) fn first_step<F: Flow<Vector = V> + ?Sized>(
         &self,
         rule: &Rule,
         flow: &F,

@@ -6,7 +6,8 @@
 
 use crate::run::requests::rounding;
 use crate::run::span_error::SpanError;
-use crate::step::{Flow, Memory as _, StepError, StepStart, Stepper, Taken};
+use crate::run::stepping::AnyStepper;
+use crate::step::{Flow, StepError, StepStart, Taken};
 
 #[cfg(feature = "serde")]
 use crate::step::exact;
@@ -123,15 +124,15 @@ pub(crate) struct Fixed {
 }
 
 /// A step of one size in a run with these corners, in parts between them.
-pub(crate) fn step<F: Flow, M: Stepper<F>>(
-    (method, flow): (&M, &F),
+pub(super) fn step<F: Flow + ?Sized>(
+    method: &mut dyn AnyStepper<F>,
+    flow: &F,
     start: &StepStart<'_, F>,
     Fixed { h, end }: Fixed,
     corners: &Corners,
-    memory: &mut M::Memory,
 ) -> Result<Taken<F>, StepError> {
     if corners.is_empty() {
-        return method.step(flow, start, h, memory);
+        return method.step(start, h);
     }
     let (mut time, mut reference) = (start.time, start.reference.clone());
     let (mut x, mut values) = (start.x.clone(), start.values.clone());
@@ -140,12 +141,12 @@ pub(crate) fn step<F: Flow, M: Stepper<F>>(
         let Stop { stop, recorded, is_corner } = corners.stop(time, end);
         let size = if before.is_none() && !is_corner { h } else { stop - time };
         if corners.has(time) {
-            *memory = memory.restarted();
+            method.restart();
         }
         let (reference_here, allowed) = (reference.clone(), start.allowed.clone());
         let from =
             StepStart { x: &x, time, values: values.clone(), reference: reference_here, allowed };
-        let mut taken = method.step(flow, &from, size, memory)?;
+        let mut taken = method.step(&from, size)?;
         flow.inspect([&x, &taken.x], true)?;
         if let Some(clocked) = flow.clocked(&taken.x, recorded) {
             taken.values = flow.laws(&clocked);

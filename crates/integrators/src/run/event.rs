@@ -277,7 +277,7 @@ impl<M: StateSpace> Events<M> {
 
     /// The events of a step in the order of their times, up to the first that stops the run or changes the state. `None` if
     /// a state inside the step is not known and is needed.
-    pub(crate) fn of_step<F: Flow<Space = M>>(
+    pub(crate) fn of_step<F: Flow<Space = M> + ?Sized>(
         &mut self,
         flow: &F,
         step: &StepEnds<'_, F>,

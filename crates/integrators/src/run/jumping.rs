@@ -3,19 +3,18 @@
 use crate::round_off::bound::of_a_law;
 use crate::run::certificate::JumpOf;
 use crate::run::controller::StepSize;
+use crate::run::course::Course;
 use crate::run::ending::Ending;
 use crate::run::event::Restart;
 use crate::run::jump::{Jump, JumpOn};
 use crate::run::state::State;
-use crate::run::steps::Steps;
 use crate::run::watching::{StepBefore, Watching};
 use crate::step::{
-    Element, EventExchange, Flow, JumpError, Laws, Memory as _, StateSpace as _, StepError,
-    Stepper, Vector as _,
+    Element, EventExchange, Flow, JumpError, Laws, StateSpace as _, StepError, Vector as _,
 };
 
 /// Where a jump leads.
-struct Landing<F: Flow> {
+struct Landing<F: Flow + ?Sized> {
     x: Element<F>,
     values: Laws<F::Numbers>,
     exchange: EventExchange,
@@ -25,7 +24,7 @@ struct Landing<F: Flow> {
     is_booked: bool,
 }
 
-impl<F: Flow, M: Stepper<F>> Steps<'_, F, M> {
+impl<F: Flow + ?Sized> Course<'_, F> {
     /// The size of a step of one size up to `end`: what a jump has left of it.
     #[inline]
     pub(super) fn left_of_a_step(&self, h: f64, end: f64) -> f64 {
@@ -82,7 +81,6 @@ impl<F: Flow, M: Stepper<F>> Steps<'_, F, M> {
         self.last_numbers = watching.events.last_numbers(&after);
         event.jump = Some(Jump { after: after.clone(), exchange });
         watching.found.push(event);
-        self.memory = self.memory.restarted();
         self.entropy = entropy;
         self.before = StepBefore {
             state: after.clone(),
@@ -112,7 +110,6 @@ impl<F: Flow, M: Stepper<F>> Steps<'_, F, M> {
         self.state = self.before.state.clone();
         self.values = self.before.values.clone();
         self.entropy = self.before.entropy;
-        self.memory = self.memory.restarted();
         self.progress.ending = None;
     }
 

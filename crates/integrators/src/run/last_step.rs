@@ -6,7 +6,7 @@ use crate::step::{EntropyStep, Flow, Laws, Scales, StepStart, Stepper};
 
 /// The last step of a run.
 #[derive(Debug)]
-pub(crate) struct LastStep<'a, F: Flow> {
+pub(crate) struct LastStep<'a, F: Flow + ?Sized> {
     pub(crate) start: StepStart<'a, F>,
     pub(crate) h: f64,
     pub(crate) in_parts: bool,
@@ -26,31 +26,32 @@ impl<'a, F: Flow, M: Stepper<F>> Steps<'a, F, M> {
 
     /// The sizes by which the next step is judged.
     pub(crate) fn scales(&self) -> Scales<F::Vector> {
-        self.progress.scales.clone()
+        self.course.progress.scales.clone()
     }
 
     /// Returns whether the steps follow a tolerance.
     pub(crate) const fn is_adaptive(&self) -> bool {
-        matches!(self.progress.step_size, StepSize::Adaptive(_))
+        matches!(self.course.progress.step_size, StepSize::Adaptive(_))
     }
 
     /// Returns whether nothing ends the run.
     pub(crate) const fn is_endless(&self) -> bool {
-        self.progress.count.is_none() && matches!(self.progress.step_size, StepSize::Fixed(_))
+        self.course.progress.count.is_none()
+            && matches!(self.course.progress.step_size, StepSize::Fixed(_))
     }
 
     /// The last step, with the errors that it was allowed if it was judged by these sizes.
     pub(crate) fn last_step(&self, scales: &Scales<F::Vector>) -> LastStep<'_, F> {
-        let before = &self.before;
-        let allowed = match &self.progress.step_size {
+        let before = &self.course.before;
+        let allowed = match &self.course.progress.step_size {
             StepSize::Fixed(_) => None,
             StepSize::Adaptive(controller) => {
-                Some(controller.allowed(&self.rule, scales, before.h))
+                Some(controller.allowed(&self.course.rule, scales, before.h))
             }
         };
         let values = before.values.clone();
-        let entropy = if self.promises.entropy { before.entropy } else { values.entropy };
-        let reference: Laws<F::Numbers> = self.reference(entropy);
+        let entropy = if self.course.promises.entropy { before.entropy } else { values.entropy };
+        let reference: Laws<F::Numbers> = self.course.reference(entropy);
         let (x, time) = (&before.state.point, before.state.time);
         let start = StepStart { x, time, values, reference, allowed };
         let entropy_step = before.entropy_step;

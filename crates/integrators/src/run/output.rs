@@ -3,12 +3,14 @@
 use metriplectic_dynamics::SecondLaw;
 
 use crate::run::corners::{self, Fixed};
+use crate::run::course::Course;
 use crate::run::ending::Ending;
 use crate::run::event::{Event, Found, Interruption};
 use crate::run::requests::rounding;
 use crate::run::schedule::Schedule;
 use crate::run::span_error::SpanError;
 use crate::run::state::State;
+use crate::run::stepping::{AnyStepper, Stepping};
 use crate::run::steps::Steps;
 use crate::run::watching::Watching;
 use crate::step::dense::{Target, between, says_between};
@@ -39,11 +41,8 @@ impl<F: Flow, M: Stepper<F>> Steps<'_, F, M> {
     /// # }
     /// ```
     pub fn at(&mut self, time: f64) -> Option<State<F::Space>> {
-        let [start, end] = [self.before.state.time, self.state.time];
-        let allowed = rounding(self.progress.start, end);
-        let inside = time >= start - allowed && time <= end + allowed;
-        if inside { self.inside(self.fraction(time)) } else { None }
-            .map(|state| State { time, ..state })
+        let Self { method, flow, memory, course } = self;
+        course.at(time, &mut Stepping { method, flow: *flow, memory })
     }
 
     /// The states at the [times asked for](crate::Watch::output_at) in the last step, as far as the iterator has not
@@ -68,7 +67,7 @@ impl<F: Flow, M: Stepper<F>> Steps<'_, F, M> {
     /// # }
     /// ```
     pub fn outputs(&self) -> impl Iterator<Item = &State<F::Space>> {
-        self.watching.iter().flat_map(|watching| &watching.queue)
+        self.course.watching.iter().flat_map(|watching| &watching.queue)
     }
 
     /// The [events](crate::Watch::event) found since the last call.
@@ -95,7 +94,7 @@ impl<F: Flow, M: Stepper<F>> Steps<'_, F, M> {
     /// # }
     /// ```
     pub fn take_events(&mut self) -> Vec<Event<F::Space>> {
-        self.watching.as_mut().map_or_else(Vec::new, |watching| std::mem::take(&mut watching.found))
+        self.course.take_events()
     }
 
     /// The outputs and events of a schedule, for a run that was resumed: closures are not in a checkpoint. Nothing
@@ -129,11 +128,33 @@ impl<F: Flow, M: Stepper<F>> Steps<'_, F, M> {
     ///
     /// [`SpanError`] if a time is outside of the run, or an event is one of other points.
     pub fn watching(mut self, schedule: impl Into<Schedule>) -> Result<Self, SpanError> {
+        self.course.watch(schedule.into())?;
+        Ok(self)
+    }
+}
+
+impl<F: Flow + ?Sized> Course<'_, F> {
+    /// Takes up the outputs and events of a schedule.
+    pub(super) fn watch(&mut self, schedule: Schedule) -> Result<(), SpanError> {
         self.watching = {
             let last = if self.before.h == 0.0 { self.last_numbers.as_slice() } else { &[] };
-            Watching::new(schedule.into().watch, &self.progress, &self.state, last)?
+            Watching::new(schedule.watch, &self.progress, &self.state, last)?
         };
-        Ok(self)
+        Ok(())
+    }
+
+    /// The events found since the last call.
+    pub(super) fn take_events(&mut self) -> Vec<Event<F::Space>> {
+        self.watching.as_mut().map_or_else(Vec::new, |watching| std::mem::take(&mut watching.found))
+    }
+
+    /// The state at a time in the last step.
+    fn at(&mut self, time: f64, method: &mut dyn AnyStepper<F>) -> Option<State<F::Space>> {
+        let [start, end] = [self.before.state.time, self.state.time];
+        let allowed = rounding(self.progress.start, end);
+        let inside = time >= start - allowed && time <= end + allowed;
+        if inside { self.inside(self.fraction(time), method) } else { None }
+            .map(|state| State { time, ..state })
     }
 
     /// A time of the last step as a fraction of it.
@@ -152,12 +173,12 @@ impl<F: Flow, M: Stepper<F>> Steps<'_, F, M> {
     }
 
     /// The state at a fraction of the last step.
-    fn inside(&mut self, theta: f64) -> Option<State<F::Space>> {
+    fn inside(&self, theta: f64, method: &mut dyn AnyStepper<F>) -> Option<State<F::Space>> {
         if theta >= 1.0 {
             return Some(self.state.clone());
         }
         let (has_entropy, reference) = (self.has_entropy(), self.reference(self.before.entropy));
-        let Self { method, flow, before, state, values, memory, progress, .. } = self;
+        let Self { flow, before, state, values, progress, .. } = self;
         let corners = &progress.corners;
         let (x, end, h) = (&before.state.point, &state.point, before.h);
         let step = StepEnds { x, end, h, values: [&before.values, values], reference: &reference };
@@ -172,18 +193,21 @@ impl<F: Flow, M: Stepper<F>> Steps<'_, F, M> {
             let out = (before.state.entropy - inside.entropy).max(inside.entropy - state.entropy);
             inside.energy.is_finite() && (!has_entropy || out <= 0.0 || out <= round_off())
         };
-        let promises = method.promises(flow);
+        let promises = self.promises;
         // A step of that size, where the method does not know what lies in this one: after a step in parts, and after
         // one that is longer than a chart.
-        let smaller_step = |method: &mut M| {
+        let smaller_step = |method: &dyn AnyStepper<F>| {
             if !says_between(*flow, x) {
                 return None;
             }
             let (values, reference) = (before.values.clone(), reference.clone());
             let start = StepStart { x, time: times[0], values, reference, allowed: None };
             let size = Fixed { h: theta * h, end: times[0] + theta * (times[1] - times[0]) };
-            let memory = &mut M::Memory::default();
-            let taken = corners::step((&*method, *flow), &start, size, corners, memory).ok()?;
+            let mut taken = None;
+            method.afresh(&mut |method| {
+                taken = corners::step(method, *flow, &start, size, corners).ok();
+            });
+            let taken = taken?;
             let inside = at(taken.x);
             if is_between(&inside) {
                 return Some(inside);
@@ -193,7 +217,7 @@ impl<F: Flow, M: Stepper<F>> Steps<'_, F, M> {
             let target = Target::new(&step, promises, theta, Some(entropy));
             Some(at(target.reached_from(*flow, &inside.point, || end.clone())))
         };
-        let known = if before.in_parts { None } else { method.between(flow, &step, memory, theta) };
+        let known = if before.in_parts { None } else { method.between(&step, theta) };
         // The output of any method serves one that finds no entropy between those of the ends.
         known
             .map(at)
@@ -204,15 +228,18 @@ impl<F: Flow, M: Stepper<F>> Steps<'_, F, M> {
 
     /// Looks at the step that was just taken.
     #[inline(never)]
-    pub(super) fn look(&mut self) -> Result<(), StepError> {
+    pub(super) fn look(&mut self, method: &mut dyn AnyStepper<F>) -> Result<(), StepError> {
         let Some(mut watching) = self.watching.take() else { return Ok(()) };
         watching.queue.clear();
-        let found = self.find(&mut watching);
+        let found = self.find(&mut watching, method);
         let (time, h) = (self.before.state.time, self.before.h);
         let looked = match found {
-            None => Err(self.method.nothing_between(time, h)),
+            None => Err(method.nothing_between(time, h)),
             Some(None) => Ok(()),
-            Some(Some(with_it)) => self.jump(&mut watching, &with_it),
+            Some(Some(with_it)) => {
+                method.restart();
+                self.jump(&mut watching, &with_it)
+            }
         };
         let piled_up = watching.events.piled_up().cloned();
         self.watching = Some(watching);
@@ -221,6 +248,7 @@ impl<F: Flow, M: Stepper<F>> Steps<'_, F, M> {
             None => looked,
         };
         if let Err(StepError::Jump { .. }) = looked {
+            method.restart();
             self.take_back();
         }
         looked
@@ -228,7 +256,11 @@ impl<F: Flow, M: Stepper<F>> Steps<'_, F, M> {
 
     /// Finds the events in the last step, and then the outputs up to its end or to the event that stops the run or changes the
     /// state. Returns the events at the same time if the state is to jump.
-    fn find(&mut self, watching: &mut Watching<F::Space>) -> Option<Option<Vec<(usize, bool)>>> {
+    fn find(
+        &mut self,
+        watching: &mut Watching<F::Space>,
+        method: &mut dyn AnyStepper<F>,
+    ) -> Option<Option<Vec<(usize, bool)>>> {
         let (mut stopped_at, mut jumps) = (None, None);
         if !watching.events.is_empty() {
             let ends = [self.before.state.clone(), self.state.clone()];
@@ -240,9 +272,9 @@ impl<F: Flow, M: Stepper<F>> Steps<'_, F, M> {
             let step = StepEnds { x, end, h: self.before.h, values, reference: &reference };
             let flow = self.flow;
             let Found { events, end } =
-                watching
-                    .events
-                    .of_step(flow, &step, ends.each_ref(), &mut |theta| self.inside(theta))?;
+                watching.events.of_step(flow, &step, ends.each_ref(), &mut |theta| {
+                    self.inside(theta, method)
+                })?;
             if let (Some(event), Some(end)) = (events.last(), end) {
                 stopped_at = Some(event.state.clone());
                 let index = event.index;
@@ -260,7 +292,7 @@ impl<F: Flow, M: Stepper<F>> Steps<'_, F, M> {
             let last = stopped_at.as_ref().map_or(self.state.time, |state| state.time);
             let mut before = self.before.state.clone();
             while let Some(time) = watching.outputs.next(last) {
-                let state = self.output(time.min(last), &before)?;
+                let state = self.output(time.min(last), &before, method)?;
                 before.clone_from(&state);
                 watching.queue.push_back(state);
             }
@@ -279,8 +311,13 @@ impl<F: Flow, M: Stepper<F>> Steps<'_, F, M> {
 
     /// The state at a time, after another one in the same step. Where the entropy has fallen in between by more
     /// than round-off, it is the nearer one of that state and the end of the step.
-    fn output(&mut self, time: f64, before: &State<F::Space>) -> Option<State<F::Space>> {
-        let state = self.inside(self.fraction(time))?;
+    fn output(
+        &self,
+        time: f64,
+        before: &State<F::Space>,
+        method: &mut dyn AnyStepper<F>,
+    ) -> Option<State<F::Space>> {
+        let state = self.inside(self.fraction(time), method)?;
         let round_off = || self.flow.entropy_round_off([&before.point, &state.point]);
         let fall = before.entropy - state.entropy;
         if self.has_entropy() && fall > 0.0 && fall > round_off() {

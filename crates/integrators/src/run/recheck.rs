@@ -12,14 +12,14 @@
 
 use crate::run::checked::{checked_states, is_due};
 use crate::run::controller::StepSize;
-use crate::run::steps::Steps;
-use crate::step::{Flow, Recheck, StepError, Stepper};
+use crate::run::course::Course;
+use crate::step::{Flow, Recheck, StepError};
 
 /// The size of a step, relative to the largest one of the run, below which the derivatives are compared with the values
 /// along every axis: where a derivative is lost, the energy and its differential contradict each other, and steps become tiny.
 const CREEPS: f64 = 1e-2;
 
-impl<F: Flow, M: Stepper<F>> Steps<'_, F, M> {
+impl<F: Flow + ?Sized> Course<'_, F> {
     /// Checks the model after a step, where it is due.
     ///
     /// # Errors

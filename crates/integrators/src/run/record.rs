@@ -1,6 +1,8 @@
 //! The states of a run in a row: one after the other, or all in a trajectory.
 
+use crate::run::checkpoint::Checkpoint;
 use crate::run::controller::StepSize;
+use crate::run::course::Course;
 use crate::run::ending::Ending;
 use crate::run::error::RunError;
 use crate::run::progress::Progress;
@@ -9,10 +11,17 @@ use crate::run::state::State;
 use crate::run::steps::Steps;
 use crate::run::trajectory::{Trajectory, thin_out};
 use crate::run::watching::Watching;
-use crate::step::{Flow, StepError, Stepper};
+use crate::step::{Flow, StateSpace, StepError, Stepper};
 
 /// The most states that a run makes room for beforehand: it may end long before its span.
 const ROOM: usize = 1 << 12;
+
+/// The states of a run so far, thinned out.
+struct Recording<M: StateSpace> {
+    states: Vec<State<M>>,
+    every: usize,
+    most: Option<usize>,
+}
 
 impl<F: Flow, M: Stepper<F>> Steps<'_, F, M> {
     /// Takes all steps that are left, and records the states from here on.
@@ -28,32 +37,58 @@ impl<F: Flow, M: Stepper<F>> Steps<'_, F, M> {
 
     /// Takes all steps that are left, and records their states.
     fn record(mut self) -> Result<Trajectory<F::Space>, RunError<F::Space>> {
-        let Progress { count, mut every, most, .. } = self.progress;
+        let mut recording = self.course.recording()?;
+        let mut failure = None;
+        while self.course.progress.ending.is_none() && failure.is_none() {
+            failure = self.advance().err();
+            self.course.record(&mut recording, failure.is_some());
+        }
+        let checkpoint = self.checkpoint();
+        self.course.trajectory(recording.states, checkpoint, failure)
+    }
+}
+
+impl<F: Flow + ?Sized> Course<'_, F> {
+    /// Begins to record.
+    fn recording(&self) -> Result<Recording<F::Space>, SpanError> {
+        let Progress { count, every, most, .. } = self.progress;
         if count.is_none() && matches!(self.progress.step_size, StepSize::Fixed(_)) {
-            return Err(SpanError::Endless.into());
+            return Err(SpanError::Endless);
         }
         let room = count.map_or(ROOM, |count| (count - self.state.step.min(count)) / every);
         let mut states = Vec::with_capacity(room.min(ROOM) + 2);
         states.push(self.state.clone());
-        let mut failure = None;
-        while self.progress.ending.is_none() && failure.is_none() {
-            failure = self.advance().err();
-            if self.watched(&mut states, failure.is_some()) {
-                continue;
-            }
-            let state = &self.state;
-            let due = state.step.is_multiple_of(every) && failure.is_none();
-            let over = self.progress.ending.is_some() || failure.is_some();
-            if (due || over) && states.last().is_none_or(|last| last.step != state.step) {
-                states.push(state.clone());
-            }
-            while most.is_some_and(|most| states.len() > most) {
-                every = every.saturating_mul(2);
-                thin_out(&mut states, every, over);
-            }
+        Ok(Recording { states, every, most })
+    }
+
+    /// Records what the last step has reached.
+    #[inline(never)]
+    fn record(&mut self, recording: &mut Recording<F::Space>, failed: bool) {
+        let Recording { states, every, most } = recording;
+        if self.watched(states, failed) {
+            return;
         }
+        let state = &self.state;
+        let due = state.step.is_multiple_of(*every) && !failed;
+        let over = self.progress.ending.is_some() || failed;
+        if (due || over) && states.last().is_none_or(|last| last.step != state.step) {
+            states.push(state.clone());
+        }
+        while most.is_some_and(|most| states.len() > most) {
+            *every = every.saturating_mul(2);
+            thin_out(states, *every, over);
+        }
+    }
+
+    /// The trajectory through these states.
+    fn trajectory(
+        mut self,
+        states: Vec<State<F::Space>>,
+        checkpoint: Checkpoint,
+        failure: Option<StepError>,
+    ) -> Result<Trajectory<F::Space>, RunError<F::Space>> {
         let ending = self.progress.ending.unwrap_or(Ending::Stopped);
-        let (checkpoint, events) = (self.checkpoint(), self.take_events());
+        let events = self.take_events();
         let certificate = self.certificate;
         let trajectory = Trajectory { states, events, certificate, ending, checkpoint };
         match failure {
@@ -87,18 +122,20 @@ impl<F: Flow, M: Stepper<F>> Iterator for Steps<'_, F, M> {
     type Item = Result<State<F::Space>, StepError>;
 
     fn next(&mut self) -> Option<Self::Item> {
-        while !self.failed {
-            if let Some(watching) = &mut self.watching
+        while !self.course.failed {
+            if let Some(watching) = &mut self.course.watching
                 && let Some(state) = watching.queue().pop_front()
             {
                 return Some(Ok(state));
             }
-            if self.progress.ending.is_some() || self.waits_for_nothing() {
+            if self.course.progress.ending.is_some() || self.course.waits_for_nothing() {
                 return None;
             }
             let advanced = self.advance().cloned();
-            self.failed = advanced.is_err();
-            if self.failed || self.watching.as_ref().is_none_or(|w| !w.replaces_steps()) {
+            self.course.failed = advanced.is_err();
+            if self.course.failed
+                || self.course.watching.as_ref().is_none_or(|w| !w.replaces_steps())
+            {
                 return Some(advanced);
             }
         }

@@ -3,23 +3,20 @@
 use std::fmt;
 
 use crate::round_off::bound::{ROUNDED, breaks_first_law};
-use crate::run::certificate::{Certificate, InvariantBalance, StepOf};
-use crate::run::controller::{Controller, Rule, StepSize};
-use crate::run::corners::{self, Stop};
+use crate::run::certificate::{Certificate, StepOf};
+use crate::run::controller::{Controller, StepSize};
+use crate::run::corners::{self, Fixed, Stop};
+use crate::run::course::{Course, Said};
 use crate::run::ending::Ending;
 use crate::run::error::RunError;
-use crate::run::event::LastNumber;
-use crate::run::judged::Judged;
-use crate::run::progress::Progress;
-use crate::run::schedule::{Schedule, Size};
-use crate::run::span_error::SpanError;
+use crate::run::schedule::Schedule;
 use crate::run::state::State;
-use crate::run::watching::{StepBefore, Watching};
+use crate::run::stepping::Stepping;
 use crate::step::dense::says_between;
 use crate::step::scales::{larger, relative};
 use crate::step::{
-    Effort, Element, EntropyStep, Flow, Laws, LimitingSites, Memory as _, Promises, Refusal,
-    Scales, StepEnds, StepError, StepStart, Stepper, Taken, Vector as _,
+    AnyFlow, Effort, Element, EntropyStep, Flow, Laws, LimitingSites, Memory as _, Refusal, Scales,
+    StepEnds, StepError, StepStart, Stepper, Taken, Vector as _,
 };
 
 /// The iterator over the states of a run after its start, in constant memory; ended by an error, or
@@ -30,31 +27,16 @@ use crate::step::{
 pub struct Steps<'a, F: Flow, M: Stepper<F>> {
     pub(super) method: M,
     pub(super) flow: &'a F,
-    pub(super) rule: Rule,
-    pub(super) progress: Progress<F::Vector>,
-    pub(super) state: State<F::Space>,
-    /// The laws at the state.
-    pub(super) values: Laws<F::Numbers>,
-    /// The entropy after the last step that dissipated.
-    pub(super) entropy: f64,
     pub(super) memory: M::Memory,
-    pub(super) promises: Promises,
-    pub(super) certificate: Certificate,
-    pub(super) failed: bool,
-    /// The step before the state, for what lies between them.
-    pub(super) before: StepBefore<F>,
-    pub(super) watching: Option<Box<Watching<F::Space>>>,
-    /// Those of the functions of events that had no value where the run was put down, until its first step.
-    pub(super) last_numbers: Vec<LastNumber>,
+    pub(super) course: Course<'a, AnyFlow<'a, F>>,
 }
 
 impl<F: Flow, M: Stepper<F>> fmt::Debug for Steps<'_, F, M> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { state, certificate, memory, .. } = self;
         f.debug_struct("Steps")
-            .field("state", state)
-            .field("memory", memory)
-            .field("certificate", certificate)
+            .field("state", &self.course.state)
+            .field("memory", &self.memory)
+            .field("certificate", &self.course.certificate)
             .finish_non_exhaustive()
     }
 }
@@ -76,110 +58,24 @@ impl<'a, F: Flow, M: Stepper<F>> Steps<'a, F, M> {
     ) -> Result<Self, RunError<F::Space>> {
         schedule.check()?;
         method.check(!schedule.is_fixed())?;
-        let rule = Rule::of(&method, schedule.start);
-        schedule.check_tolerance(&rule)?;
-        if schedule.rest.is_some() && flow.depends_on_time() {
-            return Err(SpanError::NoRestInTime.into());
-        }
-        let x0 = flow.begin(x0, schedule.start);
-        flow.check(&x0)?;
-        flow.examine(&x0)?;
-        let promises = method.promises(flow);
-        let certificate =
-            Certificate { noise: method.noise(flow), ..Certificate::start(flow, &x0, promises) };
-        let scales = Scales::at(flow, &x0, schedule.span());
-        let Schedule { size, start, count, every, most, rest, watch, mut corners } = schedule;
-        corners.start = start;
-        let step_size = match size {
-            Size::Fixed(h) => StepSize::Fixed(h),
-            Size::Tolerance(adaptive) => {
-                StepSize::Adaptive(adaptive.controller(&rule, flow, &x0, &scales)?)
-            }
-        };
-        let largest_velocity = scales.sizes.zero();
-        let judged = match &step_size {
-            StepSize::Fixed(_) => None,
-            StepSize::Adaptive(controller) => {
-                Some(Judged::new(&controller.judged_by(&scales.sizes), flow.sizes(&x0)))
-            }
-        };
-        let progress = Progress {
-            step_size,
-            start,
-            count,
-            every,
-            most,
-            scales,
-            judged,
-            corners,
-            rest,
-            largest_velocity,
-            ending: None,
-        };
-        let values = flow.laws(&x0);
-        let (energy, entropy) = (values.energy, values.entropy);
-        let state = State { step: 0, time: start, point: x0, energy, entropy };
-        let watching = Watching::new(watch, &progress, &state, &[])?;
-        let before = StepBefore {
-            state: state.clone(),
-            values: values.clone(),
-            entropy,
-            h: 0.0,
-            in_parts: false,
-            entropy_step: None,
-        };
-        let mut steps = Self {
-            method,
-            flow,
-            rule,
-            progress,
-            state,
-            before,
-            watching,
-            last_numbers: Vec::new(),
-            values,
-            entropy,
-            memory: M::Memory::default(),
-            promises,
-            certificate,
-            failed: false,
-        };
-        steps.rest(true);
-        Ok(steps)
+        let said = Said::by(&method, flow, schedule.start);
+        let course = Course::start(flow as &AnyFlow<'a, F>, said, x0, schedule)?;
+        Ok(Self { method, flow, memory: M::Memory::default(), course })
     }
 
     /// The state reached so far.
     pub const fn state(&self) -> &State<F::Space> {
-        &self.state
+        &self.course.state
     }
 
     /// The balance of the steps taken so far.
     pub const fn certificate(&self) -> &Certificate {
-        &self.certificate
+        &self.course.certificate
     }
 
     /// How the run ended; `None` as long as there are steps to take.
     pub const fn ending(&self) -> Option<Ending> {
-        if self.failed { Some(Ending::Stopped) } else { self.progress.ending }
-    }
-
-    /// What the laws were at the start of the run, with this entropy.
-    #[inline]
-    pub(super) fn reference(&self, entropy: f64) -> Laws<F::Numbers> {
-        let mut invariants = self.values.invariants.clone();
-        for (k, balance) in self.certificate.invariants.iter().enumerate() {
-            invariants[k] = balance.initial;
-        }
-        Laws { energy: self.certificate.reference_energy(), entropy, invariants }
-    }
-
-    /// Where the next step starts.
-    #[inline]
-    fn from(&self, allowed: Option<F::Vector>) -> StepStart<'_, F> {
-        let entropy = if self.promises.entropy { self.entropy } else { self.values.entropy };
-        let reference = self.reference(entropy);
-        let values = self.values.clone();
-        StepStart { x: &self.state.point, time: self.state.time, values, reference, allowed }
+        self.course.ending()
     }
 
     /// Takes one step. A run that has [ended](Self::ending) stays where it is.
@@ -188,26 +84,21 @@ impl<'a, F: Flow, M: Stepper<F>> Steps<'a, F, M> {
     ///
     /// [`StepError`]; the state is then the last one reached.
     pub fn advance(&mut self) -> Result<&State<F::Space>, StepError> {
-        if self.progress.ending.is_none() {
+        if self.course.progress.ending.is_none() {
             let flow = self.flow;
-            flow.with_room(|| self.take_step().map_err(|error| self.explained(error)))?;
+            flow.with_room(|| self.take_step().map_err(|error| self.course.explained(error)))?;
         }
-        Ok(&self.state)
+        Ok(&self.course.state)
     }
 
     /// Takes one step of a run that has not ended.
     fn take_step(&mut self) -> Result<(), StepError> {
-        let step = self.state.step + 1;
-        let Advance { mut taken, h, time } = match &self.progress.step_size {
+        let step = self.course.state.step + 1;
+        let Advance { mut taken, h, time } = match &self.course.progress.step_size {
             &StepSize::Fixed(h) => {
-                let mut memory = std::mem::take(&mut self.memory);
-                let time = self.progress.start + step as f64 * h;
-                let h = self.left_of_a_step(h, time);
-                let (system, size) = ((&self.method, self.flow), corners::Fixed { h, end: time });
-                let corners = &self.progress.corners;
-                let taken = corners::step(system, &self.from(None), size, corners, &mut memory);
-                self.memory = memory;
-                Advance { taken: taken?, h, time }
+                let time = self.course.progress.start + step as f64 * h;
+                let h = self.course.left_of_a_step(h, time);
+                Advance { taken: self.fixed(Fixed { h, end: time })?, h, time }
             }
             StepSize::Adaptive(controller) => self.controlled(controller.clone())?,
         };
@@ -216,103 +107,126 @@ impl<'a, F: Flow, M: Stepper<F>> Steps<'a, F, M> {
             taken.x = clocked;
         }
         if !is_finite(&taken.values) {
-            let time = self.state.time;
+            let time = self.course.state.time;
             return Err(StepError::OutOfDomain { time, h, tried: taken.effort });
         }
-        let change = taken.values.energy - self.certificate.reference_energy();
-        let sizes = || self.flow.energy_sizes([&self.state.point, &taken.x]);
-        if self.promises.energy
+        let change = taken.values.energy - self.course.certificate.reference_energy();
+        let sizes = || self.flow.energy_sizes([&self.course.state.point, &taken.x]);
+        if self.course.promises.energy
             && let Some(size) = breaks_first_law(change, taken.values.energy, sizes)
         {
-            let time = self.state.time;
+            let time = self.course.state.time;
             return Err(StepError::FirstLawBroken { time, h, change, size });
         }
         self.check_step(&taken)?;
         let entered = StepOf { taken: &taken, h };
-        self.certificate.enter(self.flow, &self.state.point, &self.values, entered);
+        self.course.certificate.enter(
+            self.flow,
+            &self.course.state.point,
+            &self.course.values,
+            entered,
+        );
         let first_at_the_edge =
-            taken.evidence.stability && self.certificate.limiting_sites.stiffness.is_none();
-        if step.is_power_of_two() || (first_at_the_edge && self.has_sites()) {
+            taken.evidence.stability && self.course.certificate.limiting_sites.stiffness.is_none();
+        if step.is_power_of_two() || (first_at_the_edge && self.course.has_sites()) {
             self.sample(&taken, h);
         }
         let Taken { x, values, evidence, effort } = taken;
-        (self.before.h, self.before.entropy) = (h, self.entropy);
-        self.before.in_parts = effort.splits > 0;
-        self.before.entropy_step = evidence.entropy_step;
+        (self.course.before.h, self.course.before.entropy) = (h, self.course.entropy);
+        self.course.before.in_parts = effort.splits > 0;
+        self.course.before.entropy_step = evidence.entropy_step;
         if evidence.dissipates {
-            self.entropy = values.entropy;
+            self.course.entropy = values.entropy;
         }
         let (energy, entropy) = (values.energy, values.entropy);
-        self.before.values = std::mem::replace(&mut self.values, values);
+        self.course.before.values = std::mem::replace(&mut self.course.values, values);
         let next = State { step, time, point: x, energy, entropy };
-        self.before.state = std::mem::replace(&mut self.state, next);
-        self.check_invariants(&self.before.state)?;
-        let over = match &self.progress.step_size {
-            StepSize::Fixed(_) => self.progress.count.is_some_and(|count| step >= count),
-            StepSize::Adaptive(controller) => self.state.time >= controller.pace.end,
+        self.course.before.state = std::mem::replace(&mut self.course.state, next);
+        self.course.check_invariants(&self.course.before.state)?;
+        let over = match &self.course.progress.step_size {
+            StepSize::Fixed(_) => self.course.progress.count.is_some_and(|count| step >= count),
+            StepSize::Adaptive(controller) => self.course.state.time >= controller.pace.end,
         };
         if over {
-            self.progress.ending = Some(Ending::Span);
+            self.course.progress.ending = Some(Ending::Span);
         }
-        if self.progress.judges_sizes() {
-            let here = self.flow.sizes(&self.state.point);
-            self.progress.scales = self.progress.scales.or(&here);
-            if let Some(judged) = &mut self.progress.judged {
+        if self.course.progress.judges_sizes() {
+            let here = self.flow.sizes(&self.course.state.point);
+            self.course.progress.scales = self.course.progress.scales.or(&here);
+            if let Some(judged) = &mut self.course.progress.judged {
                 judged.reached = larger(&judged.reached, &here);
             }
         }
-        self.rest(!evidence.rests);
-        if step.is_power_of_two() || self.progress.ending.is_some() {
-            self.judge_sizes();
+        self.course.rest(!evidence.rests);
+        if step.is_power_of_two() || self.course.progress.ending.is_some() {
+            self.course.judge_sizes();
         }
-        if self.watching.is_some() {
-            self.look()?;
+        if self.course.watching.is_some() {
+            let Self { course, method, flow, memory } = self;
+            course.look(&mut Stepping { method, flow: *flow, memory })?;
         }
-        self.recheck(evidence.entropy_step == Some(EntropyStep::Held))
+        self.course.recheck(evidence.entropy_step == Some(EntropyStep::Held))
+    }
+
+    /// Takes a step of one size. The memory, which is large, stays where it is.
+    #[inline]
+    fn fixed(&mut self, size: Fixed) -> Result<Taken<F>, StepError> {
+        if !self.course.progress.corners.is_empty() {
+            return self.across_corners(size);
+        }
+        let Self { method, flow, memory, course } = self;
+        method.step(flow, &start_of(course, None), size.h, memory)
+    }
+
+    /// Takes a step of one size in parts between corners.
+    #[cold]
+    fn across_corners(&mut self, size: Fixed) -> Result<Taken<F>, StepError> {
+        let Self { method, flow, memory, course } = self;
+        let (start, corners) = (course.from(None), &course.progress.corners);
+        let method = &mut Stepping { method, flow: *flow, memory };
+        let Taken { x, values, evidence, effort } =
+            corners::step(method, course.flow, &start, size, corners)?;
+        Ok(Taken { x, values, evidence, effort })
     }
 
     /// Looks at what must hold on every step. Steps of one size between corners have been looked at one by one.
     #[inline]
     fn check_step(&self, taken: &Taken<F>) -> Result<(), StepError> {
-        let fixed = matches!(self.progress.step_size, StepSize::Fixed(_));
-        if !self.flow.depends_on_time() || (fixed && !self.progress.corners.is_empty()) {
+        let fixed = matches!(self.course.progress.step_size, StepSize::Fixed(_));
+        if !self.flow.depends_on_time() || (fixed && !self.course.progress.corners.is_empty()) {
             return Ok(());
         }
-        self.flow.inspect([&self.state.point, &taken.x], fixed)
-    }
-
-    /// Whether the certificate may name a site.
-    fn has_sites(&self) -> bool {
-        self.progress.scales.sizes.sites().is_some()
+        self.flow.inspect([&self.course.state.point, &taken.x], fixed)
     }
 
     /// Notes the local error of a step, and where it is largest, on the few whose number is a power of two and on the
     /// first one at the edge of stability.
     #[cold]
     fn sample(&mut self, Taken { x: end, values, .. }: &Taken<F>, h: f64) {
-        let (flow, x) = (self.flow, &self.state.point);
+        let (flow, x) = (self.flow, &self.course.state.point);
         // The sizes that a step brings about count too, and the largest ones so far: an entry that has decayed to
         // round-off has no error relative to itself.
         let sizes = larger(&flow.sizes(x), &flow.sizes(end));
-        self.progress.scales = self.progress.scales.or(&sizes);
-        let sizes = self.progress.scales.sizes.clone();
+        self.course.progress.scales = self.course.progress.scales.or(&sizes);
+        let sizes = self.course.progress.scales.sizes.clone();
         let norm = |error: &F::Vector| {
             let above =
                 F::Vector::zip([error, &sizes], |[error, s]| (error.abs() - ROUNDED * s).max(0.0));
             relative(&above, &sizes)
         };
-        let reference = self.reference(self.entropy);
-        let step = StepEnds { x, end, h, values: [&self.values, values], reference: &reference };
+        let reference = self.course.reference(self.course.entropy);
+        let step =
+            StepEnds { x, end, h, values: [&self.course.values, values], reference: &reference };
         let Some(error) = self.method.error(flow, &step, &self.memory, norm) else {
             if says_between(flow, x) && flow.displacement(x, end).is_none() {
-                self.certificate.note_local_error(f64::INFINITY, LimitingSites::default());
+                self.course.certificate.note_local_error(f64::INFINITY, LimitingSites::default());
             }
             return;
         };
-        let sites = if self.has_sites() {
-            let allowed = match &self.progress.step_size {
+        let sites = if self.course.has_sites() {
+            let allowed = match &self.course.progress.step_size {
                 StepSize::Adaptive(controller) => {
-                    controller.allowed(&self.rule, &self.progress.scales, h)
+                    controller.allowed(&self.course.rule, &self.course.progress.scales, h)
                 }
                 StepSize::Fixed(_) => sizes.clone(),
             };
@@ -320,19 +234,7 @@ impl<'a, F: Flow, M: Stepper<F>> Steps<'a, F, M> {
         } else {
             LimitingSites::default()
         };
-        self.certificate.note_local_error(error, sites);
-    }
-
-    /// Compares the sizes that errors are relative to with those that the state has reached.
-    #[cold]
-    fn judge_sizes(&mut self) {
-        let Progress { step_size, judged, scales, start, ending, .. } = &self.progress;
-        if let (StepSize::Adaptive(controller), Some(judged)) = (step_size, judged) {
-            let relative_to = controller.judged_by(&scales.sizes);
-            let noise = scales.rounding(self.state.time - start);
-            let has_ended = ending.is_some();
-            self.certificate.misjudged_size = judged.worst(&relative_to, &noise, has_ended);
-        }
+        self.course.certificate.note_local_error(error, sites);
     }
 
     /// Tries steps until the controller accepts one. Not part of the loop over steps of one size, which
@@ -342,26 +244,27 @@ impl<'a, F: Flow, M: Stepper<F>> Steps<'a, F, M> {
         &mut self,
         mut controller: Controller<F::Vector>,
     ) -> Result<Advance<F>, StepError> {
-        let (flow, rule, time) = (self.flow, self.rule, self.state.time);
+        let (flow, rule, time) = (self.flow, self.course.rule, self.course.state.time);
         let mut effort = Effort::default();
         let (mut tries, mut broken) = (0, None);
         let Stop { stop, recorded: target, .. } =
-            self.progress.corners.stop(time, controller.pace.end);
-        if self.progress.corners.has(time) {
+            self.course.progress.corners.stop(time, controller.pace.end);
+        if self.course.progress.corners.has(time) {
             self.memory = M::Memory::default();
         }
         loop {
             tries += 1;
             if tries == TRIES {
                 // An entry that begins to move only now has no size yet.
-                let here = Scales::at(flow, &self.state.point, Some(controller.pace.end - time));
-                self.progress.scales = self.progress.scales.and(&here);
+                let here =
+                    Scales::at(flow, &self.course.state.point, Some(controller.pace.end - time));
+                self.course.progress.scales = self.course.progress.scales.and(&here);
             }
             let (h, last) = controller.pace.attempt(time, stop);
             if controller.pace.next < controller.pace.least(&rule) && !last {
                 let (h, least) = (controller.pace.next, controller.pace.least(&rule));
                 let too_small = StepError::TooSmall { time, h, least };
-                let cause = broken.or_else(|| self.dependent(&self.state));
+                let cause = broken.or_else(|| self.course.dependent(&self.course.state));
                 return Err(cause.unwrap_or(too_small));
             }
             if time + h <= time {
@@ -371,8 +274,8 @@ impl<'a, F: Flow, M: Stepper<F>> Steps<'a, F, M> {
             let ratio = controller.pace.taken.map_or(1.0, |taken| h / taken);
             let mut memory = self.memory.rescaled(ratio);
             memory.take_room(&mut self.memory);
-            let allowed = controller.allowed(&rule, &self.progress.scales, h);
-            let start = self.from(Some(allowed));
+            let allowed = controller.allowed(&rule, &self.course.progress.scales, h);
+            let start = start_of(&self.course, Some(allowed));
             let end = self.method.attempt(flow, &start, h, &mut memory);
             let mut falls = false;
             let end = match end {
@@ -396,10 +299,10 @@ impl<'a, F: Flow, M: Stepper<F>> Steps<'a, F, M> {
                 }
             };
             let error = end.as_ref().and_then(|taken| {
-                let scales = self.progress.scales.or(&flow.sizes(&taken.x));
+                let scales = self.course.progress.scales.or(&flow.sizes(&taken.x));
                 let allowed = controller.allowed(&rule, &scales, h);
-                let values = [&self.values, &taken.values];
-                let (x, reference) = (&self.state.point, &start.reference);
+                let values = [&self.course.values, &taken.values];
+                let (x, reference) = (&self.course.state.point, &start.reference);
                 let step = StepEnds { x, end: &taken.x, h, values, reference };
                 let norm = |error: &F::Vector| relative(error, &allowed);
                 self.method.error(flow, &step, &memory, norm).filter(|error| error.is_finite())
@@ -410,69 +313,41 @@ impl<'a, F: Flow, M: Stepper<F>> Steps<'a, F, M> {
                     let before = std::mem::replace(&mut self.memory, memory);
                     self.memory.reuse(before);
                     let time = if last { target } else { time + h };
-                    self.progress.step_size = StepSize::Adaptive(controller);
+                    self.course.progress.step_size = StepSize::Adaptive(controller);
                     return Ok(Advance { taken: Taken { effort, ..taken }, h, time });
                 }
                 (None, _) if falls => {
                     controller.pace.reject_fall(h);
                     self.memory.refused(memory);
-                    self.certificate.rejected += 1;
-                    self.certificate.falls_avoided += 1;
+                    self.course.certificate.rejected += 1;
+                    self.course.certificate.falls_avoided += 1;
                 }
                 (Some(taken), Some(error)) if error <= 1.0 => {
                     controller.pace.accept(&rule, h, error);
                     let before = std::mem::replace(&mut self.memory, memory);
                     self.memory.reuse(before);
                     let time = if last { target } else { time + h };
-                    self.progress.step_size = StepSize::Adaptive(controller);
+                    self.course.progress.step_size = StepSize::Adaptive(controller);
                     return Ok(Advance { taken: Taken { effort, ..taken }, h, time });
                 }
                 (_, error) => {
                     controller.pace.reject(&rule, h, error);
                     self.memory.reuse(memory);
-                    self.certificate.rejected += 1;
+                    self.course.certificate.rejected += 1;
                 }
             }
         }
     }
+}
 
-    /// Ends the run if the state is at rest.
-    fn rest(&mut self, moved: bool) {
-        let Some(tolerance) = self.progress.rest else { return };
-        let x = &self.state.point;
-        let zero = self.progress.largest_velocity.zero();
-        let Some(v) = self.flow.rates(x, &zero) else { return };
-        let Progress { scales, largest_velocity, .. } = &mut self.progress;
-        *largest_velocity = larger(largest_velocity, &v.map(f64::abs));
-        // In units of the same sizes: an entry has been smaller than it is.
-        let (speed, largest) = (scales.speed(&v), scales.speed(largest_velocity));
-        if !moved || speed <= tolerance * largest {
-            self.progress.ending = Some(Ending::Rest { speed, largest });
-        }
-    }
-
-    /// The further invariant that depends on the other fields at a state, as an error.
-    #[cold]
-    fn dependent(&self, &State { time, ref point, .. }: &State<F::Space>) -> Option<StepError> {
-        let (index, fraction) = self.flow.dependent_invariant(point)?;
-        let change = self.certificate.invariants[index].max_error;
-        Some(StepError::DependentInvariants { time, index, change, fraction })
-    }
-
-    /// Looks at the further invariants after a step.
-    ///
-    /// # Errors
-    ///
-    /// [`StepError::DependentInvariants`] if one is no longer conserved because its differential depends
-    /// on those of the others.
-    fn check_invariants(&self, before: &State<F::Space>) -> Result<(), StepError> {
-        let broken = |balance: &InvariantBalance| balance.max_error > NOT_CONSERVED * balance.scale;
-        if self.promises.invariants && self.certificate.invariants.iter().any(broken) {
-            self.dependent(before).map_or(Ok(()), Err)
-        } else {
-            Ok(())
-        }
-    }
+/// Where the next step of this flow starts.
+#[inline]
+fn start_of<'s, F: Flow>(
+    course: &'s Course<'_, AnyFlow<'_, F>>,
+    allowed: Option<F::Vector>,
+) -> StepStart<'s, F> {
+    let StepStart { x, time, values, reference, allowed } = course.from(allowed);
+    StepStart { x, time, values, reference, allowed }
 }
 
 /// Whether the laws are numbers: a method without an equation to solve may step over the edge of a domain.
@@ -482,7 +357,3 @@ fn is_finite<L>(laws: &Laws<L>) -> bool {
 
 /// Steps that are tried before the sizes of the entries are estimated anew.
 const TRIES: usize = 3;
-
-/// The error of a further invariant, relative to its terms, above which it is no longer conserved. What
-/// fades out of `Π̃` stays far below it: `10⁻⁴h²`.
-const NOT_CONSERVED: f64 = 1e-4;

@@ -11,7 +11,7 @@ use crate::step::{EntropyStep, Flow, Laws, StateSpace};
 
 /// The start of the last step.
 #[derive(Clone, Debug)]
-pub(super) struct StepBefore<F: Flow> {
+pub(super) struct StepBefore<F: Flow + ?Sized> {
     pub(super) state: State<F::Space>,
     /// The laws there.
     pub(super) values: Laws<F::Numbers>,

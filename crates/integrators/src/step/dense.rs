@@ -26,7 +26,10 @@ pub(crate) struct Hermite<V> {
 impl<V: Vector> Hermite<V> {
     /// The cubic through a step; `None` if the flow does not say what lies between its ends. Where the velocity
     /// has no value it is a straight line.
-    pub(crate) fn through<F: Flow<Vector = V>>(flow: &F, step: &StepEnds<'_, F>) -> Option<Self> {
+    pub(crate) fn through<F: Flow<Vector = V> + ?Sized>(
+        flow: &F,
+        step: &StepEnds<'_, F>,
+    ) -> Option<Self> {
         let end = flow.displacement(step.x, step.end)?;
         let slope = |q: &V| Some(flow.rates(step.x, q)?.map(|v| step.h * v));
         let slopes = slope(&end.map(|_| 0.0)).and_then(|start| Some([start, slope(&end)?]));
@@ -41,7 +44,7 @@ impl<V: Vector> Hermite<V> {
 }
 
 /// Returns whether a flow says what lies between two states that are near each other.
-pub(crate) fn says_between<F: Flow>(flow: &F, x: &Element<F>) -> bool {
+pub(crate) fn says_between<F: Flow + ?Sized>(flow: &F, x: &Element<F>) -> bool {
     flow.displacement(x, x).is_some()
 }
 
@@ -62,7 +65,7 @@ pub(crate) fn limited(rise: f64, slopes: [f64; 2]) -> [f64; 2] {
 
 /// The entropy at the fraction `θ` of a step. A rise that is not positive is round-off: the entropy is then the
 /// one at the start.
-fn entropy<F: Flow>(flow: &F, step: &StepEnds<'_, F>, theta: f64) -> f64 {
+fn entropy<F: Flow + ?Sized>(flow: &F, step: &StepEnds<'_, F>, theta: f64) -> f64 {
     let [start, end] = step.values.map(|laws| laws.entropy);
     let rise = end - start;
     if rise <= 0.0 {
@@ -78,7 +81,11 @@ fn entropy<F: Flow>(flow: &F, step: &StepEnds<'_, F>, theta: f64) -> f64 {
 
 /// Computes the laws at the fraction `θ` of a step: a law that is promised has the value of the run, as far as
 /// both ends have it; another one goes from its value at the start to that at the end.
-fn targets<F: Flow>(step: &StepEnds<'_, F>, promises: Promises, theta: f64) -> Laws<F::Numbers> {
+fn targets<F: Flow + ?Sized>(
+    step: &StepEnds<'_, F>,
+    promises: Promises,
+    theta: f64,
+) -> Laws<F::Numbers> {
     let target = |promised, reference: f64, [start, end]: [f64; 2]| {
         if promised {
             reference.max(start.min(end)).min(start.max(end))
@@ -99,7 +106,7 @@ fn targets<F: Flow>(step: &StepEnds<'_, F>, promises: Promises, theta: f64) -> L
 
 /// The state at the fraction `θ` of a step; `None` if the flow does not say what lies between its ends.
 #[inline(never)]
-pub(crate) fn between<F: Flow>(
+pub(crate) fn between<F: Flow + ?Sized>(
     flow: &F,
     step: &StepEnds<'_, F>,
     promises: Promises,
@@ -121,14 +128,14 @@ pub(crate) fn between<F: Flow>(
 }
 
 /// The target of the state at the fraction `θ` of a step: the laws of the run, and an entropy.
-pub(crate) struct Target<'a, F: Flow> {
+pub(crate) struct Target<'a, F: Flow + ?Sized> {
     step: &'a StepEnds<'a, F>,
     laws: Laws<F::Numbers>,
     entropy: Option<f64>,
     theta: f64,
 }
 
-impl<'a, F: Flow> Target<'a, F> {
+impl<'a, F: Flow + ?Sized> Target<'a, F> {
     pub(crate) fn new(
         step: &'a StepEnds<'a, F>,
         promises: Promises,

@@ -60,6 +60,11 @@ pub enum Recheck {
     },
 }
 
+/// A flow of which nothing is known but what its states and its numbers are. The parts of a run that are not in its loop
+/// are compiled for it, and so once for each space.
+pub(crate) type AnyFlow<'a, F> = dyn Flow<Space = <F as Flow>::Space, Numbers = <F as Flow>::Numbers, Vector = <F as Flow>::Vector>
+    + 'a;
+
 /// A system as a run sees it: its laws, its sizes, and its equation of motion.
 ///
 /// Implement it for a system that is no [`Metriplectic`](metriplectic_dynamics::Metriplectic) one, such as one
@@ -117,7 +122,10 @@ pub trait Flow {
 
     /// Calls `f` with the room on the stack that a step of this flow needs. A flow whose steps need little calls it
     /// as it is.
-    fn with_room<T>(&self, f: impl FnOnce() -> T) -> T {
+    fn with_room<T>(&self, f: impl FnOnce() -> T) -> T
+    where
+        Self: Sized,
+    {
         f()
     }
 

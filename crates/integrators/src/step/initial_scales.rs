@@ -40,7 +40,11 @@ const AHEAD: f64 = 1e-6;
 impl<V: Vector> Scales<V> {
     /// The sizes at `x`, where a run starts that lasts `span`, or where entries begin to move. Without a span
     /// nothing is known.
-    pub(crate) fn at<F: Flow<Vector = V>>(flow: &F, x: &Element<F>, span: Option<f64>) -> Self {
+    pub(crate) fn at<F: Flow<Vector = V> + ?Sized>(
+        flow: &F,
+        x: &Element<F>,
+        span: Option<f64>,
+    ) -> Self {
         let sizes = flow.sizes(x);
         let zero = sizes.zero();
         let Some(span) = span else { return Self { sizes: zero.clone(), terms: zero } };

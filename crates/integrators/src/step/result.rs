@@ -18,7 +18,7 @@ pub struct StepStart<'a, F: Flow + ?Sized> {
     pub allowed: Option<F::Vector>,
 }
 
-impl<'a, F: Flow> StepStart<'a, F> {
+impl<'a, F: Flow + ?Sized> StepStart<'a, F> {
     /// The first step of a run from `x`.
     pub fn first(flow: &F, x: &'a Element<F>) -> Self {
         let values = flow.laws(x);

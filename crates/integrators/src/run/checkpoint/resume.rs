@@ -7,12 +7,13 @@ use super::saved::SavedRun;
 use super::{Checkpoint, validation};
 use crate::run::certificate::Certificate;
 use crate::run::checked::checked_states;
-use crate::run::controller::{Rule, StepSize};
+use crate::run::controller::StepSize;
+use crate::run::course::{Course, Said};
 use crate::run::state::State;
 use crate::run::steps::Steps;
 use crate::run::watching::StepBefore;
 use crate::step::exact::Exact;
-use crate::step::{Flow, Memory as _, Saved, StateSpace as _, Stepper, Vector};
+use crate::step::{AnyFlow, Flow, Memory as _, Saved, StateSpace as _, Stepper, Vector};
 
 fn exact(numbers: impl IntoIterator<Item = f64>) -> Vec<Exact> {
     numbers.into_iter().map(Exact).collect()
@@ -32,11 +33,33 @@ fn vector<V: Vector>(what: &'static str, list: &[Exact], like: &V) -> Result<V, 
 impl<'a, F: Flow, M: Stepper<F>> Steps<'a, F, M> {
     /// All that the next steps depend on, but for the system and the options of the method.
     pub fn checkpoint(&self) -> Checkpoint {
+        let mut memory = Saved::default();
+        self.memory.save(&mut memory);
+        self.course.checkpoint(self.method.name(), memory)
+    }
+
+    /// A run that was put down.
+    pub(crate) fn resume(
+        method: M,
+        flow: &'a F,
+        checkpoint: &Checkpoint,
+    ) -> Result<Self, ResumeError> {
+        let c = checkpoint.run()?;
+        method.check(matches!(c.progress.step_size, StepSize::Adaptive(_)))?;
+        validation::of_the_method(&c.method, method.name())?;
+        let said = Said::by(&method, flow, c.progress.start);
+        let course = Course::resume(flow as &AnyFlow<'a, F>, said, c)?;
+        let memory = M::Memory::restore(&c.memory)?;
+        Ok(Self { method, flow, memory, course })
+    }
+}
+
+impl<'a, F: Flow + ?Sized> Course<'a, F> {
+    /// The checkpoint of a run by this method, with this memory.
+    fn checkpoint(&self, method: String, memory: Saved) -> Checkpoint {
         let State { step, time, point, energy, entropy } = &self.state;
         let velocity = self.flow.rates(point, &self.flow.sizes(point).map(|_| 0.0));
         let known = self.certificate.invariants.len();
-        let mut memory = Saved::default();
-        self.memory.save(&mut memory);
         let Ok(progress) =
             self.progress.convert(|_, v| Ok::<_, Infallible>(exact(v.to_short_list())));
         let events = match &self.watching {
@@ -45,7 +68,7 @@ impl<'a, F: Flow, M: Stepper<F>> Steps<'a, F, M> {
             None => Vec::new(),
         };
         let run = SavedRun {
-            method: self.method.name(),
+            method,
             step: *step,
             time: Exact(*time),
             point: exact(F::Space::numbers(point)),
@@ -63,25 +86,20 @@ impl<'a, F: Flow, M: Stepper<F>> Steps<'a, F, M> {
     }
 
     /// A run that was put down.
-    pub(crate) fn resume(
-        method: M,
+    fn resume(
         flow: &'a F,
-        checkpoint: &Checkpoint,
+        Said { rule, promises, noise }: Said,
+        c: &SavedRun,
     ) -> Result<Self, ResumeError> {
-        let c = checkpoint.run()?;
-        method.check(matches!(c.progress.step_size, StepSize::Adaptive(_)))?;
-        validation::of_the_method(&c.method, method.name())?;
         let entries: Vec<f64> = c.point().collect();
         let point = flow.element(&entries)?;
-        let fresh = Certificate::start(flow, &point, method.promises(flow));
-        let mut certificate =
-            c.balance.resumed(Certificate { noise: method.noise(flow), ..fresh })?;
+        let fresh = Certificate::start(flow, &point, promises);
+        let mut certificate = c.balance.resumed(Certificate { noise, ..fresh })?;
         if c.progress.ending.is_none() {
             certificate.checked_states = checked_states(flow, c.step);
         }
         let like = flow.sizes(&point);
         let progress = c.progress.convert(|what, list| vector(what, list, &like))?;
-        let memory = M::Memory::restore(&c.memory)?;
         expect_length("further invariants", c.invariants.len(), certificate.invariants.len())?;
         validation::of_the_system(flow, &point, c)?;
         let mut values = flow.laws(&point);
@@ -101,17 +119,15 @@ impl<'a, F: Flow, M: Stepper<F>> Steps<'a, F, M> {
         };
         Ok(Self {
             promises: certificate.promises,
-            rule: Rule::of(&method, progress.start),
+            rule,
             before,
             watching: None,
             last_numbers: c.events.clone(),
-            method,
             flow,
             progress,
             state,
             values,
             entropy: c.kept_entropy.0,
-            memory,
             certificate,
             failed: false,
         })

@@ -29,7 +29,7 @@ fn same(field: &'static str, stored: Exact, found: f64, terms: f64) -> Result<()
 }
 
 /// The laws of the system and its velocity, at the stored point.
-pub(super) fn of_the_system<F: Flow>(
+pub(super) fn of_the_system<F: Flow + ?Sized>(
     flow: &F,
     x: &Element<F>,
     c: &SavedRun,

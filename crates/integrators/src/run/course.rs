@@ -1,0 +1,219 @@
+//! A run without its loop: all of it but the method, its memory, and what each step needs of the system.
+
+use crate::run::certificate::{Certificate, InvariantBalance};
+use crate::run::controller::{Rule, StepSize};
+use crate::run::ending::Ending;
+use crate::run::error::RunError;
+use crate::run::event::LastNumber;
+use crate::run::judged::Judged;
+use crate::run::progress::Progress;
+use crate::run::schedule::{Schedule, Size};
+use crate::run::span_error::SpanError;
+use crate::run::state::State;
+use crate::run::watching::{StepBefore, Watching};
+use crate::step::scales::larger;
+use crate::step::{
+    Element, Flow, Laws, NoiseSummary, Promises, Scales, StepError, StepStart, Stepper, Vector as _,
+};
+
+/// What a method says of a run before its first step.
+#[derive(Clone, Debug)]
+pub(super) struct Said {
+    pub(super) rule: Rule,
+    pub(super) promises: Promises,
+    pub(super) noise: Option<NoiseSummary>,
+}
+
+impl Said {
+    /// What a method says of a run of this flow from a time on.
+    pub(super) fn by<F: Flow, M: Stepper<F>>(method: &M, flow: &F, start: f64) -> Self {
+        let (promises, noise) = (method.promises(flow), method.noise(flow));
+        Self { rule: Rule::of(method, start), promises, noise }
+    }
+}
+
+/// All of a run but the method and its memory. The flow is any one with these states and numbers
+/// ([`AnyFlow`](crate::step::AnyFlow)), so that starts, outputs, events, jumps and checkpoints are compiled once for
+/// each space. The loop over the steps knows its flow.
+pub(super) struct Course<'a, F: Flow + ?Sized> {
+    pub(super) flow: &'a F,
+    pub(super) rule: Rule,
+    pub(super) progress: Progress<F::Vector>,
+    pub(super) state: State<F::Space>,
+    /// The laws at the state.
+    pub(super) values: Laws<F::Numbers>,
+    /// The entropy after the last step that dissipated.
+    pub(super) entropy: f64,
+    pub(super) promises: Promises,
+    pub(super) certificate: Certificate,
+    pub(super) failed: bool,
+    /// The step before the state, for what lies between them.
+    pub(super) before: StepBefore<F>,
+    pub(super) watching: Option<Box<Watching<F::Space>>>,
+    /// Those of the functions of events that had no value where the run was put down, until its first step.
+    pub(super) last_numbers: Vec<LastNumber>,
+}
+
+impl<'a, F: Flow + ?Sized> Course<'a, F> {
+    /// Verifies the model, and starts.
+    pub(super) fn start(
+        flow: &'a F,
+        Said { rule, promises, noise }: Said,
+        x0: Element<F>,
+        schedule: Schedule,
+    ) -> Result<Self, RunError<F::Space>> {
+        schedule.check_tolerance(&rule)?;
+        if schedule.rest.is_some() && flow.depends_on_time() {
+            return Err(SpanError::NoRestInTime.into());
+        }
+        let x0 = flow.begin(x0, schedule.start);
+        flow.check(&x0)?;
+        flow.examine(&x0)?;
+        let certificate = Certificate { noise, ..Certificate::start(flow, &x0, promises) };
+        let scales = Scales::at(flow, &x0, schedule.span());
+        let Schedule { size, start, count, every, most, rest, watch, mut corners } = schedule;
+        corners.start = start;
+        let step_size = match size {
+            Size::Fixed(h) => StepSize::Fixed(h),
+            Size::Tolerance(adaptive) => {
+                StepSize::Adaptive(adaptive.controller(&rule, flow, &x0, &scales)?)
+            }
+        };
+        let largest_velocity = scales.sizes.zero();
+        let judged = match &step_size {
+            StepSize::Fixed(_) => None,
+            StepSize::Adaptive(controller) => {
+                Some(Judged::new(&controller.judged_by(&scales.sizes), flow.sizes(&x0)))
+            }
+        };
+        let progress = Progress {
+            step_size,
+            start,
+            count,
+            every,
+            most,
+            scales,
+            judged,
+            corners,
+            rest,
+            largest_velocity,
+            ending: None,
+        };
+        let values = flow.laws(&x0);
+        let (energy, entropy) = (values.energy, values.entropy);
+        let state = State { step: 0, time: start, point: x0, energy, entropy };
+        let watching = Watching::new(watch, &progress, &state, &[])?;
+        let before = StepBefore {
+            state: state.clone(),
+            values: values.clone(),
+            entropy,
+            h: 0.0,
+            in_parts: false,
+            entropy_step: None,
+        };
+        let mut course = Self {
+            flow,
+            rule,
+            progress,
+            state,
+            before,
+            watching,
+            last_numbers: Vec::new(),
+            values,
+            entropy,
+            promises,
+            certificate,
+            failed: false,
+        };
+        course.rest(true);
+        Ok(course)
+    }
+
+    /// How the run ended; `None` as long as there are steps to take.
+    pub(super) const fn ending(&self) -> Option<Ending> {
+        if self.failed { Some(Ending::Stopped) } else { self.progress.ending }
+    }
+
+    /// What the laws were at the start of the run, with this entropy.
+    #[inline]
+    pub(super) fn reference(&self, entropy: f64) -> Laws<F::Numbers> {
+        let mut invariants = self.values.invariants.clone();
+        for (k, balance) in self.certificate.invariants.iter().enumerate() {
+            invariants[k] = balance.initial;
+        }
+        Laws { energy: self.certificate.reference_energy(), entropy, invariants }
+    }
+
+    /// Where the next step starts.
+    #[inline]
+    pub(super) fn from(&self, allowed: Option<F::Vector>) -> StepStart<'_, F> {
+        let entropy = if self.promises.entropy { self.entropy } else { self.values.entropy };
+        let reference = self.reference(entropy);
+        let values = self.values.clone();
+        StepStart { x: &self.state.point, time: self.state.time, values, reference, allowed }
+    }
+
+    /// Whether the certificate may name a site.
+    pub(super) fn has_sites(&self) -> bool {
+        self.progress.scales.sizes.sites().is_some()
+    }
+
+    /// Compares the sizes that errors are relative to with those that the state has reached.
+    #[cold]
+    pub(super) fn judge_sizes(&mut self) {
+        let Progress { step_size, judged, scales, start, ending, .. } = &self.progress;
+        if let (StepSize::Adaptive(controller), Some(judged)) = (step_size, judged) {
+            let relative_to = controller.judged_by(&scales.sizes);
+            let noise = scales.rounding(self.state.time - start);
+            let has_ended = ending.is_some();
+            self.certificate.misjudged_size = judged.worst(&relative_to, &noise, has_ended);
+        }
+    }
+
+    /// Ends the run if the state is at rest.
+    #[inline]
+    pub(super) fn rest(&mut self, moved: bool) {
+        let Some(tolerance) = self.progress.rest else { return };
+        let x = &self.state.point;
+        let zero = self.progress.largest_velocity.zero();
+        let Some(v) = self.flow.rates(x, &zero) else { return };
+        let Progress { scales, largest_velocity, .. } = &mut self.progress;
+        *largest_velocity = larger(largest_velocity, &v.map(f64::abs));
+        // In units of the same sizes: an entry has been smaller than it is.
+        let (speed, largest) = (scales.speed(&v), scales.speed(largest_velocity));
+        if !moved || speed <= tolerance * largest {
+            self.progress.ending = Some(Ending::Rest { speed, largest });
+        }
+    }
+
+    /// The further invariant that depends on the other fields at a state, as an error.
+    #[cold]
+    pub(super) fn dependent(
+        &self,
+        &State { time, ref point, .. }: &State<F::Space>,
+    ) -> Option<StepError> {
+        let (index, fraction) = self.flow.dependent_invariant(point)?;
+        let change = self.certificate.invariants[index].max_error;
+        Some(StepError::DependentInvariants { time, index, change, fraction })
+    }
+
+    /// Looks at the further invariants after a step.
+    ///
+    /// # Errors
+    ///
+    /// [`StepError::DependentInvariants`] if one is no longer conserved because its differential depends
+    /// on those of the others.
+    #[inline]
+    pub(super) fn check_invariants(&self, before: &State<F::Space>) -> Result<(), StepError> {
+        let broken = |balance: &InvariantBalance| balance.max_error > NOT_CONSERVED * balance.scale;
+        if self.promises.invariants && self.certificate.invariants.iter().any(broken) {
+            self.dependent(before).map_or(Ok(()), Err)
+        } else {
+            Ok(())
+        }
+    }
+}
+
+/// The error of a further invariant, relative to its terms, above which it is no longer conserved. What
+/// fades out of `Π̃` stays far below it: `10⁻⁴h²`.
+const NOT_CONSERVED: f64 = 1e-4;

@@ -1,4 +1,4 @@
-//! What became of a row.
+//! Outcomes of rows.
 
 use metriplectic_integrators::Ending;
 
@@ -14,7 +14,7 @@ pub(crate) struct Entry {
     pub(crate) seconds: f64,
 }
 
-/// What became of a row.
+/// The outcome of a row.
 #[derive(Clone, Debug)]
 pub(crate) enum Outcome {
     Done(Done),
@@ -33,7 +33,7 @@ pub(crate) struct Done {
     pub(crate) measures: Box<[f64]>,
     /// The times of the recorded states, if anything was observed there.
     pub(crate) times: Box<[f64]>,
-    /// What was observed at these times, one observable after the other.
+    /// The observables at these times, one observable after the other.
     pub(crate) series: Box<[f64]>,
 }
 

@@ -1,4 +1,4 @@
-//! What can go wrong with a sweep. What goes wrong in a row is no error here: it is a row.
+//! Errors of a sweep. A row that fails is no error here: it is a row.
 
 use std::fmt;
 use std::io;
@@ -53,7 +53,7 @@ pub enum PlanError {
     Read {
         /// The file.
         path: PathBuf,
-        /// What the system says.
+        /// The error of the system.
         source: io::Error,
     },
     /// A cell of a file of rows that is not a number, or a line with too few or too many of them.
@@ -63,7 +63,7 @@ pub enum PlanError {
         path: PathBuf,
         /// The line, counted from 1.
         line: usize,
-        /// What is wrong with it.
+        /// The fault.
         problem: String,
     },
 }
@@ -77,7 +77,7 @@ pub enum JournalError {
     Io {
         /// The file.
         path: PathBuf,
-        /// What the system says.
+        /// The error of the system.
         source: io::Error,
     },
     /// The path is a folder or a device.
@@ -158,7 +158,7 @@ pub enum SweepError {
     /// The journal could not be written, because the disk is full for example.
     #[error("{source}; {} rows are kept in this error", table.len())]
     Write {
-        /// What has failed.
+        /// The error of the journal.
         source: JournalError,
         /// The rows so far.
         table: Box<Table>,
@@ -184,7 +184,7 @@ impl SweepError {
     }
 }
 
-/// What to do after an interruption.
+/// The remedy after an interruption.
 const fn advice(journal: bool) -> &'static str {
     if journal { "; run it again, and it goes on" } else { "" }
 }

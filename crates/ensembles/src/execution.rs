@@ -30,7 +30,7 @@ pub(crate) struct Execution<'r, 'a, M: StateSpace, F> {
     damaged: usize,
 }
 
-/// What the threads share.
+/// The state that the threads share.
 struct Sink {
     journal: Option<Journal>,
     rows: Vec<Entry>,
@@ -152,7 +152,7 @@ fn finished(row: &Row) {
     let _ = row;
 }
 
-/// What becomes of a row; `None` if it was put down for another time.
+/// Runs a row to its outcome; `None` if it was put down for another time.
 pub(crate) fn outcome<M, T, F>(runs: &Runs<'_, M, F>, row: &Row) -> Option<Entry>
 where
     M: StateSpace,
@@ -182,7 +182,7 @@ where
     Some(Entry { number, parameters, outcome, seconds })
 }
 
-/// What a panic has said.
+/// The message of a panic.
 fn said(payload: &(dyn Any + Send)) -> String {
     let text = payload.downcast_ref::<&str>().copied();
     let text = text.or_else(|| payload.downcast_ref::<String>().map(String::as_str));

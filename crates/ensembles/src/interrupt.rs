@@ -7,7 +7,7 @@ static ASKED: AtomicBool = AtomicBool::new(false);
 static RUNNING: AtomicUsize = AtomicUsize::new(0);
 static LISTENING: Once = Once::new();
 
-/// What a shell says of a program that Ctrl-C has ended: 128 and the number of the signal.
+/// The status of a program that Ctrl-C has ended: 128 and the number of the signal.
 const ENDED: i32 = 130;
 
 /// A sweep that runs. Meanwhile the first signal asks it to stop, and the second ends the program.

@@ -25,7 +25,7 @@ pub(crate) struct Journal {
     file: File,
 }
 
-/// What a journal holds.
+/// The content of a journal.
 #[derive(Debug)]
 pub(crate) struct Content {
     pub(crate) header: Header,
@@ -138,7 +138,7 @@ pub(crate) fn merged(paths: &[PathBuf]) -> Result<Content, JournalError> {
     combined(contents.collect::<Result<_, _>>()?)
 }
 
-/// The same of journals that have been read.
+/// Merges journals that have been read.
 pub(crate) fn combined(journals: Vec<(&Path, Content)>) -> Result<Content, JournalError> {
     let mut all: Option<Content> = None;
     let mut rows: Vec<(Entry, &Path)> = Vec::new();

@@ -134,7 +134,7 @@ impl Row {
     ///
     /// # Errors
     ///
-    /// Those of [`Method::run`], of resuming, and of the file.
+    /// The errors of [`Method::run`], of resuming, and of the file.
     pub fn run_long<F: Flow, M: Method<F>>(
         &self,
         method: M,

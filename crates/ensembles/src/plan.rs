@@ -231,7 +231,7 @@ impl Sweep {
         Ok(self.known_row(number, &self.names().into()))
     }
 
-    /// The same for a row that is known to exist, with the names of the columns.
+    /// The row of an index that is known to exist, with the names of the columns.
     pub(crate) fn known_row(&self, number: usize, names: &Arc<[String]>) -> Row {
         Row::new(number, Arc::clone(names), self.values(number), self.seed)
     }

@@ -1,4 +1,4 @@
-//! What a row is measured from.
+//! Records, from which rows are measured.
 
 use metriplectic_integrators::{Certificate, Ending, Event, State, StateSpace, Trajectory};
 
@@ -64,7 +64,7 @@ impl<M: StateSpace> Record<M> {
     }
 }
 
-/// What a closure of a row may return: a [`Trajectory`], or the [`Record`] of a long row.
+/// A result that a closure of a row may return: a [`Trajectory`], or the [`Record`] of a long row.
 pub trait Recorded {
     /// Where the states of the run live.
     type Space: StateSpace;

@@ -50,9 +50,9 @@ pub enum ShardError {
     Text {
         /// The option or the variable.
         name: &'static str,
-        /// What it says.
+        /// The value found.
         value: String,
-        /// What it should be.
+        /// The value expected.
         expected: &'static str,
     },
     /// The scheduler says which task this is, but not how many there are.
@@ -89,7 +89,7 @@ pub enum ShardError {
     },
 }
 
-/// What a variable of the environment says.
+/// The values of the variables of an environment.
 type Variables<'a> = &'a dyn Fn(&str) -> Option<String>;
 
 impl Shard {
@@ -119,7 +119,7 @@ impl Shard {
         Self::of(&line, &|name| env::var(name).ok())
     }
 
-    /// The same from any command line and environment.
+    /// Reads the shard from any command line and environment.
     ///
     /// ```
     /// use metriplectic_ensembles::Shard;
@@ -136,7 +136,7 @@ impl Shard {
     ///
     /// # Errors
     ///
-    /// Those of [`from_environment`](Self::from_environment).
+    /// The errors of [`from_environment`](Self::from_environment).
     pub fn of(line: &[String], variable: Variables<'_>) -> Result<Self, ShardError> {
         if let Some(text) = option(line, "--shard") {
             return Self::parse(&text);

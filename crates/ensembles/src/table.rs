@@ -213,7 +213,7 @@ impl<'a> TableRow<'a> {
         self.entry.seconds
     }
 
-    /// What was observed, with the times of the states; `None` if the row failed or there is no such name.
+    /// An observable, with the times of the states; `None` if the row failed or there is no such name.
     pub fn series(&self, name: &str) -> Option<impl Iterator<Item = (f64, f64)> + use<'a>> {
         let column = self.header.observables.iter().position(|other| other == name)?;
         let done = self.entry.done()?;

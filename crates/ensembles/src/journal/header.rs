@@ -7,7 +7,7 @@ use super::line::{escaped, unescaped};
 use crate::error::JournalError;
 use crate::fingerprint::of_line;
 
-/// What a journal begins with; the number is that of the format.
+/// The beginning of a journal; the number is that of the format.
 const FORMAT: &str = "metriplectic-journal 1";
 
 /// The plan of a journal, and the names of its columns.

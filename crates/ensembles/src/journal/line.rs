@@ -27,7 +27,7 @@ pub(crate) fn same_numbers(a: &Entry, b: &Entry) -> bool {
     body(a) == body(b)
 }
 
-/// What is compared of a line.
+/// The part of a line that is compared.
 fn body(entry: &Entry) -> Vec<u8> {
     let mut line = Vec::with_capacity(512);
     line.extend_from_slice(entry.number.to_string().as_bytes());

@@ -17,7 +17,7 @@ impl Table {
     ///
     /// # Errors
     ///
-    /// Those of writing.
+    /// The errors of writing.
     pub fn csv(&self, path: impl AsRef<Path>) -> io::Result<()> {
         replaced(path.as_ref(), |file| self.write_csv(file))
     }
@@ -26,7 +26,7 @@ impl Table {
     ///
     /// # Errors
     ///
-    /// Those of writing.
+    /// The errors of writing.
     pub fn write_csv(&self, mut to: impl Write) -> io::Result<()> {
         let names = self.names();
         let heads = names.iter().map(|name| if name == "failed" { "outcome" } else { name });
@@ -52,7 +52,7 @@ impl Table {
     ///
     /// # Errors
     ///
-    /// Those of writing.
+    /// The errors of writing.
     pub fn npy(&self, path: impl AsRef<Path>) -> io::Result<()> {
         let names = self.names();
         let rows = self.rows().map(|row| {
@@ -68,7 +68,7 @@ impl Series {
     ///
     /// # Errors
     ///
-    /// Those of writing.
+    /// The errors of writing.
     pub fn csv(&self, path: impl AsRef<Path>) -> io::Result<()> {
         replaced(path.as_ref(), |file| {
             let names: Vec<String> = self.names().iter().map(|name| quoted(name)).collect();
@@ -85,7 +85,7 @@ impl Series {
     ///
     /// # Errors
     ///
-    /// Those of writing.
+    /// The errors of writing.
     pub fn npy(&self, path: impl AsRef<Path>) -> io::Result<()> {
         write_npy(path.as_ref(), self.names(), self.rows().iter().cloned())
     }

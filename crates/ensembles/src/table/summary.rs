@@ -1,4 +1,4 @@
-//! What a table says to a reader.
+//! The text of a table for a reader.
 
 use std::collections::BTreeMap;
 use std::fmt;

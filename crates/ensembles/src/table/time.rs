@@ -1,4 +1,4 @@
-//! What was observed in time, over all rows.
+//! Observables in time, over all rows.
 
 use super::Table;
 use crate::entry::Done;
@@ -62,7 +62,7 @@ impl Table {
     ///
     /// # Errors
     ///
-    /// Those of [`quantiles`](Self::quantiles).
+    /// The errors of [`quantiles`](Self::quantiles).
     pub fn mean(&self, name: &str) -> Result<Series, TableError> {
         let names = ["mean", "standard_error"].map(str::to_owned).to_vec();
         self.over_rows(name, names, |values| {

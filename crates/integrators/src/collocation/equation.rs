@@ -46,7 +46,7 @@ pub(super) struct StageEquation<'a, Y: Metriplectic> {
     pub(super) h: f64,
     /// The laws at `x`.
     pub(super) values: Laws<Numbers<Y>>,
-    /// What is taken back of the errors of earlier steps.
+    /// Corrections of the errors of earlier steps.
     pub(super) drift: DriftCorrection<Y>,
     /// The start, if what is lost of the energy becomes heat.
     pub(super) heats: Option<HeatStart<Dim<Y>>>,
@@ -66,7 +66,7 @@ impl<Y: Metriplectic> Copy for StageEquation<'_, Y> {}
 
 /// The equation at given velocities.
 pub(super) struct Evaluated<Y: Metriplectic> {
-    /// What the velocities of the stages are less than they should be, at `x`.
+    /// The deficits of the velocities of the stages, at `x`.
     pub(super) residual: Unknowns<Y>,
     /// The end of the step.
     pub(super) end: Point<Y>,
@@ -74,9 +74,9 @@ pub(super) struct Evaluated<Y: Metriplectic> {
     pub(super) d: Vector<Y::Manifold>,
     /// The laws at the end.
     pub(super) values: Laws<Numbers<Y>>,
-    /// What the residual leaves of the energy and the further invariants, in units of their round-off.
+    /// The defects of the energy and the further invariants in the residual, in units of their round-off.
     pub(super) excess: f64,
-    /// What it leaves of the entropy, and the size of its terms.
+    /// Its defect of the entropy, and the size of the terms.
     pub(super) entropy: Left,
     /// The largest `|w_S|` of a stage, entry by entry.
     pub(super) entropy_covector: Vector<Y::Manifold>,
@@ -90,17 +90,17 @@ pub(super) struct Evaluated<Y: Metriplectic> {
     pub(super) heat_rounding: Vector<Y::Manifold>,
     /// The least `|w_S|` of a stage; infinite if the entropy is not corrected.
     pub(super) entropy_slope: f64,
-    /// What friction adds to the entropy.
+    /// The entropy that friction adds.
     pub(super) growth: f64,
-    /// What the entropy gains beside it.
+    /// The entropy that is gained beside it.
     pub(super) surplus: f64,
-    /// What friction at the end would produce in a step of this size; infinite where nothing is damped.
+    /// The entropy that friction at the end would produce in a step of this size; infinite where nothing is damped.
     pub(super) left: f64,
     /// The largest change of the energy at a stage.
     pub(super) excursion: f64,
 }
 
-/// What a residual leaves of a law.
+/// The defect of a law in a residual.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Left {
     /// The change of the law, less what it is to be.
@@ -340,7 +340,7 @@ impl<'a, Y: Metriplectic> StageEquation<'a, Y> {
     }
 }
 
-/// What a residual changes of each law.
+/// The change of each law by a residual.
 struct Work<C: Dimension> {
     laws: Laws<C::Array<f64>>,
 }

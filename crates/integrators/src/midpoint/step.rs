@@ -173,7 +173,7 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
     }
 }
 
-/// What a solution tells of the motion.
+/// Evidence about the motion in a solution.
 fn evidence<M: Manifold>(root: &Root<M, Dissipated>, friction: f64) -> Evidence {
     let rests = (0..Vector::<M>::LEN).all(|i| root.u[i].abs() <= 2.0 * root.round_off[i]);
     let Dissipated { slope_squared, dissipates } = root.evidence;

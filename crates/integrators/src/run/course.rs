@@ -16,7 +16,7 @@ use crate::step::{
     Element, Flow, Laws, NoiseSummary, Promises, Scales, StepError, StepStart, Stepper, Vector as _,
 };
 
-/// What a method says of a run before its first step.
+/// The statements of a method about a run before its first step.
 #[derive(Clone, Debug)]
 pub(super) struct Said {
     pub(super) rule: Rule,
@@ -25,7 +25,7 @@ pub(super) struct Said {
 }
 
 impl Said {
-    /// What a method says of a run of this flow from a time on.
+    /// Asks a method about a run of this flow from a time on.
     pub(super) fn by<F: Flow, M: Stepper<F>>(method: &M, flow: &F, start: f64) -> Self {
         let (promises, noise) = (method.promises(flow), method.noise(flow));
         Self { rule: Rule::of(method, start), promises, noise }
@@ -50,7 +50,7 @@ pub(super) struct Course<'a, F: Flow + ?Sized> {
     /// The step before the state, for what lies between them.
     pub(super) before: StepBefore<F>,
     pub(super) watching: Option<Box<Watching<F::Space>>>,
-    /// Those of the functions of events that had no value where the run was put down, until its first step.
+    /// The last numbers of functions of events that had no value where the run was put down, until its first step.
     pub(super) last_numbers: Vec<LastNumber>,
 }
 
@@ -134,7 +134,7 @@ impl<'a, F: Flow + ?Sized> Course<'a, F> {
         if self.failed { Some(Ending::Stopped) } else { self.progress.ending }
     }
 
-    /// What the laws were at the start of the run, with this entropy.
+    /// The laws at the start of the run, with this entropy.
     #[inline]
     pub(super) fn reference(&self, entropy: f64) -> Laws<F::Numbers> {
         let mut invariants = self.values.invariants.clone();

@@ -1,8 +1,8 @@
-//! What the page of guarantees promises, and where.
+//! The promises of the page of guarantees, and where they stand.
 
 use serde::{Deserialize, Serialize};
 
-/// What one table of the report holds, in the order of the page of guarantees.
+/// The subject of a table of the report, in the order of the page of guarantees.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub enum Guarantee {
     /// The first law.
@@ -35,7 +35,7 @@ pub enum Guarantee {
     RandomInput,
     /// Lattices.
     ManySites,
-    /// The same bits.
+    /// Equal bits.
     Reproducibility,
     /// Many runs in one table.
     Sweeps,
@@ -49,7 +49,7 @@ pub enum Guarantee {
 pub(super) struct Facts {
     /// The heading of its table.
     pub(super) heading: &'static str,
-    /// What the sentences of the page that it holds begin with, or contain.
+    /// The words that sentences of the page begin with, or contain, where it holds them.
     pub(super) sentences: &'static [&'static str],
     /// Figures of the gallery that show it.
     pub(super) figures: &'static [&'static str],

@@ -130,10 +130,10 @@ fn orders_on_a_sphere_with_an_energy_that_is_not_quadratic() {
         .energy(|n: &Vector3<Real>| n.z + n.z.powi(3) * 0.5 + n.x * n.x * 0.3)
         .entropy(|n: &Vector3<Real>| n.x * 0.5 + n.y * n.z * 0.3)
         .dissipation(MetricDissipation::scaled(0.3))
-        .noise(Boltzmann(k_b))
+        .noise(Boltzmann(k_b).measure(|n: &Vector3<Real>| n.x * 0.3))
         .build()
         .unwrap();
-    // The area is dz dφ, so the law on the curve H = 0.2 is exp(S/k_B) / |∂H/∂z| dφ.
+    // The area is dz dφ, so the law on the curve H = 0.2 is μ exp(S/k_B) / |∂H/∂z| dφ.
     fn at(angle: f64) -> Vector3<f64> {
         let mut z = 0.1_f64;
         for _ in 0..30 {
@@ -146,11 +146,11 @@ fn orders_on_a_sphere_with_an_energy_that_is_not_quadratic() {
     }
     let curve = Curve::new(at, |n| n.y.atan2(n.x));
     let f: &Function = &((|n: &Vector3<f64>| 0.5 * n.x + 0.3 * n.y * n.z) as Function);
-    let of = (f, exact(at, |n| (f(n) / k_b).exp() / slope(n), f));
+    let of = (f, exact(at, |n| (f(n) / k_b + 0.3 * n.x).exp() / slope(n), f));
     let two = curve.errors(of, [0.2, 0.1, 0.05], &|h, n, outcome| {
         step(&system, &NinomiyaVictoir(DormandPrince5).numbers(outcome.clone()), n, h)
     });
-    let problem = "curve on S², energy of degree 3: law of S";
+    let problem = "curve on S², energy of degree 3, a measure: law of S";
     assert_orders(problem, "NinomiyaVictoir(DormandPrince5)", &[order(&two)], 2);
     let one = curve.errors(of, [0.1, 0.05, 0.025], &|h, n, outcome| {
         step(&system, &RandomFlow(DormandPrince5).numbers(outcome.clone()), n, h)

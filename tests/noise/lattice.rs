@@ -10,6 +10,7 @@ use nalgebra::{DMatrix, DVector, Vector1, Vector2, vector};
 use crate::operator::{
     Basis, Outcome, assert_orders, coefficients, mean, operator, order, outcomes, step,
 };
+use crate::refusals::fault;
 
 const CAPACITY: f64 = 1.0;
 
@@ -99,6 +100,14 @@ fn orders_of_a_ring_of_three_bodies() {
         let all = [u.x, u.y, 3.0 - u.x - u.y];
         ring.flow().points(|site| vector![all[site]])
     };
+    // Each deviation relaxes at the rate 3.
+    let method = RandomFlow(DormandPrince5).seed(1);
+    let fast = method.run(&ring, points(&vector![1.0, 1.0]), Span::steps(0.5, 20));
+    let error = fault(fast);
+    assert!(
+        matches!(error, NoiseError::FrictionUnresolved { rate, .. } if (rate - 1.5).abs() < 0.3),
+        "{error}"
+    );
     let one = errors([0.1, 0.05, 0.025], &|h, u, outcome| {
         let end = step(&ring, &RandomFlow(DormandPrince5).numbers(outcome.clone()), &points(u), h);
         vector![end[0].x, end[1].x]

@@ -10,7 +10,7 @@ use crate::body::{INERTIA, body};
 const START: Vector3<f64> = vector![0.9, 0.5, 0.3];
 
 /// The fault of the noise in an error of a run.
-fn fault<M: StateSpace, T>(run: Result<T, RunError<M>>) -> NoiseError {
+pub(crate) fn fault<M: StateSpace, T>(run: Result<T, RunError<M>>) -> NoiseError {
     match run.err().expect("the run is refused") {
         RunError::Flow(error) => *error.downcast_ref().expect("it is a fault of noise"),
         RunError::Method(error) => *error.downcast_ref().expect("it is a fault of noise"),

@@ -125,14 +125,16 @@ fn slope(n: &Vector3<f64>) -> f64 {
 #[test]
 fn orders_on_a_sphere_with_an_energy_that_is_not_quadratic() {
     let k_b = 0.4;
-    let system = System::on(Sphere::<2>::round())
-        .bracket(Zero)
-        .energy(|n: &Vector3<Real>| n.z + n.z.powi(3) * 0.5 + n.x * n.x * 0.3)
-        .entropy(|n: &Vector3<Real>| n.x * 0.5 + n.y * n.z * 0.3)
-        .dissipation(MetricDissipation::scaled(0.3))
-        .noise(Boltzmann(k_b).measure(|n: &Vector3<Real>| n.x * 0.3))
-        .build()
-        .unwrap();
+    let with_measure = |strength: f64| {
+        System::on(Sphere::<2>::round())
+            .bracket(Zero)
+            .energy(|n: &Vector3<Real>| n.z + n.z.powi(3) * 0.5 + n.x * n.x * 0.3)
+            .entropy(|n: &Vector3<Real>| n.x * 0.5 + n.y * n.z * 0.3)
+            .dissipation(MetricDissipation::scaled(0.3))
+            .noise(Boltzmann(k_b).measure(move |n: &Vector3<Real>| n.x * strength))
+            .build()
+            .unwrap()
+    };
     // The area is dz dφ, so the law on the curve H = 0.2 is μ exp(S/k_B) / |∂H/∂z| dφ.
     fn at(angle: f64) -> Vector3<f64> {
         let mut z = 0.1_f64;
@@ -146,14 +148,21 @@ fn orders_on_a_sphere_with_an_energy_that_is_not_quadratic() {
     }
     let curve = Curve::new(at, |n| n.y.atan2(n.x));
     let f: &Function = &((|n: &Vector3<f64>| 0.5 * n.x + 0.3 * n.y * n.z) as Function);
-    let of = (f, exact(at, |n| (f(n) / k_b + 0.3 * n.x).exp() / slope(n), f));
-    let two = curve.errors(of, [0.2, 0.1, 0.05], &|h, n, outcome| {
+    let law = |strength: f64| exact(at, |n| (f(n) / k_b + strength * n.x).exp() / slope(n), f);
+    let problem = "curve on S², energy of degree 3: law of S";
+    let system = with_measure(0.0);
+    let two = curve.errors((f, law(0.0)), [0.2, 0.1, 0.05], &|h, n, outcome| {
         step(&system, &NinomiyaVictoir(DormandPrince5).numbers(outcome.clone()), n, h)
     });
-    let problem = "curve on S², energy of degree 3, a measure: law of S";
     assert_orders(problem, "NinomiyaVictoir(DormandPrince5)", &[order(&two)], 2);
-    let one = curve.errors(of, [0.1, 0.05, 0.025], &|h, n, outcome| {
+    let one = curve.errors((f, law(0.0)), [0.1, 0.05, 0.025], &|h, n, outcome| {
         step(&system, &RandomFlow(DormandPrince5).numbers(outcome.clone()), n, h)
     });
     assert_orders(problem, "RandomFlow(DormandPrince5)", &[order(&one)], 1);
+    let system = with_measure(0.3);
+    let two = curve.errors((f, law(0.3)), [0.2, 0.1, 0.05], &|h, n, outcome| {
+        step(&system, &NinomiyaVictoir(DormandPrince5).numbers(outcome.clone()), n, h)
+    });
+    let problem = "the same with the measure exp(0.3 n₁): law of S";
+    assert_orders(problem, "NinomiyaVictoir(DormandPrince5)", &[order(&two)], 2);
 }

@@ -113,7 +113,7 @@ report:
     set -euo pipefail
     rm -rf target/report
     export METRIPLECTIC_REPORT={{ justfile_directory() / "target/report" }}
-    tests=$(grep -l 'Claim::new' tests/*.rs | xargs -n 1 basename --suffix .rs)
+    tests=$(grep -rl --include='*.rs' 'Claim::new' tests | sed 's|^tests/||; s|/.*||; s|\.rs$||' | sort -u)
     run() { PROPTEST_RNG_SEED=2401 cargo test --package metriplectic-tests --package metriplectic-quick-tests --all-features "$@"; }
     run $(sed '/^examples$/d; s/^/--test /' <<< "$tests")
     cargo build --quiet --profile test --all-features --example convergence --example learning_data

@@ -871,6 +871,8 @@ fn a_thermal_body_and_fluctuating_heat_have_the_means_of_their_laws() {
     let (mean, exact) = (figure(&body, "mean_entropy"), figure(&body, "mean_entropy_of_the_law"));
     assert!((mean / exact - 1.0).abs() < 0.02, "{body}");
     assert!(figure(&body, "distance_of_the_histogram") < 0.15, "{body}");
+    let (theorem, error) = (figure(&body, "fluctuation_theorem"), figure(&body, "standard_error"));
+    assert!((theorem - 1.0).abs() < 4.0 * error && error < 0.2, "{body}");
     let heat = json(&example("fluctuating_heat", &["--json"]));
     let (variance, exact) = (figure(&heat, "variance"), figure(&heat, "variance_of_the_law"));
     assert!((variance / exact - 1.0).abs() < 0.06, "{heat}");

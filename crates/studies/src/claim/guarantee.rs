@@ -43,6 +43,8 @@ pub enum Guarantee {
     Allocation,
     /// Friction faster than a step.
     StiffFriction,
+    /// Thermal noise.
+    Noise,
 }
 
 /// A guarantee in words.
@@ -57,7 +59,7 @@ pub(super) struct Facts {
 
 impl Guarantee {
     /// All of them.
-    pub(super) const ALL: [Self; 19] = [
+    pub(super) const ALL: [Self; 20] = [
         Self::Energy,
         Self::Entropy,
         Self::Invariants,
@@ -77,6 +79,7 @@ impl Guarantee {
         Self::Sweeps,
         Self::Allocation,
         Self::StiffFriction,
+        Self::Noise,
     ];
 
     /// Its heading, its sentences and its figures.
@@ -201,6 +204,15 @@ impl Guarantee {
                 "Friction faster than a step is damped by `Radau` and named with the others",
                 &["is damped by `Radau` alone", "With every other method it is not"],
                 &["colloid"],
+            ),
+            Self::Noise => (
+                "Thermal noise samples its law with the order of its method",
+                &[
+                    "A path with thermal noise keeps its energy",
+                    "Means over paths, and the law that they sample",
+                    "Friction that is faster than a step is an error",
+                ],
+                &["thermal_rigid_body", "fluctuating_heat"],
             ),
         };
         Facts { heading, sentences, figures }

@@ -251,7 +251,7 @@ mod tests {
         let recipes = read("justfile");
         let recipe = recipes.split("\nreport:").nth(1).expect("a recipe `report`");
         let recipe = recipe.split("\n\n").next().expect("its lines");
-        assert!(recipe.contains("grep -l 'Claim::new' tests/*.rs"), "{recipe}");
+        assert!(recipe.contains("grep -rl --include='*.rs' 'Claim::new' tests"), "{recipe}");
         let mut targets = String::new();
         for (package, manifest, path) in [
             ("metriplectic-tests", "tests/Cargo.toml", "path = \""),
@@ -271,6 +271,9 @@ mod tests {
                     && fs::read_to_string(&path).expect("a test").contains("Claim::new")
                 {
                     let file = path.strip_prefix(root().join("tests")).expect("it is inside");
+                    // A folder is one target, with its name.
+                    let folder = file.parent().filter(|folder| folder.iter().count() > 0);
+                    let file = folder.map_or(file.to_owned(), |folder| folder.join("main.rs"));
                     let target = format!("target {}\"", file.display());
                     assert!(targets.contains(&target), "no package of the recipe has {target}");
                     files += 1;

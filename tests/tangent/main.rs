@@ -1,5 +1,6 @@
 //! Tangents of runs, and families: `T` against differences of runs with the same steps, the laws of `T`, and the same bits.
 
+mod adjoint;
 mod explicit;
 mod fits;
 mod parts;

@@ -22,6 +22,7 @@
 //!
 //! Components are those of the frames of the charts at both ends. [`TangentState::embedded`] has entries of velocities.
 
+mod adjoint;
 mod certificate;
 mod columns;
 mod duals;
@@ -36,12 +37,14 @@ mod record;
 mod schemes;
 mod state;
 mod steps;
+mod tape;
 
+pub use adjoint::{AdjointRun, Adjoints, LossGradient, WITHIN};
 pub use certificate::Sensitivity;
 pub use columns::Columns;
 pub use error::{TangentError, Unlinearised};
 pub use event::TangentEvent;
-pub use linearised::{Linearised, Piece, Propagated};
+pub use linearised::{Linearised, Piece, Propagated, Targets};
 pub use record::{TangentRun, Tangents};
 pub use schemes::SelfAdjoint;
 pub use state::TangentState;

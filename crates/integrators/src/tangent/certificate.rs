@@ -4,9 +4,10 @@ use std::fmt;
 
 use metriplectic_dynamics::Metriplectic;
 use metriplectic_dynamics::system::Point;
-use metriplectic_fields::{Dimension as _, Vector};
+use metriplectic_fields::{Column as _, Dimension as _, Vector};
+use metriplectic_manifolds::Manifold as _;
 
-use super::columns::{Columns, LawOfStart, jets, row};
+use super::columns::{Columns, jets, row};
 use super::error::Unlinearised;
 use crate::step::Dim;
 use crate::step::digits::counted;
@@ -34,7 +35,9 @@ pub struct Sensitivity {
 }
 
 /// The error of a law from which on a derivative is wrong.
-const BROKEN: f64 = 1e-6;
+pub(super) const BROKEN: f64 = 1e-6;
+/// The error of a law that is rounding.
+const ROUNDED: f64 = 64.0 * f64::EPSILON;
 
 impl Sensitivity {
     /// Enters a state.
@@ -45,10 +48,15 @@ impl Sensitivity {
         columns: &Columns<Y>,
     ) -> Result<(), Unlinearised> {
         let jets = jets(system, x);
-        let off = |df: &Vector<Y::Manifold>, law: &LawOfStart<Vector<Y::Manifold>>| {
+        let scales = Y::Manifold::scales(x);
+        let off = |df: &Vector<Y::Manifold>, law: &Vector<Y::Manifold>| {
             let [here, sizes] = row::<Y>(df, &columns.t);
+            let terms = df.abs().dot(&scales);
             (0..Dim::<Y>::LEN).fold(0.0, |worst, j| {
-                let (off, size) = ((here[j] - law.row[j]).abs(), sizes[j] + law.row[j].abs());
+                let (off, size) = ((here[j] - law[j]).abs(), sizes[j] + law[j].abs());
+                // The column of a direction on which nothing depends is rounding, relative to a unit of that direction.
+                let unit = terms / scales[j];
+                let size = if off <= ROUNDED * unit { size.max(unit) } else { size };
                 worse(worst, if off == 0.0 { 0.0 } else { off / size })
             })
         };

@@ -19,7 +19,7 @@ use crate::run::event::Event;
 use crate::run::last_step::LastStep;
 use crate::run::requests::{Outputs, rounding};
 use crate::run::steps::Steps;
-use crate::step::{Dim, Flow as _, Stepper};
+use crate::step::{Dim, Flow as _, Memory as _, Stepper};
 
 /// A run with its tangent, step by step; made by [`Tangents::tangent_steps`](crate::Tangents::tangent_steps).
 ///
@@ -90,7 +90,7 @@ where
     /// [`TangentError`]; the state is then the last one reached.
     pub fn advance(&mut self) -> Result<(), TangentError<D::Manifold>> {
         let flow = self.steps.flow();
-        flow.with_room(|| self.take_step().map(drop))
+        flow.wide().with_room(|| self.take_step().map(drop))
     }
 
     /// Takes one step, and returns what was asked for inside it.
@@ -131,6 +131,7 @@ where
             h: last.h,
             in_parts: last.in_parts,
             entropy_step: last.entropy_step,
+            stage_count: last.stage_count,
         };
         let system = (flow, self.steps.method());
         let next = propagate(system, &last.start, &ended, &self.columns).map_err(failed)?;
@@ -173,6 +174,7 @@ where
             h,
             in_parts: taken.effort.splits > 0,
             entropy_step: taken.evidence.entropy_step,
+            stage_count: memory.stage_count(),
         };
         let moved = propagate((flow, method), &last.start, &ended, &self.columns)?;
         Ok((taken.x, moved))

@@ -30,7 +30,7 @@ fn whole(gradient: &LossGradient) -> DVector<f64> {
 }
 
 /// Compares the adjoint with the tangent, and segments that are taken again with steps that were kept, bit for bit.
-fn transposed<D, M>(
+pub(crate) fn transposed<D, M>(
     (name, bar): (&str, f64),
     (system, method): (&D, M),
     x0: &Point<D>,

@@ -5,6 +5,7 @@ mod explicit;
 mod fits;
 mod parts;
 mod schemes;
+mod table;
 
 use metriplectic::dynamics::{Parametrised, Point};
 use metriplectic::fields::{Column as _, Dimension as _, Space, Vector};

@@ -18,7 +18,9 @@
 //! | steps | how |
 //! |---|---|
 //! | [`Scheme`](crate::Scheme) with [`SelfAdjoint`] parts | two linearisations of its own equation, from either end |
-//! | [`DormandPrince5`](crate::DormandPrince5), [`DormandPrince8`](crate::DormandPrince8), [`ExplicitRungeKutta`](crate::ExplicitRungeKutta) | stages and projection at dual numbers |
+//! | [`DormandPrince5`](crate::DormandPrince5), [`DormandPrince8`](crate::DormandPrince8), [`RungeKuttaChebyshev`](crate::RungeKuttaChebyshev), [`ExplicitRungeKutta`](crate::ExplicitRungeKutta) | stages and projection at dual numbers |
+//!
+//! A loss over a run has a gradient by the transposed steps ([`Adjoints`]), whatever the number of parameters.
 //!
 //! Components are those of the frames of the charts at both ends. [`TangentState::embedded`] has entries of velocities.
 

@@ -25,8 +25,9 @@ pub struct Sensitivity {
     pub energy: f64,
     /// The largest error of `dL_a(x_k) T_k = dL_a(x₀) T_0`.
     pub invariants: f64,
-    /// The largest error of `dS(x_k) T_k = δ(S₀ + Σ h Σ b_i σ_i)`, for explicit methods; `None` where the method does
-    /// not say what it has produced.
+    /// The largest error of `dS(x_k) T_k = δ(S₀ + Σ h Σ b_i σ_i)`, for explicit methods. For schemes that of
+    /// `dS(x') T' − dS(x) T = δ(h ⟨w_S, K̃ w_S⟩)`, on the steps whose numbers are powers of two. `None` where the method does not
+    /// say what it has produced.
     pub entropy: Option<f64>,
     /// Whether the step sizes followed a tolerance, and are frozen.
     pub frozen: bool,
@@ -40,6 +41,13 @@ pub(super) const BROKEN: f64 = 1e-6;
 const ROUNDED: f64 = 64.0 * f64::EPSILON;
 
 impl Sensitivity {
+    /// Enters the second law in a step.
+    pub(super) fn enter_entropy(&mut self, law: Option<f64>) {
+        if let Some(error) = law {
+            self.entropy = Some(worse(self.entropy.unwrap_or(0.0), error));
+        }
+    }
+
     /// Enters a state.
     pub(super) fn enter<Y: Metriplectic>(
         &mut self,

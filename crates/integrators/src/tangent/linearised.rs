@@ -61,7 +61,7 @@ pub struct Propagated<Y: Metriplectic> {
     message = "the steps of `{Self}` have no tangent on this system",
     note = "a `Scheme` has one if its retraction and its discrete gradient are symmetric (`SelfAdjoint`): not `Exponential`, \
             and not `ItohAbe`",
-    note = "`DormandPrince5`, `DormandPrince8` and `ExplicitRungeKutta` have one on every space of this library (`MovingBase`)"
+    note = "`DormandPrince5`, `DormandPrince8`, `RungeKuttaChebyshev` and `ExplicitRungeKutta` have one on every space of this library (`MovingBase`)"
 )]
 pub trait Linearised<Y: Metriplectic> {
     /// Computes the tangent at the end of a step from that at its start.
@@ -75,6 +75,18 @@ pub trait Linearised<Y: Metriplectic> {
         step: &Piece<'_, Y>,
         columns: &Columns<Y>,
     ) -> Result<Propagated<Y>, Unlinearised>;
+
+    /// Computes the error of the second law of tangents in a step, `dS(x') T' − dS(x) T = δ(h ⟨w_S, K̃ w_S⟩)`, relative to
+    /// its terms; `None` if the method does not say what it has produced, or says it in the columns.
+    fn entropy_law(
+        &self,
+        system: &Y,
+        step: &Piece<'_, Y>,
+        columns: [&Columns<Y>; 2],
+    ) -> Option<f64> {
+        let _ = (system, step, columns);
+        None
+    }
 
     /// Computes the derivative of a loss along the start of a step from that along its end: the transpose of
     /// [`propagate`](Self::propagate), `λᵀ T = λ'ᵀ T'`.

@@ -26,7 +26,7 @@ pub(super) struct Part<D: Differentiable> {
 }
 
 impl<D: Differentiable> Part<D> {
-    fn new(start: &StepStart<'_, D>, ended: &Ended<'_, D>) -> Self {
+    pub(super) fn new(start: &StepStart<'_, D>, ended: &Ended<'_, D>) -> Self {
         let allowed = start.allowed.as_ref().map(widened::<D>);
         let (x, end, reference) = (start.x.clone(), ended.end.clone(), start.reference.clone());
         Self {

@@ -8,8 +8,8 @@
 //! J = -\Bigl(\frac{\partial R}{\partial x'}\Bigr)^{-1} \frac{\partial R}{\partial x} = E A^{-1} B F^{-1} .
 //! ```
 
-use metriplectic_dynamics::Metriplectic;
 use metriplectic_dynamics::system::Point;
+use metriplectic_dynamics::{Metriplectic, SecondLaw};
 use metriplectic_fields::{
     Column as _, Dimension as _, Factors as _, Matrix, ScalarField, Space as _, Square as _,
     Vector, power_of_two,
@@ -18,9 +18,10 @@ use metriplectic_manifolds::{
     Cayley, ChartMidpoint, Manifold as _, Projection, Retraction, Riemannian as _, StepPathJet,
     WeylMidpoint,
 };
+use num_dual::Dual64;
 
 use super::certificate::BROKEN;
-use super::columns::Columns;
+use super::columns::{Columns, row};
 use super::error::Unlinearised;
 use super::frames::turned;
 use super::linearised::{Linearised, Piece, Propagated};
@@ -105,6 +106,26 @@ struct Both<Y: Metriplectic> {
 }
 
 impl<R, W: DiscreteGradient> Scheme<R, W> {
+    /// The derivative of the growth `h ⟨w_S, K̃ w_S⟩` of the entropy along the second end of a step, in the frame there.
+    fn growth<Y>(&self, system: &Y, [x, y]: [&Point<Y>; 2], h: f64) -> Option<Vector<Y::Manifold>>
+    where
+        Y: Metriplectic,
+        R: Retraction<Y::Manifold, Y::Metric>,
+    {
+        let (u, path) = path(system, &self.retraction, [x, y])?;
+        let residual = Residual::new(system, self, x, h);
+        let mut along = Vector::<Y::Manifold>::zero();
+        for k in 0..Dim::<Y>::LEN {
+            let moved = Vector::<Y::Manifold, Dual64>::from_index(|i| {
+                Dual64::new(u[i], if i == k { 1.0 } else { 0.0 })
+            });
+            along[k] = residual.defined(&moved).ok()?.1.eps;
+        }
+        // The rows of ∂y/∂u are in the frame at the end of the path.
+        let e = turned::<Y::Manifold>(path.dend, &path.end, y);
+        Matrix::<Y::Manifold>::from_entries(|i, j| e[(j, i)]).solve(&along)
+    }
+
     fn both<Y>(&self, system: &Y, &Piece { x, end, h, .. }: &Piece<'_, Y>) -> Option<Both<Y>>
     where
         Y: Metriplectic,
@@ -184,6 +205,38 @@ where
         let derivative = || self.both(system, step)?.derivative(step.h);
         let (j, along_h) = derivative().ok_or(Unlinearised::Singular)?;
         Ok(Propagated { columns: columns.after(&j), along_h })
+    }
+
+    /// The derivatives of the growth along both ends are those along the unknowns of both shots.
+    fn entropy_law(
+        &self,
+        system: &Y,
+        step: &Piece<'_, Y>,
+        [before, after]: [&Columns<Y>; 2],
+    ) -> Option<f64> {
+        if system.second_law() != SecondLaw::Exact {
+            return None;
+        }
+        let Piece { x, end, h, .. } = *step;
+        let there = self.growth(system, [x, end], h)?;
+        let back = self.growth(system, [end, x], -h)?;
+        let columns = [(&before.t, x, -back, -1.0), (&after.t, end, there, 1.0)];
+        let n = Dim::<Y>::LEN;
+        let (mut off, mut terms) = (Vector::<Y::Manifold>::zero(), 0.0_f64);
+        let mut sizes = Vector::<Y::Manifold>::zero();
+        for (t, x, growth, sign) in columns {
+            let rise = ScalarField::<Y::Manifold>::jet1(system.entropy(), x).df * sign;
+            let [change, size] = row::<Y>(&rise, t);
+            let [produced, of_production] = row::<Y>(&growth, t);
+            off += change - produced;
+            sizes += size + of_production;
+        }
+        for j in 0..n {
+            if off[j] != 0.0 {
+                terms = terms.max(off[j].abs() / sizes[j]);
+            }
+        }
+        Some(terms)
     }
 
     fn pull_back(

@@ -11,7 +11,7 @@ use super::error::{TangentError, Unlinearised};
 use super::event::TangentEvent;
 use super::frames::between;
 use super::linearised::{Linearised, Propagated};
-use super::pieces::{Ended, Wide, propagate};
+use super::pieces::{Ended, Part, Wide, propagate};
 use super::state::TangentState;
 use crate::run::certificate::Certificate;
 use crate::run::ending::Ending;
@@ -137,6 +137,15 @@ where
         let next = propagate(system, &last.start, &ended, &self.columns).map_err(failed)?;
         let wide = flow.widened(&state.point);
         self.sensitivity.enter(flow.wide(), &wide, &next.columns).map_err(failed)?;
+        // By the definition of the step, which costs as much as its derivative.
+        if state.step.is_power_of_two() && !last.in_parts {
+            let part = Part::new(&last.start, &ended);
+            let law = part.with(flow, |piece| {
+                let columns = [&self.columns, &next.columns];
+                self.steps.method().entropy_law(flow.wide(), piece, columns)
+            });
+            self.sensitivity.enter_entropy(law);
+        }
         self.sensitivity.frozen = self.steps.is_adaptive();
         self.sensitivity.undamped = self.steps.certificate().is_stiff();
         let mut ends = self.outputs.clone();

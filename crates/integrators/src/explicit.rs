@@ -73,7 +73,8 @@ use crate::step::{
     Control, Element, LimitingSites, MethodError, Promises, Refusal, StepEnds, StepError,
     StepStart, Stepper, Taken,
 };
-use chebyshev::CHEBYSHEV;
+
+pub(crate) use chebyshev::{CHEBYSHEV, Coefficients, Recursion};
 use dormand_prince::{EIGHT, FIVE};
 use trial::{Done, Trial};
 

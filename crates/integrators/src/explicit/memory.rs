@@ -72,6 +72,8 @@ pub(super) struct LastStep<V> {
     pub(super) end: V,
     /// The rise of the entropy.
     pub(super) rise: f64,
+    /// The number of stages, if the method chooses it.
+    pub(super) count: Option<u32>,
 }
 
 impl<V: Vector> LastStep<V> {
@@ -79,7 +81,7 @@ impl<V: Vector> LastStep<V> {
     pub(super) fn empty(like: &V) -> Self {
         let zero = like.zero();
         let stages = Here::at_rest(&zero);
-        Self { stages, known: 0, before: zero.clone(), end: zero, rise: 0.0 }
+        Self { stages, known: 0, before: zero.clone(), end: zero, rise: 0.0, count: None }
     }
 }
 
@@ -113,6 +115,10 @@ impl<V: Vector> ExplicitMemory<V> {
 }
 
 impl<V: Vector> Memory for ExplicitMemory<V> {
+    fn stage_count(&self) -> Option<u32> {
+        self.last.as_ref()?.count
+    }
+
     fn rescaled(&self, _: f64) -> Self {
         let Self { entropy, falls, taken, lost, read, here, spectrum, .. } = self;
         let spectrum = spectrum.clone();

@@ -793,6 +793,17 @@ fn the_shards_of_the_sweep_make_the_table_of_one_process() {
 }
 
 #[test]
+fn a_fit_finds_the_coefficients_of_a_metric() {
+    let report = json(&example("fit_metric", &["--json"]));
+    for (key, truth) in [("a", 1.5), ("b", 1.0), ("c", 2.2), ("d", 0.8)] {
+        let error = figure(&report, &format!("{key}_error"));
+        assert!((figure(&report, key) - truth).abs() < 4.0 * error && error < 0.05, "{report}");
+    }
+    assert!((figure(&report, "noise") - 1e-3).abs() < 2e-4, "{report}");
+    assert!(figure(&report, "runs") <= 30.0 && figure(&report, "tangent_law") < 1e-12, "{report}");
+}
+
+#[test]
 fn a_fit_finds_the_inertias_of_a_body() {
     let report = json(&example("fit_rigid_body", &["--json"]));
     let off = |key: &str, truth: f64| {

@@ -17,6 +17,7 @@
 //! | [`fitted`] | [`Fitted`]: the result, which prints what the data say |
 //! | `model` | the residuals of a family of systems |
 //! | [`fit`](mod@fit) | [`Fit`]: what a user says of a fit |
+//! | [`loss`](mod@loss) | [`Loss`]: a loss over runs with its gradient, for argmin's L-BFGS |
 
 pub mod covariance;
 pub mod error;
@@ -24,11 +25,13 @@ pub mod fit;
 pub mod fitted;
 pub mod least_squares;
 pub mod levenberg_marquardt;
+//LOSS pub mod loss;
 mod model;
 pub mod unknowns;
 
 pub use error::FitError;
 pub use fit::{Fit, FitBuilder};
-pub use fitted::{Estimate, Fitted};
+pub use fitted::{Ending, Estimate, Fitted};
 pub use least_squares::{LeastSquares, Squares};
 pub use levenberg_marquardt::LevenbergMarquardt;
+//LOSS pub use loss::{Loss, LossOver, Minimised};

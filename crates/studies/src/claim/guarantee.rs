@@ -43,6 +43,8 @@ pub enum Guarantee {
     Allocation,
     /// Friction faster than a step.
     StiffFriction,
+    /// Derivatives of runs, and fits.
+    Derivatives,
 }
 
 /// A guarantee in words.
@@ -57,7 +59,7 @@ pub(super) struct Facts {
 
 impl Guarantee {
     /// All of them.
-    pub(super) const ALL: [Self; 19] = [
+    pub(super) const ALL: [Self; 20] = [
         Self::Energy,
         Self::Entropy,
         Self::Invariants,
@@ -77,6 +79,7 @@ impl Guarantee {
         Self::Sweeps,
         Self::Allocation,
         Self::StiffFriction,
+        Self::Derivatives,
     ];
 
     /// Its heading, its sentences and its figures.
@@ -201,6 +204,14 @@ impl Guarantee {
                 "Friction faster than a step is damped by `Radau` and named with the others",
                 &["is damped by `Radau` alone", "With every other method it is not"],
                 &["colloid"],
+            ),
+            Self::Derivatives => (
+                "Derivatives are those of the steps, and errors of fits are as large as they say",
+                &[
+                    "The tangent of a run is the derivative of the steps",
+                    "The joint ellipsoid of 95 % holds the truth",
+                ],
+                &["fit_rigid_body", "fit_metric"],
             ),
         };
         Facts { heading, sentences, figures }

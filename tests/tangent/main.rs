@@ -4,6 +4,7 @@ mod adjoint;
 mod explicit;
 mod families;
 mod fits;
+mod losses;
 mod parts;
 mod schemes;
 mod table;

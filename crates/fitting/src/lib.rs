@@ -25,7 +25,7 @@ pub mod fit;
 pub mod fitted;
 pub mod least_squares;
 pub mod levenberg_marquardt;
-//LOSS pub mod loss;
+pub mod loss;
 mod model;
 pub mod unknowns;
 
@@ -34,4 +34,4 @@ pub use fit::{Fit, FitBuilder};
 pub use fitted::{Ending, Estimate, Fitted};
 pub use least_squares::{LeastSquares, Squares};
 pub use levenberg_marquardt::LevenbergMarquardt;
-//LOSS pub use loss::{Loss, LossOver, Minimised};
+pub use loss::{Loss, LossOver, Minimised};

@@ -6,9 +6,9 @@ use argmin::core::{CostFunction, Error, Executor, Gradient, State as _};
 use argmin::solver::linesearch::MoreThuenteLineSearch;
 use argmin::solver::quasinewton::LBFGS;
 use metriplectic_dynamics::{Differentiable, Parametrised, Point};
-use metriplectic_fields::{Real, ScalarField, Space};
+use metriplectic_fields::{Real, Space};
 use metriplectic_integrators::tangent::Linearised;
-use metriplectic_integrators::{Method as _, Schedule, Stepper, Tangents as _, Watch as _};
+use metriplectic_integrators::{Adjoints as _, Method as _, Schedule, Stepper, Watch as _};
 use nalgebra::SVector;
 
 use crate::error::FitError;
@@ -180,17 +180,14 @@ where
         let system = self.loss.family.at_parameters(*theta);
         let (mut sum, mut slope) = (0.0, SVector::zeros());
         for (i, start) in self.loss.starts.iter().enumerate() {
-            let run = self.method.clone().tangent(&system, start.clone(), self.schedule.clone())?;
+            let run = self.method.clone().adjoint(&system, start.clone(), self.schedule.clone())?;
             let first = run.states().len().saturating_sub(self.loss.times.len());
-            for (k, state) in run.states()[first..].iter().enumerate() {
-                let term = |x: &PointOf<Y, Real, P>| (self.loss.term)(i, k, x);
-                let here = ScalarField::<ManifoldOf<Y, P>>::jet1(&term, &state.point);
-                sum += here.value;
-                let along = state.along_parameters();
-                for (j, column) in along.column_iter().enumerate() {
-                    slope[j] += (0..column.len()).map(|i| here.df[i] * column[i]).sum::<f64>();
-                }
-            }
+            let loss = run.gradient(|k, x| match k.checked_sub(first) {
+                Some(k) => (self.loss.term)(i, k, x),
+                None => Real::from(0.0),
+            })?;
+            sum += loss.value;
+            slope += SVector::<f64, P>::from_column_slice(loss.along_parameters().as_slice());
         }
         Ok((sum, slope))
     }

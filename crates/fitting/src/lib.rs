@@ -11,6 +11,7 @@
 //! |---|---|
 //! | [`error`](mod@error) | [`FitError`]: why there is no fit |
 //! | [`least_squares`] | [`LeastSquares`]: residuals and their Jacobian, from one run |
+//! | `trust_region` | the best step of a linear model within a trust region |
 //! | [`levenberg_marquardt`] | [`LevenbergMarquardt`]: a solver for argmin's executor |
 //! | [`unknowns`] | which parameters are free, and which are fitted by their logarithm |
 //! | [`covariance`] | standard errors and correlations from a Jacobian |
@@ -27,6 +28,7 @@ pub mod least_squares;
 pub mod levenberg_marquardt;
 pub mod loss;
 mod model;
+mod trust_region;
 pub mod unknowns;
 
 pub use error::FitError;

@@ -4,13 +4,14 @@
 //! in the middle of a path from `(x, θ)` to `(x', θ')`, which is the same seen from both ends. At `θ' = θ`, where runs are, it is
 //! the metric at `θ`; the derivatives along `θ` and along `θ'` are half of the one along the parameters each.
 
+mod near;
+
 use std::fmt;
 use std::ops::Deref;
 use std::sync::Arc;
 
 use metriplectic_fields::{
     ChartPoint, Column, Dimension, Form, Matrix, MatrixField, Real, Scalar, Space, Square, Vector,
-    Velocity, power_of_two,
 };
 use nalgebra::SVector;
 
@@ -128,29 +129,6 @@ fn block<M: Times<Euclidean<P>>, const P: usize>(
     })
 }
 
-/// The cometric of the parameters on the way of a geodesic, relative to that of the state: so small that they stay.
-const STILL: f64 = 1.0 / (1_u128 << 100) as f64;
-
-/// The metric around one `θ`, in units in which the parameters change it as much as the path is long.
-struct Near<'a, F, const P: usize> {
-    field: &'a F,
-    theta: SVector<f64, P>,
-    units: SVector<f64, P>,
-    diagonal: f64,
-}
-
-impl<F, const P: usize> Near<'_, F, P> {
-    /// The closure `|x, τ| -> g(x, θ + s τ)` on the product.
-    fn matrix<M>(&self, (x, tau): &(M::Point<Real>, SVector<Real, P>)) -> Form<Wide<M, P>, Real>
-    where
-        M: Times<Euclidean<P>>,
-        F: Fn(&M::Point<Real>, &SVector<Real, P>) -> Form<M, Real>,
-    {
-        let theta = SVector::<Real, P>::from_fn(|k, _| tau[k] * self.units[k] + self.theta[k]);
-        block::<M, P>(&(self.field)(x, &theta), self.diagonal)
-    }
-}
-
 impl<F> ParametricMetric<F> {
     /// The matrix at any scalar, in the frame of the chart of `M`.
     fn first<M, D, const P: usize>(&self, x: &ChartPoint<Wide<M, P>, D>) -> Matrix<M, D>
@@ -163,38 +141,6 @@ impl<F> ParametricMetric<F> {
             |(x, t): &(M::Point<Real>, SVector<Real, P>)| block::<M, P>(&(self.0)(x, t), 0.0);
         let form = MatrixField::<Wide<M, P>>::at(&closure, &x.point());
         M::covariant(&Wide::<M, P>::parts(x).0, &Form::<M, D>::from_entries(|i, j| form[(i, j)]))
-    }
-
-    /// The metric near `θ`, for a path from `x` with the velocity `d`.
-    fn near<M, const P: usize>(
-        &self,
-        x: &M::Point<f64>,
-        theta: &SVector<f64, P>,
-        d: &Vector<M>,
-    ) -> Near<'_, F, P>
-    where
-        M: Manifold + Times<Euclidean<P>>,
-        F: Fn(&M::Point<Real>, &SVector<Real, P>) -> Form<M, Real>,
-    {
-        let place = (x.clone(), *theta);
-        let seeded = Wide::<M, P>::seeds(&place);
-        let n = <M::Velocity as Dimension>::LEN;
-        let largest = |form: &Form<M, Real>, part: fn(&Real) -> f64| {
-            let entries = (0..n).flat_map(|i| (0..n).map(move |j| (i, j)));
-            entries.fold(0.0, |most: f64, (i, j)| most.max(part(&form[(i, j)]).abs()))
-        };
-        let at = |k: usize| {
-            let (x, t) = seeded(M::Dim::LEN + k, M::Dim::LEN + k);
-            (self.0)(&x, &t)
-        };
-        let unit = |size: f64| {
-            if size > 0.0 && size.is_finite() { power_of_two(size) } else { 1.0 }
-        };
-        let length = Velocity::<M>::magnitude(&M::embed(&ChartPoint::centre(x), d));
-        let size = largest(&at(0), |g| g.re);
-        let units =
-            SVector::from_fn(|k, _| unit(size / largest(&at(k), |g| g.eps1)) / unit(length));
-        Near { field: &self.0, theta: *theta, units, diagonal: unit(size) / STILL }
     }
 }
 

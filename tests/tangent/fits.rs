@@ -136,6 +136,9 @@ fn combinations_that_no_datum_sees_are_named() {
     println!("{fit}");
     assert_eq!(fit.not_told_apart(), ["a", "b"]);
     assert!(fit.to_string().contains("do not tell apart: a, b"));
+    // The third is known in spite of them.
+    assert!(fit.estimate("a").unwrap().standard_error.is_infinite());
+    assert!(fit.estimate("stiffness").unwrap().standard_error < 1e-3);
 }
 
 /// A start that is measured with the same noise is fitted too, on a sphere.

@@ -27,10 +27,10 @@ macro_rules! learned {
                 Poisson::constant(Matrix3::new(0.0, 1.0, 0.0, -1.0, 0.0, 0.0, 0.0, 0.0, 0.0))
                     .unwrap(),
             )
-            .field_dissipation(|_: &Vector3<Real>, w: &Vector3<Real>, _: &Weights<Real>| {
+            .dissipation(FieldDissipation(|_: &Vector3<Real>, w: &Vector3<Real>| {
                 let b = Vector3::new(Real::from(0.0), w.z, -w.y);
                 b * b.transpose() * Real::from(0.1)
-            })
+            }))
             .energy(|x: &Vector3<Real>, w: &Weights<Real>| network(x.x, x.y, w) + x.z)
             .entropy(|x: &Vector3<Real>, _: &Weights<Real>| x.z)
             .build()

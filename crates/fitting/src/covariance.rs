@@ -33,17 +33,19 @@ impl Covariance {
         let largest = values.max();
         let fraction = if largest > 0.0 { values.min() / largest } else { 0.0 };
         let v = r.v_t.map_or_else(|| DMatrix::identity(n, n), |v| v.transpose());
+        let is_unseen = |k: usize| values[k].is_nan() || values[k] <= UNSEEN * largest;
+        // What has no part in a direction that is not seen has a rounding there.
+        let is_in = |i: usize, k: usize| !is_unseen(k) || v[(i, k)].abs() > UNSEEN;
         let matrix = DMatrix::from_fn(n, n, |i, j| {
-            let sum: f64 = (0..n)
-                .map(|k| {
-                    let term = v[(i, k)] * v[(j, k)];
-                    if term == 0.0 { 0.0 } else { term / (values[k] * values[k]) }
-                })
-                .sum();
+            let term = |k: usize| match v[(i, k)] * v[(j, k)] {
+                0.0 => 0.0,
+                term if is_unseen(k) => term.signum() * f64::INFINITY,
+                term => term / (values[k] * values[k]),
+            };
+            let sum: f64 = (0..n).filter(|&k| is_in(i, k) && is_in(j, k)).map(term).sum();
             variance * sum / (lengths[i] * lengths[j])
         });
-        let is_unseen = |k: &usize| values[*k].is_nan() || values[*k] < UNSEEN * largest;
-        let unseen = (0..n).filter(is_unseen).map(|k| v.column(k).into_owned()).collect();
+        let unseen = (0..n).filter(|&k| is_unseen(k)).map(|k| v.column(k).into_owned()).collect();
         let flattest = v.column(values.imin()).into_owned();
         Self { matrix, unseen, flattest, fraction }
     }

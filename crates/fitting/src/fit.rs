@@ -21,6 +21,9 @@ use crate::unknowns::{Names, Unknown, unknowns};
 /// The longest step of a logarithm.
 const STEEP: f64 = 3.0;
 
+/// The noise, relative to the data, that the round-off of runs may be mistaken for.
+const ROUNDED: f64 = 4096.0 * f64::EPSILON;
+
 /// A fit of the parameters of a family to data, by least squares.
 ///
 /// ```
@@ -253,6 +256,7 @@ where
         };
         // A promise that no trial has kept, or that none was left for.
         let variance = squares.sum() / (data - best.len()) as f64;
+        let variance = variance.max(ROUNDED * ROUNDED * measured.mean_square());
         if found.solver.relevant(&squares).promised() > FLAT * variance {
             let (runs, chi_squared) = (usize::try_from(runs).unwrap_or(usize::MAX), squares.sum());
             return Err(FitError::NotConverged { runs, chi_squared, parameters });

@@ -36,7 +36,7 @@ impl Estimate {
     }
 }
 
-/// How a fit ended.
+/// The end of a fit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Ending {
@@ -76,7 +76,7 @@ pub struct Fitted {
     pub noise_is_known: bool,
     /// The runs that were made.
     pub runs: u64,
-    /// How the iterations ended.
+    /// The end of the iterations.
     pub ending: Ending,
     /// The covariance of the unknowns: parameters, or their logarithms.
     pub covariance: Covariance,
@@ -94,7 +94,7 @@ pub(crate) struct Parts<'a> {
     pub(crate) stop: Stop,
 }
 
-/// Why the iterations stopped.
+/// The reason for which the iterations stopped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Stop {
     /// By the conditions of a minimum.

@@ -127,7 +127,7 @@ impl<Y: Parametrised<P>, T, M, const P: usize> fmt::Debug for LossOver<'_, Y, T,
     }
 }
 
-/// Where a loss was minimised.
+/// A minimum of a loss, as far as it was found.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Minimised<const P: usize> {

@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::least_squares::Squares;
 
-/// How much shorter or longer than the radius a step may be, and how exact its damping is.
+/// The relative difference of the length of a step from the radius, which is that of its damping too.
 const SLACK: f64 = 0.05;
 
 /// The linear model `|J δ + r|²` in units of the lengths of the columns, by its singular values.

@@ -4,7 +4,6 @@ mod adjoint;
 mod explicit;
 mod families;
 mod fits;
-mod losses;
 mod parts;
 mod schemes;
 mod table;

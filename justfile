@@ -116,8 +116,8 @@ report:
     tests=$(grep -rl --include='*.rs' 'Claim::new' tests | sed 's|^tests/||; s|/.*||; s|\.rs$||' | sort -u)
     run() { PROPTEST_RNG_SEED=2401 cargo test --package metriplectic-tests --package metriplectic-quick-tests --all-features "$@"; }
     run $(sed '/^examples$/d; s/^/--test /' <<< "$tests")
-    cargo build --quiet --profile test --all-features --example convergence --example learning_data
-    run --test examples -- orders training_data
+    cargo build --quiet --profile test --all-features --example convergence --example learning_data --example fit_metric
+    run --test examples -- orders training_data of_a_metric
     run --test long_runs -- --ignored
     cargo run --quiet --profile test --package metriplectic-studies --bin report -- target/report .
     # The figures that it links; the programs are those of the tests.

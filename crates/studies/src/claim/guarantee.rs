@@ -45,6 +45,8 @@ pub enum Guarantee {
     StiffFriction,
     /// Thermal noise.
     Noise,
+    /// Derivatives of runs, and fits.
+    Derivatives,
 }
 
 /// A guarantee in words.
@@ -80,6 +82,7 @@ impl Guarantee {
         Self::Allocation,
         Self::StiffFriction,
         Self::Noise,
+        Self::Derivatives,
     ];
 
     /// Its heading, its sentences and its figures.
@@ -213,6 +216,14 @@ impl Guarantee {
                     "Friction that is faster than a step is an error",
                 ],
                 &["thermal_rigid_body", "fluctuating_heat"],
+            ),
+            Self::Derivatives => (
+                "Derivatives are those of the steps, and errors of fits are as large as they say",
+                &[
+                    "The tangent of a run is the derivative of the steps",
+                    "The joint ellipsoid of 95 % holds the truth",
+                ],
+                &["fit_rigid_body", "fit_metric"],
             ),
         };
         Facts { heading, sentences, figures }

@@ -22,6 +22,8 @@ pub struct ExplicitMemory<V> {
     pub(super) read: Vec<f64>,
     /// The velocity at the state reached, a function of this state alone.
     pub(super) here: Option<Here<V>>,
+    /// The round-off of the entropy there, if the flow tells.
+    pub(super) round_off: Option<f64>,
     /// The step taken last.
     pub(super) last: Option<Box<LastStep<V>>>,
     /// A step before it, whose room the next one takes.
@@ -92,6 +94,7 @@ impl<V> Default for ExplicitMemory<V> {
             lost: None,
             read: Vec::new(),
             here: None,
+            round_off: None,
             last: None,
             room: None,
             spectrum: None,
@@ -114,7 +117,7 @@ impl<V: Vector> ExplicitMemory<V> {
 
 impl<V: Vector> Memory for ExplicitMemory<V> {
     fn rescaled(&self, _: f64) -> Self {
-        let Self { entropy, falls, taken, lost, read, here, spectrum, .. } = self;
+        let Self { entropy, falls, taken, lost, read, here, round_off, spectrum, .. } = self;
         let spectrum = spectrum.clone();
         let (lost, read, here) = (lost.clone(), read.clone(), here.clone());
         Self {
@@ -124,6 +127,7 @@ impl<V: Vector> Memory for ExplicitMemory<V> {
             lost,
             read,
             here,
+            round_off: *round_off,
             last: None,
             room: None,
             spectrum,
@@ -142,6 +146,7 @@ impl<V: Vector> Memory for ExplicitMemory<V> {
         self.falls = tried.falls;
         // Known before the step was tried.
         self.here = self.here.take().or(tried.here);
+        self.round_off = self.round_off.or(tried.round_off);
         self.room = tried.room.or_else(|| room_of(tried.last));
     }
 

@@ -88,7 +88,7 @@ pub(super) fn limiting_sites<F: StageFlow>(
     };
     let (error, count) = (largest(error), tableau.rows().len());
     let [before, rates] = [count, count + 1].map(|stage| &last.stages[stage].velocity);
-    let stiffness = if is_at_the_edge((tableau, h), &flow.sizes(x), last, rates) {
+    let stiffness = if last.at_the_edge {
         let change = Vector::zip([rates, before], |[rates, before]| rates - before);
         change.largest_site(&flow.sizes(x))
     } else {

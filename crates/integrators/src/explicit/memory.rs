@@ -68,8 +68,10 @@ pub(super) struct LastStep<V> {
     pub(super) stages: [Here<V>; STAGES],
     /// The stages that are known.
     pub(super) known: usize,
-    /// The coordinates of the last stage before the end.
+    /// The coordinates of the last stage before the end, until the stability of the step is known.
     pub(super) before: V,
+    /// Whether the step was at the edge of the region of stability.
+    pub(super) at_the_edge: bool,
     /// The coordinates of its end.
     pub(super) end: V,
     /// The rise of the entropy.
@@ -81,7 +83,7 @@ impl<V: Vector> LastStep<V> {
     pub(super) fn empty(like: &V) -> Self {
         let zero = like.zero();
         let stages = Here::at_rest(&zero);
-        Self { stages, known: 0, before: zero.clone(), end: zero, rise: 0.0 }
+        Self { stages, known: 0, before: zero.clone(), at_the_edge: false, end: zero, rise: 0.0 }
     }
 }
 

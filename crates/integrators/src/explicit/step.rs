@@ -203,6 +203,8 @@ fn finished<F: StageFlow>(
     let rests = end.x == *x && is_zero(&last.stages[0].velocity);
     let stability =
         tableau.stability.is_finite() && is_at_the_edge((tableau, h), &flow.sizes(x), last, &rates);
+    last.at_the_edge = stability;
+    last.before = last.before.zero();
     last.stages[last.known] = Here { velocity: rates, production: next.production };
     last.known += 1;
 

@@ -12,7 +12,7 @@ use super::memory::{LastStep, MemoryOf, Produced};
 use super::refused::Refused;
 use super::rest::{self, is_hardly};
 use super::stage::{Here, combined, produced, stage};
-use super::tableau::{Compiled, Row, STAGES, Stages};
+use super::tableau::{Compiled, Row, STAGES, Stages, Tableau};
 use super::trial::Trial;
 use crate::step::{
     Effort, Element, EntropyStep, Evidence, MethodError, Refusal, StepError, StepStart, Taken,
@@ -254,6 +254,7 @@ fn stages<F: StageFlow>(
             $({
                 const ROW: Row = $tableau.rows()[$i];
                 add_stage(trial, ROW, ($i, COUNT), last)?;
+                release(tableau, &rows[$i + 1..], last);
             })*
             const END: Row = $tableau.end;
             last.end = combined(h, END, &last.stages);
@@ -266,15 +267,25 @@ fn stages<F: StageFlow>(
         None => {
             for (i, row) in rows.iter().enumerate() {
                 add_stage(trial, row, (i, rows.len()), last)?;
+                release(tableau, &rows[i + 1..], last);
             }
             last.end = combined(h, tableau.end, &last.stages);
             last.rise = h * produced(tableau.end, &last.stages);
         }
     }
-    for stage in tableau.passed() {
+    Ok(())
+}
+
+/// Gives up the arrays of stages that neither the rows to come nor the rest of the step need, if they are those of sites.
+#[inline(always)]
+fn release<V: Vector>(tableau: &Tableau, to_come: &[Row], last: &mut LastStep<V>) {
+    if last.stages[0].velocity.sites().is_none() {
+        return;
+    }
+    let needed = |stage: usize| to_come.iter().any(|row| row.iter().any(|&(j, _)| j == stage));
+    for stage in tableau.passed().filter(|&stage| !needed(stage)) {
         last.stages[stage].velocity = last.stages[0].velocity.zero();
     }
-    Ok(())
 }
 
 /// The stage that row `i` makes, of so many. The estimate of stability needs the coordinates of the last one.

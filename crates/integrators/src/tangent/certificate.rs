@@ -26,7 +26,7 @@ pub struct Sensitivity {
     /// The largest error of `dL_a(x_k) T_k = dL_a(x₀) T_0`.
     pub invariants: f64,
     /// The largest error of `dS(x_k) T_k = δ(S₀ + Σ h Σ b_i σ_i)`, for explicit methods. For schemes that of
-    /// `dS(x') T' − dS(x) T = δ(h ⟨w_S, K̃ w_S⟩)`, on the steps whose numbers are powers of two. `None` where the method does not
+    /// `dS(x') T' − dS(x) T = δ(h ⟨w_S, K̃ w_S⟩)`, of one column on each step whose number is a power of two. `None` where the method does not
     /// say what it has produced.
     pub entropy: Option<f64>,
     /// Whether the step sizes followed a tolerance, and are frozen.

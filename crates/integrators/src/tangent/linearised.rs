@@ -76,15 +76,16 @@ pub trait Linearised<Y: Metriplectic> {
         columns: &Columns<Y>,
     ) -> Result<Propagated<Y>, Unlinearised>;
 
-    /// Computes the error of the second law of tangents in a step, `dS(x') T' − dS(x) T = δ(h ⟨w_S, K̃ w_S⟩)`, relative to
-    /// its terms; `None` if the method does not say what it has produced, or says it in the columns.
+    /// Computes the error of the second law of tangents in a step, `dS(x') δ' − dS(x) δ = δ(h ⟨w_S, K̃ w_S⟩)` for a column `δ` at its start
+    /// and `δ'` at its end, relative to its terms. `None` if the method does not say what it has produced, or says it in the
+    /// columns.
     fn entropy_law(
         &self,
         system: &Y,
         step: &Piece<'_, Y>,
-        columns: [&Columns<Y>; 2],
+        column: [&Vector<Y::Manifold>; 2],
     ) -> Option<f64> {
-        let _ = (system, step, columns);
+        let _ = (system, step, column);
         None
     }
 

@@ -21,7 +21,7 @@ use metriplectic_manifolds::{
 use num_dual::Dual64;
 
 use super::certificate::BROKEN;
-use super::columns::{Columns, row};
+use super::columns::Columns;
 use super::error::Unlinearised;
 use super::frames::turned;
 use super::linearised::{Linearised, Piece, Propagated};
@@ -106,24 +106,22 @@ struct Both<Y: Metriplectic> {
 }
 
 impl<R, W: DiscreteGradient> Scheme<R, W> {
-    /// The derivative of the growth `h ⟨w_S, K̃ w_S⟩` of the entropy along the second end of a step, in the frame there.
-    fn growth<Y>(&self, system: &Y, [x, y]: [&Point<Y>; 2], h: f64) -> Option<Vector<Y::Manifold>>
+    /// The derivative of the growth `h ⟨w_S, K̃ w_S⟩` of the entropy where the second end of a step moves along `δ`.
+    fn growth<Y>(
+        &self,
+        system: &Y,
+        [x, y]: [&Point<Y>; 2],
+        h: f64,
+        delta: &Vector<Y::Manifold>,
+    ) -> Option<f64>
     where
         Y: Metriplectic,
         R: Retraction<Y::Manifold, Y::Metric>,
     {
         let (u, path) = path(system, &self.retraction, [x, y])?;
-        let residual = Residual::new(system, self, x, h);
-        let mut along = Vector::<Y::Manifold>::zero();
-        for k in 0..Dim::<Y>::LEN {
-            let moved = Vector::<Y::Manifold, Dual64>::from_index(|i| {
-                Dual64::new(u[i], if i == k { 1.0 } else { 0.0 })
-            });
-            along[k] = residual.defined(&moved).ok()?.1.eps;
-        }
-        // The rows of ∂y/∂u are in the frame at the end of the path.
-        let e = turned::<Y::Manifold>(path.dend, &path.end, y);
-        Matrix::<Y::Manifold>::from_entries(|i, j| e[(j, i)]).solve(&along)
+        let along = turned::<Y::Manifold>(path.dend, &path.end, y).solve(delta)?;
+        let moved = Vector::<Y::Manifold, Dual64>::from_index(|i| Dual64::new(u[i], along[i]));
+        Some(Residual::new(system, self, x, h).defined(&moved).ok()?.1.eps)
     }
 
     fn both<Y>(&self, system: &Y, &Piece { x, end, h, .. }: &Piece<'_, Y>) -> Option<Both<Y>>
@@ -212,31 +210,21 @@ where
         &self,
         system: &Y,
         step: &Piece<'_, Y>,
-        [before, after]: [&Columns<Y>; 2],
+        [before, after]: [&Vector<Y::Manifold>; 2],
     ) -> Option<f64> {
         if system.second_law() != SecondLaw::Exact {
             return None;
         }
         let Piece { x, end, h, .. } = *step;
-        let there = self.growth(system, [x, end], h)?;
-        let back = self.growth(system, [end, x], -h)?;
-        let columns = [(&before.t, x, -back, -1.0), (&after.t, end, there, 1.0)];
-        let n = Dim::<Y>::LEN;
-        let (mut off, mut terms) = (Vector::<Y::Manifold>::zero(), 0.0_f64);
-        let mut sizes = Vector::<Y::Manifold>::zero();
-        for (t, x, growth, sign) in columns {
-            let rise = ScalarField::<Y::Manifold>::jet1(system.entropy(), x).df * sign;
-            let [change, size] = row::<Y>(&rise, t);
-            let [produced, of_production] = row::<Y>(&growth, t);
-            off += change - produced;
-            sizes += size + of_production;
-        }
-        for j in 0..n {
-            if off[j] != 0.0 {
-                terms = terms.max(off[j].abs() / sizes[j]);
-            }
-        }
-        Some(terms)
+        let terms = [
+            ScalarField::<Y::Manifold>::jet1(system.entropy(), end).df.dot(after),
+            -ScalarField::<Y::Manifold>::jet1(system.entropy(), x).df.dot(before),
+            -self.growth(system, [x, end], h, after)?,
+            // The growth of the step of size −h is that of the step less its sign.
+            self.growth(system, [end, x], -h, before)?,
+        ];
+        let (off, size) = (terms.iter().sum::<f64>(), terms.map(f64::abs).iter().sum::<f64>());
+        Some(if off == 0.0 { 0.0 } else { off.abs() / size })
     }
 
     fn pull_back(

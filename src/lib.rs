@@ -97,12 +97,12 @@ pub mod prelude {
     #[cfg(feature = "fitting")]
     pub use metriplectic_fitting::{Fit, FitError, Fitted};
     pub use metriplectic_integrators::{
-        Attitude, AttitudeError, Certificate, Checkpoint, DormandPrince5, DormandPrince8, Ending,
-        Error, Event, ExplicitRungeKutta, Gauss, Gonzalez, ItohAbe, MeanValue, Method, Newton,
-        NinomiyaVictoir, NoiseBuilder, NoiseError, Noisy, Observables, OpenBuilder, OpenSpace,
-        OpenState, OpenSystem, Radau, RandomFlow, ResumeError, Run, RunError, RungeKuttaChebyshev,
-        Scheme, Span, SpanError, State, StepError, Stepper, Steps, SymmetricItohAbe, Tableau,
-        Tangents, Trajectory, Until, Watch,
+        Adjoints, Attitude, AttitudeError, Certificate, Checkpoint, DormandPrince5, DormandPrince8,
+        Ending, Error, Event, ExplicitRungeKutta, Gauss, Gonzalez, ItohAbe, MeanValue, Method,
+        Newton, NinomiyaVictoir, NoiseBuilder, NoiseError, Noisy, Observables, OpenBuilder,
+        OpenSpace, OpenState, OpenSystem, Radau, RandomFlow, ResumeError, Run, RunError,
+        RungeKuttaChebyshev, Scheme, Span, SpanError, State, StepError, Stepper, Steps,
+        SymmetricItohAbe, Tableau, Tangents, Trajectory, Until, Watch,
     };
     pub use metriplectic_lattices::{
         BondState, Boundary, Graph, Lattice, LatticeError, Onsager, OpenLattice, OpenSites, Points,

@@ -1,9 +1,12 @@
 //! Tangents of runs, and families: `T` against differences of runs with the same steps, the laws of `T`, and the same bits.
 
+mod adjoint;
 mod explicit;
+mod families;
 mod fits;
 mod parts;
 mod schemes;
+mod table;
 
 use metriplectic::dynamics::{Parametrised, Point};
 use metriplectic::fields::{Column as _, Dimension as _, Space, Vector};

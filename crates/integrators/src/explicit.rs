@@ -65,7 +65,7 @@ mod trial;
 use metriplectic_dynamics::SecondLaw;
 
 pub(crate) use along::along;
-pub use flow::{Projected, ProjectionError, StageFlow, Target};
+pub use flow::{Limit, Projected, ProjectionError, StageFlow, Target};
 pub use memory::ExplicitMemory;
 use memory::MemoryOf;
 
@@ -73,7 +73,8 @@ use crate::step::{
     Control, Element, LimitingSites, MethodError, Promises, Refusal, StepEnds, StepError,
     StepStart, Stepper, Taken,
 };
-use chebyshev::CHEBYSHEV;
+
+pub(crate) use chebyshev::{CHEBYSHEV, Coefficients, Recursion};
 use dormand_prince::{EIGHT, FIVE};
 use trial::{Done, Trial};
 

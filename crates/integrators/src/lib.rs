@@ -83,6 +83,6 @@ pub use step::{
     Stepper, Taken, Vector,
 };
 pub use tangent::{
-    Linearised as LinearisedStep, SelfAdjoint, Sensitivity, TangentError, TangentEvent, TangentRun,
-    TangentState, TangentSteps, Tangents, Unlinearised,
+    AdjointRun, Adjoints, Linearised as LinearisedStep, LossGradient, SelfAdjoint, Sensitivity,
+    TangentError, TangentEvent, TangentRun, TangentState, TangentSteps, Tangents, Unlinearised,
 };

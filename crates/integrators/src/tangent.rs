@@ -18,10 +18,13 @@
 //! | steps | how |
 //! |---|---|
 //! | [`Scheme`](crate::Scheme) with [`SelfAdjoint`] parts | two linearisations of its own equation, from either end |
-//! | [`DormandPrince5`](crate::DormandPrince5), [`DormandPrince8`](crate::DormandPrince8), [`ExplicitRungeKutta`](crate::ExplicitRungeKutta) | stages and projection at dual numbers |
+//! | [`DormandPrince5`](crate::DormandPrince5), [`DormandPrince8`](crate::DormandPrince8), [`RungeKuttaChebyshev`](crate::RungeKuttaChebyshev), [`ExplicitRungeKutta`](crate::ExplicitRungeKutta) | stages and projection at dual numbers |
+//!
+//! A loss over a run has a gradient by the transposed steps ([`Adjoints`]), whatever the number of parameters.
 //!
 //! Components are those of the frames of the charts at both ends. [`TangentState::embedded`] has entries of velocities.
 
+mod adjoint;
 mod certificate;
 mod columns;
 mod duals;
@@ -36,12 +39,14 @@ mod record;
 mod schemes;
 mod state;
 mod steps;
+mod tape;
 
+pub use adjoint::{AdjointRun, Adjoints, LossGradient, WITHIN};
 pub use certificate::Sensitivity;
 pub use columns::Columns;
 pub use error::{TangentError, Unlinearised};
 pub use event::TangentEvent;
-pub use linearised::{Linearised, Piece, Propagated};
+pub use linearised::{Linearised, Piece, Propagated, Targets};
 pub use record::{TangentRun, Tangents};
 pub use schemes::SelfAdjoint;
 pub use state::TangentState;

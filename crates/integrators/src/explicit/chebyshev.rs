@@ -23,7 +23,7 @@ use crate::step::{Control, StepStart, Vector};
 
 /// The tableau without rows, with the PI controller of order 2, by which the error at the end is
 /// proportional to the tolerance.
-pub(super) const CHEBYSHEV: Tableau =
+pub(crate) const CHEBYSHEV: Tableau =
     Tableau::chebyshev("RungeKuttaChebyshev", Control::of_order(2));
 
 /// The damping `ε`.
@@ -63,7 +63,15 @@ pub(super) fn stages<F: StageFlow>(
     let zero = start.zero();
     let mut stages = Here::at_rest(&zero);
     stages[0] = Here { velocity: start, production };
-    Ok(LastStep { stages, known: 1, before: zero, end: q, rise: produced })
+    Ok(LastStep {
+        stages,
+        known: 1,
+        before: zero,
+        at_the_edge: false,
+        end: q,
+        rise: produced,
+        count: Some(count),
+    })
 }
 
 /// The estimate `0.8 (q₀ − q) + 0.4 h (k₀ + k)` of the local error (eq. 2.9).
@@ -82,10 +90,10 @@ fn stage_count(radius: f64) -> u32 {
 }
 
 /// The coefficients of the stages, from the Chebyshev polynomials at `w₀ = 1 + ε/s²`.
-struct Coefficients {
+pub(crate) struct Coefficients {
     w0: f64,
     w1: f64,
-    first: f64,
+    pub(crate) first: f64,
     /// `T_j`, `T_j'`, `T_j''` for the last `j` and the one before it.
     last: [f64; 3],
     before: [f64; 3],
@@ -95,15 +103,15 @@ struct Coefficients {
 }
 
 /// The coefficients of one stage.
-struct Recursion {
-    mu: f64,
-    nu: f64,
-    rate: f64,
-    start_rate: f64,
+pub(crate) struct Recursion {
+    pub(crate) mu: f64,
+    pub(crate) nu: f64,
+    pub(crate) rate: f64,
+    pub(crate) start_rate: f64,
 }
 
 impl Coefficients {
-    fn new(count: u32) -> Self {
+    pub(crate) fn new(count: u32) -> Self {
         let w0 = 1.0 + DAMPING / f64::from(count).powi(2);
         let mut polynomials = [[1.0, 0.0, 0.0], [w0, 1.0, 0.0]];
         for _ in 2..=count {
@@ -118,7 +126,7 @@ impl Coefficients {
         Self { w0, w1, first, last, before, b: [b, b], a: 1.0 - b * w0 }
     }
 
-    fn next(&mut self) -> Recursion {
+    pub(crate) fn next(&mut self) -> Recursion {
         let Self { w0, w1, b: [b_before, b_last], a, .. } = *self;
         let polynomials = following(w0, [self.before, self.last]);
         let [value, slope, bend] = polynomials;

@@ -201,11 +201,21 @@ where
         &self,
         u: &Vector<Y::Manifold, D>,
     ) -> Result<Vector<Y::Manifold, D>, MetricError> {
+        Ok(self.defined(u)?.0)
+    }
+
+    /// The residual, and the growth `h ⟨w_S, K̃ w_S⟩` of the entropy, by their definitions.
+    pub(crate) fn defined<D: Scalar>(
+        &self,
+        u: &Vector<Y::Manifold, D>,
+    ) -> Result<(Vector<Y::Manifold, D>, D), MetricError> {
         let metric = self.system.metric();
         let path = self.retraction.step_path(metric, self.x, u)?;
         let g = self.system.metric_at(&path.z);
-        let mut defined = Defined { step: self, inner: g.inner()?, g: &g, path: &path };
-        Ok(equation(self.system, self.h, &mut defined)?.residual)
+        let (inner, production) = (g.inner()?, D::from(0.0));
+        let mut defined = Defined { step: self, inner, g: &g, path: &path, production };
+        let residual = equation(self.system, self.h, &mut defined)?.residual;
+        Ok((residual, defined.production * D::from(self.h)))
     }
 
     /// The residual with its Jacobian, and the covectors in it, from the jets `(f, df, Hf)` of the fields: no

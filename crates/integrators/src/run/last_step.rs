@@ -2,7 +2,7 @@
 
 use crate::run::controller::StepSize;
 use crate::run::steps::Steps;
-use crate::step::{EntropyStep, Flow, Laws, Scales, StepStart, Stepper};
+use crate::step::{EntropyStep, Flow, Laws, Memory as _, Scales, StepStart, Stepper};
 
 /// The last step of a run.
 #[derive(Debug)]
@@ -11,6 +11,7 @@ pub(crate) struct LastStep<'a, F: Flow + ?Sized> {
     pub(crate) h: f64,
     pub(crate) in_parts: bool,
     pub(crate) entropy_step: Option<EntropyStep>,
+    pub(crate) stage_count: Option<u32>,
 }
 
 impl<'a, F: Flow, M: Stepper<F>> Steps<'a, F, M> {
@@ -55,6 +56,7 @@ impl<'a, F: Flow, M: Stepper<F>> Steps<'a, F, M> {
         let (x, time) = (&before.state.point, before.state.time);
         let start = StepStart { x, time, values, reference, allowed };
         let entropy_step = before.entropy_step;
-        LastStep { start, h: before.h, in_parts: before.in_parts, entropy_step }
+        let stage_count = self.memory.stage_count();
+        LastStep { start, h: before.h, in_parts: before.in_parts, entropy_step, stage_count }
     }
 }

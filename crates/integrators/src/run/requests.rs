@@ -82,6 +82,11 @@ impl Outputs {
         outputs
     }
 
+    /// The start of the run.
+    pub(crate) const fn start(&self) -> f64 {
+        self.start
+    }
+
     pub(crate) const fn is_empty(&self) -> bool {
         self.times.is_none() && self.interval.is_none()
     }

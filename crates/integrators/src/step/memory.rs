@@ -33,6 +33,11 @@ pub trait Memory: Clone + Debug + Default {
         let _ = tried;
     }
 
+    /// The number of stages of the step taken last, by a method that chooses it from step to step.
+    fn stage_count(&self) -> Option<u32> {
+        None
+    }
+
     /// Puts all of its numbers into a checkpoint.
     fn save(&self, saved: &mut Saved);
 

@@ -4,9 +4,10 @@ use std::fmt;
 
 use metriplectic_dynamics::Metriplectic;
 use metriplectic_dynamics::system::Point;
-use metriplectic_fields::{Dimension as _, Vector};
+use metriplectic_fields::{Column as _, Dimension as _, Vector};
+use metriplectic_manifolds::Manifold as _;
 
-use super::columns::{Columns, LawOfStart, jets, row};
+use super::columns::{Columns, jets, row};
 use super::error::Unlinearised;
 use crate::step::Dim;
 use crate::step::digits::counted;
@@ -24,8 +25,9 @@ pub struct Sensitivity {
     pub energy: f64,
     /// The largest error of `dL_a(x_k) T_k = dL_a(x₀) T_0`.
     pub invariants: f64,
-    /// The largest error of `dS(x_k) T_k = δ(S₀ + Σ h Σ b_i σ_i)`, for explicit methods; `None` where the method does
-    /// not say what it has produced.
+    /// The largest error of `dS(x_k) T_k = δ(S₀ + Σ h Σ b_i σ_i)`, for explicit methods. For schemes that of
+    /// `dS(x') T' − dS(x) T = δ(h ⟨w_S, K̃ w_S⟩)`, on the steps whose numbers are powers of two. `None` where the method does not
+    /// say what it has produced.
     pub entropy: Option<f64>,
     /// Whether the step sizes followed a tolerance, and are frozen.
     pub frozen: bool,
@@ -34,9 +36,18 @@ pub struct Sensitivity {
 }
 
 /// The error of a law from which on a derivative is wrong.
-const BROKEN: f64 = 1e-6;
+pub(super) const BROKEN: f64 = 1e-6;
+/// The error of a law that is rounding.
+const ROUNDED: f64 = 64.0 * f64::EPSILON;
 
 impl Sensitivity {
+    /// Enters the second law in a step.
+    pub(super) fn enter_entropy(&mut self, law: Option<f64>) {
+        if let Some(error) = law {
+            self.entropy = Some(worse(self.entropy.unwrap_or(0.0), error));
+        }
+    }
+
     /// Enters a state.
     pub(super) fn enter<Y: Metriplectic>(
         &mut self,
@@ -45,10 +56,15 @@ impl Sensitivity {
         columns: &Columns<Y>,
     ) -> Result<(), Unlinearised> {
         let jets = jets(system, x);
-        let off = |df: &Vector<Y::Manifold>, law: &LawOfStart<Vector<Y::Manifold>>| {
+        let scales = Y::Manifold::scales(x);
+        let off = |df: &Vector<Y::Manifold>, law: &Vector<Y::Manifold>| {
             let [here, sizes] = row::<Y>(df, &columns.t);
+            let terms = df.abs().dot(&scales);
             (0..Dim::<Y>::LEN).fold(0.0, |worst, j| {
-                let (off, size) = ((here[j] - law.row[j]).abs(), sizes[j] + law.row[j].abs());
+                let (off, size) = ((here[j] - law[j]).abs(), sizes[j] + law[j].abs());
+                // The column of a direction on which nothing depends is rounding, relative to a unit of that direction.
+                let unit = terms / scales[j];
+                let size = if off <= ROUNDED * unit { size.max(unit) } else { size };
                 worse(worst, if off == 0.0 { 0.0 } else { off / size })
             })
         };

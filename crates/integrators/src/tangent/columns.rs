@@ -8,35 +8,15 @@ use metriplectic_fields::{
 
 use crate::step::{CountOf, Dim};
 
-/// A law at the start of a run, with its derivatives along the start and the parameters.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct LawOfStart<V> {
-    pub(crate) value: f64,
-    pub(crate) row: V,
-}
-
-/// The values onto which explicit methods move a state, with their derivatives.
-#[derive(Debug)]
-pub(crate) struct Laws<Y: Metriplectic> {
-    pub(crate) energy: LawOfStart<Vector<Y::Manifold>>,
-    pub(crate) invariants: Vec<LawOfStart<Vector<Y::Manifold>>>,
+/// The derivatives of the values onto which explicit methods move a state, along the start and the parameters.
+#[derive(Clone, Debug)]
+pub(crate) struct Laws<V> {
+    pub(crate) energy: V,
+    pub(crate) invariants: Vec<V>,
     /// The entropy at the start, and what was produced since.
-    pub(crate) entropy: LawOfStart<Vector<Y::Manifold>>,
+    pub(crate) entropy: V,
     /// Whether the method says what was produced.
     pub(crate) entropy_is_known: bool,
-}
-
-impl<Y: Metriplectic> Clone for Laws<Y> {
-    fn clone(&self) -> Self {
-        let Self { energy, invariants, entropy, entropy_is_known } = self;
-        let (energy, entropy) = (*energy, *entropy);
-        Self {
-            energy,
-            invariants: invariants.clone(),
-            entropy,
-            entropy_is_known: *entropy_is_known,
-        }
-    }
 }
 
 /// The tangent `T = ∂x/∂(x₀, θ)` of a run at one of its states, in the frames of the charts at both ends.
@@ -45,7 +25,7 @@ impl<Y: Metriplectic> Clone for Laws<Y> {
 #[derive(Debug)]
 pub struct Columns<Y: Metriplectic> {
     pub(crate) t: Matrix<Y::Manifold>,
-    pub(crate) laws: Laws<Y>,
+    pub(crate) laws: Laws<Vector<Y::Manifold>>,
 }
 
 impl<Y: Metriplectic> Clone for Columns<Y> {
@@ -79,12 +59,11 @@ impl<Y: Metriplectic> Columns<Y> {
     /// Makes the tangent at the start of a run, `T = 1`.
     pub(crate) fn start(system: &Y, x0: &Point<Y>) -> Self {
         let jets = jets(system, x0);
-        let law = |jet: &Jet1<Y::Manifold>| LawOfStart { value: jet.value, row: jet.df };
         let listed = jets.invariants.as_ref().iter().flatten();
         let laws = Laws {
-            energy: law(&jets.energy),
-            invariants: listed.take(Y::Invariants::COUNT).map(|(_, jet)| law(jet)).collect(),
-            entropy: law(&jets.entropy),
+            energy: jets.energy.df,
+            invariants: listed.take(Y::Invariants::COUNT).map(|(_, jet)| jet.df).collect(),
+            entropy: jets.entropy.df,
             entropy_is_known: false,
         };
         Self { t: Matrix::<Y::Manifold>::one(), laws }

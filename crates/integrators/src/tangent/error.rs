@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use crate::run::checkpoint::ResumeError;
 use crate::run::error::RunError;
 use crate::step::{StateSpace, StepError};
 
@@ -43,6 +44,9 @@ pub enum TangentError<M: StateSpace> {
     /// The run did not finish.
     #[error(transparent)]
     Run(#[from] RunError<M>),
+    /// A checkpoint of the run was not taken up.
+    #[error(transparent)]
+    Resume(#[from] ResumeError),
     /// A step of the run failed.
     #[error(transparent)]
     Step(#[from] StepError),

@@ -39,7 +39,7 @@ const CORRECTIONS: usize = 10;
 const SMALL: f64 = 1e-9;
 
 /// A point of a system with derivatives.
-type DualPoint<Y> = <<Y as Metriplectic>::Manifold as Space>::Point<Dual64>;
+pub(super) type DualPoint<Y> = <<Y as Metriplectic>::Manifold as Space>::Point<Dual64>;
 
 impl<Y: Metriplectic<Manifold: MovingBase>> Landing<'_, Y> {
     /// Moves the points of all columns, whose real parts are the same.

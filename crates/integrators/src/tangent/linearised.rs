@@ -5,7 +5,7 @@ use metriplectic_fields::Vector;
 
 use super::columns::Columns;
 use super::error::Unlinearised;
-use crate::step::EntropyStep;
+use crate::step::{EntropyStep, Laws, Numbers};
 
 /// A step that was taken, or a part of one.
 #[derive(Debug)]
@@ -20,9 +20,16 @@ pub struct Piece<'a, Y: Metriplectic> {
     pub moving: usize,
     /// The error that each entry was allowed, if the steps follow a tolerance.
     pub allowed: Option<Vector<Y::Manifold>>,
+    /// The values of the laws that an explicit method moves its end onto, with the entropy at its start.
+    pub targets: Targets<Y>,
     /// How the entropy at the end was found, by a method that projects onto it.
     pub entropy_step: Option<EntropyStep>,
+    /// The number of stages, by a method that chooses it from step to step.
+    pub stage_count: Option<u32>,
 }
+
+/// The values of the laws of a run, with the entropy at the start and what was produced since.
+pub type Targets<Y> = Laws<Numbers<Y>>;
 
 /// A step with its derivatives.
 #[derive(Clone, Debug)]
@@ -37,7 +44,7 @@ pub struct Propagated<Y: Metriplectic> {
 ///
 /// Laws: 1. the tangent is the derivative of the step that was taken, of this size and on this branch; 2.
 /// `dF(x') T' = dF(x) T` for the energy and the further invariants; 3. a row of steps has the product of their
-/// derivatives.
+/// derivatives; 4. the transposed steps have the transposed product.
 ///
 /// A retraction that is not symmetric does not compile:
 ///
@@ -54,7 +61,7 @@ pub struct Propagated<Y: Metriplectic> {
     message = "the steps of `{Self}` have no tangent on this system",
     note = "a `Scheme` has one if its retraction and its discrete gradient are symmetric (`SelfAdjoint`): not `Exponential`, \
             and not `ItohAbe`",
-    note = "`DormandPrince5`, `DormandPrince8` and `ExplicitRungeKutta` have one on every space of this library (`MovingBase`)"
+    note = "`DormandPrince5`, `DormandPrince8`, `RungeKuttaChebyshev` and `ExplicitRungeKutta` have one on every space of this library (`MovingBase`)"
 )]
 pub trait Linearised<Y: Metriplectic> {
     /// Computes the tangent at the end of a step from that at its start.
@@ -68,4 +75,29 @@ pub trait Linearised<Y: Metriplectic> {
         step: &Piece<'_, Y>,
         columns: &Columns<Y>,
     ) -> Result<Propagated<Y>, Unlinearised>;
+
+    /// Computes the error of the second law of tangents in a step, `dS(x') T' − dS(x) T = δ(h ⟨w_S, K̃ w_S⟩)`, relative to
+    /// its terms; `None` if the method does not say what it has produced, or says it in the columns.
+    fn entropy_law(
+        &self,
+        system: &Y,
+        step: &Piece<'_, Y>,
+        columns: [&Columns<Y>; 2],
+    ) -> Option<f64> {
+        let _ = (system, step, columns);
+        None
+    }
+
+    /// Computes the derivative of a loss along the start of a step from that along its end: the transpose of
+    /// [`propagate`](Self::propagate), `λᵀ T = λ'ᵀ T'`.
+    ///
+    /// # Errors
+    ///
+    /// [`Unlinearised`] if the step has no derivative.
+    fn pull_back(
+        &self,
+        system: &Y,
+        step: &Piece<'_, Y>,
+        costate: &Vector<Y::Manifold>,
+    ) -> Result<Vector<Y::Manifold>, Unlinearised>;
 }

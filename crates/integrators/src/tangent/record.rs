@@ -79,6 +79,7 @@ pub trait Tangents: Sized {
         let outputs = Outputs::after(start, start, times, interval);
         let steps = self.steps(system, x0, schedule)?;
         let columns = system
+            .wide()
             .with_room(|| Columns::start(system.wide(), &system.widened(&steps.state().point)));
         Ok(TangentSteps { steps, columns, sensitivity: Sensitivity::default(), outputs, start })
     }
@@ -100,7 +101,7 @@ pub trait Tangents: Sized {
         Self: Stepper<D> + Linearised<D::Wide>,
     {
         let steps = self.tangent_steps(system, x0, schedule)?;
-        system.with_room(|| record(steps))
+        system.wide().with_room(|| record(steps))
     }
 }
 

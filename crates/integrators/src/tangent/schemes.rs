@@ -8,17 +8,20 @@
 //! J = -\Bigl(\frac{\partial R}{\partial x'}\Bigr)^{-1} \frac{\partial R}{\partial x} = E A^{-1} B F^{-1} .
 //! ```
 
-use metriplectic_dynamics::Metriplectic;
 use metriplectic_dynamics::system::Point;
+use metriplectic_dynamics::{Metriplectic, SecondLaw};
 use metriplectic_fields::{
-    Column as _, Dimension as _, Matrix, Space as _, Square as _, Vector, power_of_two,
+    Column as _, Dimension as _, Factors as _, Matrix, ScalarField, Space as _, Square as _,
+    Vector, power_of_two,
 };
 use metriplectic_manifolds::{
     Cayley, ChartMidpoint, Manifold as _, Projection, Retraction, Riemannian as _, StepPathJet,
     WeylMidpoint,
 };
+use num_dual::Dual64;
 
-use super::columns::Columns;
+use super::certificate::BROKEN;
+use super::columns::{Columns, row};
 use super::error::Unlinearised;
 use super::frames::turned;
 use super::linearised::{Linearised, Piece, Propagated};
@@ -88,6 +91,105 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
     }
 }
 
+/// Both linearisations of a step, in one frame at `z` and in those of the stored ends.
+struct Both<Y: Metriplectic> {
+    /// `∂R/∂u`.
+    a: Matrix<Y::Manifold>,
+    /// `−∂R/∂v`.
+    b: Matrix<Y::Manifold>,
+    /// `∂x'/∂u`.
+    e: Matrix<Y::Manifold>,
+    /// `∂x/∂v`.
+    f: Matrix<Y::Manifold>,
+    d: Vector<Y::Manifold>,
+    units: Vector<Y::Manifold>,
+}
+
+impl<R, W: DiscreteGradient> Scheme<R, W> {
+    /// The derivative of the growth `h ⟨w_S, K̃ w_S⟩` of the entropy along the second end of a step, in the frame there.
+    fn growth<Y>(&self, system: &Y, [x, y]: [&Point<Y>; 2], h: f64) -> Option<Vector<Y::Manifold>>
+    where
+        Y: Metriplectic,
+        R: Retraction<Y::Manifold, Y::Metric>,
+    {
+        let (u, path) = path(system, &self.retraction, [x, y])?;
+        let residual = Residual::new(system, self, x, h);
+        let mut along = Vector::<Y::Manifold>::zero();
+        for k in 0..Dim::<Y>::LEN {
+            let moved = Vector::<Y::Manifold, Dual64>::from_index(|i| {
+                Dual64::new(u[i], if i == k { 1.0 } else { 0.0 })
+            });
+            along[k] = residual.defined(&moved).ok()?.1.eps;
+        }
+        // The rows of ∂y/∂u are in the frame at the end of the path.
+        let e = turned::<Y::Manifold>(path.dend, &path.end, y);
+        Matrix::<Y::Manifold>::from_entries(|i, j| e[(j, i)]).solve(&along)
+    }
+
+    fn both<Y>(&self, system: &Y, &Piece { x, end, h, .. }: &Piece<'_, Y>) -> Option<Both<Y>>
+    where
+        Y: Metriplectic,
+        R: Retraction<Y::Manifold, Y::Metric>,
+    {
+        let there = self.shot(system, [x, end], h)?;
+        let back = self.shot(system, [end, x], -h)?;
+        Some(Both {
+            a: there.jacobian,
+            b: turned::<Y::Manifold>(back.jacobian, &back.path.z, &there.path.z),
+            e: turned::<Y::Manifold>(there.path.dend, &there.path.end, end),
+            f: turned::<Y::Manifold>(back.path.dend, &back.path.end, x),
+            d: there.path.d,
+            units: units::<Y>(x, end, &there.path.d),
+        })
+    }
+}
+
+impl<Y: Metriplectic> Both<Y> {
+    /// `J = E A⁻¹ B F⁻¹`, and `∂x'/∂h`.
+    fn derivative(&self, h: f64) -> Option<(Matrix<Y::Manifold>, Vector<Y::Manifold>)> {
+        let Self { a, b, e, f, d, units } = self;
+        let a = scaled::<Y>(a, units).factor()?;
+        let solve = |r: Vector<Y::Manifold>| {
+            let hat = a.solve(&each::<Y>(&r, |i| 1.0 / units[i]))?;
+            Some(*e * each::<Y>(&hat, |i| units[i]))
+        };
+        let inverse = scaled::<Y>(f, units).inverse()?;
+        let inverse =
+            Matrix::<Y::Manifold>::from_entries(|i, j| inverse[(i, j)] * units[i] / units[j]);
+        let right = *b * inverse;
+        let mut j = Matrix::<Y::Manifold>::zeros();
+        for k in 0..Dim::<Y>::LEN {
+            let column = solve(right.column_at(k))?;
+            for i in 0..Dim::<Y>::LEN {
+                j[(i, k)] = column[i];
+            }
+        }
+        // R = d − h V vanishes, so ∂R/∂h = −V = −d/h.
+        Some((j, solve(*d * h.recip())?))
+    }
+
+    /// `λ ↦ Jᵀ λ = F⁻ᵀ Bᵀ A⁻ᵀ Eᵀ λ` for each row, without `J`.
+    fn transposed<const K: usize>(
+        &self,
+        rows: [Vector<Y::Manifold>; K],
+    ) -> Option<[Vector<Y::Manifold>; K]> {
+        let Self { a, b, e, f, units, .. } = self;
+        let factors = |m: &Matrix<Y::Manifold>| {
+            let m = scaled::<Y>(m, units);
+            Matrix::<Y::Manifold>::from_entries(|i, j| m[(j, i)]).factor()
+        };
+        let (a, f) = (factors(a)?, factors(f)?);
+        let mut pulled = rows;
+        for row in &mut pulled {
+            let hat = a.solve(&each::<Y>(&e.transpose_times(row), |i| units[i]))?;
+            let middle = b.transpose_times(&each::<Y>(&hat, |i| 1.0 / units[i]));
+            let hat = f.solve(&each::<Y>(&middle, |i| units[i]))?;
+            *row = each::<Y>(&hat, |i| 1.0 / units[i]);
+        }
+        Some(pulled)
+    }
+}
+
 impl<Y, R, W> Linearised<Y> for Scheme<R, W>
 where
     Y: Metriplectic,
@@ -97,39 +199,71 @@ where
     fn propagate(
         &self,
         system: &Y,
-        &Piece { x, end, h, .. }: &Piece<'_, Y>,
+        step: &Piece<'_, Y>,
         columns: &Columns<Y>,
     ) -> Result<Propagated<Y>, Unlinearised> {
-        let derivative = || {
-            let there = self.shot(system, [x, end], h)?;
-            let back = self.shot(system, [end, x], -h)?;
-            let units = units::<Y>(x, end, &there.path.d);
-            let e = turned::<Y::Manifold>(there.path.dend, &there.path.end, end);
-            let f = turned::<Y::Manifold>(back.path.dend, &back.path.end, x);
-            let b = turned::<Y::Manifold>(back.jacobian, &back.path.z, &there.path.z);
-            let a = scaled::<Y>(&there.jacobian, &units).factor()?;
-            let solve = |r: Vector<Y::Manifold>| {
-                let hat =
-                    metriplectic_fields::Factors::solve(&a, &each::<Y>(&r, |i| 1.0 / units[i]))?;
-                Some(e * each::<Y>(&hat, |i| units[i]))
-            };
-            let inverse = scaled::<Y>(&f, &units).inverse()?;
-            let inverse =
-                Matrix::<Y::Manifold>::from_entries(|i, j| inverse[(i, j)] * units[i] / units[j]);
-            let right = b * inverse;
-            let mut j = Matrix::<Y::Manifold>::zeros();
-            for k in 0..Dim::<Y>::LEN {
-                let column = solve(right.column_at(k))?;
-                for i in 0..Dim::<Y>::LEN {
-                    j[(i, k)] = column[i];
-                }
-            }
-            // R = d − h V vanishes, so ∂R/∂h = −V = −d/h.
-            Some((j, solve(there.path.d * h.recip())?))
-        };
+        let derivative = || self.both(system, step)?.derivative(step.h);
         let (j, along_h) = derivative().ok_or(Unlinearised::Singular)?;
         Ok(Propagated { columns: columns.after(&j), along_h })
     }
+
+    /// The derivatives of the growth along both ends are those along the unknowns of both shots.
+    fn entropy_law(
+        &self,
+        system: &Y,
+        step: &Piece<'_, Y>,
+        [before, after]: [&Columns<Y>; 2],
+    ) -> Option<f64> {
+        if system.second_law() != SecondLaw::Exact {
+            return None;
+        }
+        let Piece { x, end, h, .. } = *step;
+        let there = self.growth(system, [x, end], h)?;
+        let back = self.growth(system, [end, x], -h)?;
+        let columns = [(&before.t, x, -back, -1.0), (&after.t, end, there, 1.0)];
+        let n = Dim::<Y>::LEN;
+        let (mut off, mut terms) = (Vector::<Y::Manifold>::zero(), 0.0_f64);
+        let mut sizes = Vector::<Y::Manifold>::zero();
+        for (t, x, growth, sign) in columns {
+            let rise = ScalarField::<Y::Manifold>::jet1(system.entropy(), x).df * sign;
+            let [change, size] = row::<Y>(&rise, t);
+            let [produced, of_production] = row::<Y>(&growth, t);
+            off += change - produced;
+            sizes += size + of_production;
+        }
+        for j in 0..n {
+            if off[j] != 0.0 {
+                terms = terms.max(off[j].abs() / sizes[j]);
+            }
+        }
+        Some(terms)
+    }
+
+    fn pull_back(
+        &self,
+        system: &Y,
+        step: &Piece<'_, Y>,
+        costate: &Vector<Y::Manifold>,
+    ) -> Result<Vector<Y::Manifold>, Unlinearised> {
+        let [before, after] =
+            [step.x, step.end].map(|x| ScalarField::<Y::Manifold>::jet1(system.energy(), x).df);
+        let pulled = || self.both(system, step)?.transposed([*costate, after]);
+        let [point, energy] = pulled().ok_or(Unlinearised::Singular)?;
+        first_law::<Y>(step.x, [&energy, &before])?;
+        Ok(point)
+    }
+}
+
+/// Refuses a derivative that breaks `dH(x') J = dH(x)`, relative to the terms `|∂_iH| s_i` in units of the sizes of entries.
+fn first_law<Y: Metriplectic>(
+    x: &Point<Y>,
+    [pulled, before]: [&Vector<Y::Manifold>; 2],
+) -> Result<(), Unlinearised> {
+    let sizes = Y::Manifold::scales(x);
+    let sum = |f: &dyn Fn(usize) -> f64| (0..Dim::<Y>::LEN).map(|i| f(i) * sizes[i]).sum::<f64>();
+    let off = sum(&|i| (pulled[i] - before[i]).abs());
+    let terms = sum(&|i| pulled[i].abs() + before[i].abs());
+    if off <= BROKEN * terms { Ok(()) } else { Err(Unlinearised::LawBroken { off: off / terms }) }
 }
 
 /// The unit of each entry, a power of two: in another one each number of a factorisation differs by a power of two, so that

@@ -11,7 +11,7 @@ use super::error::{TangentError, Unlinearised};
 use super::event::TangentEvent;
 use super::frames::between;
 use super::linearised::{Linearised, Propagated};
-use super::pieces::{Ended, Wide, propagate};
+use super::pieces::{Ended, Part, Wide, propagate};
 use super::state::TangentState;
 use crate::run::certificate::Certificate;
 use crate::run::ending::Ending;
@@ -19,7 +19,7 @@ use crate::run::event::Event;
 use crate::run::last_step::LastStep;
 use crate::run::requests::{Outputs, rounding};
 use crate::run::steps::Steps;
-use crate::step::{Dim, Flow as _, Stepper};
+use crate::step::{Dim, Flow as _, Memory as _, Stepper};
 
 /// A run with its tangent, step by step; made by [`Tangents::tangent_steps`](crate::Tangents::tangent_steps).
 ///
@@ -90,7 +90,7 @@ where
     /// [`TangentError`]; the state is then the last one reached.
     pub fn advance(&mut self) -> Result<(), TangentError<D::Manifold>> {
         let flow = self.steps.flow();
-        flow.with_room(|| self.take_step().map(drop))
+        flow.wide().with_room(|| self.take_step().map(drop))
     }
 
     /// Takes one step, and returns what was asked for inside it.
@@ -131,11 +131,21 @@ where
             h: last.h,
             in_parts: last.in_parts,
             entropy_step: last.entropy_step,
+            stage_count: last.stage_count,
         };
         let system = (flow, self.steps.method());
         let next = propagate(system, &last.start, &ended, &self.columns).map_err(failed)?;
         let wide = flow.widened(&state.point);
         self.sensitivity.enter(flow.wide(), &wide, &next.columns).map_err(failed)?;
+        // By the definition of the step, which costs as much as its derivative.
+        if state.step.is_power_of_two() && !last.in_parts {
+            let part = Part::new(&last.start, &ended);
+            let law = part.with(flow, |piece| {
+                let columns = [&self.columns, &next.columns];
+                self.steps.method().entropy_law(flow.wide(), piece, columns)
+            });
+            self.sensitivity.enter_entropy(law);
+        }
         self.sensitivity.frozen = self.steps.is_adaptive();
         self.sensitivity.undamped = self.steps.certificate().is_stiff();
         let mut ends = self.outputs.clone();
@@ -173,6 +183,7 @@ where
             h,
             in_parts: taken.effort.splits > 0,
             entropy_step: taken.evidence.entropy_step,
+            stage_count: memory.stage_count(),
         };
         let moved = propagate((flow, method), &last.start, &ended, &self.columns)?;
         Ok((taken.x, moved))

@@ -17,7 +17,7 @@ pub enum VerificationError {
     /// A claim names a test that there is not.
     #[error("`{test}` is no test: there is no `fn {name}` in tests/{file}.rs")]
     NoTest {
-        /// What the claim names.
+        /// The name in the claim.
         test: String,
         /// Its file.
         file: String,
@@ -32,7 +32,7 @@ pub enum VerificationError {
     NoSentence {
         /// The guarantee.
         guarantee: Guarantee,
-        /// What it looks for.
+        /// The text that it looks for.
         part: &'static str,
     },
     /// A sentence that names a test is held by nothing.
@@ -177,7 +177,7 @@ fn holds(sentences: &[String]) -> Result<(), VerificationError> {
     unheld.map_or(Ok(()), |sentence| Err(VerificationError::Unheld(sentence.clone())))
 }
 
-/// That `file::name` is a function of `tests/file.rs`.
+/// Accepts `file::name` if it is a function of `tests/file.rs`.
 fn has_test(test: &str, root: &Path) -> Result<(), VerificationError> {
     let (file, name) = test.split_once("::").unwrap_or((test, ""));
     let source = fs::read_to_string(root.join(format!("tests/{file}.rs"))).unwrap_or_default();

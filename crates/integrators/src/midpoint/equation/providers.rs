@@ -24,6 +24,8 @@ pub(super) struct Defined<'a, 'b, Y: Metriplectic, R, W, D: Scalar> {
     pub(super) inner: &'a <Y::Metric as Riemannian<Y::Manifold>>::At<D>,
     pub(super) g: &'a MetricAt<'a, Y::Manifold, Y::Metric, D>,
     pub(super) path: &'a StepPath<Y::Manifold, D>,
+    /// The entropy production `⟨w_S, K̃ w_S⟩` of the last velocity.
+    pub(super) production: D,
 }
 
 impl<Y, R, W, D> Provider for Defined<'_, '_, Y, R, W, D>
@@ -55,8 +57,8 @@ where
         w: &CovectorsOf<Self>,
     ) -> Result<(Vector<Y::Manifold, D>, f64), MetricError> {
         let friction = irreversible(system, self.g, w)?;
-        let production = w.entropy.dot(&friction).re();
-        Ok((reversible(system, self.g, w)? + friction, production))
+        self.production = w.entropy.dot(&friction);
+        Ok((reversible(system, self.g, w)? + friction, self.production.re()))
     }
 }
 

@@ -145,9 +145,6 @@ impl fmt::Display for Certificate {
             let steps = counted(self.effort.continued, "continuation", "continuations");
             write!(f, ", {steps} in the step size")?;
         }
-        if self.effort.globalised > 0 {
-            write!(f, ", {} of the globaliser", counted(self.effort.globalised, "call", "calls"))?;
-        }
         Ok(())
     }
 }

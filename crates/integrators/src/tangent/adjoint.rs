@@ -1,0 +1,271 @@
+//! Gradients of losses over a run, by the transposed steps from its end to its start.
+
+use std::fmt;
+
+use metriplectic_dynamics::system::Point;
+use metriplectic_dynamics::{Differentiable, Metriplectic};
+use metriplectic_fields::{Column as _, Dimension as _, Jet1, Real, ScalarField, Space, Vector};
+use nalgebra::DVector;
+
+use super::error::TangentError;
+use super::linearised::Linearised;
+use super::pieces::{Part, Wide};
+use super::tape::{Segment, Tape, TapedStep};
+use crate::run::certificate::Certificate;
+use crate::run::schedule::Schedule;
+use crate::run::state::State;
+use crate::step::{Dim, Flow as _, Stepper};
+
+/// A derivative along a state of the wide system.
+type Costate<D> = Vector<<Wide<D> as Metriplectic>::Manifold>;
+
+/// A point whose entries carry derivatives.
+type Moving<D> = <<D as Metriplectic>::Manifold as Space>::Point<Real>;
+
+/// Runs whose losses have gradients, by every method whose steps are [`Linearised`].
+///
+/// A loss `ℓ = Σ_k ℓ_k(x_k)` over states of a run has the gradient `(∂ℓ/∂x₀, ∂ℓ/∂θ)`. Its costate goes from the end to the
+/// start, by the transposed derivatives of the discrete steps:
+///
+/// ```math
+/// \lambda_k = J_k^\top \lambda_{k+1} + \frac{\partial\ell_k}{\partial x_k} .
+/// ```
+///
+/// It is the transpose of the [tangent](super::Tangents) of the same run, to round-off. No equation is integrated backwards, since
+/// friction would grow.
+///
+/// ```
+/// use metriplectic_dynamics::Family;
+/// use metriplectic_fields::Real;
+/// use metriplectic_integrators::{Adjoints, DormandPrince8, Span};
+/// use metriplectic_manifolds::LieDual;
+/// use nalgebra::{Vector3, Vector4, vector};
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let body = Family::on(LieDual::so3())
+///     .parameters(["I1", "I2", "I3", "friction"])
+///     .energy(|p: &Vector3<Real>, t: &Vector4<Real>| {
+///         (p.x * p.x / t.x + p.y * p.y / t.y + p.z * p.z / t.z) * 0.5
+///     })
+///     .entropy(|p: &Vector3<Real>, t: &Vector4<Real>| p.norm_squared() * t.w * 0.5)
+///     .build()?;
+/// let system = body.at(vector![3.0, 2.0, 1.0, 0.05]);
+/// let span = Span::until(20.0).tolerance(1e-8).output_at([5.0, 10.0, 20.0]);
+/// let run = DormandPrince8.adjoint(&system, vector![0.4, -1.0, 0.3], span)?;
+///
+/// // State 0 is the start, and states 1 to 3 are the outputs.
+/// let data = vector![0.1, -0.9, 0.4];
+/// let loss = run.gradient(|k, p: &Vector3<Real>| {
+///     if k == 0 { 0.0.into() } else { (p - data.map(Real::from)).norm_squared() }
+/// })?;
+/// println!("ℓ = {:.4}, dℓ/dx₀ = {:.4}", loss.value, loss.along_start());
+/// println!("dℓ/dγ = {:.4}", loss.along("friction").unwrap());
+/// # assert!(loss.along_parameters().len() == 4);
+/// # Ok(())
+/// # }
+/// ```
+pub trait Adjoints: Sized {
+    /// Runs a system over a schedule, and keeps the steps for gradients: those of the last [`WITHIN`] steps, and a checkpoint
+    /// every so many.
+    ///
+    /// The states of the loss are those that a [run](crate::Method::run) records: one after each step, or at the
+    /// [times asked for](crate::Watch::output_at). An output inside a step is a step of that fraction of its size.
+    ///
+    /// # Errors
+    ///
+    /// [`TangentError`]; [`TangentError::Broken`] if the schedule has events or corners.
+    fn adjoint<D>(
+        self,
+        system: &D,
+        x0: Point<D>,
+        schedule: impl Into<Schedule>,
+    ) -> Result<AdjointRun<'_, D, Self>, TangentError<D::Manifold>>
+    where
+        D: Differentiable,
+        Self: Clone + Stepper<D> + Linearised<D::Wide>,
+    {
+        self.adjoint_within(WITHIN, system, x0, schedule)
+    }
+
+    /// Runs as [`adjoint`](Self::adjoint) does, and keeps at most `steps` steps. A run of `N` has a checkpoint every `steps`, from
+    /// which a gradient takes them again: at `steps = √N` the memory is of order `√N`, for the price of one more run.
+    ///
+    /// Without outputs each state is recorded, whatever `steps` is.
+    ///
+    /// # Errors
+    ///
+    /// The errors of [`adjoint`](Self::adjoint).
+    fn adjoint_within<D>(
+        self,
+        steps: usize,
+        system: &D,
+        x0: Point<D>,
+        schedule: impl Into<Schedule>,
+    ) -> Result<AdjointRun<'_, D, Self>, TangentError<D::Manifold>>
+    where
+        D: Differentiable,
+        Self: Clone + Stepper<D> + Linearised<D::Wide>,
+    {
+        let schedule = schedule.into();
+        system.wide().with_room(|| {
+            let tape = Tape::record(self.clone(), system, (x0, schedule), steps.max(1))?;
+            Ok(AdjointRun { system, method: self, tape })
+        })
+    }
+}
+
+impl<M> Adjoints for M {}
+
+/// Steps that [`Adjoints::adjoint`] keeps.
+pub const WITHIN: usize = 1 << 16;
+
+/// A run whose losses have gradients; made by [`Adjoints::adjoint`].
+pub struct AdjointRun<'a, D: Differentiable, M> {
+    system: &'a D,
+    method: M,
+    tape: Tape<D>,
+}
+
+impl<D: Differentiable, M> fmt::Debug for AdjointRun<'_, D, M> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("AdjointRun").field("states", &self.tape.states).finish_non_exhaustive()
+    }
+}
+
+/// A loss with its gradient along the start and the parameters of a run.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LossGradient {
+    /// The loss.
+    pub value: f64,
+    pub(super) row: DVector<f64>,
+    pub(super) start: usize,
+    pub(super) names: Vec<&'static str>,
+}
+
+impl LossGradient {
+    /// The derivative `∂ℓ/∂x₀` in the frame of the chart at the start.
+    pub fn along_start(&self) -> DVector<f64> {
+        self.row.rows(0, self.start).into_owned()
+    }
+
+    /// The derivative `∂ℓ/∂θ`, one entry a parameter.
+    pub fn along_parameters(&self) -> DVector<f64> {
+        self.row.rows(self.start, self.row.len() - self.start).into_owned()
+    }
+
+    /// The derivative along a parameter; `None` if there is none of this name.
+    pub fn along(&self, parameter: &str) -> Option<f64> {
+        let k = self.names.iter().position(|name| *name == parameter)?;
+        Some(self.row[self.start + k])
+    }
+}
+
+impl<D, M> AdjointRun<'_, D, M>
+where
+    D: Differentiable,
+    M: Clone + Stepper<D> + Linearised<Wide<D>>,
+{
+    /// The recorded states, the start first.
+    pub fn states(&self) -> &[State<D::Manifold>] {
+        &self.tape.states
+    }
+
+    /// The balance of the run.
+    pub const fn certificate(&self) -> &Certificate {
+        &self.tape.certificate
+    }
+
+    /// Computes the loss `Σ_k ℓ_k(x_k)` and its gradient, by a closure `|k, x|` over the numbers and the points of the
+    /// [states](Self::states).
+    ///
+    /// # Errors
+    ///
+    /// [`TangentError::NotLinearised`] if a step has no derivative.
+    pub fn gradient(
+        &self,
+        loss: impl Fn(usize, &Moving<D>) -> Real,
+    ) -> Result<LossGradient, TangentError<D::Manifold>> {
+        let mut value = 0.0;
+        let mut rows = Vec::with_capacity(self.states().len());
+        for (k, state) in self.states().iter().enumerate() {
+            let field = |x: &Moving<D>| loss(k, x);
+            let Jet1 { value: here, df } = ScalarField::<D::Manifold>::jet1(&field, &state.point);
+            value += here;
+            rows.push(df);
+        }
+        Ok(LossGradient { value, ..self.pull_back(&rows)? })
+    }
+
+    /// Computes the gradient of a loss from its derivatives along the [states](Self::states), in the frames there. States
+    /// without one are those behind the list; the value is 0.
+    ///
+    /// # Errors
+    ///
+    /// [`TangentError::NotLinearised`] if a step has no derivative.
+    pub fn pull_back(
+        &self,
+        rows: &[Vector<D::Manifold>],
+    ) -> Result<LossGradient, TangentError<D::Manifold>> {
+        self.system.wide().with_room(|| self.backwards(rows))
+    }
+
+    fn backwards(
+        &self,
+        rows: &[Vector<D::Manifold>],
+    ) -> Result<LossGradient, TangentError<D::Manifold>> {
+        let (n, all) = (Dim::<D>::LEN, Dim::<Wide<D>>::LEN);
+        let row = |k: usize| {
+            let row = rows.get(k);
+            Costate::<D>::from_index(|i| row.filter(|_| i < n).map_or(0.0, |row| row[i]))
+        };
+        let mut costate = row(rows.len());
+        for (k, segment) in self.tape.segments.iter().enumerate().rev() {
+            let is_last = k + 1 == self.tape.segments.len();
+            let again =
+                if is_last { None } else { Some(self.again(segment, &self.tape.segments[k + 1])?) };
+            for step in again.as_ref().unwrap_or(&self.tape.steps).iter().rev() {
+                costate = self.before(step, costate, &row)?;
+            }
+        }
+        let costate = costate + row(0);
+        let row = DVector::from_fn(all, |i, _| costate[i]);
+        let names = self.system.parameters().to_vec();
+        Ok(LossGradient { value: 0.0, row, start: n, names })
+    }
+
+    /// The steps of a segment, taken again.
+    fn again(
+        &self,
+        segment: &Segment,
+        next: &Segment,
+    ) -> Result<Vec<TapedStep<D>>, TangentError<D::Manifold>> {
+        Tape::again(self.method.clone(), self.system, [segment, next])
+    }
+
+    /// The costate at the start of a step from that at its end.
+    fn before(
+        &self,
+        step: &TapedStep<D>,
+        costate: Costate<D>,
+        row: &impl Fn(usize) -> Costate<D>,
+    ) -> Result<Costate<D>, TangentError<D::Manifold>> {
+        let time = step.time;
+        let through = |parts: &[Part<D>], mut costate: Costate<D>| {
+            for part in parts.iter().rev() {
+                let pulled = part.with(self.system, |piece| {
+                    self.method.pull_back(self.system.wide(), piece, &costate)
+                });
+                costate = pulled.map_err(|cause| TangentError::NotLinearised { time, cause })?;
+            }
+            Ok::<_, TangentError<D::Manifold>>(costate)
+        };
+        let at_end = match step.state {
+            Some(k) => costate + row(k),
+            None => costate,
+        };
+        let mut before = through(&step.parts, at_end)?;
+        for (k, parts) in &step.outputs {
+            before += through(parts, row(*k))?;
+        }
+        Ok(before)
+    }
+}

@@ -37,14 +37,15 @@ impl<Y> Closed for Y where
 /// A rigid body with the entropy `½ |p|²` and half the friction of the metric. A function, so that it is one type.
 pub(crate) fn body(k_b: f64) -> Noisy<impl Closed, Uniform> {
     let so3 = LieDual::so3();
-    let friction = CasimirDissipation::new(so3.algebra(), Matrix3::identity() * 0.5).unwrap();
+    let friction =
+        CasimirDissipation::new(so3.algebra(), Matrix3::identity() * 0.5).expect("a form");
     System::on(so3)
         .energy(|p: &Vector3<Real>| p.component_mul(p).component_div(&INERTIA.cast()).sum() * 0.5)
         .entropy(|p: &Vector3<Real>| p.norm_squared() * 0.5)
         .dissipation(friction)
         .noise(Boltzmann(k_b))
         .build()
-        .unwrap()
+        .expect("a system")
 }
 
 pub(crate) fn energy(p: &Vector3<f64>) -> f64 {

@@ -26,7 +26,7 @@ fn ring(sites: usize, k_b: f64) -> Noisy<Lattice<impl Model<Manifold = Euclidean
             [Onsager { rate: u * v, b: [vector![bond.w[1].x], vector![-bond.w[0].x]] }]
         })
         .build()
-        .unwrap()
+        .expect("a lattice")
         .with_noise(Boltzmann(k_b))
 }
 
@@ -85,11 +85,14 @@ impl Basis<Vector2<f64>> for Square {
     }
 }
 
+/// A step of a size from two energies.
+type Step<'a> = dyn Fn(f64, &Vector2<f64>, &Outcome) -> Vector2<f64> + 'a;
+
 #[test]
 fn orders_of_a_ring_of_three_bodies() {
     let (k_b, square) = (0.02, Square::new());
     let ring = ring(3, k_b);
-    let errors = |sizes: [f64; 3], step: &dyn Fn(f64, &Vector2<f64>, &Outcome) -> Vector2<f64>| {
+    let errors = |sizes: [f64; 3], step: &Step<'_>| {
         sizes.map(|h| {
             let matrix = operator(&square, &outcomes(3), |u, outcome| step(h, u, outcome));
             let f = coefficients(&square, |u| (u.x - 1.0).powi(2));

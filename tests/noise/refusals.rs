@@ -123,7 +123,7 @@ fn bodies(
         }))
         .noise(Boltzmann(k_b))
         .build()
-        .unwrap()
+        .expect("a system")
 }
 
 #[test]

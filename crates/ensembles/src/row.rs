@@ -11,7 +11,7 @@ use crate::draw::{Draw, OF_THE_ROW};
 
 /// The rows up to this number verify their models in full.
 const FIRST: usize = 2;
-/// And so do the rows whose number is a multiple of this one.
+/// Rows whose number is a multiple of this one verify in full too.
 const EVERY: usize = 256;
 
 /// A row of a sweep: its number and its parameters by name.

@@ -260,7 +260,9 @@ mod tests {
     /// Problems with narrow valleys (Moré, Garbow and Hillstrom 1981), with the evaluations that they take.
     #[test]
     fn valleys_are_followed() {
-        struct Problem(fn(&[f64]) -> (Vec<f64>, Vec<f64>));
+        /// The residuals and the rows of their derivatives.
+        type Rows = (Vec<f64>, Vec<f64>);
+        struct Problem(fn(&[f64]) -> Rows);
         impl LeastSquares for Problem {
             fn squares(&self, x: &[f64]) -> Option<Squares> {
                 let (r, j) = self.0(x);
@@ -268,7 +270,7 @@ mod tests {
                 Some(Squares { residuals: DVector::from_vec(r), jacobian })
             }
         }
-        fn meyer(x: &[f64]) -> (Vec<f64>, Vec<f64>) {
+        fn meyer(x: &[f64]) -> Rows {
             const Y: [f64; 16] = [
                 34780.0, 28610.0, 23650.0, 19630.0, 16370.0, 13720.0, 11540.0, 9744.0, 8261.0,
                 7030.0, 6005.0, 5147.0, 4427.0, 3820.0, 3307.0, 2872.0,

@@ -139,7 +139,7 @@ impl<P: Model> Projection<'_, P> {
         self.stagnated(best)
     }
 
-    /// What becomes of the best state, if no correction improves it. Its differentials are evaluated anew, so that
+    /// Decides on the best state, if no correction improves it. Its differentials are evaluated anew, so that
     /// corrections need not keep them.
     #[cold]
     fn stagnated(&self, best: Option<Best<P>>) -> Result<Projected<Lattice<P>>, ProjectionError> {

@@ -177,7 +177,7 @@ impl<'a, V: Vector> Limit<'a, V> {
         }
     }
 
-    /// The same of a part of each vector.
+    /// The limit for a part of each vector.
     #[must_use]
     pub fn map<W>(self, part: impl Fn(&'a V) -> &'a W) -> Limit<'a, W> {
         match self {
@@ -187,7 +187,7 @@ impl<'a, V: Vector> Limit<'a, V> {
     }
 }
 
-/// Round-off is never too far.
+/// Half of a displacement. Round-off is never too far.
 fn half_of([step, size]: [f64; 2]) -> f64 {
     (0.5 * step.abs()).max(NEAR * size)
 }

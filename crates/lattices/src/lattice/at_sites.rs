@@ -39,7 +39,7 @@ impl<P: Model> Clone for AtSites<'_, P> {
 }
 
 impl<P: Model> AtSites<'_, P> {
-    /// Those of energy and entropy at a site.
+    /// Reads the differentials of energy and entropy at a site.
     #[inline(always)]
     pub(crate) fn at(&self, site: usize) -> [VectorOf<P>; 2] {
         let n = dimension::<P>();

@@ -61,7 +61,7 @@ pub(super) struct Facts {
 
 impl Guarantee {
     /// All of them.
-    pub(super) const ALL: [Self; 20] = [
+    pub(super) const ALL: [Self; 21] = [
         Self::Energy,
         Self::Entropy,
         Self::Invariants,

@@ -350,7 +350,7 @@ fn every_hard_start_ends_in_a_certified_step_or_in_the_right_error() {
     }
     println!("in all: {effort}");
     // A search without an end would show here, on any machine.
-    assert!(effort.iterations < 100_000, "{effort}");
+    assert!(effort.iterations < 20_000, "{effort}");
     for (case, outcome) in &all {
         let word = outcome.word();
         if word != "plain" {
@@ -375,8 +375,8 @@ fn every_hard_start_ends_in_a_certified_step_or_in_the_right_error() {
     // Every other ends in a certified step, of another solution or of halves, or in a typed error.
     assert_eq!(of_others[..5].iter().sum::<usize>(), 24);
     let [_, _, split, not_converged, out_of_domain, ..] = of_others;
-    assert!(split >= 12, "{of_others:?}");
-    assert!(not_converged + out_of_domain <= 6, "{of_others:?}");
+    assert!(split >= 9, "{of_others:?}");
+    assert!(not_converged + out_of_domain <= 9, "{of_others:?}");
     // Only what has an edge is left, and what has none does not converge.
     for (case, outcome) in &all {
         if let Outcome::Refused { error, .. } = outcome {

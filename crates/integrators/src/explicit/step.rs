@@ -192,13 +192,12 @@ fn finished<F: StageFlow>(
     // An array of many sites is given up before the next one is made.
     last.end = last.end.zero();
     last.end = flow.stage_coordinates(x, &end.x);
-    memory.lost = Some(lost);
-    memory.read = Vec::new();
+    let lost_before = memory.lost.replace(lost);
     let Some(next) = here_at(flow, &end.x, end.gradients) else {
-        // The lost digits of the state that stays are lost for good.
-        memory.lost = None;
+        memory.lost = lost_before;
         return Err(Refused::outside(flow, x, &last.end));
     };
+    memory.read = Vec::new();
     let rates = flow.stage_rates(x, (&last.end, &end.x), &next.velocity);
     let rests = end.x == *x && is_zero(&last.stages[0].velocity);
     let stability =

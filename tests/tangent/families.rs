@@ -26,10 +26,10 @@ fn accept<Y, M, const P: usize>(
     let system = family.at_parameters(theta);
     let [along_start, law] = compared(&system, method, x0, &span, 2e-3);
     let end = |t: &SVector<f64, P>| {
-        method.run(&family.at_parameters(*t), x0.clone(), span).unwrap().last().point.clone()
+        method.run(&family.at_parameters(*t), x0.clone(), span).expect("a run").last().point.clone()
     };
     let differences = differences::<Euclidean<P>, Of<Y, P>>(&theta, 2e-3, end);
-    let run = method.tangent(&system, x0.clone(), span).unwrap();
+    let run = method.tangent(&system, x0.clone(), span).expect("a tangent");
     let along = off(&run.last().along_parameters(), &differences);
     println!(
         "{name}: x₀ {along_start:.1e}, θ {along:.1e} of {:.1e}, law {law:.1e}",

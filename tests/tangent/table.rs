@@ -2,7 +2,7 @@
 
 use metriplectic::dynamics::Parametrised as _;
 use metriplectic::prelude::*;
-use nalgebra::{DMatrix, vector};
+use nalgebra::DMatrix;
 
 use crate::{body, compared, differences, off};
 

@@ -113,11 +113,11 @@ report:
     set -euo pipefail
     rm -rf target/report
     export METRIPLECTIC_REPORT={{ justfile_directory() / "target/report" }}
-    tests=$(grep -l 'Claim::new' tests/*.rs | xargs -n 1 basename --suffix .rs)
+    tests=$(grep -rl --include='*.rs' 'Claim::new' tests | sed 's|^tests/||; s|/.*||; s|\.rs$||' | sort -u)
     run() { PROPTEST_RNG_SEED=2401 cargo test --package metriplectic-tests --package metriplectic-quick-tests --all-features "$@"; }
     run $(sed '/^examples$/d; s/^/--test /' <<< "$tests")
-    cargo build --quiet --profile test --all-features --example convergence --example learning_data
-    run --test examples -- orders training_data
+    cargo build --quiet --profile test --all-features --example convergence --example learning_data --example fit_metric
+    run --test examples -- orders training_data of_a_metric
     run --test long_runs -- --ignored
     cargo run --quiet --profile test --package metriplectic-studies --bin report -- target/report .
     # The figures that it links; the programs are those of the tests.
@@ -189,7 +189,7 @@ words: docstrings (need "typos --version" "cargo install typos-cli --locked")
 docstrings:
     #!/usr/bin/env bash
     set -euo pipefail
-    if grep -rnE '^\s*//[/!] (What|Those|That|The same|Nothing)\b' crates/{fields,manifolds,dynamics,integrators,ensembles,fitting}/src; then
+    if grep -rnE '^\s*//[/!] (What|Those|That|The same|Nothing)\b' crates/{fields,manifolds,dynamics,integrators,ensembles,fitting,studies}/src; then
         echo 'begin these docstrings with a verb in the third person or with a noun' >&2
         exit 1
     fi

@@ -1,7 +1,8 @@
 //! The cost of a step of a lattice, as ratios in one run: over the number of sites, beside derivatives by hand, beside a
 //! step without the laws, and on two threads.
 //!
-//! `cargo bench -p metriplectic-benches --bench lattices` prints a table; `-- N ORDER STEPS` runs one case, for a profiler.
+//! `cargo bench -p metriplectic-benches --bench lattices` prints a table; `-- N ORDER STEPS` runs one case, for a profiler,
+//! and `-- N ORDER STEPS plain` the same without the laws.
 
 #[path = "../tests/models/chain.rs"]
 mod chain;
@@ -187,6 +188,9 @@ fn main() {
     let case: Vec<usize> = std::env::args().skip(1).filter_map(|arg| arg.parse().ok()).collect();
     if let [n, order, count] = case[..] {
         let lattice = chain(Graph::ring(n));
+        if std::env::args().any(|arg| arg == "plain") {
+            return steps(order, &Plain(&lattice), &lattice.points(waves), count);
+        }
         return steps(order, &lattice, &lattice.points(waves), count);
     }
     println!("ns for a site and a step on one thread; ratios to the closures");

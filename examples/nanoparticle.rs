@@ -63,23 +63,13 @@ fn main() -> Result<(), Box<dyn Error>> {
         .execute()?
         .complete()?;
     let (x, means) = (table.column("x")?, table.column("mean")?);
-    let of = |field: f64| -> (f64, f64) {
-        let here: Vec<f64> = x
-            .iter()
-            .zip(&means)
-            .filter(|(x, _)| (**x - field).abs() < 1e-9)
-            .map(|(_, mean)| *mean)
-            .collect();
-        let count = here.len() as f64;
-        let mean = here.iter().sum::<f64>() / count;
-        let variance = here.iter().map(|m| (m - mean).powi(2)).sum::<f64>() / (count - 1.0);
-        (mean, (variance / count).sqrt())
+    let of = |field: f64| {
+        let here = x.iter().zip(&means).filter(|(x, _)| (**x - field).abs() < 1e-9);
+        Estimate::of(here.map(|(_, mean)| *mean))
     };
-    let found: Vec<(f64, (f64, f64))> = fields.iter().map(|x| (*x, of(*x))).collect();
-    let worst = found
-        .iter()
-        .map(|(x, (mean, error))| ((mean - langevin(*x)) / error).abs())
-        .fold(0.0, f64::max);
+    let found: Vec<(f64, Estimate)> = fields.iter().map(|x| (*x, of(*x))).collect();
+    let worst =
+        found.iter().map(|(x, estimate)| estimate.errors_from(langevin(*x))).fold(0.0, f64::max);
     let balance = table.column("off")?.into_iter().fold(0.0, f64::max);
 
     let h = 3e-11;
@@ -92,7 +82,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         .map(|s| (1e9 * s.time, s.point.ledger.heat("crystal").unwrap_or(0.0) / thermal))
         .collect();
     let bars = |sign: f64| -> Vec<(f64, f64)> {
-        found.iter().map(|(x, (mean, error))| (*x, mean + sign * error)).collect()
+        found.iter().map(|(x, of)| (*x, of.mean + sign * of.standard_error)).collect()
     };
     let curve: Vec<(f64, f64)> =
         (1..=90).map(|k| f64::from(k) * 0.05).map(|x| (x, langevin(x))).collect();
@@ -109,10 +99,10 @@ fn main() -> Result<(), Box<dyn Error>> {
         .report_of_many()
         .text(&table)
         .with("fields", json!(fields))
-        .with("means", json!(found.iter().map(|(_, (mean, _))| *mean).collect::<Vec<_>>()))
+        .with("means", json!(found.iter().map(|(_, of)| of.mean).collect::<Vec<_>>()))
         .with(
             "standard_errors",
-            json!(found.iter().map(|(_, (_, error))| *error).collect::<Vec<_>>()),
+            json!(found.iter().map(|(_, of)| of.standard_error).collect::<Vec<_>>()),
         )
         .with("worst_in_standard_errors", worst)
         .with("worst_balance_in_thermal_energies", balance)

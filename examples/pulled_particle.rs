@@ -82,10 +82,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let free_energy = 0.5 * (STIFFNESS[1] / STIFFNESS[0]).ln();
     let ((forward, off), (backward, off_back)) = (works(false)?, works(true)?);
     let weights: Vec<f64> = forward.iter().map(|w| (free_energy - w).exp()).collect();
-    let count = weights.len() as f64;
-    let mean = weights.iter().sum::<f64>() / count;
-    let variance = weights.iter().map(|w| (w - mean).powi(2)).sum::<f64>() / (count - 1.0);
-    let error = (variance / count).sqrt();
+    let jarzynski = FluctuationTheorem::jarzynski(forward.iter().copied(), 1.0, free_energy);
 
     let negative: Vec<f64> = backward.iter().map(|w| -w).collect();
     let (there, back) = (histogram(&forward), histogram(&negative));
@@ -121,10 +118,10 @@ fn main() -> Result<(), Box<dyn Error>> {
         );
     example
         .report_of_many()
-        .text(format!("⟨exp(−(W − ΔF)/kT)⟩ = {mean:.4} ± {error:.4}"))
-        .with("jarzynski", mean)
-        .with("standard_error", error)
-        .with("mean_work", forward.iter().sum::<f64>() / count)
+        .text(jarzynski)
+        .with("jarzynski", jarzynski.estimate.mean)
+        .with("standard_error", jarzynski.estimate.standard_error)
+        .with("mean_work", Estimate::of(forward).mean)
         .with("free_energy", free_energy)
         .with("worst_balance", off.max(off_back))
         .figure(figure)

@@ -7,6 +7,8 @@
 
 use std::error::Error;
 
+use metriplectic::dynamics::noise::Uniform;
+use metriplectic::integrators::Noisy;
 use metriplectic::prelude::*;
 use metriplectic_studies::{Example, Globe, Panel, Panels};
 
@@ -52,15 +54,49 @@ fn main() -> Result<(), Box<dyn Error>> {
         )
         .panel(Panel::new("entropy S", "t").line("S", series).named_level("mean", mean(&axes)))
         .panel(Panel::new("H − H₀", "t").line("H − H₀", errors).level(0.0));
+    let theorem = fluctuation_theorem(&body, &axes)?;
     let last = run.last();
     let sampled = run.iter().map(|s| s.entropy).sum::<f64>() / run.states().len() as f64;
     example
         .report_of(run.certificate(), last.time, last.point.iter().copied().collect())
+        .text(theorem)
+        .with("fluctuation_theorem", theorem.estimate.mean)
+        .with("standard_error", theorem.estimate.standard_error)
         .with("mean_entropy", sampled)
         .with("mean_entropy_of_the_law", mean(&axes))
         .with("distance_of_the_histogram", off)
         .figure(figure)
         .print()
+}
+
+/// The integral fluctuation theorem `⟨exp(−ΔS/k_B)⟩ = 1` of short paths that begin uniformly on the shell.
+fn fluctuation_theorem(
+    body: &Noisy<
+        impl Metriplectic<
+            Manifold = LieDual<3>,
+            Metric = Canonical,
+            Dissipation = CasimirDissipation<3>,
+        > + Sync,
+        Uniform,
+    >,
+    axes: &Vector3<f64>,
+) -> Result<FluctuationTheorem, Box<dyn Error>> {
+    let table = Sweep::new("uniform starts")
+        .samples(400)
+        .random("height", |draw| draw.uniform(-1.0..1.0))
+        .random("angle", |draw| draw.uniform(0.0..std::f64::consts::TAU))
+        .run(|row| {
+            let (z, angle) = (row["height"], row["angle"]);
+            let r = (1.0 - z * z).sqrt();
+            let start = vector![r * angle.cos(), r * angle.sin(), z].component_mul(axes);
+            let method = NinomiyaVictoir(DormandPrince5).seed(8).path(row.number() as u64);
+            Ok(method.run(body, start, Span::steps(0.1, 10))?)
+        })
+        .measure("change", |run| run.last().entropy - run.states()[0].entropy)
+        .quiet()
+        .execute()?
+        .complete()?;
+    Ok(FluctuationTheorem::integral(table.column("change")?, K_B))
 }
 
 /// The middles of the bins of `[−1, 1]`, with the density there.

@@ -90,7 +90,9 @@ pub mod prelude {
         VectorField, Verify, Zero,
     };
     #[cfg(feature = "ensembles")]
-    pub use metriplectic_ensembles::{Row, Shard, Sweep, Table, geomspace, linspace};
+    pub use metriplectic_ensembles::{
+        Estimate, FluctuationTheorem, Row, Shard, Sweep, Table, geomspace, linspace,
+    };
     pub use metriplectic_fields::{ErasedField, MatrixField, Real, Scalar, ScalarField};
     #[cfg(feature = "fitting")]
     pub use metriplectic_fitting::{Fit, FitError, Fitted};

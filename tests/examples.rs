@@ -793,6 +793,26 @@ fn the_shards_of_the_sweep_make_the_table_of_one_process() {
 }
 
 #[test]
+fn a_fit_finds_the_coefficients_of_a_metric() {
+    let report = json(&example("fit_metric", &["--json"]));
+    let mut worst = 0.0_f64;
+    for (key, truth) in [("a", 1.5), ("b", 1.0), ("c", 2.2), ("d", 0.8)] {
+        let error = figure(&report, &format!("{key}_error"));
+        assert!(error < 0.05, "{report}");
+        worst = worst.max((figure(&report, key) - truth).abs() / error);
+    }
+    assert!(worst < 4.0, "{report}");
+    let claim = |about: &str| Claim::new(Guarantee::Derivatives, about, "DormandPrince8 on so(3)*");
+    claim("four coefficients of a metric, from 240 numbers with noise")
+        .against("the truth")
+        .record(format!("{worst:.1} standard errors"), "4");
+    let law = figure(&report, "tangent_law");
+    claim("`dH T`, over the run of the fit").record(scientific(law), scientific(1e-12));
+    assert!((figure(&report, "noise") - 1e-3).abs() < 2e-4, "{report}");
+    assert!(figure(&report, "runs") <= 30.0 && figure(&report, "tangent_law") < 1e-12, "{report}");
+}
+
+#[test]
 fn a_fit_finds_the_inertias_of_a_body() {
     let report = json(&example("fit_rigid_body", &["--json"]));
     let off = |key: &str, truth: f64| {
@@ -871,6 +891,8 @@ fn a_thermal_body_and_fluctuating_heat_have_the_means_of_their_laws() {
     let (mean, exact) = (figure(&body, "mean_entropy"), figure(&body, "mean_entropy_of_the_law"));
     assert!((mean / exact - 1.0).abs() < 0.02, "{body}");
     assert!(figure(&body, "distance_of_the_histogram") < 0.15, "{body}");
+    let (theorem, error) = (figure(&body, "fluctuation_theorem"), figure(&body, "standard_error"));
+    assert!((theorem - 1.0).abs() < 4.0 * error && error < 0.2, "{body}");
     let heat = json(&example("fluctuating_heat", &["--json"]));
     let (variance, exact) = (figure(&heat, "variance"), figure(&heat, "variance_of_the_law"));
     assert!((variance / exact - 1.0).abs() < 0.06, "{heat}");

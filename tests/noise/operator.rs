@@ -2,6 +2,7 @@
 
 use metriplectic::integrators::noise::Numbers;
 use metriplectic::integrators::{Element, Flow, StepStart, Stepper};
+use metriplectic_studies::{Claim, Guarantee};
 use nalgebra::{DMatrix, DVector};
 
 /// The numbers of one outcome, the same in each step.
@@ -122,4 +123,16 @@ pub(crate) fn order(errors: &[(f64, f64)]) -> f64 {
         [logs.iter().map(|l| l.0).sum::<f64>() / n, logs.iter().map(|l| l.1).sum::<f64>() / n];
     let above: f64 = logs.iter().map(|(x, y)| (x - mx) * (y - my)).sum();
     above / logs.iter().map(|(x, _)| (x - mx).powi(2)).sum::<f64>()
+}
+
+/// Asserts that orders are within 0.1 of an integer, and records them.
+#[track_caller]
+pub(crate) fn assert_orders(problem: &str, method: &str, found: &[f64], expected: u32) {
+    let all: Vec<_> = found.iter().map(|order| format!("{order:.2}")).collect();
+    let all = all.join(", ");
+    let meets = |order: &f64| (order - f64::from(expected)).abs() < 0.1;
+    assert!(found.iter().all(meets), "{problem}, {method}: {all}");
+    Claim::new(Guarantee::Noise, problem, method)
+        .against("the exact law, by operators without samples")
+        .record(all, format!("{expected} ± 0.1"));
 }

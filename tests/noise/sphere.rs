@@ -1,9 +1,12 @@
 //! The spin of a nanoparticle in SI units, in a bath: the stochastic equation of Landau, Lifshitz and Gilbert.
 
 use metriplectic::prelude::*;
+use metriplectic_studies::{Claim, Guarantee, scientific};
 use nalgebra::vector;
 
-use crate::operator::{Outcome, coefficients, mean, operator, order, outcomes, step};
+use crate::operator::{
+    Outcome, assert_orders, coefficients, mean, operator, order, outcomes, step,
+};
 use crate::shell::Shell;
 
 /// Boltzmann's constant in J/K, and the temperature in K.
@@ -60,27 +63,35 @@ fn measure(
 #[test]
 fn the_law_of_a_nanoparticle_in_si_units() {
     let spin = spin!(0.0);
-    let (two, error) = measure((&[0.2, 0.1, 0.05], 0.0), |h, n, outcome| {
+    let (two, error) = measure((&[0.1, 0.05, 0.025], 0.0), |h, n, outcome| {
         let method = NinomiyaVictoir(DormandPrince5).numbers(outcome.clone());
         step(&spin, &method, &spin.flow().start(*n), h).x
     });
-    assert!(two.iter().all(|order| (order - 2.0).abs() < 0.1), "{two:?}");
-    // Langevin's function coth x − 1/x.
-    assert!(error < 2e-4, "{error}");
+    let problem = "nanoparticle in SI units: law of n·B and n₁²";
+    assert_orders(problem, "NinomiyaVictoir(DormandPrince5)", &two, 2);
+    assert!(error < 1e-4, "{error}");
+    Claim::new(
+        Guarantee::Noise,
+        "nanoparticle in SI units: ⟨cos θ⟩",
+        "NinomiyaVictoir(DormandPrince5)",
+    )
+    .against("Langevin's function coth x − 1/x")
+    .record(scientific(error), "1e-4");
     let (one, _) = measure((&[0.1, 0.05, 0.025], 0.0), |h, n, outcome| {
         let method = RandomFlow(DormandPrince5).numbers(outcome.clone());
         step(&spin, &method, &spin.flow().start(*n), h).x
     });
-    assert!(one.iter().all(|order| (order - 1.0).abs() < 0.1), "{one:?}");
+    assert_orders(problem, "RandomFlow(DormandPrince5)", &one, 1);
 }
 
 #[test]
 fn the_law_of_a_spin_whose_energy_is_not_quadratic() {
     const ANISOTROPY: f64 = 2.5e-21;
     let spin = spin!(ANISOTROPY);
-    let (two, error) = measure((&[0.2, 0.1, 0.05], ANISOTROPY), |h, n, outcome| {
+    let (two, _) = measure((&[0.2, 0.1, 0.05], ANISOTROPY), |h, n, outcome| {
         let method = NinomiyaVictoir(Gauss::<2>).numbers(outcome.clone());
         step(&spin, &method, &spin.flow().start(*n), h).x
     });
-    assert!(two.iter().all(|order| (order - 2.0).abs() < 0.1), "{two:?} {error}");
+    let problem = "spin with an energy of degree 4 in a bath: law of n·B and n₁²";
+    assert_orders(problem, "NinomiyaVictoir(Gauss::<2>)", &two, 2);
 }

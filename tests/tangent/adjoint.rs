@@ -77,7 +77,7 @@ fn adjoints_are_transposed_tangents() {
     transposed(("so(3)*, order 5", NEAR_REST), (&quartic, DormandPrince5), &START, &span);
     for h in [2.0, 4.0, 8.0] {
         // In parts, with outputs inside them.
-        let coarse: Schedule = Span::steps(h, 3).output_every(0.7 * h).into();
+        let coarse: Schedule = Span::steps(h, 3).output_every(0.7 * h);
         transposed(("parts, Weyl", NEAR_REST), (&quartic, weyl), &START, &coarse);
         transposed(("parts, order 5", NEAR_REST), (&quartic, DormandPrince5), &START, &coarse);
     }
@@ -103,7 +103,7 @@ fn adjoints_have_parameters() {
     let family = body();
     let system = family.at_parameters(THETA);
     let outputs = Span::until(20.0).tolerance(1e-9).output_every(1.3);
-    transposed(("θ, order 8, frozen", ROUNDED), (&system, DormandPrince8), &START, &outputs.into());
+    transposed(("θ, order 8, frozen", ROUNDED), (&system, DormandPrince8), &START, &outputs);
     transposed(
         ("θ, order 8", ROUNDED),
         (&system, DormandPrince8),
@@ -112,7 +112,7 @@ fn adjoints_have_parameters() {
     );
     let weyl = Scheme::new(WeylMidpoint);
     let span = Span::until(5.0).tolerance(1e-5).output_at([0.3, 2.0, 5.0]);
-    transposed(("θ, Weyl, frozen", ROUNDED), (&system, weyl), &START, &span.into());
+    transposed(("θ, Weyl, frozen", ROUNDED), (&system, weyl), &START, &span);
 }
 
 /// Fifty parameters: an energy with the coefficients of a polynomial.

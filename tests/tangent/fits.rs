@@ -67,11 +67,7 @@ fn a_fit_finds_the_parameters_within_their_errors() {
 /// The joint ellipsoid of 95 % holds the truth for 88 to 99 of 100 noises.
 #[test]
 fn ellipsoids_hold_the_truth_as_often_as_they_say() {
-    let (family, Data { times, truth, .. }) = (body(), data(THETA));
-    let odd = |k: &usize| k % 4 == 3;
-    let times: Vec<f64> = (0..80).filter(odd).map(|k| times[k]).collect();
-    let truth: Vec<Vector3<f64>> = (0..80).filter(odd).map(|k| truth[k]).collect();
-    let span = Span::steps(1.0, 20);
+    let (family, Data { times, truth, span }) = (body(), data(THETA));
     let mut rng = ChaCha8Rng::seed_from_u64(11);
     let (mut inside, mut sum) = (0, 0.0);
     for _ in 0..100 {
@@ -140,6 +136,9 @@ fn combinations_that_no_datum_sees_are_named() {
     println!("{fit}");
     assert_eq!(fit.not_told_apart(), ["a", "b"]);
     assert!(fit.to_string().contains("do not tell apart: a, b"));
+    // The third is known in spite of them.
+    assert!(fit.estimate("a").unwrap().standard_error.is_infinite());
+    assert!(fit.estimate("stiffness").unwrap().standard_error < 1e-3);
 }
 
 /// A start that is measured with the same noise is fitted too, on a sphere.
@@ -205,4 +204,44 @@ fn bad_data_are_named() {
         .start_at(START)
         .run(DormandPrince8, Span::steps(0.25, 8), THETA);
     assert!(matches!(none, Err(FitError::UnknownParameter { .. })));
+}
+
+/// A metric that is indefinite at the guess has no fit, and one that is so at a trial is left.
+#[test]
+fn trials_outside_of_the_domain_are_left() {
+    let family = Family::on(LieDual::so3())
+        .parameters(["along", "across"])
+        .field_metric(|_: &Vector3<Real>, t: &Vector2<Real>| {
+            Matrix3::from_diagonal(&Vector3::new(t.x, t.y, 1.0.into()))
+        })
+        .energy(|p: &Vector3<Real>, _: &Vector2<Real>| {
+            p.x * p.x / 6.0 + p.y * p.y / 4.0 + p.z * p.z * 0.5
+        })
+        .entropy(|p: &Vector3<Real>, _: &Vector2<Real>| p.norm_squared() * 0.5)
+        .build()
+        .unwrap();
+    let (truth, span) = (vector![1.5, 0.4], Span::steps(0.25, 40));
+    let run = DormandPrince8.run(&family.at(truth), START, span).unwrap();
+    let times: Vec<f64> = run.states()[1..].iter().map(|state| state.time).collect();
+    let rows: Vec<_> = run.states()[1..].iter().map(|state| state.point).collect();
+    let fit = |guess| {
+        let fit = Fit::of(&family).observe(|p: &Vector3<Real>| *p).data(&times, &rows);
+        fit.start_at(START).run(DormandPrince8, span, guess)
+    };
+    let found = fit(vector![4.0, 2.0]).unwrap();
+    println!("{found}");
+    assert!((Vector2::from_column_slice(&found.parameters) - truth).amax() < 1e-6);
+    let refused = fit(vector![-1.0, 1.0]).unwrap_err();
+    assert!(matches!(refused, FitError::Guess(_)));
+    assert!(refused.to_string().contains("not positive"), "{refused}");
+}
+
+/// The book's program of a fit is as short as it says.
+#[test]
+fn a_fit_is_a_short_program() {
+    let book = include_str!("../../book/src/sensitivities.md");
+    let start = book.find("use metriplectic::prelude::*;\n\nfn main").expect("a program");
+    let lines = book[start..].lines().take_while(|line| !line.starts_with("```")).count();
+    println!("{lines} lines");
+    assert!(lines <= 40);
 }

@@ -2,6 +2,7 @@
 
 mod adjoint;
 mod explicit;
+mod families;
 mod fits;
 mod parts;
 mod schemes;

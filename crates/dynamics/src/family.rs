@@ -10,14 +10,18 @@
 //! Parameters that are entries of the state *with the canonical metric* are something else: the dissipation
 //! of the metric moves them, and the system is another one.
 
+mod bracket_of;
 mod builder;
 mod fields;
+mod force_of;
 mod freeze;
 mod frozen;
 mod on_first;
 
+pub use bracket_of::{BracketAt, BracketOf};
 pub use builder::FamilyBuilder;
 pub use fields::{AtParameters, OfPair};
+pub use force_of::{ForceAt, ForcedOf};
 pub use freeze::Freeze;
 pub use frozen::{Differentiable, Frozen};
 pub use on_first::{FieldAt, FieldOf, OnFirst};

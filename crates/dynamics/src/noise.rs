@@ -30,5 +30,7 @@ mod terms;
 pub use boltzmann::{Boltzmann, Fluctuation, Measured, Uniform};
 pub use drift::{Place, TermVisitor, kinetic_drift};
 pub use frame::NoiseFrame;
-pub use system::{divergence, mismatch, noise_drift, noise_vector, place, seeded_place};
+pub use system::{
+    divergence, friction_vector, mismatch, noise_drift, noise_vector, place, seeded_place,
+};
 pub use terms::{NoiseTerm, NoiseTerms};

@@ -27,6 +27,15 @@ pub trait Verify<M: Manifold> {
     /// The errors of [`verify`](Self::verify).
     fn verified(&self, x0: &M::Point<f64>) -> Result<Verified<'_, Self>, ModelError>;
 
+    /// Checks the laws at `x0` alone, and returns the system with the certificate of the other members of a family. Use it
+    /// for a system whose closures differ by their parameters from those of one that was [verified](Self::verified); a
+    /// sweep chooses the rows that are (`Row::verified`).
+    ///
+    /// # Errors
+    ///
+    /// The errors of [`verify`](Self::verify), at `x0`.
+    fn verified_as_member(&self, x0: &M::Point<f64>) -> Result<Verified<'_, Self>, ModelError>;
+
     /// Checks what a run requires before its first step: everything that [`verify`](Self::verify) does, or
     /// the laws at `x0` alone if the system is [`Verified`].
     ///

@@ -72,6 +72,11 @@ impl<Y: Metriplectic + ?Sized> Verify<Y::Manifold> for Y {
         Ok(Verified { system: self })
     }
 
+    fn verified_as_member(&self, x0: &Point<Y>) -> Result<Verified<'_, Y>, ModelError> {
+        at_one_point(self, x0)?;
+        Ok(Verified { system: self })
+    }
+
     fn check_start(&self, x0: &Point<Y>) -> Result<(), ModelError> {
         if self.is_verified() { at_one_point(self, x0) } else { self.verify(x0, RADIUS) }
     }

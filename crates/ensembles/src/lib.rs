@@ -54,6 +54,7 @@ mod bar;
 mod draw;
 mod entry;
 mod error;
+mod estimate;
 mod execution;
 mod figures;
 mod fingerprint;
@@ -71,6 +72,7 @@ mod table;
 
 pub use draw::Draw;
 pub use error::{JournalError, PlanError, SweepError, TableError};
+pub use estimate::{Estimate, FluctuationTheorem};
 pub use plan::{Sweep, geomspace, linspace};
 pub use record::{Crossing, Record, Recorded};
 pub use row::Row;

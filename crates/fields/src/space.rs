@@ -115,6 +115,10 @@ pub trait Space: Clone + Debug + PartialEq + Send + Sync + 'static {
         Some(Matrix::<Self, D>::from_entries(|i, j| dual[i].dot(&image[j])))
     }
 
+    /// Whether [`stage_rates`](Self::stage_rates) returns the velocity that it is given, as in charts that are
+    /// translations.
+    const RATES_ARE_VELOCITIES: bool = false;
+
     /// Computes the point `ψ_x(q)` of the chart in which explicit methods take their stages. It agrees with
     /// `φ_x` to first order at `q = 0`, and may be cheaper: rational where `φ_x` has angles. The default is `φ_x`.
     ///

@@ -2,6 +2,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use crate::least_squares::UNSEEN;
+
 /// The covariance `s² (JᵀJ)⁻¹` of the unknowns, and the combinations that the data do not see.
 #[derive(Clone, Debug)]
 pub struct Covariance {
@@ -9,13 +11,11 @@ pub struct Covariance {
     pub matrix: DMatrix<f64>,
     /// The directions that the data do not see, in units of the columns' lengths.
     pub unseen: Vec<DVector<f64>>,
+    /// The direction that the data see least, in the same units.
+    pub flattest: DVector<f64>,
     /// The smallest singular value of the columns in units of their lengths, relative to the largest.
     pub fraction: f64,
 }
-
-/// The fraction of the largest singular value below which the data do not see a combination: it is of the size of the errors of a
-/// Jacobian from runs of a usual tolerance.
-pub const UNSEEN: f64 = 1e-7;
 
 impl Covariance {
     /// Computes the covariance from the singular values of the Jacobian with columns of length one, so that units do not matter.
@@ -33,18 +33,21 @@ impl Covariance {
         let largest = values.max();
         let fraction = if largest > 0.0 { values.min() / largest } else { 0.0 };
         let v = r.v_t.map_or_else(|| DMatrix::identity(n, n), |v| v.transpose());
+        let is_unseen = |k: usize| values[k].is_nan() || values[k] <= UNSEEN * largest;
+        // What has no part in a direction that is not seen has a rounding there.
+        let is_in = |i: usize, k: usize| !is_unseen(k) || v[(i, k)].abs() > UNSEEN;
         let matrix = DMatrix::from_fn(n, n, |i, j| {
-            let sum: f64 = (0..n)
-                .map(|k| {
-                    let term = v[(i, k)] * v[(j, k)];
-                    if term == 0.0 { 0.0 } else { term / (values[k] * values[k]) }
-                })
-                .sum();
+            let term = |k: usize| match v[(i, k)] * v[(j, k)] {
+                0.0 => 0.0,
+                term if is_unseen(k) => term.signum() * f64::INFINITY,
+                term => term / (values[k] * values[k]),
+            };
+            let sum: f64 = (0..n).filter(|&k| is_in(i, k) && is_in(j, k)).map(term).sum();
             variance * sum / (lengths[i] * lengths[j])
         });
-        let is_unseen = |k: &usize| values[*k].is_nan() || values[*k] < UNSEEN * largest;
-        let unseen = (0..n).filter(is_unseen).map(|k| v.column(k).into_owned()).collect();
-        Self { matrix, unseen, fraction }
+        let unseen = (0..n).filter(|&k| is_unseen(k)).map(|k| v.column(k).into_owned()).collect();
+        let flattest = v.column(values.imin()).into_owned();
+        Self { matrix, unseen, flattest, fraction }
     }
 
     /// Returns whether the data do not see a combination of the unknowns.

@@ -13,13 +13,16 @@ use metriplectic_manifolds::Manifold as _;
 use nalgebra::SVector;
 
 use crate::error::FitError;
-use crate::fitted::{Fitted, Parts};
+use crate::fitted::{FLAT, Fitted, Parts, Stop};
 use crate::levenberg_marquardt::LevenbergMarquardt;
 use crate::model::{ManifoldOf, Measured, Model, PointOf};
 use crate::unknowns::{Names, Unknown, unknowns};
 
 /// The longest step of a logarithm.
 const STEEP: f64 = 3.0;
+
+/// The noise, relative to the data, that the round-off of runs may be mistaken for.
+const ROUNDED: f64 = 4096.0 * f64::EPSILON;
 
 /// A fit of the parameters of a family to data, by least squares.
 ///
@@ -245,7 +248,16 @@ where
         let squares = model.evaluate(&best).map_err(FitError::Guess)?;
         let (theta, start) = model.at(&best);
         let parameters = theta.as_slice().to_vec();
-        if state.get_termination_reason() != Some(&TerminationReason::SolverConverged) {
+        let stop = match state.get_termination_reason() {
+            Some(TerminationReason::SolverConverged) if !found.solver.has_stalled() => {
+                Stop::Converged
+            }
+            _ => Stop::Unfinished,
+        };
+        // A promise that no trial has kept, or that none was left for.
+        let variance = squares.sum() / (data - best.len()) as f64;
+        let variance = variance.max(ROUNDED * ROUNDED * measured.mean_square());
+        if found.solver.relevant(&squares).promised() > FLAT * variance {
             let (runs, chi_squared) = (usize::try_from(runs).unwrap_or(usize::MAX), squares.sum());
             return Err(FitError::NotConverged { runs, chi_squared, parameters });
         }
@@ -257,6 +269,7 @@ where
             start: ManifoldOf::<Y, P>::entries(&start),
             noise_is_known: noise.is_some(),
             runs: runs + 1,
+            stop,
         }))
     }
 

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 
 use crate::covariance::Covariance;
 use crate::least_squares::Squares;
@@ -36,6 +36,23 @@ impl Estimate {
     }
 }
 
+/// The end of a fit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Ending {
+    /// At a minimum of the sum of squares, to a tenth of a standard error.
+    Minimum,
+    /// In a flat valley: the iterations ran out, or went on without an effect, where the linear model promises a step of less than a
+    /// tenth of a standard error, along a combination that the data hardly see. The errors say how wide the valley is.
+    FlatValley,
+}
+
+/// The square of the distance to the minimum, in standard errors, at which a valley is flat.
+pub(crate) const FLAT: f64 = 1e-2;
+
+/// The [fraction](Covariance::fraction) of the columns below which iterations without an end are those in a valley.
+const NARROW: f64 = 1e-3;
+
 /// A correlation from which on two estimates are named together.
 const CORRELATED: f64 = 0.95;
 
@@ -59,6 +76,8 @@ pub struct Fitted {
     pub noise_is_known: bool,
     /// The runs that were made.
     pub runs: u64,
+    /// The end of the iterations.
+    pub ending: Ending,
     /// The covariance of the unknowns: parameters, or their logarithms.
     pub covariance: Covariance,
 }
@@ -72,11 +91,21 @@ pub(crate) struct Parts<'a> {
     pub(crate) start: Vec<f64>,
     pub(crate) noise_is_known: bool,
     pub(crate) runs: u64,
+    pub(crate) stop: Stop,
+}
+
+/// The reason for which the iterations stopped.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Stop {
+    /// By the conditions of a minimum.
+    Converged,
+    /// Several iterations in a row had no effect, or there were as many as were allowed.
+    Unfinished,
 }
 
 impl Fitted {
     pub(crate) fn new(parts: Parts<'_>) -> Self {
-        let Parts { unknowns, phi, squares, parameters, start, noise_is_known, runs } = parts;
+        let Parts { unknowns, phi, squares, parameters, start, noise_is_known, runs, stop } = parts;
         let chi_squared = squares.sum();
         let degrees = squares.residuals.len() - phi.len();
         let variance = chi_squared / degrees as f64;
@@ -107,6 +136,10 @@ impl Fitted {
             })
             .collect();
         let noise = variance.sqrt();
+        let ending = match stop {
+            Stop::Unfinished if covariance.fraction <= NARROW => Ending::FlatValley,
+            Stop::Converged | Stop::Unfinished => Ending::Minimum,
+        };
         Self {
             estimates,
             parameters,
@@ -116,6 +149,7 @@ impl Fitted {
             noise,
             noise_is_known,
             runs,
+            ending,
             covariance,
         }
     }
@@ -133,9 +167,17 @@ impl Fitted {
 
     /// The names that the data cannot tell apart: those in a combination that no residual depends on.
     pub fn not_told_apart(&self) -> Vec<&'static str> {
-        let is_in = |k: usize| {
-            self.covariance.unseen.iter().any(|unseen| unseen[k].abs() > 0.1 * unseen.amax())
-        };
+        self.named(&self.covariance.unseen)
+    }
+
+    /// The names in the combination that the residuals depend on least.
+    pub fn flattest(&self) -> Vec<&'static str> {
+        self.named(std::slice::from_ref(&self.covariance.flattest))
+    }
+
+    /// The names of estimates with a part in one of some directions.
+    fn named(&self, directions: &[DVector<f64>]) -> Vec<&'static str> {
+        let is_in = |k: usize| directions.iter().any(|along| along[k].abs() > 0.1 * along.amax());
         let named = self.estimates.iter().enumerate().filter(|(k, _)| is_in(*k));
         named.map(|(_, estimate)| estimate.name).collect()
     }
@@ -170,11 +212,56 @@ impl fmt::Display for Fitted {
         if !together.is_empty() {
             writeln!(f, "the data do not tell apart: {}; fix one of them", together.join(", "))?;
         }
+        if self.ending == Ending::FlatValley {
+            let along = self.flattest().join(", ");
+            writeln!(
+                f,
+                "the sum of squares is flat along {along}: further steps change it by less than the data can tell; fix one of \
+                 them, or measure what tells them apart"
+            )?;
+        }
         let Self { chi_squared, degrees, noise, runs, .. } = self;
         if self.noise_is_known {
             write!(f, "χ² = {chi_squared:.4e} for {degrees} degrees of freedom, {runs} runs")
         } else {
             write!(f, "noise {noise:.3e} by {degrees} degrees of freedom, {runs} runs")
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{DMatrix, DVector};
+
+    /// Two columns that differ by 10⁻⁴ of their length, with residuals that no step makes smaller.
+    #[test]
+    fn a_valley_without_an_end_is_a_sentence() {
+        let unknowns = ["a", "b"].map(|name| Unknown { index: 0, name, positive: false });
+        let fitted = |apart: f64, stop: Stop| {
+            let column = |i: usize| 1.0 + 0.1 * i as f64;
+            let jacobian =
+                DMatrix::from_fn(8, 2, |i, j| column(i) + if i % 2 == j { apart } else { 0.0 });
+            let residuals = DVector::from_fn(8, |i, _| if i % 4 < 2 { 0.1 } else { -0.1 });
+            Fitted::new(Parts {
+                unknowns: &unknowns,
+                phi: &[1.0, 2.0],
+                squares: &Squares { residuals, jacobian },
+                parameters: vec![1.0, 2.0],
+                start: Vec::new(),
+                noise_is_known: false,
+                runs: 9,
+                stop,
+            })
+        };
+        let flat = fitted(1e-4, Stop::Unfinished);
+        assert_eq!(flat.ending, Ending::FlatValley);
+        assert_eq!(flat.flattest(), ["a", "b"]);
+        assert!(flat.to_string().contains("flat along a, b"), "{flat}");
+        // The same at a minimum, or with columns that the data tell apart, is none.
+        for (apart, stop) in [(1e-4, Stop::Converged), (0.5, Stop::Unfinished)] {
+            let other = fitted(apart, stop);
+            assert!(other.ending == Ending::Minimum && !other.to_string().contains("flat"));
         }
     }
 }

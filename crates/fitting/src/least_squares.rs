@@ -2,6 +2,10 @@
 
 use nalgebra::{DMatrix, DVector};
 
+/// The fraction of the largest singular value below which the data do not see a combination: it is of the size of the errors of a
+/// Jacobian from runs of a usual tolerance.
+pub const UNSEEN: f64 = 1e-7;
+
 /// The residuals at a point, and their Jacobian `∂r_i/∂φ_j`, from one evaluation.
 #[derive(Clone, Debug)]
 pub struct Squares {
@@ -25,6 +29,25 @@ impl Squares {
             if size > 0.0 { column.dot(&self.residuals).abs() / size } else { 0.0 }
         };
         self.jacobian.column_iter().map(cosine).fold(0.0, f64::max)
+    }
+
+    /// The reduction of the sum of squares that the linear model promises, `|Q Qᵀ r|²` with a basis `Q` of the columns: none at a
+    /// minimum. In units of the variance of a residual it is the square of the distance to the minimum in standard errors.
+    pub fn promised(&self) -> f64 {
+        let mut hat = self.jacobian.clone();
+        for mut column in hat.column_iter_mut() {
+            let length = column.norm();
+            if length > 0.0 {
+                column /= length;
+            }
+        }
+        let qr = hat.qr();
+        let svd = qr.r().svd(true, false);
+        let Some(u) = svd.u else { return f64::NAN };
+        let right = u.transpose() * (qr.q().transpose() * &self.residuals);
+        let least = UNSEEN * svd.singular_values.max();
+        let seen = (0..right.len()).filter(|&k| svd.singular_values[k] > least);
+        seen.map(|k| right[k] * right[k]).sum()
     }
 
     pub(crate) fn is_finite(&self) -> bool {

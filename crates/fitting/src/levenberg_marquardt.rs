@@ -6,18 +6,22 @@ use argmin::core::{
 use nalgebra::{DMatrix, DVector};
 
 use crate::least_squares::{LeastSquares, Squares};
+use crate::trust_region::Linear;
 
-/// The method of Levenberg (1944) and Marquardt (1963), as a solver for argmin's
+/// The method of Levenberg (1944) and Marquardt (1963) with a trust region (Moré 1978), as a solver for argmin's
 /// [`Executor`](argmin::core::Executor): observers, checkpoints and limits are those of argmin.
 ///
-/// An iteration is one trial, and one evaluation of the problem: with `D` the lengths of the columns of `J`,
+/// An iteration is one trial, and one evaluation of the problem: with `D` the largest lengths that the columns of `J` have had,
 ///
 /// ```math
-/// \delta = \operatorname*{arg\,min}_\delta\, |J \delta + r|^2 + \lambda |D \delta|^2
+/// \delta = \operatorname*{arg\,min}_{|D \delta| \le \Delta}\, |J \delta + r|^2
+///        = \operatorname*{arg\,min}_\delta\, |J \delta + r|^2 + \lambda |D \delta|^2
 /// ```
 ///
-/// by a QR decomposition, so that the unit of a parameter does not matter. A trial that lowers `|r|²` is taken; `λ` follows the ratio of
-/// the actual to the predicted reduction (Nielsen 1999).
+/// by the singular values of `J D⁻¹`, so that the unit of a parameter does not matter. A trial that lowers `|r|²` is taken. The radius
+/// `Δ` is doubled where the linear model is good and divided by four where it is not; `λ ≥ 0` is the one of this radius. So the damped
+/// step *is* the best one in the trust region, and another step in the same region, such as the dogleg of Powell (1970), predicts a
+/// smaller reduction.
 ///
 /// ```
 /// use argmin::core::{Executor, State};
@@ -44,14 +48,18 @@ use crate::least_squares::{LeastSquares, Squares};
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct LevenbergMarquardt {
-    /// The damping to begin with, relative to the lengths of the columns.
+    /// The damping `λ` of the first step, whose length is the first radius.
     pub damping: f64,
+    /// The radius `Δ` of the trust region; NaN to begin with.
+    pub radius: f64,
+    /// The largest lengths that the columns of `J` have had; empty to begin with.
+    pub lengths: Vec<f64>,
     /// The cosine between residuals and columns at which a minimum is reached.
     pub cosine: f64,
     /// The relative reduction of the sum of squares, predicted and actual, at which a minimum is reached.
     pub reduction: f64,
-    /// The length of a column of `J`, in units of the root mean square of the residuals, below which its unknown is left where it is: no
-    /// residual depends on it. The logarithm of a parameter that is zero ends here, and has no minimum.
+    /// The change of the residuals by the longest step of an unknown, in units of their root mean square, below which the unknown is
+    /// left where it is: no residual depends on it. The logarithm of a parameter that is zero ends here, and has no minimum.
     pub negligible: f64,
     /// The longest step of each unknown; none if the list is shorter. A whole step is cut to them.
     pub limits: Vec<f64>,
@@ -64,6 +72,8 @@ impl Default for LevenbergMarquardt {
     fn default() -> Self {
         Self {
             damping: 1e-3,
+            radius: f64::NAN,
+            lengths: Vec::new(),
             cosine: 1e-8,
             reduction: 1e-12,
             negligible: 1e-2,
@@ -79,56 +89,53 @@ type Iteration = IterState<Vec<f64>, (), DMatrix<f64>, (), DVector<f64>, f64>;
 /// A relative change of the sum of squares that hardly counts, and how many of them in a row are a minimum.
 const SLOW: (f64, u32) = (1e-7, 8);
 
-/// A damping from which on a step is a rounding of the parameters.
-const LARGEST: f64 = 1e16;
+/// The ratios of the actual to the predicted reduction below which the radius falls, and above which it grows, with their factors.
+const POOR: (f64, f64) = (0.25, 0.25);
+const GOOD: (f64, f64) = (0.75, 2.0);
 
 impl LevenbergMarquardt {
+    /// Returns whether several iterations in a row had no effect.
+    pub(crate) const fn has_stalled(&self) -> bool {
+        self.stalled >= SLOW.1
+    }
+
     /// The residuals and the columns of the unknowns that they depend on.
-    fn relevant(&self, whole: &Squares) -> Squares {
+    pub(crate) fn relevant(&self, whole: &Squares) -> Squares {
         let mut at = whole.clone();
         let least = self.negligible * (whole.sum() / whole.residuals.len() as f64).sqrt();
-        for mut column in at.jacobian.column_iter_mut() {
-            if column.norm() < least {
+        for (mut column, limit) in at.jacobian.column_iter_mut().zip(&self.limits) {
+            if column.norm() * limit < least {
                 column.fill(0.0);
             }
         }
         at
     }
 
-    /// The step with the damping `λ`, and the reduction of the sum of squares that it predicts.
-    fn step(
-        &self,
-        at: &Squares,
-        scales: &DVector<f64>,
-        lambda: f64,
-    ) -> Option<(DVector<f64>, f64)> {
-        let (rows, n) = at.jacobian.shape();
-        let root = lambda.sqrt();
-        let damped = DMatrix::from_fn(rows + n, n, |i, j| match i.checked_sub(rows) {
-            None => at.jacobian[(i, j)] / scales[j],
-            Some(k) if k == j => root,
-            Some(_) => 0.0,
-        });
-        let right =
-            DVector::from_fn(rows + n, |i, _| if i < rows { -at.residuals[i] } else { 0.0 });
-        let qr = damped.qr();
-        let hat = qr.r().solve_upper_triangular(&(qr.q().transpose() * right))?;
-        let whole = hat.zip_map(scales, |hat, scale| hat / scale);
+    /// Lengthens the units by which columns are measured.
+    fn measure(&mut self, jacobian: &DMatrix<f64>) {
+        self.lengths.resize(jacobian.ncols(), 0.0);
+        for (length, column) in self.lengths.iter_mut().zip(jacobian.column_iter()) {
+            *length = length.max(column.norm());
+        }
+    }
+
+    /// The step within the radius, its length, and the reduction of the sum of squares that it predicts.
+    fn step(&mut self, at: &Squares) -> Option<(DVector<f64>, f64, f64)> {
+        let lengths: Vec<f64> =
+            self.lengths.iter().map(|&l| if l > 0.0 { l } else { 1.0 }).collect();
+        let linear = Linear::of(at, &lengths)?;
+        if self.radius.is_nan() {
+            self.radius = linear.damped(self.damping).norm();
+        }
+        let hat = linear.within(self.radius);
+        let whole = DVector::from_fn(hat.len(), |k, _| hat[k] / lengths[k]);
         let cut = whole.iter().zip(&self.limits).fold(1.0, |cut: f64, (step, limit)| {
             if step.abs() > *limit { cut.min(limit / step.abs()) } else { cut }
         });
         let delta = whole * cut;
         let linear = &at.jacobian * &delta + &at.residuals;
-        Some((delta, at.sum() - linear.norm_squared()))
+        Some((delta, hat.norm() * cut, at.sum() - linear.norm_squared()))
     }
-}
-
-/// The lengths of the columns; those of a column of zeros are 1.
-fn lengths(jacobian: &DMatrix<f64>) -> DVector<f64> {
-    DVector::from_fn(jacobian.ncols(), |j, _| {
-        let length = jacobian.column(j).norm();
-        if length > 0.0 { length } else { 1.0 }
-    })
 }
 
 impl<O: LeastSquares> Solver<O, Iteration> for LevenbergMarquardt {
@@ -168,10 +175,9 @@ impl<O: LeastSquares> Solver<O, Iteration> for LevenbergMarquardt {
         if at.cosine() <= self.cosine || sum == 0.0 {
             return Ok((keep(state, whole, here).terminate_with(converged), None));
         }
-        let scales = lengths(&at.jacobian);
-        let Some((delta, predicted)) = self.step(&at, &scales, self.damping) else {
-            self.damping *= 10.0;
-            return Ok((keep(state, whole, here), None));
+        self.measure(&at.jacobian);
+        let Some((delta, length, predicted)) = self.step(&at) else {
+            return Err(Error::msg("the Jacobian has no singular values"));
         };
         let is_rounding = here
             .iter()
@@ -183,17 +189,19 @@ impl<O: LeastSquares> Solver<O, Iteration> for LevenbergMarquardt {
         let there: Vec<f64> =
             here.iter().zip(delta.iter()).map(|(phi, delta)| phi + delta).collect();
         let next = evaluate(problem, &there)?;
-        let kv = argmin::kv!("damping" => self.damping;);
-        let (slow, patience) = SLOW;
-        let is_near = |next: &Squares| (next.sum() - sum).abs() <= slow * sum;
+        let kv = argmin::kv!("radius" => self.radius;);
+        let is_near = |next: &Squares| (next.sum() - sum).abs() <= SLOW.0 * sum;
         self.stalled = if next.as_ref().is_some_and(is_near) { self.stalled + 1 } else { 0 };
-        let has_stalled = self.stalled >= patience;
+        let has_stalled = self.has_stalled();
         match next.filter(|next| next.sum() < sum) {
             Some(next) => {
                 let (after, reduction) = (next.sum(), sum - next.sum());
                 let ratio = reduction / predicted;
-                // Nielsen's rule, which changes λ smoothly.
-                self.damping *= (1.0 - (2.0 * ratio - 1.0).powi(3)).clamp(0.1, 2.0);
+                if ratio < POOR.0 {
+                    self.radius = POOR.1 * length;
+                } else if ratio > GOOD.0 {
+                    self.radius = self.radius.max(GOOD.1 * length);
+                }
                 let is_over = has_stalled
                     || (reduction <= self.reduction * sum && predicted <= self.reduction * sum);
                 let state = state
@@ -205,10 +213,9 @@ impl<O: LeastSquares> Solver<O, Iteration> for LevenbergMarquardt {
                 Ok((state, Some(kv)))
             }
             None => {
-                self.damping *= 10.0;
+                self.radius = POOR.1 * length;
                 let state = keep(state, whole, here);
-                let stuck = has_stalled || self.damping > LARGEST;
-                Ok((if stuck { state.terminate_with(converged) } else { state }, Some(kv)))
+                Ok((if has_stalled { state.terminate_with(converged) } else { state }, Some(kv)))
             }
         }
     }
@@ -248,6 +255,56 @@ mod tests {
                 (DVector::from_fn(20, residual), DMatrix::from_fn(20, 2, slope));
             Some(Squares { residuals, jacobian })
         }
+    }
+
+    /// Problems with narrow valleys (Moré, Garbow and Hillstrom 1981), with the evaluations that they take.
+    #[test]
+    fn valleys_are_followed() {
+        /// The residuals and the rows of their derivatives.
+        type Rows = (Vec<f64>, Vec<f64>);
+        struct Problem(fn(&[f64]) -> Rows);
+        impl LeastSquares for Problem {
+            fn squares(&self, x: &[f64]) -> Option<Squares> {
+                let (r, j) = self.0(x);
+                let jacobian = DMatrix::from_row_slice(r.len(), x.len(), &j);
+                Some(Squares { residuals: DVector::from_vec(r), jacobian })
+            }
+        }
+        fn meyer(x: &[f64]) -> Rows {
+            const Y: [f64; 16] = [
+                34780.0, 28610.0, 23650.0, 19630.0, 16370.0, 13720.0, 11540.0, 9744.0, 8261.0,
+                7030.0, 6005.0, 5147.0, 4427.0, 3820.0, 3307.0, 2872.0,
+            ];
+            let (mut r, mut j) = (Vec::new(), Vec::new());
+            for (i, y) in Y.iter().enumerate() {
+                let t = 50.0 + 5.0 * i as f64 + x[2];
+                let e = (x[1] / t).exp();
+                r.push(x[0] * e - y);
+                j.extend([e, x[0] * e / t, -x[0] * e * x[1] / (t * t)]);
+            }
+            (r, j)
+        }
+        let rosenbrock = |x: &[f64]| {
+            let r = vec![10.0 * (x[1] - x[0] * x[0]), 1.0 - x[0]];
+            (r, vec![-20.0 * x[0], 10.0, -1.0, 0.0])
+        };
+        // An unknown of 10⁶ whose column is 10⁻⁶ of the residuals: units do not matter.
+        let brown = |x: &[f64]| {
+            let r = vec![x[0] - 1e6, x[1] - 2e-6, x[0] * x[1] - 2.0];
+            (r, vec![1.0, 0.0, 0.0, 1.0, x[1], x[0]])
+        };
+        let count = |name: &str, problem: Problem, x: &[f64], least: f64, most: u64| {
+            let found = Executor::new(problem, LevenbergMarquardt::default())
+                .configure(|state| state.param(x.to_vec()).max_iters(400))
+                .run()
+                .unwrap();
+            let (sum, runs) = (found.state().get_best_cost(), found.problem.counts["squares"]);
+            println!("{name}: {sum:.6e} after {runs} evaluations");
+            assert!(sum <= least && runs <= most, "{name}: {sum:e} after {runs}");
+        };
+        count("Rosenbrock", Problem(rosenbrock), &[-1.2, 1.0], 1e-20, 30);
+        count("Brown", Problem(brown), &[1.0, 1.0], 1e-20, 30);
+        count("Meyer", Problem(meyer), &[0.02, 4000.0, 250.0], 87.95, 200);
     }
 
     #[test]

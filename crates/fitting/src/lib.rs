@@ -11,12 +11,14 @@
 //! |---|---|
 //! | [`error`](mod@error) | [`FitError`]: why there is no fit |
 //! | [`least_squares`] | [`LeastSquares`]: residuals and their Jacobian, from one run |
+//! | `trust_region` | the best step of a linear model within a trust region |
 //! | [`levenberg_marquardt`] | [`LevenbergMarquardt`]: a solver for argmin's executor |
 //! | [`unknowns`] | which parameters are free, and which are fitted by their logarithm |
 //! | [`covariance`] | standard errors and correlations from a Jacobian |
 //! | [`fitted`] | [`Fitted`]: the result, which prints what the data say |
 //! | `model` | the residuals of a family of systems |
 //! | [`fit`](mod@fit) | [`Fit`]: what a user says of a fit |
+//! | [`loss`](mod@loss) | [`Loss`]: a loss over runs with its gradient, for argmin's L-BFGS |
 
 pub mod covariance;
 pub mod error;
@@ -24,11 +26,14 @@ pub mod fit;
 pub mod fitted;
 pub mod least_squares;
 pub mod levenberg_marquardt;
+pub mod loss;
 mod model;
+mod trust_region;
 pub mod unknowns;
 
 pub use error::FitError;
 pub use fit::{Fit, FitBuilder};
-pub use fitted::{Estimate, Fitted};
+pub use fitted::{Ending, Estimate, Fitted};
 pub use least_squares::{LeastSquares, Squares};
 pub use levenberg_marquardt::LevenbergMarquardt;
+pub use loss::{Loss, LossOver, Minimised};

@@ -28,6 +28,15 @@ pub(crate) struct Measured<const K: usize> {
     pub(crate) noise: [f64; K],
 }
 
+impl<const K: usize> Measured<K> {
+    /// The mean square of the data in units of the noise.
+    pub(crate) fn mean_square(&self) -> f64 {
+        let squares = self.rows.iter().flat_map(|row| row.iter().zip(&self.noise));
+        let sum: f64 = squares.map(|(number, noise)| (number / noise).powi(2)).sum();
+        sum / (self.rows.len() * K) as f64
+    }
+}
+
 /// The residuals `(o(x(t_i; θ)) − data_i)/σ` of a run.
 pub(crate) struct Model<'a, Y: Parametrised<P>, M, F, const P: usize, const K: usize> {
     pub(crate) family: &'a Y,

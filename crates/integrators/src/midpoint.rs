@@ -14,12 +14,9 @@
 //!    method ends near the prediction and are quartered where it does not. At most 200 increments, and
 //!    none below 10⁻⁴ of the size reached: there the solution has turned back, or has met the edge of the
 //!    domain.
-//! 4. **The globaliser**, 100 iterations of argmin's L-BFGS on `½|F(u)|²` from the best point of 1 and 2,
-//!    then Newton's method from where it ends (with the feature `argmin`). What it finds is a solution,
-//!    with both laws, but it may be another one than that of 3.
-//! 5. **Halves**: the step is taken as two of half the size, each by 1 and 2 alone, and each that
+//! 4. **Halves**: the step is taken as two of half the size, each by 1 and 2 alone, and each that
 //!    fails is halved again, [`Scheme::splits`] times at most. Both laws hold for each part.
-//! 6. [`StepError`](crate::StepError): `OutOfDomain` if in the smallest part the edge of a domain is in Newton's way,
+//! 5. [`StepError`](crate::StepError): `OutOfDomain` if in the smallest part the edge of a domain is in Newton's way,
 //!    `DependentInvariants` if it starts where a further invariant depends on the other fields, otherwise
 //!    `NotConverged`; the first and the last with all that was tried.
 //!
@@ -30,8 +27,6 @@
 
 mod equation;
 mod fallbacks;
-#[cfg(feature = "argmin")]
-mod globaliser;
 mod jacobian;
 mod level;
 mod memory;

@@ -40,9 +40,10 @@
 //!
 //! # Limits
 //!
-//! The error of the law is `O((h|K'|)²)`, and friction that is faster than a step is an error of the run
-//! ([`NoiseError::FrictionUnresolved`]). Stationary is not ergodic: with few noise fields, or an energy shell in
-//! several pieces, one path does not visit the whole shell.
+//! The error of the law is `O((h|K'|)²)` at best. Each step measures `h|K'|` along the way of its noise fields, by which
+//! explicit methods know it too. A run on which it exceeds 1 on more than a few steps ends in
+//! [`NoiseError::FrictionUnresolved`]; rare steps are a line of the certificate. Stationary is not ergodic: with few noise
+//! fields, or an energy shell in several pieces, one path does not visit the whole shell.
 
 mod builder;
 mod closed;

@@ -4,7 +4,7 @@ use metriplectic_dynamics::SecondLaw;
 use metriplectic_dynamics::invariants::Kind;
 use metriplectic_fields::{Column, Space};
 use metriplectic_integrators::explicit::{Projected, ProjectionError, Target};
-use metriplectic_integrators::{Flow, FlowError, Laws, Recheck, StageFlow};
+use metriplectic_integrators::{Flow, FlowError, Laws, Recheck, StageFlow, Vector as _};
 use metriplectic_manifolds::{Manifold, PointError};
 
 use crate::gather::Gather;
@@ -240,7 +240,6 @@ impl<P: Model> Flow for Lattice<P> {
         end: &Points<P::Manifold>,
         h: f64,
     ) -> Option<SiteVector> {
-        use metriplectic_integrators::Vector as _;
         let q = self.displacement(x, end)?;
         let (start, there) = (self.rates(x, &q.zero())?, self.rates(x, &q)?);
         let middle = SiteVector::zip([&q, &there, &start], |[q, there, start]| {
@@ -265,6 +264,12 @@ impl<P: Model> StageFlow for Lattice<P> {
         gradients.laws()
     }
 
+    fn entropy_round_off_of(&self, gradients: &Self::Gradients) -> Option<f64> {
+        let Totals { entropy, entropy_slope, .. } = &gradients.totals;
+        let size = entropy.size + entropy_slope;
+        (!P::EntropyGather::PRESENT).then_some(4.0 * f64::EPSILON * size)
+    }
+
     fn velocity(
         &self,
         x: &Points<P::Manifold>,
@@ -286,12 +291,39 @@ impl<P: Model> StageFlow for Lattice<P> {
         })
     }
 
+    fn stage_along<'a>(
+        &self,
+        x: &Points<P::Manifold>,
+        (h, count): (f64, usize),
+        term: impl Fn(usize) -> (f64, &'a SiteVector),
+        coordinates: Option<&mut SiteVector>,
+    ) -> Option<(SiteVector, f64)> {
+        let keep = coordinates.is_some() || !P::Manifold::RATES_ARE_VELOCITIES;
+        let (y, q) = match SiteVector::terms(count, &term) {
+            Some(terms) => self.stage_at(x, h, &terms, keep)?,
+            None => {
+                let q = SiteVector::combination(h, count, term);
+                (self.stage(x, &q)?, Some(q))
+            }
+        };
+        let (v, production) = self.motion(&y)?;
+        let Some(q) = q else { return Some((v, production)) };
+        let rates = self.stage_rates(x, (&q, &y), &v);
+        if let Some(coordinates) = coordinates {
+            *coordinates = q;
+        }
+        Some((rates, production))
+    }
+
     fn stage_rates(
         &self,
         x: &Points<P::Manifold>,
         (q, y): (&SiteVector, &Points<P::Manifold>),
         v: &SiteVector,
     ) -> SiteVector {
+        if P::Manifold::RATES_ARE_VELOCITIES {
+            return v.clone();
+        }
         let [q, v] = [q.reader(), v.reader()];
         self.vector_of(|site| {
             P::Manifold::stage_rates(&x[site], (&q.at(site), &y[site]), &v.at(site))
@@ -300,6 +332,18 @@ impl<P: Model> StageFlow for Lattice<P> {
 
     fn stage_coordinates(&self, x: &Points<P::Manifold>, y: &Points<P::Manifold>) -> SiteVector {
         self.vector_of(|site| P::Manifold::stage_coordinates(&x[site], &y[site]))
+    }
+
+    fn stage_rounding(
+        &self,
+        x: &Points<P::Manifold>,
+        (q, y): (&SiteVector, &Points<P::Manifold>),
+    ) -> SiteVector {
+        let (x, q, y) = (&**x, q.reader(), &**y);
+        self.vector_of(|site| {
+            let reached = P::Manifold::stage_coordinates(&x[site], &y[site]);
+            q.at::<VectorOf<P>>(site) - reached
+        })
     }
 
     fn weighs_errors(&self) -> bool {

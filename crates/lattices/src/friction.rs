@@ -4,7 +4,7 @@ use metriplectic_fields::Column;
 
 use crate::Onsager;
 use crate::error::{LatticeError, Place, Tried};
-use crate::lattice::{Lattice, differentials_at};
+use crate::lattice::{Differentials, Lattice, differentials_at};
 use crate::model::{Model, VectorOf};
 use crate::parallel;
 use crate::points::Points;
@@ -63,7 +63,7 @@ impl<P: Model> Lattice<P> {
     pub(crate) fn each_term(
         &self,
         x: &Points<P::Manifold>,
-        all: &[f64],
+        all: &Differentials,
         check: impl Fn(&Term) -> Result<(), LatticeError> + Sync,
     ) -> Result<(), LatticeError> {
         let first = self.terms_of_chunks(x, all, |first: &mut Option<LatticeError>, term| {
@@ -78,7 +78,7 @@ impl<P: Model> Lattice<P> {
     pub(crate) fn terms_of_chunks<R: Default + Send>(
         &self,
         x: &Points<P::Manifold>,
-        all: &[f64],
+        all: &Differentials,
         visit: impl Fn(&mut R, Term) + Sync,
     ) -> Vec<R> {
         let mut results = parallel::map(self.sites(), |sites| {
@@ -102,7 +102,7 @@ impl<P: Model> Lattice<P> {
         &self,
         site: usize,
         x: &Points<P::Manifold>,
-        all: &[f64],
+        all: &Differentials,
         mut visit: impl FnMut(Term),
     ) {
         let [w, s] = differentials_at::<P>(all, site);
@@ -116,7 +116,7 @@ impl<P: Model> Lattice<P> {
         &self,
         bond: usize,
         x: &Points<P::Manifold>,
-        all: &[f64],
+        all: &Differentials,
         mut visit: impl FnMut(Term),
     ) {
         let [i, j] = self.layout.bonds()[bond].map(|site| site as usize);

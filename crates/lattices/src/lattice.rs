@@ -1,20 +1,24 @@
 //! A lattice, and its loops over sites and bonds.
 
+mod at_sites;
 mod differentials;
 
 use std::fmt;
+use std::sync::atomic::AtomicBool;
 
 use metriplectic_fields::{Column, Dimension, Space, Vector};
 use metriplectic_manifolds::Manifold;
 
+use crate::blocks::{self, Room, combine};
 use crate::double::Double;
 use crate::layout::Layout;
 use crate::model::{Model, PointOf, VectorOf};
 use crate::neighbours::Shared;
-use crate::parallel;
+use crate::parallel::{self, CHUNK};
 use crate::points::Points;
 use crate::pool::{Buffer, Pool};
 use crate::vector::{Reader, SiteVector};
+pub(crate) use at_sites::{AtSites, Differentials, differentials_at};
 pub(crate) use differentials::Given;
 
 /// Points of a manifold at the sites of a graph, with energies of sites and bonds, an entropy of sites, and friction
@@ -34,6 +38,8 @@ pub struct Lattice<P> {
     both_slots: Pool<f64>,
     /// Arrays with two numbers for each site, and with a number for each slot.
     sums: [Pool<f64>; 2],
+    /// Whether the differential of the entropy was seen to differ from site to site.
+    entropy_differs: AtomicBool,
 }
 
 // By hand, because closures have no `Debug`.
@@ -50,28 +56,6 @@ impl<P: Model> fmt::Debug for Lattice<P> {
 /// The dimension of a site.
 pub(crate) const fn dimension<P: Model>() -> usize {
     <<P::Manifold as Space>::Dim as Dimension>::LEN
-}
-
-/// The numbers of a site among the differentials.
-pub(crate) const fn width<P: Model>() -> usize {
-    if P::ENTROPY { 2 * dimension::<P>() } else { dimension::<P>() }
-}
-
-/// The differentials of energy and entropy at each site.
-pub(crate) type Differentials = Buffer<f64>;
-
-/// The differentials of energy and entropy at a site.
-#[inline]
-pub(crate) fn differentials_at<P: Model>(all: &[f64], site: usize) -> [VectorOf<P>; 2] {
-    let start = site * width::<P>();
-    let numbers = &all[start..start + width::<P>()];
-    let energy = VectorOf::<P>::from_index(|k| numbers[k]);
-    let entropy = if P::ENTROPY {
-        VectorOf::<P>::from_index(|k| numbers[dimension::<P>() + k])
-    } else {
-        VectorOf::<P>::zero()
-    };
-    [energy, entropy]
 }
 
 /// A sum over the lattice, and the sum of the sizes of its terms.
@@ -99,6 +83,10 @@ impl Total {
 pub(crate) struct Totals<V> {
     pub(crate) energy: Total,
     pub(crate) entropy: Total,
+    /// `Σ |∂S x|` over the entries of all sites, for an entropy of sites alone.
+    pub(crate) entropy_slope: f64,
+    /// Whether the differential of the entropy was seen to differ between sites.
+    pub(crate) entropy_differs: bool,
     /// Those of the conserved sums.
     pub(crate) sums: Vec<Total>,
     pub(crate) sizes: V,
@@ -107,12 +95,16 @@ pub(crate) struct Totals<V> {
 impl<V: Column<f64>> Totals<V> {
     fn new(sums: usize) -> Self {
         let [energy, entropy] = [Total::default(); 2];
-        Self { energy, entropy, sums: vec![Total::default(); sums], sizes: V::zero() }
+        let sums = vec![Total::default(); sums];
+        let sizes = V::zero();
+        Self { energy, entropy, entropy_slope: 0.0, entropy_differs: false, sums, sizes }
     }
 
     fn merge(mut self, other: &Self) -> Self {
         self.energy.merge(&other.energy);
         self.entropy.merge(&other.entropy);
+        self.entropy_slope += other.entropy_slope;
+        self.entropy_differs |= other.entropy_differs;
         self.sums.iter_mut().zip(&other.sums).for_each(|(sum, part)| sum.merge(part));
         self.sizes = larger(&self.sizes, &other.sizes);
         self
@@ -136,16 +128,20 @@ impl<V: Column<f64>> Shared for Totals<V> {
             let [hi, lo] = sum.parts();
             [hi, lo, size]
         });
-        numbers.chain((0..V::LEN).map(|k| self.sizes[k])).collect()
+        let sizes = (0..V::LEN).map(|k| self.sizes[k]);
+        numbers.chain(sizes).chain([self.entropy_slope]).collect()
     }
 
     fn of_list(&self, list: &[f64]) -> Self {
         let total =
             |k: usize| Total { sum: Double::of_parts([list[k], list[k + 1]]), size: list[k + 2] };
-        let sizes = list.len() - V::LEN;
+        let slope = list.len() - 1;
+        let sizes = slope - V::LEN;
         Self {
             energy: total(0),
             entropy: total(3),
+            entropy_slope: list[slope],
+            entropy_differs: self.entropy_differs,
             sums: (0..self.sums.len()).map(|k| total(6 + 3 * k)).collect(),
             sizes: V::from_index(|k| list[sizes + k]),
         }
@@ -162,7 +158,8 @@ impl<P: Model> Lattice<P> {
         let [vectors, differentials, slots, both_slots, at_sites, in_slots] =
             std::array::from_fn(|_| Pool::default());
         let sums = [at_sites, in_slots];
-        Self { parts, layout, vectors, differentials, slots, both_slots, sums }
+        let entropy_differs = AtomicBool::new(false);
+        Self { parts, layout, vectors, differentials, slots, both_slots, sums, entropy_differs }
     }
 
     /// Gives up the arrays that were used before a run and are used no more.
@@ -189,7 +186,12 @@ impl<P: Model> Lattice<P> {
 
     /// The velocity `v = Π w + Σ K s` at each site and the total production `Σ ρ (b·s)²`; `None` if a term is not a
     /// number.
-    pub(crate) fn motion_along(&self, x: &[PointOf<P>], all: &[f64]) -> Option<(SiteVector, f64)> {
+    pub(crate) fn motion_along(
+        &self,
+        x: &[PointOf<P>],
+        all: &Differentials,
+    ) -> Option<(SiteVector, f64)> {
+        let all = all.reader::<P>();
         let mut v = self.vectors.numbers(self.sites() * dimension::<P>());
         let bonds = self.layout.bonds();
         let given = if P::BOND_FRICTION { Given::Vector } else { Given::Nothing };
@@ -197,7 +199,7 @@ impl<P: Model> Lattice<P> {
             // The second sum is not a number if a term is not finite.
             let (mut production, mut probe) = (0.0, 0.0);
             for site in part.sites.clone() {
-                let [w, s] = differentials_at::<P>(all, site);
+                let [w, s] = all.at(site);
                 let mut v = self.parts.reversible(&x[site], &w, &s);
                 self.parts.site_friction(site, &x[site], [&w, &s], |term| {
                     let force = term.b.dot(&s);
@@ -211,7 +213,7 @@ impl<P: Model> Lattice<P> {
                 for bond in part.bonds.clone() {
                     let ends = bonds[bond];
                     let [i, j] = ends.map(|site| site as usize);
-                    let [[wi, si], [wj, sj]] = [i, j].map(|site| differentials_at::<P>(all, site));
+                    let ([wi, si], [wj, sj]) = (all.at(i), all.at(j));
                     let mut v = [VectorOf::<P>::zero(); 2];
                     self.parts.bond_friction(
                         bond,
@@ -280,6 +282,51 @@ impl<P: Model> Lattice<P> {
             })
         });
         all.into_iter().all(|inside| inside).then_some(y)
+    }
+
+    /// The points `ψ_x(q)` of a stage at `q = h Σ_j w_j v_j`, in one pass, and `q` if it is to be kept; `None` if one of
+    /// them is outside.
+    pub(crate) fn stage_at(
+        &self,
+        x: &Points<P::Manifold>,
+        h: f64,
+        terms: &[(f64, &[f64])],
+        keep: bool,
+    ) -> Option<(Points<P::Manifold>, Option<SiteVector>)> {
+        let (n, manifold) = (dimension::<P>(), self.parts.manifold());
+        let (x, mut y) = (&**x, x.like());
+        let mut kept = if keep {
+            self.vectors.numbers(self.sites() * n)
+        } else {
+            self.vectors.adopt(Vec::new())
+        };
+        let mut rest = &mut *kept;
+        let work = y.chunks_mut(CHUNK).enumerate().map(|(chunk, y)| {
+            let own = if keep { y.len() * n } else { 0 };
+            let (own, after) = std::mem::take(&mut rest).split_at_mut(own);
+            rest = after;
+            (chunk * CHUNK, y, own)
+        });
+        let inside = parallel::each(work, |(first, y, kept)| {
+            let mut room = Room::of(n);
+            let mut inside = true;
+            for block in blocks::blocks(0..y.len(), n) {
+                let numbers = block.start * n..block.end * n;
+                let q = if keep { &mut kept[numbers] } else { room.numbers(numbers.len()) };
+                let site = first + block.start;
+                combine(q, site * n, h, terms);
+                let points = x[site..site + block.len()].iter().zip(&mut y[block]);
+                for ((x, y), q) in points.zip(q.chunks_exact(n)) {
+                    let q = VectorOf::<P>::from_index(|k| q[k]);
+                    inside &= P::Manifold::is_stage(&q);
+                    *y = P::Manifold::stage(x, &q);
+                    inside &= manifold.is_inside(y);
+                }
+            }
+            inside
+        });
+        let inside = inside.into_iter().all(|inside| inside);
+        inside.then(|| (y, keep.then(|| self.vector(kept))))
     }
 
     /// A vector for each site.

@@ -248,6 +248,11 @@ impl Layout {
         parallel::top(parallel::nodes(all.into_iter(), &merge), merge)
     }
 
+    /// Whether it has all of the graph.
+    pub(crate) fn is_whole(&self) -> bool {
+        self.neighbours.count() == 1
+    }
+
     /// The bonds, in the order in which they are evaluated.
     pub(crate) fn bonds(&self) -> &[[u32; 2]] {
         &self.bonds

@@ -31,6 +31,7 @@
 //! | [`flow`] | a lattice as a flow for the explicit methods |
 //! | [`error`](mod@error) | [`LatticeError`]: what can be wrong, with the site or bond |
 
+mod blocks;
 pub mod builder;
 mod double;
 pub mod error;

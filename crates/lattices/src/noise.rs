@@ -180,6 +180,31 @@ impl<P: Model<Manifold: Flat>> Fluctuating<Uniform> for Lattice<P> {
         self.added(at, of)
     }
 
+    fn friction(&self, x: &Points<P::Manifold>) -> Option<SiteVector> {
+        let (all, _) = self.differentials::<false>(x);
+        let at = |site: usize| {
+            let [w, s] = differentials_at::<P>(&all, site);
+            let mut sum = VectorOf::<P>::zero();
+            self.parts.site_friction(site, &x[site], [&w, &s], |Onsager { rate, b }| {
+                sum += b * (rate * b.dot(&s));
+            });
+            sum
+        };
+        let of = |bond: usize| {
+            let [i, j] = self.layout.bonds()[bond].map(|site| site as usize);
+            let [[wi, si], [wj, sj]] = [i, j].map(|site| differentials_at::<P>(&all, site));
+            let mut sum = [VectorOf::<P>::zero(); 2];
+            let w = [[&wi, &si], [&wj, &sj]];
+            self.parts.bond_friction(bond, [&x[i], &x[j]], w, |Onsager { rate, b }| {
+                let size = rate * (b[0].dot(&si) + b[1].dot(&sj));
+                sum[0] += b[0] * size;
+                sum[1] += b[1] * size;
+            });
+            sum
+        };
+        self.added(at, of)
+    }
+
     fn has_drift(&self, _: usize, _: &Noise<Uniform>) -> bool {
         true
     }

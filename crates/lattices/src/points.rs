@@ -2,6 +2,7 @@
 
 use std::marker::PhantomData;
 use std::ops::{Deref, DerefMut};
+use std::sync::Arc;
 
 use metriplectic_integrators::StateSpace;
 use metriplectic_manifolds::Manifold;
@@ -22,21 +23,21 @@ impl<M: Manifold> StateSpace for Sites<M> {
 }
 
 /// A point for each site, in the order of the sites; made by [`Lattice::points`](crate::Lattice::points). It is a
-/// slice of points.
+/// slice of points. Copies share their points until one is changed.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Points<M: Manifold>(Buffer<M::Point<f64>>);
+pub struct Points<M: Manifold>(Arc<Buffer<M::Point<f64>>>);
 
 impl<M: Manifold> Points<M> {
     /// As many points, which mean nothing yet.
     pub(crate) fn like(&self) -> Self {
-        Self(self.0.pool().take(self.len(), || self.to_vec()))
+        Self(Arc::new(self.0.pool().take(self.len(), || self.to_vec())))
     }
 }
 
 /// Points that come from elsewhere.
 impl<M: Manifold> From<Vec<M::Point<f64>>> for Points<M> {
     fn from(points: Vec<M::Point<f64>>) -> Self {
-        Self(Pool::default().adopt(points))
+        Self(Arc::new(Pool::default().adopt(points)))
     }
 }
 
@@ -52,6 +53,6 @@ impl<M: Manifold> Deref for Points<M> {
 impl<M: Manifold> DerefMut for Points<M> {
     #[inline]
     fn deref_mut(&mut self) -> &mut Self::Target {
-        &mut self.0
+        &mut *Arc::make_mut(&mut self.0)
     }
 }

@@ -12,14 +12,13 @@
 //! has fewer freedoms than there are laws, all `ω_i` are 1.
 
 use metriplectic_fields::{Column, Space};
-use metriplectic_integrators::Vector as _;
 use metriplectic_integrators::explicit::{Projected, ProjectionError, Target};
 use metriplectic_manifolds::Manifold;
 
 use crate::flow::LatticeJets;
 use crate::gram::{Gram, Law, Normals};
-use crate::lattice::{Lattice, Total, differentials_at, dimension};
-use crate::model::{Model, VectorOf};
+use crate::lattice::{AtSites, Lattice, Total, dimension};
+use crate::model::{Model, PointOf, VectorOf};
 use crate::parallel;
 use crate::points::Points;
 use crate::vector::{Reader, larger};
@@ -37,6 +36,28 @@ const OFF: f64 = 0.8;
 const STAGNATED: f64 = 2.0;
 /// The same where no entropy is asked for.
 const CONSERVED: f64 = 64.0;
+
+/// The laws up to which loops over sites keep their numbers in registers.
+const FEW: usize = 4;
+
+/// How many laws there are: energy, further sums, entropy.
+const fn laws<P: Model>() -> usize {
+    1 + P::SUMS + if P::ENTROPY { 1 } else { 0 }
+}
+
+/// A place for the differentials of the laws at a site.
+#[inline]
+fn few_or_many<'a, P: Model>(
+    few: &'a mut [VectorOf<P>; FEW],
+    many: &'a mut Vec<VectorOf<P>>,
+) -> &'a mut [VectorOf<P>] {
+    if laws::<P>() <= FEW {
+        &mut few[..laws::<P>()]
+    } else {
+        many.resize(laws::<P>(), VectorOf::<P>::zero());
+        many
+    }
+}
 
 pub(crate) struct Projection<'a, P: Model> {
     pub(crate) lattice: &'a Lattice<P>,
@@ -72,7 +93,7 @@ impl<P: Model> Projection<'_, P> {
     pub(crate) fn from(&self, mut y: State<P>) -> Result<Projected<Lattice<P>>, ProjectionError> {
         let with_entropy = self.target.with_entropy;
         let mut moved = 0.0;
-        let mut best: Option<(f64, Projected<Lattice<P>>)> = None;
+        let mut best: Option<Best<P>> = None;
         let mut before = f64::INFINITY;
         let mut known: Option<(Gram, Weights<'_, VectorOf<P>>)> = None;
         for corrections in 0..=CORRECTIONS {
@@ -90,7 +111,7 @@ impl<P: Model> Projection<'_, P> {
             let off = if with_entropy { normals.off() / OFF } else { 0.0 };
             let enough = if corrections == 0 { SMALL } else { ENOUGH };
             if excess <= enough && off <= 1.0 {
-                return Ok(self.projected(&normals, y, jets));
+                return Ok(self.projected(normals.entropy(), y, jets));
             }
             let worst = excess.max(off);
             if before <= worst {
@@ -101,15 +122,16 @@ impl<P: Model> Projection<'_, P> {
             let coefficients = normals.correction(with_entropy);
             let next = self.corrected(&y, &jets, &coefficients, &weights);
             moved += next.length;
-            let limit = self.target.limit.map(|limit| self.length(limit, &jets));
+            let units = || self.lattice.same(&jets.totals.sizes);
+            let limit = self.target.limit.map(|limit| limit.relative_to(&units()));
             if !moved.is_finite() || limit.is_some_and(|limit| moved > limit) {
                 return Err(ProjectionError::Far);
             }
             if worst <= CONSERVED {
                 if next.length <= f64::EPSILON {
-                    return Ok(self.projected(&normals, y, jets));
+                    return Ok(self.projected(normals.entropy(), y, jets));
                 }
-                best = Some((worst, self.projected(&normals, y, jets)));
+                best = Some(Best { excess: worst, x: y, entropy: normals.entropy() });
             }
             y = next.points.ok_or(ProjectionError::Outside)?;
             known = Some((gram, weights));
@@ -117,27 +139,24 @@ impl<P: Model> Projection<'_, P> {
         self.stagnated(best)
     }
 
-    /// What becomes of the best state, if no correction improves it.
-    fn stagnated(
-        &self,
-        best: Option<(f64, Projected<Lattice<P>>)>,
-    ) -> Result<Projected<Lattice<P>>, ProjectionError> {
-        let failed = if self.target.with_entropy {
-            ProjectionError::NoEntropy
-        } else {
-            ProjectionError::Far
-        };
-        let most = if self.target.with_entropy { STAGNATED } else { CONSERVED };
-        best.filter(|(excess, _)| *excess <= most).map(|(_, state)| state).ok_or(failed)
+    /// Decides on the best state, if no correction improves it. Its differentials are evaluated anew, so that
+    /// corrections need not keep them.
+    #[cold]
+    fn stagnated(&self, best: Option<Best<P>>) -> Result<Projected<Lattice<P>>, ProjectionError> {
+        let with_entropy = self.target.with_entropy;
+        let failed = if with_entropy { ProjectionError::NoEntropy } else { ProjectionError::Far };
+        let most = if with_entropy { STAGNATED } else { CONSERVED };
+        let Best { x, entropy, .. } = best.filter(|best| best.excess <= most).ok_or(failed)?;
+        let jets = self.lattice.jets(&x);
+        Ok(self.projected(entropy, x, jets))
     }
 
     fn projected(
         &self,
-        normals: &Normals,
+        [residual, entropy_round_off]: [f64; 2],
         x: State<P>,
         gradients: Jets<P>,
     ) -> Projected<Lattice<P>> {
-        let [residual, entropy_round_off] = normals.entropy();
         let entropy = self.target.laws.entropy - residual;
         Projected { x, gradients, entropy, entropy_round_off }
     }
@@ -180,8 +199,9 @@ impl<P: Model> Projection<'_, P> {
     }
 
     /// The differentials of the laws at a site: energy, further sums, entropy.
-    fn covectors(&self, y: &State<P>, jets: &Jets<P>, site: usize, w: &mut [VectorOf<P>]) {
-        let [energy, entropy] = differentials_at::<P>(&jets.all, site);
+    #[inline]
+    fn covectors(&self, y: &[PointOf<P>], all: AtSites<'_, P>, site: usize, w: &mut [VectorOf<P>]) {
+        let [energy, entropy] = all.at(site);
         w[0] = energy;
         for k in 0..P::SUMS {
             w[1 + k] = self.lattice.parts.sum(k, site, &y[site]).df;
@@ -192,39 +212,47 @@ impl<P: Model> Projection<'_, P> {
     }
 
     fn gram(&self, y: &State<P>, jets: &Jets<P>, weights: &Weights<'_, VectorOf<P>>) -> Gram {
-        let laws = 1 + P::SUMS + usize::from(P::ENTROPY);
+        let laws = laws::<P>();
+        let (y, all) = (&**y, jets.all.reader::<P>());
         let sizes = &jets.totals.sizes;
         let parts = parallel::map(self.lattice.sites(), |sites| {
             let mut gram = Gram::new(laws);
-            let mut w = vec![VectorOf::<P>::zero(); laws];
+            let (mut few, mut many) = ([VectorOf::<P>::zero(); FEW], Vec::new());
+            let w = few_or_many::<P>(&mut few, &mut many);
+            let (mut slopes, mut products) = ([0.0; FEW], [0.0; FEW * FEW]);
+            let [slopes, products] = if laws <= FEW {
+                [&mut slopes[..laws], &mut products[..laws * laws]]
+            } else {
+                [&mut gram.slopes[..], &mut gram.products[..]]
+            };
             for site in sites {
-                self.covectors(y, jets, site, &mut w);
+                self.covectors(y, all, site, w);
                 let (weight, scales) = (weights.at(site), P::Manifold::scales(&y[site]));
-                for (a, w) in w.iter().enumerate() {
-                    gram.slopes[a] += w.abs().dot(&scales);
+                for (slope, w) in slopes.iter_mut().zip(&*w) {
+                    *slope += w.abs().dot(&scales);
                 }
                 if weight > 0.0 {
-                    for w in &mut w {
+                    for w in &mut *w {
                         for k in 0..dimension::<P>() {
                             w[k] *= sizes[k];
                         }
                     }
                     for a in 0..laws {
                         for b in 0..=a {
-                            gram.products[a * laws + b] += weight * w[a].dot(&w[b]);
+                            products[a * laws + b] += weight * w[a].dot(&w[b]);
                         }
                     }
                 }
+            }
+            if laws <= FEW {
+                let (slopes, products) = (slopes.to_vec(), products.to_vec());
+                gram.slopes = slopes;
+                gram.products = products;
             }
             gram
         });
         let gram = self.lattice.layout.sum(parts, |a, b| a.plus(&b));
         gram.unwrap_or_else(|| Gram::new(laws))
-    }
-
-    /// The length of a vector in units of the sizes of the entries: that of the largest site.
-    fn length(&self, v: &crate::vector::SiteVector, jets: &Jets<P>) -> f64 {
-        v.relative_to(&self.lattice.same(&jets.totals.sizes))
     }
 
     /// Moves the points by a combination of the differentials.
@@ -238,8 +266,10 @@ impl<P: Model> Projection<'_, P> {
         let sizes = &jets.totals.sizes;
         let manifold = self.lattice.parts.manifold();
         let mut points = y.like();
+        let (y, all) = (&**y, jets.all.reader::<P>());
         let parts = parallel::fill(&mut points, 1, |sites, out| {
-            let mut w = vec![VectorOf::<P>::zero(); coefficients.len()];
+            let (mut few, mut many) = ([VectorOf::<P>::zero(); FEW], Vec::new());
+            let w = few_or_many::<P>(&mut few, &mut many);
             let (mut length, mut inside) = (0.0, true);
             for (site, out) in sites.zip(out) {
                 let weight = weights.at(site);
@@ -247,7 +277,7 @@ impl<P: Model> Projection<'_, P> {
                     out.clone_from(&y[site]);
                     continue;
                 }
-                self.covectors(y, jets, site, &mut w);
+                self.covectors(y, all, site, w);
                 let mut u = VectorOf::<P>::zero();
                 for (w, &c) in w.iter().zip(coefficients) {
                     u += *w * c;
@@ -269,6 +299,15 @@ impl<P: Model> Projection<'_, P> {
         let length = (largest / dimension::<P>() as f64).sqrt();
         Corrected { points: inside.then_some(points), length }
     }
+}
+
+/// A state near the laws.
+struct Best<P: Model> {
+    /// Its largest residual, in units of round-off.
+    excess: f64,
+    x: State<P>,
+    /// The residual of its entropy, and the round-off of it.
+    entropy: [f64; 2],
 }
 
 /// A state that was moved.

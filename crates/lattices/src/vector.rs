@@ -1,14 +1,18 @@
 //! Numbers for the directions of a lattice.
 
+use std::ops::Range;
+use std::sync::Arc;
+
 use metriplectic_fields::Column;
 use metriplectic_integrators::Vector;
 
+use crate::blocks::{self, Room, combine};
 use crate::parallel;
 use crate::pool::{Buffer, Pool};
 
 /// A number for each direction at each site: one after the other, or the same ones at all sites.
 ///
-/// Sizes of entries are the same at all sites, and cost no memory.
+/// Sizes of entries are the same at all sites, and cost no memory. Copies share their numbers until one is changed.
 #[derive(Clone, Debug)]
 pub struct SiteVector {
     sites: usize,
@@ -21,7 +25,7 @@ pub struct SiteVector {
 enum Numbers {
     /// Those of one site, for all of them.
     Same(Vec<f64>),
-    Each(Buffer<f64>),
+    Each(Arc<Buffer<f64>>),
 }
 
 impl std::fmt::Debug for Pool<f64> {
@@ -38,7 +42,7 @@ pub(crate) struct Reader<'a> {
 }
 
 impl Reader<'_> {
-    #[inline]
+    #[inline(always)]
     pub(crate) fn at<V: Column<f64>>(&self, site: usize) -> V {
         let start = site * self.stride;
         let numbers = &self.numbers[start..start + V::LEN];
@@ -56,14 +60,15 @@ impl SiteVector {
     /// `stride` numbers for each site.
     pub(crate) fn each(sites: usize, stride: usize, numbers: Buffer<f64>) -> Self {
         let pool = numbers.pool().clone();
-        Self { sites, stride, numbers: Numbers::Each(numbers), pool }
+        Self { sites, stride, numbers: Numbers::Each(Arc::new(numbers)), pool }
     }
 
     /// Adds a vector at one site of numbers that each site has for itself.
     pub(crate) fn add_at<V: Column<f64>>(&mut self, site: usize, more: &V) {
         if let Numbers::Each(numbers) = &mut self.numbers {
             let start = site * self.stride;
-            for (k, number) in numbers[start..start + V::LEN].iter_mut().enumerate() {
+            let numbers = &mut Arc::make_mut(numbers)[start..start + V::LEN];
+            for (k, number) in numbers.iter_mut().enumerate() {
                 *number += more[k];
             }
         }
@@ -87,6 +92,72 @@ impl SiteVector {
             Numbers::Same(_) => None,
             Numbers::Each(numbers) => Some(numbers),
         }
+    }
+
+    /// The terms of a combination. A vector that is the same at all sites adds nothing but itself, and is rare: `None`.
+    pub(crate) fn terms<'a>(
+        count: usize,
+        term: impl Fn(usize) -> (f64, &'a Self),
+    ) -> Option<Vec<(f64, &'a [f64])>> {
+        (0..count).map(|j| Some((term(j).0, term(j).1.slice()?))).collect()
+    }
+
+    /// For each function of the numbers that vectors have at the same place, the root mean square over a site, and the
+    /// largest site.
+    fn norms<const K: usize, const M: usize>(
+        vectors: [&Self; K],
+        f: impl Fn([f64; K]) -> [f64; M] + Sync,
+    ) -> [f64; M] {
+        let stride = vectors[0].stride;
+        let mean = (stride as f64).recip();
+        let of = |sites: Range<usize>| {
+            let mut largest = [0.0; M];
+            let mut tiles: [Room; K] = std::array::from_fn(|_| Room::of(stride));
+            let mut rooms: [Room; M] = std::array::from_fn(|_| Room::of(stride));
+            let length = stride * blocks::sites_of(stride).min(sites.len());
+            let tiles: [&[f64]; K] = {
+                let mut slices = [&[][..]; K];
+                for ((tile, slice), v) in tiles.iter_mut().zip(&mut slices).zip(vectors) {
+                    if let Numbers::Same(numbers) = &v.numbers {
+                        let tile = tile.numbers(length);
+                        for site in tile.chunks_exact_mut(stride) {
+                            site.copy_from_slice(numbers);
+                        }
+                        *slice = tile;
+                    }
+                }
+                slices
+            };
+            for block in blocks::blocks(sites, stride) {
+                let (start, count) = (block.start * stride, block.len() * stride);
+                let mut slices = tiles;
+                for (slice, v) in slices.iter_mut().zip(vectors) {
+                    *slice = match v.slice() {
+                        Some(numbers) => &numbers[start..start + count],
+                        None => &slice[..count],
+                    };
+                }
+                let mut out = rooms.each_mut().map(|room| room.numbers(count));
+                for i in 0..count {
+                    let numbers = f(slices.map(|slice| slice[i]));
+                    for (out, number) in out.iter_mut().zip(numbers) {
+                        out[i] = number;
+                    }
+                }
+                for (largest, out) in largest.iter_mut().zip(out) {
+                    for site in out.chunks_exact(stride) {
+                        let sum = site.iter().fold(0.0, |sum, r| sum + r * r);
+                        *largest = larger(*largest, (sum * mean).sqrt());
+                    }
+                }
+            }
+            largest
+        };
+        let merge = |mut most: [f64; M], part: [f64; M]| {
+            most.iter_mut().zip(part).for_each(|(most, part)| *most = larger(*most, part));
+            most
+        };
+        parallel::map(vectors[0].sites, of).into_iter().fold([0.0; M], merge)
     }
 
     /// The root mean square of the ratios `v_i/s_i` at each site.
@@ -175,10 +246,7 @@ impl Vector for SiteVector {
         Self: 'a,
     {
         let first = term(0).1;
-        let terms: Vec<_> = (0..count).map(|j| (term(j).0, term(j).1.slice())).collect();
-        // A vector that is the same at all sites adds nothing but itself, and is rare.
-        let Some(terms) = terms.into_iter().map(|(w, v)| Some((w, v?))).collect::<Option<Vec<_>>>()
-        else {
+        let Some(terms) = Self::terms(count, &term) else {
             let w = term(0).0;
             let start = Self::zip([first], |[k]| w * k);
             let add = |sum, j| {
@@ -187,48 +255,26 @@ impl Vector for SiteVector {
             };
             return Self::zip([&(1..count).fold(start, add)], |[sum]| h * sum);
         };
-        first.filled(|start, out| {
-            let end = start + out.len();
-            let (w, v) = terms[0];
-            let last = if count == 1 { h } else { 1.0 };
-            for (out, v) in out.iter_mut().zip(&v[start..end]) {
-                *out = last * (w * v);
-            }
-            let mut left = &terms[1..];
-            while let Some((some, rest)) = left.split_first_chunk::<3>() {
-                add(
-                    out,
-                    some.map(|(w, v)| (w, &v[start..end])),
-                    if rest.is_empty() { h } else { 1.0 },
-                );
-                left = rest;
-            }
-            match left {
-                [] => {}
-                [(w, v)] => add(out, [(*w, &v[start..end])], h),
-                [(a, v), (b, w), ..] => add(out, [(*a, &v[start..end]), (*b, &w[start..end])], h),
-            }
-        })
+        first.filled(|start, out| combine(out, start, h, &terms))
     }
 
     /// The largest site, and the root mean square over the directions of a site. A mean over the sites would allow
     /// a pulse an error that grows with the length of the lattice around it.
     fn relative_to(&self, sizes: &Self) -> f64 {
-        let ratio = self.ratios(sizes);
-        let of = |range: std::ops::Range<usize>| range.map(&ratio).fold(0.0, larger);
-        parallel::map(self.sites, of).into_iter().fold(0.0, larger)
+        let ratio = |[v, s]: [f64; 2]| if v == 0.0 { 0.0 } else { (v / s).abs() };
+        Self::norm_of([self, sizes], ratio)
     }
 
     fn norm_of<const K: usize>(vectors: [&Self; K], f: impl Fn([f64; K]) -> f64 + Sync) -> f64 {
-        let (readers, stride) = (vectors.map(Self::reader), vectors[0].stride);
-        let mean = (stride as f64).recip();
-        let at = |site: usize| {
-            let number = |k| f(readers.map(|reader| reader.numbers[site * reader.stride + k]));
-            let sum = (0..stride).map(number).fold(0.0, |sum, r| sum + r * r);
-            (sum * mean).sqrt()
-        };
-        let of = |sites: std::ops::Range<usize>| sites.map(at).fold(0.0, larger);
-        parallel::map(vectors[0].sites, of).into_iter().fold(0.0, larger)
+        let [norm] = Self::norms(vectors, |numbers| [f(numbers)]);
+        norm
+    }
+
+    fn norms_of<const K: usize>(
+        vectors: [&Self; K],
+        f: impl Fn([f64; K]) -> [f64; 2] + Sync,
+    ) -> [f64; 2] {
+        Self::norms(vectors, f)
     }
 
     fn sites(&self) -> Option<usize> {
@@ -240,7 +286,7 @@ impl Vector for SiteVector {
         let none = Ranked { ratio: 0.0, site: None };
         let ratio = self.ratios(sizes);
         let ranked = |site| Ranked { ratio: ratio(site), site: Some(site) };
-        let of = |range: std::ops::Range<usize>| range.map(ranked).fold(none, ahead);
+        let of = |range: Range<usize>| range.map(ranked).fold(none, ahead);
         parallel::map(self.sites, of).into_iter().fold(none, ahead).site
     }
 
@@ -264,7 +310,7 @@ impl Vector for SiteVector {
             most
         };
         let zeros = || vec![0.0; self.stride];
-        let of = |sites: std::ops::Range<usize>| {
+        let of = |sites: Range<usize>| {
             let numbers = &numbers[sites.start * self.stride..sites.end * self.stride];
             numbers.chunks_exact(self.stride).fold(zeros(), largest)
         };
@@ -278,15 +324,6 @@ impl Vector for SiteVector {
             return Some(Self::same(self.sites, list.to_vec(), &self.pool));
         }
         (list.len() == self.len()).then(|| self.with(|i| list[i]))
-    }
-}
-
-/// Adds a few terms `w_j v_j`, one after the other, and multiplies by a factor, in one pass.
-#[inline]
-fn add<const K: usize>(out: &mut [f64], terms: [(f64, &[f64]); K], factor: f64) {
-    let terms = terms.map(|(w, v)| (w, &v[..out.len()]));
-    for (i, out) in out.iter_mut().enumerate() {
-        *out = factor * terms.iter().fold(*out, |sum, (w, v)| sum + w * v[i]);
     }
 }
 

@@ -12,7 +12,7 @@ use metriplectic_manifolds::Manifold;
 
 use crate::error::{LatticeError, Place, Tried};
 use crate::gather::Gather as _;
-use crate::lattice::{Lattice, Total, differentials_at, dimension};
+use crate::lattice::{Differentials, Lattice, Total, differentials_at, dimension};
 use crate::model::{Model, PairManifold, PointOf, VectorOf};
 use crate::parallel;
 use crate::points::Points;
@@ -279,7 +279,7 @@ impl<P: Model> Trial<'_, P> {
     }
 
     /// The derivatives of the functions of sites and bonds, and of the totals.
-    fn all_derivatives(&mut self, all: &[f64]) -> Result<(), LatticeError> {
+    fn all_derivatives(&mut self, all: &Differentials) -> Result<(), LatticeError> {
         let [sites, bonds] = [self.lattice.sites(), self.lattice.layout.bonds().len()];
         self.derivatives_of((samples(sites), samples(bonds)))?;
         self.total_derivatives(all)
@@ -386,7 +386,7 @@ impl<P: Model> Trial<'_, P> {
     }
 
     /// The derivative of the totals along one random direction.
-    fn total_derivatives(&mut self, all: &[f64]) -> Result<(), LatticeError> {
+    fn total_derivatives(&mut self, all: &Differentials) -> Result<(), LatticeError> {
         let Self { lattice, y, .. } = *self;
         let u: Vec<VectorOf<P>> = (0..lattice.sites()).map(|site| self.along(site)).collect();
         let moved = |t: f64| {
@@ -408,7 +408,7 @@ impl<P: Model> Trial<'_, P> {
     }
 
     /// The rates of the conserved sums.
-    fn conserved(&self, all: &[f64]) -> Result<(), LatticeError> {
+    fn conserved(&self, all: &Differentials) -> Result<(), LatticeError> {
         let Self { lattice, y, .. } = *self;
         let Some((v, _)) = lattice.motion_along(y, all) else { return Ok(()) };
         for index in 0..P::SUMS {

@@ -88,6 +88,8 @@ macro_rules! translations {
                 Column::from_index(|i| y[i] - x[i])
             }
 
+            const RATES_ARE_VELOCITIES: bool = true;
+
             /// The chart is a translation.
             #[inline]
             fn stage_rates(

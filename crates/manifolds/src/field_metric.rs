@@ -132,11 +132,11 @@ impl<M: Manifold, F: MatrixField<M>> Riemannian<M> for FieldMetric<F> {
     }
 }
 
-fn on_first_half(error: MetricError) -> MetricError {
+pub(crate) fn on_first_half(error: MetricError) -> MetricError {
     error.on_part(0.0, 0.5)
 }
 
-fn on_second_half(error: MetricError) -> MetricError {
+pub(crate) fn on_second_half(error: MetricError) -> MetricError {
     error.on_part(0.5, 0.5)
 }
 

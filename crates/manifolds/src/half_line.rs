@@ -62,6 +62,8 @@ impl Space for HalfLine {
         })
     }
 
+    const RATES_ARE_VELOCITIES: bool = true;
+
     /// The chart is a translation of the logarithm.
     #[inline]
     fn stage_rates(

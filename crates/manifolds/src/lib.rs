@@ -25,6 +25,7 @@
 //! | [`flat`] | metrics that are constant in a global chart, with straight geodesics: [`Metric::constant`] |
 //! | [`field_metric`] | a metric from a closure, with numerical geodesics: [`Metric::field`] |
 //! | [`product_metric`] | metrics on a product, factor by factor |
+//! | [`parametric_metric`] | [`ParametricMetric`]: a metric from a closure with parameters |
 //! | [`step_path`] | [`StepPath`]: the base point, the displacement and the end of a step |
 //! | [`retraction`] | [`Retraction`]: `R_h` and `R_h⁻¹` |
 //! | [`weyl_midpoint`] | [`WeylMidpoint`]: the symmetric one, order 2 |
@@ -57,6 +58,7 @@ pub mod metric_at;
 pub mod metric_error;
 pub mod moving_base;
 pub mod normal;
+pub mod parametric_metric;
 #[cfg(feature = "argmin")]
 mod path;
 pub mod product;
@@ -88,6 +90,7 @@ pub use metric::{GeodesicEnd, Riemannian};
 pub use metric_at::{MetricAt, MetricJet, MetricSlopes, Slopes};
 pub use metric_error::MetricError;
 pub use moving_base::MovingBase;
+pub use parametric_metric::ParametricMetric;
 pub use product::{Product, Times};
 pub use product_metric::Split;
 pub use projection::Projection;

@@ -146,6 +146,8 @@ impl<A: Times<B>, B: Space> Space for Product<A, B> {
         stack(&A::embed(&xa, &va), &B::embed(&xb, &vb))
     }
 
+    const RATES_ARE_VELOCITIES: bool = A::RATES_ARE_VELOCITIES && B::RATES_ARE_VELOCITIES;
+
     #[inline]
     fn stage((a, b): &Self::Point<f64>, q: &Vector<Self>) -> Self::Point<f64> {
         let (qa, qb) = Self::split(q);

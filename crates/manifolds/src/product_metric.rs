@@ -1,7 +1,8 @@
-//! Metrics on a product that are sums of metrics on the factors.
+//! Metrics on a product, factor by factor.
 
 use std::fmt;
 use std::marker::PhantomData;
+use std::ops::Deref;
 
 use metriplectic_fields::{ChartPoint, Dimension, Matrix, Real, Scalar, Space, Square, Vector};
 
@@ -12,18 +13,37 @@ use crate::{
     StepPathJet,
 };
 
-/// A metric on a product that is the sum of one on each factor.
+/// A metric on a product in which the factors are orthogonal: a metric on each factor, of which the left one may depend on the
+/// point of the right factor.
 pub trait Split<A: Times<B>, B: Space>: Riemannian<Product<A, B>> {
     /// The metric on the left factor.
     type Left: Riemannian<A>;
     /// The metric on the right factor.
     type Right: Riemannian<B>;
+    /// A pointer to the metric on the left factor.
+    type LeftRef<'a>: Deref<Target = Self::Left>
+    where
+        Self: 'a;
 
-    /// The metric on each factor.
-    fn halves(&self) -> (&Self::Left, &Self::Right);
+    /// The metric on the left factor, where the right one is at `y`.
+    fn left(&self, y: &B::Point<f64>) -> Self::LeftRef<'_>;
+
+    /// The metric on the right factor.
+    fn right(&self) -> &Self::Right;
+
+    /// Returns whether the metric is the sum of its parts: the left one does not depend on the right factor.
+    #[inline]
+    fn is_sum(&self) -> bool {
+        true
+    }
 
     /// The inner product on each factor.
     fn inner_halves<D: Scalar>(at: &Self::At<D>) -> InnerHalves<A, B, Self, D>;
+}
+
+/// The metric on each factor of a sum.
+trait Sum<A: Times<B>, B: Space>: Split<A, B> {
+    fn factors(&self) -> (&Self::Left, &Self::Right);
 }
 
 /// The inner products of a product metric on the factors.
@@ -37,7 +57,7 @@ pub type MetricHalves<'a, A, B, G, D> =
     (MetricAt<'a, A, <G as Split<A, B>>::Left, D>, MetricAt<'a, B, <G as Split<A, B>>::Right, D>);
 
 impl<'a, A: Times<B>, B: Space, G: Split<A, B>, D: Scalar> MetricAt<'a, Product<A, B>, G, D> {
-    /// Returns the metric of each factor at its part of the point.
+    /// Returns the metric of each factor at its part of the point, of which `left` is [`Split::left`].
     ///
     /// # Errors
     ///
@@ -45,25 +65,50 @@ impl<'a, A: Times<B>, B: Space, G: Split<A, B>, D: Scalar> MetricAt<'a, Product<
     #[inline]
     pub fn halves<'b>(
         &self,
-        x: &'b ChartPoint<A, D>,
-        y: &'b ChartPoint<B, D>,
+        left: &'b G::Left,
+        (x, y): (&'b ChartPoint<A, D>, &'b ChartPoint<B, D>),
     ) -> Result<MetricHalves<'b, A, B, G, D>, MetricError>
     where
         'a: 'b,
     {
-        let (left, right) = self.metric.halves();
         let (a, b) = G::inner_halves(self.inner()?);
-        Ok((MetricAt::known(left, x, a), MetricAt::known(right, y, b)))
+        Ok((MetricAt::known(left, x, a), MetricAt::known(self.metric.right(), y, b)))
+    }
+}
+
+impl<A: Times<B>, B: Space, G: Riemannian<A>, F: Riemannian<B>> Sum<A, B> for (G, F) {
+    #[inline]
+    fn factors(&self) -> (&G, &F) {
+        (&self.0, &self.1)
+    }
+}
+
+impl<A: Times<B>, B: Space> Sum<A, B> for Canonical
+where
+    Self: Riemannian<A> + Riemannian<B>,
+{
+    #[inline]
+    fn factors(&self) -> (&Self, &Self) {
+        (self, self)
     }
 }
 
 impl<A: Times<B>, B: Space, G: Riemannian<A>, F: Riemannian<B>> Split<A, B> for (G, F) {
     type Left = G;
     type Right = F;
+    type LeftRef<'a>
+        = &'a G
+    where
+        Self: 'a;
 
     #[inline]
-    fn halves(&self) -> (&G, &F) {
-        (&self.0, &self.1)
+    fn left(&self, _: &B::Point<f64>) -> &G {
+        &self.0
+    }
+
+    #[inline]
+    fn right(&self) -> &F {
+        &self.1
     }
 
     #[inline]
@@ -78,10 +123,16 @@ where
 {
     type Left = Self;
     type Right = Self;
+    type LeftRef<'a> = &'a Self;
 
     #[inline]
-    fn halves(&self) -> (&Self, &Self) {
-        (self, self)
+    fn left(&self, _: &B::Point<f64>) -> &Self {
+        self
+    }
+
+    #[inline]
+    fn right(&self) -> &Self {
+        self
     }
 
     #[inline]
@@ -94,9 +145,15 @@ where
 
 /// The inner products on the factors, as one on the product.
 pub struct Block<A, B, D, P, Q> {
-    left: P,
+    pub(crate) left: P,
     right: Q,
     factors: PhantomData<(A, B, D)>,
+}
+
+impl<A, B, D, P, Q> Block<A, B, D, P, Q> {
+    pub(crate) const fn new(left: P, right: Q) -> Self {
+        Self { left, right, factors: PhantomData }
+    }
 }
 
 impl<A, B, D, P: Clone, Q: Clone> Clone for Block<A, B, D, P, Q> {
@@ -170,12 +227,12 @@ macro_rules! metric_of_the_factors {
             &self,
             x: &ChartPoint<Product<A, B>, D>,
         ) -> Result<Self::At<D>, MetricError> {
-            let ((g, f), (a, b)) = (Split::<A, B>::halves(self), Product::parts(x));
+            let ((g, f), (a, b)) = (Sum::<A, B>::factors(self), Product::parts(x));
             Ok(Block { left: g.at(&a)?, right: f.at(&b)?, factors: PhantomData })
         }
 
         fn matrix<D: Scalar>(&self, x: &ChartPoint<Product<A, B>, D>) -> Matrix<Product<A, B>, D> {
-            let ((g, f), (a, b)) = (Split::<A, B>::halves(self), Product::parts(x));
+            let ((g, f), (a, b)) = (Sum::<A, B>::factors(self), Product::parts(x));
             Product::<A, B>::block(&g.matrix(&a), &f.matrix(&b))
         }
 
@@ -190,7 +247,7 @@ macro_rules! metric_of_the_factors {
             x: &ChartPoint<Product<A, B>, D>,
             v: &Vector<Product<A, B>, D>,
         ) -> Result<GeodesicEnd<Product<A, B>, D>, MetricError> {
-            let ((g, f), (a, b)) = (Split::<A, B>::halves(self), Product::parts(x));
+            let ((g, f), (a, b)) = (Sum::<A, B>::factors(self), Product::parts(x));
             let (va, vb) = Product::<A, B>::split(v);
             let ((a, va), (b, vb)) = (g.exp(&a, &va)?, f.exp(&b, &vb)?);
             let q = Product::<A, B>::join(&a.q, &b.q);
@@ -203,7 +260,7 @@ macro_rules! metric_of_the_factors {
             x: &(A::Point<f64>, B::Point<f64>),
             v: &Vector<Product<A, B>>,
         ) -> Result<(A::Point<f64>, B::Point<f64>), MetricError> {
-            let ((g, f), (a, b)) = (Split::<A, B>::halves(self), Product::<A, B>::split(v));
+            let ((g, f), (a, b)) = (Sum::<A, B>::factors(self), Product::<A, B>::split(v));
             Ok((Riemannian::<A>::end(g, &x.0, &a)?, Riemannian::<B>::end(f, &x.1, &b)?))
         }
 
@@ -213,7 +270,7 @@ macro_rules! metric_of_the_factors {
             v: &Vector<Product<A, B>>,
             t: f64,
         ) -> Result<(A::Point<Real>, B::Point<Real>), MetricError> {
-            let ((g, f), (a, b)) = (Split::<A, B>::halves(self), Product::<A, B>::split(v));
+            let ((g, f), (a, b)) = (Sum::<A, B>::factors(self), Product::<A, B>::split(v));
             Ok((Riemannian::<A>::along(g, &x.0, &a, t)?, Riemannian::<B>::along(f, &x.1, &b, t)?))
         }
 
@@ -222,7 +279,7 @@ macro_rules! metric_of_the_factors {
             x: &(A::Point<f64>, B::Point<f64>),
             y: &(A::Point<f64>, B::Point<f64>),
         ) -> Result<Vector<Product<A, B>>, MetricError> {
-            let (g, f) = Split::<A, B>::halves(self);
+            let (g, f) = Sum::<A, B>::factors(self);
             Ok(Product::<A, B>::join(
                 &Riemannian::<A>::log(g, &x.0, &y.0)?,
                 &Riemannian::<B>::log(f, &x.1, &y.1)?,
@@ -234,7 +291,7 @@ macro_rules! metric_of_the_factors {
             x: &(A::Point<f64>, B::Point<f64>),
             d: &Vector<Product<A, B>>,
         ) -> Result<StepPath<Product<A, B>>, MetricError> {
-            let ((g, f), (da, db)) = (Split::<A, B>::halves(self), Product::<A, B>::split(d));
+            let ((g, f), (da, db)) = (Sum::<A, B>::factors(self), Product::<A, B>::split(d));
             Ok(StepPath::of_factors(
                 Riemannian::<A>::weyl_path(g, &x.0, &da)?,
                 Riemannian::<B>::weyl_path(f, &x.1, &db)?,
@@ -246,7 +303,7 @@ macro_rules! metric_of_the_factors {
             x: &(A::Point<f64>, B::Point<f64>),
             d: &Vector<Product<A, B>>,
         ) -> Result<StepPathJet<Product<A, B>>, MetricError> {
-            let ((g, f), (da, db)) = (Split::<A, B>::halves(self), Product::<A, B>::split(d));
+            let ((g, f), (da, db)) = (Sum::<A, B>::factors(self), Product::<A, B>::split(d));
             Ok(StepPathJet::of_factors(
                 Riemannian::<A>::weyl_jet(g, &x.0, &da)?,
                 Riemannian::<B>::weyl_jet(f, &x.1, &db)?,
@@ -254,7 +311,7 @@ macro_rules! metric_of_the_factors {
         }
 
         fn accuracy(&self) -> f64 {
-            let (g, f) = Split::<A, B>::halves(self);
+            let (g, f) = Sum::<A, B>::factors(self);
             Riemannian::<A>::accuracy(g).max(Riemannian::<B>::accuracy(f))
         }
 
@@ -265,7 +322,7 @@ macro_rules! metric_of_the_factors {
             v: &Vector<Product<A, B>>,
             y: &(A::Point<f64>, B::Point<f64>),
         ) -> Vector<Product<A, B>> {
-            let ((g, f), (a, b)) = (Split::<A, B>::halves(self), Product::<A, B>::split(v));
+            let ((g, f), (a, b)) = (Sum::<A, B>::factors(self), Product::<A, B>::split(v));
             Product::<A, B>::join(
                 &Riemannian::<A>::lost_digits(g, &x.0, &a, &y.0),
                 &Riemannian::<B>::lost_digits(f, &x.1, &b, &y.1),
@@ -273,7 +330,7 @@ macro_rules! metric_of_the_factors {
         }
 
         fn slopes(&self, x: &(A::Point<f64>, B::Point<f64>)) -> Slopes<Product<A, B>> {
-            let (g, f) = Split::<A, B>::halves(self);
+            let (g, f) = Sum::<A, B>::factors(self);
             let (a, b) = (Riemannian::<A>::slopes(g, &x.0), Riemannian::<B>::slopes(f, &x.1));
             of_factors::<A, B>(&a, &b)
         }
@@ -282,7 +339,7 @@ macro_rules! metric_of_the_factors {
             &self,
             x: &(A::Point<f64>, B::Point<f64>),
         ) -> Result<MetricJet<Product<A, B>, Self>, MetricError> {
-            let (g, f) = Split::<A, B>::halves(self);
+            let (g, f) = Sum::<A, B>::factors(self);
             let (a, b) = (Riemannian::<A>::jet(g, &x.0)?, Riemannian::<B>::jet(f, &x.1)?);
             let at = Block { left: a.at, right: b.at, factors: PhantomData };
             Ok(MetricJet { at, slopes: of_factors::<A, B>(&a.slopes, &b.slopes) })

@@ -65,17 +65,38 @@ impl Claim {
     #[track_caller]
     pub fn record(mut self, figure: impl fmt::Display, bound: impl fmt::Display) {
         let Some(folder) = env::var_os(FOLDER) else { return };
-        let file = Path::new(Location::caller().file()).file_stem().unwrap_or_default();
+        let file = of_tests(Location::caller().file());
         let thread = thread::current();
-        let name = thread.name().unwrap_or_default();
+        // A test in a module has the name of this before its own.
+        let name = thread.name().and_then(|name| name.rsplit("::").next()).unwrap_or_default();
         (self.figure, self.bound) = (figure.to_string(), bound.to_string());
-        self.test = format!("{}::{name}", file.to_string_lossy());
+        self.test = format!("{file}::{name}");
         let line = serde_json::to_string(&self).expect("strings are JSON");
-        let path = Path::new(&folder).join(format!("{}.{name}.jsonl", file.to_string_lossy()));
+        let path = Path::new(&folder).join(format!("{}.{name}.jsonl", file.replace('/', ".")));
         let written = fs::create_dir_all(&folder).and_then(|()| {
             let mut file = fs::OpenOptions::new().create(true).append(true).open(&path)?;
             writeln!(file, "{line}")
         });
         written.unwrap_or_else(|error| panic!("cannot write {}: {error}", path.display()));
+    }
+}
+
+/// The name of a file in the folder of the tests: `noise/body` of `tests/noise/body.rs`.
+fn of_tests(file: &str) -> &str {
+    let inside = file.rsplit_once("tests/").map_or(file, |(_, inside)| inside);
+    // The quick tests are files of the folder above.
+    let inside = inside.strip_prefix("quick/../").unwrap_or(inside);
+    inside.strip_suffix(".rs").unwrap_or(inside)
+}
+
+#[test]
+fn a_claim_names_its_file_in_the_folder_of_the_tests() {
+    for (file, name) in [
+        ("tests/order.rs", "order"),
+        ("tests/noise/body.rs", "noise/body"),
+        ("tests/quick/../second_law.rs", "second_law"),
+        ("order.rs", "order"),
+    ] {
+        assert_eq!(of_tests(file), name);
     }
 }

@@ -218,7 +218,7 @@ impl Tenth {
     }
 }
 
-/// What a least-squares line needs of the values `(n, e)`, updated without cancellation
+/// The sums that a least-squares line needs of the values `(n, e)`, updated without cancellation
 /// (Chan et al. 1983, pairwise updating).
 #[derive(Clone, Copy, Debug)]
 struct Sums {

@@ -1,4 +1,4 @@
-//! What surrounds the model of an example: its command line, its progress, its files and what it prints.
+//! The surroundings of the model of an example: its command line, its progress, its files and what it prints.
 
 use std::{env, error::Error};
 
@@ -153,7 +153,7 @@ impl Example {
     ///
     /// # Errors
     ///
-    /// Those of [`run`](Self::run).
+    /// The errors of [`run`](Self::run).
     pub fn run_with<Y: Metriplectic<Manifold: 'static>>(
         &self,
         method: impl Method<Y>,

@@ -28,7 +28,7 @@ pub struct Gallery {
 pub struct GalleryError {
     /// The file or folder.
     pub path: PathBuf,
-    /// What the system says.
+    /// The error of the system.
     pub source: io::Error,
 }
 
@@ -123,7 +123,7 @@ pub fn write_csv<const N: usize>(
 ///
 /// # Errors
 ///
-/// Those of writing to standard output, but for a pipe that nobody reads any more.
+/// The errors of writing to standard output, but for a pipe that nobody reads any more.
 pub fn print(text: impl fmt::Display) -> io::Result<()> {
     write_line(io::stdout().lock(), text)
 }

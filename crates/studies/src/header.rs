@@ -1,4 +1,4 @@
-//! What stands above a picture: its letter, its title and its legend.
+//! The head of a picture: its letter, its title and its legend.
 
 use svg::node::element::Element;
 

@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 static ASKED: AtomicBool = AtomicBool::new(false);
 static LISTENING: Once = Once::new();
 
-/// What a shell says of a program that Ctrl-C has ended: 128 and the number of the signal.
+/// The status of a program that Ctrl-C has ended: 128 and the number of the signal.
 const ENDED: i32 = 130;
 
 /// Whether Ctrl-C has been pressed: a loop that asks this can stop where its file is whole. From the

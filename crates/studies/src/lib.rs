@@ -1,4 +1,4 @@
-//! What we claim, measured.
+//! Measurements of what the library claims.
 //!
 //! A claim of this project is a number with an uncertainty, and the examples, the tests and the
 //! benches all read it off the same instruments:

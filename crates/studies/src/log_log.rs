@@ -171,7 +171,7 @@ impl LogLog {
     ///
     /// # Errors
     ///
-    /// Those of [`LogLog::svg`], and [`PlotError::Io`] if the file cannot be written.
+    /// The errors of [`LogLog::svg`], and [`PlotError::Io`] if the file cannot be written.
     pub fn save(&self, path: impl Into<PathBuf>) -> Result<(), PlotError> {
         plot::save(path.into(), &self.svg()?)
     }

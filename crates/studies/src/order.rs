@@ -74,7 +74,7 @@ pub enum OrderError {
         /// The error.
         value: f64,
     },
-    /// The same step occurs twice.
+    /// A step occurs twice.
     #[error("steps {first} and {second} are both {value}; measure each step once")]
     RepeatedStep {
         /// Index of one of the two.

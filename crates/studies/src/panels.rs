@@ -122,7 +122,7 @@ impl Panels {
     ///
     /// # Errors
     ///
-    /// Those of [`Panels::svg`], and [`PlotError::Io`] if the file cannot be written.
+    /// The errors of [`Panels::svg`], and [`PlotError::Io`] if the file cannot be written.
     pub fn save(&self, path: impl Into<PathBuf>) -> Result<(), PlotError> {
         plot::save(path.into(), &self.svg()?)
     }

@@ -17,7 +17,7 @@ pub use measured::{Comparison, LargeSteps, Orders, SecondLaws, Strides};
 /// A system with a start, and names for tables.
 #[derive(Clone, Debug)]
 pub struct Problem<Y: Metriplectic> {
-    /// What it is.
+    /// The name of the model.
     pub name: &'static str,
     /// Where it lives, as a formula.
     pub manifold: &'static str,
@@ -39,9 +39,9 @@ pub struct Problem<Y: Metriplectic> {
 /// Constants that are added to the energy and the entropy of a problem.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Constants {
-    /// That of the energy.
+    /// The constant of the energy.
     pub energy: f64,
-    /// That of the entropy.
+    /// The constant of the entropy.
     pub entropy: f64,
 }
 
@@ -62,7 +62,7 @@ fn relative(error: f64, energy: f64) -> f64 {
     error.abs() / energy.abs().max(UNIT_OF_ENERGY)
 }
 
-/// What is done with every problem, and each of the retractions that its manifold has.
+/// A study of every problem with each of the retractions that its manifold has.
 pub trait Study {
     /// Called once for each problem and retraction; `order` is what theory says.
     fn visit<Y, R>(

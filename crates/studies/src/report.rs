@@ -1,4 +1,4 @@
-//! What an example writes: its files, and text for a reader or JSON for a program.
+//! The output of an example: its files, and text for a reader or JSON for a program.
 
 use std::{error::Error, path::PathBuf};
 
@@ -32,7 +32,7 @@ impl Report {
         self.certified(&run.certificate, end.time, M::entries(&end.point))
     }
 
-    /// The same of a run of any flow, with these entries of its last state.
+    /// A report of a run of any flow, with these entries of its last state.
     pub(crate) fn certified(self, certificate: &Certificate, time: f64, entries: Vec<f64>) -> Self {
         let shown: Vec<String> = entries.iter().map(|x| readable(*x)).collect();
         let mut report = self.text(certificate);
@@ -115,7 +115,7 @@ impl Report {
     ///
     /// # Errors
     ///
-    /// What failed first: a file that cannot be written, a figure that cannot be drawn, or standard output.
+    /// The first failure: a file that cannot be written, a figure that cannot be drawn, or standard output.
     pub fn print(self) -> Result<(), Box<dyn Error>> {
         let fields = Value::Object(self.fields.clone());
         self.print_as(&fields)
@@ -125,7 +125,7 @@ impl Report {
     ///
     /// # Errors
     ///
-    /// Those of [`Report::print`].
+    /// The errors of [`Report::print`].
     pub fn print_as(self, json: &Value) -> Result<(), Box<dyn Error>> {
         self.gallery?;
         Ok(if self.json { print(json) } else { print(self.text.join("\n")) }?)

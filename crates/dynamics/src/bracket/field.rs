@@ -22,11 +22,11 @@ impl<F> fmt::Debug for FieldPoisson<F> {
 }
 
 impl<F> FieldPoisson<F> {
-    pub(super) const fn new(field: F) -> Self {
+    pub(crate) const fn new(field: F) -> Self {
         Self { field, poisson: true }
     }
 
-    pub(super) const fn almost(field: F) -> Self {
+    pub(crate) const fn almost(field: F) -> Self {
         Self { field, poisson: false }
     }
 }

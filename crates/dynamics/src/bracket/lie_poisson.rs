@@ -19,7 +19,7 @@ use super::{Bracket, BracketArgs, BracketJet, NaturalBracket};
 pub struct LiePoisson;
 
 impl<const N: usize, G: Riemannian<LieDual<N>>> Bracket<LieDual<N>, G> for LiePoisson {
-    #[inline]
+    #[inline(always)]
     fn apply<D: Scalar>(
         &self,
         at: &BracketArgs<'_, LieDual<N>, G, D>,

@@ -3,12 +3,14 @@
 use metriplectic_fields::{Matrix, Scalar, Vector};
 use metriplectic_manifolds::{Manifold, MetricError, Product, Split, Times};
 
-use super::{Bracket, BracketArgs, BracketJet, NaturalBracket, Zero};
+use super::{
+    Bracket, BracketArgs, BracketJet, NaturalBracket, Zero, by_dual_numbers, force_by_dual_numbers,
+};
 
 /// `Π_A ⊕ Π_B` on `A × B`: `{f, g} = {f, g}_A + {f, g}_B`. The Casimirs are functions of the Casimirs
 /// of both; with `(AreaForm, Zero)` on `S² × R` every function of the second factor is one.
 ///
-/// The metric must be a metric of the factors (a pair, or [`Canonical`](metriplectic_manifolds::Canonical)),
+/// The metric must be a metric of the factors (a pair, or [`Canonical`](metriplectic_manifolds::Canonical); see [`Split`]),
 /// because the brackets may use the volume forms of the factors.
 impl<A, B, G, P, Q> Bracket<Product<A, B>, G> for (P, Q)
 where
@@ -24,7 +26,9 @@ where
         alpha: &Vector<Product<A, B>, D>,
     ) -> Result<Vector<Product<A, B>, D>, MetricError> {
         let ((x, y), (sx, sy)) = (Product::parts(at.g.x), Product::<A, B>::split(at.s));
-        let ((left, right), (a, b)) = (at.g.halves(&x, &y)?, Product::<A, B>::split(alpha));
+        let left = at.g.metric.left(&y.base);
+        let ((left, right), (a, b)) =
+            (at.g.halves(&left, (&x, &y))?, Product::<A, B>::split(alpha));
         let (m, n) = (&at.space.0, &at.space.1);
         let a = self.0.apply(&BracketArgs { space: m, g: &left, s: &sx }, &a)?;
         let b = self.1.apply(&BracketArgs { space: n, g: &right, s: &sy }, &b)?;
@@ -36,8 +40,13 @@ where
         at: &BracketArgs<'_, Product<A, B>, G>,
         alpha: &Vector<Product<A, B>>,
     ) -> Result<BracketJet<Product<A, B>>, MetricError> {
+        if !at.g.metric.is_sum() {
+            return by_dual_numbers(self, at, alpha);
+        }
         let ((x, y), (sx, sy)) = (Product::parts(at.g.x), Product::<A, B>::split(at.s));
-        let ((left, right), (a, b)) = (at.g.halves(&x, &y)?, Product::<A, B>::split(alpha));
+        let left = at.g.metric.left(&y.base);
+        let ((left, right), (a, b)) =
+            (at.g.halves(&left, (&x, &y))?, Product::<A, B>::split(alpha));
         let (m, n) = (&at.space.0, &at.space.1);
         let a = self.0.linearise(&BracketArgs { space: m, g: &left, s: &sx }, &a)?;
         let b = self.1.linearise(&BracketArgs { space: n, g: &right, s: &sy }, &b)?;
@@ -58,7 +67,8 @@ where
         w: &Vector<Product<A, B>, D>,
     ) -> Result<Vector<Product<A, B>, D>, MetricError> {
         let ((x, y), (sx, sy)) = (Product::parts(at.g.x), Product::<A, B>::split(at.s));
-        let ((left, right), (a, b)) = (at.g.halves(&x, &y)?, Product::<A, B>::split(w));
+        let left = at.g.metric.left(&y.base);
+        let ((left, right), (a, b)) = (at.g.halves(&left, (&x, &y))?, Product::<A, B>::split(w));
         let (m, n) = (&at.space.0, &at.space.1);
         let a = self.0.force(&BracketArgs { space: m, g: &left, s: &sx }, &a)?;
         let b = self.1.force(&BracketArgs { space: n, g: &right, s: &sy }, &b)?;
@@ -70,8 +80,12 @@ where
         at: &BracketArgs<'_, Product<A, B>, G>,
         w: &Vector<Product<A, B>>,
     ) -> Result<BracketJet<Product<A, B>>, MetricError> {
+        if !at.g.metric.is_sum() {
+            return force_by_dual_numbers(self, at, w);
+        }
         let ((x, y), (sx, sy)) = (Product::parts(at.g.x), Product::<A, B>::split(at.s));
-        let ((left, right), (a, b)) = (at.g.halves(&x, &y)?, Product::<A, B>::split(w));
+        let left = at.g.metric.left(&y.base);
+        let ((left, right), (a, b)) = (at.g.halves(&left, (&x, &y))?, Product::<A, B>::split(w));
         let (m, n) = (&at.space.0, &at.space.1);
         let a = self.0.linearise_force(&BracketArgs { space: m, g: &left, s: &sx }, &a)?;
         let b = self.1.linearise_force(&BracketArgs { space: n, g: &right, s: &sy }, &b)?;

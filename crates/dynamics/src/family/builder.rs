@@ -3,14 +3,16 @@
 use std::fmt;
 use std::sync::Arc;
 
-use metriplectic_fields::{Dimension as _, Form, Real, ScalarField, Velocity};
-use metriplectic_manifolds::{Canonical, Euclidean, Inert, Manifold, Product, Riemannian, Times};
-use nalgebra::SVector;
+use metriplectic_fields::{Dimension as _, Form, Plus, Real, ScalarField, Velocity};
+use metriplectic_manifolds::{
+    Canonical, Euclidean, Inert, LieDual, Manifold, ParametricMetric, Product, Riemannian, Times,
+};
+use nalgebra::{Const, SVector};
 
-use super::{Family, FieldOf, OfPair, OnFirst};
-use crate::bracket::{Bracket, NaturalBracket, Zero};
+use super::{BracketOf, Family, FieldOf, ForcedOf, OfPair, OnFirst};
+use crate::bracket::{Bracket, LiePoisson, NaturalBracket, Zero};
 use crate::builder::{Built, NoEnergy, SystemBuilder};
-use crate::dissipation::{Choice, Dissipation, Given, NoDissipation};
+use crate::dissipation::{Choice, Dissipation, Given, MetricDissipation, NoDissipation, Scaled};
 use crate::invariants::{Casimir, Invariants, Momentum};
 use crate::metriplectic::SecondLaw;
 use crate::system::{BuildError, NoEntropy, System};
@@ -121,6 +123,70 @@ where
         self.with(|wide| wide.metric((metric, Inert)))
     }
 
+    /// Sets the metric by a closure `|x, θ| -> g(x, θ)`, with the matrices of
+    /// [`Metric::field`](metriplectic_manifolds::Metric::field). Where `g(x, θ)` is not symmetric and positive, a run is
+    /// [`MetricError`](metriplectic_manifolds::MetricError).
+    #[allow(
+        clippy::type_complexity,
+        reason = "the type of a builder lists the parts of the system, and a name for it would hide them"
+    )]
+    pub fn field_metric<F>(
+        self,
+        metric: F,
+    ) -> FamilyBuilder<Wide<M, ParametricMetric<F>, B, K, H, S, L, P>, P>
+    where
+        F: Fn(&M::Point<Real>, &SVector<Real, P>) -> Form<M, Real>,
+    {
+        self.with(|wide| wide.any_metric(ParametricMetric::new(metric)))
+    }
+
+    /// Sets the bracket by a closure `|x, θ| -> Π(x, θ)`, as [`Poisson::field`](crate::Poisson::field) has it.
+    #[allow(
+        clippy::type_complexity,
+        reason = "the type of a builder lists the parts of the system, and a name for it would hide them"
+    )]
+    pub fn field_bracket<F>(
+        self,
+        bracket: F,
+    ) -> FamilyBuilder<Wide<M, G, BracketOf<F>, K, H, S, L, P>, P>
+    where
+        F: Fn(&M::Point<Real>, &SVector<Real, P>) -> Form<M, Real>,
+    {
+        self.with(|wide| wide.bracket(BracketOf::new(bracket, true)))
+    }
+
+    /// Sets a skew tensor that need not be Poisson by a closure `|x, θ| -> Π(x, θ)`, as
+    /// [`AlmostPoisson::field`](crate::AlmostPoisson::field) has it.
+    #[allow(
+        clippy::type_complexity,
+        reason = "the type of a builder lists the parts of the system, and a name for it would hide them"
+    )]
+    pub fn almost_field_bracket<F>(
+        self,
+        bracket: F,
+    ) -> FamilyBuilder<Wide<M, G, BracketOf<F>, K, H, S, L, P>, P>
+    where
+        F: Fn(&M::Point<Real>, &SVector<Real, P>) -> Form<M, Real>,
+    {
+        self.with(|wide| wide.bracket(BracketOf::new(bracket, false)))
+    }
+
+    /// Sets the dissipation `κ(x, θ) K` of the metric times a closure `|x, θ| -> κ ≥ 0`, as
+    /// [`MetricDissipation::scaled`] has it.
+    #[allow(
+        clippy::type_complexity,
+        reason = "the type of a builder lists the parts of the system, and a name for it would hide them"
+    )]
+    pub fn metric_dissipation<F>(
+        self,
+        kappa: F,
+    ) -> FamilyBuilder<Wide<M, G, B, Given<Scaled<OfPair<F>, MetricDissipation>>, H, S, L, P>, P>
+    where
+        F: Fn(&M::Point<Real>, &SVector<Real, P>) -> Real,
+    {
+        self.with(|wide| wide.dissipation(MetricDissipation::scaled(OfPair(Arc::new(kappa)))))
+    }
+
     /// Sets the bracket on `M`, which does not depend on the parameters.
     #[allow(
         clippy::type_complexity,
@@ -218,5 +284,28 @@ where
             return Err(BuildError::TooManyInvariants { count, dimension });
         }
         Ok(Family::new(self.wide.build()?, self.names))
+    }
+}
+
+impl<G, K, H, S, L, const N: usize, const P: usize>
+    FamilyBuilder<Wide<LieDual<N>, G, (LiePoisson, Zero), K, H, S, L, P>, P>
+where
+    Const<N>: Plus<Const<P>>,
+    K: Choice,
+{
+    /// Sets the force by a closure `|ξ, θ| -> F(ξ, θ)` of the equations `μ' = ad*_ξ(μ + F(ξ, θ))`, as
+    /// [`SystemBuilder::force`] does.
+    #[allow(
+        clippy::type_complexity,
+        reason = "the type of a builder lists the parts of the system, and a name for it would hide them"
+    )]
+    pub fn force<F>(
+        self,
+        force: F,
+    ) -> FamilyBuilder<Wide<LieDual<N>, G, ForcedOf<F>, K::WithForce, H, S, L, P>, P>
+    where
+        F: Fn(&SVector<Real, N>, &SVector<Real, P>) -> SVector<Real, N>,
+    {
+        self.with(|wide| wide.bracket(ForcedOf(Arc::new(force))).choose(K::with_force))
     }
 }

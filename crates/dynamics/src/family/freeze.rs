@@ -1,11 +1,13 @@
 //! Parts of a family, frozen at one `θ`.
 
 use metriplectic_fields::Real;
-use metriplectic_manifolds::Inert;
+use metriplectic_manifolds::parametric_metric::MetricAtParameters;
+use metriplectic_manifolds::{Inert, ParametricMetric};
 use nalgebra::SVector;
 
+use super::{AtParameters, OfPair};
 use crate::bracket::Zero;
-use crate::dissipation::{MetricDissipation, NoDissipation};
+use crate::dissipation::{MetricDissipation, NoDissipation, Scaled};
 use crate::invariants::{Casimir, Momentum};
 use crate::system::NoEntropy;
 
@@ -24,6 +26,24 @@ impl<G: Clone, const P: usize> Freeze<P> for (G, Inert) {
 
     fn freeze(&self, _: &SVector<Real, P>) -> G {
         self.0.clone()
+    }
+}
+
+/// A metric by a closure `|x, θ| -> g`.
+impl<F, const P: usize> Freeze<P> for ParametricMetric<F> {
+    type Narrow = MetricAtParameters<F, P>;
+
+    fn freeze(&self, theta: &SVector<Real, P>) -> Self::Narrow {
+        self.at_parameters(theta)
+    }
+}
+
+/// The dissipation of the metric times a closure `|x, θ| -> κ`.
+impl<F, const P: usize> Freeze<P> for Scaled<OfPair<F>, MetricDissipation> {
+    type Narrow = Scaled<AtParameters<F, P>, MetricDissipation>;
+
+    fn freeze(&self, theta: &SVector<Real, P>) -> Self::Narrow {
+        Scaled(self.0.freeze(theta), self.1)
     }
 }
 

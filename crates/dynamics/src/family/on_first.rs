@@ -12,7 +12,7 @@ use metriplectic_manifolds::{
 use nalgebra::SVector;
 
 use super::Freeze;
-use crate::dissipation::{Dissipation, DissipationJet, FieldDissipation};
+use crate::dissipation::{Dissipation, DissipationJet, FieldDissipation, by_dual_numbers};
 
 /// A dissipation of the first factor, which does not depend on the second.
 #[derive(Clone, Copy, Debug)]
@@ -41,7 +41,8 @@ where
         alpha: &Vector<Product<A, B>, D>,
     ) -> Result<Vector<Product<A, B>, D>, MetricError> {
         let (x, y) = Product::parts(g.x);
-        let (left, _) = g.halves(&x, &y)?;
+        let left = g.metric.left(&y.base);
+        let (left, _) = g.halves(&left, (&x, &y))?;
         let ((w, _), (alpha, _)) = (Product::<A, B>::split(w), Product::<A, B>::split(alpha));
         let k = self.0.apply(&left, &w, &alpha)?;
         Ok(Product::<A, B>::join(&k, &Vector::<B, D>::zero()))
@@ -53,8 +54,12 @@ where
         w: &Vector<Product<A, B>>,
         alpha: &Vector<Product<A, B>>,
     ) -> Result<DissipationJet<Product<A, B>>, MetricError> {
+        if !g.metric.is_sum() {
+            return by_dual_numbers(self, g, w, alpha);
+        }
         let (x, y) = Product::parts(g.x);
-        let (left, _) = g.halves(&x, &y)?;
+        let left = g.metric.left(&y.base);
+        let (left, _) = g.halves(&left, (&x, &y))?;
         let ((w, _), (alpha, _)) = (Product::<A, B>::split(w), Product::<A, B>::split(alpha));
         let jet = self.0.linearise(&left, &w, &alpha)?;
         let zero = Matrix::<B>::zeros();

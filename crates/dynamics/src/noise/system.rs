@@ -119,6 +119,23 @@ where
     Ok(sum)
 }
 
+/// Computes the velocity of the friction, `K dS = Σ_r ρ_r b_r ⟨b_r, dS⟩`.
+///
+/// # Errors
+///
+/// [`MetricError`] if the metric or the chart cannot be used there.
+pub fn friction_vector<Y>(system: &Y, x: &Point<Y>) -> Result<VectorOf<Y>, MetricError>
+where
+    Y: Metriplectic<Dissipation: NoiseTerms<Y::Manifold, Y::Metric>> + ?Sized,
+{
+    let (here, mut sum) = (place(system, x), VectorOf::<Y>::zero());
+    let all = 0..system.dissipation().count();
+    each(system, &here, all, &mut |_, NoiseTerm { rate, b }| {
+        sum += b.real::<VectorOf<Y>>() * (rate.re * b.dot(&here.s).re);
+    })?;
+    Ok(sum)
+}
+
 /// Computes the kinetic drift `Σ_r c_r b_r`, without the factor `k_B`.
 ///
 /// # Errors

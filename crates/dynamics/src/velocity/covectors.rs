@@ -119,6 +119,7 @@ impl<'a, M: Space, D: Scalar> Differentials<'a, M, D> {
 impl<M: Space, D: Scalar> Gradient<M> for Differentials<'_, M, D> {
     type Covector = Vector<M, D>;
 
+    #[inline]
     fn of(&mut self, f: &impl ScalarField<M>) -> Vector<M, D> {
         let Some(RealFrame { point, frame }) = &self.real else { return differential(f, self.x) };
         let df = f.jet1(point).df;

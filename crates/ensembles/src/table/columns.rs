@@ -2,6 +2,7 @@
 
 use super::Table;
 use crate::error::TableError;
+use crate::estimate::Estimate;
 use crate::figures::FIGURES;
 
 impl Table {
@@ -28,6 +29,18 @@ impl Table {
     pub fn column(&self, name: &str) -> Result<Vec<f64>, TableError> {
         self.known(name)?;
         Ok(self.rows().map(|row| row.get(name).unwrap_or(f64::NAN)).collect())
+    }
+
+    /// Estimates the mean of a column over all rows that are done, with its standard error.
+    ///
+    /// # Errors
+    ///
+    /// [`TableError::NoColumn`]; [`TableError::NoRows`] if no row is done.
+    pub fn estimate(&self, name: &str) -> Result<Estimate, TableError> {
+        self.known(name)?;
+        let done = self.rows().filter(|row| row.entry.done().is_some());
+        let estimate = Estimate::of(done.map(|row| row.get(name).unwrap_or(f64::NAN)));
+        if estimate.count == 0 { Err(TableError::NoRows) } else { Ok(estimate) }
     }
 
     pub(super) fn known(&self, name: &str) -> Result<(), TableError> {

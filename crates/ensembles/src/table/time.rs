@@ -3,6 +3,7 @@
 use super::Table;
 use crate::entry::Done;
 use crate::error::TableError;
+use crate::estimate::Estimate;
 
 /// Numbers in time: named columns, of which the first is the time `t`.
 #[derive(Clone, Debug, PartialEq)]
@@ -66,16 +67,8 @@ impl Table {
     pub fn mean(&self, name: &str) -> Result<Series, TableError> {
         let names = ["mean", "standard_error"].map(str::to_owned).to_vec();
         self.over_rows(name, names, |values| {
-            // Welford (1962), in the order of the rows.
-            let (mut mean, mut squares) = (0.0, 0.0);
-            for (k, x) in values.iter().enumerate() {
-                let before = x - mean;
-                mean += before / (k + 1) as f64;
-                squares += before * (x - mean);
-            }
-            let n = values.len() as f64;
-            let error = if n > 1.0 { (squares / (n - 1.0) / n).sqrt() } else { f64::NAN };
-            vec![mean, error]
+            let Estimate { mean, standard_error, .. } = Estimate::of(values.iter().copied());
+            vec![mean, standard_error]
         })
     }
 

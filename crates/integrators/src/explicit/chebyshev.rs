@@ -63,7 +63,15 @@ pub(super) fn stages<F: StageFlow>(
     let zero = start.zero();
     let mut stages = Here::at_rest(&zero);
     stages[0] = Here { velocity: start, production };
-    Ok(LastStep { stages, known: 1, before: zero, end: q, rise: produced, count: Some(count) })
+    Ok(LastStep {
+        stages,
+        known: 1,
+        before: zero,
+        at_the_edge: false,
+        end: q,
+        rise: produced,
+        count: Some(count),
+    })
 }
 
 /// The estimate `0.8 (q₀ − q) + 0.4 h (k₀ + k)` of the local error (eq. 2.9).

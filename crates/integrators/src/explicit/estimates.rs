@@ -19,15 +19,14 @@ pub(super) fn is_at_the_edge<V: Vector>(
     last: &LastStep<V>,
     rates: &V,
 ) -> bool {
-    let before = [&last.before, &last.stages[tableau.rows().len()].velocity];
-    let norm = |end: &V, before: &V, factor: f64| {
-        V::norm_of([end, before, sizes, &last.end], |[end, before, size, reached]| {
-            let change = factor * (end - before);
-            if change == 0.0 { 0.0 } else { change / size.max(reached.abs()) }
-        })
-    };
-    let distance = norm(&last.end, before[0], 1.0);
-    distance > 64.0 * f64::EPSILON && norm(rates, before[1], h) > tableau.stability * distance
+    let rates_before = &last.stages[tableau.rows().len()].velocity;
+    let vectors = [&last.end, &last.before, sizes, rates, rates_before];
+    let [distance, change] = V::norms_of(vectors, |[end, before, size, rate, rate_before]| {
+        let size = size.max(end.abs());
+        [end - before, h * (rate - rate_before)]
+            .map(|change| if change == 0.0 { 0.0 } else { change / size })
+    });
+    distance > 64.0 * f64::EPSILON && change > tableau.stability * distance
 }
 
 /// The error of a step in units of the one allowed. A step that was taken in parts has the estimate of the flow.
@@ -89,7 +88,7 @@ pub(super) fn limiting_sites<F: StageFlow>(
     };
     let (error, count) = (largest(error), tableau.rows().len());
     let [before, rates] = [count, count + 1].map(|stage| &last.stages[stage].velocity);
-    let stiffness = if is_at_the_edge((tableau, h), &flow.sizes(x), last, rates) {
+    let stiffness = if last.at_the_edge {
         let change = Vector::zip([rates, before], |[rates, before]| rates - before);
         change.largest_site(&flow.sizes(x))
     } else {

@@ -2,7 +2,7 @@
 
 use metriplectic_dynamics::SecondLaw;
 
-use super::flow::{Projected, ProjectionError, StageFlow, Target};
+use super::flow::{Limit, Projected, ProjectionError, StageFlow, Target};
 use super::memory::{LastStep, Produced};
 use super::refused::Refused;
 use super::rest;
@@ -13,8 +13,6 @@ use crate::step::{Element, EntropyStep, Laws, Vector};
 /// The fraction of the round-off of an increment by which the entropy may fall: less than what the certificate
 /// counts as a fall.
 const FALL: f64 = 0.875;
-/// The length of a projection, relative to the sizes of the entries, that is round-off: some units of it.
-const NEAR: f64 = 64.0 * f64::EPSILON;
 /// The entropy that is produced in a step, in units of the round-off of the entropy, by friction that is idle.
 const IDLE: f64 = 0.25;
 /// The length of a projection in units of the error that is allowed.
@@ -28,9 +26,11 @@ pub(super) struct Landed<F: StageFlow> {
 }
 
 /// How far a state may be moved onto its laws.
-struct Bounds<V> {
-    limit: V,
-    units: Option<V>,
+enum Bounds<V> {
+    /// At most these entries, in units of the errors that are allowed.
+    Allowed(V),
+    /// At most half of the step, with the sizes at its start.
+    HalfOfStep { sizes: V, units: Option<V> },
 }
 
 /// The projection of the end of a step onto the laws, and the decision whether it is taken.
@@ -38,20 +38,27 @@ pub(super) struct Onto<'a, F: StageFlow> {
     pub(super) trial: &'a Trial<'a, F>,
     pub(super) last: &'a LastStep<F::Vector>,
     pub(super) produced: Produced,
+    /// The round-off of the entropy at the start, if it is known.
+    pub(super) round_off: Option<f64>,
 }
 
 impl<F: StageFlow> Onto<'_, F> {
     #[inline]
     pub(super) fn decide(&self, y: Element<F>) -> Result<Landed<F>, Refused> {
-        let Self { trial: &Trial { flow, start, .. }, last, produced } = *self;
-        let Bounds { limit, units } = self.bounds();
-        let units = units.as_ref().or(start.allowed.as_ref());
+        let Self { trial: &Trial { flow, start, .. }, last, produced, .. } = *self;
+        let bounds = self.bounds();
+        let (limit, units) = match &bounds {
+            Bounds::Allowed(entries) => (Limit::Entries(entries), start.allowed.as_ref()),
+            Bounds::HalfOfStep { sizes, units } => {
+                (Limit::HalfOf { step: &last.end, sizes }, units.as_ref())
+            }
+        };
         let embedded = self.embedded_error();
         let error =
             flow.weighs_errors().then(|| embedded.as_ref().unwrap_or(&last.stages[0].velocity));
         let onto = |y, entropy, with_entropy| {
             let laws = Laws { entropy, ..start.reference.clone() };
-            let limit = Some(&limit);
+            let limit = Some(limit);
             flow.project(y, &Target { laws: &laws, with_entropy, limit, units, error })
         };
         if flow.entropy_law() != SecondLaw::Exact {
@@ -93,16 +100,13 @@ impl<F: StageFlow> Onto<'_, F> {
     fn bounds(&self) -> Bounds<F::Vector> {
         let Self { trial: &Trial { flow, start, .. }, last, .. } = *self;
         if let Some(allowed) = &start.allowed {
-            return Bounds { limit: allowed.map(|error| FAR * error), units: None };
+            return Bounds::Allowed(allowed.map(|error| FAR * error));
         }
         let sizes = flow.sizes(start.x);
-        // Round-off is never too far.
-        let most = |[end, size]: [f64; 2]| (0.5 * end.abs()).max(NEAR * size);
-        let limit = Vector::zip([&last.end, &sizes], most);
         // An entry that crosses zero has the size of its displacement. A flow that weighs errors has its own units.
         let size = |[end, size]: [f64; 2]| size.max(end.abs());
         let units = (!flow.weighs_errors()).then(|| Vector::zip([&last.end, &sizes], size));
-        Bounds { limit, units }
+        Bounds::HalfOfStep { sizes, units }
     }
 
     /// The embedded error, if the flow weighs errors and it does not need the end of the step. Otherwise the
@@ -135,7 +139,11 @@ impl<F: StageFlow> Onto<'_, F> {
     fn falls(&self, end: &Projected<F>) -> bool {
         let &Trial { flow, start, .. } = self.trial;
         let rise = flow.values(&end.gradients).entropy - start.values.entropy;
-        let round_off = flow.entropy_round_off([start.x, &end.x]);
+        let known = self.round_off.zip(flow.entropy_round_off_of(&end.gradients));
+        let round_off = match known {
+            Some((start, end)) => start.max(end),
+            None => flow.entropy_round_off([start.x, &end.x]),
+        };
         if rise.abs() > round_off {
             return rise < 0.0;
         }

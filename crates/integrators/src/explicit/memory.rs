@@ -22,6 +22,8 @@ pub struct ExplicitMemory<V> {
     pub(super) read: Vec<f64>,
     /// The velocity at the state reached, a function of this state alone.
     pub(super) here: Option<Here<V>>,
+    /// The round-off of the entropy there, if the flow tells.
+    pub(super) round_off: Option<f64>,
     /// The step taken last.
     pub(super) last: Option<Box<LastStep<V>>>,
     /// A step before it, whose room the next one takes.
@@ -66,8 +68,10 @@ pub(super) struct LastStep<V> {
     pub(super) stages: [Here<V>; STAGES],
     /// The stages that are known.
     pub(super) known: usize,
-    /// The coordinates of the last stage before the end.
+    /// The coordinates of the last stage before the end, until the stability of the step is known.
     pub(super) before: V,
+    /// Whether the step was at the edge of the region of stability.
+    pub(super) at_the_edge: bool,
     /// The coordinates of its end.
     pub(super) end: V,
     /// The rise of the entropy.
@@ -81,7 +85,8 @@ impl<V: Vector> LastStep<V> {
     pub(super) fn empty(like: &V) -> Self {
         let zero = like.zero();
         let stages = Here::at_rest(&zero);
-        Self { stages, known: 0, before: zero.clone(), end: zero, rise: 0.0, count: None }
+        let (before, end) = (zero.clone(), zero);
+        Self { stages, known: 0, before, at_the_edge: false, end, rise: 0.0, count: None }
     }
 }
 
@@ -94,6 +99,7 @@ impl<V> Default for ExplicitMemory<V> {
             lost: None,
             read: Vec::new(),
             here: None,
+            round_off: None,
             last: None,
             room: None,
             spectrum: None,
@@ -120,7 +126,7 @@ impl<V: Vector> Memory for ExplicitMemory<V> {
     }
 
     fn rescaled(&self, _: f64) -> Self {
-        let Self { entropy, falls, taken, lost, read, here, spectrum, .. } = self;
+        let Self { entropy, falls, taken, lost, read, here, round_off, spectrum, .. } = self;
         let spectrum = spectrum.clone();
         let (lost, read, here) = (lost.clone(), read.clone(), here.clone());
         Self {
@@ -130,6 +136,7 @@ impl<V: Vector> Memory for ExplicitMemory<V> {
             lost,
             read,
             here,
+            round_off: *round_off,
             last: None,
             room: None,
             spectrum,
@@ -148,6 +155,7 @@ impl<V: Vector> Memory for ExplicitMemory<V> {
         self.falls = tried.falls;
         // Known before the step was tried.
         self.here = self.here.take().or(tried.here);
+        self.round_off = self.round_off.or(tried.round_off);
         self.room = tried.room.or_else(|| room_of(tried.last));
     }
 

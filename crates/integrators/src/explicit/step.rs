@@ -12,7 +12,7 @@ use super::memory::{LastStep, MemoryOf, Produced};
 use super::refused::Refused;
 use super::rest::{self, is_hardly};
 use super::stage::{Here, combined, produced, stage};
-use super::tableau::{Compiled, Row, Stages};
+use super::tableau::{Compiled, Row, STAGES, Stages, Tableau};
 use super::trial::Trial;
 use crate::step::{
     Effort, Element, EntropyStep, Evidence, MethodError, Refusal, StepError, StepStart, Taken,
@@ -108,7 +108,11 @@ fn try_step<F: StageFlow>(
     let room = memory.take_own_room();
     let here = match memory.here.take() {
         Some(here) => here,
-        None => here_at(flow, start.x, None).ok_or(Refused::Outside(None))?,
+        None => {
+            let gradients = flow.gradients(start.x).ok_or(Refused::Outside(None))?;
+            memory.round_off = flow.entropy_round_off_of(&gradients);
+            here_at(flow, start.x, gradients).ok_or(Refused::Outside(None))?
+        }
     };
     let mut last = room.unwrap_or_else(|| Box::new(LastStep::empty(&here.velocity)));
     match tableau.stages {
@@ -144,13 +148,11 @@ fn finished<F: StageFlow>(
         last.end = last.end.with(|i| last.end.get(i) + lost(i));
     }
     let y = flow.stage(x, &last.end).ok_or_else(|| Refused::outside(flow, x, &last.end))?;
-    let lost = {
-        let reached = flow.stage_coordinates(x, &y);
-        Vector::zip([&last.end, &reached], |[end, reached]| end - reached)
-    };
+    let lost = flow.stage_rounding(x, (&last.end, &y));
 
     let produced = memory.entropy.unwrap_or_else(|| Produced::from(start.values.entropy));
-    let projection = Onto { trial, last: &*last, produced };
+    let round_off = memory.round_off;
+    let projection = Onto { trial, last: &*last, produced, round_off };
     let Landed { end, produced, how } = match projection.decide(y) {
         Ok(landed) => landed,
         Err(Refused::Falls(rise)) => {
@@ -186,13 +188,22 @@ fn finished<F: StageFlow>(
         return Err(Refused::Never(StepError::WrongDerivative { time, h, rate }));
     }
     let values = flow.values(&end.gradients);
-    let next = here_at(flow, &end.x, Some(end.gradients))
-        .ok_or_else(|| Refused::outside(flow, x, &last.end))?;
+    let round_off = flow.entropy_round_off_of(&end.gradients);
+    // An array of many sites is given up before the next one is made.
+    last.end = last.end.zero();
     last.end = flow.stage_coordinates(x, &end.x);
+    let lost_before = memory.lost.replace(lost);
+    let Some(next) = here_at(flow, &end.x, end.gradients) else {
+        memory.lost = lost_before;
+        return Err(Refused::outside(flow, x, &last.end));
+    };
+    memory.read = Vec::new();
     let rates = flow.stage_rates(x, (&last.end, &end.x), &next.velocity);
     let rests = end.x == *x && is_zero(&last.stages[0].velocity);
     let stability =
         tableau.stability.is_finite() && is_at_the_edge((tableau, h), &flow.sizes(x), last, &rates);
+    last.at_the_edge = stability;
+    last.before = last.before.zero();
     last.stages[last.known] = Here { velocity: rates, production: next.production };
     last.known += 1;
 
@@ -201,8 +212,7 @@ fn finished<F: StageFlow>(
     memory.entropy = Some(produced);
     memory.falls = 0;
     memory.taken = taken;
-    memory.lost = Some(lost);
-    memory.read = Vec::new();
+    memory.round_off = round_off;
     memory.here = Some(next);
     Ok(Taken { x: end.x, values, evidence, effort: Effort::default() })
 }
@@ -219,12 +229,8 @@ fn held<F: StageFlow>(start: &StepStart<'_, F>) -> Taken<F> {
 fn here_at<F: StageFlow>(
     flow: &F,
     x: &Element<F>,
-    gradients: Option<F::Gradients>,
+    gradients: F::Gradients,
 ) -> Option<Here<F::Vector>> {
-    let gradients = match gradients {
-        Some(gradients) => gradients,
-        None => flow.gradients(x)?,
-    };
     let (velocity, production) = flow.velocity(x, &gradients)?;
     Some(Here { velocity, production })
 }
@@ -243,9 +249,11 @@ fn stages<F: StageFlow>(
     /// With the rows as constants, whose sums the compiler writes out.
     macro_rules! compiled {
         ($tableau:ident: $($i:literal)*) => {{
+            const COUNT: usize = $tableau.rows().len();
             $({
                 const ROW: Row = $tableau.rows()[$i];
-                add_stage(trial, ROW, $i, last)?;
+                add_stage(trial, ROW, ($i, COUNT), last)?;
+                release(tableau, &rows[$i + 1..], last);
             })*
             const END: Row = $tableau.end;
             last.end = combined(h, END, &last.stages);
@@ -257,31 +265,66 @@ fn stages<F: StageFlow>(
         Some(Compiled::Five) => compiled!(FIVE: 0 1 2 3 4),
         None => {
             for (i, row) in rows.iter().enumerate() {
-                add_stage(trial, row, i, last)?;
+                add_stage(trial, row, (i, rows.len()), last)?;
+                release(tableau, &rows[i + 1..], last);
             }
             last.end = combined(h, tableau.end, &last.stages);
             last.rise = h * produced(tableau.end, &last.stages);
         }
     }
-    for stage in tableau.passed() {
-        last.stages[stage].velocity = last.stages[0].velocity.zero();
-    }
     Ok(())
 }
 
-/// The stage that row `i` makes.
+/// Gives up the arrays of stages that neither the rows to come nor the rest of the step need, if they are those of sites.
+#[inline(always)]
+fn release<V: Vector>(tableau: &Tableau, to_come: &[Row], last: &mut LastStep<V>) {
+    if last.stages[0].velocity.sites().is_none() {
+        return;
+    }
+    let needed = |stage: usize| to_come.iter().any(|row| row.iter().any(|&(j, _)| j == stage));
+    for stage in tableau.passed().filter(|&stage| !needed(stage)) {
+        last.stages[stage].velocity = last.stages[0].velocity.zero();
+    }
+}
+
+/// The stage that row `i` makes, of so many. The estimate of stability needs the coordinates of the last one.
 #[inline(always)]
 fn add_stage<F: StageFlow>(
     &Trial { flow, start, h, .. }: &Trial<'_, F>,
     row: Row,
-    i: usize,
+    (i, count): (usize, usize),
     last: &mut LastStep<F::Vector>,
 ) -> Result<(), Refused> {
     let x = start.x;
-    last.before = combined(h, row, &last.stages);
-    let before = &last.before;
-    last.stages[i + 1] = stage(flow, x, before).ok_or_else(|| Refused::outside(flow, x, before))?;
+    let before = if i + 1 == count { Some(&mut last.before) } else { None };
+    let Some((velocity, production)) = stage_of(flow, x, (h, row, &last.stages), before) else {
+        return Err(Refused::outside(flow, x, &combined(h, row, &last.stages)));
+    };
+    last.stages[i + 1] = Here { velocity, production };
     Ok(())
+}
+
+/// The stage with these weights of those that are known.
+#[inline(always)]
+fn stage_of<F: StageFlow>(
+    flow: &F,
+    x: &Element<F>,
+    (h, row, stages): (f64, Row, &[Here<F::Vector>; STAGES]),
+    coordinates: Option<&mut F::Vector>,
+) -> Option<(F::Vector, f64)> {
+    if row.is_empty() {
+        let q = stages[0].velocity.zero();
+        let Here { velocity, production } = stage(flow, x, &q)?;
+        if let Some(coordinates) = coordinates {
+            *coordinates = q;
+        }
+        return Some((velocity, production));
+    }
+    let term = |j: usize| {
+        let (stage, w) = row[j];
+        (w, &stages[stage].velocity)
+    };
+    flow.stage_along(x, (h, row.len()), term, coordinates)
 }
 
 fn is_zero(v: &impl Vector) -> bool {

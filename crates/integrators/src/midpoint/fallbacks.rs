@@ -243,14 +243,6 @@ where
         {
             solved = self.newton(&whole, &near, &mut best);
         }
-        #[cfg(feature = "argmin")]
-        if all
-            && solved.is_none()
-            && let Some(closer) = super::globaliser::descend(self.equation, &best.best)
-        {
-            self.effort.globalised += 1;
-            solved = self.newton(&whole, &closer, &mut best);
-        }
         solved.ok_or_else(|| {
             let edge = at_edge(self.equation, &best.best);
             let cause = if edge { Cause::Edge } else { Cause::Unsolved };

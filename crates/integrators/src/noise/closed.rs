@@ -2,7 +2,9 @@
 
 use std::ops::Range;
 
-use metriplectic_dynamics::noise::{NoiseTerms, divergence, mismatch, noise_drift, noise_vector};
+use metriplectic_dynamics::noise::{
+    NoiseTerms, divergence, friction_vector, mismatch, noise_drift, noise_vector,
+};
 use metriplectic_dynamics::{Invariants, Metriplectic, SecondLaw, system::Point};
 use metriplectic_fields::{Column as _, ScalarField};
 use metriplectic_manifolds::{Canonical, Riemannian};
@@ -37,6 +39,10 @@ where
 
     fn drift(&self, x: &Point<Y>, _: usize, noise: &Noise<U>) -> Option<Self::Vector> {
         noise_drift(self, x, &noise.measure).ok().filter(|v| v.is_finite()).map(Components)
+    }
+
+    fn friction(&self, x: &Point<Y>) -> Option<Self::Vector> {
+        friction_vector(self, x).ok().filter(|v| v.is_finite()).map(Components)
     }
 
     fn has_drift(&self, _: usize, noise: &Noise<U>) -> bool {

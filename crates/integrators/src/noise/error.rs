@@ -82,13 +82,18 @@ pub enum NoiseError {
     NoiseWithRadau,
     /// Friction is faster than a step.
     #[error(
-        "friction is not resolved: h|K'| = {rate:.1e} exceeds 1, and the law is off by its square; take steps below {below:.1e}"
+        "friction is not resolved: h|K'| exceeds 1 on {steps} of {of} steps, and is {rate:.1e} on the last one; the law is off \
+         by its square; take steps below {below:.1e}"
     )]
     FrictionUnresolved {
         /// `h|K'|`.
         rate: f64,
         /// A step size that resolves it.
         below: f64,
+        /// On how many steps it exceeds 1.
+        steps: u64,
+        /// The steps that were taken.
+        of: u64,
     },
     /// A step was beyond the edge of stability of an explicit method, and was taken in parts.
     #[error(

@@ -47,6 +47,9 @@ pub trait Fluctuating<U>: StageFlow {
     /// it has the factor `T`.
     fn drift(&self, x: &Element<Self>, group: usize, noise: &Noise<U>) -> Option<Self::Vector>;
 
+    /// Computes the velocity `K dS` of the friction at a state, with that of all baths; `None` where it has no value.
+    fn friction(&self, x: &Element<Self>) -> Option<Self::Vector>;
+
     /// Returns whether the kinetic drift of a group may differ from zero.
     fn has_drift(&self, group: usize, noise: &Noise<U>) -> bool;
 

@@ -13,8 +13,8 @@ use crate::step::{
 
 /// How often a flow is halved.
 const HALVES: u32 = 12;
-/// The rate `h|K'|` above which friction is not resolved.
-const RESOLVED: f64 = 1.0;
+/// The least way of the noise, in units of the entries, along which the derivative of friction is measured.
+const LEAST: f64 = 1e-6;
 
 /// A step on its way.
 #[derive(Debug)]
@@ -80,10 +80,6 @@ impl<'a, F: Fluctuating<U>, U, R: Numbers> Moves<'a, F, U, R> {
         self.x = x;
         self.effort += effort;
         let rate = evidence.friction / fraction;
-        if rate > RESOLVED {
-            let below = self.h / rate;
-            return Err(self.failed(NoiseError::FrictionUnresolved { rate, below }));
-        }
         if evidence.stability && effort.splits > 0 {
             return Err(self.failed(NoiseError::StabilityUnresolved));
         }
@@ -118,6 +114,33 @@ impl<'a, F: Fluctuating<U>, U, R: Numbers> Moves<'a, F, U, R> {
         let s = fraction * self.h * noise.k_b;
         self.x = self.followed(group, s, &drift).ok_or_else(none)?;
         Ok(())
+    }
+
+    /// Follows noise fields, and measures `h|K'|` between the ends of their way: explicit methods have no Jacobian that
+    /// would say it, and noise moves the state where friction acts.
+    pub(super) fn fluctuate(
+        &mut self,
+        flows: impl FnOnce(&mut Self) -> Result<(), StepError>,
+    ) -> Result<(), StepError> {
+        let from = self.x.clone();
+        flows(self)?;
+        let rate = self.friction_from(&from).unwrap_or(0.0);
+        self.evidence.friction = self.evidence.friction.max(rate);
+        Ok(())
+    }
+
+    /// `h |K dS(y) − K dS(x)| / |y − x|` from a state `x` to this one, in units of the entries.
+    fn friction_from(&self, x: &Element<F>) -> Option<f64> {
+        let (flow, y, h) = (self.system.flow(), &self.x, self.h);
+        let [at_x, at_y] = [flow.friction(x)?, flow.friction(y)?];
+        let q = flow.stage_coordinates(x, y);
+        let sizes = flow.sizes(x);
+        let distance = q.relative_to(&sizes);
+        let [at_x, at_y] =
+            [flow.stage_rates(x, (&q.zero(), x), &at_x), flow.stage_rates(x, (&q, y), &at_y)];
+        let change = F::Vector::zip([&at_y, &at_x], |[y, x]| h * (y - x));
+        // Where noise hardly moves the state, the change is round-off.
+        (distance > LEAST).then(|| change.relative_to(&sizes) / distance)
     }
 
     /// The flow of one noise field, or of the sum of several of a group, for the times `√(2 k_B h) ξ_r`.

@@ -76,9 +76,9 @@ impl<F: Fluctuating<U>, U, M: Stepper<F>> Sampling<F, U> for NinomiyaVictoir<M> 
         if moves.is_backward() {
             terms.reverse();
         }
-        for (group, r) in terms {
-            moves.noise(group, r..r + 1)?;
-        }
+        moves.fluctuate(|moves| {
+            terms.into_iter().try_for_each(|(group, r)| moves.noise(group, r..r + 1))
+        })?;
         half(moves, 0.5)
     }
 }

@@ -59,9 +59,9 @@ impl<F: Fluctuating<U>, U, M: Stepper<F>> Sampling<F, U> for RandomFlow<M> {
     fn sample<R: Numbers>(&self, moves: &mut Moves<'_, F, U, R>) -> Result<(), StepError> {
         moves.deterministic(&self.0, [0.0, 1.0])?;
         moves.drift(1.0, false)?;
-        for (group, terms) in moves.groups().into_iter().enumerate() {
-            moves.noise(group, terms)?;
-        }
-        Ok(())
+        moves.fluctuate(|moves| {
+            let mut groups = moves.groups().into_iter().enumerate();
+            groups.try_for_each(|(group, terms)| moves.noise(group, terms))
+        })
     }
 }

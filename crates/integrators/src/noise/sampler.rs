@@ -62,14 +62,40 @@ impl<S> Sampler<S> {
     }
 }
 
-/// The memory of a method with random numbers: how many steps have been drawn. The numbers are a function of it.
+/// The memory of a method with random numbers: how many steps have been drawn, of which the numbers are a function, and on how
+/// many of them friction was faster than the step.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct NoiseMemory {
     drawn: u64,
+    unresolved: u64,
 }
 
-/// The name of the number of steps in a checkpoint.
+impl NoiseMemory {
+    /// Counts a step with the rate `h|K'|` of friction.
+    ///
+    /// # Errors
+    ///
+    /// [`NoiseError::FrictionUnresolved`] if it exceeds 1 too often: rare states may be stiff and leave the law as it is.
+    fn count(&mut self, rate: f64, h: f64) -> Result<(), NoiseError> {
+        self.drawn += 1;
+        self.unresolved += u64::from(rate > RESOLVED);
+        if rate > RESOLVED && self.unresolved > FEW + self.drawn / OFTEN {
+            let (below, [steps, of]) = (h / rate, [self.unresolved, self.drawn]);
+            return Err(NoiseError::FrictionUnresolved { rate, below, steps, of });
+        }
+        Ok(())
+    }
+}
+
+/// The rate `h|K'|` above which friction is not resolved.
+const RESOLVED: f64 = 1.0;
+/// How many steps may be unresolved in any run, and beside them one of how many.
+const FEW: u64 = 2;
+const OFTEN: u64 = 8;
+
+/// The names of the numbers of steps in a checkpoint.
 const DRAWN: &str = "steps drawn";
+const UNRESOLVED: &str = "steps with fast friction";
 
 impl Memory for NoiseMemory {
     fn rescaled(&self, _: f64) -> Self {
@@ -82,21 +108,27 @@ impl Memory for NoiseMemory {
 
     fn save(&self, saved: &mut Saved) {
         saved.put(DRAWN, [self.drawn as f64]);
+        saved.put(UNRESOLVED, [self.unresolved as f64]);
     }
 
     fn restore(saved: &Saved) -> Result<Self, RestoreError> {
-        let drawn = saved.get(DRAWN, 1)?.map_or(0.0, |list| list[0]);
-        let is_count = drawn >= 0.0 && drawn.fract() == 0.0 && drawn <= MOST;
-        if !is_count {
-            return Err(RestoreError::Damaged { what: DRAWN, value: drawn });
-        }
-        #[allow(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "it is a whole number below 2⁵³"
-        )]
-        Ok(Self { drawn: drawn as u64 })
+        Ok(Self { drawn: restored(saved, DRAWN)?, unresolved: restored(saved, UNRESOLVED)? })
     }
+}
+
+/// A number of steps in a checkpoint.
+fn restored(saved: &Saved, what: &'static str) -> Result<u64, RestoreError> {
+    let value = saved.get(what, 1)?.map_or(0.0, |list| list[0]);
+    let is_count = value >= 0.0 && value.fract() == 0.0 && value <= MOST;
+    if !is_count {
+        return Err(RestoreError::Damaged { what, value });
+    }
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "it is a whole number below 2⁵³"
+    )]
+    Ok(value as u64)
 }
 
 /// The largest number of steps that a number of a checkpoint counts.
@@ -144,8 +176,12 @@ where
     ) -> Result<Taken<Noisy<F, U>>, StepError> {
         let mut moves = Moves::from(system, start, h, (&self.numbers, memory.drawn));
         self.sampling.sample(&mut moves)?;
-        memory.drawn += 1;
-        Ok(moves.taken())
+        let taken = moves.taken();
+        memory.count(taken.evidence.friction, h).map_err(|error| StepError::Method {
+            time: start.time,
+            error: MethodError::new(error),
+        })?;
+        Ok(taken)
     }
 
     fn attempt(

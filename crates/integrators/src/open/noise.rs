@@ -7,7 +7,8 @@ use std::ops::Range;
 
 use metriplectic_dynamics::exchange::{BathTerm, Entries as _, ExchangeArgs, ExchangeTerms};
 use metriplectic_dynamics::noise::{
-    NoiseTerm, NoiseTerms, Place, kinetic_drift, noise_drift, noise_vector, place, seeded_place,
+    NoiseTerm, NoiseTerms, Place, friction_vector, kinetic_drift, noise_drift, noise_vector, place,
+    seeded_place,
 };
 use metriplectic_dynamics::{Dissipation as _, Invariants, Metriplectic, SecondLaw};
 use metriplectic_fields::{Column as _, Real, ScalarField, Vector};
@@ -61,6 +62,18 @@ where
                 r += 1;
             },
         )?;
+        Ok(sum)
+    }
+
+    /// Computes the velocity of the friction of all baths, `Σ ρ_r b_r ⟨b_r, T dS − dH⟩`.
+    fn bath_friction(&self, x: &StateOf<Y>) -> Result<VectorOf<Y>, MetricError> {
+        let place = place(&self.without_exchange(x.time), &x.x);
+        let mut sum = VectorOf::<Y>::zero();
+        self.each_bath_term(x.time, &place, &mut |BathTerm { temperature, term, .. }| {
+            let NoiseTerm { rate, b } = term;
+            let force = temperature * b.dot(&place.s).re - b.dot(&place.w).re;
+            sum += b.real::<VectorOf<Y>>() * (rate.re * force);
+        })?;
         Ok(sum)
     }
 
@@ -134,6 +147,12 @@ where
             None => noise_drift(&self.without_exchange(x.time), &x.x, &noise.measure),
             Some(bath) => self.bath_drift(x, bath, &noise.measure),
         };
+        v.ok().filter(|v| v.is_finite()).map(OpenVector::of)
+    }
+
+    fn friction(&self, x: &StateOf<Y>) -> Option<Self::Vector> {
+        let own = friction_vector(&self.without_exchange(x.time), &x.x);
+        let v = own.and_then(|own| Ok(own + self.bath_friction(x)?));
         v.ok().filter(|v| v.is_finite()).map(OpenVector::of)
     }
 

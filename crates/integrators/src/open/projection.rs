@@ -8,7 +8,7 @@ use super::clock::Clock;
 use super::state::{Booked, OpenState};
 use super::system::{Direction, OpenSystem, StateOf};
 use super::vector::OpenVector;
-use crate::explicit::{Projected, ProjectionError, StageFlow, Target};
+use crate::explicit::{Limit, Projected, ProjectionError, StageFlow, Target};
 use crate::step::{CountOf, Dim, Laws, Numbers};
 use crate::system::{JetsOf, LawJets};
 
@@ -93,12 +93,13 @@ where
         let OpenState { x, time, ledger } = y;
         let (laws, of_baths) = (ledger.targets(target.laws), ledger.entropy_of_baths());
         let has_entropy = self.closed().second_law() == SecondLaw::Exact;
-        let [limit, units, error] = [target.limit, target.units, target.error]
-            .map(|direction| direction.map(Self::components));
+        let [units, error] =
+            [target.units, target.error].map(|direction| direction.map(Self::components));
+        let limit = target.limit.map(|limit| Self::components(&limit.entries()));
         let inner = Target {
             laws: &laws,
             with_entropy: target.with_entropy && has_entropy,
-            limit: limit.as_ref(),
+            limit: limit.as_ref().map(Limit::Entries),
             units: units.as_ref(),
             error: error.as_ref(),
         };

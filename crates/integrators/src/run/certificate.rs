@@ -202,6 +202,9 @@ impl InvariantBalance {
 /// deviation that decays at this rate, with the opposite sign.
 const STIFF: f64 = 10.0;
 
+/// This rate from which on the law of thermal noise is not resolved.
+const RESOLVED: f64 = 1.0;
+
 #[cfg(feature = "serde")]
 fn by_name<S: serde::Serializer>(name: &impl fmt::Debug, to: S) -> Result<S::Ok, S::Error> {
     to.collect_str(&format_args!("{name:?}"))
@@ -396,10 +399,11 @@ impl Certificate {
 
     /// Returns whether no step is known to be too long for the motion: the local errors that were estimated are below a tenth of
     /// the state, friction is [damped](Self::is_stiff), and damping has added at most a hundredth of what the entropy
-    /// gained.
+    /// gained. With noise no rate of friction exceeds 1.
     pub fn is_resolved(&self) -> bool {
         let is_followed = self.local_error.is_none_or(|error| error <= UNRESOLVED);
-        is_followed && !self.is_stiff() && !self.skips_a_transient()
+        let is_sampled = self.noise.is_none() || self.friction <= RESOLVED;
+        is_followed && is_sampled && !self.is_stiff() && !self.skips_a_transient()
     }
 
     /// Returns whether damping has added more than a hundredth of what the entropy gained, beyond round-off.

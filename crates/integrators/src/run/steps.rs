@@ -210,9 +210,11 @@ impl<'a, F: Flow, M: Stepper<F>> Steps<'a, F, M> {
         self.course.progress.scales = self.course.progress.scales.or(&sizes);
         let sizes = self.course.progress.scales.sizes.clone();
         let norm = |error: &F::Vector| {
-            let above =
-                F::Vector::zip([error, &sizes], |[error, s]| (error.abs() - ROUNDED * s).max(0.0));
-            relative(&above, &sizes)
+            // In one pass, without an array of the numbers.
+            F::Vector::norm_of([error, &sizes], |[error, s]| {
+                let above = (error.abs() - ROUNDED * s).max(0.0);
+                if above == 0.0 { 0.0 } else { above / s }
+            })
         };
         let reference = self.course.reference(self.course.entropy);
         let step =

@@ -10,13 +10,12 @@ use super::{Effort, FlowError, JumpError, MethodError};
 
 impl fmt::Display for Effort {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { iterations, continued, globalised, splits } = self;
+        let Self { iterations, continued, splits } = self;
         write!(
             f,
-            "{}, {} in the step size, {} of the globaliser and {} of the step",
+            "{}, {} in the step size and {} of the step",
             counted(*iterations, "Newton iteration", "Newton iterations"),
             counted(*continued, "continuation", "continuations"),
-            counted(*globalised, "call", "calls"),
             counted(*splits, "halving", "halvings"),
         )
     }

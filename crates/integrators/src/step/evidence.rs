@@ -141,8 +141,6 @@ pub struct Effort {
     pub iterations: usize,
     /// How often a step was approached through smaller ones from the same start.
     pub continued: usize,
-    /// How often the globaliser was called.
-    pub globalised: usize,
     /// How often a step, or a part of it, was split in halves.
     pub splits: usize,
 }
@@ -151,7 +149,6 @@ impl std::ops::AddAssign for Effort {
     fn add_assign(&mut self, other: Self) {
         self.iterations += other.iterations;
         self.continued += other.continued;
-        self.globalised += other.globalised;
         self.splits += other.splits;
     }
 }

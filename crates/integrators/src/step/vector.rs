@@ -74,6 +74,16 @@ pub trait Vector: Clone + Debug {
         numbers.relative_to(&numbers.map(|_| 1.0))
     }
 
+    /// Two such norms, in one pass where that is cheaper.
+    #[must_use]
+    #[inline]
+    fn norms_of<const K: usize>(
+        vectors: [&Self; K],
+        f: impl Fn([f64; K]) -> [f64; 2] + Sync,
+    ) -> [f64; 2] {
+        [0, 1].map(|which| Self::norm_of(vectors, |numbers| f(numbers)[which]))
+    }
+
     /// The norm of the ratios `v_i/s_i` to the sizes `s_i`, where `0/0 = 0`; NaN if a ratio is.
     ///
     /// The default is the Euclidean norm, which bounds each ratio and which no rotation of the frame of a curved

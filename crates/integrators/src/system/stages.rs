@@ -240,7 +240,7 @@ impl<Y: Metriplectic> Projection<'_, Y> {
             }
             let correction = normals.correction(target.with_entropy, is_off);
             moved += correction.magnitude();
-            let limit = target.limit.map(|limit| in_units(&limit.0, &units).magnitude());
+            let limit = target.limit.map(|limit| in_units(&limit.entries().0, &units).magnitude());
             if !moved.is_finite() || limit.is_some_and(|limit| moved > limit) {
                 return Err(ProjectionError::Far);
             }

@@ -28,7 +28,7 @@ pub(super) struct Part<D: Differentiable> {
 impl<D: Differentiable> Part<D> {
     pub(super) fn new(start: &StepStart<'_, D>, ended: &Ended<'_, D>) -> Self {
         let allowed = start.allowed.as_ref().map(widened::<D>);
-        let (x, end, reference) = (start.x.clone(), ended.end.clone(), start.reference.clone());
+        let (x, end, reference) = (start.x.clone(), ended.end.clone(), start.reference);
         Self {
             x,
             end,

@@ -144,6 +144,10 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
 
 impl<Y: Metriplectic> Both<Y> {
     /// `J = E A⁻¹ B F⁻¹`, and `∂x'/∂h`.
+    #[allow(
+        clippy::type_complexity,
+        reason = "a derivative and its column along h, which the caller takes apart"
+    )]
     fn derivative(&self, h: f64) -> Option<(Matrix<Y::Manifold>, Vector<Y::Manifold>)> {
         let Self { a, b, e, f, d, units } = self;
         let a = scaled::<Y>(a, units).factor()?;

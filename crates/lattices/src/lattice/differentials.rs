@@ -1,14 +1,20 @@
 //! The differentials of energy and entropy, and their totals.
 
+use std::sync::atomic::Ordering;
+
 use metriplectic_fields::{Column, Jet1, Vector};
 use metriplectic_manifolds::{Manifold, Product, Times};
 use nalgebra::SVector;
 
-use super::{Differentials, Lattice, Totals, dimension, larger, width};
+use super::at_sites::width;
+use super::{Differentials, Lattice, Total, Totals, dimension, larger};
 use crate::gather::Gather;
 use crate::model::{Model, PairManifold, PointOf, VectorOf};
 use crate::parallel;
 use crate::pool::Buffer;
+
+/// The conserved sums up to which a loop over sites keeps their totals in registers.
+const FEW: usize = 4;
 
 /// What a bond gives to each of its sites.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -72,6 +78,16 @@ fn halves<P: Model>(df: &Vector<PairManifold<P>>) -> [VectorOf<P>; 2] {
     [0, n].map(|start| VectorOf::<P>::from_index(|k| df[start + k]))
 }
 
+/// Whether two vectors have the same bits.
+#[inline]
+fn has_bits_of<V: Column<f64>>(a: &V, b: &V) -> bool {
+    let mut differ = 0;
+    for k in 0..V::LEN {
+        differ |= a[k].to_bits() ^ b[k].to_bits();
+    }
+    differ == 0
+}
+
 impl<P: Model> Lattice<P> {
     /// A place for what bonds give to other chunks.
     pub(crate) fn slots(&self, given: Given) -> Buffer<f64> {
@@ -122,9 +138,35 @@ impl<P: Model> Lattice<P> {
         &self,
         x: &[PointOf<P>],
     ) -> (Differentials, Totals<VectorOf<P>>) {
-        let n = dimension::<P>();
-        let mut all = self.differentials.numbers(self.layout.reach() * width::<P>());
-        let own = &mut all[..self.sites() * width::<P>()];
+        // Parts of a lattice would have to agree on what they exchange.
+        let may_be_same = P::ENTROPY
+            && !P::EntropyGather::PRESENT
+            && self.layout.is_whole()
+            && !self.entropy_differs.load(Ordering::Relaxed);
+        if may_be_same && let Some(first) = x.first() {
+            let df = self.parts.entropy(0, first).df;
+            let (all, totals, differs) = self.differentials_with::<TOTALS>(x, Some(&df));
+            if !differs {
+                return (all, totals);
+            }
+            self.entropy_differs.store(true, Ordering::Relaxed);
+            // Those of the other width serve nobody any more.
+            self.differentials.clear();
+        }
+        let (all, totals, _) = self.differentials_with::<TOTALS>(x, None);
+        (all, totals)
+    }
+
+    /// The differentials with `same` for the one of the entropy at all sites, and whether it differs at a site; without it,
+    /// each site has its own.
+    fn differentials_with<const TOTALS: bool>(
+        &self,
+        x: &[PointOf<P>],
+        same: Option<&VectorOf<P>>,
+    ) -> (Differentials, Totals<VectorOf<P>>, bool) {
+        let (n, width) = (dimension::<P>(), width::<P>(same.is_some()));
+        let mut all = self.differentials.numbers(self.layout.reach() * width);
+        let own = &mut all[..self.sites() * width];
         let bonds = self.layout.bonds();
         let gathers = self.parts.gathers();
         let energy_sums = self.gathered(&gathers.energy, x);
@@ -133,18 +175,23 @@ impl<P: Model> Lattice<P> {
         let given = Given::by_functions::<P>();
         let totals = self.layout.scatter(own, &mut self.slots(given), |mut part| {
             let mut totals = Totals::new(if TOTALS { P::SUMS } else { 0 });
+            let mut sums = [Total::default(); FEW];
             for site in part.sites.clone() {
                 let point = &x[site];
                 let mut energy = self.parts.energy(site, point);
                 let gathered = embed(&gathers.energy, point, energy_sums, site, &mut energy.df);
                 part.set(site, 0, &energy.df);
+                let scales =
+                    if TOTALS { P::Manifold::scales(point) } else { VectorOf::<P>::zero() };
                 if TOTALS {
                     if P::EnergyGather::PRESENT {
                         totals.energy.add(gathered);
                     }
                     totals.energy.add(energy.value);
-                    totals.sizes = larger(&totals.sizes, &P::Manifold::scales(point));
-                    for (k, sum) in totals.sums.iter_mut().enumerate() {
+                    totals.sizes = larger(&totals.sizes, &scales);
+                    let sums =
+                        if P::SUMS <= FEW { &mut sums[..P::SUMS] } else { &mut *totals.sums };
+                    for (k, sum) in sums.iter_mut().enumerate() {
                         sum.add(self.parts.sum(k, site, point).value);
                     }
                 }
@@ -152,16 +199,25 @@ impl<P: Model> Lattice<P> {
                     let mut entropy = self.parts.entropy(site, point);
                     let gathered =
                         embed(&gathers.entropy, point, entropy_sums, site, &mut entropy.df);
-                    part.set(site, n, &entropy.df);
+                    match same {
+                        Some(same) => totals.entropy_differs |= !has_bits_of(&entropy.df, same),
+                        None => part.set(site, n, &entropy.df),
+                    }
                     if TOTALS {
                         if P::EntropyGather::PRESENT {
                             totals.entropy.add(gathered);
                         }
                         totals.entropy.add(entropy.value);
+                        if !P::EntropyGather::PRESENT {
+                            totals.entropy_slope += entropy.df.abs().dot(&scales);
+                        }
                     }
                 }
             }
-            if given == Given::Nothing {
+            if TOTALS && P::SUMS <= FEW {
+                totals.sums.copy_from_slice(&sums[..P::SUMS]);
+            }
+            if given == Given::Nothing || totals.entropy_differs {
                 return totals;
             }
             for bond in part.bonds.clone() {
@@ -183,10 +239,13 @@ impl<P: Model> Lattice<P> {
             }
             totals
         });
+        let differs = totals.iter().any(|part| part.entropy_differs);
         if P::BOND_FRICTION {
             self.layout.fill_ghosts(&mut all);
         }
         let totals = if TOTALS { self.layout.sum(totals, |a, b| a.merge(&b)) } else { None };
-        (all, totals.unwrap_or_else(|| Totals::new(P::SUMS)))
+        let totals = totals.unwrap_or_else(|| Totals::new(P::SUMS));
+        let entropy = same.map(|df| (0..n).map(|k| df[k]).collect());
+        (Differentials { numbers: all, entropy }, totals, differs)
     }
 }

@@ -7,7 +7,7 @@ use metriplectic_fields::Column;
 
 use super::OpenLattice;
 use crate::double::Double;
-use crate::lattice::differentials_at;
+use crate::lattice::{Differentials, differentials_at};
 use crate::model::{Model, PointOf, VectorOf};
 use crate::onsager::{Onsager, SiteState};
 use crate::parallel;
@@ -101,7 +101,7 @@ impl<P: Model> OpenLattice<P> {
         &self,
         t: f64,
         x: &[PointOf<P>],
-        all: &[f64],
+        all: &Differentials,
     ) -> Exchanged<VectorOf<P>> {
         let mut exchanged =
             Exchanged { velocities: Vec::new(), entries: Vec::new(), production: 0.0 };

@@ -8,6 +8,7 @@ use super::parts::Exchanged;
 use super::vector::OpenSiteVector;
 use super::{OpenLattice, StateOf};
 use crate::flow::LatticeJets;
+use crate::lattice::Differentials;
 use crate::model::{Model, VectorOf};
 use crate::points::Points;
 
@@ -28,7 +29,7 @@ impl<P: Model> OpenLattice<P> {
         &self,
         t: f64,
         x: &Points<P::Manifold>,
-        all: &[f64],
+        all: &Differentials,
     ) -> Option<(OpenSiteVector, f64)> {
         let (mut v, internal) = self.lattice.motion_along(x, all)?;
         let Exchanged { velocities, entries, production } = self.exchanged(t, x, all);
@@ -121,7 +122,7 @@ impl<P: Model> StageFlow for OpenLattice<P> {
         let inner = Target {
             laws: &laws,
             with_entropy: target.with_entropy && P::ENTROPY,
-            limit: target.limit.map(|v| &v.v),
+            limit: target.limit.map(|limit| limit.map(|v: &OpenSiteVector| &v.v)),
             units: target.units.map(|v| &v.v),
             error: target.error.map(|v| &v.v),
         };

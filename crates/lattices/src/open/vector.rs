@@ -76,6 +76,13 @@ impl Vector for OpenSiteVector {
         SiteVector::norm_of(vectors.map(|v| &v.v), f)
     }
 
+    fn norms_of<const K: usize>(
+        vectors: [&Self; K],
+        f: impl Fn([f64; K]) -> [f64; 2] + Sync,
+    ) -> [f64; 2] {
+        SiteVector::norms_of(vectors.map(|v| &v.v), f)
+    }
+
     fn sites(&self) -> Option<usize> {
         self.v.sites()
     }

@@ -8,7 +8,7 @@ use metriplectic_manifolds::Manifold;
 
 use super::parts::{AtSite, Part};
 use super::{OpenLattice, StateOf};
-use crate::lattice::differentials_at;
+use crate::lattice::{Differentials, differentials_at};
 use crate::model::{Model, VectorOf};
 
 /// The slope of a law along a velocity, relative to its terms, that is no round-off.
@@ -58,7 +58,7 @@ impl<P: Model> OpenLattice<P> {
         &self,
         part: &Part<P>,
         state: &StateOf<P>,
-        all: &[f64],
+        all: &Differentials,
     ) -> Result<(), ModelError> {
         let time = state.time;
         let entries = |site: usize| P::Manifold::entries(&state.x[site]);

@@ -1,8 +1,8 @@
-//! What the page of guarantees promises, and where.
+//! The promises of the page of guarantees, and where they stand.
 
 use serde::{Deserialize, Serialize};
 
-/// What one table of the report holds, in the order of the page of guarantees.
+/// The subject of a table of the report, in the order of the page of guarantees.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub enum Guarantee {
     /// The first law.
@@ -35,7 +35,7 @@ pub enum Guarantee {
     RandomInput,
     /// Lattices.
     ManySites,
-    /// The same bits.
+    /// Equal bits.
     Reproducibility,
     /// Many runs in one table.
     Sweeps,
@@ -43,13 +43,17 @@ pub enum Guarantee {
     Allocation,
     /// Friction faster than a step.
     StiffFriction,
+    /// Thermal noise.
+    Noise,
+    /// Derivatives of runs, and fits.
+    Derivatives,
 }
 
 /// A guarantee in words.
 pub(super) struct Facts {
     /// The heading of its table.
     pub(super) heading: &'static str,
-    /// What the sentences of the page that it holds begin with, or contain.
+    /// The words that sentences of the page begin with, or contain, where it holds them.
     pub(super) sentences: &'static [&'static str],
     /// Figures of the gallery that show it.
     pub(super) figures: &'static [&'static str],
@@ -57,7 +61,7 @@ pub(super) struct Facts {
 
 impl Guarantee {
     /// All of them.
-    pub(super) const ALL: [Self; 19] = [
+    pub(super) const ALL: [Self; 21] = [
         Self::Energy,
         Self::Entropy,
         Self::Invariants,
@@ -77,6 +81,8 @@ impl Guarantee {
         Self::Sweeps,
         Self::Allocation,
         Self::StiffFriction,
+        Self::Noise,
+        Self::Derivatives,
     ];
 
     /// Its heading, its sentences and its figures.
@@ -201,6 +207,23 @@ impl Guarantee {
                 "Friction faster than a step is damped by `Radau` and named with the others",
                 &["is damped by `Radau` alone", "With every other method it is not"],
                 &["colloid"],
+            ),
+            Self::Noise => (
+                "Thermal noise samples its law with the order of its method",
+                &[
+                    "A path with thermal noise keeps its energy",
+                    "Means over paths, and the law that they sample",
+                    "Friction that is faster than a step is an error",
+                ],
+                &["thermal_rigid_body", "fluctuating_heat"],
+            ),
+            Self::Derivatives => (
+                "Derivatives are those of the steps, and errors of fits are as large as they say",
+                &[
+                    "The tangent of a run is the derivative of the steps",
+                    "The joint ellipsoid of 95 % holds the truth",
+                ],
+                &["fit_rigid_body", "fit_metric"],
             ),
         };
         Facts { heading, sentences, figures }

@@ -17,7 +17,7 @@ pub enum VerificationError {
     /// A claim names a test that there is not.
     #[error("`{test}` is no test: there is no `fn {name}` in tests/{file}.rs")]
     NoTest {
-        /// What the claim names.
+        /// The name in the claim.
         test: String,
         /// Its file.
         file: String,
@@ -32,7 +32,7 @@ pub enum VerificationError {
     NoSentence {
         /// The guarantee.
         guarantee: Guarantee,
-        /// What it looks for.
+        /// The text that it looks for.
         part: &'static str,
     },
     /// A sentence that names a test is held by nothing.
@@ -177,7 +177,7 @@ fn holds(sentences: &[String]) -> Result<(), VerificationError> {
     unheld.map_or(Ok(()), |sentence| Err(VerificationError::Unheld(sentence.clone())))
 }
 
-/// That `file::name` is a function of `tests/file.rs`.
+/// Accepts `file::name` if it is a function of `tests/file.rs`.
 fn has_test(test: &str, root: &Path) -> Result<(), VerificationError> {
     let (file, name) = test.split_once("::").unwrap_or((test, ""));
     let source = fs::read_to_string(root.join(format!("tests/{file}.rs"))).unwrap_or_default();
@@ -251,7 +251,7 @@ mod tests {
         let recipes = read("justfile");
         let recipe = recipes.split("\nreport:").nth(1).expect("a recipe `report`");
         let recipe = recipe.split("\n\n").next().expect("its lines");
-        assert!(recipe.contains("grep -l 'Claim::new' tests/*.rs"), "{recipe}");
+        assert!(recipe.contains("grep -rl --include='*.rs' 'Claim::new' tests"), "{recipe}");
         let mut targets = String::new();
         for (package, manifest, path) in [
             ("metriplectic-tests", "tests/Cargo.toml", "path = \""),
@@ -271,6 +271,9 @@ mod tests {
                     && fs::read_to_string(&path).expect("a test").contains("Claim::new")
                 {
                     let file = path.strip_prefix(root().join("tests")).expect("it is inside");
+                    // A folder is one target, with its name.
+                    let folder = file.parent().filter(|folder| folder.iter().count() > 0);
+                    let file = folder.map_or(file.to_owned(), |folder| folder.join("main.rs"));
                     let target = format!("target {}\"", file.display());
                     assert!(targets.contains(&target), "no package of the recipe has {target}");
                     files += 1;

@@ -1,4 +1,4 @@
-//! What is measured on every problem: orders, large steps, and both schemes side by side.
+//! Measurements on every problem: orders, large steps, and both schemes side by side.
 
 use metriplectic_dynamics::{Metriplectic, SecondLaw};
 use metriplectic_fields::Space as _;
@@ -19,7 +19,7 @@ pub struct Orders {
     pub expected: Vec<f64>,
     /// The worst energy error of any step, relative to `|H|` or to the unit of energy, 1, if that is larger.
     pub energy_error: f64,
-    /// What went wrong, where an order could not be fitted.
+    /// The fault, where an order could not be fitted.
     pub failures: Vec<String>,
 }
 
@@ -49,7 +49,7 @@ impl Orders {
         all
     }
 
-    /// Those of canonical metrics, with geodesics in closed form.
+    /// The orders of canonical metrics, with geodesics in closed form.
     #[inline]
     pub fn canonical() -> Self {
         let mut orders = Self::new(40);
@@ -57,7 +57,7 @@ impl Orders {
         orders
     }
 
-    /// Those of metrics from closures, with numerical geodesics.
+    /// The orders of metrics from closures, with numerical geodesics.
     #[inline]
     pub fn closures() -> Self {
         let mut orders = Self::new(15);
@@ -65,7 +65,7 @@ impl Orders {
         orders
     }
 
-    /// Those of products.
+    /// The orders of products.
     #[inline]
     pub fn products() -> Self {
         let mut orders = Self::new(15);
@@ -77,7 +77,7 @@ impl Orders {
 /// Steps that are far too large for accuracy, of each retraction on every problem.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LargeSteps {
-    /// Those of each problem and scheme.
+    /// The figures of each problem and scheme.
     pub rows: Vec<Strides>,
 }
 
@@ -95,7 +95,7 @@ pub struct Strides {
 }
 
 impl LargeSteps {
-    /// Those of every problem.
+    /// The figures of every problem.
     #[inline]
     pub fn of_every_problem() -> Self {
         let mut study = Self::default();

@@ -18,7 +18,7 @@ const ONE_FALL: Certificate = Certificate {
     falls_avoided: 0,
     projected_steps: ProjectedSteps { targeted: 0, free: 0, held: 0, stability: 0 },
     stages: None,
-    effort: Effort { iterations: 9, continued: 0, globalised: 0, splits: 1 },
+    effort: Effort { iterations: 9, continued: 0, splits: 1 },
     worst_iterations: 2,
     local_error: None,
     misjudged_size: None,

@@ -5,7 +5,8 @@ use std::fmt;
 use metriplectic_dynamics::SecondLaw;
 
 use super::{
-    Certificate, InvariantBalance, MisjudgedSize, ProjectedSteps, StageBalance, UNRESOLVED,
+    Certificate, InvariantBalance, MisjudgedSize, ProjectedSteps, RESOLVED, StageBalance,
+    UNRESOLVED,
 };
 use crate::round_off::bound::of_a_law;
 use crate::run::jump::JumpBalance;
@@ -50,7 +51,13 @@ impl fmt::Display for Certificate {
         if self.projected {
             writeln!(f, "friction:    projected so that K dH = 0, not quite the tensor given")?;
         }
-        if self.is_stiff() {
+        if self.noise.is_some() && self.friction > RESOLVED {
+            writeln!(
+                f,
+                "friction not resolved: h|K'| = {:.1e} in the worst step; the law is off by its square where it exceeds 1",
+                self.friction
+            )?;
+        } else if self.is_stiff() {
             writeln!(f, "friction not damped: h|K'| = {:.1e}; `Radau` damps it", self.friction)?;
         }
         for (index, kept) in self.invariants.iter().enumerate() {
@@ -137,9 +144,6 @@ impl fmt::Display for Certificate {
         if self.effort.continued > 0 {
             let steps = counted(self.effort.continued, "continuation", "continuations");
             write!(f, ", {steps} in the step size")?;
-        }
-        if self.effort.globalised > 0 {
-            write!(f, ", {} of the globaliser", counted(self.effort.globalised, "call", "calls"))?;
         }
         Ok(())
     }

@@ -1,0 +1,314 @@
+//! Losses over runs, with gradients for argmin's solvers.
+
+use std::cell::RefCell;
+use std::fmt;
+
+use argmin::core::{CostFunction, Error, Executor, Gradient, State as _};
+use argmin::solver::linesearch::MoreThuenteLineSearch;
+use argmin::solver::quasinewton::LBFGS;
+use metriplectic_dynamics::{Differentiable, Parametrised, Point};
+use metriplectic_fields::{Real, Space};
+use metriplectic_integrators::tangent::Linearised;
+use metriplectic_integrators::{Adjoints as _, Method as _, Schedule, Stepper, Watch as _};
+use nalgebra::SVector;
+
+use crate::error::FitError;
+use crate::model::{Failure, ManifoldOf, PointOf};
+
+/// A loss over runs of a family, as a function of the parameters:
+///
+/// ```math
+/// \ell(\theta) = \sum_i \sum_k \ell_{ik}\bigl( x_i(t_k; \theta) \bigr) ,
+/// ```
+///
+/// with one run for each start `i` and a term for each time `k`. Its gradient is that of the discrete steps, by their
+/// [adjoint](metriplectic_integrators::Adjoints): the price does not grow with the number of parameters. [`minimise`](LossOver::minimise) is
+/// argmin's L-BFGS (Liu and Nocedal 1989) with the line search of Moré and Thuente (1994). For few parameters and their errors,
+/// [`Fit`](crate::Fit) is the better tool.
+///
+/// A [`LossOver`] is an argmin problem ([`CostFunction`] and [`Gradient`] of a `Vec<f64>`), for its other solvers, observers and
+/// checkpoints.
+///
+/// ```
+/// use metriplectic_dynamics::{Family, Symplectic};
+/// use metriplectic_fields::Real;
+/// use metriplectic_fitting::Loss;
+/// use metriplectic_integrators::{DormandPrince5, Method, Span, Watch};
+/// use metriplectic_manifolds::Euclidean;
+/// use nalgebra::{Vector2, vector};
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let spring = Family::on(Euclidean::<2>)
+///     .parameters(["stiffness", "hardening"])
+///     .bracket(Symplectic)
+///     .energy(|x: &Vector2<Real>, t: &Vector2<Real>| {
+///         x.y * x.y * 0.5 + x.x * x.x * t.x * 0.5 + x.x * x.x * x.x * x.x * t.y * 0.25
+///     })
+///     .build()?;
+///
+/// // What was measured, from two starts: here two runs.
+/// let (starts, times) = ([vector![1.0, 0.0], vector![0.0, 1.5]], [1.0, 2.0, 3.0]);
+/// let span = Span::steps(0.1, 30);
+/// let truth = spring.at(vector![1.5, 0.4]);
+/// let data = starts.map(|x0| DormandPrince5.run(&truth, x0, span.output_at(times)).unwrap());
+///
+/// let loss = Loss::of(&spring)
+///     .starts(&starts)
+///     .times(&times)
+///     .term(|i, k, x: &Vector2<Real>| {
+///         (x - data[i].states()[k + 1].point.map(Real::from)).norm_squared()
+///     })
+///     .over(DormandPrince5, span);
+/// let found = loss.minimise(vector![1.0, 0.0], 50)?;
+/// assert!((found.parameters - vector![1.5, 0.4]).norm() < 1e-5 && found.value < 1e-9);
+/// # Ok(())
+/// # }
+/// ```
+pub struct Loss<'a, Y: Parametrised<P>, T, const P: usize> {
+    family: &'a Y,
+    starts: Vec<Point<Y::System>>,
+    times: Vec<f64>,
+    term: T,
+}
+
+impl<Y: Parametrised<P>, T, const P: usize> fmt::Debug for Loss<'_, Y, T, P> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Loss")
+            .field("runs", &self.starts.len())
+            .field("times", &self.times.len())
+            .finish_non_exhaustive()
+    }
+}
+
+impl<'a, Y: Parametrised<P>, const P: usize> Loss<'a, Y, (), P> {
+    /// Starts a loss over runs of a family.
+    pub const fn of(family: &'a Y) -> Self {
+        Self { family, starts: Vec::new(), times: Vec::new(), term: () }
+    }
+}
+
+impl<'a, Y: Parametrised<P>, T, const P: usize> Loss<'a, Y, T, P> {
+    /// Sets the starts of the runs.
+    #[must_use]
+    pub fn starts(self, starts: &[Point<Y::System>]) -> Self {
+        Self { starts: starts.to_vec(), ..self }
+    }
+
+    /// Sets the times of the terms, which rise and come after the start.
+    #[must_use]
+    pub fn times(self, times: &[f64]) -> Self {
+        Self { times: times.to_vec(), ..self }
+    }
+
+    /// Sets the terms, a closure `|i, k, x| -> Real` of the number of the run, the number of the time, and the state.
+    pub fn term<F>(self, term: F) -> Loss<'a, Y, F, P>
+    where
+        F: Fn(usize, usize, &PointOf<Y, Real, P>) -> Real,
+    {
+        let Self { family, starts, times, .. } = self;
+        Loss { family, starts, times, term }
+    }
+
+    /// Says how runs are taken: by a method over a schedule.
+    pub fn over<M>(self, method: M, schedule: impl Into<Schedule>) -> LossOver<'a, Y, T, M, P> {
+        let schedule = schedule.into().output_at(self.times.iter().copied());
+        LossOver { loss: self, method, schedule }
+    }
+}
+
+/// A loss over runs by a method: a problem for argmin.
+pub struct LossOver<'a, Y: Parametrised<P>, T, M, const P: usize> {
+    loss: Loss<'a, Y, T, P>,
+    method: M,
+    schedule: Schedule,
+}
+
+impl<Y: Parametrised<P>, T, M, const P: usize> fmt::Debug for LossOver<'_, Y, T, M, P> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("LossOver").field("loss", &self.loss).finish_non_exhaustive()
+    }
+}
+
+/// A minimum of a loss, as far as it was found.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Minimised<const P: usize> {
+    /// The parameters of the least loss that was found.
+    pub parameters: SVector<f64, P>,
+    /// The loss there.
+    pub value: f64,
+    /// The iterations that were made.
+    pub iterations: u64,
+    /// The evaluations of the loss.
+    pub losses: u64,
+    /// The evaluations of its gradient.
+    pub gradients: u64,
+}
+
+/// Pairs of differences that L-BFGS remembers.
+const MEMORY: usize = 10;
+
+impl<Y, T, M, const P: usize> LossOver<'_, Y, T, M, P>
+where
+    Y: Parametrised<P>,
+    T: Fn(usize, usize, &PointOf<Y, Real, P>) -> Real,
+    M: Clone + Stepper<Y::System> + Linearised<<Y::System as Differentiable>::Wide>,
+{
+    /// Evaluates the loss.
+    ///
+    /// # Errors
+    ///
+    /// The error of a run.
+    pub fn value(&self, theta: &SVector<f64, P>) -> Result<f64, Failure> {
+        let system = self.loss.family.at_parameters(*theta);
+        let mut sum = 0.0;
+        for (i, start) in self.loss.starts.iter().enumerate() {
+            let run = self.method.clone().run(&system, start.clone(), self.schedule.clone())?;
+            let states = run.states();
+            let first = states.len().saturating_sub(self.loss.times.len());
+            for (k, state) in states[first..].iter().enumerate() {
+                sum += (self.loss.term)(i, k, &ManifoldOf::<Y, P>::constant(&state.point)).re;
+            }
+        }
+        Ok(sum)
+    }
+
+    /// Evaluates the loss and its gradient along the parameters.
+    ///
+    /// # Errors
+    ///
+    /// The error of a run, or of its derivative.
+    pub fn gradient_at(&self, theta: &SVector<f64, P>) -> Result<(f64, SVector<f64, P>), Failure> {
+        let system = self.loss.family.at_parameters(*theta);
+        let (mut sum, mut slope) = (0.0, SVector::zeros());
+        for (i, start) in self.loss.starts.iter().enumerate() {
+            let run = self.method.clone().adjoint(&system, start.clone(), self.schedule.clone())?;
+            let first = run.states().len().saturating_sub(self.loss.times.len());
+            let loss = run.gradient(|k, x| match k.checked_sub(first) {
+                Some(k) => (self.loss.term)(i, k, x),
+                None => Real::from(0.0),
+            })?;
+            sum += loss.value;
+            slope += SVector::<f64, P>::from_column_slice(loss.along_parameters().as_slice());
+        }
+        Ok((sum, slope))
+    }
+
+    /// Minimises the loss from a guess by argmin's L-BFGS, in at most so many iterations.
+    ///
+    /// Parameters without a run have an infinite loss. The search may end before its last iteration, at a minimum or where no step
+    /// along the gradient lowers the loss any more.
+    ///
+    /// # Errors
+    ///
+    /// [`FitError::Guess`] if there is no run or no derivative at the guess.
+    pub fn minimise(
+        &self,
+        guess: SVector<f64, P>,
+        iterations: u64,
+    ) -> Result<Minimised<P>, FitError> {
+        let (value, mut slope) = self.gradient_at(&guess).map_err(FitError::Guess)?;
+        let best = RefCell::new((value, guess));
+        let [mut taken, mut losses, mut gradients] = [0, 0, 1];
+        while taken < iterations {
+            let (before, start) = *best.borrow();
+            let problem = Watched { loss: self, best: &best, unit: unit(&start, &slope) };
+            let solver = LBFGS::new(MoreThuenteLineSearch::new(), MEMORY);
+            let start = start.as_slice().to_vec();
+            let executor = Executor::new(problem, solver)
+                .configure(|state| state.param(start).max_iters(iterations - taken));
+            // A line search that finds no better point ends with an error: what was found counts.
+            let [made, cost, gradient] = executor.run().map_or([0; 3], |found| {
+                let count = |name: &str| found.problem.counts.get(name).copied().unwrap_or(0);
+                [found.state().get_iter(), count("cost_count"), count("gradient_count")]
+            });
+            (taken, losses, gradients) =
+                (taken + made.max(1), losses + cost, gradients + gradient + 1);
+            let (after, here) = *best.borrow();
+            // A search that has ended early begins again, with another unit.
+            match self.gradient_at(&here) {
+                Ok((_, next)) if after < before => slope = next,
+                _ => break,
+            }
+        }
+        let (value, parameters) = *best.borrow();
+        Ok(Minimised { parameters, value, iterations: taken, losses, gradients })
+    }
+}
+
+/// The length of the first step of a search, relative to the parameters.
+const FIRST: f64 = 0.1;
+
+/// The unit of the loss in which the first step of L-BFGS, which is the gradient, has a sensible length.
+fn unit<const P: usize>(theta: &SVector<f64, P>, slope: &SVector<f64, P>) -> f64 {
+    let (size, steep) = (theta.norm(), slope.norm());
+    let length = FIRST * if size > 0.0 { size } else { 1.0 };
+    if steep > 0.0 { steep / length } else { 1.0 }
+}
+
+/// The loss, with the best parameters that were tried.
+struct Watched<'a, L, const P: usize> {
+    loss: &'a L,
+    best: &'a RefCell<(f64, SVector<f64, P>)>,
+    unit: f64,
+}
+
+impl<L, const P: usize> CostFunction for Watched<'_, L, P>
+where
+    L: CostFunction<Param = Vec<f64>, Output = f64>,
+{
+    type Param = Vec<f64>;
+    type Output = f64;
+
+    fn cost(&self, theta: &Vec<f64>) -> Result<f64, Error> {
+        let value = self.loss.cost(theta)?;
+        if value < self.best.borrow().0 {
+            *self.best.borrow_mut() = (value, SVector::from_column_slice(theta));
+        }
+        Ok(value / self.unit)
+    }
+}
+
+impl<L, const P: usize> Gradient for Watched<'_, L, P>
+where
+    L: Gradient<Param = Vec<f64>, Gradient = Vec<f64>>,
+{
+    type Param = Vec<f64>;
+    type Gradient = Vec<f64>;
+
+    fn gradient(&self, theta: &Vec<f64>) -> Result<Vec<f64>, Error> {
+        let gradient = self.loss.gradient(theta)?;
+        Ok(gradient.iter().map(|slope| slope / self.unit).collect())
+    }
+}
+
+impl<Y, T, M, const P: usize> CostFunction for LossOver<'_, Y, T, M, P>
+where
+    Y: Parametrised<P>,
+    T: Fn(usize, usize, &PointOf<Y, Real, P>) -> Real,
+    M: Clone + Stepper<Y::System> + Linearised<<Y::System as Differentiable>::Wide>,
+{
+    type Param = Vec<f64>;
+    type Output = f64;
+
+    /// The loss; infinite where there is no run.
+    fn cost(&self, theta: &Vec<f64>) -> Result<f64, Error> {
+        let value = self.value(&SVector::from_column_slice(theta));
+        Ok(value.ok().filter(|value| !value.is_nan()).unwrap_or(f64::INFINITY))
+    }
+}
+
+impl<Y, T, M, const P: usize> Gradient for LossOver<'_, Y, T, M, P>
+where
+    Y: Parametrised<P>,
+    T: Fn(usize, usize, &PointOf<Y, Real, P>) -> Real,
+    M: Clone + Stepper<Y::System> + Linearised<<Y::System as Differentiable>::Wide>,
+{
+    type Param = Vec<f64>;
+    type Gradient = Vec<f64>;
+
+    fn gradient(&self, theta: &Vec<f64>) -> Result<Vec<f64>, Error> {
+        let found = self.gradient_at(&SVector::from_column_slice(theta));
+        let (_, slope) = found.map_err(|error| Error::msg(error.to_string()))?;
+        Ok(slope.as_slice().to_vec())
+    }
+}

@@ -48,7 +48,7 @@ struct Directions<Y: Metriplectic> {
 }
 
 impl<Y: Metriplectic> Directions<Y> {
-    /// Those of a tangent, and one along the size of the step, which moves no law.
+    /// Takes the columns of a tangent, and one along the size of the step, which moves no law.
     fn of(columns: &Columns<Y>, targets: &Targets<Y>, h: f64) -> Self {
         let n = Dim::<Y>::LEN;
         let law = |value: f64, row: &Vector<Y::Manifold>| -> Numbers {

@@ -37,7 +37,7 @@ type Moving<D> = <<D as Metriplectic>::Manifold as Space>::Point<Real>;
 /// ```
 /// use metriplectic_dynamics::Family;
 /// use metriplectic_fields::Real;
-/// use metriplectic_integrators::{Adjoints, DormandPrince8, Span};
+/// use metriplectic_integrators::{Adjoints, DormandPrince8, Span, Watch as _};
 /// use metriplectic_manifolds::LieDual;
 /// use nalgebra::{Vector3, Vector4, vector};
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {

@@ -2,7 +2,7 @@
 //! instructions.
 //!
 //! `cargo bench -p metriplectic-benches --bench runs` counts with callgrind. A count is a difference of two executions,
-//! so that the start of the program drops out. It fails if a run of a verified model costs more than 22.5 thousand
+//! so that the start of the program drops out. It fails if a run of a verified model costs more than 22 thousand
 //! instructions or a quarter of 20 steps beside them, or a journal more than a twentieth of rows of 10 steps.
 
 use std::hint::black_box;
@@ -229,7 +229,7 @@ fn main() {
                 "{method:10} verified once: {verified:5}  {STEPS} steps {steps:7.0}, beside them {fixed:7.0}: {:5.1} %",
                 100.0 * fixed / steps
             );
-            let bound = (0.25 * steps).min(22.5e3);
+            let bound = (0.25 * steps).min(22e3);
             assert!(!verified || fixed <= bound, "{method}: a short run costs too much");
         }
     }

@@ -16,7 +16,7 @@ const H: f64 = 0.02;
 /// The steps of the two runs, between two powers of two, on which the second law of a tangent is judged.
 const STEPS: [usize; 2] = [64, 127];
 
-/// What is done.
+/// The work that is counted.
 const TASKS: [&str; 3] = ["run", "tangent", "adjoint"];
 const METHODS: [&str; 2] = ["midpoint", "order 8"];
 const PARAMETERS: [&str; 3] = ["0", "4", "50"];

@@ -231,9 +231,14 @@ pub(crate) struct JumpOf<'a, F: Flow + ?Sized> {
 }
 
 impl Certificate {
-    /// Makes the certificate of a run that starts at `x0`.
-    pub(crate) fn start<F: Flow + ?Sized>(flow: &F, x0: &Element<F>, promises: Promises) -> Self {
-        let (laws, sizes) = (flow.laws(x0), flow.term_sizes(x0));
+    /// Makes the certificate of a run that starts at `x0`, with these laws.
+    pub(crate) fn start<F: Flow + ?Sized>(
+        flow: &F,
+        x0: &Element<F>,
+        laws: &Laws<F::Numbers>,
+        promises: Promises,
+    ) -> Self {
+        let sizes = flow.term_sizes(x0);
         let kinds = flow.kinds().into_iter().enumerate();
         Self {
             initial_energy: laws.energy,

@@ -26,6 +26,7 @@ pub(super) struct Said {
 
 impl Said {
     /// Asks a method about a run of this flow from a time on.
+    #[inline]
     pub(super) fn by<F: Flow, M: Stepper<F>>(method: &M, flow: &F, start: f64) -> Self {
         let (promises, noise) = (method.promises(flow), method.noise(flow));
         Self { rule: Rule::of(method, start), promises, noise }
@@ -69,7 +70,8 @@ impl<'a, F: Flow + ?Sized> Course<'a, F> {
         let x0 = flow.begin(x0, schedule.start);
         flow.check(&x0)?;
         flow.examine(&x0)?;
-        let certificate = Certificate { noise, ..Certificate::start(flow, &x0, promises) };
+        let values = flow.laws(&x0);
+        let certificate = Certificate { noise, ..Certificate::start(flow, &x0, &values, promises) };
         let scales = Scales::at(flow, &x0, schedule.span());
         let Schedule { size, start, count, every, most, rest, watch, mut corners } = schedule;
         corners.start = start;
@@ -99,7 +101,6 @@ impl<'a, F: Flow + ?Sized> Course<'a, F> {
             largest_velocity,
             ending: None,
         };
-        let values = flow.laws(&x0);
         let (energy, entropy) = (values.energy, values.entropy);
         let state = State { step: 0, time: start, point: x0, energy, entropy };
         let watching = Watching::new(watch, &progress, &state, &[])?;

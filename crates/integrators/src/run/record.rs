@@ -50,6 +50,7 @@ impl<F: Flow, M: Stepper<F>> Steps<'_, F, M> {
 
 impl<F: Flow + ?Sized> Course<'_, F> {
     /// Begins to record.
+    #[inline]
     fn recording(&self) -> Result<Recording<F::Space>, SpanError> {
         let Progress { count, every, most, .. } = self.progress;
         if count.is_none() && matches!(self.progress.step_size, StepSize::Fixed(_)) {
@@ -80,7 +81,8 @@ impl<F: Flow + ?Sized> Course<'_, F> {
         }
     }
 
-    /// The trajectory through these states.
+    /// The trajectory through these states. In place of a call, which would move all of the run.
+    #[inline(always)]
     fn trajectory(
         mut self,
         states: Vec<State<F::Space>>,

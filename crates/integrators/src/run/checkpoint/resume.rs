@@ -58,7 +58,7 @@ impl<'a, F: Flow + ?Sized> Course<'a, F> {
     /// The checkpoint of a run by this method, with this memory.
     fn checkpoint(&self, method: String, memory: Saved) -> Checkpoint {
         let State { step, time, point, energy, entropy } = &self.state;
-        let velocity = self.flow.rates(point, &self.flow.sizes(point).map(|_| 0.0));
+        let velocity = self.flow.rates(point, &self.progress.largest_velocity.zero());
         let known = self.certificate.invariants.len();
         let Ok(progress) =
             self.progress.convert(|_, v| Ok::<_, Infallible>(exact(v.to_short_list())));
@@ -93,7 +93,8 @@ impl<'a, F: Flow + ?Sized> Course<'a, F> {
     ) -> Result<Self, ResumeError> {
         let entries: Vec<f64> = c.point().collect();
         let point = flow.element(&entries)?;
-        let fresh = Certificate::start(flow, &point, promises);
+        let mut values = flow.laws(&point);
+        let fresh = Certificate::start(flow, &point, &values, promises);
         let mut certificate = c.balance.resumed(Certificate { noise, ..fresh })?;
         if c.progress.ending.is_none() {
             certificate.checked_states = checked_states(flow, c.step);
@@ -102,7 +103,6 @@ impl<'a, F: Flow + ?Sized> Course<'a, F> {
         let progress = c.progress.convert(|what, list| vector(what, list, &like))?;
         expect_length("further invariants", c.invariants.len(), certificate.invariants.len())?;
         validation::of_the_system(flow, &point, c)?;
-        let mut values = flow.laws(&point);
         (values.energy, values.entropy) = (c.energy.0, c.entropy.0);
         for (k, stored) in c.invariants.iter().enumerate() {
             values.invariants[k] = stored.0;

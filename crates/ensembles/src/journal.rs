@@ -43,7 +43,7 @@ impl Journal {
         let failed = |source| JournalError::Io { path: path.to_owned(), source };
         regular(path)?;
         let mut options = OpenOptions::new();
-        let mut file = options.read(true).append(true).create(true).open(path).map_err(failed)?;
+        let file = options.read(true).append(true).create(true).open(path).map_err(failed)?;
         match file.try_lock() {
             Err(TryLockError::WouldBlock) => {
                 return Err(JournalError::InUse { path: path.to_owned() });
@@ -51,20 +51,22 @@ impl Journal {
             // Some network file systems have no locks; two processes then run some rows twice.
             Err(TryLockError::Error(_)) | Ok(()) => {}
         }
-        if is_begun(&mut file, header).map_err(failed)? {
+        let mut journal = Self { path: path.to_owned(), file };
+        let file = &mut journal.file;
+        if is_begun(file, header).map_err(failed)? {
             let content = read(path)?;
             content.header.check(header, path)?;
             if !content.whole {
                 // A torn last line gets its end, so that the next row begins on a line of its own.
                 file.write_all(b"\n").map_err(failed)?;
             }
-            return Ok((Self { path: path.to_owned(), file }, content));
+            return Ok((journal, content));
         }
         file.set_len(0).map_err(failed)?;
         file.write_all(header.line().as_bytes()).map_err(failed)?;
         let (header, rows) = (header.clone(), Vec::new());
         let content = Content { header, rows, damaged: 0, whole: true };
-        Ok((Self { path: path.to_owned(), file }, content))
+        Ok((journal, content))
     }
 
     /// Appends the line of a row.
@@ -75,8 +77,17 @@ impl Journal {
 
     /// Hands all rows to the disk.
     pub(crate) fn finish(self) -> Result<(), JournalError> {
-        let Self { path, file } = self;
-        file.sync_data().map_err(|source| JournalError::Io { path, source })
+        let failed = |source| JournalError::Io { path: self.path.clone(), source };
+        self.file.sync_data().map_err(failed)
+    }
+}
+
+impl Drop for Journal {
+    /// Releases the lock. Closing the file does not: a process that another thread starts has the file open until it
+    /// becomes its program, and the lock would last as long.
+    fn drop(&mut self) {
+        // Where there are no locks, there is none to release.
+        _ = self.file.unlock();
     }
 }
 

@@ -52,6 +52,26 @@ fn a_line_gives_back_the_bits_of_its_row() {
 }
 
 #[test]
+fn a_closed_journal_is_free_though_its_file_is_open_elsewhere() {
+    let path = std::env::temp_dir().join(format!("free-{}.journal", std::process::id()));
+    let (journal, _) = Journal::open(&path, &header()).unwrap();
+    // A process that is just being started shares the open file in this way.
+    let elsewhere = journal.file.try_clone().unwrap();
+    let busy = Journal::open(&path, &header()).unwrap_err();
+    assert!(matches!(busy, JournalError::InUse { .. }), "{busy}");
+    journal.finish().unwrap();
+    let (journal, _) = Journal::open(&path, &header()).unwrap();
+    // A journal that is refused after its lock leaves none either.
+    drop(journal);
+    let other = Header { plan: 0x4321, ..header() };
+    let refused = Journal::open(&path, &other).unwrap_err();
+    assert!(matches!(refused, JournalError::AnotherSweep { .. }), "{refused}");
+    Journal::open(&path, &header()).unwrap();
+    drop(elsewhere);
+    std::fs::remove_file(path).unwrap();
+}
+
+#[test]
 fn no_part_of_a_line_is_a_row() {
     let line = encode(&done(17));
     for end in 0..line.len() {

@@ -14,21 +14,21 @@ pub(crate) const fn sites_of(stride: usize) -> usize {
 }
 
 /// Room for a block.
-pub(crate) struct Room {
-    few: [f64; BLOCK],
-    many: Vec<f64>,
+pub(crate) struct Room<T> {
+    few: [T; BLOCK],
+    many: Vec<T>,
 }
 
-impl Room {
-    /// For blocks of sites with so many numbers each.
+impl<T: Copy> Room<T> {
+    /// For blocks of sites with so many items each.
     #[inline]
-    pub(crate) fn of(stride: usize) -> Self {
-        let many = if stride > BLOCK { vec![0.0; stride] } else { Vec::new() };
-        Self { few: [0.0; BLOCK], many }
+    pub(crate) fn of(stride: usize, zero: T) -> Self {
+        let many = if stride > BLOCK { vec![zero; stride] } else { Vec::new() };
+        Self { few: [zero; BLOCK], many }
     }
 
     #[inline]
-    pub(crate) fn numbers(&mut self, count: usize) -> &mut [f64] {
+    pub(crate) fn items(&mut self, count: usize) -> &mut [T] {
         if self.many.is_empty() { &mut self.few[..count] } else { &mut self.many[..count] }
     }
 }

@@ -1,4 +1,4 @@
-//! What can be wrong with a lattice.
+//! Errors of a lattice.
 
 use std::fmt;
 
@@ -108,7 +108,7 @@ pub enum LatticeError {
     /// The start is no point of the manifold at a site.
     #[error("the start at {place}: {cause}")]
     Start {
-        /// Where.
+        /// The place.
         place: Place,
         /// Why.
         cause: PointError,
@@ -118,7 +118,7 @@ pub enum LatticeError {
     NotFinite {
         /// Which part of the model.
         what: &'static str,
-        /// Where.
+        /// The place.
         place: Place,
     },
     /// A law that is broken at a site or a bond.
@@ -129,15 +129,15 @@ pub enum LatticeError {
     Broken {
         /// The law.
         law: &'static str,
-        /// Where.
+        /// The place.
         place: Place,
         /// At which state.
         tried: Tried,
         /// The entries of the state at the site, or at both sites of the bond.
         entries: Vec<f64>,
-        /// What is left, relative to the terms that should cancel.
+        /// The rest, relative to the terms that should cancel.
         size: f64,
-        /// What to do.
+        /// The remedy.
         remedy: &'static str,
     },
     /// A negative rate of friction.
@@ -146,7 +146,7 @@ pub enum LatticeError {
         Entries(entries)
     )]
     NegativeRate {
-        /// Where.
+        /// The place.
         place: Place,
         /// At which state.
         tried: Tried,
@@ -163,7 +163,7 @@ pub enum LatticeError {
     WrongDerivative {
         /// Which part of the model.
         what: &'static str,
-        /// Where.
+        /// The place.
         place: Place,
         /// The derivative by dual numbers.
         derivative: f64,

@@ -9,7 +9,7 @@ use metriplectic_fields::{Column, Jet1, Real, ScalarField, Space, Vector};
 ///
 /// [`Lattice::on`](crate::Lattice::on) makes them from closures and from every [`ScalarField`].
 pub trait LocalField<M: Space, D>: Sync {
-    /// Whether there is one; a function that is not there is zero.
+    /// True if there is one; a function that is not there is zero.
     const PRESENT: bool = true;
 
     /// Evaluates the function.
@@ -139,13 +139,13 @@ where
 
 /// Data of the sites or of the bonds: `()`, or a list.
 pub trait LocalData: Sync {
-    /// What there is for one of them.
+    /// The data of one of them.
     type Item;
 
     /// How many there are; `None` if there is no list.
     fn count(&self) -> Option<usize>;
 
-    /// Those of one of them.
+    /// Returns the data of one of them.
     fn of(&self, index: usize) -> &Self::Item;
 
     /// Gives up all but those with these indices.

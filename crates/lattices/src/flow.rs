@@ -3,8 +3,8 @@
 use metriplectic_dynamics::SecondLaw;
 use metriplectic_dynamics::invariants::Kind;
 use metriplectic_fields::{Column, Space};
-use metriplectic_integrators::explicit::{Projected, ProjectionError, Target};
-use metriplectic_integrators::{Flow, FlowError, Laws, Recheck, StageFlow, Vector as _};
+use metriplectic_integrators::explicit::{Combination, Projected, ProjectionError, Target};
+use metriplectic_integrators::{Element, Flow, FlowError, Laws, Recheck, StageFlow, Vector as _};
 use metriplectic_manifolds::{Manifold, PointError};
 
 use crate::gather::Gather;
@@ -50,7 +50,7 @@ impl<P: Model> Lattice<P> {
         sizes.map_or(0.0, |sizes| sizes[0] + sizes[1])
     }
 
-    /// The same numbers at all sites.
+    /// Makes a vector with these numbers at each site.
     pub(crate) fn same(&self, numbers: &VectorOf<P>) -> SiteVector {
         let numbers = (0..dimension::<P>()).map(|k| numbers[k]).collect();
         SiteVector::same(self.sites(), numbers, &self.vectors)
@@ -73,6 +73,24 @@ impl<V> LatticeJets<V> {
 
 fn values(sums: &[Total]) -> Vec<f64> {
     sums.iter().map(|total| total.sum.value()).collect()
+}
+
+/// The difference between a displacement and Simpson's rule over it, with the middle of the cubic through both ends.
+pub(crate) fn against_simpson<F: Flow>(
+    flow: &F,
+    x: &Element<F>,
+    end: &Element<F>,
+    h: f64,
+) -> Option<F::Vector> {
+    let q = flow.displacement(x, end)?;
+    let (start, there) = (flow.rates(x, &q.zero())?, flow.rates(x, &q)?);
+    let middle = F::Vector::zip([&q, &there, &start], |[q, there, start]| {
+        0.5 * q - (there - start) * (h / 8.0)
+    });
+    let middle = flow.rates(x, &middle)?;
+    Some(F::Vector::zip([&q, &start, &middle, &there], |[q, start, middle, there]| {
+        q - (start + 4.0 * middle + there) * (h / 6.0)
+    }))
 }
 
 impl<P: Model> Flow for Lattice<P> {
@@ -110,7 +128,7 @@ impl<P: Model> Flow for Lattice<P> {
         }
     }
 
-    /// That of the terms of the entropy, without those of the other laws.
+    /// The round-off of the terms of the entropy, without the terms of the other laws.
     fn entropy_round_off(&self, ends: [&Points<P::Manifold>; 2]) -> f64 {
         let sizes = ends.map(|x| self.entropy_size(x));
         4.0 * f64::EPSILON * sizes[0].max(sizes[1])
@@ -157,7 +175,7 @@ impl<P: Model> Flow for Lattice<P> {
         let laws = Laws { entropy: entropy.unwrap_or(laws.entropy), ..laws.clone() };
         let (error, _) = self.motion(y)?;
         let with_entropy = entropy.is_some();
-        let error = Some(&error);
+        let error = Some(Combination { factor: 1.0, terms: &[(1.0, &error)] });
         let target = Target { laws: &laws, with_entropy, limit: None, units: None, error };
         self.project(y.clone(), &target).ok().map(|end| end.x)
     }
@@ -189,6 +207,7 @@ impl<P: Model> Flow for Lattice<P> {
 
     fn examine(&self, x0: &Points<P::Manifold>) -> Result<(), FlowError> {
         let verified = self.verify(x0).map_err(FlowError::new);
+        x0.clear_others();
         self.clear();
         verified
     }
@@ -202,6 +221,7 @@ impl<P: Model> Flow for Lattice<P> {
             return self.recheck_on_the_way(x, step).map_err(FlowError::new);
         }
         let checked = self.recheck_all(x).map_err(FlowError::new);
+        x.clear_others();
         self.clear();
         checked
     }
@@ -240,15 +260,7 @@ impl<P: Model> Flow for Lattice<P> {
         end: &Points<P::Manifold>,
         h: f64,
     ) -> Option<SiteVector> {
-        let q = self.displacement(x, end)?;
-        let (start, there) = (self.rates(x, &q.zero())?, self.rates(x, &q)?);
-        let middle = SiteVector::zip([&q, &there, &start], |[q, there, start]| {
-            0.5 * q - (there - start) * (h / 8.0)
-        });
-        let middle = self.rates(x, &middle)?;
-        Some(SiteVector::zip([&q, &start, &middle, &there], |[q, start, middle, there]| {
-            q - (start + 4.0 * middle + there) * (h / 6.0)
-        }))
+        against_simpson(self, x, end, h)
     }
 }
 
@@ -275,12 +287,12 @@ impl<P: Model> StageFlow for Lattice<P> {
         x: &Points<P::Manifold>,
         gradients: &Self::Gradients,
     ) -> Option<(SiteVector, f64)> {
-        self.motion_along(x, &gradients.all)
+        self.motion_along::<true>(x, &gradients.all)
     }
 
     fn motion(&self, x: &Points<P::Manifold>) -> Option<(SiteVector, f64)> {
         let (all, _) = self.differentials::<false>(x);
-        self.motion_along(x, &all)
+        self.motion_along::<true>(x, &all)
     }
 
     fn stage(&self, x: &Points<P::Manifold>, q: &SiteVector) -> Option<Points<P::Manifold>> {
@@ -342,7 +354,8 @@ impl<P: Model> StageFlow for Lattice<P> {
         let (x, q, y) = (&**x, q.reader(), &**y);
         self.vector_of(|site| {
             let reached = P::Manifold::stage_coordinates(&x[site], &y[site]);
-            q.at::<VectorOf<P>>(site) - reached
+            let q: VectorOf<P> = q.at(site);
+            q - reached
         })
     }
 

@@ -4,8 +4,8 @@ use metriplectic_fields::Column;
 
 use crate::Onsager;
 use crate::error::{LatticeError, Place, Tried};
-use crate::lattice::{Differentials, Lattice, differentials_at};
-use crate::model::{Model, VectorOf};
+use crate::lattice::{AtSites, Differentials, Lattice};
+use crate::model::{Model, PointOf, VectorOf};
 use crate::parallel;
 use crate::points::Points;
 use crate::verify::cancels;
@@ -81,53 +81,46 @@ impl<P: Model> Lattice<P> {
         all: &Differentials,
         visit: impl Fn(&mut R, Term) + Sync,
     ) -> Vec<R> {
+        let at = (&**x, all.reader::<P>());
         let mut results = parallel::map(self.sites(), |sites| {
             let mut result = R::default();
-            sites.for_each(|site| self.site_terms(site, x, all, |term| visit(&mut result, term)));
+            sites.for_each(|site| self.look_at_site(site, at, |term| visit(&mut result, term)));
             result
         });
         if P::BOND_FRICTION {
             results.extend(parallel::map(self.layout.bonds().len(), |bonds| {
                 let mut result = R::default();
-                bonds.for_each(|bond| {
-                    self.bond_terms(bond, x, all, |term| visit(&mut result, term));
-                });
+                bonds.for_each(|bond| self.look_at_bond(bond, at, |term| visit(&mut result, term)));
                 result
             }));
         }
         results
     }
 
-    fn site_terms(
+    fn look_at_site(
         &self,
         site: usize,
-        x: &Points<P::Manifold>,
-        all: &Differentials,
+        at: (&[PointOf<P>], AtSites<'_, P>),
         mut visit: impl FnMut(Term),
     ) {
-        let [w, s] = differentials_at::<P>(all, site);
-        self.parts.site_friction(site, &x[site], [&w, &s], |Onsager { rate, b }| {
-            let along_energy = [b.dot(&w), b.abs().dot(&w.abs())];
-            visit(Term { place: Place::Site(site), rate, along_energy, force: b.dot(&s) });
+        self.site_terms(site, at, |[w, s], Onsager { rate, b }| {
+            let along_energy = [b.dot(w), b.abs().dot(&w.abs())];
+            visit(Term { place: Place::Site(site), rate, along_energy, force: b.dot(s) });
         });
     }
 
-    fn bond_terms(
+    fn look_at_bond(
         &self,
         bond: usize,
-        x: &Points<P::Manifold>,
-        all: &Differentials,
+        at: (&[PointOf<P>], AtSites<'_, P>),
         mut visit: impl FnMut(Term),
     ) {
-        let [i, j] = self.layout.bonds()[bond].map(|site| site as usize);
-        let [[wi, si], [wj, sj]] = [i, j].map(|site| differentials_at::<P>(all, site));
         let place = self.place_of(bond);
         let dot = |[bi, bj]: &[VectorOf<P>; 2], [i, j]: [&VectorOf<P>; 2]| bi.dot(i) + bj.dot(j);
-        let state = [[&wi, &si], [&wj, &sj]];
-        self.parts.bond_friction(bond, [&x[i], &x[j]], state, |Onsager { rate, b }| {
+        self.bond_terms(bond, at, |[[wi, si], [wj, sj]], Onsager { rate, b }| {
             let terms = dot(&b.map(|b| b.abs()), [&wi.abs(), &wj.abs()]);
-            let along_energy = [dot(&b, [&wi, &wj]), terms];
-            visit(Term { place, rate, along_energy, force: dot(&b, [&si, &sj]) });
+            let along_energy = [dot(&b, [wi, wj]), terms];
+            visit(Term { place, rate, along_energy, force: dot(&b, [si, sj]) });
         });
     }
 }

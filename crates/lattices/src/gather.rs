@@ -14,7 +14,7 @@ use crate::fields::Absent;
 
 /// A function of a site and of a sum over its bonds.
 pub trait Gather<M: Times<M>>: Sync {
-    /// Whether there is one; a function that is not there is zero.
+    /// True if there is one; a function that is not there is zero.
     const PRESENT: bool = true;
 
     /// Computes the function `φ` of a bond and its differential.
@@ -47,7 +47,7 @@ impl<M: Times<M>> Gather<M> for Absent {
     }
 }
 
-/// What the energy gathers, and what the entropy gathers.
+/// The sums over bonds that energy and entropy gather.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Gathers<E, S> {
     pub(crate) energy: E,

@@ -138,7 +138,7 @@ impl Normals {
         self.of_entropy().map_or(0.0, |entropy| ratio(entropy.whole[0], entropy.whole[1]))
     }
 
-    /// Whether a law is dependent and has another value than the laws on which it depends.
+    /// Returns whether a law is dependent and has another value than the laws on which it depends.
     pub(crate) fn leaves_out(&self, with_entropy: bool) -> bool {
         let asked = self.conserved().iter().chain(self.of_entropy().filter(|_| with_entropy));
         asked.into_iter().any(|law| law.dependent && law.residual.abs() > law.round_off)

@@ -63,10 +63,10 @@ impl<N, E, Ty: petgraph::EdgeType, Ix: petgraph::graph::IndexType>
     }
 }
 
-/// What is beyond the last site of a regular lattice.
+/// Boundary of a regular lattice behind its last site.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Boundary {
-    /// Nothing.
+    /// No further site.
     Open,
     /// The first site again.
     Periodic,

@@ -2,6 +2,7 @@
 
 mod at_sites;
 mod differentials;
+mod motion;
 
 use std::fmt;
 use std::sync::atomic::AtomicBool;
@@ -20,6 +21,7 @@ use crate::pool::{Buffer, Pool};
 use crate::vector::{Reader, SiteVector};
 pub(crate) use at_sites::{AtSites, Differentials, differentials_at};
 pub(crate) use differentials::Given;
+pub(crate) use motion::probed;
 
 /// Points of a manifold at the sites of a graph, with energies of sites and bonds, an entropy of sites, and friction
 /// at both; built by [`Lattice::on`].
@@ -34,11 +36,11 @@ pub struct Lattice<P> {
     differentials: Pool<f64>,
     /// Arrays with a vector for each slot of the layout.
     slots: Pool<f64>,
-    /// The same with the vectors of both laws.
+    /// Arrays with the vectors of both laws for each slot.
     both_slots: Pool<f64>,
     /// Arrays with two numbers for each site, and with a number for each slot.
     sums: [Pool<f64>; 2],
-    /// Whether the differential of the entropy was seen to differ from site to site.
+    /// True once the differential of the entropy was seen to differ from site to site.
     entropy_differs: AtomicBool,
 }
 
@@ -85,9 +87,9 @@ pub(crate) struct Totals<V> {
     pub(crate) entropy: Total,
     /// `Σ |∂S x|` over the entries of all sites, for an entropy of sites alone.
     pub(crate) entropy_slope: f64,
-    /// Whether the differential of the entropy was seen to differ between sites.
+    /// True if the differential of the entropy was seen to differ between sites.
     pub(crate) entropy_differs: bool,
-    /// Those of the conserved sums.
+    /// The totals of the conserved sums.
     pub(crate) sums: Vec<Total>,
     pub(crate) sizes: V,
 }
@@ -148,9 +150,11 @@ impl<V: Column<f64>> Shared for Totals<V> {
     }
 }
 
-/// The larger one of two sizes, entry by entry.
+/// The larger one of two sizes, entry by entry. One that is not a number counts for nothing, as in `f64::max`, which takes more
+/// instructions.
+#[inline(always)]
 fn larger<V: Column<f64>>(a: &V, b: &V) -> V {
-    V::from_index(|k| a[k].max(b[k]))
+    V::from_index(|k| if b[k] > a[k] { b[k] } else { a[k] })
 }
 
 impl<P: Model> Lattice<P> {
@@ -184,70 +188,6 @@ impl<P: Model> Lattice<P> {
         SiteVector::each(self.sites(), dimension::<P>(), numbers)
     }
 
-    /// The velocity `v = Π w + Σ K s` at each site and the total production `Σ ρ (b·s)²`; `None` if a term is not a
-    /// number.
-    pub(crate) fn motion_along(
-        &self,
-        x: &[PointOf<P>],
-        all: &Differentials,
-    ) -> Option<(SiteVector, f64)> {
-        let all = all.reader::<P>();
-        let mut v = self.vectors.numbers(self.sites() * dimension::<P>());
-        let bonds = self.layout.bonds();
-        let given = if P::BOND_FRICTION { Given::Vector } else { Given::Nothing };
-        let partial = self.layout.scatter(&mut v, &mut self.slots(given), |mut part| {
-            // The second sum is not a number if a term is not finite.
-            let (mut production, mut probe) = (0.0, 0.0);
-            for site in part.sites.clone() {
-                let [w, s] = all.at(site);
-                let mut v = self.parts.reversible(&x[site], &w, &s);
-                self.parts.site_friction(site, &x[site], [&w, &s], |term| {
-                    let force = term.b.dot(&s);
-                    v += term.b * (term.rate * force);
-                    production += term.rate * force * force;
-                });
-                probe += probed(&v);
-                part.set(site, 0, &v);
-            }
-            if P::BOND_FRICTION {
-                for bond in part.bonds.clone() {
-                    let ends = bonds[bond];
-                    let [i, j] = ends.map(|site| site as usize);
-                    let ([wi, si], [wj, sj]) = (all.at(i), all.at(j));
-                    let mut v = [VectorOf::<P>::zero(); 2];
-                    self.parts.bond_friction(
-                        bond,
-                        [&x[i], &x[j]],
-                        [[&wi, &si], [&wj, &sj]],
-                        |term| {
-                            let [bi, bj] = term.b;
-                            let force = bi.dot(&si) + bj.dot(&sj);
-                            v[0] += bi * (term.rate * force);
-                            v[1] += bj * (term.rate * force);
-                            production += term.rate * force * force;
-                        },
-                    );
-                    probe += probed(&v[0]) + probed(&v[1]);
-                    part.add(ends, &[v]);
-                }
-            }
-            [production, probe]
-        });
-        let partial = partial.into_iter().map(|[part, probe]| {
-            let mut production = Double::default();
-            production.add(part);
-            (production, probe)
-        });
-        let sum = self.layout.sum(partial.collect(), |mut a: (Double, f64), b| {
-            a.0.merge(b.0);
-            (a.0, a.1 + b.1)
-        });
-        let (production, probe) = sum.unwrap_or_default();
-        let production = production.value();
-        let is_finite = !f64::is_nan(probe) && production.is_finite();
-        is_finite.then(|| (self.vector(v), production))
-    }
-
     /// The totals of energy and entropy alone.
     pub(crate) fn totals(&self, x: &[PointOf<P>]) -> [Total; 2] {
         let (_, totals) = self.differentials::<true>(x);
@@ -268,7 +208,7 @@ impl<P: Model> Lattice<P> {
     pub(crate) fn moved_by(
         &self,
         x: &Points<P::Manifold>,
-        q: Reader<'_>,
+        q: Reader<'_, VectorOf<P>>,
         f: impl Fn(&PointOf<P>, &Vector<P::Manifold>) -> Option<PointOf<P>> + Sync,
     ) -> Option<Points<P::Manifold>> {
         let mut y = x.like();
@@ -308,11 +248,11 @@ impl<P: Model> Lattice<P> {
             (chunk * CHUNK, y, own)
         });
         let inside = parallel::each(work, |(first, y, kept)| {
-            let mut room = Room::of(n);
+            let mut room = Room::of(n, 0.0);
             let mut inside = true;
             for block in blocks::blocks(0..y.len(), n) {
                 let numbers = block.start * n..block.end * n;
-                let q = if keep { &mut kept[numbers] } else { room.numbers(numbers.len()) };
+                let q = if keep { &mut kept[numbers] } else { room.items(numbers.len()) };
                 let site = first + block.start;
                 combine(q, site * n, h, terms);
                 let points = x[site..site + block.len()].iter().zip(&mut y[block]);
@@ -343,14 +283,4 @@ impl<P: Model> Lattice<P> {
         });
         self.vector(numbers)
     }
-}
-
-/// Zero for finite numbers, and not a number otherwise.
-#[inline]
-pub(crate) fn probed<V: Column<f64>>(v: &V) -> f64 {
-    let mut sum = 0.0;
-    for k in 0..V::LEN {
-        sum += v[k];
-    }
-    sum * 0.0
 }

@@ -24,14 +24,14 @@ pub(crate) struct Layout {
     pub(crate) sites: usize,
     /// The numbers of its first site, its first chunk and its first bond in the graph.
     first: [usize; 3],
-    /// Where the numbers of its sites at the cut go, and where those of the ghosts come from.
+    /// The goals of the numbers of its sites at the cut, and the sources of those of the ghosts.
     ghosts: Edges,
     chunks: Vec<Chunk>,
     /// The bonds in the order of the chunks of their first sites.
     bonds: Vec<[u32; 2]>,
     /// The number that a bond has in the graph, unless all follow each other there.
     numbers: Option<Vec<u32>>,
-    /// What goes from slots to sites.
+    /// Pairs of a slot and the site to which its numbers are added.
     arrivals: Vec<Arrival>,
     /// The slots, with those of other parts at the end.
     pub(crate) slots: usize,
@@ -248,7 +248,7 @@ impl Layout {
         parallel::top(parallel::nodes(all.into_iter(), &merge), merge)
     }
 
-    /// Whether it has all of the graph.
+    /// Returns whether it has all of the graph.
     pub(crate) fn is_whole(&self) -> bool {
         self.neighbours.count() == 1
     }
@@ -270,11 +270,11 @@ impl Layout {
 
     /// Sums over sites and bonds: `work` writes the numbers of the sites of its chunk, and adds those that bonds
     /// give. Its results are in the order of the chunks. Without slots bonds give nothing.
-    pub(crate) fn scatter<R: Send>(
+    pub(crate) fn scatter<V: Column<f64>, R: Send>(
         &self,
         out: &mut [f64],
         slots: &mut [f64],
-        work: impl Fn(Part<'_>) -> R + Sync,
+        work: impl Fn(Part<'_, V>) -> R + Sync,
     ) -> Vec<R> {
         let stride = out.len() / self.sites;
         let width = slots.len().checked_div(self.slots).unwrap_or(0);
@@ -285,7 +285,8 @@ impl Layout {
             let (own, after) = std::mem::take(&mut rest).split_at_mut(own);
             rest = after;
             let (bonds, sites) = (chunk.bonds.clone(), parallel::sites(k, self.sites));
-            Part { sites, bonds, out, stride, slots: own, width, next: 0 }
+            let [out, slots] = [out, own].map(V::rows_mut);
+            Part { sites, bonds, out, rows: stride / V::LEN, slots, next: 0 }
         });
         let results = parallel::each(pieces, work);
         self.neighbours.exchange(&self.crossings, width, slots);
@@ -306,7 +307,7 @@ impl Layout {
     }
 }
 
-/// Where the members of each of `count` groups start, if they stand in a row.
+/// Finds the start of each of `count` groups whose members stand in a row.
 fn starts(count: usize, groups: impl Iterator<Item = usize>) -> Vec<usize> {
     let mut starts = vec![0; count + 1];
     for group in groups {
@@ -318,60 +319,44 @@ fn starts(count: usize, groups: impl Iterator<Item = usize>) -> Vec<usize> {
     starts
 }
 
-/// A chunk in the course of a sum.
-pub(crate) struct Part<'a> {
+/// A chunk in the course of a sum, with numbers that are read and written in rows.
+pub(crate) struct Part<'a, V: Column<f64>> {
     pub(crate) sites: Range<usize>,
     pub(crate) bonds: Range<usize>,
-    out: &'a mut [f64],
-    stride: usize,
-    slots: &'a mut [f64],
-    width: usize,
+    out: &'a mut [V::Row],
+    /// The rows of a site.
+    rows: usize,
+    slots: &'a mut [V::Row],
     next: usize,
 }
 
-impl Part<'_> {
-    /// Writes numbers of a site of this chunk, from the number `offset` on.
-    #[inline]
-    pub(crate) fn set<V: Column<f64>>(&mut self, site: usize, offset: usize, v: &V) {
-        let start = (site - self.sites.start) * self.stride + offset;
-        let out = &mut self.out[start..start + V::LEN];
-        for k in 0..V::LEN {
-            out[k] = v[k];
-        }
+impl<V: Column<f64>> Part<'_, V> {
+    /// Writes one of the rows of a site of this chunk.
+    #[inline(always)]
+    pub(crate) fn set(&mut self, site: usize, row: usize, v: &V) {
+        v.write(&mut self.out[(site - self.sites.start) * self.rows + row]);
     }
 
     /// Adds the vectors that a bond gives to its two sites: one after the other for each law.
     #[inline(always)]
-    pub(crate) fn add<V: Column<f64>, const LAWS: usize>(
-        &mut self,
-        [from, to]: [u32; 2],
-        laws: &[[V; 2]; LAWS],
-    ) {
-        let here = from as usize - self.sites.start;
-        let place = (to as usize).wrapping_sub(self.sites.start);
-        let start = self.next * self.width;
+    pub(crate) fn add<const LAWS: usize>(&mut self, ends: [u32; 2], laws: &[[V; 2]; LAWS]) {
+        let [here, place] = ends.map(|site| (site as usize).wrapping_sub(self.sites.start));
         let inside = place < self.sites.len();
-        self.next += usize::from(!inside);
         for (law, [first, second]) in laws.iter().enumerate() {
-            let offset = law * V::LEN;
-            self.add_here(here, offset, first);
+            add_to(&mut self.out[here * self.rows + law], first);
             if inside {
-                self.add_here(place, offset, second);
+                add_to(&mut self.out[place * self.rows + law], second);
             } else {
-                let slot = &mut self.slots[start + offset..start + offset + V::LEN];
-                for k in 0..V::LEN {
-                    slot[k] = second[k];
-                }
+                second.write(&mut self.slots[self.next]);
+                self.next += 1;
             }
         }
     }
+}
 
-    #[inline(always)]
-    fn add_here<V: Column<f64>>(&mut self, place: usize, offset: usize, v: &V) {
-        let start = place * self.stride + offset;
-        let out = &mut self.out[start..start + V::LEN];
-        for k in 0..V::LEN {
-            out[k] += v[k];
-        }
+#[inline(always)]
+fn add_to<V: Column<f64>>(row: &mut V::Row, v: &V) {
+    for (k, number) in row.as_mut().iter_mut().enumerate() {
+        *number += v[k];
     }
 }

@@ -1,4 +1,4 @@
-//! What a lattice is made of, as its loops need it.
+//! The parts of a lattice, as its loops need them.
 
 use metriplectic_dynamics::{Bracket, BracketArgs};
 use metriplectic_fields::{ChartPoint, Column, Jet1, Vector};
@@ -12,18 +12,18 @@ use crate::onsager::{BondFriction, BondState, Onsager, SiteFriction, SiteState};
 pub trait Model: Sync {
     /// The manifold of a site.
     type Manifold: Manifold + Times<Self::Manifold>;
-    /// What the energy gathers over bonds.
+    /// The sum over bonds that the energy gathers.
     type EnergyGather: Gather<Self::Manifold>;
-    /// What the entropy gathers over bonds.
+    /// The sum over bonds that the entropy gathers.
     type EntropyGather: Gather<Self::Manifold>;
 
     /// How many conserved sums there are.
     const SUMS: usize;
-    /// Whether there is an entropy.
+    /// True if there is an entropy.
     const ENTROPY: bool;
-    /// Whether bonds have an energy.
+    /// True if bonds have an energy.
     const BOND_ENERGY: bool;
-    /// Whether bonds have friction.
+    /// True if bonds have friction.
     const BOND_FRICTION: bool;
     /// How many terms of friction a site has, and a bond.
     const TERMS: [usize; 2];
@@ -37,7 +37,7 @@ pub trait Model: Sync {
     /// The energy of a bond.
     fn bond_energy(&self, bond: usize, x: &PairOf<Self>) -> Jet1<PairManifold<Self>>;
 
-    /// What energy and entropy gather over bonds.
+    /// The sums over bonds that energy and entropy gather.
     fn gathers(&self) -> &Gathers<Self::EnergyGather, Self::EntropyGather>;
 
     /// The entropy of a site.

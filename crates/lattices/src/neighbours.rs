@@ -1,4 +1,4 @@
-//! What the process of one part of a lattice asks of those of the other parts.
+//! Questions of the process of one part of a lattice to those of the other parts.
 //!
 //! There is one implementation outside the tests, [`Alone`]: a lattice of one part.
 

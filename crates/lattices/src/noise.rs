@@ -12,7 +12,7 @@ use metriplectic_integrators::{Flow, NoiseError, Noisy};
 use metriplectic_manifolds::{Flat, Manifold};
 
 use crate::gather::Gather as _;
-use crate::lattice::{Given, Lattice, differentials_at, dimension, probed};
+use crate::lattice::{Given, Lattice, dimension, probed};
 use crate::model::{Model, PointOf, VectorOf};
 use crate::onsager::Onsager;
 use crate::points::Points;
@@ -145,22 +145,19 @@ impl<P: Model<Manifold: Flat>> Fluctuating<Uniform> for Lattice<P> {
         let size = |r: usize, rate: f64| {
             if terms.contains(&r) { (strength * rate).sqrt() * numbers(r) } else { 0.0 }
         };
+        let at_points = (&**x, all.reader::<P>());
         let at = |site: usize| {
-            let [w, s] = differentials_at::<P>(&all, site);
             let (mut sum, mut r) = (VectorOf::<P>::zero(), self.first_term(site));
-            self.parts.site_friction(site, &x[site], [&w, &s], |Onsager { rate, b }| {
+            self.site_terms(site, at_points, |_, Onsager { rate, b }| {
                 sum += b * size(r, rate);
                 r += 1;
             });
             sum
         };
         let of = |bond: usize| {
-            let [i, j] = self.layout.bonds()[bond].map(|site| site as usize);
-            let [[wi, si], [wj, sj]] = [i, j].map(|site| differentials_at::<P>(&all, site));
             let mut sum = [VectorOf::<P>::zero(); 2];
             let mut r = self.first_term(self.sites() + bond);
-            let w = [[&wi, &si], [&wj, &sj]];
-            self.parts.bond_friction(bond, [&x[i], &x[j]], w, |Onsager { rate, b }| {
+            self.bond_terms(bond, at_points, |_, Onsager { rate, b }| {
                 let size = size(r, rate);
                 sum[0] += b[0] * size;
                 sum[1] += b[1] * size;
@@ -182,27 +179,7 @@ impl<P: Model<Manifold: Flat>> Fluctuating<Uniform> for Lattice<P> {
 
     fn friction(&self, x: &Points<P::Manifold>) -> Option<SiteVector> {
         let (all, _) = self.differentials::<false>(x);
-        let at = |site: usize| {
-            let [w, s] = differentials_at::<P>(&all, site);
-            let mut sum = VectorOf::<P>::zero();
-            self.parts.site_friction(site, &x[site], [&w, &s], |Onsager { rate, b }| {
-                sum += b * (rate * b.dot(&s));
-            });
-            sum
-        };
-        let of = |bond: usize| {
-            let [i, j] = self.layout.bonds()[bond].map(|site| site as usize);
-            let [[wi, si], [wj, sj]] = [i, j].map(|site| differentials_at::<P>(&all, site));
-            let mut sum = [VectorOf::<P>::zero(); 2];
-            let w = [[&wi, &si], [&wj, &sj]];
-            self.parts.bond_friction(bond, [&x[i], &x[j]], w, |Onsager { rate, b }| {
-                let size = rate * (b[0].dot(&si) + b[1].dot(&sj));
-                sum[0] += b[0] * size;
-                sum[1] += b[1] * size;
-            });
-            sum
-        };
-        self.added(at, of)
+        Some(self.motion_along::<false>(x, &all)?.0)
     }
 
     fn has_drift(&self, _: usize, _: &Noise<Uniform>) -> bool {

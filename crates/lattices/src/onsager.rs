@@ -22,7 +22,7 @@ pub struct Onsager<B> {
     pub b: B,
 }
 
-/// What friction at a site may depend on.
+/// State on which friction at a site may depend.
 pub struct SiteState<'a, M: Space, D = ()> {
     /// The point.
     pub x: &'a M::Point<f64>,
@@ -34,7 +34,7 @@ pub struct SiteState<'a, M: Space, D = ()> {
     pub data: &'a D,
 }
 
-/// What friction in a bond may depend on.
+/// State on which friction in a bond may depend.
 pub struct BondState<'a, M: Space, E = ()> {
     /// The points of its first and of its second site.
     pub x: [&'a M::Point<f64>; 2],
@@ -68,7 +68,7 @@ impl<M: Space, E> fmt::Debug for BondState<'_, M, E> {
 
 /// Friction at sites.
 pub trait SiteFriction<M: Space, D>: Sync {
-    /// Whether there is any.
+    /// True if there is any.
     const PRESENT: bool = true;
     /// How many terms a site has.
     const TERMS: usize;
@@ -79,7 +79,7 @@ pub trait SiteFriction<M: Space, D>: Sync {
 
 /// Friction in bonds.
 pub trait BondFriction<M: Space, E>: Sync {
-    /// Whether there is any.
+    /// True if there is any.
     const PRESENT: bool = true;
     /// How many terms a bond has.
     const TERMS: usize;

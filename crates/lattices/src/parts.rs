@@ -16,7 +16,7 @@ use crate::onsager::BondState;
 use crate::parallel::CHUNK;
 use crate::{Graph, Lattice, LatticeError, Model, Onsager, Points};
 
-/// Where the parts put what they tell each other.
+/// Board on which the parts put what they tell each other.
 #[derive(Debug)]
 struct Board {
     barrier: Barrier,

@@ -32,6 +32,11 @@ impl<M: Manifold> Points<M> {
     pub(crate) fn like(&self) -> Self {
         Self(Arc::new(self.0.pool().take(self.len(), || self.to_vec())))
     }
+
+    /// Gives up the arrays of other states that are used no more.
+    pub(crate) fn clear_others(&self) {
+        self.0.pool().clear();
+    }
 }
 
 /// Points that come from elsewhere.

@@ -22,7 +22,7 @@ const HEADER: u16 = 128;
 #[derive(Debug)]
 pub struct Profiles<W> {
     file: W,
-    /// Where the array begins in the file.
+    /// The place in the file at which the array begins.
     start: u64,
     columns: usize,
     rows: u64,
@@ -33,7 +33,7 @@ impl<W: Write + Seek> Profiles<W> {
     ///
     /// # Errors
     ///
-    /// Those of the file.
+    /// Returns the errors of the file.
     pub fn npy(mut file: W, columns: usize) -> io::Result<Self> {
         let start = file.stream_position()?;
         let mut profiles = Self { file, start, columns, rows: 0 };

@@ -11,17 +11,20 @@
 //! matrix `Σ_i ω_i ⟨s dF_a, s dF_b⟩` of the laws, a sum over the sites. Where this matrix is singular, because the error
 //! has fewer freedoms than there are laws, all `ω_i` are 1.
 
+use std::ops::Range;
+
 use metriplectic_fields::{Column, Space};
-use metriplectic_integrators::explicit::{Projected, ProjectionError, Target};
+use metriplectic_integrators::explicit::{Combination, Projected, ProjectionError, Target};
 use metriplectic_manifolds::Manifold;
 
+use crate::blocks::{self, Room, combine};
 use crate::flow::LatticeJets;
 use crate::gram::{Gram, Law, Normals};
 use crate::lattice::{AtSites, Lattice, Total, dimension};
 use crate::model::{Model, PointOf, VectorOf};
 use crate::parallel;
 use crate::points::Points;
-use crate::vector::{Reader, larger};
+use crate::vector::{SiteVector, larger};
 
 /// The most corrections.
 const CORRECTIONS: usize = 8;
@@ -34,7 +37,7 @@ const ENOUGH: f64 = 0.5;
 const OFF: f64 = 0.8;
 /// Residuals, in units of round-off, with which a state is accepted that no correction improves.
 const STAGNATED: f64 = 2.0;
-/// The same where no entropy is asked for.
+/// Residuals with which a state is accepted where no entropy is asked for.
 const CONSERVED: f64 = 64.0;
 
 /// The laws up to which loops over sites keep their numbers in registers.
@@ -64,20 +67,30 @@ pub(crate) struct Projection<'a, P: Model> {
     pub(crate) target: &'a Target<'a, Lattice<P>>,
 }
 
+/// The factor and the terms of an error.
+type Error<'a> = (f64, Vec<(f64, &'a [f64])>);
+
 /// The weights `ω_i` of the sites.
-#[derive(Clone, Copy)]
 struct Weights<'a, V> {
-    error: Option<Reader<'a>>,
+    error: Option<Error<'a>>,
     /// The reciprocal of the size of each entry.
     units: V,
 }
 
 impl<V: Column<f64>> Weights<'_, V> {
+    /// The errors of some sites in a row, if the sites have weights.
     #[inline]
-    fn at(&self, site: usize) -> f64 {
-        let Some(error) = &self.error else { return 1.0 };
-        let e: V = error.at(site);
-        let mut sum = 0.0;
+    fn errors<'r>(&self, sites: Range<usize>, room: &'r mut Room<f64>) -> &'r [V::Row] {
+        let Some((factor, terms)) = &self.error else { return &[] };
+        let numbers = room.items(sites.len() * V::LEN);
+        combine(numbers, sites.start * V::LEN, *factor, terms);
+        V::rows(numbers)
+    }
+
+    #[inline]
+    fn of(&self, error: Option<&V::Row>) -> f64 {
+        let Some(error) = error else { return 1.0 };
+        let (e, mut sum) = (V::of_row(error), 0.0);
         for k in 0..V::LEN {
             let ratio = e[k] * self.units[k];
             sum += ratio * ratio;
@@ -123,8 +136,8 @@ impl<P: Model> Projection<'_, P> {
             let next = self.corrected(&y, &jets, &coefficients, &weights);
             moved += next.length;
             let units = || self.lattice.same(&jets.totals.sizes);
-            let limit = self.target.limit.map(|limit| limit.relative_to(&units()));
-            if !moved.is_finite() || limit.is_some_and(|limit| moved > limit) {
+            let is_far = self.target.limit.is_some_and(|limit| limit.is_below(moved, &units()));
+            if !moved.is_finite() || is_far {
                 return Err(ProjectionError::Far);
             }
             if worst <= CONSERVED {
@@ -167,12 +180,12 @@ impl<P: Model> Projection<'_, P> {
         y: &State<P>,
         jets: &Jets<P>,
     ) -> Result<(Gram, Weights<'_, VectorOf<P>>), ProjectionError> {
-        if let Some(error) = self.target.error {
+        if let Some(error) = self.error() {
             // A common factor of the weights cancels.
             let sizes = &jets.totals.sizes;
             let reciprocal = |k: usize| if sizes[k] > 0.0 { sizes[k].recip() } else { 0.0 };
             let units = VectorOf::<P>::from_index(reciprocal);
-            let weights = Weights { error: Some(error.reader()), units };
+            let weights = Weights { error: Some(error), units };
             let gram = self.gram(y, jets, &weights);
             let normals = Normals::new(&gram, &self.laws(jets), P::ENTROPY);
             if gram.is_finite() && !normals.leaves_out(self.target.with_entropy) {
@@ -182,6 +195,12 @@ impl<P: Model> Projection<'_, P> {
         let weights = Weights { error: None, units: VectorOf::<P>::zero() };
         let gram = self.gram(y, jets, &weights);
         if gram.is_finite() { Ok((gram, weights)) } else { Err(ProjectionError::Outside) }
+    }
+
+    /// The factor and the terms of the error. One that is the same at all sites weighs none of them more.
+    fn error(&self) -> Option<Error<'_>> {
+        let Combination { factor, terms } = self.target.error?;
+        Some((factor, SiteVector::terms(terms.len(), |j| terms[j])?))
     }
 
     /// The target, the value and the sizes of each law.
@@ -219,35 +238,25 @@ impl<P: Model> Projection<'_, P> {
             let mut gram = Gram::new(laws);
             let (mut few, mut many) = ([VectorOf::<P>::zero(); FEW], Vec::new());
             let w = few_or_many::<P>(&mut few, &mut many);
+            // Numbers of their own stay in registers.
             let (mut slopes, mut products) = ([0.0; FEW], [0.0; FEW * FEW]);
-            let [slopes, products] = if laws <= FEW {
-                [&mut slopes[..laws], &mut products[..laws * laws]]
-            } else {
-                [&mut gram.slopes[..], &mut gram.products[..]]
-            };
-            for site in sites {
-                self.covectors(y, all, site, w);
-                let (weight, scales) = (weights.at(site), P::Manifold::scales(&y[site]));
-                for (slope, w) in slopes.iter_mut().zip(&*w) {
-                    *slope += w.abs().dot(&scales);
-                }
-                if weight > 0.0 {
-                    for w in &mut *w {
-                        for k in 0..dimension::<P>() {
-                            w[k] *= sizes[k];
-                        }
-                    }
-                    for a in 0..laws {
-                        for b in 0..=a {
-                            products[a * laws + b] += weight * w[a].dot(&w[b]);
-                        }
+            let mut room = Room::of(dimension::<P>(), 0.0);
+            for block in blocks::blocks(sites, dimension::<P>()) {
+                let errors = weights.errors(block.clone(), &mut room);
+                for (k, site) in block.enumerate() {
+                    self.covectors(y, all, site, w);
+                    let at = (weights.of(errors.get(k)), P::Manifold::scales(&y[site]));
+                    if laws <= FEW {
+                        let products = &mut products[..laws * laws];
+                        add_site(w, at, sizes, (&mut slopes[..laws], products));
+                    } else {
+                        add_site(w, at, sizes, (&mut gram.slopes, &mut gram.products));
                     }
                 }
             }
             if laws <= FEW {
-                let (slopes, products) = (slopes.to_vec(), products.to_vec());
-                gram.slopes = slopes;
-                gram.products = products;
+                gram.slopes.copy_from_slice(&slopes[..laws]);
+                gram.products.copy_from_slice(&products[..laws * laws]);
             }
             gram
         });
@@ -271,26 +280,31 @@ impl<P: Model> Projection<'_, P> {
             let (mut few, mut many) = ([VectorOf::<P>::zero(); FEW], Vec::new());
             let w = few_or_many::<P>(&mut few, &mut many);
             let (mut length, mut inside) = (0.0, true);
-            for (site, out) in sites.zip(out) {
-                let weight = weights.at(site);
-                if weight == 0.0 {
-                    out.clone_from(&y[site]);
-                    continue;
+            let (first, mut room) = (sites.start, Room::of(dimension::<P>(), 0.0));
+            for block in blocks::blocks(sites, dimension::<P>()) {
+                let errors = weights.errors(block.clone(), &mut room);
+                let out = &mut out[block.start - first..block.end - first];
+                for ((k, site), out) in block.enumerate().zip(out) {
+                    let weight = weights.of(errors.get(k));
+                    if weight == 0.0 {
+                        out.clone_from(&y[site]);
+                        continue;
+                    }
+                    self.covectors(y, all, site, w);
+                    let mut u = VectorOf::<P>::zero();
+                    for (w, &c) in w.iter().zip(coefficients) {
+                        u += *w * c;
+                    }
+                    let mut square = 0.0;
+                    for k in 0..dimension::<P>() {
+                        let ratio = u[k] * sizes[k] * weight;
+                        square += ratio * ratio;
+                        u[k] = ratio * sizes[k];
+                    }
+                    length = larger(length, square);
+                    *out = P::Manifold::chart(&y[site], &u);
+                    inside &= manifold.is_inside(out);
                 }
-                self.covectors(y, all, site, w);
-                let mut u = VectorOf::<P>::zero();
-                for (w, &c) in w.iter().zip(coefficients) {
-                    u += *w * c;
-                }
-                let mut square = 0.0;
-                for k in 0..dimension::<P>() {
-                    let ratio = u[k] * sizes[k] * weight;
-                    square += ratio * ratio;
-                    u[k] = ratio * sizes[k];
-                }
-                length = larger(length, square);
-                *out = P::Manifold::chart(&y[site], &u);
-                inside &= manifold.is_inside(out);
             }
             (length, inside)
         });
@@ -298,6 +312,33 @@ impl<P: Model> Projection<'_, P> {
         let largest = parts.iter().fold(0.0, |most, &(length, _)| larger(most, length));
         let length = (largest / dimension::<P>() as f64).sqrt();
         Corrected { points: inside.then_some(points), length }
+    }
+}
+
+/// Adds the slopes of the laws at a site, and the products of their differentials with a weight. The differentials are in units
+/// of the sizes afterwards.
+#[inline(always)]
+fn add_site<V: Column<f64>>(
+    w: &mut [V],
+    (weight, scales): (f64, V),
+    sizes: &V,
+    (slopes, products): (&mut [f64], &mut [f64]),
+) {
+    let laws = w.len();
+    for (slope, w) in slopes.iter_mut().zip(&*w) {
+        *slope += w.abs().dot(&scales);
+    }
+    if weight > 0.0 {
+        for w in &mut *w {
+            for k in 0..V::LEN {
+                w[k] *= sizes[k];
+            }
+        }
+        for a in 0..laws {
+            for b in 0..=a {
+                products[a * laws + b] += weight * w[a].dot(&w[b]);
+            }
+        }
     }
 }
 

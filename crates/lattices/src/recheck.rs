@@ -21,7 +21,7 @@ const DESTROYED: f64 = 1e-8;
 /// The sites, and the bonds, whose derivatives are compared on the way.
 const LOOKED_AT: usize = 8;
 
-/// What the terms of the friction of a chunk show.
+/// Findings at the terms of the friction of a chunk.
 #[derive(Default)]
 struct Seen {
     broken: Option<Box<LatticeError>>,
@@ -34,7 +34,7 @@ impl<P: Model> Lattice<P> {
     ///
     /// # Errors
     ///
-    /// Those of [`recheck_all`](Self::recheck_all).
+    /// Returns the errors of [`recheck_all`](Self::recheck_all).
     pub(crate) fn recheck_on_the_way(
         &self,
         x: &Points<P::Manifold>,

@@ -43,8 +43,7 @@ impl<P: Model> Lattice<P> {
                     forces[k] = forces[k].max(2.0 * df[k].abs().max(df[n + k].abs()));
                 }
             }
-            let [[wi, si], [wj, sj]] = [i, j].map(|site| differentials_at::<P>(&all, site));
-            self.parts.bond_friction(bond, [&x[i], &x[j]], [[&wi, &si], [&wj, &sj]], |term| {
+            self.bond_terms(bond, (x, all.reader()), |[[_, si], [_, sj]], term| {
                 let [bi, bj] = term.b.map(|b| b.abs());
                 let force = term.rate * (bi.dot(&si.abs()) + bj.dot(&sj.abs()));
                 for k in 0..n {

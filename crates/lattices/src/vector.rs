@@ -7,7 +7,7 @@ use metriplectic_fields::Column;
 use metriplectic_integrators::Vector;
 
 use crate::blocks::{self, Room, combine};
-use crate::parallel;
+use crate::parallel::{self, CHUNK};
 use crate::pool::{Buffer, Pool};
 
 /// A number for each direction at each site: one after the other, or the same ones at all sites.
@@ -23,7 +23,7 @@ pub struct SiteVector {
 
 #[derive(Clone, Debug)]
 enum Numbers {
-    /// Those of one site, for all of them.
+    /// The numbers of one site, for all of them.
     Same(Vec<f64>),
     Each(Arc<Buffer<f64>>),
 }
@@ -34,24 +34,30 @@ impl std::fmt::Debug for Pool<f64> {
     }
 }
 
-/// Numbers that are read site by site.
-#[derive(Clone, Copy)]
-pub(crate) struct Reader<'a> {
-    numbers: &'a [f64],
-    stride: usize,
+/// Columns that are read site by site.
+pub(crate) struct Reader<'a, V: Column<f64>> {
+    rows: &'a [V::Row],
+    /// The rows from one site to the next: none if all sites have the same one.
+    step: usize,
 }
 
-impl Reader<'_> {
+impl<V: Column<f64>> Copy for Reader<'_, V> {}
+
+impl<V: Column<f64>> Clone for Reader<'_, V> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<V: Column<f64>> Reader<'_, V> {
     #[inline(always)]
-    pub(crate) fn at<V: Column<f64>>(&self, site: usize) -> V {
-        let start = site * self.stride;
-        let numbers = &self.numbers[start..start + V::LEN];
-        V::from_index(|k| numbers[k])
+    pub(crate) fn at(&self, site: usize) -> V {
+        V::of_row(&self.rows[site * self.step])
     }
 }
 
 impl SiteVector {
-    /// The same numbers at all sites.
+    /// Makes a vector with these numbers at each site.
     pub(crate) fn same(sites: usize, numbers: Vec<f64>, pool: &Pool<f64>) -> Self {
         let stride = numbers.len();
         Self { sites, stride, numbers: Numbers::Same(numbers), pool: pool.clone() }
@@ -74,10 +80,16 @@ impl SiteVector {
         }
     }
 
-    pub(crate) fn reader(&self) -> Reader<'_> {
+    pub(crate) fn reader<V: Column<f64>>(&self) -> Reader<'_, V> {
+        let (numbers, stride) = self.strided();
+        Reader { rows: V::rows(numbers), step: stride.min(1) }
+    }
+
+    /// The numbers, and how many there are from one site to the next.
+    fn strided(&self) -> (&[f64], usize) {
         match &self.numbers {
-            Numbers::Same(numbers) => Reader { numbers, stride: 0 },
-            Numbers::Each(numbers) => Reader { numbers, stride: self.stride },
+            Numbers::Same(numbers) => (numbers, 0),
+            Numbers::Each(numbers) => (numbers, self.stride),
         }
     }
 
@@ -108,71 +120,78 @@ impl SiteVector {
         vectors: [&Self; K],
         f: impl Fn([f64; K]) -> [f64; M] + Sync,
     ) -> [f64; M] {
+        let parts = parallel::map(vectors[0].sites, |sites| Self::squares(vectors, &f, sites));
+        let mean = (vectors[0].stride as f64).recip();
+        // Roots and products with a positive number keep the order of the sums.
+        parts.into_iter().fold([0.0; M], both_larger).map(|sum| (sum * mean).sqrt())
+    }
+
+    /// The largest sums of squares of these sites.
+    fn squares<const K: usize, const M: usize>(
+        vectors: [&Self; K],
+        f: &impl Fn([f64; K]) -> [f64; M],
+        sites: Range<usize>,
+    ) -> [f64; M] {
         let stride = vectors[0].stride;
-        let mean = (stride as f64).recip();
-        let of = |sites: Range<usize>| {
-            let mut largest = [0.0; M];
-            let mut tiles: [Room; K] = std::array::from_fn(|_| Room::of(stride));
-            let mut rooms: [Room; M] = std::array::from_fn(|_| Room::of(stride));
-            let length = stride * blocks::sites_of(stride).min(sites.len());
-            let tiles: [&[f64]; K] = {
-                let mut slices = [&[][..]; K];
-                for ((tile, slice), v) in tiles.iter_mut().zip(&mut slices).zip(vectors) {
-                    if let Numbers::Same(numbers) = &v.numbers {
-                        let tile = tile.numbers(length);
-                        for site in tile.chunks_exact_mut(stride) {
-                            site.copy_from_slice(numbers);
-                        }
-                        *slice = tile;
-                    }
+        let mut largest = [0.0; M];
+        let mut tiles: [Room<f64>; K] = std::array::from_fn(|_| Room::of(stride, 0.0));
+        let mut room = Room::of(stride, [0.0; M]);
+        let length = stride * blocks::sites_of(stride).min(sites.len());
+        let mut same = [&[][..]; K];
+        for ((tile, same), v) in tiles.iter_mut().zip(&mut same).zip(vectors) {
+            if let Numbers::Same(numbers) = &v.numbers {
+                let tile = tile.items(length);
+                for site in tile.chunks_exact_mut(stride) {
+                    site.copy_from_slice(numbers);
                 }
-                slices
-            };
-            for block in blocks::blocks(sites, stride) {
-                let (start, count) = (block.start * stride, block.len() * stride);
-                let mut slices = tiles;
-                for (slice, v) in slices.iter_mut().zip(vectors) {
-                    *slice = match v.slice() {
-                        Some(numbers) => &numbers[start..start + count],
-                        None => &slice[..count],
-                    };
-                }
-                let mut out = rooms.each_mut().map(|room| room.numbers(count));
-                for i in 0..count {
-                    let numbers = f(slices.map(|slice| slice[i]));
-                    for (out, number) in out.iter_mut().zip(numbers) {
-                        out[i] = number;
-                    }
-                }
-                for (largest, out) in largest.iter_mut().zip(out) {
-                    for site in out.chunks_exact(stride) {
-                        let sum = site.iter().fold(0.0, |sum, r| sum + r * r);
-                        *largest = larger(*largest, (sum * mean).sqrt());
-                    }
-                }
+                *same = tile;
             }
-            largest
-        };
-        let merge = |mut most: [f64; M], part: [f64; M]| {
-            most.iter_mut().zip(part).for_each(|(most, part)| *most = larger(*most, part));
-            most
-        };
-        parallel::map(vectors[0].sites, of).into_iter().fold([0.0; M], merge)
+        }
+        for block in blocks::blocks(sites, stride) {
+            let (start, count) = (block.start * stride, block.len() * stride);
+            let mut slices = same;
+            for (slice, v) in slices.iter_mut().zip(vectors) {
+                *slice = v.slice().map_or(*slice, |numbers| &numbers[start..]);
+            }
+            let out = room.items(count);
+            each(slices, out, f);
+            for site in out.chunks_exact(stride) {
+                let mut sums = [0.0; M];
+                for numbers in site {
+                    sums.iter_mut().zip(numbers).for_each(|(sum, r)| *sum += r * r);
+                }
+                largest = both_larger(largest, sums);
+            }
+        }
+        largest
     }
 
     /// The root mean square of the ratios `v_i/s_i` at each site.
     fn ratios<'a>(&'a self, sizes: &'a Self) -> impl Fn(usize) -> f64 + Sync + 'a {
         let (count, mean) = (self.stride, (self.stride as f64).recip());
-        let [v, sizes] = [self, sizes].map(Self::reader);
+        let both = [self, sizes].map(Self::strided);
         move |site| {
-            let [v, sizes] = [v, sizes].map(|reader| {
-                let start = site * reader.stride;
-                &reader.numbers[start..start + count]
-            });
+            let [v, sizes] = both.map(|(numbers, stride)| &numbers[site * stride..][..count]);
             let ratio = |(v, s): (&f64, &f64)| if *v == 0.0 { 0.0 } else { (v / s).abs() };
             let sum = v.iter().zip(sizes).map(ratio).fold(0.0, |sum, r| sum + r * r);
             (sum * mean).sqrt()
         }
+    }
+}
+
+/// The larger numbers of two rows.
+fn both_larger<const M: usize>(mut most: [f64; M], part: [f64; M]) -> [f64; M] {
+    most.iter_mut().zip(part).for_each(|(most, part)| *most = larger(*most, part));
+    most
+}
+
+/// Writes a function of numbers that stand at the same place. The places it writes to are none of those it reads, which the
+/// compiler knows of arguments alone.
+#[inline(always)]
+fn each<const K: usize, R>(numbers: [&[f64]; K], out: &mut [R], f: impl Fn([f64; K]) -> R) {
+    let numbers = numbers.map(|numbers| &numbers[..out.len()]);
+    for (i, out) in out.iter_mut().enumerate() {
+        *out = f(numbers.map(|numbers| numbers[i]));
     }
 }
 
@@ -224,18 +243,13 @@ impl Vector for SiteVector {
         let mut slices = [&[][..]; K];
         if vectors.iter().zip(&mut slices).all(|(v, slice)| v.slice().map(|s| *slice = s).is_some())
         {
-            return first.filled(|start, out| {
-                let slices = slices.map(|slice| &slice[start..start + out.len()]);
-                for (i, out) in out.iter_mut().enumerate() {
-                    *out = f(slices.map(|slice| slice[i]));
-                }
-            });
+            return first.filled(|start, out| each(slices.map(|slice| &slice[start..]), out, &f));
         }
-        let (readers, stride) = (vectors.map(Self::reader), first.stride);
+        let (strided, stride) = (vectors.map(Self::strided), first.stride);
         first.filled(|start, out| {
             for (site, out) in (start / stride..).zip(out.chunks_exact_mut(stride)) {
                 for (k, out) in out.iter_mut().enumerate() {
-                    *out = f(readers.map(|reader| reader.numbers[site * reader.stride + k]));
+                    *out = f(strided.map(|(numbers, stride)| numbers[site * stride + k]));
                 }
             }
         })
@@ -268,6 +282,20 @@ impl Vector for SiteVector {
     fn norm_of<const K: usize>(vectors: [&Self; K], f: impl Fn([f64; K]) -> f64 + Sync) -> f64 {
         let [norm] = Self::norms(vectors, |numbers| [f(numbers)]);
         norm
+    }
+
+    fn is_norm_below<const K: usize>(
+        vectors: [&Self; K],
+        f: impl Fn([f64; K]) -> f64 + Sync,
+        bound: f64,
+    ) -> bool {
+        let sites = vectors[0].sites;
+        let mean = (vectors[0].stride as f64).recip();
+        (0..sites.div_ceil(CHUNK)).all(|chunk| {
+            let sites = parallel::sites(chunk, sites);
+            let [sum] = Self::squares(vectors, &|numbers| [f(numbers)], sites);
+            (sum * mean).sqrt() < bound
+        })
     }
 
     fn norms_of<const K: usize>(

@@ -22,7 +22,7 @@ use crate::random::Random;
 const SAMPLES: usize = 64;
 /// The displacement of the state at which they are, relative to the sizes of the entries.
 const MOVED: f64 = 1e-2;
-/// What is left of terms that should cancel, relative to them.
+/// The rest of terms that should cancel, relative to them.
 const CANCELS: f64 = 1e-9;
 /// The step of a difference quotient, relative to the sizes of the entries, and its error.
 const STEP: f64 = 1e-5;
@@ -170,26 +170,22 @@ impl<P: Model> Lattice<P> {
         self.verify_gathered("energy", &self.parts.gathers().energy, x)?;
         self.verify_gathered("entropy", &self.parts.gathers().entropy, x)?;
         let (all, _) = self.differentials::<false>(x);
-        if self.motion_along(x, &all).is_some() {
+        if self.motion_along::<true>(x, &all).is_some() {
             return Ok(());
         }
         // A term of the velocity is no number: where is it?
+        let at = (&**x, all.reader::<P>());
         for site in 0..self.sites() {
-            let [w, s] = differentials_at::<P>(&all, site);
+            let [w, s] = at.1.at(site);
             let mut sum = self.parts.reversible(&x[site], &w, &s);
-            let add = |term: crate::Onsager<VectorOf<P>>| sum += term.b * term.rate;
-            self.parts.site_friction(site, &x[site], [&w, &s], add);
+            self.site_terms(site, at, |_, term| sum += term.b * term.rate);
             if !sum.is_finite() {
                 return not_finite("velocity", Place::Site(site));
             }
         }
         for bond in 0..self.layout.bonds().len() {
-            let [i, j] = self.layout.bonds()[bond].map(|site| site as usize);
-            let [[wi, si], [wj, sj]] = [i, j].map(|site| differentials_at::<P>(&all, site));
             let mut sum = VectorOf::<P>::zero();
-            self.parts.bond_friction(bond, [&x[i], &x[j]], [[&wi, &si], [&wj, &sj]], |term| {
-                sum += (term.b[0] + term.b[1]) * term.rate;
-            });
+            self.bond_terms(bond, at, |_, term| sum += (term.b[0] + term.b[1]) * term.rate);
             if !sum.is_finite() {
                 return not_finite("friction", self.place_of(bond));
             }
@@ -242,7 +238,7 @@ impl<P: Model> Lattice<P> {
 /// The sizes of entries over which differences are taken.
 #[derive(Clone, Copy)]
 pub(crate) enum Sizes<V> {
-    /// The same at all sites.
+    /// Sizes that all sites share.
     Same(V),
     /// The size of each entry at its own site, or the given one where it is zero.
     Own(V),
@@ -410,7 +406,7 @@ impl<P: Model> Trial<'_, P> {
     /// The rates of the conserved sums.
     fn conserved(&self, all: &Differentials) -> Result<(), LatticeError> {
         let Self { lattice, y, .. } = *self;
-        let Some((v, _)) = lattice.motion_along(y, all) else { return Ok(()) };
+        let Some((v, _)) = lattice.motion_along::<true>(y, all) else { return Ok(()) };
         for index in 0..P::SUMS {
             let mut rate = Slope::default();
             for site in 0..lattice.sites() {

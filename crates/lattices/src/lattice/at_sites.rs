@@ -17,16 +17,18 @@ pub(crate) struct Differentials {
 
 /// Differentials that are read site by site.
 pub(crate) struct AtSites<'a, P: Model> {
-    numbers: &'a [f64],
+    rows: &'a [<VectorOf<P> as Column<f64>>::Row],
+    /// The differential of the entropy, if it is the same at all sites.
     entropy: Option<VectorOf<P>>,
 }
 
 impl Differentials {
     #[inline]
     pub(crate) fn reader<P: Model>(&self) -> AtSites<'_, P> {
-        let entropy = self.entropy.as_ref();
-        let entropy = entropy.map(|numbers| VectorOf::<P>::from_index(|k| numbers[k]));
-        AtSites { numbers: &self.numbers, entropy }
+        let same = self.entropy.as_ref();
+        let same = same.map(|numbers| VectorOf::<P>::from_index(|k| numbers[k]));
+        let entropy = if P::ENTROPY { same } else { Some(VectorOf::<P>::zero()) };
+        AtSites { rows: VectorOf::<P>::rows(&self.numbers), entropy }
     }
 }
 
@@ -42,15 +44,10 @@ impl<P: Model> AtSites<'_, P> {
     /// Reads the differentials of energy and entropy at a site.
     #[inline(always)]
     pub(crate) fn at(&self, site: usize) -> [VectorOf<P>; 2] {
-        let n = dimension::<P>();
-        let same =
-            if P::ENTROPY { self.entropy } else { Some(<VectorOf<P> as Column<f64>>::zero()) };
-        if let Some(entropy) = same {
-            let numbers = &self.numbers[site * n..site * n + n];
-            return [VectorOf::<P>::from_index(|k| numbers[k]), entropy];
+        match self.entropy {
+            Some(entropy) => [VectorOf::<P>::of_row(&self.rows[site]), entropy],
+            None => [2 * site, 2 * site + 1].map(|row| VectorOf::<P>::of_row(&self.rows[row])),
         }
-        let numbers = &self.numbers[2 * site * n..2 * site * n + 2 * n];
-        [VectorOf::<P>::from_index(|k| numbers[k]), VectorOf::<P>::from_index(|k| numbers[n + k])]
     }
 }
 

@@ -16,7 +16,7 @@ use crate::pool::Buffer;
 /// The conserved sums up to which a loop over sites keeps their totals in registers.
 const FEW: usize = 4;
 
-/// What a bond gives to each of its sites.
+/// Numbers that a bond gives to each of its sites.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Given {
     Nothing,
@@ -27,7 +27,7 @@ pub(crate) enum Given {
 }
 
 impl Given {
-    /// What it gives to the differentials of the laws.
+    /// Says what it gives to the differentials of the laws.
     const fn by_functions<P: Model>() -> Self {
         if P::EntropyGather::PRESENT {
             Self::BothLaws
@@ -78,7 +78,7 @@ fn halves<P: Model>(df: &Vector<PairManifold<P>>) -> [VectorOf<P>; 2] {
     [0, n].map(|start| VectorOf::<P>::from_index(|k| df[start + k]))
 }
 
-/// Whether two vectors have the same bits.
+/// Returns whether two vectors have equal bits.
 #[inline]
 fn has_bits_of<V: Column<f64>>(a: &V, b: &V) -> bool {
     let mut differ = 0;
@@ -114,7 +114,8 @@ impl<P: Model> Lattice<P> {
         let bonds = self.layout.bonds();
         self.layout.scatter(sums, &mut in_slots.numbers(self.layout.slots), |mut part| {
             for site in part.sites.clone() {
-                part.set(site, 0, &SVector::<f64, 2>::zero());
+                part.set(site, 0, &SVector::<f64, 1>::zero());
+                part.set(site, 1, &SVector::<f64, 1>::zero());
             }
             for bond in part.bonds.clone() {
                 let ends = bonds[bond];
@@ -175,6 +176,9 @@ impl<P: Model> Lattice<P> {
         let given = Given::by_functions::<P>();
         let totals = self.layout.scatter(own, &mut self.slots(given), |mut part| {
             let mut totals = Totals::new(if TOTALS { P::SUMS } else { 0 });
+            // Numbers of their own stay in registers.
+            let [mut in_energy, mut in_entropy] = [Total::default(); 2];
+            let (mut slope, mut sizes) = (0.0, VectorOf::<P>::zero());
             let mut sums = [Total::default(); FEW];
             for site in part.sites.clone() {
                 let point = &x[site];
@@ -185,10 +189,10 @@ impl<P: Model> Lattice<P> {
                     if TOTALS { P::Manifold::scales(point) } else { VectorOf::<P>::zero() };
                 if TOTALS {
                     if P::EnergyGather::PRESENT {
-                        totals.energy.add(gathered);
+                        in_energy.add(gathered);
                     }
-                    totals.energy.add(energy.value);
-                    totals.sizes = larger(&totals.sizes, &scales);
+                    in_energy.add(energy.value);
+                    sizes = larger(&sizes, &scales);
                     let sums =
                         if P::SUMS <= FEW { &mut sums[..P::SUMS] } else { &mut *totals.sums };
                     for (k, sum) in sums.iter_mut().enumerate() {
@@ -201,15 +205,15 @@ impl<P: Model> Lattice<P> {
                         embed(&gathers.entropy, point, entropy_sums, site, &mut entropy.df);
                     match same {
                         Some(same) => totals.entropy_differs |= !has_bits_of(&entropy.df, same),
-                        None => part.set(site, n, &entropy.df),
+                        None => part.set(site, 1, &entropy.df),
                     }
                     if TOTALS {
                         if P::EntropyGather::PRESENT {
-                            totals.entropy.add(gathered);
+                            in_entropy.add(gathered);
                         }
-                        totals.entropy.add(entropy.value);
+                        in_entropy.add(entropy.value);
                         if !P::EntropyGather::PRESENT {
-                            totals.entropy_slope += entropy.df.abs().dot(&scales);
+                            slope += entropy.df.abs().dot(&scales);
                         }
                     }
                 }
@@ -217,10 +221,8 @@ impl<P: Model> Lattice<P> {
             if TOTALS && P::SUMS <= FEW {
                 totals.sums.copy_from_slice(&sums[..P::SUMS]);
             }
-            if given == Given::Nothing || totals.entropy_differs {
-                return totals;
-            }
-            for bond in part.bonds.clone() {
+            let none = given == Given::Nothing || totals.entropy_differs;
+            for bond in if none { 0..0 } else { part.bonds.clone() } {
                 let ends = bonds[bond];
                 let pair = ends.map(|site| x[site as usize].clone()).into();
                 let mut jet = self.parts.bond_energy(bond, &pair);
@@ -234,10 +236,10 @@ impl<P: Model> Lattice<P> {
                     part.add(ends, &[energy]);
                 }
                 if TOTALS {
-                    totals.energy.add(jet.value);
+                    in_energy.add(jet.value);
                 }
             }
-            totals
+            Totals { energy: in_energy, entropy: in_entropy, entropy_slope: slope, sizes, ..totals }
         });
         let differs = totals.iter().any(|part| part.entropy_differs);
         if P::BOND_FRICTION {

@@ -2,7 +2,7 @@
 
 use metriplectic_dynamics::invariants::Kind;
 use metriplectic_dynamics::{ModelError, SecondLaw};
-use metriplectic_integrators::explicit::{StageFlow as _, Target};
+use metriplectic_integrators::explicit::{Combination, StageFlow as _, Target};
 use metriplectic_integrators::open::OpenState;
 use metriplectic_integrators::{
     EventExchange, Flow, FlowError, Laws, LedgerSummary, Recheck, StepError, Vector as _,
@@ -11,6 +11,7 @@ use metriplectic_manifolds::PointError;
 
 use super::vector::OpenSiteVector;
 use super::{OpenLattice, OpenSites, StateOf};
+use crate::flow::against_simpson;
 use crate::model::Model;
 
 impl<P: Model> Flow for OpenLattice<P> {
@@ -72,7 +73,7 @@ impl<P: Model> Flow for OpenLattice<P> {
         let laws = Laws { entropy: entropy.unwrap_or(laws.entropy), ..laws.clone() };
         let (error, _) = self.motion(y)?;
         let with_entropy = entropy.is_some();
-        let error = Some(&error);
+        let error = Some(Combination { factor: 1.0, terms: &[(1.0, &error)] });
         let target = Target { laws: &laws, with_entropy, limit: None, units: None, error };
         self.project(y.clone(), &target).ok().map(|end| end.x)
     }
@@ -165,14 +166,6 @@ impl<P: Model> Flow for OpenLattice<P> {
     }
 
     fn local_error(&self, x: &StateOf<P>, end: &StateOf<P>, h: f64) -> Option<OpenSiteVector> {
-        let q = self.displacement(x, end)?;
-        let (start, there) = (self.rates(x, &q.zero())?, self.rates(x, &q)?);
-        let middle = OpenSiteVector::zip([&q, &there, &start], |[q, there, start]| {
-            0.5 * q - (there - start) * (h / 8.0)
-        });
-        let middle = self.rates(x, &middle)?;
-        Some(OpenSiteVector::zip([&q, &start, &middle, &there], |[q, start, middle, there]| {
-            q - (start + 4.0 * middle + there) * (h / 6.0)
-        }))
+        against_simpson(self, x, end, h)
     }
 }

@@ -32,7 +32,7 @@ pub(super) struct Part<P: Model> {
     pub(super) kind: PartKind<P>,
 }
 
-/// What a part does at a site.
+/// The effect of a part at a site.
 pub(super) struct AtSite<V> {
     pub(super) v: V,
     /// The work or the heat in a unit of time.
@@ -43,7 +43,7 @@ pub(super) struct AtSite<V> {
     pub(super) least_rate: f64,
 }
 
-/// What all parts do at a state, in a unit of time.
+/// The effects of all parts at a state, in a unit of time.
 pub(super) struct Exchanged<V> {
     pub(super) velocities: Vec<(usize, V)>,
     /// The work of each port, the heat and the entropy of each bath.
@@ -96,7 +96,7 @@ pub(super) fn per_energy(temperature: f64) -> f64 {
 }
 
 impl<P: Model> OpenLattice<P> {
-    /// What ports and baths do at these points, with the differentials of energy and entropy there.
+    /// Sums the effects of ports and baths at these points, with the differentials of energy and entropy there.
     pub(super) fn exchanged(
         &self,
         t: f64,

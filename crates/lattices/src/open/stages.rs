@@ -1,6 +1,6 @@
 //! An open lattice for explicit methods: stages with clock and ledger, and the projection of the sites alone.
 
-use metriplectic_integrators::explicit::{Projected, ProjectionError, Target};
+use metriplectic_integrators::explicit::{Combination, Projected, ProjectionError, Target};
 use metriplectic_integrators::open::OpenState;
 use metriplectic_integrators::{Laws, StageFlow};
 
@@ -31,7 +31,7 @@ impl<P: Model> OpenLattice<P> {
         x: &Points<P::Manifold>,
         all: &Differentials,
     ) -> Option<(OpenSiteVector, f64)> {
-        let (mut v, internal) = self.lattice.motion_along(x, all)?;
+        let (mut v, internal) = self.lattice.motion_along::<true>(x, all)?;
         let Exchanged { velocities, entries, production } = self.exchanged(t, x, all);
         for (site, more) in velocities {
             v.add_at(site, &more);
@@ -119,12 +119,16 @@ impl<P: Model> StageFlow for OpenLattice<P> {
     ) -> Result<Projected<Self>, ProjectionError> {
         let OpenState { x, time, ledger } = y;
         let (laws, of_baths) = (ledger.targets(target.laws), ledger.entropy_of_baths());
+        let terms = target.error.into_iter().flat_map(|error| error.terms);
+        let terms: Vec<_> = terms.map(|&(w, v)| (w, &v.v)).collect();
+        let of_sites =
+            |error: Combination<'_, _>| Combination { factor: error.factor, terms: &terms };
         let inner = Target {
             laws: &laws,
             with_entropy: target.with_entropy && P::ENTROPY,
             limit: target.limit.map(|limit| limit.map(|v: &OpenSiteVector| &v.v)),
             units: target.units.map(|v| &v.v),
-            error: target.error.map(|v| &v.v),
+            error: target.error.map(of_sites),
         };
         let Projected { x, gradients, entropy, entropy_round_off } =
             self.lattice.project(x, &inner)?;

@@ -15,7 +15,7 @@ use crate::model::{Model, VectorOf};
 const BROKEN: f64 = 1e-8;
 
 impl<P: Model> Part<P> {
-    /// Whether it is a bath that takes energy alone.
+    /// Returns whether it is a bath that takes energy alone.
     pub(super) fn is_cold(&self) -> bool {
         matches!(&self.kind, super::PartKind::Bath { temperature, .. } if temperature.is_zero())
     }

@@ -363,7 +363,7 @@ fn every_test_that_the_guide_names_exists() {
         let tests = named(page);
         assert!(tests.len() >= at_least, "{} tests are named", tests.len());
         for (path, name) in tests {
-            let file = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(path);
+            let file = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").join(path);
             let source = std::fs::read_to_string(&file).expect("the file of a test that is named");
             // A function, or the name given to a macro that makes one, on a line of its own.
             let found = source.lines().map(str::trim_start).any(|line| {

@@ -2,7 +2,7 @@
 
 use metriplectic::dynamics::{Parametrised as _, Point};
 use metriplectic::fields::{Column as _, Vector};
-use metriplectic::integrators::{LinearisedStep, LossGradient, Schedule, TangentError};
+use metriplectic::integrators::{LinearisedAlong, LossGradient, Schedule, TangentError};
 use metriplectic::prelude::*;
 use nalgebra::{DVector, vector};
 
@@ -37,7 +37,7 @@ pub(crate) fn transposed<D, M>(
     schedule: &Schedule,
 ) where
     D: Differentiable,
-    M: Copy + Stepper<D> + LinearisedStep<D::Wide>,
+    M: Copy + Stepper<D> + LinearisedAlong<D>,
 {
     let tangent = method.tangent(system, x0.clone(), schedule.clone()).expect("a tangent");
     let run = method.adjoint(system, x0.clone(), schedule.clone()).expect("an adjoint");

@@ -1,7 +1,7 @@
 //! Explicit steps with their projection, outputs and events.
 
 use metriplectic::dynamics::Parametrised as _;
-use metriplectic::integrators::{LinearisedStep, TangentError};
+use metriplectic::integrators::{LinearisedAlong, TangentError};
 use metriplectic::prelude::*;
 use nalgebra::{DMatrix, vector};
 
@@ -35,7 +35,7 @@ fn explicit_tangents_are_those_of_differences() {
 fn accept<D, M>(name: &str, system: &D, method: M, x0: &metriplectic::dynamics::Point<D>)
 where
     D: Differentiable,
-    M: Copy + Stepper<D> + LinearisedStep<D::Wide>,
+    M: Copy + Stepper<D> + LinearisedAlong<D>,
 {
     let [error, law] = compared(system, method, x0, &Span::steps(0.1, 20), 2e-3);
     println!("{name}: T {error:.1e}, law {law:.1e}");
@@ -164,7 +164,7 @@ fn jumps_and_corners_are_refused() {
     let bounce =
         Span::steps(0.25, 40).event("x", |p: &Vector3<f64>| p.x).jump(|_, p: &Vector3<f64>| -p);
     let jumps = DormandPrince8.tangent(&system, START, bounce);
-    assert!(matches!(jumps, Err(TangentError::Broken { what: "jumps" })));
+    assert!(matches!(jumps, Err(TangentError::Broken { what: "jumps without derivatives" })));
     let corners = DormandPrince8.tangent(&system, START, Span::steps(0.25, 40).corners([0.3]));
     assert!(matches!(corners, Err(TangentError::Broken { what: "corners" })));
 }

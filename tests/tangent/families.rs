@@ -2,7 +2,7 @@
 
 use metriplectic::dynamics::{Parametrised, Point};
 use metriplectic::fields::Space;
-use metriplectic::integrators::{LinearisedStep, TangentError};
+use metriplectic::integrators::{LinearisedAlong, TangentError};
 use metriplectic::prelude::*;
 use nalgebra::{SVector, vector};
 
@@ -21,7 +21,7 @@ fn accept<Y, M, const P: usize>(
 ) where
     Y: Parametrised<P>,
     Euclidean<P>: Space<Point<f64> = SVector<f64, P>>,
-    M: Copy + Stepper<Y::System> + LinearisedStep<<Y::System as Differentiable>::Wide>,
+    M: Copy + Stepper<Y::System> + LinearisedAlong<Y::System>,
 {
     let system = family.at_parameters(theta);
     let [along_start, law] = compared(&system, method, x0, &span, 2e-3);

@@ -1,10 +1,13 @@
 //! Tangents of runs, and families: `T` against differences of runs with the same steps, the laws of `T`, and the same bits.
 
 mod adjoint;
+mod collocated;
 mod explicit;
 mod families;
 mod fits;
+mod jumps;
 mod parts;
+mod refined;
 mod schemes;
 mod table;
 
@@ -70,7 +73,7 @@ pub(crate) fn off(a: &DMatrix<f64>, b: &DMatrix<f64>) -> f64 {
 pub(crate) fn compared<D, M>(system: &D, method: M, x0: &Point<D>, span: &Span, e: f64) -> [f64; 2]
 where
     D: Differentiable,
-    M: Copy + Stepper<D> + metriplectic::integrators::LinearisedStep<D::Wide>,
+    M: Copy + Stepper<D> + metriplectic::integrators::LinearisedAlong<D>,
 {
     let plain = method.run(system, x0.clone(), *span).expect("it runs");
     let run = method.tangent(system, x0.clone(), *span).expect("it has a tangent");

@@ -1,6 +1,6 @@
 //! Steps in parts, and the parts of a family.
 
-use metriplectic::integrators::LinearisedStep;
+use metriplectic::integrators::{LinearisedAlong, TangentError};
 use metriplectic::prelude::*;
 use nalgebra::vector;
 
@@ -15,7 +15,7 @@ fn in_parts<D, M>(
     sizes: &[f64],
 ) where
     D: Differentiable,
-    M: Copy + Stepper<D> + LinearisedStep<D::Wide>,
+    M: Copy + Stepper<D> + LinearisedAlong<D>,
 {
     let split = |h: &&f64| {
         let run = method.run(system, x0.clone(), Span::steps(**h, 2));
@@ -40,6 +40,47 @@ fn parts_of_a_step_are_chained() {
     let sizes = [1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 12.0];
     in_parts("order 5", &body, DormandPrince5, &x0, &sizes);
     in_parts("Weyl", &body, Scheme::new(WeylMidpoint), &x0, &sizes);
+    // The parts of a step that damps grow from a first one, and are not followed: an error says so.
+    for h in [12.0, 16.0, 32.0] {
+        let run = Radau::<2>.run(&body, x0, Span::steps(h, 2)).unwrap();
+        assert!(run.certificate().effort.splits > 0, "h = {h} in one part");
+        match Radau::<2>.tangent(&body, x0, Span::steps(h, 2)) {
+            Err(TangentError::NotLinearised { cause, .. }) => println!("Radau, h = {h}: {cause}"),
+            other => panic!("h = {h}: {:?}", other.map(|run| run.last().along_start())),
+        }
+    }
+}
+
+/// The motion of the end of a step in parts as its size grows, with which an event moves along it.
+#[test]
+fn the_end_of_a_step_in_parts_moves_with_its_size() {
+    let body = System::on(LieDual::so3())
+        .energy(|p: &Vector3<Real>| {
+            p.x * p.x * 0.5 + p.y.powi(4) * 0.3 + p.z * p.z * 1.5 + (p.x * p.z).sin() * 0.2
+        })
+        .entropy(|p: &Vector3<Real>| (p.norm_squared() * 0.5).exp())
+        .build()
+        .unwrap();
+    let x0 = vector![0.4, -1.0, 0.3];
+    let step = |h: f64| DormandPrince5.run(&body, x0, Span::steps(h, 1)).unwrap();
+    let is_in_parts = |h: f64| step(h).certificate().effort.splits > 0;
+    let h = [1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0]
+        .into_iter()
+        .find(|h| is_in_parts(*h) && is_in_parts(0.9 * h))
+        .expect("a step is taken in parts");
+    let level = step(0.9 * h).last().point.y;
+    let span = Span::steps(h, 1).event("y", move |p: &Vector3<f64>| p.y - level);
+    let run = DormandPrince5.tangent(&body, x0, span).unwrap();
+    let event = run.events().last().unwrap();
+    let time = event.event.state.time;
+    assert!(is_in_parts(time), "h = {h}, event at {time}");
+    let found = event.velocity;
+    let (e, at) = (1e-3 * time, |h: f64| step(h).last().point);
+    let slope = |e: f64| (at(time + e) - at(time - e)) / (2.0 * e);
+    let velocity = (4.0 * slope(0.5 * e) - slope(e)) / 3.0;
+    let error = (found - velocity).amax() / velocity.amax();
+    println!("h = {h}, event at {time:.2} in parts: velocity {error:.1e}");
+    assert!(error < 1e-7, "{found:?} {velocity:?}");
 }
 
 /// The derivatives along parameters, against differences.
@@ -51,7 +92,7 @@ fn along_parameters<Y, M, const P: usize>(
     span: Span,
 ) where
     Y: metriplectic::dynamics::Parametrised<P>,
-    M: Copy + Stepper<Y::System> + LinearisedStep<<Y::System as Differentiable>::Wide>,
+    M: Copy + Stepper<Y::System> + LinearisedAlong<Y::System>,
     <Y::System as Metriplectic>::Manifold: Manifold,
 {
     let run = method.tangent(&family.at_parameters(theta), x0.clone(), span);

@@ -2,7 +2,7 @@
 
 use metriplectic::dynamics::Parametrised as _;
 use metriplectic::prelude::*;
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, vector};
 
 use crate::{body, compared, differences, off};
 
@@ -86,4 +86,70 @@ fn events_at_outputs_have_one_tangent() {
         let apart = off(&event.state.matrix(), &state.matrix());
         assert!(apart < 1e-12, "{apart:e}");
     }
+}
+
+/// Near a state at rest the entropy depends on the other laws, and its round-off moves the end of a step by more than that of the
+/// entries.
+#[test]
+fn explicit_steps_have_tangents_near_rest() {
+    let system = body().at_parameters(THETA);
+    macro_rules! accepted {
+        ($name:literal, $method:expr, $order:literal) => {
+            for beside in [1e-14, 1e-12, 1e-10, 1e-8, 1e-6, 1e-5, 1e-4, 1e-3] {
+                let x0 = vector![1.0, beside, beside];
+                for span in [Span::steps(0.2, 10), Span::steps(0.02, 10)] {
+                    let run = $method.tangent(&system, x0, span).unwrap();
+                    let exact = Gauss::<3>.tangent(&system, x0, span).unwrap();
+                    let error = off(&run.last().along_start(), &exact.last().along_start());
+                    println!("{}, beside {beside:e}: {error:.1e} off the motion", $name);
+                    assert!(error < $order, "{}, beside {beside:e}: {error:e}", $name);
+                    assert!(run.sensitivity().energy < 1e-13 && !run.sensitivity().at_rest);
+                }
+            }
+            for beside in [0.3, 1e-1, 1e-2, 1e-3] {
+                let (x0, e) = (vector![1.0, beside, beside], 0.01 * beside);
+                let [error, law] = compared(&system, $method, &x0, &Span::steps(0.2, 5), e);
+                println!("{}, beside {beside:e}: T {error:.1e}, law {law:.1e}", $name);
+                // The entropy moves an end by its round-off over the way to the state at rest.
+                let round_off = 20.0 * f64::EPSILON / (beside * e);
+                assert!(error < 1e-9_f64.max(round_off), "{}, {beside:e}: {error:e}", $name);
+            }
+            let at_rest = $method.tangent(&system, Vector3::x(), Span::steps(0.2, 10)).unwrap();
+            assert!(at_rest.sensitivity().at_rest);
+        };
+    }
+    accepted!("order 5", DormandPrince5, 2e-9);
+    accepted!("order 8", DormandPrince8, 1e-10);
+    accepted!("Chebyshev", RungeKuttaChebyshev, 1e-3);
+    let scheme = Scheme::new(WeylMidpoint);
+    let run = scheme.tangent(&system, Vector3::x(), Span::steps(0.2, 10)).unwrap();
+    assert!(!run.sensitivity().at_rest);
+}
+
+/// A body that comes to rest passes all distances from it.
+#[test]
+fn runs_that_come_to_rest_have_tangents() {
+    let system = body().at_parameters(THETA);
+    macro_rules! accepted {
+        ($name:literal, $method:expr, $tolerance:literal, $bar:literal, $projected:literal) => {
+            for (end, steps) in [(100.0, 1000), (400.0, 4000)] {
+                let span = Span::until(end).tolerance($tolerance);
+                let run = $method.tangent(&system, START, span).unwrap();
+                let exact = Gauss::<3>.tangent(&system, START, Span::steps(0.1, steps)).unwrap();
+                let error = off(&run.last().along_start(), &exact.last().along_start());
+                println!("{} to rest: {error:.1e}; {}", $name, run.sensitivity());
+                assert!(error < $bar, "{}: {error:e}", $name);
+                // A projection leaves the rounding of its step, a solve that of each step before, times its condition.
+                let solved = 20.0 * f64::EPSILON * run.sensitivity().steps as f64;
+                let laws = if $projected { 4.0 * f64::EPSILON } else { solved };
+                assert!(run.sensitivity().energy < laws, "{}: {}", $name, run.sensitivity());
+            }
+        };
+    }
+    accepted!("order 5", DormandPrince5, 1e-8, 1e-8, true);
+    accepted!("order 8", DormandPrince8, 1e-8, 1e-8, true);
+    accepted!("Chebyshev", RungeKuttaChebyshev, 1e-4, 1e-6, true);
+    accepted!("Gauss", Gauss::<2>, 1e-5, 1e-4, false);
+    accepted!("Radau", Radau::<3>, 1e-5, 1e-4, false);
+    accepted!("midpoint", Scheme::new(WeylMidpoint), 1e-4, 1e-2, false);
 }

@@ -23,7 +23,7 @@ pub use builder::FamilyBuilder;
 pub use fields::{AtParameters, OfPair};
 pub use force_of::{ForceAt, ForcedOf};
 pub use freeze::Freeze;
-pub use frozen::{Differentiable, Frozen};
+pub use frozen::{Differentiable, Frozen, RealPoint};
 pub use on_first::{FieldAt, FieldOf, OnFirst};
 
 use std::fmt;
@@ -136,7 +136,8 @@ where
             (y.energy().freeze(&t), y.entropy().freeze(&t), y.invariants().freeze(&t)),
             y.second_law(),
         );
-        Frozen { narrow, wide: Arc::clone(&self.wide), theta, names: self.names }
+        let tensors_depend = G::DEPENDS || B::DEPENDS || K::DEPENDS;
+        Frozen { narrow, wide: Arc::clone(&self.wide), theta, names: self.names, tensors_depend }
     }
 }
 

@@ -28,6 +28,31 @@ pub trait Column<D: Scalar>:
     /// The number of components.
     const LEN: usize;
 
+    /// The components in an array.
+    type Row: Copy + Send + Sync + AsRef<[D]> + AsMut<[D]>;
+
+    /// Cuts numbers into rows of [`LEN`](Self::LEN) and leaves out a shorter rest, so that a row is read with one test of its
+    /// place.
+    fn rows(numbers: &[D]) -> &[Self::Row];
+
+    /// Cuts numbers into rows that are written.
+    fn rows_mut(numbers: &mut [D]) -> &mut [Self::Row];
+
+    /// The column of the numbers in a row.
+    #[inline(always)]
+    fn of_row(row: &Self::Row) -> Self {
+        let row = row.as_ref();
+        Self::from_index(|k| row[k])
+    }
+
+    /// Writes the components into a row.
+    #[inline(always)]
+    fn write(&self, row: &mut Self::Row) {
+        for (k, number) in row.as_mut().iter_mut().enumerate() {
+            *number = self[k];
+        }
+    }
+
     /// Makes the column whose `i`-th component is `f(i)`.
     fn from_index(f: impl FnMut(usize) -> D) -> Self;
 
@@ -88,6 +113,18 @@ pub trait Column<D: Scalar>:
 
 impl<D: Scalar, const N: usize> Column<D> for SVector<D, N> {
     const LEN: usize = N;
+
+    type Row = [D; N];
+
+    #[inline(always)]
+    fn rows(numbers: &[D]) -> &[[D; N]] {
+        numbers.as_chunks().0
+    }
+
+    #[inline(always)]
+    fn rows_mut(numbers: &mut [D]) -> &mut [[D; N]] {
+        numbers.as_chunks_mut().0
+    }
 
     #[inline]
     fn from_index(mut f: impl FnMut(usize) -> D) -> Self {

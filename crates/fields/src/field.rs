@@ -31,6 +31,10 @@ use crate::{ChartPoint, Column, Dimension, Form, Matrix, Real, Scalar, Space, Sq
     note = "a type of your own implements `ScalarField` with the generic method `at`"
 )]
 pub trait ScalarField<M: Space> {
+    /// Whether the field is constant by construction, so that its differential is zero. A system whose entropy is
+    /// constant has no friction, and does not evaluate its dissipation.
+    const IS_CONSTANT: bool = false;
+
     /// Evaluates `f(x)` at any scalar.
     fn at<D: Scalar>(&self, x: &M::Point<D>) -> D;
 
@@ -81,6 +85,8 @@ pub trait ScalarField<M: Space> {
 /// A number is the constant field with this value.
 #[diagnostic::do_not_recommend]
 impl<M: Space> ScalarField<M> for f64 {
+    const IS_CONSTANT: bool = true;
+
     #[inline]
     fn at<D: Scalar>(&self, _: &M::Point<D>) -> D {
         D::from(*self)

@@ -31,11 +31,16 @@ const TINY: f64 = 1.0 / 32.0;
 /// let [_, c1, ..] = stumpff(Dual64::new(0.0, 1.0));
 /// assert_eq!(c1.eps, -1.0 / 6.0);
 /// ```
-#[inline]
+#[inline(always)]
 pub fn stumpff<D: Scalar>(s: D) -> [D; 4] {
     if D::NDERIV == 0 && s.re() == 0.0 {
         return [1.0, 1.0, 1.0 / 2.0, 1.0 / 6.0].map(D::from);
     }
+    by_size(s)
+}
+
+#[inline]
+fn by_size<D: Scalar>(s: D) -> [D; 4] {
     // Each derivative removes a term from the end of a series.
     match s.re().abs() {
         size if size < TINY => power_series(s, 5 + D::NDERIV),

@@ -7,7 +7,7 @@ use std::fmt;
 use argmin::core::{Executor, State as _, TerminationReason};
 use metriplectic_dynamics::{Differentiable, Parametrised, Point};
 use metriplectic_fields::{Dimension as _, Real, Space};
-use metriplectic_integrators::tangent::Linearised;
+use metriplectic_integrators::tangent::LinearisedAlong;
 use metriplectic_integrators::{Schedule, Stepper};
 use metriplectic_manifolds::Manifold as _;
 use nalgebra::SVector;
@@ -200,7 +200,7 @@ where
         guess: SVector<f64, P>,
     ) -> Result<Fitted, FitError>
     where
-        M: Clone + Stepper<Y::System> + Linearised<<Y::System as Differentiable>::Wide>,
+        M: Clone + Stepper<Y::System> + LinearisedAlong<Y::System>,
     {
         self.check()?;
         let Self { family, observe, times, rows, noise, free, positive, start, .. } = self;

@@ -6,9 +6,9 @@ use std::fmt;
 use argmin::core::{CostFunction, Error, Executor, Gradient, State as _};
 use argmin::solver::linesearch::MoreThuenteLineSearch;
 use argmin::solver::quasinewton::LBFGS;
-use metriplectic_dynamics::{Differentiable, Parametrised, Point};
+use metriplectic_dynamics::{Parametrised, Point};
 use metriplectic_fields::{Real, Space};
-use metriplectic_integrators::tangent::Linearised;
+use metriplectic_integrators::tangent::LinearisedAlong;
 use metriplectic_integrators::{Adjoints as _, Method as _, Schedule, Stepper, Watch as _};
 use nalgebra::SVector;
 
@@ -151,7 +151,7 @@ impl<Y, T, M, const P: usize> LossOver<'_, Y, T, M, P>
 where
     Y: Parametrised<P>,
     T: Fn(usize, usize, &PointOf<Y, Real, P>) -> Real,
-    M: Clone + Stepper<Y::System> + Linearised<<Y::System as Differentiable>::Wide>,
+    M: Clone + Stepper<Y::System> + LinearisedAlong<Y::System>,
 {
     /// Evaluates the loss.
     ///
@@ -285,7 +285,7 @@ impl<Y, T, M, const P: usize> CostFunction for LossOver<'_, Y, T, M, P>
 where
     Y: Parametrised<P>,
     T: Fn(usize, usize, &PointOf<Y, Real, P>) -> Real,
-    M: Clone + Stepper<Y::System> + Linearised<<Y::System as Differentiable>::Wide>,
+    M: Clone + Stepper<Y::System> + LinearisedAlong<Y::System>,
 {
     type Param = Vec<f64>;
     type Output = f64;
@@ -301,7 +301,7 @@ impl<Y, T, M, const P: usize> Gradient for LossOver<'_, Y, T, M, P>
 where
     Y: Parametrised<P>,
     T: Fn(usize, usize, &PointOf<Y, Real, P>) -> Real,
-    M: Clone + Stepper<Y::System> + Linearised<<Y::System as Differentiable>::Wide>,
+    M: Clone + Stepper<Y::System> + LinearisedAlong<Y::System>,
 {
     type Param = Vec<f64>;
     type Gradient = Vec<f64>;

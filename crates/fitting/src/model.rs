@@ -2,9 +2,9 @@
 
 use std::cell::RefCell;
 
-use metriplectic_dynamics::{Differentiable, Metriplectic, Parametrised, Point};
+use metriplectic_dynamics::{Metriplectic, Parametrised, Point};
 use metriplectic_fields::{Column as _, Dimension as _, Real, Space, Vector};
-use metriplectic_integrators::tangent::{Linearised, TangentState};
+use metriplectic_integrators::tangent::{LinearisedAlong, TangentState};
 use metriplectic_integrators::{Schedule, Stepper, TangentError, Tangents as _, Watch as _};
 use nalgebra::{DMatrix, DVector, SVector};
 use num_dual::Dual64;
@@ -59,7 +59,7 @@ pub(crate) type Failure = Box<dyn std::error::Error + Send + Sync>;
 impl<Y, M, F, const P: usize, const K: usize> Model<'_, Y, M, F, P, K>
 where
     Y: Parametrised<P>,
-    M: Clone + Stepper<Y::System> + Linearised<<Y::System as Differentiable>::Wide>,
+    M: Clone + Stepper<Y::System> + LinearisedAlong<Y::System>,
     F: Fn(&PointOf<Y, Real, P>) -> SVector<Real, K>,
 {
     /// The dimension of the manifold.
@@ -170,7 +170,7 @@ where
 impl<Y, M, F, const P: usize, const K: usize> LeastSquares for Model<'_, Y, M, F, P, K>
 where
     Y: Parametrised<P>,
-    M: Clone + Stepper<Y::System> + Linearised<<Y::System as Differentiable>::Wide>,
+    M: Clone + Stepper<Y::System> + LinearisedAlong<Y::System>,
     F: Fn(&PointOf<Y, Real, P>) -> SVector<Real, K>,
 {
     fn squares(&self, phi: &[f64]) -> Option<Squares> {

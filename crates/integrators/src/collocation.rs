@@ -64,6 +64,7 @@ mod in_time;
 mod linear;
 mod memory;
 mod parts;
+mod root;
 mod solve;
 mod step;
 mod tableau;
@@ -71,9 +72,12 @@ mod timed;
 
 use metriplectic_dynamics::{Metriplectic, SecondLaw, system::Point};
 
+pub(crate) use covectors::{Stages, combined, trust};
+pub(crate) use heat::HeatStart;
 pub(crate) use in_time::{EnergyInTime, InTime};
 pub use memory::StageMemory;
-pub(crate) use tableau::Tableau;
+pub(crate) use root::StepRoot;
+pub(crate) use tableau::{STAGES, Tableau};
 pub(crate) use timed::{MOST, StageSolution, TimedStep};
 
 use crate::step::failure::Fallbacks;

@@ -75,6 +75,22 @@ pub trait DiscreteGradient: Copy + Debug + Send + Sync {
         by_dual_numbers(self, f, x, path)
     }
 
+    /// Whether the mean covector is the differential `dF(z)`.
+    const IS_DIFFERENTIAL: bool = false;
+
+    /// Computes the mean covector with its derivatives along the unknowns of the paths from either end of a step, which have one
+    /// base.
+    #[inline]
+    fn mean_jets<M: Manifold>(
+        &self,
+        f: &impl ScalarField<M>,
+        [x, y]: [&M::Point<f64>; 2],
+        [there, back]: [&StepPathJet<M>; 2],
+    ) -> (Vector<M>, [Matrix<M>; 2]) {
+        let (mean, slope) = self.mean_jet(f, x, there);
+        (mean, [slope, self.mean_jet(f, y, back).1])
+    }
+
     /// The slope `⟨dF(z), d⟩` at the base point.
     #[inline]
     fn slope_at_base<M: Manifold>(

@@ -65,7 +65,7 @@ mod trial;
 use metriplectic_dynamics::SecondLaw;
 
 pub(crate) use along::along;
-pub use flow::{Limit, Projected, ProjectionError, StageFlow, Target};
+pub use flow::{Combination, Limit, Projected, ProjectionError, StageFlow, Target};
 pub use memory::ExplicitMemory;
 use memory::MemoryOf;
 

@@ -83,6 +83,7 @@ pub use step::{
     Stepper, Taken, Vector,
 };
 pub use tangent::{
-    AdjointRun, Adjoints, Linearised as LinearisedStep, LossGradient, SelfAdjoint, Sensitivity,
-    TangentError, TangentEvent, TangentRun, TangentState, TangentSteps, Tangents, Unlinearised,
+    AdjointRun, Adjoints, Linearised as LinearisedStep, LinearisedAlong, LossGradient, SelfAdjoint,
+    Sensitivity, TangentError, TangentEvent, TangentRun, TangentState, TangentSteps, Tangents,
+    Unlinearised,
 };

@@ -36,6 +36,7 @@ mod scheme;
 mod solution;
 mod step;
 
+pub(crate) use equation::BothEnds;
 pub use equation::{Dissipated, Residual};
 pub use memory::MidpointMemory;
 pub use scheme::Scheme;

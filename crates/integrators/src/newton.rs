@@ -84,13 +84,16 @@ impl<N: Dimension> Measure<N> {
 }
 
 /// The norm of a residual that is taken for round-off, in units of the norm of its bounds.
+/// A factor of four fails `tests/tangent/schemes.rs::tangents_of_schemes_are_those_of_differences`.
 pub(crate) const NORM: f64 = 3.0;
 /// The multiple of its round-off that the last correction may leave of a component, where the norm of the
 /// residual has fallen to a hundredth of its own.
 const HIDDEN: f64 = 1.0;
 /// The multiple of round-off below which the change of a residual says nothing of the Jacobian.
+/// A factor of four fails `tests/tangent/schemes.rs::tangents_of_schemes_are_those_of_differences`.
 const NOISE: f64 = 1e3;
 /// The fraction of the round-off that the last correction has to promise.
+/// A factor of four fails `tests/mutations.rs::the_friction_of_a_certificate_is_that_of_the_steps_however_long_a_jacobian_is_kept`.
 const SURE: f64 = 0.01;
 /// The multiple of round-off below which a residual says little about its Jacobian.
 const NEAR: f64 = 10.0;

@@ -12,7 +12,7 @@ mod control;
 pub mod dense;
 pub(crate) mod digits;
 mod error;
-mod evidence;
+pub(crate) mod evidence;
 pub(crate) mod exact;
 pub(crate) mod failure;
 mod flow;

@@ -13,19 +13,22 @@
 //!
 //! The run is the plain run: no bit of it changes because a tangent is asked for. Steps that follow a tolerance are *frozen*: `h_k` is
 //! a number, and what the controller would have chosen for another start is left out. `T` is then smooth where a
-//! difference of two adaptive runs is not.
+//! difference of two adaptive runs is not. [`Tangents::tangent_to`] makes it as exact as asked for.
 //!
 //! | steps | how |
 //! |---|---|
 //! | [`Scheme`](crate::Scheme) with [`SelfAdjoint`] parts | two linearisations of its own equation, from either end |
 //! | [`DormandPrince5`](crate::DormandPrince5), [`DormandPrince8`](crate::DormandPrince8), [`RungeKuttaChebyshev`](crate::RungeKuttaChebyshev), [`ExplicitRungeKutta`](crate::ExplicitRungeKutta) | stages and projection at dual numbers |
+//! | [`Gauss`](crate::Gauss), [`Radau`](crate::Radau) | the implicit function theorem at the root, with its residual at dual numbers |
 //!
 //! A loss over a run has a gradient by the transposed steps ([`Adjoints`]), whatever the number of parameters.
 //!
 //! Components are those of the frames of the charts at both ends. [`TangentState::embedded`] has entries of velocities.
 
 mod adjoint;
+mod along;
 mod certificate;
+mod collocated;
 mod columns;
 mod duals;
 mod error;
@@ -34,19 +37,26 @@ mod explicit;
 mod frames;
 mod landing;
 mod linearised;
+mod model;
+mod parameters;
+mod part;
 mod pieces;
 mod record;
+mod refined;
+mod saltation;
 mod schemes;
 mod state;
 mod steps;
 mod tape;
 
 pub use adjoint::{AdjointRun, Adjoints, LossGradient, WITHIN};
+pub use along::LinearisedAlong;
 pub use certificate::Sensitivity;
 pub use columns::Columns;
 pub use error::{TangentError, Unlinearised};
 pub use event::TangentEvent;
 pub use linearised::{Linearised, Piece, Propagated, Targets};
+pub use part::Part as StepPart;
 pub use record::{TangentRun, Tangents};
 pub use schemes::SelfAdjoint;
 pub use state::TangentState;

@@ -37,7 +37,10 @@ const ROOMS: [(&str, &[&str]); 16] = [
     ("default_scheme", &["step", "midpoint", "run"]),
     ("attitude", &["round_off", "run"]),
     ("error", &["step", "run", "attitude"]),
-    ("tangent", &["step", "discrete_gradient", "newton", "midpoint", "explicit", "run"]),
+    (
+        "tangent",
+        &["step", "round_off", "discrete_gradient", "midpoint", "collocation", "explicit", "run"],
+    ),
     ("laws", &["step", "round_off", "discrete_gradient", "midpoint", "explicit", "run"]),
 ];
 

@@ -123,7 +123,7 @@ impl<const N: usize> LieAlgebra<N> {
     }
 
     /// Computes the coadjoint action `(ad*_ξ μ)_b = C_ab^d ξ^a μ_d`, that is `⟨ad*_ξ μ, η⟩ = ⟨μ, [ξ, η]⟩`.
-    #[inline]
+    #[inline(always)]
     pub fn coadjoint<D: Scalar>(&self, xi: &SVector<D, N>, mu: &SVector<D, N>) -> SVector<D, N> {
         // A cross product: the compiler knows its indices, and there is no loop.
         if N == 3
@@ -135,6 +135,15 @@ impl<const N: usize> LieAlgebra<N> {
                 _ => xi[1] * mu[0] * q + xi[0] * mu[1] * o,
             });
         }
+        self.coadjoint_by_constants(xi, mu)
+    }
+
+    /// The sum over the constants, one after the other.
+    fn coadjoint_by_constants<D: Scalar>(
+        &self,
+        xi: &SVector<D, N>,
+        mu: &SVector<D, N>,
+    ) -> SVector<D, N> {
         let mut sum = <SVector<D, N> as Column<D>>::zero();
         for c in &self.nonzero {
             sum[c.b] += xi[c.a] * mu[c.d] * c.value;

@@ -4,7 +4,7 @@
 //! `E − ε x δᵀ`, on SO(3) the rotations about the axes of the body.
 
 use metriplectic_fields::series::stumpff;
-use metriplectic_fields::{Dimension, Space, Vector, Velocity};
+use metriplectic_fields::{Column as _, Dimension, Real, Space, Vector, Velocity};
 use nalgebra::{Matrix3, SMatrix, SVector, Vector1, Vector3};
 use num_dual::{Dual64, DualNum as _};
 
@@ -16,7 +16,8 @@ use crate::{Chart, Euclidean, HalfLine, LieDual, Rotations, Sphere};
 /// A space whose stages and charts are known around a base that moves, at dual numbers.
 ///
 /// The base is `x_ε = φ_x(εδ)`. Laws: 1. at `δ = 0` they are those of [`Space`]; 2.
-/// [`stage_rates_from`](Self::stage_rates_from) is the derivative of the inverse of [`stage_from`](Self::stage_from).
+/// [`stage_rates_from`](Self::stage_rates_from) is the derivative of the inverse of [`stage_from`](Self::stage_from); 3.
+/// [`chart_from`](Self::chart_from) is `x_ε` at `q = 0`.
 pub trait MovingBase: Space {
     /// The point `ψ_{x_ε}(q)` of the chart of stages.
     fn stage_from(
@@ -38,6 +39,18 @@ pub trait MovingBase: Space {
         delta: &Vector<Self>,
         a: &Velocity<Self, Dual64>,
     ) -> Self::Point<Dual64>;
+
+    /// The point `φ_{x_ε}(q)` of the chart, with `ε = ε₁`.
+    fn chart_from(
+        x: &Self::Point<f64>,
+        delta: &Vector<Self>,
+        q: &Vector<Self, Real>,
+    ) -> Self::Point<Real>;
+}
+
+/// A dual number as one along `ε₁`.
+fn first(a: Dual64) -> Real {
+    Real::new(a.re, a.eps, 0.0, 0.0)
 }
 
 macro_rules! translated {
@@ -69,6 +82,15 @@ macro_rules! translated {
             ) -> SVector<Dual64, N> {
                 Self::stage_from(x, delta, a)
             }
+
+            #[inline]
+            fn chart_from(
+                x: &SVector<f64, N>,
+                delta: &SVector<f64, N>,
+                q: &SVector<Real, N>,
+            ) -> SVector<Real, N> {
+                SVector::from_fn(|i, _| q[i] + first(Dual64::new(x[i], delta[i])))
+            }
         }
     };
 }
@@ -93,6 +115,10 @@ impl MovingBase for HalfLine {
     fn moved_from(x: &Vector1<f64>, delta: &Vector1<f64>, a: &Vector1<Dual64>) -> Vector1<Dual64> {
         let y = Dual64::new(x.x, x.x * delta.x);
         Vector1::new((a.x / y).exp() * y)
+    }
+
+    fn chart_from(x: &Vector1<f64>, delta: &Vector1<f64>, q: &Vector1<Real>) -> Vector1<Real> {
+        Vector1::new((q.x + first(Dual64::new(0.0, delta.x))).exp() * x.x)
     }
 }
 
@@ -141,6 +167,16 @@ macro_rules! spheres {
                 let [cosine, sine, ..] = stumpff(a.dot(a));
                 x * cosine + a * sine
             }
+
+            fn chart_from(
+                x: &SVector<f64, $a>,
+                delta: &SVector<f64, $n>,
+                q: &SVector<Real, $n>,
+            ) -> SVector<Real, $a> {
+                let (x, e) = moving::<$a, $n>(x, delta);
+                let [cosine, sine, ..] = stumpff(q.dot(q));
+                x.map(first) * cosine + e.map(first) * q * sine
+            }
         }
     )+};
 }
@@ -172,13 +208,16 @@ impl MovingBase for Rotations {
     fn moved_from(x: &Matrix3<f64>, delta: &Vector3<f64>, a: &Vector3<Dual64>) -> Matrix3<Dual64> {
         turned(x, delta) * exp(a)
     }
+
+    fn chart_from(x: &Matrix3<f64>, delta: &Vector3<f64>, q: &Vector3<Real>) -> Matrix3<Real> {
+        turned(x, delta).map(first) * exp(q)
+    }
 }
 
 /// The velocities of the factors.
 fn velocities<A: Times<B>, B: Space>(
     a: &Velocity<Product<A, B>, Dual64>,
 ) -> (Velocity<A, Dual64>, Velocity<B, Dual64>) {
-    use metriplectic_fields::Column as _;
     let n = <A::Velocity as Dimension>::LEN;
     let left = Velocity::<A, Dual64>::from_index(|i| a[i]);
     (left, Velocity::<B, Dual64>::from_index(|i| a[i + n]))
@@ -212,5 +251,14 @@ impl<A: MovingBase + Times<B>, B: MovingBase> MovingBase for Product<A, B> {
     ) -> Self::Point<Dual64> {
         let ((da, db), (va, vb)) = (Self::split(delta), velocities::<A, B>(velocity));
         (A::moved_from(a, &da, &va), B::moved_from(b, &db, &vb))
+    }
+
+    fn chart_from(
+        (a, b): &Self::Point<f64>,
+        delta: &Vector<Self>,
+        q: &Vector<Self, Real>,
+    ) -> Self::Point<Real> {
+        let ((da, db), (qa, qb)) = (Self::split(delta), Self::split(q));
+        (A::chart_from(a, &da, &qa), B::chart_from(b, &db, &qb))
     }
 }

@@ -31,6 +31,12 @@ impl<D: Scalar, const N: usize> Normal<D, N> {
         Self { q: *q, across, bend: c3 * curvature }
     }
 
+    /// Whether this is the identity at the centre, where the compiler knows the coordinates of most points.
+    #[inline(always)]
+    fn is_centre(&self) -> bool {
+        D::NDERIV == 0 && self.q.iter().all(|q| q.re() == 0.0)
+    }
+
     /// The density `√det g = σⁿ⁻¹`.
     #[inline]
     pub(crate) fn volume_density(&self) -> D {
@@ -58,6 +64,9 @@ impl<D: Scalar, const N: usize> InnerProduct<SVector<D, N>> for Normal<D, N> {
     /// By the symmetric root of `g`, which is `σ` across the ray and 1 along it.
     #[inline]
     fn orthonormal(&self, alpha: &SVector<D, N>) -> SVector<D, N> {
+        if self.is_centre() {
+            return *alpha;
+        }
         (alpha - self.q * (self.bend * self.q.dot(alpha))) * self.across.recip()
     }
 

@@ -16,6 +16,9 @@ pub trait Freeze<const P: usize> {
     /// The part of the system on `M`.
     type Narrow;
 
+    /// Whether the part depends on the parameters. Said of metrics, brackets and dissipations; a field always may.
+    const DEPENDS: bool = true;
+
     /// Freezes the part at `θ`.
     fn freeze(&self, theta: &SVector<Real, P>) -> Self::Narrow;
 }
@@ -23,6 +26,8 @@ pub trait Freeze<const P: usize> {
 /// A metric that does not depend on the parameters.
 impl<G: Clone, const P: usize> Freeze<P> for (G, Inert) {
     type Narrow = G;
+
+    const DEPENDS: bool = false;
 
     fn freeze(&self, _: &SVector<Real, P>) -> G {
         self.0.clone()
@@ -51,6 +56,8 @@ impl<F, const P: usize> Freeze<P> for Scaled<OfPair<F>, MetricDissipation> {
 impl<B: Clone, const P: usize> Freeze<P> for (B, Zero) {
     type Narrow = B;
 
+    const DEPENDS: bool = false;
+
     fn freeze(&self, _: &SVector<Real, P>) -> B {
         self.0.clone()
     }
@@ -61,6 +68,8 @@ macro_rules! the_same_anywhere {
     ($($part:ty),+) => {$(
         impl<const P: usize> Freeze<P> for $part {
             type Narrow = Self;
+
+            const DEPENDS: bool = false;
 
             fn freeze(&self, _: &SVector<Real, P>) -> Self {
                 *self

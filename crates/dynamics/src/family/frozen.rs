@@ -3,7 +3,7 @@
 use std::fmt;
 use std::sync::Arc;
 
-use metriplectic_fields::ScalarField;
+use metriplectic_fields::{Real, ScalarField, Space};
 use metriplectic_manifolds::{Euclidean, Manifold, Product, Riemannian, Times};
 use nalgebra::SVector;
 
@@ -20,6 +20,7 @@ pub struct Frozen<N, Y, const P: usize> {
     pub(super) wide: Arc<Y>,
     pub(super) theta: SVector<f64, P>,
     pub(super) names: [&'static str; P],
+    pub(super) tensors_depend: bool,
 }
 
 impl<N, Y, const P: usize> fmt::Debug for Frozen<N, Y, P> {
@@ -30,8 +31,7 @@ impl<N, Y, const P: usize> fmt::Debug for Frozen<N, Y, P> {
 
 impl<N: Clone, Y, const P: usize> Clone for Frozen<N, Y, P> {
     fn clone(&self) -> Self {
-        let Self { narrow, wide, theta, names } = self;
-        Self { narrow: narrow.clone(), wide: Arc::clone(wide), theta: *theta, names: *names }
+        Self { narrow: self.narrow.clone(), wide: Arc::clone(&self.wide), ..*self }
     }
 }
 
@@ -53,6 +53,9 @@ impl<N: Metriplectic, Y, const P: usize> Metriplectic for Frozen<N, Y, P> {
     }
 }
 
+/// A point of a system at the scalar of closures.
+pub type RealPoint<Y> = <<Y as Metriplectic>::Manifold as Space>::Point<Real>;
+
 /// A system whose runs can be differentiated along their start and along parameters.
 ///
 /// The first directions of the [`wide`](Self::wide) system are those of the system itself; those of the parameters stand
@@ -67,8 +70,18 @@ pub trait Differentiable: Metriplectic {
     /// The state of the wide system.
     fn widened(&self, x: &Point<Self>) -> Point<Self::Wide>;
 
+    /// The point of the wide system with the state `x` and the parameters `θ + ε₁ e_i + ε₂ e_j`; an index beyond the number of
+    /// the parameters moves nothing.
+    fn seeded(&self, x: RealPoint<Self>, along: [usize; 2]) -> RealPoint<Self::Wide>;
+
     /// The names of the parameters.
     fn parameters(&self) -> &[&'static str];
+
+    /// Whether the metric, the bracket or the dissipation depends on the parameters, and not the fields alone. Where it does
+    /// not, the derivative of a velocity along a parameter is that along covectors.
+    fn tensors_depend(&self) -> bool {
+        true
+    }
 }
 
 impl<M, G, B, K, H, S, L> Differentiable for System<M, G, B, K, H, S, L>
@@ -89,6 +102,10 @@ where
 
     fn widened(&self, x: &M::Point<f64>) -> M::Point<f64> {
         x.clone()
+    }
+
+    fn seeded(&self, x: M::Point<Real>, _: [usize; 2]) -> M::Point<Real> {
+        x
     }
 
     fn parameters(&self) -> &[&'static str] {
@@ -112,7 +129,18 @@ where
         (x.clone(), self.theta)
     }
 
+    #[inline]
+    fn seeded(&self, x: M::Point<Real>, [i, j]: [usize; 2]) -> (M::Point<Real>, SVector<Real, P>) {
+        let along = |k, direction| if k == direction { 1.0 } else { 0.0 };
+        let theta = |k, _| Real::new(self.theta[k], along(k, i), along(k, j), 0.0);
+        (x, SVector::from_fn(theta))
+    }
+
     fn parameters(&self) -> &[&'static str] {
         &self.names
+    }
+
+    fn tensors_depend(&self) -> bool {
+        self.tensors_depend
     }
 }

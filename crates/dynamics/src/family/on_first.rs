@@ -21,6 +21,8 @@ pub struct OnFirst<K>(pub K);
 impl<K: Clone, const P: usize> Freeze<P> for OnFirst<K> {
     type Narrow = K;
 
+    const DEPENDS: bool = false;
+
     fn freeze(&self, _: &SVector<Real, P>) -> K {
         self.0.clone()
     }

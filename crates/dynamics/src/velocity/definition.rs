@@ -1,6 +1,6 @@
 //! The velocity by its definition, at every scalar.
 
-use metriplectic_fields::{ChartPoint, Column, Scalar, Vector};
+use metriplectic_fields::{ChartPoint, Column, Scalar, ScalarField, Vector};
 use metriplectic_manifolds::{InnerProduct, MetricAt, MetricError, Riemannian};
 
 use super::covectors::{Components, Covectors, differentials};
@@ -120,6 +120,9 @@ fn friction<Y: Metriplectic + ?Sized, D: Scalar>(
     g: &At<'_, Y, D>,
     w: &Covectors<CountOf<Y>, Components<Y, D>>,
 ) -> Result<Components<Y, D>, MetricError> {
+    if Y::Entropy::IS_CONSTANT {
+        return Ok(Components::<Y, D>::zero());
+    }
     let k = |alpha: &_| system.dissipation().apply(g, &w.energy, alpha);
     if Y::Invariants::COUNT == 0 {
         return k(&w.entropy);

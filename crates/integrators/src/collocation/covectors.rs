@@ -30,7 +30,7 @@ use crate::round_off::stable_gradient::short;
 use crate::step::CountOf;
 
 /// A vector for each stage.
-pub(super) type Stages<V> = [V; STAGES];
+pub(crate) type Stages<V> = [V; STAGES];
 
 /// The stages of a step: points, velocities in the frames there, and their covectors.
 #[derive(Debug)]
@@ -124,7 +124,7 @@ impl<M: Space> StepPolynomial<'_, M> {
 
 /// `Σ_{j<s} c_j v_j`.
 #[inline]
-pub(super) fn combined<V: Column<f64>>(
+pub(crate) fn combined<V: Column<f64>>(
     stages: usize,
     coefficients: &[f64; STAGES],
     vectors: &Stages<V>,
@@ -306,14 +306,7 @@ impl<M: Manifold> AlongStages<'_, M> {
         let fraction = short(change, size);
         if fraction > 0.0 {
             let integral = self.integral(f) - slope;
-            // Without terms there is no error.
-            let error = if change > 0.0 {
-                integral.abs() * (integral / change).abs().powf(2.0 / s as f64)
-            } else {
-                0.0
-            };
-            let trust = if error > 0.0 { (1.0 + (error / rounding).powi(2)).recip() } else { 1.0 };
-            let weight = fraction * trust;
+            let weight = fraction * trust(integral, [change, rounding], s);
             delta += weight * (integral - delta);
             noise *= 1.0 - weight;
         }
@@ -353,6 +346,17 @@ impl<M: Manifold> AlongStages<'_, M> {
             sum + point.weight * f.slope(point.node, &M::chart(&chart.z, &moved))
         })
     }
+}
+
+/// How far an integral that gives the number `δ` of a change is trusted, against a difference with the error `rounding`.
+pub(crate) fn trust(delta: f64, [change, rounding]: [f64; 2], stages: usize) -> f64 {
+    // Without terms there is no error.
+    let error = if change > 0.0 {
+        delta.abs() * (delta / change).abs().powf(2.0 / stages as f64)
+    } else {
+        0.0
+    };
+    if error > 0.0 { (1.0 + (error / rounding).powi(2)).recip() } else { 1.0 }
 }
 
 /// Calls a function for each of the further invariants in turn.

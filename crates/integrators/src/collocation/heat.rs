@@ -60,8 +60,10 @@ struct Direction<V> {
 }
 
 /// The alignment up to which there is no heat: at an infinite temperature the entropy does not change the energy.
+/// A factor of four fails `tests/collocation.rs::orders_through_infinite_temperatures`.
 const FAINT: f64 = 0.01;
 /// The alignment from which on all that friction has lost becomes heat.
+/// A factor of four fails `tests/tangent/collocated.rs::parameters_of_a_metric_are_columns_of_stages`.
 const CLEAR: f64 = 0.1;
 
 /// The entries that are not warmed.
@@ -105,7 +107,7 @@ fn direction<Y: Metriplectic>(
 
 /// Where a step that heats starts.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct HeatStart<N: Dimension> {
+pub(crate) struct HeatStart<N: Dimension> {
     /// The differential of the energy.
     energy: N::Vector<f64>,
     /// The alignment of the direction of heat.
@@ -115,10 +117,15 @@ pub(super) struct HeatStart<N: Dimension> {
 }
 
 impl<N: Dimension> HeatStart<N> {
+    /// Whether an entry is not warmed.
+    pub(crate) fn is_still(&self, entry: usize) -> bool {
+        self.still.as_ref()[entry]
+    }
+
     /// The fraction of the heat that goes in a direction of a stage; `None` beyond a temperature of zero, where no
     /// motion leads: such a root belongs to another branch of the entropy. At an infinite temperature the direction
     /// turns, and there is no heat.
-    fn fraction(&self, alignment: f64) -> Option<f64> {
+    pub(crate) fn fraction(&self, alignment: f64) -> Option<f64> {
         let along = alignment * self.alignment.signum();
         let fraction = (along - FAINT) / (CLEAR - FAINT);
         (along > -CLEAR).then(|| fraction.clamp(0.0, 1.0))

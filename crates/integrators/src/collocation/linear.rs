@@ -50,8 +50,10 @@ pub(super) struct Linear<N: Dimension> {
 /// Iterations of the linear system.
 const PASSES: usize = 12;
 /// The fraction of a correction that the linear system may leave.
+/// A factor of four fails `tests/stiff_friction.rs::units_change_nothing`.
 const LEFT: f64 = 1e-3;
 /// The factor between the bound of round-off to first order and what is taken for round-off.
+/// A factor of four fails `tests/collocation.rs::one_stage_is_the_scheme_of_the_paper`.
 const MARGIN: f64 = 3.0;
 
 /// The differentials of all fields with their derivatives.

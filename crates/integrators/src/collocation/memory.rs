@@ -93,6 +93,11 @@ impl<N: Dimension> Memory for StageMemory<N> {
         Self { last: None, ..*self }
     }
 
+    fn stage_velocities(&self) -> Vec<f64> {
+        let all = self.last.iter().flat_map(|last| last.k);
+        all.flat_map(|k| (0..N::LEN).map(move |i| k[i])).collect()
+    }
+
     fn save(&self, saved: &mut Saved) {
         let column = |v: &N::Vector<f64>| (0..N::LEN).map(|i| v[i]).collect::<Vec<f64>>();
         if let Some(Continued { k, stages, h }) = &self.velocities {

@@ -15,7 +15,7 @@ pub(crate) type Numbers = [f64; STAGES];
 #[derive(Debug)]
 pub(crate) struct Tableau {
     /// How many stages there are.
-    pub(super) stages: usize,
+    pub(crate) stages: usize,
     /// The order of convergence.
     pub(crate) order: u32,
     /// Whether the entropy is corrected on one side only.
@@ -23,9 +23,9 @@ pub(crate) struct Tableau {
     /// The nodes `c_i`.
     pub(crate) nodes: Numbers,
     /// The weights `b_j`.
-    pub(super) weights: Numbers,
+    pub(crate) weights: Numbers,
     /// The matrix `a_ij`.
-    pub(super) matrix: [Numbers; STAGES],
+    pub(crate) matrix: [Numbers; STAGES],
     /// Its inverse.
     pub(super) inverse: [Numbers; STAGES],
     /// The least modulus of its eigenvalues, the parameter of the blended iteration.
@@ -36,15 +36,15 @@ pub(crate) struct Tableau {
 
 /// A node of the Gauss rule along a step.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Point {
+pub(crate) struct Point {
     /// The fraction of the step.
     pub(super) node: f64,
     /// Its weight.
-    pub(super) weight: f64,
+    pub(crate) weight: f64,
     /// The coefficients `∫₀^τ ℓ_j − b_j/2` of the position from the middle of the step.
-    pub(super) position: Numbers,
+    pub(crate) position: Numbers,
     /// The coefficients `ℓ_j(τ)` of the velocity.
-    pub(super) velocity: Numbers,
+    pub(crate) velocity: Numbers,
 }
 
 /// A Gauss rule on `[0, 1]`.
@@ -195,7 +195,7 @@ impl Tableau {
     }
 
     /// The points of the rule along the step.
-    pub(super) fn points(&self) -> &[Point] {
+    pub(crate) fn points(&self) -> &[Point] {
         &self.points[..self.stages + 2]
     }
 

@@ -48,6 +48,19 @@ impl DiscreteGradient for Gonzalez {
         (jet.df, jet.hf * path.dz)
     }
 
+    const IS_DIFFERENTIAL: bool = true;
+
+    #[inline]
+    fn mean_jets<M: Manifold>(
+        &self,
+        f: &impl ScalarField<M>,
+        _: [&M::Point<f64>; 2],
+        paths: [&StepPathJet<M>; 2],
+    ) -> (Vector<M>, [Matrix<M>; 2]) {
+        let jet = f.jet2(&paths[0].z);
+        (jet.df, paths.map(|path| jet.hf * path.dz))
+    }
+
     #[inline]
     fn slope_at_base<M: Manifold>(
         &self,

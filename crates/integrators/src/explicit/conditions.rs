@@ -33,8 +33,8 @@ pub(crate) struct Conditions<'a> {
     trees: Vec<Tree>,
 }
 
-/// The residual of a condition of order, relative to its terms, above which a weight is misprinted
-/// (`tests/tableau.rs::a_wrong_tableau_is_refused_by_its_laws_and_before_a_run`).
+/// The residual of a condition of order, relative to its terms, above which a weight is misprinted.
+/// A factor of four fails `tests/tableau.rs::a_wrong_tableau_is_refused_by_its_laws_and_before_a_run`.
 const MISPRINTED: f64 = 1e-8;
 
 impl Tableau {

@@ -48,17 +48,20 @@ pub(super) fn error<F: StageFlow>(
         (Stages::Rows(_), [[], _]) => return None,
         (Stages::Rows(_), _) => {}
     }
-    let of = |row: Row| norm(&combined(h, row, &last.stages));
+    // The sums of rows that are constants are written out, and not in a closure that is called.
     let [fifth, third] = match tableau.compiled {
         Some(Compiled::Eight) => {
             const ROWS: [Row; 2] = EIGHT.errors;
-            [of(ROWS[0]), of(ROWS[1])]
+            // One after the other, so that many sites have one array for both.
+            let fifth = norm(&combined(h, ROWS[0], &last.stages));
+            let third = norm(&combined(h, ROWS[1], &last.stages));
+            [fifth, third]
         }
         Some(Compiled::Five) => {
             const ROW: Row = FIVE.errors[0];
-            [of(ROW), 0.0]
+            [norm(&combined(h, ROW, &last.stages)), 0.0]
         }
-        None => tableau.errors.map(of),
+        None => tableau.errors.map(|row| norm(&combined(h, row, &last.stages))),
     };
     // Hairer's e₅²/√(e₅² + e₃²/100) is of the order of the method; a method with one error has that.
     Some(if third > 0.0 { fifth * (fifth / fifth.hypot(0.1 * third)) } else { fifth })

@@ -22,6 +22,13 @@ pub trait StageFlow: Flow {
         None
     }
 
+    /// The round-off of the entropy [between](Flow::entropy_round_off) two states, with the differentials at the second one.
+    #[inline]
+    fn entropy_round_off_to(&self, ends: [&Element<Self>; 2], end: &Self::Gradients) -> f64 {
+        let _ = end;
+        self.entropy_round_off(ends)
+    }
+
     /// The velocity at a state, in the frame there, and the entropy `⟨dS, K dS⟩` that is produced per unit of
     /// time; `None` where they have no value.
     fn velocity(
@@ -125,7 +132,25 @@ pub struct Target<'a, F: Flow + ?Sized> {
     pub units: Option<&'a F::Vector>,
     /// An estimate of the local error of the step, if the flow [weighs errors](StageFlow::weighs_errors): a state
     /// may be moved in proportion to it, so that nothing moves which the step has not moved.
-    pub error: Option<&'a F::Vector>,
+    pub error: Option<Combination<'a, F::Vector>>,
+}
+
+/// A combination `h Σ_j w_j v_j` of vectors whose numbers are formed where they are needed, so that many sites need no array
+/// for them.
+#[derive(Debug)]
+pub struct Combination<'a, V> {
+    /// The factor `h`.
+    pub factor: f64,
+    /// The terms `(w_j, v_j)`.
+    pub terms: &'a [(f64, &'a V)],
+}
+
+impl<V> Copy for Combination<'_, V> {}
+
+impl<V> Clone for Combination<'_, V> {
+    fn clone(&self) -> Self {
+        *self
+    }
 }
 
 /// The longest displacement by which a state is moved onto its laws.
@@ -168,11 +193,18 @@ impl<'a, V: Vector> Limit<'a, V> {
     pub fn relative_to(&self, units: &V) -> f64 {
         match *self {
             Self::Entries(entries) => entries.relative_to(units),
+            Self::HalfOf { step, sizes } => V::norm_of([step, sizes, units], half_in_units),
+        }
+    }
+
+    /// Returns whether its length relative to units is below a number. A vector of many sites looks at no more of them than it
+    /// needs.
+    #[must_use]
+    pub fn is_below(&self, length: f64, units: &V) -> bool {
+        match *self {
+            Self::Entries(_) => self.relative_to(units) < length,
             Self::HalfOf { step, sizes } => {
-                V::norm_of([step, sizes, units], |[step, size, unit]| {
-                    let most = half_of([step, size]);
-                    if most == 0.0 { 0.0 } else { (most / unit).abs() }
-                })
+                V::is_norm_below([step, sizes, units], half_in_units, length)
             }
         }
     }
@@ -190,6 +222,11 @@ impl<'a, V: Vector> Limit<'a, V> {
 /// Half of a displacement. Round-off is never too far.
 fn half_of([step, size]: [f64; 2]) -> f64 {
     (0.5 * step.abs()).max(NEAR * size)
+}
+
+fn half_in_units([step, size, unit]: [f64; 3]) -> f64 {
+    let most = half_of([step, size]);
+    if most == 0.0 { 0.0 } else { (most / unit).abs() }
 }
 
 /// A state on its laws.

@@ -189,15 +189,14 @@ fn finished<F: StageFlow>(
     }
     let values = flow.values(&end.gradients);
     let round_off = flow.entropy_round_off_of(&end.gradients);
-    // An array of many sites is given up before the next one is made.
+    // Arrays of many sites are given up before the next ones are made.
     last.end = last.end.zero();
-    last.end = flow.stage_coordinates(x, &end.x);
-    let lost_before = memory.lost.replace(lost);
     let Some(next) = here_at(flow, &end.x, end.gradients) else {
-        memory.lost = lost_before;
-        return Err(Refused::outside(flow, x, &last.end));
+        return Err(Refused::outside(flow, x, &flow.stage_coordinates(x, &end.x)));
     };
+    memory.lost = Some(lost);
     memory.read = Vec::new();
+    last.end = flow.stage_coordinates(x, &end.x);
     let rates = flow.stage_rates(x, (&last.end, &end.x), &next.velocity);
     let rests = end.x == *x && is_zero(&last.stages[0].velocity);
     let stability =
@@ -243,7 +242,16 @@ fn stages<F: StageFlow>(
     here: Here<F::Vector>,
     last: &mut LastStep<F::Vector>,
 ) -> Result<(), Refused> {
-    let &Trial { tableau, h, .. } = trial;
+    let &Trial { tableau, flow, start, h } = trial;
+    // A copy of plain numbers, which the compiler knows not to change: what all stages need of the start is computed once.
+    let copy;
+    let x = if std::mem::needs_drop::<Element<F>>() {
+        start.x
+    } else {
+        copy = start.x.clone();
+        &copy
+    };
+    let at = (flow, x, h);
     last.stages[0] = here;
     last.known = rows.len() + 1;
     /// With the rows as constants, whose sums the compiler writes out.
@@ -252,7 +260,7 @@ fn stages<F: StageFlow>(
             const COUNT: usize = $tableau.rows().len();
             $({
                 const ROW: Row = $tableau.rows()[$i];
-                add_stage(trial, ROW, ($i, COUNT), last)?;
+                add_stage(at, ROW, ($i, COUNT), last)?;
                 release(tableau, &rows[$i + 1..], last);
             })*
             const END: Row = $tableau.end;
@@ -265,7 +273,7 @@ fn stages<F: StageFlow>(
         Some(Compiled::Five) => compiled!(FIVE: 0 1 2 3 4),
         None => {
             for (i, row) in rows.iter().enumerate() {
-                add_stage(trial, row, (i, rows.len()), last)?;
+                add_stage(at, row, (i, rows.len()), last)?;
                 release(tableau, &rows[i + 1..], last);
             }
             last.end = combined(h, tableau.end, &last.stages);
@@ -290,12 +298,11 @@ fn release<V: Vector>(tableau: &Tableau, to_come: &[Row], last: &mut LastStep<V>
 /// The stage that row `i` makes, of so many. The estimate of stability needs the coordinates of the last one.
 #[inline(always)]
 fn add_stage<F: StageFlow>(
-    &Trial { flow, start, h, .. }: &Trial<'_, F>,
+    (flow, x, h): (&F, &Element<F>, f64),
     row: Row,
     (i, count): (usize, usize),
     last: &mut LastStep<F::Vector>,
 ) -> Result<(), Refused> {
-    let x = start.x;
     let before = if i + 1 == count { Some(&mut last.before) } else { None };
     let Some((velocity, production)) = stage_of(flow, x, (h, row, &last.stages), before) else {
         return Err(Refused::outside(flow, x, &combined(h, row, &last.stages)));

@@ -1,5 +1,6 @@
 //! The implicit equation of one step.
 
+mod both_ends;
 mod providers;
 
 use std::fmt::Debug;
@@ -10,6 +11,7 @@ use metriplectic_dynamics::{Metriplectic, SecondLaw, system::Point};
 use metriplectic_fields::{ChartPoint, Column, Scalar, ScalarField, Space, Square, Vector};
 use metriplectic_manifolds::{Manifold, MetricError, Retraction};
 
+pub(crate) use both_ends::BothEnds;
 use providers::{Along, Defined, Jets, Values};
 
 use super::scheme::Scheme;
@@ -160,6 +162,18 @@ where
         let Scheme { retraction, gradient, .. } = scheme;
         let (values, drift) = (system.laws(x), drift::nothing::<Y>());
         Self { system, retraction, gradient, x, h, values, drift }
+    }
+
+    /// The equation of a step of size `h` from `x`, to be linearised from both ends, for which it needs no laws at `x`.
+    pub(crate) fn between(
+        system: &'a Y,
+        scheme: &'a Scheme<R, W>,
+        x: &'a Point<Y>,
+        h: f64,
+    ) -> Self {
+        let Scheme { retraction, gradient, .. } = scheme;
+        let nothing = drift::nothing::<Y>;
+        Self { system, retraction, gradient, x, h, values: nothing(), drift: nothing() }
     }
 
     /// Makes the equation of a start with known laws, and with errors of earlier steps to correct.

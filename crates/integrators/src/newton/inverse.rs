@@ -5,6 +5,7 @@ use metriplectic_fields::{Column, Dimension, Space, Square};
 use super::{Linearised, Rounding, SURE, Stiffness};
 
 /// The factor between the bound of round-off to first order and what is taken for round-off.
+/// A factor of four fails `tests/mutations.rs::the_friction_of_a_certificate_is_that_of_the_steps_however_long_a_jacobian_is_kept`.
 const MARGIN: f64 = 3.0;
 /// The error of `J⁻¹J` at which an inverse has no digits: the Jacobian is singular to round-off, as with
 /// friction that is 10¹⁶ times faster than the motion along no axis.

@@ -5,6 +5,7 @@ use super::fluctuating::Fluctuating;
 use super::moves::Moves;
 use super::numbers::{Counter, Numbers};
 use super::system::Noisy;
+use crate::step::evidence::RESOLVED;
 use crate::step::{
     Effort, Element, Memory, MethodError, NoiseSummary, Promises, Refusal, RestoreError, Saved,
     StepEnds, StepError, StepStart, Stepper, Taken,
@@ -87,8 +88,6 @@ impl NoiseMemory {
     }
 }
 
-/// The rate `h|K'|` above which friction is not resolved.
-const RESOLVED: f64 = 1.0;
 /// How many steps may be unresolved in any run, and beside them one of how many.
 const FEW: u64 = 2;
 const OFTEN: u64 = 8;

@@ -93,15 +93,14 @@ where
         let OpenState { x, time, ledger } = y;
         let (laws, of_baths) = (ledger.targets(target.laws), ledger.entropy_of_baths());
         let has_entropy = self.closed().second_law() == SecondLaw::Exact;
-        let [units, error] =
-            [target.units, target.error].map(|direction| direction.map(Self::components));
+        let units = target.units.map(Self::components);
         let limit = target.limit.map(|limit| Self::components(&limit.entries()));
         let inner = Target {
             laws: &laws,
             with_entropy: target.with_entropy && has_entropy,
             limit: limit.as_ref().map(Limit::Entries),
             units: units.as_ref(),
-            error: error.as_ref(),
+            error: None,
         };
         let view = self.frozen(time);
         let Projected { x, gradients, entropy, entropy_round_off } = view.project(x, &inner)?;

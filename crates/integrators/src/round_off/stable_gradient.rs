@@ -55,6 +55,7 @@ impl<'a, M: Manifold> Segment<'a, M> {
 
 /// The fraction of `|F| + Σ_i |∂_iF x_i|` by which a step changes `F`, at which a difference of two values of
 /// `F` starts to be trusted; from four times that fraction on it is trusted alone.
+/// A factor of four fails `tests/tangent/schemes.rs::tangents_of_schemes_are_those_of_differences`.
 const SHORT: f64 = 1e-3;
 
 /// The weight of an integral against a difference of two values of size `size` that is about
@@ -117,6 +118,20 @@ impl<M: Manifold> StableGradient<M> {
         Self { mean: *mean, defect, change, rounding, noise }
     }
 
+    /// The data of the same path from its end to its start, which has the same covector.
+    #[must_use]
+    pub fn reversed(&self) -> Self {
+        Self { defect: -self.defect, ..self.clone() }
+    }
+
+    /// How far the derivative of the defect, a difference of nearly equal numbers, is above its own round-off: 1 where it is,
+    /// and 0 where nothing is left of it.
+    #[inline]
+    pub fn trust(&self) -> f64 {
+        let noise = 1e3 * self.rounding / self.change.max(f64::MIN_POSITIVE);
+        (1.0 + noise.powi(2)).recip()
+    }
+
     /// The covector `w` with `⟨w, d⟩ = F(x') − F(x) + drift_correction`.
     ///
     /// `drift_correction` is what earlier steps have left over; it is zero in the definition.
@@ -170,9 +185,7 @@ impl<M: Manifold> StableGradient<M> {
         let rows = path.dend.transpose_times(df_end)
             - path.dd.transpose_times(&self.mean)
             - slope.transpose_times(&path.d);
-        let noise = 1e3 * self.rounding / self.change.max(f64::MIN_POSITIVE);
-        let trust = (1.0 + noise.powi(2)).recip();
-        let mut along = rows * trust - path.dd.transpose_times(&flat) * (2.0 * c);
+        let mut along = rows * self.trust() - path.dd.transpose_times(&flat) * (2.0 * c);
         if let Some(slopes) = slopes {
             // ∂g along z, in ♭d and in G(d, d).
             let dg_v = along_slopes::<M>(slopes, &path.d) * path.dz;
@@ -185,7 +198,7 @@ impl<M: Manifold> StableGradient<M> {
 }
 
 /// The squared length below which a path is measured in units of its own.
-const SQUARE: f64 = 1e-280;
+pub(crate) const SQUARE: f64 = 1e-280;
 
 /// `♭d defect/G(d, d)` on a path so short that its squared length leaves the range of numbers, in units of
 /// a power of two near that length; zero on a path without length.

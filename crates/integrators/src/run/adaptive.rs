@@ -6,8 +6,10 @@ use crate::step::{Element, Flow, Scales, Vector};
 
 /// The least error `τ^p` of a step, with the power of its [`Control`](crate::step::Control), and the least error `τ`
 /// of a run: some units of round-off. So the least tolerance is 10⁻¹⁰ for `p = 3/2`, and this one for `p ≤ 1`.
+/// A factor of four fails `tests/adaptive.rs::a_tolerance_has_the_bounds_of_its_method`.
 const LEAST: f64 = 1e-15;
 /// The largest tolerance: an error of the size of the entry.
+/// A factor of four fails `tests/adaptive.rs::a_tolerance_has_the_bounds_of_its_method`.
 const LARGEST: f64 = 1.0;
 
 /// Options of steps that follow a tolerance.
@@ -24,6 +26,14 @@ pub(crate) struct Adaptive {
 impl Adaptive {
     pub(crate) const fn end(&self) -> f64 {
         self.end
+    }
+
+    /// Multiplies the tolerance by a factor, and takes no longer steps than this.
+    pub(crate) fn tighten(&mut self, factor: f64, largest: f64) {
+        self.tolerance *= factor;
+        let within = |h: f64| h.min(largest);
+        self.largest = Some(self.largest.map_or(largest, within));
+        (self.first, self.least) = (self.first.map(within), self.least.map(within));
     }
 
     pub(crate) fn check(&self, start: f64) -> Result<(), SpanError> {

@@ -11,6 +11,7 @@ use metriplectic_dynamics::invariants::Kind;
 use crate::round_off::bound::of_a_law;
 use crate::run::checked::checked_states;
 use crate::run::jump::{Exchanged, JumpBalance};
+use crate::step::evidence::RESOLVED;
 use crate::step::{
     Effort, Element, EntropyStep, EventExchange, Evidence, Flow, Laws, LedgerSummary,
     LimitingSites, NoiseSummary, Promises, Taken,
@@ -200,10 +201,8 @@ impl InvariantBalance {
 
 /// The rate `h|K'|` of friction from which on a step is stiff: the midpoint rule leaves two thirds of a
 /// deviation that decays at this rate, with the opposite sign.
+/// A factor of four fails `tests/stiff_friction.rs::two_temperatures_come_together`.
 const STIFF: f64 = 10.0;
-
-/// This rate from which on the law of thermal noise is not resolved.
-const RESOLVED: f64 = 1.0;
 
 #[cfg(feature = "serde")]
 fn by_name<S: serde::Serializer>(name: &impl fmt::Debug, to: S) -> Result<S::Ok, S::Error> {
@@ -433,6 +432,7 @@ impl Certificate {
 const UNRESOLVED: f64 = 0.1;
 
 /// The fraction of the gain of the entropy that damping may add where a motion is resolved.
+/// A factor of four fails `run/certificate/tests.rs::one_is_no_plural`.
 const ADDED: f64 = 0.01;
 
 /// The fraction of steps at the edge of stability from which on stability sets the steps of a run.

@@ -7,6 +7,7 @@ const FIRST: [usize; 9] = [1, 2, 3, 5, 8, 13, 21, 34, 55];
 
 /// The model is checked after each multiple of so many steps: a check costs as much as a step, and at most a hundredth of
 /// a run (`tests/verification.rs::checks_on_the_way_cost_a_hundredth_of_a_long_run`).
+/// A factor of four fails `run/checked.rs::the_states_that_are_checked_are_counted`.
 const EVERY: usize = 149;
 
 /// Returns whether the model is checked after this step.

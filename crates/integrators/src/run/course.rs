@@ -50,6 +50,8 @@ pub(super) struct Course<'a, F: Flow + ?Sized> {
     pub(super) failed: bool,
     /// The step before the state, for what lies between them.
     pub(super) before: StepBefore<F>,
+    /// The step that the last jump has cut, for what differentiates it.
+    pub(super) cut: Option<StepBefore<F>>,
     pub(super) watching: Option<Box<Watching<F::Space>>>,
     /// The last numbers of functions of events that had no value where the run was put down, until its first step.
     pub(super) last_numbers: Vec<LastNumber>,
@@ -119,6 +121,7 @@ impl<'a, F: Flow + ?Sized> Course<'a, F> {
             state,
             before,
             watching,
+            cut: None,
             last_numbers: Vec::new(),
             values,
             entropy,

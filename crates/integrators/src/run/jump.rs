@@ -3,6 +3,8 @@
 use std::any::{Any, type_name};
 use std::sync::Arc;
 
+use metriplectic_fields::Real;
+
 use crate::round_off::sum::plus;
 use crate::run::span_error::SpanError;
 use crate::run::state::State;
@@ -79,11 +81,24 @@ type Map<P> = dyn Fn(f64, &P) -> P + Send + Sync;
 /// A map of points as a type that can be recovered from `dyn Any`.
 struct Function<P>(Box<Map<P>>);
 
+/// A number at a time and a state that carry derivatives.
+type SmoothFunction<P> = dyn Fn(Real, &P) -> Real + Send + Sync;
+/// A state at a time and a state that carry derivatives.
+type SmoothMap<P> = dyn Fn(Real, &P) -> P + Send + Sync;
+
+/// The function of an event and the map of its jump, at numbers that carry derivatives.
+pub(crate) struct SmoothJump<P> {
+    pub(crate) event: Box<SmoothFunction<P>>,
+    pub(crate) map: Box<SmoothMap<P>>,
+}
+
 /// A jump that was asked for.
 #[derive(Clone)]
 pub(crate) struct JumpRequest {
     point: &'static str,
     function: Arc<dyn Any + Send + Sync>,
+    /// The [`SmoothJump`] with its derivatives, if they were given.
+    smooth: Option<Arc<dyn Any + Send + Sync>>,
     /// The temperature of the surroundings that give the energy as heat.
     pub(crate) temperature: Option<f64>,
     /// Whether the entropy of the system and its surroundings may fall.
@@ -93,7 +108,18 @@ pub(crate) struct JumpRequest {
 impl JumpRequest {
     pub(crate) fn new<P: 'static>(map: impl Fn(f64, &P) -> P + Send + Sync + 'static) -> Self {
         let function = Arc::new(Function::<P>(Box::new(map)));
-        Self { point: type_name::<P>(), function, temperature: None, lowers: false }
+        let point = type_name::<P>();
+        Self { point, function, smooth: None, temperature: None, lowers: false }
+    }
+
+    /// Adds the derivatives.
+    pub(crate) fn differentiate<P: 'static>(&mut self, smooth: SmoothJump<P>) {
+        self.smooth = Some(Arc::new(smooth));
+    }
+
+    /// The derivatives, if they were given at points of this type.
+    pub(crate) fn smooth<P: 'static>(&self) -> Option<Arc<SmoothJump<P>>> {
+        Arc::clone(self.smooth.as_ref()?).downcast().ok()
     }
 
     /// Compares the maps by identity, and the options.

@@ -82,7 +82,7 @@ impl<F: Flow + ?Sized> Course<'_, F> {
         event.jump = Some(Jump { after: after.clone(), exchange });
         watching.found.push(event);
         self.entropy = entropy;
-        self.before = StepBefore {
+        let restarted = StepBefore {
             state: after.clone(),
             values: values.clone(),
             entropy,
@@ -90,6 +90,7 @@ impl<F: Flow + ?Sized> Course<'_, F> {
             in_parts: false,
             entropy_step: None,
         };
+        self.cut = Some(std::mem::replace(&mut self.before, restarted));
         (self.state, self.values) = (after, values);
         let over = match &self.progress.step_size {
             StepSize::Fixed(_) => self.progress.count.is_some_and(|count| step >= count),

@@ -12,6 +12,7 @@ pub(crate) struct LastStep<'a, F: Flow + ?Sized> {
     pub(crate) in_parts: bool,
     pub(crate) entropy_step: Option<EntropyStep>,
     pub(crate) stage_count: Option<u32>,
+    pub(crate) stage_velocities: Vec<f64>,
 }
 
 impl<'a, F: Flow, M: Stepper<F>> Steps<'a, F, M> {
@@ -41,6 +42,29 @@ impl<'a, F: Flow, M: Stepper<F>> Steps<'a, F, M> {
             && matches!(self.course.progress.step_size, StepSize::Fixed(_))
     }
 
+    /// The step that the last jump has cut, as it was taken; `None` if there was no jump.
+    pub(crate) fn cut_step(&self, scales: &Scales<F::Vector>) -> Option<LastStep<'_, F>> {
+        let before = self.course.cut.as_ref()?;
+        let allowed = match &self.course.progress.step_size {
+            StepSize::Fixed(_) => None,
+            StepSize::Adaptive(controller) => {
+                Some(controller.allowed(&self.course.rule, scales, before.h))
+            }
+        };
+        let values = before.values.clone();
+        // The references of the run are those after the jump.
+        let reference = Laws { entropy: before.entropy, ..values.clone() };
+        let (x, time) = (&before.state.point, before.state.time);
+        Some(LastStep {
+            start: StepStart { x, time, values, reference, allowed },
+            h: before.h,
+            in_parts: before.in_parts,
+            entropy_step: before.entropy_step,
+            stage_count: None,
+            stage_velocities: Vec::new(),
+        })
+    }
+
     /// The last step, with the errors that it was allowed if it was judged by these sizes.
     pub(crate) fn last_step(&self, scales: &Scales<F::Vector>) -> LastStep<'_, F> {
         let before = &self.course.before;
@@ -57,6 +81,8 @@ impl<'a, F: Flow, M: Stepper<F>> Steps<'a, F, M> {
         let start = StepStart { x, time, values, reference, allowed };
         let entropy_step = before.entropy_step;
         let stage_count = self.memory.stage_count();
-        LastStep { start, h: before.h, in_parts: before.in_parts, entropy_step, stage_count }
+        let stage_velocities = self.memory.stage_velocities();
+        let (h, in_parts) = (before.h, before.in_parts);
+        LastStep { start, h, in_parts, entropy_step, stage_count, stage_velocities }
     }
 }

@@ -9,6 +9,7 @@ pub(crate) struct Sample {
 
 /// Evaluations after which a bracket is halved if they have not done so; one less each time that happens, so that in
 /// the end it is bisected.
+/// A factor of four fails `run/root.rs::smooth_functions_take_few_evaluations`.
 const PATIENCE: usize = 4;
 
 /// Narrows a bracket across which a function changes its sign, until it is `width` wide or the function is zero at

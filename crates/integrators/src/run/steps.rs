@@ -94,6 +94,10 @@ impl<'a, F: Flow, M: Stepper<F>> Steps<'a, F, M> {
     /// Takes one step of a run that has not ended.
     fn take_step(&mut self) -> Result<(), StepError> {
         let step = self.course.state.step + 1;
+        if self.course.has_sites() {
+            // The state before the last step is looked at no more, and leaves its array to this one.
+            self.course.before.state = self.course.state.clone();
+        }
         let Advance { mut taken, h, time } = match &self.course.progress.step_size {
             &StepSize::Fixed(h) => {
                 let time = self.course.progress.start + step as f64 * h;

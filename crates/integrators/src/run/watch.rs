@@ -1,7 +1,9 @@
 //! States at given times between the steps of a run, and events.
 
 use crate::run::event::Request;
-use crate::run::jump::JumpRequest;
+use metriplectic_fields::Real;
+
+use crate::run::jump::{JumpRequest, SmoothJump};
 use crate::run::schedule::Schedule;
 
 /// Asks a run for states at given times and for events, whatever its steps are: the steps stay the same, to the
@@ -323,6 +325,51 @@ impl Jumping {
     /// ```
     pub fn heat_at(self, temperature: f64) -> Self {
         self.with(|jump| jump.temperature = Some(temperature))
+    }
+
+    /// Gives the function of the event and the map of the jump at numbers that carry derivatives, for runs with a
+    /// [tangent](crate::Tangents). Say the type of the point in the closures. The point of a family is the pair of the state and the
+    /// parameters, which the map returns as they are.
+    ///
+    /// A ball that bounces with the restitution `e`, and the derivative of its state along `e`:
+    ///
+    /// ```
+    /// use metriplectic_dynamics::{Family, Symplectic};
+    /// use metriplectic_fields::Real;
+    /// use metriplectic_integrators::{DormandPrince8, Span, Tangents, Watch};
+    /// use metriplectic_manifolds::Euclidean;
+    /// use nalgebra::{Vector1, Vector2, vector};
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// let ball = Family::on(Euclidean::<2>)
+    ///     .parameters(["restitution"])
+    ///     .bracket(Symplectic)
+    ///     .energy(|x: &Vector2<Real>, _: &Vector1<Real>| x.y * x.y * 0.5 + x.x)
+    ///     .build()?;
+    /// let e = 0.9;
+    /// type Wide = (Vector2<Real>, Vector1<Real>);
+    /// let span = Span::until(2.0)
+    ///     .tolerance(1e-10)
+    ///     .event("wall", |x: &Vector2<f64>| x.x)
+    ///     .falling()
+    ///     .jump(move |_, x: &Vector2<f64>| vector![x.x, -e * x.y])
+    ///     .differentiable(
+    ///         |_, (x, _): &Wide| x.x,
+    ///         |_, (x, e): &Wide| (vector![x.x, -e.x * x.y], *e),
+    ///     );
+    /// let run = DormandPrince8.tangent(&ball.at(vector![e]), vector![0.5, 0.0], span)?;
+    /// // It hits the wall at t = 1 with the speed 1, so one unit of time later p = e − 1 and x = e − 1/2.
+    /// let along = run.last().along("restitution").unwrap();
+    /// assert!((along[0] - 1.0).abs() < 1e-8 && (along[1] - 1.0).abs() < 1e-8);
+    /// # Ok(())
+    /// # }
+    /// ```
+    pub fn differentiable<P: 'static>(
+        self,
+        event: impl Fn(Real, &P) -> Real + Send + Sync + 'static,
+        map: impl Fn(Real, &P) -> P + Send + Sync + 'static,
+    ) -> Self {
+        let smooth = SmoothJump { event: Box::new(event), map: Box::new(map) };
+        self.with(|jump| jump.differentiate(smooth))
     }
 
     /// Accepts a jump that lowers the entropy of the system and its surroundings: of a model without the part of the

@@ -47,6 +47,9 @@ pub struct Evidence {
     pub stages: Option<StageLaws>,
 }
 
+/// The rate `h|K'|` of friction above which a step does not resolve it.
+pub(crate) const RESOLVED: f64 = 1.0;
+
 /// The laws in a step with stages.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]

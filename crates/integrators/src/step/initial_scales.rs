@@ -24,6 +24,7 @@ use super::{Element, Flow, Vector};
 /// The fraction of the span and of the times `s_i/|v_i|` with which the search for `h` begins.
 const FIRST: f64 = 0.25;
 /// The factor by which `h` is decreased, and how often: down to 10⁻¹⁸ of the span.
+/// A factor of four fails `step/initial_scales.rs::a_motion_that_leaves_the_numbers_is_cut`.
 const CUT: f64 = 0.25;
 const CUTS: usize = 30;
 /// The fraction of a displacement by which one step and two halves may differ. An oscillation at the rate `ω` is resolved

@@ -3,6 +3,7 @@
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::fmt::Debug;
+use std::ops::Range;
 
 use super::exact::Exact;
 
@@ -38,6 +39,12 @@ pub trait Memory: Clone + Debug + Default {
         None
     }
 
+    /// The velocities of the stages of the step taken last, one stage after the other in the frame at its start, by a method
+    /// that solves for them.
+    fn stage_velocities(&self) -> Vec<f64> {
+        Vec::new()
+    }
+
     /// Puts all of its numbers into a checkpoint.
     fn save(&self, saved: &mut Saved);
 
@@ -62,6 +69,8 @@ impl Memory for () {
 
 /// Lists for which there is room at first.
 const LISTS: usize = 16;
+/// Numbers for which there is room at first.
+const NUMBERS: usize = 64;
 
 /// The numbers that a method keeps from one step to the next, in named lists.
 #[derive(Clone, Debug, Default)]
@@ -73,27 +82,31 @@ const LISTS: usize = 16;
 pub struct Saved {
     /// In the order in which they were put, which says nothing. A short run ends with a checkpoint too, and a few lists
     /// cost less than a tree.
-    lists: Vec<(Cow<'static, str>, Vec<Exact>)>,
+    lists: Vec<(Cow<'static, str>, Range<usize>)>,
+    /// The numbers of all lists, one after the other: an array for each list would cost a short run more than its numbers.
+    numbers: Vec<Exact>,
 }
 
 impl PartialEq for Saved {
     fn eq(&self, other: &Self) -> bool {
-        let is_there = |(name, list): &(Cow<'static, str>, Vec<Exact>)| {
-            other.place_of(name).is_some_and(|place| other.lists[place].1 == *list)
-        };
-        self.lists.len() == other.lists.len() && self.lists.iter().all(is_there)
+        let is_there = |(name, list): (&str, &[Exact])| other.numbers_of(name) == Some(list);
+        self.lists.len() == other.lists.len() && self.named().all(is_there)
     }
 }
 
 impl From<BTreeMap<String, Vec<Exact>>> for Saved {
     fn from(lists: BTreeMap<String, Vec<Exact>>) -> Self {
-        Self { lists: lists.into_iter().map(|(name, list)| (name.into(), list)).collect() }
+        let mut saved = Self::default();
+        for (name, list) in lists {
+            saved.put(name, list.into_iter().map(|number| number.0));
+        }
+        saved
     }
 }
 
 impl From<Saved> for BTreeMap<String, Vec<Exact>> {
     fn from(saved: Saved) -> Self {
-        saved.lists.into_iter().map(|(name, list)| (name.into_owned(), list)).collect()
+        saved.named().map(|(name, list)| (name.to_owned(), list.to_vec())).collect()
     }
 }
 
@@ -104,21 +117,27 @@ impl Saved {
         name: impl Into<Cow<'static, str>>,
         numbers: impl IntoIterator<Item = f64>,
     ) {
-        let (name, list) = (name.into(), numbers.into_iter().map(Exact).collect());
-        match self.place_of(&name) {
-            Some(known) => self.lists[known].1 = list,
-            None => {
-                if self.lists.is_empty() {
-                    self.lists.reserve(LISTS);
-                }
-                self.lists.push((name, list));
-            }
+        if self.lists.is_empty() {
+            self.lists.reserve(LISTS);
+            self.numbers.reserve(NUMBERS);
+        }
+        let (name, start) = (name.into(), self.numbers.len());
+        self.numbers.extend(numbers.into_iter().map(Exact));
+        let list = start..self.numbers.len();
+        match self.lists.iter_mut().find(|(known, _)| *known == name) {
+            Some((_, known)) => *known = list,
+            None => self.lists.push((name, list)),
         }
     }
 
-    /// The place of a name in the list.
-    fn place_of(&self, name: &str) -> Option<usize> {
-        self.lists.iter().position(|(known, _)| known == name)
+    /// The lists with their names.
+    fn named(&self) -> impl Iterator<Item = (&str, &[Exact])> {
+        self.lists.iter().map(|(name, list)| (name.as_ref(), &self.numbers[list.clone()]))
+    }
+
+    /// The numbers under a name.
+    fn numbers_of(&self, name: &str) -> Option<&[Exact]> {
+        self.named().find(|(known, _)| *known == name).map(|(_, list)| list)
     }
 
     /// The list under a name; `None` if it was not put.
@@ -143,8 +162,7 @@ impl Saved {
     ///
     /// [`RestoreError`] if it has a number that is not finite.
     pub fn list(&self, name: &'static str) -> Result<Option<Vec<f64>>, RestoreError> {
-        let Some(place) = self.place_of(name) else { return Ok(None) };
-        let list = &self.lists[place].1;
+        let Some(list) = self.numbers_of(name) else { return Ok(None) };
         match list.iter().find(|number| !number.0.is_finite()) {
             Some(number) => Err(RestoreError::Damaged { what: name, value: number.0 }),
             None => Ok(Some(list.iter().map(|number| number.0).collect())),

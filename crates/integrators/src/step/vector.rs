@@ -74,6 +74,17 @@ pub trait Vector: Clone + Debug {
         numbers.relative_to(&numbers.map(|_| 1.0))
     }
 
+    /// Returns whether [`norm_of`](Self::norm_of) is below a bound. A large vector looks at no more of its numbers than it
+    /// needs.
+    #[must_use]
+    fn is_norm_below<const K: usize>(
+        vectors: [&Self; K],
+        f: impl Fn([f64; K]) -> f64 + Sync,
+        bound: f64,
+    ) -> bool {
+        Self::norm_of(vectors, f) < bound
+    }
+
     /// Two such norms, in one pass where that is cheaper.
     #[must_use]
     #[inline]
@@ -212,8 +223,32 @@ impl<V: Column<f64>> Vector for Components<V> {
     /// Gives the bits of the default, which divides by one.
     #[inline]
     fn norm_of<const K: usize>(vectors: [&Self; K], f: impl Fn([f64; K]) -> f64 + Sync) -> f64 {
-        norm(&V::from_index(|i| f(vectors.map(|v| v.0[i])).abs()))
+        norm(&V::from_index(|i| f(at(vectors, i)).abs()))
     }
+
+    /// Gives the bits of the default, and takes each pair of numbers once.
+    #[inline]
+    fn norms_of<const K: usize>(
+        vectors: [&Self; K],
+        f: impl Fn([f64; K]) -> [f64; 2] + Sync,
+    ) -> [f64; 2] {
+        let (mut first, mut second) = (V::zero(), V::zero());
+        for i in 0..V::LEN {
+            let [a, b] = f(at(vectors, i));
+            (first[i], second[i]) = (a.abs(), b.abs());
+        }
+        [norm(&first), norm(&second)]
+    }
+}
+
+/// The numbers that vectors have at one place. A loop, because the compiler calls the closure of `array::map`.
+#[inline(always)]
+fn at<V: Column<f64>, const K: usize>(vectors: [&Components<V>; K], i: usize) -> [f64; K] {
+    let mut numbers = [0.0; K];
+    for (number, v) in numbers.iter_mut().zip(vectors) {
+        *number = v.0[i];
+    }
+    numbers
 }
 
 /// The Euclidean norm of numbers that are not negative; NaN if one is.

@@ -16,10 +16,9 @@ use metriplectic_dynamics::{Invariants as _, Metriplectic, system::Point};
 use metriplectic_fields::{ChartPoint, Column, Dimension, Space, Vector};
 use metriplectic_manifolds::Manifold;
 
+use crate::round_off::bound::INDEPENDENT;
 use crate::step::CountOf;
 
-/// The independent fraction of a differential below which it is a combination of others.
-pub(super) const INDEPENDENT: f64 = 1e-10;
 /// The rounding of a differential, and of a product with it, in units of `ε` of its terms.
 const ROUNDING: f64 = 8.0;
 

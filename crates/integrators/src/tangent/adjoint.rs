@@ -7,9 +7,9 @@ use metriplectic_dynamics::{Differentiable, Metriplectic};
 use metriplectic_fields::{Column as _, Dimension as _, Jet1, Real, ScalarField, Space, Vector};
 use nalgebra::DVector;
 
+use super::along::LinearisedAlong;
 use super::error::TangentError;
-use super::linearised::Linearised;
-use super::pieces::{Part, Wide};
+use super::part::{Part, Wide};
 use super::tape::{Segment, Tape, TapedStep};
 use crate::run::certificate::Certificate;
 use crate::run::schedule::Schedule;
@@ -22,7 +22,7 @@ type Costate<D> = Vector<<Wide<D> as Metriplectic>::Manifold>;
 /// A point whose entries carry derivatives.
 type Moving<D> = <<D as Metriplectic>::Manifold as Space>::Point<Real>;
 
-/// Runs whose losses have gradients, by every method whose steps are [`Linearised`].
+/// Runs whose losses have gradients, by every method whose steps are [linearised](LinearisedAlong).
 ///
 /// A loss `ℓ = Σ_k ℓ_k(x_k)` over states of a run has the gradient `(∂ℓ/∂x₀, ∂ℓ/∂θ)`. Its costate goes from the end to the
 /// start, by the transposed derivatives of the discrete steps:
@@ -81,7 +81,7 @@ pub trait Adjoints: Sized {
     ) -> Result<AdjointRun<'_, D, Self>, TangentError<D::Manifold>>
     where
         D: Differentiable,
-        Self: Clone + Stepper<D> + Linearised<D::Wide>,
+        Self: Clone + Stepper<D> + LinearisedAlong<D>,
     {
         self.adjoint_within(WITHIN, system, x0, schedule)
     }
@@ -103,7 +103,7 @@ pub trait Adjoints: Sized {
     ) -> Result<AdjointRun<'_, D, Self>, TangentError<D::Manifold>>
     where
         D: Differentiable,
-        Self: Clone + Stepper<D> + Linearised<D::Wide>,
+        Self: Clone + Stepper<D> + LinearisedAlong<D>,
     {
         let schedule = schedule.into();
         system.wide().with_room(|| {
@@ -162,7 +162,7 @@ impl LossGradient {
 impl<D, M> AdjointRun<'_, D, M>
 where
     D: Differentiable,
-    M: Clone + Stepper<D> + Linearised<Wide<D>>,
+    M: Clone + Stepper<D> + LinearisedAlong<D>,
 {
     /// The recorded states, the start first.
     pub fn states(&self) -> &[State<D::Manifold>] {
@@ -251,9 +251,7 @@ where
         let time = step.time;
         let through = |parts: &[Part<D>], mut costate: Costate<D>| {
             for part in parts.iter().rev() {
-                let pulled = part.with(self.system, |piece| {
-                    self.method.pull_back(self.system.wide(), piece, &costate)
-                });
+                let pulled = self.method.pull_back_along(self.system, part, &costate);
                 costate = pulled.map_err(|cause| TangentError::NotLinearised { time, cause })?;
             }
             Ok::<_, TangentError<D::Manifold>>(costate)

@@ -9,6 +9,7 @@ use metriplectic_manifolds::Manifold as _;
 
 use super::columns::{Columns, jets, row};
 use super::error::Unlinearised;
+use crate::round_off::bound::BROKEN;
 use crate::step::Dim;
 use crate::step::digits::counted;
 
@@ -33,12 +34,17 @@ pub struct Sensitivity {
     pub frozen: bool,
     /// Whether friction is not damped by the steps: `T` is then the derivative of the steps, and not that of the motion.
     pub undamped: bool,
+    /// Whether a step of `Radau` or of an explicit method has left the state at rest. Its map has no derivative there, but another slope in
+    /// each direction, because it is corrected along differences that vanish there. `T` is then the derivative without the correction, from
+    /// which each slope differs by the local error of the method. Steps of a `Scheme` and of `Gauss` have a derivative at rest.
+    pub at_rest: bool,
+    /// How far the derivatives at the end differ from those of the run with a ten times larger tolerance, or with steps twice as large,
+    /// relative to each column: of a [tangent to an accuracy](crate::Tangents::tangent_to).
+    pub difference: Option<f64>,
 }
 
-/// The error of a law from which on a derivative is wrong.
-pub(super) const BROKEN: f64 = 1e-6;
-/// The error of a law that is rounding.
-const ROUNDED: f64 = 64.0 * f64::EPSILON;
+/// The error of a derivative, in units of its direction, that is rounding.
+pub(super) const ROUNDED: f64 = 64.0 * f64::EPSILON;
 
 impl Sensitivity {
     /// Enters the second law in a step.
@@ -102,10 +108,22 @@ impl fmt::Display for Sensitivity {
             write!(f, ", |dS T − δS| ≤ {entropy:.1e}")?;
         }
         write!(f, ", over {steps}{}", if self.frozen { ", frozen" } else { "" })?;
+        if let Some(difference) = self.difference {
+            write!(
+                f,
+                "\n             and {difference:.1e} of T from that of the next coarser run"
+            )?;
+        }
         if self.undamped {
             write!(
                 f,
                 "\n             it is the derivative of the steps, which do not damp the friction, and not that of the motion"
+            )?;
+        }
+        if self.at_rest {
+            write!(
+                f,
+                "\n             these steps have no derivative at rest: it is known there to the local error, and those of `Gauss` have one"
             )?;
         }
         Ok(())

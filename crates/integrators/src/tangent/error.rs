@@ -27,6 +27,12 @@ pub enum Unlinearised {
         /// The largest difference of an entry, relative to its size.
         off: f64,
     },
+    /// The step lies where its method changes its formula, so that its derivative is another one on either side.
+    #[error(
+        "the step lies where its method changes its formula, as a step that damps does near an infinite temperature; \
+         take smaller steps, or another start"
+    )]
+    Branch,
     /// The derivative breaks the first law of tangents.
     #[error(
         "dH(x') T' differs from dH(x₀) by {off:.1e} of its terms, so the derivative is wrong; take smaller steps"
@@ -58,14 +64,46 @@ pub enum TangentError<M: StateSpace> {
         /// Why.
         cause: Unlinearised,
     },
-    /// The state jumps at an event, or steps end at corners.
+    /// An accuracy of derivatives that is not between round-off and 1.
     #[error(
-        "the schedule has {what}, across which the tangent is not carried; run up to the first one and go on from there, \
-         with the derivative of the map in between"
+        "the accuracy of the derivatives is {accuracy:e}; it must be at least 1.5e-14, which is round-off, and below 1, as 1e-8"
+    )]
+    Accuracy {
+        /// The accuracy asked for.
+        accuracy: f64,
+    },
+    /// Derivatives are not as exact as asked for.
+    #[error(
+        "the derivatives of the last two runs differ by {reached:.1e}, and not by {accuracy:.1e} or less; ask for less, for a shorter \
+         run, or for a method of higher order"
+    )]
+    Inexact {
+        /// The accuracy asked for.
+        accuracy: f64,
+        /// The difference of the last two runs.
+        reached: f64,
+    },
+    /// The state jumps at an event without derivatives, or steps end at corners.
+    #[error(
+        "the schedule has {what}, across which the tangent is not carried; give a jump its derivatives at points of the system with \
+         its parameters (`Jumping::differentiable`), or run up to the first one and go on from there"
     )]
     Broken {
         /// The jumps or the corners.
         what: &'static str,
+    },
+    /// The derivatives of a jump are those of another map than the one by which the state has jumped.
+    #[error(
+        "at t = {time} the map of the jump at {event}, given with its derivatives, leads {off:.1e} of the size of the state away from \
+         the one by which it has jumped; write the same map in both"
+    )]
+    OtherJump {
+        /// The name of the event.
+        event: String,
+        /// Its time.
+        time: f64,
+        /// The largest difference of an entry, relative to the size of the state.
+        off: f64,
     },
     /// An event is grazing: its function hardly changes along the motion, so that its time has no derivative.
     #[error(

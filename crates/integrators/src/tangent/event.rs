@@ -20,6 +20,8 @@ pub struct TangentEvent<D: Differentiable> {
     pub state: TangentState<D>,
     /// The velocity of the state along the size of the last step. It is that of the discrete map.
     pub velocity: Vector<D::Manifold>,
+    /// The state after its [jump](crate::Watched::jump), with its derivatives at the same fixed time.
+    pub after: Option<TangentState<D>>,
 }
 
 impl<D: Differentiable> fmt::Debug for TangentEvent<D> {
@@ -51,13 +53,23 @@ impl<D: Differentiable> TangentEvent<D> {
     ) -> Result<DVector<f64>, TangentError<D::Manifold>> {
         let df = g.jet1(&self.state.point).df;
         let rate = df.dot(&self.velocity);
-        let (dg, speed) = self.lengths(&df);
+        self.crosses(rate, |i| df[i])?;
+        Ok(self.state.derivative_of(&df) * -rate.recip())
+    }
+
+    /// Refuses an event whose function changes by `rate` along the motion, which is less than its differential makes possible.
+    pub(super) fn crosses(
+        &self,
+        rate: f64,
+        df: impl Fn(usize) -> f64,
+    ) -> Result<(), TangentError<D::Manifold>> {
+        let (dg, speed) = self.lengths(&Vector::<D::Manifold>::from_index(df));
         let slope = rate.abs() / (dg * speed);
         if slope.is_nan() || slope <= GRAZING {
             let (event, time) = (self.event.name.to_string(), self.state.time);
             return Err(TangentError::Grazing { event, time, slope });
         }
-        Ok(self.state.derivative_of(&df) * -rate.recip())
+        Ok(())
     }
 
     /// The derivative of the state at the event along start and parameters, `T + v δt*`, with a row for each direction of

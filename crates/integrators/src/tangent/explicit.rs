@@ -1,47 +1,55 @@
-//! The tangent of an explicit step: its stages and its projection at dual numbers.
+//! The tangent of an explicit step: its stages and its projection along directions.
 //!
-//! A stage costs one evaluation of the second derivatives of `H`, `S` and `L_a`, whatever the number of columns; each column
-//! is then evaluated at a dual number, with `δw = Hf δ` as the derivative of a differential. The columns are those of the
-//! tangent, and one along the size of the step.
+//! A stage costs one evaluation of the second derivatives of `H`, `S` and `L_a`, whatever the number of columns, and one of the
+//! tensors with their derivatives. The columns are those of the tangent, and one along the size of the step; a parameter
+//! of the fields moves no direction of the state by itself.
 //!
 //! The step size, the branch of the step (targeted or free) and the errors that were allowed are those of the step that was taken.
 
+use metriplectic_dynamics::system::Point;
 use metriplectic_dynamics::{Metriplectic, SecondLaw};
 use metriplectic_fields::{Column as _, Dimension as _, ScalarField, Space, Square as _, Vector};
 use metriplectic_manifolds::{Manifold, MovingBase};
 use num_dual::Dual64;
 
 use super::columns::Columns;
-use super::duals::{Dual, Fields, Numbers, derivative};
+use super::duals::{Direction, Dual, Fields, Numbers, derivative};
 use super::error::Unlinearised;
-use super::landing::{Aim, DualPoint, Landing};
+use super::landing::{Aim, Landed, Landing};
 use super::linearised::{Linearised, Piece, Propagated, Targets};
+use super::model::{Model, Plain};
 use crate::explicit::{
     CHEBYSHEV, Coefficients, DormandPrince5, DormandPrince8, ExplicitRungeKutta, Recursion, Row,
     RungeKuttaChebyshev, Tableau,
 };
 use crate::step::{Dim, EntropyStep};
 
-/// The rates and the production of a stage, for each column.
+/// Components with their derivatives along all columns.
+struct Along<V> {
+    value: V,
+    slopes: Vec<V>,
+}
+
+/// The end of a step and its production, along the columns.
+type StagesAlong<Y> = (Along<Vector<<Y as Metriplectic>::Manifold>>, Along<f64>);
+
+/// The rates and the production of a stage.
 struct Stage<Y: Metriplectic> {
-    rates: Vec<Dual<Y>>,
-    production: Numbers,
+    rates: Along<Vector<Y::Manifold>>,
+    production: Along<f64>,
 }
 
-/// A step at dual numbers.
-struct Step<'a, Y: Metriplectic> {
-    system: &'a Y,
-    piece: &'a Piece<'a, Y>,
-    /// The directions of the start, for each column.
-    starts: Vec<Vector<Y::Manifold>>,
-    /// The size of the step, for each column.
-    sizes: Numbers,
+/// A step along directions.
+struct Step<'a, K: Model> {
+    model: &'a K,
+    piece: &'a Piece<'a, K::System>,
+    /// The directions of the start, for each column; the last one is that of the size of the step.
+    starts: Vec<Direction<K::System>>,
 }
 
-/// Directions: of the start, of the size of the step, and of the values of the laws.
+/// Directions: of the start and the parameters, and of the values of the laws.
 struct Directions<Y: Metriplectic> {
-    starts: Vec<Vector<Y::Manifold>>,
-    sizes: Numbers,
+    starts: Vec<Direction<Y>>,
     energy: Numbers,
     invariants: Vec<Numbers>,
     entropy: Numbers,
@@ -49,19 +57,20 @@ struct Directions<Y: Metriplectic> {
 
 impl<Y: Metriplectic> Directions<Y> {
     /// Takes the columns of a tangent, and one along the size of the step, which moves no law.
-    fn of(columns: &Columns<Y>, targets: &Targets<Y>, h: f64) -> Self {
-        let n = Dim::<Y>::LEN;
-        let law = |value: f64, row: &Vector<Y::Manifold>| -> Numbers {
-            (0..=n).map(|c| Dual64::new(value, if c < n { row[c] } else { 0.0 })).collect()
+    fn of<W: Metriplectic>(columns: &Columns<W>, targets: &Targets<Y>) -> Self {
+        let (n, all) = (Dim::<Y>::LEN, Dim::<W>::LEN);
+        let law = |value: f64, row: &Vector<W::Manifold>| -> Numbers {
+            (0..=all).map(|c| Dual64::new(value, if c < all { row[c] } else { 0.0 })).collect()
         };
         let laws = &columns.laws;
         let listed = targets.invariants.as_ref().iter().zip(&laws.invariants);
-        let mut starts: Vec<_> = (0..n).map(|j| columns.t.column_at(j)).collect();
-        starts.push(Vector::<Y::Manifold>::zero());
-        let along = |j| if j == n { 1.0 } else { 0.0 };
+        let column = |c: usize| Direction {
+            delta: Vector::<Y::Manifold>::from_index(|i| columns.t[(i, c)]),
+            parameter: c.checked_sub(n),
+        };
+        let still = Direction { delta: Vector::<Y::Manifold>::zero(), parameter: None };
         Self {
-            starts,
-            sizes: (0..=n).map(|j| Dual64::new(h, along(j))).collect(),
+            starts: (0..all).map(column).chain([still]).collect(),
             energy: law(targets.energy, &laws.energy),
             invariants: listed.map(|(value, row)| law(*value, row)).collect(),
             entropy: law(targets.entropy, &laws.entropy),
@@ -69,107 +78,165 @@ impl<Y: Metriplectic> Directions<Y> {
     }
 }
 
-/// The end of a step, and the entropy that was produced.
+/// The end of a step in the frame of the one that was taken, column by column, and the entropy that was produced.
 struct Ended<Y: Metriplectic> {
-    points: Vec<DualPoint<Y>>,
+    columns: Vec<Vector<Y::Manifold>>,
     produced: Numbers,
 }
 
-impl<Y: Metriplectic<Manifold: MovingBase>> Step<'_, Y> {
-    /// `h Σ_j w_j k_j` for a column.
-    fn combined(&self, row: Row, stages: &[Stage<Y>], column: usize) -> Dual<Y> {
-        let sum = row.iter().fold(Dual::<Y>::zero(), |sum, &(stage, w)| {
-            sum + stages[stage].rates[column] * Dual64::from(w)
-        });
-        sum * self.sizes[column]
+/// Components that move along a column.
+fn dual<Y: Metriplectic>(value: &Vector<Y::Manifold>, slope: &Vector<Y::Manifold>) -> Dual<Y> {
+    Dual::<Y>::from_index(|i| Dual64::new(value[i], slope[i]))
+}
+
+/// The sum of numbers with weights, times the size of the step, whose own column is the last one.
+fn weighted(terms: &[(&Along<f64>, f64)], h: f64, columns: usize) -> Along<f64> {
+    let sum = |of: &dyn Fn(&Along<f64>) -> f64| terms.iter().map(|(a, w)| of(a) * w).sum::<f64>();
+    let value = sum(&|a| a.value);
+    let mut slopes: Vec<f64> = (0..columns).map(|c| sum(&|a| a.slopes[c]) * h).collect();
+    if let Some(last) = slopes.last_mut() {
+        *last += value;
+    }
+    Along { value: value * h, slopes }
+}
+
+impl<K, Y> Step<'_, K>
+where
+    Y: Metriplectic<Manifold: MovingBase>,
+    K: Model<System = Y>,
+{
+    /// `h Σ_j w_j k_j`.
+    fn combined(&self, row: Row, stages: &[Stage<Y>]) -> Along<Vector<Y::Manifold>> {
+        let h = self.piece.h;
+        let zero = Vector::<Y::Manifold>::zero();
+        let mut sum = Along { value: zero, slopes: vec![zero; self.starts.len()] };
+        for &(stage, w) in row {
+            let rates = &stages[stage].rates;
+            sum.value += rates.value * w;
+            let factor = h * w;
+            for (slope, rate) in sum.slopes.iter_mut().zip(&rates.slopes) {
+                *slope += *rate * factor;
+            }
+        }
+        // The last column is that of the size.
+        if let Some(last) = sum.slopes.last_mut() {
+            *last += sum.value;
+        }
+        sum.value = sum.value * h;
+        sum
     }
 
-    /// The stage at the coordinates `q`, for each column.
-    fn stage(&self, q: impl Fn(usize) -> Dual<Y>) -> Option<Stage<Y>> {
-        let x = self.piece.x;
-        let points: Vec<_> = (self.starts.iter().enumerate())
-            .map(|(c, delta)| (q(c), Y::Manifold::stage_from(x, delta, &q(c))))
-            .collect();
-        let fields = Fields::at(self.system, Y::Manifold::real(&points.first()?.1))?;
-        let mut stage = Stage { rates: Vec::new(), production: Vec::new() };
-        for ((q, y), delta) in points.iter().zip(&self.starts) {
-            let moved = derivative(&Y::Manifold::coordinates(&fields.y, y));
-            let (velocity, production) = fields.motion(self.system, &moved)?;
-            stage.rates.push(Y::Manifold::stage_rates_from((x, delta), (q, y), &velocity));
-            stage.production.push(production);
+    /// The stage at the coordinates `q`.
+    fn stage(&self, q: &Along<Vector<Y::Manifold>>) -> Option<Stage<Y>> {
+        let (x, system) = (self.piece.x, self.model.system());
+        let fields = Fields::at(self.model, Y::Manifold::stage(x, &q.value))?;
+        let motion = fields.motion(system)?;
+        let (zero, count) = (Vector::<Y::Manifold>::zero(), self.starts.len());
+        let mut rates = Along { value: zero, slopes: Vec::with_capacity(count) };
+        let mut production = Along { value: 0.0, slopes: Vec::with_capacity(count) };
+        for (start, slope) in self.starts.iter().zip(&q.slopes) {
+            let rate = if Y::Manifold::RATES_ARE_VELOCITIES {
+                let direction = Direction { delta: start.delta + *slope, ..*start };
+                let (v, rise) = fields.moved(system, &motion, &direction)?;
+                (v, rise)
+            } else {
+                let q = dual::<Y>(&q.value, slope);
+                let y = Y::Manifold::stage_from(x, &start.delta, &q);
+                let delta = derivative(&Y::Manifold::coordinates(&fields.y, &y));
+                let direction = Direction { delta, ..*start };
+                let (v, rise) = fields.moved(system, &motion, &direction)?;
+                let velocity = fields.embedded(&delta, &v);
+                (Y::Manifold::stage_rates_from((x, &start.delta), (&q, &y), &velocity), rise)
+            };
+            let (rate, rise) = rate;
+            (rates.value, production.value) = (rate.real(), rise.re);
+            rates.slopes.push(derivative(&rate));
+            production.slopes.push(rise.eps);
         }
-        Some(stage)
+        Some(Stage { rates, production })
+    }
+
+    /// The stage at the start.
+    fn first(&self) -> Option<Stage<Y>> {
+        let zero = Vector::<Y::Manifold>::zero();
+        self.stage(&Along { value: zero, slopes: vec![zero; self.starts.len()] })
     }
 
     /// The end before the projection and the production of entropy, by the rows of a tableau.
-    fn by_rows(&self, tableau: &Tableau) -> Option<(Vec<Dual<Y>>, Numbers)> {
-        let mut stages = vec![self.stage(|_| Dual::<Y>::zero())?];
+    fn by_rows(&self, tableau: &Tableau) -> Option<StagesAlong<Y>> {
+        let mut stages = vec![self.first()?];
         for row in tableau.rows() {
-            let next = self.stage(|c| self.combined(row, &stages, c))?;
+            let next = self.stage(&self.combined(row, &stages))?;
             stages.push(next);
         }
         let weights = tableau.weights();
-        let rise = |c: usize| {
-            let terms = weights.iter().map(|&(j, w)| stages[j].production[c] * w);
-            terms.fold(Dual64::from(0.0), |sum, term| sum + term) * self.sizes[c]
-        };
-        let columns = 0..self.starts.len();
-        let ends = columns.clone().map(|c| self.combined(weights, &stages, c)).collect();
-        Some((ends, columns.map(rise).collect()))
+        let terms: Vec<_> = weights.iter().map(|&(j, w)| (&stages[j].production, w)).collect();
+        let produced = weighted(&terms, self.piece.h, self.starts.len());
+        Some((self.combined(weights, &stages), produced))
     }
 
     /// The end before the projection and the production of entropy, by the recursion of Chebyshev with so many stages.
-    fn by_recursion(&self, count: u32) -> Option<(Vec<Dual<Y>>, Numbers)> {
-        let columns = 0..self.starts.len();
-        let first = self.stage(|_| Dual::<Y>::zero())?;
+    fn by_recursion(&self, count: u32) -> Option<StagesAlong<Y>> {
+        let (h, columns) = (self.piece.h, self.starts.len());
+        let first = self.first()?;
         let mut coefficients = Coefficients::new(count);
-        let mut before: Vec<_> =
-            columns.clone().map(|_| (Dual::<Y>::zero(), Dual64::from(0.0))).collect();
-        let mut last: Vec<_> = columns
-            .map(|c| {
-                let h = self.sizes[c] * coefficients.first;
-                (first.rates[c] * h, first.production[c] * h)
-            })
-            .collect();
+        let zero = Vector::<Y::Manifold>::zero();
+        let nothing = || {
+            let q = Along { value: zero, slopes: vec![zero; columns] };
+            (q, Along { value: 0.0, slopes: vec![0.0; columns] })
+        };
+        // h c k, where the size moves along the last column.
+        let times_h = |stage: &Stage<Y>, c: f64| {
+            let (rates, production) = (&stage.rates, &stage.production);
+            let mut q: Vec<_> = rates.slopes.iter().map(|k| *k * (c * h)).collect();
+            let mut p: Vec<_> = production.slopes.iter().map(|k| *k * (c * h)).collect();
+            q[columns - 1] += rates.value * c;
+            p[columns - 1] += production.value * c;
+            let value = rates.value * (c * h);
+            let q = Along { value, slopes: q };
+            (q, Along { value: production.value * (c * h), slopes: p })
+        };
+        let mut before = nothing();
+        let mut last = times_h(&first, coefficients.first);
         for _ in 2..=count {
             let Recursion { mu, nu, rate, start_rate } = coefficients.next();
-            let stage = self.stage(|c| last[c].0)?;
-            for (c, ((q, produced), before)) in last.iter_mut().zip(&mut before).enumerate() {
-                let h = self.sizes[c];
-                let (mu, nu, rate, start) =
-                    (Dual64::from(mu), Dual64::from(nu), h * rate, h * start_rate);
-                let rates = stage.rates[c] * rate + first.rates[c] * start;
-                let production = stage.production[c] * rate + first.production[c] * start;
-                let next =
-                    (*q * mu + before.0 * nu + rates, *produced * mu + before.1 * nu + production);
-                *before = (*q, *produced);
-                (*q, *produced) = next;
+            let stage = self.stage(&last.0)?;
+            let (here, start) = (times_h(&stage, rate), times_h(&first, start_rate));
+            let mut next = nothing();
+            let terms = [(&last, mu), (&before, nu), (&here, 1.0), (&start, 1.0)];
+            for ((q, p), w) in terms {
+                next.0.value += q.value * w;
+                next.1.value += p.value * w;
+                for c in 0..columns {
+                    next.0.slopes[c] += q.slopes[c] * w;
+                    next.1.slopes[c] += p.slopes[c] * w;
+                }
             }
+            before = last;
+            last = next;
         }
-        Some(last.into_iter().unzip())
+        Some(last)
     }
 
     /// The unit of each entry in which the end is moved onto the laws, for each column.
-    fn units(&self, ends: &[Dual<Y>]) -> Vec<Dual<Y>> {
-        let size = |c: usize| self.sizes_along(&self.starts[c]);
-        match &self.piece.allowed {
-            Some(allowed) => {
-                vec![Dual::<Y>::from_index(|i| Dual64::from(allowed[i])); ends.len()]
-            }
-            None => (ends.iter().enumerate())
-                .map(|(c, end)| {
-                    let size = size(c);
-                    Dual::<Y>::from_index(|i| {
-                        // A parameter has no unit: no projection moves it.
-                        if i >= self.piece.moving {
-                            return Dual64::from(0.0);
-                        }
-                        let end = super::duals::magnitude(end[i]);
-                        if end.re > size[i].re { end } else { size[i] }
-                    })
-                })
-                .collect(),
+    fn units(&self, end: &Along<Vector<Y::Manifold>>) -> Vec<Dual<Y>> {
+        if let Some(allowed) = &self.piece.allowed {
+            let units = Dual::<Y>::from_index(|i| Dual64::from(allowed[i]));
+            return vec![units; end.slopes.len()];
         }
+        (self.starts.iter().zip(&end.slopes))
+            .map(|(start, slope)| {
+                let size = self.sizes_along(&start.delta);
+                Dual::<Y>::from_index(|i| {
+                    // A parameter has no unit: no projection moves it.
+                    if i >= self.piece.moving {
+                        return Dual64::from(0.0);
+                    }
+                    let end = super::duals::magnitude(Dual64::new(end.value[i], slope[i]));
+                    if end.re > size[i].re { end } else { size[i] }
+                })
+            })
+            .collect()
     }
 
     /// The sizes of the entries at the start along a direction. They are piecewise linear, so that a difference is exact
@@ -193,104 +260,119 @@ impl<Y: Metriplectic<Manifold: MovingBase>> Step<'_, Y> {
 /// The step of a tableau along directions.
 fn taken<Y: Metriplectic<Manifold: MovingBase>>(
     tableau: &Tableau,
-    (system, piece): (&Y, &Piece<'_, Y>),
+    model: &impl Model<System = Y>,
+    piece: &Piece<'_, Y>,
     directions: Directions<Y>,
 ) -> Result<Ended<Y>, Unlinearised> {
-    let Directions { starts, sizes, energy, invariants, entropy } = directions;
-    let step = Step { system, piece, starts, sizes };
-    let (ends, rises) = match piece.stage_count {
+    let Directions { starts, energy, invariants, entropy } = directions;
+    let step = Step { model, piece, starts };
+    let (end, rise) = match piece.stage_count {
         Some(count) => step.by_recursion(count),
         None => step.by_rows(tableau),
     }
     .ok_or(Unlinearised::NotSmooth)?;
-    let (starts, columns) = (&step.starts, ends.iter().enumerate());
-    let points =
-        columns.map(|(c, end)| Y::Manifold::stage_from(piece.x, &starts[c], end)).collect();
+    let points = (step.starts.iter().zip(&end.slopes))
+        .map(|(start, slope)| {
+            Y::Manifold::stage_from(piece.x, &start.delta, &dual::<Y>(&end.value, slope))
+        })
+        .collect();
+    let rises = rise.slopes.iter().map(|slope| Dual64::new(rise.value, *slope));
     let produced: Numbers = entropy.iter().zip(rises).map(|(s, rise)| *s + rise).collect();
     let is_targeted = piece.entropy_step == Some(EntropyStep::Targeted);
-    let units = step.units(&ends);
+    let units = step.units(&end);
     let entropy = is_targeted.then(|| produced.clone());
     let aim = Aim { energy, invariants, entropy, units };
-    let points = Landing { system, aim: &aim }.land(points)?;
-    reproduced::<Y>(piece, &points[0])?;
-    Ok(Ended { points, produced })
+    let parameters: Vec<_> = step.starts.iter().map(|start| start.parameter).collect();
+    let landing = Landing { model, aim: &aim, parameters: &parameters };
+    let Landed { points, reached, rounding } = landing.land(points, piece.end)?;
+    reproduced::<Y>(piece, &reached, &rounding)?;
+    let columns = points.iter().map(|y| derivative(&Y::Manifold::coordinates(piece.end, y)));
+    Ok(Ended { columns: columns.collect(), produced })
 }
 
-/// The step of a tableau with its derivatives.
-fn propagate<Y: Metriplectic<Manifold: MovingBase>>(
+/// The step of a tableau with its derivatives, and the end of the step in the wide system.
+pub(super) fn propagate<Y, W>(
     tableau: &Tableau,
-    system: &Y,
+    model: &impl Model<System = Y>,
     piece: &Piece<'_, Y>,
-    columns: &Columns<Y>,
-) -> Result<Propagated<Y>, Unlinearised> {
-    let n = Dim::<Y>::LEN;
-    let is_exact = system.second_law() == SecondLaw::Exact;
+    (wide, wide_end, columns): (&W, &Point<W>, &Columns<W>),
+) -> Result<Propagated<W>, Unlinearised>
+where
+    Y: Metriplectic<Manifold: MovingBase>,
+    W: Metriplectic,
+{
+    let (n, all) = (Dim::<Y>::LEN, Dim::<W>::LEN);
+    let is_exact = wide.second_law() == SecondLaw::Exact;
     let mut columns = columns.clone();
     columns.laws.entropy_is_known = is_exact;
     if piece.entropy_step == Some(EntropyStep::Held) {
-        return Ok(Propagated { columns, along_h: Vector::<Y::Manifold>::zero() });
+        return Ok(Propagated { columns, along_h: Vector::<W::Manifold>::zero() });
     }
-    let directions = Directions::of(&columns, &piece.targets, piece.h);
-    let Ended { points, produced } = taken(tableau, (system, piece), directions)?;
-    let column = |c: usize| -> Vector<Y::Manifold> {
-        derivative(&Y::Manifold::coordinates(piece.end, &points[c]))
-    };
-    for c in 0..n {
-        let column = column(c);
+    let directions = Directions::of(&columns, &piece.targets);
+    let Ended { columns: ends, produced } = taken(tableau, model, piece, directions)?;
+    for (c, end) in ends.iter().enumerate().take(all) {
         for i in 0..n {
-            columns.t[(i, c)] = column[i];
+            columns.t[(i, c)] = end[i];
         }
     }
     if piece.entropy_step == Some(EntropyStep::Targeted) {
-        columns.laws.entropy = Vector::<Y::Manifold>::from_index(|c| produced[c].eps);
+        columns.laws.entropy = Vector::<W::Manifold>::from_index(|c| produced[c].eps);
     } else if is_exact {
-        let jet = ScalarField::jet1(system.entropy(), piece.end);
+        let jet = ScalarField::<W::Manifold>::jet1(wide.entropy(), wide_end);
         columns.laws.entropy = columns.t.transpose_times(&jet.df);
     }
-    Ok(Propagated { columns, along_h: column(n) })
+    let along_h = Vector::<W::Manifold>::from_index(|i| if i < n { ends[all][i] } else { 0.0 });
+    Ok(Propagated { columns, along_h })
 }
 
 /// The step of a tableau, transposed.
 ///
 /// The values of the laws are those at the start of the step, and so are their derivatives: `dH(x_k) T_k = dH(x₀) T_0`.
-fn pull_back<Y: Metriplectic<Manifold: MovingBase>>(
+pub(super) fn pull_back<Y, W>(
     tableau: &Tableau,
-    system: &Y,
+    model: &impl Model<System = Y>,
     piece: &Piece<'_, Y>,
-    costate: &Vector<Y::Manifold>,
-) -> Result<Vector<Y::Manifold>, Unlinearised> {
+    (wide, wide_start, costate): (&W, &Point<W>, &Vector<W::Manifold>),
+) -> Result<Vector<W::Manifold>, Unlinearised>
+where
+    Y: Metriplectic<Manifold: MovingBase>,
+    W: Metriplectic,
+{
     if piece.entropy_step == Some(EntropyStep::Held) {
         return Ok(*costate);
     }
-    let here = Columns::start(system, piece.x);
-    let directions = Directions::of(&here, &piece.targets, piece.h);
-    let Ended { points, .. } = taken(tableau, (system, piece), directions)?;
-    Ok(Vector::<Y::Manifold>::from_index(|c| {
-        let end: Vector<Y::Manifold> = derivative(&Y::Manifold::coordinates(piece.end, &points[c]));
-        costate.dot(&end)
+    let n = Dim::<Y>::LEN;
+    let here = Columns::start(wide, wide_start);
+    let directions = Directions::of(&here, &piece.targets);
+    let Ended { columns, .. } = taken(tableau, model, piece, directions)?;
+    let row = Vector::<Y::Manifold>::from_index(|i| costate[i]);
+    Ok(Vector::<W::Manifold>::from_index(|c| {
+        let stays = if c < n { 0.0 } else { costate[c] };
+        row.dot(&columns[c]) + stays
     }))
 }
 
-/// How far the step that is differentiated may end from the one that was taken, relative to the sizes of the entries.
-const NEAR: f64 = 1e-9;
+/// How far a step or a jump that is differentiated may end from the one that was taken, relative to the sizes of the entries.
+pub(super) const NEAR: f64 = 1e-9;
 
-/// Refuses a step that is not the one that was taken.
-fn reproduced<Y: Metriplectic>(
+/// Refuses a step that is not the one that was taken, but for a displacement that is round-off.
+pub(super) fn reproduced<Y: Metriplectic>(
     piece: &Piece<'_, Y>,
-    end: &<Y::Manifold as Space>::Point<Dual64>,
+    end: &Point<Y>,
+    rounding: &Vector<Y::Manifold>,
 ) -> Result<(), Unlinearised> {
-    let off = Y::Manifold::coordinates(piece.end, &Y::Manifold::real(end));
+    let off = Y::Manifold::coordinates(piece.end, end);
     let moved = Y::Manifold::coordinates(piece.x, piece.end);
     let (at_start, at_end) = (Y::Manifold::scales(piece.x), Y::Manifold::scales(piece.end));
     let off = (0..Dim::<Y>::LEN).fold(0.0, |worst: f64, i| {
         let size = at_start[i].max(at_end[i]).max(moved[i].abs());
-        if off[i] == 0.0 { worst } else { worst.max(off[i].abs() / size) }
+        if off[i].abs() <= rounding[i] { worst } else { worst.max(off[i].abs() / size) }
     });
     if off <= NEAR { Ok(()) } else { Err(Unlinearised::NotReproduced { off }) }
 }
 
 macro_rules! linearised {
-    ($($method:ty => $tableau:expr),+) => {$(
+    ($($method:ty),+) => {$(
         impl<Y: Metriplectic<Manifold: MovingBase>> Linearised<Y> for $method {
             fn propagate(
                 &self,
@@ -298,8 +380,8 @@ macro_rules! linearised {
                 step: &Piece<'_, Y>,
                 columns: &Columns<Y>,
             ) -> Result<Propagated<Y>, Unlinearised> {
-                let tableau: fn(&$method) -> &'static Tableau = $tableau;
-                propagate(tableau(self), system, step, columns)
+                let wide = (system, step.end, columns);
+                propagate(self.rows(), &Plain(system), step, wide)
             }
 
             fn pull_back(
@@ -308,13 +390,29 @@ macro_rules! linearised {
                 step: &Piece<'_, Y>,
                 costate: &Vector<Y::Manifold>,
             ) -> Result<Vector<Y::Manifold>, Unlinearised> {
-                let tableau: fn(&$method) -> &'static Tableau = $tableau;
-                pull_back(tableau(self), system, step, costate)
+                pull_back(self.rows(), &Plain(system), step, (system, step.x, costate))
             }
         }
     )+};
 }
-linearised!(
+linearised!(DormandPrince5, DormandPrince8, RungeKuttaChebyshev, ExplicitRungeKutta);
+
+/// A method with a tableau.
+pub(super) trait Rows {
+    fn rows(&self) -> &'static Tableau;
+}
+
+macro_rules! rows {
+    ($($method:ty => $tableau:expr),+) => {$(
+        impl Rows for $method {
+            fn rows(&self) -> &'static Tableau {
+                let tableau: fn(&$method) -> &'static Tableau = $tableau;
+                tableau(self)
+            }
+        }
+    )+};
+}
+rows!(
     DormandPrince5 => |_| DormandPrince5::TABLEAU,
     DormandPrince8 => |_| DormandPrince8::TABLEAU,
     RungeKuttaChebyshev => |_| &CHEBYSHEV,

@@ -26,6 +26,9 @@ pub struct Piece<'a, Y: Metriplectic> {
     pub entropy_step: Option<EntropyStep>,
     /// The number of stages, by a method that chooses it from step to step.
     pub stage_count: Option<u32>,
+    /// The velocities of the moving directions at its stages, one stage after the other in the frame at the start, by a method
+    /// that solves for them; none if they are not known.
+    pub stage_velocities: &'a [f64],
 }
 
 /// The values of the laws of a run, with the entropy at the start and what was produced since.
@@ -61,9 +64,13 @@ pub struct Propagated<Y: Metriplectic> {
     message = "the steps of `{Self}` have no tangent on this system",
     note = "a `Scheme` has one if its retraction and its discrete gradient are symmetric (`SelfAdjoint`): not `Exponential`, \
             and not `ItohAbe`",
-    note = "`DormandPrince5`, `DormandPrince8`, `RungeKuttaChebyshev` and `ExplicitRungeKutta` have one on every space of this library (`MovingBase`)"
+    note = "`DormandPrince5`, `DormandPrince8`, `RungeKuttaChebyshev`, `ExplicitRungeKutta`, `Gauss` and `Radau` have one on every space of this library (`MovingBase`)"
 )]
 pub trait Linearised<Y: Metriplectic> {
+    /// Whether a step from a state at rest has a derivative. A step that is corrected along differences that vanish there, as one that is
+    /// moved onto both energy and entropy, has another slope in each direction.
+    const SMOOTH_AT_REST: bool = false;
+
     /// Computes the tangent at the end of a step from that at its start.
     ///
     /// # Errors

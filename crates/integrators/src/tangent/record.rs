@@ -5,24 +5,26 @@ use std::fmt;
 use metriplectic_dynamics::Differentiable;
 use metriplectic_dynamics::system::Point;
 
-use super::certificate::Sensitivity;
+use super::along::LinearisedAlong;
+use super::certificate::{ROUNDED, Sensitivity};
 use super::columns::Columns;
 use super::error::TangentError;
 use super::event::TangentEvent;
-use super::linearised::Linearised;
-use super::pieces::Wide;
+use super::refined::{REFINEMENTS, difference, refined};
 use super::state::TangentState;
-use super::steps::{Inside, TangentSteps};
+use super::steps::{Inside, Jumps, TangentSteps};
 use crate::run::SpanError;
 use crate::run::certificate::Certificate;
 use crate::run::ending::Ending;
 use crate::run::error::RunError;
+use crate::run::event::Request;
+use crate::run::jump::JumpRequest;
 use crate::run::method::Method as _;
 use crate::run::requests::Outputs;
 use crate::run::schedule::Schedule;
 use crate::step::{Flow as _, Stepper};
 
-/// Runs with their derivatives, by every method whose steps are [`Linearised`].
+/// Runs with their derivatives, by every method whose steps are [linearised](LinearisedAlong).
 ///
 /// ```
 /// use metriplectic_dynamics::Family;
@@ -54,7 +56,8 @@ pub trait Tangents: Sized {
     ///
     /// # Errors
     ///
-    /// [`TangentError`] if the model breaks a law, the schedule cannot be run, or it has jumps or corners.
+    /// [`TangentError`] if the model breaks a law, the schedule cannot be run, or it has corners or jumps without
+    /// [derivatives](crate::Jumping::differentiable).
     fn tangent_steps<D>(
         self,
         system: &D,
@@ -63,12 +66,15 @@ pub trait Tangents: Sized {
     ) -> Result<TangentSteps<'_, D, Self>, TangentError<D::Manifold>>
     where
         D: Differentiable,
-        Self: Stepper<D> + Linearised<D::Wide>,
+        Self: Stepper<D> + LinearisedAlong<D>,
     {
         let mut schedule: Schedule = schedule.into();
         let end = schedule.end();
-        if schedule.watch.events.iter().any(|event| event.jump.is_some()) {
-            return Err(TangentError::Broken { what: "jumps" });
+        let listed = schedule.watch.events.iter().map(|event| event.jump.as_ref());
+        let jumps: Jumps<D> = listed.map(|jump| jump.and_then(JumpRequest::smooth)).collect();
+        let has_jump = |event: &Request| event.jump.is_some();
+        if schedule.watch.events.iter().zip(&jumps).any(|(e, jump)| has_jump(e) && jump.is_none()) {
+            return Err(TangentError::Broken { what: "jumps without derivatives" });
         }
         if !schedule.corners.is_empty() {
             return Err(TangentError::Broken { what: "corners" });
@@ -81,7 +87,8 @@ pub trait Tangents: Sized {
         let columns = system
             .wide()
             .with_room(|| Columns::start(system.wide(), &system.widened(&steps.state().point)));
-        Ok(TangentSteps { steps, columns, sensitivity: Sensitivity::default(), outputs, start })
+        let sensitivity = Sensitivity::default();
+        Ok(TangentSteps { steps, columns, sensitivity, outputs, start, jumps })
     }
 
     /// Runs a system over a schedule, and records the states with their derivatives: after each step, or at the
@@ -98,10 +105,58 @@ pub trait Tangents: Sized {
     ) -> Result<TangentRun<D>, TangentError<D::Manifold>>
     where
         D: Differentiable,
-        Self: Stepper<D> + Linearised<D::Wide>,
+        Self: Stepper<D> + LinearisedAlong<D>,
     {
         let steps = self.tangent_steps(system, x0, schedule)?;
         system.wide().with_room(|| record(steps))
+    }
+
+    /// Runs a system with its derivatives until they are as exact as `accuracy`.
+    ///
+    /// The tolerance that steps follow bounds the errors of the state, and a tangent is often some ten times less exact. So the
+    /// run is made again with a tenth of its tolerance, or with halves of its steps, until the derivatives `T`, `T'` at the ends of two
+    /// runs agree: `|T_j − T'_j| ≤ accuracy |T'_j|` for each column `j`, with entries in units of the
+    /// [sizes](metriplectic_manifolds::Manifold::scales) of the state. That of the finer run is returned, and its
+    /// [`Sensitivity::difference`] is the largest ratio. It is an error over the whole run, not in a step, so it includes what
+    /// grows along the run; and every method has it.
+    ///
+    /// # Errors
+    ///
+    /// [`TangentError::Accuracy`] if the accuracy is not between `1.5e-14`, which is round-off, and 1, [`TangentError::Inexact`] if it is not reached with the smallest
+    /// tolerance of the method or after twelve runs, and those of [`tangent`](Self::tangent).
+    fn tangent_to<D>(
+        self,
+        system: &D,
+        x0: Point<D>,
+        schedule: impl Into<Schedule>,
+        accuracy: f64,
+    ) -> Result<TangentRun<D>, TangentError<D::Manifold>>
+    where
+        D: Differentiable,
+        Self: Clone + Stepper<D> + LinearisedAlong<D>,
+    {
+        if !(ROUNDED..1.0).contains(&accuracy) {
+            return Err(TangentError::Accuracy { accuracy });
+        }
+        let mut schedule: Schedule = schedule.into();
+        let mut coarse = self.clone().tangent(system, x0.clone(), schedule.clone())?;
+        let mut reached = f64::INFINITY;
+        for _ in 0..REFINEMENTS {
+            let largest = coarse.certificate().largest_step;
+            schedule = refined(&schedule, Stepper::<D>::order(&self), largest);
+            let fine = self.clone().tangent(system, x0.clone(), schedule.clone());
+            let mut fine = match fine {
+                Err(TangentError::Run(RunError::Span(SpanError::Tolerance { .. }))) => break,
+                fine => fine?,
+            };
+            reached = difference(system, &fine.states[0], [coarse.last(), fine.last()]);
+            fine.sensitivity.difference = Some(reached);
+            if reached <= accuracy {
+                return Ok(fine);
+            }
+            coarse = fine;
+        }
+        Err(TangentError::Inexact { accuracy, reached })
     }
 }
 
@@ -113,7 +168,7 @@ fn record<D, M>(
 ) -> Result<TangentRun<D>, TangentError<D::Manifold>>
 where
     D: Differentiable,
-    M: Stepper<D> + Linearised<Wide<D>>,
+    M: Stepper<D> + LinearisedAlong<D>,
 {
     let asked = !steps.outputs.is_empty();
     let (mut states, mut events) = (vec![steps.state()], Vec::new());

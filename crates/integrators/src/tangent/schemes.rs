@@ -20,14 +20,13 @@ use metriplectic_manifolds::{
 };
 use num_dual::Dual64;
 
-use super::certificate::BROKEN;
 use super::columns::Columns;
 use super::error::Unlinearised;
-use super::frames::turned;
+use super::frames::{between, turned};
 use super::linearised::{Linearised, Piece, Propagated};
 use crate::discrete_gradient::{DiscreteGradient, Gonzalez, MeanValue, SymmetricItohAbe};
-use crate::midpoint::{Residual, Scheme};
-use crate::newton::Equation as _;
+use crate::midpoint::{BothEnds, Residual, Scheme};
+use crate::round_off::bound::BROKEN;
 use crate::step::Dim;
 
 /// A retraction or a discrete gradient that is the same seen from either end of a step:
@@ -41,12 +40,6 @@ macro_rules! self_adjoint {
 }
 self_adjoint!(WeylMidpoint, ChartMidpoint, Projection, Cayley);
 self_adjoint!(Gonzalez, MeanValue, SymmetricItohAbe);
-
-/// The linearisation of a step from one of its ends.
-struct Shot<Y: Metriplectic> {
-    path: StepPathJet<Y::Manifold>,
-    jacobian: Matrix<Y::Manifold>,
-}
 
 /// An unknown, and its path.
 type Path<Y> = (Vector<<Y as Metriplectic>::Manifold>, StepPathJet<<Y as Metriplectic>::Manifold>);
@@ -62,13 +55,15 @@ where
 {
     let metric = system.metric();
     let mut u = metric.log(x, y).ok()?;
-    let mut before = f64::INFINITY;
+    let (mut before, scales) = (f64::INFINITY, Y::Manifold::scales(y));
     for _ in 0..CORRECTIONS {
         let path = retraction.step_path_jet(metric, x, &u).ok()?;
         let off = Y::Manifold::coordinates(&path.end, y);
         let size = off.magnitude();
         // The last digits of the end are rounding.
-        if size == 0.0 || size >= 0.5 * before {
+        let is_rounding =
+            (0..Dim::<Y>::LEN).all(|i| off[i].abs() <= 2.0 * f64::EPSILON * scales[i]);
+        if is_rounding || size >= 0.5 * before {
             return Some((u, path));
         }
         before = size;
@@ -78,30 +73,20 @@ where
     Some((u, path))
 }
 
-impl<R, W: DiscreteGradient> Scheme<R, W> {
-    /// Linearises the step of size `h` from `x` to `y` along its unknown.
-    fn shot<Y>(&self, system: &Y, [x, y]: [&Point<Y>; 2], h: f64) -> Option<Shot<Y>>
-    where
-        Y: Metriplectic,
-        R: Retraction<Y::Manifold, Y::Metric>,
-    {
-        let (u, path) = path(system, &self.retraction, [x, y])?;
-        let jacobian = Residual::new(system, self, x, h).linearise(&u)?.jacobian;
-        Some(Shot { path, jacobian })
-    }
-}
-
 /// Both linearisations of a step, in one frame at `z` and in those of the stored ends.
-struct Both<Y: Metriplectic> {
-    /// `∂R/∂u`.
-    a: Matrix<Y::Manifold>,
-    /// `−∂R/∂v`.
-    b: Matrix<Y::Manifold>,
+pub(super) struct Both<Y: Metriplectic> {
+    /// `∂R/∂u` and `−∂R/∂v`, and what else the step knows there.
+    pub(super) at: BothEnds<Y>,
     /// `∂x'/∂u`.
     e: Matrix<Y::Manifold>,
     /// `∂x/∂v`.
     f: Matrix<Y::Manifold>,
-    d: Vector<Y::Manifold>,
+    /// The base of the step.
+    pub(super) z: Point<Y>,
+    /// Its displacement there.
+    pub(super) d: Vector<Y::Manifold>,
+    /// Its size.
+    pub(super) h: f64,
     units: Vector<Y::Manifold>,
 }
 
@@ -124,67 +109,96 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
         Some(Residual::new(system, self, x, h).defined(&moved).ok()?.1.eps)
     }
 
-    fn both<Y>(&self, system: &Y, &Piece { x, end, h, .. }: &Piece<'_, Y>) -> Option<Both<Y>>
+    /// Linearises a step from both of its ends, with the derivatives along covectors if they are asked for.
+    pub(super) fn both<Y>(
+        &self,
+        system: &Y,
+        [x, end]: [&Point<Y>; 2],
+        h: f64,
+        asks_covectors: bool,
+    ) -> Option<Both<Y>>
     where
         Y: Metriplectic,
         R: Retraction<Y::Manifold, Y::Metric>,
     {
-        let there = self.shot(system, [x, end], h)?;
-        let back = self.shot(system, [end, x], -h)?;
-        Some(Both {
-            a: there.jacobian,
-            b: turned::<Y::Manifold>(back.jacobian, &back.path.z, &there.path.z),
-            e: turned::<Y::Manifold>(there.path.dend, &there.path.end, end),
-            f: turned::<Y::Manifold>(back.path.dend, &back.path.end, x),
-            d: there.path.d,
-            units: units::<Y>(x, end, &there.path.d),
-        })
+        let (u, there) = path(system, &self.retraction, [x, end])?;
+        let (_, back) = path(system, &self.retraction, [end, x])?;
+        let there = StepPathJet {
+            dend: turned::<Y::Manifold>(there.dend, &there.end, end),
+            end: end.clone(),
+            ..there
+        };
+        let turn = between::<Y::Manifold>(&back.z, &there.z);
+        let [dz, dd] = [back.dz, back.dd].map(|a| turn.map_or(a, |turn| turn * a));
+        let dend = turned::<Y::Manifold>(back.dend, &back.end, x);
+        let d = there.d * -1.0;
+        let back = StepPathJet { z: there.z.clone(), dz, d, dd, end: x.clone(), dend };
+        let residual = Residual::between(system, self, x, h);
+        let at = residual.both_ends((&u, end), [&there, &back], asks_covectors)?;
+        let units = units::<Y>(x, end, &there.d);
+        Some(Both { e: there.dend, f: back.dend, z: there.z, d: there.d, h, at, units })
     }
 }
 
+/// The Jacobian of a step in units of the entries, factorised.
+pub(super) type Factored<Y> =
+    <Matrix<<Y as Metriplectic>::Manifold> as metriplectic_fields::Square<f64>>::Factors;
+
 impl<Y: Metriplectic> Both<Y> {
-    /// `J = E A⁻¹ B F⁻¹`, and `∂x'/∂h`.
-    #[allow(
-        clippy::type_complexity,
-        reason = "a derivative and its column along h, which the caller takes apart"
-    )]
-    fn derivative(&self, h: f64) -> Option<(Matrix<Y::Manifold>, Vector<Y::Manifold>)> {
-        let Self { a, b, e, f, d, units } = self;
-        let a = scaled::<Y>(a, units).factor()?;
-        let solve = |r: Vector<Y::Manifold>| {
-            let hat = a.solve(&each::<Y>(&r, |i| 1.0 / units[i]))?;
-            Some(*e * each::<Y>(&hat, |i| units[i]))
-        };
+    /// Factorises `∂R/∂u`.
+    pub(super) fn factored(&self) -> Option<Factored<Y>> {
+        scaled::<Y>(&self.at.jacobians[0], &self.units).factor()
+    }
+
+    /// `E A⁻¹ r`: how the end moves where the residual changes by `−r`.
+    pub(super) fn end_along(
+        &self,
+        a: &Factored<Y>,
+        r: &Vector<Y::Manifold>,
+    ) -> Option<Vector<Y::Manifold>> {
+        let hat = a.solve(&each::<Y>(r, |i| 1.0 / self.units[i]))?;
+        Some(self.e * each::<Y>(&hat, |i| self.units[i]))
+    }
+
+    /// `∂x'/∂h`: the residual `R = d − h V` vanishes, so `∂R/∂h = −V = −d/h`.
+    pub(super) fn along_h(&self, a: &Factored<Y>) -> Option<Vector<Y::Manifold>> {
+        self.end_along(a, &(self.d * self.h.recip()))
+    }
+
+    /// `J = E A⁻¹ B F⁻¹`.
+    pub(super) fn derivative(&self, a: &Factored<Y>) -> Option<Matrix<Y::Manifold>> {
+        let Self { f, units, .. } = self;
         let inverse = scaled::<Y>(f, units).inverse()?;
         let inverse =
             Matrix::<Y::Manifold>::from_entries(|i, j| inverse[(i, j)] * units[i] / units[j]);
-        let right = *b * inverse;
+        let right = self.at.jacobians[1] * inverse;
         let mut j = Matrix::<Y::Manifold>::zeros();
         for k in 0..Dim::<Y>::LEN {
-            let column = solve(right.column_at(k))?;
+            let column = self.end_along(a, &right.column_at(k))?;
             for i in 0..Dim::<Y>::LEN {
                 j[(i, k)] = column[i];
             }
         }
-        // R = d − h V vanishes, so ∂R/∂h = −V = −d/h.
-        Some((j, solve(*d * h.recip())?))
+        Some(j)
     }
 
-    /// `λ ↦ Jᵀ λ = F⁻ᵀ Bᵀ A⁻ᵀ Eᵀ λ` for each row, without `J`.
-    fn transposed<const K: usize>(
+    /// `λ ↦ (A⁻ᵀ Eᵀ λ, Jᵀ λ)` for each row, with `Jᵀ = F⁻ᵀ Bᵀ A⁻ᵀ Eᵀ`, without `J`.
+    pub(super) fn transposed<const K: usize>(
         &self,
         rows: [Vector<Y::Manifold>; K],
-    ) -> Option<[Vector<Y::Manifold>; K]> {
-        let Self { a, b, e, f, units, .. } = self;
+    ) -> Option<[[Vector<Y::Manifold>; 2]; K]> {
+        let Self { at, e, f, units, .. } = self;
+        let [a, b] = &at.jacobians;
         let factors = |m: &Matrix<Y::Manifold>| {
             let m = scaled::<Y>(m, units);
             Matrix::<Y::Manifold>::from_entries(|i, j| m[(j, i)]).factor()
         };
         let (a, f) = (factors(a)?, factors(f)?);
-        let mut pulled = rows;
-        for row in &mut pulled {
+        let mut pulled = rows.map(|row| [row; 2]);
+        for [through, row] in &mut pulled {
             let hat = a.solve(&each::<Y>(&e.transpose_times(row), |i| units[i]))?;
-            let middle = b.transpose_times(&each::<Y>(&hat, |i| 1.0 / units[i]));
+            *through = each::<Y>(&hat, |i| 1.0 / units[i]);
+            let middle = b.transpose_times(through);
             let hat = f.solve(&each::<Y>(&middle, |i| units[i]))?;
             *row = each::<Y>(&hat, |i| 1.0 / units[i]);
         }
@@ -198,15 +212,21 @@ where
     R: Retraction<Y::Manifold, Y::Metric> + SelfAdjoint,
     W: DiscreteGradient + SelfAdjoint,
 {
+    const SMOOTH_AT_REST: bool = true;
+
     fn propagate(
         &self,
         system: &Y,
         step: &Piece<'_, Y>,
         columns: &Columns<Y>,
     ) -> Result<Propagated<Y>, Unlinearised> {
-        let derivative = || self.both(system, step)?.derivative(step.h);
-        let (j, along_h) = derivative().ok_or(Unlinearised::Singular)?;
-        Ok(Propagated { columns: columns.after(&j), along_h })
+        let propagated = || {
+            let both = self.both(system, [step.x, step.end], step.h, false)?;
+            let a = both.factored()?;
+            let columns = columns.after(&both.derivative(&a)?);
+            Some(Propagated { columns, along_h: both.along_h(&a)? })
+        };
+        propagated().ok_or(Unlinearised::Singular)
     }
 
     /// The derivatives of the growth along both ends are those along the unknowns of both shots.
@@ -237,12 +257,25 @@ where
         step: &Piece<'_, Y>,
         costate: &Vector<Y::Manifold>,
     ) -> Result<Vector<Y::Manifold>, Unlinearised> {
-        let [before, after] =
-            [step.x, step.end].map(|x| ScalarField::<Y::Manifold>::jet1(system.energy(), x).df);
-        let pulled = || self.both(system, step)?.transposed([*costate, after]);
-        let [point, energy] = pulled().ok_or(Unlinearised::Singular)?;
-        first_law::<Y>(step.x, [&energy, &before])?;
+        let both = self.both(system, [step.x, step.end], step.h, false);
+        let both = both.ok_or(Unlinearised::Singular)?;
+        let [_, point] = both.pulled_back(step.x, costate)?;
         Ok(point)
+    }
+}
+
+impl<Y: Metriplectic> Both<Y> {
+    /// `A⁻ᵀ Eᵀ λ` and `Jᵀ λ`, if the first law of the step holds.
+    pub(super) fn pulled_back(
+        &self,
+        x: &Point<Y>,
+        costate: &Vector<Y::Manifold>,
+    ) -> Result<[Vector<Y::Manifold>; 2], Unlinearised> {
+        let [before, after] = self.at.energy;
+        let pulled = self.transposed([*costate, after]).ok_or(Unlinearised::Singular)?;
+        let [rows, [_, energy]] = pulled;
+        first_law::<Y>(x, [&energy, &before])?;
+        Ok(rows)
     }
 }
 
@@ -260,7 +293,7 @@ fn first_law<Y: Metriplectic>(
 
 /// The unit of each entry, a power of two: in another one each number of a factorisation differs by a power of two, so that
 /// its pivots are the same.
-fn units<Y: Metriplectic>(
+pub(super) fn units<Y: Metriplectic>(
     x: &Point<Y>,
     y: &Point<Y>,
     d: &Vector<Y::Manifold>,

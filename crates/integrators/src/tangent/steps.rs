@@ -1,25 +1,30 @@
 //! A run with its tangent, step by step.
 
 use std::fmt;
+use std::sync::Arc;
 
 use metriplectic_dynamics::Differentiable;
 use metriplectic_fields::{Column as _, Dimension as _, Space as _, Square as _, Vector};
 
+use super::along::LinearisedAlong;
 use super::certificate::Sensitivity;
 use super::columns::Columns;
+use super::duals::Hyperdual;
 use super::error::{TangentError, Unlinearised};
 use super::event::TangentEvent;
 use super::frames::between;
 use super::linearised::{Linearised, Propagated};
-use super::pieces::{Ended, Part, Wide, propagate};
+use super::part::{Ended, Part, Wide};
+use super::pieces::propagate;
 use super::state::TangentState;
 use crate::run::certificate::Certificate;
 use crate::run::ending::Ending;
 use crate::run::event::Event;
+use crate::run::jump::SmoothJump;
 use crate::run::last_step::LastStep;
 use crate::run::requests::{Outputs, rounding};
 use crate::run::steps::Steps;
-use crate::step::{Dim, Flow as _, Memory as _, Stepper};
+use crate::step::{Dim, Flow as _, Stepper};
 
 /// A run with its tangent, step by step; made by [`Tangents::tangent_steps`](crate::Tangents::tangent_steps).
 ///
@@ -30,7 +35,12 @@ pub struct TangentSteps<'a, D: Differentiable, M: Stepper<D>> {
     pub(super) sensitivity: Sensitivity,
     pub(super) outputs: Outputs,
     pub(super) start: f64,
+    /// The derivatives of the jumps, by the number of their event.
+    pub(super) jumps: Jumps<D>,
 }
+
+/// The jumps of a schedule with their derivatives.
+pub(super) type Jumps<D> = Vec<Option<Arc<SmoothJump<Hyperdual<Wide<D>>>>>>;
 
 impl<D: Differentiable, M: Stepper<D>> fmt::Debug for TangentSteps<'_, D, M> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -49,7 +59,7 @@ pub(super) struct Inside<D: Differentiable> {
 impl<D, M> TangentSteps<'_, D, M>
 where
     D: Differentiable,
-    M: Stepper<D> + Linearised<Wide<D>>,
+    M: Stepper<D> + LinearisedAlong<D>,
 {
     /// The state reached so far, with its derivatives.
     pub fn state(&self) -> TangentState<D> {
@@ -72,7 +82,7 @@ where
         self.steps.certificate()
     }
 
-    fn at(
+    pub(super) fn at(
         &self,
         step: usize,
         time: f64,
@@ -99,11 +109,14 @@ where
         let before = self.steps.state().clone();
         self.steps.advance()?;
         let mut inside = Inside { outputs: Vec::new(), events: Vec::new() };
+        let found = self.steps.take_events();
+        if found.last().is_some_and(|event| event.jump.is_some()) {
+            return self.cross(before.step, &scales, found);
+        }
         if self.steps.state().step == before.step {
             return Ok(inside);
         }
         let failed = |cause| TangentError::NotLinearised { time: before.time, cause };
-        let found = self.steps.take_events();
         let flow = self.steps.flow();
         let last = self.steps.last_step(&scales);
         let stop = match self.steps.ending() {
@@ -123,16 +136,11 @@ where
             }
         }
         for event in found {
-            inside.events.push(self.event(&last, event, before.time).map_err(failed)?);
+            let theta = (event.state.time - before.time) / (self.steps.state().time - before.time);
+            inside.events.push(self.event(&last, event, theta).map_err(failed)?);
         }
         let state = self.steps.state();
-        let ended = Ended {
-            end: &state.point,
-            h: last.h,
-            in_parts: last.in_parts,
-            entropy_step: last.entropy_step,
-            stage_count: last.stage_count,
-        };
+        let ended = Ended::of_run(&state.point, &last);
         let system = (flow, self.steps.method());
         let next = propagate(system, &last.start, &ended, &self.columns).map_err(failed)?;
         let wide = flow.widened(&state.point);
@@ -149,6 +157,8 @@ where
         }
         self.sensitivity.frozen = self.steps.is_adaptive();
         self.sensitivity.undamped = self.steps.certificate().is_stiff();
+        self.sensitivity.at_rest |=
+            !<M as Linearised<Wide<D>>>::SMOOTH_AT_REST && *last.start.x == state.point;
         let mut ends = self.outputs.clone();
         let mut is_due = false;
         while let Some(time) = ends.next(end) {
@@ -167,7 +177,7 @@ where
         clippy::type_complexity,
         reason = "a point and its derivatives, which the caller takes apart at once"
     )]
-    fn part(
+    pub(super) fn part(
         &self,
         last: &LastStep<'_, D>,
         theta: f64,
@@ -179,26 +189,19 @@ where
         let (h, mut memory) = (theta * last.h, M::Memory::default());
         let taken =
             method.step(flow, &last.start, h, &mut memory).map_err(|_| Unlinearised::Singular)?;
-        let ended = Ended {
-            end: &taken.x,
-            h,
-            in_parts: taken.effort.splits > 0,
-            entropy_step: taken.evidence.entropy_step,
-            stage_count: memory.stage_count(),
-        };
+        let ended = Ended::new(&taken, h, &memory);
         let moved = propagate((flow, method), &last.start, &ended, &self.columns)?;
         Ok((taken.x, moved))
     }
 
     /// An event of the last step with its derivatives, in the frame of its own state.
-    fn event(
+    pub(super) fn event(
         &self,
         last: &LastStep<'_, D>,
         event: Event<D::Manifold>,
-        before: f64,
+        theta: f64,
     ) -> Result<TangentEvent<D>, Unlinearised> {
         let n = Dim::<D>::LEN;
-        let theta = (event.state.time - before) / (self.steps.state().time - before);
         let (reached, Propagated { mut columns, along_h }) = self.part(last, theta)?;
         let mut velocity = Vector::<D::Manifold>::from_index(|i| along_h[i]);
         // The state of the output is not that of the step of this size, and may have another frame.
@@ -216,6 +219,6 @@ where
         }
         let (step, time) = (event.state.step, event.state.time);
         let state = self.at(step, time, event.state.point.clone(), columns);
-        Ok(TangentEvent { event, state, velocity })
+        Ok(TangentEvent { event, state, velocity, after: None })
     }
 }

@@ -4,7 +4,8 @@ use metriplectic_dynamics::Differentiable;
 use metriplectic_dynamics::system::Point;
 
 use super::error::{TangentError, Unlinearised};
-use super::pieces::{Ended, Part, parts};
+use super::part::{Ended, Part};
+use super::pieces::parts;
 use crate::run::certificate::Certificate;
 use crate::run::checkpoint::Checkpoint;
 use crate::run::error::RunError;
@@ -15,7 +16,7 @@ use crate::run::schedule::Schedule;
 use crate::run::span_error::SpanError;
 use crate::run::state::State;
 use crate::run::steps::Steps;
-use crate::step::{Flow as _, Memory as _, Stepper};
+use crate::step::{Flow as _, Stepper};
 
 /// A step of a run.
 pub(super) struct TapedStep<D: Differentiable> {
@@ -75,13 +76,7 @@ impl<D: Differentiable, M: Stepper<D>> Recorder<'_, D, M> {
         let system = (self.steps.flow(), self.steps.method());
         let last = self.steps.last_step(&scales);
         let end = self.steps.state();
-        let ended = Ended {
-            end: &end.point,
-            h: last.h,
-            in_parts: last.in_parts,
-            entropy_step: last.entropy_step,
-            stage_count: last.stage_count,
-        };
+        let ended = Ended::of_run(&end.point, &last);
         let parts = parts(system, &last.start, &ended).map_err(failed)?;
         let mut step = TapedStep { time: before.time, parts, state: None, outputs: Vec::new() };
         let mut states = Vec::new();
@@ -116,14 +111,7 @@ fn inside<D: Differentiable, M: Stepper<D>>(
     let (h, mut memory) = (theta * last.h, M::Memory::default());
     let taken =
         method.step(system, &last.start, h, &mut memory).map_err(|_| Unlinearised::Singular)?;
-    let ended = Ended {
-        end: &taken.x,
-        h,
-        in_parts: taken.effort.splits > 0,
-        entropy_step: taken.evidence.entropy_step,
-        stage_count: memory.stage_count(),
-    };
-    let parts = parts((system, method), &last.start, &ended)?;
+    let parts = parts((system, method), &last.start, &Ended::new(&taken, h, &memory))?;
     Ok((taken.x, parts))
 }
 

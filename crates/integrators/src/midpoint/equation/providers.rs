@@ -91,7 +91,7 @@ where
     /// The data of the discrete gradient of `f` on the path with the base `z` and the end `x'`, from its
     /// values at `x` and `x'`.
     #[inline]
-    fn stable_gradient(
+    pub(super) fn stable_gradient(
         &self,
         f: &impl ScalarField<Y::Manifold>,
         mean: &Vector<Y::Manifold>,

@@ -5,12 +5,12 @@ use std::fmt;
 use metriplectic_dynamics::SecondLaw;
 
 use super::{
-    Certificate, InvariantBalance, MisjudgedSize, ProjectedSteps, RESOLVED, StageBalance,
-    UNRESOLVED,
+    Certificate, InvariantBalance, MisjudgedSize, ProjectedSteps, StageBalance, UNRESOLVED,
 };
 use crate::round_off::bound::of_a_law;
 use crate::run::jump::JumpBalance;
 use crate::step::digits::{Digits, counted};
+use crate::step::evidence::RESOLVED;
 use crate::step::{Effort, LedgerSummary, LimitingSites, NoiseSummary};
 
 /// The local error from which on a hundred steps may be off by what a picture shows: about 27 steps of the midpoint rule

@@ -122,6 +122,7 @@ impl<'a, F: Flow + ?Sized> Course<'a, F> {
             rule,
             before,
             watching: None,
+            cut: None,
             last_numbers: c.events.clone(),
             flow,
             progress,

@@ -1,0 +1,242 @@
+//! The numbers that somebody has chosen: each names a test that fails when it is moved by a factor of four, or is listed here.
+//!
+//! A number whose factor of four no test notices is either without effect on what is promised, as a number that saves work,
+//! or not tested enough. The list may become shorter.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// Lengths of arrays, layouts and formats, where there is nothing to choose: file and name.
+const LAYOUT: &[(&str, &str)] = &[
+    ("collocation.rs", "SPLITS"),
+    ("collocation/tableau.rs", "POINTS"),
+    ("collocation/tableau.rs", "STAGES"),
+    ("collocation/timed.rs", "MOST"),
+    ("explicit/step.rs", "COUNT"),
+    ("explicit/tableau.rs", "STAGES"),
+    ("midpoint/predictor.rs", "DIFFERENCES"),
+    ("noise/numbers.rs", "COIN"),
+    ("noise/numbers.rs", "TERM_BITS"),
+    ("noise/numbers.rs", "UNIT"),
+    ("noise/sampler.rs", "MOST"),
+    ("open/vector.rs", "ALL"),
+    ("run/checkpoint.rs", "VERSION"),
+    ("run/observables.rs", "BUFFER"),
+    ("run/record.rs", "ROOM"),
+    ("step/memory.rs", "LISTS"),
+    ("step/memory.rs", "NUMBERS"),
+    ("tangent/duals.rs", "ENERGY"),
+    ("tangent/duals.rs", "ENTROPY"),
+];
+
+/// The numbers that can be moved by a factor of four with no failing test: file and name.
+const UNNOTICED: &[(&str, &str)] = &[
+    ("collocation/chart.rs", "NORMAL"),
+    ("collocation/equation.rs", "ROUNDINGS"),
+    ("collocation/full.rs", "DIFFERENCE"),
+    ("collocation/linear.rs", "PASSES"),
+    ("collocation/parts.rs", "FIRST"),
+    ("collocation/parts.rs", "TRIALS"),
+    ("collocation/solve.rs", "HALF"),
+    ("collocation/solve.rs", "HALVINGS"),
+    ("collocation/solve.rs", "KNOWN"),
+    ("collocation/solve.rs", "STALL"),
+    ("collocation/solve.rs", "STALLED_LAW"),
+    ("collocation/solve.rs", "SURE"),
+    ("collocation/solve.rs", "UNKNOWN"),
+    ("collocation/step.rs", "DAMPED"),
+    ("collocation/step.rs", "FAR"),
+    ("collocation/step.rs", "NOTHING"),
+    ("collocation/timed.rs", "PASSES"),
+    ("explicit/chebyshev.rs", "MOST"),
+    ("explicit/conditions.rs", "HIGHEST"),
+    ("explicit/creep.rs", "CLEAR"),
+    ("explicit/creep.rs", "CREEPING"),
+    ("explicit/creep.rs", "FRACTIONS"),
+    ("explicit/creep.rs", "LENGTH"),
+    ("explicit/creep.rs", "PATIENCE"),
+    ("explicit/dense.rs", "NODES"),
+    ("explicit/flow.rs", "NEAR"),
+    ("explicit/landing.rs", "FALL"),
+    ("explicit/landing.rs", "FAR"),
+    ("explicit/rest.rs", "HARDLY"),
+    ("explicit/rest.rs", "HARDLY_ALLOWED"),
+    ("explicit/rest.rs", "SHORT"),
+    ("explicit/spectrum.rs", "CHANGE"),
+    ("explicit/spectrum.rs", "ITERATIONS"),
+    ("explicit/spectrum.rs", "PATIENCE"),
+    ("explicit/spectrum.rs", "SAFETY"),
+    ("explicit/step.rs", "FALLS"),
+    ("explicit/step.rs", "HALVES"),
+    ("explicit/step.rs", "MANY_FALLS"),
+    ("midpoint/fallbacks.rs", "DIRECT"),
+    ("midpoint/predictor.rs", "FALLS"),
+    ("midpoint/predictor.rs", "LOW"),
+    ("midpoint/restored.rs", "CORRECTIONS"),
+    ("midpoint/restored.rs", "EXACT"),
+    ("midpoint/restored.rs", "KEPT"),
+    ("midpoint/restored.rs", "NEAR"),
+    ("midpoint/step.rs", "VERY_STIFF"),
+    ("newton.rs", "HIDDEN"),
+    ("newton.rs", "NEAR"),
+    ("newton/inverse.rs", "INVERTED"),
+    ("noise/closed.rs", "ROUND_OFF"),
+    ("noise/moves.rs", "HALVES"),
+    ("noise/moves.rs", "LEAST"),
+    ("noise/sampler.rs", "FEW"),
+    ("noise/sampler.rs", "OFTEN"),
+    ("open/flow.rs", "LAST_DIGITS"),
+    ("open/stages.rs", "HALVES"),
+    ("open/verify.rs", "AGREEING"),
+    ("open/verify.rs", "BROKEN"),
+    ("open/verify.rs", "CLEAR"),
+    ("open/verify.rs", "JUMP"),
+    ("open/verify.rs", "SAME"),
+    ("round_off/bound.rs", "BROKEN"),
+    ("round_off/bound.rs", "INDEPENDENT"),
+    ("round_off/stable_gradient.rs", "SQUARE"),
+    ("run/certificate.rs", "AT_THE_EDGE"),
+    ("run/certificate.rs", "UNRESOLVED"),
+    ("run/certificate/text.rs", "COARSE"),
+    ("run/certificate/text.rs", "COARSE_INSIDE"),
+    ("run/checkpoint/validation.rs", "LIBRARIES"),
+    ("run/controller.rs", "HELD"),
+    ("run/controller.rs", "LEAST_ERROR"),
+    ("run/controller.rs", "PATIENCE"),
+    ("run/controller.rs", "RAISED"),
+    ("run/controller.rs", "REDUCED"),
+    ("run/controller.rs", "SAFETY"),
+    ("run/corners.rs", "BEFORE"),
+    ("run/course.rs", "NOT_CONSERVED"),
+    ("run/departure.rs", "CLEAR"),
+    ("run/departure.rs", "EARLY"),
+    ("run/event.rs", "SAME_TIME"),
+    ("run/event.rs", "WIDTH"),
+    ("run/judged.rs", "MISJUDGED"),
+    ("run/recheck.rs", "CREEPS"),
+    ("run/steps.rs", "TRIES"),
+    ("run/until.rs", "TOLERANCE"),
+    ("step/evidence.rs", "RESOLVED"),
+    ("step/failure.rs", "INCREMENTS"),
+    ("step/failure.rs", "LEAST"),
+    ("step/initial_scales.rs", "AHEAD"),
+    ("step/initial_scales.rs", "CUTS"),
+    ("step/initial_scales.rs", "FIRST"),
+    ("step/initial_scales.rs", "NOTHING"),
+    ("step/initial_scales.rs", "RESOLVED"),
+    ("step/initial_scales.rs", "SAME"),
+    ("system.rs", "AHEAD"),
+    ("system.rs", "DEPENDENT"),
+    ("system/reach.rs", "CUTS"),
+    ("system/reach.rs", "LATE"),
+    ("system/reach.rs", "NOISE"),
+    ("system/reach.rs", "SAME"),
+    ("system/reach.rs", "STEEPEST"),
+    ("system/referred_rise.rs", "ROUNDING"),
+    ("system/stages.rs", "CONSERVED"),
+    ("system/stages.rs", "CORRECTIONS"),
+    ("tangent/adjoint.rs", "WITHIN"),
+    ("tangent/certificate.rs", "ROUNDED"),
+    ("tangent/event.rs", "GRAZING"),
+    ("tangent/explicit.rs", "NEAR"),
+    ("tangent/landing.rs", "CORRECTIONS"),
+    ("tangent/landing.rs", "SMALL"),
+    ("tangent/pieces.rs", "HALVES"),
+    ("tangent/refined.rs", "REFINEMENTS"),
+    ("tangent/refined.rs", "TENTH"),
+    ("tangent/schemes.rs", "CORRECTIONS"),
+];
+
+/// The words before the name of a test.
+const NOTICED: &str = "A factor of four fails `";
+
+/// A constant of the crate.
+struct Constant {
+    file: String,
+    name: String,
+    /// Its docstring.
+    text: String,
+}
+
+#[test]
+fn each_number_names_the_test_that_holds_it() {
+    let place = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let constants = constants(&place.join("src"));
+    assert!(constants.len() > 100, "{} constants", constants.len());
+    let listed = |list: &[(&str, &str)], constant: &Constant| {
+        list.contains(&(constant.file.as_str(), constant.name.as_str()))
+    };
+    for constant in &constants {
+        let Constant { file, name, text } = constant;
+        let lists = [listed(LAYOUT, constant), listed(UNNOTICED, constant)];
+        let Some((_, rest)) = text.split_once(NOTICED) else {
+            assert!(lists[0] || lists[1], "{file}: {name} names no test ({NOTICED}tests/..`)");
+            continue;
+        };
+        assert!(!lists[0] && !lists[1], "{file}: {name} names a test, and is listed");
+        let (path, test) = rest.split('`').next().and_then(|path| path.rsplit_once("::")).unwrap();
+        let place =
+            if path.starts_with("tests/") { place.join("../..") } else { place.join("src") };
+        let text = fs::read_to_string(place.join(path)).unwrap_or_default();
+        assert!(text.contains(&format!("fn {test}(")), "{file}: {name}: no test {test} in {path}");
+    }
+    for (file, name) in LAYOUT.iter().chain(UNNOTICED) {
+        let exists = constants.iter().any(|c| c.file == *file && c.name == *name);
+        assert!(exists, "{file}: there is no constant {name}");
+    }
+    let noticed = constants.len() - LAYOUT.len() - UNNOTICED.len();
+    println!("{} numbers: {noticed} with a test, {} without", constants.len(), UNNOTICED.len());
+}
+
+/// The constants of the source files, without their tests.
+fn constants(source: &Path) -> Vec<Constant> {
+    let kinds = ["f64", "usize", "u32", "u64", "[f64;"];
+    let mut found = Vec::new();
+    for path in files(source) {
+        let file =
+            path.strip_prefix(source).expect("below it").to_string_lossy().replace('\\', "/");
+        let text = fs::read_to_string(&path).expect("a source file");
+        let text = text.split("#[cfg(test)]\nmod tests {").next().expect("its first part");
+        let mut docs = String::new();
+        for line in text.lines().map(str::trim_start) {
+            let line_of_docs = line.strip_prefix("///");
+            let words = line.split("const ").nth(1).and_then(|rest| rest.split_once(": "));
+            if let Some(words) = line_of_docs {
+                docs.push_str(words);
+                docs.push('\n');
+                continue;
+            }
+            let is_constant = ["const ", "pub const ", "pub(crate) const ", "pub(super) const "]
+                .iter()
+                .any(|start| line.starts_with(start));
+            if let (true, Some((name, rest))) = (is_constant, words)
+                && name.chars().all(|c| c.is_ascii_uppercase() || c.is_ascii_digit() || c == '_')
+                && kinds.iter().any(|kind| rest.starts_with(kind))
+                && rest.contains('=')
+            {
+                let (name, text) = (name.to_owned(), std::mem::take(&mut docs));
+                found.push(Constant { file: file.clone(), name, text });
+            }
+            docs.clear();
+        }
+    }
+    let places: BTreeSet<_> = found.iter().map(|c| (&c.file, &c.name)).collect();
+    assert_eq!(places.len(), found.len(), "two constants of one name in a file");
+    found
+}
+
+/// The source files below a folder, without files of tests.
+fn files(folder: &Path) -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    for entry in fs::read_dir(folder).expect("a folder") {
+        let path = entry.expect("an entry").path();
+        if path.is_dir() {
+            found.extend(files(&path));
+        } else if path.extension().is_some_and(|end| end == "rs") && !path.ends_with("tests.rs") {
+            found.push(path);
+        }
+    }
+    found.sort();
+    found
+}

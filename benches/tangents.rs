@@ -7,7 +7,7 @@ use std::hint::black_box;
 use std::process::Command;
 
 use metriplectic::dynamics::Parametrised;
-use metriplectic::integrators::LinearisedStep;
+use metriplectic::integrators::LinearisedAlong;
 use metriplectic::prelude::*;
 
 const START: Vector3<f64> = Vector3::new(0.4, -1.0, 0.3);
@@ -65,8 +65,8 @@ fn many() -> impl Parametrised<
 fn done<D>(system: &D, [method, task]: [&str; 2], steps: usize)
 where
     D: Differentiable<Manifold = LieDual<3>>,
-    Scheme<WeylMidpoint>: Stepper<D> + LinearisedStep<D::Wide>,
-    DormandPrince8: Stepper<D> + LinearisedStep<D::Wide>,
+    Scheme<WeylMidpoint>: Stepper<D> + LinearisedAlong<D>,
+    DormandPrince8: Stepper<D> + LinearisedAlong<D>,
 {
     if method == "midpoint" {
         by(Scheme::new(WeylMidpoint), system, task, steps);
@@ -78,7 +78,7 @@ where
 fn by<D, M>(method: M, system: &D, task: &str, steps: usize)
 where
     D: Differentiable<Manifold = LieDual<3>>,
-    M: Copy + Stepper<D> + LinearisedStep<D::Wide>,
+    M: Copy + Stepper<D> + LinearisedAlong<D>,
 {
     let span = Span::steps(H, steps);
     match task {

@@ -120,6 +120,12 @@ pub(crate) fn rows() -> Vec<Row> {
         .build()
         .expect(WELL);
     let analytic = System::on(LieDual::so3()).energy(Analytic(INERTIA)).entropy(AnalyticEntropy);
+    let halves = Vector3::from(INERTIA.map(|moment| 0.5 / moment));
+    let by_entries = System::on(LieDual::so3())
+        .energy(move |p: &Vector3<Real>| {
+            p.x * p.x * halves.x + p.y * p.y * halves.y + p.z * p.z * halves.z
+        })
+        .entropy(|p: &Vector3<Real>| p.norm_squared() * 0.5);
     let typed = System::on(LieDual::so3()).energy(Energy(INERTIA)).entropy(Entropy);
     let published = body().second_law(SecondLaw::Published).build().expect(WELL);
     let [mean, itoh_abe] = [(); 2].map(|()| of_body());
@@ -127,6 +133,7 @@ pub(crate) fn rows() -> Vec<Row> {
     let rows = vec![
         Row::new("step/rigid_body/closure", of_body(), start, h)
             .counted(&calls, counting, start, h),
+        Row::new("step/rigid_body/entries", by_entries.build().expect(WELL), start, h),
         Row::new("step/rigid_body/erased", of_body().erased(), start, h),
         Row::new("step/rigid_body/typed", typed.build().expect(WELL), start, h),
         Row::new("step/rigid_body/analytic", analytic.build().expect(WELL), start, h),

@@ -91,8 +91,8 @@ fn the_laws_hold_in_steps_of_random_sizes() {
         let h = 1e-4 * 1e4_f64.powf(fraction);
         let values = Flow::laws(&body, &x);
         let reference = Laws { energy: start, ..values };
-        let from = StepStart { x: &x, time, values, reference, allowed: None };
-        let taken = scheme.step(&body, &from, h, &mut memory).expect("the step is solved");
+        let from = StepStart { flow: &body, x: &x, time, values, reference, allowed: None };
+        let taken = scheme.step(&from, h, &mut memory).expect("the step is solved");
         let end = taken.x;
         let (before, after) = (0.5 * x.norm_squared(), 0.5 * end.norm_squared());
         let round_off = 4.0 * f64::EPSILON * (before.max(1.0) + 2.0 * before);

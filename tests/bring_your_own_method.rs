@@ -22,14 +22,8 @@ impl<F: Flow> Stepper<F> for ExplicitMidpoint {
         Promises::nothing()
     }
 
-    fn step(
-        &self,
-        flow: &F,
-        start: &StepStart<'_, F>,
-        h: f64,
-        (): &mut (),
-    ) -> Result<Taken<F>, StepError> {
-        let x = start.x;
+    fn step(&self, start: &StepStart<'_, F>, h: f64, (): &mut ()) -> Result<Taken<F>, StepError> {
+        let (flow, x) = (start.flow, start.x);
         let rates = |d: &F::Vector| {
             let outside = StepError::OutOfDomain { time: start.time, h, tried: Effort::default() };
             flow.rates(x, d).ok_or(outside)
@@ -87,12 +81,11 @@ impl<F: Flow> Stepper<F> for Boastful {
 
     fn step(
         &self,
-        flow: &F,
         start: &StepStart<'_, F>,
         h: f64,
         memory: &mut (),
     ) -> Result<Taken<F>, StepError> {
-        ExplicitMidpoint.step(flow, start, h, memory)
+        ExplicitMidpoint.step(start, h, memory)
     }
 }
 

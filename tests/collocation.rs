@@ -300,7 +300,7 @@ fn one_stage_is_the_scheme_of_the_paper() {
 fn way_back<Y: Metriplectic>(method: impl Stepper<Y>, system: &Y, x: &Point<Y>, h: f64) -> f64 {
     let step = |x: &Point<Y>, h| {
         let (start, mut memory) = (StepStart::first(system, x), Default::default());
-        method.step(system, &start, h, &mut memory).expect("it is taken").x
+        method.step(&start, h, &mut memory).expect("it is taken").x
     };
     distance::<Y::Manifold>(x, &step(&step(x, h), -h))
 }
@@ -536,11 +536,18 @@ fn the_estimated_error_has_its_order_on_a_sphere() {
         let sizes = [0.1, 0.07, 0.05, 0.035];
         let errors = sizes.map(|h| {
             let (start, mut memory) = (StepStart::first(&system, &x), StageMemory::default());
-            let taken = method.step(&system, &start, h, &mut memory).expect("it is taken");
+            let taken = method.step(&start, h, &mut memory).expect("it is taken");
             let values = [&start.values, &taken.values];
-            let step = StepEnds { x: &x, end: &taken.x, h, values, reference: &start.values };
+            let step = StepEnds {
+                flow: &system,
+                x: &x,
+                end: &taken.x,
+                h,
+                values,
+                reference: &start.values,
+            };
             let norm = |v: &Components<Vector2<f64>>| v.0.norm();
-            Stepper::<_>::error(&method, &system, &step, &memory, norm).expect("it has an estimate")
+            Stepper::<_>::error(&method, &step, &memory, norm).expect("it has an estimate")
         });
         let order = Order::fit(&sizes, &errors).expect("four errors");
         println!("{method:?}: {order} from {errors:?}");

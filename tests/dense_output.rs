@@ -414,13 +414,8 @@ impl<F: Flow> Stepper<F> for ExplicitMidpoint {
         Promises::nothing()
     }
 
-    fn step(
-        &self,
-        flow: &F,
-        start: &StepStart<'_, F>,
-        h: f64,
-        (): &mut (),
-    ) -> Result<Taken<F>, StepError> {
+    fn step(&self, start: &StepStart<'_, F>, h: f64, (): &mut ()) -> Result<Taken<F>, StepError> {
+        let flow = start.flow;
         let outside = StepError::OutOfDomain { time: start.time, h, tried: Default::default() };
         let rates = |d: &F::Vector| flow.rates(start.x, d).ok_or_else(|| outside.clone());
         let first = rates(&flow.sizes(start.x).map(|_| 0.0))?;

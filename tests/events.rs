@@ -40,22 +40,20 @@ impl<F: Flow, M: Method<F>> Stepper<F> for Counted<'_, M> {
 
     fn step(
         &self,
-        flow: &F,
         start: &StepStart<'_, F>,
         h: f64,
         memory: &mut M::Memory,
     ) -> Result<Taken<F>, StepError> {
-        self.0.step(flow, start, h, memory)
+        self.0.step(start, h, memory)
     }
 
     fn attempt(
         &self,
-        flow: &F,
         start: &StepStart<'_, F>,
         h: f64,
         memory: &mut M::Memory,
     ) -> Result<Taken<F>, Refusal> {
-        self.0.attempt(flow, start, h, memory)
+        self.0.attempt(start, h, memory)
     }
 
     fn control(&self) -> Control {
@@ -64,23 +62,21 @@ impl<F: Flow, M: Method<F>> Stepper<F> for Counted<'_, M> {
 
     fn error(
         &self,
-        flow: &F,
         step: &StepEnds<'_, F>,
         memory: &M::Memory,
         norm: impl Fn(&F::Vector) -> f64,
     ) -> Option<f64> {
-        self.0.error(flow, step, memory, norm)
+        self.0.error(step, memory, norm)
     }
 
     fn between(
         &self,
-        flow: &F,
         step: &StepEnds<'_, F>,
         memory: &mut M::Memory,
         theta: f64,
     ) -> Option<Element<F>> {
         self.1.fetch_add(1, Relaxed);
-        self.0.between(flow, step, memory, theta)
+        self.0.between(step, memory, theta)
     }
 }
 

@@ -188,7 +188,7 @@ fn a_step_that_breaks_the_first_law_is_taken_in_halves() {
         let (mut x, mut splits, mut memory) = (start, 0, Default::default());
         for _ in 0..count {
             let from = StepStart::first(&system, &x);
-            let taken = Scheme::new(WeylMidpoint).step(&system, &from, h, &mut memory).ok()?;
+            let taken = Scheme::new(WeylMidpoint).step(&from, h, &mut memory).ok()?;
             (x, splits) = (taken.x, splits + taken.effort.splits);
         }
         Some((x, splits))

@@ -107,8 +107,9 @@ impl Row {
             let mut values = flow.laws(&x);
             for _ in 0..steps {
                 let reference = values.clone();
-                let start = StepStart { x: &x, time: 0.0, values, reference, allowed: None };
-                let taken = method.step(&flow, &start, h, &mut memory).expect("a step is taken");
+                let start =
+                    StepStart { flow: &flow, x: &x, time: 0.0, values, reference, allowed: None };
+                let taken = method.step(&start, h, &mut memory).expect("a step is taken");
                 iterations += taken.effort.iterations;
                 (x, values) = (taken.x, taken.values);
             }

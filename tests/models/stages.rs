@@ -58,56 +58,51 @@ macro_rules! forward_steps {
 
         fn step(
             &self,
-            flow: &$flow,
             start: &StepStart<'_, $flow>,
             h: f64,
             memory: &mut Self::Memory,
         ) -> Result<Taken<$flow>, StepError> {
-            $each!(self, memory, |method, memory| method.step(flow, start, h, memory))
+            $each!(self, memory, |method, memory| method.step(start, h, memory))
         }
 
         fn attempt(
             &self,
-            flow: &$flow,
             start: &StepStart<'_, $flow>,
             h: f64,
             memory: &mut Self::Memory,
         ) -> Result<Taken<$flow>, Refusal> {
-            $each!(self, memory, |method, memory| method.attempt(flow, start, h, memory))
+            $each!(self, memory, |method, memory| method.attempt(start, h, memory))
         }
 
         fn error(
             &self,
-            flow: &$flow,
             step: &StepEnds<'_, $flow>,
             memory: &Self::Memory,
             norm: impl Fn(&<$flow as Flow>::Vector) -> f64,
         ) -> Option<f64> {
             let mut memory = memory.clone();
-            $each!(self, &mut memory, |method, memory| method.error(flow, step, memory, norm))
+            $each!(self, &mut memory, |method, memory| method.error(step, memory, norm))
         }
 
         fn limiting_sites(
             &self,
-            flow: &$flow,
             step: &StepEnds<'_, $flow>,
             memory: &Self::Memory,
             allowed: &<$flow as Flow>::Vector,
         ) -> LimitingSites {
             let mut memory = memory.clone();
             $each!(self, &mut memory, |method, memory| {
-                method.limiting_sites(flow, step, memory, allowed)
+                method.limiting_sites(step, memory, allowed)
             })
         }
 
         fn between(
             &self,
-            flow: &$flow,
             step: &StepEnds<'_, $flow>,
             memory: &mut Self::Memory,
             theta: f64,
         ) -> Option<Element<$flow>> {
-            $each!(self, memory, |method, memory| method.between(flow, step, memory, theta))
+            $each!(self, memory, |method, memory| method.between(step, memory, theta))
         }
     };
 }

@@ -146,7 +146,7 @@ fn the_equality_of_jarzynski_has_the_order_of_the_method() {
                 let start = StepStart { time: f64::from(k) * h, ..StepStart::first(&spin, &from) };
                 for (q, outcome) in &outcomes {
                     let method = NinomiyaVictoir(DormandPrince5).numbers(outcome.clone());
-                    let end = method.step(&spin, &start, h, &mut Default::default()).unwrap().x;
+                    let end = method.step(&start, h, &mut Default::default()).unwrap().x;
                     let work = end.ledger.parameter_work();
                     values[i] += q * (-work).exp() * shell.at(&end.x).dot(&left);
                 }

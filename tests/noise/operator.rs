@@ -52,7 +52,7 @@ pub(crate) fn step<F: Flow, M: Stepper<F>>(
     h: f64,
 ) -> Element<F> {
     let start = StepStart::first(flow, x);
-    let taken = method.step(flow, &start, h, &mut M::Memory::default());
+    let taken = method.step(&start, h, &mut M::Memory::default());
     taken.unwrap_or_else(|error| panic!("a step fails: {error}")).x
 }
 

@@ -184,50 +184,48 @@ macro_rules! method {
 
             fn step(
                 &self,
-                system: &Y,
                 start: &StepStart<'_, Y>,
                 h: f64,
                 memory: &mut StageMemory<Dim<Y>>,
             ) -> Result<Taken<Y>, StepError> {
                 let start = step::start_of(Self::tableau(), start, h);
-                parts::take(Self::tableau(), Self::SPLITS, system, &start, memory)
+                parts::take(Self::tableau(), Self::SPLITS, &start, memory)
             }
 
             fn attempt(
                 &self,
-                system: &Y,
                 start: &StepStart<'_, Y>,
                 h: f64,
                 memory: &mut StageMemory<Dim<Y>>,
             ) -> Result<Taken<Y>, Refusal> {
                 let start = step::start_of(Self::tableau(), start, h);
-                step::try_step(Self::tableau(), system, &start, memory, Fallbacks::FirstTries)
-                    .map_err(|failure| Refusal {
+                step::try_step(Self::tableau(), &start, memory, Fallbacks::FirstTries).map_err(
+                    |failure| Refusal {
                         effort: failure.effort,
                         error: failure.cause.first_law(start.time, h),
                         second_law: false,
-                    })
+                    },
+                )
             }
 
             fn error(
                 &self,
-                system: &Y,
                 step: &StepEnds<'_, Y>,
                 memory: &StageMemory<Dim<Y>>,
                 norm: impl Fn(&<Y as Flow>::Vector) -> f64,
             ) -> Option<f64> {
-                dense::error(Self::tableau(), system, step, memory, norm)
+                dense::error(Self::tableau(), step, memory, norm)
             }
 
             fn between(
                 &self,
-                system: &Y,
                 step: &StepEnds<'_, Y>,
                 memory: &mut StageMemory<Dim<Y>>,
                 theta: f64,
             ) -> Option<Point<Y>> {
-                let promises = Stepper::<Y>::promises(self, system);
-                dense::between(Self::tableau(), promises, system, step, memory, theta)
+                let promises = Stepper::<Y>::promises(self, step.flow);
+                let within = dense::Within { tableau: Self::tableau(), step, theta };
+                dense::between(&within, promises, memory)
             }
         }
     };

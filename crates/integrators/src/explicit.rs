@@ -263,44 +263,40 @@ macro_rules! method {
 
             fn step(
                 &self,
-                flow: &F,
                 start: &StepStart<'_, F>,
                 h: f64,
                 memory: &mut MemoryOf<F>,
             ) -> Result<Taken<F>, StepError> {
-                step::with_halves(&Trial { tableau: self.tableau(), flow, start, h }, memory)
+                step::with_halves(&Trial { tableau: self.tableau(), start, h }, memory)
             }
 
             #[inline]
             fn attempt(
                 &self,
-                flow: &F,
                 start: &StepStart<'_, F>,
                 h: f64,
                 memory: &mut MemoryOf<F>,
             ) -> Result<Taken<F>, Refusal> {
-                step::attempt(&Trial { tableau: self.tableau(), flow, start, h }, memory)
+                step::attempt(&Trial { tableau: self.tableau(), start, h }, memory)
             }
 
             fn error(
                 &self,
-                flow: &F,
                 step: &StepEnds<'_, F>,
                 memory: &MemoryOf<F>,
                 norm: impl Fn(&F::Vector) -> f64,
             ) -> Option<f64> {
-                estimates::error(&Done { tableau: self.tableau(), flow, ends: step }, memory, norm)
+                estimates::error(&Done { tableau: self.tableau(), ends: step }, memory, norm)
             }
 
             fn limiting_sites(
                 &self,
-                flow: &F,
                 step: &StepEnds<'_, F>,
                 memory: &MemoryOf<F>,
                 allowed: &F::Vector,
             ) -> LimitingSites {
                 estimates::limiting_sites(
-                    &Done { tableau: self.tableau(), flow, ends: step },
+                    &Done { tableau: self.tableau(), ends: step },
                     memory,
                     allowed,
                 )
@@ -308,14 +304,13 @@ macro_rules! method {
 
             fn between(
                 &self,
-                flow: &F,
                 step: &StepEnds<'_, F>,
                 memory: &mut MemoryOf<F>,
                 theta: f64,
             ) -> Option<Element<F>> {
-                let promises = self.promises(flow);
+                let promises = self.promises(step.flow);
                 dense::between(
-                    &Done { tableau: self.tableau(), flow, ends: step },
+                    &Done { tableau: self.tableau(), ends: step },
                     promises,
                     memory,
                     theta,

@@ -309,7 +309,7 @@ where
 {
     let missing = |_| BrokenLaw { law: "the step exists", size: f64::NAN, bound: 0.0 };
     let (start, mut memory) = (StepStart::first(system, x), MidpointMemory::default());
-    scheme.step(system, &start, h, &mut memory).map(|taken| taken.x).map_err(missing)
+    scheme.step(&start, h, &mut memory).map(|taken| taken.x).map_err(missing)
 }
 
 #[cfg(test)]

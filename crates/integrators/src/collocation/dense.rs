@@ -13,43 +13,42 @@ use crate::step::dense::{self, cubic, limited};
 use crate::step::failure::Fallbacks;
 use crate::step::{Components, Dim, Effort, Flow, Promises, StepEnds};
 
+/// The fraction `θ` of a step that was taken.
+pub(crate) struct Within<'a, F: Flow> {
+    pub(crate) tableau: &'static Tableau,
+    pub(crate) step: &'a StepEnds<'a, F>,
+    pub(crate) theta: f64,
+}
+
 /// The state at the fraction `θ` of a step: a step of size `θh`, guessed by the polynomial of the whole one, and moved
 /// onto the laws of the run with an entropy that does not fall from one fraction to a later one.
 pub(super) fn between<Y: Metriplectic>(
-    tableau: &'static Tableau,
+    within: &Within<'_, Y>,
     promises: Promises,
-    system: &Y,
-    step: &StepEnds<'_, Y>,
     memory: &StageMemory<Dim<Y>>,
-    theta: f64,
 ) -> Option<Point<Y>> {
+    let &Within { step, theta, .. } = within;
     if theta <= 0.0 || step.x == step.end {
         return Some(step.x.clone());
     }
     if theta >= 1.0 {
         return Some(step.end.clone());
     }
-    let y = part(tableau, system, step, &memory.last?, theta)?;
+    let y = part(within, &memory.last?)?;
     let q = Y::Manifold::coordinates(step.x, step.end);
     let line = || Y::Manifold::chart(step.x, &(q * theta));
-    let entropy = promises.entropy.then(|| {
-        let reached = system.laws(&y).entropy;
-        entropy(tableau, system, step, theta, reached)
-    });
+    let entropy = promises.entropy.then(|| within.entropy(step.flow.laws(&y).entropy));
     let target = dense::Target::new(step, promises, theta, entropy);
-    Some(target.reached_from(system, &y, line))
+    Some(target.reached_from(&y, line))
 }
 
 /// The end of a step of size `θh`.
 fn part<Y: Metriplectic>(
-    tableau: &'static Tableau,
-    system: &Y,
-    step: &StepEnds<'_, Y>,
+    &Within { tableau, step, theta }: &Within<'_, Y>,
     last: &LastStep<Dim<Y>>,
-    theta: f64,
 ) -> Option<Point<Y>> {
     let (x, h, values) = (step.x, theta * step.h, *step.values[0]);
-    let equation = StageEquation::new(tableau, system, x, values, h);
+    let equation = StageEquation::new(tableau, step.flow, x, values, h);
     let guess = std::array::from_fn(|i| {
         combined(tableau.stages, &tableau.velocity(theta * tableau.nodes[i]), &last.k)
     });
@@ -59,38 +58,35 @@ fn part<Y: Metriplectic>(
     Some(solved.at.end)
 }
 
-/// The entropy at the fraction `θ` of a step: the one that the part of the step has `reached`, of the order of the
-/// method, as far as it lies within a band around a monotone function of low order.
-///
-/// The function of the entropy has the production as its slope at both ends. It is the cubic, limited so that it is monotone (Fritsch,
-/// Carlson 1980), and for a method that damps the rational function, which follows the rise of a fast transient. Half of
-/// its least slope `m` bounds the slope of the band `± ½m θ(1 − θ)`. So the entropy rises along each edge of the band, and
-/// inside of it where it differs from the function by a smooth remainder.
-pub(crate) fn entropy<F: Flow>(
-    tableau: &Tableau,
-    system: &F,
-    step: &StepEnds<'_, F>,
-    theta: f64,
-    reached: f64,
-) -> f64 {
-    let [start, end] = step.values.map(|laws| laws.entropy);
-    let rise = end - start;
-    if rise <= 0.0 {
-        return start;
+impl<F: Flow> Within<'_, F> {
+    /// The entropy at the fraction `θ` of a step: the one that the part of the step has `reached`, of the order of the
+    /// method, as far as it lies within a band around a monotone function of low order.
+    ///
+    /// The function of the entropy has the production as its slope at both ends. It is the cubic, limited so that it is monotone (Fritsch,
+    /// Carlson 1980), and for a method that damps the rational function, which follows the rise of a fast transient. Half of
+    /// its least slope `m` bounds the slope of the band `± ½m θ(1 − θ)`. So the entropy rises along each edge of the band, and
+    /// inside of it where it differs from the function by a smooth remainder.
+    pub(crate) fn entropy(&self, reached: f64) -> f64 {
+        let &Self { tableau, step, theta } = self;
+        let [start, end] = step.values.map(|laws| laws.entropy);
+        let rise = end - start;
+        if rise <= 0.0 {
+            return start;
+        }
+        let slopes = match (step.flow.production(step.x), step.flow.production(step.end)) {
+            (Some(a), Some(b)) => [step.h * a, step.h * b],
+            _ => [rise, rise],
+        };
+        let (risen, least) = if tableau.one_sided && slopes.iter().all(|slope| slope.is_finite()) {
+            (rational(rise, slopes, theta), least_slope_of_rational(rise, slopes))
+        } else {
+            let slopes = limited(rise, slopes);
+            (cubic(rise, slopes, theta), least_slope_of_cubic(rise, slopes))
+        };
+        let band = 0.5 * least * theta * (1.0 - theta);
+        let risen = risen + (reached - start - risen).clamp(-band, band);
+        (start + risen).clamp(start, end)
     }
-    let slopes = match (system.production(step.x), system.production(step.end)) {
-        (Some(a), Some(b)) => [step.h * a, step.h * b],
-        _ => [rise, rise],
-    };
-    let (risen, least) = if tableau.one_sided && slopes.iter().all(|slope| slope.is_finite()) {
-        (rational(rise, slopes, theta), least_slope_of_rational(rise, slopes))
-    } else {
-        let slopes = limited(rise, slopes);
-        (cubic(rise, slopes, theta), least_slope_of_cubic(rise, slopes))
-    };
-    let band = 0.5 * least * theta * (1.0 - theta);
-    let risen = risen + (reached - start - risen).clamp(-band, band);
-    (start + risen).clamp(start, end)
 }
 
 /// The least slope on `[0, 1]` of the cubic from 0 to `rise` with limited slopes at both ends; never negative.
@@ -132,12 +128,11 @@ fn rational(rise: f64, slopes: [f64; 2], theta: f64) -> f64 {
 /// The error of a step, by a norm: the larger one of its [defects].
 pub(super) fn error<Y: Metriplectic>(
     tableau: &'static Tableau,
-    system: &Y,
     step: &StepEnds<'_, Y>,
     memory: &StageMemory<Dim<Y>>,
     norm: impl Fn(&Components<Vector<Y::Manifold>>) -> f64,
 ) -> Option<f64> {
-    let &StepEnds { x, end, h, values, .. } = step;
+    let &StepEnds { flow: system, x, end, h, values, .. } = step;
     let equation = StageEquation::new(tableau, system, x, *values[0], h);
     let velocity = |at: &Point<Y>| Some(system.rates(at, &Components(Column::zero()))?.0);
     let velocities = [velocity(x)?, velocity(end)?];

@@ -28,17 +28,16 @@ const TRIALS: usize = 400;
 pub(super) fn take<Y: Metriplectic>(
     tableau: &'static Tableau,
     splits: usize,
-    system: &Y,
     start: &Start<'_, Y>,
     memory: &mut StageMemory<Dim<Y>>,
 ) -> Result<Taken<Y>, StepError> {
-    let failure = match try_step(tableau, system, start, memory, Fallbacks::All) {
+    let failure = match try_step(tableau, start, memory, Fallbacks::All) {
         Ok(taken) => return Ok(taken),
         Err(failure) => failure,
     };
     let kept = *memory;
     *memory = StageMemory::default();
-    let mut parts = Parts { tableau, splits, system, effort: failure.effort };
+    let mut parts = Parts { tableau, splits, effort: failure.effort };
     let taken = if tableau.one_sided {
         parts.graded(start, memory)
     } else {
@@ -57,10 +56,9 @@ pub(super) fn take<Y: Metriplectic>(
 }
 
 /// The parts of a step that was not solved whole.
-struct Parts<'a, Y: Metriplectic> {
+struct Parts {
     tableau: &'static Tableau,
     splits: usize,
-    system: &'a Y,
     /// The effort of all parts.
     effort: Effort,
 }
@@ -88,9 +86,9 @@ fn together<Y: Metriplectic>(first: &Taken<Y>, second: &Taken<Y>) -> Evidence {
     Evidence { friction, ..first.evidence.and(second.evidence) }
 }
 
-impl<Y: Metriplectic> Parts<'_, Y> {
+impl Parts {
     /// The two halves of a step that was not solved whole.
-    fn halves(
+    fn halves<Y: Metriplectic>(
         &mut self,
         start: &Start<'_, Y>,
         memory: &mut StageMemory<Dim<Y>>,
@@ -105,7 +103,7 @@ impl<Y: Metriplectic> Parts<'_, Y> {
     }
 
     /// One half.
-    fn half(
+    fn half<Y: Metriplectic>(
         &mut self,
         start: &Start<'_, Y>,
         memory: &mut StageMemory<Dim<Y>>,
@@ -119,7 +117,7 @@ impl<Y: Metriplectic> Parts<'_, Y> {
     }
 
     /// The parts of a step that damps, each twice as long as the one before it.
-    fn graded(
+    fn graded<Y: Metriplectic>(
         &mut self,
         start: &Start<'_, Y>,
         memory: &mut StageMemory<Dim<Y>>,
@@ -174,9 +172,9 @@ impl<Y: Metriplectic> Parts<'_, Y> {
     }
 
     /// The fraction of a step that the first part is: the time in which friction acts, as a power of two.
-    fn first_part(&self, start: &Start<'_, Y>) -> f64 {
-        let &Start { x, h, values, .. } = start;
-        let equation = StageEquation::new(self.tableau, self.system, x, values, h);
+    fn first_part<Y: Metriplectic>(&self, start: &Start<'_, Y>) -> f64 {
+        let &Start { system, x, h, values, .. } = start;
+        let equation = StageEquation::new(self.tableau, system, x, values, h);
         let rest = [Vector::<Y::Manifold>::zero(); STAGES];
         let friction = Linear::of(&equation, &rest).map_or(0.0, |linear| linear.friction);
         let mut fraction = 0.5;
@@ -187,13 +185,13 @@ impl<Y: Metriplectic> Parts<'_, Y> {
     }
 
     /// One part.
-    fn part(
+    fn part<Y: Metriplectic>(
         &mut self,
         start: &Start<'_, Y>,
         memory: &mut StageMemory<Dim<Y>>,
         fallbacks: Fallbacks,
     ) -> Result<Taken<Y>, Failed<Y>> {
-        match try_step(self.tableau, self.system, start, memory, fallbacks) {
+        match try_step(self.tableau, start, memory, fallbacks) {
             Ok(taken) => {
                 self.effort += taken.effort;
                 Ok(taken)
@@ -207,14 +205,14 @@ impl<Y: Metriplectic> Parts<'_, Y> {
 
     /// Explains a step that was not solved by the failure of its smallest part.
     #[cold]
-    fn error(&self, start: &Start<'_, Y>, failed: &Failed<Y>) -> StepError {
-        let &Start { time, h, values, .. } = start;
+    fn error<Y: Metriplectic>(&self, start: &Start<'_, Y>, failed: &Failed<Y>) -> StepError {
+        let &Start { system, time, h, values, .. } = start;
         let tried = self.effort;
         if let Some(error) = failed.failure.cause.first_law(time, h) {
             return error;
         }
         let suggested = smallest_part(h, self.splits);
-        let part = StageEquation::new(self.tableau, self.system, start.x, values, suggested);
+        let part = StageEquation::new(self.tableau, system, start.x, values, suggested);
         let rest = [Vector::<Y::Manifold>::zero(); STAGES];
         let residual = part.evaluate(&rest).map_or(f64::INFINITY, |at| {
             at.residual.iter().map(Column::magnitude).fold(0.0, f64::max)
@@ -226,7 +224,7 @@ impl<Y: Metriplectic> Parts<'_, Y> {
             let damps = self.tableau.one_sided;
             return StepError::StiffFriction { time, h, stiffness, residual, tried, damps };
         }
-        match (failed.failure.cause, self.system.dependent_invariant(&failed.x)) {
+        match (failed.failure.cause, system.dependent_invariant(&failed.x)) {
             (Cause::Edge, _) => StepError::OutOfDomain { time, h, tried },
             (_, Some((index, fraction))) => {
                 let change = start.accumulated_error.invariants[index].abs();

@@ -23,7 +23,7 @@ const NOTHING: f64 = 1e-6 * f64::EPSILON;
 /// The start of a step with what earlier steps have left of the laws.
 pub(super) fn start_of<'a, Y: Metriplectic>(
     tableau: &Tableau,
-    &StepStart { x, time, values, reference, .. }: &StepStart<'a, Y>,
+    &StepStart { flow: system, x, time, values, reference, .. }: &StepStart<'a, Y>,
     h: f64,
 ) -> Start<'a, Y> {
     // The entropy that a correction on one side has added stays.
@@ -33,7 +33,7 @@ pub(super) fn start_of<'a, Y: Metriplectic>(
         entropy,
         invariants: CountOf::<Y>::array(|a| values.invariants[a] - reference.invariants[a]),
     };
-    Start { x, time, h, values, accumulated_error }
+    Start { system, x, time, h, values, accumulated_error }
 }
 
 /// The change of the energy at a stage, relative to the size of its terms, that no motion makes.
@@ -50,13 +50,12 @@ const DAMPED: f64 = 1.0;
 /// Tries a step whole.
 pub(super) fn try_step<Y: Metriplectic>(
     tableau: &'static Tableau,
-    system: &Y,
     start: &Start<'_, Y>,
     memory: &mut StageMemory<Dim<Y>>,
     fallbacks: Fallbacks,
 ) -> Result<Taken<Y>, StepFailure> {
     memory.last = None;
-    let &Start { x, h, values, .. } = start;
+    let &Start { system, x, h, values, .. } = start;
     let guess = memory.guess(tableau, h);
     let mut equation = StageEquation::new(tableau, system, x, values, h);
     if let Some(guess) = &guess {

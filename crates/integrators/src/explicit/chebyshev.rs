@@ -34,7 +34,7 @@ const MOST: u32 = 4000;
 
 /// The stages of a step of size `h`.
 pub(super) fn stages<F: StageFlow>(
-    &Trial { flow, start: &StepStart { x, .. }, h, .. }: &Trial<'_, F>,
+    &Trial { start: &StepStart { flow, x, .. }, h, .. }: &Trial<'_, F>,
     here: Here<F::Vector>,
     memory: &mut MemoryOf<F>,
 ) -> Result<LastStep<F::Vector>, Refused> {

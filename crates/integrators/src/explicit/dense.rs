@@ -20,7 +20,8 @@ pub(super) fn between<F: StageFlow>(
     memory: &mut MemoryOf<F>,
     theta: f64,
 ) -> Option<Element<F>> {
-    let &Done { tableau, flow, ends: step } = done;
+    let &Done { tableau, ends: step } = done;
+    let flow = step.flow;
     if theta <= 0.0 || step.x == step.end {
         return Some(step.x.clone());
     }
@@ -32,7 +33,7 @@ pub(super) fn between<F: StageFlow>(
         Some(&*last)
     });
     // A step that was taken in parts has no stages.
-    let Some(last) = known else { return dense::between(flow, step, promises, theta) };
+    let Some(last) = known else { return dense::between(step, promises, theta) };
     let (h, line) = (step.h, last.end.map(|q| theta * q));
     let ends = [&last.stages[0], &last.stages[tableau.rows().len() + 1]];
     let rows = tableau
@@ -59,14 +60,15 @@ pub(super) fn between<F: StageFlow>(
     let on_line = || flow.stage(step.x, &line).unwrap_or_else(|| step.x.clone());
     let y = flow.stage(step.x, &q).unwrap_or_else(on_line);
     let target = dense::Target::new(step, promises, theta, target);
-    Some(target.reached_from(flow, &y, on_line))
+    Some(target.reached_from(&y, on_line))
 }
 
 /// Takes the stages that only the dense output needs, once.
 fn more_stages<F: StageFlow>(
-    &Done { tableau, flow, ends: step }: &Done<'_, F>,
+    &Done { tableau, ends: step }: &Done<'_, F>,
     last: &mut LastStep<F::Vector>,
 ) -> Option<()> {
+    let flow = step.flow;
     for row in tableau.more_stages {
         if last.known == tableau.rows().len() + 2 + tableau.more_stages.len() {
             break;

@@ -31,10 +31,11 @@ pub(super) fn is_at_the_edge<V: Vector>(
 
 /// The error of a step in units of the one allowed. A step that was taken in parts has the estimate of the flow.
 pub(super) fn error<F: StageFlow>(
-    &Done { tableau, flow, ends: step }: &Done<'_, F>,
+    &Done { tableau, ends: step }: &Done<'_, F>,
     memory: &MemoryOf<F>,
     norm: impl Fn(&F::Vector) -> f64,
 ) -> Option<f64> {
+    let flow = step.flow;
     let h = step.h;
     let Some(last) = memory.last.as_ref() else {
         return Some(norm(&flow.local_error(step.x, step.end, h)?));
@@ -71,10 +72,11 @@ pub(super) fn error<F: StageFlow>(
 /// method for the spectral radius; without it, and at the edge of the region of stability, it is the change of the
 /// rates between the last stage and the end of the step.
 pub(super) fn limiting_sites<F: StageFlow>(
-    &Done { tableau, flow, ends: step }: &Done<'_, F>,
+    &Done { tableau, ends: step }: &Done<'_, F>,
     memory: &MemoryOf<F>,
     allowed: &F::Vector,
 ) -> LimitingSites {
+    let flow = step.flow;
     let (x, h) = (step.x, step.h);
     let largest = |v: Option<F::Vector>| v.and_then(|v| v.largest_site(allowed));
     let Some(last) = memory.last.as_ref() else {

@@ -46,7 +46,8 @@ pub(super) struct Onto<'a, F: StageFlow> {
 impl<F: StageFlow> Onto<'_, F> {
     #[inline]
     pub(super) fn decide(&self, y: Element<F>) -> Result<Landed<F>, Refused> {
-        let Self { trial: &Trial { flow, start, .. }, last, produced, .. } = *self;
+        let Self { trial: &Trial { start, .. }, last, produced, .. } = *self;
+        let flow = start.flow;
         let bounds = self.bounds();
         let (limit, units) = match &bounds {
             Bounds::Allowed(entries) => (Limit::Entries(entries), start.allowed.as_ref()),
@@ -98,7 +99,8 @@ impl<F: StageFlow> Onto<'_, F> {
 
     /// The longest displacement, and the units of the entries unless they are the errors that are allowed.
     fn bounds(&self) -> Bounds<F::Vector> {
-        let Self { trial: &Trial { flow, start, .. }, last, .. } = *self;
+        let Self { trial: &Trial { start, .. }, last, .. } = *self;
+        let flow = start.flow;
         if let Some(allowed) = &start.allowed {
             return Bounds::Allowed(allowed.map(|error| FAR * error));
         }
@@ -112,7 +114,8 @@ impl<F: StageFlow> Onto<'_, F> {
     /// The terms of the embedded error with their common factor, if the flow weighs errors. Where that error needs the end of the
     /// step, the velocity at the start takes its place.
     fn error_terms(&self) -> (f64, Vec<(f64, &F::Vector)>) {
-        let Self { trial: &Trial { tableau, flow, h, .. }, last, .. } = *self;
+        let Self { trial: &Trial { tableau, start, h }, last, .. } = *self;
+        let flow = start.flow;
         if !flow.weighs_errors() {
             return (h, Vec::new());
         }
@@ -133,7 +136,8 @@ impl<F: StageFlow> Onto<'_, F> {
     /// Whether friction produces nothing but round-off while the state moves: the entropy is aimed at as without friction.
     #[cold]
     fn is_idle(&self) -> bool {
-        let Self { trial: &Trial { tableau, flow, start, h }, last, .. } = *self;
+        let Self { trial: &Trial { tableau, start, h }, last, .. } = *self;
+        let flow = start.flow;
         let doubt = (h * produced(tableau.early_error, &last.stages)).abs();
         let round_off = flow.entropy_round_off([start.x, start.x]);
         last.rise.abs() + doubt <= IDLE * round_off
@@ -143,7 +147,8 @@ impl<F: StageFlow> Onto<'_, F> {
     /// Whether the entropy at the end is below the one at the start by more than its round-off. Near an equilibrium,
     /// where every change is round-off, the flow says whether it falls.
     fn falls(&self, end: &Projected<F>) -> bool {
-        let &Trial { flow, start, .. } = self.trial;
+        let start = self.trial.start;
+        let flow = start.flow;
         let rise = flow.values(&end.gradients).entropy - start.values.entropy;
         let known = self.round_off.zip(flow.entropy_round_off_of(&end.gradients));
         let round_off = match known {

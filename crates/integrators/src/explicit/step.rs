@@ -79,9 +79,9 @@ fn halves<F: StageFlow>(
     if first.evidence.dissipates {
         reference.entropy = first.values.entropy;
     }
-    let (x, values, time) = (&first.x, first.values.clone(), start.time + h);
-    let middle = StepStart { x, time, values, reference, allowed: start.allowed.clone() };
-    let second = Trial { tableau: trial.tableau, flow: trial.flow, start: &middle, h };
+    let (flow, x, values, time) = (start.flow, &first.x, first.values.clone(), start.time + h);
+    let middle = StepStart { flow, x, time, values, reference, allowed: start.allowed.clone() };
+    let second = Trial { tableau: trial.tableau, start: &middle, h };
     let mut second = halves(&second, memory, left - 1)?;
     second.effort += first.effort;
     second.effort.splits += 1;
@@ -97,7 +97,8 @@ fn try_step<F: StageFlow>(
     trial: &Trial<'_, F>,
     memory: &mut MemoryOf<F>,
 ) -> Result<Taken<F>, Refused> {
-    let &Trial { tableau, flow, start, .. } = trial;
+    let &Trial { tableau, start, .. } = trial;
+    let flow = start.flow;
     if let Some(fault) = tableau.fault {
         return Err(Refused::Never(StepError::Method {
             time: start.time,
@@ -137,7 +138,8 @@ fn finished<F: StageFlow>(
     last: &mut LastStep<F::Vector>,
     memory: &mut MemoryOf<F>,
 ) -> Result<Taken<F>, Refused> {
-    let &Trial { tableau, flow, start, h } = trial;
+    let &Trial { tableau, start, h } = trial;
+    let flow = start.flow;
     let x = start.x;
     // Friction may vanish at the start alone, as for a body at rest.
     let dissipates = last.stages[0].production != 0.0 || last.rise != 0.0;
@@ -242,7 +244,8 @@ fn stages<F: StageFlow>(
     here: Here<F::Vector>,
     last: &mut LastStep<F::Vector>,
 ) -> Result<(), Refused> {
-    let &Trial { tableau, flow, start, h } = trial;
+    let &Trial { tableau, start, h } = trial;
+    let flow = start.flow;
     // A copy of plain numbers, which the compiler knows not to change: what all stages need of the start is computed once.
     let copy;
     let x = if std::mem::needs_drop::<Element<F>>() {

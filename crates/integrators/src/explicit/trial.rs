@@ -7,7 +7,6 @@ use crate::step::{StepEnds, StepStart};
 /// A step that is tried.
 pub(super) struct Trial<'a, F: StageFlow> {
     pub(super) tableau: &'static Tableau,
-    pub(super) flow: &'a F,
     pub(super) start: &'a StepStart<'a, F>,
     pub(super) h: f64,
 }
@@ -15,6 +14,5 @@ pub(super) struct Trial<'a, F: StageFlow> {
 /// A step that was taken.
 pub(super) struct Done<'a, F: StageFlow> {
     pub(super) tableau: &'static Tableau,
-    pub(super) flow: &'a F,
     pub(super) ends: &'a StepEnds<'a, F>,
 }

@@ -26,9 +26,8 @@ pub(super) struct StepFailure {
 }
 
 /// The parts of a step that was not solved whole.
-struct Halves<'a, Y: Metriplectic, R, W> {
+struct Halves<'a, R, W> {
     scheme: &'a Scheme<R, W>,
-    system: &'a Y,
     /// The effort of all parts.
     effort: Effort,
 }
@@ -37,7 +36,6 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
     /// The step, whole or in parts.
     pub(super) fn with_halves<Y>(
         &self,
-        system: &Y,
         start: &Start<'_, Y>,
         memory: &mut MemoryOf<Y>,
     ) -> Result<Taken<Y>, StepError>
@@ -45,18 +43,18 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
         Y: Metriplectic,
         R: Retraction<Y::Manifold, Y::Metric>,
     {
-        let failure = match self.try_step(system, start, memory, Fallbacks::All) {
+        let failure = match self.try_step(start, memory, Fallbacks::All) {
             Ok(taken) => return Ok(taken),
             Err(failure) => failure,
         };
         *memory = MemoryOf::<Y>::default();
-        let mut halves = Halves { scheme: self, system, effort: failure.effort };
+        let mut halves = Halves { scheme: self, effort: failure.effort };
         let parts =
             if self.splits == 0 { Err((failure, start.x.clone())) } else { halves.of(start, 1) };
         let effort = halves.effort;
         match parts {
             Ok(taken) => Ok(Taken { effort, ..taken }),
-            Err((smallest, x)) => Err(self.error(system, start, smallest, &x, effort)),
+            Err((smallest, x)) => Err(self.error(start, smallest, &x, effort)),
         }
     }
 
@@ -65,7 +63,6 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
     #[cold]
     fn error<Y>(
         &self,
-        system: &Y,
         start: &Start<'_, Y>,
         failure: StepFailure,
         x: &Point<Y>,
@@ -75,7 +72,7 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
         Y: Metriplectic,
         R: Retraction<Y::Manifold, Y::Metric>,
     {
-        let Start { time, h, .. } = *start;
+        let Start { system, time, h, .. } = *start;
         let StepFailure { residual, cause, .. } = failure;
         if let Some(error) = failure.cause.first_law(time, h) {
             return error;
@@ -101,42 +98,44 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
     }
 }
 
-impl<Y, R, W> Halves<'_, Y, R, W>
-where
-    Y: Metriplectic,
-    R: Retraction<Y::Manifold, Y::Metric>,
-    W: DiscreteGradient,
-{
+impl<R, W: DiscreteGradient> Halves<'_, R, W> {
     /// The two halves of a step that was not solved whole; if they were not solved either, where the
     /// smallest part of them starts.
-    fn of(
+    fn of<Y>(
         &mut self,
         start: &Start<'_, Y>,
         depth: usize,
-    ) -> Result<Taken<Y>, (StepFailure, Point<Y>)> {
+    ) -> Result<Taken<Y>, (StepFailure, Point<Y>)>
+    where
+        Y: Metriplectic,
+        R: Retraction<Y::Manifold, Y::Metric>,
+    {
         self.effort.splits += 1;
         let mut memory = MemoryOf::<Y>::default();
-        let h = 0.5 * start.h;
-        let first = self.part(start, start.x, h, depth, &mut memory)?;
-        let second = self.part(start, &first.x, h, depth, &mut memory)?;
+        let first = self.half(start, start.x, depth, &mut memory)?;
+        let second = self.half(start, &first.x, depth, &mut memory)?;
         let evidence = first.evidence.and(second.evidence);
         Ok(Taken { evidence, ..second })
     }
 
     /// One half, which starts at `x`.
-    fn part(
+    fn half<Y>(
         &mut self,
         start: &Start<'_, Y>,
         x: &Point<Y>,
-        h: f64,
         depth: usize,
         memory: &mut MemoryOf<Y>,
-    ) -> Result<Taken<Y>, (StepFailure, Point<Y>)> {
-        let laws = self.system.laws(x);
+    ) -> Result<Taken<Y>, (StepFailure, Point<Y>)>
+    where
+        Y: Metriplectic,
+        R: Retraction<Y::Manifold, Y::Metric>,
+    {
+        let h = 0.5 * start.h;
+        let laws = start.system.laws(x);
         let energy = start.accumulated_error.energy + (laws.energy - start.values.energy);
         let accumulated_error = Laws { energy, ..start.accumulated_error };
         let part = Start { x, h, values: laws, accumulated_error, ..*start };
-        match self.scheme.try_step(self.system, &part, memory, Fallbacks::FirstTries) {
+        match self.scheme.try_step(&part, memory, Fallbacks::FirstTries) {
             Ok(taken) => {
                 self.effort += taken.effort;
                 Ok(taken)

@@ -37,7 +37,6 @@ type Restored<Y> = (Point<Y>, Laws<Numbers<Y>>);
 /// has them.
 #[inline]
 pub(super) fn restored<Y: Metriplectic>(
-    system: &Y,
     start: &Start<'_, Y>,
     end: &Point<Y>,
     values: &Laws<Numbers<Y>>,
@@ -52,7 +51,7 @@ pub(super) fn restored<Y: Metriplectic>(
         return None;
     }
     let floor = exact.then_some(start.values.entropy);
-    Wanted::at(system, start, end, floor).of(end, *values)
+    Wanted::at(start, end, floor).of(end, *values)
 }
 
 /// The laws that the end of a step should have.
@@ -72,7 +71,8 @@ struct Wanted<'a, Y: Metriplectic> {
 
 impl<'a, Y: Metriplectic> Wanted<'a, Y> {
     #[cold]
-    fn at(system: &'a Y, start: &Start<'_, Y>, end: &Point<Y>, floor: Option<f64>) -> Self {
+    fn at(start: &Start<'a, Y>, end: &Point<Y>, floor: Option<f64>) -> Self {
+        let system = start.system;
         let (mut laws, mut round_off) = (start.values, system.term_sizes(end));
         laws.energy -= start.accumulated_error.energy;
         round_off.energy = of_a_law(round_off.energy);

@@ -34,7 +34,6 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
     /// leaves of the laws is for the next one to take back.
     pub(crate) fn solution<Y>(
         &self,
-        system: &Y,
         start: &Start<'_, Y>,
         memory: &mut MemoryOf<Y>,
         fallbacks: Fallbacks,
@@ -43,10 +42,11 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
         Y: Metriplectic,
         R: Retraction<Y::Manifold, Y::Metric>,
     {
-        let solved = self.solved(system, start, memory, fallbacks);
+        let solved = self.solved(start, memory, fallbacks);
         let Solved { equation, root, effort, evidence } =
             solved.map_err(|failure| (failure.cause, failure.residual, failure.effort))?;
         let failed = |cause| (cause, root.residual, effort);
+        let system = start.system;
         let metric = system.metric();
         let path = self.retraction.real_step_path(metric, start.x, &root.u);
         let z = path.map_err(|_| failed(Cause::Edge))?.z.base;

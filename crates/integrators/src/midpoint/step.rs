@@ -42,23 +42,21 @@ where
 
     fn step(
         &self,
-        system: &Y,
         start: &StepStart<'_, Y>,
         h: f64,
         memory: &mut MemoryOf<Y>,
     ) -> Result<Taken<Y>, StepError> {
-        self.with_halves(system, &Start::of(start, h), memory)
+        self.with_halves(&Start::of(start, h), memory)
     }
 
     fn attempt(
         &self,
-        system: &Y,
         start: &StepStart<'_, Y>,
         h: f64,
         memory: &mut MemoryOf<Y>,
     ) -> Result<Taken<Y>, Refusal> {
         let start = Start::of(start, h);
-        self.try_step(system, &start, memory, Fallbacks::FirstTries).map_err(|failure| Refusal {
+        self.try_step(&start, memory, Fallbacks::FirstTries).map_err(|failure| Refusal {
             effort: failure.effort,
             error: failure.cause.first_law(start.time, h),
             second_law: false,
@@ -79,7 +77,6 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
     #[inline]
     pub(super) fn solved<'a, Y>(
         &'a self,
-        system: &'a Y,
         start: &Start<'a, Y>,
         memory: &mut MemoryOf<Y>,
         fallbacks: Fallbacks,
@@ -88,13 +85,14 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
         Y: Metriplectic,
         R: Retraction<Y::Manifold, Y::Metric>,
     {
+        let system = start.system;
         let guess = memory.predictor.guess(system, start);
         let target = drift::target(system, start, &guess);
         let equation = Residual::of_start(system, self, start, target);
         let (root, effort) =
             fallbacks::solve(&self.newton, &equation, &guess, &mut memory.jacobian, fallbacks)?;
         let evidence = evidence(&root, memory.friction());
-        if !has_digits(system, start, &root, evidence.friction) {
+        if !has_digits(start, &root, evidence.friction) {
             return Err(StepFailure { residual: root.residual, cause: Cause::Unsolved, effort });
         }
         Ok(Solved { equation, root, effort, evidence })
@@ -103,7 +101,6 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
     /// Guess, solve, retract; then the last digits.
     pub(super) fn try_step<Y>(
         &self,
-        system: &Y,
         start: &Start<'_, Y>,
         memory: &mut MemoryOf<Y>,
         fallbacks: Fallbacks,
@@ -113,7 +110,8 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
         R: Retraction<Y::Manifold, Y::Metric>,
     {
         let Solved { equation, root, mut effort, evidence } =
-            self.solved(system, start, memory, fallbacks)?;
+            self.solved(start, memory, fallbacks)?;
+        let system = start.system;
         let failed = |cause, effort| StepFailure { residual: root.residual, cause, effort };
         if evidence.rests {
             // What the solver found is its own round-off, and following it would make a random walk of
@@ -153,8 +151,7 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
             }
             _ => system.laws(&x),
         };
-        let (x, values) = match restored::restored(system, start, &x, &values, equation.is_exact())
-        {
+        let (x, values) = match restored::restored(start, &x, &values, equation.is_exact()) {
             Some(restored) => {
                 memory.compensation.clear();
                 restored
@@ -193,7 +190,6 @@ const VERY_STIFF: f64 = 1e8;
 /// beside it, the round-off of the displacement is as large as the displacement, and a state would seem to
 /// rest. It is measured by the energy that goes with it, which has one unit for all components.
 fn has_digits<Y: Metriplectic>(
-    system: &Y,
     start: &Start<'_, Y>,
     Root { u, round_off, .. }: &Root<Y::Manifold, Dissipated>,
     friction: f64,
@@ -205,6 +201,6 @@ fn has_digits<Y: Metriplectic>(
     if (0..Dim::<Y>::LEN).all(|i| round_off[i] <= 1e-2 * BROKEN * (scales[i] + u[i].abs())) {
         return true;
     }
-    let dh = system.energy().jet1(start.x).df.abs();
+    let dh = start.system.energy().jet1(start.x).df.abs();
     dh.dot(round_off) <= BROKEN * (start.values.energy.abs() + dh.dot(&scales))
 }

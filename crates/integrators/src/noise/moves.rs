@@ -32,13 +32,12 @@ pub struct Moves<'a, F: Fluctuating<U>, U, R> {
 
 impl<'a, F: Fluctuating<U>, U, R: Numbers> Moves<'a, F, U, R> {
     pub(super) fn from(
-        system: &'a Noisy<F, U>,
         start: &'a StepStart<'_, Noisy<F, U>>,
         h: f64,
         (numbers, step): (&'a R, u64),
     ) -> Self {
         Self {
-            system,
+            system: start.flow,
             numbers,
             step,
             time: start.time,
@@ -74,9 +73,9 @@ impl<'a, F: Fluctuating<U>, U, R: Numbers> Moves<'a, F, U, R> {
         let (h, time) = (fraction * self.h, self.time + from * self.h);
         let values = flow.laws(&self.x);
         let reference = Laws { entropy: values.entropy, ..self.reference.clone() };
-        let start = StepStart { x: &self.x, time, values, reference, allowed: None };
+        let start = StepStart { flow, x: &self.x, time, values, reference, allowed: None };
         let Taken { x, evidence, effort, .. } =
-            method.step(flow, &start, h, &mut M::Memory::default())?;
+            method.step(&start, h, &mut M::Memory::default())?;
         self.x = x;
         self.effort += effort;
         let rate = evidence.friction / fraction;

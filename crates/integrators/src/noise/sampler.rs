@@ -168,12 +168,11 @@ where
 
     fn step(
         &self,
-        system: &Noisy<F, U>,
         start: &StepStart<'_, Noisy<F, U>>,
         h: f64,
         memory: &mut NoiseMemory,
     ) -> Result<Taken<Noisy<F, U>>, StepError> {
-        let mut moves = Moves::from(system, start, h, (&self.numbers, memory.drawn));
+        let mut moves = Moves::from(start, h, (&self.numbers, memory.drawn));
         self.sampling.sample(&mut moves)?;
         let taken = moves.taken();
         memory.count(taken.evidence.friction, h).map_err(|error| StepError::Method {
@@ -185,7 +184,6 @@ where
 
     fn attempt(
         &self,
-        _: &Noisy<F, U>,
         start: &StepStart<'_, Noisy<F, U>>,
         _: f64,
         _: &mut NoiseMemory,
@@ -201,7 +199,6 @@ where
     /// None: the size of a step of noise is no error.
     fn error(
         &self,
-        _: &Noisy<F, U>,
         _: &StepEnds<'_, Noisy<F, U>>,
         _: &NoiseMemory,
         _: impl Fn(&F::Vector) -> f64,
@@ -212,7 +209,6 @@ where
     /// None: what lies between two states is a path of its own.
     fn between(
         &self,
-        _: &Noisy<F, U>,
         _: &StepEnds<'_, Noisy<F, U>>,
         _: &mut NoiseMemory,
         _: f64,

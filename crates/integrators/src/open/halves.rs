@@ -23,6 +23,13 @@ impl Failure {
 pub(super) type Try<'a, F> =
     dyn FnMut(&StepStart<'_, F>, f64, Fallbacks) -> Result<Taken<F>, Failure> + 'a;
 
+/// The parts of a step that was not solved whole.
+struct Halves<'a, 'b, F: Flow> {
+    try_step: &'a mut Try<'b, F>,
+    /// The effort of all parts.
+    effort: Effort,
+}
+
 /// The step, whole or in halves, each of which is halved again up to `splits` times.
 pub(super) fn take<F: Flow>(
     start: &StepStart<'_, F>,
@@ -34,9 +41,9 @@ pub(super) fn take<F: Flow>(
         Ok(taken) => return Ok(taken),
         Err(failure) => failure,
     };
-    let mut effort = failure.effort;
-    let parts =
-        if splits == 0 { Err(failure) } else { halves(start, h, splits, try_step, &mut effort) };
+    let mut halves = Halves { try_step, effort: failure.effort };
+    let parts = if splits == 0 { Err(failure) } else { halves.of(start, h, splits) };
+    let effort = halves.effort;
     match parts {
         Ok(taken) => Ok(Taken { effort, ..taken }),
         Err(Failure { cause, residual, .. }) => {
@@ -50,44 +57,36 @@ pub(super) fn take<F: Flow>(
     }
 }
 
-fn halves<F: Flow>(
-    start: &StepStart<'_, F>,
-    h: f64,
-    left: usize,
-    try_step: &mut Try<'_, F>,
-    effort: &mut Effort,
-) -> Result<Taken<F>, Failure> {
-    effort.splits += 1;
-    let half = 0.5 * h;
-    let first = part(start, half, left, try_step, effort)?;
-    let middle = after(start, &first, half);
-    let second = part(&middle, half, left, try_step, effort)?;
-    let evidence = first.evidence.and(second.evidence);
-    Ok(Taken { evidence, ..second })
-}
+impl<F: Flow> Halves<'_, '_, F> {
+    /// The two halves of a step that was not solved whole.
+    fn of(&mut self, start: &StepStart<'_, F>, h: f64, left: usize) -> Result<Taken<F>, Failure> {
+        self.effort.splits += 1;
+        let half = 0.5 * h;
+        let first = self.part(start, half, left)?;
+        let middle = after(start, &first, half);
+        let second = self.part(&middle, half, left)?;
+        let evidence = first.evidence.and(second.evidence);
+        Ok(Taken { evidence, ..second })
+    }
 
-fn part<F: Flow>(
-    start: &StepStart<'_, F>,
-    h: f64,
-    left: usize,
-    try_step: &mut Try<'_, F>,
-    effort: &mut Effort,
-) -> Result<Taken<F>, Failure> {
-    match try_step(start, h, Fallbacks::FirstTries) {
-        Ok(taken) => {
-            *effort += taken.effort;
-            Ok(taken)
-        }
-        Err(failure) => {
-            *effort += failure.effort;
-            if left <= 1 { Err(failure) } else { halves(start, h, left - 1, try_step, effort) }
+    /// One half.
+    fn part(&mut self, start: &StepStart<'_, F>, h: f64, left: usize) -> Result<Taken<F>, Failure> {
+        match (self.try_step)(start, h, Fallbacks::FirstTries) {
+            Ok(taken) => {
+                self.effort += taken.effort;
+                Ok(taken)
+            }
+            Err(failure) => {
+                self.effort += failure.effort;
+                if left <= 1 { Err(failure) } else { self.of(start, h, left - 1) }
+            }
         }
     }
 }
 
 /// Where a part of a step starts that follows another one.
 pub(super) fn after<'a, F: Flow>(
-    start: &StepStart<'_, F>,
+    start: &StepStart<'a, F>,
     before: &'a Taken<F>,
     h: f64,
 ) -> StepStart<'a, F> {
@@ -97,6 +96,7 @@ pub(super) fn after<'a, F: Flow>(
     }
     let x: &'a Element<F> = &before.x;
     StepStart {
+        flow: start.flow,
         x,
         time: start.time + h,
         values: before.values.clone(),

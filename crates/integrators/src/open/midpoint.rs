@@ -48,7 +48,6 @@ where
 
     fn step(
         &self,
-        system: &OpenSystem<Y, C, X>,
         start: &StepStart<'_, OpenSystem<Y, C, X>>,
         h: f64,
         memory: &mut Self::Memory,
@@ -58,18 +57,17 @@ where
             if !std::mem::replace(&mut whole, false) {
                 *memory = MidpointMemory::default();
             }
-            open_step(self, system, start, h, memory, fallbacks)
+            open_step(self, start, h, memory, fallbacks)
         })
     }
 
     fn attempt(
         &self,
-        system: &OpenSystem<Y, C, X>,
         start: &StepStart<'_, OpenSystem<Y, C, X>>,
         h: f64,
         memory: &mut Self::Memory,
     ) -> Result<Taken<OpenSystem<Y, C, X>>, Refusal> {
-        open_step(self, system, start, h, memory, Fallbacks::FirstTries)
+        open_step(self, start, h, memory, Fallbacks::FirstTries)
             .map_err(|failure| failure.into_refusal(start.time, h))
     }
 }
@@ -77,7 +75,6 @@ where
 /// Solves a step, and books it.
 fn open_step<Y, C, X, R, W>(
     scheme: &Scheme<R, W>,
-    system: &OpenSystem<Y, C, X>,
     start: &StepStart<'_, OpenSystem<Y, C, X>>,
     h: f64,
     memory: &mut MidpointMemory<Dim<Y>>,
@@ -90,6 +87,7 @@ where
     R: Retraction<Y::Manifold, Y::Metric>,
     W: DiscreteGradient,
 {
+    let system = start.flow;
     let OpenState { x, time, ledger } = start.x;
     let times = [*time, time + h];
     let view = system.between(times);
@@ -98,8 +96,8 @@ where
         Laws { energy: view.energy_at(x), entropy: system.closed().entropy_at(x), invariants };
     let accumulated_error =
         Start::<Frozen<'_, Y, C, X>>::accumulated([&start.values, &start.reference]);
-    let inner = Start { x, time: *time, h, values, accumulated_error };
-    let solved = scheme.solution(&view, &inner, memory, fallbacks);
+    let inner = Start { system: &view, x, time: *time, h, values, accumulated_error };
+    let solved = scheme.solution(&inner, memory, fallbacks);
     let Solution { end, z, energy, entropy, mut evidence, effort } =
         solved.map_err(|(cause, residual, effort)| Failure { cause, residual, effort })?;
     let edge = || Failure { cause: Cause::Edge, residual: f64::INFINITY, effort };

@@ -23,9 +23,10 @@ use super::state::{Booked, OpenState};
 use super::system::{OpenSystem, StateOf};
 use super::vector::OpenVector;
 use super::view::Frozen;
+use crate::collocation::dense::Within;
 use crate::collocation::{
     EnergyInTime, Gauss, InTime, MOST, Radau, StageMemory, StageSolution, Tableau, TimedStep,
-    control, dense,
+    control,
 };
 use crate::step::dense::Target;
 use crate::step::failure::{Cause, Fallbacks};
@@ -120,7 +121,7 @@ where
 
     /// The start of the step as that of a system which does not depend on time.
     fn start<'b>(
-        &self,
+        &'b self,
         start: &StepStart<'b, OpenSystem<Y, C, X>>,
         h: f64,
     ) -> Start<'b, Frozen<'a, Y, C, X>> {
@@ -133,7 +134,7 @@ where
         };
         let accumulated_error =
             Start::<Frozen<'_, Y, C, X>>::accumulated([&start.values, &start.reference]);
-        Start { x, time: *time, h, values, accumulated_error }
+        Start { system: &self.middle, x, time: *time, h, values, accumulated_error }
     }
 
     /// Books a step that was solved.
@@ -175,7 +176,6 @@ where
 /// Solves a step, and books it.
 fn open_step<Y, C, X>(
     tableau: &'static Tableau,
-    system: &OpenSystem<Y, C, X>,
     start: &StepStart<'_, OpenSystem<Y, C, X>>,
     h: f64,
     memory: &mut StageMemory<Dim<Y>>,
@@ -186,7 +186,7 @@ where
     C: Clock<Y::Manifold, Y::Energy>,
     X: Exchange<Y::Manifold, Y::Metric>,
 {
-    let time = start.x.time;
+    let (system, time) = (start.flow, start.x.time);
     let step = Step::new(tableau, system, [time, time + h]);
     let solution = step.timed().solve(&step.start(start, h), memory, fallbacks);
     let residual = f64::INFINITY;
@@ -206,18 +206,17 @@ where
 /// The state at the fraction `θ` of a step: a step of size `θh`, guessed by the polynomial of the whole one, and moved onto
 /// the balance of the run with an entropy that does not fall from one fraction to a later one.
 fn between<Y, C, X>(
-    tableau: &'static Tableau,
+    within: &Within<'_, OpenSystem<Y, C, X>>,
     promises: Promises,
-    system: &OpenSystem<Y, C, X>,
-    step: &StepEnds<'_, OpenSystem<Y, C, X>>,
     memory: &StageMemory<Dim<Y>>,
-    theta: f64,
 ) -> Option<StateOf<Y>>
 where
     Y: Metriplectic,
     C: Clock<Y::Manifold, Y::Energy>,
     X: Exchange<Y::Manifold, Y::Metric>,
 {
+    let &Within { tableau, step, theta } = within;
+    let system = step.flow;
     if theta <= 0.0 {
         return Some(step.x.clone());
     }
@@ -227,15 +226,12 @@ where
     let (time, h) = (step.x.time, theta * step.h);
     let part = Step::new(tableau, system, [time, time + h]);
     let (values, reference) = (*step.values[0], *step.values[0]);
-    let start = StepStart { x: step.x, time, values, reference, allowed: None };
+    let start = StepStart { flow: system, x: step.x, time, values, reference, allowed: None };
     let solution = part.timed().part(&part.start(&start, h), memory, theta)?;
     let y = part.booked(step.x, &solution, h)?;
-    let entropy = promises.entropy.then(|| {
-        let reached = system.laws(&y).entropy;
-        dense::entropy(tableau, system, step, theta, reached)
-    });
+    let entropy = promises.entropy.then(|| within.entropy(system.laws(&y).entropy));
     let line = || y.clone();
-    Some(Target::new(step, promises, theta, entropy).reached_from(system, &y, line))
+    Some(Target::new(step, promises, theta, entropy).reached_from(&y, line))
 }
 
 /// Halvings of a step.
@@ -252,19 +248,18 @@ struct NotDamped;
 /// Accepts a system that a method which damps can take: what it damps is heat of its only bath.
 fn damps<Y, C, X>(
     tableau: &'static Tableau,
-    system: &OpenSystem<Y, C, X>,
-    time: f64,
+    start: &StepStart<'_, OpenSystem<Y, C, X>>,
 ) -> Result<(), StepError>
 where
     Y: Metriplectic,
     C: Clock<Y::Manifold, Y::Energy>,
     X: Exchange<Y::Manifold, Y::Metric>,
 {
-    let isothermal = system.closed().second_law() == SecondLaw::NoEntropy && X::BATHS == 1;
+    let isothermal = start.flow.closed().second_law() == SecondLaw::NoEntropy && X::BATHS == 1;
     if !tableau.one_sided || isothermal {
         return Ok(());
     }
-    Err(StepError::Method { time, error: MethodError::new(NotDamped) })
+    Err(StepError::Method { time: start.time, error: MethodError::new(NotDamped) })
 }
 
 macro_rules! open_stages {
@@ -299,50 +294,48 @@ macro_rules! open_stages {
 
             fn step(
                 &self,
-                system: &OpenSystem<Y, C, X>,
                 start: &StepStart<'_, OpenSystem<Y, C, X>>,
                 h: f64,
                 memory: &mut Self::Memory,
             ) -> Result<Taken<OpenSystem<Y, C, X>>, StepError> {
-                damps(Self::tableau(), system, start.time)?;
+                damps(Self::tableau(), start)?;
                 let mut whole = true;
                 halves::take(start, h, Self::SPLITS.min(HALVES), &mut |start, h, fallbacks| {
                     if !std::mem::replace(&mut whole, false) {
                         *memory = StageMemory::default();
                     }
-                    open_step(Self::tableau(), system, start, h, memory, fallbacks)
+                    open_step(Self::tableau(), start, h, memory, fallbacks)
                 })
             }
 
             fn attempt(
                 &self,
-                system: &OpenSystem<Y, C, X>,
                 start: &StepStart<'_, OpenSystem<Y, C, X>>,
                 h: f64,
                 memory: &mut Self::Memory,
             ) -> Result<Taken<OpenSystem<Y, C, X>>, Refusal> {
-                if let Err(error) = damps(Self::tableau(), system, start.time) {
+                if let Err(error) = damps(Self::tableau(), start) {
                     return Err(Refusal {
                         effort: Effort::default(),
                         error: Some(error),
                         second_law: false,
                     });
                 }
-                open_step(Self::tableau(), system, start, h, memory, Fallbacks::FirstTries)
+                open_step(Self::tableau(), start, h, memory, Fallbacks::FirstTries)
                     .map_err(|failure| failure.into_refusal(start.time, h))
             }
 
             fn error(
                 &self,
-                system: &OpenSystem<Y, C, X>,
                 step: &StepEnds<'_, OpenSystem<Y, C, X>>,
                 memory: &Self::Memory,
                 norm: impl Fn(&<OpenSystem<Y, C, X> as Flow>::Vector) -> f64,
             ) -> Option<f64> {
-                let (time, h) = (step.x.time, step.h);
+                let (system, time, h) = (step.flow, step.x.time, step.h);
                 let whole = Step::new(Self::tableau(), system, [time, time + h]);
                 let (values, reference) = (*step.values[0], *step.values[0]);
-                let start = StepStart { x: step.x, time, values, reference, allowed: None };
+                let start =
+                    StepStart { flow: system, x: step.x, time, values, reference, allowed: None };
                 let velocity = |t: f64, x: &Point<Y>| {
                     let zero = Vector::<Y::Manifold>::zero();
                     VectorField::velocity(
@@ -360,13 +353,12 @@ macro_rules! open_stages {
 
             fn between(
                 &self,
-                system: &OpenSystem<Y, C, X>,
                 step: &StepEnds<'_, OpenSystem<Y, C, X>>,
                 memory: &mut Self::Memory,
                 theta: f64,
             ) -> Option<StateOf<Y>> {
-                let promises = Stepper::<OpenSystem<Y, C, X>>::promises(self, system);
-                between(Self::tableau(), promises, system, step, memory, theta)
+                let promises = Stepper::<OpenSystem<Y, C, X>>::promises(self, step.flow);
+                between(&Within { tableau: Self::tableau(), step, theta }, promises, memory)
             }
         }
     };

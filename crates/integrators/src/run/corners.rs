@@ -126,7 +126,6 @@ pub(crate) struct Fixed {
 /// A step of one size in a run with these corners, in parts between them.
 pub(super) fn step<F: Flow + ?Sized>(
     method: &mut dyn AnyStepper<F>,
-    flow: &F,
     start: &StepStart<'_, F>,
     Fixed { h, end }: Fixed,
     corners: &Corners,
@@ -134,6 +133,7 @@ pub(super) fn step<F: Flow + ?Sized>(
     if corners.is_empty() {
         return method.step(start, h);
     }
+    let flow = start.flow;
     let (mut time, mut reference) = (start.time, start.reference.clone());
     let (mut x, mut values) = (start.x.clone(), start.values.clone());
     let mut before: Option<Taken<F>> = None;
@@ -143,9 +143,14 @@ pub(super) fn step<F: Flow + ?Sized>(
         if corners.has(time) {
             method.restart();
         }
-        let (reference_here, allowed) = (reference.clone(), start.allowed.clone());
-        let from =
-            StepStart { x: &x, time, values: values.clone(), reference: reference_here, allowed };
+        let from = StepStart {
+            flow,
+            x: &x,
+            time,
+            values: values.clone(),
+            reference: reference.clone(),
+            allowed: start.allowed.clone(),
+        };
         let mut taken = method.step(&from, size)?;
         flow.inspect([&x, &taken.x], true)?;
         if let Some(clocked) = flow.clocked(&taken.x, recorded) {

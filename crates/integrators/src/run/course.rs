@@ -153,8 +153,8 @@ impl<'a, F: Flow + ?Sized> Course<'a, F> {
     pub(super) fn from(&self, allowed: Option<F::Vector>) -> StepStart<'_, F> {
         let entropy = if self.promises.entropy { self.entropy } else { self.values.entropy };
         let reference = self.reference(entropy);
-        let values = self.values.clone();
-        StepStart { x: &self.state.point, time: self.state.time, values, reference, allowed }
+        let (State { point: x, time, .. }, values) = (&self.state, self.values.clone());
+        StepStart { flow: self.flow, x, time: *time, values, reference, allowed }
     }
 
     /// Whether the certificate may name a site.

@@ -280,12 +280,12 @@ impl<M: StateSpace> Events<M> {
     /// a state inside the step is not known and is needed.
     pub(crate) fn of_step<F: Flow<Space = M> + ?Sized>(
         &mut self,
-        flow: &F,
         step: &StepEnds<'_, F>,
         ends: [&State<M>; 2],
         output: &mut Output<'_, M>,
     ) -> Option<Found<M>> {
-        let curve = if step.x == step.end { None } else { Hermite::through(flow, step) };
+        let curve = if step.x == step.end { None } else { Hermite::through(step) };
+        let flow = step.flow;
         let moves = step.x != step.end && (curve.is_some() || says_between(flow, step.x));
         let mut inside = Vec::with_capacity(INSIDE.len());
         for &theta in INSIDE.iter().filter(|_| moves) {

@@ -56,7 +56,7 @@ impl<'a, F: Flow, M: Stepper<F>> Steps<'a, F, M> {
         let reference = Laws { entropy: before.entropy, ..values.clone() };
         let (x, time) = (&before.state.point, before.state.time);
         Some(LastStep {
-            start: StepStart { x, time, values, reference, allowed },
+            start: StepStart { flow: self.flow, x, time, values, reference, allowed },
             h: before.h,
             in_parts: before.in_parts,
             entropy_step: before.entropy_step,
@@ -78,7 +78,7 @@ impl<'a, F: Flow, M: Stepper<F>> Steps<'a, F, M> {
         let entropy = if self.course.promises.entropy { before.entropy } else { values.entropy };
         let reference: Laws<F::Numbers> = self.course.reference(entropy);
         let (x, time) = (&before.state.point, before.state.time);
-        let start = StepStart { x, time, values, reference, allowed };
+        let start = StepStart { flow: self.flow, x, time, values, reference, allowed };
         let entropy_step = before.entropy_step;
         let stage_count = self.memory.stage_count();
         let stage_velocities = self.memory.stage_velocities();

@@ -181,7 +181,8 @@ impl<F: Flow + ?Sized> Course<'_, F> {
         let Self { flow, before, state, values, progress, .. } = self;
         let corners = &progress.corners;
         let (x, end, h) = (&before.state.point, &state.point, before.h);
-        let step = StepEnds { x, end, h, values: [&before.values, values], reference: &reference };
+        let (values, reference_of_run) = ([&before.values, values], &reference);
+        let step = StepEnds { flow: *flow, x, end, h, values, reference: reference_of_run };
         let times = [before.state.time, state.time];
         let at = |point: Element<F>| {
             let Laws { energy, entropy, .. } = flow.laws(&point);
@@ -201,11 +202,12 @@ impl<F: Flow + ?Sized> Course<'_, F> {
                 return None;
             }
             let (values, reference) = (before.values.clone(), reference.clone());
-            let start = StepStart { x, time: times[0], values, reference, allowed: None };
+            let start =
+                StepStart { flow: *flow, x, time: times[0], values, reference, allowed: None };
             let size = Fixed { h: theta * h, end: times[0] + theta * (times[1] - times[0]) };
             let mut taken = None;
             method.afresh(&mut |method| {
-                taken = corners::step(method, *flow, &start, size, corners).ok();
+                taken = corners::step(method, &start, size, corners).ok();
             });
             let taken = taken?;
             let inside = at(taken.x);
@@ -215,7 +217,7 @@ impl<F: Flow + ?Sized> Course<'_, F> {
             let entropy =
                 inside.entropy.clamp(before.state.entropy, state.entropy.max(before.state.entropy));
             let target = Target::new(&step, promises, theta, Some(entropy));
-            Some(at(target.reached_from(*flow, &inside.point, || end.clone())))
+            Some(at(target.reached_from(&inside.point, || end.clone())))
         };
         let known = if before.in_parts { None } else { method.between(&step, theta) };
         // The output of any method serves one that finds no entropy between those of the ends.
@@ -223,7 +225,7 @@ impl<F: Flow + ?Sized> Course<'_, F> {
             .map(at)
             .filter(is_between)
             .or_else(|| smaller_step(method).filter(is_between))
-            .or_else(|| between(*flow, &step, promises, theta).map(at))
+            .or_else(|| between(&step, promises, theta).map(at))
     }
 
     /// Looks at the step that was just taken.
@@ -269,12 +271,12 @@ impl<F: Flow + ?Sized> Course<'_, F> {
                 self.reference(self.before.entropy),
             );
             let (x, end, values) = (&ends[0].point, &ends[1].point, laws.each_ref());
-            let step = StepEnds { x, end, h: self.before.h, values, reference: &reference };
-            let flow = self.flow;
+            let (flow, h) = (self.flow, self.before.h);
+            let step = StepEnds { flow, x, end, h, values, reference: &reference };
             let Found { events, end } =
-                watching.events.of_step(flow, &step, ends.each_ref(), &mut |theta| {
-                    self.inside(theta, method)
-                })?;
+                watching
+                    .events
+                    .of_step(&step, ends.each_ref(), &mut |theta| self.inside(theta, method))?;
             if let (Some(event), Some(end)) = (events.last(), end) {
                 stopped_at = Some(event.state.clone());
                 let index = event.index;

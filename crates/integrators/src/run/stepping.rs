@@ -35,11 +35,10 @@ impl<'a, F: Flow, M: Stepper<F>> AnyStepper<AnyFlow<'a, F>> for Stepping<'_, 'a,
         start: &StepStart<'_, AnyFlow<'a, F>>,
         h: f64,
     ) -> Result<Taken<AnyFlow<'a, F>>, StepError> {
-        let &StepStart { x, time, ref values, ref reference, ref allowed } = start;
-        let (values, reference) = (values.clone(), reference.clone());
-        let start = StepStart { x, time, values, reference, allowed: allowed.clone() };
-        let Taken { x, values, evidence, effort } =
-            self.method.step(self.flow, &start, h, self.memory)?;
+        let &StepStart { x, time, ref values, ref reference, ref allowed, .. } = start;
+        let (flow, values, reference) = (self.flow, values.clone(), reference.clone());
+        let start = StepStart { flow, x, time, values, reference, allowed: allowed.clone() };
+        let Taken { x, values, evidence, effort } = self.method.step(&start, h, self.memory)?;
         Ok(Taken { x, values, evidence, effort })
     }
 
@@ -49,9 +48,9 @@ impl<'a, F: Flow, M: Stepper<F>> AnyStepper<AnyFlow<'a, F>> for Stepping<'_, 'a,
     }
 
     fn between(&mut self, step: &StepEnds<'_, AnyFlow<'a, F>>, theta: f64) -> Option<Element<F>> {
-        let &StepEnds { x, end, h, values, reference } = step;
-        let step = StepEnds { x, end, h, values, reference };
-        self.method.between(self.flow, &step, self.memory, theta)
+        let &StepEnds { x, end, h, values, reference, .. } = step;
+        let step = StepEnds { flow: self.flow, x, end, h, values, reference };
+        self.method.between(&step, self.memory, theta)
     }
 
     fn nothing_between(&self, time: f64, h: f64) -> StepError {

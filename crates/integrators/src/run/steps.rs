@@ -179,7 +179,7 @@ impl<'a, F: Flow, M: Stepper<F>> Steps<'a, F, M> {
             return self.across_corners(size);
         }
         let Self { method, flow, memory, course } = self;
-        method.step(flow, &start_of(course, None), size.h, memory)
+        method.step(&start_of(flow, course, None), size.h, memory)
     }
 
     /// Takes a step of one size in parts between corners.
@@ -188,8 +188,7 @@ impl<'a, F: Flow, M: Stepper<F>> Steps<'a, F, M> {
         let Self { method, flow, memory, course } = self;
         let (start, corners) = (course.from(None), &course.progress.corners);
         let method = &mut Stepping { method, flow: *flow, memory };
-        let Taken { x, values, evidence, effort } =
-            corners::step(method, course.flow, &start, size, corners)?;
+        let Taken { x, values, evidence, effort } = corners::step(method, &start, size, corners)?;
         Ok(Taken { x, values, evidence, effort })
     }
 
@@ -221,9 +220,9 @@ impl<'a, F: Flow, M: Stepper<F>> Steps<'a, F, M> {
             })
         };
         let reference = self.course.reference(self.course.entropy);
-        let step =
-            StepEnds { x, end, h, values: [&self.course.values, values], reference: &reference };
-        let Some(error) = self.method.error(flow, &step, &self.memory, norm) else {
+        let (values, reference) = ([&self.course.values, values], &reference);
+        let step = StepEnds { flow, x, end, h, values, reference };
+        let Some(error) = self.method.error(&step, &self.memory, norm) else {
             if says_between(flow, x) && flow.displacement(x, end).is_none() {
                 self.course.certificate.note_local_error(f64::INFINITY, LimitingSites::default());
             }
@@ -236,7 +235,7 @@ impl<'a, F: Flow, M: Stepper<F>> Steps<'a, F, M> {
                 }
                 StepSize::Fixed(_) => sizes.clone(),
             };
-            self.method.limiting_sites(flow, &step, &self.memory, &allowed)
+            self.method.limiting_sites(&step, &self.memory, &allowed)
         } else {
             LimitingSites::default()
         };
@@ -281,8 +280,8 @@ impl<'a, F: Flow, M: Stepper<F>> Steps<'a, F, M> {
             let mut memory = self.memory.rescaled(ratio);
             memory.take_room(&mut self.memory);
             let allowed = controller.allowed(&rule, &self.course.progress.scales, h);
-            let start = start_of(&self.course, Some(allowed));
-            let end = self.method.attempt(flow, &start, h, &mut memory);
+            let start = start_of(flow, &self.course, Some(allowed));
+            let end = self.method.attempt(&start, h, &mut memory);
             let mut falls = false;
             let end = match end {
                 Ok(taken) => {
@@ -309,9 +308,9 @@ impl<'a, F: Flow, M: Stepper<F>> Steps<'a, F, M> {
                 let allowed = controller.allowed(&rule, &scales, h);
                 let values = [&self.course.values, &taken.values];
                 let (x, reference) = (&self.course.state.point, &start.reference);
-                let step = StepEnds { x, end: &taken.x, h, values, reference };
+                let step = StepEnds { flow, x, end: &taken.x, h, values, reference };
                 let norm = |error: &F::Vector| relative(error, &allowed);
-                self.method.error(flow, &step, &memory, norm).filter(|error| error.is_finite())
+                self.method.error(&step, &memory, norm).filter(|error| error.is_finite())
             });
             match (end, error) {
                 (Some(taken), _) if taken.evidence.entropy_step == Some(EntropyStep::Held) => {
@@ -349,11 +348,12 @@ impl<'a, F: Flow, M: Stepper<F>> Steps<'a, F, M> {
 /// Where the next step of this flow starts.
 #[inline]
 fn start_of<'s, F: Flow>(
+    flow: &'s F,
     course: &'s Course<'_, AnyFlow<'_, F>>,
     allowed: Option<F::Vector>,
 ) -> StepStart<'s, F> {
-    let StepStart { x, time, values, reference, allowed } = course.from(allowed);
-    StepStart { x, time, values, reference, allowed }
+    let StepStart { x, time, values, reference, allowed, .. } = course.from(allowed);
+    StepStart { flow, x, time, values, reference, allowed }
 }
 
 /// Whether the laws are numbers: a method without an equation to solve may step over the edge of a domain.

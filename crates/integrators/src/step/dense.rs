@@ -26,10 +26,8 @@ pub(crate) struct Hermite<V> {
 impl<V: Vector> Hermite<V> {
     /// The cubic through a step; `None` if the flow does not say what lies between its ends. Where the velocity
     /// has no value it is a straight line.
-    pub(crate) fn through<F: Flow<Vector = V> + ?Sized>(
-        flow: &F,
-        step: &StepEnds<'_, F>,
-    ) -> Option<Self> {
+    pub(crate) fn through<F: Flow<Vector = V> + ?Sized>(step: &StepEnds<'_, F>) -> Option<Self> {
+        let flow = step.flow;
         let end = flow.displacement(step.x, step.end)?;
         let slope = |q: &V| Some(flow.rates(step.x, q)?.map(|v| step.h * v));
         let slopes = slope(&end.map(|_| 0.0)).and_then(|start| Some([start, slope(&end)?]));
@@ -65,13 +63,13 @@ pub(crate) fn limited(rise: f64, slopes: [f64; 2]) -> [f64; 2] {
 
 /// The entropy at the fraction `θ` of a step. A rise that is not positive is round-off: the entropy is then the
 /// one at the start.
-fn entropy<F: Flow + ?Sized>(flow: &F, step: &StepEnds<'_, F>, theta: f64) -> f64 {
+fn entropy<F: Flow + ?Sized>(step: &StepEnds<'_, F>, theta: f64) -> f64 {
     let [start, end] = step.values.map(|laws| laws.entropy);
     let rise = end - start;
     if rise <= 0.0 {
         return start;
     }
-    let slope = |x| flow.production(x).filter(|slope| slope.is_finite());
+    let slope = |x| step.flow.production(x).filter(|slope| slope.is_finite());
     let slopes = match (slope(step.x), slope(step.end)) {
         (Some(a), Some(b)) => limited(rise, [step.h * a, step.h * b]),
         _ => [rise, rise],
@@ -107,24 +105,24 @@ fn targets<F: Flow + ?Sized>(
 /// The state at the fraction `θ` of a step; `None` if the flow does not say what lies between its ends.
 #[inline(never)]
 pub(crate) fn between<F: Flow + ?Sized>(
-    flow: &F,
     step: &StepEnds<'_, F>,
     promises: Promises,
     theta: f64,
 ) -> Option<Element<F>> {
+    let flow = step.flow;
     if theta <= 0.0 || step.x == step.end {
         return Some(step.x.clone());
     }
     if theta >= 1.0 {
         return Some(step.end.clone());
     }
-    let curve = Hermite::through(flow, step)?;
+    let curve = Hermite::through(step)?;
     let has_entropy = promises.entropy && flow.entropy_law() != SecondLaw::NoEntropy;
-    let target = has_entropy.then(|| entropy(flow, step, theta));
+    let target = has_entropy.then(|| entropy(step, theta));
     let y = flow.moved(step.x, &curve.at(theta));
     let line = || flow.moved(step.x, &curve.end.map(|q| theta * q));
     let target = Target::new(step, promises, theta, target);
-    Some(target.reached_from(flow, &y, line))
+    Some(target.reached_from(&y, line))
 }
 
 /// The target of the state at the fraction `θ` of a step: the laws of the run, and an entropy.
@@ -149,17 +147,17 @@ impl<'a, F: Flow + ?Sized> Target<'a, F> {
     /// them, and at last it is the nearer end, where the laws hold.
     pub(crate) fn reached_from(
         &self,
-        flow: &F,
         y: &Element<F>,
         line: impl FnOnce() -> Element<F>,
     ) -> Element<F> {
         let &Self { step, theta, .. } = self;
         let near = || if theta < 0.5 { step.x.clone() } else { step.end.clone() };
-        self.near(flow, y).or_else(|| self.near(flow, &line())).unwrap_or_else(near)
+        self.near(y).or_else(|| self.near(&line())).unwrap_or_else(near)
     }
 
-    fn near(&self, flow: &F, y: &Element<F>) -> Option<Element<F>> {
+    fn near(&self, y: &Element<F>) -> Option<Element<F>> {
         let &Self { step, ref laws, entropy, .. } = self;
+        let flow = step.flow;
         let on_all = flow.onto(y, laws, entropy);
         if on_all.is_some() || entropy.is_none() {
             return on_all;

@@ -5,6 +5,8 @@ use super::{Effort, Element, Evidence, Flow, Laws, StepError};
 /// Where a step starts.
 #[derive(Debug)]
 pub struct StepStart<'a, F: Flow + ?Sized> {
+    /// The flow.
+    pub flow: &'a F,
     /// The state.
     pub x: &'a Element<F>,
     /// The time.
@@ -20,15 +22,17 @@ pub struct StepStart<'a, F: Flow + ?Sized> {
 
 impl<'a, F: Flow + ?Sized> StepStart<'a, F> {
     /// The first step of a run from `x`.
-    pub fn first(flow: &F, x: &'a Element<F>) -> Self {
+    pub fn first(flow: &'a F, x: &'a Element<F>) -> Self {
         let values = flow.laws(x);
-        Self { x, time: 0.0, reference: values.clone(), values, allowed: None }
+        Self { flow, x, time: 0.0, reference: values.clone(), values, allowed: None }
     }
 }
 
 /// The two ends of a step that was taken.
 #[derive(Debug)]
 pub struct StepEnds<'a, F: Flow + ?Sized> {
+    /// The flow.
+    pub flow: &'a F,
     /// The state at its start.
     pub x: &'a Element<F>,
     /// The state at its end.

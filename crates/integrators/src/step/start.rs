@@ -19,6 +19,8 @@ pub(crate) type DriftCorrection<Y> = Laws<Numbers<Y>>;
 /// Where an implicit step starts.
 #[derive(Debug)]
 pub(crate) struct Start<'a, Y: Metriplectic> {
+    /// The system.
+    pub(crate) system: &'a Y,
     /// The point `x`.
     pub(crate) x: &'a Point<Y>,
     /// The time at which the step starts, for its errors; that of the whole step for a part of it.
@@ -34,11 +36,11 @@ pub(crate) struct Start<'a, Y: Metriplectic> {
 
 impl<'a, Y: Metriplectic> Start<'a, Y> {
     pub(crate) fn of(
-        &StepStart { x, time, values, reference, .. }: &StepStart<'a, Y>,
+        &StepStart { flow: system, x, time, values, reference, .. }: &StepStart<'a, Y>,
         h: f64,
     ) -> Self {
         let accumulated_error = Self::accumulated([&values, &reference]);
-        Self { x, time, h, values, accumulated_error }
+        Self { system, x, time, h, values, accumulated_error }
     }
 
     /// Returns the round-off that earlier steps have left of the laws, from those at the start of a step and of the run.

@@ -61,7 +61,6 @@ pub trait Stepper<F: Flow>: Sized {
     /// [`StepError`] if it cannot be taken.
     fn step(
         &self,
-        flow: &F,
         start: &StepStart<'_, F>,
         h: f64,
         memory: &mut Self::Memory,
@@ -74,12 +73,11 @@ pub trait Stepper<F: Flow>: Sized {
     /// The refusal of the step.
     fn attempt(
         &self,
-        flow: &F,
         start: &StepStart<'_, F>,
         h: f64,
         memory: &mut Self::Memory,
     ) -> Result<Taken<F>, Refusal> {
-        self.step(flow, start, h, memory).map_err(|error| Refusal {
+        self.step(start, h, memory).map_err(|error| Refusal {
             effort: Effort::default(),
             error: Some(error),
             second_law: false,
@@ -95,13 +93,12 @@ pub trait Stepper<F: Flow>: Sized {
     /// estimate of the [`Flow`] serves methods that have none of their own in their memory.
     fn error(
         &self,
-        flow: &F,
         step: &StepEnds<'_, F>,
         memory: &Self::Memory,
         norm: impl Fn(&F::Vector) -> f64,
     ) -> Option<f64> {
         let _ = memory;
-        Some(norm(&flow.local_error(step.x, step.end, step.h)?))
+        Some(norm(&step.flow.local_error(step.x, step.end, step.h)?))
     }
 
     /// The sites at which a step has the largest error, in units of the one allowed, and at which the motion is
@@ -110,13 +107,12 @@ pub trait Stepper<F: Flow>: Sized {
     /// The default has the site of the error that the [`Flow`] estimates.
     fn limiting_sites(
         &self,
-        flow: &F,
         step: &StepEnds<'_, F>,
         memory: &Self::Memory,
         allowed: &F::Vector,
     ) -> LimitingSites {
         let _ = memory;
-        let error = flow.local_error(step.x, step.end, step.h);
+        let error = step.flow.local_error(step.x, step.end, step.h);
         LimitingSites::new(error.and_then(|error| error.largest_site(allowed)), None)
     }
 
@@ -130,12 +126,11 @@ pub trait Stepper<F: Flow>: Sized {
     /// entropy that does not fall from one fraction to a later one.
     fn between(
         &self,
-        flow: &F,
         step: &StepEnds<'_, F>,
         memory: &mut Self::Memory,
         theta: f64,
     ) -> Option<Element<F>> {
         let _ = memory;
-        dense::between(flow, step, self.promises(flow), theta)
+        dense::between(step, self.promises(step.flow), theta)
     }
 }

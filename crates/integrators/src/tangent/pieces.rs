@@ -15,7 +15,6 @@ const HALVES: usize = 64;
 
 /// A step that is taken again in the halves in which it was taken.
 struct Again<'a, D: Differentiable, M> {
-    system: &'a D,
     method: &'a M,
     parts: Vec<Part<D>>,
 }
@@ -25,7 +24,7 @@ impl<D: Differentiable, M: Stepper<D>> Again<'_, D, M> {
     /// the next one.
     fn take(&mut self, start: &StepStart<'_, D>, h: f64, left: usize) -> Option<Laws<Numbers<D>>> {
         let mut memory = M::Memory::default();
-        if let Ok(taken) = self.method.attempt(self.system, start, h, &mut memory) {
+        if let Ok(taken) = self.method.attempt(start, h, &mut memory) {
             let reference = if taken.evidence.dissipates {
                 taken.values.entropy
             } else {
@@ -40,16 +39,16 @@ impl<D: Differentiable, M: Stepper<D>> Again<'_, D, M> {
         let half = 0.5 * h;
         let reference = self.take(start, half, left - 1)?;
         let x = self.parts.last()?.end.clone();
-        let values = crate::step::Flow::laws(self.system, &x);
-        let (time, allowed) = (start.time + half, start.allowed);
-        let middle = StepStart { x: &x, time, values, reference, allowed };
+        let (flow, time, allowed) = (start.flow, start.time + half, start.allowed);
+        let values = crate::step::Flow::laws(flow, &x);
+        let middle = StepStart { flow, x: &x, time, values, reference, allowed };
         self.take(&middle, half, left - 1)
     }
 }
 
 /// The parts in which a step was taken.
 pub(super) fn parts<D, M>(
-    (system, method): (&D, &M),
+    method: &M,
     start: &StepStart<'_, D>,
     ended: &Ended<'_, D>,
 ) -> Result<Vec<Part<D>>, Unlinearised>
@@ -60,14 +59,14 @@ where
     if !ended.in_parts {
         return Ok(vec![Part::new(start, ended)]);
     }
-    let mut again = Again { system, method, parts: Vec::new() };
+    let mut again = Again { method, parts: Vec::new() };
     let half = 0.5 * ended.h;
     let parts = (|| {
         let reference = again.take(start, half, HALVES)?;
         let x = again.parts.last()?.end.clone();
-        let values = crate::step::Flow::laws(system, &x);
-        let middle =
-            StepStart { x: &x, time: start.time + half, values, reference, allowed: start.allowed };
+        let (flow, time, allowed) = (start.flow, start.time + half, start.allowed);
+        let values = crate::step::Flow::laws(flow, &x);
+        let middle = StepStart { flow, x: &x, time, values, reference, allowed };
         again.take(&middle, half, HALVES)
     })();
     parts.ok_or(Unlinearised::Singular)?;
@@ -79,7 +78,7 @@ where
 
 /// The tangent at the end of a step.
 pub(super) fn propagate<D, M>(
-    (system, method): (&D, &M),
+    method: &M,
     start: &StepStart<'_, D>,
     ended: &Ended<'_, D>,
     columns: &Columns<Wide<D>>,
@@ -88,7 +87,7 @@ where
     D: Differentiable,
     M: Stepper<D> + LinearisedAlong<D>,
 {
-    let parts = parts((system, method), start, ended)?;
+    let (system, parts) = (start.flow, parts(method, start, ended)?);
     let (mut columns, is_whole) = (columns.clone(), parts.len() == 1);
     let mut along_h = Vector::<<Wide<D> as Metriplectic>::Manifold>::zero();
     for part in &parts {

@@ -141,8 +141,8 @@ where
         }
         let state = self.steps.state();
         let ended = Ended::of_run(&state.point, &last);
-        let system = (flow, self.steps.method());
-        let next = propagate(system, &last.start, &ended, &self.columns).map_err(failed)?;
+        let next =
+            propagate(self.steps.method(), &last.start, &ended, &self.columns).map_err(failed)?;
         let wide = flow.widened(&state.point);
         self.sensitivity.enter(flow.wide(), &wide, &next.columns).map_err(failed)?;
         // One column after the other, since the definition of the step at dual numbers is dear.
@@ -185,12 +185,10 @@ where
         (<D::Manifold as metriplectic_fields::Space>::Point<f64>, Propagated<Wide<D>>),
         Unlinearised,
     > {
-        let (flow, method) = (self.steps.flow(), self.steps.method());
-        let (h, mut memory) = (theta * last.h, M::Memory::default());
-        let taken =
-            method.step(flow, &last.start, h, &mut memory).map_err(|_| Unlinearised::Singular)?;
+        let (method, h, mut memory) = (self.steps.method(), theta * last.h, M::Memory::default());
+        let taken = method.step(&last.start, h, &mut memory).map_err(|_| Unlinearised::Singular)?;
         let ended = Ended::new(&taken, h, &memory);
-        let moved = propagate((flow, method), &last.start, &ended, &self.columns)?;
+        let moved = propagate(method, &last.start, &ended, &self.columns)?;
         Ok((taken.x, moved))
     }
 

@@ -73,11 +73,11 @@ impl<D: Differentiable, M: Stepper<D>> Recorder<'_, D, M> {
             return Ok(None);
         }
         let failed = |cause| TangentError::NotLinearised { time: before.time, cause };
-        let system = (self.steps.flow(), self.steps.method());
+        let (flow, method) = (self.steps.flow(), self.steps.method());
         let last = self.steps.last_step(&scales);
         let end = self.steps.state();
         let ended = Ended::of_run(&end.point, &last);
-        let parts = parts(system, &last.start, &ended).map_err(failed)?;
+        let parts = parts(method, &last.start, &ended).map_err(failed)?;
         let mut step = TapedStep { time: before.time, parts, state: None, outputs: Vec::new() };
         let mut states = Vec::new();
         let mut is_due = self.outputs.is_empty();
@@ -87,9 +87,9 @@ impl<D: Differentiable, M: Stepper<D>> Recorder<'_, D, M> {
                 continue;
             }
             let theta = (time - before.time) / (end.time - before.time);
-            let (point, parts) = inside(system, &last, theta).map_err(failed)?;
+            let (point, parts) = inside(method, &last, theta).map_err(failed)?;
             step.outputs.push((self.count + states.len(), parts));
-            let laws = system.0.laws(&point);
+            let laws = flow.laws(&point);
             let (energy, entropy) = (laws.energy, laws.entropy);
             states.push(State { step: before.step, time, point, energy, entropy });
         }
@@ -104,14 +104,13 @@ impl<D: Differentiable, M: Stepper<D>> Recorder<'_, D, M> {
 
 /// The state at a fraction of a step, by a step of that size.
 fn inside<D: Differentiable, M: Stepper<D>>(
-    (system, method): (&D, &M),
+    method: &M,
     last: &LastStep<'_, D>,
     theta: f64,
 ) -> Result<(Point<D>, Vec<Part<D>>), Unlinearised> {
     let (h, mut memory) = (theta * last.h, M::Memory::default());
-    let taken =
-        method.step(system, &last.start, h, &mut memory).map_err(|_| Unlinearised::Singular)?;
-    let parts = parts((system, method), &last.start, &Ended::new(&taken, h, &memory))?;
+    let taken = method.step(&last.start, h, &mut memory).map_err(|_| Unlinearised::Singular)?;
+    let parts = parts(method, &last.start, &Ended::new(&taken, h, &memory))?;
     Ok((taken.x, parts))
 }
 

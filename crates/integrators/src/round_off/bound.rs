@@ -9,6 +9,9 @@ use metriplectic_manifolds::Manifold;
 /// A factor of four fails `tests/tangent/schemes.rs::tangents_of_schemes_are_those_of_differences`.
 pub(crate) const ROUNDED: f64 = 4.0 * f64::EPSILON;
 
+/// The error of a derivative, relative to the size of its terms, that is round-off: a closure adds terms of its own.
+pub(crate) const OF_A_DERIVATIVE: f64 = 64.0 * f64::EPSILON;
+
 /// The change of the energy, relative to the size of its terms, that is no round-off: no step is taken
 /// that changes it by more.
 pub(crate) const BROKEN: f64 = 1e-6;

@@ -7,6 +7,8 @@ use metriplectic_fields::{
 };
 use metriplectic_manifolds::{InnerProduct, Manifold, MetricSlopes, Nodes, StepPathJet};
 
+use super::bound::OF_A_DERIVATIVE;
+
 /// A field along one path: the data of a discrete gradient at `f64`.
 ///
 /// The defect `δ = F(x') − F(x) − ⟨w̄, d⟩` of a mean covector `w̄` is of third order, so the difference of the two values
@@ -127,9 +129,14 @@ impl<M: Manifold> StableGradient<M> {
     /// How far the derivative of the defect, a difference of nearly equal numbers, is above its own round-off: 1 where it is,
     /// and 0 where nothing is left of it.
     #[inline]
-    pub fn trust(&self) -> f64 {
+    fn trust(&self) -> f64 {
         let noise = 1e3 * self.rounding / self.change.max(f64::MIN_POSITIVE);
         (1.0 + noise.powi(2)).recip()
+    }
+
+    /// Whether the path is so short that a difference of values has lost digits.
+    pub(crate) fn is_short(&self) -> bool {
+        f64::EPSILON * self.change.abs() <= SHORT * self.rounding
     }
 
     /// The covector `w` with `⟨w, d⟩ = F(x') − F(x) + drift_correction`.
@@ -164,14 +171,64 @@ impl<M: Manifold> StableGradient<M> {
 
     /// The derivative of the covector along the unknown of the path, from that of its mean and the
     /// differential at `x'`; `slopes` are the derivatives of the metric at `z`, if it has any.
+    ///
+    /// It is the Jacobian of Newton's method: the derivative of the defect counts as far as it is above round-off.
     #[inline]
     pub fn slope(
         &self,
         drift_correction: f64,
+        at: (&impl InnerProduct<Vector<M>>, Option<&MetricSlopes<M>>),
+        path: &StepPathJet<M>,
+        (dmean, df_end): (&Matrix<M>, &Vector<M>),
+    ) -> Matrix<M> {
+        let rows = self.defect_slope(path, (dmean, df_end)) * self.trust();
+        Self::corrected_slope((self.defect + drift_correction, rows), at, path, dmean)
+    }
+
+    /// The derivative of the covector as in [`slope`](Self::slope), for a tangent: numbers that are divided by the length of the path,
+    /// the defect and its derivatives, are zero where they are round-off. They are of second order in this length.
+    pub(crate) fn slope_above_round_off(
+        &self,
+        at: (&impl InnerProduct<Vector<M>>, Option<&MetricSlopes<M>>),
+        path: &StepPathJet<M>,
+        (dmean, df_end): (&Matrix<M>, &Vector<M>),
+    ) -> Matrix<M> {
+        let terms = |k: usize| {
+            (0..M::Dim::LEN).fold(0.0, |sum: f64, i| {
+                let mean = (path.dd[(i, k)] * self.mean[i]).abs();
+                sum + (path.dend[(i, k)] * df_end[i]).abs()
+                    + mean
+                    + (dmean[(i, k)] * path.d[i]).abs()
+            })
+        };
+        let rows = self.defect_slope(path, (dmean, df_end));
+        let rows = Vector::<M>::from_index(|k| but_round_off(rows[k], terms(k)));
+        // The defect is an integral and a part of a difference, whose round-off is rounded once more where the integral replaces it.
+        let size = OF_A_DERIVATIVE * (self.change.abs() + self.rounding) + self.noise;
+        let is_noise = self.defect.abs() <= size;
+        let defect = if is_noise { 0.0 } else { self.defect };
+        Self::corrected_slope((defect, rows), at, path, dmean)
+    }
+
+    /// The derivative `∂δ = dF(x') ∂x' − ∂⟨w̄, d⟩` of the defect, a difference of nearly equal rows.
+    #[inline]
+    fn defect_slope(
+        &self,
+        path: &StepPathJet<M>,
+        (dmean, df_end): (&Matrix<M>, &Vector<M>),
+    ) -> Vector<M> {
+        path.dend.transpose_times(df_end)
+            - path.dd.transpose_times(&self.mean)
+            - dmean.transpose_times(&path.d)
+    }
+
+    /// The derivative of `w̄ + ♭d δ/G(d, d)`, from the defect `δ` and its derivative.
+    #[inline]
+    fn corrected_slope(
+        (defect, rows): (f64, Vector<M>),
         (g, slopes): (&impl InnerProduct<Vector<M>>, Option<&MetricSlopes<M>>),
         path: &StepPathJet<M>,
         dmean: &Matrix<M>,
-        df_end: &Vector<M>,
     ) -> Matrix<M> {
         let mut slope = *dmean;
         let flat = g.flat(&path.d);
@@ -179,13 +236,8 @@ impl<M: Manifold> StableGradient<M> {
         if square < SQUARE {
             return slope;
         }
-        let c = (self.defect + drift_correction) / square;
-        // ∂δ = dF(x') ∂x' − ∂⟨w̄, d⟩, a difference of nearly equal rows, which counts only as far
-        // as it is above its own round-off.
-        let rows = path.dend.transpose_times(df_end)
-            - path.dd.transpose_times(&self.mean)
-            - slope.transpose_times(&path.d);
-        let mut along = rows * self.trust() - path.dd.transpose_times(&flat) * (2.0 * c);
+        let c = defect / square;
+        let mut along = rows - path.dd.transpose_times(&flat) * (2.0 * c);
         if let Some(slopes) = slopes {
             // ∂g along z, in ♭d and in G(d, d).
             let dg_v = along_slopes::<M>(slopes, &path.d) * path.dz;
@@ -195,6 +247,11 @@ impl<M: Manifold> StableGradient<M> {
         slope += Matrix::<M>::outer(&flat, &(along * square.recip()));
         slope + Matrix::<M>::from_columns(|k| g.flat(&path.dd.column_at(k))) * c
     }
+}
+
+/// The number `x`, or zero where it is round-off of terms of this size.
+pub(crate) fn but_round_off(x: f64, terms: f64) -> f64 {
+    if x.abs() <= OF_A_DERIVATIVE * terms { 0.0 } else { x }
 }
 
 /// The squared length below which a path is measured in units of its own.

@@ -9,7 +9,7 @@ use metriplectic_manifolds::Manifold as _;
 
 use super::columns::{Columns, jets, row};
 use super::error::Unlinearised;
-use crate::round_off::bound::BROKEN;
+use crate::round_off::bound::{BROKEN, OF_A_DERIVATIVE};
 use crate::step::Dim;
 use crate::step::digits::counted;
 
@@ -43,9 +43,6 @@ pub struct Sensitivity {
     pub difference: Option<f64>,
 }
 
-/// The error of a derivative, in units of its direction, that is rounding.
-pub(super) const ROUNDED: f64 = 64.0 * f64::EPSILON;
-
 impl Sensitivity {
     /// Enters the second law in a step.
     pub(super) fn enter_entropy(&mut self, law: Option<f64>) {
@@ -70,7 +67,7 @@ impl Sensitivity {
                 let (off, size) = ((here[j] - law[j]).abs(), sizes[j] + law[j].abs());
                 // The column of a direction on which nothing depends is rounding, relative to a unit of that direction.
                 let unit = terms / scales[j];
-                let size = if off <= ROUNDED * unit { size.max(unit) } else { size };
+                let size = if off <= OF_A_DERIVATIVE * unit { size.max(unit) } else { size };
                 worse(worst, if off == 0.0 { 0.0 } else { off / size })
             })
         };

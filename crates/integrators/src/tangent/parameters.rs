@@ -22,6 +22,7 @@ use super::error::Unlinearised;
 use super::linearised::Propagated;
 use super::part::Wide;
 use super::schemes::{Both, Factored};
+use crate::round_off::stable_gradient::but_round_off;
 use crate::step::Dim;
 
 /// The manifold of a wide system.
@@ -34,29 +35,34 @@ struct Places<'a, D: Differentiable> {
 }
 
 impl<D: Differentiable> Places<'_, D> {
-    /// `∂_θF(x') − ∂_θF(x)`, in `⌈P/2⌉` evaluations at each end.
-    fn difference(&self, f: &impl ScalarField<Whole<D>>) -> Vec<f64> {
+    /// `∂_θF(x')` and `∂_θF(x)`, in `⌈P/2⌉` evaluations at each end.
+    fn at_ends(&self, f: &impl ScalarField<Whole<D>>) -> Vec<[f64; 2]> {
         let (n, all) = (Dim::<D>::LEN, Dim::<Wide<D>>::LEN);
-        let mut difference = vec![0.0; all - n];
-        for (x, sign) in self.ends.into_iter().zip([-1.0, 1.0]) {
+        let mut slopes = vec![[0.0; 2]; all - n];
+        for (x, which) in self.ends.into_iter().zip([1, 0]) {
             let x = D::Manifold::constant::<Real>(x);
-            for (k, pair) in difference.chunks_mut(2).enumerate() {
+            for (k, pair) in slopes.chunks_mut(2).enumerate() {
                 let value = f.at_real(&self.system.seeded(x.clone(), [2 * k, 2 * k + 1]));
-                for (entry, slope) in pair.iter_mut().zip([value.eps1, value.eps2]) {
-                    *entry += sign * slope;
+                for (slopes, slope) in pair.iter_mut().zip([value.eps1, value.eps2]) {
+                    slopes[which] = slope;
                 }
             }
         }
-        difference
+        slopes
     }
+}
+
+/// The defect `F(x') − F(x) − ⟨w̄, d⟩` of a derivative of a field, or zero where it is round-off.
+fn defect([end, start]: [f64; 2], slope: f64) -> f64 {
+    but_round_off(end - start - slope, end.abs() + start.abs())
 }
 
 /// The sum over the fields of `V_F ∂_θ w_F`, one column a parameter.
 struct Velocities<'a, D: Differentiable> {
     places: &'a Places<'a, D>,
     both: &'a Both<D>,
-    /// `V_F`, and how far the derivative of its defect is trusted, field by field.
-    along: std::vec::IntoIter<(Matrix<D::Manifold>, f64)>,
+    /// `V_F`, and whether differences of `F` lose digits, field by field; `None` where `w_F` is a differential.
+    along: std::vec::IntoIter<(Matrix<D::Manifold>, Option<bool>)>,
     columns: Vec<Vector<D::Manifold>>,
 }
 
@@ -64,14 +70,14 @@ impl<D: Differentiable> Gradient<Whole<D>> for Velocities<'_, D> {
     type Covector = ();
 
     fn of(&mut self, f: &impl ScalarField<Whole<D>>) {
-        let Some((along, trust)) = self.along.next() else { return };
+        let Some((along, is_short)) = self.along.next() else { return };
         let (Places { system, .. }, Both { z, d, at, .. }) = (self.places, self.both);
-        let (n, difference) = (Dim::<D>::LEN, self.places.difference(f));
+        let (n, ends) = (Dim::<D>::LEN, self.places.at_ends(f));
         let seeded = D::Manifold::seeds(z);
-        for (k, (column, difference)) in self.columns.iter_mut().zip(difference).enumerate() {
+        for (k, (column, ends)) in self.columns.iter_mut().zip(ends).enumerate() {
             let mixed = |i| f.at_real(&system.seeded(seeded(i, n), [usize::MAX, k])).eps1eps2;
             let mean = Vector::<D::Manifold>::from_index(mixed);
-            let defect = trust * (difference - mean.dot(d));
+            let defect = if is_short.is_some() { defect(ends, mean.dot(d)) } else { 0.0 };
             *column += along * (mean + at.correction * defect);
         }
     }
@@ -81,8 +87,8 @@ impl<D: Differentiable> Gradient<Whole<D>> for Velocities<'_, D> {
 struct Products<'a, D: Differentiable> {
     places: &'a Places<'a, D>,
     both: &'a Both<D>,
-    /// `q_F`, and how far the derivative of its defect is trusted.
-    along: std::vec::IntoIter<(Vector<D::Manifold>, f64)>,
+    /// `q_F`, and whether differences of `F` lose digits; `None` where `w_F` is a differential.
+    along: std::vec::IntoIter<(Vector<D::Manifold>, Option<bool>)>,
     sums: Vec<f64>,
 }
 
@@ -90,16 +96,26 @@ impl<D: Differentiable> Gradient<Whole<D>> for Products<'_, D> {
     type Covector = ();
 
     fn of(&mut self, f: &impl ScalarField<Whole<D>>) {
-        let Some((q, trust)) = self.along.next() else { return };
+        let Some((q, is_short)) = self.along.next() else { return };
         let (Places { system, .. }, Both { z, d, at, .. }) = (self.places, self.both);
-        let share = trust * q.dot(&at.correction);
-        let p = q - *d * share;
-        let seed = Vector::<D::Manifold, Real>::from_index(|i| Real::new(0.0, p[i], 0.0, 0.0));
-        let z = D::Manifold::chart(z, &seed);
-        let difference = self.places.difference(f);
-        for (k, (sum, difference)) in self.sums.iter_mut().zip(difference).enumerate() {
-            let mixed = f.at_real(&system.seeded(z.clone(), [usize::MAX, k])).eps1eps2;
-            *sum += mixed + share * difference;
+        let along = |p: &Vector<D::Manifold>| {
+            let seed = Vector::<D::Manifold, Real>::from_index(|i| Real::new(0.0, p[i], 0.0, 0.0));
+            let z = D::Manifold::chart(z, &seed);
+            move |k| f.at_real(&system.seeded(z.clone(), [usize::MAX, k])).eps1eps2
+        };
+        let share = if is_short.is_some() { q.dot(&at.correction) } else { 0.0 };
+        let sums = self.sums.iter_mut().zip(self.places.at_ends(f)).enumerate();
+        if is_short == Some(true) {
+            // The defect alone, since it may be round-off.
+            let (along_q, along_d) = (along(&q), along(d));
+            for (k, (sum, ends)) in sums {
+                *sum += along_q(k) + share * defect(ends, along_d(k));
+            }
+            return;
+        }
+        let along_p = along(&(q - *d * share));
+        for (k, (sum, [end, start])) in sums {
+            *sum += along_p(k) + share * (end - start);
         }
     }
 }
@@ -107,12 +123,12 @@ impl<D: Differentiable> Gradient<Whole<D>> for Products<'_, D> {
 /// The entries of all fields, in the order in which they are visited.
 fn listed<D: Differentiable, T>(
     both: &Both<D>,
-    entry: impl Fn(&Matrix<D::Manifold>, f64) -> T,
+    entry: impl Fn(&Matrix<D::Manifold>, Option<bool>) -> T,
 ) -> Option<std::vec::IntoIter<T>> {
     let along = both.at.along.as_ref()?;
     let invariants = along.invariants.as_ref().iter().flatten().map(|(_, along)| along);
     let all = [&along.energy, &along.entropy].into_iter().chain(invariants);
-    Some(all.map(|(v, trust)| entry(v, *trust)).collect::<Vec<_>>().into_iter())
+    Some(all.map(|(v, is_short)| entry(v, *is_short)).collect::<Vec<_>>().into_iter())
 }
 
 /// Visits all fields of the wide system.
@@ -134,7 +150,7 @@ pub(super) fn end_along_parameters<D: Differentiable>(
 ) -> Option<Vec<Vector<D::Manifold>>> {
     let count = Dim::<Wide<D>>::LEN - Dim::<D>::LEN;
     let places = Places { system, ends };
-    let along = listed(both, |v, trust| (*v, trust))?;
+    let along = listed(both, |v, is_short| (*v, is_short))?;
     let columns = vec![Vector::<D::Manifold>::zero(); count];
     let mut velocities = Velocities { places: &places, both, along, columns };
     each_field(system, &mut velocities);
@@ -153,7 +169,7 @@ pub(super) fn pulled_back<D: Differentiable>(
     let row = Vector::<D::Manifold>::from_index(|i| costate[i]);
     let [through, point] = both.pulled_back(ends[0], &row)?;
     let places = Places { system, ends };
-    let along = listed(both, |v, trust| (transposed::<D>(v, &through), trust));
+    let along = listed(both, |v, is_short| (transposed::<D>(v, &through), is_short));
     let along = along.ok_or(Unlinearised::Singular)?;
     let mut products = Products { places: &places, both, along, sums: vec![0.0; all - n] };
     each_field(system, &mut products);

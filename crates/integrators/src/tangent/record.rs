@@ -6,13 +6,14 @@ use metriplectic_dynamics::Differentiable;
 use metriplectic_dynamics::system::Point;
 
 use super::along::LinearisedAlong;
-use super::certificate::{ROUNDED, Sensitivity};
+use super::certificate::Sensitivity;
 use super::columns::Columns;
 use super::error::TangentError;
 use super::event::TangentEvent;
 use super::refined::{REFINEMENTS, difference, refined};
 use super::state::TangentState;
 use super::steps::{Inside, Jumps, TangentSteps};
+use crate::round_off::bound::OF_A_DERIVATIVE;
 use crate::run::SpanError;
 use crate::run::certificate::Certificate;
 use crate::run::ending::Ending;
@@ -135,7 +136,7 @@ pub trait Tangents: Sized {
         D: Differentiable,
         Self: Clone + Stepper<D> + LinearisedAlong<D>,
     {
-        if !(ROUNDED..1.0).contains(&accuracy) {
+        if !(OF_A_DERIVATIVE..1.0).contains(&accuracy) {
             return Err(TangentError::Accuracy { accuracy });
         }
         let mut schedule: Schedule = schedule.into();

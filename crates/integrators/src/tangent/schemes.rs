@@ -140,14 +140,32 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
     }
 }
 
-/// The Jacobian of a step in units of the entries, factorised.
-pub(super) type Factored<Y> =
+type FactorsOf<Y> =
     <Matrix<<Y as Metriplectic>::Manifold> as metriplectic_fields::Square<f64>>::Factors;
+
+/// A matrix in units of the entries, factorised. Its solutions are refined once: then each row is solved to the round-off of its own
+/// terms (Skeel 1980), so that an entry near rest has no digits of another one.
+pub(super) struct Factored<Y: Metriplectic> {
+    matrix: Matrix<Y::Manifold>,
+    factors: FactorsOf<Y>,
+}
+
+impl<Y: Metriplectic> Factored<Y> {
+    fn of(matrix: Matrix<Y::Manifold>) -> Option<Self> {
+        Some(Self { factors: matrix.factor()?, matrix })
+    }
+
+    fn solve(&self, right: &Vector<Y::Manifold>) -> Option<Vector<Y::Manifold>> {
+        let y = self.factors.solve(right)?;
+        let left = *right - self.matrix * y;
+        Some(y + self.factors.solve(&left)?)
+    }
+}
 
 impl<Y: Metriplectic> Both<Y> {
     /// Factorises `∂R/∂u`.
     pub(super) fn factored(&self) -> Option<Factored<Y>> {
-        scaled::<Y>(&self.at.jacobians[0], &self.units).factor()
+        Factored::of(scaled::<Y>(&self.at.jacobians[0], &self.units))
     }
 
     /// `E A⁻¹ r`: how the end moves where the residual changes by `−r`.
@@ -191,7 +209,7 @@ impl<Y: Metriplectic> Both<Y> {
         let [a, b] = &at.jacobians;
         let factors = |m: &Matrix<Y::Manifold>| {
             let m = scaled::<Y>(m, units);
-            Matrix::<Y::Manifold>::from_entries(|i, j| m[(j, i)]).factor()
+            Factored::<Y>::of(Matrix::<Y::Manifold>::from_entries(|i, j| m[(j, i)]))
         };
         let (a, f) = (factors(a)?, factors(f)?);
         let mut pulled = rows.map(|row| [row; 2]);

@@ -25,13 +25,14 @@ use crate::step::{CountOf, Dim};
 pub(super) struct FromBothEnds<N: Dimension> {
     value: N::Vector<f64>,
     slopes: [N::Matrix<f64>; 2],
-    /// The part of the defect's derivative that is above its round-off; 0 for a differential, which has no defect.
-    trust: f64,
+    /// Whether the path is so short that differences of values lose digits; of a differential, which has no defect, `None`.
+    is_short: Option<bool>,
 }
 
-/// The derivatives of the velocity along each covector, and how far the derivative of its defect is trusted.
+/// The derivatives of the velocity along each covector, and whether differences of its field lose digits; `None` for a differential, which
+/// has no defect.
 pub(crate) type AlongCovectors<Y> =
-    Covectors<CountOf<Y>, (Matrix<<Y as Metriplectic>::Manifold>, f64)>;
+    Covectors<CountOf<Y>, (Matrix<<Y as Metriplectic>::Manifold>, Option<bool>)>;
 
 /// The equation of a step linearised from both ends.
 pub(crate) struct BothEnds<Y: Metriplectic> {
@@ -76,26 +77,26 @@ where
         let w = self.along.stable_gradient(f, &mean, points, [start.value, end.value]);
         let at = (*g, self.slopes);
         let slopes = [
-            w.slope(0.0, at, there, &du, &end.df),
-            w.reversed().slope(0.0, at, back, &dv, &start.df),
+            w.slope_above_round_off(at, there, (&du, &end.df)),
+            w.reversed().slope_above_round_off(at, back, (&dv, &start.df)),
         ];
         if law == Law::Energy {
             self.energy = [start.df, end.df];
         }
-        FromBothEnds { value: w.covector(0.0, *g, &there.d), slopes, trust: w.trust() }
+        FromBothEnds { value: w.covector(0.0, *g, &there.d), slopes, is_short: Some(w.is_short()) }
     }
 
     fn differential(&self, f: &impl ScalarField<Y::Manifold>) -> FromBothEnds<Dim<Y>> {
         let jet = f.jet2(&self.paths[0].z);
         let slopes = self.paths.map(|path| jet.hf * path.dz);
-        FromBothEnds { value: jet.df, slopes, trust: 0.0 }
+        FromBothEnds { value: jet.df, slopes, is_short: None }
     }
 
     #[inline]
     fn displacement_less(&self, h: f64, v: FromBothEnds<Dim<Y>>) -> FromBothEnds<Dim<Y>> {
         let [there, back] = self.paths;
         let slopes = [there.dd - v.slopes[0] * h, back.dd + v.slopes[1] * h];
-        FromBothEnds { value: there.d - v.value * h, slopes, trust: 0.0 }
+        FromBothEnds { value: there.d - v.value * h, slopes, is_short: None }
     }
 
     #[inline]
@@ -114,7 +115,7 @@ where
         }
         let slopes = [there.velocity.slope, back.velocity.slope];
         let value = there.velocity.value;
-        Ok((FromBothEnds { value, slopes, trust: 0.0 }, there.production))
+        Ok((FromBothEnds { value, slopes, is_short: None }, there.production))
     }
 }
 
@@ -144,22 +145,22 @@ fn along_covectors<Y: Metriplectic>(
 ) -> Result<AlongCovectors<Y>, MetricError> {
     let (zero, one) = (Matrix::<Y::Manifold>::zeros(), Matrix::<Y::Manifold>::one());
     let mut failure = None;
-    let mut along = |field: usize, trust: f64| {
+    let mut along = |field: usize, is_short: Option<bool>| {
         let w = with_slopes::<Y>(w, |k, _| if k == field { one } else { zero });
         match velocity_jet(system, metric, &zero, &w) {
-            Ok(jet) => (jet.velocity.slope, trust),
+            Ok(jet) => (jet.velocity.slope, is_short),
             Err(error) => {
                 failure = Some(error);
-                (zero, trust)
+                (zero, is_short)
             }
         }
     };
     let listed = w.invariants.as_ref();
     let along = Covectors {
-        energy: along(0, w.energy.trust),
-        entropy: along(1, w.entropy.trust),
+        energy: along(0, w.energy.is_short),
+        entropy: along(1, w.entropy.is_short),
         invariants: CountOf::<Y>::array(|k| {
-            listed[k].as_ref().map(|(kind, w)| (*kind, along(k + 2, w.trust)))
+            listed[k].as_ref().map(|(kind, w)| (*kind, along(k + 2, w.is_short)))
         }),
     };
     failure.map_or(Ok(along), Err)

@@ -204,7 +204,7 @@ where
         let ends = [&path.z, &path.end];
         let w = self.along.stable_gradient(f, &mean, ends, [start, end.value]);
         let value = w.covector(drift, *g, &path.d);
-        let slope = w.slope(drift, (*g, self.slopes), path, &dmean, &end.df);
+        let slope = w.slope(drift, (*g, self.slopes), path, (&dmean, &end.df));
         if law == Law::Energy {
             // Near the edge of a domain dH is far steeper at x' than at z, and the rounding of d counts
             // there.

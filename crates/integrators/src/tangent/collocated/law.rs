@@ -9,8 +9,7 @@ use num_dual::Dual64;
 use super::super::duals::{Dual, along};
 use super::moved::{Around, Direction, Moved};
 use crate::collocation::trust;
-use crate::round_off::bound::ROUNDED;
-use crate::round_off::stable_gradient::short;
+use crate::round_off::stable_gradient::{but_round_off, short};
 use crate::step::{CountOf, Dim};
 
 /// A field along a step.
@@ -57,9 +56,8 @@ impl<Y: Metriplectic> LawAlong<Y> {
         let Some(integral) = self.integrals.get(number) else { return lost };
         let lost = lost * (1.0 - self.weight) + (*integral - slope) * self.weight;
         // What is divided by the square of the velocity near rest must not be rounding.
-        let but_rounding = |x: f64, size: f64| if x.abs() <= ROUNDED * size { 0.0 } else { x };
         let along = along + ends[0].abs() + ends[1].abs();
-        Dual64::new(but_rounding(lost.re, size), but_rounding(lost.eps, along))
+        Dual64::new(but_round_off(lost.re, size), but_round_off(lost.eps, along))
     }
 }
 

@@ -15,6 +15,7 @@ use super::tableau::{ESTIMATED, Row, STAGES, Tableau};
 use super::tableau_error::TableauError;
 
 /// The highest order whose conditions are looked at: no tableau that fits has a higher one.
+/// A factor of four fails `explicit/conditions.rs::there_are_as_many_rooted_trees_as_cayley_counted`.
 const HIGHEST: u32 = 10;
 
 /// A rooted tree.

@@ -14,10 +14,13 @@ use super::stage::stage;
 use crate::step::{StepStart, Vector};
 
 /// A displacement, relative to the size of its entry, that hardly moves a state.
+/// A factor of four fails `explicit/rest.rs::hardly_moved_is_a_millionth_of_an_entry_or_a_thousandth_of_its_error`.
 const HARDLY: f64 = 1e-6;
 /// A displacement, relative to the error that is allowed, that hardly moves a state.
+/// A factor of four fails `explicit/rest.rs::hardly_moved_is_a_millionth_of_an_entry_or_a_thousandth_of_its_error`.
 const HARDLY_ALLOWED: f64 = 1e-3;
 /// The size of a step, relative to the time `1/ρ` of the motion, that is short.
+/// A factor of four fails `explicit/rest.rs::hardly_moved_is_a_millionth_of_an_entry_or_a_thousandth_of_its_error`.
 const SHORT: f64 = 1e-2;
 
 /// The sizes of the entries at the start of a step: at least the error that is allowed.
@@ -86,4 +89,36 @@ pub(super) fn is_short<F: StageFlow>(
     h: f64,
 ) -> bool {
     own_rate(flow, start, velocity).is_some_and(|rate| rate * h.abs() <= SHORT)
+}
+
+#[cfg(test)]
+mod tests {
+    use metriplectic_dynamics::{Symplectic, System};
+    use metriplectic_fields::Real;
+    use metriplectic_manifolds::Euclidean;
+    use nalgebra::{Vector2, vector};
+
+    use super::*;
+    use crate::step::{Components, Flow as _};
+
+    #[test]
+    fn hardly_moved_is_a_millionth_of_an_entry_or_a_thousandth_of_its_error() {
+        let system = System::on(Euclidean::<2>)
+            .bracket(Symplectic)
+            .energy(|x: &Vector2<Real>| x.norm_squared() * 1.5)
+            .build()
+            .unwrap();
+        let x = vector![1.0, 1.0];
+        let start = StepStart::first(&system, &x);
+        let moved =
+            |start: &StepStart<'_, _>, d| is_hardly(&system, start, &Components(vector![d, d]));
+        assert!(moved(&start, 5e-7) && !moved(&start, 2e-6));
+        let allowed = Some(Components(vector![0.1, 0.1]));
+        let start = StepStart { allowed, ..start };
+        assert!(moved(&start, 5e-5) && !moved(&start, 2e-4));
+        // The motion has the rate 3.
+        let v = system.rates(&x, &Components(vector![0.0, 0.0])).unwrap();
+        let short = |h| is_short(&system, &start, &v, h);
+        assert!(short(1e-3) && short(-1e-3) && !short(1e-2));
+    }
 }

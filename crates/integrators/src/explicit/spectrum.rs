@@ -5,10 +5,14 @@ use super::stage::stage;
 use crate::step::{Element, Vector};
 
 /// Steps after which the spectral radius is found anew.
+/// A factor of four fails `explicit/spectrum.rs::the_radius_is_that_of_the_motion_and_somewhat_more`.
 const PATIENCE: u32 = 25;
-/// The most iterations of the power method, the change at which it ends, and what the estimate may miss.
+/// The most iterations of the power method.
 const ITERATIONS: u32 = 50;
+/// The relative change of the estimate at which they end.
 const CHANGE: f64 = 0.01;
+/// The ratio of the radius that is used to the estimate, which may be too small.
+/// A factor of four fails `explicit/spectrum.rs::the_radius_is_that_of_the_motion_and_somewhat_more`.
 const SAFETY: f64 = 1.2;
 
 /// The spectral radius of the equation of motion, and a direction in which it is attained.
@@ -87,4 +91,36 @@ fn irregular<V: Vector>(sizes: &V) -> V {
         let turn = (i as f64 * 0.618_033_988_749_894_9).fract();
         sizes.get(i) * (2.0 * (turn * turn * 1e4).fract() - 1.0)
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use metriplectic_dynamics::{Symplectic, System};
+    use metriplectic_fields::Real;
+    use metriplectic_manifolds::Euclidean;
+    use nalgebra::{Vector2, vector};
+
+    use super::*;
+    use crate::step::{Components, Flow as _};
+
+    #[test]
+    fn the_radius_is_that_of_the_motion_and_somewhat_more() {
+        let system = System::on(Euclidean::<2>)
+            .bracket(Symplectic)
+            .energy(|x: &Vector2<Real>| x.x * x.y * 3.0)
+            .build()
+            .unwrap();
+        let x = vector![1.0, 0.5];
+        let v = system.rates(&x, &Components(vector![0.0, 0.0])).unwrap();
+        let mut known = spectrum(&system, &x, &v, None);
+        let radius = known.as_ref().unwrap().radius;
+        assert!((3.1..4.5).contains(&radius), "{radius} for 3");
+        // It is kept for some steps.
+        let mut steps = 0;
+        while known.as_ref().is_some_and(|known| known.age == steps) && steps < 1000 {
+            known = spectrum(&system, &x, &v, known);
+            steps += 1;
+        }
+        assert!((10..60).contains(&steps), "{steps} steps");
+    }
 }

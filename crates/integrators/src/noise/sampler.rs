@@ -88,8 +88,11 @@ impl NoiseMemory {
     }
 }
 
-/// How many steps may be unresolved in any run, and beside them one of how many.
+/// How many steps may be unresolved in any run.
+/// A factor of four fails `noise/sampler.rs::few_steps_may_be_too_long_for_friction`.
 const FEW: u64 = 2;
+/// Beside them one of so many may be.
+/// A factor of four fails `noise/sampler.rs::few_steps_may_be_too_long_for_friction`.
 const OFTEN: u64 = 8;
 
 /// The names of the numbers of steps in a checkpoint.
@@ -218,5 +221,26 @@ where
 
     fn nothing_between(&self, time: f64, _: f64) -> StepError {
         StepError::Method { time, error: MethodError::new(NoiseError::HasNoBetween) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::NoiseMemory;
+
+    /// Whether a run goes on in which one of so many steps has the rate `h|K'|`.
+    fn goes_on(rate: f64, one_of: u32) -> bool {
+        let mut memory = NoiseMemory::default();
+        (1..=400).all(|k| memory.count(if k % one_of == 0 { rate } else { 0.0 }, 0.1).is_ok())
+    }
+
+    #[test]
+    fn few_steps_may_be_too_long_for_friction() {
+        assert!(goes_on(2.0, 10) && !goes_on(2.0, 5));
+        // A step that is as long as friction asks for is not too long.
+        assert!(goes_on(0.9, 1) && !goes_on(2.0, 1));
+        let mut memory = NoiseMemory::default();
+        let rates = [2.0; 4].map(|rate| memory.count(rate, 0.1).is_ok());
+        assert_eq!(rates, [true, true, false, false]);
     }
 }

@@ -14,6 +14,7 @@ pub(crate) const OF_A_DERIVATIVE: f64 = 64.0 * f64::EPSILON;
 
 /// The change of the energy, relative to the size of its terms, that is no round-off: no step is taken
 /// that changes it by more.
+/// A factor of four fails `round_off/bound.rs::a_change_of_a_millionth_of_the_energy_is_no_round_off`.
 pub(crate) const BROKEN: f64 = 1e-6;
 
 /// The independent fraction of a differential below which it is a combination of others.
@@ -90,4 +91,21 @@ pub(crate) fn breaks_first_law(
     let sizes = sizes();
     let holds = sizes.iter().all(|&size| change.abs() <= BROKEN * size && size.is_finite());
     if holds { None } else { Some(sizes[0].min(sizes[1])) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::breaks_first_law;
+
+    #[test]
+    fn a_change_of_a_millionth_of_the_energy_is_no_round_off() {
+        // An energy of two terms that nearly cancel: the terms count, and not their sum.
+        let breaks = |change| breaks_first_law(change, 1e-9, || [3.0, 2.0]);
+        assert_eq!(breaks(1e-6), None);
+        assert_eq!(breaks(-4e-6), Some(2.0));
+        assert_eq!(
+            breaks_first_law(1e-6, 2.0, || unreachable!("the energy is large enough")),
+            None
+        );
+    }
 }

@@ -429,6 +429,7 @@ impl Certificate {
 }
 
 /// The local error, relative to the sizes of the entries, from which on a motion is not resolved.
+/// A factor of four fails `run/certificate/tests.rs::one_is_no_plural`.
 const UNRESOLVED: f64 = 0.1;
 
 /// The fraction of the gain of the entropy that damping may add where a motion is resolved.
@@ -436,6 +437,7 @@ const UNRESOLVED: f64 = 0.1;
 const ADDED: f64 = 0.01;
 
 /// The fraction of steps at the edge of stability from which on stability sets the steps of a run.
+/// A factor of four fails `run/certificate/tests.rs::stability_sets_the_steps_where_more_than_half_of_them_are_at_its_edge`.
 const AT_THE_EDGE: f64 = 0.5;
 
 impl Certificate {

@@ -207,21 +207,27 @@ pub(crate) struct Cap {
 
 impl Cap {
     /// Steps after which the bound is raised.
+    /// A factor of four fails `run/controller/tests.rs::the_bound_after_a_fall_of_the_entropy_is_raised_slowly`.
     const PATIENCE: u32 = 20;
     /// The ratio by which it is raised in each step after those.
+    /// A factor of four fails `run/controller/tests.rs::the_bound_after_a_fall_of_the_entropy_is_raised_slowly`.
     const RAISED: f64 = 1.3;
     /// The ratio of a step on which the entropy would have fallen.
+    /// A factor of four fails `run/controller/tests.rs::the_bound_after_a_fall_of_the_entropy_is_raised_slowly`.
     const REDUCED: f64 = 0.7;
     /// The ratio to the size before the tries after a step that was held.
+    /// A factor of four fails `run/controller/tests.rs::the_bound_after_a_fall_of_the_entropy_is_raised_slowly`.
     const HELD: f64 = 1.5;
 }
 
 /// Of the size at which the error would be the one allowed.
+/// A factor of four fails `run/controller/tests.rs::a_step_with_the_error_that_is_allowed_is_followed_by_a_slightly_smaller_one`.
 const SAFETY: f64 = 0.9;
 /// The ratio after a step that was not solved.
 /// A factor of four fails `run/controller/tests.rs::the_controller_stays_within_its_bounds`.
 const UNSOLVED: f64 = 0.25;
 /// The least error that the controller remembers: a step without any is no reason to be bold later.
+/// A factor of four fails `run/controller/tests.rs::a_step_with_the_error_that_is_allowed_is_followed_by_a_slightly_smaller_one`.
 const LEAST_ERROR: f64 = 1e-4;
 
 /// Whether an exponent is this one.

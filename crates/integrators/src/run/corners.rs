@@ -29,6 +29,7 @@ pub(crate) struct Corners {
 }
 
 /// How far before a corner a step ends, in roundings of the time.
+/// A factor of four fails `run/corners.rs::a_step_ends_some_roundings_before_a_corner`.
 const BEFORE: f64 = 4.0;
 
 impl Corners {
@@ -190,5 +191,12 @@ mod tests {
         }
         assert_eq!(found, [0.25, 0.3, 0.5, 0.75, 1.0]);
         assert!(!Corners::default().has(0.5) && Corners::default().after(0.0).is_none());
+    }
+
+    #[test]
+    fn a_step_ends_some_roundings_before_a_corner() {
+        let corners = Corners { times: vec![0.75], interval: None, start: 0.0 };
+        let left = (0.75 - corners.before(0.75)) / corners.rounding(0.75);
+        assert!((2.0..10.0).contains(&left), "{left} roundings");
     }
 }

@@ -30,6 +30,7 @@ pub(super) struct Sides {
 }
 
 /// How much larger than after the jump the function is where it is no round-off.
+/// A factor of four fails `run/departure.rs::a_value_of_the_size_of_the_last_one_is_round_off`.
 const CLEAR: f64 = 4.0;
 
 /// Looks for the time after a jump at which the function is no round-off, in steps of a factor of 2 up to a step of the run.
@@ -68,6 +69,7 @@ pub(super) enum Seen {
 }
 
 /// The fraction of a step up to which the function is looked at.
+/// A factor of four fails `run/departure.rs::a_state_that_goes_back_is_seen_in_the_first_fifth_of_a_step`.
 const EARLY: f64 = 0.2;
 
 impl Departure {
@@ -96,5 +98,27 @@ impl Departure {
             }
             theta = (2.0 * theta).min(EARLY);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_value_of_the_size_of_the_last_one_is_round_off() {
+        let goes_back = |here: f64| {
+            let sides = Sides { earlier: 1.0, before: 1e-16, here };
+            find(sides, 1.0, 0.1, |later| later).is_some()
+        };
+        assert!(goes_back(-3e-16) && !goes_back(-1e-15));
+    }
+
+    #[test]
+    fn a_state_that_goes_back_is_seen_in_the_first_fifth_of_a_step() {
+        let departure = Departure { time: Exact(0.001), earlier: Exact(1.0), fails: false };
+        let seen = |turns: f64| departure.seen([0.0, 1.0], |theta| Some(theta - turns));
+        assert!(matches!(seen(0.15), Some(Seen::At { .. })));
+        assert!(matches!(seen(0.3), Some(Seen::Never)));
     }
 }

@@ -14,6 +14,7 @@ pub(crate) struct Judged<V> {
 }
 
 /// The factor by which a size that was estimated may differ from the one that is reached.
+/// A factor of four fails `run/judged.rs::a_size_is_misjudged_where_it_is_off_by_a_factor_of_a_hundred`.
 const MISJUDGED: f64 = 100.0;
 
 impl<V: Vector> Judged<V> {
@@ -45,5 +46,22 @@ impl<V: Vector> Judged<V> {
             }
         }
         worst
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Judged;
+
+    #[test]
+    fn a_size_is_misjudged_where_it_is_off_by_a_factor_of_a_hundred() {
+        // An entry that starts at zero was estimated to reach 1.
+        let direction = |reached: f64| {
+            let mut judged = Judged::new(&vec![1.0], vec![0.0]);
+            judged.reached = vec![reached];
+            judged.worst(&vec![1.0], &vec![0.0], true).map(|worst| worst.direction)
+        };
+        assert_eq!([0.02, 0.5, 50.0].map(direction), [None; 3]);
+        assert_eq!([0.005, 200.0].map(direction), [Some(0); 2]);
     }
 }

@@ -35,6 +35,7 @@ pub struct Until<const N: usize = 0> {
 }
 
 /// The tolerance without another one.
+/// A factor of four fails `run/until.rs::the_tolerance_is_that_of_the_documentation`.
 const TOLERANCE: f64 = 1e-6;
 
 impl Span {
@@ -180,5 +181,15 @@ impl<const N: usize> From<Until<N>> for Schedule {
         let size = Size::Tolerance(Adaptive { end, tolerance, first, least, largest, entries });
         let (watch, corners) = (Requests::default(), Corners::default());
         Self { size, start, count: None, every, most, rest, watch, corners }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::run::span::Span;
+
+    #[test]
+    fn the_tolerance_is_that_of_the_documentation() {
+        assert_eq!(Span::until(2.0), Span::until(2.0).tolerance(1e-6));
     }
 }

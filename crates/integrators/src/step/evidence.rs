@@ -48,6 +48,7 @@ pub struct Evidence {
 }
 
 /// The rate `h|K'|` of friction above which a step does not resolve it.
+/// A factor of four fails `noise/sampler.rs::few_steps_may_be_too_long_for_friction`.
 pub(crate) const RESOLVED: f64 = 1.0;
 
 /// The laws in a step with stages.

@@ -35,8 +35,10 @@ impl Cause {
 }
 
 /// Increments of the step size that may be tried to get to the size that is asked for.
+/// A factor of four fails `step/failure.rs::a_branch_is_followed_until_its_increments_are_tiny`.
 const INCREMENTS: usize = 200;
 /// The fraction of the size reached below which an increment means that the branch of solutions ends there.
+/// A factor of four fails `step/failure.rs::a_branch_is_followed_until_its_increments_are_tiny`.
 const LEAST: f64 = 1e-4;
 
 /// Follows the solutions that begin at rest to the whole step, by fractions of its size: an increment doubles after
@@ -63,4 +65,29 @@ pub(crate) fn continue_in_step_size<T: Copy>(
 /// The size of the smallest part of a step that was split `splits` times.
 pub(crate) fn smallest_part(h: f64, splits: usize) -> f64 {
     (0..splits).fold(h, |part, _| 0.5 * part)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::continue_in_step_size;
+
+    #[test]
+    fn a_branch_is_followed_until_its_increments_are_tiny() {
+        // It ends in the middle of the step.
+        let (mut reached, mut tries) = (0.0, 0);
+        let end = continue_in_step_size((), |_, next| {
+            tries += 1;
+            (next < 0.5).then(|| reached = next)
+        });
+        assert_eq!(end, None);
+        assert!((5e-5..3e-4).contains(&(0.5 - reached)), "{reached} after {tries} tries");
+        // One that never ends, in ever smaller parts.
+        let mut tries = 0;
+        let end = continue_in_step_size((), |((), fraction), next| {
+            tries += 1;
+            (next - fraction < 3e-4).then_some(())
+        });
+        assert_eq!(end, None);
+        assert!((100..400).contains(&tries), "{tries} tries");
+    }
 }

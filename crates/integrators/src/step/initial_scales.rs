@@ -22,13 +22,17 @@ use super::scales::{Scales, larger};
 use super::{Element, Flow, Vector};
 
 /// The fraction of the span and of the times `s_i/|v_i|` with which the search for `h` begins.
+/// A factor of four fails `step/initial_scales.rs::a_relaxation_from_zero_reaches_its_end_whatever_the_span`.
 const FIRST: f64 = 0.25;
-/// The factor by which `h` is decreased, and how often: down to 10⁻¹⁸ of the span.
+/// The factor by which `h` is decreased.
 /// A factor of four fails `step/initial_scales.rs::a_motion_that_leaves_the_numbers_is_cut`.
 const CUT: f64 = 0.25;
+/// How often it is: down to 10⁻¹⁸ of the span.
+/// A factor of four fails `step/initial_scales.rs::a_motion_that_leaves_the_numbers_is_cut`.
 const CUTS: usize = 30;
 /// The fraction of a displacement by which one step and two halves may differ. An oscillation at the rate `ω` is resolved
 /// for `ωh < 1.7`, and a relaxation at the rate `λ` for `λh < 1.7`.
+/// A factor of four fails `step/initial_scales.rs::a_relaxation_from_zero_reaches_its_end_whatever_the_span`.
 const RESOLVED: f64 = 0.125;
 /// The fraction of the size of an entry below which its displacement does not matter.
 const NOTHING: f64 = 1e-9;

@@ -65,6 +65,18 @@ fn one_is_no_plural() {
     let stiff = Certificate { friction: 1e6, ..coarse.clone() };
     assert!(stiff.is_stiff() && !stiff.is_resolved());
     assert!(!stiff.to_string().contains("not resolved"), "{stiff}");
+    let with = |error, stages| {
+        let certificate = Certificate { local_error: Some(error), stages, ..coarse.clone() };
+        (certificate.to_string(), certificate.is_resolved())
+    };
+    for (error, resolved) in [(2e-3, true), (0.09, true), (0.2, false)] {
+        let (text, is_resolved) = with(error, None);
+        let found = text.contains("they add up") || text.contains("is not resolved");
+        assert!(found && is_resolved == resolved, "{error}: {text}");
+    }
+    let stages = Some(StageBalance::default());
+    assert!(!with(9e-3, stages).0.contains("accuracy"), "{}", with(9e-3, stages).0);
+    assert!(with(0.02, stages).0.contains("inside a step"), "{}", with(0.02, stages).0);
     let some = Certificate { local_error: Some(0.02), ..coarse.clone() }.to_string();
     assert!(
         some.contains("accuracy:    local errors up to 2.0e-2 of the state in a step, and"),
@@ -99,4 +111,13 @@ fn the_line_of_the_entropy_is_about_steps_that_were_not_targeted() {
     for text in [with(free, 0), with(held, 0), with(all, 2)] {
         assert!(text.contains("entropy:     "), "{text}");
     }
+}
+
+#[test]
+fn stability_sets_the_steps_where_more_than_half_of_them_are_at_its_edge() {
+    let limited = |stability| {
+        let projected_steps = ProjectedSteps { stability, ..ProjectedSteps::default() };
+        Certificate { projected_steps, ..ONE_FALL }.is_limited_by_stability()
+    };
+    assert_eq!([2, 3, 4, 7].map(limited), [false, false, true, true]);
 }

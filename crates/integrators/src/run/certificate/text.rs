@@ -15,8 +15,10 @@ use crate::step::{Effort, LedgerSummary, LimitingSites, NoiseSummary};
 
 /// The local error from which on a hundred steps may be off by what a picture shows: about 27 steps of the midpoint rule
 /// in a turn.
+/// A factor of four fails `run/certificate/tests.rs::one_is_no_plural`.
 const COARSE: f64 = 1e-3;
 /// This bound inside a step with stages, whose end is more accurate.
+/// A factor of four fails `run/certificate/tests.rs::one_is_no_plural`.
 const COARSE_INSIDE: f64 = 1e-2;
 
 impl fmt::Display for Certificate {

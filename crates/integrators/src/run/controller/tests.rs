@@ -75,3 +75,45 @@ fn the_controller_stays_within_its_bounds() {
     assert_eq!(pace.attempt(8.5, 10.0), (0.75, false));
     assert_eq!(pace.attempt(2.0, 10.0), (1.0, false));
 }
+
+/// A pace without bounds that would matter, at the size 1.
+fn free(rule: &Rule) -> Pace {
+    let pace = Pace { end: 1e9, tolerance: 1e-4, largest: Some(1e6), next: 1.0, ..Pace::default() };
+    assert!(pace.least(rule) < 1e-3);
+    pace
+}
+
+#[test]
+fn a_step_with_the_error_that_is_allowed_is_followed_by_a_slightly_smaller_one() {
+    let rule = Rule { order: 2, control: Control::of_order(2), start: 0.0 };
+    let mut pace = free(&rule);
+    pace.accept(&rule, 1.0, 1.0);
+    assert!((0.8..1.0).contains(&pace.next), "{}", pace.next);
+    // A step without an error is remembered as one with a small error, after which the next one is not cut to a tenth.
+    pace.accept(&rule, 1.0, 0.0);
+    pace.accept(&rule, 1.0, 1.0);
+    assert!((0.25..0.3).contains(&pace.next), "{}", pace.next);
+}
+
+#[test]
+fn the_bound_after_a_fall_of_the_entropy_is_raised_slowly() {
+    let rule = Rule { order: 5, control: Control::of_order(5), start: 0.0 };
+    let mut pace = free(&rule);
+    pace.reject_fall(1.0);
+    let bound = pace.next;
+    assert!((0.5..0.9).contains(&bound), "{bound}");
+    let mut steps = 0;
+    while pace.next <= bound {
+        pace.accept(&rule, pace.next, 1e-3);
+        steps += 1;
+        assert!(steps < 40, "it is never raised");
+    }
+    assert!(steps > 10, "it is raised after {steps} steps");
+    assert!(pace.next < 1.6 * bound, "{} after {bound}", pace.next);
+    // A step that was held ends the row of tries, and the size is again the one before it, and somewhat more.
+    let before = pace.next;
+    pace.reject_fall(before);
+    pace.reject_fall(pace.next);
+    pace.accept_held(&rule, pace.next);
+    assert!(pace.next > before && pace.next < 2.0 * before, "{} after {before}", pace.next);
+}

@@ -86,9 +86,6 @@ impl<N: Dimension> Measure<N> {
 /// The norm of a residual that is taken for round-off, in units of the norm of its bounds.
 /// A factor of four fails `tests/tangent/schemes.rs::tangents_of_schemes_are_those_of_differences`.
 pub(crate) const NORM: f64 = 3.0;
-/// The multiple of its round-off that the last correction may leave of a component, where the norm of the
-/// residual has fallen to a hundredth of its own.
-const HIDDEN: f64 = 1.0;
 /// The multiple of round-off below which the change of a residual says nothing of the Jacobian.
 /// A factor of four fails `tests/tangent/schemes.rs::tangents_of_schemes_are_those_of_differences`.
 const NOISE: f64 = 1e3;
@@ -247,7 +244,7 @@ impl Newton {
             best.iterations += 1;
             let round = best.residual <= residual_bound
                 || contraction * best.residual <= SURE * residual_bound;
-            if round && expected * size <= HIDDEN * most {
+            if round && expected * size <= most {
                 // What a slow contraction leaves below round-off has the same sign in each step; it costs
                 // one more solution to take it out.
                 best.best -= correction;

@@ -34,7 +34,7 @@ pub use error::StepError;
 pub use evidence::{Effort, EntropyStep, Evidence, LimitingSites, Promises, StageLaws};
 pub(crate) use flow::AnyFlow;
 pub use flow::{Element, Flow, Laws, Recheck, StateSpace};
-pub(crate) use initial_scales::classical_step;
+pub(crate) use initial_scales::{CUT, CUTS, SAME, classical_step};
 pub use jump_error::JumpError;
 pub use ledger::{EventExchange, LedgerSummary};
 pub use memory::{Memory, RestoreError, Saved};

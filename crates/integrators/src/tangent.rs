@@ -49,6 +49,9 @@ mod state;
 mod steps;
 mod tape;
 
+/// The most corrections of a root, which converge quadratically.
+const CORRECTIONS: usize = 10;
+
 pub use adjoint::{AdjointRun, Adjoints, LossGradient, WITHIN};
 pub use along::LinearisedAlong;
 pub use certificate::Sensitivity;

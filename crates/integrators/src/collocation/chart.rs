@@ -11,6 +11,8 @@ use metriplectic_fields::{Column, Dimension, Matrix, Space, Square, Vector};
 use metriplectic_manifolds::Manifold;
 use num_dual::Dual64;
 
+use crate::round_off::bound::SUMMED;
+
 /// The velocity at `φ_x(q)` with the components `v` in the chart at `x`, in the chart at `y`:
 /// `d/dε φ_y⁻¹(φ_x(q + εv))`.
 #[inline]
@@ -40,9 +42,6 @@ pub(super) struct StepChart<M: Space> {
     half: Vector<M>,
 }
 
-/// Units of round-off within which a chart is normal along a ray.
-const NORMAL: f64 = 64.0 * f64::EPSILON;
-
 impl<M: Manifold> StepChart<M> {
     /// The chart of the step with the displacement `u` at `x`; `None` beyond the edge of a chart.
     #[inline]
@@ -55,7 +54,7 @@ impl<M: Manifold> StepChart<M> {
         if !(d.is_finite() && back.is_finite()) {
             return None;
         }
-        let rounded = |i: usize| shift[i].abs() <= NORMAL * (sizes[i] + d[i].abs());
+        let rounded = |i: usize| shift[i].abs() <= SUMMED * (sizes[i] + d[i].abs());
         if (0..M::Dim::LEN).all(rounded) {
             let end = M::chart(x, u);
             return Some(Self { z, d, end, shift: Vector::<M>::zero(), half });

@@ -36,16 +36,10 @@ pub(super) fn start_of<'a, Y: Metriplectic>(
     Start { system, x, time, h, values, accumulated_error }
 }
 
-/// The change of the energy at a stage, relative to the size of its terms, that no motion makes.
-const FAR: f64 = 1.0;
-
 /// The error of the laws of a method that damps, in units of their round-off, above which the end is moved onto them.
 /// Near an equilibrium the entropy falls with the energy.
 /// A factor of four fails `tests/stiff_friction.rs::gas_containers_with_a_wall_that_leaks_fast`.
 const DAMPED_LAW: f64 = 0.125;
-
-/// The ratio `R²/(½ (1 − R²))` of a deviation above which it is not damped.
-const DAMPED: f64 = 1.0;
 
 /// Tries a step whole.
 pub(super) fn try_step<Y: Metriplectic>(
@@ -70,10 +64,10 @@ pub(super) fn try_step<Y: Metriplectic>(
         .all(|k| (0..Dim::<Y>::LEN).all(|c| (h * k[c]).abs() <= 2.0 * round_off[c]));
     let rise = if tableau.one_sided { at.growth + at.surplus } else { at.growth };
     // What is left of a deviation by the ratio R produces R² hλ of what the step has produced, or more. A deviation
-    // that the entropy does not show is round-off.
+    // that the entropy does not show is round-off. It is damped where the ratio R²/(½ (1 − R²)) is at most 1.
     let produced = at.growth.abs() + at.surplus + ROUNDED * at.sizes.entropy;
     // hλ has no unit; where it is below 1, friction is resolved.
-    let damped = DAMPED * linear.friction.max(1.0) * produced;
+    let damped = linear.friction.max(1.0) * produced;
     let evidence = Evidence {
         entropy_slope: at.entropy_slope,
         dissipates: rise.abs() > NOTHING * values.entropy.abs(),
@@ -82,10 +76,10 @@ pub(super) fn try_step<Y: Metriplectic>(
         stages: Some(StageLaws::new(at.error * ROUNDED, at.surplus)),
         ..Evidence::default()
     };
-    // A root whose stages have quite another energy belongs to no motion from here.
-    if at.excursion > FAR * values.energy.abs() {
+    // A root whose stages are off the energy by its whole size belongs to no motion from here.
+    if at.excursion > values.energy.abs() {
         let [before, after] = sizes_on_a_step(system, [x, &at.end]);
-        if at.excursion > FAR * before.max(after) {
+        if at.excursion > before.max(after) {
             return Err(failed(Cause::Unsolved, effort));
         }
     }

@@ -94,7 +94,7 @@ impl<Y: Metriplectic> TimedStep<'_, Y> {
     fn explicit_guess(&self, x: &Point<Y>, h: f64) -> Option<Unknowns<Y>> {
         let Tableau { stages, matrix, .. } = self.tableau;
         let mut k = [Vector::<Y::Manifold>::zero(); STAGES];
-        for _ in 0..PASSES {
+        for _ in 0..2 {
             let before = k;
             for i in 0..*stages {
                 let q = combined(*stages, &matrix[i], &before) * h;
@@ -174,9 +174,6 @@ impl<Y: Metriplectic> TimedStep<'_, Y> {
         Ok((solved, StageSolution { end, z, stages, lost, evidence, effort }))
     }
 }
-
-/// Passes of the iteration that guesses the first step.
-const PASSES: usize = 2;
 
 /// The most stages, for the systems of a step.
 pub(crate) const MOST: usize = STAGES;

@@ -1,5 +1,6 @@
 //! The interface between explicit methods and systems.
 
+use crate::round_off::bound::SUMMED;
 use crate::step::{Element, Flow, Laws, Vector};
 
 /// A flow on which explicit methods run: it says the rates of a stage, and moves a state onto its laws. Every
@@ -167,9 +168,6 @@ pub enum Limit<'a, V> {
     },
 }
 
-/// The length of a projection, relative to the sizes of the entries, that is round-off: some units of it.
-const NEAR: f64 = 64.0 * f64::EPSILON;
-
 impl<V> Copy for Limit<'_, V> {}
 
 impl<V> Clone for Limit<'_, V> {
@@ -221,7 +219,7 @@ impl<'a, V: Vector> Limit<'a, V> {
 
 /// Half of a displacement. Round-off is never too far.
 fn half_of([step, size]: [f64; 2]) -> f64 {
-    (0.5 * step.abs()).max(NEAR * size)
+    (0.5 * step.abs()).max(SUMMED * size)
 }
 
 fn half_in_units([step, size, unit]: [f64; 3]) -> f64 {

@@ -14,6 +14,7 @@ use super::rest::{self, is_hardly};
 use super::stage::{Here, combined, produced, stage};
 use super::tableau::{Compiled, Row, STAGES, Stages, Tableau};
 use super::trial::Trial;
+use crate::step::failure::HALVES;
 use crate::step::{
     Effort, Element, EntropyStep, Evidence, MethodError, Refusal, StepError, StepStart, Taken,
     Vector,
@@ -24,8 +25,6 @@ const FALLS: u32 = 5;
 /// Falls in a row after which a model is wrong, even if its friction produces entropy. A step beyond the edge of stability
 /// falls too, and a smaller one does not: the first steps of a stiff model may be 10³ times too long.
 const MANY_FALLS: u32 = 24;
-/// How often a step of a fixed size is halved.
-const HALVES: u32 = 12;
 
 /// Tries a step.
 #[inline]

@@ -7,12 +7,11 @@ use super::fluctuating::{Fluctuating, Landing};
 use super::numbers::Numbers;
 use super::system::Noisy;
 use crate::explicit::along;
+use crate::step::failure::HALVES;
 use crate::step::{
     Effort, Element, Evidence, Laws, MethodError, StepError, StepStart, Stepper, Taken, Vector as _,
 };
 
-/// How often a flow is halved.
-const HALVES: u32 = 12;
 /// The least way of the noise, in units of the entries, along which the derivative of friction is measured.
 const LEAST: f64 = 1e-6;
 

@@ -234,9 +234,6 @@ where
     Some(Target::new(step, promises, theta, entropy).reached_from(&y, line))
 }
 
-/// Halvings of a step.
-const HALVES: usize = 10;
-
 /// Why `Radau` does not take a system.
 #[derive(Clone, Copy, Debug, thiserror::Error)]
 #[error(
@@ -300,12 +297,17 @@ macro_rules! open_stages {
             ) -> Result<Taken<OpenSystem<Y, C, X>>, StepError> {
                 damps(Self::tableau(), start)?;
                 let mut whole = true;
-                halves::take(start, h, Self::SPLITS.min(HALVES), &mut |start, h, fallbacks| {
-                    if !std::mem::replace(&mut whole, false) {
-                        *memory = StageMemory::default();
-                    }
-                    open_step(Self::tableau(), start, h, memory, fallbacks)
-                })
+                halves::take(
+                    start,
+                    h,
+                    Self::SPLITS.min(Gauss::<1>::SPLITS),
+                    &mut |start, h, fallbacks| {
+                        if !std::mem::replace(&mut whole, false) {
+                            *memory = StageMemory::default();
+                        }
+                        open_step(Self::tableau(), start, h, memory, fallbacks)
+                    },
+                )
             }
 
             fn attempt(

@@ -9,8 +9,8 @@ use metriplectic_manifolds::Manifold;
 /// A factor of four fails `tests/tangent/schemes.rs::tangents_of_schemes_are_those_of_differences`.
 pub(crate) const ROUNDED: f64 = 4.0 * f64::EPSILON;
 
-/// The error of a derivative, relative to the size of its terms, that is round-off: a closure adds terms of its own.
-pub(crate) const OF_A_DERIVATIVE: f64 = 64.0 * f64::EPSILON;
+/// The round-off of a number that a closure or a chart sums, relative to the size of its terms.
+pub(crate) const SUMMED: f64 = 64.0 * f64::EPSILON;
 
 /// The change of the energy, relative to the size of its terms, that is no round-off: no step is taken
 /// that changes it by more.

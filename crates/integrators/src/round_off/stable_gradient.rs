@@ -7,7 +7,7 @@ use metriplectic_fields::{
 };
 use metriplectic_manifolds::{InnerProduct, Manifold, MetricSlopes, Nodes, StepPathJet};
 
-use super::bound::OF_A_DERIVATIVE;
+use super::bound::SUMMED;
 
 /// A field along one path: the data of a discrete gradient at `f64`.
 ///
@@ -204,7 +204,7 @@ impl<M: Manifold> StableGradient<M> {
         let rows = self.defect_slope(path, (dmean, df_end));
         let rows = Vector::<M>::from_index(|k| but_round_off(rows[k], terms(k)));
         // The defect is an integral and a part of a difference, whose round-off is rounded once more where the integral replaces it.
-        let size = OF_A_DERIVATIVE * (self.change.abs() + self.rounding) + self.noise;
+        let size = SUMMED * (self.change.abs() + self.rounding) + self.noise;
         let is_noise = self.defect.abs() <= size;
         let defect = if is_noise { 0.0 } else { self.defect };
         Self::corrected_slope((defect, rows), at, path, dmean)
@@ -251,7 +251,7 @@ impl<M: Manifold> StableGradient<M> {
 
 /// The number `x`, or zero where it is round-off of terms of this size.
 pub(crate) fn but_round_off(x: f64, terms: f64) -> f64 {
-    if x.abs() <= OF_A_DERIVATIVE * terms { 0.0 } else { x }
+    if x.abs() <= SUMMED * terms { 0.0 } else { x }
 }
 
 /// The squared length below which a path is measured in units of its own.

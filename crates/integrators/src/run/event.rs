@@ -173,9 +173,6 @@ const INSIDE: [f64; 4] = [0.2, 0.4, 0.6, 0.8];
 /// The width of a bracket, as a fraction of the step, at which an event is found.
 const WIDTH: f64 = 2.0 * f64::EPSILON;
 
-/// The difference of two fractions of a step that are found as one time.
-const SAME_TIME: f64 = 8.0 * f64::EPSILON;
-
 /// Where a run goes on after a jump.
 pub(crate) struct Restart<'a, M: StateSpace> {
     /// The state after the jump.
@@ -323,7 +320,7 @@ impl<M: StateSpace> Events<M> {
             return Some(Found { events, end: Some(Interruption::Stop) });
         }
         let at = thetas[order[end]];
-        let (later, same_time) = (end + 1.., |i: &usize| thetas[order[*i]] <= at + SAME_TIME);
+        let (later, same_time) = (end + 1.., |i: &usize| thetas[order[*i]] <= at + 4.0 * WIDTH);
         let with_it = later.take_while(|i| *i < order.len()).take_while(same_time);
         let with_it = with_it.map(|i| (events[i].index, events[i].rises)).collect();
         events.truncate(end + 1);

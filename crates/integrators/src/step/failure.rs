@@ -41,6 +41,9 @@ const INCREMENTS: usize = 200;
 /// A factor of four fails `step/failure.rs::a_branch_is_followed_until_its_increments_are_tiny`.
 const LEAST: f64 = 1e-4;
 
+/// How often a step of a fixed size, or a flow, is halved that is not iterated.
+pub(crate) const HALVES: u32 = 12;
+
 /// Follows the solutions that begin at rest to the whole step, by fractions of its size: an increment doubles after
 /// a solution and is quartered after a failure. `solve` is given a solution with its fraction, and the next fraction.
 pub(crate) fn continue_in_step_size<T: Copy>(

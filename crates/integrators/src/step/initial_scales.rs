@@ -26,10 +26,10 @@ use super::{Element, Flow, Vector};
 const FIRST: f64 = 0.25;
 /// The factor by which `h` is decreased.
 /// A factor of four fails `step/initial_scales.rs::a_motion_that_leaves_the_numbers_is_cut`.
-const CUT: f64 = 0.25;
+pub(crate) const CUT: f64 = 0.25;
 /// How often it is: down to 10⁻¹⁸ of the span.
 /// A factor of four fails `step/initial_scales.rs::a_motion_that_leaves_the_numbers_is_cut`.
-const CUTS: usize = 30;
+pub(crate) const CUTS: usize = 30;
 /// The fraction of a displacement by which one step and two halves may differ. An oscillation at the rate `ω` is resolved
 /// for `ωh < 1.7`, and a relaxation at the rate `λ` for `λh < 1.7`.
 /// A factor of four fails `step/initial_scales.rs::a_relaxation_from_zero_reaches_its_end_whatever_the_span`.
@@ -38,7 +38,7 @@ const RESOLVED: f64 = 0.125;
 const NOTHING: f64 = 1e-9;
 /// The fraction by which the factor between one step and two halves may differ from the one for half the size of both. The
 /// displacement `t^k` has a factor that no size changes, between 1 and 2, and is above `1 + 1/8` from `k = 7` on.
-const SAME: f64 = 0.1;
+pub(crate) const SAME: f64 = 0.1;
 /// The displacement along the velocity, relative to the first `h`, at which late entries are told apart.
 const AHEAD: f64 = 1e-6;
 

@@ -24,7 +24,7 @@ use metriplectic_dynamics::{Bracket, Dissipation, Metriplectic, system::Point};
 use metriplectic_fields::{ChartPoint, Column, Matrix, Scalar, Square, Vector, jacobian};
 use metriplectic_manifolds::Manifold;
 
-use crate::step::{Components, Scales, classical_step as classical_step_of};
+use crate::step::{CUT, CUTS, Components, SAME, Scales, classical_step as classical_step_of};
 
 /// The velocity at `x`, and the sizes of what it is summed of; `None` if it cannot be evaluated there.
 pub(super) fn velocity_and_terms<Y: Metriplectic>(
@@ -84,7 +84,7 @@ pub(super) fn reach<Y: Metriplectic>(
             r = whole;
             break;
         }
-        delta *= 0.25;
+        delta *= CUT;
     }
     let classical = classical_step(system, x, v, delta).unwrap_or(origin);
     let sizes = Vector::<Y::Manifold>::from_index(|i| {
@@ -109,12 +109,9 @@ fn classical_step<Y: Metriplectic>(
 
 /// The fraction of a displacement below which the first powers of time say nothing of it.
 const LATE: f64 = 1e-6;
-/// How often the time `δ` is cut before the nonlinear part is given up.
-const CUTS: usize = 30;
-/// A nonlinear part that grows faster than `δ⁴` is that of a wall: `2⁴`, and a quarter more.
+/// A nonlinear part that grows faster than `δ⁴` is that of a wall: `2⁴`, and a quarter more. But for a power of `δ`, which grows by
+/// the same factor at half the time.
 const STEEPEST: f64 = 20.0;
-/// But for a power of `δ`, which grows by the same factor at half the time, to this fraction of it.
-const SAME: f64 = 0.1;
 /// The fraction of the terms of a velocity below which it may be noise: 2⁻¹⁶, far above round-off.
 const NOISE: f64 = 1.0 / 65_536.0;
 

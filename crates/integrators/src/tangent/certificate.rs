@@ -9,7 +9,7 @@ use metriplectic_manifolds::Manifold as _;
 
 use super::columns::{Columns, jets, row};
 use super::error::Unlinearised;
-use crate::round_off::bound::{BROKEN, OF_A_DERIVATIVE};
+use crate::round_off::bound::{BROKEN, SUMMED};
 use crate::step::Dim;
 use crate::step::digits::counted;
 
@@ -67,7 +67,7 @@ impl Sensitivity {
                 let (off, size) = ((here[j] - law[j]).abs(), sizes[j] + law[j].abs());
                 // The column of a direction on which nothing depends is rounding, relative to a unit of that direction.
                 let unit = terms / scales[j];
-                let size = if off <= OF_A_DERIVATIVE * unit { size.max(unit) } else { size };
+                let size = if off <= SUMMED * unit { size.max(unit) } else { size };
                 worse(worst, if off == 0.0 { 0.0 } else { off / size })
             })
         };

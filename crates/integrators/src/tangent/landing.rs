@@ -5,6 +5,7 @@ use metriplectic_fields::{Column as _, Dimension as _, Jet2, Space, Vector, powe
 use metriplectic_manifolds::{Manifold, MovingBase};
 use num_dual::Dual64;
 
+use super::CORRECTIONS;
 use super::duals::{Direction, Dual, ENERGY, ENTROPY, Fields, Numbers, derivative};
 use super::error::Unlinearised;
 use super::model::Model;
@@ -36,8 +37,6 @@ struct Normal<V> {
     rounding: f64,
 }
 
-/// The most corrections.
-const CORRECTIONS: usize = 10;
 /// A correction, relative to the size of its entry, after which one more leaves nothing: they converge quadratically, and
 /// their derivatives are one correction behind.
 const SMALL: f64 = 1e-9;

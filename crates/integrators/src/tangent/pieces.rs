@@ -10,8 +10,8 @@ use super::linearised::Propagated;
 use super::part::{Ended, Part, Wide};
 use crate::step::{Laws, Numbers, StepStart, Stepper};
 
-/// How often a step is halved at most.
-const HALVES: usize = 64;
+/// A step is not halved more often than it has digits.
+const DIGITS: u32 = f64::MANTISSA_DIGITS;
 
 /// A step that is taken again in the halves in which it was taken.
 struct Again<'a, D: Differentiable, M> {
@@ -22,7 +22,7 @@ struct Again<'a, D: Differentiable, M> {
 impl<D: Differentiable, M: Stepper<D>> Again<'_, D, M> {
     /// Takes a step, in halves where it is refused, and returns the laws at its end, with the entropy that is the reference of
     /// the next one.
-    fn take(&mut self, start: &StepStart<'_, D>, h: f64, left: usize) -> Option<Laws<Numbers<D>>> {
+    fn take(&mut self, start: &StepStart<'_, D>, h: f64, left: u32) -> Option<Laws<Numbers<D>>> {
         let mut memory = M::Memory::default();
         if let Ok(taken) = self.method.attempt(start, h, &mut memory) {
             let reference = if taken.evidence.dissipates {
@@ -62,12 +62,12 @@ where
     let mut again = Again { method, parts: Vec::new() };
     let half = 0.5 * ended.h;
     let parts = (|| {
-        let reference = again.take(start, half, HALVES)?;
+        let reference = again.take(start, half, DIGITS)?;
         let x = again.parts.last()?.end.clone();
         let (flow, time, allowed) = (start.flow, start.time + half, start.allowed);
         let values = crate::step::Flow::laws(flow, &x);
         let middle = StepStart { flow, x: &x, time, values, reference, allowed };
-        again.take(&middle, half, HALVES)
+        again.take(&middle, half, DIGITS)
     })();
     parts.ok_or(Unlinearised::Singular)?;
     if let Some(last) = again.parts.last_mut() {

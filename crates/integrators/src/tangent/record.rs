@@ -13,7 +13,7 @@ use super::event::TangentEvent;
 use super::refined::{REFINEMENTS, difference, refined};
 use super::state::TangentState;
 use super::steps::{Inside, Jumps, TangentSteps};
-use crate::round_off::bound::OF_A_DERIVATIVE;
+use crate::round_off::bound::SUMMED;
 use crate::run::SpanError;
 use crate::run::certificate::Certificate;
 use crate::run::ending::Ending;
@@ -136,7 +136,7 @@ pub trait Tangents: Sized {
         D: Differentiable,
         Self: Clone + Stepper<D> + LinearisedAlong<D>,
     {
-        if !(OF_A_DERIVATIVE..1.0).contains(&accuracy) {
+        if !(SUMMED..1.0).contains(&accuracy) {
             return Err(TangentError::Accuracy { accuracy });
         }
         let mut schedule: Schedule = schedule.into();

@@ -7,7 +7,7 @@ use metriplectic_manifolds::Manifold as _;
 use super::frames::between;
 use super::part::Wide;
 use super::state::TangentState;
-use crate::round_off::bound::OF_A_DERIVATIVE;
+use crate::round_off::bound::SUMMED;
 use crate::run::schedule::{Schedule, Size};
 use crate::step::Dim;
 
@@ -70,7 +70,7 @@ pub(super) fn difference<D: Differentiable>(
     });
     columns.fold(0.0, |worst, (j, off, size, unsized_rows)| {
         // A direction on which nothing depends, or whose deviation has decayed, has a column of rounding.
-        let is_rounding = off * units[j] <= OF_A_DERIVATIVE;
+        let is_rounding = off * units[j] <= SUMMED;
         let sized = if off == 0.0 || is_rounding { 0.0 } else { off / size };
         worse(worse(worst, sized), unsized_rows)
     })

@@ -20,6 +20,7 @@ use metriplectic_manifolds::{
 };
 use num_dual::Dual64;
 
+use super::CORRECTIONS;
 use super::columns::Columns;
 use super::error::Unlinearised;
 use super::frames::{between, turned};
@@ -43,9 +44,6 @@ self_adjoint!(Gonzalez, MeanValue, SymmetricItohAbe);
 
 /// An unknown, and its path.
 type Path<Y> = (Vector<<Y as Metriplectic>::Manifold>, StepPathJet<<Y as Metriplectic>::Manifold>);
-
-/// Corrections of the unknown of a path with a known end.
-const CORRECTIONS: usize = 8;
 
 /// The path of a retraction from `x` to `y`, by Newton's method on its end, which begins at the geodesic.
 fn path<Y, R>(system: &Y, retraction: &R, [x, y]: [&Point<Y>; 2]) -> Option<Path<Y>>

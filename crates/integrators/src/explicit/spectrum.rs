@@ -59,7 +59,7 @@ pub(super) fn spectrum<F: StageFlow>(
     };
     let sizes = flow.sizes(x);
     let small = f64::EPSILON.sqrt();
-    let mut radius = 0.0;
+    let (mut radius, mut turning, mut converged) = (0.0, 0.0, false);
     for _ in 0..ITERATIONS {
         let length = direction.relative_to(&sizes);
         if !(length > 0.0 && length.is_finite()) {
@@ -70,13 +70,15 @@ pub(super) fn spectrum<F: StageFlow>(
         let k = stage(flow, x, &q)?.velocity;
         direction = Vector::zip([&k, velocity], |[k, velocity]| k - velocity);
         let found = direction.relative_to(&sizes) / small;
-        let converged = (found - radius).abs() <= CHANGE * found;
-        radius = found;
+        converged = (found - radius).abs() <= CHANGE * found;
+        // A pair of complex eigenvalues stretches a direction and shortens it in turn.
+        let both = if radius > 0.0 { (radius * found).sqrt() } else { found };
+        (turning, radius) = (both, found);
         if converged {
             break;
         }
     }
-    let radius = SAFETY * radius;
+    let radius = SAFETY * if converged { radius } else { turning };
     radius.is_finite().then_some(Spectrum {
         radius,
         age: 0,
@@ -105,20 +107,25 @@ mod tests {
 
     #[test]
     fn the_radius_is_that_of_the_motion_and_somewhat_more() {
-        let system = System::on(Euclidean::<2>)
-            .bracket(Symplectic)
-            .energy(|x: &Vector2<Real>| x.x * x.y * 3.0)
-            .build()
-            .unwrap();
-        let x = vector![1.0, 0.5];
-        let v = system.rates(&x, &Components(vector![0.0, 0.0])).unwrap();
-        let mut known = spectrum(&system, &x, &v, None);
-        let radius = known.as_ref().unwrap().radius;
-        assert!((3.1..4.5).contains(&radius), "{radius} for 3");
+        let of = |field: fn(&Vector2<Real>) -> Real| {
+            System::on(Euclidean::<2>).bracket(Symplectic).energy(field).build().unwrap()
+        };
+        let (saddle, oscillator) = (of(|x| x.x * x.y * 3.0), of(|x| x.norm_squared() * 1.5));
+        let zero = Components(vector![0.0, 0.0]);
+        for x in [vector![1.0, 0.5], vector![1e-3, 1.0], vector![1.0, 1e-6]] {
+            for system in [&saddle, &oscillator] {
+                let v = system.rates(&x, &zero).unwrap();
+                let radius = spectrum(system, &x, &v, None).unwrap().radius;
+                assert!((3.1..4.5).contains(&radius), "{radius} for 3 at {x}");
+            }
+        }
+        let (system, x) = (&saddle, vector![1.0, 0.5]);
+        let v = system.rates(&x, &zero).unwrap();
+        let mut known = spectrum(system, &x, &v, None);
         // It is kept for some steps.
         let mut steps = 0;
         while known.as_ref().is_some_and(|known| known.age == steps) && steps < 1000 {
-            known = spectrum(&system, &x, &v, known);
+            known = spectrum(system, &x, &v, known);
             steps += 1;
         }
         assert!((10..60).contains(&steps), "{steps} steps");

@@ -154,6 +154,16 @@ fn times_of_events_have_derivatives() {
     let grazing = event
         .time_along(&|p: &Vector3<Real>| (p.x * p.x / 3.0 + p.y * p.y / 2.0 + p.z * p.z) * 0.5);
     assert!(matches!(grazing, Err(TangentError::Grazing { .. })));
+    // A function with a slope of 2·10⁻⁶ of what is possible crosses, one of 5·10⁻⁷ does not.
+    let (x, v) = (event.state.point, event.velocity);
+    let units = x.abs().map(|size| size.max(1e-3 * x.amax()));
+    let along = v.component_div(&units).normalize();
+    let across = along.cross(&Vector3::x()).normalize();
+    let crosses = |slope: f64| {
+        let df = (across + along * slope).component_div(&units);
+        event.time_along(&move |p: &Vector3<Real>| p.x * df.x + p.y * df.y + p.z * df.z).is_ok()
+    };
+    assert!(crosses(2e-6) && !crosses(5e-7));
 }
 
 /// Jumps and corners are refused: the tangent would be another one beyond them.

@@ -62,6 +62,7 @@ const STALLED_LAW: f64 = 8.0;
 /// A factor of four fails `tests/stiff_friction.rs::gas_containers_with_a_wall_that_leaks_fast`.
 const SLOW: f64 = 0.3;
 /// Halvings of one correction.
+/// A factor of four fails `tests/tangent/parts.rs::parts_of_a_step_are_chained`.
 const HALVINGS: usize = 8;
 /// The fraction of the round-off that a last correction without an evaluation has to promise.
 const SURE: f64 = 0.03;

@@ -12,11 +12,13 @@ use crate::step::{Element, EntropyStep, Laws, Vector};
 
 /// The fraction of the round-off of an increment by which the entropy may fall: less than what the certificate
 /// counts as a fall.
+/// A factor of four fails `tests/explicit.rs::unstable_equilibria_are_left_or_kept`.
 const FALL: f64 = 0.875;
 /// The entropy that is produced in a step, in units of the round-off of the entropy, by friction that is idle.
 /// A factor of four fails `tests/explicit.rs::a_sound_stiff_model_runs_in_steps_that_are_far_too_long`.
 const IDLE: f64 = 0.25;
 /// The length of a projection in units of the error that is allowed.
+/// A factor of four fails `tests/open/main.rs::a_system_without_entropy_is_isothermal`.
 const FAR: f64 = 10.0;
 
 /// Where a step ends.

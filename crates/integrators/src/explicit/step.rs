@@ -21,6 +21,7 @@ use crate::step::{
 };
 
 /// Falls of the entropy in a row after which a state that hardly moves is held.
+/// A factor of four fails `tests/dense_output.rs::the_states_inside_a_step_in_parts_are_those_of_the_motion`.
 const FALLS: u32 = 5;
 /// Falls in a row after which a model is wrong, even if its friction produces entropy. A step beyond the edge of stability
 /// falls too, and a smaller one does not: the first steps of a stiff model may be 10³ times too long.

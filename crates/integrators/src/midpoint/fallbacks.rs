@@ -286,6 +286,7 @@ fn iterations<M: Space, E>(solved: &Result<Root<M, E>, Iterate<M>>) -> usize {
 const NEARBY: f64 = 0.1;
 /// Linear systems after which a way from rest is no longer direct, and its end no longer likely to be
 /// the solution that belongs to the start.
+/// A factor of four fails `tests/stiff.rs::a_step_to_the_edge_of_a_logarithm_does_not_excuse_its_energy`.
 const DIRECT: usize = 8;
 
 /// Whether it is the edge of the domain that stops Newton's method at `u`: its correction leads out,

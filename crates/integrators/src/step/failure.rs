@@ -42,6 +42,7 @@ const INCREMENTS: usize = 200;
 const LEAST: f64 = 1e-4;
 
 /// How often a step of a fixed size, or a flow, is halved that is not iterated.
+/// A factor of four fails `tests/explicit.rs::stiff_friction_is_resolved_and_named`.
 pub(crate) const HALVES: u32 = 12;
 
 /// Follows the solutions that begin at rest to the whole step, by fractions of its size: an increment doubles after

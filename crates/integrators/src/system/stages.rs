@@ -217,6 +217,7 @@ struct Normals<N: Dimension, C: Dimension> {
 /// A factor of four fails `tests/explicit.rs::nothing_drifts_in_a_million_steps`.
 const OFF: f64 = 0.8;
 /// The most corrections.
+/// A factor of four fails `tests/open/traps.rs::a_protocol_that_jumps_is_resolved_by_small_steps`.
 const CORRECTIONS: usize = 8;
 /// Residuals, in units of round-off, with which a state is accepted that no correction improves.
 /// A factor of four fails `tests/dense_output.rs::outputs_keep_the_laws_and_change_no_step`.

@@ -35,6 +35,7 @@ impl<D: Differentiable> fmt::Debug for TangentEvent<D> {
 }
 
 /// The slope of a function along the motion, relative to what it could be, below which its event is grazing.
+/// A factor of four fails `tests/tangent/explicit.rs::times_of_events_have_derivatives`.
 const GRAZING: f64 = 1e-6;
 
 impl<D: Differentiable> TangentEvent<D> {

@@ -12,8 +12,10 @@ use crate::run::schedule::{Schedule, Size};
 use crate::step::Dim;
 
 /// How often a run is refined at most.
+/// A factor of four fails `tests/tangent/refined.rs::an_accuracy_that_is_not_reached_is_an_error`.
 pub(super) const REFINEMENTS: usize = 12;
 /// The factor of a tolerance between two runs.
+/// A factor of four fails `tests/tangent/refined.rs::derivatives_of_a_state_at_rest_reach_the_accuracy`.
 const TENTH: f64 = 0.1;
 
 /// The schedule with a tenth of its tolerance, or with halves of its steps, after a run with a method of an order and with steps up to

@@ -30,6 +30,7 @@ pub(crate) const CHEBYSHEV: Tableau =
 /// A factor of four fails `explicit/chebyshev.rs::the_step_is_of_order_two_and_stable_where_its_number_of_stages_says`.
 const DAMPING: f64 = 2.0 / 13.0;
 /// The most stages of a step; a step that needs more is too long.
+/// A factor of four fails `explicit/chebyshev.rs::a_step_of_thousands_of_stages_is_taken_and_a_longer_one_is_not`.
 const MOST: u32 = 4000;
 
 /// The stages of a step of size `h`.
@@ -178,5 +179,12 @@ mod tests {
             // And no more stages than it needs.
             assert!(count < 10 || factor(count, -1.2 * radius).abs() > 1.0, "{radius}: {count}");
         }
+    }
+
+    #[test]
+    fn a_step_of_thousands_of_stages_is_taken_and_a_longer_one_is_not() {
+        let count = stage_count(1e7);
+        assert!((3900..3950).contains(&count), "{count}");
+        assert!(stage_count(2e7) > MOST && stage_count(f64::INFINITY) > MOST);
     }
 }

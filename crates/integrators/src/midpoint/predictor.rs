@@ -17,9 +17,11 @@ pub(crate) struct Predictor<N: Dimension> {
 /// Displacements that are remembered.
 pub(crate) const DIFFERENCES: usize = 8;
 /// The order from which on a difference has to fall well below the one before to count.
+/// A factor of four fails `midpoint/predictor.rs::a_high_difference_counts_where_it_falls_well_below_the_one_before`.
 const LOW: usize = 4;
 /// The fraction of the squared difference before it that its own square may be: `1/4²`. Round-off grows by a factor
 /// of two from one order to the next.
+/// A factor of four fails `midpoint/predictor.rs::a_high_difference_counts_where_it_falls_well_below_the_one_before`.
 const FALLS: f64 = 0.0625;
 
 impl<N: Dimension> Default for Predictor<N> {
@@ -149,5 +151,28 @@ mod tests {
         let line = |t: f64| 0.3 * t;
         close(&memory(&line, 0.1, 1).rescaled(0.5), &memory(&line, 0.05, 1));
         close(&memory(&line, 0.1, 3).rescaled(3.0), &memory(&line, 0.3, 2));
+    }
+
+    #[test]
+    fn a_high_difference_counts_where_it_falls_well_below_the_one_before() {
+        // A displacement of 10 and its differences; the extrapolated displacement less 10.
+        let added = |differences: &[f64]| {
+            let mut memory = Predictor::<Const<1>>::default();
+            memory.known = differences.len() + 1;
+            for (slot, d) in
+                memory.differences.iter_mut().zip([&10.0].into_iter().chain(differences))
+            {
+                *slot = Vector1::new(*d);
+            }
+            memory.extrapolate().map(|d| d.x - 10.0).unwrap()
+        };
+        let is = |differences: &[f64], sum: f64| {
+            let added = added(differences);
+            assert!((added - sum).abs() < 1e-12, "{added} of {differences:?}");
+        };
+        // Low ones count as long as they fall, and from the fourth on those below a quarter.
+        is(&[1.0, 0.9, 0.8, 0.7, 0.6], 1.0 + 0.9 + 0.8);
+        is(&[1.0, 0.9, 0.8, 0.2 * 0.8, 0.16], 1.0 + 0.9 + 0.8 + 0.16);
+        is(&[1.0, 0.9, 0.8, 0.3 * 0.8, 0.01], 1.0 + 0.9 + 0.8);
     }
 }

@@ -157,8 +157,8 @@ mod tests {
     fn a_high_difference_counts_where_it_falls_well_below_the_one_before() {
         // A displacement of 10 and its differences; the extrapolated displacement less 10.
         let added = |differences: &[f64]| {
-            let mut memory = Predictor::<Const<1>>::default();
-            memory.known = differences.len() + 1;
+            let known = differences.len() + 1;
+            let mut memory = Predictor::<Const<1>> { known, ..Default::default() };
             for (slot, d) in
                 memory.differences.iter_mut().zip([&10.0].into_iter().chain(differences))
             {

@@ -51,7 +51,7 @@ pub(crate) fn of_an_increment<Y: Metriplectic>(system: &Y, ends: [&Point<Y>; 2])
     of_an_increment_to(system, ends, &jet)
 }
 
-/// The same, with the value and the differential of the entropy at the second end.
+/// The [round-off of an increment](of_an_increment), with the value and the differential of the entropy at the second end.
 pub(crate) fn of_an_increment_to<Y: Metriplectic>(
     system: &Y,
     [x, y]: [&Point<Y>; 2],

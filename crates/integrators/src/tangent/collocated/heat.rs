@@ -33,7 +33,7 @@ pub(super) struct Heating<'a, Y: Metriplectic> {
     pub(super) flat: &'a Flat<Y>,
     /// The differential of the energy at the start.
     pub(super) energy: Dual<Y>,
-    /// What the laws of energy and entropy miss.
+    /// The numbers `δ` by which the laws of energy and entropy are missed.
     pub(super) lost: [Dual64; 2],
 }
 

@@ -62,7 +62,7 @@ pub(super) struct Around<'a, Y: Metriplectic> {
     pub(super) points: Vec<Point<Y>>,
 }
 
-/// What a direction does to a step.
+/// A step along a direction.
 pub(super) struct Moved<Y: Metriplectic> {
     /// The size of the step.
     pub(super) size: Dual64,
@@ -73,7 +73,7 @@ pub(super) struct Moved<Y: Metriplectic> {
     pub(super) stages: Vec<MovedStage<Y>>,
 }
 
-/// What a direction does to a stage, in the chart at `X_i`.
+/// A stage along a direction, in the chart at `X_i`.
 pub(super) struct MovedStage<Y: Metriplectic> {
     pub(super) place: ChartPoint<Y::Manifold, Dual64>,
     /// The derivative of the point.

@@ -131,3 +131,40 @@ fn grazing_and_other_jumps_are_refused() {
     let error = refused(&system, DormandPrince8, narrow.into());
     assert!(matches!(error, TangentError::Broken { what: "jumps without derivatives" }), "{error}");
 }
+
+/// Another map is refused in each entry, also beside one that is 10¹¹ times as large.
+#[test]
+fn another_jump_is_refused_beside_a_large_entry() {
+    const WALL: f64 = 1e11;
+    let particle = Family::on(Euclidean::<2>)
+        .parameters(["restitution"])
+        .bracket(Symplectic)
+        .energy(|x: &Vector2<Real>, _: &Vector1<Real>| x.y * x.y * 0.5)
+        .build()
+        .unwrap();
+    let system = particle.at_parameters(vector![RESTITUTION]);
+    let bounced = |other: f64| {
+        let span = Span::until(3.0)
+            .tolerance(1e-10)
+            .event("wall", |x: &Vector2<f64>| x.x - WALL)
+            .rising()
+            .jump(|_, x: &Vector2<f64>| vector![x.x, -RESTITUTION * x.y])
+            .differentiable(
+                |_, (x, _): &Wide| x.x - WALL,
+                move |_, (x, e): &Wide| (vector![x.x, -e.x * x.y * other], *e),
+            );
+        let start = vector![WALL - 0.5, 1.0];
+        let [order_8, gauss] = [
+            DormandPrince8.tangent(&system, start, span.clone()).map(drop),
+            Gauss::<2>.tangent(&system, start, span).map(drop),
+        ];
+        [order_8, gauss]
+    };
+    for run in bounced(1.0) {
+        run.unwrap();
+    }
+    for run in bounced(0.9) {
+        let error = run.unwrap_err();
+        assert!(matches!(error, TangentError::OtherJump { off, .. } if off > 0.01), "{error}");
+    }
+}

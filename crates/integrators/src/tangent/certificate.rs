@@ -90,7 +90,7 @@ impl Sensitivity {
 }
 
 /// The larger of two numbers, where NaN is the largest.
-fn worse(old: f64, new: f64) -> f64 {
+pub(super) fn worse(old: f64, new: f64) -> f64 {
     if new > old || new.is_nan() { new } else { old }
 }
 

@@ -4,6 +4,7 @@ use metriplectic_dynamics::{Differentiable, Metriplectic};
 use metriplectic_fields::{Column as _, Dimension as _, Vector};
 use metriplectic_manifolds::Manifold as _;
 
+use super::certificate::worse;
 use super::frames::between;
 use super::part::Wide;
 use super::state::TangentState;
@@ -76,9 +77,4 @@ pub(super) fn difference<D: Differentiable>(
         let sized = if off == 0.0 || is_rounding { 0.0 } else { off / size };
         worse(worse(worst, sized), unsized_rows)
     })
-}
-
-/// The larger of two numbers, where NaN is the largest.
-fn worse(old: f64, new: f64) -> f64 {
-    if new > old || new.is_nan() { new } else { old }
 }

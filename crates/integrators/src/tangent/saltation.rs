@@ -18,6 +18,7 @@ use metriplectic_fields::{
 use metriplectic_manifolds::Manifold as _;
 
 use super::along::LinearisedAlong;
+use super::certificate::worse;
 use super::columns::{Columns, jets};
 use super::error::{TangentError, Unlinearised};
 use super::event::TangentEvent;
@@ -61,7 +62,7 @@ where
         let flow = self.steps.flow();
         let before = flow.widened(&event.state.point);
         self.sensitivity.enter(flow.wide(), &before, &event.state.columns).map_err(failed)?;
-        let columns = self.after(&event)?;
+        let columns = self.after(&event, scales)?;
         let reached = self.steps.state();
         let (step, time, point) = (reached.step, event.state.time, reached.point.clone());
         event.after = Some(self.at(step, time, point, columns.clone()));
@@ -69,10 +70,12 @@ where
         (self.columns, self.outputs) = (columns, outputs);
         Ok(inside)
     }
+
     /// The tangent after the jump at an event.
     fn after(
         &self,
         event: &TangentEvent<D>,
+        scales: &Scales<<D as crate::step::Flow>::Vector>,
     ) -> Result<Columns<Wide<D>>, TangentError<D::Manifold>> {
         let (flow, time, all) = (self.steps.flow(), event.state.time, Dim::<Wide<D>>::LEN);
         let Some(Some(smooth)) = self.jumps.get(event.event.index) else {
@@ -92,7 +95,7 @@ where
             let there = (smooth.map)(at(change), &moved(v));
             <Wide<D> as Metriplectic>::Manifold::coordinates(&y, &there)
         };
-        self.same_jump(event, &map(0.0, &Direction::<D>::zero()))?;
+        self.same_jump(event, scales, &map(0.0, &Direction::<D>::zero()))?;
         let before =
             Direction::<D>::from_index(|i| if i < Dim::<D>::LEN { event.velocity[i] } else { 0.0 });
         let rate = slope(1.0, &before);
@@ -120,19 +123,27 @@ where
         Ok(columns)
     }
 
-    /// Refuses derivatives of another map than the one by which the state has jumped.
+    /// Refuses derivatives of another map than the one by which the state has jumped, entry by entry in units of the sizes of the run.
     fn same_jump(
         &self,
         event: &TangentEvent<D>,
+        scales: &Scales<<D as crate::step::Flow>::Vector>,
         off: &Vector<<Wide<D> as Metriplectic>::Manifold, Real>,
     ) -> Result<(), TangentError<D::Manifold>> {
-        let sizes = D::Manifold::scales(&self.steps.state().point);
-        let largest = (0..Dim::<D>::LEN).fold(0.0, |most: f64, i| most.max(sizes[i]));
-        let off = (0..Dim::<D>::LEN).fold(0.0, |most: f64, i| most.max(off[i].re.abs()));
-        if off <= NEAR * largest {
+        let n = Dim::<D>::LEN;
+        let [before, after] =
+            [&event.state.point, &self.steps.state().point].map(D::Manifold::scales);
+        let sizes =
+            Vector::<D::Manifold>::from_index(|i| scales.sizes.0[i].max(before[i]).max(after[i]));
+        let largest = (0..n).fold(0.0, |most: f64, i| most.max(sizes[i]));
+        // An entry that has been zero has no size of its own.
+        let size = |i: usize| if sizes[i] > 0.0 { sizes[i] } else { largest };
+        let terms = (0..n).filter(|&i| off[i].re != 0.0).map(|i| off[i].re.abs() / size(i));
+        let off = terms.fold(0.0, worse);
+        if off <= NEAR {
             return Ok(());
         }
         let (event, time) = (event.event.name.to_string(), event.state.time);
-        Err(TangentError::OtherJump { event, time, off: off / largest })
+        Err(TangentError::OtherJump { event, time, off })
     }
 }

@@ -86,7 +86,7 @@ impl Drop for Journal {
     /// Releases the lock. Closing the file does not: a process that another thread starts has the file open until it
     /// becomes its program, and the lock would last as long.
     fn drop(&mut self) {
-        // Where there are no locks, there is none to release.
+        // A file system without locks refuses this.
         _ = self.file.unlock();
     }
 }

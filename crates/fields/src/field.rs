@@ -31,7 +31,7 @@ use crate::{ChartPoint, Column, Dimension, Form, Matrix, Real, Scalar, Space, Sq
     note = "a type of your own implements `ScalarField` with the generic method `at`"
 )]
 pub trait ScalarField<M: Space> {
-    /// Whether the field is constant by construction, so that its differential is zero. A system whose entropy is
+    /// Says whether the field is constant by construction, so that its differential is zero. A system whose entropy is
     /// constant has no friction, and does not evaluate its dissipation.
     const IS_CONSTANT: bool = false;
 

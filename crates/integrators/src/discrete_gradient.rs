@@ -75,7 +75,7 @@ pub trait DiscreteGradient: Copy + Debug + Send + Sync {
         by_dual_numbers(self, f, x, path)
     }
 
-    /// Whether the mean covector is the differential `dF(z)`.
+    /// Says whether the mean covector is the differential `dF(z)`.
     const IS_DIFFERENTIAL: bool = false;
 
     /// Computes the mean covector with its derivatives along the unknowns of the paths from either end of a step, which have one

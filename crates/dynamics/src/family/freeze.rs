@@ -16,7 +16,7 @@ pub trait Freeze<const P: usize> {
     /// The part of the system on `M`.
     type Narrow;
 
-    /// Whether the part depends on the parameters. Said of metrics, brackets and dissipations; a field always may.
+    /// Says whether a metric, a bracket or a dissipation depends on the parameters. A field always may.
     const DEPENDS: bool = true;
 
     /// Freezes the part at `θ`.

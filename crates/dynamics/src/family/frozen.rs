@@ -77,7 +77,7 @@ pub trait Differentiable: Metriplectic {
     /// The names of the parameters.
     fn parameters(&self) -> &[&'static str];
 
-    /// Whether the metric, the bracket or the dissipation depends on the parameters, and not the fields alone. Where it does
+    /// Returns whether the metric, the bracket or the dissipation depends on the parameters, and not the fields alone. If it does
     /// not, the derivative of a velocity along a parameter is that along covectors.
     fn tensors_depend(&self) -> bool {
         true

@@ -117,7 +117,7 @@ pub(crate) struct HeatStart<N: Dimension> {
 }
 
 impl<N: Dimension> HeatStart<N> {
-    /// Whether an entry is not warmed.
+    /// Returns whether an entry is not warmed.
     pub(crate) fn is_still(&self, entry: usize) -> bool {
         self.still.as_ref()[entry]
     }

@@ -134,7 +134,7 @@ impl<M: Manifold> StableGradient<M> {
         (1.0 + noise.powi(2)).recip()
     }
 
-    /// Whether the path is so short that a difference of values has lost digits.
+    /// Returns whether the path is so short that a difference of values has lost digits.
     pub(crate) fn is_short(&self) -> bool {
         f64::EPSILON * self.change.abs() <= SHORT * self.rounding
     }

@@ -44,8 +44,8 @@ const SMALL: f64 = 1e-9;
 /// A point of a system with derivatives.
 pub(super) type DualPoint<Y> = <<Y as Metriplectic>::Manifold as Space>::Point<Dual64>;
 
-/// The residuals of the laws that are corrected. The derivative of a correction by round-off is none of the step, and near an
-/// equilibrium it is far above round-off.
+/// The residuals of the laws that are corrected. The derivative of a correction by round-off does not belong to the step, and near
+/// an equilibrium it is far above round-off.
 #[derive(Clone, Copy)]
 enum Residuals {
     All,

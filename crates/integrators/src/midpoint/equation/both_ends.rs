@@ -25,7 +25,7 @@ use crate::step::{CountOf, Dim};
 pub(super) struct FromBothEnds<N: Dimension> {
     value: N::Vector<f64>,
     slopes: [N::Matrix<f64>; 2],
-    /// Whether the path is so short that differences of values lose digits; of a differential, which has no defect, `None`.
+    /// Says whether the path is so short that differences of values lose digits. It is `None` for a differential, which has no defect.
     is_short: Option<bool>,
 }
 

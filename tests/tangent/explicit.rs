@@ -155,8 +155,7 @@ fn times_of_events_have_derivatives() {
         .time_along(&|p: &Vector3<Real>| (p.x * p.x / 3.0 + p.y * p.y / 2.0 + p.z * p.z) * 0.5);
     assert!(matches!(grazing, Err(TangentError::Grazing { .. })));
     // A function with a slope of 2·10⁻⁶ of what is possible crosses, one of 5·10⁻⁷ does not.
-    let (x, v) = (event.state.point, event.velocity);
-    let units = x.abs().map(|size| size.max(1e-3 * x.amax()));
+    let (v, units) = (event.velocity, event.sizes);
     let along = v.component_div(&units).normalize();
     let across = along.cross(&Vector3::x()).normalize();
     let crosses = |slope: f64| {
@@ -164,6 +163,54 @@ fn times_of_events_have_derivatives() {
         event.time_along(&move |p: &Vector3<Real>| p.x * df.x + p.y * df.y + p.z * df.z).is_ok()
     };
     assert!(crosses(2e-6) && !crosses(5e-7));
+}
+
+/// An oscillator whose position has the size `a` and whose momentum has the size `b`, with the period of the one in units of 1.
+fn oscillator(
+    a: f64,
+    b: f64,
+) -> impl Differentiable<Manifold = Euclidean<2>, Wide: Metriplectic<Manifold = Euclidean<2>>> {
+    System::on(Euclidean::<2>)
+        .bracket(Symplectic)
+        .energy(move |x: &Vector2<Real>| {
+            let (q, p) = (x.x / a, x.y / b);
+            ((q * q + p * p) * 0.5 + q.powi(4) * 0.1) * (a * b)
+        })
+        .build()
+        .expect("it is a system")
+}
+
+/// Times of events have derivatives, and are grazing or not, whatever the units of the entries.
+#[test]
+fn events_do_not_depend_on_units() {
+    macro_rules! same {
+        ($name:literal, $method:expr) => {
+            let [unit, large, small] = [[1.0, 1.0], [1e11, 1e-3], [1e-9, 1e5]].map(|[a, b]| {
+                let span = Span::steps(0.1, 40);
+                let span = span.event("p", move |x: &Vector2<f64>| x.y / b + 0.6).stop();
+                let run = $method.tangent(&oscillator(a, b), vector![a, 0.0], span).unwrap();
+                let event = &run.events()[0];
+                // A slope of 2·10⁻⁶ of what is possible crosses, one of 5·10⁻⁷ does not.
+                let along = event.velocity.component_div(&event.sizes).normalize();
+                let crosses = |slope: f64| {
+                    let df =
+                        (vector![-along.y, along.x] + along * slope).component_div(&event.sizes);
+                    event.time_along(&move |x: &Vector2<Real>| x.x * df.x + x.y * df.y).is_ok()
+                };
+                assert!(crosses(2e-6) && !crosses(5e-7), "{}: units {a:e} and {b:e}", $name);
+                let time = event.time_along(&|x: &Vector2<Real>| x.y / b).unwrap();
+                vector![time[0] * a, time[1] * b]
+            });
+            let off = [large, small].map(|time| (time - unit).amax() / unit.amax());
+            println!("{}: off by {:.1e} and {:.1e}", $name, off[0], off[1]);
+            assert!(off.iter().all(|off| *off < 1e-11), "{}: {off:?}", $name);
+        };
+    }
+    same!("order 8", DormandPrince8);
+    same!("order 5", DormandPrince5);
+    same!("midpoint", Scheme::new(WeylMidpoint).gradient(MeanValue));
+    same!("Gauss", Gauss::<2>);
+    same!("Radau", Radau::<2>);
 }
 
 /// Jumps and corners are refused: the tangent would be another one beyond them.

@@ -4,7 +4,6 @@ use std::fmt;
 
 use metriplectic_dynamics::Differentiable;
 use metriplectic_fields::{Column as _, Dimension as _, ScalarField, Vector};
-use metriplectic_manifolds::Manifold as _;
 use nalgebra::DVector;
 
 use super::error::TangentError;
@@ -20,6 +19,8 @@ pub struct TangentEvent<D: Differentiable> {
     pub state: TangentState<D>,
     /// The velocity of the state along the size of the last step. It is that of the discrete map.
     pub velocity: Vector<D::Manifold>,
+    /// The largest size that each entry has had in the run, or soon has from its start; zero for one that stays zero.
+    pub sizes: Vector<D::Manifold>,
     /// The state after its [jump](crate::Watched::jump), with its derivatives at the same fixed time.
     pub after: Option<TangentState<D>>,
 }
@@ -47,7 +48,7 @@ impl<D: Differentiable> TangentEvent<D> {
     ///
     /// # Errors
     ///
-    /// [`TangentError::Grazing`] if `dg·v` is smaller than `10⁻⁶` of its terms.
+    /// [`TangentError::Grazing`] if `|dg·v| ≤ 10⁻⁶ |dg||v|`, with the entries in units of their [`sizes`](Self::sizes).
     pub fn time_along(
         &self,
         g: &impl ScalarField<D::Manifold>,
@@ -88,15 +89,15 @@ impl<D: Differentiable> TangentEvent<D> {
         Ok(self.state.matrix() + velocity * time.transpose())
     }
 
-    /// The lengths of a differential and of the velocity, in units of the sizes of the entries or of what they reach in a unit of
-    /// the motion.
+    /// The lengths of a differential and of the velocity, in units of the sizes of the entries.
+    ///
+    /// An entry without a size does not move.
     fn lengths(&self, df: &Vector<D::Manifold>) -> (f64, f64) {
-        let scales = D::Manifold::scales(&self.state.point);
-        let largest = (0..Dim::<D>::LEN).fold(0.0, |most: f64, i| most.max(scales[i]));
-        let unit = |i: usize| if scales[i] > 0.0 { scales[i].max(1e-3 * largest) } else { largest };
-        let n = Dim::<D>::LEN;
-        let dg = (0..n).fold(0.0, |sum, i| sum + (df[i] * unit(i)).powi(2)).sqrt();
-        let speed = (0..n).fold(0.0, |sum, i| sum + (self.velocity[i] / unit(i)).powi(2)).sqrt();
-        (dg, speed)
+        let entries = (0..Dim::<D>::LEN).filter(|&i| self.sizes[i] > 0.0);
+        let (dg, speed) = entries.fold((0.0, 0.0), |(dg, speed), i| {
+            let size = self.sizes[i];
+            (dg + (df[i] * size).powi(2), speed + (self.velocity[i] / size).powi(2))
+        });
+        (dg.sqrt(), speed.sqrt())
     }
 }

@@ -55,14 +55,14 @@ where
         }
         for event in found {
             let theta = (event.state.time - start) / h;
-            inside.events.push(self.event(&last, event, theta).map_err(failed)?);
+            inside.events.push(self.event(&last, scales, event, theta).map_err(failed)?);
         }
         let theta = (event.state.time - start) / h;
-        let mut event = self.event(&last, event, theta).map_err(failed)?;
+        let mut event = self.event(&last, scales, event, theta).map_err(failed)?;
         let flow = self.steps.flow();
         let before = flow.widened(&event.state.point);
         self.sensitivity.enter(flow.wide(), &before, &event.state.columns).map_err(failed)?;
-        let columns = self.after(&event, scales)?;
+        let columns = self.after(&event)?;
         let reached = self.steps.state();
         let (step, time, point) = (reached.step, event.state.time, reached.point.clone());
         event.after = Some(self.at(step, time, point, columns.clone()));
@@ -75,7 +75,6 @@ where
     fn after(
         &self,
         event: &TangentEvent<D>,
-        scales: &Scales<<D as crate::step::Flow>::Vector>,
     ) -> Result<Columns<Wide<D>>, TangentError<D::Manifold>> {
         let (flow, time, all) = (self.steps.flow(), event.state.time, Dim::<Wide<D>>::LEN);
         let Some(Some(smooth)) = self.jumps.get(event.event.index) else {
@@ -95,7 +94,7 @@ where
             let there = (smooth.map)(at(change), &moved(v));
             <Wide<D> as Metriplectic>::Manifold::coordinates(&y, &there)
         };
-        self.same_jump(event, scales, &map(0.0, &Direction::<D>::zero()))?;
+        self.same_jump(event, &map(0.0, &Direction::<D>::zero()))?;
         let before =
             Direction::<D>::from_index(|i| if i < Dim::<D>::LEN { event.velocity[i] } else { 0.0 });
         let rate = slope(1.0, &before);
@@ -127,14 +126,11 @@ where
     fn same_jump(
         &self,
         event: &TangentEvent<D>,
-        scales: &Scales<<D as crate::step::Flow>::Vector>,
         off: &Vector<<Wide<D> as Metriplectic>::Manifold, Real>,
     ) -> Result<(), TangentError<D::Manifold>> {
         let n = Dim::<D>::LEN;
-        let [before, after] =
-            [&event.state.point, &self.steps.state().point].map(D::Manifold::scales);
-        let sizes =
-            Vector::<D::Manifold>::from_index(|i| scales.sizes.0[i].max(before[i]).max(after[i]));
+        let after = D::Manifold::scales(&self.steps.state().point);
+        let sizes = Vector::<D::Manifold>::from_index(|i| event.sizes[i].max(after[i]));
         let largest = (0..n).fold(0.0, |most: f64, i| most.max(sizes[i]));
         // An entry that has been zero has no size of its own.
         let size = |i: usize| if sizes[i] > 0.0 { sizes[i] } else { largest };

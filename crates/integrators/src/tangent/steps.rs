@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use metriplectic_dynamics::Differentiable;
 use metriplectic_fields::{Column as _, Dimension as _, Space as _, Square as _, Vector};
+use metriplectic_manifolds::Manifold as _;
 
 use super::along::LinearisedAlong;
 use super::certificate::Sensitivity;
@@ -24,7 +25,7 @@ use crate::run::jump::SmoothJump;
 use crate::run::last_step::LastStep;
 use crate::run::requests::{Outputs, rounding};
 use crate::run::steps::Steps;
-use crate::step::{Dim, Flow as _, Stepper};
+use crate::step::{Dim, Flow, Scales, Stepper};
 
 /// A run with its tangent, step by step; made by [`Tangents::tangent_steps`](crate::Tangents::tangent_steps).
 ///
@@ -137,7 +138,7 @@ where
         }
         for event in found {
             let theta = (event.state.time - before.time) / (self.steps.state().time - before.time);
-            inside.events.push(self.event(&last, event, theta).map_err(failed)?);
+            inside.events.push(self.event(&last, &scales, event, theta).map_err(failed)?);
         }
         let state = self.steps.state();
         let ended = Ended::of_run(&state.point, &last);
@@ -196,6 +197,7 @@ where
     pub(super) fn event(
         &self,
         last: &LastStep<'_, D>,
+        scales: &Scales<<D as Flow>::Vector>,
         event: Event<D::Manifold>,
         theta: f64,
     ) -> Result<TangentEvent<D>, Unlinearised> {
@@ -217,6 +219,8 @@ where
         }
         let (step, time) = (event.state.step, event.state.time);
         let state = self.at(step, time, event.state.point.clone(), columns);
-        Ok(TangentEvent { event, state, velocity, after: None })
+        let (ends, reached) = (&scales.sizes, D::Manifold::scales(&state.point));
+        let sizes = Vector::<D::Manifold>::from_index(|i| ends.0[i].max(reached[i]));
+        Ok(TangentEvent { event, state, velocity, sizes, after: None })
     }
 }

@@ -503,6 +503,69 @@ fn an_orbit_in_si_units_is_that_in_astronomical_ones() {
     }
 }
 
+/// An oscillator that warms a bath, `x = (q, p, s)`, with entries in units of `a`, `b` and `c`: energies have the unit `ab`, and times the
+/// unit 1. The metric stays that of the numbers, so that a discrete gradient along it mixes the units.
+fn warming([a, b, c]: [f64; 3]) -> impl Metriplectic<Manifold = Euclidean<3>, Metric = Canonical> {
+    let structure = matrix![0.0, 1.0, 0.0; -1.0, 0.0, 0.0; 0.0, 0.0, 0.0];
+    System::on(Euclidean::<3>)
+        .bracket(Poisson::constant(structure).expect("it is antisymmetric"))
+        .energy(move |x: &Vector3<Real>| {
+            let (q, p, s) = (x.x / a, x.y / b, x.z / c);
+            ((q * q + p * p) * 0.5 + q.powi(4) * 0.1 + s.exp() * 0.7) * (a * b)
+        })
+        .entropy(|x: &Vector3<Real>| x.z)
+        .dissipation(FieldDissipation(move |_: &Vector3<Real>, w: &Vector3<Real>| {
+            let v = Vector3::new(0.0.into(), w.z, -w.y);
+            v * v.transpose() * (w.z.recip() * (0.2 * b / a))
+        }))
+        .build()
+        .expect("the parts make a system")
+}
+
+/// A position that starts from rest has no displacement in the first guess, and one in a large unit none above the round-off of another.
+#[test]
+fn every_method_starts_from_rest_in_any_units() {
+    let units = [
+        [1.5e10, 6.5e-8, 1e6],
+        [5.4e11, 5.8e-7, 1.1e9],
+        [1e12, 1e-4, 1.0],
+        [1e20, 1.0, 1.0],
+        [1e-10, 1e-23, 1e-22],
+        [1e11, 1e25, 1e-3],
+    ];
+    let starts = [[1.0, 0.0, 0.1], [1.0, 1e-17, 0.1], [1.0, 1e-20, 0.0], [1e-9, 1.0, 1e-17]];
+    let start = |i: usize| Vector3::from(starts[i]);
+    let twin = warming([1.0; 3]);
+    let exact = [0, 1, 2, 3].map(|i| {
+        DormandPrince8.run(&twin, start(i), Span::until(4.0).tolerance(1e-13)).unwrap().last().point
+    });
+    macro_rules! as_in_units_of_one {
+        ($($method:expr, $span:expr);+) => {$(
+            let mut worst = [0.0_f64; 2];
+            for i in 0..starts.len() {
+                let off = |units: [f64; 3]| {
+                    let (system, units) = (warming(units), Vector3::from(units));
+                    let run = $method.run(&system, start(i).component_mul(&units), $span).unwrap();
+                    (run.last().point.component_div(&units) - exact[i]).amax()
+                };
+                let own = off([1.0; 3]);
+                let error = units.map(off).into_iter().fold(0.0, f64::max);
+                worst = [worst[0].max(own), worst[1].max(error)];
+                assert!(error <= 5.0 * own + 1e-12, "{}: {error:e}, {own:e}", stringify!($method));
+            }
+            println!("{}: {:.1e}, in other units {:.1e}", stringify!($method), worst[0], worst[1]);
+        )+};
+    }
+    as_in_units_of_one!(
+        WeylMidpoint, Span::steps(0.02, 200);
+        Scheme::new(WeylMidpoint).gradient(MeanValue), Span::steps(0.02, 200);
+        Scheme::new(WeylMidpoint).gradient(SymmetricItohAbe), Span::steps(0.02, 200);
+        Gauss::<2>, Span::steps(0.1, 40);
+        Radau::<2>, Span::until(4.0).tolerance(1e-7);
+        DormandPrince8, Span::until(4.0).tolerance(1e-9)
+    );
+}
+
 /// The inner product of a projection onto the laws has no unit of its own to go by.
 #[test]
 fn explicit_methods_have_the_errors_of_the_dimensionless_twin_in_si_units() {

@@ -94,6 +94,16 @@ const NOISE: f64 = 1e3;
 const SURE: f64 = 0.01;
 /// The multiple of round-off below which a residual says little about its Jacobian.
 const NEAR: f64 = 10.0;
+/// The fraction of each component of a solution that the last correction may change unchecked.
+/// A factor of four fails `newton/tests.rs::a_tenth_of_each_component_may_go_unchecked`.
+const UNCHECKED: f64 = 0.1;
+
+/// Whether a correction changes each component of a solution by a fraction of it, or by its round-off: then the Jacobian is about that
+/// of the solution, so that the contraction so far predicts the next one.
+#[inline]
+fn is_small<V: Column<f64>>(correction: &V, u: &V, round_off: &V) -> bool {
+    (0..V::LEN).all(|i| correction[i].abs() <= UNCHECKED * u[i].abs() + round_off[i])
+}
 
 /// Where a Jacobian is first used.
 struct Start<M: Space, E> {
@@ -244,7 +254,7 @@ impl Newton {
             best.iterations += 1;
             let round = best.residual <= residual_bound
                 || contraction * best.residual <= SURE * residual_bound;
-            if round && expected * size <= most {
+            if round && expected * size <= most && is_small(&correction, &best.best, &round_off) {
                 // What a slow contraction leaves below round-off has the same sign in each step; it costs
                 // one more solution to take it out.
                 best.best -= correction;

@@ -1,10 +1,11 @@
 //! The guess of a displacement.
 
 use metriplectic_dynamics::Metriplectic;
-use metriplectic_fields::{ChartPoint, Column, Dimension, Vector};
+use metriplectic_dynamics::system::Point;
+use metriplectic_fields::{ChartPoint, Column, Dimension, Space as _, Vector};
 use metriplectic_manifolds::Manifold;
 
-use crate::step::Start;
+use crate::step::{Dim, Start};
 
 /// The displacements of the steps before, from which the next one is extrapolated.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -110,10 +111,25 @@ impl<N: Dimension> Predictor<N> {
     }
 }
 
-/// The explicit Euler displacement `h (Π dH + K dS)(x)`.
+/// The explicit Euler displacement `h (Π dH + K dS)(x)`; an entry that it does not move gets that of the velocity in its middle.
+///
+/// A position that starts from rest would else have no displacement beside those of its momentum, which may have a unit so small that a
+/// discrete gradient along them is round-off.
 fn explicit<Y: Metriplectic>(system: &Y, start: &Start<'_, Y>) -> Option<Vector<Y::Manifold>> {
-    let displacement = system.velocity(&ChartPoint::<Y::Manifold>::centre(start.x)).ok()? * start.h;
-    displacement.is_finite().then_some(displacement)
+    let displacement = |x: &Point<Y>| {
+        let velocity = system.velocity(&ChartPoint::<Y::Manifold>::centre(x)).ok()?;
+        let displacement = velocity * start.h;
+        displacement.is_finite().then_some(displacement)
+    };
+    let (u, sizes) = (displacement(start.x)?, Y::Manifold::scales(start.x));
+    let rests = |i: usize| sizes[i] > 0.0 && u[i].abs() <= f64::EPSILON * sizes[i];
+    if !(0..Dim::<Y>::LEN).any(rests) {
+        return Some(u);
+    }
+    let later = displacement(&Y::Manifold::chart(start.x, &(u * 0.5))).unwrap_or(u);
+    // A stiff entry would move by more than its size.
+    let moves = |i: usize| rests(i) && later[i].abs() <= sizes[i];
+    Some(Vector::<Y::Manifold>::from_index(|i| if moves(i) { later[i] } else { u[i] }))
 }
 
 #[cfg(test)]

@@ -93,3 +93,42 @@ fn a_missing_root_is_an_error_with_the_best_point() {
     let undefined = Newton::default().solve(&Logarithm, &vector![-1.0]).unwrap_err();
     assert!(undefined.residual.is_infinite());
 }
+
+/// `q = 5·10¹¹ p`, `p = −1.4·10⁻⁴`, whose Jacobian at `q = 0` has round-off in place of a zero.
+struct RoundOffInTheJacobian;
+
+impl Equation<Euclidean<2>> for RoundOffInTheJacobian {
+    type Evidence = ();
+
+    fn evaluate(&self, u: &Vector2<f64>) -> Option<Evaluated<Euclidean<2>, ()>> {
+        let residual = vector![u.x - 5e11 * u.y, u.y + 1.4e-4];
+        Some(Evaluated { residual, evidence: () })
+    }
+
+    fn linearise(&self, u: &Vector2<f64>) -> Option<Linearised<Euclidean<2>, ()>> {
+        let round_off = if u.x == 0.0 { 7e-5 } else { 0.0 };
+        Some(Linearised {
+            residual: self.value(u)?,
+            jacobian: Matrix2::new(1.0, -5e11, round_off, 1.0),
+            rounding: Rounding { argument: vector![2e-6, 0.0], ..rounding(vector![1e-6, 1e-20]) },
+            stiffness: Stiffness::default(),
+            evidence: (),
+        })
+    }
+}
+
+/// The first correction solves the first equation in full, from which the next contraction would seem to be 10⁻¹².
+#[test]
+fn a_correction_as_large_as_the_solution_is_checked() {
+    let root = Newton::default().solve(&RoundOffInTheJacobian, &vector![0.0, -1.4e-4]).unwrap();
+    let off = root.u.component_div(&vector![-7e7, -1.4e-4]) - Vector2::repeat(1.0);
+    assert!(off.amax() < 1e-12, "{}", root.u);
+}
+
+#[test]
+fn a_tenth_of_each_component_may_go_unchecked() {
+    let (u, round_off) = (vector![1.0, -1e-6], vector![1e-16, 1e-9]);
+    assert!(is_small(&vector![-0.09, 1e-7], &u, &round_off));
+    assert!(!is_small(&vector![-0.11, 1e-7], &u, &round_off));
+    assert!(!is_small(&vector![-0.09, 1.1e-7], &u, &round_off));
+}

@@ -278,7 +278,7 @@ fn erased_closures_have_one_type_and_the_bits_of_the_closures() {
 }
 
 /// The messages are part of the interface: the first lines say what to write instead.
-/// `TRYBUILD=overwrite cargo test -p metriplectic-tests --test doors` renews the snapshots.
+/// `TRYBUILD=overwrite cargo test -p metriplectic-compile-tests` renews the snapshots.
 #[test]
 fn the_compiler_explains_what_is_not_a_field() {
     let cases = trybuild::TestCases::new();
@@ -311,7 +311,7 @@ fn short(message: &str) -> String {
 /// A reader who searches for a message finds it as a heading of the book. `…` stands for the rest of it.
 #[test]
 fn every_message_is_a_heading_of_the_book() {
-    let page = include_str!("../book/src/compiler_messages.md");
+    let page = include_str!("../../book/src/compiler_messages.md");
     let headings: Vec<&str> = page.lines().filter_map(|line| line.strip_prefix("## ")).collect();
     let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/doors");
     let mut messages = 0;

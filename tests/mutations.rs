@@ -281,8 +281,8 @@ fn the_friction_of_a_certificate_is_that_of_the_steps_however_long_a_jacobian_is
         run.certificate().friction
     };
     // It grows by a factor of four in the course of the run, and a Jacobian is kept for 100 steps.
-    // At h = 0.05 these are a quarter of it.
-    for (h, count, least) in [(0.01, 2000, 0.98), (0.05, 400, 0.85)] {
+    // At h = 0.03 these are a seventh of it.
+    for (h, count, least) in [(0.01, 2000, 0.98), (0.02, 1000, 0.85), (0.03, 660, 0.9)] {
         let run = WeylMidpoint.run(&system, start, Span::steps(h, count)).unwrap();
         let states = run.states().iter().step_by(5);
         let largest = states.map(|state| friction(&state.point, h)).fold(0.0, f64::max);
@@ -367,11 +367,28 @@ fn a_vector_transport_is_the_identity_up_to_the_length_of_the_step() {
 #[test]
 fn an_invariant_that_is_not_conserved_where_it_depends_on_the_others_is_an_error() {
     let system = cusp();
-    // A solver that takes nearly everything for a solution steps beyond it.
-    let scheme = Scheme::new(WeylMidpoint).newton(Newton { tolerance: 1e14, ..Newton::default() });
-    let run = scheme.run(&system, BEFORE_THE_CUSP, Span::steps(0.3, 10));
-    let Err(RunError::Step { cause, trajectory }) = run else { panic!("{run:?}") };
-    let StepError::DependentInvariants { index, fraction, .. } = cause else { panic!("{cause}") };
-    assert!(index == 0 && fraction < 1e-3, "{cause}");
-    assert!(!trajectory.certificate().keeps_invariants(), "{}", trajectory.certificate());
+    let mut errors = 0;
+    for h in [0.1, 0.2, 0.25, 0.3, 0.4] {
+        for quarters in 40..68_u8 {
+            // A solver that takes nearly everything for a solution steps beyond it.
+            let tolerance = 10_f64.powf(0.25 * f64::from(quarters));
+            let newton = Newton { tolerance, ..Newton::default() };
+            let scheme = Scheme::new(WeylMidpoint).newton(newton);
+            let certificate = match scheme.run(&system, BEFORE_THE_CUSP, Span::steps(h, 10)) {
+                Ok(run) => run.certificate().clone(),
+                Err(RunError::Step { cause, trajectory }) => {
+                    let StepError::DependentInvariants { index, fraction, .. } = cause else {
+                        panic!("{cause}")
+                    };
+                    assert!(index == 0 && fraction < 1e-3, "{cause}");
+                    errors += 1;
+                    trajectory.certificate().clone()
+                }
+                Err(error) => panic!("{error}"),
+            };
+            assert!(!certificate.keeps_invariants(), "h = {h}, {tolerance:e}: {certificate}");
+        }
+    }
+    // Most solutions are so far off that the differentials are independent there.
+    assert!(errors >= 3, "{errors}");
 }

@@ -181,6 +181,7 @@ fn ahead<Y: Metriplectic>(system: &Y, x: &Point<Y>, h: f64) -> Vec<Point<Y>> {
 }
 
 /// The fractions of a step that fails at which its model is looked at.
+/// A factor of four fails `system.rs::a_model_is_looked_at_from_an_eighth_of_a_step_to_its_end`.
 const AHEAD: [f64; 4] = [0.125, 0.25, 0.5, 1.0];
 
 /// The further invariants of a system at a point.
@@ -219,4 +220,41 @@ fn dependent_invariant<Y: Metriplectic>(system: &Y, x: &Point<Y>) -> Option<(usi
 }
 
 /// The independent fraction of a further invariant's differential that explains a failure.
+/// A factor of four fails `system.rs::an_invariant_with_a_thousandth_that_is_independent_explains_a_failure`.
 const DEPENDENT: f64 = 1e-3;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use metriplectic_dynamics::{Symplectic, System};
+    use metriplectic_fields::Real;
+    use metriplectic_manifolds::Euclidean;
+    use nalgebra::{Vector2, Vector3, vector};
+
+    #[test]
+    fn a_model_is_looked_at_from_an_eighth_of_a_step_to_its_end() {
+        let system = System::on(Euclidean::<2>)
+            .bracket(Symplectic)
+            .energy(|x: &Vector2<Real>| x.norm_squared() * 0.5)
+            .build()
+            .unwrap();
+        let x = vector![1.0, 0.0];
+        let along: Vec<f64> = ahead(&system, &x, 0.4).iter().map(|y| -y.y).collect();
+        let expected = [0.05, 0.1, 0.2, 0.4];
+        assert_eq!(along.len(), 4);
+        assert!(along.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-15), "{along:?}");
+    }
+
+    #[test]
+    fn an_invariant_with_a_thousandth_that_is_independent_explains_a_failure() {
+        let system = System::on(Euclidean::<3>)
+            .energy(|x: &Vector3<Real>| x.z)
+            .entropy(|x: &Vector3<Real>| -x.x)
+            .casimir(|x: &Vector3<Real>| x.z + x.y * x.y)
+            .build()
+            .unwrap();
+        // Beside dH it is 2y dy, in units of y against those of z.
+        let found = |y: f64| dependent_invariant(&system, &vector![0.0, y, 1.0]);
+        assert!(found(0.02).is_some_and(|(index, _)| index == 0) && found(0.04).is_none());
+    }
+}

@@ -17,6 +17,7 @@ use crate::step::failure::{Cause, Fallbacks, smallest_part};
 use crate::step::{Dim, Effort, Evidence, Flow as _, Laws, Start, StepError, Taken};
 
 /// The rate `|K'|` times the size of the first part, where friction is stiff.
+/// A factor of four fails `collocation/parts.rs::the_first_part_is_some_times_of_the_friction`.
 const FIRST: f64 = 4.0;
 /// The ratio of a part to the one before it, and to one that was not solved.
 /// A factor of four fails `tests/tangent/collocated.rs::parameters_of_a_metric_are_columns_of_stages`.
@@ -231,6 +232,40 @@ impl Parts {
                 StepError::DependentInvariants { time, index, change, fraction }
             }
             _ => StepError::NotConverged { time, h, residual, tried, suggested },
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::collocation::tableau::RADAU;
+    use crate::step::StepStart;
+    use metriplectic_dynamics::{FieldDissipation, Poisson, System};
+    use metriplectic_fields::Real;
+    use metriplectic_manifolds::Euclidean;
+    use nalgebra::{Vector3, matrix, vector};
+
+    #[test]
+    fn the_first_part_is_some_times_of_the_friction() {
+        // p' = −p γ beside a bath: h|K'| = γ h.
+        let structure = matrix![0.0, 1.0, 0.0; -1.0, 0.0, 0.0; 0.0, 0.0, 0.0];
+        let system = System::on(Euclidean::<3>)
+            .bracket(Poisson::constant(structure).unwrap())
+            .energy(|x: &Vector3<Real>| (x.x * x.x + x.y * x.y) * 0.5 + x.z)
+            .entropy(|x: &Vector3<Real>| x.z)
+            .dissipation(FieldDissipation(|_: &Vector3<Real>, w: &Vector3<Real>| {
+                let b = Vector3::new(0.0.into(), w.z, -w.y);
+                b * b.transpose() * (Real::from(1.0) / w.z)
+            }))
+            .build()
+            .unwrap();
+        let x = vector![1.0, 0.0, 0.0];
+        for h in [1e3, 1e5, 1e7] {
+            let start = Start::of(&StepStart::first(&system, &x), h);
+            let parts = Parts { tableau: &RADAU[1], splits: 60, effort: Effort::default() };
+            let first = h * parts.first_part(&start);
+            assert!((2.0..=4.0).contains(&first), "{first}");
         }
     }
 }

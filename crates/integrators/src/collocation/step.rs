@@ -9,16 +9,13 @@ use super::fallbacks::{self, StepFailure};
 use super::memory::{LastStep, StageMemory};
 use super::solve::Solved;
 use super::tableau::Tableau;
-use crate::round_off::bound::{ROUNDED, breaks_first_law, sizes_on_a_step};
+use crate::round_off::bound::{ROUNDED, breaks_first_law, is_dissipated, sizes_on_a_step};
 use crate::round_off::compensation::Displaced;
 use crate::round_off::drift;
 use crate::step::failure::{Cause, Fallbacks};
 use crate::step::{
     CountOf, Dim, Effort, Evidence, Flow as _, Laws, Numbers, StageLaws, Start, StepStart, Taken,
 };
-
-/// The growth of the entropy, relative to its value, below which a step of friction is round-off.
-const NOTHING: f64 = 1e-6 * f64::EPSILON;
 
 /// The start of a step with what earlier steps have left of the laws.
 pub(super) fn start_of<'a, Y: Metriplectic>(
@@ -70,7 +67,7 @@ pub(super) fn try_step<Y: Metriplectic>(
     let damped = linear.friction.max(1.0) * produced;
     let evidence = Evidence {
         entropy_slope: at.entropy_slope,
-        dissipates: rise.abs() > NOTHING * values.entropy.abs(),
+        dissipates: is_dissipated(rise.abs(), values.entropy),
         friction: if at.left <= damped { 0.0 } else { linear.friction },
         rests,
         stages: Some(StageLaws::new(at.error * ROUNDED, at.surplus)),

@@ -8,8 +8,10 @@ use crate::step::{Element, Vector};
 /// A factor of four fails `explicit/spectrum.rs::the_radius_is_that_of_the_motion_and_somewhat_more`.
 const PATIENCE: u32 = 25;
 /// The most iterations of the power method.
+/// A factor of four fails `explicit/spectrum.rs::the_power_method_ends_where_the_radius_no_longer_changes`.
 const ITERATIONS: u32 = 50;
 /// The relative change of the estimate at which they end.
+/// A factor of four fails `explicit/spectrum.rs::the_power_method_ends_where_the_radius_no_longer_changes`.
 const CHANGE: f64 = 0.01;
 /// The ratio of the radius that is used to the estimate, which may be too small.
 /// A factor of four fails `explicit/spectrum.rs::the_radius_is_that_of_the_motion_and_somewhat_more`.
@@ -97,10 +99,12 @@ fn irregular<V: Vector>(sizes: &V) -> V {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::atomic::{AtomicU32, Ordering};
+
     use metriplectic_dynamics::{Symplectic, System};
     use metriplectic_fields::Real;
     use metriplectic_manifolds::Euclidean;
-    use nalgebra::{Vector2, vector};
+    use nalgebra::{Vector2, Vector4, vector};
 
     use super::*;
     use crate::step::{Components, Flow as _};
@@ -129,5 +133,34 @@ mod tests {
             steps += 1;
         }
         assert!((10..60).contains(&steps), "{steps} steps");
+    }
+
+    #[test]
+    fn the_power_method_ends_where_the_radius_no_longer_changes() {
+        static COUNT: AtomicU32 = AtomicU32::new(0);
+        fn counted(value: Real) -> Real {
+            COUNT.fetch_add(1, Ordering::Relaxed);
+            value
+        }
+        type Field = fn(&Vector4<Real>) -> Real;
+        let iterations = |field: Field| {
+            let system = System::on(Euclidean::<4>).bracket(Symplectic).energy(field);
+            let (system, x) = (system.build().unwrap(), vector![1.0, 0.5, 0.7, 0.9]);
+            let zero = Components(vector![0.0, 0.0, 0.0, 0.0]);
+            let v = system.rates(&x, &zero).unwrap();
+            let evaluations = |work: &dyn Fn()| {
+                COUNT.store(0, Ordering::Relaxed);
+                work();
+                COUNT.load(Ordering::Relaxed)
+            };
+            let one = evaluations(&|| drop(stage(&system, &x, &zero)));
+            evaluations(&|| drop(spectrum(&system, &x, &v, None))) / one
+        };
+        // Eigenvalues ±3 and ±2.4, of which the smaller ones fade like 0.8ᵏ.
+        let saddles = iterations(|x| counted(x.x * x.z * 2.4 + x.y * x.w * 3.0));
+        // ±3i and sizes that differ: the ratio goes up and down.
+        let turns = iterations(|x| counted(x.x * x.x * 1.5 + x.z * x.z * 6.0 + x.y * x.w * 0.1));
+        println!("{saddles} and {turns} iterations");
+        assert!((5..9).contains(&saddles) && (40..60).contains(&turns), "{saddles}, {turns}");
     }
 }

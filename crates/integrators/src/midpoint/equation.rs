@@ -17,7 +17,7 @@ use providers::{Along, Defined, Jets, Values};
 use super::scheme::Scheme;
 use crate::discrete_gradient::DiscreteGradient;
 use crate::newton::{Equation, Evaluated, Linearised, Rounding, Stiffness};
-use crate::round_off::bound::ROUNDED;
+use crate::round_off::bound::{ROUNDED, is_dissipated};
 use crate::round_off::drift;
 use crate::round_off::stable_gradient::Segment;
 use crate::step::{CountOf, DriftCorrection, Flow as _, Laws, Numbers, Start};
@@ -274,12 +274,11 @@ where
         })
     }
 
-    /// Whether the entropy production is more than the square of its round-off: a million steps of it change
-    /// the entropy by more than a rounding.
+    /// What the entropy production of an evaluation says.
     fn dissipated(&self, w: &Vector<Y::Manifold>, production: f64) -> Dissipated {
         Dissipated {
             slope_squared: if self.is_exact() { w.dot(w) } else { f64::INFINITY },
-            dissipates: self.h.abs() * production > 1e-6 * f64::EPSILON * self.values.entropy.abs(),
+            dissipates: is_dissipated(self.h.abs() * production, self.values.entropy),
         }
     }
 

@@ -184,6 +184,7 @@ fn evidence<M: Manifold>(root: &Root<M, Dissipated>, friction: f64) -> Evidence 
 }
 
 /// The rate `h|K'|` of friction from which on the round-off of a solution may be large.
+/// A factor of four fails `midpoint/step.rs::a_solution_without_digits_is_one_of_very_stiff_friction`.
 const VERY_STIFF: f64 = 1e8;
 
 /// Whether the round-off of a solution is small: if friction is so stiff that the slow motion has no digits
@@ -203,4 +204,35 @@ fn has_digits<Y: Metriplectic>(
     }
     let dh = start.system.energy().jet1(start.x).df.abs();
     dh.dot(round_off) <= BROKEN * (start.values.energy.abs() + dh.dot(&scales))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::step::StepStart;
+    use metriplectic_dynamics::{Symplectic, System};
+    use metriplectic_fields::Real;
+    use metriplectic_manifolds::Euclidean;
+    use nalgebra::{Vector2, vector};
+
+    #[test]
+    fn a_solution_without_digits_is_one_of_very_stiff_friction() {
+        let system = System::on(Euclidean::<2>)
+            .bracket(Symplectic)
+            .energy(|x: &Vector2<Real>| x.norm_squared() * 0.5)
+            .build()
+            .unwrap();
+        let x = vector![1.0, 1.0];
+        let start = Start::of(&StepStart::first(&system, &x), 0.1);
+        let evidence = Dissipated { slope_squared: 1.0, dissipates: true };
+        let root = Root {
+            u: vector![0.1, 0.1],
+            residual: 0.0,
+            round_off: vector![0.1, 0.1],
+            residual_bound: 1.0,
+            iterations: 1,
+            evidence,
+        };
+        assert!(has_digits(&start, &root, 5e7) && !has_digits(&start, &root, 2e8));
+    }
 }

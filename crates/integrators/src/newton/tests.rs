@@ -1,7 +1,7 @@
 use super::*;
-use metriplectic_fields::{Matrix, Square as _};
+use metriplectic_fields::{Matrix, Square};
 use metriplectic_manifolds::Euclidean;
-use nalgebra::{Matrix1, Matrix2, Vector1, Vector2, vector};
+use nalgebra::{Matrix1, Matrix2, Matrix3, Vector1, Vector2, Vector3, vector};
 
 /// Round-off of the terms alone.
 fn rounding<M: Space>(terms: Vector<M>) -> Rounding<M> {
@@ -131,4 +131,35 @@ fn a_tenth_of_each_component_may_go_unchecked() {
     assert!(is_small(&vector![-0.09, 1e-7], &u, &round_off));
     assert!(!is_small(&vector![-0.11, 1e-7], &u, &round_off));
     assert!(!is_small(&vector![-0.09, 1.1e-7], &u, &round_off));
+}
+
+#[test]
+fn an_inverse_that_is_off_by_a_hundredth_is_none() {
+    let mut near = [0; 2];
+    for k in 0..4000_u32 {
+        let entry = |i: u32| (f64::from(9 * k + i) * 0.618_033_988_749_894_9).fract() - 0.5;
+        let vectors = [0, 3, 6].map(|i| vector![entry(i), entry(i + 1), entry(i + 2)]);
+        let small = 10_f64.powf(-13.0 - 3.0 * f64::from(k % 100) / 100.0);
+        let jacobian = vectors[0] * vectors[1].transpose()
+            + vectors[1] * vectors[2].transpose()
+            + Matrix3::identity() * small;
+        let Some(inverse) = Square::inverse(&jacobian) else { continue };
+        let product = inverse * jacobian;
+        let off = (0..3).map(|i| (product[(i, i)] - 1.0).abs()).fold(0.0, f64::max);
+        let at = Linearised::<Euclidean<3>, ()> {
+            residual: Vector3::zeros(),
+            jacobian,
+            rounding: rounding(Vector3::zeros()),
+            stiffness: Stiffness::default(),
+            evidence: (),
+        };
+        let found = Inverse::of(&at, 1.0);
+        near[0] += u32::from((0.003..0.009).contains(&off));
+        near[1] += u32::from((0.011..0.035).contains(&off));
+        // At the bound itself the order of the sum decides.
+        if !(0.009..0.011).contains(&off) {
+            assert_eq!(found.is_some(), off < 0.01, "{off:e}");
+        }
+    }
+    assert!(near[0] > 10 && near[1] > 10, "{near:?}");
 }

@@ -10,6 +10,7 @@ use super::system::{CovectorsOf, OpenSystem, StateOf};
 use crate::step::{Flow as _, StepError};
 
 /// The slope of a law along a velocity, relative to its terms, that is no round-off.
+/// A factor of four fails `open/verify.rs::a_port_that_carries_a_part_of_an_entropy_is_refused`.
 const BROKEN: f64 = 1e-8;
 
 struct Judge<'a, Y: Metriplectic, P> {
@@ -86,12 +87,14 @@ impl<Y: Metriplectic, P: Fn() -> Vec<f64>> Visitor<Y::Manifold> for Judge<'_, Y,
 /// Differences in a row whose quotients show a derivative.
 const AGREEING: usize = 4;
 /// The relative difference of quotients that agree.
+/// A factor of four fails `open/verify.rs::a_derivative_in_time_that_is_off_by_a_hundredth_is_lost`.
 const SAME: f64 = 1e-4;
 /// The change of the energy in units of its round-off that shows a quotient.
 const CLEAR: f64 = 1e6;
 
 /// The difference of the frozen work of a step and its quadrature, relative to the energies at both ends, that no smooth
 /// protocol makes in a step that resolves it.
+/// A factor of four fails `open/verify.rs::a_protocol_that_jumps_by_a_thousandth_of_the_energy_is_found`.
 const JUMP: f64 = 1e-3;
 /// The nodes and weights of the Gauss rule of three points on `[−1, 1]`.
 const GAUSS: [(f64, f64); 3] = [
@@ -187,5 +190,68 @@ where
             return Err(StepError::ProtocolJumps { time: t, h: end - t, frozen, quadrature });
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::open::{OpenBuilder as _, OpenState};
+    use metriplectic_dynamics::{Symplectic, System, Zero};
+    use metriplectic_manifolds::{Euclidean, Product};
+    use nalgebra::{Vector2, Vector4, vector};
+
+    type Pair<T> = (Vector2<T>, Vector2<T>);
+
+    #[test]
+    fn a_port_that_carries_a_part_of_an_entropy_is_refused() {
+        let carries = |part: f64| {
+            // Entropy goes in and nearly all of it out again.
+            let system = System::on(Product(Euclidean::<2>, Euclidean::<2>))
+                .bracket((Symplectic, Zero))
+                .energy(|(x, s): &Pair<Real>| x.norm_squared() * 0.5 + s.x + s.y)
+                .entropy(|(_, s): &Pair<Real>| s.x + s.y)
+                .work("push", move |_: Real, _: &Pair<Real>| {
+                    Vector4::new(0.0, 0.1, 1.0, 2.0 * part - 1.0).map(Real::from)
+                })
+                .build()
+                .unwrap();
+            let start = system.start((vector![1.0, 0.0], vector![0.5, 0.5]));
+            system.check_exchange(&start).is_err()
+        };
+        assert!(carries(2e-8) && !carries(5e-9));
+    }
+
+    #[test]
+    fn a_derivative_in_time_that_is_off_by_a_hundredth_is_lost() {
+        let is_lost = |factor: f64| {
+            let system = System::on(Euclidean::<2>)
+                .bracket(Symplectic)
+                .energy_in_time(move |t: Real, x: &Vector2<Real>| {
+                    x.norm_squared() * 0.5 + (t - t.re) * factor + t.re
+                })
+                .build()
+                .unwrap();
+            system.check_clock(&system.start(vector![1.0, 0.0])).is_err()
+        };
+        assert!(is_lost(1.02) && !is_lost(1.005));
+    }
+
+    #[test]
+    fn a_protocol_that_jumps_by_a_thousandth_of_the_energy_is_found() {
+        let jumps = |by: f64| {
+            let system = System::on(Euclidean::<2>)
+                .bracket(Symplectic)
+                .energy_in_time(move |t: Real, x: &Vector2<Real>| {
+                    x.norm_squared() * 0.5 + if t.re < 0.5 { 0.0 } else { by }
+                })
+                .build()
+                .unwrap();
+            let start = system.start(vector![1.0, 1.0]);
+            let end = OpenState { time: 1.0, ..start.clone() };
+            system.check_protocol([&start, &end]).is_err()
+        };
+        // The terms of the energy are H = 1 and ∂H x = 2.
+        assert!(jumps(2e-3 * 3.0) && !jumps(5e-4 * 3.0));
     }
 }

@@ -143,7 +143,7 @@ impl<M: Manifold> StableGradient<M> {
     ) -> Vector<M> {
         let flat = g.flat(d);
         let square = flat.dot(d);
-        if square < SQUARE {
+        if underflows(square) {
             return self.mean + along_short(self.defect + drift_correction, g, d);
         }
         self.mean + flat * ((self.defect + drift_correction) / square)
@@ -154,7 +154,7 @@ impl<M: Manifold> StableGradient<M> {
     pub fn noise(&self, g: &impl InnerProduct<Vector<M>>, d: &Vector<M>) -> Vector<M> {
         let flat = g.flat(d);
         let square = flat.dot(d);
-        if square < SQUARE {
+        if underflows(square) {
             // The defect has underflowed.
             return along_short(self.noise + f64::EPSILON * f64::MIN_POSITIVE * 16.0, g, d).abs();
         }
@@ -214,7 +214,7 @@ impl<M: Manifold> StableGradient<M> {
         let mut slope = *dmean;
         let flat = g.flat(&path.d);
         let square = flat.dot(&path.d);
-        if square < SQUARE {
+        if underflows(square) {
             return slope;
         }
         let c = defect / square;
@@ -235,8 +235,11 @@ pub(crate) fn but_round_off(x: f64, terms: f64) -> f64 {
     if x.abs() <= SUMMED * terms { 0.0 } else { x }
 }
 
-/// The squared length below which a path is measured in units of its own.
-pub(crate) const SQUARE: f64 = 1e-280;
+/// Whether a squared length is so small that its terms have lost digits: the path is then measured in units of its own.
+#[inline]
+pub(crate) fn underflows(square: f64) -> bool {
+    square * (f64::EPSILON * f64::EPSILON) < f64::MIN_POSITIVE
+}
 
 /// `♭d defect/G(d, d)` on a path so short that its squared length leaves the range of numbers, in units of
 /// a power of two near that length; zero on a path without length.
@@ -335,5 +338,11 @@ mod tests {
             || Nodes { ends: [x.cast(); 2], middle: None },
         );
         assert_eq!(stable.covector(0.0, &Canonical, &d), df);
+    }
+
+    #[test]
+    fn a_sum_of_some_tens_of_roundings_is_round_off() {
+        let left = |roundings: f64| but_round_off(roundings * f64::EPSILON * 3.0, 3.0) != 0.0;
+        assert!(!left(30.0) && left(100.0));
     }
 }

@@ -35,9 +35,11 @@ pub(crate) const CUTS: usize = 30;
 /// A factor of four fails `step/initial_scales.rs::a_relaxation_from_zero_reaches_its_end_whatever_the_span`.
 const RESOLVED: f64 = 0.125;
 /// The fraction of the size of an entry below which its displacement does not matter.
+/// A factor of four fails `step/initial_scales.rs::one_step_and_two_halves_agree_to_an_eighth_or_by_the_factor_of_a_power`.
 const NOTHING: f64 = 1e-9;
 /// The fraction by which the factor between one step and two halves may differ from the one for half the size of both. The
 /// displacement `t^k` has a factor that no size changes, between 1 and 2, and is above `1 + 1/8` from `k = 7` on.
+/// A factor of four fails `step/initial_scales.rs::one_step_and_two_halves_agree_to_an_eighth_or_by_the_factor_of_a_power`.
 pub(crate) const SAME: f64 = 0.1;
 /// The displacement along the velocity, relative to the first `h`, at which late entries are told apart.
 const AHEAD: f64 = 1e-6;
@@ -296,5 +298,25 @@ mod tests {
         assert!((1e-3..2e-3).contains(&x), "{x}");
         let [x] = sizes(|x| vec![(100.0 * x[0]).exp()], &[0.0], 1e12)[..] else { panic!("one") };
         assert!((1e-3..0.2).contains(&x), "{x}");
+    }
+
+    #[test]
+    fn one_step_and_two_halves_agree_to_an_eighth_or_by_the_factor_of_a_power() {
+        let flow = Motion(|_: &[f64]| vec![0.0]);
+        let (x, v, sizes) = (vec![1.0], vec![0.0], vec![1.0]);
+        let start = Start { flow: &flow, x: &x, v: &v, sizes: &sizes };
+        let is_resolved = |whole: f64, halves: f64| {
+            let displacements = Displacements {
+                whole: vec![whole],
+                halves: vec![halves],
+                difference: vec![(whole - halves).abs()],
+            };
+            start.is_resolved([&displacements, &displacements], None)
+        };
+        // A shorter step is off the two halves by a fraction, a longer one may be that of a power of time.
+        assert!(is_resolved(0.9, 1.0) && !is_resolved(0.6, 1.0));
+        assert!(is_resolved(2.05, 1.0) && !is_resolved(2.2, 1.0));
+        // Beside the size of the entry a displacement of 10⁻⁹ is nothing.
+        assert!(is_resolved(5e-10, 1e-14) && !is_resolved(2e-9, 1e-14));
     }
 }

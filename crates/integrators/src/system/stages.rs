@@ -223,6 +223,7 @@ const CORRECTIONS: usize = 8;
 /// A factor of four fails `tests/dense_output.rs::outputs_keep_the_laws_and_change_no_step`.
 const STAGNATED: f64 = 2.0;
 /// The limit where no entropy is asked for.
+/// A factor of four fails `system/stages.rs::a_state_that_no_correction_improves_is_accepted_without_an_entropy`.
 const CONSERVED: f64 = 64.0;
 
 /// A projection along the differentials `s² dF`, where `s_i` is the unit of entry `i`: the shortest correction in these
@@ -437,5 +438,35 @@ impl<N: Dimension, C: Dimension> Normals<N, C> {
         });
         let entropy = target.laws.entropy - residual;
         Projected { x, gradients, entropy, entropy_round_off }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use metriplectic_dynamics::{Symplectic, System};
+    use metriplectic_fields::Real;
+    use metriplectic_manifolds::Euclidean;
+    use nalgebra::{Vector2, vector};
+
+    use crate::step::Flow as _;
+
+    #[test]
+    fn a_state_that_no_correction_improves_is_accepted_without_an_entropy() {
+        let system = System::on(Euclidean::<2>)
+            .bracket(Symplectic)
+            .energy(|x: &Vector2<Real>| x.norm_squared() * 0.5)
+            .build()
+            .unwrap();
+        let x = vector![1.0, 0.5];
+        let laws = system.laws(&x);
+        let target =
+            Target { laws: &laws, with_entropy: false, limit: None, units: None, error: None };
+        let projection = Projection { system: &system, target: &target };
+        let accepted = |excess: f64| {
+            let best = projection.from(x).unwrap();
+            projection.stagnated(excess, best).is_ok()
+        };
+        assert!(accepted(40.0) && !accepted(100.0));
     }
 }

@@ -353,6 +353,7 @@ where
 }
 
 /// How far a step or a jump that is differentiated may end from the one that was taken, relative to the sizes of the entries.
+/// A factor of four fails `tangent/explicit.rs::a_step_that_ends_a_billionth_beside_the_one_that_was_taken_is_another`.
 pub(super) const NEAR: f64 = 1e-9;
 
 /// Refuses a step that is not the one that was taken, but for a displacement that is round-off.
@@ -418,3 +419,46 @@ rows!(
     RungeKuttaChebyshev => |_| &CHEBYSHEV,
     ExplicitRungeKutta => |method| method.tableau()
 );
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::step::Flow as _;
+    use metriplectic_dynamics::{Symplectic, System};
+    use metriplectic_fields::Real;
+    use metriplectic_manifolds::Euclidean;
+    use nalgebra::{Vector2, vector};
+
+    #[test]
+    fn a_step_that_ends_a_billionth_beside_the_one_that_was_taken_is_another() {
+        let system = System::on(Euclidean::<2>)
+            .bracket(Symplectic)
+            .energy(|x: &Vector2<Real>| x.norm_squared() * 0.5)
+            .build()
+            .unwrap();
+        // Of an entry in units of its own, beside a large one.
+        let (x, end) = (vector![1e9, 1e-3], vector![1e9, 2e-3]);
+        let ends_at = |off: f64| {
+            let (allowed, targets) = (None, system.laws(&x));
+            let (entropy_step, stage_count) = (None, None);
+            let (moving, stage_velocities) = (2, &[][..]);
+            let piece = Piece::<'_, _> {
+                x: &x,
+                end: &end,
+                h: 0.1,
+                moving,
+                allowed,
+                targets,
+                entropy_step,
+                stage_count,
+                stage_velocities,
+            };
+            let there = vector![end.x, end.y * (1.0 + off)];
+            fn same<Y: Metriplectic>(_: &Y, piece: &Piece<'_, Y>, there: &Point<Y>) -> bool {
+                reproduced(piece, there, &Vector::<Y::Manifold>::zero()).is_ok()
+            }
+            same(&system, &piece, &there)
+        };
+        assert!(ends_at(5e-10) && !ends_at(2e-9));
+    }
+}

@@ -17,7 +17,7 @@ use metriplectic_manifolds::{
 use super::providers::Along;
 use super::{CovectorsOf, Law, Provider, Residual, Terms, equation};
 use crate::discrete_gradient::DiscreteGradient;
-use crate::round_off::stable_gradient::{SQUARE, Segment};
+use crate::round_off::stable_gradient::{Segment, underflows};
 use crate::step::{CountOf, Dim};
 
 /// Components with their derivatives along the unknowns of a step from either end.
@@ -200,7 +200,7 @@ where
         let Terms { residual, .. } = equation(self.system, self.h, &mut pair).ok()?;
         let flat = inner.flat(&path.d);
         let square = flat.dot(&path.d);
-        let correction = if square < SQUARE { zero } else { flat * square.recip() };
+        let correction = if underflows(square) { zero } else { flat * square.recip() };
         let (jacobians, energy, along) = (residual.slopes, pair.energy, pair.along_covectors);
         let usable = jacobians.iter().all(|jacobian| jacobian.magnitude().is_finite());
         usable.then_some(BothEnds { jacobians, energy, correction, along })

@@ -7,6 +7,7 @@ use crate::step::{Element, Flow, Vector as _};
 
 /// Units of round-off by which the values of one field differ between two mathematical libraries: some
 /// units for each function in it, and far less than any change of a model.
+/// A factor of four fails `run/checkpoint/validation.rs::values_of_another_mathematical_library_are_those_of_the_system`.
 const LIBRARIES: f64 = 1024.0 * f64::EPSILON;
 
 /// Accepts the method that took the steps so far, with any options.
@@ -50,4 +51,15 @@ pub(super) fn of_the_system<F: Flow + ?Sized>(
         }
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_of_another_mathematical_library_are_those_of_the_system() {
+        let is_same = |off: f64| same("energy", Exact(1.0 + off), 1.0, 1.0).is_ok();
+        assert!(is_same(500.0 * f64::EPSILON) && !is_same(2000.0 * f64::EPSILON));
+    }
 }

@@ -5,7 +5,7 @@ use metriplectic_dynamics::system::Point;
 use metriplectic_fields::{ChartPoint, Column, Dimension, Space as _, Vector};
 use metriplectic_manifolds::Manifold;
 
-use crate::step::{Dim, Start};
+use crate::step::Start;
 
 /// The displacements of the steps before, from which the next one is extrapolated.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -111,10 +111,11 @@ impl<N: Dimension> Predictor<N> {
     }
 }
 
-/// The explicit Euler displacement `h (Π dH + K dS)(x)`; an entry that it does not move gets that of the velocity in its middle.
+/// The explicit Euler displacement `h (Π dH + K dS)(x)`. An entry that moves twice as far with the velocity at half of it gets that of
+/// this velocity.
 ///
-/// A position that starts from rest would else have no displacement beside those of its momentum, which may have a unit so small that a
-/// discrete gradient along them is round-off.
+/// Without it a position that starts from rest has no displacement beside that of its momentum, which may have a unit so small that a
+/// discrete gradient along it is round-off: Newton's method then ends anywhere.
 fn explicit<Y: Metriplectic>(system: &Y, start: &Start<'_, Y>) -> Option<Vector<Y::Manifold>> {
     let displacement = |x: &Point<Y>| {
         let velocity = system.velocity(&ChartPoint::<Y::Manifold>::centre(x)).ok()?;
@@ -122,14 +123,12 @@ fn explicit<Y: Metriplectic>(system: &Y, start: &Start<'_, Y>) -> Option<Vector<
         displacement.is_finite().then_some(displacement)
     };
     let (u, sizes) = (displacement(start.x)?, Y::Manifold::scales(start.x));
-    let rests = |i: usize| sizes[i] > 0.0 && u[i].abs() <= f64::EPSILON * sizes[i];
-    if !(0..Dim::<Y>::LEN).any(rests) {
+    let Some(later) = displacement(&Y::Manifold::chart(start.x, &(u * 0.5))) else {
         return Some(u);
-    }
-    let later = displacement(&Y::Manifold::chart(start.x, &(u * 0.5))).unwrap_or(u);
+    };
     // A stiff entry would move by more than its size.
-    let moves = |i: usize| rests(i) && later[i].abs() <= sizes[i];
-    Some(Vector::<Y::Manifold>::from_index(|i| if moves(i) { later[i] } else { u[i] }))
+    let is_later = |i: usize| later[i].abs() > 2.0 * u[i].abs() && later[i].abs() <= sizes[i];
+    Some(Vector::<Y::Manifold>::from_index(|i| if is_later(i) { later[i] } else { u[i] }))
 }
 
 #[cfg(test)]

@@ -126,6 +126,14 @@ impl<M: Manifold> StableGradient<M> {
         Self { defect: -self.defect, ..self.clone() }
     }
 
+    /// How far the derivative of the defect, a difference of nearly equal numbers, is above its own round-off: 1 where it is,
+    /// and 0 where nothing is left of it.
+    #[inline]
+    fn trust(&self) -> f64 {
+        let noise = 1e3 * self.rounding / self.change.max(f64::MIN_POSITIVE);
+        (1.0 + noise.powi(2)).recip()
+    }
+
     /// Returns whether the path is so short that a difference of values has lost digits.
     pub(crate) fn is_short(&self) -> bool {
         f64::EPSILON * self.change.abs() <= SHORT * self.rounding
@@ -164,12 +172,23 @@ impl<M: Manifold> StableGradient<M> {
     /// The derivative of the covector along the unknown of the path, from that of its mean and the
     /// differential at `x'`; `slopes` are the derivatives of the metric at `z`, if it has any.
     ///
-    /// The defect and its derivatives are divided by the length of the path, in which they are of second order: they are zero where they
-    /// are round-off. In the direction of an entry that has a small unit nothing else would be left of the derivative.
+    /// It is the Jacobian of Newton's method: the derivative of the defect counts as far as it is above round-off.
     #[inline]
     pub fn slope(
         &self,
         drift_correction: f64,
+        at: (&impl InnerProduct<Vector<M>>, Option<&MetricSlopes<M>>),
+        path: &StepPathJet<M>,
+        (dmean, df_end): (&Matrix<M>, &Vector<M>),
+    ) -> Matrix<M> {
+        let rows = self.defect_slope(path, (dmean, df_end)) * self.trust();
+        Self::corrected_slope((self.defect + drift_correction, rows), at, path, dmean)
+    }
+
+    /// The derivative of the covector as in [`slope`](Self::slope), for a tangent: numbers that are divided by the length of the path,
+    /// the defect and its derivatives, are zero where they are round-off. They are of second order in this length.
+    pub(crate) fn slope_above_round_off(
+        &self,
         at: (&impl InnerProduct<Vector<M>>, Option<&MetricSlopes<M>>),
         path: &StepPathJet<M>,
         (dmean, df_end): (&Matrix<M>, &Vector<M>),
@@ -186,8 +205,8 @@ impl<M: Manifold> StableGradient<M> {
         let rows = Vector::<M>::from_index(|k| but_round_off(rows[k], terms(k)));
         // The defect is an integral and a part of a difference, whose round-off is rounded once more where the integral replaces it.
         let size = SUMMED * (self.change.abs() + self.rounding) + self.noise;
-        let defect = self.defect + drift_correction;
-        let defect = if defect.abs() <= size { 0.0 } else { defect };
+        let is_noise = self.defect.abs() <= size;
+        let defect = if is_noise { 0.0 } else { self.defect };
         Self::corrected_slope((defect, rows), at, path, dmean)
     }
 

@@ -77,8 +77,8 @@ where
         let w = self.along.stable_gradient(f, &mean, points, [start.value, end.value]);
         let at = (*g, self.slopes);
         let slopes = [
-            w.slope(0.0, at, there, (&du, &end.df)),
-            w.reversed().slope(0.0, at, back, (&dv, &start.df)),
+            w.slope_above_round_off(at, there, (&du, &end.df)),
+            w.reversed().slope_above_round_off(at, back, (&dv, &start.df)),
         ];
         if law == Law::Energy {
             self.energy = [start.df, end.df];

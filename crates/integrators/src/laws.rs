@@ -125,10 +125,12 @@ where
     let end = one(scheme, system, x, h)?;
     let back = one(scheme, system, &end, -h)?;
     let (q, scales) = (Y::Manifold::coordinates(x, &back), Y::Manifold::scales(x));
-    // An entry that starts at zero has the size that it reaches.
+    // An entry has the size that it starts with or reaches, or that of the terms which move it in the step.
     let there = Y::Manifold::scales(&end);
+    let terms = system.rates_and_terms(x).map(|[_, terms]| terms.0);
     for i in 0..Dim::<Y>::LEN {
-        let bound = 1e-13 * scales[i].max(there[i]);
+        let moved = terms.map_or(0.0, |terms| h.abs() * terms[i]);
+        let bound = 1e-13 * scales[i].max(there[i]).max(moved);
         BrokenLaw::unless("steps of h and −h lead back", q[i].abs(), bound)?;
     }
     Ok(())

@@ -19,6 +19,7 @@ pub(crate) const SUMMED: f64 = 64.0 * f64::EPSILON;
 pub(crate) const BROKEN: f64 = 1e-6;
 
 /// The independent fraction of a differential below which it is a combination of others.
+/// A factor of four fails `system/stages.rs::a_law_with_a_part_of_ten_billionths_is_independent`.
 pub(crate) const INDEPENDENT: f64 = 1e-10;
 
 /// Whether a growth of the entropy in a step is more than the square of its round-off: a million steps of it change the entropy by more

@@ -447,7 +447,7 @@ mod tests {
     use metriplectic_dynamics::{Symplectic, System};
     use metriplectic_fields::Real;
     use metriplectic_manifolds::Euclidean;
-    use nalgebra::{Vector2, vector};
+    use nalgebra::{Vector2, Vector3, vector};
 
     use crate::step::Flow as _;
 
@@ -468,5 +468,25 @@ mod tests {
             projection.stagnated(excess, best).is_ok()
         };
         assert!(accepted(40.0) && !accepted(100.0));
+    }
+
+    #[test]
+    fn a_law_with_a_part_of_ten_billionths_is_independent() {
+        let is_independent = |part: f64| {
+            let system = System::on(Euclidean::<3>)
+                .energy(|x: &Vector3<Real>| x.x + x.y)
+                .entropy(|x: &Vector3<Real>| x.y)
+                .casimir(move |x: &Vector3<Real>| x.x + x.y + x.z * part * 2_f64.sqrt())
+                .build()
+                .unwrap();
+            let x = vector![1.0, 1.0, 1.0];
+            let laws = system.laws(&x);
+            let target =
+                Target { laws: &laws, with_entropy: false, limit: None, units: None, error: None };
+            let projection = Projection { system: &system, target: &target };
+            let normals = projection.normals(&LawJets::at(&system, &x), &x, &x);
+            !normals.invariants[0].is_none_or(|normal| normal.dependent)
+        };
+        assert!(is_independent(2e-10) && !is_independent(5e-11));
     }
 }

@@ -5,7 +5,7 @@ use metriplectic_dynamics::system::Point;
 use metriplectic_fields::{ChartPoint, Column, Dimension, Space as _, Vector};
 use metriplectic_manifolds::Manifold;
 
-use crate::step::Start;
+use crate::step::{Dim, Start};
 
 /// The displacements of the steps before, from which the next one is extrapolated.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -111,8 +111,7 @@ impl<N: Dimension> Predictor<N> {
     }
 }
 
-/// The explicit Euler displacement `h (Π dH + K dS)(x)`. An entry that moves twice as far with the velocity at half of it gets that of
-/// this velocity.
+/// The explicit Euler displacement `h (Π dH + K dS)(x)`. An entry that it hardly moves gets that of the velocity at half of it.
 ///
 /// Without it a position that starts from rest has no displacement beside that of its momentum, which may have a unit so small that a
 /// discrete gradient along it is round-off: Newton's method then ends anywhere.
@@ -123,12 +122,17 @@ fn explicit<Y: Metriplectic>(system: &Y, start: &Start<'_, Y>) -> Option<Vector<
         displacement.is_finite().then_some(displacement)
     };
     let (u, sizes) = (displacement(start.x)?, Y::Manifold::scales(start.x));
+    // The round-off of an energy ε H, over the square of such a displacement, is as large as its second derivative.
+    let rests = |i: usize| sizes[i] > 0.0 && u[i].abs() <= f64::EPSILON.sqrt() * sizes[i];
+    if !(0..Dim::<Y>::LEN).any(rests) {
+        return Some(u);
+    }
     let Some(later) = displacement(&Y::Manifold::chart(start.x, &(u * 0.5))) else {
         return Some(u);
     };
     // A stiff entry would move by more than its size.
-    let is_later = |i: usize| later[i].abs() > 2.0 * u[i].abs() && later[i].abs() <= sizes[i];
-    Some(Vector::<Y::Manifold>::from_index(|i| if is_later(i) { later[i] } else { u[i] }))
+    let moves = |i: usize| rests(i) && later[i].abs() <= sizes[i];
+    Some(Vector::<Y::Manifold>::from_index(|i| if moves(i) { later[i] } else { u[i] }))
 }
 
 #[cfg(test)]

@@ -22,6 +22,8 @@ const FIRST: f64 = 4.0;
 /// The ratio of a part to the one before it, and to one that was not solved.
 /// A factor of four fails `tests/tangent/collocated.rs::parameters_of_a_metric_are_columns_of_stages`.
 const RATIOS: [f64; 2] = [2.0, 0.25];
+/// Parts of a Radau step that are tried.
+const TRIALS: usize = 400;
 
 /// The step, whole or in parts.
 pub(super) fn take<Y: Metriplectic>(
@@ -126,8 +128,7 @@ impl Parts {
         // What has to be done before the rest is tried again.
         let mut enough = 0.0;
         let mut reached: Option<Taken<Y>> = None;
-        // From the smallest part each doubling may fail once.
-        for _ in 0..=2 * self.splits {
+        for _ in 0..TRIALS {
             let rest = 1.0 - done;
             let is_last = fraction >= rest;
             let size = start.h * if is_last { rest } else { fraction };

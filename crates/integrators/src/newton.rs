@@ -98,8 +98,8 @@ const NEAR: f64 = 10.0;
 /// A factor of four fails `newton/tests.rs::a_tenth_of_each_component_may_go_unchecked`.
 const UNCHECKED: f64 = 0.1;
 
-/// Whether a correction changes each component of a solution by a fraction of it, or by its round-off: then the Jacobian is about that
-/// of the solution, so that the contraction so far predicts the next one.
+/// Returns whether a correction changes each component of a solution by a small fraction of it, or by its round-off. The Jacobian is then
+/// close to that of the solution, and the contraction so far predicts the next one.
 #[inline]
 fn is_small<V: Column<f64>>(correction: &V, u: &V, round_off: &V) -> bool {
     (0..V::LEN).all(|i| correction[i].abs() <= UNCHECKED * u[i].abs() + round_off[i])

@@ -274,7 +274,7 @@ where
         })
     }
 
-    /// What the entropy production of an evaluation says.
+    /// Returns the slope of the entropy in an evaluation, and whether its production is above round-off.
     fn dissipated(&self, w: &Vector<Y::Manifold>, production: f64) -> Dissipated {
         Dissipated {
             slope_squared: if self.is_exact() { w.dot(w) } else { f64::INFINITY },

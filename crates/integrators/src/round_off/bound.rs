@@ -22,8 +22,8 @@ pub(crate) const BROKEN: f64 = 1e-6;
 /// A factor of four fails `system/stages.rs::a_law_with_a_part_of_ten_billionths_is_independent`.
 pub(crate) const INDEPENDENT: f64 = 1e-10;
 
-/// Whether a growth of the entropy in a step is more than the square of its round-off: a million steps of it change the entropy by more
-/// than a rounding.
+/// Returns whether a growth of the entropy in a step is more than the square of its round-off. A million steps of it then change the
+/// entropy by more than a rounding.
 pub(crate) fn is_dissipated(growth: f64, entropy: f64) -> bool {
     growth > 1e-6 * f64::EPSILON * entropy.abs()
 }

@@ -254,7 +254,7 @@ pub(crate) fn but_round_off(x: f64, terms: f64) -> f64 {
     if x.abs() <= SUMMED * terms { 0.0 } else { x }
 }
 
-/// Whether a squared length is so small that its terms have lost digits: the path is then measured in units of its own.
+/// Returns whether a squared length is so small that its terms have lost digits. The path is then measured in units of its own.
 #[inline]
 pub(crate) fn underflows(square: f64) -> bool {
     square * (f64::EPSILON * f64::EPSILON) < f64::MIN_POSITIVE

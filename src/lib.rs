@@ -91,7 +91,7 @@ pub mod prelude {
     };
     #[cfg(feature = "ensembles")]
     pub use metriplectic_ensembles::{
-        Estimate, FluctuationTheorem, Row, Shard, Sweep, Table, geomspace, linspace,
+        Estimate, FluctuationTheorem, Row, RowStatus, Shard, Sweep, Table, geomspace, linspace,
     };
     pub use metriplectic_fields::{ErasedField, MatrixField, Real, Scalar, ScalarField};
     #[cfg(feature = "fitting")]
@@ -101,7 +101,7 @@ pub mod prelude {
         Ending, Error, Event, ExplicitRungeKutta, Gauss, Gonzalez, ItohAbe, MeanValue, Method,
         Newton, NinomiyaVictoir, NoiseBuilder, NoiseError, Noisy, Observables, OpenBuilder,
         OpenSpace, OpenState, OpenSystem, Radau, RandomFlow, ResumeError, Run, RunError,
-        RungeKuttaChebyshev, Scheme, Span, SpanError, State, StepError, Stepper, Steps,
+        RungeKuttaChebyshev, Scheme, Span, SpanError, StartError, State, StepError, Stepper, Steps,
         SymmetricItohAbe, Tableau, Tangents, Trajectory, Until, Watch,
     };
     pub use metriplectic_lattices::{

@@ -21,7 +21,7 @@ fn bits<M: Manifold>(state: &State<M>) -> Vec<u64> {
 }
 
 /// All states of a run from where it is.
-fn rest<Y: Metriplectic>(steps: &mut Steps<'_, Y, Scheme<WeylMidpoint>>) -> Vec<Vec<u64>>
+fn rest<Y: Metriplectic>(steps: &mut Steps<'_, Y, WeylMidpoint>) -> Vec<Vec<u64>>
 where
     WeylMidpoint: Retraction<Y::Manifold, Y::Metric>,
 {

@@ -6,9 +6,9 @@ use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 use metriplectic::ensembles::{
-    JournalError, PlanError, Runs, ShardError, SweepError, TableError, TableRow,
+    JournalError, PlanError, RowStatus, Runs, ShardError, SweepError, TableError, TableRow,
 };
-use metriplectic::integrators::Scheme;
+use metriplectic::integrators::{Schedule, Scheme};
 use metriplectic::manifolds::metric::Canonical;
 use metriplectic::prelude::*;
 use metriplectic_studies::{Claim, Guarantee};
@@ -234,6 +234,16 @@ fn slowly(row: &Row) -> Result<Trajectory<LieDual<3>>, Error> {
     relaxing(row)
 }
 
+/// Three rows of which end their process: at once, and after the others have begun.
+const ABORTING: [usize; 3] = [0, 123, 399];
+
+fn aborts(row: &Row) -> Result<Trajectory<LieDual<3>>, Error> {
+    if ABORTING.contains(&row.number()) {
+        std::process::abort();
+    }
+    relaxing(row)
+}
+
 /// A row of many steps with outputs and an event.
 fn long_row(row: &Row) -> Result<metriplectic::ensembles::Record<LieDual<3>>, Error> {
     let span = Span::steps(0.05, 20_000).output_every(1.3).event("node", |p: &Vector3<f64>| p.y);
@@ -242,18 +252,22 @@ fn long_row(row: &Row) -> Result<metriplectic::ensembles::Record<LieDual<3>>, Er
     row.run_long(Scheme::new(WeylMidpoint), &body(1e-9)?, start, span)
 }
 
-fn long_rows(journal: Option<&Path>) -> Result<Table, SweepError> {
+type LongClosure = fn(&Row) -> Result<metriplectic::ensembles::Record<LieDual<3>>, Error>;
+
+fn long_runs() -> Runs<'static, LieDual<3>, LongClosure> {
     let plan = Sweep::new("long").grid("spin", [0.1, 0.2]);
-    let runs = plan
-        .run(long_row)
+    plan.run(long_row as LongClosure)
         .observe("p₁", |p| p.x)
         .measure("nodes", |run| run.events().len() as f64)
         .measure("last node", |run| run.events().last().map_or(f64::NAN, |e| e.state.time))
         .checkpoint_every(Duration::from_millis(1))
-        .quiet();
+        .quiet()
+}
+
+fn long_rows(journal: Option<&Path>) -> Result<Table, SweepError> {
     match journal {
-        Some(journal) => runs.journal(journal).execute(),
-        None => runs.execute(),
+        Some(journal) => long_runs().journal(journal).retry_failed().execute(),
+        None => long_runs().execute(),
     }
 }
 
@@ -264,6 +278,18 @@ fn a_task_of_a_child() {
     let outcome = match task.as_str() {
         "slow" => runs(plan("kill"), slowly).journal(&file).threads(2).execute(),
         "long" => long_rows(Some(&file)),
+        "lasting" => {
+            let lasting: Closure = |row| {
+                std::thread::sleep(Duration::from_secs(30));
+                relaxing(row)
+            };
+            runs(plan("kill"), lasting).journal(&file).threads(2).execute()
+        }
+        "abort" => runs(plan("abort"), aborts).journal(&file).threads(2).execute(),
+        "abort again" => {
+            let runs = runs(plan("abort"), aborts).journal(&file).threads(2);
+            runs.retry_failed().execute()
+        }
         "full" => runs(plan("full"), relaxing).journal(&file).execute(),
         "export" => {
             let table = runs(plan("full"), relaxing).execute().expect("all rows");
@@ -343,14 +369,265 @@ fn a_killed_sweep_goes_on_and_has_the_same_bytes() {
     fs::write(&journal, &left[..left.len() - 7]).expect("written");
     let known = Table::merge([&journal]).expect("a table");
     assert!((60..400).contains(&known.len()) && known.damaged_lines() == 1, "{}", known.len());
-    let resumed = runs(plan("kill"), relaxing).journal(&journal).execute().expect("all rows");
+    // The rows in hand are passed over, since one of them might have killed the process.
+    let passed = runs(plan("kill"), relaxing).journal(&journal).execute().expect("all rows");
+    let rows = passed.passed_over();
+    assert!(rows.len() <= 2 && passed.failed() == rows.len() && passed.len() == 400, "{passed}");
+    let runs_again = || runs(plan("kill"), relaxing).journal(&journal).retry_failed();
+    let resumed = runs_again().execute().expect("all rows");
     assert!(bytes(&resumed) == bytes(&whole));
     let killed = "the table without a kill, after `kill -9` and a torn line";
     claim("400 relaxing bodies", killed, "the same bytes", "the same bytes");
     let again = runs(plan("kill"), |_| panic!("no row is left")).journal(&journal).execute();
     assert!(bytes(&again.expect("all rows")) == bytes(&whole));
     let lines = fs::read_to_string(&journal).expect("text").lines().count();
-    assert_eq!(lines, 1 + 400 + 1, "the header, the rows, and the torn line");
+    assert_eq!(
+        lines,
+        1 + 400 + 1 + rows.len(),
+        "the header, the rows, those passed over, the torn line"
+    );
+}
+
+/// Two signals end a process in an orderly way, although rows are in hand: nobody suspects them.
+#[test]
+#[cfg(unix)]
+fn rows_that_a_second_signal_has_ended_are_run_the_next_time() {
+    let folder = folder("twice");
+    let journal = folder.join("sweep.journal");
+    let running = folder.join("sweep.journal.running");
+    let mut lasting = child("lasting", &journal).spawn().expect("it starts");
+    let in_hand = || fs::read_to_string(&running).is_ok_and(|text| text.contains(" 1 "));
+    let begun = Instant::now();
+    while !in_hand() {
+        assert!(begun.elapsed() < Duration::from_secs(60), "the child begins no row");
+    }
+    while lasting.try_wait().expect("a child").is_none() {
+        assert!(begun.elapsed() < Duration::from_secs(25), "it is not ended");
+        signal(&lasting, "-INT");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    assert_eq!(lasting.wait().expect("it has ended").code(), Some(130));
+    assert!(!running.exists());
+    let resumed = runs(plan("kill"), relaxing).journal(&journal).execute().expect("all rows");
+    assert_eq!((resumed.len(), resumed.failed()), (400, 0));
+}
+
+/// A process is ended by a row of its own, again and again: each start passes over it, and the others are run.
+#[test]
+fn a_row_that_ends_its_process_is_passed_over_and_named() {
+    let folder = folder("abort");
+    let journal = folder.join("sweep.journal");
+    let whole = runs(plan("abort"), relaxing).execute().expect("all rows");
+    let start = |task: &str| {
+        let output = child(task, &journal).output().expect("it starts");
+        let text = String::from_utf8_lossy(&output.stdout).into_owned();
+        text.lines().find(|line| line.starts_with("finished")).map(str::to_owned)
+    };
+    let begun = (0..20).find_map(|n| start("abort").map(|line| (n, line)));
+    // Two threads: a row may be in hand beside the one that ends the process.
+    let (deaths, line) = begun.expect("it finishes");
+    assert!((1..=ABORTING.len()).contains(&deaths), "{deaths}");
+    assert!(line.starts_with("finished 400"), "{line}");
+    let table = Table::merge([&journal]).expect("a table").complete().expect("all rows");
+    let passed = table.passed_over();
+    assert!(ABORTING.iter().all(|row| passed.contains(row)) && passed.len() <= 6, "{passed:?}");
+    assert_eq!(table.failed(), passed.len());
+    for (row, right) in table.rows().zip(whole.rows()) {
+        if passed.contains(&row.number()) {
+            assert_eq!((row.status(), row.outcome()), (RowStatus::PassedOver, "killed"));
+            assert_eq!((row.parameters(), row.end().len()), (right.parameters(), 0));
+            assert!(row.error().is_some_and(|(_, sentence)| sentence.contains("retry_failed")));
+        } else {
+            assert_eq!((row.status(), row.end()), (RowStatus::Done, right.end()));
+        }
+    }
+    let text = table.to_string();
+    assert!(text.contains("passed over:") && text.contains("123"), "{text}");
+    assert!(csv(&table).lines().any(|line| line.starts_with("123,") && line.contains(",killed,")));
+    // They are tried again one at a time, those that have ended a process more often last: so the rows that were in hand by
+    // chance are done after as many starts as there are others.
+    for _ in ABORTING {
+        assert_eq!(start("abort again"), None, "it is ended again");
+    }
+    let left = runs(plan("abort"), |_| panic!("no row is left")).journal(&journal).execute();
+    let left = left.expect("the rows of the journal");
+    assert_eq!((left.passed_over(), left.failed()), (ABORTING.to_vec(), 3));
+    // A model that is mended has all rows, and no journal or file is left behind but one.
+    let mended = runs(plan("abort"), relaxing).journal(&journal).retry_failed();
+    assert!(bytes(&mended.execute().expect("all rows")) == bytes(&whole));
+    let again = runs(plan("abort"), |_| panic!("no row is left")).journal(&journal);
+    assert!(bytes(&again.retry_failed().execute().expect("all rows")) == bytes(&whole));
+    assert_eq!(fs::read_dir(&folder).expect("a folder").count(), 1);
+}
+
+#[test]
+fn rows_that_failed_are_run_again_on_demand_alone() {
+    let journal = folder("retry").join("sweep.journal");
+    let whole = runs(plan("retry"), relaxing).execute().expect("all rows");
+    let failing = runs(plan("retry"), some_fail).journal(&journal).execute().expect("all rows");
+    assert_eq!(failing.failed(), 12);
+    let same = runs(plan("retry"), |_| panic!("no row is left")).journal(&journal).execute();
+    assert!(bytes(&same.expect("all rows")) == bytes(&failing));
+    // Those that fail again are rows that failed, and others that are mended are done.
+    let half: Closure = |row| if row.number() < 200 { relaxing(row) } else { some_fail(row) };
+    let half = runs(plan("retry"), half).journal(&journal).retry_failed().execute();
+    assert_eq!(half.expect("all rows").failed(), 6);
+    let merged = Table::merge([&journal, &journal]).expect("a table");
+    assert_eq!((merged.len(), merged.failed(), merged.damaged_lines()), (400, 6, 0));
+    // In shards too, each of which runs its own.
+    for index in 0..3 {
+        let shard = Shard::new(index, 3).expect("a shard");
+        let sharded = |closure| runs(plan("retry"), closure).journal(&journal).shard(shard);
+        let failed = sharded(some_fail as Closure).execute().expect("rows").failed();
+        let again = sharded(relaxing).retry_failed().execute().expect("rows");
+        assert!(failed > 0 && again.failed() == 0 && again.len() < 135);
+    }
+    let last = runs(plan("retry"), relaxing).journal(&journal).retry_failed().execute();
+    assert!(bytes(&last.expect("all rows")) == bytes(&whole));
+    let all = Table::merge(Table::journals(&journal).expect("files")).expect("a table");
+    assert!(bytes(&all) == bytes(&whole));
+}
+
+#[test]
+fn samples_are_added_and_the_rows_so_far_stay() {
+    let folder = folder("more");
+    let journal = folder.join("sweep.journal");
+    let small = || {
+        Sweep::new("more")
+            .grid("friction", [0.1, 0.2, 0.3])
+            .samples(4)
+            .random("spin", |draw| draw.uniform(-1.0..1.0))
+    };
+    let first = runs(small(), relaxing).journal(&journal).execute().expect("rows");
+    let before = fs::read_to_string(&journal).expect("text");
+    let refuses: Closure = |row| {
+        assert!(row.number() >= 12, "row {} is run again", row.number());
+        relaxing(row)
+    };
+    let more = |n: usize| runs(small().more_samples(n), refuses).journal(&journal).execute();
+    let [five, eight] = [more(5), more(8)].map(|table| table.expect("rows"));
+    assert_eq!((five.len(), eight.len(), eight.planned(), eight.failed()), (27, 36, 36, 0));
+    let lines = |table: &Table| csv(table).lines().map(str::to_owned).collect::<Vec<_>>();
+    assert_eq!(lines(&eight)[..28], lines(&five)[..]);
+    assert_eq!(lines(&eight)[..13], lines(&first)[..]);
+    assert!(fs::read_to_string(&journal).expect("text").starts_with(&before));
+    // Each combination of the other factors has the new samples, and no two of them are the same.
+    let spins: std::collections::BTreeSet<u64> =
+        column(&eight, "spin").iter().map(|x| x.to_bits()).collect();
+    assert_eq!(spins.len(), 36);
+    for friction in [0.1_f64, 0.2, 0.3] {
+        let same = |x: &&f64| x.to_bits() == friction.to_bits();
+        assert_eq!(column(&eight, "friction").iter().filter(same).count(), 12);
+    }
+    // The bytes are those of a sweep that had them from its start, in shards that are merged too.
+    let whole = runs(small().more_samples(3).more_samples(5), relaxing).execute().expect("rows");
+    assert!(bytes(&whole) == bytes(&eight));
+    let merged = Table::merge([&journal]).expect("a table").complete().expect("all rows");
+    assert!(bytes(&merged) == bytes(&whole));
+    let parts = folder.join("parts.journal");
+    for (index, samples) in [(0, 8), (1, 0), (1, 8), (0, 2)] {
+        let shard = Shard::new(index, 2).expect("a shard");
+        let plan = small().more_samples(samples);
+        runs(plan, relaxing).journal(&parts).shard(shard).execute().expect("rows");
+    }
+    let merged = Table::merge(Table::journals(&parts).expect("files")).expect("a table");
+    assert!(bytes(&merged.complete().expect("all rows")) == bytes(&whole));
+    // A plan of fewer samples has its own rows of the journal.
+    let fewer = more(2).expect("rows");
+    assert_eq!((fewer.len(), lines(&fewer)), (18, lines(&eight)[..19].to_vec()));
+    // Other plans are refused as before.
+    let other = runs(small().seed(1).more_samples(5), relaxing).journal(&journal).execute();
+    assert!(matches!(other, Err(SweepError::Journal(JournalError::AnotherSweep { .. }))));
+    let cube = Sweep::new("cube").latin_hypercube(4, [("a", 0.0..1.0)]).more_samples(1);
+    assert!(matches!(cube.rows(), Err(PlanError::MoreOfAHypercube)));
+    let many = Sweep::new("many").samples(2).more_samples(usize::MAX);
+    assert!(matches!(many.rows(), Err(PlanError::TooManyRows)));
+}
+
+/// A long row ends at the event that stops it, as a run does.
+#[test]
+fn a_long_row_ends_where_its_run_ends() {
+    let [free, fixed] = [Span::until(20.0).tolerance(1e-8).into(), Span::steps(0.05, 400).into()];
+    let [every, at]: [fn(Schedule) -> Schedule; 2] =
+        [|s| s.output_every(1.0), |s| s.output_at([0.5, 19.0])];
+    let stop = |s: Schedule| -> Schedule { s.event("y", |p: &Vector3<f64>| p.y).stop().into() };
+    let pass = |s: Schedule| -> Schedule { s.event("y", |p: &Vector3<f64>| p.y).into() };
+    let schedules: Vec<Schedule> = [free, fixed]
+        .into_iter()
+        .flat_map(|span: Schedule| [every(span.clone()), at(span.clone()), span])
+        .flat_map(|span| [stop(span.clone()), pass(span.clone()), span])
+        .collect();
+    let last = schedules.len() - 1;
+    let plan = || Sweep::new("ends").grid("schedule", linspace(0.0, last as f64, last + 1));
+    let start = vector![0.4, -1.0, 0.3];
+    let schedule = |row: &Row| schedules[row.number()].clone();
+    let runs = plan().run(|row| Ok(DormandPrince8.run(&body(0.05)?, start, schedule(row))?));
+    let long = plan().run(|row| row.run_long(DormandPrince8, &body(0.05)?, start, schedule(row)));
+    let [short, long] =
+        [runs.quiet().execute(), long.quiet().execute()].map(|table| table.expect("all rows"));
+    assert_eq!((short.failed(), long.failed()), (0, 0), "{long}");
+    for (a, b) in short.rows().zip(long.rows()) {
+        assert_eq!(a.outcome(), b.outcome());
+        assert_eq!((a.get("run.t"), a.end()), (b.get("run.t"), b.end()), "row {}", a.number());
+        assert!(a.outcome() != "event" || a.end()[1].abs() < 1e-12, "{:?}", a.end());
+    }
+    assert!(short.rows().filter(|row| row.outcome() == "event").count() == 6);
+}
+
+/// A checkpoint of another plan is refused before any row is run, and fails none.
+#[test]
+#[cfg(unix)]
+fn a_checkpoint_of_another_plan_ends_the_sweep_and_no_row() {
+    let folder = folder("stale");
+    let journal = folder.join("sweep.journal");
+    let mut killed = child("long", &journal).spawn().expect("it starts");
+    let stale = folder.join("sweep.row-0.checkpoint");
+    let begun = Instant::now();
+    while !stale.is_file() {
+        assert!(begun.elapsed() < Duration::from_secs(60), "the child writes nothing");
+    }
+    signal(&killed, "-KILL");
+    killed.wait().expect("it ends");
+    let _ = fs::remove_file(folder.join("sweep.row-1.checkpoint"));
+    let bytes_of = fs::read(&stale).expect("a checkpoint");
+    // A row that has written a checkpoint since it began goes on from there, and is not passed over.
+    let copy = folder.join("copy");
+    fs::create_dir(&copy).expect("a folder");
+    for name in ["sweep.journal", "sweep.journal.running", "sweep.row-0.checkpoint"] {
+        fs::copy(folder.join(name), copy.join(name)).expect("a copy");
+    }
+    let resumed = long_runs().journal(copy.join("sweep.journal")).execute().expect("all rows");
+    assert!(!resumed.passed_over().contains(&0) && resumed.len() == 2, "{resumed}");
+    // The model has changed, and the journal is moved away.
+    fs::remove_file(&journal).expect("a journal");
+    let begin = |tag: &str| {
+        let plan = Sweep::new("long").tag(tag).grid("spin", [0.1, 0.2]);
+        let short = |row: &Row| {
+            let span = Span::steps(0.05, 20);
+            row.run_long(
+                Scheme::new(WeylMidpoint),
+                &body(0.1)?,
+                vector![row["spin"], -1.0, 0.3],
+                span,
+            )
+        };
+        plan.run(short).journal(&journal).quiet().execute()
+    };
+    match begin("model 2").unwrap_err() {
+        SweepError::Journal(JournalError::Checkpoint { path, changed: false, .. }) => {
+            assert_eq!(path, stale);
+        }
+        other => panic!("{other}"),
+    }
+    assert_eq!(fs::read(&stale).expect("it is left as it is"), bytes_of);
+    assert_eq!(Table::merge([&journal]).expect("a journal").len(), 0, "no row has failed");
+    // One that was changed is refused too, by the same plan.
+    fs::write(&stale, &bytes_of[..bytes_of.len() / 2]).expect("written");
+    let error = begin("model 2").unwrap_err();
+    assert!(matches!(error, SweepError::Journal(JournalError::Checkpoint { changed: true, .. })));
+    fs::remove_file(&stale).expect("it is there");
+    let table = begin("model 2").expect("all rows");
+    assert_eq!((table.len(), table.failed()), (2, 0), "{table}");
 }
 
 #[test]

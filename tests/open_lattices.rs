@@ -76,7 +76,7 @@ fn one_site_is_the_system_that_it_is() {
         .work("motor", [0], |t, _, _: &Vector2<f64>| vector![0.0, (1.3 * t).sin() * 0.4])
         .bath(
             "air",
-            |t: f64| 0.7 + 0.1 * t.sin(),
+            |t: Real| t.sin() * 0.1 + 0.7,
             [0],
             |_, _: &SiteState<'_, Mass>| [Onsager { rate: 0.08, b: vector![0.0, 1.0] }],
         );
@@ -86,7 +86,7 @@ fn one_site_is_the_system_that_it_is() {
         .work("motor", |t: Real, _: &Vector2<Real>| vector![0.0.into(), (t * 1.3).sin() * 0.4])
         .bath(
             "air",
-            Bath::in_time(|t: f64| 0.7 + 0.1 * t.sin()).friction(
+            Bath::in_time(|t: Real| t.sin() * 0.1 + 0.7).friction(
                 |_: Real, _: &Vector2<Real>, _: &Vector2<Real>| {
                     [Contact { rate: 0.08.into(), along: vector![0.0.into(), 1.0.into()] }]
                 },
@@ -144,7 +144,7 @@ fn a_piston_sends_sound_into_a_chain_and_books_its_work() {
 #[test]
 fn the_ledger_has_the_same_bits_on_every_number_of_threads() {
     let n = 3000;
-    let rod = rod(n).opened().bath("room", |t: f64| 1.5 + 0.3 * t.sin(), 0..n, contact);
+    let rod = rod(n).opened().bath("room", |t: Real| t.sin() * 0.3 + 1.5, 0..n, contact);
     let run = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| {

@@ -507,11 +507,12 @@ fn heat_of_a_transient_that_no_step_resolves_is_named() {
             println!("{method:?}, course {index}: {off:?} K");
             let c = runs[0].certificate();
             assert!(off[0] < bounds[0] && off[1] < bounds[1], "{method:?}, {index}: {off:?}");
-            // A known deficiency: heat of a transient that no step resolves is shared by the metric.
-            let is_adaptive = index == 3;
-            assert_eq!(off[0] < 0.1, is_adaptive, "{method:?}, {index}: {off:?}");
-            assert_eq!(c.is_resolved(), is_adaptive, "{method:?}, {index}: {c}");
-            assert_eq!(c.to_string().contains("not resolved"), !is_adaptive, "{c}");
+            // A known deficiency: heat of a transient that no step resolves is shared by the metric. One run of the longest
+            // steps is solved in parts, which resolve it.
+            let is_right = index == 3 || (index == 2 && method == Radau4);
+            assert_eq!(off[0] < 0.1, is_right, "{method:?}, {index}: {off:?}");
+            assert_eq!(c.is_resolved(), is_right, "{method:?}, {index}: {c}");
+            assert_eq!(c.to_string().contains("not resolved"), !is_right, "{c}");
         }
     }
 }

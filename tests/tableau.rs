@@ -269,6 +269,33 @@ fn a_wrong_tableau_is_refused_by_its_laws_and_before_a_run() {
         }
     };
     let steps = || Schedule::from(Span::steps(0.1, 3));
+    // Numbers that are none, no order, and an error or a dense output that a run would follow.
+    const NAN: Tableau =
+        Tableau::new("not a number", 3, &[&[(0, 0.5)], &[(0, -1.0), (1, f64::NAN)]], KUTTA_END);
+    const NAN_END: Tableau = Tableau::new("not a number", 1, &[], &[(0, f64::NAN)]);
+    const ZERO: Tableau = Tableau::new("no order", 0, &[], &[(0, 1.0)]);
+    const NOTHING: Tableau = KUTTA.error(&[(0, 0.0)], 2);
+    const NAN_ERROR: Tableau = TSITOURAS.error(&[(0, f64::NAN)], 4);
+    const NAN_DENSE: Tableau = TSITOURAS.dense(&[], &[&[(0, f64::NAN)]]);
+    for tableau in [&NAN, &NAN_END, &ZERO] {
+        assert_eq!(broken(tableau), "the end has the order of the method");
+        assert!(matches!(refused(tableau, steps()), TableauError::Order { .. }));
+    }
+    assert_eq!(broken(&NOTHING), "an error does not vanish in the next order");
+    assert_eq!(broken(&NAN_ERROR), "an error vanishes up to its order");
+    assert_eq!(broken(&NAN_DENSE), "the dense output has the order of the method less one");
+    let follows = || Schedule::from(Span::until(1.0).tolerance(1e-4));
+    for span in [steps(), follows()] {
+        let nothing = TableauError::NothingEstimated { name: "Kutta3", which: 0, order: 2 };
+        assert_eq!(refused(&NOTHING, span.clone()), nothing);
+        for tableau in [&ERROR, &EARLY, &NAN_ERROR] {
+            let error = refused(tableau, span.clone());
+            assert!(matches!(error, TableauError::Error { which: 0, order: 4, .. }));
+        }
+        for tableau in [&DENSE, &NAN_DENSE] {
+            assert!(matches!(refused(tableau, span.clone()), TableauError::Dense { order: 4, .. }));
+        }
+    }
     assert!(matches!(refused(&STAGE, steps()), TableauError::Order { order: 3, .. }));
     assert!(
         matches!(refused(&WEIGHT, steps()), TableauError::Order { order: 3, off, .. } if off < 1e-5)

@@ -133,7 +133,7 @@
 //! | (discGrad-m) `h⟨w, v⟩ = ΔH` †, `w → dH` | [`laws::discrete_gradient`](crate::integrators::laws::discrete_gradient) | `crates/integrators/src/laws.rs::the_discrete_gradient_keeps_its_laws`, `tests/errata.rs::a_discrete_gradient_on_a_manifold_counts_the_step` |
 //! | (gonzalez-m) `w = dH(z) + (ΔH/h − dH(z)v) ♭v/G(v,v)` † | [`Gonzalez`](crate::integrators::Gonzalez) | `tests/errata.rs::a_discrete_gradient_on_a_manifold_counts_the_step`, `tests/covariance.rs::a_step_on_the_sphere_is_the_same_in_colatitude_and_longitude` |
 //! | `♭(u)(v) = G(u, v)` | [`InnerProduct::flat`](crate::manifolds::InnerProduct::flat) | `crates/manifolds/src/laws/tests.rs::flat_spaces_keep_the_laws` |
-//! | `R_h⁻¹(x_k, x_{k+1}) = Π(z) w + K_d(z) dS(z)` † | [`Scheme`](crate::integrators::Scheme), [`Residual`](crate::integrators::Residual), [`Run`](crate::integrators::Run) | `tests/reference.rs::one_step_of_pure_relaxation_on_the_sphere_is_the_published_one`, `tests/reference.rs::one_step_on_the_rotation_group_is_the_published_one`, `tests/errata.rs::the_dissipation_acts_on_the_differential_and_not_on_the_gradient` |
+//! | `R_h⁻¹(x_k, x_{k+1}) = Π(z) w + K_d(z) dS(z)` † | [`Scheme`](crate::integrators::Scheme), [`Residual`](crate::integrators::Residual), [`Method`](crate::integrators::Method) | `tests/reference.rs::one_step_of_pure_relaxation_on_the_sphere_is_the_published_one`, `tests/reference.rs::one_step_on_the_rotation_group_is_the_published_one`, `tests/errata.rs::the_dissipation_acts_on_the_differential_and_not_on_the_gradient` |
 //!
 //! # Beyond the paper
 //!

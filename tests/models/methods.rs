@@ -147,6 +147,24 @@ impl<M: Memory, I: Memory, E: Memory> Memory for OneOf<M, I, E> {
         }
     }
 
+    fn stage_count(&self) -> Option<u32> {
+        match self {
+            Self::New => None,
+            Self::Scheme(memory) => memory.stage_count(),
+            Self::Implicit(memory) => memory.stage_count(),
+            Self::Explicit(memory) => memory.stage_count(),
+        }
+    }
+
+    fn stage_velocities(&self) -> Vec<f64> {
+        match self {
+            Self::New => Vec::new(),
+            Self::Scheme(memory) => memory.stage_velocities(),
+            Self::Implicit(memory) => memory.stage_velocities(),
+            Self::Explicit(memory) => memory.stage_velocities(),
+        }
+    }
+
     fn save(&self, saved: &mut Saved) {
         match self {
             Self::New => {}
@@ -205,4 +223,122 @@ impl<Y: Metriplectic, R: Retraction<Y::Manifold, Y::Metric> + Copy> Stepper<Y> f
         OneOf<MidpointMemory<Dim<Y>>, StageMemory<Dim<Y>>, <DormandPrince8 as Stepper<Y>>::Memory>;
 
     forward_steps!(Y, each);
+}
+
+/// The schemes with one stage, as one type.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum OneStage {
+    Weyl,
+    Chart,
+    Exponential,
+    MeanValue,
+    ItohAbe,
+}
+
+impl OneStage {
+    /// All of them.
+    pub(crate) const ALL: [Self; 5] =
+        [Self::Weyl, Self::Chart, Self::Exponential, Self::MeanValue, Self::ItohAbe];
+}
+
+macro_rules! each_scheme {
+    ($self:expr, $both:expr, |$method:ident, $memory:ident| $call:expr) => {
+        match ($self, $both) {
+            (OneStage::Weyl, $memory) => {
+                let $method = &Scheme::new(WeylMidpoint);
+                $call
+            }
+            (OneStage::Chart, $memory) => {
+                let $method = &Scheme::new(ChartMidpoint);
+                $call
+            }
+            (OneStage::Exponential, $memory) => {
+                let $method = &Scheme::new(Exponential);
+                $call
+            }
+            (OneStage::MeanValue, $memory) => {
+                let $method = &Scheme::new(WeylMidpoint).gradient(MeanValue);
+                $call
+            }
+            (OneStage::ItohAbe, $memory) => {
+                let $method = &Scheme::new(WeylMidpoint).gradient(ItohAbe);
+                $call
+            }
+        }
+    };
+}
+
+// Systems and open systems.
+impl<F, M> Stepper<F> for OneStage
+where
+    F: Flow,
+    M: Memory,
+    Scheme<WeylMidpoint>: Stepper<F, Memory = M>,
+    Scheme<ChartMidpoint>: Stepper<F, Memory = M>,
+    Scheme<Exponential>: Stepper<F, Memory = M>,
+    Scheme<WeylMidpoint, MeanValue>: Stepper<F, Memory = M>,
+    Scheme<WeylMidpoint, ItohAbe>: Stepper<F, Memory = M>,
+{
+    type Memory = M;
+
+    forward_steps!(F, each_scheme);
+}
+
+/// Every method of a space without a metric of its own, for systems and open systems alike.
+#[derive(Clone, Copy, PartialEq)]
+pub(crate) enum Every {
+    OneStage(OneStage),
+    Implicit(Stages),
+    Explicit(Explicit),
+}
+
+impl Every {
+    /// All of them.
+    pub(crate) fn all() -> Vec<Self> {
+        let schemes = OneStage::ALL.map(Self::OneStage).into_iter();
+        let implicit = GAUSS.into_iter().chain(RADAU).map(Self::Implicit);
+        schemes.chain(implicit).chain(Explicit::ALL.map(Self::Explicit)).collect()
+    }
+}
+
+impl fmt::Debug for Every {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::OneStage(method) => method.fmt(f),
+            Self::Implicit(method) => method.fmt(f),
+            Self::Explicit(method) => method.fmt(f),
+        }
+    }
+}
+
+macro_rules! each_of_every {
+    ($self:expr, $both:expr, |$method:ident, $memory:ident| $call:expr) => {
+        match $self {
+            Every::OneStage($method) => {
+                let $memory = $both.scheme();
+                $call
+            }
+            Every::Implicit($method) => {
+                let $memory = $both.implicit();
+                $call
+            }
+            Every::Explicit($method) => {
+                let $memory = $both.explicit();
+                $call
+            }
+        }
+    };
+}
+
+impl<F, M, I> Stepper<F> for Every
+where
+    F: StageFlow,
+    M: Memory,
+    I: Memory,
+    OneStage: Stepper<F, Memory = M>,
+    Stages: Stepper<F, Memory = I>,
+{
+    type Memory = OneOf<M, I, ExplicitMemory<F::Vector>>;
+
+    forward_steps!(F, each_of_every);
 }

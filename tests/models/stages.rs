@@ -1,9 +1,8 @@
 //! The methods with stages as one type, so that a test compiles its runs once.
 #![allow(dead_code, reason = "each test file uses some of the methods")]
 
-use metriplectic::fields::Space;
 use metriplectic::integrators::{
-    Control, Element, Flow, LimitingSites, MethodError, Promises, Refusal, StageMemory, StepEnds,
+    Control, Element, Flow, LimitingSites, Memory, MethodError, Promises, Refusal, StepEnds,
     StepStart, Taken,
 };
 use metriplectic::prelude::*;
@@ -37,6 +36,12 @@ macro_rules! forward_steps {
         fn order(&self) -> u32 {
             $each!(self, &mut Self::Memory::default(), |method, _memory| {
                 Stepper::<$flow>::order(method)
+            })
+        }
+
+        fn damps(&self) -> bool {
+            $each!(self, &mut Self::Memory::default(), |method, _memory| {
+                Stepper::<$flow>::damps(method)
             })
         }
 
@@ -144,8 +149,20 @@ macro_rules! each {
     };
 }
 
-impl<Y: Metriplectic> Stepper<Y> for Stages {
-    type Memory = StageMemory<<<Y as Metriplectic>::Manifold as Space>::Dim>;
+// Systems and open systems.
+impl<F, M> Stepper<F> for Stages
+where
+    F: Flow,
+    M: Memory,
+    Gauss<1>: Stepper<F, Memory = M>,
+    Gauss<2>: Stepper<F, Memory = M>,
+    Gauss<3>: Stepper<F, Memory = M>,
+    Gauss<4>: Stepper<F, Memory = M>,
+    Radau<2>: Stepper<F, Memory = M>,
+    Radau<3>: Stepper<F, Memory = M>,
+    Radau<4>: Stepper<F, Memory = M>,
+{
+    type Memory = M;
 
-    forward_steps!(Y, each);
+    forward_steps!(F, each);
 }

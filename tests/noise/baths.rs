@@ -142,7 +142,7 @@ fn the_equality_of_jarzynski_has_the_order_of_the_method() {
         for k in (0..count).rev() {
             let mut values = DMatrix::<f64>::zeros(shell.nodes().len(), 1);
             for (i, n) in shell.nodes().iter().enumerate() {
-                let from = spin.begin(spin.flow().start(*n), f64::from(k) * h);
+                let from = spin.begin(spin.flow().start(*n), f64::from(k) * h).unwrap();
                 let start = StepStart { time: f64::from(k) * h, ..StepStart::first(&spin, &from) };
                 for (q, outcome) in &outcomes {
                     let method = NinomiyaVictoir(DormandPrince5).numbers(outcome.clone());

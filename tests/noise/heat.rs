@@ -12,6 +12,7 @@ use nalgebra::{DMatrix, DVector};
 use crate::operator::{
     Basis, Outcome, assert_orders, coefficients, mean, operator, order, outcomes, step,
 };
+use crate::refusals::fault;
 
 const CAPACITIES: [f64; 2] = [3.0, 5.0];
 const K_B: f64 = 0.1;
@@ -151,4 +152,9 @@ fn without_the_kinetic_drift_the_law_is_wrong_at_every_step_size() {
         step(&bodies, &NinomiyaVictoir(DormandPrince5).numbers(outcome.clone()), u, h)
     });
     assert!(order(&mean).abs() < 0.3 && mean[1].1.abs() > 1e-3, "{mean:?}");
+    // A run says so.
+    let run =
+        RandomFlow(DormandPrince5).seed(1).run(&bodies, vector![0.4, 0.6], Span::steps(0.1, 1));
+    let error = fault(run);
+    assert!(matches!(error, NoiseError::DriftNotZero { .. }), "{error}");
 }

@@ -167,3 +167,39 @@ fn threads_do_not_change_a_bit() {
     assert_eq!(run(1), run(3));
     assert_eq!(run(1), run(7));
 }
+
+#[test]
+fn a_lattice_at_rest_has_a_drift_and_a_divergence() {
+    type Site = Vector2<Real>;
+    // A momentum that gives its energy to the heat of its site, from rest.
+    let rest = Lattice::on(Graph::ring(6), Euclidean::<2>)
+        .energy(|x: &Site| x.x * x.x * 0.5 + x.y)
+        .entropy(|x: &Site| x.y.ln())
+        .site_onsager(|site| [Onsager { rate: site.x.y, b: vector![site.w.y, -site.w.x] }])
+        .build()
+        .expect("a lattice")
+        .with_noise(Boltzmann(0.01));
+    let at = |x: Vector2<f64>| move |_: usize| x;
+    let span = Span::steps(0.01, 20);
+    let method = RandomFlow(DormandPrince5).seed(1);
+    let run = method.run(&rest, rest.flow().points(at(vector![0.0, 1.0])), span);
+    let run = run.unwrap_or_else(|error| panic!("{error}"));
+    assert!(run.certificate().keeps_energy() && run.last().point[0].x != 0.0);
+    // {x, y} = y changes the volume at the rate −H_x, which is zero at the start.
+    type Affine = Vector3<Real>;
+    let affine = Lattice::on(Graph::ring(6), Euclidean::<3>)
+        .bracket(Poisson::field(|x: &Affine| {
+            let mut pi = Matrix3::<Real>::zeros();
+            (pi[(0, 1)], pi[(1, 0)]) = (x.y, -x.y);
+            pi
+        }))
+        .energy(|x: &Affine| (x.x * x.x + x.y * x.y) * 0.5 + x.z)
+        .entropy(|x: &Affine| x.z)
+        .site_onsager(|site| [Onsager { rate: 0.1, b: vector![0.0, site.w.z, -site.w.y] }])
+        .build()
+        .expect("a lattice")
+        .with_noise(Boltzmann(0.1));
+    let run = method.run(&affine, affine.flow().points(|_| vector![0.0, 1.2, 0.3]), span);
+    let error = fault(run);
+    assert!(matches!(error, NoiseError::NotUnimodular { .. }), "{error}");
+}

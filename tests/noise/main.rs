@@ -8,6 +8,7 @@
 mod baths;
 mod body;
 mod curve;
+mod half_line;
 mod heat;
 mod lattice;
 mod operator;

@@ -78,6 +78,21 @@ fn the_certificate_says_that_the_entropy_fluctuates() {
 }
 
 #[test]
+fn no_path_promises_a_second_law() {
+    let body = body(0.3);
+    let certificates = (0..20).map(|path| {
+        let method = RandomFlow(DormandPrince5).seed(1).path(path);
+        method.run(&body, START, Span::steps(0.05, 1)).unwrap().certificate().clone()
+    });
+    let mut rose = 0;
+    for certificate in certificates {
+        rose += usize::from(certificate.entropy_falls == 0);
+        assert!(!certificate.keeps_entropy(), "{certificate}");
+    }
+    assert!((2..19).contains(&rose), "{rose}");
+}
+
+#[test]
 fn a_path_that_is_put_down_goes_on_with_the_same_bits() {
     let body = body(0.3);
     for method in

@@ -14,7 +14,8 @@ where
 {
     let mut x = start.clone();
     for k in 0..5 {
-        let [off, size] = mismatch(system, &x).expect("a place on the manifold");
+        let units = Y::Manifold::scales(&x);
+        let [off, size] = mismatch(system, &x, &units).expect("a place on the manifold");
         assert!(off <= 1e-13 * size, "{name}: the terms are off by {off} of {size}");
         let drift = noise_drift(system, &x, &Uniform).expect("a place on the manifold");
         let largest = metriplectic::fields::Column::magnitude(&drift);
@@ -66,6 +67,13 @@ fn the_table_of_terms() {
         .build()
         .unwrap();
     check("rotations", &rotations, &Matrix3::identity());
+    type Spin = (Vector3<Real>, Vector1<Real>);
+    let spin = System::on(Product(Sphere::<2>::round(), HalfLine))
+        .energy(move |x: &Spin| h(&x.0) * x.1.x + x.1.x.powi(2))
+        .entropy(|x: &Spin| x.1.x.ln())
+        .build()
+        .unwrap();
+    check("a sphere and a half line", &spin, &(vector![0.6, 0.0, 0.8], vector![1.3]));
     let curved = |x: &Vector3<Real>| {
         Matrix3::from_diagonal(&vector![x.y * x.y + 1.0, x.x.exp(), x.x * x.x + x.z * x.z + 2.0])
     };

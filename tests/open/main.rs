@@ -476,7 +476,7 @@ fn a_bath_whose_temperature_changes_books_its_entropy_stage_by_stage() {
         .energy(|p: &Vector1<Real>| p.x)
         .bath(
             "air",
-            Bath::in_time(|t: f64| 1.0 + 0.5 * t).friction(
+            Bath::in_time(|t: Real| t * 0.5 + 1.0).friction(
                 |_: Real, _: &Vector1<Real>, _: &Vector1<Real>| {
                     [Contact { rate: 1.0.into(), along: vector![1.0.into()] }]
                 },
@@ -594,7 +594,7 @@ fn surroundings_that_break_a_law_are_refused() {
     let error = DormandPrince8.run(&cold, cold.start(start()), span).unwrap_err();
     assert!(matches!(error, RunError::Model(ModelError::BathNotPositive { .. })), "{error}");
     let nan = builder()
-        .bath("air", Bath::in_time(|t: f64| (0.5 - t).sqrt()).friction(contact(0.1)))
+        .bath("air", Bath::in_time(|t: Real| (-t + 0.5).sqrt()).friction(contact(0.1)))
         .build()
         .unwrap();
     let error = WeylMidpoint.run(&nan, nan.start(start()), span).unwrap_err();

@@ -148,7 +148,7 @@ macro_rules! from_a_time {
             })
             .bath(
                 "air",
-                Bath::in_time(move |t: f64| 0.7 + 0.1 * (t - zero).sin()).friction(
+                Bath::in_time(move |t: Real| (t - zero).sin() * 0.1 + 0.7).friction(
                     |_: Real, _: &Vector2<Real>, _: &Vector2<Real>| {
                         [Contact { rate: 0.08.into(), along: Vector2::y() }]
                     },

@@ -22,6 +22,7 @@
 
 mod boltzmann;
 mod drift;
+mod examination;
 mod frame;
 mod onsager;
 mod system;
@@ -29,8 +30,10 @@ mod terms;
 
 pub use boltzmann::{Boltzmann, Fluctuation, Measured, Uniform};
 pub use drift::{Place, TermVisitor, kinetic_drift};
+pub use examination::Around;
 pub use frame::NoiseFrame;
 pub use system::{
-    divergence, friction_vector, mismatch, noise_drift, noise_vector, place, seeded_place,
+    divergence, friction_vector, lost_in_dissipation, mismatch, noise_drift, noise_vector, place,
+    seeded_place,
 };
 pub use terms::{NoiseTerm, NoiseTerms};

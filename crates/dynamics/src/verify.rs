@@ -11,9 +11,9 @@
 
 pub(crate) mod balance;
 pub(crate) mod bracket;
-mod derivatives;
+pub(crate) mod derivatives;
 mod dissipation;
-mod domain;
+pub(crate) mod domain;
 mod examination;
 mod fields;
 mod findings;
@@ -47,7 +47,7 @@ const SAMPLES: usize = 16;
 const ENOUGH: usize = 12;
 
 /// The distance from the start within which a run samples its model, relative to the size of each coordinate.
-const RADIUS: f64 = 0.1;
+pub(crate) const RADIUS: f64 = 0.1;
 
 /// An invariant is taken for a function of the other fields if less than this fraction of its differential is
 /// independent of theirs at every sample.

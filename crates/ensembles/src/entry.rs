@@ -19,7 +19,29 @@ pub(crate) struct Entry {
 pub(crate) enum Outcome {
     Done(Done),
     Failed(Failed),
+    /// The process has ended while the row ran, so many times.
+    PassedOver(usize),
 }
+
+/// What became of a row.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum RowStatus {
+    /// Its run has ended.
+    Done,
+    /// It failed, with an error or a panic.
+    Failed,
+    /// The process ended while the row ran, by an abort of the row itself or from outside. So the next start has passed over it.
+    /// [`Runs::retry_failed`](crate::Runs::retry_failed) runs it again.
+    PassedOver,
+}
+
+/// The kind of a row that was passed over.
+const KILLED: &str = "killed";
+
+/// The sentence of a row that was passed over.
+const PASSED_OVER: &str =
+    "the process ended while this row ran, so it was passed over; `retry_failed()` runs it again";
 
 /// A row whose run has ended.
 #[derive(Clone, Debug)]
@@ -63,14 +85,43 @@ impl Entry {
     pub(crate) const fn done(&self) -> Option<&Done> {
         match &self.outcome {
             Outcome::Done(done) => Some(done),
-            Outcome::Failed(_) => None,
+            Outcome::Failed(_) | Outcome::PassedOver(_) => None,
         }
     }
 
     pub(crate) const fn failed(&self) -> Option<&Failed> {
         match &self.outcome {
             Outcome::Failed(failed) => Some(failed),
+            Outcome::Done(_) | Outcome::PassedOver(_) => None,
+        }
+    }
+
+    pub(crate) const fn status(&self) -> RowStatus {
+        match self.outcome {
+            Outcome::Done(_) => RowStatus::Done,
+            Outcome::Failed(_) => RowStatus::Failed,
+            Outcome::PassedOver(_) => RowStatus::PassedOver,
+        }
+    }
+
+    /// How often the process has ended while the row ran, since it last had another outcome.
+    pub(crate) const fn passed_over(&self) -> Option<usize> {
+        match self.outcome {
+            Outcome::PassedOver(times) => Some(times),
+            Outcome::Done(_) | Outcome::Failed(_) => None,
+        }
+    }
+
+    pub(crate) const fn is_done(&self) -> bool {
+        matches!(self.outcome, Outcome::Done(_))
+    }
+
+    /// The kind and the sentence of a row that is not done.
+    pub(crate) fn error(&self) -> Option<(&str, &str)> {
+        match &self.outcome {
             Outcome::Done(_) => None,
+            Outcome::Failed(failed) => Some((&failed.kind, &failed.message)),
+            Outcome::PassedOver(_) => Some((KILLED, PASSED_OVER)),
         }
     }
 }

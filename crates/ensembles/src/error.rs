@@ -30,6 +30,11 @@ pub enum PlanError {
     /// The product of the factors is too large.
     #[error("the sweep has more rows than can be numbered")]
     TooManyRows,
+    /// Samples are added to a Latin hypercube.
+    #[error(
+        "samples of a Latin hypercube cannot be added: its strata depend on their number; begin another sweep, or use `samples`"
+    )]
+    MoreOfAHypercube,
     /// The bounds of a range are not finite and in order.
     #[error("`{column}` ranges from {start} to {end}; give finite bounds, the lower one first")]
     Range {
@@ -139,6 +144,20 @@ pub enum JournalError {
         first: PathBuf,
         /// The other file.
         second: PathBuf,
+    },
+    /// A checkpoint of a [long row](crate::Row::run_long) beside the journal belongs to another plan, or was changed. No row is
+    /// run, and the checkpoint is left as it is.
+    #[error(
+        "the checkpoint {} of row {row} {}; move it away, and the row begins anew",
+        path.display(), if *changed { "was changed" } else { "belongs to another sweep" }
+    )]
+    Checkpoint {
+        /// The file.
+        path: PathBuf,
+        /// The row.
+        row: usize,
+        /// Whether the file was changed; if not, it belongs to another plan.
+        changed: bool,
     },
     /// There is no journal to merge.
     #[error("there are no journals to merge")]

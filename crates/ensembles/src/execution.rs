@@ -1,7 +1,7 @@
 //! Rows on all threads.
 
 use std::any::Any;
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -11,13 +11,14 @@ use std::time::Instant;
 use metriplectic_integrators::{Error, StateSpace};
 
 use crate::bar::Bar;
-use crate::entry::{Done, Entry, Failed, Outcome, ending};
+use crate::entry::{Done, Entry, Failed, Outcome, RowStatus, ending};
 use crate::error::{JournalError, SweepError};
 use crate::figures::{figures, kind};
 use crate::interrupt::{self, Listening};
 use crate::journal::{Header, Journal, combined, encode};
 use crate::record::{Record, Recorded};
 use crate::row::Row;
+use crate::running::{InFlight, Running};
 use crate::runs::Runs;
 use crate::table::Table;
 
@@ -26,8 +27,17 @@ pub(crate) struct Execution<'r, 'a, M: StateSpace, F> {
     runs: &'r Runs<'a, M, F>,
     header: Header,
     journal: Option<Journal>,
+    running: Option<Running>,
     known: Vec<Entry>,
     damaged: usize,
+}
+
+/// The rows that are left.
+struct Todo {
+    /// Those that any thread may run.
+    rows: Vec<usize>,
+    /// Those that are run one at a time, after all others.
+    alone: Vec<usize>,
 }
 
 /// The state that the threads share.
@@ -47,12 +57,17 @@ where
     /// Opens the journal.
     pub(crate) fn new(runs: &'r Runs<'a, M, F>, header: Header) -> Result<Self, SweepError> {
         let Some(path) = runs.journal_of_shard() else {
-            return Ok(Self { runs, header, journal: None, known: Vec::new(), damaged: 0 });
+            let (known, damaged) = (Vec::new(), 0);
+            return Ok(Self { runs, header, journal: None, running: None, known, damaged });
         };
-        let (journal, content) = Journal::open(&path, &header)?;
+        let (mut journal, content) = Journal::open(&path, &header)?;
+        // One that was moved away had other rows in hand.
+        let left = if content.new { Vec::new() } else { Running::left(&path, header.plan) };
         // Rows that stand twice are compared.
         let content = combined(vec![(&path, content)])?;
-        let (known, damaged) = (content.rows, content.damaged);
+        let (mut known, damaged) = (content.rows, content.damaged);
+        // A plan of fewer samples has none of the others.
+        known.retain(|entry| entry.number < header.rows);
         let bits = |values: &[f64]| values.iter().map(|x| x.to_bits()).collect::<Vec<_>>();
         for entry in &known {
             if bits(&entry.parameters) != bits(&runs.plan.values(entry.number)) {
@@ -61,34 +76,91 @@ where
                 return Err(JournalError::AnotherSweep { path, found, expected }.into());
             }
         }
-        Ok(Self { runs, header, journal: Some(journal), known, damaged })
+        let done: HashSet<usize> =
+            known.iter().filter(|entry| entry.is_done()).map(|entry| entry.number).collect();
+        // A row whose checkpoint has moved on goes on from there.
+        let is_stuck = |&(row, sum): &InFlight| {
+            row < header.rows && !done.contains(&row) && sum == checkpoint(runs, row)
+        };
+        for (number, _) in left.into_iter().filter(is_stuck) {
+            let before = known.iter().find(|entry| entry.number == number);
+            let times = before.and_then(Entry::passed_over).unwrap_or(0) + 1;
+            let (parameters, outcome) = (runs.plan.values(number), Outcome::PassedOver(times));
+            let entry = Entry { number, parameters, outcome, seconds: 0.0 };
+            journal.append(&encode(&entry))?;
+            known.retain(|known| known.number != number);
+            known.push(entry);
+        }
+        let mut execution =
+            Self { runs, header, journal: Some(journal), running: None, known, damaged };
+        refuse_checkpoints(runs, &execution.header, &execution.todo())?;
+        let (plan, threads) = (execution.header.plan, runs.thread_count());
+        execution.running = Some(Running::begin(&path, plan, threads)?);
+        Ok(execution)
+    }
+
+    /// The rows of the shard that the journal does not have, and those that are to be run again.
+    fn todo(&self) -> Todo {
+        let Self { runs, header, known, .. } = self;
+        let known: HashMap<usize, &Entry> = known.iter().map(|e| (e.number, e)).collect();
+        let (mut rows, mut failed, mut alone) = (Vec::new(), Vec::new(), Vec::new());
+        for row in (runs.shard.index..header.rows).step_by(runs.shard.count) {
+            match known.get(&row).map(|entry| (entry.status(), entry.passed_over())) {
+                None => rows.push(row),
+                Some((RowStatus::Failed, _)) if runs.retries => failed.push(row),
+                Some((_, Some(times))) if runs.retries => alone.push((times, row)),
+                Some(_) => {}
+            }
+        }
+        rows.append(&mut failed);
+        // Those that have ended a process more often come after all others, which then are not held up by them.
+        alone.sort_unstable();
+        Todo { rows, alone: alone.into_iter().map(|(_, row)| row).collect() }
     }
 
     /// Runs the rows that are not known.
     pub(crate) fn all(self) -> Result<Table, SweepError> {
-        let Self { runs, header, journal, known, damaged } = self;
+        let Todo { rows: todo, alone } = self.todo();
+        let Self { runs, header, journal, running, known, damaged } = self;
         let _listening = Listening::begin();
-        let done: HashSet<usize> = known.iter().map(|entry| entry.number).collect();
-        let mine = (runs.shard.index..header.rows).step_by(runs.shard.count);
-        let all = mine.len();
-        let todo: Vec<usize> = mine.filter(|row| !done.contains(row)).collect();
-        let failed = known.iter().filter(|entry| entry.failed().is_some()).count();
-        let bar = Bar::new(all, all - todo.len(), failed, runs.quiet);
+        let all = (runs.shard.index..header.rows).step_by(runs.shard.count).len();
+        let again: HashSet<usize> = todo.iter().chain(&alone).copied().collect();
+        let failed = known.iter().filter(|e| !e.is_done() && !again.contains(&e.number)).count();
+        let bar = Bar::new(all, all - again.len(), failed, runs.quiet);
         let has_journal = journal.is_some();
         let sink = Mutex::new(Sink { journal, rows: known, failure: None, bar });
         let names: Arc<[String]> = header.parameters.clone().into();
-        let (next, stopped) = (AtomicUsize::new(0), AtomicBool::new(false));
+        let stopped = AtomicBool::new(false);
+        let [next, threads] = [const { AtomicUsize::new(0) }; 2];
+        let locked = || sink.lock().unwrap_or_else(PoisonError::into_inner);
+        // Outside of the lock: other threads go on meanwhile.
+        let kept = |written: Result<(), JournalError>| written.is_ok() || locked().kept(written);
+        let begin = |thread, row| match &running {
+            Some(running) => running.row(thread, (row, checkpoint(runs, row))),
+            None => Ok(()),
+        };
+        let end = |thread| running.as_ref().map_or(Ok(()), |running| running.none(thread));
+        let run = |thread: usize, number: usize| {
+            let row = prepared(runs, runs.plan.known_row(number, &names), &header);
+            let begun = !interrupt::asked() && kept(begin(thread, number));
+            let taken = begun
+                && outcome(runs, &row).is_some_and(|entry| {
+                    let line = if has_journal { encode(&entry) } else { Vec::new() };
+                    locked().take(entry, &line)
+                });
+            if taken {
+                finished(&row);
+            }
+            begun && kept(end(thread)) && taken
+        };
         let work = || {
+            let thread = threads.fetch_add(1, Ordering::Relaxed);
             while !stopped.load(Ordering::Relaxed)
                 && let Some(&number) = todo.get(next.fetch_add(1, Ordering::Relaxed))
             {
-                let row = prepared(runs, runs.plan.known_row(number, &names), &header);
-                let taken = !interrupt::asked()
-                    && outcome(runs, &row).is_some_and(|entry| {
-                        let line = if has_journal { encode(&entry) } else { Vec::new() };
-                        sink.lock().unwrap_or_else(PoisonError::into_inner).take(entry, &line)
-                    });
-                if taken { finished(&row) } else { stopped.store(true, Ordering::Relaxed) }
+                if !run(thread, number) {
+                    stopped.store(true, Ordering::Relaxed);
+                }
             }
         };
         // Threads of its own: one of rayon's would begin another row while it waits for the loops of a lattice.
@@ -99,6 +171,11 @@ where
             }
             work();
         });
+        for number in alone {
+            if stopped.load(Ordering::Relaxed) || !run(0, number) {
+                stopped.store(true, Ordering::Relaxed);
+            }
+        }
         let stopped = stopped.into_inner();
         let Sink { journal, rows, failure, bar } =
             sink.into_inner().unwrap_or_else(PoisonError::into_inner);
@@ -118,13 +195,18 @@ where
 impl Sink {
     /// Takes a row that is done, and returns whether it is kept. After a failed write nothing more is written.
     fn take(&mut self, entry: Entry, line: &[u8]) -> bool {
-        self.bar.add(entry.failed().is_some());
+        self.bar.add(!entry.is_done());
         self.rows.push(entry);
-        if self.failure.is_none()
-            && let Some(journal) = &mut self.journal
-        {
-            self.failure = journal.append(line).err();
-        }
+        let written = match (&mut self.journal, &self.failure) {
+            (Some(journal), None) => journal.append(line),
+            _ => Ok(()),
+        };
+        self.kept(written)
+    }
+
+    /// Keeps the first failure, and returns whether there is none.
+    fn kept(&mut self, written: Result<(), JournalError>) -> bool {
+        self.failure = self.failure.take().or(written.err());
         self.failure.is_none()
     }
 }
@@ -142,6 +224,30 @@ fn prepared<M: StateSpace, F>(runs: &Runs<'_, M, F>, mut row: Row, header: &Head
 #[cfg(not(feature = "serde"))]
 fn prepared<M: StateSpace, F>(_: &Runs<'_, M, F>, row: Row, _: &Header) -> Row {
     row
+}
+
+/// The check sum of the checkpoint of a row; 0 if there is none.
+fn checkpoint<M: StateSpace, F>(runs: &Runs<'_, M, F>, row: usize) -> u64 {
+    #[cfg(feature = "serde")]
+    let sum = runs.journal.as_deref().map_or(0, |journal| crate::long::check_sum(journal, row));
+    #[cfg(not(feature = "serde"))]
+    let (sum, _) = (0, (runs, row));
+    sum
+}
+
+/// Refuses checkpoints of another plan, before any row is run.
+fn refuse_checkpoints<M: StateSpace, F>(
+    runs: &Runs<'_, M, F>,
+    header: &Header,
+    todo: &Todo,
+) -> Result<(), JournalError> {
+    #[cfg(feature = "serde")]
+    if let Some(journal) = runs.journal.as_deref() {
+        crate::long::refuse(journal, header.plan, [&todo.rows, &todo.alone])?;
+    }
+    #[cfg(not(feature = "serde"))]
+    let _ = (runs, header, todo);
+    Ok(())
 }
 
 /// Removes the checkpoint of a row that is in the journal.

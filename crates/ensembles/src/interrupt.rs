@@ -1,11 +1,14 @@
 //! Ctrl-C and the signals of a scheduler while a sweep runs.
 
-use std::sync::Once;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Mutex, Once, PoisonError};
 
 static ASKED: AtomicBool = AtomicBool::new(false);
 static RUNNING: AtomicUsize = AtomicUsize::new(0);
 static LISTENING: Once = Once::new();
+/// Files that a process removes before the second signal ends it.
+static LEFT: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 
 /// The status of a program that Ctrl-C has ended: 128 and the number of the signal.
 const ENDED: i32 = 130;
@@ -24,6 +27,9 @@ impl Listening {
             let _ = ctrlc::set_handler(|| {
                 let idle = RUNNING.load(Ordering::SeqCst) == 0;
                 if ASKED.swap(true, Ordering::SeqCst) || idle {
+                    for path in &*LEFT.lock().unwrap_or_else(PoisonError::into_inner) {
+                        let _ = std::fs::remove_file(path);
+                    }
                     std::process::exit(ENDED);
                 }
             });
@@ -41,4 +47,14 @@ impl Drop for Listening {
 /// Whether a signal has asked the sweep to stop.
 pub(crate) fn asked() -> bool {
     ASKED.load(Ordering::Relaxed)
+}
+
+/// Says that a file is to be removed where a second signal ends the program.
+pub(crate) fn leaves(path: &Path) {
+    LEFT.lock().unwrap_or_else(PoisonError::into_inner).push(path.to_owned());
+}
+
+/// Says that a file is no longer there.
+pub(crate) fn has_left(path: &Path) {
+    LEFT.lock().unwrap_or_else(PoisonError::into_inner).retain(|other| other != path);
 }

@@ -4,10 +4,15 @@
 //! after it is a row. A line ends in its check sum, so a torn line is no row, and a sweep that is started again runs
 //! this row anew. Rows stand in the order in which they finished. Numbers are the hexadecimal digits of their bits,
 //! without the zeros at the end.
+//!
+//! A row that failed may be run again: of its lines the last one counts. A plan that gets more samples gets a line with
+//! its number of rows. Rows that are being run stand in another file, see `running.rs`.
 
 mod header;
 mod line;
 
+use std::cmp::Reverse;
+use std::collections::{HashMap, HashSet};
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{self, BufRead as _, BufReader, Read, Seek as _, SeekFrom, Write};
 use std::path::{Path, PathBuf};
@@ -33,6 +38,8 @@ pub(crate) struct Content {
     pub(crate) rows: Vec<Entry>,
     /// Lines that are no rows: torn or changed ones.
     pub(crate) damaged: usize,
+    /// Whether the file has just begun.
+    pub(crate) new: bool,
     /// Whether the last line has its end.
     whole: bool,
 }
@@ -54,18 +61,22 @@ impl Journal {
         let mut journal = Self { path: path.to_owned(), file };
         let file = &mut journal.file;
         if is_begun(file, header).map_err(failed)? {
-            let content = read(path)?;
+            let mut content = read(path)?;
             content.header.check(header, path)?;
             if !content.whole {
                 // A torn last line gets its end, so that the next row begins on a line of its own.
                 file.write_all(b"\n").map_err(failed)?;
+            }
+            if content.header.rows < header.rows {
+                file.write_all(&line::encode_rows(header.rows)).map_err(failed)?;
+                content.header.rows = header.rows;
             }
             return Ok((journal, content));
         }
         file.set_len(0).map_err(failed)?;
         file.write_all(header.line().as_bytes()).map_err(failed)?;
         let (header, rows) = (header.clone(), Vec::new());
-        let content = Content { header, rows, damaged: 0, whole: true };
+        let content = Content { header, rows, damaged: 0, new: true, whole: true };
         Ok((journal, content))
     }
 
@@ -128,15 +139,31 @@ pub(crate) fn read(path: &Path) -> Result<Content, JournalError> {
     };
     next(&mut line)?;
     let header = Header::parse(&line, path)?;
-    let mut content = Content { header, rows: Vec::new(), damaged: 0, whole: true };
+    let (rows, new) = (Vec::new(), false);
+    let mut content = Content { header, rows, damaged: 0, new, whole: true };
     while next(&mut line)? > 0 {
         content.whole = line.ends_with(b"\n");
         match line::decode(&line, &content.header) {
             Some(entry) => content.rows.push(entry),
-            None => content.damaged += 1,
+            None => match line::decode_rows(&line) {
+                Some(rows) => content.header.rows = content.header.rows.max(rows),
+                None => content.damaged += 1,
+            },
         }
     }
+    settle(&mut content.rows);
     Ok(content)
+}
+
+/// Leaves of each row that has failed and was run again the last line.
+fn settle(rows: &mut Vec<Entry>) {
+    let last: HashMap<usize, usize> =
+        rows.iter().enumerate().map(|(at, entry)| (entry.number, at)).collect();
+    let mut lines = 0..;
+    rows.retain(|entry| {
+        let line = lines.next();
+        entry.is_done() || line == last.get(&entry.number).copied()
+    });
 }
 
 /// The rows of some journals of one plan, in the order of their numbers and each once.
@@ -159,14 +186,22 @@ pub(crate) fn combined(journals: Vec<(&Path, Content)>) -> Result<Content, Journ
             None => all = Some(content),
             Some(first) => {
                 content.header.check(&first.header, path)?;
+                first.header.rows = first.header.rows.max(content.header.rows);
                 first.damaged += content.damaged;
             }
         }
     }
     let mut all = all.ok_or(JournalError::None)?;
-    rows.sort_by_key(|(entry, _)| entry.number);
+    // A row that one process has passed over and another has run is that of the other.
+    let run: HashSet<usize> = (rows.iter())
+        .filter(|(entry, _)| entry.passed_over().is_none())
+        .map(|(entry, _)| entry.number)
+        .collect();
+    rows.retain(|(entry, _)| entry.passed_over().is_none() || !run.contains(&entry.number));
+    rows.sort_by_key(|(entry, _)| (entry.number, Reverse(entry.passed_over())));
     for ((entry, first), (other, second)) in rows.iter().zip(rows.iter().skip(1)) {
-        if entry.number == other.number && !same_numbers(entry, other) {
+        let ran = entry.passed_over().is_none();
+        if entry.number == other.number && ran && !same_numbers(entry, other) {
             let (row, first, second) = (entry.number, first.to_path_buf(), second.to_path_buf());
             return Err(JournalError::Contradiction { row, first, second });
         }

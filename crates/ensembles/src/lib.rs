@@ -43,12 +43,14 @@
 //! # Laws
 //!
 //! 1. The bytes of a table do not depend on threads, shards, machines with the same program and mathematical library,
-//!    or how often the sweep was put down.
-//! 2. Each row of the plan is in the table once, done or failed, or it is [missing](Table::missing).
+//!    or how often the sweep was put down. After a kill this holds of the table with [`retry_failed`](Runs::retry_failed).
+//! 2. Each row of the plan is in the table once, [done, failed or passed over](RowStatus), or it is
+//!    [missing](Table::missing). A row is passed over if it was being run when the process was killed.
 //! 3. A row [alone](Runs::only) has the bits of the same row in the table.
 //! 4. A failed write ends the sweep with an error that has the rows so far.
 //! 5. If any bytes are removed from the end of a journal, at most the rows of these bytes are run anew, and of a torn
 //!    line there is one.
+//! 6. [Samples that are added](Sweep::more_samples) change no row that was there.
 
 mod bar;
 mod draw;
@@ -66,11 +68,13 @@ mod plan;
 mod record;
 mod row;
 mod rows_file;
+mod running;
 mod runs;
 mod shard;
 mod table;
 
 pub use draw::Draw;
+pub use entry::RowStatus;
 pub use error::{JournalError, PlanError, SweepError, TableError};
 pub use estimate::{Estimate, FluctuationTheorem};
 pub use plan::{Sweep, geomspace, linspace};

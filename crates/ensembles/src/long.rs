@@ -15,6 +15,7 @@ use metriplectic_integrators::{
     Steps,
 };
 
+use crate::error::JournalError;
 use crate::fingerprint::of_line;
 use crate::interrupt;
 use crate::record::{Crossing, Record};
@@ -32,10 +33,11 @@ pub(crate) struct LongRow {
 }
 
 /// The file of a long row.
-struct Place<'a> {
+struct Place {
     path: PathBuf,
     row: usize,
-    of: &'a LongRow,
+    plan: u64,
+    interval: Duration,
 }
 
 /// A row that was put down because of a signal. It is no failure.
@@ -73,14 +75,45 @@ impl LongRow {
         Self { journal: journal.to_owned(), plan, interval, used: AtomicBool::new(false) }
     }
 
-    /// The file of a row: `relax.row-17.checkpoint` beside `relax.journal`.
-    fn place(&self, row: usize) -> Place<'_> {
-        let path = self.journal.with_extension(format!("row-{row}.checkpoint"));
-        Place { path, row, of: self }
+    /// The file of a row.
+    fn place(&self, row: usize) -> Place {
+        Place { path: path(&self.journal, row), row, plan: self.plan, interval: self.interval }
     }
 }
 
-impl Place<'_> {
+/// The file of a row: `relax.row-17.checkpoint` beside `relax.journal`.
+fn path(journal: &Path, row: usize) -> PathBuf {
+    journal.with_extension(format!("row-{row}.checkpoint"))
+}
+
+/// The check sum of the checkpoint of a row; 0 if there is none.
+pub(crate) fn check_sum(journal: &Path, row: usize) -> u64 {
+    fs::read(path(journal, row)).map_or(0, |bytes| of_line(&bytes))
+}
+
+/// Refuses checkpoints of rows that belong to another plan, or that were changed.
+pub(crate) fn refuse(
+    journal: &Path,
+    plan: u64,
+    rows: [&Vec<usize>; 2],
+) -> Result<(), JournalError> {
+    let folder = journal.parent().filter(|folder| !folder.as_os_str().is_empty());
+    // A folder that cannot be read has the journal in it, which says so.
+    let Ok(files) = fs::read_dir(folder.unwrap_or_else(|| Path::new("."))) else { return Ok(()) };
+    let stem = journal.file_stem().unwrap_or_default().to_string_lossy().into_owned() + ".row-";
+    for file in files.flatten() {
+        let name = file.file_name().to_string_lossy().into_owned();
+        let row = name.strip_prefix(&stem).and_then(|name| name.strip_suffix(".checkpoint"));
+        let Some(Ok(row)) = row.map(str::parse) else { continue };
+        if rows.iter().any(|rows| rows.contains(&row)) {
+            let (path, interval) = (path(journal, row), Duration::ZERO);
+            Place { path, row, plan, interval }.read()?;
+        }
+    }
+    Ok(())
+}
+
+impl Place {
     fn failed(&self, problem: impl ToString) -> Error {
         let (path, problem) = (self.path.clone(), problem.to_string());
         FlowError::new(CheckpointError { path, problem }).into()
@@ -94,20 +127,19 @@ impl Place<'_> {
     }
 
     /// The checkpoint of this row, if there is one.
-    fn read(&self) -> Result<Option<Saved>, Error> {
+    fn read(&self) -> Result<Option<Saved>, JournalError> {
         let Ok(text) = fs::read_to_string(&self.path) else { return Ok(None) };
-        let changed = || self.failed("it was changed; remove it, and the row begins anew");
-        let (json, sum) = text.trim_end().rsplit_once("\n#").ok_or_else(changed)?;
+        let refused = |changed| {
+            let (path, row) = (self.path.clone(), self.row);
+            JournalError::Checkpoint { path, row, changed }
+        };
+        let (json, sum) = text.trim_end().rsplit_once("\n#").ok_or_else(|| refused(true))?;
         if u64::from_str_radix(sum, 16) != Ok(of_line(json.as_bytes())) {
-            return Err(changed());
+            return Err(refused(true));
         }
-        let saved: Saved = serde_json::from_str(json).map_err(|error| self.failed(error))?;
-        if (saved.plan, saved.row) != (self.of.plan, self.row) {
-            return Err(
-                self.failed("it belongs to another sweep; remove it, and the row begins anew")
-            );
-        }
-        Ok(Some(saved))
+        let saved: Saved = serde_json::from_str(json).map_err(|_| refused(true))?;
+        let own = (saved.plan, saved.row) == (self.plan, self.row);
+        if own { Ok(Some(saved)) } else { Err(refused(false)) }
     }
 }
 
@@ -147,7 +179,7 @@ impl Row {
             long.used.store(true, Ordering::Relaxed);
             long.place(self.number())
         });
-        let saved = long.as_ref().map_or(Ok(None), Place::read)?;
+        let saved = long.as_ref().map_or(Ok(None), Place::read).map_err(FlowError::new)?;
         let (mut steps, mut record) = match saved {
             None => {
                 let steps = method.steps(flow, start, schedule)?;
@@ -169,7 +201,7 @@ impl Row {
             let Some(long) = &long else { continue };
             let asked = interrupt::asked();
             let glance = steps.state().step.is_multiple_of(GLANCE);
-            if asked || glance && written.elapsed() >= long.of.interval {
+            if asked || glance && written.elapsed() >= long.interval {
                 if steps.ending().is_none() && failure.is_none() {
                     long.write(&saved_of(long, &steps, &record))?;
                     if asked {
@@ -184,7 +216,9 @@ impl Row {
             let trajectory = Box::new(steps.run()?);
             return Err(RunError::Step { cause, trajectory }.into());
         }
-        if record.last().time < steps.state().time {
+        // The states that a run yields in place of its steps end with its last one, which is at the event that stops it.
+        let has_last = steps.outputs().next().is_some();
+        if !has_last && record.last().step < steps.state().step {
             record.states.push(steps.state().clone());
         }
         record.certificate = steps.certificate().clone();
@@ -201,7 +235,7 @@ fn begun<F: Flow, M: Method<F>>(steps: &Steps<'_, F, M>) -> Record<F::Space> {
 }
 
 fn saved_of<F: Flow, M: Method<F>>(
-    long: &Place<'_>,
+    long: &Place,
     steps: &Steps<'_, F, M>,
     record: &Record<F::Space>,
 ) -> Saved {
@@ -210,7 +244,7 @@ fn saved_of<F: Flow, M: Method<F>>(
         .iter()
         .map(|event| (event.name.clone(), event.index, event.rises, SavedState::of(&event.state)));
     Saved {
-        plan: long.of.plan,
+        plan: long.plan,
         row: long.row,
         checkpoint: steps.checkpoint(),
         states: record.states.iter().map(SavedState::of).collect(),

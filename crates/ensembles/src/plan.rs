@@ -40,6 +40,8 @@ pub struct Sweep {
     seed: u64,
     factors: Vec<Factor>,
     drawn: Vec<Drawn>,
+    /// Samples that were added.
+    more: usize,
 }
 
 /// A factor of the product of all rows.
@@ -100,7 +102,7 @@ impl Sweep {
     #[must_use]
     pub fn new(name: impl Into<String>) -> Self {
         let (tag, factors, drawn) = (String::new(), Vec::new(), Vec::new());
-        Self { name: name.into(), tag, seed: 0, factors, drawn }
+        Self { name: name.into(), tag, seed: 0, factors, drawn, more: 0 }
     }
 
     /// Multiplies the rows by the values of a parameter.
@@ -114,6 +116,26 @@ impl Sweep {
     #[must_use]
     pub fn samples(self, count: usize) -> Self {
         self.times(Factor::Samples(count))
+    }
+
+    /// Adds samples to a sweep that has run: so many further rows for each combination of the other factors, in which the
+    /// columns of [`random`](Self::random) differ.
+    ///
+    /// The rows so far keep their numbers, their parameters and their bytes, and the journal keeps them. The new rows have the
+    /// numbers behind, one sample after the other, so that samples may be added again.
+    ///
+    /// ```
+    /// use metriplectic_ensembles::Sweep;
+    /// let plan = || Sweep::new("spins").samples(50).random("spin", |draw| draw.uniform(-1.0..1.0));
+    /// let more = plan().more_samples(150);
+    /// assert_eq!((plan().rows()?, more.rows()?), (50, 200));
+    /// assert_eq!(plan().row(49)?["spin"], more.row(49)?["spin"]);
+    /// # Ok::<(), metriplectic_ensembles::PlanError>(())
+    /// ```
+    #[must_use]
+    pub fn more_samples(mut self, count: usize) -> Self {
+        self.more = self.more.saturating_add(count);
+        self
     }
 
     /// Draws a parameter anew in each row.
@@ -214,8 +236,20 @@ impl Sweep {
             return Err(PlanError::NoName);
         }
         self.factors.iter().try_for_each(Factor::check)?;
-        let product = |rows: usize, factor: &Factor| rows.checked_mul(factor.len());
-        self.factors.iter().try_fold(1, product).ok_or(PlanError::TooManyRows)
+        if self.more > 0 && self.factors.iter().any(|f| matches!(f, Factor::Hypercube { .. })) {
+            return Err(PlanError::MoreOfAHypercube);
+        }
+        let product = |all: bool| {
+            let factors = self.factors.iter().filter(|f| all || !matches!(f, Factor::Samples(_)));
+            factors.map(Factor::len).try_fold(1, usize::checked_mul)
+        };
+        let more = product(false).and_then(|each| each.checked_mul(self.more));
+        product(true).zip(more).and_then(|(a, b)| a.checked_add(b)).ok_or(PlanError::TooManyRows)
+    }
+
+    /// The number of rows without the samples that were added.
+    pub(crate) fn first_rows(&self) -> usize {
+        self.factors.iter().map(Factor::len).product()
     }
 
     /// A row with its parameters.
@@ -249,12 +283,18 @@ impl Sweep {
 
     /// The parameters of a row.
     pub(crate) fn values(&self, number: usize) -> Box<[f64]> {
-        // The last factor varies fastest.
-        let mut stride = self.factors.iter().map(Factor::len).product::<usize>();
+        // The last factor varies fastest. A sample that was added has all other factors in a row.
+        let added = number.checked_sub(self.first_rows());
+        let len = |factor: &Factor| match factor {
+            Factor::Samples(_) if added.is_some() => 1,
+            factor => factor.len(),
+        };
+        let mut stride = self.factors.iter().map(len).product::<usize>();
+        let place = added.unwrap_or(number);
         let mut values = Vec::new();
         for (at, factor) in self.factors.iter().enumerate() {
-            stride /= factor.len();
-            let index = number / stride % factor.len();
+            stride /= len(factor);
+            let index = place / stride % len(factor);
             match factor {
                 Factor::Grid { values: grid, .. } => values.push(grid[index]),
                 Factor::Listed { rows, .. } => values.extend_from_slice(&rows[index]),
@@ -306,13 +346,21 @@ impl Sweep {
         let factors: Vec<_> = self.factors.iter().map(factor).collect();
         let drawn: Vec<_> = self.drawn.iter().map(|drawn| format!(", {}", drawn.name)).collect();
         let tag = if self.tag.is_empty() { String::new() } else { format!(", {}", self.tag) };
-        format!("{}: {}{}, seed {}{tag}", self.name, factors.join(" × "), drawn.concat(), self.seed)
+        let more =
+            if self.more > 0 { format!(" and {} more samples", self.more) } else { String::new() };
+        format!(
+            "{}: {}{more}{}, seed {}{tag}",
+            self.name,
+            factors.join(" × "),
+            drawn.concat(),
+            self.seed
+        )
     }
 
     /// A hash of everything that the numbers of the rows depend on, but for the closures. Those that draw parameters
-    /// are known by the values that they draw in a few rows.
-    pub(crate) fn fingerprint(&self, rows: usize, others: &[String]) -> u64 {
-        let mut hash = Fingerprint::default();
+    /// are known by the values that they draw in a few rows. Samples that were added change no row.
+    pub(crate) fn fingerprint(&self, others: &[String]) -> u64 {
+        let (rows, mut hash) = (self.first_rows(), Fingerprint::default());
         hash.text(&self.name);
         hash.text(&self.tag);
         hash.word(self.seed);

@@ -29,6 +29,7 @@ pub struct Runs<'a, M: StateSpace, F> {
     pub(crate) threads: Option<usize>,
     pub(crate) has_end: bool,
     pub(crate) quiet: bool,
+    pub(crate) retries: bool,
     #[cfg(feature = "serde")]
     pub(crate) checkpoints: std::time::Duration,
 }
@@ -45,6 +46,7 @@ impl<'a, M: StateSpace, F> Runs<'a, M, F> {
             threads: None,
             has_end: true,
             quiet: false,
+            retries: false,
             #[cfg(feature = "serde")]
             checkpoints: std::time::Duration::from_secs(60),
         }
@@ -75,11 +77,22 @@ impl<'a, M: StateSpace, F> Runs<'a, M, F> {
     }
 
     /// Keeps each row in a file as soon as it is done. A sweep that is started again runs the rows that the file
-    /// does not have. Each [shard](Self::shard) has a file of its own: shard 3 of `relax.journal` is
+    /// does not have. Rows that were being run when the process was killed are [passed over](crate::RowStatus::PassedOver), since one
+    /// of them may have killed it. Each [shard](Self::shard) has a file of its own: shard 3 of `relax.journal` is
     /// `relax.3.journal`.
     #[must_use]
     pub fn journal(self, path: impl Into<PathBuf>) -> Self {
         Self { journal: Some(path.into()), ..self }
+    }
+
+    /// Runs the rows of the journal that failed or were [passed over](crate::RowStatus::PassedOver) once more, after all others.
+    /// Those that were passed over come last and one at a time: if one of them ends the process again, it is the only one that the
+    /// next start passes over.
+    ///
+    /// The journal keeps the last outcome of a row. Rows that are done are not run again.
+    #[must_use]
+    pub fn retry_failed(self) -> Self {
+        Self { retries: true, ..self }
     }
 
     /// Runs the rows of a shard alone.
@@ -142,7 +155,7 @@ impl<'a, M: StateSpace, F> Runs<'a, M, F> {
         columns.insert(measures.len(), String::new());
         Ok(Header {
             version: env!("CARGO_PKG_VERSION").to_owned(),
-            plan: self.plan.fingerprint(rows, &columns),
+            plan: self.plan.fingerprint(&columns),
             rows,
             name: self.plan.name().to_owned(),
             about: self.plan.about(),
@@ -161,7 +174,7 @@ where
 {
     /// Runs all rows that the journal does not have, on all threads, and returns the table.
     ///
-    /// A row that fails is a row of the table. The terminal shows a bar with the rate, the failures and the time left.
+    /// A row that fails is a row of the table, and [`retry_failed`](Self::retry_failed) runs it again. The terminal shows a bar with the rate, the failures and the time left.
     /// Ctrl-C, or the signal of a scheduler, ends the sweep after the rows in hand.
     ///
     /// # Errors

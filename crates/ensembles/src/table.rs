@@ -9,7 +9,7 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use crate::entry::Entry;
+use crate::entry::{Entry, RowStatus};
 use crate::error::{JournalError, TableError};
 use crate::figures::FIGURES;
 use crate::journal::{Header, merged};
@@ -25,7 +25,7 @@ pub use time::Series;
 /// |---|---|
 /// | `row` | the number |
 /// | the parameters | by their names |
-/// | `outcome` | `span`, `rest`, `event` or `stopped` for how it ended; the kind of the error if it failed |
+/// | `outcome` | `span`, `rest`, `event` or `stopped` for how it ended; the kind of the error if it failed; `killed` if it was [passed over](RowStatus::PassedOver) |
 /// | `run.t` | the time reached |
 /// | `run.steps`, `run.rejected` | steps taken, and given up |
 /// | `run.energy_error` | `max abs(H − H₀)`, relative to the size of the terms of `H` |
@@ -55,7 +55,10 @@ pub struct TableRow<'a> {
 
 impl Table {
     pub(crate) fn new(header: Header, mut entries: Vec<Entry>, damaged: usize) -> Self {
+        // Of a row that was run again the last outcome counts.
+        entries.reverse();
         entries.sort_by_key(|entry| entry.number);
+        entries.dedup_by_key(|entry| entry.number);
         Self { header, entries, damaged }
     }
 
@@ -116,7 +119,7 @@ impl Table {
         &self.header.name
     }
 
-    /// The number of rows in the table, done or failed.
+    /// The number of rows in the table, done or not.
     #[must_use]
     pub const fn len(&self) -> usize {
         self.entries.len()
@@ -134,10 +137,18 @@ impl Table {
         self.header.rows
     }
 
-    /// The number of rows that failed.
+    /// The number of rows that failed or were passed over.
     #[must_use]
     pub fn failed(&self) -> usize {
-        self.entries.iter().filter(|entry| entry.failed().is_some()).count()
+        self.entries.iter().filter(|entry| !entry.is_done()).count()
+    }
+
+    /// The numbers of the rows that were being run when a process was killed, so that the next one has
+    /// [passed over](RowStatus::PassedOver) them.
+    #[must_use]
+    pub fn passed_over(&self) -> Vec<usize> {
+        let passed = |entry: &&Entry| entry.passed_over().is_some();
+        self.entries.iter().filter(passed).map(|entry| entry.number).collect()
     }
 
     /// The lines of the journals that were no whole rows: torn by a kill, for example. Their rows are run anew.
@@ -195,10 +206,16 @@ impl<'a> TableRow<'a> {
         &self.entry.parameters
     }
 
-    /// The kind of the error in a word and its sentence, if the row failed.
+    /// What became of the row.
+    #[must_use]
+    pub const fn status(&self) -> RowStatus {
+        self.entry.status()
+    }
+
+    /// The kind of the error in a word and its sentence, if the row failed. That of a row that was passed over is `killed`.
     #[must_use]
     pub fn error(&self) -> Option<(&'a str, &'a str)> {
-        self.entry.failed().map(|failed| (failed.kind.as_str(), failed.message.as_str()))
+        self.entry.error()
     }
 
     /// The entries of the last state; none in a row that failed.
@@ -231,7 +248,7 @@ impl<'a> TableRow<'a> {
             return Some(entry.number as f64);
         }
         if column == "failed" {
-            return Some(f64::from(u8::from(entry.failed().is_some())));
+            return Some(f64::from(u8::from(!entry.is_done())));
         }
         if let Some(k) = at(&header.parameters) {
             return Some(entry.parameters[k]);

@@ -135,6 +135,11 @@ where
     F: Fn(&PointOf<Y, Real, P>) -> SVector<Real, K>,
 {
     /// Sets the data: a row of `K` numbers for each time, in rising order.
+    ///
+    /// A state belongs to a row by its time. Runs go on at rest, up to the last row, although the schedule ends them
+    /// [there](metriplectic_integrators::Until::until_rest): the residuals would jump with the steps. Where no run goes on, the state at
+    /// rest stands for all later rows. A run that ends early in another way, at an event that stops it, is no run of the
+    /// model: [`Unpaired`](metriplectic_integrators::Unpaired) names the row and the ending.
     pub fn data(mut self, times: &[f64], rows: &[SVector<f64, K>]) -> Self {
         (self.times, self.rows) = (times.to_vec(), rows.to_vec());
         self

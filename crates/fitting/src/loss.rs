@@ -13,7 +13,7 @@ use metriplectic_integrators::{Adjoints as _, Method as _, Schedule, Stepper, Wa
 use nalgebra::SVector;
 
 use crate::error::FitError;
-use crate::model::{Failure, ManifoldOf, PointOf};
+use crate::model::{Failure, ManifoldOf, PointOf, at_rest_too};
 
 /// A loss over runs of a family, as a function of the parameters:
 ///
@@ -93,7 +93,11 @@ impl<'a, Y: Parametrised<P>, T, const P: usize> Loss<'a, Y, T, P> {
         Self { starts: starts.to_vec(), ..self }
     }
 
-    /// Sets the times of the terms, which rise and come after the start.
+    /// Sets the times of the terms, from the start of the runs to their end.
+    ///
+    /// A state belongs to a term by its time. Runs go on at rest, up to the last term, although the schedule ends them
+    /// [there](metriplectic_integrators::Until::until_rest): the loss would jump with the steps. Where no run goes on, the state at rest
+    /// stands for all later terms. A run that ends early in another way has no loss: the error names the time and the ending.
     #[must_use]
     pub fn times(self, times: &[f64]) -> Self {
         Self { times: times.to_vec(), ..self }
@@ -157,16 +161,16 @@ where
     ///
     /// # Errors
     ///
-    /// The error of a run.
+    /// The error of a run, or [`Unpaired`](metriplectic_integrators::Unpaired) if a run ends before a term.
     pub fn value(&self, theta: &SVector<f64, P>) -> Result<f64, Failure> {
         let system = self.loss.family.at_parameters(*theta);
         let mut sum = 0.0;
         for (i, start) in self.loss.starts.iter().enumerate() {
-            let run = self.method.clone().run(&system, start.clone(), self.schedule.clone())?;
-            let states = run.states();
-            let first = states.len().saturating_sub(self.loss.times.len());
-            for (k, state) in states[first..].iter().enumerate() {
-                sum += (self.loss.term)(i, k, &ManifoldOf::<Y, P>::constant(&state.point)).re;
+            let run = |schedule| self.method.clone().run(&system, start.clone(), schedule);
+            let run = at_rest_too(&self.schedule, run)?;
+            for (k, index) in run.indices_at(&self.loss.times)?.into_iter().enumerate() {
+                let point = &run.states()[index].point;
+                sum += (self.loss.term)(i, k, &ManifoldOf::<Y, P>::constant(point)).re;
             }
         }
         Ok(sum)
@@ -176,16 +180,21 @@ where
     ///
     /// # Errors
     ///
-    /// The error of a run, or of its derivative.
+    /// The error of a run, or of its derivative, or [`Unpaired`](metriplectic_integrators::Unpaired) if a run ends before a term.
     pub fn gradient_at(&self, theta: &SVector<f64, P>) -> Result<(f64, SVector<f64, P>), Failure> {
         let system = self.loss.family.at_parameters(*theta);
         let (mut sum, mut slope) = (0.0, SVector::zeros());
         for (i, start) in self.loss.starts.iter().enumerate() {
-            let run = self.method.clone().adjoint(&system, start.clone(), self.schedule.clone())?;
-            let first = run.states().len().saturating_sub(self.loss.times.len());
-            let loss = run.gradient(|k, x| match k.checked_sub(first) {
-                Some(k) => (self.loss.term)(i, k, x),
-                None => Real::from(0.0),
+            let run = |schedule| self.method.clone().adjoint(&system, start.clone(), schedule);
+            let run = at_rest_too(&self.schedule, run)?;
+            // The terms of each state: at rest the last one has all that are left.
+            let mut terms = vec![Vec::new(); run.states().len()];
+            for (k, index) in run.indices_at(&self.loss.times)?.into_iter().enumerate() {
+                terms[index].push(k);
+            }
+            let loss = run.gradient(|index, x| {
+                let term = |sum: Real, k: &usize| sum + (self.loss.term)(i, *k, x);
+                terms[index].iter().fold(Real::from(0.0), term)
             })?;
             sum += loss.value;
             slope += SVector::<f64, P>::from_column_slice(loss.along_parameters().as_slice());

@@ -5,7 +5,7 @@ use std::cell::RefCell;
 use metriplectic_dynamics::{Metriplectic, Parametrised, Point};
 use metriplectic_fields::{Column as _, Dimension as _, Real, Space, Vector};
 use metriplectic_integrators::tangent::{LinearisedAlong, TangentState};
-use metriplectic_integrators::{Schedule, Stepper, TangentError, Tangents as _, Watch as _};
+use metriplectic_integrators::{Schedule, Stepper, Tangents as _, Watch as _};
 use nalgebra::{DMatrix, DVector, SVector};
 use num_dual::Dual64;
 
@@ -51,6 +51,18 @@ pub(crate) struct Model<'a, Y: Parametrised<P>, M, F, const P: usize, const K: u
     pub(crate) free_start: bool,
     /// Why the last run failed.
     pub(crate) failure: RefCell<Option<Failure>>,
+}
+
+/// Runs up to the last datum, at rest too: the end of a run [until rest](Schedule::without_rest) jumps where a parameter changes its
+/// steps. Where no run goes on at rest, it is the run until rest.
+pub(crate) fn at_rest_too<R, E>(
+    schedule: &Schedule,
+    run: impl Fn(Schedule) -> Result<R, E>,
+) -> Result<R, E> {
+    match run(schedule.clone().without_rest()) {
+        Err(_) if schedule.ends_at_rest() => run(schedule.clone()),
+        run => run,
+    }
 }
 
 /// Why a run failed.
@@ -121,18 +133,18 @@ where
         (value, slope * state.matrix())
     }
 
-    /// The states at the times of the data.
+    /// The states at the times of the data. If no run goes on at rest, the last one stands for all later times.
     fn states(
         &self,
         system: &Y::System,
         start: &Point<Y::System>,
-    ) -> Result<Vec<TangentState<Y::System>>, TangentError<ManifoldOf<Y, P>>> {
-        let schedule = self.schedule.clone().output_at(self.measured.times.iter().copied());
-        let run = self.method.clone().tangent(system, start.clone(), schedule)?;
-        let states = run.states();
-        // The start is recorded whether it was asked for or not.
-        let skip = states.len().saturating_sub(self.measured.times.len());
-        Ok(states[skip..].to_vec())
+    ) -> Result<Vec<TangentState<Y::System>>, Failure> {
+        let times = &self.measured.times;
+        let schedule = self.schedule.clone().output_at(times.iter().copied());
+        let run = |schedule| self.method.clone().tangent(system, start.clone(), schedule);
+        let run = at_rest_too(&schedule, run)?;
+        let indices = run.indices_at(times)?;
+        Ok(indices.into_iter().map(|index| run.states()[index].clone()).collect())
     }
 
     /// The residuals and their Jacobian, or why there are none.

@@ -41,6 +41,7 @@ use metriplectic_manifolds::{
 use nalgebra::{Matrix3, Vector3};
 
 use crate::round_off::stable_gradient::{Segment, StableGradient};
+use crate::run::event::Event;
 use crate::run::state::State;
 use crate::run::trajectory::Trajectory;
 
@@ -98,7 +99,8 @@ impl<'a, Y: Metriplectic<Manifold = LieDual<3>>> Attitude<'a, Y> {
         &self.rotation
     }
 
-    /// The attitudes at the states of a run that has recorded each of its steps, from `r0` on.
+    /// The attitudes at the states of a run that has recorded each of its steps, from `r0` on. A kick at an
+    /// [event](crate::Watched::jump) changes the momentum and not the attitude: the step that it cuts is followed in two parts.
     ///
     /// # Errors
     ///
@@ -111,14 +113,68 @@ impl<'a, Y: Metriplectic<Manifold = LieDual<3>>> Attitude<'a, Y> {
         let mut attitude = Self::start(system, &run.states()[0], r0)?;
         let mut rotations = Vec::with_capacity(run.states().len());
         rotations.push(r0);
+        let mut events = run.events().iter().peekable();
         for state in &run.states()[1..] {
+            // A state at the time of an event may be the one before it.
+            let is_over = |event: &Event<LieDual<3>>| {
+                let State { time, point, .. } = &event.state;
+                *time < state.time
+                    || time.to_bits() == state.time.to_bits() && *point != state.point
+            };
+            while let Some(event) = events.next_if(|event| is_over(event)) {
+                attitude.jump(event)?;
+            }
             rotations.push(*attitude.advance(state)?);
         }
         Ok(rotations)
     }
 
+    /// Follows the run to an event of its next step, and through the [jump](crate::Watched::jump) there. An event without a jump
+    /// changes nothing.
+    ///
+    /// If you [advance](Self::advance) from step to step, hand over the events of each step before its state: a jump between two
+    /// states is not seen from them.
+    ///
+    /// ```
+    /// # use metriplectic_dynamics::System;
+    /// # use metriplectic_fields::Real;
+    /// # use metriplectic_integrators::{Attitude, Run, Span, Watch};
+    /// # use metriplectic_manifolds::{LieDual, WeylMidpoint};
+    /// # use nalgebra::{Matrix3, Vector3, vector};
+    /// # let body = System::on(LieDual::so3())
+    /// #     .energy(|p: &Vector3<Real>| (p.x * p.x + p.y * p.y / 2.0 + p.z * p.z / 3.0) * 0.5)
+    /// #     .build()?;
+    /// let span = Span::steps(0.1, 30)
+    ///     .event_in_time("kick", |t, _: &Vector3<f64>| t - 1.52)
+    ///     .jump(|_, p: &Vector3<f64>| vector![p.x, p.y, p.z + 0.5]);
+    /// let mut steps = WeylMidpoint.steps(&body, vector![1.0, 0.3, 0.8], span)?;
+    /// let mut attitude = Attitude::start(&body, steps.state(), Matrix3::identity())?;
+    /// while steps.ending().is_none() {
+    ///     let next = steps.advance()?.clone();
+    ///     for event in steps.take_events() {
+    ///         attitude.jump(&event)?;
+    ///     }
+    ///     attitude.advance(&next)?;
+    /// }
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    ///
+    /// The errors of [`advance`](Self::advance).
+    pub fn jump(&mut self, event: &Event<LieDual<3>>) -> Result<(), AttitudeError> {
+        let Some(jump) = &event.jump else { return Ok(()) };
+        if event.state.time > self.state.time {
+            self.follow(&event.state)?;
+        }
+        let kick: Vector3<f64> = jump.after.point - event.state.point;
+        self.momentum += self.rotation * kick;
+        self.state = jump.after.clone();
+        Ok(())
+    }
+
     /// Follows one step of the run to its next state: the form of [`along`](Self::along) in constant
-    /// memory.
+    /// memory. Where the state may jump, [`jump`](Self::jump) comes before it.
     ///
     /// # Errors
     ///
@@ -126,9 +182,20 @@ impl<'a, Y: Metriplectic<Manifold = LieDual<3>>> Attitude<'a, Y> {
     /// metric of the system cannot be used.
     pub fn advance(&mut self, next: &State<LieDual<3>>) -> Result<&Matrix3<f64>, AttitudeError> {
         let (from, to) = (self.state.step, next.step);
-        if to != from + 1 {
+        // A jump may have led to it, and a run may end inside a step.
+        let is_within = to == from && next.time >= self.state.time;
+        if !(is_within || to == from + 1) {
             return Err(AttitudeError::Skipped { from, to });
         }
+        if next.time > self.state.time {
+            self.follow(next)?;
+        }
+        self.state = next.clone();
+        Ok(&self.rotation)
+    }
+
+    /// Follows the motion to a state at a later time.
+    fn follow(&mut self, next: &State<LieDual<3>>) -> Result<(), AttitudeError> {
         let turn = self.velocity(next)? * step_size(&self.state, next);
         let (p, half) = (next.point, 0.5 * turn.norm());
         let slower = if half > 0.0 { half.atan() / half } else { 1.0 };
@@ -136,8 +203,7 @@ impl<'a, Y: Metriplectic<Manifold = LieDual<3>>> Attitude<'a, Y> {
         let balance = self.rotation.tr_mul(&self.momentum);
         let tilt = smallest_rotation(&(rotations::exp(&turn) * p), &balance);
         self.rotation = Rotations::chart(&Rotations::chart(&self.rotation, &tilt), &turn);
-        self.state = next.clone();
-        Ok(&self.rotation)
+        Ok(())
     }
 
     /// The discrete gradient `w` of the energy from the last state to the next one.

@@ -73,12 +73,12 @@ mod timed;
 use metriplectic_dynamics::{Metriplectic, SecondLaw, system::Point};
 
 pub(crate) use covectors::{Stages, combined, trust};
-pub(crate) use heat::HeatStart;
+pub(crate) use heat::{HeatStart, fraction, largest_entries};
 pub(crate) use in_time::{EnergyInTime, InTime};
 pub use memory::StageMemory;
 pub(crate) use root::StepRoot;
 pub(crate) use tableau::{STAGES, Tableau};
-pub(crate) use timed::{MOST, StageSolution, TimedStep};
+pub(crate) use timed::{MOST, Stage, StageSolution, TimedStep};
 
 use crate::step::failure::Fallbacks;
 use crate::step::{

@@ -1,74 +1,99 @@
-//! Runs with the default scheme.
+//! Retractions as methods: each stands for its scheme with the default options.
 
 use metriplectic_manifolds::{Cayley, ChartMidpoint, Exponential, Projection, WeylMidpoint};
 
 use crate::midpoint::Scheme;
-use crate::run::checkpoint::{Checkpoint, ResumeError};
-use crate::run::error::RunError;
-use crate::run::method::Method as _;
-use crate::run::schedule::Schedule;
-use crate::run::steps::Steps;
-use crate::run::trajectory::Trajectory;
-use crate::step::{Element, Flow, Stepper};
+use crate::step::{
+    Control, Element, Flow, LimitingSites, MethodError, NoiseSummary, Promises, Refusal, StepEnds,
+    StepError, StepStart, Stepper, Taken,
+};
 
-/// Runs a system with the default scheme of a retraction:
-/// `WeylMidpoint.run(&system, x0, Span::steps(0.1, 1000))`.
-///
-/// A retraction of your own runs by `Scheme::new(mine).run(..)`.
-pub trait Run: Sized {
-    /// [`Method::run`](crate::Method::run) with the defaults.
-    ///
-    /// # Errors
-    ///
-    /// The errors of [`Method::run`](crate::Method::run).
-    fn run<F: Flow>(
-        self,
-        system: &F,
-        x0: Element<F>,
-        schedule: impl Into<Schedule>,
-    ) -> Result<Trajectory<F::Space>, RunError<F::Space>>
-    where
-        Scheme<Self>: Stepper<F>,
-    {
-        Scheme::new(self).run(system, x0, schedule)
-    }
+/// The steps of `Scheme::new(R)`, under its name.
+macro_rules! by_default {
+    ($($retraction:ty),+) => {$(
+        impl<F: Flow> Stepper<F> for $retraction
+        where
+            Scheme<Self>: Stepper<F>,
+        {
+            type Memory = <Scheme<Self> as Stepper<F>>::Memory;
 
-    /// [`Method::steps`](crate::Method::steps) with the defaults.
-    ///
-    /// # Errors
-    ///
-    /// The errors of [`Method::steps`](crate::Method::steps).
-    fn steps<F: Flow>(
-        self,
-        system: &F,
-        x0: Element<F>,
-        schedule: impl Into<Schedule>,
-    ) -> Result<Steps<'_, F, Scheme<Self>>, RunError<F::Space>>
-    where
-        Scheme<Self>: Stepper<F>,
-    {
-        Scheme::new(self).steps(system, x0, schedule)
-    }
+            fn name(&self) -> String {
+                Scheme::new(*self).name()
+            }
 
-    /// [`Method::resume`](crate::Method::resume) with the defaults.
-    ///
-    /// # Errors
-    ///
-    /// The errors of [`Method::resume`](crate::Method::resume).
-    fn resume<'a, F: Flow>(
-        self,
-        system: &'a F,
-        checkpoint: &Checkpoint,
-    ) -> Result<Steps<'a, F, Scheme<Self>>, ResumeError>
-    where
-        Scheme<Self>: Stepper<F>,
-    {
-        Scheme::new(self).resume(system, checkpoint)
-    }
+            fn order(&self) -> u32 {
+                Scheme::new(*self).order()
+            }
+
+            fn promises(&self, flow: &F) -> Promises {
+                Scheme::new(*self).promises(flow)
+            }
+
+            fn damps(&self) -> bool {
+                Scheme::new(*self).damps()
+            }
+
+            fn noise(&self, flow: &F) -> Option<NoiseSummary> {
+                Scheme::new(*self).noise(flow)
+            }
+
+            fn nothing_between(&self, time: f64, h: f64) -> StepError {
+                Scheme::new(*self).nothing_between(time, h)
+            }
+
+            fn check(&self, follows_tolerance: bool) -> Result<(), MethodError> {
+                Scheme::new(*self).check(follows_tolerance)
+            }
+
+            fn step(
+                &self,
+                start: &StepStart<'_, F>,
+                h: f64,
+                memory: &mut Self::Memory,
+            ) -> Result<Taken<F>, StepError> {
+                Scheme::new(*self).step(start, h, memory)
+            }
+
+            fn attempt(
+                &self,
+                start: &StepStart<'_, F>,
+                h: f64,
+                memory: &mut Self::Memory,
+            ) -> Result<Taken<F>, Refusal> {
+                Scheme::new(*self).attempt(start, h, memory)
+            }
+
+            fn control(&self) -> Control {
+                Scheme::new(*self).control()
+            }
+
+            fn error(
+                &self,
+                step: &StepEnds<'_, F>,
+                memory: &Self::Memory,
+                norm: impl Fn(&F::Vector) -> f64,
+            ) -> Option<f64> {
+                Scheme::new(*self).error(step, memory, norm)
+            }
+
+            fn limiting_sites(
+                &self,
+                step: &StepEnds<'_, F>,
+                memory: &Self::Memory,
+                allowed: &F::Vector,
+            ) -> LimitingSites {
+                Scheme::new(*self).limiting_sites(step, memory, allowed)
+            }
+
+            fn between(
+                &self,
+                step: &StepEnds<'_, F>,
+                memory: &mut Self::Memory,
+                theta: f64,
+            ) -> Option<Element<F>> {
+                Scheme::new(*self).between(step, memory, theta)
+            }
+        }
+    )+};
 }
-
-impl Run for WeylMidpoint {}
-impl Run for ChartMidpoint {}
-impl Run for Exponential {}
-impl Run for Projection {}
-impl Run for Cayley {}
+by_default!(WeylMidpoint, ChartMidpoint, Exponential, Projection, Cayley);

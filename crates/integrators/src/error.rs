@@ -11,7 +11,7 @@ use metriplectic_manifolds::{AlgebraError, MetricError, PointError};
 use crate::attitude::AttitudeError;
 use crate::run::checkpoint::ResumeError;
 use crate::run::span_error::SpanError;
-use crate::step::{MethodError, StateSpace, StepError};
+use crate::step::{MethodError, StartError, StateSpace, StepError};
 
 pub use crate::run::error::RunError;
 pub use crate::step::FlowError;
@@ -54,6 +54,9 @@ pub enum Error {
     /// A span that cannot be run.
     #[error(transparent)]
     Span(#[from] SpanError),
+    /// A state that contradicts the run that is to start in it.
+    #[error(transparent)]
+    Start(#[from] StartError),
     /// A checkpoint that cannot be resumed.
     #[error(transparent)]
     Resume(#[from] ResumeError),
@@ -75,6 +78,7 @@ impl<M: StateSpace> From<RunError<M>> for Error {
             RunError::Flow(error) => Self::Flow(error),
             RunError::Method(error) => Self::Method(error),
             RunError::Span(error) => Self::Span(error),
+            RunError::Start(error) => Self::Start(error),
             error @ RunError::Step { .. } => Self::Run(Box::new(error)),
         }
     }

@@ -198,8 +198,8 @@ pub struct ExplicitRungeKutta {
 }
 
 impl ExplicitRungeKutta {
-    /// The method of a tableau. A run refuses a tableau whose rows name stages that are not known, or whose weights miss
-    /// their order, with the [`TableauError`] in [`RunError::Method`](crate::RunError::Method).
+    /// The method of a tableau. A run refuses a tableau whose rows name stages that are not known, whose weights miss
+    /// their order, or whose error estimates nothing, with the [`TableauError`] in [`RunError::Method`](crate::RunError::Method).
     pub const fn new(tableau: &'static Tableau) -> Self {
         Self { tableau }
     }

@@ -8,7 +8,7 @@ use metriplectic_manifolds::{Manifold, Retraction, Riemannian, StepPath};
 
 use crate::discrete_gradient::{DiscreteGradient, along as along_path};
 use crate::explicit::Tableau;
-use crate::explicit::conditions::Conditions;
+use crate::explicit::conditions::{Conditions, highest};
 use crate::midpoint::{MidpointMemory, Scheme};
 use crate::round_off::bound::{of_a_law, of_an_increment, size_of_terms};
 use crate::run::method::Method;
@@ -188,7 +188,7 @@ pub fn method<F: Flow, M: Method<F> + Clone>(
 
 /// Checks the coefficients of an explicit Runge-Kutta method by the conditions of order, one for each rooted tree:
 ///
-/// 1. the weights of the end have the [order](Tableau::order) of the method;
+/// 1. the weights of the end have the [order](Tableau::order) of the method, which is from 1 to 10;
 /// 2. an error vanishes up to its order, and not in the next one;
 /// 3. a dense output has the order of the method less one.
 ///
@@ -199,8 +199,7 @@ pub fn tableau(tableau: &Tableau) -> Result<(), BrokenLaw> {
     let faults = usize::from(tableau.has_a_fault());
     BrokenLaw::unless("a row names stages that are known", faults as f64, 0.0)?;
     let orders = tableau.orders_of_errors();
-    let most = orders.iter().map(|order| order + 1).fold(tableau.order(), u32::max);
-    let conditions = Conditions::of(tableau, most);
+    let conditions = Conditions::of(tableau, highest(tableau.order(), orders));
     let round_off = 64.0 * f64::EPSILON;
     BrokenLaw::unless("the end has the order of the method", conditions.of_end(), round_off)?;
     for which in 0..orders.len() {

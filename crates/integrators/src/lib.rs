@@ -15,7 +15,7 @@
 //! | [`system`] | every metriplectic system is a flow | [`step`], [`round_off`], [`explicit`] |
 //! | [`noise`](mod@noise) | [`Noisy`]: a system with thermal noise; [`NinomiyaVictoir`], [`RandomFlow`], which sample its law with any method | [`step`], [`explicit`] |
 //! | [`open`](mod@open) | [`OpenSystem`]: a clock in the energy, ports, baths and a ledger, for every method | [`step`], [`round_off`], [`discrete_gradient`], [`midpoint`], [`collocation`], [`explicit`], [`system`], [`noise`](mod@noise) |
-//! | [`Run`] | runs with the default scheme of a retraction | [`step`], [`midpoint`], [`run`] |
+//! | `default_scheme` | a retraction is a method: its [`Scheme`] with the default options | [`step`], [`midpoint`] |
 //! | [`attitude`] | [`Attitude`]: where a body points along a run of its angular momentum | [`run`], [`round_off`] |
 //! | [`tangent`](mod@tangent) | [`Tangents`]: the derivative of a run along its start and parameters | [`step`], [`discrete_gradient`], [`newton`], [`midpoint`], [`explicit`], [`run`] |
 //! | [`laws`] | what a step and a method promise, and the functions that check it | all of them |
@@ -49,7 +49,6 @@ pub mod tangent;
 
 pub use attitude::{Attitude, AttitudeError};
 pub use collocation::{Gauss, Radau, StageMemory};
-pub use default_scheme::Run;
 pub use discrete_gradient::{DiscreteGradient, Gonzalez, ItohAbe, MeanValue, SymmetricItohAbe};
 pub use error::{Error, FlowError, RunError};
 pub use explicit::{
@@ -64,23 +63,25 @@ pub use noise::{
 pub use open::{OpenBuilder, OpenSpace, OpenState, OpenSystem};
 pub use round_off::stable_gradient::StableGradient;
 pub use run::certificate::{
-    Certificate, InvariantBalance, MisjudgedSize, ProjectedSteps, StageBalance,
+    Certificate, InvariantBalance, MisjudgedSize, ProjectedSteps, RestInTime, StageBalance,
+    UnsureEvent,
 };
 pub use run::checkpoint::{Checkpoint, ResumeError};
 pub use run::event::Event;
 pub use run::jump::{Jump, JumpBalance};
 pub use run::observables::{Csv, Npy, Observables, TableError};
+pub use run::paired::Unpaired;
 pub use run::span::Span;
 pub use run::steps::Steps;
 pub use run::trajectory::Trajectory;
 pub use run::until::Until;
 pub use run::watch::{Jumping, Watch, Watched};
-pub use run::{Ending, Method, Schedule, SpanError, State};
+pub use run::{Ending, Method, Method as Run, Schedule, SpanError, State};
 pub use step::{
     Components, Control, Effort, Element, EntropyStep, EventExchange, Evidence, Flow, JumpError,
-    Laws, LedgerSummary, LimitingSites, Memory, MethodError, NoiseSummary, Promises, Recheck,
-    Refusal, RestoreError, Saved, Scales, StageLaws, StateSpace, StepEnds, StepError, StepStart,
-    Stepper, Taken, Vector,
+    Laws, LedgerErrors, LedgerSummary, LimitingSites, Memory, MethodError, NoiseSummary, Promises,
+    Recheck, Refusal, RestoreError, Saved, Scales, StageLaws, StartError, StateSpace, StepEnds,
+    StepError, StepStart, Stepper, Taken, Vector,
 };
 pub use tangent::{
     AdjointRun, Adjoints, Linearised as LinearisedStep, LinearisedAlong, LossGradient, SelfAdjoint,

@@ -35,8 +35,8 @@
 //!
 //! # Random numbers
 //!
-//! A number is a function of the seed, the path, the step and the term alone ([`Counter`]). So a run that is resumed has the
-//! same numbers, and so have runs on other threads.
+//! A number is a function of the seed, the path, the step and the term alone ([`Counter`]), by [`philox`]. So a run that is
+//! resumed has the same numbers, and so have runs on other threads.
 //!
 //! # Limits
 //!
@@ -53,16 +53,18 @@ mod fluctuating;
 mod moves;
 mod ninomiya_victoir;
 mod numbers;
+mod philox;
 mod random_flow;
 mod sampler;
 mod system;
 
 pub use builder::{Fluctuates, NoiseBuilder};
-pub(crate) use closed::examine_model;
+pub(crate) use closed::{ROUND_OFF, examine_model, vanishes};
 pub use error::NoiseError;
 pub use fluctuating::{Drawn, Fluctuating, Landing, Noise};
 pub use ninomiya_victoir::NinomiyaVictoir;
-pub use numbers::{Counter, Numbers};
+pub use numbers::{Counter, Numbers, Purpose};
+pub use philox::philox;
 pub use random_flow::RandomFlow;
 pub use sampler::{NoiseMemory, Sampler, Sampling};
 pub use system::Noisy;

@@ -19,7 +19,7 @@ pub use stages::LawJets;
 
 use crate::explicit::{StageFlow as _, Target};
 use crate::round_off::bound::{SizesAt, of_an_increment, size_of_terms, sizes_on_a_step};
-use crate::step::{Components, CountOf, Dim, Flow, Laws, Numbers, Recheck, Scales};
+use crate::step::{Components, CountOf, Dim, Flow, Laws, Numbers, Recheck, Scales, initial_scales};
 
 type Tangent<Y> = Components<metriplectic_fields::Vector<<Y as Metriplectic>::Manifold>>;
 
@@ -151,7 +151,20 @@ impl<Y: Metriplectic> Flow for Y {
     }
 
     fn reach(&self, x: &Point<Y>, span: f64) -> Option<Scales<Tangent<Y>>> {
-        reach::reach(self, x, span)
+        if reach::is_small::<Y>() {
+            reach::reach(self, x, span)
+        } else {
+            initial_scales(self, x, span)
+        }
+    }
+
+    fn velocity_terms(
+        &self,
+        x: &Point<Y>,
+        v: &Tangent<Y>,
+        sizes: &Tangent<Y>,
+    ) -> Option<Tangent<Y>> {
+        reach::terms_of_many(self, x, &v.0, &sizes.0).map(Components)
     }
 
     fn rates_and_terms(&self, x: &Point<Y>) -> Option<[Tangent<Y>; 2]> {

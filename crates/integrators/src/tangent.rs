@@ -17,7 +17,7 @@
 //!
 //! | steps | how |
 //! |---|---|
-//! | [`Scheme`](crate::Scheme) with [`SelfAdjoint`] parts | two linearisations of its own equation, from either end |
+//! | [`Scheme`](crate::Scheme) with [`SelfAdjoint`] parts, or such a retraction alone | two linearisations of its own equation, from either end |
 //! | [`DormandPrince5`](crate::DormandPrince5), [`DormandPrince8`](crate::DormandPrince8), [`RungeKuttaChebyshev`](crate::RungeKuttaChebyshev), [`ExplicitRungeKutta`](crate::ExplicitRungeKutta) | stages and projection at dual numbers |
 //! | [`Gauss`](crate::Gauss), [`Radau`](crate::Radau) | the implicit function theorem at the root, with its residual at dual numbers |
 //!
@@ -30,6 +30,7 @@ mod along;
 mod certificate;
 mod collocated;
 mod columns;
+mod default_schemes;
 mod duals;
 mod error;
 mod event;

@@ -34,7 +34,7 @@ const ROOMS: [(&str, &[&str]); 16] = [
             "noise",
         ],
     ),
-    ("default_scheme", &["step", "midpoint", "run"]),
+    ("default_scheme", &["step", "midpoint"]),
     ("attitude", &["round_off", "run"]),
     ("error", &["step", "run", "attitude"]),
     (

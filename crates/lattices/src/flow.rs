@@ -131,7 +131,7 @@ impl<P: Model> Flow for Lattice<P> {
     /// The round-off of the terms of the entropy, without the terms of the other laws.
     fn entropy_round_off(&self, ends: [&Points<P::Manifold>; 2]) -> f64 {
         let sizes = ends.map(|x| self.entropy_size(x));
-        4.0 * f64::EPSILON * sizes[0].max(sizes[1])
+        4.0 * f64::EPSILON * sizes[0].max(sizes[1]) + f64::MIN_POSITIVE / f64::EPSILON
     }
 
     fn rates(&self, x: &Points<P::Manifold>, d: &SiteVector) -> Option<SiteVector> {
@@ -279,7 +279,8 @@ impl<P: Model> StageFlow for Lattice<P> {
     fn entropy_round_off_of(&self, gradients: &Self::Gradients) -> Option<f64> {
         let Totals { entropy, entropy_slope, .. } = &gradients.totals;
         let size = entropy.size + entropy_slope;
-        (!P::EntropyGather::PRESENT).then_some(4.0 * f64::EPSILON * size)
+        (!P::EntropyGather::PRESENT)
+            .then_some(4.0 * f64::EPSILON * size + f64::MIN_POSITIVE / f64::EPSILON)
     }
 
     fn velocity(

@@ -133,6 +133,12 @@ impl Normals {
         self.of_entropy().map_or([0.0; 2], |entropy| [entropy.residual, entropy.round_off])
     }
 
+    /// The residual of the entropy in units of its round-off, if no other law has a larger one; zero otherwise.
+    pub(crate) fn entropy_excess(&self) -> f64 {
+        let entropy = self.of_entropy().map_or(0.0, Normal::excess);
+        if self.conserved().iter().all(|law| law.excess() <= entropy) { entropy } else { 0.0 }
+    }
+
     /// The residual of the entropy in units of its round-off, whatever it depends on.
     pub(crate) fn off(&self) -> f64 {
         self.of_entropy().map_or(0.0, |entropy| ratio(entropy.whole[0], entropy.whole[1]))

@@ -258,6 +258,11 @@ impl Layout {
         &self.bonds
     }
 
+    /// The number that its first site has in the graph.
+    pub(crate) const fn first_site(&self) -> usize {
+        self.first[0]
+    }
+
     /// The number that a bond has in the graph.
     pub(crate) fn number(&self, bond: usize) -> usize {
         self.numbers.as_ref().map_or(self.first[2] + bond, |numbers| numbers[bond] as usize)

@@ -36,16 +36,17 @@ impl<P: Model<Manifold: Flat>> Lattice<P> {
 /// A term at both ends of a bond; at a site the second end is zero.
 type Term<P> = Onsager<[VectorOf<P>; 2]>;
 
-/// Computes `Σ c_r b_r` of the terms of a place, with `c_r = ρ_r div b_r + ½ ⟨dρ_r, b_r⟩`.
+/// Computes `Σ c_r b_r` of the terms of a place, with `c_r = ρ_r div b_r + ½ ⟨dρ_r, b_r⟩`. An entry that is zero has one of these
+/// `sizes`.
 fn drift<P: Model>(
     terms: impl Fn([&PointOf<P>; 2]) -> Vec<Term<P>>,
     x: [&PointOf<P>; 2],
-    ends: usize,
+    (ends, sizes): (usize, &VectorOf<P>),
 ) -> [VectorOf<P>; 2] {
     let here = terms(x);
     let mut factors = vec![0.0; here.len()];
     for end in 0..ends {
-        let scales = P::Manifold::scales(x[end]);
+        let scales = own_or::<P>(x[end], sizes);
         for k in 0..dimension::<P>() {
             let width = WIDTH * scales[k];
             let moved = [width, -width].map(|by| {
@@ -70,8 +71,33 @@ fn drift<P: Model>(
     sum
 }
 
+/// The sizes of the entries at a site, or the given ones where they are zero.
+fn own_or<P: Model>(x: &PointOf<P>, sizes: &VectorOf<P>) -> VectorOf<P> {
+    let own = P::Manifold::scales(x);
+    VectorOf::<P>::from_index(|k| if own[k] > 0.0 { own[k] } else { sizes[k] })
+}
+
 impl<P: Model> Lattice<P> {
-    /// The number of the first term at a site, or of a bond after all sites.
+    /// The sizes over which differences are taken where an entry is zero: the largest ones on the lattice. An entry that is zero
+    /// at all sites has the distance over which the energy of a site changes by its value.
+    fn sizes_of_differences(&self, x: &Points<P::Manifold>) -> VectorOf<P> {
+        let largest = self.largest_sizes(x);
+        let others = (0..dimension::<P>()).map(|k| largest[k]).fold(0.0, f64::max);
+        let unit = if others > 0.0 { others } else { 1.0 };
+        let (all, totals) = self.differentials::<true>(x);
+        let mean = totals.energy.size / self.sites() as f64;
+        let distance = |k: usize| {
+            let y = P::Manifold::chart(&x[0], &(VectorOf::<P>::basis(k) * unit));
+            let slope = |df: VectorOf<P>| df[k];
+            let bend = slope(self.parts.energy(0, &y).df) - slope(all.reader::<P>().at(0)[0]);
+            let distance = (2.0 * mean * unit / bend.abs()).sqrt();
+            if distance > 0.0 && distance.is_finite() { distance } else { unit }
+        };
+        VectorOf::<P>::from_index(|k| if largest[k] > 0.0 { largest[k] } else { distance(k) })
+    }
+
+    /// The number of the first term at a site, or of a bond after all sites. Bonds have the numbers of the graph, and not those
+    /// of the chunks in which they are evaluated.
     fn first_term(&self, place: usize) -> usize {
         let [of_a_site, of_a_bond] = P::TERMS;
         let sites = self.sites();
@@ -156,7 +182,7 @@ impl<P: Model<Manifold: Flat>> Fluctuating<Uniform> for Lattice<P> {
         };
         let of = |bond: usize| {
             let mut sum = [VectorOf::<P>::zero(); 2];
-            let mut r = self.first_term(self.sites() + bond);
+            let mut r = self.first_term(self.sites() + self.layout.number(bond));
             self.bond_terms(bond, at_points, |_, Onsager { rate, b }| {
                 let size = size(r, rate);
                 sum[0] += b[0] * size;
@@ -169,10 +195,13 @@ impl<P: Model<Manifold: Flat>> Fluctuating<Uniform> for Lattice<P> {
     }
 
     fn drift(&self, x: &Points<P::Manifold>, _: usize, _: &Noise<Uniform>) -> Option<SiteVector> {
-        let at = |site: usize| drift::<P>(|[x, _]| self.terms_at(site, x), [&x[site]; 2], 1)[0];
+        let sizes = self.sizes_of_differences(x);
+        let at = |site: usize| {
+            drift::<P>(|[x, _]| self.terms_at(site, x), [&x[site]; 2], (1, &sizes))[0]
+        };
         let of = |bond: usize| {
             let [i, j] = self.layout.bonds()[bond].map(|site| site as usize);
-            drift::<P>(|both| self.terms_of(bond, both), [&x[i], &x[j]], 2)
+            drift::<P>(|both| self.terms_of(bond, both), [&x[i], &x[j]], (2, &sizes))
         };
         self.added(at, of)
     }
@@ -197,7 +226,13 @@ impl<P: Model<Manifold: Flat>> Fluctuating<Uniform> for Lattice<P> {
         if P::BOND_ENERGY || P::EnergyGather::PRESENT || P::EntropyGather::PRESENT {
             return Err(NoiseError::BondsHaveEnergies);
         }
-        (0..self.sites()).try_for_each(|site| self.keeps_volume(site, &x[site]))
+        // The divergence may vanish at the start by a symmetry.
+        let sizes = self.sizes_of_differences(x);
+        let (y, _) = self.near(x, &self.vector_of(|site| own_or::<P>(&x[site], &sizes)));
+        [x, &y].into_iter().try_for_each(|x| {
+            let sizes = self.sizes_of_differences(x);
+            (0..self.sites()).try_for_each(|site| self.keeps_volume(site, &x[site], &sizes))
+        })
     }
 }
 
@@ -205,8 +240,13 @@ impl<P: Model> Lattice<P> {
     /// # Errors
     ///
     /// [`NoiseError::NotUnimodular`] if the reversible motion of a site changes the volume.
-    fn keeps_volume(&self, site: usize, x: &PointOf<P>) -> Result<(), NoiseError> {
-        let scales = P::Manifold::scales(x);
+    fn keeps_volume(
+        &self,
+        site: usize,
+        x: &PointOf<P>,
+        sizes: &VectorOf<P>,
+    ) -> Result<(), NoiseError> {
+        let scales = own_or::<P>(x, sizes);
         let [mut divergence, mut size] = [0.0, 0.0];
         for k in 0..<P::Manifold as Space>::Dim::LEN {
             let width = WIDTH * scales[k];

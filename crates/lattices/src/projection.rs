@@ -14,6 +14,7 @@
 use std::ops::Range;
 
 use metriplectic_fields::{Column, Space};
+use metriplectic_integrators::Vector as _;
 use metriplectic_integrators::explicit::{Combination, Projected, ProjectionError, Target};
 use metriplectic_manifolds::Manifold;
 
@@ -134,6 +135,9 @@ impl<P: Model> Projection<'_, P> {
             before = worst;
             let coefficients = normals.correction(with_entropy);
             let next = self.corrected(&y, &jets, &coefficients, &weights);
+            if with_entropy && self.is_blurred(next.length, &normals, &jets) {
+                return Err(ProjectionError::NoEntropy);
+            }
             moved += next.length;
             let units = || self.lattice.same(&jets.totals.sizes);
             let is_far = self.target.limit.is_some_and(|limit| limit.is_below(moved, &units()));
@@ -150,6 +154,21 @@ impl<P: Model> Projection<'_, P> {
             known = Some((gram, weights));
         }
         self.stagnated(best)
+    }
+
+    /// Returns whether the round-off of the entropy is as long as the errors that are allowed, where a correction of this length takes back
+    /// a residual of it: a state moved onto an entropy has an error then which no smaller step makes smaller.
+    fn is_blurred(&self, length: f64, normals: &Normals, jets: &Jets<P>) -> bool {
+        let (Some(allowed), excess) = (self.target.units, normals.entropy_excess()) else {
+            return false;
+        };
+        // A longer correction of such a residual is too far.
+        if !(excess > 0.0 && excess <= CONSERVED) {
+            return false;
+        }
+        let sizes = self.lattice.same(&jets.totals.sizes);
+        let in_units = |[error, size]: [f64; 2]| if error == 0.0 { 0.0 } else { error / size };
+        SiteVector::is_norm_below([allowed, &sizes], in_units, length / excess)
     }
 
     /// Decides on the best state, if no correction improves it. Its differentials are evaluated anew, so that
@@ -206,8 +225,13 @@ impl<P: Model> Projection<'_, P> {
     /// The target, the value and the sizes of each law.
     fn laws(&self, jets: &Jets<P>) -> Vec<Law> {
         let target = self.target.laws;
+        // A residual without digits is none.
+        let below = |total: &Total, target: f64| {
+            let residual = total.sum.below(target);
+            if residual.abs() <= f64::MIN_POSITIVE / f64::EPSILON { 0.0 } else { residual }
+        };
         let law = |target: f64, total: &Total| Law {
-            residual: total.sum.below(target),
+            residual: below(total, target),
             size: target.abs() + total.size,
         };
         let sums = jets.totals.sums.iter().zip(&target.invariants);

@@ -1,27 +1,74 @@
-//! Random numbers that are the same in each run.
+//! Random numbers that are the same in each run, and wherever a site is.
 
 use metriplectic_fields::Column;
+use metriplectic_integrators::noise::{Purpose, philox};
 
-/// The generator `SplitMix64` (Steele, Lea, Flood 2014).
-pub(crate) struct Random(u64);
+/// What random directions are for, so that no two purposes share numbers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u64)]
+pub(crate) enum Use {
+    /// The displacement of a state near another one.
+    Near,
+    /// Directions at the start.
+    Start,
+    /// Directions where each entry has a size of its own.
+    Own,
+    /// Directions at a state that a run has reached.
+    Reached,
+    /// A displacement by roundings.
+    Rounding,
+}
+
+/// What a direction belongs to, by its number in the graph.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum At {
+    /// The entries at a site.
+    Site(usize),
+    /// The entries of both sites of a bond.
+    Bond(usize),
+    /// A covector at a site.
+    Covector(usize),
+}
+
+/// The numbers of one use: functions of the place and of their order there, by the
+/// [law](metriplectic_integrators::noise::Counter) of all random numbers.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Random(Use);
 
 impl Random {
-    pub(crate) const fn new(seed: u64) -> Self {
-        Self(seed)
+    pub(crate) const fn new(of: Use) -> Self {
+        Self(of)
     }
 
     /// A number between −1 and 1.
-    pub(crate) fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+    fn number(self, [index, place]: [u64; 2]) -> f64 {
+        let [word, ..] = philox([0; 2], [index, place, Purpose::Trial as u64, self.0 as u64]);
         // The 53 leading bits make a number between 0 and 2⁵³.
-        ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
+        (word >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
     }
 
-    /// A vector with entries up to these sizes.
-    pub(crate) fn vector<V: Column<f64>>(&mut self, sizes: &V) -> V {
-        V::from_index(|k| sizes[k] * self.next())
+    /// The number between −1 and 1 of an entry of a state, by its number among all of them.
+    pub(crate) fn of_entry(self, entry: usize) -> f64 {
+        self.number([0, entry as u64])
+    }
+
+    /// The numbers between −1 and 1 at a place, one after the other.
+    pub(crate) fn at(self, place: At) -> impl FnMut() -> f64 {
+        // Places of each kind begin at an index of their own, and have fewer numbers than lie between.
+        let [place, mut index] = match place {
+            At::Site(site) => [site as u64, 1 << 16],
+            At::Bond(bond) => [bond as u64, 2 << 16],
+            At::Covector(site) => [site as u64, 3 << 16],
+        };
+        move || {
+            index += 1;
+            self.number([index, place])
+        }
+    }
+
+    /// A vector at a place with entries up to these sizes.
+    pub(crate) fn vector<V: Column<f64>>(self, place: At, sizes: &V) -> V {
+        let mut next = self.at(place);
+        V::from_index(|k| sizes[k] * next())
     }
 }

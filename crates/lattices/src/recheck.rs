@@ -12,7 +12,7 @@ use crate::lattice::{Lattice, differentials_at};
 use crate::model::Model;
 use crate::parallel;
 use crate::points::Points;
-use crate::random::Random;
+use crate::random::{Random, Use};
 use crate::verify::{Sizes, Trial, cancels, golden, samples};
 
 /// The entropy that a negative rate destroys, relative to all production, that is round-off.
@@ -133,8 +133,8 @@ impl<P: Model> Lattice<P> {
         let judge = |y: &Points<P::Manifold>| {
             let largest = self.largest_sizes(y);
             let look = |sizes| {
-                let (tried, random) = (Tried::Reached, Random::new(4));
-                let mut trial = Trial { lattice: self, y, sizes, tried, random, mean };
+                let (tried, random) = (Tried::Reached, Random::new(Use::Reached));
+                let trial = Trial { lattice: self, y, sizes, tried, random, mean };
                 trial.derivatives_of(places.clone())
             };
             // As at the start: a difference that is not small decides nothing.

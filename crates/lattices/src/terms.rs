@@ -7,7 +7,7 @@ use crate::lattice::{Lattice, differentials_at, dimension};
 use crate::model::{Model, VectorOf};
 use crate::parallel;
 use crate::points::Points;
-use crate::random::Random;
+use crate::random::Use;
 use crate::vector::SiteVector;
 
 /// The displacement of a difference quotient, relative to the sizes of the entries.
@@ -58,8 +58,8 @@ impl<P: Model> Lattice<P> {
                 sum + self.parts.reversible(&x[site], &column, &s).abs()
             })
         });
-        let mut random = Random::new(2);
-        let noise = v.with(|i| random.next() * sizes.get(i) * STEP);
+        let irregular = self.irregular(Use::Rounding, v);
+        let noise = SiteVector::zip([&irregular, sizes], |[next, size]| next * size * STEP);
         let there = self.rates(x, &noise)?;
         let change = SiteVector::zip([&there, v], |[there, v]| (there - v) * STEP.recip());
         let rounded = change.by_kind();

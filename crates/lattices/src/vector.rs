@@ -365,14 +365,14 @@ struct Ranked {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::random::Random;
+    use crate::random::{Random, Use};
 
     #[test]
     fn a_norm_without_an_array_has_the_bits_of_one_with_it() {
-        let (sites, stride, mut random) = (3000, 3, Random::new(5));
+        let (sites, stride, random) = (3000, 3, Random::new(Use::Start));
         let pool = Pool::default();
-        let v = SiteVector::same(sites, vec![0.0; stride], &pool).with(|_| random.next());
-        let w = v.with(|i| if i % 7 == 0 { v.get(i) } else { random.next() });
+        let v = SiteVector::same(sites, vec![0.0; stride], &pool).with(|i| random.of_entry(i));
+        let w = v.with(|i| if i % 7 == 0 { v.get(i) } else { random.of_entry(v.len() + i) });
         let sizes = SiteVector::same(sites, vec![0.5, 2.0, 1e-3], &pool);
         let ratio = |[v, w, size]: [f64; 3]| (v - w) / size;
         let numbers = SiteVector::zip([&v, &w, &sizes], ratio);

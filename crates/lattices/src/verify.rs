@@ -16,7 +16,7 @@ use crate::lattice::{Differentials, Lattice, Total, differentials_at, dimension}
 use crate::model::{Model, PairManifold, PointOf, VectorOf};
 use crate::parallel;
 use crate::points::Points;
-use crate::random::Random;
+use crate::random::{At, Random, Use};
 
 /// Sites, and bonds, at which closures are tried.
 const SAMPLES: usize = 64;
@@ -70,7 +70,7 @@ impl<P: Model> Lattice<P> {
         self.verify_values(x)?;
         self.verify_friction_around(x)?;
         let (y, tried) = self.near(x, &self.sizes(x));
-        let (sizes, random) = (Sizes::Same(self.largest_sizes(&y)), Random::new(1));
+        let (sizes, random) = (Sizes::Same(self.largest_sizes(&y)), Random::new(Use::Start));
         let trial = Trial { lattice: self, y: &y, sizes, tried, random, mean: [0.0; 2] }.all();
         trial.map_err(|law| self.located(law, &y))
     }
@@ -206,6 +206,12 @@ impl<P: Model> Lattice<P> {
         })
     }
 
+    /// A random number between −1 and 1 for each entry of a state.
+    pub(crate) fn irregular(&self, of: Use, like: &crate::SiteVector) -> crate::SiteVector {
+        let (random, first) = (Random::new(of), self.layout.first_site() * dimension::<P>());
+        like.with(|i| random.of_entry(first + i))
+    }
+
     /// Moves a state by a little along its velocity and at random, each entry by a fraction of its size. Returns the
     /// state without a change if it has no neighbour with finite values.
     pub(crate) fn near(
@@ -219,8 +225,7 @@ impl<P: Model> Lattice<P> {
         let speed = sized.relative_to(sizes);
         drop(sized);
         let time = if speed > 0.0 { speed.recip() } else { 0.0 };
-        let mut random = Random::new(0);
-        let noise = v.with(|_| random.next());
+        let noise = self.irregular(Use::Near, &v);
         for fraction in [MOVED, 1e-2 * MOVED, 1e-4 * MOVED] {
             let d = crate::SiteVector::zip([&v, &noise, sizes], |[v, noise, size]| {
                 fraction * (time * v + noise * size)
@@ -268,14 +273,14 @@ impl<P: Model> Trial<'_, P> {
         self.all_derivatives(&all).or_else(|error| {
             // The difference of a small entry is not small if it is a fraction of the largest one.
             let sizes = Sizes::Own(lattice.largest_sizes(y));
-            let random = Random::new(3);
+            let random = Random::new(Use::Own);
             Trial { sizes, random, ..*self }.all_derivatives(&all).map_err(|_| error)
         })?;
         self.conserved(&all)
     }
 
     /// The derivatives of the functions of sites and bonds, and of the totals.
-    fn all_derivatives(&mut self, all: &Differentials) -> Result<(), LatticeError> {
+    fn all_derivatives(&self, all: &Differentials) -> Result<(), LatticeError> {
         let [sites, bonds] = [self.lattice.sites(), self.lattice.layout.bonds().len()];
         self.derivatives_of((samples(sites), samples(bonds)))?;
         self.total_derivatives(all)
@@ -283,7 +288,7 @@ impl<P: Model> Trial<'_, P> {
 
     /// The derivatives of the functions of these sites and bonds.
     pub(crate) fn derivatives_of(
-        &mut self,
+        &self,
         (sites, bonds): (impl Iterator<Item = usize> + Clone, impl Iterator<Item = usize> + Clone),
     ) -> Result<(), LatticeError> {
         let lattice = self.lattice;
@@ -312,18 +317,20 @@ impl<P: Model> Trial<'_, P> {
     }
 
     /// The bracket of a site.
-    fn site(&mut self, site: usize, [w, s]: &[VectorOf<P>; 2]) -> Result<(), LatticeError> {
+    fn site(&self, site: usize, [w, s]: &[VectorOf<P>; 2]) -> Result<(), LatticeError> {
         let (parts, x, place) = (&self.lattice.parts, &self.y[site], Place::Site(site));
         let tried = self.tried;
         let cancels =
             |law, rest_and_terms, remedy| cancels(law, (place, tried), rest_and_terms, remedy);
+        let mut next = self.random.at(At::Covector(self.lattice.layout.first_site() + site));
+        let mut varied = || VectorOf::<P>::from_index(|k| w[k] * (1.0 + next()));
         for _ in 0..2 {
-            let alpha = VectorOf::<P>::from_index(|k| w[k] * (1.0 + self.random.next()));
+            let alpha = varied();
             let v = parts.reversible(x, &alpha, s);
             cancels("Π = −Πᵀ", [alpha.dot(&v), alpha.abs().dot(&v.abs())], "")?;
         }
         // Along the velocity, and along what Π makes of any other differential.
-        let alpha = VectorOf::<P>::from_index(|k| w[k] * (1.0 + self.random.next()));
+        let alpha = varied();
         let remedy = if P::EntropyGather::PRESENT { GATHERED_CASIMIR } else { CASIMIR };
         for covector in [w, &alpha] {
             let v = parts.reversible(x, covector, s);
@@ -333,7 +340,7 @@ impl<P: Model> Trial<'_, P> {
     }
 
     /// The derivatives of the functions of a site.
-    fn derivatives(&mut self, site: usize) -> Result<(), LatticeError> {
+    fn derivatives(&self, site: usize) -> Result<(), LatticeError> {
         let (parts, x) = (&self.lattice.parts, &self.y[site]);
         let u = self.along(site);
         let moved = |t: f64| P::Manifold::chart(x, &(u * t));
@@ -358,19 +365,20 @@ impl<P: Model> Trial<'_, P> {
     }
 
     /// A random direction at a site.
-    fn along(&mut self, site: usize) -> VectorOf<P> {
-        let sizes = self.sizes_at(site);
-        self.random.vector(&sizes)
+    fn along(&self, site: usize) -> VectorOf<P> {
+        let place = At::Site(self.lattice.layout.first_site() + site);
+        self.random.vector(place, &self.sizes_at(site))
     }
 
     /// A random direction of the sites of a bond.
-    fn random_along(&mut self, bond: usize) -> Vector<PairManifold<P>> {
+    fn random_along(&self, bond: usize) -> Vector<PairManifold<P>> {
         let (n, ends) = (dimension::<P>(), self.lattice.layout.bonds()[bond]);
         let sizes = ends.map(|site| self.sizes_at(site as usize));
-        self.random.vector(&Column::from_index(|k| sizes[k / n][k % n]))
+        let place = At::Bond(self.lattice.layout.number(bond));
+        self.random.vector(place, &Column::from_index(|k| sizes[k / n][k % n]))
     }
 
-    fn bond_derivative(&mut self, bond: usize) -> Result<(), LatticeError> {
+    fn bond_derivative(&self, bond: usize) -> Result<(), LatticeError> {
         let lattice = self.lattice;
         let x = lattice.pair(self.y, bond);
         let u = self.random_along(bond);
@@ -382,7 +390,7 @@ impl<P: Model> Trial<'_, P> {
     }
 
     /// The derivative of the totals along one random direction.
-    fn total_derivatives(&mut self, all: &Differentials) -> Result<(), LatticeError> {
+    fn total_derivatives(&self, all: &Differentials) -> Result<(), LatticeError> {
         let Self { lattice, y, .. } = *self;
         let u: Vec<VectorOf<P>> = (0..lattice.sites()).map(|site| self.along(site)).collect();
         let moved = |t: f64| {

@@ -11,7 +11,7 @@
 //! - **Brackets**: none, as on every curve. The half line is a factor, for a temperature, a volume or
 //!   an internal energy, of a [`Product`](crate::Product).
 
-use metriplectic_fields::{ChartPoint, Column, Scalar, Space};
+use metriplectic_fields::{ChartPoint, Column, Real, Scalar, Space};
 use nalgebra::{Const, SVector, Vector1};
 use rand::{Rng, RngExt};
 
@@ -114,6 +114,12 @@ impl Manifold for HalfLine {
         (w.x * v.x).abs()
     }
 
+    /// The velocity `s' = s`, of the length 1.
+    #[inline]
+    fn leg(x: &Vector1<Real>, _: usize) -> Vector1<Real> {
+        *x
+    }
+
     /// No positive number is nearest to one that is not: `2.2·10⁻³⁰⁸`, the smallest of full precision,
     /// stands for zero.
     fn project(&self, x: &Vector1<f64>) -> Vector1<f64> {
@@ -145,7 +151,6 @@ impl Flat for HalfLine {}
 mod tests {
     use super::*;
     use crate::{Canonical, Exponential, Metric, MetricError, Riemannian, WeylMidpoint, laws};
-    use metriplectic_fields::Real;
     use nalgebra::Matrix1;
     use num_dual::DualNum;
     use proptest::prelude::*;

@@ -9,7 +9,7 @@
 //! manifold. A projection after the step would move the point, and change `H`. The certificate of a run
 //! contains the largest defect of its points.
 
-use metriplectic_fields::{Column, Real, Space, Vector};
+use metriplectic_fields::{Column, Real, Space, Vector, Velocity};
 use rand::Rng;
 
 use crate::chart_midpoint;
@@ -110,6 +110,17 @@ pub trait Manifold: Space {
     #[inline]
     fn pairing_size(w: &Vector<Self>, v: &Vector<Self>) -> f64 {
         w.magnitude() * v.magnitude()
+    }
+
+    /// The `a`-th of as many velocities as one has entries. Their parts along the manifold, `E_a`, make the inverse of the
+    /// [canonical](crate::Canonical) metric, `Σ_a E_a ⊗ E_a = g⁻¹`, and are smooth on the whole manifold. Thermal noise acts along
+    /// them.
+    ///
+    /// The default is the `a`-th axis, where the canonical metric is that of the space around. A half line has `s`, for
+    /// `ds²/s²`.
+    #[inline]
+    fn leg(_x: &Self::Point<Real>, a: usize) -> Velocity<Self, Real> {
+        Column::basis(a)
     }
 
     /// Projects an array of numbers to the nearest point of the manifold, or to one of several. Entries that are

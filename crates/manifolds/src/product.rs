@@ -249,6 +249,16 @@ impl<A: Manifold + Times<B>, B: Manifold> Manifold for Product<A, B> {
         A::pairing_size(&wa, &va) + B::pairing_size(&wb, &vb)
     }
 
+    #[inline]
+    fn leg((x, y): &Self::Point<Real>, a: usize) -> Velocity<Self, Real> {
+        let n = A::Velocity::LEN;
+        if a < n {
+            stack(&A::leg(x, a), &Velocity::<B, Real>::zero())
+        } else {
+            stack(&Velocity::<A, Real>::zero(), &B::leg(y, a - n))
+        }
+    }
+
     fn project(&self, (a, b): &Self::Point<f64>) -> Self::Point<f64> {
         (self.0.project(a), self.1.project(b))
     }

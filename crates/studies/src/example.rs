@@ -165,11 +165,15 @@ impl Example {
         let mut states = vec![steps.state().clone()];
         let mut progress = Progress::over(span.count());
         for step in 1..=span.count() {
-            let state = steps.advance()?;
-            if span.records(step) {
-                states.push(state.clone());
+            steps.advance()?;
+            let over = steps.ending().is_some();
+            if span.records(step) || over {
+                states.push(steps.state().clone());
             }
             progress.step();
+            if over {
+                break;
+            }
         }
         Ok(Record { states, certificate: steps.run()?.certificate().clone() })
     }

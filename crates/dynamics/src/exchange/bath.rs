@@ -15,12 +15,13 @@ use crate::dissipation::along_velocities;
 /// use metriplectic_dynamics::exchange::{Bath, Contact};
 /// use metriplectic_fields::Real;
 /// use nalgebra::Vector2;
+/// use num_dual::DualNum;
 /// // Air at 300 K that slows the second entry down, a momentum: R = γ on it.
 /// let air = Bath::at(300.0).friction(|_t: Real, _x: &Vector2<Real>, _w: &Vector2<Real>| {
 ///     [Contact { rate: Real::from(0.08), along: Vector2::<Real>::y() }]
 /// });
 /// // A room whose temperature changes, and `R = rate · g⁻¹` with the metric of the system.
-/// let room = Bath::in_time(|t| 290.0 + 5.0 * (0.26 * t).sin()).isotropic(0.1);
+/// let room = Bath::in_time(|t| (t * 0.26).sin() * 5.0 + 290.0).isotropic(0.1);
 /// ```
 #[derive(Clone)]
 pub struct Bath<T, R> {
@@ -35,8 +36,8 @@ impl Bath<f64, ()> {
     }
 }
 
-impl<T: Fn(f64) -> f64> Bath<T, ()> {
-    /// A bath whose temperature is a function of time.
+impl<T: Fn(Real) -> Real> Bath<T, ()> {
+    /// A bath whose temperature is a function `|t: Real| -> Real` of time, as every other closure of time.
     pub const fn in_time(temperature: T) -> Self {
         Self { temperature, friction: () }
     }
@@ -84,10 +85,10 @@ impl Temperature for f64 {
     }
 }
 
-impl<F: Fn(f64) -> f64> Temperature for F {
+impl<F: Fn(Real) -> Real> Temperature for F {
     #[inline]
     fn at(&self, t: f64) -> f64 {
-        self(t)
+        self(Real::from(t)).re
     }
 }
 

@@ -1,6 +1,6 @@
 //! Fields `E_a` with `Σ E_a E_aᵀ = g⁻¹` that are smooth on the whole manifold.
 
-use metriplectic_fields::{Column, Dimension, Real, Space, Vector, Velocity};
+use metriplectic_fields::{Column, Dimension, Real, Space, Vector};
 use metriplectic_manifolds::{
     Canonical, Constant, FieldMetric, Flat, InnerProduct, Manifold, MetricAt, MetricError,
     Riemannian,
@@ -12,7 +12,8 @@ use crate::exchange::components;
 /// A metric with fields `E_a` of vectors, `Σ_a E_a ⊗ E_a = g⁻¹`, that are smooth on the whole manifold.
 ///
 /// No frame of a sphere is. There these are the `n + 1` projections of the axes of the space around it, on SO(3) the three
-/// rotations about the axes of the body, and on a vector space an orthonormal basis of the metric.
+/// rotations about the axes of the body, on a half line `s ∂_s`, on a vector space an orthonormal basis of the metric, and on a
+/// product those of the factors. For the canonical metric they are [`Manifold::leg`].
 #[diagnostic::on_unimplemented(
     message = "the noise of the metric `{Self}` on `{M}` is not known",
     note = "it is for the canonical metric, and for `Metric::constant` and `Metric::field` on a vector space or a chart; write the friction as `OnsagerDissipation(|x, w| [Contact {{ rate, along }}])` otherwise"
@@ -47,8 +48,8 @@ where
     }
 
     fn frame(g: &MetricAt<'_, M, Self, Real>) -> Result<Vec<Vector<M, Real>>, MetricError> {
-        let axis = |a| components::<M>(g.x, &Velocity::<M, Real>::basis(a));
-        let legs = (0..<Self as NoiseFrame<M>>::legs()).map(axis);
+        let x = g.x.point();
+        let legs = (0..<Self as NoiseFrame<M>>::legs()).map(|a| components(g.x, &M::leg(&x, a)));
         legs.collect::<Option<_>>().ok_or_else(|| MetricError::out_of_chart(g.x))
     }
 }

@@ -5,29 +5,35 @@
 
 use std::ops::Range;
 
-use metriplectic_fields::{ChartPoint, Column, Dimension as _, Jet2, Real, ScalarField, Vector};
+use metriplectic_fields::{
+    ChartPoint, Column, Dimension as _, Jet2, Matrix, Real, ScalarField, Vector,
+};
 use metriplectic_manifolds::{Canonical, Manifold, MetricError, Riemannian};
 
 use super::drift::{Place, TermVisitor, centre, kinetic_drift, ln_density, seeded};
+use super::examination::{Around, place_at};
 use super::terms::{NoiseTerm, NoiseTerms};
 use crate::bracket::Bracket as _;
 use crate::dissipation::Dissipation as _;
 use crate::invariants::{Invariants as _, Kind, Visitor};
 use crate::metriplectic::{Dim, Metriplectic, Point};
 use crate::orthogonal::Orthogonal;
-use crate::velocity::differentials;
+use crate::verify::balance::ROUNDING;
 
 type VectorOf<Y> = Vector<<Y as Metriplectic>::Manifold>;
 
 /// The second jets of the fields of a system at a point.
-struct Jets<M: Manifold> {
+pub(super) struct Jets<M: Manifold> {
     energy: Jet2<M>,
     entropy: Jet2<M>,
     invariants: Vec<Jet2<M>>,
 }
 
 impl<M: Manifold> Jets<M> {
-    fn at<Y: Metriplectic<Manifold = M> + ?Sized>(system: &Y, x: &M::Point<f64>) -> Self {
+    pub(super) fn at<Y: Metriplectic<Manifold = M> + ?Sized>(
+        system: &Y,
+        x: &M::Point<f64>,
+    ) -> Self {
         struct All<'a, M: Manifold>(&'a M::Point<f64>, Vec<Jet2<M>>);
         impl<M: Manifold> Visitor<M> for All<'_, M> {
             fn visit(&mut self, _: Kind, f: &impl ScalarField<M>) {
@@ -46,6 +52,20 @@ impl<M: Manifold> Jets<M> {
             w: seeded(&self.energy, directions),
             s: seeded(&self.entropy, directions),
             invariants: self.invariants.iter().map(|jet| seeded(jet, directions)).collect(),
+        }
+    }
+
+    /// The place at a point with the derivatives along a vector in `ε₁`.
+    pub(super) fn along(&self, x: &M::Point<f64>, u: &Vector<M>) -> Place<M> {
+        let dual = |value: &Vector<M>, slope: Vector<M>| {
+            Vector::<M, Real>::from_index(|k| Real::new(value[k], slope[k], 0.0, 0.0))
+        };
+        let of = |jet: &Jet2<M>| dual(&jet.df, jet.hf * *u);
+        Place {
+            x: ChartPoint { base: x.clone(), q: dual(&Vector::<M>::zero(), *u) },
+            w: of(&self.energy),
+            s: of(&self.entropy),
+            invariants: self.invariants.iter().map(of).collect(),
         }
     }
 }
@@ -87,15 +107,7 @@ pub fn seeded_place<Y: Metriplectic + ?Sized>(
 
 /// The place at a point without derivatives.
 pub fn place<Y: Metriplectic + ?Sized>(system: &Y, x: &Point<Y>) -> Place<Y::Manifold> {
-    let w = differentials(system, &ChartPoint::<Y::Manifold>::centre(x));
-    let real = |v: &VectorOf<Y>| Vector::<Y::Manifold, Real>::embed(v);
-    let listed = w.invariants.as_ref().iter().flatten();
-    Place {
-        x: ChartPoint::centre(x),
-        w: real(&w.energy),
-        s: real(&w.entropy),
-        invariants: listed.map(|(_, l)| real(l)).collect(),
-    }
+    place_at(system, &ChartPoint::centre(x))
 }
 
 /// Computes `Σ_r a_r √(κ ρ_r) b_r` over some of the terms, with the strength `κ` and the number `a_r` of each.
@@ -160,7 +172,8 @@ where
     )
 }
 
-/// Computes `div_μ(Π dH)` at a point, and the sum of the sizes of its terms.
+/// Computes `div_μ(Π dH)` at a point, and the sum of the sizes of its terms, in which the rounding of the velocity in these
+/// units of the coordinates counts too. Where each term is the rounding of larger ones, the divergence is no larger.
 ///
 /// # Errors
 ///
@@ -169,6 +182,7 @@ pub fn divergence<Y>(
     system: &Y,
     x: &Point<Y>,
     measure: &impl ScalarField<Y::Manifold>,
+    units: &VectorOf<Y>,
 ) -> Result<[f64; 2], MetricError>
 where
     Y: Metriplectic + ?Sized,
@@ -177,7 +191,7 @@ where
     let n = Dim::<Y>::LEN;
     let jets = Jets::at(system, x);
     let density = ln_density(x, measure)?;
-    let [mut sum, mut size] = [0.0_f64; 2];
+    let [mut sum, mut size, mut rate] = [0.0_f64; 3];
     let mut add = |term: f64| {
         sum += term;
         size += term.abs();
@@ -192,35 +206,46 @@ where
             add(v[i + 1].eps2);
             add(density[i + 1] * v[i + 1].re);
         }
+        if i == 0 {
+            rate = (0..n).map(|k| (v[k].re / units[k]).abs()).sum();
+        }
     }
-    Ok([sum, size])
+    Ok([sum, size + ROUNDING * rate])
 }
 
-/// Computes the largest entry of `Σ ρ_r b_r b_rᵀ − K` at a point, and that of `K`, both in units of the entries.
+/// Computes the largest entry of `Σ ρ_r b_r b_rᵀ − K` at a point, and that of `K`, both in these units of the coordinates.
 ///
 /// # Errors
 ///
 /// [`MetricError`] if the metric or the chart cannot be used there.
-pub fn mismatch<Y>(system: &Y, x: &Point<Y>) -> Result<[f64; 2], MetricError>
+pub fn mismatch<Y>(system: &Y, x: &Point<Y>, units: &VectorOf<Y>) -> Result<[f64; 2], MetricError>
 where
     Y: Metriplectic<Dissipation: NoiseTerms<Y::Manifold, Y::Metric>> + ?Sized,
 {
-    let w = differentials(system, &ChartPoint::<Y::Manifold>::centre(x)).energy;
+    let here = Place { invariants: Vec::new(), ..place(system, x) };
     let centre = ChartPoint::<Y::Manifold>::centre(x);
-    let k = system.dissipation().tensor(&system.metric_at(&centre), &w)?;
-    let scales = Y::Manifold::scales(x);
-    let in_units = |i: usize, j: usize, entry: f64| entry / (scales[i] * scales[j]);
+    let k = system.dissipation().tensor(&system.metric_at(&centre), &here.w.real())?;
+    let in_units = |i: usize, j: usize, entry: f64| (entry / (units[i] * units[j])).abs();
     let n = Dim::<Y>::LEN;
     let pairs = || (0..n).flat_map(|i| (0..n).map(move |j| (i, j)));
-    let size = pairs().map(|(i, j)| in_units(i, j, k[(i, j)]).abs()).fold(0.0, f64::max);
-    let mut rest = k;
-    let here = Place { invariants: Vec::new(), ..place(system, x) };
+    let largest = |a: &Matrix<Y::Manifold>| {
+        pairs().map(|(i, j)| in_units(i, j, a[(i, j)])).fold(0.0, f64::max)
+    };
+    let (size, mut rest) = (largest(&k), k);
     let all = 0..system.dissipation().count();
     each(system, &here, all, &mut |_, NoiseTerm { rate, b }| {
         for (i, j) in pairs() {
             rest[(i, j)] -= rate.re * b[i].re * b[j].re;
         }
     })?;
-    let off = pairs().map(|(i, j)| in_units(i, j, rest[(i, j)]).abs()).fold(0.0, f64::max);
-    Ok([off, size])
+    Ok([largest(&rest), size])
+}
+
+/// Compares the derivatives of the terms of a dissipation with their values, as [`Around::lost_in_terms`].
+pub fn lost_in_dissipation<Y>(system: &Y, around: &Around<Y::Manifold>) -> Option<[f64; 2]>
+where
+    Y: Metriplectic<Dissipation: NoiseTerms<Y::Manifold, Y::Metric>> + ?Sized,
+{
+    let all = 0..system.dissipation().count();
+    around.lost_in_terms(system, |place, visit| each(system, place, all.clone(), visit))
 }

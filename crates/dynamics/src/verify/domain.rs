@@ -9,7 +9,7 @@ use crate::metriplectic::{Metriplectic, Point};
 use crate::model_error::ModelError;
 
 /// Finds a field whose value at `x` is not a finite number.
-pub(super) fn value_not_finite<Y: Metriplectic + ?Sized>(
+pub(crate) fn value_not_finite<Y: Metriplectic + ?Sized>(
     system: &Y,
     x: &Point<Y>,
 ) -> Option<ModelError> {

@@ -8,7 +8,7 @@ use crate::error::JournalError;
 use crate::fingerprint::of_line;
 
 /// The beginning of a journal; the number is that of the format.
-const FORMAT: &str = "metriplectic-journal 1";
+const FORMAT: &str = "metriplectic-journal 2";
 
 /// The plan of a journal, and the names of its columns.
 #[derive(Clone, Debug, PartialEq)]
@@ -93,7 +93,9 @@ impl Header {
             let (found, expected) = (self.version.clone(), expected.version.clone());
             return Err(JournalError::AnotherVersion { path: path.to_owned(), found, expected });
         }
-        if self != expected {
+        // Samples may have been added to a plan since.
+        let (rows, about) = (expected.rows, expected.about.clone());
+        if (Self { rows, about, ..self.clone() }) != *expected {
             return Err(JournalError::NotAJournal { path: path.to_owned() });
         }
         Ok(())

@@ -3,7 +3,11 @@
 //! ```text
 //! 17 ok span|parameters|figures|end|measures|times|series ~seconds #sum
 //! 18 failed start|parameters|figures or nothing|sentence ~seconds #sum
+//! 19 passed times|parameters| ~seconds #sum
+//! rows 1000 #sum
 //! ```
+//!
+//! The last of these says that the plan has got more rows than before.
 
 use super::Header;
 use crate::entry::{Done, ENDINGS, Entry, Failed, Outcome};
@@ -15,10 +19,7 @@ pub(crate) fn encode(entry: &Entry) -> Vec<u8> {
     let mut line = body(entry);
     line.extend_from_slice(b" ~");
     push(&mut line, entry.seconds);
-    let sum = of_line(&line);
-    line.extend_from_slice(b" #");
-    push_hex(&mut line, sum, 16);
-    line.push(b'\n');
+    end(&mut line);
     line
 }
 
@@ -48,8 +49,45 @@ fn body(entry: &Entry) -> Vec<u8> {
             line.push(b'|');
             line.extend_from_slice(escaped(message).as_bytes());
         }
+        Outcome::PassedOver(times) => {
+            line.extend_from_slice(format!(" passed {times}").as_bytes());
+            push_list(&mut line, &entry.parameters);
+            push_list(&mut line, &[]);
+        }
     }
     line
+}
+
+/// The line that says how many rows a plan has now, with its end.
+pub(crate) fn encode_rows(rows: usize) -> Vec<u8> {
+    let mut line = format!("{ROWS}{rows}").into_bytes();
+    end(&mut line);
+    line
+}
+
+/// The number of rows that a line says; `None` if it is another line.
+pub(crate) fn decode_rows(line: &[u8]) -> Option<usize> {
+    whole(line)?.strip_prefix(ROWS)?.parse().ok()
+}
+
+/// The beginning of the line that says how many rows a plan has now.
+const ROWS: &str = "rows ";
+
+/// Ends a line with its check sum.
+fn end(line: &mut Vec<u8>) {
+    let sum = of_line(line);
+    line.extend_from_slice(b" #");
+    push_hex(line, sum, 16);
+    line.push(b'\n');
+}
+
+/// The text of a line without its check sum; `None` if it is torn or changed.
+fn whole(line: &[u8]) -> Option<&str> {
+    let text = std::str::from_utf8(line).ok()?.strip_suffix('\n')?;
+    let (body, sum) = text.rsplit_once(" #")?;
+    let is_whole =
+        sum.len() == 16 && u64::from_str_radix(sum, 16).ok()? == of_line(body.as_bytes());
+    is_whole.then_some(body)
 }
 
 fn push_list(line: &mut Vec<u8>, numbers: &[f64]) {
@@ -96,12 +134,7 @@ fn list(text: &str) -> Option<Box<[f64]>> {
 
 /// The row of a line; `None` if it is torn, changed, or no row of this plan.
 pub(crate) fn decode(line: &[u8], header: &Header) -> Option<Entry> {
-    let text = std::str::from_utf8(line).ok()?.strip_suffix('\n')?;
-    let (body, sum) = text.rsplit_once(" #")?;
-    if sum.len() != 16 || u64::from_str_radix(sum, 16).ok()? != of_line(body.as_bytes()) {
-        return None;
-    }
-    let (body, seconds) = body.rsplit_once(" ~")?;
+    let (body, seconds) = whole(line)?.rsplit_once(" ~")?;
     let mut parts = body.split('|');
     let mut head = parts.next()?.split(' ');
     let (number_of_row, status, word) = (head.next()?.parse().ok()?, head.next()?, head.next()?);
@@ -125,6 +158,7 @@ pub(crate) fn decode(line: &[u8], header: &Header) -> Option<Entry> {
             };
             Outcome::Failed(Failed { kind: word.to_owned(), message, figures })
         }
+        "passed" => Outcome::PassedOver(word.parse().ok()?),
         _ => return None,
     };
     let fits = number_of_row < header.rows && parameters.len() == header.parameters.len();

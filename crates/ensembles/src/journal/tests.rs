@@ -1,6 +1,6 @@
 use super::line::{decode, escaped, unescaped};
 use super::*;
-use crate::entry::{Done, Failed, Outcome};
+use crate::entry::{Done, Failed, Outcome, RowStatus};
 
 fn header() -> Header {
     let names = |list: &[&str]| list.iter().map(|name| (*name).to_owned()).collect();
@@ -39,15 +39,75 @@ fn failed(number: usize) -> Entry {
     Entry { number, parameters: [f64::NAN, 2.0].into(), outcome, seconds: 1e-3 }
 }
 
+fn passed_over(number: usize) -> Entry {
+    let outcome = Outcome::PassedOver(number);
+    Entry { number, parameters: [0.5, -0.0].into(), outcome, seconds: 0.0 }
+}
+
+#[test]
+fn the_last_line_of_a_row_that_failed_counts_and_a_row_that_is_done_is_not_replaced() {
+    let path = std::env::temp_dir().join(format!("settled-{}.journal", std::process::id()));
+    let [one, two] = ["1", "2"].map(|n| path.with_extension(n));
+    let numbers = |paths: &[&PathBuf]| {
+        let paths: Vec<PathBuf> = paths.iter().map(|path| (*path).clone()).collect();
+        let content = merged(&paths)?;
+        let rows = content.rows.iter().map(|entry| (entry.number, entry.status()));
+        assert_eq!(content.damaged, 0);
+        Ok::<_, JournalError>(rows.collect::<Vec<_>>())
+    };
+    let write = |path: &Path, entries: &[Entry]| {
+        let lines = entries.iter().flat_map(encode);
+        let text: Vec<u8> = header().line().into_bytes().into_iter().chain(lines).collect();
+        std::fs::write(path, text).unwrap();
+    };
+    write(&one, &[failed(1), passed_over(2), done(3), done(1), done(2), done(3), failed(5)]);
+    use RowStatus::{Done, Failed, PassedOver};
+    let settled = [(1, Done), (2, Done), (3, Done), (5, Failed)];
+    assert_eq!(numbers(&[&one]).unwrap(), settled);
+    // What one process has passed over another has run; a row that failed here and not there is a contradiction.
+    write(&two, &[passed_over(1), passed_over(5), passed_over(7), passed_over(7)]);
+    let both = [(1, Done), (2, Done), (3, Done), (5, Failed), (7, PassedOver)];
+    assert_eq!(numbers(&[&one, &two]).unwrap(), both);
+    assert_eq!(numbers(&[&two, &one]).unwrap(), both);
+    write(&two, &[failed(1)]);
+    let error = numbers(&[&one, &two]).unwrap_err();
+    assert!(matches!(error, JournalError::Contradiction { row: 1, .. }), "{error}");
+    write(&two, &[done(1), failed(1)]);
+    let error = numbers(&[&two]).unwrap_err();
+    assert!(matches!(error, JournalError::Contradiction { row: 1, .. }), "{error}");
+    for path in [one, two] {
+        std::fs::remove_file(path).unwrap();
+    }
+}
+
+#[test]
+fn a_journal_of_a_plan_that_has_grown_has_its_rows() {
+    let path = std::env::temp_dir().join(format!("grown-{}.journal", std::process::id()));
+    let grown = Header { rows: 200, about: "more samples".into(), ..header() };
+    let (mut journal, _) = Journal::open(&path, &header()).unwrap();
+    journal.append(&encode(&done(99))).unwrap();
+    drop(journal);
+    let (mut journal, content) = Journal::open(&path, &grown).unwrap();
+    assert_eq!((content.rows.len(), content.header.rows, content.damaged), (1, 200, 0));
+    journal.append(&encode(&done(199))).unwrap();
+    drop(journal);
+    // The plan as it was before finds its journal too.
+    for header in [header(), grown] {
+        let (_, content) = Journal::open(&path, &header).unwrap();
+        assert_eq!((content.rows.len(), content.header.rows, content.damaged), (2, 200, 0));
+    }
+    std::fs::remove_file(path).unwrap();
+}
+
 #[test]
 fn a_line_gives_back_the_bits_of_its_row() {
-    for entry in [done(17), failed(3)] {
+    for entry in [done(17), failed(3), passed_over(4)] {
         let line = encode(&entry);
         assert_eq!(line.iter().filter(|&&byte| byte == b'\n').count(), 1);
         let read = decode(&line, &header()).unwrap();
         assert!(same_numbers(&entry, &read), "{read:?}");
         assert_eq!((read.number, read.seconds.to_bits()), (entry.number, entry.seconds.to_bits()));
-        assert_eq!(read.failed().map(|f| &f.message), entry.failed().map(|f| &f.message));
+        assert_eq!((read.status(), read.error()), (entry.status(), entry.error()));
     }
 }
 
@@ -94,9 +154,11 @@ fn a_header_is_read_back_with_its_names() {
             Err(JournalError::NotAJournal { .. } | JournalError::AnotherVersion { .. })
         ));
     }
-    let later = line.replace("journal 1 ", "journal 2 ");
-    let error = Header::parse(later.as_bytes(), path).unwrap_err();
-    assert!(matches!(error, JournalError::AnotherVersion { .. }), "{error}");
+    for other in ["journal 1 ", "journal 3 "] {
+        let other = line.replace("journal 2 ", other);
+        let error = Header::parse(other.as_bytes(), path).unwrap_err();
+        assert!(matches!(error, JournalError::AnotherVersion { .. }), "{error}");
+    }
 }
 
 #[test]

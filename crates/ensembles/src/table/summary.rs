@@ -15,7 +15,7 @@ impl fmt::Display for Table {
         }
         write!(f, " rows, {} failed", self.failed())?;
         let mut kinds: BTreeMap<&str, usize> = BTreeMap::new();
-        for (kind, _) in self.rows().filter_map(|row| row.entry.failed().map(|e| (&e.kind, ()))) {
+        for (kind, _) in self.rows().filter_map(|row| row.error()) {
             *kinds.entry(kind).or_default() += 1;
         }
         if !kinds.is_empty() {
@@ -25,6 +25,11 @@ impl fmt::Display for Table {
         let first = self.rows().find_map(|row| Some((row.number(), row.error()?.1.to_owned())));
         if let Some((row, sentence)) = first {
             write!(f, "\nrow {row}: {sentence}")?;
+        }
+        let passed = self.passed_over();
+        if !passed.is_empty() {
+            let (n, rows) = (passed.len(), listed(&passed));
+            write!(f, "\npassed over: {n} rows, which ran when a process ended: {rows}")?;
         }
         let worst = |column: &str| {
             let numbers = self.rows().filter_map(|row| Some((row.number(), row.get(column)?)));
@@ -67,9 +72,9 @@ impl<'a> TableRow<'a> {
     /// How the run ended, `span`, `rest`, `event` or `stopped`, or the kind of the error.
     #[must_use]
     pub fn outcome(&self) -> &'a str {
-        match (self.entry.done(), self.entry.failed()) {
+        match (self.entry.done(), self.entry.error()) {
             (Some(done), _) => done.ending,
-            (_, Some(failed)) => &failed.kind,
+            (_, Some((kind, _))) => kind,
             _ => "",
         }
     }

@@ -26,6 +26,7 @@ use metriplectic_manifolds::{InnerProduct, Manifold, Riemannian};
 
 use super::chart::StepChart;
 use super::tableau::{STAGES, Tableau};
+use crate::round_off::bound::NO_DIGITS;
 use crate::round_off::stable_gradient::short;
 use crate::step::CountOf;
 
@@ -120,6 +121,13 @@ impl<M: Space> StepPolynomial<'_, M> {
     pub(super) fn combined(&self, coefficients: &[f64; STAGES]) -> Vector<M> {
         combined(self.tableau.stages, coefficients, &self.k)
     }
+}
+
+/// A power of two near `1/h`, by which rates are divided before they are multiplied by a covector: a power may be too large or too
+/// small for a number where the work in the step is not.
+#[inline]
+pub(super) fn unit_of_rates(h: f64) -> f64 {
+    power_of_two(h.recip().abs())
 }
 
 /// `Σ_{j<s} c_j v_j`.
@@ -271,6 +279,7 @@ impl<M: Manifold> AlongStages<'_, M> {
         let (Self { stages, polynomial, scales }, zero) = (self, Vector::<M>::zero());
         let StepPolynomial { tableau, chart, h, .. } = polynomial;
         let (s, end) = (tableau.stages, f.end(start.value, &chart.end));
+        let unit = unit_of_rates(*h);
         let mut w = [zero; STAGES];
         let (mut slope, mut change, mut excursion) = (0.0, 0.0, 0.0_f64);
         let mut by_time = 0.0;
@@ -279,8 +288,9 @@ impl<M: Manifold> AlongStages<'_, M> {
             let jet = f.jet1(i, &stages.x[i]);
             excursion = excursion.max((jet.value - start.value).abs());
             w[i] = jet.df;
-            slope += tableau.weights[i] * h * w[i].dot(&stages.v[i]);
-            change += tableau.weights[i] * h.abs() * M::pairing_size(&w[i], &stages.v[i]);
+            let v = stages.v[i] * unit.recip();
+            slope += tableau.weights[i] * h * unit * w[i].dot(&v);
+            change += tableau.weights[i] * h.abs() * unit * M::pairing_size(&w[i], &v);
             size += tableau.weights[i] * w[i].abs().dot(scales);
             if let Some(rate) = f.rate(i, &stages.x[i]) {
                 slope += tableau.weights[i] * rate;
@@ -309,6 +319,10 @@ impl<M: Manifold> AlongStages<'_, M> {
             let weight = fraction * trust(integral, [change, rounding], s);
             delta += weight * (integral - delta);
             noise *= 1.0 - weight;
+        }
+        // A change without digits is none.
+        if delta.abs() <= NO_DIGITS {
+            delta = 0.0;
         }
         delta += start.drift;
         let squares = stages.square * stages.unit;

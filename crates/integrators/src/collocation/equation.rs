@@ -18,12 +18,12 @@ use metriplectic_manifolds::Manifold;
 use super::chart::{StepChart, in_chart_at};
 use super::covectors::{
     AlongStages, Correction, LawStart, OfInvariants, StageCovectors, StageCovectorsOf, StagePoints,
-    Stages, StepPolynomial, all_finite, at_stage, combined,
+    Stages, StepPolynomial, all_finite, at_stage, combined, unit_of_rates,
 };
 use super::heat::{self, HeatStart};
-use super::in_time::{InTime, Timed};
+use super::in_time::{InTime, Timed, frozen_share};
 use super::tableau::{STAGES, Tableau};
-use crate::round_off::bound::ROUNDED;
+use crate::round_off::bound::{NO_DIGITS, ROUNDED};
 use crate::round_off::drift;
 use crate::step::{CountOf, Dim, DriftCorrection, Laws, Numbers};
 
@@ -168,6 +168,8 @@ impl<'a, Y: Metriplectic> StageEquation<'a, Y> {
         let inside = |x: &Point<Y>| system.manifold().is_inside(x);
         let stages = StagePoints::of(system.metric(), &polynomial, inside)?;
         let mut w = self.covectors(&stages, &polynomial);
+        let unit = unit_of_rates(h);
+        let scaled = |v: &Vector<Y::Manifold>| *v * unit.recip();
         // The work and the heat of an open system.
         let mut exchanged = 0.0;
         let (mut heat, mut surplus, mut left) = (None, 0.0, f64::INFINITY);
@@ -179,7 +181,7 @@ impl<'a, Y: Metriplectic> StageEquation<'a, Y> {
             };
             let last = tableau.stages - 1;
             let at_last = friction(last)?;
-            left = h.abs() * w.entropy.w[last].dot(&at_last);
+            left = h.abs() * unit * w.entropy.w[last].dot(&scaled(&at_last));
             let vanishes = |v: Vector<Y::Manifold>| v.magnitude() == 0.0;
             let is_reversible =
                 vanishes(at_last) && (0..last).all(|i| friction(i).is_some_and(vanishes));
@@ -195,13 +197,13 @@ impl<'a, Y: Metriplectic> StageEquation<'a, Y> {
         for i in 0..tableau.stages {
             let at = ChartPoint::<Y::Manifold>::centre(&stages.x[i]);
             let here = at_stage::<Y>(&w, i);
-            let weight = h * tableau.weights[i];
+            let weight = h * tableau.weights[i] * unit;
             let system = self.in_time.map_or(system, |in_time| &in_time.systems[i]);
             let g = system.metric_at(&at);
             let friction = irreversible(system, &g, &here).ok()?;
             let velocity = reversible(system, &g, &here).ok()? + friction;
             let mut off = if self.in_time.is_some() {
-                exchanged += weight * here.energy.dot(&velocity);
+                exchanged += weight * here.energy.dot(&scaled(&velocity));
                 velocity
             } else {
                 self.conserving(velocity, &here.energy)
@@ -209,11 +211,11 @@ impl<'a, Y: Metriplectic> StageEquation<'a, Y> {
             if let Some(heat) = &heat {
                 off += heat[i];
             }
-            work.add(weight, &here, &off);
+            work.add(weight, &here, &scaled(&off));
             let sizes = here.entropy.abs();
             entropy_covector =
                 Vector::<Y::Manifold>::from_index(|c| entropy_covector[c].max(sizes[c]));
-            production += weight * here.entropy.dot(&friction);
+            production += weight * here.entropy.dot(&scaled(&friction));
             entropy_slope = entropy_slope.min(here.entropy.magnitude());
             let zero = Vector::<Y::Manifold>::zero();
             let in_middle = in_chart_at::<Y::Manifold>(&chart.z, &stages.x[i], &zero, &off);
@@ -290,8 +292,9 @@ impl<'a, Y: Metriplectic> StageEquation<'a, Y> {
         velocity: Vector<Y::Manifold>,
         w: &Vector<Y::Manifold>,
     ) -> Vector<Y::Manifold> {
-        let parts = Vector::<Y::Manifold>::from_index(|c| self.rounding[c] * w[c]);
-        let (work, size) = (w.dot(&velocity), parts.magnitude());
+        let unit = unit_of_rates(self.h);
+        let parts = Vector::<Y::Manifold>::from_index(|c| (self.rounding[c] / unit) * w[c]);
+        let (work, size) = (w.dot(&(velocity * unit.recip())), parts.magnitude());
         if !(work.abs() <= ROUNDINGS * size && size > 0.0) {
             return velocity;
         }
@@ -323,14 +326,12 @@ impl<'a, Y: Metriplectic> StageEquation<'a, Y> {
         let energy = LawStart { value: values.energy, drift: drift.energy };
         let entropy = LawStart { value: values.entropy, drift: drift.entropy };
         let of_energy = match self.in_time {
-            // What a method that damps loses of the energy is heat of the bath.
-            Some(in_time) if self.tableau.one_sided => {
-                let (tableau, x, z) = (self.tableau, self.x, &polynomial.chart.z);
-                along.of_law(&Timed { in_time, tableau, x, z }, energy, Correction::Raised)
-            }
             Some(in_time) => {
                 let (tableau, x, z) = (self.tableau, self.x, &polynomial.chart.z);
-                along.of_law(&Timed { in_time, tableau, x, z }, energy, of_energy)
+                let share = frozen_share((tableau, in_time), &stages.x, z);
+                // What a method that damps loses of the energy is heat of the bath.
+                let correction = if tableau.one_sided { Correction::Raised } else { of_energy };
+                along.of_law(&Timed { in_time, tableau, x, z, share }, energy, correction)
             }
             None => along.of(system.energy(), energy, of_energy),
         };
@@ -368,7 +369,7 @@ impl<C: Dimension> Work<C> {
 #[inline]
 fn relative<C: Dimension>(off: &Laws<C::Array<f64>>, sizes: &Laws<C::Array<f64>>) -> f64 {
     // 0/0 = 0: a law without terms has no round-off, and nothing changes it.
-    let ratio = |off: f64, size: f64| if off == 0.0 { 0.0 } else { off.abs() / size };
+    let ratio = |off: f64, size: f64| if off.abs() <= NO_DIGITS { 0.0 } else { off.abs() / size };
     let listed = off.invariants.as_ref().iter().zip(sizes.invariants.as_ref());
     listed.fold(ratio(off.energy, sizes.energy), |largest, (&off, &size)| {
         larger(largest, ratio(off, size))

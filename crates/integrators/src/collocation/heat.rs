@@ -21,17 +21,18 @@
 //! Near an equilibrium `dS = β dH`, and with `τ = 1` the number `N = δ_S − β δ_H` is the gain of `S − βH`, which has a
 //! maximum there: it is not negative, and nothing is corrected.
 //!
-//! At an infinite temperature `⟨dH, ♯n⟩` changes its sign and `u` has no direction: near it `τ` is reduced to zero. Where
-//! friction vanishes at every stage nothing is damped, and the entropy is corrected in both directions.
+//! At an infinite temperature `⟨dH, ♯n⟩` changes its sign and `u` has no direction: near it `τ` is reduced to zero. How
+//! near is measured with the largest entries of `dH` at the stages, since a single term is never small beside itself.
+//! Where friction vanishes at every stage nothing is damped, and the entropy is corrected in both directions.
 //!
 //! `u` is a choice: where an unresolved transient loses energy, the laws do not say which variable warms. Heat moves no
 //! entry whose row of `K` is zero at the start, such as a length on which the entropy depends. Where several entries may
 //! take it, the metric shares it.
 
 use metriplectic_dynamics::orthogonal::Orthogonal;
-use metriplectic_dynamics::velocity::{self, Covectors};
+use metriplectic_dynamics::velocity::{self, Covectors, differentials};
 use metriplectic_dynamics::{Dissipation as _, Metriplectic, system::Point};
-use metriplectic_fields::{ChartPoint, Column, Dimension, Vector};
+use metriplectic_fields::{ChartPoint, Column, Dimension, Space as _, Vector};
 use metriplectic_manifolds::{InnerProduct, Manifold, Riemannian};
 
 use super::chart::{StepChart, in_chart_at};
@@ -54,9 +55,16 @@ pub(super) struct Heat<V> {
 struct Direction<V> {
     /// The vector `♯n`.
     sharp: V,
-    /// The change `⟨dH, ♯n⟩` of the energy along it in units of its terms, between −1 and 1; its sign is that of the
-    /// temperature.
-    alignment: f64,
+    /// The change `⟨dH, ♯n⟩` of the energy along it; its sign is that of the temperature.
+    warmed: f64,
+}
+
+impl<V: Column<f64>> Direction<V> {
+    /// The change of the energy in units of its terms with these entries of `dH`; zero without terms.
+    fn alignment<M: Manifold<Dim: Dimension<Vector<f64> = V>>>(&self, energy: &V) -> f64 {
+        let terms = M::pairing_size(energy, &self.sharp);
+        if terms > 0.0 { self.warmed / terms } else { 0.0 }
+    }
 }
 
 /// The alignment up to which there is no heat: at an infinite temperature the entropy does not change the energy.
@@ -79,7 +87,7 @@ fn still<Y: Metriplectic>(
     let g = system.metric_at(&centre);
     let k = system.dissipation().tensor(&g, &w.energy).ok()?;
     let still = Dim::<Y>::array(|i| (0..Dim::<Y>::LEN).all(|j| k[(i, j)] == 0.0));
-    let is_warmed = direction(system, x, w, &still)?.alignment.abs() > FAINT;
+    let is_warmed = is_clear::<Y>(&direction(system, x, w, &still)?, &w.energy);
     Some(if is_warmed { still } else { Dim::<Y>::array(|_| false) })
 }
 
@@ -100,9 +108,26 @@ fn direction<Y: Metriplectic>(
     }
     let sharp = g.sharp(&normals.project_covector(0, &w.entropy));
     let warmed = w.energy.dot(&sharp);
-    let terms = Y::Manifold::pairing_size(&w.energy, &sharp);
-    let alignment = if terms > 0.0 { warmed / terms } else { 0.0 };
-    alignment.is_finite().then_some(Direction { sharp, alignment })
+    warmed.is_finite().then_some(Direction { sharp, warmed })
+}
+
+/// Whether a direction of heat changes the energy by more than its terms leave.
+fn is_clear<Y: Metriplectic>(
+    at: &Direction<Vector<Y::Manifold>>,
+    energy: &Vector<Y::Manifold>,
+) -> bool {
+    at.alignment::<Y::Manifold>(energy).abs() > FAINT
+}
+
+/// The fraction of the heat that goes in the directions of the stages, which change the energy by these numbers; the units
+/// are sums of terms with the largest entries of `dH` at the stages. At an infinite temperature the direction turns: near
+/// one there is no heat, and on its other side neither.
+pub(crate) fn fraction(warmed: &[f64], units: &[f64]) -> f64 {
+    let sign = warmed.last().map_or(0.0, |last| last.signum());
+    warmed.iter().zip(units).fold(1.0, |least, (warmed, unit)| {
+        let along = if *unit > 0.0 { sign * warmed / unit } else { 0.0 };
+        least.min(((along - FAINT) / (CLEAR - FAINT)).clamp(0.0, 1.0))
+    })
 }
 
 /// Where a step that heats starts.
@@ -110,8 +135,8 @@ fn direction<Y: Metriplectic>(
 pub(crate) struct HeatStart<N: Dimension> {
     /// The differential of the energy.
     energy: N::Vector<f64>,
-    /// The alignment of the direction of heat.
-    alignment: f64,
+    /// The change of the energy along the direction of heat.
+    warmed: f64,
     /// The entries that are not warmed.
     still: N::Array<bool>,
 }
@@ -120,15 +145,6 @@ impl<N: Dimension> HeatStart<N> {
     /// Returns whether an entry is not warmed.
     pub(crate) fn is_still(&self, entry: usize) -> bool {
         self.still.as_ref()[entry]
-    }
-
-    /// The fraction of the heat that goes in a direction of a stage; `None` beyond a temperature of zero, where no
-    /// motion leads: such a root belongs to another branch of the entropy. At an infinite temperature the direction
-    /// turns, and there is no heat.
-    pub(crate) fn fraction(&self, alignment: f64) -> Option<f64> {
-        let along = alignment * self.alignment.signum();
-        let fraction = (along - FAINT) / (CLEAR - FAINT);
-        (along > -CLEAR).then(|| fraction.clamp(0.0, 1.0))
     }
 }
 
@@ -139,9 +155,9 @@ pub(super) fn start<Y: Metriplectic>(
     w: &Covectors<CountOf<Y>, Vector<Y::Manifold>>,
 ) -> Option<HeatStart<Dim<Y>>> {
     let still = still(system, x, w)?;
-    let Direction { alignment, .. } = direction(system, x, w, &still)?;
-    let start = HeatStart { energy: w.energy, alignment, still };
-    (alignment.abs() > FAINT).then_some(start)
+    let at = direction(system, x, w, &still)?;
+    let start = HeatStart { energy: w.energy, warmed: at.warmed, still };
+    is_clear::<Y>(&at, &w.energy).then_some(start)
 }
 
 /// A step that heats.
@@ -165,12 +181,19 @@ pub(super) fn add<Y: Metriplectic>(
 ) -> Option<Heat<Vector<Y::Manifold>>> {
     let &Step { system, tableau, h, .. } = step;
     let zero = Vector::<Y::Manifold>::zero();
-    let (mut sharp, mut directed) = ([zero; STAGES], 1.0_f64);
+    let (mut sharp, mut warmed, mut units) = ([zero; STAGES], [0.0; STAGES], [0.0; STAGES]);
     for i in 0..tableau.stages {
         let at = direction(system, &stages.x[i], &at_stage::<Y>(w, i), &step.start.still)?;
-        directed = directed.min(step.start.fraction(at.alignment)?);
-        sharp[i] = at.sharp;
+        (sharp[i], warmed[i]) = (at.sharp, at.warmed);
     }
+    if !stays_above_zero(step, stages, &warmed) {
+        return None;
+    }
+    let largest = largest_entries(&w.energy.w[..tableau.stages]);
+    for i in 0..tableau.stages {
+        units[i] = Y::Manifold::pairing_size(&largest, &sharp[i]);
+    }
+    let directed = fraction(&warmed[..tableau.stages], &units[..tableau.stages]);
     let lost = if step.is_reversible { 0.0 } else { directed * transient(step, stages, w)? };
     let (delta, square) = (w.energy.left, stages.square());
     if square != 0.0 {
@@ -202,6 +225,63 @@ pub(super) fn add<Y: Metriplectic>(
         rounding.iter().fold(0.0, |largest, rounding| f64::max(largest, rounding[c]))
     });
     Some(Heat { velocity, gain, rounding })
+}
+
+/// The largest size of each entry.
+pub(crate) fn largest_entries<V: Column<f64>>(vectors: &[V]) -> V {
+    V::from_index(|c| vectors.iter().fold(0.0, |largest, v| f64::max(largest, v[c].abs())))
+}
+
+/// The factor by which the jump of `⟨dH, ♯n⟩` across a change of its sign shrinks, or grows, until it is known which one it
+/// does.
+const JUMP: f64 = 16.0;
+/// Halvings of the way across a change of the sign.
+const HALVINGS: usize = 64;
+
+/// Whether no stage is beyond a temperature of zero, where no motion leads: such a root belongs to another branch of the
+/// entropy. There `⟨dH, ♯n⟩` has a pole, and changes its sign as it does at an infinite temperature, where it vanishes.
+fn stays_above_zero<Y: Metriplectic>(
+    step: &Step<'_, Y>,
+    stages: &StagePoints<Y::Manifold>,
+    warmed: &[f64; STAGES],
+) -> bool {
+    let mut before = (step.chart.d * -0.5, step.start.warmed);
+    (0..step.tableau.stages).all(|i| {
+        let here = (stages.q[i], warmed[i]);
+        let is_same = here.1 == 0.0 || before.1 == 0.0 || here.1.signum() == before.1.signum();
+        let is_above = is_same || vanishes_between(step, before, here) == Some(true);
+        before = here;
+        is_above
+    })
+}
+
+/// Whether `⟨dH, ♯n⟩` vanishes where it changes its sign between two points in the chart of the step, which stand with
+/// its values; `None` where it is not defined.
+fn vanishes_between<Y: Metriplectic>(
+    step: &Step<'_, Y>,
+    mut a: (Vector<Y::Manifold>, f64),
+    mut b: (Vector<Y::Manifold>, f64),
+) -> Option<bool> {
+    let jump = (b.1 - a.1).abs();
+    for _ in 0..HALVINGS {
+        let q = (a.0 + b.0) * 0.5;
+        let y = Y::Manifold::chart(&step.chart.z, &q);
+        if !step.system.manifold().is_inside(&y) {
+            return None;
+        }
+        let w = differentials(step.system, &ChartPoint::<Y::Manifold>::centre(&y));
+        let middle = (q, direction(step.system, &y, &w, &step.start.still)?.warmed);
+        if middle.1.signum() == a.1.signum() {
+            a = middle;
+        } else {
+            b = middle;
+        }
+        let now = (b.1 - a.1).abs();
+        if now * JUMP <= jump || now >= JUMP * jump {
+            return Some(now < jump);
+        }
+    }
+    Some(false)
 }
 
 /// The fraction `τ` of what is lost that becomes heat: what the energy loses is a quadratic form of the variations of

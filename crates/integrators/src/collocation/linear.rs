@@ -41,6 +41,8 @@ pub(super) struct Linear<N: Dimension> {
     sensitivity: N::Matrix<f64>,
     /// The round-off by that of the points.
     moved: N::Vector<f64>,
+    /// The displacement that it was formed at, without its sign.
+    displaced: N::Vector<f64>,
     /// The rate `h|K'|` of the friction.
     pub(super) friction: f64,
     /// The rate `h|Π'|` of the reversible motion.
@@ -55,6 +57,13 @@ const LEFT: f64 = 1e-3;
 /// The factor between the bound of round-off to first order and what is taken for round-off.
 /// A factor of four fails `tests/collocation.rs::one_stage_is_the_scheme_of_the_paper`.
 const MARGIN: f64 = 3.0;
+/// The ratio of the displacement of a guess to the size that an entry has on a step, above which the round-off there is not that of the
+/// step: it may be longer than the step itself.
+/// A factor of four fails `collocation/linear.rs::a_linear_part_serves_displacements_of_its_own_size`.
+const LONGER: f64 = 256.0;
+
+/// The displacement of an entry, relative to its size, from which on a state is not at rest.
+const HALF_OF_THE_DIGITS: f64 = 1.5e-8;
 
 /// The differentials of all fields with their derivatives.
 struct Hessians<'a, M: Space>(&'a M::Point<f64>);
@@ -108,6 +117,7 @@ impl<N: Dimension> Linear<N> {
             terms: inverse.abs() * terms,
             sensitivity,
             moved,
+            displaced: chart.d.abs(),
             friction: h.abs() * jet.friction,
             rotation: h.abs() * jet.rotation,
         })
@@ -130,6 +140,22 @@ impl<N: Dimension> Linear<N> {
         let heat = self.inverse.abs() * at.heat_rounding;
         let first = self.terms + self.sensitivity.abs() * at.noise + self.moved + heat;
         (first + largest * f64::EPSILON) * MARGIN
+    }
+
+    /// Returns whether it was formed at far longer displacements than `d` from a state whose entries have these sizes.
+    pub(super) fn is_of_a_longer_step(&self, sizes: &N::Vector<f64>, d: &N::Vector<f64>) -> bool {
+        (0..N::LEN).any(|c| {
+            let noise = MARGIN * (self.terms[c] + self.moved[c]);
+            self.displaced[c] > LONGER * (sizes[c] + d[c].abs() + noise)
+        })
+    }
+
+    /// Whether a velocity at the start moves entries of these sizes, by more than its round-off. The round-off of a step has
+    /// no bound where its velocities vanish or its heat has no direction, so it alone shows no rest.
+    pub(super) fn moves(&self, velocity: &N::Vector<f64>, sizes: &N::Vector<f64>) -> bool {
+        let asked = self.inverse * *velocity * self.h;
+        let rounded = (self.terms + self.moved) * MARGIN;
+        (0..N::LEN).any(|c| asked[c].abs() > rounded[c].max(HALF_OF_THE_DIGITS * sizes[c]))
     }
 
     /// The round-off of the terms of a velocity.
@@ -202,5 +228,35 @@ impl<N: Dimension> Linear<N> {
             }
         }
         (delta, size)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::collocation::tableau::GAUSS;
+    use metriplectic_dynamics::{Symplectic, System};
+    use metriplectic_fields::Real;
+    use metriplectic_manifolds::Euclidean;
+    use nalgebra::{Vector2, vector};
+
+    #[test]
+    fn a_linear_part_serves_displacements_of_its_own_size() {
+        let system = System::on(Euclidean::<2>)
+            .bracket(Symplectic)
+            .energy(|x: &Vector2<Real>| x.norm_squared() * 0.5)
+            .build()
+            .unwrap();
+        let x = vector![1.0, 0.25];
+        let values = crate::step::Flow::laws(&system, &x);
+        let equation = StageEquation::new(&GAUSS[1], &system, &x, values, 0.1);
+        // A displacement of the second entry by this multiple of its size.
+        let serves = |multiple: f64| {
+            let mut k = [Vector2::zeros(); STAGES];
+            k[..2].fill(vector![0.0, 2.5 * multiple]);
+            let linear = Linear::of(&equation, &k).unwrap();
+            !linear.is_of_a_longer_step(&x.abs(), &Vector2::zeros())
+        };
+        assert!(serves(128.0) && !serves(512.0));
     }
 }

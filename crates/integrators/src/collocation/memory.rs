@@ -7,7 +7,7 @@ use super::chart::StepChart;
 use super::covectors::{Stages, combined};
 use super::tableau::{STAGES, Tableau};
 use crate::round_off::compensation::Compensation;
-use crate::step::{Memory, RestoreError, Saved};
+use crate::step::{FARTHEST, Memory, RestoreError, Saved};
 
 /// The memory of [`Gauss`](crate::Gauss) and [`Radau`](crate::Radau) from one step to the next: the velocities of the
 /// stages, whose polynomial is continued, and the digits that rounding has lost of the position.
@@ -47,11 +47,14 @@ impl<N: Dimension> Default for StageMemory<N> {
 }
 
 impl<N: Dimension> StageMemory<N> {
-    /// The velocities of a step of size `h`, on the continued polynomial; zero before the first step.
+    /// The velocities of a step of size `h`, on the continued polynomial; none before the first step, and after one
+    /// that was [far shorter](FARTHEST).
     pub(super) fn guess(&self, tableau: &Tableau, h: f64) -> Option<Stages<N::Vector<f64>>> {
         let Continued { k, stages, h: before } = self.velocities?;
         let ratio = h / before;
-        if stages != tableau.stages || ratio.is_nan() || ratio <= 0.0 {
+        // Not so if it is not a number.
+        let is_near = ratio > 0.0 && ratio <= FARTHEST;
+        if stages != tableau.stages || !is_near {
             return None;
         }
         Some(std::array::from_fn(|i| {

@@ -1,12 +1,14 @@
 //! The iteration for the velocities of the stages.
 
-use metriplectic_dynamics::Metriplectic;
-use metriplectic_fields::{Dimension as _, Vector};
+use metriplectic_dynamics::{Metriplectic, VectorField};
+use metriplectic_fields::{ChartPoint, Column as _, Dimension as _, Vector};
+use metriplectic_manifolds::Manifold as _;
 
 use super::chart::StepChart;
 use super::equation::{Evaluated, StageEquation, Unknowns};
 use super::full::Full;
 use super::linear::Linear;
+use super::tableau::STAGES;
 use crate::step::{Dim, Flow as _, Laws, Numbers};
 
 /// A solved step.
@@ -21,6 +23,37 @@ pub(super) struct Solved<Y: Metriplectic> {
     pub(super) round_off: Vector<Y::Manifold>,
     /// Evaluations of the equation.
     pub(super) evaluations: usize,
+}
+
+impl<Y: Metriplectic> Solved<Y> {
+    /// Returns whether all displacements are round-off.
+    pub(super) fn rests(&self, &StageEquation { tableau, h, .. }: &StageEquation<'_, Y>) -> bool {
+        let Self { k, round_off, .. } = self;
+        let is_round_off = |k: &Vector<Y::Manifold>| {
+            (0..Dim::<Y>::LEN).all(|c| (h * k[c]).abs() <= 2.0 * round_off[c])
+        };
+        k[..tableau.stages].iter().all(is_round_off)
+    }
+
+    /// Returns whether the motion at the start of the step would leave it, although all displacements are round-off.
+    ///
+    /// A root that is judged by itself may be rest where nothing rests. So the velocity is asked, which no guess enters.
+    #[cold]
+    fn contradicts(&self, equation: &StageEquation<'_, Y>) -> bool {
+        let at = ChartPoint::<Y::Manifold>::centre(equation.x);
+        let mut v = [Vector::<Y::Manifold>::zero(); STAGES];
+        for i in 0..equation.tableau.stages {
+            let here = match &equation.in_time {
+                Some(in_time) => VectorField::velocity(&in_time.systems[i], &at),
+                None if i == 0 => equation.system.velocity(&at),
+                None => Ok(v[0]),
+            };
+            let Ok(here) = here else { return false };
+            v[i] = here;
+        }
+        let (_, size) = self.linear.correction(&v, &self.round_off);
+        size > MOVES
+    }
 }
 
 /// A step that was not solved.
@@ -66,6 +99,10 @@ const SLOW: f64 = 0.3;
 const HALVINGS: usize = 8;
 /// The fraction of the round-off that a last correction without an evaluation has to promise.
 const SURE: f64 = 0.03;
+
+/// The displacement by the velocity at a state, in units of round-off, from which on the state does not rest.
+/// A factor of four fails `collocation/solve.rs::a_state_with_a_velocity_does_not_rest`.
+const MOVES: f64 = 100.0;
 
 /// The error of the laws at an end, in units of their round-off, above which a better end is looked for.
 const HALF: f64 = 0.5;
@@ -142,7 +179,11 @@ impl<Y: Metriplectic> StageEquation<'_, Y> {
             iteration.evaluations += iteration.full.as_ref().map_or(0, |full| full.evaluations);
         }
         let here = iteration.corrected(guess, at).ok_or(undefined)?;
-        iteration.run(here)
+        let solved = iteration.run(here)?;
+        if solved.rests(&equation) && solved.contradicts(&equation) {
+            return Err(Unsolved { evaluations: solved.evaluations, edge: false, ..undefined });
+        }
+        Ok(solved)
     }
 
     /// The end after the last correction, with the laws evaluated there; `None` if they are off.
@@ -255,8 +296,11 @@ impl<Y: Metriplectic> Iteration<'_, Y> {
             };
             contraction = (next.size / here.size).max(next.excess / here.excess);
             let is_slow = next.size > SLOW * here.size && next.size > STALL;
+            // Round-off at a guess that was far too long would let the iteration stop anywhere.
+            let sizes = Y::Manifold::scales(self.equation.x);
+            let is_too_long = self.linear.is_of_a_longer_step(&sizes, &next.at.d);
             (here, is_fresh) = (next, false);
-            if is_slow {
+            if is_slow || is_too_long {
                 here = self.renew(here).ok_or(failed)?;
                 (contraction, is_fresh) = (f64::INFINITY, true);
             }
@@ -314,4 +358,35 @@ fn moved<Y: Metriplectic>(here: &Iterate<Y>, length: f64) -> Unknowns<Y> {
         *k += *delta * length;
     }
     k
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::collocation::tableau::GAUSS;
+    use metriplectic_dynamics::{Symplectic, System};
+    use metriplectic_fields::Real;
+    use metriplectic_manifolds::Euclidean;
+    use nalgebra::{Vector2, vector};
+
+    #[test]
+    fn a_state_with_a_velocity_does_not_rest() {
+        let system = System::on(Euclidean::<2>)
+            .bracket(Symplectic)
+            .energy(|x: &Vector2<Real>| x.norm_squared() * 0.5)
+            .build()
+            .unwrap();
+        // A root that is off by these units of round-off in both entries, and was declared to be rest.
+        let moves = |units: f64| {
+            let x = vector![0.0, 1.0];
+            let equation = StageEquation::new(&GAUSS[0], &system, &x, system.laws(&x), 1e-3);
+            let rest = [Vector2::zeros(); STAGES];
+            let linear = Linear::of(&equation, &rest).unwrap();
+            let at = equation.evaluate(&rest).unwrap();
+            // The displacement 1e-3 in one of two entries.
+            let round_off = Vector2::repeat(1e-3 / 2_f64.sqrt() / units);
+            Solved::<_> { k: rest, at, linear, round_off, evaluations: 0 }.contradicts(&equation)
+        };
+        assert!(moves(200.0) && !moves(50.0));
+    }
 }

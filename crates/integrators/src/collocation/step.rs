@@ -1,20 +1,22 @@
 //! One step: guess, solve, end; then the last digits.
 
 use metriplectic_dynamics::{Metriplectic, system::Point};
-use metriplectic_fields::{Dimension, Space as _};
+use metriplectic_fields::{Column, Dimension, Space as _};
 use metriplectic_manifolds::Manifold;
 
 use super::equation::StageEquation;
 use super::fallbacks::{self, StepFailure};
+use super::linear::Linear;
 use super::memory::{LastStep, StageMemory};
 use super::solve::Solved;
-use super::tableau::Tableau;
+use super::tableau::{STAGES, Tableau};
 use crate::round_off::bound::{ROUNDED, breaks_first_law, is_dissipated, sizes_on_a_step};
 use crate::round_off::compensation::Displaced;
 use crate::round_off::drift;
 use crate::step::failure::{Cause, Fallbacks};
 use crate::step::{
-    CountOf, Dim, Effort, Evidence, Flow as _, Laws, Numbers, StageLaws, Start, StepStart, Taken,
+    Components, CountOf, Dim, Effort, Evidence, Flow as _, Laws, Numbers, StageLaws, Start,
+    StepStart, Taken,
 };
 
 /// The start of a step with what earlier steps have left of the laws.
@@ -54,11 +56,17 @@ pub(super) fn try_step<Y: Metriplectic>(
     }
     let mut effort = Effort::default();
     let solved = fallbacks::solve(&equation, guess, fallbacks, &mut effort)?;
-    let Solved { k, at, linear, round_off, .. } = solved;
+    let rests = solved.rests(&equation);
+    let Solved { k, at, linear, .. } = solved;
     let failed = |cause, effort| StepFailure { cause, effort };
-    let rests = k[..tableau.stages]
-        .iter()
-        .all(|k| (0..Dim::<Y>::LEN).all(|c| (h * k[c]).abs() <= 2.0 * round_off[c]));
+    // The linear part may be that of another state, which says nothing of the round-off here.
+    if rests
+        && let Some(Components(velocity)) = system.rates(x, &Components(Column::zero()))
+        && let Some(here) = Linear::of(&equation, &[Column::zero(); STAGES])
+        && here.moves(&velocity, &Y::Manifold::scales(x))
+    {
+        return Err(failed(Cause::Unsolved, effort));
+    }
     let rise = if tableau.one_sided { at.growth + at.surplus } else { at.growth };
     // What is left of a deviation by the ratio R produces R² hλ of what the step has produced, or more. A deviation
     // that the entropy does not show is round-off. It is damped where the ratio R²/(½ (1 − R²)) is at most 1.

@@ -200,7 +200,7 @@ impl Tableau {
     }
 
     /// The coefficients `ℓ_j(τ)` of the velocity at the fraction `τ` of the step, inside or outside.
-    pub(super) const fn velocity(&self, tau: f64) -> Numbers {
+    pub(crate) const fn velocity(&self, tau: f64) -> Numbers {
         let (mut coefficients, mut j) = ([0.0; STAGES], 0);
         while j < self.stages {
             coefficients[j] = lagrange(&self.nodes, self.stages, j, tau);

@@ -6,9 +6,9 @@ use metriplectic_manifolds::Manifold;
 
 use super::covectors::{all_finite, at_stage, combined};
 use super::dense;
-use super::equation::{StageEquation, Unknowns};
+use super::equation::{StageEquation, StagesOf, Unknowns};
 use super::fallbacks::{self, StepFailure};
-use super::in_time::InTime;
+use super::in_time::{InTime, frozen_share};
 use super::memory::{LastStep, StageMemory};
 use super::solve::Solved;
 use super::tableau::{STAGES, Tableau};
@@ -21,8 +21,8 @@ use crate::step::{Dim, Effort, Evidence, StageLaws, Start};
 pub(crate) struct StageSolution<Y: Metriplectic> {
     /// The end of the step, with the digits that earlier steps have lost.
     pub(crate) end: Point<Y>,
-    /// The middle of its chart.
-    pub(crate) z: Point<Y>,
+    /// The middle of its chart, and the share of this frozen state in the work of the time.
+    pub(crate) frozen: (Point<Y>, f64),
     /// The nodes and the weights of the stages, and the stages with the covectors of energy and entropy.
     pub(crate) stages: Vec<Stage<Y>>,
     /// The loss of energy beside work and heat of the stages, in a method that damps: not positive.
@@ -39,6 +39,9 @@ pub(crate) struct Stage<Y: Metriplectic> {
     pub(crate) energy: Vector<Y::Manifold>,
     pub(crate) entropy: Vector<Y::Manifold>,
 }
+
+/// The stages of a step, with the frozen state of its work and the share of this state.
+type ListedStages<Y> = (Vec<Stage<Y>>, (Point<Y>, f64));
 
 /// A step of a system in time.
 #[derive(Debug)]
@@ -134,6 +137,33 @@ impl<Y: Metriplectic> TimedStep<'_, Y> {
         dense::defects(&self.equation(start), memory, end, velocities)
     }
 
+    /// The stages of the step that was solved last, with the frozen state and its share.
+    pub(crate) fn stages(
+        &self,
+        start: &Start<'_, Y>,
+        memory: &StageMemory<Dim<Y>>,
+    ) -> Option<ListedStages<Y>> {
+        let last = memory.last.as_ref()?;
+        Some(self.listed(self.equation(start).stages(&last.k)?))
+    }
+
+    /// Lists stages, with the frozen state and its share.
+    fn listed(&self, (points, w, z): StagesOf<Y>) -> ListedStages<Y> {
+        let tableau = self.tableau;
+        let stages = (0..tableau.stages).map(|i| {
+            let here = at_stage::<Y>(&w, i);
+            Stage {
+                node: tableau.nodes[i],
+                weight: tableau.weights[i],
+                x: points.x[i].clone(),
+                energy: here.energy,
+                entropy: here.entropy,
+            }
+        });
+        let share = frozen_share((tableau, self.in_time), &points.x, &z);
+        (stages.collect(), (z, share))
+    }
+
     fn solved(
         &self,
         equation: &StageEquation<'_, Y>,
@@ -151,17 +181,9 @@ impl<Y: Metriplectic> TimedStep<'_, Y> {
         if self.middle.manifold().defect(&at.end).is_infinite() {
             return Err(failed(Cause::Edge));
         }
-        let (points, w, z) = equation.stages(k).ok_or_else(|| failed(Cause::Edge))?;
-        let stages = (0..tableau.stages).map(|i| {
-            let here = at_stage::<Y>(&w, i);
-            Stage {
-                node: tableau.nodes[i],
-                weight: tableau.weights[i],
-                x: points.x[i].clone(),
-                energy: here.energy,
-                entropy: here.entropy,
-            }
-        });
+        let solved_at = equation.stages(k).ok_or_else(|| failed(Cause::Edge))?;
+        let lost = if tableau.one_sided { solved_at.1.energy.left.min(0.0) } else { 0.0 };
+        let (stages, frozen) = self.listed(solved_at);
         let evidence = Evidence {
             entropy_slope: at.entropy_slope,
             dissipates: at.growth != 0.0,
@@ -169,9 +191,8 @@ impl<Y: Metriplectic> TimedStep<'_, Y> {
             stages: Some(StageLaws::new(at.error * crate::round_off::bound::ROUNDED, at.surplus)),
             ..Evidence::default()
         };
-        let (end, stages, effort) = (at.end.clone(), stages.collect(), *effort);
-        let lost = if tableau.one_sided { w.energy.left.min(0.0) } else { 0.0 };
-        Ok((solved, StageSolution { end, z, stages, lost, evidence, effort }))
+        let (end, effort) = (at.end.clone(), *effort);
+        Ok((solved, StageSolution { end, frozen, stages, lost, evidence, effort }))
     }
 }
 

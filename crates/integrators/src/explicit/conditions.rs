@@ -39,8 +39,9 @@ pub(crate) struct Conditions<'a> {
 const MISPRINTED: f64 = 1e-8;
 
 impl Tableau {
-    /// Refuses a tableau with which a run cannot start: one whose rows name stages that are not known, whose conditions
-    /// of order do not hold, or one without an error of its own where steps follow a tolerance.
+    /// Refuses a tableau with which a run cannot start: one whose rows name stages that are not known; whose end, errors or
+    /// dense output miss their conditions of order; with an error that estimates nothing; or without an error of its own
+    /// where steps follow a tolerance.
     ///
     /// # Errors
     ///
@@ -50,9 +51,26 @@ impl Tableau {
         if let Some(fault) = fault {
             return Err(fault);
         }
-        let off = off(self);
-        if off > MISPRINTED {
+        let orders = self.orders_of_errors();
+        let conditions = Conditions::of(self, highest(order, orders));
+        let off = conditions.of_end();
+        if !is_as_printed(off) {
             return Err(TableauError::Order { name, order, off });
+        }
+        for (which, &order) in orders.iter().enumerate() {
+            let [off, own] = conditions.of_error(which);
+            if !is_as_printed(off) {
+                return Err(TableauError::Error { name, which, order, off });
+            }
+            if own <= MISPRINTED {
+                return Err(TableauError::NothingEstimated { name, which, order });
+            }
+        }
+        if self.has_dense_output() {
+            let off = conditions.inside(order - 1);
+            if !is_as_printed(off) {
+                return Err(TableauError::Dense { name, order: order - 1, off });
+            }
         }
         if follows_tolerance && error.is_empty() && order > ESTIMATED {
             return Err(TableauError::NoError { name, order });
@@ -61,15 +79,15 @@ impl Tableau {
     }
 }
 
-/// The residual of the conditions of order of a tableau, relative to their terms; infinite for an order that no such
-/// tableau has.
-fn off(tableau: &Tableau) -> f64 {
-    let order = tableau.order;
-    if order == 0 || order > HIGHEST {
-        f64::INFINITY
-    } else {
-        Conditions::of(tableau, order).of_end()
-    }
+/// Whether a residual is round-off of the printed digits. One that is not a number is not.
+fn is_as_printed(off: f64) -> bool {
+    off <= MISPRINTED
+}
+
+/// The highest order whose conditions a tableau of this order is asked for, with errors of these orders: that of the method, or the
+/// one above that of an error.
+pub(crate) fn highest(order: u32, errors: &[u32]) -> u32 {
+    errors.iter().map(|order| order.saturating_add(1)).fold(order, u32::max)
 }
 
 impl<'a> Conditions<'a> {
@@ -92,16 +110,20 @@ impl<'a> Conditions<'a> {
         Self { tableau, trees }
     }
 
-    /// The largest residual of the conditions of the end.
+    /// The largest residual of the conditions of the end; infinite for an order that no such tableau has.
     pub(crate) fn of_end(&self) -> f64 {
-        self.largest(self.tableau.order, self.tableau.end, 1.0)
+        let order = self.tableau.order;
+        if order == 0 || order > HIGHEST {
+            return f64::INFINITY;
+        }
+        self.largest(order, self.tableau.end, 1.0)
     }
 
     /// The largest weights of an error up to its order, and in the next one.
     pub(crate) fn of_error(&self, which: usize) -> [f64; 2] {
         let (row, order) = (self.tableau.errors[which], self.tableau.error_orders[which]);
         let next = self.trees.iter().filter(|tree| tree.nodes == order + 1);
-        [self.largest(order, row, 0.0), next.map(|tree| tree.off(row, 0.0)).fold(0.0, f64::max)]
+        [self.largest(order, row, 0.0), next.map(|tree| tree.off(row, 0.0)).fold(0.0, larger)]
     }
 
     /// The largest residual of the conditions of a state inside a step, up to this order.
@@ -128,14 +150,19 @@ impl<'a> Conditions<'a> {
                 weights.into_iter().enumerate().filter(|(_, w)| *w != 0.0).collect();
             self.largest(order, &row, theta)
         };
-        [0.2, 0.5, 0.9].into_iter().map(residual).fold(0.0, f64::max)
+        [0.2, 0.5, 0.9].into_iter().map(residual).fold(0.0, larger)
     }
 
     /// The largest residual of a row, where the value wanted is `θ^{|t|}/γ(t)`.
     fn largest(&self, order: u32, row: &[(usize, f64)], theta: f64) -> f64 {
         let trees = self.trees.iter().filter(|tree| tree.nodes <= order);
-        trees.map(|tree| tree.off(row, theta)).fold(0.0, f64::max)
+        trees.map(|tree| tree.off(row, theta)).fold(0.0, larger)
     }
+}
+
+/// The larger one of two residuals; NaN if one is.
+fn larger(a: f64, b: f64) -> f64 {
+    if a.is_nan() || a > b { a } else { b }
 }
 
 impl Tree {

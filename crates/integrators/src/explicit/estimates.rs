@@ -8,7 +8,7 @@ use super::spectrum::Spectrum;
 use super::stage::combined;
 use super::tableau::{Compiled, ESTIMATED, Row, Stages, Tableau};
 use super::trial::Done;
-use crate::step::{LimitingSites, Vector};
+use crate::step::{LedgerErrors, LimitingSites, Vector};
 
 /// Whether the rates between the last stage and the end differ by as much as at the edge of the region of
 /// stability: `h |k_e − k_s| / |q_e − q_s|` of Hairer, Wanner (Solving ODEs II, §IV.2), relative to these sizes
@@ -65,7 +65,31 @@ pub(super) fn error<F: StageFlow>(
         None => tableau.errors.map(|row| norm(&combined(h, row, &last.stages))),
     };
     // Hairer's e₅²/√(e₅² + e₃²/100) is of the order of the method; a method with one error has that.
-    Some(if third > 0.0 { fifth * (fifth / fifth.hypot(0.1 * third)) } else { fifth })
+    // A tenth of the least number is zero.
+    let whole = fifth.hypot(0.1 * third);
+    Some(if third > 0.0 && whole > 0.0 { fifth * (fifth / whole) } else { fifth })
+}
+
+/// The errors of what a step has booked; `None` without an embedded estimate.
+#[cold]
+pub(super) fn of_the_ledger<F: StageFlow>(
+    tableau: &Tableau,
+    flow: &F,
+    h: f64,
+    last: &LastStep<F::Vector>,
+) -> Option<LedgerErrors> {
+    let row = |row: Row| combined(h, row, &last.stages);
+    let errors = match (tableau.stages, tableau.errors) {
+        (Stages::Chebyshev, _) => chebyshev::error(last, h),
+        (Stages::Rows(_), [[], _]) => return None,
+        (Stages::Rows(_), [only, []]) => row(only),
+        (Stages::Rows(_), [fifth, third]) => {
+            Vector::zip([&row(fifth), &row(third)], |[fifth, third]| {
+                if third == 0.0 { fifth } else { fifth * (fifth / fifth.hypot(0.1 * third)) }
+            })
+        }
+    };
+    flow.ledger_errors(&errors)
 }
 
 /// The sites with the largest embedded error and the stiffest motion. The stiff direction is the one of the power

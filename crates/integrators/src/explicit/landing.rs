@@ -30,8 +30,8 @@ pub(super) struct Landed<F: StageFlow> {
 
 /// How far a state may be moved onto its laws.
 enum Bounds<V> {
-    /// At most these entries, in units of the errors that are allowed.
-    Allowed(V),
+    /// At most these entries, in units of the errors that are allowed, or in these.
+    Allowed(V, Option<V>),
     /// At most half of the step, with the sizes at its start.
     HalfOfStep { sizes: V, units: Option<V> },
 }
@@ -52,7 +52,9 @@ impl<F: StageFlow> Onto<'_, F> {
         let flow = start.flow;
         let bounds = self.bounds();
         let (limit, units) = match &bounds {
-            Bounds::Allowed(entries) => (Limit::Entries(entries), start.allowed.as_ref()),
+            Bounds::Allowed(entries, units) => {
+                (Limit::Entries(entries), units.as_ref().or(start.allowed.as_ref()))
+            }
             Bounds::HalfOfStep { sizes, units } => {
                 (Limit::HalfOf { step: &last.end, sizes }, units.as_ref())
             }
@@ -104,7 +106,15 @@ impl<F: StageFlow> Onto<'_, F> {
         let Self { trial: &Trial { start, .. }, last, .. } = *self;
         let flow = start.flow;
         if let Some(allowed) = &start.allowed {
-            return Bounds::Allowed(allowed.map(|error| FAR * error));
+            let begins =
+                (0..allowed.len()).any(|i| allowed.get(i) == 0.0 && last.end.get(i) != 0.0);
+            if begins {
+                // An entry that begins to move has no size yet but its displacement.
+                let most = |[error, end]: [f64; 2]| if error > 0.0 { error } else { end.abs() };
+                let units = Vector::zip([allowed, &last.end], most);
+                return Bounds::Allowed(units.map(|error| FAR * error), Some(units));
+            }
+            return Bounds::Allowed(allowed.map(|error| FAR * error), None);
         }
         let sizes = flow.sizes(start.x);
         // An entry that crosses zero has the size of its displacement. A flow that weighs errors has its own units.

@@ -143,6 +143,10 @@ impl<V: Vector> Memory for ExplicitMemory<V> {
         }
     }
 
+    fn clocked(&mut self) {
+        (self.here, self.round_off) = (None, None);
+    }
+
     fn take_room(&mut self, from: &mut Self) {
         self.room = from.room.take();
     }

@@ -5,7 +5,7 @@ use metriplectic_dynamics::system::Point;
 use metriplectic_fields::{ChartPoint, Column, Dimension, Space as _, Vector};
 use metriplectic_manifolds::Manifold;
 
-use crate::step::{Dim, Start};
+use crate::step::{Dim, FARTHEST, Start};
 
 /// The displacements of the steps before, from which the next one is extrapolated.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -95,6 +95,9 @@ impl<N: Dimension> Predictor<N> {
         if ratio.to_bits() == 1.0_f64.to_bits() {
             return *self;
         }
+        if ratio > FARTHEST {
+            return Self::default();
+        }
         // Far from the three points their parabola says nothing.
         let known = if ratio > 2.0 { self.known.min(1) } else { self.known.min(3) };
         let difference = |j| if j < known { self.differences[j] } else { N::Vector::<f64>::zero() };
@@ -170,6 +173,12 @@ mod tests {
         let line = |t: f64| 0.3 * t;
         close(&memory(&line, 0.1, 1).rescaled(0.5), &memory(&line, 0.05, 1));
         close(&memory(&line, 0.1, 3).rescaled(3.0), &memory(&line, 0.3, 2));
+    }
+
+    #[test]
+    fn nothing_is_extrapolated_to_a_far_longer_step() {
+        let memory = Predictor::<Const<1>> { known: 3, ..Default::default() };
+        assert!(memory.rescaled(12.0).known > 0 && memory.rescaled(20.0).known == 0);
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! One implicit step: guess, solve, retract, and the last digits.
 
 use metriplectic_dynamics::{Invariants, Metriplectic, SecondLaw};
-use metriplectic_fields::{Column, Dimension, ScalarField, Vector};
+use metriplectic_fields::{ChartPoint, Column, Dimension, ScalarField, Vector};
 use metriplectic_manifolds::{Manifold, Retraction};
 
 use super::equation::{Dissipated, Residual};
@@ -10,7 +10,7 @@ use super::memory::MemoryOf;
 use super::scheme::Scheme;
 use super::{level, restored};
 use crate::discrete_gradient::DiscreteGradient;
-use crate::newton::Root;
+use crate::newton::{Inverse, Root};
 use crate::round_off::bound::{BROKEN, breaks_first_law, sizes_on_a_step};
 use crate::round_off::compensation::Displaced;
 use crate::round_off::drift;
@@ -92,7 +92,8 @@ impl<R, W: DiscreteGradient> Scheme<R, W> {
         let (root, effort) =
             fallbacks::solve(&self.newton, &equation, &guess, &mut memory.jacobian, fallbacks)?;
         let evidence = evidence(&root, memory.friction());
-        if !has_digits(start, &root, evidence.friction) {
+        let contradicts = evidence.rests && moves(start, &root, memory.jacobian.inverse.as_ref());
+        if contradicts || !has_digits(start, &root, evidence.friction) {
             return Err(StepFailure { residual: root.residual, cause: Cause::Unsolved, effort });
         }
         Ok(Solved { equation, root, effort, evidence })
@@ -183,6 +184,25 @@ fn evidence<M: Manifold>(root: &Root<M, Dissipated>, friction: f64) -> Evidence 
     }
 }
 
+/// The displacement by the velocity at a state, in units of round-off, from which on the state does not rest.
+/// A factor of four fails `midpoint/step.rs::a_state_with_a_velocity_does_not_rest`.
+const MOVES: f64 = 100.0;
+
+/// Returns whether the motion at the start of a step leaves it, by the velocity, which no guess enters, and the inverse of the
+/// Jacobian.
+#[cold]
+fn moves<Y: Metriplectic>(
+    start: &Start<'_, Y>,
+    Root { round_off, .. }: &Root<Y::Manifold, Dissipated>,
+    inverse: Option<&Inverse<Dim<Y>>>,
+) -> bool {
+    let at = ChartPoint::<Y::Manifold>::centre(start.x);
+    let Ok(velocity) = start.system.velocity(&at) else { return false };
+    let explicit = velocity * start.h;
+    let d = inverse.map_or(explicit, |inverse| inverse.matrix * explicit);
+    (0..Dim::<Y>::LEN).any(|i| d[i].abs() > MOVES * round_off[i])
+}
+
 /// The rate `h|K'|` of friction from which on the round-off of a solution may be large.
 /// A factor of four fails `midpoint/step.rs::a_solution_without_digits_is_one_of_very_stiff_friction`.
 const VERY_STIFF: f64 = 1e8;
@@ -214,6 +234,25 @@ mod tests {
     use metriplectic_fields::Real;
     use metriplectic_manifolds::Euclidean;
     use nalgebra::{Vector2, vector};
+
+    #[test]
+    fn a_state_with_a_velocity_does_not_rest() {
+        let system = System::on(Euclidean::<2>)
+            .bracket(Symplectic)
+            .energy(|x: &Vector2<Real>| x.norm_squared() * 0.5)
+            .build()
+            .unwrap();
+        let moves = |p: f64| {
+            let x = vector![0.0, p];
+            let start = Start::of(&StepStart::first(&system, &x), 0.5);
+            let evidence = Dissipated { slope_squared: 1.0, dissipates: false };
+            let (u, round_off) = (vector![0.0, 0.0], vector![1e-16, 1e-16]);
+            let root =
+                Root { u, residual: 0.0, round_off, residual_bound: 1.0, iterations: 1, evidence };
+            moves(&start, &root, None)
+        };
+        assert!(moves(4e-14) && !moves(1e-14));
+    }
 
     #[test]
     fn a_solution_without_digits_is_one_of_very_stiff_friction() {

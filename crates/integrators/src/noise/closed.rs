@@ -3,10 +3,11 @@
 use std::ops::Range;
 
 use metriplectic_dynamics::noise::{
-    NoiseTerms, divergence, friction_vector, mismatch, noise_drift, noise_vector,
+    Around, NoiseTerms, Uniform, divergence, friction_vector, lost_in_dissipation, mismatch,
+    noise_drift, noise_vector,
 };
 use metriplectic_dynamics::{Invariants, Metriplectic, SecondLaw, system::Point};
-use metriplectic_fields::{Column as _, ScalarField};
+use metriplectic_fields::{Column, ScalarField, Vector};
 use metriplectic_manifolds::{Canonical, Riemannian};
 
 use super::error::NoiseError;
@@ -15,7 +16,7 @@ use crate::step::{Components, Flow};
 
 /// The round-off of a sum, relative to the sizes of its terms.
 /// A factor of four fails `noise/closed.rs::a_bracket_that_changes_the_volume_by_a_billionth_is_not_unimodular`.
-const ROUND_OFF: f64 = 1e-9;
+pub(crate) const ROUND_OFF: f64 = 1e-9;
 
 impl<Y, U> Fluctuating<U> for Y
 where
@@ -47,7 +48,7 @@ where
     }
 
     fn has_drift(&self, _: usize, noise: &Noise<U>) -> bool {
-        !(self.dissipation().is_closed() && noise.is_uniform && Y::Invariants::COUNT == 0)
+        !(is_closed(self) && noise.is_uniform)
     }
 
     fn landed(&self, Landing { to, laws, .. }: Landing<'_, Self>) -> Option<Point<Y>> {
@@ -58,18 +59,27 @@ where
         if self.second_law() != SecondLaw::Exact {
             return Err(NoiseError::NoiseAndPublished);
         }
-        examine_model(self, x, noise)
+        examine_model(self, &Around::of(self, x), noise)
     }
 }
 
-/// Verifies that the terms are those of the dissipation, and that the reversible motion keeps the measure.
+/// Returns whether the terms are said to have no kinetic drift with the measure 1.
+fn is_closed<Y>(system: &Y) -> bool
+where
+    Y: Metriplectic<Dissipation: NoiseTerms<Y::Manifold, Y::Metric>>,
+{
+    system.dissipation().is_closed() && Y::Invariants::COUNT == 0
+}
+
+/// Verifies at a start and around it that the terms are those of the dissipation, that the kinetic drift is that of their
+/// values, and that the reversible motion keeps the measure.
 ///
 /// # Errors
 ///
-/// [`NoiseError::TermsDiffer`], [`NoiseError::NotUnimodular`].
+/// [`NoiseError::TermsDiffer`], [`NoiseError::DriftNotZero`], [`NoiseError::LostDerivative`], [`NoiseError::NotUnimodular`].
 pub(crate) fn examine_model<Y, U>(
     system: &Y,
-    x: &Point<Y>,
+    around: &Around<Y::Manifold>,
     noise: &Noise<U>,
 ) -> Result<(), NoiseError>
 where
@@ -77,18 +87,53 @@ where
     U: ScalarField<Y::Manifold>,
     Canonical: Riemannian<Y::Manifold>,
 {
-    // Where they have no value, the verification of the model says why.
-    if let Ok([off, size]) = mismatch(system, x)
-        && off > ROUND_OFF * size
-    {
-        return Err(NoiseError::TermsDiffer { off, size });
+    let units = &around.units;
+    for x in &around.points {
+        // Where they have no value, the verification of the model says why.
+        if let Ok([off, size]) = mismatch(system, x, units) {
+            if off > ROUND_OFF * size {
+                return Err(NoiseError::TermsDiffer { off, size });
+            }
+            if is_closed(system)
+                && let Ok(drift) = noise_drift(system, x, &Uniform)
+            {
+                vanishes::<Y>(&drift, units, size)?;
+            }
+        }
+        if let Ok([divergence, size]) = divergence(system, x, &noise.measure, units)
+            && divergence.abs() > ROUND_OFF * size
+        {
+            return Err(NoiseError::NotUnimodular { divergence, size });
+        }
     }
-    if let Ok([divergence, size]) = divergence(system, x, &noise.measure)
-        && divergence.abs() > ROUND_OFF * size
-    {
-        return Err(NoiseError::NotUnimodular { divergence, size });
+    let lost = |what, found: Option<[f64; 2]>| match found {
+        Some([derivative, quotient]) => {
+            Err(NoiseError::LostDerivative { what, derivative, quotient })
+        }
+        None => Ok(()),
+    };
+    if !noise.is_uniform {
+        lost("ln μ", around.lost_in_measure(&noise.measure))?;
     }
-    Ok(())
+    if is_closed(system) {
+        return Ok(());
+    }
+    lost("the terms of the friction", lost_in_dissipation(system, around))
+}
+
+/// Refuses a kinetic drift that does not vanish beside a friction of a size, in units of the coordinates.
+///
+/// # Errors
+///
+/// [`NoiseError::DriftNotZero`].
+pub(crate) fn vanishes<Y: Metriplectic>(
+    drift: &Vector<Y::Manifold>,
+    units: &Vector<Y::Manifold>,
+    size: f64,
+) -> Result<(), NoiseError> {
+    let entries = 0..<Vector<Y::Manifold> as Column<f64>>::LEN;
+    let off = entries.map(|i| (drift[i] / units[i]).abs()).fold(0.0, f64::max);
+    if off > ROUND_OFF * size { Err(NoiseError::DriftNotZero { off, size }) } else { Ok(()) }
 }
 
 #[cfg(test)]
@@ -114,7 +159,8 @@ mod tests {
                 .build()
                 .unwrap();
             let noise = Noise::of(Boltzmann(0.1));
-            let verdict = examine_model(&system, &vector![0.7, 1.2, 0.3], &noise);
+            let around = Around::of(&system, &vector![0.7, 1.2, 0.3]);
+            let verdict = examine_model(&system, &around, &noise);
             matches!(verdict, Err(NoiseError::NotUnimodular { .. }))
         };
         // The divergence is 2.2 times this part of terms of the size 2.

@@ -16,7 +16,7 @@ pub enum NoiseError {
     },
     /// The reversible motion changes the volume `μ`, so `exp(S/k_B) μ` would not be its law.
     #[error(
-        "div_μ(Π dH) = {divergence:.1e} at the start of the run, where its terms add up to {size:.1e}: the reversible \
+        "div_μ(Π dH) = {divergence:.1e} at the start of the run or near it, where its terms add up to {size:.1e}: the reversible \
          motion changes the volume, and exp(S/k_B) would not be the law; give the measure that it keeps by \
          `Boltzmann(k_B).measure(|x| ..)`, with ln μ relative to the volume of the canonical metric"
     )]
@@ -29,13 +29,51 @@ pub enum NoiseError {
     /// The terms of the dissipation do not add up to it.
     #[error(
         "the terms of the dissipation differ from it by {off:.1e}, of {size:.1e}, in units of the entries; its metric is \
-         not that of the space around, so write the friction as `OnsagerDissipation`"
+         not that of the space around, so give the manifold `Manifold::leg`, or write the friction as `OnsagerDissipation`"
     )]
     TermsDiffer {
         /// The largest entry of `Σ ρ b bᵀ − K`.
         off: f64,
         /// The largest entry of `K`.
         size: f64,
+    },
+    /// The terms of a bath do not add up to its friction.
+    #[error(
+        "the terms of bath {bath}, counted from 0, give another velocity than its friction: they differ by {off:.1e}, of \
+         {size:.1e}, in units of the entries; its metric is not that of the space around, so give the manifold \
+         `Manifold::leg`, or write the friction as contacts, `.friction(|t, x, w| [Contact {{ rate, along }}])`"
+    )]
+    BathTermsDiffer {
+        /// The number of the bath among the baths.
+        bath: usize,
+        /// The largest entry of `Σ ρ b ⟨b, A⟩ − R A`.
+        off: f64,
+        /// The largest entry of `R A`.
+        size: f64,
+    },
+    /// Terms are said to have no kinetic drift, and have one.
+    #[error(
+        "the terms are said to have no kinetic drift, and have one of {off:.1e} beside a friction of {size:.1e}, in units of the \
+         entries; return `false` from `NoiseTerms::is_closed`, or correct the fields of the `NoiseFrame`"
+    )]
+    DriftNotZero {
+        /// The largest entry of `Σ c b`.
+        off: f64,
+        /// The largest entry of the friction.
+        size: f64,
+    },
+    /// A derivative of which the kinetic drift is made is not that of the values.
+    #[error(
+        "the derivative of {what} is {derivative:.6e} around the start, but its values give {quotient:.6e}, and the kinetic drift \
+         would be wrong; calculate with `Real` throughout: `x.re` and `Real::from(..)` are constants to it"
+    )]
+    LostDerivative {
+        /// The terms of the friction, those of the baths, or `ln μ`.
+        what: &'static str,
+        /// The derivative by dual numbers.
+        derivative: f64,
+        /// The difference quotient of the values.
+        quotient: f64,
     },
     /// The entropy is no Casimir of the bracket.
     #[error(

@@ -8,7 +8,8 @@ use super::error::NoiseError;
 use super::fluctuating::Fluctuating;
 use super::system::Noisy;
 use crate::step::{
-    Element, EventExchange, Flow, FlowError, Laws, LedgerSummary, Recheck, Scales, StepError,
+    Element, EventExchange, Flow, FlowError, Laws, LedgerErrors, LedgerSummary, Recheck, Scales,
+    StartError, StepError,
 };
 
 impl<F: Fluctuating<U>, U> Flow for Noisy<F, U> {
@@ -53,7 +54,7 @@ impl<F: Fluctuating<U>, U> Flow for Noisy<F, U> {
         self.flow().onto(y, laws, entropy)
     }
 
-    fn begin(&self, x: Element<F>, time: f64) -> Element<F> {
+    fn begin(&self, x: Element<F>, time: f64) -> Result<Element<F>, StartError> {
         self.flow().begin(x, time)
     }
 
@@ -76,6 +77,18 @@ impl<F: Fluctuating<U>, U> Flow for Noisy<F, U> {
 
     fn ledger(&self, x: &Element<F>) -> Option<LedgerSummary> {
         self.flow().ledger(x)
+    }
+
+    fn has_ledger(&self) -> bool {
+        self.flow().has_ledger()
+    }
+
+    fn ledger_errors(&self, errors: &F::Vector) -> Option<LedgerErrors> {
+        self.flow().ledger_errors(errors)
+    }
+
+    fn with_ledger_sizes(&self, x: &Element<F>, scales: Scales<F::Vector>) -> Scales<F::Vector> {
+        self.flow().with_ledger_sizes(x, scales)
     }
 
     fn inspect(&self, ends: [&Element<F>; 2], of_one_size: bool) -> Result<(), StepError> {
@@ -123,8 +136,13 @@ impl<F: Fluctuating<U>, U> Flow for Noisy<F, U> {
         self.flow().recheck(x, occasion)
     }
 
+    /// What the law needs may hold at the start alone, so it is judged at the end of the run too.
     fn reexamine(&self, x: &Element<F>, occasion: Recheck) -> Result<(), FlowError> {
-        self.flow().reexamine(x, occasion)
+        self.flow().reexamine(x, occasion)?;
+        match occasion {
+            Recheck::End => self.flow().examine_noise(x, self.noise()).map_err(FlowError::new),
+            Recheck::OnTheWay { .. } | Recheck::Failure { .. } => Ok(()),
+        }
     }
 
     fn site_outside(&self, x: &Element<F>, d: &F::Vector) -> Option<usize> {

@@ -1,10 +1,29 @@
 //! Random numbers by counter.
+//!
+//! One law gives all of them. A block of four words `(u₀, u₁, u₂, u₃)` belongs to a key and a counter, by
+//! [`philox`](super::philox):
+//!
+//! | word | of the key | of the counter |
+//! |---|---|---|
+//! | 0 | the seed | the step, from 0 |
+//! | 1 | the path | the term, or 0 |
+//! | 2 | | what the number is [for](Purpose) |
+//! | 3 | | 0, or a place of its own |
+//!
+//! All words have 64 bits, so no two numbers share a key and a counter, and none is beyond the range. With
+//! `U(u) = (⌊u/2¹²⌋ + ½) 2⁻⁵²`, in `(0, 1)`, the number of a term is (Box and Muller 1958)
+//!
+//! ```math
+//! \xi = \sqrt{-2 \ln U(u_0)}\, \cos 2\pi U(u_1) ,
+//! ```
+//!
+//! or `−√3, √3, 0` where `⌊6 u₀/2⁶⁴⌋` is 0, 1, or larger. The coin of a step is the leading bit of `u₀`. Integers are the
+//! same on each machine and on each device, and Gaussian numbers to the round-off of its logarithm and cosine.
 
 use std::f64::consts::TAU;
 use std::fmt::Debug;
 
-use rand::rngs::ChaCha8Rng;
-use rand::{Rng as _, SeedableRng as _};
+use super::philox::philox;
 
 /// The numbers of a path: a function of the step and of the term, with no state.
 pub trait Numbers: Clone + Debug + Sync {
@@ -18,9 +37,30 @@ pub trait Numbers: Clone + Debug + Sync {
     fn name(&self) -> String;
 }
 
-/// The numbers of `(seed, path, step, term)` by ChaCha8: a named algorithm, the same on each machine.
+/// What a number is for: a word of its counter, so that no two purposes share numbers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+#[repr(u64)]
+pub enum Purpose {
+    /// The number of a term in a step.
+    Term = 0,
+    /// The coin of a step.
+    Coin = 1,
+    /// The directions in which a model is tried.
+    Trial = 2,
+}
+
+/// The numbers of `(seed, path, step, term)` by Philox4x64-10.
 ///
-/// The seed is its key and the path its stream. A step and a term have a block of their own.
+/// Seed and path are the key of [`philox`](super::philox()), and each step and term has a block of its own, up to `2⁶⁴` of both:
+///
+/// ```math
+/// \xi = \sqrt{-2 \ln U(u_0)}\, \cos 2\pi U(u_1), \qquad
+/// (u_0, u_1, u_2, u_3) = \mathrm{Philox}_{(\text{seed}, \text{path})}(\text{step}, \text{term}, 0, 0) ,
+/// ```
+///
+/// with `U(u) = (⌊u/2¹²⌋ + ½) 2⁻⁵²` (Box and Muller 1958). Integers are the same on each machine and device, and Gaussian numbers
+/// to the round-off of logarithm and cosine.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Counter {
     seed: u64,
@@ -30,12 +70,6 @@ pub struct Counter {
 
 /// `2⁻⁵²`.
 const UNIT: f64 = 1.0 / (1_u64 << 52) as f64;
-/// The numbers of bits for the term in the counter of blocks.
-const TERM_BITS: u32 = 28;
-/// The words in a block of the generator.
-const WORDS: u128 = 16;
-/// The place of the coin, after all terms.
-const COIN: u64 = (1 << TERM_BITS) - 1;
 
 impl Counter {
     /// The Gaussian numbers of a seed, on path 0.
@@ -56,15 +90,9 @@ impl Counter {
         Self { is_three_point: true, ..self }
     }
 
-    /// The generator of a step and a place in it.
-    fn block(&self, step: u64, place: u64) -> ChaCha8Rng {
-        let mut key = [0; 32];
-        key[..8].copy_from_slice(&self.seed.to_le_bytes());
-        let mut rng = ChaCha8Rng::from_seed(key);
-        rng.set_stream(self.path);
-        let block = (u128::from(step) << TERM_BITS) + u128::from(place);
-        rng.set_word_pos(block * WORDS);
-        rng
+    /// The block of a step and a term.
+    const fn block(&self, step: u64, term: u64, purpose: Purpose) -> [u64; 4] {
+        philox([self.seed, self.path], [step, term, purpose as u64, 0])
     }
 }
 
@@ -84,17 +112,16 @@ fn three_point(u: u64) -> f64 {
 
 impl Numbers for Counter {
     fn number(&self, step: u64, term: usize) -> f64 {
-        let mut rng = self.block(step, term as u64);
+        let [first, second, ..] = self.block(step, term as u64, Purpose::Term);
         if self.is_three_point {
-            return three_point(rng.next_u64());
+            return three_point(first);
         }
-        // Box and Muller (1958).
-        let [radius, angle] = [(); 2].map(|()| uniform(rng.next_u64()));
+        let [radius, angle] = [uniform(first), uniform(second)];
         (-2.0 * radius.ln()).sqrt() * (TAU * angle).cos()
     }
 
     fn is_backward(&self, step: u64) -> bool {
-        self.block(step, COIN).next_u64() >> 63 == 1
+        self.block(step, 0, Purpose::Coin)[0] >> 63 == 1
     }
 
     fn name(&self) -> String {
@@ -139,9 +166,55 @@ mod tests {
             Counter::new(1).path(1).number(5, 2),
             Counter::new(1).number(6, 2),
             Counter::new(1).number(5, 3),
+            // With 28 bits for the term these would be the numbers of another step, and the coin that of a term.
+            Counter::new(1).number(4, (1 << 28) + 2),
+            Counter::new(1).number(5, (1 << 28) - 1),
+            Counter::new(1).number(5, 2 + (1 << 40)),
+            Counter::new(1).number(5 + (1 << 53), 2),
         ];
         assert!(others.iter().all(|other| other.to_bits() != base.to_bits()));
         assert_eq!(Counter::new(1).number(5, 2).to_bits(), base.to_bits());
+    }
+
+    #[test]
+    fn no_counter_comes_twice() {
+        // At the powers of two, where a word that is too narrow wraps, and beside them.
+        let edges = || {
+            let near = |k: u32| [(1_u64 << k) - 1, 1 << k, (1 << k) + 1];
+            (0..64).step_by(4).flat_map(near).chain([u64::MAX])
+        };
+        let counter = Counter::new(1);
+        let mut blocks: Vec<[u64; 4]> = Vec::new();
+        for purpose in [Purpose::Term, Purpose::Coin, Purpose::Trial] {
+            for step in edges() {
+                blocks.extend(edges().map(|term| counter.block(step, term, purpose)));
+            }
+        }
+        blocks.sort_unstable();
+        let count = blocks.len();
+        blocks.dedup();
+        assert!(count == 3 * 49 * 49 && blocks.len() == count, "{} of {count}", blocks.len());
+        let coins = (0..64).filter(|step| counter.is_backward(*step)).count();
+        let leading =
+            (0..64).filter(|step| counter.block(*step, 0, Purpose::Term)[0] >> 63 == 1).count();
+        assert!((16..48).contains(&coins) && (16..48).contains(&leading), "{coins} {leading}");
+    }
+
+    #[test]
+    fn the_law_does_not_change() {
+        // By an implementation of the law in another language.
+        let counter = Counter::new(7).path(3);
+        let found =
+            [(0, 0), (1, 2), (1 << 40, 1 << 36)].map(|(step, term)| counter.number(step, term));
+        let numbers = [-0.899_156_670_235_990_4, 0.202_085_713_022_563_98, 0.528_280_379_878_660_2];
+        for (found, expected) in found.into_iter().zip(numbers) {
+            assert!((found - expected).abs() < 4.0 * f64::EPSILON, "{found} {expected}");
+        }
+        let coins: Vec<bool> = (0..8).map(|step| counter.is_backward(step)).collect();
+        assert_eq!(coins, [true, true, false, false, true, true, true, false]);
+        let (three, root) = (counter.three_point(), 3.0_f64.sqrt());
+        let points: Vec<f64> = (0..8).map(|term| three.number(5, term)).collect();
+        assert_eq!(points, [0.0, 0.0, 0.0, 0.0, root, 0.0, 0.0, root]);
     }
 
     #[test]

@@ -14,9 +14,14 @@ use super::state::{Booked, Ledger, OpenSpace, OpenState};
 use super::system::{CovectorsOf, Direction, OpenSystem, StateOf};
 use super::vector::OpenVector;
 use crate::explicit::{StageFlow as _, Target};
-use crate::round_off::bound::{ROUNDED, of_an_increment, size_of_terms, sizes_on_a_step};
+use crate::round_off::bound::{
+    NO_DIGITS, ROUNDED, breaks_first_law, of_an_increment, size_of_terms, sizes_on_a_step,
+};
+use crate::step::failure::Cause;
+use crate::step::scales::relative;
 use crate::step::{
-    Components, EventExchange, Flow, Laws, LedgerSummary, Numbers, Recheck, StepError, StepStart,
+    Components, EventExchange, Flow, Laws, LedgerErrors, LedgerSummary, Numbers, Recheck, Scales,
+    StartError, StepError, StepStart,
 };
 
 impl<Y, C, X> Flow for OpenSystem<Y, C, X>
@@ -56,7 +61,7 @@ where
     }
 
     fn sizes(&self, x: &StateOf<Y>) -> Direction<Y, X> {
-        OpenVector::of(Y::Manifold::scales(&x.x))
+        OpenVector { booked: x.ledger.sizes(), ..OpenVector::of(Y::Manifold::scales(&x.x)) }
     }
 
     fn moved(&self, x: &StateOf<Y>, d: &Direction<Y, X>) -> StateOf<Y> {
@@ -97,8 +102,8 @@ where
         Ok(OpenState { x, time: rest[0], ledger: Ledger::read(self.columns(), &rest[1..]) })
     }
 
-    fn begin(&self, x: StateOf<Y>, time: f64) -> StateOf<Y> {
-        OpenState { time, ..self.start(x.x) }
+    fn begin(&self, x: StateOf<Y>, time: f64) -> Result<StateOf<Y>, StartError> {
+        x.begun(time, &Ledger::empty(self.columns()))
     }
 
     fn clocked(&self, x: &StateOf<Y>, time: f64) -> Option<StateOf<Y>> {
@@ -129,6 +134,41 @@ where
         Some(x.ledger.summarised(parameter, self.entropy_at(x)))
     }
 
+    fn has_ledger(&self) -> bool {
+        true
+    }
+
+    fn ledger_errors(&self, errors: &Direction<Y, X>) -> Option<LedgerErrors> {
+        Some(errors.errors(self.columns()))
+    }
+
+    fn with_ledger_sizes(
+        &self,
+        x: &StateOf<Y>,
+        Scales { mut sizes, mut terms }: Scales<Direction<Y, X>>,
+    ) -> Scales<Direction<Y, X>> {
+        let Some(energy) = self.energy_of_motion(x, &sizes.v) else {
+            return Scales { sizes, terms };
+        };
+        let speed = self.fastest(x, &sizes);
+        let temperatures = self.baths(x.time);
+        let entropy = |i: usize| {
+            let of_bath = temperatures.iter().find(|(heat, _)| heat + 1 == i);
+            of_bath.map_or(0.0, |(_, t)| if *t > 0.0 { energy / t } else { 0.0 })
+        };
+        let known = self.columns().sizes(energy, entropy);
+        let floor = |size: f64, known: f64| size.max(LITTLE * known);
+        sizes.booked = Booked {
+            parameter: floor(sizes.booked.parameter, energy),
+            entries: X::Entries::from_index(|i| floor(sizes.booked.entries.get(i), known[i])),
+        };
+        terms.booked = Booked {
+            parameter: energy * speed,
+            entries: X::Entries::from_index(|i| known[i] * speed),
+        };
+        Scales { sizes, terms }
+    }
+
     fn inspect(&self, ends: [&StateOf<Y>; 2], of_one_size: bool) -> Result<(), StepError> {
         if of_one_size {
             self.check_protocol(ends)?;
@@ -154,7 +194,12 @@ where
     }
 
     fn check(&self, x0: &StateOf<Y>) -> Result<(), ModelError> {
-        self.without_exchange(x0.time).check_start(&x0.x)?;
+        let model = self.without_exchange(x0.time);
+        match model.check_start(&x0.x) {
+            // What flows in gives the energy its size: entries whose squares have no digits are zeros.
+            Err(ModelError::Underflow { .. }) => model.check_start(&self.without_tiny(&x0.x)?)?,
+            verdict => verdict?,
+        }
         self.check_clock(x0)?;
         self.check_exchange(x0)
     }
@@ -192,8 +237,10 @@ where
 
     fn energy_sizes(&self, [x, end]: [&StateOf<Y>; 2]) -> [f64; 2] {
         let sizes = sizes_on_a_step(&self.between([x.time, end.time]), [&x.x, &end.x]);
-        let work = self.frozen_work([x.time, end.time], &x.x).abs();
-        sizes.map(|size| size + work)
+        // What flows in may find a state without energy.
+        let flowed =
+            self.frozen_work([x.time, end.time], &x.x).abs() + end.ledger.flowed(&x.ledger);
+        sizes.map(|size| size + flowed)
     }
 
     fn entropy_round_off(&self, ends: [&StateOf<Y>; 2]) -> f64 {
@@ -213,13 +260,25 @@ where
             return None;
         }
         let f = |t: f64, q| {
-            VectorField::velocity(&self.frozen(t), &ChartPoint { base: x.x.clone(), q }).ok()
+            let at = ChartPoint { base: x.x.clone(), q };
+            let v = VectorField::velocity(&self.frozen(t), &at).ok()?;
+            let booked = self.booking(t, [&x.x, &Y::Manifold::chart(&x.x, &q)])?;
+            Some((v, booked))
         };
         let (start, there) = (f(x.time, Vector::<Y::Manifold>::zero())?, f(end.time, q)?);
-        let middle = f(x.time + 0.5 * h, q * 0.5 - (there - start) * (h / 8.0))?;
-        Some(OpenVector::of(q - (start + middle * 4.0 + there) * (h / 6.0)))
+        let middle = f(x.time + 0.5 * h, q * 0.5 - (there.0 - start.0) * (h / 8.0))?;
+        let v = q - (start.0 + middle.0 * 4.0 + there.0) * (h / 6.0);
+        let rule =
+            Booked::combined(&[(h / 6.0, &start.1), (h / 1.5, &middle.1), (h / 6.0, &there.1)]);
+        let booked = Booked::combined(&[(1.0, &self.booked_between(x, end)), (-1.0, &rule)]);
+        Some(OpenVector { v, clock: 0.0, booked })
     }
 }
+
+/// The fraction of the energy of the motion to which the errors of work and heat are relative as long as less has flowed.
+const LITTLE: f64 = 0.1;
+/// The displacement, relative to the sizes, at which the speed of a motion is looked at beside its start.
+const AHEAD: f64 = 1e-3;
 
 /// The error of the balance, relative to the terms of the energy, up to which it is one of last digits.
 const LAST_DIGITS: f64 = 1e-11;
@@ -230,6 +289,14 @@ where
     C: Clock<Y::Manifold, Y::Energy>,
     X: Exchange<Y::Manifold, Y::Metric>,
 {
+    /// The point with zeros in place of the entries whose squares have no digits.
+    fn without_tiny(&self, x: &Point<Y>) -> Result<Point<Y>, PointError> {
+        let tiny = NO_DIGITS.sqrt();
+        let entries = Y::Manifold::entries(x).into_iter();
+        let entries: Vec<f64> = entries.map(|x| if x.abs() < tiny { 0.0 } else { x }).collect();
+        self.closed().manifold().from_entries(&entries)
+    }
+
     /// The differentials of all laws at a point.
     pub(super) fn covectors(&self, t: f64, x: &Point<Y>) -> CovectorsOf<Y> {
         differentials(&self.without_exchange(t), &ChartPoint::<Y::Manifold>::centre(x))
@@ -248,6 +315,63 @@ where
         }
         let centre = ChartPoint::<Y::Manifold>::centre(x);
         Some(w.entropy.dot(&irreversible(&model, &model.metric_at(&centre), w).ok()?))
+    }
+
+    /// What the energy changes by if each entry moves by its size: the size of work and heat, which no constant in the energy
+    /// changes. `None` where it has no value or does not change.
+    fn energy_of_motion(&self, x: &StateOf<Y>, sizes: &Vector<Y::Manifold>) -> Option<f64> {
+        let energy = |q| self.energy(x.time, &Y::Manifold::chart(&x.x, &q));
+        let here = energy(Vector::<Y::Manifold>::zero());
+        let mut largest = 0.0;
+        for c in 0..Vector::<Y::Manifold>::LEN {
+            let moved = Vector::<Y::Manifold>::basis(c) * sizes[c];
+            let changes = [moved, moved * -1.0].map(|q| (energy(q) - here).abs());
+            largest =
+                changes.into_iter().filter(|change| change.is_finite()).fold(largest, f64::max);
+        }
+        (largest > 0.0).then_some(largest)
+    }
+
+    /// The rate at which a state moves by its size, there and where it has moved by it.
+    fn fastest(&self, x: &StateOf<Y>, sizes: &Direction<Y, X>) -> f64 {
+        let speed = |d: &Direction<Y, X>| {
+            self.rates(x, d).map(|rates| relative(&rates, sizes)).filter(|speed| speed.is_finite())
+        };
+        let there = OpenVector::of(sizes.v * AHEAD);
+        let speeds = [speed(&OpenVector::of(Vector::<Y::Manifold>::zero())), speed(&there)];
+        speeds.into_iter().flatten().fold(0.0, f64::max)
+    }
+
+    /// The rates at which a step from a point books at another one: beside the frozen work at its start.
+    pub(super) fn booking(&self, t: f64, [x, y]: [&Point<Y>; 2]) -> Option<Booked<X::Entries>> {
+        let parameter = if C::RUNS { self.power(t, y) - self.power(t, x) } else { 0.0 };
+        let entries = self.entry_rates(t, y, &self.covectors(t, y))?;
+        Some(Booked { parameter, entries })
+    }
+
+    /// The errors of what a step of the midpoint rule has booked. Its error and that of the trapezoidal rule have the ratio −½, so
+    /// their difference is three times the error where the state moves along a line, and about as large where it does not.
+    pub(super) fn against_trapezoid(
+        &self,
+        x: &StateOf<Y>,
+        end: &StateOf<Y>,
+        h: f64,
+    ) -> Option<LedgerErrors> {
+        let [first, last] = [x, end].map(|at| self.booking(at.time, [&x.x, &at.x]));
+        let (first, last) = (first?, last?);
+        let booked = self.booked_between(x, end);
+        let third = 1.0 / 3.0;
+        let weight = -0.5 * third * h;
+        let booked = Booked::combined(&[(third, &booked), (weight, &first), (weight, &last)]);
+        let none = OpenVector::of(Vector::<Y::Manifold>::zero());
+        self.ledger_errors(&OpenVector { booked, ..none })
+    }
+
+    /// What a step has booked beside the frozen work at its start.
+    pub(super) fn booked_between(&self, x: &StateOf<Y>, end: &StateOf<Y>) -> Booked<X::Entries> {
+        let mut booked = end.ledger.since(&x.ledger);
+        booked.parameter -= self.frozen_work([x.time, end.time], &x.x);
+        booked
     }
 
     /// The rates of the entries of the ledger.
@@ -283,9 +407,7 @@ where
         y: &StateOf<Y>,
         v: Vector<Y::Manifold>,
     ) -> Direction<Y, X> {
-        let mut booked = y.ledger.since(&x.ledger);
-        booked.parameter -= self.frozen_work([x.time, y.time], &x.x);
-        OpenVector { v, clock: y.time - x.time, booked }
+        OpenVector { v, clock: y.time - x.time, booked: self.booked_between(x, y) }
     }
 
     /// The end of an implicit step with the last digits of its balance. Where friction is fast and a step short, the rounding of
@@ -311,6 +433,18 @@ where
             Some((laws, moved)) => (moved, laws),
             None => (x, values),
         }
+    }
+
+    /// The cause for which the end of a step is not taken, if its balance is not that of the run.
+    pub(super) fn broken_balance(
+        &self,
+        start: &StepStart<'_, Self>,
+        end: &StateOf<Y>,
+        energy: f64,
+    ) -> Option<Cause> {
+        let change = energy - start.reference.energy;
+        let size = breaks_first_law(change, energy, || self.energy_sizes([start.x, end]))?;
+        Some(Cause::Energy { change, size })
     }
 
     /// The components of a direction, as those of the closed system.

@@ -113,8 +113,12 @@ where
     if !(values.energy.is_finite() && values.entropy.is_finite()) {
         return Err(edge());
     }
+    if let Some(cause) = system.broken_balance(start, &x, values.energy) {
+        return Err(Failure { cause, residual: f64::INFINITY, effort });
+    }
     // The entropy changes where heat flows, too.
     evidence.dissipates |= rates.production != 0.0;
     evidence.rests = false;
+    evidence.ledger = system.against_trapezoid(start.x, &x, h);
     Ok(Taken { x, values, evidence, effort })
 }

@@ -5,24 +5,50 @@
 
 use std::ops::Range;
 
-use metriplectic_dynamics::exchange::{BathTerm, Entries as _, ExchangeArgs, ExchangeTerms};
-use metriplectic_dynamics::noise::{
-    NoiseTerm, NoiseTerms, Place, friction_vector, kinetic_drift, noise_drift, noise_vector, place,
-    seeded_place,
+use metriplectic_dynamics::exchange::{
+    BathTerm, Entries as _, ExchangeArgs, ExchangeTerms, Part, PartKind, Visitor,
 };
+use metriplectic_dynamics::noise::{
+    Around, NoiseTerm, NoiseTerms, Place, friction_vector, kinetic_drift, noise_drift,
+    noise_vector, place, seeded_place,
+};
+use metriplectic_dynamics::system::Point;
 use metriplectic_dynamics::{Dissipation as _, Invariants, Metriplectic, SecondLaw};
-use metriplectic_fields::{Column as _, Real, ScalarField, Vector};
-use metriplectic_manifolds::{Canonical, MetricAt, MetricError, Riemannian};
+use metriplectic_fields::{Column, Real, ScalarField, Vector};
+use metriplectic_manifolds::{Canonical, Manifold, MetricAt, MetricError, Riemannian};
 
 use super::clock::Clock;
 use super::state::{Booked, OpenState};
 use super::system::{OpenSystem, StateOf};
 use super::vector::OpenVector;
-use crate::noise::{Drawn, Fluctuating, Landing, Noise, NoiseError, examine_model};
+use crate::noise::{
+    Drawn, Fluctuating, Landing, Noise, NoiseError, ROUND_OFF, examine_model, vanishes,
+};
 use crate::step::Flow;
 
 /// A vector of a system.
 type VectorOf<Y> = Vector<<Y as Metriplectic>::Manifold>;
+
+/// How far the terms of a bath are off its friction, in units of the coordinates.
+#[derive(Clone, Copy, Default)]
+struct Compared {
+    off: f64,
+    /// The largest entry of the velocity.
+    size: f64,
+    /// The largest entry of `T Σ ρ b bᵀ`.
+    tensor: f64,
+}
+
+/// The velocities of the baths of a list.
+struct Velocities<V>(Vec<V>);
+
+impl<M: Manifold> Visitor<M> for Velocities<Vector<M>> {
+    fn visit(&mut self, part: Part<'_>, velocity: &Vector<M, Real>, _: &Vector<M, Real>) {
+        if let PartKind::Bath { .. } = part.kind {
+            self.0.push(velocity.real());
+        }
+    }
+}
 
 impl<Y, C, X> OpenSystem<Y, C, X>
 where
@@ -75,6 +101,95 @@ where
             sum += b.real::<VectorOf<Y>>() * (rate.re * force);
         })?;
         Ok(sum)
+    }
+
+    /// Verifies at a start and around it that the terms of each bath are those of its friction, and that the kinetic drift is
+    /// that of their values.
+    fn examine_baths<U: ScalarField<Y::Manifold>>(
+        &self,
+        t: f64,
+        around: &Around<Y::Manifold>,
+        noise: &Noise<U>,
+    ) -> Result<(), NoiseError>
+    where
+        Canonical: Riemannian<Y::Manifold>,
+    {
+        let units = &around.units;
+        let has_no_drift = |bath| self.exchange().is_closed(bath) && noise.is_uniform;
+        for x in &around.points {
+            // Where they have no value, the verification of the model says why.
+            let Ok(baths) = self.compared_baths(t, x, units) else { continue };
+            for (bath, Compared { off, size, tensor }) in baths.into_iter().enumerate() {
+                if off > ROUND_OFF * size {
+                    return Err(NoiseError::BathTermsDiffer { bath, off, size });
+                }
+                let state = OpenState { time: t, ..self.start(x.clone()) };
+                if has_no_drift(bath)
+                    && let Ok(drift) = self.bath_drift(&state, bath, &noise.measure)
+                {
+                    vanishes::<Y>(&drift, units, tensor)?;
+                }
+            }
+        }
+        if (0..X::BATHS).all(has_no_drift) {
+            return Ok(());
+        }
+        let found = around.lost_in_terms(&self.without_exchange(t), |place, visit| {
+            let mut r = 0;
+            self.each_bath_term(t, place, &mut |BathTerm { term, .. }| {
+                visit(r, term);
+                r += 1;
+            })
+        });
+        match found {
+            Some([derivative, quotient]) => {
+                let what = "the terms of the baths";
+                Err(NoiseError::LostDerivative { what, derivative, quotient })
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// Compares the velocity of each bath with that of its terms, for a generic covector in place of `dS`.
+    fn compared_baths(
+        &self,
+        t: f64,
+        x: &Point<Y>,
+        units: &VectorOf<Y>,
+    ) -> Result<Vec<Compared>, MetricError> {
+        let n = <VectorOf<Y> as Column<f64>>::LEN;
+        let here = place(&self.without_exchange(t), x);
+        let largest = (0..n).map(|i| (here.w[i].re * units[i]).abs()).fold(0.0, f64::max);
+        let mut temperatures = Vec::new();
+        self.exchange().temperatures(t, &mut temperatures);
+        let hottest = temperatures.iter().copied().fold(0.0, f64::max);
+        // `T dS` as large as `dH`, so that both count.
+        let scale = if largest > 0.0 && hottest > 0.0 { largest / hottest } else { 1.0 };
+        let s = Vector::<Y::Manifold, Real>::from_index(|i| {
+            Real::from(scale * (1.0 + i as f64).sin() / units[i])
+        });
+        let place = Place { s, ..here };
+        let g = MetricAt::new(self.closed().metric(), &place.x);
+        let at = ExchangeArgs { t, g: &g, w: &place.w, s: &place.s };
+        let mut velocities = Velocities(Vec::new());
+        self.exchange().each(&at, &mut velocities)?;
+        let mut rest = velocities.0;
+        let mut baths = vec![Compared::default(); rest.len()];
+        self.exchange().each_term(&at, &mut |BathTerm { bath, temperature, term }| {
+            let (b, rate): (VectorOf<Y>, f64) = (term.b.real(), term.rate.re);
+            let [s, w] = [&place.s, &place.w].map(Column::real::<VectorOf<Y>>);
+            let affinity = s * temperature - w;
+            rest[bath] -= b * (rate * b.dot(&affinity));
+            let terms: f64 = (0..n).map(|i| (b[i] * affinity[i]).abs()).sum();
+            let reach = (0..n).map(|i| (b[i] / units[i]).abs()).fold(0.0, f64::max);
+            let Compared { size, tensor, .. } = &mut baths[bath];
+            *size = size.max(rate * reach * terms);
+            *tensor = tensor.max(temperature * rate * reach * reach);
+        })?;
+        for (compared, rest) in baths.iter_mut().zip(&rest) {
+            compared.off = (0..n).map(|i| (rest[i] / units[i]).abs()).fold(0.0, f64::max);
+        }
+        Ok(baths)
     }
 
     /// Computes `T Σ c_r b_r` of a bath.
@@ -196,6 +311,9 @@ where
         if Y::Invariants::COUNT > 0 && X::BATHS > 0 {
             return Err(NoiseError::InvariantsInABath);
         }
-        examine_model(&self.without_exchange(x.time), &x.x, noise)
+        let view = self.without_exchange(x.time);
+        let around = Around::of(&view, &x.x);
+        examine_model(&view, &around, noise)?;
+        if X::BATHS > 0 { self.examine_baths(x.time, &around, noise) } else { Ok(()) }
     }
 }

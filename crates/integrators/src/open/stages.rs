@@ -6,7 +6,8 @@
 //! ```
 //!
 //! with `z` the middle of the step. `δ_H` is the error of a rule for an integral that vanishes with the velocity, so the
-//! corrected covectors have the order of the method up to rest. Ports and baths are evaluated at the stages, and `W_a`
+//! corrected covectors have the order of the method up to rest. `Radau` reduces the share `θ` of `z` where a stiff
+//! state follows the time and `z` does not. Ports and baths are evaluated at the stages, and `W_a`
 //! and `Q_b` are the sums `h Σ b_i ⟨w_{H,i}, …⟩`.
 //!
 //! `Radau` corrects the energy where `δ_H > 0` alone. What it loses where it damps, `−δ_H`, is heat of the bath: the balance
@@ -25,14 +26,14 @@ use super::vector::OpenVector;
 use super::view::Frozen;
 use crate::collocation::dense::Within;
 use crate::collocation::{
-    EnergyInTime, Gauss, InTime, MOST, Radau, StageMemory, StageSolution, Tableau, TimedStep,
-    control,
+    EnergyInTime, Gauss, InTime, MOST, Radau, Stage, StageMemory, StageSolution, Tableau,
+    TimedStep, control,
 };
 use crate::step::dense::Target;
 use crate::step::failure::{Cause, Fallbacks};
 use crate::step::{
-    Control, Dim, Effort, Flow, Laws, MethodError, Promises, Refusal, Start, StepEnds, StepError,
-    StepStart, Stepper, Taken,
+    Control, Dim, Effort, Flow, Laws, LedgerErrors, MethodError, Promises, Refusal, Start,
+    StepEnds, StepError, StepStart, Stepper, Taken,
 };
 
 /// The energy of an open system along a step.
@@ -64,21 +65,22 @@ where
     C: Clock<Y::Manifold, Y::Energy>,
     X: Exchange<Y::Manifold, Y::Metric>,
 {
-    fn change(&self, x: &Point<Y>, end: &Point<Y>, z: &Point<Y>) -> f64 {
+    fn change(&self, [x, end]: [&Point<Y>; 2], (z, share): (&Point<Y>, f64)) -> f64 {
         let [t, later] = self.times;
         let energy = |t, x| self.system.energy(t, x);
         if C::RUNS {
-            (energy(later, end) - energy(later, z)) - (energy(t, x) - energy(t, z))
+            (energy(later, end) - share * energy(later, z)) - (energy(t, x) - share * energy(t, z))
         } else {
             energy(t, end) - energy(t, x)
         }
     }
 
-    fn size(&self, x: &Point<Y>, end: &Point<Y>, z: &Point<Y>) -> f64 {
+    fn size(&self, [x, end]: [&Point<Y>; 2], z: &Point<Y>) -> f64 {
         if !C::RUNS {
             return 0.0;
         }
         let [t, later] = self.times;
+        // A stiff state has lost the digits of the frozen one, whatever its share.
         let sizes = [(later, end), (later, z), (t, x), (t, z)];
         sizes.into_iter().map(|(t, x)| self.system.energy(t, x).abs()).sum()
     }
@@ -145,13 +147,13 @@ where
         h: f64,
     ) -> Option<StateOf<Y>> {
         let Self { system, along, .. } = self;
-        let StageSolution { end, z, stages, lost, .. } = solution;
-        let mut parameter = system.frozen_work(along.times, z);
+        let StageSolution { end, frozen: (z, share), stages, lost, .. } = solution;
+        let mut parameter = share * system.frozen_work(along.times, z);
         let mut entries = X::Entries::from_index(|_| 0.0);
         for stage in stages {
             let (t, weight) = (along.time(stage.node), h * stage.weight);
             if C::RUNS {
-                let power = system.power(t, &stage.x) - system.power(t, z);
+                let power = system.power(t, &stage.x) - share * system.power(t, z);
                 parameter += stage.weight * along.size() * power;
             }
             let rates =
@@ -170,6 +172,66 @@ where
         }
         let ledger = from.ledger.with(&Booked { parameter, entries });
         Some(OpenState { x: end.clone(), time: along.times[1], ledger })
+    }
+
+    /// The defects of the rates of the ledger at both ends of a step,
+    ///
+    /// ```math
+    /// h \bigl( R(0) - r(t, x) \bigr), \qquad h \bigl( R(1) - r(t', x') \bigr) ,
+    /// ```
+    ///
+    /// with the polynomial `R` of their values `r` at the stages: `O(h^{s+1})`, as those of the motion.
+    fn ledger_defects(
+        &self,
+        [x, end]: [&StateOf<Y>; 2],
+        stages: &[Stage<Frozen<'a, Y, C, X>>],
+        frozen: (&Point<Y>, f64),
+    ) -> Option<[Booked<X::Entries>; 2]> {
+        let Self { tableau, system, along, .. } = self;
+        let (z, share) = frozen;
+        let power = |t: f64, x: &Point<Y>| {
+            if C::RUNS { system.power(t, x) - share * system.power(t, z) } else { 0.0 }
+        };
+        let mut rates = Vec::with_capacity(stages.len());
+        for stage in stages {
+            let t = along.time(stage.node);
+            let w = [&stage.energy, &stage.entropy];
+            let entries = system.exchanged(t, &stage.x, w).ok()?.entries;
+            rates.push(Booked { parameter: power(t, &stage.x), entries });
+        }
+        let defect = |node: f64, at: &StateOf<Y>| {
+            let entries = system.entry_rates(at.time, &at.x, &system.covectors(at.time, &at.x))?;
+            let here = Booked { parameter: power(at.time, &at.x), entries };
+            let coefficients = tableau.velocity(node);
+            let mut terms = vec![(-along.size(), &here)];
+            terms.extend(coefficients.iter().map(|c| c * along.size()).zip(&rates));
+            Some(Booked::combined(&terms))
+        };
+        Some([defect(0.0, x)?, defect(1.0, end)?])
+    }
+
+    /// The errors of what a step has booked. The error of its rule is of a higher order than a defect `e`: relative to what has
+    /// flowed it is about `(e/s)^{(p+1)/(s+1)}`, by which steps of this method follow a tolerance.
+    fn ledger_errors(
+        &self,
+        ends: [&StateOf<Y>; 2],
+        solution: &StageSolution<Frozen<'a, Y, C, X>>,
+    ) -> Option<LedgerErrors> {
+        let Self { tableau, system, .. } = self;
+        let StageSolution { frozen: (z, share), stages, .. } = solution;
+        let defects = self.ledger_defects(ends, stages, (z, *share))?;
+        let sizes = ends.map(|x| x.ledger.sizes::<X::Entries>());
+        let power = f64::from(tableau.order + 1) / (tableau.stages as f64 + 1.0);
+        let error = |index: usize| {
+            let [first, second] = defects.each_ref().map(|defect| defect.get(index).abs());
+            let [start, end] = sizes.each_ref().map(|size| size.get(index));
+            let (defect, size) = (first.max(second), start.max(end));
+            if defect < size { size * (defect / size).powf(power) } else { defect }
+        };
+        let booked =
+            Booked { parameter: error(0), entries: X::Entries::from_index(|i| error(i + 1)) };
+        let none = OpenVector::of(Vector::<Y::Manifold>::zero());
+        system.ledger_errors(&OpenVector { booked, ..none })
     }
 }
 
@@ -198,8 +260,12 @@ where
     if !(values.energy.is_finite() && values.entropy.is_finite()) {
         return Err(edge());
     }
+    if let Some(cause) = system.broken_balance(start, &x, values.energy) {
+        return Err(Failure { cause, residual, effort });
+    }
     let mut evidence = solution.evidence;
     evidence.dissipates |= X::BATHS > 0;
+    evidence.ledger = step.ledger_errors([start.x, &x], &solution);
     Ok(Taken { x, values, evidence, effort })
 }
 
@@ -348,8 +414,12 @@ macro_rules! open_stages {
                 };
                 let velocities = [velocity(time, &step.x.x)?, velocity(time + h, &step.end.x)?];
                 let start = whole.start(&start, h);
-                let defects = whole.timed().defects(&start, memory, &step.end.x, velocities)?;
-                let [first, second] = defects.map(OpenVector::of);
+                let timed = whole.timed();
+                let defects = timed.defects(&start, memory, &step.end.x, velocities)?;
+                let (stages, (z, share)) = timed.stages(&start, memory)?;
+                let booked = whole.ledger_defects([step.x, step.end], &stages, (&z, share))?;
+                let [first, second] = [0, 1]
+                    .map(|end| OpenVector { booked: booked[end], ..OpenVector::of(defects[end]) });
                 Some(norm(&first).max(norm(&second)))
             }
 

@@ -7,7 +7,7 @@ use metriplectic_dynamics::exchange::{Entries, Names};
 use metriplectic_manifolds::Manifold;
 
 use crate::round_off::sum::plus;
-use crate::step::{EventExchange, Laws, LedgerSummary, StateSpace};
+use crate::step::{EventExchange, Laws, LedgerErrors, LedgerSummary, StartError, StateSpace};
 
 /// The entries of a step: the work of the parameter, and those of ports and baths.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -20,8 +20,15 @@ pub struct Booked<E> {
 
 impl<E: Entries> Booked<E> {
     /// The numbers by their index, the parameter first.
-    fn get(&self, index: usize) -> f64 {
+    pub(super) fn get(&self, index: usize) -> f64 {
         index.checked_sub(1).map_or(self.parameter, |index| self.entries.get(index))
+    }
+
+    /// A combination of what is booked, with weights.
+    pub(super) fn combined(terms: &[(f64, &Self)]) -> Self {
+        let sum =
+            |index: usize| terms.iter().map(|(weight, booked)| weight * booked.get(index)).sum();
+        Self { parameter: sum(0), entries: E::from_index(|i| sum(i + 1)) }
     }
 
     /// A step in which nothing is booked.
@@ -63,6 +70,22 @@ impl Columns {
     pub(super) fn heat(&self, bath: usize) -> Option<usize> {
         let heats = self.0.iter().enumerate().filter(|(_, column)| column.1 == Kind::Heat);
         heats.map(|(index, _)| index).nth(bath)
+    }
+
+    /// The largest size of an entry of each kind: work, heat and entropy.
+    pub(super) fn largest(&self, entry: impl Fn(usize) -> f64) -> [f64; 3] {
+        [Kind::Work, Kind::Heat, Kind::Entropy].map(|kind| {
+            let entries = self.0.iter().enumerate().filter(|(_, column)| column.1 == kind);
+            entries.fold(0.0, |most, (i, _)| f64::max(most, entry(i).abs()))
+        })
+    }
+
+    /// Numbers of the columns: one for each work and each heat, and another one for each entropy.
+    pub(super) fn sizes(&self, energy: f64, entropy: impl Fn(usize) -> f64) -> Vec<f64> {
+        let columns = self.0.iter().enumerate();
+        columns
+            .map(|(i, (_, kind))| if *kind == Kind::Entropy { entropy(i) } else { energy })
+            .collect()
     }
 
     fn index(&self, name: &str, kind: Kind) -> Option<usize> {
@@ -149,6 +172,31 @@ impl Ledger {
     fn change(&self, other: &Self, index: usize) -> f64 {
         let [[a, low_a], [b, low_b]] = [self.sums[index], other.sums[index]];
         (a - b) + (low_a - low_b)
+    }
+
+    /// Returns the sum `Σ |ΔW| + Σ |ΔQ|` of all work and heat that was booked between another ledger and this one.
+    #[must_use]
+    pub fn flowed(&self, other: &Self) -> f64 {
+        let columns = self.columns.0.iter().enumerate();
+        let energies = columns.filter(|(_, (_, kind))| *kind != Kind::Entropy).map(|(i, _)| i + 1);
+        std::iter::once(0).chain(energies).map(|index| self.change(other, index).abs()).sum()
+    }
+
+    /// The sizes of the sums.
+    pub(super) fn sizes<E: Entries>(&self) -> Booked<E> {
+        let size = |index: usize| self.sums[index][0].abs();
+        Booked { parameter: size(0), entries: E::from_index(|i| size(i + 1)) }
+    }
+
+    /// The sizes of the entries of ports and baths.
+    pub fn entry_sizes(&self) -> Vec<f64> {
+        self.sums[1..].iter().map(|[sum, _]| sum.abs()).collect()
+    }
+
+    /// Sorts errors of the entries of ports and baths, and takes the largest of each kind.
+    pub fn errors_by_kind(&self, errors: &[f64]) -> LedgerErrors {
+        let [work, heat, entropy] = self.columns.largest(|i| errors[i]);
+        LedgerErrors::new(work, heat, entropy)
     }
 
     /// Returns the entries that were booked between another ledger and this one.
@@ -253,6 +301,11 @@ impl Ledger {
         self.net.iter().chain(sums).copied().collect()
     }
 
+    /// How many entries there are beside the work of the parameter.
+    fn len(&self) -> usize {
+        self.columns.0.len()
+    }
+
     /// How many numbers a ledger with these columns has.
     pub(super) fn length(columns: &Columns) -> usize {
         10 + 2 * columns.0.len()
@@ -281,6 +334,24 @@ pub struct OpenState<P> {
 }
 
 impl<P> OpenState<P> {
+    /// The state in which a run starts at a time, of a system with a ledger like this empty one. A state on which nothing is
+    /// booked, with a clock at zero, takes the time of the run. The clock and the ledger of another one go on.
+    ///
+    /// # Errors
+    ///
+    /// [`StartError`] if the clock shows another time, or the ledger has other entries.
+    pub fn begun(self, time: f64, empty: &Ledger) -> Result<Self, StartError> {
+        let [found, expected] = [&self.ledger, empty].map(Ledger::len);
+        if self.ledger.columns != empty.columns {
+            return Err(StartError::Ledger { found, expected });
+        }
+        let is_new = self.time == 0.0 && self.ledger == *empty;
+        if !is_new && (self.time - time).abs() > 0.0 {
+            return Err(StartError::Clock { clock: self.time, start: time });
+        }
+        Ok(Self { time, ..self })
+    }
+
     /// The state with another point, at the same time and with the same ledger: for an
     /// [event that changes the state](crate::Watched::jump).
     #[must_use]

@@ -7,6 +7,7 @@ use metriplectic_manifolds::{Manifold, MetricAt};
 
 use super::clock::Clock;
 use super::system::{CovectorsOf, OpenSystem, StateOf};
+use crate::round_off::bound::{NO_DIGITS, size_of_terms};
 use crate::step::{Flow as _, StepError};
 
 /// The slope of a law along a velocity, relative to its terms, that is no round-off.
@@ -47,7 +48,7 @@ impl<Y: Metriplectic, P: Fn() -> Vec<f64>> Judge<'_, Y, P> {
         // 0/0 = 0: a law that nothing changes is kept.
         let slope = |law: &Vector<Y::Manifold>, v: &Vector<Y::Manifold>| {
             let (slope, terms) = (law.dot(v).abs(), Y::Manifold::pairing_size(law, v));
-            if slope == 0.0 { 0.0 } else { slope / terms }
+            if slope <= NO_DIGITS { 0.0 } else { slope / terms }
         };
         let carried = slope(&self.w.entropy, given);
         if part.kind == PartKind::Port && carried > BROKEN {
@@ -148,10 +149,13 @@ where
             let delta = 2_f64.powi(exponent);
             // Forward, because the law of motion may have changed at this time.
             let later = t + delta;
-            let values = [self.energy(t, x), self.energy(later, x)];
-            let change = values[1] - values[0];
+            let change = self.energy(later, x) - self.energy(t, x);
             let quotient = change / (later - t);
-            let clear = change.abs() > CLEAR * f64::EPSILON * (values[0].abs() + values[1].abs());
+            // A sum of large terms that cancel, as in the bottom of a stiff well, has the round-off of its terms.
+            let terms = |t| size_of_terms::<Y::Manifold>(self.frozen(t).energy(), x);
+            let size = f64::EPSILON * (terms(t) + terms(later));
+            // Behind a pulse all quotients are zero.
+            let clear = change.abs() > CLEAR * (size + NO_DIGITS) && quotient.abs() > NO_DIGITS;
             let agrees = clear && (quotient - before).abs() <= SAME * quotient.abs();
             agreeing = if agrees { agreeing + 1 } else { 0 };
             before = if clear { quotient } else { f64::NAN };
@@ -186,7 +190,7 @@ where
             .map(|(node, weight)| 2.0 * half * weight * self.power(t + half * (1.0 + node), point))
             .sum();
         let terms = self.energy_sizes(ends)[0] + frozen.abs();
-        if (frozen - quadrature).abs() > JUMP * terms {
+        if (frozen - quadrature).abs() > JUMP * terms + NO_DIGITS {
             return Err(StepError::ProtocolJumps { time: t, h: end - t, frozen, quadrature });
         }
         Ok(())

@@ -22,16 +22,20 @@ pub(crate) const BROKEN: f64 = 1e-6;
 /// A factor of four fails `system/stages.rs::a_law_with_a_part_of_ten_billionths_is_independent`.
 pub(crate) const INDEPENDENT: f64 = 1e-10;
 
+/// The largest number without digits: what rounds to a multiple of the least number has an error of its own size below it, and
+/// counts as zero in every comparison.
+pub(crate) const NO_DIGITS: f64 = f64::MIN_POSITIVE / f64::EPSILON;
+
 /// Returns whether a growth of the entropy in a step is more than the square of its round-off. A million steps of it then change the
 /// entropy by more than a rounding.
 pub(crate) fn is_dissipated(growth: f64, entropy: f64) -> bool {
-    growth > 1e-6 * f64::EPSILON * entropy.abs()
+    growth > 1e-6 * f64::EPSILON * entropy.abs() + NO_DIGITS
 }
 
 /// The round-off of a conserved function whose terms have this size: a step evaluates it at two rounded
 /// points, and runs of 10⁷ steps stay within 50 roundings.
 pub(crate) const fn of_a_law(scale: f64) -> f64 {
-    50.0 * f64::EPSILON * scale
+    50.0 * f64::EPSILON * scale + NO_DIGITS
 }
 
 /// The size `|F| + Σ_i |∂_iF x_i|` of the terms of a field at a point, to which the round-off of its value
@@ -68,7 +72,7 @@ pub(crate) fn of_an_increment_to<Y: Metriplectic>(
     let [at_x, at_y] = [Y::Manifold::scales(x), Y::Manifold::scales(y)];
     let scales = Vector::<Y::Manifold>::from_index(|i| at_x[i].max(at_y[i]));
     let size = |jet: &Jet1<Y::Manifold>| jet.value.abs() + jet.df.abs().dot(&scales);
-    ROUNDED * size(&system.entropy().jet1(x)).max(size(end))
+    ROUNDED * size(&system.entropy().jet1(x)).max(size(end)) + NO_DIGITS
 }
 
 /// The size `|H| + Σ_i |∂_iH| (|x_i| + |d_i|)` of the terms of the energy on the step `d` between two points:
@@ -86,14 +90,14 @@ pub(crate) fn sizes_on_a_step<Y: Metriplectic>(system: &Y, [x, end]: [&Point<Y>;
 }
 
 /// The smaller size of the terms of the energy on a step, if a change is more than a millionth of it, or no
-/// number.
+/// number. A change [without digits](NO_DIGITS) is none.
 pub(crate) fn breaks_first_law(
     change: f64,
     energy: f64,
     sizes: impl FnOnce() -> [f64; 2],
 ) -> Option<f64> {
     // Most often the energy itself is large enough, and needs no differential; an infinite one is not.
-    if energy.is_finite() && change.abs() <= BROKEN * energy.abs() {
+    if energy.is_finite() && change.abs() <= (BROKEN * energy.abs()).max(NO_DIGITS) {
         return None;
     }
     let sizes = sizes();
@@ -121,5 +125,8 @@ mod tests {
             breaks_first_law(1e-6, 2.0, || unreachable!("the energy is large enough")),
             None
         );
+        // Below the last digits of all numbers every change is round-off.
+        assert_eq!(breaks_first_law(1e-300, 0.0, || [0.0; 2]), None);
+        assert_eq!(breaks_first_law(1e-280, 0.0, || [0.0; 2]), Some(0.0));
     }
 }

@@ -13,7 +13,7 @@ use crate::run::checked::checked_states;
 use crate::run::jump::{Exchanged, JumpBalance};
 use crate::step::evidence::RESOLVED;
 use crate::step::{
-    Effort, Element, EntropyStep, EventExchange, Evidence, Flow, Laws, LedgerSummary,
+    Effort, Element, EntropyStep, EventExchange, Evidence, Flow, Laws, LedgerErrors, LedgerSummary,
     LimitingSites, NoiseSummary, Promises, Taken,
 };
 
@@ -50,7 +50,8 @@ pub struct Certificate {
     pub max_manifold_defect: f64,
     /// Steps taken.
     pub steps: usize,
-    /// The size of the smallest step taken; 0 before the first step.
+    /// The size of the smallest step taken, and of the smallest part of one that a corner or a jump has cut; 0 before the first
+    /// step.
     pub smallest_step: f64,
     /// The size of the largest step taken; 0 before the first step.
     pub largest_step: f64,
@@ -78,6 +79,10 @@ pub struct Certificate {
     /// by more than a factor of 100. It is looked for in steps that follow a tolerance, where
     /// their number is a power of two and at the end of the run.
     pub misjudged_size: Option<MisjudgedSize>,
+    /// The steps of a system that takes the time in which nothing has changed its motion, although they were long enough for
+    /// something to happen between the times at which a method looks; `None` without such steps.
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
+    pub rest_in_time: Option<RestInTime>,
     /// The sites of a large system that set the size of the steps: the site with the largest of these local errors,
     /// relative to the error that is allowed, and the site where the motion was stiffest when this was last found.
     /// [`RungeKuttaChebyshev`](crate::RungeKuttaChebyshev) looks for it, and the other explicit methods if stability
@@ -103,9 +108,20 @@ pub struct Certificate {
     /// its entropy that of the system and its baths.
     #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
     pub exchange: Option<LedgerSummary>,
+    /// How far the entries of the ledger of an open system are off, as the method estimates it. The entries add up to the
+    /// balance in each step, so that the first law says nothing of their errors. `None` for a closed system, and for a
+    /// tableau without an embedded error.
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
+    pub exchange_errors: Option<LedgerErrors>,
     /// The balance of each event at which the state has [jumped](crate::Watched::jump).
     #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Vec::is_empty"))]
     pub jumps: Vec<JumpBalance>,
+    /// The events whose functions vary in a step faster than looks at them tell: some may not have been found.
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Vec::is_empty"))]
+    pub unsure_events: Vec<UnsureEvent>,
+    /// The names of events with a [jump](crate::Watched::jump) whose function is zero at the start, where the state does not jump.
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Vec::is_empty"))]
+    pub events_at_start: Vec<String>,
     /// The work and heat of jumps of a system whose states have no ledger.
     #[cfg_attr(feature = "serde", serde(skip))]
     pub(crate) exchanged_in_jumps: Exchanged,
@@ -176,6 +192,32 @@ pub struct MisjudgedSize {
     pub reached: f64,
 }
 
+/// Steps in which nothing has changed the motion of a system that takes the time.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[non_exhaustive]
+pub struct RestInTime {
+    /// How many.
+    pub steps: usize,
+    /// How long they were together.
+    pub time: f64,
+    /// The longest of them.
+    pub longest: f64,
+}
+
+/// An event whose function was looked at in steps where its values did not agree with each other.
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[non_exhaustive]
+pub struct UnsureEvent {
+    /// The name of the event.
+    pub name: String,
+    /// The number of such steps.
+    pub steps: usize,
+    /// The first time from which on they did not agree.
+    pub first: f64,
+}
+
 /// The balance of a further invariant.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
@@ -220,6 +262,8 @@ pub(crate) struct JumpOf<'a, F: Flow + ?Sized> {
     pub(crate) name: &'a str,
     /// The state after it.
     pub(crate) x: &'a Element<F>,
+    /// The size of the step that it has cut, up to it.
+    pub(crate) h: f64,
     /// The laws at the start of the step that it has cut, before it and after it.
     pub(crate) values: [&'a Laws<F::Numbers>; 3],
     pub(crate) exchange: &'a EventExchange,
@@ -268,6 +312,7 @@ impl Certificate {
             worst_iterations: 0,
             local_error: None,
             misjudged_size: None,
+            rest_in_time: None,
             limiting_sites: LimitingSites::default(),
             checked_states: checked_states(flow, 0),
             verified_before: flow.is_verified(),
@@ -275,7 +320,10 @@ impl Certificate {
             second_law: flow.entropy_law(),
             friction: 0.0,
             exchange: flow.ledger(x0),
+            exchange_errors: None,
             jumps: Vec::new(),
+            unsure_events: Vec::new(),
+            events_at_start: Vec::new(),
             exchanged_in_jumps: Exchanged::NOTHING,
             noise: None,
             projected: flow.is_projected(),
@@ -292,13 +340,19 @@ impl Certificate {
         step: StepOf<'_, F>,
     ) {
         let StepOf { taken: Taken { x: next, values: after, evidence, effort }, h } = step;
-        self.smallest_step = if self.steps == 0 { h } else { self.smallest_step.min(h) };
+        let shortest = h.min(evidence.shortest_part);
+        self.smallest_step =
+            if self.steps == 0 { shortest } else { self.smallest_step.min(shortest) };
         self.largest_step = self.largest_step.max(h);
         let error = (after.energy - self.reference_energy()).abs();
         self.max_energy_error = self.max_energy_error.max(error);
         // The terms of the energy are evaluated where the error asks for them, and not in every step.
         if error > of_a_law(self.energy_scale) {
-            self.energy_scale = self.energy_scale.max(flow.term_sizes(next).energy);
+            let size = flow.term_sizes(next).energy;
+            // A balance has the round-off of what flowed in the step, too.
+            let flowed =
+                if self.exchange.is_some() { flow.energy_sizes([x, next])[1] } else { 0.0 };
+            self.energy_scale = self.energy_scale.max(size).max(flowed);
         }
         let increment = after.entropy - before.entropy;
         self.min_entropy_increment =
@@ -322,6 +376,10 @@ impl Certificate {
         if self.exchange.is_some() {
             self.exchange = flow.ledger(next);
         }
+        self.exchange_errors = match (self.exchange_errors, evidence.ledger) {
+            (Some(sum), Some(step)) => Some(sum.and(step)),
+            (sum, step) => sum.or(step),
+        };
         self.projected_steps.enter(evidence);
         if let Some(laws) = evidence.stages {
             let balance = self.stages.get_or_insert_default();
@@ -345,7 +403,9 @@ impl Certificate {
 
     /// Enters a jump at the end of a step that it has cut.
     pub(crate) fn enter_jump<F: Flow + ?Sized>(&mut self, flow: &F, jump: &JumpOf<'_, F>) {
-        let JumpOf { name, x, values: [start, before, after], exchange, rise, is_booked } = *jump;
+        let JumpOf { name, x, h, values: [start, before, after], exchange, rise, is_booked } =
+            *jump;
+        self.smallest_step = self.smallest_step.min(h);
         self.max_energy_error =
             self.max_energy_error.max((before.energy - self.reference_energy()).abs());
         self.min_entropy_increment = self.min_entropy_increment.min(before.entropy - start.entropy);
@@ -362,6 +422,26 @@ impl Certificate {
             self.jumps.len() - 1
         });
         self.jumps[index].enter(exchange, rise);
+    }
+
+    /// Notes a step of size `h` in which nothing has changed the motion.
+    #[cold]
+    pub(crate) fn note_rest(&mut self, h: f64) {
+        let rest = self.rest_in_time.get_or_insert_default();
+        rest.steps += 1;
+        rest.time += h;
+        rest.longest = rest.longest.max(h);
+    }
+
+    /// Notes that the looks at the function of an event did not agree in a step.
+    pub(crate) fn note_unsure_event(&mut self, name: &str, time: f64) {
+        match self.unsure_events.iter_mut().find(|event| event.name == name) {
+            Some(event) => event.steps += 1,
+            None => {
+                let name = name.to_owned();
+                self.unsure_events.push(UnsureEvent { name, steps: 1, first: time });
+            }
+        }
     }
 
     /// Notes an estimate of the local error, relative to the state, and the sites that set the step.
@@ -401,6 +481,11 @@ impl Certificate {
         self.friction > STIFF
     }
 
+    /// Returns whether a run has refused more than half as many steps as it has taken, as it does at a corner in time.
+    const fn refuses_often(&self) -> bool {
+        self.rejected >= REFUSED && 2 * self.rejected > self.steps
+    }
+
     /// Returns whether no step is known to be too long for the motion: the local errors that were estimated are below a tenth of
     /// the state, friction is [damped](Self::is_stiff), and damping has added at most a hundredth of what the entropy
     /// gained. With noise no rate of friction exceeds 1.
@@ -417,9 +502,10 @@ impl Certificate {
         self.stages.is_some_and(|StageBalance { surplus, .. }| surplus > least)
     }
 
-    /// Whether the entropy fell on no step by more than its round-off.
+    /// Whether the entropy fell on no step by more than its round-off, in a run without noise. With noise the second law holds in
+    /// the mean alone, so this is false for every path, also for one on which the entropy happened to rise.
     pub const fn keeps_entropy(&self) -> bool {
-        self.entropy_falls == 0
+        self.noise.is_none() && self.entropy_falls == 0
     }
 
     /// Whether every further invariant was kept to round-off.
@@ -427,6 +513,10 @@ impl Certificate {
         self.invariants.iter().all(InvariantBalance::is_kept)
     }
 }
+
+/// Refused steps from which on they may be those at a corner in time.
+/// A factor of four fails `run/certificate/tests.rs::refused_steps_of_a_driven_run_ask_for_a_corner`.
+const REFUSED: usize = 8;
 
 /// The local error, relative to the sizes of the entries, from which on a motion is not resolved.
 /// A factor of four fails `run/certificate/tests.rs::one_is_no_plural`.

@@ -186,6 +186,9 @@ pub(crate) struct Pace {
     pub(crate) rejected: bool,
     /// The bound of the size by the second law.
     pub(crate) cap: Option<Cap>,
+    /// When the law of motion has jumped last, in a step that has left the state where it was.
+    #[cfg_attr(feature = "serde", serde(default, with = "exact"))]
+    pub(crate) jumped: Option<f64>,
 }
 
 /// A bound of the step size after a step on which the entropy would have fallen.
@@ -230,6 +233,16 @@ const UNSOLVED: f64 = 0.25;
 /// A factor of four fails `run/controller/tests.rs::a_step_with_the_error_that_is_allowed_is_followed_by_a_slightly_smaller_one`.
 const LEAST_ERROR: f64 = 1e-4;
 
+/// The longest step of a system that takes the time, relative to the run, as long as nothing changes its motion.
+/// A factor of four fails `tests/trust/from_rest.rs::a_pulse_is_seen_from_rest`.
+const AT_REST: f64 = 0.01;
+/// The length of a step in which the law of motion of a system that takes the time may jump, in units of the least step.
+const INSTANT: f64 = 64.0;
+/// How far two such steps are apart, in units of their length.
+const APART: f64 = 1e3;
+/// The first step of a system that takes the time, relative to the run, from a state at rest.
+const FROM_REST: f64 = 1e-6;
+
 /// Whether an exponent is this one.
 const fn is(exponent: f64, this: f64) -> bool {
     (exponent - this).abs() < f64::EPSILON
@@ -243,7 +256,30 @@ fn inverse_root(x: f64, alpha: f64) -> f64 {
 impl Pace {
     /// The step size below which the run ends in an error.
     pub(crate) fn least(&self, rule: &Rule) -> f64 {
-        self.least.unwrap_or(16.0 * f64::EPSILON * rule.start.abs().max(self.end.abs()))
+        self.least.unwrap_or(self.roundings(rule))
+    }
+
+    /// Some roundings of the times of the run.
+    fn roundings(&self, rule: &Rule) -> f64 {
+        16.0 * f64::EPSILON * rule.start.abs().max(self.end.abs())
+    }
+
+    /// Returns whether a step is so short that a time in it has few digits, and no such step was taken shortly before. A jump of
+    /// the law of motion is found to within it. A motion that ends shrinks its steps again.
+    pub(crate) fn may_jump(&self, rule: &Rule, t: f64, h: f64) -> bool {
+        let instant = INSTANT * self.roundings(rule);
+        h <= instant && self.jumped.is_none_or(|before| t - before > APART * instant)
+    }
+
+    /// The law of motion has jumped in a step of size `h` from time `t`.
+    pub(crate) fn jumped(&mut self, t: f64, h: f64) {
+        self.jumped = Some(t);
+        (self.taken, self.rejected, self.error) = (Some(h), false, None);
+    }
+
+    /// The longest step of a system that takes the time, as long as nothing changes its motion: a hundredth of the run.
+    pub(crate) fn longest_at_rest(&self, rule: &Rule) -> f64 {
+        AT_REST * (self.end - rule.start)
     }
 
     /// A step size within the bounds.
@@ -360,6 +396,7 @@ impl<V: Vector> Controller<V> {
         scales: &Scales<V>,
     ) -> f64 {
         let (span, allowed) = (self.pace.end - rule.start, self.allowed(rule, scales, 0.0));
+        let (in_time, longest) = (flow.depends_on_time(), self.pace.longest_at_rest(rule));
         let h = flow.rates(x, &scales.sizes.zero()).and_then(|v| {
             let own_time = scales.speed(&v).recip().min(span);
             let euler = 0.01 * own_time;
@@ -368,9 +405,15 @@ impl<V: Vector> Controller<V> {
             // h = T (0.01 / (|Tf| (ωT)^p))^{1/(p+1)}, with |f| (ωT)² = |100² Δf|²/|f| for Δf over T/100.
             let (speed, bend) = (relative(&v, &allowed), 100.0 * relative(&change, &allowed));
             let error = own_time * speed * (bend / speed).powi(rule.order.cast_signed());
+            // Nothing bends the motion so far, and what the time will bring is not known.
+            let bends = error > 0.0;
+            if in_time && !bends {
+                return (speed > 0.0).then_some(own_time.min(longest));
+            }
             Some(own_time * rule.local_root(0.01 / error).min(1.0))
         });
-        h.filter(|h| *h > 0.0).unwrap_or(1e-3 * span)
+        let at_rest = if in_time { FROM_REST } else { 1e-3 };
+        h.filter(|h| *h > 0.0).unwrap_or(at_rest * span)
     }
 }
 

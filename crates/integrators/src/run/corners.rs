@@ -2,9 +2,14 @@
 //!
 //! A protocol that jumps, or has a kink, breaks the order of a method that steps across. A step ends a few roundings before
 //! a corner, on the old law. There the [clock](crate::Flow::clocked) of the state is set to the corner: what the energy
-//! changes by is work at a frozen state. The next step begins with the new law, and with no memory of the old one.
+//! changes by is work at a frozen state. The next step begins a few roundings behind the corner, with the new law, and
+//! with no memory of the old one.
+//!
+//! Two expressions of one time, such as `3 · 0.1` and `0.3`, differ by roundings. So a closure may switch a rounding before or
+//! after the corner that names its time, and a time of the grid may lie on either side. Times within some roundings are one
+//! time.
 
-use crate::run::requests::rounding;
+use crate::run::rounding::rounding;
 use crate::run::span_error::SpanError;
 use crate::run::stepping::AnyStepper;
 use crate::step::{Flow, StepError, StepStart, Taken};
@@ -28,9 +33,10 @@ pub(crate) struct Corners {
     pub(crate) start: f64,
 }
 
-/// How far before a corner a step ends, in roundings of the time.
+/// How far before a corner a step ends, and how far behind it the next one begins, in roundings of the time. Times that differ
+/// by less are one time.
 /// A factor of four fails `run/corners.rs::a_step_ends_some_roundings_before_a_corner`.
-const BEFORE: f64 = 4.0;
+const APART: f64 = 4.0;
 
 impl Corners {
     pub(crate) fn is_empty(&self) -> bool {
@@ -42,7 +48,7 @@ impl Corners {
         if let Some(&time) = self.times.iter().find(|time| !time.is_finite()) {
             return Err(SpanError::Corner { time });
         }
-        let least = BEFORE * self.rounding(if end.is_finite() { end } else { self.start });
+        let least = 3.0 * self.apart(if end.is_finite() { end } else { self.start });
         match self.interval {
             Some(interval) if !(interval > least && interval.is_finite()) => {
                 Err(SpanError::Sampling { interval })
@@ -51,13 +57,18 @@ impl Corners {
         }
     }
 
-    fn rounding(&self, time: f64) -> f64 {
-        rounding(self.start, time)
+    /// By how much two expressions of one time may differ.
+    fn apart(&self, time: f64) -> f64 {
+        APART * rounding(self.start, time)
     }
 
-    /// The first corner after a time, but for its rounding.
+    /// The first corner after a time that is not this time.
     pub(crate) fn after(&self, time: f64) -> Option<f64> {
-        let done = time + BEFORE * self.rounding(time);
+        self.beyond(time + self.apart(time))
+    }
+
+    /// The first corner beyond a time.
+    fn beyond(&self, done: f64) -> Option<f64> {
         let index = self.times.partition_point(|corner| *corner <= done);
         let listed = self.times.get(index).copied();
         let counted = self.interval.map(|interval| {
@@ -74,17 +85,24 @@ impl Corners {
         }
     }
 
-    /// Returns whether a time is a corner.
-    pub(crate) fn has(&self, time: f64) -> bool {
-        !self.is_empty()
-            && self
-                .after(time - 2.0 * BEFORE * self.rounding(time))
-                .is_some_and(|corner| corner <= time)
+    /// The time at which a step begins whose start is a corner: behind the last corner that is this time.
+    #[inline]
+    pub(crate) fn behind(&self, time: f64) -> Option<f64> {
+        if self.is_empty() {
+            return None;
+        }
+        let apart = self.apart(time);
+        let is_here = |corner: &f64| *corner <= time + apart;
+        let mut corner = self.beyond(time - apart - f64::EPSILON * apart).filter(is_here)?;
+        while let Some(next) = self.beyond(corner).filter(is_here) {
+            corner = next;
+        }
+        Some(corner.max(time) + apart)
     }
 
     /// The time at which a step ends that goes on to a corner.
     fn before(&self, corner: f64) -> f64 {
-        corner - BEFORE * self.rounding(corner)
+        corner - self.apart(corner)
     }
 
     /// How far a step may go from a time on the way to an end.
@@ -93,13 +111,14 @@ impl Corners {
         if self.is_empty() {
             return Stop { stop: end, recorded: end, is_corner: false };
         }
-        let rounding = self.rounding(end);
-        match self.after(time).filter(|corner| *corner <= end + rounding) {
+        let apart = self.apart(end);
+        match self.after(time).filter(|corner| *corner <= end + apart) {
             None => Stop { stop: end, recorded: end, is_corner: false },
             Some(corner) => {
                 // A corner at the end may be another expression of the same time.
-                let is_end = corner >= end - rounding;
-                let recorded = if is_end { end } else { corner };
+                let is_end = corner >= end - apart;
+                let (recorded, corner) =
+                    if is_end { (end, corner.min(end)) } else { (corner, corner) };
                 Stop { stop: self.before(corner), recorded, is_corner: true }
             }
         }
@@ -140,9 +159,18 @@ pub(super) fn step<F: Flow + ?Sized>(
     let mut before: Option<Taken<F>> = None;
     loop {
         let Stop { stop, recorded, is_corner } = corners.stop(time, end);
-        let size = if before.is_none() && !is_corner { h } else { stop - time };
-        if corners.has(time) {
+        let behind = corners.behind(time);
+        let size = if before.is_none() && behind.is_none() && !is_corner {
+            h
+        } else {
+            stop - behind.unwrap_or(time)
+        };
+        if let Some(behind) = behind {
             method.restart();
+            if let Some(clocked) = flow.clocked(&x, behind) {
+                values = flow.laws(&clocked);
+                x = clocked;
+            }
         }
         let from = StepStart {
             flow,
@@ -153,6 +181,7 @@ pub(super) fn step<F: Flow + ?Sized>(
             allowed: start.allowed.clone(),
         };
         let mut taken = method.step(&from, size)?;
+        taken.evidence.shortest_part = size;
         flow.inspect([&x, &taken.x], true)?;
         if let Some(clocked) = flow.clocked(&taken.x, recorded) {
             taken.values = flow.laws(&clocked);
@@ -184,19 +213,38 @@ mod tests {
         let mut found = Vec::new();
         let mut time = 0.0;
         while let Some(corner) = corners.after(time).filter(|corner| *corner <= 1.0) {
-            assert!(corners.has(corner) && !corners.has(corners.before(corner)));
+            let behind = corners.behind(corner).expect("it is a corner");
+            assert!(behind > corner && corners.behind(corners.before(corner) - 1e-15).is_none());
             assert!(corners.before(corner) > time);
             found.push(corner);
             time = corner;
         }
         assert_eq!(found, [0.25, 0.3, 0.5, 0.75, 1.0]);
-        assert!(!Corners::default().has(0.5) && Corners::default().after(0.0).is_none());
+        let none = Corners::default();
+        assert!(none.behind(0.5).is_none() && none.after(0.0).is_none());
+    }
+
+    #[test]
+    fn two_expressions_of_a_time_are_one_time() {
+        // 3 · 0.1 lies a rounding behind 0.3, and 0.7 a rounding behind 7 · 0.1.
+        for (grid, corner) in
+            [(3.0 * 0.1, 0.3), (0.3, 3.0 * 0.1), (0.7, 7.0 * 0.1), (7.0 * 0.1, 0.7)]
+        {
+            let corners = Corners { times: vec![corner], interval: None, start: 0.0 };
+            let Stop { stop, recorded, is_corner } = corners.stop(grid - 0.1, grid);
+            assert!(is_corner && stop < corner.min(grid) && recorded.to_bits() == grid.to_bits());
+            let behind = corners.behind(grid).expect("it is a corner");
+            assert!(behind > corner.max(grid) && corners.after(grid).is_none());
+            assert!(!corners.stop(grid, grid + 0.1).is_corner);
+        }
     }
 
     #[test]
     fn a_step_ends_some_roundings_before_a_corner() {
         let corners = Corners { times: vec![0.75], interval: None, start: 0.0 };
-        let left = (0.75 - corners.before(0.75)) / corners.rounding(0.75);
+        let left = (0.75 - corners.before(0.75)) / rounding(0.0, 0.75);
         assert!((2.0..10.0).contains(&left), "{left} roundings");
+        let begun = (corners.behind(0.75).expect("a corner") - 0.75) / rounding(0.0, 0.75);
+        assert!((2.0..10.0).contains(&begun), "{begun} roundings");
     }
 }

@@ -6,6 +6,7 @@ use crate::run::ending::Ending;
 use crate::run::error::RunError;
 use crate::run::event::LastNumber;
 use crate::run::judged::Judged;
+use crate::run::least_sizes::least_sizes;
 use crate::run::progress::Progress;
 use crate::run::schedule::{Schedule, Size};
 use crate::run::span_error::SpanError;
@@ -69,12 +70,13 @@ impl<'a, F: Flow + ?Sized> Course<'a, F> {
         if schedule.rest.is_some() && flow.depends_on_time() {
             return Err(SpanError::NoRestInTime.into());
         }
-        let x0 = flow.begin(x0, schedule.start);
+        let x0 = flow.begin(x0, schedule.start)?;
         flow.check(&x0)?;
         flow.examine(&x0)?;
         let values = flow.laws(&x0);
-        let certificate = Certificate { noise, ..Certificate::start(flow, &x0, &values, promises) };
-        let scales = Scales::at(flow, &x0, schedule.span());
+        let mut certificate =
+            Certificate { noise, ..Certificate::start(flow, &x0, &values, promises) };
+        let mut scales = Scales::at(flow, &x0, schedule.span());
         let Schedule { size, start, count, every, most, rest, watch, mut corners } = schedule;
         corners.start = start;
         let step_size = match size {
@@ -90,6 +92,11 @@ impl<'a, F: Flow + ?Sized> Course<'a, F> {
                 Some(Judged::new(&controller.judged_by(&scales.sizes), flow.sizes(&x0)))
             }
         };
+        if let StepSize::Adaptive(controller) = &step_size
+            && flow.depends_on_time()
+        {
+            scales = scales.or(&least_sizes(flow, &x0, [start, controller.pace.end]));
+        }
         let progress = Progress {
             step_size,
             start,
@@ -105,7 +112,11 @@ impl<'a, F: Flow + ?Sized> Course<'a, F> {
         };
         let (energy, entropy) = (values.energy, values.entropy);
         let state = State { step: 0, time: start, point: x0, energy, entropy };
-        let watching = Watching::new(watch, &progress, &state, &[])?;
+        let mut watching = Watching::new(watch, &progress, &state, &[])?;
+        if let Some(watching) = &mut watching {
+            let names = watching.events.begin(&state).into_iter();
+            certificate.events_at_start = names.map(|name| name.to_string()).collect();
+        }
         let before = StepBefore {
             state: state.clone(),
             values: values.clone(),

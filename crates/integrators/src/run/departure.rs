@@ -33,8 +33,13 @@ pub(super) struct Sides {
 /// A factor of four fails `run/departure.rs::a_value_of_the_size_of_the_last_one_is_round_off`.
 const CLEAR: f64 = 4.0;
 
+/// How many times in a row the function has to be seen on its later side, and farther from zero each time, until it is known
+/// not to go back.
+/// A factor of four fails `run/departure.rs::a_state_that_goes_on_is_not_awaited`.
+const GOES_ON: usize = 3;
+
 /// Looks for the time after a jump at which the function is no round-off, in steps of a factor of 2 up to a step of the run.
-/// `None` if the state does not go back.
+/// `None` if the state does not go back, or goes on before it comes back.
 pub(super) fn find(
     Sides { earlier, before, here }: Sides,
     time: f64,
@@ -43,14 +48,21 @@ pub(super) fn find(
 ) -> Option<Departure> {
     let is_round_off = earlier * here <= 0.0 && here.abs() <= CLEAR * before.abs();
     let mut later = CLEAR * f64::EPSILON * time.abs().max(h);
+    let (mut farthest, mut goes_on) = (CLEAR * here.abs(), 0);
     while is_round_off && later < h {
-        if earlier * value(later) > CLEAR * here.abs() {
+        let back = earlier * value(later);
+        if back > CLEAR * here.abs() {
             return Some(Departure {
                 time: Exact(time + later),
                 earlier: Exact(earlier),
                 fails: false,
             });
         }
+        goes_on = if -back > farthest { goes_on + 1 } else { 0 };
+        if goes_on == GOES_ON {
+            return None;
+        }
+        farthest = (CLEAR * here.abs()).max(-back);
         later *= 2.0;
     }
     None
@@ -112,6 +124,22 @@ mod tests {
             find(sides, 1.0, 0.1, |later| later).is_some()
         };
         assert!(goes_back(-3e-16) && !goes_back(-1e-15));
+    }
+
+    #[test]
+    fn a_state_that_goes_on_is_not_awaited() {
+        // It comes back after half a step, and its first two values are the noise of a bounce.
+        let leaves = |value: fn(f64) -> f64| {
+            let sides = Sides { earlier: 1.0, before: -1e-17, here: -1e-17 };
+            let mut looks = 0;
+            let goes_back = find(sides, 1.0, 1.0, |later| {
+                looks += 1;
+                value(later)
+            });
+            (goes_back.is_some(), looks)
+        };
+        assert_eq!(leaves(|later| later * (later - 0.5)), (false, 3));
+        assert!(leaves(|later| if later < 3e-15 { -later } else { later }).0);
     }
 
     #[test]

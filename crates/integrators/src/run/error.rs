@@ -6,7 +6,7 @@ use metriplectic_dynamics::ModelError;
 
 use crate::run::span_error::SpanError;
 use crate::run::trajectory::Trajectory;
-use crate::step::{FlowError, MethodError, StateSpace, StepError};
+use crate::step::{FlowError, MethodError, StartError, StateSpace, StepError};
 
 /// A run that did not finish.
 #[derive(Clone, thiserror::Error)]
@@ -24,6 +24,9 @@ pub enum RunError<M: StateSpace> {
     /// The span cannot be run.
     #[error(transparent)]
     Span(#[from] SpanError),
+    /// The state contradicts the run that is to start in it.
+    #[error(transparent)]
+    Start(#[from] StartError),
     /// A step failed; what was computed until then is kept.
     #[error("{cause} ({} steps were taken and are kept in this error)", trajectory.certificate().steps)]
     Step {
@@ -39,7 +42,9 @@ impl<M: StateSpace> RunError<M> {
     pub fn trajectory(&self) -> Option<&Trajectory<M>> {
         match self {
             Self::Step { trajectory, .. } => Some(trajectory),
-            Self::Model(_) | Self::Flow(_) | Self::Method(_) | Self::Span(_) => None,
+            Self::Model(_) | Self::Flow(_) | Self::Method(_) | Self::Span(_) | Self::Start(_) => {
+                None
+            }
         }
     }
 }

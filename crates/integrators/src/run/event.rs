@@ -1,9 +1,10 @@
 //! Where a function of the state changes its sign.
 //!
 //! The function is known at both ends of a step. Inside it is looked at on the cubic of Hermite
-//! ([`dense`](crate::step::dense)), at a few points and without their projection onto the laws, which is what makes
-//! an output expensive. Where that shows a change of sign, the states of the output decide: first at the points
-//! around the change, then in a bracket that is narrowed to the last digits of the time.
+//! ([`dense`](crate::step::dense)), without the projection onto the laws, which is what makes an output expensive: at four
+//! points, and at as many more as the values ask for (`run/looks.rs`). A function of the time alone has no
+//! need of a point, and is looked at more often. Where that shows a change of sign, the states of the output decide: first at
+//! the points around the change, then in a bracket that is narrowed to the last digits of the time.
 
 use std::any::{Any, type_name};
 use std::fmt;
@@ -11,13 +12,15 @@ use std::sync::Arc;
 
 use crate::run::departure::{self, Departure, Seen, Sides};
 use crate::run::jump::{Jump, JumpOn, JumpRequest};
+use crate::run::looks::{self, Looked};
 use crate::run::root::{Sample, narrow};
+use crate::run::rounding::rounding;
 use crate::run::span_error::SpanError;
 use crate::run::state::State;
 use crate::step::dense::{Hermite, says_between};
 use crate::step::digits::Digits;
 use crate::step::exact::Exact;
-use crate::step::{Flow, StateSpace, StepEnds};
+use crate::step::{Flow, StateSpace, StepEnds, Vector as _};
 
 /// A change of sign of a function of the state, found in a run; asked for by [`Watch::event`](crate::Watch::event).
 ///
@@ -90,6 +93,10 @@ pub(crate) struct Request {
     pub(crate) falling: bool,
     pub(crate) stops: bool,
     pub(crate) jump: Option<JumpRequest>,
+    /// The longest time between two looks, if one was asked for.
+    pub(crate) resolution: Option<f64>,
+    /// Whether the function was given with the time.
+    is_in_time: bool,
     /// The type of the points, and the [`Function`] of them.
     point: &'static str,
     function: Arc<dyn Any + Send + Sync>,
@@ -98,6 +105,7 @@ pub(crate) struct Request {
 impl Request {
     pub(crate) fn new<P: 'static>(
         name: String,
+        is_in_time: bool,
         function: impl Fn(f64, &P) -> f64 + Send + Sync + 'static,
     ) -> Self {
         Self {
@@ -106,6 +114,8 @@ impl Request {
             falling: true,
             stops: false,
             jump: None,
+            resolution: None,
+            is_in_time,
             point: type_name::<P>(),
             function: Arc::new(Function::<P>(Box::new(function))),
         }
@@ -127,7 +137,7 @@ impl fmt::Debug for Request {
 /// Compares the functions by identity, and their options.
 impl PartialEq for Request {
     fn eq(&self, other: &Self) -> bool {
-        let options = |r: &Self| (r.rising, r.falling, r.stops);
+        let options = |r: &Self| (r.rising, r.falling, r.stops, r.resolution);
         let jumps = match (&self.jump, &other.jump) {
             (Some(a), Some(b)) => a.is(b),
             (a, b) => a.is_none() && b.is_none(),
@@ -149,6 +159,8 @@ struct Watched<M: StateSpace> {
     jump: Option<JumpOn<M>>,
     /// How the state leaves the event at which it has jumped, as long as the function is round-off there.
     departure: Option<Departure>,
+    /// Both before the last step.
+    before: (f64, Option<Departure>),
 }
 
 /// The last number of the function of an event that has no value where a run is put down.
@@ -166,9 +178,17 @@ pub(crate) struct LastNumber {
 /// The events of a run.
 pub(crate) struct Events<M: StateSpace>(Vec<Watched<M>>);
 
-/// The fractions of a step at which the functions are looked at inside it.
+/// The fractions of a step at which the functions are looked at inside it in any case. They are not quite its fifths, so that a
+/// function with their period does not look constant.
 /// A factor of four fails `tests/events.rs::an_event_across_a_nan_at_the_end_of_a_step_is_found_by_every_method`.
-const INSIDE: [f64; 4] = [0.2, 0.4, 0.6, 0.8];
+const INSIDE: [f64; 4] = [0.188_8, 0.412_1, 0.595_3, 0.814_7];
+
+/// The looks inside a step at a function of the time alone.
+/// A factor of four fails `tests/trust/events.rs::looks_are_few_where_the_function_is_simple`.
+const OF_TIME: usize = 16;
+
+/// The looks of a [resolution](crate::Watched::resolution) that are held at once.
+const PIECE: usize = 64;
 
 /// The width of a bracket, as a fraction of the step, at which an event is found.
 const WIDTH: f64 = 2.0 * f64::EPSILON;
@@ -188,6 +208,8 @@ pub(crate) struct Found<M: StateSpace> {
     pub(crate) events: Vec<Event<M>>,
     /// The action of the last of them.
     pub(crate) end: Option<Interruption>,
+    /// The functions whose looks did not agree up to there, with the first such times.
+    pub(crate) unsure: Vec<(Arc<str>, f64)>,
 }
 
 /// The effect of an event on the run.
@@ -244,7 +266,8 @@ impl<M: StateSpace> Events<M> {
                 Some(jump) => Some(jump.on(index)?),
                 None => None,
             };
-            Ok(Watched { request, function, value, jump, departure })
+            let before = (value, departure);
+            Ok(Watched { request, function, value, jump, departure, before })
         };
         requests.into_iter().enumerate().map(watched).collect::<Result<_, _>>().map(Self)
     }
@@ -273,6 +296,21 @@ impl<M: StateSpace> Events<M> {
         self.0.iter().any(|watched| watched.request.stops)
     }
 
+    /// Begins a run at a state. A function that is zero there, but for the rounding of the time, has no event there. Returns the
+    /// names of those with a jump.
+    pub(crate) fn begin(&mut self, state: &State<M>) -> Vec<Arc<str>> {
+        let mut names = Vec::new();
+        for watched in &mut self.0 {
+            if watched.is_zero(state) {
+                watched.value = 0.0;
+                if watched.jump.is_some() {
+                    names.push(Arc::clone(&watched.request.name));
+                }
+            }
+        }
+        names
+    }
+
     /// The events of a step in the order of their times, up to the first that stops the run or changes the state. `None` if
     /// a state inside the step is not known and is needed.
     pub(crate) fn of_step<F: Flow<Space = M> + ?Sized>(
@@ -281,50 +319,71 @@ impl<M: StateSpace> Events<M> {
         ends: [&State<M>; 2],
         output: &mut Output<'_, M>,
     ) -> Option<Found<M>> {
-        let curve = if step.x == step.end { None } else { Hermite::through(step) };
-        let flow = step.flow;
-        let moves = step.x != step.end && (curve.is_some() || says_between(flow, step.x));
+        let &StepEnds { flow, x, end, h, .. } = step;
+        let curve = if x == end { None } else { Hermite::through(step) };
+        let moves = x != end && (curve.is_some() || says_between(flow, x));
+        let mut point = |theta: f64, output: &mut Output<'_, M>| match &curve {
+            Some(curve) => Some(flow.moved(x, &curve.at(theta))),
+            // The step is longer than a chart.
+            None => Some(output(theta)?.point),
+        };
         let mut inside = Vec::with_capacity(INSIDE.len());
         for &theta in INSIDE.iter().filter(|_| moves) {
-            let point = match &curve {
-                Some(curve) => flow.moved(step.x, &curve.at(theta)),
-                // The step is longer than a chart.
-                None => output(theta)?.point,
-            };
-            inside.push(Inside { theta, point });
+            inside.push(Inside { theta, point: point(theta, output)? });
         }
-        self.on_points(&inside, ends, output)
+        let mut ahead = |later: f64| match flow.rates(end, &flow.sizes(end).zero()) {
+            Some(v) => flow.moved(end, &v.map(|v| later * v)),
+            None => end.clone(),
+        };
+        let step = InStep { ends, h, moves, inside: &inside, point: &mut point, ahead: &mut ahead };
+        self.in_step(step, output)
     }
 
-    /// Looks for events at the points on the cubic.
-    fn on_points(
-        &mut self,
-        inside: &[Inside<M>],
-        ends: [&State<M>; 2],
-        output: &mut Output<'_, M>,
-    ) -> Option<Found<M>> {
+    /// Looks for events in a step.
+    fn in_step(&mut self, mut step: InStep<'_, M>, output: &mut Output<'_, M>) -> Option<Found<M>> {
+        // Those that end the step first: behind them no other one is looked for.
+        let mut indices: Vec<usize> = (0..self.0.len()).collect();
+        indices.sort_by_key(|&index| !self.0[index].interrupts());
+        let (mut limit, mut unsure) = (1.0_f64, Vec::new());
         let (mut thetas, mut found) = (Vec::new(), Vec::new());
-        for (index, watched) in self.0.iter_mut().enumerate() {
-            for Change { theta, rises, state } in watched.look(inside, ends, output)? {
-                let name = Arc::clone(&watched.request.name);
-                thetas.push(theta);
+        for index in indices {
+            let watched = &mut self.0[index];
+            let Changes { changes, unsure: first } = watched.look(&mut step, limit, output)?;
+            let name = &watched.request.name;
+            unsure.extend(first.map(|theta| (Arc::clone(name), theta)));
+            for Change { theta, rises, state } in changes {
+                let name = Arc::clone(name);
+                thetas.push((theta, index));
                 found.push(Some(Event { name, index, rises, state, jump: None }));
+                if watched.interrupts() {
+                    limit = limit.min(theta);
+                }
             }
         }
+        unsure.retain(|(_, theta)| *theta <= limit);
+        let unsure = unsure.into_iter().map(|(name, theta)| (name, step.time(theta))).collect();
         let order = in_order(&thetas);
         let mut events: Vec<Event<M>> = order.iter().filter_map(|&i| found[i].take()).collect();
         let end = events.iter().position(|event| self.0[event.index].interrupts());
-        let Some(end) = end else { return Some(Found { events, end: None }) };
-        if self.0[events[end].index].request.stops {
-            events.truncate(end + 1);
-            return Some(Found { events, end: Some(Interruption::Stop) });
+        let Some(end) = end else { return Some(Found { events, end: None, unsure }) };
+        let at = thetas[order[end]].0;
+        let same_time = |i: &usize| thetas[order[*i]].0 <= at + SAME_TIME;
+        let with_it = (end..order.len()).take_while(same_time);
+        // A stop comes before the jumps at its time, which do not happen.
+        let stops = |event: &Event<M>| self.0[event.index].request.stops;
+        if let Some(stop) = with_it.clone().find(|i| stops(&events[*i])) {
+            events.truncate(stop + 1);
+            let mut i = 0..;
+            events.retain(|event| {
+                i.next().is_none_or(|i| i < end)
+                    || stops(event)
+                    || !self.0[event.index].interrupts()
+            });
+            return Some(Found { events, end: Some(Interruption::Stop), unsure });
         }
-        let at = thetas[order[end]];
-        let (later, same_time) = (end + 1.., |i: &usize| thetas[order[*i]] <= at + 4.0 * WIDTH);
-        let with_it = later.take_while(|i| *i < order.len()).take_while(same_time);
-        let with_it = with_it.map(|i| (events[i].index, events[i].rises)).collect();
+        let with_it = with_it.skip(1).map(|i| (events[i].index, events[i].rises)).collect();
         events.truncate(end + 1);
-        Some(Found { events, end: Some(Interruption::Jump { with_it }) })
+        Some(Found { events, end: Some(Interruption::Jump { with_it }), unsure })
     }
 
     /// The jump at an event.
@@ -360,6 +419,13 @@ impl<M: StateSpace> Events<M> {
         }
     }
 
+    /// Forgets a step that is taken back.
+    pub(crate) fn take_back(&mut self) {
+        for watched in &mut self.0 {
+            (watched.value, watched.departure) = watched.before;
+        }
+    }
+
     /// An event to which the state returns at once, for ever.
     pub(crate) fn piled_up(&self) -> Option<&Arc<str>> {
         let stuck = |watched: &&Watched<M>| watched.departure.is_some_and(|leaves| leaves.fails);
@@ -367,11 +433,46 @@ impl<M: StateSpace> Events<M> {
     }
 }
 
-/// The indices of times in their order. A sort of the events themselves is compiled for each space.
-fn in_order(times: &[f64]) -> Vec<usize> {
+/// The indices of events in the order of their times, and at one time in that in which they were asked for. A sort of the events
+/// themselves is compiled for each space.
+fn in_order(times: &[(f64, usize)]) -> Vec<usize> {
     let mut order: Vec<usize> = (0..times.len()).collect();
-    order.sort_by(|&i, &j| times[i].total_cmp(&times[j]));
+    let key = |i: usize| times[i];
+    order.sort_by(|&i, &j| key(i).0.total_cmp(&key(j).0).then(key(i).1.cmp(&key(j).1)));
     order
+}
+
+/// How far two events at one time may be apart, as a fraction of the step.
+const SAME_TIME: f64 = 4.0 * WIDTH;
+
+/// A step in which functions are looked at.
+struct InStep<'a, M: StateSpace> {
+    ends: [&'a State<M>; 2],
+    /// The size of the step.
+    h: f64,
+    /// Whether the state moves, and the flow says what lies between the ends.
+    moves: bool,
+    /// The points at the looks that are taken in any case; none where the state does not move.
+    inside: &'a [Inside<M>],
+    /// The point at a fraction.
+    point: &'a mut PointAt<'a, M>,
+    /// The point at a time after the end, along the velocity.
+    ahead: &'a mut dyn FnMut(f64) -> M::Element,
+}
+
+/// A point at a fraction of a step; `None` if it is not known.
+type PointAt<'a, M> = dyn FnMut(f64, &mut Output<'_, M>) -> Option<<M as StateSpace>::Element> + 'a;
+
+impl<M: StateSpace> InStep<'_, M> {
+    fn time(&self, theta: f64) -> f64 {
+        self.ends[0].time + theta * (self.ends[1].time - self.ends[0].time)
+    }
+}
+
+/// The changes of sign in a step, and the fraction at which the looks first did not agree.
+struct Changes<M: StateSpace> {
+    changes: Vec<Change<M>>,
+    unsure: Option<f64>,
 }
 
 impl<M: StateSpace> Watched<M> {
@@ -384,51 +485,178 @@ impl<M: StateSpace> Watched<M> {
         (self.function.0)(state.time, &state.point)
     }
 
+    /// Whether the function is zero at a state, or, if it was given with the time, within the rounding of the time.
+    fn is_zero(&self, state: &State<M>) -> bool {
+        let here = self.at(state);
+        let rounding = rounding(state.time, state.time);
+        let beside = |time: f64| (self.function.0)(time, &state.point);
+        here == 0.0
+            || self.request.is_in_time
+                && beside(state.time - rounding) * beside(state.time + rounding) < 0.0
+    }
+
     /// Whether the function changes its sign between two points in a direction that was asked for.
     fn changes(&self, a: f64, b: f64) -> bool {
         self.request.rising && a < 0.0 && b >= 0.0 || self.request.falling && a > 0.0 && b <= 0.0
     }
 
-    /// The changes of sign in a step; `None` as in [`Events::of_step`].
+    /// Whether the function is one of the time alone, as far as the states of a step tell.
+    fn is_of_time(&self, step: &InStep<'_, M>) -> bool {
+        let [start, end] = step.ends;
+        let same = |time: f64, point: &M::Element| {
+            let values = [&start.point, point].map(|point| (self.function.0)(time, point));
+            values[0].to_bits() == values[1].to_bits()
+        };
+        let inside = || INSIDE.iter().map(|&theta| step.time(theta));
+        self.request.is_in_time
+            && same(end.time, &end.point)
+            && if step.inside.is_empty() {
+                inside().all(|time| same(time, &end.point))
+            } else {
+                inside().zip(step.inside).all(|(time, inside)| same(time, &inside.point))
+            }
+    }
+
+    /// The sign that the function has soon after the end of a step; 0 if it stays zero.
+    fn later_sign(&self, step: &mut InStep<'_, M>) -> f64 {
+        let time = step.ends[1].time;
+        let mut later = rounding(time, step.h);
+        while later < step.h {
+            let value = (self.function.0)(time + later, &(step.ahead)(later));
+            if value != 0.0 && !value.is_nan() {
+                return value.signum();
+            }
+            later *= 2.0;
+        }
+        0.0
+    }
+
+    /// The changes of sign in a step, in the order of their times; `None` as in [`Events::of_step`]. Those after `limit` are of no
+    /// interest, and those after the first one if the event ends the step.
     fn look(
         &mut self,
-        inside: &[Inside<M>],
-        [start, end]: [&State<M>; 2],
+        step: &mut InStep<'_, M>,
+        limit: f64,
         output: &mut Output<'_, M>,
-    ) -> Option<Vec<Change<M>>> {
+    ) -> Option<Changes<M>> {
+        let [start, end] = step.ends;
         let (before, after) = (self.value, self.at(end));
+        self.before = (before, self.departure);
         let node = |at, value, state: Option<&State<M>>| Node {
             sample: Sample { at, value },
             state: state.cloned(),
         };
         let mut nodes = vec![node(0.0, before, Some(start))];
+        let (mut changes, mut unsure) = (Vec::new(), None);
         let mut first = 0.0;
         if let Some(departure) = self.departure {
             match departure.seen([start.time, end.time], |theta| Some(self.at(&output(theta)?)))? {
-                Seen::NotYet => return Some(Vec::new()),
+                Seen::NotYet => return Some(Changes { changes, unsure }),
                 Seen::At { theta, value } => {
                     (nodes, first) = (vec![node(theta, value, None)], theta);
                     self.departure = None;
                 }
                 Seen::Never => {
                     self.departure = Some(departure.failed());
-                    return Some(Vec::new());
+                    return Some(Changes { changes, unsure });
                 }
             }
         }
-        for Inside { theta, point } in inside.iter().filter(|inside| inside.theta > first) {
-            let time = start.time + theta * (end.time - start.time);
-            nodes.push(node(*theta, (self.function.0)(time, point), None));
+        let of_time = self.is_of_time(step);
+        let looks = Looks::new(self.request.resolution, end.time - start.time, of_time, step.moves);
+        for piece in 0..looks.pieces {
+            let mut samples: Vec<Sample> = nodes.iter().map(|node| node.sample).collect();
+            let mut value = |theta: f64, output: &mut Output<'_, M>| {
+                let time = step.time(theta);
+                if of_time {
+                    return Some((self.function.0)(time, &start.point));
+                }
+                let known =
+                    step.inside.iter().find(|inside| inside.theta.to_bits() == theta.to_bits());
+                Some(match known {
+                    Some(Inside { point, .. }) => (self.function.0)(time, point),
+                    None => (self.function.0)(time, &(step.point)(theta, output)?),
+                })
+            };
+            for theta in looks.of_piece(piece).filter(|theta| *theta > first) {
+                samples.push(Sample { at: theta, value: value(theta, output)? });
+            }
+            let is_last = piece + 1 == looks.pieces;
+            if is_last {
+                samples.push(Sample { at: 1.0, value: after });
+            }
+            samples.retain(|sample| !sample.value.is_nan());
+            let Looked { mut samples, unsure: here } =
+                looks::closer(samples, &mut |theta| value(theta, output))?;
+            unsure = unsure.or(here);
+            looks::turns(&mut samples, &mut |theta| {
+                // The cubic is not near enough for a turn near zero.
+                if of_time { value(theta, output) } else { Some(self.at(&output(theta)?)) }
+            })?;
+            nodes.truncate(1);
+            let known = nodes.pop().filter(|node| !node.sample.value.is_nan());
+            nodes = samples.into_iter().map(|Sample { at, value }| node(at, value, None)).collect();
+            if let (Some(known), Some(node)) = (known, nodes.first_mut()) {
+                node.state = known.state;
+            }
+            if let Some(last) = nodes.last_mut().filter(|last| last.sample.at >= 1.0) {
+                last.state = Some(end.clone());
+            }
+            if !of_time {
+                self.confirm(&mut nodes, output)?;
+            }
+            let sign = if is_last && nodes.last().is_some_and(|node| node.sample.value == 0.0) {
+                self.later_sign(step)
+            } else {
+                0.0
+            };
+            leave_out_touches(&mut nodes, sign, is_last);
+            for pair in nodes.windows(2) {
+                let [a, b] = [pair[0].sample, pair[1].sample];
+                if a.at > limit + SAME_TIME || self.interrupts() && !changes.is_empty() {
+                    break;
+                }
+                if self.changes(a.value, b.value) {
+                    let rises = a.value < 0.0;
+                    let is_later = |value: f64| if rises { value >= 0.0 } else { value <= 0.0 };
+                    let mut last = pair[1].state.clone();
+                    let theta = narrow([a, b], WIDTH, |theta| {
+                        if of_time {
+                            return Some((self.function.0)(step.time(theta), &start.point));
+                        }
+                        let state = output(theta)?;
+                        let value = self.at(&state);
+                        if is_later(value) {
+                            last = Some(state);
+                        }
+                        Some(value)
+                    })?;
+                    let state = if of_time { output(theta)? } else { last? };
+                    changes.push(Change { theta, rises, state });
+                }
+            }
+            // A change across a step that ends at a NaN is found in the next one.
+            self.value = nodes.last().map_or(f64::NAN, |node| node.sample.value);
+            let over = nodes.last().is_some_and(|node| node.sample.at > limit + SAME_TIME);
+            if over || self.interrupts() && !changes.is_empty() {
+                if !is_last && !after.is_nan() {
+                    self.value = after;
+                }
+                break;
+            }
+            nodes.drain(..nodes.len().saturating_sub(1));
         }
-        nodes.push(node(1.0, after, Some(end)));
-        nodes.retain(|node| !node.sample.value.is_nan());
-        // At the points around a change the states of the output decide.
+        Some(Changes { changes, unsure })
+    }
+
+    /// Lets the states of the output decide at the points around a change.
+    fn confirm(&self, nodes: &mut Vec<Node<M>>, output: &mut Output<'_, M>) -> Option<()> {
         loop {
             let unsure = nodes.windows(2).position(|pair| {
                 self.changes(pair[0].sample.value, pair[1].sample.value)
                     && pair.iter().any(|node| node.state.is_none())
             });
-            let Some(first) = unsure else { break };
+            let Some(first) = unsure else { return Some(()) };
             for node in &mut nodes[first..=first + 1] {
                 if node.state.is_none() {
                     let state = output(node.sample.at)?;
@@ -438,25 +666,80 @@ impl<M: StateSpace> Watched<M> {
             }
             nodes.retain(|node| !node.sample.value.is_nan());
         }
-        // A change across a step that ends at a NaN is found in the next one.
-        self.value = nodes.last().map_or(f64::NAN, |node| node.sample.value);
-        let mut changes = Vec::new();
-        for pair in nodes.windows(2) {
-            let [a, b] = [pair[0].sample, pair[1].sample];
-            if self.changes(a.value, b.value) {
-                let rises = a.value < 0.0;
-                let mut last = pair[1].state.clone();
-                let theta = narrow([a, b], WIDTH, |theta| {
-                    let state = output(theta)?;
-                    let value = self.at(&state);
-                    if (rises && value >= 0.0) || (!rises && value <= 0.0) {
-                        last = Some(state);
-                    }
-                    Some(value)
-                })?;
-                changes.push(Change { theta, rises, state: last? });
+    }
+}
+
+/// The looks inside a step that are taken in any case.
+struct Looks {
+    /// The parts of the step that are looked at one after the other.
+    pieces: usize,
+    /// The gaps of equal size, if there are.
+    gaps: Option<usize>,
+    of_time: bool,
+    /// Whether there are any.
+    are_taken: bool,
+}
+
+impl Looks {
+    /// Those of a step of this length.
+    fn new(resolution: Option<f64>, length: f64, of_time: bool, moves: bool) -> Self {
+        #[allow(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "it is a whole number that is positive, and saturates"
+        )]
+        let asked = resolution.map_or(0, |resolution| (length / resolution).ceil() as usize);
+        let without = if of_time { OF_TIME } else { INSIDE.len() };
+        let are_taken = of_time || moves;
+        let gaps = Some(asked).filter(|gaps| *gaps > without && are_taken);
+        Self { pieces: gaps.map_or(1, |gaps| gaps.div_ceil(PIECE)), gaps, of_time, are_taken }
+    }
+
+    /// The looks in a part of the step, as fractions of the step.
+    fn of_piece(&self, piece: usize) -> impl Iterator<Item = f64> + use<> {
+        let &Self { gaps, of_time, are_taken, .. } = self;
+        let (first, last) = match gaps {
+            Some(gaps) => {
+                (piece.saturating_mul(PIECE).max(1), ((piece + 1).saturating_mul(PIECE)).min(gaps))
             }
+            None if !are_taken => (0, 0),
+            None if of_time => (0, OF_TIME),
+            None => (0, INSIDE.len()),
+        };
+        (first..last).map(move |k| match gaps {
+            Some(gaps) => k as f64 / gaps as f64,
+            // Not quite even, for the sake of periods.
+            None if of_time => {
+                (k as f64 + 0.25 + 0.5 * (k as f64 * UNEVEN).fract()) / OF_TIME as f64
+            }
+            None => INSIDE[k],
+        })
+    }
+}
+
+/// The golden section: its multiples are spread evenly between whole numbers.
+const UNEVEN: f64 = 0.618_033_988_749_894_9;
+
+/// Leaves out the points at which a function touches zero and goes back. `later` is its sign after the last one, 0 if it stays
+/// zero; the end of a part of a step waits for the next one.
+fn leave_out_touches<M: StateSpace>(nodes: &mut Vec<Node<M>>, later: f64, is_last: bool) {
+    let sign = |value: f64| if value == 0.0 { 0.0 } else { value.signum() };
+    let (mut side, mut zeros) = (0.0, 0);
+    let mut i = 0;
+    while i < nodes.len() {
+        let here = sign(nodes[i].sample.value);
+        if here == 0.0 && side != 0.0 {
+            zeros += 1;
+        } else if here != 0.0 {
+            if zeros > 0 && here * side > 0.0 {
+                nodes.drain(i - zeros..i);
+                i -= zeros;
+            }
+            (side, zeros) = (here, 0);
         }
-        Some(changes)
+        i += 1;
+    }
+    if zeros > 0 && (!is_last || later * side > 0.0) {
+        nodes.truncate(nodes.len() - zeros);
     }
 }

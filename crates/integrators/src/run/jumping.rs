@@ -56,6 +56,7 @@ impl<F: Flow + ?Sized> Course<'_, F> {
         let jump = JumpOf {
             name: &event.name,
             x: &x,
+            h: event.state.time - self.before.state.time,
             values: [&self.before.values, &before, &values],
             exchange: &exchange,
             rise,
@@ -112,6 +113,9 @@ impl<F: Flow + ?Sized> Course<'_, F> {
         self.values = self.before.values.clone();
         self.entropy = self.before.entropy;
         self.progress.ending = None;
+        if let Some(watching) = &mut self.watching {
+            watching.events.take_back();
+        }
     }
 
     /// Where a jump leads from a state with these laws.

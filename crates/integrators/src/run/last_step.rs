@@ -36,12 +36,6 @@ impl<'a, F: Flow, M: Stepper<F>> Steps<'a, F, M> {
         matches!(self.course.progress.step_size, StepSize::Adaptive(_))
     }
 
-    /// Returns whether nothing ends the run.
-    pub(crate) const fn is_endless(&self) -> bool {
-        self.course.progress.count.is_none()
-            && matches!(self.course.progress.step_size, StepSize::Fixed(_))
-    }
-
     /// The step that the last jump has cut, as it was taken; `None` if there was no jump.
     pub(crate) fn cut_step(&self, scales: &Scales<F::Vector>) -> Option<LastStep<'_, F>> {
         let before = self.course.cut.as_ref()?;

@@ -7,7 +7,9 @@ use crate::run::steps::Steps;
 use crate::run::trajectory::Trajectory;
 use crate::step::{Element, Flow, Stepper};
 
-/// Runs of a one-step method. Every [`Stepper`] is one.
+/// Runs of a one-step method. Every [`Stepper`] is one, and a retraction of this library too:
+/// `WeylMidpoint.run(&system, x0, Span::steps(0.1, 1000))` takes the steps of its [`Scheme`](crate::Scheme) with the default
+/// options. A retraction of your own runs by `Scheme::new(mine).run(..)`. `Run` is another name of this trait.
 pub trait Method<F: Flow>: Stepper<F> {
     /// Verifies the model and starts a run: endless in steps of size `h`, or over a [`Span`](crate::Span) or
     /// [`Until`](crate::Until).

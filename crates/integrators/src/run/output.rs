@@ -6,7 +6,7 @@ use crate::run::corners::{self, Fixed};
 use crate::run::course::Course;
 use crate::run::ending::Ending;
 use crate::run::event::{Event, Found, Interruption};
-use crate::run::requests::rounding;
+use crate::run::rounding::rounding;
 use crate::run::schedule::Schedule;
 use crate::run::span_error::SpanError;
 use crate::run::state::State;
@@ -273,7 +273,7 @@ impl<F: Flow + ?Sized> Course<'_, F> {
             let (x, end, values) = (&ends[0].point, &ends[1].point, laws.each_ref());
             let (flow, h) = (self.flow, self.before.h);
             let step = StepEnds { flow, x, end, h, values, reference: &reference };
-            let Found { events, end } =
+            let Found { events, end, unsure } =
                 watching
                     .events
                     .of_step(&step, ends.each_ref(), &mut |theta| self.inside(theta, method))?;
@@ -287,6 +287,9 @@ impl<F: Flow + ?Sized> Course<'_, F> {
                         None
                     }
                 };
+            }
+            for (name, time) in unsure {
+                self.certificate.note_unsure_event(&name, time);
             }
             watching.found.extend(events);
         }

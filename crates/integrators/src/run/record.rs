@@ -6,21 +6,21 @@ use crate::run::course::Course;
 use crate::run::ending::Ending;
 use crate::run::error::RunError;
 use crate::run::progress::Progress;
+use crate::run::recording::{Numbered, Recording};
 use crate::run::span_error::SpanError;
 use crate::run::state::State;
 use crate::run::steps::Steps;
-use crate::run::trajectory::{Trajectory, thin_out};
+use crate::run::trajectory::Trajectory;
 use crate::run::watching::Watching;
 use crate::step::{Flow, StateSpace, StepError, Stepper};
 
 /// The most states that a run makes room for beforehand: it may end long before its span.
 const ROOM: usize = 1 << 12;
 
-/// The states of a run so far, thinned out.
-struct Recording<M: StateSpace> {
-    states: Vec<State<M>>,
-    every: usize,
-    most: Option<usize>,
+impl<M: StateSpace> Numbered for State<M> {
+    fn step(&self) -> usize {
+        self.step
+    }
 }
 
 impl<F: Flow, M: Stepper<F>> Steps<'_, F, M> {
@@ -35,9 +35,19 @@ impl<F: Flow, M: Stepper<F>> Steps<'_, F, M> {
         flow.with_room(|| self.record())
     }
 
+    /// Begins to record a run, from what is recorded of its start.
+    pub(crate) fn recording<S: Numbered>(&self, start: S) -> Result<Recording<S>, SpanError> {
+        self.course.recording(start)
+    }
+
+    /// Whether the [outputs](Self::outputs) of the last step are recorded in place of the state at its end.
+    pub(crate) fn replaces_steps(&self) -> bool {
+        self.course.watching.as_deref().is_some_and(Watching::replaces_steps)
+    }
+
     /// Takes all steps that are left, and records their states.
     fn record(mut self) -> Result<Trajectory<F::Space>, RunError<F::Space>> {
-        let mut recording = self.course.recording()?;
+        let mut recording = self.course.recording(self.course.state.clone())?;
         let mut failure = None;
         while self.course.progress.ending.is_none() && failure.is_none() {
             failure = self.advance().err();
@@ -51,34 +61,25 @@ impl<F: Flow, M: Stepper<F>> Steps<'_, F, M> {
 impl<F: Flow + ?Sized> Course<'_, F> {
     /// Begins to record.
     #[inline]
-    fn recording(&self) -> Result<Recording<F::Space>, SpanError> {
+    fn recording<S: Numbered>(&self, start: S) -> Result<Recording<S>, SpanError> {
         let Progress { count, every, most, .. } = self.progress;
         if count.is_none() && matches!(self.progress.step_size, StepSize::Fixed(_)) {
             return Err(SpanError::Endless);
         }
         let room = count.map_or(ROOM, |count| (count - self.state.step.min(count)) / every);
         let mut states = Vec::with_capacity(room.min(ROOM) + 2);
-        states.push(self.state.clone());
+        states.push(start);
         Ok(Recording { states, every, most })
     }
 
     /// Records what the last step has reached.
     #[inline(never)]
-    fn record(&mut self, recording: &mut Recording<F::Space>, failed: bool) {
-        let Recording { states, every, most } = recording;
-        if self.watched(states, failed) {
+    fn record(&mut self, recording: &mut Recording<State<F::Space>>, failed: bool) {
+        if self.watched(&mut recording.states, failed) {
             return;
         }
-        let state = &self.state;
-        let due = state.step.is_multiple_of(*every) && !failed;
-        let over = self.progress.ending.is_some() || failed;
-        if (due || over) && states.last().is_none_or(|last| last.step != state.step) {
-            states.push(state.clone());
-        }
-        while most.is_some_and(|most| states.len() > most) {
-            *every = every.saturating_mul(2);
-            thin_out(states, *every, over);
-        }
+        let (state, over) = (&self.state, self.progress.ending.is_some());
+        recording.end_of_step(state.step, [over, failed], || state.clone());
     }
 
     /// The trajectory through these states. In place of a call, which would move all of the run.

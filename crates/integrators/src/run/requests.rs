@@ -1,6 +1,7 @@
 //! Requests for outputs and events, and the outputs that are still to come.
 
 use crate::run::event::Request;
+use crate::run::rounding::rounding;
 use crate::run::span_error::SpanError;
 
 /// Requests of a schedule for outputs and events.
@@ -25,6 +26,13 @@ impl Requests {
         if let Some(&time) = self.times.iter().flatten().find(outside) {
             return Err(SpanError::Output { time, start, end });
         }
+        let unseen =
+            |resolution: f64| !(resolution > rounding(start, seen) && resolution.is_finite());
+        for (index, event) in self.events.iter().enumerate() {
+            if let Some(resolution) = event.resolution.filter(|resolution| unseen(*resolution)) {
+                return Err(SpanError::EventResolution { index, resolution });
+            }
+        }
         match self.interval {
             Some(interval) if !(interval > 0.0 && interval.is_finite()) => {
                 Err(SpanError::OutputInterval { interval })
@@ -38,17 +46,14 @@ impl Requests {
     }
 }
 
-/// By how much a time of a run that began at `start` may differ from another expression of the same time.
-pub(crate) fn rounding(start: f64, time: f64) -> f64 {
-    2.0 * f64::EPSILON * start.abs().max(time.abs())
-}
-
 /// The outputs of a run that are still to come.
 #[derive(Clone, Debug)]
 pub(crate) struct Outputs {
     start: f64,
     times: Option<Vec<f64>>,
     interval: Option<f64>,
+    /// When the run ends; infinite if it does not.
+    end: f64,
     /// How many of the times are over, and how many intervals.
     index: usize,
     count: usize,
@@ -62,7 +67,8 @@ impl Outputs {
         times: Option<Vec<f64>>,
         interval: Option<f64>,
     ) -> Self {
-        let mut outputs = Self { start, times, interval, index: 0, count: 0 };
+        let end = f64::INFINITY;
+        let mut outputs = Self { start, times, interval, end, index: 0, count: 0 };
         let done = time + rounding(start, time);
         outputs.index = outputs.listed().partition_point(|t| *t <= done);
         if let Some(interval) = interval {
@@ -82,9 +88,10 @@ impl Outputs {
         outputs
     }
 
-    /// The start of the run.
-    pub(crate) const fn start(&self) -> f64 {
-        self.start
+    /// The outputs of a run that ends then: a multiple of the interval that is another expression of this time is the end.
+    pub(crate) const fn until(mut self, end: f64) -> Self {
+        self.end = end;
+        self
     }
 
     pub(crate) const fn is_empty(&self) -> bool {
@@ -102,7 +109,9 @@ impl Outputs {
 
     /// The next multiple of the interval.
     fn in_interval(&self) -> Option<f64> {
-        Some(self.start + (self.count + 1) as f64 * self.interval?)
+        let time = self.start + (self.count + 1) as f64 * self.interval?;
+        let is_end = (time - self.end).abs() <= rounding(self.start, time);
+        Some(if is_end { self.end } else { time })
     }
 
     /// The next output up to `time`, or so near to it that it is the same time.
@@ -111,6 +120,8 @@ impl Outputs {
         let listed = self.listed().get(self.index).copied().filter(|t| *t <= last);
         let counted = self.in_interval().filter(|t| *t <= last);
         let next = match (listed, counted) {
+            // A multiple may be another expression of a listed time.
+            (Some(a), Some(b)) if (a - b).abs() <= rounding(self.start, a) => a.max(b),
             (Some(a), Some(b)) => a.min(b),
             (a, b) => a.or(b)?,
         };
@@ -146,5 +157,26 @@ mod tests {
             // 35 multiples up to 3.5, and 0.25 and 2.75, which are none of them.
             assert!((37..=39).contains(&all.len()), "{} from {start}", all.len());
         }
+    }
+    #[test]
+    fn a_multiple_of_the_interval_may_be_the_end() {
+        // Ends and intervals with two decimals: the multiples are 1 to n, whatever their digits.
+        let mut other_digits = 0;
+        for interval in [1_u32, 3, 7, 10, 30, 60, 70] {
+            for n in 1..=64_u32 {
+                let (end, step) = (f64::from(n * interval) / 100.0, f64::from(interval) / 100.0);
+                let outputs = Outputs::after(0.0, 0.0, None, Some(step));
+                let all = |mut outputs: Outputs| std::iter::from_fn(move || outputs.next(end));
+                let times: Vec<f64> = all(outputs.clone().until(end)).collect();
+                assert_eq!(times.len(), n as usize);
+                assert_eq!(times.last(), Some(&end));
+                other_digits += usize::from(all(outputs).last() != Some(end));
+                // Beside a list with other expressions of the same times.
+                let listed = (1..=n).map(|k| f64::from(k * interval) / 100.0).collect();
+                let both = Outputs::after(0.0, 0.0, Some(listed), Some(step)).until(end);
+                assert_eq!(all(both).count(), n as usize);
+            }
+        }
+        assert!(other_digits > 40, "{other_digits} ends have two expressions");
     }
 }

@@ -13,7 +13,7 @@ pub(crate) struct Sample {
 const PATIENCE: usize = 4;
 
 /// Narrows a bracket across which a function changes its sign, until it is `width` wide or the function is zero at
-/// its end. The function is positive at the end, or zero, and negative at the start, if it rises; if it falls, the
+/// its end and not before it. The function is positive at the end, or zero, and negative at the start, if it rises; if it falls, the
 /// other way round. A place where it is NaN counts as one before the change. The end of the bracket is returned;
 /// `None` if the function stops.
 ///
@@ -29,12 +29,15 @@ pub(crate) fn narrow(
     let (mut distance, mut since, mut wide) = (width, 0, end.at - start.at);
     let mut patience = PATIENCE;
     let mut before_last = None;
-    while end.value != 0.0 && end.at - start.at > width {
+    // A function that stays zero is bisected for the place where it has come to zero.
+    let earlier = end.at - f64::EPSILON.sqrt() * (end.at - start.at);
+    let stays = end.value == 0.0 && f(earlier) == Some(0.0);
+    while (end.value != 0.0 || stays) && end.at - start.at > width {
         let length = end.at - start.at;
         let secant = end.at - right * length / (right - left);
         let margin = distance.min(0.5 * length);
         let is_close = !(secant >= start.at + margin && secant <= end.at - margin);
-        let halves = since >= patience || !secant.is_finite();
+        let halves = stays || since >= patience || !secant.is_finite();
         if halves {
             patience = patience.saturating_sub(1);
         }
@@ -119,6 +122,13 @@ mod tests {
             assert!((end - root).abs() < allowed && count <= most, "{index}: {end}, {count}");
             assert!(f(end) == 0.0 || f(end) * f(1.0) > 0.0, "{index}: the end is after the change");
         }
+    }
+
+    #[test]
+    fn a_function_that_stays_zero_has_come_there() {
+        let (end, count) = found(|x| (0.37 - x).max(0.0), [0.0, 1.0]);
+        assert!((end - 0.37).abs() < 2e-15 && count < 60, "{end} after {count} evaluations");
+        assert_eq!(found(|x| x - 1.0, [0.0, 1.0]), (1.0, 1));
     }
 
     #[test]

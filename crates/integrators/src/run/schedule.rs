@@ -48,6 +48,20 @@ impl From<f64> for Schedule {
 }
 
 impl Schedule {
+    /// Leaves out [`until_rest`](crate::Until::until_rest), so that the run goes on at rest.
+    ///
+    /// Rest is found at the end of a step. So the end of a run until rest jumps where a parameter changes the steps, and a loss of it
+    /// has no slope.
+    #[must_use]
+    pub fn without_rest(self) -> Self {
+        Self { rest: None, ..self }
+    }
+
+    /// Whether the run ends where the state comes to rest.
+    pub const fn ends_at_rest(&self) -> bool {
+        self.rest.is_some()
+    }
+
     /// Whether all steps have one size.
     pub(crate) const fn is_fixed(&self) -> bool {
         matches!(self.size, Size::Fixed(_))

@@ -2,13 +2,23 @@
 
 use crate::step::type_names::short;
 
+/// What leads back in time.
+const fn backwards(is_backwards: bool) -> &'static str {
+    if is_backwards {
+        "; where nothing dissipates, a run with the energy −H leads back"
+    } else {
+        ""
+    }
+}
+
 /// A span that cannot be run.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SpanError {
     /// The step size is zero, negative, infinite or NaN.
     #[error(
-        "the step size is {h}; it must be a positive finite number (entropy grows only forward in time)"
+        "the step size is {h}; it must be a positive finite number (entropy grows only forward in time{})",
+        backwards(*.h < 0.0)
     )]
     StepSize {
         /// The step size.
@@ -17,7 +27,8 @@ pub enum SpanError {
     /// The end is not after the start, or one of them is infinite or NaN; with steps of one size the end
     /// may be too large for a number.
     #[error(
-        "the run would start at t = {start} and end at t = {end}; its end must be a later, finite time"
+        "the run would start at t = {start} and end at t = {end}; its end must be a later, finite time{}",
+        backwards(end < start)
     )]
     End {
         /// The time at which it starts.
@@ -155,6 +166,16 @@ pub enum SpanError {
         index: usize,
         /// The temperature.
         temperature: f64,
+    },
+    /// The resolution of an event is not a positive finite time, or the time of the run does not see it.
+    #[error(
+        "event {index} has a resolution of {resolution}; it must be a positive finite time that the time of the run sees"
+    )]
+    EventResolution {
+        /// Which event, in the order in which they were asked for, counted from 0.
+        index: usize,
+        /// The resolution.
+        resolution: f64,
     },
     /// The function of an event has points of another type than the run.
     #[error(

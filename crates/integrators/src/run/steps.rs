@@ -15,8 +15,8 @@ use crate::run::stepping::Stepping;
 use crate::step::dense::says_between;
 use crate::step::scales::{larger, relative};
 use crate::step::{
-    AnyFlow, Effort, Element, EntropyStep, Flow, Laws, LimitingSites, Memory as _, Refusal, Scales,
-    StepEnds, StepError, StepStart, Stepper, Taken, Vector as _,
+    AnyFlow, Effort, Element, EntropyStep, Evidence, Flow, Laws, LimitingSites, Memory as _,
+    Refusal, Scales, StepEnds, StepError, StepStart, Stepper, Taken, Vector as _,
 };
 
 /// The iterator over the states of a run after its start, in constant memory; ended by an error, or
@@ -98,29 +98,26 @@ impl<'a, F: Flow, M: Stepper<F>> Steps<'a, F, M> {
             // The state before the last step is looked at no more, and leaves its array to this one.
             self.course.before.state = self.course.state.clone();
         }
+        let behind = self.leave_corner();
         let Advance { mut taken, h, time } = match &self.course.progress.step_size {
             &StepSize::Fixed(h) => {
                 let time = self.course.progress.start + step as f64 * h;
                 let h = self.course.left_of_a_step(h, time);
                 Advance { taken: self.fixed(Fixed { h, end: time })?, h, time }
             }
-            StepSize::Adaptive(controller) => self.controlled(controller.clone())?,
+            StepSize::Adaptive(controller) => self.controlled(controller.clone(), behind)?,
         };
         if let Some(clocked) = self.flow.clocked(&taken.x, time) {
             taken.values = self.flow.laws(&clocked);
             taken.x = clocked;
+            self.memory.clocked();
         }
         if !is_finite(&taken.values) {
             let time = self.course.state.time;
             return Err(StepError::OutOfDomain { time, h, tried: taken.effort });
         }
-        let change = taken.values.energy - self.course.certificate.reference_energy();
-        let sizes = || self.flow.energy_sizes([&self.course.state.point, &taken.x]);
-        if self.course.promises.energy
-            && let Some(size) = breaks_first_law(change, taken.values.energy, sizes)
-        {
-            let time = self.course.state.time;
-            return Err(StepError::FirstLawBroken { time, h, change, size });
+        if let Some(broken) = self.broken_law(&taken, h) {
+            return Err(broken);
         }
         self.check_step(&taken)?;
         let entered = StepOf { taken: &taken, h };
@@ -170,6 +167,30 @@ impl<'a, F: Flow, M: Stepper<F>> Steps<'a, F, M> {
             course.look(&mut Stepping { method, flow: *flow, memory })?;
         }
         self.course.recheck(evidence.entropy_step == Some(EntropyStep::Held))
+    }
+
+    /// The error that names the first law, if a step has broken it.
+    #[inline]
+    fn broken_law(&self, taken: &Taken<F>, h: f64) -> Option<StepError> {
+        let change = taken.values.energy - self.course.certificate.reference_energy();
+        let sizes = || self.flow.energy_sizes([&self.course.state.point, &taken.x]);
+        if !self.course.promises.energy {
+            return None;
+        }
+        let size = breaks_first_law(change, taken.values.energy, sizes)?;
+        Some(StepError::FirstLawBroken { time: self.course.state.time, h, change, size })
+    }
+
+    /// Sets the clock of the state behind the corner that it has reached, with the law of the next step. Returns the time
+    /// there.
+    #[inline]
+    fn leave_corner(&mut self) -> Option<f64> {
+        let behind = self.course.progress.corners.behind(self.course.state.time)?;
+        if let Some(clocked) = self.flow.clocked(&self.course.state.point, behind) {
+            self.course.values = self.flow.laws(&clocked);
+            self.course.state.point = clocked;
+        }
+        Some(behind)
     }
 
     /// Takes a step of one size. The memory, which is large, stays where it is.
@@ -248,13 +269,16 @@ impl<'a, F: Flow, M: Stepper<F>> Steps<'a, F, M> {
     fn controlled(
         &mut self,
         mut controller: Controller<F::Vector>,
+        behind: Option<f64>,
     ) -> Result<Advance<F>, StepError> {
         let (flow, rule, time) = (self.flow, self.course.rule, self.course.state.time);
         let mut effort = Effort::default();
         let (mut tries, mut broken) = (0, None);
         let Stop { stop, recorded: target, .. } =
             self.course.progress.corners.stop(time, controller.pace.end);
-        if self.course.progress.corners.has(time) {
+        // After a corner a step begins a few roundings later than its state is recorded.
+        let begin = behind.unwrap_or(time);
+        if behind.is_some() {
             self.memory = M::Memory::default();
         }
         loop {
@@ -265,14 +289,14 @@ impl<'a, F: Flow, M: Stepper<F>> Steps<'a, F, M> {
                     Scales::at(flow, &self.course.state.point, Some(controller.pace.end - time));
                 self.course.progress.scales = self.course.progress.scales.and(&here);
             }
-            let (h, last) = controller.pace.attempt(time, stop);
+            let (h, last) = controller.pace.attempt(begin, stop);
             if controller.pace.next < controller.pace.least(&rule) && !last {
                 let (h, least) = (controller.pace.next, controller.pace.least(&rule));
                 let too_small = StepError::TooSmall { time, h, least };
                 let cause = broken.or_else(|| self.course.dependent(&self.course.state));
                 return Err(cause.unwrap_or(too_small));
             }
-            if time + h <= time {
+            if begin + h <= begin {
                 let standstill = StepError::Standstill { time, h: controller.pace.next };
                 return Err(broken.unwrap_or(standstill));
             }
@@ -286,7 +310,10 @@ impl<'a, F: Flow, M: Stepper<F>> Steps<'a, F, M> {
             let end = match end {
                 Ok(taken) => {
                     effort += taken.effort;
-                    is_finite(&taken.values).then_some(taken)
+                    let law = self.broken_law(&taken, h).filter(|_| is_finite(&taken.values));
+                    let holds = law.is_none();
+                    broken = law.or(broken);
+                    (holds && is_finite(&taken.values)).then_some(taken)
                 }
                 Err(Refusal { effort: wasted, error, second_law }) => {
                     effort += wasted;
@@ -309,7 +336,9 @@ impl<'a, F: Flow, M: Stepper<F>> Steps<'a, F, M> {
                 let values = [&self.course.values, &taken.values];
                 let (x, reference) = (&self.course.state.point, &start.reference);
                 let step = StepEnds { flow, x, end: &taken.x, h, values, reference };
-                let norm = |error: &F::Vector| relative(error, &allowed);
+                let norm = |error: &F::Vector| {
+                    relative(error, &allowed).max(error.beside_relative_to(&allowed))
+                };
                 self.method.error(&step, &memory, norm).filter(|error| error.is_finite())
             });
             match (end, error) {
@@ -317,7 +346,7 @@ impl<'a, F: Flow, M: Stepper<F>> Steps<'a, F, M> {
                     controller.pace.accept_held(&rule, h);
                     let before = std::mem::replace(&mut self.memory, memory);
                     self.memory.reuse(before);
-                    let time = if last { target } else { time + h };
+                    let time = if last { target } else { begin + h };
                     self.course.progress.step_size = StepSize::Adaptive(controller);
                     return Ok(Advance { taken: Taken { effort, ..taken }, h, time });
                 }
@@ -329,13 +358,23 @@ impl<'a, F: Flow, M: Stepper<F>> Steps<'a, F, M> {
                 }
                 (Some(taken), Some(error)) if error <= 1.0 => {
                     controller.pace.accept(&rule, h, error);
+                    self.look_at_rest(&mut controller, &taken, h);
                     let before = std::mem::replace(&mut self.memory, memory);
                     self.memory.reuse(before);
-                    let time = if last { target } else { time + h };
+                    let time = if last { target } else { begin + h };
                     self.course.progress.step_size = StepSize::Adaptive(controller);
                     return Ok(Advance { taken: Taken { effort, ..taken }, h, time });
                 }
                 (_, error) => {
+                    if controller.pace.may_jump(&rule, begin, h)
+                        && let Some(taken) = self.held_in_an_instant(begin + h)
+                    {
+                        controller.pace.jumped(begin, h);
+                        self.memory = self.memory.restarted();
+                        self.course.progress.step_size = StepSize::Adaptive(controller);
+                        let time = if last { target } else { begin + h };
+                        return Ok(Advance { taken: Taken { effort, ..taken }, h, time });
+                    }
                     controller.pace.reject(&rule, h, error);
                     self.memory.reuse(memory);
                     self.course.certificate.rejected += 1;
@@ -343,6 +382,46 @@ impl<'a, F: Flow, M: Stepper<F>> Steps<'a, F, M> {
             }
         }
     }
+}
+
+impl<F: Flow, M: Stepper<F>> Steps<'_, F, M> {
+    /// The step to a time so near that a jump of the law of motion between the two has no place in it: the state stays, and
+    /// what the energy changes by is work of the time. `None` where states have no clock.
+    #[cold]
+    fn held_in_an_instant(&self, time: f64) -> Option<Taken<F>> {
+        let x = self.flow.clocked(&self.course.state.point, time)?;
+        let values = self.flow.laws(&x);
+        let (evidence, effort) = (Evidence::default(), Effort::default());
+        is_finite(&values).then_some(Taken { x, values, evidence, effort })
+    }
+
+    /// Bounds the next step where a system takes the time, and nothing has changed the motion in this one: what moves the state
+    /// later would be stepped over.
+    #[inline]
+    fn look_at_rest(&mut self, controller: &mut Controller<F::Vector>, taken: &Taken<F>, h: f64) {
+        let longest = controller.pace.longest_at_rest(&self.course.rule);
+        if !self.flow.depends_on_time() || controller.pace.next.max(h) < longest {
+            return;
+        }
+        let allowed = controller.allowed(&self.course.rule, &self.course.progress.scales, h);
+        let ends = [&self.course.state.point, &taken.x];
+        if moves_on(self.flow, ends, &allowed, h) {
+            controller.pace.next = controller.pace.next.min(longest);
+            self.course.certificate.note_rest(h);
+        }
+    }
+}
+
+/// Returns whether the velocity is the same at both ends of a step of size `h`, but for what the error allows.
+fn moves_on<F: Flow + ?Sized>(
+    flow: &F,
+    ends: [&Element<F>; 2],
+    allowed: &F::Vector,
+    h: f64,
+) -> bool {
+    let zero = allowed.zero();
+    let [Some(start), Some(end)] = ends.map(|x| flow.rates(x, &zero)) else { return false };
+    (0..zero.len()).all(|i| h * (end.get(i) - start.get(i)).abs() <= allowed.get(i))
 }
 
 /// Where the next step of this flow starts.

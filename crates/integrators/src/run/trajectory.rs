@@ -6,19 +6,9 @@ use crate::run::certificate::Certificate;
 use crate::run::checkpoint::Checkpoint;
 use crate::run::ending::Ending;
 use crate::run::event::Event;
+use crate::run::paired::{Unpaired, paired};
 use crate::run::state::State;
 use crate::step::StateSpace;
-
-/// Gives up the states between the first and the last that no multiple of `every` steps leads to, and
-/// the last one too unless it is to be kept.
-pub(super) fn thin_out<M: StateSpace>(states: &mut Vec<State<M>>, every: usize, keeps_last: bool) {
-    let last = states.len() - 1;
-    let mut index = 0..;
-    states.retain(|state| {
-        let index = index.next().unwrap_or(last);
-        index == 0 || index == last && keeps_last || state.step.is_multiple_of(every)
-    });
-}
 
 /// The record of a run: states and certificate.
 #[derive(Clone, Debug, PartialEq)]
@@ -65,6 +55,37 @@ impl<M: StateSpace> Trajectory<M> {
     /// The state at the end of the run.
     pub fn last(&self) -> &State<M> {
         &self.states[self.states.len() - 1]
+    }
+
+    /// The numbers of the [states](Self::states) at some times, to the rounding of times. The last state of a run that came to
+    /// [rest](Ending::Rest) stands for all later times.
+    ///
+    /// Data find their states by this, not by their place in a list: a run may end before its data do.
+    ///
+    /// ```
+    /// # use metriplectic_dynamics::System;
+    /// # use metriplectic_fields::Real;
+    /// # use metriplectic_integrators::{Run, Span, Watch};
+    /// # use metriplectic_manifolds::{LieDual, WeylMidpoint};
+    /// # use nalgebra::Vector3;
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// # let body = System::on(LieDual::so3())
+    /// #     .energy(|p: &Vector3<Real>| p.x * p.x * 0.5 + p.y * p.y + p.z * p.z * 1.5)
+    /// #     .build()?;
+    /// let span = Span::until(10.0).output_at([1.0, 2.0]);
+    /// let run = WeylMidpoint.run(&body, Vector3::new(0.4, 0.5, 0.3), span)?;
+    /// assert_eq!(run.indices_at(&[2.0, 10.0, 0.0])?, [2, 3, 0]);
+    /// assert!(run.indices_at(&[3.0]).is_err());
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
+    /// # Errors
+    ///
+    /// [`Unpaired`] names the time at which there is no state, and how the run has ended if it did not reach it.
+    pub fn indices_at(&self, times: &[f64]) -> Result<Vec<usize>, Unpaired> {
+        let recorded: Vec<f64> = self.states.iter().map(|state| state.time).collect();
+        paired(times, &recorded, (self.ending, self.events.last().map(|event| &event.name)))
     }
 
     /// The balance of the run, over all of its steps, recorded or not.

@@ -74,7 +74,8 @@ pub trait Watch: Into<Schedule> {
 
     /// Names times at which the law of motion of an open system jumps or has a kink. No step goes across them: each ends at
     /// a corner on the old law, and the next one begins there with the new law. What the energy changes by at the corner
-    /// is work of the time at a frozen state. Corners outside of the run are left out.
+    /// is work of the time at a frozen state. Times that differ by a few roundings are one corner. Corners outside of the run
+    /// are left out.
     ///
     /// ```
     /// use metriplectic_dynamics::{Symplectic, System};
@@ -117,14 +118,65 @@ pub trait Watch: Into<Schedule> {
         schedule
     }
 
+    /// The time at which the run starts, 0 without another one, as [`Span::starting_at`](crate::Span::starting_at) and
+    /// [`Until::starting_at`](crate::Until::starting_at) say it before outputs and events.
+    ///
+    /// ```
+    /// use metriplectic_integrators::{Span, Watch};
+    /// let span = Span::until(3.0).starting_at(2.0).output_every(0.25);
+    /// assert_eq!(span, Span::until(3.0).output_every(0.25).starting_at(2.0));
+    /// ```
+    #[must_use]
+    fn starting_at(self, start: f64) -> Schedule {
+        Schedule { start, ..self.into() }
+    }
+
+    /// Records the start and every `every`-th state after it, and always the last.
+    #[must_use]
+    fn every(self, every: usize) -> Schedule {
+        Schedule { every, ..self.into() }
+    }
+
+    /// Records at most `states` states, as [`Span::at_most`](crate::Span::at_most) and
+    /// [`Until::at_most`](crate::Until::at_most) do.
+    #[must_use]
+    fn at_most(self, states: usize) -> Schedule {
+        let schedule = self.into();
+        match schedule.count {
+            Some(count) => {
+                let every = count.div_ceil(states.max(2) - 1);
+                Schedule { every, ..schedule }
+            }
+            None => Schedule { most: Some(states.max(2)), ..schedule },
+        }
+    }
+
+    /// Ends the run as soon as the state is at rest, see [`Ending::Rest`](crate::Ending::Rest).
+    #[must_use]
+    fn until_rest(self, tolerance: f64) -> Schedule {
+        Schedule { rest: Some(tolerance), ..self.into() }
+    }
+
     /// Finds where a function of the point changes its sign, to the last digits of the time, and records the
     /// [events](crate::Trajectory::events) by their name. Say the type of the point in the closure.
     ///
     /// Both directions count unless you go on with [`rising`](Watched::rising) or [`falling`](Watched::falling),
-    /// and the run goes on after it unless you say [`stop`](Watched::stop). Inside a step the function is looked at
-    /// four times, so that two changes of sign in one step are found unless they lie closer than a fifth of it. A
-    /// function that is zero at the start has no event there. A point where it is NaN is left out, inside a step and at
-    /// its end: a change of sign across such points is an event at the first time after them.
+    /// and the run goes on after it unless you say [`stop`](Watched::stop).
+    ///
+    /// Inside a step the function is looked at as often as it asks for. Four looks and the end are compared with cubics through
+    /// one another. Where they differ by more than 1/64 of the range of the values, gaps are parted until they do not; and where
+    /// a parabola through three values turns near zero, its turn is looked at. So a function that is smooth on a step costs five
+    /// evaluations, and one that oscillates some ten in a period. What is of one sign but for a short time is not seen: say
+    /// its [`resolution`](Watched::resolution). Where 4096 further looks in a step are not enough, or the values are noise,
+    /// the certificate says so ([`Certificate::unsure_events`](crate::Certificate::unsure_events)).
+    ///
+    /// - A function that touches zero and goes back does not change its sign: no event. One that stays zero has one where it
+    ///   has come to zero.
+    /// - A function that is zero at the start has no event there: the start is the state after all that happens at its time.
+    ///   The certificate names such events with a [jump](Watched::jump)
+    ///   ([`Certificate::events_at_start`](crate::Certificate::events_at_start)); apply the map to the start for a jump there.
+    /// - A point where it is NaN is left out, inside a step and at its end: a change of sign across such points is an event at
+    ///   the first time after them.
     ///
     /// ```
     /// # use metriplectic_dynamics::System;
@@ -150,10 +202,13 @@ pub trait Watch: Into<Schedule> {
         name: impl Into<String>,
         function: impl Fn(&P) -> f64 + Send + Sync + 'static,
     ) -> Watched {
-        self.event_in_time(name, move |_, x: &P| function(x))
+        self.into().watched(Request::new(name.into(), false, move |_, x: &P| function(x)))
     }
 
     /// Asks for the sign changes of a function of the time and the point.
+    ///
+    /// A function of the time alone needs no state, so it is looked at 16 times in a step, and at rest too. It is taken for one
+    /// if its values with the state at the start of the step are those with the states on its way, to the last bit.
     ///
     /// ```
     /// # use metriplectic_dynamics::System;
@@ -177,13 +232,18 @@ pub trait Watch: Into<Schedule> {
         name: impl Into<String>,
         function: impl Fn(f64, &P) -> f64 + Send + Sync + 'static,
     ) -> Watched {
-        let mut schedule = self.into();
-        schedule.watch.events.push(Request::new(name.into(), function));
-        Watched(schedule)
+        self.into().watched(Request::new(name.into(), true, function))
     }
 }
 
 impl<S: Into<Schedule>> Watch for S {}
+
+impl Schedule {
+    fn watched(mut self, request: Request) -> Watched {
+        self.watch.events.push(request);
+        Watched(self)
+    }
+}
 
 /// A schedule with an event, whose direction and consequence can be said; made by [`Watch::event`].
 #[derive(Clone, Debug, PartialEq)]
@@ -218,6 +278,37 @@ impl Watched {
     /// ```
     pub fn falling(self) -> Self {
         self.with(|request| (request.rising, request.falling) = (false, true))
+    }
+
+    /// Looks at the function at least once in each interval `dt` of the time, however long the steps are. Say it where the function
+    /// is of one sign but for a short time, as that of a thin detector: no look can tell where to look for it.
+    ///
+    /// A ray crosses a slit of the width 0.1 between `t = 2.95` and `t = 3.05`, in one step from 0 to 10:
+    ///
+    /// ```
+    /// # use metriplectic_dynamics::{Symplectic, System};
+    /// # use metriplectic_fields::Real;
+    /// use metriplectic_integrators::{DormandPrince8, Method, Span, Watch};
+    /// # use metriplectic_manifolds::Euclidean;
+    /// use nalgebra::{Vector2, vector};
+    /// # fn main() -> Result<(), metriplectic_integrators::Error> {
+    /// # let ray = System::on(Euclidean::<2>)
+    /// #     .bracket(Symplectic)
+    /// #     .energy(|x: &Vector2<Real>| x.y)
+    /// #     .build()?;
+    /// let inside = |x: &Vector2<f64>| if (x.x - 3.0).abs() < 0.05 { 1.0 } else { -1.0 };
+    /// let span = Span::until(10.0).event("slit", inside).resolution(0.05);
+    /// let run = DormandPrince8.run(&ray, vector![0.0, 0.0], span)?;
+    /// let times: Vec<f64> = run.events().iter().map(|event| event.state.time).collect();
+    /// assert!((times[0] - 2.95).abs() < 1e-12 && (times[1] - 3.05).abs() < 1e-12);
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
+    /// A run with an interval that is not positive and finite, or that its time does not see, is
+    /// [refused](crate::SpanError::EventResolution).
+    pub fn resolution(self, dt: f64) -> Self {
+        self.with(|request| request.resolution = Some(dt))
     }
 
     /// Ends the run at the event, with [`Ending::Event`](crate::Ending::Event): the last state of the trajectory is
@@ -288,10 +379,15 @@ impl Watched {
     /// ```
     ///
     /// Make it [`falling`](Self::falling) or [`rising`](Self::rising) for a wall. The model has to go on behind it by up
-    /// to one step, because an event is looked for in a step that was taken. An output at the time of a jump is the state
-    /// before it. The jump of one event is no event of another one. An event that [stops](Self::stop) the run does not
-    /// change the state. In steps of one size the rest of the step is taken from `x'`, so that the steps end at the
-    /// same times.
+    /// to one step, because an event is looked for in a step that was taken. The jump of one event is no event of another one.
+    /// In steps of one size the rest of the step is taken from `x'`, so that the steps end at the same times.
+    ///
+    /// At the time of a jump:
+    ///
+    /// - An output, and so a datum, is the state before it. A step that ends there is recorded with the state after it.
+    /// - At the time of the start the state does not jump; see [`Watch::event`].
+    /// - Another event that jumps does so next, in the order in which they were asked for.
+    /// - Another event that [stops](Self::stop) comes first: the run ends in the state before the jump, which does not happen.
     pub fn jump<P: 'static>(self, map: impl Fn(f64, &P) -> P + Send + Sync + 'static) -> Jumping {
         Jumping(self.with(|request| request.jump = Some(JumpRequest::new(map))))
     }
@@ -370,6 +466,21 @@ impl Jumping {
     ) -> Self {
         let smooth = SmoothJump { event: Box::new(event), map: Box::new(map) };
         self.with(|jump| jump.differentiate(smooth))
+    }
+
+    /// Looks at the function at least once in each interval `dt` of the time, see [`Watched::resolution`].
+    pub fn resolution(self, dt: f64) -> Self {
+        Self(self.0.resolution(dt))
+    }
+
+    /// The function has to rise through zero, see [`Watched::rising`].
+    pub fn rising(self) -> Self {
+        Self(self.0.rising())
+    }
+
+    /// The function has to fall through zero, see [`Watched::falling`].
+    pub fn falling(self) -> Self {
+        Self(self.0.falling())
     }
 
     /// Accepts a jump that lowers the entropy of the system and its surroundings: of a model without the part of the

@@ -45,7 +45,7 @@ impl<M: StateSpace> Watching<M> {
         let start = progress.start;
         requests.check([start, progress.end()], progress.next_end(state.time))?;
         let Requests { times, interval, events } = requests;
-        let outputs = Outputs::after(state.time, start, times, interval);
+        let outputs = Outputs::after(state.time, start, times, interval).until(progress.end());
         let events = Events::new(events, state, last)?;
         if outputs.is_empty() && events.is_empty() {
             return Ok(None);

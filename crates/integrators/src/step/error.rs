@@ -210,7 +210,8 @@ pub enum StepError {
     #[error(
         "the step from t = {} would have to be {h:.1e} long to keep the tolerance, below the least \
          step {least:.1e}; the motion may end there: see the energy and the entropy around this \
-         state, or ask for a coarser tolerance",
+         state, or ask for a coarser tolerance; if something drives it and has a corner or a jump there, name its time by \
+         `.corners([..])`",
         digits(.time)
     )]
     TooSmall {
@@ -225,7 +226,8 @@ pub enum StepError {
     #[error(
         "the step from t = {} would have to be {h:.1e} long to keep the tolerance, below the last \
          digit of the time; the motion may end there: see the energy and the entropy around this state, \
-         let the run start at t = 0, or ask for a coarser tolerance",
+         let the run start at t = 0, or ask for a coarser tolerance; if something drives it and has a corner or a jump \
+         there, name its time by `.corners([..])`",
         digits(.time)
     )]
     Standstill {

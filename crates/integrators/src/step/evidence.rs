@@ -1,5 +1,7 @@
 //! Promises of a method, and the evidence and the effort of a step.
 
+use super::LedgerErrors;
+
 /// The laws that hold exactly on every step of a method.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -45,6 +47,10 @@ pub struct Evidence {
     pub stability: bool,
     /// The laws in the stages of a method that has them.
     pub stages: Option<StageLaws>,
+    /// The size of the shortest part between corners, of a step that a run has taken in parts; infinite for a whole one.
+    pub shortest_part: f64,
+    /// The estimated errors of what the step has booked; `None` for a closed system, and without an estimate.
+    pub ledger: Option<LedgerErrors>,
 }
 
 /// The rate `h|K'|` of friction above which a step does not resolve it.
@@ -96,6 +102,8 @@ impl Default for Evidence {
             entropy_step: None,
             stability: false,
             stages: None,
+            shortest_part: f64::INFINITY,
+            ledger: None,
         }
     }
 }
@@ -111,6 +119,11 @@ impl Evidence {
             entropy_step: next.entropy_step.or(self.entropy_step),
             stability: self.stability | next.stability,
             stages: match (self.stages, next.stages) {
+                (Some(a), Some(b)) => Some(a.and(b)),
+                (a, b) => a.or(b),
+            },
+            shortest_part: self.shortest_part.min(next.shortest_part),
+            ledger: match (self.ledger, next.ledger) {
                 (Some(a), Some(b)) => Some(a.and(b)),
                 (a, b) => a.or(b),
             },

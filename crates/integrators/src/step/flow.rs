@@ -8,7 +8,9 @@ use metriplectic_dynamics::{ModelError, SecondLaw};
 use metriplectic_manifolds::{Manifold, PointError};
 
 use super::initial_scales::initial_scales;
-use super::{EventExchange, FlowError, LedgerSummary, Scales, StepError, Vector};
+use super::{
+    EventExchange, FlowError, LedgerErrors, LedgerSummary, Scales, StartError, StepError, Vector,
+};
 
 /// Where the states of a run live. Every [`Manifold`] is a state space.
 pub trait StateSpace: Clone + Debug + PartialEq + Send + Sync + 'static {
@@ -130,9 +132,13 @@ pub trait Flow {
     }
 
     /// The state in which a run starts at a time. The default is the one that is given.
-    fn begin(&self, x: Element<Self>, time: f64) -> Element<Self> {
+    ///
+    /// # Errors
+    ///
+    /// [`StartError`] if the state carries a clock that shows another time.
+    fn begin(&self, x: Element<Self>, time: f64) -> Result<Element<Self>, StartError> {
         let _ = time;
-        x
+        Ok(x)
     }
 
     /// The state at another reading of the clock, where states carry one; `None` if they do not, or show this time. A run
@@ -167,6 +173,30 @@ pub trait Flow {
     fn ledger(&self, x: &Element<Self>) -> Option<LedgerSummary> {
         let _ = x;
         None
+    }
+
+    /// Returns whether the numbers of a direction beyond [`len`](Vector::len) are booked in a ledger, whose errors a run
+    /// estimates.
+    #[inline]
+    fn has_ledger(&self) -> bool {
+        false
+    }
+
+    /// Sorts the estimated errors of what a step has booked; `None` without a ledger.
+    fn ledger_errors(&self, errors: &Self::Vector) -> Option<LedgerErrors> {
+        let _ = errors;
+        None
+    }
+
+    /// Gives the entries of the ledger the sizes at a state that their errors are relative to where little has flowed, and the
+    /// sizes of the terms of their rates.
+    fn with_ledger_sizes(
+        &self,
+        x: &Element<Self>,
+        scales: Scales<Self::Vector>,
+    ) -> Scales<Self::Vector> {
+        let _ = x;
+        scales
     }
 
     /// Looks at the ends of each step that was taken, for what must hold on every one. Steps are `of_one_size`, or follow a
@@ -277,7 +307,8 @@ pub trait Flow {
     /// The round-off of the growth of the entropy in a step.
     fn entropy_round_off(&self, ends: [&Element<Self>; 2]) -> f64 {
         let sizes = ends.map(|x| self.term_sizes(x).entropy);
-        4.0 * f64::EPSILON * sizes[0].max(sizes[1])
+        // Numbers without digits are zeros.
+        4.0 * f64::EPSILON * sizes[0].max(sizes[1]) + f64::MIN_POSITIVE / f64::EPSILON
     }
 
     /// The invariant that depends most on the other fields at a state, and its independent fraction, if this

@@ -24,6 +24,9 @@ use super::{Element, Flow, Vector};
 /// The fraction of the span and of the times `s_i/|v_i|` with which the search for `h` begins.
 /// A factor of four fails `step/initial_scales.rs::a_relaxation_from_zero_reaches_its_end_whatever_the_span`.
 const FIRST: f64 = 0.25;
+/// The time `s_i/|v_i|`, relative to the span, below which an entry has only begun to move.
+/// A factor of four fails `step/initial_scales.rs::an_entry_that_has_only_begun_to_move_has_no_size_yet`.
+const BEGUN: f64 = 1e-8;
 /// The factor by which `h` is decreased.
 /// A factor of four fails `step/initial_scales.rs::a_motion_that_leaves_the_numbers_is_cut`.
 pub(crate) const CUT: f64 = 0.25;
@@ -55,16 +58,17 @@ impl<V: Vector> Scales<V> {
         let sizes = flow.sizes(x);
         let zero = sizes.zero();
         let Some(span) = span else { return Self { sizes: zero.clone(), terms: zero } };
-        match flow.reach(x, span) {
+        let scales = match flow.reach(x, span) {
             Some(reached) => reached.or(&sizes),
             None => Self { sizes, terms: zero },
-        }
+        };
+        flow.with_ledger_sizes(x, scales)
     }
 }
 
 /// The sizes that the entries reach soon in a run that lasts `span`; `None` if the flow has no rates at `x`, or
 /// nowhere near it.
-pub(super) fn initial_scales<F: Flow + ?Sized>(
+pub(crate) fn initial_scales<F: Flow + ?Sized>(
     flow: &F,
     x: &Element<F>,
     span: f64,
@@ -119,7 +123,9 @@ impl<F: Flow + ?Sized> Start<'_, F> {
     fn own_time(&self, span: f64) -> f64 {
         let speeds = self.v.by_kind();
         let times = F::Vector::zip([self.sizes, &speeds], |[size, speed]| size / speed);
-        let positive = (0..times.len()).map(|i| times.get(i)).filter(|time| *time > 0.0);
+        // An entry that is nothing beside what its velocity makes of the run has no size yet.
+        let least = BEGUN * span;
+        let positive = (0..times.len()).map(|i| times.get(i)).filter(|time| *time > least);
         positive.fold(span, f64::min)
     }
 
@@ -289,6 +295,17 @@ mod tests {
                 assert!((0.3..10.0).contains(&(u / power)), "{k}: {u}, {power}");
             }
         }
+    }
+
+    #[test]
+    fn an_entry_that_has_only_begun_to_move_has_no_size_yet() {
+        // q' = p, p' = 1 from a momentum that is nothing beside the one that it reaches.
+        let position = |p: f64| sizes(|x| vec![x[1], 1.0], &[0.0, p], 1.0)[0];
+        for p in [0.0, 1e-300, 1e-100, 1e-12, 5e-9] {
+            assert!((position(p) - 0.03125).abs() < 1e-6, "{p}: {}", position(p));
+        }
+        // From one of 2·10⁻⁸ the position is followed in this unit.
+        assert!(position(2e-8) < 1e-15, "{}", position(2e-8));
     }
 
     #[test]

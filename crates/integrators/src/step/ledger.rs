@@ -15,6 +15,37 @@ pub struct EventExchange {
     pub entropy: f64,
 }
 
+/// Estimates of how far the entries of a ledger are off: the sums over the steps of the largest error of an entry of each kind.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[non_exhaustive]
+pub struct LedgerErrors {
+    /// Of the work of the time, and of that of a port.
+    pub work: f64,
+    /// Of the heat of a bath.
+    pub heat: f64,
+    /// Of the entropy that a bath has gained.
+    pub entropy: f64,
+}
+
+impl LedgerErrors {
+    /// Makes these errors of work, heat and entropy.
+    #[must_use]
+    pub const fn new(work: f64, heat: f64, entropy: f64) -> Self {
+        Self { work, heat, entropy }
+    }
+
+    /// Adds the errors of two steps.
+    #[must_use]
+    pub(crate) fn and(self, next: Self) -> Self {
+        Self {
+            work: self.work + next.work,
+            heat: self.heat + next.heat,
+            entropy: self.entropy + next.entropy,
+        }
+    }
+}
+
 /// The exchange of an open system since the start of a run.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]

@@ -7,6 +7,11 @@ use std::ops::Range;
 
 use super::exact::Exact;
 
+/// The ratio of the size of a step to that of the one before, up to which a method may extrapolate. Beyond it the differences of
+/// a short step are round-off, which a polynomial of degree `n` multiplies by the `n`-th power of the ratio.
+/// A factor of four fails `midpoint/predictor.rs::nothing_is_extrapolated_to_a_far_longer_step`.
+pub(crate) const FARTHEST: f64 = 16.0;
+
 /// The memory of a method from one step to the next.
 pub trait Memory: Clone + Debug + Default {
     /// The memory for steps of `ratio` times the size.
@@ -18,6 +23,9 @@ pub trait Memory: Clone + Debug + Default {
     fn restarted(&self) -> Self {
         Self::default()
     }
+
+    /// Forgets what is a function of the state reached, whose [clock](crate::Flow::clocked) was set by a rounding.
+    fn clocked(&mut self) {}
 
     /// Takes over the room of another memory, which needs it no more. No number of a step depends on it.
     fn take_room(&mut self, from: &mut Self) {

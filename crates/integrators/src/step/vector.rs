@@ -110,7 +110,7 @@ pub trait Vector: Clone + Debug {
             }
             largest = f64::max(largest, ratio(i));
         }
-        if largest > 0.0 && largest.is_finite() {
+        if largest >= f64::MIN_POSITIVE && largest.is_finite() {
             let unit = largest.recip();
             let sum =
                 (0..self.len()).fold(0.0, |sum, i| sum + (ratio(i) * unit) * (ratio(i) * unit));
@@ -118,6 +118,14 @@ pub trait Vector: Clone + Debug {
         } else {
             largest
         }
+    }
+
+    /// The largest of the ratios `|v_i|/s_i` of the numbers beyond [`len`](Self::len) to their sizes, of those that have one; zero
+    /// without such numbers.
+    #[inline]
+    fn beside_relative_to(&self, sizes: &Self) -> f64 {
+        let _ = sizes;
+        0.0
     }
 
     /// The number of sites, if these are the numbers of a system of sites, one site after the other.
@@ -262,7 +270,7 @@ fn norm<V: Column<f64>>(ratios: &V) -> f64 {
     if check.is_nan() {
         return f64::NAN;
     }
-    if largest > 0.0 && largest.is_finite() {
+    if largest >= f64::MIN_POSITIVE && largest.is_finite() {
         let unit = largest.recip();
         let mut sum = 0.0;
         for i in 0..V::LEN {

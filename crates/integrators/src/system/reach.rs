@@ -1,8 +1,9 @@
 //! How far the entries of a state move soon.
 //!
-//! Flows without derivatives have `step/initial_scales.rs`, from rates alone. This routine is not replaced by it: `1/|f'_ii|`
-//! and `1/√|f'_ij f'_ji|` are times of the motion also in directions in which nothing is displaced yet, and the terms `t_i`
-//! need `f'` anyway. The two share the classical step.
+//! Flows without derivatives have `step/initial_scales.rs`, from rates alone, and so do systems of [many](SMALL) entries: all of
+//! `f'` costs `n` velocities at dual numbers. This routine is not replaced by it where there are few: `1/|f'_ii|`
+//! and `1/√|f'_ij f'_ji|` are times of the motion also in directions in which nothing is displaced yet. The two share the
+//! classical step.
 //!
 //! An entry that starts at zero has no size yet. It gets the one that it reaches soon: with `v = f(x)`,
 //! `a = f'(x) v` and the nonlinear part `r = f(δv) − v − δa`,
@@ -17,30 +18,67 @@
 //! of `δ`, so that a steep wall on the way does not count, and until the motion is nowhere on that step much faster than
 //! at its start: a pendulum at a right angle has no frequency yet.
 //!
-//! The terms of a velocity have the sizes `t_i = Σ_j (|Π_ij||∂_jH| + |K_ij||∂_jS| + |f'_ij||x_j|)`.
+//! The terms of a velocity have the sizes `t_i = Σ_j (|Π_ij||∂_jH| + |K_ij||∂_jS| + |f'_ij||x_j|)`. Of many entries, the last
+//! sum is the largest `|Σ_j f'_ij s_j|` of a few vectors `s_j = ±|x_j|` with irregular signs: about the root of the sum of the squares,
+//! as that of independent roundings.
 
 use metriplectic_dynamics::velocity::differentials;
 use metriplectic_dynamics::{Bracket, Dissipation, Metriplectic, system::Point};
-use metriplectic_fields::{ChartPoint, Column, Matrix, Scalar, Square, Vector, jacobian};
+use metriplectic_fields::{
+    ChartPoint, Column, Dimension, Matrix, Scalar, Square, Vector, jacobian, power_of_two,
+};
 use metriplectic_manifolds::Manifold;
 
-use crate::step::{CUT, CUTS, Components, SAME, Scales, classical_step as classical_step_of};
+use crate::step::{CUT, CUTS, Components, Dim, SAME, Scales, classical_step as classical_step_of};
 
 /// The velocity at `x`, and the sizes of what it is summed of; `None` if it cannot be evaluated there.
 pub(super) fn velocity_and_terms<Y: Metriplectic>(
     system: &Y,
     x: &Point<Y>,
 ) -> Option<[Vector<Y::Manifold>; 2]> {
-    let v = velocity(system, x, Vector::<Y::Manifold>::zero())?;
-    Some([
-        v,
-        terms(
-            system,
-            x,
-            &slopes_at(system, x, Vector::<Y::Manifold>::zero()),
-            &Y::Manifold::scales(x),
-        )?,
-    ])
+    let (origin, sizes) = (Vector::<Y::Manifold>::zero(), Y::Manifold::scales(x));
+    let v = velocity(system, x, origin)?;
+    if !is_small::<Y>() {
+        return Some([v, terms_of_many(system, x, &v, &sizes)?]);
+    }
+    let slopes = slopes_at(system, x, origin);
+    Some([v, terms(system, x, |i, j| (slopes[(i, j)] * sizes[j]).abs())?])
+}
+
+/// The number of entries up to which all derivatives of a velocity are formed.
+/// A factor of four fails `system/reach.rs::the_start_of_a_large_system_costs_some_velocities`.
+const SMALL: usize = 8;
+
+/// Whether a system has few entries.
+pub(super) const fn is_small<Y: Metriplectic>() -> bool {
+    <Dim<Y> as Dimension>::LEN <= SMALL
+}
+
+/// The directions along which the change of a velocity of many entries is looked at.
+/// A factor of four fails `system/reach.rs::the_start_of_a_large_system_costs_some_velocities`.
+const DIRECTIONS: usize = 3;
+
+/// The sizes of what a velocity `v` of many entries is summed of, with entries of these sizes.
+pub(super) fn terms_of_many<Y: Metriplectic>(
+    system: &Y,
+    x: &Point<Y>,
+    v: &Vector<Y::Manifold>,
+    sizes: &Vector<Y::Manifold>,
+) -> Option<Vector<Y::Manifold>> {
+    // By differences: a velocity at dual numbers costs as much as `n` of them.
+    let small = f64::EPSILON.sqrt();
+    let mut moved = Vector::<Y::Manifold>::zero();
+    for direction in 0..DIRECTIONS {
+        let q = Column::from_index(|i| {
+            // Both signs, without a pattern (Weyl 1916).
+            let turn = ((i * DIRECTIONS + direction) as f64 * 0.618_033_988_749_894_9).fract();
+            let sign = if (turn * turn * 1e4).fract() < 0.5 { -1.0 } else { 1.0 };
+            sign * small * sizes[i]
+        });
+        let change = velocity(system, x, q)? - *v;
+        moved = Column::from_index(|i| moved[i].max(change[i].abs() / small));
+    }
+    Some(terms(system, x, |_, _| 0.0)? + moved)
 }
 
 /// The sizes that the entries reach soon; `None` if the equation of motion cannot be evaluated at `x`.
@@ -52,12 +90,17 @@ pub(super) fn reach<Y: Metriplectic>(
     let (origin, sizes) = (Vector::<Y::Manifold>::zero(), Y::Manifold::scales(x));
     let v = velocity(system, x, origin)?;
     let slopes = slopes_at(system, x, origin);
-    let (a, terms) = (slopes * v, terms(system, x, &slopes, &sizes)?);
-    let nonlinear = |delta: f64| Some(velocity(system, x, v * delta)? - v - a * delta);
+    let moved = |i, j| (slopes[(i, j)] * sizes[j]).abs();
+    let terms = terms(system, x, moved)?;
+    let first = 0.25 * shortest_time(&slopes, span);
+    // The acceleration in a unit of rates, whose square may be too large or too small for a number.
+    let unit = if first.is_normal() { power_of_two(first.recip()) } else { 1.0 };
+    let a = slopes * (v * unit.recip());
+    let nonlinear = |delta: f64| Some(velocity(system, x, v * delta)? - v - a * (unit * delta));
     let is_smooth = |delta: f64, whole: &Vector<Y::Manifold>, half: &Vector<Y::Manifold>| {
         let quarter = std::cell::OnceCell::new();
         (0..Vector::<Y::Manifold>::LEN).all(|i| {
-            let linear = 1e-6 * (v[i].abs() + delta * a[i].abs());
+            let linear = 1e-6 * (v[i].abs() + unit * delta * a[i].abs());
             let is_flat = whole[i].abs() <= STEEPEST * half[i].abs() + linear + NOISE * terms[i];
             let is_power = || {
                 let quarter = quarter.get_or_init(|| nonlinear(0.25 * delta));
@@ -69,7 +112,7 @@ pub(super) fn reach<Y: Metriplectic>(
             is_flat || is_power()
         })
     };
-    let (mut delta, mut r) = (0.25 * shortest_time(&slopes, span), origin);
+    let (mut delta, mut r) = (first, origin);
     let is_short = |delta: f64| {
         [0.5 * delta, delta].into_iter().all(|h| {
             let reached = classical_step(system, x, v, h);
@@ -88,7 +131,7 @@ pub(super) fn reach<Y: Metriplectic>(
     }
     let classical = classical_step(system, x, v, delta).unwrap_or(origin);
     let sizes = Vector::<Y::Manifold>::from_index(|i| {
-        let linear = (delta * v[i].abs()).max(0.5 * delta * delta * a[i].abs());
+        let linear = (delta * v[i].abs()).max(0.5 * delta * (unit * delta) * a[i].abs());
         let first = linear.max(delta * r[i].abs() / 3.0);
         if first < LATE * classical[i].abs() { classical[i].abs() } else { first }
     });
@@ -136,12 +179,11 @@ fn shortest_time<V: Column<f64>>(slopes: &impl Square<f64, Column = V>, span: f6
     time
 }
 
-/// The sizes `Σ_j (|Π_ij||∂_jH| + |K_ij||∂_jS| + |f'_ij||x_j|)` of what the velocity is summed of.
+/// The sizes `Σ_j (|Π_ij||∂_jH| + |K_ij||∂_jS| + m_ij)` of what the velocity is summed of, where `m_ij = |f'_ij||x_j|`.
 fn terms<Y: Metriplectic>(
     system: &Y,
     x: &Point<Y>,
-    slopes: &Matrix<Y::Manifold>,
-    sizes: &Vector<Y::Manifold>,
+    moved: impl Fn(usize, usize) -> f64,
 ) -> Option<Vector<Y::Manifold>> {
     let centre = ChartPoint::<Y::Manifold>::centre(x);
     let w = differentials(system, &centre);
@@ -152,7 +194,7 @@ fn terms<Y: Metriplectic>(
         let n = Vector::<Y::Manifold>::LEN;
         (0..n).fold(0.0, |sum: f64, j| {
             let laws = (pi[(i, j)] * w.energy[j]).abs() + (k[(i, j)] * w.entropy[j]).abs();
-            sum + laws + (slopes[(i, j)] * sizes[j]).abs()
+            sum + laws + moved(i, j)
         })
     }))
 }
@@ -237,6 +279,48 @@ mod tests {
             .unwrap();
         let sizes = Scales::at(&system, &nalgebra::Vector6::zeros(), Some(4.0)).sizes.0;
         assert!(sizes[0] > 0.01 && sizes[1] > 0.05, "{sizes}");
+    }
+
+    #[test]
+    fn the_start_of_a_large_system_costs_some_velocities() {
+        use std::sync::atomic::{AtomicUsize, Ordering};
+        static COUNT: AtomicUsize = AtomicUsize::new(0);
+        // Evaluations of the energy for the sizes at the start, per velocity, of oscillators of which half are displaced.
+        macro_rules! velocities {
+            ($n:literal) => {{
+                let pi = nalgebra::SMatrix::<f64, $n, $n>::from_fn(|i, j| {
+                    let next = |i: usize, j: usize| f64::from(i % 2 == 0 && j == i + 1);
+                    next(i, j) - next(j, i)
+                });
+                let system = System::on(Euclidean::<$n>)
+                    .bracket(Poisson::constant(pi).unwrap())
+                    .energy(|x: &nalgebra::SVector<Real, $n>| {
+                        COUNT.fetch_add(1, Ordering::Relaxed);
+                        x.norm_squared() * 0.5
+                    })
+                    .build()
+                    .unwrap();
+                let x = nalgebra::SVector::<f64, $n>::from_fn(|i, _| f64::from(i % 2 == 0));
+                let count = |work: &dyn Fn()| {
+                    COUNT.store(0, Ordering::Relaxed);
+                    work();
+                    COUNT.load(Ordering::Relaxed)
+                };
+                let one = count(&|| assert!(velocity(&system, &x, x * 0.0).is_some()));
+                let all = count(&|| {
+                    let Scales { sizes, terms } = Scales::at(&system, &x, Some(50.0));
+                    // An amplitude of 1, and a force of two terms: that of `dH`, and that of the rounding of a position.
+                    assert!(sizes.0.iter().all(|size| (0.2..1.1).contains(size)), "{sizes:?}");
+                    let forces = terms.0.iter().skip(1).step_by(2);
+                    assert!(forces.clone().all(|terms| (1.9..2.1).contains(terms)), "{terms:?}");
+                });
+                all as f64 / one as f64
+            }};
+        }
+        let counts = [velocities!(8), velocities!(10), velocities!(30)];
+        println!("{counts:?} velocities");
+        // With all derivatives they are 1741 for 8 entries; a look at a direction costs one.
+        assert!(counts[1] < 50.0 && counts[2] < 50.0 && counts[0] > 500.0, "{counts:?}");
     }
 
     #[test]

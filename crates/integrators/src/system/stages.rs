@@ -9,7 +9,7 @@ use metriplectic_manifolds::Manifold;
 
 use super::referred_rise;
 use crate::explicit::{Projected, ProjectionError, StageFlow, Target};
-use crate::round_off::bound::{INDEPENDENT, of_an_increment_to};
+use crate::round_off::bound::{INDEPENDENT, NO_DIGITS, of_an_increment_to};
 use crate::step::{Components, CountOf, Dim, Laws, Numbers};
 
 type Tangent<Y> = Components<Vector<<Y as Metriplectic>::Manifold>>;
@@ -306,14 +306,19 @@ impl<Y: Metriplectic> Projection<'_, Y> {
         let normal = |w: &Vector<Y::Manifold>, target: f64, value: f64| {
             let whole = Vector::<Y::Manifold>::from_index(|i| units[i] * w[i]);
             let length = whole.magnitude();
-            let factor = if length > 0.0 { power_of_two(length) } else { 1.0 };
+            // No displacement of a unit changes a law whose differential has no digits.
+            let (whole, factor) = if length > NO_DIGITS {
+                (whole, power_of_two(length))
+            } else {
+                (Vector::<Y::Manifold>::zero(), 1.0)
+            };
             let hat = whole * factor.recip();
             let terms = 2.0 * target.abs() + w.abs().dot(scales);
             Normal {
                 hat,
                 square: hat.dot(&hat),
                 residual: (target - value) / factor,
-                round_off: f64::EPSILON * terms / factor,
+                round_off: f64::EPSILON * terms / factor + NO_DIGITS / factor,
                 factor,
                 dependent: false,
             }

@@ -12,6 +12,8 @@ use super::error::TangentError;
 use super::part::{Part, Wide};
 use super::tape::{Segment, Tape, TapedStep};
 use crate::run::certificate::Certificate;
+use crate::run::ending::Ending;
+use crate::run::paired::{Unpaired, paired};
 use crate::run::schedule::Schedule;
 use crate::run::state::State;
 use crate::step::{Dim, Flow as _, Stepper};
@@ -52,7 +54,7 @@ type Moving<D> = <<D as Metriplectic>::Manifold as Space>::Point<Real>;
 /// let span = Span::until(20.0).tolerance(1e-8).output_at([5.0, 10.0, 20.0]);
 /// let run = DormandPrince8.adjoint(&system, vector![0.4, -1.0, 0.3], span)?;
 ///
-/// // State 0 is the start, and states 1 to 3 are the outputs.
+/// // State 0 is the start, and states 1 to 3 are the outputs. The last state is the end of the run, asked for or not.
 /// let data = vector![0.1, -0.9, 0.4];
 /// let loss = run.gradient(|k, p: &Vector3<Real>| {
 ///     if k == 0 { 0.0.into() } else { (p - data.map(Real::from)).norm_squared() }
@@ -67,8 +69,9 @@ pub trait Adjoints: Sized {
     /// Runs a system over a schedule, and keeps the steps for gradients: those of the last [`WITHIN`] steps, and a checkpoint
     /// every so many.
     ///
-    /// The states of the loss are those that a [run](crate::Method::run) records: one after each step, or at the
-    /// [times asked for](crate::Watch::output_at). An output inside a step is a step of that fraction of its size.
+    /// The states of the loss are those that a [run](crate::Method::run) records: after each step or every so many, or at the
+    /// [times asked for](crate::Watch::output_at); and the last one always. An output inside a step is a step of that fraction of
+    /// its size. [`AdjointRun::indices_at`] has the number of the state at a time.
     ///
     /// # Errors
     ///
@@ -89,7 +92,7 @@ pub trait Adjoints: Sized {
     /// Runs as [`adjoint`](Self::adjoint) does, and keeps at most `steps` steps. A run of `N` has a checkpoint every `steps`, from
     /// which a gradient takes them again: at `steps = √N` the memory is of order `√N`, for the price of one more run.
     ///
-    /// Without outputs each state is recorded, whatever `steps` is.
+    /// Without outputs each state is recorded, whatever `steps` is; [`Until::at_most`](crate::Until::at_most) bounds them.
     ///
     /// # Errors
     ///
@@ -169,9 +172,29 @@ where
         &self.tape.states
     }
 
+    /// The state at the end of the run.
+    pub fn last(&self) -> &State<D::Manifold> {
+        &self.tape.states[self.tape.states.len() - 1]
+    }
+
+    /// The numbers of the states at some times, as [`Trajectory::indices_at`](crate::Trajectory::indices_at).
+    ///
+    /// # Errors
+    ///
+    /// [`Unpaired`].
+    pub fn indices_at(&self, times: &[f64]) -> Result<Vec<usize>, Unpaired> {
+        let recorded: Vec<f64> = self.states().iter().map(|state| state.time).collect();
+        paired(times, &recorded, (self.ending(), None))
+    }
+
     /// The balance of the run.
     pub const fn certificate(&self) -> &Certificate {
         &self.tape.certificate
+    }
+
+    /// How the run ended.
+    pub const fn ending(&self) -> Ending {
+        self.tape.ending
     }
 
     /// Computes the loss `Σ_k ℓ_k(x_k)` and its gradient, by a closure `|k, x|` over the numbers and the points of the
@@ -238,7 +261,7 @@ where
         segment: &Segment,
         next: &Segment,
     ) -> Result<Vec<TapedStep<D>>, TangentError<D::Manifold>> {
-        Tape::again(self.method.clone(), self.system, [segment, next])
+        self.tape.again(self.method.clone(), self.system, [segment, next])
     }
 
     /// The costate at the start of a step from that at its end.
@@ -256,13 +279,10 @@ where
             }
             Ok::<_, TangentError<D::Manifold>>(costate)
         };
-        let at_end = match step.state {
-            Some(k) => costate + row(k),
-            None => costate,
-        };
-        let mut before = through(&step.parts, at_end)?;
-        for (k, parts) in &step.outputs {
-            before += through(parts, row(*k))?;
+        let [inside, at_end] = self.tape.recorded(step);
+        let mut before = through(&step.parts, at_end.fold(costate, |sum, k| sum + row(k)))?;
+        for (k, parts) in inside.zip(&step.outputs) {
+            before += through(parts, row(k))?;
         }
         Ok(before)
     }

@@ -21,7 +21,8 @@ use crate::run::error::RunError;
 use crate::run::event::Request;
 use crate::run::jump::JumpRequest;
 use crate::run::method::Method as _;
-use crate::run::requests::Outputs;
+use crate::run::paired::{Unpaired, paired};
+use crate::run::recording::Numbered;
 use crate::run::schedule::Schedule;
 use crate::step::{Flow as _, Stepper};
 
@@ -69,8 +70,7 @@ pub trait Tangents: Sized {
         D: Differentiable,
         Self: Stepper<D> + LinearisedAlong<D>,
     {
-        let mut schedule: Schedule = schedule.into();
-        let end = schedule.end();
+        let schedule: Schedule = schedule.into();
         let listed = schedule.watch.events.iter().map(|event| event.jump.as_ref());
         let jumps: Jumps<D> = listed.map(|jump| jump.and_then(JumpRequest::smooth)).collect();
         let has_jump = |event: &Request| event.jump.is_some();
@@ -80,20 +80,17 @@ pub trait Tangents: Sized {
         if !schedule.corners.is_empty() {
             return Err(TangentError::Broken { what: "corners" });
         }
-        schedule.watch.check([schedule.start, end], schedule.start).map_err(RunError::from)?;
-        let (times, interval) = (schedule.watch.times.take(), schedule.watch.interval.take());
-        let start = schedule.start;
-        let outputs = Outputs::after(start, start, times, interval);
         let steps = self.steps(system, x0, schedule)?;
         let columns = system
             .wide()
             .with_room(|| Columns::start(system.wide(), &system.widened(&steps.state().point)));
         let sensitivity = Sensitivity::default();
-        Ok(TangentSteps { steps, columns, sensitivity, outputs, start, jumps })
+        Ok(TangentSteps { steps, columns, sensitivity, jumps })
     }
 
-    /// Runs a system over a schedule, and records the states with their derivatives: after each step, or at the
-    /// [times asked for](crate::Watch::output_at). An output inside a step is a step of that fraction of the size.
+    /// Runs a system over a schedule, and records the states that a [run](crate::Method::run) records, with their derivatives:
+    /// after each step or every so many, or at the [times asked for](crate::Watch::output_at); and the last one always. An output
+    /// inside a step is a step of that fraction of the size.
     ///
     /// # Errors
     ///
@@ -171,28 +168,27 @@ where
     D: Differentiable,
     M: Stepper<D> + LinearisedAlong<D>,
 {
-    let asked = !steps.outputs.is_empty();
-    let (mut states, mut events) = (vec![steps.state()], Vec::new());
-    if steps.steps.is_endless() {
-        return Err(RunError::from(SpanError::Endless).into());
-    }
+    let mut recording = steps.steps.recording(steps.state()).map_err(RunError::from)?;
+    let mut events = Vec::new();
     while steps.ending().is_none() {
         let Inside { outputs, events: found } = steps.take_step()?;
-        let stop = steps.ending().is_some_and(Ending::is_event);
-        states.extend(outputs);
         events.extend(found);
-        if let Some(event) = events.last().filter(|_| stop) {
-            states.push(event_state(event));
-        } else if !asked {
-            states.push(steps.state());
+        if steps.steps.replaces_steps() {
+            recording.states.extend(outputs);
+        } else {
+            let (step, over) = (steps.steps.state().step, steps.ending().is_some());
+            recording.end_of_step(step, [over, false], || steps.state());
         }
     }
     let (certificate, sensitivity) = (steps.steps.certificate().clone(), steps.sensitivity);
-    Ok(TangentRun { states, events, certificate, sensitivity })
+    let ending = steps.ending().unwrap_or(Ending::Stopped);
+    Ok(TangentRun { states: recording.states, events, certificate, ending, sensitivity })
 }
 
-fn event_state<D: Differentiable>(event: &TangentEvent<D>) -> TangentState<D> {
-    event.state.clone()
+impl<D: Differentiable> Numbered for TangentState<D> {
+    fn step(&self) -> usize {
+        self.step
+    }
 }
 
 /// The record of a run with its tangent.
@@ -200,6 +196,7 @@ pub struct TangentRun<D: Differentiable> {
     states: Vec<TangentState<D>>,
     events: Vec<TangentEvent<D>>,
     certificate: Certificate,
+    ending: Ending,
     sensitivity: Sensitivity,
 }
 
@@ -218,11 +215,7 @@ impl<D: Differentiable> TangentRun<D> {
         &self.states
     }
 
-    /// The last state.
-    ///
-    /// # Panics
-    ///
-    /// Never: the start is recorded.
+    /// The state at the end of the run.
     pub fn last(&self) -> &TangentState<D> {
         &self.states[self.states.len() - 1]
     }
@@ -232,9 +225,24 @@ impl<D: Differentiable> TangentRun<D> {
         &self.events
     }
 
+    /// The numbers of the states at some times, as [`Trajectory::indices_at`](crate::Trajectory::indices_at).
+    ///
+    /// # Errors
+    ///
+    /// [`Unpaired`].
+    pub fn indices_at(&self, times: &[f64]) -> Result<Vec<usize>, Unpaired> {
+        let recorded: Vec<f64> = self.states.iter().map(|state| state.time).collect();
+        paired(times, &recorded, (self.ending, self.events.last().map(|event| &event.event.name)))
+    }
+
     /// The balance of the run.
     pub const fn certificate(&self) -> &Certificate {
         &self.certificate
+    }
+
+    /// How the run ended.
+    pub const fn ending(&self) -> Ending {
+        self.ending
     }
 
     /// The laws of the tangent.

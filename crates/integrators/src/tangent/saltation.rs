@@ -39,7 +39,6 @@ where
     /// Carries the tangent across the jump at the last of the events that were found.
     pub(super) fn cross(
         &mut self,
-        step: usize,
         scales: &Scales<<D as crate::step::Flow>::Vector>,
         mut found: Vec<Event<D::Manifold>>,
     ) -> Result<Inside<D>, TangentError<D::Manifold>> {
@@ -48,8 +47,10 @@ where
         let Some(event) = found.pop() else { return Ok(inside) };
         let (start, h) = (last.start.time, last.h);
         let failed = |cause| TangentError::NotLinearised { time: start, cause };
-        let mut outputs = self.outputs.clone();
-        while let Some(time) = outputs.next(event.state.time) {
+        let mut asked = self.asked();
+        // A run that is over ends with the state after the jump.
+        let is_over = self.steps.ending().is_some() && asked.pop().is_some();
+        for (step, time) in asked {
             let (point, moved) = self.part(&last, (time - start) / h).map_err(failed)?;
             inside.outputs.push(self.at(step, time, point, moved.columns));
         }
@@ -67,7 +68,10 @@ where
         let (step, time, point) = (reached.step, event.state.time, reached.point.clone());
         event.after = Some(self.at(step, time, point, columns.clone()));
         inside.events.push(event);
-        (self.columns, self.outputs) = (columns, outputs);
+        self.columns = columns;
+        if is_over {
+            inside.outputs.push(self.state());
+        }
         Ok(inside)
     }
 

@@ -23,7 +23,6 @@ use crate::run::ending::Ending;
 use crate::run::event::Event;
 use crate::run::jump::SmoothJump;
 use crate::run::last_step::LastStep;
-use crate::run::requests::{Outputs, rounding};
 use crate::run::steps::Steps;
 use crate::step::{Dim, Flow, Scales, Stepper};
 
@@ -34,8 +33,6 @@ pub struct TangentSteps<'a, D: Differentiable, M: Stepper<D>> {
     pub(super) steps: Steps<'a, D, M>,
     pub(super) columns: Columns<Wide<D>>,
     pub(super) sensitivity: Sensitivity,
-    pub(super) outputs: Outputs,
-    pub(super) start: f64,
     /// The derivatives of the jumps, by the number of their event.
     pub(super) jumps: Jumps<D>,
 }
@@ -51,8 +48,9 @@ impl<D: Differentiable, M: Stepper<D>> fmt::Debug for TangentSteps<'_, D, M> {
     }
 }
 
-/// States inside a step, and the events there.
+/// What a step has reached, and the events in it.
 pub(super) struct Inside<D: Differentiable> {
+    /// The states that the run yields in place of the one at the end of the step.
     pub(super) outputs: Vec<TangentState<D>>,
     pub(super) events: Vec<TangentEvent<D>>,
 }
@@ -112,7 +110,7 @@ where
         let mut inside = Inside { outputs: Vec::new(), events: Vec::new() };
         let found = self.steps.take_events();
         if found.last().is_some_and(|event| event.jump.is_some()) {
-            return self.cross(before.step, &scales, found);
+            return self.cross(&scales, found);
         }
         if self.steps.state().step == before.step {
             return Ok(inside);
@@ -120,25 +118,22 @@ where
         let failed = |cause| TangentError::NotLinearised { time: before.time, cause };
         let flow = self.steps.flow();
         let last = self.steps.last_step(&scales);
-        let stop = match self.steps.ending() {
-            Some(Ending::Event { .. }) => found.last().map(|event| event.state.time),
+        let end = self.steps.state();
+        let theta = |time: f64| (time - before.time) / (end.time - before.time);
+        for event in found {
+            let theta = theta(event.state.time);
+            inside.events.push(self.event(&last, &scales, event, theta).map_err(failed)?);
+        }
+        let mut asked = self.asked();
+        // The run has ended at the event, not at the end of the step.
+        let stop = match (self.steps.ending(), inside.events.last()) {
+            (Some(Ending::Event { .. }), Some(event)) => asked.pop().map(|_| event.state.clone()),
             _ => None,
         };
-        let end = stop.unwrap_or_else(|| self.steps.state().time);
-        let mut outputs = self.outputs.clone();
-        while let Some(time) = outputs.next(end) {
-            let near = rounding(self.start, self.steps.state().time);
-            let is_end = (self.steps.state().time - time).abs() <= near;
-            if !is_end {
-                let (point, moved) = self
-                    .part(&last, (time - before.time) / (self.steps.state().time - before.time))
-                    .map_err(failed)?;
-                inside.outputs.push(self.at(before.step, time, point, moved.columns));
-            }
-        }
-        for event in found {
-            let theta = (event.state.time - before.time) / (self.steps.state().time - before.time);
-            inside.events.push(self.event(&last, &scales, event, theta).map_err(failed)?);
+        let at_end = asked.iter().position(|(step, _)| *step == end.step).unwrap_or(asked.len());
+        for &(step, time) in &asked[..at_end] {
+            let (point, moved) = self.part(&last, theta(time)).map_err(failed)?;
+            inside.outputs.push(self.at(step, time, point, moved.columns));
         }
         let state = self.steps.state();
         let ended = Ended::of_run(&state.point, &last);
@@ -160,17 +155,17 @@ where
         self.sensitivity.undamped = self.steps.certificate().is_stiff();
         self.sensitivity.at_rest |=
             !<M as Linearised<Wide<D>>>::SMOOTH_AT_REST && *last.start.x == state.point;
-        let mut ends = self.outputs.clone();
-        let mut is_due = false;
-        while let Some(time) = ends.next(end) {
-            is_due = (state.time - time).abs() <= rounding(self.start, state.time);
-        }
-        self.outputs = ends;
         self.columns = next.columns;
-        if is_due && stop.is_none() {
-            inside.outputs.push(self.state());
+        for &(_, time) in &asked[at_end..] {
+            inside.outputs.push(TangentState { time, ..self.state() });
         }
+        inside.outputs.extend(stop);
         Ok(inside)
+    }
+
+    /// The steps and the times of the states that the run yields in place of the one at the end of the last step.
+    pub(super) fn asked(&self) -> Vec<(usize, f64)> {
+        self.steps.outputs().map(|state| (state.step, state.time)).collect()
     }
 
     /// The state at a fraction of the last step, by a step of that size, with its derivatives.

@@ -1,5 +1,7 @@
 //! The steps of a run, kept for the way back.
 
+use std::ops::Range;
+
 use metriplectic_dynamics::Differentiable;
 use metriplectic_dynamics::system::Point;
 
@@ -8,12 +10,12 @@ use super::part::{Ended, Part};
 use super::pieces::parts;
 use crate::run::certificate::Certificate;
 use crate::run::checkpoint::Checkpoint;
+use crate::run::ending::Ending;
 use crate::run::error::RunError;
 use crate::run::last_step::LastStep;
 use crate::run::method::Method as _;
-use crate::run::requests::{Outputs, rounding};
+use crate::run::rounding::rounding;
 use crate::run::schedule::Schedule;
-use crate::run::span_error::SpanError;
 use crate::run::state::State;
 use crate::run::steps::Steps;
 use crate::step::{Flow as _, Stepper};
@@ -23,18 +25,15 @@ pub(super) struct TapedStep<D: Differentiable> {
     /// The time of its start.
     pub(super) time: f64,
     pub(super) parts: Vec<Part<D>>,
-    /// The number of the recorded state at its end.
-    pub(super) state: Option<usize>,
-    /// Recorded states inside it, and the steps to them.
-    pub(super) outputs: Vec<(usize, Vec<Part<D>>)>,
+    /// The steps up to its end, and the latest time that is one of its end.
+    pub(super) end: (usize, f64),
+    /// The steps to the recorded states inside it.
+    pub(super) outputs: Vec<Vec<Part<D>>>,
 }
 
 /// The start of a row of steps.
 pub(super) struct Segment {
     checkpoint: Checkpoint,
-    outputs: Outputs,
-    /// Recorded states so far.
-    count: usize,
     step: usize,
 }
 
@@ -42,26 +41,26 @@ pub(super) struct Segment {
 pub(super) struct Tape<D: Differentiable> {
     pub(super) states: Vec<State<D::Manifold>>,
     pub(super) certificate: Certificate,
+    pub(super) ending: Ending,
+    /// The schedule, for the outputs of steps that are taken again.
+    schedule: Schedule,
     pub(super) segments: Vec<Segment>,
     pub(super) steps: Vec<TapedStep<D>>,
 }
 
-/// A run on its way, with its outputs.
+/// A run on its way.
 struct Recorder<'a, D: Differentiable, M: Stepper<D>> {
     steps: Steps<'a, D, M>,
-    outputs: Outputs,
+    /// The time at which it started.
     start: f64,
-    /// Recorded states so far.
-    count: usize,
 }
 
-/// A step with the states that were recorded in it.
+/// A step with the states that the run yields in place of the one at its end.
 type Recorded<D> = (TapedStep<D>, Vec<State<<D as metriplectic_dynamics::Metriplectic>::Manifold>>);
 
 impl<D: Differentiable, M: Stepper<D>> Recorder<'_, D, M> {
     fn segment(&self) -> Segment {
-        let (checkpoint, step) = (self.steps.checkpoint(), self.steps.state().step);
-        Segment { checkpoint, outputs: self.outputs.clone(), count: self.count, step }
+        Segment { checkpoint: self.steps.checkpoint(), step: self.steps.state().step }
     }
 
     /// Takes one step; `None` if the run has ended before it.
@@ -69,35 +68,30 @@ impl<D: Differentiable, M: Stepper<D>> Recorder<'_, D, M> {
         let scales = self.steps.scales();
         let before = self.steps.state().clone();
         self.steps.advance()?;
-        if self.steps.state().step == before.step {
+        let end = self.steps.state();
+        if end.step == before.step {
             return Ok(None);
         }
         let failed = |cause| TangentError::NotLinearised { time: before.time, cause };
         let (flow, method) = (self.steps.flow(), self.steps.method());
         let last = self.steps.last_step(&scales);
-        let end = self.steps.state();
         let ended = Ended::of_run(&end.point, &last);
         let parts = parts(method, &last.start, &ended).map_err(failed)?;
-        let mut step = TapedStep { time: before.time, parts, state: None, outputs: Vec::new() };
+        let until = (end.step, end.time + rounding(self.start, end.time));
+        let mut step = TapedStep { time: before.time, parts, end: until, outputs: Vec::new() };
         let mut states = Vec::new();
-        let mut is_due = self.outputs.is_empty();
-        while let Some(time) = self.outputs.next(end.time) {
-            if (end.time - time).abs() <= rounding(self.start, end.time) {
-                is_due = true;
+        for asked in self.steps.outputs() {
+            if asked.step == end.step {
+                states.push(asked.clone());
                 continue;
             }
-            let theta = (time - before.time) / (end.time - before.time);
+            let theta = (asked.time - before.time) / (end.time - before.time);
             let (point, parts) = inside(method, &last, theta).map_err(failed)?;
-            step.outputs.push((self.count + states.len(), parts));
+            step.outputs.push(parts);
             let laws = flow.laws(&point);
             let (energy, entropy) = (laws.energy, laws.entropy);
-            states.push(State { step: before.step, time, point, energy, entropy });
+            states.push(State { point, energy, entropy, ..*asked });
         }
-        if is_due {
-            step.state = Some(self.count + states.len());
-            states.push(end.clone());
-        }
-        self.count += states.len();
         Ok(Some((step, states)))
     }
 }
@@ -119,7 +113,7 @@ impl<D: Differentiable> Tape<D> {
     pub(super) fn record<M: Stepper<D>>(
         method: M,
         system: &D,
-        (x0, mut schedule): (Point<D>, Schedule),
+        (x0, schedule): (Point<D>, Schedule),
         most: usize,
     ) -> Result<Self, TangentError<D::Manifold>> {
         if !schedule.watch.events.is_empty() {
@@ -128,40 +122,41 @@ impl<D: Differentiable> Tape<D> {
         if !schedule.corners.is_empty() {
             return Err(TangentError::Broken { what: "corners" });
         }
-        let (start, end) = (schedule.start, schedule.end());
-        schedule.watch.check([start, end], start).map_err(RunError::from)?;
-        let (times, interval) = (schedule.watch.times.take(), schedule.watch.interval.take());
-        let outputs = Outputs::after(start, start, times, interval);
-        let steps = method.steps(system, x0, schedule)?;
-        if steps.is_endless() {
-            return Err(RunError::from(SpanError::Endless).into());
-        }
-        let mut states = vec![steps.state().clone()];
-        let mut recorder = Recorder { steps, outputs, start, count: 1 };
+        let steps = method.steps(system, x0, schedule.clone())?;
+        let mut recording =
+            steps.recording(steps.state().clone()).map_err(RunError::<D::Manifold>::from)?;
+        let mut recorder = Recorder { steps, start: schedule.start };
         let (mut segments, mut taken) = (vec![recorder.segment()], Vec::new());
         while recorder.steps.ending().is_none() {
             if taken.len() == most {
                 taken.clear();
                 segments.push(recorder.segment());
             }
-            if let Some((step, here)) = recorder.advance()? {
-                taken.push(step);
-                states.extend(here);
+            let Some((step, instead)) = recorder.advance()? else { continue };
+            taken.push(step);
+            if recorder.steps.replaces_steps() {
+                recording.states.extend(instead);
+            } else {
+                let (end, over) = (recorder.steps.state(), recorder.steps.ending().is_some());
+                recording.end_of_step(end.step, [over, false], || end.clone());
             }
         }
         let certificate = recorder.steps.certificate().clone();
-        Ok(Self { states, certificate, segments, steps: taken })
+        let ending = recorder.steps.ending().unwrap_or(Ending::Stopped);
+        let states = recording.states;
+        Ok(Self { states, certificate, ending, schedule, segments, steps: taken })
     }
 
     /// Takes the steps between two segments again, bit for bit.
     pub(super) fn again<M: Stepper<D>>(
+        &self,
         method: M,
         system: &D,
         [segment, next]: [&Segment; 2],
     ) -> Result<Vec<TapedStep<D>>, TangentError<D::Manifold>> {
         let steps = method.resume(system, &segment.checkpoint)?;
-        let (outputs, count) = (segment.outputs.clone(), segment.count);
-        let mut recorder = Recorder { start: outputs.start(), steps, outputs, count };
+        let steps = steps.watching(self.schedule.clone()).map_err(RunError::from)?;
+        let mut recorder = Recorder { steps, start: self.schedule.start };
         let mut taken = Vec::with_capacity(next.step - segment.step);
         while recorder.steps.state().step < next.step {
             match recorder.advance()? {
@@ -170,5 +165,14 @@ impl<D: Differentiable> Tape<D> {
             }
         }
         Ok(taken)
+    }
+
+    /// The numbers of the recorded states inside a step, and of those at its end.
+    pub(super) fn recorded(&self, step: &TapedStep<D>) -> [Range<usize>; 2] {
+        let (number, latest) = step.end;
+        let end = self.states.partition_point(|state| state.step < number);
+        let is_end = |state: &&State<D::Manifold>| state.step == number && state.time <= latest;
+        let at_end = self.states[end..].iter().take_while(is_end).count();
+        [end - step.outputs.len()..end, end..end + at_end]
     }
 }

@@ -5,14 +5,19 @@ use metriplectic_dynamics::{ModelError, SecondLaw};
 use metriplectic_integrators::explicit::{Combination, StageFlow as _, Target};
 use metriplectic_integrators::open::OpenState;
 use metriplectic_integrators::{
-    EventExchange, Flow, FlowError, Laws, LedgerSummary, Recheck, StepError, Vector as _,
+    EventExchange, Flow, FlowError, Laws, LedgerErrors, LedgerSummary, Recheck, Scales, StartError,
+    StepError, Vector as _,
 };
 use metriplectic_manifolds::PointError;
 
+use super::parts::per_energy;
 use super::vector::OpenSiteVector;
 use super::{OpenLattice, OpenSites, StateOf};
 use crate::flow::against_simpson;
 use crate::model::Model;
+
+/// The fraction of the energy to which the errors of work and heat are relative as long as less has flowed.
+const LITTLE: f64 = 1e-3;
 
 impl<P: Model> Flow for OpenLattice<P> {
     type Space = OpenSites<P::Manifold>;
@@ -35,10 +40,10 @@ impl<P: Model> Flow for OpenLattice<P> {
             + 4.0 * f64::EPSILON * of_baths[0].max(of_baths[1])
     }
 
-    /// The larger one of both ends: what flows in may find a state without energy.
     fn energy_sizes(&self, ends: [&StateOf<P>; 2]) -> [f64; 2] {
-        let [start, end] = ends.map(|x| self.term_sizes(x).energy);
-        [start.max(end); 2]
+        // What flows in may find a state without energy.
+        let flowed = ends[1].ledger.flowed(&ends[0].ledger);
+        ends.map(|x| self.term_sizes(x).energy + flowed)
     }
 
     fn rates(&self, x: &StateOf<P>, d: &OpenSiteVector) -> Option<OpenSiteVector> {
@@ -48,7 +53,9 @@ impl<P: Model> Flow for OpenLattice<P> {
     }
 
     fn sizes(&self, x: &StateOf<P>) -> OpenSiteVector {
-        OpenSiteVector::new(self.lattice.sizes(&x.x), vec![0.0; self.beside(x, x).len()])
+        let mut beside = vec![0.0];
+        beside.extend(x.ledger.entry_sizes());
+        OpenSiteVector::new(self.lattice.sizes(&x.x), beside)
     }
 
     fn moved(&self, x: &StateOf<P>, d: &OpenSiteVector) -> StateOf<P> {
@@ -88,8 +95,8 @@ impl<P: Model> Flow for OpenLattice<P> {
         Ok(OpenState { x, time: rest[0], ledger: self.empty.with_numbers(&rest[1..]) })
     }
 
-    fn begin(&self, x: StateOf<P>, time: f64) -> StateOf<P> {
-        OpenState { time, ..self.start(x.x) }
+    fn begin(&self, x: StateOf<P>, time: f64) -> Result<StateOf<P>, StartError> {
+        x.begun(time, &self.empty)
     }
 
     fn clocked(&self, x: &StateOf<P>, time: f64) -> Option<StateOf<P>> {
@@ -111,6 +118,31 @@ impl<P: Model> Flow for OpenLattice<P> {
 
     fn ledger(&self, x: &StateOf<P>) -> Option<LedgerSummary> {
         Some(x.ledger.summarised(None, self.entropy_at(x)))
+    }
+
+    fn has_ledger(&self) -> bool {
+        true
+    }
+
+    fn ledger_errors(&self, errors: &OpenSiteVector) -> Option<LedgerErrors> {
+        Some(self.empty.errors_by_kind(&errors.beside[1..]))
+    }
+
+    fn with_ledger_sizes(
+        &self,
+        x: &StateOf<P>,
+        mut scales: Scales<OpenSiteVector>,
+    ) -> Scales<OpenSiteVector> {
+        let energy = LITTLE * self.lattice.term_sizes(&x.x).energy;
+        let mut known = vec![0.0];
+        for part in &self.parts {
+            known.push(energy);
+            known.extend(part.temperature(x.time).map(|t| energy * per_energy(t)));
+        }
+        for (size, known) in scales.sizes.beside.iter_mut().zip(known) {
+            *size = size.max(known);
+        }
+        scales
     }
 
     fn inspect(&self, ends: [&StateOf<P>; 2], _: bool) -> Result<(), StepError> {

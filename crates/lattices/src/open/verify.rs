@@ -39,7 +39,9 @@ impl Slope {
     }
 
     fn size(self) -> f64 {
-        if self.sum == 0.0 { 0.0 } else { self.sum.abs() / self.terms }
+        // Numbers without digits are zeros.
+        let least = f64::MIN_POSITIVE / f64::EPSILON;
+        if self.sum.abs() <= least { 0.0 } else { self.sum.abs() / self.terms }
     }
 }
 

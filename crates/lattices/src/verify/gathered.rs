@@ -43,7 +43,7 @@ impl<P: Model> Lattice<P> {
 impl<P: Model> Trial<'_, P> {
     /// Compares the derivatives of `φ` at these bonds, and those of `g` at these sites, with differences of values.
     pub(super) fn gathered_derivatives<G: Gather<P::Manifold>>(
-        &mut self,
+        &self,
         what: &'static str,
         gather: &G,
         (sites, bonds): (impl Iterator<Item = usize>, impl Iterator<Item = usize>),

@@ -5,6 +5,8 @@ use serde::{Deserialize, Serialize};
 /// The subject of a table of the report, in the order of the page of guarantees.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub enum Guarantee {
+    /// Every method on every kind of flow.
+    Kinds,
     /// The first law.
     Energy,
     /// The second law.
@@ -61,7 +63,8 @@ pub(super) struct Facts {
 
 impl Guarantee {
     /// All of them.
-    pub(super) const ALL: [Self; 21] = [
+    pub(super) const ALL: [Self; 22] = [
+        Self::Kinds,
         Self::Energy,
         Self::Entropy,
         Self::Invariants,
@@ -88,6 +91,11 @@ impl Guarantee {
     /// Its heading, its sentences and its figures.
     pub(super) const fn facts(self) -> Facts {
         let (heading, sentences, figures): (_, &[_], &[_]) = match self {
+            Self::Kinds => (
+                "Every method is right on every kind of flow, or says why not",
+                &["asserts every run of this table", "✓"],
+                &[],
+            ),
             Self::Energy => (
                 "Energy is constant to round-off",
                 &[

@@ -2,7 +2,7 @@
 
 use metriplectic_dynamics::{Metriplectic, SecondLaw};
 use metriplectic_fields::Space as _;
-use metriplectic_integrators::{Certificate, Method as _, Run, Scheme, Span};
+use metriplectic_integrators::{Certificate, Method as _, Scheme, Span};
 use metriplectic_manifolds::{Retraction, Riemannian as _, WeylMidpoint};
 
 use super::list::{canonical, closures, products};

@@ -22,6 +22,7 @@ const ONE_FALL: Certificate = Certificate {
     worst_iterations: 2,
     local_error: None,
     misjudged_size: None,
+    rest_in_time: None,
     limiting_sites: LimitingSites::new(None, None),
     checked_states: 5,
     verified_before: false,
@@ -29,11 +30,29 @@ const ONE_FALL: Certificate = Certificate {
     second_law: SecondLaw::Exact,
     friction: 0.0,
     exchange: None,
+    exchange_errors: None,
     jumps: Vec::new(),
+    unsure_events: Vec::new(),
+    events_at_start: Vec::new(),
     exchanged_in_jumps: Exchanged::NOTHING,
     noise: None,
     projected: false,
 };
+
+#[test]
+fn refused_steps_of_a_driven_run_ask_for_a_corner() {
+    let text = |steps: usize, rejected: usize, is_open: bool| {
+        let (work, heat) = (Vec::new(), Vec::new());
+        let ledger = LedgerSummary { parameter: Some(0.5), work, heat, system_entropy: 0.0 };
+        let exchange = is_open.then_some(ledger);
+        Certificate { steps, rejected, exchange, ..ONE_FALL }.to_string()
+    };
+    assert!(text(11, 11, true).contains("11 rejected; if what drives it has a corner"));
+    for [steps, rejected] in [[40, 11], [2, 2]] {
+        assert!(!text(steps, rejected, true).contains("corner"));
+    }
+    assert!(text(20, 13, true).contains("corner") && !text(11, 11, false).contains("corner"));
+}
 
 #[test]
 fn one_is_no_plural() {

@@ -5,13 +5,14 @@ use std::fmt;
 use metriplectic_dynamics::SecondLaw;
 
 use super::{
-    Certificate, InvariantBalance, MisjudgedSize, ProjectedSteps, StageBalance, UNRESOLVED,
+    Certificate, InvariantBalance, MisjudgedSize, ProjectedSteps, RestInTime, StageBalance,
+    UNRESOLVED, UnsureEvent,
 };
 use crate::round_off::bound::of_a_law;
 use crate::run::jump::JumpBalance;
 use crate::step::digits::{Digits, counted};
 use crate::step::evidence::RESOLVED;
-use crate::step::{Effort, LedgerSummary, LimitingSites, NoiseSummary};
+use crate::step::{Effort, LedgerErrors, LedgerSummary, LimitingSites, NoiseSummary};
 
 /// The local error from which on a hundred steps may be off by what a picture shows: about 27 steps of the midpoint rule
 /// in a turn.
@@ -42,6 +43,7 @@ impl fmt::Display for Certificate {
         }
         self.exchanged(f)?;
         self.jumped(f)?;
+        self.looked(f)?;
         match self.second_law {
             SecondLaw::NoEntropy => writeln!(f, "second law:  no entropy"),
             _ if let Some(noise) = &self.noise => self.fluctuation(noise, f),
@@ -95,7 +97,18 @@ impl fmt::Display for Certificate {
             {
                 write!(f, "; the largest error is at site {site}")?;
             }
+            if self.exchange.is_some() && self.refuses_often() {
+                write!(f, "; if what drives it has a corner, name its time by `.corners([..])`")?;
+            }
             writeln!(f)?;
+        }
+        if let Some(RestInTime { steps, time, longest }) = self.rest_in_time {
+            let steps = counted(steps, "step", "steps");
+            writeln!(
+                f,
+                "at rest:     nothing changed the motion in {steps} of up to {longest:.1e}, a time of {time:.1e}; a shorter pulse may \
+                 lie between the times that were looked at: name its `.corners`, or a `.largest_step`"
+            )?;
         }
         self.accuracy(f)?;
         if let Some(MisjudgedSize { direction, judged, reached }) = self.misjudged_size {
@@ -183,6 +196,19 @@ impl Certificate {
         if !heat.is_empty() {
             writeln!(f, "heat:        {}", named(heat).join(", "))?;
         }
+        let Some(LedgerErrors { work: of_work, heat: of_heat, entropy }) = self.exchange_errors
+        else {
+            return Ok(());
+        };
+        let errors = [("work", of_work), ("heat", of_heat), ("the entropy of a bath", entropy)];
+        let known: Vec<String> = errors
+            .iter()
+            .filter(|(_, error)| *error != 0.0)
+            .map(|(kind, error)| format!("{kind} {error:.1e}"))
+            .collect();
+        if !known.is_empty() {
+            writeln!(f, "ledger:      estimated errors: {}", known.join(", "))?;
+        }
         Ok(())
     }
 
@@ -197,6 +223,26 @@ impl Certificate {
                 write!(f, ", ΔS ≥ {least_rise:.1e}")?;
             }
             writeln!(f)?;
+        }
+        Ok(())
+    }
+
+    /// Says which events were looked for where their function tells nothing.
+    fn looked(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for UnsureEvent { name, steps, first } in &self.unsure_events {
+            let steps = counted(*steps, "step", "steps");
+            writeln!(
+                f,
+                "events:      {name} varies faster than looks at it tell, in {steps}, first at t = {}; some may be missing, \
+                 ask for `.resolution(dt)`",
+                Digits(*first)
+            )?;
+        }
+        for name in &self.events_at_start {
+            writeln!(
+                f,
+                "events:      {name} is zero at the start, and the state does not jump there"
+            )?;
         }
         Ok(())
     }

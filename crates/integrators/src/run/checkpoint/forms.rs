@@ -6,12 +6,13 @@ use metriplectic_dynamics::invariants::Kind;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use crate::run::certificate::{
-    Certificate, InvariantBalance, MisjudgedSize, ProjectedSteps, StageBalance,
+    Certificate, InvariantBalance, MisjudgedSize, ProjectedSteps, RestInTime, StageBalance,
+    UnsureEvent,
 };
 use crate::run::ending::Ending;
 use crate::run::jump::{Exchanged, JumpBalance};
 use crate::step::exact::{self, ExactForm};
-use crate::step::{Effort, LedgerSummary, LimitingSites, NoiseSummary, Promises};
+use crate::step::{Effort, LedgerErrors, LedgerSummary, LimitingSites, NoiseSummary, Promises};
 
 #[derive(Serialize, Deserialize)]
 #[serde(remote = "Certificate", deny_unknown_fields)]
@@ -51,6 +52,8 @@ struct CertificateForm {
     local_error: Option<f64>,
     #[serde(with = "exact")]
     misjudged_size: Option<MisjudgedSize>,
+    #[serde(default, with = "exact")]
+    rest_in_time: Option<RestInTime>,
     limiting_sites: LimitingSites,
     checked_states: usize,
     #[serde(default)]
@@ -63,8 +66,14 @@ struct CertificateForm {
     // It is that of the point.
     #[serde(skip)]
     exchange: Option<LedgerSummary>,
+    #[serde(default, with = "exact")]
+    exchange_errors: Option<LedgerErrors>,
     #[serde(with = "exact")]
     jumps: Vec<JumpBalance>,
+    #[serde(with = "exact", default)]
+    unsure_events: Vec<UnsureEvent>,
+    #[serde(default)]
+    events_at_start: Vec<String>,
     #[serde(with = "exact")]
     exchanged_in_jumps: Exchanged,
     // It is that of the method.
@@ -100,6 +109,15 @@ struct JumpBalanceForm {
 }
 
 #[derive(Serialize, Deserialize)]
+#[serde(remote = "UnsureEvent")]
+struct UnsureEventForm {
+    name: String,
+    steps: usize,
+    #[serde(with = "exact")]
+    first: f64,
+}
+
+#[derive(Serialize, Deserialize)]
 #[serde(remote = "Exchanged")]
 struct ExchangedForm {
     #[serde(with = "exact")]
@@ -118,6 +136,18 @@ struct StageBalanceForm {
 }
 
 #[derive(Serialize, Deserialize)]
+#[serde(remote = "LedgerErrors")]
+#[non_exhaustive]
+struct LedgerErrorsForm {
+    #[serde(with = "exact")]
+    work: f64,
+    #[serde(with = "exact")]
+    heat: f64,
+    #[serde(with = "exact")]
+    entropy: f64,
+}
+
+#[derive(Serialize, Deserialize)]
 #[serde(remote = "MisjudgedSize")]
 struct MisjudgedSizeForm {
     direction: usize,
@@ -125,6 +155,16 @@ struct MisjudgedSizeForm {
     judged: f64,
     #[serde(with = "exact")]
     reached: f64,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(remote = "RestInTime")]
+struct RestInTimeForm {
+    steps: usize,
+    #[serde(with = "exact")]
+    time: f64,
+    #[serde(with = "exact")]
+    longest: f64,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -178,8 +218,11 @@ exact_form! {
     CertificateForm of Certificate,
     InvariantBalanceForm of InvariantBalance,
     JumpBalanceForm of JumpBalance,
+    UnsureEventForm of UnsureEvent,
     ExchangedForm of Exchanged,
     StageBalanceForm of StageBalance,
+    LedgerErrorsForm of LedgerErrors,
     MisjudgedSizeForm of MisjudgedSize,
+    RestInTimeForm of RestInTime,
     EndingForm of Ending
 }

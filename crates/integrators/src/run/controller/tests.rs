@@ -1,5 +1,5 @@
 use super::*;
-use crate::{Run, Span};
+use crate::{Method as _, Scheme, Span};
 use metriplectic_dynamics::{AreaForm, Metriplectic, Nambu, System, system::Point};
 use metriplectic_fields::{Column as _, Real, Space as _};
 use metriplectic_manifolds::{Exponential, Retraction, Rotations, Sphere, WeylMidpoint};
@@ -10,10 +10,11 @@ use num_dual::DualNum;
 fn off<Y, R>(retraction: R, system: &Y, x: &Point<Y>, h: f64) -> f64
 where
     Y: Metriplectic,
-    R: Run + Retraction<Y::Manifold, Y::Metric>,
+    R: Retraction<Y::Manifold, Y::Metric>,
     WeylMidpoint: Retraction<Y::Manifold, Y::Metric>,
 {
-    let end = retraction.run(system, x.clone(), Span::steps(h, 1)).unwrap().last().point.clone();
+    let one = Scheme::new(retraction).run(system, x.clone(), Span::steps(h, 1)).unwrap();
+    let end = one.last().point.clone();
     let fine = WeylMidpoint.run(system, x.clone(), Span::steps(h / 200.0, 200)).unwrap();
     let at = |y| Y::Manifold::coordinates(x, y);
     let exact = at(&end) - at(&fine.last().point);

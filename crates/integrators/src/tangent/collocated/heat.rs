@@ -12,7 +12,7 @@ use num_dual::{Dual64, DualNum as _};
 use super::super::duals::{Dual, magnitude};
 use super::super::error::Unlinearised;
 use super::moved::{Around, Direction, Moved, MovedStage};
-use crate::collocation::HeatStart;
+use crate::collocation::{HeatStart, fraction, largest_entries};
 use crate::step::{CountOf, Dim};
 
 /// The covectors of all laws at a stage.
@@ -59,8 +59,8 @@ fn applied<Y: Metriplectic>([t, dt]: &[Matrix<Y::Manifold>; 2], v: &Dual<Y>) -> 
 }
 
 impl<Y: Metriplectic<Manifold: MovingBase>> Heating<'_, Y> {
-    /// The covector by which a stage is warmed, as a vector, and the fraction of the heat that goes there.
-    fn sharp(&self, stage: &MovedStage<Y>, w: &AtStage<Y>) -> Result<(Dual<Y>, f64), Unlinearised> {
+    /// The covector by which a stage is warmed, as a vector.
+    fn sharp(&self, stage: &MovedStage<Y>, w: &AtStage<Y>) -> Result<Dual<Y>, Unlinearised> {
         let metric = self.around.system.metric();
         let g = metric.at(&stage.place).map_err(|_| Unlinearised::Singular)?;
         let mut normals = Orthogonal::<Dim<Y>, Dual64>::default();
@@ -70,15 +70,22 @@ impl<Y: Metriplectic<Manifold: MovingBase>> Heating<'_, Y> {
         for (_, l) in w.invariants.as_ref().iter().flatten() {
             normals.push(&g, l);
         }
-        let sharp = g.sharp(&normals.project_covector(0, &w.entropy));
-        let terms = Y::Manifold::pairing_size(&real::<Y>(&w.energy), &real::<Y>(&sharp));
-        let alignment = if terms > 0.0 { w.energy.dot(&sharp).re / terms } else { 0.0 };
-        let fraction = self.start.fraction(alignment).ok_or(Unlinearised::Branch)?;
+        Ok(g.sharp(&normals.project_covector(0, &w.entropy)))
+    }
+
+    /// The fraction of the heat that goes in these directions.
+    fn fraction(&self, sharp: &[Dual<Y>], w: &[AtStage<Y>]) -> Result<f64, Unlinearised> {
+        let energies: Vec<_> = w.iter().map(|w| real::<Y>(&w.energy)).collect();
+        let largest = largest_entries(&energies);
+        let of_stages = sharp.iter().zip(&energies).map(|(sharp, energy)| {
+            let sharp = real::<Y>(sharp);
+            (energy.dot(&sharp), Y::Manifold::pairing_size(&largest, &sharp))
+        });
+        let (warmed, units): (Vec<_>, Vec<_>) = of_stages.unzip();
+        let fraction = fraction(&warmed, &units);
         // Between the two the fraction follows sizes, which have no derivative.
-        if fraction > 0.0 && fraction < 1.0 {
-            return Err(Unlinearised::Branch);
-        }
-        Ok((sharp, fraction))
+        let follows = fraction > 0.0 && fraction < 1.0;
+        if follows { Err(Unlinearised::Branch) } else { Ok(fraction) }
     }
 
     /// Whether friction vanishes at every stage.
@@ -94,12 +101,9 @@ impl<Y: Metriplectic<Manifold: MovingBase>> Heating<'_, Y> {
         let Self { around, moved, flat, .. } = self;
         let (weights, h) = (&around.root.tableau.weights, moved.size);
         let is_reversible = self.is_reversible(w);
-        let (mut sharp, mut directed) = (Vec::new(), 1.0_f64);
-        for (stage, w) in moved.stages.iter().zip(w.iter()) {
-            let (vector, fraction) = self.sharp(stage, w)?;
-            directed = directed.min(fraction);
-            sharp.push(vector);
-        }
+        let sharp = moved.stages.iter().zip(w.iter()).map(|(stage, w)| self.sharp(stage, w));
+        let sharp = sharp.collect::<Result<Vec<_>, _>>()?;
+        let directed = self.fraction(&sharp, w)?;
         let lost =
             if is_reversible || directed == 0.0 { Dual64::from(0.0) } else { self.transient(w)? };
         let [delta, mut gain] = self.lost;

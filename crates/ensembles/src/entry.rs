@@ -23,7 +23,7 @@ pub(crate) enum Outcome {
     PassedOver(usize),
 }
 
-/// What became of a row.
+/// The outcome of a row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum RowStatus {

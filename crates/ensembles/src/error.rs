@@ -156,7 +156,7 @@ pub enum JournalError {
         path: PathBuf,
         /// The row.
         row: usize,
-        /// Whether the file was changed; if not, it belongs to another plan.
+        /// True if the file was changed; if not, it belongs to another plan.
         changed: bool,
     },
     /// There is no journal to merge.

@@ -34,9 +34,9 @@ pub(crate) struct Execution<'r, 'a, M: StateSpace, F> {
 
 /// The rows that are left.
 struct Todo {
-    /// Those that any thread may run.
+    /// The rows that any thread may run.
     rows: Vec<usize>,
-    /// Those that are run one at a time, after all others.
+    /// The rows that are run one at a time, after all others.
     alone: Vec<usize>,
 }
 

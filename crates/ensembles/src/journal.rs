@@ -38,7 +38,7 @@ pub(crate) struct Content {
     pub(crate) rows: Vec<Entry>,
     /// Lines that are no rows: torn or changed ones.
     pub(crate) damaged: usize,
-    /// Whether the file has just begun.
+    /// True if the file has just begun.
     pub(crate) new: bool,
     /// Whether the last line has its end.
     whole: bool,

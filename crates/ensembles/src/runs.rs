@@ -86,7 +86,7 @@ impl<'a, M: StateSpace, F> Runs<'a, M, F> {
     }
 
     /// Runs the rows of the journal that failed or were [passed over](crate::RowStatus::PassedOver) once more, after all others.
-    /// Those that were passed over come last and one at a time: if one of them ends the process again, it is the only one that the
+    /// Rows that were passed over come last and one at a time: if one of them ends the process again, it is the only one that the
     /// next start passes over.
     ///
     /// The journal keeps the last outcome of a row. Rows that are done are not run again.

@@ -206,7 +206,7 @@ impl<'a> TableRow<'a> {
         &self.entry.parameters
     }
 
-    /// What became of the row.
+    /// The outcome of the row.
     #[must_use]
     pub const fn status(&self) -> RowStatus {
         self.entry.status()

@@ -3,7 +3,7 @@
 use metriplectic_fields::Column;
 use metriplectic_integrators::noise::{Purpose, philox};
 
-/// What random directions are for, so that no two purposes share numbers.
+/// The purpose of random directions, so that no two purposes share numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u64)]
 pub(crate) enum Use {
@@ -19,7 +19,7 @@ pub(crate) enum Use {
     Rounding,
 }
 
-/// What a direction belongs to, by its number in the graph.
+/// The owner of a direction, by its number in the graph.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum At {
     /// The entries at a site.

@@ -1,4 +1,4 @@
-//! What the law of noise needs of a model, at a start and around it.
+//! Conditions of the law of noise on a model, at a start and around it.
 //!
 //! A condition may hold at the start by a symmetry, or because an entry is zero. So it is judged at points around it too, in
 //! units that do not vanish.

@@ -136,7 +136,7 @@ impl<F: Fluctuating<U>, U> Flow for Noisy<F, U> {
         self.flow().recheck(x, occasion)
     }
 
-    /// What the law needs may hold at the start alone, so it is judged at the end of the run too.
+    /// Conditions of the law may hold at the start alone, so they are judged at the end of the run too.
     fn reexamine(&self, x: &Element<F>, occasion: Recheck) -> Result<(), FlowError> {
         self.flow().reexamine(x, occasion)?;
         match occasion {

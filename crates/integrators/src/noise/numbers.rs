@@ -37,7 +37,7 @@ pub trait Numbers: Clone + Debug + Sync {
     fn name(&self) -> String;
 }
 
-/// What a number is for: a word of its counter, so that no two purposes share numbers.
+/// The purpose of a number: a word of its counter, so that no two purposes share numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 #[repr(u64)]

@@ -5,7 +5,7 @@
 const ROUNDS: u32 = 10;
 /// The factors of a round.
 const FACTORS: [u64; 2] = [0xD2E7_470E_E14C_6C93, 0xCA5A_8263_9512_1157];
-/// What is added to the words of the key from one round to the next.
+/// The numbers that are added to the words of the key from one round to the next.
 const WEYL: [u64; 2] = [0x9E37_79B9_7F4A_7C15, 0xBB67_AE85_84CA_A73B];
 
 /// Computes the four words that Philox4x64-10 makes of a key and a counter (Salmon, Moraes, Dror, Shaw 2011).

@@ -317,7 +317,7 @@ where
         Some(w.entropy.dot(&irreversible(&model, &model.metric_at(&centre), w).ok()?))
     }
 
-    /// What the energy changes by if each entry moves by its size: the size of work and heat, which no constant in the energy
+    /// The change of the energy if each entry moves by its size: the size of work and heat, which no constant in the energy
     /// changes. `None` where it has no value or does not change.
     fn energy_of_motion(&self, x: &StateOf<Y>, sizes: &Vector<Y::Manifold>) -> Option<f64> {
         let energy = |q| self.energy(x.time, &Y::Manifold::chart(&x.x, &q));
@@ -367,7 +367,7 @@ where
         self.ledger_errors(&OpenVector { booked, ..none })
     }
 
-    /// What a step has booked beside the frozen work at its start.
+    /// The numbers that a step has booked beside the frozen work at its start.
     pub(super) fn booked_between(&self, x: &StateOf<Y>, end: &StateOf<Y>) -> Booked<X::Entries> {
         let mut booked = end.ledger.since(&x.ledger);
         booked.parameter -= self.frozen_work([x.time, end.time], &x.x);

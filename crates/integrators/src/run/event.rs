@@ -681,7 +681,7 @@ struct Looks {
 }
 
 impl Looks {
-    /// Those of a step of this length.
+    /// The looks of a step of this length.
     fn new(resolution: Option<f64>, length: f64, of_time: bool, moves: bool) -> Self {
         #[allow(
             clippy::cast_possible_truncation,

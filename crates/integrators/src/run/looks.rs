@@ -7,7 +7,7 @@
 
 use crate::run::root::Sample;
 
-/// What is known of a function in a step.
+/// The values that are known of a function in a step.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Looked {
     /// The values, in the order of their places.
@@ -118,7 +118,7 @@ impl Range {
         (self.least, self.most) = (self.least.min(value), self.most.max(value));
     }
 
-    /// What a value may be off by.
+    /// The error that a value may have.
     fn allowed(&self) -> f64 {
         let rounding = ROUNDING * self.least.abs().max(self.most.abs());
         (AGREE * (self.most - self.least)).max(rounding)

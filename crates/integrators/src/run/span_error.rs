@@ -2,7 +2,7 @@
 
 use crate::step::type_names::short;
 
-/// What leads back in time.
+/// Advice on a run back in time.
 const fn backwards(is_backwards: bool) -> &'static str {
     if is_backwards {
         "; where nothing dissipates, a run with the energy −H leads back"

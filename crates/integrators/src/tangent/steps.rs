@@ -48,7 +48,7 @@ impl<D: Differentiable, M: Stepper<D>> fmt::Debug for TangentSteps<'_, D, M> {
     }
 }
 
-/// What a step has reached, and the events in it.
+/// The state that a step has reached, and the events in it.
 pub(super) struct Inside<D: Differentiable> {
     /// The states that the run yields in place of the one at the end of the step.
     pub(super) outputs: Vec<TangentState<D>>,

@@ -177,7 +177,10 @@ impl Derivatives {
 
     /// The rounding of a quotient, from that of the values and of the points.
     fn rounding(&self, i: usize, at: &Quotient) -> f64 {
-        f64::EPSILON * (64.0 * at.size + 4.0 * self.df[i].abs() * self.scale) / at.delta
+        // Values below the least one with digits are zeros.
+        let least = f64::MIN_POSITIVE / f64::EPSILON;
+        let of_values = f64::EPSILON * (64.0 * at.size + 4.0 * self.df[i].abs() * self.scale);
+        (of_values + least) / at.delta
     }
 
     /// The rounding of a derivative.

@@ -6,7 +6,7 @@
 //! at rest, has the rates to which the motion of the others leads.
 
 use crate::step::scales::larger;
-use crate::step::{Element, Flow, Vector as _};
+use crate::step::{Element, Flow, Scales, Vector as _};
 
 /// How often the rates are looked at along the time of a run.
 const LOOKS: u32 = 100;
@@ -55,7 +55,9 @@ pub(super) fn least_sizes<F: Flow + ?Sized>(
         });
         largest = joined;
     }
-    largest.map(|rate| LEAST * span * rate)
+    // Work and heat have the size of the energy to which the rates lead.
+    let reached = Scales { sizes: largest.map(|rate| span * rate), terms: zero };
+    flow.with_ledger_sizes(x, reached).sizes.map(|size| LEAST * size)
 }
 
 #[cfg(test)]

@@ -513,15 +513,6 @@ const NOT_YET: &[NotYet] = &[
         cells: |cell| cell.kind == Kind::Jump && cell.course == Course::Tolerance,
         shows: "off by",
     },
-    // With a clock and fast friction inside, the error is that of the tolerance and a little more.
-    NotYet {
-        cells: |cell| {
-            cell.kind == Kind::Clock
-                && cell.start == Start::Stiff
-                && cell.course == Course::Tolerance
-        },
-        shows: "off by",
-    },
     // Chebyshev's production may be negative in a step that is long for friction, and a path meets such a step.
     NotYet {
         cells: |cell| {

@@ -577,7 +577,7 @@ fn every_method_is_right_on_every_kind_of_flow_or_says_why_not() {
         println!("{kind:?}: {:.2?}", began.elapsed());
     }
     let entries = NOT_YET.iter().zip(stale);
-    for (entry, _) in entries.filter(|(entry, is_stale)| *is_stale) {
+    for (entry, _) in entries.filter(|(_, is_stale)| *is_stale) {
         wrong.push(format!("no cell shows \"{}\" any more: delete its entry", entry.shows));
     }
     println!("{cells} cells, off by {farthest:.2?} of what is allowed");

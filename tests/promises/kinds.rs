@@ -1,7 +1,7 @@
 //! The kinds of flows: a damped oscillator in any units, its surroundings, and a chain of three of them.
 
 use metriplectic::integrators::noise::Counter;
-use metriplectic::integrators::{Certificate, MethodError, Schedule, StateSpace};
+use metriplectic::integrators::{Certificate, MethodError, NotDamped, Schedule, StateSpace};
 use metriplectic::lattices::LatticeError;
 use metriplectic::prelude::*;
 
@@ -88,6 +88,7 @@ pub(crate) type Outcome = Result<Ran, (String, String)>;
 fn of_method(error: &MethodError) -> String {
     match error.downcast_ref::<NoiseError>() {
         Some(error) => format!("NoiseError::{}", variant(&format!("{error:?}"))),
+        None if error.downcast_ref::<NotDamped>().is_some() => "NotDamped".to_owned(),
         None => "MethodError".to_owned(),
     }
 }
@@ -117,9 +118,6 @@ fn name_of<M: StateSpace>(error: &RunError<M>) -> String {
     match error {
         RunError::Method(error) => of_method(error),
         RunError::Step { cause, .. } => match cause {
-            StepError::Method { error, .. } if error.to_string().contains("`Radau` damps") => {
-                "NotDamped".to_owned()
-            }
             StepError::Method { error, .. } => of_method(error),
             StepError::StiffFriction { .. } => step("StiffFriction"),
             StepError::NotConverged { .. } => step("NotConverged"),

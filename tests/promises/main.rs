@@ -492,11 +492,6 @@ struct NotYet {
 
 /// The cells that are wrong today. A cell may be right nevertheless; an entry that no cell shows is to be deleted.
 const NOT_YET: &[NotYet] = &[
-    // Verification takes 1 for the size of a state whose entries are zero.
-    NotYet {
-        cells: |cell| cell.unit < 1.0 && cell.start == Start::Zero && cell.kind.has_entropy(),
-        shows: "ModelError",
-    },
     // A fall of the entropy by its round-off, from rest.
     NotYet {
         cells: |cell| is_chebyshev(cell) && cell.kind == Kind::Port && cell.start == Start::Rest,
@@ -507,12 +502,6 @@ const NOT_YET: &[NotYet] = &[
         cells: |cell| cell.kind == Kind::Clock && matches!(cell.method, Every::Implicit(_)),
         shows: "StepError::TooSmall",
     },
-    // A state inside a step has the entropy of a cubic where the production vanishes in the step, and steps with fast friction
-    // have outputs that follow no tolerance.
-    NotYet {
-        cells: |cell| cell.kind == Kind::Jump && cell.course == Course::Tolerance,
-        shows: "off by",
-    },
     // Chebyshev's production may be negative in a step that is long for friction, and a path meets such a step.
     NotYet {
         cells: |cell| {
@@ -522,15 +511,6 @@ const NOT_YET: &[NotYet] = &[
                 && cell.course == Course::Fixed
         },
         shows: "StepError::EntropyFalls",
-    },
-    // Schemes of order 1 say that their order is 2.
-    NotYet {
-        cells: |cell| cell.kind.is_noisy() && order(cell.method) == 1,
-        shows: "it runs: NoiseError::OrderTooLow",
-    },
-    NotYet {
-        cells: |cell| cell.kind.is_noisy() && order(cell.method) == 1,
-        shows: "NoiseError::FrictionUnresolved",
     },
 ];
 

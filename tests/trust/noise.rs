@@ -1,4 +1,4 @@
-//! A retraction is a method wherever one is asked for: in samplers, tangents and adjoints.
+//! Noise from the zero of an energy; and a retraction is a method wherever one is asked for: in samplers, tangents and adjoints.
 
 use metriplectic::prelude::*;
 
@@ -41,4 +41,63 @@ fn a_retraction_is_its_scheme() {
     steps.advance().unwrap();
     let resumed = scheme.resume(&system, &steps.checkpoint()).unwrap().run().unwrap();
     assert_eq!(resumed.last().point, WeylMidpoint.run(&system, start, span).unwrap().last().point);
+}
+
+/// Runs paths of a system in an isotropic bath at `T = 1` with rate ½ from a state at which the energy vanishes, and compares the
+/// mean of `H`. With `H = ½|p|²` in `n` damped directions it is `½ n (1 − e^{−t})`.
+macro_rules! from_the_zero {
+    ($name:literal, $space:expr, $zero:expr, $energy:expr, $directions:expr) => {{
+        const PATHS: u64 = 200;
+        let system = System::on($space)
+            .energy($energy)
+            .bath("air", Bath::at(1.0).isotropic(0.5))
+            .noise(Boltzmann(1.0))
+            .build()
+            .unwrap();
+        let start = system.flow().start($zero);
+        let exact = 0.5 * $directions * (1.0 - (-2.0_f64).exp());
+        // The variance of the energy of n degrees of freedom is 2/n of the square of its mean.
+        let error = exact * (2.0 / $directions / PATHS as f64).sqrt();
+        let mean = |method: &str, end: &dyn Fn(u64) -> Result<(f64, bool), String>| {
+            let mut sum = 0.0;
+            for path in 0..PATHS {
+                let (energy, balances) =
+                    end(path).unwrap_or_else(|e| panic!("{}, {method}, path {path}: {e}", $name));
+                assert!(balances, "{}, {method}, path {path}", $name);
+                sum += energy / PATHS as f64;
+            }
+            let off = (sum - exact) / error;
+            println!(
+                "{}, {method}: H = {sum:.3} of {exact:.3}, {off:.1} errors of the mean",
+                $name
+            );
+            assert!(off.abs() <= 4.0, "{}, {method}: {sum} instead of {exact}", $name);
+        };
+        let span = Span::steps(0.05, 40);
+        macro_rules! by {
+            ($method:expr) => {
+                mean(stringify!($method), &|path| {
+                    let method = NinomiyaVictoir($method).seed(8).path(path);
+                    let run =
+                        method.run(&system, start.clone(), span).map_err(|e| e.to_string())?;
+                    Ok((
+                        system.flow().energy_at(&run.last().point),
+                        run.certificate().keeps_energy(),
+                    ))
+                });
+            };
+        }
+        by!(DormandPrince5);
+        by!(Gauss::<2>);
+    }};
+}
+
+#[test]
+fn noise_moves_a_state_from_the_zero_of_its_energy() {
+    let half = |p: &Vector2<Real>| p.norm_squared() * 0.5;
+    from_the_zero!("trap", Euclidean::<2>, vector![0.0, 0.0], half, 2.0);
+    let free = |p: &Vector2<Real>| p.y * p.y * 0.5;
+    from_the_zero!("free particle", Euclidean::<2>, vector![0.0, 0.0], free, 1.0);
+    let ball = |p: &Vector3<Real>| p.norm_squared() * 0.5;
+    from_the_zero!("ball", LieDual::so3(), vector![0.0, 0.0, 0.0], ball, 3.0);
 }

@@ -60,7 +60,7 @@ pub use newton::{Equation, Iterate, Linearised, Newton, Root, Rounding};
 pub use noise::{
     Counter, NinomiyaVictoir, NoiseBuilder, NoiseError, Noisy, RandomFlow, Sampler, Sampling,
 };
-pub use open::{OpenBuilder, OpenSpace, OpenState, OpenSystem};
+pub use open::{NotDamped, OpenBuilder, OpenSpace, OpenState, OpenSystem};
 pub use round_off::stable_gradient::StableGradient;
 pub use run::certificate::{
     Certificate, InvariantBalance, MisjudgedSize, ProjectedSteps, RestInTime, StageBalance,

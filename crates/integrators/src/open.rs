@@ -48,6 +48,7 @@ mod view;
 pub use builder::{OpenBuilder, Opened, Opening};
 pub use clock::{AtTime, Clock, InTime, Still};
 pub use projection::OpenGradients;
+pub use stages::NotDamped;
 pub use state::{Booked, Ledger, OpenSpace, OpenState};
 pub use system::OpenSystem;
 pub use vector::OpenVector;

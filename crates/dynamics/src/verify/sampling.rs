@@ -35,7 +35,8 @@ impl<M: Manifold> CoordinateScales<M> {
     ///
     /// The entropy takes the place of an energy that does not depend on the entry. The formula has the unit of
     /// `x_i` in every unit of `H`. If neither field depends on the entry, its size is the largest of the other
-    /// sizes. If every entry is zero, its size is 1, because nothing in the model tells a unit.
+    /// sizes. If every entry is zero, no entry tells `E`: it is then the least change over a distance of 1, so that the
+    /// largest size is 1 and all of them change the field by the same.
     pub(crate) fn at<Y: Metriplectic<Manifold = M> + ?Sized>(system: &Y, x: &Point<Y>) -> Self {
         let own = M::scales(x);
         let largest = (0..M::Dim::LEN).map(|i| own[i]).fold(0.0, f64::max);
@@ -79,10 +80,16 @@ pub(crate) fn terms<M: Space>(jet: &Jet2<M>, sizes: &Vector<M>) -> f64 {
     (0..M::Dim::LEN).map(term).sum()
 }
 
-/// The distance along each direction over which a field changes by the size of its terms.
+/// The distance along each direction over which a field changes by the size of its terms; at a state of zeros by the
+/// least change over a distance of 1.
 fn distances<M: Space>(f: &impl ScalarField<M>, x: &M::Point<f64>, sizes: &Vector<M>) -> Vector<M> {
     let jet = f.jet2(x);
-    let change = terms(&jet, sizes);
+    let is_zero = (0..M::Dim::LEN).all(|i| sizes[i] == 0.0);
+    let over_one = |i| jet.df[i].abs() + 0.5 * jet.hf[(i, i)].abs();
+    let least = || {
+        (0..M::Dim::LEN).map(over_one).filter(|&change| change > 0.0).fold(f64::INFINITY, f64::min)
+    };
+    let change = if is_zero { least() } else { terms(&jet, sizes) };
     Vector::<M>::from_index(|i| {
         let (slope, bend) = (jet.df[i].abs(), jet.hf[(i, i)].abs());
         2.0 * change / (slope + slope.hypot((2.0 * change * bend).sqrt()))

@@ -211,8 +211,9 @@ pub(super) trait Law<M: Space> {
     /// The value and the differential at a stage.
     fn jet1(&self, stage: usize, x: &M::Point<f64>) -> Jet1<M>;
 
-    /// Returns its change by time alone in the whole step at its rate at a stage, if it depends on time.
-    fn rate(&self, stage: usize, x: &M::Point<f64>) -> Option<f64>;
+    /// Returns its change by time alone in the whole step at its rate at a stage, and the size of the terms of this rate, if it
+    /// depends on time.
+    fn rate(&self, stage: usize, x: &M::Point<f64>) -> Option<[f64; 2]>;
 
     /// Its derivative along the polynomial of the step at a fraction of it, where the point is `x`.
     fn slope(&self, node: f64, x: &M::Point<Real>) -> f64;
@@ -238,7 +239,7 @@ impl<M: Space, F: ScalarField<M>> Law<M> for Constant<'_, F> {
     }
 
     #[inline]
-    fn rate(&self, _: usize, _: &M::Point<f64>) -> Option<f64> {
+    fn rate(&self, _: usize, _: &M::Point<f64>) -> Option<[f64; 2]> {
         None
     }
 
@@ -282,7 +283,7 @@ impl<M: Manifold> AlongStages<'_, M> {
         let unit = unit_of_rates(*h);
         let mut w = [zero; STAGES];
         let (mut slope, mut change, mut excursion) = (0.0, 0.0, 0.0_f64);
-        let mut by_time = 0.0;
+        let (mut by_time, mut rates) = (0.0, 0.0);
         let mut size = start.value.abs() + end.abs() + f.size(&chart.end);
         for i in 0..s {
             let jet = f.jet1(i, &stages.x[i]);
@@ -292,10 +293,11 @@ impl<M: Manifold> AlongStages<'_, M> {
             slope += tableau.weights[i] * h * unit * w[i].dot(&v);
             change += tableau.weights[i] * h.abs() * unit * M::pairing_size(&w[i], &v);
             size += tableau.weights[i] * w[i].abs().dot(scales);
-            if let Some(rate) = f.rate(i, &stages.x[i]) {
+            if let Some([rate, terms]) = f.rate(i, &stages.x[i]) {
                 slope += tableau.weights[i] * rate;
                 by_time += tableau.weights[i] * rate;
                 change += tableau.weights[i] * rate.abs();
+                rates += tableau.weights[i] * terms;
             }
         }
         let none = StageCovectors {
@@ -320,6 +322,8 @@ impl<M: Manifold> AlongStages<'_, M> {
             delta += weight * (integral - delta);
             noise *= 1.0 - weight;
         }
+        // Both have the rates of time as terms.
+        noise += f64::EPSILON * rates;
         // A change without digits is none.
         if delta.abs() <= NO_DIGITS {
             delta = 0.0;

@@ -9,7 +9,7 @@ use super::equation::StageEquation;
 use super::fallbacks;
 use super::memory::{LastStep, StageMemory};
 use super::tableau::Tableau;
-use crate::step::dense::{self, cubic, limited};
+use crate::step::dense;
 use crate::step::failure::Fallbacks;
 use crate::step::{Components, Dim, Effort, Flow, Promises, StepEnds};
 
@@ -21,7 +21,7 @@ pub(crate) struct Within<'a, F: Flow> {
 }
 
 /// The state at the fraction `θ` of a step: a step of size `θh`, guessed by the polynomial of the whole one, and moved
-/// onto the laws of the run with an entropy that does not fall from one fraction to a later one.
+/// onto the laws of the run.
 pub(super) fn between<Y: Metriplectic>(
     within: &Within<'_, Y>,
     promises: Promises,
@@ -59,70 +59,14 @@ fn part<Y: Metriplectic>(
 }
 
 impl<F: Flow> Within<'_, F> {
-    /// The entropy at the fraction `θ` of a step: the one that the part of the step has `reached`, of the order of the
-    /// method, as far as it lies within a band around a monotone function of low order.
-    ///
-    /// The function of the entropy has the production as its slope at both ends. It is the cubic, limited so that it is monotone (Fritsch,
-    /// Carlson 1980), and for a method that damps the rational function, which follows the rise of a fast transient. Half of
-    /// its least slope `m` bounds the slope of the band `± ½m θ(1 − θ)`. So the entropy rises along each edge of the band, and
-    /// inside of it where it differs from the function by a smooth remainder.
+    /// The entropy at the fraction `θ` of a step: the one that the part of the step has `reached`, between those at the
+    /// ends of the step. Two parts of a step have errors of their own, of the order of the method. So a later one may have
+    /// less entropy by as much where production vanishes inside the step, and the outputs of a run are
+    /// [raised](crate::run) onto the entropy of the output before.
     pub(crate) fn entropy(&self, reached: f64) -> f64 {
-        let &Self { tableau, step, theta } = self;
-        let [start, end] = step.values.map(|laws| laws.entropy);
-        let rise = end - start;
-        if rise <= 0.0 {
-            return start;
-        }
-        let slopes = match (step.flow.production(step.x), step.flow.production(step.end)) {
-            (Some(a), Some(b)) => [step.h * a, step.h * b],
-            _ => [rise, rise],
-        };
-        let (risen, least) = if tableau.one_sided && slopes.iter().all(|slope| slope.is_finite()) {
-            (rational(rise, slopes, theta), least_slope_of_rational(rise, slopes))
-        } else {
-            let slopes = limited(rise, slopes);
-            (cubic(rise, slopes, theta), least_slope_of_cubic(rise, slopes))
-        };
-        let band = 0.5 * least * theta * (1.0 - theta);
-        let risen = risen + (reached - start - risen).clamp(-band, band);
-        (start + risen).clamp(start, end)
+        let [start, end] = self.step.values.map(|laws| laws.entropy);
+        reached.min(end).max(start)
     }
-}
-
-/// The least slope on `[0, 1]` of the cubic from 0 to `rise` with limited slopes at both ends; never negative.
-fn least_slope_of_cubic(rise: f64, [start, end]: [f64; 2]) -> f64 {
-    // The slope is aθ² + bθ + c.
-    let (a, b) = (3.0 * (start + end - 2.0 * rise), 2.0 * (3.0 * rise - 2.0 * start - end));
-    let lowest = -b / (2.0 * a);
-    let inside = if a > 0.0 && (0.0..=1.0).contains(&lowest) {
-        0.5_f64.mul_add(b * lowest, start)
-    } else {
-        f64::INFINITY
-    };
-    start.min(end).min(inside).max(0.0)
-}
-
-/// A lower bound for the slope of [`rational`] on `[0, 1]`,
-///
-/// ```math
-/// \frac{\min(d_0, d_1, \Delta)\, \Delta^2}{\max(\Delta, (2\Delta + d_0 + d_1)/4)^2} .
-/// ```
-fn least_slope_of_rational(rise: f64, slopes: [f64; 2]) -> f64 {
-    let [start, end] = slopes.map(|slope| (slope / rise).max(0.0));
-    let most = (0.25 * (2.0 + start + end)).max(1.0);
-    rise * start.min(end).min(1.0) / (most * most)
-}
-
-/// The rational quadratic function from 0 to `rise` with these slopes, which is monotone if they are not negative
-/// (Gregory, Delbourgo 1982, IMA J. Numer. Anal. 2, 123-130):
-///
-/// ```math
-/// \frac{\Delta \theta^2 + d_0\, \theta(1 - \theta)}{\Delta + (d_0 + d_1 - 2\Delta)\, \theta(1 - \theta)}\, \Delta .
-/// ```
-fn rational(rise: f64, slopes: [f64; 2], theta: f64) -> f64 {
-    let [start, end] = slopes.map(|slope| (slope / rise).max(0.0));
-    let both = theta * (1.0 - theta);
-    rise * (theta * theta + start * both) / (1.0 + (start + end - 2.0) * both)
 }
 
 /// The error of a step, by a norm: the larger one of its [defects].
@@ -169,53 +113,4 @@ pub(super) fn defects<Y: Metriplectic>(
     };
     let [first, second] = velocities;
     Some([defect(0.0, x, first), defect(1.0, end, second)])
-}
-
-#[cfg(test)]
-mod tests {
-    use super::{cubic, least_slope_of_cubic, least_slope_of_rational, limited, rational};
-
-    #[test]
-    fn the_entropy_inside_a_step_is_monotone_and_has_its_slopes() {
-        let (rise, tiny) = (0.3, 1e-6);
-        for slopes in [[0.3, 0.3], [2.0, 0.0], [0.0, 5.0], [1e12, 1e-3]] {
-            let at = |theta| rational(rise, slopes, theta);
-            assert!(at(0.0).abs() <= 0.0 && (at(1.0) - rise).abs() <= 1e-16);
-            let values: Vec<f64> = (0..=1000).map(|k| at(f64::from(k) * 1e-3)).collect();
-            assert!(values.is_sorted(), "{slopes:?}");
-            if slopes[0] < 1e3 {
-                let ends = [at(tiny) / tiny, (rise - at(1.0 - tiny)) / tiny];
-                let off = [ends[0] - slopes[0], ends[1] - slopes[1]];
-                assert!(off.iter().all(|off| off.abs() <= 1e-3), "{slopes:?}: {ends:?}");
-            }
-        }
-        // A fast transient is over at once.
-        assert!(rise - rational(rise, [1e12, 0.0], 0.1) <= 1e-11);
-    }
-
-    #[test]
-    fn the_least_slope_is_none_that_a_difference_falls_below() {
-        for [start, end] in
-            [[1.0, 1.0], [0.2, 1.7], [2.9, 0.1], [0.0, 0.5], [1.2, 2.7], [50.0, 3.0]]
-        {
-            let (rise, step) = (0.3, 1e-3);
-            let slopes = [start * rise, end * rise];
-            let cubic_slopes = limited(rise, slopes);
-            let [mut cubics, mut rationals] = [f64::INFINITY; 2];
-            for k in 0..1000 {
-                let [a, b] = [k, k + 1].map(|k| f64::from(k) * step);
-                let difference = |f: &dyn Fn(f64) -> f64| (f(b) - f(a)) / step;
-                cubics = cubics.min(difference(&|theta| cubic(rise, cubic_slopes, theta)));
-                rationals = rationals.min(difference(&|theta| rational(rise, slopes, theta)));
-            }
-            // The cubic's is attained, up to the change of the slope within a difference.
-            let least = least_slope_of_cubic(rise, cubic_slopes);
-            assert!(
-                least <= cubics + 1e-12 && cubics <= least + 20.0 * step * rise,
-                "{start}, {end}"
-            );
-            let least = least_slope_of_rational(rise, slopes);
-            assert!(least <= rationals + 1e-12, "{start}, {end}: {least} {rationals}");
-        }
-    }
 }

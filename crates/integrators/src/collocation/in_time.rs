@@ -97,9 +97,10 @@ impl<Y: Metriplectic> Law<Y::Manifold> for Timed<'_, Y> {
         self.in_time.systems[stage].energy().jet1(x)
     }
 
-    fn rate(&self, stage: usize, x: &Point<Y>) -> Option<f64> {
+    fn rate(&self, stage: usize, x: &Point<Y>) -> Option<[f64; 2]> {
         let (node, energy) = (self.tableau.nodes[stage], self.in_time.energy);
-        Some(energy.rate(node, x) - self.share * energy.rate(node, self.z))
+        let [rate, frozen] = [energy.rate(node, x), self.share * energy.rate(node, self.z)];
+        Some([rate - frozen, rate.abs() + frozen.abs()])
     }
 
     fn slope(&self, node: f64, x: &<Y::Manifold as Space>::Point<Real>) -> f64 {

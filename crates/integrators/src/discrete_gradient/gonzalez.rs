@@ -17,6 +17,10 @@ use super::DiscreteGradient;
 pub struct Gonzalez;
 
 impl DiscreteGradient for Gonzalez {
+    fn order(&self) -> u32 {
+        2
+    }
+
     #[inline]
     fn mean<M: Manifold, D: Scalar>(
         &self,

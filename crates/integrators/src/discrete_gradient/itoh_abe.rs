@@ -24,6 +24,10 @@ pub struct ItohAbe;
 pub struct SymmetricItohAbe;
 
 impl DiscreteGradient for ItohAbe {
+    fn order(&self) -> u32 {
+        1
+    }
+
     fn mean<M: Manifold, D: Scalar>(
         &self,
         f: &impl ScalarField<M>,
@@ -36,6 +40,10 @@ impl DiscreteGradient for ItohAbe {
 }
 
 impl DiscreteGradient for SymmetricItohAbe {
+    fn order(&self) -> u32 {
+        2
+    }
+
     fn mean<M: Manifold, D: Scalar>(
         &self,
         f: &impl ScalarField<M>,

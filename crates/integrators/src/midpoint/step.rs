@@ -33,7 +33,7 @@ where
     }
 
     fn order(&self) -> u32 {
-        2
+        self.order_of::<Y::Manifold, Y::Metric>()
     }
 
     fn promises(&self, system: &Y) -> Promises {

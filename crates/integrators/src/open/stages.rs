@@ -300,13 +300,13 @@ where
     Some(Target::new(step, promises, theta, entropy).reached_from(&y, line))
 }
 
-/// Why `Radau` does not take a system.
-#[derive(Clone, Copy, Debug, thiserror::Error)]
+/// Why `Radau` does not take an open system, in the [`MethodError`] of its step.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
     "`Radau` damps an open system without an entropy of its own and with one bath, to which it gives what it damps; take \
      `Gauss`, or an explicit method"
 )]
-struct NotDamped;
+pub struct NotDamped;
 
 /// Accepts a system that a method which damps can take: what it damps is heat of its only bath.
 fn damps<Y, C, X>(

@@ -294,10 +294,10 @@ impl<F: Flow + ?Sized> Course<'_, F> {
             watching.found.extend(events);
         }
         if !watching.outputs.is_empty() {
-            let last = stopped_at.as_ref().map_or(self.state.time, |state| state.time);
+            let last = stopped_at.as_ref().unwrap_or(&self.state);
             let mut before = self.before.state.clone();
-            while let Some(time) = watching.outputs.next(last) {
-                let state = self.output(time.min(last), &before, method)?;
+            while let Some(time) = watching.outputs.next(last.time) {
+                let state = self.output(time.min(last.time), [&before, last], method)?;
                 before.clone_from(&state);
                 watching.queue.push_back(state);
             }
@@ -314,22 +314,40 @@ impl<F: Flow + ?Sized> Course<'_, F> {
         Some(jumps)
     }
 
-    /// The state at a time, after another one in the same step. Where the entropy has fallen in between by more
-    /// than round-off, it is the nearer one of that state and the end of the step.
+    /// The state at a time, after another one in the same step and before the state `last`. Where its entropy is beyond
+    /// one of these by more than round-off, it is moved onto theirs; where there is none, it is the nearer one of them.
     fn output(
         &self,
         time: f64,
-        before: &State<F::Space>,
+        [before, last]: [&State<F::Space>; 2],
         method: &mut dyn AnyStepper<F>,
     ) -> Option<State<F::Space>> {
-        let state = self.inside(self.fraction(time), method)?;
-        let round_off = || self.flow.entropy_round_off([&before.point, &state.point]);
-        let fall = before.entropy - state.entropy;
-        if self.has_entropy() && fall > 0.0 && fall > round_off() {
-            let is_early = time - before.time < self.state.time - time;
-            let nearer = if is_early { before } else { &self.state };
-            return Some(State { time, step: state.step, ..nearer.clone() });
+        let theta = self.fraction(time);
+        let state = State { time, ..self.inside(theta, method)? };
+        if !self.has_entropy() {
+            return Some(state);
         }
-        Some(State { time, ..state })
+        let is_between = |entropy: f64| {
+            let round_off = || self.flow.entropy_round_off([&before.point, &state.point]);
+            let out = (before.entropy - entropy).max(entropy - last.entropy);
+            out <= 0.0 || out <= round_off()
+        };
+        if is_between(state.entropy) {
+            return Some(state);
+        }
+        let reference = self.reference(self.before.entropy);
+        let (x, end, h) = (&self.before.state.point, &self.state.point, self.before.h);
+        let values = [&self.before.values, &self.values];
+        let step = StepEnds { flow: self.flow, x, end, h, values, reference: &reference };
+        let entropy = state.entropy.min(last.entropy).max(before.entropy);
+        let point = Target::new(&step, self.promises, theta, Some(entropy)).near(&state.point);
+        if let Some(point) = point {
+            let Laws { energy, entropy, .. } = self.flow.laws(&point);
+            if is_between(entropy) {
+                return Some(State { point, energy, entropy, ..state });
+            }
+        }
+        let nearer = if time - before.time < last.time - time { before } else { last };
+        Some(State { time, step: state.step, ..nearer.clone() })
     }
 }

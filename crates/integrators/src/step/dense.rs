@@ -155,7 +155,8 @@ impl<'a, F: Flow + ?Sized> Target<'a, F> {
         self.near(y).or_else(|| self.near(&line())).unwrap_or_else(near)
     }
 
-    fn near(&self, y: &Element<F>) -> Option<Element<F>> {
+    /// The state near `y` with these laws, or near an equilibrium with all but the entropy.
+    pub(crate) fn near(&self, y: &Element<F>) -> Option<Element<F>> {
         let &Self { step, ref laws, entropy, .. } = self;
         let flow = step.flow;
         let on_all = flow.onto(y, laws, entropy);

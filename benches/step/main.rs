@@ -17,7 +17,7 @@ use std::hint::black_box;
 
 use criterion::Criterion;
 use metriplectic::dynamics::system::Point;
-use metriplectic::integrators::{DiscreteGradient, Element, Flow, StateSpace, StepStart};
+use metriplectic::integrators::{DiscreteGradient, Element, Flow, Schedule, StateSpace, StepStart};
 use metriplectic::prelude::*;
 
 #[path = "../../tests/models/chain.rs"]
@@ -31,6 +31,7 @@ mod rigid_body;
 mod so3_nambu;
 mod spinning_top;
 mod stable_gradient;
+mod whole;
 
 /// Steps in one measurement.
 const STEPS: usize = 100;
@@ -118,6 +119,28 @@ impl Row {
         Self { name: name.into(), run: Box::new(run), calls: None }
     }
 
+    /// Steps of a whole run, tried ones where it has a tolerance.
+    fn whole<F: Flow + 'static, M: Method<F> + Clone + 'static>(
+        name: &str,
+        method: M,
+        flow: F,
+        start: Element<F>,
+        span: impl Into<Schedule> + Clone + 'static,
+    ) -> Self {
+        let run = move |steps: usize| {
+            let start = black_box(start.clone());
+            let run = method.clone().steps(&flow, start, span.clone());
+            let mut run = run.unwrap_or_else(|error| panic!("{error}"));
+            let tried = |of: &Certificate| of.steps + of.rejected;
+            while tried(run.certificate()) < steps {
+                run.advance().expect("a step is taken");
+            }
+            let end = F::Space::numbers(&run.state().point);
+            Outcome { end, iterations: run.certificate().effort.iterations }
+        };
+        Self { name: format!("run/{name}"), run: Box::new(run), calls: None }
+    }
+
     /// Notes the calls of a closure in a step, from the same system with a closure that counts them.
     fn counted<Y: Metriplectic + 'static>(
         self,
@@ -158,6 +181,7 @@ fn rows() -> Vec<Row> {
         chart_midpoint::rows(),
         dimension::rows(),
         lattice::rows(),
+        whole::rows(),
     ];
     all.into_iter().flatten().collect()
 }

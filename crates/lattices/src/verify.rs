@@ -21,7 +21,9 @@ use crate::random::{At, Random, Use};
 /// Sites, and bonds, at which closures are tried.
 const SAMPLES: usize = 64;
 /// The displacement of the state at which they are, relative to the sizes of the entries.
-const MOVED: f64 = 1e-2;
+pub(crate) const MOVED: f64 = 1e-2;
+/// The ratio of a distance to the one that is tried before it.
+pub(crate) const NEARER: f64 = 1e-2;
 /// The rest of terms that should cancel, relative to them.
 const CANCELS: f64 = 1e-9;
 /// The step of a difference quotient, relative to the sizes of the entries, and its error.
@@ -219,24 +221,31 @@ impl<P: Model> Lattice<P> {
         x: &Points<P::Manifold>,
         sizes: &crate::SiteVector,
     ) -> (Points<P::Manifold>, Tried) {
-        let unmoved = || (x.clone(), Tried::Start);
-        let Some((v, _)) = self.motion(x) else { return unmoved() };
+        for fraction in [MOVED, NEARER * MOVED, NEARER * NEARER * MOVED] {
+            if let Some(y) = self.moved_by(fraction, x, sizes) {
+                return (y, Tried::Near { fraction });
+            }
+        }
+        (x.clone(), Tried::Start)
+    }
+
+    /// Moves a state as [`near`](Self::near) does, each entry by this fraction of its size; `None` if there are no values.
+    pub(crate) fn moved_by(
+        &self,
+        fraction: f64,
+        x: &Points<P::Manifold>,
+        sizes: &crate::SiteVector,
+    ) -> Option<Points<P::Manifold>> {
+        let (v, _) = self.motion(x)?;
         let sized = crate::SiteVector::zip([&v, sizes], |[v, s]| if s > 0.0 { v } else { 0.0 });
         let speed = sized.relative_to(sizes);
         drop(sized);
         let time = if speed > 0.0 { speed.recip() } else { 0.0 };
         let noise = self.irregular(Use::Near, &v);
-        for fraction in [MOVED, 1e-2 * MOVED, 1e-4 * MOVED] {
-            let d = crate::SiteVector::zip([&v, &noise, sizes], |[v, noise, size]| {
-                fraction * (time * v + noise * size)
-            });
-            if let Some(y) = self.stage(x, &d)
-                && self.motion(&y).is_some()
-            {
-                return (y, Tried::Near { fraction });
-            }
-        }
-        unmoved()
+        let d = crate::SiteVector::zip([&v, &noise, sizes], |[v, noise, size]| {
+            fraction * (time * v + noise * size)
+        });
+        self.stage(x, &d).filter(|y| self.motion(y).is_some())
     }
 }
 

@@ -72,7 +72,7 @@ impl<P: Model> Lattice<P> {
                 let mut mean = None;
                 // Friction that is wrong in a small region is right at a state beyond it.
                 for fraction in [MOVED, NEARER * MOVED] {
-                    match self.moved_by(fraction, x, &sizes).map(|y| self.recheck_at(&y)) {
+                    match self.moved_near(fraction, x, &sizes).map(|y| self.recheck_at(&y)) {
                         Some(Err(_)) => return Err(found),
                         Some(Ok(here)) => mean = Some(here),
                         None => {}

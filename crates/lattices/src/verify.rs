@@ -222,7 +222,7 @@ impl<P: Model> Lattice<P> {
         sizes: &crate::SiteVector,
     ) -> (Points<P::Manifold>, Tried) {
         for fraction in [MOVED, NEARER * MOVED, NEARER * NEARER * MOVED] {
-            if let Some(y) = self.moved_by(fraction, x, sizes) {
+            if let Some(y) = self.moved_near(fraction, x, sizes) {
                 return (y, Tried::Near { fraction });
             }
         }
@@ -230,7 +230,7 @@ impl<P: Model> Lattice<P> {
     }
 
     /// Moves a state as [`near`](Self::near) does, each entry by this fraction of its size; `None` if there are no values.
-    pub(crate) fn moved_by(
+    pub(crate) fn moved_near(
         &self,
         fraction: f64,
         x: &Points<P::Manifold>,

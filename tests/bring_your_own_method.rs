@@ -58,10 +58,6 @@ fn a_method_of_forty_lines_keeps_the_laws_of_a_method() {
     laws::method(ExplicitMidpoint, &top, &vector![0.48, 0.6, 0.64], 0.02).unwrap();
     laws::method(Scheme::new(WeylMidpoint), &body(), &START, 0.05).unwrap();
     laws::method(Scheme::new(WeylMidpoint), &top, &vector![0.48, 0.6, 0.64], 0.05).unwrap();
-    laws::method(Exponential, &body(), &START, 0.02).unwrap();
-    laws::method(Scheme::new(WeylMidpoint).gradient(ItohAbe), &body(), &START, 0.02).unwrap();
-    laws::method(Scheme::new(Exponential).gradient(SymmetricItohAbe), &body(), &START, 0.02)
-        .unwrap();
     laws::method(ExplicitMidpoint, &Oscillators::new(100), &excited(100), 0.02).unwrap();
     // Another order than that of the method is noticed, and a promise that does not hold.
     let error = laws::method(Boastful, &body(), &START, 0.05).unwrap_err();

@@ -517,6 +517,15 @@ const NOT_YET: &[NotYet] = &[
         },
         shows: "StepError::EntropyFalls",
     },
+    // Schemes of order 1 say that their order is 2.
+    NotYet {
+        cells: |cell| cell.kind.is_noisy() && order(cell.method) == 1,
+        shows: "it runs: NoiseError::OrderTooLow",
+    },
+    NotYet {
+        cells: |cell| cell.kind.is_noisy() && order(cell.method) == 1,
+        shows: "NoiseError::FrictionUnresolved",
+    },
 ];
 
 fn is_chebyshev(cell: &Cell) -> bool {

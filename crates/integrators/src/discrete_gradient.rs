@@ -39,14 +39,11 @@ use crate::round_off::stable_gradient::{Segment, StableGradient};
 /// with the missing step size restored): a covector `w` at the base `z` of a path from `x` to `x'`
 /// with the displacement `d`.
 ///
-/// The methods to write are [`mean`](Self::mean), at any scalar, and the order.
+/// The one method to write is [`mean`](Self::mean), at any scalar.
 ///
 /// Laws ([`laws::discrete_gradient`](crate::laws::discrete_gradient)): 1. `⟨w, d⟩ = F(x') − F(x)`;
 /// 2. `w → dF(z)` as the points meet; 3. what is evaluated safely is the definition.
 pub trait DiscreteGradient: Copy + Debug + Send + Sync {
-    /// The order of the schemes with it and a symmetric retraction: 2 if `w` is that of the path from `x'` to `x`, else 1.
-    fn order(&self) -> u32;
-
     /// The covector `w̄` before its correction, in the frame of the chart of the base point.
     fn mean<M: Manifold, D: Scalar>(
         &self,

@@ -34,10 +34,6 @@ fn turned<D: Scalar>(r: &Matrix3<D>, a: &Vector3<D>) -> Matrix3<D> {
 }
 
 impl<G: Riemannian<Rotations>> Retraction<Rotations, G> for Cayley {
-    fn order(&self) -> u32 {
-        2
-    }
-
     fn step_path<D: Scalar>(
         &self,
         _: &G,

@@ -43,10 +43,6 @@ fn beyond<M: Manifold>(u: &Vector<M>) -> MetricError {
 }
 
 impl<M: Manifold, G: Riemannian<M>> Retraction<M, G> for ChartMidpoint {
-    fn order(&self) -> u32 {
-        2
-    }
-
     fn step_path<D: Scalar>(
         &self,
         _: &G,

@@ -18,10 +18,6 @@ use crate::{
 pub struct Exponential;
 
 impl<M: Manifold, G: Riemannian<M>> Retraction<M, G> for Exponential {
-    fn order(&self) -> u32 {
-        1
-    }
-
     #[inline]
     fn step_path<D: Scalar>(
         &self,

@@ -67,10 +67,6 @@ impl<const A: usize, const N: usize> Parts<A, N> {
 macro_rules! projection {
     ($n:literal in $a:literal) => {
         impl<G: Riemannian<Sphere<$n>>> Retraction<Sphere<$n>, G> for Projection {
-            fn order(&self) -> u32 {
-                2
-            }
-
             fn step_path<D: Scalar>(
                 &self,
                 _: &G,

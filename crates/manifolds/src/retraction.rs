@@ -16,9 +16,6 @@ pub use crate::step_path::{StepPath, StepPathJet};
 /// ends where the pair does; 3. `real_step_path` is `path`, and `step_path_jet` its derivative; 4. a symmetric retraction
 /// returns the same base and the opposite vector for the swapped pair.
 pub trait Retraction<M: Manifold, G: Riemannian<M>> {
-    /// The order of the schemes built on it with a symmetric discrete gradient: 2 for a symmetric retraction, else 1.
-    fn order(&self) -> u32;
-
     /// Follows the path that leaves `x` with initial displacement `u ∈ T_xM`, the unknown of a step.
     ///
     /// # Errors

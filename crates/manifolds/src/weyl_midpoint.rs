@@ -18,10 +18,6 @@ use crate::{
 pub struct WeylMidpoint;
 
 impl<M: Manifold, G: Riemannian<M>> Retraction<M, G> for WeylMidpoint {
-    fn order(&self) -> u32 {
-        2
-    }
-
     #[inline]
     fn step_path<D: Scalar>(
         &self,

@@ -34,10 +34,6 @@ where
     A: Retraction<M, G>,
     B: Retraction<M, G>,
 {
-    fn order(&self) -> u32 {
-        of_either!(self.order())
-    }
-
     fn step_path<D: Scalar>(
         &self,
         metric: &G,
@@ -144,10 +140,6 @@ impl fmt::Debug for AnyGradient {
 }
 
 impl DiscreteGradient for AnyGradient {
-    fn order(&self) -> u32 {
-        of_any!(self.order())
-    }
-
     fn mean<M: Manifold, D: Scalar>(
         &self,
         f: &impl ScalarField<M>,

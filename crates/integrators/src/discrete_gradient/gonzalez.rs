@@ -17,10 +17,6 @@ use super::DiscreteGradient;
 pub struct Gonzalez;
 
 impl DiscreteGradient for Gonzalez {
-    fn order(&self) -> u32 {
-        2
-    }
-
     #[inline]
     fn mean<M: Manifold, D: Scalar>(
         &self,

@@ -24,10 +24,6 @@ pub struct ItohAbe;
 pub struct SymmetricItohAbe;
 
 impl DiscreteGradient for ItohAbe {
-    fn order(&self) -> u32 {
-        1
-    }
-
     fn mean<M: Manifold, D: Scalar>(
         &self,
         f: &impl ScalarField<M>,
@@ -40,10 +36,6 @@ impl DiscreteGradient for ItohAbe {
 }
 
 impl DiscreteGradient for SymmetricItohAbe {
-    fn order(&self) -> u32 {
-        2
-    }
-
     fn mean<M: Manifold, D: Scalar>(
         &self,
         f: &impl ScalarField<M>,

@@ -24,10 +24,6 @@ use super::{DiscreteGradient, GAUSS, segment};
 pub struct MeanValue;
 
 impl DiscreteGradient for MeanValue {
-    fn order(&self) -> u32 {
-        2
-    }
-
     fn mean<M: Manifold, D: Scalar>(
         &self,
         f: &impl ScalarField<M>,

@@ -1,7 +1,5 @@
 //! A scheme and its options.
 
-use metriplectic_manifolds::{Manifold, Retraction, Riemannian};
-
 use crate::discrete_gradient::{DiscreteGradient, Gonzalez};
 use crate::newton::Newton;
 
@@ -38,15 +36,6 @@ impl<R, W> Scheme<R, W> {
     pub fn gradient<V: DiscreteGradient>(self, gradient: V) -> Scheme<R, V> {
         let Self { retraction, newton, splits, .. } = self;
         Scheme { retraction, gradient, newton, splits }
-    }
-
-    /// The order of the steps on a manifold with a metric: the lower one of retraction and discrete gradient.
-    pub(crate) fn order_of<M: Manifold, G: Riemannian<M>>(&self) -> u32
-    where
-        R: Retraction<M, G>,
-        W: DiscreteGradient,
-    {
-        self.retraction.order().min(self.gradient.order())
     }
 
     /// Replaces the options of the solver.

@@ -23,7 +23,7 @@
 //!
 //! At an infinite temperature `⟨dH, ♯n⟩` changes its sign and `u` has no direction: near it `τ` is reduced to zero. How
 //! near is measured with the largest entries of `dH` at the stages, since a single term is never small beside itself.
-//! Where friction vanishes at every stage nothing is damped, and the entropy is corrected in both directions.
+//! Nothing is damped where friction vanishes at every stage, and the entropy is corrected in both directions.
 //!
 //! `u` is a choice: where an unresolved transient loses energy, the laws do not say which variable warms. Heat moves no
 //! entry whose row of `K` is zero at the start, such as a length on which the entropy depends. Where several entries may
@@ -111,7 +111,7 @@ fn direction<Y: Metriplectic>(
     warmed.is_finite().then_some(Direction { sharp, warmed })
 }
 
-/// Whether a direction of heat changes the energy by more than its terms leave.
+/// Returns whether a direction of heat changes the energy by more than its terms leave.
 fn is_clear<Y: Metriplectic>(
     at: &Direction<Vector<Y::Manifold>>,
     energy: &Vector<Y::Manifold>,
@@ -238,7 +238,7 @@ const JUMP: f64 = 16.0;
 /// Halvings of the way across a change of the sign.
 const HALVINGS: usize = 64;
 
-/// Whether no stage is beyond a temperature of zero, where no motion leads: such a root belongs to another branch of the
+/// Returns whether no stage is beyond a temperature of zero, where no motion leads: such a root belongs to another branch of the
 /// entropy. There `⟨dH, ♯n⟩` has a pole, and changes its sign as it does at an infinite temperature, where it vanishes.
 fn stays_above_zero<Y: Metriplectic>(
     step: &Step<'_, Y>,
@@ -255,7 +255,7 @@ fn stays_above_zero<Y: Metriplectic>(
     })
 }
 
-/// Whether `⟨dH, ♯n⟩` vanishes where it changes its sign between two points in the chart of the step, which stand with
+/// Returns whether `⟨dH, ♯n⟩` vanishes where it changes its sign between two points in the chart of the step, which stand with
 /// its values; `None` where it is not defined.
 fn vanishes_between<Y: Metriplectic>(
     step: &Step<'_, Y>,

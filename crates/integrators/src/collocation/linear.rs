@@ -150,7 +150,7 @@ impl<N: Dimension> Linear<N> {
         })
     }
 
-    /// Whether a velocity at the start moves entries of these sizes, by more than its round-off. The round-off of a step has
+    /// Returns whether a velocity at the start moves entries of these sizes, by more than its round-off. The round-off of a step has
     /// no bound where its velocities vanish or its heat has no direction, so it alone shows no rest.
     pub(super) fn moves(&self, velocity: &N::Vector<f64>, sizes: &N::Vector<f64>) -> bool {
         let asked = self.inverse * *velocity * self.h;

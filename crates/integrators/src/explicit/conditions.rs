@@ -79,7 +79,7 @@ impl Tableau {
     }
 }
 
-/// Whether a residual is round-off of the printed digits. One that is not a number is not.
+/// Returns whether a residual is round-off of the printed digits. One that is not a number is not.
 fn is_as_printed(off: f64) -> bool {
     off <= MISPRINTED
 }

@@ -20,6 +20,9 @@ impl<F: Flow, M: Stepper<F>> Steps<'_, F, M> {
     /// The state at a time in the last step, on the [dense output](Stepper::between) of the method; `None` at other
     /// times, or if the flow does not say what lies between two states.
     ///
+    /// The entropy is between those at the ends of the step. That of two times in one step of `Gauss` or `Radau` may fall by
+    /// the error of the method; that of [outputs](Self::outputs) never falls.
+    ///
     /// ```
     /// # use metriplectic_dynamics::System;
     /// # use metriplectic_fields::Real;

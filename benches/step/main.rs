@@ -133,6 +133,7 @@ impl Row {
             let mut run = run.unwrap_or_else(|error| panic!("{error}"));
             let tried = |of: &Certificate| of.steps + of.rejected;
             while tried(run.certificate()) < steps {
+                assert!(run.ending().is_none(), "the run has ended before");
                 run.advance().expect("a step is taken");
             }
             let end = F::Space::numbers(&run.state().point);

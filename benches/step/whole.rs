@@ -109,12 +109,5 @@ pub(crate) fn rows() -> Vec<Row> {
             start(),
             Span::until(1e3).tolerance(1e-12),
         ),
-        Row::whole(
-            "body/tried/order_8",
-            DormandPrince8,
-            body(),
-            start(),
-            Span::until(1e3).tolerance(1e-12),
-        ),
     ]
 }

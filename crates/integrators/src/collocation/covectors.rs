@@ -113,6 +113,8 @@ pub(super) struct StepPolynomial<'a, M: Space> {
     /// The displacements `h k_i`.
     pub(super) k: Stages<Vector<M>>,
     pub(super) h: f64,
+    /// The [unit of rates](unit_of_rates).
+    pub(super) unit: f64,
 }
 
 impl<M: Space> StepPolynomial<'_, M> {
@@ -152,7 +154,7 @@ impl<M: Manifold> StagePoints<M> {
         polynomial: &StepPolynomial<'_, M>,
         is_inside: impl Fn(&M::Point<f64>) -> bool,
     ) -> Option<Self> {
-        let StepPolynomial { tableau, chart, k, h } = polynomial;
+        let StepPolynomial { tableau, chart, k, h, .. } = polynomial;
         let zero = Vector::<M>::zero();
         let mut stages = Self {
             x: std::array::from_fn(|_| chart.z.clone()),
@@ -278,9 +280,9 @@ impl<M: Manifold> AlongStages<'_, M> {
         correction: Correction,
     ) -> StageCovectors<Vector<M>> {
         let (Self { stages, polynomial, scales }, zero) = (self, Vector::<M>::zero());
-        let StepPolynomial { tableau, chart, h, .. } = polynomial;
+        let &StepPolynomial { tableau, chart, h, unit, .. } = *polynomial;
         let (s, end) = (tableau.stages, f.end(start.value, &chart.end));
-        let unit = unit_of_rates(*h);
+        let (in_unit, [step, size_of_step]) = (unit.recip(), [h * unit, h.abs() * unit]);
         let mut w = [zero; STAGES];
         let (mut slope, mut change, mut excursion) = (0.0, 0.0, 0.0_f64);
         let (mut by_time, mut rates) = (0.0, 0.0);
@@ -289,9 +291,9 @@ impl<M: Manifold> AlongStages<'_, M> {
             let jet = f.jet1(i, &stages.x[i]);
             excursion = excursion.max((jet.value - start.value).abs());
             w[i] = jet.df;
-            let v = stages.v[i] * unit.recip();
-            slope += tableau.weights[i] * h * unit * w[i].dot(&v);
-            change += tableau.weights[i] * h.abs() * unit * M::pairing_size(&w[i], &v);
+            let v = stages.v[i] * in_unit;
+            slope += tableau.weights[i] * step * w[i].dot(&v);
+            change += tableau.weights[i] * size_of_step * M::pairing_size(&w[i], &v);
             size += tableau.weights[i] * w[i].abs().dot(scales);
             if let Some([rate, terms]) = f.rate(i, &stages.x[i]) {
                 slope += tableau.weights[i] * rate;

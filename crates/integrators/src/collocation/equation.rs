@@ -157,7 +157,7 @@ impl<'a, Y: Metriplectic> StageEquation<'a, Y> {
         for i in 0..tableau.stages {
             displacements[i] += chart.to_middle(x, &k[i]) * h;
         }
-        StepPolynomial { tableau, chart, k: displacements, h }
+        StepPolynomial { tableau, chart, k: displacements, h, unit: unit_of_rates(h) }
     }
 
     /// The equation at these velocities; `None` where it is not defined.
@@ -168,8 +168,8 @@ impl<'a, Y: Metriplectic> StageEquation<'a, Y> {
         let inside = |x: &Point<Y>| system.manifold().is_inside(x);
         let stages = StagePoints::of(system.metric(), &polynomial, inside)?;
         let mut w = self.covectors(&stages, &polynomial);
-        let unit = unit_of_rates(h);
-        let scaled = |v: &Vector<Y::Manifold>| *v * unit.recip();
+        let (unit, in_unit) = (polynomial.unit, polynomial.unit.recip());
+        let scaled = |v: &Vector<Y::Manifold>| *v * in_unit;
         // The work and the heat of an open system.
         let mut exchanged = 0.0;
         let (mut heat, mut surplus, mut left) = (None, 0.0, f64::INFINITY);
@@ -206,7 +206,7 @@ impl<'a, Y: Metriplectic> StageEquation<'a, Y> {
                 exchanged += weight * here.energy.dot(&scaled(&velocity));
                 velocity
             } else {
-                self.conserving(velocity, &here.energy)
+                self.conserving(velocity, &here.energy, in_unit)
             } - stages.v[i];
             if let Some(heat) = &heat {
                 off += heat[i];
@@ -291,10 +291,10 @@ impl<'a, Y: Metriplectic> StageEquation<'a, Y> {
         &self,
         velocity: Vector<Y::Manifold>,
         w: &Vector<Y::Manifold>,
+        in_unit: f64,
     ) -> Vector<Y::Manifold> {
-        let unit = unit_of_rates(self.h);
-        let parts = Vector::<Y::Manifold>::from_index(|c| (self.rounding[c] / unit) * w[c]);
-        let (work, size) = (w.dot(&(velocity * unit.recip())), parts.magnitude());
+        let parts = Vector::<Y::Manifold>::from_index(|c| (self.rounding[c] * in_unit) * w[c]);
+        let (work, size) = (w.dot(&(velocity * in_unit)), parts.magnitude());
         if !(work.abs() <= ROUNDINGS * size && size > 0.0) {
             return velocity;
         }

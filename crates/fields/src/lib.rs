@@ -46,7 +46,7 @@ pub use differential::{differential, differential_at, hessian, hessian_at, jacob
 pub use dimension::{Dimension, Plus};
 pub use erased::ErasedField;
 pub use field::{Jet1, Jet2, MatrixField, MatrixJet, ScalarField, along_slopes};
-pub use laws::BrokenLaw;
+pub use metriplectic_equations::{BrokenLaw, NotPositive};
 pub use scalar::{Real, Scalar};
 pub use space::{ChartPoint, Form, Matrix, Space, Vector, Velocity, product_rule};
-pub use square::{Factors, NotPositive, Square};
+pub use square::{Factors, Square};

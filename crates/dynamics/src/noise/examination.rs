@@ -3,6 +3,7 @@
 //! A condition may hold at the start by a symmetry, or because an entry is zero. So it is judged at points around it too, in
 //! units that do not vanish.
 
+use metriplectic_equations::judge::{Derivatives, Judge, Mismatch, OF_SOLUTIONS, RADIUS};
 use metriplectic_fields::{ChartPoint, Column, Dimension as _, Real, ScalarField, Space, Vector};
 use metriplectic_manifolds::{Manifold, MetricError};
 use rand::SeedableRng;
@@ -11,12 +12,9 @@ use rand::rngs::ChaCha8Rng;
 use super::drift::{Place, TermVisitor};
 use super::system::Jets;
 use super::terms::NoiseTerm;
+use crate::in_numbers::{InNumbers, point};
 use crate::metriplectic::{Dim, Metriplectic, Point};
 use crate::velocity::differentials;
-use crate::verify::RADIUS;
-use crate::verify::derivatives::{Derivatives, Mismatch, OF_SOLUTIONS};
-use crate::verify::domain::value_not_finite;
-use crate::verify::sampling::CoordinateScales;
 
 /// The points around a start at which noise is judged.
 const POINTS: usize = 8;
@@ -36,15 +34,14 @@ pub struct Around<M: Space> {
 impl<M: Manifold> Around<M> {
     /// Draws points around a start.
     pub fn of<Y: Metriplectic<Manifold = M> + ?Sized>(system: &Y, x0: &Point<Y>) -> Self {
-        let sizes = CoordinateScales::at(system, x0);
+        let (system, entries) = (InNumbers(system), M::entries(x0));
+        let judge = Judge::of(&system, 0.0);
+        let sizes = judge.coordinate_scales(&entries);
         let mut rng = ChaCha8Rng::seed_from_u64(SEED);
-        let inside = |x: &Point<Y>| {
-            system.manifold().defect(x).is_finite() && value_not_finite(system, x).is_none()
-        };
         let mut points = vec![x0.clone()];
-        let drawn = (0..POINTS).filter_map(|_| sizes.draw(x0, RADIUS, &mut rng, &mut 0, inside));
-        points.extend(drawn.map(|(x, _)| x));
-        Self { points, units: sizes.units }
+        let drawn = (0..POINTS).filter_map(|_| judge.draw(&entries, &sizes, RADIUS, &mut rng));
+        points.extend(drawn.map(|x| point::<M>(&x)));
+        Self { points, units: Column::from_index(|i| sizes.units[i]) }
     }
 
     /// A direction that moves each coordinate by a part of its size.

@@ -50,9 +50,11 @@ impl Balance {
 
 /// The size of what should vanish, and of the terms that should cancel in it.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Violation {
-    pub(crate) size: f64,
-    pub(crate) terms: f64,
+pub struct Violation {
+    /// The size of what should vanish.
+    pub size: f64,
+    /// The size of the terms that should cancel in it.
+    pub terms: f64,
 }
 
 impl Violation {

@@ -1,8 +1,6 @@
-//! Tensors and vectors as plain numbers, so that what judges them is compiled once, and not for every model.
+//! Square matrices of a size that is known at run time.
 
 use std::ops::{Index, IndexMut};
-
-use metriplectic_fields::{Column, Square};
 
 /// The entries of a square matrix.
 #[derive(Clone, Debug)]
@@ -13,20 +11,13 @@ pub(crate) struct Table {
 }
 
 impl Table {
-    /// Copies the entries of a matrix.
-    pub(crate) fn of<A: Square<f64>>(a: &A) -> Self {
-        let n = A::Column::LEN;
-        let mut entries = Vec::with_capacity(n * n);
-        for i in 0..n {
-            for j in 0..n {
-                entries.push(a[(i, j)]);
-            }
-        }
-        Self { n, entries }
+    /// Makes the table of zeros.
+    pub(crate) fn zeros(n: usize) -> Self {
+        Self { n, entries: vec![0.0; n * n] }
     }
 
     /// Makes the table of the entries `f(i, j)`.
-    pub(super) fn from_entries(n: usize, f: impl Fn(usize, usize) -> f64) -> Self {
+    pub(crate) fn from_entries(n: usize, f: impl Fn(usize, usize) -> f64) -> Self {
         Self { n, entries: pairs(n).map(|(i, j)| f(i, j)).collect() }
     }
 
@@ -36,13 +27,28 @@ impl Table {
     }
 
     /// Row by row.
-    pub(super) fn entries(&self) -> &[f64] {
+    pub(crate) fn entries(&self) -> &[f64] {
         &self.entries
+    }
+
+    /// Row by row.
+    pub(crate) fn entries_mut(&mut self) -> &mut [f64] {
+        &mut self.entries
+    }
+
+    /// The column `j`.
+    pub(super) fn column(&self, j: usize) -> Vec<f64> {
+        (0..self.n).map(|i| self[(i, j)]).collect()
+    }
+
+    /// The product with a vector.
+    pub(super) fn times(&self, v: &[f64]) -> Vec<f64> {
+        self.entries.chunks_exact(self.n).map(|row| super::at::dot(row, v)).collect()
     }
 
     /// The largest absolute value of an entry, and NaN if one is NaN.
     pub(super) fn max_abs(&self) -> f64 {
-        self.entries.iter().map(|entry| entry.abs()).fold(0.0, super::balance::worse)
+        super::at::max_abs(&self.entries)
     }
 }
 
@@ -57,20 +63,6 @@ impl Index<(usize, usize)> for Table {
 impl IndexMut<(usize, usize)> for Table {
     fn index_mut(&mut self, (i, j): (usize, usize)) -> &mut f64 {
         &mut self.entries[i * self.n + j]
-    }
-}
-
-/// Copies the components of a vector.
-pub(crate) fn components<V: Column<f64>>(v: &V) -> Vec<f64> {
-    let mut values = Vec::with_capacity(V::LEN);
-    append(&mut values, v);
-    values
-}
-
-/// Appends the components of a vector.
-pub(super) fn append<V: Column<f64>>(values: &mut Vec<f64>, v: &V) {
-    for i in 0..V::LEN {
-        values.push(v[i]);
     }
 }
 

@@ -3,8 +3,6 @@
 //! The sums of module `balance` are those of the start, where points are generic. Here a covector comes with the size
 //! of its round-off.
 
-use metriplectic_fields::{Column, Square};
-
 /// The violation of a law that is taken for round-off, relative to the terms that cancel. It is a hundred times that at
 /// the start: a closure may lose two digits on the way.
 pub(super) const TOLERANCE: f64 = 1e-8;
@@ -13,13 +11,15 @@ pub(super) const TOLERANCE: f64 = 1e-8;
 const ROUNDING: f64 = 16.0 * f64::EPSILON / TOLERANCE;
 
 /// A covector and the sizes of which a few `ε` are its round-off.
-type Rounded<'a, V> = [&'a V; 2];
+pub(super) type Rounded<'a> = [&'a [f64]; 2];
 
 /// Replaces sizes that are zero by the largest one, or by 1.
-pub(super) fn positive<V: Column<f64>>(sizes: V) -> V {
-    let largest = (0..V::LEN).map(|i| sizes[i]).fold(0.0, f64::max);
+pub(super) fn make_positive(sizes: &mut [f64]) {
+    let largest = sizes.iter().copied().fold(0.0, f64::max);
     let other = if largest > 0.0 { largest } else { 1.0 };
-    V::from_index(|i| if sizes[i] > 0.0 { sizes[i] } else { other })
+    for size in sizes {
+        *size = if *size > 0.0 { *size } else { other };
+    }
 }
 
 /// A sum and the sizes of its terms.
@@ -43,15 +43,11 @@ impl Sum {
 }
 
 /// Computes the largest relative size of a row of `A w`.
-pub(super) fn product<A: Square<f64>>(
-    a: &A,
-    [w, rounding]: Rounded<'_, A::Column>,
-    units: &A::Column,
-) -> f64 {
-    let n = A::Column::LEN;
+pub(super) fn product(a: &[f64], [w, rounding]: Rounded<'_>, units: &[f64]) -> f64 {
+    let n = units.len();
     let row = |i: usize| {
         let mut row = Sum::default();
-        (0..n).for_each(|j| row.add(a[(i, j)] * w[j], a[(i, j)] * rounding[j]));
+        (0..n).for_each(|j| row.add(a[i * n + j] * w[j], a[i * n + j] * rounding[j]));
         row
     };
     let largest = (0..n).map(|i| row(i).terms / units[i]).fold(0.0, f64::max);
@@ -59,16 +55,16 @@ pub(super) fn product<A: Square<f64>>(
 }
 
 /// Computes the relative size of `⟨α, A β⟩`.
-pub(super) fn form<A: Square<f64>>(
-    a: &A,
-    [[alpha, of_alpha], [beta, of_beta]]: [Rounded<'_, A::Column>; 2],
-    units: &A::Column,
+pub(super) fn form(
+    a: &[f64],
+    [[alpha, of_alpha], [beta, of_beta]]: [Rounded<'_>; 2],
+    units: &[f64],
 ) -> f64 {
-    let n = A::Column::LEN;
+    let n = units.len();
     let (mut sum, mut rate) = (Sum::default(), 0.0_f64);
     for i in 0..n {
         for j in 0..n {
-            let entry = a[(i, j)];
+            let entry = a[i * n + j];
             let rounding =
                 (alpha[i] * entry * of_beta[j]).abs() + (of_alpha[i] * entry * beta[j]).abs();
             sum.add(alpha[i] * entry * beta[j], rounding);
@@ -80,76 +76,81 @@ pub(super) fn form<A: Square<f64>>(
 }
 
 /// Computes the relative size of `⟨α, v⟩`, with its sign.
-pub(super) fn pairing<V: Column<f64>>([alpha, rounding]: Rounded<'_, V>, v: &V, units: &V) -> f64 {
-    let mut sum = Sum::default();
-    (0..V::LEN).for_each(|i| sum.add(alpha[i] * v[i], rounding[i] * v[i]));
-    let rate = (0..V::LEN).map(|i| (v[i] / units[i]).abs()).fold(0.0, f64::max);
-    let size = (0..V::LEN).map(|i| (alpha[i] * units[i]).abs()).fold(0.0, f64::max);
+pub(super) fn pairing([alpha, rounding]: Rounded<'_>, v: &[f64], units: &[f64]) -> f64 {
+    let (mut sum, n) = (Sum::default(), units.len());
+    (0..n).for_each(|i| sum.add(alpha[i] * v[i], rounding[i] * v[i]));
+    let rate = (0..n).map(|i| (v[i] / units[i]).abs()).fold(0.0, f64::max);
+    let size = (0..n).map(|i| (alpha[i] * units[i]).abs()).fold(0.0, f64::max);
     sum.beside(size * rate)
 }
 
 /// The largest entry of a tensor on covectors in the given units; 0 where it has lost its digits.
-fn largest<A: Square<f64>>(a: &A, units: &A::Column) -> f64 {
+fn largest(a: &[f64], units: &[f64]) -> f64 {
+    let n = units.len();
     let (mut plain, mut scaled) = (0.0_f64, 0.0_f64);
-    for i in 0..A::Column::LEN {
-        for j in 0..A::Column::LEN {
-            plain = plain.max(a[(i, j)].abs());
-            scaled = scaled.max((a[(i, j)] / units[i] / units[j]).abs());
+    for i in 0..n {
+        for j in 0..n {
+            plain = plain.max(a[i * n + j].abs());
+            scaled = scaled.max((a[i * n + j] / units[i] / units[j]).abs());
         }
     }
     if plain * f64::EPSILON > f64::MIN_POSITIVE && scaled.is_finite() { scaled } else { 0.0 }
 }
 
 /// Computes the largest relative difference of an entry from the transposed one times the `sign`.
-pub(super) fn asymmetry<A: Square<f64>>(a: &A, sign: f64, units: &A::Column) -> f64 {
-    let (top, mut worst) = (largest(a, units), 0.0_f64);
+pub(super) fn asymmetry(a: &[f64], sign: f64, units: &[f64]) -> f64 {
+    let (n, top, mut worst) = (units.len(), largest(a, units), 0.0_f64);
     if top == 0.0 {
         return 0.0;
     }
-    for i in 0..A::Column::LEN {
+    for i in 0..n {
         for j in 0..=i {
             let mut sum = Sum::default();
-            sum.add(a[(i, j)], 0.0);
-            sum.add(-sign * a[(j, i)], 0.0);
+            sum.add(a[i * n + j], 0.0);
+            sum.add(-sign * a[j * n + i], 0.0);
             worst = worst.max(sum.beside(top * units[i] * units[j]).abs());
         }
     }
     worst
 }
 
-/// Measures how far a symmetric tensor on covectors is from positive semidefinite: the most negative pivot of
-/// its `LDLᵀ` decomposition with diagonal pivoting, after a scaling to a diagonal of ones.
-pub(super) fn indefiniteness<A: Square<f64>>(k: &A, units: &A::Column) -> f64 {
-    let (n, top) = (A::Column::LEN, largest(k, units));
+/// Measures how far a symmetric tensor `k` on covectors is from positive semidefinite: the most negative pivot of
+/// its `LDLᵀ` decomposition with diagonal pivoting, after a scaling to a diagonal of ones. It works in the room `a`, of
+/// `n² + n` numbers.
+pub(super) fn indefiniteness(k: &[f64], units: &[f64], a: &mut [f64]) -> f64 {
+    let (n, top) = (units.len(), largest(k, units));
     if top == 0.0 {
         return 0.0;
     }
-    let hat = |i: usize, j: usize| 0.5 * (k[(i, j)] + k[(j, i)]) / units[i] / units[j] / top;
-    let size = A::Column::from_index(|i| (hat(i, i).abs() + ROUNDING).sqrt());
-    let mut a = A::from_entries(|i, j| hat(i, j) / (size[i] * size[j]));
+    let hat = |i: usize, j: usize| 0.5 * (k[i * n + j] + k[j * n + i]) / units[i] / units[j] / top;
+    let (a, size) = a.split_at_mut(n * n);
+    (0..n).for_each(|i| size[i] = (hat(i, i).abs() + ROUNDING).sqrt());
+    for i in 0..n {
+        (0..n).for_each(|j| a[i * n + j] = hat(i, j) / (size[i] * size[j]));
+    }
     let mut worst = 0.0_f64;
     for p in 0..n {
         let mut pivot = p;
         for i in p..n {
-            worst = worst.max(-a[(i, i)]);
-            if a[(i, i)] > a[(pivot, pivot)] {
+            worst = worst.max(-a[i * n + i]);
+            if a[i * n + i] > a[pivot * n + pivot] {
                 pivot = i;
             }
         }
-        exchange(&mut a, p, pivot);
-        if a[(p, p)] <= TOLERANCE {
+        exchange(a, n, p, pivot);
+        if a[p * n + p] <= TOLERANCE {
             // |a_ij| ≤ √(a_ii a_jj) in a semidefinite matrix, and the diagonal is zero here.
             for i in p..n {
                 for j in p..n {
-                    worst = worst.max(a[(i, j)].abs());
+                    worst = worst.max(a[i * n + j].abs());
                 }
             }
             return worst;
         }
         for i in p + 1..n {
             for j in p + 1..n {
-                let rank_one = a[(i, p)] * a[(p, j)] / a[(p, p)];
-                a[(i, j)] -= rank_one;
+                let rank_one = a[i * n + p] * a[p * n + j] / a[p * n + p];
+                a[i * n + j] -= rank_one;
             }
         }
     }
@@ -157,11 +158,11 @@ pub(super) fn indefiniteness<A: Square<f64>>(k: &A, units: &A::Column) -> f64 {
 }
 
 /// Exchanges two rows, and the columns of the same indices.
-fn exchange<A: Square<f64>>(a: &mut A, p: usize, q: usize) {
-    for k in 0..A::Column::LEN {
-        (a[(p, k)], a[(q, k)]) = (a[(q, k)], a[(p, k)]);
+fn exchange(a: &mut [f64], n: usize, p: usize, q: usize) {
+    for k in 0..n {
+        a.swap(p * n + k, q * n + k);
     }
-    for k in 0..A::Column::LEN {
-        (a[(k, p)], a[(k, q)]) = (a[(k, q)], a[(k, p)]);
+    for k in 0..n {
+        a.swap(k * n + p, k * n + q);
     }
 }

@@ -3,7 +3,7 @@
 use std::fmt;
 use std::sync::Arc;
 
-use metriplectic_manifolds::{MetricError, PointError};
+use crate::{MetricError, PointError};
 
 /// A model that breaks one of its laws. `size` is relative to the terms that should cancel.
 #[derive(Clone, PartialEq, thiserror::Error)]

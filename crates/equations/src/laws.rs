@@ -1,0 +1,1 @@
+//! The laws of an implementation, and the functions that check them.

@@ -11,8 +11,8 @@ const CANCELS: f64 = 1e-9;
 
 /// Checks a system at a state that is generic, along the direction `u`, which is to move each entry by some part of its size:
 ///
-/// 1. every slice is filled; 2. the values of the differentials are the values; 3. `⟨dF, u⟩` is the derivative of each law
-///    along `φ_x(su)`; 4. `φ_x(0) = x`, and the coordinates of `φ_x(u)` are `u`; 5. the velocity conserves the energy and
+/// 1. every slice is filled; 2. `φ_x(0) = x`, and the coordinates of `φ_x(u)` are `u`; 3. the values of the differentials are
+///    the values; 4. `⟨dF, u⟩` is the derivative of each law along `φ_x(su)`; 5. the velocity conserves the energy and
 ///    the further invariants, and `⟨dS, x'⟩` is the production, which is not negative; 6. the rates at `ψ_x(0)` are the
 ///    velocity.
 ///
@@ -25,6 +25,17 @@ pub fn equations(system: &dyn Equations, t: f64, x: &[f64], u: &[f64]) -> Result
     let Sizes { entries, directions: n, laws } = system.sizes();
     same("the state has its entries", x.len() as f64, entries as f64)?;
     same("the direction has as many numbers as the chart", u.len() as f64, n as f64)?;
+    let (mut sizes, mut y, mut q) = (nan(n), nan(entries), nan(n));
+    system.scales(x, &mut sizes);
+    filled("the sizes of the entries", &sizes)?;
+    system.chart(x, &vec![0.0; n], &mut y);
+    near("φ_x(0) = x", &y, x)?;
+    system.chart(x, u, &mut y);
+    filled("the entries of φ_x(u)", &y)?;
+    if system.coordinates(x, &y, &mut q) {
+        near("φ_x⁻¹(φ_x(u)) = u", &q, u)?;
+    }
+
     let (mut values, mut again, mut w) = (nan(laws), nan(laws), nan(laws * n));
     system.values(t, x, &mut values);
     system.differentials(t, x, &mut again, &mut w);
@@ -39,17 +50,6 @@ pub fn equations(system: &dyn Equations, t: f64, x: &[f64], u: &[f64]) -> Result
             system.values(t, &y, &mut values);
             to.push(values[law]);
         })?;
-    }
-
-    let (mut sizes, mut y, mut q) = (nan(n), nan(entries), nan(n));
-    system.scales(x, &mut sizes);
-    filled("the sizes of the entries", &sizes)?;
-    system.chart(x, &vec![0.0; n], &mut y);
-    near("φ_x(0) = x", &y, x)?;
-    system.chart(x, u, &mut y);
-    filled("the entries of φ_x(u)", &y)?;
-    if system.coordinates(x, &y, &mut q) {
-        near("φ_x⁻¹(φ_x(u)) = u", &q, u)?;
     }
 
     let (mut v, mut rates) = (nan(n), nan(n));

@@ -59,10 +59,13 @@ impl Study for Compared {
         let q = Flow::sizes(system, start).with(|i| u[i]);
         assert_eq!(y, Y::Manifold::entries(&system.moved(start, &q)), "{name}");
         let there = StageFlow::stage(system, start, &q).expect("it is a stage");
-        let of_stage = numbers.stage(0.0, &x, &u, &mut rates).expect("it has rates");
-        let (at_stage, production) = StageFlow::motion(system, &there).expect("it has a velocity");
+        let mut of_stage = vec![0.0; entries];
+        assert!(numbers.stage_state(&x, &u, &mut of_stage), "{name}");
+        let production = numbers.velocity(0.0, &of_stage, &mut v).expect("it has a velocity");
+        numbers.stage_rates(&x, &u, &of_stage, &v, &mut rates);
+        let (at_stage, of_types) = StageFlow::motion(system, &there).expect("it has a velocity");
         let typed = StageFlow::stage_rates(system, start, (&q, &there), &at_stage);
-        assert_eq!((rates, of_stage), (numbers_of(&typed), production), "{name}");
+        assert_eq!((rates, production), (numbers_of(&typed), of_types), "{name}");
 
         // The laws of an implementation, near the start, where nothing vanishes by symmetry.
         laws::equations(&numbers, 0.0, &y, &u).unwrap_or_else(|law| panic!("{name}: {law}"));

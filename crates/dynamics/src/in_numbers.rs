@@ -1,6 +1,6 @@
 //! A system in plain numbers.
 
-use metriplectic_equations::judge::Judge;
+use metriplectic_equations::judge::coordinate_scales;
 use metriplectic_equations::room::with_numbers;
 use metriplectic_equations::{
     Covectors, ENERGY, ENTROPY, Equations, Jet, Kind, MetricError, Model, Part, PointError,
@@ -17,8 +17,8 @@ use num_dual::Dual64;
 use crate::bracket::{Bracket, BracketArgs};
 use crate::dissipation::Dissipation;
 use crate::invariants::{Action, Invariants, Visitor};
-use crate::metriplectic::{Dim, Metriplectic, Point};
-use crate::velocity::{differentials, independence, irreversible};
+use crate::metriplectic::{CountOf, Dim, Metriplectic, Point};
+use crate::velocity::{self, Gradient, independence, irreversible};
 
 /// A system that answers the questions of [`Equations`] and [`Model`], by reading points and columns from slices.
 ///
@@ -218,6 +218,21 @@ impl<M: Space> Visitor<M> for KindOf {
     }
 }
 
+/// The covectors of all laws of a system.
+type OfLaws<Y> = velocity::Covectors<CountOf<Y>, Vector<Of<Y>>>;
+
+/// The differentials at a point, in the chart there.
+struct AtPoint<'a, M: Space>(&'a M::Point<f64>);
+
+impl<M: Space> Gradient<M> for AtPoint<'_, M> {
+    type Covector = Vector<M>;
+
+    #[inline]
+    fn of(&mut self, f: &impl ScalarField<M>) -> Vector<M> {
+        f.jet1(self.0).df
+    }
+}
+
 impl<Y: Metriplectic + ?Sized> InNumbers<'_, Y> {
     /// Calls `with` for one law.
     fn law(&self, law: usize, with: &mut impl WithField<Of<Y>>) {
@@ -282,7 +297,10 @@ impl<Y: Metriplectic + ?Sized> Equations for InNumbers<'_, Y> {
     fn velocity(&self, _: f64, x: &[f64], v: &mut [f64]) -> Option<f64> {
         with_room::<Dim<Y>, _>(|| {
             let centre = ChartPoint::<Of<Y>>::centre(&point::<Of<Y>>(x));
-            let (g, w) = (self.0.metric_at(&centre), differentials(self.0, &centre));
+            let mut at = AtPoint::<Of<Y>>(&centre.base);
+            let laws = [at.of(self.0.energy()), at.of(self.0.entropy())];
+            let w = OfLaws::<Y>::new(laws, self.0.invariants(), &mut at);
+            let g = self.0.metric_at(&centre);
             let args = self.0.bracket_args(&g, &w.entropy);
             let reversible = self.0.bracket().apply(&args, &w.energy).ok()?;
             let friction = irreversible(self.0, &g, &w).ok()?;
@@ -324,20 +342,26 @@ impl<Y: Metriplectic + ?Sized> Equations for InNumbers<'_, Y> {
         q.is_finite() && Of::<Y>::is_near(&q)
     }
 
-    fn stage(&self, t: f64, x: &[f64], q: &[f64], rates: &mut [f64]) -> Option<f64> {
-        let (x, q) = (point::<Of<Y>>(x), column(q));
+    fn stage_state(&self, x: &[f64], q: &[f64], y: &mut [f64]) -> bool {
+        let q = column(q);
         if !Of::<Y>::is_stage(&q) {
-            return None;
+            return false;
         }
-        let y = Of::<Y>::stage(&x, &q);
-        if !self.0.manifold().is_inside(&y) {
-            return None;
+        let state = Of::<Y>::stage(&point::<Of<Y>>(x), &q);
+        write::<Of<Y>>(&state, y);
+        self.0.manifold().is_inside(&state)
+    }
+
+    fn stage_coordinates(&self, x: &[f64], y: &[f64], q: &mut [f64]) {
+        put(&Of::<Y>::stage_coordinates(&point::<Of<Y>>(x), &point::<Of<Y>>(y)), q);
+    }
+
+    fn stage_rates(&self, x: &[f64], q: &[f64], y: &[f64], v: &[f64], rates: &mut [f64]) {
+        if Of::<Y>::RATES_ARE_VELOCITIES {
+            return rates.copy_from_slice(v);
         }
-        let production = with_entries::<Of<Y>, _>(&y, |y| self.velocity(t, y, rates))?;
-        if !Of::<Y>::RATES_ARE_VELOCITIES {
-            put(&Of::<Y>::stage_rates(&x, (&q, &y), &column(rates)), rates);
-        }
-        Some(production)
+        let (x, y) = (point::<Of<Y>>(x), point::<Of<Y>>(y));
+        put(&Of::<Y>::stage_rates(&x, (&column(q), &y), &column(v)), rates);
     }
 
     fn model(&self) -> Option<&dyn Model> {
@@ -589,7 +613,5 @@ impl<Y: Metriplectic + ?Sized> Model for InNumbers<'_, Y> {
 
 /// The sizes of the coordinates at a point, all of them positive.
 pub(crate) fn units_at<Y: Metriplectic + ?Sized>(system: &Y, x: &Point<Y>) -> Vector<Of<Y>> {
-    let system = InNumbers(system);
-    let judge = Judge::of(&system, 0.0);
-    column(&judge.coordinate_scales(&Of::<Y>::entries(x)).units)
+    column(&coordinate_scales(&InNumbers(system), 0.0, &Of::<Y>::entries(x)).units)
 }

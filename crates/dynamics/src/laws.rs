@@ -1,6 +1,6 @@
 //! The laws of brackets and dissipations, and the functions that check them.
 
-use metriplectic_equations::judge::{BracketDefects, Judge};
+use metriplectic_equations::judge::{BracketDefects, bracket_defects, coordinate_scales};
 use metriplectic_fields::{
     BrokenLaw, ChartPoint, Column, Dimension, Matrix, ScalarField, Space, Square, Vector,
 };
@@ -38,10 +38,9 @@ pub fn bracket<Y: Metriplectic>(
     let exists = |_| BrokenLaw { law: "Π exists", size: f64::NAN, bound: 0.0 };
     let bracket = system.bracket();
     let (system_in_numbers, entries) = (InNumbers(system), Y::Manifold::entries(x));
-    let judge = Judge::of(&system_in_numbers, 0.0);
-    let units = judge.coordinate_scales(&entries).units;
+    let units = coordinate_scales(&system_in_numbers, 0.0, &entries).units;
     let BracketDefects { size: tensor_size, skewness, jacobi, .. } =
-        judge.bracket_defects(&entries, &units).map_err(exists)?;
+        bracket_defects(&system_in_numbers, 0.0, &entries, &units).map_err(exists)?;
     let round_off = round_off::<Y::Manifold>;
     BrokenLaw::unless("Π is skew", skewness.size, round_off(skewness.terms))?;
     if bracket.is_poisson() {

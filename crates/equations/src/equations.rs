@@ -28,7 +28,7 @@ pub struct Sizes {
 ///
 /// Laws ([`laws::equations`](crate::laws::equations)): 1. the differentials are those of the values; 2. `⟨dH, x'⟩ = 0` and
 /// `⟨dL_a, x'⟩ = 0`; 3. `⟨dS, x'⟩` is the production, and not negative; 4. `φ_x(0) = x`, and the coordinates are the
-/// inverse of the chart; 5. the rates at the stage `ψ_x(0)` are the velocity.
+/// inverse of the chart; 5. `ψ_x(0) = x`, and the rates there are the velocity.
 pub trait Equations {
     /// Returns the lengths of all slices. They do not change.
     fn sizes(&self) -> Sizes;
@@ -92,12 +92,23 @@ pub trait Equations {
         q.iter().all(|q| q.is_finite())
     }
 
-    /// Computes the rates `q'` at the stage `ψ_x(q)` of an explicit method, and returns the production there; `None` where the stage
-    /// has no velocity or is outside of the domain. The chart `ψ_x` agrees with `φ_x` to first order and may be
-    /// cheaper. The default is the velocity at `x + q`.
-    fn stage(&self, t: f64, x: &[f64], q: &[f64], rates: &mut [f64]) -> Option<f64> {
-        let y: Vec<f64> = x.iter().zip(q).map(|(x, q)| x + q).collect();
-        self.velocity(t, &y, rates)
+    /// Computes the state `y = ψ_x(q)` at which an explicit method takes a stage; returns `false` beyond the edge of this chart
+    /// or of the domain. The chart `ψ_x` agrees with `φ_x` to first order and may be cheaper. The default is `φ_x`.
+    fn stage_state(&self, x: &[f64], q: &[f64], y: &mut [f64]) -> bool {
+        self.chart(x, q, y);
+        y.iter().all(|y| y.is_finite())
+    }
+
+    /// Computes the coordinates `q = ψ_x⁻¹(y)`. The default is `φ_x⁻¹(y)`.
+    fn stage_coordinates(&self, x: &[f64], y: &[f64], q: &mut [f64]) {
+        let _ = self.coordinates(x, y, q);
+    }
+
+    /// Computes the rates `q'` at `y = ψ_x(q)` of the velocity `v` in the frame at `y`. The default is `v`, as in charts that are
+    /// translations.
+    fn stage_rates(&self, x: &[f64], q: &[f64], y: &[f64], v: &[f64], rates: &mut [f64]) {
+        let _ = (x, q, y);
+        rates.copy_from_slice(v);
     }
 
     /// Returns the parts of the system apart, if they are known.

@@ -13,8 +13,8 @@ const CANCELS: f64 = 1e-9;
 ///
 /// 1. every slice is filled; 2. `φ_x(0) = x`, and the coordinates of `φ_x(u)` are `u`; 3. the values of the differentials are
 ///    the values; 4. `⟨dF, u⟩` is the derivative of each law along `φ_x(su)`; 5. the velocity conserves the energy and
-///    the further invariants, and `⟨dS, x'⟩` is the production, which is not negative; 6. the rates at `ψ_x(0)` are the
-///    velocity.
+///    the further invariants, and `⟨dS, x'⟩` is the production, which is not negative; 6. `ψ_x(0) = x`, the rates
+///    there are the velocity, and the stage coordinates are the inverse of `ψ_x`.
 ///
 /// The fifth law is that of a closed system.
 ///
@@ -65,8 +65,15 @@ pub fn equations(system: &dyn Equations, t: f64, x: &[f64], u: &[f64]) -> Result
             BrokenLaw::unless("the velocity conserves H and L_a", slope.abs(), CANCELS * terms)?;
         }
     }
-    if system.stage(t, x, &vec![0.0; n], &mut rates).is_some() {
+    let still = vec![0.0; n];
+    if system.stage_state(x, &still, &mut y) {
+        near("ψ_x(0) = x", &y, x)?;
+        system.stage_rates(x, &still, &y, &v, &mut rates);
         near("the rates at ψ_x(0) are the velocity", &rates, &v)?;
+    }
+    if system.stage_state(x, u, &mut y) {
+        system.stage_coordinates(x, &y, &mut q);
+        near("ψ_x⁻¹(ψ_x(u)) = u", &q, u)?;
     }
     Ok(())
 }

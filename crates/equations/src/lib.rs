@@ -34,6 +34,7 @@ pub mod metric_error;
 pub mod model;
 pub mod model_error;
 pub mod point_error;
+mod pointers;
 pub mod report;
 pub mod room;
 pub mod second_law;

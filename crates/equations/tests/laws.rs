@@ -20,6 +20,7 @@ enum Fault {
     Velocity,
     Production,
     Stage,
+    StageRates,
     ValueByItself,
     DifferentialByItself,
     Hessian,
@@ -122,12 +123,13 @@ impl Equations for Body {
         true
     }
 
-    fn stage(&self, t: f64, x: &[f64], q: &[f64], rates: &mut [f64]) -> Option<f64> {
-        let mut y = [0.0; N];
-        self.chart(x, q, &mut y);
-        let production = self.velocity(t, &y, rates);
-        rates[1] += 1e-3 * self.has(Fault::Stage);
-        production
+    fn stage_coordinates(&self, x: &[f64], y: &[f64], q: &mut [f64]) {
+        (0..N).for_each(|i| q[i] = (y[i] - x[i]) * (1.0 + 1e-3 * self.has(Fault::Stage)));
+    }
+
+    fn stage_rates(&self, _: &[f64], _: &[f64], _: &[f64], v: &[f64], rates: &mut [f64]) {
+        rates.copy_from_slice(v);
+        rates[1] += 1e-3 * self.has(Fault::StageRates);
     }
 
     fn model(&self) -> Option<&dyn Model> {
@@ -301,7 +303,8 @@ fn each_wrong_answer_breaks_the_law_of_its_name() {
         (Fault::Coordinates, "φ_x⁻¹(φ_x(u)) = u"),
         (Fault::Velocity, "the velocity conserves H and L_a"),
         (Fault::Production, "⟨dS, x'⟩ is the production"),
-        (Fault::Stage, "the rates at ψ_x(0) are the velocity"),
+        (Fault::Stage, "ψ_x⁻¹(ψ_x(u)) = u"),
+        (Fault::StageRates, "the rates at ψ_x(0) are the velocity"),
         (Fault::ValueByItself, "a law by itself has its value"),
         (Fault::DifferentialByItself, "a law by itself has its differential"),
         (Fault::Hessian, "a Hessian is the derivative of the differential"),

@@ -3,7 +3,9 @@
 //! A condition may hold at the start by a symmetry, or because an entry is zero. So it is judged at points around it too, in
 //! units that do not vanish.
 
-use metriplectic_equations::judge::{Derivatives, Judge, Mismatch, OF_SOLUTIONS, RADIUS};
+use metriplectic_equations::judge::{
+    Derivatives, Mismatch, OF_SOLUTIONS, RADIUS, coordinate_scales, draw,
+};
 use metriplectic_fields::{ChartPoint, Column, Dimension as _, Real, ScalarField, Space, Vector};
 use metriplectic_manifolds::{Manifold, MetricError};
 use rand::SeedableRng;
@@ -35,11 +37,11 @@ impl<M: Manifold> Around<M> {
     /// Draws points around a start.
     pub fn of<Y: Metriplectic<Manifold = M> + ?Sized>(system: &Y, x0: &Point<Y>) -> Self {
         let (system, entries) = (InNumbers(system), M::entries(x0));
-        let judge = Judge::of(&system, 0.0);
-        let sizes = judge.coordinate_scales(&entries);
+        let sizes = coordinate_scales(&system, 0.0, &entries);
         let mut rng = ChaCha8Rng::seed_from_u64(SEED);
         let mut points = vec![x0.clone()];
-        let drawn = (0..POINTS).filter_map(|_| judge.draw(&entries, &sizes, RADIUS, &mut rng));
+        let drawn =
+            (0..POINTS).filter_map(|_| draw((&system, 0.0, &entries), &sizes, RADIUS, &mut rng));
         points.extend(drawn.map(|x| point::<M>(&x)));
         Self { points, units: Column::from_index(|i| sizes.units[i]) }
     }

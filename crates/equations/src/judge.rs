@@ -32,6 +32,7 @@ pub use self::balance::Violation;
 pub use self::bracket::BracketDefects;
 pub use self::derivatives::{Derivatives, Mismatch, OF_SOLUTIONS, Rounding, Values};
 pub use self::sampling::CoordinateScales;
+pub use self::table::Row;
 
 use rand::rngs::ChaCha8Rng;
 
@@ -227,7 +228,7 @@ pub fn draw(
     rng: &mut ChaCha8Rng,
 ) -> Option<Vec<f64>> {
     let inside = |at: At<'_>| at.model.defect(at.x).is_finite() && value_not_finite(at).is_none();
-    sizes.draw(At { model, t, x }, radius, rng, &mut 0, inside).map(|(y, _)| y)
+    sizes.draw(At { model, t, x }, radius, rng, &mut 0, inside).map(|(y, _)| y.to_vec())
 }
 
 /// Evaluates the skewness and the Jacobi identity of the bracket of a model in coordinates of the sizes `units`.

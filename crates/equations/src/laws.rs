@@ -3,7 +3,7 @@
 //! They tell whether an adapter answers what it is asked: each answer is compared with another one that follows from it.
 //! Whether the model keeps the laws of a metriplectic system is what the [judge](crate::judge) says.
 
-use crate::judge::{Derivatives, OF_SOLUTIONS};
+use crate::judge::{Derivatives, OF_SOLUTIONS, Row};
 use crate::{BrokenLaw, Covectors, ENTROPY, Equations, Jet, Model, Part, Sizes};
 
 /// The rest of terms that should cancel, relative to them: closures may lose some digits.
@@ -103,7 +103,7 @@ pub fn model(system: &dyn Model, t: f64, x: &[f64], u: &[f64]) -> Result<(), Bro
         derivative("the slopes of the metric are its derivatives", &along, &|s, to| {
             let mut g = nan(n * n);
             system.metric(x, &scaled(u, s), &mut g);
-            to.append(&mut g);
+            to.extend(g);
         })?;
     }
 
@@ -149,7 +149,7 @@ fn one_law(
     derivative("a Hessian is the derivative of the differential", &along, &|s, to| {
         let mut df = nan(n);
         system.differential_at(law, t, x, &scaled(u, s), &mut df);
-        to.append(&mut df);
+        to.extend(df);
     })
 }
 
@@ -278,14 +278,14 @@ fn near(law: &'static str, found: &[f64], expected: &[f64]) -> Result<(), Broken
 fn derivative(
     law: &'static str,
     df: &[f64],
-    values: &dyn Fn(f64, &mut Vec<f64>),
+    values: &dyn Fn(f64, &mut Row),
 ) -> Result<(), BrokenLaw> {
     let largest = df.iter().fold(0.0_f64, |most, df| most.max(df.abs()));
     let unit = if largest > 0.0 { largest } else { 1.0 };
     let derivatives = Derivatives {
         scale: 1.0,
-        df: df.to_vec(),
-        units: vec![unit; df.len()],
+        df: Row::from_slice(df),
+        units: Row::from_elem(unit, df.len()),
         rounding: OF_SOLUTIONS,
     };
     let mismatch = derivatives.compare(&|s, to| {

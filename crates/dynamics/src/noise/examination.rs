@@ -4,7 +4,7 @@
 //! units that do not vanish.
 
 use metriplectic_equations::judge::{
-    Derivatives, Mismatch, OF_SOLUTIONS, RADIUS, coordinate_scales, draw,
+    Derivatives, Mismatch, OF_SOLUTIONS, RADIUS, Row, coordinate_scales, draw,
 };
 use metriplectic_fields::{ChartPoint, Column, Dimension as _, Real, ScalarField, Space, Vector};
 use metriplectic_manifolds::{Manifold, MetricError};
@@ -62,9 +62,9 @@ impl<M: Manifold> Around<M> {
     pub fn lost_in_measure(&self, measure: &impl ScalarField<M>) -> Option<[f64; 2]> {
         let u = self.direction();
         self.at_most_points(|x| {
-            let df = vec![measure.jet1(x).df.dot(&u)];
-            let derivatives =
-                Derivatives { scale: 1.0, df, units: vec![1.0], rounding: OF_SOLUTIONS };
+            let df = Row::from_slice(&[measure.jet1(x).df.dot(&u)]);
+            let units = Row::from_slice(&[1.0]);
+            let derivatives = Derivatives { scale: 1.0, df, units, rounding: OF_SOLUTIONS };
             let compared = derivatives.compare(&|t, values| {
                 values.push(measure.at::<f64>(&M::chart(x, &(u * t))));
                 Some(())
@@ -104,8 +104,8 @@ impl<M: Manifold> Around<M> {
                 let rate = or_one(term[0].abs());
                 std::iter::once(rate).chain((0..n).map(move |i| or_one(size * self.units[i])))
             });
-            let derivatives =
-                Derivatives { scale: 1.0, df, units: units.collect(), rounding: OF_SOLUTIONS };
+            let (df, units) = (df.into(), units.collect());
+            let derivatives = Derivatives { scale: 1.0, df, units, rounding: OF_SOLUTIONS };
             let compared = derivatives.compare(&|t, values| {
                 let at = ChartPoint { base: x.clone(), q: u * t };
                 values.extend(entries(&place_at(system, &at), |a| a.re)?);

@@ -1,6 +1,6 @@
 //! A state at which laws are checked.
 
-use super::table::Table;
+use super::table::{Row, Table, zeros};
 use crate::{Covectors, ENERGY, ENTROPY, MetricError, Model, ModelError, Part};
 
 /// A model at a state and a time.
@@ -15,7 +15,7 @@ pub(crate) struct At<'a> {
 #[derive(Clone, Debug)]
 pub(crate) struct Jet2 {
     pub(crate) value: f64,
-    pub(crate) df: Vec<f64>,
+    pub(crate) df: Row,
     pub(crate) hf: Table,
 }
 
@@ -60,14 +60,14 @@ impl<'a> At<'a> {
     }
 
     /// The state `φ_x(q)`.
-    pub(crate) fn chart(&self, q: &[f64]) -> Vec<f64> {
-        let mut y = vec![0.0; self.x.len()];
+    pub(crate) fn chart(&self, q: &[f64]) -> Row {
+        let mut y = zeros(self.x.len());
         self.model.chart(self.x, q, &mut y);
         y
     }
 
-    pub(crate) fn scales(&self) -> Vec<f64> {
-        let mut sizes = vec![0.0; self.n()];
+    pub(crate) fn scales(&self) -> Row {
+        let mut sizes = zeros(self.n());
         self.model.scales(self.x, &mut sizes);
         sizes
     }
@@ -77,14 +77,14 @@ impl<'a> At<'a> {
     }
 
     /// The value and the differential of a law.
-    pub(super) fn jet(&self, law: usize) -> (f64, Vec<f64>) {
-        let mut df = vec![0.0; self.n()];
+    pub(super) fn jet(&self, law: usize) -> (f64, Row) {
+        let mut df = zeros(self.n());
         (self.model.jet(law, self.t, self.x, &mut df), df)
     }
 
     pub(crate) fn jet2(&self, law: usize) -> Jet2 {
         let n = self.n();
-        let (mut df, mut hf) = (vec![0.0; n], Table::zeros(n));
+        let (mut df, mut hf) = (zeros(n), Table::zeros(n));
         let value = self.model.hessian(law, self.t, self.x, &mut df, hf.entries_mut());
         Jet2 { value, df, hf }
     }
@@ -112,9 +112,9 @@ impl<'a> At<'a> {
         part: Part,
         w: Covectors<'_>,
         alpha: &[f64],
-    ) -> Result<Vec<f64>, MetricError> {
-        let zero = vec![0.0; self.n()];
-        let mut v = vec![0.0; self.n()];
+    ) -> Result<Row, MetricError> {
+        let zero = zeros(self.n());
+        let mut v = zeros(self.n());
         self.model.apply(part, self.t, (self.x, &zero), w, alpha, &mut v)?;
         Ok(v)
     }
@@ -128,7 +128,7 @@ impl<'a> At<'a> {
     ) -> Result<PartJet, MetricError> {
         let n = self.n();
         let [mut along_x, mut along_w, mut tensor] = [0; 3].map(|_| Table::zeros(n));
-        let mut value = vec![0.0; n];
+        let mut value = zeros(n);
         let mut jet = crate::Jet {
             value: &mut value,
             along_x: along_x.entries_mut(),
@@ -152,7 +152,7 @@ impl<'a> At<'a> {
 
 /// A vector with its derivatives.
 pub(super) struct PartJet {
-    pub(super) value: Vec<f64>,
+    pub(super) value: Row,
     pub(super) along_x: Table,
     pub(super) along_w: Table,
     pub(super) tensor: Table,

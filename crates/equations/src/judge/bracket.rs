@@ -6,7 +6,7 @@ use rand::{RngExt, SeedableRng};
 use super::at::{At, Jet2, Place};
 use super::balance::{self, Balance, ROUNDING, Violation, asymmetry, largest, worse};
 use super::findings::Findings;
-use super::table::Table;
+use super::table::{Row, Table, zeros};
 use crate::{Covectors, ENERGY, MetricError, ModelError, Part, SecondLaw};
 
 /// A Poisson tensor at one state, and the largest violations of its laws relative to the terms that should
@@ -100,7 +100,7 @@ impl Here<'_> {
         let n = at.n();
         let mut slopes = Vec::with_capacity(n);
         for l in 0..n {
-            let mut along = vec![0.0; n];
+            let mut along = zeros(n);
             along[l] = 1.0;
             let ds = entropy.hf.times(&along);
             let mut slope = Table::zeros(n);
@@ -117,7 +117,7 @@ impl Here<'_> {
         let n = at.n();
         let mut rng = ChaCha8Rng::seed_from_u64(SEED);
         let mut covector =
-            || units.iter().map(|unit| rng.random_range(-1.0..1.0) / unit).collect::<Vec<_>>();
+            || units.iter().map(|unit| rng.random_range(-1.0..1.0) / unit).collect::<Row>();
         let top = largest(tensor, units);
         let (mut violation, mut is_finite) = (Violation::default(), true);
         for _ in 0..TRIPLES {
@@ -127,7 +127,7 @@ impl Here<'_> {
                 let [alpha, beta, gamma] = [0, 1, 2].map(|i| &w[(k + i) % 3]);
                 let along = tensor.times(alpha);
                 let ds = entropy.hf.times(&along);
-                let (along, mut slope) = ([&along[..], &ds], vec![0.0; n]);
+                let (along, mut slope) = ([&along[..], &ds], zeros(n));
                 let of = (&entropy.df[..], &gamma[..]);
                 at.model.bracket_slope_of(at.t, at.x, along, of.0, of.1, &mut slope)?;
                 // Each row is a term, because a derivative may be a rounding of large rows.

@@ -20,6 +20,8 @@
 //!
 //! by more than this bound. A wide bound decides nothing.
 
+use super::table::Row;
+
 /// The ratio of one `δ` to the next. With a half, values that are integers times some rounding would give the
 /// same wrong quotient again and again.
 const RATIO: f64 = 0.45;
@@ -51,7 +53,7 @@ pub(super) const OF_CLOSURES: Rounding = Rounding { itself: 1e-9, others: 64.0 *
 pub const OF_SOLUTIONS: Rounding = Rounding { itself: 1e-6, others: 1e-9 };
 
 /// Appends the values of all entries at a distance along the direction; `None` if there are no values.
-pub type Values<'a> = &'a dyn Fn(f64, &mut Vec<f64>) -> Option<()>;
+pub type Values<'a> = &'a dyn Fn(f64, &mut Row) -> Option<()>;
 
 /// A derivative that is not that of the values.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -68,9 +70,9 @@ pub struct Derivatives {
     /// The size of the coordinate along which they are taken.
     pub scale: f64,
     /// The derivatives.
-    pub df: Vec<f64>,
+    pub df: Row,
     /// The units of the entries.
-    pub units: Vec<f64>,
+    pub units: Row,
     /// Their rounding.
     pub rounding: Rounding,
 }
@@ -126,7 +128,7 @@ impl Derivatives {
     /// The quotients of all entries at `δ_k`; `None` where a value is not finite.
     fn quotients(&self, k: i32, f: Values<'_>) -> Option<Vec<Quotient>> {
         let (delta, n) = (self.scale * RATIO.powi(k), self.df.len());
-        let mut values = Vec::with_capacity(2 * n);
+        let mut values = Row::with_capacity(2 * n);
         f(delta, &mut values)?;
         f(-delta, &mut values)?;
         (0..n).map(|i| Quotient::of(delta, values[i], values[i + n])).collect()
@@ -135,7 +137,7 @@ impl Derivatives {
     /// Returns `Some` if each derivative agrees with a quotient of a narrow bound, whatever the rounding is.
     fn agree_at_once(&self, f: Values<'_>) -> Option<()> {
         let (deltas, n) = ([FIRST - 1, FIRST].map(|k| self.scale * RATIO.powi(k)), self.df.len());
-        let mut values = Vec::with_capacity(4 * n);
+        let mut values = Row::with_capacity(4 * n);
         for delta in deltas {
             f(delta, &mut values)?;
             f(-delta, &mut values)?;

@@ -3,7 +3,7 @@
 use super::at::{At, Place};
 use super::balance::{self, ROUNDING, TOLERANCE};
 use super::findings::Findings;
-use super::table::{Table, pairs};
+use super::table::{Row, Table, pairs};
 use crate::{Covectors, ENERGY, ModelError, Part};
 
 /// Checks that `K` is symmetric and positive semidefinite, and that it annihilates `dH` and the discrete
@@ -84,7 +84,7 @@ fn rounding(at: At<'_>, units: &[f64], k: &Table) -> Table {
             let sign = if (state >> (i % 2)) & 1 == 0 { 1.0 } else { -1.0 };
             sign * MOVED * unit / (1 + i % 3) as f64
         });
-        let y = at.chart(&q.collect::<Vec<_>>());
+        let y = at.chart(&q.collect::<Row>());
         let there = at.moved_to(&y);
         let (_, energy) = there.jet(ENERGY);
         // A dissipation does not depend on the covector of the entropy.

@@ -1,7 +1,7 @@
 //! The domain of a model: the states at which its parts have values.
 
 use super::at::{At, all_finite, dot, max_abs, name};
-use super::table::Table;
+use super::table::{Row, Table, zeros};
 use crate::{Covectors, ENERGY, ENTROPY, ModelError, Part};
 
 /// Finds a field whose value at a state is not a finite number.
@@ -10,7 +10,7 @@ pub(crate) fn value_not_finite(at: At<'_>) -> Option<ModelError> {
     let [(_, energy), (_, entropy)] = [ENERGY, ENTROPY].map(|law| at.jet(law));
     let w = Covectors { energy: &energy, entropy: &entropy };
     let mut metric = Table::zeros(n);
-    model.metric(at.x, &vec![0.0; n], metric.entries_mut());
+    model.metric(at.x, &zeros(n), metric.entries_mut());
     // If the metric cannot be used, it is reported, and not a part without a value.
     let of_tensor = |part| at.tensor(part, w).map_or(0.0, |tensor| tensor.max_abs());
     let of_force = || at.apply(Part::Force, w, &energy).map_or(0.0, |force| max_abs(&force));
@@ -33,7 +33,7 @@ pub(crate) fn value_not_finite(at: At<'_>) -> Option<ModelError> {
 /// zero if one of its factors is.
 pub(super) fn has_digits(at: At<'_>, law: usize) -> Result<(), ModelError> {
     let ((value, df), scales) = (at.jet(law), at.scales());
-    let slopes: Vec<f64> = df.iter().map(|slope| slope.abs()).collect();
+    let slopes: Row = df.iter().map(|slope| slope.abs()).collect();
     let size = value.abs() + dot(&slopes, &scales);
     // A product may be zero by underflow alone: ½q² and its term q·q at q = 10⁻²⁰⁰.
     let mut lost = df.iter().zip(&scales).map(|(&slope, &scale)| slope != 0.0 && scale > 0.0);

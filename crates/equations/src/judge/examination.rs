@@ -1,5 +1,6 @@
 //! The examination of a model: every law, at the start and at samples around it.
 
+use super::table::{Row, zeros};
 use rand::SeedableRng;
 use rand::rngs::ChaCha8Rng;
 
@@ -31,7 +32,7 @@ impl<'a> Examination<'a> {
     }
 
     /// Draws a state around the start at which the model has values.
-    pub(super) fn sample(&mut self, report: &mut Report) -> Option<Vec<f64>> {
+    pub(super) fn sample(&mut self, report: &mut Report) -> Option<Row> {
         let Self { start, sizes, radius, rng } = self;
         // Outside the domain of an open chart, where the defect is infinite, or of a field, there is no model.
         let inside =
@@ -76,14 +77,14 @@ impl<'a> Examination<'a> {
     /// ```
     ///
     /// It differs from `dH(x)` unless `H` is linear. `None` if the energy has no value nearby.
-    fn discrete_gradient(&mut self, at: At<'_>, energy: &Jet2) -> Option<Vec<f64>> {
+    fn discrete_gradient(&mut self, at: At<'_>, energy: &Jet2) -> Option<Row> {
         let Self { sizes, radius, rng, .. } = self;
         let n = at.n();
         let inside = |at: At<'_>| at.model.defect(at.x).is_finite() && at.value(ENERGY).is_finite();
         let (y, d) = sizes.draw(at, *radius, rng, &mut 0, inside)?;
-        let mut there = vec![0.0; n];
+        let mut there = zeros(n);
         at.model.differential_at(ENERGY, at.t, at.x, &d, &mut there);
-        let mean: Vec<f64> = (0..n).map(|i| (energy.df[i] + there[i]) * 0.5).collect();
+        let mean: Row = (0..n).map(|i| (energy.df[i] + there[i]) * 0.5).collect();
         let end = at.moved_to(&y).value(ENERGY);
         let along: Balance = (0..n).map(|i| -mean[i] * d[i]).collect();
         let defect = end - energy.value + along.sum();
@@ -92,10 +93,10 @@ impl<'a> Examination<'a> {
         if defect.abs() <= rounding {
             return Some(mean);
         }
-        let mut flat = vec![0.0; n];
+        let mut flat = zeros(n);
         at.model.flat(at.x, &d, &mut flat).ok()?;
         let factor = defect / dot(&flat, &d);
-        let w: Vec<f64> = (0..n).map(|i| mean[i] + flat[i] * factor).collect();
+        let w: Row = (0..n).map(|i| mean[i] + flat[i] * factor).collect();
         Some(if all_finite(&w) { w } else { mean })
     }
 }

@@ -3,8 +3,9 @@
 use super::at::{PartJet, Place};
 use super::derivatives::{Derivatives, Mismatch, OF_CLOSURES, OF_SOLUTIONS, Values};
 use super::dissipation::is_round_off;
-use super::table::Table;
+use super::table::{Row, Table, zeros};
 use crate::{Covectors, ENERGY, ENTROPY, ModelError, Part};
+use smallvec::smallvec;
 
 /// The derivatives of the tensors of a model at a state, evaluated once for all axes.
 pub(super) struct TensorSlopes {
@@ -75,8 +76,8 @@ struct Along<'a, 'b> {
 
 impl Along<'_, '_> {
     /// The displacement by `t`.
-    fn displacement(&self, t: f64) -> Vec<f64> {
-        let mut q = vec![0.0; self.place.units.len()];
+    fn displacement(&self, t: f64) -> Row {
+        let mut q = zeros(self.place.units.len());
         q[self.axis] = t;
         q
     }
@@ -96,8 +97,8 @@ impl Along<'_, '_> {
 
     fn scalar(&self, law: usize, df: &[f64]) -> Result<(), ModelError> {
         let at = self.place.at;
-        let (scale, df) = (self.place.units[self.axis], vec![df[self.axis]]);
-        let derivatives = Derivatives { scale, df, units: vec![1.0], rounding: OF_CLOSURES };
+        let (scale, df) = (self.place.units[self.axis], smallvec![df[self.axis]]);
+        let derivatives = Derivatives { scale, df, units: smallvec![1.0], rounding: OF_CLOSURES };
         self.compare(super::at::name(law), &derivatives, &|t, values| {
             values.push(at.moved_to(&at.chart(&self.displacement(t))).value(law));
             Some(())
@@ -108,9 +109,9 @@ impl Along<'_, '_> {
         let Some(slopes) = &slopes.metric else { return Ok(()) };
         let (at, sizes) = (self.place.at, self.place.units);
         let n = sizes.len();
-        let df = slopes[self.axis * n * n..][..n * n].to_vec();
+        let df = Row::from_slice(&slopes[self.axis * n * n..][..n * n]);
         let units = Table::from_entries(n, |i, j| (sizes[i] * sizes[j]).recip());
-        let units = units.entries().to_vec();
+        let units = units.entries().into();
         let derivatives = Derivatives { scale: sizes[self.axis], df, units, rounding: OF_CLOSURES };
         self.compare("metric", &derivatives, &|t, values| {
             let mut g = Table::zeros(n);
@@ -124,7 +125,8 @@ impl Along<'_, '_> {
         let Some(slopes) = &slopes.bracket else { return Ok(()) };
         let (units, alpha) = (self.place.units, generic(self.place.units));
         let (scale, df) = (units[self.axis], slopes.column(self.axis));
-        let derivatives = Derivatives { scale, df, units: units.to_vec(), rounding: OF_CLOSURES };
+        let derivatives =
+            Derivatives { scale, df, units: Row::from_slice(units), rounding: OF_CLOSURES };
         self.compare("bracket", &derivatives, &|t, values| {
             let w = self.place.differentials();
             self.append(Part::Bracket, &self.displacement(t), w, &alpha, values)
@@ -138,9 +140,9 @@ impl Along<'_, '_> {
         q: &[f64],
         w: Covectors<'_>,
         alpha: &[f64],
-        values: &mut Vec<f64>,
+        values: &mut Row,
     ) -> Option<()> {
-        let (at, mut v) = (self.place.at, vec![0.0; q.len()]);
+        let (at, mut v) = (self.place.at, zeros(q.len()));
         at.model.apply(part, at.t, (at.x, q), w, alpha, &mut v).ok()?;
         values.append(&mut v);
         Some(())
@@ -150,7 +152,8 @@ impl Along<'_, '_> {
         let &Place { units, ref energy, .. } = self.place;
         let (w, here, axis) = (&energy.df, self.place.differentials(), self.axis);
         let (scale, df) = (units[axis], jet.along_x.column(axis));
-        let along_x = Derivatives { scale, df, units: units.to_vec(), rounding: OF_SOLUTIONS };
+        let along_x =
+            Derivatives { scale, df, units: Row::from_slice(units), rounding: OF_SOLUTIONS };
         self.compare("dissipation", &along_x, &|t, values| {
             self.append(Part::Dissipation, &self.displacement(t), here, alpha, values)
         })?;
@@ -174,6 +177,6 @@ impl Along<'_, '_> {
 }
 
 /// A covector that involves every column of a tensor.
-fn generic(units: &[f64]) -> Vec<f64> {
+fn generic(units: &[f64]) -> Row {
     units.iter().enumerate().map(|(i, unit)| (1.0 + i as f64).sin() / unit).collect()
 }

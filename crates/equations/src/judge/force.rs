@@ -3,6 +3,7 @@
 use super::at::{Place, all_finite, dot};
 use super::balance::{self, worse};
 use super::findings::Findings;
+use super::table::{Row, zeros};
 use crate::{Covectors, ENERGY, ENTROPY, ModelError, Part, SecondLaw};
 
 /// Checks that `⟨w, f(w)⟩ = 0` for `dH` and for the discrete gradient `w`, and that `⟨dS, f⟩ ≥ 0` at the state
@@ -32,8 +33,8 @@ pub(super) fn examine(
         findings.note("⟨dH, force⟩ = 0", size, error);
     }
     if at.model.second_law() == SecondLaw::Exact {
-        let sizes: Vec<f64> = energy.df.iter().map(|w| w.abs()).collect();
-        let terms: Vec<f64> = (0..sizes.len())
+        let sizes: Row = energy.df.iter().map(|w| w.abs()).collect();
+        let terms: Row = (0..sizes.len())
             .map(|i| (0..sizes.len()).map(|j| jet.tensor[(i, j)].abs() * sizes[j]).sum())
             .collect();
         let differentials = [energy.df.clone(), entropy.df.clone()];
@@ -54,7 +55,7 @@ const STEP: f64 = 0.1;
 
 /// The mean differentials of energy and entropy along a step around the state, by Simpson's rule: the
 /// covectors that a scheme has there, up to its order. `force` are the absolute terms of the force.
-fn covectors_of_a_step(place: &Place<'_>, force: &[f64]) -> Option<[Vec<f64>; 2]> {
+fn covectors_of_a_step(place: &Place<'_>, force: &[f64]) -> Option<[Row; 2]> {
     let &Place { at, units, ref energy, ref entropy } = place;
     let n = units.len();
     let tensor = at.tensor(Part::Bracket, place.differentials()).ok()?;
@@ -63,18 +64,18 @@ fn covectors_of_a_step(place: &Place<'_>, force: &[f64]) -> Option<[Vec<f64>; 2]
         (reversible + force[i]) / units[i]
     };
     let rate = (0..n).map(term).fold(0.0, f64::max);
-    let mut velocity = vec![0.0; n];
+    let mut velocity = zeros(n);
     at.model.velocity(at.t, at.x, &mut velocity)?;
     let factor = 0.5 * STEP / rate;
     let means = [(ENERGY, energy), (ENTROPY, entropy)].map(|(law, here)| {
         let end = |sign: f64| {
-            let q: Vec<f64> = velocity.iter().map(|v| v * factor * sign).collect();
-            let mut df = vec![0.0; n];
+            let q: Row = velocity.iter().map(|v| v * factor * sign).collect();
+            let mut df = zeros(n);
             at.model.differential_at(law, at.t, at.x, &q, &mut df);
             df
         };
         let (before, after) = (end(-1.0), end(1.0));
-        (0..n).map(|i| (before[i] + here.df[i] * 4.0 + after[i]) * (1.0 / 6.0)).collect::<Vec<_>>()
+        (0..n).map(|i| (before[i] + here.df[i] * 4.0 + after[i]) * (1.0 / 6.0)).collect::<Row>()
     });
     // A step may lead out of the domain of the model.
     means.iter().all(|mean| all_finite(mean)).then_some(means)

@@ -5,7 +5,7 @@ use super::balance::{self, Balance, TOLERANCE, worse};
 use super::dissipation;
 use super::findings::Findings;
 use super::sampling;
-use super::table::{Table, pairs};
+use super::table::{Row, Table, pairs, zeros};
 use crate::{Covectors, ENERGY, ENTROPY, Kind, ModelError, Part};
 
 /// Checks that each further invariant has finite derivatives, is conserved by the bracket as its kind says, and
@@ -35,7 +35,7 @@ impl Invariance<'_, '_, '_> {
     }
 
     /// Checks that it is conserved, and returns its differential.
-    fn conserved(&mut self) -> Result<Vec<f64>, ModelError> {
+    fn conserved(&mut self) -> Result<Row, ModelError> {
         let &Place { at, units, ref energy, .. } = self.place;
         let dl = at.finite_jet2(self.law)?.df;
         let kind = at.model.kind(self.index());
@@ -74,7 +74,7 @@ impl Invariance<'_, '_, '_> {
     fn symmetric(&mut self, dj: &[f64]) -> Result<(), ModelError> {
         let (index, &Place { at, units, ref energy, .. }) = (self.index(), self.place);
         let n = units.len();
-        let (mut generator, mut at_rest) = (vec![0.0; n], vec![0.0; n]);
+        let (mut generator, mut at_rest) = (zeros(n), zeros(n));
         if !at.model.generator(index, at.x, &mut generator, &mut at_rest) {
             return Ok(());
         }
@@ -83,7 +83,7 @@ impl Invariance<'_, '_, '_> {
         let moves = generator.iter().zip(units).map(|(v, unit)| (v / unit).abs());
         let rate = moves.fold(0.0, f64::max);
         let far = if rate > 0.0 { FAR / rate } else { FAR };
-        let (mut y, mut tangent) = (vec![0.0; at.x.len()], Table::zeros(n));
+        let (mut y, mut tangent) = (zeros(at.x.len()), Table::zeros(n));
         at.model.action(index, at.x, far, &mut y, tangent.entries_mut());
 
         let moved = at.moved_to(&y);

@@ -1,7 +1,9 @@
 //! The laws of a system of which nothing is known but its laws and its velocity.
 
+use super::table::{Row, zeros};
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
+use smallvec::smallvec;
 
 use super::at::{all_finite, name};
 use super::balance::{self, Balance};
@@ -30,10 +32,10 @@ pub(super) struct Motion<'a> {
 
 /// What is evaluated at a state.
 struct Here {
-    values: Vec<f64>,
+    values: Row,
     /// The differentials, one after another.
-    w: Vec<f64>,
-    v: Vec<f64>,
+    w: Row,
+    v: Row,
     production: f64,
 }
 
@@ -48,7 +50,7 @@ impl<'a> Motion<'a> {
     /// The laws, their differentials and the velocity, which must have values.
     fn here(&self) -> Result<Here, ModelError> {
         let Sizes { directions: n, laws, .. } = self.system.sizes();
-        let (mut values, mut w, mut v) = (vec![0.0; laws], vec![0.0; laws * n], vec![0.0; n]);
+        let (mut values, mut w, mut v) = (zeros(laws), zeros(laws * n), zeros(n));
         self.system.differentials(self.t, self.x, &mut values, &mut w);
         let point = || self.x.to_vec();
         for (law, row) in w.chunks_exact(n).enumerate() {
@@ -72,8 +74,8 @@ impl<'a> Motion<'a> {
 
     /// The sizes of the coordinates, all of them positive: where an entry is zero, the distance over which the energy
     /// changes by the sum of its terms.
-    fn units(&self, here: &Here) -> Vec<f64> {
-        let mut units = vec![0.0; here.v.len()];
+    fn units(&self, here: &Here) -> Row {
+        let mut units = zeros(here.v.len());
         self.system.scales(self.x, &mut units);
         let terms: f64 = here.w.iter().zip(&units).map(|(w, size)| (w * size).abs()).sum();
         for (unit, slope) in units.iter_mut().zip(&here.w) {
@@ -92,11 +94,11 @@ impl<'a> Motion<'a> {
         (units, radius): (&[f64], f64),
         rng: &mut ChaCha8Rng,
         passed_over: &mut usize,
-    ) -> Option<Vec<f64>> {
-        let mut y = vec![0.0; self.x.len()];
+    ) -> Option<Row> {
+        let mut y = zeros(self.x.len());
         (0..=DRAWS).find_map(|draw| {
             let reach = radius * 0.25_f64.powi(draw);
-            let q: Vec<f64> =
+            let q: Row =
                 units.iter().map(|unit| reach * unit * rng.random_range(-1.0..1.0)).collect();
             self.system.chart(self.x, &q, &mut y);
             let found = self.system.defect(&y).is_finite() && self.moved_to(&y).here().is_ok();
@@ -182,12 +184,13 @@ impl<'a> Motion<'a> {
         let n = units.len();
         // A law whose derivative is wrong is judged by itself: its entries have units of their own.
         (0..here.values.len()).try_for_each(|law| {
-            let df = vec![here.w[law * n + axis]];
+            let df = smallvec![here.w[law * n + axis]];
             let scale = units[axis];
-            let derivatives = Derivatives { scale, df, units: vec![1.0], rounding: OF_CLOSURES };
+            let derivatives =
+                Derivatives { scale, df, units: smallvec![1.0], rounding: OF_CLOSURES };
             let mismatch = derivatives.compare(&|s, to| {
-                let (mut q, mut y) = (vec![0.0; n], vec![0.0; self.x.len()]);
-                let mut values = vec![0.0; here.values.len()];
+                let (mut q, mut y) = (zeros(n), zeros(self.x.len()));
+                let mut values = zeros(here.values.len());
                 q[axis] = s;
                 self.system.chart(self.x, &q, &mut y);
                 self.system.values(self.t, &y, &mut values);
@@ -210,7 +213,7 @@ impl<'a> Motion<'a> {
         let (mut rng, mut first) = (ChaCha8Rng::seed_from_u64(SEED), Ok(()));
         for sample in 0..=SAMPLES {
             let drawn = match sample {
-                0 => Some(self.x.to_vec()),
+                0 => Some(Row::from_slice(self.x)),
                 _ => self.draw((&units, radius), &mut rng, &mut report.passed_over),
             };
             let Some(x) = drawn else { continue };
@@ -221,7 +224,7 @@ impl<'a> Motion<'a> {
             let axes = if sample == 0 { 0..n } else { (sample - 1) * each..sample * each };
             let compared =
                 axes.map(|axis| axis % n).try_for_each(|axis| at.along(&here, &units, axis));
-            let mut findings = Findings { point: x.clone(), laws: &mut report.laws, first: None };
+            let mut findings = Findings { point: x.to_vec(), laws: &mut report.laws, first: None };
             at.laws(&here, &units, |law, size, error| findings.note(law, size, error));
             first = first.and(compared).and(findings.first.map_or(Ok(()), Err));
         }

@@ -21,7 +21,7 @@ use super::domain::value_not_finite;
 use super::fields::compare_scalars;
 use super::sampling::CoordinateScales;
 use super::sums::Rounded;
-use super::table::Table;
+use super::table::{Table, zeros};
 use super::{RADIUS, SAMPLES, dissipation, sums};
 use crate::room::with_numbers;
 use crate::{Covectors, ENERGY, ENTROPY, Kind, ModelError, Part, SecondLaw};
@@ -239,7 +239,7 @@ impl Reached<'_> {
     /// Returns whether the differentials are finite, where nothing else can be judged.
     fn values(&self) -> Result<(), ModelError> {
         let n = self.at.n();
-        let (mut numbers, mut work) = (vec![0.0; 2 * n], vec![0.0; n * n]);
+        let (mut numbers, mut work) = (zeros(2 * n), zeros(n * n));
         let (value, rounding) = numbers.split_at_mut(n);
         let mut room = [value, rounding];
         [ENERGY, ENTROPY]

@@ -1,5 +1,6 @@
 //! The states at which a model is judged: the start, and states around it at which it has values.
 
+use super::table::Row;
 use rand::RngExt;
 use rand::rngs::ChaCha8Rng;
 
@@ -16,9 +17,9 @@ const NEGLIGIBLE: f64 = 1e-6;
 #[derive(Clone, Debug)]
 pub struct CoordinateScales {
     /// The sizes that round-off and difference quotients are relative to. They are positive.
-    pub units: Vec<f64>,
+    pub units: Row,
     /// The sizes of the entries themselves wherever they are not zero, however small.
-    own: Vec<f64>,
+    own: Row,
 }
 
 impl CoordinateScales {
@@ -46,7 +47,7 @@ impl CoordinateScales {
             let distance = known.unwrap_or(others);
             if own <= NEGLIGIBLE * distance { distance } else { own }
         });
-        let units: Vec<f64> = units.collect();
+        let units: Row = units.collect();
         let own = own.iter().zip(&units).map(|(&own, &unit)| if own > 0.0 { own } else { unit });
         Self { own: own.collect(), units }
     }
@@ -60,11 +61,11 @@ impl CoordinateScales {
         rng: &mut ChaCha8Rng,
         passed_over: &mut usize,
         accepted: impl Fn(At<'_>) -> bool,
-    ) -> Option<(Vec<f64>, Vec<f64>)> {
+    ) -> Option<(Row, Row)> {
         (0..=DRAWS).find_map(|draw| {
             let sizes = if draw == 0 { &self.units } else { &self.own };
             let reach = radius * 0.25_f64.powi(draw);
-            let q: Vec<f64> =
+            let q: Row =
                 sizes.iter().map(|size| reach * size * rng.random_range(-1.0..1.0)).collect();
             let y = at.chart(&q);
             let found = accepted(at.moved_to(&y));
@@ -85,7 +86,7 @@ pub(super) fn terms(jet: &Jet2, sizes: &[f64]) -> f64 {
 
 /// The distance along each direction over which a field changes by the size of its terms; at a state of zeros by the
 /// least change over a distance of 1.
-fn distances(jet: &Jet2, sizes: &[f64]) -> Vec<f64> {
+fn distances(jet: &Jet2, sizes: &[f64]) -> Row {
     let over_one = |i: usize| jet.df[i].abs() + 0.5 * jet.hf[(i, i)].abs();
     let least = || {
         let changes = (0..sizes.len()).map(over_one).filter(|&change| change > 0.0);

@@ -2,18 +2,28 @@
 
 use std::ops::{Index, IndexMut};
 
+use smallvec::{SmallVec, smallvec};
+
+/// Numbers in a row, without an allocation where they are few.
+pub type Row = SmallVec<[f64; 8]>;
+
+/// So many zeros.
+pub(super) fn zeros(count: usize) -> Row {
+    smallvec![0.0; count]
+}
+
 /// The entries of a square matrix.
 #[derive(Clone, Debug)]
 pub(crate) struct Table {
     n: usize,
     /// Row by row.
-    entries: Vec<f64>,
+    entries: SmallVec<[f64; 64]>,
 }
 
 impl Table {
     /// Makes the table of zeros.
     pub(crate) fn zeros(n: usize) -> Self {
-        Self { n, entries: vec![0.0; n * n] }
+        Self { n, entries: smallvec![0.0; n * n] }
     }
 
     /// Makes the table of the entries `f(i, j)`.
@@ -37,12 +47,12 @@ impl Table {
     }
 
     /// The column `j`.
-    pub(super) fn column(&self, j: usize) -> Vec<f64> {
+    pub(super) fn column(&self, j: usize) -> Row {
         (0..self.n).map(|i| self[(i, j)]).collect()
     }
 
     /// The product with a vector.
-    pub(super) fn times(&self, v: &[f64]) -> Vec<f64> {
+    pub(super) fn times(&self, v: &[f64]) -> Row {
         self.entries.chunks_exact(self.n).map(|row| super::at::dot(row, v)).collect()
     }
 

@@ -22,6 +22,27 @@ pub(super) fn make_positive(sizes: &mut [f64]) {
     }
 }
 
+/// Calls a function of sums in an instance for small sizes, or in that for any.
+macro_rules! by_size {
+    ($n:expr, $sum:ident($($argument:expr),*)) => {
+        match $n {
+            1 => $sum::<1>($($argument),*),
+            2 => $sum::<2>($($argument),*),
+            3 => $sum::<3>($($argument),*),
+            4 => $sum::<4>($($argument),*),
+            5 => $sum::<5>($($argument),*),
+            6 => $sum::<6>($($argument),*),
+            _ => $sum::<0>($($argument),*),
+        }
+    };
+}
+
+/// The number of directions, which the instance `N` knows, and that for any size, 0, does not.
+#[inline(always)]
+fn size<const N: usize>(units: &[f64]) -> usize {
+    if N == 0 { units.len() } else { N }
+}
+
 /// A sum and the sizes of its terms.
 #[derive(Clone, Copy, Default)]
 struct Sum {
@@ -43,8 +64,14 @@ impl Sum {
 }
 
 /// Computes the largest relative size of a row of `A w`.
-pub(super) fn product(a: &[f64], [w, rounding]: Rounded<'_>, units: &[f64]) -> f64 {
-    let n = units.len();
+pub(super) fn product(a: &[f64], w: Rounded<'_>, units: &[f64]) -> f64 {
+    by_size!(units.len(), product_of(a, w, units))
+}
+
+#[inline(always)]
+fn product_of<const N: usize>(a: &[f64], [w, rounding]: Rounded<'_>, units: &[f64]) -> f64 {
+    let n = size::<N>(units);
+    let (a, units, w, rounding) = (&a[..n * n], &units[..n], &w[..n], &rounding[..n]);
     let row = |i: usize| {
         let mut row = Sum::default();
         (0..n).for_each(|j| row.add(a[i * n + j] * w[j], a[i * n + j] * rounding[j]));
@@ -85,8 +112,10 @@ pub(super) fn pairing([alpha, rounding]: Rounded<'_>, v: &[f64], units: &[f64]) 
 }
 
 /// The largest entry of a tensor on covectors in the given units; 0 where it has lost its digits.
-fn largest(a: &[f64], units: &[f64]) -> f64 {
-    let n = units.len();
+#[inline(always)]
+fn largest<const N: usize>(a: &[f64], units: &[f64]) -> f64 {
+    let n = size::<N>(units);
+    let (a, units) = (&a[..n * n], &units[..n]);
     let (mut plain, mut scaled) = (0.0_f64, 0.0_f64);
     for i in 0..n {
         for j in 0..n {
@@ -99,7 +128,14 @@ fn largest(a: &[f64], units: &[f64]) -> f64 {
 
 /// Computes the largest relative difference of an entry from the transposed one times the `sign`.
 pub(super) fn asymmetry(a: &[f64], sign: f64, units: &[f64]) -> f64 {
-    let (n, top, mut worst) = (units.len(), largest(a, units), 0.0_f64);
+    by_size!(units.len(), asymmetry_of(a, sign, units))
+}
+
+#[inline(always)]
+fn asymmetry_of<const N: usize>(a: &[f64], sign: f64, units: &[f64]) -> f64 {
+    let n = size::<N>(units);
+    let (a, units) = (&a[..n * n], &units[..n]);
+    let (top, mut worst) = (largest::<N>(a, units), 0.0_f64);
     if top == 0.0 {
         return 0.0;
     }
@@ -118,12 +154,20 @@ pub(super) fn asymmetry(a: &[f64], sign: f64, units: &[f64]) -> f64 {
 /// its `LDLᵀ` decomposition with diagonal pivoting, after a scaling to a diagonal of ones. It works in the room `a`, of
 /// `n² + n` numbers.
 pub(super) fn indefiniteness(k: &[f64], units: &[f64], a: &mut [f64]) -> f64 {
-    let (n, top) = (units.len(), largest(k, units));
+    by_size!(units.len(), indefiniteness_of(k, units, a))
+}
+
+#[inline(always)]
+fn indefiniteness_of<const N: usize>(k: &[f64], units: &[f64], a: &mut [f64]) -> f64 {
+    let n = size::<N>(units);
+    let (k, units) = (&k[..n * n], &units[..n]);
+    let top = largest::<N>(k, units);
     if top == 0.0 {
         return 0.0;
     }
     let hat = |i: usize, j: usize| 0.5 * (k[i * n + j] + k[j * n + i]) / units[i] / units[j] / top;
     let (a, size) = a.split_at_mut(n * n);
+    let size = &mut size[..n];
     (0..n).for_each(|i| size[i] = (hat(i, i).abs() + ROUNDING).sqrt());
     for i in 0..n {
         (0..n).for_each(|j| a[i * n + j] = hat(i, j) / (size[i] * size[j]));
@@ -158,6 +202,7 @@ pub(super) fn indefiniteness(k: &[f64], units: &[f64], a: &mut [f64]) -> f64 {
 }
 
 /// Exchanges two rows, and the columns of the same indices.
+#[inline(always)]
 fn exchange(a: &mut [f64], n: usize, p: usize, q: usize) {
     for k in 0..n {
         a.swap(p * n + k, q * n + k);

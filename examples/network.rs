@@ -182,11 +182,11 @@ fn main() -> Result<(), Box<dyn Error>> {
             temperatures.line(format!("{i}"), series(&|s| s.point[2 * bodies + i] / capacity));
     }
     let first = &run.states()[0];
-    let laws = Panel::new("change", "t")
-        .line("S − S₀", series(&|s| s.entropy - first.entropy))
-        .line("10¹⁵ (H − H₀)", series(&|s| 1e15 * (s.energy - first.energy)));
+    let entropy = Panel::new("S − S₀", "t").line("S", series(&|s| s.entropy - first.entropy));
+    let energy = Panel::new("H − H₀", "t").line("H", series(&|s| s.energy - first.energy));
     let title = format!("A network of {bodies} bodies, {} variables", 3 * bodies);
-    let figure = Panels::new(title).panel(positions).panel(temperatures).panel(laws);
+    let panels = [positions, temperatures, entropy, energy];
+    let figure = panels.into_iter().fold(Panels::new(title), Panels::panel);
     let last = run.last();
     example
         .report_of(run.certificate(), last.time, last.point.clone())

@@ -46,5 +46,6 @@ pub use metric_error::{MetricError, NotPositive};
 pub use model::{Covectors, Jet, Model, Part};
 pub use model_error::ModelError;
 pub use point_error::PointError;
+pub use pointers::VerifiedEquations;
 pub use report::{LawResidual, Report};
 pub use second_law::SecondLaw;

@@ -72,6 +72,7 @@ pub mod guide;
 pub use metriplectic_dynamics as dynamics;
 #[cfg(feature = "ensembles")]
 pub use metriplectic_ensembles as ensembles;
+pub use metriplectic_equations as equations;
 pub use metriplectic_fields as fields;
 #[cfg(feature = "fitting")]
 pub use metriplectic_fitting as fitting;

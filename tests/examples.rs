@@ -141,6 +141,7 @@ fn every_example_of_a_run_reports_the_same_keys() {
         // The runs that they report choose their steps.
         "entropy_containers",
         "heated_rod",
+        "network",
     ];
     for name in names.flatten().filter(|name| !many.contains(&name.as_str())) {
         let report = json(&example(&name, &["--json", "--steps", "20"]));

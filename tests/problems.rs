@@ -11,6 +11,8 @@ mod by_hand;
 mod chain;
 #[path = "problems/every_method.rs"]
 mod every_method;
+#[path = "problems/in_numbers.rs"]
+mod in_numbers;
 #[path = "models/lattices.rs"]
 #[allow(dead_code, reason = "one of the lattices is in the table")]
 mod lattices;
@@ -38,6 +40,11 @@ fn the_energy_is_kept_where_a_step_spans_two_radians() {
     // Two retractions on each of sixteen problems, the chart midpoint on six with closures, and the cheap ones on
     // nine of them.
     assert_eq!(study.rows.len(), 47);
+}
+
+#[test]
+fn every_problem_answers_in_numbers_as_it_does_in_types() {
+    in_numbers::compare();
 }
 
 #[test]

@@ -15,24 +15,7 @@ use std::fmt;
 use metriplectic_fields::{Dimension, Plus, Real, ScalarField, Space};
 use nalgebra::Const;
 
-/// The reason why a function is conserved.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum Kind {
-    /// The bracket annihilates it: `Π dC = 0`.
-    Casimir,
-    /// The energy is symmetric: `⟨dJ, Π dH⟩ = 0`.
-    Momentum,
-}
-
-impl fmt::Display for Kind {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Casimir => "Casimir",
-            Self::Momentum => "momentum",
-        })
-    }
-}
+pub use metriplectic_equations::Kind;
 
 /// A list of further invariants: `()`, or a shorter list and an invariant. It is made by
 /// [`SystemBuilder::casimir`](crate::SystemBuilder::casimir),

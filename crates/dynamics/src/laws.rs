@@ -1,5 +1,6 @@
 //! The laws of brackets and dissipations, and the functions that check them.
 
+use metriplectic_equations::judge::{BracketDefects, bracket_defects, coordinate_scales};
 use metriplectic_fields::{
     BrokenLaw, ChartPoint, Column, Dimension, Matrix, ScalarField, Space, Square, Vector,
 };
@@ -9,9 +10,8 @@ use crate::bracket::{
     Bracket, BracketArgs, by_dual_numbers as by_dual_numbers_bracket, force_by_dual_numbers,
 };
 use crate::dissipation::{Dissipation, by_dual_numbers};
+use crate::in_numbers::{InNumbers, units_at};
 use crate::metriplectic::{Metriplectic, Point, SecondLaw};
-use crate::verify::bracket::{BracketDefects, bracket_defects};
-use crate::verify::sampling::CoordinateScales;
 
 /// The round-off of a tensor contraction whose terms have the size `scale`.
 fn round_off<M: Manifold>(scale: f64) -> f64 {
@@ -37,11 +37,11 @@ pub fn bracket<Y: Metriplectic>(
 ) -> Result<(), BrokenLaw> {
     let exists = |_| BrokenLaw { law: "Π exists", size: f64::NAN, bound: 0.0 };
     let bracket = system.bracket();
-    let units = CoordinateScales::at(system, x).units;
-    let defects =
-        bracket_defects(system, x, &system.entropy().jet2(x), &units, 1.0).map_err(exists)?;
-    let (round_off, tensor_size) = (round_off::<Y::Manifold>, defects.tensor.max_abs());
-    let BracketDefects { skewness, jacobi, .. } = defects;
+    let (system_in_numbers, entries) = (InNumbers(system), Y::Manifold::entries(x));
+    let units = coordinate_scales(&system_in_numbers, 0.0, &entries).units;
+    let BracketDefects { size: tensor_size, skewness, jacobi, .. } =
+        bracket_defects(&system_in_numbers, 0.0, &entries, &units).map_err(exists)?;
+    let round_off = round_off::<Y::Manifold>;
     BrokenLaw::unless("Π is skew", skewness.size, round_off(skewness.terms))?;
     if bracket.is_poisson() {
         BrokenLaw::unless("Jacobi identity", jacobi.size, round_off(jacobi.terms))?;
@@ -146,7 +146,7 @@ pub fn dissipation<Y: Metriplectic>(
     let jet = dissipation.linearise(&g, w, alpha).map_err(broken("K exists"))?;
     let defined = by_dual_numbers(dissipation, &g, w, alpha).map_err(broken("K exists"))?;
     // The terms have the sizes K α / ℓ, K α / |w| and K.
-    let units = CoordinateScales::at(system, x).units;
+    let units = units_at(system, x);
     let shortest = (0..<Y::Manifold as Space>::Dim::LEN).map(|i| units[i]).fold(f64::MAX, f64::min);
     let image = size * alpha.magnitude();
     for (law, left, right, terms) in [

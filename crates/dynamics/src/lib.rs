@@ -14,8 +14,9 @@
 //! | [`exchange`] | [`Port`], [`Bath`]: work and heat from outside |
 //! | [`invariants`] | further Casimirs and momenta `L_a`, and symmetries |
 //! | [`orthogonal`] | projections off covectors, by which a tensor is made to annihilate them |
-//! | [`model_error`] | [`ModelError`]: the law that a model violates, with the numbers |
+//! | [`mod@model_error`] | [`ModelError`]: the law that a model violates, with the numbers |
 //! | [`report`](mod@report) | [`Report`]: the residual of every law |
+//! | [`in_numbers`] | [`InNumbers`]: a system that answers the questions of [`Equations`](metriplectic_equations::Equations) |
 //! | [`vector_field`] | [`VectorField`]: `system.velocity(x)` |
 //! | [`verification`] | [`Verify`]: `system.verify(x0, radius)`, `system.report(x0)`; [`Verified`] |
 //! | [`metriplectic`] | [`Metriplectic`]: the parts of a system |
@@ -35,14 +36,13 @@ pub mod dissipation;
 pub mod euler_poincare;
 pub mod exchange;
 pub mod family;
+pub mod in_numbers;
 pub mod invariants;
 pub mod laws;
 pub mod legendre;
 pub mod metriplectic;
-pub mod model_error;
 pub mod noise;
 pub mod orthogonal;
-pub mod report;
 pub mod system;
 pub mod vector_field;
 pub mod velocity;
@@ -63,12 +63,12 @@ pub use dissipation::{
 };
 pub use exchange::{Bath, Contact, Port};
 pub use family::{Differentiable, Family, FamilyBuilder, Frozen, Parametrised};
+pub use in_numbers::InNumbers;
 pub use invariants::Invariants;
 pub use legendre::{Legendre, LegendreError};
 pub use metriplectic::{Metriplectic, Point, SecondLaw};
-pub use model_error::ModelError;
+pub use metriplectic_equations::{LawResidual, ModelError, Report, model_error, report};
 pub use noise::{Boltzmann, NoiseTerms};
-pub use report::{LawResidual, Report};
 pub use system::{BuildError, NoEntropy, System};
 pub use vector_field::VectorField;
 pub use verification::{Verified, Verify};

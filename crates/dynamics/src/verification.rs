@@ -2,8 +2,7 @@
 
 use metriplectic_manifolds::Manifold;
 
-use crate::model_error::ModelError;
-use crate::report::Report;
+use crate::{ModelError, Report};
 
 /// A model on the manifold `M` whose laws can be checked. Every [`Metriplectic`](crate::Metriplectic)
 /// system is one.

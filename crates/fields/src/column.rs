@@ -149,6 +149,13 @@ impl<D: Scalar, const N: usize> Column<D> for SVector<D, N> {
 /// The sums of squares without overflow or underflow.
 pub(crate) const SQUARES: RangeInclusive<f64> = 1e-280..=1e280;
 
+/// Computes the length of a list of numbers, also where their squares overflow or underflow.
+#[must_use]
+pub fn length(numbers: &[f64]) -> f64 {
+    let sum = numbers.iter().fold(0.0, |sum, number| sum + number * number);
+    if SQUARES.contains(&sum) { sum.sqrt() } else { scaled_norm(numbers.iter().copied()) }
+}
+
 /// The norm of numbers whose squares underflow or overflow, from the numbers in units of a power of two
 /// near the largest.
 #[cold]

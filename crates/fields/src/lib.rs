@@ -41,12 +41,12 @@ pub mod space;
 pub mod square;
 pub mod stack;
 
-pub use column::{Column, power_of_two};
+pub use column::{Column, length, power_of_two};
 pub use differential::{differential, differential_at, hessian, hessian_at, jacobian};
 pub use dimension::{Dimension, Plus};
 pub use erased::ErasedField;
 pub use field::{Jet1, Jet2, MatrixField, MatrixJet, ScalarField, along_slopes};
-pub use laws::BrokenLaw;
+pub use metriplectic_equations::{BrokenLaw, NotPositive};
 pub use scalar::{Real, Scalar};
 pub use space::{ChartPoint, Form, Matrix, Space, Vector, Velocity, product_rule};
-pub use square::{Factors, NotPositive, Square};
+pub use square::{Factors, Square};

@@ -4,6 +4,7 @@ use std::fmt::Debug;
 use std::ops::{Add, AddAssign, Index, IndexMut, Mul, Neg, Sub, SubAssign};
 
 use approx::RelativeEq;
+use metriplectic_equations::NotPositive;
 use nalgebra::{ArrayStorage, Const, SMatrix, SVector};
 use num_dual::linalg::LU;
 
@@ -219,16 +220,6 @@ pub trait Square<D: Scalar>:
 pub trait Factors<V> {
     /// Solves `A x = b`; `None` if it is not a number.
     fn solve(&self, b: &V) -> Option<V>;
-}
-
-/// A matrix that should be positive definite has a pivot that is not.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-#[error("not positive definite: the Cholesky pivot {index} is {pivot:.3e}")]
-pub struct NotPositive {
-    /// The row of the failing pivot.
-    pub index: usize,
-    /// Its value.
-    pub pivot: f64,
 }
 
 impl<D: Scalar, const N: usize> Square<D> for SMatrix<D, N, N> {

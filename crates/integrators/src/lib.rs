@@ -13,6 +13,7 @@
 //! | [`explicit`] | [`DormandPrince8`], [`DormandPrince5`], [`RungeKuttaChebyshev`]: explicit methods, and then back onto the laws | [`step`], [`round_off`] |
 //! | [`run`] | [`Method`], [`Span`], [`Until`], [`Watch`], [`Steps`], [`Trajectory`], [`Event`], [`Certificate`], [`Checkpoint`], [`Observables`]: what a user does with a run of any method | [`step`], [`round_off`] |
 //! | [`system`] | every metriplectic system is a flow | [`step`], [`round_off`], [`explicit`] |
+//! | [`numbers`] | [`FromEquations`]: a system in plain numbers is a flow | [`step`], [`round_off`], [`explicit`], [`system`] |
 //! | [`noise`](mod@noise) | [`Noisy`]: a system with thermal noise; [`NinomiyaVictoir`], [`RandomFlow`], which sample its law with any method | [`step`], [`explicit`] |
 //! | [`open`](mod@open) | [`OpenSystem`]: a clock in the energy, ports, baths and a ledger, for every method | [`step`], [`round_off`], [`discrete_gradient`], [`midpoint`], [`collocation`], [`explicit`], [`system`], [`noise`](mod@noise) |
 //! | `default_scheme` | a retraction is a method: its [`Scheme`] with the default options | [`step`], [`midpoint`] |
@@ -40,6 +41,7 @@ pub mod laws;
 pub mod midpoint;
 pub mod newton;
 pub mod noise;
+pub mod numbers;
 pub mod open;
 pub mod round_off;
 pub mod run;
@@ -60,6 +62,7 @@ pub use newton::{Equation, Iterate, Linearised, Newton, Root, Rounding};
 pub use noise::{
     Counter, NinomiyaVictoir, NoiseBuilder, NoiseError, Noisy, RandomFlow, Sampler, Sampling,
 };
+pub use numbers::{FromEquations, Numbers};
 pub use open::{NotDamped, OpenBuilder, OpenSpace, OpenState, OpenSystem};
 pub use round_off::stable_gradient::StableGradient;
 pub use run::certificate::{

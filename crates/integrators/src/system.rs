@@ -16,6 +16,7 @@ use metriplectic_manifolds::{Manifold, PointError};
 
 pub(crate) use stages::JetsOf;
 pub use stages::LawJets;
+pub(crate) use stages::{CONSERVED, CORRECTIONS, OFF, STAGNATED};
 
 use crate::explicit::{StageFlow as _, Target};
 use crate::round_off::bound::{SizesAt, of_an_increment, size_of_terms, sizes_on_a_step};

@@ -10,7 +10,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// The rooms, each with the rooms that its files name. A room names only rooms above it.
-const ROOMS: [(&str, &[&str]); 16] = [
+const ROOMS: [(&str, &[&str]); 17] = [
     ("step", &[]),
     ("round_off", &["step"]),
     ("discrete_gradient", &["round_off"]),
@@ -20,6 +20,7 @@ const ROOMS: [(&str, &[&str]); 16] = [
     ("explicit", &["step", "round_off"]),
     ("run", &["step", "round_off"]),
     ("system", &["step", "round_off", "explicit"]),
+    ("numbers", &["step", "round_off", "explicit", "system"]),
     ("noise", &["step", "explicit"]),
     (
         "open",

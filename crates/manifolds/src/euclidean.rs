@@ -117,6 +117,11 @@ macro_rules! columns {
             x.iter().copied().collect()
         }
 
+        #[inline]
+        fn write(x: &SVector<f64, N>, put: &mut impl FnMut(f64)) {
+            x.iter().copied().for_each(put);
+        }
+
         fn assemble(next: &mut impl FnMut() -> f64) -> SVector<f64, N> {
             Column::from_index(|_| next())
         }

@@ -10,6 +10,7 @@ use crate::chart_metric;
 use crate::geodesic::{self, Arrival};
 use crate::geodesic_jet::{ArrivalJet, GeodesicJet};
 use crate::metric::{Factored, GeodesicEnd, MetricError};
+use crate::metric_error::{on_part, stopped};
 use crate::{Manifold, MetricJet, Riemannian, Slopes, StepPath, StepPathJet, shooting};
 
 /// A metric given as a matrix field; see [`Metric::field`](crate::Metric::field).
@@ -69,14 +70,14 @@ impl<M: Manifold, F: MatrixField<M>> Riemannian<M> for FieldMetric<F> {
     ) -> Result<M::Point<Real>, MetricError> {
         let (here, velocity) = if t > 0.0 {
             let (here, velocity) = geodesic::follow_real(&self.field, x, &(*v * t))
-                .map_err(|error| error.on_part(0.0, t))?;
+                .map_err(|error| on_part(error, 0.0, t))?;
             (here, velocity * t.recip())
         } else {
             (x.clone(), *v)
         };
         let bend = geodesic::acceleration(&self.field, &here, &velocity).ok_or_else(|| {
             let g = chart_metric::metric(&self.field, &ChartPoint::<M>::centre(&here));
-            MetricError::stopped(t, &g).unwrap_or(MetricError::Edge { time: t })
+            stopped(t, &g).unwrap_or(MetricError::Edge { time: t })
         })?;
         let jet =
             Vector::<M, Real>::from_index(|i| Real::new(0.0, velocity[i], velocity[i], bend[i]));
@@ -133,11 +134,11 @@ impl<M: Manifold, F: MatrixField<M>> Riemannian<M> for FieldMetric<F> {
 }
 
 pub(crate) fn on_first_half(error: MetricError) -> MetricError {
-    error.on_part(0.0, 0.5)
+    on_part(error, 0.0, 0.5)
 }
 
 pub(crate) fn on_second_half(error: MetricError) -> MetricError {
-    error.on_part(0.5, 0.5)
+    on_part(error, 0.5, 0.5)
 }
 
 #[cfg(test)]

@@ -28,6 +28,7 @@ use crate::chart_metric::{metric, metric_jet};
 pub(crate) use crate::extrapolation::TOLERANCE as ACCURACY;
 use crate::extrapolation::{self, Start, State};
 use crate::metric::GeodesicEnd;
+use crate::metric_error::stopped;
 use crate::{Manifold, MetricError};
 
 /// The shortest piece of a geodesic, in a unit of time.
@@ -143,7 +144,7 @@ fn obstacle<M: Space>(
     let places = (0..=LOOK_AHEAD).map(|k| if k == 0 { 0.0 } else { 2_f64.powi(k) });
     places.into_iter().find_map(|t| {
         let place = ChartPoint { base: at.base.clone(), q: at.q + *ahead * t };
-        MetricError::stopped(time, &metric(field, &place))
+        stopped(time, &metric(field, &place))
     })
 }
 

@@ -94,6 +94,11 @@ impl Manifold for HalfLine {
         vec![x.x]
     }
 
+    #[inline]
+    fn write(x: &Vector1<f64>, put: &mut impl FnMut(f64)) {
+        put(x.x);
+    }
+
     fn assemble(next: &mut impl FnMut() -> f64) -> Vector1<f64> {
         Vector1::new(next())
     }

@@ -88,7 +88,7 @@ pub use lie_dual::LieDual;
 pub use manifold::{Manifold, PointError};
 pub use metric::{GeodesicEnd, Riemannian};
 pub use metric_at::{MetricAt, MetricJet, MetricSlopes, Slopes};
-pub use metric_error::MetricError;
+pub use metric_error::{MetricError, out_of_chart};
 pub use moving_base::MovingBase;
 pub use parametric_metric::ParametricMetric;
 pub use product::{Product, Times};

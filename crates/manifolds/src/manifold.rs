@@ -9,6 +9,7 @@
 //! manifold. A projection after the step would move the point, and change `H`. The certificate of a run
 //! contains the largest defect of its points.
 
+pub use metriplectic_equations::PointError;
 use metriplectic_fields::{Column, Real, Space, Vector, Velocity};
 use rand::Rng;
 
@@ -37,6 +38,12 @@ pub trait Manifold: Space {
 
     /// Lists the entries of the point, in the order in which it is written.
     fn entries(x: &Self::Point<f64>) -> Vec<f64>;
+
+    /// Passes the entries on one by one, in the order of [`entries`](Self::entries), from which the default takes them.
+    #[inline]
+    fn write(x: &Self::Point<f64>, put: &mut impl FnMut(f64)) {
+        Self::entries(x).into_iter().for_each(put);
+    }
 
     /// Reads a point, without a check, whose entries are `next()`, `next()`, … in the order of
     /// [`entries`](Self::entries). For numbers from outside, use [`from_entries`](Self::from_entries).
@@ -206,41 +213,3 @@ pub trait Manifold: Space {
 /// The defect that is accepted, relative to the size of the point. A start that was typed with ten digits is
 /// accepted, and a mistaken start is refused.
 const POINT_TOLERANCE: f64 = 1e-10;
-
-/// A point that is not on the manifold.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum PointError {
-    /// An entry is NaN or infinite.
-    #[error("entry {index} of the point is {value}; every entry must be a finite number")]
-    NotFinite {
-        /// Which entry.
-        index: usize,
-        /// Its value.
-        value: f64,
-    },
-    /// A list of entries has another length than a point.
-    #[error("{found} entries do not make a point, which has {expected}")]
-    Length {
-        /// How many there are.
-        found: usize,
-        /// How many a point has.
-        expected: usize,
-    },
-    /// All entries are zero, where only their direction counts.
-    #[error("all entries are zero, which have no direction")]
-    NoDirection,
-    /// The point is not in the domain of the chart.
-    #[error("the point is outside the domain of its chart; start inside")]
-    OutsideChart,
-    /// The point is too far off the manifold.
-    #[error(
-        "the point is {defect:.3e} off the manifold ({allowed:.1e} is allowed); project it first"
-    )]
-    OffManifold {
-        /// How far off.
-        defect: f64,
-        /// How far it may be.
-        allowed: f64,
-    },
-}

@@ -229,6 +229,12 @@ impl<A: Manifold + Times<B>, B: Manifold> Manifold for Product<A, B> {
         entries
     }
 
+    #[inline]
+    fn write((a, b): &Self::Point<f64>, put: &mut impl FnMut(f64)) {
+        A::write(a, put);
+        B::write(b, put);
+    }
+
     fn assemble(next: &mut impl FnMut() -> f64) -> Self::Point<f64> {
         (A::assemble(next), B::assemble(next))
     }

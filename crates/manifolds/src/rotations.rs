@@ -186,6 +186,11 @@ impl Manifold for Rotations {
         x.transpose().iter().copied().collect()
     }
 
+    #[inline]
+    fn write(x: &Matrix3<f64>, put: &mut impl FnMut(f64)) {
+        x.transpose().iter().copied().for_each(put);
+    }
+
     fn assemble(next: &mut impl FnMut() -> f64) -> Matrix3<f64> {
         Matrix3::from_fn(|_, _| next()).transpose()
     }

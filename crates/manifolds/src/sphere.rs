@@ -186,6 +186,11 @@ macro_rules! sphere {
                 x.iter().copied().collect()
             }
 
+            #[inline]
+            fn write(x: &SVector<f64, $a>, put: &mut impl FnMut(f64)) {
+                x.iter().copied().for_each(put);
+            }
+
             fn assemble(next: &mut impl FnMut() -> f64) -> SVector<f64, $a> {
                 SVector::<f64, $a>::from_fn(|_, _| next())
             }

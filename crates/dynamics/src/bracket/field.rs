@@ -3,7 +3,7 @@
 use std::fmt;
 
 use metriplectic_fields::{Matrix, MatrixField, Scalar, Square, Vector, along_slopes};
-use metriplectic_manifolds::{Manifold, MetricError, Riemannian};
+use metriplectic_manifolds::{Manifold, MetricError, Riemannian, out_of_chart};
 
 use super::{Bracket, BracketArgs, BracketJet};
 
@@ -72,6 +72,6 @@ impl<F> FieldPoisson<F> {
         F: MatrixField<M>,
     {
         M::contravariant(at.g.x, &self.field.at(&at.g.x.point()))
-            .ok_or_else(|| MetricError::out_of_chart(at.g.x))
+            .ok_or_else(|| out_of_chart(at.g.x))
     }
 }

@@ -5,7 +5,7 @@ use std::fmt;
 use metriplectic_fields::{
     ChartPoint, Column, Dimension, Factors, Form, Matrix, Real, Scalar, Square, Vector, Velocity,
 };
-use metriplectic_manifolds::{Manifold, MetricAt, MetricError, Riemannian};
+use metriplectic_manifolds::{Manifold, MetricAt, MetricError, Riemannian, out_of_chart};
 
 use super::{Dissipation, DissipationJet};
 
@@ -77,11 +77,11 @@ where
         } else {
             lift::<M, D>(x, w, |x, w| self.tensor_at(x, w))
         };
-        Ok(tensor.ok_or_else(|| MetricError::out_of_chart(x))? * *alpha)
+        Ok(tensor.ok_or_else(|| out_of_chart(x))? * *alpha)
     }
 
     fn tensor(&self, g: &MetricAt<'_, M, G>, w: &Vector<M>) -> Result<Matrix<M>, MetricError> {
-        self.real_tensor(g.x, w).ok_or_else(|| MetricError::out_of_chart(g.x))
+        self.real_tensor(g.x, w).ok_or_else(|| out_of_chart(g.x))
     }
 
     fn linearise(
@@ -100,7 +100,7 @@ where
         let n = M::Dim::LEN;
         for k in 0..n {
             let (x, w) = seeded::<M, f64>(x, w, k, n + k);
-            let tensor = self.tensor_at(&x, &w).ok_or_else(|| MetricError::out_of_chart(&x))?;
+            let tensor = self.tensor_at(&x, &w).ok_or_else(|| out_of_chart(&x))?;
             for i in 0..n {
                 let row = |part: fn(&Real) -> f64| {
                     (0..n).fold(0.0, |sum, j| sum + part(&tensor[(i, j)]) * alpha[j])

@@ -5,7 +5,7 @@ use std::fmt;
 use metriplectic_fields::{
     ChartPoint, Column, Dimension, Matrix, MatrixField, MatrixJet, Scalar, Square, Vector,
 };
-use metriplectic_manifolds::{Manifold, MetricAt, MetricError, Riemannian};
+use metriplectic_manifolds::{Manifold, MetricAt, MetricError, Riemannian, out_of_chart};
 
 use super::{Dissipation, DissipationJet, turn};
 
@@ -81,7 +81,7 @@ pub(super) fn form<M: Manifold, D: Scalar>(
     field: &impl MatrixField<M>,
     x: &ChartPoint<M, D>,
 ) -> Result<Matrix<M, D>, MetricError> {
-    M::contravariant(x, &field.at(&x.point())).ok_or_else(|| MetricError::out_of_chart(x))
+    M::contravariant(x, &field.at(&x.point())).ok_or_else(|| out_of_chart(x))
 }
 
 /// `K_w α`, bilinear in `σ` and `μ`.

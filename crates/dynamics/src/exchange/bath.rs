@@ -3,7 +3,7 @@
 use std::fmt;
 
 use metriplectic_fields::{Column, Real, Vector, Velocity};
-use metriplectic_manifolds::{InnerProduct, Manifold, MetricError, Riemannian};
+use metriplectic_manifolds::{InnerProduct, Manifold, MetricError, Riemannian, out_of_chart};
 
 use super::list::ExchangeArgs;
 use super::{components, vanishes};
@@ -177,7 +177,7 @@ impl<F> Contacts<F> {
         F: Fn(Real, &M::Point<Real>, &Velocity<M, Real>) -> [Contact<Velocity<M, Real>>; N],
     {
         let x = at.g.x;
-        let w = along_velocities(x, at.w, vanishes).ok_or_else(|| MetricError::out_of_chart(x))?;
+        let w = along_velocities(x, at.w, vanishes).ok_or_else(|| out_of_chart(x))?;
         Ok((self.0)(Real::from(at.t), &x.point(), &w))
     }
 }
@@ -196,7 +196,7 @@ where
         let x = at.g.x;
         let mut sum = Vector::<M, Real>::zero();
         for Contact { rate, along } in self.at(at)? {
-            let y = components(x, &along).ok_or_else(|| MetricError::out_of_chart(x))?;
+            let y = components(x, &along).ok_or_else(|| out_of_chart(x))?;
             sum += y * (rate * y.dot(alpha));
         }
         Ok(sum)

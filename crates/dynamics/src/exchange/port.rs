@@ -4,7 +4,7 @@ use std::fmt;
 use std::sync::Arc;
 
 use metriplectic_fields::{ChartPoint, Real, Vector, Velocity};
-use metriplectic_manifolds::{Manifold, MetricError};
+use metriplectic_manifolds::{Manifold, MetricError, out_of_chart};
 
 use super::components;
 
@@ -34,7 +34,7 @@ impl<F> Port<F> {
         F: Fn(Real, &M::Point<Real>) -> Velocity<M, Real>,
     {
         let velocity = (self.velocity)(Real::from(t), &x.point());
-        components(x, &velocity).ok_or_else(|| MetricError::out_of_chart(x))
+        components(x, &velocity).ok_or_else(|| out_of_chart(x))
     }
 }
 

@@ -1,7 +1,7 @@
 //! The friction of baths as terms, which their noise needs.
 
 use metriplectic_fields::{Real, Vector, Velocity};
-use metriplectic_manifolds::{Manifold, MetricError, Riemannian};
+use metriplectic_manifolds::{Manifold, MetricError, Riemannian, out_of_chart};
 
 use super::bath::{Bath, Contact, Contacts, Friction, Isotropic, Temperature};
 use super::components;
@@ -73,7 +73,7 @@ where
     ) -> Result<(), MetricError> {
         let x = at.g.x;
         for Contact { rate, along } in self.at(at)? {
-            let b = components(x, &along).ok_or_else(|| MetricError::out_of_chart(x))?;
+            let b = components(x, &along).ok_or_else(|| out_of_chart(x))?;
             visit(NoiseTerm { rate, b });
         }
         Ok(())

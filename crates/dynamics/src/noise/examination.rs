@@ -3,6 +3,9 @@
 //! A condition may hold at the start by a symmetry, or because an entry is zero. So it is judged at points around it too, in
 //! units that do not vanish.
 
+use metriplectic_equations::judge::{
+    Derivatives, Mismatch, OF_SOLUTIONS, RADIUS, Row, coordinate_scales, draw,
+};
 use metriplectic_fields::{ChartPoint, Column, Dimension as _, Real, ScalarField, Space, Vector};
 use metriplectic_manifolds::{Manifold, MetricError};
 use rand::SeedableRng;
@@ -11,12 +14,9 @@ use rand::rngs::ChaCha8Rng;
 use super::drift::{Place, TermVisitor};
 use super::system::Jets;
 use super::terms::NoiseTerm;
+use crate::in_numbers::{InNumbers, point};
 use crate::metriplectic::{Dim, Metriplectic, Point};
 use crate::velocity::differentials;
-use crate::verify::RADIUS;
-use crate::verify::derivatives::{Derivatives, Mismatch, OF_SOLUTIONS};
-use crate::verify::domain::value_not_finite;
-use crate::verify::sampling::CoordinateScales;
 
 /// The points around a start at which noise is judged.
 const POINTS: usize = 8;
@@ -36,15 +36,14 @@ pub struct Around<M: Space> {
 impl<M: Manifold> Around<M> {
     /// Draws points around a start.
     pub fn of<Y: Metriplectic<Manifold = M> + ?Sized>(system: &Y, x0: &Point<Y>) -> Self {
-        let sizes = CoordinateScales::at(system, x0);
+        let (system, entries) = (InNumbers(system), M::entries(x0));
+        let sizes = coordinate_scales(&system, 0.0, &entries);
         let mut rng = ChaCha8Rng::seed_from_u64(SEED);
-        let inside = |x: &Point<Y>| {
-            system.manifold().defect(x).is_finite() && value_not_finite(system, x).is_none()
-        };
         let mut points = vec![x0.clone()];
-        let drawn = (0..POINTS).filter_map(|_| sizes.draw(x0, RADIUS, &mut rng, &mut 0, inside));
-        points.extend(drawn.map(|(x, _)| x));
-        Self { points, units: sizes.units }
+        let drawn =
+            (0..POINTS).filter_map(|_| draw((&system, 0.0, &entries), &sizes, RADIUS, &mut rng));
+        points.extend(drawn.map(|x| point::<M>(&x)));
+        Self { points, units: Column::from_index(|i| sizes.units[i]) }
     }
 
     /// A direction that moves each coordinate by a part of its size.
@@ -63,9 +62,9 @@ impl<M: Manifold> Around<M> {
     pub fn lost_in_measure(&self, measure: &impl ScalarField<M>) -> Option<[f64; 2]> {
         let u = self.direction();
         self.at_most_points(|x| {
-            let df = vec![measure.jet1(x).df.dot(&u)];
-            let derivatives =
-                Derivatives { scale: 1.0, df, units: vec![1.0], rounding: OF_SOLUTIONS };
+            let df = Row::from_slice(&[measure.jet1(x).df.dot(&u)]);
+            let units = Row::from_slice(&[1.0]);
+            let derivatives = Derivatives { scale: 1.0, df, units, rounding: OF_SOLUTIONS };
             let compared = derivatives.compare(&|t, values| {
                 values.push(measure.at::<f64>(&M::chart(x, &(u * t))));
                 Some(())
@@ -105,8 +104,8 @@ impl<M: Manifold> Around<M> {
                 let rate = or_one(term[0].abs());
                 std::iter::once(rate).chain((0..n).map(move |i| or_one(size * self.units[i])))
             });
-            let derivatives =
-                Derivatives { scale: 1.0, df, units: units.collect(), rounding: OF_SOLUTIONS };
+            let (df, units) = (df.into(), units.collect());
+            let derivatives = Derivatives { scale: 1.0, df, units, rounding: OF_SOLUTIONS };
             let compared = derivatives.compare(&|t, values| {
                 let at = ChartPoint { base: x.clone(), q: u * t };
                 values.extend(entries(&place_at(system, &at), |a| a.re)?);

@@ -3,7 +3,7 @@
 use metriplectic_fields::{Column, Dimension, Real, Space, Vector};
 use metriplectic_manifolds::{
     Canonical, Constant, FieldMetric, Flat, InnerProduct, Manifold, MetricAt, MetricError,
-    Riemannian,
+    Riemannian, out_of_chart,
 };
 use nalgebra::Const;
 
@@ -50,7 +50,7 @@ where
     fn frame(g: &MetricAt<'_, M, Self, Real>) -> Result<Vec<Vector<M, Real>>, MetricError> {
         let x = g.x.point();
         let legs = (0..<Self as NoiseFrame<M>>::legs()).map(|a| components(g.x, &M::leg(&x, a)));
-        legs.collect::<Option<_>>().ok_or_else(|| MetricError::out_of_chart(g.x))
+        legs.collect::<Option<_>>().ok_or_else(|| out_of_chart(g.x))
     }
 }
 

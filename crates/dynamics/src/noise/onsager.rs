@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use metriplectic_fields::{Real, Vector, Velocity};
-use metriplectic_manifolds::{Manifold, MetricAt, MetricError, Riemannian};
+use metriplectic_manifolds::{Manifold, MetricAt, MetricError, Riemannian, out_of_chart};
 
 use super::terms::{NoiseTerm, NoiseTerms};
 use crate::dissipation::{OnsagerDissipation, along_velocities};
@@ -26,7 +26,7 @@ where
         terms: Range<usize>,
         visit: &mut dyn FnMut(usize, NoiseTerm<Vector<M, Real>>),
     ) -> Result<(), MetricError> {
-        let outside = || MetricError::out_of_chart(g.x);
+        let outside = || out_of_chart(g.x);
         let w = along_velocities(g.x, w, vanishes).ok_or_else(outside)?;
         let all = (self.0)(&g.x.point(), &w).into_iter().enumerate();
         for (r, Contact { rate, along }) in all.skip(terms.start).take(terms.len()) {

@@ -18,7 +18,7 @@ use crate::dissipation::Dissipation as _;
 use crate::invariants::{Invariants as _, Kind, Visitor};
 use crate::metriplectic::{Dim, Metriplectic, Point};
 use crate::orthogonal::Orthogonal;
-use crate::verify::balance::ROUNDING;
+use metriplectic_equations::judge::ROUNDING;
 
 type VectorOf<Y> = Vector<<Y as Metriplectic>::Manifold>;
 

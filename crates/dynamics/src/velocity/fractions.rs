@@ -8,10 +8,10 @@ use metriplectic_fields::Vector;
 use super::covectors::{Place, differentials};
 use super::plan::ProjectionPlan;
 use crate::bracket::Bracket;
+use crate::in_numbers::units_at;
 use crate::invariants::{Invariants, Kind};
 use crate::metriplectic::{Dim, Metriplectic, SecondLaw};
 use crate::orthogonal::{InUnits, Orthogonal};
-use crate::verify::sampling::CoordinateScales;
 
 /// Computes for each further invariant the smallest fraction of its differential at `x` that is independent of
 /// the differentials of the other fields in its projections.
@@ -19,7 +19,7 @@ pub fn independence<Y: Metriplectic + ?Sized>(system: &Y, x: &Place<Y, f64>) -> 
     if Y::Invariants::COUNT == 0 {
         return Vec::new();
     }
-    let (w, g) = (differentials(system, x), units_at(system, x));
+    let (w, g) = (differentials(system, x), in_units(system, x));
     let (mut casimirs, mut all) =
         (Orthogonal::<Dim<Y>>::default(), Orthogonal::<Dim<Y>>::default());
     if system.second_law() == SecondLaw::Exact && !system.bracket().is_zero() {
@@ -52,7 +52,7 @@ pub fn projected_fractions<Y: Metriplectic + ?Sized>(system: &Y, x: &Place<Y, f6
     if Y::Invariants::COUNT == 0 {
         return Vec::new();
     }
-    let (w, g) = (differentials(system, x), units_at(system, x));
+    let (w, g) = (differentials(system, x), in_units(system, x));
     let mut bracket = Orthogonal::<Dim<Y>>::default();
     if ProjectionPlan::of(system, &w).entropy {
         bracket.push(&g, &w.entropy);
@@ -78,9 +78,9 @@ pub fn projected_fractions<Y: Metriplectic + ?Sized>(system: &Y, x: &Place<Y, f6
 }
 
 /// The sizes of the coordinates at `x` as units.
-fn units_at<Y: Metriplectic + ?Sized>(
+fn in_units<Y: Metriplectic + ?Sized>(
     system: &Y,
     x: &Place<Y, f64>,
 ) -> InUnits<Vector<Y::Manifold>> {
-    InUnits(CoordinateScales::at(system, &x.point()).units)
+    InUnits(units_at::<Y>(system, &x.point()))
 }

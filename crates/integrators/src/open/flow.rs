@@ -194,18 +194,11 @@ where
     }
 
     fn check(&self, x0: &StateOf<Y>) -> Result<(), ModelError> {
-        let model = self.without_exchange(x0.time);
-        match model.check_start(&x0.x) {
-            // What flows in gives the energy its size: entries whose squares have no digits are zeros.
-            Err(ModelError::Underflow { .. }) => model.check_start(&self.without_tiny(&x0.x)?)?,
-            verdict => verdict?,
-        }
-        self.check_clock(x0)?;
-        self.check_exchange(x0)
+        self.judged(x0, |model, x| model.check_start(x))
     }
 
     fn is_verified(&self) -> bool {
-        self.closed().is_verified()
+        self.has_certificate() || self.closed().is_verified()
     }
 
     fn rechecks(&self, _: Recheck) -> bool {
@@ -290,7 +283,7 @@ where
     X: Exchange<Y::Manifold, Y::Metric>,
 {
     /// The point with zeros in place of the entries whose squares have no digits.
-    fn without_tiny(&self, x: &Point<Y>) -> Result<Point<Y>, PointError> {
+    pub(super) fn without_tiny(&self, x: &Point<Y>) -> Result<Point<Y>, PointError> {
         let tiny = NO_DIGITS.sqrt();
         let entries = Y::Manifold::entries(x).into_iter();
         let entries: Vec<f64> = entries.map(|x| if x.abs() < tiny { 0.0 } else { x }).collect();

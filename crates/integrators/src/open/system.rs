@@ -23,6 +23,7 @@ pub struct OpenSystem<Y, C, X> {
     exchange: X,
     columns: Arc<Columns>,
     clock: PhantomData<C>,
+    verified: bool,
 }
 
 impl<Y: fmt::Debug, C, X> fmt::Debug for OpenSystem<Y, C, X> {
@@ -33,7 +34,18 @@ impl<Y: fmt::Debug, C, X> fmt::Debug for OpenSystem<Y, C, X> {
 
 impl<Y, C, X> OpenSystem<Y, C, X> {
     pub(super) fn new(closed: Y, exchange: X, names: &Names) -> Self {
-        Self { closed, exchange, columns: Arc::new(Columns::new(names)), clock: PhantomData }
+        let columns = Arc::new(Columns::new(names));
+        Self { closed, exchange, columns, clock: PhantomData, verified: false }
+    }
+
+    /// The same system, whose model was verified.
+    pub(super) fn with_certificate(self) -> Self {
+        Self { verified: true, ..self }
+    }
+
+    /// Whether the model was verified before the run.
+    pub(super) const fn has_certificate(&self) -> bool {
+        self.verified
     }
 
     pub(super) const fn closed(&self) -> &Y {
@@ -120,7 +132,7 @@ where
 
     /// The model without its surroundings, at one time.
     pub(super) fn without_exchange(&self, t: f64) -> Closed<'_, Y, C> {
-        Closed::new(&self.closed, t)
+        Closed::new(&self.closed, t, self.verified)
     }
 
     /// The index of the heat of each bath among the entries, and its temperature.

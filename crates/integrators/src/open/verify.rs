@@ -1,14 +1,17 @@
 //! The laws of the surroundings of a system.
 
 use metriplectic_dynamics::exchange::{Exchange, ExchangeArgs, Part, PartKind, Visitor};
-use metriplectic_dynamics::{Metriplectic, ModelError};
-use metriplectic_fields::{ChartPoint, Column as _, Real, Vector};
+use metriplectic_dynamics::{Metriplectic, ModelError, Report, Verify as _, system::Point};
+use metriplectic_equations::judge::RADIUS;
+use metriplectic_fields::{ChartPoint, Column as _, Dimension as _, Real, Vector};
 use metriplectic_manifolds::{Manifold, MetricAt};
 
 use super::clock::Clock;
+use super::state::OpenState;
 use super::system::{CovectorsOf, OpenSystem, StateOf};
+use super::view::Closed;
 use crate::round_off::bound::{NO_DIGITS, size_of_terms};
-use crate::step::{Flow as _, StepError};
+use crate::step::{CountOf, Flow as _, StepError};
 
 /// The slope of a law along a velocity, relative to its terms, that is no round-off.
 /// A factor of four fails `open/verify.rs::a_port_that_carries_a_part_of_an_entropy_is_refused`.
@@ -19,17 +22,19 @@ struct Judge<'a, Y: Metriplectic, P> {
     time: f64,
     point: &'a P,
     verdict: Result<(), ModelError>,
+    /// The largest slope of the entropy along what a port gives, and of an invariant along what a part gives.
+    slopes: [f64; 2],
 }
 
 impl<Y: Metriplectic, P: Fn() -> Vec<f64>> Judge<'_, Y, P> {
     fn of_part(
-        &self,
+        &mut self,
         part: Part<'_>,
         velocity: &Vector<Y::Manifold>,
         given: &Vector<Y::Manifold>,
     ) -> Result<(), ModelError> {
         let (name, time) = (|| part.name.clone(), self.time);
-        let point = || (self.point)();
+        let point = self.point;
         if let PartKind::Bath { temperature, least_rate } = part.kind {
             if !(temperature >= 0.0 && temperature.is_finite()) {
                 return Err(ModelError::BathNotPositive { bath: name(), temperature, time });
@@ -51,12 +56,16 @@ impl<Y: Metriplectic, P: Fn() -> Vec<f64>> Judge<'_, Y, P> {
             if slope <= NO_DIGITS { 0.0 } else { slope / terms }
         };
         let carried = slope(&self.w.entropy, given);
+        if part.kind == PartKind::Port {
+            self.slopes[0] = self.slopes[0].max(carried);
+        }
         if part.kind == PartKind::Port && carried > BROKEN {
             let (port, size) = (name(), carried);
             return Err(ModelError::WorkCarriesEntropy { port, time, point: point(), size });
         }
         for (index, (_, law)) in self.w.invariants.as_ref().iter().flatten().enumerate() {
             let size = slope(law, given);
+            self.slopes[1] = self.slopes[1].max(size);
             if size > BROKEN {
                 let part = name();
                 return Err(ModelError::PortBreaksInvariant {
@@ -110,11 +119,75 @@ where
     C: Clock<Y::Manifold, Y::Energy>,
     X: Exchange<Y::Manifold, Y::Metric>,
 {
+    /// Checks the laws of the system around a state, at its time, with the clock, the ports and the baths there. A run does
+    /// this first, with a radius of 0.1; see [`Verify::verify`](metriplectic_dynamics::Verify::verify).
+    ///
+    /// # Errors
+    ///
+    /// [`ModelError`] that names the law, the state and the size of the violation.
+    pub fn verify(&self, x0: &OpenState<Point<Y>>, radius: f64) -> Result<(), ModelError> {
+        self.judged(x0, |model, x| model.verify(x, radius))
+    }
+
+    /// Lists the residual of every law of the model around a state, at its time, and of its surroundings there. Read it
+    /// when a new model misbehaves.
+    pub fn report(&self, x0: &OpenState<Point<Y>>) -> Report {
+        let mut report = self.without_exchange(x0.time).report(&x0.x);
+        if report.verdict.is_ok() {
+            match self.slopes_of_exchange(x0) {
+                Ok(slopes) => {
+                    let laws = [("⟨dS, F⟩ = 0", X::PORTS), ("⟨dL, F⟩ = 0", X::PORTS + X::BATHS)];
+                    let asked = [1, CountOf::<Y>::LEN];
+                    for (((law, parts), asked), size) in laws.into_iter().zip(asked).zip(slopes) {
+                        if parts * asked > 0 {
+                            report.note(law, size, BROKEN, Y::Manifold::entries(&x0.x));
+                        }
+                    }
+                    report.verdict = self.check_clock(x0);
+                }
+                Err(broken) => report.verdict = Err(broken),
+            }
+        }
+        report
+    }
+
+    /// Verifies the model around a state, and returns the system with this certificate. A run of it, from any start, checks the
+    /// laws at that start without samples around it. Use it for a study of many runs.
+    ///
+    /// # Errors
+    ///
+    /// The errors of [`verify`](Self::verify).
+    pub fn verified(self, x0: &OpenState<Point<Y>>) -> Result<Self, ModelError> {
+        self.verify(x0, RADIUS)?;
+        Ok(self.with_certificate())
+    }
+
+    /// Judges the model without its surroundings, and then these.
+    pub(super) fn judged(
+        &self,
+        x0: &StateOf<Y>,
+        judge: impl Fn(&Closed<'_, Y, C>, &Point<Y>) -> Result<(), ModelError>,
+    ) -> Result<(), ModelError> {
+        let model = self.without_exchange(x0.time);
+        match judge(&model, &x0.x) {
+            // What flows in gives the energy its size: entries whose squares have no digits are zeros.
+            Err(ModelError::Underflow { .. }) => judge(&model, &self.without_tiny(&x0.x)?)?,
+            verdict => verdict?,
+        }
+        self.check_clock(x0)?;
+        self.check_exchange(x0)
+    }
+
     /// Checks at a state that ports carry no entropy and keep the further invariants, that no temperature is negative, and that no
     /// friction has a negative rate.
     pub(super) fn check_exchange(&self, state: &StateOf<Y>) -> Result<(), ModelError> {
+        self.slopes_of_exchange(state).map(|_| ())
+    }
+
+    /// The slopes of the entropy along ports and of the further invariants along all parts, which must be round-off.
+    fn slopes_of_exchange(&self, state: &StateOf<Y>) -> Result<[f64; 2], ModelError> {
         if X::PORTS + X::BATHS == 0 {
-            return Ok(());
+            return Ok([0.0; 2]);
         }
         let point = || Y::Manifold::entries(&state.x);
         let w = self.covectors(state.time, &state.x);
@@ -122,10 +195,11 @@ where
         let g = MetricAt::new(self.closed().metric(), &centre);
         let [energy, entropy] = [&w.energy, &w.entropy].map(Vector::<Y::Manifold, Real>::embed);
         let at = ExchangeArgs { t: state.time, g: &g, w: &energy, s: &entropy };
-        let mut judge = Judge::<Y, _> { w: &w, time: state.time, point: &point, verdict: Ok(()) };
+        let (time, verdict) = (state.time, Ok(()));
+        let mut judge = Judge::<Y, _> { w: &w, time, point: &point, verdict, slopes: [0.0; 2] };
         let looked_at = self.exchange().each(&at, &mut judge);
         looked_at.map_err(|source| ModelError::Metric { source, point: point() })?;
-        judge.verdict
+        judge.verdict.map(|()| judge.slopes)
     }
 
     /// Compares the derivative of the energy along time with its values. Nothing is known of the times of a model, so the
@@ -201,9 +275,11 @@ where
 mod tests {
     use super::*;
     use crate::open::{OpenBuilder as _, OpenState};
-    use metriplectic_dynamics::{Symplectic, System, Zero};
+    use crate::{DormandPrince5, Method as _, Span};
+    use metriplectic_dynamics::{Bath, Symplectic, System, Zero};
     use metriplectic_manifolds::{Euclidean, Product};
-    use nalgebra::{Vector2, Vector4, vector};
+    use nalgebra::{Vector1, Vector2, Vector3, Vector4, vector};
+    use num_dual::DualNum as _;
 
     type Pair<T> = (Vector2<T>, Vector2<T>);
 
@@ -224,6 +300,38 @@ mod tests {
             system.check_exchange(&start).is_err()
         };
         assert!(carries(2e-8) && !carries(5e-9));
+    }
+
+    #[test]
+    fn an_open_system_is_verified_once_and_its_report_lists_its_surroundings() {
+        let system = |carried: f64| {
+            System::on(Product(Euclidean::<2>, Euclidean::<1>))
+                .bracket((Symplectic, Zero))
+                .energy_in_time(|t: Real, (x, s): &(Vector2<Real>, Vector1<Real>)| {
+                    x.norm_squared() * 0.5 + x.x * t.sin() + s.x
+                })
+                .entropy(|(_, s): &(Vector2<Real>, Vector1<Real>)| s.x)
+                .work("push", move |t: Real, _: &(Vector2<Real>, Vector1<Real>)| {
+                    Vector3::new(Real::from(0.0), t.cos(), Real::from(carried))
+                })
+                .bath("air", Bath::at(1.0).isotropic(0.1))
+                .build()
+                .unwrap()
+        };
+        let start = |system: &OpenSystem<_, _, _>| system.start((vector![1.0, 0.0], vector![0.5]));
+        let sound = system(0.0);
+        let x0 = start(&sound);
+        assert_eq!(sound.verify(&x0, 0.1), Ok(()));
+        let report = sound.report(&x0);
+        assert!(report.verdict.is_ok() && report.laws.iter().any(|law| law.law == "⟨dS, F⟩ = 0"));
+        let wrong = system(0.1);
+        assert!(matches!(wrong.verify(&x0, 0.1), Err(ModelError::WorkCarriesEntropy { .. })));
+        assert!(wrong.report(&x0).verdict.is_err() && wrong.verified(&x0).is_err());
+        let run = |system: &_| {
+            let span = Span::steps(0.1, 3);
+            DormandPrince5.run(system, x0.clone(), span).unwrap().certificate().verified_before
+        };
+        assert!(!run(&sound) && run(&sound.verified(&x0).unwrap()));
     }
 
     #[test]

@@ -215,16 +215,16 @@ struct Normals<N: Dimension, C: Dimension> {
 /// The residual of an entropy, in units of its round-off, from which on the round-off of the other laws, which
 /// moves it too, is corrected.
 /// A factor of four fails `tests/explicit.rs::nothing_drifts_in_a_million_steps`.
-const OFF: f64 = 0.8;
+pub(crate) const OFF: f64 = 0.8;
 /// The most corrections.
 /// A factor of four fails `tests/open/traps.rs::a_protocol_that_jumps_is_resolved_by_small_steps`.
-const CORRECTIONS: usize = 8;
+pub(crate) const CORRECTIONS: usize = 8;
 /// Residuals, in units of round-off, with which a state is accepted that no correction improves.
 /// A factor of four fails `tests/dense_output.rs::outputs_keep_the_laws_and_change_no_step`.
-const STAGNATED: f64 = 2.0;
+pub(crate) const STAGNATED: f64 = 2.0;
 /// The limit where no entropy is asked for.
 /// A factor of four fails `system/stages.rs::a_state_that_no_correction_improves_is_accepted_without_an_entropy`.
-const CONSERVED: f64 = 64.0;
+pub(crate) const CONSERVED: f64 = 64.0;
 
 /// A projection along the differentials `s² dF`, where `s_i` is the unit of entry `i`: the shortest correction in these
 /// units.

@@ -3,7 +3,7 @@
 use std::fmt;
 use std::sync::Arc;
 
-use metriplectic_manifolds::{MetricError, PointError};
+use crate::{MetricError, PointError};
 
 /// A model that breaks one of its laws. `size` is relative to the terms that should cancel.
 #[derive(Clone, PartialEq, thiserror::Error)]
@@ -352,6 +352,49 @@ pub enum ModelError {
         derivative: f64,
         /// The difference quotient of the values.
         quotient: f64,
+    },
+    /// The velocity of a system of your own changes its energy.
+    #[error(
+        "the velocity changes the energy at {point:?}: ⟨dH, x'⟩ is {size:.1e} of its terms; compare the differentials and the \
+         velocity with H"
+    )]
+    MotionChangesEnergy {
+        /// The entries of the point.
+        point: Vec<f64>,
+        /// The relative size of the violation.
+        size: f64,
+    },
+    /// The velocity of a system of your own changes a further invariant.
+    #[error(
+        "the velocity changes a further invariant at {point:?}: ⟨dL, x'⟩ is {size:.1e} of its terms; a law of a system is \
+         conserved by its velocity"
+    )]
+    MotionChangesInvariant {
+        /// The entries of the point.
+        point: Vec<f64>,
+        /// The relative size of the violation.
+        size: f64,
+    },
+    /// The production that a system of your own returns is not the growth of its entropy.
+    #[error(
+        "the production of entropy is not ⟨dS, x'⟩ at {point:?}: it is off by {size:.1e} of its terms; return from `velocity` what \
+         the friction adds to S"
+    )]
+    ProductionOff {
+        /// The entries of the point.
+        point: Vec<f64>,
+        /// The relative size of the violation.
+        size: f64,
+    },
+    /// The entropy of a system of your own falls.
+    #[error(
+        "the entropy falls at {point:?}: the production is negative by {size:.1e} of its terms; friction must not be negative"
+    )]
+    ProductionNegative {
+        /// The entries of the point.
+        point: Vec<f64>,
+        /// The relative size of the violation.
+        size: f64,
     },
     /// `K_w w ≠ 0` for a discrete gradient `w` of the energy.
     #[error(

@@ -45,6 +45,11 @@ pub struct Report {
 }
 
 impl Report {
+    /// Adds a law that was judged beside those of the model.
+    pub fn note(&mut self, law: &'static str, size: f64, allowed: f64, point: Vec<f64>) {
+        self.laws.push(LawResidual { law, size, allowed, point });
+    }
+
     /// The report of an examination that has not begun.
     pub(crate) const fn new() -> Self {
         Self {

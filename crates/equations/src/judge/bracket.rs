@@ -1,26 +1,25 @@
 //! The laws of the bracket.
 
-use metriplectic_fields::{ChartPoint, Column, Dimension, Jet2, Matrix, Space, Square, Vector};
-use metriplectic_manifolds::MetricError;
-use num_dual::Dual64;
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
 
+use super::at::{At, Jet2, Place};
 use super::balance::{self, Balance, ROUNDING, Violation, asymmetry, largest, worse};
 use super::findings::Findings;
-use super::place::{Place, unusable};
-use super::table::{Table, components};
-use crate::bracket::{Bracket, BracketArgs};
-use crate::metriplectic::{Metriplectic, Point, SecondLaw};
-use crate::model_error::ModelError;
+use super::table::{Row, Table, zeros};
+use crate::{Covectors, ENERGY, MetricError, ModelError, Part, SecondLaw};
 
-/// A Poisson tensor at one point, and the largest violations of its laws relative to the terms that should
+/// A Poisson tensor at one state, and the largest violations of its laws relative to the terms that should
 /// cancel.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct BracketDefects<M: Space> {
-    pub(crate) tensor: Matrix<M>,
-    pub(crate) skewness: Violation,
-    pub(crate) jacobi: Violation,
+#[derive(Clone, Debug)]
+pub struct BracketDefects {
+    /// The largest absolute value of an entry of the tensor.
+    pub size: f64,
+    pub(crate) tensor: Table,
+    /// The violation of `Πᵀ = −Π`.
+    pub skewness: Violation,
+    /// The violation of the Jacobi identity.
+    pub jacobi: Violation,
     /// Whether the derivatives of the tensor are finite.
     pub(crate) is_finite: bool,
 }
@@ -29,32 +28,31 @@ pub(crate) struct BracketDefects<M: Space> {
 /// too many of them, random covectors take the place of the axes.
 const ALL_TRIPLES: usize = 12;
 
-/// The triples of random covectors at one point.
+/// The triples of random covectors at one state.
 const TRIPLES: usize = 4;
 
-/// Evaluates skewness and the Jacobi identity `Π^{il}∂_lΠ^{jk} + cyclic` at `x`, in chart coordinates of the
+/// Evaluates skewness and the Jacobi identity `Π^{il}∂_lΠ^{jk} + cyclic` at a state, in chart coordinates of the
 /// sizes `units`, for the `entropy` there. The terms may all be round-off. So their sizes include the `rounding` of
 /// the largest terms elsewhere, and of a generic product `Π^{il} Π^{jk} / ℓ_l`.
-pub(crate) fn bracket_defects<Y: Metriplectic + ?Sized>(
-    system: &Y,
-    x: &Point<Y>,
-    entropy: &Jet2<Y::Manifold>,
-    units: &Vector<Y::Manifold>,
+pub(crate) fn bracket_defects(
+    at: At<'_>,
+    entropy: &Jet2,
+    units: &[f64],
     rounding: f64,
-) -> Result<BracketDefects<Y::Manifold>, MetricError> {
-    let centre = ChartPoint::<Y::Manifold>::centre(x);
-    let g = system.metric_at(&centre);
-    let tensor = system.bracket().tensor(&system.bracket_args(&g, &entropy.df))?;
-    let (table, sizes) = (Table::of(&tensor), components(units));
-    let at = At { system, x, entropy, units: &sizes, rounding, tensor: &tensor, table: &table };
-    let large = <Y::Manifold as Space>::Dim::LEN > ALL_TRIPLES;
+) -> Result<BracketDefects, MetricError> {
+    // A bracket does not depend on the covector of the energy.
+    let (_, energy) = at.jet(ENERGY);
+    let w = Covectors { energy: &energy, entropy: &entropy.df };
+    let tensor = at.tensor(Part::Bracket, w)?;
+    let here = Here { at, entropy, units, rounding, tensor: &tensor };
+    let large = at.n() > ALL_TRIPLES;
     let Jacobi { violation, is_finite } =
-        if large { at.jacobi_of_covectors()? } else { at.jacobi_of_axes()? };
-    let skewness = asymmetry(&table, -1.0, &sizes, rounding);
-    Ok(BracketDefects { tensor, skewness, jacobi: violation, is_finite })
+        if large { here.jacobi_of_covectors()? } else { here.jacobi_of_axes()? };
+    let skewness = asymmetry(&tensor, -1.0, units, rounding);
+    Ok(BracketDefects { size: tensor.max_abs(), tensor, skewness, jacobi: violation, is_finite })
 }
 
-/// The Jacobi identity at a point.
+/// The Jacobi identity at a state.
 struct Jacobi {
     violation: Violation,
     /// Whether the derivatives of the tensor are finite.
@@ -87,64 +85,53 @@ impl Jacobi {
 }
 
 /// Where the Jacobi identity is evaluated.
-struct At<'a, Y: Metriplectic + ?Sized> {
-    system: &'a Y,
-    x: &'a Point<Y>,
-    entropy: &'a Jet2<Y::Manifold>,
+struct Here<'a> {
+    at: At<'a>,
+    entropy: &'a Jet2,
     units: &'a [f64],
     rounding: f64,
-    tensor: &'a Matrix<Y::Manifold>,
-    table: &'a Table,
+    tensor: &'a Table,
 }
 
-impl<Y: Metriplectic + ?Sized> At<'_, Y> {
-    /// Evaluates `of` with the bracket at the point `φ_x(εv)`.
-    fn moved<T>(
-        &self,
-        v: &Vector<Y::Manifold>,
-        of: impl FnOnce(&BracketArgs<'_, Y::Manifold, Y::Metric, Dual64>) -> T,
-    ) -> T {
-        let q = Vector::<Y::Manifold, Dual64>::from_index(|i| Dual64::new(0.0, v[i]));
-        let moved = ChartPoint { base: self.x.clone(), q };
-        let slope = self.entropy.hf * *v;
-        let ds = Vector::<Y::Manifold, Dual64>::from_index(|i| {
-            Dual64::new(self.entropy.df[i], slope[i])
-        });
-        let g = self.system.metric_at(&moved);
-        of(&self.system.bracket_args(&g, &ds))
-    }
-
+impl Here<'_> {
     /// The sum `Σ_l Π^{il}∂_lΠ^{jk} + cyclic` for all triples of axes, term by term.
     fn jacobi_of_axes(&self) -> Result<Jacobi, MetricError> {
-        let n = <Y::Manifold as Space>::Dim::LEN;
+        let &Self { at, entropy, .. } = self;
+        let n = at.n();
         let mut slopes = Vec::with_capacity(n);
         for l in 0..n {
-            let along = Vector::<Y::Manifold>::basis(l);
-            let dual = self.moved(&along, |args| self.system.bracket().tensor(args))?;
-            slopes.push(Table::of(&Matrix::<Y::Manifold>::from_entries(|i, j| dual[(i, j)].eps)));
+            let mut along = zeros(n);
+            along[l] = 1.0;
+            let ds = entropy.hf.times(&along);
+            let mut slope = Table::zeros(n);
+            let along = [&along[..], &ds];
+            at.model.bracket_slope(at.t, at.x, along, &entropy.df, slope.entries_mut())?;
+            slopes.push(slope);
         }
-        Ok(Jacobi::of_axes(self.table, &slopes, self.units, self.rounding))
+        Ok(Jacobi::of_axes(self.tensor, &slopes, self.units, self.rounding))
     }
 
     /// The sum for random covectors, `⟨β, ∂_{Πα}Π γ⟩ + cyclic`, which is the sum of three derivatives.
     fn jacobi_of_covectors(&self) -> Result<Jacobi, MetricError> {
-        let &Self { system, units, rounding, tensor, table, .. } = self;
-        let n = <Y::Manifold as Space>::Dim::LEN;
+        let &Self { at, entropy, units, rounding, tensor } = self;
+        let n = at.n();
         let mut rng = ChaCha8Rng::seed_from_u64(SEED);
         let mut covector =
-            || Vector::<Y::Manifold>::from_index(|i| rng.random_range(-1.0..1.0) / units[i]);
-        let top = largest(table, units);
+            || units.iter().map(|unit| rng.random_range(-1.0..1.0) / unit).collect::<Row>();
+        let top = largest(tensor, units);
         let (mut violation, mut is_finite) = (Violation::default(), true);
         for _ in 0..TRIPLES {
             let w = [covector(), covector(), covector()];
             let mut balance = Balance::default();
             for k in 0..3 {
                 let [alpha, beta, gamma] = [0, 1, 2].map(|i| &w[(k + i) % 3]);
-                let gamma = Vector::<Y::Manifold, Dual64>::embed(gamma);
-                let moved =
-                    self.moved(&(*tensor * *alpha), |args| system.bracket().apply(args, &gamma))?;
+                let along = tensor.times(alpha);
+                let ds = entropy.hf.times(&along);
+                let (along, mut slope) = ([&along[..], &ds], zeros(n));
+                let of = (&entropy.df[..], &gamma[..]);
+                at.model.bracket_slope_of(at.t, at.x, along, of.0, of.1, &mut slope)?;
                 // Each row is a term, because a derivative may be a rounding of large rows.
-                balance.extend((0..n).map(|i| beta[i] * moved[i].eps));
+                balance.extend((0..n).map(|i| beta[i] * slope[i]));
             }
             is_finite &= balance.sum().is_finite();
             violation = violation.or_worse(balance.beside(rounding * top * top));
@@ -157,13 +144,10 @@ impl<Y: Metriplectic + ?Sized> At<'_, Y> {
 const SEED: u64 = 0x4a61_636f_6269_2121;
 
 /// Checks that `Π` is skew, satisfies the Jacobi identity, and has `S` as a Casimir.
-pub(super) fn examine<Y: Metriplectic + ?Sized>(
-    place: &Place<'_, Y>,
-    findings: &mut Findings<'_>,
-) -> Result<(), ModelError> {
-    let &Place { system, x, units, ref entropy, .. } = place;
-    let defects = bracket_defects(system, x, entropy, units, ROUNDING);
-    let defects = defects.map_err(unusable::<Y::Manifold>(x))?;
+pub(super) fn examine(place: &Place<'_>, findings: &mut Findings<'_>) -> Result<(), ModelError> {
+    let &Place { at, units, ref entropy, .. } = place;
+    let defects = bracket_defects(at, entropy, units, ROUNDING);
+    let defects = defects.map_err(|source| at.unusable(source))?;
     if !defects.is_finite {
         let point = findings.point.clone();
         return Err(ModelError::DerivativeNotFinite { field: "bracket", point });
@@ -171,15 +155,14 @@ pub(super) fn examine<Y: Metriplectic + ?Sized>(
     let size = defects.skewness.relative();
     findings.note("Πᵀ = −Π", size, |point, size| ModelError::BracketNotSkew { point, size });
     let size = defects.jacobi.relative();
-    if system.bracket().is_poisson() {
+    if at.model.is_poisson() {
         let error = |point, size| ModelError::NoJacobiIdentity { point, size };
         findings.note("Jacobi identity", size, error);
     } else {
         findings.record("Jacobi identity", size, f64::INFINITY);
     }
-    if system.second_law() == SecondLaw::Exact {
-        let tensor = Table::of(&defects.tensor);
-        let size = balance::product(&tensor, &components(&entropy.df), &components(units));
+    if at.model.second_law() == SecondLaw::Exact {
+        let size = balance::product(&defects.tensor, &entropy.df, units);
         findings
             .note("Π dS = 0", size, |point, size| ModelError::EntropyNotCasimir { point, size });
     }

@@ -20,6 +20,8 @@
 //!
 //! by more than this bound. A wide bound decides nothing.
 
+use super::table::Row;
+
 /// The ratio of one `δ` to the next. With a half, values that are integers times some rounding would give the
 /// same wrong quotient again and again.
 const RATIO: f64 = 0.45;
@@ -38,39 +40,41 @@ const NARROW: f64 = 1e-2;
 const NARROW_AT_ONCE: f64 = 1e-4;
 const NARROW_BESIDE_VALUES: f64 = 1e-8;
 /// The rounding of a derivative, relative to itself and to the largest one of the other entries.
-#[derive(Clone, Copy)]
-pub(crate) struct Rounding {
+#[derive(Clone, Copy, Debug)]
+pub struct Rounding {
     itself: f64,
     others: f64,
 }
 
 /// The rounding of a closure, evaluated by dual numbers.
-pub(crate) const OF_CLOSURES: Rounding = Rounding { itself: 1e-9, others: 64.0 * f64::EPSILON };
+pub(super) const OF_CLOSURES: Rounding = Rounding { itself: 1e-9, others: 64.0 * f64::EPSILON };
 
 /// The rounding of a tensor that solves with a metric, which multiplies it by the condition number.
-pub(crate) const OF_SOLUTIONS: Rounding = Rounding { itself: 1e-6, others: 1e-9 };
+pub const OF_SOLUTIONS: Rounding = Rounding { itself: 1e-6, others: 1e-9 };
 
 /// Appends the values of all entries at a distance along the direction; `None` if there are no values.
-pub(crate) type Values<'a> = &'a dyn Fn(f64, &mut Vec<f64>) -> Option<()>;
+pub type Values<'a> = &'a dyn Fn(f64, &mut Row) -> Option<()>;
 
 /// A derivative that is not that of the values.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Mismatch {
+pub struct Mismatch {
     /// The derivative by dual numbers.
-    pub(crate) derivative: f64,
+    pub derivative: f64,
     /// The difference quotient of the values.
-    pub(crate) quotient: f64,
+    pub quotient: f64,
 }
 
 /// The derivatives of the entries of a field along a direction.
-pub(crate) struct Derivatives {
+#[derive(Clone, Debug)]
+pub struct Derivatives {
     /// The size of the coordinate along which they are taken.
-    pub(crate) scale: f64,
+    pub scale: f64,
     /// The derivatives.
-    pub(crate) df: Vec<f64>,
+    pub df: Row,
     /// The units of the entries.
-    pub(crate) units: Vec<f64>,
-    pub(crate) rounding: Rounding,
+    pub units: Row,
+    /// Their rounding.
+    pub rounding: Rounding,
 }
 
 /// No quotient has a narrow bound.
@@ -97,7 +101,7 @@ impl Quotient {
 
 impl Derivatives {
     /// Compares the derivatives with the values of the entries.
-    pub(crate) fn compare(&self, f: Values<'_>) -> Option<Mismatch> {
+    pub fn compare(&self, f: Values<'_>) -> Option<Mismatch> {
         let at = |k| self.quotients(k, f);
         if self.agree_at_once(f).is_some() {
             return None;
@@ -124,7 +128,7 @@ impl Derivatives {
     /// The quotients of all entries at `δ_k`; `None` where a value is not finite.
     fn quotients(&self, k: i32, f: Values<'_>) -> Option<Vec<Quotient>> {
         let (delta, n) = (self.scale * RATIO.powi(k), self.df.len());
-        let mut values = Vec::with_capacity(2 * n);
+        let mut values = Row::with_capacity(2 * n);
         f(delta, &mut values)?;
         f(-delta, &mut values)?;
         (0..n).map(|i| Quotient::of(delta, values[i], values[i + n])).collect()
@@ -133,7 +137,7 @@ impl Derivatives {
     /// Returns `Some` if each derivative agrees with a quotient of a narrow bound, whatever the rounding is.
     fn agree_at_once(&self, f: Values<'_>) -> Option<()> {
         let (deltas, n) = ([FIRST - 1, FIRST].map(|k| self.scale * RATIO.powi(k)), self.df.len());
-        let mut values = Vec::with_capacity(4 * n);
+        let mut values = Row::with_capacity(4 * n);
         for delta in deltas {
             f(delta, &mut values)?;
             f(-delta, &mut values)?;

@@ -3,7 +3,8 @@
 //! The entries of a state may have different units, so the norm of a vector has no meaning. A sum
 //! `Σ_j A_ij w_j` is compared with `Σ_j |A_ij||w_j|`, row by row, in which every term has one unit.
 
-use super::table::{Table, pairs};
+use super::table::{Row, Table, pairs, zeros};
+use smallvec::SmallVec;
 
 /// The violation of a law that is taken for round-off, relative to the terms that cancel. Models contain
 /// transcendental functions, so it is far above `ε`. It is far below any mistake.
@@ -50,9 +51,11 @@ impl Balance {
 
 /// The size of what should vanish, and of the terms that should cancel in it.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Violation {
-    pub(crate) size: f64,
-    pub(crate) terms: f64,
+pub struct Violation {
+    /// The size of what should vanish.
+    pub size: f64,
+    /// The size of the terms that should cancel in it.
+    pub terms: f64,
 }
 
 impl Violation {
@@ -113,14 +116,14 @@ pub(super) fn product_rounded(
 
 /// For each index the largest size of an entry in its block: the rows and columns that entries of `a` which
 /// are not zero connect it with. Rounding comes only from these.
-fn largest_in_blocks(a: &Table, sizes: &Table) -> Vec<f64> {
+fn largest_in_blocks(a: &Table, sizes: &Table) -> Row {
     let n = a.len();
-    let mut block: Vec<usize> = (0..n).collect();
+    let mut block: SmallVec<[usize; 8]> = (0..n).collect();
     for (i, j) in pairs(n).filter(|&ij| a[ij] != 0.0) {
         let (kept, joined) = (block[i], block[j]);
         block.iter_mut().filter(|b| **b == joined).for_each(|b| *b = kept);
     }
-    let mut largest = vec![0.0; n];
+    let mut largest = zeros(n);
     for (i, j) in pairs(n) {
         largest[block[i]] = worse(largest[block[i]], sizes[(i, j)]);
     }
@@ -182,9 +185,9 @@ pub(crate) fn indefiniteness(k: &Table, units: &[f64]) -> f64 {
         let entry = 0.5 * (k[(i, j)] + k[(j, i)]);
         if entry == 0.0 { 0.0 } else { entry / units[i] / units[j] / top[i] }
     });
-    let diagonal: Vec<f64> = (0..n).map(|i| hat[(i, i)].abs() + ROUNDING).collect();
+    let diagonal: Row = (0..n).map(|i| hat[(i, i)].abs() + ROUNDING).collect();
     let mut a = Table::from_entries(n, |i, j| hat[(i, j)] / (diagonal[i] * diagonal[j]).sqrt());
-    let mut left: Vec<usize> = (0..n).collect();
+    let mut left: SmallVec<[usize; 8]> = (0..n).collect();
     let mut negative = 0.0_f64;
     while let Some(&p) = left.iter().max_by(|&&i, &&j| a[(i, i)].total_cmp(&a[(j, j)])) {
         negative = left.iter().map(|&i| -a[(i, i)]).fold(negative, f64::max);
@@ -193,7 +196,7 @@ pub(crate) fn indefiniteness(k: &Table, units: &[f64]) -> f64 {
             let violation = |&i: &usize| left.iter().map(|&j| a[(i, j)].abs()).fold(0.0, f64::max);
             return left.iter().map(violation).fold(negative, f64::max);
         }
-        left.retain(|&i| i != p);
+        left.retain(|i| *i != p);
         for &i in &left {
             for &j in &left {
                 let rank_one = a[(i, p)] * a[(p, j)] / a[(p, p)];

@@ -1,0 +1,299 @@
+//! The laws of an implementation of [`Equations`] and [`Model`], and the functions that check them.
+//!
+//! They tell whether an adapter answers what it is asked: each answer is compared with another one that follows from it.
+//! Whether the model keeps the laws of a metriplectic system is what the [judge](crate::judge) says.
+
+use crate::judge::{Derivatives, OF_SOLUTIONS, Row};
+use crate::{BrokenLaw, Covectors, ENTROPY, Equations, Jet, Model, Part, Sizes};
+
+/// The rest of terms that should cancel, relative to them: closures may lose some digits.
+const CANCELS: f64 = 1e-9;
+
+/// Checks a system at a state that is generic, along the direction `u`, which is to move each entry by some part of its size:
+///
+/// 1. every slice is filled; 2. `φ_x(0) = x`, and the coordinates of `φ_x(u)` are `u`; 3. the values of the differentials are
+///    the values; 4. `⟨dF, u⟩` is the derivative of each law along `φ_x(su)`; 5. the velocity conserves the energy and
+///    the further invariants, and `⟨dS, x'⟩` is the production, which is not negative; 6. `ψ_x(0) = x`, the rates
+///    there are the velocity, and the stage coordinates are the inverse of `ψ_x`.
+///
+/// The fifth law is that of a closed system.
+///
+/// # Errors
+///
+/// The first law that is broken.
+pub fn equations(system: &dyn Equations, t: f64, x: &[f64], u: &[f64]) -> Result<(), BrokenLaw> {
+    let Sizes { entries, directions: n, laws } = system.sizes();
+    same("the state has its entries", x.len() as f64, entries as f64)?;
+    same("the direction has as many numbers as the chart", u.len() as f64, n as f64)?;
+    let (mut sizes, mut y, mut q) = (nan(n), nan(entries), nan(n));
+    system.scales(x, &mut sizes);
+    filled("the sizes of the entries", &sizes)?;
+    system.chart(x, &vec![0.0; n], &mut y);
+    near("φ_x(0) = x", &y, x)?;
+    system.chart(x, u, &mut y);
+    filled("the entries of φ_x(u)", &y)?;
+    if system.coordinates(x, &y, &mut q) {
+        near("φ_x⁻¹(φ_x(u)) = u", &q, u)?;
+    }
+
+    let (mut values, mut again, mut w) = (nan(laws), nan(laws), nan(laws * n));
+    system.values(t, x, &mut values);
+    system.differentials(t, x, &mut again, &mut w);
+    filled("the values of all laws", &values)?;
+    filled("the differentials of all laws", &w)?;
+    for (law, row) in w.chunks_exact(n).enumerate() {
+        same("the differentials come with the values", again[law], values[law])?;
+        derivative("⟨dF, u⟩ is the derivative of F", &[dot(row, u)], &|s, to| {
+            let mut y = nan(entries);
+            system.chart(x, &scaled(u, s), &mut y);
+            let mut values = nan(laws);
+            system.values(t, &y, &mut values);
+            to.push(values[law]);
+        })?;
+    }
+
+    let (mut v, mut rates) = (nan(n), nan(n));
+    let Some(production) = system.velocity(t, x, &mut v) else { return Ok(()) };
+    filled("the velocity", &v)?;
+    for (law, row) in w.chunks_exact(n).enumerate() {
+        let (slope, terms) = (dot(row, &v), size_of(row, &v));
+        if law == ENTROPY {
+            let size = (slope - production).abs();
+            BrokenLaw::unless("⟨dS, x'⟩ is the production", size, CANCELS * terms)?;
+            BrokenLaw::unless("the production is not negative", -production, CANCELS * terms)?;
+        } else {
+            BrokenLaw::unless("the velocity conserves H and L_a", slope.abs(), CANCELS * terms)?;
+        }
+    }
+    let still = vec![0.0; n];
+    if system.stage_state(x, &still, &mut y) {
+        near("ψ_x(0) = x", &y, x)?;
+        system.stage_rates(x, &still, &y, &v, &mut rates);
+        near("the rates at ψ_x(0) are the velocity", &rates, &v)?;
+    }
+    if system.stage_state(x, u, &mut y) {
+        system.stage_coordinates(x, &y, &mut q);
+        near("ψ_x⁻¹(ψ_x(u)) = u", &q, u)?;
+    }
+    Ok(())
+}
+
+/// Checks a system whose parts are known apart in the same way:
+///
+/// 1. each law by itself has the values and differentials of all of them, and its Hessian is symmetric and the derivative of
+///    the differential; 2. the columns of a tensor are the vectors of its part; 3. the derivatives of a part, of its tensor and of
+///    the metric are those of their values; 4. the parts add up to the velocity, unless further invariants are projected out.
+///
+/// # Errors
+///
+/// The first law that is broken.
+pub fn model(system: &dyn Model, t: f64, x: &[f64], u: &[f64]) -> Result<(), BrokenLaw> {
+    let Sizes { directions: n, laws, .. } = system.sizes();
+    let (mut values, mut w) = (nan(laws), nan(laws * n));
+    system.differentials(t, x, &mut values, &mut w);
+    for law in 0..laws {
+        one_law(system, law, (t, x, u), (values[law], &w[law * n..][..n]))?;
+    }
+
+    let mut slopes = nan(n * n * n);
+    if system.metric_slopes(x, &mut slopes) {
+        let along: Vec<f64> = (0..n * n)
+            .map(|entry| (0..n).map(|k| slopes[k * n * n + entry] * u[k]).sum())
+            .collect();
+        derivative("the slopes of the metric are its derivatives", &along, &|s, to| {
+            let mut g = nan(n * n);
+            system.metric(x, &scaled(u, s), &mut g);
+            to.extend(g);
+        })?;
+    }
+
+    let differentials = Covectors { energy: &w[..n], entropy: &w[n..2 * n] };
+    let mut sum = vec![0.0; n];
+    for (part, alpha) in [
+        (Part::Bracket, differentials.energy),
+        (Part::Force, differentials.energy),
+        (Part::Dissipation, differentials.entropy),
+    ] {
+        if system.is_zero(part) {
+            continue;
+        }
+        let v = one_part(system, part, (t, x, u), differentials, alpha)?;
+        sum.iter_mut().zip(v).for_each(|(sum, v)| *sum += v);
+    }
+    let mut velocity = nan(n);
+    if laws == ENTROPY + 1 && system.velocity(t, x, &mut velocity).is_some() {
+        near("the parts add up to the velocity", &sum, &velocity)?;
+    }
+    Ok(())
+}
+
+/// Checks one law of a model.
+fn one_law(
+    system: &dyn Model,
+    law: usize,
+    (t, x, u): (f64, &[f64], &[f64]),
+    (value, row): (f64, &[f64]),
+) -> Result<(), BrokenLaw> {
+    let n = u.len();
+    let (mut df, mut second, mut hf) = (nan(n), nan(n), nan(n * n));
+    same("a law by itself has its value", system.value(law, t, x), value)?;
+    same("a differential comes with its value", system.jet(law, t, x, &mut df), value)?;
+    near("a law by itself has its differential", &df, row)?;
+    let beside = system.hessian(law, t, x, &mut second, &mut hf);
+    near("a Hessian comes with its value and differential", &second, row)?;
+    near("a Hessian comes with its value and differential", &[beside], &[value])?;
+    filled("the Hessian", &hf)?;
+    let transposed: Vec<f64> = (0..n * n).map(|k| hf[k % n * n + k / n]).collect();
+    near("a Hessian is symmetric", &hf, &transposed)?;
+    let along: Vec<f64> = hf.chunks_exact(n).map(|row| dot(row, u)).collect();
+    derivative("a Hessian is the derivative of the differential", &along, &|s, to| {
+        let mut df = nan(n);
+        system.differential_at(law, t, x, &scaled(u, s), &mut df);
+        to.extend(df);
+    })
+}
+
+/// Checks one part of a model, and returns its vector.
+fn one_part(
+    system: &dyn Model,
+    part: Part,
+    (t, x, u): (f64, &[f64], &[f64]),
+    w: Covectors<'_>,
+    alpha: &[f64],
+) -> Result<Vec<f64>, BrokenLaw> {
+    let n = u.len();
+    let exists = |_| BrokenLaw { law: "a part exists", size: f64::NAN, bound: 0.0 };
+    let still = vec![0.0; n];
+    let apply = |q: &[f64], w: Covectors<'_>, alpha: &[f64]| {
+        let mut v = nan(n);
+        system.apply(part, t, (x, q), w, alpha, &mut v).map(|()| v)
+    };
+    let v = apply(&still, w, alpha).map_err(exists)?;
+    filled("the vector of a part", &v)?;
+    let [mut value, mut along_x, mut along_w, mut slopes] = [n, n * n, n * n, n * n].map(nan);
+    let mut jet = Jet {
+        value: &mut value,
+        along_x: &mut along_x,
+        along_w: &mut along_w,
+        tensor: &mut slopes,
+    };
+    system.linearise(part, t, x, w, alpha, &mut jet).map_err(exists)?;
+    near("derivatives come with the vector of a part", &value, &v)?;
+    let of = |matrix: &[f64]| matrix.chunks_exact(n).map(|row| dot(row, u)).collect::<Vec<_>>();
+    derivative("along_x is the derivative along the state", &of(&along_x), &|s, to| {
+        to.extend(apply(&scaled(u, s), w, alpha).unwrap_or_else(|_| nan(n)));
+    })?;
+    // The covector that the part depends on, beside what the tensor says.
+    let covector = if part == Part::Dissipation { w.energy } else { w.entropy };
+    let turned: Vec<f64> =
+        covector.iter().enumerate().map(|(i, c)| c * (1.0 + i as f64).sin()).collect();
+    let along: Vec<f64> = along_w.chunks_exact(n).map(|row| dot(row, &turned)).collect();
+    derivative("along_w is the derivative along a covector", &along, &|s, to| {
+        let moved: Vec<f64> = covector.iter().zip(&turned).map(|(c, d)| c + s * d).collect();
+        let w = if part == Part::Dissipation {
+            Covectors { energy: &moved, ..w }
+        } else {
+            Covectors { entropy: &moved, ..w }
+        };
+        to.extend(apply(&still, w, alpha).unwrap_or_else(|_| nan(n)));
+    })?;
+    if part == Part::Force {
+        return Ok(v);
+    }
+    let mut tensor = nan(n * n);
+    system.tensor(part, t, x, w, &mut tensor).map_err(exists)?;
+    near("the derivative along α is the tensor", &slopes, &tensor)?;
+    let product: Vec<f64> = tensor.chunks_exact(n).map(|row| dot(row, alpha)).collect();
+    near("the columns of a tensor are the vectors of its part", &product, &v)?;
+    if part == Part::Bracket {
+        bracket_slopes(system, (t, x, u), w, alpha)?;
+    }
+    Ok(v)
+}
+
+/// Checks the derivatives of the bracket along a direction and the covector of the entropy.
+fn bracket_slopes(
+    system: &dyn Model,
+    (t, x, u): (f64, &[f64], &[f64]),
+    w: Covectors<'_>,
+    alpha: &[f64],
+) -> Result<(), BrokenLaw> {
+    let n = u.len();
+    let exists = |_| BrokenLaw { law: "the bracket has derivatives", size: f64::NAN, bound: 0.0 };
+    let ds: Vec<f64> =
+        w.entropy.iter().enumerate().map(|(i, s)| s * (2.0 + i as f64).sin()).collect();
+    let (mut of_tensor, mut of_vector) = (nan(n * n), nan(n));
+    let along = [u, &ds];
+    system.bracket_slope(t, x, along, w.entropy, &mut of_tensor).map_err(exists)?;
+    system.bracket_slope_of(t, x, along, w.entropy, alpha, &mut of_vector).map_err(exists)?;
+    let product: Vec<f64> = of_tensor.chunks_exact(n).map(|row| dot(row, alpha)).collect();
+    near("the slope of Π α is that of Π", &product, &of_vector)?;
+    derivative("the slope of the bracket is its derivative", &of_vector, &|s, to| {
+        let moved: Vec<f64> = w.entropy.iter().zip(&ds).map(|(c, d)| c + s * d).collect();
+        let mut v = nan(n);
+        let w = Covectors { entropy: &moved, ..w };
+        let place = (x, &scaled(u, s)[..]);
+        let applied = system.apply(Part::Bracket, t, place, w, alpha, &mut v);
+        to.extend(applied.map_or_else(|_| nan(n), |()| v));
+    })
+}
+
+fn nan(count: usize) -> Vec<f64> {
+    vec![f64::NAN; count]
+}
+
+fn scaled(u: &[f64], s: f64) -> Vec<f64> {
+    u.iter().map(|u| u * s).collect()
+}
+
+fn dot(alpha: &[f64], v: &[f64]) -> f64 {
+    alpha.iter().zip(v).map(|(a, v)| a * v).sum()
+}
+
+fn size_of(alpha: &[f64], v: &[f64]) -> f64 {
+    alpha.iter().zip(v).map(|(a, v)| (a * v).abs()).sum()
+}
+
+/// Numbers that are the same, bit for bit.
+fn same(law: &'static str, found: f64, expected: f64) -> Result<(), BrokenLaw> {
+    let is_same = found == expected || found.is_nan() && expected.is_nan();
+    BrokenLaw::unless(law, if is_same { 0.0 } else { (found - expected).abs() }, 0.0)
+}
+
+/// Slices that hold no number of before.
+fn filled(law: &'static str, numbers: &[f64]) -> Result<(), BrokenLaw> {
+    let left = numbers.iter().filter(|number| number.is_nan()).count();
+    BrokenLaw::unless(law, left as f64, 0.0)
+}
+
+/// Slices that are the same up to the round-off of their largest number.
+fn near(law: &'static str, found: &[f64], expected: &[f64]) -> Result<(), BrokenLaw> {
+    let size = expected.iter().chain(found).fold(0.0_f64, |most, number| most.max(number.abs()));
+    let off = found.iter().zip(expected).map(|(a, b)| (a - b).abs());
+    let worst = off.fold(0.0_f64, |most, off| if off.is_nan() { off } else { most.max(off) });
+    BrokenLaw::unless(law, worst, CANCELS * size)
+}
+
+/// Derivatives at 0 of the numbers that a function of one parameter appends.
+fn derivative(
+    law: &'static str,
+    df: &[f64],
+    values: &dyn Fn(f64, &mut Row),
+) -> Result<(), BrokenLaw> {
+    let largest = df.iter().fold(0.0_f64, |most, df| most.max(df.abs()));
+    let unit = if largest > 0.0 { largest } else { 1.0 };
+    let derivatives = Derivatives {
+        scale: 1.0,
+        df: Row::from_slice(df),
+        units: Row::from_elem(unit, df.len()),
+        rounding: OF_SOLUTIONS,
+    };
+    let mismatch = derivatives.compare(&|s, to| {
+        values(s, to);
+        Some(())
+    });
+    mismatch.map_or(Ok(()), |found| {
+        let (size, bound) = ((found.derivative - found.quotient).abs(), CANCELS * largest);
+        Err(BrokenLaw { law, size, bound })
+    })
+}

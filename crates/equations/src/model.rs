@@ -1,0 +1,185 @@
+//! The parts of a system apart.
+
+use crate::{Equations, MetricError};
+
+/// A part of the motion.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Part {
+    /// `Π α`, which may depend on the covector of the entropy.
+    Bracket,
+    /// The force `f(w)`, which does no work.
+    Force,
+    /// `K_w α`, which annihilates the covector `w` of the energy.
+    Dissipation,
+}
+
+/// The covectors that the parts of a motion depend on: differentials, or discrete gradients.
+#[derive(Clone, Copy, Debug)]
+pub struct Covectors<'a> {
+    /// That of the energy: a dissipation annihilates it, and a force acts on it.
+    pub energy: &'a [f64],
+    /// That of the entropy: some brackets are made of it.
+    pub entropy: &'a [f64],
+}
+
+/// A vector at a state with its derivatives: matrices of `n × n` numbers.
+#[derive(Debug)]
+pub struct Jet<'a> {
+    /// The vector `Π α`, `f(w)` or `K_w α`.
+    pub value: &'a mut [f64],
+    /// Its derivatives along the state, in the chart there.
+    pub along_x: &'a mut [f64],
+    /// Its derivatives along the covector that the part depends on: that of the entropy for a bracket and for a force, that of
+    /// the energy for a dissipation.
+    pub along_w: &'a mut [f64],
+    /// Its derivatives along `α`, or along `w` for a force: the tensor.
+    pub tensor: &'a mut [f64],
+}
+
+/// A system whose parts are known apart: the laws one by one, the metric, and the tensors with their derivatives. The judge of
+/// models asks these questions.
+///
+/// Displacements `q` and covectors are in the frame of the chart at `x`, also where a part is evaluated at `φ_x(q)`.
+///
+/// Laws ([`laws::model`](crate::laws::model)): 1. the parts add up to the velocity; 2. the columns of a tensor are the vectors of
+/// its part; 3. derivatives are those of the values; 4. a Hessian is symmetric, and the derivative of the differential.
+pub trait Model: Equations {
+    /// Returns whether a part is zero by construction.
+    fn is_zero(&self, part: Part) -> bool;
+
+    /// Returns whether the bracket is to satisfy the Jacobi identity.
+    fn is_poisson(&self) -> bool {
+        true
+    }
+
+    /// Returns whether the dissipation is defined by the covectors that it annihilates, so that the further invariants are
+    /// projected out of it too. Any other dissipation must annihilate them by itself.
+    fn adapts(&self) -> bool {
+        false
+    }
+
+    /// Evaluates one law at a state.
+    fn value(&self, law: usize, t: f64, x: &[f64]) -> f64;
+
+    /// Evaluates one law with its differential.
+    fn jet(&self, law: usize, t: f64, x: &[f64], df: &mut [f64]) -> f64;
+
+    /// Evaluates one law with its differential and its Hessian in the chart at `x`.
+    fn hessian(&self, law: usize, t: f64, x: &[f64], df: &mut [f64], hf: &mut [f64]) -> f64;
+
+    /// Computes the differential of one law at `φ_x(q)`, in the chart at `x`.
+    fn differential_at(&self, law: usize, t: f64, x: &[f64], q: &[f64], df: &mut [f64]);
+
+    /// Computes for each further invariant the smallest fraction of its differential that is independent of those of the laws
+    /// before it.
+    fn independence(&self, t: f64, x: &[f64], fractions: &mut [f64]);
+
+    /// Evaluates the matrix of the metric at `φ_x(q)`, without a check.
+    fn metric(&self, x: &[f64], q: &[f64], g: &mut [f64]);
+
+    /// Checks that the metric at a state can be used, and with `geodesics` that it has one from there.
+    ///
+    /// # Errors
+    ///
+    /// [`MetricError`] if its matrix is not symmetric and positive, or a geodesic cannot be followed.
+    fn check_metric(&self, x: &[f64], geodesics: bool) -> Result<(), MetricError>;
+
+    /// Evaluates the derivatives of the metric along the directions of the chart, `n` matrices; returns `false` for a metric that is
+    /// constant by construction.
+    fn metric_slopes(&self, x: &[f64], slopes: &mut [f64]) -> bool;
+
+    /// Computes the covector `♭d` of a vector at a state.
+    ///
+    /// # Errors
+    ///
+    /// [`MetricError`] if the metric cannot be used there.
+    fn flat(&self, x: &[f64], d: &[f64], w: &mut [f64]) -> Result<(), MetricError>;
+
+    /// Evaluates the tensor of the bracket or of the dissipation at a state.
+    ///
+    /// # Errors
+    ///
+    /// [`MetricError`] if the metric cannot be used there.
+    fn tensor(
+        &self,
+        part: Part,
+        t: f64,
+        x: &[f64],
+        w: Covectors<'_>,
+        tensor: &mut [f64],
+    ) -> Result<(), MetricError>;
+
+    /// Evaluates the vector of a part at `φ_x(q)`, of the state and the displacement in `place`. A force has no `α`.
+    ///
+    /// # Errors
+    ///
+    /// [`MetricError`] if the metric cannot be used there.
+    fn apply(
+        &self,
+        part: Part,
+        t: f64,
+        place: (&[f64], &[f64]),
+        w: Covectors<'_>,
+        alpha: &[f64],
+        v: &mut [f64],
+    ) -> Result<(), MetricError>;
+
+    /// Evaluates the vector of a part at a state with its derivatives, as implicit methods use them.
+    ///
+    /// # Errors
+    ///
+    /// [`MetricError`] if the metric cannot be used there.
+    fn linearise(
+        &self,
+        part: Part,
+        t: f64,
+        x: &[f64],
+        w: Covectors<'_>,
+        alpha: &[f64],
+        jet: &mut Jet<'_>,
+    ) -> Result<(), MetricError>;
+
+    /// Evaluates the derivative of the tensor of the bracket along the direction `u` at a state, with the covector of
+    /// the entropy that changes by `ds`.
+    ///
+    /// # Errors
+    ///
+    /// [`MetricError`] if the metric cannot be used there.
+    fn bracket_slope(
+        &self,
+        t: f64,
+        x: &[f64],
+        along: [&[f64]; 2],
+        entropy: &[f64],
+        slope: &mut [f64],
+    ) -> Result<(), MetricError>;
+
+    /// Evaluates the derivative of `Π α` in the same way.
+    ///
+    /// # Errors
+    ///
+    /// [`MetricError`] if the metric cannot be used there.
+    fn bracket_slope_of(
+        &self,
+        t: f64,
+        x: &[f64],
+        along: [&[f64]; 2],
+        entropy: &[f64],
+        alpha: &[f64],
+        slope: &mut [f64],
+    ) -> Result<(), MetricError>;
+
+    /// Computes the velocity with which the symmetry of a momentum moves a state, in the chart there, and where it moves it at the
+    /// time 0; returns `false` if the invariant comes without one.
+    fn generator(
+        &self,
+        invariant: usize,
+        x: &[f64],
+        moved: &mut [f64],
+        at_zero: &mut [f64],
+    ) -> bool;
+
+    /// Computes the state to which the symmetry of a momentum leads after a time, and the derivative of this map in the charts
+    /// at both states.
+    fn action(&self, invariant: usize, x: &[f64], time: f64, y: &mut [f64], tangent: &mut [f64]);
+}

@@ -1,0 +1,464 @@
+//! A system in plain numbers is a flow, of a size that is known at run time.
+
+mod projection;
+
+use std::fmt;
+
+use metriplectic_dynamics::invariants::Kind;
+use metriplectic_dynamics::{ModelError, SecondLaw};
+use metriplectic_equations::judge::{Judge, RADIUS};
+use metriplectic_equations::{ENERGY, ENTROPY, Equations, Report, Sizes, VerifiedEquations};
+use metriplectic_manifolds::PointError;
+
+use self::projection::Projection;
+use crate::explicit::{Projected, ProjectionError, StageFlow, Target};
+use crate::step::{Element, Flow, Laws, Recheck, StateSpace};
+
+/// States that are lists of numbers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Numbers;
+
+impl StateSpace for Numbers {
+    type Element = Vec<f64>;
+
+    fn numbers(x: &Vec<f64>) -> Vec<f64> {
+        x.clone()
+    }
+}
+
+/// The flow of a system that answers [`Equations`]: one of your own, or one whose number of variables is read from a file.
+///
+/// Explicit methods run it, with all that a run does: tolerances, outputs, events and their jumps, certificates, checkpoints,
+/// observables and sweeps. `H` and the further invariants are kept to round-off, and `S` never falls. `S` may be behind a
+/// pointer: `FromEquations<Box<dyn Equations>>` is a type that a struct can name, for every system.
+///
+/// A hundred oscillators with springs to their neighbours:
+///
+/// ```
+/// use metriplectic_equations::{ENERGY, ENTROPY, Equations, Sizes};
+/// use metriplectic_integrators::{DormandPrince8, FromEquations, Method as _, Span};
+///
+/// /// `H = Σ ½p² + Σ ½(q_{i+1} − q_i)²`, with both ends fixed.
+/// struct Oscillators(usize);
+///
+/// impl Oscillators {
+///     fn extension(&self, x: &[f64], i: usize) -> f64 {
+///         let at = |i: usize| if i == 0 || i > self.0 { 0.0 } else { x[i - 1] };
+///         at(i + 1) - at(i)
+///     }
+///
+///     fn force(&self, x: &[f64], i: usize) -> f64 {
+///         self.extension(x, i + 1) - self.extension(x, i)
+///     }
+/// }
+///
+/// impl Equations for Oscillators {
+///     fn sizes(&self) -> Sizes {
+///         Sizes { entries: 2 * self.0, directions: 2 * self.0, laws: 2 }
+///     }
+///
+///     fn values(&self, _: f64, x: &[f64], values: &mut [f64]) {
+///         let springs: f64 = (0..=self.0).map(|i| 0.5 * self.extension(x, i).powi(2)).sum();
+///         values[ENERGY] = springs + x[self.0..].iter().map(|p| 0.5 * p * p).sum::<f64>();
+///         values[ENTROPY] = 0.0;
+///     }
+///
+///     fn differentials(&self, t: f64, x: &[f64], values: &mut [f64], w: &mut [f64]) {
+///         self.values(t, x, values);
+///         w.fill(0.0);
+///         (0..self.0).for_each(|i| w[i] = -self.force(x, i));
+///         w[self.0..2 * self.0].copy_from_slice(&x[self.0..]);
+///     }
+///
+///     fn velocity(&self, _: f64, x: &[f64], v: &mut [f64]) -> Option<f64> {
+///         v[..self.0].copy_from_slice(&x[self.0..]);
+///         (0..self.0).for_each(|i| v[self.0 + i] = self.force(x, i));
+///         Some(0.0)
+///     }
+/// }
+///
+/// let mut start = vec![0.0; 200];
+/// start[50] = 1.0;
+/// let chain = FromEquations(Oscillators(100));
+/// let run = DormandPrince8.run(&chain, start, Span::until(50.0).tolerance(1e-8))?;
+/// assert!(run.certificate().max_relative_energy_error() < 1e-14);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Copy)]
+pub struct FromEquations<S>(pub S);
+
+// By hand, because systems have no `Debug`.
+impl<S> fmt::Debug for FromEquations<S> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_tuple("FromEquations").finish_non_exhaustive()
+    }
+}
+
+/// The time that a system without a clock is asked at.
+const NO_CLOCK: f64 = 0.0;
+
+impl<S: Equations> FromEquations<S> {
+    /// Checks the laws of the system around a state: the [model](Equations::model) if its parts are known, and the
+    /// velocity and the differentials if they are not. A run does this first, with a radius of 0.1.
+    ///
+    /// # Errors
+    ///
+    /// [`ModelError`] that names the law, the state and the size of the violation.
+    pub fn verify(&self, x0: &[f64], radius: f64) -> Result<(), ModelError> {
+        Judge::of(&self.0, NO_CLOCK).verify(x0, radius)
+    }
+
+    /// Lists the residual of every law around a state. Read it when a new system misbehaves.
+    pub fn report(&self, x0: &[f64]) -> Report {
+        Judge::of(&self.0, NO_CLOCK).report(x0)
+    }
+
+    /// Verifies the system around a state, and returns it with this certificate. A run of it, from any start, checks the laws at
+    /// that start without samples around it. Use it for a study of many runs.
+    ///
+    /// # Errors
+    ///
+    /// The errors of [`verify`](Self::verify).
+    pub fn verified(self, x0: &[f64]) -> Result<FromEquations<VerifiedEquations<S>>, ModelError> {
+        VerifiedEquations::around(self.0, x0).map(FromEquations)
+    }
+
+    /// The size of a direction, entry by entry.
+    fn scales(&self, x: &[f64]) -> Vec<f64> {
+        let mut sizes = vec![0.0; self.0.sizes().directions];
+        self.0.scales(x, &mut sizes);
+        sizes
+    }
+
+    fn laws_of(values: &[f64]) -> Laws<Vec<f64>> {
+        let invariants = values[ENTROPY + 1..].to_vec();
+        Laws { energy: values[ENERGY], entropy: values[ENTROPY], invariants }
+    }
+}
+
+/// The laws of a system with their differentials, one after another.
+#[derive(Clone, Debug)]
+pub struct Rows {
+    /// The values.
+    values: Vec<f64>,
+    /// The differentials.
+    w: Vec<f64>,
+}
+
+impl Rows {
+    fn of(system: &(impl Equations + ?Sized), x: &[f64]) -> Self {
+        let Sizes { directions, laws, .. } = system.sizes();
+        let (mut values, mut w) = (vec![0.0; laws], vec![0.0; laws * directions]);
+        system.differentials(NO_CLOCK, x, &mut values, &mut w);
+        Self { values, w }
+    }
+
+    fn is_finite(&self) -> bool {
+        self.values.iter().chain(&self.w).all(|number| number.is_finite())
+    }
+
+    /// The differential of a law.
+    fn row(&self, law: usize) -> &[f64] {
+        let n = self.w.len() / self.values.len();
+        &self.w[law * n..][..n]
+    }
+}
+
+impl<S: Equations> Flow for FromEquations<S> {
+    type Space = Numbers;
+    type Numbers = Vec<f64>;
+    type Vector = Vec<f64>;
+
+    fn laws(&self, x: &Vec<f64>) -> Laws<Vec<f64>> {
+        let mut values = vec![0.0; self.0.sizes().laws];
+        self.0.values(NO_CLOCK, x, &mut values);
+        Self::laws_of(&values)
+    }
+
+    fn term_sizes(&self, x: &Vec<f64>) -> Laws<Vec<f64>> {
+        let (rows, scales) = (Rows::of(&self.0, x), self.scales(x));
+        let size = |(law, value): (usize, &f64)| {
+            let terms = rows.row(law).iter().zip(&scales).map(|(w, scale)| w.abs() * scale);
+            value.abs() + terms.sum::<f64>()
+        };
+        Self::laws_of(&rows.values.iter().enumerate().map(size).collect::<Vec<_>>())
+    }
+
+    fn rates(&self, x: &Vec<f64>, d: &Vec<f64>) -> Option<Vec<f64>> {
+        let y = self.stage(x, d)?;
+        let (v, _) = self.motion(&y)?;
+        Some(self.stage_rates(x, (d, &y), &v))
+    }
+
+    fn sizes(&self, x: &Vec<f64>) -> Vec<f64> {
+        self.scales(x)
+    }
+
+    fn moved(&self, x: &Vec<f64>, d: &Vec<f64>) -> Vec<f64> {
+        let mut y = vec![0.0; x.len()];
+        self.0.chart(x, d, &mut y);
+        y
+    }
+
+    fn displacement(&self, x: &Vec<f64>, y: &Vec<f64>) -> Option<Vec<f64>> {
+        let mut q = vec![0.0; self.0.sizes().directions];
+        self.0.coordinates(x, y, &mut q).then_some(q)
+    }
+
+    fn production(&self, x: &Vec<f64>) -> Option<f64> {
+        self.motion(x).map(|(_, production)| production)
+    }
+
+    fn onto(&self, y: &Vec<f64>, laws: &Laws<Vec<f64>>, entropy: Option<f64>) -> Option<Vec<f64>> {
+        let laws = Laws { entropy: entropy.unwrap_or(laws.entropy), ..laws.clone() };
+        let with_entropy = entropy.is_some();
+        let target = Target { laws: &laws, with_entropy, limit: None, units: None, error: None };
+        self.project(y.clone(), &target).ok().map(|end| end.x)
+    }
+
+    fn element(&self, entries: &[f64]) -> Result<Vec<f64>, PointError> {
+        let (found, expected) = (entries.len(), self.0.sizes().entries);
+        if found != expected {
+            return Err(PointError::Length { found, expected });
+        }
+        self.0.check(entries)?;
+        Ok(entries.to_vec())
+    }
+
+    fn entropy_law(&self) -> SecondLaw {
+        self.0.second_law()
+    }
+
+    fn kinds(&self) -> Vec<Kind> {
+        (0..self.0.sizes().laws - ENTROPY - 1).map(|invariant| self.0.kind(invariant)).collect()
+    }
+
+    fn check(&self, x0: &Vec<f64>) -> Result<(), ModelError> {
+        if self.0.is_verified() {
+            Judge::of(&self.0, NO_CLOCK).check_start(x0)
+        } else {
+            self.verify(x0, RADIUS)
+        }
+    }
+
+    fn is_verified(&self) -> bool {
+        self.0.is_verified()
+    }
+
+    fn rechecks(&self, _: Recheck) -> bool {
+        true
+    }
+
+    fn recheck(&self, x: &Vec<f64>, occasion: Recheck) -> Result<(), ModelError> {
+        let judge = Judge::of(&self.0, NO_CLOCK);
+        match occasion {
+            Recheck::OnTheWay { step } => {
+                judge.check_state(x).and_then(|()| judge.look_at_derivatives(x, step))
+            }
+            Recheck::End => judge.check_state(x).and_then(|()| judge.check_derivatives(x)),
+            Recheck::Failure { .. } => judge.check_around(x, &[]),
+        }
+    }
+
+    fn defect(&self, x: &Vec<f64>) -> f64 {
+        self.0.defect(x)
+    }
+}
+
+impl<S: Equations> StageFlow for FromEquations<S> {
+    type Gradients = Rows;
+
+    fn gradients(&self, x: &Vec<f64>) -> Option<Rows> {
+        let rows = Rows::of(&self.0, x);
+        rows.is_finite().then_some(rows)
+    }
+
+    fn values(&self, rows: &Rows) -> Laws<Vec<f64>> {
+        Self::laws_of(&rows.values)
+    }
+
+    fn velocity(&self, x: &Vec<f64>, _: &Rows) -> Option<(Vec<f64>, f64)> {
+        self.motion(x)
+    }
+
+    fn motion(&self, x: &Vec<f64>) -> Option<(Vec<f64>, f64)> {
+        let mut v = vec![0.0; self.0.sizes().directions];
+        let production = self.0.velocity(NO_CLOCK, x, &mut v)?;
+        v.iter().all(|v| v.is_finite()).then_some((v, production))
+    }
+
+    fn stage(&self, x: &Vec<f64>, q: &Vec<f64>) -> Option<Vec<f64>> {
+        let mut y = vec![0.0; x.len()];
+        self.0.stage_state(x, q, &mut y).then_some(y)
+    }
+
+    fn stage_rates(&self, x: &Vec<f64>, (q, y): (&Vec<f64>, &Vec<f64>), v: &Vec<f64>) -> Vec<f64> {
+        let mut rates = vec![0.0; v.len()];
+        self.0.stage_rates(x, q, y, v, &mut rates);
+        rates
+    }
+
+    fn stage_coordinates(&self, x: &Vec<f64>, y: &Vec<f64>) -> Vec<f64> {
+        let mut q = vec![0.0; self.0.sizes().directions];
+        self.0.stage_coordinates(x, y, &mut q);
+        q
+    }
+
+    fn project(
+        &self,
+        y: Element<Self>,
+        target: &Target<'_, Self>,
+    ) -> Result<Projected<Self>, ProjectionError> {
+        let target_of = projection::Aim {
+            laws: target.laws,
+            with_entropy: target.with_entropy,
+            limit: target.limit,
+            units: target.units,
+        };
+        let landed = Projection { system: &self.0, target: target_of }.from(y)?;
+        Ok(Projected {
+            x: landed.x,
+            gradients: landed.rows,
+            entropy: landed.entropy,
+            entropy_round_off: landed.entropy_round_off,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{DormandPrince5, DormandPrince8, Method, RunError, RungeKuttaChebyshev, Span};
+    use metriplectic_dynamics::bracket::{AreaForm, Zero};
+    use metriplectic_dynamics::{InNumbers, Metriplectic, System, system::Point};
+    use metriplectic_fields::Real;
+    use metriplectic_manifolds::{Euclidean, LieDual, Manifold, Product, Sphere};
+    use nalgebra::{Vector1, Vector3, vector};
+    use num_dual::DualNum as _;
+
+    fn body() -> impl Metriplectic<Manifold = LieDual<3>> {
+        System::on(LieDual::so3())
+            .energy(|p: &Vector3<Real>| p.x * p.x * 0.05 + p.y * p.y * 0.1 + p.z * p.z * 0.5)
+            .entropy(|p: &Vector3<Real>| p.norm_squared() * 0.5)
+            .build()
+            .unwrap()
+    }
+
+    /// A spin on S² with its heat.
+    fn spin() -> impl Metriplectic<Manifold = Product<Sphere<2>, Euclidean<1>>> {
+        System::on(Product(Sphere::<2>::round(), Euclidean::<1>))
+            .bracket((AreaForm, Zero))
+            .energy(|(n, s): &(Vector3<Real>, Vector1<Real>)| {
+                n.x * n.x * 0.5 + n.y * n.y * 0.25 - n.z * 0.4 + s.x.exp()
+            })
+            .entropy(|(_, s): &(Vector3<Real>, Vector1<Real>)| s.x)
+            .build()
+            .unwrap()
+    }
+
+    /// The bits of both ways.
+    fn bits<Y, N>(system: &Y, x: &Point<Y>, method: N) -> [Vec<u64>; 2]
+    where
+        Y: Metriplectic,
+        N: Method<Y> + for<'a> Method<FromEquations<InNumbers<'a, Y>>> + Copy,
+    {
+        let span = || Span::steps(0.1, 25);
+        let typed = method.run(system, x.clone(), span()).unwrap();
+        let numbers = FromEquations(InNumbers(system));
+        let run = method.run(&numbers, Y::Manifold::entries(x), span()).unwrap();
+        assert!(run.certificate().max_relative_energy_error() < 1e-15);
+        let bits = |x: &[f64]| x.iter().map(|x| x.to_bits()).collect();
+        [bits(&Y::Manifold::entries(&typed.last().point)), bits(&run.last().point)]
+    }
+
+    #[test]
+    fn a_system_in_numbers_runs_with_the_bits_of_its_types() {
+        let (start, spun) = (vector![0.4, -1.0, 0.3], (vector![0.6, 0.0, 0.8], vector![0.2]));
+        for [typed, numbers] in [
+            bits(&body(), &start, DormandPrince8),
+            bits(&body(), &start, DormandPrince5),
+            bits(&body(), &start, RungeKuttaChebyshev),
+            bits(&spin(), &spun, DormandPrince8),
+            bits(&spin(), &spun, DormandPrince5),
+        ] {
+            assert_eq!(typed, numbers);
+        }
+    }
+
+    #[test]
+    fn a_boxed_system_follows_a_tolerance_to_the_end_of_its_types() {
+        /// A field of a struct, for any system.
+        struct Holder<'a> {
+            system: FromEquations<Box<dyn Equations + 'a>>,
+        }
+        let (body, start) = (body(), vector![0.4, -1.0, 0.3]);
+        let holder = Holder { system: FromEquations(Box::new(InNumbers(&body))) };
+        let span = || Span::until(5.0).tolerance(1e-9);
+        let typed = DormandPrince8.run(&body, start, span()).unwrap();
+        let run = DormandPrince8.run(&holder.system, vec![0.4, -1.0, 0.3], span()).unwrap();
+        let (a, b) = (typed.last(), run.last());
+        let off = a.point.iter().zip(&b.point).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(off < 1e-7 && b.entropy > run.states()[0].entropy, "{off}");
+        let run = run.certificate();
+        assert!(run.max_relative_energy_error() < 1e-15 && run.keeps_entropy(), "{run}");
+    }
+
+    /// A damped oscillator `q' = p, p' = −q − γp, s' = γp²` at the temperature 1, with a fault.
+    struct Damped(fn(&mut [f64], &mut f64));
+
+    impl Equations for Damped {
+        fn sizes(&self) -> Sizes {
+            Sizes { entries: 3, directions: 3, laws: 2 }
+        }
+
+        fn values(&self, _: f64, x: &[f64], values: &mut [f64]) {
+            values[ENERGY] = 0.5 * (x[0] * x[0] + x[1] * x[1]) + x[2];
+            values[ENTROPY] = x[2];
+        }
+
+        fn differentials(&self, t: f64, x: &[f64], values: &mut [f64], w: &mut [f64]) {
+            self.values(t, x, values);
+            w.copy_from_slice(&[x[0], x[1], 1.0, 0.0, 0.0, 1.0]);
+        }
+
+        fn velocity(&self, _: f64, x: &[f64], v: &mut [f64]) -> Option<f64> {
+            let mut production = 0.1 * x[1] * x[1];
+            v.copy_from_slice(&[x[1], -x[0] - 0.1 * x[1], production]);
+            (self.0)(v, &mut production);
+            Some(production)
+        }
+
+        fn second_law(&self) -> SecondLaw {
+            SecondLaw::Exact
+        }
+    }
+
+    #[test]
+    fn a_system_of_ones_own_is_judged_by_its_motion() {
+        let run = |fault| {
+            let system = FromEquations(Damped(fault));
+            DormandPrince8.run(&system, vec![1.0, 0.0, 0.0], Span::until(5.0).tolerance(1e-8))
+        };
+        let sound = run(|_, _| {}).unwrap();
+        assert!(sound.certificate().keeps_entropy() && !sound.certificate().verified_before);
+        let x0 = vec![1.0, 0.0, 0.0];
+        let kept = FromEquations(Damped(|_, _| {})).verified(&x0).unwrap();
+        let again = DormandPrince8.run(&kept, x0, Span::until(5.0).tolerance(1e-8)).unwrap();
+        assert!(again.certificate().verified_before && again.last() == sound.last());
+        let refusal = |fault| match run(fault) {
+            Err(RunError::Model(error)) => error,
+            other => panic!("{other:?}"),
+        };
+        let energy = refusal(|v, _| v[1] += 0.1 * v[0]);
+        assert!(matches!(energy, ModelError::MotionChangesEnergy { .. }), "{energy}");
+        let production = refusal(|_, production| *production *= 1.01);
+        assert!(matches!(production, ModelError::ProductionOff { .. }), "{production}");
+        let falls = refusal(|v, production| {
+            (v[1], v[2]) = (v[1] + 0.2 * v[0], v[2] - 0.2 * v[0] * v[0]);
+            *production = v[2];
+        });
+        assert!(matches!(falls, ModelError::ProductionNegative { .. }), "{falls}");
+        let nan = refusal(|v, _| v[0] = f64::NAN);
+        assert!(matches!(nan, ModelError::ValueNotFinite { field: "velocity", .. }), "{nan}");
+    }
+}

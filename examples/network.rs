@@ -43,31 +43,31 @@ impl Network {
             let mut words = line.split('#').next().unwrap_or_default().split_whitespace();
             let Some(kind) = words.next() else { continue };
             let bad = || format!("line {} is no line of a network: {line:?}", number + 1);
-            let numbers: Result<Vec<f64>, _> = words.map(str::parse).collect();
-            let numbers = numbers.map_err(|_| bad())?;
-            let body = |number: f64| {
-                let bodies = 0..network.masses.len();
-                bodies.into_iter().find(|&i| number == i as f64).ok_or_else(bad)
+            let number = |word: &str| word.parse::<f64>().map_err(|_| bad());
+            let body = |word: &str| {
+                let index = word.parse().ok().filter(|index| *index < network.masses.len());
+                index.ok_or_else(bad)
             };
-            match (kind, &numbers[..]) {
+            match (kind, &words.collect::<Vec<_>>()[..]) {
                 ("body", &[mass, position, momentum, capacity, temperature]) => {
-                    network.masses.push(mass);
+                    let capacity = number(capacity)?;
+                    positions.push(number(position)?);
+                    momenta.push(number(momentum)?);
+                    energies.push(capacity * number(temperature)?);
                     network.capacities.push(capacity);
-                    positions.push(position);
-                    momenta.push(momentum);
-                    energies.push(capacity * temperature);
+                    network.masses.push(number(mass)?);
                 }
                 ("spring", &[i, j, stiffness, length]) => {
-                    let ends = [body(i)?, body(j)?];
-                    network.springs.push((ends, [stiffness, length]));
+                    let spring = ([body(i)?, body(j)?], [number(stiffness)?, number(length)?]);
+                    network.springs.push(spring);
                 }
                 ("damper", &[i, j, coefficient]) => {
-                    let ends = [body(i)?, body(j)?];
-                    network.dampers.push((ends, [coefficient]));
+                    let damper = ([body(i)?, body(j)?], [number(coefficient)?]);
+                    network.dampers.push(damper);
                 }
                 ("link", &[i, j, conductance]) => {
-                    let ends = [body(i)?, body(j)?];
-                    network.links.push((ends, [conductance]));
+                    let link = ([body(i)?, body(j)?], [number(conductance)?]);
+                    network.links.push(link);
                 }
                 _ => return Err(bad()),
             }

@@ -254,10 +254,9 @@ fn size_of(alpha: &[f64], v: &[f64]) -> f64 {
     alpha.iter().zip(v).map(|(a, v)| (a * v).abs()).sum()
 }
 
-/// Numbers that are the same, bit for bit.
+/// Numbers that are the same, bit for bit but for the sign of zero.
 fn same(law: &'static str, found: f64, expected: f64) -> Result<(), BrokenLaw> {
-    let is_same = found == expected || found.is_nan() && expected.is_nan();
-    BrokenLaw::unless(law, if is_same { 0.0 } else { (found - expected).abs() }, 0.0)
+    BrokenLaw::unless(law, (found - expected).abs(), 0.0)
 }
 
 /// Slices that hold no number of before.

@@ -26,7 +26,7 @@ impl LawResidual {
 }
 
 /// The residual of every law of a model, and the first error if there is one; see
-/// [`Verify::report`](crate::Verify::report).
+/// [`Judge::report`](crate::judge::Judge::report).
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Report {
@@ -38,9 +38,9 @@ pub struct Report {
     pub passed_over: usize,
     /// Directions of the frame at the start that the dissipation of the metric moves and the bracket does not, if there are others
     /// that it does. An internal energy is one. A parameter is not: it would not stay constant, and belongs into a
-    /// [`Family`](crate::Family).
+    /// `Family`.
     pub moved_by_friction: Vec<usize>,
-    /// The result of [`Verify::verify`](crate::Verify::verify).
+    /// The result of [`Judge::verify`](crate::judge::Judge::verify).
     pub verdict: Result<(), ModelError>,
 }
 

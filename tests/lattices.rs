@@ -12,6 +12,8 @@ mod gathered;
 mod limiting_sites;
 #[path = "models/lattices.rs"]
 mod models;
+#[path = "models/tables.rs"]
+mod tables;
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -297,6 +299,23 @@ fn runs_have_outputs_events_rest_and_checkpoints() {
     let resumed = DormandPrince8.resume(&lattice, &checkpoint).unwrap().run().unwrap();
     assert_eq!(resumed.last(), whole.last());
     assert_eq!(resumed.certificate(), whole.certificate());
+    tables::are_those_of_the_run(&lattice, || {
+        Ok(DormandPrince8.run(&lattice, start.clone(), span().at_most(9))?)
+    });
+    // A jump by half a turn about the axis, which is a symmetry: the closed form goes on, turned.
+    type Ring = Points<Product<Sphere<2>, Euclidean<1>>>;
+    let turned = |x: &helix::Spin| (vector![-x.0.x, -x.0.y, x.0.z], x.1);
+    let turns = span().event("0.45", move |x: &Ring| height(x) - 0.45).jump(move |_, x: &Ring| {
+        let mut after = x.clone();
+        after.iter_mut().for_each(|x| *x = turned(x));
+        after
+    });
+    let run = DormandPrince8.run(&lattice, start.clone(), turns).unwrap();
+    assert_eq!(run.certificate().jumps[0].count, 1);
+    for (site, x) in run.last().point.iter().enumerate() {
+        let exact = turned(&helix::at(n, site, run.last().time));
+        assert!((x.0 - exact.0).norm() < 1e-8 && (x.1 - exact.1).norm() < 1e-8, "site {site}");
+    }
     // All spins are up in the end.
     let span = Span::until(1e3).tolerance(1e-8).until_rest(1e-6).at_most(2);
     let rest = DormandPrince5.run(&lattice, start, span).unwrap();

@@ -1,5 +1,8 @@
 //! Lattices with ports and baths at sites: both laws, closed forms, bits, and errors.
 
+#[path = "models/tables.rs"]
+mod tables;
+
 use metriplectic::lattices::OpenLattice;
 use metriplectic::lattices::model::Model;
 use metriplectic::prelude::*;
@@ -194,6 +197,7 @@ fn outputs_jumps_and_checkpoints_of_an_open_lattice() {
     let resumed = resumed.watching(schedule()).unwrap().run().unwrap();
     assert_eq!(resumed.last(), whole.last());
     assert_eq!(resumed.certificate(), whole.certificate());
+    tables::are_those_of_the_run(&rod, || Ok(DormandPrince5.run(&rod, start(), schedule())?));
 }
 
 #[test]

@@ -1,1 +1,1 @@
-//! The values that closures of a model may be, and the compiler's errors about others.
+//! The values that closures of a model may be, the compiler's errors about others, and what works with what.

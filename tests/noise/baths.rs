@@ -9,6 +9,7 @@ use rayon::prelude::*;
 use crate::operator::{Basis as _, assert_orders, coefficients, order, outcomes};
 use crate::refusals::fault;
 use crate::shell::Shell;
+use crate::tables;
 
 const TEMPERATURE: f64 = 0.8;
 
@@ -57,6 +58,19 @@ fn heat_and_work_of_each_path_balance() {
         let entropy = ledger.bath_entropy("water").unwrap();
         assert!((entropy + heat / TEMPERATURE).abs() < 1e-12);
     }
+    // A path that is put down goes on with the same bits, and has its tables.
+    let (method, span) = (NinomiyaVictoir(DormandPrince5).seed(4), Span::steps(0.05, 40));
+    let run = || Ok(method.run(&particle, start.clone(), span)?);
+    let whole: Result<_, Error> = run();
+    let whole = whole.unwrap();
+    let mut steps = method.steps(&particle, start.clone(), span).unwrap();
+    for _ in 0..17 {
+        steps.advance().unwrap();
+    }
+    let resumed = method.resume(&particle, &steps.checkpoint()).unwrap().run().unwrap();
+    assert_eq!(resumed.last(), whole.last());
+    assert_eq!(resumed.certificate(), whole.certificate());
+    tables::are_those_of_the_run(&particle, run);
     // Its friction is −0.7 p.
     let fast = NinomiyaVictoir(DormandPrince5).seed(4).run(&particle, start, Span::steps(2.0, 10));
     let error = fault(fast);

@@ -11,6 +11,7 @@ use crate::operator::{
     Basis, Outcome, assert_orders, coefficients, mean, operator, order, outcomes, step,
 };
 use crate::refusals::fault;
+use crate::tables;
 
 const CAPACITY: f64 = 1.0;
 
@@ -151,6 +152,48 @@ fn a_hundred_bodies_have_the_variance_of_their_law() {
     )
     .against("Dirichlet's law")
     .record(format!("{:+.1} %", 100.0 * off), "5 %");
+}
+
+#[test]
+fn a_path_of_a_ring_is_that_of_every_method() {
+    let ring = ring(5, 0.01);
+    let start = || ring.flow().points(|site| vector![1.0 + 0.3 * (site as f64).sin()]);
+    assert_eq!(ring.flow().verify(&start()), Ok(()));
+    let span = Span::steps(0.02, 50);
+    let method = RandomFlow(DormandPrince5).seed(3);
+    let run = || Ok(method.run(&ring, start(), span)?);
+    let whole: Result<_, Error> = run();
+    let whole = whole.unwrap();
+    // With the numbers of a step frozen, the motion has the order of each method.
+    let off = |run: Trajectory<_>| {
+        let (a, b): (&Points<Euclidean<1>>, _) = (&run.last().point, &whole.last().point);
+        a.iter().zip(b.iter()).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max)
+    };
+    let moved = off(method.run(&ring, start(), Span::steps(0.02, 1)).unwrap());
+    let eight = off(RandomFlow(DormandPrince8).seed(3).run(&ring, start(), span).unwrap());
+    let two = off(RandomFlow(RungeKuttaChebyshev).seed(3).run(&ring, start(), span).unwrap());
+    println!("off by {eight:.1e} and {two:.1e} of {moved:.1e}");
+    assert!(eight < 1e-7 * moved && two < 1e-2 * moved, "{eight:e} {two:e} {moved:e}");
+    // Put down and taken up again.
+    let mut steps = method.steps(&ring, start(), span).unwrap();
+    for _ in 0..23 {
+        steps.advance().unwrap();
+    }
+    let resumed = method.resume(&ring, &steps.checkpoint()).unwrap().run().unwrap();
+    assert_eq!(resumed.last(), whole.last());
+    assert_eq!(resumed.certificate(), whole.certificate());
+    // States at the ends of steps, and none between them.
+    let recorded = method.run(&ring, start(), span.output_at([0.5])).unwrap();
+    let is_there = |time: f64| (time - 0.5).abs() < 1e-12;
+    let at = recorded.iter().find(|state| is_there(state.time)).unwrap();
+    let same = whole.iter().find(|state| is_there(state.time)).unwrap();
+    assert_eq!(at.point, same.point);
+    let between = method.run(&ring, start(), span.output_at([0.51]));
+    assert_eq!(fault(between), NoiseError::HasNoBetween);
+    let level = whole.states()[5].point[0].x + 1e-6;
+    let event = span.event("level", move |x: &Points<Euclidean<1>>| x[0].x - level);
+    assert_eq!(fault(method.run(&ring, start(), event)), NoiseError::HasNoBetween);
+    tables::are_those_of_the_run(&ring, run);
 }
 
 #[test]

@@ -16,4 +16,6 @@ mod paths;
 mod refusals;
 mod shell;
 mod sphere;
+#[path = "../models/tables.rs"]
+mod tables;
 mod terms;

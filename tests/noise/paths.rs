@@ -7,6 +7,7 @@ use nalgebra::vector;
 use rayon::prelude::*;
 
 use crate::body::{INERTIA, body};
+use crate::tables;
 
 const START: Vector3<f64> = vector![0.9, 0.5, 0.3];
 
@@ -109,6 +110,7 @@ fn a_path_that_is_put_down_goes_on_with_the_same_bits() {
         let resumed = method.resume(&body, &checkpoint).unwrap().run().unwrap();
         assert_eq!(resumed.last(), whole.last());
         assert_eq!(resumed.certificate(), whole.certificate());
+        tables::are_those_of_the_run(&body, || Ok(method.run(&body, START, span)?));
         // Another path is another method.
         assert!(matches!(
             method.path(1).resume(&body, &checkpoint),

@@ -60,6 +60,8 @@ fn pendulum() -> OpenSystem<
         .expect("it is a system")
 }
 
+#[path = "../models/tables.rs"]
+mod tables;
 mod traps;
 
 fn start() -> (Vector2<f64>, Vector1<f64>) {
@@ -546,6 +548,10 @@ fn outputs_events_and_checkpoints_have_the_ledger() {
         )*};
     }
     whole!(WeylMidpoint, 1e-3; Gauss::<2>, 1e-5; DormandPrince5, 1e-6; DormandPrince8, 1e-6);
+    tables::are_those_of_the_run(&system, || {
+        let span = Span::until(end).tolerance(1e-6);
+        Ok(DormandPrince8.run(&system, system.start(start()), span)?)
+    });
 }
 
 #[test]

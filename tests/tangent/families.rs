@@ -6,7 +6,7 @@ use metriplectic::integrators::{LinearisedAlong, TangentError};
 use metriplectic::prelude::*;
 use nalgebra::{SVector, vector};
 
-use crate::{compared, differences, off};
+use crate::{compared, differences, off, tables};
 
 /// The manifold of a family.
 type Of<Y, const P: usize> = <<Y as Parametrised<P>>::System as Metriplectic>::Manifold;
@@ -75,6 +75,30 @@ const START: Vector3<f64> = Vector3::new(0.4, -1.0, 0.3);
 
 fn theta() -> Parameters<f64> {
     vector![1.7, 0.3, 1.3, 0.7, 0.3]
+}
+
+#[test]
+fn a_member_of_a_family_is_verified_and_has_its_tables() {
+    let family = Family::on(LieDual::so3())
+        .parameters(["skew"])
+        .energy(|p: &Vector3<Real>, _: &Vector1<Real>| {
+            p.x * p.x * 0.5 + p.y * p.y + p.z * p.z * 1.5
+        })
+        .entropy(|p: &Vector3<Real>, t: &Vector1<Real>| p.norm_squared() * 0.5 + p.x * t.x)
+        .build()
+        .unwrap();
+    let start = vector![0.4, -1.0, 0.3];
+    let (sound, skew) = (family.at(vector![0.0]), family.at(vector![0.1]));
+    sound.verify(&start, 0.1).unwrap();
+    let refused = |error| matches!(error, ModelError::EntropyNotCasimir { .. });
+    assert!(refused(skew.verify(&start, 0.1).unwrap_err()));
+    assert!(refused(skew.verified(&start).err().unwrap()));
+    let verified = sound.verified(&start).unwrap();
+    let run = || Ok(DormandPrince8.run(&sound, start, Span::steps(0.1, 20))?);
+    let cheap = DormandPrince8.run(&verified, start, Span::steps(0.1, 20)).unwrap();
+    let whole: Result<_, Error> = run();
+    assert_eq!(cheap.states(), whole.unwrap().states());
+    tables::are_those_of_the_run(&sound, run);
 }
 
 #[test]

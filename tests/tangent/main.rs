@@ -10,6 +10,8 @@ mod parts;
 mod refined;
 mod schemes;
 mod table;
+#[path = "../models/tables.rs"]
+mod tables;
 
 use metriplectic::dynamics::{Parametrised, Point};
 use metriplectic::fields::{Column as _, Dimension as _, Space, Vector};

@@ -1,0 +1,237 @@
+//! The matrix: what a program of each kind of system and each verb does today.
+
+/// A row for each verb and a column for each kind, in the order of [`KINDS`](crate::programs::KINDS).
+///
+/// - The name of one of the [`TESTS`]: the program compiles, and this test compares such a run with a reference.
+/// - The codes of the compiler's errors: the program does not compile.
+/// - `none`: there is no program, because nothing in the library says what such a system is.
+/// - `–`: the program makes no sense, or the kind has it already.
+///
+/// Whoever fills an empty cell names its test here.
+pub(crate) const CELLS: &str = "
+verb                                  | closed     | family    | open     | noisy     | noisy open | lattice  | open lattice | noisy lattice | own         | sizes
+
+`WeylMidpoint`                        | promises   | promises  | promises | promises  | promises   | E0277    | E0277        | E0277         | E0277       | none
+`Scheme` with `ItohAbe`               | promises   | promises  | promises | promises  | promises   | E0277    | E0277        | E0277         | E0277       | none
+`Gauss`                               | promises   | promises  | promises | promises  | promises   | E0277    | E0277        | E0277         | E0277       | none
+`Radau`                               | promises   | promises  | one bath | no radau  | no radau   | E0277    | E0277        | E0277         | E0277       | none
+`DormandPrince8`                      | promises   | promises  | promises | promises  | promises   | promises | promises     | frozen        | E0277       | none
+`RungeKuttaChebyshev`                 | promises   | promises  | promises | promises  | promises   | promises | promises     | frozen        | E0277       | none
+`NinomiyaVictoir`                     | –          | –         | –        | promises  | promises   | –        | –            | ring          | –           | –
+energy and entropy in boxes: `erased` | erased     | E0599     | E0599    | E0599     | E0599      | E0599    | E0599        | E0599         | E0599       | none
+
+`tangent` of `WeylMidpoint`           | schemes    | default   | E0277    | E0277     | E0277      | E0277    | E0277        | E0277         | E0277       | none
+`tangent` of `DormandPrince8`         | explicit   | explicit  | E0277    | E0277     | E0277      | E0277    | E0277        | E0277         | E0277       | none
+`tangent` of `Gauss`                  | stages     | stages    | E0277    | E0277     | E0277      | E0277    | E0277        | E0277         | E0277       | none
+`tangent` across a jump               | saltation  | saltation | E0277    | E0277     | E0277      | E0277    | E0277        | E0277         | E0277       | none
+`adjoint` of `DormandPrince8`         | transposed | adjoint   | E0277    | E0277     | E0277      | E0277    | E0277        | E0277         | E0277       | none
+parameters in its builder             | promises   | promises  | E0599    | E0599     | E0599      | E0599    | E0599        | E0599         | E0277       | none
+`Fit`                                 | fit        | fit       | E0599    | E0599     | E0599      | E0599    | E0599        | E0599         | E0277 E0599 | none
+`Loss`                                | loss       | loss      | E0599    | E0599     | E0599      | E0599    | E0599        | E0599         | E0277 E0599 | none
+
+`verified`                            | verified   | member    | E0599    | E0599     | E0599      | E0599    | E0599        | E0599         | E0599       | none
+`verify`                              | verify     | member    | E0599    | E0599     | E0599      | sites    | closed part  | closed ring   | E0599       | none
+`report`                              | report     | columns   | E0599    | E0599     | E0599      | E0599    | E0599        | E0599         | E0599       | none
+
+thermal noise in its builder          | promises   | E0599     | books    | –         | –          | ring     | E0599        | –             | E0277       | none
+an energy that depends on time        | promises   | E0599     | –        | books     | books      | E0599    | E0599        | E0599         | E0599       | none
+ports and baths                       | promises   | E0599     | –        | books     | –          | promises | –            | E0599         | E0599       | none
+
+events                                | events     | saltation | ledger   | no events | no events  | helix    | quench       | no events     | E0277       | none
+jumps                                 | promises   | saltation | kicks    | no events | no events  | helix    | quench       | no events     | E0277       | none
+outputs                               | outputs    | inside    | ledger   | ends      | ends       | helix    | quench       | ends          | E0277       | none
+checkpoints                           | resumed    | default   | ledger   | put down  | books      | helix    | quench       | frozen        | E0277 E0599 | none
+`Sweep`                               | sweeps     | member    | ledger   | put down  | books      | helix    | quench       | frozen        | E0277       | none
+`Observables`                         | tables     | member    | ledger   | put down  | books      | helix    | quench       | frozen        | own flow    | none
+";
+
+/// The file and the function of a test, by its name in [`CELLS`], and what the book says where it is not all as it should be.
+pub(crate) struct Reference {
+    pub(crate) name: &'static str,
+    pub(crate) file: &'static str,
+    pub(crate) test: &'static str,
+    pub(crate) limit: Limit,
+}
+
+/// What keeps a program that compiles from being the whole answer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Limit {
+    /// Nothing.
+    None,
+    /// It runs for some systems, or in part.
+    Partly(&'static str),
+    /// The run is refused.
+    Refused(&'static str),
+}
+
+/// A test whose program is right.
+const fn right(name: &'static str, file: &'static str, test: &'static str) -> Reference {
+    Reference { name, file, test, limit: Limit::None }
+}
+
+const fn partly(
+    name: &'static str,
+    [file, test]: [&'static str; 2],
+    sentence: &'static str,
+) -> Reference {
+    Reference { name, file, test, limit: Limit::Partly(sentence) }
+}
+
+const fn refused(
+    name: &'static str,
+    [file, test]: [&'static str; 2],
+    sentence: &'static str,
+) -> Reference {
+    Reference { name, file, test, limit: Limit::Refused(sentence) }
+}
+
+const CLOSED_PART: &str = "of its closed part, by `lattice().verify(..)` or `flow().verify(..)`; the other parts are judged when it \
+                           runs";
+
+const PROMISES: [&str; 2] =
+    ["tests/promises/main.rs", "every_method_is_right_on_every_kind_of_flow_or_says_why_not"];
+
+/// The tests that the matrix names.
+pub(crate) const TESTS: &[Reference] = &[
+    right("promises", PROMISES[0], PROMISES[1]),
+    partly(
+        "one bath",
+        PROMISES,
+        "`Radau` takes open systems [without an entropy of their own and with one bath]\
+         (open_systems.md#what-is-not-promised); others are refused (`StepError::Method`)",
+    ),
+    refused("no radau", PROMISES, "refused when it runs: `NoiseError::NoiseWithRadau`"),
+    right("ring", "tests/noise/lattice.rs", "orders_of_a_ring_of_three_bodies"),
+    right(
+        "erased",
+        "tests/compile/doors.rs",
+        "erased_closures_have_one_type_and_the_bits_of_the_closures",
+    ),
+    right("schemes", "tests/tangent/schemes.rs", "tangents_of_schemes_are_those_of_differences"),
+    right("default", "tests/trust/noise.rs", "a_retraction_is_its_scheme"),
+    right("explicit", "tests/tangent/explicit.rs", "explicit_tangents_are_those_of_differences"),
+    right("stages", "tests/tangent/collocated.rs", "tangents_of_stages_are_those_of_differences"),
+    right("saltation", "tests/tangent/jumps.rs", "tangents_across_jumps_are_those_of_differences"),
+    right("transposed", "tests/tangent/adjoint.rs", "adjoints_are_transposed_tangents"),
+    right("adjoint", "tests/tangent/adjoint.rs", "adjoints_have_parameters"),
+    right("fit", "tests/tangent/fits.rs", "a_fit_finds_the_parameters_within_their_errors"),
+    right("loss", "tests/trust/fits.rs", "a_loss_pairs_states_with_its_terms_by_time"),
+    right(
+        "verified",
+        "tests/verification.rs",
+        "a_verified_system_runs_as_the_system_does_and_judges_its_start",
+    ),
+    right(
+        "verify",
+        "tests/verification.rs",
+        "a_lost_derivative_of_every_part_of_a_model_is_refused",
+    ),
+    right(
+        "sites",
+        "tests/lattice_errors.rs",
+        "friction_that_breaks_a_law_is_refused_with_its_bond",
+    ),
+    partly(
+        "closed part",
+        ["tests/open_lattices.rs", "surroundings_of_a_lattice_that_break_a_law_are_refused"],
+        CLOSED_PART,
+    ),
+    partly(
+        "closed ring",
+        ["tests/noise/lattice.rs", "a_path_of_a_ring_is_that_of_every_method"],
+        CLOSED_PART,
+    ),
+    right("frozen", "tests/noise/lattice.rs", "a_path_of_a_ring_is_that_of_every_method"),
+    right(
+        "member",
+        "tests/tangent/families.rs",
+        "a_member_of_a_family_is_verified_and_has_its_tables",
+    ),
+    right("report", "tests/bad_input.rs", "a_model_is_judged_only_inside_its_domain"),
+    right("columns", "tests/tangent/schemes.rs", "parameters_are_columns"),
+    right("books", "tests/noise/baths.rs", "heat_and_work_of_each_path_balance"),
+    right(
+        "events",
+        "tests/events.rs",
+        "events_of_an_oscillator_are_at_the_times_of_its_closed_form",
+    ),
+    right("ledger", "tests/open/main.rs", "outputs_events_and_checkpoints_have_the_ledger"),
+    right("kicks", "tests/jumps.rs", "an_open_system_has_the_jumps_in_its_ledger"),
+    right("helix", "tests/lattices.rs", "runs_have_outputs_events_rest_and_checkpoints"),
+    right("quench", "tests/open_lattices.rs", "outputs_jumps_and_checkpoints_of_an_open_lattice"),
+    refused(
+        "no events",
+        ["tests/noise/refusals.rs", "events_and_jumps"],
+        "refused where the number changes its sign: `NoiseError::HasNoBetween`",
+    ),
+    right("outputs", "tests/dense_output.rs", "outputs_are_as_accurate_as_the_steps"),
+    right("inside", "tests/tangent/explicit.rs", "outputs_inside_steps_have_tangents"),
+    partly(
+        "ends",
+        ["tests/noise/refusals.rs", "constants_steps_and_outputs"],
+        "at the ends of steps; between them `NoiseError::HasNoBetween`",
+    ),
+    right("resumed", "tests/checkpoint.rs", "a_resumed_run_is_the_run"),
+    right("put down", "tests/noise/paths.rs", "a_path_that_is_put_down_goes_on_with_the_same_bits"),
+    right("sweeps", "tests/ensembles.rs", "a_row_alone_has_the_bits_of_the_table"),
+    right("tables", "crates/integrators/src/run/observables/tests.rs", "numbers_survive_a_csv"),
+    right(
+        "own flow",
+        "tests/bring_your_own_method.rs",
+        "a_system_of_any_size_needs_no_more_than_a_flow",
+    ),
+];
+
+/// A cell.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) enum Cell {
+    /// The program compiles, and a test compares such a run with a reference; its number in [`TESTS`].
+    Tested(usize),
+    /// It does not compile, with these codes.
+    Errors(Vec<String>),
+    /// There is no program.
+    None,
+    /// A program makes no sense.
+    NoSense,
+}
+
+impl Cell {
+    /// Whether a program is compiled.
+    pub(crate) const fn has_program(&self) -> bool {
+        !matches!(self, Self::None | Self::NoSense)
+    }
+
+    pub(crate) const fn compiles(&self) -> bool {
+        matches!(self, Self::Tested(_))
+    }
+
+    fn of(word: &str) -> Self {
+        match word {
+            "–" => Self::NoSense,
+            "none" => Self::None,
+            codes if codes.starts_with("E0") => {
+                Self::Errors(codes.split_whitespace().map(str::to_owned).collect())
+            }
+            name => {
+                let test = TESTS.iter().position(|test| test.name == name);
+                Self::Tested(test.unwrap_or_else(|| panic!("`{name}` is no test of the matrix")))
+            }
+        }
+    }
+}
+
+/// The lines of the matrix: a verb with its cells. Empty lines are left out.
+pub(crate) fn rows() -> Vec<(&'static str, Vec<Cell>)> {
+    let lines = CELLS.lines().filter(|line| !line.is_empty()).skip(1);
+    let words = |line: &'static str| line.split('|').map(str::trim).collect::<Vec<_>>();
+    let row = |words: Vec<&'static str>| {
+        (words[0], words[1..].iter().map(|word| Cell::of(word)).collect())
+    };
+    lines.map(words).map(row).collect()
+}
+
+/// The names of the columns.
+pub(crate) fn columns() -> Vec<&'static str> {
+    let first = CELLS.lines().find(|line| !line.is_empty()).expect("it has a first line");
+    first.split('|').skip(1).map(str::trim).collect()
+}

@@ -1,0 +1,9 @@
+{
+    // A rigid body with friction and its thermal noise.
+    let system = System::on(LieDual::so3())
+        .energy(|p: &Vector3<Real>| p.x * p.x * 0.5 + p.y * p.y + p.z * p.z * 1.5)
+        .entropy(|p: &Vector3<Real>| p.norm_squared() * 0.5)
+        .noise(Boltzmann(0.1))
+        .build()?;
+    (system, vector![0.4, -1.0, 0.3])
+}

@@ -1,0 +1,251 @@
+//! The programs of the cells: a system of a kind, and a verb that is asked of it.
+
+/// A kind of system.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Kind {
+    /// A system of the builder.
+    Closed,
+    /// A member of a family, at values of its parameters.
+    Family,
+    /// With a clock, a port and a bath.
+    Open,
+    /// With thermal noise.
+    Noisy,
+    /// With a port, a bath and their noise.
+    NoisyOpen,
+    /// Many sites.
+    Lattice,
+    /// Many sites with a port and a bath.
+    OpenLattice,
+    /// Many sites with noise.
+    NoisyLattice,
+    /// A type of the user's that implements `Flow`.
+    Own,
+    /// From a number of variables that is read at run time, which nothing in the library says yet.
+    Sizes,
+}
+
+use Kind::{
+    Closed, Family, Lattice, Noisy, NoisyLattice, NoisyOpen, Open, OpenLattice, Own, Sizes,
+};
+
+/// The kinds, in the order of the columns.
+pub(crate) const KINDS: [Kind; 10] =
+    [Closed, Family, Open, Noisy, NoisyOpen, Lattice, OpenLattice, NoisyLattice, Own, Sizes];
+
+impl Kind {
+    /// The heading of its column.
+    pub(crate) const fn heading(self) -> &'static str {
+        match self {
+            Closed => "closed",
+            Family => "family",
+            Open => "open",
+            Noisy => "noisy",
+            NoisyOpen => "noisy open",
+            Lattice => "lattice",
+            OpenLattice => "open lattice",
+            NoisyLattice => "noisy lattice",
+            Own => "own",
+            Sizes => "sizes",
+        }
+    }
+
+    /// An expression: a system and the state in which its runs start.
+    const fn system(self) -> &'static str {
+        match self {
+            Closed => include_str!("kinds/closed.rs"),
+            Family => include_str!("kinds/family.rs"),
+            Open => include_str!("kinds/open.rs"),
+            Noisy => include_str!("kinds/noisy.rs"),
+            NoisyOpen => include_str!("kinds/noisy_open.rs"),
+            Lattice => include_str!("kinds/lattice.rs"),
+            OpenLattice => include_str!("kinds/open_lattice.rs"),
+            NoisyLattice => include_str!("kinds/noisy_lattice.rs"),
+            Own => include_str!("kinds/own.rs"),
+            Sizes => panic!("nothing says what it is"),
+        }
+    }
+
+    /// The type of its states.
+    const fn point(self) -> &'static str {
+        match self {
+            Closed | Family | Noisy => "Vector3<f64>",
+            Open | NoisyOpen => "OpenState<Vector3<f64>>",
+            Lattice => "Points<LieDual<3>>",
+            OpenLattice => "OpenState<Points<LieDual<3>>>",
+            NoisyLattice => "Points<Euclidean<1>>",
+            Own | Sizes => "Vec<f64>",
+        }
+    }
+
+    const fn is_noisy(self) -> bool {
+        matches!(self, Noisy | NoisyOpen | NoisyLattice)
+    }
+
+    /// A method as runs of this kind take it.
+    fn method(self, method: &str) -> String {
+        if self.is_noisy() { format!("RandomFlow({method}).seed(1)") } else { method.to_owned() }
+    }
+}
+
+const STEPS: &str = "Span::steps(0.1, 10)";
+const ENERGY: &str = ".energy(|p: &Vector3<Real>| p.x * p.x * 0.5 + p.y * p.y + p.z * p.z * 1.5)";
+const ENTROPY: &str = ".entropy(|p: &Vector3<Real>| p.norm_squared() * 0.5)";
+const CLOCK: &str =
+    ".energy_in_time(|t: Real, p: &Vector3<Real>| p.x * p.x * 0.5 + p.y * p.y + p.x * t.sin())";
+const PORT: &str = ".work(\"torque\", |t: Real, p: &Vector3<Real>| p * t.sin())";
+const BATH: &str = ".bath(\"air\", Bath::at(1.0).isotropic(0.1))";
+const NOISE: &str = ".noise(Boltzmann(0.1))";
+/// The surroundings of a lattice.
+const SITES: &str = ".opened()
+    .work(\"torque\", [0], |t, _, p: &Vector3<f64>| p * t.sin())
+    .bath(\"air\", 1.0, [1], |_, _: &SiteState<'_, LieDual<3>>| [Onsager { rate: 0.1, b: vector![0.0, 1.0, 0.0] }])";
+
+/// The builder of a family, with a clock instead of its energy where there is one.
+fn family(has_clock: bool) -> String {
+    let energy = if has_clock {
+        ".energy_in_time(|t: Real, p: &Vector3<Real>, a: &Vector1<Real>| p.x * p.x * a.x + p.y * p.y + p.x * t.sin())"
+    } else {
+        ".energy(|p: &Vector3<Real>, a: &Vector1<Real>| p.x * p.x * a.x + p.y * p.y + p.z * p.z * 1.5)"
+    };
+    let entropy = ".entropy(|p: &Vector3<Real>, _: &Vector1<Real>| p.norm_squared() * 0.5)";
+    format!("Family::on(LieDual::so3()).parameters([\"a\"]){energy}{entropy}")
+}
+
+/// A statement that builds a system of this kind with parameters, as `f`.
+fn with_parameters(kind: Kind) -> String {
+    let parts = match kind {
+        Closed | Family => String::new(),
+        Open => format!("{PORT}{BATH}"),
+        Noisy => NOISE.to_owned(),
+        NoisyOpen => format!("{PORT}{BATH}{NOISE}"),
+        Lattice | OpenLattice | NoisyLattice => {
+            return "let f = Lattice::on(Graph::ring(4), LieDual::so3()).parameters([\"a\"]);"
+                .to_owned();
+        }
+        Own | Sizes => {
+            return "fn family<F: Differentiable>(f: F) -> F { f }\n    let f = family(s.clone());"
+                .to_owned();
+        }
+    };
+    format!("let f = {}{parts}.build()?;", family(kind == Open))
+}
+
+/// A statement that builds a system of this kind with one part more, which its kind does not have.
+fn with(kind: Kind, part: &str) -> String {
+    let built =
+        |parts: &str| format!("let _ = System::on(LieDual::so3()){ENTROPY}{parts}.build()?;");
+    match (part, kind) {
+        ("noise", Closed) => built(&format!("{ENERGY}{NOISE}")),
+        ("noise", Family) => format!("let _ = {}{NOISE}.build()?;", family(false)),
+        ("noise", Open) => built(&format!("{CLOCK}{PORT}{BATH}{NOISE}")),
+        ("noise", Lattice | OpenLattice) => "let _ = s.with_noise(Boltzmann(0.1));".to_owned(),
+        ("noise", _) => format!(
+            "let n = Noisy::new(s, metriplectic::integrators::noise::Noise::of(Boltzmann(0.1)));
+    let _ = RandomFlow(DormandPrince8).seed(1).run(&n, x, {STEPS})?;"
+        ),
+        ("clock", Closed) => built(CLOCK),
+        ("clock", Family) => format!("let _ = {}.build()?;", family(true)),
+        ("clock", Noisy) => built(&format!("{CLOCK}{NOISE}")),
+        ("clock", NoisyOpen) => built(&format!("{CLOCK}{PORT}{BATH}{NOISE}")),
+        ("clock", OpenLattice) => format!("let _ = s{CLOCK};"),
+        ("clock", _) => format!("let _ = s.opened(){CLOCK};"),
+        ("ports", Closed) => built(&format!("{ENERGY}{PORT}{BATH}")),
+        ("ports", Family) => format!("let _ = {}{PORT}{BATH}.build()?;", family(false)),
+        ("ports", Noisy) => built(&format!("{ENERGY}{PORT}{BATH}{NOISE}")),
+        (_, _) => format!("let _ = s{SITES};"),
+    }
+}
+
+/// The statements that ask a verb, by its name in the matrix, of the system `s` from the start `x`.
+fn verb(kind: Kind, name: &str) -> String {
+    let (point, dp8) = (kind.point(), kind.method("DormandPrince8"));
+    let run = |method: &str| format!("let _ = {}.run(&s, x, {STEPS})?;", kind.method(method));
+    let tangent =
+        |method: &str| format!("let _ = {}.tangent(&s, x, {STEPS})?;", kind.method(method));
+    let event = format!("{STEPS}.event(\"e\", |_: &{point}| 1.0)");
+    let jump = format!("{event}.jump(|_, x: &{point}| x.clone())");
+    match name {
+        "`WeylMidpoint`" => run("WeylMidpoint"),
+        "`Scheme` with `ItohAbe`" => run("Scheme::new(WeylMidpoint).gradient(ItohAbe)"),
+        "`Gauss`" => run("Gauss::<2>"),
+        "`Radau`" => run("Radau::<2>"),
+        "`DormandPrince8`" => run("DormandPrince8"),
+        "`RungeKuttaChebyshev`" => run("RungeKuttaChebyshev"),
+        "`NinomiyaVictoir`" => {
+            format!("let _ = NinomiyaVictoir(DormandPrince5).seed(1).run(&s, x, {STEPS})?;")
+        }
+        "energy and entropy in boxes: `erased`" => "let _ = s.erased();".to_owned(),
+        "`tangent` of `WeylMidpoint`" => tangent("WeylMidpoint"),
+        "`tangent` of `DormandPrince8`" => tangent("DormandPrince8"),
+        "`tangent` of `Gauss`" => tangent("Gauss::<2>"),
+        "`tangent` across a jump" => format!("let _ = {dp8}.tangent(&s, x, {jump})?;"),
+        "`adjoint` of `DormandPrince8`" => format!("let _ = {dp8}.adjoint(&s, x, {STEPS})?;"),
+        "parameters in its builder" => with_parameters(kind),
+        "`Fit`" => format!(
+            "{}
+    let fit = Fit::of(&f).observe(|p| p.clone()).data(&[0.5], &[vector![0.0, 0.0, 0.0]]);
+    let _ = fit.start_at(x).run({dp8}, {STEPS}, vector![1.0])?;",
+            with_parameters(kind)
+        ),
+        "`Loss`" => format!(
+            "{}
+    let loss = metriplectic::fitting::Loss::of(&f).starts(&[x]).times(&[0.5]);
+    let _ = loss.term(|_, _, _| Real::from(0.0)).over({dp8}, {STEPS});",
+            with_parameters(kind)
+        ),
+        "`verified`" => {
+            format!("let v = s.verified(&x)?;\n    let _ = {dp8}.run(&v, x.clone(), {STEPS})?;")
+        }
+        "`verify`" => match kind {
+            Lattice => "let _ = s.verify(&x);",
+            OpenLattice => "let _ = s.lattice().verify(&x.x);",
+            NoisyLattice => "let _ = s.flow().verify(&x);",
+            _ => "let _ = s.verify(&x, 0.1);",
+        }
+        .to_owned(),
+        "`report`" => "println!(\"{}\", s.report(&x));".to_owned(),
+        "thermal noise in its builder" => with(kind, "noise"),
+        "an energy that depends on time" => with(kind, "clock"),
+        "ports and baths" => with(kind, "ports"),
+        "events" => format!("let _ = {dp8}.run(&s, x, {event})?;"),
+        "jumps" => format!("let _ = {dp8}.run(&s, x, {jump})?;"),
+        "outputs" => format!("let _ = {dp8}.run(&s, x, {STEPS}.output_at([0.5]))?;"),
+        "checkpoints" => format!(
+            "let mut steps = {dp8}.steps(&s, x, {STEPS})?;
+    steps.advance()?;
+    let checkpoint = steps.checkpoint();
+    let _ = {dp8}.resume(&s, &checkpoint)?.run()?;"
+        ),
+        "`Sweep`" => format!(
+            "let sweep = Sweep::new(\"one\").grid(\"k\", [1.0]);
+    let _ = sweep.run(|_| Ok({dp8}.run(&s, x.clone(), {STEPS})?)).execute()?;"
+        ),
+        "`Observables`" => {
+            "let watch = Observables::on(&s).of(\"one\", |_| 1.0);\n    let _ = watch.csv(Vec::new())?;"
+                .to_owned()
+        }
+        other => panic!("`{other}` has no program"),
+    }
+}
+
+/// What is in front of each program.
+const HEAD: &str = "#![allow(unused)]
+use metriplectic::integrators::{Element, Flow, Laws, StateSpace};
+use metriplectic::manifolds::PointError;
+use metriplectic::prelude::*;
+";
+
+/// The program of a cell.
+pub(crate) fn program(kind: Kind, name: &str) -> String {
+    let (system, verb) = (kind.system().trim_end(), verb(kind, name));
+    format!(
+        "{HEAD}
+fn main() -> Result<(), Box<dyn std::error::Error>> {{
+    let (s, x) = {system};
+    {verb}
+    Ok(())
+}}
+"
+    )
+}

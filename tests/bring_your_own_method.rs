@@ -1,8 +1,10 @@
 //! A method and a system that a user writes against the public traits, run like those of the library.
 
 use metriplectic::dynamics::SecondLaw;
+use metriplectic::equations::{ENERGY, ENTROPY, Equations, Sizes};
 use metriplectic::integrators::{
-    Effort, Element, Evidence, Flow, Laws, Promises, StateSpace, StepStart, Taken, Vector, laws,
+    Effort, Element, Evidence, Flow, FromEquations, Laws, Promises, StateSpace, StepStart, Taken,
+    Vector, laws,
 };
 use metriplectic::manifolds::PointError;
 use metriplectic::prelude::*;
@@ -228,4 +230,86 @@ fn a_system_of_any_size_needs_no_more_than_a_flow() {
     // Of a system of another size it is none.
     let error = ExplicitMidpoint.resume(&Oscillators::new(99), &checkpoint).unwrap_err();
     assert!(matches!(error, ResumeError::Point(PointError::Length { found: 200, expected: 198 })));
+}
+
+/// Oscillators of the frequency 1, as the trait of systems in plain numbers has them.
+#[derive(Clone, Debug)]
+struct Unit(usize);
+
+impl Equations for Unit {
+    fn sizes(&self) -> Sizes {
+        Sizes { entries: 2 * self.0, directions: 2 * self.0, laws: 2 }
+    }
+
+    fn values(&self, _: f64, x: &[f64], values: &mut [f64]) {
+        values[ENERGY] = x.iter().map(|x| 0.5 * x * x).sum();
+        values[ENTROPY] = 0.0;
+    }
+
+    fn differentials(&self, t: f64, x: &[f64], values: &mut [f64], w: &mut [f64]) {
+        self.values(t, x, values);
+        w.fill(0.0);
+        w[..x.len()].copy_from_slice(x);
+    }
+
+    fn velocity(&self, _: f64, x: &[f64], v: &mut [f64]) -> Option<f64> {
+        let (q, p) = x.split_at(self.0);
+        v[..self.0].copy_from_slice(p);
+        (0..self.0).for_each(|i| v[self.0 + i] = -q[i]);
+        Some(0.0)
+    }
+}
+
+/// `q_i = (i + 1) cos t`, until `q₀` vanishes at `t = π/2` and all momenta are reversed.
+#[test]
+fn a_system_in_numbers_has_all_that_a_run_has() {
+    // More variables than a typed system may have.
+    const COUNT: usize = 150;
+    let system = FromEquations(Unit(COUNT));
+    let start: Vec<f64> =
+        (0..2 * COUNT).map(|i| if i < COUNT { (i + 1) as f64 } else { 0.0 }).collect();
+    let turn = std::f64::consts::FRAC_PI_2;
+    let span = || {
+        Span::until(2.0)
+            .tolerance(1e-9)
+            .output_at([0.5, 1.75])
+            .event("wall", |x: &Vec<f64>| x[0])
+            .jump(|_, x: &Vec<f64>| {
+                x.iter().enumerate().map(|(i, x)| if i < COUNT { *x } else { -x }).collect()
+            })
+    };
+    let run = DormandPrince8.run(&system, start.clone(), span()).unwrap();
+    let near =
+        |found: f64, expected: f64| assert!((found - expected).abs() < 1e-6, "{found} {expected}");
+    near(run.events()[0].state.time, turn);
+    let outputs: Vec<_> = run.iter().filter(|s| s.time == 0.5 || s.time == 1.75).collect();
+    assert_eq!(outputs.len(), 2);
+    near(outputs[0].point[4], 5.0 * 0.5_f64.cos());
+    // Reversed at π/2, so the way goes back: q(t) = cos(π − t).
+    near(outputs[1].point[4], 5.0 * (2.0 * turn - 1.75).cos());
+    near(run.last().point[0], (2.0 * turn - 2.0).cos());
+    assert!(run.certificate().max_relative_energy_error() < 1e-14);
+
+    let plain = || Span::until(2.0).tolerance(1e-9);
+    let whole = DormandPrince8.run(&system, start.clone(), plain()).unwrap();
+    let mut steps = DormandPrince8.steps(&system, start.clone(), plain()).unwrap();
+    for _ in 0..3 {
+        steps.advance().unwrap();
+    }
+    let resumed = DormandPrince8.resume(&system, &steps.checkpoint()).unwrap().run().unwrap();
+    assert!(resumed.last() == whole.last(), "a resumed run is the run");
+
+    let watch = Observables::on(&system).of("q5", |x: &Vec<f64>| x[4]);
+    let mut table = watch.csv(Vec::new()).unwrap();
+    whole.iter().for_each(|state| table.write(state).unwrap());
+    let text = String::from_utf8(table.finish().unwrap()).unwrap();
+    assert_eq!(text.lines().count(), whole.states().len() + 1);
+
+    let sweep = Sweep::new("of numbers").grid("turns", [1.0, 2.0]);
+    let table = sweep.run(|row| {
+        let span = Span::until(row["turns"]).tolerance(1e-9);
+        Ok(DormandPrince8.run(&system, start.clone(), span)?)
+    });
+    let table = table.execute().unwrap();
+    assert_eq!(table.rows().len(), 2);
 }

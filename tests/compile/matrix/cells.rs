@@ -4,45 +4,44 @@
 ///
 /// - The name of one of the [`TESTS`]: the program compiles, and this test compares such a run with a reference.
 /// - The codes of the compiler's errors: the program does not compile.
-/// - `none`: there is no program, because nothing in the library says what such a system is.
 /// - `–`: the program makes no sense, or the kind has it already.
 ///
 /// Whoever fills an empty cell names its test here.
 pub(crate) const CELLS: &str = "
-verb                                  | closed     | family    | open     | noisy     | noisy open | lattice  | open lattice | noisy lattice | own         | sizes
+verb                                  | closed     | family    | open         | noisy     | noisy open | lattice  | open lattice | noisy lattice | own          | sizes
 
-`WeylMidpoint`                        | promises   | promises  | promises | promises  | promises   | E0277    | E0277        | E0277         | E0277       | none
-`Scheme` with `ItohAbe`               | promises   | promises  | promises | promises  | promises   | E0277    | E0277        | E0277         | E0277       | none
-`Gauss`                               | promises   | promises  | promises | promises  | promises   | E0277    | E0277        | E0277         | E0277       | none
-`Radau`                               | promises   | promises  | one bath | no radau  | no radau   | E0277    | E0277        | E0277         | E0277       | none
-`DormandPrince8`                      | promises   | promises  | promises | promises  | promises   | promises | promises     | frozen        | E0277       | none
-`RungeKuttaChebyshev`                 | promises   | promises  | promises | promises  | promises   | promises | promises     | frozen        | E0277       | none
-`NinomiyaVictoir`                     | –          | –         | –        | promises  | promises   | –        | –            | ring          | –           | –
-energy and entropy in boxes: `erased` | erased     | E0599     | E0599    | E0599     | E0599      | E0599    | E0599        | E0599         | E0599       | none
+`WeylMidpoint`                        | promises   | promises  | promises     | promises  | promises   | E0277    | E0277        | E0277         | E0277        | E0277
+`Scheme` with `ItohAbe`               | promises   | promises  | promises     | promises  | promises   | E0277    | E0277        | E0277         | E0277        | E0277
+`Gauss`                               | promises   | promises  | promises     | promises  | promises   | E0277    | E0277        | E0277         | E0277        | E0277
+`Radau`                               | promises   | promises  | one bath     | no radau  | no radau   | E0277    | E0277        | E0277         | E0277        | E0277
+`DormandPrince8`                      | promises   | promises  | promises     | promises  | promises   | promises | promises     | frozen        | numbers      | numbers
+`RungeKuttaChebyshev`                 | promises   | promises  | promises     | promises  | promises   | promises | promises     | frozen        | numbers      | numbers
+`NinomiyaVictoir`                     | –          | –         | –            | promises  | promises   | –        | –            | ring          | –            | –
+energy and entropy in boxes: `erased` | erased     | E0599     | E0599        | E0599     | E0599      | E0599    | E0599        | E0599         | E0599        | E0599
 
-`tangent` of `WeylMidpoint`           | schemes    | default   | E0277    | E0277     | E0277      | E0277    | E0277        | E0277         | E0277       | none
-`tangent` of `DormandPrince8`         | explicit   | explicit  | E0277    | E0277     | E0277      | E0277    | E0277        | E0277         | E0277       | none
-`tangent` of `Gauss`                  | stages     | stages    | E0277    | E0277     | E0277      | E0277    | E0277        | E0277         | E0277       | none
-`tangent` across a jump               | saltation  | saltation | E0277    | E0277     | E0277      | E0277    | E0277        | E0277         | E0277       | none
-`adjoint` of `DormandPrince8`         | transposed | adjoint   | E0277    | E0277     | E0277      | E0277    | E0277        | E0277         | E0277       | none
-parameters in its builder             | promises   | promises  | E0599    | E0599     | E0599      | E0599    | E0599        | E0599         | E0277       | none
-`Fit`                                 | fit        | fit       | E0599    | E0599     | E0599      | E0599    | E0599        | E0599         | E0277 E0599 | none
-`Loss`                                | loss       | loss      | E0599    | E0599     | E0599      | E0599    | E0599        | E0599         | E0277 E0599 | none
+`tangent` of `WeylMidpoint`           | schemes    | default   | E0277        | E0277     | E0277      | E0277    | E0277        | E0277         | E0277        | E0277
+`tangent` of `DormandPrince8`         | explicit   | explicit  | E0277        | E0277     | E0277      | E0277    | E0277        | E0277         | E0277        | E0277
+`tangent` of `Gauss`                  | stages     | stages    | E0277        | E0277     | E0277      | E0277    | E0277        | E0277         | E0277        | E0277
+`tangent` across a jump               | saltation  | saltation | E0277        | E0277     | E0277      | E0277    | E0277        | E0277         | E0277        | E0277
+`adjoint` of `DormandPrince8`         | transposed | adjoint   | E0277        | E0277     | E0277      | E0277    | E0277        | E0277         | E0277        | E0277
+parameters in its builder             | promises   | promises  | E0599        | E0599     | E0599      | E0599    | E0599        | E0599         | E0277        | E0277
+`Fit`                                 | fit        | fit       | E0599        | E0599     | E0599      | E0599    | E0599        | E0599         | E0277 E0599  | E0277 E0599
+`Loss`                                | loss       | loss      | E0599        | E0599     | E0599      | E0599    | E0599        | E0599         | E0277 E0599  | E0277 E0599
 
-`verified`                            | verified   | member    | E0599    | E0599     | E0599      | E0599    | E0599        | E0599         | E0599       | none
-`verify`                              | verify     | member    | E0599    | E0599     | E0599      | sites    | closed part  | closed ring   | E0599       | none
-`report`                              | report     | columns   | E0599    | E0599     | E0599      | E0599    | E0599        | E0599         | E0599       | none
+`verified`                            | verified   | member    | surroundings | E0599     | E0599      | E0599    | E0599        | E0599         | by numbers   | by numbers
+`verify`                              | verify     | member    | surroundings | E0599     | E0599      | sites    | closed part  | closed ring   | by numbers   | by numbers
+`report`                              | report     | columns   | surroundings | E0599     | E0599      | E0599    | E0599        | E0599         | by numbers   | by numbers
 
-thermal noise in its builder          | promises   | E0599     | books    | –         | –          | ring     | E0599        | –             | E0277       | none
-an energy that depends on time        | promises   | E0599     | –        | books     | books      | E0599    | E0599        | E0599         | E0599       | none
-ports and baths                       | promises   | E0599     | –        | books     | –          | promises | –            | E0599         | E0599       | none
+thermal noise in its builder          | promises   | E0599     | books        | –         | –          | ring     | E0599        | –             | E0277        | E0277
+an energy that depends on time        | promises   | E0599     | –            | books     | books      | E0599    | E0599        | E0599         | E0599        | E0599
+ports and baths                       | promises   | E0599     | –            | books     | –          | promises | –            | E0599         | E0599        | E0599
 
-events                                | events     | saltation | ledger   | no events | no events  | helix    | quench       | no events     | E0277       | none
-jumps                                 | promises   | saltation | kicks    | no events | no events  | helix    | quench       | no events     | E0277       | none
-outputs                               | outputs    | inside    | ledger   | ends      | ends       | helix    | quench       | ends          | E0277       | none
-checkpoints                           | resumed    | default   | ledger   | put down  | books      | helix    | quench       | frozen        | E0277 E0599 | none
-`Sweep`                               | sweeps     | member    | ledger   | put down  | books      | helix    | quench       | frozen        | E0277       | none
-`Observables`                         | tables     | member    | ledger   | put down  | books      | helix    | quench       | frozen        | own flow    | none
+events                                | events     | saltation | ledger       | no events | no events  | helix    | quench       | no events     | numbers runs | numbers runs
+jumps                                 | promises   | saltation | kicks        | no events | no events  | helix    | quench       | no events     | numbers runs | numbers runs
+outputs                               | outputs    | inside    | ledger       | ends      | ends       | helix    | quench       | ends          | numbers runs | numbers runs
+checkpoints                           | resumed    | default   | ledger       | put down  | books      | helix    | quench       | frozen        | numbers runs | numbers runs
+`Sweep`                               | sweeps     | member    | ledger       | put down  | books      | helix    | quench       | frozen        | numbers runs | numbers runs
+`Observables`                         | tables     | member    | ledger       | put down  | books      | helix    | quench       | frozen        | numbers runs | numbers runs
 ";
 
 /// The file and the function of a test, by its name in [`CELLS`], and what the book says where it is not all as it should be.
@@ -176,9 +175,24 @@ pub(crate) const TESTS: &[Reference] = &[
     right("sweeps", "tests/ensembles.rs", "a_row_alone_has_the_bits_of_the_table"),
     right("tables", "crates/integrators/src/run/observables/tests.rs", "numbers_survive_a_csv"),
     right(
-        "own flow",
+        "numbers",
+        "crates/integrators/src/numbers.rs",
+        "a_system_in_numbers_runs_with_the_bits_of_its_types",
+    ),
+    right(
+        "by numbers",
+        "crates/integrators/src/numbers.rs",
+        "a_system_of_ones_own_is_judged_by_its_motion",
+    ),
+    right(
+        "numbers runs",
         "tests/bring_your_own_method.rs",
-        "a_system_of_any_size_needs_no_more_than_a_flow",
+        "a_system_in_numbers_has_all_that_a_run_has",
+    ),
+    right(
+        "surroundings",
+        "crates/integrators/src/open/verify.rs",
+        "an_open_system_is_verified_once_and_its_report_lists_its_surroundings",
     ),
 ];
 
@@ -189,8 +203,6 @@ pub(crate) enum Cell {
     Tested(usize),
     /// It does not compile, with these codes.
     Errors(Vec<String>),
-    /// There is no program.
-    None,
     /// A program makes no sense.
     NoSense,
 }
@@ -198,7 +210,7 @@ pub(crate) enum Cell {
 impl Cell {
     /// Whether a program is compiled.
     pub(crate) const fn has_program(&self) -> bool {
-        !matches!(self, Self::None | Self::NoSense)
+        !matches!(self, Self::NoSense)
     }
 
     pub(crate) const fn compiles(&self) -> bool {
@@ -208,7 +220,6 @@ impl Cell {
     fn of(word: &str) -> Self {
         match word {
             "–" => Self::NoSense,
-            "none" => Self::None,
             codes if codes.starts_with("E0") => {
                 Self::Errors(codes.split_whitespace().map(str::to_owned).collect())
             }

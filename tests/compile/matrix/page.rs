@@ -33,7 +33,7 @@ impl Notes {
                 Limit::Partly(note) => format!("✓ {}", self.letter(note)),
                 Limit::Refused(note) => self.letter(note).to_string(),
             },
-            Cell::Errors(_) | Cell::None => "no".to_owned(),
+            Cell::Errors(_) => "no".to_owned(),
             Cell::NoSense => "–".to_owned(),
         }
     }

@@ -19,9 +19,9 @@ pub(crate) enum Kind {
     OpenLattice,
     /// Many sites with noise.
     NoisyLattice,
-    /// A type of the user's that implements `Flow`.
+    /// A type of the user's that implements `Equations`.
     Own,
-    /// From a number of variables that is read at run time, which nothing in the library says yet.
+    /// With a number of variables that is read at run time.
     Sizes,
 }
 
@@ -62,7 +62,7 @@ impl Kind {
             OpenLattice => include_str!("kinds/open_lattice.rs"),
             NoisyLattice => include_str!("kinds/noisy_lattice.rs"),
             Own => include_str!("kinds/own.rs"),
-            Sizes => panic!("nothing says what it is"),
+            Sizes => include_str!("kinds/sizes.rs"),
         }
     }
 
@@ -231,8 +231,8 @@ fn verb(kind: Kind, name: &str) -> String {
 
 /// What is in front of each program.
 const HEAD: &str = "#![allow(unused)]
-use metriplectic::integrators::{Element, Flow, Laws, StateSpace};
-use metriplectic::manifolds::PointError;
+use metriplectic::equations::{ENERGY, ENTROPY, Equations, Sizes};
+use metriplectic::integrators::FromEquations;
 use metriplectic::prelude::*;
 ";
 

@@ -40,7 +40,9 @@ use self::at::At;
 use self::domain::{has_digits, value_not_finite};
 use self::examination::Examination;
 use self::motion::Motion;
-use crate::{ENERGY, ENTROPY, Equations, MetricError, Model, ModelError, Report};
+use crate::{
+    ENERGY, ENTROPY, Equations, MetricError, Model, ModelError, PointError, Report, Sizes,
+};
 
 /// The number of states sampled around the start.
 const SAMPLES: usize = 16;
@@ -119,6 +121,7 @@ impl<'a> Judge<'a> {
     ///
     /// The errors of [`verify`](Self::verify), at this state.
     pub fn check_start(&self, x: &[f64]) -> Result<(), ModelError> {
+        self.check_sizes(x)?;
         self.system.check(x)?;
         match self.at(x) {
             Ok(at) => value_not_finite(at).map_or_else(|| reached::examine(at), Err),
@@ -165,8 +168,24 @@ impl<'a> Judge<'a> {
         }
     }
 
+    /// Checks that a system says sizes that can be, and that the state has its entries.
+    fn check_sizes(&self, x: &[f64]) -> Result<(), ModelError> {
+        let Sizes { entries, directions, laws } = self.system.sizes();
+        if directions == 0 || directions > entries || laws < 2 {
+            return Err(ModelError::BadSizes { entries, directions, laws });
+        }
+        if x.len() != entries {
+            return Err(PointError::Length { found: x.len(), expected: entries }.into());
+        }
+        Ok(())
+    }
+
     fn examined(&self, x0: &[f64], radius: f64) -> Report {
         let mut report = Report::new();
+        if let Err(wrong) = self.check_sizes(x0) {
+            report.verdict = Err(wrong);
+            return report;
+        }
         report.verdict = match self.at(x0) {
             Ok(at) => examine(at, radius, &mut report),
             Err(motion) => motion.examine(radius, &mut report),

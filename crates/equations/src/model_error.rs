@@ -353,6 +353,19 @@ pub enum ModelError {
         /// The difference quotient of the values.
         quotient: f64,
     },
+    /// A system of your own says sizes that cannot be.
+    #[error(
+        "a system with {entries} entries, {directions} directions and {laws} laws cannot be: it has at least one direction, no more of \
+         them than entries, and two laws, the energy and the entropy"
+    )]
+    BadSizes {
+        /// The numbers of a state.
+        entries: usize,
+        /// The directions of its chart.
+        directions: usize,
+        /// The laws.
+        laws: usize,
+    },
     /// The velocity of a system of your own changes its energy.
     #[error(
         "the velocity changes the energy at {point:?}: ⟨dH, x'⟩ is {size:.1e} of its terms; compare the differentials and the \

@@ -4,13 +4,15 @@
 use metriplectic_equations::judge::Judge;
 use metriplectic_equations::{
     BrokenLaw, Covectors, ENERGY, ENTROPY, Equations, Jet, MetricError, Model, ModelError, Part,
-    SecondLaw, Sizes, laws,
+    PointError, SecondLaw, Sizes, laws,
 };
 
 /// What is wrong with an answer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Fault {
     None,
+    /// One law.
+    Sizes,
     /// An entry of a slice that is not filled.
     NotFilled,
     Differential,
@@ -81,7 +83,8 @@ impl Body {
 
 impl Equations for Body {
     fn sizes(&self) -> Sizes {
-        Sizes { entries: N, directions: N, laws: 2 }
+        let laws = if self.0 == Fault::Sizes { 1 } else { 2 };
+        Sizes { entries: N, directions: N, laws }
     }
 
     fn values(&self, _: f64, x: &[f64], values: &mut [f64]) {
@@ -326,6 +329,9 @@ fn the_judge_finds_what_is_wrong_with_a_model_by_hand() {
     assert_eq!(verdict(Fault::None), Ok(()));
     assert!(matches!(verdict(Fault::NotSkew), Err(ModelError::BracketNotSkew { .. })));
     assert!(matches!(verdict(Fault::NotKept), Err(ModelError::EnergyNotKept { .. })));
+    assert!(matches!(verdict(Fault::Sizes), Err(ModelError::BadSizes { laws: 1, .. })));
+    let short = Judge::of(&Body(Fault::None), 0.0).verify(&STATE[..2], 0.1);
+    assert!(matches!(short, Err(ModelError::Start(PointError::Length { found: 2, expected: 3 }))));
     let report = Judge::of(&Body(Fault::None), 0.0).report(&STATE);
     assert!(report.laws.len() >= 6 && report.judged == 17, "{report}");
 }

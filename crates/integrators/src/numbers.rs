@@ -230,7 +230,9 @@ impl<S: Equations> Flow for FromEquations<S> {
     }
 
     fn kinds(&self) -> Vec<Kind> {
-        (0..self.0.sizes().laws - ENTROPY - 1).map(|invariant| self.0.kind(invariant)).collect()
+        (0..self.0.sizes().laws.saturating_sub(ENTROPY + 1))
+            .map(|invariant| self.0.kind(invariant))
+            .collect()
     }
 
     fn check(&self, x0: &Vec<f64>) -> Result<(), ModelError> {
@@ -458,6 +460,13 @@ mod tests {
             *production = v[2];
         });
         assert!(matches!(falls, ModelError::ProductionNegative { .. }), "{falls}");
+        let short = DormandPrince8.run(
+            &FromEquations(Damped(|_, _| {})),
+            vec![1.0, 0.0],
+            Span::steps(0.1, 1),
+        );
+        let length = PointError::Length { found: 2, expected: 3 };
+        assert!(matches!(short, Err(RunError::Model(ModelError::Start(found))) if found == length));
         let nan = refusal(|v, _| v[0] = f64::NAN);
         assert!(matches!(nan, ModelError::ValueNotFinite { field: "velocity", .. }), "{nan}");
     }

@@ -282,7 +282,7 @@ fn a_system_in_numbers_has_all_that_a_run_has() {
     let near =
         |found: f64, expected: f64| assert!((found - expected).abs() < 1e-6, "{found} {expected}");
     near(run.events()[0].state.time, turn);
-    let outputs: Vec<_> = run.iter().filter(|s| s.time == 0.5 || s.time == 1.75).collect();
+    let outputs: Vec<_> = run.iter().filter(|s| [0.5, 1.75].contains(&s.time)).collect();
     assert_eq!(outputs.len(), 2);
     near(outputs[0].point[4], 5.0 * 0.5_f64.cos());
     // Reversed at π/2, so the way goes back: q(t) = cos(π − t).

@@ -10,9 +10,9 @@ use metriplectic::manifolds::Manifold;
 use metriplectic::prelude::*;
 use metriplectic_studies::problems::{Problem, Study, each};
 
-/// The names of the problems that were compared.
+/// The names, metrics and types of the problems that were compared.
 #[derive(Default)]
-struct Compared(BTreeSet<&'static str>);
+struct Compared(BTreeSet<[&'static str; 3]>);
 
 /// Compares all problems.
 pub(crate) fn compare() {
@@ -32,7 +32,7 @@ impl Study for Compared {
         Y: Metriplectic,
         R: Retraction<Y::Manifold, Y::Metric> + Copy,
     {
-        if !self.0.insert(problem.name) {
+        if !self.0.insert([problem.name, problem.metric, std::any::type_name::<Y>()]) {
             return;
         }
         let (system, start) = (&problem.system, &problem.start);

@@ -27,7 +27,7 @@ pub struct Sizes {
 /// Four questions have no default. The others have that of a closed system on a flat space.
 ///
 /// Laws ([`laws::equations`](crate::laws::equations)): 1. the differentials are those of the values; 2. `⟨dH, x'⟩ = 0` and
-/// `⟨dL_a, x'⟩ = 0`; 3. `⟨dS, x'⟩` is the production, and not negative; 4. `φ_x(0) = x`, and the coordinates are the
+/// `⟨dL_a, x'⟩ = 0`; 3. the production is not negative, and `⟨dS, x'⟩` of an exact second law; 4. `φ_x(0) = x`, and the coordinates are the
 /// inverse of the chart; 5. `ψ_x(0) = x`, and the rates there are the velocity.
 pub trait Equations {
     /// Returns the lengths of all slices. They do not change.

@@ -21,6 +21,7 @@ enum Fault {
     Coordinates,
     Velocity,
     Production,
+    Negative,
     Stage,
     StageRates,
     ValueByItself,
@@ -109,7 +110,8 @@ impl Equations for Body {
         let turned = self.part(Part::Bracket, x, &w, &w);
         (0..N).for_each(|i| v[i] = turned[i] + friction[i]);
         v[0] += 1e-3 * self.has(Fault::Velocity);
-        Some(dot(&s, &friction) * (1.0 - 2.0 * self.has(Fault::Production)))
+        let wrong = 0.5 * self.has(Fault::Production) + 2.0 * self.has(Fault::Negative);
+        Some(dot(&s, &friction) * (1.0 - wrong))
     }
 
     fn second_law(&self) -> SecondLaw {
@@ -306,6 +308,7 @@ fn each_wrong_answer_breaks_the_law_of_its_name() {
         (Fault::Coordinates, "φ_x⁻¹(φ_x(u)) = u"),
         (Fault::Velocity, "the velocity conserves H and L_a"),
         (Fault::Production, "⟨dS, x'⟩ is the production"),
+        (Fault::Negative, "the production is not negative"),
         (Fault::Stage, "ψ_x⁻¹(ψ_x(u)) = u"),
         (Fault::StageRates, "the rates at ψ_x(0) are the velocity"),
         (Fault::ValueByItself, "a law by itself has its value"),

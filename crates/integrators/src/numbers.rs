@@ -1,6 +1,7 @@
 //! A system in plain numbers is a flow, of a size that is known at run time.
 
 mod projection;
+mod rows;
 
 use std::fmt;
 
@@ -11,6 +12,8 @@ use metriplectic_equations::{ENERGY, ENTROPY, Equations, Report, Sizes, Verified
 use metriplectic_manifolds::PointError;
 
 use self::projection::Projection;
+use self::rows::NO_CLOCK;
+pub use self::rows::Rows;
 use crate::explicit::{Projected, ProjectionError, StageFlow, Target};
 use crate::step::{Element, Flow, Laws, Recheck, StateSpace};
 
@@ -94,9 +97,6 @@ impl<S> fmt::Debug for FromEquations<S> {
     }
 }
 
-/// The time that a system without a clock is asked at.
-const NO_CLOCK: f64 = 0.0;
-
 impl<S: Equations> FromEquations<S> {
     /// Checks the laws of the system around a state: the [model](Equations::model) if its parts are known, and the
     /// velocity and the differentials if they are not. A run does this first, with a radius of 0.1.
@@ -133,34 +133,6 @@ impl<S: Equations> FromEquations<S> {
     fn laws_of(values: &[f64]) -> Laws<Vec<f64>> {
         let invariants = values[ENTROPY + 1..].to_vec();
         Laws { energy: values[ENERGY], entropy: values[ENTROPY], invariants }
-    }
-}
-
-/// The laws of a system with their differentials, one after another.
-#[derive(Clone, Debug)]
-pub struct Rows {
-    /// The values.
-    values: Vec<f64>,
-    /// The differentials.
-    w: Vec<f64>,
-}
-
-impl Rows {
-    fn of(system: &(impl Equations + ?Sized), x: &[f64]) -> Self {
-        let Sizes { directions, laws, .. } = system.sizes();
-        let (mut values, mut w) = (vec![0.0; laws], vec![0.0; laws * directions]);
-        system.differentials(NO_CLOCK, x, &mut values, &mut w);
-        Self { values, w }
-    }
-
-    fn is_finite(&self) -> bool {
-        self.values.iter().chain(&self.w).all(|number| number.is_finite())
-    }
-
-    /// The differential of a law.
-    fn row(&self, law: usize) -> &[f64] {
-        let n = self.w.len() / self.values.len();
-        &self.w[law * n..][..n]
     }
 }
 

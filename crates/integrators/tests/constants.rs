@@ -18,6 +18,7 @@ const LAYOUT: &[(&str, &str)] = &[
     ("midpoint/predictor.rs", "DIFFERENCES"),
     ("noise/numbers.rs", "UNIT"),
     ("noise/sampler.rs", "MOST"),
+    ("numbers/rows.rs", "NO_CLOCK"),
     ("open/vector.rs", "ALL"),
     ("round_off/bound.rs", "NO_DIGITS"),
     ("run/checkpoint.rs", "VERSION"),

@@ -5,7 +5,7 @@
 use metriplectic_equations::{ENERGY, ENTROPY, Equations, SecondLaw};
 use metriplectic_fields::{length, power_of_two};
 
-use super::Rows;
+use super::rows::Rows;
 use crate::explicit::{Limit, ProjectionError};
 use crate::round_off::bound::{INDEPENDENT, NO_DIGITS};
 use crate::step::Laws;

@@ -8,7 +8,7 @@ use std::fmt;
 use metriplectic_dynamics::invariants::Kind;
 use metriplectic_dynamics::{ModelError, SecondLaw};
 use metriplectic_equations::judge::{Judge, RADIUS};
-use metriplectic_equations::{ENERGY, ENTROPY, Equations, Report, Sizes, VerifiedEquations};
+use metriplectic_equations::{ENERGY, ENTROPY, Equations, Report, VerifiedEquations};
 use metriplectic_manifolds::PointError;
 
 use self::projection::Projection;
@@ -305,6 +305,7 @@ mod tests {
     use crate::{DormandPrince5, DormandPrince8, Method, RunError, RungeKuttaChebyshev, Span};
     use metriplectic_dynamics::bracket::{AreaForm, Zero};
     use metriplectic_dynamics::{InNumbers, Metriplectic, System, system::Point};
+    use metriplectic_equations::Sizes;
     use metriplectic_fields::Real;
     use metriplectic_manifolds::{Euclidean, LieDual, Manifold, Product, Sphere};
     use nalgebra::{Vector1, Vector3, vector};

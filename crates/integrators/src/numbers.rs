@@ -80,8 +80,9 @@ impl StateSpace for Numbers {
 ///     }
 /// }
 ///
-/// let mut start = vec![0.0; 200];
-/// start[50] = 1.0;
+/// // The second mode.
+/// let mode = |i: usize| (std::f64::consts::TAU * (i + 1) as f64 / 101.0).sin();
+/// let start = (0..200).map(|i| if i < 100 { mode(i) } else { 0.0 }).collect();
 /// let chain = FromEquations(Oscillators(100));
 /// let run = DormandPrince8.run(&chain, start, Span::until(50.0).tolerance(1e-8))?;
 /// assert!(run.certificate().max_relative_energy_error() < 1e-14);

@@ -22,7 +22,7 @@ use metriplectic_studies::{Example, Panel, Panels};
 /// The file beside this program.
 const LADDER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/network.txt");
 
-/// What two bodies are connected by, with its numbers.
+/// A connection of two bodies, with its numbers.
 type Connection<const N: usize> = ([usize; 2], [f64; N]);
 
 #[derive(Debug, Default)]

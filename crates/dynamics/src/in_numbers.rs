@@ -90,7 +90,7 @@ fn put_matrix<A: Square<f64>>(a: &A, to: &mut [f64]) {
     }
 }
 
-/// What is done with one field of a system.
+/// Visits fields of a system.
 trait WithField<M: Space> {
     fn visit(&mut self, f: &impl ScalarField<M>);
 }
@@ -312,6 +312,10 @@ impl<Y: Metriplectic + ?Sized> Equations for InNumbers<'_, Y> {
 
     fn second_law(&self) -> SecondLaw {
         self.0.second_law()
+    }
+
+    fn is_verified(&self) -> bool {
+        self.0.is_verified()
     }
 
     fn kind(&self, invariant: usize) -> Kind {

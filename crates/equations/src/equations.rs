@@ -1,4 +1,4 @@
-//! What is asked of every system.
+//! The questions that every system answers.
 
 use crate::{Kind, Model, PointError, SecondLaw};
 

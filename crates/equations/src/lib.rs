@@ -21,7 +21,7 @@
 //! | [`judge`] | the laws of a model at a start, around it, and at the states of a run |
 //! | [`report`] | [`Report`]: the residual of every law |
 //! | [`model_error`] | [`ModelError`]: the law that a model violates, with the numbers |
-//! | [`metric_error`], [`point_error`] | [`MetricError`], [`PointError`]: a metric that cannot be used, a state that is none |
+//! | [`metric_error`], [`point_error`] | [`MetricError`], [`PointError`]: a metric that cannot be used, entries that are not a state |
 //! | [`room`] | slices of numbers that cost no allocation where they are short |
 //! | [`laws`] | the laws of an implementation of [`Equations`] and [`Model`], as functions for its tests |
 

@@ -16,9 +16,9 @@ pub enum Part {
 /// The covectors that the parts of a motion depend on: differentials, or discrete gradients.
 #[derive(Clone, Copy, Debug)]
 pub struct Covectors<'a> {
-    /// That of the energy: a dissipation annihilates it, and a force acts on it.
+    /// The covector of the energy: a dissipation annihilates it, and a force acts on it.
     pub energy: &'a [f64],
-    /// That of the entropy: some brackets are made of it.
+    /// The covector of the entropy: some brackets are made of it.
     pub entropy: &'a [f64],
 }
 

@@ -1,4 +1,4 @@
-//! A state that is none.
+//! Errors of entries that are not a state.
 
 /// A point that is not on the manifold.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]

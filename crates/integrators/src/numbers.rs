@@ -305,7 +305,7 @@ mod tests {
     use super::*;
     use crate::{DormandPrince5, DormandPrince8, Method, RunError, RungeKuttaChebyshev, Span};
     use metriplectic_dynamics::bracket::{AreaForm, Zero};
-    use metriplectic_dynamics::{InNumbers, Metriplectic, System, system::Point};
+    use metriplectic_dynamics::{InNumbers, Metriplectic, System, Verify as _, system::Point};
     use metriplectic_equations::Sizes;
     use metriplectic_fields::Real;
     use metriplectic_manifolds::{Euclidean, LieDual, Manifold, Product, Sphere};
@@ -368,6 +368,9 @@ mod tests {
             system: FromEquations<Box<dyn Equations + 'a>>,
         }
         let (body, start) = (body(), vector![0.4, -1.0, 0.3]);
+        let kept = body.verified(&start).unwrap();
+        assert!(FromEquations(InNumbers(&kept)).is_verified());
+        assert!(!FromEquations(InNumbers(&body)).is_verified());
         let holder = Holder { system: FromEquations(Box::new(InNumbers(&body))) };
         let span = || Span::until(5.0).tolerance(1e-9);
         let typed = DormandPrince8.run(&body, start, span()).unwrap();

@@ -52,10 +52,10 @@ pub(crate) struct Reference {
     pub(crate) limit: Limit,
 }
 
-/// What keeps a program that compiles from being the whole answer.
+/// The limit of a program that compiles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Limit {
-    /// Nothing.
+    /// None: it is the whole answer.
     None,
     /// It runs for some systems, or in part.
     Partly(&'static str),

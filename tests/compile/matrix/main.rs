@@ -1,4 +1,4 @@
-//! What works with what: each kind of system with each verb is a program, and the matrix in `cells.rs` says whether it compiles.
+//! The matrix of what works with what: each kind of system with each verb is a program, and the matrix in `cells.rs` says whether it compiles.
 //!
 //! The matrix can only get fuller: a program that compiles where the matrix has an error fails the test, with the sentence that its
 //! cell is to be set, and so does one that no longer compiles. A cell with a program that compiles names the test that compares such a

@@ -10,7 +10,7 @@ use serde_json::Value;
 /// The folder of the library.
 const ROOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../..");
 
-/// What the compiler says of a program.
+/// The answer of the compiler to a program.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Said {
     /// Whether it has checked the program and found nothing.
@@ -74,7 +74,7 @@ incremental = false
     package
 }
 
-/// What the compiler says of each program, by its name.
+/// Asks the compiler about each program, by its name.
 ///
 /// # Panics
 ///

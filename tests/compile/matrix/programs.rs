@@ -61,8 +61,8 @@ impl Kind {
             Lattice => include_str!("kinds/lattice.rs"),
             OpenLattice => include_str!("kinds/open_lattice.rs"),
             NoisyLattice => include_str!("kinds/noisy_lattice.rs"),
-            Own => include_str!("kinds/own.rs"),
-            Sizes => include_str!("kinds/sizes.rs"),
+            // Any number of variables of a system of one's own is read.
+            Own | Sizes => include_str!("kinds/own.rs"),
         }
     }
 
@@ -229,7 +229,7 @@ fn verb(kind: Kind, name: &str) -> String {
     }
 }
 
-/// What is in front of each program.
+/// The lines in front of each program.
 const HEAD: &str = "#![allow(unused)]
 use metriplectic::equations::{ENERGY, ENTROPY, Equations, Sizes};
 use metriplectic::integrators::FromEquations;

@@ -51,7 +51,7 @@ impl<'a> At<'a> {
         ENTROPY + 1..self.laws().end
     }
 
-    /// The same model at another state.
+    /// Moves the model to another state.
     pub(super) const fn moved_to<'b>(&self, x: &'b [f64]) -> At<'b>
     where
         'a: 'b,

@@ -30,7 +30,7 @@ pub(super) struct Motion<'a> {
     pub(super) x: &'a [f64],
 }
 
-/// What is evaluated at a state.
+/// The laws, their differentials and the velocity at a state.
 struct Here {
     values: Row,
     /// The differentials, one after another.
@@ -173,7 +173,7 @@ impl<'a> Motion<'a> {
         (0..units.len()).try_for_each(|axis| self.along(&here, &units, axis))
     }
 
-    /// The same along one axis, which `turn` chooses.
+    /// Compares them along one axis, which `turn` chooses.
     pub(super) fn look(&self, turn: usize) -> Result<(), ModelError> {
         let here = self.here()?;
         let units = self.units(&here);

@@ -7,7 +7,7 @@ use smallvec::{SmallVec, smallvec};
 /// Numbers in a row, without an allocation where they are few.
 pub type Row = SmallVec<[f64; 8]>;
 
-/// So many zeros.
+/// Makes a row of zeros.
 pub(super) fn zeros(count: usize) -> Row {
     smallvec![0.0; count]
 }

@@ -38,7 +38,7 @@ impl<Y, C, X> OpenSystem<Y, C, X> {
         Self { closed, exchange, columns, clock: PhantomData, verified: false }
     }
 
-    /// The same system, whose model was verified.
+    /// Marks the system as one whose model was verified.
     pub(super) fn with_certificate(self) -> Self {
         Self { verified: true, ..self }
     }

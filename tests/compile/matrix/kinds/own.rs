@@ -1,5 +1,5 @@
 {
-    // Oscillators that answer the questions of a system by themselves.
+    // Oscillators that answer the questions of a system by themselves, and whose number is read.
     #[derive(Clone)]
     struct Oscillators(usize);
     impl Equations for Oscillators {
@@ -22,5 +22,6 @@
             Some(0.0)
         }
     }
-    (FromEquations(Oscillators(3)), vec![0.1, 0.2, 0.3, 0.0, 0.0, 0.0])
+    let count: usize = "3".parse()?;
+    (FromEquations(Oscillators(count)), vec![0.1; 2 * count])
 }

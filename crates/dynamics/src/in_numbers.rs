@@ -376,9 +376,9 @@ impl<Y: Metriplectic + ?Sized> Equations for InNumbers<'_, Y> {
 impl<Y: Metriplectic + ?Sized> Model for InNumbers<'_, Y> {
     fn is_zero(&self, part: Part) -> bool {
         match part {
-            Part::Bracket => self.0.bracket().is_zero(),
-            Part::Force => !self.0.bracket().is_forced(),
-            Part::Dissipation => self.0.dissipation().is_none(),
+            Part::Reversible => self.0.bracket().is_zero(),
+            Part::Gyroscopic => !self.0.bracket().is_forced(),
+            Part::Irreversible => self.0.dissipation().is_none(),
         }
     }
 
@@ -475,12 +475,12 @@ impl<Y: Metriplectic + ?Sized> Model for InNumbers<'_, Y> {
             let centre = ChartPoint::<Of<Y>>::centre(&point::<Of<Y>>(x));
             let g = self.0.metric_at(&centre);
             let of_part: Matrix<Of<Y>> = match part {
-                Part::Bracket => {
+                Part::Reversible => {
                     let s = column(w.entropy);
                     self.0.bracket().tensor(&self.0.bracket_args(&g, &s))?
                 }
-                Part::Force => Matrix::<Of<Y>>::zeros(),
-                Part::Dissipation => self.0.dissipation().tensor(&g, &column(w.energy))?,
+                Part::Gyroscopic => Matrix::<Of<Y>>::zeros(),
+                Part::Irreversible => self.0.dissipation().tensor(&g, &column(w.energy))?,
             };
             put_matrix(&of_part, tensor);
             Ok(())
@@ -501,9 +501,9 @@ impl<Y: Metriplectic + ?Sized> Model for InNumbers<'_, Y> {
             let (g, s) = (self.0.metric_at(&at), column(w.entropy));
             let args = self.0.bracket_args(&g, &s);
             let of_part = match part {
-                Part::Bracket => self.0.bracket().apply(&args, &column(alpha))?,
-                Part::Force => self.0.bracket().force(&args, &column(w.energy))?,
-                Part::Dissipation => {
+                Part::Reversible => self.0.bracket().apply(&args, &column(alpha))?,
+                Part::Gyroscopic => self.0.bracket().force(&args, &column(w.energy))?,
+                Part::Irreversible => {
                     self.0.dissipation().apply(&g, &column(w.energy), &column(alpha))?
                 }
             };
@@ -526,16 +526,16 @@ impl<Y: Metriplectic + ?Sized> Model for InNumbers<'_, Y> {
             let (g, s, energy) = (self.0.metric_at(&centre), column(w.entropy), column(w.energy));
             let args = self.0.bracket_args(&g, &s);
             let (value, matrices) = match part {
-                Part::Bracket | Part::Force => {
+                Part::Reversible | Part::Gyroscopic => {
                     let bracket = self.0.bracket();
-                    let jet = if part == Part::Bracket {
+                    let jet = if part == Part::Reversible {
                         bracket.linearise(&args, &column(alpha))?
                     } else {
                         bracket.linearise_force(&args, &energy)?
                     };
                     (jet.value, [jet.along_z, jet.along_s, jet.tensor])
                 }
-                Part::Dissipation => {
+                Part::Irreversible => {
                     let jet = self.0.dissipation().linearise(&g, &energy, &column(alpha))?;
                     (jet.value, [jet.along_z, jet.along_w, jet.tensor])
                 }

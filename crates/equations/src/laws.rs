@@ -113,9 +113,9 @@ pub fn model(system: &dyn Model, t: f64, x: &[f64], u: &[f64]) -> Result<(), Bro
     let differentials = Covectors { energy: &w[..n], entropy: &w[n..2 * n] };
     let mut sum = vec![0.0; n];
     for (part, alpha) in [
-        (Part::Bracket, differentials.energy),
-        (Part::Force, differentials.energy),
-        (Part::Dissipation, differentials.entropy),
+        (Part::Reversible, differentials.energy),
+        (Part::Gyroscopic, differentials.energy),
+        (Part::Irreversible, differentials.entropy),
     ] {
         if system.is_zero(part) {
             continue;
@@ -187,20 +187,20 @@ fn one_part(
         to.extend(apply(&scaled(u, s), w, alpha).unwrap_or_else(|_| nan(n)));
     })?;
     // The covector that the part depends on, beside what the tensor says.
-    let covector = if part == Part::Dissipation { w.energy } else { w.entropy };
+    let covector = if part == Part::Irreversible { w.energy } else { w.entropy };
     let turned: Vec<f64> =
         covector.iter().enumerate().map(|(i, c)| c * (1.0 + i as f64).sin()).collect();
     let along: Vec<f64> = along_w.chunks_exact(n).map(|row| dot(row, &turned)).collect();
     derivative("along_w is the derivative along a covector", &along, &|s, to| {
         let moved: Vec<f64> = covector.iter().zip(&turned).map(|(c, d)| c + s * d).collect();
-        let w = if part == Part::Dissipation {
+        let w = if part == Part::Irreversible {
             Covectors { energy: &moved, ..w }
         } else {
             Covectors { entropy: &moved, ..w }
         };
         to.extend(apply(&still, w, alpha).unwrap_or_else(|_| nan(n)));
     })?;
-    if part == Part::Force {
+    if part == Part::Gyroscopic {
         return Ok(v);
     }
     let mut tensor = nan(n * n);
@@ -208,7 +208,7 @@ fn one_part(
     near("the derivative along α is the tensor", &slopes, &tensor)?;
     let product: Vec<f64> = tensor.chunks_exact(n).map(|row| dot(row, alpha)).collect();
     near("the columns of a tensor are the vectors of its part", &product, &v)?;
-    if part == Part::Bracket {
+    if part == Part::Reversible {
         bracket_slopes(system, (t, x, u), w, alpha)?;
     }
     Ok(v)
@@ -236,7 +236,7 @@ fn bracket_slopes(
         let mut v = nan(n);
         let w = Covectors { entropy: &moved, ..w };
         let place = (x, &scaled(u, s)[..]);
-        let applied = system.apply(Part::Bracket, t, place, w, alpha, &mut v);
+        let applied = system.apply(Part::Reversible, t, place, w, alpha, &mut v);
         to.extend(applied.map_or_else(|_| nan(n), |()| v));
     })
 }

@@ -6,11 +6,11 @@ use crate::{Equations, MetricError};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Part {
     /// `Π α`, which may depend on the covector of the entropy.
-    Bracket,
-    /// The force `f(w)`, which does no work.
-    Force,
+    Reversible,
+    /// The gyroscopic force `f(w)`: it does no work.
+    Gyroscopic,
     /// `K_w α`, which annihilates the covector `w` of the energy.
-    Dissipation,
+    Irreversible,
 }
 
 /// The covectors that the parts of a motion depend on: differentials, or discrete gradients.

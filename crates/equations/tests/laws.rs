@@ -69,15 +69,15 @@ impl Body {
     /// `Π α = α × x` or `K_w α`.
     fn part(&self, part: Part, x: &[f64], w: &[f64], alpha: &[f64]) -> [f64; N] {
         let v = match part {
-            Part::Bracket => cross(alpha, x),
-            Part::Force => [0.0; N],
-            Part::Dissipation => {
+            Part::Reversible => cross(alpha, x),
+            Part::Gyroscopic => [0.0; N],
+            Part::Irreversible => {
                 let (square, along) = (dot(w, w), dot(w, alpha));
                 std::array::from_fn(|i| square * alpha[i] - along * w[i])
             }
         };
-        let skew = self.has(Fault::NotSkew) * f64::from(u8::from(part == Part::Bracket));
-        let kept = self.has(Fault::NotKept) * f64::from(u8::from(part == Part::Dissipation));
+        let skew = self.has(Fault::NotSkew) * f64::from(u8::from(part == Part::Reversible));
+        let kept = self.has(Fault::NotKept) * f64::from(u8::from(part == Part::Irreversible));
         std::array::from_fn(|i| v[i] + (skew + kept) * alpha[i])
     }
 }
@@ -106,8 +106,8 @@ impl Equations for Body {
 
     fn velocity(&self, _: f64, x: &[f64], v: &mut [f64]) -> Option<f64> {
         let [w, s] = [ENERGY, ENTROPY].map(|law| Self::differential(law, x));
-        let friction = self.part(Part::Dissipation, x, &w, &s);
-        let turned = self.part(Part::Bracket, x, &w, &w);
+        let friction = self.part(Part::Irreversible, x, &w, &s);
+        let turned = self.part(Part::Reversible, x, &w, &w);
         (0..N).for_each(|i| v[i] = turned[i] + friction[i]);
         v[0] += 1e-3 * self.has(Fault::Velocity);
         let wrong = 0.5 * self.has(Fault::Production) + 2.0 * self.has(Fault::Negative);
@@ -144,7 +144,7 @@ impl Equations for Body {
 
 impl Model for Body {
     fn is_zero(&self, part: Part) -> bool {
-        part == Part::Force
+        part == Part::Gyroscopic
     }
 
     fn value(&self, law: usize, _: f64, x: &[f64]) -> f64 {
@@ -233,12 +233,12 @@ impl Model for Body {
         self.tensor(part, t, x, w, jet.tensor)?;
         let (w, along) = (w.energy, dot(w.energy, alpha));
         for k in 0..N {
-            let turned = if part == Part::Bracket { cross(alpha, &unit(k)) } else { [0.0; N] };
+            let turned = if part == Part::Reversible { cross(alpha, &unit(k)) } else { [0.0; N] };
             for i in 0..N {
                 jet.along_x[i * N + k] = turned[i];
                 let diagonal = if i == k { along } else { 0.0 };
                 let turned = 2.0 * w[k] * alpha[i] - diagonal - w[i] * alpha[k];
-                jet.along_w[i * N + k] = if part == Part::Bracket { 0.0 } else { turned };
+                jet.along_w[i * N + k] = if part == Part::Reversible { 0.0 } else { turned };
             }
         }
         jet.along_x[3] += 1e-3 * self.has(Fault::AlongState);

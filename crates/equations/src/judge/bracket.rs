@@ -43,7 +43,7 @@ pub(crate) fn bracket_defects(
     // A bracket does not depend on the covector of the energy.
     let (_, energy) = at.jet(ENERGY);
     let w = Covectors { energy: &energy, entropy: &entropy.df };
-    let tensor = at.tensor(Part::Bracket, w)?;
+    let tensor = at.tensor(Part::Reversible, w)?;
     let here = Here { at, entropy, units, rounding, tensor: &tensor };
     let large = at.n() > ALL_TRIPLES;
     let Jacobi { violation, is_finite } =

@@ -14,17 +14,17 @@ pub(super) fn examine(
     findings: &mut Findings<'_>,
 ) -> Result<(), ModelError> {
     let &Place { at, units, ref energy, ref entropy } = place;
-    if at.model.is_zero(Part::Dissipation) {
+    if at.model.is_zero(Part::Irreversible) {
         return Ok(());
     }
     let here = place.differentials();
-    let jet = at.linearise(Part::Dissipation, here, &entropy.df);
+    let jet = at.linearise(Part::Irreversible, here, &entropy.df);
     let jet = jet.map_err(|source| at.unusable(source))?;
     if !(jet.along_x.max_abs() + jet.along_w.max_abs()).is_finite() {
         let point = findings.point.clone();
         return Err(ModelError::DerivativeNotFinite { field: "dissipation", point });
     }
-    let tensor = |w| at.tensor(Part::Dissipation, w).map_err(|source| at.unusable(source));
+    let tensor = |w| at.tensor(Part::Irreversible, w).map_err(|source| at.unusable(source));
     let k = tensor(here)?;
     let size = balance::asymmetry(&k, 1.0, units, ROUNDING).relative();
     findings
@@ -61,7 +61,7 @@ pub(super) fn beside_round_off(at: At<'_>, units: &[f64], k: &Table, alpha: &[f6
 
 /// Returns whether `K` at a place is round-off in every entry, so that its quotients say nothing of its derivatives.
 pub(super) fn is_round_off(place: &Place<'_>) -> bool {
-    let Ok(k) = place.at.tensor(Part::Dissipation, place.differentials()) else { return false };
+    let Ok(k) = place.at.tensor(Part::Irreversible, place.differentials()) else { return false };
     let rounding = rounding(place.at, place.units, &k);
     pairs(k.len()).all(|ij| k[ij].abs() <= ROUNDED * rounding[ij])
 }
@@ -89,7 +89,7 @@ fn rounding(at: At<'_>, units: &[f64], k: &Table) -> Table {
         let (_, energy) = there.jet(ENERGY);
         // A dissipation does not depend on the covector of the entropy.
         let w = Covectors { energy: &energy, entropy: &energy };
-        let there = there.tensor(Part::Dissipation, w).ok()?;
+        let there = there.tensor(Part::Irreversible, w).ok()?;
         Some(Table::from_entries(n, |i, j| (there[(i, j)] - k[(i, j)]).abs()))
     });
     changes.fold(Table::zeros(n), |most, change| {

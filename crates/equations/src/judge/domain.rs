@@ -13,7 +13,7 @@ pub(crate) fn value_not_finite(at: At<'_>) -> Option<ModelError> {
     model.metric(at.x, &zeros(n), metric.entries_mut());
     // If the metric cannot be used, it is reported, and not a part without a value.
     let of_tensor = |part| at.tensor(part, w).map_or(0.0, |tensor| tensor.max_abs());
-    let of_force = || at.apply(Part::Force, w, &energy).map_or(0.0, |force| max_abs(&force));
+    let of_force = || at.apply(Part::Gyroscopic, w, &energy).map_or(0.0, |force| max_abs(&force));
     // If a derivative of the energy is not finite, it is reported, and not what acts on it.
     let is_finite = all_finite(&energy);
     let acting = |value: &dyn Fn() -> f64| if is_finite { value() } else { 0.0 };
@@ -21,9 +21,9 @@ pub(crate) fn value_not_finite(at: At<'_>) -> Option<ModelError> {
         ("energy", at.value(ENERGY)),
         ("entropy", at.value(ENTROPY)),
         ("metric", metric.max_abs()),
-        ("bracket", of_tensor(Part::Bracket)),
+        ("bracket", of_tensor(Part::Reversible)),
         ("force", acting(&of_force)),
-        ("dissipation", acting(&|| of_tensor(Part::Dissipation))),
+        ("dissipation", acting(&|| of_tensor(Part::Irreversible))),
     ];
     let (field, value) = values.into_iter().find(|(_, value)| !value.is_finite())?;
     Some(ModelError::ValueNotFinite { field, value, point: at.point() })

@@ -21,10 +21,10 @@ impl TensorSlopes {
         let n = units.len();
         let mut slopes = vec![0.0; n * n * n];
         let metric = at.model.metric_slopes(at.x, &mut slopes).then_some(slopes);
-        if at.model.is_zero(Part::Bracket) {
+        if at.model.is_zero(Part::Reversible) {
             return Ok(Self { metric, bracket: None });
         }
-        let jet = at.linearise(Part::Bracket, place.differentials(), &generic(units));
+        let jet = at.linearise(Part::Reversible, place.differentials(), &generic(units));
         let jet = jet.map_err(|source| at.unusable(source))?;
         Ok(Self { metric, bracket: Some(jet.along_x) })
     }
@@ -57,11 +57,11 @@ pub(super) fn compare_scalars(place: &Place<'_>, axis: usize) -> Result<(), Mode
 /// law uses them, so a law that its values violate is named first.
 pub(super) fn compare_dissipation(place: &Place<'_>, axes: &[usize]) -> Result<(), ModelError> {
     let &Place { at, units, .. } = place;
-    if at.model.is_zero(Part::Dissipation) || axes.is_empty() {
+    if at.model.is_zero(Part::Irreversible) || axes.is_empty() {
         return Ok(());
     }
     let alpha = generic(units);
-    let jet = at.linearise(Part::Dissipation, place.differentials(), &alpha);
+    let jet = at.linearise(Part::Irreversible, place.differentials(), &alpha);
     let jet = jet.map_err(|source| at.unusable(source))?;
     let compared =
         axes.iter().try_for_each(|&axis| Along { place, axis }.dissipation(&jet, &alpha));
@@ -129,7 +129,7 @@ impl Along<'_, '_> {
             Derivatives { scale, df, units: Row::from_slice(units), rounding: OF_CLOSURES };
         self.compare("bracket", &derivatives, &|t, values| {
             let w = self.place.differentials();
-            self.append(Part::Bracket, &self.displacement(t), w, &alpha, values)
+            self.append(Part::Reversible, &self.displacement(t), w, &alpha, values)
         })
     }
 
@@ -155,7 +155,7 @@ impl Along<'_, '_> {
         let along_x =
             Derivatives { scale, df, units: Row::from_slice(units), rounding: OF_SOLUTIONS };
         self.compare("dissipation", &along_x, &|t, values| {
-            self.append(Part::Dissipation, &self.displacement(t), here, alpha, values)
+            self.append(Part::Irreversible, &self.displacement(t), here, alpha, values)
         })?;
 
         // If a component of dH is negligible, its size is that of the largest energy of all components.
@@ -171,7 +171,7 @@ impl Along<'_, '_> {
             let mut w = w.clone();
             w[axis] += t;
             let w = Covectors { energy: &w, ..here };
-            self.append(Part::Dissipation, &still, w, alpha, values)
+            self.append(Part::Irreversible, &still, w, alpha, values)
         })
     }
 }

@@ -14,19 +14,20 @@ pub(super) fn examine(
     findings: &mut Findings<'_>,
 ) -> Result<(), ModelError> {
     let &Place { at, units, ref energy, ref entropy } = place;
-    if at.model.is_zero(Part::Force) {
+    if at.model.is_zero(Part::Gyroscopic) {
         return Ok(());
     }
     let here = place.differentials();
-    let jet = at.linearise(Part::Force, here, &energy.df);
+    let jet = at.linearise(Part::Gyroscopic, here, &energy.df);
     let jet = jet.map_err(|source| at.unusable(source))?;
     let derivatives = jet.along_x.max_abs() + jet.along_w.max_abs() + jet.tensor.max_abs();
     if !derivatives.is_finite() {
         let point = findings.point.clone();
         return Err(ModelError::DerivativeNotFinite { field: "force", point });
     }
-    let force =
-        |w: Covectors<'_>| at.apply(Part::Force, w, w.energy).map_err(|source| at.unusable(source));
+    let force = |w: Covectors<'_>| {
+        at.apply(Part::Gyroscopic, w, w.energy).map_err(|source| at.unusable(source))
+    };
     for w in [Some(&energy.df[..]), w].into_iter().flatten() {
         let size = balance::pairing(w, &force(Covectors { energy: w, ..here })?, units);
         let error = |point, size| ModelError::ForceDoesWork { point, size };
@@ -58,7 +59,7 @@ const STEP: f64 = 0.1;
 fn covectors_of_a_step(place: &Place<'_>, force: &[f64]) -> Option<[Row; 2]> {
     let &Place { at, units, ref energy, ref entropy } = place;
     let n = units.len();
-    let tensor = at.tensor(Part::Bracket, place.differentials()).ok()?;
+    let tensor = at.tensor(Part::Reversible, place.differentials()).ok()?;
     let term = |i: usize| {
         let reversible = (0..n).map(|j| tensor[(i, j)].abs() * energy.df[j].abs()).sum::<f64>();
         (reversible + force[i]) / units[i]

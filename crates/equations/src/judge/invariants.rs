@@ -42,7 +42,7 @@ impl Invariance<'_, '_, '_> {
         let findings = &mut *self.findings;
         let here = self.place.differentials();
         let tensor = |part| at.tensor(part, here).map_err(|source| at.unusable(source));
-        let bracket = tensor(Part::Bracket)?;
+        let bracket = tensor(Part::Reversible)?;
         match kind {
             Kind::Casimir => {
                 let size = balance::product(&bracket, &dl, units);
@@ -55,15 +55,15 @@ impl Invariance<'_, '_, '_> {
                 findings.note("⟨dJ, Π dH⟩ = 0", size, error);
             }
         }
-        if !at.model.is_zero(Part::Force) {
-            let force = at.linearise(Part::Force, here, &energy.df);
+        if !at.model.is_zero(Part::Gyroscopic) {
+            let force = at.linearise(Part::Gyroscopic, here, &energy.df);
             let force = force.map_err(|source| at.unusable(source))?;
             let size = balance::pairing(&dl, &force.value, units);
             let error = |point, size| ModelError::ForceChangesInvariant { point, size };
             findings.note("⟨dL, force⟩ = 0", size, error);
         }
-        if !at.model.is_zero(Part::Dissipation) && !at.model.adapts() {
-            let size = dissipation::annihilated(self.place, &tensor(Part::Dissipation)?, &dl);
+        if !at.model.is_zero(Part::Irreversible) && !at.model.adapts() {
+            let size = dissipation::annihilated(self.place, &tensor(Part::Irreversible)?, &dl);
             let error = |point, size| ModelError::InvariantNotKept { point, size };
             findings.note("K dL = 0", size, error);
         }
@@ -96,11 +96,11 @@ impl Invariance<'_, '_, '_> {
         findings.note("H∘Φ = H", size, error);
 
         // T Π(x) Tᵀ = Π(Φ(x)) with the derivative T of the map.
-        let here = at.tensor(Part::Bracket, self.place.differentials());
+        let here = at.tensor(Part::Reversible, self.place.differentials());
         let here = here.map_err(|source| at.unusable(source))?;
         let (_, entropy) = moved.jet(ENTROPY);
         let w = Covectors { energy: &there.df, entropy: &entropy };
-        let there = moved.tensor(Part::Bracket, w).map_err(|source| moved.unusable(source))?;
+        let there = moved.tensor(Part::Reversible, w).map_err(|source| moved.unusable(source))?;
         let size = push_forward(&tangent, &here, &there, units);
         let error = |point, size| ModelError::ActionNotPoisson { point, size };
         findings.note("Φ is Poisson", size, error);

@@ -300,9 +300,9 @@ impl Reached<'_> {
         model.check_metric(x, false).map_err(metric)?;
         let w = Covectors { energy: &*room.energy[0], entropy: &*room.entropy[0] };
         let exact = model.second_law() == SecondLaw::Exact;
-        if !model.is_zero(Part::Bracket) {
+        if !model.is_zero(Part::Reversible) {
             let pi = &mut *room.bracket;
-            model.tensor(Part::Bracket, t, x, w, pi).map_err(metric)?;
+            model.tensor(Part::Reversible, t, x, w, pi).map_err(metric)?;
             self.finite("bracket", max_abs(pi))?;
             self.law(sums::asymmetry(pi, -1.0, units), |point, size| ModelError::BracketNotSkew {
                 point,
@@ -313,12 +313,12 @@ impl Reached<'_> {
                 self.law(size, |point, size| ModelError::EntropyNotCasimir { point, size })?;
             }
         }
-        if !model.is_zero(Part::Force) {
+        if !model.is_zero(Part::Gyroscopic) {
             // The room of a law is empty as yet.
             room.law[0].fill(0.0);
             let force = &mut *room.force;
             let there = (x, &*room.law[0]);
-            model.apply(Part::Force, t, there, w, w.energy, force).map_err(metric)?;
+            model.apply(Part::Gyroscopic, t, there, w, w.energy, force).map_err(metric)?;
             self.finite("force", max_abs(force))?;
             let size = sums::pairing(rounded(&room.energy), force, units).abs();
             self.law(size, |point, size| ModelError::ForceDoesWork { point, size })?;
@@ -327,10 +327,10 @@ impl Reached<'_> {
                 self.law(-rate, |point, size| ModelError::ForceDestroysEntropy { point, size })?;
             }
         }
-        let has_friction = !model.is_zero(Part::Dissipation);
+        let has_friction = !model.is_zero(Part::Irreversible);
         if has_friction {
             let k = &mut *room.friction;
-            model.tensor(Part::Dissipation, t, x, w, k).map_err(metric)?;
+            model.tensor(Part::Irreversible, t, x, w, k).map_err(metric)?;
             self.finite("dissipation", max_abs(k))?;
             self.law(sums::asymmetry(k, 1.0, units), |point, size| {
                 ModelError::DissipationNotSymmetric { point, size }

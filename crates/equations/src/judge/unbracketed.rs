@@ -8,14 +8,14 @@ use crate::{Covectors, ENERGY, ENTROPY, Part};
 /// With the canonical metric on its factor, a parameter is one of them: `K dS` moves it wherever `H` or `S` depends on it.
 pub(super) fn directions(at: At<'_>) -> Vec<usize> {
     let (model, n) = (at.model, at.n());
-    if model.is_zero(Part::Dissipation) || !model.adapts() || model.is_zero(Part::Bracket) {
+    if model.is_zero(Part::Irreversible) || !model.adapts() || model.is_zero(Part::Reversible) {
         return Vec::new();
     }
     let [(_, energy), (_, entropy)] = [ENERGY, ENTROPY].map(|law| at.jet(law));
     let w = Covectors { energy: &energy, entropy: &entropy };
     // What a metric cannot say is a law of its own.
     let (Ok(bracket), Ok(friction)) =
-        (at.tensor(Part::Bracket, w), at.tensor(Part::Dissipation, w))
+        (at.tensor(Part::Reversible, w), at.tensor(Part::Irreversible, w))
     else {
         return Vec::new();
     };

@@ -1,23 +1,29 @@
 //! Every system answers the questions of a verification, by the [judge](metriplectic_equations::judge) of models.
 
 use metriplectic_equations::judge::{Judge, RADIUS};
+use metriplectic_fields::stack::with_room;
 use metriplectic_manifolds::Manifold;
 
 use crate::in_numbers::{InNumbers, with_entries};
-use crate::metriplectic::{Metriplectic, Point};
+use crate::metriplectic::{Dim, Metriplectic, Point};
 use crate::verification::{Verified, Verify};
 use crate::{ModelError, Report};
 
 /// The time that the clock of a closed system shows.
 const NO_CLOCK: f64 = 0.0;
 
+/// Asks the judge of a system, with room for the matrices of all of its questions.
+fn judged<Y: Metriplectic + ?Sized, T>(system: &Y, ask: impl FnOnce(&Judge<'_>) -> T) -> T {
+    with_room::<Dim<Y>, T>(|| ask(&Judge::of(&InNumbers(system), NO_CLOCK)))
+}
+
 impl<Y: Metriplectic + ?Sized> Verify<Y::Manifold> for Y {
     fn verify(&self, x0: &Point<Y>, radius: f64) -> Result<(), ModelError> {
-        Judge::of(&InNumbers(self), NO_CLOCK).verify(&Y::Manifold::entries(x0), radius)
+        judged(self, |judge| judge.verify(&Y::Manifold::entries(x0), radius))
     }
 
     fn report(&self, x0: &Point<Y>) -> Report {
-        Judge::of(&InNumbers(self), NO_CLOCK).report(&Y::Manifold::entries(x0))
+        judged(self, |judge| judge.report(&Y::Manifold::entries(x0)))
     }
 
     fn verified(&self, x0: &Point<Y>) -> Result<Verified<'_, Y>, ModelError> {
@@ -26,34 +32,34 @@ impl<Y: Metriplectic + ?Sized> Verify<Y::Manifold> for Y {
     }
 
     fn verified_as_member(&self, x0: &Point<Y>) -> Result<Verified<'_, Y>, ModelError> {
-        Judge::of(&InNumbers(self), NO_CLOCK).check_start(&Y::Manifold::entries(x0))?;
+        judged(self, |judge| judge.check_start(&Y::Manifold::entries(x0)))?;
         Ok(Verified { system: self })
     }
 
     fn check_start(&self, x0: &Point<Y>) -> Result<(), ModelError> {
         if self.is_verified() {
-            Judge::of(&InNumbers(self), NO_CLOCK).check_start(&Y::Manifold::entries(x0))
+            judged(self, |judge| judge.check_start(&Y::Manifold::entries(x0)))
         } else {
             self.verify(x0, RADIUS)
         }
     }
 
     fn check_state(&self, x: &Point<Y>) -> Result<(), ModelError> {
-        with_entries::<Y::Manifold, _>(x, |x| Judge::of(&InNumbers(self), NO_CLOCK).check_state(x))
+        with_entries::<Y::Manifold, _>(x, |x| judged(self, |judge| judge.check_state(x)))
     }
 
     fn check_derivatives(&self, x: &Point<Y>) -> Result<(), ModelError> {
-        Judge::of(&InNumbers(self), NO_CLOCK).check_derivatives(&Y::Manifold::entries(x))
+        judged(self, |judge| judge.check_derivatives(&Y::Manifold::entries(x)))
     }
 
     fn look_at_derivatives(&self, x: &Point<Y>, turn: usize) -> Result<(), ModelError> {
-        let system = InNumbers(self);
-        let judge = Judge::of(&system, NO_CLOCK);
-        with_entries::<Y::Manifold, _>(x, |x| judge.look_at_derivatives(x, turn))
+        with_entries::<Y::Manifold, _>(x, |x| {
+            judged(self, |judge| judge.look_at_derivatives(x, turn))
+        })
     }
 
     fn check_around(&self, x: &Point<Y>, ahead: &[Point<Y>]) -> Result<(), ModelError> {
         let ahead: Vec<_> = ahead.iter().map(Y::Manifold::entries).collect();
-        Judge::of(&InNumbers(self), NO_CLOCK).check_around(&Y::Manifold::entries(x), &ahead)
+        judged(self, |judge| judge.check_around(&Y::Manifold::entries(x), &ahead))
     }
 }

@@ -22,7 +22,14 @@ pub fn with_room<N: Dimension, T>(f: impl FnOnce() -> T) -> T {
         return f();
     }
     let needed = BYTES_PER_ENTRY * N::LEN * N::LEN;
-    stacker::maybe_grow(needed / 2, needed, f)
+    stacker::maybe_grow(needed / 2, needed, || apart(f))
+}
+
+/// Calls `f` with a frame of its own: in place of the call, its matrices would stand in the frame of the caller, before there is
+/// room.
+#[inline(never)]
+fn apart<T>(f: impl FnOnce() -> T) -> T {
+    f()
 }
 
 #[cfg(test)]

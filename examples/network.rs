@@ -15,7 +15,7 @@
 use std::error::Error;
 
 use metriplectic::equations::{ENERGY, ENTROPY, Equations, Kind, Sizes};
-use metriplectic::integrators::{FromEquations, Numbers};
+use metriplectic::integrators::{FromEquations, PlainNumbers};
 use metriplectic::prelude::*;
 use metriplectic_studies::{Example, Panel, Panels};
 
@@ -168,9 +168,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     let (bodies, network) = (network.bodies(), FromEquations(network));
     let end = example.steps as f64 * example.step_size;
     let span = Span::until(end).tolerance(1e-8).output_every(example.step_size);
-    let run = DormandPrince8.run(&network, start, span)?;
+    let run = DormandPrince8.run(&network, start.into(), span)?;
 
-    let series = |value: &dyn Fn(&State<Numbers>) -> f64| -> Vec<(f64, f64)> {
+    let series = |value: &dyn Fn(&State<PlainNumbers>) -> f64| -> Vec<(f64, f64)> {
         run.iter().map(|state| (state.time, value(state))).collect()
     };
     let [mut positions, mut temperatures] =
@@ -189,7 +189,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let figure = panels.into_iter().fold(Panels::new(title), Panels::panel);
     let last = run.last();
     example
-        .report_of(run.certificate(), last.time, last.point.clone())
+        .report_of(run.certificate(), last.time, last.point.to_vec())
         .with("entropy_gained", last.entropy - first.entropy)
         .figure(figure)
         .print()

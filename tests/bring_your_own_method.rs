@@ -3,8 +3,8 @@
 use metriplectic::dynamics::SecondLaw;
 use metriplectic::equations::{ENERGY, ENTROPY, Equations, Sizes};
 use metriplectic::integrators::{
-    Effort, Element, Evidence, Flow, FromEquations, Laws, Promises, StateSpace, StepStart, Taken,
-    Vector, laws,
+    Effort, Element, Entries, Evidence, Flow, FromEquations, Laws, Promises, StateSpace, StepStart,
+    Taken, Vector, laws,
 };
 use metriplectic::manifolds::PointError;
 use metriplectic::prelude::*;
@@ -266,15 +266,15 @@ fn a_system_in_numbers_has_all_that_a_run_has() {
     // More variables than a typed system may have.
     const COUNT: usize = 150;
     let system = FromEquations(Unit(COUNT));
-    let start: Vec<f64> =
+    let start: Entries =
         (0..2 * COUNT).map(|i| if i < COUNT { (i + 1) as f64 } else { 0.0 }).collect();
     let turn = std::f64::consts::FRAC_PI_2;
     let span = || {
         Span::until(2.0)
             .tolerance(1e-9)
             .output_at([0.5, 1.75])
-            .event("wall", |x: &Vec<f64>| x[0])
-            .jump(|_, x: &Vec<f64>| {
+            .event("wall", |x: &Entries| x[0])
+            .jump(|_, x: &Entries| {
                 x.iter().enumerate().map(|(i, x)| if i < COUNT { *x } else { -x }).collect()
             })
     };
@@ -299,7 +299,7 @@ fn a_system_in_numbers_has_all_that_a_run_has() {
     let resumed = DormandPrince8.resume(&system, &steps.checkpoint()).unwrap().run().unwrap();
     assert!(resumed.last() == whole.last(), "a resumed run is the run");
 
-    let watch = Observables::on(&system).of("q5", |x: &Vec<f64>| x[4]);
+    let watch = Observables::on(&system).of("q5", |x: &Entries| x[4]);
     let mut table = watch.csv(Vec::new()).unwrap();
     whole.iter().for_each(|state| table.write(state).unwrap());
     let text = String::from_utf8(table.finish().unwrap()).unwrap();

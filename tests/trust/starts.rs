@@ -93,6 +93,33 @@ fn a_start_that_contradicts_is_a_typed_error_everywhere() {
     assert!(matches!(of_other, Error::Start(StartError::Ledger { found: 2, expected: 1 })));
 }
 
+/// What a jump makes of a state is its point: the clock and the ledger are those of the run, whatever the closure returns.
+#[test]
+fn a_jump_takes_the_point_of_a_state_with_another_ledger() {
+    macro_rules! oscillator {
+        () => {
+            System::on(Euclidean::<2>)
+                .bracket(Symplectic)
+                .energy(|x: &Vector2<Real>| x.norm_squared() * 0.5)
+        };
+    }
+    let push = |_: Real, _: &Vector2<Real>| vector![0.0.into(), 0.5.into()];
+    let one = oscillator!().work("one", push).build().unwrap();
+    let two = oscillator!().work("two", push).work("three", push).build().unwrap();
+    let run = |other: bool| {
+        let elsewhere = two.start(vector![0.0, 0.0]);
+        let kick = move |_: f64, x: &OpenState<Vector2<f64>>| {
+            let there = if other { &elsewhere } else { x };
+            there.at(vector![x.x.x, -x.x.y])
+        };
+        let span =
+            Span::steps(0.1, 40).event_in_time("kick", |t, _: &OpenState<Vector2<f64>>| t - 1.23);
+        DormandPrince8.run(&one, one.start(vector![1.0, 0.0]), span.jump(kick)).unwrap()
+    };
+    assert_eq!(run(true).last(), run(false).last());
+    assert!(run(true).last().point.ledger.work("one").is_some_and(|work| work != 0.0));
+}
+
 fn chirp(t: Real) -> Real {
     (t * 1.3).sin() * 0.4
 }

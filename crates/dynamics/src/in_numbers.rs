@@ -221,19 +221,60 @@ impl<M: Space> Visitor<M> for KindOf {
 /// The covectors of all laws of a system.
 type OfLaws<Y> = velocity::Covectors<CountOf<Y>, Vector<Of<Y>>>;
 
-/// The differentials at a point, in the chart there.
-struct AtPoint<'a, M: Space>(&'a M::Point<f64>);
+/// The covectors that another one computed, in the order of the laws.
+struct Given<F>(F);
+
+impl<M: Space, F: FnMut() -> Vector<M>> Gradient<M> for Given<F> {
+    type Covector = Vector<M>;
+
+    #[inline]
+    fn of(&mut self, _: &impl ScalarField<M>) -> Vector<M> {
+        (self.0)()
+    }
+}
+
+/// The differentials at a point, and zero, or NaN if a value or an entry is no number.
+struct AtPoint<'a, M: Space> {
+    x: &'a M::Point<f64>,
+    check: f64,
+}
 
 impl<M: Space> Gradient<M> for AtPoint<'_, M> {
     type Covector = Vector<M>;
 
     #[inline]
     fn of(&mut self, f: &impl ScalarField<M>) -> Vector<M> {
-        f.jet1(self.0).df
+        let jet = f.jet1(self.x);
+        self.check += 0.0 * jet.value;
+        for i in 0..Vector::<M>::LEN {
+            self.check += 0.0 * jet.df[i];
+        }
+        jet.df
     }
 }
 
 impl<Y: Metriplectic + ?Sized> InNumbers<'_, Y> {
+    /// The differentials of all laws at a point; `None` if one of them or a value is no number.
+    #[inline]
+    fn covectors(&self, x: &Point<Y>) -> Option<OfLaws<Y>> {
+        let mut at = AtPoint::<Of<Y>> { x, check: 0.0 };
+        let laws = [at.of(self.0.energy()), at.of(self.0.entropy())];
+        let w = OfLaws::<Y>::new(laws, self.0.invariants(), &mut at);
+        if at.check == 0.0 { Some(w) } else { None }
+    }
+
+    /// The velocity and the production at a point with these differentials; `None` where they have no value.
+    #[inline(always)]
+    fn motion(&self, x: &Point<Y>, w: &OfLaws<Y>) -> Option<(Vector<Of<Y>>, f64)> {
+        let centre = ChartPoint::<Of<Y>>::centre(x);
+        let g = self.0.metric_at(&centre);
+        let args = self.0.bracket_args(&g, &w.entropy);
+        let reversible = self.0.bracket().apply(&args, &w.energy).ok()?;
+        let friction = irreversible(self.0, &g, w).ok()?;
+        let velocity = reversible + friction;
+        velocity.is_finite().then(|| (velocity, w.entropy.dot(&friction)))
+    }
+
     /// Calls `with` for one law.
     fn law(&self, law: usize, with: &mut impl WithField<Of<Y>>) {
         match law {
@@ -296,17 +337,39 @@ impl<Y: Metriplectic + ?Sized> Equations for InNumbers<'_, Y> {
 
     fn velocity(&self, _: f64, x: &[f64], v: &mut [f64]) -> Option<f64> {
         with_room::<Dim<Y>, _>(|| {
-            let centre = ChartPoint::<Of<Y>>::centre(&point::<Of<Y>>(x));
-            let mut at = AtPoint::<Of<Y>>(&centre.base);
-            let laws = [at.of(self.0.energy()), at.of(self.0.entropy())];
-            let w = OfLaws::<Y>::new(laws, self.0.invariants(), &mut at);
-            let g = self.0.metric_at(&centre);
-            let args = self.0.bracket_args(&g, &w.entropy);
-            let reversible = self.0.bracket().apply(&args, &w.energy).ok()?;
-            let friction = irreversible(self.0, &g, &w).ok()?;
-            let velocity = reversible + friction;
+            let x = point::<Of<Y>>(x);
+            let (velocity, production) = self.motion(&x, &self.covectors(&x)?)?;
             put(&velocity, v);
-            velocity.is_finite().then(|| w.entropy.dot(&friction))
+            Some(production)
+        })
+    }
+
+    fn velocity_with(&self, _: f64, x: &[f64], w: &[f64], v: &mut [f64]) -> Option<f64> {
+        with_room::<Dim<Y>, _>(|| {
+            let mut rows = w.chunks_exact(Dim::<Y>::LEN).map(column);
+            let mut next = || rows.next().expect("a covector for each law");
+            let (laws, mut others) = ([next(), next()], Given(next));
+            let w = OfLaws::<Y>::new(laws, self.0.invariants(), &mut others);
+            let (velocity, production) = self.motion(&point::<Of<Y>>(x), &w)?;
+            put(&velocity, v);
+            Some(production)
+        })
+    }
+
+    fn stage(&self, _: f64, x: &[f64], q: &[f64], rates: &mut [f64]) -> Option<f64> {
+        with_room::<Dim<Y>, _>(|| {
+            let q = column(q);
+            if !Of::<Y>::is_stage(&q) {
+                return None;
+            }
+            let x = point::<Of<Y>>(x);
+            let y = Of::<Y>::stage(&x, &q);
+            if !self.0.manifold().is_inside(&y) {
+                return None;
+            }
+            let (velocity, production) = self.motion(&y, &self.covectors(&y)?)?;
+            put(&Of::<Y>::stage_rates(&x, (&q, &y), &velocity), rates);
+            Some(production)
         })
     }
 

@@ -1,5 +1,6 @@
 //! The questions that every system answers.
 
+use crate::room::with_numbers;
 use crate::{Kind, Model, PointError, SecondLaw};
 
 /// The number of the energy `H` among the laws.
@@ -109,6 +110,29 @@ pub trait Equations {
     fn stage_rates(&self, x: &[f64], q: &[f64], y: &[f64], v: &[f64], rates: &mut [f64]) {
         let _ = (x, q, y);
         rates.copy_from_slice(v);
+    }
+
+    /// Computes the velocity and the production at a state whose differentials `w` are known, of all laws: what a step asks for
+    /// at its ends. The default forms the differentials anew.
+    fn velocity_with(&self, t: f64, x: &[f64], w: &[f64], v: &mut [f64]) -> Option<f64> {
+        let _ = w;
+        self.velocity(t, x, v)
+    }
+
+    /// Takes a stage of an explicit method: computes the rates `q'` at `y = ψ_x(q)`, and returns the production there; `None`
+    /// beyond the edge of the chart or of the domain. The default asks for the state, its velocity and the rates one after
+    /// another.
+    fn stage(&self, t: f64, x: &[f64], q: &[f64], rates: &mut [f64]) -> Option<f64> {
+        with_numbers(x.len() + q.len(), |room| {
+            let (y, v) = room.split_at_mut(x.len());
+            if !self.stage_state(x, q, y) {
+                return None;
+            }
+            let production = self.velocity(t, y, v)?;
+            let is_finite = v.iter().all(|v| v.is_finite());
+            self.stage_rates(x, q, y, v, rates);
+            is_finite.then_some(production)
+        })
     }
 
     /// Returns whether the system was verified before, so that a run checks its laws at its start without samples around it.

@@ -95,6 +95,16 @@ macro_rules! answers {
                 $other.stage_rates(x, q, y, v, rates);
             }
 
+            fn velocity_with(&self, t: f64, x: &[f64], w: &[f64], v: &mut [f64]) -> Option<f64> {
+                let $this = self;
+                $other.velocity_with(t, x, w, v)
+            }
+
+            fn stage(&self, t: f64, x: &[f64], q: &[f64], rates: &mut [f64]) -> Option<f64> {
+                let $this = self;
+                $other.stage(t, x, q, rates)
+            }
+
             fn is_verified(&self) -> bool {
                 let $this = self;
                 $verified($other)

@@ -151,6 +151,7 @@ pub(crate) const SQUARES: RangeInclusive<f64> = 1e-280..=1e280;
 
 /// Computes the length of a list of numbers, also where their squares overflow or underflow.
 #[must_use]
+#[inline]
 pub fn length(numbers: &[f64]) -> f64 {
     let sum = numbers.iter().fold(0.0, |sum, number| sum + number * number);
     if SQUARES.contains(&sum) { sum.sqrt() } else { scaled_norm(numbers.iter().copied()) }

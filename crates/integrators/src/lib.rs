@@ -62,7 +62,7 @@ pub use newton::{Equation, Iterate, Linearised, Newton, Root, Rounding};
 pub use noise::{
     Counter, NinomiyaVictoir, NoiseBuilder, NoiseError, Noisy, RandomFlow, Sampler, Sampling,
 };
-pub use numbers::{FromEquations, Numbers};
+pub use numbers::FromEquations;
 pub use open::{NotDamped, OpenBuilder, OpenSpace, OpenState, OpenSystem};
 pub use round_off::stable_gradient::StableGradient;
 pub use run::certificate::{
@@ -81,10 +81,11 @@ pub use run::until::Until;
 pub use run::watch::{Jumping, Watch, Watched};
 pub use run::{Ending, Method, Method as Run, Schedule, SpanError, State};
 pub use step::{
-    Components, Control, Effort, Element, EntropyStep, EventExchange, Evidence, Flow, JumpError,
-    Laws, LedgerErrors, LedgerSummary, LimitingSites, Memory, MethodError, NoiseSummary, Promises,
-    Recheck, Refusal, RestoreError, Saved, Scales, StageLaws, StartError, StateSpace, StepEnds,
-    StepError, StepStart, Stepper, Taken, Vector,
+    Components, Control, Directions, Effort, Element, Entries, EntropyStep, EventExchange,
+    Evidence, Flow, JumpError, Laws, LedgerErrors, LedgerSummary, LimitingSites, Memory,
+    MethodError, NoiseSummary, Panicked, PlainNumbers, Promises, Recheck, Refusal, RestoreError,
+    Saved, Scales, StageLaws, StartError, StateSpace, StepEnds, StepError, StepStart, Stepper,
+    Taken, Values, Vector,
 };
 pub use tangent::{
     AdjointRun, Adjoints, Linearised as LinearisedStep, LinearisedAlong, LossGradient, SelfAdjoint,

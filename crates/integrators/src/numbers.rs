@@ -1,6 +1,7 @@
 //! A system in plain numbers is a flow, of a size that is known at run time.
 
 mod projection;
+mod referred_rise;
 mod rows;
 
 use std::fmt;
@@ -11,28 +12,21 @@ use metriplectic_equations::judge::{Judge, RADIUS};
 use metriplectic_equations::{ENERGY, ENTROPY, Equations, Report, VerifiedEquations};
 use metriplectic_manifolds::PointError;
 
-use self::projection::Projection;
+use self::projection::{Aim, Projection};
 use self::rows::NO_CLOCK;
 pub use self::rows::Rows;
 use crate::explicit::{Projected, ProjectionError, StageFlow, Target};
-use crate::step::{Element, Flow, Laws, Recheck, StateSpace};
-
-/// States that are lists of numbers.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Numbers;
-
-impl StateSpace for Numbers {
-    type Element = Vec<f64>;
-
-    fn numbers(x: &Vec<f64>) -> Vec<f64> {
-        x.clone()
-    }
-}
+use crate::round_off::bound::{NO_DIGITS, ROUNDED};
+use crate::step::{
+    Directions, Entries, Flow, FlowVisitor, Laws, PlainNumbers, Recheck, Values, Vector as _,
+    Written,
+};
 
 /// The flow of a system that answers [`Equations`]: one of your own, or one whose number of variables is read from a file.
 ///
 /// Explicit methods run it, with all that a run does: tolerances, outputs, events and their jumps, certificates, checkpoints,
-/// observables and sweeps. `H` and the further invariants are kept to round-off, and `S` never falls. `S` may be behind a
+/// observables and sweeps. `H` and the further invariants are kept to round-off, and `S` never falls. A panic in the system is an
+/// error of its run ([`Panicked`](crate::Panicked)), which keeps the states before a step in which it happens. `S` may be behind a
 /// pointer: `FromEquations<Box<dyn Equations>>` is a type that a struct can name, for every system.
 ///
 /// A hundred oscillators with springs to their neighbours:
@@ -123,79 +117,118 @@ impl<S: Equations> FromEquations<S> {
     pub fn verified(self, x0: &[f64]) -> Result<FromEquations<VerifiedEquations<S>>, ModelError> {
         VerifiedEquations::around(self.0, x0).map(FromEquations)
     }
+}
 
-    /// The size of a direction, entry by entry.
-    fn scales(&self, x: &[f64]) -> Vec<f64> {
-        let mut sizes = vec![0.0; self.0.sizes().directions];
-        self.0.scales(x, &mut sizes);
-        sizes
+/// The laws of these values.
+fn laws_of(values: &[f64]) -> Laws<Values> {
+    let invariants = Values::of(&values[ENTROPY + 1..]);
+    Laws { energy: values[ENERGY], entropy: values[ENTROPY], invariants }
+}
+
+/// The sizes of the entries of a state.
+fn scales(system: &dyn Equations, x: &[f64]) -> Directions {
+    let mut sizes = Directions::zeros(system.sizes().directions);
+    system.scales(x, sizes.numbers_mut());
+    sizes
+}
+
+/// The displacement from a state to another one; `None` beyond the edge of the chart.
+fn displacement(system: &dyn Equations, x: &[f64], y: &[f64]) -> Option<Directions> {
+    let mut q = Directions::zeros(system.sizes().directions);
+    system.coordinates(x, y, q.numbers_mut()).then_some(q)
+}
+
+impl<S: Equations> FromEquations<S> {
+    /// The round-off `4ε (|S| + Σ_i |∂_iS x_i|)` of an entropy increment, the larger one of the two ends, with the value and the
+    /// differential at the second one. The entries of `x' = x + u` are rounded in units of the larger end, so `x_i` is that of
+    /// both.
+    fn entropy_round_off_at(&self, [x, y]: [&[f64]; 2], end: (f64, &Directions)) -> f64 {
+        let [at_x, at_y] = [x, y].map(|x| scales(&self.0, x));
+        let sizes = Directions::zip([&at_x, &at_y], |[at_x, at_y]| at_x.max(at_y));
+        let size = |value: f64, w: &Directions| {
+            value.abs() + projection::sum(w, &sizes, |w, size| w.abs() * size)
+        };
+        let start = if let Some(model) = self.0.model() {
+            let mut w = sizes.zero();
+            let value = model.jet(ENTROPY, NO_CLOCK, x, w.numbers_mut());
+            size(value, &w)
+        } else {
+            let rows = Rows::of(&self.0, x);
+            size(rows.values[ENTROPY], rows.row(ENTROPY))
+        };
+        ROUNDED * start.max(size(end.0, end.1)) + NO_DIGITS
     }
 
-    fn laws_of(values: &[f64]) -> Laws<Vec<f64>> {
-        let invariants = values[ENTROPY + 1..].to_vec();
-        Laws { energy: values[ENERGY], entropy: values[ENTROPY], invariants }
+    /// The velocity and the production at a state, with its differentials if they are known.
+    fn motion_with(&self, x: &[f64], rows: Option<&Rows>) -> Option<(Directions, f64)> {
+        let mut v = Directions::zeros(self.0.sizes().directions);
+        let production = match rows {
+            Some(rows) => {
+                rows.with_all(|w| self.0.velocity_with(NO_CLOCK, x, w, v.numbers_mut()))?
+            }
+            None => self.0.velocity(NO_CLOCK, x, v.numbers_mut())?,
+        };
+        v.numbers().iter().all(|v| v.is_finite()).then_some((v, production))
     }
 }
 
 impl<S: Equations> Flow for FromEquations<S> {
-    type Space = Numbers;
-    type Numbers = Vec<f64>;
-    type Vector = Vec<f64>;
+    type Space = PlainNumbers;
+    type Numbers = Values;
+    type Vector = Directions;
 
-    fn laws(&self, x: &Vec<f64>) -> Laws<Vec<f64>> {
-        let mut values = vec![0.0; self.0.sizes().laws];
+    fn laws(&self, x: &Entries) -> Laws<Values> {
+        let mut values = Entries::zeros(self.0.sizes().laws);
         self.0.values(NO_CLOCK, x, &mut values);
-        Self::laws_of(&values)
+        laws_of(&values)
     }
 
-    fn term_sizes(&self, x: &Vec<f64>) -> Laws<Vec<f64>> {
-        let (rows, scales) = (Rows::of(&self.0, x), self.scales(x));
+    fn term_sizes(&self, x: &Entries) -> Laws<Values> {
+        let (rows, scales) = (Rows::of(&self.0, x), scales(&self.0, x));
         let size = |(law, value): (usize, &f64)| {
-            let terms = rows.row(law).iter().zip(&scales).map(|(w, scale)| w.abs() * scale);
-            value.abs() + terms.sum::<f64>()
+            value.abs() + projection::sum(rows.row(law), &scales, |w, scale| w.abs() * scale)
         };
-        Self::laws_of(&rows.values.iter().enumerate().map(size).collect::<Vec<_>>())
+        laws_of(&rows.values.iter().enumerate().map(size).collect::<Entries>())
     }
 
-    fn rates(&self, x: &Vec<f64>, d: &Vec<f64>) -> Option<Vec<f64>> {
+    fn rates(&self, x: &Entries, d: &Directions) -> Option<Directions> {
         let y = self.stage(x, d)?;
         let (v, _) = self.motion(&y)?;
         Some(self.stage_rates(x, (d, &y), &v))
     }
 
-    fn sizes(&self, x: &Vec<f64>) -> Vec<f64> {
-        self.scales(x)
+    fn sizes(&self, x: &Entries) -> Directions {
+        scales(&self.0, x)
     }
 
-    fn moved(&self, x: &Vec<f64>, d: &Vec<f64>) -> Vec<f64> {
-        let mut y = vec![0.0; x.len()];
-        self.0.chart(x, d, &mut y);
+    fn moved(&self, x: &Entries, d: &Directions) -> Entries {
+        let mut y = Entries::zeros(x.len());
+        self.0.chart(x, d.numbers(), &mut y);
         y
     }
 
-    fn displacement(&self, x: &Vec<f64>, y: &Vec<f64>) -> Option<Vec<f64>> {
-        let mut q = vec![0.0; self.0.sizes().directions];
-        self.0.coordinates(x, y, &mut q).then_some(q)
+    fn displacement(&self, x: &Entries, y: &Entries) -> Option<Directions> {
+        displacement(&self.0, x, y)
     }
 
-    fn production(&self, x: &Vec<f64>) -> Option<f64> {
+    fn production(&self, x: &Entries) -> Option<f64> {
         self.motion(x).map(|(_, production)| production)
     }
 
-    fn onto(&self, y: &Vec<f64>, laws: &Laws<Vec<f64>>, entropy: Option<f64>) -> Option<Vec<f64>> {
+    fn onto(&self, y: &Entries, laws: &Laws<Values>, entropy: Option<f64>) -> Option<Entries> {
         let laws = Laws { entropy: entropy.unwrap_or(laws.entropy), ..laws.clone() };
         let with_entropy = entropy.is_some();
         let target = Target { laws: &laws, with_entropy, limit: None, units: None, error: None };
         self.project(y.clone(), &target).ok().map(|end| end.x)
     }
 
-    fn element(&self, entries: &[f64]) -> Result<Vec<f64>, PointError> {
+    fn element(&self, entries: &[f64]) -> Result<Entries, PointError> {
         let (found, expected) = (entries.len(), self.0.sizes().entries);
         if found != expected {
             return Err(PointError::Length { found, expected });
         }
         self.0.check(entries)?;
-        Ok(entries.to_vec())
+        Ok(entries.into())
     }
 
     fn entropy_law(&self) -> SecondLaw {
@@ -208,7 +241,7 @@ impl<S: Equations> Flow for FromEquations<S> {
             .collect()
     }
 
-    fn check(&self, x0: &Vec<f64>) -> Result<(), ModelError> {
+    fn check(&self, x0: &Entries) -> Result<(), ModelError> {
         if self.0.is_verified() {
             Judge::of(&self.0, NO_CLOCK).check_start(x0)
         } else {
@@ -224,7 +257,7 @@ impl<S: Equations> Flow for FromEquations<S> {
         true
     }
 
-    fn recheck(&self, x: &Vec<f64>, occasion: Recheck) -> Result<(), ModelError> {
+    fn recheck(&self, x: &Entries, occasion: Recheck) -> Result<(), ModelError> {
         let judge = Judge::of(&self.0, NO_CLOCK);
         match occasion {
             Recheck::OnTheWay { step } => {
@@ -235,62 +268,124 @@ impl<S: Equations> Flow for FromEquations<S> {
         }
     }
 
-    fn defect(&self, x: &Vec<f64>) -> f64 {
+    fn defect(&self, x: &Entries) -> f64 {
         self.0.defect(x)
+    }
+
+    fn visit<V: FlowVisitor<Self>>(&self, visitor: V) -> V::Output {
+        visitor.written(self)
+    }
+
+    fn entropy_round_off(&self, [x, y]: [&Entries; 2]) -> f64 {
+        let rows = Rows::of(&self.0, y);
+        self.entropy_round_off_at([x, y], (rows.values[ENTROPY], rows.row(ENTROPY)))
+    }
+}
+
+impl<S: Equations> Written for FromEquations<S> {
+    const CATCHES_PANICS: bool = true;
+
+    type Layout = ();
+
+    fn layout(&self) -> &() {
+        &()
+    }
+
+    fn read((): &(), entries: &[f64]) -> Entries {
+        entries.into()
+    }
+
+    fn write(x: &Entries) -> Entries {
+        x.clone()
+    }
+
+    fn vector(directions: &Directions) -> Directions {
+        directions.clone()
+    }
+
+    fn directions(v: &Directions) -> Directions {
+        v.clone()
+    }
+
+    fn numbers(values: &Values) -> Values {
+        values.clone()
     }
 }
 
 impl<S: Equations> StageFlow for FromEquations<S> {
     type Gradients = Rows;
 
-    fn gradients(&self, x: &Vec<f64>) -> Option<Rows> {
+    fn gradients(&self, x: &Entries) -> Option<Rows> {
         let rows = Rows::of(&self.0, x);
         rows.is_finite().then_some(rows)
     }
 
-    fn values(&self, rows: &Rows) -> Laws<Vec<f64>> {
-        Self::laws_of(&rows.values)
+    fn values(&self, rows: &Rows) -> Laws<Values> {
+        laws_of(&rows.values)
     }
 
-    fn velocity(&self, x: &Vec<f64>, _: &Rows) -> Option<(Vec<f64>, f64)> {
-        self.motion(x)
+    fn entropy_round_off_to(&self, [x, y]: [&Entries; 2], end: &Rows) -> f64 {
+        self.entropy_round_off_at([x, y], (end.values[ENTROPY], end.row(ENTROPY)))
     }
 
-    fn motion(&self, x: &Vec<f64>) -> Option<(Vec<f64>, f64)> {
-        let mut v = vec![0.0; self.0.sizes().directions];
-        let production = self.0.velocity(NO_CLOCK, x, &mut v)?;
-        v.iter().all(|v| v.is_finite()).then_some((v, production))
+    fn velocity(&self, x: &Entries, rows: &Rows) -> Option<(Directions, f64)> {
+        self.motion_with(x, Some(rows))
     }
 
-    fn stage(&self, x: &Vec<f64>, q: &Vec<f64>) -> Option<Vec<f64>> {
-        let mut y = vec![0.0; x.len()];
-        self.0.stage_state(x, q, &mut y).then_some(y)
+    fn motion(&self, x: &Entries) -> Option<(Directions, f64)> {
+        self.motion_with(x, None)
     }
 
-    fn stage_rates(&self, x: &Vec<f64>, (q, y): (&Vec<f64>, &Vec<f64>), v: &Vec<f64>) -> Vec<f64> {
-        let mut rates = vec![0.0; v.len()];
-        self.0.stage_rates(x, q, y, v, &mut rates);
+    fn stage(&self, x: &Entries, q: &Directions) -> Option<Entries> {
+        let mut y = Entries::zeros(x.len());
+        self.0.stage_state(x, q.numbers(), &mut y).then_some(y)
+    }
+
+    fn stage_rates(
+        &self,
+        x: &Entries,
+        (q, y): (&Directions, &Entries),
+        v: &Directions,
+    ) -> Directions {
+        let mut rates = v.zero();
+        self.0.stage_rates(x, q.numbers(), y, v.numbers(), rates.numbers_mut());
         rates
     }
 
-    fn stage_coordinates(&self, x: &Vec<f64>, y: &Vec<f64>) -> Vec<f64> {
-        let mut q = vec![0.0; self.0.sizes().directions];
-        self.0.stage_coordinates(x, y, &mut q);
+    fn stage_along<'a>(
+        &self,
+        x: &Entries,
+        (h, count): (f64, usize),
+        term: impl Fn(usize) -> (f64, &'a Directions),
+        coordinates: Option<&mut Directions>,
+    ) -> Option<(Directions, f64)> {
+        let q = Directions::combination(h, count, term);
+        let mut rates = q.zero();
+        let production = self.0.stage(NO_CLOCK, x, q.numbers(), rates.numbers_mut())?;
+        if let Some(coordinates) = coordinates {
+            *coordinates = q;
+        }
+        Some((rates, production))
+    }
+
+    fn stage_coordinates(&self, x: &Entries, y: &Entries) -> Directions {
+        let mut q = Directions::zeros(self.0.sizes().directions);
+        self.0.stage_coordinates(x, y, q.numbers_mut());
         q
+    }
+
+    fn falls_below_round_off(&self, x: &Entries, y: &Entries) -> bool {
+        referred_rise::falls(&self.0, x, y)
     }
 
     fn project(
         &self,
-        y: Element<Self>,
+        y: Entries,
         target: &Target<'_, Self>,
     ) -> Result<Projected<Self>, ProjectionError> {
-        let target_of = projection::Aim {
-            laws: target.laws,
-            with_entropy: target.with_entropy,
-            limit: target.limit,
-            units: target.units,
-        };
-        let landed = Projection { system: &self.0, target: target_of }.from(y)?;
+        let Target { laws, with_entropy, limit, units, .. } = *target;
+        let target = Aim { laws, with_entropy, limit, units };
+        let landed = Projection { system: &self.0, target }.from(y)?;
         Ok(Projected {
             x: landed.x,
             gradients: landed.rows,
@@ -303,7 +398,10 @@ impl<S: Equations> StageFlow for FromEquations<S> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{DormandPrince5, DormandPrince8, Method, RunError, RungeKuttaChebyshev, Span};
+    use crate::{
+        DormandPrince5, DormandPrince8, Method, Panicked, RunError, RungeKuttaChebyshev, Schedule,
+        Span, StepError,
+    };
     use metriplectic_dynamics::bracket::{AreaForm, Zero};
     use metriplectic_dynamics::{InNumbers, Metriplectic, System, Verify as _, system::Point};
     use metriplectic_equations::Sizes;
@@ -341,7 +439,7 @@ mod tests {
         let span = || Span::steps(0.1, 25);
         let typed = method.run(system, x.clone(), span()).unwrap();
         let numbers = FromEquations(InNumbers(system));
-        let run = method.run(&numbers, Y::Manifold::entries(x), span()).unwrap();
+        let run = method.run(&numbers, Y::Manifold::entries(x).into(), span()).unwrap();
         assert!(run.certificate().max_relative_energy_error() < 1e-15);
         let bits = |x: &[f64]| x.iter().map(|x| x.to_bits()).collect();
         [bits(&Y::Manifold::entries(&typed.last().point)), bits(&run.last().point)]
@@ -374,7 +472,7 @@ mod tests {
         let holder = Holder { system: FromEquations(Box::new(InNumbers(&body))) };
         let span = || Span::until(5.0).tolerance(1e-9);
         let typed = DormandPrince8.run(&body, start, span()).unwrap();
-        let run = DormandPrince8.run(&holder.system, vec![0.4, -1.0, 0.3], span()).unwrap();
+        let run = DormandPrince8.run(&holder.system, [0.4, -1.0, 0.3].into(), span()).unwrap();
         let (a, b) = (typed.last(), run.last());
         let off = a.point.iter().zip(&b.point).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
         assert!(off < 1e-7 && b.entropy > run.states()[0].entropy, "{off}");
@@ -413,16 +511,39 @@ mod tests {
     }
 
     #[test]
+    fn a_panic_in_a_system_is_an_error_that_keeps_the_states_so_far() {
+        // The force is about −q: it rises through 1/2 soon after t = 2.
+        let weak = |v: &mut [f64], _: &mut f64| assert!(v[1] < 0.5, "it is drawn by {}", v[1]);
+        let run = |fault, schedule: Schedule| {
+            DormandPrince8.run(&FromEquations(Damped(fault)), [1.0, 0.0, 0.0].into(), schedule)
+        };
+        for schedule in [Span::until(5.0).tolerance(1e-8).into(), Span::steps(0.1, 50).into()] {
+            let Err(RunError::Step { cause: StepError::Flow { time, law }, trajectory }) =
+                run(weak, schedule)
+            else {
+                panic!("it has no error of its own")
+            };
+            let Panicked { message, .. } = law.downcast_ref().unwrap();
+            assert!(message.starts_with("it is drawn by 0."), "{message}");
+            assert_eq!(trajectory.last().time.to_bits(), time.to_bits());
+            assert!((1.0..2.5).contains(&time), "{time}");
+        }
+        let error = run(|_, _| panic!("at once"), Span::steps(0.1, 50).into()).unwrap_err();
+        let RunError::Flow(error) = error else { panic!("{error}") };
+        assert_eq!(error.to_string(), "it has panicked: at once");
+    }
+
+    #[test]
     fn a_system_of_ones_own_is_judged_by_its_motion() {
         let run = |fault| {
             let system = FromEquations(Damped(fault));
-            DormandPrince8.run(&system, vec![1.0, 0.0, 0.0], Span::until(5.0).tolerance(1e-8))
+            DormandPrince8.run(&system, [1.0, 0.0, 0.0].into(), Span::until(5.0).tolerance(1e-8))
         };
         let sound = run(|_, _| {}).unwrap();
         assert!(sound.certificate().keeps_entropy() && !sound.certificate().verified_before);
         let x0 = vec![1.0, 0.0, 0.0];
         let kept = FromEquations(Damped(|_, _| {})).verified(&x0).unwrap();
-        let again = DormandPrince8.run(&kept, x0, Span::until(5.0).tolerance(1e-8)).unwrap();
+        let again = DormandPrince8.run(&kept, x0.into(), Span::until(5.0).tolerance(1e-8)).unwrap();
         assert!(again.certificate().verified_before && again.last() == sound.last());
         let refusal = |fault| match run(fault) {
             Err(RunError::Model(error)) => error,
@@ -439,7 +560,7 @@ mod tests {
         assert!(matches!(falls, ModelError::ProductionNegative { .. }), "{falls}");
         let short = DormandPrince8.run(
             &FromEquations(Damped(|_, _| {})),
-            vec![1.0, 0.0],
+            [1.0, 0.0].into(),
             Span::steps(0.1, 1),
         );
         let length = PointError::Length { found: 2, expected: 3 };

@@ -14,13 +14,17 @@ use metriplectic_dynamics::{
 use metriplectic_fields::{ChartPoint, Column, Dimension, ScalarField, Space, stack};
 use metriplectic_manifolds::{Manifold, PointError};
 
+pub(crate) use referred_rise::ROUNDING;
 pub(crate) use stages::JetsOf;
 pub use stages::LawJets;
 pub(crate) use stages::{CONSERVED, CORRECTIONS, OFF, STAGNATED};
 
 use crate::explicit::{StageFlow as _, Target};
 use crate::round_off::bound::{SizesAt, of_an_increment, size_of_terms, sizes_on_a_step};
-use crate::step::{Components, CountOf, Dim, Flow, Laws, Numbers, Recheck, Scales, initial_scales};
+use crate::step::{
+    Components, CountOf, Dim, Directions, Entries, Flow, FlowVisitor, Laws, Numbers, Recheck,
+    Scales, Values, Written, initial_scales,
+};
 
 type Tangent<Y> = Components<metriplectic_fields::Vector<<Y as Metriplectic>::Manifold>>;
 
@@ -30,8 +34,8 @@ impl<Y: Metriplectic> Flow for Y {
     type Vector = Tangent<Y>;
 
     #[inline]
-    fn with_room<T>(&self, f: impl FnOnce() -> T) -> T {
-        stack::with_room::<Dim<Y>, T>(f)
+    fn room(&self, work: &mut dyn FnMut()) {
+        stack::with_room::<Dim<Y>, ()>(work);
     }
 
     #[inline]
@@ -152,7 +156,8 @@ impl<Y: Metriplectic> Flow for Y {
     }
 
     fn reach(&self, x: &Point<Y>, span: f64) -> Option<Scales<Tangent<Y>>> {
-        if reach::is_small::<Y>() {
+        // A constant, so that only one of the two is compiled.
+        if const { reach::is_small::<Y>() } {
             reach::reach(self, x, span)
         } else {
             initial_scales(self, x, span)
@@ -172,6 +177,11 @@ impl<Y: Metriplectic> Flow for Y {
         reach::velocity_and_terms(self, x).map(|both| both.map(Components))
     }
 
+    /// In plain numbers, so that a run is compiled with this library.
+    fn visit<V: FlowVisitor<Y>>(&self, visitor: V) -> V::Output {
+        visitor.written(self)
+    }
+
     /// The estimate `e` of the local error, in the chart at `x`; see the [controller](crate::run::controller).
     #[inline(never)]
     fn local_error(&self, x: &Point<Y>, end: &Point<Y>, h: f64) -> Option<Tangent<Y>> {
@@ -186,11 +196,57 @@ impl<Y: Metriplectic> Flow for Y {
     }
 }
 
+impl<Y: Metriplectic> Written for Y {
+    type Layout = ();
+
+    fn layout(&self) -> &() {
+        &()
+    }
+
+    #[inline]
+    fn read((): &(), entries: &[f64]) -> Point<Y> {
+        let mut entries = entries.iter();
+        Y::Manifold::assemble(&mut || *entries.next().expect("a state has all of its entries"))
+    }
+
+    #[inline]
+    fn write(x: &Point<Y>) -> Entries {
+        let mut count = 0;
+        Y::Manifold::write(x, &mut |_| count += 1);
+        let mut entries = Entries::zeros(count);
+        let mut to = entries.iter_mut();
+        let mut put = |entry| *to.next().expect("there is room for all entries") = entry;
+        Y::Manifold::write(x, &mut put);
+        entries
+    }
+
+    #[inline]
+    fn vector(directions: &Directions) -> Tangent<Y> {
+        let numbers = &directions.numbers()[..Dim::<Y>::LEN];
+        Components(Column::from_index(|i| numbers[i]))
+    }
+
+    #[inline]
+    fn directions(v: &Tangent<Y>) -> Directions {
+        let mut directions = Directions::zeros(Dim::<Y>::LEN);
+        let to = directions.numbers_mut().iter_mut().enumerate();
+        to.for_each(|(i, to)| *to = v.0[i]);
+        directions
+    }
+
+    #[inline]
+    fn numbers(values: &Values) -> Numbers<Y> {
+        let values = values.as_ref();
+        CountOf::<Y>::array(|k| values[k])
+    }
+}
+
 /// States along the velocity at `x`, on the way of a step of size `h`.
 #[cold]
 fn ahead<Y: Metriplectic>(system: &Y, x: &Point<Y>, h: f64) -> Vec<Point<Y>> {
     let velocity = reach::velocity(system, x, Column::zero()).filter(Column::is_finite);
-    let steps = velocity.into_iter().flat_map(|v| AHEAD.map(|theta| v * (theta * h)));
+    let Some(v) = velocity else { return Vec::new() };
+    let steps = AHEAD.iter().map(|theta| v * (theta * h));
     steps.filter(Y::Manifold::is_near).map(|q| Y::Manifold::chart(x, &q)).collect()
 }
 

@@ -74,7 +74,7 @@ impl Kind {
             Lattice => "Points<LieDual<3>>",
             OpenLattice => "OpenState<Points<LieDual<3>>>",
             NoisyLattice => "Points<Euclidean<1>>",
-            Own | Sizes => "Vec<f64>",
+            Own | Sizes => "Entries",
         }
     }
 
@@ -232,7 +232,7 @@ fn verb(kind: Kind, name: &str) -> String {
 /// The lines in front of each program.
 const HEAD: &str = "#![allow(unused)]
 use metriplectic::equations::{ENERGY, ENTROPY, Equations, Sizes};
-use metriplectic::integrators::FromEquations;
+use metriplectic::integrators::{Entries, FromEquations};
 use metriplectic::prelude::*;
 ";
 

@@ -8,8 +8,8 @@ use super::error::NoiseError;
 use super::fluctuating::Fluctuating;
 use super::system::Noisy;
 use crate::step::{
-    Element, EventExchange, Flow, FlowError, Laws, LedgerErrors, LedgerSummary, Recheck, Scales,
-    StartError, StepError,
+    Directions, Element, Entries, EventExchange, Flow, FlowError, FlowVisitor, Laws, LedgerErrors,
+    LedgerSummary, Recheck, Scales, StartError, StepError, Values, Written,
 };
 
 impl<F: Fluctuating<U>, U> Flow for Noisy<F, U> {
@@ -17,8 +17,8 @@ impl<F: Fluctuating<U>, U> Flow for Noisy<F, U> {
     type Numbers = F::Numbers;
     type Vector = F::Vector;
 
-    fn with_room<T>(&self, f: impl FnOnce() -> T) -> T {
-        self.flow().with_room(f)
+    fn room(&self, work: &mut dyn FnMut()) {
+        self.flow().room(work);
     }
 
     fn laws(&self, x: &Element<F>) -> Laws<F::Numbers> {
@@ -180,5 +180,65 @@ impl<F: Fluctuating<U>, U> Flow for Noisy<F, U> {
 
     fn rates_and_terms(&self, x: &Element<F>) -> Option<[F::Vector; 2]> {
         self.flow().rates_and_terms(x)
+    }
+
+    /// As the flow without noise receives it.
+    fn visit<V: FlowVisitor<Self>>(&self, visitor: V) -> V::Output {
+        self.flow().visit(WithNoise { noisy: self, visitor })
+    }
+}
+
+/// A visitor of a flow with noise, where the flow without it says in which way.
+struct WithNoise<'a, F, U, V> {
+    noisy: &'a Noisy<F, U>,
+    visitor: V,
+}
+
+impl<F: Fluctuating<U>, U, V: FlowVisitor<Noisy<F, U>>> FlowVisitor<F> for WithNoise<'_, F, U, V> {
+    type Output = V::Output;
+
+    fn typed(self, _: &F) -> V::Output {
+        self.visitor.typed(self.noisy)
+    }
+
+    fn written(self, _: &F) -> V::Output
+    where
+        F: Written,
+    {
+        self.visitor.written(self.noisy)
+    }
+}
+
+impl<F: Fluctuating<U> + Written, U> Written for Noisy<F, U> {
+    const CATCHES_PANICS: bool = F::CATCHES_PANICS;
+
+    type Layout = F::Layout;
+
+    fn layout(&self) -> &F::Layout {
+        self.flow().layout()
+    }
+
+    fn read(layout: &F::Layout, entries: &[f64]) -> Element<F> {
+        F::read(layout, entries)
+    }
+
+    fn led(x: &Element<F>, y: Element<F>) -> Element<F> {
+        F::led(x, y)
+    }
+
+    fn write(x: &Element<F>) -> Entries {
+        F::write(x)
+    }
+
+    fn vector(directions: &Directions) -> F::Vector {
+        F::vector(directions)
+    }
+
+    fn directions(v: &F::Vector) -> Directions {
+        F::directions(v)
+    }
+
+    fn numbers(values: &Values) -> F::Numbers {
+        F::numbers(values)
     }
 }

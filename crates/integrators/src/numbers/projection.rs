@@ -5,19 +5,21 @@
 use metriplectic_equations::{ENERGY, ENTROPY, Equations, SecondLaw};
 use metriplectic_fields::{length, power_of_two};
 
+use smallvec::SmallVec;
+
 use super::rows::Rows;
 use crate::explicit::{Limit, ProjectionError};
 use crate::round_off::bound::{INDEPENDENT, NO_DIGITS};
-use crate::step::Laws;
+use crate::step::{Directions, Entries, Laws, Values, Vector as _};
 use crate::system::{CONSERVED, CORRECTIONS, OFF, STAGNATED};
 
 /// Where a state is to go, as [`Target`](crate::explicit::Target) says.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Aim<'a> {
-    pub(super) laws: &'a Laws<Vec<f64>>,
+    pub(super) laws: &'a Laws<Values>,
     pub(super) with_entropy: bool,
-    pub(super) limit: Option<Limit<'a, Vec<f64>>>,
-    pub(super) units: Option<&'a Vec<f64>>,
+    pub(super) limit: Option<Limit<'a, Directions>>,
+    pub(super) units: Option<&'a Directions>,
 }
 
 impl Aim<'_> {
@@ -34,7 +36,7 @@ impl Aim<'_> {
 /// A state on its laws.
 #[derive(Clone, Debug)]
 pub(super) struct Landed {
-    pub(super) x: Vec<f64>,
+    pub(super) x: Entries,
     pub(super) rows: Rows,
     pub(super) entropy: f64,
     pub(super) entropy_round_off: f64,
@@ -46,7 +48,7 @@ pub(super) struct Landed {
 struct Normal {
     /// The components `s_i ∂_iF/f` of its differential, with the units `s` of the entries. The factor `f` is a power of
     /// two near their length, so that no square underflows.
-    hat: Vec<f64>,
+    hat: Directions,
     square: f64,
     /// The target less the value, over `f`.
     residual: f64,
@@ -70,22 +72,23 @@ impl Normal {
 
 /// The laws at a state, made independent of each other: energy, further invariants, entropy.
 struct Normals {
-    conserved: Vec<Normal>,
+    energy: Normal,
+    invariants: SmallVec<[Normal; 1]>,
     entropy: Option<Normal>,
     /// The residual of the entropy in units of its round-off, whatever it depends on.
     off: f64,
 }
 
 /// A projection along the differentials `s² dF`, where `s_i` is the unit of entry `i`.
-pub(super) struct Projection<'a, S: ?Sized> {
-    pub(super) system: &'a S,
+pub(super) struct Projection<'a> {
+    pub(super) system: &'a dyn Equations,
     pub(super) target: Aim<'a>,
 }
 
-impl<S: Equations + ?Sized> Projection<'_, S> {
-    pub(super) fn from(&self, mut y: Vec<f64>) -> Result<Landed, ProjectionError> {
+impl Projection<'_> {
+    pub(super) fn from(&self, mut y: Entries) -> Result<Landed, ProjectionError> {
         let Self { system, target } = self;
-        let mut scales = vec![0.0; system.sizes().directions];
+        let mut scales = Directions::zeros(system.sizes().directions);
         let mut moved = 0.0;
         let mut best: Option<(f64, Landed)> = None;
         for _ in 0..=CORRECTIONS {
@@ -93,7 +96,7 @@ impl<S: Equations + ?Sized> Projection<'_, S> {
             if !rows.is_finite() || !system.defect(&y).is_finite() {
                 return Err(ProjectionError::Outside);
             }
-            system.scales(&y, &mut scales);
+            system.scales(&y, scales.numbers_mut());
             let units = target.units.unwrap_or(&scales);
             let normals = self.normals(&rows, &scales, units);
             let excess = normals.excess(target.with_entropy)?;
@@ -113,15 +116,17 @@ impl<S: Equations + ?Sized> Projection<'_, S> {
                 return Err(ProjectionError::NoEntropy);
             }
             let correction = normals.correction(target.with_entropy, is_off);
-            moved += length(&correction);
-            let limit = target.limit.map(|limit| length(&in_units(&limit.entries(), units)));
+            moved += length(correction.numbers());
+            let limit =
+                target.limit.map(|limit| length(in_units(&limit.entries(), units).numbers()));
             if !moved.is_finite() || limit.is_some_and(|limit| moved > limit) {
                 return Err(ProjectionError::Far);
             }
-            let u: Vec<f64> = units.iter().zip(&correction).map(|(unit, c)| unit * c).collect();
-            let unseen = u.iter().zip(&scales).all(|(u, s)| u.abs() <= f64::EPSILON * s);
-            let mut next = vec![0.0; y.len()];
-            system.chart(&y, &u, &mut next);
+            let u = Directions::zip([units, &correction], |[unit, c]| unit * c);
+            let pairs = u.numbers().iter().zip(scales.numbers());
+            let unseen = pairs.fold(true, |all, (u, s)| all & (u.abs() <= f64::EPSILON * s));
+            let mut next = Entries::zeros(y.len());
+            system.chart(&y, u.numbers(), &mut next);
             let here = normals.landed(std::mem::replace(&mut y, next), rows, target);
             if unseen && excess <= CONSERVED {
                 return Ok(here);
@@ -144,33 +149,38 @@ impl<S: Equations + ?Sized> Projection<'_, S> {
         }
     }
 
-    fn normals(&self, rows: &Rows, scales: &[f64], units: &[f64]) -> Normals {
-        let normal = |law: usize| {
-            let (w, value) = (rows.row(law), rows.values[law]);
-            let target = self.target.of(law);
-            let mut hat: Vec<f64> = units.iter().zip(w).map(|(unit, w)| unit * w).collect();
-            let size = length(&hat);
-            // No displacement of a unit changes a law whose differential has no digits.
-            let factor = if size > NO_DIGITS { power_of_two(size) } else { 1.0 };
-            let into = if size > NO_DIGITS { factor.recip() } else { 0.0 };
-            hat.iter_mut().for_each(|hat| *hat *= into);
-            let terms: f64 = w.iter().zip(scales).map(|(w, scale)| w.abs() * scale).sum();
-            let terms = 2.0 * target.abs() + terms;
-            Normal {
-                square: dot(&hat, &hat),
-                hat,
-                residual: (target - value) / factor,
-                round_off: f64::EPSILON * terms / factor + NO_DIGITS / factor,
-                factor,
-                dependent: false,
-            }
-        };
+    /// A law at a state, whatever it depends on.
+    #[inline(always)]
+    fn normal(&self, rows: &Rows, law: usize, [scales, units]: [&Directions; 2]) -> Normal {
+        let (w, value) = (rows.row(law), rows.values[law]);
+        let target = self.target.of(law);
+        let mut hat = Directions::zip([units, w], |[unit, w]| unit * w);
+        let size = length(hat.numbers());
+        // No displacement of a unit changes a law whose differential has no digits.
+        let factor = if size > NO_DIGITS { power_of_two(size) } else { 1.0 };
+        let into = if size > NO_DIGITS { factor.recip() } else { 0.0 };
+        hat.numbers_mut().iter_mut().for_each(|hat| *hat *= into);
+        let terms = 2.0 * target.abs() + sum(w, scales, |w, scale| w.abs() * scale);
+        Normal {
+            square: dot(&hat, &hat),
+            hat,
+            residual: (target - value) / factor,
+            round_off: f64::EPSILON * terms / factor + NO_DIGITS / factor,
+            factor,
+            dependent: false,
+        }
+    }
+
+    #[inline(always)]
+    fn normals(&self, rows: &Rows, scales: &Directions, units: &Directions) -> Normals {
+        let normal = |law| self.normal(rows, law, [scales, units]);
         let energy = normal(ENERGY);
         let energy = Normal { dependent: energy.square == 0.0, ..energy };
-        let mut normals = Normals { conserved: vec![energy], entropy: None, off: 0.0 };
+        let invariants = SmallVec::new();
+        let mut normals = Normals { energy, invariants, entropy: None, off: 0.0 };
         for law in ENTROPY + 1..rows.values.len() {
             let independent = normals.independent(normal(law));
-            normals.conserved.push(independent);
+            normals.invariants.push(independent);
         }
         if self.system.second_law() == SecondLaw::Exact {
             let whole = normal(ENTROPY);
@@ -182,25 +192,33 @@ impl<S: Equations + ?Sized> Projection<'_, S> {
 }
 
 impl Normals {
-    /// The laws so far that are independent of each other.
-    fn independents(&self) -> impl Iterator<Item = &Normal> {
-        self.conserved.iter().filter(|normal| !normal.dependent)
+    /// Visits the laws so far that are independent of each other.
+    #[inline(always)]
+    fn each_before(&self, mut visit: impl FnMut(&Normal)) {
+        if !self.energy.dependent {
+            visit(&self.energy);
+        }
+        for normal in &self.invariants {
+            if !normal.dependent {
+                visit(normal);
+            }
+        }
     }
 
     /// Removes the part of a law that depends on those before it.
+    #[inline]
     fn independent(&self, whole: Normal) -> Normal {
         let square = whole.square;
         let mut normal = whole;
         // The second pass removes the rounding error of the first.
         for _ in 0..2 {
-            for before in self.independents() {
+            self.each_before(|before| {
                 let share = dot(&before.hat, &normal.hat) / before.square;
-                for (hat, before) in normal.hat.iter_mut().zip(&before.hat) {
-                    *hat -= before * share;
-                }
+                let pairs = normal.hat.numbers_mut().iter_mut().zip(before.hat.numbers());
+                pairs.for_each(|(hat, before)| *hat -= before * share);
                 normal.residual -= share * before.residual;
                 normal.round_off += share.abs() * before.round_off;
-            }
+            });
         }
         normal.square = dot(&normal.hat, &normal.hat);
         let independent = normal.square > INDEPENDENT * INDEPENDENT * square;
@@ -209,7 +227,8 @@ impl Normals {
 
     /// The largest residual in units of its round-off.
     fn excess(&self, with_entropy: bool) -> Result<f64, ProjectionError> {
-        let conserved = self.independents().map(Normal::excess).fold(0.0, f64::max);
+        let mut conserved = 0.0_f64;
+        self.each_before(|normal| conserved = conserved.max(normal.excess()));
         match &self.entropy {
             Some(entropy) if with_entropy => {
                 if entropy.dependent && entropy.residual.abs() > entropy.round_off {
@@ -229,20 +248,25 @@ impl Normals {
 
     /// The correction, in units of the entries. A residual below half its round-off is left, unless the last digits
     /// are asked for.
-    fn correction(&self, with_entropy: bool, last_digits: bool) -> Vec<f64> {
+    fn correction(&self, with_entropy: bool, last_digits: bool) -> Directions {
         let least = if last_digits { 0.0 } else { 0.5 };
-        let entropy = self.entropy.iter().filter(|entropy| with_entropy && !entropy.dependent);
-        let mut sum = vec![0.0; self.conserved[0].hat.len()];
-        for normal in self.independents().chain(entropy) {
+        let mut sum = self.energy.hat.zero();
+        let mut add = |normal: &Normal| {
             if normal.excess() > least {
                 let factor = normal.residual / normal.square;
-                sum.iter_mut().zip(&normal.hat).for_each(|(sum, hat)| *sum += hat * factor);
+                let pairs = sum.numbers_mut().iter_mut().zip(normal.hat.numbers());
+                pairs.for_each(|(sum, hat)| *sum += hat * factor);
             }
+        };
+        self.each_before(&mut add);
+        match &self.entropy {
+            Some(entropy) if with_entropy && !entropy.dependent => add(entropy),
+            _ => {}
         }
         sum
     }
 
-    fn landed(&self, x: Vec<f64>, rows: Rows, target: &Aim<'_>) -> Landed {
+    fn landed(&self, x: Entries, rows: Rows, target: &Aim<'_>) -> Landed {
         let (residual, entropy_round_off) = self.entropy.as_ref().map_or((0.0, 0.0), |entropy| {
             (entropy.residual * entropy.factor, entropy.round_off * entropy.factor)
         });
@@ -251,10 +275,18 @@ impl Normals {
 }
 
 /// The components `v_i/s_i`; those of an entry without a unit vanish.
-fn in_units(v: &[f64], units: &[f64]) -> Vec<f64> {
-    v.iter().zip(units).map(|(v, unit)| if *v == 0.0 { 0.0 } else { v / unit }).collect()
+#[inline]
+fn in_units(v: &Directions, units: &Directions) -> Directions {
+    Directions::zip([v, units], |[v, unit]| if v == 0.0 { 0.0 } else { v / unit })
 }
 
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
+/// A sum over the numbers of two vectors at the same place.
+#[inline]
+pub(super) fn sum(a: &Directions, b: &Directions, term: impl Fn(f64, f64) -> f64) -> f64 {
+    a.numbers().iter().zip(b.numbers()).fold(0.0, |sum, (a, b)| sum + term(*a, *b))
+}
+
+#[inline]
+pub(super) fn dot(a: &Directions, b: &Directions) -> f64 {
+    sum(a, b, |a, b| a * b)
 }

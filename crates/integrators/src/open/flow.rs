@@ -1,16 +1,18 @@
 //! An open system as a flow.
 
+use std::sync::Arc;
+
 use metriplectic_dynamics::exchange::{Entries as _, Exchange};
 use metriplectic_dynamics::velocity::{differentials, irreversible};
 use metriplectic_dynamics::{
     Dissipation as _, Metriplectic, ModelError, SecondLaw, VectorField, Verify as _,
     invariants::Kind, system::Point,
 };
-use metriplectic_fields::{ChartPoint, Column as _, Space as _, Vector};
+use metriplectic_fields::{ChartPoint, Column, Space as _, Vector};
 use metriplectic_manifolds::{Manifold, PointError};
 
 use super::clock::Clock;
-use super::state::{Booked, Ledger, OpenSpace, OpenState};
+use super::state::{Booked, Columns, Ledger, OpenSpace, OpenState};
 use super::system::{CovectorsOf, Direction, OpenSystem, StateOf};
 use super::vector::OpenVector;
 use crate::explicit::{StageFlow as _, Target};
@@ -20,8 +22,9 @@ use crate::round_off::bound::{
 use crate::step::failure::Cause;
 use crate::step::scales::relative;
 use crate::step::{
-    Components, EventExchange, Flow, Laws, LedgerErrors, LedgerSummary, Numbers, Recheck, Scales,
-    StartError, StepError, StepStart,
+    self, Components, Directions, EventExchange, Flow, FlowVisitor, Laws, LedgerErrors,
+    LedgerSummary, Numbers, Recheck, Scales, StartError, StateSpace as _, StepError, StepStart,
+    Values, Vector as _, Written,
 };
 
 impl<Y, C, X> Flow for OpenSystem<Y, C, X>
@@ -34,8 +37,8 @@ where
     type Numbers = Numbers<Y>;
     type Vector = Direction<Y, X>;
 
-    fn with_room<T>(&self, f: impl FnOnce() -> T) -> T {
-        self.closed().with_room(f)
+    fn room(&self, work: &mut dyn FnMut()) {
+        self.closed().room(work);
     }
 
     fn laws(&self, x: &StateOf<Y>) -> Laws<Numbers<Y>> {
@@ -177,6 +180,11 @@ where
             .map_err(|law| StepError::Model { time: ends[1].time, law: Box::new(law) })
     }
 
+    /// In plain numbers, so that a run is compiled with this library.
+    fn visit<V: FlowVisitor<Self>>(&self, visitor: V) -> V::Output {
+        visitor.written(self)
+    }
+
     fn entropy_law(&self) -> SecondLaw {
         match self.closed().second_law() {
             _ if self.exchange().has_cold_bath() => SecondLaw::Published,
@@ -265,6 +273,52 @@ where
             Booked::combined(&[(h / 6.0, &start.1), (h / 1.5, &middle.1), (h / 6.0, &there.1)]);
         let booked = Booked::combined(&[(1.0, &self.booked_between(x, end)), (-1.0, &rule)]);
         Some(OpenVector { v, clock: 0.0, booked })
+    }
+}
+
+impl<Y, C, X> Written for OpenSystem<Y, C, X>
+where
+    Y: Metriplectic,
+    C: Clock<Y::Manifold, Y::Energy>,
+    X: Exchange<Y::Manifold, Y::Metric>,
+{
+    type Layout = Arc<Columns>;
+
+    fn layout(&self) -> &Arc<Columns> {
+        self.columns()
+    }
+
+    fn read(columns: &Arc<Columns>, entries: &[f64]) -> StateOf<Y> {
+        let (point, rest) = entries.split_at(entries.len() - 1 - Ledger::length(columns));
+        let ledger = Ledger::read(columns, &rest[1..]);
+        OpenState { x: Y::read(&(), point), time: rest[0], ledger }
+    }
+
+    fn led(x: &StateOf<Y>, y: StateOf<Y>) -> StateOf<Y> {
+        x.at(y.x)
+    }
+
+    fn write(x: &StateOf<Y>) -> step::Entries {
+        OpenSpace::<Y::Manifold>::numbers(x).into()
+    }
+
+    fn vector(directions: &Directions) -> Direction<Y, X> {
+        let (v, rest) = directions.numbers().split_at(Vector::<Y::Manifold>::LEN);
+        let entries = X::Entries::from_index(|i| rest[i + 2]);
+        let booked = Booked { parameter: rest[1], entries };
+        OpenVector { v: Column::from_index(|i| v[i]), clock: rest[0], booked }
+    }
+
+    fn directions(v: &Direction<Y, X>) -> Directions {
+        let beside = Direction::<Y, X>::BESIDE;
+        let mut directions = Directions::beside(Vector::<Y::Manifold>::LEN + beside, beside);
+        let to = directions.numbers_mut().iter_mut().enumerate();
+        to.for_each(|(i, to)| *to = v.get(i));
+        directions
+    }
+
+    fn numbers(values: &Values) -> Numbers<Y> {
+        Y::numbers(values)
     }
 }
 

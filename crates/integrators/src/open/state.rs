@@ -47,7 +47,7 @@ enum Kind {
 
 /// The entries of a ledger with their names.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Columns(Vec<(Arc<str>, Kind)>);
+pub struct Columns(Vec<(Arc<str>, Kind)>);
 
 impl Columns {
     /// Makes the columns of the parts with these names.

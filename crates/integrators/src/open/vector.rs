@@ -35,7 +35,10 @@ impl<V: Column<f64>, E: Entries> OpenVector<V, E> {
     }
 
     /// How many numbers there are, with those of the clock and the ledger.
-    const ALL: usize = V::LEN + 2 + E::LEN;
+    const ALL: usize = V::LEN + Self::BESIDE;
+
+    /// How many there are beside the components.
+    pub(super) const BESIDE: usize = 2 + E::LEN;
 }
 
 impl<V: Column<f64>, E: Entries> Vector for OpenVector<V, E> {

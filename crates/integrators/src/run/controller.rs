@@ -61,7 +61,7 @@
 //! asked for, to the last bit. The first step is that of Hairer, Nørsett, Wanner (Solving ODEs I, §II.4),
 //! with the sizes of the entries in place of their absolute numbers.
 
-use crate::step::scales::relative;
+use crate::step::scales::{relative, rounding};
 use crate::step::{Control, Element, Flow, Scales, Stepper, Vector};
 
 #[cfg(feature = "serde")]
@@ -139,7 +139,7 @@ pub(crate) struct Rule {
 
 impl Rule {
     /// The rule of this method, in a run from this time.
-    pub(crate) fn of<F: Flow, M: Stepper<F>>(method: &M, start: f64) -> Self {
+    pub(crate) fn of<F: Flow + ?Sized, M: Stepper<F>>(method: &M, start: f64) -> Self {
         Self { order: method.order(), control: method.control(), start }
     }
 
@@ -254,6 +254,13 @@ fn inverse_root(x: f64, alpha: f64) -> f64 {
 }
 
 impl Pace {
+    /// The error of a step relative to the sizes of the entries.
+    pub(crate) fn relative_error(&self, rule: &Rule) -> f64 {
+        let (power, tolerance) = (rule.control.power, self.tolerance);
+        let relative = if is(power, 1.0) { tolerance } else { tolerance.powf(power) };
+        relative.max(8.0 * f64::EPSILON)
+    }
+
     /// The step size below which the run ends in an error.
     pub(crate) fn least(&self, rule: &Rule) -> f64 {
         self.least.unwrap_or(self.roundings(rule))
@@ -359,18 +366,21 @@ impl<V: Vector> Controller<V> {
     /// The error `τ^{(p+1)/p} s_i + a_i` that is allowed in a step of size `h`, entry by entry, and what
     /// rounding may make of the estimate.
     pub(crate) fn allowed(&self, rule: &Rule, scales: &Scales<V>, h: f64) -> V {
-        let (power, tolerance) = (rule.control.power, self.pace.tolerance);
-        let tolerance = if is(power, 1.0) { tolerance } else { tolerance.powf(power) };
-        let tolerance = tolerance.max(8.0 * f64::EPSILON);
-        let noise = scales.rounding(h);
-        let sizes = &scales.sizes;
+        self.allowed_at(self.pace.relative_error(rule), [&scales.sizes, &scales.terms], h)
+    }
+
+    /// The error that is allowed beside entries of these sizes, and of these terms, with the relative one.
+    pub(crate) fn allowed_at(&self, relative: f64, [sizes, terms]: [&V; 2], h: f64) -> V {
+        let noise = |terms: f64| rounding(terms, h);
         match &self.entries {
-            Entries::Automatic => V::zip([sizes, &noise], |[size, noise]| tolerance * size + noise),
-            Entries::Scale(known) => V::zip([sizes, &noise, known], |[size, noise, known]| {
-                tolerance * if known > 0.0 { known } else { size } + noise
+            Entries::Automatic => {
+                V::zip([sizes, terms], |[size, terms]| relative * size + noise(terms))
+            }
+            Entries::Scale(known) => V::zip([sizes, terms, known], |[size, terms, known]| {
+                relative * if known > 0.0 { known } else { size } + noise(terms)
             }),
-            Entries::Absolute(errors) => V::zip([sizes, &noise, errors], |[size, noise, error]| {
-                tolerance * size + error + noise
+            Entries::Absolute(errors) => V::zip([sizes, terms, errors], |[size, terms, error]| {
+                relative * size + error + noise(terms)
             }),
         }
     }

@@ -28,7 +28,7 @@ pub(super) struct Said {
 impl Said {
     /// Asks a method about a run of this flow from a time on.
     #[inline]
-    pub(super) fn by<F: Flow, M: Stepper<F>>(method: &M, flow: &F, start: f64) -> Self {
+    pub(super) fn by<F: Flow + ?Sized, M: Stepper<F>>(method: &M, flow: &F, start: f64) -> Self {
         let (promises, noise) = (method.promises(flow), method.noise(flow));
         Self { rule: Rule::of(method, start), promises, noise }
     }

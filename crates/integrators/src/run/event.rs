@@ -20,7 +20,7 @@ use crate::run::state::State;
 use crate::step::dense::{Hermite, says_between};
 use crate::step::digits::Digits;
 use crate::step::exact::Exact;
-use crate::step::{Flow, StateSpace, StepEnds, Vector as _};
+use crate::step::{Element, Entries, Flow, StateSpace, StepEnds, Vector as _, Written};
 
 /// A change of sign of a function of the state, found in a run; asked for by [`Watch::event`](crate::Watch::event).
 ///
@@ -99,6 +99,8 @@ pub(crate) struct Request {
     is_in_time: bool,
     /// The type of the points, and the [`Function`] of them.
     point: &'static str,
+    /// The type that the points should have, if it is another one than that of the run.
+    expected: Option<&'static str>,
     function: Arc<dyn Any + Send + Sync>,
 }
 
@@ -117,8 +119,34 @@ impl Request {
             resolution: None,
             is_in_time,
             point: type_name::<P>(),
+            expected: None,
             function: Arc::new(Function::<P>(Box::new(function))),
         }
+    }
+}
+
+impl Request {
+    /// Translates the event to states in plain numbers. One that was asked for at other states stays as it is, and a run of plain
+    /// numbers refuses it by the name of its own states.
+    pub(crate) fn in_numbers<F: Written>(&self, flow: &F) -> Self {
+        let expected = Some(type_name::<Element<F>>());
+        let jump = self.jump.as_ref().map(|jump| jump.in_numbers(flow));
+        let Ok(function) = Arc::clone(&self.function).downcast::<Function<Element<F>>>() else {
+            return Self { expected, jump, ..self.clone() };
+        };
+        let layout = flow.layout().clone();
+        let read = F::read as fn(&F::Layout, &[f64]) -> Element<F>;
+        let function = move |time: f64, x: &Entries| (function.0)(time, &read(&layout, x));
+        let function = Arc::new(Function::<Entries>(Box::new(function)));
+        Self { expected, jump, function, ..self.clone() }
+    }
+
+    /// The function of it on the states of a run.
+    fn on<M: StateSpace>(&self, index: usize) -> Result<Arc<Function<M::Element>>, SpanError> {
+        Arc::clone(&self.function).downcast().map_err(|_| {
+            let expected = self.expected.unwrap_or(type_name::<M::Element>());
+            SpanError::EventPoint { index, found: self.point, expected }
+        })
     }
 }
 
@@ -252,11 +280,7 @@ impl<M: StateSpace> Events<M> {
         last: &[LastNumber],
     ) -> Result<Self, SpanError> {
         let watched = |(index, request): (usize, Request)| {
-            let Ok(function) = Arc::clone(&request.function).downcast::<Function<M::Element>>()
-            else {
-                let expected = type_name::<M::Element>();
-                return Err(SpanError::EventPoint { index, found: request.point, expected });
-            };
+            let function = request.on::<M>(index)?;
             let here = (function.0)(state.time, &state.point);
             let same = |last: &&LastNumber| last.index == index && *last.name == *request.name;
             let last = last.iter().find(same);

@@ -8,7 +8,7 @@ use metriplectic_fields::Real;
 use crate::round_off::sum::plus;
 use crate::run::span_error::SpanError;
 use crate::run::state::State;
-use crate::step::{EventExchange, StateSpace};
+use crate::step::{Element, Entries, EventExchange, StateSpace, Written};
 
 /// A jump of the state at an event, asked for by [`Watched::jump`](crate::Watched::jump).
 #[derive(Clone, Debug, PartialEq)]
@@ -96,6 +96,8 @@ pub(crate) struct SmoothJump<P> {
 #[derive(Clone)]
 pub(crate) struct JumpRequest {
     point: &'static str,
+    /// The type that the points should have, if it is another one than that of the run.
+    expected: Option<&'static str>,
     function: Arc<dyn Any + Send + Sync>,
     /// The [`SmoothJump`] with its derivatives, if they were given.
     smooth: Option<Arc<dyn Any + Send + Sync>>,
@@ -109,7 +111,8 @@ impl JumpRequest {
     pub(crate) fn new<P: 'static>(map: impl Fn(f64, &P) -> P + Send + Sync + 'static) -> Self {
         let function = Arc::new(Function::<P>(Box::new(map)));
         let point = type_name::<P>();
-        Self { point, function, smooth: None, temperature: None, lowers: false }
+        let expected = None;
+        Self { point, expected, function, smooth: None, temperature: None, lowers: false }
     }
 
     /// Adds the derivatives.
@@ -129,6 +132,24 @@ impl JumpRequest {
             && Arc::ptr_eq(&self.function, &other.function)
     }
 
+    /// Translates the jump to states in plain numbers.
+    pub(crate) fn in_numbers<F: Written>(&self, flow: &F) -> Self {
+        let expected = Some(type_name::<Element<F>>());
+        let Ok(map) = Arc::clone(&self.function).downcast::<Function<Element<F>>>() else {
+            return Self { expected, ..self.clone() };
+        };
+        let layout = flow.layout().clone();
+        let read = F::read as fn(&F::Layout, &[f64]) -> Element<F>;
+        let led = F::led as fn(&Element<F>, Element<F>) -> Element<F>;
+        let write = F::write as fn(&Element<F>) -> Entries;
+        let map = move |time: f64, x: &Entries| {
+            let x = read(&layout, x);
+            write(&led(&x, (map.0)(time, &x)))
+        };
+        let function = Arc::new(Function::<Entries>(Box::new(map)));
+        Self { expected, function, smooth: None, ..*self }
+    }
+
     /// The jump on the states of a run.
     pub(crate) fn on<M: StateSpace>(self, index: usize) -> Result<JumpOn<M>, SpanError> {
         if let Some(temperature) = self.temperature
@@ -139,7 +160,7 @@ impl JumpRequest {
         match Arc::clone(&self.function).downcast::<Function<M::Element>>() {
             Ok(map) => Ok(JumpOn { map, temperature: self.temperature, lowers: self.lowers }),
             Err(_) => {
-                let expected = type_name::<M::Element>();
+                let expected = self.expected.unwrap_or(type_name::<M::Element>());
                 Err(SpanError::EventPoint { index, found: self.point, expected })
             }
         }

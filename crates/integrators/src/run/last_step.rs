@@ -15,7 +15,7 @@ pub(crate) struct LastStep<'a, F: Flow + ?Sized> {
     pub(crate) stage_velocities: Vec<f64>,
 }
 
-impl<'a, F: Flow, M: Stepper<F>> Steps<'a, F, M> {
+impl<'a, F: Flow + ?Sized, M: Stepper<F>> Steps<'a, F, M> {
     /// The system.
     pub(crate) const fn flow(&self) -> &'a F {
         self.flow

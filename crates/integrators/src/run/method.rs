@@ -2,10 +2,11 @@
 
 use crate::run::checkpoint::{Checkpoint, ResumeError};
 use crate::run::error::RunError;
+use crate::run::plain::Whole;
 use crate::run::schedule::Schedule;
 use crate::run::steps::Steps;
 use crate::run::trajectory::Trajectory;
-use crate::step::{Element, Flow, Stepper};
+use crate::step::{Element, Flow, Stepper, in_room};
 
 /// Runs of a one-step method. Every [`Stepper`] is one, and a retraction of this library too:
 /// `WeylMidpoint.run(&system, x0, Span::steps(0.1, 1000))` takes the steps of its [`Scheme`](crate::Scheme) with the default
@@ -24,7 +25,7 @@ pub trait Method<F: Flow>: Stepper<F> {
         schedule: impl Into<Schedule>,
     ) -> Result<Steps<'_, F, Self>, RunError<F::Space>> {
         let schedule = schedule.into();
-        flow.with_room(|| Steps::start(self, flow, x0, schedule))
+        in_room(flow, || Steps::start(self, flow, x0, schedule))
     }
 
     /// Verifies the model, runs it over a [`Span`](crate::Span) or [`Until`](crate::Until), and records the states.
@@ -39,7 +40,7 @@ pub trait Method<F: Flow>: Stepper<F> {
         schedule: impl Into<Schedule>,
     ) -> Result<Trajectory<F::Space>, RunError<F::Space>> {
         let schedule = schedule.into();
-        flow.with_room(|| self.steps(flow, x0, schedule)?.run())
+        flow.visit(Whole { method: self, x0, schedule })
     }
 
     /// Takes up a run where it was put down. With the system and the method of that run the steps
@@ -54,7 +55,7 @@ pub trait Method<F: Flow>: Stepper<F> {
         flow: &'a F,
         checkpoint: &Checkpoint,
     ) -> Result<Steps<'a, F, Self>, ResumeError> {
-        flow.with_room(|| Steps::resume(self, flow, checkpoint))
+        in_room(flow, || Steps::resume(self, flow, checkpoint))
     }
 }
 

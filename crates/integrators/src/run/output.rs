@@ -16,7 +16,7 @@ use crate::run::watching::Watching;
 use crate::step::dense::{Target, between, says_between};
 use crate::step::{Element, Flow, JumpError, Laws, StepEnds, StepError, StepStart, Stepper};
 
-impl<F: Flow, M: Stepper<F>> Steps<'_, F, M> {
+impl<F: Flow + ?Sized, M: Stepper<F>> Steps<'_, F, M> {
     /// The state at a time in the last step, on the [dense output](Stepper::between) of the method; `None` at other
     /// times, or if the flow does not say what lies between two states.
     ///

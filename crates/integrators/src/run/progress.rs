@@ -1,10 +1,10 @@
 //! Where a run is on its schedule: what its next step depends on beside the state and the memory of the method.
 
-use crate::run::controller::StepSize;
+use crate::run::controller::{Pace, StepSize};
 use crate::run::corners::Corners;
 use crate::run::ending::Ending;
 use crate::run::judged::Judged;
-use crate::step::Scales;
+use crate::step::{Scales, Vector};
 
 #[cfg(feature = "serde")]
 use crate::step::exact;
@@ -75,6 +75,13 @@ impl<V> Progress<V> {
         })
     }
 
+    /// Sets the sizes of the steps that follow a tolerance.
+    pub(crate) const fn set_pace(&mut self, pace: Pace) {
+        if let StepSize::Adaptive(controller) = &mut self.step_size {
+            controller.pace = pace;
+        }
+    }
+
     /// When the run ends; in a run without an end, when the next step from `time` does.
     pub(crate) fn next_end(&self, time: f64) -> f64 {
         match &self.step_size {
@@ -90,6 +97,20 @@ impl<V> Progress<V> {
                 self.count.map_or(f64::INFINITY, |count| self.start + count as f64 * h)
             }
             StepSize::Adaptive(controller) => controller.pace.end,
+        }
+    }
+}
+
+impl<V: Vector> Progress<V> {
+    /// The error that is allowed in a step of size `h`, with entries of their sizes so far or of these; none in steps of one
+    /// size.
+    pub(crate) fn allowed(&self, relative_error: f64, sizes: Option<&V>, h: f64) -> V {
+        let Scales { sizes: so_far, terms } = &self.scales;
+        match &self.step_size {
+            StepSize::Adaptive(controller) => {
+                controller.allowed_at(relative_error, [sizes.unwrap_or(so_far), terms], h)
+            }
+            StepSize::Fixed(_) => so_far.zero(),
         }
     }
 }

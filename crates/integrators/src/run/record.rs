@@ -12,7 +12,7 @@ use crate::run::state::State;
 use crate::run::steps::Steps;
 use crate::run::trajectory::Trajectory;
 use crate::run::watching::Watching;
-use crate::step::{Flow, StateSpace, StepError, Stepper};
+use crate::step::{Flow, StateSpace, StepError, Stepper, in_room};
 
 /// The most states that a run makes room for beforehand: it may end long before its span.
 const ROOM: usize = 1 << 12;
@@ -23,7 +23,7 @@ impl<M: StateSpace> Numbered for State<M> {
     }
 }
 
-impl<F: Flow, M: Stepper<F>> Steps<'_, F, M> {
+impl<F: Flow + ?Sized, M: Stepper<F>> Steps<'_, F, M> {
     /// Takes all steps that are left, and records the states from here on.
     ///
     /// # Errors
@@ -32,7 +32,7 @@ impl<F: Flow, M: Stepper<F>> Steps<'_, F, M> {
     /// [`SpanError::Endless`] if the schedule has no end.
     pub fn run(self) -> Result<Trajectory<F::Space>, RunError<F::Space>> {
         let flow = self.flow;
-        flow.with_room(|| self.record())
+        in_room(flow, || self.record())
     }
 
     /// Begins to record a run, from what is recorded of its start.
@@ -121,7 +121,7 @@ impl<F: Flow + ?Sized> Course<'_, F> {
     }
 }
 
-impl<F: Flow, M: Stepper<F>> Iterator for Steps<'_, F, M> {
+impl<F: Flow + ?Sized, M: Stepper<F>> Iterator for Steps<'_, F, M> {
     type Item = Result<State<F::Space>, StepError>;
 
     fn next(&mut self) -> Option<Self::Item> {

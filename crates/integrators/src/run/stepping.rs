@@ -23,13 +23,13 @@ pub(super) trait AnyStepper<F: Flow + ?Sized> {
 }
 
 /// A method with its memory and its flow.
-pub(super) struct Stepping<'s, 'a, F: Flow, M: Stepper<F>> {
+pub(super) struct Stepping<'s, 'a, F: Flow + ?Sized, M: Stepper<F>> {
     pub(super) method: &'s M,
     pub(super) flow: &'a F,
     pub(super) memory: &'s mut M::Memory,
 }
 
-impl<'a, F: Flow, M: Stepper<F>> AnyStepper<AnyFlow<'a, F>> for Stepping<'_, 'a, F, M> {
+impl<'a, F: Flow + ?Sized, M: Stepper<F>> AnyStepper<AnyFlow<'a, F>> for Stepping<'_, 'a, F, M> {
     fn step(
         &mut self,
         start: &StepStart<'_, AnyFlow<'a, F>>,
@@ -44,7 +44,7 @@ impl<'a, F: Flow, M: Stepper<F>> AnyStepper<AnyFlow<'a, F>> for Stepping<'_, 'a,
 
     fn afresh(&self, f: &mut dyn FnMut(&mut dyn AnyStepper<AnyFlow<'a, F>>)) {
         let &Self { method, flow, .. } = self;
-        f(&mut Stepping { method, flow, memory: &mut M::Memory::default() });
+        f(&mut Stepping { method, flow, memory: &mut method.memory() });
     }
 
     fn between(&mut self, step: &StepEnds<'_, AnyFlow<'a, F>>, theta: f64) -> Option<Element<F>> {

@@ -4,7 +4,7 @@ use std::fmt;
 
 use crate::round_off::bound::{ROUNDED, breaks_first_law};
 use crate::run::certificate::{Certificate, StepOf};
-use crate::run::controller::{Controller, StepSize};
+use crate::run::controller::{Pace, StepSize};
 use crate::run::corners::{self, Fixed, Stop};
 use crate::run::course::{Course, Said};
 use crate::run::ending::Ending;
@@ -16,7 +16,7 @@ use crate::step::dense::says_between;
 use crate::step::scales::{larger, relative};
 use crate::step::{
     AnyFlow, Effort, Element, EntropyStep, Evidence, Flow, Laws, LimitingSites, Memory as _,
-    Refusal, Scales, StepEnds, StepError, StepStart, Stepper, Taken, Vector as _,
+    Refusal, Scales, StepEnds, StepError, StepStart, Stepper, Taken, Vector as _, in_room,
 };
 
 /// The iterator over the states of a run after its start, in constant memory; ended by an error, or
@@ -24,14 +24,14 @@ use crate::step::{
 /// the [times asked for](crate::Watch::output_at) and the last one. An endless iterator over such times ends with them.
 ///
 /// Made by [`Method::steps`](crate::Method::steps) or [`Run::steps`](crate::Run::steps).
-pub struct Steps<'a, F: Flow, M: Stepper<F>> {
+pub struct Steps<'a, F: Flow + ?Sized, M: Stepper<F>> {
     pub(super) method: M,
     pub(super) flow: &'a F,
     pub(super) memory: M::Memory,
     pub(super) course: Course<'a, AnyFlow<'a, F>>,
 }
 
-impl<F: Flow, M: Stepper<F>> fmt::Debug for Steps<'_, F, M> {
+impl<F: Flow + ?Sized, M: Stepper<F>> fmt::Debug for Steps<'_, F, M> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Steps")
             .field("state", &self.course.state)
@@ -42,25 +42,39 @@ impl<F: Flow, M: Stepper<F>> fmt::Debug for Steps<'_, F, M> {
 }
 
 /// A step of a run.
-struct Advance<F: Flow> {
+struct Advance<F: Flow + ?Sized> {
     taken: Taken<F>,
     h: f64,
     time: f64,
 }
 
-impl<'a, F: Flow, M: Stepper<F>> Steps<'a, F, M> {
-    /// Verifies the model, and starts.
-    pub(crate) fn start(
+impl<'a, F: Flow + ?Sized, M: Stepper<F>> Steps<'a, F, M> {
+    /// Verifies the model, and starts a run of a flow, which is given as any one with its states and numbers too.
+    pub(crate) fn start_any(
         method: M,
-        flow: &'a F,
+        (flow, any): (&'a F, &'a AnyFlow<'a, F>),
         x0: Element<F>,
         schedule: Schedule,
     ) -> Result<Self, RunError<F::Space>> {
         schedule.check()?;
         method.check(!schedule.is_fixed())?;
         let said = Said::by(&method, flow, schedule.start);
-        let course = Course::start(flow as &AnyFlow<'a, F>, said, x0, schedule)?;
-        Ok(Self { method, flow, memory: M::Memory::default(), course })
+        let course = Course::start(any, said, x0, schedule)?;
+        let memory = method.memory();
+        Ok(Self { method, flow, memory, course })
+    }
+
+    /// Verifies the model, and starts.
+    pub(crate) fn start(
+        method: M,
+        flow: &'a F,
+        x0: Element<F>,
+        schedule: Schedule,
+    ) -> Result<Self, RunError<F::Space>>
+    where
+        F: Sized,
+    {
+        Self::start_any(method, (flow, flow), x0, schedule)
     }
 
     /// The state reached so far.
@@ -86,7 +100,7 @@ impl<'a, F: Flow, M: Stepper<F>> Steps<'a, F, M> {
     pub fn advance(&mut self) -> Result<&State<F::Space>, StepError> {
         if self.course.progress.ending.is_none() {
             let flow = self.flow;
-            flow.with_room(|| self.take_step().map_err(|error| self.course.explained(error)))?;
+            in_room(flow, || self.take_step().map_err(|error| self.course.explained(error)))?;
         }
         Ok(&self.course.state)
     }
@@ -105,7 +119,7 @@ impl<'a, F: Flow, M: Stepper<F>> Steps<'a, F, M> {
                 let h = self.course.left_of_a_step(h, time);
                 Advance { taken: self.fixed(Fixed { h, end: time })?, h, time }
             }
-            StepSize::Adaptive(controller) => self.controlled(controller.clone(), behind)?,
+            StepSize::Adaptive(controller) => self.controlled(controller.pace, behind)?,
         };
         if let Some(clocked) = self.flow.clocked(&taken.x, time) {
             taken.values = self.flow.laws(&clocked);
@@ -266,125 +280,131 @@ impl<'a, F: Flow, M: Stepper<F>> Steps<'a, F, M> {
     /// Tries steps until the controller accepts one. Not part of the loop over steps of one size, which
     /// is compiled for every system.
     #[inline(never)]
-    fn controlled(
-        &mut self,
-        mut controller: Controller<F::Vector>,
-        behind: Option<f64>,
-    ) -> Result<Advance<F>, StepError> {
+    fn controlled(&mut self, mut pace: Pace, behind: Option<f64>) -> Result<Advance<F>, StepError> {
         let (flow, rule, time) = (self.flow, self.course.rule, self.course.state.time);
+        let relative_error = pace.relative_error(&rule);
         let mut effort = Effort::default();
         let (mut tries, mut broken) = (0, None);
-        let Stop { stop, recorded: target, .. } =
-            self.course.progress.corners.stop(time, controller.pace.end);
+        let Stop { stop, recorded: target, .. } = self.course.progress.corners.stop(time, pace.end);
         // After a corner a step begins a few roundings later than its state is recorded.
         let begin = behind.unwrap_or(time);
         if behind.is_some() {
-            self.memory = M::Memory::default();
+            self.memory = self.method.memory();
         }
         loop {
             tries += 1;
             if tries == TRIES {
                 // An entry that begins to move only now has no size yet.
-                let here =
-                    Scales::at(flow, &self.course.state.point, Some(controller.pace.end - time));
+                let here = Scales::at(flow, &self.course.state.point, Some(pace.end - time));
                 self.course.progress.scales = self.course.progress.scales.and(&here);
             }
-            let (h, last) = controller.pace.attempt(begin, stop);
-            if controller.pace.next < controller.pace.least(&rule) && !last {
-                let (h, least) = (controller.pace.next, controller.pace.least(&rule));
+            let (h, last) = pace.attempt(begin, stop);
+            if pace.next < pace.least(&rule) && !last {
+                let (h, least) = (pace.next, pace.least(&rule));
                 let too_small = StepError::TooSmall { time, h, least };
                 let cause = broken.or_else(|| self.course.dependent(&self.course.state));
                 return Err(cause.unwrap_or(too_small));
             }
             if begin + h <= begin {
-                let standstill = StepError::Standstill { time, h: controller.pace.next };
+                let standstill = StepError::Standstill { time, h: pace.next };
                 return Err(broken.unwrap_or(standstill));
             }
-            let ratio = controller.pace.taken.map_or(1.0, |taken| h / taken);
+            let ratio = pace.taken.map_or(1.0, |taken| h / taken);
             let mut memory = self.memory.rescaled(ratio);
             memory.take_room(&mut self.memory);
-            let allowed = controller.allowed(&rule, &self.course.progress.scales, h);
+            let allowed = self.course.progress.allowed(relative_error, None, h);
             let start = start_of(flow, &self.course, Some(allowed));
-            let end = self.method.attempt(&start, h, &mut memory);
-            let mut falls = false;
-            let end = match end {
+            let mut tried = self.method.attempt(&start, h, &mut memory);
+            let (mut falls, mut is_taken, mut error) = (false, false, None);
+            match &mut tried {
                 Ok(taken) => {
                     effort += taken.effort;
-                    let law = self.broken_law(&taken, h).filter(|_| is_finite(&taken.values));
-                    let holds = law.is_none();
+                    taken.effort = effort;
+                    let has_values = is_finite(&taken.values);
+                    let law = self.broken_law(taken, h).filter(|_| has_values);
+                    let (holds, reference) = (law.is_none() && has_values, &start.reference);
                     broken = law.or(broken);
-                    (holds && is_finite(&taken.values)).then_some(taken)
+                    let step = Tried { taken, reference, h, relative_error };
+                    let is_held = taken.evidence.entropy_step == Some(EntropyStep::Held);
+                    error = if holds { self.error(&step, &memory) } else { None };
+                    let accepted = error.filter(|error| *error <= 1.0);
+                    if holds && is_held {
+                        pace.accept_held(&rule, h);
+                    } else if let Some(error) = accepted {
+                        pace.accept(&rule, h, error);
+                        self.look_at_rest(&mut pace, taken, h);
+                    }
+                    is_taken = holds && (is_held || accepted.is_some());
                 }
-                Err(Refusal { effort: wasted, error, second_law }) => {
-                    effort += wasted;
+                Err(Refusal { effort: wasted, error: refused, second_law }) => {
+                    effort += *wasted;
+                    let refused = refused.take();
                     // An entropy that falls in a step that hardly moves the state falls in a smaller one too.
                     if let Some(
-                        never
-                        @ (StepError::EntropyFalls { .. } | StepError::WrongDerivative { .. }),
-                    ) = error
+                        never @ (StepError::EntropyFalls { .. }
+                        | StepError::WrongDerivative { .. }
+                        | StepError::Flow { .. }),
+                    ) = refused
                     {
                         return Err(never);
                     }
-                    broken = error.or(broken);
-                    falls = second_law;
-                    None
-                }
-            };
-            let error = end.as_ref().and_then(|taken| {
-                let scales = self.course.progress.scales.or(&flow.sizes(&taken.x));
-                let allowed = controller.allowed(&rule, &scales, h);
-                let values = [&self.course.values, &taken.values];
-                let (x, reference) = (&self.course.state.point, &start.reference);
-                let step = StepEnds { flow, x, end: &taken.x, h, values, reference };
-                let norm = |error: &F::Vector| {
-                    relative(error, &allowed).max(error.beside_relative_to(&allowed))
-                };
-                self.method.error(&step, &memory, norm).filter(|error| error.is_finite())
-            });
-            match (end, error) {
-                (Some(taken), _) if taken.evidence.entropy_step == Some(EntropyStep::Held) => {
-                    controller.pace.accept_held(&rule, h);
-                    let before = std::mem::replace(&mut self.memory, memory);
-                    self.memory.reuse(before);
-                    let time = if last { target } else { begin + h };
-                    self.course.progress.step_size = StepSize::Adaptive(controller);
-                    return Ok(Advance { taken: Taken { effort, ..taken }, h, time });
-                }
-                (None, _) if falls => {
-                    controller.pace.reject_fall(h);
-                    self.memory.refused(memory);
-                    self.course.certificate.rejected += 1;
-                    self.course.certificate.falls_avoided += 1;
-                }
-                (Some(taken), Some(error)) if error <= 1.0 => {
-                    controller.pace.accept(&rule, h, error);
-                    self.look_at_rest(&mut controller, &taken, h);
-                    let before = std::mem::replace(&mut self.memory, memory);
-                    self.memory.reuse(before);
-                    let time = if last { target } else { begin + h };
-                    self.course.progress.step_size = StepSize::Adaptive(controller);
-                    return Ok(Advance { taken: Taken { effort, ..taken }, h, time });
-                }
-                (_, error) => {
-                    if controller.pace.may_jump(&rule, begin, h)
-                        && let Some(taken) = self.held_in_an_instant(begin + h)
-                    {
-                        controller.pace.jumped(begin, h);
-                        self.memory = self.memory.restarted();
-                        self.course.progress.step_size = StepSize::Adaptive(controller);
-                        let time = if last { target } else { begin + h };
-                        return Ok(Advance { taken: Taken { effort, ..taken }, h, time });
-                    }
-                    controller.pace.reject(&rule, h, error);
-                    self.memory.reuse(memory);
-                    self.course.certificate.rejected += 1;
+                    broken = refused.or(broken);
+                    falls = *second_law;
                 }
             }
+            if is_taken && let Ok(taken) = tried {
+                let before = std::mem::replace(&mut self.memory, memory);
+                self.memory.reuse(before);
+                self.course.progress.set_pace(pace);
+                let time = if last { target } else { begin + h };
+                return Ok(Advance { taken, h, time });
+            }
+            if falls {
+                pace.reject_fall(h);
+                self.memory.refused(memory);
+                self.course.certificate.rejected += 1;
+                self.course.certificate.falls_avoided += 1;
+                continue;
+            }
+            if pace.may_jump(&rule, begin, h)
+                && let Some(taken) = self.held_in_an_instant(begin + h)
+            {
+                pace.jumped(begin, h);
+                self.memory = self.memory.restarted();
+                self.course.progress.set_pace(pace);
+                let time = if last { target } else { begin + h };
+                return Ok(Advance { taken: Taken { effort, ..taken }, h, time });
+            }
+            pace.reject(&rule, h, error);
+            self.memory.reuse(memory);
+            self.course.certificate.rejected += 1;
         }
+    }
+
+    /// The error of a step that was tried, in units of the one allowed.
+    #[inline]
+    fn error(&self, step: &Tried<'_, F>, memory: &M::Memory) -> Option<f64> {
+        let &Tried { taken, reference, h, relative_error } = step;
+        let (flow, course) = (self.flow, &self.course);
+        let sizes = larger(&course.progress.scales.sizes, &flow.sizes(&taken.x));
+        let allowed = course.progress.allowed(relative_error, Some(&sizes), h);
+        let values = [&course.values, &taken.values];
+        let step = StepEnds { flow, x: &course.state.point, end: &taken.x, h, values, reference };
+        let norm =
+            |error: &F::Vector| relative(error, &allowed).max(error.beside_relative_to(&allowed));
+        self.method.error(&step, memory, norm).filter(|error| error.is_finite())
     }
 }
 
-impl<F: Flow, M: Stepper<F>> Steps<'_, F, M> {
+/// A step that was tried.
+struct Tried<'a, F: Flow + ?Sized> {
+    taken: &'a Taken<F>,
+    reference: &'a Laws<F::Numbers>,
+    h: f64,
+    relative_error: f64,
+}
+
+impl<F: Flow + ?Sized, M: Stepper<F>> Steps<'_, F, M> {
     /// The step to a time so near that a jump of the law of motion between the two has no place in it: the state stays, and
     /// what the energy changes by is work of the time. `None` where states have no clock.
     #[cold]
@@ -398,15 +418,16 @@ impl<F: Flow, M: Stepper<F>> Steps<'_, F, M> {
     /// Bounds the next step where a system takes the time, and nothing has changed the motion in this one: what moves the state
     /// later would be stepped over.
     #[inline]
-    fn look_at_rest(&mut self, controller: &mut Controller<F::Vector>, taken: &Taken<F>, h: f64) {
-        let longest = controller.pace.longest_at_rest(&self.course.rule);
-        if !self.flow.depends_on_time() || controller.pace.next.max(h) < longest {
+    fn look_at_rest(&mut self, pace: &mut Pace, taken: &Taken<F>, h: f64) {
+        let longest = pace.longest_at_rest(&self.course.rule);
+        if !self.flow.depends_on_time() || pace.next.max(h) < longest {
             return;
         }
-        let allowed = controller.allowed(&self.course.rule, &self.course.progress.scales, h);
+        let relative_error = pace.relative_error(&self.course.rule);
+        let allowed = self.course.progress.allowed(relative_error, None, h);
         let ends = [&self.course.state.point, &taken.x];
         if moves_on(self.flow, ends, &allowed, h) {
-            controller.pace.next = controller.pace.next.min(longest);
+            pace.next = pace.next.min(longest);
             self.course.certificate.note_rest(h);
         }
     }
@@ -426,7 +447,7 @@ fn moves_on<F: Flow + ?Sized>(
 
 /// Where the next step of this flow starts.
 #[inline]
-fn start_of<'s, F: Flow>(
+fn start_of<'s, F: Flow + ?Sized>(
     flow: &'s F,
     course: &'s Course<'_, AnyFlow<'_, F>>,
     allowed: Option<F::Vector>,

@@ -8,6 +8,7 @@ use metriplectic_dynamics::{ModelError, SecondLaw};
 use metriplectic_manifolds::{Manifold, PointError};
 
 use super::initial_scales::initial_scales;
+use super::plain::{Directions, Entries, Values};
 use super::{
     EventExchange, FlowError, LedgerErrors, LedgerSummary, Scales, StartError, StepError, Vector,
 };
@@ -62,10 +63,84 @@ pub enum Recheck {
     },
 }
 
+/// States that are lists of numbers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PlainNumbers;
+
+impl StateSpace for PlainNumbers {
+    type Element = Entries;
+
+    fn numbers(x: &Entries) -> Vec<f64> {
+        x.to_vec()
+    }
+}
+
+/// A flow in plain numbers, of which nothing else is known.
+pub type PlainFlow<'a> = dyn Flow<Space = PlainNumbers, Numbers = Values, Vector = Directions> + 'a;
+
+/// A flow whose states, vectors and laws are written in plain numbers, so that its runs are compiled with this library.
+pub trait Written: Flow + Sized {
+    /// Whether a panic in the flow ends a run in an error: in one whose functions are yours.
+    const CATCHES_PANICS: bool = false;
+
+    /// The parts of a state that are no entries, such as the names in a ledger.
+    type Layout: Clone + Send + Sync + 'static;
+
+    /// Returns these parts, which all states of the flow share.
+    fn layout(&self) -> &Self::Layout;
+
+    /// Reads a state.
+    fn read(layout: &Self::Layout, entries: &[f64]) -> Element<Self>;
+
+    /// Writes the entries of a state.
+    fn write(x: &Element<Self>) -> Entries;
+
+    /// Returns the state that a jump leads to, as [`jumped`](Flow::jumped) does.
+    fn led(x: &Element<Self>, y: Element<Self>) -> Element<Self> {
+        let _ = x;
+        y
+    }
+
+    /// Reads a vector.
+    fn vector(directions: &Directions) -> Self::Vector;
+
+    /// Writes a vector.
+    fn directions(v: &Self::Vector) -> Directions;
+
+    /// Reads a number for each further invariant.
+    fn numbers(values: &Values) -> Self::Numbers;
+}
+
+/// A visitor of a flow: in its types, or in plain numbers.
+pub trait FlowVisitor<F: Flow>: Sized {
+    /// The result.
+    type Output;
+
+    /// Visits the flow in its types.
+    fn typed(self, flow: &F) -> Self::Output;
+
+    /// Visits the flow in plain numbers.
+    fn written(self, flow: &F) -> Self::Output
+    where
+        F: Written;
+}
+
 /// A flow of which nothing is known but what its states and its numbers are. The parts of a run that are not in its loop
 /// are compiled for it, and so once for each space.
 pub(crate) type AnyFlow<'a, F> = dyn Flow<Space = <F as Flow>::Space, Numbers = <F as Flow>::Numbers, Vector = <F as Flow>::Vector>
     + 'a;
+
+/// Calls `f` in the [room](Flow::room) of a flow.
+///
+/// # Panics
+///
+/// If the room does not call the work in it.
+#[inline]
+pub fn in_room<F: Flow + ?Sized, T>(flow: &F, f: impl FnOnce() -> T) -> T {
+    let (mut f, mut result) = (Some(f), None);
+    flow.room(&mut || result = f.take().map(|f| f()));
+    result.expect("a room calls the work in it")
+}
 
 /// A system as a run sees it: its laws, its sizes, and its equation of motion.
 ///
@@ -122,13 +197,11 @@ pub trait Flow {
         Some(y.clone())
     }
 
-    /// Calls `f` with the room on the stack that a step of this flow needs. A flow whose steps need little calls it
+    /// Calls `work` once, with the room on the stack that a step of this flow needs. A flow whose steps need little calls it
     /// as it is.
-    fn with_room<T>(&self, f: impl FnOnce() -> T) -> T
-    where
-        Self: Sized,
-    {
-        f()
+    #[inline]
+    fn room(&self, work: &mut dyn FnMut()) {
+        work();
     }
 
     /// The state in which a run starts at a time. The default is the one that is given.
@@ -341,6 +414,14 @@ pub trait Flow {
         let rates = self.rates(x, &self.sizes(x).map(|_| 0.0))?;
         let terms = rates.map(f64::abs);
         Some([rates, terms])
+    }
+
+    /// Receives a visitor: in the types of the flow, or in plain numbers if it is [written](Written) in them.
+    fn visit<V: FlowVisitor<Self>>(&self, visitor: V) -> V::Output
+    where
+        Self: Sized,
+    {
+        visitor.typed(self)
     }
 
     /// An estimate of the local error of a step, for methods that have none; `None` if it has no value.

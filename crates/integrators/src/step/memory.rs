@@ -13,7 +13,7 @@ use super::exact::Exact;
 pub(crate) const FARTHEST: f64 = 16.0;
 
 /// The memory of a method from one step to the next.
-pub trait Memory: Clone + Debug + Default {
+pub trait Memory: Clone + Debug + Default + 'static {
     /// The memory for steps of `ratio` times the size.
     #[must_use]
     fn rescaled(&self, ratio: f64) -> Self;

@@ -36,7 +36,7 @@ impl<V: Vector> Scales<V> {
 
     /// The rounding of a displacement in the time `h`.
     pub(crate) fn rounding(&self, h: f64) -> V {
-        self.terms.map(|terms| terms * (16.0 * f64::EPSILON * h))
+        self.terms.map(|terms| rounding(terms, h))
     }
 
     /// The norm of the velocity relative to the sizes, without what is noise.
@@ -45,6 +45,11 @@ impl<V: Vector> Scales<V> {
         let above = V::zip([v, &noise], |[v, noise]| if v.abs() <= noise { 0.0 } else { v });
         relative(&above, &self.sizes)
     }
+}
+
+/// The rounding of a displacement in the time `h`, of a velocity with terms of this size.
+pub(crate) fn rounding(terms: f64, h: f64) -> f64 {
+    terms * (16.0 * f64::EPSILON * h)
 }
 
 /// The larger one of two sizes, entry by entry.

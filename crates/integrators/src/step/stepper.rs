@@ -10,7 +10,7 @@ use super::{
 /// Laws ([`laws::method`](crate::laws::method)): 1. [`order`](Self::order) is the slope of the error;
 /// 2. what [`promises`](Self::promises) says holds on every step; 3. a step from a saved memory is the same
 /// step, bit for bit.
-pub trait Stepper<F: Flow>: Sized {
+pub trait Stepper<F: Flow + ?Sized>: Sized {
     /// The memory from one step to the next, [`saved`](Memory) by a checkpoint.
     type Memory: Memory;
 
@@ -18,6 +18,11 @@ pub trait Stepper<F: Flow>: Sized {
     /// its name. The default is the name of the type without paths.
     fn name(&self) -> String {
         name_of::<Self>()
+    }
+
+    /// The memory before the first step, and after a corner across which nothing is extrapolated.
+    fn memory(&self) -> Self::Memory {
+        Self::Memory::default()
     }
 
     /// The order of convergence: it sets the exponents of adaptive step sizes.
@@ -54,7 +59,7 @@ pub trait Stepper<F: Flow>: Sized {
 
     /// Takes a step of size `h`, in parts if needed.
     ///
-    /// A run calls it within [`Flow::with_room`]; so does a caller that steps a large system by itself.
+    /// A run calls it in the [room](Flow::room) of the flow ([`in_room`](super::in_room)); so does a caller that steps a large system by itself.
     ///
     /// # Errors
     ///

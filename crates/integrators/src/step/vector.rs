@@ -6,7 +6,7 @@ use metriplectic_fields::Column;
 
 /// A number for each direction of a [`Flow`](crate::Flow): `Vec<f64>`, or the [`Components`] of a vector of
 /// fixed length.
-pub trait Vector: Clone + Debug {
+pub trait Vector: Clone + Debug + 'static {
     /// How many there are.
     fn len(&self) -> usize;
 
@@ -225,13 +225,15 @@ impl<V: Column<f64>> Vector for Components<V> {
     #[inline]
     fn relative_to(&self, sizes: &Self) -> f64 {
         let ratio = |i| if self.0[i] == 0.0 { 0.0 } else { (self.0[i] / sizes.0[i]).abs() };
-        norm(&V::from_index(ratio))
+        let ratios = V::from_index(ratio);
+        norm(V::LEN, |i| ratios[i])
     }
 
     /// Gives the bits of the default, which divides by one.
     #[inline]
     fn norm_of<const K: usize>(vectors: [&Self; K], f: impl Fn([f64; K]) -> f64 + Sync) -> f64 {
-        norm(&V::from_index(|i| f(at(vectors, i)).abs()))
+        let numbers = V::from_index(|i| f(at(vectors, i)).abs());
+        norm(V::LEN, |i| numbers[i])
     }
 
     /// Gives the bits of the default, and takes each pair of numbers once.
@@ -245,7 +247,7 @@ impl<V: Column<f64>> Vector for Components<V> {
             let [a, b] = f(at(vectors, i));
             (first[i], second[i]) = (a.abs(), b.abs());
         }
-        [norm(&first), norm(&second)]
+        [norm(V::LEN, |i| first[i]), norm(V::LEN, |i| second[i])]
     }
 }
 
@@ -259,13 +261,13 @@ fn at<V: Column<f64>, const K: usize>(vectors: [&Components<V>; K], i: usize) ->
     numbers
 }
 
-/// The Euclidean norm of numbers that are not negative; NaN if one is.
-#[inline]
-fn norm<V: Column<f64>>(ratios: &V) -> f64 {
+/// The Euclidean norm of so many numbers that are not negative; NaN if one is.
+#[inline(always)]
+pub(super) fn norm(count: usize, number: impl Fn(usize) -> f64) -> f64 {
     let (mut largest, mut check) = (0.0, 0.0);
-    for i in 0..V::LEN {
-        check += ratios[i];
-        largest = f64::max(largest, ratios[i]);
+    for i in 0..count {
+        check += number(i);
+        largest = f64::max(largest, number(i));
     }
     if check.is_nan() {
         return f64::NAN;
@@ -273,8 +275,8 @@ fn norm<V: Column<f64>>(ratios: &V) -> f64 {
     if largest >= f64::MIN_POSITIVE && largest.is_finite() {
         let unit = largest.recip();
         let mut sum = 0.0;
-        for i in 0..V::LEN {
-            sum += (ratios[i] * unit) * (ratios[i] * unit);
+        for i in 0..count {
+            sum += (number(i) * unit) * (number(i) * unit);
         }
         largest * sum.sqrt()
     } else {

@@ -38,7 +38,7 @@ pub(super) fn velocity_and_terms<Y: Metriplectic>(
 ) -> Option<[Vector<Y::Manifold>; 2]> {
     let (origin, sizes) = (Vector::<Y::Manifold>::zero(), Y::Manifold::scales(x));
     let v = velocity(system, x, origin)?;
-    if !is_small::<Y>() {
+    if const { !is_small::<Y>() } {
         return Some([v, terms_of_many(system, x, &v, &sizes)?]);
     }
     let slopes = slopes_at(system, x, origin);

@@ -21,7 +21,7 @@ use crate::step::CountOf;
 
 /// The rounding of a differential, and of a product with it, in units of `ε` of its terms.
 /// A factor of four fails `tests/explicit.rs::a_start_beside_an_unstable_axis_leaves_it_with_friction_that_produces_nothing`.
-const ROUNDING: f64 = 8.0;
+pub(crate) const ROUNDING: f64 = 8.0;
 
 /// A law along a line: its differentials at the start, in the middle and at the end, made independent of others.
 #[derive(Clone, Copy, Debug)]

@@ -16,7 +16,7 @@ use crate::run::ending::Ending;
 use crate::run::paired::{Unpaired, paired};
 use crate::run::schedule::Schedule;
 use crate::run::state::State;
-use crate::step::{Dim, Flow as _, Stepper};
+use crate::step::{Dim, Stepper, in_room};
 
 /// A derivative along a state of the wide system.
 type Costate<D> = Vector<<Wide<D> as Metriplectic>::Manifold>;
@@ -109,7 +109,7 @@ pub trait Adjoints: Sized {
         Self: Clone + Stepper<D> + LinearisedAlong<D>,
     {
         let schedule = schedule.into();
-        system.wide().with_room(|| {
+        in_room(system.wide(), || {
             let tape = Tape::record(self.clone(), system, (x0, schedule), steps.max(1))?;
             Ok(AdjointRun { system, method: self, tape })
         })
@@ -228,7 +228,7 @@ where
         &self,
         rows: &[Vector<D::Manifold>],
     ) -> Result<LossGradient, TangentError<D::Manifold>> {
-        self.system.wide().with_room(|| self.backwards(rows))
+        in_room(self.system.wide(), || self.backwards(rows))
     }
 
     fn backwards(

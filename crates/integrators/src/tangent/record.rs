@@ -24,7 +24,7 @@ use crate::run::method::Method as _;
 use crate::run::paired::{Unpaired, paired};
 use crate::run::recording::Numbered;
 use crate::run::schedule::Schedule;
-use crate::step::{Flow as _, Stepper};
+use crate::step::{Stepper, in_room};
 
 /// Runs with their derivatives, by every method whose steps are [linearised](LinearisedAlong).
 ///
@@ -81,9 +81,9 @@ pub trait Tangents: Sized {
             return Err(TangentError::Broken { what: "corners" });
         }
         let steps = self.steps(system, x0, schedule)?;
-        let columns = system
-            .wide()
-            .with_room(|| Columns::start(system.wide(), &system.widened(&steps.state().point)));
+        let columns = in_room(system.wide(), || {
+            Columns::start(system.wide(), &system.widened(&steps.state().point))
+        });
         let sensitivity = Sensitivity::default();
         Ok(TangentSteps { steps, columns, sensitivity, jumps })
     }
@@ -106,7 +106,7 @@ pub trait Tangents: Sized {
         Self: Stepper<D> + LinearisedAlong<D>,
     {
         let steps = self.tangent_steps(system, x0, schedule)?;
-        system.wide().with_room(|| record(steps))
+        in_room(system.wide(), || record(steps))
     }
 
     /// Runs a system with its derivatives until they are as exact as `accuracy`.

@@ -24,7 +24,7 @@ use crate::run::event::Event;
 use crate::run::jump::SmoothJump;
 use crate::run::last_step::LastStep;
 use crate::run::steps::Steps;
-use crate::step::{Dim, Flow, Scales, Stepper};
+use crate::step::{Dim, Flow, Scales, Stepper, in_room};
 
 /// A run with its tangent, step by step; made by [`Tangents::tangent_steps`](crate::Tangents::tangent_steps).
 ///
@@ -99,7 +99,7 @@ where
     /// [`TangentError`]; the state is then the last one reached.
     pub fn advance(&mut self) -> Result<(), TangentError<D::Manifold>> {
         let flow = self.steps.flow();
-        flow.wide().with_room(|| self.take_step().map(drop))
+        in_room(flow.wide(), || self.take_step().map(drop))
     }
 
     /// Takes one step, and returns what was asked for inside it.

@@ -23,5 +23,5 @@
         }
     }
     let count: usize = "3".parse()?;
-    (FromEquations(Oscillators(count)), vec![0.1; 2 * count])
+    (FromEquations(Oscillators(count)), Entries::from(vec![0.1; 2 * count]))
 }

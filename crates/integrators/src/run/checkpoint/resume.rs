@@ -30,14 +30,16 @@ fn vector<V: Vector>(what: &'static str, list: &[Exact], like: &V) -> Result<V, 
     like.with_list(&numbers).ok_or(ResumeError::Length { what, found, expected })
 }
 
-impl<'a, F: Flow, M: Stepper<F>> Steps<'a, F, M> {
+impl<F: Flow + ?Sized, M: Stepper<F>> Steps<'_, F, M> {
     /// All that the next steps depend on, but for the system and the options of the method.
     pub fn checkpoint(&self) -> Checkpoint {
         let mut memory = Saved::default();
         self.memory.save(&mut memory);
         self.course.checkpoint(self.method.name(), memory)
     }
+}
 
+impl<'a, F: Flow, M: Stepper<F>> Steps<'a, F, M> {
     /// A run that was put down.
     pub(crate) fn resume(
         method: M,

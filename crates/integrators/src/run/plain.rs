@@ -1,0 +1,105 @@
+//! Runs of flows in plain numbers: compiled with this library, and not with each system.
+
+use crate::run::error::RunError;
+use crate::run::event::Event;
+use crate::run::jump::Jump;
+use crate::run::schedule::Schedule;
+use crate::run::state::State;
+use crate::run::steps::Steps;
+use crate::run::trajectory::Trajectory;
+use crate::step::in_plain::{InPlainNumbers, MethodInTypes};
+use crate::step::panicked::caught;
+use crate::step::{
+    Element, Entries, Flow, FlowError, FlowVisitor, PlainFlow, PlainMethod, PlainNumbers, Stepper,
+    Written, in_room,
+};
+
+/// A run of a method over a schedule, in the types of a flow or in plain numbers.
+pub(super) struct Whole<F: Flow, M> {
+    pub(super) method: M,
+    pub(super) x0: Element<F>,
+    pub(super) schedule: Schedule,
+}
+
+impl<F: Flow, M: Stepper<F>> FlowVisitor<F> for Whole<F, M> {
+    type Output = Result<Trajectory<F::Space>, RunError<F::Space>>;
+
+    fn typed(self, flow: &F) -> Self::Output {
+        let Self { method, x0, schedule } = self;
+        in_room(flow, || Steps::start(method, flow, x0, schedule)?.run())
+    }
+
+    fn written(self, flow: &F) -> Self::Output
+    where
+        F: Written,
+    {
+        let Self { method, x0, mut schedule } = self;
+        for request in &mut schedule.watch.events {
+            *request = request.in_numbers(flow);
+        }
+        let in_numbers = InPlainNumbers::from(flow, x0);
+        let method = MethodInTypes { method, flow };
+        let run = || run(&method, &in_numbers, schedule);
+        let outcome = if const { F::CATCHES_PANICS } {
+            caught(run).unwrap_or_else(|panicked| Err(FlowError::new(panicked).into()))
+        } else {
+            run()
+        };
+        match outcome {
+            Ok(run) => Ok(run.read::<F>(flow.layout())),
+            Err(error) => Err(error.read::<F>(flow.layout())),
+        }
+    }
+}
+
+/// Runs a flow in plain numbers, which knows its start.
+fn run(
+    method: &dyn PlainMethod,
+    flow: &PlainFlow<'_>,
+    schedule: Schedule,
+) -> Result<Trajectory<PlainNumbers>, RunError<PlainNumbers>> {
+    in_room(flow, || Steps::start_any(method, (flow, flow), Entries::zeros(0), schedule)?.run())
+}
+
+impl State<PlainNumbers> {
+    fn read<F: Written>(self, layout: &F::Layout) -> State<F::Space> {
+        let Self { step, time, point, energy, entropy } = self;
+        State { step, time, point: F::read(layout, &point), energy, entropy }
+    }
+}
+
+impl Event<PlainNumbers> {
+    fn read<F: Written>(self, layout: &F::Layout) -> Event<F::Space> {
+        let Self { name, index, rises, state, jump } = self;
+        let jump =
+            jump.map(|Jump { after, exchange }| Jump { after: after.read::<F>(layout), exchange });
+        Event { name, index, rises, state: state.read::<F>(layout), jump }
+    }
+}
+
+impl Trajectory<PlainNumbers> {
+    fn read<F: Written>(self, layout: &F::Layout) -> Trajectory<F::Space> {
+        let Self { states, events, certificate, ending, checkpoint } = self;
+        // Into an array of its own: in the one of the plain states it would leave a hole in the memory behind each run.
+        let mut typed = Vec::with_capacity(states.len());
+        typed.extend(states.into_iter().map(|state| state.read::<F>(layout)));
+        let states = typed;
+        let events = events.into_iter().map(|event| event.read::<F>(layout)).collect();
+        Trajectory { states, events, certificate, ending, checkpoint }
+    }
+}
+
+impl RunError<PlainNumbers> {
+    fn read<F: Written>(self, layout: &F::Layout) -> RunError<F::Space> {
+        match self {
+            Self::Model(error) => RunError::Model(error),
+            Self::Flow(error) => RunError::Flow(error),
+            Self::Method(error) => RunError::Method(error),
+            Self::Span(error) => RunError::Span(error),
+            Self::Start(error) => RunError::Start(error),
+            Self::Step { cause, trajectory } => {
+                RunError::Step { cause, trajectory: Box::new(trajectory.read::<F>(layout)) }
+            }
+        }
+    }
+}

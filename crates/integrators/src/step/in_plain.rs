@@ -1,0 +1,384 @@
+//! A flow in plain numbers: it answers as the flow does in its types, and reads and writes numbers. So does a method of it.
+
+use std::cell::Cell;
+
+use metriplectic_dynamics::invariants::Kind;
+use metriplectic_dynamics::{ModelError, SecondLaw};
+use metriplectic_manifolds::PointError;
+
+use super::panicked::{Panicked, caught};
+use super::plain_method::{PlainMemory, PlainMethod};
+use super::{
+    Control, Directions, Effort, Element, Entries, EventExchange, Flow, FlowError, Laws,
+    LedgerErrors, LedgerSummary, MethodError, NoiseSummary, PlainFlow, PlainNumbers, Promises,
+    Recheck, Refusal, Scales, StartError, StepEnds, StepError, StepStart, Stepper, Taken, Values,
+    Written,
+};
+
+/// A flow in plain numbers.
+pub(crate) struct InPlainNumbers<'a, F: Flow> {
+    flow: &'a F,
+    /// The state in which a run starts, until it has begun: its ledger may be that of another flow.
+    start: Cell<Option<Element<F>>>,
+}
+
+/// Writes the laws of a flow.
+fn written<L: AsRef<[f64]>>(Laws { energy, entropy, invariants }: &Laws<L>) -> Laws<Values> {
+    Laws { energy: *energy, entropy: *entropy, invariants: Values::of(invariants.as_ref()) }
+}
+
+/// Reads the laws of a flow.
+fn typed<F: Written>(Laws { energy, entropy, invariants }: &Laws<Values>) -> Laws<F::Numbers> {
+    Laws { energy: *energy, entropy: *entropy, invariants: F::numbers(invariants) }
+}
+
+impl<'a, F: Written> InPlainNumbers<'a, F> {
+    /// The flow, for a run from a state.
+    pub(crate) const fn from(flow: &'a F, start: Element<F>) -> Self {
+        Self { flow, start: Cell::new(Some(start)) }
+    }
+
+    #[inline]
+    fn at(&self, x: &[f64]) -> Element<F> {
+        F::read(self.flow.layout(), x)
+    }
+
+    fn scales(Scales { sizes, terms }: Scales<F::Vector>) -> Scales<Directions> {
+        Scales { sizes: F::directions(&sizes), terms: F::directions(&terms) }
+    }
+}
+
+impl<F: Written> Flow for InPlainNumbers<'_, F> {
+    type Space = PlainNumbers;
+    type Numbers = Values;
+    type Vector = Directions;
+
+    fn room(&self, work: &mut dyn FnMut()) {
+        self.flow.room(work);
+    }
+
+    fn laws(&self, x: &Entries) -> Laws<Values> {
+        written(&self.flow.laws(&self.at(x)))
+    }
+
+    fn term_sizes(&self, x: &Entries) -> Laws<Values> {
+        written(&self.flow.term_sizes(&self.at(x)))
+    }
+
+    /// Has no value where the flow panics: so a checkpoint of the states before is written.
+    fn rates(&self, x: &Entries, d: &Directions) -> Option<Directions> {
+        let rates = || self.flow.rates(&self.at(x), &F::vector(d));
+        let rates =
+            if const { F::CATCHES_PANICS } { caught(rates).ok().flatten() } else { rates() };
+        rates.map(|v| F::directions(&v))
+    }
+
+    fn sizes(&self, x: &Entries) -> Directions {
+        F::directions(&self.flow.sizes(&self.at(x)))
+    }
+
+    fn moved(&self, x: &Entries, d: &Directions) -> Entries {
+        F::write(&self.flow.moved(&self.at(x), &F::vector(d)))
+    }
+
+    fn displacement(&self, x: &Entries, y: &Entries) -> Option<Directions> {
+        self.flow.displacement(&self.at(x), &self.at(y)).map(|v| F::directions(&v))
+    }
+
+    fn production(&self, x: &Entries) -> Option<f64> {
+        self.flow.production(&self.at(x))
+    }
+
+    fn onto(&self, y: &Entries, to: &Laws<Values>, entropy: Option<f64>) -> Option<Entries> {
+        let (y, laws) = (self.at(y), typed::<F>(to));
+        self.flow.onto(&y, &laws, entropy).map(|y| F::write(&y))
+    }
+
+    /// Begins in the state that was given in types.
+    fn begin(&self, x: Entries, time: f64) -> Result<Entries, StartError> {
+        let start = self.start.take().unwrap_or_else(|| self.at(&x));
+        self.flow.begin(start, time).map(|x| F::write(&x))
+    }
+
+    fn clocked(&self, x: &Entries, time: f64) -> Option<Entries> {
+        self.flow.clocked(&self.at(x), time).map(|x| F::write(&x))
+    }
+
+    fn jumped(&self, x: &Entries, y: Entries) -> Entries {
+        F::write(&self.flow.jumped(&self.at(x), self.at(&y)))
+    }
+
+    fn with_event(&self, x: &Entries, event: &EventExchange) -> Option<Entries> {
+        self.flow.with_event(&self.at(x), event).map(|x| F::write(&x))
+    }
+
+    fn depends_on_time(&self) -> bool {
+        self.flow.depends_on_time()
+    }
+
+    fn ledger(&self, x: &Entries) -> Option<LedgerSummary> {
+        self.flow.ledger(&self.at(x))
+    }
+
+    fn has_ledger(&self) -> bool {
+        self.flow.has_ledger()
+    }
+
+    fn ledger_errors(&self, errors: &Directions) -> Option<LedgerErrors> {
+        self.flow.ledger_errors(&F::vector(errors))
+    }
+
+    fn with_ledger_sizes(&self, x: &Entries, scales: Scales<Directions>) -> Scales<Directions> {
+        let Scales { sizes, terms } = scales;
+        let scales = Scales { sizes: F::vector(&sizes), terms: F::vector(&terms) };
+        Self::scales(self.flow.with_ledger_sizes(&self.at(x), scales))
+    }
+
+    fn inspect(&self, ends: [&Entries; 2], of_one_size: bool) -> Result<(), StepError> {
+        let [x, y] = ends.map(|x| self.at(x));
+        self.flow.inspect([&x, &y], of_one_size)
+    }
+
+    fn element(&self, entries: &[f64]) -> Result<Entries, PointError> {
+        self.flow.element(entries).map(|x| F::write(&x))
+    }
+
+    fn entropy_law(&self) -> SecondLaw {
+        self.flow.entropy_law()
+    }
+
+    fn kinds(&self) -> Vec<Kind> {
+        self.flow.kinds()
+    }
+
+    fn is_projected(&self) -> bool {
+        self.flow.is_projected()
+    }
+
+    fn check(&self, x0: &Entries) -> Result<(), ModelError> {
+        self.flow.check(&self.at(x0))
+    }
+
+    fn is_verified(&self) -> bool {
+        self.flow.is_verified()
+    }
+
+    fn examine(&self, x0: &Entries) -> Result<(), FlowError> {
+        self.flow.examine(&self.at(x0))
+    }
+
+    fn rechecks(&self, occasion: Recheck) -> bool {
+        self.flow.rechecks(occasion)
+    }
+
+    fn recheck(&self, x: &Entries, occasion: Recheck) -> Result<(), ModelError> {
+        self.flow.recheck(&self.at(x), occasion)
+    }
+
+    fn reexamine(&self, x: &Entries, occasion: Recheck) -> Result<(), FlowError> {
+        self.flow.reexamine(&self.at(x), occasion)
+    }
+
+    fn site_outside(&self, x: &Entries, d: &Directions) -> Option<usize> {
+        self.flow.site_outside(&self.at(x), &F::vector(d))
+    }
+
+    fn defect(&self, x: &Entries) -> f64 {
+        self.flow.defect(&self.at(x))
+    }
+
+    fn energy_sizes(&self, ends: [&Entries; 2]) -> [f64; 2] {
+        let [x, y] = ends.map(|x| self.at(x));
+        self.flow.energy_sizes([&x, &y])
+    }
+
+    fn entropy_round_off(&self, ends: [&Entries; 2]) -> f64 {
+        let [x, y] = ends.map(|x| self.at(x));
+        self.flow.entropy_round_off([&x, &y])
+    }
+
+    fn dependent_invariant(&self, x: &Entries) -> Option<(usize, f64)> {
+        self.flow.dependent_invariant(&self.at(x))
+    }
+
+    fn reach(&self, x: &Entries, span: f64) -> Option<Scales<Directions>> {
+        self.flow.reach(&self.at(x), span).map(Self::scales)
+    }
+
+    fn velocity_terms(
+        &self,
+        x: &Entries,
+        v: &Directions,
+        sizes: &Directions,
+    ) -> Option<Directions> {
+        self.flow
+            .velocity_terms(&self.at(x), &F::vector(v), &F::vector(sizes))
+            .map(|v| F::directions(&v))
+    }
+
+    fn rates_and_terms(&self, x: &Entries) -> Option<[Directions; 2]> {
+        self.flow.rates_and_terms(&self.at(x)).map(|both| both.map(|v| F::directions(&v)))
+    }
+
+    fn local_error(&self, x: &Entries, end: &Entries, h: f64) -> Option<Directions> {
+        self.flow.local_error(&self.at(x), &self.at(end), h).map(|v| F::directions(&v))
+    }
+}
+
+/// A method that takes its steps in types, as one of flows in plain numbers.
+pub(crate) struct MethodInTypes<'a, F, M> {
+    pub(crate) method: M,
+    pub(crate) flow: &'a F,
+}
+
+/// The error of a step in which the system has panicked.
+fn error_of(start: &StepStart<'_, PlainFlow<'_>>, panicked: Panicked) -> StepError {
+    StepError::Flow { time: start.time, law: FlowError::new(panicked) }
+}
+
+impl<F: Written, M: Stepper<F>> MethodInTypes<'_, F, M> {
+    #[inline]
+    fn at(&self, x: &[f64]) -> Element<F> {
+        F::read(self.flow.layout(), x)
+    }
+
+    /// Calls `f` with the start of a step in types.
+    #[inline]
+    fn from<T>(
+        &self,
+        start: &StepStart<'_, PlainFlow<'_>>,
+        f: impl FnOnce(&StepStart<'_, F>) -> T,
+    ) -> T {
+        let StepStart { x, time, values, reference, allowed, .. } = start;
+        f(&StepStart {
+            flow: self.flow,
+            x: &self.at(x),
+            time: *time,
+            values: typed::<F>(values),
+            reference: typed::<F>(reference),
+            allowed: allowed.as_ref().map(F::vector),
+        })
+    }
+
+    /// Calls `f` with the ends of a step in types.
+    #[inline]
+    fn between_ends<T>(
+        &self,
+        &StepEnds { x, end, h, values, reference, .. }: &StepEnds<'_, PlainFlow<'_>>,
+        f: impl FnOnce(&StepEnds<'_, F>) -> T,
+    ) -> T {
+        let [x, end] = [x, end].map(|x| self.at(x));
+        let [before, after] = values.map(typed::<F>);
+        let reference = &typed::<F>(reference);
+        let (flow, values) = (self.flow, [&before, &after]);
+        f(&StepEnds { flow, x: &x, end: &end, h, values, reference })
+    }
+
+    #[inline]
+    fn taken<'a>(Taken { x, values, evidence, effort }: Taken<F>) -> Taken<PlainFlow<'a>> {
+        Taken { x: F::write(&x), values: written(&values), evidence, effort }
+    }
+}
+
+impl<F: Written, M: Stepper<F>> PlainMethod for MethodInTypes<'_, F, M> {
+    fn name(&self) -> String {
+        self.method.name()
+    }
+
+    fn order(&self) -> u32 {
+        self.method.order()
+    }
+
+    fn control(&self) -> Control {
+        self.method.control()
+    }
+
+    fn damps(&self) -> bool {
+        self.method.damps()
+    }
+
+    fn memory(&self) -> PlainMemory {
+        PlainMemory::new(self.method.memory())
+    }
+
+    fn promises(&self, _: &PlainFlow<'_>) -> Promises {
+        self.method.promises(self.flow)
+    }
+
+    fn noise(&self, _: &PlainFlow<'_>) -> Option<NoiseSummary> {
+        self.method.noise(self.flow)
+    }
+
+    fn nothing_between(&self, time: f64, h: f64) -> StepError {
+        self.method.nothing_between(time, h)
+    }
+
+    fn check(&self, follows_tolerance: bool) -> Result<(), MethodError> {
+        self.method.check(follows_tolerance)
+    }
+
+    fn step<'a>(
+        &self,
+        start: &StepStart<'_, PlainFlow<'a>>,
+        h: f64,
+        memory: &mut PlainMemory,
+    ) -> Result<Taken<PlainFlow<'a>>, StepError> {
+        let step = |memory: &mut PlainMemory| {
+            self.from(start, |start| self.method.step(start, h, memory.of()))
+        };
+        if const { !F::CATCHES_PANICS } {
+            return step(memory).map(Self::taken);
+        }
+        let before = memory.clone();
+        match caught(|| step(memory)) {
+            Ok(taken) => taken.map(Self::taken),
+            Err(panicked) => {
+                // A part of the step may have been taken.
+                *memory = before;
+                Err(error_of(start, panicked))
+            }
+        }
+    }
+
+    fn attempt<'a>(
+        &self,
+        start: &StepStart<'_, PlainFlow<'a>>,
+        h: f64,
+        memory: &mut PlainMemory,
+    ) -> Result<Taken<PlainFlow<'a>>, Refusal> {
+        let mut attempt = || self.from(start, |start| self.method.attempt(start, h, memory.of()));
+        if const { !F::CATCHES_PANICS } {
+            return attempt().map(Self::taken);
+        }
+        let refused = |panicked| Refusal {
+            effort: Effort::default(),
+            error: Some(error_of(start, panicked)),
+            second_law: false,
+        };
+        caught(attempt).unwrap_or_else(|panicked| Err(refused(panicked))).map(Self::taken)
+    }
+
+    fn error(
+        &self,
+        step: &StepEnds<'_, PlainFlow<'_>>,
+        memory: &PlainMemory,
+        norm: &dyn Fn(&Directions) -> f64,
+    ) -> Option<f64> {
+        self.between_ends(step, |step| {
+            self.method.error(step, memory.after_a_step()?, |error| norm(&F::directions(error)))
+        })
+    }
+
+    fn between(
+        &self,
+        step: &StepEnds<'_, PlainFlow<'_>>,
+        memory: &mut PlainMemory,
+        theta: f64,
+    ) -> Option<Entries> {
+        let mut inside =
+            || self.between_ends(step, |step| self.method.between(step, memory.of(), theta));
+        let inside =
+            if const { F::CATCHES_PANICS } { caught(inside).ok().flatten() } else { inside() };
+        inside.map(|x| F::write(&x))
+    }
+}

@@ -93,7 +93,7 @@ fn a_start_that_contradicts_is_a_typed_error_everywhere() {
     assert!(matches!(of_other, Error::Start(StartError::Ledger { found: 2, expected: 1 })));
 }
 
-/// What a jump makes of a state is its point: the clock and the ledger are those of the run, whatever the closure returns.
+/// A jump takes the point of the state that its closure returns: the clock and the ledger are those of the run.
 #[test]
 fn a_jump_takes_the_point_of_a_state_with_another_ledger() {
     macro_rules! oscillator {

@@ -23,7 +23,7 @@
 //!
 //! At an infinite temperature `⟨dH, ♯n⟩` changes its sign and `u` has no direction: near it `τ` is reduced to zero. How
 //! near is measured with the largest entries of `dH` at the stages, since a single term is never small beside itself.
-//! Where friction vanishes at every stage, it damps nothing, and the entropy is corrected in both directions.
+//! It damps nothing where friction vanishes at every stage, and the entropy is corrected in both directions.
 //!
 //! `u` is a choice: where an unresolved transient loses energy, the laws do not say which variable warms. Heat moves no
 //! entry whose row of `K` is zero at the start, such as a length on which the entropy depends. Where several entries may

@@ -80,7 +80,7 @@ pub type PlainFlow<'a> = dyn Flow<Space = PlainNumbers, Numbers = Values, Vector
 
 /// A flow whose states, vectors and laws are written in plain numbers, so that its runs are compiled with this library.
 pub trait Written: Flow + Sized {
-    /// Whether a panic in the flow ends a run in an error: in one whose functions are yours.
+    /// Says whether a panic in the flow ends a run in an error: in one whose functions are yours.
     const CATCHES_PANICS: bool = false;
 
     /// The parts of a state that are no entries, such as the names in a ledger.

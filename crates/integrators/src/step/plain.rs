@@ -205,7 +205,7 @@ impl Directions {
 
     /// So many zeros, with so many of a ledger among them.
     #[inline]
-    pub fn beside(count: usize, beside: usize) -> Self {
+    pub(crate) fn beside(count: usize, beside: usize) -> Self {
         Self { all: Few::zeros(count), beside }
     }
 

@@ -20,6 +20,7 @@ const LAYOUT: &[(&str, &str)] = &[
     ("noise/sampler.rs", "MOST"),
     ("numbers/rows.rs", "NO_CLOCK"),
     ("open/vector.rs", "ALL"),
+    ("open/vector.rs", "BESIDE"),
     ("round_off/bound.rs", "NO_DIGITS"),
     ("run/checkpoint.rs", "VERSION"),
     ("run/event.rs", "PIECE"),

@@ -254,6 +254,12 @@ impl<M: Space> Gradient<M> for AtPoint<'_, M> {
 }
 
 impl<Y: Metriplectic + ?Sized> InNumbers<'_, Y> {
+    /// Calls `f` with the system and the entries of a state, with room on the stack for its matrices, and without an allocation
+    /// where the entries are few.
+    pub fn at<T>(&self, x: &Point<Y>, f: impl FnOnce(&dyn Equations, &[f64]) -> T) -> T {
+        with_room::<Dim<Y>, T>(|| with_entries::<Of<Y>, T>(x, |x| f(self, x)))
+    }
+
     /// The differentials of all laws at a point; `None` if one of them or a value is no number.
     #[inline]
     fn covectors(&self, x: &Point<Y>) -> Option<OfLaws<Y>> {
@@ -289,7 +295,7 @@ impl<Y: Metriplectic + ?Sized> InNumbers<'_, Y> {
     fn laws(&self, with: &mut impl WithField<Of<Y>>) {
         with.visit(self.0.energy());
         with.visit(self.0.entropy());
-        if Y::Invariants::COUNT > 0 {
+        if const { Y::Invariants::COUNT > 0 } {
             self.0.invariants().each(&mut Each(with));
         }
     }

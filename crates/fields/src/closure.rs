@@ -91,13 +91,13 @@ fn taylor_seeds<M: Space, D: Scalar>(
     let n = M::Dim::LEN;
     let base = M::real(x);
     let none = D::zero();
-    if D::NDERIV == 0 {
+    if const { D::NDERIV == 0 } {
         let weights = Weights { re: 1.0, eps1: none, eps2: none, eps1eps2: none };
         return visit(&M::constant(&base), &weights);
     }
     let (d, seeded) = (M::coordinates(&base, x), M::seeds(&base));
     let first = |i: usize| if i == 0 { 1.0 } else { 0.0 };
-    if D::NDERIV == 1 {
+    if const { D::NDERIV == 1 } {
         for i in (0..n).step_by(2) {
             let eps2 = if i + 1 < n { d[i + 1] } else { none };
             let weights = Weights { re: first(i), eps1: d[i], eps2, eps1eps2: none };

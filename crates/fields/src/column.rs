@@ -130,8 +130,11 @@ impl<D: Scalar, const N: usize> Column<D> for SVector<D, N> {
     fn from_index(mut f: impl FnMut(usize) -> D) -> Self {
         // Of all ways to write this loop it is the cheapest to compile, and columns are made everywhere.
         let mut entries = [D::zero(); N];
-        for (i, entry) in entries.iter_mut().enumerate() {
+        let mut left = entries.as_mut_slice();
+        let mut i = 0;
+        while let [entry, rest @ ..] = left {
             *entry = f(i);
+            (left, i) = (rest, i + 1);
         }
         Self::from_array_storage(ArrayStorage([entries]))
     }

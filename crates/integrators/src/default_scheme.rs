@@ -17,6 +17,8 @@ macro_rules! by_default {
         {
             type Memory = <Scheme<Self> as Stepper<F>>::Memory;
 
+            const HAS_DEFAULT_BETWEEN: bool = <Scheme<Self> as Stepper<F>>::HAS_DEFAULT_BETWEEN;
+
             fn name(&self) -> String {
                 Scheme::new(*self).name()
             }

@@ -76,7 +76,7 @@ use crate::step::{
 
 pub(crate) use chebyshev::{CHEBYSHEV, Coefficients, Recursion};
 use dormand_prince::{EIGHT, FIVE};
-use trial::{Done, Trial};
+use trial::{Done, Kind, Trial};
 
 pub use tableau::{Row, Tableau};
 pub use tableau_error::TableauError;
@@ -267,7 +267,7 @@ macro_rules! method {
                 h: f64,
                 memory: &mut MemoryOf<F>,
             ) -> Result<Taken<F>, StepError> {
-                step::with_halves(&Trial { tableau: self.tableau(), start, h }, memory)
+                step::with_halves::<F, Self>(&Trial { tableau: self.tableau(), start, h }, memory)
             }
 
             #[inline]
@@ -277,7 +277,7 @@ macro_rules! method {
                 h: f64,
                 memory: &mut MemoryOf<F>,
             ) -> Result<Taken<F>, Refusal> {
-                step::attempt(&Trial { tableau: self.tableau(), start, h }, memory)
+                step::attempt::<F, Self>(&Trial { tableau: self.tableau(), start, h }, memory)
             }
 
             fn error(
@@ -330,6 +330,23 @@ fn with_digest(tableau: &'static Tableau) -> String {
     let digest = tableau.digest();
     let ours = [&EIGHT, &FIVE].into_iter().any(|ours| ours.digest() == digest);
     if ours { plain(tableau) } else { format!("{} {digest:016x}", tableau.name) }
+}
+
+impl Kind for DormandPrince8 {
+    const MAY_BE_EIGHT: bool = true;
+}
+
+impl Kind for DormandPrince5 {
+    const MAY_BE_FIVE: bool = true;
+}
+
+impl Kind for RungeKuttaChebyshev {
+    const IS_CHEBYSHEV: bool = true;
+}
+
+impl Kind for ExplicitRungeKutta {
+    const MAY_BE_EIGHT: bool = true;
+    const MAY_BE_FIVE: bool = true;
 }
 
 method!(DormandPrince8, plain, |_, _| Ok(()));

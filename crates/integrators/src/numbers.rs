@@ -1,6 +1,7 @@
 //! A system in plain numbers is a flow, of a size that is known at run time.
 
 mod projection;
+mod recheck;
 mod referred_rise;
 mod rows;
 
@@ -13,6 +14,7 @@ use metriplectic_equations::{ENERGY, ENTROPY, Equations, Report, VerifiedEquatio
 use metriplectic_manifolds::PointError;
 
 use self::projection::{Aim, Projection};
+pub(crate) use self::recheck::recheck;
 use self::rows::NO_CLOCK;
 pub use self::rows::Rows;
 use crate::explicit::{Projected, ProjectionError, StageFlow, Target};
@@ -258,14 +260,7 @@ impl<S: Equations> Flow for FromEquations<S> {
     }
 
     fn recheck(&self, x: &Entries, occasion: Recheck) -> Result<(), ModelError> {
-        let judge = Judge::of(&self.0, NO_CLOCK);
-        match occasion {
-            Recheck::OnTheWay { step } => {
-                judge.check_state(x).and_then(|()| judge.look_at_derivatives(x, step))
-            }
-            Recheck::End => judge.check_state(x).and_then(|()| judge.check_derivatives(x)),
-            Recheck::Failure { .. } => judge.check_around(x, &[]),
-        }
+        recheck(&self.0, x, occasion)
     }
 
     fn defect(&self, x: &Entries) -> f64 {

@@ -8,6 +8,7 @@
 //!
 //! This module knows of no method and of no run.
 
+mod both;
 mod control;
 pub mod dense;
 pub(crate) mod digits;
@@ -34,6 +35,7 @@ mod stepper;
 pub(crate) mod type_names;
 mod vector;
 
+pub(crate) use both::both;
 pub use control::Control;
 pub use error::StepError;
 pub use evidence::{Effort, EntropyStep, Evidence, LimitingSites, Promises, StageLaws};

@@ -9,7 +9,7 @@ use metriplectic_dynamics::velocity::{
     Covectors, Gradient, differentials, irreversible, projected_fractions,
 };
 use metriplectic_dynamics::{
-    Dissipation, Invariants, Metriplectic, ModelError, SecondLaw, system::Point,
+    Dissipation, InNumbers, Invariants, Metriplectic, ModelError, SecondLaw, system::Point,
 };
 use metriplectic_fields::{ChartPoint, Column, Dimension, ScalarField, Space, stack};
 use metriplectic_manifolds::{Manifold, PointError};
@@ -20,6 +20,7 @@ pub use stages::LawJets;
 pub(crate) use stages::{CONSERVED, CORRECTIONS, OFF, STAGNATED};
 
 use crate::explicit::{StageFlow as _, Target};
+use crate::numbers::recheck;
 use crate::round_off::bound::{SizesAt, of_an_increment, size_of_terms, sizes_on_a_step};
 use crate::step::{
     Components, CountOf, Dim, Directions, Entries, Flow, FlowVisitor, Laws, Numbers, Recheck,
@@ -129,13 +130,7 @@ impl<Y: Metriplectic> Flow for Y {
     }
 
     fn recheck(&self, x: &Point<Y>, occasion: Recheck) -> Result<(), ModelError> {
-        match occasion {
-            Recheck::OnTheWay { step } => {
-                self.check_state(x).and_then(|()| self.look_at_derivatives(x, step))
-            }
-            Recheck::End => self.check_state(x).and_then(|()| self.check_derivatives(x)),
-            Recheck::Failure { h } => self.check_around(x, &ahead(self, x, h)),
-        }
+        InNumbers(self).at(x, |system, x| recheck(system, x, occasion))
     }
 
     #[inline]
@@ -174,7 +169,7 @@ impl<Y: Metriplectic> Flow for Y {
     }
 
     fn rates_and_terms(&self, x: &Point<Y>) -> Option<[Tangent<Y>; 2]> {
-        reach::velocity_and_terms(self, x).map(|both| both.map(Components))
+        reach::velocity_and_terms(self, x).map(|[v, terms]| [Components(v), Components(terms)])
     }
 
     /// In plain numbers, so that a run is compiled with this library.
@@ -241,19 +236,6 @@ impl<Y: Metriplectic> Written for Y {
     }
 }
 
-/// States along the velocity at `x`, on the way of a step of size `h`.
-#[cold]
-fn ahead<Y: Metriplectic>(system: &Y, x: &Point<Y>, h: f64) -> Vec<Point<Y>> {
-    let velocity = reach::velocity(system, x, Column::zero()).filter(Column::is_finite);
-    let Some(v) = velocity else { return Vec::new() };
-    let steps = AHEAD.iter().map(|theta| v * (theta * h));
-    steps.filter(Y::Manifold::is_near).map(|q| Y::Manifold::chart(x, &q)).collect()
-}
-
-/// The fractions of a step that fails at which its model is looked at.
-/// A factor of four fails `system.rs::a_model_is_looked_at_from_an_eighth_of_a_step_to_its_end`.
-const AHEAD: [f64; 4] = [0.125, 0.25, 0.5, 1.0];
-
 /// The further invariants of a system at a point.
 fn values<Y: Metriplectic>(system: &Y, x: &Point<Y>) -> Numbers<Y> {
     struct Values<'a, M: Space>(&'a M::Point<f64>);
@@ -274,7 +256,7 @@ fn of_each<Y: Metriplectic>(
     system: &Y,
     number: &mut impl Gradient<Y::Manifold, Covector = f64>,
 ) -> Numbers<Y> {
-    if Y::Invariants::COUNT == 0 {
+    if const { Y::Invariants::COUNT == 0 } {
         return CountOf::<Y>::array(|_| 0.0);
     }
     let numbers = Covectors::new([0.0; 2], system.invariants(), number);
@@ -296,24 +278,10 @@ const DEPENDENT: f64 = 1e-3;
 #[cfg(test)]
 mod tests {
     use super::*;
-    use metriplectic_dynamics::{Symplectic, System};
+    use metriplectic_dynamics::System;
     use metriplectic_fields::Real;
     use metriplectic_manifolds::Euclidean;
-    use nalgebra::{Vector2, Vector3, vector};
-
-    #[test]
-    fn a_model_is_looked_at_from_an_eighth_of_a_step_to_its_end() {
-        let system = System::on(Euclidean::<2>)
-            .bracket(Symplectic)
-            .energy(|x: &Vector2<Real>| x.norm_squared() * 0.5)
-            .build()
-            .unwrap();
-        let x = vector![1.0, 0.0];
-        let along: Vec<f64> = ahead(&system, &x, 0.4).iter().map(|y| -y.y).collect();
-        let expected = [0.05, 0.1, 0.2, 0.4];
-        assert_eq!(along.len(), 4);
-        assert!(along.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-15), "{along:?}");
-    }
+    use nalgebra::{Vector3, vector};
 
     #[test]
     fn an_invariant_with_a_thousandth_that_is_independent_explains_a_failure() {

@@ -267,6 +267,8 @@ impl<P: Model> Flow for Lattice<P> {
 impl<P: Model> StageFlow for Lattice<P> {
     type Gradients = LatticeJets<VectorOf<P>>;
 
+    const WEIGHS_ERRORS: bool = true;
+
     fn gradients(&self, x: &Points<P::Manifold>) -> Option<Self::Gradients> {
         let jets = self.jets(x);
         jets.is_finite().then_some(jets)
@@ -358,10 +360,6 @@ impl<P: Model> StageFlow for Lattice<P> {
             let q: VectorOf<P> = q.at(site);
             q - reached
         })
-    }
-
-    fn weighs_errors(&self) -> bool {
-        true
     }
 
     fn project(

@@ -69,7 +69,7 @@ where
 {
     #[inline]
     fn at<D: Scalar>(&self, xi: &SVector<D, N>) -> SVector<D, N> {
-        if D::NDERIV == 0 {
+        if const { D::NDERIV == 0 } {
             return self(&xi.map(|xi| xi.re().into())).map(|f| f.re.into());
         }
         // Each component is a scalar field on the algebra, which has its lift.

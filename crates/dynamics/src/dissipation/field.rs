@@ -70,7 +70,7 @@ where
         alpha: &Vector<M, D>,
     ) -> Result<Vector<M, D>, MetricError> {
         let x = g.x;
-        let tensor = if D::NDERIV == 0 {
+        let tensor = if const { D::NDERIV == 0 } {
             let real = ChartPoint::<M> { base: x.base.clone(), q: x.q.real() };
             let tensor = self.real_tensor(&real, &w.real());
             tensor.map(|k| Matrix::<M, D>::from_entries(|i, j| D::from(k[(i, j)])))

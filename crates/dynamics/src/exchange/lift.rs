@@ -57,13 +57,13 @@ impl<M: Manifold, D: Scalar> Arguments<'_, M, D> {
             sum += Vector::<M, D>::from_index(|k| part(&v[k]));
             Ok::<(), MetricError>(())
         };
-        if D::NDERIV == 0 {
+        if const { D::NDERIV == 0 } {
             add(3 * n, 3 * n, &|a| D::from(a.re))?;
             return Ok(sum);
         }
         let value = |i: usize, re: f64| D::from(if i == 0 { re } else { 0.0 });
         for i in 0..3 * n {
-            if D::NDERIV == 1 {
+            if const { D::NDERIV == 1 } {
                 add(i, 3 * n, &|a| d(i) * a.eps1 + value(i, a.re))?;
                 continue;
             }

@@ -102,17 +102,18 @@ struct RealFrame<M: Space> {
 impl<'a, M: Space, D: Scalar> Differentials<'a, M, D> {
     /// Prepares the differentials at `x`.
     pub fn at(x: &'a ChartPoint<M, D>) -> Self {
-        let real = (D::NDERIV == 0).then(|| {
-            let q: Vector<M> = x.q.real();
-            let point = M::chart(&x.base, &q);
-            let frame = Matrix::<M>::from_columns(|k| {
-                let moved = Vector::<M, Dual64>::embed(&q) + epsilon::<M>(k);
-                let direction = M::coordinates(&point, &M::chart(&x.base, &moved));
-                Vector::<M>::from_index(|i| direction[i].eps)
-            });
-            RealFrame { point, frame }
+        // A constant, so that each scalar is compiled with its own way alone.
+        if const { D::NDERIV > 0 } {
+            return Self { x, real: None };
+        }
+        let q: Vector<M> = x.q.real();
+        let point = M::chart(&x.base, &q);
+        let frame = Matrix::<M>::from_columns(|k| {
+            let moved = Vector::<M, Dual64>::embed(&q) + epsilon::<M>(k);
+            let direction = M::coordinates(&point, &M::chart(&x.base, &moved));
+            Vector::<M>::from_index(|i| direction[i].eps)
         });
-        Self { x, real }
+        Self { x, real: Some(RealFrame { point, frame }) }
     }
 }
 
@@ -121,7 +122,10 @@ impl<M: Space, D: Scalar> Gradient<M> for Differentials<'_, M, D> {
 
     #[inline]
     fn of(&mut self, f: &impl ScalarField<M>) -> Vector<M, D> {
-        let Some(RealFrame { point, frame }) = &self.real else { return differential(f, self.x) };
+        if const { D::NDERIV > 0 } {
+            return differential(f, self.x);
+        }
+        let RealFrame { point, frame } = self.real.as_ref().expect("a real point has its frame");
         let df = f.jet1(point).df;
         let term = |i: usize, k: usize| if i < M::Dim::LEN { frame[(i, k)] * df[i] } else { 0.0 };
         Vector::<M, D>::from_index(|k| {

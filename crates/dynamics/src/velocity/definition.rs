@@ -43,7 +43,7 @@ pub fn reversible<Y: Metriplectic + ?Sized, D: Scalar>(
         return bracket(&w.energy);
     }
     let g = g.inner()?;
-    if Y::Invariants::COUNT == 0 {
+    if const { Y::Invariants::COUNT == 0 } {
         // With the entropy alone, the same projections need no list.
         let w_hat = g.orthonormal(&w.entropy);
         let square = w_hat.dot(&w_hat);
@@ -101,7 +101,7 @@ fn force<Y: Metriplectic + ?Sized, D: Scalar>(
     w: &Covectors<CountOf<Y>, Components<Y, D>>,
 ) -> Result<Components<Y, D>, MetricError> {
     let force = system.bracket().force(&system.bracket_args(g, &w.entropy), &w.energy)?;
-    if Y::Invariants::COUNT == 0 {
+    if const { Y::Invariants::COUNT == 0 } {
         return Ok(force);
     }
     let (g, mut normals) = (g.inner()?, Orthogonal::<Dim<Y>, D>::default());
@@ -120,11 +120,11 @@ fn friction<Y: Metriplectic + ?Sized, D: Scalar>(
     g: &At<'_, Y, D>,
     w: &Covectors<CountOf<Y>, Components<Y, D>>,
 ) -> Result<Components<Y, D>, MetricError> {
-    if Y::Entropy::IS_CONSTANT {
+    if const { Y::Entropy::IS_CONSTANT } {
         return Ok(Components::<Y, D>::zero());
     }
     let k = |alpha: &_| system.dissipation().apply(g, &w.energy, alpha);
-    if Y::Invariants::COUNT == 0 {
+    if const { Y::Invariants::COUNT == 0 } {
         return k(&w.entropy);
     }
     let (normals, first) = orthogonal_to_energy::<Y, D>(g.inner()?, w);

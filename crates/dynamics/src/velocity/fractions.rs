@@ -16,7 +16,8 @@ use crate::orthogonal::{InUnits, Orthogonal};
 /// Computes for each further invariant the smallest fraction of its differential at `x` that is independent of
 /// the differentials of the other fields in its projections.
 pub fn independence<Y: Metriplectic + ?Sized>(system: &Y, x: &Place<Y, f64>) -> Vec<f64> {
-    if Y::Invariants::COUNT == 0 {
+    // A constant, so that nothing is compiled for a system without further invariants.
+    if const { Y::Invariants::COUNT == 0 } {
         return Vec::new();
     }
     let (w, g) = (differentials(system, x), in_units(system, x));
@@ -49,7 +50,8 @@ pub fn independence<Y: Metriplectic + ?Sized>(system: &Y, x: &Place<Y, f64>) -> 
 /// [`independence`] also includes fractions beside the entropy *and* the energy. These vanish at every
 /// equilibrium without an effect on a step.
 pub fn projected_fractions<Y: Metriplectic + ?Sized>(system: &Y, x: &Place<Y, f64>) -> Vec<f64> {
-    if Y::Invariants::COUNT == 0 {
+    // A constant, so that nothing is compiled for a system without further invariants.
+    if const { Y::Invariants::COUNT == 0 } {
         return Vec::new();
     }
     let (w, g) = (differentials(system, x), in_units(system, x));

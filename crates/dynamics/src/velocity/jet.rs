@@ -59,7 +59,7 @@ pub fn velocity_jet<Y: Metriplectic + ?Sized>(
     let mut normals = OrthogonalJet::<Dim<Y>>::default();
     let mut first = 0;
     let mut alpha = w.entropy;
-    if Y::Invariants::COUNT > 0 {
+    if const { Y::Invariants::COUNT > 0 } {
         normals.push(g, dg_v, &w.energy);
         first = normals.len();
         w.invariants.as_ref().iter().flatten().for_each(|(_, l)| normals.push(g, dg_v, l));
@@ -182,7 +182,7 @@ where
         let slope = jet.along_z * *dz + jet.tensor * w.energy.slope + jet.along_s * w.entropy.slope;
         let vector = WithJacobian { value: jet.value, slope };
         let terms = jet.tensor.abs() * w.energy.value.abs();
-        if Y::Invariants::COUNT == 0 {
+        if const { Y::Invariants::COUNT == 0 } {
             return Ok(Part { vector, tensor: jet.tensor, terms });
         }
         let mut normals = OrthogonalJet::<Dim<Y>>::default();

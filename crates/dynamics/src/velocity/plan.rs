@@ -41,7 +41,7 @@ impl ProjectionPlan {
         let entropy = system.second_law() == SecondLaw::Exact;
         let moves = !system.bracket().is_zero();
         let already = system.bracket().annihilates_entropy();
-        let has = |kind| Y::Invariants::COUNT > 0 && w.has(kind);
+        let has = |kind| if const { Y::Invariants::COUNT > 0 } { w.has(kind) } else { false };
         let projected = moves && (entropy && !already || has(Kind::Casimir));
         Self { entropy, projected, momenta: moves && has(Kind::Momentum) }
     }

@@ -7,7 +7,7 @@
 use super::flow::StageFlow;
 use super::rest::sizes;
 use crate::round_off::bound::ROUNDED;
-use crate::step::{StepStart, Vector};
+use crate::step::{StepStart, Vector, both};
 
 /// Steps between two looks at the energy.
 pub(super) const PATIENCE: u32 = 64;
@@ -43,7 +43,7 @@ pub(super) fn energy_rate<F: StageFlow>(
     let clear = CLEAR * ROUNDED * flow.term_sizes(start.x).energy;
     // At an equilibrium the velocity is round-off and has any direction: the step itself has to change the energy.
     let whole = displacement.relative_to(&sizes) / LENGTH;
-    let rates = [LENGTH / speed, -LENGTH / speed].map(|time| {
+    let rates = both([LENGTH / speed, -LENGTH / speed], |time| {
         let mut changes = [0.0; FRACTIONS.len()];
         for (change, fraction) in changes.iter_mut().zip(FRACTIONS) {
             let y = flow.stage(start.x, &velocity.map(|v| fraction * time * v))?;

@@ -11,7 +11,7 @@ use super::memory::{LastStep, MemoryOf};
 use super::stage::{combined, produced, stage};
 use super::trial::Done;
 use crate::step::dense;
-use crate::step::{Element, Promises, Vector};
+use crate::step::{Element, Promises, Vector, both};
 
 /// The state at the fraction `θ` of a step.
 pub(super) fn between<F: StageFlow>(
@@ -36,21 +36,20 @@ pub(super) fn between<F: StageFlow>(
     let Some(last) = known else { return dense::between(step, promises, theta) };
     let (h, line) = (step.h, last.end.map(|q| theta * q));
     let ends = [&last.stages[0], &last.stages[tableau.rows().len() + 1]];
-    let rows = tableau
-        .dense
-        .iter()
-        .map(|row| (combined(1.0, row, &last.stages), produced(row, &last.stages)));
-    let rows: Vec<(F::Vector, f64)> = rows.collect();
+    let mut rows: Vec<(F::Vector, f64)> = Vec::with_capacity(tableau.dense.len());
+    for row in tableau.dense {
+        rows.push((combined(1.0, row, &last.stages), produced(row, &last.stages)));
+    }
     let mut higher = vec![0.0; rows.len()];
     let q = last.end.with(|i| {
-        let slopes = ends.map(|end| h * end.velocity.get(i));
+        let slopes = both(ends, |end| h * end.velocity.get(i));
         for (number, (row, _)) in higher.iter_mut().zip(&rows) {
             *number = h * row.get(i);
         }
         polynomial(last.end.get(i), slopes, &higher, theta)
     });
     let target = promises.entropy.then(|| {
-        let slopes = ends.map(|end| h * end.production);
+        let slopes = both(ends, |end| h * end.production);
         for (number, (_, row)) in higher.iter_mut().zip(&rows) {
             *number = h * row;
         }

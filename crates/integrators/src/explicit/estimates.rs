@@ -8,7 +8,7 @@ use super::spectrum::Spectrum;
 use super::stage::combined;
 use super::tableau::{Compiled, ESTIMATED, Row, Stages, Tableau};
 use super::trial::Done;
-use crate::step::{LedgerErrors, LimitingSites, Vector};
+use crate::step::{LedgerErrors, LimitingSites, Vector, both};
 
 /// Whether the rates between the last stage and the end differ by as much as at the edge of the region of
 /// stability: `h |k_e − k_s| / |q_e − q_s|` of Hairer, Wanner (Solving ODEs II, §IV.2), relative to these sizes
@@ -23,8 +23,9 @@ pub(super) fn is_at_the_edge<V: Vector>(
     let vectors = [&last.end, &last.before, sizes, rates, rates_before];
     let [distance, change] = V::norms_of(vectors, |[end, before, size, rate, rate_before]| {
         let size = size.max(end.abs());
-        [end - before, h * (rate - rate_before)]
-            .map(|change| if change == 0.0 { 0.0 } else { change / size })
+        both([end - before, h * (rate - rate_before)], |change| {
+            if change == 0.0 { 0.0 } else { change / size }
+        })
     });
     distance > 64.0 * f64::EPSILON && change > tableau.stability * distance
 }
@@ -62,7 +63,7 @@ pub(super) fn error<F: StageFlow>(
             const ROW: Row = FIVE.errors[0];
             [norm(&combined(h, ROW, &last.stages)), 0.0]
         }
-        None => tableau.errors.map(|row| norm(&combined(h, row, &last.stages))),
+        None => both(tableau.errors, |row| norm(&combined(h, row, &last.stages))),
     };
     // Hairer's e₅²/√(e₅² + e₃²/100) is of the order of the method; a method with one error has that.
     // A tenth of the least number is zero.

@@ -9,6 +9,9 @@ pub trait StageFlow: Flow {
     /// The differentials of the laws at a state, with their values.
     type Gradients: Clone + std::fmt::Debug;
 
+    /// Whether [`project`](Self::project) uses an estimate of the local error; see [`Target::error`].
+    const WEIGHS_ERRORS: bool = false;
+
     /// Evaluates the laws and their differentials at a state; `None` where one has no value.
     fn gradients(&self, x: &Element<Self>) -> Option<Self::Gradients>;
 
@@ -101,11 +104,6 @@ pub trait StageFlow: Flow {
         false
     }
 
-    /// Whether [`project`](Self::project) uses an estimate of the local error; see [`Target::error`].
-    fn weighs_errors(&self) -> bool {
-        false
-    }
-
     /// Moves a state onto its laws, by Newton's method along their differentials.
     ///
     /// # Errors
@@ -129,9 +127,9 @@ pub struct Target<'a, F: Flow + ?Sized> {
     pub limit: Option<Limit<'a, F::Vector>>,
     /// The unit of each entry, in which displacements and the independence of the laws are measured: the error that is
     /// allowed, or the size in this step. Without it, the size at the state. A flow that
-    /// [weighs errors](StageFlow::weighs_errors) may have units of its own.
+    /// [weighs errors](StageFlow::WEIGHS_ERRORS) may have units of its own.
     pub units: Option<&'a F::Vector>,
-    /// An estimate of the local error of the step, if the flow [weighs errors](StageFlow::weighs_errors): a state
+    /// An estimate of the local error of the step, if the flow [weighs errors](StageFlow::WEIGHS_ERRORS): a state
     /// may be moved in proportion to it, so that nothing moves which the step has not moved.
     pub error: Option<Combination<'a, F::Vector>>,
 }

@@ -60,7 +60,7 @@ impl<F: StageFlow> Onto<'_, F> {
             }
         };
         let (factor, terms) = self.error_terms();
-        let error = flow.weighs_errors().then_some(Combination { factor, terms: &terms });
+        let error = F::WEIGHS_ERRORS.then_some(Combination { factor, terms: &terms });
         let onto = |y, entropy, with_entropy| {
             let laws = Laws { entropy, ..start.reference.clone() };
             let limit = Some(limit);
@@ -119,16 +119,16 @@ impl<F: StageFlow> Onto<'_, F> {
         let sizes = flow.sizes(start.x);
         // An entry that crosses zero has the size of its displacement. A flow that weighs errors has its own units.
         let size = |[end, size]: [f64; 2]| size.max(end.abs());
-        let units = (!flow.weighs_errors()).then(|| Vector::zip([&last.end, &sizes], size));
+        let units = (!F::WEIGHS_ERRORS).then(|| Vector::zip([&last.end, &sizes], size));
         Bounds::HalfOfStep { sizes, units }
     }
 
     /// The terms of the embedded error with their common factor, if the flow weighs errors. Where that error needs the end of the
     /// step, the velocity at the start takes its place.
     fn error_terms(&self) -> (f64, Vec<(f64, &F::Vector)>) {
-        let Self { trial: &Trial { tableau, start, h }, last, .. } = *self;
-        let flow = start.flow;
-        if !flow.weighs_errors() {
+        let Self { trial: &Trial { tableau, h, .. }, last, .. } = *self;
+        // A constant, so that other flows are compiled without a list.
+        if const { !F::WEIGHS_ERRORS } {
             return (h, Vec::new());
         }
         let of = |&(stage, w): &(usize, f64)| (w, &last.stages[stage].velocity);

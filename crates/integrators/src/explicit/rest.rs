@@ -54,11 +54,13 @@ fn own_rate<F: StageFlow>(flow: &F, start: &StepStart<'_, F>, velocity: &F::Vect
     let sizes = sizes(flow, start);
     let time = f64::EPSILON.sqrt() / velocity.relative_to(&sizes);
     // On one of both sides of a jump the rates change as they do without it.
-    [time, -time].into_iter().try_fold(f64::INFINITY, |least, time| {
+    let rate = |time: f64| {
         let there = stage(flow, start.x, &velocity.map(|v| time * v))?.velocity;
         let change = Vector::zip([&there, velocity], |[there, v]| there - v);
-        Some(least.min(change.relative_to(&sizes) / f64::EPSILON.sqrt()))
-    })
+        Some(change.relative_to(&sizes) / f64::EPSILON.sqrt())
+    };
+    let ahead = f64::INFINITY.min(rate(time)?);
+    Some(ahead.min(rate(-time)?))
 }
 
 /// Returns whether the state at the start of a step, with this velocity, is at rest in its own motion.

@@ -13,7 +13,7 @@ use super::refused::Refused;
 use super::rest::{self, is_hardly};
 use super::stage::{Here, combined, produced, stage};
 use super::tableau::{Compiled, Row, STAGES, Stages, Tableau};
-use super::trial::Trial;
+use super::trial::{Kind, Trial};
 use crate::step::failure::HALVES;
 use crate::step::{
     Effort, Element, EntropyStep, Evidence, Memory as _, MethodError, Refusal, StepError,
@@ -29,11 +29,11 @@ const MANY_FALLS: u32 = 24;
 
 /// Tries a step.
 #[inline]
-pub(super) fn attempt<F: StageFlow>(
+pub(super) fn attempt<F: StageFlow, K: Kind>(
     trial: &Trial<'_, F>,
     memory: &mut MemoryOf<F>,
 ) -> Result<Taken<F>, Refusal> {
-    let refused = match try_step(trial, memory) {
+    let refused = match try_step::<F, K>(trial, memory) {
         Ok(taken) => return Ok(taken),
         Err(refused) => refused,
     };
@@ -45,17 +45,17 @@ pub(super) fn attempt<F: StageFlow>(
 }
 
 /// Takes a step of a fixed size, in halves where it is refused.
-pub(super) fn with_halves<F: StageFlow>(
+pub(super) fn with_halves<F: StageFlow, K: Kind>(
     trial: &Trial<'_, F>,
     memory: &mut MemoryOf<F>,
 ) -> Result<Taken<F>, StepError> {
-    let first = match try_step(trial, memory) {
+    let first = match try_step::<F, K>(trial, memory) {
         Ok(whole) => return Ok(whole),
         Err(Refused::Never(error)) => return Err(error),
         Err(refused) => refused,
     };
     let kept = memory.clone();
-    halves(trial, memory, HALVES).map_err(|refused| {
+    halves::<F, K>(trial, memory, HALVES).map_err(|refused| {
         // What the parts that were taken have left belongs to no state of the run.
         *memory = kept;
         let tried = Effort { splits: HALVES as usize, ..Effort::default() };
@@ -72,18 +72,18 @@ pub(super) fn with_halves<F: StageFlow>(
     })
 }
 
-fn halves<F: StageFlow>(
+fn halves<F: StageFlow, K: Kind>(
     trial: &Trial<'_, F>,
     memory: &mut MemoryOf<F>,
     left: u32,
 ) -> Result<Taken<F>, Refused> {
-    match try_step(trial, memory) {
+    match try_step::<F, K>(trial, memory) {
         Err(Refused::Outside(_) | Refused::Far | Refused::Falls(_)) if left > 0 => {}
         Err(refused) => return waited(trial, &refused, memory).ok_or(refused),
         taken => return taken,
     }
     let (start, h) = (trial.start, 0.5 * trial.h);
-    let first = halves(&Trial { h, ..*trial }, memory, left - 1)?;
+    let first = halves::<F, K>(&Trial { h, ..*trial }, memory, left - 1)?;
     let mut reference = start.reference.clone();
     if first.evidence.dissipates {
         reference.entropy = first.values.entropy;
@@ -91,7 +91,7 @@ fn halves<F: StageFlow>(
     let (flow, x, values, time) = (start.flow, &first.x, first.values.clone(), start.time + h);
     let middle = StepStart { flow, x, time, values, reference, allowed: start.allowed.clone() };
     let second = Trial { tableau: trial.tableau, start: &middle, h };
-    let mut second = halves(&second, memory, left - 1)?;
+    let mut second = halves::<F, K>(&second, memory, left - 1)?;
     second.effort += first.effort;
     second.effort.splits += 1;
     second.evidence = first.evidence.and(second.evidence);
@@ -140,7 +140,7 @@ fn begins<F: StageFlow>(flow: &F, x: &Element<F>, velocity: &F::Vector, h: f64) 
 
 /// Stages, end, projection, decision.
 #[inline]
-fn try_step<F: StageFlow>(
+fn try_step<F: StageFlow, K: Kind>(
     trial: &Trial<'_, F>,
     memory: &mut MemoryOf<F>,
 ) -> Result<Taken<F>, Refused> {
@@ -164,8 +164,11 @@ fn try_step<F: StageFlow>(
     };
     let mut last = room.unwrap_or_else(|| Box::new(LastStep::empty(&here.velocity)));
     match tableau.stages {
-        Stages::Chebyshev => *last = chebyshev::stages(trial, here, memory)?,
-        Stages::Rows(rows) => stages(trial, rows, here, &mut last)?,
+        // A constant, so that other methods are compiled without these stages.
+        Stages::Chebyshev if const { K::IS_CHEBYSHEV } => {
+            *last = chebyshev::stages(trial, here, memory)?;
+        }
+        _ => stages::<F, K>(trial, here, &mut last)?,
     }
     let taken = finished(trial, &mut last, memory);
     if memory.here.is_some() {
@@ -287,13 +290,13 @@ fn here_at<F: StageFlow>(
 
 /// The stages of a step, and the coordinates of its end, into the room for them.
 #[inline]
-fn stages<F: StageFlow>(
+fn stages<F: StageFlow, K: Kind>(
     trial: &Trial<'_, F>,
-    rows: &[Row],
     here: Here<F::Vector>,
     last: &mut LastStep<F::Vector>,
 ) -> Result<(), Refused> {
     let &Trial { tableau, start, h } = trial;
+    let rows = tableau.rows();
     let flow = start.flow;
     // A copy of plain numbers, which the compiler knows not to change: what all stages need of the start is computed once.
     let copy;
@@ -321,9 +324,13 @@ fn stages<F: StageFlow>(
         }};
     }
     match tableau.compiled {
-        Some(Compiled::Eight) => compiled!(EIGHT: 0 1 2 3 4 5 6 7 8 9 10),
-        Some(Compiled::Five) => compiled!(FIVE: 0 1 2 3 4),
-        None => {
+        Some(Compiled::Eight) if const { K::MAY_BE_EIGHT } => {
+            compiled!(EIGHT: 0 1 2 3 4 5 6 7 8 9 10);
+        }
+        Some(Compiled::Five) if const { K::MAY_BE_FIVE } => {
+            compiled!(FIVE: 0 1 2 3 4);
+        }
+        _ => {
             for (i, row) in rows.iter().enumerate() {
                 add_stage(at, row, (i, rows.len()), last)?;
                 release(tableau, &rows[i + 1..], last);

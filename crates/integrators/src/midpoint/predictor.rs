@@ -101,13 +101,13 @@ impl<N: Dimension> Predictor<N> {
         // Far from the three points their parabola says nothing.
         let known = if ratio > 2.0 { self.known.min(1) } else { self.known.min(3) };
         let difference = |j| if j < known { self.differences[j] } else { N::Vector::<f64>::zero() };
-        let [d, slope, bend] = [0, 1, 2].map(difference);
+        let (d, slope, bend) = (difference(0), difference(1), difference(2));
         let mean = d + bend * ((ratio * ratio - 1.0) / 24.0);
         let at = |k: f64| {
             let s = 0.5 - (k + 0.5) * ratio;
             (mean + slope * s + bend * (0.5 * s * (s + 1.0))) * ratio
         };
-        let [a, b, c] = [0.0, 1.0, 2.0].map(at);
+        let (a, b, c) = (at(0.0), at(1.0), at(2.0));
         let mut rescaled = Self { known: if ratio > 2.0 { 2 * known } else { known }, ..*self };
         rescaled.differences[..3].copy_from_slice(&[a, a - b, a - b * 2.0 + c]);
         rescaled

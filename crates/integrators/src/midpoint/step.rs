@@ -28,6 +28,8 @@ where
 {
     type Memory = MemoryOf<Y>;
 
+    const HAS_DEFAULT_BETWEEN: bool = true;
+
     fn name(&self) -> String {
         format!("Scheme<{}, {}>", name_of::<R>(), name_of::<W>())
     }

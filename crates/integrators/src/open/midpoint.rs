@@ -34,6 +34,8 @@ where
 {
     type Memory = MidpointMemory<Dim<Y>>;
 
+    const HAS_DEFAULT_BETWEEN: bool = true;
+
     fn name(&self) -> String {
         format!("Scheme<{}, {}>", name_of::<R>(), name_of::<W>())
     }

@@ -5,6 +5,8 @@ use metriplectic_dynamics::{Metriplectic, system::Point};
 use metriplectic_fields::{Column, Jet1, ScalarField, Space, Vector};
 use metriplectic_manifolds::Manifold;
 
+use crate::step::both;
+
 /// A few roundings, relative to the size of what is rounded.
 /// A factor of four fails `tests/tangent/schemes.rs::tangents_of_schemes_are_those_of_differences`.
 pub(crate) const ROUNDED: f64 = 4.0 * f64::EPSILON;
@@ -83,7 +85,7 @@ pub(crate) fn of_an_increment_to<Y: Metriplectic>(
 /// not.
 pub(crate) fn sizes_on_a_step<Y: Metriplectic>(system: &Y, [x, end]: [&Point<Y>; 2]) -> [f64; 2] {
     let d = Y::Manifold::coordinates(x, end).abs();
-    [x, end].map(|x| {
+    both([x, end], |x| {
         let exchanged = system.energy().jet1(x).df.abs().dot(&d);
         size_of_terms::<Y::Manifold>(system.energy(), x) + exchanged
     })

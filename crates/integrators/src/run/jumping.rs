@@ -10,7 +10,7 @@ use crate::run::jump::{Jump, JumpOn};
 use crate::run::state::State;
 use crate::run::watching::{StepBefore, Watching};
 use crate::step::{
-    Element, EventExchange, Flow, JumpError, Laws, StateSpace as _, StepError, Vector as _,
+    Element, EventExchange, Flow, JumpError, Laws, StateSpace as _, StepError, Vector as _, both,
 };
 
 /// Where a jump leads.
@@ -134,7 +134,7 @@ impl<F: Flow + ?Sized> Course<'_, F> {
             return Err(JumpError::OutOfDomain { entries });
         }
         let ends = [&state.point, &x];
-        let sizes = ends.map(|x| flow.term_sizes(x));
+        let sizes = both(ends, |x| flow.term_sizes(x));
         for index in 0..self.certificate.invariants.len() {
             let of = |laws: &Laws<F::Numbers>| laws.invariants.as_ref()[index];
             let change = of(&values) - of(before);

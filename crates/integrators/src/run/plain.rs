@@ -84,7 +84,9 @@ impl Trajectory<PlainNumbers> {
         let mut typed = Vec::with_capacity(states.len());
         typed.extend(states.into_iter().map(|state| state.read::<F>(layout)));
         let states = typed;
-        let events = events.into_iter().map(|event| event.read::<F>(layout)).collect();
+        let mut typed = Vec::with_capacity(events.len());
+        typed.extend(events.into_iter().map(|event| event.read::<F>(layout)));
+        let events = typed;
         Trajectory { states, events, certificate, ending, checkpoint }
     }
 }

@@ -16,7 +16,7 @@ use crate::step::dense::says_between;
 use crate::step::scales::{larger, relative};
 use crate::step::{
     AnyFlow, Effort, Element, EntropyStep, Evidence, Flow, Laws, LimitingSites, Memory as _,
-    Refusal, Scales, StepEnds, StepError, StepStart, Stepper, Taken, Vector as _, in_room,
+    Refusal, Scales, StepEnds, StepError, StepStart, Stepper, Taken, Vector as _, both, in_room,
 };
 
 /// The iterator over the states of a run after its start, in constant memory; ended by an error, or
@@ -441,7 +441,7 @@ fn moves_on<F: Flow + ?Sized>(
     h: f64,
 ) -> bool {
     let zero = allowed.zero();
-    let [Some(start), Some(end)] = ends.map(|x| flow.rates(x, &zero)) else { return false };
+    let [Some(start), Some(end)] = both(ends, |x| flow.rates(x, &zero)) else { return false };
     (0..zero.len()).all(|i| h * (end.get(i) - start.get(i)).abs() <= allowed.get(i))
 }
 

@@ -14,7 +14,7 @@
 
 use metriplectic_dynamics::SecondLaw;
 
-use super::{Element, Flow, Laws, Promises, StepEnds, Vector};
+use super::{Element, Entries, Flow, Laws, PlainFlow, Promises, StepEnds, Vector, both};
 
 /// The cubic of Hermite in the chart at the start of a step.
 #[derive(Clone, Debug)]
@@ -64,7 +64,7 @@ pub(crate) fn limited(rise: f64, slopes: [f64; 2]) -> [f64; 2] {
 /// The entropy at the fraction `θ` of a step. A rise that is not positive is round-off: the entropy is then the
 /// one at the start.
 fn entropy<F: Flow + ?Sized>(step: &StepEnds<'_, F>, theta: f64) -> f64 {
-    let [start, end] = step.values.map(|laws| laws.entropy);
+    let [start, end] = both(step.values, |laws| laws.entropy);
     let rise = end - start;
     if rise <= 0.0 {
         return start;
@@ -95,8 +95,8 @@ fn targets<F: Flow + ?Sized>(
     let mut laws = start.clone();
     laws.energy = target(promises.energy, step.reference.energy, [start.energy, end.energy]);
     for k in 0..start.invariants.as_ref().len() {
-        let [a, b, reference] =
-            [start, end, step.reference].map(|laws| laws.invariants.as_ref()[k]);
+        let of = |laws: &Laws<F::Numbers>| laws.invariants.as_ref()[k];
+        let (a, b, reference) = (of(start), of(end), of(step.reference));
         laws.invariants[k] = target(promises.invariants, reference, [a, b]);
     }
     laws
@@ -123,6 +123,16 @@ pub(crate) fn between<F: Flow + ?Sized>(
     let line = || flow.moved(step.x, &curve.end.map(|q| theta * q));
     let target = Target::new(step, promises, theta, target);
     Some(target.reached_from(&y, line))
+}
+
+/// The state at the fraction `θ` of a step in plain numbers: compiled with this library.
+#[inline(never)]
+pub(crate) fn between_in_numbers(
+    step: &StepEnds<'_, PlainFlow<'_>>,
+    promises: Promises,
+    theta: f64,
+) -> Option<Entries> {
+    between(step, promises, theta)
 }
 
 /// The target of the state at the fraction `θ` of a step: the laws of the run, and an entropy.
@@ -164,7 +174,7 @@ impl<'a, F: Flow + ?Sized> Target<'a, F> {
             return on_all;
         }
         // Near an equilibrium the other laws determine the entropy.
-        let [least, most] = step.values.map(|laws| laws.entropy);
+        let [least, most] = both(step.values, |laws| laws.entropy);
         let round_off = flow.entropy_round_off([step.x, step.end]);
         flow.onto(y, laws, None).filter(|y| {
             let entropy = flow.laws(y).entropy;

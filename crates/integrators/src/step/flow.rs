@@ -11,6 +11,7 @@ use super::initial_scales::initial_scales;
 use super::plain::{Directions, Entries, Values};
 use super::{
     EventExchange, FlowError, LedgerErrors, LedgerSummary, Scales, StartError, StepError, Vector,
+    both,
 };
 
 /// Where the states of a run live. Every [`Manifold`] is a state space.
@@ -374,12 +375,12 @@ pub trait Flow {
 
     /// The sizes of the terms of the energy on a step, at its two ends.
     fn energy_sizes(&self, ends: [&Element<Self>; 2]) -> [f64; 2] {
-        ends.map(|x| self.term_sizes(x).energy)
+        both(ends, |x| self.term_sizes(x).energy)
     }
 
     /// The round-off of the growth of the entropy in a step.
     fn entropy_round_off(&self, ends: [&Element<Self>; 2]) -> f64 {
-        let sizes = ends.map(|x| self.term_sizes(x).entropy);
+        let sizes = both(ends, |x| self.term_sizes(x).entropy);
         // Numbers without digits are zeros.
         4.0 * f64::EPSILON * sizes[0].max(sizes[1]) + f64::MIN_POSITIVE / f64::EPSILON
     }

@@ -12,7 +12,7 @@ use super::{
     Control, Directions, Effort, Element, Entries, EventExchange, Flow, FlowError, Laws,
     LedgerErrors, LedgerSummary, MethodError, NoiseSummary, PlainFlow, PlainNumbers, Promises,
     Recheck, Refusal, Scales, StartError, StepEnds, StepError, StepStart, Stepper, Taken, Values,
-    Written,
+    Written, both, dense,
 };
 
 /// A flow in plain numbers.
@@ -135,7 +135,7 @@ impl<F: Written> Flow for InPlainNumbers<'_, F> {
     }
 
     fn inspect(&self, ends: [&Entries; 2], of_one_size: bool) -> Result<(), StepError> {
-        let [x, y] = ends.map(|x| self.at(x));
+        let [x, y] = both(ends, |x| self.at(x));
         self.flow.inspect([&x, &y], of_one_size)
     }
 
@@ -188,12 +188,12 @@ impl<F: Written> Flow for InPlainNumbers<'_, F> {
     }
 
     fn energy_sizes(&self, ends: [&Entries; 2]) -> [f64; 2] {
-        let [x, y] = ends.map(|x| self.at(x));
+        let [x, y] = both(ends, |x| self.at(x));
         self.flow.energy_sizes([&x, &y])
     }
 
     fn entropy_round_off(&self, ends: [&Entries; 2]) -> f64 {
-        let [x, y] = ends.map(|x| self.at(x));
+        let [x, y] = both(ends, |x| self.at(x));
         self.flow.entropy_round_off([&x, &y])
     }
 
@@ -217,7 +217,9 @@ impl<F: Written> Flow for InPlainNumbers<'_, F> {
     }
 
     fn rates_and_terms(&self, x: &Entries) -> Option<[Directions; 2]> {
-        self.flow.rates_and_terms(&self.at(x)).map(|both| both.map(|v| F::directions(&v)))
+        self.flow
+            .rates_and_terms(&self.at(x))
+            .map(|[v, terms]| [F::directions(&v), F::directions(&terms)])
     }
 
     fn local_error(&self, x: &Entries, end: &Entries, h: f64) -> Option<Directions> {
@@ -267,8 +269,8 @@ impl<F: Written, M: Stepper<F>> MethodInTypes<'_, F, M> {
         &StepEnds { x, end, h, values, reference, .. }: &StepEnds<'_, PlainFlow<'_>>,
         f: impl FnOnce(&StepEnds<'_, F>) -> T,
     ) -> T {
-        let [x, end] = [x, end].map(|x| self.at(x));
-        let [before, after] = values.map(typed::<F>);
+        let [x, end] = both([x, end], |x| self.at(x));
+        let [before, after] = both(values, typed::<F>);
         let reference = &typed::<F>(reference);
         let (flow, values) = (self.flow, [&before, &after]);
         f(&StepEnds { flow, x: &x, end: &end, h, values, reference })
@@ -375,6 +377,10 @@ impl<F: Written, M: Stepper<F>> PlainMethod for MethodInTypes<'_, F, M> {
         memory: &mut PlainMemory,
         theta: f64,
     ) -> Option<Entries> {
+        // A constant, so that the state is formed in plain numbers where it can be.
+        if const { M::HAS_DEFAULT_BETWEEN } {
+            return dense::between_in_numbers(step, self.method.promises(self.flow), theta);
+        }
         let mut inside =
             || self.between_ends(step, |step| self.method.between(step, memory.of(), theta));
         let inside =

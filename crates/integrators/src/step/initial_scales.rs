@@ -19,7 +19,7 @@
 //! of a lattice, share the largest size.
 
 use super::scales::{Scales, larger};
-use super::{Element, Flow, Vector};
+use super::{Element, Flow, Vector, both};
 
 /// The fraction of the span and of the times `s_i/|v_i|` with which the search for `h` begins.
 /// A factor of four fails `step/initial_scales.rs::a_relaxation_from_zero_reaches_its_end_whatever_the_span`.
@@ -158,7 +158,7 @@ impl<F: Flow + ?Sized> Start<'_, F> {
         let halves = classical_step(flow, x, [&middle, &there], 0.5 * h)?;
         let whole = classical_step(flow, x, [&origin, v], h)?;
         let difference = F::Vector::zip([&whole, &halves], |[whole, halves]| whole - halves);
-        let [whole, halves] = [whole, halves].map(|d| d.by_kind());
+        let [whole, halves] = both([whole, halves], |d| d.by_kind());
         Some(Displacements { whole, halves, difference: difference.by_kind() })
     }
 
@@ -173,7 +173,7 @@ impl<F: Flow + ?Sized> Start<'_, F> {
         (0..sizes.kinds()).all(|i| {
             let allowed = RESOLVED * second.halves.get(i) + NOTHING * sizes.get(i);
             let agrees = second.difference.get(i) <= allowed && allowed.is_finite();
-            let [before, factor] = [first, second].map(|d| d.whole.get(i) / d.halves.get(i));
+            let [before, factor] = both([first, second], |d| d.whole.get(i) / d.halves.get(i));
             let is_power = (1.0..=2.0 + SAME).contains(&factor)
                 && (before / factor - 1.0).abs() <= SAME
                 && second.difference.get(i) <= (1.0 + SAME) * second.halves.get(i);

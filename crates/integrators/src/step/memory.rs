@@ -125,12 +125,18 @@ impl Saved {
         name: impl Into<Cow<'static, str>>,
         numbers: impl IntoIterator<Item = f64>,
     ) {
+        let mut numbers = numbers.into_iter();
+        self.put_each(name.into(), &mut || numbers.next());
+    }
+
+    /// Puts a list whose numbers come one after another: compiled once, and not for each kind of list.
+    fn put_each(&mut self, name: Cow<'static, str>, next: &mut dyn FnMut() -> Option<f64>) {
         if self.lists.is_empty() {
             self.lists.reserve(LISTS);
             self.numbers.reserve(NUMBERS);
         }
-        let (name, start) = (name.into(), self.numbers.len());
-        self.numbers.extend(numbers.into_iter().map(Exact));
+        let start = self.numbers.len();
+        self.numbers.extend(std::iter::from_fn(next).map(Exact));
         let list = start..self.numbers.len();
         match self.lists.iter_mut().find(|(known, _)| *known == name) {
             Some((_, known)) => *known = list,

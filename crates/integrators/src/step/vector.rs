@@ -4,6 +4,8 @@ use std::fmt::Debug;
 
 use metriplectic_fields::Column;
 
+use super::both;
+
 /// A number for each direction of a [`Flow`](crate::Flow): `Vec<f64>`, or the [`Components`] of a vector of
 /// fixed length.
 pub trait Vector: Clone + Debug + 'static {
@@ -92,7 +94,7 @@ pub trait Vector: Clone + Debug + 'static {
         vectors: [&Self; K],
         f: impl Fn([f64; K]) -> [f64; 2] + Sync,
     ) -> [f64; 2] {
-        [0, 1].map(|which| Self::norm_of(vectors, |numbers| f(numbers)[which]))
+        both([0, 1], |which| Self::norm_of(vectors, |numbers| f(numbers)[which]))
     }
 
     /// The norm of the ratios `v_i/s_i` to the sizes `s_i`, where `0/0 = 0`; NaN if a ratio is.
@@ -205,6 +207,16 @@ impl<V: Column<f64>> Vector for Components<V> {
     #[inline]
     fn with(&self, number: impl FnMut(usize) -> f64) -> Self {
         Self(V::from_index(number))
+    }
+
+    #[inline]
+    fn map(&self, f: impl Fn(f64) -> f64) -> Self {
+        Self(V::from_index(|i| f(self.0[i])))
+    }
+
+    #[inline]
+    fn zip<const K: usize>(vectors: [&Self; K], f: impl Fn([f64; K]) -> f64 + Sync) -> Self {
+        Self(V::from_index(|i| f(at(vectors, i))))
     }
 
     #[inline(always)]

@@ -11,7 +11,7 @@
 //! with `β` and `γ_a` of its middle, is the same rise for states of one energy. Both of its factors are `O(δ)`, so it
 //! shows deviations down to `ε`.
 
-use metriplectic_dynamics::velocity::differentials;
+use metriplectic_dynamics::velocity::{Covectors, differentials};
 use metriplectic_dynamics::{Invariants as _, Metriplectic, system::Point};
 use metriplectic_fields::{ChartPoint, Column, Dimension, Space, Vector};
 use metriplectic_manifolds::Manifold;
@@ -37,9 +37,13 @@ struct Along<V> {
 impl<V: Column<f64>> Along<V> {
     /// Removes the part that depends on another law.
     fn without(self, law: &Self) -> Self {
+        let has_digits = law.square > 0.0;
+        if !has_digits {
+            return self;
+        }
         let share = law.hat.dot(&self.hat) / law.square;
-        let [before, middle, after] = law.w.map(|w| w * -share);
-        let w = [self.w[0] + before, self.w[1] + middle, self.w[2] + after];
+        let with = |k: usize| self.w[k] + law.w[k] * -share;
+        let w = [with(0), with(1), with(2)];
         let (hat, terms) = (self.hat - law.hat * share, self.terms + law.terms * share.abs());
         Self { w, terms, hat, square: hat.dot(&hat) }
     }
@@ -63,21 +67,29 @@ pub(super) fn falls<Y: Metriplectic>(system: &Y, x: &Point<Y>, y: &Point<Y>) -> 
             // The second pass removes the rounding error of the first.
             let mut rest = whole;
             for _ in 0..2 {
-                let before = std::iter::once(&energy).chain(listed.as_ref().iter().flatten());
-                rest = before.filter(|law| law.square > 0.0).fold(rest, Along::without);
+                rest = rest.without(&energy);
+                if const { Y::Invariants::COUNT > 0 } {
+                    rest = listed.as_ref().iter().flatten().fold(rest, Along::without);
+                }
             }
             rest
         };
-    for k in 0..Y::Invariants::COUNT {
-        let all = [&start, &middle, &end].map(|w| w.invariants[k].map(|(_, l)| l));
-        let [Some(before), Some(between), Some(after)] = all else { break };
-        let whole = law([before, between, after]);
-        let rest = independent(whole, &listed);
-        let is_new = rest.square > INDEPENDENT * INDEPENDENT * whole.square;
-        listed[k] = is_new.then_some(rest);
+    if const { Y::Invariants::COUNT > 0 } {
+        for k in 0..Y::Invariants::COUNT {
+            let of = |w: &Covectors<CountOf<Y>, _>| w.invariants[k].map(|(_, l)| l);
+            let (before, between, after) = (of(&start), of(&middle), of(&end));
+            let (Some(before), Some(between), Some(after)) = (before, between, after) else {
+                break;
+            };
+            let whole = law([before, between, after]);
+            let rest = independent(whole, &listed);
+            let is_new = rest.square > INDEPENDENT * INDEPENDENT * whole.square;
+            listed[k] = is_new.then_some(rest);
+        }
     }
     let entropy = independent(law([start.entropy, middle.entropy, end.entropy]), &listed);
-    let [before, between, after] = entropy.w.map(|w| w.dot(&d));
+    let [before, between, after] = &entropy.w;
+    let (before, between, after) = (before.dot(&d), between.dot(&d), after.dot(&d));
     let (simpson, trapezoid) = ((before + 4.0 * between + after) / 6.0, 0.5 * (before + after));
     let rounding = entropy.terms.dot(&d.abs()) + entropy.w[1].abs().dot(&scales);
     simpson + (simpson - trapezoid).abs() + ROUNDING * f64::EPSILON * rounding < 0.0

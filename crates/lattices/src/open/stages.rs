@@ -66,6 +66,8 @@ impl<P: Model> OpenLattice<P> {
 impl<P: Model> StageFlow for OpenLattice<P> {
     type Gradients = OpenJets<VectorOf<P>>;
 
+    const WEIGHS_ERRORS: bool = true;
+
     fn gradients(&self, x: &StateOf<P>) -> Option<Self::Gradients> {
         Some(self.jets_at(x, self.lattice.gradients(&x.x)?))
     }
@@ -104,10 +106,6 @@ impl<P: Model> StageFlow for OpenLattice<P> {
 
     fn stage_coordinates(&self, x: &StateOf<P>, y: &StateOf<P>) -> OpenSiteVector {
         OpenSiteVector::new(self.lattice.stage_coordinates(&x.x, &y.x), self.beside(x, y))
-    }
-
-    fn weighs_errors(&self) -> bool {
-        true
     }
 
     /// Moves the sites alone. The energy of the lattice is to be the target and what has flowed in, its entropy the target less

@@ -18,7 +18,7 @@ use super::providers::Along;
 use super::{CovectorsOf, Law, Provider, Residual, Terms, equation};
 use crate::discrete_gradient::DiscreteGradient;
 use crate::round_off::stable_gradient::{Segment, underflows};
-use crate::step::{CountOf, Dim};
+use crate::step::{CountOf, Dim, both};
 
 /// Components with their derivatives along the unknowns of a step from either end.
 #[derive(Clone, Copy, Debug)]
@@ -72,7 +72,7 @@ where
     fn discrete(&mut self, law: Law, f: &impl ScalarField<Y::Manifold>) -> FromBothEnds<Dim<Y>> {
         let (Along { step, g, .. }, [there, back]) = (self.along, self.paths);
         let (mean, [du, dv]) = step.gradient.mean_jets(f, self.ends, self.paths);
-        let [start, end] = self.ends.map(|x| f.jet1(x));
+        let [start, end] = both(self.ends, |x| f.jet1(x));
         let points = [&there.z, self.ends[1]];
         let w = self.along.stable_gradient(f, &mean, points, [start.value, end.value]);
         let at = (*g, self.slopes);
@@ -105,7 +105,7 @@ where
         system: &Y,
         w: &CovectorsOf<Self>,
     ) -> Result<(FromBothEnds<Dim<Y>>, f64), MetricError> {
-        let [there, back] = [0, 1].map(|k| {
+        let [there, back] = both([0, 1], |k| {
             let w = with_slopes::<Y>(w, |_, w| w.slopes[k]);
             velocity_jet(system, self.metric, &self.paths[k].dz, &w)
         });

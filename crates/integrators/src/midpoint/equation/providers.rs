@@ -16,7 +16,7 @@ use metriplectic_manifolds::{
 use super::{CovectorsOf, Law, Provider, Residual};
 use crate::discrete_gradient::DiscreteGradient;
 use crate::round_off::stable_gradient::{Segment, StableGradient};
-use crate::step::Dim;
+use crate::step::{Dim, both};
 
 /// Discrete gradients along one path by their definition.
 pub(super) struct Defined<'a, 'b, Y: Metriplectic, R, W, D: Scalar> {
@@ -104,7 +104,7 @@ where
             let nodes = retraction.along(metric, x, self.u);
             // The same path has been followed to its end, so the alternative is not reached.
             nodes.unwrap_or_else(|_| Nodes {
-                ends: [*x, end].map(Y::Manifold::constant),
+                ends: both([*x, end], Y::Manifold::constant),
                 middle: None,
             })
         };

@@ -18,6 +18,7 @@ const LAYOUT: &[(&str, &str)] = &[
     ("midpoint/predictor.rs", "DIFFERENCES"),
     ("noise/numbers.rs", "UNIT"),
     ("noise/sampler.rs", "MOST"),
+    ("numbers/referred_rise.rs", "VECTORS"),
     ("numbers/rows.rs", "NO_CLOCK"),
     ("open/vector.rs", "ALL"),
     ("open/vector.rs", "BESIDE"),

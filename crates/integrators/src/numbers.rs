@@ -1,7 +1,7 @@
 //! A system in plain numbers is a flow, of a size that is known at run time.
 
+mod answered;
 mod projection;
-mod recheck;
 mod referred_rise;
 mod rows;
 
@@ -13,9 +13,8 @@ use metriplectic_equations::judge::{Judge, RADIUS};
 use metriplectic_equations::{ENERGY, ENTROPY, Equations, Report, VerifiedEquations};
 use metriplectic_manifolds::PointError;
 
+pub(crate) use self::answered::{Answered, Beside, InTypes};
 use self::projection::{Aim, Projection};
-pub(crate) use self::recheck::recheck;
-use self::rows::NO_CLOCK;
 pub use self::rows::Rows;
 use crate::explicit::{Projected, ProjectionError, StageFlow, Target};
 use crate::round_off::bound::{NO_DIGITS, ROUNDED};
@@ -23,6 +22,7 @@ use crate::step::{
     Directions, Entries, Flow, FlowVisitor, Laws, PlainNumbers, Recheck, Values, Vector as _,
     Written,
 };
+use crate::system::{NO_CLOCK, recheck};
 
 /// The flow of a system that answers [`Equations`]: one of your own, or one whose number of variables is read from a file.
 ///

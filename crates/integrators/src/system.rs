@@ -1,6 +1,7 @@
 //! Every metriplectic system is a flow, and one on which explicit methods run.
 
 mod reach;
+mod recheck;
 mod referred_rise;
 mod stages;
 
@@ -14,13 +15,13 @@ use metriplectic_dynamics::{
 use metriplectic_fields::{ChartPoint, Column, Dimension, ScalarField, Space, stack};
 use metriplectic_manifolds::{Manifold, PointError};
 
+pub(crate) use recheck::{NO_CLOCK, recheck};
 pub(crate) use referred_rise::ROUNDING;
 pub(crate) use stages::JetsOf;
 pub use stages::LawJets;
 pub(crate) use stages::{CONSERVED, CORRECTIONS, OFF, STAGNATED};
 
 use crate::explicit::{StageFlow as _, Target};
-use crate::numbers::recheck;
 use crate::round_off::bound::{SizesAt, of_an_increment, size_of_terms, sizes_on_a_step};
 use crate::step::{
     Components, CountOf, Dim, Directions, Entries, Flow, FlowVisitor, Laws, Numbers, Recheck,
@@ -174,7 +175,7 @@ impl<Y: Metriplectic> Flow for Y {
 
     /// In plain numbers, so that a run is compiled with this library.
     fn visit<V: FlowVisitor<Y>>(&self, visitor: V) -> V::Output {
-        visitor.written(self)
+        visitor.answered(self, &InNumbers(self))
     }
 
     /// The estimate `e` of the local error, in the chart at `x`; see the [controller](crate::run::controller).

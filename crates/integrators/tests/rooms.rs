@@ -18,9 +18,9 @@ const ROOMS: [(&str, &[&str]); 17] = [
     ("midpoint", &["step", "round_off", "discrete_gradient", "newton"]),
     ("collocation", &["step", "round_off"]),
     ("explicit", &["step", "round_off"]),
-    ("run", &["step", "round_off"]),
     ("system", &["step", "round_off", "explicit"]),
     ("numbers", &["step", "round_off", "explicit", "system"]),
+    ("run", &["step", "round_off", "numbers"]),
     ("noise", &["step", "explicit"]),
     (
         "open",

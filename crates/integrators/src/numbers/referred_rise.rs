@@ -6,9 +6,8 @@ use metriplectic_equations::room::with_numbers;
 use metriplectic_equations::{ENERGY, ENTROPY, Equations, Sizes};
 use smallvec::SmallVec;
 
-use super::rows::NO_CLOCK;
 use crate::round_off::bound::INDEPENDENT;
-use crate::system::ROUNDING;
+use crate::system::{NO_CLOCK, ROUNDING};
 
 /// The vectors of a law along a line, one after another: its differentials at the start, in the middle and at the end; the
 /// components `s_i ∂_iF` of the one in the middle, with the sizes `s` of the entries; and the absolute terms of that one.

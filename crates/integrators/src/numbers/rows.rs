@@ -4,9 +4,7 @@ use metriplectic_equations::room::with_numbers;
 use metriplectic_equations::{ENERGY, ENTROPY, Equations, Sizes};
 
 use crate::step::{Directions, Few, Vector as _};
-
-/// The time that a system without a clock is asked at.
-pub(super) const NO_CLOCK: f64 = 0.0;
+use crate::system::NO_CLOCK;
 
 /// The laws of a system with their differentials.
 #[derive(Clone, Debug)]

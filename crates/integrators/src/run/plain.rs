@@ -1,5 +1,8 @@
 //! Runs of flows in plain numbers: compiled with this library, and not with each system.
 
+use metriplectic_equations::Equations;
+
+use crate::numbers::{Answered, Beside, FromEquations, InTypes};
 use crate::run::error::RunError;
 use crate::run::event::Event;
 use crate::run::jump::Jump;
@@ -39,7 +42,7 @@ impl<F: Flow, M: Stepper<F>> FlowVisitor<F> for Whole<F, M> {
         }
         let in_numbers = InPlainNumbers::from(flow, x0);
         let method = MethodInTypes { method, flow };
-        let run = || run(&method, &in_numbers, schedule);
+        let run = || run(&method, (&in_numbers, Entries::zeros(0)), schedule);
         let outcome = if const { F::CATCHES_PANICS } {
             caught(run).unwrap_or_else(|panicked| Err(FlowError::new(panicked).into()))
         } else {
@@ -50,15 +53,40 @@ impl<F: Flow, M: Stepper<F>> FlowVisitor<F> for Whole<F, M> {
             Err(error) => Err(error.read::<F>(flow.layout())),
         }
     }
+
+    fn answered(self, flow: &F, system: &dyn Equations) -> Self::Output
+    where
+        F: Written,
+    {
+        let Self { method, x0, mut schedule } = self;
+        for request in &mut schedule.watch.events {
+            *request = request.in_numbers(flow);
+        }
+        let method = MethodInTypes { method, flow };
+        match run_answered(&method, (system, &InTypes(flow)), F::write(&x0), schedule) {
+            Ok(run) => Ok(run.read::<F>(flow.layout())),
+            Err(error) => Err(error.read::<F>(flow.layout())),
+        }
+    }
 }
 
-/// Runs a flow in plain numbers, which knows its start.
+/// Runs a flow in plain numbers.
 fn run(
     method: &dyn PlainMethod,
-    flow: &PlainFlow<'_>,
+    (flow, x0): (&PlainFlow<'_>, Entries),
     schedule: Schedule,
 ) -> Result<Trajectory<PlainNumbers>, RunError<PlainNumbers>> {
-    in_room(flow, || Steps::start_any(method, (flow, flow), Entries::zeros(0), schedule)?.run())
+    in_room(flow, || Steps::start_any(method, (flow, flow), x0, schedule)?.run())
+}
+
+/// Runs a system of which nearly all is asked by its equations.
+fn run_answered(
+    method: &dyn PlainMethod,
+    (system, beside): (&dyn Equations, &dyn Beside),
+    x0: Entries,
+    schedule: Schedule,
+) -> Result<Trajectory<PlainNumbers>, RunError<PlainNumbers>> {
+    run(method, (&Answered { numbers: FromEquations(system), beside }, x0), schedule)
 }
 
 impl State<PlainNumbers> {

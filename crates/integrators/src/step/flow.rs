@@ -5,6 +5,7 @@ use std::ops::IndexMut;
 
 use metriplectic_dynamics::invariants::Kind;
 use metriplectic_dynamics::{ModelError, SecondLaw};
+use metriplectic_equations::Equations;
 use metriplectic_manifolds::{Manifold, PointError};
 
 use super::initial_scales::initial_scales;
@@ -124,6 +125,15 @@ pub trait FlowVisitor<F: Flow>: Sized {
     fn written(self, flow: &F) -> Self::Output
     where
         F: Written;
+
+    /// Visits the flow of a system that answers [`Equations`], for steps in plain numbers.
+    fn answered(self, flow: &F, system: &dyn Equations) -> Self::Output
+    where
+        F: Written,
+    {
+        let _ = system;
+        self.written(flow)
+    }
 }
 
 /// A flow of which nothing is known but what its states and its numbers are. The parts of a run that are not in its loop

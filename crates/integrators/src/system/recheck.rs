@@ -4,8 +4,10 @@ use metriplectic_dynamics::ModelError;
 use metriplectic_equations::Equations;
 use metriplectic_equations::judge::Judge;
 
-use super::rows::NO_CLOCK;
 use crate::step::Recheck;
+
+/// The time that a system without a clock is asked at.
+pub(crate) const NO_CLOCK: f64 = 0.0;
 
 /// Looks at the laws of a system at a state that a run has reached.
 ///
@@ -28,7 +30,7 @@ pub(crate) fn recheck(
 }
 
 /// The fractions of a step that fails at which its model is looked at.
-/// A factor of four fails `numbers/recheck.rs::a_model_is_looked_at_from_an_eighth_of_a_step_to_its_end`.
+/// A factor of four fails `system/recheck.rs::a_model_is_looked_at_from_an_eighth_of_a_step_to_its_end`.
 const AHEAD: [f64; 4] = [0.125, 0.25, 0.5, 1.0];
 
 /// States along the velocity at `x`, on the way of a step of size `h`; those beyond the edge of the chart are left out.

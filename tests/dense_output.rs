@@ -305,6 +305,33 @@ fn the_states_inside_a_step_that_is_longer_than_a_chart_are_those_of_the_motion(
     check("Radau", 1e-2, Radau::<4>.run(&body, start, span));
 }
 
+/// A run goes in plain numbers, its steps in types. A start beside the space makes a frame that is the identity but for rounding.
+#[test]
+fn a_run_on_a_curved_space_has_the_outputs_of_its_steps() {
+    fn same<Y: Metriplectic>(
+        name: &str,
+        system: &Y,
+        start: &Point<Y>,
+        method: impl Method<Y> + Copy,
+    ) {
+        let span = Span::until(2.0).tolerance(1e-5).output_every(0.013);
+        let run = method.run(system, start.clone(), span.clone()).unwrap();
+        let steps = method.steps(system, start.clone(), span).unwrap();
+        let yielded: Vec<_> = steps.map(|state| bits(&state.unwrap())).collect();
+        assert!(yielded.len() > 150, "{name}: {}", yielded.len());
+        assert_eq!(yielded, run.states()[1..].iter().map(bits).collect::<Vec<_>>(), "{name}");
+    }
+    let (spin, (n, heat)) = (spin(), SPIN);
+    let beside = (n * (1.0 + 4e-11), heat);
+    same("spin, midpoint", &spin, &beside, WeylMidpoint);
+    same("spin, order 8", &spin, &beside, DormandPrince8);
+    same("spin, Gauss", &spin, &beside, Gauss::<2>);
+    same("rotations, midpoint", &group(), &attitude(), WeylMidpoint);
+    same("rotations, order 5", &group(), &attitude(), DormandPrince5);
+    same("top, midpoint", &heavy_top(), &TOP, WeylMidpoint);
+    same("top, order 8", &heavy_top(), &TOP, DormandPrince8);
+}
+
 #[test]
 fn the_iterator_the_trajectory_and_a_step_have_the_same_outputs() {
     let body = free_body();

@@ -260,7 +260,11 @@ impl<S: Equations> Flow for FromEquations<S> {
     }
 
     fn recheck(&self, x: &Entries, occasion: Recheck) -> Result<(), ModelError> {
-        recheck(&self.0, x, occasion)
+        match occasion {
+            // At states ahead the functions of the system may panic, which would hide the error of the step.
+            Recheck::Failure { .. } => Judge::of(&self.0, NO_CLOCK).check_around(x, &[]),
+            _ => recheck(&self.0, x, occasion),
+        }
     }
 
     fn defect(&self, x: &Entries) -> f64 {
@@ -272,6 +276,11 @@ impl<S: Equations> Flow for FromEquations<S> {
     }
 
     fn entropy_round_off(&self, [x, y]: [&Entries; 2]) -> f64 {
+        if let Some(model) = self.0.model() {
+            let mut w = Directions::zeros(self.0.sizes().directions);
+            let value = model.jet(ENTROPY, NO_CLOCK, y, w.numbers_mut());
+            return self.entropy_round_off_at([x, y], (value, &w));
+        }
         let rows = Rows::of(&self.0, y);
         self.entropy_round_off_at([x, y], (rows.values[ENTROPY], rows.row(ENTROPY)))
     }

@@ -9,6 +9,7 @@ use super::FromEquations;
 use crate::step::{
     Directions, Entries, Flow, Laws, PlainNumbers, Recheck, Scales, Values, Written, both,
 };
+use crate::system::recheck;
 
 /// A typed system, as far as its [`Equations`] do not say what a run asks: derivatives of its velocity, and the stack that its
 /// matrices need.
@@ -18,6 +19,9 @@ pub(crate) trait Beside {
 
     /// [`Flow::rates`].
     fn rates(&self, x: &[f64], d: &Directions) -> Option<Directions>;
+
+    /// [`Flow::production`].
+    fn production(&self, x: &[f64]) -> Option<f64>;
 
     /// [`Flow::is_projected`].
     fn is_projected(&self) -> bool;
@@ -51,6 +55,10 @@ impl<F: Written> Beside for InTypes<'_, F> {
 
     fn rates(&self, x: &[f64], d: &Directions) -> Option<Directions> {
         self.0.rates(&F::read(self.0.layout(), x), &F::vector(d)).map(|v| F::directions(&v))
+    }
+
+    fn production(&self, x: &[f64]) -> Option<f64> {
+        self.0.production(&F::read(self.0.layout(), x))
     }
 
     fn is_projected(&self) -> bool {
@@ -114,7 +122,6 @@ impl Flow for Answered<'_> {
         fn sizes(&self, x: &Entries) -> Directions;
         fn moved(&self, x: &Entries, d: &Directions) -> Entries;
         fn displacement(&self, x: &Entries, y: &Entries) -> Option<Directions>;
-        fn production(&self, x: &Entries) -> Option<f64>;
         fn onto(&self, y: &Entries, laws: &Laws<Values>, entropy: Option<f64>) -> Option<Entries>;
         fn element(&self, entries: &[f64]) -> Result<Entries, PointError>;
         fn entropy_law(&self) -> SecondLaw;
@@ -122,7 +129,6 @@ impl Flow for Answered<'_> {
         fn check(&self, x0: &Entries) -> Result<(), ModelError>;
         fn is_verified(&self) -> bool;
         fn rechecks(&self, occasion: Recheck) -> bool;
-        fn recheck(&self, x: &Entries, occasion: Recheck) -> Result<(), ModelError>;
         fn defect(&self, x: &Entries) -> f64;
         fn entropy_round_off(&self, ends: [&Entries; 2]) -> f64;
     }
@@ -133,6 +139,14 @@ impl Flow for Answered<'_> {
 
     fn rates(&self, x: &Entries, d: &Directions) -> Option<Directions> {
         self.beside.rates(x, d)
+    }
+
+    fn production(&self, x: &Entries) -> Option<f64> {
+        self.beside.production(x)
+    }
+
+    fn recheck(&self, x: &Entries, occasion: Recheck) -> Result<(), ModelError> {
+        recheck(self.numbers.0, x, occasion)
     }
 
     fn is_projected(&self) -> bool {

@@ -126,7 +126,7 @@ pub trait FlowVisitor<F: Flow>: Sized {
     where
         F: Written;
 
-    /// Visits the flow of a system that answers [`Equations`], for steps in plain numbers.
+    /// Visits the flow of a system that answers [`Equations`], whose states are points without a ledger or a clock.
     fn answered(self, flow: &F, system: &dyn Equations) -> Self::Output
     where
         F: Written,

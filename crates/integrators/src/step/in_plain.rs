@@ -378,7 +378,7 @@ impl<F: Written, M: Stepper<F>> PlainMethod for MethodInTypes<'_, F, M> {
         theta: f64,
     ) -> Option<Entries> {
         // A constant, so that the state is formed in plain numbers where it can be.
-        if const { M::HAS_DEFAULT_BETWEEN } {
+        if const { M::HAS_DEFAULT_BETWEEN && !F::CATCHES_PANICS } {
             return dense::between_in_numbers(step, self.method.promises(self.flow), theta);
         }
         let mut inside =

@@ -41,21 +41,28 @@ fn ahead(system: &dyn Equations, x: &[f64], h: f64) -> Vec<Vec<f64>> {
     if !is_known || v.iter().any(|v| !v.is_finite()) {
         return Vec::new();
     }
+    let mut sizes = v.clone();
+    system.scales(x, &mut sizes);
     let along = |theta: &f64| {
         let q: Vec<f64> = v.iter().map(|v| v * (theta * h)).collect();
         let (mut y, mut back) = (vec![0.0; x.len()], q.clone());
         system.chart(x, &q, &mut y);
-        system.coordinates(x, &y, &mut back).then_some(y)
+        let is_near = system.coordinates(x, &y, &mut back);
+        // Beyond the edge a chart may come back to states that are near.
+        let mut pairs = back.iter().zip(&q).zip(&sizes);
+        let comes_back = pairs.all(|((back, q), size)| (back - q).abs() <= 1e-6 * (q.abs() + size));
+        (is_near && comes_back).then_some(y)
     };
     AHEAD.iter().filter_map(along).collect()
 }
 
 #[cfg(test)]
 mod tests {
+    use metriplectic_dynamics::bracket::AreaForm;
     use metriplectic_dynamics::{InNumbers, Symplectic, System};
     use metriplectic_fields::Real;
-    use metriplectic_manifolds::Euclidean;
-    use nalgebra::Vector2;
+    use metriplectic_manifolds::{Euclidean, Sphere};
+    use nalgebra::{Vector2, Vector3};
 
     use super::*;
 
@@ -71,5 +78,17 @@ mod tests {
         let expected = [0.05, 0.1, 0.2, 0.4];
         assert_eq!(along.len(), 4);
         assert!(along.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-15), "{along:?}");
+    }
+
+    #[test]
+    fn a_step_around_a_sphere_leads_to_no_state_ahead() {
+        // A rotation about an axis, by 6.2 in the step: its end is near the start again, and its middle is beyond the edge.
+        let system = System::on(Sphere::<2>::round())
+            .bracket(AreaForm)
+            .energy(|x: &Vector3<Real>| x.z)
+            .build()
+            .unwrap();
+        let states = ahead(&InNumbers(&system), &[1.0, 0.0, 0.0], 6.2);
+        assert_eq!(states.len(), 2, "{states:?}");
     }
 }

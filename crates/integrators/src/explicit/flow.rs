@@ -9,7 +9,7 @@ pub trait StageFlow: Flow {
     /// The differentials of the laws at a state, with their values.
     type Gradients: Clone + std::fmt::Debug;
 
-    /// Whether [`project`](Self::project) uses an estimate of the local error; see [`Target::error`].
+    /// Says whether [`project`](Self::project) uses an estimate of the local error; see [`Target::error`].
     const WEIGHS_ERRORS: bool = false;
 
     /// Evaluates the laws and their differentials at a state; `None` where one has no value.

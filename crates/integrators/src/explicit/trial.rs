@@ -13,11 +13,11 @@ pub(super) struct Trial<'a, F: StageFlow> {
 
 /// The coefficients of a method, as far as they are known when it is compiled: it is compiled without the stages of others.
 pub(super) trait Kind {
-    /// Whether its stages are those of Chebyshev's recursion.
+    /// Says whether its stages are those of Chebyshev's recursion.
     const IS_CHEBYSHEV: bool = false;
-    /// Whether its rows may be those of the method of order 8, which are compiled as constants.
+    /// Says whether its rows may be those of the method of order 8, which are compiled as constants.
     const MAY_BE_EIGHT: bool = false;
-    /// Whether its rows may be those of the method of order 5.
+    /// Says whether its rows may be those of the method of order 5.
     const MAY_BE_FIVE: bool = false;
 }
 

@@ -14,7 +14,7 @@ pub trait Stepper<F: Flow + ?Sized>: Sized {
     /// The memory from one step to the next, [`saved`](Memory) by a checkpoint.
     type Memory: Memory;
 
-    /// Whether [`between`](Self::between) is the default. Then a run in plain numbers forms the state in plain numbers.
+    /// Says whether [`between`](Self::between) is the default. Then a run in plain numbers forms the state in plain numbers.
     const HAS_DEFAULT_BETWEEN: bool = false;
 
     /// The name in a checkpoint, with the stages or the tableau and without options. A run is resumed by a method of

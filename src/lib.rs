@@ -100,10 +100,10 @@ pub mod prelude {
     pub use metriplectic_integrators::{
         Adjoints, Attitude, AttitudeError, Certificate, Checkpoint, DormandPrince5, DormandPrince8,
         Ending, Error, Event, ExplicitRungeKutta, Gauss, Gonzalez, ItohAbe, MeanValue, Method,
-        Newton, NinomiyaVictoir, NoiseBuilder, NoiseError, Noisy, Observables, OpenBuilder,
-        OpenSpace, OpenState, OpenSystem, Radau, RandomFlow, ResumeError, Run, RunError,
-        RungeKuttaChebyshev, Scheme, Span, SpanError, StartError, State, StepError, Stepper, Steps,
-        SymmetricItohAbe, Tableau, Tangents, Trajectory, Until, Watch,
+        Newton, NinomiyaVictoir, NoiseBuilder, NoiseError, Noisy, NoisyError, Observables,
+        OpenBuilder, OpenSpace, OpenState, OpenSystem, Radau, RandomFlow, ResumeError, Run,
+        RunError, RungeKuttaChebyshev, Scheme, Span, SpanError, StartError, State, StepError,
+        Stepper, Steps, SymmetricItohAbe, Tableau, Tangents, Trajectory, Until, Watch,
     };
     pub use metriplectic_lattices::{
         BondState, Boundary, Graph, Lattice, LatticeError, Onsager, OpenLattice, OpenSites, Points,

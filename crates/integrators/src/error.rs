@@ -9,6 +9,7 @@ use metriplectic_dynamics::{BuildError, FormError, LegendreError, ModelError, Po
 use metriplectic_manifolds::{AlgebraError, MetricError, PointError};
 
 use crate::attitude::AttitudeError;
+use crate::noise::NoisyError;
 use crate::run::checkpoint::ResumeError;
 use crate::run::span_error::SpanError;
 use crate::step::{MethodError, StartError, StateSpace, StepError};
@@ -80,6 +81,15 @@ impl<M: StateSpace> From<RunError<M>> for Error {
             RunError::Span(error) => Self::Span(error),
             RunError::Start(error) => Self::Start(error),
             error @ RunError::Step { .. } => Self::Run(Box::new(error)),
+        }
+    }
+}
+
+impl From<NoisyError> for Error {
+    fn from(error: NoisyError) -> Self {
+        match error {
+            NoisyError::Model(error) => Self::Model(error),
+            NoisyError::Noise(error) => Self::Flow(FlowError::new(error)),
         }
     }
 }

@@ -60,7 +60,8 @@ pub use explicit::{
 pub use midpoint::{Residual, Scheme};
 pub use newton::{Equation, Iterate, Linearised, Newton, Root, Rounding};
 pub use noise::{
-    Counter, NinomiyaVictoir, NoiseBuilder, NoiseError, Noisy, RandomFlow, Sampler, Sampling,
+    Counter, Judged, NinomiyaVictoir, NoiseBuilder, NoiseError, Noisy, NoisyError, NoisyReport,
+    RandomFlow, Sampler, Sampling,
 };
 pub use numbers::FromEquations;
 pub use open::{NotDamped, OpenBuilder, OpenSpace, OpenState, OpenSystem};

@@ -37,7 +37,7 @@ const ROOMS: [(&str, &[&str]); 17] = [
     ),
     ("default_scheme", &["step", "midpoint"]),
     ("attitude", &["round_off", "run"]),
-    ("error", &["step", "run", "attitude"]),
+    ("error", &["step", "run", "noise", "attitude"]),
     (
         "tangent",
         &["step", "round_off", "discrete_gradient", "midpoint", "collocation", "explicit", "run"],

@@ -28,9 +28,9 @@ parameters in its builder             | promises   | promises  | E0599        | 
 `Fit`                                 | fit        | fit       | E0599        | E0599     | E0599      | E0599    | E0599        | E0599         | E0277 E0599  | E0277 E0599
 `Loss`                                | loss       | loss      | E0599        | E0599     | E0599      | E0599    | E0599        | E0599         | E0277 E0599  | E0277 E0599
 
-`verified`                            | verified   | member    | surroundings | E0599     | E0599      | E0599    | E0599        | E0599         | by numbers   | by numbers
-`verify`                              | verify     | member    | surroundings | E0599     | E0599      | sites    | closed part  | closed ring   | by numbers   | by numbers
-`report`                              | report     | columns   | surroundings | E0599     | E0599      | E0599    | E0599        | E0599         | by numbers   | by numbers
+`verified`                            | verified   | member    | surroundings | its noise | its noise  | E0599    | E0599        | E0599         | by numbers   | by numbers
+`verify`                              | verify     | member    | surroundings | its noise | its noise  | sites    | closed part  | closed ring   | by numbers   | by numbers
+`report`                              | report     | columns   | surroundings | its noise | its noise  | E0599    | E0599        | E0599         | by numbers   | by numbers
 
 thermal noise in its builder          | promises   | E0599     | books        | –         | –          | ring     | E0599        | –             | E0277        | E0277
 an energy that depends on time        | promises   | E0599     | –            | books     | books      | E0599    | E0599        | E0599         | E0599        | E0599
@@ -193,6 +193,11 @@ pub(crate) const TESTS: &[Reference] = &[
         "surroundings",
         "crates/integrators/src/open/verify.rs",
         "an_open_system_is_verified_once_and_its_report_lists_its_surroundings",
+    ),
+    right(
+        "its noise",
+        "crates/integrators/src/noise/verify.rs",
+        "noisy_systems_are_verified_once_and_run_as_before",
     ),
 ];
 

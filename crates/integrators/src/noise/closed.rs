@@ -6,12 +6,15 @@ use metriplectic_dynamics::noise::{
     Around, NoiseTerms, Uniform, divergence, friction_vector, lost_in_dissipation, mismatch,
     noise_drift, noise_vector,
 };
-use metriplectic_dynamics::{Invariants, Metriplectic, SecondLaw, system::Point};
+use metriplectic_dynamics::{
+    Invariants, Metriplectic, ModelError, Report, SecondLaw, system::Point,
+};
 use metriplectic_fields::{Column, ScalarField, Vector};
 use metriplectic_manifolds::{Canonical, Riemannian};
 
 use super::error::NoiseError;
 use super::fluctuating::{Drawn, Fluctuating, Landing, Noise};
+use super::judged::Judged;
 use crate::step::{Components, Flow};
 
 /// The round-off of a sum, relative to the sizes of its terms.
@@ -60,6 +63,20 @@ where
             return Err(NoiseError::NoiseAndPublished);
         }
         examine_model(self, &Around::of(self, x), noise)
+    }
+
+    fn check_start_alone(&self, x0: &Point<Y>) -> Result<(), ModelError> {
+        self.verified_as_member(x0).map(drop)
+    }
+}
+
+impl<Y: Metriplectic> Judged for Y {
+    fn verify_model(&self, x0: &Point<Y>, radius: f64) -> Result<(), ModelError> {
+        self.verify(x0, radius)
+    }
+
+    fn report_model(&self, x0: &Point<Y>) -> Report {
+        self.report(x0)
     }
 }
 

@@ -1,5 +1,7 @@
 //! Faults of noise.
 
+use metriplectic_dynamics::ModelError;
+
 /// Why a system has no noise of this kind, or a method cannot sample it. It is in
 /// [`RunError::Flow`](crate::RunError::Flow), [`RunError::Method`](crate::RunError::Method) or
 /// [`StepError::Method`](crate::StepError::Method), and can be downcast from it.
@@ -156,4 +158,16 @@ pub enum NoiseError {
         "the kinetic drift `k_B Σ c_r b_r` has no value, or leads out of the domain; take smaller steps"
     )]
     DriftUnresolved,
+}
+
+/// Why a system with noise is not verified.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum NoisyError {
+    /// A model that breaks one of its laws.
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    /// Noise whose law is not `exp(S/k_B) μ`.
+    #[error(transparent)]
+    Noise(#[from] NoiseError),
 }

@@ -4,7 +4,6 @@ use metriplectic_dynamics::invariants::Kind;
 use metriplectic_dynamics::{ModelError, SecondLaw};
 use metriplectic_manifolds::PointError;
 
-use super::error::NoiseError;
 use super::fluctuating::Fluctuating;
 use super::system::Noisy;
 use crate::step::{
@@ -112,20 +111,20 @@ impl<F: Fluctuating<U>, U> Flow for Noisy<F, U> {
     }
 
     fn check(&self, x0: &Element<F>) -> Result<(), ModelError> {
-        self.flow().check(x0)
+        if self.has_certificate() {
+            self.flow().check_start_alone(x0)
+        } else {
+            self.flow().check(x0)
+        }
     }
 
     fn is_verified(&self) -> bool {
-        self.flow().is_verified()
+        self.has_certificate() || self.flow().is_verified()
     }
 
     fn examine(&self, x0: &Element<F>) -> Result<(), FlowError> {
         self.flow().examine(x0)?;
-        let k_b = self.noise().k_b;
-        if !(k_b > 0.0 && k_b.is_finite()) {
-            return Err(FlowError::new(NoiseError::BoltzmannNotPositive { k_b }));
-        }
-        self.flow().examine_noise(x0, self.noise()).map_err(FlowError::new)
+        self.examine_law(x0).map_err(FlowError::new)
     }
 
     fn rechecks(&self, occasion: Recheck) -> bool {

@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use metriplectic_dynamics::ModelError;
 use metriplectic_dynamics::noise::Fluctuation;
 
 use crate::explicit::StageFlow;
@@ -63,6 +64,16 @@ pub trait Fluctuating<U>: StageFlow {
     ///
     /// The first condition that is not met.
     fn examine_noise(&self, x: &Element<Self>, noise: &Noise<U>) -> Result<(), NoiseError>;
+
+    /// Verifies the laws of the model at the start of a run of a [verified](super::Noisy::verified) system, without samples
+    /// around it. By default the model is [checked](crate::Flow::check) as at any start.
+    ///
+    /// # Errors
+    ///
+    /// The first law of the model that is broken.
+    fn check_start_alone(&self, x0: &Element<Self>) -> Result<(), ModelError> {
+        self.check(x0)
+    }
 }
 
 /// The strength `κ = 2 k_B h` of the noise of a step, and the number of each term.

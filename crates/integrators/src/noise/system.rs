@@ -2,18 +2,21 @@
 
 use std::fmt;
 
-use super::fluctuating::Noise;
+use super::error::NoiseError;
+use super::fluctuating::{Fluctuating, Noise};
+use crate::step::Element;
 
 /// A flow `F` with thermal noise, built by [`NoiseBuilder::noise`](super::NoiseBuilder::noise) or
 /// [`Noisy::new`]. Methods without random numbers do not run on it.
 pub struct Noisy<F, U> {
     flow: F,
     noise: Noise<U>,
+    verified: bool,
 }
 
 impl<F: fmt::Debug, U> fmt::Debug for Noisy<F, U> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { flow, noise } = self;
+        let Self { flow, noise, .. } = self;
         f.debug_struct("Noisy").field("flow", flow).field("k_b", &noise.k_b).finish_non_exhaustive()
     }
 }
@@ -21,7 +24,7 @@ impl<F: fmt::Debug, U> fmt::Debug for Noisy<F, U> {
 impl<F, U> Noisy<F, U> {
     /// Gives a flow noise of this strength.
     pub const fn new(flow: F, noise: Noise<U>) -> Self {
-        Self { flow, noise }
+        Self { flow, noise, verified: false }
     }
 
     /// Returns the flow without its noise.
@@ -32,5 +35,30 @@ impl<F, U> Noisy<F, U> {
     /// Returns the strength of the noise.
     pub const fn noise(&self) -> &Noise<U> {
         &self.noise
+    }
+
+    /// Marks the system as one whose model was verified.
+    pub(super) fn with_certificate(self) -> Self {
+        Self { verified: true, ..self }
+    }
+
+    /// Whether the model was verified before the run, with this noise.
+    pub(super) const fn has_certificate(&self) -> bool {
+        self.verified
+    }
+}
+
+impl<F: Fluctuating<U>, U> Noisy<F, U> {
+    /// Verifies at a state that `exp(S/k_B) μ` is the law of the noise.
+    ///
+    /// # Errors
+    ///
+    /// [`NoiseError::BoltzmannNotPositive`], and those of [`Fluctuating::examine_noise`].
+    pub(super) fn examine_law(&self, x: &Element<F>) -> Result<(), NoiseError> {
+        let k_b = self.noise.k_b;
+        if !(k_b > 0.0 && k_b.is_finite()) {
+            return Err(NoiseError::BoltzmannNotPositive { k_b });
+        }
+        self.flow.examine_noise(x, &self.noise)
     }
 }

@@ -6,14 +6,16 @@
 use std::ops::Range;
 
 use metriplectic_dynamics::exchange::{
-    BathTerm, Entries as _, ExchangeArgs, ExchangeTerms, Part, PartKind, Visitor,
+    BathTerm, Entries as _, Exchange, ExchangeArgs, ExchangeTerms, Part, PartKind, Visitor,
 };
 use metriplectic_dynamics::noise::{
     Around, NoiseTerm, NoiseTerms, Place, friction_vector, kinetic_drift, noise_drift,
     noise_vector, place, seeded_place,
 };
 use metriplectic_dynamics::system::Point;
-use metriplectic_dynamics::{Dissipation as _, Invariants, Metriplectic, SecondLaw};
+use metriplectic_dynamics::{
+    Dissipation as _, Invariants, Metriplectic, ModelError, Report, SecondLaw, Verify as _,
+};
 use metriplectic_fields::{Column, Real, ScalarField, Vector};
 use metriplectic_manifolds::{Canonical, Manifold, MetricAt, MetricError, Riemannian};
 
@@ -22,7 +24,7 @@ use super::state::{Booked, OpenState};
 use super::system::{OpenSystem, StateOf};
 use super::vector::OpenVector;
 use crate::noise::{
-    Drawn, Fluctuating, Landing, Noise, NoiseError, ROUND_OFF, examine_model, vanishes,
+    Drawn, Fluctuating, Judged, Landing, Noise, NoiseError, ROUND_OFF, examine_model, vanishes,
 };
 use crate::step::Flow;
 
@@ -315,5 +317,24 @@ where
         let around = Around::of(&view, &x.x);
         examine_model(&view, &around, noise)?;
         if X::BATHS > 0 { self.examine_baths(x.time, &around, noise) } else { Ok(()) }
+    }
+
+    fn check_start_alone(&self, x0: &StateOf<Y>) -> Result<(), ModelError> {
+        self.judged(x0, |model, x| model.verified_as_member(x).map(drop))
+    }
+}
+
+impl<Y, C, X> Judged for OpenSystem<Y, C, X>
+where
+    Y: Metriplectic,
+    C: Clock<Y::Manifold, Y::Energy>,
+    X: Exchange<Y::Manifold, Y::Metric>,
+{
+    fn verify_model(&self, x0: &StateOf<Y>, radius: f64) -> Result<(), ModelError> {
+        self.verify(x0, radius)
+    }
+
+    fn report_model(&self, x0: &StateOf<Y>) -> Report {
+        self.report(x0)
     }
 }

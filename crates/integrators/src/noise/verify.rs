@@ -84,7 +84,7 @@ mod tests {
     use num_dual::DualNum as _;
 
     const START: Vector3<f64> = vector![0.4, -1.0, 0.3];
-    /// What Boltzmann's constant must not be.
+    /// Values that Boltzmann's constant must not have.
     const NOT_POSITIVE: [f64; 4] = [-1.0, 0.0, f64::NAN, f64::INFINITY];
 
     /// A rigid body with friction.

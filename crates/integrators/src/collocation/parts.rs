@@ -11,7 +11,7 @@ use super::equation::StageEquation;
 use super::fallbacks::StepFailure;
 use super::linear::Linear;
 use super::memory::StageMemory;
-use super::step::try_step;
+use super::step::{breaks_another_law, try_step};
 use super::tableau::{STAGES, Tableau};
 use crate::step::failure::{Cause, Fallbacks, smallest_part};
 use crate::step::{Dim, Effort, Evidence, Flow as _, Laws, Start, StepError, Taken};
@@ -45,6 +45,12 @@ pub(super) fn take<Y: Metriplectic>(
         parts.halves(start, memory, 1)
     };
     match taken {
+        // Many parts add up what each of them may leave of a law.
+        Ok(taken) if breaks_another_law(start, &taken.x, &taken.values) => {
+            *memory = kept;
+            let failure = StepFailure { cause: Cause::Unsolved, effort: parts.effort };
+            Err(parts.error(start, &Failed { failure, x: taken.x, h: start.h }))
+        }
         Ok(taken) => {
             memory.last = None;
             Ok(Taken { effort: parts.effort, ..taken })

@@ -1,6 +1,6 @@
 //! One step: guess, solve, end; then the last digits.
 
-use metriplectic_dynamics::{Metriplectic, system::Point};
+use metriplectic_dynamics::{Metriplectic, SecondLaw, system::Point};
 use metriplectic_fields::{Column, Dimension, Space as _};
 use metriplectic_manifolds::Manifold;
 
@@ -10,7 +10,9 @@ use super::linear::Linear;
 use super::memory::{LastStep, StageMemory};
 use super::solve::Solved;
 use super::tableau::{STAGES, Tableau};
-use crate::round_off::bound::{ROUNDED, breaks_first_law, is_dissipated, sizes_on_a_step};
+use crate::round_off::bound::{
+    ROUNDED, breaks_first_law, breaks_invariants, falls, is_dissipated, sizes_on_a_step,
+};
 use crate::round_off::compensation::Displaced;
 use crate::round_off::drift;
 use crate::step::failure::{Cause, Fallbacks};
@@ -128,7 +130,23 @@ pub(super) fn try_step<Y: Metriplectic>(
     if let Some(size) = breaks_first_law(change, values_end.energy, sizes) {
         return Err(failed(Cause::Energy { change, size }, effort));
     }
+    if breaks_another_law(start, &x_end, &values_end) {
+        return Err(failed(Cause::Unsolved, effort));
+    }
     Ok(Taken { x: x_end, values: values_end, evidence, effort })
+}
+
+/// Returns whether a step changes a further invariant, or lowers the entropy, by more than round-off. Where a law depends on the
+/// others, the covectors of the stages are so long that their terms have no digits of it.
+pub(super) fn breaks_another_law<Y: Metriplectic>(
+    &Start { system, x, h, ref values, .. }: &Start<'_, Y>,
+    end: &Point<Y>,
+    after: &Laws<Numbers<Y>>,
+) -> bool {
+    let rises = system.second_law() == SecondLaw::Exact && h > 0.0;
+    let term_sizes = |x: &Point<Y>| system.term_sizes(x);
+    breaks_invariants([values, after], || [x, end].map(term_sizes))
+        || (rises && falls([values, after], || [x, end].map(term_sizes)))
 }
 
 /// The end with the last digits of the laws, where the stages have lost them, as they do if friction is stiff: moved onto

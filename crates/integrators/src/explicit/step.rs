@@ -168,7 +168,7 @@ fn try_step<F: StageFlow, K: Kind>(
         Stages::Chebyshev if const { K::IS_CHEBYSHEV } => {
             *last = chebyshev::stages(trial, here, memory)?;
         }
-        _ => stages::<F, K>(trial, here, &mut last)?,
+        Stages::Chebyshev | Stages::Rows(_) => stages::<F, K>(trial, here, &mut last)?,
     }
     let taken = finished(trial, &mut last, memory);
     if memory.here.is_some() {

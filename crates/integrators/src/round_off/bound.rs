@@ -5,7 +5,7 @@ use metriplectic_dynamics::{Metriplectic, system::Point};
 use metriplectic_fields::{Column, Jet1, ScalarField, Space, Vector};
 use metriplectic_manifolds::Manifold;
 
-use crate::step::both;
+use crate::step::{Laws, both};
 
 /// A few roundings, relative to the size of what is rounded.
 /// A factor of four fails `tests/tangent/schemes.rs::tangents_of_schemes_are_those_of_differences`.
@@ -107,9 +107,54 @@ pub(crate) fn breaks_first_law(
     if holds { None } else { Some(sizes[0].min(sizes[1])) }
 }
 
+/// Returns whether a step changes a further invariant by more than [round-off](of_a_law) of its terms, which have these sizes at
+/// both ends. Most often its value itself is large enough, and the sizes are not asked for.
+pub(crate) fn breaks_invariants<L: AsRef<[f64]>>(
+    [before, after]: [&Laws<L>; 2],
+    sizes: impl FnOnce() -> [Laws<L>; 2],
+) -> bool {
+    let breaks = |sizes: &Laws<L>| {
+        let listed = [before, after, sizes].map(|laws| laws.invariants.as_ref());
+        let [before, after, sizes] = listed;
+        let is_off = |a: usize| (after[a] - before[a]).abs() > of_a_law(sizes[a].abs());
+        (0..sizes.len()).any(is_off)
+    };
+    breaks(after) && sizes().iter().all(breaks)
+}
+
+/// Returns whether a step lowers the entropy by more than [round-off](of_a_law) of its terms, in the same way.
+pub(crate) fn falls<L>(
+    [before, after]: [&Laws<L>; 2],
+    sizes: impl FnOnce() -> [Laws<L>; 2],
+) -> bool {
+    let falls = |sizes: &Laws<L>| before.entropy - after.entropy > of_a_law(sizes.entropy.abs());
+    falls(after) && sizes().iter().all(falls)
+}
+
 #[cfg(test)]
 mod tests {
-    use super::{breaks_first_law, is_dissipated};
+    use super::{breaks_first_law, breaks_invariants, falls, is_dissipated};
+    use crate::step::Laws;
+
+    #[test]
+    fn fifty_roundings_of_the_terms_of_a_law_in_a_step_are_round_off() {
+        let laws =
+            |entropy: f64, invariant: f64| Laws { energy: 0.0, entropy, invariants: [invariant] };
+        let start = laws(1.0, 1.0);
+        let rounded = |count: f64| 1.0 + count * f64::EPSILON;
+        let never = || unreachable!("the value is large enough");
+        // Terms that are three times as large as their sum.
+        let terms = || [laws(3.0, 3.0), laws(3.5, 3.5)];
+        assert!(!breaks_invariants([&start, &laws(1.0, rounded(-40.0))], never));
+        assert!(!breaks_invariants([&start, &laws(1.0, rounded(140.0))], terms));
+        assert!(breaks_invariants([&start, &laws(1.0, rounded(160.0))], || [
+            laws(0.0, 3.0),
+            laws(0.0, 3.0)
+        ]));
+        assert!(!falls([&start, &laws(2.0, 0.0)], never));
+        assert!(!falls([&start, &laws(rounded(-140.0), 1.0)], terms));
+        assert!(falls([&start, &laws(rounded(-200.0), 1.0)], terms));
+    }
 
     #[test]
     fn what_changes_an_entropy_in_a_million_steps_is_dissipated() {

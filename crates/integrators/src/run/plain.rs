@@ -36,34 +36,43 @@ impl<F: Flow, M: Stepper<F>> FlowVisitor<F> for Whole<F, M> {
     where
         F: Written,
     {
-        let Self { method, x0, mut schedule } = self;
-        for request in &mut schedule.watch.events {
-            *request = request.in_numbers(flow);
-        }
-        let in_numbers = InPlainNumbers::from(flow, x0);
-        let method = MethodInTypes { method, flow };
-        let run = || run(&method, (&in_numbers, Entries::zeros(0)), schedule);
-        let outcome = if const { F::CATCHES_PANICS } {
-            caught(run).unwrap_or_else(|panicked| Err(FlowError::new(panicked).into()))
-        } else {
-            run()
-        };
-        match outcome {
-            Ok(run) => Ok(run.read::<F>(flow.layout())),
-            Err(error) => Err(error.read::<F>(flow.layout())),
-        }
+        self.in_numbers(flow, |method, x0, schedule| {
+            let in_numbers = InPlainNumbers::from(flow, x0);
+            let run = || run(method, (&in_numbers, Entries::zeros(0)), schedule);
+            if const { F::CATCHES_PANICS } {
+                caught(run).unwrap_or_else(|panicked| Err(FlowError::new(panicked).into()))
+            } else {
+                run()
+            }
+        })
     }
 
     fn answered(self, flow: &F, system: &dyn Equations) -> Self::Output
     where
         F: Written,
     {
+        self.in_numbers(flow, |method, x0, schedule| {
+            run_answered(method, (system, &InTypes(flow)), F::write(&x0), schedule)
+        })
+    }
+}
+
+impl<F: Written, M: Stepper<F>> Whole<F, M> {
+    /// Runs the method in plain numbers, and reads what comes out in the types of the flow.
+    fn in_numbers(
+        self,
+        flow: &F,
+        run: impl FnOnce(
+            &dyn PlainMethod,
+            Element<F>,
+            Schedule,
+        ) -> Result<Trajectory<PlainNumbers>, RunError<PlainNumbers>>,
+    ) -> Result<Trajectory<F::Space>, RunError<F::Space>> {
         let Self { method, x0, mut schedule } = self;
         for request in &mut schedule.watch.events {
             *request = request.in_numbers(flow);
         }
-        let method = MethodInTypes { method, flow };
-        match run_answered(&method, (system, &InTypes(flow)), F::write(&x0), schedule) {
+        match run(&MethodInTypes { method, flow }, x0, schedule) {
             Ok(run) => Ok(run.read::<F>(flow.layout())),
             Err(error) => Err(error.read::<F>(flow.layout())),
         }

@@ -1,5 +1,5 @@
-//! Attitudes along runs on so(3)*: their order against another method, the momentum in space, and
-//! orthogonality over many steps.
+//! Attitudes along runs on so(3)*: their order against another method, and the momentum in space. A long one is in
+//! `conservation.rs`.
 
 mod models;
 
@@ -33,7 +33,7 @@ fn reference(
         let turn = p.cross(&omega);
         (turn + omega.cross(&turn) * friction, r * omega.cross_matrix())
     };
-    let count = 20_000;
+    let count = 4000;
     let h = t / f64::from(count);
     let (mut p, mut r) = (start, Matrix3::identity());
     for _ in 0..count {
@@ -128,24 +128,6 @@ fn a_body_that_spins_about_a_principal_axis_turns_by_the_exact_angle() {
     // The rounded angle of each step, and each product.
     let off = (attitudes[100] - rotations::exp(&vector![0.0, 0.0, 100.0])).norm();
     assert!(off <= 100.0 * 4.0 * f64::EPSILON, "{off:.1e}");
-}
-
-#[test]
-fn an_attitude_is_orthogonal_after_a_hundred_thousand_steps_and_the_momentum_does_not_drift() {
-    let body = free_body();
-    let mut steps = WeylMidpoint.steps(&body, TUMBLING, 0.1).unwrap();
-    let mut attitude = Attitude::start(&body, steps.state(), Matrix3::identity()).unwrap();
-    let (mut defect, mut drift) = (0.0_f64, 0.0_f64);
-    let count: u32 = if cfg!(debug_assertions) { 100_000 } else { 1_000_000 };
-    for _ in 0..count {
-        let state = steps.advance().unwrap();
-        let r = attitude.advance(state).unwrap();
-        defect = defect.max(Rotations.defect(r));
-        drift = drift.max((r * state.point - TUMBLING).norm());
-    }
-    println!("{count} steps: |RᵀR − 1| ≤ {defect:.1e}, |Rp − p₀| ≤ {drift:.1e}");
-    assert!(defect <= 1e-14, "{defect:.1e}");
-    assert!(drift <= walk(count), "{drift:.1e}");
 }
 
 #[test]

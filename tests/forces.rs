@@ -4,7 +4,6 @@
 mod models;
 
 use metriplectic::dynamics::{laws, system::BuildError};
-use metriplectic::fields::ChartPoint;
 use metriplectic::prelude::*;
 use metriplectic_studies::Order;
 use models::{half_square, kinetic};
@@ -52,7 +51,7 @@ fn reference(
         let xi = velocity(&mu);
         (mu + vortex_by_hand(&xi)).cross(&xi)
     };
-    let steps = 8000;
+    let steps = 2000;
     let h = time / f64::from(steps);
     for _ in 0..steps {
         let a = rate(mu);
@@ -114,22 +113,6 @@ fn the_force_on_a_lagrangian_that_is_not_quadratic_is_integrated_to_second_order
     let exact = reference(|mu| legendre.velocity(mu).unwrap(), START, 4.0);
     let order = fitted(&system, 4.0, [40, 80, 160, 320], exact);
     assert!(order.agrees(2.0, 0.02), "{order}");
-}
-
-#[test]
-fn the_energy_is_conserved_over_a_hundred_thousand_steps() {
-    // The swirl changes its sign with the first component, and the motion goes on.
-    let swirl = |xi: &Vector3<Real>| Vector3::new(-xi.y, xi.x, 0.0.into()) * (xi.x * 0.8);
-    let system = System::on(LieDual::so3()).energy(kinetic(INERTIA)).force(swirl).build().unwrap();
-    let run = WeylMidpoint.run(&system, START, Span::steps(0.1, 100_000).at_most(100)).unwrap();
-    let certificate = run.certificate();
-    println!("{certificate}");
-    assert!(certificate.keeps_energy(), "{certificate}");
-    let text = certificate.to_string();
-    assert!(text.contains("second law:  no entropy") && !text.contains("Hamiltonian"), "{text}");
-    // The motion does not die out: the last digits of H are those of a state that moves.
-    let speed = system.velocity(&ChartPoint::<_, f64>::centre(&run.last().point)).unwrap().norm();
-    assert!(speed > 1e-2, "{speed:.1e}");
 }
 
 #[test]

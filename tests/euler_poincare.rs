@@ -71,7 +71,7 @@ where
         .build()
         .expect("a sound model");
     system.verify(&start, 0.1).expect("a sound model");
-    let run = WeylMidpoint.run(&system, start, Span::steps(0.05, 400)).expect("a sound model");
+    let run = WeylMidpoint.run(&system, start, Span::steps(0.05, 150)).expect("a sound model");
     let certificate = run.certificate();
     assert!(certificate.keeps_energy(), "{certificate}");
     // Newton's method has the right Jacobian.

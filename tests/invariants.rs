@@ -81,7 +81,7 @@ fn casimirs_of_a_hamiltonian_system_are_kept_on_a_curved_space_too() {
         SMatrix::<Real, 6, 6>::identity() + wave * wave.transpose() * Real::from(0.5)
     };
     let top = || System::on(LieDual::se3()).metric(Metric::field(metric)).energy(heavy);
-    let (start, span) = (SVector::from(HEAVY), Span::steps(0.1, 100));
+    let (start, span) = (SVector::from(HEAVY), Span::steps(0.1, 20));
     let kept = top().casimir(gamma_squared).casimir(alignment).build().unwrap();
     let run = WeylMidpoint.run(&kept, start, span).unwrap();
     println!("{}", run.certificate());

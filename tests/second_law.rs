@@ -156,7 +156,9 @@ fn the_relaxing_body_rests_at_its_equilibrium_without_a_fall_of_entropy() {
 
 #[test]
 fn every_problem_keeps_its_entropy_for_a_few_more_iterations() {
-    let laws = metriplectic_studies::problems::SecondLaws::of_every_problem(0.05, 100);
+    // The report has more steps; what breaks the second law breaks it in few.
+    let steps = if std::env::var_os("METRIPLECTIC_REPORT").is_some() { 100 } else { 20 };
+    let laws = metriplectic_studies::problems::SecondLaws::of_every_problem(0.05, steps);
     for row in &laws.rows {
         let metriplectic_studies::problems::Comparison { problem, exact, published } = row;
         println!(

@@ -56,10 +56,12 @@ fn bent<const A: usize>(a: f64) -> impl Fn(&SVector<Real, A>) -> SMatrix<Real, A
     }
 }
 
+/// The last number is that of the cases of the laws. One of a sphere of seven dimensions takes a hundred times as long
+/// as one of three, by the same code, so the larger ones have two; those of five and six dimensions are left out.
 macro_rules! on_the_sphere {
-    ($name:ident, $laws:ident, $n:literal, $a:literal) => {
+    ($name:ident, $laws:ident, $n:literal, $a:literal, $cases:literal) => {
         proptest! {
-            #![proptest_config(ProptestConfig::with_cases(8))]
+            #![proptest_config(ProptestConfig::with_cases($cases))]
 
             #[test]
             fn $laws(
@@ -72,6 +74,10 @@ macro_rules! on_the_sphere {
                 let y: SVector<f64, $a> = Sphere::<$n>::chart(&x, &u);
                 laws::symmetric_retraction::<Sphere<$n>, _, _>(&Projection, &g, &x, &y)?;
             }
+        }
+
+        proptest! {
+            #![proptest_config(ProptestConfig::with_cases(8))]
 
             #[test]
             fn $name(seed in any::<u64>(), u in prop::array::uniform::<_, $n>(-1.0..1.0)) {
@@ -90,43 +96,36 @@ on_the_sphere!(
     the_ambient_identity_is_the_round_metric_of_the_circle,
     bent_metrics_of_the_circle_keep_the_laws,
     1,
-    2
+    2,
+    8
 );
 on_the_sphere!(
     the_ambient_identity_is_the_round_metric_of_the_sphere,
     bent_metrics_of_the_sphere_keep_the_laws,
     2,
-    3
+    3,
+    8
 );
 on_the_sphere!(
     the_ambient_identity_is_the_round_metric_of_the_three_sphere,
     bent_metrics_of_the_three_sphere_keep_the_laws,
     3,
-    4
+    4,
+    8
 );
 on_the_sphere!(
     the_ambient_identity_is_the_round_metric_of_the_four_sphere,
     bent_metrics_of_the_four_sphere_keep_the_laws,
     4,
-    5
-);
-on_the_sphere!(
-    the_ambient_identity_is_the_round_metric_of_the_five_sphere,
-    bent_metrics_of_the_five_sphere_keep_the_laws,
     5,
-    6
-);
-on_the_sphere!(
-    the_ambient_identity_is_the_round_metric_of_the_six_sphere,
-    bent_metrics_of_the_six_sphere_keep_the_laws,
-    6,
-    7
+    2
 );
 on_the_sphere!(
     the_ambient_identity_is_the_round_metric_of_the_seven_sphere,
     bent_metrics_of_the_seven_sphere_keep_the_laws,
     7,
-    8
+    8,
+    2
 );
 
 proptest! {
@@ -170,31 +169,6 @@ proptest! {
             moved(y, sum, h / 6.0)
         });
         prop_assert!((end - exact.0).norm() < 1e-11, "{:e}", (end - exact.0).norm());
-    }
-
-    #[test]
-    fn metrics_that_vary_keep_the_laws_on_rotations_and_products(
-        seed in any::<u64>(), u in prop::array::uniform6(-0.7..0.7), a in 0.1..1.0_f64,
-    ) {
-        let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        let body = Metric::field(move |r: &Matrix3<Real>| {
-            let lean = r.column(2).into_owned();
-            Matrix3::from_diagonal(&vector![1.0, 1.5, 2.0]).cast::<Real>()
-                + lean * lean.transpose() * Real::from(a)
-        });
-        let (x, v) = (Rotations.random(&mut rng), vector![u[0], u[1], u[2]]);
-        geodesic_laws::<Rotations, _>(&body, &x, &v)?;
-        laws::retraction::<Rotations, _, _>(&Cayley, &body, &x, &v)?;
-        let y = Rotations::chart(&x, &v);
-        laws::symmetric_retraction::<Rotations, _, _>(&Cayley, &body, &x, &y)?;
-
-        let space = Product(Rotations, Euclidean::<3>);
-        let coupled = Metric::field(move |(r, p): &(Matrix3<Real>, Vector3<Real>)| {
-            let w = SVector::<Real, 6>::from_fn(|i, _| if i < 3 { r[(i, 2)] } else { p[i - 3].sin() });
-            SMatrix::<Real, 6, 6>::identity() + w * w.transpose() * Real::from(a)
-        });
-        let (x, v) = (space.random(&mut rng), SVector::from(u));
-        geodesic_laws::<Product<Rotations, Euclidean<3>>, _>(&coupled, &x, &v)?;
     }
 
     #[test]
@@ -261,6 +235,36 @@ proptest! {
     }
 }
 
+proptest! {
+    // Each in six dimensions takes a second.
+    #![proptest_config(ProptestConfig::with_cases(4))]
+
+    #[test]
+    fn metrics_that_vary_keep_the_laws_on_rotations_and_products(
+        seed in any::<u64>(), u in prop::array::uniform6(-0.7..0.7), a in 0.1..1.0_f64,
+    ) {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let body = Metric::field(move |r: &Matrix3<Real>| {
+            let lean = r.column(2).into_owned();
+            Matrix3::from_diagonal(&vector![1.0, 1.5, 2.0]).cast::<Real>()
+                + lean * lean.transpose() * Real::from(a)
+        });
+        let (x, v) = (Rotations.random(&mut rng), vector![u[0], u[1], u[2]]);
+        geodesic_laws::<Rotations, _>(&body, &x, &v)?;
+        laws::retraction::<Rotations, _, _>(&Cayley, &body, &x, &v)?;
+        let y = Rotations::chart(&x, &v);
+        laws::symmetric_retraction::<Rotations, _, _>(&Cayley, &body, &x, &y)?;
+
+        let space = Product(Rotations, Euclidean::<3>);
+        let coupled = Metric::field(move |(r, p): &(Matrix3<Real>, Vector3<Real>)| {
+            let w = SVector::<Real, 6>::from_fn(|i, _| if i < 3 { r[(i, 2)] } else { p[i - 3].sin() });
+            SMatrix::<Real, 6, 6>::identity() + w * w.transpose() * Real::from(a)
+        });
+        let (x, v) = (space.random(&mut rng), SVector::from(u));
+        geodesic_laws::<Product<Rotations, Euclidean<3>>, _>(&coupled, &x, &v)?;
+    }
+}
+
 /// Where a step of size 0.1 leads.
 fn one_step<Y: Metriplectic>(
     system: &Y,
@@ -295,15 +299,16 @@ fn geodesics_of_the_half_plane_end_where_their_circles_do() {
     assert!(worst <= 1e-13, "{worst:e}");
 }
 
-/// How many of 10⁴ logarithms are found, each checked by `length`.
+/// How many of `count` logarithms are found, each checked by `is_right`.
 fn found<G: Riemannian<Euclidean<2>>>(
     metric: &G,
+    count: u32,
     mut pair: impl FnMut(&mut ChaCha8Rng) -> (Vector2<f64>, Vector2<f64>),
     is_right: impl Fn(&Vector2<f64>, &Vector2<f64>, &Vector2<f64>) -> bool,
 ) -> u32 {
     let mut rng = ChaCha8Rng::seed_from_u64(2024);
     let mut found = 0;
-    for _ in 0..10_000 {
+    for _ in 0..count {
         let (x, y) = pair(&mut rng);
         match metric.log(&x, &y) {
             Ok(v) => {
@@ -316,22 +321,34 @@ fn found<G: Riemannian<Euclidean<2>>>(
     found
 }
 
-#[test]
-fn logarithms_of_the_half_plane_are_found() {
+/// How many of `count` logarithms of the half plane are found, with the distance as their length.
+fn found_in_the_half_plane(count: u32) -> u32 {
     let field = Metric::field(|q: &Vector2<Real>| Matrix2::from_diagonal_element(q.y.powi(-2)));
     let point = |rng: &mut ChaCha8Rng| {
         vector![rng.random_range(-3.0..3.0), 10.0_f64.powf(rng.random_range(-1.0..1.0))]
     };
     let found = found(
         &field,
+        count,
         |rng| (point(rng), point(rng)),
         |x, y, v| {
             let distance = (1.0 + (y - x).norm_squared() / (2.0 * x.y * y.y)).acosh();
             (v.norm() / x.y - distance).abs() < 1e-10 * (1.0 + distance)
         },
     );
-    println!("{found} of 10000 logarithms of the half plane");
-    assert!(found >= 9990);
+    println!("{found} of {count} logarithms of the half plane");
+    found
+}
+
+#[test]
+fn logarithms_of_the_half_plane_are_found() {
+    assert_eq!(found_in_the_half_plane(1000), 1000);
+}
+
+#[test]
+#[ignore = "slow study: 10⁴ logarithms, of which the test takes the first thousand"]
+fn logarithms_of_ten_thousand_pairs_of_the_half_plane_are_found() {
+    assert!(found_in_the_half_plane(10_000) >= 9990);
 }
 
 #[test]
@@ -347,7 +364,7 @@ fn logarithms_of_a_bumpy_conformal_metric_are_found() {
         let length: f64 = rng.random_range(0.0..0.9);
         (x, x + vector![direction.cos(), direction.sin()] * length)
     };
-    let found = found(&field, &mut start, |x, y, v| {
+    let found = found(&field, 10_000, &mut start, |x, y, v| {
         let end = Riemannian::<Euclidean<2>>::end(&field, x, v).unwrap();
         (end - y).norm() < 1e-11
     });

@@ -672,35 +672,47 @@ fn the_thermoelastic_pendulum_keeps_energy_and_angular_momentum() {
     assert!((errors[0] / errors[1] - 4.0).abs() < 0.1, "{errors:?}");
 }
 
+/// Asserts that a model keeps both laws and its momenta over so many steps.
+fn keeps_its_laws(name: &str, steps: u32, size: &str, allowed: f64) {
+    let options = ["--json", "--steps", &steps.to_string(), "--step-size", size];
+    let report = json(&example(name, &options));
+    let number = |key: &str| report[key].as_f64().expect("a number");
+    let (energy, taken) = (number("initial_energy").abs().max(1.0), number("steps"));
+    let error = number("max_energy_error") / energy;
+    println!("{name}: {taken} steps, |H − H₀| ≤ {error:.1e}, {}", report["invariants"]);
+    assert!(taken >= f64::from(steps) && error <= 50.0 * f64::EPSILON, "{name}: {report}");
+    assert_eq!(report["entropy_falls"], 0, "{name}: {report}");
+    for kept in report["invariants"].as_array().expect("a list") {
+        let error = kept["max_error"].as_f64().expect("a number");
+        assert!(error <= allowed, "{name}: {kept}");
+    }
+}
+
 #[test]
 fn every_model_keeps_both_laws_over_a_hundred_thousand_steps() {
-    let models = [
+    for name in [
         "gas_containers",
-        "damped_oscillator",
         "thermoelastic_pendulum",
         "heavy_top",
         "forced_rigid_body",
         "feedback_torque",
-        "tumbling_satellite",
-    ];
-    for name in models {
-        // The oscillator is at rest after t = 10⁴, with no error left of which to fit an order.
-        let size = if name == "damped_oscillator" { "0.001" } else { "0.05" };
-        let options = ["--json", "--steps", "100000", "--step-size", size];
-        let report = json(&example(name, &options));
-        let number = |key: &str| report[key].as_f64().expect("a number");
-        let (energy, steps) = (number("initial_energy").abs().max(1.0), number("steps"));
-        let error = number("max_energy_error") / energy;
-        println!("{name}: {steps} steps, |H − H₀| ≤ {error:.1e}, {}", report["invariants"]);
-        assert!(steps >= 1e5 && error <= 50.0 * f64::EPSILON, "{name}: {report}");
-        assert_eq!(report["entropy_falls"], 0, "{name}: {report}");
-        // At rest, a relative equilibrium, the three momenta of the satellite are dependent.
-        let allowed = if name == "tumbling_satellite" { 1e-9 } else { 5e-14 };
-        for kept in report["invariants"].as_array().expect("a list") {
-            let error = kept["max_error"].as_f64().expect("a number");
-            assert!(error <= allowed, "{name}: {kept}");
-        }
+    ] {
+        keeps_its_laws(name, 100_000, "0.05", 5e-14);
     }
+    // The oscillator is at rest after t = 10⁴, with no error left of which to fit an order.
+    keeps_its_laws("damped_oscillator", 100_000, "0.001", 5e-14);
+}
+
+#[test]
+fn the_satellite_keeps_both_laws_on_its_way_to_rest_and_there() {
+    keeps_its_laws("tumbling_satellite", 20_000, "0.05", 5e-14);
+}
+
+#[test]
+#[ignore = "slow study: a hundred thousand steps in thirteen dimensions"]
+fn the_satellite_keeps_both_laws_over_a_hundred_thousand_steps() {
+    // At rest, a relative equilibrium, the three momenta of the satellite are dependent.
+    keeps_its_laws("tumbling_satellite", 100_000, "0.05", 1e-9);
 }
 
 #[test]

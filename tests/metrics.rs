@@ -57,7 +57,7 @@ fn bent<const A: usize>(a: f64) -> impl Fn(&SVector<Real, A>) -> SMatrix<Real, A
 }
 
 /// The last number is that of the cases of the laws. One of a sphere of seven dimensions takes a hundred times as long
-/// as one of three, by the same code, so the larger ones have two; those of five and six dimensions are left out.
+/// as one of three, by the same code, so the larger ones have one or two.
 macro_rules! on_the_sphere {
     ($name:ident, $laws:ident, $n:literal, $a:literal, $cases:literal) => {
         proptest! {
@@ -119,6 +119,20 @@ on_the_sphere!(
     4,
     5,
     2
+);
+on_the_sphere!(
+    the_ambient_identity_is_the_round_metric_of_the_five_sphere,
+    bent_metrics_of_the_five_sphere_keep_the_laws,
+    5,
+    6,
+    1
+);
+on_the_sphere!(
+    the_ambient_identity_is_the_round_metric_of_the_six_sphere,
+    bent_metrics_of_the_six_sphere_keep_the_laws,
+    6,
+    7,
+    1
 );
 on_the_sphere!(
     the_ambient_identity_is_the_round_metric_of_the_seven_sphere,

@@ -103,7 +103,7 @@
 //! | `x_k = φ(x_{k−1}, h)`, for `h ≤ h̄` | [`Steps`](crate::integrators::Steps); a step that is not solved is split in halves | `tests/problems/every_method.rs::every_method_keeps_its_promises_on_every_problem`, `tests/conservation.rs::steps_far_too_large_keep_the_energy` |
 //! | second law, `ΔS ≥ −C h³` † | [`SecondLaw::Published`](crate::dynamics::SecondLaw::Published) | `tests/errata.rs::the_published_scheme_lowers_the_entropy_and_by_third_order_only` |
 //! | (semid-d) `K_d(α, β) = G*(w,w) G*(α,β) − G*(w,α) G*(w,β)` † | [`MetricDissipation`](crate::dynamics::MetricDissipation), told to annihilate `w` | `tests/errata.rs::the_factor_in_the_discrete_form_makes_another_equation_of_it` |
-//! | first law, `H(x_{k+1}) = H(x_k)` | [`laws::step`](crate::integrators::laws::step) | `crates/integrators/src/laws.rs::a_midpoint_step_is_symmetric_and_keeps_the_energy`, `tests/conservation.rs::a_million_steps_of_the_relaxing_body_keep_the_energy`, `tests/conservation.rs::a_hundred_thousand_steps_of_a_heavy_body_keep_energy_and_orthogonality` |
+//! | first law, `H(x_{k+1}) = H(x_k)` | [`laws::step`](crate::integrators::laws::step) | `crates/integrators/src/laws.rs::a_midpoint_step_is_symmetric_and_keeps_the_energy`, `tests/conservation.rs::a_million_steps_of_the_relaxing_body_keep_the_energy`, `tests/conservation.rs::a_million_steps_of_a_heavy_body_keep_energy_and_orthogonality` |
 //!
 //! # §4.3 Example: the relaxing rigid body
 //!

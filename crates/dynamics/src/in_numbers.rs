@@ -154,6 +154,20 @@ impl<M: Space> WithField<M> for Jets<'_, M> {
     }
 }
 
+/// The parts of a field at a hyper-dual point.
+struct Along<'a, M: Space> {
+    x: &'a M::Point<Real>,
+    found: [f64; 4],
+}
+
+impl<M: Space> WithField<M> for Along<'_, M> {
+    #[inline]
+    fn visit(&mut self, f: &impl ScalarField<M>) {
+        let f = f.at_real(self.x);
+        self.found = [f.re, f.eps1, f.eps2, f.eps1eps2];
+    }
+}
+
 /// Value, differential and Hessian of a field.
 struct Second<'a, M: Space> {
     x: &'a M::Point<f64>,
@@ -464,6 +478,24 @@ impl<Y: Metriplectic + ?Sized> Model for InNumbers<'_, Y> {
         let x = &point::<Of<Y>>(x);
         self.law(law, &mut Values { x, values: value.iter_mut() });
         value[0]
+    }
+
+    fn annihilates_entropy(&self) -> bool {
+        self.0.bracket().annihilates_entropy()
+    }
+
+    fn has_constant_entropy(&self) -> bool {
+        Y::Entropy::IS_CONSTANT
+    }
+
+    fn along(&self, law: usize, _: f64, x: &[f64], [u, v]: [&[f64]; 2]) -> [f64; 4] {
+        let n = Dim::<Y>::LEN;
+        let (u, v) = (&u[..n], &v[..n]);
+        let q = Vector::<Of<Y>, Real>::from_index(|i| Real::new(0.0, u[i], v[i], 0.0));
+        let x = Of::<Y>::chart(&point::<Of<Y>>(x), &q);
+        let mut along = Along::<Of<Y>> { x: &x, found: [0.0; 4] };
+        self.law(law, &mut along);
+        along.found
     }
 
     fn jet(&self, law: usize, _: f64, x: &[f64], df: &mut [f64]) -> f64 {

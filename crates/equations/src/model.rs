@@ -1,6 +1,7 @@
 //! The parts of a system apart.
 
-use crate::{Equations, MetricError};
+use crate::room::with_numbers;
+use crate::{Equations, MetricError, SecondLaw};
 
 /// A part of the motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -60,6 +61,30 @@ pub trait Model: Equations {
 
     /// Evaluates one law at a state.
     fn value(&self, law: usize, t: f64, x: &[f64]) -> f64;
+
+    /// Returns whether the bracket is made of the covector of the entropy, and annihilates it.
+    fn annihilates_entropy(&self) -> bool {
+        self.is_zero(Part::Reversible)
+    }
+
+    /// Returns whether the entropy is constant by construction, so that no friction moves a state.
+    fn has_constant_entropy(&self) -> bool {
+        self.second_law() == SecondLaw::NoEntropy
+    }
+
+    /// Evaluates one law at the hyper-dual state `x + u ε₁ + v ε₂` of a vector space: `f`, `⟨df, u⟩`, `⟨df, v⟩` and `f''(u, v)` at `x`.
+    /// The default forms the Hessian.
+    fn along(&self, law: usize, t: f64, x: &[f64], [u, v]: [&[f64]; 2]) -> [f64; 4] {
+        let n = u.len();
+        with_numbers(n * (n + 1), |room| {
+            let (df, hf) = room.split_at_mut(n);
+            let value = self.hessian(law, t, x, df, hf);
+            let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+            let rows = hf.chunks_exact(n).zip(u);
+            let second = rows.map(|(row, u)| u * dot(row, v)).sum();
+            [value, dot(df, u), dot(df, v), second]
+        })
+    }
 
     /// Evaluates one law with its differential.
     fn jet(&self, law: usize, t: f64, x: &[f64], df: &mut [f64]) -> f64;

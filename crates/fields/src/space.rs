@@ -115,6 +115,9 @@ pub trait Space: Clone + Debug + PartialEq + Send + Sync + 'static {
         Some(Matrix::<Self, D>::from_entries(|i, j| dual[i].dot(&image[j])))
     }
 
+    /// Whether points are columns of numbers, and the chart is `φ_x(q) = x + q` everywhere.
+    const IS_VECTOR_SPACE: bool = false;
+
     /// Whether [`stage_rates`](Self::stage_rates) returns the velocity that it is given, as in charts that are
     /// translations.
     const RATES_ARE_VELOCITIES: bool = false;

@@ -82,7 +82,7 @@ pub(crate) use timed::{MOST, Stage, StageSolution, TimedStep};
 
 use crate::step::failure::Fallbacks;
 use crate::step::{
-    Control, Dim, Flow, Promises, Refusal, StepEnds, StepError, StepStart, Stepper, Taken,
+    Control, Dim, Flow, Implicit, Promises, Refusal, StepEnds, StepError, StepStart, Stepper, Taken,
 };
 use tableau::{GAUSS, RADAU};
 
@@ -161,6 +161,12 @@ macro_rules! method {
 
         impl<Y: Metriplectic, const S: usize> Stepper<Y> for $name<S> {
             type Memory = StageMemory<Dim<Y>>;
+
+            const IS_IMPLICIT: bool = true;
+
+            fn implicit(&self) -> Option<Implicit> {
+                Some(Implicit::$name { stages: S })
+            }
 
             fn name(&self) -> String {
                 format!("{}::<{S}>", stringify!($name))

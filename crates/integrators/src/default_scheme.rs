@@ -4,8 +4,8 @@ use metriplectic_manifolds::{Cayley, ChartMidpoint, Exponential, Projection, Wey
 
 use crate::midpoint::Scheme;
 use crate::step::{
-    Control, Element, Flow, LimitingSites, MethodError, NoiseSummary, Promises, Refusal, StepEnds,
-    StepError, StepStart, Stepper, Taken,
+    Control, Element, Flow, Implicit, LimitingSites, MethodError, NoiseSummary, Promises, Refusal,
+    StepEnds, StepError, StepStart, Stepper, Taken,
 };
 
 /// The steps of `Scheme::new(R)`, under its name.
@@ -18,6 +18,12 @@ macro_rules! by_default {
             type Memory = <Scheme<Self> as Stepper<F>>::Memory;
 
             const HAS_DEFAULT_BETWEEN: bool = <Scheme<Self> as Stepper<F>>::HAS_DEFAULT_BETWEEN;
+
+            const IS_IMPLICIT: bool = <Scheme<Self> as Stepper<F>>::IS_IMPLICIT;
+
+            fn implicit(&self) -> Option<Implicit> {
+                Scheme::new(*self).implicit()
+            }
 
             fn name(&self) -> String {
                 Scheme::new(*self).name()

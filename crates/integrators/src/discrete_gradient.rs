@@ -44,6 +44,10 @@ use crate::round_off::stable_gradient::{Segment, StableGradient};
 /// Laws ([`laws::discrete_gradient`](crate::laws::discrete_gradient)): 1. `⟨w, d⟩ = F(x') − F(x)`;
 /// 2. `w → dF(z)` as the points meet; 3. what is evaluated safely is the definition.
 pub trait DiscreteGradient: Copy + Debug + Send + Sync {
+    /// Says whether this is the one of [`Gonzalez`].
+    #[doc(hidden)]
+    const IS_GONZALEZ: bool = false;
+
     /// The covector `w̄` before its correction, in the frame of the chart of the base point.
     fn mean<M: Manifold, D: Scalar>(
         &self,

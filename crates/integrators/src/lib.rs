@@ -4,23 +4,24 @@
 //!
 //! | room | what it holds | knows |
 //! |---|---|---|
-//! | [`step`] | [`Flow`] and [`Stepper`]: what a run knows of a system and of a method; [`StepError`] | |
+//! | [`newton`] | [`Newton`]: the solver of an implicit midpoint step | |
+//! | [`step`] | [`Flow`] and [`Stepper`]: what a run knows of a system and of a method; [`StepError`] | [`newton`] |
 //! | [`round_off`] | covectors, laws and positions that are safe against round-off | [`step`] |
 //! | [`discrete_gradient`] | [`DiscreteGradient`]: [`Gonzalez`], [`MeanValue`], [`ItohAbe`], [`SymmetricItohAbe`] | [`round_off`] |
-//! | [`newton`] | [`Newton`]: the solver of an implicit midpoint step | |
 //! | [`midpoint`] | [`Scheme`]: the method of the paper, its equation and its fallbacks | [`step`], [`round_off`], [`discrete_gradient`], [`newton`] |
 //! | [`collocation`] | [`Gauss`], [`Radau`]: methods with stages, of order `2s` and `2s − 1` | [`step`], [`round_off`] |
 //! | [`explicit`] | [`DormandPrince8`], [`DormandPrince5`], [`RungeKuttaChebyshev`]: explicit methods, and then back onto the laws | [`step`], [`round_off`] |
 //! | [`system`] | every metriplectic system is a flow | [`step`], [`round_off`], [`explicit`] |
 //! | [`numbers`] | [`FromEquations`]: a system in plain numbers is a flow | [`step`], [`round_off`], [`explicit`], [`system`] |
-//! | [`run`] | [`Method`], [`Span`], [`Until`], [`Watch`], [`Steps`], [`Trajectory`], [`Event`], [`Certificate`], [`Checkpoint`], [`Observables`]: what a user does with a run of any method | [`step`], [`round_off`], [`numbers`] |
+//! | `compiled` | implicit methods in plain numbers, one instance for each number of variables | [`step`], [`midpoint`], [`collocation`], [`numbers`] |
+//! | [`run`] | [`Method`], [`Span`], [`Until`], [`Watch`], [`Steps`], [`Trajectory`], [`Event`], [`Certificate`], [`Checkpoint`], [`Observables`]: what a user does with a run of any method | [`step`], [`round_off`], [`numbers`], `compiled` |
 //! | [`noise`](mod@noise) | [`Noisy`]: a system with thermal noise; [`NinomiyaVictoir`], [`RandomFlow`], which sample its law with any method | [`step`], [`explicit`] |
 //! | [`open`](mod@open) | [`OpenSystem`]: a clock in the energy, ports, baths and a ledger, for every method | [`step`], [`round_off`], [`discrete_gradient`], [`midpoint`], [`collocation`], [`explicit`], [`system`], [`noise`](mod@noise) |
 //! | `default_scheme` | a retraction is a method: its [`Scheme`] with the default options | [`step`], [`midpoint`] |
 //! | [`attitude`] | [`Attitude`]: where a body points along a run of its angular momentum | [`run`], [`round_off`] |
 //! | [`tangent`](mod@tangent) | [`Tangents`]: the derivative of a run along its start and parameters | [`step`], [`discrete_gradient`], [`newton`], [`midpoint`], [`explicit`], [`run`] |
 //! | [`laws`] | what a step and a method promise, and the functions that check it | all of them |
-//! | [`error`](mod@error) | [`Error`]: everything that can go wrong | [`step`], [`run`], [`attitude`] |
+//! | [`error`](mod@error) | [`Error`]: everything that can go wrong | [`step`], [`run`], [`noise`](mod@noise), [`attitude`] |
 //!
 //! # What a later version may add
 //!
@@ -33,6 +34,7 @@
 
 pub mod attitude;
 pub mod collocation;
+mod compiled;
 mod default_scheme;
 pub mod discrete_gradient;
 pub mod error;
@@ -83,10 +85,10 @@ pub use run::watch::{Jumping, Watch, Watched};
 pub use run::{Ending, Method, Method as Run, Schedule, SpanError, State};
 pub use step::{
     Components, Control, Directions, Effort, Element, Entries, EntropyStep, EventExchange,
-    Evidence, Flow, JumpError, Laws, LedgerErrors, LedgerSummary, LimitingSites, Memory,
-    MethodError, NoiseSummary, Panicked, PlainNumbers, Promises, Recheck, Refusal, RestoreError,
-    Saved, Scales, StageLaws, StartError, StateSpace, StepEnds, StepError, StepStart, Stepper,
-    Taken, Values, Vector,
+    Evidence, Flow, Implicit, Inlined, JumpError, Laws, LedgerErrors, LedgerSummary, LimitingSites,
+    Memory, MethodError, NoiseSummary, Panicked, PlainNumbers, Promises, Recheck, Refusal,
+    RestoreError, Saved, Scales, StageLaws, StartError, StateSpace, StepEnds, StepError, StepStart,
+    Stepper, Taken, Values, Vector,
 };
 pub use tangent::{
     AdjointRun, Adjoints, Linearised as LinearisedStep, LinearisedAlong, LossGradient, SelfAdjoint,

@@ -1,6 +1,7 @@
 //! A system in plain numbers is a flow, of a size that is known at run time.
 
 mod answered;
+mod modelled;
 mod projection;
 mod referred_rise;
 mod rows;
@@ -14,6 +15,7 @@ use metriplectic_equations::{ENERGY, ENTROPY, Equations, Report, VerifiedEquatio
 use metriplectic_manifolds::PointError;
 
 pub(crate) use self::answered::{Answered, Beside, InTypes};
+pub(crate) use self::modelled::Modelled;
 use self::projection::{Aim, Projection};
 pub use self::rows::Rows;
 use crate::explicit::{Projected, ProjectionError, StageFlow, Target};

@@ -17,8 +17,10 @@ pub(crate) mod evidence;
 pub(crate) mod exact;
 pub(crate) mod failure;
 mod flow;
+pub(crate) mod implicit;
 pub(crate) mod in_plain;
 mod initial_scales;
+mod inlined;
 mod jump_error;
 mod ledger;
 mod memory;
@@ -44,7 +46,9 @@ pub use flow::{
     Element, Flow, FlowVisitor, Laws, PlainFlow, PlainNumbers, Recheck, StateSpace, Written,
     in_room,
 };
+pub use implicit::Implicit;
 pub(crate) use initial_scales::{CUT, CUTS, SAME, classical_step, initial_scales};
+pub use inlined::Inlined;
 pub use jump_error::JumpError;
 pub use ledger::{EventExchange, LedgerErrors, LedgerSummary};
 pub(crate) use memory::FARTHEST;

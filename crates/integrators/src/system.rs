@@ -23,10 +23,12 @@ pub(crate) use stages::{CONSERVED, CORRECTIONS, OFF, STAGNATED};
 
 use crate::explicit::{StageFlow as _, Target};
 use crate::round_off::bound::{SizesAt, of_an_increment, size_of_terms, sizes_on_a_step};
+use crate::step::implicit::COMPILED;
 use crate::step::{
     Components, CountOf, Dim, Directions, Entries, Flow, FlowVisitor, Laws, Numbers, Recheck,
     Scales, Values, Written, initial_scales,
 };
+use metriplectic_manifolds::Riemannian as _;
 
 type Tangent<Y> = Components<metriplectic_fields::Vector<<Y as Metriplectic>::Manifold>>;
 
@@ -193,6 +195,11 @@ impl<Y: Metriplectic> Flow for Y {
 }
 
 impl<Y: Metriplectic> Written for Y {
+    const IS_COMPILED: bool = Y::Manifold::IS_VECTOR_SPACE
+        && Y::Metric::IS_CANONICAL
+        && Y::Invariants::COUNT == 0
+        && <Dim<Y> as Dimension>::LEN <= COMPILED;
+
     type Layout = ();
 
     fn layout(&self) -> &() {

@@ -10,17 +10,18 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// The rooms, each with the rooms that its files name. A room names only rooms above it.
-const ROOMS: [(&str, &[&str]); 17] = [
-    ("step", &[]),
+const ROOMS: [(&str, &[&str]); 18] = [
+    ("newton", &[]),
+    ("step", &["newton"]),
     ("round_off", &["step"]),
     ("discrete_gradient", &["round_off"]),
-    ("newton", &[]),
     ("midpoint", &["step", "round_off", "discrete_gradient", "newton"]),
     ("collocation", &["step", "round_off"]),
     ("explicit", &["step", "round_off"]),
     ("system", &["step", "round_off", "explicit"]),
     ("numbers", &["step", "round_off", "explicit", "system"]),
-    ("run", &["step", "round_off", "numbers"]),
+    ("compiled", &["step", "midpoint", "collocation", "numbers"]),
+    ("run", &["step", "round_off", "numbers", "compiled"]),
     ("noise", &["step", "explicit"]),
     (
         "open",

@@ -96,7 +96,7 @@ impl<const N: usize> PartialEq for Chart<N> {
     }
 }
 
-translations!(Chart);
+translations!(Chart, false);
 
 impl<const N: usize> Manifold for Chart<N> {
     // The nearest point of the domain is not known, so `project` leaves a point where it is.

@@ -62,7 +62,7 @@ pub(crate) fn sum_of_terms<V: Column<f64>>(w: &V, v: &V) -> f64 {
 
 /// The charts of a part of a vector space.
 macro_rules! translations {
-    ($space:ident) => {
+    ($space:ident, $is_vector_space:literal) => {
         impl<const N: usize> Space for $space<N> {
             type Dim = Const<N>;
             type Velocity = Const<N>;
@@ -87,6 +87,8 @@ macro_rules! translations {
             fn coordinates<D: Scalar>(x: &SVector<f64, N>, y: &SVector<D, N>) -> SVector<D, N> {
                 Column::from_index(|i| y[i] - x[i])
             }
+
+            const IS_VECTOR_SPACE: bool = $is_vector_space;
 
             const RATES_ARE_VELOCITIES: bool = true;
 
@@ -152,7 +154,7 @@ pub(crate) use columns;
 /// The charts of a vector space, and its membership: every finite column of numbers is a point.
 macro_rules! vector_space {
     ($space:ident) => {
-        $crate::euclidean::translations!($space);
+        $crate::euclidean::translations!($space, true);
 
         impl<const N: usize> Manifold for $space<N> {
             $crate::euclidean::columns!();

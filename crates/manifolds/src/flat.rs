@@ -70,6 +70,8 @@ macro_rules! straight_geodesics {
 }
 
 impl<M: Flat> Riemannian<M> for Canonical {
+    const IS_CANONICAL: bool = true;
+
     type At<D: Scalar> = Self;
 
     #[inline]

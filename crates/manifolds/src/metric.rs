@@ -31,6 +31,10 @@ pub type GeodesicEnd<M, D> = (ChartPoint<M, D>, Vector<M, D>);
     note = "a metric is `Metric::constant(matrix)?`, or `Metric::field(closure)` with a closure from a point over `Real` to the symmetric matrix g"
 )]
 pub trait Riemannian<M: Space> {
+    /// Says whether this is the canonical metric.
+    #[doc(hidden)]
+    const IS_CANONICAL: bool = false;
+
     /// The metric at one point.
     type At<D: Scalar>: InnerProduct<Vector<M, D>>;
 

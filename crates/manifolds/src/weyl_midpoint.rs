@@ -18,6 +18,8 @@ use crate::{
 pub struct WeylMidpoint;
 
 impl<M: Manifold, G: Riemannian<M>> Retraction<M, G> for WeylMidpoint {
+    const IS_WEYL_MIDPOINT: bool = true;
+
     #[inline]
     fn step_path<D: Scalar>(
         &self,

@@ -17,6 +17,8 @@ use super::DiscreteGradient;
 pub struct Gonzalez;
 
 impl DiscreteGradient for Gonzalez {
+    const IS_GONZALEZ: bool = true;
+
     #[inline]
     fn mean<M: Manifold, D: Scalar>(
         &self,

@@ -16,8 +16,8 @@ use crate::round_off::compensation::Displaced;
 use crate::round_off::drift;
 use crate::step::failure::{Cause, Fallbacks};
 use crate::step::{
-    Dim, Effort, Evidence, Flow as _, Laws, Promises, Refusal, Start, StepError, StepStart,
-    Stepper, Taken, name_of,
+    Dim, Effort, Evidence, Flow as _, Implicit, Laws, Promises, Refusal, Start, StepError,
+    StepStart, Stepper, Taken, name_of,
 };
 
 impl<Y, R, W> Stepper<Y> for Scheme<R, W>
@@ -29,6 +29,13 @@ where
     type Memory = MemoryOf<Y>;
 
     const HAS_DEFAULT_BETWEEN: bool = true;
+
+    const IS_IMPLICIT: bool = R::IS_WEYL_MIDPOINT && W::IS_GONZALEZ;
+
+    fn implicit(&self) -> Option<Implicit> {
+        let &Self { newton, splits, .. } = self;
+        (R::IS_WEYL_MIDPOINT && W::IS_GONZALEZ).then_some(Implicit::Midpoint { newton, splits })
+    }
 
     fn name(&self) -> String {
         format!("Scheme<{}, {}>", name_of::<R>(), name_of::<W>())

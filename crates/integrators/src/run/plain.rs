@@ -2,6 +2,7 @@
 
 use metriplectic_equations::Equations;
 
+use crate::compiled;
 use crate::numbers::{Answered, Beside, FromEquations, InTypes};
 use crate::run::error::RunError;
 use crate::run::event::Event;
@@ -13,8 +14,8 @@ use crate::run::trajectory::Trajectory;
 use crate::step::in_plain::{InPlainNumbers, MethodInTypes};
 use crate::step::panicked::caught;
 use crate::step::{
-    Element, Entries, Flow, FlowError, FlowVisitor, PlainFlow, PlainMethod, PlainNumbers, Stepper,
-    Written, in_room,
+    Element, Entries, Flow, FlowError, FlowVisitor, Implicit, PlainFlow, PlainMethod, PlainNumbers,
+    Stepper, Written, in_room,
 };
 
 /// A run of a method over a schedule, in the types of a flow or in plain numbers.
@@ -51,6 +52,13 @@ impl<F: Flow, M: Stepper<F>> FlowVisitor<F> for Whole<F, M> {
     where
         F: Written,
     {
+        // A constant, so that the method is not compiled in types beside.
+        if const { M::IS_IMPLICIT && F::IS_COMPILED } {
+            let Self { method, x0, schedule } = self;
+            let (method, asked) = (method.implicit(), (system, &InTypes(flow) as &dyn Beside));
+            let schedule = in_numbers(schedule, flow);
+            return read::<F>(flow, run_implicit(method, asked, F::write(&x0), schedule));
+        }
         self.in_numbers(flow, |method, x0, schedule| {
             run_answered(method, (system, &InTypes(flow)), F::write(&x0), schedule)
         })
@@ -62,20 +70,33 @@ impl<F: Written, M: Stepper<F>> Whole<F, M> {
     fn in_numbers(
         self,
         flow: &F,
-        run: impl FnOnce(
-            &dyn PlainMethod,
-            Element<F>,
-            Schedule,
-        ) -> Result<Trajectory<PlainNumbers>, RunError<PlainNumbers>>,
+        run: impl FnOnce(&dyn PlainMethod, Element<F>, Schedule) -> Outcome,
     ) -> Result<Trajectory<F::Space>, RunError<F::Space>> {
-        let Self { method, x0, mut schedule } = self;
-        for request in &mut schedule.watch.events {
-            *request = request.in_numbers(flow);
-        }
-        match run(&MethodInTypes { method, flow }, x0, schedule) {
-            Ok(run) => Ok(run.read::<F>(flow.layout())),
-            Err(error) => Err(error.read::<F>(flow.layout())),
-        }
+        let Self { method, x0, schedule } = self;
+        let schedule = in_numbers(schedule, flow);
+        read::<F>(flow, run(&MethodInTypes { method, flow }, x0, schedule))
+    }
+}
+
+/// Writes the events of a schedule.
+fn in_numbers<F: Written>(mut schedule: Schedule, flow: &F) -> Schedule {
+    for request in &mut schedule.watch.events {
+        *request = request.in_numbers(flow);
+    }
+    schedule
+}
+
+/// The outcome of a run in plain numbers.
+type Outcome = Result<Trajectory<PlainNumbers>, RunError<PlainNumbers>>;
+
+/// Reads the outcome of a run in the types of a flow.
+fn read<F: Written>(
+    flow: &F,
+    outcome: Outcome,
+) -> Result<Trajectory<F::Space>, RunError<F::Space>> {
+    match outcome {
+        Ok(run) => Ok(run.read::<F>(flow.layout())),
+        Err(error) => Err(error.read::<F>(flow.layout())),
     }
 }
 
@@ -84,7 +105,7 @@ fn run(
     method: &dyn PlainMethod,
     (flow, x0): (&PlainFlow<'_>, Entries),
     schedule: Schedule,
-) -> Result<Trajectory<PlainNumbers>, RunError<PlainNumbers>> {
+) -> Outcome {
     in_room(flow, || Steps::start_any(method, (flow, flow), x0, schedule)?.run())
 }
 
@@ -94,8 +115,21 @@ fn run_answered(
     (system, beside): (&dyn Equations, &dyn Beside),
     x0: Entries,
     schedule: Schedule,
-) -> Result<Trajectory<PlainNumbers>, RunError<PlainNumbers>> {
+) -> Outcome {
     run(method, (&Answered { numbers: FromEquations(system), beside }, x0), schedule)
+}
+
+/// Runs a system by an implicit method that is compiled with the library.
+fn run_implicit(
+    method: Option<Implicit>,
+    (system, beside): (&dyn Equations, &dyn Beside),
+    x0: Entries,
+    schedule: Schedule,
+) -> Outcome {
+    let parts = method.zip(system.model());
+    let (method, model) = parts.expect("the constants say that there are a method and a model");
+    let run = |method: &dyn PlainMethod| run_answered(method, (system, beside), x0, schedule);
+    compiled::with_method(method, model, run).expect("the constants say that there is an instance")
 }
 
 impl State<PlainNumbers> {

@@ -85,6 +85,11 @@ pub trait Written: Flow + Sized {
     /// Says whether a panic in the flow ends a run in an error: in one whose functions are yours.
     const CATCHES_PANICS: bool = false;
 
+    /// Says whether the entries of a state are those of a vector space with the canonical metric, so few that implicit methods are
+    /// compiled with the library.
+    #[doc(hidden)]
+    const IS_COMPILED: bool = false;
+
     /// The parts of a state that are no entries, such as the names in a ledger.
     type Layout: Clone + Send + Sync + 'static;
 

@@ -1,8 +1,8 @@
 //! The interface between runs and methods.
 
 use super::{
-    Control, Effort, Element, Flow, LimitingSites, Memory, MethodError, NoiseSummary, Promises,
-    Refusal, StepEnds, StepError, StepStart, Taken, Vector as _, dense, name_of,
+    Control, Effort, Element, Flow, Implicit, LimitingSites, Memory, MethodError, NoiseSummary,
+    Promises, Refusal, StepEnds, StepError, StepStart, Taken, Vector as _, dense, name_of,
 };
 
 /// A one-step method.
@@ -16,6 +16,16 @@ pub trait Stepper<F: Flow + ?Sized>: Sized {
 
     /// Says whether [`between`](Self::between) is the default. Then a run in plain numbers forms the state in plain numbers.
     const HAS_DEFAULT_BETWEEN: bool = false;
+
+    /// Says whether [`implicit`](Self::implicit) may return a method.
+    #[doc(hidden)]
+    const IS_IMPLICIT: bool = false;
+
+    /// Returns what the method is, if its steps in plain numbers are compiled with the library.
+    #[doc(hidden)]
+    fn implicit(&self) -> Option<Implicit> {
+        None
+    }
 
     /// The name in a checkpoint, with the stages or the tableau and without options. A run is resumed by a method of
     /// its name. The default is the name of the type without paths.

@@ -1,0 +1,121 @@
+//! A method that is compiled with each system.
+
+use super::{
+    Control, Element, Flow, LimitingSites, MethodError, NoiseSummary, Promises, Refusal, StepEnds,
+    StepError, StepStart, Stepper, Taken,
+};
+
+/// A method that is compiled with your system, also where the library has an instance of it.
+///
+/// `Method::run` of a system with up to four variables on `Euclidean` or `LieDual`, with the canonical metric and without further
+/// invariants, takes the steps of `WeylMidpoint`, [`Gauss`](crate::Gauss) and [`Radau`](crate::Radau) by instances that are
+/// compiled with the library, which know the system behind a pointer. A program compiles in a quarter of the time then. This wrapper
+/// compiles the method with the system: three variables with cheap closures take 0.7 to 0.8 times the instructions. The
+/// steps have the same bits.
+///
+/// ```
+/// use metriplectic_dynamics::System;
+/// use metriplectic_fields::Real;
+/// use metriplectic_integrators::{Gauss, Inlined, Method, Span};
+/// use metriplectic_manifolds::LieDual;
+/// use nalgebra::Vector3;
+/// # fn main() -> Result<(), metriplectic_integrators::Error> {
+/// let body = System::on(LieDual::so3())
+///     .energy(|p: &Vector3<Real>| p.x * p.x * 0.5 + p.y * p.y + p.z * p.z * 1.5)
+///     .entropy(|p: &Vector3<Real>| p.norm_squared() * 0.5)
+///     .build()?;
+/// let (start, span) = (Vector3::new(0.4, 0.5, 0.3), Span::steps(0.1, 100));
+/// let run = Inlined(Gauss::<3>).run(&body, start, span)?;
+/// assert_eq!(run.last().point, Gauss::<3>.run(&body, start, span)?.last().point);
+/// # Ok(())
+/// # }
+/// ```
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Inlined<M>(pub M);
+
+impl<F: Flow, M: Stepper<F>> Stepper<F> for Inlined<M> {
+    type Memory = M::Memory;
+
+    const HAS_DEFAULT_BETWEEN: bool = M::HAS_DEFAULT_BETWEEN;
+
+    fn name(&self) -> String {
+        self.0.name()
+    }
+
+    fn memory(&self) -> M::Memory {
+        self.0.memory()
+    }
+
+    fn order(&self) -> u32 {
+        self.0.order()
+    }
+
+    fn promises(&self, flow: &F) -> Promises {
+        self.0.promises(flow)
+    }
+
+    fn damps(&self) -> bool {
+        self.0.damps()
+    }
+
+    fn noise(&self, flow: &F) -> Option<NoiseSummary> {
+        self.0.noise(flow)
+    }
+
+    fn nothing_between(&self, time: f64, h: f64) -> StepError {
+        self.0.nothing_between(time, h)
+    }
+
+    fn check(&self, follows_tolerance: bool) -> Result<(), MethodError> {
+        self.0.check(follows_tolerance)
+    }
+
+    fn step(
+        &self,
+        start: &StepStart<'_, F>,
+        h: f64,
+        memory: &mut M::Memory,
+    ) -> Result<Taken<F>, StepError> {
+        self.0.step(start, h, memory)
+    }
+
+    fn attempt(
+        &self,
+        start: &StepStart<'_, F>,
+        h: f64,
+        memory: &mut M::Memory,
+    ) -> Result<Taken<F>, Refusal> {
+        self.0.attempt(start, h, memory)
+    }
+
+    fn control(&self) -> Control {
+        self.0.control()
+    }
+
+    fn error(
+        &self,
+        step: &StepEnds<'_, F>,
+        memory: &M::Memory,
+        norm: impl Fn(&F::Vector) -> f64,
+    ) -> Option<f64> {
+        self.0.error(step, memory, norm)
+    }
+
+    fn limiting_sites(
+        &self,
+        step: &StepEnds<'_, F>,
+        memory: &M::Memory,
+        allowed: &F::Vector,
+    ) -> LimitingSites {
+        self.0.limiting_sites(step, memory, allowed)
+    }
+
+    fn between(
+        &self,
+        step: &StepEnds<'_, F>,
+        memory: &mut M::Memory,
+        theta: f64,
+    ) -> Option<Element<F>> {
+        self.0.between(step, memory, theta)
+    }
+}

@@ -99,8 +99,8 @@ pub mod prelude {
     pub use metriplectic_fitting::{Fit, FitError, Fitted};
     pub use metriplectic_integrators::{
         Adjoints, Attitude, AttitudeError, Certificate, Checkpoint, DormandPrince5, DormandPrince8,
-        Ending, Error, Event, ExplicitRungeKutta, Gauss, Gonzalez, ItohAbe, MeanValue, Method,
-        Newton, NinomiyaVictoir, NoiseBuilder, NoiseError, Noisy, NoisyError, Observables,
+        Ending, Error, Event, ExplicitRungeKutta, Gauss, Gonzalez, Inlined, ItohAbe, MeanValue,
+        Method, Newton, NinomiyaVictoir, NoiseBuilder, NoiseError, Noisy, NoisyError, Observables,
         OpenBuilder, OpenSpace, OpenState, OpenSystem, Radau, RandomFlow, ResumeError, Run,
         RunError, RungeKuttaChebyshev, Scheme, Span, SpanError, StartError, State, StepError,
         Stepper, Steps, SymmetricItohAbe, Tableau, Tangents, Trajectory, Until, Watch,

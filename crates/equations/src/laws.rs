@@ -149,6 +149,13 @@ fn one_law(
     let transposed: Vec<f64> = (0..n * n).map(|k| hf[k % n * n + k / n]).collect();
     near("a Hessian is symmetric", &hf, &transposed)?;
     let along: Vec<f64> = hf.chunks_exact(n).map(|row| dot(row, u)).collect();
+    let v: Vec<f64> = u.iter().rev().copied().collect();
+    let expected = [value, dot(&df, u), dot(&df, &v), dot(&along, &v)];
+    near(
+        "a law along two vectors has its derivatives",
+        &system.along(law, t, x, [u, &v]),
+        &expected,
+    )?;
     derivative("a Hessian is the derivative of the differential", &along, &|s, to| {
         let mut df = nan(n);
         system.differential_at(law, t, x, &scaled(u, s), &mut df);

@@ -62,7 +62,7 @@ pub trait Model: Equations {
     /// Evaluates one law at a state.
     fn value(&self, law: usize, t: f64, x: &[f64]) -> f64;
 
-    /// Returns whether the bracket is made of the covector of the entropy, and annihilates it.
+    /// Returns whether the bracket annihilates every covector of the entropy by construction: it is made of it, or zero.
     fn annihilates_entropy(&self) -> bool {
         self.is_zero(Part::Reversible)
     }
@@ -72,8 +72,8 @@ pub trait Model: Equations {
         self.second_law() == SecondLaw::NoEntropy
     }
 
-    /// Evaluates one law at the hyper-dual state `x + u ε₁ + v ε₂` of a vector space: `f`, `⟨df, u⟩`, `⟨df, v⟩` and `f''(u, v)` at `x`.
-    /// The default forms the Hessian.
+    /// Evaluates one law along two vectors in the chart at `x`, at the hyper-dual state `φ_x(u ε₁ + v ε₂)`: `f`, `⟨df, u⟩`, `⟨df, v⟩` and
+    /// `f''(u, v)`. The default forms the Hessian.
     fn along(&self, law: usize, t: f64, x: &[f64], [u, v]: [&[f64]; 2]) -> [f64; 4] {
         let n = u.len();
         with_numbers(n * (n + 1), |room| {

@@ -165,6 +165,7 @@ macro_rules! method {
             const IS_IMPLICIT: bool = true;
 
             fn implicit(&self) -> Option<Implicit> {
+                let () = Self::IS_A_METHOD;
                 Some(Implicit::$name { stages: S })
             }
 

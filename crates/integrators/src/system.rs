@@ -198,6 +198,7 @@ impl<Y: Metriplectic> Written for Y {
     const IS_COMPILED: bool = Y::Manifold::IS_VECTOR_SPACE
         && Y::Metric::IS_CANONICAL
         && Y::Invariants::COUNT == 0
+        && <Dim<Y> as Dimension>::LEN > 0
         && <Dim<Y> as Dimension>::LEN <= COMPILED;
 
     type Layout = ();

@@ -136,8 +136,8 @@ pub(super) fn try_step<Y: Metriplectic>(
     Ok(Taken { x: x_end, values: values_end, evidence, effort })
 }
 
-/// Returns whether a step changes a further invariant, or lowers the entropy, by more than round-off. Where a law depends on the
-/// others, the covectors of the stages are so long that their terms have no digits of it.
+/// Returns whether a step changes a further invariant, or lowers the entropy, by more than round-off beside a dependent invariant: the
+/// covectors of the stages are so long there that their terms have no digits of it.
 pub(super) fn breaks_another_law<Y: Metriplectic>(
     &Start { system, x, h, ref values, .. }: &Start<'_, Y>,
     end: &Point<Y>,
@@ -145,8 +145,10 @@ pub(super) fn breaks_another_law<Y: Metriplectic>(
 ) -> bool {
     let rises = system.second_law() == SecondLaw::Exact && h > 0.0;
     let term_sizes = |x: &Point<Y>| system.term_sizes(x);
-    breaks_invariants([values, after], || [x, end].map(term_sizes))
-        || (rises && falls([values, after], || [x, end].map(term_sizes)))
+    let is_broken = breaks_invariants([values, after], || [x, end].map(term_sizes))
+        || (rises && falls([values, after], || [x, end].map(term_sizes)));
+    // An invariant that is independent is solved for within the round-off of the stages.
+    is_broken && [x, end].into_iter().any(|x| system.dependent_invariant(x).is_some())
 }
 
 /// The end with the last digits of the laws, where the stages have lost them, as they do if friction is stiff: moved onto

@@ -45,6 +45,8 @@ impl<const N: usize> ScalarField<Euclidean<N>> for Law<'_> {
 
     /// Evaluates the law on a plane, where `ε₁ε₂` has no part in the point, as on all paths of methods in a vector space.
     fn at_real(&self, x: &SVector<Real, N>) -> Real {
+        let is_plane = |x: &Real| x.eps1eps2 == 0.0 || x.eps1eps2.is_nan();
+        debug_assert!(x.iter().all(is_plane), "a path in a vector space is a line");
         let u = SVector::<f64, N>::from_index(|i| x[i].eps1);
         let v = SVector::<f64, N>::from_index(|i| x[i].eps2);
         let x = SVector::<f64, N>::from_index(|i| x[i].re);
@@ -70,6 +72,8 @@ impl<const N: usize> ScalarField<Euclidean<N>> for Law<'_> {
             df.as_mut_slice(),
             hf.as_mut_slice(),
         );
+        // Row by row, where the matrices here are column by column.
+        hf.transpose_mut();
         Jet2 { value, df, hf }
     }
 }

@@ -17,8 +17,7 @@ use super::system::{CovectorsOf, Direction, OpenSystem, StateOf};
 use super::vector::OpenVector;
 use crate::explicit::{StageFlow as _, Target};
 use crate::round_off::bound::{
-    NO_DIGITS, ROUNDED, breaks_first_law, breaks_invariants, of_an_increment, size_of_terms,
-    sizes_on_a_step,
+    NO_DIGITS, ROUNDED, breaks_first_law, of_an_increment, size_of_terms, sizes_on_a_step,
 };
 use crate::step::failure::Cause;
 use crate::step::scales::relative;
@@ -483,21 +482,16 @@ where
         }
     }
 
-    /// The cause for which the end of a step is not taken, if its balance is not that of the run, or if it changes a further
-    /// invariant.
+    /// The cause for which the end of a step is not taken, if its balance is not that of the run.
     pub(super) fn broken_balance(
         &self,
         start: &StepStart<'_, Self>,
         end: &StateOf<Y>,
-        values: &Laws<Numbers<Y>>,
+        energy: f64,
     ) -> Option<Cause> {
-        let (ends, energy) = ([start.x, end], values.energy);
         let change = energy - start.reference.energy;
-        if let Some(size) = breaks_first_law(change, energy, || self.energy_sizes(ends)) {
-            return Some(Cause::Energy { change, size });
-        }
-        let sizes = || ends.map(|x| self.term_sizes(x));
-        breaks_invariants([&start.values, values], sizes).then_some(Cause::Unsolved)
+        let size = breaks_first_law(change, energy, || self.energy_sizes([start.x, end]))?;
+        Some(Cause::Energy { change, size })
     }
 
     /// The components of a direction, as those of the closed system.

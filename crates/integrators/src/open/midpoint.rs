@@ -115,7 +115,7 @@ where
     if !(values.energy.is_finite() && values.entropy.is_finite()) {
         return Err(edge());
     }
-    if let Some(cause) = system.broken_balance(start, &x, &values) {
+    if let Some(cause) = system.broken_balance(start, &x, values.energy) {
         return Err(Failure { cause, residual: f64::INFINITY, effort });
     }
     // The entropy changes where heat flows, too.

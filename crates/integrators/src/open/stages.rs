@@ -260,7 +260,7 @@ where
     if !(values.energy.is_finite() && values.entropy.is_finite()) {
         return Err(edge());
     }
-    if let Some(cause) = system.broken_balance(start, &x, &values) {
+    if let Some(cause) = system.broken_balance(start, &x, values.energy) {
         return Err(Failure { cause, residual, effort });
     }
     let mut evidence = solution.evidence;

@@ -85,8 +85,8 @@ pub trait Written: Flow + Sized {
     /// Says whether a panic in the flow ends a run in an error: in one whose functions are yours.
     const CATCHES_PANICS: bool = false;
 
-    /// Says whether the entries of a state are those of a vector space with the canonical metric, so few that implicit methods are
-    /// compiled with the library.
+    /// Says whether the flow is a model on a vector space with the canonical metric, without further invariants and of so few
+    /// variables that implicit methods are compiled with the library.
     #[doc(hidden)]
     const IS_COMPILED: bool = false;
 

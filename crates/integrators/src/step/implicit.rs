@@ -5,6 +5,7 @@ use crate::newton::Newton;
 /// An implicit method with its options, whose steps in plain numbers are compiled with the library.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[doc(hidden)]
+#[non_exhaustive]
 pub enum Implicit {
     /// The scheme of the Weyl midpoint with the discrete gradient of Gonzalez.
     Midpoint {

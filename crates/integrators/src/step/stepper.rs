@@ -17,7 +17,7 @@ pub trait Stepper<F: Flow + ?Sized>: Sized {
     /// Says whether [`between`](Self::between) is the default. Then a run in plain numbers forms the state in plain numbers.
     const HAS_DEFAULT_BETWEEN: bool = false;
 
-    /// Says whether [`implicit`](Self::implicit) may return a method.
+    /// Says whether [`implicit`](Self::implicit) returns a method.
     #[doc(hidden)]
     const IS_IMPLICIT: bool = false;
 

@@ -73,7 +73,7 @@ mod tests {
     ) {
         let schedules: [Schedule; 2] = [
             Span::steps(h, 40).into(),
-            Span::until(20.0 * h).tolerance(1e-6).output_every(3.0 * h).into(),
+            Span::until(20.0 * h).tolerance(1e-6).output_every(3.0 * h),
         ];
         for schedule in schedules {
             macro_rules! agree {

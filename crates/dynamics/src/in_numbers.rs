@@ -491,7 +491,7 @@ impl<Y: Metriplectic + ?Sized> Model for InNumbers<'_, Y> {
     fn along(&self, law: usize, _: f64, x: &[f64], [u, v]: [&[f64]; 2]) -> [f64; 4] {
         let n = Dim::<Y>::LEN;
         let (u, v) = (&u[..n], &v[..n]);
-        // An entry −0 and 0 would be 0.
+        // With −0, so that an entry of −0 keeps its sign in the sum.
         let q = Vector::<Of<Y>, Real>::from_index(|i| Real::new(-0.0, u[i], v[i], 0.0));
         let x = Of::<Y>::chart(&point::<Of<Y>>(x), &q);
         let mut along = Along::<Of<Y>> { x: &x, found: [0.0; 4] };

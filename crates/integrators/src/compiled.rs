@@ -3,13 +3,13 @@
 //! Each step is that of the same text as in the types of a system, and has its bits.
 
 use metriplectic_equations::Model;
+use metriplectic_manifolds::WeylMidpoint;
 
 use crate::collocation::{Gauss, Radau};
 use crate::midpoint::Scheme;
 use crate::numbers::Modelled;
 use crate::step::in_plain::MethodInTypes;
 use crate::step::{Implicit, PlainMethod};
-use metriplectic_manifolds::WeylMidpoint;
 
 /// Calls `f` with a method of a model on a vector space with the canonical metric; `None` for a size without an instance.
 pub(crate) fn with_method<T>(

@@ -42,7 +42,7 @@ impl<F, U> Noisy<F, U> {
         Self { verified: true, ..self }
     }
 
-    /// Whether the model was verified before the run, with this noise.
+    /// Returns whether the model was verified before the run, with this noise.
     pub(super) const fn has_certificate(&self) -> bool {
         self.verified
     }

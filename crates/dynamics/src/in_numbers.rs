@@ -419,6 +419,10 @@ impl<Y: Metriplectic + ?Sized> Equations for InNumbers<'_, Y> {
         put(&Of::<Y>::scales(&point::<Of<Y>>(x)), sizes);
     }
 
+    fn is_vector_space(&self) -> bool {
+        Of::<Y>::IS_VECTOR_SPACE
+    }
+
     fn chart(&self, x: &[f64], q: &[f64], y: &mut [f64]) {
         write::<Of<Y>>(&Of::<Y>::chart(&point::<Of<Y>>(x), &column(q)), y);
     }

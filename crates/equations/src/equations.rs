@@ -29,7 +29,8 @@ pub struct Sizes {
 ///
 /// Laws ([`laws::equations`](crate::laws::equations)): 1. the differentials are those of the values; 2. `⟨dH, x'⟩ = 0` and
 /// `⟨dL_a, x'⟩ = 0`; 3. the production is not negative, and `⟨dS, x'⟩` of an exact second law; 4. `φ_x(0) = x`, and the coordinates are the
-/// inverse of the chart; 5. `ψ_x(0) = x`, and the rates there are the velocity.
+/// inverse of the chart; 5. `ψ_x(0) = x`, and the rates there are the velocity; 6. in a [vector space](Self::is_vector_space) both charts
+/// are translations.
 pub trait Equations {
     /// Returns the lengths of all slices. They do not change.
     fn sizes(&self) -> Sizes;
@@ -76,6 +77,12 @@ pub trait Equations {
         for (size, x) in sizes.iter_mut().zip(x) {
             *size = x.abs();
         }
+    }
+
+    /// Returns whether the space is a vector space: both charts are `x + q` everywhere, and the sizes are `|x_i|`, as in the defaults
+    /// here. Then they need not be asked for.
+    fn is_vector_space(&self) -> bool {
+        false
     }
 
     /// Computes the state `y = φ_x(q)`. The default is `x + q`.

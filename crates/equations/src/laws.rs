@@ -15,7 +15,8 @@ const CANCELS: f64 = 1e-9;
 ///    the values; 4. `⟨dF, u⟩` is the derivative of each law along `φ_x(su)`; 5. the velocity conserves the energy and
 ///    the further invariants, the production is not negative, and it is `⟨dS, x'⟩` of an
 ///    [exact](SecondLaw::Exact) second law; 6. `ψ_x(0) = x`, the rates
-///    there are the velocity, and the stage coordinates are the inverse of `ψ_x`.
+///    there are the velocity, and the stage coordinates are the inverse of `ψ_x`; 7. in a vector space both charts are `x + u`, the
+///    rates in them are the velocity, and the sizes are `|x_i|`.
 ///
 /// The fifth law is that of a closed system.
 ///
@@ -77,6 +78,18 @@ pub fn equations(system: &dyn Equations, t: f64, x: &[f64], u: &[f64]) -> Result
     if system.stage_state(x, u, &mut y) {
         system.stage_coordinates(x, &y, &mut q);
         near("ψ_x⁻¹(ψ_x(u)) = u", &q, u)?;
+    }
+    if system.is_vector_space() {
+        same("a vector space has an entry in each direction", entries as f64, n as f64)?;
+        let moved: Vec<f64> = x.iter().zip(u).map(|(x, u)| x + u).collect();
+        system.chart(x, u, &mut y);
+        near("φ_x(u) = x + u in a vector space", &y, &moved)?;
+        system.stage_state(x, u, &mut y);
+        near("ψ_x(u) = x + u in a vector space", &y, &moved)?;
+        system.stage_rates(x, u, &y, &v, &mut rates);
+        near("the rates of a vector space are the velocity", &rates, &v)?;
+        let lengths: Vec<f64> = x.iter().map(|x| x.abs()).collect();
+        near("the sizes of a vector space are |x_i|", &sizes, &lengths)?;
     }
     Ok(())
 }

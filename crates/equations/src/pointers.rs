@@ -70,6 +70,11 @@ macro_rules! answers {
                 $other.scales(x, sizes);
             }
 
+            fn is_vector_space(&self) -> bool {
+                let $this = self;
+                $other.is_vector_space()
+            }
+
             fn chart(&self, x: &[f64], q: &[f64], y: &mut [f64]) {
                 let $this = self;
                 $other.chart(x, q, y);

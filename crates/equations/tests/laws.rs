@@ -24,6 +24,8 @@ enum Fault {
     Negative,
     Stage,
     StageRates,
+    /// A size of a vector space.
+    Size,
     ValueByItself,
     DifferentialByItself,
     Hessian,
@@ -116,6 +118,17 @@ impl Equations for Body {
 
     fn second_law(&self) -> SecondLaw {
         SecondLaw::Exact
+    }
+
+    fn is_vector_space(&self) -> bool {
+        true
+    }
+
+    fn scales(&self, x: &[f64], sizes: &mut [f64]) {
+        (0..N).for_each(|i| sizes[i] = x[i].abs());
+        if self.0 == Fault::Size {
+            sizes[2] = 1.0;
+        }
     }
 
     fn chart(&self, x: &[f64], q: &[f64], y: &mut [f64]) {
@@ -311,6 +324,7 @@ fn each_wrong_answer_breaks_the_law_of_its_name() {
         (Fault::Negative, "the production is not negative"),
         (Fault::Stage, "ψ_x⁻¹(ψ_x(u)) = u"),
         (Fault::StageRates, "the rates at ψ_x(0) are the velocity"),
+        (Fault::Size, "the sizes of a vector space are |x_i|"),
         (Fault::ValueByItself, "a law by itself has its value"),
         (Fault::DifferentialByItself, "a law by itself has its differential"),
         (Fault::Hessian, "a Hessian is the derivative of the differential"),

@@ -41,7 +41,7 @@ pub mod space;
 pub mod square;
 pub mod stack;
 
-pub use column::{Column, length, power_of_two};
+pub use column::{Column, dot, length, power_of_two};
 pub use differential::{differential, differential_at, hessian, hessian_at, jacobian};
 pub use dimension::{Dimension, Plus};
 pub use erased::ErasedField;

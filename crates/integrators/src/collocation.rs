@@ -82,7 +82,7 @@ pub(crate) use timed::{MOST, Stage, StageSolution, TimedStep};
 
 use crate::step::failure::Fallbacks;
 use crate::step::{
-    Control, Dim, Flow, Implicit, Promises, Refusal, StepEnds, StepError, StepStart, Stepper, Taken,
+    Compiled, Control, Dim, Flow, Promises, Refusal, StepEnds, StepError, StepStart, Stepper, Taken,
 };
 use tableau::{GAUSS, RADAU};
 
@@ -164,9 +164,9 @@ macro_rules! method {
 
             const IS_IMPLICIT: bool = true;
 
-            fn implicit(&self) -> Option<Implicit> {
+            fn compiled(&self) -> Option<Compiled> {
                 let () = Self::IS_A_METHOD;
-                Some(Implicit::$name { stages: S })
+                Some(Compiled::$name { stages: S })
             }
 
             fn name(&self) -> String {

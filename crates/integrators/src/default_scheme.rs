@@ -4,7 +4,7 @@ use metriplectic_manifolds::{Cayley, ChartMidpoint, Exponential, Projection, Wey
 
 use crate::midpoint::Scheme;
 use crate::step::{
-    Control, Element, Flow, Implicit, LimitingSites, MethodError, NoiseSummary, Promises, Refusal,
+    Compiled, Control, Element, Flow, LimitingSites, MethodError, NoiseSummary, Promises, Refusal,
     StepEnds, StepError, StepStart, Stepper, Taken,
 };
 
@@ -21,8 +21,8 @@ macro_rules! by_default {
 
             const IS_IMPLICIT: bool = <Scheme<Self> as Stepper<F>>::IS_IMPLICIT;
 
-            fn implicit(&self) -> Option<Implicit> {
-                Scheme::new(*self).implicit()
+            fn compiled(&self) -> Option<Compiled> {
+                Scheme::new(*self).compiled()
             }
 
             fn name(&self) -> String {

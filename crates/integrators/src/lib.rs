@@ -13,7 +13,7 @@
 //! | [`explicit`] | [`DormandPrince8`], [`DormandPrince5`], [`RungeKuttaChebyshev`]: explicit methods, and then back onto the laws | [`step`], [`round_off`] |
 //! | [`system`] | every metriplectic system is a flow | [`step`], [`round_off`], [`explicit`] |
 //! | [`numbers`] | [`FromEquations`]: a system in plain numbers is a flow | [`step`], [`round_off`], [`explicit`], [`system`] |
-//! | `compiled` | implicit methods in plain numbers, one instance for each number of variables | [`step`], [`midpoint`], [`collocation`], [`numbers`] |
+//! | `compiled` | methods in plain numbers, one instance for each number of directions and entries | [`step`], [`midpoint`], [`collocation`], [`explicit`], [`numbers`] |
 //! | [`run`] | [`Method`], [`Span`], [`Until`], [`Watch`], [`Steps`], [`Trajectory`], [`Event`], [`Certificate`], [`Checkpoint`], [`Observables`]: what a user does with a run of any method | [`step`], [`round_off`], [`numbers`], `compiled` |
 //! | [`noise`](mod@noise) | [`Noisy`]: a system with thermal noise; [`NinomiyaVictoir`], [`RandomFlow`], which sample its law with any method | [`step`], [`explicit`] |
 //! | [`open`](mod@open) | [`OpenSystem`]: a clock in the energy, ports, baths and a ledger, for every method | [`step`], [`round_off`], [`discrete_gradient`], [`midpoint`], [`collocation`], [`explicit`], [`system`], [`noise`](mod@noise) |
@@ -84,11 +84,11 @@ pub use run::until::Until;
 pub use run::watch::{Jumping, Watch, Watched};
 pub use run::{Ending, Method, Method as Run, Schedule, SpanError, State};
 pub use step::{
-    Components, Control, Directions, Effort, Element, Entries, EntropyStep, EventExchange,
-    Evidence, Flow, Implicit, Inlined, JumpError, Laws, LedgerErrors, LedgerSummary, LimitingSites,
-    Memory, MethodError, NoiseSummary, Panicked, PlainNumbers, Promises, Recheck, Refusal,
-    RestoreError, Saved, Scales, StageLaws, StartError, StateSpace, StepEnds, StepError, StepStart,
-    Stepper, Taken, Values, Vector,
+    Compiled, Components, Control, Directions, Effort, Element, Entries, EntropyStep,
+    EventExchange, Evidence, Flow, Inlined, JumpError, Laws, LedgerErrors, LedgerSummary,
+    LimitingSites, Memory, MethodError, NoiseSummary, Panicked, PlainNumbers, Promises, Recheck,
+    Refusal, RestoreError, Saved, Scales, StageLaws, StartError, StateSpace, StepEnds, StepError,
+    StepStart, Stepper, Taken, Values, Vector,
 };
 pub use tangent::{
     AdjointRun, Adjoints, Linearised as LinearisedStep, LinearisedAlong, LossGradient, SelfAdjoint,

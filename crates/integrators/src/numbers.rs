@@ -1,28 +1,35 @@
 //! A system in plain numbers is a flow, of a size that is known at run time.
 
 mod answered;
+mod kept;
+mod lengths;
 mod modelled;
+mod of_length;
 mod projection;
 mod referred_rise;
 mod rows;
+mod stages;
 
 use std::fmt;
 
 use metriplectic_dynamics::invariants::Kind;
 use metriplectic_dynamics::{ModelError, SecondLaw};
 use metriplectic_equations::judge::{Judge, RADIUS};
-use metriplectic_equations::{ENERGY, ENTROPY, Equations, Report, VerifiedEquations};
+use metriplectic_equations::{ENTROPY, Equations, Report, VerifiedEquations};
 use metriplectic_manifolds::PointError;
 
 pub(crate) use self::answered::{Answered, Beside, InTypes};
+use self::lengths::{AtRunTime, List as _};
 pub(crate) use self::modelled::Modelled;
-use self::projection::{Aim, Projection};
+pub(crate) use self::of_length::OfLength;
+use self::projection::{Aim, Projection, sum};
 pub use self::rows::Rows;
+use self::rows::laws;
+use self::stages::{displacement, entropy_round_off, scales, stage_flow};
 use crate::explicit::{Projected, ProjectionError, StageFlow, Target};
-use crate::round_off::bound::{NO_DIGITS, ROUNDED};
 use crate::step::{
-    Directions, Entries, Flow, FlowVisitor, Laws, PlainNumbers, Recheck, Values, Vector as _,
-    Written,
+    Directions, Element, Entries, Flow, FlowVisitor, Laws, PlainNumbers, Recheck, Values,
+    Vector as _, Written,
 };
 use crate::system::{NO_CLOCK, recheck};
 
@@ -123,56 +130,10 @@ impl<S: Equations> FromEquations<S> {
     }
 }
 
-/// The laws of these values.
-fn laws_of(values: &[f64]) -> Laws<Values> {
-    let invariants = Values::of(&values[ENTROPY + 1..]);
-    Laws { energy: values[ENERGY], entropy: values[ENTROPY], invariants }
-}
-
-/// The sizes of the entries of a state.
-fn scales(system: &dyn Equations, x: &[f64]) -> Directions {
-    let mut sizes = Directions::zeros(system.sizes().directions);
-    system.scales(x, sizes.numbers_mut());
-    sizes
-}
-
-/// The displacement from a state to another one; `None` beyond the edge of the chart.
-fn displacement(system: &dyn Equations, x: &[f64], y: &[f64]) -> Option<Directions> {
-    let mut q = Directions::zeros(system.sizes().directions);
-    system.coordinates(x, y, q.numbers_mut()).then_some(q)
-}
-
-impl<S: Equations> FromEquations<S> {
-    /// The round-off `4ε (|S| + Σ_i |∂_iS x_i|)` of an entropy increment, the larger one of the two ends, with the value and the
-    /// differential at the second one. The entries of `x' = x + u` are rounded in units of the larger end, so `x_i` is that of
-    /// both.
-    fn entropy_round_off_at(&self, [x, y]: [&[f64]; 2], end: (f64, &Directions)) -> f64 {
-        let [at_x, at_y] = [x, y].map(|x| scales(&self.0, x));
-        let sizes = Directions::zip([&at_x, &at_y], |[at_x, at_y]| at_x.max(at_y));
-        let size = |value: f64, w: &Directions| {
-            value.abs() + projection::sum(w, &sizes, |w, size| w.abs() * size)
-        };
-        let start = if let Some(model) = self.0.model() {
-            let mut w = sizes.zero();
-            let value = model.jet(ENTROPY, NO_CLOCK, x, w.numbers_mut());
-            size(value, &w)
-        } else {
-            let rows = Rows::of(&self.0, x);
-            size(rows.values[ENTROPY], rows.row(ENTROPY))
-        };
-        ROUNDED * start.max(size(end.0, end.1)) + NO_DIGITS
-    }
-
-    /// The velocity and the production at a state, with its differentials if they are known.
-    fn motion_with(&self, x: &[f64], rows: Option<&Rows>) -> Option<(Directions, f64)> {
-        let mut v = Directions::zeros(self.0.sizes().directions);
-        let production = match rows {
-            Some(rows) => {
-                rows.with_all(|w| self.0.velocity_with(NO_CLOCK, x, w, v.numbers_mut()))?
-            }
-            None => self.0.velocity(NO_CLOCK, x, v.numbers_mut())?,
-        };
-        v.numbers().iter().all(|v| v.is_finite()).then_some((v, production))
+impl<S> FromEquations<S> {
+    /// Returns the system that it asks.
+    const fn equations(&self) -> &S {
+        &self.0
     }
 }
 
@@ -184,15 +145,15 @@ impl<S: Equations> Flow for FromEquations<S> {
     fn laws(&self, x: &Entries) -> Laws<Values> {
         let mut values = Entries::zeros(self.0.sizes().laws);
         self.0.values(NO_CLOCK, x, &mut values);
-        laws_of(&values)
+        laws::<AtRunTime>(&values)
     }
 
     fn term_sizes(&self, x: &Entries) -> Laws<Values> {
-        let (rows, scales) = (Rows::of(&self.0, x), scales(&self.0, x));
+        let (rows, scales) = (Rows::<AtRunTime>::of(&self.0, x), scales(&self.0, x));
         let size = |(law, value): (usize, &f64)| {
-            value.abs() + projection::sum(rows.row(law), &scales, |w, scale| w.abs() * scale)
+            value.abs() + sum(&rows.row(law), &scales, |w, scale| w.abs() * scale)
         };
-        laws_of(&rows.values.iter().enumerate().map(size).collect::<Entries>())
+        laws::<AtRunTime>(&rows.values().iter().enumerate().map(size).collect::<Entries>())
     }
 
     fn rates(&self, x: &Entries, d: &Directions) -> Option<Directions> {
@@ -274,17 +235,21 @@ impl<S: Equations> Flow for FromEquations<S> {
     }
 
     fn visit<V: FlowVisitor<Self>>(&self, visitor: V) -> V::Output {
-        visitor.written(self)
+        visitor.own(self, &self.0)
     }
 
     fn entropy_round_off(&self, [x, y]: [&Entries; 2]) -> f64 {
         if let Some(model) = self.0.model() {
             let mut w = Directions::zeros(self.0.sizes().directions);
             let value = model.jet(ENTROPY, NO_CLOCK, y, w.numbers_mut());
-            return self.entropy_round_off_at([x, y], (value, &w));
+            return entropy_round_off::<AtRunTime>(&self.0, [x, y], (value, &w));
         }
-        let rows = Rows::of(&self.0, y);
-        self.entropy_round_off_at([x, y], (rows.values[ENTROPY], rows.row(ENTROPY)))
+        let rows = Rows::<AtRunTime>::of(&self.0, y);
+        entropy_round_off::<AtRunTime>(
+            &self.0,
+            [x, y],
+            (rows.values()[ENTROPY], &rows.row(ENTROPY)),
+        )
     }
 }
 
@@ -318,88 +283,7 @@ impl<S: Equations> Written for FromEquations<S> {
     }
 }
 
-impl<S: Equations> StageFlow for FromEquations<S> {
-    type Gradients = Rows;
-
-    fn gradients(&self, x: &Entries) -> Option<Rows> {
-        let rows = Rows::of(&self.0, x);
-        rows.is_finite().then_some(rows)
-    }
-
-    fn values(&self, rows: &Rows) -> Laws<Values> {
-        laws_of(&rows.values)
-    }
-
-    fn entropy_round_off_to(&self, [x, y]: [&Entries; 2], end: &Rows) -> f64 {
-        self.entropy_round_off_at([x, y], (end.values[ENTROPY], end.row(ENTROPY)))
-    }
-
-    fn velocity(&self, x: &Entries, rows: &Rows) -> Option<(Directions, f64)> {
-        self.motion_with(x, Some(rows))
-    }
-
-    fn motion(&self, x: &Entries) -> Option<(Directions, f64)> {
-        self.motion_with(x, None)
-    }
-
-    fn stage(&self, x: &Entries, q: &Directions) -> Option<Entries> {
-        let mut y = Entries::zeros(x.len());
-        self.0.stage_state(x, q.numbers(), &mut y).then_some(y)
-    }
-
-    fn stage_rates(
-        &self,
-        x: &Entries,
-        (q, y): (&Directions, &Entries),
-        v: &Directions,
-    ) -> Directions {
-        let mut rates = v.zero();
-        self.0.stage_rates(x, q.numbers(), y, v.numbers(), rates.numbers_mut());
-        rates
-    }
-
-    fn stage_along<'a>(
-        &self,
-        x: &Entries,
-        (h, count): (f64, usize),
-        term: impl Fn(usize) -> (f64, &'a Directions),
-        coordinates: Option<&mut Directions>,
-    ) -> Option<(Directions, f64)> {
-        let q = Directions::combination(h, count, term);
-        let mut rates = q.zero();
-        let production = self.0.stage(NO_CLOCK, x, q.numbers(), rates.numbers_mut())?;
-        if let Some(coordinates) = coordinates {
-            *coordinates = q;
-        }
-        Some((rates, production))
-    }
-
-    fn stage_coordinates(&self, x: &Entries, y: &Entries) -> Directions {
-        let mut q = Directions::zeros(self.0.sizes().directions);
-        self.0.stage_coordinates(x, y, q.numbers_mut());
-        q
-    }
-
-    fn falls_below_round_off(&self, x: &Entries, y: &Entries) -> bool {
-        referred_rise::falls(&self.0, x, y)
-    }
-
-    fn project(
-        &self,
-        y: Entries,
-        target: &Target<'_, Self>,
-    ) -> Result<Projected<Self>, ProjectionError> {
-        let Target { laws, with_entropy, limit, units, .. } = *target;
-        let target = Aim { laws, with_entropy, limit, units };
-        let landed = Projection { system: &self.0, target }.from(y)?;
-        Ok(Projected {
-            x: landed.x,
-            gradients: landed.rows,
-            entropy: landed.entropy,
-            entropy_round_off: landed.entropy_round_off,
-        })
-    }
-}
+stage_flow!([S: Equations] FromEquations<S>, AtRunTime);
 
 #[cfg(test)]
 mod tests {
@@ -410,7 +294,7 @@ mod tests {
     };
     use metriplectic_dynamics::bracket::{AreaForm, Zero};
     use metriplectic_dynamics::{InNumbers, Metriplectic, System, Verify as _, system::Point};
-    use metriplectic_equations::Sizes;
+    use metriplectic_equations::{ENERGY, Sizes};
     use metriplectic_fields::Real;
     use metriplectic_manifolds::{Euclidean, LieDual, Manifold, Product, Sphere};
     use nalgebra::{Vector1, Vector3, vector};

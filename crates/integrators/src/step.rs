@@ -9,6 +9,7 @@
 //! This module knows of no method and of no run.
 
 mod both;
+pub(crate) mod compiled;
 mod control;
 pub mod dense;
 pub(crate) mod digits;
@@ -17,7 +18,6 @@ pub(crate) mod evidence;
 pub(crate) mod exact;
 pub(crate) mod failure;
 mod flow;
-pub(crate) mod implicit;
 pub(crate) mod in_plain;
 mod initial_scales;
 mod inlined;
@@ -38,6 +38,7 @@ pub(crate) mod type_names;
 mod vector;
 
 pub(crate) use both::both;
+pub use compiled::Compiled;
 pub use control::Control;
 pub use error::StepError;
 pub use evidence::{Effort, EntropyStep, Evidence, LimitingSites, Promises, StageLaws};
@@ -46,7 +47,6 @@ pub use flow::{
     Element, Flow, FlowVisitor, Laws, PlainFlow, PlainNumbers, Recheck, StateSpace, Written,
     in_room,
 };
-pub use implicit::Implicit;
 pub(crate) use initial_scales::{CUT, CUTS, SAME, classical_step, initial_scales};
 pub use inlined::Inlined;
 pub use jump_error::JumpError;
@@ -66,4 +66,5 @@ pub(crate) use start::{CountOf, Dim, DriftCorrection, Start};
 pub use start_error::StartError;
 pub use stepper::Stepper;
 pub(crate) use type_names::name_of;
+pub(crate) use vector::norm;
 pub use vector::{Components, Vector};

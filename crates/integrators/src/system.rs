@@ -23,7 +23,7 @@ pub(crate) use stages::{CONSERVED, CORRECTIONS, OFF, STAGNATED};
 
 use crate::explicit::{StageFlow as _, Target};
 use crate::round_off::bound::{SizesAt, of_an_increment, size_of_terms, sizes_on_a_step};
-use crate::step::implicit::COMPILED;
+use crate::step::compiled::{has_explicit, has_implicit};
 use crate::step::{
     Components, CountOf, Dim, Directions, Entries, Flow, FlowVisitor, Laws, Numbers, Recheck,
     Scales, Values, Written, initial_scales,
@@ -195,11 +195,13 @@ impl<Y: Metriplectic> Flow for Y {
 }
 
 impl<Y: Metriplectic> Written for Y {
-    const IS_COMPILED: bool = Y::Manifold::IS_VECTOR_SPACE
+    const HAS_EXPLICIT: bool =
+        Y::Invariants::COUNT == 0 && has_explicit(<Dim<Y> as Dimension>::LEN, Y::Manifold::ENTRIES);
+
+    const HAS_IMPLICIT: bool = Y::Manifold::IS_VECTOR_SPACE
         && Y::Metric::IS_CANONICAL
         && Y::Invariants::COUNT == 0
-        && <Dim<Y> as Dimension>::LEN > 0
-        && <Dim<Y> as Dimension>::LEN <= COMPILED;
+        && has_implicit(<Dim<Y> as Dimension>::LEN);
 
     type Layout = ();
 

@@ -27,7 +27,6 @@ const LAYOUT: &[(&str, &str)] = &[
     ("run/looks.rs", "WINDOW"),
     ("run/observables.rs", "BUFFER"),
     ("run/record.rs", "ROOM"),
-    ("step/implicit.rs", "COMPILED"),
     ("step/memory.rs", "LISTS"),
     ("step/memory.rs", "NUMBERS"),
     ("system/recheck.rs", "NO_CLOCK"),

@@ -20,7 +20,7 @@ const ROOMS: [(&str, &[&str]); 18] = [
     ("explicit", &["step", "round_off"]),
     ("system", &["step", "round_off", "explicit"]),
     ("numbers", &["step", "round_off", "explicit", "system"]),
-    ("compiled", &["step", "midpoint", "collocation", "numbers"]),
+    ("compiled", &["step", "midpoint", "collocation", "explicit", "numbers"]),
     ("run", &["step", "round_off", "numbers", "compiled"]),
     ("noise", &["step", "explicit"]),
     (

@@ -1,6 +1,6 @@
 //! The Cayley retraction of SO(3).
 
-use metriplectic_fields::{ChartPoint, Column, Scalar, Space};
+use metriplectic_fields::{ChartPoint, Column, Scalar, Space, dot};
 use nalgebra::{Matrix3, Vector3};
 
 use crate::metric::{MetricError, stretched};
@@ -24,7 +24,7 @@ pub struct Cayley;
 
 /// `cay(a)`.
 fn cayley<D: Scalar>(a: &Vector3<D>) -> Matrix3<D> {
-    let (turn, scale) = (hat(a), (a.dot(a) * 0.25 + 1.0).recip());
+    let (turn, scale) = (hat(a), (dot(a, a) * 0.25 + 1.0).recip());
     Matrix3::from_diagonal_element(D::one()) + (turn + turn * turn * D::from(0.5)) * scale
 }
 

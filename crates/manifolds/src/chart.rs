@@ -99,6 +99,8 @@ impl<const N: usize> PartialEq for Chart<N> {
 translations!(Chart, false);
 
 impl<const N: usize> Manifold for Chart<N> {
+    const ENTRIES: usize = N;
+
     // The nearest point of the domain is not known, so `project` leaves a point where it is.
     columns!();
 

@@ -157,6 +157,8 @@ macro_rules! vector_space {
         $crate::euclidean::translations!($space, true);
 
         impl<const N: usize> Manifold for $space<N> {
+            const ENTRIES: usize = N;
+
             $crate::euclidean::columns!();
 
             fn defect(&self, x: &SVector<f64, N>) -> f64 {

@@ -82,6 +82,8 @@ impl Space for HalfLine {
 }
 
 impl Manifold for HalfLine {
+    const ENTRIES: usize = 1;
+
     straight_lines!();
 
     /// The distance to the [projection](Self::project): how far a number is below zero, and not quite

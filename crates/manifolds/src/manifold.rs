@@ -25,6 +25,10 @@ use crate::step_path::{StepPath, StepPathJet};
 /// dual numbers too; 3. chart points and random points lie on the manifold; 4. a point that is read
 /// from its entries is the same point, bit for bit.
 pub trait Manifold: Space {
+    /// Says how many entries a point has, and 0 where it is not said.
+    #[doc(hidden)]
+    const ENTRIES: usize = 0;
+
     /// Measures how far the point is off the manifold, in the units of its entries. It is 0 where every array
     /// of numbers is a point, and NaN or infinite if an entry is.
     fn defect(&self, x: &Self::Point<f64>) -> f64;

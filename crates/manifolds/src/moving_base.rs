@@ -4,7 +4,7 @@
 //! `E − ε x δᵀ`, on SO(3) the rotations about the axes of the body.
 
 use metriplectic_fields::series::stumpff;
-use metriplectic_fields::{Column as _, Dimension, Real, Space, Vector, Velocity};
+use metriplectic_fields::{Column as _, Dimension, Real, Space, Vector, Velocity, dot};
 use nalgebra::{Matrix3, SMatrix, SVector, Vector1, Vector3};
 use num_dual::{Dual64, DualNum as _};
 
@@ -143,7 +143,7 @@ macro_rules! spheres {
                 q: &SVector<Dual64, $n>,
             ) -> SVector<Dual64, $a> {
                 let (x, e) = moving::<$a, $n>(x, delta);
-                let s = q.dot(q) * 0.25;
+                let s = dot(q, q) * 0.25;
                 (x * (-s + 1.0) + e * q) * (s + 1.0).recip()
             }
 
@@ -155,7 +155,7 @@ macro_rules! spheres {
             ) -> SVector<Dual64, $n> {
                 let (x, e) = moving::<$a, $n>(x, delta);
                 let two = Dual64::from(2.0);
-                (e.tr_mul(a) * two - q * x.dot(a)) * (x.dot(y) + 1.0).recip()
+                (e.tr_mul(a) * two - q * dot(&x, a)) * (dot(&x, y) + 1.0).recip()
             }
 
             fn moved_from(
@@ -164,7 +164,7 @@ macro_rules! spheres {
                 a: &SVector<Dual64, $a>,
             ) -> SVector<Dual64, $a> {
                 let (x, _) = moving::<$a, $n>(x, delta);
-                let [cosine, sine, ..] = stumpff(a.dot(a));
+                let [cosine, sine, ..] = stumpff(dot(a, a));
                 x * cosine + a * sine
             }
 
@@ -174,7 +174,7 @@ macro_rules! spheres {
                 q: &SVector<Real, $n>,
             ) -> SVector<Real, $a> {
                 let (x, e) = moving::<$a, $n>(x, delta);
-                let [cosine, sine, ..] = stumpff(q.dot(q));
+                let [cosine, sine, ..] = stumpff(dot(q, q));
                 x.map(first) * cosine + e.map(first) * q * sine
             }
         }
@@ -191,7 +191,7 @@ fn turned(x: &Matrix3<f64>, delta: &Vector3<f64>) -> Matrix3<Dual64> {
 impl MovingBase for Rotations {
     /// Cayley's map.
     fn stage_from(x: &Matrix3<f64>, delta: &Vector3<f64>, q: &Vector3<Dual64>) -> Matrix3<Dual64> {
-        let scale = (q.dot(q) * 0.25 + 1.0).recip();
+        let scale = (dot(q, q) * 0.25 + 1.0).recip();
         turned(x, delta) * rodrigues(q, scale, scale * 0.5)
     }
 
@@ -202,7 +202,7 @@ impl MovingBase for Rotations {
         a: &Vector3<Dual64>,
     ) -> Vector3<Dual64> {
         let half = Dual64::from(0.5);
-        a + q.cross(a) * half + q * (q.dot(a) * 0.25)
+        a + q.cross(a) * half + q * (dot(q, a) * 0.25)
     }
 
     fn moved_from(x: &Matrix3<f64>, delta: &Vector3<f64>, a: &Vector3<Dual64>) -> Matrix3<Dual64> {

@@ -1,7 +1,7 @@
 //! Normal coordinates on a space of constant curvature.
 
-use metriplectic_fields::Scalar;
 use metriplectic_fields::series::stumpff;
+use metriplectic_fields::{Scalar, dot};
 use nalgebra::{SMatrix, SVector};
 
 use crate::InnerProduct;
@@ -27,7 +27,7 @@ pub struct Normal<D, const N: usize> {
 impl<D: Scalar, const N: usize> Normal<D, N> {
     #[inline]
     pub(crate) fn at(q: &SVector<D, N>, curvature: f64) -> Self {
-        let [_, across, _, c3] = stumpff(q.dot(q) * curvature);
+        let [_, across, _, c3] = stumpff(dot(q, q) * curvature);
         Self { q: *q, across, bend: c3 * curvature }
     }
 
@@ -58,7 +58,7 @@ impl<D: Scalar, const N: usize> InnerProduct<SVector<D, N>> for Normal<D, N> {
     #[inline]
     fn flat(&self, v: &SVector<D, N>) -> SVector<D, N> {
         let square = self.across * self.across;
-        v * square + self.q * (self.bend * (self.across + 1.0) * self.q.dot(v))
+        v * square + self.q * (self.bend * (self.across + 1.0) * dot(&self.q, v))
     }
 
     /// By the symmetric root of `g`, which is `σ` across the ray and 1 along it.
@@ -67,7 +67,7 @@ impl<D: Scalar, const N: usize> InnerProduct<SVector<D, N>> for Normal<D, N> {
         if self.is_centre() {
             return *alpha;
         }
-        (alpha - self.q * (self.bend * self.q.dot(alpha))) * self.across.recip()
+        (alpha - self.q * (self.bend * dot(&self.q, alpha))) * self.across.recip()
     }
 
     #[inline]

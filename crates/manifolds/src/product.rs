@@ -212,6 +212,9 @@ impl<A: Times<B>, B: Space> StepPathJet<Product<A, B>> {
 }
 
 impl<A: Manifold + Times<B>, B: Manifold> Manifold for Product<A, B> {
+    const ENTRIES: usize =
+        if A::ENTRIES > 0 && B::ENTRIES > 0 { A::ENTRIES + B::ENTRIES } else { 0 };
+
     /// Returns the larger defect of the two factors.
     fn defect(&self, (a, b): &Self::Point<f64>) -> f64 {
         let (a, b) = (self.0.defect(a), self.1.defect(b));

@@ -1,6 +1,6 @@
 //! The symmetric projection retraction of the spheres.
 
-use metriplectic_fields::{ChartPoint, Column, Scalar, Space};
+use metriplectic_fields::{ChartPoint, Column, Scalar, Space, dot};
 use nalgebra::{SMatrix, SVector};
 use num_dual::Dual;
 
@@ -35,7 +35,7 @@ struct Ambient<D: Scalar, const A: usize> {
 impl<D: Scalar, const A: usize> Ambient<D, A> {
     fn new(x: &SVector<f64, A>, u: &SVector<D, A>) -> Self {
         let x = SVector::<D, A>::from_fn(|i, _| D::from(x[i]));
-        let s = u.dot(u) * 0.25;
+        let s = dot(u, u) * 0.25;
         let scale = (s + 1.0).sqrt().recip();
         Self {
             z: (x + u * D::from(0.5)) * scale,

@@ -1,7 +1,7 @@
 //! Rotation matrices by rotation vectors: exponential, logarithm, and their derivatives.
 
-use metriplectic_fields::Scalar;
 use metriplectic_fields::series::{angle_over_sine, stumpff};
+use metriplectic_fields::{Scalar, dot};
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 
 /// The matrix of `v ↦ a × v`.
@@ -38,7 +38,7 @@ pub(crate) fn rodrigues<D: Scalar>(q: &Vector3<D>, a: D, b: D) -> Matrix3<D> {
 /// every order at `q = 0`.
 #[inline]
 pub fn exp<D: Scalar>(q: &Vector3<D>) -> Matrix3<D> {
-    let [_, c1, c2, _] = stumpff(q.dot(q));
+    let [_, c1, c2, _] = stumpff(dot(q, q));
     rodrigues(q, c1, c2)
 }
 
@@ -50,7 +50,7 @@ pub fn exp<D: Scalar>(q: &Vector3<D>) -> Matrix3<D> {
 pub fn log<D: Scalar>(r: &Matrix3<D>) -> Vector3<D> {
     let [w, x, y, z] = quaternion(r);
     let v = Vector3::new(x, y, z);
-    v * (angle_over_sine(v.dot(&v), w) * 2.0)
+    v * (angle_over_sine(dot(&v, &v), w) * 2.0)
 }
 
 /// The unit quaternion `(w, x, y, z)`, `w ≥ 0`, of a rotation matrix, from the largest of its four
@@ -86,14 +86,14 @@ pub(crate) fn turn([w, x, y, z]: [f64; 4]) -> Matrix3<f64> {
 /// ```
 #[inline]
 pub fn dexp<D: Scalar>(q: &Vector3<D>) -> Matrix3<D> {
-    let [_, _, c2, c3] = stumpff(q.dot(q));
+    let [_, _, c2, c3] = stumpff(dot(q, q));
     rodrigues(q, -c2, c3)
 }
 
 /// The inverse of [`dexp`], `1 + ½q̂ + (1 − ½θ cot ½θ)/θ² q̂²`, for `|q| < 2π`.
 pub fn dexp_inverse<D: Scalar>(q: &Vector3<D>) -> Matrix3<D> {
     // With t = θ²/4 the weight is (c₁ − c₀)/(4t c₁), and c₁ − c₀ = t (c₂ − c₃).
-    let [_, c1, c2, c3] = stumpff(q.dot(q) * 0.25);
+    let [_, c1, c2, c3] = stumpff(dot(q, q) * 0.25);
     rodrigues(q, D::from(0.5), (c2 - c3) / c1 * 0.25)
 }
 

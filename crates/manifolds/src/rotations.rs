@@ -40,7 +40,7 @@ mod bi_invariant;
 use std::f64::consts::PI;
 
 use metriplectic_fields::series::stumpff;
-use metriplectic_fields::{ChartPoint, MatrixJet, Real, Scalar, Space, Square, product_rule};
+use metriplectic_fields::{ChartPoint, MatrixJet, Real, Scalar, Space, Square, dot, product_rule};
 use nalgebra::{Const, Matrix3, Vector3, Vector4};
 use rand::{Rng, RngExt};
 
@@ -160,7 +160,7 @@ impl Space for Rotations {
         (q, _): (&Vector3<f64>, &Matrix3<f64>),
         v: &Vector3<f64>,
     ) -> Vector3<f64> {
-        v + q.cross(v) * 0.5 + q * (0.25 * q.dot(v))
+        v + q.cross(v) * 0.5 + q * (0.25 * dot(q, v))
     }
 
     #[inline]
@@ -175,6 +175,8 @@ impl Space for Rotations {
 }
 
 impl Manifold for Rotations {
+    const ENTRIES: usize = 9;
+
     /// `max |RᵀR − 1|`, and at least 2 for a reflection.
     fn defect(&self, x: &Matrix3<f64>) -> f64 {
         let gram = (x.tr_mul(x) - Matrix3::identity()).max_abs();

@@ -42,7 +42,7 @@ mod round;
 use std::f64::consts::PI;
 
 use metriplectic_fields::series::{angle_over_sine, stumpff};
-use metriplectic_fields::{ChartPoint, Column, MatrixJet, Real, Scalar, Space, product_rule};
+use metriplectic_fields::{ChartPoint, Column, MatrixJet, Real, Scalar, Space, dot, product_rule};
 use nalgebra::{Const, SMatrix, SVector};
 use rand::{Rng, RngExt};
 
@@ -90,7 +90,7 @@ macro_rules! sphere {
 
             #[inline]
             fn chart<D: Scalar>(x: &SVector<f64, $a>, q: &SVector<D, $n>) -> SVector<D, $a> {
-                let [cosine, sine, ..] = stumpff(q.dot(q));
+                let [cosine, sine, ..] = stumpff(dot(q, q));
                 let along = spread(&frame::<$a, $n>(x), q) * sine;
                 polished(&SVector::from_fn(|i, _| along[i] + cosine * x[i]))
             }
@@ -107,12 +107,12 @@ macro_rules! sphere {
             }
 
             fn coordinates<D: Scalar>(x: &SVector<f64, $a>, y: &SVector<D, $a>) -> SVector<D, $n> {
-                let cosine = y.dot(&Column::embed(x));
+                let cosine = dot(y, &Column::embed(x));
                 // Eᵀx = 0, and the shorter one of y − x and y + x has the digits of y across x.
                 let side = 1_f64.copysign(cosine.re());
                 let short = SVector::<D, $a>::from_fn(|i, _| y[i] - side * x[i]);
                 let tangent = components(&frame::<$a, $n>(x), &short);
-                tangent * angle_over_sine(tangent.dot(&tangent), cosine)
+                tangent * angle_over_sine(dot(&tangent, &tangent), cosine)
             }
 
             fn embed<D: Scalar>(at: &ChartPoint<Self, D>, v: &SVector<D, $n>) -> SVector<D, $a> {
@@ -144,7 +144,7 @@ macro_rules! sphere {
             /// Stereographic, `((1 − s) x + E q)/(1 + s)` with `s = |q|²/4`.
             #[inline]
             fn stage(x: &SVector<f64, $a>, q: &SVector<f64, $n>) -> SVector<f64, $a> {
-                let s = 0.25 * q.norm_squared();
+                let s = 0.25 * dot(q, q);
                 polished(&((x * (1.0 - s) + frame::<$a, $n>(x) * q) / (1.0 + s)))
             }
 
@@ -152,7 +152,7 @@ macro_rules! sphere {
             #[inline]
             fn stage_coordinates(x: &SVector<f64, $a>, y: &SVector<f64, $a>) -> SVector<f64, $n> {
                 // Eᵀx = 0, and y − x has the digits of y across x.
-                frame::<$a, $n>(x).tr_mul(&(y - x)) * (2.0 / (1.0 + x.dot(y)))
+                frame::<$a, $n>(x).tr_mul(&(y - x)) * (2.0 / (1.0 + dot(x, y)))
             }
 
             /// `(2Eᵀa − q (x·a))/(1 + x·y)` with `a = E(y) v`.
@@ -163,12 +163,12 @@ macro_rules! sphere {
                 v: &SVector<f64, $n>,
             ) -> SVector<f64, $n> {
                 let a = frame::<$a, $n>(y) * v;
-                (frame::<$a, $n>(x).tr_mul(&a) * 2.0 - q * x.dot(&a)) / (1.0 + x.dot(y))
+                (frame::<$a, $n>(x).tr_mul(&a) * 2.0 - q * dot(x, &a)) / (1.0 + dot(x, y))
             }
 
             #[inline]
             fn is_stage(q: &SVector<f64, $n>) -> bool {
-                q.norm_squared() <= 16.0
+                dot(q, q) <= 16.0
             }
 
             #[inline]
@@ -178,6 +178,8 @@ macro_rules! sphere {
         }
 
         impl Manifold for Sphere<$n> {
+            const ENTRIES: usize = $a;
+
             fn defect(&self, x: &SVector<f64, $a>) -> f64 {
                 (x.norm() - 1.0).abs()
             }
@@ -246,7 +248,7 @@ macro_rules! sphere {
             /// With the velocity of the great circle, and `γ'' = −|u|² γ`.
             #[inline]
             fn line_at(x: &SVector<f64, $a>, u: &SVector<f64, $n>, t: f64) -> SVector<Real, $a> {
-                let (v, s) = (frame::<$a, $n>(x) * u, u.norm_squared());
+                let (v, s) = (frame::<$a, $n>(x) * u, dot(u, u));
                 let [y, dy] = if t > 0.0 { great_circle(x, &v, t) } else { [*x, v] };
                 SVector::from_fn(|i, _| Real::new(y[i], dy[i], dy[i], -s * y[i]))
             }

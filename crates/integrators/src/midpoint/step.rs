@@ -16,7 +16,7 @@ use crate::round_off::compensation::Displaced;
 use crate::round_off::drift;
 use crate::step::failure::{Cause, Fallbacks};
 use crate::step::{
-    Dim, Effort, Evidence, Flow as _, Implicit, Laws, Promises, Refusal, Start, StepError,
+    Compiled, Dim, Effort, Evidence, Flow as _, Laws, Promises, Refusal, Start, StepError,
     StepStart, Stepper, Taken, name_of,
 };
 
@@ -32,9 +32,9 @@ where
 
     const IS_IMPLICIT: bool = R::IS_WEYL_MIDPOINT && W::IS_GONZALEZ;
 
-    fn implicit(&self) -> Option<Implicit> {
+    fn compiled(&self) -> Option<Compiled> {
         let &Self { newton, splits, .. } = self;
-        (R::IS_WEYL_MIDPOINT && W::IS_GONZALEZ).then_some(Implicit::Midpoint { newton, splits })
+        (R::IS_WEYL_MIDPOINT && W::IS_GONZALEZ).then_some(Compiled::Midpoint { newton, splits })
     }
 
     fn name(&self) -> String {

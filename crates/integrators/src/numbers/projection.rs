@@ -7,22 +7,22 @@ use metriplectic_fields::{length, power_of_two};
 
 use smallvec::SmallVec;
 
+use super::lengths::{Lengths, List};
 use super::rows::Rows;
 use crate::explicit::{Limit, ProjectionError};
 use crate::round_off::bound::{INDEPENDENT, NO_DIGITS};
-use crate::step::{Directions, Entries, Laws, Values, Vector as _};
+use crate::step::{Laws, Vector};
 use crate::system::{CONSERVED, CORRECTIONS, OFF, STAGNATED};
 
 /// Where a state is to go, as [`Target`](crate::explicit::Target) says.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Aim<'a> {
-    pub(super) laws: &'a Laws<Values>,
+pub(super) struct Aim<'a, L: Lengths> {
+    pub(super) laws: &'a Laws<L::Invariants>,
     pub(super) with_entropy: bool,
-    pub(super) limit: Option<Limit<'a, Directions>>,
-    pub(super) units: Option<&'a Directions>,
+    pub(super) limit: Option<Limit<'a, L::Vector>>,
+    pub(super) units: Option<&'a L::Vector>,
 }
 
-impl Aim<'_> {
+impl<L: Lengths> Aim<'_, L> {
     /// The value of a law.
     fn of(&self, law: usize) -> f64 {
         match law {
@@ -35,9 +35,9 @@ impl Aim<'_> {
 
 /// A state on its laws.
 #[derive(Clone, Debug)]
-pub(super) struct Landed {
-    pub(super) x: Entries,
-    pub(super) rows: Rows,
+pub(super) struct Landed<L: Lengths> {
+    pub(super) x: L::State,
+    pub(super) rows: Rows<L>,
     pub(super) entropy: f64,
     pub(super) entropy_round_off: f64,
 }
@@ -45,10 +45,10 @@ pub(super) struct Landed {
 /// A law made independent of those before it: by Gram and Schmidt on their differentials, with the same
 /// combination of their residuals.
 #[derive(Clone, Debug)]
-struct Normal {
+struct Normal<V> {
     /// The components `s_i ∂_iF/f` of its differential, with the units `s` of the entries. The factor `f` is a power of
     /// two near their length, so that no square underflows.
-    hat: Directions,
+    hat: V,
     square: f64,
     /// The target less the value, over `f`.
     residual: f64,
@@ -59,7 +59,7 @@ struct Normal {
     dependent: bool,
 }
 
-impl Normal {
+impl<V> Normal<V> {
     /// The residual in units of its round-off. What depends on other laws has their residual.
     fn excess(&self) -> f64 {
         if self.dependent || self.residual == 0.0 {
@@ -71,32 +71,32 @@ impl Normal {
 }
 
 /// The laws at a state, made independent of each other: energy, further invariants, entropy.
-struct Normals {
-    energy: Normal,
-    invariants: SmallVec<[Normal; 1]>,
-    entropy: Option<Normal>,
+struct Normals<L: Lengths> {
+    energy: Normal<L::Vector>,
+    invariants: SmallVec<[Normal<L::Vector>; 1]>,
+    entropy: Option<Normal<L::Vector>>,
     /// The residual of the entropy in units of its round-off, whatever it depends on.
     off: f64,
 }
 
 /// A projection along the differentials `s² dF`, where `s_i` is the unit of entry `i`.
-pub(super) struct Projection<'a> {
-    pub(super) system: &'a dyn Equations,
-    pub(super) target: Aim<'a>,
+pub(super) struct Projection<'a, E: ?Sized, L: Lengths> {
+    pub(super) system: &'a E,
+    pub(super) target: Aim<'a, L>,
 }
 
-impl Projection<'_> {
-    pub(super) fn from(&self, mut y: Entries) -> Result<Landed, ProjectionError> {
+impl<E: Equations + ?Sized, L: Lengths> Projection<'_, E, L> {
+    pub(super) fn from(&self, mut y: L::State) -> Result<Landed<L>, ProjectionError> {
         let Self { system, target } = self;
-        let mut scales = Directions::zeros(system.sizes().directions);
+        let mut scales = L::Vector::room(|| system.sizes().directions);
         let mut moved = 0.0;
-        let mut best: Option<(f64, Landed)> = None;
+        let mut best: Option<(f64, Landed<L>)> = None;
         for _ in 0..=CORRECTIONS {
-            let rows = Rows::of(*system, &y);
-            if !rows.is_finite() || !system.defect(&y).is_finite() {
+            let rows = Rows::<L>::of(*system, y.numbers());
+            if !rows.is_finite() || !system.defect(y.numbers()).is_finite() {
                 return Err(ProjectionError::Outside);
             }
-            system.scales(&y, scales.numbers_mut());
+            system.scales(y.numbers(), scales.numbers_mut());
             let units = target.units.unwrap_or(&scales);
             let normals = self.normals(&rows, &scales, units);
             let excess = normals.excess(target.with_entropy)?;
@@ -122,11 +122,11 @@ impl Projection<'_> {
             if !moved.is_finite() || limit.is_some_and(|limit| moved > limit) {
                 return Err(ProjectionError::Far);
             }
-            let u = Directions::zip([units, &correction], |[unit, c]| unit * c);
+            let u = L::Vector::zip([units, &correction], |[unit, c]| unit * c);
             let pairs = u.numbers().iter().zip(scales.numbers());
             let unseen = pairs.fold(true, |all, (u, s)| all & (u.abs() <= f64::EPSILON * s));
-            let mut next = Entries::zeros(y.len());
-            system.chart(&y, u.numbers(), &mut next);
+            let mut next = L::State::room(|| y.numbers().len());
+            system.chart(y.numbers(), u.numbers(), next.numbers_mut());
             let here = normals.landed(std::mem::replace(&mut y, next), rows, target);
             if unseen && excess <= CONSERVED {
                 return Ok(here);
@@ -140,7 +140,7 @@ impl Projection<'_> {
     }
 
     /// Decides on the best state, if no correction improves it.
-    fn stagnated(&self, excess: f64, best: Landed) -> Result<Landed, ProjectionError> {
+    fn stagnated(&self, excess: f64, best: Landed<L>) -> Result<Landed<L>, ProjectionError> {
         match self.target.with_entropy {
             _ if excess <= STAGNATED => Ok(best),
             true => Err(ProjectionError::NoEntropy),
@@ -151,16 +151,21 @@ impl Projection<'_> {
 
     /// A law at a state, whatever it depends on.
     #[inline(always)]
-    fn normal(&self, rows: &Rows, law: usize, [scales, units]: [&Directions; 2]) -> Normal {
-        let (w, value) = (rows.row(law), rows.values[law]);
+    fn normal(
+        &self,
+        rows: &Rows<L>,
+        law: usize,
+        [scales, units]: [&L::Vector; 2],
+    ) -> Normal<L::Vector> {
+        let (w, value) = (rows.row(law), rows.values()[law]);
         let target = self.target.of(law);
-        let mut hat = Directions::zip([units, w], |[unit, w]| unit * w);
+        let mut hat = L::Vector::zip([units, &w], |[unit, w]| unit * w);
         let size = length(hat.numbers());
         // No displacement of a unit changes a law whose differential has no digits.
         let factor = if size > NO_DIGITS { power_of_two(size) } else { 1.0 };
         let into = if size > NO_DIGITS { factor.recip() } else { 0.0 };
         hat.numbers_mut().iter_mut().for_each(|hat| *hat *= into);
-        let terms = 2.0 * target.abs() + sum(w, scales, |w, scale| w.abs() * scale);
+        let terms = 2.0 * target.abs() + sum(&w, scales, |w, scale| w.abs() * scale);
         Normal {
             square: dot(&hat, &hat),
             hat,
@@ -172,15 +177,18 @@ impl Projection<'_> {
     }
 
     #[inline(always)]
-    fn normals(&self, rows: &Rows, scales: &Directions, units: &Directions) -> Normals {
+    fn normals(&self, rows: &Rows<L>, scales: &L::Vector, units: &L::Vector) -> Normals<L> {
         let normal = |law| self.normal(rows, law, [scales, units]);
         let energy = normal(ENERGY);
         let energy = Normal { dependent: energy.square == 0.0, ..energy };
         let invariants = SmallVec::new();
         let mut normals = Normals { energy, invariants, entropy: None, off: 0.0 };
-        for law in ENTROPY + 1..rows.values.len() {
-            let independent = normals.independent(normal(law));
-            normals.invariants.push(independent);
+        // A constant, so that nothing is left of the list where it is empty.
+        if const { L::HAS_INVARIANTS } {
+            for law in ENTROPY + 1..rows.values().len() {
+                let independent = normals.independent(normal(law));
+                normals.invariants.push(independent);
+            }
         }
         if self.system.second_law() == SecondLaw::Exact {
             let whole = normal(ENTROPY);
@@ -191,23 +199,21 @@ impl Projection<'_> {
     }
 }
 
-impl Normals {
+impl<L: Lengths> Normals<L> {
     /// Visits the laws so far that are independent of each other.
     #[inline(always)]
-    fn each_before(&self, mut visit: impl FnMut(&Normal)) {
+    fn each_before(&self, mut visit: impl FnMut(&Normal<L::Vector>)) {
         if !self.energy.dependent {
             visit(&self.energy);
         }
-        for normal in &self.invariants {
-            if !normal.dependent {
-                visit(normal);
-            }
+        if const { L::HAS_INVARIANTS } {
+            self.invariants.iter().filter(|normal| !normal.dependent).for_each(visit);
         }
     }
 
     /// Removes the part of a law that depends on those before it.
     #[inline]
-    fn independent(&self, whole: Normal) -> Normal {
+    fn independent(&self, whole: Normal<L::Vector>) -> Normal<L::Vector> {
         let square = whole.square;
         let mut normal = whole;
         // The second pass removes the rounding error of the first.
@@ -242,16 +248,16 @@ impl Normals {
 
     /// Returns whether the round-off of the entropy is as long as a unit.
     fn is_blurred(&self) -> bool {
-        let reach = |entropy: &Normal| entropy.round_off / entropy.square.sqrt();
+        let reach = |entropy: &Normal<L::Vector>| entropy.round_off / entropy.square.sqrt();
         self.entropy.iter().any(|entropy| !entropy.dependent && reach(entropy) > 1.0)
     }
 
     /// The correction, in units of the entries. A residual below half its round-off is left, unless the last digits
     /// are asked for.
-    fn correction(&self, with_entropy: bool, last_digits: bool) -> Directions {
+    fn correction(&self, with_entropy: bool, last_digits: bool) -> L::Vector {
         let least = if last_digits { 0.0 } else { 0.5 };
         let mut sum = self.energy.hat.zero();
-        let mut add = |normal: &Normal| {
+        let mut add = |normal: &Normal<L::Vector>| {
             if normal.excess() > least {
                 let factor = normal.residual / normal.square;
                 let pairs = sum.numbers_mut().iter_mut().zip(normal.hat.numbers());
@@ -266,7 +272,7 @@ impl Normals {
         sum
     }
 
-    fn landed(&self, x: Entries, rows: Rows, target: &Aim<'_>) -> Landed {
+    fn landed(&self, x: L::State, rows: Rows<L>, target: &Aim<'_, L>) -> Landed<L> {
         let (residual, entropy_round_off) = self.entropy.as_ref().map_or((0.0, 0.0), |entropy| {
             (entropy.residual * entropy.factor, entropy.round_off * entropy.factor)
         });
@@ -276,17 +282,17 @@ impl Normals {
 
 /// The components `v_i/s_i`; those of an entry without a unit vanish.
 #[inline]
-fn in_units(v: &Directions, units: &Directions) -> Directions {
-    Directions::zip([v, units], |[v, unit]| if v == 0.0 { 0.0 } else { v / unit })
+fn in_units<V: Vector>(v: &V, units: &V) -> V {
+    V::zip([v, units], |[v, unit]| if v == 0.0 { 0.0 } else { v / unit })
 }
 
 /// A sum over the numbers of two vectors at the same place.
 #[inline]
-pub(super) fn sum(a: &Directions, b: &Directions, term: impl Fn(f64, f64) -> f64) -> f64 {
+pub(super) fn sum<V: List>(a: &V, b: &V, term: impl Fn(f64, f64) -> f64) -> f64 {
     a.numbers().iter().zip(b.numbers()).fold(0.0, |sum, (a, b)| sum + term(*a, *b))
 }
 
 #[inline]
-pub(super) fn dot(a: &Directions, b: &Directions) -> f64 {
+pub(super) fn dot<V: List>(a: &V, b: &V) -> f64 {
     sum(a, b, |a, b| a * b)
 }

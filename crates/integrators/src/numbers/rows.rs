@@ -1,56 +1,66 @@
 //! The laws of a system in plain numbers at a state, with their differentials.
 
-use metriplectic_equations::room::with_numbers;
-use metriplectic_equations::{ENERGY, ENTROPY, Equations, Sizes};
+use metriplectic_equations::{ENERGY, ENTROPY, Equations};
 
-use crate::step::{Directions, Few, Vector as _};
+use super::lengths::{AtRunTime, Lengths, List};
+use crate::step::Laws;
 use crate::system::NO_CLOCK;
 
 /// The laws of a system with their differentials.
 #[derive(Clone, Debug)]
-pub struct Rows {
-    /// The values.
-    pub(super) values: Few<3>,
-    /// The differentials of the energy and of the entropy.
-    first: [Directions; 2],
-    /// The differentials of the further invariants.
-    invariants: Vec<Directions>,
+#[allow(private_bounds, reason = "no other crate makes rows")]
+pub struct Rows<L: Lengths = AtRunTime> {
+    values: L::Values,
+    /// The differentials, one after another.
+    w: L::Rows,
 }
 
-impl Rows {
-    pub(super) fn of(system: &dyn Equations, x: &[f64]) -> Self {
-        let Sizes { directions, laws, .. } = system.sizes();
-        with_numbers(laws * directions, |w| {
-            let mut values = Few::zeros(laws);
-            system.differentials(NO_CLOCK, x, &mut values, w);
-            let row = |law: usize| Directions::of(&w[law * directions..][..directions]);
-            let first = [row(ENERGY), row(ENTROPY)];
-            let invariants = if laws > 2 { (2..laws).map(row).collect() } else { Vec::new() };
-            Self { values, first, invariants }
-        })
+#[allow(private_bounds, reason = "no other crate makes rows")]
+impl<L: Lengths> Rows<L> {
+    #[inline]
+    pub(super) fn of(system: &(impl Equations + ?Sized), x: &[f64]) -> Self {
+        let mut values = L::Values::room(|| system.sizes().laws);
+        let mut w = L::Rows::room(|| system.sizes().laws * system.sizes().directions);
+        system.differentials(NO_CLOCK, x, values.numbers_mut(), w.numbers_mut());
+        Self { values, w }
     }
 
     /// Returns whether all numbers are finite.
+    #[inline]
     pub(super) fn is_finite(&self) -> bool {
-        let check = |numbers: &[f64]| numbers.iter().fold(0.0, |sum, number| sum + 0.0 * number);
-        let rows = self.first.iter().chain(&self.invariants);
-        rows.fold(check(&self.values), |sum, row| sum + check(row.numbers())) == 0.0
+        let check = |sum, numbers: &[f64]| numbers.iter().fold(sum, |sum, n| sum + 0.0 * n);
+        check(check(0.0, self.values.numbers()), self.w.numbers()) == 0.0
+    }
+
+    /// The values of the laws.
+    #[inline]
+    pub(super) fn laws(&self) -> Laws<L::Invariants> {
+        laws::<L>(self.values())
+    }
+
+    /// The values of the laws, one after another.
+    #[inline]
+    pub(super) fn values(&self) -> &[f64] {
+        self.values.numbers()
     }
 
     /// The differential of a law.
-    pub(super) fn row(&self, law: usize) -> &Directions {
-        if law <= ENTROPY { &self.first[law] } else { &self.invariants[law - ENTROPY - 1] }
+    #[inline]
+    pub(super) fn row(&self, law: usize) -> L::Vector {
+        let n = self.w.numbers().len() / self.values().len();
+        L::Vector::of(&self.w.numbers()[law * n..][..n])
     }
 
-    /// Calls `f` with the differentials of all laws, one after another.
-    pub(super) fn with_all<T>(&self, f: impl FnOnce(&[f64]) -> T) -> T {
-        let n = self.first[ENERGY].len();
-        with_numbers(self.values.len() * n, |w| {
-            let rows = self.first.iter().chain(&self.invariants);
-            w.chunks_exact_mut(n.max(1)).zip(rows).for_each(|(to, row)| {
-                to.copy_from_slice(row.numbers());
-            });
-            f(w)
-        })
+    /// The differentials of all laws, one after another.
+    #[inline]
+    pub(super) fn all(&self) -> &[f64] {
+        self.w.numbers()
     }
+}
+
+/// The laws of these values.
+#[inline]
+pub(super) fn laws<L: Lengths>(values: &[f64]) -> Laws<L::Invariants> {
+    let invariants = L::invariants(&values[ENTROPY + 1..]);
+    Laws { energy: values[ENERGY], entropy: values[ENTROPY], invariants }
 }

@@ -14,7 +14,7 @@ use crate::run::trajectory::Trajectory;
 use crate::step::in_plain::{InPlainNumbers, MethodInTypes};
 use crate::step::panicked::caught;
 use crate::step::{
-    Element, Entries, Flow, FlowError, FlowVisitor, Implicit, PlainFlow, PlainMethod, PlainNumbers,
+    Compiled, Element, Entries, Flow, FlowError, FlowVisitor, PlainFlow, PlainMethod, PlainNumbers,
     Stepper, Written, in_room,
 };
 
@@ -53,15 +53,28 @@ impl<F: Flow, M: Stepper<F>> FlowVisitor<F> for Whole<F, M> {
         F: Written,
     {
         // A constant, so that the method is not compiled in types beside.
-        if const { M::IS_IMPLICIT && F::IS_COMPILED } {
+        if const { M::IS_EXPLICIT && F::HAS_EXPLICIT || M::IS_IMPLICIT && F::HAS_IMPLICIT } {
             let Self { method, x0, schedule } = self;
-            let (method, asked) = (method.implicit(), (system, &InTypes(flow) as &dyn Beside));
+            let (method, asked) = (method.compiled(), (system, &InTypes(flow) as &dyn Beside));
             let schedule = in_numbers(schedule, flow);
-            return read::<F>(flow, run_implicit(method, asked, F::write(&x0), schedule));
+            return read::<F>(flow, run_compiled(method, asked, F::write(&x0), schedule));
         }
         self.in_numbers(flow, |method, x0, schedule| {
             run_answered(method, (system, &InTypes(flow)), F::write(&x0), schedule)
         })
+    }
+
+    fn own(self, flow: &F, system: &dyn Equations) -> Self::Output
+    where
+        F: Written,
+    {
+        // A constant, so that an explicit method is not compiled with each system.
+        if const { M::IS_EXPLICIT } {
+            let Self { method, x0, schedule } = self;
+            let schedule = in_numbers(schedule, flow);
+            return read::<F>(flow, run_own(method.compiled(), system, F::write(&x0), schedule));
+        }
+        self.written(flow)
     }
 }
 
@@ -119,17 +132,32 @@ fn run_answered(
     run(method, (&Answered { numbers: FromEquations(system), beside }, x0), schedule)
 }
 
-/// Runs a system by an implicit method that is compiled with the library.
-fn run_implicit(
-    method: Option<Implicit>,
+/// Runs a system of one's own by an explicit method. It may panic.
+fn run_own(
+    method: Option<Compiled>,
+    system: &dyn Equations,
+    x0: Entries,
+    schedule: Schedule,
+) -> Outcome {
+    let method = method.and_then(compiled::explicit).expect("a constant says that it is explicit");
+    let flow = &FromEquations(system);
+    let in_numbers = InPlainNumbers::from(flow, x0);
+    let start = (&in_numbers as &PlainFlow<'_>, Entries::zeros(0));
+    let run = || run(&MethodInTypes { method, flow }, start, schedule);
+    caught(run).unwrap_or_else(|panicked| Err(FlowError::new(panicked).into()))
+}
+
+/// Runs a system by a method that is compiled with the library.
+fn run_compiled(
+    method: Option<Compiled>,
     (system, beside): (&dyn Equations, &dyn Beside),
     x0: Entries,
     schedule: Schedule,
 ) -> Outcome {
-    let parts = method.zip(system.model());
-    let (method, model) = parts.expect("the constants say that there are a method and a model");
-    let run = |method: &dyn PlainMethod| run_answered(method, (system, beside), x0, schedule);
-    compiled::with_method(method, model, run).expect("the constants say that there is an instance")
+    let flow = Answered { numbers: FromEquations(system), beside };
+    let run = |method: &dyn PlainMethod| run(method, (&flow, x0), schedule);
+    let done = method.and_then(|method| compiled::with_method(method, &flow, run));
+    done.expect("the constants say that there is an instance")
 }
 
 impl State<PlainNumbers> {

@@ -85,10 +85,14 @@ pub trait Written: Flow + Sized {
     /// Says whether a panic in the flow ends a run in an error: in one whose functions are yours.
     const CATCHES_PANICS: bool = false;
 
+    /// Says whether the flow answers [`Equations`] and has so few directions that explicit methods are compiled with the library.
+    #[doc(hidden)]
+    const HAS_EXPLICIT: bool = false;
+
     /// Says whether the flow is a model on a vector space with the canonical metric, without further invariants and of so few
     /// variables that implicit methods are compiled with the library.
     #[doc(hidden)]
-    const IS_COMPILED: bool = false;
+    const HAS_IMPLICIT: bool = false;
 
     /// The parts of a state that are no entries, such as the names in a ledger.
     type Layout: Clone + Send + Sync + 'static;
@@ -133,6 +137,15 @@ pub trait FlowVisitor<F: Flow>: Sized {
 
     /// Visits the flow of a system that answers [`Equations`], whose states are points without a ledger or a clock.
     fn answered(self, flow: &F, system: &dyn Equations) -> Self::Output
+    where
+        F: Written,
+    {
+        let _ = system;
+        self.written(flow)
+    }
+
+    /// Visits the flow of a system that answers [`Equations`] and nothing else, whose states are plain numbers.
+    fn own(self, flow: &F, system: &dyn Equations) -> Self::Output
     where
         F: Written,
     {

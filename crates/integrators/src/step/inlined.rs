@@ -7,11 +7,17 @@ use super::{
 
 /// A method that is compiled with your system, also where the library has an instance of it.
 ///
-/// `Method::run` of a system with up to four variables on `Euclidean` or `LieDual`, with the canonical metric and without further
-/// invariants, takes the steps of `WeylMidpoint`, [`Gauss`](crate::Gauss) and [`Radau`](crate::Radau) by instances that are
-/// compiled with the library, which know the system behind a pointer. A program compiles in a quarter of the time then. This wrapper
-/// compiles the method with the system: three variables with cheap closures take 0.7 to 0.8 times the instructions. The
-/// steps have the same bits. Single steps (`Method::steps`), tangents and adjoints are compiled with the system anyway.
+/// `Method::run` of a small system takes its steps by instances that are compiled with the library, which know the system behind a
+/// pointer, so that a program compiles in less than half of the time:
+///
+/// - those of explicit methods, if the system has no further invariants and its space is one of `Euclidean`, `LieDual` and `Chart` of
+///   2, 3, 4 or 6 variables, S², SO(3), S² × R and SO(3) × R³, or another product of as many directions and entries;
+/// - those of `WeylMidpoint`, [`Gauss`](crate::Gauss) and [`Radau`](crate::Radau), if it has up to four variables on `Euclidean` or `LieDual`,
+///   the canonical metric and no further invariants.
+///
+/// This wrapper compiles the method with the system. With cheap closures of three variables a step by an instance takes 1.05 to 1.15 times
+/// the instructions of explicit methods, and 1.3 to 1.4 times those of implicit ones. The steps have the same bits. Single steps
+/// (`Method::steps`), tangents and adjoints are compiled with the system anyway.
 ///
 /// ```
 /// use metriplectic_dynamics::System;

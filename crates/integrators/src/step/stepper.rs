@@ -1,7 +1,7 @@
 //! The interface between runs and methods.
 
 use super::{
-    Control, Effort, Element, Flow, Implicit, LimitingSites, Memory, MethodError, NoiseSummary,
+    Compiled, Control, Effort, Element, Flow, LimitingSites, Memory, MethodError, NoiseSummary,
     Promises, Refusal, StepEnds, StepError, StepStart, Taken, Vector as _, dense, name_of,
 };
 
@@ -17,13 +17,17 @@ pub trait Stepper<F: Flow + ?Sized>: Sized {
     /// Says whether [`between`](Self::between) is the default. Then a run in plain numbers forms the state in plain numbers.
     const HAS_DEFAULT_BETWEEN: bool = false;
 
-    /// Says whether [`implicit`](Self::implicit) returns a method.
+    /// Says whether [`compiled`](Self::compiled) returns an explicit method.
+    #[doc(hidden)]
+    const IS_EXPLICIT: bool = false;
+
+    /// Says whether [`compiled`](Self::compiled) returns an implicit method.
     #[doc(hidden)]
     const IS_IMPLICIT: bool = false;
 
     /// Returns what the method is, if its steps in plain numbers are compiled with the library.
     #[doc(hidden)]
-    fn implicit(&self) -> Option<Implicit> {
+    fn compiled(&self) -> Option<Compiled> {
         None
     }
 

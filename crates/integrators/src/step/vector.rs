@@ -275,7 +275,7 @@ fn at<V: Column<f64>, const K: usize>(vectors: [&Components<V>; K], i: usize) ->
 
 /// The Euclidean norm of so many numbers that are not negative; NaN if one is.
 #[inline(always)]
-pub(super) fn norm(count: usize, number: impl Fn(usize) -> f64) -> f64 {
+pub(crate) fn norm(count: usize, number: impl Fn(usize) -> f64) -> f64 {
     let (mut largest, mut check) = (0.0, 0.0);
     for i in 0..count {
         check += number(i);

@@ -1,7 +1,7 @@
 //! The frames of a sphere, and its great circles.
 
 use metriplectic_fields::series::stumpff;
-use metriplectic_fields::{Column, Scalar, Space};
+use metriplectic_fields::{Column, Scalar, Space, dot};
 use nalgebra::{Const, SMatrix, SVector};
 use num_dual::Dual64;
 
@@ -51,7 +51,7 @@ pub(super) fn pushforward<D: Scalar, const A: usize, const N: usize>(
     x: &SVector<f64, A>,
     q: &SVector<D, N>,
 ) -> SMatrix<D, A, N> {
-    let (e, [_, c1, c2, c3]) = (frame::<A, N>(x), stumpff(q.dot(q)));
+    let (e, [_, c1, c2, c3]) = (frame::<A, N>(x), stumpff(dot(q, q)));
     let along = spread(&e, q) * (c2 - c3);
     SMatrix::from_fn(|i, k| c1 * e[(i, k)] - (along[i] + c1 * x[i]) * q[k])
 }
@@ -70,7 +70,7 @@ pub(super) fn great_circle<D: Scalar, const A: usize>(
     v: &SVector<D, A>,
     t: f64,
 ) -> [SVector<D, A>; 2] {
-    let s = v.dot(v);
+    let s = dot(v, v);
     let [cosine, sine, ..] = stumpff(s * (t * t));
     [x * cosine + v * (sine * t), v * cosine - x * (s * sine * t)]
 }

@@ -15,6 +15,7 @@ use metriplectic_dynamics::{
 use metriplectic_fields::{ChartPoint, Column, Dimension, ScalarField, Space, stack};
 use metriplectic_manifolds::{Manifold, PointError};
 
+use reach::Around;
 pub(crate) use recheck::{NO_CLOCK, recheck};
 pub(crate) use referred_rise::ROUNDING;
 pub(crate) use stages::JetsOf;
@@ -155,8 +156,10 @@ impl<Y: Metriplectic> Flow for Y {
 
     fn reach(&self, x: &Point<Y>, span: f64) -> Option<Scales<Tangent<Y>>> {
         // A constant, so that only one of the two is compiled.
-        if const { reach::is_small::<Y>() } {
-            reach::reach(self, x, span)
+        if const { reach::is_small(<Dim<Y> as Dimension>::LEN) } {
+            let sizes = Self::directions(&self.sizes(x));
+            let Scales { sizes, terms } = reach::reach(&Around { system: self, x }, &sizes, span)?;
+            Some(Scales { sizes: Self::vector(&sizes), terms: Self::vector(&terms) })
         } else {
             initial_scales(self, x, span)
         }
@@ -168,11 +171,15 @@ impl<Y: Metriplectic> Flow for Y {
         v: &Tangent<Y>,
         sizes: &Tangent<Y>,
     ) -> Option<Tangent<Y>> {
-        reach::terms_of_many(self, x, &v.0, &sizes.0).map(Components)
+        let (v, sizes) = (Self::directions(v), Self::directions(sizes));
+        let terms = reach::terms_of_many(&Around { system: self, x }, &v, &sizes)?;
+        Some(Self::vector(&terms))
     }
 
     fn rates_and_terms(&self, x: &Point<Y>) -> Option<[Tangent<Y>; 2]> {
-        reach::velocity_and_terms(self, x).map(|[v, terms]| [Components(v), Components(terms)])
+        let sizes = Self::directions(&self.sizes(x));
+        let [v, terms] = reach::velocity_and_terms(&Around { system: self, x }, &sizes)?;
+        Some([Self::vector(&v), Self::vector(&terms)])
     }
 
     /// In plain numbers, so that a run is compiled with this library.

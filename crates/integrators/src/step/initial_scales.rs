@@ -82,19 +82,18 @@ pub(crate) fn initial_scales<F: Flow + ?Sized>(
     (is_finite(&sizes) && is_finite(&terms)).then_some(Scales { sizes, terms })
 }
 
-/// The displacement from `x` of a step of the classical Runge-Kutta method that begins at the displacement `d`, with
+/// The displacement of a step of the classical Runge-Kutta method that begins at the displacement `d`, with
 /// the velocity `v` there; `None` if it leaves the domain.
-pub(crate) fn classical_step<F: Flow + ?Sized>(
-    flow: &F,
-    x: &Element<F>,
-    [d, v]: [&F::Vector; 2],
+pub(crate) fn classical_step<V: Vector>(
+    rates: impl Fn(&V) -> Option<V>,
+    [d, v]: [&V; 2],
     h: f64,
-) -> Option<F::Vector> {
-    let ahead = |v: &F::Vector, t: f64| F::Vector::zip([d, v], |[d, v]| d + t * v);
-    let second = flow.rates(x, &ahead(v, 0.5 * h))?;
-    let third = flow.rates(x, &ahead(&second, 0.5 * h))?;
-    let last = flow.rates(x, &ahead(&third, h))?;
-    Some(F::Vector::zip([d, v, &second, &third, &last], |[d, first, second, third, last]| {
+) -> Option<V> {
+    let ahead = |v: &V, t: f64| V::zip([d, v], |[d, v]| d + t * v);
+    let second = rates(&ahead(v, 0.5 * h))?;
+    let third = rates(&ahead(&second, 0.5 * h))?;
+    let last = rates(&ahead(&third, h))?;
+    Some(V::zip([d, v, &second, &third, &last], |[d, first, second, third, last]| {
         d + (first + (second + third) * 2.0 + last) * (h / 6.0)
     }))
 }
@@ -153,10 +152,11 @@ impl<F: Flow + ?Sized> Start<'_, F> {
     fn displacements(&self, h: f64) -> Option<Displacements<F::Vector>> {
         let &Self { flow, x, v, .. } = self;
         let origin = v.zero();
-        let middle = classical_step(flow, x, [&origin, v], 0.5 * h)?;
-        let there = flow.rates(x, &middle)?;
-        let halves = classical_step(flow, x, [&middle, &there], 0.5 * h)?;
-        let whole = classical_step(flow, x, [&origin, v], h)?;
+        let rates = |d: &F::Vector| flow.rates(x, d);
+        let middle = classical_step(rates, [&origin, v], 0.5 * h)?;
+        let there = rates(&middle)?;
+        let halves = classical_step(rates, [&middle, &there], 0.5 * h)?;
+        let whole = classical_step(rates, [&origin, v], h)?;
         let difference = F::Vector::zip([&whole, &halves], |[whole, halves]| whole - halves);
         let [whole, halves] = both([whole, halves], |d| d.by_kind());
         Some(Displacements { whole, halves, difference: difference.by_kind() })

@@ -215,6 +215,12 @@ impl Directions {
         Self { all: Few::of(numbers), beside: 0 }
     }
 
+    /// So many numbers, given by their index.
+    #[inline]
+    pub(crate) fn from_index(count: usize, number: impl FnMut(usize) -> f64) -> Self {
+        Self::zeros(count).with(number)
+    }
+
     /// All numbers.
     #[inline]
     pub fn numbers(&self) -> &[f64] {

@@ -25,33 +25,91 @@
 use metriplectic_dynamics::velocity::differentials;
 use metriplectic_dynamics::{Bracket, Dissipation, Metriplectic, system::Point};
 use metriplectic_fields::{
-    ChartPoint, Column, Dimension, Matrix, Scalar, Square, Vector, jacobian, power_of_two,
+    ChartPoint, Column, Dimension, Matrix, Scalar, Vector, jacobian, power_of_two,
 };
-use metriplectic_manifolds::Manifold;
 
-use crate::step::{CUT, CUTS, Components, Dim, SAME, Scales, classical_step as classical_step_of};
+use crate::step::{
+    CUT, CUTS, Dim, Directions, Few, SAME, Scales, Vector as _, Written, classical_step,
+};
 
-/// The velocity at `x`, and the sizes of what it is summed of; `None` if it cannot be evaluated there.
-pub(super) fn velocity_and_terms<Y: Metriplectic>(
-    system: &Y,
-    x: &Point<Y>,
-) -> Option<[Vector<Y::Manifold>; 2]> {
-    let (origin, sizes) = (Vector::<Y::Manifold>::zero(), Y::Manifold::scales(x));
-    let v = velocity(system, x, origin)?;
-    if const { !is_small::<Y>() } {
-        return Some([v, terms_of_many(system, x, &v, &sizes)?]);
+/// The entries of a square matrix, row by row.
+type Rows = Few<64>;
+
+/// The motion of a system around a state, in plain numbers.
+pub(super) trait Motion {
+    /// The velocity at a displacement; `None` where it has no value.
+    fn velocity(&self, q: &Directions) -> Option<Directions>;
+
+    /// The derivatives `f'` of the velocity at a displacement, along the chart at the state; not numbers where there are none.
+    fn slopes(&self, q: &Directions) -> Rows;
+
+    /// The terms `|Π_ij ∂_jH| + |K_ij ∂_jS|` of the velocity at the state; `None` if its metric cannot be used.
+    fn terms(&self) -> Option<Rows>;
+}
+
+/// A typed system around a state.
+pub(super) struct Around<'a, Y: Metriplectic> {
+    pub(super) system: &'a Y,
+    pub(super) x: &'a Point<Y>,
+}
+
+impl<Y: Metriplectic> Motion for Around<'_, Y> {
+    fn velocity(&self, q: &Directions) -> Option<Directions> {
+        let v = velocity(self.system, self.x, Y::vector(q).0)?;
+        Some(Directions::from_index(Dim::<Y>::LEN, |i| v[i]))
     }
-    let slopes = slopes_at(system, x, origin);
-    Some([v, terms(system, x, |i, j| (slopes[(i, j)] * sizes[j]).abs())?])
+
+    fn slopes(&self, q: &Directions) -> Rows {
+        let nowhere = || Column::from_index(|_| f64::NAN.into());
+        let of = |&q: &_| velocity(self.system, self.x, q).unwrap_or_else(nowhere);
+        let slopes: Matrix<Y::Manifold> = jacobian::<Y::Manifold, f64>(of, &Y::vector(q).0);
+        rows(Dim::<Y>::LEN, |i, j| slopes[(i, j)])
+    }
+
+    fn terms(&self) -> Option<Rows> {
+        let centre = ChartPoint::<Y::Manifold>::centre(self.x);
+        let w = differentials(self.system, &centre);
+        let g = self.system.metric_at(&centre);
+        let args = self.system.bracket_args(&g, &w.entropy);
+        let pi = self.system.bracket().tensor(&args).ok()?;
+        let k = self.system.dissipation().tensor(&g, &w.energy).ok()?;
+        Some(rows(Dim::<Y>::LEN, |i, j| {
+            (pi[(i, j)] * w.energy[j]).abs() + (k[(i, j)] * w.entropy[j]).abs()
+        }))
+    }
+}
+
+/// The rows of a matrix.
+fn rows(n: usize, entry: impl Fn(usize, usize) -> f64) -> Rows {
+    let mut rows = Rows::zeros(n * n);
+    for (k, to) in rows.iter_mut().enumerate() {
+        *to = entry(k / n, k % n);
+    }
+    rows
+}
+
+/// The velocity at a state, and the sizes of what it is summed of; `None` if it cannot be evaluated there.
+pub(super) fn velocity_and_terms(
+    motion: &dyn Motion,
+    sizes: &Directions,
+) -> Option<[Directions; 2]> {
+    let origin = sizes.zero();
+    let v = motion.velocity(&origin)?;
+    let terms = if is_small(sizes.len()) {
+        terms(motion, moved(&motion.slopes(&origin), sizes))?
+    } else {
+        terms_of_many(motion, &v, sizes)?
+    };
+    Some([v, terms])
 }
 
 /// The number of entries up to which all derivatives of a velocity are formed.
 /// A factor of four fails `system/reach.rs::the_start_of_a_large_system_costs_some_velocities`.
 const SMALL: usize = 8;
 
-/// Whether a system has few entries.
-pub(super) const fn is_small<Y: Metriplectic>() -> bool {
-    <Dim<Y> as Dimension>::LEN <= SMALL
+/// Whether so many entries are few.
+pub(super) const fn is_small(entries: usize) -> bool {
+    entries <= SMALL
 }
 
 /// The directions along which the change of a velocity of many entries is looked at.
@@ -59,64 +117,72 @@ pub(super) const fn is_small<Y: Metriplectic>() -> bool {
 const DIRECTIONS: usize = 3;
 
 /// The sizes of what a velocity `v` of many entries is summed of, with entries of these sizes.
-pub(super) fn terms_of_many<Y: Metriplectic>(
-    system: &Y,
-    x: &Point<Y>,
-    v: &Vector<Y::Manifold>,
-    sizes: &Vector<Y::Manifold>,
-) -> Option<Vector<Y::Manifold>> {
+pub(super) fn terms_of_many(
+    motion: &dyn Motion,
+    v: &Directions,
+    sizes: &Directions,
+) -> Option<Directions> {
     // By differences: a velocity at dual numbers costs as much as `n` of them.
     let small = f64::EPSILON.sqrt();
-    let mut moved = Vector::<Y::Manifold>::zero();
+    let mut moved = sizes.zero();
     for direction in 0..DIRECTIONS {
-        let q = Column::from_index(|i| {
+        let q = sizes.with(|i| {
             // Both signs, without a pattern (Weyl 1916).
             let turn = ((i * DIRECTIONS + direction) as f64 * 0.618_033_988_749_894_9).fract();
             let sign = if (turn * turn * 1e4).fract() < 0.5 { -1.0 } else { 1.0 };
-            sign * small * sizes[i]
+            sign * small * sizes.get(i)
         });
-        let change = velocity(system, x, q)? - *v;
-        moved = Column::from_index(|i| moved[i].max(change[i].abs() / small));
+        let there = motion.velocity(&q)?;
+        moved = Directions::zip([&moved, &there, v], |[moved, there, v]| {
+            moved.max((there - v).abs() / small)
+        });
     }
-    Some(terms(system, x, |_, _| 0.0)? + moved)
+    Some(Directions::zip([&terms(motion, |_, _| 0.0)?, &moved], |[terms, moved]| terms + moved))
 }
 
-/// The sizes that the entries reach soon; `None` if the equation of motion cannot be evaluated at `x`.
-pub(super) fn reach<Y: Metriplectic>(
-    system: &Y,
-    x: &Point<Y>,
+/// The sizes that the entries reach soon; `None` if the equation of motion cannot be evaluated at the state.
+pub(super) fn reach(
+    motion: &dyn Motion,
+    sizes: &Directions,
     span: f64,
-) -> Option<Scales<Components<Vector<Y::Manifold>>>> {
-    let (origin, sizes) = (Vector::<Y::Manifold>::zero(), Y::Manifold::scales(x));
-    let v = velocity(system, x, origin)?;
-    let slopes = slopes_at(system, x, origin);
-    let moved = |i, j| (slopes[(i, j)] * sizes[j]).abs();
-    let terms = terms(system, x, moved)?;
-    let first = 0.25 * shortest_time(&slopes, span);
+) -> Option<Scales<Directions>> {
+    let (n, origin) = (sizes.len(), sizes.zero());
+    let v = motion.velocity(&origin)?;
+    let slopes = motion.slopes(&origin);
+    let terms = terms(motion, moved(&slopes, sizes))?;
+    let first = 0.25 * shortest_time(n, &slopes, span);
     // The acceleration in a unit of rates, whose square may be too large or too small for a number.
     let unit = if first.is_normal() { power_of_two(first.recip()) } else { 1.0 };
-    let a = slopes * (v * unit.recip());
-    let nonlinear = |delta: f64| Some(velocity(system, x, v * delta)? - v - a * (unit * delta));
-    let is_smooth = |delta: f64, whole: &Vector<Y::Manifold>, half: &Vector<Y::Manifold>| {
+    let rate = v.map(|v| v * unit.recip());
+    let a = v.with(|i| {
+        (1..n).fold(slopes[i * n] * rate.get(0), |sum, j| slopes[i * n + j] * rate.get(j) + sum)
+    });
+    let nonlinear = |delta: f64| {
+        let there = motion.velocity(&v.map(|v| v * delta))?;
+        Some(Directions::zip([&there, &v, &a], |[there, v, a]| there - v - a * (unit * delta)))
+    };
+    let is_smooth = |delta: f64, whole: &Directions, half: &Directions| {
         let quarter = std::cell::OnceCell::new();
-        (0..Vector::<Y::Manifold>::LEN).all(|i| {
-            let linear = 1e-6 * (v[i].abs() + unit * delta * a[i].abs());
-            let is_flat = whole[i].abs() <= STEEPEST * half[i].abs() + linear + NOISE * terms[i];
+        (0..n).all(|i| {
+            let linear = 1e-6 * (v.get(i).abs() + unit * delta * a.get(i).abs());
+            let [whole, half] = [whole.get(i), half.get(i)];
+            let is_flat = whole.abs() <= STEEPEST * half.abs() + linear + NOISE * terms.get(i);
             let is_power = || {
                 let quarter = quarter.get_or_init(|| nonlinear(0.25 * delta));
                 quarter.as_ref().is_some_and(|quarter| {
-                    let [first, second] = [whole[i] / half[i], half[i] / quarter[i]];
+                    let [first, second] = [whole / half, half / quarter.get(i)];
                     (first / second - 1.0).abs() <= SAME
                 })
             };
             is_flat || is_power()
         })
     };
-    let (mut delta, mut r) = (first, origin);
+    let (mut delta, mut r) = (first, origin.clone());
+    let step = |h: f64| classical_step(|q| motion.velocity(q), [&origin, &v], h);
     let is_short = |delta: f64| {
         [0.5 * delta, delta].into_iter().all(|h| {
-            let reached = classical_step(system, x, v, h);
-            reached.is_some_and(|d| delta <= 0.5 * shortest_time(&slopes_at(system, x, d), span))
+            let is_slow = |d: Directions| delta <= 0.5 * shortest_time(n, &motion.slopes(&d), span);
+            step(h).is_some_and(is_slow)
         })
     };
     for _ in 0..CUTS {
@@ -129,25 +195,14 @@ pub(super) fn reach<Y: Metriplectic>(
         }
         delta *= CUT;
     }
-    let classical = classical_step(system, x, v, delta).unwrap_or(origin);
-    let sizes = Vector::<Y::Manifold>::from_index(|i| {
-        let linear = (delta * v[i].abs()).max(0.5 * delta * (unit * delta) * a[i].abs());
-        let first = linear.max(delta * r[i].abs() / 3.0);
-        if first < LATE * classical[i].abs() { classical[i].abs() } else { first }
+    let classical = step(delta).unwrap_or(origin);
+    let sizes = Directions::zip([&v, &a, &r, &classical], |[v, a, r, classical]| {
+        let linear = (delta * v.abs()).max(0.5 * delta * (unit * delta) * a.abs());
+        let first = linear.max(delta * r.abs() / 3.0);
+        if first < LATE * classical.abs() { classical.abs() } else { first }
     });
-    (sizes.is_finite() && terms.is_finite())
-        .then_some(Scales { sizes: Components(sizes), terms: Components(terms) })
-}
-
-/// The displacement of a step of the classical Runge-Kutta method; `None` if it leaves the domain.
-fn classical_step<Y: Metriplectic>(
-    system: &Y,
-    x: &Point<Y>,
-    v: Vector<Y::Manifold>,
-    h: f64,
-) -> Option<Vector<Y::Manifold>> {
-    let (origin, v) = (Components(Vector::<Y::Manifold>::zero()), Components(v));
-    classical_step_of(system, x, [&origin, &v], h).map(|end| end.0)
+    let is_finite = |v: &Directions| v.numbers().iter().all(|v| v.is_finite());
+    (is_finite(&sizes) && is_finite(&terms)).then_some(Scales { sizes, terms })
 }
 
 /// The fraction of a displacement below which the first powers of time say nothing of it.
@@ -159,11 +214,11 @@ const STEEPEST: f64 = 20.0;
 const NOISE: f64 = 1.0 / 65_536.0;
 
 /// The shortest time of the motion, and at most `span`; zero where a derivative is not a number.
-fn shortest_time<V: Column<f64>>(slopes: &impl Square<f64, Column = V>, span: f64) -> f64 {
+fn shortest_time(n: usize, slopes: &Rows, span: f64) -> f64 {
     let mut time = span;
-    for i in 0..V::LEN {
+    for i in 0..n {
         for j in 0..=i {
-            let (there, back) = (slopes[(i, j)].abs(), slopes[(j, i)].abs());
+            let (there, back) = (slopes[i * n + j].abs(), slopes[j * n + i].abs());
             let product = there * back;
             // The product of two numbers that are not zero may be too small or too large for a number.
             let rate =
@@ -179,36 +234,18 @@ fn shortest_time<V: Column<f64>>(slopes: &impl Square<f64, Column = V>, span: f6
     time
 }
 
-/// The sizes `Σ_j (|Π_ij||∂_jH| + |K_ij||∂_jS| + m_ij)` of what the velocity is summed of, where `m_ij = |f'_ij||x_j|`.
-fn terms<Y: Metriplectic>(
-    system: &Y,
-    x: &Point<Y>,
-    moved: impl Fn(usize, usize) -> f64,
-) -> Option<Vector<Y::Manifold>> {
-    let centre = ChartPoint::<Y::Manifold>::centre(x);
-    let w = differentials(system, &centre);
-    let g = system.metric_at(&centre);
-    let pi = system.bracket().tensor(&system.bracket_args(&g, &w.entropy)).ok()?;
-    let k = system.dissipation().tensor(&g, &w.energy).ok()?;
-    Some(Column::from_index(|i| {
-        let n = Vector::<Y::Manifold>::LEN;
-        (0..n).fold(0.0, |sum: f64, j| {
-            let laws = (pi[(i, j)] * w.energy[j]).abs() + (k[(i, j)] * w.entropy[j]).abs();
-            sum + laws + moved(i, j)
-        })
-    }))
+/// The terms `|f'_ij| s_j`, with entries of these sizes.
+fn moved(slopes: &Rows, sizes: &Directions) -> impl Fn(usize, usize) -> f64 {
+    move |i, j| (slopes[i * sizes.len() + j] * sizes.get(j)).abs()
 }
 
-/// The derivatives `f'` of the velocity at `φ_x(q)`, along the chart at `x`; not numbers where there are none.
-fn slopes_at<Y: Metriplectic>(
-    system: &Y,
-    x: &Point<Y>,
-    q: Vector<Y::Manifold>,
-) -> Matrix<Y::Manifold> {
-    jacobian::<Y::Manifold, f64>(
-        |&q| velocity(system, x, q).unwrap_or_else(|| Column::from_index(|_| f64::NAN.into())),
-        &q,
-    )
+/// The sizes `Σ_j (|Π_ij||∂_jH| + |K_ij||∂_jS| + m_ij)` of what the velocity is summed of.
+fn terms(motion: &dyn Motion, moved: impl Fn(usize, usize) -> f64) -> Option<Directions> {
+    let laws = motion.terms()?;
+    let n = laws.len().isqrt();
+    Some(Directions::from_index(n, |i| {
+        (0..n).fold(0.0, |sum: f64, j| sum + laws[i * n + j] + moved(i, j))
+    }))
 }
 
 /// The velocity at `φ_x(q)`, if there is one.

@@ -27,6 +27,7 @@ mod memory;
 mod noise;
 mod own_error;
 pub(crate) mod panicked;
+pub(crate) mod passed_on;
 pub(crate) mod plain;
 mod plain_method;
 mod result;

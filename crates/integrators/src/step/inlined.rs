@@ -1,9 +1,7 @@
 //! A method that is compiled with each system.
 
-use super::{
-    Control, Element, Flow, LimitingSites, MethodError, NoiseSummary, Promises, Refusal, StepEnds,
-    StepError, StepStart, Stepper, Taken,
-};
+use super::passed_on::passed_on;
+use super::{Flow, Stepper};
 
 /// A method that is compiled with your system, also where the library has an instance of it.
 ///
@@ -44,84 +42,5 @@ impl<F: Flow, M: Stepper<F>> Stepper<F> for Inlined<M> {
 
     const HAS_DEFAULT_BETWEEN: bool = M::HAS_DEFAULT_BETWEEN;
 
-    fn name(&self) -> String {
-        self.0.name()
-    }
-
-    fn memory(&self) -> M::Memory {
-        self.0.memory()
-    }
-
-    fn order(&self) -> u32 {
-        self.0.order()
-    }
-
-    fn promises(&self, flow: &F) -> Promises {
-        self.0.promises(flow)
-    }
-
-    fn damps(&self) -> bool {
-        self.0.damps()
-    }
-
-    fn noise(&self, flow: &F) -> Option<NoiseSummary> {
-        self.0.noise(flow)
-    }
-
-    fn nothing_between(&self, time: f64, h: f64) -> StepError {
-        self.0.nothing_between(time, h)
-    }
-
-    fn check(&self, follows_tolerance: bool) -> Result<(), MethodError> {
-        self.0.check(follows_tolerance)
-    }
-
-    fn step(
-        &self,
-        start: &StepStart<'_, F>,
-        h: f64,
-        memory: &mut M::Memory,
-    ) -> Result<Taken<F>, StepError> {
-        self.0.step(start, h, memory)
-    }
-
-    fn attempt(
-        &self,
-        start: &StepStart<'_, F>,
-        h: f64,
-        memory: &mut M::Memory,
-    ) -> Result<Taken<F>, Refusal> {
-        self.0.attempt(start, h, memory)
-    }
-
-    fn control(&self) -> Control {
-        self.0.control()
-    }
-
-    fn error(
-        &self,
-        step: &StepEnds<'_, F>,
-        memory: &M::Memory,
-        norm: impl Fn(&F::Vector) -> f64,
-    ) -> Option<f64> {
-        self.0.error(step, memory, norm)
-    }
-
-    fn limiting_sites(
-        &self,
-        step: &StepEnds<'_, F>,
-        memory: &M::Memory,
-        allowed: &F::Vector,
-    ) -> LimitingSites {
-        self.0.limiting_sites(step, memory, allowed)
-    }
-
-    fn between(
-        &self,
-        step: &StepEnds<'_, F>,
-        memory: &mut M::Memory,
-        theta: f64,
-    ) -> Option<Element<F>> {
-        self.0.between(step, memory, theta)
-    }
+    passed_on!(F, this => this.0);
 }

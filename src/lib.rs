@@ -102,8 +102,8 @@ pub mod prelude {
         Ending, Error, Event, ExplicitRungeKutta, Gauss, Gonzalez, Inlined, ItohAbe, MeanValue,
         Method, Newton, NinomiyaVictoir, NoiseBuilder, NoiseError, Noisy, NoisyError, Observables,
         OpenBuilder, OpenSpace, OpenState, OpenSystem, Radau, RandomFlow, ResumeError, Run,
-        RunError, RungeKuttaChebyshev, Scheme, Span, SpanError, StartError, State, StepError,
-        Stepper, Steps, SymmetricItohAbe, Tableau, Tangents, Trajectory, Until, Watch,
+        RunError, RungeKuttaChebyshev, Scheme, Simulation, Span, SpanError, StartError, State,
+        StepError, Stepper, Steps, SymmetricItohAbe, Tableau, Tangents, Trajectory, Until, Watch,
     };
     pub use metriplectic_lattices::{
         BondState, Boundary, Graph, Lattice, LatticeError, Onsager, OpenLattice, OpenSites, Points,

@@ -18,7 +18,7 @@ use metriplectic_equations::judge::{Judge, RADIUS};
 use metriplectic_equations::{ENTROPY, Equations, Report, VerifiedEquations};
 use metriplectic_manifolds::PointError;
 
-pub(crate) use self::answered::{Answered, Beside, InTypes};
+pub(crate) use self::answered::{Answered, InTypes};
 use self::lengths::{AtRunTime, List as _};
 pub(crate) use self::modelled::Modelled;
 pub(crate) use self::of_length::OfLength;

@@ -175,6 +175,11 @@ fn verb(kind: Kind, name: &str) -> String {
         "`NinomiyaVictoir`" => {
             format!("let _ = NinomiyaVictoir(DormandPrince5).seed(1).run(&s, x, {STEPS})?;")
         }
+        "a field of a struct: `Simulation`" => format!(
+            "struct Case {{ simulation: Simulation }}
+    let case = Case {{ simulation: Simulation::new({dp8}, s) }};
+    let _ = case.simulation.run(&[0.4, 0.5, 0.3], {STEPS});"
+        ),
         "energy and entropy in boxes: `erased`" => "let _ = s.erased();".to_owned(),
         "`tangent` of `WeylMidpoint`" => tangent("WeylMidpoint"),
         "`tangent` of `DormandPrince8`" => tangent("DormandPrince8"),

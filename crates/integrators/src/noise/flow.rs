@@ -221,6 +221,10 @@ impl<F: Fluctuating<U> + Written, U> Written for Noisy<F, U> {
         F::read(layout, entries)
     }
 
+    fn at_start(&self, entries: &[f64]) -> Result<Element<F>, PointError> {
+        self.flow().at_start(entries)
+    }
+
     fn led(x: &Element<F>, y: Element<F>) -> Element<F> {
         F::led(x, y)
     }

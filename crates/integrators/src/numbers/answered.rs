@@ -99,7 +99,13 @@ impl<F: Written> Beside for InTypes<'_, F> {
 /// The flow of a typed system in plain numbers: its [`Equations`], and what stands beside them.
 pub(crate) struct Answered<'a> {
     pub(crate) numbers: FromEquations<&'a dyn Equations>,
-    pub(crate) beside: &'a dyn Beside,
+    beside: &'a dyn Beside,
+}
+
+impl<'a> Answered<'a> {
+    pub(crate) const fn of(system: &'a dyn Equations, beside: &'a dyn Beside) -> Self {
+        Self { numbers: FromEquations(system), beside }
+    }
 }
 
 /// Answers as [`FromEquations`] does.

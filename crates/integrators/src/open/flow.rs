@@ -294,6 +294,13 @@ where
         OpenState { x: Y::read(&(), point), time: rest[0], ledger }
     }
 
+    fn at_start(&self, entries: &[f64]) -> Result<StateOf<Y>, PointError> {
+        match self.closed().manifold().from_entries(entries) {
+            Err(PointError::Length { .. }) => self.element(entries),
+            point => point.map(|x| self.start(x)),
+        }
+    }
+
     fn led(x: &StateOf<Y>, y: StateOf<Y>) -> StateOf<Y> {
         x.at(y.x)
     }

@@ -3,7 +3,7 @@
 use metriplectic_equations::Equations;
 
 use crate::compiled;
-use crate::numbers::{Answered, Beside, FromEquations, InTypes};
+use crate::numbers::{Answered, FromEquations, InTypes};
 use crate::run::error::RunError;
 use crate::run::event::Event;
 use crate::run::jump::Jump;
@@ -37,57 +37,74 @@ impl<F: Flow, M: Stepper<F>> FlowVisitor<F> for Whole<F, M> {
     where
         F: Written,
     {
-        self.in_numbers(flow, |method, x0, schedule| {
-            let in_numbers = InPlainNumbers::from(flow, x0);
-            let run = || run(method, (&in_numbers, Entries::zeros(0)), schedule);
-            if const { F::CATCHES_PANICS } {
-                caught(run).unwrap_or_else(|panicked| Err(FlowError::new(panicked).into()))
-            } else {
-                run()
-            }
-        })
+        read::<F>(flow, self.in_numbers(flow).written(flow))
     }
 
     fn answered(self, flow: &F, system: &dyn Equations) -> Self::Output
     where
         F: Written,
     {
-        // A constant, so that the method is not compiled in types beside.
-        if const { M::IS_EXPLICIT && F::HAS_EXPLICIT || M::IS_IMPLICIT && F::HAS_IMPLICIT } {
-            let Self { method, x0, schedule } = self;
-            let (method, asked) = (method.compiled(), (system, &InTypes(flow) as &dyn Beside));
-            let schedule = in_numbers(schedule, flow);
-            return read::<F>(flow, run_compiled(method, asked, F::write(&x0), schedule));
-        }
-        self.in_numbers(flow, |method, x0, schedule| {
-            run_answered(method, (system, &InTypes(flow)), F::write(&x0), schedule)
-        })
+        read::<F>(flow, self.in_numbers(flow).answered(flow, system))
     }
 
     fn own(self, flow: &F, system: &dyn Equations) -> Self::Output
     where
         F: Written,
     {
-        // A constant, so that an explicit method is not compiled with each system.
-        if const { M::IS_EXPLICIT } {
-            let Self { method, x0, schedule } = self;
-            let schedule = in_numbers(schedule, flow);
-            return read::<F>(flow, run_own(method.compiled(), system, F::write(&x0), schedule));
-        }
-        self.written(flow)
+        read::<F>(flow, self.in_numbers(flow).own(flow, system))
     }
 }
 
-impl<F: Written, M: Stepper<F>> Whole<F, M> {
-    /// Runs the method in plain numbers, and reads what comes out in the types of the flow.
-    fn in_numbers(
-        self,
-        flow: &F,
-        run: impl FnOnce(&dyn PlainMethod, Element<F>, Schedule) -> Outcome,
-    ) -> Result<Trajectory<F::Space>, RunError<F::Space>> {
+impl<F: Flow, M: Stepper<F>> Whole<F, M> {
+    fn in_numbers(self, flow: &F) -> WholeInNumbers<F, M>
+    where
+        F: Written,
+    {
         let Self { method, x0, schedule } = self;
-        let schedule = in_numbers(schedule, flow);
-        read::<F>(flow, run(&MethodInTypes { method, flow }, x0, schedule))
+        WholeInNumbers { method, x0, schedule: in_numbers(schedule, flow) }
+    }
+}
+
+/// A run whose events are asked and whose states come out in plain numbers.
+pub(super) struct WholeInNumbers<F: Flow, M> {
+    pub(super) method: M,
+    pub(super) x0: Element<F>,
+    pub(super) schedule: Schedule,
+}
+
+impl<F: Written, M: Stepper<F>> FlowVisitor<F> for WholeInNumbers<F, M> {
+    type Output = Outcome;
+
+    fn typed(self, flow: &F) -> Outcome {
+        self.written(flow)
+    }
+
+    fn written(self, flow: &F) -> Outcome {
+        let Self { method, x0, schedule } = self;
+        let in_numbers = InPlainNumbers::from(flow, x0);
+        let start = (&in_numbers as &PlainFlow<'_>, Entries::zeros(0));
+        let run = || run(&MethodInTypes { method, flow }, start, schedule);
+        if const { F::CATCHES_PANICS } { without_panics(run) } else { run() }
+    }
+
+    fn answered(self, flow: &F, system: &dyn Equations) -> Outcome {
+        let Self { method, x0, schedule } = self;
+        let (x0, beside) = (F::write(&x0), InTypes(flow));
+        let answered = &Answered::of(system, &beside);
+        // A constant, so that the method is not compiled in types beside.
+        if const { M::IS_EXPLICIT && F::HAS_EXPLICIT || M::IS_IMPLICIT && F::HAS_IMPLICIT } {
+            return run_compiled(method.compiled(), answered, x0, schedule);
+        }
+        run(&MethodInTypes { method, flow }, (answered, x0), schedule)
+    }
+
+    fn own(self, flow: &F, system: &dyn Equations) -> Outcome {
+        // A constant, so that an explicit method is not compiled with each system.
+        if const { M::IS_EXPLICIT } {
+            let Self { method, x0, schedule } = self;
+            return run_own(method.compiled(), system, F::write(&x0), schedule);
+        }
+        self.written(flow)
     }
 }
 
@@ -100,7 +117,7 @@ fn in_numbers<F: Written>(mut schedule: Schedule, flow: &F) -> Schedule {
 }
 
 /// The outcome of a run in plain numbers.
-type Outcome = Result<Trajectory<PlainNumbers>, RunError<PlainNumbers>>;
+pub(super) type Outcome = Result<Trajectory<PlainNumbers>, RunError<PlainNumbers>>;
 
 /// Reads the outcome of a run in the types of a flow.
 fn read<F: Written>(
@@ -122,16 +139,6 @@ fn run(
     in_room(flow, || Steps::start_any(method, (flow, flow), x0, schedule)?.run())
 }
 
-/// Runs a system of which nearly all is asked by its equations.
-fn run_answered(
-    method: &dyn PlainMethod,
-    (system, beside): (&dyn Equations, &dyn Beside),
-    x0: Entries,
-    schedule: Schedule,
-) -> Outcome {
-    run(method, (&Answered { numbers: FromEquations(system), beside }, x0), schedule)
-}
-
 /// Runs a system of one's own by an explicit method. It may panic.
 fn run_own(
     method: Option<Compiled>,
@@ -143,21 +150,24 @@ fn run_own(
     let flow = &FromEquations(system);
     let in_numbers = InPlainNumbers::from(flow, x0);
     let start = (&in_numbers as &PlainFlow<'_>, Entries::zeros(0));
-    let run = || run(&MethodInTypes { method, flow }, start, schedule);
-    caught(run).unwrap_or_else(|panicked| Err(FlowError::new(panicked).into()))
+    without_panics(|| run(&MethodInTypes { method, flow }, start, schedule))
 }
 
 /// Runs a system by a method that is compiled with the library.
 fn run_compiled(
     method: Option<Compiled>,
-    (system, beside): (&dyn Equations, &dyn Beside),
+    flow: &Answered<'_>,
     x0: Entries,
     schedule: Schedule,
 ) -> Outcome {
-    let flow = Answered { numbers: FromEquations(system), beside };
-    let run = |method: &dyn PlainMethod| run(method, (&flow, x0), schedule);
-    let done = method.and_then(|method| compiled::with_method(method, &flow, run));
+    let run = |method: &dyn PlainMethod| run(method, (flow, x0), schedule);
+    let done = method.and_then(|method| compiled::with_method(method, flow, run));
     done.expect("the constants say that there is an instance")
+}
+
+/// The outcome of a run, or the panic in it as its error.
+fn without_panics(run: impl FnOnce() -> Outcome) -> Outcome {
+    caught(run).unwrap_or_else(|panicked| Err(FlowError::new(panicked).into()))
 }
 
 impl State<PlainNumbers> {

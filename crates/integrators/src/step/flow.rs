@@ -106,6 +106,15 @@ pub trait Written: Flow + Sized {
     /// Writes the entries of a state.
     fn write(x: &Element<Self>) -> Entries;
 
+    /// Reads and checks the state in which a run starts. What is booked beside a point may be left out.
+    ///
+    /// # Errors
+    ///
+    /// [`PointError`] if they are no entries of a state.
+    fn at_start(&self, entries: &[f64]) -> Result<Element<Self>, PointError> {
+        self.element(entries)
+    }
+
     /// Returns the state that a jump leads to, as [`jumped`](Flow::jumped) does.
     fn led(x: &Element<Self>, y: Element<Self>) -> Element<Self> {
         let _ = x;

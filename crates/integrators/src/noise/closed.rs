@@ -9,6 +9,7 @@ use metriplectic_dynamics::noise::{
 use metriplectic_dynamics::{
     Invariants, Metriplectic, ModelError, Report, SecondLaw, system::Point,
 };
+use metriplectic_equations::judge::RADIUS;
 use metriplectic_fields::{Column, ScalarField, Vector};
 use metriplectic_manifolds::{Canonical, Riemannian};
 
@@ -71,12 +72,21 @@ where
 }
 
 impl<Y: Metriplectic> Judged for Y {
+    type Broken = ModelError;
+    type Report = Report;
+
+    const RADIUS: f64 = RADIUS;
+
     fn verify_model(&self, x0: &Point<Y>, radius: f64) -> Result<(), ModelError> {
         self.verify(x0, radius)
     }
 
     fn report_model(&self, x0: &Point<Y>) -> Report {
         self.report(x0)
+    }
+
+    fn is_sound(report: &Report) -> bool {
+        report.verdict.is_ok()
     }
 }
 

@@ -163,11 +163,17 @@ pub enum NoiseError {
 /// Why a system with noise is not verified.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
-pub enum NoisyError {
+pub enum NoisyError<E: std::error::Error + 'static = ModelError> {
     /// A model that breaks one of its laws.
     #[error(transparent)]
-    Model(#[from] ModelError),
+    Model(E),
     /// Noise whose law is not `exp(S/k_B) μ`.
     #[error(transparent)]
     Noise(#[from] NoiseError),
+}
+
+impl From<ModelError> for NoisyError {
+    fn from(law: ModelError) -> Self {
+        Self::Model(law)
+    }
 }

@@ -123,7 +123,11 @@ impl<F: Fluctuating<U>, U> Flow for Noisy<F, U> {
     }
 
     fn examine(&self, x0: &Element<F>) -> Result<(), FlowError> {
-        self.flow().examine(x0)?;
+        if self.has_certificate() {
+            self.flow().examine_start_alone(x0)?;
+        } else {
+            self.flow().examine(x0)?;
+        }
         self.examine_law(x0).map_err(FlowError::new)
     }
 

@@ -7,7 +7,7 @@ use metriplectic_dynamics::noise::Fluctuation;
 
 use crate::explicit::StageFlow;
 use crate::noise::error::NoiseError;
-use crate::step::{Element, Laws};
+use crate::step::{Element, FlowError, Laws};
 
 /// The strength of the noise of a system, and the measure of its law.
 #[derive(Clone, Copy, Debug)]
@@ -73,6 +73,16 @@ pub trait Fluctuating<U>: StageFlow {
     /// The first law of the model that is broken.
     fn check_start_alone(&self, x0: &Element<Self>) -> Result<(), ModelError> {
         self.check(x0)
+    }
+
+    /// Verifies what only the flow knows of at the start of a run of a [verified](super::Noisy::verified) system, at that
+    /// state alone. By default the start is [examined](crate::Flow::examine) as any is.
+    ///
+    /// # Errors
+    ///
+    /// The flow's own error.
+    fn examine_start_alone(&self, x0: &Element<Self>) -> Result<(), FlowError> {
+        self.examine(x0)
     }
 }
 

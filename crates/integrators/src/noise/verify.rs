@@ -3,7 +3,6 @@
 use std::fmt;
 
 use metriplectic_dynamics::Report;
-use metriplectic_equations::judge::RADIUS;
 
 use super::error::{NoiseError, NoisyError};
 use super::fluctuating::Fluctuating;
@@ -14,14 +13,14 @@ use crate::step::Element;
 /// The report of a system with noise; see [`Noisy::report`].
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
-pub struct NoisyReport {
+pub struct NoisyReport<R = Report> {
     /// The residual of every law of the model, and its verdict.
-    pub model: Report,
+    pub model: R,
     /// The verdict of the noise. `None` where the model breaks a law, so that there is no law to sample.
     pub noise: Option<Result<(), NoiseError>>,
 }
 
-impl fmt::Display for NoisyReport {
+impl<R: fmt::Display> fmt::Display for NoisyReport<R> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "{}", self.model)?;
         match &self.noise {
@@ -35,22 +34,22 @@ impl fmt::Display for NoisyReport {
 impl<F: Judged + Fluctuating<U>, U> Noisy<F, U> {
     /// Checks the laws of the model around a state, with those of its surroundings if it has any, and then what makes
     /// `exp(S/k_B) μ` the law of the noise: Boltzmann's constant, the terms, the kinetic drift and the measure. A run does
-    /// this first, with a radius of 0.1.
+    /// this first, with a radius of 0.1, or of 0.01 if it is a lattice.
     ///
     /// # Errors
     ///
     /// [`NoisyError::Model`] that names the law, the state and the size of the violation, and [`NoisyError::Noise`] if the
     /// model is sound and its noise has another law.
-    pub fn verify(&self, x0: &Element<F>, radius: f64) -> Result<(), NoisyError> {
-        self.flow().verify_model(x0, radius)?;
+    pub fn verify(&self, x0: &Element<F>, radius: f64) -> Result<(), NoisyError<F::Broken>> {
+        self.flow().verify_model(x0, radius).map_err(NoisyError::Model)?;
         Ok(self.examine_law(x0)?)
     }
 
     /// Lists the residual of every law of the model around a state, with the verdict of its noise there. Read it when a new
     /// model misbehaves.
-    pub fn report(&self, x0: &Element<F>) -> NoisyReport {
+    pub fn report(&self, x0: &Element<F>) -> NoisyReport<F::Report> {
         let model = self.flow().report_model(x0);
-        let noise = model.verdict.is_ok().then(|| self.examine_law(x0));
+        let noise = F::is_sound(&model).then(|| self.examine_law(x0));
         NoisyReport { model, noise }
     }
 
@@ -61,8 +60,8 @@ impl<F: Judged + Fluctuating<U>, U> Noisy<F, U> {
     /// # Errors
     ///
     /// The errors of [`verify`](Self::verify).
-    pub fn verified(self, x0: &Element<F>) -> Result<Self, NoisyError> {
-        self.verify(x0, RADIUS)?;
+    pub fn verified(self, x0: &Element<F>) -> Result<Self, NoisyError<F::Broken>> {
+        self.verify(x0, F::RADIUS)?;
         Ok(self.with_certificate())
     }
 }
@@ -145,6 +144,11 @@ mod tests {
         if y.re > 2.0 { y - 1.0 } else { Real::from(1.0) }
     }
 
+    /// A closed system or an open one.
+    trait Model: Judged<Broken = ModelError, Report = Report> {}
+
+    impl<F: Judged<Broken = ModelError, Report = Report>> Model for F {}
+
     /// Runs a few short steps.
     fn run<F: Fluctuating<U>, U>(
         system: &Noisy<F, U>,
@@ -154,7 +158,7 @@ mod tests {
     }
 
     /// Verifies a sound system, reports on it, and runs it with and without its certificate.
-    fn is_sound<F: Judged + Fluctuating<U>, U>(system: Noisy<F, U>, x0: &Element<F>) {
+    fn is_sound<F: Model + Fluctuating<U>, U>(system: Noisy<F, U>, x0: &Element<F>) {
         assert_eq!(system.verify(x0, 0.1), Ok(()));
         let report = system.report(x0);
         assert!(report.model.verdict.is_ok() && !report.model.laws.is_empty(), "{report}");
@@ -171,7 +175,7 @@ mod tests {
     }
 
     /// Returns the error of each of the verbs, all of them the same.
-    fn refused<F: Judged + Fluctuating<U>, U>(system: Noisy<F, U>, x0: &Element<F>) -> NoisyError {
+    fn refused<F: Model + Fluctuating<U>, U>(system: Noisy<F, U>, x0: &Element<F>) -> NoisyError {
         let error = system.verify(x0, 0.1).unwrap_err();
         let report = system.report(x0);
         let text = report.to_string();

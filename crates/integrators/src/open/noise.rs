@@ -16,6 +16,7 @@ use metriplectic_dynamics::system::Point;
 use metriplectic_dynamics::{
     Dissipation as _, Invariants, Metriplectic, ModelError, Report, SecondLaw, Verify as _,
 };
+use metriplectic_equations::judge::RADIUS;
 use metriplectic_fields::{Column, Real, ScalarField, Vector};
 use metriplectic_manifolds::{Canonical, Manifold, MetricAt, MetricError, Riemannian};
 
@@ -330,11 +331,20 @@ where
     C: Clock<Y::Manifold, Y::Energy>,
     X: Exchange<Y::Manifold, Y::Metric>,
 {
+    type Broken = ModelError;
+    type Report = Report;
+
+    const RADIUS: f64 = RADIUS;
+
     fn verify_model(&self, x0: &StateOf<Y>, radius: f64) -> Result<(), ModelError> {
         self.verify(x0, radius)
     }
 
     fn report_model(&self, x0: &StateOf<Y>) -> Report {
         self.report(x0)
+    }
+
+    fn is_sound(report: &Report) -> bool {
+        report.verdict.is_ok()
     }
 }

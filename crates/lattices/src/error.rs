@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use metriplectic_dynamics::ModelError;
 use metriplectic_manifolds::PointError;
 
 /// A lattice that cannot be built, or that breaks a law at the start of a run. `size` is relative to the terms that
@@ -178,6 +179,9 @@ pub enum LatticeError {
         /// The rate, relative to the sizes of its terms.
         size: f64,
     },
+    /// A port or a bath of an [`OpenLattice`](crate::OpenLattice) that breaks a law.
+    #[error(transparent)]
+    Surroundings(Box<ModelError>),
 }
 
 /// The sentence of the `Display` form, which is what a `main` that returns the error prints.

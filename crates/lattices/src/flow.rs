@@ -50,6 +50,18 @@ impl<P: Model> Lattice<P> {
         sizes.map_or(0.0, |sizes| sizes[0] + sizes[1])
     }
 
+    /// Verifies the start of a run, at this state alone if the laws were verified before.
+    pub(crate) fn examine_start(
+        &self,
+        x0: &Points<P::Manifold>,
+        verified: bool,
+    ) -> Result<(), FlowError> {
+        let verdict = if verified { self.verify_start_alone(x0) } else { self.verify(x0) };
+        x0.clear_others();
+        self.clear();
+        verdict.map_err(FlowError::new)
+    }
+
     /// Makes a vector with these numbers at each site.
     pub(crate) fn same(&self, numbers: &VectorOf<P>) -> SiteVector {
         let numbers = (0..dimension::<P>()).map(|k| numbers[k]).collect();
@@ -206,10 +218,11 @@ impl<P: Model> Flow for Lattice<P> {
     }
 
     fn examine(&self, x0: &Points<P::Manifold>) -> Result<(), FlowError> {
-        let verified = self.verify(x0).map_err(FlowError::new);
-        x0.clear_others();
-        self.clear();
-        verified
+        self.examine_start(x0, self.verified)
+    }
+
+    fn is_verified(&self) -> bool {
+        self.verified
     }
 
     fn rechecks(&self, _: Recheck) -> bool {

@@ -8,6 +8,7 @@ use crate::lattice::{AtSites, Differentials, Lattice};
 use crate::model::{Model, PointOf, VectorOf};
 use crate::parallel;
 use crate::points::Points;
+use crate::report::{LatticeLaw, Laws, RATES};
 use crate::verify::cancels;
 
 const ANNIHILATES: &str =
@@ -33,24 +34,26 @@ impl Term {
     /// # Errors
     ///
     /// [`LatticeError::NegativeRate`].
-    pub(crate) fn negative_rate(&self, tried: Tried) -> Result<(), LatticeError> {
+    pub(crate) fn negative_rate(&self, tried: Tried, laws: &mut Laws) -> Result<(), LatticeError> {
         let &Self { place, rate, .. } = self;
-        if rate < 0.0 {
-            Err(LatticeError::NegativeRate { place, tried, rate, entries: Vec::new() })
-        } else {
-            Ok(())
-        }
+        let found = || LatticeLaw::new(RATES, [(-rate).max(0.0), 0.0], place);
+        laws.note(found, rate >= 0.0 || rate.is_nan(), || LatticeError::NegativeRate {
+            place,
+            tried,
+            rate,
+            entries: Vec::new(),
+        })
     }
 
     /// # Errors
     ///
     /// [`LatticeError::Broken`] if it changes the energy.
-    pub(crate) fn keeps_energy(&self, tried: Tried) -> Result<(), LatticeError> {
+    pub(crate) fn keeps_energy(&self, tried: Tried, laws: &mut Laws) -> Result<(), LatticeError> {
         let law = match self.place {
             Place::Bond { .. } => "b·(dH_i, dH_j) = 0",
             Place::Site(_) | Place::Total => "b·dH = 0",
         };
-        cancels(law, (self.place, tried), self.along_energy, ANNIHILATES)
+        cancels((law, ANNIHILATES), (self.place, tried), self.along_energy, laws)
     }
 }
 
@@ -64,32 +67,41 @@ impl<P: Model> Lattice<P> {
         &self,
         x: &Points<P::Manifold>,
         all: &Differentials,
-        check: impl Fn(&Term) -> Result<(), LatticeError> + Sync,
+        laws: &mut Laws,
+        check: impl Fn(&Term, &mut Laws) -> Result<(), LatticeError> + Sync,
     ) -> Result<(), LatticeError> {
-        let first = self.terms_of_chunks(x, all, |first: &mut Option<LatticeError>, term| {
-            if first.is_none() {
-                *first = check(&term).err();
+        let nothing = laws.fresh();
+        let begin = || (nothing.clone(), Ok(()));
+        let chunks = self.terms_of_chunks(x, all, begin, |(laws, verdict), term| {
+            if verdict.is_ok() {
+                *verdict = check(&term, laws);
             }
         });
-        first.into_iter().flatten().next().map_or(Ok(()), Err)
+        let mut first = Ok(());
+        for (seen, verdict) in chunks {
+            laws.merge(seen);
+            first = first.and(verdict);
+        }
+        first
     }
 
     /// The results of visits to the terms of each chunk of sites and of bonds.
-    pub(crate) fn terms_of_chunks<R: Default + Send>(
+    pub(crate) fn terms_of_chunks<R: Send>(
         &self,
         x: &Points<P::Manifold>,
         all: &Differentials,
+        begin: impl Fn() -> R + Sync,
         visit: impl Fn(&mut R, Term) + Sync,
     ) -> Vec<R> {
         let at = (&**x, all.reader::<P>());
         let mut results = parallel::map(self.sites(), |sites| {
-            let mut result = R::default();
+            let mut result = begin();
             sites.for_each(|site| self.look_at_site(site, at, |term| visit(&mut result, term)));
             result
         });
         if P::BOND_FRICTION {
             results.extend(parallel::map(self.layout.bonds().len(), |bonds| {
-                let mut result = R::default();
+                let mut result = begin();
                 bonds.for_each(|bond| self.look_at_bond(bond, at, |term| visit(&mut result, term)));
                 result
             }));

@@ -42,6 +42,8 @@ pub struct Lattice<P> {
     sums: [Pool<f64>; 2],
     /// True once the differential of the entropy was seen to differ from site to site.
     entropy_differs: AtomicBool,
+    /// Whether its laws were verified before the run.
+    pub(crate) verified: bool,
 }
 
 // By hand, because closures have no `Debug`.
@@ -163,7 +165,23 @@ impl<P: Model> Lattice<P> {
             std::array::from_fn(|_| Pool::default());
         let sums = [at_sites, in_slots];
         let entropy_differs = AtomicBool::new(false);
-        Self { parts, layout, vectors, differentials, slots, both_slots, sums, entropy_differs }
+        Self {
+            parts,
+            layout,
+            vectors,
+            differentials,
+            slots,
+            both_slots,
+            sums,
+            entropy_differs,
+            verified: false,
+        }
+    }
+
+    /// Marks the lattice as one whose laws were verified.
+    pub(crate) fn with_certificate(mut self) -> Self {
+        self.verified = true;
+        self
     }
 
     /// Gives up the arrays that were used before a run and are used no more.

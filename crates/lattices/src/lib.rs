@@ -29,6 +29,7 @@
 //! | [`points`] | [`Points`]: the states of a lattice |
 //! | [`profiles`] | [`Profiles`]: rows of numbers along the lattice, in a file |
 //! | [`flow`] | a lattice as a flow for the explicit methods |
+//! | [`report`] | [`LatticeReport`]: every law, with the place where it is worst |
 //! | [`error`](mod@error) | [`LatticeError`]: what can be wrong, with the site or bond |
 
 mod blocks;
@@ -57,6 +58,7 @@ pub mod profiles;
 mod projection;
 mod random;
 mod recheck;
+pub mod report;
 mod terms;
 pub mod vector;
 mod verify;
@@ -70,4 +72,5 @@ pub use onsager::{BondState, Onsager, SiteState};
 pub use open::{OpenLattice, OpenSites};
 pub use points::{Points, Sites};
 pub use profiles::Profiles;
+pub use report::{LatticeLaw, LatticeReport};
 pub use vector::SiteVector;

@@ -8,15 +8,18 @@ use std::ops::Range;
 use metriplectic_dynamics::noise::{Boltzmann, Uniform};
 use metriplectic_fields::{Column, Dimension as _, Space};
 use metriplectic_integrators::noise::{Drawn, Fluctuating, Landing, Noise};
-use metriplectic_integrators::{Flow, NoiseError, Noisy};
+use metriplectic_integrators::{Flow, FlowError, Judged, NoiseError, Noisy};
 use metriplectic_manifolds::{Flat, Manifold};
 
+use crate::error::LatticeError;
 use crate::gather::Gather as _;
 use crate::lattice::{Given, Lattice, dimension, probed};
 use crate::model::{Model, PointOf, VectorOf};
 use crate::onsager::Onsager;
 use crate::points::Points;
+use crate::report::{LatticeReport, Laws};
 use crate::vector::SiteVector;
+use crate::verify::MOVED;
 
 /// The half width of a difference, in units of an entry: where its rounding is as large as its error, `ε^{1/3}`.
 const WIDTH: f64 = 6e-6;
@@ -219,6 +222,10 @@ impl<P: Model<Manifold: Flat>> Fluctuating<Uniform> for Lattice<P> {
         self.onto(&to, laws, None)
     }
 
+    fn examine_start_alone(&self, x0: &Points<P::Manifold>) -> Result<(), FlowError> {
+        self.examine_start(x0, true)
+    }
+
     fn examine_noise(&self, x: &Points<P::Manifold>, _: &Noise<Uniform>) -> Result<(), NoiseError> {
         if !P::ENTROPY {
             return Err(NoiseError::NoiseAndPublished);
@@ -228,11 +235,30 @@ impl<P: Model<Manifold: Flat>> Fluctuating<Uniform> for Lattice<P> {
         }
         // The divergence may vanish at the start by a symmetry.
         let sizes = self.sizes_of_differences(x);
-        let (y, _) = self.near(x, &self.vector_of(|site| own_or::<P>(&x[site], &sizes)));
+        let (y, _) = self.near(x, &self.vector_of(|site| own_or::<P>(&x[site], &sizes)), MOVED);
         [x, &y].into_iter().try_for_each(|x| {
             let sizes = self.sizes_of_differences(x);
             (0..self.sites()).try_for_each(|site| self.keeps_volume(site, &x[site], &sizes))
         })
+    }
+}
+
+impl<P: Model> Judged for Lattice<P> {
+    type Broken = LatticeError;
+    type Report = LatticeReport;
+
+    const RADIUS: f64 = MOVED;
+
+    fn verify_model(&self, x: &Points<P::Manifold>, radius: f64) -> Result<(), LatticeError> {
+        self.judge(x, radius, &mut Laws::first())
+    }
+
+    fn report_model(&self, x: &Points<P::Manifold>) -> LatticeReport {
+        self.report(x)
+    }
+
+    fn is_sound(report: &LatticeReport) -> bool {
+        report.verdict.is_ok()
     }
 }
 

@@ -68,6 +68,8 @@ pub use vector::OpenSiteVector;
 pub struct OpenLattice<P: Model> {
     lattice: Lattice<P>,
     parts: Vec<Part<P>>,
+    /// Whether its laws were verified before the run, with those of its parts.
+    verified: bool,
     /// A ledger without entries.
     empty: Ledger,
 }
@@ -105,7 +107,7 @@ impl<M: Manifold> StateSpace for OpenSites<M> {
 impl<P: Model> Lattice<P> {
     /// The lattice with surroundings, which have no part yet.
     pub fn opened(self) -> OpenLattice<P> {
-        OpenLattice { lattice: self, parts: Vec::new(), empty: Ledger::of([]) }
+        OpenLattice { lattice: self, parts: Vec::new(), verified: false, empty: Ledger::of([]) }
     }
 }
 
@@ -163,6 +165,7 @@ impl<P: Model> OpenLattice<P> {
         self.parts.push(Part { name, sites: sites.into_iter().collect(), kind });
         let names = self.parts.iter().map(|part| (Arc::clone(&part.name), part.is_bath()));
         self.empty = Ledger::of(names);
+        self.verified = false;
         self
     }
 

@@ -8,11 +8,12 @@ use metriplectic_fields::Column;
 
 use crate::error::{LatticeError, Place, Tried};
 use crate::friction::Term;
-use crate::lattice::{Lattice, differentials_at};
+use crate::lattice::{Differentials, Lattice, differentials_at};
 use crate::model::Model;
 use crate::parallel;
 use crate::points::Points;
 use crate::random::{Random, Use};
+use crate::report::Laws;
 use crate::verify::{MOVED, NEARER, Sizes, Trial, cancels, golden, samples};
 
 /// The entropy that a negative rate destroys, relative to all production, that is round-off.
@@ -90,31 +91,20 @@ impl<P: Model> Lattice<P> {
         let (all, totals) = self.differentials::<true>(x);
         let count = self.sites() as f64;
         let mean = [totals.energy.size / count, totals.entropy.size / count];
-        let casimir = |site: usize| {
-            let [w, s] = differentials_at::<P>(&all, site);
-            let v = self.parts.reversible(&x[site], &w, &s);
-            let rest_and_terms = [s.dot(&v), s.abs().dot(&v.abs())];
-            cancels("Π dS = 0", (Place::Site(site), tried), rest_and_terms, "")
-        };
         // Without an entropy there is no friction either.
         if !P::ENTROPY {
             return Ok(mean);
         }
-        let sites = parallel::map(self.sites(), |mut sites| {
-            sites.try_for_each(casimir).err().map(Box::new)
-        });
-        if let Some(law) = sites.into_iter().flatten().next() {
-            return Err(self.located(*law, x));
-        }
+        self.casimir_at(x, &all, tried)?;
         let (mut production, mut negative) = (0.0, false);
         let look = |seen: &mut Seen, term: Term| {
             if seen.broken.is_none() {
-                seen.broken = term.keeps_energy(tried).err().map(Box::new);
+                seen.broken = term.keeps_energy(tried, &mut Laws::first()).err().map(Box::new);
             }
             seen.production += term.production().abs();
             seen.negative |= term.production() < 0.0;
         };
-        for seen in self.terms_of_chunks(x, &all, look) {
+        for seen in self.terms_of_chunks(x, &all, Seen::default, look) {
             if let Some(law) = seen.broken {
                 return Err(self.located(*law, x));
             }
@@ -124,11 +114,51 @@ impl<P: Model> Lattice<P> {
         if !negative {
             return Ok(mean);
         }
-        let verdict = self.each_term(x, &all, |term| {
+        let verdict = self.each_term(x, &all, &mut Laws::first(), |term, laws| {
             let destroys = -term.production() > DESTROYED * production;
-            if destroys { term.negative_rate(tried) } else { Ok(()) }
+            if destroys { term.negative_rate(tried, laws) } else { Ok(()) }
         });
         verdict.map(|()| mean).map_err(|law| self.located(law, x))
+    }
+
+    /// Checks `Π dS = 0` at every site.
+    ///
+    /// # Errors
+    ///
+    /// [`LatticeError::Broken`].
+    pub(crate) fn verify_casimir(
+        &self,
+        x: &Points<P::Manifold>,
+        tried: Tried,
+    ) -> Result<(), LatticeError> {
+        if !P::ENTROPY {
+            return Ok(());
+        }
+        let (all, _) = self.differentials::<false>(x);
+        self.casimir_at(x, &all, tried)
+    }
+
+    /// Checks `Π dS = 0` at every site, with the differentials there.
+    fn casimir_at(
+        &self,
+        x: &Points<P::Manifold>,
+        all: &Differentials,
+        tried: Tried,
+    ) -> Result<(), LatticeError> {
+        let casimir = |site: usize| {
+            let [w, s] = differentials_at::<P>(all, site);
+            let v = self.parts.reversible(&x[site], &w, &s);
+            let rest_and_terms = [s.dot(&v), s.abs().dot(&v.abs())];
+            let law = ("Π dS = 0", "");
+            cancels(law, (Place::Site(site), tried), rest_and_terms, &mut Laws::first())
+        };
+        let sites = parallel::map(self.sites(), |mut sites| {
+            sites.try_for_each(casimir).err().map(Box::new)
+        });
+        match sites.into_iter().flatten().next() {
+            Some(law) => Err(self.located(*law, x)),
+            None => Ok(()),
+        }
     }
 
     /// Compares the derivatives of the closures at these sites and bonds with their values. A kink has no derivative, so
@@ -144,13 +174,13 @@ impl<P: Model> Lattice<P> {
             let look = |sizes| {
                 let (tried, random) = (Tried::Reached, Random::new(Use::Reached));
                 let trial = Trial { lattice: self, y, sizes, tried, random, mean };
-                trial.derivatives_of(places.clone())
+                trial.derivatives_of(places.clone(), &mut Laws::first())
             };
             // As at the start: a difference that is not small decides nothing.
             look(Sizes::Own(largest)).or_else(|law| look(Sizes::Same(largest)).map_err(|_| law))
         };
         let Err(found) = judge(x) else { return Ok(()) };
-        let (y, _) = self.near(x, &self.own_sizes(x));
+        let (y, _) = self.near(x, &self.own_sizes(x), MOVED);
         if judge(&y).is_err() { Err(found) } else { Ok(()) }
     }
 }

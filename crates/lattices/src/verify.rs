@@ -11,12 +11,14 @@ use metriplectic_integrators::{Flow as _, StageFlow as _, Vector as _};
 use metriplectic_manifolds::Manifold;
 
 use crate::error::{LatticeError, Place, Tried};
+use crate::friction::Term;
 use crate::gather::Gather as _;
 use crate::lattice::{Differentials, Lattice, Total, differentials_at, dimension};
 use crate::model::{Model, PairManifold, PointOf, VectorOf};
 use crate::parallel;
 use crate::points::Points;
 use crate::random::{At, Random, Use};
+use crate::report::{LatticeLaw, LatticeReport, Laws, RATES};
 
 /// Sites, and bonds, at which closures are tried.
 const SAMPLES: usize = 64;
@@ -58,6 +60,106 @@ impl<P: Model> Lattice<P> {
     ///
     /// The first [`LatticeError`], with its site or bond.
     pub fn verify(&self, x: &Points<P::Manifold>) -> Result<(), LatticeError> {
+        self.judge(x, MOVED, &mut Laws::first())
+    }
+
+    /// Lists every law that [`verify`](Self::verify) tries, with the site or the bond where it is worst. Read it when a new
+    /// lattice misbehaves.
+    pub fn report(&self, x: &Points<P::Manifold>) -> LatticeReport {
+        let (verdict, mut laws) = (self.verify(x), Laws::all());
+        // A state without points or values ends it, and is in the verdict.
+        let _ = self.judge(x, MOVED, &mut laws);
+        let size = [self.sites(), self.layout.bonds().len()];
+        let tried = size.map(|count| samples(count).count());
+        LatticeReport { laws: laws.into_list(), size, tried, verdict }
+    }
+
+    /// Verifies the lattice at a state, and returns it with this certificate. A run of it, from any start, looks at the
+    /// points, at all values, at the friction and at `Π dS = 0` there, and at no states and derivatives around it. Use it
+    /// for a study of many runs.
+    ///
+    /// ```
+    /// use metriplectic_fields::Real;
+    /// use metriplectic_integrators::{DormandPrince5, Method, Span};
+    /// use metriplectic_lattices::{Graph, Lattice, Onsager};
+    /// use metriplectic_manifolds::Euclidean;
+    /// use nalgebra::{ComplexField, Vector1, vector};
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// let rod = Lattice::on(Graph::chain(5), Euclidean::<1>)
+    ///     .energy(|u: &Vector1<Real>| u.x)
+    ///     .entropy(|u: &Vector1<Real>| u.x.ln())
+    ///     .bond_onsager(|bond| {
+    ///         let [u, v] = bond.x;
+    ///         [Onsager { rate: u.x * v.x, b: [vector![1.0], vector![-1.0]] }]
+    ///     })
+    ///     .build()?;
+    /// let start = |hot: f64| rod.points(|site| vector![if site == 0 { hot } else { 1.0 }]);
+    /// println!("{}", rod.report(&start(2.0))); // … verdict: the lattice keeps its laws
+    /// # let starts = [2.0, 3.0].map(start);
+    /// # let start = |hot: f64| starts[if hot > 2.5 { 1 } else { 0 }].clone();
+    /// let rod = rod.verified(&start(2.0))?;
+    /// let run = DormandPrince5.run(&rod, start(3.0), Span::steps(0.1, 10))?;
+    /// assert!(run.certificate().verified_before);
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
+    /// # Errors
+    ///
+    /// The errors of [`verify`](Self::verify).
+    pub fn verified(self, x: &Points<P::Manifold>) -> Result<Self, LatticeError> {
+        self.verify(x)?;
+        Ok(self.with_certificate())
+    }
+
+    /// Judges the points and all values at a state, and the laws there and near it.
+    ///
+    /// # Errors
+    ///
+    /// The first [`LatticeError`]; if `laws` are listed, that of a point or a value.
+    pub(crate) fn judge(
+        &self,
+        x: &Points<P::Manifold>,
+        radius: f64,
+        laws: &mut Laws,
+    ) -> Result<(), LatticeError> {
+        self.verify_points(x)?;
+        self.verify_values(x)?;
+        self.judge_friction_around(x, radius, laws)?;
+        let (y, tried) = self.near(x, &self.sizes(x), radius);
+        let (sizes, random) = (Sizes::Same(self.largest_sizes(&y)), Random::new(Use::Start));
+        let trial = Trial { lattice: self, y: &y, sizes, tried, random, mean: [0.0; 2] }.all(laws);
+        trial.map_err(|law| self.located(law, &y))
+    }
+
+    /// Verifies the start of a run of a [verified](Self::verified) lattice: the points, all values, and the laws at this
+    /// state alone.
+    ///
+    /// # Errors
+    ///
+    /// The first [`LatticeError`].
+    pub(crate) fn verify_start_alone(&self, x: &Points<P::Manifold>) -> Result<(), LatticeError> {
+        self.verify_points(x)?;
+        self.verify_values(x)?;
+        let judge = |y: &_, tried| {
+            self.verify_casimir(y, tried)?;
+            self.judge_friction(y, tried, &mut Laws::first())
+        };
+        match judge(x, Tried::Start) {
+            Err(found @ LatticeError::Broken { .. }) => {
+                // At an equilibrium Π dH and b may be all round-off.
+                let (y, tried) = self.near(x, &self.own_sizes(x), MOVED);
+                if judge(&y, tried).is_err() {
+                    return Err(found);
+                }
+                self.verify_rates(x, Tried::Start)
+            }
+            verdict => verdict,
+        }
+    }
+
+    /// Looks for points that are none.
+    fn verify_points(&self, x: &Points<P::Manifold>) -> Result<(), LatticeError> {
         let (found, expected) = (x.len(), self.sites());
         if found != expected {
             return Err(LatticeError::Points { found, expected });
@@ -66,38 +168,58 @@ impl<P: Model> Lattice<P> {
             let check = |site| self.parts.manifold().check(&x[site]).err().map(|e| (site, e));
             sites.filter_map(check).next()
         });
-        if let Some((site, cause)) = wrong.into_iter().flatten().next() {
-            return Err(LatticeError::Start { place: Place::Site(site), cause });
+        match wrong.into_iter().flatten().next() {
+            Some((site, cause)) => Err(LatticeError::Start { place: Place::Site(site), cause }),
+            None => Ok(()),
         }
-        self.verify_values(x)?;
-        self.verify_friction_around(x)?;
-        let (y, tried) = self.near(x, &self.sizes(x));
-        let (sizes, random) = (Sizes::Same(self.largest_sizes(&y)), Random::new(Use::Start));
-        let trial = Trial { lattice: self, y: &y, sizes, tried, random, mean: [0.0; 2] }.all();
-        trial.map_err(|law| self.located(law, &y))
     }
 
     /// Verifies the friction of all sites and bonds at a start, and at a state near it.
-    fn verify_friction_around(&self, x: &Points<P::Manifold>) -> Result<(), LatticeError> {
-        let at_start = self.verify_friction(x, Tried::Start);
+    fn judge_friction_around(
+        &self,
+        x: &Points<P::Manifold>,
+        radius: f64,
+        laws: &mut Laws,
+    ) -> Result<(), LatticeError> {
+        let [mut here, mut there] = [laws.fresh(), laws.fresh()];
+        let at_start = self.judge_friction(x, Tried::Start, &mut here);
         // Small entries beside large ones keep their signs here, as rates of friction may need.
-        let (y, tried) = self.near(x, &self.own_sizes(x));
-        let nearby = self.verify_friction(&y, tried);
-        match at_start {
+        let (y, tried) = self.near(x, &self.own_sizes(x), radius);
+        let nearby = self.judge_friction(&y, tried, &mut there);
+        if nearby.is_ok() && there.hold() {
             // At an equilibrium b may be all round-off, and every b was tried nearby.
-            Err(LatticeError::Broken { .. }) if nearby.is_ok() => {}
-            verdict => verdict?,
+            here.forgive_all_but(RATES);
         }
-        nearby
+        laws.merge(here);
+        laws.merge(there);
+        match at_start {
+            Err(LatticeError::Broken { .. }) if nearby.is_ok() => {
+                self.verify_rates(x, Tried::Start)
+            }
+            verdict => verdict.and(nearby),
+        }
     }
 
     /// Verifies the terms of the friction at a state, in `O(N)`.
-    fn verify_friction(&self, x: &Points<P::Manifold>, tried: Tried) -> Result<(), LatticeError> {
+    fn judge_friction(
+        &self,
+        x: &Points<P::Manifold>,
+        tried: Tried,
+        laws: &mut Laws,
+    ) -> Result<(), LatticeError> {
         let (all, _) = self.differentials::<false>(x);
-        let verdict = self.each_term(x, &all, |term| {
-            term.negative_rate(tried)?;
-            term.keeps_energy(tried)
+        let verdict = self.each_term(x, &all, laws, |term, laws| {
+            term.negative_rate(tried, laws)?;
+            term.keeps_energy(tried, laws)
         });
+        verdict.map_err(|law| self.located(law, x))
+    }
+
+    /// Verifies the rates of the friction at a state.
+    fn verify_rates(&self, x: &Points<P::Manifold>, tried: Tried) -> Result<(), LatticeError> {
+        let (all, _) = self.differentials::<false>(x);
+        let check = |term: &Term, laws: &mut Laws| term.negative_rate(tried, laws);
+        let verdict = self.each_term(x, &all, &mut Laws::first(), check);
         verdict.map_err(|law| self.located(law, x))
     }
 
@@ -214,14 +336,15 @@ impl<P: Model> Lattice<P> {
         like.with(|i| random.of_entry(first + i))
     }
 
-    /// Moves a state by a little along its velocity and at random, each entry by a fraction of its size. Returns the
+    /// Moves a state by a little along its velocity and at random, each entry by a fraction `radius` of its size. Returns the
     /// state without a change if it has no neighbour with finite values.
     pub(crate) fn near(
         &self,
         x: &Points<P::Manifold>,
         sizes: &crate::SiteVector,
+        radius: f64,
     ) -> (Points<P::Manifold>, Tried) {
-        for fraction in [MOVED, NEARER * MOVED, NEARER * NEARER * MOVED] {
+        for fraction in [radius, NEARER * radius, NEARER * NEARER * radius] {
             if let Some(y) = self.moved_near(fraction, x, sizes) {
                 return (y, Tried::Near { fraction });
             }
@@ -271,47 +394,56 @@ pub(crate) struct Trial<'a, P: Model> {
 }
 
 impl<P: Model> Trial<'_, P> {
-    fn all(&mut self) -> Result<(), LatticeError> {
+    fn all(&mut self, laws: &mut Laws) -> Result<(), LatticeError> {
         let Self { lattice, y, .. } = *self;
         let (all, totals) = lattice.differentials::<true>(y);
         let count = lattice.sites() as f64;
         self.mean = [totals.energy.size / count, totals.entropy.size / count];
         for site in samples(lattice.sites()) {
-            self.site(site, &differentials_at::<P>(&all, site))?;
+            self.site(site, &differentials_at::<P>(&all, site), laws)?;
         }
-        self.all_derivatives(&all).or_else(|error| {
+        let mut found = laws.fresh();
+        let mut verdict = self.all_derivatives(&all, &mut found);
+        if verdict.is_err() || !found.hold() {
             // The difference of a small entry is not small if it is a fraction of the largest one.
             let sizes = Sizes::Own(lattice.largest_sizes(y));
-            let random = Random::new(Use::Own);
-            Trial { sizes, random, ..*self }.all_derivatives(&all).map_err(|_| error)
-        })?;
-        self.conserved(&all)
+            let (trial, mut again) =
+                (Trial { sizes, random: Random::new(Use::Own), ..*self }, laws.fresh());
+            if trial.all_derivatives(&all, &mut again).is_ok() && again.hold() {
+                (verdict, found) = (Ok(()), again);
+            }
+        }
+        laws.merge(found);
+        verdict?;
+        self.conserved(&all, laws)
     }
 
     /// The derivatives of the functions of sites and bonds, and of the totals.
-    fn all_derivatives(&self, all: &Differentials) -> Result<(), LatticeError> {
+    fn all_derivatives(&self, all: &Differentials, laws: &mut Laws) -> Result<(), LatticeError> {
         let [sites, bonds] = [self.lattice.sites(), self.lattice.layout.bonds().len()];
-        self.derivatives_of((samples(sites), samples(bonds)))?;
-        self.total_derivatives(all)
+        self.derivatives_of((samples(sites), samples(bonds)), laws)?;
+        self.total_derivatives(all, laws)
     }
 
     /// The derivatives of the functions of these sites and bonds.
     pub(crate) fn derivatives_of(
         &self,
         (sites, bonds): (impl Iterator<Item = usize> + Clone, impl Iterator<Item = usize> + Clone),
+        laws: &mut Laws,
     ) -> Result<(), LatticeError> {
         let lattice = self.lattice;
         for site in sites.clone() {
-            self.derivatives(site)?;
+            self.derivatives(site, laws)?;
         }
         if P::BOND_ENERGY {
             for bond in bonds.clone() {
-                self.bond_derivative(bond)?;
+                self.bond_derivative(bond, laws)?;
             }
         }
         let gathers = lattice.parts.gathers();
-        self.gathered_derivatives("energy", &gathers.energy, (sites.clone(), bonds.clone()))?;
-        self.gathered_derivatives("entropy", &gathers.entropy, (sites, bonds))
+        let places = (sites.clone(), bonds.clone());
+        self.gathered_derivatives(ENERGY, &gathers.energy, places, laws)?;
+        self.gathered_derivatives(ENTROPY, &gathers.entropy, (sites, bonds), laws)
     }
 
     /// The sizes of the entries at a site.
@@ -326,11 +458,17 @@ impl<P: Model> Trial<'_, P> {
     }
 
     /// The bracket of a site.
-    fn site(&self, site: usize, [w, s]: &[VectorOf<P>; 2]) -> Result<(), LatticeError> {
+    fn site(
+        &self,
+        site: usize,
+        [w, s]: &[VectorOf<P>; 2],
+        laws: &mut Laws,
+    ) -> Result<(), LatticeError> {
         let (parts, x, place) = (&self.lattice.parts, &self.y[site], Place::Site(site));
         let tried = self.tried;
-        let cancels =
-            |law, rest_and_terms, remedy| cancels(law, (place, tried), rest_and_terms, remedy);
+        let mut cancels = |law, rest_and_terms, remedy| {
+            cancels((law, remedy), (place, tried), rest_and_terms, laws)
+        };
         let mut next = self.random.at(At::Covector(self.lattice.layout.first_site() + site));
         let mut varied = || VectorOf::<P>::from_index(|k| w[k] * (1.0 + next()));
         for _ in 0..2 {
@@ -349,7 +487,7 @@ impl<P: Model> Trial<'_, P> {
     }
 
     /// The derivatives of the functions of a site.
-    fn derivatives(&self, site: usize) -> Result<(), LatticeError> {
+    fn derivatives(&self, site: usize, laws: &mut Laws) -> Result<(), LatticeError> {
         let (parts, x) = (&self.lattice.parts, &self.y[site]);
         let u = self.along(site);
         let moved = |t: f64| P::Manifold::chart(x, &(u * t));
@@ -357,18 +495,19 @@ impl<P: Model> Trial<'_, P> {
         let energy = parts.energy(site, x);
         let size = energy.value.abs().max(self.mean[0]);
         let slope = Slope::of(&energy.df, &u);
-        quotient("energy", (place, tried), size, slope, |t| parts.values(site, &moved(t))[0])?;
+        let at = (place, tried);
+        quotient(ENERGY, at, (size, slope), |t| parts.values(site, &moved(t))[0], laws)?;
         if P::ENTROPY {
             let entropy = parts.entropy(site, x);
             let size = entropy.value.abs().max(self.mean[1]);
             let slope = Slope::of(&entropy.df, &u);
-            quotient("entropy", (place, tried), size, slope, |t| parts.values(site, &moved(t))[1])?;
+            quotient(ENTROPY, at, (size, slope), |t| parts.values(site, &moved(t))[1], laws)?;
         }
         for k in 0..P::SUMS {
             let sum = parts.sum(k, site, x);
             let slope = Slope::of(&sum.df, &u);
             let value = |t| parts.sum(k, site, &moved(t)).value;
-            quotient("conserved sum", (place, tried), sum.value, slope, value)?;
+            quotient(SUM, at, (sum.value, slope), value, laws)?;
         }
         Ok(())
     }
@@ -387,7 +526,7 @@ impl<P: Model> Trial<'_, P> {
         self.random.vector(place, &Column::from_index(|k| sizes[k / n][k % n]))
     }
 
-    fn bond_derivative(&self, bond: usize) -> Result<(), LatticeError> {
+    fn bond_derivative(&self, bond: usize, laws: &mut Laws) -> Result<(), LatticeError> {
         let lattice = self.lattice;
         let x = lattice.pair(self.y, bond);
         let u = self.random_along(bond);
@@ -395,11 +534,11 @@ impl<P: Model> Trial<'_, P> {
             |t: f64| lattice.parts.bond_value(bond, &PairManifold::<P>::chart(&x, &(u * t)));
         let jet = lattice.parts.bond_energy(bond, &x);
         let (size, at) = (jet.value.abs().max(self.mean[0]), (lattice.place_of(bond), self.tried));
-        quotient("energy", at, size, Slope::of(&jet.df, &u), value)
+        quotient(ENERGY, at, (size, Slope::of(&jet.df, &u)), value, laws)
     }
 
     /// The derivative of the totals along one random direction.
-    fn total_derivatives(&self, all: &Differentials) -> Result<(), LatticeError> {
+    fn total_derivatives(&self, all: &Differentials, laws: &mut Laws) -> Result<(), LatticeError> {
         let Self { lattice, y, .. } = *self;
         let u: Vec<VectorOf<P>> = (0..lattice.sites()).map(|site| self.along(site)).collect();
         let moved = |t: f64| {
@@ -416,12 +555,15 @@ impl<P: Model> Trial<'_, P> {
             }
         }
         let between = |ends: [Total; 2]| move |t: f64| ends[usize::from(t < 0.0)].sum.value();
-        quotient("energy", at, h0.size, slopes[0], between([h1, h0]))?;
-        quotient("entropy", at, s0.size, slopes[1], between([s1, s0]))
+        quotient(ENERGY, at, (h0.size, slopes[0]), between([h1, h0]), laws)?;
+        if !P::ENTROPY {
+            return Ok(());
+        }
+        quotient(ENTROPY, at, (s0.size, slopes[1]), between([s1, s0]), laws)
     }
 
     /// The rates of the conserved sums.
-    fn conserved(&self, all: &Differentials) -> Result<(), LatticeError> {
+    fn conserved(&self, all: &Differentials, laws: &mut Laws) -> Result<(), LatticeError> {
         let Self { lattice, y, .. } = *self;
         let Some((v, _)) = lattice.motion_along::<true>(y, all) else { return Ok(()) };
         for index in 0..P::SUMS {
@@ -431,14 +573,20 @@ impl<P: Model> Trial<'_, P> {
                 let next = Slope::of(&df, &v.reader().at(site));
                 rate = Slope { sum: rate.sum + next.sum, terms: rate.terms + next.terms };
             }
-            if rate.sum.abs() > CANCELS * rate.terms {
-                let size = rate.sum.abs() / rate.terms;
-                return Err(LatticeError::NotConserved { index, size });
-            }
+            let is_broken = rate.sum.abs() > CANCELS * rate.terms;
+            // 0/0 = 0: a sum that nothing changes is kept.
+            let size = if rate.sum == 0.0 { 0.0 } else { rate.sum.abs() / rate.terms };
+            let found = || LatticeLaw::new("⟨dL, x'⟩ = 0", [size, CANCELS], Place::Total);
+            laws.note(found, !is_broken, || LatticeError::NotConserved { index, size })?;
         }
         Ok(())
     }
 }
+
+/// The functions whose derivatives are compared with their values, and the laws of these.
+const ENERGY: (&str, &str) = ("energy", "⟨dH, u⟩ = ΔH");
+const ENTROPY: (&str, &str) = ("entropy", "⟨dS, u⟩ = ΔS");
+const SUM: (&str, &str) = ("conserved sum", "⟨dL, u⟩ = ΔL");
 
 const CASIMIR: &str = "; the entropy of a site must be a Casimir of its bracket";
 const GATHERED_CASIMIR: &str = "; the entropy of a site and what it gathers must not depend on what the bracket moves; \
@@ -452,17 +600,24 @@ const GATHERED_CASIMIR: &str = "; the entropy of a site and what it gathers must
 ///
 /// [`LatticeError::Broken`].
 pub(crate) fn cancels(
-    law: &'static str,
+    (law, remedy): (&'static str, &'static str),
     (place, tried): (Place, Tried),
     [rest, terms]: [f64; 2],
-    remedy: &'static str,
+    laws: &mut Laws,
 ) -> Result<(), LatticeError> {
     let bound = if tried == Tried::Reached { 10.0 * CANCELS } else { CANCELS };
-    if rest.abs() <= bound * terms || terms < f64::MIN_POSITIVE / f64::EPSILON {
-        return Ok(());
-    }
-    let (size, entries) = (rest.abs() / terms, Vec::new());
-    Err(LatticeError::Broken { law, place, tried, size, entries, remedy })
+    let has_digits = terms >= f64::MIN_POSITIVE / f64::EPSILON;
+    let holds = rest.abs() <= bound * terms || !has_digits;
+    let size = || if has_digits { rest.abs() / terms } else { 0.0 };
+    let found = || LatticeLaw::new(law, [size(), bound], place);
+    laws.note(found, holds, || LatticeError::Broken {
+        law,
+        place,
+        tried,
+        size: size(),
+        entries: Vec::new(),
+        remedy,
+    })
 }
 
 /// A derivative along a direction, and the sizes of its terms.
@@ -483,11 +638,11 @@ impl Slope {
 /// A state that a run has reached may be one where values are the round-off of larger terms, as between sites at rest. Such
 /// differences are no derivative of anything: over another distance they have another quotient.
 fn quotient(
-    what: &'static str,
+    (what, law): (&'static str, &'static str),
     (place, tried): (Place, Tried),
-    size: f64,
-    slope: Slope,
+    (size, slope): (f64, Slope),
     value: impl Fn(f64) -> f64,
+    laws: &mut Laws,
 ) -> Result<(), LatticeError> {
     let over = |step: f64| [value(step), value(-step)];
     let [after, before] = over(STEP);
@@ -495,16 +650,20 @@ fn quotient(
     let round_off = 16.0 * f64::EPSILON * size.abs().max(after.abs()) / STEP;
     // The quotient is as large as the terms unless it is round-off, or a derivative is missing.
     let terms = slope.terms.max(quotient.abs());
-    if (quotient - slope.sum).abs() <= QUOTIENT * terms + round_off || !quotient.is_finite() {
-        return Ok(());
-    }
-    if tried == Tried::Reached {
+    let off = (quotient - slope.sum).abs();
+    let mut holds = off <= QUOTIENT * terms + round_off || !quotient.is_finite();
+    if !holds && tried == Tried::Reached {
         let [after, before] = over(FAR_STEP);
         let [near, far] = [quotient, (after - before) / (2.0 * FAR_STEP)].map(|q| q - slope.sum);
         // A jump of the derivative on the way is no wrong one.
-        if (near - far).abs() > SAME * near.abs() || !far.is_finite() {
-            return Ok(());
-        }
+        holds = (near - far).abs() > SAME * near.abs() || !far.is_finite();
     }
-    Err(LatticeError::WrongDerivative { what, place, derivative: slope.sum, quotient })
+    let found = || {
+        // 0/0 = 0, and a value that is none nearby decides nothing.
+        let decides = off > 0.0 && quotient.is_finite();
+        let sizes = [off, QUOTIENT * terms + round_off].map(|size| size / terms);
+        LatticeLaw::new(law, if decides { sizes } else { [0.0, QUOTIENT] }, place)
+    };
+    let derivative = slope.sum;
+    laws.note(found, holds, || LatticeError::WrongDerivative { what, place, derivative, quotient })
 }

@@ -168,7 +168,11 @@ impl<P: Model> Flow for OpenLattice<P> {
     }
 
     fn examine(&self, x0: &StateOf<P>) -> Result<(), FlowError> {
-        self.lattice.examine(&x0.x)
+        self.lattice.examine_start(&x0.x, self.is_verified())
+    }
+
+    fn is_verified(&self) -> bool {
+        self.verified || self.lattice.is_verified()
     }
 
     fn rechecks(&self, occasion: Recheck) -> bool {

@@ -8,8 +8,10 @@ use metriplectic_manifolds::Manifold;
 
 use super::parts::{AtSite, Part};
 use super::{OpenLattice, StateOf};
+use crate::error::{LatticeError, Place};
 use crate::lattice::{Differentials, differentials_at};
 use crate::model::{Model, VectorOf};
+use crate::report::{LatticeLaw, LatticeReport, Laws};
 
 /// The slope of a law along a velocity, relative to its terms, that is no round-off.
 const BROKEN: f64 = 1e-8;
@@ -46,31 +48,97 @@ impl Slope {
 }
 
 impl<P: Model> OpenLattice<P> {
+    /// Verifies the lattice at a state, as [`Lattice::verify`](crate::Lattice::verify) does, and its ports and baths at the
+    /// time of that state. Every run verifies its start.
+    ///
+    /// # Errors
+    ///
+    /// The first [`LatticeError`]: that of a site or a bond, or [`LatticeError::Surroundings`] with the port or the bath.
+    pub fn verify(&self, x0: &StateOf<P>) -> Result<(), LatticeError> {
+        self.lattice.verify(&x0.x)?;
+        self.verify_parts(x0)
+    }
+
+    /// Lists every law that [`verify`](Self::verify) tries, with the site or the bond where it is worst, and the port or the
+    /// bath. Read it when a new lattice misbehaves.
+    pub fn report(&self, x0: &StateOf<P>) -> LatticeReport {
+        let report = self.lattice.report(&x0.x);
+        let mut laws = Laws::of(report.laws);
+        // The ports and baths have no state to be tried at, unless the lattice has.
+        let verdict = match report.verdict {
+            Err(law) if laws.is_empty() => Err(law),
+            verdict => {
+                // A part without values ends it, and is in the verdict.
+                let _ = self.judge_parts(x0, &mut laws);
+                verdict.and_then(|()| self.verify_parts(x0))
+            }
+        };
+        LatticeReport { laws: laws.into_list(), verdict, ..report }
+    }
+
+    /// Verifies the lattice with its ports and baths at a state, and returns it with this certificate, which a further port
+    /// or bath takes away. A run of it, from any start, checks the laws at that start alone, as that of a
+    /// [verified](crate::Lattice::verified) lattice does. Use it for a study of many runs.
+    ///
+    /// # Errors
+    ///
+    /// The errors of [`verify`](Self::verify).
+    pub fn verified(self, x0: &StateOf<P>) -> Result<Self, LatticeError> {
+        self.verify(x0)?;
+        Ok(Self { verified: true, ..self })
+    }
+
+    fn verify_parts(&self, x0: &StateOf<P>) -> Result<(), LatticeError> {
+        self.look_at_parts(x0).map_err(|law| LatticeError::Surroundings(Box::new(law)))
+    }
+
     /// Checks at a state that sites exist, that ports carry no entropy, that ports and baths keep the conserved sums, that no
     /// temperature is negative, and that no friction has a negative rate.
     pub(super) fn look_at_parts(&self, state: &StateOf<P>) -> Result<(), ModelError> {
-        if self.parts.is_empty() {
+        self.judge_parts(state, &mut Laws::first())
+    }
+
+    /// Looks at the laws of all ports and baths.
+    ///
+    /// # Errors
+    ///
+    /// The first law that is broken; if `laws` are listed, a part without values.
+    fn judge_parts(&self, state: &StateOf<P>, laws: &mut Laws) -> Result<(), ModelError> {
+        // A state with too few points is refused by the lattice.
+        if self.parts.is_empty() || state.x.len() != self.lattice.sites() {
             return Ok(());
         }
         let (all, _) = self.lattice.differentials::<false>(&state.x);
-        self.parts.iter().try_for_each(|part| self.look_at_part(part, state, &all))
+        self.parts.iter().try_for_each(|part| self.judge_part(part, state, &all, laws))
     }
 
-    fn look_at_part(
+    fn judge_part(
         &self,
         part: &Part<P>,
         state: &StateOf<P>,
         all: &Differentials,
+        laws: &mut Laws,
     ) -> Result<(), ModelError> {
         let time = state.time;
+        let found = |law, sizes, place| LatticeLaw {
+            part: Some(Arc::clone(&part.name)),
+            ..LatticeLaw::new(law, sizes, place)
+        };
         let entries = |site: usize| P::Manifold::entries(&state.x[site]);
         let named = |site: usize| -> Arc<str> { format!("{} at site {site}", part.name).into() };
         let temperature = part.temperature(time);
-        if let Some(temperature) = temperature
-            && !(temperature >= 0.0 && temperature.is_finite())
-        {
-            let bath = Arc::clone(&part.name);
-            return Err(ModelError::BathNotPositive { bath, temperature, time });
+        if let Some(temperature) = temperature {
+            let holds = temperature >= 0.0 && temperature.is_finite();
+            let below = if temperature.is_finite() { (-temperature).max(0.0) } else { f64::NAN };
+            let place = part.sites.first().map_or(Place::Total, |&site| Place::Site(site));
+            laws.note(
+                || found("T ≥ 0", [below, 0.0], place),
+                holds,
+                || {
+                    let bath = Arc::clone(&part.name);
+                    ModelError::BathNotPositive { bath, temperature, time }
+                },
+            )?;
         }
         let mut sums = vec![Slope::default(); P::SUMS];
         for &site in &part.sites {
@@ -82,32 +150,43 @@ impl<P: Model> OpenLattice<P> {
             let [w, s] = differentials_at::<P>(all, site);
             let AtSite { v, least_rate, .. } =
                 part.at_site((time, temperature.unwrap_or(0.0)), site, x, [&w, &s]);
-            if least_rate < 0.0 || least_rate.is_nan() {
-                let (bath, rate) = (named(site), least_rate);
-                return Err(ModelError::FrictionNotPositive { bath, rate, time });
+            let place = Place::Site(site);
+            if temperature.is_some() {
+                let below = if least_rate.is_nan() { least_rate } else { (-least_rate).max(0.0) };
+                let (rates, holds) =
+                    (|| found("ρ ≥ 0 of baths", [below, 0.0], place), below == 0.0);
+                laws.note(rates, holds, || {
+                    let (bath, rate) = (named(site), least_rate);
+                    ModelError::FrictionNotPositive { bath, rate, time }
+                })?;
             }
             if !v.is_finite() {
                 let (part, point) = (named(site), entries(site));
                 return Err(ModelError::ExchangeNotFinite { part, time, point });
             }
-            let mut carried = Slope::default();
-            carried.add::<P::Manifold>(&s, &v);
-            let size = carried.size();
-            if temperature.is_none() && size > BROKEN {
-                let (port, point) = (named(site), entries(site));
-                return Err(ModelError::WorkCarriesEntropy { port, time, point, size });
+            if temperature.is_none() {
+                let mut carried = Slope::default();
+                carried.add::<P::Manifold>(&s, &v);
+                let size = carried.size();
+                let work = || found("⟨dS, F⟩ = 0", [size, BROKEN], place);
+                laws.note(work, size <= BROKEN || size.is_nan(), || {
+                    let (port, point) = (named(site), entries(site));
+                    ModelError::WorkCarriesEntropy { port, time, point, size }
+                })?;
             }
             for (k, sum) in sums.iter_mut().enumerate() {
                 let law: VectorOf<P> = self.lattice.parts.sum(k, site, x).df;
                 sum.add::<P::Manifold>(&law, &v);
             }
         }
-        match sums.iter().position(|sum| sum.size() > BROKEN) {
-            Some(index) => {
-                let (part, size, point) = (Arc::clone(&part.name), sums[index].size(), Vec::new());
-                Err(ModelError::PortBreaksInvariant { part, index, time, point, size })
-            }
-            None => Ok(()),
+        for (index, sum) in sums.into_iter().enumerate() {
+            let size = sum.size();
+            let kept = || found("⟨dL, F⟩ = 0", [size, BROKEN], Place::Total);
+            laws.note(kept, size <= BROKEN || size.is_nan(), || {
+                let (part, point) = (Arc::clone(&part.name), Vec::new());
+                ModelError::PortBreaksInvariant { part, index, time, point, size }
+            })?;
         }
+        Ok(())
     }
 }

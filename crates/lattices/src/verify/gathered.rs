@@ -9,6 +9,7 @@ use crate::lattice::Lattice;
 use crate::model::{Model, PairManifold};
 use crate::parallel;
 use crate::points::Points;
+use crate::report::Laws;
 
 impl<P: Model> Lattice<P> {
     /// Looks for values and derivatives of `φ` and `g` that are no numbers.
@@ -44,9 +45,10 @@ impl<P: Model> Trial<'_, P> {
     /// Compares the derivatives of `φ` at these bonds, and those of `g` at these sites, with differences of values.
     pub(super) fn gathered_derivatives<G: Gather<P::Manifold>>(
         &self,
-        what: &'static str,
+        of: (&'static str, &'static str),
         gather: &G,
         (sites, bonds): (impl Iterator<Item = usize>, impl Iterator<Item = usize>),
+        laws: &mut Laws,
     ) -> Result<(), LatticeError> {
         if !G::PRESENT {
             return Ok(());
@@ -59,7 +61,7 @@ impl<P: Model> Trial<'_, P> {
             let moved = |t: f64| PairManifold::<P>::chart(&x, &(u * t));
             let phi = gather.weight(&x);
             let (slope, at) = (Slope::of(&phi.df, &u), (lattice.place_of(bond), self.tried));
-            quotient(what, at, phi.value, slope, |t| gather.weight(&moved(t)).value)?;
+            quotient(of, at, (phi.value, slope), |t| gather.weight(&moved(t)).value, laws)?;
         }
         for site in sites {
             let (x, rho) = (&self.y[site], sums[2 * site]);
@@ -68,10 +70,10 @@ impl<P: Model> Trial<'_, P> {
             let moved = |t: f64| P::Manifold::chart(x, &(u * t));
             let g = gather.embedded(x, rho);
             let value = |t| gather.embedded(&moved(t), rho).jet.value;
-            quotient(what, at, g.jet.value, Slope::of(&g.jet.df, &u), value)?;
+            quotient(of, at, (g.jet.value, Slope::of(&g.jet.df, &u)), value, laws)?;
             let sum = g.along_rho * rho;
             let value = |t: f64| gather.embedded(x, rho * (1.0 + t)).jet.value;
-            quotient(what, at, g.jet.value, Slope { sum, terms: sum.abs() }, value)?;
+            quotient(of, at, (g.jet.value, Slope { sum, terms: sum.abs() }), value, laws)?;
         }
         Ok(())
     }

@@ -14,7 +14,7 @@ use crate::parallel;
 use crate::points::Points;
 use crate::random::{Random, Use};
 use crate::report::Laws;
-use crate::verify::{MOVED, NEARER, Sizes, Trial, cancels, golden, samples};
+use crate::verify::{MOVED, NEARER, Sizes, Trial, cancels, casimir_remedy, golden, samples};
 
 /// The entropy that a negative rate destroys, relative to all production, that is round-off.
 const DESTROYED: f64 = 1e-8;
@@ -149,7 +149,8 @@ impl<P: Model> Lattice<P> {
             let [w, s] = differentials_at::<P>(all, site);
             let v = self.parts.reversible(&x[site], &w, &s);
             let rest_and_terms = [s.dot(&v), s.abs().dot(&v.abs())];
-            let law = ("Π dS = 0", "");
+            let remedy = if tried == Tried::Start { casimir_remedy::<P>() } else { "" };
+            let law = ("Π dS = 0", remedy);
             cancels(law, (Place::Site(site), tried), rest_and_terms, &mut Laws::first())
         };
         let sites = parallel::map(self.sites(), |mut sites| {

@@ -29,9 +29,9 @@ parameters in its builder             | promises   | promises  | E0599        | 
 `Fit`                                 | fit        | fit       | E0599        | E0599     | E0599      | E0599    | E0599        | E0599         | E0277 E0599  | E0277 E0599
 `Loss`                                | loss       | loss      | E0599        | E0599     | E0599      | E0599    | E0599        | E0599         | E0277 E0599  | E0277 E0599
 
-`verified`                            | verified   | member    | surroundings | its noise | its noise  | E0599    | E0599        | E0599         | by numbers   | by numbers
-`verify`                              | verify     | member    | surroundings | its noise | its noise  | sites    | closed part  | closed ring   | by numbers   | by numbers
-`report`                              | report     | columns   | surroundings | its noise | its noise  | E0599    | E0599        | E0599         | by numbers   | by numbers
+`verified`                            | verified   | member    | surroundings | its noise | its noise  | sites    | sites open   | its ring      | by numbers   | by numbers
+`verify`                              | verify     | member    | surroundings | its noise | its noise  | sites    | sites open   | its ring      | by numbers   | by numbers
+`report`                              | report     | columns   | surroundings | its noise | its noise  | sites    | sites open   | its ring      | by numbers   | by numbers
 
 thermal noise in its builder          | promises   | E0599     | books        | –         | –          | ring     | E0599        | –             | E0277        | E0277
 an energy that depends on time        | promises   | E0599     | –            | books     | books      | E0599    | E0599        | E0599         | E0599        | E0599
@@ -85,9 +85,6 @@ const fn refused(
     Reference { name, file, test, limit: Limit::Refused(sentence) }
 }
 
-const CLOSED_PART: &str = "of its closed part, by `lattice().verify(..)` or `flow().verify(..)`; the other parts are judged when it \
-                           runs";
-
 const PROMISES: [&str; 2] =
     ["tests/promises/main.rs", "every_method_is_right_on_every_kind_of_flow_or_says_why_not"];
 
@@ -133,18 +130,18 @@ pub(crate) const TESTS: &[Reference] = &[
     ),
     right(
         "sites",
-        "tests/lattice_errors.rs",
-        "friction_that_breaks_a_law_is_refused_with_its_bond",
+        "tests/lattice_verification.rs",
+        "a_lattice_is_verified_once_and_its_report_lists_every_law",
     ),
-    partly(
-        "closed part",
-        ["tests/open_lattices.rs", "surroundings_of_a_lattice_that_break_a_law_are_refused"],
-        CLOSED_PART,
+    right(
+        "sites open",
+        "tests/lattice_verification.rs",
+        "an_open_lattice_is_verified_once_and_its_report_lists_its_surroundings",
     ),
-    partly(
-        "closed ring",
-        ["tests/noise/lattice.rs", "a_path_of_a_ring_is_that_of_every_method"],
-        CLOSED_PART,
+    right(
+        "its ring",
+        "tests/lattice_verification.rs",
+        "a_lattice_with_noise_is_verified_once_with_the_law_of_its_noise",
     ),
     right("frozen", "tests/noise/lattice.rs", "a_path_of_a_ring_is_that_of_every_method"),
     right(

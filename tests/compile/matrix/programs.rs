@@ -203,9 +203,8 @@ fn verb(kind: Kind, name: &str) -> String {
             format!("let v = s.verified(&x)?;\n    let _ = {dp8}.run(&v, x.clone(), {STEPS})?;")
         }
         "`verify`" => match kind {
-            Lattice => "let _ = s.verify(&x);",
-            OpenLattice => "let _ = s.lattice().verify(&x.x);",
-            NoisyLattice => "let _ = s.flow().verify(&x);",
+            Lattice | OpenLattice => "let _ = s.verify(&x);",
+            NoisyLattice => "let _ = s.verify(&x, 0.01);",
             _ => "let _ = s.verify(&x, 0.1);",
         }
         .to_owned(),

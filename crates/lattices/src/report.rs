@@ -39,8 +39,7 @@ impl LatticeLaw {
         }
         // Violations of 0 that allow nothing are as good as each other.
         let part = |law: &Self| if law.size > 0.0 { law.size / law.allowed } else { 0.0 };
-        let [here, there] = [part(self), part(other)];
-        here > there || (here == there && self.size > other.size)
+        (part(self), self.size) > (part(other), other.size)
     }
 }
 
@@ -86,7 +85,7 @@ impl fmt::Display for LatticeReport {
     }
 }
 
-/// What becomes of the laws that are looked at: the first one that is broken is an error, or all are listed.
+/// A listener to the laws that are looked at: the first one that is broken is an error, or all are listed.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Laws(Option<Vec<LatticeLaw>>);
 
@@ -106,7 +105,7 @@ impl Laws {
         Self(Some(laws))
     }
 
-    /// What does the same, and has seen nothing yet.
+    /// A listener of the same kind that has seen nothing yet.
     pub(crate) fn fresh(&self) -> Self {
         Self(self.0.as_ref().map(|_| Vec::new()))
     }

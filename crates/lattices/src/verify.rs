@@ -590,7 +590,7 @@ const CASIMIR: &str = "; the entropy of a site must be a Casimir of its bracket"
 const GATHERED_CASIMIR: &str = "; the entropy of a site and what it gathers must not depend on what the bracket moves; \
      gather such a density in the energy, by `.gather(..)`, and take the entropy of each site as a variable";
 
-/// What to do where `Π dS = 0` is broken.
+/// The remedy where `Π dS = 0` is broken.
 pub(crate) const fn casimir_remedy<P: Model>() -> &'static str {
     if P::EntropyGather::PRESENT { GATHERED_CASIMIR } else { CASIMIR }
 }

@@ -247,7 +247,9 @@ impl<P: Model> Judged for Lattice<P> {
     type Broken = LatticeError;
     type Report = LatticeReport;
 
-    const RADIUS: f64 = MOVED;
+    fn radius() -> f64 {
+        MOVED
+    }
 
     fn verify_model(&self, x: &Points<P::Manifold>, radius: f64) -> Result<(), LatticeError> {
         self.judge(x, radius, &mut Laws::first())

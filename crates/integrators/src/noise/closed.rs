@@ -75,7 +75,9 @@ impl<Y: Metriplectic> Judged for Y {
     type Broken = ModelError;
     type Report = Report;
 
-    const RADIUS: f64 = RADIUS;
+    fn radius() -> f64 {
+        RADIUS
+    }
 
     fn verify_model(&self, x0: &Point<Y>, radius: f64) -> Result<(), ModelError> {
         self.verify(x0, radius)

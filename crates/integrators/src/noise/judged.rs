@@ -12,8 +12,8 @@ pub trait Judged: Flow {
     /// The list of the laws.
     type Report;
 
-    /// The radius of [`verify_model`](Self::verify_model) before a run.
-    const RADIUS: f64;
+    /// Returns the radius of [`verify_model`](Self::verify_model) before a run.
+    fn radius() -> f64;
 
     /// Checks the laws of the model at `x0` and at states around it, each coordinate within `radius` times its size there.
     ///

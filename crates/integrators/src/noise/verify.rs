@@ -61,7 +61,7 @@ impl<F: Judged + Fluctuating<U>, U> Noisy<F, U> {
     ///
     /// The errors of [`verify`](Self::verify).
     pub fn verified(self, x0: &Element<F>) -> Result<Self, NoisyError<F::Broken>> {
-        self.verify(x0, F::RADIUS)?;
+        self.verify(x0, F::radius())?;
         Ok(self.with_certificate())
     }
 }

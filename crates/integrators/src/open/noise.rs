@@ -334,7 +334,9 @@ where
     type Broken = ModelError;
     type Report = Report;
 
-    const RADIUS: f64 = RADIUS;
+    fn radius() -> f64 {
+        RADIUS
+    }
 
     fn verify_model(&self, x0: &StateOf<Y>, radius: f64) -> Result<(), ModelError> {
         self.verify(x0, radius)

@@ -139,11 +139,16 @@ impl<F: Fluctuating<U>, U> Flow for Noisy<F, U> {
         self.flow().recheck(x, occasion)
     }
 
-    /// Conditions of the law may hold at the start alone, so they are judged at the end of the run too.
+    /// Judges the conditions of the law, which may hold at the start alone.
+    fn examine_end(&self, x: &Element<F>) -> Result<(), FlowError> {
+        self.flow().examine_noise(x, self.noise()).map_err(FlowError::new)
+    }
+
+    /// Judges the conditions of the law at the end of the run too.
     fn reexamine(&self, x: &Element<F>, occasion: Recheck) -> Result<(), FlowError> {
         self.flow().reexamine(x, occasion)?;
         match occasion {
-            Recheck::End => self.flow().examine_noise(x, self.noise()).map_err(FlowError::new),
+            Recheck::End => self.examine_end(x),
             Recheck::OnTheWay { .. } | Recheck::Failure { .. } => Ok(()),
         }
     }

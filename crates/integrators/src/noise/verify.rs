@@ -72,7 +72,7 @@ mod tests {
     use crate::noise::{Noise, NoiseBuilder as _, RandomFlow};
     use crate::open::OpenBuilder as _;
     use crate::step::Flow;
-    use crate::{DormandPrince5, Error, Method as _, RunError, Span, Trajectory};
+    use crate::{DormandPrince5, Error, Method as _, RunError, Span, StepError, Trajectory};
     use metriplectic_dynamics::noise::Uniform;
     use metriplectic_dynamics::{
         Bath, Boltzmann, ModelError, Poisson, Symplectic, System, Verify as _, Zero,
@@ -289,6 +289,24 @@ mod tests {
         let open = open.verified(&sound).unwrap();
         assert!(run(&open, &edge).unwrap().certificate().verified_before);
         assert!(matches!(run(&open, &broken), Err(RunError::Model(_))));
+    }
+
+    #[test]
+    fn the_law_of_the_noise_is_judged_at_the_end_of_each_run() {
+        // Friction drives it away from the third axis, to y = 2.4.
+        let start = vector![0.8, 1.5, -2.0];
+        let refused = |run: Result<Trajectory<Euclidean<3>>, RunError<Euclidean<3>>>| match run {
+            Err(RunError::Step { cause: StepError::Flow { time, law }, .. }) => {
+                assert!(
+                    time > 0.05
+                        && matches!(law.downcast_ref(), Some(NoiseError::NotUnimodular { .. }))
+                );
+            }
+            other => panic!("{:?}", other.map(|run| run.certificate().to_string())),
+        };
+        let (method, span) = (RandomFlow(DormandPrince5).seed(1), Span::steps(0.02, 4));
+        refused(method.run(&bent!(sloping), start, span));
+        refused(method.run(&bent!(sloping).verified(&start).unwrap(), start, span));
     }
 
     #[test]

@@ -166,7 +166,7 @@ fn run_compiled(
 }
 
 /// The outcome of a run, or the panic in it as its error.
-fn without_panics(run: impl FnOnce() -> Outcome) -> Outcome {
+pub(super) fn without_panics(run: impl FnOnce() -> Outcome) -> Outcome {
     caught(run).unwrap_or_else(|panicked| Err(FlowError::new(panicked).into()))
 }
 

@@ -51,7 +51,12 @@ impl<F: Flow + ?Sized> Course<'_, F> {
         let counted = due && self.flow.rechecks(on_the_way);
         self.certificate.checked_states =
             checked_states(self.flow, step) + usize::from(over && !counted);
-        let verdict = self.verdict(occasion);
+        let mut verdict = self.verdict(occasion);
+        if over && !all && verdict.is_ok() {
+            let time = self.state.time;
+            let ended = self.flow.examine_end(&self.state.point);
+            verdict = ended.map_err(|law| StepError::Flow { time, law });
+        }
         if verdict.is_err() {
             self.progress.ending = None;
         }

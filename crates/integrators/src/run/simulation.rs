@@ -5,14 +5,14 @@ use std::fmt;
 use metriplectic_dynamics::ModelError;
 
 use crate::run::error::RunError;
-use crate::run::plain::{Outcome, WholeInNumbers};
+use crate::run::plain::{Outcome, WholeInNumbers, without_panics};
 use crate::run::schedule::Schedule;
 use crate::run::trajectory::Trajectory;
 use crate::step::{PlainNumbers, Stepper, Written};
 
-/// A system of any kind with a method of it: a type that a struct can name, whatever the closures are.
+/// A system with a method of it: a type that a struct can name, whatever the closures are.
 ///
-/// It has closed systems, members of families, open systems, systems with noise, and
+/// It has all kinds but lattices: closed systems, members of families, open systems, systems with noise, and
 /// [your own](crate::FromEquations), with every method that runs them. States are [`Entries`](crate::Entries), slices of numbers in the order
 /// in which a point is written. Those of an open system have the time and the entries of its ledger after the point; a start may
 /// leave them out. The functions of events and of [observables](crate::Observables) take `&Entries` then. The run is that of
@@ -73,9 +73,12 @@ impl Simulation {
     {
         let name = method.name();
         let run = move |start: &[f64], schedule| {
-            let x0 = system.at_start(start).map_err(ModelError::Start)?;
-            let method = method.clone();
-            system.visit(WholeInNumbers { method, x0, schedule })
+            let run = || {
+                let x0 = system.at_start(start).map_err(ModelError::Start)?;
+                let method = method.clone();
+                system.visit(WholeInNumbers { method, x0, schedule })
+            };
+            if const { F::CATCHES_PANICS } { without_panics(run) } else { run() }
         };
         Self { method: name, run: Box::new(run) }
     }
@@ -205,6 +208,35 @@ mod tests {
         fn velocity(&self, t: f64, x: &[f64], v: &mut [f64]) -> Option<f64> {
             InNumbers(&self.0).velocity(t, x, v)
         }
+    }
+
+    #[test]
+    fn a_panic_in_a_system_is_an_error_of_its_run() {
+        /// A system that panics where its start is checked.
+        struct Panics;
+
+        impl Equations for Panics {
+            fn sizes(&self) -> metriplectic_equations::Sizes {
+                metriplectic_equations::Sizes { entries: 1, directions: 1, laws: 2 }
+            }
+
+            fn values(&self, _: f64, _: &[f64], _: &mut [f64]) {}
+
+            fn differentials(&self, _: f64, _: &[f64], _: &mut [f64], _: &mut [f64]) {}
+
+            fn velocity(&self, _: f64, _: &[f64], _: &mut [f64]) -> Option<f64> {
+                None
+            }
+
+            fn check(&self, _: &[f64]) -> Result<(), PointError> {
+                panic!("it has no states")
+            }
+        }
+        let simulation = Simulation::new(DormandPrince8, FromEquations(Panics));
+        let Err(RunError::Flow(error)) = simulation.run(&[1.0], Span::steps(0.1, 1)) else {
+            panic!("it has no error of its own")
+        };
+        assert_eq!(error.to_string(), "it has panicked: it has no states");
     }
 
     #[test]

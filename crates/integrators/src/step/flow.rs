@@ -397,6 +397,16 @@ pub trait Flow {
         Ok(())
     }
 
+    /// Verifies at the end of the run of a system that was verified before it what may hold at some states alone.
+    ///
+    /// # Errors
+    ///
+    /// The flow's own error.
+    fn examine_end(&self, x: &Element<Self>) -> Result<(), FlowError> {
+        let _ = x;
+        Ok(())
+    }
+
     /// The part of a system at which a displacement from a state leads out of the domain, if the system has parts
     /// that are numbered, such as sites.
     fn site_outside(&self, x: &Element<Self>, d: &Self::Vector) -> Option<usize> {

@@ -179,6 +179,10 @@ impl<F: Written> Flow for InPlainNumbers<'_, F> {
         self.flow.reexamine(&self.at(x), occasion)
     }
 
+    fn examine_end(&self, x: &Entries) -> Result<(), FlowError> {
+        self.flow.examine_end(&self.at(x))
+    }
+
     fn site_outside(&self, x: &Entries, d: &Directions) -> Option<usize> {
         self.flow.site_outside(&self.at(x), &F::vector(d))
     }

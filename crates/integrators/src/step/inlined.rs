@@ -9,7 +9,7 @@ use super::{Flow, Stepper};
 /// pointer, so that a program compiles in less than half of the time:
 ///
 /// - those of explicit methods, if the system has no further invariants and its space is one of `Euclidean`, `LieDual` and `Chart` of
-///   2, 3, 4 or 6 variables, S², SO(3), S² × R and SO(3) × R³, or another product of as many directions and entries;
+///   2, 3, 4 or 6 variables, S², S³, SO(3), S² × R and SO(3) × R³, or another product of as many directions and entries;
 /// - those of `WeylMidpoint`, [`Gauss`](crate::Gauss) and [`Radau`](crate::Radau), if it has up to four variables on `Euclidean` or `LieDual`,
 ///   the canonical metric and no further invariants.
 ///

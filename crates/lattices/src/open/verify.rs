@@ -77,7 +77,7 @@ impl<P: Model> OpenLattice<P> {
     }
 
     /// Verifies the lattice with its ports and baths at a state, and returns it with this certificate, which a further port
-    /// or bath takes away. A run of it, from any start, checks the laws at that start alone, as that of a
+    /// or bath takes away, unless the lattice itself was verified. A run of it, from any start, checks the laws at that start alone, as that of a
     /// [verified](crate::Lattice::verified) lattice does. Use it for a study of many runs.
     ///
     /// # Errors

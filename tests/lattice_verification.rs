@@ -220,7 +220,7 @@ fn a_start_of_a_verified_lattice_is_judged_alone() {
     assert!(matches!(run(nan.into()), LatticeError::Start { place: Place::Site(3), .. }));
     let few = start(1.0)[1..].to_vec();
     assert_eq!(run(few.into()), LatticeError::Points { found: 9, expected: 10 });
-    // An energy that is none.
+    // An energy that is not finite.
     let mut cold = start(1.0).to_vec();
     cold[7].1.x = -1.0;
     assert!(matches!(run(cold.into()), LatticeError::NotFinite { place: Place::Site(7), .. }));

@@ -1,4 +1,4 @@
-//! Methods in plain numbers, compiled with this library: one instance for each number of directions.
+//! Methods in plain numbers, compiled with this library: one instance for each number of directions and entries.
 //!
 //! Each step is that of the same text as in the types of a system, and has its bits.
 

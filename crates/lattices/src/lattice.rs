@@ -42,7 +42,7 @@ pub struct Lattice<P> {
     sums: [Pool<f64>; 2],
     /// True once the differential of the entropy was seen to differ from site to site.
     entropy_differs: AtomicBool,
-    /// Whether its laws were verified before the run.
+    /// True once its laws were verified.
     pub(crate) verified: bool,
 }
 

@@ -68,7 +68,7 @@ pub use vector::OpenSiteVector;
 pub struct OpenLattice<P: Model> {
     lattice: Lattice<P>,
     parts: Vec<Part<P>>,
-    /// Whether its laws were verified before the run, with those of its parts.
+    /// True once its laws were verified, with those of its parts.
     verified: bool,
     /// A ledger without entries.
     empty: Ledger,

@@ -22,7 +22,7 @@ pub struct LatticeLaw {
     pub place: Place,
     /// The port or the bath whose law it is.
     pub part: Option<Arc<str>>,
-    /// Whether the law holds there, and so at all places that were tried.
+    /// True if the law holds there, and so at all places that were tried.
     pub holds: bool,
 }
 
@@ -32,7 +32,7 @@ impl LatticeLaw {
         Self { law, size, allowed, place, part: None, holds: true }
     }
 
-    /// Whether the law is worse here than at another place: broken, or nearer to it.
+    /// Returns whether the law is worse here than at another place: broken, or nearer to it.
     fn is_worse_than(&self, other: &Self) -> bool {
         if self.holds != other.holds {
             return other.holds;
@@ -57,7 +57,7 @@ impl fmt::Display for LatticeLaw {
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct LatticeReport {
-    /// The laws, in the order in which they are tried. There is none if the points or the values are none.
+    /// The laws, in the order in which they are tried. The list is empty where a point or a value is not finite.
     pub laws: Vec<LatticeLaw>,
     /// The sites and the bonds of the lattice. The friction was tried at all of them.
     pub size: [usize; 2],
@@ -143,12 +143,12 @@ impl Laws {
         self.0.iter_mut().for_each(|laws| laws.retain(|found| found.holds || found.law == law));
     }
 
-    /// Whether all laws that are listed hold.
+    /// Returns whether all laws that are listed hold.
     pub(crate) fn hold(&self) -> bool {
         self.0.iter().flatten().all(|law| law.holds)
     }
 
-    /// Whether nothing is listed.
+    /// Returns whether nothing is listed.
     pub(crate) fn is_empty(&self) -> bool {
         self.0.as_ref().is_none_or(Vec::is_empty)
     }

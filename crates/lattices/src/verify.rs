@@ -163,7 +163,7 @@ impl<P: Model> Lattice<P> {
         }
     }
 
-    /// Looks for points that are none.
+    /// Looks for points that are not on their manifold.
     fn verify_points(&self, x: &Points<P::Manifold>) -> Result<(), LatticeError> {
         let (found, expected) = (x.len(), self.sites());
         if found != expected {
@@ -669,7 +669,7 @@ fn quotient(
         holds = (near - far).abs() > SAME * near.abs() || !far.is_finite();
     }
     let found = || {
-        // 0/0 = 0, and a value that is none nearby decides nothing.
+        // 0/0 = 0, and a value nearby that is not finite decides nothing.
         let decides = off > 0.0 && quotient.is_finite();
         let sizes = [off, QUOTIENT * terms + round_off].map(|size| size / terms);
         LatticeLaw::new(law, if decides { sizes } else { [0.0, QUOTIENT] }, place)

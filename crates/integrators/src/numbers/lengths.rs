@@ -3,7 +3,7 @@
 use std::fmt::Debug;
 use std::ops::{Deref, DerefMut, IndexMut};
 
-use crate::step::{Directions, Entries, Few, PlainNumbers, StateSpace, Values, Vector, norm};
+use crate::step::{Directions, Entries, Few, StateSpace, Values, Vector, norm};
 
 /// A list of numbers.
 pub(crate) trait List: Clone + Debug {
@@ -164,8 +164,6 @@ fn at<const N: usize, const K: usize>(vectors: [&Array<N>; K], i: usize) -> [f64
 
 /// The lists of a flow.
 pub(crate) trait Lengths: Debug + 'static {
-    /// The space of its states.
-    type Space: StateSpace<Element = Self::State>;
     /// The entries of a state.
     type State: List;
     /// A number for each direction.
@@ -189,7 +187,6 @@ pub(crate) trait Lengths: Debug + 'static {
 pub struct AtRunTime;
 
 impl Lengths for AtRunTime {
-    type Space = PlainNumbers;
     type State = Entries;
     type Vector = Directions;
     type Invariants = Values;
@@ -221,7 +218,6 @@ impl<const E: usize> StateSpace for Arrays<E> {
 pub(crate) struct Known<const N: usize, const E: usize>;
 
 impl<const N: usize, const E: usize> Lengths for Known<N, E> {
-    type Space = Arrays<E>;
     type State = [f64; E];
     type Vector = Array<N>;
     type Invariants = [f64; 0];

@@ -107,7 +107,7 @@ pub(super) fn velocity_and_terms(
 /// A factor of four fails `system/reach.rs::the_start_of_a_large_system_costs_some_velocities`.
 const SMALL: usize = 8;
 
-/// Whether so many entries are few.
+/// Returns whether so many entries are few.
 pub(super) const fn is_small(entries: usize) -> bool {
     entries <= SMALL
 }

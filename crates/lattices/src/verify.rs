@@ -677,3 +677,18 @@ fn quotient(
     let derivative = slope.sum;
     laws.note(found, holds, || LatticeError::WrongDerivative { what, place, derivative, quotient })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn terms_that_are_no_number_cancel_nothing() {
+        let holds = |rest_and_terms| {
+            let at = (Place::Total, Tried::Start);
+            cancels(("Π dS = 0", ""), at, rest_and_terms, &mut Laws::first()).is_ok()
+        };
+        assert!(holds([1e-12, 1.0]) && holds([0.0, 0.0]));
+        assert!(!holds([1e-6, 1.0]) && !holds([f64::NAN, 1.0]) && !holds([0.0, f64::NAN]));
+    }
+}

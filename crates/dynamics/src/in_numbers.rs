@@ -488,6 +488,10 @@ impl<Y: Metriplectic + ?Sized> Model for InNumbers<'_, Y> {
         self.0.bracket().annihilates_entropy()
     }
 
+    fn has_canonical_metric(&self) -> bool {
+        Y::Metric::IS_CANONICAL
+    }
+
     fn has_constant_entropy(&self) -> bool {
         Y::Entropy::IS_CONSTANT
     }

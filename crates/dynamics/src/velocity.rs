@@ -36,3 +36,4 @@ pub use self::covectors::{Covectors, Differentials, Gradient, differentials};
 pub use self::definition::{irreversible, reversible};
 pub use self::fractions::{independence, projected_fractions};
 pub use self::jet::{VelocityJet, velocity_jet};
+pub use self::plan::{CASIMIR, MOMENTUM};

@@ -123,6 +123,13 @@ pub fn model(system: &dyn Model, t: f64, x: &[f64], u: &[f64]) -> Result<(), Bro
         })?;
     }
 
+    if system.has_canonical_metric() {
+        let mut g = nan(n * n);
+        system.metric(x, &vec![0.0; n], &mut g);
+        let one: Vec<f64> = (0..n * n).map(|k| if k % (n + 1) == 0 { 1.0 } else { 0.0 }).collect();
+        near("a canonical metric is the identity", &g, &one)?;
+    }
+
     let differentials = Covectors { energy: &w[..n], entropy: &w[n..2 * n] };
     let mut sum = vec![0.0; n];
     for (part, alpha) in [

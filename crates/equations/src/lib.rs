@@ -18,6 +18,7 @@
 //! |---|---|
 //! | [`equations`] | [`Equations`]: laws, differentials, velocity and space of a system; [`Sizes`] |
 //! | [`model`] | [`Model`]: the bracket, the force, the dissipation and the metric apart, with their derivatives |
+//! | [`differences`] | [`Differences`]: a model whose derivatives are formed by differences of its parts |
 //! | [`judge`] | the laws of a model at a start, around it, and at the states of a run |
 //! | [`report`] | [`Report`]: the residual of every law |
 //! | [`model_error`] | [`ModelError`]: the law that a model violates, with the numbers |
@@ -26,6 +27,7 @@
 //! | [`laws`] | the laws of an implementation of [`Equations`] and [`Model`], as functions for its tests |
 
 pub mod broken_law;
+pub mod differences;
 pub mod equations;
 pub mod judge;
 pub mod kind;
@@ -40,6 +42,7 @@ pub mod room;
 pub mod second_law;
 
 pub use broken_law::BrokenLaw;
+pub use differences::{Apart, Differences};
 pub use equations::{ENERGY, ENTROPY, Equations, Sizes};
 pub use kind::Kind;
 pub use metric_error::{MetricError, NotPositive};

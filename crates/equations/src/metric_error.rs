@@ -37,6 +37,18 @@ pub enum MetricError {
         /// The norm of the coordinates; NaN where there are no coordinates.
         distance: f64,
     },
+    /// A metric that is said to be the canonical one has another matrix.
+    #[error(
+        "the metric is said to be the canonical one, but its entry ({row}, {column}) is {value}"
+    )]
+    NotCanonical {
+        /// Row of the entry.
+        row: usize,
+        /// Its column.
+        column: usize,
+        /// Its value.
+        value: f64,
+    },
     /// `g ≠ gᵀ`.
     #[error(
         "the metric is not symmetric: entries ({row}, {column}) and ({column}, {row}) differ by {size:.3e}"

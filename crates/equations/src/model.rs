@@ -72,6 +72,17 @@ pub trait Model: Equations {
         self.second_law() == SecondLaw::NoEntropy
     }
 
+    /// Returns whether the metric is that in which the frame of each chart is orthonormal, by construction. On a vector space geodesics
+    /// are straight lines then.
+    fn has_canonical_metric(&self) -> bool {
+        false
+    }
+
+    /// Returns whether derivatives are formed by differences, and so have two thirds of the digits.
+    fn has_derivatives_by_differences(&self) -> bool {
+        false
+    }
+
     /// Evaluates one law along two vectors in the chart at `x`, at the hyper-dual state `φ_x(u ε₁ + v ε₂)`: `f`, `⟨df, u⟩`, `⟨df, v⟩` and
     /// `f''(u, v)`. The default forms the Hessian.
     fn along(&self, law: usize, t: f64, x: &[f64], [u, v]: [&[f64]; 2]) -> [f64; 4] {

@@ -115,8 +115,8 @@ pub trait Space: Clone + Debug + PartialEq + Send + Sync + 'static {
         Some(Matrix::<Self, D>::from_entries(|i, j| dual[i].dot(&image[j])))
     }
 
-    /// Says whether this is `Rⁿ` in all but its bracket: points are columns of numbers, the chart is `φ_x(q) = x + q`, and sizes, membership
-    /// and products with covectors are those of columns.
+    /// Says whether this is `Rⁿ` in all but its bracket: the entries of a point are its coordinates, the chart is `φ_x(q) = x + q`, and sizes,
+    /// membership and products with covectors are those of columns.
     #[doc(hidden)]
     const IS_VECTOR_SPACE: bool = false;
 

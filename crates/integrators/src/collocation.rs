@@ -54,20 +54,20 @@
 )]
 
 mod chart;
-mod covectors;
+pub(crate) mod covectors;
 pub(crate) mod dense;
-mod equation;
-mod fallbacks;
-mod full;
-mod heat;
+pub(crate) mod equation;
+pub(crate) mod fallbacks;
+pub(crate) mod full;
+pub(crate) mod heat;
 mod in_time;
-mod linear;
-mod memory;
-mod parts;
+pub(crate) mod linear;
+pub(crate) mod memory;
+pub(crate) mod parts;
 mod root;
-mod solve;
-mod step;
-mod tableau;
+pub(crate) mod solve;
+pub(crate) mod step;
+pub(crate) mod tableau;
 mod timed;
 
 use metriplectic_dynamics::{Metriplectic, SecondLaw, system::Point};

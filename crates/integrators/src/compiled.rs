@@ -2,16 +2,14 @@
 //!
 //! Each step is that of the same text as in the types of a system, and has its bits.
 
-use metriplectic_equations::Sizes;
-use metriplectic_manifolds::WeylMidpoint;
+use metriplectic_equations::{Equations, Sizes};
 
-use crate::collocation::{Gauss, Radau};
 use crate::explicit::{ExplicitRungeKutta, Tableau};
-use crate::midpoint::Scheme;
-use crate::numbers::{Answered, Modelled, OfLength};
+use crate::implicit::{Collocation, InLists, Midpoint};
+use crate::numbers::{Answered, FromEquations, OfLength};
 use crate::step::compiled::{explicit_lengths, implicit_lengths};
 use crate::step::in_plain::MethodInTypes;
-use crate::step::{Compiled, PlainMethod};
+use crate::step::{Compiled, PlainMethod, Written};
 
 /// Calls `f` with a method of a system; `None` for a size without an instance.
 pub(crate) fn with_method<T>(
@@ -35,16 +33,27 @@ pub(crate) fn with_method<T>(
         }
         return Some(explicit_lengths!(of_lengths));
     }
-    let model = system.model()?;
     macro_rules! of_length {
         ($($n:literal)*) => {
             match directions {
-                $($n => implicit::<$n, T>(method, &Modelled::new(model), f),)*
+                $($n => Some(implicit(method, &OfLength::<$n, $n>::new(flow), f)?),)*
                 _ => None,
             }
         };
     }
     implicit_lengths!(of_length)
+}
+
+/// Calls `f` with a method of a system of one's own; `None` for one that is not of this library.
+pub(crate) fn with_own<T>(
+    method: Compiled,
+    flow: &FromEquations<&dyn Equations>,
+    f: impl FnOnce(&dyn PlainMethod) -> T,
+) -> Option<T> {
+    match explicit(method) {
+        Some(method) => Some(f(&MethodInTypes { method, flow })),
+        None => implicit(method, flow, f),
+    }
 }
 
 /// Returns the method, if it is explicit.
@@ -53,28 +62,24 @@ pub(crate) fn explicit(method: Compiled) -> Option<ExplicitRungeKutta> {
     tableau.downcast_ref::<Tableau>().map(ExplicitRungeKutta::new)
 }
 
-/// Calls `f` with an implicit method of a model on a vector space with the canonical metric.
-fn implicit<const N: usize, T>(
+/// Calls `f` with an implicit method of a model on a vector space.
+fn implicit<F: InLists + Written, T>(
     method: Compiled,
-    flow: &Modelled<'_, N>,
+    flow: &F,
     f: impl FnOnce(&dyn PlainMethod) -> T,
 ) -> Option<T> {
-    macro_rules! of_stages {
-        ($name:ident, $found:ident: $($stages:literal)*) => {
-            match $found {
-                $($stages => f(&MethodInTypes { method: $name::<$stages>, flow }),)*
-                _ => return None,
-            }
-        };
-    }
     Some(match method {
         Compiled::Explicit(_) => return None,
-        Compiled::Midpoint { newton, splits } => {
-            let method = Scheme { newton, splits, ..Scheme::new(WeylMidpoint) };
-            f(&MethodInTypes { method, flow })
+        Compiled::Midpoint { name, line, newton, splits } => {
+            let line = Some(line);
+            f(&MethodInTypes { method: Midpoint { name, line, newton, splits }, flow })
         }
-        Compiled::Gauss { stages } => of_stages!(Gauss, stages: 1 2 3 4),
-        Compiled::Radau { stages } => of_stages!(Radau, stages: 2 3 4),
+        Compiled::Gauss { stages } => {
+            f(&MethodInTypes { method: Collocation::gauss(stages)?, flow })
+        }
+        Compiled::Radau { stages } => {
+            f(&MethodInTypes { method: Collocation::radau(stages)?, flow })
+        }
     })
 }
 
@@ -84,7 +89,8 @@ mod tests {
     use metriplectic_dynamics::{Metriplectic, Symplectic, System};
     use metriplectic_fields::Real;
     use metriplectic_manifolds::{
-        Chart, Euclidean, LieDual, Manifold, Product, Rotations, Sphere, WeylMidpoint,
+        Chart, ChartMidpoint, Euclidean, Exponential, LieDual, Manifold, Product, Rotations,
+        Sphere, WeylMidpoint,
     };
     use nalgebra::{Matrix3, SVector, Vector1, Vector2, Vector3, Vector4, Vector6, vector};
     use num_dual::DualNum as _;
@@ -92,8 +98,8 @@ mod tests {
     use super::*;
     use crate::step::Inlined;
     use crate::{
-        DormandPrince5, DormandPrince8, Method, RunError, RungeKuttaChebyshev, Schedule, Span,
-        Tableau, Trajectory, Watch as _,
+        DormandPrince5, DormandPrince8, Gauss, MeanValue, Method, Radau, RunError,
+        RungeKuttaChebyshev, Schedule, Scheme, Span, Tableau, Trajectory, Watch as _,
     };
 
     /// Lists all that came out of a run, with its bits: the states, and the certificate or the error.
@@ -144,8 +150,10 @@ mod tests {
         x0: &metriplectic_dynamics::system::Point<Y>,
         h: f64,
     ) {
-        assert!(<Y as crate::step::Written>::HAS_IMPLICIT, "{name}");
+        assert!(<Y as Written>::HAS_IMPLICIT, "{name}");
         agree(name, system, x0, h, WeylMidpoint);
+        agree(name, system, x0, h, Exponential);
+        agree(name, system, x0, h, Scheme::new(ChartMidpoint).gradient(MeanValue));
         agree(name, system, x0, h, Gauss::<1>);
         agree(name, system, x0, h, Gauss::<4>);
         agree(name, system, x0, h, Radau::<2>);
@@ -167,7 +175,7 @@ mod tests {
         x0: &metriplectic_dynamics::system::Point<Y>,
         h: f64,
     ) -> String {
-        assert!(<Y as crate::step::Written>::HAS_EXPLICIT, "{name}");
+        assert!(<Y as Written>::HAS_EXPLICIT, "{name}");
         agree(name, system, x0, h, DormandPrince5);
         agree(name, system, x0, h, RungeKuttaChebyshev);
         agree(name, system, x0, h, ExplicitRungeKutta::new(&KUTTA));

@@ -34,6 +34,7 @@ use metriplectic_manifolds::{
 use num_dual::Dual64;
 
 use crate::round_off::stable_gradient::{Segment, StableGradient};
+use crate::step::GradientKind;
 
 /// A discrete gradient on a manifold (Bloch, Farré Puiggalí, Martín de Diego 2024, eq. "discGrad-m",
 /// with the missing step size restored): a covector `w` at the base `z` of a path from `x` to `x'`
@@ -44,9 +45,9 @@ use crate::round_off::stable_gradient::{Segment, StableGradient};
 /// Laws ([`laws::discrete_gradient`](crate::laws::discrete_gradient)): 1. `⟨w, d⟩ = F(x') − F(x)`;
 /// 2. `w → dF(z)` as the points meet; 3. what is evaluated safely is the definition.
 pub trait DiscreteGradient: Copy + Debug + Send + Sync {
-    /// Says whether this is the one of [`Gonzalez`].
+    /// Names it, if it is one of this library.
     #[doc(hidden)]
-    const IS_GONZALEZ: bool = false;
+    const KIND: Option<GradientKind> = None;
 
     /// The covector `w̄` before its correction, in the frame of the chart of the base point.
     fn mean<M: Manifold, D: Scalar>(
@@ -198,7 +199,7 @@ fn partial<M: Space, D: Scalar>(
 }
 
 /// Nodes and weights of the Gauss-Legendre rule of order 8 on `[0, 1]`.
-const GAUSS: [(f64, f64); 4] = [
+pub(crate) const GAUSS: [(f64, f64); 4] = [
     (0.069_431_844_202_973_71, 0.173_927_422_568_726_93),
     (0.330_009_478_207_571_87, 0.326_072_577_431_273_07),
     (0.669_990_521_792_428_1, 0.326_072_577_431_273_07),

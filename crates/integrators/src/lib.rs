@@ -39,6 +39,7 @@ mod default_scheme;
 pub mod discrete_gradient;
 pub mod error;
 pub mod explicit;
+mod implicit;
 pub mod laws;
 pub mod midpoint;
 pub mod newton;
@@ -59,6 +60,7 @@ pub use explicit::{
     DormandPrince5, DormandPrince8, ExplicitRungeKutta, Row, RungeKuttaChebyshev, StageFlow,
     Tableau, TableauError,
 };
+pub use implicit::NotImplicit;
 pub use midpoint::{Residual, Scheme};
 pub use newton::{Equation, Iterate, Linearised, Newton, Root, Rounding};
 pub use noise::{
@@ -85,10 +87,10 @@ pub use run::watch::{Jumping, Watch, Watched};
 pub use run::{Ending, Method, Method as Run, Schedule, Simulation, SpanError, State};
 pub use step::{
     Compiled, Components, Control, Directions, Effort, Element, Entries, EntropyStep,
-    EventExchange, Evidence, Flow, Inlined, JumpError, Laws, LedgerErrors, LedgerSummary,
-    LimitingSites, Memory, MethodError, NoiseSummary, Panicked, PlainNumbers, Promises, Recheck,
-    Refusal, RestoreError, Saved, Scales, StageLaws, StartError, StateSpace, StepEnds, StepError,
-    StepStart, Stepper, Taken, Values, Vector,
+    EventExchange, Evidence, Flow, GradientKind, Inlined, JumpError, Laws, LedgerErrors,
+    LedgerSummary, LimitingSites, LineOfStep, Memory, MethodError, NoiseSummary, Panicked,
+    PlainNumbers, Promises, Recheck, Refusal, RestoreError, Saved, Scales, StageLaws, StartError,
+    StateSpace, StepEnds, StepError, StepStart, Stepper, Taken, Values, Vector,
 };
 pub use tangent::{
     AdjointRun, Adjoints, Linearised as LinearisedStep, LinearisedAlong, LossGradient, SelfAdjoint,

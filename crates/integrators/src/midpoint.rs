@@ -26,15 +26,15 @@
 //! All of them end in a certified step.
 
 mod equation;
-mod fallbacks;
-mod jacobian;
+pub(crate) mod fallbacks;
+pub(crate) mod jacobian;
 mod level;
-mod memory;
-mod predictor;
-mod restored;
+pub(crate) mod memory;
+pub(crate) mod predictor;
+pub(crate) mod restored;
 mod scheme;
 mod solution;
-mod step;
+pub(crate) mod step;
 
 pub(crate) use equation::BothEnds;
 pub use equation::{Dissipated, Residual};

@@ -6,9 +6,7 @@ mod inverse;
 use metriplectic_fields::{Column, Dimension, Space, Vector};
 
 pub use equation::{Equation, Evaluated, Iterate, Linearised, Root, Rounding, Stiffness};
-pub(crate) use inverse::Inverse;
-
-use inverse::{corrections, reaches};
+pub(crate) use inverse::{INVERTED, Inverse, MARGIN, corrections, reaches};
 
 /// Newton's method, damped, down to round-off.
 ///
@@ -88,15 +86,15 @@ impl<N: Dimension> Measure<N> {
 pub(crate) const NORM: f64 = 3.0;
 /// The multiple of round-off below which the change of a residual says nothing of the Jacobian.
 /// A factor of four fails `tests/tangent/schemes.rs::tangents_of_schemes_are_those_of_differences`.
-const NOISE: f64 = 1e3;
+pub(crate) const NOISE: f64 = 1e3;
 /// The fraction of the round-off that the last correction has to promise.
 /// A factor of four fails `tests/mutations.rs::the_friction_of_a_certificate_is_that_of_the_steps_however_long_a_jacobian_is_kept`.
-const SURE: f64 = 0.01;
+pub(crate) const SURE: f64 = 0.01;
 /// The multiple of round-off below which a residual says little about its Jacobian.
-const NEAR: f64 = 10.0;
+pub(crate) const NEAR: f64 = 10.0;
 /// The fraction of each component of a solution that the last correction may change unchecked.
 /// A factor of four fails `newton/tests.rs::a_tenth_of_each_component_may_go_unchecked`.
-const UNCHECKED: f64 = 0.1;
+pub(crate) const UNCHECKED: f64 = 0.1;
 
 /// Returns whether a correction changes each component of a solution by a small fraction of it, or by its round-off. The Jacobian is then
 /// close to that of the solution, and the contraction so far predicts the next one.
@@ -306,7 +304,8 @@ impl Newton {
                 inverse.learn(&taken, &predicted, &mut correction);
             }
             // Another equation's Jacobian gets its corrections, the last one unchecked.
-            let remaining = corrections::<M::Dim>().saturating_sub(taken + 1).max(1);
+            let remaining =
+                corrections(<M::Dim as Dimension>::LEN).saturating_sub(taken + 1).max(1);
             let limit = SURE * residual_bound;
             if !own
                 && best.residual > residual_bound

@@ -3,7 +3,6 @@
 mod answered;
 mod kept;
 mod lengths;
-mod modelled;
 mod of_length;
 mod projection;
 mod referred_rise;
@@ -19,8 +18,7 @@ use metriplectic_equations::{ENTROPY, Equations, Report, VerifiedEquations};
 use metriplectic_manifolds::PointError;
 
 pub(crate) use self::answered::{Answered, InTypes};
-use self::lengths::{AtRunTime, List as _};
-pub(crate) use self::modelled::Modelled;
+pub(crate) use self::lengths::{AtRunTime, Known, Lengths, List};
 pub(crate) use self::of_length::OfLength;
 use self::projection::{Aim, Projection, sum};
 pub use self::rows::Rows;
@@ -31,7 +29,7 @@ use crate::step::{
     Directions, Element, Entries, Flow, FlowVisitor, Laws, PlainNumbers, Recheck, Values,
     Vector as _, Written,
 };
-use crate::system::{NO_CLOCK, recheck};
+use crate::system::{NO_CLOCK, least_dependent, recheck};
 
 /// The flow of a system that answers [`Equations`]: one of your own, or one whose number of variables is read from a file.
 ///
@@ -232,6 +230,26 @@ impl<S: Equations> Flow for FromEquations<S> {
 
     fn defect(&self, x: &Entries) -> f64 {
         self.0.defect(x)
+    }
+
+    fn dependent_invariant(&self, x: &Entries) -> Option<(usize, f64)> {
+        let mut fractions = vec![0.0; self.0.sizes().laws.saturating_sub(ENTROPY + 1)];
+        self.0.model()?.independence(NO_CLOCK, x, &mut fractions);
+        least_dependent(fractions)
+    }
+
+    /// The estimate of the local error by the rates in the chart of a stage, as for systems in types.
+    fn local_error(&self, x: &Entries, end: &Entries, h: f64) -> Option<Directions> {
+        let mut q = Directions::zeros(self.0.sizes().directions);
+        self.0.stage_coordinates(x, end, q.numbers_mut());
+        let (start, there) = (self.rates(x, &q.map(|_| 0.0))?, self.rates(x, &q)?);
+        let middle =
+            Directions::zip([&q, &start, &there], |[q, a, b]| q * 0.5 - (b - a) * (h / 8.0));
+        let middle = self.rates(x, &middle)?;
+        let error = Directions::zip([&q, &start, &middle, &there], |[q, a, m, b]| {
+            q - (a + m * 4.0 + b) * (h / 6.0)
+        });
+        Some(error)
     }
 
     fn visit<V: FlowVisitor<Self>>(&self, visitor: V) -> V::Output {

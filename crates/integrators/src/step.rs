@@ -39,7 +39,8 @@ pub(crate) mod type_names;
 mod vector;
 
 pub(crate) use both::both;
-pub use compiled::Compiled;
+#[doc(hidden)]
+pub use compiled::{Compiled, GradientKind, LineOfStep};
 pub use control::Control;
 pub use error::StepError;
 pub use evidence::{Effort, EntropyStep, Evidence, LimitingSites, Promises, StageLaws};

@@ -284,7 +284,12 @@ fn of_each<Y: Metriplectic>(
 /// The further invariant that has the least independent fraction at `x`, and this fraction, if it is small
 /// enough to be the cause of a failure.
 fn dependent_invariant<Y: Metriplectic>(system: &Y, x: &Point<Y>) -> Option<(usize, f64)> {
-    let fractions = projected_fractions(system, &ChartPoint::centre(x));
+    least_dependent(projected_fractions(system, &ChartPoint::centre(x)))
+}
+
+/// The further invariant with the least of these independent fractions, and this fraction, if it is small enough to be the cause
+/// of a failure.
+pub(crate) fn least_dependent(fractions: Vec<f64>) -> Option<(usize, f64)> {
     let least = fractions.into_iter().enumerate().min_by(|a, b| a.1.total_cmp(&b.1));
     least.filter(|(_, fraction)| *fraction < DEPENDENT)
 }

@@ -43,6 +43,8 @@ fn beyond<M: Manifold>(u: &Vector<M>) -> MetricError {
 }
 
 impl<M: Manifold, G: Riemannian<M>> Retraction<M, G> for ChartMidpoint {
+    const BASE_OF_LINES: Option<f64> = Some(0.5);
+
     fn step_path<D: Scalar>(
         &self,
         _: &G,

@@ -18,6 +18,8 @@ use crate::{
 pub struct Exponential;
 
 impl<M: Manifold, G: Riemannian<M>> Retraction<M, G> for Exponential {
+    const BASE_OF_LINES: Option<f64> = Some(0.0);
+
     #[inline]
     fn step_path<D: Scalar>(
         &self,

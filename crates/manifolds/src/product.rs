@@ -111,6 +111,8 @@ impl<A: Times<B>, B: Space> Space for Product<A, B> {
     type Velocity = A::SumVelocity;
     type Point<D: Scalar> = (A::Point<D>, B::Point<D>);
 
+    const IS_VECTOR_SPACE: bool = A::IS_VECTOR_SPACE && B::IS_VECTOR_SPACE;
+
     #[inline]
     fn constant<D: Scalar>((a, b): &Self::Point<f64>) -> Self::Point<D> {
         (A::constant(a), B::constant(b))

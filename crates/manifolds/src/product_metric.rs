@@ -354,6 +354,8 @@ where
     G: Riemannian<A>,
     F: Riemannian<B>,
 {
+    const IS_CANONICAL: bool = G::IS_CANONICAL && F::IS_CANONICAL;
+
     metric_of_the_factors!();
 }
 
@@ -363,5 +365,8 @@ where
     B: Space,
     Self: Riemannian<A> + Riemannian<B>,
 {
+    const IS_CANONICAL: bool =
+        <Self as Riemannian<A>>::IS_CANONICAL && <Self as Riemannian<B>>::IS_CANONICAL;
+
     metric_of_the_factors!();
 }

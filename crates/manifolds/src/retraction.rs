@@ -16,9 +16,10 @@ pub use crate::step_path::{StepPath, StepPathJet};
 /// ends where the pair does; 3. `real_step_path` is `path`, and `step_path_jet` its derivative; 4. a symmetric retraction
 /// returns the same base and the opposite vector for the swapped pair.
 pub trait Retraction<M: Manifold, G: Riemannian<M>> {
-    /// Says whether this is the one of [`WeylMidpoint`](crate::WeylMidpoint).
+    /// Says where its base point is on the straight lines of a vector space with the canonical metric, as a fraction of the way, if
+    /// its paths are these lines there.
     #[doc(hidden)]
-    const IS_WEYL_MIDPOINT: bool = false;
+    const BASE_OF_LINES: Option<f64> = None;
 
     /// Follows the path that leaves `x` with initial displacement `u ∈ T_xM`, the unknown of a step.
     ///

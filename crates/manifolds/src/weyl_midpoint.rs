@@ -18,7 +18,7 @@ use crate::{
 pub struct WeylMidpoint;
 
 impl<M: Manifold, G: Riemannian<M>> Retraction<M, G> for WeylMidpoint {
-    const IS_WEYL_MIDPOINT: bool = true;
+    const BASE_OF_LINES: Option<f64> = Some(0.5);
 
     #[inline]
     fn step_path<D: Scalar>(

@@ -15,11 +15,11 @@ use crate::metriplectic::{CountOf, Metriplectic, SecondLaw};
 /// discretisation: its direction is arbitrary, and the equation of a step is then stiff in it. `μ = 10⁻⁶` is
 /// too small for the quartic Casimir of so(5)* at `h = 0.2`. Without its projection a Casimir changes by
 /// less than `μ|dC||v|` per unit of time.
-pub(super) const CASIMIR: f64 = 1e-4;
+pub const CASIMIR: f64 = 1e-4;
 
 /// The bound for a momentum. Near a relative equilibrium it is a function of the other fields to first order,
 /// so a step that conserves these changes it by no more than the order of `h³σ`.
-pub(super) const MOMENTUM: f64 = 1e-6;
+pub const MOMENTUM: f64 = 1e-6;
 
 /// Which covectors the bracket is made to annihilate.
 pub(super) struct ProjectionPlan {

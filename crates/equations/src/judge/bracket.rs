@@ -49,8 +49,14 @@ pub(crate) fn bracket_defects(
     let Jacobi { violation, is_finite } =
         if large { here.jacobi_of_covectors()? } else { here.jacobi_of_axes()? };
     let skewness = asymmetry(&tensor, -1.0, units, rounding);
-    Ok(BracketDefects { size: tensor.max_abs(), tensor, skewness, jacobi: violation, is_finite })
+    let by_differences = at.model.has_derivatives_by_differences();
+    let terms = violation.terms * if by_differences { OF_DIFFERENCES } else { 1.0 };
+    let jacobi = Violation { terms, ..violation };
+    Ok(BracketDefects { size: tensor.max_abs(), tensor, skewness, jacobi, is_finite })
 }
+
+/// The round-off of derivatives by differences, in units of that of derivatives of closures.
+const OF_DIFFERENCES: f64 = 1e4;
 
 /// The Jacobi identity at a state.
 struct Jacobi {

@@ -125,8 +125,9 @@ impl Along<'_, '_> {
         let Some(slopes) = &slopes.bracket else { return Ok(()) };
         let (units, alpha) = (self.place.units, generic(self.place.units));
         let (scale, df) = (units[self.axis], slopes.column(self.axis));
-        let derivatives =
-            Derivatives { scale, df, units: Row::from_slice(units), rounding: OF_CLOSURES };
+        let by_differences = self.place.at.model.has_derivatives_by_differences();
+        let rounding = if by_differences { OF_SOLUTIONS } else { OF_CLOSURES };
+        let derivatives = Derivatives { scale, df, units: Row::from_slice(units), rounding };
         self.compare("bracket", &derivatives, &|t, values| {
             let w = self.place.differentials();
             self.append(Part::Reversible, &self.displacement(t), w, &alpha, values)

@@ -87,14 +87,14 @@ pub(super) fn at_stage<Y: Metriplectic>(
 
 /// The start of a law: its value, and what is taken back of its error.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct LawStart {
-    pub(super) value: f64,
-    pub(super) drift: f64,
+pub(crate) struct LawStart {
+    pub(crate) value: f64,
+    pub(crate) drift: f64,
 }
 
 /// How the covectors of a law are corrected.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Correction {
+pub(crate) enum Correction {
     /// Not at all: they are differentials.
     None,
     /// Not here: they are differentials, and `δ` is known.
@@ -128,7 +128,7 @@ impl<M: Space> StepPolynomial<'_, M> {
 /// A power of two near `1/h`, by which rates are divided before they are multiplied by a covector: a power may be too large or too
 /// small for a number where the work in the step is not.
 #[inline]
-pub(super) fn unit_of_rates(h: f64) -> f64 {
+pub(crate) fn unit_of_rates(h: f64) -> f64 {
     power_of_two(h.recip().abs())
 }
 

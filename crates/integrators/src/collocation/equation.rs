@@ -36,7 +36,7 @@ pub(super) type StagesOf<Y> =
 
 /// Units of round-off up to which a velocity that changes the energy is one that has lost digits.
 /// A factor of four fails `tests/stiff_friction.rs::gas_containers_with_a_wall_that_leaks_fast`.
-const ROUNDINGS: f64 = 16.0;
+pub(crate) const ROUNDINGS: f64 = 16.0;
 
 /// The equation of a step.
 #[derive(Debug)]
@@ -103,11 +103,11 @@ pub(super) struct Evaluated<Y: Metriplectic> {
 
 /// The defect of a law in a residual.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Left {
+pub(crate) struct Left {
     /// The change of the law, less what it is to be.
-    pub(super) work: f64,
+    pub(crate) work: f64,
     /// The size of the terms of the law.
-    pub(super) size: f64,
+    pub(crate) size: f64,
 }
 
 impl<'a, Y: Metriplectic> StageEquation<'a, Y> {
@@ -377,6 +377,6 @@ fn relative<C: Dimension>(off: &Laws<C::Array<f64>>, sizes: &Laws<C::Array<f64>>
 }
 
 /// The larger one of two numbers; NaN if one is.
-fn larger(a: f64, b: f64) -> f64 {
+pub(crate) fn larger(a: f64, b: f64) -> f64 {
     if b.is_nan() || b > a { b } else { a }
 }

@@ -13,22 +13,22 @@ use crate::step::failure::{self, Cause, Fallbacks};
 
 /// A step that was not taken.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct StepFailure {
+pub(crate) struct StepFailure {
     /// Why it was not taken.
-    pub(super) cause: Cause,
+    pub(crate) cause: Cause,
     /// The effort of the tries.
-    pub(super) effort: Effort,
+    pub(crate) effort: Effort,
 }
 
 /// Corrections from the guess.
-const WHOLE: Budget =
+pub(crate) const WHOLE: Budget =
     Budget { corrections: 30, tolerance: 1.0, derivatives: Derivatives::InTheMiddle };
 /// Corrections from rest.
-const FROM_REST: Budget = Budget { corrections: 20, ..WHOLE };
+pub(crate) const FROM_REST: Budget = Budget { corrections: 20, ..WHOLE };
 /// Corrections with the derivatives of all stages.
-const FULL: Budget = Budget { derivatives: Derivatives::OfAllStages, ..WHOLE };
+pub(crate) const FULL: Budget = Budget { derivatives: Derivatives::OfAllStages, ..WHOLE };
 /// Corrections of a step on the way to a larger one, which need not be solved to round-off.
-const ON_THE_WAY: Budget = Budget { corrections: 8, tolerance: 1e6, ..FULL };
+pub(crate) const ON_THE_WAY: Budget = Budget { corrections: 8, tolerance: 1e6, ..FULL };
 
 /// Solves the equation of a step from a guess, from rest, or by continuation in its size.
 pub(super) fn solve<Y: Metriplectic>(

@@ -23,7 +23,7 @@ pub(super) struct Full {
 }
 
 /// The difference at which a derivative is taken, relative to the size of an entry: near the root of round-off.
-const DIFFERENCE: f64 = 1e-7;
+pub(crate) const DIFFERENCE: f64 = 1e-7;
 
 impl Full {
     /// The derivatives at these velocities, where the equation has been evaluated, by differences in units of the
@@ -92,7 +92,7 @@ impl Full {
 
 /// The decomposition of a matrix with row pivoting, in units of the largest entry of each row; `None` if it is
 /// singular or not a number.
-fn factored(mut a: Vec<f64>, size: usize) -> Option<(Vec<f64>, Vec<usize>)> {
+pub(crate) fn factored(mut a: Vec<f64>, size: usize) -> Option<(Vec<f64>, Vec<usize>)> {
     let mut units: Vec<f64> = (0..size)
         .map(|i| a[i * size..(i + 1) * size].iter().fold(0.0_f64, |most, x| most.max(x.abs())))
         .collect();

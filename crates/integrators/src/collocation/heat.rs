@@ -69,7 +69,7 @@ impl<V: Column<f64>> Direction<V> {
 
 /// The alignment up to which there is no heat: at an infinite temperature the entropy does not change the energy.
 /// A factor of four fails `tests/collocation.rs::orders_through_infinite_temperatures`.
-const FAINT: f64 = 0.01;
+pub(crate) const FAINT: f64 = 0.01;
 /// The alignment from which on all that friction has lost becomes heat.
 /// A factor of four fails `tests/tangent/collocated.rs::parameters_of_a_metric_are_columns_of_stages`.
 const CLEAR: f64 = 0.1;
@@ -234,9 +234,9 @@ pub(crate) fn largest_entries<V: Column<f64>>(vectors: &[V]) -> V {
 
 /// The factor by which the jump of `⟨dH, ♯n⟩` across a change of its sign shrinks, or grows, until it is known which one it
 /// does.
-const JUMP: f64 = 16.0;
+pub(crate) const JUMP: f64 = 16.0;
 /// Halvings of the way across a change of the sign.
-const HALVINGS: usize = 64;
+pub(crate) const HALVINGS: usize = 64;
 
 /// Returns whether no stage is beyond a temperature of zero, where no motion leads: such a root belongs to another branch of the
 /// entropy. There `⟨dH, ♯n⟩` has a pole, and changes its sign as it does at an infinite temperature, where it vanishes.

@@ -50,20 +50,20 @@ pub(super) struct Linear<N: Dimension> {
 }
 
 /// Iterations of the linear system.
-const PASSES: usize = 12;
+pub(crate) const PASSES: usize = 12;
 /// The fraction of a correction that the linear system may leave.
 /// A factor of four fails `tests/stiff_friction.rs::units_change_nothing`.
-const LEFT: f64 = 1e-3;
+pub(crate) const LEFT: f64 = 1e-3;
 /// The factor between the bound of round-off to first order and what is taken for round-off.
 /// A factor of four fails `tests/collocation.rs::one_stage_is_the_scheme_of_the_paper`.
-const MARGIN: f64 = 3.0;
+pub(crate) const MARGIN: f64 = 3.0;
 /// The ratio of the displacement of a guess to the size that an entry has on a step, above which the round-off there is not that of the
 /// step: it may be longer than the step itself.
 /// A factor of four fails `collocation/linear.rs::a_linear_part_serves_displacements_of_its_own_size`.
-const LONGER: f64 = 256.0;
+pub(crate) const LONGER: f64 = 256.0;
 
 /// The displacement of an entry, relative to its size, from which on a state is not at rest.
-const HALF_OF_THE_DIGITS: f64 = 1.5e-8;
+pub(crate) const HALF_OF_THE_DIGITS: f64 = 1.5e-8;
 
 /// The differentials of all fields with their derivatives.
 struct Hessians<'a, M: Space>(&'a M::Point<f64>);

@@ -88,7 +88,7 @@ impl<N: Dimension> StageMemory<N> {
 }
 
 /// The names of the velocities in a checkpoint.
-const NAMES: [&str; STAGES] =
+pub(crate) const NAMES: [&str; STAGES] =
     ["velocity of stage 1", "velocity of stage 2", "velocity of stage 3", "velocity of stage 4"];
 
 impl<N: Dimension> Memory for StageMemory<N> {

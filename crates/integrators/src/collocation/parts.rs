@@ -18,12 +18,12 @@ use crate::step::{Dim, Effort, Evidence, Flow as _, Laws, Start, StepError, Take
 
 /// The rate `|K'|` times the size of the first part, where friction is stiff.
 /// A factor of four fails `collocation/parts.rs::the_first_part_is_some_times_of_the_friction`.
-const FIRST: f64 = 4.0;
+pub(crate) const FIRST: f64 = 4.0;
 /// The ratio of a part to the one before it, and to one that was not solved.
 /// A factor of four fails `tests/tangent/collocated.rs::parameters_of_a_metric_are_columns_of_stages`.
-const RATIOS: [f64; 2] = [2.0, 0.25];
+pub(crate) const RATIOS: [f64; 2] = [2.0, 0.25];
 /// Parts of a Radau step that are tried.
-const TRIALS: usize = 400;
+pub(crate) const TRIALS: usize = 400;
 
 /// The step, whole or in parts.
 pub(super) fn take<Y: Metriplectic>(

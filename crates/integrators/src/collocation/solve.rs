@@ -58,29 +58,29 @@ impl<Y: Metriplectic> Solved<Y> {
 
 /// A step that was not solved.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Unsolved {
+pub(crate) struct Unsolved {
     /// The smallest correction, in units of round-off.
-    pub(super) residual: f64,
+    pub(crate) residual: f64,
     /// Whether the equation was not defined on the way.
-    pub(super) edge: bool,
+    pub(crate) edge: bool,
     /// Evaluations of the equation.
-    pub(super) evaluations: usize,
+    pub(crate) evaluations: usize,
 }
 
 /// How far the iteration goes.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Budget {
+pub(crate) struct Budget {
     /// Corrections.
-    pub(super) corrections: usize,
+    pub(crate) corrections: usize,
     /// The correction that counts as solved, in units of its round-off.
-    pub(super) tolerance: f64,
+    pub(crate) tolerance: f64,
     /// Which derivatives they are computed with.
-    pub(super) derivatives: Derivatives,
+    pub(crate) derivatives: Derivatives,
 }
 
 /// The derivatives that a correction is computed with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Derivatives {
+pub(crate) enum Derivatives {
     /// Derivatives of the equation of motion in the middle of the step.
     InTheMiddle,
     /// Derivatives of the equation of the step along all of its unknowns.
@@ -88,30 +88,30 @@ pub(super) enum Derivatives {
 }
 
 /// The multiple of round-off at which a correction that no longer falls counts as solved.
-const STALL: f64 = 100.0;
+pub(crate) const STALL: f64 = 100.0;
 /// The multiple of its round-off that the residual may then leave of a law, of which runs are allowed 12.
-const STALLED_LAW: f64 = 8.0;
+pub(crate) const STALLED_LAW: f64 = 8.0;
 /// The contraction from which on a linear part no longer serves.
 /// A factor of four fails `tests/stiff_friction.rs::gas_containers_with_a_wall_that_leaks_fast`.
-const SLOW: f64 = 0.3;
+pub(crate) const SLOW: f64 = 0.3;
 /// Halvings of one correction.
 /// A factor of four fails `tests/tangent/parts.rs::parts_of_a_step_are_chained`.
-const HALVINGS: usize = 8;
+pub(crate) const HALVINGS: usize = 8;
 /// The fraction of the round-off that a last correction without an evaluation has to promise.
-const SURE: f64 = 0.03;
+pub(crate) const SURE: f64 = 0.03;
 
 /// The displacement by the velocity at a state, in units of round-off, from which on the state does not rest.
 /// A factor of four fails `collocation/solve.rs::a_state_with_a_velocity_does_not_rest`.
-const MOVES: f64 = 100.0;
+pub(crate) const MOVES: f64 = 100.0;
 
 /// The error of the laws at an end, in units of their round-off, above which a better end is looked for.
-const HALF: f64 = 0.5;
+pub(crate) const HALF: f64 = 0.5;
 
 /// The ratio of a round-off to that after a correction below which it was not known before.
-const UNKNOWN: f64 = 0.25;
+pub(crate) const UNKNOWN: f64 = 0.25;
 
 /// The fraction of the squares of known corrections that the next one may be.
-const KNOWN: f64 = 0.25;
+pub(crate) const KNOWN: f64 = 0.25;
 
 /// An evaluation with its correction.
 struct Iterate<Y: Metriplectic> {

@@ -40,7 +40,7 @@ pub(super) fn start_of<'a, Y: Metriplectic>(
 /// The error of the laws of a method that damps, in units of their round-off, above which the end is moved onto them.
 /// Near an equilibrium the entropy falls with the energy.
 /// A factor of four fails `tests/stiff_friction.rs::gas_containers_with_a_wall_that_leaks_fast`.
-const DAMPED_LAW: f64 = 0.125;
+pub(crate) const DAMPED_LAW: f64 = 0.125;
 
 /// Tries a step whole.
 pub(super) fn try_step<Y: Metriplectic>(

@@ -27,9 +27,9 @@ pub(crate) struct Tableau {
     /// The matrix `a_ij`.
     pub(crate) matrix: [Numbers; STAGES],
     /// Its inverse.
-    pub(super) inverse: [Numbers; STAGES],
+    pub(crate) inverse: [Numbers; STAGES],
     /// The least modulus of its eigenvalues, the parameter of the blended iteration.
-    pub(super) gamma: f64,
+    pub(crate) gamma: f64,
     /// The Gauss rule with two more nodes than there are stages, at which the polynomial of the step is evaluated.
     pub(super) points: [Point; POINTS],
 }

@@ -3,7 +3,7 @@
 use metriplectic_fields::{Matrix, Scalar, ScalarField, Vector, differential};
 use metriplectic_manifolds::{Manifold, StepPath, StepPathJet};
 
-use super::DiscreteGradient;
+use super::{DiscreteGradient, GradientKind};
 
 /// The midpoint discrete gradient on a manifold (Gonzalez 1996; Bloch, Farré Puiggalí, Martín de
 /// Diego 2024, eq. "gonzalez-m", with the missing step size restored):
@@ -17,7 +17,7 @@ use super::DiscreteGradient;
 pub struct Gonzalez;
 
 impl DiscreteGradient for Gonzalez {
-    const IS_GONZALEZ: bool = true;
+    const KIND: Option<GradientKind> = Some(GradientKind::Gonzalez);
 
     #[inline]
     fn mean<M: Manifold, D: Scalar>(

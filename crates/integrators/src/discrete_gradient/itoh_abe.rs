@@ -3,7 +3,7 @@
 use metriplectic_fields::{Column, Scalar, ScalarField, Vector};
 use metriplectic_manifolds::{Manifold, StepPath};
 
-use super::{DiscreteGradient, GAUSS, partial, segment};
+use super::{DiscreteGradient, GAUSS, GradientKind, partial, segment};
 use crate::round_off::stable_gradient::short;
 
 /// The coordinate increment discrete gradient (Itoh and Abe 1988) in the chart at the base point: with
@@ -24,6 +24,8 @@ pub struct ItohAbe;
 pub struct SymmetricItohAbe;
 
 impl DiscreteGradient for ItohAbe {
+    const KIND: Option<GradientKind> = Some(GradientKind::ItohAbe);
+
     fn mean<M: Manifold, D: Scalar>(
         &self,
         f: &impl ScalarField<M>,
@@ -36,6 +38,8 @@ impl DiscreteGradient for ItohAbe {
 }
 
 impl DiscreteGradient for SymmetricItohAbe {
+    const KIND: Option<GradientKind> = Some(GradientKind::SymmetricItohAbe);
+
     fn mean<M: Manifold, D: Scalar>(
         &self,
         f: &impl ScalarField<M>,

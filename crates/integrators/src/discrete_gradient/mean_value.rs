@@ -7,7 +7,7 @@ use metriplectic_fields::{
 use metriplectic_manifolds::{Manifold, StepPath, StepPathJet};
 use num_dual::Dual64;
 
-use super::{DiscreteGradient, GAUSS, segment};
+use super::{DiscreteGradient, GAUSS, GradientKind, segment};
 
 /// The mean value discrete gradient (Harten, Lax, van Leer 1983; McLachlan, Quispel, Robidoux 1999;
 /// on manifolds Celledoni, Eidnes, Owren, Ringholm 2019), along the segment `q(s)` from `x` to `x'` in
@@ -24,6 +24,8 @@ use super::{DiscreteGradient, GAUSS, segment};
 pub struct MeanValue;
 
 impl DiscreteGradient for MeanValue {
+    const KIND: Option<GradientKind> = Some(GradientKind::MeanValue);
+
     fn mean<M: Manifold, D: Scalar>(
         &self,
         f: &impl ScalarField<M>,

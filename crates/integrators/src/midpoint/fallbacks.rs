@@ -283,11 +283,11 @@ fn iterations<M: Space, E>(solved: &Result<Root<M, E>, Iterate<M>>) -> usize {
 
 /// A solution belongs to a branch if it is off its prediction by no more than this fraction of the way.
 /// A factor of four fails `tests/mutations.rs::each_part_of_a_step_conserves_the_momentum_of_its_start`.
-const NEARBY: f64 = 0.1;
+pub(crate) const NEARBY: f64 = 0.1;
 /// Linear systems after which a way from rest is no longer direct, and its end no longer likely to be
 /// the solution that belongs to the start.
 /// A factor of four fails `tests/stiff.rs::a_step_to_the_edge_of_a_logarithm_does_not_excuse_its_energy`.
-const DIRECT: usize = 8;
+pub(crate) const DIRECT: usize = 8;
 
 /// Whether it is the edge of the domain that stops Newton's method at `u`: its correction leads out,
 /// cut to the length of the step, because a far longer one, from a Jacobian that is nearly singular,

@@ -23,7 +23,7 @@ impl<N: Dimension> Default for KeptJacobian<N> {
 
 /// Steps after which a Jacobian is formed again, because the sizes of the terms may have changed.
 /// A factor of four fails `tests/mutations.rs::the_friction_of_a_certificate_is_that_of_the_steps_however_long_a_jacobian_is_kept`.
-const STEPS: u32 = 100;
+pub(crate) const STEPS: u32 = 100;
 
 impl<N: Dimension> KeptJacobian<N> {
     /// Forgets a Jacobian that may not be tried for a step of size `h` with this guess of the displacement: the

@@ -36,7 +36,7 @@ impl<N: Dimension> MidpointMemory<N> {
 }
 
 /// The names of the displacements in a checkpoint.
-const NAMES: [&str; DIFFERENCES] = [
+pub(crate) const NAMES: [&str; DIFFERENCES] = [
     "displacement",
     "first difference",
     "second difference",

@@ -19,11 +19,11 @@ pub(crate) struct Predictor<N: Dimension> {
 pub(crate) const DIFFERENCES: usize = 8;
 /// The order from which on a difference has to fall well below the one before to count.
 /// A factor of four fails `midpoint/predictor.rs::a_high_difference_counts_where_it_falls_well_below_the_one_before`.
-const LOW: usize = 4;
+pub(crate) const LOW: usize = 4;
 /// The fraction of the squared difference before it that its own square may be: `1/4²`. Round-off grows by a factor
 /// of two from one order to the next.
 /// A factor of four fails `midpoint/predictor.rs::a_high_difference_counts_where_it_falls_well_below_the_one_before`.
-const FALLS: f64 = 0.0625;
+pub(crate) const FALLS: f64 = 0.0625;
 
 impl<N: Dimension> Default for Predictor<N> {
     fn default() -> Self {

@@ -19,20 +19,20 @@ use crate::step::{Dim, Flow as _, Laws, Numbers, Start};
 
 /// The largest distance by which an end is moved, relative to the step.
 /// A factor of four fails `tests/dependent_invariants.rs::a_casimir_of_so5_stays_where_the_entropy_depends_on_it`.
-const NEAR: f64 = 1e-2;
+pub(crate) const NEAR: f64 = 1e-2;
 
 /// The most corrections: a fall of the entropy by `10⁻⁴` is round-off after 20.
 /// A factor of four fails `tests/dependent_invariants.rs::a_casimir_of_so5_stays_where_the_entropy_depends_on_it`.
-const CORRECTIONS: usize = 32;
+pub(crate) const CORRECTIONS: usize = 32;
 
 /// The fraction of the round-off of a law that an invariant may be off by before an end is moved.
 /// A factor of four fails `tests/dependent_invariants.rs::a_casimir_of_so5_stays_where_the_entropy_depends_on_it`.
-const KEPT: f64 = 0.5;
+pub(crate) const KEPT: f64 = 0.5;
 
 /// The fraction of this by which the invariants may differ from the wanted ones. The entropy depends on them, and has
 /// to hold to its own round-off.
 /// A factor of four fails `tests/dependent_invariants.rs::a_casimir_of_so5_stays_where_the_entropy_depends_on_it`.
-const EXACT: f64 = 0.03;
+pub(crate) const EXACT: f64 = 0.03;
 
 /// A state and the laws there.
 type Restored<Y> = (Point<Y>, Laws<Numbers<Y>>);

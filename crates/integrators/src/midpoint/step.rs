@@ -16,8 +16,8 @@ use crate::round_off::compensation::Displaced;
 use crate::round_off::drift;
 use crate::step::failure::{Cause, Fallbacks};
 use crate::step::{
-    Compiled, Dim, Effort, Evidence, Flow as _, Laws, Promises, Refusal, Start, StepError,
-    StepStart, Stepper, Taken, name_of,
+    Compiled, Dim, Effort, Evidence, Flow as _, Laws, LineOfStep, Promises, Refusal, Start,
+    StepError, StepStart, Stepper, Taken, name_of,
 };
 
 impl<Y, R, W> Stepper<Y> for Scheme<R, W>
@@ -30,15 +30,16 @@ where
 
     const HAS_DEFAULT_BETWEEN: bool = true;
 
-    const IS_IMPLICIT: bool = R::IS_WEYL_MIDPOINT && W::IS_GONZALEZ;
+    const IS_IMPLICIT: bool = R::BASE_OF_LINES.is_some() && W::KIND.is_some();
 
     fn compiled(&self) -> Option<Compiled> {
         let &Self { newton, splits, .. } = self;
-        (R::IS_WEYL_MIDPOINT && W::IS_GONZALEZ).then_some(Compiled::Midpoint { newton, splits })
+        let line = LineOfStep { base: R::BASE_OF_LINES?, gradient: W::KIND? };
+        Some(Compiled::Midpoint { name: scheme_name::<R, W>, line, newton, splits })
     }
 
     fn name(&self) -> String {
-        format!("Scheme<{}, {}>", name_of::<R>(), name_of::<W>())
+        scheme_name::<R, W>()
     }
 
     fn order(&self) -> u32 {
@@ -71,6 +72,11 @@ where
             second_law: false,
         })
     }
+}
+
+/// The name of a scheme in a checkpoint.
+pub(crate) fn scheme_name<R, W>() -> String {
+    format!("Scheme<{}, {}>", name_of::<R>(), name_of::<W>())
 }
 
 /// A solution of the equation of a step.
@@ -195,7 +201,7 @@ fn evidence<M: Manifold>(root: &Root<M, Dissipated>, friction: f64) -> Evidence 
 
 /// The displacement by the velocity at a state, in units of round-off, from which on the state does not rest.
 /// A factor of four fails `midpoint/step.rs::a_state_with_a_velocity_does_not_rest`.
-const MOVES: f64 = 100.0;
+pub(crate) const MOVES: f64 = 100.0;
 
 /// Returns whether the motion at the start of a step leaves it, by the velocity, which no guess enters, and the inverse of the
 /// Jacobian.
@@ -214,7 +220,7 @@ fn moves<Y: Metriplectic>(
 
 /// The rate `h|K'|` of friction from which on the round-off of a solution may be large.
 /// A factor of four fails `midpoint/step.rs::a_solution_without_digits_is_one_of_very_stiff_friction`.
-const VERY_STIFF: f64 = 1e8;
+pub(crate) const VERY_STIFF: f64 = 1e8;
 
 /// Whether the round-off of a solution is small: if friction is so stiff that the slow motion has no digits
 /// beside it, the round-off of the displacement is as large as the displacement, and a state would seem to

@@ -6,11 +6,11 @@ use super::{Linearised, Rounding, SURE, Stiffness};
 
 /// The factor between the bound of round-off to first order and what is taken for round-off.
 /// A factor of four fails `tests/mutations.rs::the_friction_of_a_certificate_is_that_of_the_steps_however_long_a_jacobian_is_kept`.
-const MARGIN: f64 = 3.0;
+pub(crate) const MARGIN: f64 = 3.0;
 /// The error of `J⁻¹J` at which an inverse has no digits: the Jacobian is singular to round-off, as with
 /// friction that is 10¹⁶ times faster than the motion along no axis.
 /// A factor of four fails `newton/tests.rs::an_inverse_that_is_off_by_a_hundredth_is_none`.
-const INVERTED: f64 = 0.01;
+pub(crate) const INVERTED: f64 = 0.01;
 /// The inverse of a Jacobian, kept up to date by Broyden's rank-one corrections, and what it makes of
 /// the round-off of the equation.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -67,7 +67,7 @@ impl<N: Dimension> Inverse<N> {
     /// Whether as many corrections of the next guess as a Jacobian is worth are expected to be enough, the last
     /// one unchecked.
     pub(super) fn serves(&self) -> bool {
-        reaches(self.first, self.contraction, corrections::<N>(), SURE)
+        reaches(self.first, self.contraction, corrections(N::LEN), SURE)
     }
 
     /// The correction of a residual.
@@ -106,13 +106,13 @@ impl<N: Dimension> Inverse<N> {
 
 /// The corrections by a kept Jacobian that cost less than a new one. In dimension `n` the derivatives of the
 /// residual cost about as much as `n` residuals.
-pub(super) const fn corrections<N: Dimension>() -> usize {
-    if N::LEN > 6 { N::LEN / 2 } else { 3 }
+pub(crate) const fn corrections(n: usize) -> usize {
+    if n > 6 { n / 2 } else { 3 }
 }
 
 /// Whether a number of corrections with this contraction reduce a residual to a limit.
 #[inline]
-pub(super) fn reaches(residual: f64, contraction: f64, corrections: usize, limit: f64) -> bool {
+pub(crate) fn reaches(residual: f64, contraction: f64, corrections: usize, limit: f64) -> bool {
     let mut left = residual;
     for _ in 0..corrections {
         if left <= limit {

@@ -1,7 +1,7 @@
 //! Lists of numbers whose lengths are known at run time, or when this library is compiled.
 
 use std::fmt::Debug;
-use std::ops::{Deref, DerefMut, IndexMut};
+use std::ops::{Deref, DerefMut, Index, IndexMut};
 
 use crate::step::{Directions, Entries, Few, StateSpace, Values, Vector, norm};
 
@@ -72,6 +72,22 @@ impl<const N: usize> DerefMut for Array<N> {
     #[inline]
     fn deref_mut(&mut self) -> &mut [f64] {
         &mut self.0
+    }
+}
+
+impl<const N: usize> Index<usize> for Array<N> {
+    type Output = f64;
+
+    #[inline]
+    fn index(&self, i: usize) -> &f64 {
+        &self.0[i]
+    }
+}
+
+impl<const N: usize> IndexMut<usize> for Array<N> {
+    #[inline]
+    fn index_mut(&mut self, i: usize) -> &mut f64 {
+        &mut self.0[i]
     }
 }
 
@@ -165,9 +181,11 @@ fn at<const N: usize, const K: usize>(vectors: [&Array<N>; K], i: usize) -> [f64
 /// The lists of a flow.
 pub(crate) trait Lengths: Debug + 'static {
     /// The entries of a state.
-    type State: List;
+    type State: List + PartialEq;
     /// A number for each direction.
-    type Vector: Vector + List;
+    type Vector: Vector + List + IndexMut<usize, Output = f64>;
+    /// Numbers for each pair of directions, row by row.
+    type Matrix: List;
     /// A number for each further invariant.
     type Invariants: AsRef<[f64]> + IndexMut<usize, Output = f64> + Clone + Debug;
     /// A number for each law.
@@ -177,6 +195,9 @@ pub(crate) trait Lengths: Debug + 'static {
 
     /// Says whether there may be further invariants.
     const HAS_INVARIANTS: bool;
+
+    /// The number of directions, of which there are `count` if it is not known.
+    fn directions(count: usize) -> usize;
 
     /// The numbers of a slice.
     fn invariants(numbers: &[f64]) -> Self::Invariants;
@@ -189,11 +210,17 @@ pub struct AtRunTime;
 impl Lengths for AtRunTime {
     type State = Entries;
     type Vector = Directions;
+    type Matrix = Few<16>;
     type Invariants = Values;
     type Values = Few<3>;
     type Rows = Few<16>;
 
     const HAS_INVARIANTS: bool = true;
+
+    #[inline]
+    fn directions(count: usize) -> usize {
+        count
+    }
 
     #[inline]
     fn invariants(numbers: &[f64]) -> Values {
@@ -220,11 +247,17 @@ pub(crate) struct Known<const N: usize, const E: usize>;
 impl<const N: usize, const E: usize> Lengths for Known<N, E> {
     type State = [f64; E];
     type Vector = Array<N>;
+    type Matrix = [[f64; N]; N];
     type Invariants = [f64; 0];
     type Values = [f64; 2];
     type Rows = [[f64; N]; 2];
 
     const HAS_INVARIANTS: bool = false;
+
+    #[inline]
+    fn directions(_: usize) -> usize {
+        N
+    }
 
     #[inline]
     fn invariants(_: &[f64]) -> [f64; 0] {

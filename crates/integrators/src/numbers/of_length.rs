@@ -30,7 +30,7 @@ impl<'a, const N: usize, const E: usize> OfLength<'a, N, E> {
     }
 
     /// Returns the system that it asks.
-    const fn equations(&self) -> &Kept<'a> {
+    pub(crate) const fn equations(&self) -> &Kept<'a> {
         &self.system
     }
 }

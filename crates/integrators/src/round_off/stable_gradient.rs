@@ -3,7 +3,7 @@
 use std::borrow::Borrow;
 
 use metriplectic_fields::{
-    Column, Dimension, Matrix, Real, ScalarField, Space, Square, Vector, along_slopes, power_of_two,
+    Column, Dimension, Matrix, ScalarField, Space, Square, Vector, along_slopes, power_of_two,
 };
 use metriplectic_manifolds::{InnerProduct, Manifold, MetricSlopes, Nodes, StepPathJet};
 
@@ -85,8 +85,27 @@ fn safer<M: Space>(
     rounding: f64,
 ) -> (f64, f64) {
     let middle = middle.as_ref().map_or_else(base, |z| f.at_real(z).eps1);
-    let integral = Integral::new([f.at_real(x), f.at_real(y)], middle, slope);
+    let slopes = [x, y].map(|x| {
+        let f = f.at_real(x);
+        [f.eps1, f.eps1eps2]
+    });
+    integral(slopes, middle, slope, rounding)
+}
+
+/// The defect as an integral, and its weight against a difference with the error `rounding`, from the first and the second
+/// derivative of `F` at both ends of a path and the first one in its middle, less the slope `⟨w̄, d⟩`.
+#[inline]
+pub(crate) fn integral(ends: [[f64; 2]; 2], middle: f64, slope: f64, rounding: f64) -> (f64, f64) {
+    let integral = Integral::new(ends, middle, slope);
     (integral.value, integral.weight(rounding))
+}
+
+/// How far the derivative of a defect, a difference of nearly equal numbers, is above its own round-off: 1 where it is, and 0 where
+/// nothing is left of it.
+#[inline]
+pub(crate) fn trust(change: f64, rounding: f64) -> f64 {
+    let noise = 1e3 * rounding / change.max(f64::MIN_POSITIVE);
+    (1.0 + noise.powi(2)).recip()
 }
 
 impl<M: Manifold> StableGradient<M> {
@@ -124,14 +143,6 @@ impl<M: Manifold> StableGradient<M> {
     #[must_use]
     pub fn reversed(&self) -> Self {
         Self { defect: -self.defect, ..self.clone() }
-    }
-
-    /// How far the derivative of the defect, a difference of nearly equal numbers, is above its own round-off: 1 where it is,
-    /// and 0 where nothing is left of it.
-    #[inline]
-    fn trust(&self) -> f64 {
-        let noise = 1e3 * self.rounding / self.change.max(f64::MIN_POSITIVE);
-        (1.0 + noise.powi(2)).recip()
     }
 
     /// Returns whether the path is so short that a difference of values has lost digits.
@@ -181,7 +192,7 @@ impl<M: Manifold> StableGradient<M> {
         path: &StepPathJet<M>,
         (dmean, df_end): (&Matrix<M>, &Vector<M>),
     ) -> Matrix<M> {
-        let rows = self.defect_slope(path, (dmean, df_end)) * self.trust();
+        let rows = self.defect_slope(path, (dmean, df_end)) * trust(self.change, self.rounding);
         Self::corrected_slope((self.defect + drift_correction, rows), at, path, dmean)
     }
 
@@ -280,12 +291,12 @@ impl Integral {
     /// From `f`, `f'` at both ends of the path (first and second derivative of `F`) and `f` in its
     /// middle, less the slope `⟨w̄, d⟩`. The error is estimated by the difference to Simpson's rule.
     #[inline]
-    fn new([start, end]: [Real; 2], middle: f64, slope: f64) -> Self {
-        let (f0, f1, f2) = (start.eps1 - slope, middle - slope, end.eps1 - slope);
-        let ends = end.eps1eps2 - start.eps1eps2;
+    fn new([start, end]: [[f64; 2]; 2], middle: f64, slope: f64) -> Self {
+        let (f0, f1, f2) = (start[0] - slope, middle - slope, end[0] - slope);
+        let ends = end[1] - start[1];
         let value = (7.0 * (f0 + f2) + 16.0 * f1) / 30.0 - ends / 60.0;
         let simpson = (f0 + f2 + 4.0 * f1) / 6.0;
-        let size = start.eps1.abs() + middle.abs() + end.eps1.abs();
+        let size = start[0].abs() + middle.abs() + end[0].abs();
         Self { value, error: (value - simpson).abs() + f64::EPSILON * size }
     }
 
@@ -299,6 +310,7 @@ impl Integral {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use metriplectic_fields::Real;
     use metriplectic_manifolds::{Canonical, Euclidean};
     use nalgebra::{Vector2, vector};
     use num_dual::DualNum;

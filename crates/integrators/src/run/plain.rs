@@ -3,6 +3,7 @@
 use metriplectic_equations::Equations;
 
 use crate::compiled;
+use crate::implicit::NotImplicit;
 use crate::numbers::{Answered, FromEquations, InTypes};
 use crate::run::error::RunError;
 use crate::run::event::Event;
@@ -14,8 +15,8 @@ use crate::run::trajectory::Trajectory;
 use crate::step::in_plain::{InPlainNumbers, MethodInTypes};
 use crate::step::panicked::caught;
 use crate::step::{
-    Compiled, Element, Entries, Flow, FlowError, FlowVisitor, PlainFlow, PlainMethod, PlainNumbers,
-    Stepper, Written, in_room,
+    Compiled, Element, Entries, Flow, FlowError, FlowVisitor, MethodError, PlainFlow, PlainMethod,
+    PlainNumbers, Stepper, Written, in_room,
 };
 
 /// A run of a method over a schedule, in the types of a flow or in plain numbers.
@@ -99,8 +100,8 @@ impl<F: Written, M: Stepper<F>> FlowVisitor<F> for WholeInNumbers<F, M> {
     }
 
     fn own(self, flow: &F, system: &dyn Equations) -> Outcome {
-        // A constant, so that an explicit method is not compiled with each system.
-        if const { M::IS_EXPLICIT } {
+        // A constant, so that the method is not compiled with each system.
+        if const { M::IS_EXPLICIT || M::IS_IMPLICIT } {
             let Self { method, x0, schedule } = self;
             return run_own(method.compiled(), system, F::write(&x0), schedule);
         }
@@ -139,18 +140,19 @@ fn run(
     in_room(flow, || Steps::start_any(method, (flow, flow), x0, schedule)?.run())
 }
 
-/// Runs a system of one's own by an explicit method. It may panic.
+/// Runs a system of one's own, which may panic.
 fn run_own(
     method: Option<Compiled>,
     system: &dyn Equations,
     x0: Entries,
     schedule: Schedule,
 ) -> Outcome {
-    let method = method.and_then(compiled::explicit).expect("a constant says that it is explicit");
     let flow = &FromEquations(system);
     let in_numbers = InPlainNumbers::from(flow, x0);
     let start = (&in_numbers as &PlainFlow<'_>, Entries::zeros(0));
-    without_panics(|| run(&MethodInTypes { method, flow }, start, schedule))
+    let run = |method: &dyn PlainMethod| without_panics(|| run(method, start, schedule));
+    let done = method.and_then(|method| compiled::with_own(method, flow, run));
+    done.unwrap_or_else(|| Err(MethodError::new(NotImplicit::Scheme).into()))
 }
 
 /// Runs a system by a method that is compiled with the library.

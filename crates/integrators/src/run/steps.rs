@@ -58,6 +58,7 @@ impl<'a, F: Flow + ?Sized, M: Stepper<F>> Steps<'a, F, M> {
     ) -> Result<Self, RunError<F::Space>> {
         schedule.check()?;
         method.check(!schedule.is_fixed())?;
+        method.serves(flow)?;
         let said = Said::by(&method, flow, schedule.start);
         let course = Course::start(any, said, x0, schedule)?;
         let memory = method.memory();

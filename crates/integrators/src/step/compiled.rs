@@ -4,6 +4,20 @@ use std::any::Any;
 
 use crate::newton::Newton;
 
+/// The discrete gradients of this library.
+#[doc(hidden)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum GradientKind {
+    /// [`Gonzalez`](crate::Gonzalez).
+    Gonzalez,
+    /// [`MeanValue`](crate::MeanValue).
+    MeanValue,
+    /// [`ItohAbe`](crate::ItohAbe).
+    ItohAbe,
+    /// [`SymmetricItohAbe`](crate::SymmetricItohAbe).
+    SymmetricItohAbe,
+}
+
 /// A method with its options, whose steps in plain numbers are compiled with the library.
 #[derive(Clone, Copy, Debug)]
 #[doc(hidden)]
@@ -11,8 +25,12 @@ use crate::newton::Newton;
 pub enum Compiled {
     /// An explicit method, by its [`Tableau`](crate::Tableau), which this module does not know.
     Explicit(&'static (dyn Any + Send + Sync)),
-    /// The scheme of the Weyl midpoint with the discrete gradient of Gonzalez.
+    /// A scheme.
     Midpoint {
+        /// Its name in a checkpoint.
+        name: fn() -> String,
+        /// The path on a vector space and the discrete gradient.
+        line: LineOfStep,
         /// Solves the equation of a step.
         newton: Newton,
         /// How often a step that is not solved is split in halves.
@@ -28,6 +46,16 @@ pub enum Compiled {
         /// Its stages.
         stages: usize,
     },
+}
+
+/// The step of a scheme on a vector space: a straight line with its base point, and a discrete gradient.
+#[doc(hidden)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LineOfStep {
+    /// Where the base point is, as a fraction of the displacement.
+    pub base: f64,
+    /// The discrete gradient.
+    pub gradient: GradientKind,
 }
 
 /// Calls a macro with the directions and the entries with which explicit methods are compiled with the library.

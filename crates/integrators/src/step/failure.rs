@@ -47,14 +47,14 @@ pub(crate) const HALVES: u32 = 12;
 
 /// Follows the solutions that begin at rest to the whole step, by fractions of its size: an increment doubles after
 /// a solution and is quartered after a failure. `solve` is given a solution with its fraction, and the next fraction.
-pub(crate) fn continue_in_step_size<T: Copy>(
+pub(crate) fn continue_in_step_size<T: Clone>(
     rest: T,
     mut solve: impl FnMut((T, f64), f64) -> Option<T>,
 ) -> Option<T> {
     let (mut reached, mut increment) = ((rest, 0.0), 0.125);
     for _ in 0..INCREMENTS {
         let next = f64::min(reached.1 + increment, 1.0);
-        match solve(reached, next) {
+        match solve(reached.clone(), next) {
             Some(found) if next >= 1.0 => return Some(found),
             Some(found) => (reached, increment) = ((found, next), 2.0 * increment),
             None => increment *= 0.25,

@@ -320,7 +320,8 @@ impl<F: Written, M: Stepper<F>> PlainMethod for MethodInTypes<'_, F, M> {
     }
 
     fn check(&self, follows_tolerance: bool) -> Result<(), MethodError> {
-        self.method.check(follows_tolerance)
+        self.method.check(follows_tolerance)?;
+        self.method.serves(self.flow)
     }
 
     fn step<'a>(

@@ -6,12 +6,12 @@ macro_rules! passed_on {
     ($flow:ty, $this:ident => $other:expr) => {
         fn name(&self) -> String {
             let $this = self;
-            $other.name()
+            $crate::step::Stepper::<$flow>::name(&$other)
         }
 
         fn order(&self) -> u32 {
             let $this = self;
-            $other.order()
+            $crate::step::Stepper::<$flow>::order(&$other)
         }
 
         fn promises(&self, flow: &$flow) -> $crate::step::Promises {
@@ -21,7 +21,7 @@ macro_rules! passed_on {
 
         fn damps(&self) -> bool {
             let $this = self;
-            $other.damps()
+            $crate::step::Stepper::<$flow>::damps(&$other)
         }
 
         fn noise(&self, flow: &$flow) -> Option<$crate::step::NoiseSummary> {
@@ -31,17 +31,22 @@ macro_rules! passed_on {
 
         fn nothing_between(&self, time: f64, h: f64) -> $crate::step::StepError {
             let $this = self;
-            $other.nothing_between(time, h)
+            $crate::step::Stepper::<$flow>::nothing_between(&$other, time, h)
         }
 
         fn check(&self, follows_tolerance: bool) -> Result<(), $crate::step::MethodError> {
             let $this = self;
-            $other.check(follows_tolerance)
+            $crate::step::Stepper::<$flow>::check(&$other, follows_tolerance)
+        }
+
+        fn serves(&self, flow: &$flow) -> Result<(), $crate::step::MethodError> {
+            let $this = self;
+            $other.serves(flow)
         }
 
         fn memory(&self) -> Self::Memory {
             let $this = self;
-            $other.memory()
+            $crate::step::Stepper::<$flow>::memory(&$other)
         }
 
         fn step(
@@ -66,7 +71,7 @@ macro_rules! passed_on {
 
         fn control(&self) -> $crate::step::Control {
             let $this = self;
-            $other.control()
+            $crate::step::Stepper::<$flow>::control(&$other)
         }
 
         fn error(

@@ -241,6 +241,22 @@ impl Directions {
     }
 }
 
+impl Index<usize> for Directions {
+    type Output = f64;
+
+    #[inline]
+    fn index(&self, i: usize) -> &f64 {
+        &self.all[i]
+    }
+}
+
+impl IndexMut<usize> for Directions {
+    #[inline]
+    fn index_mut(&mut self, i: usize) -> &mut f64 {
+        &mut self.all[i]
+    }
+}
+
 /// The arrays of vectors, if their numbers stand in them, and how many there are.
 #[inline(always)]
 fn here<const K: usize>(vectors: [&Directions; K]) -> Option<(usize, [&[f64; 8]; K])> {

@@ -74,6 +74,16 @@ pub trait Stepper<F: Flow + ?Sized>: Sized {
         Ok(())
     }
 
+    /// Refuses a flow of which the method has no steps.
+    ///
+    /// # Errors
+    ///
+    /// The method's own error.
+    fn serves(&self, flow: &F) -> Result<(), MethodError> {
+        let _ = flow;
+        Ok(())
+    }
+
     /// Takes a step of size `h`, in parts if needed.
     ///
     /// A run calls it in the [room](Flow::room) of the flow ([`in_room`](super::in_room)); so does a caller that steps a large system by itself.

@@ -1,0 +1,473 @@
+//! Systems whose parts are known apart, with derivatives by differences.
+
+use crate::{
+    Covectors, ENERGY, ENTROPY, Equations, Jet, Kind, MetricError, Model, Part, PointError,
+    SecondLaw, Sizes,
+};
+
+/// A system on a vector space whose bracket and friction are known apart.
+///
+/// [`Differences`] makes it a [`Model`], of which implicit methods take steps.
+pub trait Apart: Equations {
+    /// Returns whether a part is zero by construction.
+    fn is_zero(&self, part: Part) -> bool;
+
+    /// Returns whether the bracket is to satisfy the Jacobi identity.
+    fn is_poisson(&self) -> bool {
+        true
+    }
+
+    /// Computes the vector `Π α`, `f(w)` or `K_w α` of a part at a state, or numbers that are not finite where it has none. It is
+    /// linear in `α`, which a force does not have. A friction annihilates `w`, the covector of the energy.
+    fn apply(&self, part: Part, t: f64, x: &[f64], w: Covectors<'_>, alpha: &[f64], v: &mut [f64]);
+}
+
+/// A system whose derivatives are formed by central differences: Hessians from differentials, and those of its parts.
+///
+/// Implicit methods need them for Newton's method alone, so both laws are exact, and a step differs by round-off from that with
+/// derivatives by hand. It lives on a vector space with the canonical inner product: charts are translations, and sizes
+/// `|x_i|`.
+///
+/// A pendulum with friction that heats a bath, `q' = p, p' = −sin q − γ p/T, u' = γ p²/T` with the temperature `T = 1 + u`:
+///
+/// ```
+/// use metriplectic_equations::{
+///     Apart, Covectors, Differences, ENERGY, ENTROPY, Equations, Part, SecondLaw, Sizes, laws,
+/// };
+///
+/// struct Pendulum {
+///     friction: f64,
+/// }
+///
+/// impl Equations for Pendulum {
+///     fn sizes(&self) -> Sizes {
+///         Sizes { entries: 3, directions: 3, laws: 2 }
+///     }
+///
+///     fn values(&self, _: f64, x: &[f64], values: &mut [f64]) {
+///         values[ENERGY] = 0.5 * x[1] * x[1] - x[0].cos() + x[2];
+///         values[ENTROPY] = (1.0 + x[2]).ln();
+///     }
+///
+///     fn differentials(&self, t: f64, x: &[f64], values: &mut [f64], w: &mut [f64]) {
+///         self.values(t, x, values);
+///         w.copy_from_slice(&[x[0].sin(), x[1], 1.0, 0.0, 0.0, 1.0 / (1.0 + x[2])]);
+///     }
+///
+///     fn velocity(&self, _: f64, x: &[f64], v: &mut [f64]) -> Option<f64> {
+///         let rate = self.friction / (1.0 + x[2]);
+///         v.copy_from_slice(&[x[1], -x[0].sin() - rate * x[1], rate * x[1] * x[1]]);
+///         Some(v[2] / (1.0 + x[2]))
+///     }
+///
+///     fn second_law(&self) -> SecondLaw {
+///         SecondLaw::Exact
+///     }
+/// }
+///
+/// impl Apart for Pendulum {
+///     fn is_zero(&self, part: Part) -> bool {
+///         part == Part::Gyroscopic
+///     }
+///
+///     fn apply(&self, part: Part, _: f64, _: &[f64], w: Covectors<'_>, alpha: &[f64], v: &mut [f64]) {
+///         if part == Part::Reversible {
+///             return v.copy_from_slice(&[alpha[1], -alpha[0], 0.0]);
+///         }
+///         // K = γ b bᵀ with ⟨w, b⟩ = 0.
+///         let b = [0.0, -1.0, w.energy[1] / w.energy[2]];
+///         let along = self.friction * (b[1] * alpha[1] + b[2] * alpha[2]);
+///         (0..3).for_each(|i| v[i] = along * b[i]);
+///     }
+/// }
+///
+/// let system = Differences(Pendulum { friction: 0.1 });
+/// let (x, u) = ([0.5, 0.3, 0.2], [0.1, -0.2, 0.15]);
+/// laws::equations(&system, 0.0, &x, &u)?;
+/// laws::model(system.model().unwrap(), 0.0, &x, &u)?;
+/// # Ok::<(), metriplectic_equations::BrokenLaw>(())
+/// ```
+#[derive(Clone, Copy, Debug)]
+pub struct Differences<S>(pub S);
+
+/// The step of a difference quotient, relative to a size: near the third root of round-off, where the errors of a central difference
+/// by truncation and by round-off are equal.
+const STEP: f64 = 6e-6;
+
+impl<S: Apart> Equations for Differences<S> {
+    fn sizes(&self) -> Sizes {
+        self.0.sizes()
+    }
+
+    fn values(&self, t: f64, x: &[f64], values: &mut [f64]) {
+        self.0.values(t, x, values);
+    }
+
+    fn differentials(&self, t: f64, x: &[f64], values: &mut [f64], w: &mut [f64]) {
+        self.0.differentials(t, x, values, w);
+    }
+
+    fn velocity(&self, t: f64, x: &[f64], v: &mut [f64]) -> Option<f64> {
+        self.0.velocity(t, x, v)
+    }
+
+    fn second_law(&self) -> SecondLaw {
+        self.0.second_law()
+    }
+
+    fn kind(&self, invariant: usize) -> Kind {
+        self.0.kind(invariant)
+    }
+
+    fn check(&self, x: &[f64]) -> Result<(), PointError> {
+        self.0.check(x)
+    }
+
+    fn defect(&self, x: &[f64]) -> f64 {
+        self.0.defect(x)
+    }
+
+    fn is_vector_space(&self) -> bool {
+        true
+    }
+
+    fn velocity_with(&self, t: f64, x: &[f64], w: &[f64], v: &mut [f64]) -> Option<f64> {
+        self.0.velocity_with(t, x, w, v)
+    }
+
+    fn is_verified(&self) -> bool {
+        self.0.is_verified()
+    }
+
+    fn model(&self) -> Option<&dyn Model> {
+        Some(self)
+    }
+}
+
+/// `x + s u`.
+fn moved(x: &[f64], s: f64, u: &[f64]) -> Vec<f64> {
+    x.iter().zip(u).map(|(x, u)| x + s * u).collect()
+}
+
+fn unit(n: usize, k: usize) -> Vec<f64> {
+    (0..n).map(|i| if i == k { 1.0 } else { 0.0 }).collect()
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+/// The central difference quotient of numbers that a function of one parameter fills.
+fn quotient(step: f64, to: &mut [f64], f: impl Fn(f64, &mut [f64])) {
+    let mut before = vec![0.0; to.len()];
+    f(step, to);
+    f(-step, &mut before);
+    to.iter_mut().zip(before).for_each(|(to, before)| *to = (*to - before) / (2.0 * step));
+}
+
+/// The largest step along a vector that moves each entry by its [`STEP`] at most.
+fn step_along(u: &[f64], sizes: &[f64]) -> f64 {
+    let pairs = u.iter().zip(sizes).filter(|(u, _)| **u != 0.0);
+    let most = pairs.fold(f64::INFINITY, |most, (u, size)| most.min(size / u.abs()));
+    STEP * if most.is_finite() { most } else { 1.0 }
+}
+
+impl<S: Apart> Differences<S> {
+    fn n(&self) -> usize {
+        self.0.sizes().directions
+    }
+
+    /// All laws with their differentials.
+    fn jets(&self, t: f64, x: &[f64]) -> [Vec<f64>; 2] {
+        let Sizes { laws, directions, .. } = self.0.sizes();
+        let [mut values, mut w] = [laws, laws * directions].map(|count| vec![0.0; count]);
+        self.0.differentials(t, x, &mut values, &mut w);
+        [values, w]
+    }
+
+    /// The sizes of the entries: their own; else the distance over which energy or entropy changes by the terms of the other entries;
+    /// else that which the velocity covers while it changes another entry by its size; else the largest one.
+    fn sizes_at(&self, t: f64, x: &[f64]) -> Vec<f64> {
+        let n = self.n();
+        let [_, w] = self.jets(t, x);
+        let own: Vec<f64> = x.iter().map(|x| x.abs()).collect();
+        let largest = own.iter().copied().fold(0.0, f64::max);
+        if own.iter().all(|size| *size > 0.0) {
+            return own;
+        }
+        let mut v = vec![0.0; n];
+        let has_velocity = self.0.velocity(t, x, &mut v).is_some();
+        let times = own.iter().zip(&v).filter(|(x, v)| **x > 0.0 && **v != 0.0);
+        let time = times.map(|(x, v)| x / v.abs()).fold(f64::INFINITY, f64::min);
+        let size = |i: usize| {
+            let by_law = [ENERGY, ENTROPY].into_iter().find_map(|law| {
+                let df = &w[law * n..][..n];
+                let terms: f64 = df.iter().zip(&own).map(|(df, x)| (df * x).abs()).sum();
+                let distance = terms / df[i].abs();
+                (distance > 0.0 && distance.is_finite()).then_some(distance)
+            });
+            let by_velocity = || {
+                let distance = v[i].abs() * time;
+                (has_velocity && distance > 0.0 && distance.is_finite()).then_some(distance)
+            };
+            let others = if largest > 0.0 { largest } else { 1.0 };
+            by_law.or_else(by_velocity).unwrap_or(others)
+        };
+        (0..n).map(|i| if own[i] > 0.0 { own[i] } else { size(i) }).collect()
+    }
+
+    /// The sizes of the components of a covector in units of these sizes of the entries.
+    fn covector_sizes(w: &[f64], sizes: &[f64]) -> Vec<f64> {
+        let terms: f64 = w.iter().zip(sizes).map(|(w, size)| (w * size).abs()).sum();
+        let size = |(w, size): (&f64, &f64)| match (w.abs(), terms / size) {
+            (own, _) if own > 0.0 => own,
+            (_, shared) if shared > 0.0 => shared,
+            _ => 1.0,
+        };
+        w.iter().zip(sizes).map(size).collect()
+    }
+
+    /// The vector of a part; an error where it has none.
+    fn vector(
+        &self,
+        part: Part,
+        t: f64,
+        x: &[f64],
+        w: Covectors<'_>,
+        alpha: &[f64],
+        v: &mut [f64],
+    ) -> Result<(), MetricError> {
+        self.0.apply(part, t, x, w, alpha, v);
+        let bad = v.iter().find(|v| !v.is_finite());
+        let quantity = "a velocity of a part";
+        bad.map_or(Ok(()), |&value| Err(MetricError::NotFinite { quantity, value }))
+    }
+
+    /// A matrix whose columns are quotients along each direction, with steps of these sizes.
+    fn columns(sizes: &[f64], to: &mut [f64], f: impl Fn(&[f64], f64, &mut [f64])) {
+        let n = sizes.len();
+        let mut column = vec![0.0; n];
+        for (k, size) in sizes.iter().enumerate() {
+            let e = unit(n, k);
+            quotient(STEP * size, &mut column, |s, v| f(&e, s, v));
+            (0..n).for_each(|i| to[i * n + k] = column[i]);
+        }
+    }
+}
+
+impl<S: Apart> Model for Differences<S> {
+    fn is_zero(&self, part: Part) -> bool {
+        self.0.is_zero(part)
+    }
+
+    fn is_poisson(&self) -> bool {
+        self.0.is_poisson()
+    }
+
+    fn has_canonical_metric(&self) -> bool {
+        true
+    }
+
+    fn has_derivatives_by_differences(&self) -> bool {
+        true
+    }
+
+    fn value(&self, law: usize, t: f64, x: &[f64]) -> f64 {
+        let mut values = vec![0.0; self.0.sizes().laws];
+        self.0.values(t, x, &mut values);
+        values[law]
+    }
+
+    fn along(&self, law: usize, t: f64, x: &[f64], [u, v]: [&[f64]; 2]) -> [f64; 4] {
+        let mut df = vec![0.0; u.len()];
+        let value = self.jet(law, t, x, &mut df);
+        let step = step_along(u, &self.sizes_at(t, x));
+        let mut change = df.clone();
+        quotient(step, &mut change, |s, df| {
+            self.jet(law, t, &moved(x, s, u), df);
+        });
+        [value, dot(&df, u), dot(&df, v), dot(&change, v)]
+    }
+
+    fn jet(&self, law: usize, t: f64, x: &[f64], df: &mut [f64]) -> f64 {
+        let [values, w] = self.jets(t, x);
+        let n = df.len();
+        df.copy_from_slice(&w[law * n..][..n]);
+        values[law]
+    }
+
+    fn hessian(&self, law: usize, t: f64, x: &[f64], df: &mut [f64], hf: &mut [f64]) -> f64 {
+        let n = df.len();
+        let mut columns = vec![0.0; n * n];
+        Self::columns(&self.sizes_at(t, x), &mut columns, |e, s, df| {
+            self.jet(law, t, &moved(x, s, e), df);
+        });
+        for k in 0..n * n {
+            hf[k] = 0.5 * (columns[k] + columns[k % n * n + k / n]);
+        }
+        self.jet(law, t, x, df)
+    }
+
+    fn differential_at(&self, law: usize, t: f64, x: &[f64], q: &[f64], df: &mut [f64]) {
+        self.jet(law, t, &moved(x, 1.0, q), df);
+    }
+
+    fn independence(&self, t: f64, x: &[f64], fractions: &mut [f64]) {
+        if fractions.is_empty() {
+            return;
+        }
+        let (n, [_, w], sizes) = (self.n(), self.jets(t, x), self.sizes_at(t, x));
+        let in_units =
+            |law: usize| -> Vec<f64> { (0..n).map(|i| w[law * n + i] * sizes[i]).collect() };
+        let mut before: Vec<Vec<f64>> = Vec::new();
+        let mut push = |law: usize| {
+            let whole = in_units(law);
+            let mut rest = whole.clone();
+            // The second pass removes the rounding error of the first.
+            for _ in 0..2 {
+                for normal in &before {
+                    let c = dot(normal, &rest);
+                    rest.iter_mut().zip(normal).for_each(|(rest, normal)| *rest -= c * normal);
+                }
+            }
+            let [size, left] = [dot(&whole, &whole).sqrt(), dot(&rest, &rest).sqrt()];
+            if left > 0.0 {
+                before.push(rest.iter().map(|rest| rest / left).collect());
+            }
+            if size > 0.0 { left / size } else { 0.0 }
+        };
+        if self.second_law() == SecondLaw::Exact {
+            push(ENTROPY);
+        }
+        push(ENERGY);
+        for (k, fraction) in fractions.iter_mut().enumerate() {
+            *fraction = push(ENTROPY + 1 + k);
+        }
+    }
+
+    fn metric(&self, _: &[f64], _: &[f64], g: &mut [f64]) {
+        let n = self.n();
+        (0..n * n).for_each(|k| g[k] = if k % (n + 1) == 0 { 1.0 } else { 0.0 });
+    }
+
+    fn check_metric(&self, _: &[f64], _: bool) -> Result<(), MetricError> {
+        Ok(())
+    }
+
+    fn metric_slopes(&self, _: &[f64], _: &mut [f64]) -> bool {
+        false
+    }
+
+    fn flat(&self, _: &[f64], d: &[f64], w: &mut [f64]) -> Result<(), MetricError> {
+        w.copy_from_slice(d);
+        Ok(())
+    }
+
+    fn tensor(
+        &self,
+        part: Part,
+        t: f64,
+        x: &[f64],
+        w: Covectors<'_>,
+        tensor: &mut [f64],
+    ) -> Result<(), MetricError> {
+        let n = self.n();
+        let mut column = vec![0.0; n];
+        for k in 0..n {
+            self.vector(part, t, x, w, &unit(n, k), &mut column)?;
+            (0..n).for_each(|i| tensor[i * n + k] = column[i]);
+        }
+        Ok(())
+    }
+
+    fn apply(
+        &self,
+        part: Part,
+        t: f64,
+        (x, q): (&[f64], &[f64]),
+        w: Covectors<'_>,
+        alpha: &[f64],
+        v: &mut [f64],
+    ) -> Result<(), MetricError> {
+        self.vector(part, t, &moved(x, 1.0, q), w, alpha, v)
+    }
+
+    fn linearise(
+        &self,
+        part: Part,
+        t: f64,
+        x: &[f64],
+        w: Covectors<'_>,
+        alpha: &[f64],
+        jet: &mut Jet<'_>,
+    ) -> Result<(), MetricError> {
+        self.vector(part, t, x, w, alpha, jet.value)?;
+        let sizes = self.sizes_at(t, x);
+        Self::columns(&sizes, jet.along_x, |e, s, v| {
+            self.0.apply(part, t, &moved(x, s, e), w, alpha, v);
+        });
+        let along = |energy: bool, to: &mut [f64]| {
+            let covector = if energy { w.energy } else { w.entropy };
+            Self::columns(&Self::covector_sizes(covector, &sizes), to, |e, s, v| {
+                let moved = &moved(covector, s, e)[..];
+                let w = if energy {
+                    Covectors { energy: moved, ..w }
+                } else {
+                    Covectors { entropy: moved, ..w }
+                };
+                self.0.apply(part, t, x, w, alpha, v);
+            });
+        };
+        along(part == Part::Irreversible, jet.along_w);
+        if part == Part::Gyroscopic {
+            along(true, jet.tensor);
+            return Ok(());
+        }
+        self.tensor(part, t, x, w, jet.tensor)
+    }
+
+    fn bracket_slope(
+        &self,
+        t: f64,
+        x: &[f64],
+        along: [&[f64]; 2],
+        entropy: &[f64],
+        slope: &mut [f64],
+    ) -> Result<(), MetricError> {
+        let n = self.n();
+        let mut column = vec![0.0; n];
+        for k in 0..n {
+            self.bracket_slope_of(t, x, along, entropy, &unit(n, k), &mut column)?;
+            (0..n).for_each(|i| slope[i * n + k] = column[i]);
+        }
+        Ok(())
+    }
+
+    fn bracket_slope_of(
+        &self,
+        t: f64,
+        x: &[f64],
+        [u, ds]: [&[f64]; 2],
+        entropy: &[f64],
+        alpha: &[f64],
+        slope: &mut [f64],
+    ) -> Result<(), MetricError> {
+        let step = step_along(u, &self.sizes_at(t, x));
+        quotient(step, slope, |s, v| {
+            let moved_entropy = moved(entropy, s, ds);
+            // A bracket depends on no covector of the energy.
+            let w = Covectors { energy: &moved_entropy, entropy: &moved_entropy };
+            self.0.apply(Part::Reversible, t, &moved(x, s, u), w, alpha, v);
+        });
+        Ok(())
+    }
+
+    fn generator(&self, _: usize, _: &[f64], _: &mut [f64], _: &mut [f64]) -> bool {
+        false
+    }
+
+    fn action(&self, _: usize, x: &[f64], _: f64, y: &mut [f64], tangent: &mut [f64]) {
+        y.copy_from_slice(x);
+        self.metric(x, x, tangent);
+    }
+}

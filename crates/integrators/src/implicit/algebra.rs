@@ -1,0 +1,281 @@
+//! Vectors and matrices of a length that is known at run time, or when this library is compiled.
+
+use std::fmt;
+use std::ops::{Index, IndexMut};
+
+use metriplectic_fields::length;
+
+use crate::numbers::{Lengths, List};
+
+/// The vector of `n` numbers that are given by their index.
+#[inline]
+pub(super) fn vector<V: List>(n: usize, mut number: impl FnMut(usize) -> f64) -> V {
+    let mut v = V::room(|| n);
+    v.numbers_mut().iter_mut().enumerate().for_each(|(i, to)| *to = number(i));
+    v
+}
+
+/// `Σ_i a_i b_i`.
+#[inline]
+pub(super) fn dot(a: &impl List, b: &impl List) -> f64 {
+    let mut terms = a.numbers().iter().zip(b.numbers()).map(|(a, b)| a * b);
+    let first = terms.next().unwrap_or(0.0);
+    terms.fold(first, |sum, term| sum + term)
+}
+
+/// `Σ_i |a_i| |b_i|`.
+#[inline]
+pub(super) fn sum_of_terms(a: &impl List, b: &impl List) -> f64 {
+    let mut terms = a.numbers().iter().zip(b.numbers()).map(|(a, b)| (a * b).abs());
+    let first = terms.next().unwrap_or(0.0);
+    terms.fold(first, |sum, term| sum + term)
+}
+
+/// The Euclidean norm, also if squares overflow or underflow.
+#[inline]
+pub(super) fn magnitude(v: &impl List) -> f64 {
+    length(v.numbers())
+}
+
+/// Returns whether every number is finite.
+#[inline]
+pub(super) fn is_finite(v: &impl List) -> bool {
+    v.numbers().iter().fold(0.0, |sum, v| sum + 0.0 * v) == 0.0
+}
+
+/// `v += c w`.
+#[inline]
+pub(super) fn add(v: &mut impl List, c: f64, w: &impl List) {
+    v.numbers_mut().iter_mut().zip(w.numbers()).for_each(|(v, w)| *v += w * c);
+}
+
+/// A square matrix, row by row.
+pub(super) struct Matrix<L: Lengths> {
+    n: usize,
+    a: L::Matrix,
+}
+
+// By hand, because lengths have neither.
+impl<L: Lengths> Clone for Matrix<L> {
+    #[inline]
+    fn clone(&self) -> Self {
+        Self { n: self.n, a: self.a.clone() }
+    }
+}
+
+impl<L: Lengths> fmt::Debug for Matrix<L> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_list().entries(self.a.numbers().chunks(self.n().max(1))).finish()
+    }
+}
+
+impl<L: Lengths> Index<(usize, usize)> for Matrix<L> {
+    type Output = f64;
+
+    #[inline]
+    fn index(&self, (i, j): (usize, usize)) -> &f64 {
+        &self.a.numbers()[i * self.n() + j]
+    }
+}
+
+impl<L: Lengths> IndexMut<(usize, usize)> for Matrix<L> {
+    #[inline]
+    fn index_mut(&mut self, (i, j): (usize, usize)) -> &mut f64 {
+        let n = self.n();
+        &mut self.a.numbers_mut()[i * n + j]
+    }
+}
+
+impl<L: Lengths> Matrix<L> {
+    /// The matrix of zeros.
+    #[inline]
+    pub(super) fn zeros(n: usize) -> Self {
+        Self { n, a: L::Matrix::room(|| n * n) }
+    }
+
+    /// The matrix whose entry in row `i`, column `j` is `f(i, j)`.
+    #[inline]
+    pub(super) fn of(n: usize, f: impl Fn(usize, usize) -> f64) -> Self {
+        let mut matrix = Self::zeros(n);
+        for (i, row) in matrix.rows_mut().enumerate() {
+            row.iter_mut().enumerate().for_each(|(j, to)| *to = f(i, j));
+        }
+        matrix
+    }
+
+    /// The multiple of the identity.
+    #[inline]
+    pub(super) fn scaled_one(n: usize, c: f64) -> Self {
+        Self::of(n, |i, j| if i == j { c } else { 0.0 })
+    }
+
+    /// The number of rows.
+    #[inline]
+    pub(super) fn n(&self) -> usize {
+        L::directions(self.n)
+    }
+
+    /// All numbers, row by row.
+    #[inline]
+    pub(super) fn numbers(&self) -> &[f64] {
+        self.a.numbers()
+    }
+
+    /// All numbers, row by row, to be changed.
+    #[inline]
+    pub(super) fn numbers_mut(&mut self) -> &mut [f64] {
+        self.a.numbers_mut()
+    }
+
+    #[inline]
+    fn rows(&self) -> impl DoubleEndedIterator<Item = &[f64]> + ExactSizeIterator {
+        self.a.numbers().chunks_exact(self.n().max(1))
+    }
+
+    #[inline]
+    fn rows_mut(&mut self) -> impl Iterator<Item = &mut [f64]> {
+        let n = self.n().max(1);
+        self.a.numbers_mut().chunks_exact_mut(n)
+    }
+
+    /// A function of each entry.
+    #[inline]
+    pub(super) fn map(&self, f: impl Fn(f64) -> f64) -> Self {
+        let mut matrix = self.clone();
+        matrix.numbers_mut().iter_mut().for_each(|a| *a = f(*a));
+        matrix
+    }
+
+    /// The absolute values.
+    #[inline]
+    pub(super) fn abs(&self) -> Self {
+        self.map(f64::abs)
+    }
+
+    /// `A += c B`.
+    #[inline]
+    pub(super) fn add(&mut self, c: f64, other: &Self) {
+        let pairs = self.a.numbers_mut().iter_mut().zip(other.a.numbers());
+        pairs.for_each(|(a, b)| *a += b * c);
+    }
+
+    /// `A += c a bᵀ`.
+    #[inline]
+    pub(super) fn add_outer(&mut self, c: f64, a: &L::Vector, b: &L::Vector) {
+        let n = self.n();
+        for (i, row) in self.rows_mut().enumerate() {
+            (0..n).for_each(|j| row[j] += c * (a[i] * b[j]));
+        }
+    }
+
+    /// `A v`.
+    #[inline]
+    pub(super) fn times(&self, v: &L::Vector) -> L::Vector {
+        let mut product = L::Vector::room(|| self.n());
+        for (row, to) in self.rows().zip(product.numbers_mut()) {
+            let mut terms = row.iter().zip(v.numbers()).map(|(a, v)| a * v);
+            let first = terms.next().unwrap_or(0.0);
+            *to = terms.fold(first, |sum, term| sum + term);
+        }
+        product
+    }
+
+    /// `Aᵀ v`, the row `vᵀ A` as a vector.
+    #[inline]
+    pub(super) fn transpose_times(&self, v: &L::Vector) -> L::Vector {
+        let mut product = L::Vector::room(|| self.n());
+        for (i, row) in self.rows().enumerate() {
+            let to = product.numbers_mut().iter_mut().zip(row);
+            if i == 0 {
+                to.for_each(|(to, a)| *to = a * v[i]);
+            } else {
+                to.for_each(|(to, a)| *to += a * v[i]);
+            }
+        }
+        product
+    }
+
+    /// `A B`.
+    #[inline]
+    pub(super) fn product(&self, other: &Self) -> Self {
+        let mut product = Self::zeros(self.n());
+        for (row, to) in self.rows().zip(product.rows_mut()) {
+            for (k, (a, other)) in row.iter().zip(other.rows()).enumerate() {
+                let to = to.iter_mut().zip(other);
+                if k == 0 {
+                    to.for_each(|(to, b)| *to = a * b);
+                } else {
+                    to.for_each(|(to, b)| *to += a * b);
+                }
+            }
+        }
+        product
+    }
+
+    /// `tr A²`.
+    pub(super) fn trace_of_square(&self) -> f64 {
+        let n = self.n();
+        (0..n).map(|i| (0..n).map(|j| self[(i, j)] * self[(j, i)]).sum::<f64>()).sum()
+    }
+
+    /// The Frobenius norm.
+    #[inline]
+    pub(super) fn magnitude(&self) -> f64 {
+        magnitude(&self.a)
+    }
+
+    /// Solves `A X = B` for so many columns, row by row, by elimination with row pivoting; `None` if `A` is singular or not a number.
+    fn solve_columns(&self, right: &mut [f64], columns: usize) -> Option<()> {
+        let (n, mut a) = (self.n(), self.clone());
+        let a = a.numbers_mut();
+        let less = |row: &mut [f64], factor: f64, other: &[f64]| {
+            row.iter_mut().zip(other).for_each(|(x, other)| *x -= factor * other);
+        };
+        for k in 0..n {
+            let (mut largest, mut pivot) = (0.0, k);
+            for i in k..n {
+                let size = a[i * n + k].abs();
+                if size > largest {
+                    (largest, pivot) = (size, i);
+                }
+            }
+            if largest == 0.0 {
+                return None;
+            }
+            if pivot != k {
+                (k..n).for_each(|j| a.swap(k * n + j, pivot * n + j));
+                (0..columns).for_each(|j| right.swap(k * columns + j, pivot * columns + j));
+            }
+            let (above, below) = a.split_at_mut((k + 1) * n);
+            let (known, unknown) = right.split_at_mut((k + 1) * columns);
+            let (above, known) = (&above[k * n..], &known[k * columns..]);
+            for (row, x) in below.chunks_exact_mut(n).zip(unknown.chunks_exact_mut(columns)) {
+                let factor = row[k] / above[k];
+                less(&mut row[k + 1..], factor, &above[k + 1..]);
+                less(x, factor, known);
+            }
+        }
+        for i in (0..n).rev() {
+            let (x, known) = right[i * columns..].split_at_mut(columns);
+            for (k, known) in (i + 1..n).zip(known.chunks_exact(columns)) {
+                less(x, a[i * n + k], known);
+            }
+            x.iter_mut().for_each(|x| *x /= a[i * n + i]);
+        }
+        (right.iter().fold(0.0, |sum, x| sum + 0.0 * x) == 0.0).then_some(())
+    }
+
+    /// Solves `A x = b`; `None` if `A` is singular or not a number.
+    pub(super) fn solve(&self, b: &L::Vector) -> Option<L::Vector> {
+        let mut x = b.clone();
+        self.solve_columns(x.numbers_mut(), 1)?;
+        Some(x)
+    }
+
+    /// Computes the inverse; `None` if the matrix is singular or not a number.
+    pub(super) fn inverse(&self) -> Option<Self> {
+        let mut inverse = Self::scaled_one(self.n(), 1.0);
+        self.solve_columns(inverse.numbers_mut(), self.n())?;
+        Some(inverse)
+    }
+}

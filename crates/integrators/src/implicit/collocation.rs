@@ -1,0 +1,22 @@
+//! Methods with stages for a model in plain numbers, on a vector space.
+
+#![allow(
+    clippy::needless_range_loop,
+    reason = "a stage is an index of several lists and of the tableau"
+)]
+
+mod chart;
+mod covectors;
+mod dense;
+mod equation;
+mod fallbacks;
+mod full;
+mod heat;
+mod linear;
+mod memory;
+mod parts;
+mod solve;
+mod step;
+
+pub(crate) use memory::StageNumbers;
+pub(crate) use step::Collocation;

@@ -1,0 +1,289 @@
+//! The covectors of the laws at the stages, with one scalar correction of each for all of them. As in [`crate::collocation`],
+//! whose formulas it has.
+
+use metriplectic_equations::{ENERGY, ENTROPY};
+use metriplectic_fields::power_of_two;
+
+use super::chart::StepChart;
+use crate::collocation::Stages;
+use crate::collocation::covectors::{Correction, LawStart};
+use crate::collocation::tableau::{Numbers, STAGES, Tableau};
+use crate::collocation::trust;
+use crate::implicit::algebra::{add, dot, is_finite, magnitude, sum_of_terms};
+use crate::implicit::parts::{OfLaws, Parts};
+use crate::numbers::Lengths;
+use crate::round_off::bound::NO_DIGITS;
+use crate::round_off::stable_gradient::short;
+use crate::step::{Laws, Vector};
+
+/// A vector for each stage, which is zero beyond the last one.
+#[inline]
+pub(super) fn each_stage<L: Lengths>(
+    parts: &Parts<'_, L>,
+    stages: usize,
+    mut f: impl FnMut(usize) -> L::Vector,
+) -> Stages<L::Vector> {
+    std::array::from_fn(|i| if i < stages { f(i) } else { parts.zero() })
+}
+
+/// A zero for each stage.
+#[inline]
+pub(super) fn zeros<L: Lengths>(parts: &Parts<'_, L>) -> Stages<L::Vector> {
+    std::array::from_fn(|_| parts.zero())
+}
+
+/// `h Σ_{j<s} c_j v_j`.
+#[inline]
+pub(super) fn combined<V: Vector>(
+    h: f64,
+    stages: usize,
+    coefficients: &Numbers,
+    vectors: &Stages<V>,
+) -> V {
+    V::combination(h, stages, |j| (coefficients[j], &vectors[j]))
+}
+
+/// Whether every component of every vector is finite.
+pub(super) fn all_finite<L: Lengths>(vectors: &[L::Vector]) -> bool {
+    vectors.iter().all(is_finite)
+}
+
+/// The number of a law.
+#[inline]
+pub(super) fn of_law<L: Lengths>(laws: &Laws<L::Invariants>, law: usize) -> f64 {
+    match law {
+        ENERGY => laws.energy,
+        ENTROPY => laws.entropy,
+        _ => laws.invariants.as_ref()[law - ENTROPY - 1],
+    }
+}
+
+impl<V> OfLaws<V> {
+    /// What belongs to a law, to be changed.
+    #[inline]
+    fn of_mut(&mut self, law: usize) -> &mut V {
+        match law {
+            ENERGY => &mut self.energy,
+            ENTROPY => &mut self.entropy,
+            _ => &mut self.invariants[law - ENTROPY - 1],
+        }
+    }
+}
+
+/// The polynomial of a step, around its middle.
+pub(super) struct StepPolynomial<'a, L: Lengths> {
+    pub(super) parts: &'a Parts<'a, L>,
+    pub(super) tableau: &'static Tableau,
+    pub(super) chart: &'a StepChart<L>,
+    /// The displacements `h k_i`.
+    pub(super) k: Stages<L::Vector>,
+    pub(super) h: f64,
+    /// The [unit of rates](crate::collocation::covectors::unit_of_rates).
+    pub(super) unit: f64,
+}
+
+impl<L: Lengths> StepPolynomial<'_, L> {
+    /// The combination `Σ_j c_j h k_j`.
+    #[inline]
+    fn combined(&self, coefficients: &Numbers) -> L::Vector {
+        combined(1.0, self.tableau.stages, coefficients, &self.k)
+    }
+}
+
+/// The stages of a step: points and velocities.
+pub(super) struct StagePoints<L: Lengths> {
+    /// The points `X_i`; those beyond the last stage repeat the middle.
+    pub(super) x: Stages<L::State>,
+    /// The displacements to them from the middle.
+    pub(super) q: Stages<L::Vector>,
+    /// The velocities `v_i`.
+    pub(super) v: Stages<L::Vector>,
+    /// The covectors `♭v_i/υ` with the unit `υ`.
+    flat: Stages<L::Vector>,
+    /// A power of two near the largest velocity.
+    unit: f64,
+    /// `D/υ²`.
+    square: f64,
+}
+
+impl<L: Lengths> StagePoints<L> {
+    /// The stages of a polynomial; `None` where a velocity is not finite.
+    #[inline]
+    pub(super) fn of(polynomial: &StepPolynomial<'_, L>) -> Option<Self> {
+        let StepPolynomial { parts, tableau, chart, k, h, .. } = polynomial;
+        let (s, weights) = (tableau.stages, &tableau.weights);
+        let q = each_stage(parts, s, |i| {
+            let centred = std::array::from_fn(|j| tableau.matrix[i][j] - 0.5 * weights[j]);
+            polynomial.combined(&centred)
+        });
+        let x: Stages<L::State> =
+            std::array::from_fn(
+                |i| {
+                    if i < s { parts.moved(&chart.z, &q[i]) } else { chart.z.clone() }
+                },
+            );
+        let rate = h.recip();
+        let v = each_stage(parts, s, |i| k[i].map(|k| k * rate));
+        let largest = v[..s].iter().map(magnitude).fold(0.0, f64::max);
+        if !largest.is_finite() {
+            return None;
+        }
+        let unit = power_of_two(largest);
+        let flat = each_stage(parts, s, |i| v[i].map(|v| v / unit));
+        let square = (0..s).fold(0.0, |sum, i| sum + h * weights[i] * dot(&flat[i], &flat[i]));
+        Some(Self { x, q, v, flat, unit, square })
+    }
+
+    /// The covector `♭v_i`.
+    pub(super) fn flat(&self, i: usize) -> L::Vector {
+        self.flat[i].map(|v| v * self.unit)
+    }
+
+    /// The number `D`.
+    pub(super) const fn square(&self) -> f64 {
+        self.square * self.unit * self.unit
+    }
+}
+
+/// The covectors of all laws at the stages.
+pub(super) struct StageCovectors<L: Lengths> {
+    /// The covectors `w_i` of each stage.
+    pub(super) w: Stages<OfLaws<L::Vector>>,
+    /// The laws along the step.
+    pub(super) laws: OfLaws<LawOfStages<L::Vector>>,
+    /// The largest change of the energy at a stage.
+    pub(super) excursion: f64,
+}
+
+/// A law at the stages of a step, beside its covectors.
+pub(super) struct LawOfStages<V> {
+    /// The value `F(x')`.
+    pub(super) end: f64,
+    /// The size of the terms of `F`, to which its round-off is relative.
+    pub(super) size: f64,
+    /// The round-off of the covectors, the largest over the stages.
+    pub(super) noise: V,
+    /// The number `δ` with what is taken back of errors; zero if it is corrected.
+    pub(super) left: f64,
+    /// The round-off of `δ`.
+    pub(super) left_round_off: f64,
+}
+
+impl<L: Lengths> StageCovectors<L> {
+    /// The covectors of laws with these starts, corrected in these ways.
+    #[inline]
+    pub(super) fn of(
+        stages: &StagePoints<L>,
+        polynomial: &StepPolynomial<'_, L>,
+        start: impl Fn(usize) -> LawStart,
+        correction: impl Fn(usize) -> Correction,
+    ) -> Self {
+        let StepPolynomial { parts, tableau, chart, .. } = polynomial;
+        let mut energies = [0.0; STAGES];
+        let mut w = std::array::from_fn(|i| {
+            if i >= tableau.stages {
+                return OfLaws { energy: parts.zero(), entropy: parts.zero(), invariants: vec![] };
+            }
+            parts.each_law(|law| {
+                let (value, df) = parts.jet(law, &stages.x[i]);
+                if law == ENERGY {
+                    energies[i] = value;
+                }
+                df
+            })
+        });
+        let before = start(ENERGY).value;
+        let energies = energies[..tableau.stages].iter();
+        let excursion = energies.map(|energy| (energy - before).abs()).fold(0.0, f64::max);
+        let along = AlongStages { stages, polynomial, scales: parts.scales(&chart.end) };
+        let laws = parts.each_law(|law| along.of(law, start(law), correction(law), &mut w));
+        Self { w, laws, excursion }
+    }
+}
+
+/// Corrects the covectors of one law after the other.
+struct AlongStages<'a, L: Lengths> {
+    stages: &'a StagePoints<L>,
+    polynomial: &'a StepPolynomial<'a, L>,
+    /// The sizes of the entries at the end.
+    scales: L::Vector,
+}
+
+impl<L: Lengths> AlongStages<'_, L> {
+    /// A law whose differentials at the stages are given, and become its covectors.
+    #[inline]
+    fn of(
+        &self,
+        law: usize,
+        start: LawStart,
+        correction: Correction,
+        w: &mut Stages<OfLaws<L::Vector>>,
+    ) -> LawOfStages<L::Vector> {
+        let Self { stages, polynomial, scales } = self;
+        let &StepPolynomial { parts, tableau, chart, h, unit, .. } = *polynomial;
+        let (s, end) = (tableau.stages, parts.value(law, &chart.end));
+        let (in_unit, [step, size_of_step]) = (unit.recip(), [h * unit, h.abs() * unit]);
+        let (mut slope, mut change) = (0.0, 0.0);
+        let mut size = start.value.abs() + end.abs();
+        for i in 0..s {
+            let (w, v) = (&*w[i].of_mut(law), stages.v[i].map(|v| v * in_unit));
+            slope += tableau.weights[i] * step * dot(w, &v);
+            change += tableau.weights[i] * size_of_step * sum_of_terms(w, &v);
+            size += tableau.weights[i] * sum_of_terms(w, scales);
+        }
+        let none = LawOfStages { end, size, noise: parts.zero(), left: 0.0, left_round_off: 0.0 };
+        if correction == Correction::None {
+            return none;
+        }
+        let rounding = f64::EPSILON * size;
+        let mut delta = (end - start.value) - slope;
+        let mut noise = rounding;
+        let fraction = short(change, size);
+        if fraction > 0.0 {
+            let integral = self.integral(law) - slope;
+            let weight = fraction * trust(integral, [change, rounding], s);
+            delta += weight * (integral - delta);
+            noise *= 1.0 - weight;
+        }
+        // A change without digits is none.
+        if delta.abs() <= NO_DIGITS {
+            delta = 0.0;
+        }
+        delta += start.drift;
+        let squares = stages.square * stages.unit;
+        let left_round_off = noise + f64::EPSILON * change;
+        let is_later = correction == Correction::Later;
+        let none =
+            if is_later { LawOfStages { left: delta, left_round_off, ..none } } else { none };
+        if squares == 0.0 {
+            return none;
+        }
+        let blur = (noise / squares).abs();
+        let mut noise = none.noise;
+        for i in 0..s {
+            let (w, flat) = (&*w[i].of_mut(law), &stages.flat[i]);
+            for c in 0..parts.n() {
+                let here = blur * flat[c].abs() + f64::EPSILON * w[c].abs();
+                noise[c] = here.max(noise[c]);
+            }
+        }
+        if !is_later {
+            for i in 0..s {
+                add(w[i].of_mut(law), delta / squares, &stages.flat[i]);
+            }
+        }
+        LawOfStages { noise, ..none }
+    }
+
+    /// The change of a law along the polynomial of the step, as an integral.
+    #[inline]
+    fn integral(&self, law: usize) -> f64 {
+        let StepPolynomial { parts, tableau, chart, .. } = self.polynomial;
+        tableau.points().iter().fold(0.0, |sum, point| {
+            let q = self.polynomial.combined(&point.position);
+            let v = self.polynomial.combined(&point.velocity);
+            let [slope, _] = parts.along(law, &parts.moved(&chart.z, &q), &v);
+            sum + point.weight * slope
+        })
+    }
+}

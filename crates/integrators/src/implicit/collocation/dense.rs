@@ -1,0 +1,60 @@
+//! States inside a step with stages, and the error of a step. As in [`crate::collocation`].
+
+use super::covectors::{combined, each_stage};
+use super::equation::StageEquation;
+use super::fallbacks;
+use super::memory::{LastStep, StageNumbers};
+use super::step::Collocation;
+use crate::implicit::algebra::is_finite;
+use crate::implicit::parts::Parts;
+use crate::implicit::start::Start;
+use crate::numbers::Lengths;
+use crate::step::failure::Fallbacks;
+use crate::step::{Effort, Vector as _};
+
+impl Collocation {
+    /// The end of a step of size `θh` from the start of the last one, whose polynomial is its guess.
+    pub(in crate::implicit) fn part_of_step<L: Lengths>(
+        &self,
+        start: &Start<'_, L>,
+        memory: &StageNumbers<L>,
+        theta: f64,
+    ) -> Option<L::State> {
+        let (tableau, LastStep { k, .. }) = (self.tableau, memory.last.as_ref()?);
+        let equation = StageEquation::new(tableau, &Start { h: theta * start.h, ..start.clone() });
+        let guess = each_stage(start.parts, tableau.stages, |i| {
+            let coefficients = tableau.velocity(theta * tableau.nodes[i]);
+            combined(1.0, tableau.stages, &coefficients, k)
+        });
+        let mut effort = Effort::default();
+        let solved =
+            fallbacks::solve(&equation, Some(guess), Fallbacks::FirstTries, &mut effort).ok()?;
+        Some(solved.at.end)
+    }
+
+    /// The error of a step of size `h` between two states, by a norm: the larger one of the defects
+    ///
+    /// ```math
+    /// h M^{-1} (u'(0) - f(x)), \qquad h M^{-1} (u'(1) - f(x'))
+    /// ```
+    ///
+    /// of its polynomial at both ends.
+    pub(in crate::implicit) fn error_of_step<L: Lengths>(
+        &self,
+        parts: &Parts<'_, L>,
+        ends: [&L::State; 2],
+        h: f64,
+        memory: &StageNumbers<L>,
+        norm: impl Fn(&L::Vector) -> f64,
+    ) -> Option<f64> {
+        let velocity = |at: &L::State| parts.velocity(at).filter(is_finite);
+        let [first, second] = [velocity(ends[0])?, velocity(ends[1])?];
+        let (tableau, LastStep { k, filter }) = (self.tableau, memory.last.as_ref()?);
+        let k = each_stage(parts, tableau.stages, |i| k[i].map(|k| k * h));
+        let defect = |tau: f64, velocity: &L::Vector| {
+            let slope = combined(1.0, tableau.stages, &tableau.velocity(tau), &k);
+            norm(&filter.times(&parts.vector(|c| slope[c] - velocity[c] * h)))
+        };
+        Some(defect(0.0, &first).max(defect(1.0, &second)))
+    }
+}

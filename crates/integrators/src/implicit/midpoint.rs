@@ -1,0 +1,13 @@
+//! The scheme of the paper for a model in plain numbers, on a vector space.
+
+mod equation;
+mod fallbacks;
+mod gradient;
+mod level;
+mod memory;
+mod newton;
+mod restored;
+mod step;
+
+pub(crate) use memory::MidpointNumbers;
+pub(crate) use step::Midpoint;

@@ -1,0 +1,193 @@
+//! The equation of one step of the midpoint scheme on a vector space, as in [`Residual`](crate::Residual), whose formula it is.
+
+use metriplectic_equations::{ENERGY, ENTROPY};
+
+use super::gradient::{LawAlong, Line};
+use crate::implicit::algebra::{Matrix, dot, is_finite};
+use crate::implicit::drift;
+use crate::implicit::parts::{OfLaws, Parts, WithJacobian};
+use crate::implicit::velocity::{VelocityJet, velocity_jet};
+use crate::newton::Stiffness;
+use crate::numbers::Lengths;
+use crate::round_off::bound::{ROUNDED, is_dissipated};
+use crate::step::{Laws, LineOfStep};
+
+/// The equation `F(u) = u − h (Π̃ w_H + K̃ w_S) = 0` of the displacement `u` of a step from `x`.
+pub(super) struct Equation<'a, L: Lengths> {
+    pub(super) parts: &'a Parts<'a, L>,
+    pub(super) line: LineOfStep,
+    pub(super) x: &'a L::State,
+    pub(super) h: f64,
+    /// The laws at `x`.
+    pub(super) values: Laws<L::Invariants>,
+    /// The correction of the errors of earlier steps.
+    pub(super) drift: Laws<L::Invariants>,
+}
+
+/// What an evaluation tells of the entropy.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Dissipated {
+    /// `|w_S|²`; infinite if the entropy has no discrete gradient.
+    pub(super) slope_squared: f64,
+    /// Whether anything is dissipated.
+    pub(super) dissipates: bool,
+}
+
+/// The residual at one displacement.
+pub(super) struct Evaluated<L: Lengths> {
+    pub(super) residual: L::Vector,
+    pub(super) evidence: Dissipated,
+}
+
+/// The residual with its Jacobian, and what is in it.
+pub(super) struct Linearised<L: Lengths> {
+    pub(super) residual: L::Vector,
+    pub(super) jacobian: Matrix<L>,
+    pub(super) rounding: Rounding<L>,
+    pub(super) stiffness: Stiffness,
+    pub(super) evidence: Dissipated,
+    /// The discrete gradients of energy and entropy.
+    pub(super) energy: L::Vector,
+    pub(super) entropy: L::Vector,
+    /// The growth `h⟨w_S, K̃ w_S⟩` of the entropy by friction.
+    pub(super) growth: f64,
+}
+
+/// The round-off of a residual, as in [`Rounding`](crate::Rounding).
+pub(super) struct Rounding<L: Lengths> {
+    /// The round-off of the terms.
+    pub(super) terms: L::Vector,
+    /// The derivative along the covectors that the components share.
+    pub(super) sensitivity: Matrix<L>,
+    /// The sizes of the round-off of these.
+    pub(super) covector: L::Vector,
+    /// Those of the points.
+    pub(super) argument: L::Vector,
+}
+
+impl<L: Lengths> Rounding<L> {
+    /// The bound of each component, with the Jacobian.
+    pub(super) fn bounds(&self, parts: &Parts<'_, L>, jacobian: &Matrix<L>) -> L::Vector {
+        let one = |i: usize, j: usize| if i == j { 1.0 } else { 0.0 };
+        let by_covectors = self.sensitivity.abs().times(&self.covector);
+        let moved = parts.matrix(|i, j| (jacobian[(i, j)] - one(i, j)).abs());
+        let by_points = moved.times(&self.argument);
+        parts.vector(|i| self.terms[i] + by_covectors[i] + by_points[i])
+    }
+}
+
+impl<'a, L: Lengths> Equation<'a, L> {
+    /// The equation of a step of a fraction of the size, which takes nothing back.
+    pub(super) fn of_fraction(&self, fraction: f64) -> Self {
+        let Self { parts, line, x, h, values, .. } = self;
+        let (values, drift) = (values.clone(), drift::nothing::<L>(values));
+        Self { parts, line: *line, x, h: h * fraction, values, drift }
+    }
+
+    /// Whether the entropy has a discrete gradient.
+    pub(super) const fn is_exact(&self) -> bool {
+        self.parts.is_exact
+    }
+
+    /// The value of a law at `x`, and what is taken back of its error.
+    #[inline]
+    fn start_of(&self, law: usize) -> [f64; 2] {
+        let of = |laws: &Laws<L::Invariants>| match law {
+            ENERGY => laws.energy,
+            ENTROPY => laws.entropy,
+            _ => laws.invariants.as_ref()[law - ENTROPY - 1],
+        };
+        [of(&self.values), of(&self.drift)]
+    }
+
+    /// Returns whether a law has a discrete gradient, and no differential in its place.
+    #[inline]
+    const fn is_discrete(&self, law: usize) -> bool {
+        law != ENTROPY || self.is_exact()
+    }
+
+    fn dissipated(&self, entropy: &L::Vector, production: f64) -> Dissipated {
+        let slope_squared = if self.is_exact() { dot(entropy, entropy) } else { f64::INFINITY };
+        let growth = self.h.abs() * production;
+        Dissipated { slope_squared, dissipates: is_dissipated(growth, self.values.entropy) }
+    }
+
+    /// The residual, safe against round-off; `None` where it is not defined.
+    pub(super) fn evaluate(&self, u: &L::Vector) -> Option<Evaluated<L>> {
+        let &Self { parts, h, .. } = self;
+        let line = &Line::new(parts, self.x, self.line.base, u);
+        let w = parts.each_law(|law| {
+            if !self.is_discrete(law) {
+                return parts.jet(law, &line.z).1;
+            }
+            let [start, drift] = self.start_of(law);
+            let end = parts.value(law, &line.end);
+            let along = LawAlong { parts, law, line };
+            along.stable(self.line.gradient, [start, end], false).covector(drift, u)
+        });
+        let friction = parts.irreversible(&line.z, &w)?;
+        let production = dot(&w.entropy, &friction);
+        let reversible = parts.reversible(&line.z, &w)?;
+        let residual = parts.vector(|i| u[i] - (reversible[i] + friction[i]) * h);
+        let evidence = self.dissipated(&w.entropy, production);
+        is_finite(&residual).then_some(Evaluated { residual, evidence })
+    }
+
+    /// The residual with its Jacobian; `None` where it is not defined.
+    pub(super) fn linearise(&self, u: &L::Vector) -> Option<Linearised<L>> {
+        let &Self { parts, h, .. } = self;
+        let line = &Line::new(parts, self.x, self.line.base, u);
+        let mut noise = None;
+        let w: OfLaws<WithJacobian<L>> = parts.each_law(|law| {
+            if !self.is_discrete(law) {
+                let second = parts.second(law, &line.z);
+                let slope = second.hf.map(|h| h * line.c);
+                return WithJacobian { value: second.df, slope };
+            }
+            let [start, drift] = self.start_of(law);
+            let (end, df) = parts.jet(law, &line.end);
+            let along = LawAlong { parts, law, line };
+            let stable = along.stable(self.line.gradient, [start, end], true);
+            if law == ENERGY {
+                // Near the edge of a domain dH is far steeper at x' than at z, and the rounding of d counts there.
+                let of_defect = stable.noise(u);
+                noise = Some(parts.vector(|i| of_defect[i] + df[i].abs() * f64::EPSILON));
+            }
+            let value = stable.covector(drift, u);
+            WithJacobian { value, slope: stable.slope(drift, u, &df) }
+        });
+        let jet = velocity_jet(parts, &line.z, line.c, &w)?;
+        let VelocityJet { velocity, terms, sensitivity, production, friction, rotation } = jet;
+        let rounding = Rounding {
+            // What underflows is no larger than the least normal number.
+            terms: parts
+                .vector(|i| ROUNDED * h.abs() * terms[i] + f64::MIN_POSITIVE * (1.0 + h.abs())),
+            sensitivity: sensitivity.map(|a| a * h),
+            covector: noise.unwrap_or_else(|| parts.zero()),
+            argument: {
+                let sizes = parts.scales(self.x);
+                parts.vector(|i| (sizes[i] + u[i].abs()) * f64::EPSILON)
+            },
+        };
+        // Half of a displacement reaches z.
+        let stiffness =
+            Stiffness { friction: 2.0 * h.abs() * friction, rotation: 2.0 * h.abs() * rotation };
+        let evidence = self.dissipated(&w.entropy.value, production);
+        let residual = parts.vector(|i| u[i] - velocity.value[i] * h);
+        let mut jacobian = velocity.slope.map(|slope| -(slope * h));
+        for i in 0..parts.n() {
+            jacobian[(i, i)] += 1.0;
+        }
+        let is_usable = is_finite(&residual) && jacobian.magnitude().is_finite();
+        is_usable.then(|| Linearised {
+            residual,
+            jacobian,
+            rounding,
+            stiffness,
+            evidence,
+            energy: w.energy.value,
+            entropy: w.entropy.value,
+            growth: h * production,
+        })
+    }
+}

@@ -1,0 +1,55 @@
+//! Why a system has no implicit steps.
+
+use metriplectic_equations::Equations;
+
+/// A system, or a method, without implicit steps in plain numbers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum NotImplicit {
+    /// The parts of the system are not known apart.
+    #[error(
+        "an implicit method asks for the parts of a system, its bracket and its friction: answer `Equations::model`, or take an explicit method"
+    )]
+    Model,
+    /// The space of the system is not known to be a vector space.
+    #[error(
+        "an implicit method takes steps along the straight lines of a vector space: answer `Equations::is_vector_space` if the charts are translations, or take an explicit method"
+    )]
+    Space,
+    /// The metric of the system is not the canonical one.
+    #[error(
+        "an implicit method in plain numbers has the canonical metric of a vector space: answer `Model::has_canonical_metric` if it is that one, or take an explicit method"
+    )]
+    Metric,
+    /// The retraction or the discrete gradient is not one of this library.
+    #[error(
+        "a system in plain numbers is stepped by the retractions and the discrete gradients of this library alone"
+    )]
+    Scheme,
+    /// There are so many variables that a matrix of all pairs of them has no room.
+    #[error(
+        "a Jacobian of all pairs of {variables} variables has no room: take an explicit method, and RungeKuttaChebyshev where friction is stiff"
+    )]
+    Variables {
+        /// How many there are.
+        variables: usize,
+    },
+}
+
+/// The most variables of a system with implicit steps: a Jacobian of 4096 has 16 million entries.
+const MOST: usize = 4096;
+
+/// Refuses a system without implicit steps.
+pub(crate) fn refuse(system: &dyn Equations) -> Result<(), NotImplicit> {
+    let Some(model) = system.model() else { return Err(NotImplicit::Model) };
+    let variables = system.sizes().directions;
+    if !system.is_vector_space() {
+        Err(NotImplicit::Space)
+    } else if !model.has_canonical_metric() {
+        Err(NotImplicit::Metric)
+    } else if variables > MOST {
+        Err(NotImplicit::Variables { variables })
+    } else {
+        Ok(())
+    }
+}

@@ -1,0 +1,302 @@
+//! The velocity `Π̃ w_H + K̃ w_S` of a model for given covectors, as in [`metriplectic_dynamics::velocity`], whose formulas they are,
+//! with its derivatives along the unknown of a step.
+
+use metriplectic_dynamics::invariants::Kind;
+use metriplectic_dynamics::velocity::{CASIMIR, MOMENTUM};
+use metriplectic_equations::Part;
+
+use super::algebra::{Matrix, add, dot};
+use super::orthogonal::{Orthogonal, OrthogonalJet, Units, scaled};
+use super::parts::{OfLaws, PartJet, Parts, WithJacobian};
+use crate::numbers::{Lengths, List};
+
+impl<L: Lengths> Parts<'_, L> {
+    fn has(&self, kind: Kind) -> bool {
+        self.kinds.contains(&kind)
+    }
+
+    /// Returns whether the bracket is projected off the entropy and the Casimirs.
+    fn is_projected(&self) -> bool {
+        self.moves && (self.is_exact && !self.annihilates_entropy || self.has(Kind::Casimir))
+    }
+
+    /// The covectors of one kind.
+    fn of_kind<'b, V>(&'b self, kind: Kind, w: &'b OfLaws<V>) -> impl Iterator<Item = &'b V> {
+        let listed = self.kinds.iter().zip(&w.invariants);
+        listed.filter_map(move |(k, w)| (*k == kind).then_some(w))
+    }
+
+    /// Computes the vector `Π̃ w_H`; `None` where it has no value.
+    #[inline]
+    pub(super) fn reversible(&self, z: &L::State, w: &OfLaws<L::Vector>) -> Option<L::Vector> {
+        if !self.moves {
+            return Some(self.zero());
+        }
+        let OfLaws { energy, entropy, .. } = w;
+        let bracket = |alpha: &L::Vector| self.apply(Part::Reversible, z, [alpha, entropy, alpha]);
+        let (is_projected, has_momenta) = (self.is_projected(), self.has(Kind::Momentum));
+        if !is_projected && !has_momenta {
+            return bracket(energy);
+        }
+        if self.kinds.is_empty() {
+            // With the entropy alone, the same projections need no list.
+            let square = dot(entropy, entropy);
+            if square > 0.0 {
+                let fraction = square.recip();
+                let mut alpha = energy.clone();
+                add(&mut alpha, -(dot(entropy, energy) * fraction), entropy);
+                let mut v = bracket(&alpha)?;
+                let along = dot(entropy, &v) * fraction;
+                add(&mut v, -along, entropy);
+                return Some(v);
+            }
+            return bracket(energy);
+        }
+        let (g, mut normals) = (Units::Canonical, Orthogonal::none());
+        if self.is_exact {
+            normals.push(g, entropy);
+        }
+        self.of_kind(Kind::Casimir, w).for_each(|c| normals.push(g, c));
+        let mut a = if is_projected {
+            let alpha = normals.faded_covector(0, energy, CASIMIR);
+            normals.faded_vector(0, &bracket(&alpha)?, CASIMIR)
+        } else {
+            bracket(energy)?
+        };
+        if has_momenta {
+            normals.push(g, energy);
+            let first = normals.len();
+            self.of_kind(Kind::Momentum, w).for_each(|j| normals.push(g, j));
+            a = normals.faded_vector(first, &a, MOMENTUM);
+        }
+        Some(a)
+    }
+
+    /// Computes the vector `K̃ w_S`, and adds the vector of a force; `None` where it has no value.
+    #[inline]
+    pub(super) fn irreversible(&self, z: &L::State, w: &OfLaws<L::Vector>) -> Option<L::Vector> {
+        let mut v = self.friction(z, w)?;
+        if self.is_forced {
+            add(&mut v, 1.0, &self.force(z, w)?);
+        }
+        Some(v)
+    }
+
+    fn force(&self, z: &L::State, w: &OfLaws<L::Vector>) -> Option<L::Vector> {
+        let force = self.apply(Part::Gyroscopic, z, [&w.energy, &w.entropy, &w.energy])?;
+        if self.kinds.is_empty() {
+            return Some(force);
+        }
+        let (g, mut normals) = (Units::Canonical, Orthogonal::none());
+        normals.push(g, &w.energy);
+        if self.is_exact {
+            normals.push(g, &w.entropy);
+        }
+        let listed = w.invariants.iter();
+        Some(listed.fold(force, |force, l| normals.without(g, l, force, MOMENTUM)))
+    }
+
+    #[inline]
+    fn friction(&self, z: &L::State, w: &OfLaws<L::Vector>) -> Option<L::Vector> {
+        if !self.rubs {
+            return Some(self.zero());
+        }
+        let OfLaws { energy, entropy, .. } = w;
+        let k = |alpha: &L::Vector| self.apply(Part::Irreversible, z, [energy, entropy, alpha]);
+        if self.kinds.is_empty() {
+            return k(entropy);
+        }
+        let (g, mut normals) = (Units::Canonical, Orthogonal::none());
+        normals.push(g, energy);
+        let first = normals.len();
+        w.invariants.iter().for_each(|l| normals.push(g, l));
+        Some(normals.project_vector(first, &k(&normals.project_covector(first, entropy))?))
+    }
+}
+
+/// The velocity with its derivatives along the unknown of a step.
+pub(super) struct VelocityJet<L: Lengths> {
+    /// The velocity, and its derivatives.
+    pub(super) velocity: WithJacobian<L>,
+    /// The sum of the absolute terms of each component. Its round-off is relative to this sum.
+    pub(super) terms: L::Vector,
+    /// The derivative of the velocity along `w_H`, without the derivative of the projections.
+    pub(super) sensitivity: Matrix<L>,
+    /// The entropy production `⟨w_S, K̃ w_S⟩`.
+    pub(super) production: f64,
+    /// The rate of the friction, `√|tr A²|` with `A` the derivative of `K̃ w_S` along the unknown.
+    pub(super) friction: f64,
+    /// The rate of `Π̃ w_H`.
+    pub(super) rotation: f64,
+}
+
+/// A part of the velocity.
+struct OfPart<L: Lengths> {
+    /// The part, and its derivatives.
+    vector: WithJacobian<L>,
+    /// Its derivative along the covector that it acts on.
+    tensor: Matrix<L>,
+    /// The absolute terms that it is summed of.
+    terms: L::Vector,
+}
+
+/// `|A| |v|`.
+fn terms<L: Lengths>(a: &Matrix<L>, v: &L::Vector) -> L::Vector {
+    let n = v.numbers().len();
+    let mut sum = L::Vector::room(|| n);
+    for i in 0..n {
+        sum[i] = (0..n).fold(0.0, |sum, j| sum + a[(i, j)].abs() * v[j].abs());
+    }
+    sum
+}
+
+/// Where the velocity of a system is linearised, along the unknown of a step.
+struct Linearisation<'a, L: Lengths> {
+    parts: &'a Parts<'a, L>,
+    z: &'a L::State,
+    /// The derivative of the point, a multiple of the identity.
+    dz: f64,
+    w: &'a OfLaws<WithJacobian<L>>,
+}
+
+impl<L: Lengths> Linearisation<'_, L> {
+    /// A part with its derivatives along the unknown, for the covector `alpha`, and the `other` one that it depends on.
+    fn part(
+        &self,
+        part: Part,
+        alpha: &WithJacobian<L>,
+        other: &WithJacobian<L>,
+    ) -> Option<(PartJet<L>, OfPart<L>)> {
+        let OfLaws { energy, entropy, .. } = self.w;
+        let w = [&energy.value, &entropy.value, &alpha.value];
+        let jet = self.parts.linearise(part, self.z, w)?;
+        let mut slope = scaled(&jet.along_x, self.dz);
+        slope.add(1.0, &jet.along_w.product(&other.slope));
+        slope.add(1.0, &jet.tensor.product(&alpha.slope));
+        let terms = terms(&jet.tensor, &alpha.value);
+        let vector = WithJacobian { value: jet.value.clone(), slope };
+        let tensor = jet.tensor.clone();
+        Some((jet, OfPart { vector, tensor, terms }))
+    }
+
+    /// A part that is zero.
+    fn none(&self) -> OfPart<L> {
+        let zeros = || self.parts.zeros();
+        let vector = WithJacobian { value: self.parts.zero(), slope: zeros() };
+        OfPart { vector, tensor: zeros(), terms: self.parts.zero() }
+    }
+
+    fn reversible(&self) -> Option<OfPart<L>> {
+        let &Self { parts, w, .. } = self;
+        if !parts.moves {
+            return Some(self.none());
+        }
+        let bracket =
+            |alpha: &WithJacobian<L>| Some(self.part(Part::Reversible, alpha, &w.entropy)?.1);
+        let (is_projected, has_momenta) = (parts.is_projected(), parts.has(Kind::Momentum));
+        if !is_projected && !has_momenta {
+            return bracket(&w.energy);
+        }
+        let mut normals = OrthogonalJet::none();
+        if parts.is_exact {
+            normals.push(&w.entropy);
+        }
+        parts.of_kind(Kind::Casimir, w).for_each(|c| normals.push(c));
+        let mut pi = if is_projected {
+            bracket(&normals.faded(0, &w.energy, CASIMIR))?
+        } else {
+            bracket(&w.energy)?
+        };
+        if is_projected {
+            // The projection of the covector has its own terms. Those of a Casimir that fades out are not amplified: such a
+            // bound would stop Newton's method where energy and entropy still gain digits.
+            let mut of_covector = parts.zero();
+            normals.add_terms(0, &w.energy.value, CASIMIR, (&mut of_covector, 1.0));
+            add(&mut pi.terms, 1.0, &terms(&pi.tensor, &of_covector));
+            normals.add_terms(0, &pi.vector.value, CASIMIR, (&mut pi.terms, 1.0));
+            pi.vector = normals.faded(0, &pi.vector, CASIMIR);
+        }
+        if has_momenta {
+            normals.push(&w.energy);
+            let first = normals.len();
+            parts.of_kind(Kind::Momentum, w).for_each(|j| normals.push(j));
+            let amplification = 1.0 + normals.amplification(first, MOMENTUM);
+            let v = &pi.vector.value;
+            normals.add_terms(first, v, MOMENTUM, (&mut pi.terms, amplification));
+            pi.vector = normals.faded(first, &pi.vector, MOMENTUM);
+        }
+        Some(pi)
+    }
+
+    fn force(&self) -> Option<OfPart<L>> {
+        let &Self { parts, w, .. } = self;
+        let (_, mut force) = self.part(Part::Gyroscopic, &w.energy, &w.entropy)?;
+        if parts.kinds.is_empty() {
+            return Some(force);
+        }
+        let mut normals = OrthogonalJet::none();
+        normals.push(&w.energy);
+        if parts.is_exact {
+            normals.push(&w.entropy);
+        }
+        let (first, value) = (normals.len(), force.vector.value.clone());
+        let listed = w.invariants.iter();
+        force.vector = listed.fold(force.vector, |v, l| normals.without(l, v, MOMENTUM));
+        let amplification = 1.0 + normals.amplification(first, MOMENTUM);
+        normals.add_terms(first, &value, MOMENTUM, (&mut force.terms, amplification));
+        Some(force)
+    }
+}
+
+/// Computes the velocity at a point, with the derivatives along the unknown of a step, from those of the covectors and of the point,
+/// a multiple `dz` of the identity; `None` where it has no value.
+pub(super) fn velocity_jet<L: Lengths>(
+    parts: &Parts<'_, L>,
+    z: &L::State,
+    dz: f64,
+    w: &OfLaws<WithJacobian<L>>,
+) -> Option<VelocityJet<L>> {
+    let at = Linearisation { parts, z, dz, w };
+    let pi = at.reversible()?;
+    let mut normals = OrthogonalJet::none();
+    let (mut first, mut alpha) = (0, None);
+    if !parts.kinds.is_empty() {
+        normals.push(&w.energy);
+        first = normals.len();
+        w.invariants.iter().for_each(|l| normals.push(l));
+        alpha = Some(normals.projected(first, &w.entropy));
+    }
+    let alpha = alpha.as_ref().unwrap_or(&w.entropy);
+    let (mut sum, mut terms, mut sensitivity) = (pi.vector.clone(), pi.terms, pi.tensor);
+    let mut irreversible = None;
+    if parts.rubs {
+        let (jet, k) = at.part(Part::Irreversible, alpha, &w.energy)?;
+        let amplified = 1.0 + normals.amplification(first, MOMENTUM);
+        add(&mut terms, 1.0, &k.terms);
+        normals.add_terms(first, &k.vector.value, MOMENTUM, (&mut terms, amplified));
+        sensitivity.add(1.0, &jet.along_w);
+        irreversible = Some(normals.projected(first, &k.vector));
+    }
+    if parts.is_forced {
+        let force = at.force()?;
+        add(&mut terms, 1.0, &force.terms);
+        sensitivity.add(1.0, &force.tensor);
+        irreversible = Some(match irreversible {
+            Some(mut sum) => {
+                add(&mut sum.value, 1.0, &force.vector.value);
+                sum.slope.add(1.0, &force.vector.slope);
+                sum
+            }
+            None => force.vector,
+        });
+    }
+    let rotation = pi.vector.slope.trace_of_square().abs().sqrt();
+    let (mut production, mut friction) = (0.0, 0.0);
+    if let Some(irreversible) = irreversible {
+        production = dot(&w.entropy.value, &irreversible.value);
+        friction = irreversible.slope.trace_of_square().abs().sqrt();
+        add(&mut sum.value, 1.0, &irreversible.value);
+        sum.slope.add(1.0, &irreversible.slope);
+    }
+    Some(VelocityJet { velocity: sum, terms, sensitivity, production, friction, rotation })
+}

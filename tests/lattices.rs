@@ -8,6 +8,8 @@ mod chain;
 mod digits;
 #[path = "lattices/gathered.rs"]
 mod gathered;
+#[path = "lattices/implicit.rs"]
+mod implicit;
 #[path = "lattices/limiting_sites.rs"]
 mod limiting_sites;
 #[path = "models/lattices.rs"]

@@ -174,6 +174,10 @@ fn a_path_of_a_ring_is_that_of_every_method() {
     let two = off(RandomFlow(RungeKuttaChebyshev).seed(3).run(&ring, start(), span).unwrap());
     println!("off by {eight:.1e} and {two:.1e} of {moved:.1e}");
     assert!(eight < 1e-7 * moved && two < 1e-2 * moved, "{eight:e} {two:e} {moved:e}");
+    let midpoint = off(RandomFlow(WeylMidpoint).seed(3).run(&ring, start(), span).unwrap());
+    let four = off(RandomFlow(Gauss::<2>).seed(3).run(&ring, start(), span).unwrap());
+    println!("off by {midpoint:.1e} and {four:.1e} of {moved:.1e}");
+    assert!(midpoint < 1e-2 * moved && four < 1e-5 * moved, "{midpoint:e} {four:e} {moved:e}");
     // Put down and taken up again.
     let mut steps = method.steps(&ring, start(), span).unwrap();
     for _ in 0..23 {

@@ -34,6 +34,7 @@
 
 mod blocks;
 pub mod builder;
+mod dense;
 mod double;
 pub mod error;
 pub mod fields;

@@ -52,6 +52,9 @@ pub trait Model: Sync {
     /// A conserved function at a site.
     fn sum(&self, index: usize, site: usize, x: &PointOf<Self>) -> Jet1<Self::Manifold>;
 
+    /// Returns whether there is a bracket.
+    fn has_bracket(&self) -> bool;
+
     /// `Π w` at a site; not a number where it has no value.
     fn reversible(
         &self,
@@ -186,6 +189,10 @@ where
     #[inline]
     fn sum(&self, index: usize, site: usize, x: &M::Point<f64>) -> Jet1<M> {
         self.sums.jet(index, x, self.data.sites.of(site))
+    }
+
+    fn has_bracket(&self) -> bool {
+        !Bracket::<M, Canonical>::is_zero(&self.bracket)
     }
 
     #[inline]

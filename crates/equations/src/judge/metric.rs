@@ -13,8 +13,8 @@ pub(super) fn examine(at: At<'_>) -> Result<(), ModelError> {
     if at.model.has_canonical_metric() {
         let mut g = vec![0.0; n * n];
         at.model.metric(at.x, &vec![0.0; n], &mut g);
-        let one = |k: usize| if k % (n + 1) == 0 { 1.0 } else { 0.0 };
-        if let Some(k) = (0..n * n).find(|&k| g[k] != one(k)) {
+        let off = |k: usize| g[k] - if k.is_multiple_of(n + 1) { 1.0 } else { 0.0 };
+        if let Some(k) = (0..n * n).find(|&k| off(k).abs() > 0.0 || off(k).is_nan()) {
             let source = MetricError::NotCanonical { row: k / n, column: k % n, value: g[k] };
             return Err(at.unusable(source));
         }

@@ -26,9 +26,9 @@ pub enum NotImplicit {
         "a system in plain numbers is stepped by the retractions and the discrete gradients of this library alone"
     )]
     Scheme,
-    /// There are so many variables that a matrix of all pairs of them has no room.
+    /// There are so many variables that a matrix of all pairs of them is too large.
     #[error(
-        "a Jacobian of all pairs of {variables} variables has no room: take an explicit method, and RungeKuttaChebyshev where friction is stiff"
+        "a Jacobian of all pairs of {variables} variables is too large: take an explicit method, and RungeKuttaChebyshev where friction is stiff"
     )]
     Variables {
         /// How many there are.
@@ -36,8 +36,9 @@ pub enum NotImplicit {
     },
 }
 
-/// The most variables of a system with implicit steps: a Jacobian of 4096 has 16 million entries.
-const MOST: usize = 4096;
+/// The most variables of a system with implicit steps: a Jacobian of 1024 has a million entries, and its inverse takes a billion
+/// operations.
+const MOST: usize = 1024;
 
 /// Refuses a system without implicit steps.
 pub(crate) fn refuse(system: &dyn Equations) -> Result<(), NotImplicit> {

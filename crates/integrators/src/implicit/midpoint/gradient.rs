@@ -194,7 +194,7 @@ impl<L: Lengths> LawAlong<'_, L> {
         let fraction = short(change, size);
         let (mut defect, mut noise) = (difference, rounding);
         if fraction > 0.0 {
-            let middle = if line.c != 0.5 {
+            let middle = if (line.c - 0.5).abs() > 0.0 {
                 let middle = parts.moved(line.x, &parts.vector(|i| d[i] * 0.5));
                 parts.along(law, &middle, d)[0]
             } else if kind == GradientKind::Gonzalez {

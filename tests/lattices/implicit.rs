@@ -1,6 +1,6 @@
 //! Implicit steps of lattices of some tens of sites.
 
-use metriplectic::integrators::{ItohAbe, NotImplicit, Schedule, SymmetricItohAbe};
+use metriplectic::integrators::{ItohAbe, NotImplicit, Schedule, Stepper, SymmetricItohAbe};
 use metriplectic::prelude::*;
 
 use super::order;
@@ -98,5 +98,7 @@ fn a_lattice_without_implicit_steps_says_which_method_to_take() {
     };
     let found = Gauss::<2>.run(&long, start, Span::steps(0.1, 1)).unwrap_err();
     assert_eq!(refusal(found), NotImplicit::Variables { variables: 1200 });
+    let shorter = chain(Graph::ring(320));
+    assert!(Stepper::serves(&Gauss::<2>, &shorter).is_ok());
     assert!(NotImplicit::Variables { variables: 1200 }.to_string().contains("RungeKuttaChebyshev"));
 }

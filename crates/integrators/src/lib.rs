@@ -7,14 +7,15 @@
 //! | [`newton`] | [`Newton`]: the solver of an implicit midpoint step | |
 //! | [`step`] | [`Flow`] and [`Stepper`]: what a run knows of a system and of a method; [`StepError`] | [`newton`] |
 //! | [`round_off`] | covectors, laws and positions that are safe against round-off | [`step`] |
-//! | [`discrete_gradient`] | [`DiscreteGradient`]: [`Gonzalez`], [`MeanValue`], [`ItohAbe`], [`SymmetricItohAbe`] | [`round_off`] |
+//! | [`discrete_gradient`] | [`DiscreteGradient`]: [`Gonzalez`], [`MeanValue`], [`ItohAbe`], [`SymmetricItohAbe`] | [`step`], [`round_off`] |
 //! | [`midpoint`] | [`Scheme`]: the method of the paper, its equation and its fallbacks | [`step`], [`round_off`], [`discrete_gradient`], [`newton`] |
 //! | [`collocation`] | [`Gauss`], [`Radau`]: methods with stages, of order `2s` and `2s − 1` | [`step`], [`round_off`] |
 //! | [`explicit`] | [`DormandPrince8`], [`DormandPrince5`], [`RungeKuttaChebyshev`]: explicit methods, and then back onto the laws | [`step`], [`round_off`] |
 //! | [`system`] | every metriplectic system is a flow | [`step`], [`round_off`], [`explicit`] |
 //! | [`numbers`] | [`FromEquations`]: a system in plain numbers is a flow | [`step`], [`round_off`], [`explicit`], [`system`] |
-//! | `compiled` | methods in plain numbers, one instance for each number of directions and entries | [`step`], [`midpoint`], [`collocation`], [`explicit`], [`numbers`] |
-//! | [`run`] | [`Method`], [`Span`], [`Until`], [`Watch`], [`Steps`], [`Trajectory`], [`Event`], [`Certificate`], [`Checkpoint`], [`Observables`]: what a user does with a run of any method | [`step`], [`round_off`], [`numbers`], `compiled` |
+//! | `implicit` | implicit methods of models in plain numbers, of any size: the [`Scheme`], [`Gauss`] and [`Radau`] of [`FromEquations`] | [`newton`], [`step`], [`round_off`], [`discrete_gradient`], [`midpoint`], [`collocation`], [`system`], [`numbers`] |
+//! | `compiled` | methods in plain numbers, one instance for each number of directions and entries | [`step`], [`explicit`], [`numbers`], `implicit` |
+//! | [`run`] | [`Method`], [`Span`], [`Until`], [`Watch`], [`Steps`], [`Trajectory`], [`Event`], [`Certificate`], [`Checkpoint`], [`Observables`]: what a user does with a run of any method | [`step`], [`round_off`], [`numbers`], `implicit`, `compiled` |
 //! | [`noise`](mod@noise) | [`Noisy`]: a system with thermal noise; [`NinomiyaVictoir`], [`RandomFlow`], which sample its law with any method | [`step`], [`explicit`] |
 //! | [`open`](mod@open) | [`OpenSystem`]: a clock in the energy, ports, baths and a ledger, for every method | [`step`], [`round_off`], [`discrete_gradient`], [`midpoint`], [`collocation`], [`explicit`], [`system`], [`noise`](mod@noise) |
 //! | `default_scheme` | a retraction is a method: its [`Scheme`] with the default options | [`step`], [`midpoint`] |

@@ -10,18 +10,31 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// The rooms, each with the rooms that its files name. A room names only rooms above it.
-const ROOMS: [(&str, &[&str]); 18] = [
+const ROOMS: [(&str, &[&str]); 19] = [
     ("newton", &[]),
     ("step", &["newton"]),
     ("round_off", &["step"]),
-    ("discrete_gradient", &["round_off"]),
+    ("discrete_gradient", &["step", "round_off"]),
     ("midpoint", &["step", "round_off", "discrete_gradient", "newton"]),
     ("collocation", &["step", "round_off"]),
     ("explicit", &["step", "round_off"]),
     ("system", &["step", "round_off", "explicit"]),
     ("numbers", &["step", "round_off", "explicit", "system"]),
-    ("compiled", &["step", "midpoint", "collocation", "explicit", "numbers"]),
-    ("run", &["step", "round_off", "numbers", "compiled"]),
+    (
+        "implicit",
+        &[
+            "newton",
+            "step",
+            "round_off",
+            "discrete_gradient",
+            "midpoint",
+            "collocation",
+            "system",
+            "numbers",
+        ],
+    ),
+    ("compiled", &["step", "explicit", "numbers", "implicit"]),
+    ("run", &["step", "round_off", "numbers", "implicit", "compiled"]),
     ("noise", &["step", "explicit"]),
     (
         "open",
@@ -47,11 +60,10 @@ const ROOMS: [(&str, &[&str]); 18] = [
 ];
 
 /// The files that name each other, all of them pairs: a default and what it is computed from, an equation and its
-/// covectors, a solver and what it keeps.
-const PAIRS: [[&str; 2]; 3] = [
+/// covectors.
+const PAIRS: [[&str; 2]; 2] = [
     ["step::flow", "step::initial_scales"],
     ["midpoint::equation", "midpoint::equation::providers"],
-    ["newton", "newton::inverse"],
 ];
 
 /// The files by their modules, without comments, texts and tests.

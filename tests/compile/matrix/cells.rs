@@ -10,10 +10,10 @@
 pub(crate) const CELLS: &str = "
 verb                                  | closed     | family    | open         | noisy     | noisy open | lattice  | open lattice | noisy lattice | own          | sizes
 
-`WeylMidpoint`                        | promises   | promises  | promises     | promises  | promises   | E0277    | E0277        | E0277         | E0277        | E0277
-`Scheme` with `ItohAbe`               | promises   | promises  | promises     | promises  | promises   | E0277    | E0277        | E0277         | E0277        | E0277
-`Gauss`                               | promises   | promises  | promises     | promises  | promises   | E0277    | E0277        | E0277         | E0277        | E0277
-`Radau`                               | promises   | promises  | one bath     | no radau  | no radau   | E0277    | E0277        | E0277         | E0277        | E0277
+`WeylMidpoint`                        | promises   | promises  | promises     | promises  | promises   | dense    | E0277        | dense path    | by parts     | by parts
+`Scheme` with `ItohAbe`               | promises   | promises  | promises     | promises  | promises   | dense    | E0277        | dense path    | by parts     | by parts
+`Gauss`                               | promises   | promises  | promises     | promises  | promises   | dense    | E0277        | dense path    | by parts     | by parts
+`Radau`                               | promises   | promises  | one bath     | no radau  | no radau   | dense    | E0277        | no radau      | by parts     | by parts
 `DormandPrince8`                      | promises   | promises  | promises     | promises  | promises   | promises | promises     | frozen        | numbers      | numbers
 `RungeKuttaChebyshev`                 | promises   | promises  | promises     | promises  | promises   | promises | promises     | frozen        | numbers      | numbers
 `NinomiyaVictoir`                     | –          | –         | –            | promises  | promises   | –        | –            | ring          | –            | –
@@ -142,6 +142,25 @@ pub(crate) const TESTS: &[Reference] = &[
         "its ring",
         "tests/lattice_verification.rs",
         "a_lattice_with_noise_is_verified_once_with_the_law_of_its_noise",
+    ),
+    partly(
+        "dense",
+        [
+            "tests/lattices/implicit.rs",
+            "implicit_methods_of_a_chain_have_their_orders_and_both_laws",
+        ],
+        "with sites on vector spaces and up to 1024 variables; others are refused (`NotImplicit`)",
+    ),
+    partly(
+        "dense path",
+        ["tests/noise/lattice.rs", "a_path_of_a_ring_is_that_of_every_method"],
+        "with sites on vector spaces and up to 1024 variables; others are refused (`NotImplicit`)",
+    ),
+    partly(
+        "by parts",
+        ["crates/integrators/src/implicit.rs", "a_system_in_numbers_takes_the_steps_of_its_types"],
+        "on vector spaces, if the parts of the system are [known apart](recipes.md#a-system-of-your-own), \
+         and up to 1024 variables; others are refused (`NotImplicit`)",
     ),
     right("frozen", "tests/noise/lattice.rs", "a_path_of_a_ring_is_that_of_every_method"),
     right(

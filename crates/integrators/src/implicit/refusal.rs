@@ -38,6 +38,7 @@ pub enum NotImplicit {
 
 /// The most variables of a system with implicit steps: a Jacobian of 1024 has a million entries, and its inverse takes a billion
 /// operations.
+/// A factor of four fails `tests/lattices/implicit.rs::a_lattice_without_implicit_steps_says_which_method_to_take`.
 const MOST: usize = 1024;
 
 /// Refuses a system without implicit steps.

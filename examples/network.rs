@@ -7,14 +7,17 @@
 //! ```
 //!
 //! A damper takes the power `c (v_j − v_i)²` from the motion of its ends and gives half of it to each of them as heat. In a
-//! link the heat `κ (T_j − T_i)` flows. The program writes no bracket and no friction: a system of its own answers
-//! `Equations`, and a run keeps `H` and `P` to round-off, while `S` never falls.
+//! link the heat `κ (T_j − T_i)` flows. The program writes laws and velocities in slices of numbers: a system of its own answers
+//! `Equations`, and a run by an explicit method keeps `H` and `P` to round-off, while `S` never falls. With its bracket and its friction
+//! apart (`Apart`) implicit methods run it too, which its stiff links may need.
 //!
 //! `NETWORK=my_network.txt cargo run --release --example network` reads another file.
 
 use std::error::Error;
 
-use metriplectic::equations::{ENERGY, ENTROPY, Equations, Kind, Sizes};
+use metriplectic::equations::{
+    Apart, Covectors, Differences, ENERGY, ENTROPY, Equations, Kind, Part, Sizes,
+};
 use metriplectic::integrators::{FromEquations, PlainNumbers};
 use metriplectic::prelude::*;
 use metriplectic_studies::{Example, Panel, Panels};
@@ -160,15 +163,52 @@ impl Equations for Network {
     }
 }
 
+impl Apart for Network {
+    fn is_zero(&self, part: Part) -> bool {
+        part == Part::Gyroscopic
+    }
+
+    fn apply(&self, part: Part, _: f64, x: &[f64], w: Covectors<'_>, alpha: &[f64], v: &mut [f64]) {
+        let (k, [_, _, u]) = (self.bodies(), self.split(x));
+        let [along_q, along_p, along_u] = self.split(alpha);
+        let [_, speed, warmth] = self.split(w.energy);
+        let temperature = |i: usize| u[i] / self.capacities[i];
+        v.fill(0.0);
+        if part == Part::Reversible {
+            v[..k].copy_from_slice(along_p);
+            return (0..k).for_each(|i| v[k + i] = -along_q[i]);
+        }
+        // Terms ρ b bᵀ with ⟨dH, b⟩ = 0: the momentum that a damper moves, with the heat that one of its ends takes.
+        for &([i, j], [coefficient]) in &self.dampers {
+            for end in [i, j] {
+                let heat = (speed[j] - speed[i]) / warmth[end];
+                let along = along_p[i] - along_p[j] + heat * along_u[end];
+                let rate = 0.5 * coefficient * temperature(end) * along;
+                v[k + i] += rate;
+                v[k + j] -= rate;
+                v[2 * k + end] += rate * heat;
+            }
+        }
+        for &([i, j], [conductance]) in &self.links {
+            let along = along_u[i] / warmth[i] - along_u[j] / warmth[j];
+            let rate = conductance * temperature(i) * temperature(j) * along;
+            v[2 * k + i] += rate / warmth[i];
+            v[2 * k + j] -= rate / warmth[j];
+        }
+    }
+}
+
 fn main() -> Result<(), Box<dyn Error>> {
     let about = "A network of bodies, springs, dampers and heat links from a text file.";
     let example = Example::new(about, 2000, 0.05);
     let file = std::env::var("NETWORK").unwrap_or_else(|_| LADDER.to_owned());
     let (network, start) = Network::read(&std::fs::read_to_string(file)?)?;
-    let (bodies, network) = (network.bodies(), FromEquations(network));
+    let (bodies, network) = (network.bodies(), FromEquations(Differences(network)));
     let end = example.steps as f64 * example.step_size;
     let span = Span::until(end).tolerance(1e-8).output_every(example.step_size);
-    let run = DormandPrince8.run(&network, start.into(), span)?;
+    let run = DormandPrince8.run(&network, start.clone().into(), span)?;
+    let implicit = Span::until(end).tolerance(1e-6).at_most(2);
+    let implicit = Radau::<3>.run(&network, start.into(), implicit)?;
 
     let series = |value: &dyn Fn(&State<PlainNumbers>) -> f64| -> Vec<(f64, f64)> {
         run.iter().map(|state| (state.time, value(state))).collect()
@@ -177,7 +217,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         [Panel::new("position q", "t"), Panel::new("temperature T", "t")];
     for i in 0..bodies {
         positions = positions.line(format!("{i}"), series(&|s| s.point[i]));
-        let capacity = network.0.capacities[i];
+        let capacity = network.0.0.capacities[i];
         temperatures =
             temperatures.line(format!("{i}"), series(&|s| s.point[2 * bodies + i] / capacity));
     }
@@ -188,9 +228,12 @@ fn main() -> Result<(), Box<dyn Error>> {
     let panels = [positions, temperatures, entropy, energy];
     let figure = panels.into_iter().fold(Panels::new(title), Panels::panel);
     let last = run.last();
+    let ends = last.point.iter().zip(&implicit.last().point);
+    let apart = ends.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
     example
         .report_of(run.certificate(), last.time, last.point.to_vec())
         .with("entropy_gained", last.entropy - first.entropy)
+        .with("implicit_end_apart", apart)
         .figure(figure)
         .print()
 }

@@ -33,7 +33,8 @@ use crate::system::{NO_CLOCK, least_dependent, recheck};
 
 /// The flow of a system that answers [`Equations`]: one of your own, or one whose number of variables is read from a file.
 ///
-/// Explicit methods run it, with all that a run does: tolerances, outputs, events and their jumps, certificates, checkpoints,
+/// Explicit methods run it, and implicit ones if its parts are known apart
+/// ([`Differences`](metriplectic_equations::Differences)), with all that a run does: tolerances, outputs, events and their jumps, certificates, checkpoints,
 /// observables and sweeps. `H` and the further invariants are kept to round-off, and `S` never falls. A panic in the system is an
 /// error of its run ([`Panicked`](crate::Panicked)), which keeps the states before a step in which it happens. `S` may be behind a
 /// pointer: `FromEquations<Box<dyn Equations>>` is a type that a struct can name, for every system.

@@ -158,7 +158,7 @@ impl<'a, L: Lengths> Parts<'a, L> {
         self.vector(|i| x.numbers()[i].abs())
     }
 
-    /// What rounding loses of the displacement `d` on the way from `x` to `end`.
+    /// Computes the rounding error of the displacement `d` on the way from `x` to `end`.
     #[inline]
     pub(super) fn lost_digits(&self, x: &L::State, d: &L::Vector, end: &L::State) -> L::Vector {
         self.vector(|i| d[i] - (end.numbers()[i] - x.numbers()[i]))

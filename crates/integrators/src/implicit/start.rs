@@ -39,7 +39,7 @@ pub(super) struct Step<L: Lengths> {
     pub(super) effort: Effort,
 }
 
-/// What an implicit step asks of a flow beside the parts of its model.
+/// The questions of an implicit step to a flow beside the parts of its model.
 pub(super) trait Around<L: Lengths> {
     /// The state near `y` with these laws, and with this entropy if it is given; `None` if there is none.
     fn onto(

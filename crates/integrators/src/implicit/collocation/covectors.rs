@@ -59,7 +59,7 @@ pub(super) fn of_law<L: Lengths>(laws: &Laws<L::Invariants>, law: usize) -> f64 
 }
 
 impl<V> OfLaws<V> {
-    /// What belongs to a law, to be changed.
+    /// The member of a law, to be changed.
     #[inline]
     fn of_mut(&mut self, law: usize) -> &mut V {
         match law {

@@ -1,4 +1,4 @@
-//! What methods with stages keep from one step to the next: as [`StageMemory`](crate::StageMemory), in plain numbers and under its
+//! The memory of methods with stages from one step to the next: as [`StageMemory`](crate::StageMemory), in plain numbers and under its
 //! names.
 
 use std::fmt;

@@ -24,7 +24,7 @@ pub(super) struct Equation<'a, L: Lengths> {
     pub(super) drift: Laws<L::Invariants>,
 }
 
-/// What an evaluation tells of the entropy.
+/// The entropy in an evaluation.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Dissipated {
     /// `|w_S|²`; infinite if the entropy has no discrete gradient.
@@ -61,7 +61,7 @@ pub(super) struct Rounding<L: Lengths> {
     pub(super) sensitivity: Matrix<L>,
     /// The sizes of the round-off of these.
     pub(super) covector: L::Vector,
-    /// Those of the points.
+    /// The sizes of the round-off of the points.
     pub(super) argument: L::Vector,
 }
 

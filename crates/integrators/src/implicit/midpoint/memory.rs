@@ -1,4 +1,4 @@
-//! What a scheme keeps from one step to the next: as [`MidpointMemory`](crate::midpoint::MidpointMemory), in plain numbers and under
+//! The memory of a scheme from one step to the next: as [`MidpointMemory`](crate::midpoint::MidpointMemory), in plain numbers and under
 //! its names.
 
 use std::fmt;

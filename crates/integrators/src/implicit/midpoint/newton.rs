@@ -21,7 +21,7 @@ pub(super) struct Root<L: Lengths> {
     pub(super) residual_bound: f64,
     /// Linear systems solved.
     pub(super) iterations: usize,
-    /// What the last evaluation told of the entropy.
+    /// The entropy in the last evaluation.
     pub(super) evidence: Dissipated,
 }
 

@@ -89,7 +89,7 @@ pub use run::{Ending, Method, Method as Run, Schedule, Simulation, SpanError, St
 pub use step::{
     Compiled, Components, Control, Directions, Effort, Element, Entries, EntropyStep,
     EventExchange, Evidence, Flow, GradientKind, Inlined, JumpError, Laws, LedgerErrors,
-    LedgerSummary, LimitingSites, LineOfStep, Memory, MethodError, NoiseSummary, Panicked,
+    LedgerSummary, LimitingSites, LineOfStep, Listed, Memory, MethodError, NoiseSummary, Panicked,
     PlainNumbers, Promises, Recheck, Refusal, RestoreError, Saved, Scales, StageLaws, StartError,
     StateSpace, StepEnds, StepError, StepStart, Stepper, Taken, Values, Vector,
 };

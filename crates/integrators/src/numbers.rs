@@ -26,7 +26,7 @@ use self::rows::laws;
 use self::stages::{displacement, entropy_round_off, scales, stage_flow};
 use crate::explicit::{Projected, ProjectionError, StageFlow, Target};
 use crate::step::{
-    Directions, Element, Entries, Flow, FlowVisitor, Laws, PlainNumbers, Recheck, Values,
+    Directions, Element, Entries, Flow, FlowVisitor, Laws, Listed, PlainNumbers, Recheck, Values,
     Vector as _, Written,
 };
 use crate::system::{NO_CLOCK, least_dependent, recheck};
@@ -272,7 +272,7 @@ impl<S: Equations> Flow for FromEquations<S> {
     }
 }
 
-impl<S: Equations> Written for FromEquations<S> {
+impl<S: Equations> Listed for FromEquations<S> {
     const CATCHES_PANICS: bool = true;
 
     type Layout = ();
@@ -288,7 +288,9 @@ impl<S: Equations> Written for FromEquations<S> {
     fn write(x: &Entries) -> Entries {
         x.clone()
     }
+}
 
+impl<S: Equations> Written for FromEquations<S> {
     fn vector(directions: &Directions) -> Directions {
         directions.clone()
     }

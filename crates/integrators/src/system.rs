@@ -26,8 +26,8 @@ use crate::explicit::{StageFlow as _, Target};
 use crate::round_off::bound::{SizesAt, of_an_increment, size_of_terms, sizes_on_a_step};
 use crate::step::compiled::{has_explicit, has_implicit};
 use crate::step::{
-    Components, CountOf, Dim, Directions, Entries, Flow, FlowVisitor, Laws, Numbers, Recheck,
-    Scales, Values, Written, initial_scales,
+    Components, CountOf, Dim, Directions, Entries, Flow, FlowVisitor, Laws, Listed, Numbers,
+    Recheck, Scales, Values, Written, initial_scales,
 };
 use metriplectic_manifolds::Riemannian as _;
 
@@ -201,15 +201,7 @@ impl<Y: Metriplectic> Flow for Y {
     }
 }
 
-impl<Y: Metriplectic> Written for Y {
-    const HAS_EXPLICIT: bool =
-        Y::Invariants::COUNT == 0 && has_explicit(<Dim<Y> as Dimension>::LEN, Y::Manifold::ENTRIES);
-
-    const HAS_IMPLICIT: bool = Y::Manifold::IS_VECTOR_SPACE
-        && Y::Metric::IS_CANONICAL
-        && Y::Invariants::COUNT == 0
-        && has_implicit(<Dim<Y> as Dimension>::LEN);
-
+impl<Y: Metriplectic> Listed for Y {
     type Layout = ();
 
     fn layout(&self) -> &() {
@@ -232,6 +224,16 @@ impl<Y: Metriplectic> Written for Y {
         Y::Manifold::write(x, &mut put);
         entries
     }
+}
+
+impl<Y: Metriplectic> Written for Y {
+    const HAS_EXPLICIT: bool =
+        Y::Invariants::COUNT == 0 && has_explicit(<Dim<Y> as Dimension>::LEN, Y::Manifold::ENTRIES);
+
+    const HAS_IMPLICIT: bool = Y::Manifold::IS_VECTOR_SPACE
+        && Y::Metric::IS_CANONICAL
+        && Y::Invariants::COUNT == 0
+        && has_implicit(<Dim<Y> as Dimension>::LEN);
 
     #[inline]
     fn vector(directions: &Directions) -> Tangent<Y> {

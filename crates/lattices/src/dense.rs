@@ -10,32 +10,21 @@ use metriplectic_equations::{
 };
 use metriplectic_fields::{Column, Space as _};
 use metriplectic_integrators::{
-    Control, DiscreteGradient, Element, Entries, Flow, FromEquations, Gauss, Laws, MethodError,
+    Control, DiscreteGradient, Element, Flow, FromEquations, Gauss, Laws, Listed as _, MethodError,
     NotImplicit, Promises, Radau, Refusal, Scheme, StageFlow as _, StepEnds, StepError, StepStart,
     Stepper, Taken, Values, Vector as _,
 };
-use metriplectic_manifolds::{Canonical, Euclidean, Manifold, Retraction};
+use metriplectic_manifolds::{Canonical, Euclidean, Retraction};
 
+use crate::flow::listed;
 use crate::lattice::{Lattice, differentials_at, dimension};
 use crate::model::{Model, VectorOf};
-use crate::points::Points;
 use crate::vector::SiteVector;
 
 /// A lattice in plain numbers.
 struct Dense<'a, P>(&'a Lattice<P>);
 
-/// The entries of all points, site by site.
-fn entries<M: Manifold>(x: &Points<M>) -> Entries {
-    x.iter().flat_map(M::entries).collect()
-}
-
 impl<P: Model> Dense<'_, P> {
-    fn points(&self, entries: &[f64]) -> Points<P::Manifold> {
-        let mut entries = entries.iter();
-        let mut next = || *entries.next().expect("a state has all of its entries");
-        self.0.points(|_| P::Manifold::assemble(&mut next))
-    }
-
     /// The vector with these numbers.
     fn vector(&self, numbers: &[f64]) -> SiteVector {
         self.0.vector_of(|site| column::<P>(numbers, site))
@@ -61,13 +50,13 @@ impl<P: Model> Equations for Dense<'_, P> {
     }
 
     fn values(&self, _: f64, x: &[f64], values: &mut [f64]) {
-        let laws = self.0.laws(&self.points(x));
+        let laws = self.0.laws(&listed(x));
         (values[ENERGY], values[ENTROPY]) = (laws.energy, laws.entropy);
         values[ENTROPY + 1..].copy_from_slice(&laws.invariants);
     }
 
     fn differentials(&self, _: f64, x: &[f64], values: &mut [f64], w: &mut [f64]) {
-        let (n, x) = (x.len(), self.points(x));
+        let (n, x) = (x.len(), listed(x));
         let jets = self.0.jets(&x);
         let laws = jets.laws();
         (values[ENERGY], values[ENTROPY]) = (laws.energy, laws.entropy);
@@ -84,7 +73,7 @@ impl<P: Model> Equations for Dense<'_, P> {
     }
 
     fn velocity(&self, _: f64, x: &[f64], v: &mut [f64]) -> Option<f64> {
-        let (velocity, production) = self.0.motion(&self.points(x))?;
+        let (velocity, production) = self.0.motion(&listed(x))?;
         v.copy_from_slice(&velocity.to_list());
         Some(production)
     }
@@ -102,7 +91,7 @@ impl<P: Model> Equations for Dense<'_, P> {
     }
 
     fn defect(&self, x: &[f64]) -> f64 {
-        self.0.defect(&self.points(x))
+        self.0.defect(&listed(x))
     }
 }
 
@@ -116,7 +105,7 @@ impl<P: Model> Apart for Dense<'_, P> {
     }
 
     fn apply(&self, part: Part, _: f64, x: &[f64], w: Covectors<'_>, alpha: &[f64], v: &mut [f64]) {
-        let (lattice, x) = (self.0, self.points(x));
+        let (lattice, x) = (self.0, listed::<P::Manifold>(x));
         v.fill(0.0);
         let at = |numbers: &[f64], site: usize| column::<P>(numbers, site);
         for site in 0..lattice.sites() {
@@ -172,7 +161,7 @@ fn with_start<P: Model, T>(
     in_numbers(start.flow, |flow| {
         f(&StepStart {
             flow,
-            x: &entries(start.x),
+            x: &Lattice::<P>::write(start.x),
             time: start.time,
             values: written(&start.values),
             reference: written(&start.reference),
@@ -186,7 +175,7 @@ fn with_ends<P: Model, T>(
     step: &StepEnds<'_, Lattice<P>>,
     f: impl FnOnce(&StepEnds<'_, Plain<'_>>) -> T,
 ) -> T {
-    let [x, end] = [step.x, step.end].map(entries);
+    let [x, end] = [step.x, step.end].map(Lattice::<P>::write);
     let [before, after] = step.values.map(written);
     let (values, reference) = ([&before, &after], &written(step.reference));
     in_numbers(step.flow, |flow| {
@@ -195,10 +184,10 @@ fn with_ends<P: Model, T>(
 }
 
 /// Reads a step of a lattice.
-fn read<P: Model>(lattice: &Lattice<P>, taken: Taken<Plain<'_>>) -> Taken<Lattice<P>> {
+fn typed<P: Model>(taken: Taken<Plain<'_>>) -> Taken<Lattice<P>> {
     let Taken { x, values: Laws { energy, entropy, invariants }, evidence, effort } = taken;
     let values = Laws { energy, entropy, invariants: invariants.as_ref().to_vec() };
-    Taken { x: Dense(lattice).points(&x), values, evidence, effort }
+    Taken { x: listed(&x), values, evidence, effort }
 }
 
 /// The steps of an implicit method of a lattice: those of the lattice in plain numbers.
@@ -242,9 +231,8 @@ macro_rules! implicit {
                 h: f64,
                 memory: &mut Self::Memory,
             ) -> Result<Taken<Lattice<P>>, StepError> {
-                let lattice = start.flow;
                 with_start(start, |start| {
-                    self.step(start, h, memory).map(|taken| read(lattice, taken))
+                    self.step(start, h, memory).map(typed)
                 })
             }
 
@@ -254,9 +242,8 @@ macro_rules! implicit {
                 h: f64,
                 memory: &mut Self::Memory,
             ) -> Result<Taken<Lattice<P>>, Refusal> {
-                let lattice = start.flow;
                 with_start(start, |start| {
-                    self.attempt(start, h, memory).map(|taken| read(lattice, taken))
+                    self.attempt(start, h, memory).map(typed)
                 })
             }
 
@@ -278,10 +265,7 @@ macro_rules! implicit {
                 memory: &mut Self::Memory,
                 theta: f64,
             ) -> Option<Element<Lattice<P>>> {
-                let lattice = Dense(step.flow);
-                with_ends(step, |step| {
-                    self.between(step, memory, theta).map(|x| lattice.points(&x))
-                })
+                with_ends(step, |step| self.between(step, memory, theta).map(|x| listed(&x)))
             }
         }
     )+};

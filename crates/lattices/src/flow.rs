@@ -4,7 +4,10 @@ use metriplectic_dynamics::SecondLaw;
 use metriplectic_dynamics::invariants::Kind;
 use metriplectic_fields::{Column, Space};
 use metriplectic_integrators::explicit::{Combination, Projected, ProjectionError, Target};
-use metriplectic_integrators::{Element, Flow, FlowError, Laws, Recheck, StageFlow, Vector as _};
+use metriplectic_integrators::{
+    Element, Entries, Flow, FlowError, Laws, Listed, Recheck, StageFlow, StateSpace as _,
+    Vector as _,
+};
 use metriplectic_manifolds::{Manifold, PointError};
 
 use crate::gather::Gather;
@@ -274,6 +277,33 @@ impl<P: Model> Flow for Lattice<P> {
         h: f64,
     ) -> Option<SiteVector> {
         against_simpson(self, x, end, h)
+    }
+}
+
+/// The points with these entries, site by site.
+pub(crate) fn listed<M: Manifold>(entries: &[f64]) -> Points<M> {
+    let mut entries = entries.iter().peekable();
+    let mut points = Vec::new();
+    while entries.peek().is_some() {
+        let mut next = || *entries.next().expect("a state has all entries of its last point");
+        points.push(M::assemble(&mut next));
+    }
+    Points::from(points)
+}
+
+impl<P: Model> Listed for Lattice<P> {
+    type Layout = ();
+
+    fn layout(&self) -> &() {
+        &()
+    }
+
+    fn read((): &(), entries: &[f64]) -> Points<P::Manifold> {
+        listed(entries)
+    }
+
+    fn write(x: &Points<P::Manifold>) -> Entries {
+        Sites::<P::Manifold>::numbers(x).into()
     }
 }
 

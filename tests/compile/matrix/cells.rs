@@ -17,7 +17,7 @@ verb                                  | closed     | family    | open         | 
 `DormandPrince8`                      | promises   | promises  | promises     | promises  | promises   | promises | promises     | frozen        | numbers      | numbers
 `RungeKuttaChebyshev`                 | promises   | promises  | promises     | promises  | promises   | promises | promises     | frozen        | numbers      | numbers
 `NinomiyaVictoir`                     | –          | –         | –            | promises  | promises   | –        | –            | ring          | –            | –
-a field of a struct: `Simulation`     | struct     | struct    | struct       | struct    | struct     | E0277    | E0277        | E0277         | struct       | struct
+a field of a struct: `Simulation`     | struct     | struct    | struct       | struct    | struct     | in lists | in lists     | in lists      | struct       | struct
 energy and entropy in boxes: `erased` | erased     | E0599     | E0599        | E0599     | E0599      | E0599    | E0599        | E0599         | E0599        | E0599
 
 `tangent` of `WeylMidpoint`           | schemes    | default   | E0277        | E0277     | E0277      | E0277    | E0277        | E0277         | E0277        | E0277
@@ -103,6 +103,11 @@ pub(crate) const TESTS: &[Reference] = &[
         "struct",
         "crates/integrators/src/run/simulation.rs",
         "systems_of_all_kinds_run_from_a_struct_with_the_bits_of_their_types",
+    ),
+    right(
+        "in lists",
+        "tests/lattices/simulations.rs",
+        "lattices_of_all_kinds_run_from_a_struct_with_the_bits_of_their_types",
     ),
     right(
         "erased",

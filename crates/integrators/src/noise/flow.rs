@@ -8,7 +8,7 @@ use super::fluctuating::Fluctuating;
 use super::system::Noisy;
 use crate::step::{
     Directions, Element, Entries, EventExchange, Flow, FlowError, FlowVisitor, Laws, LedgerErrors,
-    LedgerSummary, Recheck, Scales, StartError, StepError, Values, Written,
+    LedgerSummary, Listed, Recheck, Scales, StartError, StepError, Values, Written,
 };
 
 impl<F: Fluctuating<U>, U> Flow for Noisy<F, U> {
@@ -217,7 +217,7 @@ impl<F: Fluctuating<U>, U, V: FlowVisitor<Noisy<F, U>>> FlowVisitor<F> for WithN
     }
 }
 
-impl<F: Fluctuating<U> + Written, U> Written for Noisy<F, U> {
+impl<F: Fluctuating<U> + Listed, U> Listed for Noisy<F, U> {
     const CATCHES_PANICS: bool = F::CATCHES_PANICS;
 
     type Layout = F::Layout;
@@ -241,7 +241,9 @@ impl<F: Fluctuating<U> + Written, U> Written for Noisy<F, U> {
     fn write(x: &Element<F>) -> Entries {
         F::write(x)
     }
+}
 
+impl<F: Fluctuating<U> + Written, U> Written for Noisy<F, U> {
     fn vector(directions: &Directions) -> F::Vector {
         F::vector(directions)
     }

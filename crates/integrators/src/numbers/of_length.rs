@@ -15,7 +15,7 @@ use super::rows::Rows;
 use super::stages::{self, stage_flow};
 use super::{StageFlow, referred_rise};
 use crate::explicit::{Projected, ProjectionError, Target};
-use crate::step::{Directions, Element, Entries, Flow, Laws, Values, Vector as _, Written};
+use crate::step::{Directions, Element, Entries, Flow, Laws, Listed, Values, Vector as _, Written};
 use crate::system::NO_CLOCK;
 
 /// A typed system of `N` directions and `E` entries without further invariants, in plain numbers.
@@ -114,7 +114,7 @@ impl<const N: usize, const E: usize> Flow for OfLength<'_, N, E> {
     }
 }
 
-impl<const N: usize, const E: usize> Written for OfLength<'_, N, E> {
+impl<const N: usize, const E: usize> Listed for OfLength<'_, N, E> {
     type Layout = ();
 
     fn layout(&self) -> &() {
@@ -130,7 +130,9 @@ impl<const N: usize, const E: usize> Written for OfLength<'_, N, E> {
     fn write(x: &[f64; E]) -> Entries {
         entries(x)
     }
+}
 
+impl<const N: usize, const E: usize> Written for OfLength<'_, N, E> {
     #[inline]
     fn vector(directions: &Directions) -> Array<N> {
         List::of(directions.numbers())

@@ -23,8 +23,8 @@ use crate::step::failure::Cause;
 use crate::step::scales::relative;
 use crate::step::{
     self, Components, Directions, EventExchange, Flow, FlowVisitor, Laws, LedgerErrors,
-    LedgerSummary, Numbers, Recheck, Scales, StartError, StateSpace as _, StepError, StepStart,
-    Values, Vector as _, Written,
+    LedgerSummary, Listed, Numbers, Recheck, Scales, StartError, StateSpace as _, StepError,
+    StepStart, Values, Vector as _, Written,
 };
 
 impl<Y, C, X> Flow for OpenSystem<Y, C, X>
@@ -276,7 +276,7 @@ where
     }
 }
 
-impl<Y, C, X> Written for OpenSystem<Y, C, X>
+impl<Y, C, X> Listed for OpenSystem<Y, C, X>
 where
     Y: Metriplectic,
     C: Clock<Y::Manifold, Y::Energy>,
@@ -308,7 +308,14 @@ where
     fn write(x: &StateOf<Y>) -> step::Entries {
         OpenSpace::<Y::Manifold>::numbers(x).into()
     }
+}
 
+impl<Y, C, X> Written for OpenSystem<Y, C, X>
+where
+    Y: Metriplectic,
+    C: Clock<Y::Manifold, Y::Energy>,
+    X: Exchange<Y::Manifold, Y::Metric>,
+{
     fn vector(directions: &Directions) -> Direction<Y, X> {
         let (v, rest) = directions.numbers().split_at(Vector::<Y::Manifold>::LEN);
         let entries = X::Entries::from_index(|i| rest[i + 2]);

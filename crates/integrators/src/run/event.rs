@@ -20,7 +20,7 @@ use crate::run::state::State;
 use crate::step::dense::{Hermite, says_between};
 use crate::step::digits::Digits;
 use crate::step::exact::Exact;
-use crate::step::{Element, Entries, Flow, StateSpace, StepEnds, Vector as _, Written};
+use crate::step::{Element, Entries, Flow, Listed, StateSpace, StepEnds, Vector as _};
 
 /// A change of sign of a function of the state, found in a run; asked for by [`Watch::event`](crate::Watch::event).
 ///
@@ -128,7 +128,7 @@ impl Request {
 impl Request {
     /// Translates the event to states in plain numbers. One that was asked for at other states stays as it is, and a run of plain
     /// numbers refuses it by the name of its own states.
-    pub(crate) fn in_numbers<F: Written>(&self, flow: &F) -> Self {
+    pub(crate) fn in_numbers<F: Listed>(&self, flow: &F) -> Self {
         let expected = Some(type_name::<Element<F>>());
         let jump = self.jump.as_ref().map(|jump| jump.in_numbers(flow));
         let Ok(function) = Arc::clone(&self.function).downcast::<Function<Element<F>>>() else {
@@ -138,6 +138,19 @@ impl Request {
         let read = F::read as fn(&F::Layout, &[f64]) -> Element<F>;
         let function = move |time: f64, x: &Entries| (function.0)(time, &read(&layout, x));
         let function = Arc::new(Function::<Entries>(Box::new(function)));
+        Self { expected, jump, function, ..self.clone() }
+    }
+
+    /// Translates an event at states in plain numbers to those of a flow. One that was asked for at other states stays as it is.
+    pub(crate) fn in_types<F: Listed>(&self, flow: &F) -> Self {
+        let expected = Some(type_name::<Entries>());
+        let jump = self.jump.as_ref().map(|jump| jump.in_types(flow));
+        let Ok(function) = Arc::clone(&self.function).downcast::<Function<Entries>>() else {
+            return Self { expected, jump, ..self.clone() };
+        };
+        let write = F::write as fn(&Element<F>) -> Entries;
+        let function = move |time: f64, x: &Element<F>| (function.0)(time, &write(x));
+        let function = Arc::new(Function::<Element<F>>(Box::new(function)));
         Self { expected, jump, function, ..self.clone() }
     }
 

@@ -8,7 +8,7 @@ use metriplectic_fields::Real;
 use crate::round_off::sum::plus;
 use crate::run::span_error::SpanError;
 use crate::run::state::State;
-use crate::step::{Element, Entries, EventExchange, StateSpace, Written};
+use crate::step::{Element, Entries, EventExchange, Listed, StateSpace};
 
 /// A jump of the state at an event, asked for by [`Watched::jump`](crate::Watched::jump).
 #[derive(Clone, Debug, PartialEq)]
@@ -133,7 +133,7 @@ impl JumpRequest {
     }
 
     /// Translates the jump to states in plain numbers.
-    pub(crate) fn in_numbers<F: Written>(&self, flow: &F) -> Self {
+    pub(crate) fn in_numbers<F: Listed>(&self, flow: &F) -> Self {
         let expected = Some(type_name::<Element<F>>());
         let Ok(map) = Arc::clone(&self.function).downcast::<Function<Element<F>>>() else {
             return Self { expected, ..self.clone() };
@@ -147,6 +147,20 @@ impl JumpRequest {
             write(&led(&x, (map.0)(time, &x)))
         };
         let function = Arc::new(Function::<Entries>(Box::new(map)));
+        Self { expected, function, smooth: None, ..*self }
+    }
+
+    /// Translates a jump of states in plain numbers to those of a flow.
+    pub(crate) fn in_types<F: Listed>(&self, flow: &F) -> Self {
+        let expected = Some(type_name::<Entries>());
+        let Ok(map) = Arc::clone(&self.function).downcast::<Function<Entries>>() else {
+            return Self { expected, ..self.clone() };
+        };
+        let layout = flow.layout().clone();
+        let read = F::read as fn(&F::Layout, &[f64]) -> Element<F>;
+        let write = F::write as fn(&Element<F>) -> Entries;
+        let map = move |time: f64, x: &Element<F>| read(&layout, &(map.0)(time, &write(x)));
+        let function = Arc::new(Function::<Element<F>>(Box::new(map)));
         Self { expected, function, smooth: None, ..*self }
     }
 

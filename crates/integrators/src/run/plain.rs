@@ -15,8 +15,8 @@ use crate::run::trajectory::Trajectory;
 use crate::step::in_plain::{InPlainNumbers, MethodInTypes};
 use crate::step::panicked::caught;
 use crate::step::{
-    Compiled, Element, Entries, Flow, FlowError, FlowVisitor, MethodError, PlainFlow, PlainMethod,
-    PlainNumbers, Stepper, Written, in_room,
+    Compiled, Element, Entries, Flow, FlowError, FlowVisitor, Listed, MethodError, PlainFlow,
+    PlainMethod, PlainNumbers, StateSpace, Stepper, Written, in_room,
 };
 
 /// A run of a method over a schedule, in the types of a flow or in plain numbers.
@@ -73,14 +73,29 @@ pub(super) struct WholeInNumbers<F: Flow, M> {
     pub(super) schedule: Schedule,
 }
 
-impl<F: Written, M: Stepper<F>> FlowVisitor<F> for WholeInNumbers<F, M> {
+impl<F: Listed, M: Stepper<F>> FlowVisitor<F> for WholeInNumbers<F, M> {
     type Output = Outcome;
 
+    /// Runs in types, and writes what comes out.
     fn typed(self, flow: &F) -> Outcome {
-        self.written(flow)
+        let Self { method, x0, mut schedule } = self;
+        for request in &mut schedule.watch.events {
+            *request = request.in_types(flow);
+        }
+        let run = || {
+            let done = in_room(flow, || Steps::start(method, flow, x0, schedule)?.run());
+            match done {
+                Ok(run) => Ok(run.written::<F>()),
+                Err(error) => Err(error.written::<F>()),
+            }
+        };
+        if const { F::CATCHES_PANICS } { without_panics(run) } else { run() }
     }
 
-    fn written(self, flow: &F) -> Outcome {
+    fn written(self, flow: &F) -> Outcome
+    where
+        F: Written,
+    {
         let Self { method, x0, schedule } = self;
         let in_numbers = InPlainNumbers::from(flow, x0);
         let start = (&in_numbers as &PlainFlow<'_>, Entries::zeros(0));
@@ -88,7 +103,10 @@ impl<F: Written, M: Stepper<F>> FlowVisitor<F> for WholeInNumbers<F, M> {
         if const { F::CATCHES_PANICS } { without_panics(run) } else { run() }
     }
 
-    fn answered(self, flow: &F, system: &dyn Equations) -> Outcome {
+    fn answered(self, flow: &F, system: &dyn Equations) -> Outcome
+    where
+        F: Written,
+    {
         let Self { method, x0, schedule } = self;
         let (x0, beside) = (F::write(&x0), InTypes(flow));
         let answered = &Answered::of(system, &beside);
@@ -99,7 +117,10 @@ impl<F: Written, M: Stepper<F>> FlowVisitor<F> for WholeInNumbers<F, M> {
         run(&MethodInTypes { method, flow }, (answered, x0), schedule)
     }
 
-    fn own(self, flow: &F, system: &dyn Equations) -> Outcome {
+    fn own(self, flow: &F, system: &dyn Equations) -> Outcome
+    where
+        F: Written,
+    {
         // A constant, so that the method is not compiled with each system.
         if const { M::IS_EXPLICIT || M::IS_IMPLICIT } {
             let Self { method, x0, schedule } = self;
@@ -110,7 +131,7 @@ impl<F: Written, M: Stepper<F>> FlowVisitor<F> for WholeInNumbers<F, M> {
 }
 
 /// Writes the events of a schedule.
-fn in_numbers<F: Written>(mut schedule: Schedule, flow: &F) -> Schedule {
+fn in_numbers<F: Listed>(mut schedule: Schedule, flow: &F) -> Schedule {
     for request in &mut schedule.watch.events {
         *request = request.in_numbers(flow);
     }
@@ -121,10 +142,7 @@ fn in_numbers<F: Written>(mut schedule: Schedule, flow: &F) -> Schedule {
 pub(super) type Outcome = Result<Trajectory<PlainNumbers>, RunError<PlainNumbers>>;
 
 /// Reads the outcome of a run in the types of a flow.
-fn read<F: Written>(
-    flow: &F,
-    outcome: Outcome,
-) -> Result<Trajectory<F::Space>, RunError<F::Space>> {
+fn read<F: Listed>(flow: &F, outcome: Outcome) -> Result<Trajectory<F::Space>, RunError<F::Space>> {
     match outcome {
         Ok(run) => Ok(run.read::<F>(flow.layout())),
         Err(error) => Err(error.read::<F>(flow.layout())),
@@ -173,14 +191,14 @@ pub(super) fn without_panics(run: impl FnOnce() -> Outcome) -> Outcome {
 }
 
 impl State<PlainNumbers> {
-    fn read<F: Written>(self, layout: &F::Layout) -> State<F::Space> {
+    fn read<F: Listed>(self, layout: &F::Layout) -> State<F::Space> {
         let Self { step, time, point, energy, entropy } = self;
         State { step, time, point: F::read(layout, &point), energy, entropy }
     }
 }
 
 impl Event<PlainNumbers> {
-    fn read<F: Written>(self, layout: &F::Layout) -> Event<F::Space> {
+    fn read<F: Listed>(self, layout: &F::Layout) -> Event<F::Space> {
         let Self { name, index, rises, state, jump } = self;
         let jump =
             jump.map(|Jump { after, exchange }| Jump { after: after.read::<F>(layout), exchange });
@@ -189,7 +207,7 @@ impl Event<PlainNumbers> {
 }
 
 impl Trajectory<PlainNumbers> {
-    fn read<F: Written>(self, layout: &F::Layout) -> Trajectory<F::Space> {
+    fn read<F: Listed>(self, layout: &F::Layout) -> Trajectory<F::Space> {
         let Self { states, events, certificate, ending, checkpoint } = self;
         // Into an array of its own: in the one of the plain states it would leave a hole in the memory behind each run.
         let mut typed = Vec::with_capacity(states.len());
@@ -203,7 +221,7 @@ impl Trajectory<PlainNumbers> {
 }
 
 impl RunError<PlainNumbers> {
-    fn read<F: Written>(self, layout: &F::Layout) -> RunError<F::Space> {
+    fn read<F: Listed>(self, layout: &F::Layout) -> RunError<F::Space> {
         match self {
             Self::Model(error) => RunError::Model(error),
             Self::Flow(error) => RunError::Flow(error),
@@ -212,6 +230,47 @@ impl RunError<PlainNumbers> {
             Self::Start(error) => RunError::Start(error),
             Self::Step { cause, trajectory } => {
                 RunError::Step { cause, trajectory: Box::new(trajectory.read::<F>(layout)) }
+            }
+        }
+    }
+}
+
+/// Writes what a run in the types of a flow has left.
+impl<M: StateSpace> State<M> {
+    fn written<F: Listed<Space = M>>(self) -> State<PlainNumbers> {
+        let Self { step, time, point, energy, entropy } = self;
+        State { step, time, point: F::write(&point), energy, entropy }
+    }
+}
+
+impl<M: StateSpace> Event<M> {
+    fn written<F: Listed<Space = M>>(self) -> Event<PlainNumbers> {
+        let Self { name, index, rises, state, jump } = self;
+        let jump =
+            jump.map(|Jump { after, exchange }| Jump { after: after.written::<F>(), exchange });
+        Event { name, index, rises, state: state.written::<F>(), jump }
+    }
+}
+
+impl<M: StateSpace> Trajectory<M> {
+    fn written<F: Listed<Space = M>>(self) -> Trajectory<PlainNumbers> {
+        let Self { states, events, certificate, ending, checkpoint } = self;
+        let states = states.into_iter().map(State::written::<F>).collect();
+        let events = events.into_iter().map(Event::written::<F>).collect();
+        Trajectory { states, events, certificate, ending, checkpoint }
+    }
+}
+
+impl<M: StateSpace> RunError<M> {
+    fn written<F: Listed<Space = M>>(self) -> RunError<PlainNumbers> {
+        match self {
+            Self::Model(error) => RunError::Model(error),
+            Self::Flow(error) => RunError::Flow(error),
+            Self::Method(error) => RunError::Method(error),
+            Self::Span(error) => RunError::Span(error),
+            Self::Start(error) => RunError::Start(error),
+            Self::Step { cause, trajectory } => {
+                RunError::Step { cause, trajectory: Box::new(trajectory.written::<F>()) }
             }
         }
     }

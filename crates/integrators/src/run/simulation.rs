@@ -8,11 +8,11 @@ use crate::run::error::RunError;
 use crate::run::plain::{Outcome, WholeInNumbers, without_panics};
 use crate::run::schedule::Schedule;
 use crate::run::trajectory::Trajectory;
-use crate::step::{PlainNumbers, Stepper, Written};
+use crate::step::{Listed, PlainNumbers, Stepper};
 
 /// A system with a method of it: a type that a struct can name, whatever the closures are.
 ///
-/// It has all kinds but lattices: closed systems, members of families, open systems, systems with noise, and
+/// It has all kinds: closed systems, members of families, open systems, systems with noise, lattices, and
 /// [your own](crate::FromEquations), with every method that runs them. States are [`Entries`](crate::Entries), slices of numbers in the order
 /// in which a point is written. Those of an open system have the time and the entries of its ledger after the point; a start may
 /// leave them out. The functions of events and of [observables](crate::Observables) take `&Entries` then. The run is that of
@@ -68,7 +68,7 @@ impl Simulation {
     /// Puts a system and a method of it behind a pointer.
     pub fn new<F, M>(method: M, system: F) -> Self
     where
-        F: Written + Send + Sync + 'static,
+        F: Listed + Send + Sync + 'static,
         M: Stepper<F> + Clone + Send + Sync + 'static,
     {
         let name = method.name();

@@ -80,19 +80,10 @@ impl StateSpace for PlainNumbers {
 /// A flow in plain numbers, of which nothing else is known.
 pub type PlainFlow<'a> = dyn Flow<Space = PlainNumbers, Numbers = Values, Vector = Directions> + 'a;
 
-/// A flow whose states, vectors and laws are written in plain numbers, so that its runs are compiled with this library.
-pub trait Written: Flow + Sized {
+/// A flow whose states are listed in plain numbers, so that a [`Simulation`](crate::Simulation) runs it.
+pub trait Listed: Flow + Sized {
     /// Says whether a panic in the flow ends a run in an error: in one whose functions are yours.
     const CATCHES_PANICS: bool = false;
-
-    /// Says whether the flow answers [`Equations`] and has so few directions that explicit methods are compiled with the library.
-    #[doc(hidden)]
-    const HAS_EXPLICIT: bool = false;
-
-    /// Says whether the flow is a model on a vector space with the canonical metric, without further invariants and of so few
-    /// variables that implicit methods are compiled with the library.
-    #[doc(hidden)]
-    const HAS_IMPLICIT: bool = false;
 
     /// The parts of a state that are no entries, such as the names in a ledger.
     type Layout: Clone + Send + Sync + 'static;
@@ -120,6 +111,18 @@ pub trait Written: Flow + Sized {
         let _ = x;
         y
     }
+}
+
+/// A flow whose vectors and laws are written in plain numbers too, so that its runs are compiled with this library.
+pub trait Written: Listed {
+    /// Says whether the flow answers [`Equations`] and has so few directions that explicit methods are compiled with the library.
+    #[doc(hidden)]
+    const HAS_EXPLICIT: bool = false;
+
+    /// Says whether the flow is a model on a vector space with the canonical metric, without further invariants and of so few
+    /// variables that implicit methods are compiled with the library.
+    #[doc(hidden)]
+    const HAS_IMPLICIT: bool = false;
 
     /// Reads a vector.
     fn vector(directions: &Directions) -> Self::Vector;

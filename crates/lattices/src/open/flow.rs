@@ -3,21 +3,50 @@
 use metriplectic_dynamics::invariants::Kind;
 use metriplectic_dynamics::{ModelError, SecondLaw};
 use metriplectic_integrators::explicit::{Combination, StageFlow as _, Target};
-use metriplectic_integrators::open::OpenState;
+use metriplectic_integrators::open::{Ledger, OpenState};
 use metriplectic_integrators::{
-    EventExchange, Flow, FlowError, Laws, LedgerErrors, LedgerSummary, Recheck, Scales, StartError,
-    StepError, Vector as _,
+    Entries, EventExchange, Flow, FlowError, Laws, LedgerErrors, LedgerSummary, Listed, Recheck,
+    Scales, StartError, StateSpace as _, StepError, Vector as _,
 };
 use metriplectic_manifolds::PointError;
 
 use super::parts::per_energy;
 use super::vector::OpenSiteVector;
 use super::{OpenLattice, OpenSites, StateOf};
-use crate::flow::against_simpson;
+use crate::flow::{against_simpson, listed};
 use crate::model::Model;
 
 /// The fraction of the energy to which the errors of work and heat are relative as long as less has flowed.
 const LITTLE: f64 = 1e-3;
+
+impl<P: Model> Listed for OpenLattice<P> {
+    /// A ledger without entries.
+    type Layout = Ledger;
+
+    fn layout(&self) -> &Ledger {
+        &self.empty
+    }
+
+    fn read(empty: &Ledger, entries: &[f64]) -> StateOf<P> {
+        let (points, rest) = entries.split_at(entries.len() - 1 - empty.numbers().len());
+        OpenState { x: listed(points), time: rest[0], ledger: empty.with_numbers(&rest[1..]) }
+    }
+
+    fn at_start(&self, entries: &[f64]) -> Result<StateOf<P>, PointError> {
+        match self.lattice.element(entries) {
+            Err(PointError::Length { .. }) => self.element(entries),
+            points => points.map(|x| self.start(x)),
+        }
+    }
+
+    fn led(x: &StateOf<P>, y: StateOf<P>) -> StateOf<P> {
+        x.at(y.x)
+    }
+
+    fn write(x: &StateOf<P>) -> Entries {
+        OpenSites::<P::Manifold>::numbers(x).into()
+    }
+}
 
 impl<P: Model> Flow for OpenLattice<P> {
     type Space = OpenSites<P::Manifold>;

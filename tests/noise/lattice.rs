@@ -178,6 +178,8 @@ fn a_path_of_a_ring_is_that_of_every_method() {
     let four = off(RandomFlow(Gauss::<2>).seed(3).run(&ring, start(), span).unwrap());
     println!("off by {midpoint:.1e} and {four:.1e} of {moved:.1e}");
     assert!(midpoint < 1e-2 * moved && four < 1e-5 * moved, "{midpoint:e} {four:e} {moved:e}");
+    let refused = RandomFlow(Radau::<2>).seed(3).run(&ring, start(), span);
+    assert_eq!(fault(refused), NoiseError::NoiseWithRadau);
     // Put down and taken up again.
     let mut steps = method.steps(&ring, start(), span).unwrap();
     for _ in 0..23 {

@@ -422,5 +422,17 @@ mod tests {
         let x = SVector::<f64, 24>::from_fn(|i, _| 0.5 * (i as f64 * 1.7).sin());
         agree(&chain, &x, Span::steps(0.1, 20).into(), WeylMidpoint);
         agree(&chain, &x, Span::steps(0.1, 10).into(), Gauss::<2>);
+        // Derivatives that serve many steps go on in a run that is taken up again.
+        let numbers = FromEquations(InNumbers(&chain));
+        let (start, span) = (x.as_slice().into(), Span::steps(0.1, 30));
+        let whole = Gauss::<2>.run(&numbers, start, span).unwrap();
+        let mut steps = Gauss::<2>.steps(&numbers, x.as_slice().into(), span).unwrap();
+        for _ in 0..13 {
+            steps.advance().unwrap();
+        }
+        let checkpoint = steps.checkpoint();
+        let resumed = Gauss::<2>.resume(&numbers, &checkpoint).unwrap().run().unwrap();
+        assert_eq!(resumed.last(), whole.last());
+        assert_eq!(resumed.certificate(), whole.certificate());
     }
 }

@@ -180,6 +180,18 @@ impl<L: Lengths> Matrix<L> {
         product
     }
 
+    /// `|A| v`.
+    #[inline]
+    pub(super) fn abs_times(&self, v: &L::Vector) -> L::Vector {
+        let mut product = L::Vector::room(|| self.n());
+        for (row, to) in self.rows().zip(product.numbers_mut()) {
+            let mut terms = row.iter().zip(v.numbers()).map(|(a, v)| a.abs() * v);
+            let first = terms.next().unwrap_or(0.0);
+            *to = terms.fold(first, |sum, term| sum + term);
+        }
+        product
+    }
+
     /// `Aᵀ v`, the row `vᵀ A` as a vector.
     #[inline]
     pub(super) fn transpose_times(&self, v: &L::Vector) -> L::Vector {

@@ -12,6 +12,7 @@ mod equation;
 mod fallbacks;
 mod full;
 mod heat;
+mod kept;
 mod linear;
 mod memory;
 mod parts;

@@ -59,7 +59,7 @@ pub(super) fn target<L: Lengths>(start: &Start<'_, L>, d: &L::Vector) -> Laws<L:
         if far(e, law) && r.is_finite() { e / (1.0 + r.powi(-2)) } else { 0.0 }
     };
     let of_energy = moved(&w.energy, &sensitivity.times(&length));
-    let by_friction = k.map_or_else(|| parts.zero(), |k| k.tensor.abs().times(&length));
+    let by_friction = k.map_or_else(|| parts.zero(), |k| k.tensor.abs_times(&length));
     let of_entropy = 1.0 + moved(&w.entropy, &by_friction);
     let mut drift = nothing::<L>(values);
     drift.energy = fraction(*energy, values.energy.abs(), &w.energy, of_energy);

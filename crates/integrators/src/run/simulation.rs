@@ -134,7 +134,7 @@ mod tests {
     }
 
     /// The entries of a state.
-    fn written<F: Written>(flow: &F, x: impl Fn(&F) -> Element<F>) -> Entries {
+    fn written<F: Listed>(flow: &F, x: impl Fn(&F) -> Element<F>) -> Entries {
         F::write(&x(flow))
     }
 
@@ -149,7 +149,7 @@ mod tests {
     /// A system with a method, and the run of both in types.
     fn case<F, M>(method: M, system: F, x0: Element<F>, start: &[f64], span: Span) -> Case
     where
-        F: Written + Send + Sync + 'static,
+        F: Listed + Send + Sync + 'static,
         M: Stepper<F> + Clone + Send + Sync + 'static,
     {
         let run = method.clone().run(&system, x0, span).unwrap();

@@ -28,7 +28,8 @@ impl Collocation {
         });
         let mut effort = Effort::default();
         let solved =
-            fallbacks::solve(&equation, Some(guess), Fallbacks::FirstTries, &mut effort).ok()?;
+            fallbacks::solve(&equation, Some(guess), None, Fallbacks::FirstTries, &mut effort)
+                .ok()?;
         Some(solved.at.end)
     }
 

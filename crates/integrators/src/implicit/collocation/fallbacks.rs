@@ -2,6 +2,7 @@
 
 use super::covectors::{each_stage, zeros};
 use super::equation::{StageEquation, Unknowns};
+use super::linear::Linear;
 use super::solve::Solved;
 use crate::collocation::fallbacks::{FROM_REST, FULL, ON_THE_WAY, StepFailure, WHOLE};
 use crate::collocation::solve::Unsolved;
@@ -11,35 +12,41 @@ use crate::step::failure::{self, Cause, Fallbacks};
 use crate::step::{Effort, Vector as _};
 
 /// The evaluations of a solution, or of a try.
-fn evaluations<L: Lengths>(solved: &Result<Solved<'_, L>, Unsolved>) -> usize {
+fn evaluations<L: Lengths>(solved: &Result<Solved<L>, Unsolved>) -> usize {
     match solved {
         Ok(solved) => solved.evaluations,
         Err(unsolved) => unsolved.evaluations,
     }
 }
 
-/// Solves the equation of a step from a guess, from rest, or by continuation in its size.
+/// Solves the equation of a step from a guess, with the derivatives of an earlier step if they are known, from rest, or by continuation in
+/// its size.
 pub(super) fn solve<'a, L: Lengths>(
     equation: &StageEquation<'a, L>,
     guess: Option<Unknowns<L>>,
+    known: Option<Linear<L>>,
     fallbacks: Fallbacks,
     effort: &mut Effort,
-) -> Result<Solved<'a, L>, StepFailure> {
+) -> Result<Solved<L>, StepFailure> {
     let mut best = Unsolved { residual: f64::INFINITY, edge: false, evaluations: 0 };
-    let mut attempt = |equation: &StageEquation<'a, L>, guess, budget, effort: &mut Effort| {
-        let solved = equation.solve(guess, budget);
-        effort.iterations += evaluations(&solved);
-        solved.map_err(|unsolved| {
-            if unsolved.residual < best.residual || best.evaluations == 0 {
-                best = unsolved;
-            }
-        })
-    };
+    let mut try_near =
+        |equation: &StageEquation<'a, L>, guess, budget, known, effort: &mut Effort| {
+            let solved = equation.solve_near(guess, budget, known);
+            effort.iterations += evaluations(&solved);
+            solved.map_err(|unsolved| {
+                if unsolved.residual < best.residual || best.evaluations == 0 {
+                    best = unsolved;
+                }
+            })
+        };
     if let Some(guess) = &guess
-        && let Ok(solved) = attempt(equation, guess.clone(), WHOLE, effort)
+        && let Ok(solved) = try_near(equation, guess.clone(), WHOLE, known, effort)
     {
         return Ok(solved);
     }
+    let mut attempt = |equation: &StageEquation<'a, L>, guess, budget, effort: &mut Effort| {
+        try_near(equation, guess, budget, None, effort)
+    };
     let mut equation = equation.clone();
     if equation.tableau.one_sided {
         // Where friction is stiff, to take back a rounding of the energy may ask for more than the motion gives.

@@ -6,37 +6,63 @@ use super::equation::{Evaluated, StageEquation, Unknowns};
 use crate::collocation::equation::Left;
 use crate::collocation::linear::{HALF_OF_THE_DIGITS, LEFT, LONGER, MARGIN, PASSES};
 use crate::collocation::tableau::Tableau;
-use crate::implicit::algebra::{Matrix, add, dot};
+use crate::implicit::algebra::{Matrix, add, dot, magnitude, vector};
 use crate::implicit::parts::{Parts, Second, WithJacobian};
 use crate::implicit::velocity::{VelocityJet, velocity_jet};
-use crate::numbers::Lengths;
+use crate::numbers::{Lengths, List};
 use crate::round_off::bound::ROUNDED;
 use crate::step::Vector as _;
 
 /// The linear part of the equation of a step.
-pub(super) struct Linear<'a, L: Lengths> {
-    tableau: &'static Tableau,
-    parts: &'a Parts<'a, L>,
-    h: f64,
+pub(super) struct Linear<L: Lengths> {
+    pub(super) tableau: &'static Tableau,
+    /// The size of the step that it was formed for.
+    pub(super) h: f64,
     /// The matrix `hJ`.
-    slope: Matrix<L>,
+    pub(super) slope: Matrix<L>,
     /// The matrix `M⁻¹`.
-    inverse: Matrix<L>,
+    pub(super) inverse: Matrix<L>,
     /// The round-off of the terms of a displacement.
-    rounded: L::Vector,
+    pub(super) rounded: L::Vector,
     /// The solution with the terms as the right side.
-    terms: L::Vector,
+    pub(super) terms: L::Vector,
     /// The derivative of a displacement along the covector of the energy, and `M⁻¹` times it.
-    sensitivity: Matrix<L>,
+    pub(super) sensitivity: Matrix<L>,
     /// The round-off by that of the points.
-    moved: L::Vector,
+    pub(super) moved: L::Vector,
     /// The displacement that it was formed at, without its sign.
-    displaced: L::Vector,
+    pub(super) displaced: L::Vector,
     /// The rate `h|K'|` of the friction.
     pub(super) friction: f64,
     /// The rate `h|Π'|` of the reversible motion.
     pub(super) rotation: f64,
+    /// Steps since the one that it was formed in.
+    pub(super) age: u32,
 }
+
+// By hand, because lengths have none.
+impl<L: Lengths> Clone for Linear<L> {
+    fn clone(&self) -> Self {
+        let Self { slope, inverse, rounded, terms, sensitivity, moved, displaced, .. } = self;
+        Self {
+            slope: slope.clone(),
+            inverse: inverse.clone(),
+            rounded: rounded.clone(),
+            terms: terms.clone(),
+            sensitivity: sensitivity.clone(),
+            moved: moved.clone(),
+            displaced: displaced.clone(),
+            ..*self
+        }
+    }
+}
+
+/// The number of variables up to which derivatives are formed in each step, because they cost less than the corrections that they save.
+const FEW: usize = 6;
+/// Steps that derivatives serve, because the sizes of the terms may change.
+const STEPS: u32 = 20;
+/// Evaluations of a step after which its derivatives serve no other one.
+const EVALUATIONS: usize = 6;
 
 /// The velocity at a point with its derivatives along the point.
 fn slopes<L: Lengths>(parts: &Parts<'_, L>, z: &L::State) -> Option<VelocityJet<L>> {
@@ -47,9 +73,9 @@ fn slopes<L: Lengths>(parts: &Parts<'_, L>, z: &L::State) -> Option<VelocityJet<
     velocity_jet(parts, z, 1.0, &w)
 }
 
-impl<'a, L: Lengths> Linear<'a, L> {
+impl<L: Lengths> Linear<L> {
     /// The linear part in the middle of a step with these velocities; `None` where it is not defined, or has no inverse.
-    pub(super) fn of(equation: &StageEquation<'a, L>, k: &Unknowns<L>) -> Option<Self> {
+    pub(super) fn of(equation: &StageEquation<'_, L>, k: &Unknowns<L>) -> Option<Self> {
         let &StageEquation { tableau, parts, x, h, .. } = equation;
         let chart = equation.chart(k)?;
         let jet = slopes(parts, &chart.z)?;
@@ -63,13 +89,12 @@ impl<'a, L: Lengths> Linear<'a, L> {
         let moved = of_points.times(&sizes).map(|moved| moved * f64::EPSILON);
         let rounded =
             jet.terms.map(|terms| ROUNDED * h.abs() * terms + f64::MIN_POSITIVE * (1.0 + h.abs()));
-        let terms = inverse.abs().times(&rounded);
+        let terms = inverse.abs_times(&rounded);
         let sensitivity = inverse.product(&jet.sensitivity.map(|slope| slope * h));
         let usable = slope.magnitude().is_finite() && inverse.magnitude().is_finite();
         let (friction, rotation) = (h.abs() * jet.friction, h.abs() * jet.rotation);
         usable.then_some(Self {
             tableau,
-            parts,
             h,
             slope,
             inverse,
@@ -80,20 +105,42 @@ impl<'a, L: Lengths> Linear<'a, L> {
             displaced,
             friction,
             rotation,
+            age: 0,
         })
     }
 
+    /// The number of variables.
+    fn n(&self) -> usize {
+        self.slope.n()
+    }
+
     /// The matrix `M⁻¹`.
-    pub(super) fn filter(self) -> Matrix<L> {
-        self.inverse
+    pub(super) const fn filter(&self) -> &Matrix<L> {
+        &self.inverse
+    }
+
+    /// Returns whether it may serve a step of size `h` with this guess of the displacement: one of the same size, about as long.
+    pub(super) fn serves(&self, tableau: &Tableau, h: f64, guess: &L::Vector) -> bool {
+        let fraction = magnitude(guess) / magnitude(&self.displaced);
+        std::ptr::eq(self.tableau, tableau)
+            && self.n() == guess.numbers().len()
+            && self.h.to_bits() == h.to_bits()
+            && self.age < STEPS
+            && (0.7..1.5).contains(&fraction)
+    }
+
+    /// The same for the next step, after one that has taken so many evaluations with it; `None` where it is to be formed anew.
+    pub(super) fn kept(mut self, evaluations: usize) -> Option<Self> {
+        self.age += 1;
+        (self.n() > FEW && evaluations <= EVALUATIONS).then_some(self)
     }
 
     /// The round-off of the displacement of a stage.
     pub(super) fn round_off(&self, at: &Evaluated<L>, k: &Unknowns<L>) -> L::Vector {
         let k = &k[..self.tableau.stages];
-        let heat = self.inverse.abs().times(&at.heat_rounding);
-        let noise = self.sensitivity.abs().times(&at.noise);
-        self.parts.vector(|c| {
+        let heat = self.inverse.abs_times(&at.heat_rounding);
+        let noise = self.sensitivity.abs_times(&at.noise);
+        vector(self.n(), |c| {
             let largest = k.iter().map(|k| (self.h * k[c]).abs()).fold(0.0, f64::max);
             let first = self.terms[c] + noise[c] + self.moved[c] + heat[c];
             (first + largest * f64::EPSILON) * MARGIN
@@ -102,7 +149,7 @@ impl<'a, L: Lengths> Linear<'a, L> {
 
     /// Returns whether it was formed at far longer displacements than `d` from a state whose entries have these sizes.
     pub(super) fn is_of_a_longer_step(&self, sizes: &L::Vector, d: &L::Vector) -> bool {
-        (0..self.parts.n()).any(|c| {
+        (0..self.n()).any(|c| {
             let noise = MARGIN * (self.terms[c] + self.moved[c]);
             self.displaced[c] > LONGER * (sizes[c] + d[c].abs() + noise)
         })
@@ -111,7 +158,7 @@ impl<'a, L: Lengths> Linear<'a, L> {
     /// Returns whether a velocity at the start moves entries of these sizes, by more than its round-off.
     pub(super) fn moves(&self, velocity: &L::Vector, sizes: &L::Vector) -> bool {
         let asked = self.inverse.times(velocity);
-        (0..self.parts.n()).any(|c| {
+        (0..self.n()).any(|c| {
             let rounded = (self.terms[c] + self.moved[c]) * MARGIN;
             (asked[c] * self.h).abs() > rounded.max(HALF_OF_THE_DIGITS * sizes[c])
         })
@@ -137,7 +184,7 @@ impl<'a, L: Lengths> Linear<'a, L> {
         if of_terms <= 1.0 {
             return at.excess.max(of_terms);
         }
-        let mut by_covectors = self.sensitivity.abs().times(&at.noise);
+        let mut by_covectors = self.sensitivity.abs_times(&at.noise);
         add(&mut by_covectors, 1.0, &at.heat_rounding);
         add(&mut by_covectors, 1.0, &self.rounded);
         at.excess.max(in_units(&by_covectors))
@@ -146,7 +193,7 @@ impl<'a, L: Lengths> Linear<'a, L> {
     /// The root mean square of displacements by these velocities, in units of their round-off; infinite if it is not
     /// finite.
     pub(super) fn measure(&self, v: &Unknowns<L>, round_off: &L::Vector) -> f64 {
-        let (stages, n) = (self.tableau.stages, self.parts.n());
+        let (stages, n) = (self.tableau.stages, self.n());
         let mut sum = 0.0;
         for v in &v[..stages] {
             for c in 0..n {
@@ -161,10 +208,11 @@ impl<'a, L: Lengths> Linear<'a, L> {
     /// The correction of the velocities by a residual, and its measure.
     pub(super) fn correction(
         &self,
+        parts: &Parts<'_, L>,
         residual: &Unknowns<L>,
         round_off: &L::Vector,
     ) -> (Unknowns<L>, f64) {
-        let Self { parts, slope, inverse, .. } = self;
+        let Self { slope, inverse, .. } = self;
         let Tableau { stages: s, matrix, inverse: coefficients, gamma, .. } = *self.tableau;
         let (mut delta, mut rho, mut size) = (zeros(parts), residual.clone(), 0.0);
         for _ in 0..PASSES {

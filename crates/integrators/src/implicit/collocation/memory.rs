@@ -5,6 +5,7 @@ use std::fmt;
 
 use super::covectors::{all_finite, combined, each_stage};
 use super::equation::Unknowns;
+use super::linear::Linear;
 use crate::collocation::memory::NAMES;
 use crate::collocation::tableau::Tableau;
 use crate::implicit::algebra::Matrix;
@@ -19,6 +20,8 @@ use crate::step::{FARTHEST, Memory, RestoreError, Saved};
 pub struct StageNumbers<L: Lengths> {
     /// The velocities of the stages of the last step.
     velocities: Option<Continued<L>>,
+    /// The derivatives of an earlier step.
+    pub(super) linear: Option<Linear<L>>,
     pub(super) compensation: Compensation<L>,
     /// The last step, for its error and for what lies inside it.
     pub(super) last: Option<LastStep<L>>,
@@ -61,7 +64,7 @@ impl<L: Lengths> fmt::Debug for StageNumbers<L> {
 
 impl<L: Lengths> Default for StageNumbers<L> {
     fn default() -> Self {
-        Self { velocities: None, compensation: Compensation(None), last: None }
+        Self { velocities: None, linear: None, compensation: Compensation(None), last: None }
     }
 }
 
@@ -72,7 +75,8 @@ impl<L: Lengths> StageNumbers<L> {
         let velocities = self.velocities.as_ref();
         let velocities =
             velocities.map(|&Continued { ref k, stages, h }| Continued { k: k.clone(), stages, h });
-        Self { velocities, compensation: self.compensation.clone(), last: None }
+        let (linear, compensation) = (self.linear.clone(), self.compensation.clone());
+        Self { velocities, linear, compensation, last: None }
     }
 
     /// The memory itself, if its vectors have this length, as those of every step do.
@@ -131,6 +135,9 @@ impl<L: Lengths> Memory for StageNumbers<L> {
             }
             saved.put("size of the step of the stages", [*h]);
         }
+        if let Some(linear) = &self.linear {
+            linear.save(saved);
+        }
         if let Some(lost) = &self.compensation.0 {
             saved.put("compensation", column(lost));
         }
@@ -166,6 +173,6 @@ impl<L: Lengths> Memory for StageNumbers<L> {
             (None, _) => None,
         };
         let compensation = Compensation(column("compensation")?);
-        Ok(Self { velocities, compensation, last: None })
+        Ok(Self { velocities, linear: Linear::restored(saved)?, compensation, last: None })
     }
 }

@@ -14,20 +14,20 @@ use crate::numbers::Lengths;
 use crate::step::Laws;
 
 /// A solved step.
-pub(super) struct Solved<'a, L: Lengths> {
+pub(super) struct Solved<L: Lengths> {
     /// The velocities of the stages.
     pub(super) k: Unknowns<L>,
     /// The last evaluation. Its end and its values are those of `k`.
     pub(super) at: Evaluated<L>,
     /// The linear part that solved it.
-    pub(super) linear: Linear<'a, L>,
+    pub(super) linear: Linear<L>,
     /// The round-off of the displacements.
     pub(super) round_off: L::Vector,
     /// Evaluations of the equation.
     pub(super) evaluations: usize,
 }
 
-impl<L: Lengths> Solved<'_, L> {
+impl<L: Lengths> Solved<L> {
     /// Returns whether all displacements are round-off.
     pub(super) fn rests(&self, equation: &StageEquation<'_, L>) -> bool {
         let &StageEquation { tableau, parts, h, .. } = equation;
@@ -43,7 +43,7 @@ impl<L: Lengths> Solved<'_, L> {
         let &StageEquation { tableau, parts, x, .. } = equation;
         let Some(velocity) = parts.velocity(x) else { return false };
         let v = each_stage(parts, tableau.stages, |_| velocity.clone());
-        let (_, size) = self.linear.correction(&v, &self.round_off);
+        let (_, size) = self.linear.correction(parts, &v, &self.round_off);
         size > MOVES
     }
 }
@@ -106,13 +106,20 @@ struct End<L: Lengths> {
 
 impl<'a, L: Lengths> StageEquation<'a, L> {
     /// The velocities near a guess, at which the laws hold.
-    pub(super) fn solve(
+    pub(super) fn solve(&self, guess: Unknowns<L>, budget: Budget) -> Result<Solved<L>, Unsolved> {
+        self.solve_near(guess, budget, None)
+    }
+
+    /// The same, first with the derivatives of an earlier step, if there are any.
+    pub(super) fn solve_near(
         &self,
         guess: Unknowns<L>,
         budget: Budget,
-    ) -> Result<Solved<'a, L>, Unsolved> {
+        known: Option<Linear<L>>,
+    ) -> Result<Solved<L>, Unsolved> {
         let undefined = Unsolved { residual: f64::INFINITY, edge: true, evaluations: 1 };
-        let linear = Linear::of(self, &guess).ok_or(undefined)?;
+        let is_fresh = known.is_none();
+        let linear = known.or_else(|| Linear::of(self, &guess)).ok_or(undefined)?;
         let equation = StageEquation { rounding: linear.rounding(), ..self.clone() };
         let at = equation.evaluate(&guess).ok_or(undefined)?;
         let mut iteration =
@@ -123,7 +130,7 @@ impl<'a, L: Lengths> StageEquation<'a, L> {
             iteration.evaluations += iteration.full.as_ref().map_or(0, |full| full.evaluations);
         }
         let here = iteration.corrected(guess, at).ok_or(undefined)?;
-        let solved = iteration.run(here)?;
+        let solved = iteration.run(here, is_fresh)?;
         if solved.rests(self) && solved.contradicts(self) {
             return Err(Unsolved { evaluations: solved.evaluations, edge: false, ..undefined });
         }
@@ -149,7 +156,7 @@ impl<'a, L: Lengths> StageEquation<'a, L> {
 struct Iteration<'a, L: Lengths> {
     equation: StageEquation<'a, L>,
     budget: Budget,
-    linear: Linear<'a, L>,
+    linear: Linear<L>,
     /// The derivatives of all stages, where these are asked for.
     full: Option<Full>,
     evaluations: usize,
@@ -167,7 +174,7 @@ impl<'a, L: Lengths> Iteration<'a, L> {
                 let size = self.linear.measure(&delta, &round_off);
                 (delta, size)
             }
-            None => self.linear.correction(&at.residual, &round_off),
+            None => self.linear.correction(self.equation.parts, &at.residual, &round_off),
         };
         let excess = self.linear.excess(&at);
         size.is_finite().then_some(Iterate { k, at, delta, round_off, size, excess })
@@ -176,7 +183,7 @@ impl<'a, L: Lengths> Iteration<'a, L> {
     /// The correction with one Jacobian.
     fn blended(&self, k: &Unknowns<L>, at: &Evaluated<L>) -> Unknowns<L> {
         let round_off = self.linear.round_off(at, k);
-        self.linear.correction(&at.residual, &round_off).0
+        self.linear.correction(self.equation.parts, &at.residual, &round_off).0
     }
 
     /// Forms the derivatives anew at the point.
@@ -196,14 +203,15 @@ impl<'a, L: Lengths> Iteration<'a, L> {
         self.corrected(k, at)
     }
 
-    fn solved(self, here: Iterate<L>) -> Solved<'a, L> {
+    fn solved(self, here: Iterate<L>) -> Solved<L> {
         let Iterate { k, at, round_off, .. } = here;
         Solved { k, at, linear: self.linear, round_off, evaluations: self.evaluations }
     }
 
-    fn run(mut self, mut here: Iterate<L>) -> Result<Solved<'a, L>, Unsolved> {
+    /// Corrects as far as the budget goes; derivatives that are not `fresh` are formed anew where they do not serve.
+    fn run(mut self, mut here: Iterate<L>, mut is_fresh: bool) -> Result<Solved<L>, Unsolved> {
         let parts = self.equation.parts;
-        let (mut contraction, mut is_fresh) = (f64::INFINITY, true);
+        let mut contraction = f64::INFINITY;
         loop {
             if here.total() <= self.budget.tolerance {
                 let better = if here.at.error > HALF { self.better(&here) } else { None };

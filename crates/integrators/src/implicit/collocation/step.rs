@@ -57,9 +57,12 @@ impl Collocation {
             equation.drift = drift::target(start, &equation.displacement(guess));
         }
         let mut effort = Effort::default();
-        let solved = fallbacks::solve(&equation, guess, fallbacks, &mut effort)?;
+        let known = memory.linear.take().filter(|known| {
+            guess.as_ref().is_some_and(|k| known.serves(tableau, h, &equation.displacement(k)))
+        });
+        let solved = fallbacks::solve(&equation, guess, known, fallbacks, &mut effort)?;
         let rests = solved.rests(&equation);
-        let Solved { k, at, linear, .. } = solved;
+        let Solved { k, at, linear, evaluations, .. } = solved;
         let failed = |cause| StepFailure { cause, effort };
         // The linear part may be that of another state, which says nothing of the round-off here.
         if rests
@@ -90,11 +93,12 @@ impl Collocation {
                 return Err(failed(Cause::Unsolved));
             }
         }
-        let filter = linear.filter();
+        let filter = linear.filter().clone();
         if rests {
             memory.last = Some(LastStep { k, filter });
             return Ok(Step { x: x.clone(), values: values.clone(), evidence, effort });
         }
+        memory.linear = linear.kept(evaluations);
         let u = equation.displacement(&k);
         memory.note(tableau, h, &k);
         memory.last = Some(LastStep { k, filter });

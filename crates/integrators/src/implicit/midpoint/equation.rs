@@ -69,7 +69,7 @@ impl<L: Lengths> Rounding<L> {
     /// The bound of each component, with the Jacobian.
     pub(super) fn bounds(&self, parts: &Parts<'_, L>, jacobian: &Matrix<L>) -> L::Vector {
         let one = |i: usize, j: usize| if i == j { 1.0 } else { 0.0 };
-        let by_covectors = self.sensitivity.abs().times(&self.covector);
+        let by_covectors = self.sensitivity.abs_times(&self.covector);
         let moved = parts.matrix(|i, j| (jacobian[(i, j)] - one(i, j)).abs());
         let by_points = moved.times(&self.argument);
         parts.vector(|i| self.terms[i] + by_covectors[i] + by_points[i])

@@ -82,8 +82,8 @@ impl<L: Lengths> Inverse<L> {
         }
         // J⁻¹(J − 1) = 1 − J⁻¹.
         let one = |i: usize, j: usize| if i == j { 1.0 } else { 0.0 };
-        let of_terms = matrix.abs().times(terms);
-        let of_covectors = matrix.product(sensitivity).abs().times(covector);
+        let of_terms = matrix.abs_times(terms);
+        let of_covectors = matrix.product(sensitivity).abs_times(covector);
         let of_points = parts.matrix(|i, j| (one(i, j) - matrix[(i, j)]).abs()).times(argument);
         // A point and its compensation have twice the digits: smaller displacements move nothing.
         let round_off = parts

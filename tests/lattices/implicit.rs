@@ -98,6 +98,18 @@ fn a_lattice_without_implicit_steps_says_which_method_to_take() {
     };
     let found = Gauss::<2>.run(&long, start, Span::steps(0.1, 1)).unwrap_err();
     assert_eq!(refusal(found), NotImplicit::Variables { variables: 1200 });
+    // So does a path with noise, and a run that is taken up again.
+    let noisy = chain(Graph::ring(400)).with_noise(Boltzmann(1e-6));
+    let start = noisy.flow().points(waves);
+    let found = RandomFlow(WeylMidpoint).seed(1).run(&noisy, start, Span::steps(0.1, 1));
+    let Err(RunError::Method(error)) = found else { panic!("it has a step") };
+    assert_eq!(error.downcast_ref(), Some(&NotImplicit::Variables { variables: 1200 }));
+    let short = chain(Graph::ring(8));
+    let steps = WeylMidpoint.steps(&short, short.points(waves), Span::steps(0.1, 2)).unwrap();
+    let Err(error) = WeylMidpoint.resume(&long, &steps.checkpoint()) else {
+        panic!("it goes on with another lattice")
+    };
+    assert_eq!(error.to_string(), NotImplicit::Variables { variables: 1200 }.to_string());
     let shorter = chain(Graph::ring(320));
     assert!(Stepper::serves(&Gauss::<2>, &shorter).is_ok());
     assert!(NotImplicit::Variables { variables: 1200 }.to_string().contains("RungeKuttaChebyshev"));

@@ -5,7 +5,7 @@ use super::fluctuating::Fluctuating;
 use super::moves::Moves;
 use super::numbers::{Counter, Numbers};
 use super::sampler::{Sampler, Sampling};
-use crate::step::{StepError, Stepper};
+use crate::step::{MethodError, StepError, Stepper};
 
 /// Samples a system with noise by half steps of the method `M` around the flows of all noise fields, with the weak order 2
 /// (Ninomiya and Victoir 2008).
@@ -61,6 +61,10 @@ impl<F: Fluctuating<U>, U, M: Stepper<F>> Sampling<F, U> for NinomiyaVictoir<M> 
             _ if self.0.damps() => Err(NoiseError::NoiseWithRadau),
             _ => Ok(()),
         }
+    }
+
+    fn serves(&self, flow: &F) -> Result<(), MethodError> {
+        self.0.serves(flow)
     }
 
     fn sample<R: Numbers>(&self, moves: &mut Moves<'_, F, U, R>) -> Result<(), StepError> {

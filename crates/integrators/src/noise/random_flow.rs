@@ -5,7 +5,7 @@ use super::fluctuating::Fluctuating;
 use super::moves::Moves;
 use super::numbers::{Counter, Numbers};
 use super::sampler::{Sampler, Sampling};
-use crate::step::{StepError, Stepper};
+use crate::step::{MethodError, StepError, Stepper};
 
 /// Samples a system with noise by a step of the method `M` and one random flow, with the weak order 1: for large systems, whose
 /// terms it takes all at once.
@@ -54,6 +54,10 @@ impl<F: Fluctuating<U>, U, M: Stepper<F>> Sampling<F, U> for RandomFlow<M> {
 
     fn check(&self) -> Result<(), NoiseError> {
         if self.0.damps() { Err(NoiseError::NoiseWithRadau) } else { Ok(()) }
+    }
+
+    fn serves(&self, flow: &F) -> Result<(), MethodError> {
+        self.0.serves(flow)
     }
 
     fn sample<R: Numbers>(&self, moves: &mut Moves<'_, F, U, R>) -> Result<(), StepError> {

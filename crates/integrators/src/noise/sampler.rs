@@ -27,6 +27,16 @@ pub trait Sampling<F: Fluctuating<U>, U>: Sized {
     /// [`NoiseError::OrderTooLow`].
     fn check(&self) -> Result<(), NoiseError>;
 
+    /// Refuses a flow without noise of which the method that it wraps has no steps.
+    ///
+    /// # Errors
+    ///
+    /// The error of that method.
+    fn serves(&self, flow: &F) -> Result<(), MethodError> {
+        let _ = flow;
+        Ok(())
+    }
+
     /// Takes a step.
     ///
     /// # Errors
@@ -167,6 +177,10 @@ where
             return Err(MethodError::new(NoiseError::NeedsFixedSteps));
         }
         self.sampling.check().map_err(MethodError::new)
+    }
+
+    fn serves(&self, system: &Noisy<F, U>) -> Result<(), MethodError> {
+        self.sampling.serves(system.flow())
     }
 
     fn step(

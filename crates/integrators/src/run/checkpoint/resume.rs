@@ -48,6 +48,7 @@ impl<'a, F: Flow, M: Stepper<F>> Steps<'a, F, M> {
     ) -> Result<Self, ResumeError> {
         let c = checkpoint.run()?;
         method.check(matches!(c.progress.step_size, StepSize::Adaptive(_)))?;
+        method.serves(flow)?;
         validation::of_the_method(&c.method, method.name())?;
         let said = Said::by(&method, flow, c.progress.start);
         let course = Course::resume(flow as &AnyFlow<'a, F>, said, c)?;

@@ -1,6 +1,6 @@
 //! Implicit steps of lattices of some tens of sites.
 
-use metriplectic::integrators::{ItohAbe, NotImplicit, Schedule, Stepper, SymmetricItohAbe};
+use metriplectic::integrators::{ItohAbe, NoImplicitSteps, Schedule, Stepper, SymmetricItohAbe};
 use metriplectic::prelude::*;
 
 use super::order;
@@ -85,32 +85,49 @@ fn a_lattice_without_implicit_steps_says_which_method_to_take() {
         .unwrap();
     let start = spins.points(|_| vector![0.6, 0.0, 0.8]);
     let refusal = |error: RunError<_>| match error {
-        RunError::Method(error) => *error.downcast_ref::<NotImplicit>().unwrap(),
+        RunError::Method(error) => *error.downcast_ref::<NoImplicitSteps>().unwrap(),
         error => panic!("{error}"),
     };
     let found = WeylMidpoint.run(&spins, start, Span::steps(0.1, 1)).unwrap_err();
-    assert_eq!(refusal(found), NotImplicit::Space);
+    assert_eq!(refusal(found), NoImplicitSteps::Space);
     let long = chain(Graph::ring(400));
     let start = long.points(waves);
     let refusal = |error: RunError<_>| match error {
-        RunError::Method(error) => *error.downcast_ref::<NotImplicit>().unwrap(),
+        RunError::Method(error) => *error.downcast_ref::<NoImplicitSteps>().unwrap(),
         error => panic!("{error}"),
     };
     let found = Gauss::<2>.run(&long, start, Span::steps(0.1, 1)).unwrap_err();
-    assert_eq!(refusal(found), NotImplicit::Variables { variables: 1200 });
+    assert_eq!(refusal(found), NoImplicitSteps::Variables { variables: 1200 });
     // So does a path with noise, and a run that is taken up again.
     let noisy = chain(Graph::ring(400)).with_noise(Boltzmann(1e-6));
     let start = noisy.flow().points(waves);
     let found = RandomFlow(WeylMidpoint).seed(1).run(&noisy, start, Span::steps(0.1, 1));
     let Err(RunError::Method(error)) = found else { panic!("it has a step") };
-    assert_eq!(error.downcast_ref(), Some(&NotImplicit::Variables { variables: 1200 }));
+    assert_eq!(error.downcast_ref(), Some(&NoImplicitSteps::Variables { variables: 1200 }));
+    // The chart of a half line is a logarithm.
+    let gas = Lattice::on(Graph::chain(4), HalfLine)
+        .energy(|u: &Vector1<Real>| u.x)
+        .entropy(|u: &Vector1<Real>| u.x.ln())
+        .bond_onsager(|bond| {
+            let [u, v] = bond.w.map(|w| w.x);
+            [Onsager { rate: 1.0, b: [vector![v], vector![-u]] }]
+        })
+        .build()
+        .unwrap()
+        .with_noise(Boltzmann(1e-20));
+    let start = gas.flow().points(|i| vector![1.0 + i as f64]);
+    let found = RandomFlow(Gauss::<2>).seed(1).run(&gas, start, Span::steps(0.01, 1));
+    let Err(RunError::Method(error)) = found else { panic!("it has a step") };
+    assert_eq!(error.downcast_ref(), Some(&NoImplicitSteps::Space));
     let short = chain(Graph::ring(8));
     let steps = WeylMidpoint.steps(&short, short.points(waves), Span::steps(0.1, 2)).unwrap();
     let Err(error) = WeylMidpoint.resume(&long, &steps.checkpoint()) else {
         panic!("it goes on with another lattice")
     };
-    assert_eq!(error.to_string(), NotImplicit::Variables { variables: 1200 }.to_string());
+    assert_eq!(error.to_string(), NoImplicitSteps::Variables { variables: 1200 }.to_string());
     let shorter = chain(Graph::ring(320));
     assert!(Stepper::serves(&Gauss::<2>, &shorter).is_ok());
-    assert!(NotImplicit::Variables { variables: 1200 }.to_string().contains("RungeKuttaChebyshev"));
+    assert!(
+        NoImplicitSteps::Variables { variables: 1200 }.to_string().contains("RungeKuttaChebyshev")
+    );
 }

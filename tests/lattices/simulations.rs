@@ -52,16 +52,16 @@ fn lattices_of_all_kinds_run_from_a_struct_with_the_bits_of_their_types() {
         let run = simulation.run(&energies, span()).unwrap();
         assert_eq!(&outcome(&run), expected, "{simulation:?}");
     }
-    // Events and jumps are asked in plain numbers: the first site is heated to 1.2 again and again.
+    // Events and jumps are asked in plain numbers: where the first site comes to 1.2.
     let simulation = &cases[0].0;
     let watched = Span::until(4.0)
         .tolerance(1e-8)
-        .event("1.5", |u: &Entries| u[0] - 1.2)
+        .event("1.2", |u: &Entries| u[0] - 1.2)
         .jump(|_, u: &Entries| u.iter().map(|u| u * 1.0).collect());
     let run = simulation.run(&energies, watched).unwrap();
     let typed = Span::until(4.0)
         .tolerance(1e-8)
-        .event("1.5", |u: &Points<Euclidean<1>>| u[0].x - 1.2)
+        .event("1.2", |u: &Points<Euclidean<1>>| u[0].x - 1.2)
         .jump(|_, u: &Points<Euclidean<1>>| u.clone());
     let typed = DormandPrince8.run(&rod(), points(&rod()), typed).unwrap();
     assert_eq!(run.events().len(), 1);

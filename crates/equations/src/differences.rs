@@ -9,7 +9,7 @@ use crate::{
 ///
 /// [`Differences`] makes it a [`Model`], of which implicit methods take steps.
 pub trait Apart: Equations {
-    /// Returns whether a part is zero by construction.
+    /// Returns whether a part is zero by construction, so that it is not asked for.
     fn is_zero(&self, part: Part) -> bool;
 
     /// Returns whether the bracket is to satisfy the Jacobi identity.
@@ -18,7 +18,8 @@ pub trait Apart: Equations {
     }
 
     /// Computes the vector `Π α`, `f(w)` or `K_w α` of a part at a state, or numbers that are not finite where it has none. It is
-    /// linear in `α`, which a force does not have. A friction annihilates `w`, the covector of the energy.
+    /// linear in `α`, which a force does not have. A friction annihilates `w`, the covector of the energy. It may depend on that of the
+    /// entropy, as on temperatures; Newton's method has no derivatives along this one, and takes more iterations then.
     fn apply(&self, part: Part, t: f64, x: &[f64], w: Covectors<'_>, alpha: &[f64], v: &mut [f64]);
 }
 
@@ -26,7 +27,8 @@ pub trait Apart: Equations {
 ///
 /// Implicit methods need them for Newton's method alone, so both laws are exact, and a step differs by round-off from that with
 /// derivatives by hand. It lives on a vector space with the canonical inner product: charts are translations, and sizes
-/// `|x_i|`.
+/// `|x_i|`, whatever the system says of them. The step of a difference is relative to an entry. That of an entry which is zero is relative to
+/// the distance over which it changes a law, or to the largest entry: let one entry at least have the size of the motion.
 ///
 /// A pendulum with friction that heats a bath, `q' = p, p' = −sin q − γ p/T, u' = γ p²/T` with the temperature `T = 1 + u`:
 ///
@@ -93,6 +95,9 @@ pub struct Differences<S>(pub S);
 /// The step of a difference quotient, relative to a size: near the third root of round-off, where the errors of a central difference
 /// by truncation and by round-off are equal.
 const STEP: f64 = 6e-6;
+
+/// The fraction of another size below which a size is negligible: a step of it would be lost in round-off.
+const NEGLIGIBLE: f64 = 1e-6;
 
 impl<S: Apart> Equations for Differences<S> {
     fn sizes(&self) -> Sizes {
@@ -185,16 +190,13 @@ impl<S: Apart> Differences<S> {
         [values, w]
     }
 
-    /// The sizes of the entries: their own; else the distance over which energy or entropy changes by the terms of the other entries;
-    /// else that which the velocity covers while it changes another entry by its size; else the largest one.
+    /// The sizes of the entries: their own, unless they are negligible; else the distance over which energy or entropy changes by the terms
+    /// of the other entries; else that which the velocity covers while it changes another entry by its size; else the largest one.
     fn sizes_at(&self, t: f64, x: &[f64]) -> Vec<f64> {
         let n = self.n();
         let [_, w] = self.jets(t, x);
         let own: Vec<f64> = x.iter().map(|x| x.abs()).collect();
         let largest = own.iter().copied().fold(0.0, f64::max);
-        if own.iter().all(|size| *size > 0.0) {
-            return own;
-        }
         let mut v = vec![0.0; n];
         let has_velocity = self.0.velocity(t, x, &mut v).is_some();
         let times = own.iter().zip(&v).filter(|(x, v)| **x > 0.0 && **v != 0.0);
@@ -211,16 +213,19 @@ impl<S: Apart> Differences<S> {
                 (has_velocity && distance > 0.0 && distance.is_finite()).then_some(distance)
             };
             let others = if largest > 0.0 { largest } else { 1.0 };
-            by_law.or_else(by_velocity).unwrap_or(others)
+            // A size of others says nothing of an entry that has one.
+            let known = by_law.or_else(by_velocity);
+            known.unwrap_or(if own[i] > 0.0 { own[i] } else { others })
         };
-        (0..n).map(|i| if own[i] > 0.0 { own[i] } else { size(i) }).collect()
+        let chosen = |i: usize, size: f64| if own[i] > NEGLIGIBLE * size { own[i] } else { size };
+        (0..n).map(|i| chosen(i, size(i))).collect()
     }
 
     /// The sizes of the components of a covector in units of these sizes of the entries.
     fn covector_sizes(w: &[f64], sizes: &[f64]) -> Vec<f64> {
         let terms: f64 = w.iter().zip(sizes).map(|(w, size)| (w * size).abs()).sum();
         let size = |(w, size): (&f64, &f64)| match (w.abs(), terms / size) {
-            (own, _) if own > 0.0 => own,
+            (own, shared) if own > NEGLIGIBLE * shared => own,
             (_, shared) if shared > 0.0 => shared,
             _ => 1.0,
         };
@@ -237,6 +242,10 @@ impl<S: Apart> Differences<S> {
         alpha: &[f64],
         v: &mut [f64],
     ) -> Result<(), MetricError> {
+        if self.0.is_zero(part) {
+            v.fill(0.0);
+            return Ok(());
+        }
         self.0.apply(part, t, x, w, alpha, v);
         let bad = v.iter().find(|v| !v.is_finite());
         let quantity = "a velocity of a part";
@@ -402,6 +411,12 @@ impl<S: Apart> Model for Differences<S> {
         jet: &mut Jet<'_>,
     ) -> Result<(), MetricError> {
         self.vector(part, t, x, w, alpha, jet.value)?;
+        if self.0.is_zero(part) {
+            [&mut *jet.along_x, &mut *jet.along_w, &mut *jet.tensor]
+                .into_iter()
+                .for_each(|matrix| matrix.fill(0.0));
+            return Ok(());
+        }
         let sizes = self.sizes_at(t, x);
         Self::columns(&sizes, jet.along_x, |e, s, v| {
             self.0.apply(part, t, &moved(x, s, e), w, alpha, v);
@@ -452,6 +467,10 @@ impl<S: Apart> Model for Differences<S> {
         alpha: &[f64],
         slope: &mut [f64],
     ) -> Result<(), MetricError> {
+        if self.0.is_zero(Part::Reversible) {
+            slope.fill(0.0);
+            return Ok(());
+        }
         let step = step_along(u, &self.sizes_at(t, x));
         quotient(step, slope, |s, v| {
             let moved_entropy = moved(entropy, s, ds);

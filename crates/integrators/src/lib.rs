@@ -61,7 +61,7 @@ pub use explicit::{
     DormandPrince5, DormandPrince8, ExplicitRungeKutta, Row, RungeKuttaChebyshev, StageFlow,
     Tableau, TableauError,
 };
-pub use implicit::NotImplicit;
+pub use implicit::NoImplicitSteps;
 pub use midpoint::{Residual, Scheme};
 pub use newton::{Equation, Iterate, Linearised, Newton, Root, Rounding};
 pub use noise::{

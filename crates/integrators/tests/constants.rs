@@ -51,8 +51,6 @@ const UNNOTICED: &[(&str, &str)] = &[
     ("collocation/solve.rs", "UNKNOWN"),
     ("explicit/creep.rs", "PATIENCE"),
     ("explicit/step.rs", "MANY_FALLS"),
-    ("implicit/collocation/linear.rs", "EVALUATIONS"),
-    ("implicit/collocation/linear.rs", "FEW"),
     ("implicit/collocation/linear.rs", "STEPS"),
     ("newton.rs", "NEAR"),
     ("noise/moves.rs", "LEAST"),

@@ -11,8 +11,8 @@ use metriplectic_equations::{
 use metriplectic_fields::{Column, Space as _};
 use metriplectic_integrators::{
     Control, DiscreteGradient, Element, Flow, FromEquations, Gauss, Laws, Listed as _, MethodError,
-    NotImplicit, Promises, Radau, Refusal, Scheme, StageFlow as _, StepEnds, StepError, StepStart,
-    Stepper, Taken, Values, Vector as _,
+    NoImplicitSteps, Promises, Radau, Refusal, Scheme, StageFlow as _, StepEnds, StepError,
+    StepStart, Stepper, Taken, Values, Vector as _,
 };
 use metriplectic_manifolds::{Canonical, Euclidean, Retraction};
 
@@ -220,7 +220,7 @@ macro_rules! implicit {
 
             fn serves(&self, lattice: &Lattice<P>) -> Result<(), MethodError> {
                 if !P::Manifold::IS_VECTOR_SPACE {
-                    return Err(MethodError::new(NotImplicit::Space));
+                    return Err(MethodError::new(NoImplicitSteps::Space));
                 }
                 in_numbers(lattice, |flow| self.serves(flow))
             }

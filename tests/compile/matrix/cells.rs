@@ -154,18 +154,18 @@ pub(crate) const TESTS: &[Reference] = &[
             "tests/lattices/implicit.rs",
             "implicit_methods_of_a_chain_have_their_orders_and_both_laws",
         ],
-        "with sites on vector spaces and up to 1024 variables; others are refused (`NotImplicit`)",
+        "with sites on vector spaces and up to 1024 variables; others are refused (`NoImplicitSteps`)",
     ),
     partly(
         "dense path",
         ["tests/noise/lattice.rs", "a_path_of_a_ring_is_that_of_every_method"],
-        "with sites on vector spaces and up to 1024 variables; others are refused (`NotImplicit`)",
+        "with sites on vector spaces and up to 1024 variables; others are refused (`NoImplicitSteps`)",
     ),
     partly(
         "by parts",
         ["crates/integrators/src/implicit.rs", "a_system_in_numbers_takes_the_steps_of_its_types"],
         "on vector spaces, if the parts of the system are [known apart](recipes.md#a-system-of-your-own), \
-         and up to 1024 variables; others are refused (`NotImplicit`)",
+         and up to 1024 variables; others are refused (`NoImplicitSteps`)",
     ),
     right("frozen", "tests/noise/lattice.rs", "a_path_of_a_ring_is_that_of_every_method"),
     right(

@@ -21,7 +21,8 @@ impl TensorSlopes {
         let n = units.len();
         let mut slopes = vec![0.0; n * n * n];
         let metric = at.model.metric_slopes(at.x, &mut slopes).then_some(slopes);
-        if at.model.is_zero(Part::Reversible) {
+        // A difference quotient beside another one proves nothing.
+        if at.model.is_zero(Part::Reversible) || at.model.has_derivatives_by_differences() {
             return Ok(Self { metric, bracket: None });
         }
         let jet = at.linearise(Part::Reversible, place.differentials(), &generic(units));
@@ -57,7 +58,8 @@ pub(super) fn compare_scalars(place: &Place<'_>, axis: usize) -> Result<(), Mode
 /// law uses them, so a law that its values violate is named first.
 pub(super) fn compare_dissipation(place: &Place<'_>, axes: &[usize]) -> Result<(), ModelError> {
     let &Place { at, units, .. } = place;
-    if at.model.is_zero(Part::Irreversible) || axes.is_empty() {
+    let by_differences = at.model.has_derivatives_by_differences();
+    if at.model.is_zero(Part::Irreversible) || axes.is_empty() || by_differences {
         return Ok(());
     }
     let alpha = generic(units);
@@ -125,9 +127,8 @@ impl Along<'_, '_> {
         let Some(slopes) = &slopes.bracket else { return Ok(()) };
         let (units, alpha) = (self.place.units, generic(self.place.units));
         let (scale, df) = (units[self.axis], slopes.column(self.axis));
-        let by_differences = self.place.at.model.has_derivatives_by_differences();
-        let rounding = if by_differences { OF_SOLUTIONS } else { OF_CLOSURES };
-        let derivatives = Derivatives { scale, df, units: Row::from_slice(units), rounding };
+        let derivatives =
+            Derivatives { scale, df, units: Row::from_slice(units), rounding: OF_CLOSURES };
         self.compare("bracket", &derivatives, &|t, values| {
             let w = self.place.differentials();
             self.append(Part::Reversible, &self.displacement(t), w, &alpha, values)

@@ -1,6 +1,8 @@
 //! Projections off covectors, one after another, as in [`metriplectic_dynamics::orthogonal`], whose formulas they are: of covectors
 //! and vectors in plain numbers, and of these with their derivatives along the unknown of a step.
 
+use smallvec::SmallVec;
+
 use super::algebra::{Matrix, add, dot, magnitude, vector};
 use super::parts::WithJacobian;
 use crate::numbers::{Lengths, List};
@@ -67,15 +69,15 @@ struct Normal<V> {
 
 /// Covectors made orthogonal to each other.
 #[derive(Clone)]
-pub(super) struct Orthogonal<V>(Vec<Normal<V>>);
+pub(super) struct Orthogonal<V>(SmallVec<[Normal<V>; 2]>);
 
 impl<V: List> Orthogonal<V> {
-    pub(super) const fn none() -> Self {
-        Self(Vec::new())
+    pub(super) fn none() -> Self {
+        Self(SmallVec::new())
     }
 
     /// Returns the number of covectors.
-    pub(super) const fn len(&self) -> usize {
+    pub(super) fn len(&self) -> usize {
         self.0.len()
     }
 
@@ -152,7 +154,7 @@ impl<V: List> Orthogonal<V> {
 }
 
 /// [`Orthogonal`] in the canonical inner product, where every quantity has its derivatives along the unknown of a step.
-pub(super) struct OrthogonalJet<L: Lengths>(Vec<NormalJet<L>>);
+pub(super) struct OrthogonalJet<L: Lengths>(SmallVec<[NormalJet<L>; 1]>);
 
 struct NormalJet<L: Lengths> {
     /// The covector `n`, which is `♯n` as well.
@@ -216,12 +218,12 @@ fn without<L: Lengths>(
 }
 
 impl<L: Lengths> OrthogonalJet<L> {
-    pub(super) const fn none() -> Self {
-        Self(Vec::new())
+    pub(super) fn none() -> Self {
+        Self(SmallVec::new())
     }
 
     /// Returns the number of covectors.
-    pub(super) const fn len(&self) -> usize {
+    pub(super) fn len(&self) -> usize {
         self.0.len()
     }
 

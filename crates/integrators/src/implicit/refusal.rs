@@ -1,11 +1,11 @@
 //! Why a system has no implicit steps.
 
-use metriplectic_equations::Equations;
+use metriplectic_equations::{Equations, Sizes};
 
 /// A system, or a method, without implicit steps in plain numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
-pub enum NotImplicit {
+pub enum NoImplicitSteps {
     /// The parts of the system are not known apart.
     #[error(
         "an implicit method asks for the parts of a system, its bracket and its friction: answer `Equations::model`, or take an explicit method"
@@ -42,15 +42,15 @@ pub enum NotImplicit {
 const MOST: usize = 1024;
 
 /// Refuses a system without implicit steps.
-pub(crate) fn refuse(system: &dyn Equations) -> Result<(), NotImplicit> {
-    let Some(model) = system.model() else { return Err(NotImplicit::Model) };
-    let variables = system.sizes().directions;
-    if !system.is_vector_space() {
-        Err(NotImplicit::Space)
+pub(crate) fn refuse(system: &dyn Equations) -> Result<(), NoImplicitSteps> {
+    let Some(model) = system.model() else { return Err(NoImplicitSteps::Model) };
+    let Sizes { entries, directions: variables, .. } = system.sizes();
+    if !system.is_vector_space() || entries != variables {
+        Err(NoImplicitSteps::Space)
     } else if !model.has_canonical_metric() {
-        Err(NotImplicit::Metric)
+        Err(NoImplicitSteps::Metric)
     } else if variables > MOST {
-        Err(NotImplicit::Variables { variables })
+        Err(NoImplicitSteps::Variables { variables })
     } else {
         Ok(())
     }

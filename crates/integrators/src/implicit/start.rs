@@ -49,6 +49,9 @@ pub(super) trait Around<L: Lengths> {
         entropy: Option<f64>,
     ) -> Option<L::State>;
 
+    /// Returns whether a state is outside of the domain.
+    fn is_outside(&self, x: &L::State) -> bool;
+
     /// The further invariant whose differential depends on the others at a state, with the fraction of it that does not.
     fn dependent_invariant(&self, x: &L::State) -> Option<(usize, f64)>;
 }

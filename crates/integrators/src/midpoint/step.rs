@@ -16,8 +16,8 @@ use crate::round_off::compensation::Displaced;
 use crate::round_off::drift;
 use crate::step::failure::{Cause, Fallbacks};
 use crate::step::{
-    Compiled, Dim, Effort, Evidence, Flow as _, Laws, LineOfStep, Promises, Refusal, Start,
-    StepError, StepStart, Stepper, Taken, name_of,
+    Compiled, Dim, Effort, Evidence, Flow as _, GradientKind, Laws, LineOfStep, Promises, Refusal,
+    Start, StepError, StepStart, Stepper, Taken, name_of,
 };
 
 impl<Y, R, W> Stepper<Y> for Scheme<R, W>
@@ -30,11 +30,12 @@ where
 
     const HAS_DEFAULT_BETWEEN: bool = true;
 
-    const IS_IMPLICIT: bool = R::BASE_OF_LINES.is_some() && W::KIND.is_some();
+    const IS_IMPLICIT: bool = R::BASE_OF_LINES.is_some() && has_bits_of_types(W::KIND);
 
     fn compiled(&self) -> Option<Compiled> {
         let &Self { newton, splits, .. } = self;
-        let line = LineOfStep { base: R::BASE_OF_LINES?, gradient: W::KIND? };
+        let gradient = W::KIND.filter(|_| has_bits_of_types(W::KIND))?;
+        let line = LineOfStep { base: R::BASE_OF_LINES?, gradient };
         Some(Compiled::Midpoint { name: scheme_name::<R, W>, line, newton, splits })
     }
 
@@ -72,6 +73,12 @@ where
             second_law: false,
         })
     }
+}
+
+/// Returns whether steps in plain numbers have the bits of those in types, as the runs of tangents do. Newton's method for increments has
+/// derivatives by dual numbers there, and in closed form here.
+const fn has_bits_of_types(gradient: Option<GradientKind>) -> bool {
+    matches!(gradient, Some(GradientKind::Gonzalez | GradientKind::MeanValue))
 }
 
 /// The name of a scheme in a checkpoint.

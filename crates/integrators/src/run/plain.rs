@@ -3,7 +3,7 @@
 use metriplectic_equations::Equations;
 
 use crate::compiled;
-use crate::implicit::NotImplicit;
+use crate::implicit::NoImplicitSteps;
 use crate::numbers::{Answered, FromEquations, InTypes};
 use crate::run::error::RunError;
 use crate::run::event::Event;
@@ -170,7 +170,7 @@ fn run_own(
     let start = (&in_numbers as &PlainFlow<'_>, Entries::zeros(0));
     let run = |method: &dyn PlainMethod| without_panics(|| run(method, start, schedule));
     let done = method.and_then(|method| compiled::with_own(method, flow, run));
-    done.unwrap_or_else(|| Err(MethodError::new(NotImplicit::Scheme).into()))
+    done.unwrap_or_else(|| Err(MethodError::new(NoImplicitSteps::Scheme).into()))
 }
 
 /// Runs a system by a method that is compiled with the library.

@@ -65,10 +65,7 @@ impl<F: Flow + ?Sized> Course<'_, F> {
 
     /// The verdict on the model at the state of the run.
     fn verdict(&self, occasion: Recheck) -> Result<(), StepError> {
-        let (x, time) = (&self.state.point, self.state.time);
-        let broken = |law| StepError::Model { time, law: Box::new(law) };
-        self.flow.recheck(x, occasion).map_err(broken)?;
-        self.flow.reexamine(x, occasion).map_err(|law| StepError::Flow { time, law })
+        self.flow.verdict(&self.state.point, self.state.time, occasion)
     }
 
     /// Finds a jump of the protocol along a step of one size that was not taken, at the frozen state.

@@ -400,6 +400,18 @@ pub trait Flow {
         Ok(())
     }
 
+    /// The verdict on the model at a state that the run has reached: of [`recheck`](Self::recheck), then of
+    /// [`reexamine`](Self::reexamine).
+    ///
+    /// # Errors
+    ///
+    /// [`StepError::Model`] or [`StepError::Flow`].
+    fn verdict(&self, x: &Element<Self>, time: f64, occasion: Recheck) -> Result<(), StepError> {
+        let broken = |law| StepError::Model { time, law: Box::new(law) };
+        self.recheck(x, occasion).map_err(broken)?;
+        self.reexamine(x, occasion).map_err(|law| StepError::Flow { time, law })
+    }
+
     /// Verifies at the end of the run of a system that was verified before it what may hold at some states alone.
     ///
     /// # Errors

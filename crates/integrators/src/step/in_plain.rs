@@ -179,6 +179,16 @@ impl<F: Written> Flow for InPlainNumbers<'_, F> {
         self.flow.reexamine(&self.at(x), occasion)
     }
 
+    /// A panic is an error of the flow, so the states before it are kept.
+    fn verdict(&self, x: &Entries, time: f64, occasion: Recheck) -> Result<(), StepError> {
+        let verdict = || self.flow.verdict(&self.at(x), time, occasion);
+        if const { F::CATCHES_PANICS } {
+            let error = |panicked| StepError::Flow { time, law: FlowError::new(panicked) };
+            return caught(verdict).map_err(error)?;
+        }
+        verdict()
+    }
+
     fn examine_end(&self, x: &Entries) -> Result<(), FlowError> {
         self.flow.examine_end(&self.at(x))
     }
@@ -371,9 +381,12 @@ impl<F: Written, M: Stepper<F>> PlainMethod for MethodInTypes<'_, F, M> {
         memory: &PlainMemory,
         norm: &dyn Fn(&Directions) -> f64,
     ) -> Option<f64> {
-        self.between_ends(step, |step| {
-            self.method.error(step, memory.after_a_step()?, |error| norm(&F::directions(error)))
-        })
+        let error = || {
+            self.between_ends(step, |step| {
+                self.method.error(step, memory.after_a_step()?, |error| norm(&F::directions(error)))
+            })
+        };
+        if const { F::CATCHES_PANICS } { caught(error).ok().flatten() } else { error() }
     }
 
     fn between(

@@ -58,10 +58,12 @@ impl<L: Lengths> Clone for Linear<L> {
 }
 
 /// The number of variables up to which derivatives are formed in each step, because they cost less than the corrections that they save.
+/// A factor of four fails `implicit.rs::derivatives_of_many_variables_serve_many_steps`.
 const FEW: usize = 6;
 /// Steps that derivatives serve, because the sizes of the terms may change.
 const STEPS: u32 = 20;
 /// Evaluations of a step after which its derivatives serve no other one.
+/// A factor of four fails `implicit.rs::derivatives_of_many_variables_serve_many_steps`.
 const EVALUATIONS: usize = 6;
 
 /// The velocity at a point with its derivatives along the point.

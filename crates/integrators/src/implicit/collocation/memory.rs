@@ -51,7 +51,7 @@ impl<L: Lengths> Clone for StageNumbers<L> {
         let last = self.last.as_ref();
         let last =
             last.map(|LastStep { k, filter }| LastStep { k: k.clone(), filter: filter.clone() });
-        Self { last, ..self.without_last() }
+        Self { last, ..self.without_last(self.linear.clone()) }
     }
 }
 
@@ -70,13 +70,12 @@ impl<L: Lengths> Default for StageNumbers<L> {
 
 #[allow(private_bounds, reason = "no other crate makes one")]
 impl<L: Lengths> StageNumbers<L> {
-    /// The memory without its last step.
-    fn without_last(&self) -> Self {
+    /// The memory without its last step, with these derivatives.
+    fn without_last(&self, linear: Option<Linear<L>>) -> Self {
         let velocities = self.velocities.as_ref();
         let velocities =
             velocities.map(|&Continued { ref k, stages, h }| Continued { k: k.clone(), stages, h });
-        let (linear, compensation) = (self.linear.clone(), self.compensation.clone());
-        Self { velocities, linear, compensation, last: None }
+        Self { velocities, linear, compensation: self.compensation.clone(), last: None }
     }
 
     /// The memory itself, if its vectors have this length, as those of every step do.
@@ -118,8 +117,9 @@ impl<L: Lengths> StageNumbers<L> {
 }
 
 impl<L: Lengths> Memory for StageNumbers<L> {
-    fn rescaled(&self, _: f64) -> Self {
-        self.without_last()
+    fn rescaled(&self, ratio: f64) -> Self {
+        let linear = self.linear.as_ref().filter(|_| ratio.to_bits() == 1.0_f64.to_bits());
+        self.without_last(linear.cloned())
     }
 
     fn stage_velocities(&self) -> Vec<f64> {

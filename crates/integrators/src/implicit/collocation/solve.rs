@@ -229,7 +229,8 @@ impl<'a, L: Lengths> Iteration<'a, L> {
                 return Err(failed);
             }
             let Some(next) = self.descend(&here) else {
-                if here.size <= STALL && here.excess <= STALLED_LAW {
+                let is_of_another_step = self.linear.age > 0;
+                if here.size <= STALL && here.excess <= STALLED_LAW && !is_of_another_step {
                     return Ok(self.solved(here));
                 }
                 if is_fresh && let Some(next) = self.begin(&here) {

@@ -98,6 +98,9 @@ impl Collocation {
             memory.last = Some(LastStep { k, filter });
             return Ok(Step { x: x.clone(), values: values.clone(), evidence, effort });
         }
+        if around.is_outside(&at.end) {
+            return Err(failed(Cause::Edge));
+        }
         memory.linear = linear.kept(evaluations);
         let u = equation.displacement(&k);
         memory.note(tableau, h, &k);

@@ -3,6 +3,8 @@
 
 use std::fmt;
 
+use smallvec::SmallVec;
+
 use super::newton::Inverse;
 use crate::implicit::algebra::{Matrix, add, dot, magnitude};
 use crate::implicit::drift::Compensation;
@@ -25,7 +27,7 @@ pub struct MidpointNumbers<L: Lengths> {
 
 /// The displacements of the steps before, from which the next one is extrapolated: their backward differences `∇ʲd`, as far as they
 /// are known.
-pub(super) struct Predictor<L: Lengths>(Vec<L::Vector>);
+pub(super) struct Predictor<L: Lengths>(SmallVec<[L::Vector; DIFFERENCES]>);
 
 /// The Jacobian of an earlier step, and what it was formed for.
 pub(super) struct KeptJacobian<L: Lengths> {
@@ -60,7 +62,7 @@ impl<L: Lengths> fmt::Debug for MidpointNumbers<L> {
 impl<L: Lengths> Default for MidpointNumbers<L> {
     fn default() -> Self {
         Self {
-            predictor: Predictor(Vec::new()),
+            predictor: Predictor(SmallVec::new()),
             jacobian: KeptJacobian { inverse: None, h: 0.0, length: 0.0 },
             compensation: Compensation(None),
         }
@@ -153,9 +155,9 @@ impl<L: Lengths> Predictor<L> {
         if ratio.to_bits() == 1.0_f64.to_bits() {
             return Self(self.0.clone());
         }
-        let Some(first) = self.0.first() else { return Self(Vec::new()) };
+        let Some(first) = self.0.first() else { return Self(SmallVec::new()) };
         if ratio > FARTHEST {
-            return Self(Vec::new());
+            return Self(SmallVec::new());
         }
         // Far from the three points their parabola says nothing.
         let known = self.0.len().min(if ratio > 2.0 { 1 } else { 3 });

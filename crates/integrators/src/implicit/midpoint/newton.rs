@@ -5,7 +5,7 @@ use super::equation::{Dissipated, Equation, Evaluated, Linearised, Rounding};
 use crate::implicit::algebra::{Matrix, add, dot, magnitude};
 use crate::implicit::parts::Parts;
 use crate::newton::{
-    INVERTED, MARGIN, NEAR, NOISE, NORM, Newton, SURE, Stiffness, UNCHECKED, reaches,
+    INVERTED, MARGIN, NEAR, NOISE, NORM, Newton, SURE, Stiffness, UNCHECKED, corrections, reaches,
 };
 use crate::numbers::{Lengths, List};
 
@@ -118,11 +118,6 @@ impl<L: Lengths> Inverse<L> {
             add(correction, c, &turned);
         }
     }
-}
-
-/// The corrections by a kept Jacobian that cost less than a new one.
-const fn corrections(n: usize) -> usize {
-    if n > 6 { n / 2 } else { 3 }
 }
 
 /// A measure of corrections: the root mean square of their components in units of round-off.

@@ -86,6 +86,7 @@ impl Midpoint {
         &self,
         start: &Start<'_, L>,
         memory: &mut MidpointNumbers<L>,
+        around: &dyn Around<L>,
         fallbacks: Fallbacks,
     ) -> Result<Step<L>, Box<StepFailure>> {
         let &Start { parts, x, h, ref values, .. } = start;
@@ -114,6 +115,9 @@ impl Midpoint {
         } else {
             equation.polish(&root, end, &mut effort)
         };
+        if around.is_outside(&end) {
+            return Err(failed(Cause::Edge, effort).into());
+        }
         memory.predictor.note(parts, &u);
         let compensated = if moved {
             memory.compensation.0 = None;
@@ -154,12 +158,12 @@ impl Midpoint {
         memory: &mut MidpointNumbers<L>,
         around: &dyn Around<L>,
     ) -> Result<Step<L>, StepError> {
-        let failure = match self.try_step(start, memory, Fallbacks::All) {
+        let failure = match self.try_step(start, memory, around, Fallbacks::All) {
             Ok(taken) => return Ok(taken),
             Err(failure) => failure,
         };
         *memory = MidpointNumbers::default();
-        let mut halves = Halves { scheme: self, effort: failure.effort };
+        let mut halves = Halves { scheme: self, around, effort: failure.effort };
         let parts =
             if self.splits == 0 { Err((failure, start.x.clone())) } else { halves.of(start, 1) };
         let effort = halves.effort;
@@ -207,8 +211,9 @@ impl Midpoint {
 }
 
 /// The parts of a step that was not solved whole.
-struct Halves<'a> {
+struct Halves<'a, L: Lengths> {
     scheme: &'a Midpoint,
+    around: &'a dyn Around<L>,
     /// The effort of all parts.
     effort: Effort,
 }
@@ -216,9 +221,9 @@ struct Halves<'a> {
 /// A part that was not taken, and where it starts.
 type Failed<L> = (Box<StepFailure>, <L as Lengths>::State);
 
-impl Halves<'_> {
+impl<L: Lengths> Halves<'_, L> {
     /// The two halves of a step that was not solved whole; if they were not solved either, where the smallest part of them starts.
-    fn of<L: Lengths>(&mut self, start: &Start<'_, L>, depth: usize) -> Result<Step<L>, Failed<L>> {
+    fn of(&mut self, start: &Start<'_, L>, depth: usize) -> Result<Step<L>, Failed<L>> {
         self.effort.splits += 1;
         let mut memory = MidpointNumbers::default();
         let first = self.half(start, start.x, depth, &mut memory)?;
@@ -228,7 +233,7 @@ impl Halves<'_> {
     }
 
     /// One half, which starts at `x`.
-    fn half<L: Lengths>(
+    fn half(
         &mut self,
         start: &Start<'_, L>,
         x: &L::State,
@@ -239,7 +244,7 @@ impl Halves<'_> {
         let mut accumulated_error = start.accumulated_error.clone();
         accumulated_error.energy += values.energy - start.values.energy;
         let part = Start { x, h: 0.5 * start.h, values, accumulated_error, ..*start };
-        match self.scheme.try_step(&part, memory, Fallbacks::FirstTries) {
+        match self.scheme.try_step(&part, memory, self.around, Fallbacks::FirstTries) {
             Ok(taken) => {
                 self.effort += taken.effort;
                 Ok(taken)

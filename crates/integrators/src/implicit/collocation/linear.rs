@@ -131,7 +131,7 @@ impl<L: Lengths> Linear<L> {
             && (0.7..1.5).contains(&fraction)
     }
 
-    /// The same for the next step, after one that has taken so many evaluations with it; `None` where it is to be formed anew.
+    /// The derivatives for the next step, after one that has taken so many evaluations with it; `None` where it is to be formed anew.
     pub(super) fn kept(mut self, evaluations: usize) -> Option<Self> {
         self.age += 1;
         (self.n() > FEW && evaluations <= EVALUATIONS).then_some(self)

@@ -110,7 +110,7 @@ impl<'a, L: Lengths> StageEquation<'a, L> {
         self.solve_near(guess, budget, None)
     }
 
-    /// The same, first with the derivatives of an earlier step, if there are any.
+    /// The velocities near a guess, first with the derivatives of an earlier step, if there are any.
     pub(super) fn solve_near(
         &self,
         guess: Unknowns<L>,

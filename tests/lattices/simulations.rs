@@ -15,7 +15,7 @@ fn rod() -> Lattice<impl Model<Manifold = Euclidean<1>>> {
             [Onsager { rate: u * v, b: [vector![bond.w[1].x], vector![-bond.w[0].x]] }]
         })
         .build()
-        .unwrap()
+        .expect("a lattice")
 }
 
 /// The entries of the states and the certificate.
@@ -81,7 +81,7 @@ fn typed<F: Listed, N: Method<F>>(
     start: metriplectic::integrators::Element<F>,
     span: Span,
 ) -> (Vec<Vec<f64>>, String) {
-    let run = method.run(lattice, start, span).unwrap();
+    let run = method.run(lattice, start, span).expect("a run");
     let states = run.states().iter().map(|state| F::write(&state.point).to_vec());
     (states.collect(), run.certificate().to_string())
 }

@@ -85,7 +85,9 @@ pub use run::steps::Steps;
 pub use run::trajectory::Trajectory;
 pub use run::until::Until;
 pub use run::watch::{Jumping, Watch, Watched};
-pub use run::{Ending, Method, Method as Run, Schedule, Simulation, SpanError, State};
+pub use run::{
+    Ending, Method, Method as Run, Schedule, Simulation, SpanError, State, StepSequence,
+};
 pub use step::{
     Compiled, Components, Control, Directions, Effort, Element, Entries, EntropyStep,
     EventExchange, Evidence, Flow, GradientKind, Inlined, JumpError, Laws, LedgerErrors,

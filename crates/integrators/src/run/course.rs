@@ -9,6 +9,7 @@ use crate::run::judged::Judged;
 use crate::run::least_sizes::least_sizes;
 use crate::run::progress::Progress;
 use crate::run::schedule::{Schedule, Size};
+use crate::run::sequence::Frozen;
 use crate::run::span_error::SpanError;
 use crate::run::state::State;
 use crate::run::watching::{StepBefore, Watching};
@@ -41,6 +42,8 @@ pub(super) struct Course<'a, F: Flow + ?Sized> {
     pub(super) flow: &'a F,
     pub(super) rule: Rule,
     pub(super) progress: Progress<F::Vector>,
+    /// The steps of another run.
+    pub(super) frozen: Frozen,
     pub(super) state: State<F::Space>,
     /// The laws at the state.
     pub(super) values: Laws<F::Numbers>,
@@ -77,7 +80,9 @@ impl<'a, F: Flow + ?Sized> Course<'a, F> {
         let mut certificate =
             Certificate { noise, ..Certificate::start(flow, &x0, &values, promises) };
         let mut scales = Scales::at(flow, &x0, schedule.span());
-        let Schedule { size, start, count, every, most, rest, watch, mut corners } = schedule;
+        let Schedule { size, start, count, every, most, rest, watch, mut corners, frozen } =
+            schedule;
+        frozen.begin();
         corners.start = start;
         let step_size = match size {
             Size::Fixed(h) => StepSize::Fixed(h),
@@ -129,6 +134,7 @@ impl<'a, F: Flow + ?Sized> Course<'a, F> {
             flow,
             rule,
             progress,
+            frozen,
             state,
             before,
             watching,

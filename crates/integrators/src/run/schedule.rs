@@ -4,6 +4,7 @@ use crate::run::adaptive::Adaptive;
 use crate::run::controller::Rule;
 use crate::run::corners::Corners;
 use crate::run::requests::Requests;
+use crate::run::sequence::{Frozen, StepSequence};
 use crate::run::span_error::{SpanError, check_step_size, check_steps};
 
 /// How a run goes: what [`Method::steps`](crate::Method::steps) and [`Method::run`](crate::Method::run)
@@ -30,6 +31,8 @@ pub struct Schedule {
     pub(crate) watch: Requests,
     /// The times across which no step goes.
     pub(crate) corners: Corners,
+    /// The steps of another run.
+    pub(crate) frozen: Frozen,
 }
 
 /// How large the steps of a course are.
@@ -42,8 +45,8 @@ pub(crate) enum Size {
 impl From<f64> for Schedule {
     fn from(h: f64) -> Self {
         let (start, every, most, rest) = (0.0, 1, None, None);
-        let (watch, corners) = (Requests::default(), Corners::default());
-        Self { size: Size::Fixed(h), start, count: None, every, most, rest, watch, corners }
+        let (watch, corners, frozen) = (Requests::default(), Corners::default(), Frozen::No);
+        Self { size: Size::Fixed(h), start, count: None, every, most, rest, watch, corners, frozen }
     }
 }
 
@@ -55,6 +58,21 @@ impl Schedule {
     #[must_use]
     pub fn without_rest(self) -> Self {
         Self { rest: None, ..self }
+    }
+
+    /// Notes the steps that a run takes which follows a tolerance, for runs [beside it](Self::taking). A run of this schedule begins the
+    /// sequence anew.
+    #[must_use]
+    pub fn noting(self, sequence: &StepSequence) -> Self {
+        Self { frozen: Frozen::noting(sequence), ..self }
+    }
+
+    /// Takes the steps of another run of this schedule in place of those that the tolerance asks for: each is taken whatever its error
+    /// is. One that cannot be taken, because its equation has no solution or the entropy would fall, is taken in parts, and the run goes on
+    /// with the steps after it.
+    #[must_use]
+    pub fn taking(self, sequence: &StepSequence) -> Self {
+        Self { frozen: Frozen::taking(sequence), ..self }
     }
 
     /// Whether the run ends where the state comes to rest.

@@ -3,6 +3,7 @@
 use crate::run::corners::Corners;
 use crate::run::requests::Requests;
 use crate::run::schedule::{Schedule, Size};
+use crate::run::sequence::Frozen;
 
 /// The time span of a run: the step size, the number of steps, and every how many a state is kept.
 ///
@@ -84,8 +85,8 @@ impl Span {
 impl From<Span> for Schedule {
     fn from(Span { start, step, count, every, rest }: Span) -> Self {
         let (size, watch) = (Size::Fixed(step), Requests::default());
-        let (count, corners) = (Some(count), Corners::default());
-        Self { size, start, count, every, most: None, rest, watch, corners }
+        let (count, corners, frozen) = (Some(count), Corners::default(), Frozen::No);
+        Self { size, start, count, every, most: None, rest, watch, corners, frozen }
     }
 }
 

@@ -289,6 +289,7 @@ impl<'a, F: Flow + ?Sized, M: Stepper<F>> Steps<'a, F, M> {
         let Stop { stop, recorded: target, .. } = self.course.progress.corners.stop(time, pace.end);
         // After a corner a step begins a few roundings later than its state is recorded.
         let begin = behind.unwrap_or(time);
+        let mut frozen = self.course.frozen.end(self.course.state.step, begin);
         if behind.is_some() {
             self.memory = self.method.memory();
         }
@@ -299,8 +300,11 @@ impl<'a, F: Flow + ?Sized, M: Stepper<F>> Steps<'a, F, M> {
                 let here = Scales::at(flow, &self.course.state.point, Some(pace.end - time));
                 self.course.progress.scales = self.course.progress.scales.and(&here);
             }
-            let (h, last) = pace.attempt(begin, stop);
-            if pace.next < pace.least(&rule) && !last {
+            let (h, last) = match frozen {
+                Some(end) => (end.min(stop) - begin, end >= stop),
+                None => pace.attempt(begin, stop),
+            };
+            if pace.next < pace.least(&rule) && !last && frozen.is_none() {
                 let (h, least) = (pace.next, pace.least(&rule));
                 let too_small = StepError::TooSmall { time, h, least };
                 let cause = broken.or_else(|| self.course.dependent(&self.course.state));
@@ -328,7 +332,7 @@ impl<'a, F: Flow + ?Sized, M: Stepper<F>> Steps<'a, F, M> {
                     let step = Tried { taken, reference, h, relative_error };
                     let is_held = taken.evidence.entropy_step == Some(EntropyStep::Held);
                     error = if holds { self.error(&step, &memory) } else { None };
-                    let accepted = error.filter(|error| *error <= 1.0);
+                    let accepted = error.filter(|error| *error <= 1.0 || frozen.is_some());
                     if holds && is_held {
                         pace.accept_held(&rule, h);
                     } else if let Some(error) = accepted {
@@ -358,8 +362,11 @@ impl<'a, F: Flow + ?Sized, M: Stepper<F>> Steps<'a, F, M> {
                 self.memory.reuse(before);
                 self.course.progress.set_pace(pace);
                 let time = if last { target } else { begin + h };
+                self.course.frozen.note(time);
                 return Ok(Advance { taken, h, time });
             }
+            // A step that cannot be taken is taken in parts.
+            frozen = None;
             if falls {
                 pace.reject_fall(h);
                 self.memory.refused(memory);
@@ -374,6 +381,7 @@ impl<'a, F: Flow + ?Sized, M: Stepper<F>> Steps<'a, F, M> {
                 self.memory = self.memory.restarted();
                 self.course.progress.set_pace(pace);
                 let time = if last { target } else { begin + h };
+                self.course.frozen.note(time);
                 return Ok(Advance { taken: Taken { effort, ..taken }, h, time });
             }
             pace.reject(&rule, h, error);

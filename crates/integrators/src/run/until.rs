@@ -7,6 +7,7 @@ use crate::run::controller::Entries;
 use crate::run::corners::Corners;
 use crate::run::requests::Requests;
 use crate::run::schedule::{Schedule, Size};
+use crate::run::sequence::Frozen;
 use crate::run::span::Span;
 
 /// A run to a time, in steps that follow a tolerance; made by [`Span::until`].
@@ -179,8 +180,8 @@ impl<const N: usize> From<Until<N>> for Schedule {
             until;
         let Ok(entries) = entries.convert(|_, numbers| Ok::<_, Infallible>((*numbers).into()));
         let size = Size::Tolerance(Adaptive { end, tolerance, first, least, largest, entries });
-        let (watch, corners) = (Requests::default(), Corners::default());
-        Self { size, start, count: None, every, most, rest, watch, corners }
+        let (watch, corners, frozen) = (Requests::default(), Corners::default(), Frozen::No);
+        Self { size, start, count: None, every, most, rest, watch, corners, frozen }
     }
 }
 

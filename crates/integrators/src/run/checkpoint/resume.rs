@@ -9,6 +9,7 @@ use crate::run::certificate::Certificate;
 use crate::run::checked::checked_states;
 use crate::run::controller::StepSize;
 use crate::run::course::{Course, Said};
+use crate::run::sequence::Frozen;
 use crate::run::state::State;
 use crate::run::steps::Steps;
 use crate::run::watching::StepBefore;
@@ -126,6 +127,7 @@ impl<'a, F: Flow + ?Sized> Course<'a, F> {
             before,
             watching: None,
             cut: None,
+            frozen: Frozen::No,
             last_numbers: c.events.clone(),
             flow,
             progress,

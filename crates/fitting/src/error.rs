@@ -68,6 +68,14 @@ pub enum FitError {
         /// The guess.
         value: f64,
     },
+    /// A parameter of no known size, along which no difference can be taken.
+    #[error(
+        "the guess of {name} is zero, which says nothing of its size; guess another number of the size that it may have"
+    )]
+    NoSize {
+        /// The parameter.
+        name: &'static str,
+    },
     /// No parameter is free.
     #[error("no parameter is free; name one, or leave `free` out to fit them all")]
     NothingFree,

@@ -1,21 +1,22 @@
-//! Fits of the parameters of a family.
+//! Fits of the parameters of a system.
 
-use std::cell::RefCell;
 use std::cmp::Ordering;
 use std::fmt;
 
 use argmin::core::{Executor, State as _, TerminationReason};
 use metriplectic_dynamics::{Differentiable, Parametrised, Point};
 use metriplectic_fields::{Dimension as _, Real, Space};
+use metriplectic_integrators::step::Element;
 use metriplectic_integrators::tangent::LinearisedAlong;
-use metriplectic_integrators::{Schedule, Stepper};
-use metriplectic_manifolds::Manifold as _;
-use nalgebra::SVector;
+use metriplectic_integrators::{Flow, Schedule, Stepper};
+use nalgebra::{SMatrix, SVector};
 
 use crate::error::FitError;
 use crate::fitted::{FLAT, Fitted, Parts, Stop};
+use crate::least_squares::Squares;
 use crate::levenberg_marquardt::LevenbergMarquardt;
-use crate::model::{ManifoldOf, Measured, Model, PointOf};
+use crate::model::{Failure, ManifoldOf, Measured, Model, PointOf, Residuals};
+use crate::systems::{Observed, Systems};
 use crate::unknowns::{Names, Unknown, unknowns};
 
 /// The longest step of a logarithm.
@@ -24,7 +25,12 @@ const STEEP: f64 = 3.0;
 /// The noise, relative to the data, that the round-off of runs may be mistaken for.
 const ROUNDED: f64 = 4096.0 * f64::EPSILON;
 
-/// A fit of the parameters of a family to data, by least squares.
+/// A fit of the parameters of a system to data, by least squares.
+///
+/// | of | the system | derivatives of the runs |
+/// |---|---|---|
+/// | [`Fit::of`] a [`Family`](metriplectic_dynamics::Family) | closed | exact, those of the discrete steps |
+/// | [`Fit::of_systems`] | of any kind: with ports, baths and noise, a lattice, one of your own | differences of runs in the same steps |
 ///
 /// ```
 /// use metriplectic_dynamics::Family;
@@ -65,37 +71,162 @@ const ROUNDED: f64 = 4096.0 * f64::EPSILON;
 /// # Ok(())
 /// # }
 /// ```
-pub struct Fit<'a, Y, const P: usize> {
-    family: &'a Y,
+pub struct Fit<Y, const P: usize> {
+    of: Y,
 }
 
-impl<Y, const P: usize> fmt::Debug for Fit<'_, Y, P> {
+impl<Y, const P: usize> fmt::Debug for Fit<Y, P> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Fit").finish_non_exhaustive()
     }
 }
 
-impl<'a, Y: Parametrised<P>, const P: usize> Fit<'a, Y, P> {
+impl<'a, Y: Parametrised<P>, const P: usize> Fit<&'a Y, P> {
     /// Starts a fit of the parameters of a family.
     pub const fn of(family: &'a Y) -> Self {
-        Self { family }
+        Self { of: family }
     }
 
     /// Says what was measured, as a closure of the state that returns `K` numbers. It is differentiated as a field is.
-    pub fn observe<F, const K: usize>(self, observe: F) -> FitBuilder<'a, Y, F, P, K>
+    pub fn observe<F, const K: usize>(
+        self,
+        observe: F,
+    ) -> FitBuilder<&'a Y, F, FamilyStart<Point<Y::System>>, P, K>
     where
         F: Fn(&PointOf<Y, Real, P>) -> SVector<Real, K>,
     {
-        FitBuilder {
-            family: self.family,
-            observe,
+        FitBuilder { of: self.of, observe, start: None, options: Options::default() }
+    }
+}
+
+impl<B, F, Error, const P: usize> Fit<Systems<B, P>, P>
+where
+    B: Fn(&SVector<f64, P>) -> Result<F, Error>,
+    F: Flow,
+    Error: Into<Failure>,
+{
+    /// Starts a fit of any system, from the names of its parameters and a closure that builds it at values of them.
+    ///
+    /// The system may have ports, baths, noise of a fixed seed, an energy in time; it may be a lattice or of a type of your own. Its
+    /// derivatives along a parameter are central differences of runs in the [same steps](metriplectic_integrators::StepSequence), by
+    /// `ε^{1/3}` of the parameter, or of its guess if that is larger: an evaluation takes `2P + 1` runs, and the derivatives have about
+    /// ten digits. A closed system is better fitted by [`of`](Self::of) its [`Family`](metriplectic_dynamics::Family), whose derivatives
+    /// are exact.
+    ///
+    /// ```
+    /// use metriplectic_dynamics::{Bath, Contact, Symplectic, System};
+    /// use metriplectic_fields::Real;
+    /// use metriplectic_fitting::Fit;
+    /// use metriplectic_integrators::{DormandPrince8, Method, OpenBuilder, OpenState, Span, Watch};
+    /// use metriplectic_manifolds::Euclidean;
+    /// use nalgebra::{Vector2, vector};
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// // A body on a spring that hardens, in air.
+    /// let oscillator = |t: &Vector2<f64>| {
+    ///     let (stiffness, friction) = (t.x, t.y);
+    ///     System::on(Euclidean::<2>)
+    ///         .bracket(Symplectic)
+    ///         .energy(move |x: &Vector2<Real>| (x.y * x.y + x.x * x.x * stiffness) * 0.5 + x.x * x.x * x.x * x.x * 0.25)
+    ///         .bath("air", Bath::at(0.7).friction(move |_: Real, _: &Vector2<Real>, _: &Vector2<Real>| {
+    ///             [Contact { rate: friction.into(), along: vector![0.0.into(), 1.0.into()] }]
+    ///         }))
+    ///         .build()
+    /// };
+    /// let times: Vec<f64> = (1..=20).map(f64::from).collect();
+    /// let span = Span::until(20.0).tolerance(1e-8);
+    /// let truth = oscillator(&vector![1.5, 0.1])?;
+    /// let start = truth.start(vector![1.0, 0.0]);
+    /// let run = DormandPrince8.run(&truth, start, span.output_at(times.clone()))?;
+    /// let data: Vec<_> = run.states()[1..].iter().map(|state| vector![state.point.x.x]).collect();
+    ///
+    /// let fit = Fit::of_systems(["stiffness", "friction"], oscillator)
+    ///     .observe(|state: &OpenState<Vector2<f64>>| vector![state.x.x])
+    ///     .data(&times, &data)
+    ///     .start_from(|oscillator, _| oscillator.start(vector![1.0, 0.0]))
+    ///     .run(DormandPrince8, span, vector![1.4, 0.05])?;
+    /// println!("{fit}");
+    /// assert!((fit.parameters[1] - 0.1).abs() < 1e-6);
+    /// # Ok(())
+    /// # }
+    /// ```
+    pub const fn of_systems(names: [&'static str; P], build: B) -> Self {
+        Self { of: Systems { names, build } }
+    }
+
+    /// Says what was measured, as a closure of the state that returns `K` numbers: those of an open system may be its work and heat.
+    #[allow(
+        clippy::type_complexity,
+        reason = "the type of a builder lists the parts of the fit, and a name for it would hide them"
+    )]
+    pub fn observe<O, const K: usize>(
+        self,
+        observe: O,
+    ) -> FitBuilder<
+        Systems<B, P>,
+        impl Fn(&SVector<f64, P>, &Element<F>) -> SVector<f64, K>,
+        SystemStart<F, P>,
+        P,
+        K,
+    >
+    where
+        O: Fn(&Element<F>) -> SVector<f64, K>,
+    {
+        self.observe_with(move |_, x| observe(x))
+    }
+
+    /// Says what was measured, as a closure `|θ, x|` of the parameters too, such as those of a meter.
+    pub fn observe_with<O, const K: usize>(
+        self,
+        observe: O,
+    ) -> FitBuilder<Systems<B, P>, O, SystemStart<F, P>, P, K>
+    where
+        O: Fn(&SVector<f64, P>, &Element<F>) -> SVector<f64, K>,
+    {
+        FitBuilder { of: self.of, observe, start: None, options: Options::default() }
+    }
+}
+
+/// The start of the runs of a family.
+#[derive(Clone, Debug)]
+pub struct FamilyStart<X> {
+    point: X,
+    /// Whether it is a guess.
+    is_free: bool,
+}
+
+/// The start of the runs of other systems, which may depend on the system and on the parameters.
+pub type SystemStart<S, const P: usize> = Box<dyn Fn(&S, &SVector<f64, P>) -> Element<S>>;
+
+/// What is observed of a run at a time, with its derivatives along the parameters.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Observation<const P: usize, const K: usize> {
+    /// The numbers that are observed.
+    pub value: SVector<f64, K>,
+    /// The derivative of each number along each parameter.
+    pub along: SMatrix<f64, K, P>,
+}
+
+/// Data, noise, parameters and solver of a fit.
+#[derive(Clone, Debug)]
+pub(crate) struct Options<const K: usize> {
+    times: Vec<f64>,
+    rows: Vec<SVector<f64, K>>,
+    noise: Option<[f64; K]>,
+    free: Names,
+    positive: Names,
+    iterations: u64,
+    solver: LevenbergMarquardt,
+}
+
+impl<const K: usize> Default for Options<K> {
+    fn default() -> Self {
+        Self {
             times: Vec::new(),
             rows: Vec::new(),
             noise: None,
             free: Names::All,
             positive: Names::None,
-            start: None,
-            free_start: false,
             iterations: 100,
             solver: LevenbergMarquardt::default(),
         }
@@ -104,45 +235,36 @@ impl<'a, Y: Parametrised<P>, const P: usize> Fit<'a, Y, P> {
 
 /// A fit in the making: each method replaces one part.
 #[must_use = "a fit does nothing until `run` is called"]
-pub struct FitBuilder<'a, Y: Parametrised<P>, F, const P: usize, const K: usize> {
-    family: &'a Y,
+pub struct FitBuilder<Y, F, X, const P: usize, const K: usize> {
+    of: Y,
     observe: F,
-    times: Vec<f64>,
-    rows: Vec<SVector<f64, K>>,
-    noise: Option<[f64; K]>,
-    free: Names,
-    positive: Names,
-    start: Option<Point<Y::System>>,
-    free_start: bool,
-    iterations: u64,
-    solver: LevenbergMarquardt,
+    start: Option<X>,
+    options: Options<K>,
 }
 
-impl<Y: Parametrised<P>, F, const P: usize, const K: usize> fmt::Debug
-    for FitBuilder<'_, Y, F, P, K>
-{
+impl<Y, F, X, const P: usize, const K: usize> fmt::Debug for FitBuilder<Y, F, X, P, K> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("FitBuilder")
-            .field("rows", &self.rows.len())
-            .field("free", &self.free)
+            .field("rows", &self.options.rows.len())
+            .field("free", &self.options.free)
             .finish_non_exhaustive()
     }
 }
 
-impl<Y, F, const P: usize, const K: usize> FitBuilder<'_, Y, F, P, K>
-where
-    Y: Parametrised<P>,
-    F: Fn(&PointOf<Y, Real, P>) -> SVector<Real, K>,
-{
+impl<Y, F, X, const P: usize, const K: usize> FitBuilder<Y, F, X, P, K> {
+    fn with(self, options: impl FnOnce(Options<K>) -> Options<K>) -> Self {
+        Self { options: options(self.options), ..self }
+    }
+
     /// Sets the data: a row of `K` numbers for each time, in rising order.
     ///
     /// A state belongs to a row by its time. Runs go on at rest, up to the last row, although the schedule ends them
     /// [there](metriplectic_integrators::Until::until_rest): the residuals would jump with the steps. Where no run goes on, the state at
     /// rest stands for all later rows. A run that ends early in another way, at an event that stops it, is no run of the
     /// model: [`Unpaired`](metriplectic_integrators::Unpaired) names the row and the ending.
-    pub fn data(mut self, times: &[f64], rows: &[SVector<f64, K>]) -> Self {
-        (self.times, self.rows) = (times.to_vec(), rows.to_vec());
-        self
+    pub fn data(self, times: &[f64], rows: &[SVector<f64, K>]) -> Self {
+        let (times, rows) = (times.to_vec(), rows.to_vec());
+        self.with(|options| Options { times, rows, ..options })
     }
 
     /// Sets the standard deviation of all numbers. Without it, it is estimated from the residuals.
@@ -152,42 +274,50 @@ where
 
     /// Sets the standard deviation of each column.
     pub fn noise_each(self, sigma: [f64; K]) -> Self {
-        Self { noise: Some(sigma), ..self }
+        self.with(|options| Options { noise: Some(sigma), ..options })
     }
 
     /// Frees these parameters, and fixes the others at their guess. Without it all are free.
     pub fn free<T: Into<String>>(self, names: impl IntoIterator<Item = T>) -> Self {
-        Self { free: Names::Some(names.into_iter().map(Into::into).collect()), ..self }
+        let free = Names::Some(names.into_iter().map(Into::into).collect());
+        self.with(|options| Options { free, ..options })
     }
 
     /// Fits the logarithms of these parameters, so that they stay positive.
     pub fn positive<T: Into<String>>(self, names: impl IntoIterator<Item = T>) -> Self {
-        Self { positive: Names::Some(names.into_iter().map(Into::into).collect()), ..self }
+        let positive = Names::Some(names.into_iter().map(Into::into).collect());
+        self.with(|options| Options { positive, ..options })
     }
 
     /// Fits the logarithms of all parameters.
     pub fn positive_all(self) -> Self {
-        Self { positive: Names::All, ..self }
-    }
-
-    /// Sets the state at the start, which is known.
-    pub fn start_at(self, x0: Point<Y::System>) -> Self {
-        Self { start: Some(x0), free_start: false, ..self }
-    }
-
-    /// Sets a guess of the state at the start, which is fitted too.
-    pub fn free_start(self, x0: Point<Y::System>) -> Self {
-        Self { start: Some(x0), free_start: true, ..self }
+        self.with(|options| Options { positive: Names::All, ..options })
     }
 
     /// Replaces the options of the solver.
     pub fn solver(self, solver: LevenbergMarquardt) -> Self {
-        Self { solver, ..self }
+        self.with(|options| Options { solver, ..options })
     }
 
     /// Sets the most iterations, 100 without it.
     pub fn iterations(self, iterations: u64) -> Self {
-        Self { iterations, ..self }
+        self.with(|options| Options { iterations, ..options })
+    }
+}
+
+impl<Y, F, const P: usize, const K: usize> FitBuilder<&Y, F, FamilyStart<Point<Y::System>>, P, K>
+where
+    Y: Parametrised<P>,
+    F: Fn(&PointOf<Y, Real, P>) -> SVector<Real, K>,
+{
+    /// Sets the state at the start, which is known.
+    pub fn start_at(self, x0: Point<Y::System>) -> Self {
+        Self { start: Some(FamilyStart { point: x0, is_free: false }), ..self }
+    }
+
+    /// Sets a guess of the state at the start, which is fitted too.
+    pub fn free_start(self, x0: Point<Y::System>) -> Self {
+        Self { start: Some(FamilyStart { point: x0, is_free: true }), ..self }
     }
 
     /// Finds the parameters with which runs by a method over a schedule come nearest to the data, from a guess.
@@ -207,24 +337,16 @@ where
     where
         M: Clone + Stepper<Y::System> + LinearisedAlong<Y::System>,
     {
-        self.check()?;
-        let Self { family, observe, times, rows, noise, free, positive, start, .. } = self;
-        let Some(start) = start else {
+        self.options.check()?;
+        let Self { of: family, observe, start, options } = self;
+        let Some(FamilyStart { point: start, is_free }) = start else {
             return Err(FitError::Solver(
                 "no start was given; say `start_at` or `free_start`".into(),
             ));
         };
         let known = family.at_parameters(guess).parameters().to_vec();
-        let unknowns = unknowns(&known, guess.as_slice(), [&free, &positive])?;
-        let measured = Measured { times, rows, noise: noise.unwrap_or([1.0; K]) };
-        let mut phi: Vec<f64> = unknowns.iter().map(|u| u.of(guess[u.index])).collect();
-        if self.free_start {
-            phi.extend(vec![0.0; <ManifoldOf<Y, P> as Space>::Dim::LEN]);
-        }
-        let data = measured.rows.len() * K;
-        if data <= phi.len() {
-            return Err(FitError::TooFewData { data, unknowns: phi.len() });
-        }
+        let unknowns = options.unknowns(&known, guess.as_slice())?;
+        let measured = options.measured();
         let model = Model {
             family,
             method,
@@ -234,9 +356,170 @@ where
             unknowns: &unknowns,
             guess,
             start,
-            free_start: self.free_start,
-            failure: RefCell::new(None),
+            free_start: is_free,
         };
+        let coordinates = if is_free { <ManifoldOf<Y, P> as Space>::Dim::LEN } else { 0 };
+        options.nearest(&model, &measured, &unknowns, (guess, coordinates))
+    }
+}
+
+impl<B, S, Error, F, const P: usize, const K: usize>
+    FitBuilder<Systems<B, P>, F, SystemStart<S, P>, P, K>
+where
+    B: Fn(&SVector<f64, P>) -> Result<S, Error>,
+    S: Flow,
+    Error: Into<Failure>,
+    F: Fn(&SVector<f64, P>, &Element<S>) -> SVector<f64, K>,
+{
+    /// Sets the state at the start, which is known.
+    pub fn start_at(self, x0: Element<S>) -> Self
+    where
+        Element<S>: 'static,
+    {
+        self.start_from(move |_, _| x0.clone())
+    }
+
+    /// Sets the state at the start as a function `|system, θ| x₀` of the system, which begins the ledger of an open one, and of the
+    /// parameters, some of which may be entries of the start.
+    pub fn start_from(self, start: impl Fn(&S, &SVector<f64, P>) -> Element<S> + 'static) -> Self {
+        Self { start: Some(Box::new(start)), ..self }
+    }
+
+    /// Evaluates what is observed at some times, with its derivatives along all parameters, at values of them that are not zero. Entries of
+    /// the start are parameters too, if the start [says so](Self::start_from).
+    ///
+    /// ```
+    /// # use metriplectic_dynamics::{Symplectic, System};
+    /// # use metriplectic_fields::Real;
+    /// # use metriplectic_fitting::Fit;
+    /// # use metriplectic_integrators::{Gauss, Span};
+    /// # use metriplectic_manifolds::Euclidean;
+    /// # use nalgebra::{Vector2, vector};
+    /// # fn main() -> Result<(), metriplectic_fitting::FitError> {
+    /// // The height of a ball, along the gravity and along the velocity with which it is thrown.
+    /// let found = Fit::of_systems(["gravity", "thrown"], |t: &Vector2<f64>| {
+    ///     let g = t.x;
+    ///     System::on(Euclidean::<2>)
+    ///         .bracket(Symplectic)
+    ///         .energy(move |x: &Vector2<Real>| x.y * x.y * 0.5 + x.x * g)
+    ///         .build()
+    /// })
+    /// .observe(|x| vector![x.x])
+    /// .start_from(|_, t| vector![0.0, t.y])
+    /// .derivatives(Gauss::<2>, Span::steps(0.1, 20), vector![9.8, 5.0], &[1.0, 2.0])?;
+    /// assert!((found[1].along - nalgebra::matrix![-2.0, 2.0]).norm() < 1e-8);
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
+    /// # Errors
+    ///
+    /// [`FitError`]; [`FitError::NoSize`] for a parameter that is zero.
+    pub fn derivatives<M>(
+        self,
+        method: M,
+        schedule: impl Into<Schedule>,
+        theta: SVector<f64, P>,
+        times: &[f64],
+    ) -> Result<Vec<Observation<P, K>>, FitError>
+    where
+        M: Clone + Stepper<S>,
+    {
+        let rows = vec![SVector::zeros(); times.len()];
+        let options = Options { times: times.to_vec(), rows, ..Options::default() };
+        Self { options, ..self }.runs(method, schedule.into(), theta, |model, _| {
+            let phi: Vec<f64> = theta.iter().copied().collect();
+            let Squares { residuals, jacobian } = model.evaluate(&phi).map_err(FitError::Guess)?;
+            let observation = |i: usize| Observation {
+                value: SVector::from_fn(|k, _| residuals[i * K + k]),
+                along: SMatrix::from_fn(|k, j| jacobian[(i * K + k, j)]),
+            };
+            Ok((0..times.len()).map(observation).collect())
+        })
+    }
+
+    /// Finds the parameters with which runs by a method over a schedule come nearest to the data, from a guess.
+    ///
+    /// The runs should be more accurate than the noise: an error of the runs is an error of the parameters that no
+    /// standard error shows.
+    ///
+    /// # Errors
+    ///
+    /// [`FitError`]; [`FitError::NoSize`] for a parameter whose guess is zero.
+    pub fn run<M>(
+        self,
+        method: M,
+        schedule: impl Into<Schedule>,
+        guess: SVector<f64, P>,
+    ) -> Result<Fitted, FitError>
+    where
+        M: Clone + Stepper<S>,
+    {
+        let with = |model: &Observed<'_, B, S, M, F, P, K>, options: Options<K>| {
+            options.nearest(model, model.measured, model.unknowns, (guess, 0))
+        };
+        self.runs(method, schedule.into(), guess, with)
+    }
+
+    /// Looks at the data, and calls `f` with the runs at unknowns.
+    fn runs<M, T>(
+        self,
+        method: M,
+        schedule: Schedule,
+        guess: SVector<f64, P>,
+        f: impl FnOnce(&Observed<'_, B, S, M, F, P, K>, Options<K>) -> Result<T, FitError>,
+    ) -> Result<T, FitError> {
+        self.options.check()?;
+        let Self { of: systems, observe, start, options } = self;
+        let Some(start) = start else {
+            return Err(FitError::Solver(
+                "no start was given; say `start_at` or `start_from`".into(),
+            ));
+        };
+        let unknowns = options.unknowns(&systems.names, guess.as_slice())?;
+        let without = |unknown: &&Unknown| guess[unknown.index] == 0.0;
+        if let Some(Unknown { name, .. }) = unknowns.iter().find(without) {
+            return Err(FitError::NoSize { name });
+        }
+        let measured = options.measured();
+        let model = Observed {
+            systems: &systems,
+            method,
+            schedule: &schedule,
+            observe: &observe,
+            measured: &measured,
+            unknowns: &unknowns,
+            guess,
+            start: &*start,
+        };
+        f(&model, options)
+    }
+}
+
+impl<const K: usize> Options<K> {
+    fn measured(&self) -> Measured<K> {
+        let (times, rows) = (self.times.clone(), self.rows.clone());
+        Measured { times, rows, noise: self.noise.unwrap_or([1.0; K]) }
+    }
+
+    fn unknowns(&self, known: &[&'static str], guess: &[f64]) -> Result<Vec<Unknown>, FitError> {
+        unknowns(known, guess, [&self.free, &self.positive])
+    }
+
+    /// Finds the least sum of squares from a guess, with so many coordinates of the start beside the parameters.
+    fn nearest<const P: usize>(
+        self,
+        model: &impl Residuals<P>,
+        measured: &Measured<K>,
+        unknowns: &[Unknown],
+        (guess, coordinates): (SVector<f64, P>, usize),
+    ) -> Result<Fitted, FitError> {
+        let mut phi: Vec<f64> = unknowns.iter().map(|u| u.of(guess[u.index])).collect();
+        phi.extend(vec![0.0; coordinates]);
+        let data = measured.rows.len() * K;
+        if data <= phi.len() {
+            return Err(FitError::TooFewData { data, unknowns: phi.len() });
+        }
         model.evaluate(&phi).map_err(FitError::Guess)?;
         // A factor of e⁻³ in a step: the slope of a logarithm vanishes with its parameter.
         let limit = |u: &Unknown| if u.positive { STEEP } else { f64::INFINITY };
@@ -244,10 +527,10 @@ where
         if solver.limits.is_empty() {
             solver.limits = unknowns.iter().map(limit).collect();
         }
-        let executor = Executor::new(&model, solver)
+        let executor = Executor::new(model, solver)
             .configure(|state| state.param(phi).max_iters(self.iterations));
         let found = executor.run().map_err(|error| FitError::Solver(error.to_string()))?;
-        let runs = 1 + found.problem.counts.get("squares").copied().unwrap_or(0);
+        let evaluations = 1 + found.problem.counts.get("squares").copied().unwrap_or(0);
         let state = found.state();
         let best = state.get_best_param().cloned().unwrap_or_default();
         let squares = model.evaluate(&best).map_err(FitError::Guess)?;
@@ -262,18 +545,20 @@ where
         // A promise that no trial has kept, or that none was left for.
         let variance = squares.sum() / (data - best.len()) as f64;
         let variance = variance.max(ROUNDED * ROUNDED * measured.mean_square());
+        let runs = |evaluations: u64| evaluations * model.runs();
         if found.solver.relevant(&squares).promised() > FLAT * variance {
-            let (runs, chi_squared) = (usize::try_from(runs).unwrap_or(usize::MAX), squares.sum());
+            let (runs, chi_squared) =
+                (usize::try_from(runs(evaluations)).unwrap_or(usize::MAX), squares.sum());
             return Err(FitError::NotConverged { runs, chi_squared, parameters });
         }
         Ok(Fitted::new(Parts {
-            unknowns: &unknowns,
+            unknowns,
             phi: &best,
             squares: &squares,
             parameters,
-            start: ManifoldOf::<Y, P>::entries(&start),
-            noise_is_known: noise.is_some(),
-            runs: runs + 1,
+            start,
+            noise_is_known: self.noise.is_some(),
+            runs: runs(evaluations + 1),
             stop,
         }))
     }

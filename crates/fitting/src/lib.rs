@@ -1,9 +1,10 @@
 //! Fits of metriplectic systems to data.
 //!
-//! A [`Family`](metriplectic_dynamics::Family) has parameters `θ`; a fit finds those with which a run comes nearest to what was
-//! measured, with their standard errors. The derivatives are those of the discrete steps
+//! A system has parameters `θ`; a fit finds those with which a run comes nearest to what was measured, with their standard errors. The
+//! derivatives of a [`Family`](metriplectic_dynamics::Family) are those of the discrete steps
 //! ([`Tangents`](metriplectic_integrators::Tangents)), so each run keeps its laws whatever `θ` is tried, and no difference quotient has
-//! a noise to be tuned.
+//! a noise to be tuned. [Systems of any other kind](Fit::of_systems) are fitted by differences of runs in the
+//! [same steps](metriplectic_integrators::StepSequence).
 //!
 //! Each module uses only modules above it in this table.
 //!
@@ -16,7 +17,8 @@
 //! | [`unknowns`] | which parameters are free, and which are fitted by their logarithm |
 //! | [`covariance`] | standard errors and correlations from a Jacobian |
 //! | [`fitted`] | [`Fitted`]: the result, which prints what the data say |
-//! | `model` | the residuals of a family of systems |
+//! | `model` | the residuals of runs, and those of a family |
+//! | [`systems`] | [`Systems`]: systems of any kind with parameters, and differences of their runs |
 //! | [`fit`](mod@fit) | [`Fit`]: what a user says of a fit |
 //! | [`loss`](mod@loss) | [`Loss`]: a loss over runs with its gradient, for argmin's L-BFGS |
 
@@ -28,12 +30,15 @@ pub mod least_squares;
 pub mod levenberg_marquardt;
 pub mod loss;
 mod model;
+pub mod systems;
 mod trust_region;
 pub mod unknowns;
 
 pub use error::FitError;
-pub use fit::{Fit, FitBuilder};
+pub use fit::{FamilyStart, Fit, FitBuilder, Observation, SystemStart};
 pub use fitted::{Ending, Estimate, Fitted};
 pub use least_squares::{LeastSquares, Squares};
 pub use levenberg_marquardt::LevenbergMarquardt;
-pub use loss::{Loss, LossOver, Minimised};
+pub use loss::{Graded, Loss, LossOver, Minimised};
+pub use model::Failure;
+pub use systems::Systems;

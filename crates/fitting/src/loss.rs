@@ -8,23 +8,26 @@ use argmin::solver::linesearch::MoreThuenteLineSearch;
 use argmin::solver::quasinewton::LBFGS;
 use metriplectic_dynamics::{Parametrised, Point};
 use metriplectic_fields::{Real, Space};
+use metriplectic_integrators::step::Element;
 use metriplectic_integrators::tangent::LinearisedAlong;
-use metriplectic_integrators::{Adjoints as _, Method as _, Schedule, Stepper, Watch as _};
-use nalgebra::SVector;
+use metriplectic_integrators::{Adjoints as _, Flow, Method as _, Schedule, Stepper, Watch as _};
+use nalgebra::{DVector, SVector};
 
 use crate::error::FitError;
 use crate::model::{Failure, ManifoldOf, PointOf, at_rest_too};
+use crate::systems::{Beside, Systems, sides, slope};
 
-/// A loss over runs of a family, as a function of the parameters:
+/// A loss over runs of a system, as a function of its parameters:
 ///
 /// ```math
 /// \ell(\theta) = \sum_i \sum_k \ell_{ik}\bigl( x_i(t_k; \theta) \bigr) ,
 /// ```
 ///
-/// with one run for each start `i` and a term for each time `k`. Its gradient is that of the discrete steps, by their
-/// [adjoint](metriplectic_integrators::Adjoints): the price does not grow with the number of parameters. [`minimise`](LossOver::minimise) is
-/// argmin's L-BFGS (Liu and Nocedal 1989) with the line search of Moré and Thuente (1994). For few parameters and their errors,
-/// [`Fit`](crate::Fit) is the better tool.
+/// with one run for each start `i` and a term for each time `k`. The gradient over runs [of](Self::of) a
+/// [`Family`](metriplectic_dynamics::Family) is that of the discrete steps, by their [adjoint](metriplectic_integrators::Adjoints): the
+/// price does not grow with the number of parameters. That over runs of systems of any kind is by differences
+/// ([`of_systems`](Self::of_systems)). [`minimise`](LossOver::minimise) is argmin's L-BFGS (Liu and Nocedal 1989) with the line search of Moré
+/// and Thuente (1994). For few parameters and their errors, [`Fit`](crate::Fit) is the better tool.
 ///
 /// A [`LossOver`] is an argmin problem ([`CostFunction`] and [`Gradient`] of a `Vec<f64>`), for its other solvers, observers and
 /// checkpoints.
@@ -63,14 +66,14 @@ use crate::model::{Failure, ManifoldOf, PointOf, at_rest_too};
 /// # Ok(())
 /// # }
 /// ```
-pub struct Loss<'a, Y: Parametrised<P>, T, const P: usize> {
-    family: &'a Y,
-    starts: Vec<Point<Y::System>>,
+pub struct Loss<Y, X, T, const P: usize> {
+    of: Y,
+    starts: Vec<X>,
     times: Vec<f64>,
     term: T,
 }
 
-impl<Y: Parametrised<P>, T, const P: usize> fmt::Debug for Loss<'_, Y, T, P> {
+impl<Y, X, T, const P: usize> fmt::Debug for Loss<Y, X, T, P> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Loss")
             .field("runs", &self.starts.len())
@@ -79,17 +82,65 @@ impl<Y: Parametrised<P>, T, const P: usize> fmt::Debug for Loss<'_, Y, T, P> {
     }
 }
 
-impl<'a, Y: Parametrised<P>, const P: usize> Loss<'a, Y, (), P> {
+impl<'a, Y: Parametrised<P>, const P: usize> Loss<&'a Y, Point<Y::System>, (), P> {
     /// Starts a loss over runs of a family.
     pub const fn of(family: &'a Y) -> Self {
-        Self { family, starts: Vec::new(), times: Vec::new(), term: () }
+        Self { of: family, starts: Vec::new(), times: Vec::new(), term: () }
     }
 }
 
-impl<'a, Y: Parametrised<P>, T, const P: usize> Loss<'a, Y, T, P> {
+impl<'a, Y: Parametrised<P>, T, const P: usize> Loss<&'a Y, Point<Y::System>, T, P> {
+    /// Sets the terms, a closure `|i, k, x| -> Real` of the number of the run, the number of the time, and the state.
+    pub fn term<F>(self, term: F) -> Loss<&'a Y, Point<Y::System>, F, P>
+    where
+        F: Fn(usize, usize, &PointOf<Y, Real, P>) -> Real,
+    {
+        self.with(term)
+    }
+}
+
+impl<B, S, Error, const P: usize> Loss<Systems<B, P>, Element<S>, (), P>
+where
+    B: Fn(&SVector<f64, P>) -> Result<S, Error>,
+    S: Flow,
+    Error: Into<Failure>,
+{
+    /// Starts a loss over runs of any system, from the names of its parameters and a closure that builds it at values of them.
+    ///
+    /// A gradient is one of central differences, as in [`Fit::of_systems`](crate::Fit::of_systems), so it takes `2P + 1` runs for each start.
+    /// No parameter may be zero then, which has no size.
+    pub const fn of_systems(names: [&'static str; P], build: B) -> Self {
+        let of = Systems { names, build };
+        Self { of, starts: Vec::new(), times: Vec::new(), term: () }
+    }
+}
+
+impl<B, S, Error, T, const P: usize> Loss<Systems<B, P>, Element<S>, T, P>
+where
+    B: Fn(&SVector<f64, P>) -> Result<S, Error>,
+    S: Flow,
+{
+    /// Sets the terms, a closure `|i, k, x| -> f64` of the number of the run, the number of the time, and the state.
+    pub fn term<F>(self, term: F) -> Loss<Systems<B, P>, Element<S>, F, P>
+    where
+        F: Fn(usize, usize, &Element<S>) -> f64,
+    {
+        self.with(term)
+    }
+}
+
+impl<Y, X, T, const P: usize> Loss<Y, X, T, P> {
+    fn with<F>(self, term: F) -> Loss<Y, X, F, P> {
+        let Self { of, starts, times, .. } = self;
+        Loss { of, starts, times, term }
+    }
+
     /// Sets the starts of the runs.
     #[must_use]
-    pub fn starts(self, starts: &[Point<Y::System>]) -> Self {
+    pub fn starts(self, starts: &[X]) -> Self
+    where
+        X: Clone,
+    {
         Self { starts: starts.to_vec(), ..self }
     }
 
@@ -103,32 +154,140 @@ impl<'a, Y: Parametrised<P>, T, const P: usize> Loss<'a, Y, T, P> {
         Self { times: times.to_vec(), ..self }
     }
 
-    /// Sets the terms, a closure `|i, k, x| -> Real` of the number of the run, the number of the time, and the state.
-    pub fn term<F>(self, term: F) -> Loss<'a, Y, F, P>
-    where
-        F: Fn(usize, usize, &PointOf<Y, Real, P>) -> Real,
-    {
-        let Self { family, starts, times, .. } = self;
-        Loss { family, starts, times, term }
-    }
-
     /// Says how runs are taken: by a method over a schedule.
-    pub fn over<M>(self, method: M, schedule: impl Into<Schedule>) -> LossOver<'a, Y, T, M, P> {
+    pub fn over<M>(self, method: M, schedule: impl Into<Schedule>) -> LossOver<Y, X, T, M, P> {
         let schedule = schedule.into().output_at(self.times.iter().copied());
         LossOver { loss: self, method, schedule }
     }
 }
 
 /// A loss over runs by a method: a problem for argmin.
-pub struct LossOver<'a, Y: Parametrised<P>, T, M, const P: usize> {
-    loss: Loss<'a, Y, T, P>,
+pub struct LossOver<Y, X, T, M, const P: usize> {
+    loss: Loss<Y, X, T, P>,
     method: M,
     schedule: Schedule,
 }
 
-impl<Y: Parametrised<P>, T, M, const P: usize> fmt::Debug for LossOver<'_, Y, T, M, P> {
+impl<Y, X, T, M, const P: usize> fmt::Debug for LossOver<Y, X, T, M, P> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("LossOver").field("loss", &self.loss).finish_non_exhaustive()
+    }
+}
+
+/// A loss that is evaluated with its gradient. Law: the gradient is that of the value, over the steps of one run.
+pub trait Graded<const P: usize> {
+    /// Evaluates the loss.
+    ///
+    /// # Errors
+    ///
+    /// The error of a run, or [`Unpaired`](metriplectic_integrators::Unpaired) if a run ends before a term.
+    fn evaluate(&self, theta: &SVector<f64, P>) -> Result<f64, Failure>;
+
+    /// Evaluates the loss and its gradient along the parameters.
+    ///
+    /// # Errors
+    ///
+    /// The error of a run, or of its derivative.
+    fn differentiate(&self, theta: &SVector<f64, P>) -> Result<(f64, SVector<f64, P>), Failure>;
+}
+
+impl<Y, T, M, const P: usize> Graded<P> for LossOver<&Y, Point<Y::System>, T, M, P>
+where
+    Y: Parametrised<P>,
+    T: Fn(usize, usize, &PointOf<Y, Real, P>) -> Real,
+    M: Clone + Stepper<Y::System> + LinearisedAlong<Y::System>,
+{
+    fn evaluate(&self, theta: &SVector<f64, P>) -> Result<f64, Failure> {
+        let system = self.loss.of.at_parameters(*theta);
+        let mut sum = 0.0;
+        for (i, start) in self.loss.starts.iter().enumerate() {
+            let run = |schedule| self.method.clone().run(&system, start.clone(), schedule);
+            let run = at_rest_too(&self.schedule, run)?;
+            for (k, index) in run.indices_at(&self.loss.times)?.into_iter().enumerate() {
+                let point = &run.states()[index].point;
+                sum += (self.loss.term)(i, k, &ManifoldOf::<Y, P>::constant(point)).re;
+            }
+        }
+        Ok(sum)
+    }
+
+    fn differentiate(&self, theta: &SVector<f64, P>) -> Result<(f64, SVector<f64, P>), Failure> {
+        let system = self.loss.of.at_parameters(*theta);
+        let (mut sum, mut slope) = (0.0, SVector::zeros());
+        for (i, start) in self.loss.starts.iter().enumerate() {
+            let run = |schedule| self.method.clone().adjoint(&system, start.clone(), schedule);
+            let run = at_rest_too(&self.schedule, run)?;
+            // The terms of each state: at rest the last one has all that are left.
+            let mut terms = vec![Vec::new(); run.states().len()];
+            for (k, index) in run.indices_at(&self.loss.times)?.into_iter().enumerate() {
+                terms[index].push(k);
+            }
+            let loss = run.gradient(|index, x| {
+                let term = |sum: Real, k: &usize| sum + (self.loss.term)(i, *k, x);
+                terms[index].iter().fold(Real::from(0.0), term)
+            })?;
+            sum += loss.value;
+            slope += SVector::<f64, P>::from_column_slice(loss.along_parameters().as_slice());
+        }
+        Ok((sum, slope))
+    }
+}
+
+impl<B, S, Error, T, M, const P: usize> LossOver<Systems<B, P>, Element<S>, T, M, P>
+where
+    B: Fn(&SVector<f64, P>) -> Result<S, Error>,
+    S: Flow,
+    Error: Into<Failure>,
+    T: Fn(usize, usize, &Element<S>) -> f64,
+    M: Clone + Stepper<S>,
+{
+    /// The terms of one run, summed.
+    fn of_run(
+        &self,
+        i: usize,
+        theta: &SVector<f64, P>,
+        schedule: Schedule,
+    ) -> Result<f64, Failure> {
+        let system = (self.loss.of.build)(theta).map_err(Into::into)?;
+        let run = self.method.clone().run(&system, self.loss.starts[i].clone(), schedule)?;
+        let indices = run.indices_at(&self.loss.times)?.into_iter().enumerate();
+        Ok(indices.map(|(k, at)| (self.loss.term)(i, k, &run.states()[at].point)).sum())
+    }
+}
+
+impl<B, S, Error, T, M, const P: usize> Graded<P> for LossOver<Systems<B, P>, Element<S>, T, M, P>
+where
+    B: Fn(&SVector<f64, P>) -> Result<S, Error>,
+    S: Flow,
+    Error: Into<Failure>,
+    T: Fn(usize, usize, &Element<S>) -> f64,
+    M: Clone + Stepper<S>,
+{
+    fn evaluate(&self, theta: &SVector<f64, P>) -> Result<f64, Failure> {
+        let of_run = |i| at_rest_too(&self.schedule, |schedule| self.of_run(i, theta, schedule));
+        (0..self.loss.starts.len()).map(of_run).sum()
+    }
+
+    fn differentiate(&self, theta: &SVector<f64, P>) -> Result<(f64, SVector<f64, P>), Failure> {
+        if let Some(k) = (0..P).find(|&k| theta[k] == 0.0) {
+            return Err(FitError::NoSize { name: self.loss.of.names[k] }.into());
+        }
+        let (mut sum, mut gradient) = (0.0, SVector::zeros());
+        for i in 0..self.loss.starts.len() {
+            let runs = Beside::new(&self.schedule);
+            let here = runs.first(|schedule| self.of_run(i, theta, schedule))?;
+            for k in 0..P {
+                let beside = sides(theta[k], theta[k].abs()).map(|side| {
+                    let mut theta = *theta;
+                    theta[k] = side;
+                    let there = runs.next(|schedule| self.of_run(i, &theta, schedule));
+                    (side, there.map(|value| DVector::from_element(1, value)))
+                });
+                gradient[k] += slope((theta[k], &DVector::from_element(1, here)), beside)?[0];
+            }
+            sum += here;
+        }
+        Ok((sum, gradient))
     }
 }
 
@@ -151,11 +310,9 @@ pub struct Minimised<const P: usize> {
 /// Pairs of differences that L-BFGS remembers.
 const MEMORY: usize = 10;
 
-impl<Y, T, M, const P: usize> LossOver<'_, Y, T, M, P>
+impl<Y, X, T, M, const P: usize> LossOver<Y, X, T, M, P>
 where
-    Y: Parametrised<P>,
-    T: Fn(usize, usize, &PointOf<Y, Real, P>) -> Real,
-    M: Clone + Stepper<Y::System> + LinearisedAlong<Y::System>,
+    Self: Graded<P>,
 {
     /// Evaluates the loss.
     ///
@@ -163,17 +320,7 @@ where
     ///
     /// The error of a run, or [`Unpaired`](metriplectic_integrators::Unpaired) if a run ends before a term.
     pub fn value(&self, theta: &SVector<f64, P>) -> Result<f64, Failure> {
-        let system = self.loss.family.at_parameters(*theta);
-        let mut sum = 0.0;
-        for (i, start) in self.loss.starts.iter().enumerate() {
-            let run = |schedule| self.method.clone().run(&system, start.clone(), schedule);
-            let run = at_rest_too(&self.schedule, run)?;
-            for (k, index) in run.indices_at(&self.loss.times)?.into_iter().enumerate() {
-                let point = &run.states()[index].point;
-                sum += (self.loss.term)(i, k, &ManifoldOf::<Y, P>::constant(point)).re;
-            }
-        }
-        Ok(sum)
+        self.evaluate(theta)
     }
 
     /// Evaluates the loss and its gradient along the parameters.
@@ -182,24 +329,7 @@ where
     ///
     /// The error of a run, or of its derivative, or [`Unpaired`](metriplectic_integrators::Unpaired) if a run ends before a term.
     pub fn gradient_at(&self, theta: &SVector<f64, P>) -> Result<(f64, SVector<f64, P>), Failure> {
-        let system = self.loss.family.at_parameters(*theta);
-        let (mut sum, mut slope) = (0.0, SVector::zeros());
-        for (i, start) in self.loss.starts.iter().enumerate() {
-            let run = |schedule| self.method.clone().adjoint(&system, start.clone(), schedule);
-            let run = at_rest_too(&self.schedule, run)?;
-            // The terms of each state: at rest the last one has all that are left.
-            let mut terms = vec![Vec::new(); run.states().len()];
-            for (k, index) in run.indices_at(&self.loss.times)?.into_iter().enumerate() {
-                terms[index].push(k);
-            }
-            let loss = run.gradient(|index, x| {
-                let term = |sum: Real, k: &usize| sum + (self.loss.term)(i, *k, x);
-                terms[index].iter().fold(Real::from(0.0), term)
-            })?;
-            sum += loss.value;
-            slope += SVector::<f64, P>::from_column_slice(loss.along_parameters().as_slice());
-        }
-        Ok((sum, slope))
+        self.differentiate(theta)
     }
 
     /// Minimises the loss from a guess by argmin's L-BFGS, in at most so many iterations.
@@ -290,11 +420,9 @@ where
     }
 }
 
-impl<Y, T, M, const P: usize> CostFunction for LossOver<'_, Y, T, M, P>
+impl<Y, X, T, M, const P: usize> CostFunction for LossOver<Y, X, T, M, P>
 where
-    Y: Parametrised<P>,
-    T: Fn(usize, usize, &PointOf<Y, Real, P>) -> Real,
-    M: Clone + Stepper<Y::System> + LinearisedAlong<Y::System>,
+    Self: Graded<P>,
 {
     type Param = Vec<f64>;
     type Output = f64;
@@ -306,11 +434,9 @@ where
     }
 }
 
-impl<Y, T, M, const P: usize> Gradient for LossOver<'_, Y, T, M, P>
+impl<Y, X, T, M, const P: usize> Gradient for LossOver<Y, X, T, M, P>
 where
-    Y: Parametrised<P>,
-    T: Fn(usize, usize, &PointOf<Y, Real, P>) -> Real,
-    M: Clone + Stepper<Y::System> + LinearisedAlong<Y::System>,
+    Self: Graded<P>,
 {
     type Param = Vec<f64>;
     type Gradient = Vec<f64>;

@@ -1,11 +1,10 @@
-//! The residuals of a family of systems.
-
-use std::cell::RefCell;
+//! The residuals of runs, and those of a family of systems.
 
 use metriplectic_dynamics::{Metriplectic, Parametrised, Point};
 use metriplectic_fields::{Column as _, Dimension as _, Real, Space, Vector};
 use metriplectic_integrators::tangent::{LinearisedAlong, TangentState};
 use metriplectic_integrators::{Schedule, Stepper, Tangents as _, Watch as _};
+use metriplectic_manifolds::Manifold as _;
 use nalgebra::{DMatrix, DVector, SVector};
 use num_dual::Dual64;
 
@@ -49,8 +48,20 @@ pub(crate) struct Model<'a, Y: Parametrised<P>, M, F, const P: usize, const K: u
     pub(crate) start: Point<Y::System>,
     /// Whether the coordinates of the start, in the chart at its guess, are unknowns too.
     pub(crate) free_start: bool,
-    /// Why the last run failed.
-    pub(crate) failure: RefCell<Option<Failure>>,
+}
+
+/// The residuals `(o(x(t_i; θ)) − data_i)/σ` of runs, at unknowns.
+pub(crate) trait Residuals<const P: usize>: LeastSquares {
+    /// The residuals and their Jacobian, or why there are none.
+    fn evaluate(&self, phi: &[f64]) -> Result<Squares, Failure>;
+
+    /// The parameters, and the entries of the start.
+    fn at(&self, phi: &[f64]) -> (SVector<f64, P>, Vec<f64>);
+
+    /// The runs that an evaluation takes.
+    fn runs(&self) -> u64 {
+        1
+    }
 }
 
 /// Runs up to the last datum, at rest too: the end of a run [until rest](Schedule::without_rest) jumps where a parameter changes its
@@ -66,7 +77,7 @@ pub(crate) fn at_rest_too<R, E>(
 }
 
 /// Why a run failed.
-pub(crate) type Failure = Box<dyn std::error::Error + Send + Sync>;
+pub type Failure = Box<dyn std::error::Error + Send + Sync>;
 
 impl<Y, M, F, const P: usize, const K: usize> Model<'_, Y, M, F, P, K>
 where
@@ -78,7 +89,7 @@ where
     const N: usize = <ManifoldOf<Y, P> as Space>::Dim::LEN;
 
     /// The parameters and the start of unknowns.
-    pub(crate) fn at(&self, phi: &[f64]) -> (SVector<f64, P>, Point<Y::System>) {
+    fn placed(&self, phi: &[f64]) -> (SVector<f64, P>, Point<Y::System>) {
         let mut theta = self.guess;
         for (unknown, phi) in self.unknowns.iter().zip(phi) {
             theta[unknown.index] = unknown.parameter(*phi);
@@ -146,10 +157,16 @@ where
         let indices = run.indices_at(times)?;
         Ok(indices.into_iter().map(|index| run.states()[index].clone()).collect())
     }
+}
 
-    /// The residuals and their Jacobian, or why there are none.
-    pub(crate) fn evaluate(&self, phi: &[f64]) -> Result<Squares, Failure> {
-        let (theta, start) = self.at(phi);
+impl<Y, M, F, const P: usize, const K: usize> Residuals<P> for Model<'_, Y, M, F, P, K>
+where
+    Y: Parametrised<P>,
+    M: Clone + Stepper<Y::System> + LinearisedAlong<Y::System>,
+    F: Fn(&PointOf<Y, Real, P>) -> SVector<Real, K>,
+{
+    fn evaluate(&self, phi: &[f64]) -> Result<Squares, Failure> {
+        let (theta, start) = self.placed(phi);
         let system = self.family.at_parameters(theta);
         let states = self.states(&system, &start)?;
         let (first, frame) = (self.unknowns.len(), self.frame(phi, &start));
@@ -177,6 +194,11 @@ where
         }
         Ok(Squares { residuals, jacobian })
     }
+
+    fn at(&self, phi: &[f64]) -> (SVector<f64, P>, Vec<f64>) {
+        let (theta, start) = self.placed(phi);
+        (theta, ManifoldOf::<Y, P>::entries(&start))
+    }
 }
 
 impl<Y, M, F, const P: usize, const K: usize> LeastSquares for Model<'_, Y, M, F, P, K>
@@ -186,6 +208,6 @@ where
     F: Fn(&PointOf<Y, Real, P>) -> SVector<Real, K>,
 {
     fn squares(&self, phi: &[f64]) -> Option<Squares> {
-        self.evaluate(phi).map_err(|failure| *self.failure.borrow_mut() = Some(failure)).ok()
+        self.evaluate(phi).ok()
     }
 }

@@ -1,0 +1,168 @@
+//! The residuals of systems of any kind, and differences of their runs.
+//!
+//! The derivative of an observed number `o` along an unknown `φ` is the central difference
+//!
+//! ```math
+//! \partial_\varphi o \approx \frac{o(\varphi + \delta) - o(\varphi - \delta)}{2\delta} , \qquad \delta = \epsilon^{1/3} s ,
+//! ```
+//!
+//! of two runs in the steps of a third one at `φ` ([`StepSequence`]; Bock 1981). `s` is the size of the parameter, or 1 for a logarithm.
+//! Round-off and truncation are both about `ε^{2/3}` of it.
+
+use metriplectic_integrators::step::Element;
+use metriplectic_integrators::{
+    Flow, Method as _, Schedule, StateSpace as _, StepSequence, Stepper, Watch as _,
+};
+use nalgebra::{DMatrix, DVector, SVector};
+
+use crate::least_squares::{LeastSquares, Squares};
+use crate::model::{Failure, Measured, Residuals, at_rest_too};
+use crate::unknowns::Unknown;
+
+/// Systems of any kind with named parameters.
+#[derive(Clone, Copy, Debug)]
+pub struct Systems<B, const P: usize> {
+    pub(crate) names: [&'static str; P],
+    /// The system at values of them.
+    pub(crate) build: B,
+}
+
+/// Runs of one schedule, and those beside it in the same steps.
+pub(crate) struct Beside<'a> {
+    pub(crate) schedule: &'a Schedule,
+    pub(crate) sequence: StepSequence,
+}
+
+impl<'a> Beside<'a> {
+    pub(crate) fn new(schedule: &'a Schedule) -> Self {
+        Self { schedule, sequence: StepSequence::default() }
+    }
+
+    /// The run that chooses the steps.
+    pub(crate) fn first<R, E>(&self, run: impl Fn(Schedule) -> Result<R, E>) -> Result<R, E> {
+        at_rest_too(self.schedule, |schedule| run(schedule.noting(&self.sequence)))
+    }
+
+    /// A run that takes them.
+    pub(crate) fn next<R, E>(&self, run: impl Fn(Schedule) -> Result<R, E>) -> Result<R, E> {
+        at_rest_too(self.schedule, |schedule| run(schedule.taking(&self.sequence)))
+    }
+}
+
+/// A number, and those on both sides of it at a distance of which sums and differences have the same digits.
+pub(crate) fn sides(at: f64, size: f64) -> [f64; 2] {
+    let step = f64::EPSILON.cbrt() * size;
+    [at + step, at - step]
+}
+
+/// The slope of numbers between the sides of `at`. Where one side has no run, the slope on the other side.
+pub(crate) fn slope(
+    (at, here): (f64, &DVector<f64>),
+    [(above, after), (below, before)]: [(f64, Result<DVector<f64>, Failure>); 2],
+) -> Result<DVector<f64>, Failure> {
+    match (after, before) {
+        (Ok(after), Ok(before)) => Ok((after - before) / (above - below)),
+        (Ok(after), Err(_)) => Ok((after - here) / (above - at)),
+        (Err(_), Ok(before)) => Ok((here - before) / (at - below)),
+        (Err(failure), Err(_)) => Err(failure),
+    }
+}
+
+/// The residuals `(o(x(t_i; θ)) − data_i)/σ` of runs of systems of any kind.
+pub(crate) struct Observed<'a, B, S: Flow, M, F, const P: usize, const K: usize> {
+    pub(crate) systems: &'a Systems<B, P>,
+    pub(crate) method: M,
+    pub(crate) schedule: &'a Schedule,
+    pub(crate) observe: &'a F,
+    pub(crate) measured: &'a Measured<K>,
+    pub(crate) unknowns: &'a [Unknown],
+    pub(crate) guess: SVector<f64, P>,
+    pub(crate) start: &'a dyn Fn(&S, &SVector<f64, P>) -> Element<S>,
+}
+
+impl<B, S, Error, M, F, const P: usize, const K: usize> Observed<'_, B, S, M, F, P, K>
+where
+    B: Fn(&SVector<f64, P>) -> Result<S, Error>,
+    S: Flow,
+    Error: Into<Failure>,
+    M: Clone + Stepper<S>,
+    F: Fn(&SVector<f64, P>, &Element<S>) -> SVector<f64, K>,
+{
+    fn theta(&self, phi: &[f64]) -> SVector<f64, P> {
+        let mut theta = self.guess;
+        for (unknown, phi) in self.unknowns.iter().zip(phi) {
+            theta[unknown.index] = unknown.parameter(*phi);
+        }
+        theta
+    }
+
+    /// The residuals of a run over a schedule.
+    fn residuals(&self, phi: &[f64], schedule: Schedule) -> Result<DVector<f64>, Failure> {
+        let theta = self.theta(phi);
+        let system = (self.systems.build)(&theta).map_err(Into::into)?;
+        let Measured { times, rows, noise } = self.measured;
+        let start = (self.start)(&system, &theta);
+        let run = self.method.clone().run(&system, start, schedule)?;
+        let mut residuals = DVector::zeros(rows.len() * K);
+        for (i, index) in run.indices_at(times)?.into_iter().enumerate() {
+            let observed = (self.observe)(&theta, &run.states()[index].point);
+            for k in 0..K {
+                residuals[i * K + k] = (observed[k] - rows[i][k]) / noise[k];
+            }
+        }
+        Ok(residuals)
+    }
+}
+
+impl<B, S, Error, M, F, const P: usize, const K: usize> Residuals<P>
+    for Observed<'_, B, S, M, F, P, K>
+where
+    B: Fn(&SVector<f64, P>) -> Result<S, Error>,
+    S: Flow,
+    Error: Into<Failure>,
+    M: Clone + Stepper<S>,
+    F: Fn(&SVector<f64, P>, &Element<S>) -> SVector<f64, K>,
+{
+    fn evaluate(&self, phi: &[f64]) -> Result<Squares, Failure> {
+        let schedule = self.schedule.clone().output_at(self.measured.times.iter().copied());
+        let runs = Beside::new(&schedule);
+        let residuals = runs.first(|schedule| self.residuals(phi, schedule))?;
+        let mut jacobian = DMatrix::zeros(residuals.len(), phi.len());
+        for (j, unknown) in self.unknowns.iter().enumerate() {
+            let guess = self.guess[unknown.index];
+            let size = if unknown.positive { 1.0 } else { phi[j].abs().max(guess.abs()) };
+            let beside = sides(phi[j], size).map(|side| {
+                let mut phi = phi.to_vec();
+                phi[j] = side;
+                (side, runs.next(|schedule| self.residuals(&phi, schedule)))
+            });
+            jacobian.set_column(j, &slope((phi[j], &residuals), beside)?);
+        }
+        Ok(Squares { residuals, jacobian })
+    }
+
+    fn at(&self, phi: &[f64]) -> (SVector<f64, P>, Vec<f64>) {
+        let theta = self.theta(phi);
+        let system = (self.systems.build)(&theta).ok();
+        let start = system.map(|system| S::Space::numbers(&(self.start)(&system, &theta)));
+        (theta, start.unwrap_or_default())
+    }
+
+    fn runs(&self) -> u64 {
+        1 + 2 * self.unknowns.len() as u64
+    }
+}
+
+impl<B, S, Error, M, F, const P: usize, const K: usize> LeastSquares
+    for Observed<'_, B, S, M, F, P, K>
+where
+    B: Fn(&SVector<f64, P>) -> Result<S, Error>,
+    S: Flow,
+    Error: Into<Failure>,
+    M: Clone + Stepper<S>,
+    F: Fn(&SVector<f64, P>, &Element<S>) -> SVector<f64, K>,
+{
+    fn squares(&self, phi: &[f64]) -> Option<Squares> {
+        self.evaluate(phi).ok()
+    }
+}

@@ -26,8 +26,8 @@ energy and entropy in boxes: `erased` | erased     | E0599     | E0599        | 
 `tangent` across a jump               | saltation  | saltation | E0277        | E0277     | E0277      | E0277    | E0277        | E0277         | E0277        | E0277
 `adjoint` of `DormandPrince8`         | transposed | adjoint   | E0277        | E0277     | E0277      | E0277    | E0277        | E0277         | E0277        | E0277
 parameters in its builder             | promises   | promises  | E0599        | E0599     | E0599      | E0599    | E0599        | E0599         | E0277        | E0277
-`Fit`                                 | fit        | fit       | E0599        | E0599     | E0599      | E0599    | E0599        | E0599         | E0277 E0599  | E0277 E0599
-`Loss`                                | loss       | loss      | E0599        | E0599     | E0599      | E0599    | E0599        | E0599         | E0277 E0599  | E0277 E0599
+`Fit`                                 | fit        | fit       | a tank       | a path    | a path     | a rod    | a rod        | a rod         | a row        | a row
+`Loss`                                | loss       | loss      | a tank       | a path    | a path     | a rod    | a rod        | a rod         | a row        | a row
 
 `verified`                            | verified   | member    | surroundings | its noise | its noise  | sites    | sites open   | its ring      | by numbers   | by numbers
 `verify`                              | verify     | member    | surroundings | its noise | its noise  | sites    | sites open   | its ring      | by numbers   | by numbers
@@ -88,6 +88,9 @@ const fn refused(
 const PROMISES: [&str; 2] =
     ["tests/promises/main.rs", "every_method_is_right_on_every_kind_of_flow_or_says_why_not"];
 
+const BY_DIFFERENCES: &str = "`Fit::of_systems` and `Loss::of_systems`: derivatives are \
+                              [differences of runs in the same steps](sensitivities.md#fits-of-any-kind-of-system)";
+
 /// The tests that the matrix names.
 pub(crate) const TESTS: &[Reference] = &[
     right("promises", PROMISES[0], PROMISES[1]),
@@ -122,6 +125,26 @@ pub(crate) const TESTS: &[Reference] = &[
     right("transposed", "tests/tangent/adjoint.rs", "adjoints_are_transposed_tangents"),
     right("adjoint", "tests/tangent/adjoint.rs", "adjoints_have_parameters"),
     right("fit", "tests/tangent/fits.rs", "a_fit_finds_the_parameters_within_their_errors"),
+    partly(
+        "a tank",
+        ["tests/fits.rs", "the_damping_of_a_tank_is_found_from_the_rate_of_its_spacecraft"],
+        BY_DIFFERENCES,
+    ),
+    partly(
+        "a path",
+        ["tests/fits.rs", "noisy_paths_are_fitted_at_their_own_numbers"],
+        BY_DIFFERENCES,
+    ),
+    partly(
+        "a rod",
+        ["tests/fits.rs", "the_conduction_of_lattices_is_found_from_temperatures_and_heat"],
+        BY_DIFFERENCES,
+    ),
+    partly(
+        "a row",
+        ["tests/fits.rs", "a_system_of_ones_own_is_fitted_by_every_kind_of_method_in_any_unit"],
+        BY_DIFFERENCES,
+    ),
     right("loss", "tests/trust/fits.rs", "a_loss_pairs_states_with_its_terms_by_time"),
     right(
         "verified",

@@ -131,6 +131,14 @@ fn with_parameters(kind: Kind) -> String {
     format!("let f = {}{parts}.build()?;", family(kind == Open))
 }
 
+/// A statement that says how a system of this kind is built at values of parameters.
+fn built(kind: Kind) -> String {
+    let system = kind.system().trim_end();
+    format!(
+        "let build = |_: &Vector1<f64>| Ok::<_, metriplectic::fitting::Failure>({{ let s = {system}; s.0 }});"
+    )
+}
+
 /// A statement that builds a system of this kind with one part more, which its kind does not have.
 fn with(kind: Kind, part: &str) -> String {
     let built =
@@ -187,17 +195,30 @@ fn verb(kind: Kind, name: &str) -> String {
         "`tangent` across a jump" => format!("let _ = {dp8}.tangent(&s, x, {jump})?;"),
         "`adjoint` of `DormandPrince8`" => format!("let _ = {dp8}.adjoint(&s, x, {STEPS})?;"),
         "parameters in its builder" => with_parameters(kind),
-        "`Fit`" => format!(
+        "`Fit`" if matches!(kind, Closed | Family) => format!(
             "{}
     let fit = Fit::of(&f).observe(|p| p.clone()).data(&[0.5], &[vector![0.0, 0.0, 0.0]]);
     let _ = fit.start_at(x).run({dp8}, {STEPS}, vector![1.0])?;",
             with_parameters(kind)
         ),
-        "`Loss`" => format!(
+        "`Fit`" => format!(
+            "{}
+    let fit = Fit::of_systems([\"a\"], build).observe(|_: &{point}| vector![1.0]);
+    let fit = fit.data(&[0.5, 1.0], &[vector![1.0], vector![1.0]]);
+    let _ = fit.start_at(x).run({dp8}, {STEPS}, vector![1.0])?;",
+            built(kind)
+        ),
+        "`Loss`" if matches!(kind, Closed | Family) => format!(
             "{}
     let loss = metriplectic::fitting::Loss::of(&f).starts(&[x]).times(&[0.5]);
     let _ = loss.term(|_, _, _| Real::from(0.0)).over({dp8}, {STEPS});",
             with_parameters(kind)
+        ),
+        "`Loss`" => format!(
+            "{}
+    let loss = metriplectic::fitting::Loss::of_systems([\"a\"], build).starts(&[x]).times(&[0.5]);
+    let _ = loss.term(|_, _, _: &{point}| 0.0).over({dp8}, {STEPS}).gradient_at(&vector![1.0]);",
+            built(kind)
         ),
         "`verified`" => {
             format!("let v = s.verified(&x)?;\n    let _ = {dp8}.run(&v, x.clone(), {STEPS})?;")

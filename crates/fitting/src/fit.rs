@@ -190,14 +190,14 @@ where
 #[derive(Clone, Debug)]
 pub struct FamilyStart<X> {
     point: X,
-    /// Whether it is a guess.
+    /// True of a guess, which is fitted too.
     is_free: bool,
 }
 
 /// The start of the runs of other systems, which may depend on the system and on the parameters.
 pub type SystemStart<S, const P: usize> = Box<dyn Fn(&S, &SVector<f64, P>) -> Element<S>>;
 
-/// What is observed of a run at a time, with its derivatives along the parameters.
+/// The numbers that are observed of a run at a time, with their derivatives along the parameters.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Observation<const P: usize, const K: usize> {

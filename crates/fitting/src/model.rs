@@ -9,7 +9,7 @@ use nalgebra::{DMatrix, DVector, SVector};
 use num_dual::Dual64;
 
 use crate::least_squares::{LeastSquares, Squares};
-use crate::unknowns::Unknown;
+use crate::unknowns::{Unknown, parameters};
 
 /// The manifold of the systems of a family.
 pub(crate) type ManifoldOf<Y, const P: usize> =
@@ -90,10 +90,7 @@ where
 
     /// The parameters and the start of unknowns.
     fn placed(&self, phi: &[f64]) -> (SVector<f64, P>, Point<Y::System>) {
-        let mut theta = self.guess;
-        for (unknown, phi) in self.unknowns.iter().zip(phi) {
-            theta[unknown.index] = unknown.parameter(*phi);
-        }
+        let theta = parameters(&self.guess, self.unknowns, phi);
         let start = match self.moved(phi) {
             Some(q) => ManifoldOf::<Y, P>::chart(&self.start, &q),
             None => self.start.clone(),

@@ -17,7 +17,7 @@ use nalgebra::{DMatrix, DVector, SVector};
 
 use crate::least_squares::{LeastSquares, Squares};
 use crate::model::{Failure, Measured, Residuals, at_rest_too};
-use crate::unknowns::Unknown;
+use crate::unknowns::{Unknown, parameters};
 
 /// Systems of any kind with named parameters.
 #[derive(Clone, Copy, Debug)]
@@ -88,17 +88,9 @@ where
     M: Clone + Stepper<S>,
     F: Fn(&SVector<f64, P>, &Element<S>) -> SVector<f64, K>,
 {
-    fn theta(&self, phi: &[f64]) -> SVector<f64, P> {
-        let mut theta = self.guess;
-        for (unknown, phi) in self.unknowns.iter().zip(phi) {
-            theta[unknown.index] = unknown.parameter(*phi);
-        }
-        theta
-    }
-
     /// The residuals of a run over a schedule.
     fn residuals(&self, phi: &[f64], schedule: Schedule) -> Result<DVector<f64>, Failure> {
-        let theta = self.theta(phi);
+        let theta = parameters(&self.guess, self.unknowns, phi);
         let system = (self.systems.build)(&theta).map_err(Into::into)?;
         let Measured { times, rows, noise } = self.measured;
         let start = (self.start)(&system, &theta);
@@ -142,7 +134,7 @@ where
     }
 
     fn at(&self, phi: &[f64]) -> (SVector<f64, P>, Vec<f64>) {
-        let theta = self.theta(phi);
+        let theta = parameters(&self.guess, self.unknowns, phi);
         let system = (self.systems.build)(&theta).ok();
         let start = system.map(|system| S::Space::numbers(&(self.start)(&system, &theta)));
         (theta, start.unwrap_or_default())

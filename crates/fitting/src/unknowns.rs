@@ -1,5 +1,7 @@
 //! The unknowns of a fit: free parameters, some by their logarithm.
 
+use nalgebra::SVector;
+
 use crate::error::FitError;
 
 /// A free parameter.
@@ -28,6 +30,19 @@ impl Unknown {
     pub fn slope(&self, theta: f64) -> f64 {
         if self.positive { theta } else { 1.0 }
     }
+}
+
+/// The parameters at unknowns: those of the guess, with the free ones in their places.
+pub(crate) fn parameters<const P: usize>(
+    guess: &SVector<f64, P>,
+    unknowns: &[Unknown],
+    phi: &[f64],
+) -> SVector<f64, P> {
+    let mut theta = *guess;
+    for (unknown, phi) in unknowns.iter().zip(phi) {
+        theta[unknown.index] = unknown.parameter(*phi);
+    }
+    theta
 }
 
 /// Names of parameters: some, or all.

@@ -69,7 +69,8 @@ impl Schedule {
 
     /// Takes the steps of another run of this schedule in place of those that the tolerance asks for: each is taken whatever its error
     /// is. One that cannot be taken, because its equation has no solution or the entropy would fall, is taken in parts, and the run goes on
-    /// with the steps after it.
+    /// with the steps after it. Where the sequence has no more steps, and where it has none, the tolerance chooses them; steps of one size
+    /// stay as they are.
     #[must_use]
     pub fn taking(self, sequence: &StepSequence) -> Self {
         Self { frozen: Frozen::taking(sequence), ..self }

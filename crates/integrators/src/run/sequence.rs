@@ -50,7 +50,7 @@ impl StepSequence {
     }
 }
 
-/// Where the sizes of the steps of a run come from, and whether they are noted.
+/// The origin of the sizes of the steps of a run, and the notes of them.
 #[derive(Clone, Debug, Default)]
 pub(crate) enum Frozen {
     /// From the controller.

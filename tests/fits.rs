@@ -7,6 +7,7 @@ use metriplectic::lattices::SiteState;
 use metriplectic::manifolds::rand::rngs::ChaCha8Rng;
 use metriplectic::manifolds::rand::{RngExt, SeedableRng};
 use metriplectic::prelude::*;
+use metriplectic_studies::{Claim, Guarantee};
 
 /// Gaussian numbers of a seed.
 fn normal(seed: u64) -> impl FnMut() -> f64 {
@@ -138,7 +139,9 @@ fn a_fit_by_differences_is_the_one_by_derivatives() {
                 a.zip(b).fold(0.0_f64, |worst, (a, b)| worst.max((a - b).abs() / a.abs()))
             };
             let (values, errors) = (off(|e| e.value), off(|e| e.standard_error));
-            println!("{}: {values:.1e}, {errors:.1e}", stringify!($method));
+            Claim::new(Guarantee::Derivatives, "estimates of a fit by differences", stringify!($method))
+                .against("a fit by derivatives")
+                .record(format!("{values:.1e}"), concat!("< ", stringify!($bound)));
             assert!(values < $bound && errors < 1e-6, "{values:e} {errors:e}");
             assert!(by_derivatives.standard_error_is_small());
         })*};
@@ -656,7 +659,9 @@ fn derivatives_of_work_heat_and_state_are_those_of_closed_forms() {
                     worst = worst.max((observation.along.column(k) - slope).amax());
                 }
             }
-            println!("{}: {worst:.1e}", stringify!($method));
+            Claim::new(Guarantee::Derivatives, "state and heat of an oscillator in air", stringify!($method))
+                .against("the closed form")
+                .record(format!("{worst:.1e}"), concat!("< ", stringify!($bound)));
             assert!(worst < $bound, "{worst:e}");
         })*};
     }

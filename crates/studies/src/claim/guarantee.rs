@@ -230,6 +230,8 @@ impl Guarantee {
                 &[
                     "The tangent of a run is the derivative of the steps",
                     "The joint ellipsoid of 95 % holds the truth",
+                    "by differences of runs in the same steps, agree with those by derivatives",
+                    "Derivatives of state and heat of an oscillator in air are right",
                 ],
                 &["fit_rigid_body", "fit_metric"],
             ),

@@ -110,8 +110,11 @@ impl Vector for OpenSiteVector {
         list
     }
 
+    /// The short list of the sites, then the clock and the ledger; the whole list if this one has the length of a list of the sites.
     fn to_short_list(&self) -> Vec<f64> {
-        self.v.to_short_list()
+        let mut list = self.v.to_short_list();
+        list.extend(&self.beside);
+        if list.len() == self.v.len() { self.to_list() } else { list }
     }
 
     fn kinds(&self) -> usize {
@@ -124,10 +127,14 @@ impl Vector for OpenSiteVector {
 
     fn with_list(&self, list: &[f64]) -> Option<Self> {
         let (length, count) = (self.v.len(), self.beside.len());
-        if list.len() == length + count && count > 0 {
-            let (v, beside) = list.split_at(length);
-            return Some(Self { v: self.v.with_list(v)?, beside: beside.to_vec() });
+        let of_sites = [length, self.v.kinds()];
+        let split = list.len().checked_sub(count).filter(|split| of_sites.contains(split));
+        match split {
+            Some(split) if !of_sites.contains(&list.len()) => {
+                let (v, beside) = list.split_at(split);
+                Some(Self { v: self.v.with_list(v)?, beside: beside.to_vec() })
+            }
+            _ => Some(Self { v: self.v.with_list(list)?, beside: vec![0.0; count] }),
         }
-        Some(Self { v: self.v.with_list(list)?, beside: vec![0.0; count] })
     }
 }

@@ -106,8 +106,8 @@ pub mod prelude {
         StepError, Stepper, Steps, SymmetricItohAbe, Tableau, Tangents, Trajectory, Until, Watch,
     };
     pub use metriplectic_lattices::{
-        BondState, Boundary, Graph, Lattice, LatticeError, Onsager, OpenLattice, OpenSites, Points,
-        Profiles, SiteState,
+        BondState, Boundary, Graph, Lattice, LatticeError, NoisySurroundings, Onsager, OpenLattice,
+        OpenSites, Points, Profiles, SiteState,
     };
     pub use metriplectic_manifolds::{
         Canonical, Cayley, Chart, ChartMidpoint, Euclidean, Exponential, HalfLine, Inert,

@@ -7,6 +7,7 @@
 mod algebra;
 mod collocation;
 mod drift;
+mod driven;
 mod midpoint;
 mod orthogonal;
 mod parts;
@@ -19,12 +20,13 @@ use metriplectic_equations::{Equations, Model};
 use metriplectic_manifolds::{Canonical, Euclidean, Retraction};
 
 pub(crate) use self::collocation::{Collocation, StageNumbers};
-pub(crate) use self::midpoint::Midpoint;
-pub(crate) use self::midpoint::MidpointNumbers;
+pub(crate) use self::driven::{DrivenMethod, DrivenStage, DrivenStart, DrivenStep};
+pub(crate) use self::midpoint::{Midpoint, MidpointNumbers};
 use self::parts::Parts;
 pub use self::refusal::NoImplicitSteps;
-use self::refusal::refuse;
-use self::start::{Around, Start, Step, accumulated};
+pub(crate) use self::refusal::refuse;
+pub(crate) use self::start::accumulated;
+use self::start::{Around, Start, Step};
 use crate::collocation::dense::Within;
 use crate::collocation::tableau::{GAUSS, RADAU};
 use crate::collocation::{Gauss, Radau, Tableau, control};
@@ -261,7 +263,7 @@ impl<F: InLists> Stepper<F> for Collocation {
 }
 
 /// A scheme in plain numbers.
-fn midpoint<R, W>(&Scheme { newton, splits, .. }: &Scheme<R, W>) -> Midpoint
+pub(crate) fn midpoint<R, W>(&Scheme { newton, splits, .. }: &Scheme<R, W>) -> Midpoint
 where
     R: Retraction<Euclidean<1>, Canonical>,
     W: DiscreteGradient,
@@ -309,7 +311,7 @@ macro_rules! of_stages {
     ($($name:ident),*) => {$(
         impl<const S: usize> $name<S> {
             /// The method in plain numbers.
-            fn in_numbers() -> Collocation {
+            pub(crate) fn in_numbers() -> Collocation {
                 Collocation { tableau: Self::tableau(), splits: Self::SPLITS }
             }
         }

@@ -17,7 +17,7 @@
 //! | `compiled` | methods in plain numbers, one instance for each number of directions and entries | [`step`], [`explicit`], [`numbers`], `implicit` |
 //! | [`run`] | [`Method`], [`Span`], [`Until`], [`Watch`], [`Steps`], [`Trajectory`], [`Event`], [`Certificate`], [`Checkpoint`], [`Observables`]: what a user does with a run of any method | [`step`], [`round_off`], [`numbers`], `implicit`, `compiled` |
 //! | [`noise`](mod@noise) | [`Noisy`]: a system with thermal noise; [`NinomiyaVictoir`], [`RandomFlow`], which sample its law with any method | [`step`], [`explicit`] |
-//! | [`open`](mod@open) | [`OpenSystem`]: a clock in the energy, ports, baths and a ledger, for every method | [`step`], [`round_off`], [`discrete_gradient`], [`midpoint`], [`collocation`], [`explicit`], [`system`], [`noise`](mod@noise) |
+//! | [`open`](mod@open) | [`OpenSystem`]: a clock in the energy, ports, baths and a ledger, for every method | [`step`], [`round_off`], [`discrete_gradient`], [`midpoint`], [`collocation`], [`explicit`], [`system`], [`numbers`], `implicit`, [`noise`](mod@noise) |
 //! | `default_scheme` | a retraction is a method: its [`Scheme`] with the default options | [`step`], [`midpoint`] |
 //! | [`attitude`] | [`Attitude`]: where a body points along a run of its angular momentum | [`run`], [`round_off`] |
 //! | [`tangent`](mod@tangent) | [`Tangents`]: the derivative of a run along its start and parameters | [`step`], [`discrete_gradient`], [`newton`], [`midpoint`], [`explicit`], [`run`] |

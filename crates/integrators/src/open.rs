@@ -31,10 +31,12 @@
 //! would move a state near rest, and a protocol that jumps inside a step would do the wrong work at each step size.
 //! The midpoint scheme takes the symmetric form `½ [H(t', x') − H(t, x') + H(t', x) − H(t, x)]`.
 
+mod balance;
 mod builder;
 mod clock;
 mod flow;
 mod halves;
+mod in_numbers;
 mod midpoint;
 mod noise;
 mod projection;
@@ -47,6 +49,7 @@ mod view;
 
 pub use builder::{OpenBuilder, Opened, Opening};
 pub use clock::{AtTime, Clock, InTime, Still};
+pub use in_numbers::{Exchanged, OpenFlow, OpenSteps};
 pub use projection::OpenGradients;
 pub use stages::NotDamped;
 pub use state::{Booked, Ledger, OpenSpace, OpenState};

@@ -54,7 +54,7 @@ const UNNOTICED: &[(&str, &str)] = &[
     ("implicit/collocation/linear.rs", "STEPS"),
     ("newton.rs", "NEAR"),
     ("noise/moves.rs", "LEAST"),
-    ("open/flow.rs", "LAST_DIGITS"),
+    ("open/balance.rs", "LAST_DIGITS"),
     ("open/flow.rs", "AHEAD"),
     ("open/flow.rs", "LITTLE"),
     ("open/verify.rs", "AGREEING"),

@@ -46,6 +46,8 @@ const ROOMS: [(&str, &[&str]); 19] = [
             "collocation",
             "explicit",
             "system",
+            "numbers",
+            "implicit",
             "noise",
         ],
     ),

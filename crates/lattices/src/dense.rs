@@ -22,23 +22,23 @@ use crate::model::{Model, VectorOf};
 use crate::vector::SiteVector;
 
 /// A lattice in plain numbers.
-struct Dense<'a, P>(&'a Lattice<P>);
+pub(crate) struct Dense<'a, P>(pub(crate) &'a Lattice<P>);
 
 impl<P: Model> Dense<'_, P> {
     /// The vector with these numbers.
-    fn vector(&self, numbers: &[f64]) -> SiteVector {
+    pub(crate) fn vector(&self, numbers: &[f64]) -> SiteVector {
         self.0.vector_of(|site| column::<P>(numbers, site))
     }
 }
 
 /// The part of a site of a vector.
-fn column<P: Model>(numbers: &[f64], site: usize) -> VectorOf<P> {
+pub(crate) fn column<P: Model>(numbers: &[f64], site: usize) -> VectorOf<P> {
     let own = &numbers[site * dimension::<P>()..][..dimension::<P>()];
     VectorOf::<P>::from_index(|k| own[k])
 }
 
 /// Writes the part of a site of a vector.
-fn put<P: Model>(v: &VectorOf<P>, site: usize, numbers: &mut [f64]) {
+pub(crate) fn put<P: Model>(v: &VectorOf<P>, site: usize, numbers: &mut [f64]) {
     let own = &mut numbers[site * dimension::<P>()..][..dimension::<P>()];
     own.iter_mut().enumerate().for_each(|(k, to)| *to = v[k]);
 }
@@ -148,7 +148,7 @@ fn in_numbers<P: Model, T>(lattice: &Lattice<P>, f: impl FnOnce(&Plain<'_>) -> T
 }
 
 /// Writes the laws of a lattice.
-fn written(laws: &Laws<Vec<f64>>) -> Laws<Values> {
+pub(crate) fn written(laws: &Laws<Vec<f64>>) -> Laws<Values> {
     let &Laws { energy, entropy, ref invariants } = laws;
     Laws { energy, entropy, invariants: Values::of(invariants) }
 }

@@ -20,7 +20,7 @@ use crate::points::Points;
 use crate::pool::{Buffer, Pool};
 use crate::vector::{Reader, SiteVector};
 pub(crate) use at_sites::{AtSites, Differentials, differentials_at};
-pub(crate) use differentials::Given;
+pub(crate) use differentials::{Given, halves};
 pub(crate) use motion::probed;
 
 /// Points of a manifold at the sites of a graph, with energies of sites and bonds, an entropy of sites, and friction

@@ -70,7 +70,7 @@ pub use graph::{Boundary, Graph};
 pub use lattice::Lattice;
 pub use model::Model;
 pub use onsager::{BondState, Onsager, SiteState};
-pub use open::{OpenLattice, OpenSites};
+pub use open::{NoisySurroundings, OpenLattice, OpenSites};
 pub use points::{Points, Sites};
 pub use profiles::Profiles;
 pub use report::{LatticeLaw, LatticeReport};

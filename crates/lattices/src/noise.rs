@@ -37,11 +37,11 @@ impl<P: Model<Manifold: Flat>> Lattice<P> {
 }
 
 /// A term at both ends of a bond; at a site the second end is zero.
-type Term<P> = Onsager<[VectorOf<P>; 2]>;
+pub(crate) type Term<P> = Onsager<[VectorOf<P>; 2]>;
 
 /// Computes `Σ c_r b_r` of the terms of a place, with `c_r = ρ_r div b_r + ½ ⟨dρ_r, b_r⟩`. An entry that is zero has one of these
 /// `sizes`.
-fn drift<P: Model>(
+pub(crate) fn drift<P: Model>(
     terms: impl Fn([&PointOf<P>; 2]) -> Vec<Term<P>>,
     x: [&PointOf<P>; 2],
     (ends, sizes): (usize, &VectorOf<P>),
@@ -83,7 +83,7 @@ fn own_or<P: Model>(x: &PointOf<P>, sizes: &VectorOf<P>) -> VectorOf<P> {
 impl<P: Model> Lattice<P> {
     /// The sizes over which differences are taken where an entry is zero: the largest ones on the lattice. An entry that is zero
     /// at all sites has the distance over which the energy of a site changes by its value.
-    fn sizes_of_differences(&self, x: &Points<P::Manifold>) -> VectorOf<P> {
+    pub(crate) fn sizes_of_differences(&self, x: &Points<P::Manifold>) -> VectorOf<P> {
         let largest = self.largest_sizes(x);
         let others = (0..dimension::<P>()).map(|k| largest[k]).fold(0.0, f64::max);
         let unit = if others > 0.0 { others } else { 1.0 };
@@ -101,7 +101,7 @@ impl<P: Model> Lattice<P> {
 
     /// The number of the first term at a site, or of a bond after all sites. Bonds have the numbers of the graph, and not those
     /// of the chunks in which they are evaluated.
-    fn first_term(&self, place: usize) -> usize {
+    pub(crate) fn first_term(&self, place: usize) -> usize {
         let [of_a_site, of_a_bond] = P::TERMS;
         let sites = self.sites();
         place.min(sites) * of_a_site + place.saturating_sub(sites) * of_a_bond
@@ -233,13 +233,7 @@ impl<P: Model<Manifold: Flat>> Fluctuating<Uniform> for Lattice<P> {
         if P::BOND_ENERGY || P::EnergyGather::PRESENT || P::EntropyGather::PRESENT {
             return Err(NoiseError::BondsHaveEnergies);
         }
-        // The divergence may vanish at the start by a symmetry.
-        let sizes = self.sizes_of_differences(x);
-        let (y, _) = self.near(x, &self.vector_of(|site| own_or::<P>(&x[site], &sizes)), MOVED);
-        [x, &y].into_iter().try_for_each(|x| {
-            let sizes = self.sizes_of_differences(x);
-            (0..self.sites()).try_for_each(|site| self.keeps_volume(site, &x[site], &sizes))
-        })
+        self.keep_volume(x, |_, site, y| self.parts.energy(site, y).df)
     }
 }
 
@@ -264,6 +258,29 @@ impl<P: Model> Judged for Lattice<P> {
     }
 }
 
+impl<P: Model<Manifold: Flat>> Lattice<P> {
+    /// Verifies at the start and near it that the reversible motion of each site keeps the volume, with the differential `w` of the
+    /// energy there.
+    ///
+    /// # Errors
+    ///
+    /// [`NoiseError::NotUnimodular`] if that of a site changes it.
+    pub(crate) fn keep_volume(
+        &self,
+        x: &Points<P::Manifold>,
+        w: impl Fn(&[PointOf<P>], usize, &PointOf<P>) -> VectorOf<P>,
+    ) -> Result<(), NoiseError> {
+        // The divergence may vanish at the start by a symmetry.
+        let sizes = self.sizes_of_differences(x);
+        let (y, _) = self.near(x, &self.vector_of(|site| own_or::<P>(&x[site], &sizes)), MOVED);
+        [x, &y].into_iter().try_for_each(|x| {
+            let sizes = self.sizes_of_differences(x);
+            let keeps = |site| self.keeps_volume(site, (&x[site], &sizes), |y| w(x, site, y));
+            (0..self.sites()).try_for_each(keeps)
+        })
+    }
+}
+
 impl<P: Model> Lattice<P> {
     /// # Errors
     ///
@@ -271,8 +288,8 @@ impl<P: Model> Lattice<P> {
     fn keeps_volume(
         &self,
         site: usize,
-        x: &PointOf<P>,
-        sizes: &VectorOf<P>,
+        (x, sizes): (&PointOf<P>, &VectorOf<P>),
+        w: impl Fn(&PointOf<P>) -> VectorOf<P>,
     ) -> Result<(), NoiseError> {
         let scales = own_or::<P>(x, sizes);
         let [mut divergence, mut size] = [0.0, 0.0];
@@ -280,8 +297,7 @@ impl<P: Model> Lattice<P> {
             let width = WIDTH * scales[k];
             let [up, down] = [width, -width].map(|by| {
                 let y = P::Manifold::chart(x, &(VectorOf::<P>::basis(k) * by));
-                let [w, s] = [self.parts.energy(site, &y).df, self.parts.entropy(site, &y).df];
-                self.parts.reversible(&y, &w, &s)[k]
+                self.parts.reversible(&y, &w(&y), &self.parts.entropy(site, &y).df)[k]
             });
             divergence += (up - down) / (2.0 * width);
             size += up.abs().max(down.abs()) / scales[k];

@@ -11,7 +11,9 @@
 //! An entry of the ledger is a sum over the sites of its port or bath. It is summed in double digits, in chunks of a fixed
 //! length that are merged in a fixed order, so its bits do not depend on the number of threads.
 
+mod dense;
 mod flow;
+mod noise;
 mod parts;
 mod stages;
 mod vector;
@@ -28,11 +30,15 @@ use crate::lattice::Lattice;
 use crate::model::{Model, PointOf, VectorOf};
 use crate::onsager::{Onsager, SiteState};
 use crate::points::{Points, Sites};
+pub use noise::NoisySurroundings;
 use parts::{Part, PartKind};
 pub use stages::OpenJets;
 pub use vector::OpenSiteVector;
 
-/// A [`Lattice`] with ports and baths at some of its sites; made by [`Lattice::opened`]. The explicit methods run it.
+/// A [`Lattice`] with ports and baths at some of its sites; made by [`Lattice::opened`].
+///
+/// The explicit methods run it. So do the schemes, `Gauss` and `Radau` on vector spaces of up to 1024 variables; `Radau` takes a lattice
+/// without an entropy of its own and with one bath.
 ///
 /// ```
 /// use metriplectic_fields::Real;
@@ -153,7 +159,8 @@ impl<P: Model> OpenLattice<P> {
                 friction(t, at).into_iter().for_each(visit);
             };
         let temperature = Box::new(temperature);
-        self.with(name.into(), sites, PartKind::Bath { temperature, contacts: Box::new(contacts) })
+        let contacts = Box::new(contacts);
+        self.with(name.into(), sites, PartKind::Bath { temperature, contacts, terms: R })
     }
 
     fn with(

@@ -18,6 +18,8 @@ mod memory;
 mod parts;
 mod solve;
 mod step;
+mod timed;
 
 pub(crate) use memory::StageNumbers;
 pub(crate) use step::Collocation;
+pub(super) use timed::{Stage, StageSolution, TimedStep};

@@ -11,3 +11,4 @@ mod step;
 
 pub(crate) use memory::MidpointNumbers;
 pub(crate) use step::Midpoint;
+pub(super) use step::Solution;

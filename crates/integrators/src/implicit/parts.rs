@@ -63,6 +63,8 @@ pub(super) struct PartJet<L: Lengths> {
 /// A model, with the answers that do not change.
 pub(super) struct Parts<'a, L: Lengths> {
     model: &'a dyn Model,
+    /// The time of its force, which nothing else depends on.
+    time: f64,
     count: usize,
     /// Why each further invariant is conserved.
     pub(super) kinds: Vec<Kind>,
@@ -85,6 +87,7 @@ impl<'a, L: Lengths> Parts<'a, L> {
         let further = if L::HAS_INVARIANTS { laws.saturating_sub(ENTROPY + 1) } else { 0 };
         Self {
             model,
+            time: NO_CLOCK,
             count: directions,
             kinds: (0..further).map(|k| model.kind(k)).collect(),
             is_exact: model.second_law() == SecondLaw::Exact,
@@ -94,6 +97,11 @@ impl<'a, L: Lengths> Parts<'a, L> {
             annihilates_entropy: model.annihilates_entropy(),
             lengths: std::marker::PhantomData,
         }
+    }
+
+    /// The model with its force at a time.
+    pub(super) fn at(&self, time: f64) -> Self {
+        Self { time, kinds: self.kinds.clone(), ..*self }
     }
 
     /// The number of directions.
@@ -167,7 +175,7 @@ impl<'a, L: Lengths> Parts<'a, L> {
     /// The laws at a state.
     pub(super) fn laws(&self, x: &L::State) -> Laws<L::Invariants> {
         let mut values = L::Values::room(|| self.kinds.len() + ENTROPY + 1);
-        self.model.values(NO_CLOCK, x.numbers(), values.numbers_mut());
+        self.model.values(self.time, x.numbers(), values.numbers_mut());
         let values = values.numbers();
         let invariants = L::invariants(&values[ENTROPY + 1..]);
         Laws { energy: values[ENERGY], entropy: values[ENTROPY], invariants }
@@ -176,14 +184,14 @@ impl<'a, L: Lengths> Parts<'a, L> {
     /// A law at a state.
     #[inline]
     pub(super) fn value(&self, law: usize, x: &L::State) -> f64 {
-        self.model.value(law, NO_CLOCK, x.numbers())
+        self.model.value(law, self.time, x.numbers())
     }
 
     /// A law with its differential.
     #[inline]
     pub(super) fn jet(&self, law: usize, x: &L::State) -> (f64, L::Vector) {
         let mut df = self.zero();
-        let value = self.model.jet(law, NO_CLOCK, x.numbers(), df.numbers_mut());
+        let value = self.model.jet(law, self.time, x.numbers(), df.numbers_mut());
         (value, df)
     }
 
@@ -191,21 +199,21 @@ impl<'a, L: Lengths> Parts<'a, L> {
     #[inline]
     pub(super) fn second(&self, law: usize, x: &L::State) -> Second<L> {
         let (mut df, mut hf) = (self.zero(), self.zeros());
-        self.model.hessian(law, NO_CLOCK, x.numbers(), df.numbers_mut(), hf.numbers_mut());
+        self.model.hessian(law, self.time, x.numbers(), df.numbers_mut(), hf.numbers_mut());
         Second { df, hf }
     }
 
     /// The first and the second derivative of a law along a vector.
     #[inline]
     pub(super) fn along(&self, law: usize, x: &L::State, v: &L::Vector) -> [f64; 2] {
-        let [_, first, _, second] = self.model.along(law, NO_CLOCK, x.numbers(), [v.numbers(); 2]);
+        let [_, first, _, second] = self.model.along(law, self.time, x.numbers(), [v.numbers(); 2]);
         [first, second]
     }
 
     /// The second derivative of a law along two vectors.
     #[inline]
     pub(super) fn mixed(&self, law: usize, x: &L::State, along: [&L::Vector; 2]) -> f64 {
-        self.model.along(law, NO_CLOCK, x.numbers(), along.map(List::numbers))[3]
+        self.model.along(law, self.time, x.numbers(), along.map(List::numbers))[3]
     }
 
     /// The differentials of all laws at a state.
@@ -225,7 +233,7 @@ impl<'a, L: Lengths> Parts<'a, L> {
         let place = (z.numbers(), self.zero());
         let place = (place.0, place.1.numbers());
         let (alpha, to) = (alpha.numbers(), v.numbers_mut());
-        self.model.apply(part, NO_CLOCK, place, w, alpha, to).ok()?;
+        self.model.apply(part, self.time, place, w, alpha, to).ok()?;
         Some(v)
     }
 
@@ -233,7 +241,7 @@ impl<'a, L: Lengths> Parts<'a, L> {
     pub(super) fn tensor(&self, x: &L::State, w: &OfLaws<L::Vector>) -> Option<Matrix<L>> {
         let (w, mut k) = (covectors::<L>(&w.energy, &w.entropy), self.zeros());
         let (part, x) = (Part::Irreversible, x.numbers());
-        self.model.tensor(part, NO_CLOCK, x, w, k.numbers_mut()).ok()?;
+        self.model.tensor(part, self.time, x, w, k.numbers_mut()).ok()?;
         Some(k)
     }
 
@@ -254,7 +262,7 @@ impl<'a, L: Lengths> Parts<'a, L> {
             tensor: tensor.numbers_mut(),
         };
         let w = covectors::<L>(energy, entropy);
-        self.model.linearise(part, NO_CLOCK, z.numbers(), w, alpha.numbers(), &mut jet).ok()?;
+        self.model.linearise(part, self.time, z.numbers(), w, alpha.numbers(), &mut jet).ok()?;
         Some(PartJet { value, along_x, along_w, tensor })
     }
 }

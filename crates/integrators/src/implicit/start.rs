@@ -57,7 +57,7 @@ pub(super) trait Around<L: Lengths> {
 }
 
 /// The round-off that earlier steps have left of the laws, from those at the start of a step and of the run.
-pub(super) fn accumulated<L: Lengths>(
+pub(crate) fn accumulated<L: Lengths>(
     [values, reference]: [&Laws<L::Invariants>; 2],
 ) -> Laws<L::Invariants> {
     let mut invariants = values.invariants.clone();

@@ -37,6 +37,12 @@ impl<F, U> Noisy<F, U> {
         &self.noise
     }
 
+    /// Returns the noise around another flow, which is not verified.
+    #[must_use]
+    pub fn map<G>(self, f: impl FnOnce(F) -> G) -> Noisy<G, U> {
+        Noisy { flow: f(self.flow), noise: self.noise, verified: false }
+    }
+
     /// Marks the system as one whose model was verified.
     pub(super) fn with_certificate(self) -> Self {
         Self { verified: true, ..self }

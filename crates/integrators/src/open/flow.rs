@@ -16,15 +16,12 @@ use super::state::{Booked, Columns, Ledger, OpenSpace, OpenState};
 use super::system::{CovectorsOf, Direction, OpenSystem, StateOf};
 use super::vector::OpenVector;
 use crate::explicit::{StageFlow as _, Target};
-use crate::round_off::bound::{
-    NO_DIGITS, ROUNDED, breaks_first_law, of_an_increment, size_of_terms, sizes_on_a_step,
-};
-use crate::step::failure::Cause;
+use crate::round_off::bound::{NO_DIGITS, of_an_increment, size_of_terms, sizes_on_a_step};
 use crate::step::scales::relative;
 use crate::step::{
     self, Components, Directions, EventExchange, Flow, FlowVisitor, Laws, LedgerErrors,
     LedgerSummary, Listed, Numbers, Recheck, Scales, StartError, StateSpace as _, StepError,
-    StepStart, Values, Vector as _, Written,
+    Values, Vector as _, Written,
 };
 
 impl<Y, C, X> Flow for OpenSystem<Y, C, X>
@@ -341,9 +338,6 @@ const LITTLE: f64 = 0.1;
 /// The displacement, relative to the sizes, at which the speed of a motion is looked at beside its start.
 const AHEAD: f64 = 1e-3;
 
-/// The error of the balance, relative to the terms of the energy, up to which it is one of last digits.
-const LAST_DIGITS: f64 = 1e-11;
-
 impl<Y, C, X> OpenSystem<Y, C, X>
 where
     Y: Metriplectic,
@@ -469,43 +463,6 @@ where
         v: Vector<Y::Manifold>,
     ) -> Direction<Y, X> {
         OpenVector { v, clock: y.time - x.time, booked: self.booked_between(x, y) }
-    }
-
-    /// The end of an implicit step with the last digits of its balance. Where friction is fast and a step short, the rounding of
-    /// the end makes heat that is larger than a rounding of the energy. The point is moved onto the balance, with its entropy
-    /// where that does not depend on it, unless the entropy would fall.
-    pub(super) fn with_last_digits(
-        &self,
-        start: &StepStart<'_, Self>,
-        x: StateOf<Y>,
-    ) -> (StateOf<Y>, Laws<Numbers<Y>>) {
-        let values = self.laws(&x);
-        let off = |laws: &Laws<Numbers<Y>>| (laws.energy - start.reference.energy).abs();
-        let size = self.term_sizes(&x).energy;
-        if !(off(&values) > ROUNDED * size && off(&values) <= LAST_DIGITS * size) {
-            return (x, values);
-        }
-        let both = self.onto(&x, &start.reference, Some(values.entropy));
-        let moved = both.or_else(|| self.onto(&x, &start.reference, None));
-        let moved = moved.map(|moved| (self.laws(&moved), moved));
-        match moved
-            .filter(|(laws, _)| off(laws) < off(&values) && laws.entropy >= start.values.entropy)
-        {
-            Some((laws, moved)) => (moved, laws),
-            None => (x, values),
-        }
-    }
-
-    /// The cause for which the end of a step is not taken, if its balance is not that of the run.
-    pub(super) fn broken_balance(
-        &self,
-        start: &StepStart<'_, Self>,
-        end: &StateOf<Y>,
-        energy: f64,
-    ) -> Option<Cause> {
-        let change = energy - start.reference.energy;
-        let size = breaks_first_law(change, energy, || self.energy_sizes([start.x, end]))?;
-        Some(Cause::Energy { change, size })
     }
 
     /// The components of a direction, as those of the closed system.

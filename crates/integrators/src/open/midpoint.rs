@@ -12,6 +12,7 @@ use metriplectic_dynamics::exchange::{Entries as _, Exchange};
 use metriplectic_dynamics::{Metriplectic, SecondLaw};
 use metriplectic_manifolds::Retraction;
 
+use super::balance::balanced;
 use super::clock::Clock;
 use super::halves::{self, Failure};
 use super::state::{Booked, OpenState};
@@ -111,13 +112,7 @@ where
         entries: X::Entries::from_index(|i| h * rates.entries.get(i)),
     };
     let x = OpenState { x: end, time: times[1], ledger: ledger.with(&booked) };
-    let (x, values) = system.with_last_digits(start, x);
-    if !(values.energy.is_finite() && values.entropy.is_finite()) {
-        return Err(edge());
-    }
-    if let Some(cause) = system.broken_balance(start, &x, values.energy) {
-        return Err(Failure { cause, residual: f64::INFINITY, effort });
-    }
+    let (x, values) = balanced(start, x, effort)?;
     // The entropy changes where heat flows, too.
     evidence.dissipates |= rates.production != 0.0;
     evidence.rests = false;

@@ -18,6 +18,7 @@ use metriplectic_dynamics::exchange::{Entries as _, Exchange};
 use metriplectic_dynamics::{Metriplectic, SecondLaw, VectorField, system::Point};
 use metriplectic_fields::{ChartPoint, Column as _, Real, Space, Vector};
 
+use super::balance::balanced;
 use super::clock::Clock;
 use super::halves::{self, Failure};
 use super::state::{Booked, OpenState};
@@ -256,13 +257,7 @@ where
     let effort = solution.effort;
     let edge = || Failure { cause: Cause::Edge, residual, effort };
     let x = step.booked(start.x, &solution, h).ok_or_else(edge)?;
-    let (x, values) = system.with_last_digits(start, x);
-    if !(values.energy.is_finite() && values.entropy.is_finite()) {
-        return Err(edge());
-    }
-    if let Some(cause) = system.broken_balance(start, &x, values.energy) {
-        return Err(Failure { cause, residual, effort });
-    }
+    let (x, values) = balanced(start, x, effort)?;
     let mut evidence = solution.evidence;
     evidence.dissipates |= X::BATHS > 0;
     evidence.ledger = step.ledger_errors([start.x, &x], &solution);

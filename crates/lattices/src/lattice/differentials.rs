@@ -73,7 +73,7 @@ fn spread<M: Manifold + Times<M>, G: Gather<M>>(
 
 /// The parts of a differential on a bond that belong to its two sites.
 #[inline]
-fn halves<P: Model>(df: &Vector<PairManifold<P>>) -> [VectorOf<P>; 2] {
+pub(crate) fn halves<P: Model>(df: &Vector<PairManifold<P>>) -> [VectorOf<P>; 2] {
     let n = dimension::<P>();
     [0, n].map(|start| VectorOf::<P>::from_index(|k| df[start + k]))
 }

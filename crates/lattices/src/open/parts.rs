@@ -22,7 +22,12 @@ pub(super) type Velocity<P> = dyn Fn(f64, usize, &PointOf<P>) -> VectorOf<P> + S
 
 pub(super) enum PartKind<P: Model> {
     Port(Box<Velocity<P>>),
-    Bath { temperature: Box<dyn Temperature + Send + Sync>, contacts: Box<Contacts<P>> },
+    Bath {
+        temperature: Box<dyn Temperature + Send + Sync>,
+        contacts: Box<Contacts<P>>,
+        /// How many terms there are at a site.
+        terms: usize,
+    },
 }
 
 /// A port or a bath.
@@ -103,6 +108,16 @@ impl<P: Model> OpenLattice<P> {
         x: &[PointOf<P>],
         all: &Differentials,
     ) -> Exchanged<VectorOf<P>> {
+        self.exchanged_with(t, x, |site| differentials_at::<P>(all, site))
+    }
+
+    /// Sums them with these covectors of energy and entropy at a site.
+    pub(super) fn exchanged_with(
+        &self,
+        t: f64,
+        x: &[PointOf<P>],
+        covectors: impl Fn(usize) -> [VectorOf<P>; 2] + Sync,
+    ) -> Exchanged<VectorOf<P>> {
         let mut exchanged =
             Exchanged { velocities: Vec::new(), entries: Vec::new(), production: 0.0 };
         for part in &self.parts {
@@ -111,7 +126,7 @@ impl<P: Model> OpenLattice<P> {
                 let (mut power, mut production) = (Double::default(), Double::default());
                 let mut velocities = Vec::with_capacity(range.len());
                 for &site in &part.sites[range] {
-                    let [w, s] = differentials_at::<P>(all, site);
+                    let [w, s] = covectors(site);
                     let at = part.at_site((t, temperature), site, &x[site], [&w, &s]);
                     power.add(at.power);
                     production.add(at.production);

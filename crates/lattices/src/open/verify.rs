@@ -88,7 +88,7 @@ impl<P: Model> OpenLattice<P> {
         Ok(Self { verified: true, ..self })
     }
 
-    fn verify_parts(&self, x0: &StateOf<P>) -> Result<(), LatticeError> {
+    pub(super) fn verify_parts(&self, x0: &StateOf<P>) -> Result<(), LatticeError> {
         self.look_at_parts(x0).map_err(|law| LatticeError::Surroundings(Box::new(law)))
     }
 

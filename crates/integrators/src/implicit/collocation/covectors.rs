@@ -252,7 +252,8 @@ impl<L: Lengths> AlongStages<'_, L> {
         delta += start.drift;
         let squares = stages.square * stages.unit;
         let left_round_off = noise + f64::EPSILON * change;
-        let is_later = correction == Correction::Later;
+        let is_later = correction == Correction::Later
+            || correction == Correction::Raised && (delta < 0.0 || squares == 0.0);
         let none =
             if is_later { LawOfStages { left: delta, left_round_off, ..none } } else { none };
         if squares == 0.0 {

@@ -33,13 +33,7 @@ impl Collocation {
         Some(solved.at.end)
     }
 
-    /// The error of a step of size `h` between two states, by a norm: the larger one of the defects
-    ///
-    /// ```math
-    /// h M^{-1} (u'(0) - f(x)), \qquad h M^{-1} (u'(1) - f(x'))
-    /// ```
-    ///
-    /// of its polynomial at both ends.
+    /// The error of a step of size `h` between two states, by a norm: the larger one of its [defects](Self::defects).
     pub(in crate::implicit) fn error_of_step<L: Lengths>(
         &self,
         parts: &Parts<'_, L>,
@@ -48,14 +42,33 @@ impl Collocation {
         memory: &StageNumbers<L>,
         norm: impl Fn(&L::Vector) -> f64,
     ) -> Option<f64> {
-        let velocity = |at: &L::State| parts.velocity(at).filter(is_finite);
-        let [first, second] = [velocity(ends[0])?, velocity(ends[1])?];
+        let [first, second] = self.defects([parts; 2], ends, h, memory)?;
+        Some(norm(&first).max(norm(&second)))
+    }
+
+    /// The defects
+    ///
+    /// ```math
+    /// h M^{-1} (u'(0) - f(x)), \qquad h M^{-1} (u'(1) - f(x'))
+    /// ```
+    ///
+    /// of the polynomial of a step of size `h` at both ends, with the model at the time of each end.
+    pub(in crate::implicit) fn defects<L: Lengths>(
+        &self,
+        parts: [&Parts<'_, L>; 2],
+        ends: [&L::State; 2],
+        h: f64,
+        memory: &StageNumbers<L>,
+    ) -> Option<[L::Vector; 2]> {
+        let velocity = |i: usize| parts[i].velocity(ends[i]).filter(is_finite);
+        let [first, second] = [velocity(0)?, velocity(1)?];
         let (tableau, LastStep { k, filter }) = (self.tableau, memory.last.as_ref()?);
+        let parts = parts[0];
         let k = each_stage(parts, tableau.stages, |i| k[i].map(|k| k * h));
         let defect = |tau: f64, velocity: &L::Vector| {
             let slope = combined(1.0, tableau.stages, &tableau.velocity(tau), &k);
-            norm(&filter.times(&parts.vector(|c| slope[c] - velocity[c] * h)))
+            filter.times(&parts.vector(|c| slope[c] - velocity[c] * h))
         };
-        Some(defect(0.0, &first).max(defect(1.0, &second)))
+        Some([defect(0.0, &first), defect(1.0, &second)])
     }
 }

@@ -37,6 +37,9 @@ pub(super) struct StageEquation<'a, L: Lengths> {
     pub(super) heats: Option<HeatStart<L>>,
     /// The round-off of the terms of a velocity; zero where it is not known.
     pub(super) rounding: L::Vector,
+    /// The model at the times of the stages, if its force depends on time and does work. Then `parts` is that in the middle of the
+    /// step.
+    pub(super) in_time: Option<&'a [Parts<'a, L>]>,
 }
 
 // By hand, because lengths have none.
@@ -100,7 +103,7 @@ impl<'a, L: Lengths> StageEquation<'a, L> {
         } else {
             None
         };
-        Self { tableau, parts, x, h, values, drift, heats, rounding: parts.zero() }
+        Self { tableau, parts, x, h, values, drift, heats, rounding: parts.zero(), in_time: None }
     }
 
     /// The equation of a step of a fraction of the size, which takes nothing back.
@@ -157,6 +160,8 @@ impl<'a, L: Lengths> StageEquation<'a, L> {
             (heat, surplus) = (Some(added.velocity), added.gain.max(0.0));
             heat_rounding = added.rounding;
         }
+        // The work and the heat of surroundings.
+        let mut exchanged = 0.0;
         let mut residual = zeros(parts);
         let mut work = drift::nothing::<L>(&self.values);
         let (mut entropy_slope, mut production) = (f64::INFINITY, 0.0);
@@ -164,10 +169,16 @@ impl<'a, L: Lengths> StageEquation<'a, L> {
         for i in 0..tableau.stages {
             let (x, here) = (&stages.x[i], &covectors.w[i]);
             let weight = h * tableau.weights[i] * unit;
-            let friction = parts.irreversible(x, here)?;
-            let mut velocity = parts.reversible(x, here)?;
+            let at_stage = self.at_stage(i);
+            let friction = at_stage.irreversible(x, here)?;
+            let mut velocity = at_stage.reversible(x, here)?;
             add(&mut velocity, 1.0, &friction);
-            let mut off = self.conserving(velocity, &here.energy, in_unit);
+            let mut off = if self.in_time.is_some() {
+                exchanged += weight * dot(&here.energy, &scaled(&velocity));
+                velocity
+            } else {
+                self.conserving(velocity, &here.energy, in_unit)
+            };
             add(&mut off, -1.0, &stages.v[i]);
             if let Some(heat) = &heat {
                 add(&mut off, 1.0, &heat[i]);
@@ -185,7 +196,10 @@ impl<'a, L: Lengths> StageEquation<'a, L> {
         let excess = relative(&work, &sizes) / ROUNDED;
         let entropy =
             Left { work: if parts.is_exact { work.entropy } else { 0.0 }, size: laws.entropy.size };
-        let values = numbers::<L>(&laws, |law| law.end);
+        let mut values = numbers::<L>(&laws, |law| law.end);
+        if self.in_time.is_some() {
+            values.energy -= exchanged + laws.energy.left.min(0.0);
+        }
         let error = self.error(&values, &sizes);
         let usable = all_finite::<L>(&residual) && !excess.is_nan();
         usable.then_some(Evaluated {
@@ -206,6 +220,20 @@ impl<'a, L: Lengths> StageEquation<'a, L> {
             left,
             excursion,
         })
+    }
+
+    /// The model at the time of a stage.
+    pub(super) fn at_stage(&self, i: usize) -> &'a Parts<'a, L> {
+        self.in_time.map_or(self.parts, |stages| &stages[i])
+    }
+
+    /// The stages at these velocities with their covectors.
+    pub(super) fn stages(&self, k: &Unknowns<L>) -> Option<(StagePoints<L>, StageCovectors<L>)> {
+        let chart = self.chart(k)?;
+        let polynomial = self.polynomial(&chart, k);
+        let stages = StagePoints::of(&polynomial)?;
+        let covectors = self.covectors(&stages, &polynomial);
+        Some((stages, covectors))
     }
 
     /// The errors of the energy and the further invariants at the end, in units of round-off.
@@ -242,7 +270,7 @@ impl<'a, L: Lengths> StageEquation<'a, L> {
         stages: &StagePoints<L>,
         polynomial: &StepPolynomial<'_, L>,
     ) -> StageCovectors<L> {
-        let Self { parts, values, drift, heats, .. } = self;
+        let Self { parts, values, drift, heats, tableau, in_time, .. } = self;
         let start = |law: usize| {
             let [value, drift] = [values, drift].map(|laws| of_law::<L>(laws, law));
             LawStart { value, drift }
@@ -250,6 +278,8 @@ impl<'a, L: Lengths> StageEquation<'a, L> {
         let correction = |law: usize| match law {
             ENTROPY if !parts.is_exact => Correction::None,
             ENERGY | ENTROPY if heats.is_some() => Correction::Later,
+            // What a method that damps loses of the energy is heat of the bath.
+            ENERGY if tableau.one_sided && in_time.is_some() => Correction::Raised,
             _ => Correction::Here,
         };
         StageCovectors::of(stages, polynomial, start, correction)

@@ -40,9 +40,11 @@ impl<L: Lengths> Solved<L> {
     /// Returns whether the motion at the start of the step would leave it, by the velocity there, which no guess enters.
     #[cold]
     fn contradicts(&self, equation: &StageEquation<'_, L>) -> bool {
-        let &StageEquation { tableau, parts, x, .. } = equation;
-        let Some(velocity) = parts.velocity(x) else { return false };
-        let v = each_stage(parts, tableau.stages, |_| velocity.clone());
+        let &StageEquation { tableau, parts, x, in_time, .. } = equation;
+        let known = if in_time.is_some() { tableau.stages } else { 1 };
+        let velocities = (0..known).map(|i| equation.at_stage(i).velocity(x));
+        let Some(velocities) = velocities.collect::<Option<Vec<_>>>() else { return false };
+        let v = each_stage(parts, tableau.stages, |i| velocities[i.min(known - 1)].clone());
         let (_, size) = self.linear.correction(parts, &v, &self.round_off);
         size > MOVES
     }
@@ -139,6 +141,10 @@ impl<'a, L: Lengths> StageEquation<'a, L> {
 
     /// The end after the last correction, with the laws evaluated there; `None` if they are off.
     fn last(&self, here: &Iterate<L>) -> Option<End<L>> {
+        // The balance with surroundings needs the stages.
+        if self.in_time.is_some() {
+            return None;
+        }
         let k = here.moved(1.0);
         let chart = self.chart(&k)?;
         let values = self.parts.laws(&chart.end);

@@ -3,7 +3,7 @@
 
 use metriplectic_equations::ENERGY;
 
-use super::equation::{Dissipated, Equation};
+use super::equation::{Dissipated, Equation, Linearised};
 use super::fallbacks::StepFailure;
 use super::level::Polished;
 use super::memory::MidpointNumbers;
@@ -31,6 +31,27 @@ pub(crate) struct Midpoint {
     pub(crate) newton: Newton,
     /// How often a step that is not solved is split in halves.
     pub(crate) splits: usize,
+}
+
+/// A solution of the equation of a step.
+struct Solved<'a, L: Lengths> {
+    equation: Equation<'a, L>,
+    root: Root<L>,
+    effort: Effort,
+    evidence: Evidence,
+}
+
+/// A step that was solved, of a model whose force does work.
+pub(in crate::implicit) struct Solution<L: Lengths> {
+    /// The end of the step.
+    pub(in crate::implicit) end: L::State,
+    /// The base point `z`.
+    pub(in crate::implicit) z: L::State,
+    /// The discrete gradients of energy and entropy.
+    pub(in crate::implicit) energy: L::Vector,
+    pub(in crate::implicit) entropy: L::Vector,
+    pub(in crate::implicit) evidence: Evidence,
+    pub(in crate::implicit) effort: Effort,
 }
 
 /// Evidence about the motion in a solution.
@@ -81,6 +102,53 @@ impl Midpoint {
         self.line.expect("a run refuses schemes of one's own")
     }
 
+    /// Guesses a step and solves its equation.
+    fn solved<'a, L: Lengths>(
+        &self,
+        start: &Start<'a, L>,
+        memory: &mut MidpointNumbers<L>,
+        fallbacks: Fallbacks,
+    ) -> Result<Solved<'a, L>, Box<StepFailure>> {
+        let &Start { parts, x, h, ref values, .. } = start;
+        memory.keep_length(parts.n());
+        let guess = memory.predictor.guess(start);
+        let drift = drift::target(start, &guess);
+        let equation = Equation { parts, line: self.line(), x, h, values: values.clone(), drift };
+        let kept = &mut memory.jacobian;
+        let (root, effort) = equation.solve(&self.newton, &guess, kept, fallbacks)?;
+        let evidence = evidence(parts, &root, memory.friction());
+        let contradicts = evidence.rests && moves(start, &root, memory.jacobian.inverse.as_ref());
+        if contradicts || !has_digits(start, &root, evidence.friction) {
+            let cause = Cause::Unsolved;
+            return Err(StepFailure { residual: root.residual, cause, effort }.into());
+        }
+        Ok(Solved { equation, root, effort, evidence })
+    }
+
+    /// Solves the equation of a step whose force does work, and adds the digits that earlier steps have lost of the position. What the
+    /// step leaves of the laws is for the next one to take back.
+    pub(in crate::implicit) fn solution<L: Lengths>(
+        &self,
+        start: &Start<'_, L>,
+        memory: &mut MidpointNumbers<L>,
+        fallbacks: Fallbacks,
+    ) -> Result<Solution<L>, Box<StepFailure>> {
+        let &Start { parts, x, .. } = start;
+        let Solved { equation, root, effort, evidence } = self.solved(start, memory, fallbacks)?;
+        let edge = || StepFailure { residual: root.residual, cause: Cause::Edge, effort };
+        let c = equation.line.base;
+        let z = parts.moved(x, &parts.vector(|i| root.u[i] * c));
+        let Linearised { energy, entropy, .. } = equation.linearise(&root.u).ok_or_else(edge)?;
+        let end = if evidence.rests {
+            x.clone()
+        } else {
+            let end = parts.moved(x, &root.u);
+            memory.predictor.note(parts, &root.u);
+            memory.compensation.add(parts, [x, &end], &root.u).unwrap_or(end)
+        };
+        Ok(Solution { end, z, energy, entropy, evidence, effort })
+    }
+
     /// Tries a step whole.
     pub(in crate::implicit) fn try_step<L: Lengths>(
         &self,
@@ -89,19 +157,10 @@ impl Midpoint {
         around: &dyn Around<L>,
         fallbacks: Fallbacks,
     ) -> Result<Step<L>, Box<StepFailure>> {
-        let &Start { parts, x, h, ref values, .. } = start;
-        memory.keep_length(parts.n());
-        let guess = memory.predictor.guess(start);
-        let drift = drift::target(start, &guess);
-        let equation = Equation { parts, line: self.line(), x, h, values: values.clone(), drift };
-        let kept = &mut memory.jacobian;
-        let (root, mut effort) = equation.solve(&self.newton, &guess, kept, fallbacks)?;
-        let evidence = evidence(parts, &root, memory.friction());
+        let &Start { parts, x, ref values, .. } = start;
+        let Solved { equation, root, mut effort, evidence } =
+            self.solved(start, memory, fallbacks)?;
         let failed = |cause, effort| StepFailure { residual: root.residual, cause, effort };
-        let contradicts = evidence.rests && moves(start, &root, memory.jacobian.inverse.as_ref());
-        if contradicts || !has_digits(start, &root, evidence.friction) {
-            return Err(failed(Cause::Unsolved, effort).into());
-        }
         if evidence.rests {
             // What the solver found is its own round-off, and following it would make a random walk of the energy.
             return Ok(Step { x: x.clone(), values: values.clone(), evidence, effort });

@@ -1,5 +1,9 @@
 //! Lattices with ports and baths at sites: both laws, closed forms, bits, and errors.
 
+#[path = "lattices/open_implicit.rs"]
+mod implicit;
+#[path = "lattices/open_noise.rs"]
+mod noise;
 #[path = "models/tables.rs"]
 mod tables;
 

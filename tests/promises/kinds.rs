@@ -6,7 +6,8 @@ use metriplectic::lattices::LatticeError;
 use metriplectic::prelude::*;
 
 use crate::Kind;
-use crate::methods::{Every, Explicit};
+use crate::methods::{Every, OneStage};
+use crate::stages::Stages;
 
 /// Constants of a model, in units of its own: `q'' + γq' + ω²q = D sin Ωt`, in units of a length, a time and an energy.
 #[derive(Clone, Copy, Debug)]
@@ -323,8 +324,36 @@ pub(crate) fn numbers() -> Counter {
     Counter::new(11)
 }
 
+/// A run of a lattice by one of all methods.
+macro_rules! run_of_sites {
+    ($method:expr, $lattice:expr, $start:expr, $schedule:expr) => {{
+        macro_rules! by {
+            ($one:expr) => {
+                $one.run($lattice, $start, $schedule)
+            };
+        }
+        match $method {
+            Every::OneStage(OneStage::Weyl) => by!(WeylMidpoint),
+            Every::OneStage(OneStage::Chart) => by!(ChartMidpoint),
+            Every::OneStage(OneStage::Exponential) => by!(Exponential),
+            Every::OneStage(OneStage::MeanValue) => {
+                by!(Scheme::new(WeylMidpoint).gradient(MeanValue))
+            }
+            Every::OneStage(OneStage::ItohAbe) => by!(Scheme::new(WeylMidpoint).gradient(ItohAbe)),
+            Every::Implicit(Stages::Gauss1) => by!(Gauss::<1>),
+            Every::Implicit(Stages::Gauss2) => by!(Gauss::<2>),
+            Every::Implicit(Stages::Gauss3) => by!(Gauss::<3>),
+            Every::Implicit(Stages::Gauss4) => by!(Gauss::<4>),
+            Every::Implicit(Stages::Radau2) => by!(Radau::<2>),
+            Every::Implicit(Stages::Radau3) => by!(Radau::<3>),
+            Every::Implicit(Stages::Radau4) => by!(Radau::<4>),
+            Every::Explicit(method) => by!(method),
+        }
+    }};
+}
+
 /// A chain of three oscillators with friction in its bonds, whose heat both sites share.
-pub(crate) fn lattice(method: Explicit, asked: &Asked<'_>) -> Outcome {
+pub(crate) fn lattice(method: Every, asked: &Asked<'_>) -> Outcome {
     let world = asked.world;
     let lattice = Lattice::on(Graph::chain(3), Euclidean::<3>)
         .bracket(Poisson::constant(canonical()).expect("it is skew"))
@@ -345,12 +374,12 @@ pub(crate) fn lattice(method: Explicit, asked: &Asked<'_>) -> Outcome {
         .build()
         .expect("it is a lattice");
     let start = lattice.points(|i| world.with_heat(asked.start[i]));
-    let run = method.run(&lattice, start, asked.schedule.clone());
+    let run = run_of_sites!(method, &lattice, start, asked.schedule.clone());
     outcome(&world, run, |points| points.iter().flat_map(|x| three(&world, x)).collect())
 }
 
 /// A chain of three oscillators in a bath, with a motor at the first.
-pub(crate) fn open_lattice(method: Explicit, asked: &Asked<'_>) -> Outcome {
+pub(crate) fn open_lattice(method: Every, asked: &Asked<'_>) -> Outcome {
     let world = asked.world;
     let lattice = Lattice::on(Graph::chain(3), Euclidean::<2>)
         .bracket(Symplectic)
@@ -369,7 +398,8 @@ pub(crate) fn open_lattice(method: Explicit, asked: &Asked<'_>) -> Outcome {
             [Onsager { rate: world.friction(), b: vector![0.0, 1.0] }]
         });
     let start = lattice.lattice().points(|i| world.state([asked.start[i][0], asked.start[i][1]]));
-    let run = method.run(&lattice, lattice.start(start), asked.schedule.clone());
+    let start = lattice.start(start);
+    let run = run_of_sites!(method, &lattice, start, asked.schedule.clone());
     outcome(&world, run, |state| {
         let points = state.x.iter().flat_map(|x| two(&world, x));
         points.chain(work(&world, state)).chain(heat(&world, state)).collect()

@@ -10,10 +10,10 @@
 pub(crate) const CELLS: &str = "
 verb                                  | closed     | family    | open         | noisy     | noisy open | lattice  | open lattice | noisy lattice | own          | sizes
 
-`WeylMidpoint`                        | promises   | promises  | promises     | promises  | promises   | dense    | E0277        | dense path    | by parts     | by parts
-`Scheme` with `ItohAbe`               | promises   | promises  | promises     | promises  | promises   | dense    | E0277        | dense path    | by parts     | by parts
-`Gauss`                               | promises   | promises  | promises     | promises  | promises   | dense    | E0277        | dense path    | by parts     | by parts
-`Radau`                               | promises   | promises  | one bath     | no radau  | no radau   | dense    | E0277        | no radau      | by parts     | by parts
+`WeylMidpoint`                        | promises   | promises  | promises     | promises  | promises   | dense    | dense open   | dense path    | by parts     | by parts
+`Scheme` with `ItohAbe`               | promises   | promises  | promises     | promises  | promises   | dense    | dense open   | dense path    | by parts     | by parts
+`Gauss`                               | promises   | promises  | promises     | promises  | promises   | dense    | dense open   | dense path    | by parts     | by parts
+`Radau`                               | promises   | promises  | one bath     | no radau  | no radau   | dense    | dense bath   | no radau      | by parts     | by parts
 `DormandPrince8`                      | promises   | promises  | promises     | promises  | promises   | promises | promises     | frozen        | numbers      | numbers
 `RungeKuttaChebyshev`                 | promises   | promises  | promises     | promises  | promises   | promises | promises     | frozen        | numbers      | numbers
 `NinomiyaVictoir`                     | –          | –         | –            | promises  | promises   | –        | –            | ring          | –            | –
@@ -33,9 +33,9 @@ parameters in its builder             | promises   | promises  | E0599        | 
 `verify`                              | verify     | member    | surroundings | its noise | its noise  | sites    | sites open   | its ring      | by numbers   | by numbers
 `report`                              | report     | columns   | surroundings | its noise | its noise  | sites    | sites open   | its ring      | by numbers   | by numbers
 
-thermal noise in its builder          | promises   | E0599     | books        | –         | –          | ring     | E0599        | –             | E0277        | E0277
+thermal noise in its builder          | promises   | E0599     | books        | –         | –          | ring     | warm sites   | –             | E0277        | E0277
 an energy that depends on time        | promises   | E0599     | –            | books     | books      | E0599    | E0599        | E0599         | E0599        | E0599
-ports and baths                       | promises   | E0599     | –            | books     | –          | promises | –            | E0599         | E0599        | E0599
+ports and baths                       | promises   | E0599     | –            | books     | –          | promises | –            | warm sites    | E0599        | E0599
 
 events                                | events     | saltation | ledger       | no events | no events  | helix    | quench       | no events     | numbers runs | numbers runs
 jumps                                 | promises   | saltation | kicks        | no events | no events  | helix    | quench       | no events     | numbers runs | numbers runs
@@ -179,6 +179,21 @@ pub(crate) const TESTS: &[Reference] = &[
         ],
         "with sites on vector spaces and up to 1024 variables; others are refused (`NoImplicitSteps`)",
     ),
+    partly(
+        "dense open",
+        ["tests/lattices/open_implicit.rs", "sites_and_ledger_have_the_order_of_each_method"],
+        "with sites on vector spaces and up to 1024 variables; others are refused (`NoImplicitSteps`)",
+    ),
+    partly(
+        "dense bath",
+        [
+            "tests/lattices/open_implicit.rs",
+            "radau_gives_what_it_damps_to_the_only_bath_or_refuses",
+        ],
+        "with sites on vector spaces and up to 1024 variables (others: `NoImplicitSteps`), \
+         [without an entropy of their own and with one bath](open_systems.md#what-is-not-promised) (others: `NotDamped`)",
+    ),
+    right("warm sites", "tests/lattices/open_noise.rs", "bodies_in_a_room_have_the_law_of_gibbs"),
     partly(
         "dense path",
         ["tests/noise/lattice.rs", "a_path_of_a_ring_is_that_of_every_method"],

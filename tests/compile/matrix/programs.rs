@@ -100,6 +100,10 @@ const NOISE: &str = ".noise(Boltzmann(0.1))";
 const SITES: &str = ".opened()
     .work(\"torque\", [0], |t, _, p: &Vector3<f64>| p * t.sin())
     .bath(\"air\", 1.0, [1], |_, _: &SiteState<'_, LieDual<3>>| [Onsager { rate: 0.1, b: vector![0.0, 1.0, 0.0] }])";
+/// The surroundings of a lattice of bodies with heat.
+const ROOM: &str = ".opened()
+    .work(\"nothing\", [0], |t, _, u: &Vector1<f64>| u * 0.0)
+    .bath(\"room\", 1.0, [1], |_, at: &SiteState<'_, Euclidean<1>>| [Onsager { rate: at.x.x, b: vector![1.0] }])";
 
 /// The builder of a family, with a clock instead of its energy where there is one.
 fn family(has_clock: bool) -> String {
@@ -161,6 +165,7 @@ fn with(kind: Kind, part: &str) -> String {
         ("ports", Closed) => built(&format!("{ENERGY}{PORT}{BATH}")),
         ("ports", Family) => format!("let _ = {}{PORT}{BATH}.build()?;", family(false)),
         ("ports", Noisy) => built(&format!("{ENERGY}{PORT}{BATH}{NOISE}")),
+        (_, NoisyLattice) => format!("let _ = s{ROOM};"),
         (_, _) => format!("let _ = s{SITES};"),
     }
 }

@@ -27,7 +27,7 @@ struct Units {
 
 const ONE: Units = Units { energy: 1.0, entropy: 1.0, length: 1.0 };
 
-/// What a chain may have beside that of every test.
+/// The options of a chain.
 #[derive(Clone, Copy)]
 struct Options {
     units: Units,

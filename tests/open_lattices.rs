@@ -4,6 +4,8 @@
 mod implicit;
 #[path = "lattices/open_noise.rs"]
 mod noise;
+#[path = "lattices/open_ports.rs"]
+mod ports;
 #[path = "models/tables.rs"]
 mod tables;
 

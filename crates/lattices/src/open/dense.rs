@@ -3,7 +3,7 @@
 use metriplectic_dynamics::SecondLaw;
 use metriplectic_dynamics::invariants::Kind;
 use metriplectic_equations::{Apart, Covectors, Differences, Equations, Part, PointError, Sizes};
-use metriplectic_fields::Space as _;
+use metriplectic_fields::{Column as _, Space as _};
 use metriplectic_integrators::open::{Exchanged, OpenFlow, OpenSteps};
 use metriplectic_integrators::{
     Control, Directions, DiscreteGradient, Element, Entries, Flow as _, Gauss, Laws, Listed as _,
@@ -29,10 +29,32 @@ impl<P: Model> Driven<'_, P> {
         Dense(&self.0.lattice)
     }
 
-    /// The effects of ports and baths with these covectors of energy and entropy.
-    fn exchanged(&self, t: f64, x: &[f64], w: [&[f64]; 2]) -> OfParts<VectorOf<P>> {
-        let at = |site: usize| w.map(|w| column::<P>(w, site));
-        self.0.exchanged_with(t, &listed::<P::Manifold>(x), at)
+    /// The effects of ports and baths with these covectors `w_H` and `w_S` of energy and entropy.
+    ///
+    /// A port carries no entropy, `⟨dS, F⟩ = 0`. Where `w_S` is a discrete gradient it differs from the differential, and in a step
+    /// a port has the velocity `F − ♯w_S ⟨w_S, F⟩/⟨w_S, ♯w_S⟩`, as in a typed system.
+    fn exchanged(&self, t: f64, x: &[f64], [w, s]: [&[f64]; 2]) -> OfParts<VectorOf<P>> {
+        let lattice = self.0;
+        let at = |site: usize| [w, s].map(|w| column::<P>(w, site));
+        let mut exchanged = lattice.exchanged_with(t, &listed::<P::Manifold>(x), at);
+        let along_entropy = |a: &[f64]| s.iter().zip(a).map(|(s, a)| s * a).sum::<f64>();
+        let [square, warmed] = [s, w].map(along_entropy);
+        let (mut entry, mut fraction, count) = (0, 0.0, exchanged.velocities.len());
+        for (k, part) in lattice.parts.iter().enumerate() {
+            let end = exchanged.firsts.get(k + 1).copied().unwrap_or(count);
+            let own = &exchanged.velocities[exchanged.firsts[k]..end];
+            let carried: f64 = own.iter().map(|(site, v)| at(*site)[1].dot(v)).sum();
+            if !part.is_bath() && carried != 0.0 {
+                fraction += carried / square;
+                exchanged.entries[entry] -= carried / square * warmed;
+            }
+            entry += if part.is_bath() { 2 } else { 1 };
+        }
+        if fraction != 0.0 {
+            let along = |site: usize| (site, at(site)[1] * -fraction);
+            exchanged.velocities.extend((0..lattice.lattice.sites()).map(along));
+        }
+        exchanged
     }
 }
 

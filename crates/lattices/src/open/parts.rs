@@ -51,6 +51,8 @@ pub(super) struct AtSite<V> {
 /// The effects of all parts at a state, in a unit of time.
 pub(super) struct Exchanged<V> {
     pub(super) velocities: Vec<(usize, V)>,
+    /// The number of velocities before those of each part.
+    pub(super) firsts: Vec<usize>,
     /// The work of each port, the heat and the entropy of each bath.
     pub(super) entries: Vec<f64>,
     pub(super) production: f64,
@@ -118,9 +120,14 @@ impl<P: Model> OpenLattice<P> {
         x: &[PointOf<P>],
         covectors: impl Fn(usize) -> [VectorOf<P>; 2] + Sync,
     ) -> Exchanged<VectorOf<P>> {
-        let mut exchanged =
-            Exchanged { velocities: Vec::new(), entries: Vec::new(), production: 0.0 };
+        let mut exchanged = Exchanged {
+            velocities: Vec::new(),
+            firsts: Vec::new(),
+            entries: Vec::new(),
+            production: 0.0,
+        };
         for part in &self.parts {
+            exchanged.firsts.push(exchanged.velocities.len());
             let temperature = part.temperature(t).unwrap_or(0.0);
             let chunks = parallel::map(part.sites.len(), |range| {
                 let (mut power, mut production) = (Double::default(), Double::default());

@@ -32,7 +32,7 @@ impl<P: Model> OpenLattice<P> {
         all: &Differentials,
     ) -> Option<(OpenSiteVector, f64)> {
         let (mut v, internal) = self.lattice.motion_along::<true>(x, all)?;
-        let Exchanged { velocities, entries, production } = self.exchanged(t, x, all);
+        let Exchanged { velocities, entries, production, .. } = self.exchanged(t, x, all);
         for (site, more) in velocities {
             v.add_at(site, &more);
         }

@@ -12,9 +12,14 @@ mod tables;
 use metriplectic::lattices::OpenLattice;
 use metriplectic::lattices::model::Model;
 use metriplectic::prelude::*;
+use metriplectic_studies::{Claim, Guarantee};
 
 type Rod = Euclidean<1>;
 type Mass = Euclidean<2>;
+
+fn claim(problem: &str, method: &str) -> Claim {
+    Claim::new(Guarantee::ManySites, problem, method)
+}
 
 /// Heat in a rod: the energy `u` and the entropy `ln u` of each site, and the flux `v − u` in a bond.
 fn rod(sites: usize) -> Lattice<impl Model<Manifold = Rod>> {

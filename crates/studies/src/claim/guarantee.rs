@@ -196,9 +196,14 @@ impl Guarantee {
             Self::RandomInput => {
                 ("Input without sense never panics", &["**Fuzzed input** never panics"], &[])
             }
-            Self::ManySites => {
-                ("Lattices keep both laws", &["A lattice has the same laws"], &["heat_chain"])
-            }
+            Self::ManySites => (
+                "Lattices keep both laws",
+                &[
+                    "A lattice has the same laws",
+                    "With ports and baths implicit steps keep the balance of work and heat",
+                ],
+                &["heat_chain"],
+            ),
             Self::Reproducibility => {
                 ("The same inputs have the same bits", &["A run has the same bits each time"], &[])
             }

@@ -230,6 +230,22 @@ fn one_part(
     if part == Part::Gyroscopic {
         return Ok(v);
     }
+    if part == Part::Irreversible {
+        let mut slope = nan(n * n);
+        let depends = system.friction_along_entropy(t, x, w, alpha, &mut slope).map_err(exists)?;
+        let turned: Vec<f64> =
+            w.entropy.iter().enumerate().map(|(i, c)| c * (1.0 + i as f64).sin()).collect();
+        let along = if depends {
+            slope.chunks_exact(n).map(|row| dot(row, &turned)).collect()
+        } else {
+            vec![0.0; n]
+        };
+        derivative("a friction has its derivative along the entropy", &along, &|s, to| {
+            let moved: Vec<f64> = w.entropy.iter().zip(&turned).map(|(c, d)| c + s * d).collect();
+            let w = Covectors { entropy: &moved, ..w };
+            to.extend(apply(&still, w, alpha).unwrap_or_else(|_| nan(n)));
+        })?;
+    }
     let mut tensor = nan(n * n);
     system.tensor(part, t, x, w, &mut tensor).map_err(exists)?;
     near("the derivative along α is the tensor", &slopes, &tensor)?;

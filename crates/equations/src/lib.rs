@@ -42,7 +42,7 @@ pub mod room;
 pub mod second_law;
 
 pub use broken_law::BrokenLaw;
-pub use differences::{Apart, Differences};
+pub use differences::{Apart, Differences, Slopes, slopes};
 pub use equations::{ENERGY, ENTROPY, Equations, Sizes};
 pub use kind::Kind;
 pub use metric_error::{MetricError, NotPositive};

@@ -175,6 +175,27 @@ pub trait Model: Equations {
         jet: &mut Jet<'_>,
     ) -> Result<(), MetricError>;
 
+    /// Evaluates the derivatives of `K_w α` along the covector of the entropy, and returns whether a friction may depend on it. The default
+    /// is that of one that does not, by construction.
+    ///
+    /// [`linearise`](Self::linearise) leaves them out, because Newton's method needs no more derivatives than are worth their cost. The
+    /// derivative of a step needs all.
+    ///
+    /// # Errors
+    ///
+    /// [`MetricError`] if the metric cannot be used there.
+    fn friction_along_entropy(
+        &self,
+        t: f64,
+        x: &[f64],
+        w: Covectors<'_>,
+        alpha: &[f64],
+        slope: &mut [f64],
+    ) -> Result<bool, MetricError> {
+        let _ = (t, x, w, alpha, slope);
+        Ok(false)
+    }
+
     /// Evaluates the derivative of the tensor of the bracket along the direction `u` at a state, with the covector of
     /// the entropy that changes by `ds`.
     ///

@@ -33,6 +33,7 @@ enum Fault {
     Vector,
     AlongState,
     AlongCovector,
+    AlongEntropy,
     Tensor,
     BracketSlope,
     /// The bracket is not skew.
@@ -66,6 +67,12 @@ impl Body {
 
     fn differential(law: usize, x: &[f64]) -> [f64; N] {
         std::array::from_fn(|i| if law == ENERGY { RATES[i] * x[i] } else { x[i] })
+    }
+
+    /// A part of a friction that depends on the covector of the entropy.
+    fn by_entropy(&self, part: Part, w: Covectors<'_>) -> f64 {
+        let is_there = self.0 == Fault::AlongEntropy && part == Part::Irreversible;
+        if is_there { 1e-3 * w.entropy[0] } else { 0.0 }
     }
 
     /// `Π α = α × x` or `K_w α`.
@@ -229,7 +236,7 @@ impl Model for Body {
     ) -> Result<(), MetricError> {
         let y: [f64; N] = std::array::from_fn(|i| x[i] + q[i]);
         v.copy_from_slice(&self.part(part, &y, w.energy, alpha));
-        v[1] += 1e-3 * self.has(Fault::Vector);
+        v[1] += 1e-3 * self.has(Fault::Vector) + self.by_entropy(part, w);
         Ok(())
     }
 
@@ -243,6 +250,7 @@ impl Model for Body {
         jet: &mut Jet<'_>,
     ) -> Result<(), MetricError> {
         jet.value.copy_from_slice(&self.part(part, x, w.energy, alpha));
+        jet.value[1] += self.by_entropy(part, w);
         self.tensor(part, t, x, w, jet.tensor)?;
         let (w, along) = (w.energy, dot(w.energy, alpha));
         for k in 0..N {
@@ -332,6 +340,7 @@ fn each_wrong_answer_breaks_the_law_of_its_name() {
         (Fault::Vector, "derivatives come with the vector of a part"),
         (Fault::AlongState, "along_x is the derivative along the state"),
         (Fault::AlongCovector, "along_w is the derivative along a covector"),
+        (Fault::AlongEntropy, "a friction has its derivative along the entropy"),
         (Fault::Tensor, "the columns of a tensor are the vectors of its part"),
         (Fault::BracketSlope, "the slope of the bracket is its derivative"),
     ] {

@@ -155,7 +155,8 @@ fn times_of_events_have_derivatives() {
         .time_along(&|p: &Vector3<Real>| (p.x * p.x / 3.0 + p.y * p.y / 2.0 + p.z * p.z) * 0.5);
     assert!(matches!(grazing, Err(TangentError::Grazing { .. })));
     // A function with a slope of 2·10⁻⁶ of what is possible crosses, one of 5·10⁻⁷ does not.
-    let (v, units) = (event.velocity, event.sizes);
+    let [v, units]: [Vector3<f64>; 2] =
+        [&event.velocity, &event.sizes].map(|v| v.fixed_rows::<3>(0).into_owned());
     let along = v.component_div(&units).normalize();
     let across = along.cross(&Vector3::x()).normalize();
     let crosses = |slope: f64| {
@@ -191,10 +192,11 @@ fn events_do_not_depend_on_units() {
                 let run = $method.tangent(&oscillator(a, b), vector![a, 0.0], span).unwrap();
                 let event = &run.events()[0];
                 // A slope of 2·10⁻⁶ of what is possible crosses, one of 5·10⁻⁷ does not.
-                let along = event.velocity.component_div(&event.sizes).normalize();
+                let [velocity, sizes]: [Vector2<f64>; 2] =
+                    [&event.velocity, &event.sizes].map(|v| v.fixed_rows::<2>(0).into_owned());
+                let along = velocity.component_div(&sizes).normalize();
                 let crosses = |slope: f64| {
-                    let df =
-                        (vector![-along.y, along.x] + along * slope).component_div(&event.sizes);
+                    let df = (vector![-along.y, along.x] + along * slope).component_div(&sizes);
                     event.time_along(&move |x: &Vector2<Real>| x.x * df.x + x.y * df.y).is_ok()
                 };
                 assert!(crosses(2e-6) && !crosses(5e-7), "{}: units {a:e} and {b:e}", $name);

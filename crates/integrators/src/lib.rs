@@ -96,7 +96,7 @@ pub use step::{
     StateSpace, StepEnds, StepError, StepStart, Stepper, Taken, Values, Vector,
 };
 pub use tangent::{
-    AdjointRun, Adjoints, Linearised as LinearisedStep, LinearisedAlong, LossGradient, SelfAdjoint,
-    Sensitivity, TangentError, TangentEvent, TangentRun, TangentState, TangentSteps, Tangents,
-    Unlinearised,
+    AdjointRun, Adjoints, Differentiated, Linearised as LinearisedStep, LinearisedAlong,
+    LossGradient, SelfAdjoint, Sensitivity, TangentError, TangentEvent, TangentRun, TangentState,
+    TangentSteps, Tangents, Unlinearised,
 };

@@ -54,5 +54,6 @@ pub use projection::OpenGradients;
 pub use stages::NotDamped;
 pub use state::{Booked, Ledger, OpenSpace, OpenState};
 pub use system::OpenSystem;
+pub(crate) use system::StateOf;
 pub use vector::OpenVector;
 pub use view::{Closed, EnergyAt, Frozen};

@@ -56,7 +56,21 @@ const ROOMS: [(&str, &[&str]); 19] = [
     ("error", &["step", "run", "noise", "attitude"]),
     (
         "tangent",
-        &["step", "round_off", "discrete_gradient", "midpoint", "collocation", "explicit", "run"],
+        &[
+            "step",
+            "round_off",
+            "discrete_gradient",
+            "midpoint",
+            "collocation",
+            "explicit",
+            "system",
+            "numbers",
+            "implicit",
+            "compiled",
+            "run",
+            "noise",
+            "open",
+        ],
     ),
     ("laws", &["step", "round_off", "discrete_gradient", "midpoint", "explicit", "run"]),
 ];

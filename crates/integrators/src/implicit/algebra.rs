@@ -50,7 +50,7 @@ pub(super) fn add(v: &mut impl List, c: f64, w: &impl List) {
 }
 
 /// A square matrix, row by row.
-pub(super) struct Matrix<L: Lengths> {
+pub(crate) struct Matrix<L: Lengths> {
     n: usize,
     a: L::Matrix,
 }
@@ -89,7 +89,7 @@ impl<L: Lengths> IndexMut<(usize, usize)> for Matrix<L> {
 impl<L: Lengths> Matrix<L> {
     /// The matrix of zeros.
     #[inline]
-    pub(super) fn zeros(n: usize) -> Self {
+    pub(crate) fn zeros(n: usize) -> Self {
         Self { n, a: L::Matrix::room(|| n * n) }
     }
 
@@ -105,7 +105,7 @@ impl<L: Lengths> Matrix<L> {
 
     /// The multiple of the identity.
     #[inline]
-    pub(super) fn scaled_one(n: usize, c: f64) -> Self {
+    pub(crate) fn scaled_one(n: usize, c: f64) -> Self {
         Self::of(n, |i, j| if i == j { c } else { 0.0 })
     }
 
@@ -117,7 +117,7 @@ impl<L: Lengths> Matrix<L> {
 
     /// All numbers, row by row.
     #[inline]
-    pub(super) fn numbers(&self) -> &[f64] {
+    pub(crate) fn numbers(&self) -> &[f64] {
         self.a.numbers()
     }
 

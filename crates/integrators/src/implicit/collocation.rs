@@ -16,10 +16,12 @@ mod kept;
 mod linear;
 mod memory;
 mod parts;
+mod root;
 mod solve;
 mod step;
 mod timed;
 
 pub(crate) use memory::StageNumbers;
+pub(crate) use root::StageRoot;
 pub(crate) use step::Collocation;
 pub(super) use timed::{Stage, StageSolution, TimedStep};

@@ -7,8 +7,11 @@ mod level;
 mod memory;
 mod newton;
 mod restored;
+mod root;
 mod step;
 
+pub(crate) use equation::FromEnd;
 pub(crate) use memory::MidpointNumbers;
+pub(crate) use root::from_end;
 pub(crate) use step::Midpoint;
 pub(super) use step::Solution;

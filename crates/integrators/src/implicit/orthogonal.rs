@@ -154,7 +154,7 @@ impl<V: List> Orthogonal<V> {
 }
 
 /// [`Orthogonal`] in the canonical inner product, where every quantity has its derivatives along the unknown of a step.
-pub(super) struct OrthogonalJet<L: Lengths>(SmallVec<[NormalJet<L>; 1]>);
+pub(crate) struct OrthogonalJet<L: Lengths>(SmallVec<[NormalJet<L>; 1]>);
 
 struct NormalJet<L: Lengths> {
     /// The covector `n`, which is `♯n` as well.
@@ -218,7 +218,7 @@ fn without<L: Lengths>(
 }
 
 impl<L: Lengths> OrthogonalJet<L> {
-    pub(super) fn none() -> Self {
+    pub(crate) fn none() -> Self {
         Self(SmallVec::new())
     }
 
@@ -258,7 +258,7 @@ impl<L: Lengths> OrthogonalJet<L> {
     }
 
     /// Adds a covector.
-    pub(super) fn push(&mut self, w: &WithJacobian<L>) {
+    pub(crate) fn push(&mut self, w: &WithJacobian<L>) {
         let n = self.projected(0, &self.projected(0, w));
         let most = w.value.numbers().len();
         if magnitude(&n.value) > INDEPENDENT * magnitude(&w.value) && self.0.len() < most {
@@ -269,7 +269,7 @@ impl<L: Lengths> OrthogonalJet<L> {
     }
 
     /// Projects a vector or a covector off the covectors from the `first` on.
-    pub(super) fn projected(&self, first: usize, v: &WithJacobian<L>) -> WithJacobian<L> {
+    pub(crate) fn projected(&self, first: usize, v: &WithJacobian<L>) -> WithJacobian<L> {
         let normals = self.0[first..].iter();
         normals.fold(v.clone(), |v, NormalJet { n, square, .. }| without(&v, n, n, square))
     }

@@ -11,19 +11,19 @@ use crate::system::NO_CLOCK;
 
 /// One number, vector or law for each field.
 #[derive(Clone, Debug)]
-pub(super) struct OfLaws<V> {
+pub(crate) struct OfLaws<V> {
     /// Of the energy.
-    pub(super) energy: V,
+    pub(crate) energy: V,
     /// Of the entropy.
-    pub(super) entropy: V,
+    pub(crate) entropy: V,
     /// Of each further invariant, in their order.
-    pub(super) invariants: Vec<V>,
+    pub(crate) invariants: Vec<V>,
 }
 
 impl<V> OfLaws<V> {
     /// A function of each.
     #[inline]
-    pub(super) fn map<T>(&self, mut f: impl FnMut(&V) -> T) -> OfLaws<T> {
+    pub(crate) fn map<T>(&self, mut f: impl FnMut(&V) -> T) -> OfLaws<T> {
         OfLaws {
             energy: f(&self.energy),
             entropy: f(&self.entropy),
@@ -34,9 +34,9 @@ impl<V> OfLaws<V> {
 
 /// A vector, and its derivatives along the unknown of a step: a column for each direction.
 #[derive(Debug)]
-pub(super) struct WithJacobian<L: Lengths> {
-    pub(super) value: L::Vector,
-    pub(super) slope: Matrix<L>,
+pub(crate) struct WithJacobian<L: Lengths> {
+    pub(crate) value: L::Vector,
+    pub(crate) slope: Matrix<L>,
 }
 
 impl<L: Lengths> Clone for WithJacobian<L> {
@@ -47,9 +47,9 @@ impl<L: Lengths> Clone for WithJacobian<L> {
 }
 
 /// The differential of a law at a point, and its Hessian.
-pub(super) struct Second<L: Lengths> {
-    pub(super) df: L::Vector,
-    pub(super) hf: Matrix<L>,
+pub(crate) struct Second<L: Lengths> {
+    pub(crate) df: L::Vector,
+    pub(crate) hf: Matrix<L>,
 }
 
 /// The vector of a part of the motion with its derivatives.
@@ -61,28 +61,28 @@ pub(super) struct PartJet<L: Lengths> {
 }
 
 /// A model, with the answers that do not change.
-pub(super) struct Parts<'a, L: Lengths> {
+pub(crate) struct Parts<'a, L: Lengths> {
     model: &'a dyn Model,
     /// The time of its force, which nothing else depends on.
     time: f64,
     count: usize,
     /// Why each further invariant is conserved.
-    pub(super) kinds: Vec<Kind>,
+    pub(crate) kinds: Vec<Kind>,
     /// Whether the entropy has a discrete gradient.
-    pub(super) is_exact: bool,
+    pub(crate) is_exact: bool,
     /// Whether there is a bracket.
     pub(super) moves: bool,
     /// Whether there is a force.
     pub(super) is_forced: bool,
     /// Whether there is friction.
-    pub(super) rubs: bool,
+    pub(crate) rubs: bool,
     /// Whether the bracket annihilates every covector of the entropy.
     pub(super) annihilates_entropy: bool,
     lengths: std::marker::PhantomData<L>,
 }
 
 impl<'a, L: Lengths> Parts<'a, L> {
-    pub(super) fn of(model: &'a dyn Model) -> Self {
+    pub(crate) fn of(model: &'a dyn Model) -> Self {
         let Sizes { directions, laws, .. } = model.sizes();
         let further = if L::HAS_INVARIANTS { laws.saturating_sub(ENTROPY + 1) } else { 0 };
         Self {
@@ -106,7 +106,7 @@ impl<'a, L: Lengths> Parts<'a, L> {
 
     /// The number of directions.
     #[inline]
-    pub(super) fn n(&self) -> usize {
+    pub(crate) fn n(&self) -> usize {
         L::directions(self.count)
     }
 
@@ -134,13 +134,13 @@ impl<'a, L: Lengths> Parts<'a, L> {
 
     /// The number of the law of a further invariant.
     #[inline]
-    pub(super) const fn invariant(k: usize) -> usize {
+    pub(crate) const fn invariant(k: usize) -> usize {
         ENTROPY + 1 + k
     }
 
     /// A number for each law, from its number.
     #[inline]
-    pub(super) fn each_law<V>(&self, mut f: impl FnMut(usize) -> V) -> OfLaws<V> {
+    pub(crate) fn each_law<V>(&self, mut f: impl FnMut(usize) -> V) -> OfLaws<V> {
         OfLaws {
             energy: f(ENERGY),
             entropy: f(ENTROPY),
@@ -189,7 +189,7 @@ impl<'a, L: Lengths> Parts<'a, L> {
 
     /// A law with its differential.
     #[inline]
-    pub(super) fn jet(&self, law: usize, x: &L::State) -> (f64, L::Vector) {
+    pub(crate) fn jet(&self, law: usize, x: &L::State) -> (f64, L::Vector) {
         let mut df = self.zero();
         let value = self.model.jet(law, self.time, x.numbers(), df.numbers_mut());
         (value, df)
@@ -197,7 +197,7 @@ impl<'a, L: Lengths> Parts<'a, L> {
 
     /// The differential of a law and its Hessian.
     #[inline]
-    pub(super) fn second(&self, law: usize, x: &L::State) -> Second<L> {
+    pub(crate) fn second(&self, law: usize, x: &L::State) -> Second<L> {
         let (mut df, mut hf) = (self.zero(), self.zeros());
         self.model.hessian(law, self.time, x.numbers(), df.numbers_mut(), hf.numbers_mut());
         Second { df, hf }
@@ -243,6 +243,20 @@ impl<'a, L: Lengths> Parts<'a, L> {
         let (part, x) = (Part::Irreversible, x.numbers());
         self.model.tensor(part, self.time, x, w, k.numbers_mut()).ok()?;
         Some(k)
+    }
+
+    /// The derivatives of the friction along the covector of the entropy, or none if it does not depend on it; `None` where it has no
+    /// value.
+    pub(super) fn friction_along_entropy(
+        &self,
+        z: &L::State,
+        [energy, entropy, alpha]: [&L::Vector; 3],
+    ) -> Option<Option<Matrix<L>>> {
+        let (w, mut slope) = (covectors::<L>(energy, entropy), self.zeros());
+        let (z, to) = (z.numbers(), slope.numbers_mut());
+        let depends =
+            self.model.friction_along_entropy(NO_CLOCK, z, w, alpha.numbers(), to).ok()?;
+        Some(depends.then_some(slope))
     }
 
     /// The vector of a part with its derivatives; `None` where it has no value.

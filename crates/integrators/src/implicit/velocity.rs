@@ -115,19 +115,21 @@ impl<L: Lengths> Parts<'_, L> {
 }
 
 /// The velocity with its derivatives along the unknown of a step.
-pub(super) struct VelocityJet<L: Lengths> {
+pub(crate) struct VelocityJet<L: Lengths> {
     /// The velocity, and its derivatives.
-    pub(super) velocity: WithJacobian<L>,
+    pub(crate) velocity: WithJacobian<L>,
     /// The sum of the absolute terms of each component. Its round-off is relative to this sum.
-    pub(super) terms: L::Vector,
+    pub(crate) terms: L::Vector,
     /// The derivative of the velocity along `w_H`, without the derivative of the projections.
-    pub(super) sensitivity: Matrix<L>,
+    pub(crate) sensitivity: Matrix<L>,
     /// The entropy production `⟨w_S, K̃ w_S⟩`.
-    pub(super) production: f64,
+    pub(crate) production: f64,
     /// The rate of the friction, `√|tr A²|` with `A` the derivative of `K̃ w_S` along the unknown.
-    pub(super) friction: f64,
+    pub(crate) friction: f64,
     /// The rate of `Π̃ w_H`.
-    pub(super) rotation: f64,
+    pub(crate) rotation: f64,
+    /// The part `K̃ w_S` with the vector of a force, if there is one.
+    pub(crate) irreversible: Option<WithJacobian<L>>,
 }
 
 /// A part of the velocity.
@@ -157,6 +159,8 @@ struct Linearisation<'a, L: Lengths> {
     /// The derivative of the point, a multiple of the identity.
     dz: f64,
     w: &'a OfLaws<WithJacobian<L>>,
+    /// Whether the derivatives of a friction along the covector of the entropy are asked for, which Newton's method leaves out.
+    is_whole: bool,
 }
 
 impl<L: Lengths> Linearisation<'_, L> {
@@ -173,6 +177,12 @@ impl<L: Lengths> Linearisation<'_, L> {
         let mut slope = scaled(&jet.along_x, self.dz);
         slope.add(1.0, &jet.along_w.product(&other.slope));
         slope.add(1.0, &jet.tensor.product(&alpha.slope));
+        if self.is_whole
+            && part == Part::Irreversible
+            && let Some(along_entropy) = self.parts.friction_along_entropy(self.z, w)?
+        {
+            slope.add(1.0, &along_entropy.product(&entropy.slope));
+        }
         let terms = terms(&jet.tensor, &alpha.value);
         let vector = WithJacobian { value: jet.value.clone(), slope };
         let tensor = jet.tensor.clone();
@@ -184,6 +194,15 @@ impl<L: Lengths> Linearisation<'_, L> {
         let zeros = || self.parts.zeros();
         let vector = WithJacobian { value: self.parts.zero(), slope: zeros() };
         OfPart { vector, tensor: zeros(), terms: self.parts.zero() }
+    }
+
+    /// `Π w_H` without a projection, as it is written by hand.
+    fn written(&self) -> Option<OfPart<L>> {
+        let &Self { parts, w, .. } = self;
+        if !parts.moves {
+            return Some(self.none());
+        }
+        Some(self.part(Part::Reversible, &w.energy, &w.entropy)?.1)
     }
 
     fn reversible(&self) -> Option<OfPart<L>> {
@@ -249,54 +268,103 @@ impl<L: Lengths> Linearisation<'_, L> {
 }
 
 /// Computes the velocity at a point, with the derivatives along the unknown of a step, from those of the covectors and of the point,
-/// a multiple `dz` of the identity; `None` where it has no value.
+/// a multiple `dz` of the identity; `None` where it has no value. They are those of Newton's method, which leaves out that of a
+/// friction along the covector of the entropy.
 pub(super) fn velocity_jet<L: Lengths>(
     parts: &Parts<'_, L>,
     z: &L::State,
     dz: f64,
     w: &OfLaws<WithJacobian<L>>,
 ) -> Option<VelocityJet<L>> {
-    let at = Linearisation { parts, z, dz, w };
-    let pi = at.reversible()?;
-    let mut normals = OrthogonalJet::none();
-    let (mut first, mut alpha) = (0, None);
-    if !parts.kinds.is_empty() {
-        normals.push(&w.energy);
-        first = normals.len();
-        w.invariants.iter().for_each(|l| normals.push(l));
-        alpha = Some(normals.projected(first, &w.entropy));
+    Linearisation { parts, z, dz, w, is_whole: false }.velocity()
+}
+
+/// Computes [`velocity_jet`] with all derivatives.
+pub(crate) fn whole_velocity_jet<L: Lengths>(
+    parts: &Parts<'_, L>,
+    z: &L::State,
+    dz: f64,
+    w: &OfLaws<WithJacobian<L>>,
+) -> Option<VelocityJet<L>> {
+    Linearisation { parts, z, dz, w, is_whole: true }.velocity()
+}
+
+/// Computes the velocity `Π dH + f(dH) + K dS` at a state, as it is written by hand, with all derivatives along the state.
+pub(super) fn written_velocity_jet<L: Lengths>(
+    parts: &Parts<'_, L>,
+    z: &L::State,
+    w: &OfLaws<WithJacobian<L>>,
+) -> Option<VelocityJet<L>> {
+    let at = Linearisation { parts, z, dz: 1.0, w, is_whole: true };
+    at.with_reversible(at.written()?)
+}
+
+/// Computes the part `Π̃ w_H` of a [velocity](whole_velocity_jet).
+pub(crate) fn reversible_jet<L: Lengths>(
+    parts: &Parts<'_, L>,
+    z: &L::State,
+    dz: f64,
+    w: &OfLaws<WithJacobian<L>>,
+) -> Option<WithJacobian<L>> {
+    Some(Linearisation { parts, z, dz, w, is_whole: true }.reversible()?.vector)
+}
+
+impl<L: Lengths> Linearisation<'_, L> {
+    fn velocity(&self) -> Option<VelocityJet<L>> {
+        self.with_reversible(self.reversible()?)
     }
-    let alpha = alpha.as_ref().unwrap_or(&w.entropy);
-    let (mut sum, mut terms, mut sensitivity) = (pi.vector.clone(), pi.terms, pi.tensor);
-    let mut irreversible = None;
-    if parts.rubs {
-        let (jet, k) = at.part(Part::Irreversible, alpha, &w.energy)?;
-        let amplified = 1.0 + normals.amplification(first, MOMENTUM);
-        add(&mut terms, 1.0, &k.terms);
-        normals.add_terms(first, &k.vector.value, MOMENTUM, (&mut terms, amplified));
-        sensitivity.add(1.0, &jet.along_w);
-        irreversible = Some(normals.projected(first, &k.vector));
+
+    /// The velocity with this reversible part.
+    fn with_reversible(&self, pi: OfPart<L>) -> Option<VelocityJet<L>> {
+        let &Self { parts, w, .. } = self;
+        let mut normals = OrthogonalJet::none();
+        let (mut first, mut alpha) = (0, None);
+        if !parts.kinds.is_empty() {
+            normals.push(&w.energy);
+            first = normals.len();
+            w.invariants.iter().for_each(|l| normals.push(l));
+            alpha = Some(normals.projected(first, &w.entropy));
+        }
+        let alpha = alpha.as_ref().unwrap_or(&w.entropy);
+        let (mut sum, mut terms, mut sensitivity) = (pi.vector.clone(), pi.terms, pi.tensor);
+        let mut irreversible = None;
+        if parts.rubs {
+            let (jet, k) = self.part(Part::Irreversible, alpha, &w.energy)?;
+            let amplified = 1.0 + normals.amplification(first, MOMENTUM);
+            add(&mut terms, 1.0, &k.terms);
+            normals.add_terms(first, &k.vector.value, MOMENTUM, (&mut terms, amplified));
+            sensitivity.add(1.0, &jet.along_w);
+            irreversible = Some(normals.projected(first, &k.vector));
+        }
+        if parts.is_forced {
+            let force = self.force()?;
+            add(&mut terms, 1.0, &force.terms);
+            sensitivity.add(1.0, &force.tensor);
+            irreversible = Some(match irreversible {
+                Some(mut sum) => {
+                    add(&mut sum.value, 1.0, &force.vector.value);
+                    sum.slope.add(1.0, &force.vector.slope);
+                    sum
+                }
+                None => force.vector,
+            });
+        }
+        let rotation = pi.vector.slope.trace_of_square().abs().sqrt();
+        let (mut production, mut friction) = (0.0, 0.0);
+        if let Some(irreversible) = &irreversible {
+            production = dot(&w.entropy.value, &irreversible.value);
+            friction = irreversible.slope.trace_of_square().abs().sqrt();
+            add(&mut sum.value, 1.0, &irreversible.value);
+            sum.slope.add(1.0, &irreversible.slope);
+        }
+        Some(VelocityJet {
+            velocity: sum,
+            terms,
+            sensitivity,
+            production,
+            friction,
+            rotation,
+            irreversible,
+        })
     }
-    if parts.is_forced {
-        let force = at.force()?;
-        add(&mut terms, 1.0, &force.terms);
-        sensitivity.add(1.0, &force.tensor);
-        irreversible = Some(match irreversible {
-            Some(mut sum) => {
-                add(&mut sum.value, 1.0, &force.vector.value);
-                sum.slope.add(1.0, &force.vector.slope);
-                sum
-            }
-            None => force.vector,
-        });
-    }
-    let rotation = pi.vector.slope.trace_of_square().abs().sqrt();
-    let (mut production, mut friction) = (0.0, 0.0);
-    if let Some(irreversible) = irreversible {
-        production = dot(&w.entropy.value, &irreversible.value);
-        friction = irreversible.slope.trace_of_square().abs().sqrt();
-        add(&mut sum.value, 1.0, &irreversible.value);
-        sum.slope.add(1.0, &irreversible.slope);
-    }
-    Some(VelocityJet { velocity: sum, terms, sensitivity, production, friction, rotation })
 }

@@ -353,7 +353,7 @@ where
     }
 
     /// The differentials of all laws at a point.
-    pub(super) fn covectors(&self, t: f64, x: &Point<Y>) -> CovectorsOf<Y> {
+    pub(crate) fn covectors(&self, t: f64, x: &Point<Y>) -> CovectorsOf<Y> {
         differentials(&self.without_exchange(t), &ChartPoint::<Y::Manifold>::centre(x))
     }
 

@@ -229,6 +229,17 @@ impl Ledger {
         Some(self.sums[self.columns.index(name, kind)? + 1][0])
     }
 
+    /// The places of the work of a port, and of the heat and the entropy of a bath, behind the work of the parameter.
+    pub(crate) fn places(&self, name: &str) -> [Option<usize>; 3] {
+        [Kind::Work, Kind::Heat, Kind::Entropy]
+            .map(|kind| self.columns.index(name, kind).map(|index| index + 1))
+    }
+
+    /// How many sums there are, that of the work of the parameter among them.
+    pub(crate) fn count(&self) -> usize {
+        self.sums.len()
+    }
+
     /// The work of the [events that change the state](crate::Watched::jump), into the system.
     pub const fn event_work(&self) -> f64 {
         self.events[0][0]

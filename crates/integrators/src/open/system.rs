@@ -73,7 +73,7 @@ pub(super) type Direction<Y, X> =
 pub(super) type CovectorsOf<Y> = Covectors<CountOf<Y>, Vector<<Y as Metriplectic>::Manifold>>;
 
 /// A state of an open system.
-pub(super) type StateOf<Y> = OpenState<Point<Y>>;
+pub(crate) type StateOf<Y> = OpenState<Point<Y>>;
 
 impl<Y, C, X> OpenSystem<Y, C, X>
 where

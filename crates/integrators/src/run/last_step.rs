@@ -2,7 +2,7 @@
 
 use crate::run::controller::StepSize;
 use crate::run::steps::Steps;
-use crate::step::{EntropyStep, Flow, Laws, Memory as _, Scales, StepStart, Stepper};
+use crate::step::{EntropyStep, Flow, Laws, Memory as _, Saved, Scales, StepStart, Stepper};
 
 /// The last step of a run.
 #[derive(Debug)]
@@ -29,6 +29,25 @@ impl<'a, F: Flow + ?Sized, M: Stepper<F>> Steps<'a, F, M> {
     /// The sizes by which the next step is judged.
     pub(crate) fn scales(&self) -> Scales<F::Vector> {
         self.course.progress.scales.clone()
+    }
+
+    /// The memory before the next step, without what the method extrapolates from.
+    pub(crate) fn saved_memory(&self) -> Saved {
+        let mut saved = Saved::default();
+        self.memory.restarted().save(&mut saved);
+        saved
+    }
+
+    /// The sizes that the entries have, or soon have: by the scales of steps that follow a tolerance, and by the motion in all steps of
+    /// one size.
+    pub(crate) fn known_sizes(&self) -> F::Vector {
+        match &self.course.progress.step_size {
+            StepSize::Fixed(size) => {
+                let span = self.course.progress.count.map_or(*size, |count| count as f64 * size);
+                Scales::at(self.flow, &self.course.state.point, Some(span.abs())).sizes
+            }
+            StepSize::Adaptive(_) => self.scales().sizes,
+        }
     }
 
     /// Returns whether the steps follow a tolerance.

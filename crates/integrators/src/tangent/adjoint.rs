@@ -1,30 +1,24 @@
 //! Gradients of losses over a run, by the transposed steps from its end to its start.
 
 use std::fmt;
+use std::ops::Index;
 
-use metriplectic_dynamics::system::Point;
-use metriplectic_dynamics::{Differentiable, Metriplectic};
-use metriplectic_fields::{Column as _, Dimension as _, Jet1, Real, ScalarField, Space, Vector};
+use metriplectic_fields::Real;
 use nalgebra::DVector;
 
-use super::along::LinearisedAlong;
+use super::differentiated::Differentiated;
 use super::error::TangentError;
-use super::part::{Part, Wide};
+use super::part::Part;
+use super::steps::in_wide_room;
 use super::tape::{Segment, Tape, TapedStep};
 use crate::run::certificate::Certificate;
 use crate::run::ending::Ending;
 use crate::run::paired::{Unpaired, paired};
 use crate::run::schedule::Schedule;
 use crate::run::state::State;
-use crate::step::{Dim, Stepper, in_room};
+use crate::step::{Element, Flow, Stepper};
 
-/// A derivative along a state of the wide system.
-type Costate<D> = Vector<<Wide<D> as Metriplectic>::Manifold>;
-
-/// A point whose entries carry derivatives.
-type Moving<D> = <<D as Metriplectic>::Manifold as Space>::Point<Real>;
-
-/// Runs whose losses have gradients, by every method whose steps are [linearised](LinearisedAlong).
+/// Runs whose losses have gradients, by every method whose steps are [differentiated](Differentiated).
 ///
 /// A loss `ℓ = Σ_k ℓ_k(x_k)` over states of a run has the gradient `(∂ℓ/∂x₀, ∂ℓ/∂θ)`. Its costate goes from the end to the
 /// start, by the transposed derivatives of the discrete steps:
@@ -76,15 +70,15 @@ pub trait Adjoints: Sized {
     /// # Errors
     ///
     /// [`TangentError`]; [`TangentError::Broken`] if the schedule has events or corners.
-    fn adjoint<D>(
+    fn adjoint<F>(
         self,
-        system: &D,
-        x0: Point<D>,
+        system: &F,
+        x0: Element<F>,
         schedule: impl Into<Schedule>,
-    ) -> Result<AdjointRun<'_, D, Self>, TangentError<D::Manifold>>
+    ) -> Result<AdjointRun<'_, F, Self>, TangentError<F::Space>>
     where
-        D: Differentiable,
-        Self: Clone + Stepper<D> + LinearisedAlong<D>,
+        F: Differentiated<Self>,
+        Self: Clone + Stepper<F>,
     {
         self.adjoint_within(WITHIN, system, x0, schedule)
     }
@@ -97,19 +91,19 @@ pub trait Adjoints: Sized {
     /// # Errors
     ///
     /// The errors of [`adjoint`](Self::adjoint).
-    fn adjoint_within<D>(
+    fn adjoint_within<F>(
         self,
         steps: usize,
-        system: &D,
-        x0: Point<D>,
+        system: &F,
+        x0: Element<F>,
         schedule: impl Into<Schedule>,
-    ) -> Result<AdjointRun<'_, D, Self>, TangentError<D::Manifold>>
+    ) -> Result<AdjointRun<'_, F, Self>, TangentError<F::Space>>
     where
-        D: Differentiable,
-        Self: Clone + Stepper<D> + LinearisedAlong<D>,
+        F: Differentiated<Self>,
+        Self: Clone + Stepper<F>,
     {
         let schedule = schedule.into();
-        in_room(system.wide(), || {
+        in_wide_room::<F, Self, _>(system, || {
             let tape = Tape::record(self.clone(), system, (x0, schedule), steps.max(1))?;
             Ok(AdjointRun { system, method: self, tape })
         })
@@ -122,13 +116,13 @@ impl<M> Adjoints for M {}
 pub const WITHIN: usize = 1 << 16;
 
 /// A run whose losses have gradients; made by [`Adjoints::adjoint`].
-pub struct AdjointRun<'a, D: Differentiable, M> {
-    system: &'a D,
+pub struct AdjointRun<'a, F: Flow, M> {
+    system: &'a F,
     method: M,
-    tape: Tape<D>,
+    tape: Tape<F>,
 }
 
-impl<D: Differentiable, M> fmt::Debug for AdjointRun<'_, D, M> {
+impl<F: Flow, M> fmt::Debug for AdjointRun<'_, F, M> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("AdjointRun").field("states", &self.tape.states).finish_non_exhaustive()
     }
@@ -162,18 +156,18 @@ impl LossGradient {
     }
 }
 
-impl<D, M> AdjointRun<'_, D, M>
+impl<F, M> AdjointRun<'_, F, M>
 where
-    D: Differentiable,
-    M: Clone + Stepper<D> + LinearisedAlong<D>,
+    F: Differentiated<M>,
+    M: Clone + Stepper<F>,
 {
     /// The recorded states, the start first.
-    pub fn states(&self) -> &[State<D::Manifold>] {
+    pub fn states(&self) -> &[State<F::Space>] {
         &self.tape.states
     }
 
     /// The state at the end of the run.
-    pub fn last(&self) -> &State<D::Manifold> {
+    pub fn last(&self) -> &State<F::Space> {
         &self.tape.states[self.tape.states.len() - 1]
     }
 
@@ -205,13 +199,12 @@ where
     /// [`TangentError::NotLinearised`] if a step has no derivative.
     pub fn gradient(
         &self,
-        loss: impl Fn(usize, &Moving<D>) -> Real,
-    ) -> Result<LossGradient, TangentError<D::Manifold>> {
+        loss: impl Fn(usize, &F::Moving) -> Real,
+    ) -> Result<LossGradient, TangentError<F::Space>> {
         let mut value = 0.0;
         let mut rows = Vec::with_capacity(self.states().len());
         for (k, state) in self.states().iter().enumerate() {
-            let field = |x: &Moving<D>| loss(k, x);
-            let Jet1 { value: here, df } = ScalarField::<D::Manifold>::jet1(&field, &state.point);
+            let (here, df) = self.system.differential(&|x| loss(k, x), &state.point);
             value += here;
             rows.push(df);
         }
@@ -224,21 +217,22 @@ where
     /// # Errors
     ///
     /// [`TangentError::NotLinearised`] if a step has no derivative.
-    pub fn pull_back(
+    pub fn pull_back<R: Index<usize, Output = f64>>(
         &self,
-        rows: &[Vector<D::Manifold>],
-    ) -> Result<LossGradient, TangentError<D::Manifold>> {
-        in_room(self.system.wide(), || self.backwards(rows))
+        rows: &[R],
+    ) -> Result<LossGradient, TangentError<F::Space>> {
+        in_wide_room::<F, M, _>(self.system, || self.backwards(rows))
     }
 
-    fn backwards(
+    fn backwards<R: Index<usize, Output = f64>>(
         &self,
-        rows: &[Vector<D::Manifold>],
-    ) -> Result<LossGradient, TangentError<D::Manifold>> {
-        let (n, all) = (Dim::<D>::LEN, Dim::<Wide<D>>::LEN);
+        rows: &[R],
+    ) -> Result<LossGradient, TangentError<F::Space>> {
+        let (n, names) = (self.system.directions(), self.system.names().to_vec());
+        let all = n + names.len();
         let row = |k: usize| {
             let row = rows.get(k);
-            Costate::<D>::from_index(|i| row.filter(|_| i < n).map_or(0.0, |row| row[i]))
+            DVector::from_fn(all, |i, _| row.filter(|_| i < n).map_or(0.0, |row| row[i]))
         };
         let mut costate = row(rows.len());
         for (k, segment) in self.tape.segments.iter().enumerate().rev() {
@@ -249,35 +243,33 @@ where
                 costate = self.before(step, costate, &row)?;
             }
         }
-        let costate = costate + row(0);
-        let row = DVector::from_fn(all, |i, _| costate[i]);
-        let names = self.system.parameters().to_vec();
+        let row = costate + row(0);
         Ok(LossGradient { value: 0.0, row, start: n, names })
     }
 
     /// The steps of a segment, taken again.
     fn again(
         &self,
-        segment: &Segment,
-        next: &Segment,
-    ) -> Result<Vec<TapedStep<D>>, TangentError<D::Manifold>> {
+        segment: &Segment<F::Vector>,
+        next: &Segment<F::Vector>,
+    ) -> Result<Vec<TapedStep<F>>, TangentError<F::Space>> {
         self.tape.again(self.method.clone(), self.system, [segment, next])
     }
 
     /// The costate at the start of a step from that at its end.
     fn before(
         &self,
-        step: &TapedStep<D>,
-        costate: Costate<D>,
-        row: &impl Fn(usize) -> Costate<D>,
-    ) -> Result<Costate<D>, TangentError<D::Manifold>> {
+        step: &TapedStep<F>,
+        costate: DVector<f64>,
+        row: &impl Fn(usize) -> DVector<f64>,
+    ) -> Result<DVector<f64>, TangentError<F::Space>> {
         let time = step.time;
-        let through = |parts: &[Part<D>], mut costate: Costate<D>| {
+        let through = |parts: &[Part<F>], mut costate: DVector<f64>| {
             for part in parts.iter().rev() {
-                let pulled = self.method.pull_back_along(self.system, part, &costate);
+                let pulled = self.system.pull_back(&self.method, part, &costate);
                 costate = pulled.map_err(|cause| TangentError::NotLinearised { time, cause })?;
             }
-            Ok::<_, TangentError<D::Manifold>>(costate)
+            Ok::<_, TangentError<F::Space>>(costate)
         };
         let [inside, at_end] = self.tape.recorded(step);
         let mut before = through(&step.parts, at_end.fold(costate, |sum, k| sum + row(k)))?;

@@ -2,15 +2,11 @@
 
 use std::fmt;
 
-use metriplectic_dynamics::Metriplectic;
-use metriplectic_dynamics::system::Point;
-use metriplectic_fields::{Column as _, Dimension as _, Vector};
-use metriplectic_manifolds::Manifold as _;
+use nalgebra::DVector;
 
-use super::columns::{Columns, jets, row};
+use super::columns::{Carried, LawRows, row};
 use super::error::Unlinearised;
 use crate::round_off::bound::{BROKEN, SUMMED};
-use crate::step::Dim;
 use crate::step::digits::counted;
 
 /// The laws of a tangent, each as its largest error relative to its terms `Σ_i |∂_iF T_ij|`, over all columns and steps.
@@ -51,19 +47,17 @@ impl Sensitivity {
         }
     }
 
-    /// Enters a state.
-    pub(super) fn enter<Y: Metriplectic>(
+    /// Enters the derivatives at a state with these differentials of its laws and these sizes of its directions.
+    pub(super) fn enter(
         &mut self,
-        system: &Y,
-        x: &Point<Y>,
-        columns: &Columns<Y>,
+        here: &LawRows<DVector<f64>>,
+        scales: &DVector<f64>,
+        carried: &Carried,
     ) -> Result<(), Unlinearised> {
-        let jets = jets(system, x);
-        let scales = Y::Manifold::scales(x);
-        let off = |df: &Vector<Y::Manifold>, law: &Vector<Y::Manifold>| {
-            let [here, sizes] = row::<Y>(df, &columns.t);
-            let terms = df.abs().dot(&scales);
-            (0..Dim::<Y>::LEN).fold(0.0, |worst, j| {
+        let off = |df: &DVector<f64>, law: &DVector<f64>| {
+            let [here, sizes] = row(df, &carried.t);
+            let terms = df.abs().dot(scales);
+            (0..df.len()).fold(0.0, |worst, j| {
                 let (off, size) = ((here[j] - law[j]).abs(), sizes[j] + law[j].abs());
                 // The column of a direction on which nothing depends is rounding, relative to a unit of that direction.
                 let unit = terms / scales[j];
@@ -71,9 +65,9 @@ impl Sensitivity {
                 worse(worst, if off == 0.0 { 0.0 } else { off / size })
             })
         };
-        let energy = off(&jets.energy.df, &columns.laws.energy);
-        let listed = jets.invariants.as_ref().iter().flatten().zip(&columns.laws.invariants);
-        let invariants = listed.fold(0.0, |worst, ((_, jet), law)| worse(worst, off(&jet.df, law)));
+        let energy = off(&here.energy, &carried.laws.energy);
+        let listed = here.invariants.iter().zip(&carried.laws.invariants);
+        let invariants = listed.fold(0.0, |worst, (df, law)| worse(worst, off(df, law)));
         let worst = worse(energy, invariants);
         if worst > BROKEN || worst.is_nan() {
             return Err(Unlinearised::LawBroken { off: worst });
@@ -81,8 +75,8 @@ impl Sensitivity {
         self.steps += 1;
         self.energy = self.energy.max(energy);
         self.invariants = self.invariants.max(invariants);
-        if columns.laws.entropy_is_known {
-            let entropy = off(&jets.entropy.df, &columns.laws.entropy);
+        if carried.laws.entropy_is_known {
+            let entropy = off(&here.entropy, &carried.laws.entropy);
             self.entropy = Some(self.entropy.unwrap_or(0.0).max(entropy));
         }
         Ok(())

@@ -22,37 +22,18 @@ use metriplectic_fields::{
     Column as _, Dimension as _, Matrix, ScalarField, Space as _, Square as _, Vector,
 };
 use metriplectic_manifolds::MovingBase;
-use nalgebra::{DMatrix, DVector, Dyn, LU};
+use nalgebra::{DMatrix, DVector};
 
 use self::equation::{Derivative, Equation};
 use self::moved::Around;
 use super::along::LinearisedAlong;
 use super::columns::Columns;
 use super::error::Unlinearised;
+use super::factors::Refined;
 use super::linearised::{Linearised, Piece, Propagated};
 use super::schemes::units;
 use crate::collocation::{Gauss, Radau, STAGES, StepRoot, Tableau};
 use crate::step::Dim;
-
-/// The factors of a matrix, whose solutions are refined once: then each row is solved to the round-off of its own terms
-/// (Skeel 1980), so that an entry near rest has no digits of another one.
-struct Refined<'a> {
-    matrix: Cow<'a, DMatrix<f64>>,
-    factors: LU<f64, Dyn, Dyn>,
-}
-
-impl<'a> Refined<'a> {
-    fn of(matrix: Cow<'a, DMatrix<f64>>) -> Option<Self> {
-        let finite = matrix.iter().all(|entry| entry.is_finite());
-        finite.then(|| Self { factors: matrix.clone().into_owned().lu(), matrix })
-    }
-
-    fn solve(&self, right: &DVector<f64>) -> Option<DVector<f64>> {
-        let y = self.factors.solve(right)?;
-        let left = right - &*self.matrix * &y;
-        Some(y + self.factors.solve(&left)?)
-    }
-}
 
 /// A step linearised at its root, in units of the entries.
 struct AtRoot<Y: Metriplectic> {

@@ -2,15 +2,15 @@
 
 use metriplectic_dynamics::velocity::{Covectors, Gradient};
 use metriplectic_dynamics::{Invariants, Metriplectic, system::Point};
-use metriplectic_fields::{
-    Column as _, Dimension as _, Jet1, Matrix, ScalarField, Space, Square as _, Vector,
-};
+use metriplectic_fields::{Jet1, Matrix, ScalarField, Space, Square as _, Vector};
 
-use crate::step::{CountOf, Dim};
+use nalgebra::{DMatrix, DVector};
+
+use crate::step::CountOf;
 
 /// The derivatives of the values onto which explicit methods move a state, along the start and the parameters.
 #[derive(Clone, Debug)]
-pub(crate) struct Laws<V> {
+pub struct LawRows<V> {
     pub(crate) energy: V,
     pub(crate) invariants: Vec<V>,
     /// The entropy at the start, and what was produced since.
@@ -19,13 +19,69 @@ pub(crate) struct Laws<V> {
     pub(crate) entropy_is_known: bool,
 }
 
-/// The tangent `T = ∂x/∂(x₀, θ)` of a run at one of its states, in the frames of the charts at both ends.
+/// The derivatives that a run carries along, in plain numbers: the tangent `T = ∂x/∂(x₀, θ)` at one of its states, in the frames of the
+/// charts at both ends, and those of its laws.
 ///
-/// Column `j` is the derivative along direction `j` of the wide system: first those of the start, then the parameters.
+/// Column `j` is the derivative along direction `j`: first those of the start, then the parameters. The rows of the parameters are
+/// those of the identity.
+#[derive(Clone, Debug)]
+pub struct Carried {
+    pub(crate) t: DMatrix<f64>,
+    pub(crate) laws: LawRows<DVector<f64>>,
+}
+
+/// A step with its derivatives.
+#[derive(Clone, Debug)]
+pub struct Moved {
+    /// The derivatives at the end of the step.
+    pub(crate) carried: Carried,
+    /// The derivative `∂x'/∂h` of the end along the size of the step, in the directions of the state.
+    pub(crate) along_h: DVector<f64>,
+}
+
+impl<V> LawRows<V> {
+    /// The rows of the energy, the entropy and the further invariants.
+    pub const fn new(energy: V, entropy: V, invariants: Vec<V>) -> Self {
+        Self { energy, invariants, entropy, entropy_is_known: false }
+    }
+
+    /// A function of each row.
+    #[must_use]
+    pub fn map<W>(&self, f: impl Fn(&V) -> W) -> LawRows<W> {
+        let Self { energy, invariants, entropy, entropy_is_known } = self;
+        let invariants = invariants.iter().map(&f).collect();
+        let (energy, entropy) = (f(energy), f(entropy));
+        LawRows { energy, invariants, entropy, entropy_is_known: *entropy_is_known }
+    }
+}
+
+impl LawRows<DVector<f64>> {
+    /// Sets the derivatives of the energy and of the entropy in a direction.
+    pub fn set(&mut self, direction: usize, energy: f64, entropy: f64) {
+        (self.energy[direction], self.entropy[direction]) = (energy, entropy);
+    }
+}
+
+impl Carried {
+    /// Makes the tangent at the start of a run, `T = 1`, from the differentials of its laws there.
+    pub(crate) fn start(laws: LawRows<DVector<f64>>) -> Self {
+        let n = laws.energy.len();
+        Self { t: DMatrix::identity(n, n), laws }
+    }
+}
+
+/// The row `dFᵀ T` and, column by column, the size `Σ_i |∂_iF T_ij|` of its terms.
+pub(crate) fn row(df: &DVector<f64>, t: &DMatrix<f64>) -> [DVector<f64>; 2] {
+    let size = |j: usize| (0..t.nrows()).map(|i| (df[i] * t[(i, j)]).abs()).sum();
+    let sizes = DVector::from_fn(t.ncols(), |j, _| size(j));
+    [t.tr_mul(df), sizes]
+}
+
+/// The columns of a [`Carried`] tangent, as a system takes them in its types.
 #[derive(Debug)]
 pub struct Columns<Y: Metriplectic> {
     pub(crate) t: Matrix<Y::Manifold>,
-    pub(crate) laws: Laws<Vector<Y::Manifold>>,
+    pub(crate) laws: LawRows<Vector<Y::Manifold>>,
 }
 
 impl<Y: Metriplectic> Clone for Columns<Y> {
@@ -60,7 +116,7 @@ impl<Y: Metriplectic> Columns<Y> {
     pub(crate) fn start(system: &Y, x0: &Point<Y>) -> Self {
         let jets = jets(system, x0);
         let listed = jets.invariants.as_ref().iter().flatten();
-        let laws = Laws {
+        let laws = LawRows {
             energy: jets.energy.df,
             invariants: listed.take(Y::Invariants::COUNT).map(|(_, jet)| jet.df).collect(),
             entropy: jets.entropy.df,
@@ -78,15 +134,4 @@ impl<Y: Metriplectic> Columns<Y> {
     pub const fn matrix(&self) -> &Matrix<Y::Manifold> {
         &self.t
     }
-}
-
-/// The row `dFᵀ T` and, column by column, the size `Σ_i |∂_iF T_ij|` of its terms.
-pub(crate) fn row<Y: Metriplectic>(
-    df: &Vector<Y::Manifold>,
-    t: &Matrix<Y::Manifold>,
-) -> [Vector<Y::Manifold>; 2] {
-    let sizes = Vector::<Y::Manifold>::from_index(|j| {
-        (0..Dim::<Y>::LEN).fold(0.0, |sum, i| sum + (df[i] * t[(i, j)]).abs())
-    });
-    [t.transpose_times(df), sizes]
 }

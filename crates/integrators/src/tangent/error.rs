@@ -13,6 +13,12 @@ pub enum Unlinearised {
     /// A path from one end of a step to the other was not found, or a Jacobian is singular or not a number.
     #[error("the equation of the step has no regular derivative there; take smaller steps")]
     Singular,
+    /// The scheme is not the same seen from either end of a step.
+    #[error(
+        "the steps have derivatives if the scheme is symmetric: take `WeylMidpoint` or `ChartMidpoint` with `Gonzalez`, `MeanValue` or \
+         `SymmetricItohAbe`, or another method"
+    )]
+    NotSymmetric,
     /// A field has no second derivative at a state of the run.
     #[error(
         "a second derivative of the model is not finite there, as that of a norm at zero; write `norm_squared()`, or \
@@ -33,6 +39,11 @@ pub enum Unlinearised {
          take smaller steps, or another start"
     )]
     Branch,
+    /// Derivatives by differences have no step.
+    #[error(
+        "every entry that moves has been zero in the run, so that a difference has no size; start elsewhere"
+    )]
+    NoSize,
     /// The derivative breaks the first law of tangents.
     #[error(
         "dH(x') T' differs from dH(x₀) by {off:.1e} of its terms, so the derivative is wrong; take smaller steps"

@@ -8,7 +8,7 @@ use num_dual::Dual64;
 ///
 /// Two such points may have different frames: that of a sphere turns where its last entry changes its sign, and the middle of
 /// a step computed from either end may lie on either side.
-pub(super) fn between<M: Space>(from: &M::Point<f64>, to: &M::Point<f64>) -> Option<Matrix<M>> {
+pub fn between<M: Space>(from: &M::Point<f64>, to: &M::Point<f64>) -> Option<Matrix<M>> {
     // A chart that is a translation has one frame everywhere.
     if from == to || M::RATES_ARE_VELOCITIES {
         return None;

@@ -39,7 +39,7 @@ struct Normal<V> {
 
 /// A correction, relative to the size of its entry, after which one more leaves nothing: they converge quadratically, and
 /// their derivatives are one correction behind.
-const SMALL: f64 = 1e-9;
+pub(super) const SMALL: f64 = 1e-9;
 
 /// A point of a system with derivatives.
 pub(super) type DualPoint<Y> = <<Y as Metriplectic>::Manifold as Space>::Point<Dual64>;
@@ -47,7 +47,7 @@ pub(super) type DualPoint<Y> = <<Y as Metriplectic>::Manifold as Space>::Point<D
 /// The residuals of the laws that are corrected. The derivative of a correction by round-off does not belong to the step, and near
 /// an equilibrium it is far above round-off.
 #[derive(Clone, Copy)]
-enum Residuals {
+pub(super) enum Residuals {
     All,
     AboveRounding,
     None,

@@ -1,40 +1,66 @@
 //! A step that was taken, or a part of one.
 
-use metriplectic_dynamics::system::Point;
 use metriplectic_dynamics::{Differentiable, Metriplectic};
 use metriplectic_fields::{Column as _, Dimension as _, Vector};
 
+use super::error::Unlinearised;
 use super::linearised::Piece;
 use crate::run::last_step::LastStep;
-use crate::step::{Components, CountOf, Dim, EntropyStep, Laws, Memory, Numbers, StepStart, Taken};
+use crate::step::{
+    CountOf, Dim, Element, EntropyStep, Flow, Laws, Memory, Saved, StepStart, Stepper, Taken,
+    Vector as _,
+};
 
 /// A system of a run.
 pub(super) type Wide<D> = <D as Differentiable>::Wide;
+
+/// The means to take a step again, and others beside it.
+#[derive(Clone, Debug)]
+pub(super) struct Again<V> {
+    /// The memory of the method before it, without what it extrapolates from.
+    pub(super) memory: Saved,
+    /// The largest size that each entry has had in the run, or soon has from its start.
+    pub(super) sizes: V,
+}
+
+/// The memory with which a step is taken again.
+pub(super) fn memory_before<F: Flow, M: Stepper<F>>(
+    again: Option<&Again<F::Vector>>,
+) -> Result<M::Memory, Unlinearised> {
+    let restored = again.map(|again| M::Memory::restore(&again.memory));
+    restored.transpose().map_err(|_| Unlinearised::Singular).map(Option::unwrap_or_default)
+}
 
 /// A step of a system that was taken, or a part of one.
 #[allow(
     missing_debug_implementations,
     reason = "it stands in signatures of a trait, and its entries are private"
 )]
-pub struct Part<D: Differentiable> {
-    pub(super) x: Point<D>,
-    pub(super) end: Point<D>,
+pub struct Part<F: Flow> {
+    pub(super) x: Element<F>,
+    pub(super) end: Element<F>,
+    pub(super) time: f64,
     pub(super) h: f64,
+    pub(super) in_parts: bool,
+    pub(super) again: Option<Again<F::Vector>>,
     pub(super) entropy_step: Option<EntropyStep>,
     pub(super) stage_count: Option<u32>,
     pub(super) stage_velocities: Vec<f64>,
-    pub(super) allowed: Option<Vector<<Wide<D> as Metriplectic>::Manifold>>,
-    pub(super) reference: Laws<Numbers<D>>,
+    pub(super) allowed: Option<F::Vector>,
+    pub(super) reference: Laws<F::Numbers>,
 }
 
-impl<D: Differentiable> Part<D> {
-    pub(super) fn new(start: &StepStart<'_, D>, ended: &Ended<'_, D>) -> Self {
-        let allowed = start.allowed.as_ref().map(widened::<D>);
-        let (x, end, reference) = (start.x.clone(), ended.end.clone(), start.reference);
+impl<F: Flow> Part<F> {
+    pub(super) fn new(start: &StepStart<'_, F>, ended: &Ended<'_, F>) -> Self {
+        let allowed = start.allowed.clone();
+        let (x, end, reference) = (start.x.clone(), ended.end.clone(), start.reference.clone());
         Self {
             x,
             end,
+            time: start.time,
             h: ended.h,
+            in_parts: ended.in_parts,
+            again: ended.again.clone(),
             entropy_step: ended.entropy_step,
             stage_count: ended.stage_count,
             stage_velocities: ended.stage_velocities.clone(),
@@ -42,7 +68,9 @@ impl<D: Differentiable> Part<D> {
             reference,
         }
     }
+}
 
+impl<D: Differentiable> Part<D> {
     /// The part as one of the system itself.
     pub(super) fn narrow(&self) -> Piece<'_, D> {
         let allowed = self.allowed.as_ref();
@@ -51,7 +79,7 @@ impl<D: Differentiable> Part<D> {
             end: &self.end,
             h: self.h,
             moving: Dim::<D>::LEN,
-            allowed: allowed.map(|a| Vector::<D::Manifold>::from_index(|i| a[i])),
+            allowed: allowed.map(|a| a.0),
             targets: self.reference,
             entropy_step: self.entropy_step,
             stage_count: self.stage_count,
@@ -70,7 +98,7 @@ impl<D: Differentiable> Part<D> {
             end,
             h: self.h,
             moving: Dim::<D>::LEN,
-            allowed: self.allowed,
+            allowed: self.allowed.as_ref().map(widened::<D>),
             targets: Laws { energy, entropy, invariants },
             entropy_step: self.entropy_step,
             stage_count: self.stage_count,
@@ -80,18 +108,20 @@ impl<D: Differentiable> Part<D> {
 }
 
 /// The end of a step that was taken.
-pub(super) struct Ended<'a, D: Metriplectic> {
-    pub(super) end: &'a Point<D>,
+pub(super) struct Ended<'a, F: Flow> {
+    pub(super) end: &'a Element<F>,
     pub(super) h: f64,
     pub(super) in_parts: bool,
     pub(super) entropy_step: Option<EntropyStep>,
     pub(super) stage_count: Option<u32>,
     pub(super) stage_velocities: Vec<f64>,
+    /// If steps beside it are to be taken.
+    pub(super) again: Option<Again<F::Vector>>,
 }
 
-impl<'a, D: Metriplectic> Ended<'a, D> {
+impl<'a, F: Flow> Ended<'a, F> {
     /// The end of a step of size `h`, with the memory after it.
-    pub(super) fn new(taken: &'a Taken<D>, h: f64, memory: &impl Memory) -> Self {
+    pub(super) fn new(taken: &'a Taken<F>, h: f64, memory: &impl Memory) -> Self {
         Self {
             end: &taken.x,
             h,
@@ -99,11 +129,12 @@ impl<'a, D: Metriplectic> Ended<'a, D> {
             entropy_step: taken.evidence.entropy_step,
             stage_count: memory.stage_count(),
             stage_velocities: memory.stage_velocities(),
+            again: None,
         }
     }
 
     /// The end of the last step of a run.
-    pub(super) fn of_run(end: &'a Point<D>, last: &LastStep<'_, D>) -> Self {
+    pub(super) fn of_run(end: &'a Element<F>, last: &LastStep<'_, F>) -> Self {
         Self {
             end,
             h: last.h,
@@ -111,14 +142,22 @@ impl<'a, D: Metriplectic> Ended<'a, D> {
             entropy_step: last.entropy_step,
             stage_count: last.stage_count,
             stage_velocities: last.stage_velocities.clone(),
+            again: None,
         }
+    }
+
+    /// As it is, of a step beside which others are to be taken.
+    pub(super) fn with_again(self, again: Option<&Again<F::Vector>>) -> Self {
+        Self { again: again.cloned(), ..self }
     }
 }
 
 /// Components of the wide system: those of the first factor, and zeros.
 fn widened<D: Differentiable>(
-    v: &Components<Vector<D::Manifold>>,
+    v: &<D as Flow>::Vector,
 ) -> Vector<<Wide<D> as Metriplectic>::Manifold> {
     let n = Dim::<D>::LEN;
-    Vector::<<Wide<D> as Metriplectic>::Manifold>::from_index(|i| if i < n { v.0[i] } else { 0.0 })
+    Vector::<<Wide<D> as Metriplectic>::Manifold>::from_index(
+        |i| if i < n { v.get(i) } else { 0.0 },
+    )
 }

@@ -1,28 +1,26 @@
 //! The steps of a run, whole or in parts, with their derivatives.
 
-use metriplectic_dynamics::{Differentiable, Metriplectic};
-use metriplectic_fields::{Column as _, Vector};
+use nalgebra::DVector;
 
-use super::along::LinearisedAlong;
-use super::columns::Columns;
+use super::columns::{Carried, Moved};
+use super::differentiated::Differentiated;
 use super::error::Unlinearised;
-use super::linearised::Propagated;
-use super::part::{Ended, Part, Wide};
-use crate::step::{Laws, Numbers, StepStart, Stepper};
+use super::part::{Ended, Part};
+use crate::step::{Flow, Laws, StepStart, Stepper};
 
 /// A step is not halved more often than it has digits.
 const DIGITS: u32 = f64::MANTISSA_DIGITS;
 
 /// A step that is taken again in the halves in which it was taken.
-struct Again<'a, D: Differentiable, M> {
+struct Again<'a, F: Flow, M> {
     method: &'a M,
-    parts: Vec<Part<D>>,
+    parts: Vec<Part<F>>,
 }
 
-impl<D: Differentiable, M: Stepper<D>> Again<'_, D, M> {
+impl<F: Flow, M: Stepper<F>> Again<'_, F, M> {
     /// Takes a step, in halves where it is refused, and returns the laws at its end, with the entropy that is the reference of
     /// the next one.
-    fn take(&mut self, start: &StepStart<'_, D>, h: f64, left: u32) -> Option<Laws<Numbers<D>>> {
+    fn take(&mut self, start: &StepStart<'_, F>, h: f64, left: u32) -> Option<Laws<F::Numbers>> {
         let mut memory = M::Memory::default();
         if let Ok(taken) = self.method.attempt(start, h, &mut memory) {
             let reference = if taken.evidence.dissipates {
@@ -31,7 +29,7 @@ impl<D: Differentiable, M: Stepper<D>> Again<'_, D, M> {
                 start.reference.entropy
             };
             self.parts.push(Part::new(start, &Ended::new(&taken, h, &memory)));
-            return Some(Laws { entropy: reference, ..start.reference });
+            return Some(Laws { entropy: reference, ..start.reference.clone() });
         }
         if left == 0 {
             return None;
@@ -39,24 +37,25 @@ impl<D: Differentiable, M: Stepper<D>> Again<'_, D, M> {
         let half = 0.5 * h;
         let reference = self.take(start, half, left - 1)?;
         let x = self.parts.last()?.end.clone();
-        let (flow, time, allowed) = (start.flow, start.time + half, start.allowed);
-        let values = crate::step::Flow::laws(flow, &x);
+        let (flow, time, allowed) = (start.flow, start.time + half, start.allowed.clone());
+        let values = flow.laws(&x);
         let middle = StepStart { flow, x: &x, time, values, reference, allowed };
         self.take(&middle, half, left - 1)
     }
 }
 
 /// The parts in which a step was taken.
-pub(super) fn parts<D, M>(
+pub(super) fn parts<F, M>(
     method: &M,
-    start: &StepStart<'_, D>,
-    ended: &Ended<'_, D>,
-) -> Result<Vec<Part<D>>, Unlinearised>
+    start: &StepStart<'_, F>,
+    ended: &Ended<'_, F>,
+) -> Result<Vec<Part<F>>, Unlinearised>
 where
-    D: Differentiable,
-    M: Stepper<D>,
+    F: Flow,
+    M: Stepper<F>,
 {
-    if !ended.in_parts {
+    // Steps beside one in parts are taken in the same parts.
+    if !ended.in_parts || ended.again.is_some() {
         return Ok(vec![Part::new(start, ended)]);
     }
     let mut again = Again { method, parts: Vec::new() };
@@ -64,8 +63,8 @@ where
     let parts = (|| {
         let reference = again.take(start, half, DIGITS)?;
         let x = again.parts.last()?.end.clone();
-        let (flow, time, allowed) = (start.flow, start.time + half, start.allowed);
-        let values = crate::step::Flow::laws(flow, &x);
+        let (flow, time, allowed) = (start.flow, start.time + half, start.allowed.clone());
+        let values = flow.laws(&x);
         let middle = StepStart { flow, x: &x, time, values, reference, allowed };
         again.take(&middle, half, DIGITS)
     })();
@@ -76,32 +75,33 @@ where
     Ok(again.parts)
 }
 
-/// The tangent at the end of a step.
-pub(super) fn propagate<D, M>(
+/// The derivatives at the end of a step.
+pub(super) fn propagate<F, M>(
     method: &M,
-    start: &StepStart<'_, D>,
-    ended: &Ended<'_, D>,
-    columns: &Columns<Wide<D>>,
-) -> Result<Propagated<Wide<D>>, Unlinearised>
+    start: &StepStart<'_, F>,
+    ended: &Ended<'_, F>,
+    carried: &Carried,
+) -> Result<Moved, Unlinearised>
 where
-    D: Differentiable,
-    M: Stepper<D> + LinearisedAlong<D>,
+    F: Differentiated<M>,
+    M: Stepper<F>,
 {
     let (system, parts) = (start.flow, parts(method, start, ended)?);
-    let (mut columns, is_whole) = (columns.clone(), parts.len() == 1);
-    let mut along_h = Vector::<<Wide<D> as Metriplectic>::Manifold>::zero();
+    let (mut carried, is_whole, n) = (carried.clone(), parts.len() == 1, system.directions());
+    let mut along_h = DVector::zeros(n);
     for part in &parts {
-        let next = method.propagate_along(system, part, &columns)?;
+        let next = system.propagate(method, part, &carried)?;
         if is_whole {
             return Ok(next);
         }
         // By the derivative of the part itself, since the columns may have become dependent where friction is strong.
-        if along_h.magnitude() > 0.0 {
-            let here = Columns::start(system.wide(), &system.widened(&part.x));
-            along_h = method.propagate_along(system, part, &here)?.columns.t * along_h;
+        if along_h.iter().any(|along| *along != 0.0) {
+            let here = Carried::start(system.wide_rows(&part.x));
+            let moved = system.propagate(method, part, &here)?.carried.t;
+            along_h = moved.view((0, 0), (n, n)) * along_h;
         }
         along_h += next.along_h * (part.h / ended.h);
-        columns = next.columns;
+        carried = next.carried;
     }
-    Ok(Propagated { columns, along_h })
+    Ok(Moved { carried, along_h })
 }

@@ -2,17 +2,14 @@
 
 use std::fmt;
 
-use metriplectic_dynamics::Differentiable;
-use metriplectic_dynamics::system::Point;
-
-use super::along::LinearisedAlong;
 use super::certificate::Sensitivity;
-use super::columns::Columns;
+use super::columns::Carried;
+use super::differentiated::Differentiated;
 use super::error::TangentError;
 use super::event::TangentEvent;
 use super::refined::{REFINEMENTS, difference, refined};
 use super::state::TangentState;
-use super::steps::{Inside, Jumps, TangentSteps};
+use super::steps::{Inside, Jumps, TangentSteps, in_wide_room};
 use crate::round_off::bound::SUMMED;
 use crate::run::SpanError;
 use crate::run::certificate::Certificate;
@@ -24,9 +21,9 @@ use crate::run::method::Method as _;
 use crate::run::paired::{Unpaired, paired};
 use crate::run::recording::Numbered;
 use crate::run::schedule::Schedule;
-use crate::step::{Stepper, in_room};
+use crate::step::{Element, Flow, Stepper};
 
-/// Runs with their derivatives, by every method whose steps are [linearised](LinearisedAlong).
+/// Runs with their derivatives, by every method whose steps are [differentiated](Differentiated).
 ///
 /// ```
 /// use metriplectic_dynamics::Family;
@@ -60,19 +57,20 @@ pub trait Tangents: Sized {
     ///
     /// [`TangentError`] if the model breaks a law, the schedule cannot be run, or it has corners or jumps without
     /// [derivatives](crate::Jumping::differentiable).
-    fn tangent_steps<D>(
+    fn tangent_steps<F>(
         self,
-        system: &D,
-        x0: Point<D>,
+        system: &F,
+        x0: Element<F>,
         schedule: impl Into<Schedule>,
-    ) -> Result<TangentSteps<'_, D, Self>, TangentError<D::Manifold>>
+    ) -> Result<TangentSteps<'_, F, Self>, TangentError<F::Space>>
     where
-        D: Differentiable,
-        Self: Stepper<D> + LinearisedAlong<D>,
+        F: Differentiated<Self>,
+        Self: Stepper<F>,
     {
         let schedule: Schedule = schedule.into();
         let listed = schedule.watch.events.iter().map(|event| event.jump.as_ref());
-        let jumps: Jumps<D> = listed.map(|jump| jump.and_then(JumpRequest::smooth)).collect();
+        let jumps: Jumps<F::MovingWide> =
+            listed.map(|jump| jump.and_then(JumpRequest::smooth)).collect();
         let has_jump = |event: &Request| event.jump.is_some();
         if schedule.watch.events.iter().zip(&jumps).any(|(e, jump)| has_jump(e) && jump.is_none()) {
             return Err(TangentError::Broken { what: "jumps without derivatives" });
@@ -81,11 +79,9 @@ pub trait Tangents: Sized {
             return Err(TangentError::Broken { what: "corners" });
         }
         let steps = self.steps(system, x0, schedule)?;
-        let columns = in_room(system.wide(), || {
-            Columns::start(system.wide(), &system.widened(&steps.state().point))
-        });
-        let sensitivity = Sensitivity::default();
-        Ok(TangentSteps { steps, columns, sensitivity, jumps })
+        let laws = in_wide_room::<F, Self, _>(system, || system.wide_rows(&steps.state().point));
+        let (carried, sensitivity) = (Carried::start(laws), Sensitivity::default());
+        Ok(TangentSteps { steps, carried, sensitivity, jumps, largest: None })
     }
 
     /// Runs a system over a schedule, and records the states that a [run](crate::Method::run) records, with their derivatives:
@@ -95,18 +91,18 @@ pub trait Tangents: Sized {
     /// # Errors
     ///
     /// [`TangentError`].
-    fn tangent<D>(
+    fn tangent<F>(
         self,
-        system: &D,
-        x0: Point<D>,
+        system: &F,
+        x0: Element<F>,
         schedule: impl Into<Schedule>,
-    ) -> Result<TangentRun<D>, TangentError<D::Manifold>>
+    ) -> Result<TangentRun<F>, TangentError<F::Space>>
     where
-        D: Differentiable,
-        Self: Stepper<D> + LinearisedAlong<D>,
+        F: Differentiated<Self>,
+        Self: Stepper<F>,
     {
         let steps = self.tangent_steps(system, x0, schedule)?;
-        in_room(system.wide(), || record(steps))
+        in_wide_room::<F, Self, _>(system, || record(steps))
     }
 
     /// Runs a system with its derivatives until they are as exact as `accuracy`.
@@ -122,16 +118,16 @@ pub trait Tangents: Sized {
     ///
     /// [`TangentError::Accuracy`] if the accuracy is not between `1.5e-14`, which is round-off, and 1, [`TangentError::Inexact`] if it is not reached with the smallest
     /// tolerance of the method or after twelve runs, and those of [`tangent`](Self::tangent).
-    fn tangent_to<D>(
+    fn tangent_to<F>(
         self,
-        system: &D,
-        x0: Point<D>,
+        system: &F,
+        x0: Element<F>,
         schedule: impl Into<Schedule>,
         accuracy: f64,
-    ) -> Result<TangentRun<D>, TangentError<D::Manifold>>
+    ) -> Result<TangentRun<F>, TangentError<F::Space>>
     where
-        D: Differentiable,
-        Self: Clone + Stepper<D> + LinearisedAlong<D>,
+        F: Differentiated<Self>,
+        Self: Clone + Stepper<F>,
     {
         if !(SUMMED..1.0).contains(&accuracy) {
             return Err(TangentError::Accuracy { accuracy });
@@ -141,13 +137,14 @@ pub trait Tangents: Sized {
         let mut reached = f64::INFINITY;
         for _ in 0..REFINEMENTS {
             let largest = coarse.certificate().largest_step;
-            schedule = refined(&schedule, Stepper::<D>::order(&self), largest);
+            schedule = refined(&schedule, Stepper::<F>::order(&self), largest);
             let fine = self.clone().tangent(system, x0.clone(), schedule.clone());
             let mut fine = match fine {
                 Err(TangentError::Run(RunError::Span(SpanError::Tolerance { .. }))) => break,
                 fine => fine?,
             };
-            reached = difference(system, &fine.states[0], [coarse.last(), fine.last()]);
+            let ends = [coarse.last(), fine.last()];
+            reached = difference::<F, Self>(system, &fine.states[0], ends);
             fine.sensitivity.difference = Some(reached);
             if reached <= accuracy {
                 return Ok(fine);
@@ -161,12 +158,10 @@ pub trait Tangents: Sized {
 impl<M> Tangents for M {}
 
 /// Takes all steps that are left.
-fn record<D, M>(
-    mut steps: TangentSteps<'_, D, M>,
-) -> Result<TangentRun<D>, TangentError<D::Manifold>>
+fn record<F, M>(mut steps: TangentSteps<'_, F, M>) -> Result<TangentRun<F>, TangentError<F::Space>>
 where
-    D: Differentiable,
-    M: Stepper<D> + LinearisedAlong<D>,
+    F: Differentiated<M>,
+    M: Stepper<F>,
 {
     let mut recording = steps.steps.recording(steps.state()).map_err(RunError::from)?;
     let mut events = Vec::new();
@@ -185,22 +180,22 @@ where
     Ok(TangentRun { states: recording.states, events, certificate, ending, sensitivity })
 }
 
-impl<D: Differentiable> Numbered for TangentState<D> {
+impl<F: Flow> Numbered for TangentState<F> {
     fn step(&self) -> usize {
         self.step
     }
 }
 
 /// The record of a run with its tangent.
-pub struct TangentRun<D: Differentiable> {
-    states: Vec<TangentState<D>>,
-    events: Vec<TangentEvent<D>>,
+pub struct TangentRun<F: Flow> {
+    states: Vec<TangentState<F>>,
+    events: Vec<TangentEvent<F>>,
     certificate: Certificate,
     ending: Ending,
     sensitivity: Sensitivity,
 }
 
-impl<D: Differentiable> fmt::Debug for TangentRun<D> {
+impl<F: Flow> fmt::Debug for TangentRun<F> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("TangentRun")
             .field("states", &self.states)
@@ -209,19 +204,19 @@ impl<D: Differentiable> fmt::Debug for TangentRun<D> {
     }
 }
 
-impl<D: Differentiable> TangentRun<D> {
+impl<F: Flow> TangentRun<F> {
     /// The recorded states, the start first.
-    pub fn states(&self) -> &[TangentState<D>] {
+    pub fn states(&self) -> &[TangentState<F>] {
         &self.states
     }
 
     /// The state at the end of the run.
-    pub fn last(&self) -> &TangentState<D> {
+    pub fn last(&self) -> &TangentState<F> {
         &self.states[self.states.len() - 1]
     }
 
     /// The events with their derivatives.
-    pub fn events(&self) -> &[TangentEvent<D>] {
+    pub fn events(&self) -> &[TangentEvent<F>] {
         &self.events
     }
 

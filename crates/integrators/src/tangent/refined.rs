@@ -1,16 +1,13 @@
 //! Derivatives that are as exact as asked for.
 
-use metriplectic_dynamics::{Differentiable, Metriplectic};
-use metriplectic_fields::{Column as _, Dimension as _, Vector};
-use metriplectic_manifolds::Manifold as _;
+use nalgebra::DVector;
 
 use super::certificate::worse;
-use super::frames::between;
-use super::part::Wide;
+use super::differentiated::Differentiated;
 use super::state::TangentState;
 use crate::round_off::bound::SUMMED;
 use crate::run::schedule::{Schedule, Size};
-use crate::step::Dim;
+use crate::step::Stepper;
 
 /// How often a run is refined at most.
 /// A factor of four fails `tests/tangent/refined.rs::an_accuracy_that_is_not_reached_is_an_error`.
@@ -45,28 +42,27 @@ pub(super) fn refined(schedule: &Schedule, order: u32, largest: f64) -> Schedule
 ///
 /// An entry of the state that is zero has no size: its row is compared with its own largest derivative, along the entries
 /// of the start that have none either, or along the others in their units.
-pub(super) fn difference<D: Differentiable>(
-    system: &D,
-    start: &TangentState<D>,
-    [coarse, fine]: [&TangentState<D>; 2],
+pub(super) fn difference<F: Differentiated<M>, M: Stepper<F>>(
+    system: &F,
+    start: &TangentState<F>,
+    [coarse, fine]: [&TangentState<F>; 2],
 ) -> f64 {
-    let (n, all) = (Dim::<D>::LEN, Dim::<Wide<D>>::LEN);
-    let turn = between::<D::Manifold>(&coarse.point, &fine.point);
-    let rows = D::Manifold::scales(&fine.point);
-    let units = <Wide<D> as Metriplectic>::Manifold::scales(&system.widened(&start.point));
-    let size = |column: &Vector<D::Manifold>| {
+    let (n, all) = (system.directions(), fine.carried.t.ncols());
+    let turn = system.turn(&coarse.point, &fine.point);
+    let (rows, units) = (system.units(&fine.point), system.units(&start.point));
+    let size = |column: &DVector<f64>| {
         (0..n).filter(|i| rows[*i] > 0.0).map(|i| column[i].abs() / rows[i]).fold(0.0, worse)
     };
     let row = |i: usize, j: usize| {
         let alike = (0..all).filter(|k| (units[*k] > 0.0) == (units[j] > 0.0));
         let unit = |k: usize| if units[k] > 0.0 { units[k] / units[j] } else { 1.0 };
-        alike.map(|k| fine.columns.t[(i, k)].abs() * unit(k)).fold(0.0, worse)
+        alike.map(|k| fine.carried.t[(i, k)].abs() * unit(k)).fold(0.0, worse)
     };
     let columns = (0..all).map(|j| {
-        let [before, after] = [coarse, fine]
-            .map(|state| Vector::<D::Manifold>::from_index(|i| state.columns.t[(i, j)]));
-        let before = turn.map_or(before, |turn| turn * before);
-        let apart = after - before;
+        let [before, after] =
+            [coarse, fine].map(|state| state.carried.t.view((0, j), (n, 1)).column(0).into_owned());
+        let before = turn.as_ref().map_or_else(|| before.clone(), |turn| turn * &before);
+        let apart = &after - before;
         let unsized_rows = (0..n).filter(|i| rows[*i] == 0.0 && apart[*i] != 0.0);
         let unsized_rows = unsized_rows.map(|i| apart[i].abs() / row(i, j)).fold(0.0, worse);
         (j, size(&apart), size(&after), unsized_rows)

@@ -2,12 +2,11 @@
 
 use std::ops::Range;
 
-use metriplectic_dynamics::Differentiable;
-use metriplectic_dynamics::system::Point;
-
+use super::differentiated::Differentiated;
 use super::error::{TangentError, Unlinearised};
-use super::part::{Ended, Part};
+use super::part::{Again, Ended, Part, memory_before};
 use super::pieces::parts;
+use super::steps::again;
 use crate::run::certificate::Certificate;
 use crate::run::checkpoint::Checkpoint;
 use crate::run::ending::Ending;
@@ -18,54 +17,61 @@ use crate::run::rounding::rounding;
 use crate::run::schedule::Schedule;
 use crate::run::state::State;
 use crate::run::steps::Steps;
-use crate::step::{Flow as _, Stepper};
+use crate::step::{Element, Flow, Stepper};
 
 /// A step of a run.
-pub(super) struct TapedStep<D: Differentiable> {
+pub(super) struct TapedStep<F: Flow> {
     /// The time of its start.
     pub(super) time: f64,
-    pub(super) parts: Vec<Part<D>>,
+    pub(super) parts: Vec<Part<F>>,
     /// The steps up to its end, and the latest time that is one of its end.
     pub(super) end: (usize, f64),
     /// The steps to the recorded states inside it.
-    pub(super) outputs: Vec<Vec<Part<D>>>,
+    pub(super) outputs: Vec<Vec<Part<F>>>,
 }
 
 /// The start of a row of steps.
-pub(super) struct Segment {
+pub(super) struct Segment<V> {
+    /// The largest sizes of the entries before it.
+    largest: Option<V>,
     checkpoint: Checkpoint,
     step: usize,
 }
 
 /// The steps of a run: all of its last segment, and the starts of the others.
-pub(super) struct Tape<D: Differentiable> {
-    pub(super) states: Vec<State<D::Manifold>>,
+pub(super) struct Tape<F: Flow> {
+    pub(super) states: Vec<State<F::Space>>,
     pub(super) certificate: Certificate,
     pub(super) ending: Ending,
     /// The schedule, for the outputs of steps that are taken again.
     schedule: Schedule,
-    pub(super) segments: Vec<Segment>,
-    pub(super) steps: Vec<TapedStep<D>>,
+    pub(super) segments: Vec<Segment<F::Vector>>,
+    pub(super) steps: Vec<TapedStep<F>>,
 }
 
 /// A run on its way.
-struct Recorder<'a, D: Differentiable, M: Stepper<D>> {
-    steps: Steps<'a, D, M>,
+struct Recorder<'a, F: Flow, M: Stepper<F>> {
+    steps: Steps<'a, F, M>,
     /// The time at which it started.
     start: f64,
+    /// The largest sizes of the entries so far, if steps beside the others are taken.
+    largest: Option<F::Vector>,
 }
 
 /// A step with the states that the run yields in place of the one at its end.
-type Recorded<D> = (TapedStep<D>, Vec<State<<D as metriplectic_dynamics::Metriplectic>::Manifold>>);
+type Recorded<F> = (TapedStep<F>, Vec<State<<F as Flow>::Space>>);
 
-impl<D: Differentiable, M: Stepper<D>> Recorder<'_, D, M> {
-    fn segment(&self) -> Segment {
-        Segment { checkpoint: self.steps.checkpoint(), step: self.steps.state().step }
+impl<F: Differentiated<M>, M: Stepper<F>> Recorder<'_, F, M> {
+    fn segment(&self) -> Segment<F::Vector> {
+        let (checkpoint, step) = (self.steps.checkpoint(), self.steps.state().step);
+        Segment { largest: self.largest.clone(), checkpoint, step }
     }
 
     /// Takes one step; `None` if the run has ended before it.
-    fn advance(&mut self) -> Result<Option<Recorded<D>>, TangentError<D::Manifold>> {
+    fn advance(&mut self) -> Result<Option<Recorded<F>>, TangentError<F::Space>> {
+        let again = again(&self.steps, &mut self.largest);
         let scales = self.steps.scales();
+        let again = again.as_ref();
         let before = self.steps.state().clone();
         self.steps.advance()?;
         let end = self.steps.state();
@@ -75,7 +81,7 @@ impl<D: Differentiable, M: Stepper<D>> Recorder<'_, D, M> {
         let failed = |cause| TangentError::NotLinearised { time: before.time, cause };
         let (flow, method) = (self.steps.flow(), self.steps.method());
         let last = self.steps.last_step(&scales);
-        let ended = Ended::of_run(&end.point, &last);
+        let ended = Ended::of_run(&end.point, &last).with_again(again);
         let parts = parts(method, &last.start, &ended).map_err(failed)?;
         let until = (end.step, end.time + rounding(self.start, end.time));
         let mut step = TapedStep { time: before.time, parts, end: until, outputs: Vec::new() };
@@ -86,7 +92,7 @@ impl<D: Differentiable, M: Stepper<D>> Recorder<'_, D, M> {
                 continue;
             }
             let theta = (asked.time - before.time) / (end.time - before.time);
-            let (point, parts) = inside(method, &last, theta).map_err(failed)?;
+            let (point, parts) = inside(method, (&last, again), theta).map_err(failed)?;
             step.outputs.push(parts);
             let laws = flow.laws(&point);
             let (energy, entropy) = (laws.energy, laws.entropy);
@@ -97,25 +103,28 @@ impl<D: Differentiable, M: Stepper<D>> Recorder<'_, D, M> {
 }
 
 /// The state at a fraction of a step, by a step of that size.
-fn inside<D: Differentiable, M: Stepper<D>>(
+fn inside<F: Flow, M: Stepper<F>>(
     method: &M,
-    last: &LastStep<'_, D>,
+    (last, again): (&LastStep<'_, F>, Option<&Again<F::Vector>>),
     theta: f64,
-) -> Result<(Point<D>, Vec<Part<D>>), Unlinearised> {
-    let (h, mut memory) = (theta * last.h, M::Memory::default());
+) -> Result<(Element<F>, Vec<Part<F>>), Unlinearised> {
+    let (h, mut memory) = (theta * last.h, memory_before::<F, M>(again)?);
     let taken = method.step(&last.start, h, &mut memory).map_err(|_| Unlinearised::Singular)?;
-    let parts = parts(method, &last.start, &Ended::new(&taken, h, &memory))?;
+    let parts = parts(method, &last.start, &Ended::new(&taken, h, &memory).with_again(again))?;
     Ok((taken.x, parts))
 }
 
-impl<D: Differentiable> Tape<D> {
+impl<F: Flow> Tape<F> {
     /// Runs a system, and keeps at most `most` steps.
-    pub(super) fn record<M: Stepper<D>>(
+    pub(super) fn record<M: Stepper<F>>(
         method: M,
-        system: &D,
-        (x0, schedule): (Point<D>, Schedule),
+        system: &F,
+        (x0, schedule): (Element<F>, Schedule),
         most: usize,
-    ) -> Result<Self, TangentError<D::Manifold>> {
+    ) -> Result<Self, TangentError<F::Space>>
+    where
+        F: Differentiated<M>,
+    {
         if !schedule.watch.events.is_empty() {
             return Err(TangentError::Broken { what: "events" });
         }
@@ -124,8 +133,8 @@ impl<D: Differentiable> Tape<D> {
         }
         let steps = method.steps(system, x0, schedule.clone())?;
         let mut recording =
-            steps.recording(steps.state().clone()).map_err(RunError::<D::Manifold>::from)?;
-        let mut recorder = Recorder { steps, start: schedule.start };
+            steps.recording(steps.state().clone()).map_err(RunError::<F::Space>::from)?;
+        let mut recorder = Recorder { steps, start: schedule.start, largest: None };
         let (mut segments, mut taken) = (vec![recorder.segment()], Vec::new());
         while recorder.steps.ending().is_none() {
             if taken.len() == most {
@@ -148,15 +157,19 @@ impl<D: Differentiable> Tape<D> {
     }
 
     /// Takes the steps between two segments again, bit for bit.
-    pub(super) fn again<M: Stepper<D>>(
+    pub(super) fn again<M: Stepper<F>>(
         &self,
         method: M,
-        system: &D,
-        [segment, next]: [&Segment; 2],
-    ) -> Result<Vec<TapedStep<D>>, TangentError<D::Manifold>> {
+        system: &F,
+        [segment, next]: [&Segment<F::Vector>; 2],
+    ) -> Result<Vec<TapedStep<F>>, TangentError<F::Space>>
+    where
+        F: Differentiated<M>,
+    {
         let steps = method.resume(system, &segment.checkpoint)?;
         let steps = steps.watching(self.schedule.clone()).map_err(RunError::from)?;
-        let mut recorder = Recorder { steps, start: self.schedule.start };
+        let mut recorder =
+            Recorder { steps, start: self.schedule.start, largest: segment.largest.clone() };
         let mut taken = Vec::with_capacity(next.step - segment.step);
         while recorder.steps.state().step < next.step {
             match recorder.advance()? {
@@ -168,10 +181,10 @@ impl<D: Differentiable> Tape<D> {
     }
 
     /// The numbers of the recorded states inside a step, and of those at its end.
-    pub(super) fn recorded(&self, step: &TapedStep<D>) -> [Range<usize>; 2] {
+    pub(super) fn recorded(&self, step: &TapedStep<F>) -> [Range<usize>; 2] {
         let (number, latest) = step.end;
         let end = self.states.partition_point(|state| state.step < number);
-        let is_end = |state: &&State<D::Manifold>| state.step == number && state.time <= latest;
+        let is_end = |state: &&State<F::Space>| state.step == number && state.time <= latest;
         let at_end = self.states[end..].iter().take_while(is_end).count();
         [end - step.outputs.len()..end, end..end + at_end]
     }

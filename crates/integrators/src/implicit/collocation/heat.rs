@@ -74,7 +74,7 @@ pub(super) struct HeatStart<L: Lengths> {
     /// The change of the energy along the direction of heat.
     warmed: f64,
     /// The entries that are not warmed.
-    still: Vec<bool>,
+    pub(super) still: Vec<bool>,
 }
 
 // By hand, because lengths have none.

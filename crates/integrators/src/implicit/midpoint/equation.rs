@@ -2,11 +2,11 @@
 
 use metriplectic_equations::{ENERGY, ENTROPY};
 
-use super::gradient::{LawAlong, Line};
-use crate::implicit::algebra::{Matrix, dot, is_finite};
+use super::gradient::{LawAlong, Line, Stable};
+use crate::implicit::algebra::{Matrix, add, dot, is_finite};
 use crate::implicit::drift;
 use crate::implicit::parts::{OfLaws, Parts, WithJacobian};
-use crate::implicit::velocity::{VelocityJet, velocity_jet};
+use crate::implicit::velocity::{VelocityJet, velocity_jet, whole_velocity_jet};
 use crate::newton::Stiffness;
 use crate::numbers::Lengths;
 use crate::round_off::bound::{ROUNDED, is_dissipated};
@@ -51,6 +51,16 @@ pub(super) struct Linearised<L: Lengths> {
     pub(super) entropy: L::Vector,
     /// The growth `h⟨w_S, K̃ w_S⟩` of the entropy by friction.
     pub(super) growth: f64,
+}
+
+/// The equation at its root, along the end of its step.
+pub(crate) struct FromEnd<L: Lengths> {
+    /// The Jacobian `∂F/∂u`.
+    pub(crate) jacobian: Matrix<L>,
+    /// The differential of the energy at the end.
+    pub(crate) energy: L::Vector,
+    /// The derivative of the growth `h⟨w_S, K̃ w_S⟩` of the entropy.
+    pub(crate) growth: L::Vector,
 }
 
 /// The round-off of a residual, as in [`Rounding`](crate::Rounding).
@@ -133,12 +143,16 @@ impl<'a, L: Lengths> Equation<'a, L> {
         is_finite(&residual).then_some(Evaluated { residual, evidence })
     }
 
-    /// The residual with its Jacobian; `None` where it is not defined.
-    pub(super) fn linearise(&self, u: &L::Vector) -> Option<Linearised<L>> {
-        let &Self { parts, h, .. } = self;
-        let line = &Line::new(parts, self.x, self.line.base, u);
-        let mut noise = None;
-        let w: OfLaws<WithJacobian<L>> = parts.each_law(|law| {
+    /// The covectors of all laws along a line, with derivatives along the displacement: of a discrete gradient by the function `slope`,
+    /// from the number of its law, its data, and the differential at the end.
+    #[inline]
+    fn jets(
+        &self,
+        line: &Line<'_, L>,
+        mut slope: impl FnMut(usize, Stable<L>, &L::Vector) -> Matrix<L>,
+    ) -> OfLaws<WithJacobian<L>> {
+        let parts = self.parts;
+        parts.each_law(|law| {
             if !self.is_discrete(law) {
                 let second = parts.second(law, &line.z);
                 let slope = second.hf.map(|h| h * line.c);
@@ -148,16 +162,57 @@ impl<'a, L: Lengths> Equation<'a, L> {
             let (end, df) = parts.jet(law, &line.end);
             let along = LawAlong { parts, law, line };
             let stable = along.stable(self.line.gradient, [start, end], true);
+            WithJacobian { value: stable.covector(drift, line.d), slope: slope(law, stable, &df) }
+        })
+    }
+
+    /// The Jacobian `1 − h ∂V` of the residual, from the derivatives of the velocity.
+    #[inline]
+    fn jacobian(&self, velocity: &Matrix<L>) -> Matrix<L> {
+        let mut jacobian = velocity.map(|slope| -(slope * self.h));
+        for i in 0..self.parts.n() {
+            jacobian[(i, i)] += 1.0;
+        }
+        jacobian
+    }
+
+    /// The Jacobian at the root `u`, for the derivative of the step: numbers that are divided by its length are zero where they are
+    /// round-off. `None` where it is not defined.
+    pub(super) fn at_root(&self, u: &L::Vector) -> Option<FromEnd<L>> {
+        let &Self { parts, h, .. } = self;
+        let line = &Line::new(parts, self.x, self.line.base, u);
+        let mut energy = parts.zero();
+        let w = self.jets(line, |law, stable, df| {
+            if law == ENERGY {
+                energy = df.clone();
+            }
+            stable.slope_above_round_off(u, df)
+        });
+        let jet = whole_velocity_jet(parts, &line.z, line.c, &w)?;
+        let jacobian = self.jacobian(&jet.velocity.slope);
+        let mut growth = parts.zero();
+        if let Some(friction) = &jet.irreversible {
+            add(&mut growth, h, &w.entropy.slope.transpose_times(&friction.value));
+            add(&mut growth, h, &friction.slope.transpose_times(&w.entropy.value));
+        }
+        jacobian.magnitude().is_finite().then_some(FromEnd { jacobian, energy, growth })
+    }
+
+    /// The residual with its Jacobian; `None` where it is not defined.
+    pub(super) fn linearise(&self, u: &L::Vector) -> Option<Linearised<L>> {
+        let &Self { parts, h, .. } = self;
+        let line = &Line::new(parts, self.x, self.line.base, u);
+        let mut noise = None;
+        let w = self.jets(line, |law, stable, df| {
             if law == ENERGY {
                 // Near the edge of a domain dH is far steeper at x' than at z, and the rounding of d counts there.
                 let of_defect = stable.noise(u);
                 noise = Some(parts.vector(|i| of_defect[i] + df[i].abs() * f64::EPSILON));
             }
-            let value = stable.covector(drift, u);
-            WithJacobian { value, slope: stable.slope(drift, u, &df) }
+            stable.slope(self.start_of(law)[1], u, df)
         });
         let jet = velocity_jet(parts, &line.z, line.c, &w)?;
-        let VelocityJet { velocity, terms, sensitivity, production, friction, rotation } = jet;
+        let VelocityJet { velocity, terms, sensitivity, production, friction, rotation, .. } = jet;
         let rounding = Rounding {
             // What underflows is no larger than the least normal number.
             terms: parts
@@ -174,10 +229,7 @@ impl<'a, L: Lengths> Equation<'a, L> {
             Stiffness { friction: 2.0 * h.abs() * friction, rotation: 2.0 * h.abs() * rotation };
         let evidence = self.dissipated(&w.entropy.value, production);
         let residual = parts.vector(|i| u[i] - velocity.value[i] * h);
-        let mut jacobian = velocity.slope.map(|slope| -(slope * h));
-        for i in 0..parts.n() {
-            jacobian[(i, i)] += 1.0;
-        }
+        let jacobian = self.jacobian(&velocity.slope);
         let is_usable = is_finite(&residual) && jacobian.magnitude().is_finite();
         is_usable.then(|| Linearised {
             residual,

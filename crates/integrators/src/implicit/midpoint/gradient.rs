@@ -6,7 +6,8 @@ use crate::implicit::algebra::{Matrix, add, dot, magnitude, sum_of_terms, vector
 use crate::implicit::orthogonal::scaled;
 use crate::implicit::parts::Parts;
 use crate::numbers::{Lengths, List};
-use crate::round_off::stable_gradient::{integral, short, trust, underflows};
+use crate::round_off::bound::SUMMED;
+use crate::round_off::stable_gradient::{but_round_off, integral, short, trust, underflows};
 use crate::step::GradientKind;
 use metriplectic_fields::power_of_two;
 
@@ -256,18 +257,43 @@ impl<L: Lengths> Stable<L> {
         d: &L::Vector,
         df_end: &L::Vector,
     ) -> Matrix<L> {
-        let Self { mean, dmean, defect, change, rounding, .. } = self;
+        let trust = trust(self.change, self.rounding);
+        let defect = self.defect + drift_correction;
+        self.corrected(defect, d, df_end, |row, _| row * trust)
+    }
+
+    /// The derivative of the covector as in [`slope`](Self::slope), for the derivative of a step: numbers that are divided by its length,
+    /// the defect and its derivatives, are zero where they are round-off. They are of second order in this length.
+    pub(super) fn slope_above_round_off(self, d: &L::Vector, df_end: &L::Vector) -> Matrix<L> {
+        // The defect is an integral and a part of a difference, whose round-off is rounded once more where the integral replaces it.
+        let size = SUMMED * (self.change.abs() + self.rounding) + self.noise;
+        let defect = if self.defect.abs() <= size { 0.0 } else { self.defect };
+        self.corrected(defect, d, df_end, |row, terms| but_round_off(row, terms()))
+    }
+
+    /// The derivative of `w̄ + d δ/⟨d, d⟩`, from the defect `δ` and a function of its derivatives and of the sizes of their terms.
+    #[inline]
+    fn corrected(
+        self,
+        defect: f64,
+        d: &L::Vector,
+        df_end: &L::Vector,
+        above: impl Fn(f64, &dyn Fn() -> f64) -> f64,
+    ) -> Matrix<L> {
+        let Self { mean, dmean, .. } = self;
         let mut slope = dmean.expect("the derivatives were asked for");
         let square = dot(d, d);
         if underflows(square) {
             return slope;
         }
-        let (n, trust) = (d.numbers().len(), trust(change, rounding));
-        let bent = slope.transpose_times(d);
-        let c = (defect + drift_correction) / square;
+        let n = d.numbers().len();
+        let (bent, sizes) = (slope.transpose_times(d), &slope);
+        let c = defect / square;
         let reciprocal = square.recip();
         let along: L::Vector = vector(n, |i| {
-            let row = (df_end[i] - mean[i] - bent[i]) * trust;
+            let bent_terms = || (0..n).map(|k| (sizes[(k, i)] * d[k]).abs()).sum::<f64>();
+            let terms = || bent_terms() + df_end[i].abs() + mean[i].abs();
+            let row = above(df_end[i] - mean[i] - bent[i], &terms);
             (row - d[i] * (2.0 * c)) * reciprocal
         });
         slope.add_outer(1.0, d, &along);

@@ -1,0 +1,146 @@
+//! The derivative of a self-adjoint midpoint step of a model, by two linearisations, as in [`schemes`](super::super::schemes), whose
+//! formulas it has.
+//!
+//! On a vector space the end `x' = x + d` moves with the unknown `d` of the step, and the start with that of the step of the opposite
+//! size from `x'` to `x`. So `E = F = 1`, and with the Jacobians `A = ∂R/∂x'` and `B = −∂R/∂x` of the residual `R = d − h V`
+//!
+//! ```math
+//! J = A^{-1} B, \qquad \frac{\partial x'}{\partial h} = A^{-1} \frac{d}{h}, \qquad J^T \lambda = B^T A^{-T} \lambda .
+//! ```
+
+use std::borrow::Cow;
+
+use metriplectic_dynamics::SecondLaw;
+use metriplectic_equations::ENTROPY;
+use nalgebra::{DMatrix, DVector};
+
+use super::super::error::Unlinearised;
+use super::super::factors::Refined;
+use super::units::{differential, first_law, relative, scaled, units};
+use super::{Derivative, StepOfModel};
+use crate::implicit::{FromEnd, from_end};
+use crate::numbers::AtRunTime;
+use crate::step::{GradientKind, LineOfStep};
+
+/// Returns whether a step is the same seen from either end.
+pub(in crate::tangent) fn is_self_adjoint(line: LineOfStep) -> bool {
+    line.base.to_bits() == 0.5_f64.to_bits() && line.gradient != GradientKind::ItohAbe
+}
+
+/// Both linearisations of a step, in units of the entries.
+struct Both {
+    /// `A` and `B`.
+    jacobians: [DMatrix<f64>; 2],
+    /// The differentials of the energy at the start and at the end.
+    energy: [DVector<f64>; 2],
+    /// The displacement.
+    d: DVector<f64>,
+    units: DVector<f64>,
+}
+
+/// The equation of a step along its end, and that of the opposite step along the start.
+fn from_both_ends(
+    step: &StepOfModel<'_>,
+    line: LineOfStep,
+) -> Result<[FromEnd<AtRunTime>; 2], Unlinearised> {
+    if !is_self_adjoint(line) {
+        return Err(Unlinearised::NotSymmetric);
+    }
+    let &StepOfModel { model, x, end, h, .. } = step;
+    let there = from_end(model, line, [x, end], h).ok_or(Unlinearised::Singular)?;
+    let back = from_end(model, line, [end, x], -h).ok_or(Unlinearised::Singular)?;
+    Ok([there, back])
+}
+
+impl Both {
+    fn of(step: &StepOfModel<'_>, line: LineOfStep) -> Result<Self, Unlinearised> {
+        let units = units(step);
+        let [there, back] = from_both_ends(step, line)?;
+        let column = |v: &[f64]| DVector::from_column_slice(v);
+        let (x, end) = (column(step.x), column(step.end));
+        Ok(Self {
+            jacobians: [&there, &back].map(|at| scaled(at.jacobian.numbers(), &units)),
+            energy: [&back, &there].map(|at| column(at.energy.numbers())),
+            d: end - x,
+            units,
+        })
+    }
+
+    fn derivative(&self, h: f64) -> Option<Derivative> {
+        let Self { jacobians: [a, b], d, units, .. } = self;
+        let a = Refined::of(Cow::Borrowed(a))?;
+        let mut along_x = DMatrix::zeros(units.len(), units.len());
+        for k in 0..units.len() {
+            let column = a.solve(&b.column(k).into_owned())?;
+            along_x.set_column(k, &(column.component_mul(units) / units[k]));
+        }
+        let along_h = a.solve(&(d.component_div(units) / h))?.component_mul(units);
+        Some(Derivative { along_x, along_h })
+    }
+
+    /// `Jᵀ λ` for each row.
+    fn transposed<const K: usize>(&self, rows: [&DVector<f64>; K]) -> Option<[DVector<f64>; K]> {
+        let Self { jacobians: [a, b], units, .. } = self;
+        let a = Refined::of(Cow::Owned(a.transpose()))?;
+        let mut pulled = rows.map(DVector::clone);
+        for row in &mut pulled {
+            let through = a.solve(&row.component_mul(units))?;
+            *row = b.tr_mul(&through).component_div(units);
+        }
+        Some(pulled)
+    }
+}
+
+/// The derivatives of a step along a line.
+///
+/// # Errors
+///
+/// [`Unlinearised`] if the step is not symmetric, or its Jacobian is singular or not a number.
+pub(in crate::tangent) fn derivative(
+    step: &StepOfModel<'_>,
+    line: LineOfStep,
+) -> Result<Derivative, Unlinearised> {
+    Both::of(step, line)?.derivative(step.h).ok_or(Unlinearised::Singular)
+}
+
+/// The derivative `Jᵀ λ` of a loss along the start of a step from that along its end, if the first law of the step holds.
+///
+/// # Errors
+///
+/// [`Unlinearised`] as for the [derivative], and if `dH(x') J` is not `dH(x)`.
+pub(in crate::tangent) fn pull_back(
+    step: &StepOfModel<'_>,
+    line: LineOfStep,
+    costate: &[f64],
+) -> Result<DVector<f64>, Unlinearised> {
+    let both = Both::of(step, line)?;
+    let [before, after] = &both.energy;
+    let costate = DVector::from_column_slice(costate);
+    let pulled = both.transposed([&costate, after]);
+    let [row, energy] = pulled.ok_or(Unlinearised::Singular)?;
+    first_law(step.x, [&energy, before])?;
+    Ok(row)
+}
+
+/// The error of the second law of tangents in a step, `dS(x') δ' − dS(x) δ = δ(h ⟨w_S, K̃ w_S⟩)`, for a column `δ` at its start and `δ'` at
+/// its end, relative to its terms. `None` if the entropy has no discrete gradient, or the step has no derivative.
+pub(in crate::tangent) fn entropy_law(
+    step: &StepOfModel<'_>,
+    line: LineOfStep,
+    [before, after]: [&[f64]; 2],
+) -> Option<f64> {
+    let &StepOfModel { model, x, end, .. } = step;
+    if model.second_law() != SecondLaw::Exact {
+        return None;
+    }
+    let [there, back] = from_both_ends(step, line).ok()?;
+    let [before, after] = [before, after].map(DVector::from_column_slice);
+    let along = |row: &[f64], v: &DVector<f64>| DVector::from_column_slice(row).dot(v);
+    Some(relative(&[
+        differential(model, ENTROPY, end).dot(&after),
+        -differential(model, ENTROPY, x).dot(&before),
+        -along(there.growth.numbers(), &after),
+        // The growth of the step of size −h is that of the step less its sign.
+        along(back.growth.numbers(), &before),
+    ]))
+}

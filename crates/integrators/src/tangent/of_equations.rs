@@ -1,0 +1,253 @@
+//! The derivatives of runs of systems in plain numbers.
+
+use metriplectic_equations::{ENERGY, ENTROPY, Equations, Model, Sizes};
+use metriplectic_fields::Real;
+use nalgebra::{DMatrix, DVector};
+
+use super::beside;
+use super::columns::{Carried, LawRows, Moved};
+use super::differentiated::Differentiated;
+use super::error::Unlinearised;
+use super::numbers::{
+    Derivative, StepOfModel, collocated, explicit_propagate, is_self_adjoint, schemes,
+};
+use super::part::Part;
+use super::smooth::SmoothFlow;
+use crate::collocation::Tableau;
+use crate::compiled::explicit;
+use crate::explicit::ExplicitRungeKutta;
+use crate::implicit::Collocation;
+use crate::numbers::FromEquations;
+use crate::step::{Compiled, Directions, Entries, Flow as _, Laws, LineOfStep, Stepper};
+use crate::system::NO_CLOCK;
+
+/// The values of the laws that an explicit method moves the end of a step onto.
+fn targets<S: Equations>(step: &Part<FromEquations<S>>) -> Laws<Vec<f64>> {
+    let Laws { energy, entropy, invariants } = &step.reference;
+    let invariants = AsRef::<[f64]>::as_ref(invariants).to_vec();
+    Laws { energy: *energy, entropy: *entropy, invariants }
+}
+
+/// A step in plain numbers of a system, or of its model.
+fn in_numbers<'a, S: Equations, Y: ?Sized>(
+    model: &'a Y,
+    step: &'a Part<FromEquations<S>>,
+    targets: &'a Laws<Vec<f64>>,
+) -> StepOfModel<'a, Y> {
+    StepOfModel {
+        model,
+        x: &step.x,
+        end: &step.end,
+        h: step.h,
+        allowed: step.allowed.as_ref().map(|allowed| allowed.numbers()),
+        targets,
+        entropy_step: step.entropy_step,
+        stage_count: step.stage_count,
+        stage_velocities: &step.stage_velocities,
+    }
+}
+
+impl<S: Equations> SmoothFlow for FromEquations<S> {
+    type Moving = Vec<Real>;
+
+    fn directions(&self) -> usize {
+        self.0.sizes().directions
+    }
+
+    fn law_rows(&self, x: &Entries) -> LawRows<DVector<f64>> {
+        let Sizes { directions: n, laws, .. } = self.0.sizes();
+        let (mut values, mut w) = (vec![0.0; laws], vec![0.0; laws * n]);
+        self.0.differentials(NO_CLOCK, x, &mut values, &mut w);
+        let row = |law: usize| DVector::from_column_slice(&w[law * n..][..n]);
+        LawRows::new(row(ENERGY), row(ENTROPY), (ENTROPY + 1..laws).map(row).collect())
+    }
+
+    fn turn(&self, from: &Entries, to: &Entries) -> Option<DMatrix<f64>> {
+        if self.0.is_vector_space() || from == to {
+            return None;
+        }
+        // The frames are orthonormal, so that a step is one in the units of the space.
+        let (n, step) = (self.directions(), f64::EPSILON.cbrt());
+        let column = |k: usize| {
+            let at = |step: f64| {
+                let d = Directions::from_index(n, |i| if i == k { step } else { 0.0 });
+                let mut q = DVector::zeros(n);
+                let _ = self.0.coordinates(to, &self.moved(from, &d), q.as_mut_slice());
+                q
+            };
+            (at(step) - at(-step)) / (2.0 * step)
+        };
+        Some(DMatrix::from_columns(&(0..n).map(column).collect::<Vec<_>>()))
+    }
+
+    /// In `⌈n/2⌉` evaluations on a vector space, and by differences of the function along the entries elsewhere.
+    fn differential(&self, f: &dyn Fn(&Vec<Real>) -> Real, x: &Entries) -> (f64, DVector<f64>) {
+        let (mut along_entries, mut value) = (DVector::zeros(x.len()), 0.0);
+        for i in (0..x.len()).step_by(2) {
+            let along = |k: usize, direction: usize| if k == direction { 1.0 } else { 0.0 };
+            let seeded = |(k, x): (usize, &f64)| Real::new(*x, along(k, i), along(k, i + 1), 0.0);
+            let there = f(&x.iter().enumerate().map(seeded).collect());
+            value = there.re;
+            along_entries[i] = there.eps1;
+            if let Some(next) = along_entries.get_mut(i + 1) {
+                *next = there.eps2;
+            }
+        }
+        if self.0.is_vector_space() {
+            return (value, along_entries);
+        }
+        let slope = |k: usize, _| along_entries.dot(&self.entries_along(x, k));
+        (value, DVector::from_fn(self.directions(), slope))
+    }
+
+    fn moving(&self, x: &Entries, v: &DVector<f64>) -> Vec<Real> {
+        let along = if self.0.is_vector_space() {
+            v.clone()
+        } else {
+            let columns = (0..v.len()).map(|k| self.entries_along(x, k) * v[k]);
+            columns.fold(DVector::zeros(x.len()), |sum, column| sum + column)
+        };
+        x.iter().zip(&along).map(|(x, v)| Real::new(*x, *v, 0.0, 0.0)).collect()
+    }
+
+    fn coordinates(&self, y: &Entries, there: &Vec<Real>) -> Vec<[f64; 2]> {
+        if self.0.is_vector_space() {
+            return y.iter().zip(there).map(|(y, there)| [there.re - y, there.eps1]).collect();
+        }
+        let at = |e: f64| {
+            let z: Vec<f64> = there.iter().map(|there| there.re + e * there.eps1).collect();
+            let mut q = vec![0.0; self.directions()];
+            let _ = self.0.coordinates(y, &z, &mut q);
+            q
+        };
+        let largest = there.iter().fold(0.0, |most: f64, there| most.max(there.eps1.abs()));
+        let step = if largest > 0.0 { f64::EPSILON.cbrt() / largest } else { 1.0 };
+        let slopes = at(step).into_iter().zip(at(-step)).map(|(a, b)| (a - b) / (2.0 * step));
+        at(0.0).into_iter().zip(slopes).map(|(q, slope)| [q, slope]).collect()
+    }
+}
+
+impl<S: Equations> FromEquations<S> {
+    /// The derivative of the entries along a direction of the chart at a state.
+    fn entries_along(&self, x: &Entries, k: usize) -> DVector<f64> {
+        let step = f64::EPSILON.cbrt();
+        let at = |step: f64| {
+            let d = Directions::from_index(self.directions(), |i| if i == k { step } else { 0.0 });
+            DVector::from_column_slice(&self.moved(x, &d))
+        };
+        (at(step) - at(-step)) / (2.0 * step)
+    }
+}
+
+/// How the derivatives of the steps of a method are formed.
+enum Exactly<'a> {
+    /// By its stages and its projection.
+    Explicit(ExplicitRungeKutta),
+    /// From both ends.
+    Midpoint(&'a dyn Model, LineOfStep),
+    /// At the root for its stages.
+    Stages(&'a dyn Model, &'static Tableau),
+}
+
+impl<S: Equations> FromEquations<S> {
+    /// How the steps of a method are differentiated; `None` for other steps beside them.
+    fn exactly(&self, method: Option<Compiled>) -> Option<Exactly<'_>> {
+        let method = method.filter(|_| self.0.is_vector_space())?;
+        let model = self.0.model();
+        let stages = |method: Option<Collocation>| Some(Exactly::Stages(model?, method?.tableau));
+        match method {
+            Compiled::Explicit(_) => explicit(method).map(Exactly::Explicit),
+            Compiled::Midpoint { line, .. } if is_self_adjoint(line) => {
+                Some(Exactly::Midpoint(model?, line))
+            }
+            Compiled::Midpoint { .. } => None,
+            Compiled::Gauss { stages: count } => stages(Collocation::gauss(count)),
+            Compiled::Radau { stages: count } => stages(Collocation::radau(count)),
+        }
+    }
+}
+
+/// The derivatives are exact on a [model](metriplectic_equations::Model) on a vector space; to two thirds of the digits where it has
+/// [differences](metriplectic_equations::Differences), and for explicit methods where its parts are not known apart. Other
+/// methods and spaces have them by differences of steps.
+impl<S: Equations, M: Stepper<Self>> Differentiated<M> for FromEquations<S> {
+    type MovingWide = Vec<Real>;
+
+    fn takes_steps_beside(&self, method: &M) -> bool {
+        self.exactly(method.compiled()).is_none()
+    }
+
+    fn propagate(
+        &self,
+        method: &M,
+        step: &Part<Self>,
+        carried: &Carried,
+    ) -> Result<Moved, Unlinearised> {
+        let targets = targets(step);
+        let derivative = match self.exactly(method.compiled()) {
+            None => return beside::propagate(self, method, step, carried),
+            Some(Exactly::Explicit(method)) => {
+                let of = in_numbers(&self.0 as &dyn Equations, step, &targets);
+                return explicit_propagate(method.tableau(), &of, carried);
+            }
+            Some(Exactly::Midpoint(model, line)) => {
+                schemes::derivative(&in_numbers(model, step, &targets), line)
+            }
+            Some(Exactly::Stages(model, tableau)) => {
+                collocated::derivative(&in_numbers(model, step, &targets), tableau)
+            }
+        };
+        let Derivative { along_x, along_h } = derivative?;
+        Ok(Moved {
+            carried: Carried { t: along_x * &carried.t, laws: carried.laws.clone() },
+            along_h,
+        })
+    }
+
+    fn pull_back(
+        &self,
+        method: &M,
+        step: &Part<Self>,
+        costate: &DVector<f64>,
+    ) -> Result<DVector<f64>, Unlinearised> {
+        let (targets, row) = (targets(step), costate.as_slice());
+        match self.exactly(method.compiled()) {
+            Some(Exactly::Midpoint(model, line)) => {
+                schemes::pull_back(&in_numbers(model, step, &targets), line, row)
+            }
+            Some(Exactly::Stages(model, tableau)) => {
+                collocated::pull_back(&in_numbers(model, step, &targets), tableau, row)
+            }
+            Some(Exactly::Explicit(_)) | None => {
+                let here = Carried::start(self.law_rows(&step.x));
+                Ok(self.propagate(method, step, &here)?.carried.t.tr_mul(costate))
+            }
+        }
+    }
+
+    fn second_law_error(
+        &self,
+        method: &M,
+        step: &Part<Self>,
+        column: [&DVector<f64>; 2],
+    ) -> Option<f64> {
+        let (targets, column) = (targets(step), column.map(|column| column.as_slice()));
+        match self.exactly(method.compiled())? {
+            Exactly::Explicit(_) => None,
+            Exactly::Midpoint(model, line) => {
+                schemes::entropy_law(&in_numbers(model, step, &targets), line, column)
+            }
+            Exactly::Stages(model, tableau) => {
+                collocated::entropy_law(&in_numbers(model, step, &targets), tableau, column)
+            }
+        }
+    }
+
+    fn moved_along(&self, x: &Entries, v: &DVector<f64>) -> Vec<Real> {
+        self.moving(x, v)
+    }
+
+    fn coordinates_around(&self, y: &Entries, there: &Vec<Real>) -> Vec<[f64; 2]> {
+        SmoothFlow::coordinates(self, y, there)
+    }
+}

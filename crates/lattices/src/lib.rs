@@ -60,6 +60,7 @@ mod projection;
 mod random;
 mod recheck;
 pub mod report;
+mod tangent;
 mod terms;
 pub mod vector;
 mod verify;

@@ -20,11 +20,11 @@ verb                                  | closed     | family    | open         | 
 a field of a struct: `Simulation`     | struct     | struct    | struct       | struct    | struct     | in lists | in lists     | in lists      | struct       | struct
 energy and entropy in boxes: `erased` | erased     | E0599     | E0599        | E0599     | E0599      | E0599    | E0599        | E0599         | E0599        | E0599
 
-`tangent` of `WeylMidpoint`           | schemes    | default   | E0277        | E0277     | E0277      | E0277    | E0277        | E0277         | E0277        | E0277
-`tangent` of `DormandPrince8`         | explicit   | explicit  | E0277        | E0277     | E0277      | E0277    | E0277        | E0277         | E0277        | E0277
-`tangent` of `Gauss`                  | stages     | stages    | E0277        | E0277     | E0277      | E0277    | E0277        | E0277         | E0277        | E0277
-`tangent` across a jump               | saltation  | saltation | E0277        | E0277     | E0277      | E0277    | E0277        | E0277         | E0277        | E0277
-`adjoint` of `DormandPrince8`         | transposed | adjoint   | E0277        | E0277     | E0277      | E0277    | E0277        | E0277         | E0277        | E0277
+`tangent` of `WeylMidpoint`           | schemes    | default   | beside       | its path  | its path   | beside sites | beside sites | beside sites  | in numbers   | in numbers
+`tangent` of `DormandPrince8`         | explicit   | explicit  | beside       | its path  | its path   | beside sites | beside sites | beside sites  | in numbers   | in numbers
+`tangent` of `Gauss`                  | stages     | stages    | beside       | its path  | its path   | beside sites | beside sites | beside sites  | in numbers   | in numbers
+`tangent` across a jump               | saltation  | saltation | bounces      | no events | no events  | bounces  | bounces      | no events     | bounces      | bounces
+`adjoint` of `DormandPrince8`         | transposed | adjoint   | beside       | its path  | its path   | beside sites | beside sites | beside sites  | in numbers   | in numbers
 parameters in its builder             | promises   | promises  | E0599        | E0599     | E0599      | E0599    | E0599        | E0599         | E0277        | E0277
 `Fit`                                 | fit        | fit       | a tank       | a path    | a path     | a rod    | a rod        | a rod         | a row        | a row
 `Loss`                                | loss       | loss      | a tank       | a path    | a path     | a rod    | a rod        | a rod         | a row        | a row
@@ -91,6 +91,9 @@ const PROMISES: [&str; 2] =
 const BY_DIFFERENCES: &str = "`Fit::of_systems` and `Loss::of_systems`: derivatives are \
                               [differences of runs in the same steps](sensitivities.md#fits-of-any-kind-of-system)";
 
+const BESIDE: &str = "derivatives of a step are \
+                      [differences of steps beside it](sensitivities.md#derivatives-of-any-kind-of-system)";
+
 /// The tests that the matrix names.
 pub(crate) const TESTS: &[Reference] = &[
     right("promises", PROMISES[0], PROMISES[1]),
@@ -122,6 +125,33 @@ pub(crate) const TESTS: &[Reference] = &[
     right("explicit", "tests/tangent/explicit.rs", "explicit_tangents_are_those_of_differences"),
     right("stages", "tests/tangent/collocated.rs", "tangents_of_stages_are_those_of_differences"),
     right("saltation", "tests/tangent/jumps.rs", "tangents_across_jumps_are_those_of_differences"),
+    partly(
+        "beside",
+        [
+            "tests/tangents/beside.rs",
+            "open_systems_have_tangents_of_their_points_and_of_their_ledgers",
+        ],
+        BESIDE,
+    ),
+    partly(
+        "its path",
+        [
+            "tests/tangents/beside.rs",
+            "paths_with_noise_have_the_tangents_of_their_own_random_numbers",
+        ],
+        BESIDE,
+    ),
+    partly("beside sites", ["tests/tangents/beside.rs", "lattices_have_tangents"], BESIDE),
+    partly(
+        "in numbers",
+        [
+            "tests/tangents/in_numbers.rs",
+            "systems_of_ones_own_have_the_tangents_of_differences_of_runs",
+        ],
+        "exact for models on vector spaces; to some ten digits elsewhere, \
+         [by differences](sensitivities.md#derivatives-of-any-kind-of-system)",
+    ),
+    right("bounces", "tests/tangents/beside.rs", "tangents_of_every_kind_of_system_cross_jumps"),
     right("transposed", "tests/tangent/adjoint.rs", "adjoints_are_transposed_tangents"),
     right("adjoint", "tests/tangent/adjoint.rs", "adjoints_have_parameters"),
     right("fit", "tests/tangent/fits.rs", "a_fit_finds_the_parameters_within_their_errors"),

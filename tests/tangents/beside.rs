@@ -1,0 +1,375 @@
+//! Tangents by differences of steps: of open, noisy and open noisy systems, of lattices, and of systems in plain numbers on curved
+//! spaces; against differences of whole runs in the same steps, and against exact ones.
+
+use metriplectic::dynamics::InNumbers;
+use metriplectic::equations::{Equations, Sizes};
+use metriplectic::integrators::{
+    Differentiated, Element, Entries, FromEquations, OpenState, Schedule, TangentError,
+    Unlinearised, Vector as _,
+};
+use metriplectic::lattices::{Onsager, Points, SiteState};
+use metriplectic::prelude::*;
+use nalgebra::{DMatrix, DVector, Vector1, vector};
+
+use crate::off;
+
+/// A loss of the states of a run: a row for each of them.
+fn row(k: usize, n: usize) -> DVector<f64> {
+    DVector::from_fn(n, |i, _| (1.0 + i as f64 + k as f64).sin())
+}
+
+/// Compares the tangent of a run of fixed steps with differences of whole runs along each direction of the point, and the
+/// transposed steps with the tangent. The error is relative to the largest entry.
+fn compared<F, M>(name: &str, flow: &F, method: M, x0: &Element<F>, span: Span)
+where
+    F: Differentiated<M>,
+    M: Clone + Stepper<F>,
+{
+    let run = method.clone().tangent(flow, x0.clone(), span).expect("a tangent");
+    let plain = method.clone().run(flow, x0.clone(), span).expect("it runs");
+    assert!(plain.last().point == run.last().point, "{name}: the tangent changed the run");
+    let (end, sizes) = (&run.last().point, flow.sizes(x0));
+    let n = sizes.len();
+    let columns = (0..n).map(|k| {
+        let slope = |e: f64| {
+            let at = |e: f64| {
+                let d = sizes.with(|i| if i == k { e } else { 0.0 });
+                let run = method.clone().run(flow, flow.moved(x0, &d), span).expect("it runs");
+                let d = flow.between(end, &run.last().point).expect("it is near");
+                DVector::from_vec(d.to_list())
+            };
+            (at(e) - at(-e)) / (2.0 * e)
+        };
+        (slope(1e-5) * 4.0 - slope(2e-5)) / 3.0
+    });
+    let differences = DMatrix::from_columns(&columns.collect::<Vec<_>>());
+    let found = run.last().matrix();
+    let error = off(&found.columns(0, n).into_owned(), &differences);
+    let back = method.adjoint(flow, x0.clone(), span).expect("an adjoint");
+    let all = found.nrows();
+    let rows: Vec<_> = (0..back.states().len()).map(|k| row(k, all)).collect();
+    let forward = run.states().iter().zip(&rows).map(|(state, row)| state.derivative_of(row));
+    let forward = forward.fold(DVector::zeros(all), |sum: DVector<f64>, row| sum + row);
+    let gradient = back.pull_back(&rows).expect("a gradient").along_start();
+    let transposed = (gradient - &forward).amax() / forward.amax();
+    println!("{name}: {error:.1e}, transposed {transposed:.1e}, {}", run.sensitivity());
+    // Some ten digits of each step; where energy and entropy are nearly dependent, their projection bends over a hundredth of a size.
+    assert!(error < 1e-7, "{name}: {error:e}\n{found:.9}\n{differences:.9}");
+    assert!(transposed < 1e-7, "{name}: {transposed:e}");
+    assert!(run.sensitivity().energy < 1e-8, "{name}: {}", run.sensitivity());
+}
+
+macro_rules! open_body {
+    () => {
+        System::on(LieDual::so3())
+            .energy_in_time(|t: Real, p: &Vector3<Real>| {
+                p.x * p.x * 0.5 + p.y * p.y + p.z * p.z * 1.5 + p.x * t.sin()
+            })
+            .entropy(|p: &Vector3<Real>| p.norm_squared() * 0.5)
+            .work("torque", |t: Real, p: &Vector3<Real>| {
+                p.cross(&vector![Real::from(0.0), t.sin() * 0.5, Real::from(0.0)])
+            })
+            .bath("air", Bath::at(1.0).isotropic(0.1))
+    };
+}
+
+const START: Vector3<f64> = Vector3::new(0.4, -1.0, 0.3);
+
+#[test]
+fn open_systems_have_tangents_of_their_points_and_of_their_ledgers() {
+    let open = open_body!().build().unwrap();
+    let start = open.start(START);
+    macro_rules! all {
+        ($($method:expr),+) => {$(
+            compared(stringify!($method), &open, $method, &start, Span::steps(0.1, 20));
+        )+};
+    }
+    all!(
+        WeylMidpoint,
+        Scheme::new(WeylMidpoint).gradient(ItohAbe),
+        Gauss::<2>,
+        DormandPrince5,
+        DormandPrince8,
+        RungeKuttaChebyshev
+    );
+    // An oscillator with the mass and the spring 1 in air at a temperature: it has no entropy of its own.
+    let oscillator = System::on(Euclidean::<2>)
+        .bracket(Symplectic)
+        .energy(|x: &Vector2<Real>| (x.x * x.x + x.y * x.y) * 0.5)
+        .bath(
+            "air",
+            Bath::at(2.0).friction(|_, _: &Vector2<Real>, _: &Vector2<Real>| {
+                [Contact { rate: Real::from(0.3), along: Vector2::<Real>::y() }]
+            }),
+        )
+        .build()
+        .unwrap();
+    let start = oscillator.start(vector![1.0, 0.2]);
+    compared("Radau", &oscillator, Radau::<2>, &start, Span::steps(0.1, 20));
+    // By hand: x' = (p, −q − γp) and Q' = −γp², with q'' + γq' + q = 0.
+    let run = DormandPrince8.tangent(&oscillator, start, Span::steps(0.05, 40)).unwrap();
+    let (gamma, t) = (0.3, 2.0_f64);
+    let (decay, omega) = ((-0.5 * gamma * t).exp(), (1.0 - 0.25 * gamma * gamma).sqrt());
+    let (sin, cos) = (omega * t).sin_cos();
+    let along_q = decay * (cos + 0.5 * gamma / omega * sin);
+    let along_p = decay * sin / omega;
+    let found = run.last().matrix();
+    let error = (found[(0, 0)] - along_q).abs().max((found[(0, 1)] - along_p).abs());
+    println!("by hand: {error:.1e}");
+    assert!(error < 1e-9, "{error:e}");
+    // The heat is the change of the energy.
+    let heat = run.last().heat_along("air").unwrap();
+    let end = run.last().point.x;
+    for (k, start) in [1.0, 0.2].into_iter().enumerate() {
+        let energy = end.x * found[(0, k)] + end.y * found[(1, k)] - start;
+        assert!((heat[k] - energy).abs() < 1e-9, "{k}: {} and {energy}", heat[k]);
+    }
+    let entropy = run.last().bath_entropy_along("air").unwrap();
+    // But along what was booked before, which the start is free to choose.
+    let off_heat = (entropy * 2.0 + &heat).rows(0, 3).amax();
+    assert!(off_heat < 1e-14, "{off_heat:e}");
+    assert!(run.last().work_along("air").is_none());
+}
+
+#[test]
+fn paths_with_noise_have_the_tangents_of_their_own_random_numbers() {
+    let system = System::on(LieDual::so3())
+        .energy(|p: &Vector3<Real>| p.x * p.x * 0.5 + p.y * p.y + p.z * p.z * 1.5)
+        .entropy(|p: &Vector3<Real>| p.norm_squared() * 0.5)
+        .noise(Boltzmann(0.1))
+        .build()
+        .unwrap();
+    let open = open_body!().noise(Boltzmann(0.1)).build().unwrap();
+    let start = open.flow().start(START);
+    for seed in [1, 2] {
+        let span = Span::steps(0.02, 30);
+        compared("noise, Weyl", &system, RandomFlow(WeylMidpoint).seed(seed), &START, span);
+        let sampler = NinomiyaVictoir(WeylMidpoint).seed(seed);
+        compared("noise of order 2", &system, sampler, &START, span);
+        compared("open noise, 5", &open, RandomFlow(DormandPrince5).seed(seed), &start, span);
+    }
+}
+
+#[test]
+fn lattices_have_tangents() {
+    let ring = || {
+        Lattice::on(Graph::ring(4), LieDual::so3())
+            .energy(|p: &Vector3<Real>| p.x * p.x * 0.5 + p.y * p.y + p.z * p.z * 1.5)
+            .entropy(|p: &Vector3<Real>| p.norm_squared() * 0.5)
+            .bond_onsager(|bond| {
+                let [u, v] = bond.w;
+                [Onsager { rate: 0.1, b: [u.cross(v), v.cross(u)] }]
+            })
+            .build()
+            .unwrap()
+    };
+    let lattice = ring();
+    let start = lattice.points(|site| vector![0.4 + 0.1 * site as f64, -1.0, 0.3]);
+    let span = Span::steps(0.1, 10);
+    compared("lattice, 8", &lattice, DormandPrince8, &start, span);
+    compared("lattice, Chebyshev", &lattice, RungeKuttaChebyshev, &start, span);
+    compared("lattice, Gauss", &lattice, Gauss::<2>, &start, span);
+    let open = ring()
+        .opened()
+        .work("torque", [0], |t, _, p: &Vector3<f64>| p.cross(&vector![0.0, 0.5 * t.sin(), 0.0]))
+        .bath("air", 1.0, [1], |_, _: &SiteState<'_, LieDual<3>>| {
+            [Onsager { rate: 0.1, b: vector![0.0, 1.0, 0.0] }]
+        });
+    let start = open.start(start);
+    compared("open lattice, 8", &open, DormandPrince8, &start, span);
+    compared("open lattice, Weyl", &open, WeylMidpoint, &start, span);
+    compared("open lattice, Gauss", &open, Gauss::<2>, &start, span);
+    let conducting = Lattice::on(Graph::ring(4), Euclidean::<1>)
+        .energy(|u: &Vector1<Real>| u.x)
+        .entropy(|u: &Vector1<Real>| u.x.ln())
+        .bond_onsager(|bond| {
+            let [u, v] = bond.x.map(|u| u.x);
+            [Onsager { rate: 0.1 * u * v, b: [vector![bond.w[1].x], vector![-bond.w[0].x]] }]
+        })
+        .build()
+        .unwrap()
+        .with_noise(Boltzmann(0.01));
+    let start = conducting.flow().points(|site| vector![1.0 + 0.1 * site as f64]);
+    let noise = RandomFlow(DormandPrince5).seed(3);
+    compared("noisy lattice", &conducting, noise, &start, Span::steps(0.02, 20));
+}
+
+/// A sphere in plain numbers, against the derivatives of the same run in types.
+#[test]
+fn derivatives_by_differences_have_ten_digits() {
+    let sphere = System::on(Sphere::<2>::round())
+        .energy(|n: &Vector3<Real>| n.x * n.x * 0.5 + n.y * n.y + n.z.powi(3) * 0.4)
+        .entropy(|n: &Vector3<Real>| n.z + n.x * n.y * 0.3)
+        .build()
+        .unwrap();
+    let numbers = FromEquations(InNumbers(&sphere));
+    for n in [vector![0.36, 0.48, 0.8], vector![0.6, 0.8, -0.0], vector![0.48, 0.6, -0.64]] {
+        let start = Entries::from([n.x, n.y, n.z]);
+        for schedule in [
+            Schedule::from(Span::steps(0.1, 20)),
+            Span::until(2.0).tolerance(1e-7).output_every(0.3),
+        ] {
+            let exact = DormandPrince8.tangent(&sphere, n, schedule.clone()).unwrap();
+            let run = DormandPrince8.tangent(&numbers, start.clone(), schedule).unwrap();
+            assert_eq!(exact.states().len(), run.states().len());
+            let pairs = exact.states().iter().zip(run.states());
+            let errors = pairs.map(|(exact, found)| off(&found.matrix(), &exact.matrix()));
+            let error = errors.fold(0.0, f64::max);
+            println!("{n:?}: {error:.1e}");
+            assert!(error < 1e-9, "{error:e}");
+        }
+    }
+}
+
+#[test]
+fn steps_on_another_branch_and_states_without_a_size_are_refused() {
+    let oscillator = System::on(Euclidean::<2>)
+        .bracket(Symplectic)
+        .energy_in_time(|_, x: &Vector2<Real>| (x.x * x.x + x.y * x.y) * 0.5)
+        .build()
+        .unwrap();
+    let start = oscillator.start(vector![0.0, 0.0]);
+    let error = WeylMidpoint.tangent(&oscillator, start, Span::steps(0.1, 3)).unwrap_err();
+    assert!(
+        matches!(error, TangentError::NotLinearised { cause: Unlinearised::NoSize, .. }),
+        "{error}"
+    );
+}
+
+/// Compares the tangent across the impacts of a ball with differences of runs that find their own times of impact, along each
+/// direction of the point and along the clock.
+fn bounces<F>(name: &str, flow: &F, x0: &Element<F>, floor: impl Fn(Until) -> Schedule)
+where
+    F: Differentiated<DormandPrince8>,
+    DormandPrince8: Stepper<F>,
+{
+    // A clock is moved with all times of the run.
+    let schedule = |late: f64| floor(Span::until(2.0 + late).starting_at(late).tolerance(1e-11));
+    let run = DormandPrince8.tangent(flow, x0.clone(), schedule(0.0)).expect("a tangent");
+    let plain = DormandPrince8.run(flow, x0.clone(), schedule(0.0)).expect("it runs");
+    assert!(plain.last().point == run.last().point && run.events().len() == 1, "{name}");
+    let (end, sizes) = (&run.last().point, flow.sizes(x0));
+    let columns = sizes.len() + usize::from(flow.clock().is_some());
+    let differences = (0..columns).map(|k| {
+        let at = |e: f64| {
+            let late = if flow.clock() == Some(k) { e } else { 0.0 };
+            let d = sizes.with(|i| if i == k && late == 0.0 { e } else { 0.0 });
+            let run = DormandPrince8.run(flow, flow.moved(x0, &d), schedule(late));
+            let end_of_run = &run.expect("it runs").last().point.clone();
+            DVector::from_vec(flow.between(end, end_of_run).expect("it is near").to_list())
+        };
+        let slope = |e: f64| (at(e) - at(-e)) / (2.0 * e);
+        (slope(5e-4) * 4.0 - slope(1e-3)) / 3.0
+    });
+    let differences = DMatrix::from_columns(&differences.collect::<Vec<_>>());
+    let found = run.last().matrix().columns(0, columns).into_owned();
+    let error = off(&found, &differences);
+    println!("{name}: {error:.1e}, {}", run.sensitivity());
+    // Runs to 1e-11, and their differences over 1e-3.
+    assert!(error < 1e-7, "{name}: {error:e}\n{found:.9}\n{differences:.9}");
+}
+
+#[test]
+fn tangents_of_every_kind_of_system_cross_jumps() {
+    const RESTITUTION: f64 = 0.9;
+    struct Ball;
+    impl Equations for Ball {
+        fn sizes(&self) -> Sizes {
+            Sizes { entries: 2, directions: 2, laws: 2 }
+        }
+
+        fn values(&self, _: f64, x: &[f64], values: &mut [f64]) {
+            values.copy_from_slice(&[0.5 * x[1] * x[1] + x[0], 0.0]);
+        }
+
+        fn differentials(&self, t: f64, x: &[f64], values: &mut [f64], w: &mut [f64]) {
+            self.values(t, x, values);
+            w.copy_from_slice(&[1.0, x[1], 0.0, 0.0]);
+        }
+
+        fn velocity(&self, _: f64, x: &[f64], v: &mut [f64]) -> Option<f64> {
+            v.copy_from_slice(&[x[1], -1.0]);
+            Some(0.0)
+        }
+
+        fn is_vector_space(&self) -> bool {
+            true
+        }
+    }
+    bounces("own", &FromEquations(Ball), &[0.5, 0.1].into(), |span| {
+        span.event("floor", |x: &Entries| x[0])
+            .falling()
+            .jump(|_, x: &Entries| Entries::from([x[0], -RESTITUTION * x[1]]))
+            .differentiable(
+                |_, x: &Vec<Real>| x[0],
+                |_, x: &Vec<Real>| vec![x[0], -x[1] * RESTITUTION],
+            )
+            .into()
+    });
+    let pushed = System::on(Euclidean::<2>)
+        .bracket(Symplectic)
+        .energy(|x: &Vector2<Real>| x.y * x.y * 0.5 + x.x)
+        .work("wind", |t: Real, x: &Vector2<Real>| vector![Real::from(0.0), (t + x.x).sin() * 0.3])
+        .build()
+        .unwrap();
+    // The floor moves, and so does the ball after its impact: both by the clock.
+    bounces("open", &pushed, &pushed.start(vector![0.5, 0.1]), |span| {
+        span.event("floor", |state: &OpenState<Vector2<f64>>| state.x.x - 0.05 * state.time.sin())
+            .falling()
+            .jump(|t, state: &OpenState<Vector2<f64>>| {
+                state.at(vector![state.x.x, -RESTITUTION * state.x.y + 0.1 * t.cos()])
+            })
+            .differentiable(
+                |t, x: &Vector2<Real>| x.x - t.sin() * 0.05,
+                |t, x: &Vector2<Real>| vector![x.x, t.cos() * 0.1 - x.y * RESTITUTION],
+            )
+            .into()
+    });
+}
+
+#[test]
+fn tangents_of_lattices_cross_jumps() {
+    const RESTITUTION: f64 = 0.9;
+    let balls = || {
+        Lattice::on(Graph::ring(3), Euclidean::<2>)
+            .bracket(Symplectic)
+            .energy(|x: &Vector2<Real>| x.y * x.y * 0.5 + x.x)
+            .bond_energy(|(a, b): &(Vector2<Real>, Vector2<Real>)| (a.x - b.x) * (a.x - b.x) * 0.05)
+            .build()
+            .unwrap()
+    };
+    type Balls = Vec<Vector2<Real>>;
+    let map = |x: &Balls| {
+        let first = vector![x[0].x, -x[0].y * RESTITUTION];
+        std::iter::once(first).chain(x[1..].iter().copied()).collect::<Balls>()
+    };
+    let start = |site: usize| vector![0.5 + 1.5 * site as f64, 0.1];
+    let ring = balls();
+    bounces("lattice", &ring, &ring.points(start), |span| {
+        span.event("floor", |x: &Points<Euclidean<2>>| x[0].x)
+            .falling()
+            .jump(|_, x: &Points<Euclidean<2>>| {
+                let mut y = x.clone();
+                y[0].y *= -RESTITUTION;
+                y
+            })
+            .differentiable(|_, x: &Balls| x[0].x, move |_, x: &Balls| map(x))
+            .into()
+    });
+    let open = balls()
+        .opened()
+        .work("wind", [0], |t, _, x: &Vector2<f64>| vector![0.0, 0.3 * (t + x.x).sin()]);
+    let x0 = open.start(open.lattice().points(start));
+    bounces("open lattice", &open, &x0, |span| {
+        type State = OpenState<Points<Euclidean<2>>>;
+        span.event("floor", |state: &State| state.x[0].x)
+            .falling()
+            .jump(|_, state: &State| {
+                let mut y = state.x.clone();
+                y[0].y *= -RESTITUTION;
+                state.at(y)
+            })
+            .differentiable(|_, x: &Balls| x[0].x, move |_, x: &Balls| map(x))
+            .into()
+    });
+}

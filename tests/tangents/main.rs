@@ -1,0 +1,11 @@
+//! Tangents of systems of any kind: in plain numbers, and by differences of steps.
+
+mod beside;
+mod in_numbers;
+
+use nalgebra::DMatrix;
+
+/// The largest difference relative to the largest entry.
+pub(crate) fn off(a: &DMatrix<f64>, b: &DMatrix<f64>) -> f64 {
+    (a - b).amax() / b.amax()
+}

@@ -103,7 +103,8 @@ pub mod prelude {
         Method, Newton, NinomiyaVictoir, NoiseBuilder, NoiseError, Noisy, NoisyError, Observables,
         OpenBuilder, OpenSpace, OpenState, OpenSystem, Radau, RandomFlow, ResumeError, Run,
         RunError, RungeKuttaChebyshev, Scheme, Simulation, Span, SpanError, StartError, State,
-        StepError, Stepper, Steps, SymmetricItohAbe, Tableau, Tangents, Trajectory, Until, Watch,
+        StepError, Stepper, Steps, SymmetricItohAbe, Systems, Tableau, Tangents, Trajectory, Until,
+        Watch,
     };
     pub use metriplectic_lattices::{
         BondState, Boundary, Graph, Lattice, LatticeError, NoisySurroundings, Onsager, OpenLattice,

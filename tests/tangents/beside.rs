@@ -3,13 +3,14 @@
 
 use metriplectic::dynamics::InNumbers;
 use metriplectic::equations::{Equations, Sizes};
+use metriplectic::integrators::tangent::{HasFlow, SmoothFlow};
 use metriplectic::integrators::{
     Differentiated, Element, Entries, FromEquations, OpenState, Schedule, TangentError,
     Unlinearised, Vector as _,
 };
 use metriplectic::lattices::{Onsager, Points, SiteState};
 use metriplectic::prelude::*;
-use nalgebra::{DMatrix, DVector, Vector1, vector};
+use nalgebra::{DMatrix, DVector, SVector, Vector1, vector};
 
 use crate::off;
 
@@ -22,7 +23,7 @@ fn row(k: usize, n: usize) -> DVector<f64> {
 /// transposed steps with the tangent. The error is relative to the largest entry.
 fn compared<F, M>(name: &str, flow: &F, method: M, x0: &Element<F>, span: Span)
 where
-    F: Differentiated<M>,
+    F: Differentiated<M> + HasFlow<Flow = F> + SmoothFlow,
     M: Clone + Stepper<F>,
 {
     let run = method.clone().tangent(flow, x0.clone(), span).expect("a tangent");
@@ -194,6 +195,40 @@ fn lattices_have_tangents() {
     compared("noisy lattice", &conducting, noise, &start, Span::steps(0.02, 20));
 }
 
+/// Many stages, whose number is that of the step beside which others are taken.
+#[test]
+fn stiff_lattices_have_tangents_of_the_stages_that_they_took() {
+    let rod = Lattice::on(Graph::chain(12), Euclidean::<1>)
+        .energy(|u: &Vector1<Real>| u.x)
+        .entropy(|u: &Vector1<Real>| u.x.ln())
+        .bond_onsager(|_| [Onsager { rate: 200.0, b: [vector![1.0], vector![-1.0]] }])
+        .build()
+        .unwrap();
+    let start = rod.points(|site| vector![1.0 + 0.1 * site as f64]);
+    compared("stiff", &rod, RungeKuttaChebyshev, &start, Span::steps(0.05, 30));
+}
+
+/// A sphere beside a number of any size: the frames of the chart have the sizes of the space.
+#[test]
+fn losses_on_products_have_derivatives_in_any_unit() {
+    for unit in [1.0, 1e4, 1e11] {
+        let warm = System::on(Product(Sphere::<2>::round(), Euclidean::<1>))
+            .energy(move |(n, u): &(Vector3<Real>, Vector1<Real>)| n.x * n.x * 0.5 + u.x / unit)
+            .entropy(move |(_, u): &(Vector3<Real>, Vector1<Real>)| u.x / unit)
+            .build()
+            .unwrap();
+        let numbers = FromEquations(InNumbers(&warm));
+        let start = Entries::from([0.36, 0.48, 0.8, unit]);
+        let run = DormandPrince8.adjoint(&numbers, start, Span::steps(0.1, 2)).unwrap();
+        let last = run.states().len() - 1;
+        let zero = Real::from(0.0);
+        let loss = run.gradient(|k, x| if k == last { x[3] / unit } else { zero }).unwrap();
+        let along = loss.along_start()[2] * unit;
+        println!("{unit:e}: {along}");
+        assert!((along - 1.0).abs() < 1e-6, "{unit:e}: {along}");
+    }
+}
+
 /// A sphere in plain numbers, against the derivatives of the same run in types.
 #[test]
 fn derivatives_by_differences_have_ten_digits() {
@@ -236,11 +271,122 @@ fn steps_on_another_branch_and_states_without_a_size_are_refused() {
     );
 }
 
+/// A particle that is pushed, `p' = sin t`, far from the time zero: the clock of its start, by hand.
+#[test]
+fn the_clock_has_digits_at_any_time_and_in_steps_of_any_size() {
+    let pushed = System::on(Euclidean::<2>)
+        .bracket(Symplectic)
+        .energy(|x: &Vector2<Real>| x.y * x.y * 0.5)
+        .work("push", |t: Real, _: &Vector2<Real>| vector![Real::from(0.0), t.sin()])
+        .build()
+        .unwrap();
+    for (start, h, count) in [(0.0, 1e-3, 500), (1e3, 1e-3, 500), (1e6, 1e-3, 200), (0.0, 0.1, 20)]
+    {
+        let span = Span::steps(h, count).starting_at(start);
+        let x0 = pushed.start(vector![1.0, 0.7]);
+        let run = DormandPrince8.tangent(&pushed, x0, span).unwrap();
+        let (found, end) = (run.last().matrix(), run.last().time);
+        let exact = end.sin() - f64::sin(start);
+        let off = (found[(1, 2)] - exact).abs() / exact.abs();
+        println!("from {start:e} by {h:e}: {off:.1e}");
+        assert!((found[(2, 2)] - 1.0).abs() < 1e-15);
+        // Times of 1e6 have ten digits.
+        assert!(off < if start > 1e5 { 1e-6 } else { 1e-9 }, "{off:e}");
+    }
+    // An output just after a step.
+    let x0 = pushed.start(vector![1.0, 0.7]);
+    let outputs = Span::steps(0.1, 3).output_at([0.1, 0.1 + 1e-9, 0.3]);
+    let run = DormandPrince8.tangent(&pushed, x0, outputs).unwrap();
+    let [early, late] = [1, 2].map(|k| run.states()[k].matrix());
+    assert!((early - late).amax() < 1e-8);
+}
+
+/// A momentum that is small beside the distance over which it moves, and an angle that has turned many times.
+#[test]
+fn entries_whose_size_is_no_scale_have_digits() {
+    let free = System::on(Euclidean::<2>)
+        .bracket(Symplectic)
+        .energy_in_time(|_, x: &Vector2<Real>| x.y * x.y * 0.5)
+        .build()
+        .unwrap();
+    for p in [1e-2, 1e-4, 1e-8, 1e-12] {
+        for name in ["8", "Weyl"] {
+            let (x0, span) = (free.start(vector![1.0, p]), Span::steps(0.1, 20));
+            let run = if name == "8" {
+                DormandPrince8.tangent(&free, x0, span).unwrap()
+            } else {
+                WeylMidpoint.tangent(&free, x0, span).unwrap()
+            };
+            let off = (run.last().matrix()[(0, 1)] - 2.0).abs();
+            println!("p = {p:e} by {name}: {off:.1e}");
+            // One that is a hundredth of the other bounds the displacement.
+            assert!(off < 2e-8, "{p:e}: {off:e}");
+        }
+    }
+    let pendulum = System::on(Euclidean::<2>)
+        .bracket(Symplectic)
+        .energy_in_time(|_, x: &Vector2<Real>| x.y * x.y * 0.5 - x.x.cos())
+        .build()
+        .unwrap();
+    let exact = System::on(Euclidean::<2>)
+        .bracket(Symplectic)
+        .energy(|x: &Vector2<Real>| x.y * x.y * 0.5 - x.x.cos())
+        .build()
+        .unwrap();
+    for turns in [0.0, 10.0, 1e3, 1.3e5] {
+        let q = 0.3 + turns * std::f64::consts::TAU;
+        let (x0, span) = (vector![q, 0.4], Span::steps(0.1, 20));
+        let found = DormandPrince8.tangent(&pendulum, pendulum.start(x0), span).unwrap();
+        let expected = DormandPrince8.tangent(&exact, x0, span).unwrap().last().matrix();
+        let error = off(&found.last().matrix().view((0, 0), (2, 2)).into_owned(), &expected);
+        println!("{turns} turns: {error:.1e}");
+        // The angle itself loses as many digits.
+        assert!(error < 1e-9_f64.max(2e-11 * q), "{turns} turns: {error:e}");
+    }
+    // A planet that stays in its plane: place and momentum across it are zero.
+    let potential = |x: &SVector<Real, 6>| {
+        let [place, momentum] =
+            [x.fixed_rows::<3>(0).norm_squared(), x.fixed_rows::<3>(3).norm_squared()];
+        momentum * 0.5 - place.powf(-0.5)
+    };
+    let exact = System::on(Euclidean::<6>).bracket(Symplectic).energy(potential).build().unwrap();
+    let planet = System::on(Euclidean::<6>)
+        .bracket(Symplectic)
+        .energy_in_time(move |_, x: &SVector<Real, 6>| potential(x))
+        .build()
+        .unwrap();
+    let (x0, span) = (SVector::from([1.0, 0.0, 0.0, 0.0, 1.1, 0.0]), Span::steps(0.1, 20));
+    let expected = DormandPrince8.tangent(&exact, x0, span).unwrap().last().matrix();
+    let found = DormandPrince8.tangent(&planet, planet.start(x0), span).unwrap().last().matrix();
+    let error = off(&found.view((0, 0), (6, 6)).into_owned(), &expected);
+    println!("a planet: {error:.1e}");
+    assert!(error < 1e-9, "{error:e}");
+    // The heat of a body that cools by six orders of magnitude.
+    let cooling = System::on(Euclidean::<1>)
+        .energy(|u: &Vector1<Real>| u.x)
+        .entropy(|u: &Vector1<Real>| u.x.ln())
+        .bath(
+            "air",
+            Bath::at(1.0).friction(|_: Real, u: &Vector1<Real>, _: &Vector1<Real>| {
+                [Contact { rate: u.x, along: vector![1.0.into()] }]
+            }),
+        )
+        .build()
+        .unwrap();
+    // u' = (1 − u/…): the rate of the bath is u (T/u − 1)/T, so u(t) = 1 + (u₀ − 1) e^{−t}.
+    let start = cooling.start(vector![1e6]);
+    let run = DormandPrince8.tangent(&cooling, start, Span::until(20.0).tolerance(1e-10)).unwrap();
+    let found = run.last().matrix()[(0, 0)];
+    let exact = (run.last().point.x.x - 1.0) / (1e6 - 1.0);
+    println!("u = {}, off by {:.1e}", run.last().point.x.x, found / exact - 1.0);
+    assert!((found / exact - 1.0).abs() < 1e-6, "{found} {exact}");
+}
+
 /// Compares the tangent across the impacts of a ball with differences of runs that find their own times of impact, along each
 /// direction of the point and along the clock.
 fn bounces<F>(name: &str, flow: &F, x0: &Element<F>, floor: impl Fn(Until) -> Schedule)
 where
-    F: Differentiated<DormandPrince8>,
+    F: Differentiated<DormandPrince8> + HasFlow<Flow = F> + SmoothFlow,
     DormandPrince8: Stepper<F>,
 {
     // A clock is moved with all times of the run.
@@ -253,7 +399,7 @@ where
     let differences = (0..columns).map(|k| {
         let at = |e: f64| {
             let late = if flow.clock() == Some(k) { e } else { 0.0 };
-            let d = sizes.with(|i| if i == k && late == 0.0 { e } else { 0.0 });
+            let d = sizes.with(|i| if i == k { e } else { 0.0 });
             let run = DormandPrince8.run(flow, flow.moved(x0, &d), schedule(late));
             let end_of_run = &run.expect("it runs").last().point.clone();
             DVector::from_vec(flow.between(end, end_of_run).expect("it is near").to_list())
@@ -312,6 +458,32 @@ fn tangents_of_every_kind_of_system_cross_jumps() {
         .work("wind", |t: Real, x: &Vector2<Real>| vector![Real::from(0.0), (t + x.x).sin() * 0.3])
         .build()
         .unwrap();
+    // An energy that depends on time does work at the jump.
+    let swinging = System::on(Euclidean::<2>)
+        .bracket(Symplectic)
+        .energy_in_time(|t: Real, x: &Vector2<Real>| x.y * x.y * 0.5 * (t.sin() * 0.3 + 1.0) + x.x)
+        .build()
+        .unwrap();
+    bounces("in time", &swinging, &swinging.start(vector![0.5, 0.1]), |span| {
+        span.event("floor", |state: &OpenState<Vector2<f64>>| state.x.x)
+            .falling()
+            .jump(|_, state: &OpenState<Vector2<f64>>| {
+                state.at(vector![state.x.x, -RESTITUTION * state.x.y])
+            })
+            .differentiable(
+                |_, x: &Vector2<Real>| x.x,
+                |_, x: &Vector2<Real>| vector![x.x, -x.y * RESTITUTION],
+            )
+            .into()
+    });
+    // An impact just after the start has the velocity of the motion, p' = −1 + 0.3 sin(t + q).
+    let early = Span::until(0.5).tolerance(1e-9);
+    let early = early.event("floor", |state: &OpenState<Vector2<f64>>| state.x.x).falling();
+    let run = DormandPrince8.tangent(&pushed, pushed.start(vector![1e-9, -1.0]), early).unwrap();
+    let velocity = &run.events()[0].velocity;
+    let off = (velocity[0] + 1.0).abs().max((velocity[1] + 1.0).abs());
+    println!("early: {off:.1e}");
+    assert!(off < 1e-8, "{velocity}");
     // The floor moves, and so does the ball after its impact: both by the clock.
     bounces("open", &pushed, &pushed.start(vector![0.5, 0.1]), |span| {
         span.event("floor", |state: &OpenState<Vector2<f64>>| state.x.x - 0.05 * state.time.sin())

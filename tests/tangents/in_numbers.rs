@@ -269,3 +269,47 @@ fn systems_of_ones_own_have_the_tangents_of_differences_of_runs() {
         is_that_of_differences(&name("Itoh-Abe"), &apart, explicit, &x0, span);
     }
 }
+
+/// A pendulum that has turned many times.
+struct Turned;
+
+impl Equations for Turned {
+    fn sizes(&self) -> Sizes {
+        Sizes { entries: 2, directions: 2, laws: 2 }
+    }
+
+    fn values(&self, _: f64, x: &[f64], values: &mut [f64]) {
+        values.copy_from_slice(&[0.5 * x[1] * x[1] - x[0].cos(), 0.0]);
+    }
+
+    fn differentials(&self, t: f64, x: &[f64], values: &mut [f64], w: &mut [f64]) {
+        self.values(t, x, values);
+        w.copy_from_slice(&[x[0].sin(), x[1], 0.0, 0.0]);
+    }
+
+    fn velocity(&self, _: f64, x: &[f64], v: &mut [f64]) -> Option<f64> {
+        v.copy_from_slice(&[x[1], -x[0].sin()]);
+        Some(0.0)
+    }
+
+    fn is_vector_space(&self) -> bool {
+        true
+    }
+}
+
+#[test]
+fn an_angle_that_has_turned_many_times_has_derivatives() {
+    let system = FromEquations(Turned);
+    let span = Span::steps(0.1, 12);
+    let matrix = |q: f64| {
+        let run = DormandPrince8.tangent(&system, [q, 0.3].into(), span).expect("a tangent");
+        run.last().matrix()
+    };
+    let expected = matrix(0.7);
+    for turns in [10.0, 1e3, 1e5] {
+        let error = off(&matrix(0.7 + turns * std::f64::consts::TAU), &expected);
+        println!("{turns} turns: {error:.1e}");
+        // The angle itself loses as many digits.
+        assert!(error < 1e-9 * turns, "{turns}: {error:e}");
+    }
+}

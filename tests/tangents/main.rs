@@ -2,6 +2,7 @@
 
 mod beside;
 mod in_numbers;
+mod parameters;
 
 use nalgebra::DMatrix;
 

@@ -8,7 +8,7 @@ use metriplectic_dynamics::{Differentiable, Parametrised, Point};
 use metriplectic_fields::{Dimension as _, Real, Space};
 use metriplectic_integrators::step::Element;
 use metriplectic_integrators::tangent::LinearisedAlong;
-use metriplectic_integrators::{Flow, Schedule, Stepper};
+use metriplectic_integrators::{Flow, Schedule, Stepper, Systems};
 use nalgebra::{SMatrix, SVector};
 
 use crate::error::FitError;
@@ -16,7 +16,7 @@ use crate::fitted::{FLAT, Fitted, Parts, Stop};
 use crate::least_squares::Squares;
 use crate::levenberg_marquardt::LevenbergMarquardt;
 use crate::model::{Failure, ManifoldOf, Measured, Model, PointOf, Residuals};
-use crate::systems::{Observed, Systems};
+use crate::systems::Observed;
 use crate::unknowns::{Names, Unknown, unknowns};
 
 /// The longest step of a logarithm.
@@ -150,7 +150,7 @@ where
     /// # }
     /// ```
     pub const fn of_systems(names: [&'static str; P], build: B) -> Self {
-        Self { of: Systems { names, build } }
+        Self { of: Systems::new(names, build) }
     }
 
     /// Says what was measured, as a closure of the state that returns `K` numbers: those of an open system may be its work and heat.
@@ -476,7 +476,7 @@ where
                 "no start was given; say `start_at` or `start_from`".into(),
             ));
         };
-        let unknowns = options.unknowns(&systems.names, guess.as_slice())?;
+        let unknowns = options.unknowns(systems.names(), guess.as_slice())?;
         let without = |unknown: &&Unknown| guess[unknown.index] == 0.0;
         if let Some(Unknown { name, .. }) = unknowns.iter().find(without) {
             return Err(FitError::NoSize { name });

@@ -18,7 +18,7 @@
 //! | [`covariance`] | standard errors and correlations from a Jacobian |
 //! | [`fitted`] | [`Fitted`]: the result, which prints what the data say |
 //! | `model` | the residuals of runs, and those of a family |
-//! | [`systems`] | [`Systems`]: systems of any kind with parameters, and differences of their runs |
+//! | `systems` | the residuals of systems of any kind, and differences of their runs |
 //! | [`fit`](mod@fit) | [`Fit`]: what a user says of a fit |
 //! | [`loss`](mod@loss) | [`Loss`]: a loss over runs with its gradient, for argmin's L-BFGS |
 
@@ -30,7 +30,7 @@ pub mod least_squares;
 pub mod levenberg_marquardt;
 pub mod loss;
 mod model;
-pub mod systems;
+mod systems;
 mod trust_region;
 pub mod unknowns;
 
@@ -41,4 +41,3 @@ pub use least_squares::{LeastSquares, Squares};
 pub use levenberg_marquardt::LevenbergMarquardt;
 pub use loss::{Graded, Loss, LossOver, Minimised};
 pub use model::Failure;
-pub use systems::Systems;

@@ -10,12 +10,14 @@ use metriplectic_dynamics::{Parametrised, Point};
 use metriplectic_fields::{Real, Space};
 use metriplectic_integrators::step::Element;
 use metriplectic_integrators::tangent::LinearisedAlong;
-use metriplectic_integrators::{Adjoints as _, Flow, Method as _, Schedule, Stepper, Watch as _};
+use metriplectic_integrators::{
+    Adjoints as _, Flow, Method as _, Schedule, Stepper, Systems, Watch as _,
+};
 use nalgebra::{DVector, SVector};
 
 use crate::error::FitError;
 use crate::model::{Failure, ManifoldOf, PointOf, at_rest_too};
-use crate::systems::{Beside, Systems, sides, slope};
+use crate::systems::{Beside, sides, slope};
 
 /// A loss over runs of a system, as a function of its parameters:
 ///
@@ -110,7 +112,7 @@ where
     /// A gradient is one of central differences, as in [`Fit::of_systems`](crate::Fit::of_systems), so it takes `2P + 1` runs for each start.
     /// No parameter may be zero then, which has no size.
     pub const fn of_systems(names: [&'static str; P], build: B) -> Self {
-        let of = Systems { names, build };
+        let of = Systems::new(names, build);
         Self { of, starts: Vec::new(), times: Vec::new(), term: () }
     }
 }
@@ -248,7 +250,7 @@ where
         theta: &SVector<f64, P>,
         schedule: Schedule,
     ) -> Result<f64, Failure> {
-        let system = (self.loss.of.build)(theta).map_err(Into::into)?;
+        let system = self.loss.of.build(theta).map_err(Into::into)?;
         let run = self.method.clone().run(&system, self.loss.starts[i].clone(), schedule)?;
         let indices = run.indices_at(&self.loss.times)?.into_iter().enumerate();
         Ok(indices.map(|(k, at)| (self.loss.term)(i, k, &run.states()[at].point)).sum())
@@ -270,7 +272,7 @@ where
 
     fn differentiate(&self, theta: &SVector<f64, P>) -> Result<(f64, SVector<f64, P>), Failure> {
         if let Some(k) = (0..P).find(|&k| theta[k] == 0.0) {
-            return Err(FitError::NoSize { name: self.loss.of.names[k] }.into());
+            return Err(FitError::NoSize { name: self.loss.of.names()[k] }.into());
         }
         let (mut sum, mut gradient) = (0.0, SVector::zeros());
         for i in 0..self.loss.starts.len() {

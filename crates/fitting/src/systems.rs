@@ -11,21 +11,13 @@
 
 use metriplectic_integrators::step::Element;
 use metriplectic_integrators::{
-    Flow, Method as _, Schedule, StateSpace as _, StepSequence, Stepper, Watch as _,
+    Flow, Method as _, Schedule, StateSpace as _, StepSequence, Stepper, Systems, Watch as _,
 };
 use nalgebra::{DMatrix, DVector, SVector};
 
 use crate::least_squares::{LeastSquares, Squares};
 use crate::model::{Failure, Measured, Residuals, at_rest_too};
 use crate::unknowns::{Unknown, parameters};
-
-/// Systems of any kind with named parameters.
-#[derive(Clone, Copy, Debug)]
-pub struct Systems<B, const P: usize> {
-    pub(crate) names: [&'static str; P],
-    /// The system at values of them.
-    pub(crate) build: B,
-}
 
 /// Runs of one schedule, and those beside it in the same steps.
 pub(crate) struct Beside<'a> {
@@ -91,7 +83,7 @@ where
     /// The residuals of a run over a schedule.
     fn residuals(&self, phi: &[f64], schedule: Schedule) -> Result<DVector<f64>, Failure> {
         let theta = parameters(&self.guess, self.unknowns, phi);
-        let system = (self.systems.build)(&theta).map_err(Into::into)?;
+        let system = self.systems.build(&theta).map_err(Into::into)?;
         let Measured { times, rows, noise } = self.measured;
         let start = (self.start)(&system, &theta);
         let run = self.method.clone().run(&system, start, schedule)?;
@@ -135,7 +127,7 @@ where
 
     fn at(&self, phi: &[f64]) -> (SVector<f64, P>, Vec<f64>) {
         let theta = parameters(&self.guess, self.unknowns, phi);
-        let system = (self.systems.build)(&theta).ok();
+        let system = self.systems.build(&theta).ok();
         let start = system.map(|system| S::Space::numbers(&(self.start)(&system, &theta)));
         (theta, start.unwrap_or_default())
     }

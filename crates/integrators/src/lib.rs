@@ -97,6 +97,6 @@ pub use step::{
 };
 pub use tangent::{
     AdjointRun, Adjoints, Differentiated, Linearised as LinearisedStep, LinearisedAlong,
-    LossGradient, SelfAdjoint, Sensitivity, TangentError, TangentEvent, TangentRun, TangentState,
-    TangentSteps, Tangents, Unlinearised,
+    LossGradient, SelfAdjoint, Sensitivity, SystemAt, Systems, TangentError, TangentEvent,
+    TangentRun, TangentState, TangentSteps, Tangents, Unlinearised,
 };

@@ -55,6 +55,7 @@ mod schemes;
 mod smooth;
 mod state;
 mod steps;
+mod systems;
 mod tape;
 
 /// The most corrections of a root, which converge quadratically.
@@ -73,6 +74,7 @@ pub use linearised::{Linearised, Piece, Propagated, Targets};
 pub use part::Part as StepPart;
 pub use record::{TangentRun, Tangents};
 pub use schemes::SelfAdjoint;
-pub use smooth::SmoothFlow;
+pub use smooth::{FlowOf, HasFlow, SmoothFlow, SpaceOf};
 pub use state::TangentState;
 pub use steps::TangentSteps;
+pub use systems::{SystemAt, Systems};

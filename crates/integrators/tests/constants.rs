@@ -77,6 +77,12 @@ const UNNOTICED: &[(&str, &str)] = &[
     ("system/reach.rs", "STEEPEST"),
     ("tangent.rs", "CORRECTIONS"),
     ("tangent/adjoint.rs", "WITHIN"),
+    ("tangent/beside.rs", "BENT"),
+    ("tangent/beside.rs", "INSTANT"),
+    ("tangent/beside.rs", "RATIO"),
+    ("tangent/beside.rs", "TRIES"),
+    ("tangent/beside.rs", "WEAK"),
+    ("tangent/beside.rs", "WIDE"),
     ("tangent/landing.rs", "SMALL"),
 ];
 

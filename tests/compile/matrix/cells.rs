@@ -25,7 +25,7 @@ energy and entropy in boxes: `erased` | erased     | E0599     | E0599        | 
 `tangent` of `Gauss`                  | stages     | stages    | beside       | its path  | its path   | beside sites | beside sites | beside sites  | in numbers   | in numbers
 `tangent` across a jump               | saltation  | saltation | bounces      | no events | no events  | bounces  | bounces      | no events     | bounces      | bounces
 `adjoint` of `DormandPrince8`         | transposed | adjoint   | beside       | its path  | its path   | beside sites | beside sites | beside sites  | in numbers   | in numbers
-parameters in its builder             | promises   | promises  | E0599        | E0599     | E0599      | E0599    | E0599        | E0599         | E0277        | E0277
+derivatives along parameters          | a family   | a family  | its ledger   | along its noise | along its noise | along sites | along sites | along sites | a ball  | a ball
 `Fit`                                 | fit        | fit       | a tank       | a path    | a path     | a rod    | a rod        | a rod         | a row        | a row
 `Loss`                                | loss       | loss      | a tank       | a path    | a path     | a rod    | a rod        | a rod         | a row        | a row
 
@@ -148,9 +148,33 @@ pub(crate) const TESTS: &[Reference] = &[
             "tests/tangents/in_numbers.rs",
             "systems_of_ones_own_have_the_tangents_of_differences_of_runs",
         ],
-        "exact for models on vector spaces; to some ten digits elsewhere, \
+        "as exact as the derivatives of the model on vector spaces; to some ten digits elsewhere, \
          [by differences](sensitivities.md#derivatives-of-any-kind-of-system)",
     ),
+    right(
+        "a family",
+        "tests/tangents/parameters.rs",
+        "derivatives_along_parameters_are_those_of_a_family",
+    ),
+    partly(
+        "its ledger",
+        [
+            "tests/tangents/parameters.rs",
+            "states_and_ledgers_of_open_systems_have_derivatives_along_parameters",
+        ],
+        BESIDE,
+    ),
+    partly(
+        "along its noise",
+        ["tests/tangents/parameters.rs", "noise_has_derivatives_along_parameters"],
+        BESIDE,
+    ),
+    partly(
+        "along sites",
+        ["tests/tangents/parameters.rs", "lattices_have_derivatives_along_parameters"],
+        BESIDE,
+    ),
+    partly("a ball", ["tests/tangents/parameters.rs", "jumps_depend_on_parameters"], BESIDE),
     right("bounces", "tests/tangents/beside.rs", "tangents_of_every_kind_of_system_cross_jumps"),
     right("transposed", "tests/tangent/adjoint.rs", "adjoints_are_transposed_tangents"),
     right("adjoint", "tests/tangent/adjoint.rs", "adjoints_have_parameters"),

@@ -116,23 +116,9 @@ fn family(has_clock: bool) -> String {
     format!("Family::on(LieDual::so3()).parameters([\"a\"]){energy}{entropy}")
 }
 
-/// A statement that builds a system of this kind with parameters, as `f`.
-fn with_parameters(kind: Kind) -> String {
-    let parts = match kind {
-        Closed | Family => String::new(),
-        Open => format!("{PORT}{BATH}"),
-        Noisy => NOISE.to_owned(),
-        NoisyOpen => format!("{PORT}{BATH}{NOISE}"),
-        Lattice | OpenLattice | NoisyLattice => {
-            return "let f = Lattice::on(Graph::ring(4), LieDual::so3()).parameters([\"a\"]);"
-                .to_owned();
-        }
-        Own | Sizes => {
-            return "fn family<F: Differentiable>(f: F) -> F { f }\n    let f = family(s.clone());"
-                .to_owned();
-        }
-    };
-    format!("let f = {}{parts}.build()?;", family(kind == Open))
+/// A statement that builds a family, as `f`.
+fn with_parameters() -> String {
+    format!("let f = {}.build()?;", family(false))
 }
 
 /// A statement that says how a system of this kind is built at values of parameters.
@@ -199,12 +185,23 @@ fn verb(kind: Kind, name: &str) -> String {
         "`tangent` of `Gauss`" => tangent("Gauss::<2>"),
         "`tangent` across a jump" => format!("let _ = {dp8}.tangent(&s, x, {jump})?;"),
         "`adjoint` of `DormandPrince8`" => format!("let _ = {dp8}.adjoint(&s, x, {STEPS})?;"),
-        "parameters in its builder" => with_parameters(kind),
+        "derivatives along parameters" if matches!(kind, Closed | Family) => format!(
+            "{}
+    let _ = {dp8}.tangent(&f.at(vector![1.0]), x, {STEPS})?.last().along(\"a\");",
+            with_parameters()
+        ),
+        "derivatives along parameters" => format!(
+            "{}
+    let systems = Systems::new([\"a\"], build);
+    let at = systems.at(vector![1.0]).map_err(|error| error.to_string())?;
+    let _ = {dp8}.tangent(&at, x, {STEPS})?.last().along(\"a\");",
+            built(kind)
+        ),
         "`Fit`" if matches!(kind, Closed | Family) => format!(
             "{}
     let fit = Fit::of(&f).observe(|p| p.clone()).data(&[0.5], &[vector![0.0, 0.0, 0.0]]);
     let _ = fit.start_at(x).run({dp8}, {STEPS}, vector![1.0])?;",
-            with_parameters(kind)
+            with_parameters()
         ),
         "`Fit`" => format!(
             "{}
@@ -217,7 +214,7 @@ fn verb(kind: Kind, name: &str) -> String {
             "{}
     let loss = metriplectic::fitting::Loss::of(&f).starts(&[x]).times(&[0.5]);
     let _ = loss.term(|_, _, _| Real::from(0.0)).over({dp8}, {STEPS});",
-            with_parameters(kind)
+            with_parameters()
         ),
         "`Loss`" => format!(
             "{}

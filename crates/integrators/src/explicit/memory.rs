@@ -143,6 +143,11 @@ impl<V: Vector> Memory for ExplicitMemory<V> {
         }
     }
 
+    /// The number of stages depends on the spectral radius, which is found every so many steps.
+    fn beside(&self) -> Self {
+        Self { spectrum: self.spectrum.clone(), ..Self::default() }
+    }
+
     fn clocked(&mut self) {
         (self.here, self.round_off) = (None, None);
     }

@@ -110,7 +110,7 @@ where
     }
 
     /// The rate `∂_tH(t, x)`.
-    pub(super) fn power(&self, t: f64, x: &Point<Y>) -> f64 {
+    pub(crate) fn power(&self, t: f64, x: &Point<Y>) -> f64 {
         if !C::RUNS {
             return 0.0;
         }

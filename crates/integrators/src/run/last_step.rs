@@ -34,7 +34,7 @@ impl<'a, F: Flow + ?Sized, M: Stepper<F>> Steps<'a, F, M> {
     /// The memory before the next step, without what the method extrapolates from.
     pub(crate) fn saved_memory(&self) -> Saved {
         let mut saved = Saved::default();
-        self.memory.restarted().save(&mut saved);
+        self.memory.beside().save(&mut saved);
         saved
     }
 

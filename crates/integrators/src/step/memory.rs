@@ -24,6 +24,12 @@ pub trait Memory: Clone + Debug + Default + 'static {
         Self::default()
     }
 
+    /// The memory with which a step is taken again, and others beside it: without what they would extrapolate from.
+    #[must_use]
+    fn beside(&self) -> Self {
+        self.restarted()
+    }
+
     /// Forgets what is a function of the state reached, whose [clock](crate::Flow::clocked) was set by a rounding.
     fn clocked(&mut self) {}
 

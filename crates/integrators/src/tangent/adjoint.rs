@@ -9,6 +9,7 @@ use nalgebra::DVector;
 use super::differentiated::Differentiated;
 use super::error::TangentError;
 use super::part::Part;
+use super::smooth::{FlowOf, HasFlow, SmoothFlow, SpaceOf, VectorOf};
 use super::steps::in_wide_room;
 use super::tape::{Segment, Tape, TapedStep};
 use crate::run::certificate::Certificate;
@@ -16,7 +17,7 @@ use crate::run::ending::Ending;
 use crate::run::paired::{Unpaired, paired};
 use crate::run::schedule::Schedule;
 use crate::run::state::State;
-use crate::step::{Element, Flow, Stepper};
+use crate::step::{Element, Stepper};
 
 /// Runs whose losses have gradients, by every method whose steps are [differentiated](Differentiated).
 ///
@@ -27,8 +28,8 @@ use crate::step::{Element, Flow, Stepper};
 /// \lambda_k = J_k^\top \lambda_{k+1} + \frac{\partial\ell_k}{\partial x_k} .
 /// ```
 ///
-/// It is the transpose of the [tangent](super::Tangents) of the same run, to round-off. No equation is integrated backwards, since
-/// friction would grow.
+/// It is the transpose of the [tangent](super::Tangents) of the same run: to round-off, or to the digits of differences where these are its
+/// derivatives. No equation is integrated backwards, since friction would grow.
 ///
 /// ```
 /// use metriplectic_dynamics::Family;
@@ -70,15 +71,15 @@ pub trait Adjoints: Sized {
     /// # Errors
     ///
     /// [`TangentError`]; [`TangentError::Broken`] if the schedule has events or corners.
-    fn adjoint<F>(
+    fn adjoint<D>(
         self,
-        system: &F,
-        x0: Element<F>,
+        system: &D,
+        x0: Element<FlowOf<D>>,
         schedule: impl Into<Schedule>,
-    ) -> Result<AdjointRun<'_, F, Self>, TangentError<F::Space>>
+    ) -> Result<AdjointRun<'_, D, Self>, TangentError<SpaceOf<D>>>
     where
-        F: Differentiated<Self>,
-        Self: Clone + Stepper<F>,
+        D: Differentiated<Self>,
+        Self: Clone + Stepper<FlowOf<D>>,
     {
         self.adjoint_within(WITHIN, system, x0, schedule)
     }
@@ -91,19 +92,19 @@ pub trait Adjoints: Sized {
     /// # Errors
     ///
     /// The errors of [`adjoint`](Self::adjoint).
-    fn adjoint_within<F>(
+    fn adjoint_within<D>(
         self,
         steps: usize,
-        system: &F,
-        x0: Element<F>,
+        system: &D,
+        x0: Element<FlowOf<D>>,
         schedule: impl Into<Schedule>,
-    ) -> Result<AdjointRun<'_, F, Self>, TangentError<F::Space>>
+    ) -> Result<AdjointRun<'_, D, Self>, TangentError<SpaceOf<D>>>
     where
-        F: Differentiated<Self>,
-        Self: Clone + Stepper<F>,
+        D: Differentiated<Self>,
+        Self: Clone + Stepper<FlowOf<D>>,
     {
         let schedule = schedule.into();
-        in_wide_room::<F, Self, _>(system, || {
+        in_wide_room::<D, Self, _>(system, || {
             let tape = Tape::record(self.clone(), system, (x0, schedule), steps.max(1))?;
             Ok(AdjointRun { system, method: self, tape })
         })
@@ -116,13 +117,13 @@ impl<M> Adjoints for M {}
 pub const WITHIN: usize = 1 << 16;
 
 /// A run whose losses have gradients; made by [`Adjoints::adjoint`].
-pub struct AdjointRun<'a, F: Flow, M> {
-    system: &'a F,
+pub struct AdjointRun<'a, D: HasFlow, M> {
+    system: &'a D,
     method: M,
-    tape: Tape<F>,
+    tape: Tape<FlowOf<D>>,
 }
 
-impl<F: Flow, M> fmt::Debug for AdjointRun<'_, F, M> {
+impl<D: HasFlow, M> fmt::Debug for AdjointRun<'_, D, M> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("AdjointRun").field("states", &self.tape.states).finish_non_exhaustive()
     }
@@ -156,18 +157,18 @@ impl LossGradient {
     }
 }
 
-impl<F, M> AdjointRun<'_, F, M>
+impl<D, M> AdjointRun<'_, D, M>
 where
-    F: Differentiated<M>,
-    M: Clone + Stepper<F>,
+    D: Differentiated<M>,
+    M: Clone + Stepper<FlowOf<D>>,
 {
     /// The recorded states, the start first.
-    pub fn states(&self) -> &[State<F::Space>] {
+    pub fn states(&self) -> &[State<SpaceOf<D>>] {
         &self.tape.states
     }
 
     /// The state at the end of the run.
-    pub fn last(&self) -> &State<F::Space> {
+    pub fn last(&self) -> &State<SpaceOf<D>> {
         &self.tape.states[self.tape.states.len() - 1]
     }
 
@@ -199,12 +200,12 @@ where
     /// [`TangentError::NotLinearised`] if a step has no derivative.
     pub fn gradient(
         &self,
-        loss: impl Fn(usize, &F::Moving) -> Real,
-    ) -> Result<LossGradient, TangentError<F::Space>> {
+        loss: impl Fn(usize, &<FlowOf<D> as SmoothFlow>::Moving) -> Real,
+    ) -> Result<LossGradient, TangentError<SpaceOf<D>>> {
         let mut value = 0.0;
         let mut rows = Vec::with_capacity(self.states().len());
         for (k, state) in self.states().iter().enumerate() {
-            let (here, df) = self.system.differential(&|x| loss(k, x), &state.point);
+            let (here, df) = self.system.as_flow().differential(&|x| loss(k, x), &state.point);
             value += here;
             rows.push(df);
         }
@@ -220,15 +221,15 @@ where
     pub fn pull_back<R: Index<usize, Output = f64>>(
         &self,
         rows: &[R],
-    ) -> Result<LossGradient, TangentError<F::Space>> {
-        in_wide_room::<F, M, _>(self.system, || self.backwards(rows))
+    ) -> Result<LossGradient, TangentError<SpaceOf<D>>> {
+        in_wide_room::<D, M, _>(self.system, || self.backwards(rows))
     }
 
     fn backwards<R: Index<usize, Output = f64>>(
         &self,
         rows: &[R],
-    ) -> Result<LossGradient, TangentError<F::Space>> {
-        let (n, names) = (self.system.directions(), self.system.names().to_vec());
+    ) -> Result<LossGradient, TangentError<SpaceOf<D>>> {
+        let (n, names) = (self.system.as_flow().directions(), self.system.names().to_vec());
         let all = n + names.len();
         let row = |k: usize| {
             let row = rows.get(k);
@@ -250,26 +251,26 @@ where
     /// The steps of a segment, taken again.
     fn again(
         &self,
-        segment: &Segment<F::Vector>,
-        next: &Segment<F::Vector>,
-    ) -> Result<Vec<TapedStep<F>>, TangentError<F::Space>> {
+        segment: &Segment<VectorOf<D>>,
+        next: &Segment<VectorOf<D>>,
+    ) -> Result<Vec<TapedStep<FlowOf<D>>>, TangentError<SpaceOf<D>>> {
         self.tape.again(self.method.clone(), self.system, [segment, next])
     }
 
     /// The costate at the start of a step from that at its end.
     fn before(
         &self,
-        step: &TapedStep<F>,
+        step: &TapedStep<FlowOf<D>>,
         costate: DVector<f64>,
         row: &impl Fn(usize) -> DVector<f64>,
-    ) -> Result<DVector<f64>, TangentError<F::Space>> {
+    ) -> Result<DVector<f64>, TangentError<SpaceOf<D>>> {
         let time = step.time;
-        let through = |parts: &[Part<F>], mut costate: DVector<f64>| {
+        let through = |parts: &[Part<FlowOf<D>>], mut costate: DVector<f64>| {
             for part in parts.iter().rev() {
                 let pulled = self.system.pull_back(&self.method, part, &costate);
                 costate = pulled.map_err(|cause| TangentError::NotLinearised { time, cause })?;
             }
-            Ok::<_, TangentError<F::Space>>(costate)
+            Ok::<_, TangentError<SpaceOf<D>>>(costate)
         };
         let [inside, at_end] = self.tape.recorded(step);
         let mut before = through(&step.parts, at_end.fold(costate, |sum, k| sum + row(k)))?;

@@ -6,7 +6,7 @@ use nalgebra::DVector;
 
 use super::columns::{Carried, LawRows, row};
 use super::error::Unlinearised;
-use crate::round_off::bound::{BROKEN, SUMMED};
+use crate::round_off::bound::BROKEN;
 use crate::step::digits::counted;
 
 /// The laws of a tangent, each as its largest error relative to its terms `Σ_i |∂_iF T_ij|`, over all columns and steps.
@@ -47,12 +47,14 @@ impl Sensitivity {
         }
     }
 
-    /// Enters the derivatives at a state with these differentials of its laws and these sizes of its directions.
+    /// Enters the derivatives at a state with these differentials of its laws and these sizes of its directions. The round-off is
+    /// relative to the terms of a law.
     pub(super) fn enter(
         &mut self,
         here: &LawRows<DVector<f64>>,
         scales: &DVector<f64>,
         carried: &Carried,
+        rounding: f64,
     ) -> Result<(), Unlinearised> {
         let off = |df: &DVector<f64>, law: &DVector<f64>| {
             let [here, sizes] = row(df, &carried.t);
@@ -61,7 +63,7 @@ impl Sensitivity {
                 let (off, size) = ((here[j] - law[j]).abs(), sizes[j] + law[j].abs());
                 // The column of a direction on which nothing depends is rounding, relative to a unit of that direction.
                 let unit = terms / scales[j];
-                let size = if off <= SUMMED * unit { size.max(unit) } else { size };
+                let size = if off <= rounding * unit { size.max(unit) } else { size };
                 worse(worst, if off == 0.0 { 0.0 } else { off / size })
             })
         };

@@ -8,12 +8,12 @@ use metriplectic_manifolds::Manifold;
 use nalgebra::DVector;
 
 use super::along::LinearisedAlong;
-use super::beside;
+use super::beside::{self, NoParameters};
 use super::columns::{Carried, Columns, LawRows, Moved};
 use super::error::Unlinearised;
 use super::linearised::{Linearised, Propagated};
 use super::part::{Part, Wide};
-use super::smooth::{SmoothFlow, matrix, numbers};
+use super::smooth::{FlowOf, HasFlow, SmoothFlow, matrix, numbers};
 use crate::noise::{Fluctuating, Noisy};
 use crate::step::{Compiled, Dim, Element, Flow as _, Stepper, Vector as _};
 
@@ -22,8 +22,8 @@ use crate::step::{Compiled, Dim, Element, Flow as _, Stepper, Vector as _};
 /// The parameters are further directions behind those of a state, and nothing moves them. Vectors and covectors have a number for each
 /// of all directions.
 ///
-/// The derivatives of a step are exact for systems in types and for [models](metriplectic_equations::Model) on a vector space. For any
-/// other kind of system they are formed by differences of steps beside it, as in the defaults here: with the same size, the same
+/// The derivatives of a step are exact for systems in types and, as far as its own derivatives are, for a
+/// [model](metriplectic_equations::Model) on a vector space. For any other kind of system they are formed by differences of steps beside it, as in the defaults here: with the same size, the same
 /// random numbers and the same branch of the method, to two thirds of the digits.
 ///
 /// Laws: those of [`Linearised`].
@@ -34,7 +34,7 @@ use crate::step::{Compiled, Dim, Element, Flow as _, Stepper, Vector as _};
     note = "`DormandPrince5`, `DormandPrince8`, `RungeKuttaChebyshev`, `ExplicitRungeKutta`, `Gauss` and `Radau` have one on every space of \
             this library (`MovingBase`)"
 )]
-pub trait Differentiated<M: Stepper<Self>>: SmoothFlow {
+pub trait Differentiated<M: Stepper<<Self as HasFlow>::Flow>>: HasFlow {
     /// A state and parameters whose entries carry derivatives, of the closures of a jump.
     type MovingWide: 'static;
 
@@ -45,7 +45,7 @@ pub trait Differentiated<M: Stepper<Self>>: SmoothFlow {
 
     /// Does work in a room with the temporary numbers of steps with derivatives.
     fn wide_room(&self, work: &mut dyn FnMut()) {
-        self.room(work);
+        self.as_flow().room(work);
     }
 
     /// Returns whether the derivatives of steps are formed by differences of steps beside them.
@@ -55,13 +55,13 @@ pub trait Differentiated<M: Stepper<Self>>: SmoothFlow {
     }
 
     /// Computes the differentials of the laws at a state, in all directions.
-    fn wide_rows(&self, x: &Element<Self>) -> LawRows<DVector<f64>> {
-        self.law_rows(x)
+    fn wide_rows(&self, x: &Element<FlowOf<Self>>) -> LawRows<DVector<f64>> {
+        self.as_flow().law_rows(x)
     }
 
     /// Computes the size of each direction.
-    fn units(&self, x: &Element<Self>) -> DVector<f64> {
-        DVector::from_vec(self.sizes(x).to_list())
+    fn units(&self, x: &Element<FlowOf<Self>>) -> DVector<f64> {
+        DVector::from_vec(self.as_flow().sizes(x).to_list())
     }
 
     /// Returns whether a step from a state at rest has a derivative.
@@ -77,10 +77,10 @@ pub trait Differentiated<M: Stepper<Self>>: SmoothFlow {
     fn propagate(
         &self,
         method: &M,
-        step: &Part<Self>,
+        step: &Part<FlowOf<Self>>,
         carried: &Carried,
     ) -> Result<Moved, Unlinearised> {
-        beside::propagate(self, method, step, carried)
+        beside::propagate((self.as_flow(), method, &NoParameters), step, carried)
     }
 
     /// Computes the derivative of a loss along the start of a step and the parameters from that along its end.
@@ -91,17 +91,17 @@ pub trait Differentiated<M: Stepper<Self>>: SmoothFlow {
     fn pull_back(
         &self,
         method: &M,
-        step: &Part<Self>,
+        step: &Part<FlowOf<Self>>,
         costate: &DVector<f64>,
     ) -> Result<DVector<f64>, Unlinearised> {
-        beside::pull_back(self, method, step, costate)
+        beside::pull_back((self.as_flow(), method, &NoParameters), step, costate)
     }
 
     /// Computes the error of the second law of tangents in a step, for a column at its start and at its end; `None` if it is not known.
     fn second_law_error(
         &self,
         method: &M,
-        step: &Part<Self>,
+        step: &Part<FlowOf<Self>>,
         column: [&DVector<f64>; 2],
     ) -> Option<f64> {
         let _ = (method, step, column);
@@ -109,15 +109,20 @@ pub trait Differentiated<M: Stepper<Self>>: SmoothFlow {
     }
 
     /// Moves a state and the parameters along a vector: the first derivative of their entries.
-    fn moved_along(&self, x: &Element<Self>, v: &DVector<f64>) -> Self::MovingWide;
+    fn moved_along(&self, x: &Element<FlowOf<Self>>, v: &DVector<f64>) -> Self::MovingWide;
 
     /// Computes the coordinates of a moving state with parameters around `y`, with their first derivative.
-    fn coordinates_around(&self, y: &Element<Self>, there: &Self::MovingWide) -> Vec<[f64; 2]>;
+    fn coordinates_around(
+        &self,
+        y: &Element<FlowOf<Self>>,
+        there: &Self::MovingWide,
+    ) -> Vec<[f64; 2]>;
 
     /// Computes the velocity in all directions at a state; `None` where it has no value.
-    fn velocity_at(&self, x: &Element<Self>) -> Option<DVector<f64>> {
-        let zero = self.sizes(x).map(|_| 0.0);
-        Some(DVector::from_vec(self.rates(x, &zero)?.to_list()))
+    fn velocity_at(&self, x: &Element<FlowOf<Self>>) -> Option<DVector<f64>> {
+        let flow = self.as_flow();
+        let zero = flow.sizes(x).map(|_| 0.0);
+        Some(DVector::from_vec(flow.rates(x, &zero)?.to_list()))
     }
 }
 

@@ -44,6 +44,23 @@ pub enum Unlinearised {
         "every entry that moves has been zero in the run, so that a difference has no size; start elsewhere"
     )]
     NoSize,
+    /// A parameter is zero, and derivatives along it are differences.
+    #[error(
+        "the parameter {name} is zero, so that a difference along it has no size; take another value, or a `Family`, whose derivatives \
+         are exact"
+    )]
+    ZeroParameter {
+        /// The parameter.
+        name: &'static str,
+    },
+    /// A system at parameters beside those of the run is refused.
+    #[error("there is no system at parameters beside these; take values inside their bounds")]
+    NoSystem,
+    /// A step bends over less than differences can resolve.
+    #[error(
+        "differences of steps beside the step do not agree, as where a function is not smooth; take smaller steps, or another start"
+    )]
+    Bent,
     /// The derivative breaks the first law of tangents.
     #[error(
         "dH(x') T' differs from dH(x₀) by {off:.1e} of its terms, so the derivative is wrong; take smaller steps"

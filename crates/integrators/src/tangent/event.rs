@@ -51,13 +51,15 @@ impl<F: Flow> TangentEvent<F> {
     ///
     /// [`TangentError::Grazing`] if `|dg·v| ≤ 10⁻⁶ |dg||v|`, with the entries in units of their [`sizes`](Self::sizes).
     pub fn time_by(&self, dg: &DVector<f64>) -> Result<DVector<f64>, TangentError<F::Space>> {
+        // The function does not depend on a ledger.
+        let dg = &dg.clone().resize_vertically(self.velocity.len(), 0.0);
         let rate = dg.dot(&self.velocity);
         self.crosses(rate, dg)?;
         Ok(self.state.derivative_of(dg) * -rate.recip())
     }
 
     /// The derivative of the state at the event along start and parameters, `T + v δt*`, with a row for each direction of
-    /// the frame there, from the differential of the function of the event.
+    /// the frame there, from the differential of the function of the event. An open system has further rows, of its clock and its ledger.
     ///
     /// # Errors
     ///

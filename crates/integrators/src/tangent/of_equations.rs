@@ -4,7 +4,7 @@ use metriplectic_equations::{ENERGY, ENTROPY, Equations, Model, Sizes};
 use metriplectic_fields::Real;
 use nalgebra::{DMatrix, DVector};
 
-use super::beside;
+use super::beside::{self, NoParameters};
 use super::columns::{Carried, LawRows, Moved};
 use super::differentiated::Differentiated;
 use super::error::Unlinearised;
@@ -18,7 +18,9 @@ use crate::compiled::explicit;
 use crate::explicit::ExplicitRungeKutta;
 use crate::implicit::Collocation;
 use crate::numbers::FromEquations;
-use crate::step::{Compiled, Directions, Entries, Flow as _, Laws, LineOfStep, Stepper};
+use crate::step::{
+    Compiled, Directions, Entries, Flow as _, Laws, LineOfStep, Stepper, Vector as _,
+};
 use crate::system::NO_CLOCK;
 
 /// The values of the laws that an explicit method moves the end of a step onto.
@@ -66,14 +68,12 @@ impl<S: Equations> SmoothFlow for FromEquations<S> {
         if self.0.is_vector_space() || from == to {
             return None;
         }
-        // The frames are orthonormal, so that a step is one in the units of the space.
-        let (n, step) = (self.directions(), f64::EPSILON.cbrt());
+        let (n, steps) = (self.directions(), self.steps_of_chart(to));
         let column = |k: usize| {
+            let step = steps[k];
             let at = |step: f64| {
                 let d = Directions::from_index(n, |i| if i == k { step } else { 0.0 });
-                let mut q = DVector::zeros(n);
-                let _ = self.0.coordinates(to, &self.moved(from, &d), q.as_mut_slice());
-                q
+                DVector::from_vec(self.coordinates_at(to, &self.moved(from, &d)))
             };
             (at(step) - at(-step)) / (2.0 * step)
         };
@@ -116,11 +116,12 @@ impl<S: Equations> SmoothFlow for FromEquations<S> {
         }
         let at = |e: f64| {
             let z: Vec<f64> = there.iter().map(|there| there.re + e * there.eps1).collect();
-            let mut q = vec![0.0; self.directions()];
-            let _ = self.0.coordinates(y, &z, &mut q);
-            q
+            self.coordinates_at(y, &z)
         };
-        let largest = there.iter().fold(0.0, |most: f64, there| most.max(there.eps1.abs()));
+        let size = there.iter().fold(0.0, |most: f64, there| most.max(there.re.abs()));
+        let sized = |there: &Real| if there.re == 0.0 { size } else { there.re.abs() };
+        let largest =
+            there.iter().fold(0.0, |most: f64, there| most.max(there.eps1.abs() / sized(there)));
         let step = if largest > 0.0 { f64::EPSILON.cbrt() / largest } else { 1.0 };
         let slopes = at(step).into_iter().zip(at(-step)).map(|(a, b)| (a - b) / (2.0 * step));
         at(0.0).into_iter().zip(slopes).map(|(q, slope)| [q, slope]).collect()
@@ -128,9 +129,27 @@ impl<S: Equations> SmoothFlow for FromEquations<S> {
 }
 
 impl<S: Equations> FromEquations<S> {
+    /// The coordinates of a state in the chart at another one; NaN where they are not known.
+    fn coordinates_at(&self, at: &[f64], y: &[f64]) -> Vec<f64> {
+        let mut q = vec![0.0; self.directions()];
+        if !self.0.coordinates(at, y, &mut q) {
+            q.fill(f64::NAN);
+        }
+        q
+    }
+
+    /// The steps of differences of the chart at a state: fractions of the sizes of the directions, or of the largest one.
+    fn steps_of_chart(&self, x: &Entries) -> Vec<f64> {
+        let sizes = self.sizes(x).to_list();
+        let largest = sizes.iter().copied().fold(0.0, f64::max);
+        let largest = if largest > 0.0 { largest } else { 1.0 };
+        let step = |size: f64| f64::EPSILON.cbrt() * if size > 0.0 { size } else { largest };
+        sizes.into_iter().map(step).collect()
+    }
+
     /// The derivative of the entries along a direction of the chart at a state.
     fn entries_along(&self, x: &Entries, k: usize) -> DVector<f64> {
-        let step = f64::EPSILON.cbrt();
+        let step = self.steps_of_chart(x)[k];
         let at = |step: f64| {
             let d = Directions::from_index(self.directions(), |i| if i == k { step } else { 0.0 });
             DVector::from_column_slice(&self.moved(x, &d))
@@ -185,7 +204,7 @@ impl<S: Equations, M: Stepper<Self>> Differentiated<M> for FromEquations<S> {
     ) -> Result<Moved, Unlinearised> {
         let targets = targets(step);
         let derivative = match self.exactly(method.compiled()) {
-            None => return beside::propagate(self, method, step, carried),
+            None => return beside::propagate((self, method, &NoParameters), step, carried),
             Some(Exactly::Explicit(method)) => {
                 let of = in_numbers(&self.0 as &dyn Equations, step, &targets);
                 return explicit_propagate(method.tableau(), &of, carried);

@@ -31,6 +31,10 @@ where
         Some(Vector::<Y::Manifold>::LEN)
     }
 
+    fn power_of_time(&self, x: &StateOf<Y>) -> Option<(usize, f64)> {
+        C::RUNS.then(|| (Vector::<Y::Manifold>::LEN + 1, self.power(x.time, &x.x)))
+    }
+
     /// The differentials of the balance `H − W − Q` and of `S + Σ S_b`. The clock moves neither: the frozen work is booked.
     fn law_rows(&self, x: &StateOf<Y>) -> LawRows<DVector<f64>> {
         let w = self.covectors(x.time, &x.x);
@@ -84,24 +88,24 @@ where
     X: Exchange<Y::Manifold, Y::Metric>,
     M: Stepper<Self>,
 {
-    type MovingWide = Self::Moving;
+    type MovingWide = <Self as SmoothFlow>::Moving;
 
-    fn moved_along(&self, x: &StateOf<Y>, v: &DVector<f64>) -> Self::Moving {
+    fn moved_along(&self, x: &StateOf<Y>, v: &DVector<f64>) -> Self::MovingWide {
         self.moving(x, v)
     }
 
-    fn coordinates_around(&self, y: &StateOf<Y>, there: &Self::Moving) -> Vec<[f64; 2]> {
+    fn coordinates_around(&self, y: &StateOf<Y>, there: &Self::MovingWide) -> Vec<[f64; 2]> {
         SmoothFlow::coordinates(self, y, there)
     }
 }
 
 /// The rows of the ledger: the derivatives of what was booked along the start. Columns are those of
-/// [`matrix`](TangentState::matrix): the directions of the point, the clock, and what was booked before.
+/// [`matrix`](TangentState::matrix): the directions of the point, the clock, what was booked before, and the parameters.
 impl<P, F: Flow<Space: StateSpace<Element = OpenState<P>>>> TangentState<F> {
-    /// The rows of ports and baths are the last ones.
+    /// The rows of ports and baths are the last ones of a state, before those of parameters.
     fn booked_along(&self, place: usize) -> DVector<f64> {
-        let count = self.point.ledger.count();
-        self.carried.t.row(self.carried.t.nrows() - count + place).transpose()
+        let [n, _] = self.lengths();
+        self.carried.t.row(n - self.point.ledger.count() + place).transpose()
     }
 
     /// The derivative of the work of a port; `None` if no port has this name.
@@ -124,7 +128,8 @@ impl<P, F: Flow<Space: StateSpace<Element = OpenState<P>>>> TangentState<F> {
 }
 
 impl<M: Manifold, F: Flow<Space = OpenSpace<M>>> TangentState<F> {
-    /// The derivative of the work `W_t` of the time in the energy.
+    /// The derivative of the work `W_t` of the time in the energy. The column of the clock is that of a start whose clock moves at a fixed
+    /// point, where `∂_t H` is work already, and so at the end: it is `dW_t/dt₀ + ∂_t H(x₀) − ∂_t H(x)`.
     pub fn parameter_work_along(&self) -> DVector<f64> {
         self.booked_along(0)
     }

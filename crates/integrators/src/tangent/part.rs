@@ -21,6 +21,8 @@ pub(super) struct Again<V> {
     pub(super) memory: Saved,
     /// The largest size that each entry has had in the run, or soon has from its start.
     pub(super) sizes: V,
+    /// The size of the whole step.
+    pub(super) whole: f64,
 }
 
 /// The memory with which a step is taken again.
@@ -146,9 +148,9 @@ impl<'a, F: Flow> Ended<'a, F> {
         }
     }
 
-    /// As it is, of a step beside which others are to be taken.
-    pub(super) fn with_again(self, again: Option<&Again<F::Vector>>) -> Self {
-        Self { again: again.cloned(), ..self }
+    /// As it is, of a whole step of this size beside which others are to be taken, or of a part of it.
+    pub(super) fn with_again(self, again: Option<&Again<F::Vector>>, whole: f64) -> Self {
+        Self { again: again.map(|again| Again { whole, ..again.clone() }), ..self }
     }
 }
 

@@ -6,6 +6,7 @@ use super::columns::{Carried, Moved};
 use super::differentiated::Differentiated;
 use super::error::Unlinearised;
 use super::part::{Ended, Part};
+use super::smooth::{FlowOf, SmoothFlow as _};
 use crate::step::{Flow, Laws, StepStart, Stepper};
 
 /// A step is not halved more often than it has digits.
@@ -76,18 +77,18 @@ where
 }
 
 /// The derivatives at the end of a step.
-pub(super) fn propagate<F, M>(
-    method: &M,
-    start: &StepStart<'_, F>,
-    ended: &Ended<'_, F>,
+pub(super) fn propagate<D, M>(
+    (system, method): (&D, &M),
+    start: &StepStart<'_, FlowOf<D>>,
+    ended: &Ended<'_, FlowOf<D>>,
     carried: &Carried,
 ) -> Result<Moved, Unlinearised>
 where
-    F: Differentiated<M>,
-    M: Stepper<F>,
+    D: Differentiated<M>,
+    M: Stepper<FlowOf<D>>,
 {
-    let (system, parts) = (start.flow, parts(method, start, ended)?);
-    let (mut carried, is_whole, n) = (carried.clone(), parts.len() == 1, system.directions());
+    let (parts, n) = (parts(method, start, ended)?, system.as_flow().directions());
+    let (mut carried, is_whole) = (carried.clone(), parts.len() == 1);
     let mut along_h = DVector::zeros(n);
     for part in &parts {
         let next = system.propagate(method, part, &carried)?;

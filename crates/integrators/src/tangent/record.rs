@@ -8,6 +8,7 @@ use super::differentiated::Differentiated;
 use super::error::TangentError;
 use super::event::TangentEvent;
 use super::refined::{REFINEMENTS, difference, refined};
+use super::smooth::{FlowOf, SpaceOf};
 use super::state::TangentState;
 use super::steps::{Inside, Jumps, TangentSteps, in_wide_room};
 use crate::round_off::bound::SUMMED;
@@ -57,19 +58,19 @@ pub trait Tangents: Sized {
     ///
     /// [`TangentError`] if the model breaks a law, the schedule cannot be run, or it has corners or jumps without
     /// [derivatives](crate::Jumping::differentiable).
-    fn tangent_steps<F>(
+    fn tangent_steps<D>(
         self,
-        system: &F,
-        x0: Element<F>,
+        system: &D,
+        x0: Element<FlowOf<D>>,
         schedule: impl Into<Schedule>,
-    ) -> Result<TangentSteps<'_, F, Self>, TangentError<F::Space>>
+    ) -> Result<TangentSteps<'_, D, Self>, TangentError<SpaceOf<D>>>
     where
-        F: Differentiated<Self>,
-        Self: Stepper<F>,
+        D: Differentiated<Self>,
+        Self: Stepper<FlowOf<D>>,
     {
         let schedule: Schedule = schedule.into();
         let listed = schedule.watch.events.iter().map(|event| event.jump.as_ref());
-        let jumps: Jumps<F::MovingWide> =
+        let jumps: Jumps<D::MovingWide> =
             listed.map(|jump| jump.and_then(JumpRequest::smooth)).collect();
         let has_jump = |event: &Request| event.jump.is_some();
         if schedule.watch.events.iter().zip(&jumps).any(|(e, jump)| has_jump(e) && jump.is_none()) {
@@ -78,10 +79,10 @@ pub trait Tangents: Sized {
         if !schedule.corners.is_empty() {
             return Err(TangentError::Broken { what: "corners" });
         }
-        let steps = self.steps(system, x0, schedule)?;
-        let laws = in_wide_room::<F, Self, _>(system, || system.wide_rows(&steps.state().point));
+        let steps = self.steps(system.as_flow(), x0, schedule)?;
+        let laws = in_wide_room::<D, Self, _>(system, || system.wide_rows(&steps.state().point));
         let (carried, sensitivity) = (Carried::start(laws), Sensitivity::default());
-        Ok(TangentSteps { steps, carried, sensitivity, jumps, largest: None })
+        Ok(TangentSteps { system, steps, carried, sensitivity, jumps, largest: None })
     }
 
     /// Runs a system over a schedule, and records the states that a [run](crate::Method::run) records, with their derivatives:
@@ -91,18 +92,18 @@ pub trait Tangents: Sized {
     /// # Errors
     ///
     /// [`TangentError`].
-    fn tangent<F>(
+    fn tangent<D>(
         self,
-        system: &F,
-        x0: Element<F>,
+        system: &D,
+        x0: Element<FlowOf<D>>,
         schedule: impl Into<Schedule>,
-    ) -> Result<TangentRun<F>, TangentError<F::Space>>
+    ) -> Result<TangentRun<FlowOf<D>>, TangentError<SpaceOf<D>>>
     where
-        F: Differentiated<Self>,
-        Self: Stepper<F>,
+        D: Differentiated<Self>,
+        Self: Stepper<FlowOf<D>>,
     {
         let steps = self.tangent_steps(system, x0, schedule)?;
-        in_wide_room::<F, Self, _>(system, || record(steps))
+        in_wide_room::<D, Self, _>(system, || record(steps))
     }
 
     /// Runs a system with its derivatives until they are as exact as `accuracy`.
@@ -118,16 +119,16 @@ pub trait Tangents: Sized {
     ///
     /// [`TangentError::Accuracy`] if the accuracy is not between `1.5e-14`, which is round-off, and 1, [`TangentError::Inexact`] if it is not reached with the smallest
     /// tolerance of the method or after twelve runs, and those of [`tangent`](Self::tangent).
-    fn tangent_to<F>(
+    fn tangent_to<D>(
         self,
-        system: &F,
-        x0: Element<F>,
+        system: &D,
+        x0: Element<FlowOf<D>>,
         schedule: impl Into<Schedule>,
         accuracy: f64,
-    ) -> Result<TangentRun<F>, TangentError<F::Space>>
+    ) -> Result<TangentRun<FlowOf<D>>, TangentError<SpaceOf<D>>>
     where
-        F: Differentiated<Self>,
-        Self: Clone + Stepper<F>,
+        D: Differentiated<Self>,
+        Self: Clone + Stepper<FlowOf<D>>,
     {
         if !(SUMMED..1.0).contains(&accuracy) {
             return Err(TangentError::Accuracy { accuracy });
@@ -137,14 +138,14 @@ pub trait Tangents: Sized {
         let mut reached = f64::INFINITY;
         for _ in 0..REFINEMENTS {
             let largest = coarse.certificate().largest_step;
-            schedule = refined(&schedule, Stepper::<F>::order(&self), largest);
+            schedule = refined(&schedule, Stepper::<FlowOf<D>>::order(&self), largest);
             let fine = self.clone().tangent(system, x0.clone(), schedule.clone());
             let mut fine = match fine {
                 Err(TangentError::Run(RunError::Span(SpanError::Tolerance { .. }))) => break,
                 fine => fine?,
             };
             let ends = [coarse.last(), fine.last()];
-            reached = difference::<F, Self>(system, &fine.states[0], ends);
+            reached = difference::<D, Self>(system, &fine.states[0], ends);
             fine.sensitivity.difference = Some(reached);
             if reached <= accuracy {
                 return Ok(fine);
@@ -158,10 +159,12 @@ pub trait Tangents: Sized {
 impl<M> Tangents for M {}
 
 /// Takes all steps that are left.
-fn record<F, M>(mut steps: TangentSteps<'_, F, M>) -> Result<TangentRun<F>, TangentError<F::Space>>
+fn record<D, M>(
+    mut steps: TangentSteps<'_, D, M>,
+) -> Result<TangentRun<FlowOf<D>>, TangentError<SpaceOf<D>>>
 where
-    F: Differentiated<M>,
-    M: Stepper<F>,
+    D: Differentiated<M>,
+    M: Stepper<FlowOf<D>>,
 {
     let mut recording = steps.steps.recording(steps.state()).map_err(RunError::from)?;
     let mut events = Vec::new();

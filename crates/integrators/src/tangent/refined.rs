@@ -4,6 +4,7 @@ use nalgebra::DVector;
 
 use super::certificate::worse;
 use super::differentiated::Differentiated;
+use super::smooth::{FlowOf, SmoothFlow as _};
 use super::state::TangentState;
 use crate::round_off::bound::SUMMED;
 use crate::run::schedule::{Schedule, Size};
@@ -42,13 +43,13 @@ pub(super) fn refined(schedule: &Schedule, order: u32, largest: f64) -> Schedule
 ///
 /// An entry of the state that is zero has no size: its row is compared with its own largest derivative, along the entries
 /// of the start that have none either, or along the others in their units.
-pub(super) fn difference<F: Differentiated<M>, M: Stepper<F>>(
-    system: &F,
-    start: &TangentState<F>,
-    [coarse, fine]: [&TangentState<F>; 2],
+pub(super) fn difference<D: Differentiated<M>, M: Stepper<FlowOf<D>>>(
+    system: &D,
+    start: &TangentState<FlowOf<D>>,
+    [coarse, fine]: [&TangentState<FlowOf<D>>; 2],
 ) -> f64 {
-    let (n, all) = (system.directions(), fine.carried.t.ncols());
-    let turn = system.turn(&coarse.point, &fine.point);
+    let (n, all) = (system.as_flow().directions(), fine.carried.t.ncols());
+    let turn = system.as_flow().turn(&coarse.point, &fine.point);
     let (rows, units) = (system.units(&fine.point), system.units(&start.point));
     let size = |column: &DVector<f64>| {
         (0..n).filter(|i| rows[*i] > 0.0).map(|i| column[i].abs() / rows[i]).fold(0.0, worse)
@@ -69,7 +70,7 @@ pub(super) fn difference<F: Differentiated<M>, M: Stepper<F>>(
     });
     columns.fold(0.0, |worst, (j, off, size, unsized_rows)| {
         // A direction on which nothing depends, or whose deviation has decayed, has a column of rounding.
-        let is_rounding = off * units[j] <= SUMMED;
+        let is_rounding = units[j] > 0.0 && off * units[j] <= SUMMED;
         let sized = if off == 0.0 || is_rounding { 0.0 } else { off / size };
         worse(worse(worst, sized), unsized_rows)
     })

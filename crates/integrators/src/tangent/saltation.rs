@@ -21,22 +21,23 @@ use super::error::{TangentError, Unlinearised};
 use super::event::TangentEvent;
 use super::explicit::NEAR;
 use super::part::Again;
+use super::smooth::{FlowOf, SmoothFlow as _, SpaceOf, VectorOf};
 use super::steps::{Inside, TangentSteps};
 use crate::run::event::Event;
 use crate::step::{Scales, Stepper};
 
-impl<F, M> TangentSteps<'_, F, M>
+impl<D, M> TangentSteps<'_, D, M>
 where
-    F: Differentiated<M>,
-    M: Stepper<F>,
+    D: Differentiated<M>,
+    M: Stepper<FlowOf<D>>,
 {
     /// Carries the tangent across the jump at the last of the events that were found.
     pub(super) fn cross(
         &mut self,
-        scales: &Scales<F::Vector>,
-        again: Option<&Again<F::Vector>>,
-        mut found: Vec<Event<F::Space>>,
-    ) -> Result<Inside<F>, TangentError<F::Space>> {
+        scales: &Scales<VectorOf<D>>,
+        again: Option<&Again<VectorOf<D>>>,
+        mut found: Vec<Event<SpaceOf<D>>>,
+    ) -> Result<Inside<FlowOf<D>>, TangentError<SpaceOf<D>>> {
         let mut inside = Inside { outputs: Vec::new(), events: Vec::new() };
         let Some(last) = self.steps.cut_step(scales) else { return Ok(inside) };
         let Some(event) = found.pop() else { return Ok(inside) };
@@ -55,10 +56,10 @@ where
         }
         let theta = (event.state.time - start) / h;
         let mut event = self.event((&last, again), scales, event, theta).map_err(failed)?;
-        let flow = self.steps.flow();
         let before = &event.state.point;
-        let (rows, units) = (flow.wide_rows(before), flow.units(before));
-        self.sensitivity.enter(&rows, &units, &event.state.carried).map_err(failed)?;
+        let (rows, units) = (self.system.wide_rows(before), self.units(before, last.h));
+        let rounding = self.rounding();
+        self.sensitivity.enter(&rows, &units, &event.state.carried, rounding).map_err(failed)?;
         let carried = self.after(&event)?;
         let reached = self.steps.state();
         let (step, time, point) = (reached.step, event.state.time, reached.point.clone());
@@ -72,18 +73,18 @@ where
     }
 
     /// The tangent after the jump at an event.
-    fn after(&self, event: &TangentEvent<F>) -> Result<Carried, TangentError<F::Space>> {
-        let (flow, time) = (self.steps.flow(), event.state.time);
+    fn after(&self, event: &TangentEvent<FlowOf<D>>) -> Result<Carried, TangentError<SpaceOf<D>>> {
+        let (system, flow, time) = (self.system, self.steps.flow(), event.state.time);
         let Some(Some(smooth)) = self.jumps.get(event.event.index) else {
             return Err(TangentError::Broken { what: "jumps without derivatives" });
         };
         let [x, y] = [&event.state.point, &self.steps.state().point];
         let at = |change: f64| Real::new(time, change, 0.0, 0.0);
         let slope = |change: f64, v: &DVector<f64>| {
-            (smooth.event)(at(change), &flow.moved_along(x, v)).eps1
+            (smooth.event)(at(change), &system.moved_along(x, v)).eps1
         };
         let map = |change: f64, v: &DVector<f64>| {
-            flow.coordinates_around(y, &(smooth.map)(at(change), &flow.moved_along(x, v)))
+            system.coordinates_around(y, &(smooth.map)(at(change), &system.moved_along(x, v)))
         };
         let (n, all) = (flow.directions(), event.state.carried.t.ncols());
         self.same_jump(event, &map(0.0, &DVector::zeros(all)))?;
@@ -91,9 +92,10 @@ where
         let rate = slope(1.0, &before);
         let unit = |k: usize| DVector::from_fn(all, |i, _| if i == k { 1.0 } else { 0.0 });
         event.crosses(rate, &DVector::from_fn(n, |i, _| slope(0.0, &unit(i))))?;
-        let after = flow
+        let after = system
             .velocity_at(y)
             .ok_or(TangentError::NotLinearised { time, cause: Unlinearised::Singular })?;
+        let powers = (flow.power_of_time(x), flow.power_of_time(y));
         let mut carried = event.state.carried.clone();
         for j in 0..all {
             let column = event.state.carried.t.column(j).into_owned();
@@ -106,8 +108,15 @@ where
                 let landed = landed.get(i).map_or(column[i], |entry| entry[1]);
                 carried.t[(i, j)] = landed - after[i] * change;
             }
+            if let Some(clock) = flow.clock() {
+                carried.t[(clock, j)] = late;
+            }
+            // A later jump leaves the power of the time at one state for that at another.
+            if let (Some((work, before)), Some((_, after))) = powers {
+                carried.t[(work, j)] += (before - after) * (late + change);
+            }
         }
-        let rows = flow.wide_rows(y);
+        let rows = system.wide_rows(y);
         carried.laws.energy = carried.t.tr_mul(&rows.energy);
         carried.laws.entropy = carried.t.tr_mul(&rows.entropy);
         for (law, df) in carried.laws.invariants.iter_mut().zip(&rows.invariants) {
@@ -119,11 +128,10 @@ where
     /// Refuses derivatives of another map than the one by which the state has jumped, entry by entry in units of the sizes of the run.
     fn same_jump(
         &self,
-        event: &TangentEvent<F>,
+        event: &TangentEvent<FlowOf<D>>,
         off: &[[f64; 2]],
-    ) -> Result<(), TangentError<F::Space>> {
-        let flow = self.steps.flow();
-        let after = flow.units(&self.steps.state().point);
+    ) -> Result<(), TangentError<SpaceOf<D>>> {
+        let after = self.system.units(&self.steps.state().point);
         let sizes: Vec<f64> = event.sizes.iter().zip(&after).map(|(a, b)| a.max(*b)).collect();
         let largest = sizes.iter().fold(0.0, |most: f64, size| most.max(*size));
         // An entry that has been zero has no size of its own.

@@ -25,6 +25,13 @@ pub trait SmoothFlow: Flow + Sized {
         None
     }
 
+    /// Computes the power `∂_t H` of the time in the energy at a state, with the direction of its work; `None` if the energy does not
+    /// depend on time.
+    fn power_of_time(&self, x: &Element<Self>) -> Option<(usize, f64)> {
+        let _ = x;
+        None
+    }
+
     /// Computes the differentials of the laws at a state, as [`Flow::laws`] has them.
     fn law_rows(&self, x: &Element<Self>) -> LawRows<DVector<f64>>;
 
@@ -50,6 +57,32 @@ pub trait SmoothFlow: Flow + Sized {
     /// Computes the coordinates of a moving state around `y`, with their first derivative. A ledger has none.
     fn coordinates(&self, y: &Element<Self>, there: &Self::Moving) -> Vec<[f64; 2]>;
 }
+
+/// A flow, or one at values of parameters.
+pub trait HasFlow {
+    /// The flow of its runs.
+    type Flow: SmoothFlow;
+
+    /// Returns the flow.
+    fn as_flow(&self) -> &Self::Flow;
+}
+
+impl<F: SmoothFlow> HasFlow for F {
+    type Flow = F;
+
+    fn as_flow(&self) -> &F {
+        self
+    }
+}
+
+/// The flow of a system.
+pub type FlowOf<D> = <D as HasFlow>::Flow;
+
+/// The space of its states.
+pub type SpaceOf<D> = <FlowOf<D> as Flow>::Space;
+
+/// A vector of it.
+pub(super) type VectorOf<D> = <FlowOf<D> as Flow>::Vector;
 
 /// The numbers of a column.
 pub(super) fn numbers<V: metriplectic_fields::Column<f64>>(v: &V) -> DVector<f64> {
@@ -107,6 +140,10 @@ impl<F: Fluctuating<U> + SmoothFlow, U> SmoothFlow for Noisy<F, U> {
 
     fn clock(&self) -> Option<usize> {
         self.flow().clock()
+    }
+
+    fn power_of_time(&self, x: &Element<F>) -> Option<(usize, f64)> {
+        self.flow().power_of_time(x)
     }
 
     fn law_rows(&self, x: &Element<F>) -> LawRows<DVector<f64>> {

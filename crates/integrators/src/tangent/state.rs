@@ -43,7 +43,7 @@ impl<F: Flow> fmt::Debug for TangentState<F> {
 
 impl<F: Flow> TangentState<F> {
     /// The numbers of directions of a state, and of all with those of the parameters.
-    fn lengths(&self) -> [usize; 2] {
+    pub(super) fn lengths(&self) -> [usize; 2] {
         let all = self.carried.t.nrows();
         [all - self.names.len(), all]
     }
@@ -74,7 +74,7 @@ impl<F: Flow> TangentState<F> {
     }
 
     /// The derivative of a function `f` of the state along start and parameters, `df T`, from its differential in the frame of the chart
-    /// at this point.
+    /// at this point, with an entry for each row of [`matrix`](Self::matrix): of an open system for clock and ledger too.
     pub fn derivative_of(&self, df: &impl Index<usize, Output = f64>) -> DVector<f64> {
         let [n, all] = self.lengths();
         DVector::from_fn(all, |j, _| {

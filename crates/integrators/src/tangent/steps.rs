@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use nalgebra::DVector;
 
+use super::beside;
 use super::certificate::Sensitivity;
 use super::columns::{Carried, Moved};
 use super::differentiated::Differentiated;
@@ -12,7 +13,9 @@ use super::error::{TangentError, Unlinearised};
 use super::event::TangentEvent;
 use super::part::{Again, Ended, Part, memory_before};
 use super::pieces::propagate;
+use super::smooth::{FlowOf, SmoothFlow as _, SpaceOf, VectorOf};
 use super::state::TangentState;
+use crate::round_off::bound::SUMMED;
 use crate::run::certificate::Certificate;
 use crate::run::ending::Ending;
 use crate::run::event::Event;
@@ -22,8 +25,8 @@ use crate::run::steps::Steps;
 use crate::step::{Element, Flow, Scales, Stepper, Vector as _};
 
 /// Does work in the room of the steps with derivatives.
-pub(super) fn in_wide_room<F: Differentiated<M>, M: Stepper<F>, T>(
-    system: &F,
+pub(super) fn in_wide_room<D: Differentiated<M>, M: Stepper<FlowOf<D>>, T>(
+    system: &D,
     f: impl FnOnce() -> T,
 ) -> T {
     let (mut f, mut result) = (Some(f), None);
@@ -32,39 +35,43 @@ pub(super) fn in_wide_room<F: Differentiated<M>, M: Stepper<F>, T>(
 }
 
 /// The means to take the next step of a run again, if steps beside it give its derivatives. The largest sizes so far are kept.
-pub(super) fn again<F: Differentiated<M>, M: Stepper<F>>(
-    steps: &Steps<'_, F, M>,
-    largest: &mut Option<F::Vector>,
-) -> Option<Again<F::Vector>> {
-    if !steps.flow().takes_steps_beside(steps.method()) {
+pub(super) fn again<D: Differentiated<M>, M: Stepper<FlowOf<D>>>(
+    system: &D,
+    steps: &Steps<'_, FlowOf<D>, M>,
+    largest: &mut Option<VectorOf<D>>,
+) -> Option<Again<VectorOf<D>>> {
+    if !system.takes_steps_beside(steps.method()) {
         return None;
     }
     let known = steps.known_sizes();
     let sizes = match largest.take() {
-        Some(largest) => F::Vector::zip([&largest, &known], |[largest, known]| largest.max(known)),
+        Some(largest) => {
+            VectorOf::<D>::zip([&largest, &known], |[largest, known]| largest.max(known))
+        }
         None => known,
     };
     *largest = Some(sizes.clone());
-    Some(Again { memory: steps.saved_memory(), sizes })
+    Some(Again { memory: steps.saved_memory(), sizes, whole: f64::NAN })
 }
 
 /// A run with its tangent, step by step; made by [`Tangents::tangent_steps`](crate::Tangents::tangent_steps).
 ///
 /// The steps are those of the run without it, bit for bit.
-pub struct TangentSteps<'a, F: Differentiated<M>, M: Stepper<F>> {
-    pub(super) steps: Steps<'a, F, M>,
+pub struct TangentSteps<'a, D: Differentiated<M>, M: Stepper<FlowOf<D>>> {
+    pub(super) system: &'a D,
+    pub(super) steps: Steps<'a, FlowOf<D>, M>,
     pub(super) carried: Carried,
     pub(super) sensitivity: Sensitivity,
     /// The derivatives of the jumps, by the number of their event.
-    pub(super) jumps: Jumps<F::MovingWide>,
+    pub(super) jumps: Jumps<D::MovingWide>,
     /// The largest sizes of the entries so far, if steps beside the others are taken.
-    pub(super) largest: Option<F::Vector>,
+    pub(super) largest: Option<VectorOf<D>>,
 }
 
 /// The jumps of a schedule with their derivatives, at points of this type.
 pub(super) type Jumps<P> = Vec<Option<Arc<SmoothJump<P>>>>;
 
-impl<F: Differentiated<M>, M: Stepper<F>> fmt::Debug for TangentSteps<'_, F, M> {
+impl<D: Differentiated<M>, M: Stepper<FlowOf<D>>> fmt::Debug for TangentSteps<'_, D, M> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("TangentSteps")
             .field("sensitivity", &self.sensitivity)
@@ -79,13 +86,13 @@ pub(super) struct Inside<F: Flow> {
     pub(super) events: Vec<TangentEvent<F>>,
 }
 
-impl<F, M> TangentSteps<'_, F, M>
+impl<D, M> TangentSteps<'_, D, M>
 where
-    F: Differentiated<M>,
-    M: Stepper<F>,
+    D: Differentiated<M>,
+    M: Stepper<FlowOf<D>>,
 {
     /// The state reached so far, with its derivatives.
-    pub fn state(&self) -> TangentState<F> {
+    pub fn state(&self) -> TangentState<FlowOf<D>> {
         let state = self.steps.state();
         self.at(state.step, state.time, state.point.clone(), self.carried.clone())
     }
@@ -109,10 +116,10 @@ where
         &self,
         step: usize,
         time: f64,
-        point: Element<F>,
+        point: Element<FlowOf<D>>,
         carried: Carried,
-    ) -> TangentState<F> {
-        let names = self.steps.flow().names().to_vec();
+    ) -> TangentState<FlowOf<D>> {
+        let names = self.system.names().to_vec();
         TangentState { step, time, point, carried, names }
     }
 
@@ -121,14 +128,13 @@ where
     /// # Errors
     ///
     /// [`TangentError`]; the state is then the last one reached.
-    pub fn advance(&mut self) -> Result<(), TangentError<F::Space>> {
-        let flow = self.steps.flow();
-        in_wide_room::<F, M, _>(flow, || self.take_step().map(drop))
+    pub fn advance(&mut self) -> Result<(), TangentError<SpaceOf<D>>> {
+        in_wide_room::<D, M, _>(self.system, || self.take_step().map(drop))
     }
 
     /// Takes one step, and returns what was asked for inside it.
-    pub(super) fn take_step(&mut self) -> Result<Inside<F>, TangentError<F::Space>> {
-        let again = again(&self.steps, &mut self.largest);
+    pub(super) fn take_step(&mut self) -> Result<Inside<FlowOf<D>>, TangentError<SpaceOf<D>>> {
+        let again = again(self.system, &self.steps, &mut self.largest);
         let scales = self.steps.scales();
         let before = self.steps.state().clone();
         self.steps.advance()?;
@@ -141,7 +147,7 @@ where
             return Ok(inside);
         }
         let failed = |cause| TangentError::NotLinearised { time: before.time, cause };
-        let flow = self.steps.flow();
+        let system = self.system;
         let last = &self.steps.last_step(&scales);
         let again = again.as_ref();
         let end = self.steps.state();
@@ -162,24 +168,25 @@ where
             inside.outputs.push(self.at(step, time, point, moved.carried));
         }
         let state = self.steps.state();
-        let ended = Ended::of_run(&state.point, last).with_again(again);
-        let next =
-            propagate(self.steps.method(), &last.start, &ended, &self.carried).map_err(failed)?;
-        let (rows, units) = (flow.wide_rows(&state.point), flow.units(&state.point));
-        self.sensitivity.enter(&rows, &units, &next.carried).map_err(failed)?;
+        let ended = Ended::of_run(&state.point, last).with_again(again, last.h);
+        let next = propagate((system, self.steps.method()), &last.start, &ended, &self.carried)
+            .map_err(failed)?;
+        let (rows, units) = (system.wide_rows(&state.point), self.units(&state.point, last.h));
+        let rounding = self.rounding();
+        self.sensitivity.enter(&rows, &units, &next.carried, rounding).map_err(failed)?;
         // One column after the other, since the definition of the step at dual numbers is dear.
         if state.step.is_power_of_two() && !last.in_parts {
             let part = Part::new(&last.start, &ended);
             let j = state.step.trailing_zeros() as usize % self.carried.t.ncols();
             let [before, after] =
                 [&self.carried.t, &next.carried.t].map(|t| t.column(j).into_owned());
-            let law = flow.second_law_error(self.steps.method(), &part, [&before, &after]);
+            let law = system.second_law_error(self.steps.method(), &part, [&before, &after]);
             self.sensitivity.enter_entropy(law);
         }
         self.sensitivity.frozen = self.steps.is_adaptive();
         self.sensitivity.undamped = self.steps.certificate().is_stiff();
-        self.sensitivity.at_rest |=
-            !flow.is_smooth_at_rest(self.steps.method()) && *last.start.x == state.point;
+        self.sensitivity.at_rest |= !system.is_smooth_at_rest(self.steps.method())
+            && self.is_same_point(last.start.x, &state.point);
         self.carried = next.carried;
         for &(_, time) in &asked[at_end..] {
             inside.outputs.push(TangentState { time, ..self.state() });
@@ -193,30 +200,54 @@ where
         self.steps.outputs().map(|state| (state.step, state.time)).collect()
     }
 
+    /// The sizes of all directions after a step of size `h`, which is that of a clock.
+    pub(super) fn units(&self, x: &Element<FlowOf<D>>, h: f64) -> DVector<f64> {
+        let mut units = self.system.units(x);
+        if let Some(clock) = self.system.as_flow().clock() {
+            units[clock] = h.abs();
+        }
+        units
+    }
+
+    /// Whether two states are the same but for the time and what is booked.
+    fn is_same_point(&self, x: &Element<FlowOf<D>>, y: &Element<FlowOf<D>>) -> bool {
+        let apart = self.system.as_flow().between(x, y);
+        apart.is_some_and(|d| (0..d.len()).all(|i| d.get(i) == 0.0))
+    }
+
+    /// The round-off of the laws of the tangent, relative to their terms.
+    pub(super) fn rounding(&self) -> f64 {
+        let is_beside = self.system.takes_steps_beside(self.steps.method());
+        if is_beside { beside::rounding() } else { SUMMED }
+    }
+
     /// The state at a fraction of the last step, by a step of that size, with its derivatives.
     pub(super) fn part(
         &self,
-        (last, again): (&LastStep<'_, F>, Option<&Again<F::Vector>>),
+        (last, again): (&LastStep<'_, FlowOf<D>>, Option<&Again<VectorOf<D>>>),
         theta: f64,
-    ) -> Result<(Element<F>, Moved), Unlinearised> {
+    ) -> Result<(Element<FlowOf<D>>, Moved), Unlinearised> {
         let (method, h) = (self.steps.method(), theta * last.h);
-        let mut memory = memory_before::<F, M>(again)?;
+        let mut memory = memory_before::<FlowOf<D>, M>(again)?;
         let taken = method.step(&last.start, h, &mut memory).map_err(|_| Unlinearised::Singular)?;
-        let ended = Ended::new(&taken, h, &memory).with_again(again);
-        let moved = propagate(method, &last.start, &ended, &self.carried)?;
+        let ended = Ended::new(&taken, h, &memory).with_again(again, last.h);
+        let moved = propagate((self.system, method), &last.start, &ended, &self.carried)?;
         Ok((taken.x, moved))
     }
 
     /// An event of the last step with its derivatives, in the frame of its own state.
     pub(super) fn event(
         &self,
-        last: (&LastStep<'_, F>, Option<&Again<F::Vector>>),
-        scales: &Scales<F::Vector>,
-        event: Event<F::Space>,
+        last: (&LastStep<'_, FlowOf<D>>, Option<&Again<VectorOf<D>>>),
+        scales: &Scales<VectorOf<D>>,
+        event: Event<SpaceOf<D>>,
         theta: f64,
-    ) -> Result<TangentEvent<F>, Unlinearised> {
+    ) -> Result<TangentEvent<FlowOf<D>>, Unlinearised> {
         let (flow, n) = (self.steps.flow(), self.steps.flow().directions());
         let (reached, Moved { mut carried, along_h: mut velocity }) = self.part(last, theta)?;
+        if velocity.iter().any(|v| v.is_nan()) {
+            return Err(Unlinearised::Branch);
+        }
         // The state of the output is not that of the step of this size, and may have another frame.
         if let Some(turn) = flow.turn(&reached, &event.state.point) {
             velocity = &turn * velocity;
@@ -225,7 +256,7 @@ where
         }
         let (step, time) = (event.state.step, event.state.time);
         let state = self.at(step, time, event.state.point.clone(), carried);
-        let (ends, reached) = (&scales.sizes, flow.units(&state.point));
+        let (ends, reached) = (&scales.sizes, self.system.units(&state.point));
         let sizes = DVector::from_fn(n, |i, _| ends.get(i).max(reached[i]));
         Ok(TangentEvent { event, state, velocity, sizes, after: None })
     }

@@ -6,6 +6,7 @@ use super::differentiated::Differentiated;
 use super::error::{TangentError, Unlinearised};
 use super::part::{Again, Ended, Part, memory_before};
 use super::pieces::parts;
+use super::smooth::{FlowOf, HasFlow, SmoothFlow, SpaceOf, VectorOf};
 use super::steps::again;
 use crate::run::certificate::Certificate;
 use crate::run::checkpoint::Checkpoint;
@@ -50,26 +51,27 @@ pub(super) struct Tape<F: Flow> {
 }
 
 /// A run on its way.
-struct Recorder<'a, F: Flow, M: Stepper<F>> {
-    steps: Steps<'a, F, M>,
+struct Recorder<'a, D: HasFlow, M: Stepper<FlowOf<D>>> {
+    system: &'a D,
+    steps: Steps<'a, FlowOf<D>, M>,
     /// The time at which it started.
     start: f64,
     /// The largest sizes of the entries so far, if steps beside the others are taken.
-    largest: Option<F::Vector>,
+    largest: Option<VectorOf<D>>,
 }
 
 /// A step with the states that the run yields in place of the one at its end.
 type Recorded<F> = (TapedStep<F>, Vec<State<<F as Flow>::Space>>);
 
-impl<F: Differentiated<M>, M: Stepper<F>> Recorder<'_, F, M> {
-    fn segment(&self) -> Segment<F::Vector> {
+impl<D: Differentiated<M>, M: Stepper<FlowOf<D>>> Recorder<'_, D, M> {
+    fn segment(&self) -> Segment<VectorOf<D>> {
         let (checkpoint, step) = (self.steps.checkpoint(), self.steps.state().step);
         Segment { largest: self.largest.clone(), checkpoint, step }
     }
 
     /// Takes one step; `None` if the run has ended before it.
-    fn advance(&mut self) -> Result<Option<Recorded<F>>, TangentError<F::Space>> {
-        let again = again(&self.steps, &mut self.largest);
+    fn advance(&mut self) -> Result<Option<Recorded<FlowOf<D>>>, TangentError<SpaceOf<D>>> {
+        let again = again(self.system, &self.steps, &mut self.largest);
         let scales = self.steps.scales();
         let again = again.as_ref();
         let before = self.steps.state().clone();
@@ -81,7 +83,7 @@ impl<F: Differentiated<M>, M: Stepper<F>> Recorder<'_, F, M> {
         let failed = |cause| TangentError::NotLinearised { time: before.time, cause };
         let (flow, method) = (self.steps.flow(), self.steps.method());
         let last = self.steps.last_step(&scales);
-        let ended = Ended::of_run(&end.point, &last).with_again(again);
+        let ended = Ended::of_run(&end.point, &last).with_again(again, last.h);
         let parts = parts(method, &last.start, &ended).map_err(failed)?;
         let until = (end.step, end.time + rounding(self.start, end.time));
         let mut step = TapedStep { time: before.time, parts, end: until, outputs: Vec::new() };
@@ -110,20 +112,21 @@ fn inside<F: Flow, M: Stepper<F>>(
 ) -> Result<(Element<F>, Vec<Part<F>>), Unlinearised> {
     let (h, mut memory) = (theta * last.h, memory_before::<F, M>(again)?);
     let taken = method.step(&last.start, h, &mut memory).map_err(|_| Unlinearised::Singular)?;
-    let parts = parts(method, &last.start, &Ended::new(&taken, h, &memory).with_again(again))?;
+    let parts =
+        parts(method, &last.start, &Ended::new(&taken, h, &memory).with_again(again, last.h))?;
     Ok((taken.x, parts))
 }
 
-impl<F: Flow> Tape<F> {
+impl<F: SmoothFlow> Tape<F> {
     /// Runs a system, and keeps at most `most` steps.
-    pub(super) fn record<M: Stepper<F>>(
+    pub(super) fn record<D, M: Stepper<F>>(
         method: M,
-        system: &F,
+        system: &D,
         (x0, schedule): (Element<F>, Schedule),
         most: usize,
     ) -> Result<Self, TangentError<F::Space>>
     where
-        F: Differentiated<M>,
+        D: Differentiated<M> + HasFlow<Flow = F>,
     {
         if !schedule.watch.events.is_empty() {
             return Err(TangentError::Broken { what: "events" });
@@ -131,10 +134,10 @@ impl<F: Flow> Tape<F> {
         if !schedule.corners.is_empty() {
             return Err(TangentError::Broken { what: "corners" });
         }
-        let steps = method.steps(system, x0, schedule.clone())?;
+        let steps = method.steps(system.as_flow(), x0, schedule.clone())?;
         let mut recording =
             steps.recording(steps.state().clone()).map_err(RunError::<F::Space>::from)?;
-        let mut recorder = Recorder { steps, start: schedule.start, largest: None };
+        let mut recorder = Recorder { system, steps, start: schedule.start, largest: None };
         let (mut segments, mut taken) = (vec![recorder.segment()], Vec::new());
         while recorder.steps.ending().is_none() {
             if taken.len() == most {
@@ -157,19 +160,23 @@ impl<F: Flow> Tape<F> {
     }
 
     /// Takes the steps between two segments again, bit for bit.
-    pub(super) fn again<M: Stepper<F>>(
+    pub(super) fn again<D, M: Stepper<F>>(
         &self,
         method: M,
-        system: &F,
+        system: &D,
         [segment, next]: [&Segment<F::Vector>; 2],
     ) -> Result<Vec<TapedStep<F>>, TangentError<F::Space>>
     where
-        F: Differentiated<M>,
+        D: Differentiated<M> + HasFlow<Flow = F>,
     {
-        let steps = method.resume(system, &segment.checkpoint)?;
+        let steps = method.resume(system.as_flow(), &segment.checkpoint)?;
         let steps = steps.watching(self.schedule.clone()).map_err(RunError::from)?;
-        let mut recorder =
-            Recorder { steps, start: self.schedule.start, largest: segment.largest.clone() };
+        let mut recorder = Recorder {
+            system,
+            steps,
+            start: self.schedule.start,
+            largest: segment.largest.clone(),
+        };
         let mut taken = Vec::with_capacity(next.step - segment.step);
         while recorder.steps.state().step < next.step {
             match recorder.advance()? {

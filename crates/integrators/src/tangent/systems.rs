@@ -1,0 +1,213 @@
+//! Systems of any kind that depend on parameters, and their derivatives along them.
+
+use std::fmt;
+use std::ops::Deref;
+
+use metriplectic_fields::Real;
+use nalgebra::{DVector, SVector};
+
+use super::beside::{self, Parameters};
+use super::columns::{Carried, LawRows, Moved};
+use super::differentiated::Differentiated;
+use super::error::Unlinearised;
+use super::part::Part;
+use super::smooth::{HasFlow, SmoothFlow};
+use crate::step::{Element, Stepper, Vector as _};
+
+/// Systems of any kind with named parameters: with ports, baths and noise, lattices, systems of your own.
+///
+/// A [member](Self::at) has [tangents](crate::Tangents) and [adjoints](crate::Adjoints) along its start and its parameters, by
+/// differences of steps beside each step, to some ten digits. Those of a [`Family`](metriplectic_dynamics::Family) are exact.
+///
+/// ```
+/// use metriplectic_dynamics::{Symplectic, System};
+/// use metriplectic_fields::Real;
+/// use metriplectic_integrators::{DormandPrince8, OpenBuilder as _, Span, Systems, Tangents as _};
+/// use metriplectic_manifolds::Euclidean;
+/// use nalgebra::{Vector1, Vector2, vector};
+/// use num_dual::DualNum as _;
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// // A mass on a spring that is pushed: how does the work depend on the stiffness?
+/// let pushed = Systems::new(["stiffness"], |t: &Vector1<f64>| {
+///     let stiffness = t.x;
+///     System::on(Euclidean::<2>)
+///         .bracket(Symplectic)
+///         .energy(move |x: &Vector2<Real>| (x.x * x.x * stiffness + x.y * x.y) * 0.5)
+///         .work("push", |t: Real, _: &Vector2<Real>| vector![Real::from(0.0), t.sin()])
+///         .build()
+/// });
+/// let system = pushed.at(vector![2.0])?;
+/// let start = system.start(vector![1.0, 0.0]);
+/// let run = DormandPrince8.tangent(&system, start, Span::until(5.0).tolerance(1e-9))?;
+/// println!("∂x/∂k = {}", run.last().along("stiffness").unwrap());
+/// let work = run.last().work_along("push").unwrap();
+/// println!("∂W/∂k = {}", work[work.len() - 1]);
+/// # assert!(work[work.len() - 1].abs() > 0.01);
+/// # Ok(())
+/// # }
+/// ```
+#[derive(Clone, Copy, Debug)]
+pub struct Systems<B, const P: usize> {
+    names: [&'static str; P],
+    build: B,
+}
+
+impl<B, const P: usize> Systems<B, P> {
+    /// Systems with these parameters: `build` makes the system at values of them.
+    pub const fn new(names: [&'static str; P], build: B) -> Self {
+        Self { names, build }
+    }
+
+    /// The names of the parameters.
+    pub const fn names(&self) -> &[&'static str; P] {
+        &self.names
+    }
+
+    /// Builds the system at values of the parameters.
+    ///
+    /// # Errors
+    ///
+    /// The error of the closure.
+    pub fn build<S, E>(&self, theta: &SVector<f64, P>) -> Result<S, E>
+    where
+        B: Fn(&SVector<f64, P>) -> Result<S, E>,
+    {
+        (self.build)(theta)
+    }
+
+    /// Builds the system at values of the parameters, whose runs have derivatives along them.
+    ///
+    /// A tangent builds systems at parameters some 10⁻⁵ of their sizes away. What a closure of the schedule captures, as that of a
+    /// jump, stays as it is: write there what depends on parameters by [`differentiable`](crate::Jumping::differentiable), whose
+    /// maps take the state and the parameters.
+    ///
+    /// # Errors
+    ///
+    /// The error of the closure.
+    pub fn at<S, E>(&self, theta: SVector<f64, P>) -> Result<SystemAt<'_, S>, E>
+    where
+        B: Fn(&SVector<f64, P>) -> Result<S, E>,
+    {
+        let system = (self.build)(&theta)?;
+        let beside = move |by: &[f64]| {
+            let displaced = theta + SVector::from_column_slice(by);
+            (self.build)(&displaced).map_err(drop)
+        };
+        let values = theta.as_slice().to_vec();
+        Ok(SystemAt { system, names: &self.names, values, beside: Box::new(beside) })
+    }
+}
+
+/// The system beside one, by what its parameters are displaced.
+type SystemBeside<'a, S> = Box<dyn Fn(&[f64]) -> Result<S, ()> + 'a>;
+
+/// A system of any kind at values of parameters; made by [`Systems::at`].
+pub struct SystemAt<'a, S> {
+    system: S,
+    names: &'a [&'static str],
+    values: Vec<f64>,
+    beside: SystemBeside<'a, S>,
+}
+
+impl<S> Deref for SystemAt<'_, S> {
+    type Target = S;
+
+    fn deref(&self) -> &S {
+        &self.system
+    }
+}
+
+impl<S> fmt::Debug for SystemAt<'_, S> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("SystemAt")
+            .field("names", &self.names)
+            .field("values", &self.values)
+            .finish_non_exhaustive()
+    }
+}
+
+impl<S> Parameters<S> for SystemAt<'_, S> {
+    fn values(&self) -> &[f64] {
+        &self.values
+    }
+
+    fn displaced(&self, by: &[f64]) -> Result<S, Unlinearised> {
+        (self.beside)(by).map_err(|()| Unlinearised::NoSystem)
+    }
+}
+
+impl<S> SystemAt<'_, S> {
+    /// Refuses parameters without a size.
+    fn sized(&self) -> Result<(), Unlinearised> {
+        let zero = self.values.iter().position(|value| value.abs() == 0.0 || value.is_nan());
+        zero.map_or(Ok(()), |k| Err(Unlinearised::ZeroParameter { name: self.names[k] }))
+    }
+}
+
+impl<S: SmoothFlow> HasFlow for SystemAt<'_, S> {
+    type Flow = S;
+
+    fn as_flow(&self) -> &S {
+        &self.system
+    }
+}
+
+/// By differences of steps.
+impl<S: SmoothFlow, M: Stepper<S>> Differentiated<M> for SystemAt<'_, S> {
+    type MovingWide = (S::Moving, Vec<Real>);
+
+    fn names(&self) -> &[&'static str] {
+        self.names
+    }
+
+    fn wide_rows(&self, x: &Element<S>) -> LawRows<DVector<f64>> {
+        let unknown = |row: &DVector<f64>| {
+            row.clone().resize_vertically(row.len() + self.values.len(), f64::NAN)
+        };
+        let known = beside::law_rows(&self.system, self, x);
+        known.unwrap_or_else(|_| self.system.law_rows(x).map(unknown))
+    }
+
+    fn units(&self, x: &Element<S>) -> DVector<f64> {
+        let sizes = self.system.sizes(x).to_list();
+        let values = self.values.iter().map(|value| value.abs());
+        DVector::from_vec(sizes.into_iter().chain(values).collect())
+    }
+
+    fn propagate(
+        &self,
+        method: &M,
+        step: &Part<S>,
+        carried: &Carried,
+    ) -> Result<Moved, Unlinearised> {
+        self.sized()?;
+        beside::propagate((&self.system, method, self), step, carried)
+    }
+
+    fn pull_back(
+        &self,
+        method: &M,
+        step: &Part<S>,
+        costate: &DVector<f64>,
+    ) -> Result<DVector<f64>, Unlinearised> {
+        self.sized()?;
+        beside::pull_back((&self.system, method, self), step, costate)
+    }
+
+    fn moved_along(&self, x: &Element<S>, v: &DVector<f64>) -> Self::MovingWide {
+        let n = self.system.directions();
+        let parameter = |(k, value): (usize, &f64)| Real::new(*value, v[n + k], 0.0, 0.0);
+        let parameters = self.values.iter().enumerate().map(parameter).collect();
+        (self.system.moving(x, &v.rows(0, n).into_owned()), parameters)
+    }
+
+    fn coordinates_around(&self, y: &Element<S>, (there, _): &Self::MovingWide) -> Vec<[f64; 2]> {
+        self.system.coordinates(y, there)
+    }
+
+    fn velocity_at(&self, x: &Element<S>) -> Option<DVector<f64>> {
+        let zero = self.system.sizes(x).zero();
+        let rates = DVector::from_vec(self.system.rates(x, &zero)?.to_list());
+        Some(rates.resize_vertically(self.system.directions() + self.values.len(), 0.0))
+    }
+}

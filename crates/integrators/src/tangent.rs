@@ -20,6 +20,8 @@
 //! | [`Scheme`](crate::Scheme) with [`SelfAdjoint`] parts, or such a retraction alone | two linearisations of its own equation, from either end |
 //! | [`DormandPrince5`](crate::DormandPrince5), [`DormandPrince8`](crate::DormandPrince8), [`RungeKuttaChebyshev`](crate::RungeKuttaChebyshev), [`ExplicitRungeKutta`](crate::ExplicitRungeKutta) | stages and projection at dual numbers |
 //! | [`Gauss`](crate::Gauss), [`Radau`](crate::Radau) | the implicit function theorem at the root, with its residual at dual numbers |
+//! | these of a [model](metriplectic_equations::Model) in plain numbers on a vector space | the same, with the derivatives of the model |
+//! | of any other kind of system: open, noisy, a lattice, at [values of parameters](Systems) | differences of steps beside the step, to some ten digits |
 //!
 //! A loss over a run has a gradient by the transposed steps ([`Adjoints`]), whatever the number of parameters.
 //!

@@ -516,3 +516,32 @@ fn an_open_lattice_without_implicit_steps_is_refused() {
     };
     assert_eq!(error.downcast_ref(), Some(&NoImplicitSteps::Space));
 }
+
+/// A bath that is below zero inside a step, and one whose temperature is known from a time on.
+#[test]
+fn temperatures_are_asked_for_where_the_force_acts() {
+    let bath = |temperature: fn(Real) -> Real| {
+        Lattice::on(Graph::chain(3), Euclidean::<2>)
+            .bracket(Symplectic)
+            .energy(|x: &Vector2<Real>| (x.x * x.x + x.y * x.y) * 0.5)
+            .build()
+            .expect("it is a lattice")
+            .opened()
+            .bath("air", temperature, [1], |_, _: &SiteState<'_, Euclidean<2>>| {
+                [Onsager { rate: 0.3, b: vector![0.0, 1.0] }]
+            })
+    };
+    let start = |site: usize| vector![1.0 + site as f64, 0.5];
+    let cold = bath(|t| Real::from(if (t.re - 0.05).abs() < 0.049 { -1.0 } else { 1.0 }));
+    let x0 = cold.start(cold.lattice().points(start));
+    let error = WeylMidpoint.run(&cold, x0, Span::steps(0.1, 1)).expect_err("it is below zero");
+    assert!(matches!(error, RunError::Step { .. }), "{error}");
+    let late = bath(|t| {
+        assert!(t.re >= 5.0, "before the table");
+        t * 0.2
+    });
+    let x0 = late.start(late.lattice().points(start));
+    let run = Radau::<2>.run(&late, x0, Span::steps(0.1, 20).starting_at(5.0)).expect("it runs");
+    let certificate = run.certificate();
+    assert!(certificate.keeps_energy() && certificate.keeps_entropy(), "{certificate}");
+}

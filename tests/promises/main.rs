@@ -410,10 +410,12 @@ fn refusal(cell: &Cell) -> Option<&'static str> {
 
 /// The largest error of a run with steps of one size, of twice what is measured or more; from rest the explicit methods
 /// lose an order, as `book/src/open_systems.md` says.
-fn bound(method: Every) -> f64 {
+fn bound(kind: Kind, method: Every) -> f64 {
     match method {
         Every::OneStage(OneStage::Exponential) => 1e-2,
-        Every::OneStage(OneStage::ItohAbe) => 6e-3,
+        Every::OneStage(OneStage::ItohAbe) if matches!(kind, Kind::Lattice | Kind::OpenLattice) => {
+            6e-3
+        }
         Every::OneStage(_) | Every::Implicit(Gauss1) => 1e-3,
         Every::Implicit(Gauss2) => 2e-6,
         Every::Implicit(Gauss3) => 2e-10,
@@ -466,8 +468,8 @@ fn judged(cell: &Cell, farthest: &mut [f64; 2]) -> Result<Verdict, String> {
         return Err(format!("it ends at {}", ran.time));
     }
     let bound = match course {
-        Course::Fixed if start == Start::Stiff => bound(method).max(DAMPED),
-        Course::Fixed => bound(method),
+        Course::Fixed if start == Start::Stiff => bound(kind, method).max(DAMPED),
+        Course::Fixed => bound(kind, method),
         Course::Tolerance => OF_TOLERANCE * tolerance(method),
     };
     if worst <= bound {

@@ -8,7 +8,7 @@ use crate::{Equations, MetricError, SecondLaw};
 pub enum Part {
     /// `Π α`, which may depend on the covector of the entropy.
     Reversible,
-    /// The gyroscopic force `f(w)`: it does no work.
+    /// The gyroscopic force `f(w)`: it does no work, but for that of ports and baths, which are booked.
     Gyroscopic,
     /// `K_w α`, which annihilates the covector `w` of the energy.
     Irreversible,

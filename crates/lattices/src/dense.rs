@@ -148,7 +148,7 @@ fn in_numbers<P: Model, T>(lattice: &Lattice<P>, f: impl FnOnce(&Plain<'_>) -> T
 }
 
 /// Writes the laws of a lattice.
-pub(crate) fn written(laws: &Laws<Vec<f64>>) -> Laws<Values> {
+fn written(laws: &Laws<Vec<f64>>) -> Laws<Values> {
     let &Laws { energy, entropy, ref invariants } = laws;
     Laws { energy, entropy, invariants: Values::of(invariants) }
 }

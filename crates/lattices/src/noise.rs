@@ -87,12 +87,12 @@ impl<P: Model> Lattice<P> {
         let largest = self.largest_sizes(x);
         let others = (0..dimension::<P>()).map(|k| largest[k]).fold(0.0, f64::max);
         let unit = if others > 0.0 { others } else { 1.0 };
-        let (all, totals) = self.differentials::<true>(x);
+        let (_, totals) = self.differentials::<true>(x);
         let mean = totals.energy.size / self.sites() as f64;
         let distance = |k: usize| {
             let y = P::Manifold::chart(&x[0], &(VectorOf::<P>::basis(k) * unit));
             let slope = |df: VectorOf<P>| df[k];
-            let bend = slope(self.parts.energy(0, &y).df) - slope(all.reader::<P>().at(0)[0]);
+            let bend = slope(self.parts.energy(0, &y).df) - slope(self.parts.energy(0, &x[0]).df);
             let distance = (2.0 * mean * unit / bend.abs()).sqrt();
             if distance > 0.0 && distance.is_finite() { distance } else { unit }
         };
@@ -233,7 +233,8 @@ impl<P: Model<Manifold: Flat>> Fluctuating<Uniform> for Lattice<P> {
         if P::BOND_ENERGY || P::EnergyGather::PRESENT || P::EntropyGather::PRESENT {
             return Err(NoiseError::BondsHaveEnergies);
         }
-        self.keep_volume(x, |_, site, y| self.parts.energy(site, y).df)
+        let energy = |site: usize, y: &PointOf<P>| self.parts.energy(site, y).df;
+        self.start_and_near(x).iter().try_for_each(|x| self.keep_volume(x, energy))
     }
 }
 
@@ -259,8 +260,14 @@ impl<P: Model> Judged for Lattice<P> {
 }
 
 impl<P: Model<Manifold: Flat>> Lattice<P> {
-    /// Verifies at the start and near it that the reversible motion of each site keeps the volume, with the differential `w` of the
-    /// energy there.
+    /// The start and a state near it: the divergence of a motion may vanish at the start by a symmetry.
+    pub(crate) fn start_and_near(&self, x: &Points<P::Manifold>) -> [Points<P::Manifold>; 2] {
+        let sizes = self.sizes_of_differences(x);
+        let (y, _) = self.near(x, &self.vector_of(|site| own_or::<P>(&x[site], &sizes)), MOVED);
+        [x.clone(), y]
+    }
+
+    /// Verifies that the reversible motion of each site keeps the volume, with the differential `w` of the energy there.
     ///
     /// # Errors
     ///
@@ -268,16 +275,11 @@ impl<P: Model<Manifold: Flat>> Lattice<P> {
     pub(crate) fn keep_volume(
         &self,
         x: &Points<P::Manifold>,
-        w: impl Fn(&[PointOf<P>], usize, &PointOf<P>) -> VectorOf<P>,
+        w: impl Fn(usize, &PointOf<P>) -> VectorOf<P>,
     ) -> Result<(), NoiseError> {
-        // The divergence may vanish at the start by a symmetry.
         let sizes = self.sizes_of_differences(x);
-        let (y, _) = self.near(x, &self.vector_of(|site| own_or::<P>(&x[site], &sizes)), MOVED);
-        [x, &y].into_iter().try_for_each(|x| {
-            let sizes = self.sizes_of_differences(x);
-            let keeps = |site| self.keeps_volume(site, (&x[site], &sizes), |y| w(x, site, y));
-            (0..self.sites()).try_for_each(keeps)
-        })
+        let keeps = |site| self.keeps_volume(site, (&x[site], &sizes), |y| w(site, y));
+        (0..self.sites()).try_for_each(keeps)
     }
 }
 

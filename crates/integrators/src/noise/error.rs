@@ -90,8 +90,8 @@ pub enum NoiseError {
     InvariantsInABath,
     /// A lattice has energies of bonds, or gathers over them.
     #[error(
-        "the kinetic drift of a lattice is known where its energy and its entropy are sums over sites, and this one has \
-         energies of bonds, or gathers over them"
+        "the kinetic drift of a lattice with friction of its own is known where its energy and its entropy are sums over sites, and that of \
+         baths where nothing is gathered; this one has energies of bonds, or gathers over them"
     )]
     BondsHaveEnergies,
     /// Steps follow a tolerance.

@@ -66,8 +66,11 @@ pub trait OpenFlow: Flow<Space: StateSpace<Element = OpenState<Self::Point>>> {
     fn laws_of_point(&self, x: &Self::Point) -> Laws<Self::Numbers>;
 
     /// Sums the effects of ports and baths at a time, at a point with these covectors of energy and entropy. `None` where they have
-    /// no value.
+    /// no value, or a temperature is negative.
     fn exchanged(&self, t: f64, x: &[f64], w: [&[f64]; 2]) -> Option<Exchanged>;
+
+    /// The number of baths.
+    fn bath_count(&self) -> usize;
 
     /// The temperature of each bath at a time, with the index of its heat among the entries of the ledger.
     fn baths(&self, t: f64) -> Vec<(usize, f64)>;
@@ -398,7 +401,7 @@ fn damps<F: OpenFlow>(method: &Collocation, flow: &F) -> Result<(), MethodError>
     }
     let has_entropy =
         flow.with_equations(|equations| equations.second_law() != SecondLaw::NoEntropy);
-    let baths = flow.baths(0.0).len();
+    let baths = flow.bath_count();
     if has_entropy || baths != 1 { Err(MethodError::new(NotDamped)) } else { Ok(()) }
 }
 

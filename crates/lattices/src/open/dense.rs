@@ -142,9 +142,16 @@ impl<P: Model> OpenFlow for OpenLattice<P> {
     }
 
     fn exchanged(&self, t: f64, x: &[f64], w: [&[f64]; 2]) -> Option<Exchanged> {
+        if self.baths(t).iter().any(|(_, temperature)| *temperature < 0.0) {
+            return None;
+        }
         let OfParts { entries, production, .. } = Driven(self).exchanged(t, x, w);
         let is_finite = production.is_finite() && entries.iter().all(|rate| rate.is_finite());
         is_finite.then_some(Exchanged { entries, production })
+    }
+
+    fn bath_count(&self) -> usize {
+        self.parts.iter().filter(|part| part.is_bath()).count()
     }
 
     fn baths(&self, t: f64) -> Vec<(usize, f64)> {

@@ -342,7 +342,10 @@ impl<P: Model<Manifold: Flat>> Fluctuating<Uniform> for OpenLattice<P> {
         if self.own_terms() > 0 {
             return Ok(());
         }
-        self.lattice.keep_volume(&x.x, |x, site, y| Around::of(&self.lattice, x).energy(site, y))
+        self.lattice.start_and_near(&x.x).iter().try_for_each(|x| {
+            let around = Around::of(&self.lattice, x);
+            self.lattice.keep_volume(x, |site, y| around.energy(site, y))
+        })
     }
 }
 

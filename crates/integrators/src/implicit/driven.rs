@@ -18,7 +18,7 @@ use crate::numbers::AtRunTime;
 use crate::step::failure::{Cause, Fallbacks};
 use crate::step::{Directions, Effort, Entries, Evidence, Laws, Memory, Values};
 
-/// Where a step starts.
+/// The start of a step of a driven model.
 pub(crate) struct DrivenStart<'a> {
     pub(crate) model: &'a dyn Model,
     pub(crate) x: &'a Entries,

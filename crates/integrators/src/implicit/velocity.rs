@@ -159,7 +159,7 @@ struct Linearisation<'a, L: Lengths> {
     /// The derivative of the point, a multiple of the identity.
     dz: f64,
     w: &'a OfLaws<WithJacobian<L>>,
-    /// Whether the derivatives of a friction along the covector of the entropy are asked for, which Newton's method leaves out.
+    /// Says whether the derivatives of a friction along the covector of the entropy are asked for, which Newton's method leaves out.
     is_whole: bool,
 }
 

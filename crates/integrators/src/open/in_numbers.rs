@@ -94,7 +94,7 @@ pub trait OpenSteps {
         Control::of_order(self.order())
     }
 
-    /// Whether the method damps.
+    /// Returns whether the method damps.
     fn damps(&self) -> bool {
         false
     }

@@ -56,11 +56,11 @@ pub(super) trait Parameters<F> {
     ///
     /// # Errors
     ///
-    /// [`Unlinearised::NoSystem`] if there is none.
+    /// [`Unlinearised::NoSystem`] if the closure of the system refuses them.
     fn displaced(&self, by: &[f64]) -> Result<F, Unlinearised>;
 }
 
-/// Those of a system that has none.
+/// The parameters of a system without parameters.
 pub(super) struct NoParameters;
 
 impl<F> Parameters<F> for NoParameters {

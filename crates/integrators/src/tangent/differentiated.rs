@@ -23,8 +23,8 @@ use crate::step::{Compiled, Dim, Element, Flow as _, Stepper, Vector as _};
 /// of all directions.
 ///
 /// The derivatives of a step are exact for systems in types and, as far as its own derivatives are, for a
-/// [model](metriplectic_equations::Model) on a vector space. For any other kind of system they are formed by differences of steps beside it, as in the defaults here: with the same size, the same
-/// random numbers and the same branch of the method, to two thirds of the digits.
+/// [model](metriplectic_equations::Model) on a vector space. For any other kind of system they are formed by differences of steps beside
+/// it, as in the defaults here: with the same size, the same random numbers and the same branch of the method, to some ten digits.
 ///
 /// Laws: those of [`Linearised`].
 #[diagnostic::on_unimplemented(

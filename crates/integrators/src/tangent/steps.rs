@@ -209,7 +209,7 @@ where
         units
     }
 
-    /// Whether two states are the same but for the time and what is booked.
+    /// Returns whether two states are the same but for the time and what is booked.
     fn is_same_point(&self, x: &Element<FlowOf<D>>, y: &Element<FlowOf<D>>) -> bool {
         let apart = self.system.as_flow().between(x, y);
         apart.is_some_and(|d| (0..d.len()).all(|i| d.get(i) == 0.0))

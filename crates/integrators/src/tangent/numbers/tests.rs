@@ -102,7 +102,7 @@ fn in_units(j: &DMatrix<f64>, units: &DVector<f64>) -> DMatrix<f64> {
     DMatrix::from_fn(j.nrows(), j.ncols(), |r, c| j[(r, c)] * units[c] / units[r])
 }
 
-/// A direction that is none of the axes, in units of the entries.
+/// A direction with a component along each axis, in units of the entries.
 fn some(units: &DVector<f64>, phase: f64) -> DVector<f64> {
     DVector::from_fn(units.len(), |i, _| units[i] * (phase + 1.3 * i as f64).sin())
 }

@@ -62,7 +62,7 @@ impl Heating<'_> {
         if follows { Err(Unlinearised::Branch) } else { Ok(fraction) }
     }
 
-    /// Whether friction vanishes at every stage.
+    /// Says whether friction vanishes at every stage.
     fn is_reversible(&self, stages: &[Stage]) -> Result<bool, Unlinearised> {
         for stage in stages {
             let [_, friction] = stage.velocity(&self.around.parts)?;

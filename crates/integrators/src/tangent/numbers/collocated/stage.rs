@@ -41,7 +41,7 @@ impl Flat {
     }
 }
 
-/// Where a stage is, with its covectors.
+/// The state of a stage, with its covectors.
 pub(super) struct Stage {
     pub(super) place: Entries,
     /// The derivative of the place.

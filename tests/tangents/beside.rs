@@ -382,6 +382,31 @@ fn entries_whose_size_is_no_scale_have_digits() {
     assert!((found / exact - 1.0).abs() < 1e-6, "{found} {exact}");
 }
 
+/// An explicit step that has left an open system at rest says so, though its clock has moved.
+#[test]
+fn steps_from_rest_of_open_systems_are_marked() {
+    let sprung = System::on(Euclidean::<2>)
+        .bracket(Symplectic)
+        .energy(|x: &Vector2<Real>| ((x.x - 1.0) * (x.x - 1.0) + x.y * x.y) * 0.5)
+        .bath(
+            "air",
+            Bath::at(2.0).friction(|_, _: &Vector2<Real>, _: &Vector2<Real>| {
+                [Contact { rate: Real::from(0.3), along: Vector2::<Real>::y() }]
+            }),
+        )
+        .build()
+        .unwrap();
+    let run = |place: f64, is_at_rest: bool| {
+        let start = sprung.start(vector![place, 0.0]);
+        let run = DormandPrince8.tangent(&sprung, start, Span::steps(0.1, 3)).unwrap();
+        assert_eq!(run.sensitivity().at_rest, is_at_rest, "{place}");
+        run.last().matrix().view((0, 0), (2, 2)).into_owned()
+    };
+    // The motion is linear, so its derivatives do not depend on the start.
+    let error = off(&run(1.0, true), &run(1.5, false));
+    assert!(error < 1e-9, "{error:e}");
+}
+
 /// Compares the tangent across the impacts of a ball with differences of runs that find their own times of impact, along each
 /// direction of the point and along the clock.
 fn bounces<F>(name: &str, flow: &F, x0: &Element<F>, floor: impl Fn(Until) -> Schedule)
